@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the firmware asks of a CAN controller. Frames are copied; the port owns filters, bit timing and bus-off recovery.
+#pragma once
+
+#include "base/can_frame.hpp"
+
+#include <concepts>
+#include <cstdint>
+#include <optional>
+
+namespace tetap::hal {
+
+/// What went wrong on the controller's side, counted since start, never reset.
+struct CanFaults {
+  std::uint32_t rx_overflow = 0;  ///< frames the controller or the socket had to drop
+  std::uint32_t tx_full = 0;      ///< frames send() refused
+  std::uint32_t bus_off = 0;      ///< times the controller left the bus, or the interface was down
+};
+
+template <class B>
+concept CanBus = requires(B& bus, const B& view, const base::CanFrame& frame) {
+  /// Takes the frame for transmission, in order; false: no room, the frame is not taken.
+  { bus.send(frame) } -> std::same_as<bool>;
+  /// The next received frame, in order of arrival; empty: none now. Never waits.
+  { bus.receive() } -> std::same_as<std::optional<base::CanFrame>>;
+  /// Called once at the end of each poll: hands on what send() collected (batched system calls, transmit FIFO).
+  { bus.flush() } -> std::same_as<void>;
+  { view.faults() } -> std::same_as<CanFaults>;
+};
+
+}  // namespace tetap::hal
