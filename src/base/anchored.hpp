@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+// A coordinate as integer anchor plus small float offset: the float keeps micrometres however far the origin is, and the filter
+// arithmetic stays in float.
+#pragma once
+
+#include <cstdint>
+
+namespace tetap::base {
+
+/// Micrometres as metres, in two exactly representable parts; |um| up to 2^31 m.
+[[nodiscard]] constexpr float metres(std::int64_t um) {
+  constexpr std::int64_t kPerMetre = 1'000'000;
+  const std::int64_t whole = um / kPerMetre;
+  if (whole > 2'000'000'000 || whole < -2'000'000'000) return whole > 0 ? 2e9F : -2e9F;
+  return static_cast<float>(static_cast<std::int32_t>(whole)) +
+         static_cast<float>(static_cast<std::int32_t>(um % kPerMetre)) * 1e-6F;
+}
+
+/// Metres as micrometres, rounded to nearest; saturates at +-2000 m (callers hold offsets below 256 m). NaN gives 0.
+[[nodiscard]] constexpr std::int64_t micrometres(float m) {
+  const float bounded = m > 2000.0F ? 2000.0F : m < -2000.0F ? -2000.0F : m == m ? m : 0.0F;
+  const float um = bounded * 1e6F;
+  return static_cast<std::int32_t>(um < 0.0F ? um - 0.5F : um + 0.5F);
+}
+
+/// Axis coordinate. Invariant after settle(): |offset_m| <= 128.
+struct Anchored {
+  std::int64_t anchor_um = 0;
+  float offset_m = 0;
+
+  static constexpr Anchored from_um(std::int64_t um) { return Anchored{.anchor_um = um, .offset_m = 0}; }
+
+  /// This coordinate moved by d metres.
+  [[nodiscard]] constexpr Anchored plus(float d_m) const {
+    Anchored moved{.anchor_um = anchor_um, .offset_m = offset_m + d_m};
+    moved.settle();
+    return moved;
+  }
+  /// This minus other, in metres.
+  [[nodiscard]] constexpr float minus(const Anchored& other) const {
+    return metres(anchor_um - other.anchor_um) + (offset_m - other.offset_m);
+  }
+  [[nodiscard]] constexpr std::int64_t um() const { return anchor_um + micrometres(offset_m); }
+
+ private:
+  /// Moves the anchor so that the offset is small again. The step 256 m is exact in float and in micrometres, and x - 256 is exact
+  /// for x in [128, 512] (Sterbenz), so no bit of the position is lost. A jump beyond is re-anchored whole.
+  constexpr void settle() {
+    constexpr float kStep_m = 256.0F;
+    constexpr std::int64_t kStep_um = 256'000'000;
+    if (offset_m > 384.0F || offset_m < -384.0F) {
+      const std::int64_t whole_um = micrometres(offset_m);
+      anchor_um += whole_um;
+      offset_m = 0.0F;
+    } else if (offset_m > 128.0F) {
+      anchor_um += kStep_um;
+      offset_m -= kStep_m;
+    } else if (offset_m < -128.0F) {
+      anchor_um -= kStep_um;
+      offset_m += kStep_m;
+    }
+  }
+};
+
+}  // namespace tetap::base

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a filter asks of a state and of its models. A state lives on a manifold: x.plus(dx) moves it by an error vector,
+// x.minus(other) is the error vector that leads from other to x. Dense vectors are the trivial case.
+#pragma once
+
+#include "filter/symmetric.hpp"
+
+#include <array>
+#include <concepts>
+
+namespace tetap::filter {
+
+template <class S>
+concept State = requires(const S& x, const Vector<typename S::Scalar, S::kErrors>& dx) {
+  { x.plus(dx) } -> std::same_as<S>;
+  { x.minus(x) } -> std::same_as<Vector<typename S::Scalar, S::kErrors>>;
+};
+
+/// x+ = predict(x), with F = d predict / d error state and the process noise Q added over the step.
+template <class M, class S>
+concept MotionModel = State<S> && requires(const M& model, const S& x) {
+  { model.predict(x) } -> std::same_as<S>;
+  { model.jacobian(x) } -> std::same_as<Matrix<typename S::Scalar, S::kErrors, S::kErrors>>;
+  { model.noise(x) } -> std::same_as<Symmetric<typename S::Scalar, S::kErrors>>;
+};
+
+/// A model holds one measurement z. kTouches names the error states its Jacobian has columns for, so that a sparse update costs what
+/// it must. residual() is z minus z_hat, wrapped where a component is an angle. noise() are variances of independent components.
+template <class M, class S>
+concept MeasurementModel = State<S> && requires(const M& model, const S& x, const Vector<typename S::Scalar, M::kDimension>& z_hat) {
+  { model.predict(x) } -> std::same_as<Vector<typename S::Scalar, M::kDimension>>;
+  { model.residual(z_hat) } -> std::same_as<Vector<typename S::Scalar, M::kDimension>>;
+  { model.noise() } -> std::same_as<Vector<typename S::Scalar, M::kDimension>>;
+  { model.jacobian(x) } -> std::same_as<Matrix<typename S::Scalar, M::kDimension, static_cast<int>(M::kTouches.size())>>;
+};
+
+/// A state that is just N numbers.
+template <class Scalar_, int N>
+struct VectorState {
+  using Scalar = Scalar_;
+  static constexpr int kErrors = N;
+  Vector<Scalar, N> value = Vector<Scalar, N>::Zero();
+
+  [[nodiscard]] VectorState plus(const Vector<Scalar, N>& dx) const { return {value + dx}; }
+  [[nodiscard]] Vector<Scalar, N> minus(const VectorState& other) const { return value - other.value; }
+};
+
+}  // namespace tetap::filter

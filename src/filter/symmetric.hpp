@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: Apache-2.0
+// A covariance that is symmetric because only its upper half exists.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+
+namespace tetap::filter {
+
+template <class Scalar, int N>
+using Vector = Eigen::Matrix<Scalar, N, 1>;
+
+template <class Scalar, int Rows, int Columns>
+using Matrix = Eigen::Matrix<Scalar, Rows, Columns>;
+
+template <class Scalar_, int N>
+class Symmetric {
+ public:
+  using Scalar = Scalar_;
+  static constexpr int kSize = N;
+
+  constexpr Symmetric() = default;
+  static constexpr Symmetric diagonal(const std::array<Scalar, N>& variances) {
+    Symmetric result;
+    for (int i = 0; i < N; ++i) result(i, i) = variances[static_cast<std::size_t>(i)];
+    return result;
+  }
+  /// The upper half of a square matrix; what is below the diagonal is not looked at.
+  static Symmetric upper_of(const Matrix<Scalar, N, N>& full) {
+    Symmetric result;
+    for (int c = 0; c < N; ++c)
+      for (int r = 0; r <= c; ++r) result(r, c) = full(r, c);
+    return result;
+  }
+
+  [[nodiscard]] constexpr Scalar operator()(int r, int c) const { return packed_[index(r, c)]; }
+  [[nodiscard]] constexpr Scalar& operator()(int r, int c) { return packed_[index(r, c)]; }
+  [[nodiscard]] constexpr const auto& packed() const { return packed_; }
+
+  [[nodiscard]] Matrix<Scalar, N, N> dense() const {
+    Matrix<Scalar, N, N> full;
+    for (int c = 0; c < N; ++c)
+      for (int r = 0; r < N; ++r) full(r, c) = (*this)(r, c);
+    return full;
+  }
+
+  /// True when an L L^T factor with pivots above zero exists (and so no entry is NaN).
+  [[nodiscard]] bool positive_definite() const {
+    Symmetric l = *this;
+    for (int j = 0; j < N; ++j) {
+      for (int i = 0; i < j; ++i) {
+        Scalar sum = l(i, j);
+        for (int k = 0; k < i; ++k) sum -= l(k, i) * l(k, j);
+        l(i, j) = sum / l(i, i);
+      }
+      Scalar pivot = l(j, j);
+      for (int k = 0; k < j; ++k) pivot -= l(k, j) * l(k, j);
+      if (!(pivot > Scalar{0}) || !(pivot < Scalar{1e30F})) return false;
+      l(j, j) = __builtin_sqrtf(pivot);
+    }
+    return true;
+  }
+
+ private:
+  static constexpr std::size_t index(int r, int c) {
+    const int low = r < c ? r : c;
+    const int high = r < c ? c : r;
+    return static_cast<std::size_t>(high * (high + 1) / 2 + low);
+  }
+  std::array<Scalar, static_cast<std::size_t>(N) * (N + 1) / 2> packed_{};
+};
+
+/// F P F^T + Q, upper half only.
+template <class Scalar, int N>
+[[nodiscard]] Symmetric<Scalar, N> propagate(const Symmetric<Scalar, N>& p, const Matrix<Scalar, N, N>& f,
+                                             const Symmetric<Scalar, N>& q) {
+  const Matrix<Scalar, N, N> fp = f.lazyProduct(p.dense());
+  Symmetric<Scalar, N> result = q;
+  for (int c = 0; c < N; ++c)
+    for (int r = 0; r <= c; ++r) result(r, c) += fp.row(r).dot(f.row(c));
+  return result;
+}
+
+}  // namespace tetap::filter

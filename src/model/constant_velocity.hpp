@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+// Constant velocity in the plane, state (x, vx, y, vy), driven by white acceleration
+// (Bar-Shalom, Li, Kirubarajan 2001, eq. 6.2.2-12: discretised continuous noise is q dt^3/3 ...; this is the piecewise-constant
+// acceleration form, eq. 6.3.2-4, q in (m/s^2)^2).
+#pragma once
+
+#include "filter/kalman.hpp"
+
+namespace tetap::model {
+
+template <class Scalar>
+struct ConstantVelocity {
+  Scalar dt_s = 0;
+  Scalar acceleration_variance = 0;  ///< (m/s^2)^2 per axis, constant within a step
+
+  using State = filter::VectorState<Scalar, 4>;
+
+  [[nodiscard]] State predict(const State& x) const {
+    State next = x;
+    next.value(0) += dt_s * x.value(1);
+    next.value(2) += dt_s * x.value(3);
+    return next;
+  }
+  [[nodiscard]] filter::Matrix<Scalar, 4, 4> jacobian(const State&) const {
+    filter::Matrix<Scalar, 4, 4> f = filter::Matrix<Scalar, 4, 4>::Identity();
+    f(0, 1) = dt_s;
+    f(2, 3) = dt_s;
+    return f;
+  }
+  [[nodiscard]] filter::Symmetric<Scalar, 4> noise(const State&) const {
+    const Scalar dt2 = dt_s * dt_s;
+    filter::Symmetric<Scalar, 4> q;
+    for (int axis = 0; axis < 4; axis += 2) {
+      q(axis, axis) = acceleration_variance * dt2 * dt2 * Scalar{0.25F};
+      q(axis, axis + 1) = acceleration_variance * dt2 * dt_s * Scalar{0.5F};
+      q(axis + 1, axis + 1) = acceleration_variance * dt2;
+    }
+    return q;
+  }
+};
+
+}  // namespace tetap::model
