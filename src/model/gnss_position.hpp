@@ -13,18 +13,18 @@ struct GnssPosition {
   static constexpr int kDimension = 2;
   static constexpr std::array<int, 3> kTouches{0, 1, 2};
 
-  PlanarPose reference;  ///< the pose the fix is expressed against, so that differences stay small in float
-  filter::Vector<float, 2> offset_m = filter::Vector<float, 2>::Zero();  ///< fix minus reference, in n
-  float sigma_m = 0;                                                   ///< 1 sigma per axis
+  base::Anchored x;        ///< the fix, east
+  base::Anchored y;        ///< north
+  float sigma_m = 0;       ///< 1 sigma per axis
   float antenna_x_b_m = 0;
   float antenna_y_b_m = 0;
 
-  /// The antenna's place relative to the reference.
+  /// The antenna's place minus the fix: positions are differenced as anchored numbers, so no digit is lost far from the origin.
   [[nodiscard]] filter::Vector<float, 2> predict(const PlanarPose& pose) const {
     const auto lever_n = lever(pose);
-    return {pose.x.minus(reference.x) + lever_n(0), pose.y.minus(reference.y) + lever_n(1)};
+    return {pose.x.minus(x) + lever_n(0), pose.y.minus(y) + lever_n(1)};
   }
-  [[nodiscard]] filter::Vector<float, 2> residual(const filter::Vector<float, 2>& z_hat) const { return offset_m - z_hat; }
+  [[nodiscard]] filter::Vector<float, 2> residual(const filter::Vector<float, 2>& z_hat) const { return -z_hat; }
   [[nodiscard]] filter::Vector<float, 2> noise() const { return {sigma_m * sigma_m, sigma_m * sigma_m}; }
   [[nodiscard]] filter::Matrix<float, 2, 3> jacobian(const PlanarPose& pose) const {
     const auto lever_n = lever(pose);

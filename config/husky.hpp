@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+// Clearpath Husky A200 of robot_localization's test bag: skid-steered, wheel odometry 10 Hz, IMU 30 Hz, GNSS 2.5 Hz. Yaw rate from the
+// gyroscope, because skidding wheels do not tell it.
+#pragma once
+
+#include "app/estimators/odometry.hpp"
+#include "app/estimators/pose_ekf.hpp"
+#include "app/node.hpp"
+
+namespace tetap::robot::husky {
+
+using Estimators = app::Estimators<app::Odometry, app::PoseEkf>;
+
+inline constexpr app::Numbers numbers{
+    .loop = {.window_us = 200'000, .ahead_us = 200'000},
+    .wheels = {.drive = {.left_radius_m = 0.165F, .right_radius_m = 0.165F, .track_m = 0.545F, .counts_per_turn = 78000.0F},
+               .noise = {.speed = 0.0001F, .speed_per_speed = 0.002F, .yaw_rate = 0.0001F, .yaw_rate_per_yaw_rate = 0.01F}},
+    // base_link -> imu_link: roll -90 deg, yaw +90 deg (the bag's launch file): the body's z axis is the sensor's y axis, reversed sign
+    // decided by gravity at rest, which the accelerometer reads as +9.8 on y.
+    .gyro = {.use = 1, .up_s = {0, 1, 0}, .noise = 0.0001F},
+    .gnss = {.sigma_floor_m = 0.5F, .sigma_scale = 2.0F},
+};
+
+}  // namespace tetap::robot::husky

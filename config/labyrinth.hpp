@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: Apache-2.0
+// The robot of the TU Chemnitz labyrinth set: left and right wheel speeds, ultra-wideband ranges to four known anchors.
+#pragma once
+
+#include "app/estimators/odometry.hpp"
+#include "app/estimators/pose_ekf.hpp"
+#include "app/node.hpp"
+
+namespace tetap::robot::labyrinth {
+
+using Estimators = app::Estimators<app::Odometry, app::PoseEkf>;
+
+inline constexpr app::Numbers numbers{
+    // The set states track 0.0785 m, wheel speed variance 1e-4 (m/s)^2 at 7.8 Hz (times 0.128 s: a density), range variance 0.01 m^2.
+    .wheels = {.drive = {.left_radius_m = 0.05F, .right_radius_m = 0.05F, .track_m = 0.0785F}, .wheel_speed_noise = 1.3e-5F},
+    .landmark = {.sigma_range_only_m = 0.1F},
+};
+
+}  // namespace tetap::robot::labyrinth

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+// What estimators give: an estimate with its uncertainty, and a record of every measurement they were offered.
+#pragma once
+
+#include "base/time.hpp"
+#include "config/messages.hpp"
+#include "filter/symmetric.hpp"
+#include "model/planar_pose.hpp"
+
+#include <cstdint>
+
+namespace tetap::app {
+
+struct Estimate {
+  base::Micros time;
+  model::PlanarPose pose;
+  filter::Symmetric<float, 3> p;     ///< of (x, y, yaw)
+  float forward_mps = 0;
+  float yaw_rate_radps = 0;
+  bool position_valid = false;
+  bool heading_valid = false;
+  bool velocity_valid = false;
+};
+
+/// One measurement (or input) and what became of it. dof 0: an input that is integrated, not compared.
+struct Innovation {
+  can::Verdict verdict = can::Verdict::kNotUsed;
+  std::uint8_t dof = 0;
+  float nis = 0;
+  float gate = 0;
+  std::uint8_t landmark = 0xFF;
+};
+
+/// The filter's record in the bus's words.
+template <int M>
+[[nodiscard]] Innovation record(const filter::Innovation<float, M>& from, std::uint8_t landmark = 0xFF) {
+  constexpr can::Verdict kWord[] = {can::Verdict::kAccepted, can::Verdict::kRejected, can::Verdict::kSingular,
+                                    can::Verdict::kNotFinite};
+  return {.verdict = kWord[static_cast<std::size_t>(from.verdict)],
+          .dof = M,
+          .nis = from.nis,
+          .gate = from.gate,
+          .landmark = landmark};
+}
+
+}  // namespace tetap::app

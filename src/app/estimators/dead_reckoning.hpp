@@ -1,0 +1,209 @@
+// SPDX-License-Identifier: Apache-2.0
+// Pose from wheels, and from a gyroscope where the robot has one: the motion half that every planar estimator shares.
+// The state only changes when a sample is fused; advance() moves the time for which estimate() extrapolates, so a tick never
+// splits an integration and the pose after n counts is the textbook's to the bit.
+#pragma once
+
+#include "app/estimate.hpp"
+#include "app/numbers.hpp"
+#include "app/samples.hpp"
+#include "filter/ekf.hpp"
+#include "model/planar_increment.hpp"
+
+#include <cstdint>
+
+namespace tetap::app {
+
+class DeadReckoning {
+ public:
+  filter::Ekf<model::PlanarPose> filter;
+
+  void start(base::Micros t, const model::PlanarPose& pose, float sigma_position_m, float sigma_yaw_rad) {
+    const float variance = sigma_position_m * sigma_position_m;
+    filter.x = pose;
+    filter.p = filter::Symmetric<float, 3>::diagonal({variance, variance, sigma_yaw_rad * sigma_yaw_rad});
+    if (t > time_) time_ = t;
+    untravelled();
+  }
+
+  void advance(base::Micros t) { out_time_ = t; }
+
+  void fuse(const WheelCounts& now, base::Micros stamp, const Numbers& n);
+  void fuse(const WheelSpeeds& speeds, base::Micros stamp, const Numbers& n) {
+    fuse_speed({.kind = Held::Kind::kWheels, .first_mps = speeds.left_mps, .second = speeds.right_mps}, stamp, n);
+  }
+  void fuse(const BodySpeed& speed, base::Micros stamp, const Numbers& n) {
+    fuse_speed({.kind = Held::Kind::kBody,
+                .first_mps = n.wheels.speed_scale * speed.forward_mps,
+                .second = n.wheels.yaw_rate_scale * speed.yaw_rate_radps},
+               stamp, n);
+  }
+  void fuse(const ImuSample& sample, base::Micros stamp, const Numbers& n);
+
+  /// Brings the state to t with what is held; called before a measurement is fused at its own time.
+  void propagate(base::Micros t, const Numbers& n);
+
+  /// State and covariance extrapolated to the time of the last advance().
+  [[nodiscard]] Estimate estimate(const Numbers& n) const;
+
+  template <class Sink>
+  void each_bit(Sink&& sink) const {
+    sink(time_.us);
+    sink(filter.x.x.anchor_um);
+    sink(filter.x.x.offset_m);
+    sink(filter.x.y.anchor_um);
+    sink(filter.x.y.offset_m);
+    sink(filter.x.yaw_rad);
+    for (const float v : filter.p.packed()) sink(v);
+    sink(held_.first_mps);
+    sink(held_.second);
+    sink(applied_left_m_);
+    sink(applied_right_m_);
+    sink(gyro_bias_radps_);
+    sink(gyro_rate_radps_);
+    sink(last_input_.us);
+  }
+
+ private:
+  /// The last speeds heard of; what the robot is assumed to keep doing.
+  struct Held {
+    enum class Kind : std::uint8_t { kNone, kBody, kWheels };
+    Kind kind = Kind::kNone;
+    float first_mps = 0;  ///< forward speed, or the left wheel's
+    float second = 0;     ///< yaw rate [rad/s], or the right wheel's speed
+  };
+
+  void fuse_speed(const Held& held, base::Micros stamp, const Numbers& n);
+  [[nodiscard]] float forward_mps() const {
+    return held_.kind == Held::Kind::kWheels ? 0.5F * (held_.first_mps + held_.second) : held_.first_mps;
+  }
+  [[nodiscard]] float yaw_rate_radps(const Numbers& n) const {
+    if (n.gyro.use != 0) return gyro_rate_radps_;
+    return held_.kind == Held::Kind::kWheels ? (held_.second - held_.first_mps) / n.wheels.drive.track_m : held_.second;
+  }
+  [[nodiscard]] model::PlanarIncrement held_increment(float dt_s, const Numbers& n) const;
+  void turn_by_gyro(model::PlanarIncrement& increment, float dyaw_rad, float dt_s, const Numbers& n) const {
+    increment.dyaw_rad = dyaw_rad;
+    increment.var_dyaw = n.gyro.noise * dt_s;
+    increment.cov_ds_dyaw = 0;
+  }
+  void untravelled() { applied_left_m_ = applied_right_m_ = 0; }
+
+  base::Micros time_;        ///< of the state
+  base::Micros out_time_;    ///< of the estimate
+  base::Micros last_input_;  ///< stamp of the last wheel sample
+  base::Micros counts_time_;
+  base::Micros still_since_;
+  Held held_;
+  WheelCounts counts_;
+  bool have_counts_ = false;
+  bool moving_ = true;
+  float applied_left_m_ = 0;   ///< travel extrapolated since the last counts, taken off when the next ones come
+  float applied_right_m_ = 0;
+  float gyro_rate_radps_ = 0;
+  float gyro_bias_radps_ = 0;
+};
+
+inline model::PlanarIncrement DeadReckoning::held_increment(float dt_s, const Numbers& n) const {
+  model::PlanarIncrement increment;
+  switch (held_.kind) {
+    case Held::Kind::kNone: break;
+    case Held::Kind::kBody:
+      increment = model::Unicycle{.forward_mps = held_.first_mps, .yaw_rate_radps = held_.second, .noise = n.wheels.noise}
+                      .increment(dt_s);
+      break;
+    case Held::Kind::kWheels: {
+      increment = n.wheels.drive.increment(held_.first_mps * dt_s, held_.second * dt_s);
+      const float white = n.wheels.wheel_speed_noise * dt_s;
+      increment.var_ds += 0.5F * white;
+      increment.var_dyaw += 2.0F * white / (n.wheels.drive.track_m * n.wheels.drive.track_m);
+      break;
+    }
+  }
+  if (n.gyro.use != 0) turn_by_gyro(increment, gyro_rate_radps_ * dt_s, dt_s, n);
+  return increment;
+}
+
+inline void DeadReckoning::propagate(base::Micros t, const Numbers& n) {
+  if (t <= time_) return;
+  const float dt_s = base::seconds(t - time_);
+  time_ = t;
+  if (held_.kind == Held::Kind::kNone) return;  // nothing was ever heard of motion: standing where it was put
+  if (t - last_input_ > base::Micros{n.wheels.timeout_us}) {
+    const float grown = n.wheels.timeout_noise * dt_s;
+    filter.predict(model::PlanarIncrement{.var_ds = grown, .var_dyaw = grown});
+    return;
+  }
+  filter.predict(held_increment(dt_s, n));
+  if (held_.kind == Held::Kind::kWheels) {
+    applied_left_m_ += held_.first_mps * dt_s;
+    applied_right_m_ += held_.second * dt_s;
+  }
+}
+
+inline void DeadReckoning::fuse(const WheelCounts& now, base::Micros stamp, const Numbers& n) {
+  const auto& drive = n.wheels.drive;
+  const bool usable = have_counts_ && stamp > counts_time_ && stamp - counts_time_ <= base::Micros{n.wheels.timeout_us};
+  if (usable) {
+    const float left_m = drive.left_m(model::count_difference(now.left, counts_.left));
+    const float right_m = drive.right_m(model::count_difference(now.right, counts_.right));
+    model::PlanarIncrement increment = drive.increment(left_m - applied_left_m_, right_m - applied_right_m_);
+    if (n.gyro.use != 0) turn_by_gyro(increment, 0.0F, 0.0F, n);
+    filter.predict(increment);
+    const float per_s = 1.0F / base::seconds(stamp - counts_time_);
+    held_ = {.kind = Held::Kind::kWheels, .first_mps = left_m * per_s, .second = right_m * per_s};
+  } else {
+    held_ = {.kind = Held::Kind::kWheels};
+  }
+  if (stamp > time_) time_ = stamp;
+  untravelled();
+  counts_ = now;
+  counts_time_ = last_input_ = stamp;
+  have_counts_ = true;
+}
+
+inline void DeadReckoning::fuse_speed(const Held& held, base::Micros stamp, const Numbers& n) {
+  const bool first = held_.kind == Held::Kind::kNone;
+  if (n.wheels.hold == Hold::kForward || first) propagate(stamp, n);
+  held_ = held;
+  const base::Micros before = last_input_;
+  last_input_ = stamp;
+  if (n.wheels.hold == Hold::kBackward && !first && stamp - before <= base::Micros{n.wheels.timeout_us}) propagate(stamp, n);
+  if (stamp > time_) time_ = stamp;
+}
+
+inline void DeadReckoning::fuse(const ImuSample& sample, base::Micros stamp, const Numbers& n) {
+  if (n.gyro.use == 0 || sample.interval.us <= 0 || sample.interval > base::Micros{n.wheels.timeout_us}) return;
+  const float interval_s = base::seconds(sample.interval);
+  const float raw_radps = (n.gyro.up_s[0] * sample.dangle_b_rad[0] + n.gyro.up_s[1] * sample.dangle_b_rad[1] +
+                           n.gyro.up_s[2] * sample.dangle_b_rad[2]) /
+                          interval_s;
+  const float forward = forward_mps();
+  const bool still = held_.kind != Held::Kind::kNone && forward < n.gyro.standstill_mps && -forward < n.gyro.standstill_mps;
+  if (!still) {
+    moving_ = true;
+  } else if (moving_) {
+    moving_ = false;
+    still_since_ = stamp;
+  } else if (stamp - still_since_ > base::Micros{1'000'000}) {
+    gyro_bias_radps_ += (raw_radps - gyro_bias_radps_) * (interval_s / n.gyro.bias_time_s);
+  }
+  gyro_rate_radps_ = raw_radps - gyro_bias_radps_;
+  propagate(stamp, n);
+}
+
+inline Estimate DeadReckoning::estimate(const Numbers& n) const {
+  DeadReckoning ahead = *this;
+  ahead.propagate(out_time_, n);
+  const bool fresh = held_.kind != Held::Kind::kNone && out_time_ - last_input_ <= base::Micros{n.wheels.timeout_us};
+  return {.time = out_time_,
+          .pose = ahead.filter.x,
+          .p = ahead.filter.p,
+          .forward_mps = fresh ? forward_mps() : 0.0F,
+          .yaw_rate_radps = fresh ? yaw_rate_radps(n) : 0.0F,
+          .position_valid = true,
+          .heading_valid = true,
+          .velocity_valid = fresh};
+}
+
+}  // namespace tetap::app

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+// Odometry: dead reckoning alone, continuous and without jumps (REP-105 "odom").
+#pragma once
+
+#include "app/context.hpp"
+#include "app/estimators/dead_reckoning.hpp"
+
+namespace tetap::app {
+
+class Odometry {
+ public:
+  static constexpr can::EstimatorKind kKind = can::EstimatorKind::kOdometry;
+
+  void restart(base::Micros t, const Context& with) {
+    *this = {};
+    const StartNumbers& s = with.numbers.start;
+    const bool known = s.known != 0;
+    motion_.start(t,
+                  known ? model::PlanarPose{.x = base::Anchored{}.plus(s.x_m), .y = base::Anchored{}.plus(s.y_m), .yaw_rad = s.yaw_rad}
+                        : model::PlanarPose{},
+                  kStartSigma, kStartSigma);
+  }
+  /// A given pose moves the odometry's origin: its covariance is that of the way since.
+  void set_pose(base::Micros t, const SetPose& given, const Context& with) {
+    motion_.propagate(t, with.numbers);
+    motion_.start(t, given.pose, kStartSigma, kStartSigma);
+  }
+
+  void advance(base::Micros t, const Context&) { motion_.advance(t); }
+
+  template <class Input>
+    requires requires(DeadReckoning& motion, const Input& input, const Numbers& n) { motion.fuse(input, base::Micros{}, n); }
+  Innovation fuse(const Input& input, base::Micros stamp, const Context& with) {
+    motion_.fuse(input, stamp, with.numbers);
+    return {.verdict = can::Verdict::kAccepted};
+  }
+
+  [[nodiscard]] Estimate estimate(const Context& with) const { return motion_.estimate(with.numbers); }
+  [[nodiscard]] can::Mode mode(const Context&) const { return can::Mode::kDeadReckoning; }
+  template <class Sink>
+  void each_bit(Sink&& sink) const { motion_.each_bit(sink); }
+
+ private:
+  static constexpr float kStartSigma = 1e-3F;  // a millimetre and a milliradian: of the definition of the origin, not of the world
+  DeadReckoning motion_;
+};
+
+}  // namespace tetap::app

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+// The product: one object, one poll(). A port's main() is this object and a loop.
+#pragma once
+
+#include "app/node.hpp"
+#include "app/pacer.hpp"
+#include "hal/board.hpp"
+
+#include <cstdint>
+
+namespace tetap::app {
+
+template <hal::Board Board, class Estimators>
+class Firmware {
+ public:
+  Firmware(Board& board, const Numbers& numbers, const Version& version)
+      : board_(board), numbers_(numbers), node_(numbers, version), pacer_(base::Micros{numbers.loop.period_us}) {}
+
+  /// Takes what has arrived, ticks when it is time, hands on what is to be sent. Call it in a loop, as often as you like.
+  void poll() {
+    while (const auto frame = board_.can.receive()) on_frame(*frame);
+    if (const auto t = pacer_.on_poll(board_.now(), health_)) tick(*t);
+    board_.can.flush();
+  }
+
+ private:
+  static constexpr std::uint32_t kInputs = 0x20;  ///< offsets below are inputs
+
+  void on_frame(const base::CanFrame& frame) {
+    if (frame.extended || frame.id < numbers_.can_base || frame.id >= numbers_.can_base + kInputs) return;
+    if (frame.id != numbers_.can_base + can::InSync::kOffset) return node_.on_frame(frame);
+    const auto sync = can::decode<can::InSync>(can::payload(frame));
+    if (!sync) return;
+    const base::Micros time{static_cast<std::int64_t>(sync->time_us)};
+    if (sync->kind == can::SyncKind::kBegin) {
+      node_.power_on(time);
+      node_.send_version([this](const base::CanFrame& out) { send(out); });
+    }
+    if (const auto t = pacer_.on_sync(sync->kind, time, board_.now(), health_)) tick(*t);
+  }
+
+  void tick(base::Micros t) {
+    const base::Micros began = board_.now();
+    health_.sync = pacer_.state();
+    health_.bus = board_.can.faults();
+    node_.tick(t, health_, [this](const base::CanFrame& out) { send(out); });
+    const std::int64_t took_us = (board_.now() - began).us;
+    const auto us = static_cast<std::uint32_t>(took_us < 0 ? 0 : took_us > 1'000'000 ? 1'000'000 : took_us);
+    if (us > health_.longest_us) health_.longest_us = us;
+    health_.mean_us += (static_cast<float>(us) - health_.mean_us) * 0.01F;
+  }
+
+  void send(const base::CanFrame& frame) { static_cast<void>(board_.can.send(frame)); }  // refused frames: CanFaults::tx_full
+
+  Board& board_;
+  const Numbers& numbers_;
+  Node<Estimators> node_;
+  Pacer pacer_;
+  LoopHealth health_;
+};
+
+}  // namespace tetap::app

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the world did to us, counted once where it was noticed. Counters only grow (modulo 2^16) and go out in Est_Diag.
+#pragma once
+
+#include "config/messages.hpp"
+#include "hal/can_bus.hpp"
+
+#include <cstdint>
+
+namespace tetap::app {
+
+/// Counters that follow from the frames and ticks alone: equal in every replay.
+struct Counters {
+  std::uint16_t too_late = 0;        ///< sample older than the window
+  std::uint16_t too_early = 0;       ///< stamp further ahead than a sample may wait
+  std::uint16_t duplicate = 0;
+  std::uint16_t incomplete = 0;      ///< a sample of several frames of which one never came
+  std::uint16_t malformed = 0;       ///< wrong length, or an input id that means nothing
+  std::uint16_t out_of_range = 0;    ///< a value that must be there is marked not available
+  std::uint16_t not_used = 0;        ///< no estimator takes this kind of sample
+  std::uint16_t no_time = 0;         ///< came before the first tick
+  std::uint16_t command_refused = 0; ///< CRC wrong or counter repeated
+  std::uint16_t map_full = 0;
+  std::uint16_t timeline_full = 0;
+  std::uint16_t events_dropped = 0;
+  std::uint16_t events_high_water = 0;
+};
+
+/// What the loop saw of real time and the bus: differs from run to run, and is never fed back into an estimate.
+struct LoopHealth {
+  can::SyncState sync = can::SyncState::kOwnTimer;
+  std::uint32_t longest_us = 0;  ///< tick, since start
+  float mean_us = 0;             ///< running mean
+  std::uint16_t ticks_late = 0;  ///< periods skipped because a tick overran
+  std::uint16_t sync_lost = 0;
+  std::uint16_t sync_back = 0;   ///< sync frames whose time was not after the last tick
+  std::uint16_t sync_jump = 0;   ///< sync frames too far ahead
+  hal::CanFaults bus;
+};
+
+/// Bits of Est_Status.Faults.
+enum class Fault : std::uint16_t {
+  kInputStale = 1 << 0,       ///< no motion input within its timeout
+  kRejecting = 1 << 1,        ///< a sensor was refused three times in a row
+  kIncomplete = 1 << 2,       ///< half samples within the last second
+  kTooLate = 1 << 3,          ///< samples beyond the window within the last second
+  kMalformed = 1 << 4,        ///< malformed, out-of-range or unstamped frames within the last second
+  kCapacity = 1 << 5,         ///< a full map, timeline or event queue within the last second
+  kCommandRefused = 1 << 6,   ///< within the last second
+  kRestarted = 1 << 7,        ///< an estimator was restarted within the last second
+};
+
+}  // namespace tetap::app

@@ -1,0 +1,204 @@
+// SPDX-License-Identifier: Apache-2.0
+// From frames to samples and commands: decodes, puts samples of several frames together, counts what does not fit.
+#pragma once
+
+#include "app/context.hpp"
+#include "app/health.hpp"
+#include "app/sample.hpp"
+#include "base/crc.hpp"
+#include "can/codec.hpp"
+#include "can/e2e.hpp"
+#include "config/messages.hpp"
+
+#include <array>
+#include <cstdint>
+#include <optional>
+
+namespace tetap::app {
+
+struct MapEntry {
+  std::uint8_t id = 0;
+  model::Landmark landmark;
+};
+
+class Inbox {
+ public:
+  /// Everything of an input frame but what it means: called with the offset within the node's block. Out gets sample(Sample),
+  /// map_entry(MapEntry), set_pose(SetPose), reset(can::ResetWhat). `reference` is the time stamps are extended around.
+  template <class Out>
+  void on_frame(std::uint8_t offset, const base::CanFrame& frame, base::Micros reference, Counters& counters, Out&& out);
+
+  /// At each tick: half samples older than `patience` are given up and counted.
+  void expire(base::Micros now, base::Micros patience, Counters& counters) {
+    for (Partial& partial : partials_)
+      if (partial.missing != 0 && now - partial.since > patience) partial.missing = 0, ++counters.incomplete;
+  }
+
+ private:
+  /// A sample of which some frames are there. missing: a bit per frame still to come; 0: the slot is free.
+  struct Partial {
+    Sample sample;
+    std::uint8_t missing = 0;
+    base::Micros since;
+  };
+  static constexpr std::uint8_t kImuFrames = 0b111, kPositionFrames = 0b1111, kVelocityFrames = 0b11;
+
+  Partial& slot(can::Sensor sensor, std::uint8_t instance, std::uint8_t sequence, std::uint8_t frames, base::Micros reference,
+                Counters& counters);
+  template <class Out>
+  void complete(Partial& partial, std::uint8_t frame_bit, std::uint32_t bits, Counters& counters, Out& out);
+  template <class Out>
+  void imu(std::uint8_t offset, const base::CanFrame& frame, std::uint32_t bits, base::Micros reference, Counters& counters, Out& out);
+  template <class Message, class Fill, class Out>
+  void gnss(const base::CanFrame& frame, can::Sensor sensor, std::uint8_t frames, std::uint8_t frame_bit, std::uint32_t bits,
+            base::Micros reference, Counters& counters, Out& out, Fill&& fill);
+  template <class Out>
+  void command(std::uint8_t offset, const base::CanFrame& frame, Counters& counters, Out& out);
+
+  std::array<Partial, 16> partials_{};
+  std::optional<can::CmdSetPos> set_pos_;
+  std::optional<can::CmdSetYaw> set_yaw_;
+  std::array<std::uint8_t, 2> last_counter_{0xFF, 0xFF};  ///< of reset and of set pose
+};
+
+/// A whole sample from one frame.
+template <class Message>
+[[nodiscard]] constexpr Sample stamped(const Message& message, can::Sensor sensor, std::uint32_t bits, base::Micros reference) {
+  Sample sample;
+  sample.stamp = base::extend(message.stamp_us, 20, reference);
+  sample.sensor = sensor;
+  sample.instance = message.inst;
+  sample.sequence = message.seq;
+  sample.bits = bits;
+  return sample;
+}
+
+/// CRC-32 of a frame's meaning: offset, length, data.
+[[nodiscard]] constexpr std::uint32_t frame_crc(std::uint8_t offset, const base::CanFrame& frame) {
+  base::Crc32 crc;
+  crc.add(offset);
+  crc.add(frame.size);
+  for (std::size_t i = 0; i < frame.size && i < frame.data.size(); ++i) crc.add(frame.data[i]);
+  return crc.value();
+}
+
+inline Inbox::Partial& Inbox::slot(can::Sensor sensor, std::uint8_t instance, std::uint8_t sequence, std::uint8_t frames,
+                                   base::Micros reference, Counters& counters) {
+  Partial* chosen = &partials_[0];
+  for (Partial& partial : partials_) {
+    const Sample& s = partial.sample;
+    if (partial.missing != 0 && s.sensor == sensor && s.instance == instance && s.sequence == sequence) return partial;
+    const bool better = chosen->missing != 0 && (partial.missing == 0 || partial.since < chosen->since);
+    if (better) chosen = &partial;
+  }
+  if (chosen->missing != 0) ++counters.incomplete;
+  *chosen = Partial{.missing = frames, .since = reference};
+  chosen->sample.sensor = sensor;
+  chosen->sample.instance = instance;
+  chosen->sample.sequence = sequence;
+  return *chosen;
+}
+
+template <class Out>
+void Inbox::complete(Partial& partial, std::uint8_t frame_bit, std::uint32_t bits, Counters& counters, Out& out) {
+  if ((partial.missing & frame_bit) == 0) {
+    ++counters.duplicate;
+    return;
+  }
+  partial.missing = static_cast<std::uint8_t>(partial.missing & ~frame_bit);
+  partial.sample.bits += bits;
+  if (partial.missing == 0) out.sample(partial.sample);
+}
+
+template <class Out>
+void Inbox::imu(std::uint8_t offset, const base::CanFrame& frame, std::uint32_t bits, base::Micros reference, Counters& counters,
+                Out& out) {
+  const auto instance = static_cast<std::uint8_t>((offset - can::ImuGyro::kOffset) / can::ImuGyro::kStride);
+  const auto part = static_cast<std::uint8_t>((offset - can::ImuGyro::kOffset) % can::ImuGyro::kStride);
+  if (part == 0) {
+    const auto gyro = can::decode<can::ImuGyro>(can::payload(frame));
+    if (!gyro) return void(++counters.malformed);
+    if (!all_finite(gyro->ang_x_rad, gyro->ang_y_rad, gyro->ang_z_rad)) return void(++counters.out_of_range);
+    Partial& partial = slot(can::Sensor::kImu, instance, gyro->seq, kImuFrames, reference, counters);
+    partial.sample.payload.imu.dangle_b_rad = {gyro->ang_x_rad, gyro->ang_y_rad, gyro->ang_z_rad};
+    complete(partial, 0b001, bits, counters, out);
+  } else if (part == 1) {
+    const auto accel = can::decode<can::ImuAccel>(can::payload(frame));
+    if (!accel) return void(++counters.malformed);
+    if (!all_finite(accel->vel_x_mps, accel->vel_y_mps, accel->vel_z_mps)) return void(++counters.out_of_range);
+    Partial& partial = slot(can::Sensor::kImu, instance, accel->seq, kImuFrames, reference, counters);
+    partial.sample.payload.imu.dvelocity_b_mps = {accel->vel_x_mps, accel->vel_y_mps, accel->vel_z_mps};
+    complete(partial, 0b010, bits, counters, out);
+  } else {
+    const auto time = can::decode<can::ImuTime>(can::payload(frame));
+    if (!time) return void(++counters.malformed);
+    Partial& partial = slot(can::Sensor::kImu, instance, time->seq, kImuFrames, reference, counters);
+    partial.sample.stamp = base::extend(time->stamp_us, 20, reference);
+    ImuSample& imu = partial.sample.payload.imu;
+    imu.interval = {static_cast<std::int64_t>(time->interval_us)};
+    imu.temperature_degC = time->temp_degC;
+    imu.clipped_gyro = time->clip_gyro;
+    imu.clipped_accel = time->clip_accel;
+    complete(partial, 0b100, bits, counters, out);
+  }
+}
+
+template <class Message, class Fill, class Out>
+void Inbox::gnss(const base::CanFrame& frame, can::Sensor sensor, std::uint8_t frames, std::uint8_t frame_bit, std::uint32_t bits,
+                 base::Micros reference, Counters& counters, Out& out, Fill&& fill) {
+  const auto message = can::decode<Message>(can::payload(frame));
+  if (!message) return void(++counters.malformed);
+  Partial& partial = slot(sensor, message->inst, message->seq, frames, reference, counters);
+  const base::Micros stamp = base::extend(message->stamp_us, 20, reference);
+  Sample& sample = partial.sample;
+  if (partial.missing == frames) {
+    sample.stamp = stamp;
+    if (sensor == can::Sensor::kGnssPosition) {
+      sample.payload.gnss_position = {};
+    } else {
+      sample.payload.gnss_velocity = {};
+    }
+  } else if (sample.stamp != stamp) {  // frames of two samples under one sequence number: never mixed
+    ++counters.incomplete;
+    partial.missing = frames;
+    sample.stamp = stamp;
+    sample.bits = 0;
+  }
+  if (!fill(*message, sample.payload)) return void((++counters.out_of_range, partial.missing = 0));
+  complete(partial, frame_bit, bits, counters, out);
+}
+
+template <class Out>
+void Inbox::command(std::uint8_t offset, const base::CanFrame& frame, Counters& counters, Out& out) {
+  const auto counter = static_cast<std::uint8_t>(frame.data[1] & 0x0F);
+  std::uint8_t& last = last_counter_[offset == can::CmdReset::kOffset ? 0 : 1];
+  if (!can::e2e_valid(offset, can::payload(frame)) || counter == last) return void(++counters.command_refused);
+  if (offset == can::CmdReset::kOffset) {
+    const auto reset = can::decode<can::CmdReset>(can::payload(frame));
+    if (!reset) return void(++counters.malformed);
+    last = counter;
+    out.reset(reset->what);
+    return;
+  }
+  if (offset == can::CmdSetPos::kOffset) set_pos_ = can::decode<can::CmdSetPos>(can::payload(frame));
+  if (offset == can::CmdSetYaw::kOffset) set_yaw_ = can::decode<can::CmdSetYaw>(can::payload(frame));
+  if (!set_pos_ || !set_yaw_ || set_pos_->ctr != set_yaw_->ctr) return;
+  const can::CmdSetPos position = *set_pos_;
+  const can::CmdSetYaw yaw = *set_yaw_;
+  set_pos_.reset();
+  set_yaw_.reset();
+  last = counter;
+  constexpr std::int64_t kUmPerStep = 2000;
+  const bool heading = base::is_finite(yaw.std_yaw_rad) && base::is_finite(yaw.yaw_rad);
+  if (position.x_raw == can::CmdSetPos::kXNotAvailable || position.y_raw == can::CmdSetPos::kYNotAvailable ||
+      !base::is_finite(yaw.std_pos_m)) {
+    return void(++counters.out_of_range);
+  }
+  out.set_pose(SetPose{.pose = {.x = base::Anchored::from_um(position.x_raw * kUmPerStep),
+                                .y = base::Anchored::from_um(position.y_raw * kUmPerStep),
+                                .yaw_rad = heading ? yaw.yaw_rad : 0.0F},
+                       .sigma_position_m = yaw.std_pos_m,
+                       .sigma_yaw_rad = heading ? yaw.std_yaw_rad : 4.0F});
+}
+
+}  // namespace tetap::app

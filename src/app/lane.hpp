@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: Apache-2.0
+// One estimator in the firmware: its current state, its state at the far end of the window, and its statistics.
+// A late sample is fused at its own time by starting again from `past` and repeating what came since: the result is the one that
+// would have been had the sample been on time. Costs: twice the estimator's memory; a burst only when something is late.
+#pragma once
+
+#include "app/context.hpp"
+#include "app/estimate.hpp"
+#include "app/sample.hpp"
+
+#include <array>
+#include <concepts>
+#include <cstdint>
+
+namespace tetap::app {
+
+template <class E>
+concept Estimator = requires(E& e, const E& view, base::Micros t, const Context& with, const SetPose& pose) {
+  { E::kKind } -> std::convertible_to<can::EstimatorKind>;
+  { e.restart(t, with) } -> std::same_as<void>;
+  { e.set_pose(t, pose, with) } -> std::same_as<void>;
+  { e.advance(t, with) } -> std::same_as<void>;
+  { view.estimate(with) } -> std::same_as<Estimate>;
+  { view.mode(with) } -> std::same_as<can::Mode>;
+};
+
+/// What became of one sensor's samples.
+struct SensorStatistics {
+  std::uint16_t accepted = 0;
+  std::uint16_t rejected = 0;
+  float nis_mean = 0;          ///< running mean over the last 50 or so compared measurements
+  std::uint8_t refused_in_a_row = 0;
+  bool compared = false;
+  base::Micros last_accepted;
+};
+
+inline constexpr std::size_t kSensors = 7;
+inline constexpr std::size_t kInstances = 4;
+
+template <Estimator E>
+class Lane {
+ public:
+  using Type = E;
+
+  void restart(base::Micros t, const Context& with) {
+    now_.restart(t, with);
+    past_ = now_;
+  }
+  void set_pose(base::Micros t, const SetPose& pose, const Context& with) {
+    now_.set_pose(t, pose, with);
+    past_ = now_;
+  }
+
+  /// Fuses into the current state; the record is what the bus is told.
+  Innovation fuse(const Sample& sample, const Context& with) { return fuse_into(now_, sample, with); }
+  /// The sample leaves the window: the far end takes it.
+  void retire(const Sample& sample, const Context& with) { static_cast<void>(fuse_into(past_, sample, with)); }
+  /// Back to the far end of the window.
+  void rewind() { now_ = past_; }
+  /// What is now can no longer be changed by late samples.
+  void close() { past_ = now_; }
+
+  void advance(base::Micros t, const Context& with) { now_.advance(t, with); }
+  [[nodiscard]] Estimate estimate(const Context& with) const { return now_.estimate(with); }
+  [[nodiscard]] can::Mode mode(const Context& with) const { return now_.mode(with); }
+
+  void account(const Sample& sample, const Innovation& innovation) {
+    SensorStatistics& s = statistics(sample.sensor, sample.instance);
+    if (innovation.verdict == can::Verdict::kAccepted) {
+      ++s.accepted;
+      s.refused_in_a_row = 0;
+      s.last_accepted = sample.stamp;
+    } else if (innovation.verdict == can::Verdict::kRejected) {
+      ++s.rejected;
+      if (s.refused_in_a_row < 255) ++s.refused_in_a_row;
+    }
+    if (innovation.dof > 0) {
+      s.nis_mean = s.compared ? s.nis_mean + (innovation.nis - s.nis_mean) * 0.02F : innovation.nis;
+      s.compared = true;
+    }
+  }
+  [[nodiscard]] SensorStatistics& statistics(can::Sensor sensor, std::uint8_t instance) {
+    return statistics_[static_cast<std::size_t>(sensor) * kInstances + instance];
+  }
+  [[nodiscard]] const SensorStatistics& statistics(std::size_t index) const { return statistics_[index]; }
+  void clear_statistics() { statistics_ = {}; }
+
+  template <class Sink>
+  void each_bit(Sink&& sink) const { now_.each_bit(sink); }
+
+ private:
+  static Innovation fuse_into(E& estimator, const Sample& sample, const Context& with) {
+    Innovation innovation;
+    visit(sample, [&](const auto& payload) {
+      if constexpr (requires { estimator.fuse(payload, sample.stamp, with); })
+        innovation = estimator.fuse(payload, sample.stamp, with);
+    });
+    return innovation;
+  }
+
+  E now_;
+  E past_;
+  std::array<SensorStatistics, kSensors * kInstances> statistics_{};
+};
+
+}  // namespace tetap::app

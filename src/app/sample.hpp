@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+// Any sample with its stamp and identity: what the timeline holds and orders.
+#pragma once
+
+#include "app/samples.hpp"
+#include "config/messages.hpp"
+
+#include <compare>
+#include <cstdint>
+
+namespace tetap::app {
+
+struct Sample {
+  base::Micros stamp;
+  can::Sensor sensor = can::Sensor::kNotAvailable;  ///< says which member of the payload is there
+  std::uint8_t instance = 0;
+  std::uint8_t sequence = 0;
+  std::uint8_t detail = 0;   ///< tells apart what one sensor saw at one moment: the landmark
+  std::uint32_t bits = 0;    ///< sum of the CRC-32 of the frames it came in: stands for the payload in hashes
+
+  union Payload {
+    constexpr Payload() : imu{} {}
+    ImuSample imu;
+    WheelCounts counts;
+    WheelSpeeds wheel_speeds;
+    BodySpeed body_speed;
+    GnssPosition gnss_position;
+    GnssVelocity gnss_velocity;
+    LandmarkSighting sighting;
+  } payload;
+
+  /// The order in which samples are consumed, whatever the order of arrival.
+  [[nodiscard]] constexpr std::strong_ordering order(const Sample& other) const {
+    if (const auto by = stamp <=> other.stamp; by != 0) return by;
+    if (const auto by = sensor <=> other.sensor; by != 0) return by;
+    if (const auto by = instance <=> other.instance; by != 0) return by;
+    if (const auto by = sequence <=> other.sequence; by != 0) return by;
+    return detail <=> other.detail;
+  }
+};
+
+/// Calls f with the payload that is there; false when there is none.
+template <class F>
+constexpr bool visit(const Sample& sample, F&& f) {
+  switch (sample.sensor) {
+    case can::Sensor::kImu: f(sample.payload.imu); return true;
+    case can::Sensor::kWheelCounts: f(sample.payload.counts); return true;
+    case can::Sensor::kWheelSpeed: f(sample.payload.wheel_speeds); return true;
+    case can::Sensor::kBodySpeed: f(sample.payload.body_speed); return true;
+    case can::Sensor::kRangeBearing: f(sample.payload.sighting); return true;
+    case can::Sensor::kGnssPosition: f(sample.payload.gnss_position); return true;
+    case can::Sensor::kGnssVelocity: f(sample.payload.gnss_velocity); return true;
+    case can::Sensor::kNotAvailable: return false;
+  }
+  return false;
+}
+
+}  // namespace tetap::app

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+// Samples in the order in which they were true: those waiting for their tick, and the recent past kept so that a late one can still
+// be fused at its own time.
+#pragma once
+
+#include "app/sample.hpp"
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+namespace tetap::app {
+
+enum class Insert : std::uint8_t { kTaken, kDuplicate, kFull };
+
+/// When full, insert() refuses; the caller then retires the oldest consumed sample and tries again, or counts the loss.
+template <std::size_t Capacity>
+class Timeline {
+ public:
+  struct Entry {
+    Sample sample;
+    bool consumed = false;  ///< the current estimate has it
+    bool reported = false;  ///< its record went out
+  };
+
+  /// Keeps the order; a sample equal in stamp, kind, instance, sequence and detail is a duplicate.
+  [[nodiscard]] constexpr Insert insert(const Sample& sample) {
+    std::size_t at = size_;
+    while (at > 0 && entries_[at - 1].sample.order(sample) > 0) --at;
+    if (at > 0 && entries_[at - 1].sample.order(sample) == 0) return Insert::kDuplicate;
+    if (size_ == Capacity) return Insert::kFull;
+    for (std::size_t i = size_; i > at; --i) entries_[i] = entries_[i - 1];
+    entries_[at] = Entry{.sample = sample};
+    ++size_;
+    if (size_ > high_water_) high_water_ = static_cast<std::uint16_t>(size_);
+    return Insert::kTaken;
+  }
+
+  /// How many samples have a stamp <= t.
+  [[nodiscard]] constexpr std::size_t until(base::Micros t) const {
+    std::size_t n = size_;
+    while (n > 0 && entries_[n - 1].sample.stamp > t) --n;
+    return n;
+  }
+
+  constexpr void drop_front(std::size_t count) {
+    for (std::size_t i = count; i < size_; ++i) entries_[i - count] = entries_[i];
+    size_ -= count;
+  }
+  constexpr void clear() { size_ = 0; }
+
+  [[nodiscard]] constexpr Entry& operator[](std::size_t i) { return entries_[i]; }
+  [[nodiscard]] constexpr const Entry& operator[](std::size_t i) const { return entries_[i]; }
+  [[nodiscard]] constexpr std::size_t size() const { return size_; }
+  [[nodiscard]] constexpr std::uint16_t high_water() const { return high_water_; }
+
+ private:
+  std::array<Entry, Capacity> entries_{};
+  std::size_t size_ = 0;
+  std::uint16_t high_water_ = 0;
+};
+
+}  // namespace tetap::app
