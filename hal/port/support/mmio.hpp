@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
+// A block of memory-mapped 32-bit registers. Drivers take it as a template parameter, so host tests hand them a model of the chip.
+#pragma once
+
+#include <cstdint>
+
+namespace tetap::hal {
+
+struct Mmio {
+  std::uintptr_t base;
+
+  [[nodiscard]] std::uint32_t read(std::uint32_t offset) const {
+    return *reinterpret_cast<const volatile std::uint32_t*>(base + offset);
+  }
+  void write(std::uint32_t offset, std::uint32_t value) const {
+    *reinterpret_cast<volatile std::uint32_t*>(base + offset) = value;
+  }
+};
+
+}  // namespace tetap::hal

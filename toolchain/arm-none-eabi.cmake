@@ -1,0 +1,36 @@
+# Toolchain file of everything that is flashed. TETAP_CORE picks the core: r5 (Zynq UltraScale+), m7 or m4f (MPS2).
+set(CMAKE_SYSTEM_NAME Generic)
+set(CMAKE_SYSTEM_PROCESSOR arm)
+set(CMAKE_C_COMPILER arm-none-eabi-gcc)
+set(CMAKE_CXX_COMPILER arm-none-eabi-g++)
+set(CMAKE_ASM_COMPILER arm-none-eabi-gcc)
+set(CMAKE_OBJCOPY arm-none-eabi-objcopy)
+set(CMAKE_SIZE arm-none-eabi-size)
+
+set(TETAP_CORE "r5" CACHE STRING "r5, m7 or m4f")
+set_property(CACHE TETAP_CORE PROPERTY STRINGS r5 m7 m4f)
+# CMake's compiler checks are little projects of their own: no linker script there, and they must see the core too.
+set(CMAKE_TRY_COMPILE_TARGET_TYPE STATIC_LIBRARY)
+list(APPEND CMAKE_TRY_COMPILE_PLATFORM_VARIABLES TETAP_CORE)
+
+if(TETAP_CORE STREQUAL "r5")
+  # VFPv3-D16: no fused multiply-add.
+  set(TETAP_CORE_FLAGS "-mcpu=cortex-r5 -mfpu=vfpv3-d16 -mfloat-abi=hard -marm")
+  set(TETAP_BOARD zynqmp_r5)
+elseif(TETAP_CORE STREQUAL "m7")
+  set(TETAP_CORE_FLAGS "-mcpu=cortex-m7 -mfpu=fpv5-d16 -mfloat-abi=hard -mthumb")
+  set(TETAP_BOARD mps2_m7)
+elseif(TETAP_CORE STREQUAL "m4f")
+  # Double precision is done in software (libgcc).
+  set(TETAP_CORE_FLAGS "-mcpu=cortex-m4 -mfpu=fpv4-sp-d16 -mfloat-abi=hard -mthumb")
+  set(TETAP_BOARD mps2_m4f)
+else()
+  message(FATAL_ERROR "TETAP_CORE is '${TETAP_CORE}'; it must be r5, m7 or m4f")
+endif()
+foreach(language C CXX ASM)
+  set(CMAKE_${language}_FLAGS_INIT "${TETAP_CORE_FLAGS}")
+endforeach()
+
+set(CMAKE_FIND_ROOT_PATH_MODE_PROGRAM NEVER)
+set(CMAKE_FIND_ROOT_PATH_MODE_LIBRARY ONLY)
+set(CMAKE_FIND_ROOT_PATH_MODE_INCLUDE ONLY)

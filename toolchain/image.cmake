@@ -1,0 +1,42 @@
+# tetap_image(NAME target BOARD zynqmp_r5|mps2_m7|mps2_m4f SOURCES main.cpp ... [LIBRARIES tetap_app ...] [STACK bytes] [OUTPUT name])
+# makes NAME.elf .bin .hex .map in the binary directory, or OUTPUT.elf ... when another file name is wanted. Beside every object of
+# the image lie its .su and .ci (stack use and call graph, GCC's VCG form): CMakeFiles/NAME.dir/.
+function(tetap_image)
+  cmake_parse_arguments(ARG "" "NAME;BOARD;STACK;OUTPUT" "SOURCES;LIBRARIES" ${ARGN})
+  foreach(needed NAME BOARD SOURCES)
+    if(NOT ARG_${needed})
+      message(FATAL_ERROR "tetap_image: ${needed} is missing")
+    endif()
+  endforeach()
+  if(ARG_UNPARSED_ARGUMENTS)
+    message(FATAL_ERROR "tetap_image(${ARG_NAME}): what is '${ARG_UNPARSED_ARGUMENTS}'?")
+  endif()
+  if(NOT ARG_BOARD STREQUAL TETAP_BOARD)
+    message(FATAL_ERROR "tetap_image(${ARG_NAME}): board ${ARG_BOARD} does not run on core ${TETAP_CORE} of this build (${TETAP_BOARD} does)")
+  endif()
+  if(NOT ARG_OUTPUT)
+    set(ARG_OUTPUT ${ARG_NAME})
+  endif()
+  string(REGEX REPLACE "_m[47]f?$" "" folder ${ARG_BOARD})
+  set(port ${PROJECT_SOURCE_DIR}/hal/port)
+  set(script ${port}/${folder}/link.ld)
+  set(output ${CMAKE_CURRENT_BINARY_DIR}/${ARG_OUTPUT})
+
+  add_executable(${ARG_NAME} ${ARG_SOURCES} ${port}/${folder}/startup.cpp ${port}/support/runtime.cpp)
+  set_target_properties(${ARG_NAME} PROPERTIES OUTPUT_NAME ${ARG_OUTPUT} SUFFIX .elf LINK_DEPENDS ${script}
+    RUNTIME_OUTPUT_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR})
+  target_include_directories(${ARG_NAME} PRIVATE ${PROJECT_SOURCE_DIR}/src ${PROJECT_SOURCE_DIR})
+  target_compile_options(${ARG_NAME} PRIVATE -fstack-usage -fcallgraph-info=su)
+  string(TOUPPER ${folder} board_macro)
+  target_compile_definitions(${ARG_NAME} PRIVATE TETAP_BOARD_${board_macro})
+  target_link_libraries(${ARG_NAME} PRIVATE tetap_flashed_flags ${ARG_LIBRARIES})
+  # Of the C library only what the compiler itself calls (memcpy, memset, memmove, memcmp) can be linked: nothing supplies _sbrk, so
+  # malloc fails to link, and libm is not there at all.
+  target_link_options(${ARG_NAME} PRIVATE -nostdlib -nostartfiles -T ${script} -Wl,--gc-sections -Wl,--print-memory-usage
+    -Wl,--fatal-warnings -Wl,-Map=${output}.map $<$<BOOL:${ARG_STACK}>:-Wl,--defsym=_stack_size=${ARG_STACK}>)
+  target_link_libraries(${ARG_NAME} PRIVATE -Wl,--start-group -lc -lgcc -Wl,--end-group)
+  add_custom_command(TARGET ${ARG_NAME} POST_BUILD
+    COMMAND ${CMAKE_OBJCOPY} -O binary ${output}.elf ${output}.bin
+    COMMAND ${CMAKE_OBJCOPY} -O ihex ${output}.elf ${output}.hex
+    BYPRODUCTS ${output}.bin ${output}.hex ${output}.map)
+endfunction()
