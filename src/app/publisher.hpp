@@ -181,8 +181,8 @@ void Publisher<N>::estimate(std::size_t instance, can::EstimatorKind kind, bool 
     put(can::EstStdMore{.epoch = tag(),
                         .corr_x_yaw = e.p(0, 2) / (x * yaw),
                         .corr_y_yaw = e.p(1, 2) / (y * yaw),
-                        .std_speed_mps = base::kNaN,
-                        .std_yaw_rate_radps = base::kNaN},
+                        .std_speed_mps = base::kNan,
+                        .std_yaw_rate_radps = base::kNan},
         send, instance);
   }
 }
@@ -228,8 +228,8 @@ void Publisher<N>::statistics(const Lanes& lanes, base::Micros now, Send& send) 
                            .estimator = static_cast<std::uint8_t>(estimator),
                            .accepted = stat->accepted,
                            .rejected = static_cast<std::uint16_t>(stat->rejected & 0xFFFU),
-                           .nis_mean = stat->compared ? stat->nis_mean : base::kNaN,
-                           .age_s = stat->accepted > 0 ? age_s : base::kNaN,
+                           .nis_mean = stat->compared ? stat->nis_mean : base::kNan,
+                           .age_s = stat->accepted > 0 ? age_s : base::kNan,
                            .epoch = tag()},
         send);
     return;
@@ -307,8 +307,8 @@ void Publisher<N>::event(const Innovation& innovation, const Sample& sample, std
                               .verdict = innovation.verdict,
                               .dof = innovation.dof,
                               .age_ms = static_cast<float>(base::seconds(now - sample.stamp) * 1000.0F),
-                              .nis = innovation.dof > 0 ? innovation.nis : base::kNaN,
-                              .ratio = innovation.gate > 0.0F ? innovation.nis / innovation.gate : base::kNaN,
+                              .nis = innovation.dof > 0 ? innovation.nis : base::kNan,
+                              .ratio = innovation.gate > 0.0F ? innovation.nis / innovation.gate : base::kNan,
                               .id = innovation.landmark,
                               .epoch = 0};
   if (events_.size == events_.queue.size()) {

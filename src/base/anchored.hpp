@@ -3,6 +3,8 @@
 // arithmetic stays in float.
 #pragma once
 
+#include "base/float_bits.hpp"
+
 #include <cstdint>
 
 namespace tetap::base {
@@ -18,7 +20,7 @@ namespace tetap::base {
 
 /// Metres as micrometres, rounded to nearest; saturates at +-2000 m (callers hold offsets below 256 m). NaN gives 0.
 [[nodiscard]] constexpr std::int64_t micrometres(float m) {
-  const float bounded = m > 2000.0F ? 2000.0F : m < -2000.0F ? -2000.0F : m == m ? m : 0.0F;
+  const float bounded = m > 2000.0F ? 2000.0F : m < -2000.0F ? -2000.0F : is_nan(m) ? 0.0F : m;
   const float um = bounded * 1e6F;
   return static_cast<std::int32_t>(um < 0.0F ? um - 0.5F : um + 0.5F);
 }

@@ -2,6 +2,8 @@
 // A covariance that is symmetric because only its upper half exists.
 #pragma once
 
+#include "base/math.hpp"
+
 #include <Eigen/Core>
 #include <array>
 
@@ -56,7 +58,7 @@ class Symmetric {
       Scalar pivot = l(j, j);
       for (int k = 0; k < j; ++k) pivot -= l(k, j) * l(k, j);
       if (!(pivot > Scalar{0}) || !(pivot < Scalar{1e30F})) return false;
-      l(j, j) = __builtin_sqrtf(pivot);
+      l(j, j) = base::sqrt(pivot);
     }
     return true;
   }

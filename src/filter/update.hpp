@@ -7,6 +7,7 @@
 // factorisation), so the gate is known before anything is changed and P+ needs one pass over its upper half.
 #pragma once
 
+#include "base/math.hpp"
 #include "filter/symmetric.hpp"
 
 #include <array>
@@ -68,11 +69,11 @@ template <class Scalar, int N, int M, std::size_t K>
     }
     Scalar pivot = record.s(j, j);
     for (int k = 0; k < j; ++k) pivot -= l(k, j) * l(k, j);
-    if (!(pivot > Scalar{0})) {
-      record.verdict = pivot == pivot ? Verdict::kSingular : Verdict::kNotFinite;
+    if (!(pivot > Scalar{0}) || !(pivot < Scalar{1e30F})) {
+      record.verdict = pivot <= Scalar{0} ? Verdict::kSingular : Verdict::kNotFinite;
       return result;
     }
-    l(j, j) = __builtin_sqrtf(pivot);
+    l(j, j) = base::sqrt(pivot);
     Scalar sum = nu(j);
     for (int k = 0; k < j; ++k) sum -= l(k, j) * y(k);
     y(j) = sum / l(j, j);

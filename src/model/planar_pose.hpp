@@ -3,7 +3,7 @@
 #pragma once
 
 #include "base/anchored.hpp"
-#include "base/angle.hpp"
+#include "base/math.hpp"
 #include "filter/state.hpp"
 
 namespace tetap::model {

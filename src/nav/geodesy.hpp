@@ -3,6 +3,7 @@
 // Through ECEF (Torge & Mueller 2012, sec. 4.1.3), in the bit-identical double of src/base: the only place where double is used.
 #pragma once
 
+#include "base/math.hpp"
 #include "base/math_double.hpp"
 
 #include <cstdint>
@@ -44,7 +45,7 @@ class LocalFrame {
         longitude_2ndeg < -4 * kQuarterTurn) {
       return {};
     }
-    const double height = height_m == height_m ? static_cast<double>(height_m) : static_cast<double>(height_m_);
+    const double height = base::is_finite(height_m) ? static_cast<double>(height_m) : static_cast<double>(height_m_);
     const auto p = ecef(base::sincos(static_cast<double>(latitude_2ndeg) * kRadPer2ndeg),
                         base::sincos(static_cast<double>(longitude_2ndeg) * kRadPer2ndeg), height);
     const double dx = p.x - origin_.x;

@@ -1,0 +1,66 @@
+# tetap. This file only calls presets and tools; `make` prints what there is.
+SHELL := /bin/bash
+.SHELLFLAGS := -eu -o pipefail -c
+.DEFAULT_GOAL := help
+
+ROBOT ?= rover
+BOARD ?= linux
+BUS   ?= vcan
+SEED  ?= 1
+FAULT ?=
+REALTIME ?=
+LOG   ?=
+TRUTH ?=
+export ROBOT BOARD BUS SEED FAULT REALTIME LOG TRUTH
+
+.PHONY: help sim test quick proof replay firmware size heap stack count bits check setup host arm
+
+help: ## this list
+	@echo "tetap: state estimation on the robot's own microcontroller"; echo
+	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | while IFS=$$'\t' read -r name text; do printf '  make %-9s %s\n' "$$name" "$$text"; done
+	@echo; echo "  ROBOT=$(ROBOT) BOARD=$(BOARD) BUS=$(BUS) SEED=$(SEED) FAULT= REALTIME= LOG= TRUTH="
+
+sim: setup host ## the simulated world over vcan0: table, report, pictures in out/sim (SEED= FAULT= REALTIME=1 BOARD=zynqmp_r5 BUS=memory)
+	@tools/sim
+
+test: setup ## every proof on short prefixes, with a table of where the time went
+	@tools/prove short
+
+quick: setup host ## host unit tests only
+	@ctest --preset quick
+
+proof: setup ## the whole lengths: exhaustive functions, full logs, long runs
+	@tools/prove whole
+
+replay: setup host ## a recorded log over vcan0: LOG=run.log [TRUTH=run.truth.csv] ROBOT=mrclam|husky|labyrinth|rover [BOARD=] [BUS=memory]
+	@tools/replay
+
+firmware: setup ## the flash image: BOARD=zynqmp_r5 ROBOT=rover, with its size table
+	@tools/firmware
+
+size: arm ## flash and RAM per section of every image against the budgets
+	@tools/size --all
+
+heap: arm ## no allocator in any linked image
+	@tools/heap --all
+
+stack: arm ## worst-case stack from the call graph, against the painted high-water mark
+	@tools/stack --all
+
+count: arm ## instructions per workload and per tick on the emulated cores, against the budgets
+	@tools/count --all
+
+bits: setup ## the same bits from every compiler, option and core
+	@tools/bits
+
+check: setup host ## format, tidy, layers, DBC fresh
+	@tools/check
+
+setup:
+	@tools/setup
+
+host:
+	@tools/build host
+
+arm: setup
+	@tools/build r5 m7 m4f
