@@ -12,7 +12,9 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <optional>
+#include <type_traits>
 
 namespace tetap::app {
 
@@ -20,6 +22,18 @@ struct MapEntry {
   std::uint8_t id = 0;
   model::Landmark landmark;
 };
+
+/// What the codec gives for "not available" where a field is an integer of steps.
+inline constexpr std::int32_t kNoSteps = std::numeric_limits<std::int32_t>::min();
+inline constexpr std::int64_t kNoAngle = std::numeric_limits<std::int64_t>::min();
+
+[[nodiscard]] constexpr bool all_finite(auto... values) { return (base::is_finite(values) && ...); }
+
+/// The receiver's word for the fix; one that has no name is no fix.
+[[nodiscard]] constexpr GnssFix fix_of(can::GnssFix fix) {
+  const auto code = static_cast<std::uint8_t>(fix);
+  return code <= static_cast<std::uint8_t>(GnssFix::kRtkFixed) ? static_cast<GnssFix>(code) : GnssFix::kNone;
+}
 
 class Inbox {
  public:
@@ -190,8 +204,7 @@ void Inbox::command(std::uint8_t offset, const base::CanFrame& frame, Counters& 
   last = counter;
   constexpr std::int64_t kUmPerStep = 2000;
   const bool heading = base::is_finite(yaw.std_yaw_rad) && base::is_finite(yaw.yaw_rad);
-  if (position.x_raw == can::CmdSetPos::kXNotAvailable || position.y_raw == can::CmdSetPos::kYNotAvailable ||
-      !base::is_finite(yaw.std_pos_m)) {
+  if (position.x_raw == kNoSteps || position.y_raw == kNoSteps || !base::is_finite(yaw.std_pos_m)) {
     return void(++counters.out_of_range);
   }
   out.set_pose(SetPose{.pose = {.x = base::Anchored::from_um(position.x_raw * kUmPerStep),
@@ -199,6 +212,96 @@ void Inbox::command(std::uint8_t offset, const base::CanFrame& frame, Counters& 
                                 .yaw_rad = heading ? yaw.yaw_rad : 0.0F},
                        .sigma_position_m = yaw.std_pos_m,
                        .sigma_yaw_rad = heading ? yaw.std_yaw_rad : 4.0F});
+}
+
+template <class Out>
+void Inbox::on_frame(std::uint8_t offset, const base::CanFrame& frame, base::Micros reference, Counters& counters, Out&& out) {
+  const auto bytes = can::payload(frame);
+  const std::uint32_t bits = frame_crc(offset, frame);
+  // One frame, one sample: decode, refuse what must be there and is not, stamp, fill.
+  const auto single = [&]<class Message>(std::type_identity<Message>, can::Sensor sensor, auto&& fill) {
+    const auto message = can::decode<Message>(bytes);
+    if (!message) return void(++counters.malformed);
+    Sample sample = stamped(*message, sensor, bits, reference);
+    if (!fill(*message, sample)) return void(++counters.out_of_range);
+    out.sample(sample);
+  };
+  using can::Sensor;
+  if (bytes.size() != 8) return void(++counters.malformed);
+  if (offset >= can::ImuGyro::kOffset && offset < can::ImuGyro::kOffset + 4 * can::ImuGyro::kStride)
+    return imu(offset, frame, bits, reference, counters, out);
+
+  switch (offset) {
+    case can::CmdReset::kOffset:
+    case can::CmdSetPos::kOffset:
+    case can::CmdSetYaw::kOffset: return command(offset, frame, counters, out);
+    case can::InMapEntry::kOffset: {
+      const auto entry = can::decode<can::InMapEntry>(bytes);
+      if (!entry) return void(++counters.malformed);
+      if (entry->x_raw == kNoSteps || entry->y_raw == kNoSteps) return void(++counters.out_of_range);
+      out.map_entry(MapEntry{.id = entry->id,
+                             .landmark = {.x = base::Anchored::from_um(std::int64_t{entry->x_raw} * 1000),
+                                          .y = base::Anchored::from_um(std::int64_t{entry->y_raw} * 1000)}});
+      return;
+    }
+    case can::InWheelCounts::kOffset:
+      return single(std::type_identity<can::InWheelCounts>{}, Sensor::kWheelCounts, [](const auto& m, Sample& s) {
+        s.payload.counts = {.left = m.left, .right = m.right};
+        return true;
+      });
+    case can::InWheelSpeed::kOffset:
+      return single(std::type_identity<can::InWheelSpeed>{}, Sensor::kWheelSpeed, [](const auto& m, Sample& s) {
+        s.payload.wheel_speeds = {.left_mps = m.left_mps, .right_mps = m.right_mps};
+        return all_finite(m.left_mps, m.right_mps);
+      });
+    case can::InBodySpeed::kOffset:
+      return single(std::type_identity<can::InBodySpeed>{}, Sensor::kBodySpeed, [](const auto& m, Sample& s) {
+        s.payload.body_speed = {.forward_mps = m.forward_mps, .yaw_rate_radps = m.yaw_rate_radps};
+        return all_finite(m.forward_mps, m.yaw_rate_radps);
+      });
+    case can::InRangeBearing::kOffset:
+      return single(std::type_identity<can::InRangeBearing>{}, Sensor::kRangeBearing, [](const auto& m, Sample& s) {
+        s.payload.sighting = {.landmark = m.id, .range_m = m.range_m, .bearing_rad = m.bearing_rad};
+        s.detail = m.id;
+        return base::is_finite(m.range_m) || base::is_finite(m.bearing_rad);
+      });
+    case can::InGnssLat::kOffset:
+      return gnss<can::InGnssLat>(frame, Sensor::kGnssPosition, kPositionFrames, 0b0001, bits, reference, counters, out,
+                                  [](const auto& m, auto& p) { return p.gnss_position.latitude_2ndeg = m.lat_raw, m.lat_raw != kNoAngle; });
+    case can::InGnssLon::kOffset:
+      return gnss<can::InGnssLon>(frame, Sensor::kGnssPosition, kPositionFrames, 0b0010, bits, reference, counters, out,
+                                  [](const auto& m, auto& p) { return p.gnss_position.longitude_2ndeg = m.lon_raw, m.lon_raw != kNoAngle; });
+    case can::InGnssAlt::kOffset:
+      return gnss<can::InGnssAlt>(frame, Sensor::kGnssPosition, kPositionFrames, 0b0100, bits, reference, counters, out,
+                                  [](const auto& m, auto& p) {
+                                    p.gnss_position.height_m = m.height_m;
+                                    p.gnss_position.fix = fix_of(m.fix);
+                                    p.gnss_position.satellites = m.num_sv;
+                                    return true;
+                                  });
+    case can::InGnssAcc::kOffset:
+      return gnss<can::InGnssAcc>(frame, Sensor::kGnssPosition, kPositionFrames, 0b1000, bits, reference, counters, out,
+                                  [](const auto& m, auto& p) {
+                                    p.gnss_position.horizontal_acc_m = m.hor_m;
+                                    p.gnss_position.vertical_acc_m = m.ver_m;
+                                    return true;
+                                  });
+    case can::InGnssVelEN::kOffset:
+      return gnss<can::InGnssVelEN>(frame, Sensor::kGnssVelocity, kVelocityFrames, 0b01, bits, reference, counters, out,
+                                    [](const auto& m, auto& p) {
+                                      p.gnss_velocity.v_n_mps[0] = m.east_mps;
+                                      p.gnss_velocity.v_n_mps[1] = m.north_mps;
+                                      return all_finite(m.east_mps, m.north_mps);
+                                    });
+    case can::InGnssVelU::kOffset:
+      return gnss<can::InGnssVelU>(frame, Sensor::kGnssVelocity, kVelocityFrames, 0b10, bits, reference, counters, out,
+                                   [](const auto& m, auto& p) {
+                                     p.gnss_velocity.v_n_mps[2] = m.up_mps;
+                                     p.gnss_velocity.acc_mps = m.acc_mps;
+                                     return true;
+                                   });
+    default: ++counters.malformed;
+  }
 }
 
 }  // namespace tetap::app

@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+// The robots a host program can be: all of them, chosen by name. (A flash image holds one.)
+#pragma once
+
+#include "config/husky.hpp"
+#include "config/labyrinth.hpp"
+#include "config/mrclam.hpp"
+#include "config/rover.hpp"
+
+#include <string>
+#include <string_view>
+#include <type_traits>
+
+namespace tetap::sim {
+
+inline constexpr std::string_view kRobotNames = "husky labyrinth mrclam rover";
+
+/// Calls f(std::type_identity<Estimators>, numbers) for the robot of that name; false when there is none.
+template <class F>
+[[nodiscard]] bool with_robot(std::string_view name, F&& f) {
+  if (name == "rover") return f(std::type_identity<robot::rover::Estimators>{}, robot::rover::numbers), true;
+  if (name == "mrclam") return f(std::type_identity<robot::mrclam::Estimators>{}, robot::mrclam::numbers), true;
+  if (name == "husky") return f(std::type_identity<robot::husky::Estimators>{}, robot::husky::numbers), true;
+  if (name == "labyrinth") return f(std::type_identity<robot::labyrinth::Estimators>{}, robot::labyrinth::numbers), true;
+  return false;
+}
+
+}  // namespace tetap::sim
