@@ -77,6 +77,8 @@ template <Signal kSignal, class T>
 [[nodiscard]] constexpr std::int64_t to_steps(T value) {
   if constexpr (std::is_enum_v<T>) {
     return to_steps<kSignal>(static_cast<std::underlying_type_t<T>>(value));
+  } else if constexpr (std::is_same_v<T, bool>) {
+    return value ? 1 : 0;
   } else {
     if constexpr (kSignal.wraps) return static_cast<std::int64_t>(value);
     if constexpr (kSignal.has_gap) {
