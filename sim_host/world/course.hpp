@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: Apache-2.0
+// A test course: waypoints joined by straight lines, every corner rounded by an arc, driven by a time plan within limits of speed,
+// acceleration, lateral acceleration and yaw rate.
+#pragma once
+
+#include "base/time.hpp"
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace tetap::sim {
+
+struct Landmark {
+  std::uint8_t id = 0;
+  double x_m = 0;
+  double y_m = 0;
+};
+
+struct Waypoint {
+  double x_m = 0;
+  double y_m = 0;
+  double radius_m = 0;       ///< of the corner; 0 at the two ends and where the line goes straight on
+  double stop_s = 0;         ///< standstill there; only where radius_m = 0
+};
+
+struct CourseLimits {
+  double speed_mps = 2.0;
+  double acceleration_mps2 = 0.8;
+  double lateral_mps2 = 0.8;
+  double yaw_rate_radps = 1.2;
+};
+
+struct Course {
+  std::vector<Waypoint> waypoints;
+  std::vector<Landmark> landmarks;
+};
+
+/// Proving ground of 52 m x 30 m: straights, two skid pads (one each way), slalom, hairpin, standstill at the start, in the middle, at the end.
+[[nodiscard]] Course default_course();
+/// A straight lead-in and full circles to the left, for laws that have closed forms.
+[[nodiscard]] Course circle_course(double radius_m, int turns);
+
+struct PathPoint {
+  double x_m = 0;
+  double y_m = 0;
+  double yaw_rad = 0;          ///< continuous: two turns to the left add 4 pi
+  double curvature_per_m = 0;  ///< positive to the left
+};
+
+/// Where the driver wants to be at a time.
+struct PlanPoint {
+  double s_m = 0;
+  double speed_mps = 0;
+  double acceleration_mps2 = 0;
+  bool parked = false;
+};
+
+/// The course as a function of path length, and path length as a function of time.
+class Plan {
+ public:
+  /// Throws std::invalid_argument where the waypoints cannot be driven: a corner whose arc does not fit, a stop in a corner.
+  Plan(const Course& course, const CourseLimits& limits);
+
+  [[nodiscard]] PathPoint path(double s_m) const;
+  [[nodiscard]] PlanPoint at(base::Micros since_start) const;
+  /// The first time at which the plan is at path length s_m.
+  [[nodiscard]] base::Micros time_at(double s_m) const;
+  [[nodiscard]] double length_m() const { return length_m_; }
+  [[nodiscard]] base::Micros duration() const { return duration_; }
+
+ private:
+  struct Piece {
+    double s_m, length_m, curvature_per_m, x_m, y_m, yaw_rad;
+  };
+  struct Node {
+    double s_m, speed_mps, time_s;  ///< two nodes with the same s_m bracket a standstill
+  };
+  void add_pieces(const Course& course);
+  void add_speeds(const CourseLimits& limits);
+  [[nodiscard]] const Piece& piece(double s_m) const;
+
+  std::vector<Piece> pieces_;
+  std::vector<double> stops_m_;  ///< path length of every waypoint with a standstill
+  std::vector<double> stops_s_;
+  std::vector<Node> nodes_;
+  double length_m_ = 0;
+  base::Micros duration_;
+};
+
+}  // namespace tetap::sim

@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: Apache-2.0
+// What can go wrong in the world, by name: `--fault NAME[@START[+DURATION]]`, seconds from the start of the run.
+#pragma once
+
+#include "base/time.hpp"
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace tetap::sim {
+
+enum class Fault : std::uint8_t {
+  kGnssJump, kGnssRamp, kGnssOutage, kGnssFrozen, kGnssWrongHeight,
+  kSlipLeft, kSlipRight, kWheelStuck, kEncoderDropout,
+  kImuStuck, kImuClipping, kGyroBiasStep,
+  kLandmarkWrongId, kLandmarkOutlier,
+  kStaleStamps, kFutureStamps, kClockJump, kLostFrames, kKidnapped,
+};
+
+struct FaultInfo {
+  Fault fault;
+  std::string_view name;
+  double start_s;     ///< unless the command line says otherwise
+  double duration_s;  ///< 0: an instant
+  std::string_view what;
+};
+
+/// Magnitudes of the faults, where a description states one.
+struct FaultNumbers {
+  static constexpr double kJump_m = 100;               ///< to the east
+  static constexpr double kRamp_mps = 1;               ///< to the north
+  static constexpr double kHeight_m = 47;              ///< the geoid left out or counted twice
+  static constexpr double kSpin_mps = 1;               ///< of the wheel's rim, on top of its rolling
+  static constexpr std::int64_t kDropout_us = 100'000; ///< contact lost for this long, then back for as long
+  static constexpr double kClipVibration_mps2 = 60;
+  static constexpr double kClipVibration_radps = 12;
+  static constexpr double kGyroStep_radps = 0.02;
+  static constexpr double kOutlierShare = 0.5;
+  static constexpr double kOutlierRange_m[2] = {2, 6};
+  static constexpr double kOutlierBearing_rad = 0.5;
+  static constexpr std::int64_t kStale_us = 400'000;
+  static constexpr std::int64_t kFuture_us = 400'000;
+  static constexpr std::int64_t kClockJump_us = 3'000'000;
+  static constexpr double kLossShare = 0.2;
+  static constexpr double kKidnapped_m = 8;            ///< along the course
+};
+
+[[nodiscard]] std::span<const FaultInfo> fault_table();
+[[nodiscard]] const FaultInfo& info(Fault fault);
+/// One line per fault, for --help.
+[[nodiscard]] std::string fault_help();
+
+struct FaultSetting {
+  Fault fault;
+  base::Micros start;
+  base::Micros duration;
+};
+
+struct FaultsParsed {
+  std::vector<FaultSetting> settings;
+  std::string error;  ///< empty: all understood
+};
+
+/// `NAME[@START[+DURATION]]`, several separated by commas; an empty text is no fault.
+[[nodiscard]] FaultsParsed parse_faults(std::string_view text);
+
+/// The faults of a run; times count from its start.
+class Faults {
+ public:
+  Faults() = default;
+  explicit Faults(std::vector<FaultSetting> settings) : settings_{std::move(settings)} {}
+
+  /// Within [start, start + duration).
+  [[nodiscard]] bool active(Fault fault, base::Micros at) const { return since(fault, at).has_value(); }
+  /// How long it has been on.
+  [[nodiscard]] std::optional<base::Micros> since(Fault fault, base::Micros at) const;
+  /// True for exactly one of a sequence of adjoining intervals (before, now]: where the fault starts.
+  [[nodiscard]] bool starts(Fault fault, base::Micros before, base::Micros now) const;
+
+ private:
+  std::vector<FaultSetting> settings_;
+};
+
+}  // namespace tetap::sim

@@ -1,0 +1,291 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "sim_host/world/sensors.hpp"
+
+#include <limits>
+
+namespace tetap::sim {
+namespace {
+
+constexpr double kStep_s = 500e-6;
+constexpr double kReferenceSpeed_mps = 2.0;  // at which the vibration figures are stated
+constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
+
+double period_s(int rate_hz) { return rate_hz > 0 ? 1.0 / rate_hz : 1.0; }
+float single(double x) { return static_cast<float>(x); }
+
+Vector3 three(Chance& chance, double sigma) {
+  const double x = chance.normal(sigma);
+  const double y = chance.normal(sigma);
+  return {x, y, chance.normal(sigma)};
+}
+
+}  // namespace
+
+Imu::Imu(const ImuNumbers& numbers, double wheel_radius_m, const Wgs84& earth, std::uint64_t seed)
+    : numbers_{numbers},
+      period_s_{period_s(numbers.rate_hz)},
+      wheel_radius_m_{wheel_radius_m},
+      gravity_mps2_{earth.gravity_mps2()},
+      earth_rate_n_radps_{numbers.earth_rotation ? earth.earth_rate_n_radps() : Vector3{}},
+      noise_{seed, Stream::kImuNoise},
+      vibration_{seed, Stream::kImuVibration},
+      gyro_walk_{walks(numbers.gyro_walk_radps)},
+      accel_walk_{walks(numbers.accel_walk_mps2)} {
+  Chance turn_on{seed, Stream::kImuTurnOn};
+  gyro_bias_ = three(turn_on, numbers.gyro_turn_on_radps);
+  accel_bias_ = three(turn_on, numbers.accel_turn_on_mps2);
+  gyro_scale_ = three(turn_on, numbers.scale);
+  accel_scale_ = three(turn_on, numbers.scale);
+}
+
+Imu::Processes Imu::walks(double sigma) {
+  const auto one = [&] { return GaussMarkov{sigma, numbers_.walk_tau_s, period_s_, noise_}; };
+  return Processes{one(), one(), one()};
+}
+
+void Imu::sense(const Motion& motion, double speed_mps, base::Micros now, const Faults& faults) {
+  speed_mps_ = speed_mps;
+  const Vector3& a = motion.acceleration_n_mps2;
+  Vector3 force = to_body(motion.attitude_rad, {a[0], a[1], a[2] + gravity_mps2_});
+  Vector3 rate = to_body(motion.attitude_rad, earth_rate_n_radps_);
+  for (std::size_t i = 0; i < 3; ++i) rate[i] += motion.rate_b_radps[i];
+
+  // Tyre lugs: each axis hears them with another phase.
+  lug_phase_rad_ = wrap(lug_phase_rad_ + numbers_.lugs * speed_mps * kStep_s / wheel_radius_m_);
+  const Direction lug = direction(lug_phase_rad_);
+  const double share = magnitude(speed_mps) / kReferenceSpeed_mps;
+  const Vector3 shape{0.5 * lug.cos, 0.5 * lug.sin, 0.7 * (lug.cos + lug.sin)};
+  for (std::size_t i = 0; i < 3; ++i) {
+    force[i] = (force[i] + share * numbers_.vibration_mps2 * shape[i]) * (1 + accel_scale_[i]);
+    rate[i] = (rate[i] + share * numbers_.vibration_radps * shape[i]) * (1 + gyro_scale_[i]);
+  }
+  if (const auto on = faults.since(Fault::kImuClipping, now)) {
+    constexpr double kShake_radps = 2 * kPi * 97;  // a loose mount
+    const double shake = sim::sin(kShake_radps * static_cast<double>(on->us) * 1e-6);
+    for (std::size_t i = 0; i < 3; ++i) {
+      force[i] += FaultNumbers::kClipVibration_mps2 * shake;
+      rate[i] += FaultNumbers::kClipVibration_radps * shake;
+    }
+  }
+
+  bool gyro_clips = false;
+  bool accel_clips = false;
+  const auto add = [](double& sum, double raw, double range, bool& clips) {
+    const double limited = clamp(raw, -range, range);
+    clips = clips || magnitude(raw) > range;
+    sum += limited * kStep_s;
+  };
+  for (std::size_t i = 0; i < 3; ++i) {
+    add(angle_[i], rate[i], numbers_.gyro_range_radps, gyro_clips);
+    add(velocity_[i], force[i], numbers_.accel_range_mps2, accel_clips);
+  }
+  clipped_gyro_ += gyro_clips ? 1 : 0;
+  clipped_accel_ += accel_clips ? 1 : 0;
+}
+
+app::ImuSample Imu::sample(base::Micros now, const Faults& faults) {
+  const double root = sim::sqrt(period_s_);
+  const double share = magnitude(speed_mps_) / kReferenceSpeed_mps;
+  app::ImuSample s{.interval = {static_cast<std::int64_t>(period_s_ * 1e6 + 0.5)},
+                   .temperature_degC = single(numbers_.temperature_degC),
+                   .clipped_gyro = static_cast<std::uint8_t>(clipped_gyro_),
+                   .clipped_accel = static_cast<std::uint8_t>(clipped_accel_)};
+  const bool stepped = faults.active(Fault::kGyroBiasStep, now);
+  for (std::size_t i = 0; i < 3; ++i) {
+    double gyro_bias = gyro_bias_[i] + gyro_walk_[i].next(noise_);
+    if (stepped && i == 2) gyro_bias += FaultNumbers::kGyroStep_radps;
+    const double accel_bias = accel_bias_[i] + accel_walk_[i].next(noise_);
+    const double angle_noise = noise_.normal(numbers_.gyro_noise * root);
+    const double velocity_noise = noise_.normal(numbers_.accel_noise[i] * root) + vibration_.normal(numbers_.vibration_noise * share * root);
+    s.dangle_b_rad[i] = single(angle_[i] + gyro_bias * period_s_ + angle_noise);
+    s.dvelocity_b_mps[i] = single(velocity_[i] + accel_bias * period_s_ + velocity_noise);
+  }
+  angle_ = velocity_ = {};
+  clipped_gyro_ = clipped_accel_ = 0;
+  if (!faults.active(Fault::kImuStuck, now)) last_ = s;
+  return last_;
+}
+
+Wheels::Wheels(const WheelSensorNumbers& numbers, const RoverNumbers& rover, std::uint64_t seed)
+    : numbers_{numbers},
+      nominal_metres_per_count_{2 * kPi * rover.wheel_radius_m / numbers.counts_per_turn},
+      nominal_track_m_{rover.track_m},
+      chance_{seed, Stream::kWheels} {
+  left_.metres_per_count = nominal_metres_per_count_ * (1 + 0.5 * rover.radius_difference);
+  right_.metres_per_count = nominal_metres_per_count_ * (1 - 0.5 * rover.radius_difference);
+  for (Wheel* wheel : {&left_, &right_}) {
+    wheel->offset = static_cast<std::uint16_t>(65536 * chance_.uniform());
+    wheel->travel_m = wheel->metres_per_count * chance_.uniform();  // nobody parks on an edge of the encoder
+  }
+}
+
+void Wheels::sense(const Motion& motion, base::Micros now, const Faults& faults) {
+  double left_m = motion.rim_left_m;
+  double right_m = motion.rim_right_m;
+  if (faults.active(Fault::kSlipLeft, now)) left_m += FaultNumbers::kSpin_mps * kStep_s;
+  if (faults.active(Fault::kSlipRight, now)) right_m += FaultNumbers::kSpin_mps * kStep_s;
+  if (faults.active(Fault::kWheelStuck, now)) left_m = 0;
+  if (const auto on = faults.since(Fault::kEncoderDropout, now); on && on->us / FaultNumbers::kDropout_us % 2 == 0) right_m = 0;
+  left_.travel_m += left_m;
+  left_.unread_m += left_m;
+  right_.travel_m += right_m;
+  right_.unread_m += right_m;
+}
+
+void Wheels::read() {
+  for (Wheel* wheel : {&left_, &right_}) {
+    wheel->travel_m += chance_.normal() * sim::sqrt(numbers_.noise_m * magnitude(wheel->unread_m));
+    wheel->unread_m = 0;
+    wheel->read = wheel->count;
+    wheel->count = static_cast<std::int64_t>(sim::floor(wheel->travel_m / wheel->metres_per_count));
+  }
+}
+
+app::WheelCounts Wheels::counts() {
+  read();
+  const auto wrapped = [](const Wheel& w) { return static_cast<std::uint16_t>(static_cast<std::uint64_t>(w.count) + w.offset); };
+  return {.left = wrapped(left_), .right = wrapped(right_)};
+}
+
+app::WheelSpeeds Wheels::wheel_speeds() {
+  read();
+  const auto speed = [this](const Wheel& w) {
+    return single(static_cast<double>(w.count - w.read) * nominal_metres_per_count_ * numbers_.rate_hz);
+  };
+  return {.left_mps = speed(left_), .right_mps = speed(right_)};
+}
+
+app::BodySpeed Wheels::body_speed() {
+  read();
+  const double per_count = nominal_metres_per_count_ * numbers_.rate_hz;
+  const double left = static_cast<double>(left_.count - left_.read) * per_count;
+  const double right = static_cast<double>(right_.count - right_.read) * per_count;
+  return {.forward_mps = single(0.5 * (left + right)), .yaw_rate_radps = single((right - left) / nominal_track_m_)};
+}
+
+Gnss::Gnss(const GnssNumbers& numbers, const Wgs84& earth, std::uint64_t seed)
+    : numbers_{numbers},
+      earth_{&earth},
+      period_s_{period_s(numbers.rate_hz)},
+      noise_{seed, Stream::kGnssNoise},
+      outage_chance_{seed, Stream::kGnssOutage},
+      glitch_chance_{seed, Stream::kGnssGlitch},
+      accuracy_chance_{seed, Stream::kGnssAccuracy},
+      correlated_{GaussMarkov{numbers.correlated_m, numbers.correlated_tau_s, period_s_, noise_},
+                  GaussMarkov{numbers.correlated_m, numbers.correlated_tau_s, period_s_, noise_},
+                  GaussMarkov{numbers.correlated_m * numbers.vertical_factor, numbers.correlated_tau_s, period_s_, noise_}},
+      accuracy_{numbers.accuracy_error, 20, period_s_, accuracy_chance_} {}
+
+void Gnss::advance_errors(base::Micros now) {
+  for (auto& error : correlated_) error.next(noise_);
+  accuracy_.next(accuracy_chance_);
+
+  const bool quiet = now < numbers_.quiet_start;
+  const bool begins = numbers_.outage_every_s > 0 && outage_chance_.happens(period_s_ / numbers_.outage_every_s);
+  const double lasts_s = outage_chance_.uniform(numbers_.outage_min_s, numbers_.outage_max_s);
+  if (begins && !quiet && now >= outage_until_) outage_until_ = now + base::Micros{static_cast<std::int64_t>(lasts_s * 1e6)};
+
+  const bool strikes = glitch_chance_.happens(numbers_.glitch_probability);
+  const double size_m = glitch_chance_.uniform(numbers_.glitch_min_m, numbers_.glitch_max_m);
+  const Direction towards = direction(glitch_chance_.uniform(-kPi, kPi));
+  const int fixes = 1 + static_cast<int>(numbers_.glitch_fixes_max * glitch_chance_.uniform());
+  if (glitch_fixes_ > 0) --glitch_fixes_;
+  if (strikes && !quiet && glitch_fixes_ == 0) glitch_fixes_ = fixes, glitch_m_ = {size_m * towards.cos, size_m * towards.sin};
+}
+
+Gnss::Reading Gnss::sample(const Truth& truth, const Vector3& rate_b, base::Micros now, const Faults& faults) {
+  advance_errors(now);
+  const Vector3 white = three(noise_, numbers_.white_m);
+  const Vector3 velocity_noise = three(noise_, numbers_.velocity_mps);
+
+  const Vector3& l = numbers_.antenna_b_m;
+  const Vector3 attitude{truth.roll_rad, truth.pitch_rad, truth.yaw_rad};
+  const Vector3 lever_n = to_level(attitude, l);
+  const Vector3 swing_n =
+      to_level(attitude, {rate_b[1] * l[2] - rate_b[2] * l[1], rate_b[2] * l[0] - rate_b[0] * l[2], rate_b[0] * l[1] - rate_b[1] * l[0]});
+
+  Vector3 at_m{truth.x_m + lever_n[0] + correlated_[0].value() + white[0], truth.y_m + lever_n[1] + correlated_[1].value() + white[1],
+               truth.z_m + lever_n[2] + correlated_[2].value() + white[2] * numbers_.vertical_factor};
+  if (glitch_fixes_ > 0) at_m[0] += glitch_m_[0], at_m[1] += glitch_m_[1];
+  if (faults.active(Fault::kGnssJump, now)) at_m[0] += FaultNumbers::kJump_m;
+  if (const auto on = faults.since(Fault::kGnssRamp, now)) at_m[1] += FaultNumbers::kRamp_mps * static_cast<double>(on->us) * 1e-6;
+  if (faults.active(Fault::kGnssWrongHeight, now)) at_m[2] += FaultNumbers::kHeight_m;
+
+  const double believed = clamp(1 + accuracy_.value(), 0.5, 2);
+  const double sigma_m = sim::sqrt(numbers_.white_m * numbers_.white_m + numbers_.correlated_m * numbers_.correlated_m) * believed;
+  const GeodeticPoint point = earth_->geodetic(at_m);
+  Reading reading;
+  reading.position = app::GnssPosition{.latitude_2ndeg = point.latitude_2ndeg,
+                                       .longitude_2ndeg = point.longitude_2ndeg,
+                                       .height_m = single(point.height_m),
+                                       .horizontal_acc_m = single(sigma_m),
+                                       .vertical_acc_m = single(sigma_m * numbers_.vertical_factor),
+                                       .fix = app::GnssFix::kDifferential,
+                                       .satellites = 14};
+  Vector3 v;
+  for (std::size_t i = 0; i < 3; ++i) v[i] = truth.v_n_mps[i] + swing_n[i] + velocity_noise[i];
+  reading.velocity = app::GnssVelocity{.v_n_mps = {single(v[0]), single(v[1]), single(v[2])},
+                                       .acc_mps = single(numbers_.velocity_mps * believed)};
+
+  if (now < outage_until_ && last_.position) {
+    // A receiver that lost the sky goes on talking: its last position, and the word that it is none.
+    app::GnssPosition lost = *last_.position;
+    lost.fix = app::GnssFix::kNone;
+    lost.satellites = 2;
+    lost.horizontal_acc_m = lost.vertical_acc_m = kNone;
+    reading = {.position = lost, .velocity = std::nullopt};
+  } else if (faults.active(Fault::kGnssFrozen, now) && last_.position) {
+    reading = last_;
+  } else {
+    last_ = reading;
+  }
+  if (faults.active(Fault::kGnssOutage, now)) return {};
+  return reading;
+}
+
+Camera::Camera(const CameraNumbers& numbers, std::vector<Landmark> landmarks, std::uint64_t seed)
+    : numbers_{numbers},
+      landmarks_{std::move(landmarks)},
+      map_{landmarks_},
+      noise_{seed, Stream::kCamera},
+      wrong_{seed, Stream::kCameraWrong},
+      outlier_{seed, Stream::kFaultOutlier} {
+  Chance survey{seed, Stream::kSurvey};
+  for (auto& landmark : map_) {
+    landmark.x_m += survey.normal(numbers.survey_m);
+    landmark.y_m += survey.normal(numbers.survey_m);
+  }
+}
+
+std::vector<app::LandmarkSighting> Camera::sample(const Truth& truth, base::Micros now, const Faults& faults) {
+  std::vector<app::LandmarkSighting> sightings;
+  for (std::size_t i = 0; i < landmarks_.size(); ++i) {
+    const double dx = landmarks_[i].x_m - truth.x_m;
+    const double dy = landmarks_[i].y_m - truth.y_m;
+    const double range_m = sim::sqrt(dx * dx + dy * dy);
+    const double bearing_rad = wrap(sim::atan2(dy, dx) - truth.yaw_rad);
+    if (range_m > numbers_.range_max_m || magnitude(bearing_rad) > 0.5 * numbers_.field_of_view_rad) continue;
+
+    const bool missed = noise_.happens(numbers_.miss_probability);
+    const double range_noise = noise_.normal(numbers_.sigma_range_m + numbers_.sigma_range_per_m * range_m);
+    const double bearing_noise = noise_.normal(numbers_.sigma_bearing_rad);
+    const bool mistaken = wrong_.happens(numbers_.wrong_id_probability);
+    const auto other = static_cast<std::size_t>(static_cast<double>(landmarks_.size()) * wrong_.uniform());
+    const bool outlier = outlier_.happens(FaultNumbers::kOutlierShare);
+    const double outlier_range_m = outlier_.uniform(FaultNumbers::kOutlierRange_m[0], FaultNumbers::kOutlierRange_m[1]);
+    const double outlier_bearing_rad = outlier_.uniform(-FaultNumbers::kOutlierBearing_rad, FaultNumbers::kOutlierBearing_rad);
+    if (missed) continue;
+
+    double seen_m = range_m * (1 + numbers_.scale_error) + range_noise;
+    double seen_rad = bearing_rad - numbers_.mount_error_rad + bearing_noise;
+    std::size_t named = mistaken ? other : i;
+    if (faults.active(Fault::kLandmarkWrongId, now) && (named ^ 1U) < landmarks_.size()) named ^= 1U;
+    if (outlier && faults.active(Fault::kLandmarkOutlier, now)) seen_m += outlier_range_m, seen_rad += outlier_bearing_rad;
+    sightings.push_back({.landmark = landmarks_[named].id,
+                         .range_m = single(seen_m > 0 ? seen_m : 0),
+                         .bearing_rad = single(wrap(seen_rad))});
+  }
+  return sightings;
+}
+
+}  // namespace tetap::sim

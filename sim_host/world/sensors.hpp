@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: Apache-2.0
+// The sensors: each sees the truth, adds its own errors and the faults that concern it, and says an app:: sample.
+// A fault never changes how many random numbers are drawn, so with and without it everything else is the same.
+#pragma once
+
+#include "app/samples.hpp"
+#include "sim_host/world/chance.hpp"
+#include "sim_host/world/faults.hpp"
+#include "sim_host/world/numbers.hpp"
+#include "sim_host/world/rover.hpp"
+#include "sim_host/world/wgs84.hpp"
+
+#include <array>
+#include <optional>
+#include <vector>
+
+namespace tetap::sim {
+
+/// Raw samples at 2 kHz, limited to full scale, summed to increments between two calls of sample().
+class Imu {
+ public:
+  Imu(const ImuNumbers& numbers, double wheel_radius_m, const Wgs84& earth, std::uint64_t seed);
+  void sense(const Motion& motion, double speed_mps, base::Micros now, const Faults& faults);
+  [[nodiscard]] app::ImuSample sample(base::Micros now, const Faults& faults);
+
+ private:
+  using Processes = std::array<GaussMarkov, 3>;
+  [[nodiscard]] Processes walks(double sigma);
+
+  ImuNumbers numbers_;
+  double period_s_;
+  double wheel_radius_m_;
+  double gravity_mps2_;
+  Vector3 earth_rate_n_radps_;
+  Chance noise_, vibration_;
+  Vector3 gyro_bias_{}, accel_bias_{}, gyro_scale_{}, accel_scale_{};
+  Processes gyro_walk_, accel_walk_;
+  Vector3 angle_{}, velocity_{};
+  double lug_phase_rad_ = 0;
+  double speed_mps_ = 0;
+  int clipped_gyro_ = 0, clipped_accel_ = 0;
+  app::ImuSample last_;
+};
+
+/// Quadrature counters of both wheels, or speeds made from their differences.
+class Wheels {
+ public:
+  Wheels(const WheelSensorNumbers& numbers, const RoverNumbers& rover, std::uint64_t seed);
+  void sense(const Motion& motion, base::Micros now, const Faults& faults);
+  [[nodiscard]] app::WheelCounts counts();
+  [[nodiscard]] app::WheelSpeeds wheel_speeds();
+  [[nodiscard]] app::BodySpeed body_speed();
+
+ private:
+  struct Wheel {
+    double metres_per_count = 0;   ///< with the true radius
+    double travel_m = 0;           ///< of the rim, with the sensor's noise
+    double unread_m = 0;           ///< since the last reading
+    std::int64_t count = 0;
+    std::int64_t read = 0;
+    std::uint16_t offset = 0;      ///< counters free-run: nobody zeroes them
+  };
+  void read();
+
+  WheelSensorNumbers numbers_;
+  double nominal_metres_per_count_;
+  double nominal_track_m_;
+  Chance chance_;
+  Wheel left_, right_;
+};
+
+class Gnss {
+ public:
+  struct Reading {
+    std::optional<app::GnssPosition> position;
+    std::optional<app::GnssVelocity> velocity;
+  };
+  Gnss(const GnssNumbers& numbers, const Wgs84& earth, std::uint64_t seed);
+  [[nodiscard]] Reading sample(const Truth& truth, const Vector3& rate_b_radps, base::Micros now, const Faults& faults);
+
+ private:
+  void advance_errors(base::Micros now);
+
+  GnssNumbers numbers_;
+  const Wgs84* earth_;
+  double period_s_;
+  Chance noise_, outage_chance_, glitch_chance_, accuracy_chance_;
+  std::array<GaussMarkov, 3> correlated_;
+  GaussMarkov accuracy_;
+  base::Micros outage_until_;
+  int glitch_fixes_ = 0;
+  std::array<double, 2> glitch_m_{};
+  Reading last_;
+};
+
+/// Range and bearing to landmarks with known identity.
+class Camera {
+ public:
+  Camera(const CameraNumbers& numbers, std::vector<Landmark> landmarks, std::uint64_t seed);
+  [[nodiscard]] std::vector<app::LandmarkSighting> sample(const Truth& truth, base::Micros now, const Faults& faults);
+  /// What a surveyor gives: positions with an error of a few centimetres.
+  [[nodiscard]] const std::vector<Landmark>& map() const { return map_; }
+
+ private:
+  CameraNumbers numbers_;
+  std::vector<Landmark> landmarks_;
+  std::vector<Landmark> map_;
+  Chance noise_, wrong_, outlier_;
+};
+
+}  // namespace tetap::sim

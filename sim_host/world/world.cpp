@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "sim_host/world/world.hpp"
+
+#include <algorithm>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+namespace tetap::sim {
+namespace {
+
+// When within its period a sensor samples: no two clocks tick together, and IMU and wheels are there before a tick at a full 10 ms.
+constexpr base::Micros kImuPhase{9'000};
+constexpr base::Micros kWheelPhase{8'500};
+constexpr base::Micros kGnssPhase{104'000};
+constexpr base::Micros kCameraPhase{33'500};
+
+void check_rate(const char* what, int rate_hz) {
+  if (rate_hz < 0 || (rate_hz > 0 && (2000 % rate_hz != 0)))
+    throw std::invalid_argument(std::string{what} + " rate of " + std::to_string(rate_hz) + " Hz does not divide 2000 Hz");
+}
+
+bool due(int rate_hz, base::Micros phase, base::Micros now) {
+  if (rate_hz == 0) return false;
+  const std::int64_t period_us = 1'000'000 / rate_hz;
+  return now.us % period_us == phase.us % period_us;
+}
+
+bool later(base::Micros a_arrival, std::uint64_t a_order, base::Micros b_arrival, std::uint64_t b_order) {
+  return a_arrival != b_arrival ? a_arrival > b_arrival : a_order > b_order;
+}
+
+}  // namespace
+
+Numbers World::effective(const Options& options) {
+  Numbers n = options.numbers;
+  if (!options.mismatched) n = matched(n);
+  if (!options.latency) n = without_latency(n);
+  check_rate("IMU", n.imu.rate_hz);
+  check_rate("wheel", n.wheels.rate_hz);
+  check_rate("GNSS", n.gnss.rate_hz);
+  check_rate("landmark", n.camera.rate_hz);
+  if (options.substeps < 1) throw std::invalid_argument("substeps must be 1 or more");
+  return n;
+}
+
+World::World(const Options& options, std::uint64_t seed)
+    : numbers_{effective(options)},
+      start_{options.start},
+      faults_{options.faults},
+      plan_{std::make_unique<const Plan>(options.course, options.limits)},
+      earth_{std::make_unique<const Wgs84>(options.origin)},
+      rover_{numbers_.rover, *plan_, seed, options.substeps},
+      imu_{numbers_.imu, numbers_.rover.wheel_radius_m, *earth_, seed},
+      wheels_{numbers_.wheels, numbers_.rover, seed},
+      gnss_{numbers_.gnss, *earth_, seed},
+      camera_{numbers_.camera, options.course.landmarks, seed},
+      imu_latency_{seed, Stream::kImuLatency},
+      wheel_latency_{seed, Stream::kWheelLatency},
+      gnss_latency_{seed, Stream::kGnssLatency},
+      camera_latency_{seed, Stream::kCameraLatency},
+      loss_{seed, Stream::kFaultLoss} {}
+
+Truth World::truth() const {
+  Truth t = rover_.truth();
+  t.time = start_ + now_;
+  return t;
+}
+
+StartPose World::start_pose() const {
+  const PathPoint at = plan_->path(0);
+  return {.x_m = at.x_m, .y_m = at.y_m, .yaw_rad = wrap(at.yaw_rad), .sigma_m = numbers_.rover.start_m, .sigma_yaw_rad = numbers_.rover.start_rad};
+}
+
+base::Micros World::clock_offset_at(base::Micros since_start) const {
+  return {faults_.active(Fault::kClockJump, since_start) ? FaultNumbers::kClockJump_us : 0};
+}
+
+void World::kidnap() {
+  const double s_m = plan_->at(now_ + rover_.ahead()).s_m;
+  const base::Micros there = plan_->time_at(std::min(s_m + FaultNumbers::kKidnapped_m, plan_->length_m()));
+  rover_.set_ahead(there - now_);
+  rover_.place(plan_->path(plan_->at(there).s_m));
+}
+
+void World::emit(Value value, std::uint8_t sequence, base::Micros stamp_late, base::Micros latency) {
+  const base::Micros at = start_ + now_;
+  base::Micros stamp = at + stamp_late + clock_offset_at(now_);
+  if (faults_.active(Fault::kStaleStamps, now_)) stamp = stamp - base::Micros{FaultNumbers::kStale_us};
+  if (faults_.active(Fault::kFutureStamps, now_)) stamp = stamp + base::Micros{FaultNumbers::kFuture_us};
+  unsigned lost = 0;
+  if (faults_.active(Fault::kLostFrames, now_))
+    for (int part = 0; part < parts(value); ++part) lost |= loss_.happens(FaultNumbers::kLossShare) ? 1U << part : 0U;
+  pending_.push_back({Measurement{.stamp = stamp,
+                                  .arrival = at + stamp_late + latency,
+                                  .sequence = sequence,
+                                  .lost_parts = static_cast<std::uint8_t>(lost),
+                                  .value = std::move(value)},
+                      made_++});
+  std::push_heap(pending_.begin(), pending_.end(), [](const Pending& a, const Pending& b) {
+    return later(a.measurement.arrival, a.order, b.measurement.arrival, b.order);
+  });
+}
+
+void World::step() {
+  const base::Micros before = now_;
+  now_ += Rover::kStep;
+  if (faults_.starts(Fault::kKidnapped, before, now_)) kidnap();
+  const Motion motion = rover_.step(now_);
+  rate_b_radps_ = motion.rate_b_radps;
+
+  const auto& n = numbers_;
+  if (n.imu.rate_hz > 0) {
+    imu_.sense(motion, rover_.truth().speed_mps, now_, faults_);
+    if (due(n.imu.rate_hz, kImuPhase, now_))
+      emit(imu_.sample(now_, faults_), imu_sequence_++, {}, imu_latency_.between(n.imu.latency_min, n.imu.latency_max));
+  }
+  if (n.wheels.rate_hz > 0) {
+    wheels_.sense(motion, now_, faults_);
+    if (due(n.wheels.rate_hz, kWheelPhase, now_)) {
+      const base::Micros late = wheel_latency_.between({}, n.wheels.stamp_late_max);
+      const base::Micros latency = wheel_latency_.between(n.wheels.latency_min, n.wheels.latency_max);
+      const Value value = n.wheels.output == WheelOutput::kCounts        ? Value{wheels_.counts()}
+                          : n.wheels.output == WheelOutput::kWheelSpeeds ? Value{wheels_.wheel_speeds()}
+                                                                         : Value{wheels_.body_speed()};
+      emit(value, wheel_sequence_++, late, latency);
+    }
+  }
+  if (due(n.gnss.rate_hz, kGnssPhase, now_)) {
+    const Gnss::Reading reading = gnss_.sample(truth(), rate_b_radps_, now_, faults_);
+    const base::Micros latency = gnss_latency_.between(n.gnss.latency_min, n.gnss.latency_max);
+    if (reading.position) emit(*reading.position, position_sequence_++, {}, latency);
+    if (reading.velocity) emit(*reading.velocity, velocity_sequence_++, {}, latency);
+  }
+  if (due(n.camera.rate_hz, kCameraPhase, now_)) {
+    const base::Micros latency = camera_latency_.between(n.camera.latency_min, n.camera.latency_max);
+    for (const auto& sighting : camera_.sample(truth(), now_, faults_)) emit(sighting, sighting_sequence_++, {}, latency);
+  }
+}
+
+void World::advance_to(base::Micros t, std::vector<Measurement>& arrived) {
+  while (start_ + now_ + Rover::kStep <= t) step();
+  const auto by_arrival = [](const Pending& a, const Pending& b) {
+    return later(a.measurement.arrival, a.order, b.measurement.arrival, b.order);
+  };
+  while (!pending_.empty() && pending_.front().measurement.arrival <= t) {
+    std::pop_heap(pending_.begin(), pending_.end(), by_arrival);
+    arrived.push_back(std::move(pending_.back().measurement));
+    pending_.pop_back();
+  }
+}
+
+}  // namespace tetap::sim

@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: Apache-2.0
+// The simulated world: a rover on a course, seen by its sensors. The same options and seed give the same measurements, bit for bit, on
+// every host; the truth leaves only by truth(), for judges.
+#pragma once
+
+#include "base/time.hpp"
+#include "sim_host/world/course.hpp"
+#include "sim_host/world/faults.hpp"
+#include "sim_host/world/measurement.hpp"
+#include "sim_host/world/numbers.hpp"
+#include "sim_host/world/rover.hpp"
+#include "sim_host/world/sensors.hpp"
+#include "sim_host/world/wgs84.hpp"
+
+#include <memory>
+#include <span>
+#include <vector>
+
+namespace tetap::sim {
+
+/// What a start command can know: where the rover was put, and how well.
+struct StartPose {
+  double x_m = 0, y_m = 0, yaw_rad = 0;
+  double sigma_m = 0, sigma_yaw_rad = 0;
+};
+
+class World {
+ public:
+  struct Options {
+    bool mismatched = true;           ///< false: only errors that filters model, see matched()
+    bool latency = true;              ///< false: everything arrives at its stamp
+    Numbers numbers;
+    Course course = default_course();
+    CourseLimits limits;
+    GeodeticOrigin origin{.latitude_deg = 48.2627, .longitude_deg = 11.6683, .height_m = 520};
+    std::vector<FaultSetting> faults;
+    base::Micros start{1'000'000};    ///< time of the bus when the run starts
+    int substeps = 1;                 ///< integration steps per 0.5 ms
+  };
+
+  /// Throws std::invalid_argument where a rate does not divide 2000 Hz or the course cannot be driven.
+  World(const Options& options, std::uint64_t seed);
+
+  /// Lets the world run until `t`; appends what has arrived by then, in the order of arrival. Never runs backwards.
+  void advance_to(base::Micros t, std::vector<Measurement>& arrived);
+
+  /// Times of the world: start() until start() + duration(). Truth is as of the last advance_to, on the grid of 0.5 ms.
+  [[nodiscard]] Truth truth() const;
+  [[nodiscard]] base::Micros start() const { return start_; }
+  [[nodiscard]] base::Micros duration() const { return plan_->duration(); }
+  /// By how much the clock of the bus is off now (fault clock_jump): what sync frames add to the world's time.
+  [[nodiscard]] base::Micros clock_offset() const { return clock_offset_at(now_); }
+
+  /// What may be told to a filter.
+  [[nodiscard]] StartPose start_pose() const;
+  [[nodiscard]] std::span<const Landmark> map() const { return camera_.map(); }
+  [[nodiscard]] const GeodeticOrigin& origin() const { return earth_->origin(); }
+  [[nodiscard]] const Numbers& numbers() const { return numbers_; }
+  [[nodiscard]] const Plan& plan() const { return *plan_; }
+
+ private:
+  struct Pending {
+    Measurement measurement;
+    std::uint64_t order;  ///< of making: what arrives at one instant keeps it
+  };
+  static Numbers effective(const Options& options);
+  [[nodiscard]] base::Micros clock_offset_at(base::Micros since_start) const;
+  void step();
+  void kidnap();
+  void emit(Value value, std::uint8_t sequence, base::Micros stamp_late, base::Micros latency);
+
+  Numbers numbers_;
+  base::Micros start_;
+  Faults faults_;
+  // Behind pointers, because sensors and rover point at them and a World may move.
+  std::unique_ptr<const Plan> plan_;
+  std::unique_ptr<const Wgs84> earth_;
+  Rover rover_;
+  Imu imu_;
+  Wheels wheels_;
+  Gnss gnss_;
+  Camera camera_;
+  Chance imu_latency_, wheel_latency_, gnss_latency_, camera_latency_, loss_;
+  base::Micros now_;  ///< since the start
+  Vector3 rate_b_radps_{};
+  std::uint8_t imu_sequence_ = 0, wheel_sequence_ = 0, position_sequence_ = 0, velocity_sequence_ = 0, sighting_sequence_ = 0;
+  std::uint64_t made_ = 0;
+  std::vector<Pending> pending_;
+};
+
+}  // namespace tetap::sim

@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "sim_host/world/course.hpp"
+
+#include "sim_host/world/math.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <set>
+#include <stdexcept>
+
+namespace tetap::sim {
+namespace {
+
+constexpr base::Micros kStep{2'000};
+
+TEST(Course, the_default_path_is_continuous_in_position_and_heading) {
+  const Plan plan{default_course(), {}};
+  for (double s = 0; s + 0.01 <= plan.length_m(); s += 0.01) {
+    const PathPoint a = plan.path(s);
+    const PathPoint b = plan.path(s + 0.01);
+    const double chord = sim::sqrt((b.x_m - a.x_m) * (b.x_m - a.x_m) + (b.y_m - a.y_m) * (b.y_m - a.y_m));
+    ASSERT_NEAR(chord, 0.01, 1e-5) << s;
+    ASSERT_LE(magnitude(b.yaw_rad - a.yaw_rad), 0.01 / 0.6 + 1e-9) << s;
+  }
+}
+
+TEST(Course, the_default_course_fits_a_yard_and_comes_home) {
+  const Course course = default_course();
+  const Plan plan{course, {}};
+  for (double s = 0; s <= plan.length_m(); s += 0.1) {
+    const PathPoint p = plan.path(s);
+    ASSERT_TRUE(p.x_m >= -6 && p.x_m <= 54 && p.y_m >= -6 && p.y_m <= 34) << s;
+  }
+  const PathPoint end = plan.path(plan.length_m());
+  EXPECT_LT(sim::sqrt(end.x_m * end.x_m + end.y_m * end.y_m), 1);
+  EXPECT_GE(plan.duration().us, 180'000'000);
+  EXPECT_LE(plan.duration().us, 240'000'000);
+  EXPECT_GE(course.landmarks.size(), 12U);
+  EXPECT_LE(course.landmarks.size(), 20U);
+  std::set<int> ids;
+  for (const auto& landmark : course.landmarks) ids.insert(landmark.id);
+  EXPECT_EQ(ids.size(), course.landmarks.size());
+}
+
+TEST(Course, no_landmark_stands_in_the_way) {
+  const Course course = default_course();
+  const Plan plan{course, {}};
+  for (double s = 0; s <= plan.length_m(); s += 0.1)
+    for (const auto& l : course.landmarks) {
+      const PathPoint p = plan.path(s);
+      ASSERT_GT((l.x_m - p.x_m) * (l.x_m - p.x_m) + (l.y_m - p.y_m) * (l.y_m - p.y_m), 1.5 * 1.5) << "landmark " << int{l.id};
+    }
+}
+
+TEST(Course, the_plan_keeps_every_limit_and_uses_each_of_them) {
+  for (const double speed : {0.5, 2.0, 5.0}) {
+    const CourseLimits limits{.speed_mps = speed};
+    const Plan plan{default_course(), limits};
+    double top = 0, top_lateral = 0, top_turn = 0;
+    for (base::Micros t; t <= plan.duration(); t += kStep) {
+      const PlanPoint p = plan.at(t);
+      const double bend = magnitude(plan.path(p.s_m).curvature_per_m);
+      ASSERT_LE(magnitude(p.acceleration_mps2), limits.acceleration_mps2 * 1.001) << t.us;
+      // A corner begins between two nodes of the plan, 2 cm apart.
+      ASSERT_LE(p.speed_mps * p.speed_mps * bend, limits.lateral_mps2 + 2 * 0.02 * bend) << t.us;
+      top = std::max(top, p.speed_mps);
+      top_lateral = std::max(top_lateral, p.speed_mps * p.speed_mps * bend);
+      top_turn = std::max(top_turn, p.speed_mps * bend);
+    }
+    EXPECT_LE(top, speed * (1 + 1e-12));
+    EXPECT_GE(top, speed * 0.95);
+    if (speed >= 2) {
+      EXPECT_GE(top_lateral, 0.95 * limits.lateral_mps2);
+      EXPECT_GE(top_turn, 1.0);
+    }
+  }
+}
+
+TEST(Course, speed_is_the_derivative_of_path_length) {
+  const Plan plan{default_course(), {}};
+  for (base::Micros t; t + kStep <= plan.duration(); t += kStep) {
+    const PlanPoint a = plan.at(t);
+    const PlanPoint b = plan.at(t + kStep);
+    ASSERT_NEAR((b.s_m - a.s_m) / 2e-3, 0.5 * (a.speed_mps + b.speed_mps), 2e-3) << t.us;
+  }
+}
+
+TEST(Course, the_rover_stands_at_the_start_in_the_middle_and_at_the_end) {
+  const Plan plan{default_course(), {}};
+  double parked_s = 0;
+  int stands = 0;
+  bool before = false;
+  for (base::Micros t; t < plan.duration(); t += kStep) {
+    const bool parked = plan.at(t).parked;
+    stands += parked && !before ? 1 : 0;
+    parked_s += parked ? 2e-3 : 0;
+    before = parked;
+  }
+  EXPECT_EQ(stands, 3);
+  EXPECT_NEAR(parked_s, 10 + 12 + 8, 0.05);
+}
+
+TEST(Course, time_at_is_the_inverse_of_at) {
+  const Plan plan{default_course(), {}};
+  for (double s = 0.5; s < plan.length_m(); s += 7.3) EXPECT_NEAR(plan.at(plan.time_at(s)).s_m, s, 0.021);
+}
+
+TEST(Course, a_course_that_cannot_be_driven_is_refused_with_the_waypoint) {
+  const auto message = [](std::vector<Waypoint> waypoints) -> std::string {
+    try {
+      const Plan plan{{.waypoints = std::move(waypoints), .landmarks = {}}, {}};
+    } catch (const std::invalid_argument& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_NE(message({{.x_m = 0}, {.x_m = 2, .radius_m = 3}, {.x_m = 2, .y_m = 9}}).find("waypoint 1: its arc does not fit"), std::string::npos);
+  EXPECT_NE(message({{.x_m = 0}, {.x_m = 2}, {.x_m = 2, .y_m = 9}}).find("waypoint 1: a corner without a radius"), std::string::npos);
+  EXPECT_NE(message({{.x_m = 0}, {.x_m = 9, .radius_m = 1, .stop_s = 1}, {.x_m = 9, .y_m = 9}}).find("waypoint 1: a standstill"), std::string::npos);
+  EXPECT_NE(message({{.x_m = 0}}), "");
+}
+
+}  // namespace
+}  // namespace tetap::sim

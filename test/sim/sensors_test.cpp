@@ -1,0 +1,391 @@
+// SPDX-License-Identifier: Apache-2.0
+// Statistics of every sensor, with bounds on both sides: an error that is too small is as wrong as one that is too large.
+#include "sim_host/world/sensors.hpp"
+
+#include "test/sim/support.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+namespace tetap::sim {
+namespace {
+
+const Wgs84 kEarth{{48.2627, 11.6683, 520}};
+const Faults kNoFaults;
+
+/// Allan deviation of rates at averaging time m samples (IEEE Std 952, annex C, non-overlapping).
+double allan(const std::vector<double>& rates, std::size_t m) {
+  std::vector<double> means;
+  for (std::size_t i = 0; i + m <= rates.size(); i += m) {
+    double sum = 0;
+    for (std::size_t k = i; k < i + m; ++k) sum += rates[k];
+    means.push_back(sum / static_cast<double>(m));
+  }
+  double square = 0;
+  for (std::size_t i = 1; i < means.size(); ++i) square += (means[i] - means[i - 1]) * (means[i] - means[i - 1]);
+  return sim::sqrt(0.5 * square / static_cast<double>(means.size() - 1));
+}
+
+/// Samples of an IMU at rest for that long: six series, rate and specific force.
+std::array<std::vector<double>, 6> imu_at_rest(const ImuNumbers& numbers, double seconds, std::uint64_t seed) {
+  Imu imu{numbers, 0.1, kEarth, seed};
+  const int steps = 2000 / numbers.rate_hz;
+  std::array<std::vector<double>, 6> series;
+  base::Micros now;
+  for (int i = 0; i < static_cast<int>(seconds * numbers.rate_hz); ++i) {
+    for (int k = 0; k < steps; ++k) imu.sense({}, 0, now += Rover::kStep, kNoFaults);
+    const app::ImuSample s = imu.sample(now, kNoFaults);
+    for (std::size_t a = 0; a < 3; ++a) {
+      series[a].push_back(static_cast<double>(s.dangle_b_rad[a]) * numbers.rate_hz);
+      series[3 + a].push_back(static_cast<double>(s.dvelocity_b_mps[a]) * numbers.rate_hz);
+    }
+  }
+  return series;
+}
+
+TEST(GaussMarkov, has_the_stated_variance_and_correlation_time) {
+  Chance chance{1, Stream::kSlip};
+  GaussMarkov process{2.0, 3.0, 0.1, chance};
+  std::vector<double> values;
+  for (int i = 0; i < 400'000; ++i) values.push_back(process.next(chance));
+  EXPECT_NEAR(statistics(values).variance, 4, 0.2);
+  EXPECT_NEAR(correlation(values, 30), std::exp(-1), 0.03);
+  EXPECT_NEAR(correlation(values, 60), std::exp(-2), 0.03);
+}
+
+TEST(Chance, uniform_and_normal_have_their_moments_and_streams_are_apart) {
+  Chance a{1, Stream::kSlip};
+  Chance b{1, Stream::kGround};
+  std::vector<double> uniform, normal, product;
+  double fourth = 0;
+  for (int i = 0; i < 200'000; ++i) {
+    uniform.push_back(a.uniform());
+    ASSERT_GT(uniform.back(), 0);
+    ASSERT_LT(uniform.back(), 1);
+    normal.push_back(a.normal());
+    product.push_back(normal.back() * b.normal());
+    fourth += std::pow(normal.back(), 4) / 200'000;
+  }
+  EXPECT_NEAR(statistics(uniform).mean, 0.5, 0.003);
+  EXPECT_NEAR(statistics(uniform).variance, 1.0 / 12, 0.001);
+  EXPECT_NEAR(statistics(normal).mean, 0, 0.01);
+  EXPECT_NEAR(statistics(normal).variance, 1, 0.015);
+  EXPECT_NEAR(fourth, 3, 0.1);
+  EXPECT_NEAR(statistics(product).mean, 0, 0.01);
+}
+
+TEST(Imu, white_noise_is_the_data_sheets_at_every_rate) {
+  for (const int rate_hz : {100, 200, 400}) {
+    ImuNumbers numbers = matched(Numbers{}).imu;
+    numbers.rate_hz = rate_hz;
+    const auto series = imu_at_rest(numbers, 300, 5);
+    for (std::size_t a = 0; a < 3; ++a) {
+      // Allan deviation of white noise at one second is the density itself.
+      EXPECT_NEAR(allan(series[a], static_cast<std::size_t>(rate_hz)) / numbers.gyro_noise, 1, 0.2);
+      EXPECT_NEAR(allan(series[3 + a], static_cast<std::size_t>(rate_hz)) / numbers.accel_noise[a], 1, 0.2);
+      EXPECT_NEAR(statistics(series[a]).variance / (numbers.gyro_noise * numbers.gyro_noise * rate_hz), 1, 0.05);
+    }
+  }
+}
+
+TEST(Imu, allan_deviation_falls_with_white_noise_and_rises_with_the_wandering_bias) {
+  ImuNumbers numbers;
+  numbers.gyro_walk_radps = 3e-4;  // strong enough to stand out within twenty minutes
+  numbers.walk_tau_s = 60;
+  const auto series = imu_at_rest(numbers, 1200, 6);
+  const double white = allan(series[2], 100);
+  EXPECT_NEAR(allan(series[2], 400) / white, 0.5, 0.25);
+  EXPECT_GT(allan(series[2], 6000), 2 * numbers.gyro_noise / sim::sqrt(60.0) * 2);
+  EXPECT_LT(allan(series[2], 6000), 6e-4);
+}
+
+TEST(Imu, turn_on_biases_differ_between_seeds_by_as_much_as_stated) {
+  std::vector<double> gyro, accel;
+  const ImuNumbers numbers;
+  for (std::uint64_t seed = 1; seed <= 150; ++seed) {
+    const auto series = imu_at_rest(numbers, 2, seed);
+    for (std::size_t a = 0; a < 2; ++a) {
+      gyro.push_back(statistics(series[a]).mean);
+      accel.push_back(statistics(series[3 + a]).mean);
+    }
+  }
+  EXPECT_NEAR(sim::sqrt(statistics(gyro).variance) / numbers.gyro_turn_on_radps, 1, 0.15);
+  EXPECT_NEAR(sim::sqrt(statistics(accel).variance) / numbers.accel_turn_on_mps2, 1, 0.15);
+}
+
+TEST(Imu, at_rest_it_feels_gravity_upward_and_the_turning_earth) {
+  ImuNumbers numbers = matched(Numbers{}).imu;
+  numbers.earth_rotation = true;
+  numbers.gyro_noise = 0;
+  const auto series = imu_at_rest(numbers, 60, 7);
+  EXPECT_NEAR(statistics(series[5]).mean, kEarth.gravity_mps2(), 3e-4);
+  EXPECT_NEAR(statistics(series[3]).mean, 0, 3e-4);
+  EXPECT_NEAR(statistics(series[2]).mean, 7.292115e-5 * std::sin(48.2627 * kPi / 180), 1e-9);
+  EXPECT_NEAR(statistics(series[1]).mean, 7.292115e-5 * std::cos(48.2627 * kPi / 180), 1e-9);
+}
+
+TEST(Imu, vibration_grows_with_speed_and_is_none_at_rest) {
+  ImuNumbers numbers = matched(Numbers{}).imu;
+  numbers.accel_noise = {};
+  numbers.vibration_mps2 = 1.5;
+  numbers.rate_hz = 400;
+  const auto spread = [&](double speed) {
+    Imu imu{numbers, 0.1, kEarth, 1};
+    std::vector<double> z;
+    base::Micros now;
+    for (int i = 0; i < 4000; ++i) {
+      for (int k = 0; k < 5; ++k) imu.sense({}, speed, now += Rover::kStep, kNoFaults);
+      z.push_back(static_cast<double>(imu.sample(now, kNoFaults).dvelocity_b_mps[2]) * 400);
+    }
+    return sim::sqrt(statistics(z).variance);
+  };
+  EXPECT_LT(spread(0), 1e-4);
+  const double slow = spread(1);
+  const double fast = spread(2);
+  EXPECT_NEAR(fast / slow, 2, 0.2);
+  EXPECT_NEAR(fast, 1.5 * 0.7, 0.15);  // amplitude 0.7 sqrt 2 of 1.5 m/s^2 has the rms 0.7 of it
+}
+
+Motion rolling(double left_m, double right_m) {
+  Motion motion;
+  motion.rim_left_m = left_m;
+  motion.rim_right_m = right_m;
+  return motion;
+}
+
+TEST(Wheels, counting_rounds_down_to_a_count_and_never_drifts) {
+  const WheelSensorNumbers numbers;
+  const RoverNumbers rover{.radius_difference = 0};
+  const double metres = 2 * kPi * rover.wheel_radius_m / numbers.counts_per_turn;
+  Wheels wheels{numbers, rover, 3};
+  base::Micros now;
+  const app::WheelCounts first = wheels.counts();
+  app::WheelCounts last = first;
+  std::vector<double> error;
+  double truth_m = 0;
+  std::int64_t left = 0;
+  for (int i = 0; i < 20'000; ++i) {
+    const double step_m = 1.234567e-3 * (1 + 0.5 * sim::sin(0.01 * i));
+    truth_m += step_m;
+    wheels.sense(rolling(step_m, -step_m), now += Rover::kStep, kNoFaults);
+    const app::WheelCounts counts = wheels.counts();
+    left += static_cast<std::int16_t>(counts.left - last.left);
+    last = counts;
+    error.push_back(truth_m / metres - static_cast<double>(left));
+    ASSERT_LT(magnitude(error.back()), 1) << i;
+  }
+  EXPECT_NEAR(statistics(error).variance, 1.0 / 12, 0.1 / 12);
+}
+
+TEST(Wheels, counters_start_anywhere_and_wrap_both_ways) {
+  std::vector<double> starts;
+  for (std::uint64_t seed = 1; seed <= 300; ++seed) starts.push_back(Wheels{{}, {}, seed}.counts().left);
+  EXPECT_NEAR(statistics(starts).mean, 32768, 4000);
+  EXPECT_GT(*std::max_element(starts.begin(), starts.end()), 64000);
+  EXPECT_LT(*std::min_element(starts.begin(), starts.end()), 1500);
+}
+
+TEST(Wheels, matched_noise_has_the_variance_k_per_metre) {
+  const Numbers n = matched(Numbers{});
+  Wheels wheels{n.wheels, n.rover, 3};
+  const double metres = 2 * kPi * n.rover.wheel_radius_m / n.wheels.counts_per_turn;
+  base::Micros now;
+  app::WheelCounts last = wheels.counts();
+  std::vector<double> left, right;
+  for (int i = 0; i < 30'000; ++i) {
+    wheels.sense(rolling(0.02, 0.01), now += Rover::kStep, kNoFaults);
+    const app::WheelCounts counts = wheels.counts();
+    left.push_back(static_cast<std::int16_t>(counts.left - last.left) * metres - 0.02);
+    right.push_back(static_cast<std::int16_t>(counts.right - last.right) * metres - 0.01);
+    last = counts;
+  }
+  // Rounding adds two twelfths of a squared count to each difference.
+  const double rounding = metres * metres / 6;
+  EXPECT_NEAR((statistics(left).variance - rounding) / (n.wheels.noise_m * 0.02), 1, 0.04);
+  EXPECT_NEAR((statistics(right).variance - rounding) / (n.wheels.noise_m * 0.01), 1, 0.04);
+  EXPECT_NEAR(statistics(left).mean, 0, 2e-5);
+}
+
+TEST(Wheels, speeds_are_the_counts_differences_over_the_interval) {
+  WheelSensorNumbers numbers;
+  numbers.rate_hz = 50;
+  numbers.counts_per_turn = 1e6;
+  const RoverNumbers rover{.radius_difference = 0};
+  Wheels a{numbers, rover, 3};
+  Wheels b{numbers, rover, 3};
+  base::Micros now;
+  for (int i = 0; i < 40; ++i) {
+    a.sense(rolling(0.8 / 2000, 1.2 / 2000), now += Rover::kStep, kNoFaults);
+    b.sense(rolling(0.8 / 2000, 1.2 / 2000), now, kNoFaults);
+  }
+  const app::WheelSpeeds speeds = a.wheel_speeds();
+  EXPECT_NEAR(speeds.left_mps, 0.8F, 1e-4F);
+  EXPECT_NEAR(speeds.right_mps, 1.2F, 1e-4F);
+  const app::BodySpeed body = b.body_speed();
+  EXPECT_NEAR(body.forward_mps, 1.0F, 1e-4F);
+  EXPECT_NEAR(body.yaw_rate_radps, 0.8F, 2e-4F);
+}
+
+TEST(Wheels, slip_is_there_in_curves_and_on_acceleration_and_small) {
+  World::Options options{.latency = false};
+  options.numbers.rover.radius_difference = options.numbers.rover.track_error = 0;
+  World world{options, 1};
+  std::vector<Measurement> arrived;
+  world.advance_to(world.start() + base::Micros{8'500}, arrived);
+  double rim = 0, path = 0;
+  const app::WheelCounts* last = nullptr;
+  std::vector<Measurement> all;
+  for (base::Micros t = world.start(); t < world.start() + world.duration(); t += base::Micros{10'000}) {
+    world.advance_to(t, all);
+    path += world.truth().speed_mps * 0.01;
+  }
+  for (const auto& m : all)
+    if (const auto* c = std::get_if<app::WheelCounts>(&m.value)) {
+      if (last) rim += 0.5 * (static_cast<std::int16_t>(c->left - last->left) + static_cast<std::int16_t>(c->right - last->right)) * 2 * kPi * 0.1 / 2000;
+      last = c;
+    }
+  EXPECT_GT(rim / path, 1.001);
+  EXPECT_LT(rim / path, 1.02);
+}
+
+struct GnssSeries {
+  std::vector<double> east, north, up, accuracy, velocity;
+  int fixes = 0, outages = 0, lost = 0;
+};
+
+GnssSeries gnss_at_rest(const GnssNumbers& numbers, int samples, std::uint64_t seed) {
+  Gnss gnss{numbers, kEarth, seed};
+  GnssSeries series;
+  base::Micros now;
+  bool was_lost = false;
+  for (int i = 0; i < samples; ++i) {
+    const auto reading = gnss.sample({}, {}, now += base::Micros{200'000}, kNoFaults);
+    const auto& p = *reading.position;
+    const bool is_lost = p.fix == app::GnssFix::kNone;
+    if (is_lost) {
+      ++series.lost;
+      series.outages += was_lost ? 0 : 1;
+      EXPECT_FALSE(reading.velocity);
+      EXPECT_TRUE(std::isnan(p.horizontal_acc_m));
+    } else {
+      const auto enu = kEarth.enu_m({p.latitude_2ndeg, p.longitude_2ndeg, static_cast<double>(p.height_m)});
+      series.east.push_back(enu[0]), series.north.push_back(enu[1]), series.up.push_back(enu[2]);
+      series.accuracy.push_back(static_cast<double>(p.horizontal_acc_m));
+      series.velocity.push_back(static_cast<double>(reading.velocity->v_n_mps[0]));
+      ++series.fixes;
+    }
+    was_lost = is_lost;
+  }
+  return series;
+}
+
+TEST(Gnss, error_is_correlated_over_the_stated_time_and_as_large_as_the_receiver_says) {
+  GnssNumbers numbers;
+  numbers.outage_every_s = numbers.glitch_probability = 0;
+  numbers.antenna_b_m = {};
+  const auto s = gnss_at_rest(numbers, 200'000, 2);
+  const double total = 0.8 * 0.8 + 0.3 * 0.3;
+  EXPECT_NEAR(statistics(s.east).variance / total, 1, 0.15);
+  EXPECT_NEAR(statistics(s.north).variance / total, 1, 0.15);
+  EXPECT_NEAR(statistics(s.up).variance / total, 1.6 * 1.6, 0.5);
+  EXPECT_NEAR(correlation(s.east, 300), 0.64 / total * std::exp(-1), 0.08);
+  EXPECT_NEAR(correlation(s.north, 1), 0.64 / total, 0.03);  // the rest is white
+  EXPECT_NEAR(statistics(s.accuracy).mean, sim::sqrt(total), 0.03);
+  EXPECT_NEAR(sim::sqrt(statistics(s.accuracy).variance) / sim::sqrt(total), 0.2, 0.04);
+  EXPECT_NEAR(sim::sqrt(statistics(s.velocity).variance), 0.05, 0.001);
+  std::vector<double> radial;
+  for (std::size_t i = 0; i < s.east.size(); ++i) radial.push_back(std::hypot(s.east[i], s.north[i]));
+  std::nth_element(radial.begin(), radial.begin() + 100'000, radial.end());
+  EXPECT_NEAR(radial[100'000], 1.0, 0.08);  // circular error probable
+}
+
+TEST(Gnss, outages_and_glitches_come_as_often_as_stated_and_never_at_the_start) {
+  GnssNumbers numbers;
+  numbers.correlated_m = 0;
+  numbers.white_m = 0.1;
+  const auto s = gnss_at_rest(numbers, 100'000, 3);  // 20 000 s
+  EXPECT_NEAR(s.outages, 20'000 / 95.0, 45);
+  EXPECT_NEAR(s.lost * 0.2 / s.outages, 5, 0.6);
+  const auto glitched = static_cast<double>(std::count_if(s.east.begin(), s.east.end(), [&, i = std::size_t{0}](double) mutable {
+    const bool far = std::hypot(s.east[i], s.north[i]) > 2;
+    ++i;
+    return far;
+  }));
+  EXPECT_NEAR(glitched / s.fixes, 0.004 * 2.5, 0.003);
+  for (std::uint64_t seed = 1; seed <= 50; ++seed) {
+    const auto start = gnss_at_rest(numbers, 99, seed);
+    EXPECT_EQ(start.lost, 0);
+    for (const double e : start.east) EXPECT_LT(magnitude(e), 1);
+  }
+}
+
+TEST(Gnss, in_the_matched_world_it_is_white_with_the_sigma_it_states) {
+  const auto s = gnss_at_rest(matched(Numbers{}).gnss, 40'000, 4);
+  EXPECT_EQ(s.fixes, 40'000);
+  EXPECT_NEAR(statistics(s.east).variance / (0.85 * 0.85), 1, 0.03);
+  EXPECT_NEAR(correlation(s.east, 1), 0, 0.02);
+  for (const double a : s.accuracy) ASSERT_NEAR(a, 0.85, 1e-6);
+}
+
+TEST(Gnss, the_antenna_swings_with_the_body) {
+  GnssNumbers numbers = perfect().gnss;
+  numbers.antenna_b_m = {0.3, 0, 0.4};
+  Gnss gnss{numbers, kEarth, 1};
+  Truth truth{.roll_rad = 0.1, .yaw_rad = kPi / 2, .v_n_mps = {0, 1, 0}};
+  const auto reading = gnss.sample(truth, {0, 0, 0.5}, {200'000}, kNoFaults);
+  const auto& p = *reading.position;
+  const auto enu = kEarth.enu_m({p.latitude_2ndeg, p.longitude_2ndeg, static_cast<double>(p.height_m)});
+  EXPECT_NEAR(enu[0], 0.4 * std::sin(0.1), 2e-4);  // heading north, leaning to the right: the mast leans east
+  EXPECT_NEAR(enu[1], 0.3, 2e-4);
+  EXPECT_NEAR(enu[2], 0.4 * std::cos(0.1), 2e-4);
+  EXPECT_NEAR(reading.velocity->v_n_mps[0], -0.5 * 0.3 * std::cos(0.1), 1e-6);
+  EXPECT_NEAR(reading.velocity->v_n_mps[1], 1, 1e-6);
+}
+
+TEST(Camera, sees_what_is_in_range_and_in_view_and_nothing_else) {
+  const auto landmarks = parked_course(1).landmarks;
+  Camera camera{perfect().camera, landmarks, 1};
+  // ahead 5 m; 33 deg left 7.2 m; 90 deg left; 39 deg right 14.2 m; behind
+  const auto seen = camera.sample({}, {200'000}, kNoFaults);
+  ASSERT_EQ(seen.size(), 2U);
+  EXPECT_EQ(seen[0].landmark, 1);
+  EXPECT_FLOAT_EQ(seen[0].range_m, 5);
+  EXPECT_NEAR(seen[0].bearing_rad, 0, 1e-6F);
+  EXPECT_EQ(seen[1].landmark, 2);
+  EXPECT_NEAR(seen[1].range_m, std::sqrt(52.0F), 1e-5F);
+  EXPECT_NEAR(seen[1].bearing_rad, std::atan2(4.0F, 6.0F), 1e-6F);
+  const auto turned = camera.sample({.yaw_rad = kPi - 0.1}, {400'000}, kNoFaults);
+  ASSERT_EQ(turned.size(), 1U);
+  EXPECT_EQ(turned[0].landmark, 5);
+  EXPECT_NEAR(turned[0].bearing_rad, 0.1F, 1e-6F);
+}
+
+TEST(Camera, noise_misses_and_wrong_names_come_as_often_as_stated) {
+  for (const bool mismatched : {false, true}) {
+    const CameraNumbers n = mismatched ? CameraNumbers{} : matched(Numbers{}).camera;
+    Camera camera{n, parked_course(1).landmarks, 1};
+    std::vector<double> range, bearing;
+    int wrong = 0;
+    constexpr int kLooks = 40'000;
+    for (int i = 0; i < kLooks; ++i)
+      for (const auto& s : camera.sample({}, {200'000}, kNoFaults)) {
+        if (s.range_m > 6.2F) continue;  // landmark 1 only, by its range
+        range.push_back(static_cast<double>(s.range_m) - 5);
+        bearing.push_back(static_cast<double>(s.bearing_rad));
+        wrong += s.landmark != 1 ? 1 : 0;
+      }
+    const double seen = static_cast<double>(range.size()) / kLooks;
+    EXPECT_NEAR(seen, 0.85, 0.01);
+    EXPECT_NEAR(sim::sqrt(statistics(range).variance), mismatched ? 0.15 : 0.10, 0.003);
+    EXPECT_NEAR(statistics(range).mean, mismatched ? 0.025 : 0, 0.004);
+    EXPECT_NEAR(sim::sqrt(statistics(bearing).variance), 0.015, 0.0003);
+    EXPECT_NEAR(statistics(bearing).mean, mismatched ? -0.004 : 0, 0.0004);
+    EXPECT_NEAR(wrong / static_cast<double>(range.size()), mismatched ? 0.005 * 0.8 : 0, 0.0015);  // one in five draws names itself
+  }
+}
+
+}  // namespace
+}  // namespace tetap::sim
