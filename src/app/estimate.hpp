@@ -4,7 +4,7 @@
 
 #include "base/time.hpp"
 #include "config/messages.hpp"
-#include "filter/symmetric.hpp"
+#include "filter/update.hpp"
 #include "model/planar_pose.hpp"
 
 #include <cstdint>

@@ -38,16 +38,4 @@ struct LoopHealth {
   hal::CanFaults bus;
 };
 
-/// Bits of Est_Status.Faults.
-enum class Fault : std::uint16_t {
-  kInputStale = 1 << 0,       ///< no motion input within its timeout
-  kRejecting = 1 << 1,        ///< a sensor was refused three times in a row
-  kIncomplete = 1 << 2,       ///< half samples within the last second
-  kTooLate = 1 << 3,          ///< samples beyond the window within the last second
-  kMalformed = 1 << 4,        ///< malformed, out-of-range or unstamped frames within the last second
-  kCapacity = 1 << 5,         ///< a full map, timeline or event queue within the last second
-  kCommandRefused = 1 << 6,   ///< within the last second
-  kRestarted = 1 << 7,        ///< an estimator was restarted within the last second
-};
-
 }  // namespace tetap::app

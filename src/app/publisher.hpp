@@ -192,10 +192,10 @@ template <class Send>
 void Publisher<N>::status(const Summary& s, Send& send) {
   if (!every(numbers_.publish.status_every, 1)) return;
   std::uint16_t faults = epoch_ < troubled_until_ ? troubles_ : std::uint16_t{0};
-  const auto raise = [&faults](Fault fault, bool is) { faults = static_cast<std::uint16_t>(faults | (is ? static_cast<unsigned>(fault) : 0U)); };
-  raise(Fault::kInputStale, !s.velocity_valid);
-  raise(Fault::kRejecting, s.rejecting);
-  raise(Fault::kRestarted, s.restarted);
+  const auto raise = [&faults](can::Fault fault, bool is) { faults = static_cast<std::uint16_t>(faults | (is ? 1U << static_cast<unsigned>(fault) : 0U)); };
+  raise(can::Fault::kInputStale, !s.velocity_valid);
+  raise(can::Fault::kRejecting, s.rejecting);
+  raise(can::Fault::kRestarted, s.restarted);
   put(can::protect(can::EstStatus{.ctr = static_cast<std::uint8_t>(status_counter_++ & 0x0F),
                                   .mode = s.mode,
                                   .pos_valid = s.position_valid,
@@ -240,14 +240,14 @@ template <std::size_t N>
 void Publisher<N>::note_troubles(const Counters& now) {
   const Counters& then = last_second_;
   std::uint16_t raised = 0;
-  const auto raise = [&raised](Fault fault, bool is) { raised = static_cast<std::uint16_t>(raised | (is ? static_cast<unsigned>(fault) : 0U)); };
-  raise(Fault::kIncomplete, now.incomplete != then.incomplete);
-  raise(Fault::kTooLate, now.too_late != then.too_late);
-  raise(Fault::kMalformed, now.malformed != then.malformed || now.out_of_range != then.out_of_range || now.no_time != then.no_time ||
+  const auto raise = [&raised](can::Fault fault, bool is) { raised = static_cast<std::uint16_t>(raised | (is ? 1U << static_cast<unsigned>(fault) : 0U)); };
+  raise(can::Fault::kIncomplete, now.incomplete != then.incomplete);
+  raise(can::Fault::kTooLate, now.too_late != then.too_late);
+  raise(can::Fault::kMalformed, now.malformed != then.malformed || now.out_of_range != then.out_of_range || now.no_time != then.no_time ||
                                now.too_early != then.too_early);
-  raise(Fault::kCapacity, now.map_full != then.map_full || now.timeline_full != then.timeline_full ||
+  raise(can::Fault::kCapacity, now.map_full != then.map_full || now.timeline_full != then.timeline_full ||
                               now.events_dropped != then.events_dropped);
-  raise(Fault::kCommandRefused, now.command_refused != then.command_refused);
+  raise(can::Fault::kCommandRefused, now.command_refused != then.command_refused);
   if (raised != 0) {
     const std::uint32_t second = static_cast<std::uint32_t>(1'000'000 / numbers_.loop.period_us);
     troubles_ = epoch_ < troubled_until_ ? static_cast<std::uint16_t>(troubles_ | raised) : raised;
