@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "bench.hpp"
+
+#include <gtest/gtest.h>
+#include <vector>
+
+namespace tetap::test {
+namespace {
+
+struct Collected {
+  std::vector<app::Sample> samples;
+  std::vector<app::MapEntry> entries;
+  std::vector<app::SetPose> poses;
+  std::vector<can::ResetWhat> resets;
+  void sample(const app::Sample& s) { samples.push_back(s); }
+  void map_entry(const app::MapEntry& e) { entries.push_back(e); }
+  void set_pose(const app::SetPose& p) { poses.push_back(p); }
+  void reset(can::ResetWhat w) { resets.push_back(w); }
+};
+
+struct Desk {
+  app::Inbox inbox;
+  app::Counters counters;
+  Collected out;
+  void put(const base::CanFrame& frame, std::int64_t reference_us = 10'000'000) {
+    inbox.on_frame(static_cast<std::uint8_t>(frame.id - 0x300), frame, {reference_us}, counters, out);
+  }
+};
+
+TEST(Inbox, ExtendsTwentyBitStampsAroundTheReference) {
+  for (const std::int64_t truth : {9'600'000LL, 9'999'999LL, 10'000'000LL, 10'400'000LL}) {
+    Desk desk;
+    desk.put(body_speed(truth, 1.0F, 0.0F));
+    ASSERT_EQ(desk.out.samples.size(), 1U);
+    EXPECT_EQ(desk.out.samples[0].stamp.us, truth);
+  }
+}
+
+TEST(Inbox, PutsAFixTogetherFromFourFramesInAnyOrder) {
+  const auto s = stamp(9'990'000);
+  const Frames frames{in(can::InGnssLat{.stamp_us = s, .seq = 4, .inst = 1, .lat_raw = 21'187'906'000}), in(can::InGnssLon{.stamp_us = s, .seq = 4, .inst = 1, .lon_raw = -35'573'697'333}),
+                      in(can::InGnssAlt{.stamp_us = s, .seq = 4, .inst = 1, .height_m = 7.3F, .fix = can::GnssFix::kFix3D, .num_sv = 9}),
+                      in(can::InGnssAcc{.stamp_us = s, .seq = 4, .inst = 1, .hor_m = 0.9F, .ver_m = 1.8F})};
+  for (const auto& order : {std::vector{0, 1, 2, 3}, std::vector{3, 1, 0, 2}}) {
+    Desk desk;
+    for (const int i : order) desk.put(frames[static_cast<std::size_t>(i)]);
+    ASSERT_EQ(desk.out.samples.size(), 1U);
+    const auto& fix = desk.out.samples[0].payload.gnss_position;
+    EXPECT_EQ(fix.latitude_2ndeg, 21'187'906'000);
+    EXPECT_EQ(fix.longitude_2ndeg, -35'573'697'333);
+    EXPECT_NEAR(fix.height_m, 7.3F, 1e-3F);
+    EXPECT_NEAR(fix.horizontal_acc_m, 0.9F, 1e-3F);
+    EXPECT_EQ(fix.fix, app::GnssFix::k3d);
+    EXPECT_EQ(desk.out.samples[0].instance, 1);
+    EXPECT_EQ(desk.out.samples[0].stamp.us, 9'990'000);
+  }
+}
+
+TEST(Inbox, FramesOfTwoFixesUnderOneSequenceNumberAreNeverMixed) {
+  Desk desk;
+  const auto part = [](std::int64_t t, int which) -> base::CanFrame {
+    if (which == 0) return in(can::InGnssLat{.stamp_us = stamp(t), .seq = 4, .lat_raw = t});
+    if (which == 1) return in(can::InGnssLon{.stamp_us = stamp(t), .seq = 4, .lon_raw = t});
+    if (which == 2) return in(can::InGnssAlt{.stamp_us = stamp(t), .seq = 4});
+    return in(can::InGnssAcc{.stamp_us = stamp(t), .seq = 4});
+  };
+  desk.put(part(9'800'000, 0));
+  desk.put(part(9'800'000, 1));
+  for (int which = 0; which < 4; ++which) desk.put(part(9'990'000, which));
+  ASSERT_EQ(desk.out.samples.size(), 1U);
+  EXPECT_EQ(desk.out.samples[0].payload.gnss_position.latitude_2ndeg, 9'990'000);
+  EXPECT_EQ(desk.out.samples[0].payload.gnss_position.longitude_2ndeg, 9'990'000);
+  EXPECT_EQ(desk.counters.incomplete, 1);
+}
+
+TEST(Inbox, RangeOnlyAndBearingOnlyPassAndNeitherIsRefused) {
+  const float none = std::numeric_limits<float>::quiet_NaN();
+  Desk desk;
+  desk.put(sighting(10'000'000, 1, 2.0F, none));
+  desk.put(sighting(10'000'000, 2, none, 0.5F));
+  desk.put(sighting(10'000'000, 3, none, none));
+  ASSERT_EQ(desk.out.samples.size(), 2U);
+  EXPECT_FALSE(base::is_finite(desk.out.samples[0].payload.sighting.bearing_rad));
+  EXPECT_FALSE(base::is_finite(desk.out.samples[1].payload.sighting.range_m));
+  EXPECT_EQ(desk.counters.out_of_range, 1);
+}
+
+TEST(Inbox, SetPoseNeedsBothHalvesOfOneCounter) {
+  Desk desk;
+  desk.put(set_pose(1, 1000, 2000, 0.5F)[0]);
+  desk.put(set_pose(2, 3000, 4000, 0.7F)[1]);
+  EXPECT_TRUE(desk.out.poses.empty());
+  desk.put(set_pose(2, 3000, 4000, 0.7F)[0]);
+  ASSERT_EQ(desk.out.poses.size(), 1U);
+  EXPECT_EQ(desk.out.poses[0].pose.x.um(), 3'000'000);
+  EXPECT_NEAR(desk.out.poses[0].pose.yaw_rad, 0.7F, 5e-5F);
+}
+
+TEST(Inbox, AnImuSampleCarriesIncrementsIntervalAndClips) {
+  Desk desk;
+  desk.put(in(can::ImuGyro{.ang_x_rad = 0.001F, .ang_y_rad = -0.002F, .ang_z_rad = 0.003F, .seq = 9}, 2));
+  desk.put(in(can::ImuAccel{.vel_x_mps = 0.1F, .vel_y_mps = 0.2F, .vel_z_mps = 0.0981F, .seq = 9}, 2));
+  desk.put(in(can::ImuTime{.stamp_us = stamp(9'999'000), .interval_us = 5'000, .clip_gyro = 3, .clip_accel = 1, .temp_degC = 30.5F, .seq = 9}, 2));
+  ASSERT_EQ(desk.out.samples.size(), 1U);
+  const auto& s = desk.out.samples[0];
+  EXPECT_EQ(s.instance, 2);
+  EXPECT_EQ(s.payload.imu.interval.us, 5'000);
+  EXPECT_NEAR(s.payload.imu.dangle_b_rad[1], -0.002F, 1e-6F);
+  EXPECT_NEAR(s.payload.imu.dvelocity_b_mps[2], 0.0981F, 1e-5F);
+  EXPECT_EQ(s.payload.imu.clipped_gyro, 3);
+  EXPECT_NEAR(s.payload.imu.temperature_degC, 30.5F, 0.05F);
+}
+
+}  // namespace
+}  // namespace tetap::test
