@@ -470,7 +470,7 @@ class BadInput(unittest.TestCase):
 
         self.refused(spoil("fix.csv", 2, "lat_deg", "latitude"), "test1_fix.csv:2", "no column 'lat_deg'")
         self.refused(spoil("fix.csv", 3, ",42.375812,", ",142.375812,"), "test1_fix.csv:3", "no such place")
-        self.refused(spoil("imu_data.csv", 40, ",", ",,"), "test1_imu_data.csv:40", "22 columns, expected 21")
+        self.refused(spoil("imu_data.csv", 40, ",", ",,"), "test1_imu_data.csv:40", "41 columns, expected 21")
         self.refused(spoil("odom.csv", 40, "14322355", "14322356"), "test1_husky_velocity_controller_odom.csv:41", "goes back by 99.9")
 
 
