@@ -65,7 +65,14 @@ template <Signal kSignal>
   constexpr auto kPerUnit = static_cast<float>(kSignal.per_unit);
   constexpr float kLowest = static_cast<float>(kSignal.lowest()) / kPerUnit;
   constexpr float kHighest = static_cast<float>(kSignal.highest()) / kPerUnit;
-  if (value > kLowest && value < kHighest) return nearest(value * kPerUnit);
+  if (value > kLowest && value < kHighest) {
+    const std::int32_t steps = nearest(value * kPerUnit);
+    if constexpr (kSignal.length > 22) {  // the product's own rounding can reach half a step and lead to a neighbour
+      if (static_cast<float>(steps - 1) / kPerUnit >= value) return steps - 1;
+      if (static_cast<float>(steps + 1) / kPerUnit <= value) return steps + 1;
+    }
+    return steps;
+  }
   if (value >= kHighest) return kSignal.highest();
   if (value <= kLowest) return kSignal.lowest();
   return kSignal.gap();  // NaN
