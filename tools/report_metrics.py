@@ -236,10 +236,9 @@ def judge(run, estimator, truth, names):
     """The metrics of one estimator. Without truth: what can be said without."""
     rows = run.of(estimator)
     valid = rows["pos_valid"] == 1
-    steps = np.hypot(np.diff(rows["x_m"][valid]), np.diff(rows["y_m"][valid]))
     result = {"name": NAMES.get(estimator, f"estimator{estimator}"),
               "kind": names["EstimatorKind"].get(int(rows["kind"][-1]), str(int(rows["kind"][-1]))),
-              "epochs": int(len(valid)), "epochs_not_valid": int((~valid).sum()), "path_length_m": float(steps.sum()),
+              "epochs": int(len(valid)), "epochs_not_valid": int((~valid).sum()),
               "measurements": measurements(run.innovations, estimator, names)}
     if valid.any():
         last = np.flatnonzero(valid)[-1]

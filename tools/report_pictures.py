@@ -96,8 +96,9 @@ def path(run, truth, landmarks, title):
     if truth is not None:
         name = "GPS track" if truth.is_reference else "truth"
         tx, ty = _broken_at_gaps(truth.time_s, truth.x_m, truth.y_m)
-        style = {"marker": ".", "markersize": 2.5, "linewidth": 0.6} if truth.is_reference else {"linewidth": 2.6, "alpha": 0.45}
-        axes.plot(tx[thinned(len(tx))], ty[thinned(len(ty))], color=TRUTH, label=name, zorder=3 if truth.is_reference else 2,
+        style = {"marker": ".", "markersize": 5, "markeredgewidth": 0, "linewidth": 0.5, "alpha": 0.6} if truth.is_reference else {
+            "linewidth": 2.6, "alpha": 0.45}
+        axes.plot(tx[thinned(len(tx))], ty[thinned(len(ty))], color=TRUTH, label=name, zorder=2,
                   solid_capstyle="round", **style)
     for k, rows in tracks.items():
         valid = rows["pos_valid"] == 1
@@ -106,7 +107,7 @@ def path(run, truth, landmarks, title):
         ex, ey = _broken_at_gaps(rows["time_s"][valid], rows["x_m"][valid], rows["y_m"][valid])
         axes.plot(ex[thinned(len(ex))], ey[thinned(len(ey))], color=ESTIMATORS[k], linewidth=1.1, label=LABELS[k], zorder=3 + k * 0.1)
     best = 1 if 1 in tracks else run.estimators[-1]
-    centres, widths, heights, angles = covariance_ellipses(tracks[best], 0.95, 40)
+    centres, widths, heights, angles = covariance_ellipses(tracks[best], 0.95, 28)
     if len(centres):
         axes.add_collection(EllipseCollection(widths, heights, angles, units="xy", offsets=centres, offset_transform=axes.transData,
                                               facecolor="none", edgecolor=ESTIMATORS[best], linewidth=0.9, zorder=4))
@@ -192,22 +193,28 @@ def nis(run, estimator, names, title):
         accepted, rejected = mine & (rows["verdict"] == 0), mine & (rows["verdict"] == 1)
         many = accepted.sum() > 3000
         one.plot(rows["time_s"][accepted], value[accepted], linestyle="none", marker=".", markersize=2.5 if many else 4,
-                 color=ESTIMATORS[estimator], alpha=0.5, markeredgewidth=0, label="accepted")
+                 color=ESTIMATORS[estimator], alpha=0.5, markeredgewidth=0)
         one.plot(rows["time_s"][rejected], value[rejected], linestyle="none", marker="x", markersize=5, color=REJECTED, markeredgewidth=1.2,
-                 label="rejected by the gate", zorder=4)
+                 zorder=4)
         for dof in np.unique(rows["dof"][mine]):
             bound = metrics.chi_square(0.95, max(int(dof), 1))
-            one.axhline(bound, color=INK, linewidth=1.0, linestyle=(0, (5, 3)), label=f"95 % ({int(dof)} dof)")
+            one.axhline(bound, color=INK, linewidth=1.0, linestyle=(0, (5, 3)))
         one.set_yscale("log")
         one.set_ylim(floor * 0.7, max(30.0, 1.6 * float(value[mine].max())))
         one.set_ylabel("NIS")
         one.grid(True, which="minor", axis="y", color=FAINT, linewidth=0.3)
         below = np.mean(rows["nis"][accepted | rejected] <= metrics.chi_square(0.95, max(int(np.median(rows["dof"][mine])), 1)))
         name = names["Sensor"].get(sensor, str(sensor))
-        one.annotate(f"{name}: {100 * below:.1f} % below the line, {int(rejected.sum())} rejected", (1.0, 1.0), xycoords="axes fraction",
-                     ha="right", va="bottom", fontsize=9, color=GREY)
-        legend(one)
+        dofs = " and ".join(str(int(dof)) for dof in np.unique(rows["dof"][mine]))
+        one.annotate(f"{name} ({dofs} dof): {100 * below:.1f} % below the line, {int(rejected.sum())} rejected", (0.0, 1.0),
+                     xycoords="axes fraction", xytext=(0, 4), textcoords="offset points", ha="left", va="bottom", fontsize=9, color=GREY)
+    axes[0].set_title(title, loc="left", fontsize=11.5, color=INK, pad=24)
     axes[-1].set_xlabel("time [s]")
+    handles = [Line2D([], [], color=ESTIMATORS[estimator], marker=".", markersize=8, linestyle="none"),
+               Line2D([], [], color=REJECTED, marker="x", markersize=6, linestyle="none"),
+               Line2D([], [], color=INK, linewidth=1.0, linestyle=(0, (5, 3)))]
+    legend(axes[0], handles=handles, labels=["accepted", "rejected by the gate", "95 % of a right model"], ncol=3, loc="lower right",
+           bbox_to_anchor=(1.0, 1.0), columnspacing=1.4)
     return fig
 
 

@@ -1,0 +1,342 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: Apache-2.0
+"""tools/report: metrics against laws and brute force, files it writes, bad input."""
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import unittest
+
+import numpy as np
+
+ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+TOOLS = os.path.join(ROOT, "tools")
+sys.path.insert(0, TOOLS)
+sys.dont_write_bytecode = True
+
+import report_metrics as metrics  # noqa: E402
+
+RUN = {"frames_in": 1234, "frames_lost": 0, "estimates_out": 777, "times_realtime": 12.5, "bus_load_percent": 9.25, "estimates_sha256": "ab" * 32,
+       "state_crc_last": "0x12345678", "bus": "memory", "way": "one process", "robot": "rover", "mode": "lockstep", "duration_s": 10.0, "seed": 7,
+       "fault": "none"}
+
+
+def text_of(path):
+    with open(path, encoding="utf-8") as file:
+        return file.read()
+
+
+class Case(unittest.TestCase):
+    def setUp(self):
+        self.directory = tempfile.mkdtemp()
+        self.addCleanup(shutil.rmtree, self.directory, ignore_errors=True)
+
+    def path(self, name):
+        return os.path.join(self.directory, name)
+
+    def write(self, name, text):
+        with open(self.path(name), "w", encoding="utf-8") as file:
+            file.write(text)
+
+    def write_rows(self, name, columns, rows):
+        def field(value):
+            return "" if value is None or value != value else f"{value:.12g}"
+        self.write(name, ",".join(columns) + "\n" + "".join(",".join(field(value) for value in row) + "\n" for row in rows))
+
+    def truth(self, time_s, x, y, yaw=None, about=None):
+        yaw = [None] * len(time_s) if yaw is None else yaw
+        self.write_rows("t.truth.csv", metrics.TRUTH, zip(time_s, x, y, yaw))
+        if about is not None:
+            self.write("t.json", json.dumps(about))
+        return self.path("t.truth.csv")
+
+    def estimates(self, time_s, x, y, yaw, estimator=1, std=None, corr=None, valid=None, more=()):
+        """One row per time; `std` and `corr` are rows of three, or None for rows without."""
+        rows = list(more)
+        for n, t in enumerate(time_s):
+            s = [None] * 3 if std is None or std[n] is None else std[n]
+            c = [None] * 3 if corr is None or std[n] is None else corr[n]
+            ok = 1 if valid is None else valid[n]
+            rows.append([n, t, estimator, 1 + estimator, x[n], y[n], yaw[n], 0.5, 0.1, *s, *c, ok, ok])
+        self.write_rows("estimates.csv", metrics.ESTIMATES, rows)
+        self.write("run.json", json.dumps(RUN))
+        return rows
+
+    def report(self, *arguments):
+        return subprocess.run([os.path.join(TOOLS, "report"), self.directory, *arguments], capture_output=True, text=True, timeout=120)
+
+    def summary(self, *arguments):
+        result = self.report("--no-pictures", *arguments)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        return json.loads(text_of(self.path("summary.json")))
+
+
+class Errors(Case):
+    time_s = 1 + 0.01 * np.arange(500)
+
+    def test_an_estimate_that_is_the_truth_has_no_error_also_between_its_rows_and_where_yaw_wraps(self):
+        yaw = 3.0 + 0.1 * (self.time_s - 1)  # through +pi
+        truth_t = 1 + 0.03 * np.arange(170)
+        truth = self.truth(truth_t, 2 * truth_t, -truth_t, metrics.wrapped(3.0 + 0.1 * (truth_t - 1)))
+        self.estimates(self.time_s, 2 * self.time_s, -self.time_s, metrics.wrapped(yaw))
+        fused = self.summary("--truth", truth)["fused"]
+        for key in ("position_rmse_m", "final_error_m", "max_error_m", "heading_rmse_deg"):
+            self.assertLess(fused[key], 1e-6, key)
+        self.assertEqual(fused["epochs_with_truth"], 500)
+
+    def test_a_known_error_is_found_in_every_figure_and_at_the_top(self):
+        zero = np.zeros(500)
+        truth = self.truth(self.time_s, zero, zero, zero)
+        x = np.where(np.arange(500) == 499, 0.5, 0.3)
+        self.estimates(self.time_s, x, zero + 0.4, zero - 0.02)
+        summary = self.summary("--truth", truth)
+        fused = summary["fused"]
+        self.assertAlmostEqual(fused["position_rmse_m"], np.sqrt((499 * 0.25 + 0.41) / 500), places=9)
+        self.assertAlmostEqual(fused["final_error_m"], np.sqrt(0.41), places=9)
+        self.assertAlmostEqual(fused["max_error_m"], np.sqrt(0.41), places=9)
+        self.assertAlmostEqual(fused["heading_rmse_deg"], np.degrees(0.02), places=9)
+        self.assertAlmostEqual(fused["final_heading_error_deg"], -np.degrees(0.02), places=9)
+        self.assertEqual((summary["position_rmse_m"], summary["heading_rmse_deg"]), (fused["position_rmse_m"], fused["heading_rmse_deg"]))
+
+    def test_odometry_and_fused_are_told_apart(self):
+        zero = np.zeros(500)
+        truth = self.truth(self.time_s, zero, zero, zero)
+        odometry = self.estimates(self.time_s, zero + 3, zero + 4, zero, estimator=0)
+        self.estimates(self.time_s, zero + 1, zero, zero, more=odometry)
+        summary = self.summary("--truth", truth)
+        self.assertAlmostEqual(summary["odometry"]["position_rmse_m"], 5.0)
+        self.assertAlmostEqual(summary["fused"]["position_rmse_m"], 1.0)
+        self.assertAlmostEqual(summary["position_rmse_m"], 1.0)
+        self.assertEqual((summary["odometry"]["kind"], summary["fused"]["kind"]), ("Odometry", "Ekf"))
+
+    def test_nothing_is_compared_in_gaps_of_the_truth_nor_outside_of_it(self):
+        known = (self.time_s < 2.0) | (self.time_s > 2.5)
+        zero = np.zeros(500)
+        inside = known & (self.time_s > 1.4995) & (self.time_s < 5.0005)
+        truth = self.truth(self.time_s[inside], zero[inside], zero[inside], zero[inside])
+        x = np.where(inside, 0.1, 99.0)
+        self.estimates(self.time_s, x, zero, zero)
+        fused = self.summary("--truth", truth)["fused"]
+        self.assertAlmostEqual(fused["max_error_m"], 0.1)
+        self.assertEqual(fused["epochs_with_truth"], int(inside.sum()))
+        self.assertAlmostEqual(self.summary("--truth", truth, "--max-gap", "1.0")["fused"]["max_error_m"], 99.0)
+
+    def test_estimates_that_are_not_valid_are_counted_and_not_compared(self):
+        zero = np.zeros(500)
+        truth = self.truth(self.time_s, zero, zero, zero)
+        valid = (np.arange(500) >= 20).astype(int)
+        self.estimates(self.time_s, np.where(valid, 0.2, 50.0), zero, zero, valid=valid)
+        fused = self.summary("--truth", truth)["fused"]
+        self.assertEqual((fused["epochs"], fused["epochs_not_valid"]), (500, 20))
+        self.assertAlmostEqual(fused["max_error_m"], 0.2)
+
+    def test_without_truth_there_are_no_errors_and_no_failure(self):
+        zero = np.zeros(500)
+        self.estimates(self.time_s, zero, zero, zero)
+        summary = self.summary()
+        self.assertIsNone(summary["truth"])
+        self.assertIsNone(summary["position_rmse_m"])
+
+    def test_what_the_player_wrote_is_at_the_top_of_the_summary(self):
+        zero = np.zeros(500)
+        self.estimates(self.time_s, zero, zero, zero)
+        summary = self.summary()
+        for key, value in RUN.items():
+            self.assertEqual(summary[key], value, key)
+
+
+class Nees(Case):
+    def matched(self, yaw_known, count=4000, scale=1.0):
+        """Errors drawn from the covariance published every second epoch; those in between are absurd and must not count."""
+        generator = np.random.default_rng(3)
+        time_s = 1 + 0.01 * np.arange(count)
+        std = generator.uniform(0.02, 0.3, (count, 3))
+        mix = np.array([[1.0, 0.0, 0.0], [0.6, 0.8, 0.0], [-0.5, 0.3, np.sqrt(1 - 0.34)]])
+        r = mix @ mix.T
+        error = (generator.normal(size=(count, 3)) @ mix.T) * std * scale
+        published = [None if n % 2 else std[n] for n in range(count)]
+        error[1::2] = 100.0
+        zero = np.zeros(count)
+        truth = self.truth(time_s, zero, zero, zero if yaw_known else None)
+        self.estimates(time_s, error[:, 0], error[:, 1], metrics.wrapped(error[:, 2]), std=published, corr=[(r[0, 1], r[0, 2], r[1, 2])] * count)
+        brute = []
+        for n in range(0, count, 2):
+            p = np.outer(std[n], std[n]) * r
+            e = np.array([*error[n, :2], metrics.wrapped(error[n, 2])])
+            d = 3 if yaw_known else 2
+            brute.append(e[:d] @ np.linalg.inv(p[:d, :d]) @ e[:d])
+        return truth, np.array(brute)
+
+    def test_errors_drawn_from_the_published_covariance_are_consistent(self):
+        for yaw_known, dof in ((True, 3), (False, 2)):
+            truth, brute = self.matched(yaw_known)
+            fused = self.summary("--truth", truth)["fused"]
+            self.assertEqual((fused["nees_dof"], fused["nees_epochs"]), (dof, 2000))
+            self.assertAlmostEqual(fused["nees_mean"], brute.mean(), places=6)
+            # 2000 independent draws: mean within 4 sigma (variance 2 dof), shares within 4 sigma (binomial)
+            self.assertLess(abs(fused["nees_mean"] - dof), 4 * np.sqrt(2 * dof / 2000))
+            self.assertLess(abs(fused["nees_inside_95"] - 0.95), 0.02)
+            self.assertLess(abs(fused["nees_inside_two_sided_95"] - 0.95), 0.02)
+
+    def test_an_overconfident_estimate_is_seen_as_such(self):
+        truth, _ = self.matched(True, scale=2.0)
+        fused = self.summary("--truth", truth)["fused"]
+        self.assertGreater(fused["nees_mean"], 10.0)
+        self.assertLess(fused["nees_inside_95"], 0.7)
+
+    def test_a_timid_estimate_is_outside_of_the_two_sided_interval(self):
+        truth, _ = self.matched(True, scale=0.1)
+        fused = self.summary("--truth", truth)["fused"]
+        self.assertGreater(fused["nees_inside_95"], 0.999)
+        self.assertLess(fused["nees_inside_two_sided_95"], 0.1)
+
+    def test_a_covariance_that_is_none_is_counted_and_left_out(self):
+        time_s, zero = 1 + 0.01 * np.arange(4), np.zeros(4)
+        truth = self.truth(time_s, zero, zero, zero)
+        std = [(0.1, 0.1, 0.1), (0.0, 0.1, 0.1), (0.1, 0.1, 0.1), None]
+        self.estimates(time_s, zero + 0.1, zero, zero, std=std, corr=[(0, 0, 0), (0, 0, 0), (1.0, 0, 0), (0, 0, 0)])
+        fused = self.summary("--truth", truth)["fused"]
+        self.assertEqual((fused["nees_epochs"], fused["nees_covariances_not_usable"]), (1, 2))
+        self.assertAlmostEqual(fused["nees_mean"], 1.0)
+
+
+class Innovations(Case):
+    def test_verdicts_are_counted_by_sensor_and_nis_is_the_mean_of_the_accepted(self):
+        time_s, zero = 1 + 0.01 * np.arange(10), np.zeros(10)
+        self.estimates(time_s, zero, zero, zero)
+        rows = [[0, 1, 1, 4, 0, 0, 2, 1.0, 0.1, 5, 7], [1, 1, 1, 4, 0, 0, 2, 3.0, 0.1, 5, 7], [2, 1, 1, 4, 0, 1, 2, 20.0, 2.0, 5, 7],
+                [3, 1, 1, 4, 0, 4, 2, None, None, 5, 99], [4, 1, 1, 5, 0, 3, 2, None, None, 500, None], [5, 1, 0, 4, 0, 0, 2, 9.0, 1, 5, 7]]
+        self.write_rows("innovations.csv", metrics.INNOVATIONS, rows)
+        measured = self.summary()["fused"]["measurements"]
+        landmarks = measured["RangeBearing"]
+        self.assertEqual((landmarks["accepted"], landmarks["rejected"], landmarks["other"]), (2, 1, 1))
+        self.assertEqual(landmarks["verdicts"], {"Accepted": 2, "Rejected": 1, "UnknownLandmark": 1})
+        self.assertAlmostEqual(landmarks["nis_mean"], 2.0)
+        self.assertAlmostEqual(landmarks["nis_mean_with_rejected"], 8.0)
+        self.assertAlmostEqual(landmarks["nis_inside_95"], 2 / 3)
+        self.assertEqual(measured["GnssPosition"], {"accepted": 0, "rejected": 0, "other": 1, "verdicts": {"TooLate": 1}})
+
+    def test_names_of_the_bus_s_enumerations_stand_for_their_numbers(self):
+        time_s, zero = 1 + 0.01 * np.arange(10), np.zeros(10)
+        self.estimates(time_s, zero, zero, zero)
+        header = ",".join(metrics.INNOVATIONS)
+        self.write("innovations.csv", f"{header}\n0,1,1,RangeBearing,0,NotFinite,2,,,5,7\n0,1,1,RangeBearing,0,Accepted,2,1.5,0.1,5,7\n")
+        measured = self.summary()["fused"]["measurements"]
+        self.assertEqual(measured["RangeBearing"]["verdicts"], {"Accepted": 1, "NotFinite": 1})
+
+
+class Pictures(Case):
+    def run_with_everything(self, about=None, yaw=True):
+        time_s = 1 + 0.01 * np.arange(300)
+        x, y = np.cos(time_s), np.sin(time_s)
+        heading = metrics.wrapped(time_s + np.pi / 2)
+        truth = self.truth(time_s, x, y, heading if yaw else None, about)
+        std = [None if n % 5 else (0.1, 0.1, 0.05) for n in range(300)]
+        odometry = self.estimates(time_s, x + 0.1 * (time_s - 1), y, heading, estimator=0, std=std, corr=[(0.1, 0, 0)] * 300)
+        self.estimates(time_s, x + 0.02, y, heading, std=std, corr=[(0.1, 0, 0)] * 300, more=odometry)
+        self.write_rows("innovations.csv", metrics.INNOVATIONS,
+                        [[n, t, 1, 4, 0, int(n % 50 == 0), 2, 15.0 if n % 50 == 0 else 1.0, 0.1, 5, 7] for n, t in enumerate(time_s)])
+        self.write_rows("status.csv", metrics.STATUS, [[n, t, 3 if n > 50 else 1, 24, n // 250, n // 280, 2] for n, t in enumerate(time_s)])
+        return truth
+
+    def test_the_page_is_one_file_that_needs_no_network_and_shows_every_picture(self):
+        truth = self.run_with_everything({"truth": "vicon", "landmarks": [{"id": 7, "x_m": 2.0, "y_m": 1.0}]})
+        result = self.report("--truth", truth, "--title", "a <run> & its title")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        page = text_of(self.path("report.html"))
+        sources = re.findall(r'(?:src|href)="([^"]{0,30})', page)
+        self.assertEqual(len(sources), 4)
+        self.assertTrue(all(source.startswith("data:image/png;base64,") for source in sources))
+        self.assertNotIn("http", re.sub(r"base64,[^\"]*", "", page))
+        self.assertIn("a &lt;run&gt; &amp; its title", page)
+        for name in ("path", "errors", "nis", "timeline"):
+            with open(self.path(f"{name}.png"), "rb") as file:
+                head = file.read(24)
+            self.assertEqual(head[:8], b"\x89PNG\r\n\x1a\n")
+            self.assertGreater(int.from_bytes(head[16:20], "big"), 800)
+        for text in ("position RMSE", "fused", "odometry", "RangeBearing accepted / rejected / other"):
+            self.assertIn(text, page)
+            self.assertIn(text, result.stdout)
+
+    def test_without_pictures_only_the_summary_is_written(self):
+        truth = self.run_with_everything()
+        before = set(os.listdir(self.directory))
+        self.assertEqual(self.report("--truth", truth, "--no-pictures").returncode, 0)
+        self.assertEqual(set(os.listdir(self.directory)) - before, {"summary.json"})
+
+    def test_a_gps_track_is_called_a_reference_and_nothing_is_said_of_consistency(self):
+        truth = self.run_with_everything({"truth": "gps track"}, yaw=False)
+        result = self.report("--truth", truth)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn("end-point difference", result.stdout)
+        for word in ("RMSE", "NEES"):
+            self.assertNotIn(word, result.stdout)
+        summary = json.loads(text_of(self.path("summary.json")))
+        self.assertTrue(summary["truth"]["is_reference"])
+        self.assertIsNone(summary["fused"]["nees_mean"])
+        self.assertAlmostEqual(summary["odometry"]["final_error_m"], 0.1 * 2.99, places=6)
+        self.assertIn("not truth", text_of(self.path("report.html")))
+
+    def test_pictures_are_drawn_without_truth_innovations_or_any_valid_estimate(self):
+        time_s, zero = 1 + 0.01 * np.arange(20), np.zeros(20)
+        self.estimates(time_s, zero, zero, zero, valid=np.zeros(20))
+        result = self.report()
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertTrue(os.path.exists(self.path("path.png")))
+
+    def test_numbers_that_are_none_are_null_in_the_summary(self):
+        truth = self.run_with_everything(yaw=False)
+        self.report("--truth", truth, "--no-pictures")
+        text = text_of(self.path("summary.json"))
+        self.assertNotIn("NaN", text)
+        self.assertIsNone(json.loads(text)["heading_rmse_deg"])
+
+
+class BadInput(Case):
+    def refused(self, *words, truth=None):
+        result = self.report("--no-pictures", *(["--truth", truth] if truth else []))
+        self.assertEqual(result.returncode, 1, result.stderr)
+        self.assertEqual(result.stderr.count("\n"), 1, result.stderr)
+        for word in words:
+            self.assertIn(word, result.stderr)
+        self.assertFalse(os.path.exists(self.path("summary.json")))
+
+    def test_file_line_and_reason_are_named(self):
+        time_s, zero = 1 + 0.01 * np.arange(5), np.zeros(5)
+        self.estimates(time_s, zero, zero, zero)
+        good = text_of(self.path("estimates.csv"))
+        lines = good.splitlines()
+        for text, words in ((good.replace("pos_valid", "valid", 1), ("estimates.csv:1", "no column 'pos_valid'")),
+                            ("\n".join(lines[:3] + [lines[3] + ",1"] + lines[4:]) + "\n", ("estimates.csv:4", "18 columns, expected 17")),
+                            ("\n".join(lines[:3] + [lines[3].replace("1.02,", "later,")] + lines[4:]) + "\n", ("estimates.csv:4", "later")),
+                            ("\n".join(lines[:3] + [lines[3][:20]]), ("estimates.csv:4", "columns")),
+                            (lines[0] + "\n", ("estimates.csv", "no estimate in it")),
+                            ("", ("estimates.csv:1", "no column"))):
+            with self.subTest(words=words):
+                self.write("estimates.csv", text)
+                self.refused(*words)
+
+    def test_missing_or_broken_files_are_named(self):
+        self.refused("run.json", "No such file")
+        time_s, zero = 1 + 0.01 * np.arange(5), np.zeros(5)
+        self.estimates(time_s, zero, zero, zero)
+        self.write("run.json", "{\n  \"a\": ,\n}")
+        self.refused("run.json:2", "not JSON")
+        self.write("run.json", "[1]")
+        self.refused("run.json:1", "not a JSON object")
+        self.write("run.json", "{}")
+        self.refused("nowhere.csv", "No such file", truth=self.path("nowhere.csv"))
+
+    def test_a_truth_that_goes_back_or_has_no_position_is_refused(self):
+        time_s, zero = 1 + 0.01 * np.arange(5), np.zeros(5)
+        self.estimates(time_s, zero, zero, zero)
+        self.refused("t.truth.csv", "row 3: time goes back", truth=self.truth([1, 2, 1.5], [0] * 3, [0] * 3))
+        self.refused("t.truth.csv", "row 2 has no x_m", truth=self.truth([1, 2, 3], [0, None, 0], [0] * 3))
+        self.refused("t.truth.csv", "fewer than two rows", truth=self.truth([1], [0], [0]))
+
+
+if __name__ == "__main__":
+    unittest.main()
