@@ -18,6 +18,7 @@ namespace {
 using namespace tetap;
 
 std::mt19937_64 random_bits(20240229);
+int printed = 0;
 
 float uniform(float low, float high) { return std::uniform_real_distribution<float>(low, high)(random_bits); }
 
@@ -62,9 +63,8 @@ void print_one(std::uint32_t base, std::size_t instance) {
     field = random_value<kSignal, std::remove_cvref_t<decltype(field)>>();
   });
   const base::CanFrame frame = can::frame(base, message, instance);
-  static int line = 0;
-  ++line;
-  std::printf("(%d.%06d) vcan0 %03X#", 1700000000 + line / 1000, line % 1000 * 1000, frame.id);
+  ++printed;
+  std::printf("(%d.%06d) vcan0 %03X#", 1700000000 + printed / 1000, printed % 1000 * 1000, frame.id);
   for (const unsigned byte : frame.data) std::printf("%02X", byte);
   std::printf(" ;");
   const auto back = can::decode<M>(can::payload(frame));
