@@ -11,7 +11,8 @@ add_library(tetap_flags INTERFACE)
 target_compile_options(tetap_flags INTERFACE
   -ffp-contract=${TETAP_FP_CONTRACT} -fno-fast-math -fno-math-errno -ffunction-sections -fdata-sections
   -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Wdouble-promotion -Wfloat-equal -Wvla -Werror
-  -Wno-missing-field-initializers  # designated initialisers leave the rest to the defaults, on purpose)
+  # Designated initialisers leave the rest to the defaults, on purpose.
+  -Wno-missing-field-initializers)
 target_compile_definitions(tetap_flags INTERFACE
   # Blocked products and triangular solves link malloc whatever the sizes; the threshold keeps products coefficient-wise.
   EIGEN_NO_MALLOC EIGEN_CACHEFRIENDLY_PRODUCT_THRESHOLD=64 EIGEN_MPL2_ONLY

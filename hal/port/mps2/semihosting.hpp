@@ -2,6 +2,7 @@
 // Exit status, arguments and files of the computer that runs the emulator. "Semihosting for AArch32 and AArch64" (ARM IHI 0092), chapter 6.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 
@@ -55,6 +56,18 @@ struct CommandLine {
   CommandLine() {
     std::uint32_t block[] = {reinterpret_cast<std::uintptr_t>(text), N};
     if (call(0x15, block) != 0) text[0] = '\0';
+  }
+  /// The first Count words (the image's path is one), null where there are fewer. Cuts `text` at the spaces.
+  template <std::size_t Count>
+  [[nodiscard]] std::array<const char*, Count> words() {
+    std::array<const char*, Count> found{};
+    for (std::size_t i = 0, n = 0; i < N && text[i] != '\0'; ++i) {
+      const bool begins = text[i] != ' ' && (i == 0 || text[i - 1] == '\0');
+      if (begins && n < Count) found[n++] = &text[i];
+      if (text[i] == ' ') text[i] = '\0';
+      if (text[i] == '\0' && i + 1 < N && text[i + 1] == '\0') break;
+    }
+    return found;
   }
 };
 

@@ -2,7 +2,8 @@
 // Vectors, reset and faults of the Cortex-M7 and Cortex-M4F. ARM DDI 0403 (ARMv7-M) sections B1.5 and B3.2.
 #include "hal/port/mps2/board.hpp"
 
-int main();
+// ISO C++ does not let a program call main by that name.
+int image_main() asm("main");
 
 extern "C" {
 
@@ -54,7 +55,7 @@ struct Vectors {
 
 void tetap_start() {
   tetap::hal::load_sections();
-  tetap::hal::mps2::semihosting::exit(main());
+  tetap::hal::mps2::semihosting::exit(image_main());
 }
 
 void tetap_fault(const std::uint32_t* frame, std::uint32_t exception) {

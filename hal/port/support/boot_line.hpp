@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: Apache-2.0
+// The lines an image prints about itself: at boot the robot and the hashes of the self-check (the same on every target; anybody with
+// a board can compare them with `make bits`), later the stack's high-water mark.
+#pragma once
+
+#include "hal/port/support/text.hpp"
+
+#include <cstdint>
+
+namespace tetap::hal {
+
+template <class Board>
+void print_stack_line(const Board& board) {
+  const auto stack = Board::stack();
+  board.print(Text<>{}.add("tetap: stack ").dec(stack.used).add(" of ").dec(stack.reserved).add('\n').c_str());
+}
+
+}  // namespace tetap::hal

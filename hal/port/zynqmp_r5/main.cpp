@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: Apache-2.0
+// The flash image of a robot whose estimator is a Cortex-R5F of a Zynq UltraScale+.
+#include "app/firmware.hpp"
+#include "hal/port/support/boot_line.hpp"
+#include "hal/port/zynqmp_r5/board.hpp"
+#include "robot.hpp"
+#include "version.hpp"
+
+int main() {
+  using Board = tetap::hal::zynqmp_r5::Board;
+  static Board board;
+  tetap::hal::print_boot_line(board, tetap::robot::kName);
+  static tetap::app::Firmware<Board, tetap::robot::chosen::Estimators> firmware{board, tetap::robot::chosen::numbers, tetap::kVersion};
+  for (std::uint32_t polls = 0;; ++polls) {
+    firmware.poll();
+    if ((polls & 0xF'FFFF) == 0xF'FFFF) tetap::hal::print_stack_line(board);
+  }
+}

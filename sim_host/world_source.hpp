@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+// The simulated world as a source of ticks: what its sensors send, as frames. The truth is kept for the report and never sent.
+#pragma once
+
+#include "sim_host/encode.hpp"
+#include "sim_host/play/script.hpp"
+#include "sim_host/world/world.hpp"
+
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
+namespace tetap::sim {
+
+class WorldSource {
+ public:
+  WorldSource(World world, std::uint32_t base, base::Micros period, base::Micros limit)
+      : world_(std::move(world)), base_(base), period_(period), next_(world_.start() + period),
+        end_(world_.start() + (limit < world_.duration() ? limit : world_.duration())) {}
+
+  /// The first tick brings the landmark map and the start pose.
+  bool next(Tick& tick) {
+    if (next_ > end_) return false;
+    measurements_.clear();
+    frames_.clear();
+    world_.advance_to(next_, measurements_);
+    if (truth_.empty()) introduce();
+    for (const Measurement& m : measurements_) encode(base_, m, frames_);
+    truth_.push_back(world_.truth());
+    tick = {.time = next_ + world_.clock_offset(), .inputs = frames_, .begin = {}};
+    if (truth_.size() == 1) tick.begin = next_ - period_;
+    next_ += period_;
+    return true;
+  }
+
+  [[nodiscard]] const std::vector<Truth>& truth() const { return truth_; }
+  [[nodiscard]] const World& world() const { return world_; }
+
+ private:
+  void introduce() {
+    for (const Landmark& mark : world_.map())
+      frames_.push_back(can::frame(base_, can::InMapEntry{.id = mark.id, .x_raw = millimetres(mark.x_m), .y_raw = millimetres(mark.y_m)}));
+    const StartPose start = world_.start_pose();
+    frames_.push_back(can::frame(base_, can::protect(can::CmdSetPos{.ctr = 1, .x_raw = millimetres(start.x_m) / 2, .y_raw = millimetres(start.y_m) / 2})));
+    frames_.push_back(can::frame(base_, can::protect(can::CmdSetYaw{.ctr = 1, .yaw_rad = static_cast<float>(start.yaw_rad), .std_pos_m = static_cast<float>(start.sigma_m),
+                                                                    .std_yaw_rad = static_cast<float>(start.sigma_yaw_rad)})));
+  }
+  static std::int32_t millimetres(double m) { return static_cast<std::int32_t>(std::lround(m * 1000.0)); }
+
+  World world_;
+  std::uint32_t base_;
+  base::Micros period_;
+  base::Micros next_;
+  base::Micros end_;
+  std::vector<Measurement> measurements_;
+  std::vector<base::CanFrame> frames_;
+  std::vector<Truth> truth_;
+};
+
+static_assert(Source<WorldSource>);
+
+}  // namespace tetap::sim

@@ -1,0 +1,15 @@
+# Writes OUTPUT (a header) with the first 32 bits of the commit, only when they have changed: run at every build, rebuilds nothing by itself.
+execute_process(COMMAND git -C ${SOURCE} rev-parse --short=8 HEAD OUTPUT_VARIABLE commit OUTPUT_STRIP_TRAILING_WHITESPACE ERROR_QUIET
+                RESULT_VARIABLE failed)
+if(failed)
+  set(commit 00000000)
+endif()
+string(SUBSTRING "${commit}" 0 8 commit)
+set(text "// Generated. The first 32 bits of the commit this was built from; 0: not from a repository.\n#pragma once\n#include \"app/publisher.hpp\"\nnamespace tetap {\ninline constexpr app::Version kVersion{.git = 0x${commit}};\n}\n")
+set(old "")
+if(EXISTS ${OUTPUT})
+  file(READ ${OUTPUT} old)
+endif()
+if(NOT text STREQUAL old)
+  file(WRITE ${OUTPUT} "${text}")
+endif()
