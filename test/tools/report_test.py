@@ -101,6 +101,12 @@ class Errors(Case):
         self.assertAlmostEqual(fused["final_heading_error_deg"], -np.degrees(0.02), places=9)
         self.assertEqual((summary["position_rmse_m"], summary["heading_rmse_deg"]), (fused["position_rmse_m"], fused["heading_rmse_deg"]))
 
+    def test_a_heading_across_the_wrap_is_near_and_not_a_turn_away(self):
+        zero = np.zeros(500)
+        truth = self.truth(self.time_s, zero, zero, zero + 3.13)
+        self.estimates(self.time_s, zero, zero, zero - 3.13)
+        self.assertAlmostEqual(self.summary("--truth", truth)["heading_rmse_deg"], np.degrees(2 * np.pi - 6.26), places=6)
+
     def test_odometry_and_fused_are_told_apart(self):
         zero = np.zeros(500)
         truth = self.truth(self.time_s, zero, zero, zero)
