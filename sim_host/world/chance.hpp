@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Random draws of the world. Every effect has its own stream, so switching one on or off leaves all the others' draws as they were.
+// Random draws of the world. Every effect has its own stream, so switching one on or off leaves all the others' draws
+// as they were.
 #pragma once
 
 #include "base/time.hpp"
@@ -11,14 +12,33 @@ namespace tetap::sim {
 
 /// One stream number per effect; the order is part of what a seed means, so new ones go to the end.
 enum class Stream : std::uint32_t {
-  kStart, kDriver, kGround, kSlip, kImuTurnOn, kImuNoise, kImuVibration, kImuLatency, kWheels, kWheelLatency,
-  kGnssNoise, kGnssOutage, kGnssGlitch, kGnssAccuracy, kGnssLatency, kCamera, kCameraWrong, kCameraLatency, kSurvey, kFaultOutlier,
+  kStart,
+  kDriver,
+  kGround,
+  kSlip,
+  kImuTurnOn,
+  kImuNoise,
+  kImuVibration,
+  kImuLatency,
+  kWheels,
+  kWheelLatency,
+  kGnssNoise,
+  kGnssOutage,
+  kGnssGlitch,
+  kGnssAccuracy,
+  kGnssLatency,
+  kCamera,
+  kCameraWrong,
+  kCameraLatency,
+  kSurvey,
+  kFaultOutlier,
   kFaultLoss,
 };
 
 class Chance {
  public:
-  Chance(std::uint64_t seed, Stream stream) : key_{seed * 0x9E3779B97F4A7C15U + static_cast<std::uint32_t>(stream) + 1} {}
+  Chance(std::uint64_t seed, Stream stream)
+      : key_{seed * 0x9E3779B97F4A7C15U + static_cast<std::uint32_t>(stream) + 1} {}
 
   /// In (0, 1).
   [[nodiscard]] double uniform() {

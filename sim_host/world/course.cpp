@@ -56,9 +56,9 @@ Course default_course() {
           },
       .landmarks =
           {
-              {1, 9, -2.5}, {2, 22, -2.5}, {3, 36, -2.5}, {4, 51, -2},  {5, 52, 9},   {6, 44, 12},  {7, 52, 20},  {8, 49.5, 31},
-              {9, 36, 32},  {10, 25.5, 24}, {11, 21, 31}, {12, 9, 31},  {13, 2.5, 27}, {14, 3, 14}, {15, 13, 14}, {16, 20, 12},
-              {17, 27, 13}, {18, 35, 12},  {19, 8, 7},   {20, -7, 2},
+              {1, 9, -2.5},  {2, 22, -2.5}, {3, 36, -2.5},  {4, 51, -2},  {5, 52, 9},  {6, 44, 12},   {7, 52, 20},
+              {8, 49.5, 31}, {9, 36, 32},   {10, 25.5, 24}, {11, 21, 31}, {12, 9, 31}, {13, 2.5, 27}, {14, 3, 14},
+              {15, 13, 14},  {16, 20, 12},  {17, 27, 13},   {18, 35, 12}, {19, 8, 7},  {20, -7, 2},
           },
   };
 }
@@ -155,7 +155,8 @@ void Plan::add_speeds(const CourseLimits& limits) {
 }
 
 const Plan::Piece& Plan::piece(double s_m) const {
-  const auto after = std::upper_bound(pieces_.begin(), pieces_.end(), s_m, [](double s, const Piece& p) { return s < p.s_m; });
+  const auto after =
+      std::upper_bound(pieces_.begin(), pieces_.end(), s_m, [](double s, const Piece& p) { return s < p.s_m; });
   return after == pieces_.begin() ? pieces_.front() : *(after - 1);
 }
 
@@ -167,12 +168,14 @@ PathPoint Plan::path(double s_m) const {
   const double curvature = s_m < length_m_ ? p.curvature_per_m : 0;
   if (magnitude(p.curvature_per_m) < 1e-12) return {p.x_m + along * from.cos, p.y_m + along * from.sin, yaw_rad, 0};
   const Direction to = direction(yaw_rad);
-  return {p.x_m + (to.sin - from.sin) / p.curvature_per_m, p.y_m - (to.cos - from.cos) / p.curvature_per_m, yaw_rad, curvature};
+  return {p.x_m + (to.sin - from.sin) / p.curvature_per_m, p.y_m - (to.cos - from.cos) / p.curvature_per_m, yaw_rad,
+          curvature};
 }
 
 PlanPoint Plan::at(base::Micros since_start) const {
   const double time_s = static_cast<double>(since_start.us) * 1e-6;
-  const auto after = std::upper_bound(nodes_.begin(), nodes_.end(), time_s, [](double t, const Node& n) { return t < n.time_s; });
+  const auto after =
+      std::upper_bound(nodes_.begin(), nodes_.end(), time_s, [](double t, const Node& n) { return t < n.time_s; });
   if (after == nodes_.begin()) return {.s_m = 0, .parked = true};
   if (after == nodes_.end()) return {.s_m = length_m_, .parked = true};
   const Node& a = *(after - 1);
@@ -187,7 +190,8 @@ PlanPoint Plan::at(base::Micros since_start) const {
 }
 
 base::Micros Plan::time_at(double s_m) const {
-  const auto after = std::lower_bound(nodes_.begin(), nodes_.end(), s_m, [](const Node& n, double s) { return n.s_m < s; });
+  const auto after =
+      std::lower_bound(nodes_.begin(), nodes_.end(), s_m, [](const Node& n, double s) { return n.s_m < s; });
   if (after == nodes_.end()) return duration_;
   return {static_cast<std::int64_t>(sim::floor(after->time_s * 1e6))};
 }

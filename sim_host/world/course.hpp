@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A test course: waypoints joined by straight lines, every corner rounded by an arc, driven by a time plan within limits of speed,
-// acceleration, lateral acceleration and yaw rate.
+// A test course: waypoints joined by straight lines, every corner rounded by an arc, driven by a time plan within
+// limits of speed, acceleration, lateral acceleration and yaw rate.
 #pragma once
 
 #include "base/time.hpp"
@@ -20,8 +20,8 @@ struct Landmark {
 struct Waypoint {
   double x_m = 0;
   double y_m = 0;
-  double radius_m = 0;       ///< of the corner; 0 at the two ends and where the line goes straight on
-  double stop_s = 0;         ///< standstill there; only where radius_m = 0
+  double radius_m = 0;  ///< of the corner; 0 at the two ends and where the line goes straight on
+  double stop_s = 0;    ///< standstill there; only where radius_m = 0
 };
 
 struct CourseLimits {
@@ -36,7 +36,8 @@ struct Course {
   std::vector<Landmark> landmarks;
 };
 
-/// Proving ground of 52 m x 30 m: straights, two skid pads (one each way), slalom, hairpin, standstill at the start, in the middle, at the end.
+/// Proving ground of 52 m x 30 m: straights, two skid pads (one each way), slalom, hairpin, standstill at the start, in
+/// the middle, at the end.
 [[nodiscard]] Course default_course();
 /// A straight lead-in and full circles to the left, for laws that have closed forms.
 [[nodiscard]] Course circle_course(double radius_m, int turns);
@@ -59,7 +60,8 @@ struct PlanPoint {
 /// The course as a function of path length, and path length as a function of time.
 class Plan {
  public:
-  /// Throws std::invalid_argument where the waypoints cannot be driven: a corner whose arc does not fit, a stop in a corner.
+  /// Throws std::invalid_argument where the waypoints cannot be driven: a corner whose arc does not fit, a stop in a
+  /// corner.
   Plan(const Course& course, const CourseLimits& limits);
 
   [[nodiscard]] PathPoint path(double s_m) const;

@@ -13,22 +13,30 @@ constexpr std::array kTable{
     FaultInfo{Fault::kGnssJump, "gnss_jump", 60, 10, "GNSS position is 100 m too far east, accuracy figure unchanged"},
     FaultInfo{Fault::kGnssRamp, "gnss_ramp", 60, 30, "GNSS position walks off to the north at 1 m/s"},
     FaultInfo{Fault::kGnssOutage, "gnss_outage", 60, 30, "no GNSS message at all"},
-    FaultInfo{Fault::kGnssFrozen, "gnss_frozen", 60, 15, "GNSS repeats its last position and velocity with fresh stamps"},
-    FaultInfo{Fault::kGnssWrongHeight, "gnss_wrong_height", 60, 30, "GNSS height is 47 m too high (geoid counted twice)"},
+    FaultInfo{Fault::kGnssFrozen, "gnss_frozen", 60, 15,
+              "GNSS repeats its last position and velocity with fresh stamps"},
+    FaultInfo{Fault::kGnssWrongHeight, "gnss_wrong_height", 60, 30,
+              "GNSS height is 47 m too high (geoid counted twice)"},
     FaultInfo{Fault::kSlipLeft, "slip_left", 70, 4, "left wheel spins: its rim runs 1 m/s faster than it rolls"},
     FaultInfo{Fault::kSlipRight, "slip_right", 70, 4, "right wheel spins: its rim runs 1 m/s faster than it rolls"},
     FaultInfo{Fault::kWheelStuck, "wheel_stuck", 70, 5, "left wheel is blocked and dragged: its counter stands still"},
-    FaultInfo{Fault::kEncoderDropout, "encoder_dropout", 70, 10, "right encoder loses contact: counts of every other 100 ms are missing"},
+    FaultInfo{Fault::kEncoderDropout, "encoder_dropout", 70, 10,
+              "right encoder loses contact: counts of every other 100 ms are missing"},
     FaultInfo{Fault::kImuStuck, "imu_stuck", 60, 10, "IMU repeats its last sample with fresh stamps"},
-    FaultInfo{Fault::kImuClipping, "imu_clipping", 60, 5, "vibration of 60 m/s^2 and 12 rad/s drives the IMU into its limits (counted in the clip fields)"},
+    FaultInfo{Fault::kImuClipping, "imu_clipping", 60, 5,
+              "vibration of 60 m/s^2 and 12 rad/s drives the IMU into its limits (counted in the clip fields)"},
     FaultInfo{Fault::kGyroBiasStep, "gyro_bias_step", 60, 40, "gyro bias about the vertical axis steps by 0.02 rad/s"},
-    FaultInfo{Fault::kLandmarkWrongId, "landmark_wrong_id", 60, 15, "sightings carry the id of another landmark (neighbours swapped)"},
-    FaultInfo{Fault::kLandmarkOutlier, "landmark_outlier", 60, 20, "half of the sightings are 2 to 6 m and up to 0.5 rad off"},
+    FaultInfo{Fault::kLandmarkWrongId, "landmark_wrong_id", 60, 15,
+              "sightings carry the id of another landmark (neighbours swapped)"},
+    FaultInfo{Fault::kLandmarkOutlier, "landmark_outlier", 60, 20,
+              "half of the sightings are 2 to 6 m and up to 0.5 rad off"},
     FaultInfo{Fault::kStaleStamps, "stale_stamps", 60, 5, "stamps of all sensors are 400 ms older than their data"},
     FaultInfo{Fault::kFutureStamps, "future_stamps", 60, 5, "stamps of all sensors are 400 ms ahead of their data"},
-    FaultInfo{Fault::kClockJump, "clock_jump", 60, 20, "the clock of the bus (stamps and sync) jumps 3 s ahead, and back at the end"},
+    FaultInfo{Fault::kClockJump, "clock_jump", 60, 20,
+              "the clock of the bus (stamps and sync) jumps 3 s ahead, and back at the end"},
     FaultInfo{Fault::kLostFrames, "lost_frames", 60, 20, "each frame is lost with a probability of 20 %"},
-    FaultInfo{Fault::kKidnapped, "kidnapped", 20, 0, "rover is set down 8 m further along its course, unseen by wheels and IMU"},
+    FaultInfo{Fault::kKidnapped, "kidnapped", 20, 0,
+              "rover is set down 8 m further along its course, unseen by wheels and IMU"},
 };
 
 std::string names() {
@@ -59,8 +67,8 @@ std::string fault_help() {
   std::string text;
   for (const auto& row : kTable) {
     std::array<char, 64> line{};
-    std::snprintf(line.data(), line.size(), "  %-18.*s @%g+%g", static_cast<int>(row.name.size()), row.name.data(), row.start_s,
-                  row.duration_s);
+    std::snprintf(line.data(), line.size(), "  %-18.*s @%g+%g", static_cast<int>(row.name.size()), row.name.data(),
+                  row.start_s, row.duration_s);
     std::string padded{line.data()};
     padded.resize(std::max<std::size_t>(padded.size(), 30), ' ');
     text += padded + "  " + std::string{row.what} + "\n";

@@ -14,11 +14,25 @@
 namespace tetap::sim {
 
 enum class Fault : std::uint8_t {
-  kGnssJump, kGnssRamp, kGnssOutage, kGnssFrozen, kGnssWrongHeight,
-  kSlipLeft, kSlipRight, kWheelStuck, kEncoderDropout,
-  kImuStuck, kImuClipping, kGyroBiasStep,
-  kLandmarkWrongId, kLandmarkOutlier,
-  kStaleStamps, kFutureStamps, kClockJump, kLostFrames, kKidnapped,
+  kGnssJump,
+  kGnssRamp,
+  kGnssOutage,
+  kGnssFrozen,
+  kGnssWrongHeight,
+  kSlipLeft,
+  kSlipRight,
+  kWheelStuck,
+  kEncoderDropout,
+  kImuStuck,
+  kImuClipping,
+  kGyroBiasStep,
+  kLandmarkWrongId,
+  kLandmarkOutlier,
+  kStaleStamps,
+  kFutureStamps,
+  kClockJump,
+  kLostFrames,
+  kKidnapped,
 };
 
 struct FaultInfo {
@@ -31,11 +45,11 @@ struct FaultInfo {
 
 /// Magnitudes of the faults, where a description states one.
 struct FaultNumbers {
-  static constexpr double kJump_m = 100;               ///< to the east
-  static constexpr double kRamp_mps = 1;               ///< to the north
-  static constexpr double kHeight_m = 47;              ///< the geoid left out or counted twice
-  static constexpr double kSpin_mps = 1;               ///< of the wheel's rim, on top of its rolling
-  static constexpr std::int64_t kDropout_us = 100'000; ///< contact lost for this long, then back for as long
+  static constexpr double kJump_m = 100;                ///< to the east
+  static constexpr double kRamp_mps = 1;                ///< to the north
+  static constexpr double kHeight_m = 47;               ///< the geoid left out or counted twice
+  static constexpr double kSpin_mps = 1;                ///< of the wheel's rim, on top of its rolling
+  static constexpr std::int64_t kDropout_us = 100'000;  ///< contact lost for this long, then back for as long
   static constexpr double kClipVibration_mps2 = 60;
   static constexpr double kClipVibration_radps = 12;
   static constexpr double kGyroStep_radps = 0.02;
@@ -46,7 +60,7 @@ struct FaultNumbers {
   static constexpr std::int64_t kFuture_us = 400'000;
   static constexpr std::int64_t kClockJump_us = 3'000'000;
   static constexpr double kLossShare = 0.2;
-  static constexpr double kKidnapped_m = 8;            ///< along the course
+  static constexpr double kKidnapped_m = 8;  ///< along the course
 };
 
 [[nodiscard]] std::span<const FaultInfo> fault_table();

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The world's arithmetic: everything beyond + - * / sqrt goes through here, so that a seed gives the same bits on every host.
+// The world's arithmetic: everything beyond + - * / sqrt goes through here, so that a seed gives the same bits on every
+// host.
 #pragma once
 
 #include <cmath>

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What leaves the world: a sensor's sample with the time it claims and the time it is on the bus. Nothing of the truth is in it.
+// What leaves the world: a sensor's sample with the time it claims and the time it is on the bus. Nothing of the truth
+// is in it.
 #pragma once
 
 #include "app/samples.hpp"
@@ -10,19 +11,21 @@
 
 namespace tetap::sim {
 
-using Value = std::variant<app::ImuSample, app::WheelCounts, app::WheelSpeeds, app::BodySpeed, app::GnssPosition, app::GnssVelocity,
-                           app::LandmarkSighting>;
+using Value = std::variant<app::ImuSample, app::WheelCounts, app::WheelSpeeds, app::BodySpeed, app::GnssPosition,
+                           app::GnssVelocity, app::LandmarkSighting>;
 
 struct Measurement {
   base::Micros stamp;
   base::Micros arrival;
   std::uint8_t instance = 0;
-  std::uint8_t sequence = 0;    ///< counts per kind of value; the sender sends the low 4 bits
-  std::uint8_t lost_parts = 0;  ///< bit i: its i-th frame is lost on the way (fault lost_frames); the sender leaves it out
+  std::uint8_t sequence = 0;  ///< counts per kind of value; the sender sends the low 4 bits
+  std::uint8_t lost_parts =
+      0;  ///< bit i: its i-th frame is lost on the way (fault lost_frames); the sender leaves it out
   Value value;
 };
 
-/// In how many frames a value travels: gyro, accel, time; latitude, longitude, height, accuracy; east and north, up; one.
+/// In how many frames a value travels: gyro, accel, time; latitude, longitude, height, accuracy; east and north, up;
+/// one.
 [[nodiscard]] constexpr int parts(const Value& value) {
   if (std::holds_alternative<app::ImuSample>(value)) return 3;
   if (std::holds_alternative<app::GnssPosition>(value)) return 4;

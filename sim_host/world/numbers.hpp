@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// How imperfect the world is: every magnitude with its source. The defaults are the mismatched world, with effects no planar filter
-// models; matched() keeps only what a filter models exactly, for consistency tests.
+// How imperfect the world is: every magnitude with its source. The defaults are the mismatched world, with effects no
+// planar filter models; matched() keeps only what a filter models exactly, for consistency tests.
 //
 // [ICM] TDK DS-000347 v1.7 (ICM-42688-P): sec. 3.1 table 1 (gyroscope), sec. 3.2 table 2 (accelerometer).
 // [F9P] u-blox UBX-17051259 (ZED-F9P data sheet): sec. 1.2 (performance): 1.0 m CEP with SBAS, 0.05 m/s velocity.
-// [BF]  Borenstein, Feng, "Measurement and correction of systematic odometry errors in mobile robots", IEEE T-RA 12(6), 1996.
-// [own] our choice, stated so that a report can name it.
+// [BF]  Borenstein, Feng, "Measurement and correction of systematic odometry errors in mobile robots", IEEE T-RA 12(6),
+// 1996. [own] our choice, stated so that a report can name it.
 #pragma once
 
 #include "base/time.hpp"
@@ -16,90 +16,98 @@
 
 namespace tetap::sim {
 
-inline constexpr double kG0 = 9.80665;   ///< standard gravity [m/s^2], the "g" of data sheets
+inline constexpr double kG0 = 9.80665;  ///< standard gravity [m/s^2], the "g" of data sheets
 
 struct RoverNumbers {
-  double wheel_radius_m = 0.10;          ///< as in the robot's papers; what a filter is given
-  double track_m = 0.50;                 ///< likewise
-  double radius_difference = 0.005;      ///< (left - right) / mean: unequal wheels [BF: the larger of the two dominant errors]
-  double track_error = 0.01;             ///< true over nominal, minus 1: contact points are not where the drawing says [BF: the other one]
-  double slip_per_mps2 = 0.010;          ///< longitudinal slip for an acceleration of 1 m/s^2 [own]
-  double slip_curve_per_mps2 = 0.006;    ///< both wheels turn further than they roll, per lateral acceleration [own]
-  double slip_random = 0.010;            ///< 1 sigma per wheel at full load, Gauss-Markov [own]
+  double wheel_radius_m = 0.10;  ///< as in the robot's papers; what a filter is given
+  double track_m = 0.50;         ///< likewise
+  double radius_difference =
+      0.005;  ///< (left - right) / mean: unequal wheels [BF: the larger of the two dominant errors]
+  double track_error =
+      0.01;  ///< true over nominal, minus 1: contact points are not where the drawing says [BF: the other one]
+  double slip_per_mps2 = 0.010;        ///< longitudinal slip for an acceleration of 1 m/s^2 [own]
+  double slip_curve_per_mps2 = 0.006;  ///< both wheels turn further than they roll, per lateral acceleration [own]
+  double slip_random = 0.010;          ///< 1 sigma per wheel at full load, Gauss-Markov [own]
   double slip_random_tau_s = 1.0;
-  double side_slip_s = 0.010;            ///< drift to the outside of a curve: v_y = -side_slip * v * yaw rate [own]
-  double roll_rad_per_mps2 = 0.012;      ///< body leans to the outside: 0.7 deg at 1 m/s^2 [own]
-  double pitch_rad_per_mps2 = 0.010;     ///< and squats on acceleration [own]
-  double ground_rad = 0.004;             ///< roll and pitch by uneven ground, 1 sigma while moving [own]
+  double side_slip_s = 0.010;         ///< drift to the outside of a curve: v_y = -side_slip * v * yaw rate [own]
+  double roll_rad_per_mps2 = 0.012;   ///< body leans to the outside: 0.7 deg at 1 m/s^2 [own]
+  double pitch_rad_per_mps2 = 0.010;  ///< and squats on acceleration [own]
+  double ground_rad = 0.004;          ///< roll and pitch by uneven ground, 1 sigma while moving [own]
   double ground_tau_s = 0.4;
-  double driver_wander_m = 0.08;         ///< lateral, Gauss-Markov: no two runs drive the same line [own]
+  double driver_wander_m = 0.08;  ///< lateral, Gauss-Markov: no two runs drive the same line [own]
   double driver_wander_tau_s = 6;
-  double start_m = 0.05;                 ///< 1 sigma per axis of where the rover really stands at the start [own]
+  double start_m = 0.05;  ///< 1 sigma per axis of where the rover really stands at the start [own]
   double start_rad = 0.02;
 };
 
 struct ImuNumbers {
-  int rate_hz = 100;                     ///< 0: no IMU; a divisor of 2000
-  std::array<double, 3> accel_noise = {65e-6 * kG0, 65e-6 * kG0, 70e-6 * kG0};  ///< m/s^2/sqrt(Hz) [ICM: 65 x, y; 70 z ug/sqrt(Hz)]
-  double gyro_noise = radians(0.0028);   ///< rad/s/sqrt(Hz) [ICM: 0.0028 deg/s/sqrt(Hz)]
-  double gyro_turn_on_radps = radians(0.1);   ///< 1 sigma; [ICM] states +-0.5 deg/s on a board, here after a bench calibration
-  double accel_turn_on_mps2 = 0.05;      ///< 1 sigma; [ICM] states +-20 mg, likewise
+  int rate_hz = 100;  ///< 0: no IMU; a divisor of 2000
+  std::array<double, 3> accel_noise = {65e-6 * kG0, 65e-6 * kG0,
+                                       70e-6 * kG0};  ///< m/s^2/sqrt(Hz) [ICM: 65 x, y; 70 z ug/sqrt(Hz)]
+  double gyro_noise = radians(0.0028);                ///< rad/s/sqrt(Hz) [ICM: 0.0028 deg/s/sqrt(Hz)]
+  double gyro_turn_on_radps =
+      radians(0.1);                  ///< 1 sigma; [ICM] states +-0.5 deg/s on a board, here after a bench calibration
+  double accel_turn_on_mps2 = 0.05;  ///< 1 sigma; [ICM] states +-20 mg, likewise
   double gyro_walk_radps = radians(10.0 / 3600);  ///< in-run bias, Gauss-Markov 1 sigma [own: not in the data sheet]
   double accel_walk_mps2 = 0.001;
   double walk_tau_s = 300;
-  double scale = 0.003;                  ///< 1 sigma per axis [ICM: +-0.5 % initial tolerance]
-  double vibration_mps2 = 1.5;           ///< amplitude at 2 m/s, proportional to speed, from tyre lugs [own]
+  double scale = 0.003;         ///< 1 sigma per axis [ICM: +-0.5 % initial tolerance]
+  double vibration_mps2 = 1.5;  ///< amplitude at 2 m/s, proportional to speed, from tyre lugs [own]
   double vibration_radps = 0.03;
-  int lugs = 17;                         ///< per turn of the wheel: 54 Hz at 2 m/s
-  double vibration_noise = 0.02;         ///< m/s^2/sqrt(Hz) at 2 m/s, broadband [own]
-  double gyro_range_radps = radians(500);///< full scale as configured
+  int lugs = 17;                           ///< per turn of the wheel: 54 Hz at 2 m/s
+  double vibration_noise = 0.02;           ///< m/s^2/sqrt(Hz) at 2 m/s, broadband [own]
+  double gyro_range_radps = radians(500);  ///< full scale as configured
   double accel_range_mps2 = 4 * kG0;
   bool earth_rotation = true;
   double temperature_degC = 31;
+  base::Micros phase{9'000};  ///< when within its period it samples: no two clocks tick together [own]
   base::Micros latency_min{300}, latency_max{700};
 };
 
 enum class WheelOutput : std::uint8_t { kCounts, kWheelSpeeds, kBodySpeed };
 
 struct WheelSensorNumbers {
-  int rate_hz = 100;                     ///< 0: none; a divisor of 2000
+  int rate_hz = 100;  ///< 0: none; a divisor of 2000
   WheelOutput output = WheelOutput::kCounts;
-  double counts_per_turn = 2000;         ///< 500 lines, four edges: 0.31 mm of travel
-  double noise_m = 0;                    ///< k: variance of the measured travel per metre; the filters' own error model
-  base::Micros stamp_late_max{100};      ///< stamped by software up to this much after the counters were latched [own]
+  double counts_per_turn = 2000;     ///< 500 lines, four edges: 0.31 mm of travel
+  double noise_m = 0;                ///< k: variance of the measured travel per metre; the filters' own error model
+  base::Micros stamp_late_max{100};  ///< stamped by software up to this much after the counters were latched [own]
+  base::Micros phase{8'500};
   base::Micros latency_min{300}, latency_max{900};
 };
 
 struct GnssNumbers {
-  int rate_hz = 5;                       ///< 0: none
-  double white_m = 0.30;                 ///< per horizontal axis; with the next line 0.85 m = 1.0 m CEP [F9P]
-  double correlated_m = 0.80;            ///< Gauss-Markov
-  double correlated_tau_s = 60;          ///< multipath and atmosphere [own; minutes in the literature]
-  double vertical_factor = 1.6;          ///< height error over horizontal [own: usual geometry]
-  double velocity_mps = 0.05;            ///< white, per axis [F9P]
-  double accuracy_error = 0.2;           ///< 1 sigma of the receiver's own accuracy figure against the truth, slow [own]
+  int rate_hz = 5;               ///< 0: none
+  double white_m = 0.30;         ///< per horizontal axis; with the next line 0.85 m = 1.0 m CEP [F9P]
+  double correlated_m = 0.80;    ///< Gauss-Markov
+  double correlated_tau_s = 60;  ///< multipath and atmosphere [own; minutes in the literature]
+  double vertical_factor = 1.6;  ///< height error over horizontal [own: usual geometry]
+  double velocity_mps = 0.05;    ///< white, per axis [F9P]
+  double accuracy_error = 0.2;   ///< 1 sigma of the receiver's own accuracy figure against the truth, slow [own]
   std::array<double, 3> antenna_b_m{0, 0, 0.4};
-  double outage_every_s = 90;            ///< mean time between outages; 0: none [own]
+  double outage_every_s = 90;  ///< mean time between outages; 0: none [own]
   double outage_min_s = 2, outage_max_s = 8;
-  double glitch_probability = 0.004;     ///< per fix: multipath jump that the accuracy figure does not show [own]
+  double glitch_probability = 0.004;  ///< per fix: multipath jump that the accuracy figure does not show [own]
   double glitch_min_m = 4, glitch_max_m = 15;
   int glitch_fixes_max = 4;              ///< it lasts 1 to so many fixes
   base::Micros quiet_start{20'000'000};  ///< no outage or glitch before, so that a first fix is a fix
+  base::Micros phase{104'000};
   base::Micros latency_min{80'000}, latency_max{120'000};
 };
 
 struct CameraNumbers {
-  int rate_hz = 5;                       ///< 0: none
+  int rate_hz = 5;  ///< 0: none
   double range_max_m = 12;
   double field_of_view_rad = radians(120);
   double sigma_range_m = 0.10;
-  double sigma_range_per_m = 0.01;       ///< grows with range
+  double sigma_range_per_m = 0.01;  ///< grows with range
   double sigma_bearing_rad = 0.015;
-  double scale_error = 0.005;            ///< of range: focal length [own]
-  double mount_error_rad = 0.004;        ///< yaw of the mount against what the filter is told [own]
+  double scale_error = 0.005;      ///< of range: focal length [own]
+  double mount_error_rad = 0.004;  ///< yaw of the mount against what the filter is told [own]
   double miss_probability = 0.15;
   double wrong_id_probability = 0.005;
-  double survey_m = 0.015;               ///< 1 sigma per axis of the landmark map
+  double survey_m = 0.015;  ///< 1 sigma per axis of the landmark map
+  base::Micros phase{33'500};
   base::Micros latency_min{20'000}, latency_max{60'000};
 };
 
@@ -111,9 +119,11 @@ struct Numbers {
   CameraNumbers camera;
 };
 
-/// Only white noise of the stated sigma and encoder noise k |ds|: nothing a filter does not model. Accuracy figures are exact.
+/// Only white noise of the stated sigma and encoder noise k |ds|: nothing a filter does not model. Accuracy figures are
+/// exact, and every sensor samples at an instant of the wheels', so that nothing is interpolated.
 [[nodiscard]] inline Numbers matched(Numbers n) {
-  n.rover.radius_difference = n.rover.track_error = n.rover.slip_per_mps2 = n.rover.slip_curve_per_mps2 = n.rover.slip_random = 0;
+  n.rover.radius_difference = n.rover.track_error = n.rover.slip_per_mps2 = n.rover.slip_curve_per_mps2 =
+      n.rover.slip_random = 0;
   n.rover.side_slip_s = n.rover.roll_rad_per_mps2 = n.rover.pitch_rad_per_mps2 = n.rover.ground_rad = 0;
   n.imu.gyro_turn_on_radps = n.imu.accel_turn_on_mps2 = n.imu.gyro_walk_radps = n.imu.accel_walk_mps2 = n.imu.scale = 0;
   n.imu.vibration_mps2 = n.imu.vibration_radps = n.imu.vibration_noise = 0;
@@ -121,6 +131,9 @@ struct Numbers {
   n.wheels.counts_per_turn = 20000;  // so that quantisation (31 um) stays far below the noise of one sample
   n.wheels.noise_m = 2e-5;
   n.wheels.stamp_late_max = {};
+  n.imu.phase = n.wheels.phase = {8'500};
+  n.gnss.phase = {108'500};
+  n.camera.phase = {38'500};
   n.gnss.white_m = 0.85;
   n.gnss.correlated_m = n.gnss.accuracy_error = n.gnss.outage_every_s = n.gnss.glitch_probability = 0;
   n.gnss.antenna_b_m = {};

@@ -4,7 +4,7 @@
 namespace tetap::sim {
 namespace {
 
-constexpr int kDriverTicks = 20;           // the driver decides every 10 ms
+constexpr int kDriverTicks = 20;  // the driver decides every 10 ms
 constexpr double kDriver_s = 0.010;
 constexpr double kAccelerationLag_s = 0.10;  // motor current and load
 constexpr double kYawLag_s = 0.12;
@@ -70,7 +70,8 @@ void Rover::drive(base::Micros since_start) {
 
   constexpr double kAlong = 1.0, kBeside = 1.5, kHeading = 2.5, kSpeed = 2.5;
   const double speed = wanted.speed_mps * off.cos + kAlong * along_m;
-  wanted_acceleration_mps2_ = clamp(wanted.acceleration_mps2 + kSpeed * (speed - speed_mps_), -kAccelerationMax_mps2, kAccelerationMax_mps2);
+  wanted_acceleration_mps2_ =
+      clamp(wanted.acceleration_mps2 + kSpeed * (speed - speed_mps_), -kAccelerationMax_mps2, kAccelerationMax_mps2);
   wanted_yaw_rate_radps_ = wanted.speed_mps * (curvature + kBeside * clamp(beside_m, -0.5, 0.5) + kHeading * off.sin);
 }
 
@@ -98,7 +99,8 @@ Motion Rover::step(base::Micros since_start) {
     motion.rate_b_radps[i] /= substeps_;
   }
   const double half_turn = 0.5 * yaw_rate_radps_ * 500e-6;
-  motion.attitude_rad = {0.5 * (before.roll_rad + after.roll_rad), 0.5 * (before.pitch_rad + after.pitch_rad), yaw_rad_ - half_turn};
+  motion.attitude_rad = {0.5 * (before.roll_rad + after.roll_rad), 0.5 * (before.pitch_rad + after.pitch_rad),
+                         yaw_rad_ - half_turn};
   return motion;
 }
 
@@ -110,7 +112,8 @@ void Rover::integrate(double h_s, Motion& motion) {
     acceleration_mps2_ = -speed_mps_ / kBrakeLag_s;
     speed_mps_ += h_s * acceleration_mps2_;
     yaw_rate_radps_ -= h_s / kBrakeLag_s * yaw_rate_radps_;
-    if (magnitude(speed_mps_) < 1e-4 && magnitude(yaw_rate_radps_) < 1e-4) speed_mps_ = yaw_rate_radps_ = acceleration_mps2_ = 0;
+    if (magnitude(speed_mps_) < 1e-4 && magnitude(yaw_rate_radps_) < 1e-4)
+      speed_mps_ = yaw_rate_radps_ = acceleration_mps2_ = 0;
   } else {
     const double lagging = acceleration_mps2_;
     acceleration_mps2_ += h_s / kAccelerationLag_s * (wanted_acceleration_mps2_ - acceleration_mps2_);
@@ -127,7 +130,8 @@ void Rover::integrate(double h_s, Motion& motion) {
   y_m_ += h_s * (speed * d.sin + drift * d.cos);
   yaw_rad_ += h_s * rate;
 
-  // Lean: a damped spring towards what load and ground ask for. Outside of a left curve is right: roll > 0 is left side up.
+  // Lean: a damped spring towards what load and ground ask for. Outside of a left curve is right: roll > 0 is left side
+  // up.
   const double lateral = speed * rate;
   const double uneven = clamp(magnitude(speed) / 0.5, 0, 1);
   const double roll_goal = numbers_.roll_rad_per_mps2 * lateral + uneven * ground_roll_.value();
@@ -147,7 +151,8 @@ void Rover::integrate(double h_s, Motion& motion) {
 
   // Wheels: what the contact points travel, and slip on top, which grows with the load and is not there at standstill.
   const double load = clamp(0.3 + magnitude(acceleration_mps2_) + magnitude(lateral), 0, 2);
-  const double slip = numbers_.slip_per_mps2 * acceleration_mps2_ * (speed < 0 ? -1 : 1) + numbers_.slip_curve_per_mps2 * magnitude(lateral);
+  const double slip = numbers_.slip_per_mps2 * acceleration_mps2_ * (speed < 0 ? -1 : 1) +
+                      numbers_.slip_curve_per_mps2 * magnitude(lateral);
   motion.rim_left_m += h_s * (speed - 0.5 * track_m_ * rate) * (1 + slip + load * slip_left_.value());
   motion.rim_right_m += h_s * (speed + 0.5 * track_m_ * rate) * (1 + slip + load * slip_right_.value());
 }

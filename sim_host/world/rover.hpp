@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The rover itself: a driver who follows the plan, body dynamics with lag, lean and side slip, and wheels that slip. Integrated at
-// 2 kHz or a multiple. Driver: Kanayama et al., "A stable tracking control method for an autonomous mobile robot", ICRA 1990, eq. 5.
+// The rover itself: a driver who follows the plan, body dynamics with lag, lean and side slip, and wheels that slip.
+// Integrated at 2 kHz or a multiple. Driver: Kanayama et al., "A stable tracking control method for an autonomous
+// mobile robot", ICRA 1990, eq. 5.
 #pragma once
 
 #include "base/time.hpp"
@@ -14,7 +15,8 @@ namespace tetap::sim {
 
 using Vector3 = std::array<double, 3>;
 
-/// Frames: n = east north up from the course's origin, b = forward left up. R_nb = Rz(yaw) Ry(pitch) Rx(roll): pitch is nose down.
+/// Frames: n = east north up from the course's origin, b = forward left up. R_nb = Rz(yaw) Ry(pitch) Rx(roll): pitch is
+/// nose down.
 struct Truth {
   base::Micros time;
   double x_m = 0, y_m = 0, z_m = 0;
@@ -26,10 +28,10 @@ struct Truth {
 
 /// Between the start and the end of one step.
 struct Motion {
-  Vector3 rate_b_radps{};           ///< of b against n, in b
+  Vector3 rate_b_radps{};  ///< of b against n, in b
   Vector3 acceleration_n_mps2{};
-  Vector3 attitude_rad{};           ///< roll, pitch, yaw in the middle
-  double rim_left_m = 0;            ///< travel of the wheels' rims: what they turned times their true radius
+  Vector3 attitude_rad{};  ///< roll, pitch, yaw in the middle
+  double rim_left_m = 0;   ///< travel of the wheels' rims: what they turned times their true radius
   double rim_right_m = 0;
 };
 
@@ -40,7 +42,8 @@ struct Motion {
 
 class Rover {
  public:
-  static constexpr base::Micros kStep{500};  ///< random processes and sensors live on this grid, whatever the integration rate
+  static constexpr base::Micros kStep{
+      500};  ///< random processes and sensors live on this grid, whatever the integration rate
 
   /// `substeps` integration steps per kStep.
   Rover(const RoverNumbers& numbers, const Plan& plan, std::uint64_t seed, int substeps);
@@ -65,7 +68,7 @@ class Rover {
   base::Micros ahead_;
   double track_m_;
 
-  double x_m_, y_m_, yaw_rad_;       // yaw is continuous
+  double x_m_, y_m_, yaw_rad_;  // yaw is continuous
   double speed_mps_ = 0, acceleration_mps2_ = 0, yaw_rate_radps_ = 0;
   double roll_rad_ = 0, roll_rate_radps_ = 0, pitch_rad_ = 0, pitch_rate_radps_ = 0;
 

@@ -96,7 +96,8 @@ app::ImuSample Imu::sample(base::Micros now, const Faults& faults) {
     if (stepped && i == 2) gyro_bias += FaultNumbers::kGyroStep_radps;
     const double accel_bias = accel_bias_[i] + accel_walk_[i].next(noise_);
     const double angle_noise = noise_.normal(numbers_.gyro_noise * root);
-    const double velocity_noise = noise_.normal(numbers_.accel_noise[i] * root) + vibration_.normal(numbers_.vibration_noise * share * root);
+    const double velocity_noise =
+        noise_.normal(numbers_.accel_noise[i] * root) + vibration_.normal(numbers_.vibration_noise * share * root);
     s.dangle_b_rad[i] = single(angle_[i] + gyro_bias * period_s_ + angle_noise);
     s.dvelocity_b_mps[i] = single(velocity_[i] + accel_bias * period_s_ + velocity_noise);
   }
@@ -125,7 +126,8 @@ void Wheels::sense(const Motion& motion, base::Micros now, const Faults& faults)
   if (faults.active(Fault::kSlipLeft, now)) left_m += FaultNumbers::kSpin_mps * kStep_s;
   if (faults.active(Fault::kSlipRight, now)) right_m += FaultNumbers::kSpin_mps * kStep_s;
   if (faults.active(Fault::kWheelStuck, now)) left_m = 0;
-  if (const auto on = faults.since(Fault::kEncoderDropout, now); on && on->us / FaultNumbers::kDropout_us % 2 == 0) right_m = 0;
+  if (const auto on = faults.since(Fault::kEncoderDropout, now); on && on->us / FaultNumbers::kDropout_us % 2 == 0)
+    right_m = 0;
   left_.travel_m += left_m;
   left_.unread_m += left_m;
   right_.travel_m += right_m;
@@ -143,7 +145,9 @@ void Wheels::read() {
 
 app::WheelCounts Wheels::counts() {
   read();
-  const auto wrapped = [](const Wheel& w) { return static_cast<std::uint16_t>(static_cast<std::uint64_t>(w.count) + w.offset); };
+  const auto wrapped = [](const Wheel& w) {
+    return static_cast<std::uint16_t>(static_cast<std::uint64_t>(w.count) + w.offset);
+  };
   return {.left = wrapped(left_), .right = wrapped(right_)};
 }
 
@@ -171,9 +175,10 @@ Gnss::Gnss(const GnssNumbers& numbers, const Wgs84& earth, std::uint64_t seed)
       outage_chance_{seed, Stream::kGnssOutage},
       glitch_chance_{seed, Stream::kGnssGlitch},
       accuracy_chance_{seed, Stream::kGnssAccuracy},
-      correlated_{GaussMarkov{numbers.correlated_m, numbers.correlated_tau_s, period_s_, noise_},
-                  GaussMarkov{numbers.correlated_m, numbers.correlated_tau_s, period_s_, noise_},
-                  GaussMarkov{numbers.correlated_m * numbers.vertical_factor, numbers.correlated_tau_s, period_s_, noise_}},
+      correlated_{
+          GaussMarkov{numbers.correlated_m, numbers.correlated_tau_s, period_s_, noise_},
+          GaussMarkov{numbers.correlated_m, numbers.correlated_tau_s, period_s_, noise_},
+          GaussMarkov{numbers.correlated_m * numbers.vertical_factor, numbers.correlated_tau_s, period_s_, noise_}},
       accuracy_{numbers.accuracy_error, 20, period_s_, accuracy_chance_} {}
 
 void Gnss::advance_errors(base::Micros now) {
@@ -183,14 +188,16 @@ void Gnss::advance_errors(base::Micros now) {
   const bool quiet = now < numbers_.quiet_start;
   const bool begins = numbers_.outage_every_s > 0 && outage_chance_.happens(period_s_ / numbers_.outage_every_s);
   const double lasts_s = outage_chance_.uniform(numbers_.outage_min_s, numbers_.outage_max_s);
-  if (begins && !quiet && now >= outage_until_) outage_until_ = now + base::Micros{static_cast<std::int64_t>(lasts_s * 1e6)};
+  if (begins && !quiet && now >= outage_until_)
+    outage_until_ = now + base::Micros{static_cast<std::int64_t>(lasts_s * 1e6)};
 
   const bool strikes = glitch_chance_.happens(numbers_.glitch_probability);
   const double size_m = glitch_chance_.uniform(numbers_.glitch_min_m, numbers_.glitch_max_m);
   const Direction towards = direction(glitch_chance_.uniform(-kPi, kPi));
   const int fixes = 1 + static_cast<int>(numbers_.glitch_fixes_max * glitch_chance_.uniform());
   if (glitch_fixes_ > 0) --glitch_fixes_;
-  if (strikes && !quiet && glitch_fixes_ == 0) glitch_fixes_ = fixes, glitch_m_ = {size_m * towards.cos, size_m * towards.sin};
+  if (strikes && !quiet && glitch_fixes_ == 0)
+    glitch_fixes_ = fixes, glitch_m_ = {size_m * towards.cos, size_m * towards.sin};
 }
 
 Gnss::Reading Gnss::sample(const Truth& truth, const Vector3& rate_b, base::Micros now, const Faults& faults) {
@@ -201,18 +208,21 @@ Gnss::Reading Gnss::sample(const Truth& truth, const Vector3& rate_b, base::Micr
   const Vector3& l = numbers_.antenna_b_m;
   const Vector3 attitude{truth.roll_rad, truth.pitch_rad, truth.yaw_rad};
   const Vector3 lever_n = to_level(attitude, l);
-  const Vector3 swing_n =
-      to_level(attitude, {rate_b[1] * l[2] - rate_b[2] * l[1], rate_b[2] * l[0] - rate_b[0] * l[2], rate_b[0] * l[1] - rate_b[1] * l[0]});
+  const Vector3 swing_n = to_level(attitude, {rate_b[1] * l[2] - rate_b[2] * l[1], rate_b[2] * l[0] - rate_b[0] * l[2],
+                                              rate_b[0] * l[1] - rate_b[1] * l[0]});
 
-  Vector3 at_m{truth.x_m + lever_n[0] + correlated_[0].value() + white[0], truth.y_m + lever_n[1] + correlated_[1].value() + white[1],
+  Vector3 at_m{truth.x_m + lever_n[0] + correlated_[0].value() + white[0],
+               truth.y_m + lever_n[1] + correlated_[1].value() + white[1],
                truth.z_m + lever_n[2] + correlated_[2].value() + white[2] * numbers_.vertical_factor};
   if (glitch_fixes_ > 0) at_m[0] += glitch_m_[0], at_m[1] += glitch_m_[1];
   if (faults.active(Fault::kGnssJump, now)) at_m[0] += FaultNumbers::kJump_m;
-  if (const auto on = faults.since(Fault::kGnssRamp, now)) at_m[1] += FaultNumbers::kRamp_mps * static_cast<double>(on->us) * 1e-6;
+  if (const auto on = faults.since(Fault::kGnssRamp, now))
+    at_m[1] += FaultNumbers::kRamp_mps * static_cast<double>(on->us) * 1e-6;
   if (faults.active(Fault::kGnssWrongHeight, now)) at_m[2] += FaultNumbers::kHeight_m;
 
   const double believed = clamp(1 + accuracy_.value(), 0.5, 2);
-  const double sigma_m = sim::sqrt(numbers_.white_m * numbers_.white_m + numbers_.correlated_m * numbers_.correlated_m) * believed;
+  const double sigma_m =
+      sim::sqrt(numbers_.white_m * numbers_.white_m + numbers_.correlated_m * numbers_.correlated_m) * believed;
   const GeodeticPoint point = earth_->geodetic(at_m);
   Reading reading;
   reading.position = app::GnssPosition{.latitude_2ndeg = point.latitude_2ndeg,
@@ -273,14 +283,16 @@ std::vector<app::LandmarkSighting> Camera::sample(const Truth& truth, base::Micr
     const auto other = static_cast<std::size_t>(static_cast<double>(landmarks_.size()) * wrong_.uniform());
     const bool outlier = outlier_.happens(FaultNumbers::kOutlierShare);
     const double outlier_range_m = outlier_.uniform(FaultNumbers::kOutlierRange_m[0], FaultNumbers::kOutlierRange_m[1]);
-    const double outlier_bearing_rad = outlier_.uniform(-FaultNumbers::kOutlierBearing_rad, FaultNumbers::kOutlierBearing_rad);
+    const double outlier_bearing_rad =
+        outlier_.uniform(-FaultNumbers::kOutlierBearing_rad, FaultNumbers::kOutlierBearing_rad);
     if (missed) continue;
 
     double seen_m = range_m * (1 + numbers_.scale_error) + range_noise;
     double seen_rad = bearing_rad - numbers_.mount_error_rad + bearing_noise;
     std::size_t named = mistaken ? other : i;
     if (faults.active(Fault::kLandmarkWrongId, now) && (named ^ 1U) < landmarks_.size()) named ^= 1U;
-    if (outlier && faults.active(Fault::kLandmarkOutlier, now)) seen_m += outlier_range_m, seen_rad += outlier_bearing_rad;
+    if (outlier && faults.active(Fault::kLandmarkOutlier, now))
+      seen_m += outlier_range_m, seen_rad += outlier_bearing_rad;
     sightings.push_back({.landmark = landmarks_[named].id,
                          .range_m = single(seen_m > 0 ? seen_m : 0),
                          .bearing_rad = single(wrap(seen_rad))});

@@ -53,12 +53,12 @@ class Wheels {
 
  private:
   struct Wheel {
-    double metres_per_count = 0;   ///< with the true radius
-    double travel_m = 0;           ///< of the rim, with the sensor's noise
-    double unread_m = 0;           ///< since the last reading
+    double metres_per_count = 0;  ///< with the true radius
+    double travel_m = 0;          ///< of the rim, with the sensor's noise
+    double unread_m = 0;          ///< since the last reading
     std::int64_t count = 0;
     std::int64_t read = 0;
-    std::uint16_t offset = 0;      ///< counters free-run: nobody zeroes them
+    std::uint16_t offset = 0;  ///< counters free-run: nobody zeroes them
   };
   void read();
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // WGS84 for the world, in double and apart from the firmware's own, so that one judges the other.
-// Ellipsoid and gravity formula: NGA.STND.0036 (2014), tables 3.1 and 3.6, eq. 4-1. ECEF to geodetic: the fixed point of
+// Ellipsoid and normal gravity: NIMA TR8350.2, 3rd ed. (2000), sec. 3 and 4. ECEF to geodetic: the fixed point of
 // Hofmann-Wellenhof, Lichtenegger, Wasle, GNSS (2008), sec. 8.2.1; it gains three digits a round near the ellipsoid.
 #pragma once
 
@@ -61,7 +61,8 @@ class Wgs84 {
 
   /// East, north, up of the origin.
   [[nodiscard]] std::array<double, 3> enu_m(const GeodeticPoint& point) const {
-    const auto at = ecef(direction(angle_rad(point.latitude_2ndeg)), direction(angle_rad(point.longitude_2ndeg)), point.height_m);
+    const auto at =
+        ecef(direction(angle_rad(point.latitude_2ndeg)), direction(angle_rad(point.longitude_2ndeg)), point.height_m);
     const double x = at[0] - origin_ecef_m_[0];
     const double y = at[1] - origin_ecef_m_[1];
     const double z = at[2] - origin_ecef_m_[2];

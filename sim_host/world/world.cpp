@@ -9,15 +9,10 @@
 namespace tetap::sim {
 namespace {
 
-// When within its period a sensor samples: no two clocks tick together, and IMU and wheels are there before a tick at a full 10 ms.
-constexpr base::Micros kImuPhase{9'000};
-constexpr base::Micros kWheelPhase{8'500};
-constexpr base::Micros kGnssPhase{104'000};
-constexpr base::Micros kCameraPhase{33'500};
-
 void check_rate(const char* what, int rate_hz) {
   if (rate_hz < 0 || (rate_hz > 0 && (2000 % rate_hz != 0)))
-    throw std::invalid_argument(std::string{what} + " rate of " + std::to_string(rate_hz) + " Hz does not divide 2000 Hz");
+    throw std::invalid_argument(std::string{what} + " rate of " + std::to_string(rate_hz) +
+                                " Hz does not divide 2000 Hz");
 }
 
 bool due(int rate_hz, base::Micros phase, base::Micros now) {
@@ -69,7 +64,11 @@ Truth World::truth() const {
 
 StartPose World::start_pose() const {
   const PathPoint at = plan_->path(0);
-  return {.x_m = at.x_m, .y_m = at.y_m, .yaw_rad = wrap(at.yaw_rad), .sigma_m = numbers_.rover.start_m, .sigma_yaw_rad = numbers_.rover.start_rad};
+  return {.x_m = at.x_m,
+          .y_m = at.y_m,
+          .yaw_rad = wrap(at.yaw_rad),
+          .sigma_m = numbers_.rover.start_m,
+          .sigma_yaw_rad = numbers_.rover.start_rad};
 }
 
 base::Micros World::clock_offset_at(base::Micros since_start) const {
@@ -112,12 +111,12 @@ void World::step() {
   const auto& n = numbers_;
   if (n.imu.rate_hz > 0) {
     imu_.sense(motion, rover_.truth().speed_mps, now_, faults_);
-    if (due(n.imu.rate_hz, kImuPhase, now_))
+    if (due(n.imu.rate_hz, n.imu.phase, now_))
       emit(imu_.sample(now_, faults_), imu_sequence_++, {}, imu_latency_.between(n.imu.latency_min, n.imu.latency_max));
   }
   if (n.wheels.rate_hz > 0) {
     wheels_.sense(motion, now_, faults_);
-    if (due(n.wheels.rate_hz, kWheelPhase, now_)) {
+    if (due(n.wheels.rate_hz, n.wheels.phase, now_)) {
       const base::Micros late = wheel_latency_.between({}, n.wheels.stamp_late_max);
       const base::Micros latency = wheel_latency_.between(n.wheels.latency_min, n.wheels.latency_max);
       const Value value = n.wheels.output == WheelOutput::kCounts        ? Value{wheels_.counts()}
@@ -126,15 +125,16 @@ void World::step() {
       emit(value, wheel_sequence_++, late, latency);
     }
   }
-  if (due(n.gnss.rate_hz, kGnssPhase, now_)) {
+  if (due(n.gnss.rate_hz, n.gnss.phase, now_)) {
     const Gnss::Reading reading = gnss_.sample(truth(), rate_b_radps_, now_, faults_);
     const base::Micros latency = gnss_latency_.between(n.gnss.latency_min, n.gnss.latency_max);
     if (reading.position) emit(*reading.position, position_sequence_++, {}, latency);
     if (reading.velocity) emit(*reading.velocity, velocity_sequence_++, {}, latency);
   }
-  if (due(n.camera.rate_hz, kCameraPhase, now_)) {
+  if (due(n.camera.rate_hz, n.camera.phase, now_)) {
     const base::Micros latency = camera_latency_.between(n.camera.latency_min, n.camera.latency_max);
-    for (const auto& sighting : camera_.sample(truth(), now_, faults_)) emit(sighting, sighting_sequence_++, {}, latency);
+    for (const auto& sighting : camera_.sample(truth(), now_, faults_))
+      emit(sighting, sighting_sequence_++, {}, latency);
   }
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The simulated world: a rover on a course, seen by its sensors. The same options and seed give the same measurements, bit for bit, on
-// every host; the truth leaves only by truth(), for judges.
+// The simulated world: a rover on a course, seen by its sensors. The same options and seed give the same measurements,
+// bit for bit, on every host; the truth leaves only by truth(), for judges.
 #pragma once
 
 #include "base/time.hpp"
@@ -27,15 +27,15 @@ struct StartPose {
 class World {
  public:
   struct Options {
-    bool mismatched = true;           ///< false: only errors that filters model, see matched()
-    bool latency = true;              ///< false: everything arrives at its stamp
+    bool mismatched = true;  ///< false: only errors that filters model, see matched()
+    bool latency = true;     ///< false: everything arrives at its stamp
     Numbers numbers;
     Course course = default_course();
     CourseLimits limits;
     GeodeticOrigin origin{.latitude_deg = 48.2627, .longitude_deg = 11.6683, .height_m = 520};
     std::vector<FaultSetting> faults;
-    base::Micros start{1'000'000};    ///< time of the bus when the run starts
-    int substeps = 1;                 ///< integration steps per 0.5 ms
+    base::Micros start{1'000'000};  ///< time of the bus when the run starts
+    int substeps = 1;               ///< integration steps per 0.5 ms
   };
 
   /// Throws std::invalid_argument where a rate does not divide 2000 Hz or the course cannot be driven.
@@ -83,7 +83,8 @@ class World {
   Chance imu_latency_, wheel_latency_, gnss_latency_, camera_latency_, loss_;
   base::Micros now_;  ///< since the start
   Vector3 rate_b_radps_{};
-  std::uint8_t imu_sequence_ = 0, wheel_sequence_ = 0, position_sequence_ = 0, velocity_sequence_ = 0, sighting_sequence_ = 0;
+  std::uint8_t imu_sequence_ = 0, wheel_sequence_ = 0, position_sequence_ = 0, velocity_sequence_ = 0,
+               sighting_sequence_ = 0;
   std::uint64_t made_ = 0;
   std::vector<Pending> pending_;
 };

@@ -49,7 +49,8 @@ TEST(Course, no_landmark_stands_in_the_way) {
   for (double s = 0; s <= plan.length_m(); s += 0.1)
     for (const auto& l : course.landmarks) {
       const PathPoint p = plan.path(s);
-      ASSERT_GT((l.x_m - p.x_m) * (l.x_m - p.x_m) + (l.y_m - p.y_m) * (l.y_m - p.y_m), 1.5 * 1.5) << "landmark " << int{l.id};
+      ASSERT_GT((l.x_m - p.x_m) * (l.x_m - p.x_m) + (l.y_m - p.y_m) * (l.y_m - p.y_m), 1.5 * 1.5)
+          << "landmark " << int{l.id};
     }
 }
 
@@ -115,9 +116,14 @@ TEST(Course, a_course_that_cannot_be_driven_is_refused_with_the_waypoint) {
     }
     return "";
   };
-  EXPECT_NE(message({{.x_m = 0}, {.x_m = 2, .radius_m = 3}, {.x_m = 2, .y_m = 9}}).find("waypoint 1: its arc does not fit"), std::string::npos);
-  EXPECT_NE(message({{.x_m = 0}, {.x_m = 2}, {.x_m = 2, .y_m = 9}}).find("waypoint 1: a corner without a radius"), std::string::npos);
-  EXPECT_NE(message({{.x_m = 0}, {.x_m = 9, .radius_m = 1, .stop_s = 1}, {.x_m = 9, .y_m = 9}}).find("waypoint 1: a standstill"), std::string::npos);
+  EXPECT_NE(
+      message({{.x_m = 0}, {.x_m = 2, .radius_m = 3}, {.x_m = 2, .y_m = 9}}).find("waypoint 1: its arc does not fit"),
+      std::string::npos);
+  EXPECT_NE(message({{.x_m = 0}, {.x_m = 2}, {.x_m = 2, .y_m = 9}}).find("waypoint 1: a corner without a radius"),
+            std::string::npos);
+  EXPECT_NE(message({{.x_m = 0}, {.x_m = 9, .radius_m = 1, .stop_s = 1}, {.x_m = 9, .y_m = 9}})
+                .find("waypoint 1: a standstill"),
+            std::string::npos);
   EXPECT_NE(message({{.x_m = 0}}), "");
 }
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Statistics of every sensor, with bounds on both sides: an error that is too small is as wrong as one that is too large.
+// Statistics of every sensor, with bounds on both sides: an error that is too small is as wrong as one that is too
+// large.
 #include "sim_host/world/sensors.hpp"
 
 #include "test/sim/support.hpp"
@@ -8,7 +9,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
+#include <set>
 
 namespace tetap::sim {
 namespace {
@@ -77,6 +78,14 @@ TEST(Chance, uniform_and_normal_have_their_moments_and_streams_are_apart) {
   EXPECT_NEAR(statistics(product).mean, 0, 0.01);
 }
 
+TEST(Chance, every_seed_and_every_stream_draws_its_own_numbers) {
+  std::set<double> first;
+  for (std::uint64_t seed = 0; seed < 100; ++seed) {
+    for (std::uint32_t stream = 0; stream < 20; ++stream) first.insert(Chance{seed, Stream{stream}}.uniform());
+  }
+  EXPECT_EQ(first.size(), 2000U);
+}
+
 TEST(Imu, white_noise_is_the_data_sheets_at_every_rate) {
   for (const int rate_hz : {100, 200, 400}) {
     ImuNumbers numbers = matched(Numbers{}).imu;
@@ -93,13 +102,14 @@ TEST(Imu, white_noise_is_the_data_sheets_at_every_rate) {
 
 TEST(Imu, allan_deviation_falls_with_white_noise_and_rises_with_the_wandering_bias) {
   ImuNumbers numbers;
-  numbers.gyro_walk_radps = 3e-4;  // strong enough to stand out within twenty minutes
+  numbers.gyro_walk_radps = 1e-4;
   numbers.walk_tau_s = 60;
-  const auto series = imu_at_rest(numbers, 1200, 6);
-  const double white = allan(series[2], 100);
-  EXPECT_NEAR(allan(series[2], 400) / white, 0.5, 0.25);
-  EXPECT_GT(allan(series[2], 6000), 2 * numbers.gyro_noise / sim::sqrt(60.0) * 2);
-  EXPECT_LT(allan(series[2], 6000), 6e-4);
+  const auto series = imu_at_rest(numbers, 2400, 6);
+  EXPECT_NEAR(allan(series[2], 10) / (numbers.gyro_noise / sim::sqrt(0.1)), 1, 0.05);
+  EXPECT_NEAR(allan(series[2], 40) / allan(series[2], 10), 0.5, 0.05);
+  // Markov noise (IEEE Std 952, annex C): AVAR(T) = 2 sigma^2 tau/T (1 - tau/2T (3 - 4 e^(-T/tau) + e^(-2T/tau))), 0.58
+  // sigma at T = tau.
+  EXPECT_NEAR(allan(series[2], 6000) / numbers.gyro_walk_radps, 0.58, 0.2);
 }
 
 TEST(Imu, turn_on_biases_differ_between_seeds_by_as_much_as_stated) {
@@ -244,7 +254,10 @@ TEST(Wheels, slip_is_there_in_curves_and_on_acceleration_and_small) {
   }
   for (const auto& m : all)
     if (const auto* c = std::get_if<app::WheelCounts>(&m.value)) {
-      if (last) rim += 0.5 * (static_cast<std::int16_t>(c->left - last->left) + static_cast<std::int16_t>(c->right - last->right)) * 2 * kPi * 0.1 / 2000;
+      if (last)
+        rim += 0.5 *
+               (static_cast<std::int16_t>(c->left - last->left) + static_cast<std::int16_t>(c->right - last->right)) *
+               2 * kPi * 0.1 / 2000;
       last = c;
     }
   EXPECT_GT(rim / path, 1.001);
@@ -309,11 +322,12 @@ TEST(Gnss, outages_and_glitches_come_as_often_as_stated_and_never_at_the_start) 
   const auto s = gnss_at_rest(numbers, 100'000, 3);  // 20 000 s
   EXPECT_NEAR(s.outages, 20'000 / 95.0, 45);
   EXPECT_NEAR(s.lost * 0.2 / s.outages, 5, 0.6);
-  const auto glitched = static_cast<double>(std::count_if(s.east.begin(), s.east.end(), [&, i = std::size_t{0}](double) mutable {
-    const bool far = std::hypot(s.east[i], s.north[i]) > 2;
-    ++i;
-    return far;
-  }));
+  const auto glitched =
+      static_cast<double>(std::count_if(s.east.begin(), s.east.end(), [&, i = std::size_t{0}](double) mutable {
+        const bool far = std::hypot(s.east[i], s.north[i]) > 2;
+        ++i;
+        return far;
+      }));
   EXPECT_NEAR(glitched / s.fixes, 0.004 * 2.5, 0.003);
   for (std::uint64_t seed = 1; seed <= 50; ++seed) {
     const auto start = gnss_at_rest(numbers, 99, seed);
@@ -383,7 +397,8 @@ TEST(Camera, noise_misses_and_wrong_names_come_as_often_as_stated) {
     EXPECT_NEAR(statistics(range).mean, mismatched ? 0.025 : 0, 0.004);
     EXPECT_NEAR(sim::sqrt(statistics(bearing).variance), 0.015, 0.0003);
     EXPECT_NEAR(statistics(bearing).mean, mismatched ? -0.004 : 0, 0.0004);
-    EXPECT_NEAR(wrong / static_cast<double>(range.size()), mismatched ? 0.005 * 0.8 : 0, 0.0015);  // one in five draws names itself
+    EXPECT_NEAR(wrong / static_cast<double>(range.size()), mismatched ? 0.005 * 0.8 : 0,
+                0.0015);  // one in five draws names itself
   }
 }
 

@@ -21,11 +21,13 @@ class Hash {
   void add(const Measurement& m) {
     add(static_cast<std::uint64_t>(m.stamp.us));
     add(static_cast<std::uint64_t>(m.arrival.us));
-    add(std::uint64_t{m.instance} | std::uint64_t{m.sequence} << 8 | std::uint64_t{m.lost_parts} << 16 | m.value.index() << 24);
+    add(std::uint64_t{m.instance} | std::uint64_t{m.sequence} << 8 | std::uint64_t{m.lost_parts} << 16 |
+        m.value.index() << 24);
     std::visit([this](const auto& v) { fields(v); }, m.value);
   }
   void add(const Truth& t) {
-    for (const double x : {t.x_m, t.y_m, t.z_m, t.roll_rad, t.pitch_rad, t.yaw_rad, t.speed_mps, t.yaw_rate_radps}) add(x);
+    for (const double x : {t.x_m, t.y_m, t.z_m, t.roll_rad, t.pitch_rad, t.yaw_rad, t.speed_mps, t.yaw_rate_radps})
+      add(x);
   }
   [[nodiscard]] std::uint64_t value() const { return hash_; }
 
@@ -112,7 +114,8 @@ inline Statistics statistics(const std::vector<double>& values) {
 inline double correlation(const std::vector<double>& values, std::size_t lag) {
   double product = 0;
   double square = 0;
-  for (std::size_t i = 0; i + lag < values.size(); ++i) product += values[i] * values[i + lag], square += values[i] * values[i];
+  for (std::size_t i = 0; i + lag < values.size(); ++i)
+    product += values[i] * values[i + lag], square += values[i] * values[i];
   return product / square;
 }
 

@@ -8,7 +8,8 @@
 namespace tetap::sim {
 namespace {
 
-constexpr GeodeticOrigin kPlaces[] = {{48.2627, 11.6683, 520}, {0, 0, 0}, {-33.9, 151.2, 30}, {64.1, -21.9, -20}, {70.5, 179.9, 3000}};
+constexpr GeodeticOrigin kPlaces[] = {
+    {48.2627, 11.6683, 520}, {0, 0, 0}, {-33.9, 151.2, 30}, {64.1, -21.9, -20}, {70.5, 179.9, 3000}};
 
 TEST(Wgs84, there_and_back_is_the_same_place_to_the_resolution_of_the_bus) {
   Chance chance{1, Stream::kStart};
@@ -33,7 +34,8 @@ TEST(Wgs84, the_origin_is_where_it_says) {
   }
 }
 
-// One degree of latitude is 110574.3 m at the equator and 111132.9 m about 45 deg: radius of curvature M = a(1-e2)/(1-e2 s^2)^1.5.
+// One degree of latitude is 110574.3 m at the equator and 111132.9 m about 45 deg: radius of curvature M =
+// a(1-e2)/(1-e2 s^2)^1.5.
 TEST(Wgs84, a_small_step_moves_by_the_radii_of_curvature) {
   for (const auto& place : kPlaces) {
     const Wgs84 earth{place};

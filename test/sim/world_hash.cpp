@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Prints one hash over all measurements and truths of some worlds: the same whatever compiler and optimisation built it.
+// Prints one hash over all measurements and truths of some worlds: the same whatever compiler and optimisation built
+// it.
 #include "test/sim/support.hpp"
 
 #include <cinttypes>
@@ -12,7 +13,8 @@ int main() {
   Hash h;
   for (const bool mismatched : {false, true}) {
     World::Options options{.mismatched = mismatched};
-    for (const auto& row : fault_table()) options.faults.push_back({row.fault, seconds_us(row.start_s), seconds_us(row.duration_s)});
+    for (const auto& row : fault_table())
+      options.faults.push_back({row.fault, seconds_us(row.start_s), seconds_us(row.duration_s)});
     World world{options, 42};
     std::vector<Measurement> arrived;
     for (base::Micros t = world.start(); t < world.start() + world.duration(); t += base::Micros{100'000}) {
