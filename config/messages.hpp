@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
+// clang-format off
 // Generated from config/tetap.dbc by tools/dbc: not to be edited. One struct per message or page; encode, decode and frame are in
 // can/codec.hpp. Fields are in the units of their suffix; `_raw` counts steps of the k..Scale next to it.
-// clang-format off
 #pragma once
 
 #include "can/signal.hpp"

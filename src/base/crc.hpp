@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// CRC-32 (IEEE 802.3, reflected) and CRC-8 H2F (AUTOSAR CP SWS_CRCLibrary: polynomial 0x2F), byte by byte, also at compile time.
-// Nibble tables: 64 and 16 bytes. Check values over "123456789": 0xCBF43926 and 0xDF.
+// CRC-32 (IEEE 802.3, reflected) and CRC-8 H2F (AUTOSAR CP SWS_CRCLibrary: polynomial 0x2F), byte by byte, also at
+// compile time. Nibble tables: 64 and 16 bytes. Check values over "123456789": 0xCBF43926 and 0xDF.
 #pragma once
 
 #include <array>

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Message structs to payloads and frames, and back; also in constant expressions. A message struct (config/messages.hpp) says
-//   kOffset  its id within the node's block          kStride  on top: id distance of one instance to the next, if there are several
-//   each()   calls visit(At<signal>, field) for every field        kMux, kPage  where and what the page number is, if it is a page
+// Message structs to payloads and frames, and back; also in constant expressions. A message struct
+// (config/messages.hpp) has
+//   kOffset      its id within the node's block; kStride: the id distance of its instances, if there are several
+//   each()       calls visit(At<signal>, field) for every field
+//   kMux, kPage  where the page number is and which it is, if the struct is one page of a multiplexed message
 #pragma once
 
 #include "base/can_frame.hpp"
@@ -20,13 +22,17 @@ concept Paged = requires {
   M::kPage;
 };
 template <class M>
-concept Repeated = requires { M::kStride; };
+concept Repeated = requires {
+  M::kStride;
+};
 
 template <class M>
 [[nodiscard]] constexpr Payload encode(const M& message) {
   std::uint64_t packed = 0;
   if constexpr (Paged<M>) packed = M::kMux.put(M::kPage);
-  M::each(message, [&packed]<Signal kSignal>(At<kSignal>, const auto& field) { packed |= kSignal.put(to_steps<kSignal>(field)); });
+  M::each(message, [&packed]<Signal kSignal>(At<kSignal>, const auto& field) {
+    packed |= kSignal.put(to_steps<kSignal>(field));
+  });
   return bytes(packed);
 }
 

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// One signal of a classic CAN frame: where its bits are, and how a field of a message struct becomes those bits and back. Little-endian
-// (DBC "Intel"). Values out of range saturate, never wrap; NaN is the not-available code. The same bits on every target: one correctly
-// rounded division decodes, one product encodes, and no float becomes an integer before its range is known.
+// One signal of a classic CAN frame: where its bits are, and how a field of a message struct becomes those bits and
+// back. Little-endian (DBC "Intel"). Values out of range saturate, never wrap; NaN is the not-available code. The same
+// bits on every target: one correctly rounded division decodes, one product encodes, and no float becomes an integer
+// before its range is known.
 #pragma once
 
 #include <array>
@@ -78,9 +79,10 @@ template <Signal kSignal>
   return kSignal.gap();  // NaN
 }
 
-/// Integer, flag or enum to steps. An integer's own not-available code is the largest (unsigned) or smallest (signed) of its type.
+/// Integer, flag or enum to steps. An integer's own not-available code is the largest (unsigned) or smallest (signed)
+/// of its type.
 template <Signal kSignal, class T>
-  requires std::integral<T> || std::is_enum_v<T>
+requires std::integral<T> || std::is_enum_v<T>
 [[nodiscard]] constexpr std::int64_t to_steps(T value) {
   if constexpr (std::is_enum_v<T>) {
     return to_steps<kSignal>(static_cast<std::underlying_type_t<T>>(value));
@@ -106,7 +108,8 @@ template <Signal kSignal, class T>
     return static_cast<float>(static_cast<std::int32_t>(steps)) / static_cast<float>(kSignal.per_unit);
   } else {
     if constexpr (kSignal.has_gap) {
-      if (steps == kSignal.gap()) return kSignal.is_signed ? std::numeric_limits<T>::min() : std::numeric_limits<T>::max();
+      if (steps == kSignal.gap())
+        return kSignal.is_signed ? std::numeric_limits<T>::min() : std::numeric_limits<T>::max();
     }
     return static_cast<T>(steps);
   }

@@ -49,7 +49,8 @@ TEST(Crc, OfNothingIsZero) {
 
 TEST(Crc, EqualsTheBitwiseDefinitionForEveryByteInTwoPlaces) {
   for (unsigned byte = 0; byte < 256; ++byte) {
-    const std::array<std::uint8_t, 3> data{static_cast<std::uint8_t>(byte), 0x5A, static_cast<std::uint8_t>(~byte & 0xFFU)};
+    const std::array<std::uint8_t, 3> data{static_cast<std::uint8_t>(byte), 0x5A,
+                                           static_cast<std::uint8_t>(~byte & 0xFFU)};
     ASSERT_EQ(crc_of<Crc32>(data), crc32_by_bits(data)) << byte;
   }
 }

@@ -43,7 +43,7 @@ TYPED_TEST(EveryMessage, SurvivesDecodeThenEncodeForRandomBits) {
   const std::uint64_t used = used_bits<TypeParam>();
   for (int i = 0; i < 20'000; ++i) {
     std::uint64_t bits = random();
-    if (i % 4 == 1) bits |= random() | random();   // all ones, the unsigned codes for not available, are tried too
+    if (i % 4 == 1) bits |= random() | random();  // all ones, the unsigned codes for not available, are tried too
     if (i % 4 == 2) bits &= random() & random();
     if (i == 0) bits = ~std::uint64_t{0};
     const std::uint64_t sent = on_page<TypeParam>(bits);
@@ -86,12 +86,14 @@ TYPED_TEST(EveryMessage, SaturatesAndNeverWraps) {
       const float per_unit = static_cast<float>(kSignal.per_unit);
       const float top = static_cast<float>(kSignal.highest()) / per_unit;
       const float bottom = static_cast<float>(kSignal.lowest()) / per_unit;
-      for (const float value : {top, std::nextafter(top, Limits::max()), top + 0.6F / per_unit, top + 1 / per_unit,
-                                top + 1, 2 * top + 2, 65536 * (top + 1), 4.3e9F, 9.3e18F, Limits::max(), Limits::infinity()}) {
+      for (const float value :
+           {top, std::nextafter(top, Limits::max()), top + 0.6F / per_unit, top + 1 / per_unit, top + 1, 2 * top + 2,
+            65536 * (top + 1), 4.3e9F, 9.3e18F, Limits::max(), Limits::infinity()}) {
         EXPECT_EQ(sent(value), kSignal.highest()) << value;
       }
-      for (const float value : {bottom, std::nextafter(bottom, Limits::lowest()), bottom - 0.6F / per_unit, bottom - 1 / per_unit,
-                                bottom - 1, 2 * bottom - 2, 65536 * (bottom - 1), -4.3e9F, -9.3e18F, Limits::lowest(), -Limits::infinity()}) {
+      for (const float value : {bottom, std::nextafter(bottom, Limits::lowest()), bottom - 0.6F / per_unit,
+                                bottom - 1 / per_unit, bottom - 1, 2 * bottom - 2, 65536 * (bottom - 1), -4.3e9F,
+                                -9.3e18F, Limits::lowest(), -Limits::infinity()}) {
         EXPECT_EQ(sent(value), kSignal.lowest()) << value;
       }
       EXPECT_EQ(sent(Limits::quiet_NaN()), kSignal.gap());
@@ -144,7 +146,8 @@ TYPED_TEST(EveryMessage, IsRefusedWithAnyOtherLength) {
 TYPED_TEST(EveryMessage, IsRefusedOnAnyOtherPage) {
   if constexpr (Paged<TypeParam>) {
     for (std::uint64_t page = 0; page <= TypeParam::kMux.mask(); ++page)
-      EXPECT_EQ(decode<TypeParam>(bytes(TypeParam::kMux.put(static_cast<std::int64_t>(page)))).has_value(), page == TypeParam::kPage);
+      EXPECT_EQ(decode<TypeParam>(bytes(TypeParam::kMux.put(static_cast<std::int64_t>(page)))).has_value(),
+                page == TypeParam::kPage);
   }
 }
 
@@ -188,14 +191,16 @@ TEST(MessageIds, OfTwoNodesDoNotMeet) {
 }
 
 TEST(Frames, AreWhatTheLayoutSaysByHand) {
-  // yaw 1.0 rad = 10000 = 0x2710; speed -1 m/s = -1000 = 0xFC18; yaw rate not available = 0x8000; epoch 5; position and velocity valid
-  const base::CanFrame out = frame(0x300, EstMotion{.yaw_rad = 1.0F,
-                                                    .speed_mps = -1.0F,
-                                                    .yaw_rate_radps = std::numeric_limits<float>::quiet_NaN(),
-                                                    .epoch = 5,
-                                                    .pos_valid = true,
-                                                    .hdg_valid = false,
-                                                    .vel_valid = true},
+  // yaw 1.0 rad = 10000 = 0x2710; speed -1 m/s = -1000 = 0xFC18; yaw rate not available = 0x8000; epoch 5; position and
+  // velocity valid
+  const base::CanFrame out = frame(0x300,
+                                   EstMotion{.yaw_rad = 1.0F,
+                                             .speed_mps = -1.0F,
+                                             .yaw_rate_radps = std::numeric_limits<float>::quiet_NaN(),
+                                             .epoch = 5,
+                                             .pos_valid = true,
+                                             .hdg_valid = false,
+                                             .vel_valid = true},
                                    1);
   EXPECT_EQ(out.id, 0x32FU);
   EXPECT_EQ(out.size, 8);
@@ -204,7 +209,8 @@ TEST(Frames, AreWhatTheLayoutSaysByHand) {
 }
 
 TEST(Frames, OfSensorsCarryTheLowBitsOfTheStamp) {
-  const auto sent = decode<InWheelCounts>(encode(InWheelCounts{.stamp_us = 0x12345678, .seq = 17, .inst = 1, .left = 65535, .right = 0}));
+  const auto sent = decode<InWheelCounts>(
+      encode(InWheelCounts{.stamp_us = 0x12345678, .seq = 17, .inst = 1, .left = 65535, .right = 0}));
   EXPECT_EQ(*sent, (InWheelCounts{.stamp_us = 0x45678, .seq = 1, .inst = 1, .left = 65535, .right = 0}));
 }
 
@@ -217,7 +223,8 @@ TEST(Frames, ThatClaimMoreBytesThanTheyHaveAreReadNoFurther) {
 // The codec is usable where the compiler needs a constant.
 constexpr EstPos kSent{.x_raw = -5, .y_raw = EstPos::kYNotAvailable, .epoch = 3, .kind = EstimatorKind::kEkf};
 static_assert(*decode<EstPos>(payload(frame(0x340, kSent, 1))) == kSent);
-static_assert(decode<InRangeBearing>(encode(InRangeBearing{.id = 9, .range_m = 1e30F, .bearing_rad = -0.25F}))->bearing_rad < -0.2498F);
+static_assert(decode<InRangeBearing>(encode(InRangeBearing{.id = 9, .range_m = 1e30F, .bearing_rad = -0.25F}))
+                  ->bearing_rad < -0.2498F);
 static_assert(!decode<EstStdPose>(encode(EstStdMore{})));
 static_assert(encode(InMapEntry{.id = 7, .x_raw = 1, .y_raw = -1}) == Payload{7, 1, 0, 0, 0xF0, 0xFF, 0xFF, 0xFF});
 

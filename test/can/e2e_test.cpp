@@ -35,7 +35,8 @@ TYPED_TEST(ProtectedMessage, IsRefusedWhenAnyOneOrTwoBitsAreFlipped) {
 
 TYPED_TEST(ProtectedMessage, IsRefusedUnderAnyOtherIdOfTheBlock) {
   const Payload good = encode(protect(TypeParam{.ctr = 9}));
-  for (std::uint8_t offset = 0; offset < kBlock; ++offset) EXPECT_EQ(e2e_valid(offset, good), offset == TypeParam::kOffset);
+  for (std::uint8_t offset = 0; offset < kBlock; ++offset)
+    EXPECT_EQ(e2e_valid(offset, good), offset == TypeParam::kOffset);
 }
 
 TYPED_TEST(ProtectedMessage, IsRefusedWhenShorter) {
@@ -45,7 +46,8 @@ TYPED_TEST(ProtectedMessage, IsRefusedWhenShorter) {
 }
 
 TEST(Protection, CoversTheOffsetThenBytesOneToSeven) {
-  // The check value's input "123456789" is eight bytes and an offset: '1' as the offset, '2'..'8' as bytes 1 to 7, and one more to come.
+  // The check value's input "123456789" is eight bytes and an offset: '1' as the offset, '2'..'8' as bytes 1 to 7, and
+  // one more to come.
   const Payload digits{0, '2', '3', '4', '5', '6', '7', '8'};
   base::Crc8H2f crc;
   for (const char digit : {'1', '2', '3', '4', '5', '6', '7', '8'}) crc.add(static_cast<std::uint8_t>(digit));

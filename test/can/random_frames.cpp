@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Prints candump lines of every message with random values, many of them out of range, for a judge that knows only the DBC:
+// Prints candump lines of every message with random values, many of them out of range, for a judge that knows only the
+// DBC:
 //   (time) vcan0 ID#DATA ; START=GIVEN:DECODED ...
-// START is the signal's first bit, GIVEN what was encoded and DECODED what our decoder reads back; integers of scaled signals are steps.
+// START is the signal's first bit, GIVEN what was encoded and DECODED what our decoder reads back; integers of scaled
+// signals are steps.
 #include "can/codec.hpp"
 #include "config/messages.hpp"
 

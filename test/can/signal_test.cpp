@@ -83,15 +83,20 @@ TEST(SignalValues, NeverWrapAndNeverLookLikeNotAvailableHoweverLarge) {
       continue;
     }
     // Half a step, and half a unit in the last place of the float product.
-    ASSERT_NEAR(static_cast<double>(speed), std::clamp(static_cast<double>(value) * 1e4, -262143.0, 262143.0), 0.5 + 1.0 / 64) << value;
-    ASSERT_NEAR(static_cast<double>(sigma), std::clamp(static_cast<double>(value) * 500.0, 0.0, 65534.0), 0.5 + 1.0 / 256) << value;
+    ASSERT_NEAR(static_cast<double>(speed), std::clamp(static_cast<double>(value) * 1e4, -262143.0, 262143.0),
+                0.5 + 1.0 / 64)
+        << value;
+    ASSERT_NEAR(static_cast<double>(sigma), std::clamp(static_cast<double>(value) * 500.0, 0.0, 65534.0),
+                0.5 + 1.0 / 256)
+        << value;
   }
 }
 
 TEST(SignalValues, DecodeToTheFloatNearestToTheDecimalValue) {
   for (std::int64_t steps = kSpeed.lowest(); steps <= kSpeed.highest(); ++steps) {
     const auto value = from_steps<kSpeed, float>(steps);
-    ASSERT_EQ(std::bit_cast<std::uint32_t>(value), std::bit_cast<std::uint32_t>(static_cast<float>(static_cast<double>(steps) / 1e4)));
+    ASSERT_EQ(std::bit_cast<std::uint32_t>(value),
+              std::bit_cast<std::uint32_t>(static_cast<float>(static_cast<double>(steps) / 1e4)));
   }
 }
 
