@@ -135,7 +135,10 @@ outside() {
     "$(cd / && WORDS='two words' "${uml[@]}" -q bash -c 'printf "<%s>" "$@"; echo -n " $WORDS $WITH_VCAN $PWD"; kill -9 $$' x \
       "${arguments[@]}"; echo " $?")"
   expect "uml: over the time limit is status 124" 124 "$(status_of "${uml[@]}" -t 0.5 sleep 20)"
-  expect "uml: a reader that goes away ends the command" 141 "$("${uml[@]}" -q yes | head -n 1 >"$work/y"; echo "${PIPESTATUS[0]}")"
+  expect "uml: a reader that goes away ends the command" 141 \
+    "$("${uml[@]}" -q yes | head -n 1 >"$work/y"; echo "${PIPESTATUS[0]}")"
+  expect "uml: what the command leaves running ends with it" 5 \
+    "$(status_of timeout 20 "${uml[@]}" bash -c 'sleep 100 & setsid sleep 100 & exit 5')"
   expect "uml: not installed is one message and status 125" \
     "125 1 with-vcan: user-mode-linux is not installed (apt-get install user-mode-linux)" \
     "$(WITH_VCAN_UML=/nowhere message_of "${uml[@]}" true)"
@@ -166,7 +169,7 @@ outside() {
   local passed failed
   passed=$(grep -c passed "$work/results")
   failed=$(grep -c failed "$work/results")
-  [ $((passed + failed)) -eq 31 ] || failed=$((failed + 1)) # a stage that broke off is a failure, too
+  [ $((passed + failed)) -eq 32 ] || failed=$((failed + 1)) # a stage that broke off is a failure, too
   echo "$passed passed, $failed failed"
   [ "$failed" = 0 ]
 }
