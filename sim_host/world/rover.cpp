@@ -58,7 +58,9 @@ void Rover::place(const PathPoint& at) { x_m_ = at.x_m, y_m_ = at.y_m, yaw_rad_ 
 void Rover::drive(base::Micros since_start) {
   const PlanPoint wanted = plan_->at(since_start + ahead_);
   parked_ = wanted.parked;
-  // The driver turns in early by the steering lag, and wanders off the line as people do.
+  // The driver accelerates and turns in early by the lags, and wanders off the line as people do.
+  const PlanPoint soon =
+      plan_->at(since_start + ahead_ + base::Micros{static_cast<std::int64_t>(kAccelerationLag_s * 1e6)});
   const PathPoint here = plan_->path(wanted.s_m);
   const double curvature = plan_->path(wanted.s_m + wanted.speed_mps * kYawLag_s).curvature_per_m;
   const Direction d = direction(yaw_rad_);
@@ -71,7 +73,7 @@ void Rover::drive(base::Micros since_start) {
   constexpr double kAlong = 1.0, kBeside = 1.5, kHeading = 2.5, kSpeed = 2.5;
   const double speed = wanted.speed_mps * off.cos + kAlong * along_m;
   wanted_acceleration_mps2_ =
-      clamp(wanted.acceleration_mps2 + kSpeed * (speed - speed_mps_), -kAccelerationMax_mps2, kAccelerationMax_mps2);
+      clamp(soon.acceleration_mps2 + kSpeed * (speed - speed_mps_), -kAccelerationMax_mps2, kAccelerationMax_mps2);
   wanted_yaw_rate_radps_ = wanted.speed_mps * (curvature + kBeside * clamp(beside_m, -0.5, 0.5) + kHeading * off.sin);
 }
 
