@@ -15,8 +15,7 @@ inline constexpr app::Numbers numbers{
     .loop = {.window_us = 200'000, .ahead_us = 200'000},
     .wheels = {.drive = {.left_radius_m = 0.165F, .right_radius_m = 0.165F, .track_m = 0.545F, .counts_per_turn = 78000.0F},
                .noise = {.speed = 0.0001F, .speed_per_speed = 0.002F, .yaw_rate = 0.0001F, .yaw_rate_per_yaw_rate = 0.01F}},
-    // base_link -> imu_link: roll -90 deg, yaw +90 deg (the bag's launch file): the body's z axis is the sensor's y axis, reversed sign
-    // decided by gravity at rest, which the accelerometer reads as +9.8 on y.
+    // The sensor is mounted x right, y up, z backwards: gravity at rest and the turns of the wheels both say so.
     .gyro = {.use = 1, .up_s = {0, 1, 0}, .noise = 0.0001F},
     .gnss = {.sigma_floor_m = 0.5F, .sigma_scale = 2.0F},
 };

@@ -12,6 +12,11 @@
 
 namespace tetap::sim {
 
+template <class... F>
+struct Cases : F... {
+  using F::operator()...;
+};
+
 /// Appends the measurement's frames, but not those that are lost on the way.
 inline void encode(std::uint32_t base, const Measurement& m, std::vector<base::CanFrame>& out) {
   const auto stamp = static_cast<std::uint32_t>(static_cast<std::uint64_t>(m.stamp.us) & 0xFFFFF);
@@ -20,39 +25,39 @@ inline void encode(std::uint32_t base, const Measurement& m, std::vector<base::C
   const auto put = [&](const auto& message, std::size_t instance = 0) {
     if ((m.lost_parts >> part++ & 1) == 0) out.push_back(can::frame(base, message, instance));
   };
-  const auto kind = [](app::GnssFix fix) { return static_cast<can::GnssFix>(fix); };
-  struct {
-    decltype(stamp)& t;
-    decltype(seq)& s;
-    const Measurement& m;
-    decltype(put)& put;
-    decltype(kind)& fix;
-    void operator()(const app::ImuSample& v) const {
-      put(can::ImuGyro{.ang_x_rad = v.dangle_b_rad[0], .ang_y_rad = v.dangle_b_rad[1], .ang_z_rad = v.dangle_b_rad[2], .seq = s}, m.instance);
-      put(can::ImuAccel{.vel_x_mps = v.dvelocity_b_mps[0], .vel_y_mps = v.dvelocity_b_mps[1], .vel_z_mps = v.dvelocity_b_mps[2], .seq = s}, m.instance);
-      put(can::ImuTime{.stamp_us = t, .interval_us = static_cast<std::uint16_t>(v.interval.us), .clip_gyro = v.clipped_gyro, .clip_accel = v.clipped_accel, .temp_degC = v.temperature_degC, .seq = s},
-          m.instance);
-    }
-    void operator()(const app::WheelCounts& v) const { put(can::InWheelCounts{.stamp_us = t, .seq = s, .inst = m.instance, .left = v.left, .right = v.right}); }
-    void operator()(const app::WheelSpeeds& v) const { put(can::InWheelSpeed{.stamp_us = t, .seq = s, .inst = m.instance, .left_mps = v.left_mps, .right_mps = v.right_mps}); }
-    void operator()(const app::BodySpeed& v) const {
-      put(can::InBodySpeed{.stamp_us = t, .seq = s, .inst = m.instance, .forward_mps = v.forward_mps, .yaw_rate_radps = v.yaw_rate_radps});
-    }
-    void operator()(const app::GnssPosition& v) const {
-      put(can::InGnssLat{.stamp_us = t, .seq = s, .inst = m.instance, .lat_raw = v.latitude_2ndeg});
-      put(can::InGnssLon{.stamp_us = t, .seq = s, .inst = m.instance, .lon_raw = v.longitude_2ndeg});
-      put(can::InGnssAlt{.stamp_us = t, .seq = s, .inst = m.instance, .height_m = v.height_m, .fix = fix(v.fix), .num_sv = v.satellites});
-      put(can::InGnssAcc{.stamp_us = t, .seq = s, .inst = m.instance, .hor_m = v.horizontal_acc_m, .ver_m = v.vertical_acc_m});
-    }
-    void operator()(const app::GnssVelocity& v) const {
-      put(can::InGnssVelEN{.stamp_us = t, .seq = s, .inst = m.instance, .east_mps = v.v_n_mps[0], .north_mps = v.v_n_mps[1]});
-      put(can::InGnssVelU{.stamp_us = t, .seq = s, .inst = m.instance, .up_mps = v.v_n_mps[2], .acc_mps = v.acc_mps});
-    }
-    void operator()(const app::LandmarkSighting& v) const {
-      put(can::InRangeBearing{.stamp_us = t, .seq = s, .inst = m.instance, .id = v.landmark, .range_m = v.range_m, .bearing_rad = v.bearing_rad});
-    }
-  } const visitor{stamp, seq, m, put, kind};
-  std::visit(visitor, m.value);
+  const Cases write{
+      [&](const app::ImuSample& v) {
+        put(can::ImuGyro{.ang_x_rad = v.dangle_b_rad[0], .ang_y_rad = v.dangle_b_rad[1], .ang_z_rad = v.dangle_b_rad[2], .seq = seq}, m.instance);
+        put(can::ImuAccel{.vel_x_mps = v.dvelocity_b_mps[0], .vel_y_mps = v.dvelocity_b_mps[1], .vel_z_mps = v.dvelocity_b_mps[2], .seq = seq},
+            m.instance);
+        put(can::ImuTime{.stamp_us = stamp, .interval_us = static_cast<std::uint16_t>(v.interval.us), .clip_gyro = v.clipped_gyro,
+                         .clip_accel = v.clipped_accel, .temp_degC = v.temperature_degC, .seq = seq},
+            m.instance);
+      },
+      [&](const app::WheelCounts& v) {
+        put(can::InWheelCounts{.stamp_us = stamp, .seq = seq, .inst = m.instance, .left = v.left, .right = v.right});
+      },
+      [&](const app::WheelSpeeds& v) {
+        put(can::InWheelSpeed{.stamp_us = stamp, .seq = seq, .inst = m.instance, .left_mps = v.left_mps, .right_mps = v.right_mps});
+      },
+      [&](const app::BodySpeed& v) {
+        put(can::InBodySpeed{.stamp_us = stamp, .seq = seq, .inst = m.instance, .forward_mps = v.forward_mps, .yaw_rate_radps = v.yaw_rate_radps});
+      },
+      [&](const app::GnssPosition& v) {
+        put(can::InGnssLat{.stamp_us = stamp, .seq = seq, .inst = m.instance, .lat_raw = v.latitude_2ndeg});
+        put(can::InGnssLon{.stamp_us = stamp, .seq = seq, .inst = m.instance, .lon_raw = v.longitude_2ndeg});
+        put(can::InGnssAlt{.stamp_us = stamp, .seq = seq, .inst = m.instance, .height_m = v.height_m, .fix = static_cast<can::GnssFix>(v.fix),
+                           .num_sv = v.satellites});
+        put(can::InGnssAcc{.stamp_us = stamp, .seq = seq, .inst = m.instance, .hor_m = v.horizontal_acc_m, .ver_m = v.vertical_acc_m});
+      },
+      [&](const app::GnssVelocity& v) {
+        put(can::InGnssVelEN{.stamp_us = stamp, .seq = seq, .inst = m.instance, .east_mps = v.v_n_mps[0], .north_mps = v.v_n_mps[1]});
+        put(can::InGnssVelU{.stamp_us = stamp, .seq = seq, .inst = m.instance, .up_mps = v.v_n_mps[2], .acc_mps = v.acc_mps});
+      },
+      [&](const app::LandmarkSighting& v) {
+        put(can::InRangeBearing{.stamp_us = stamp, .seq = seq, .inst = m.instance, .id = v.landmark, .range_m = v.range_m, .bearing_rad = v.bearing_rad});
+      }};
+  std::visit(write, m.value);
 }
 
 }  // namespace tetap::sim

@@ -2,8 +2,8 @@
 // tetap-node: the firmware as a Linux program on SocketCAN. It stands in for the board.
 #include "app/firmware.hpp"
 #include "hal/port/linux/board.hpp"
+#include "sim_host/in_process.hpp"
 #include "sim_host/options.hpp"
-#include "sim_host/robots.hpp"
 #include "version.hpp"
 
 #include <csignal>
@@ -18,11 +18,10 @@ volatile std::sig_atomic_t stop_asked = 0;
 void ask_to_stop(int) { stop_asked = 1; }
 
 constexpr const char* kHelp =
-    "tetap-node: the firmware as a Linux program on SocketCAN\n"
-    "  --can IFACE    the interface (vcan0)\n"
-    "  --robot NAME   husky labyrinth mrclam rover (rover)\n"
-    "  --base ID      first id of the node's block of 64 (0x300)\n"
-    "Ends on INT or TERM with status 0.\n";
+    "usage: tetap-node [OPTION]...\n\nThe firmware as a Linux program on SocketCAN. Ends on INT or TERM with status 0.\n\n"
+    "  --can IFACE    the interface (default vcan0)\n"
+    "  --robot NAME   husky, labyrinth, mrclam or rover (default rover)\n"
+    "  --base ID      first id of the node's block of 64 (default 0x300)\n";
 
 template <class Estimators>
 void run(tetap::hal::LinuxBoard& board, const tetap::app::Numbers& numbers) {
@@ -37,18 +36,18 @@ void run(tetap::hal::LinuxBoard& board, const tetap::app::Numbers& numbers) {
 
 int main(int argc, char** argv) try {
   const tetap::sim::Options options(argc, argv, {"can", "robot", "base"}, {}, kHelp);
+  const std::string interface = options.text("can", "vcan0");
   const std::string robot = options.text("robot", "rover");
   std::signal(SIGINT, ask_to_stop);
   std::signal(SIGTERM, ask_to_stop);
-  tetap::hal::LinuxBoard board(options.text("can", "vcan0"));
-  const bool known = tetap::sim::with_robot(robot, [&]<class Estimators>(std::type_identity<Estimators>, tetap::app::Numbers numbers) {
+  tetap::sim::for_robot(robot, [&]<class Estimators>(std::type_identity<Estimators>, tetap::app::Numbers numbers) {
     numbers.can_base = options.base();
-    std::fprintf(stderr, "tetap-node: robot %s on %s, ids %03X to %03X\n", robot.c_str(), board.can.interface().c_str(), numbers.can_base, numbers.can_base + 0x3F);
+    tetap::hal::LinuxBoard board(interface);
+    std::fprintf(stderr, "tetap-node: robot %s on %s, ids %03X to %03X\n", robot.c_str(), interface.c_str(), numbers.can_base, numbers.can_base + 0x3F);
     run<Estimators>(board, numbers);
   });
-  if (!known) throw std::runtime_error("no robot '" + robot + "'; there are: " + std::string(tetap::sim::kRobotNames));
   return 0;
 } catch (const std::exception& error) {
   std::fprintf(stderr, "tetap-node: %s\n", error.what());
-  return 1;
+  return 2;
 }

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+// Lines of `candump -L`: "(seconds.micros) interface id#data", standard and extended ids, remote frames "#R", CAN FD "##<flags>data",
+// optional direction " R" or " T". Format as in can-utils lib.c (parse_canframe, sprint_canframe).
+#pragma once
+
+#include "base/can_frame.hpp"
+#include "base/time.hpp"
+#include "sim_host/play/out_file.hpp"
+
+#include <cstdint>
+#include <string_view>
+#include <variant>
+
+namespace tetap::sim {
+
+struct LogLine {
+  enum class Kind : std::uint8_t { kData, kRemote, kError, kFd };
+
+  base::Micros time;
+  std::string_view interface;      ///< points into the text that was parsed
+  Kind kind = Kind::kData;
+  base::BasicCanFrame<64> frame;   ///< data frames have at most 8 bytes
+  std::uint8_t fd_flags = 0;
+
+  /// For a data frame only.
+  [[nodiscard]] base::CanFrame classic() const {
+    base::CanFrame f{.id = frame.id, .extended = frame.extended, .size = frame.size};
+    for (std::size_t i = 0; i < f.data.size(); ++i) f.data[i] = frame.data[i];
+    return f;
+  }
+};
+
+/// Why a line is no log line; the text lives for ever.
+struct BadLine {
+  std::string_view reason;
+};
+
+/// One line without its newline (a carriage return before it is allowed). No globals, no allocation: fit for a fuzzer.
+[[nodiscard]] std::variant<LogLine, BadLine> parse_log_line(std::string_view line);
+
+/// Appends a data frame as one line, newline included.
+void append_log_line(Line& out, base::Micros time, std::string_view interface, const base::CanFrame& frame);
+
+}  // namespace tetap::sim

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+// The DBC's words for enum values and messages, for CSV files and error messages. Judge: the tests read them from config/tetap.dbc.
+#pragma once
+
+#include "config/messages.hpp"
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+namespace tetap::sim {
+
+/// "?" for a code that has no name.
+[[nodiscard]] constexpr std::string_view name(can::Sensor value) {
+  constexpr std::array<std::string_view, 7> kNames{"Imu",         "WheelCounts",  "WheelSpeed",  "BodySpeed",
+                                                   "RangeBearing", "GnssPosition", "GnssVelocity"};
+  const auto i = static_cast<std::size_t>(value);
+  return value == can::Sensor::kNotAvailable ? "NotAvailable" : i < kNames.size() ? kNames[i] : "?";
+}
+[[nodiscard]] constexpr std::string_view name(can::Verdict value) {
+  constexpr std::array<std::string_view, 8> kNames{"Accepted", "Rejected",  "NotUsed",   "TooLate", "UnknownLandmark",
+                                                   "Singular", "NotFinite", "Stale"};
+  const auto i = static_cast<std::size_t>(value);
+  return i < kNames.size() ? kNames[i] : "?";
+}
+[[nodiscard]] constexpr std::string_view name(can::Mode value) {
+  constexpr std::array<std::string_view, 7> kNames{"Boot", "WaitingForPose", "Aligning", "Nominal", "DeadReckoning", "Degraded", "Fault"};
+  const auto i = static_cast<std::size_t>(value);
+  return i < kNames.size() ? kNames[i] : "?";
+}
+[[nodiscard]] constexpr std::string_view name(can::ResetCause value) {
+  constexpr std::array<std::string_view, 6> kNames{"PowerOn", "Command", "SetPose", "TimeJump", "NotFinite", "NotPositive"};
+  const auto i = static_cast<std::size_t>(value);
+  return i < kNames.size() ? kNames[i] : "?";
+}
+[[nodiscard]] constexpr std::string_view name(can::EstimatorKind value) {
+  constexpr std::array<std::string_view, 8> kNames{"None", "Odometry", "Ekf", "Kf", "Ukf", "Particle", "Inertial", "Attitude"};
+  const auto i = static_cast<std::size_t>(value);
+  return i < kNames.size() ? kNames[i] : "?";
+}
+
+/// Of a frame the node sends, by its place in the node's block.
+[[nodiscard]] inline std::string message_name(std::uint32_t offset) {
+  constexpr std::array<std::string_view, 8> kCommon{"Est_Epoch",      "Est_StateCrc", "Est_Status",  "Est_Innov",
+                                                    "Est_SensorStat", "Est_Diag",     "Est_Version", "Est_Origin"};
+  if (offset >= can::EstEpoch::kOffset && offset < can::EstEpoch::kOffset + kCommon.size())
+    return std::string(kCommon[offset - can::EstEpoch::kOffset]);
+  if (offset >= can::EstPos::kOffset && offset < can::EstPos::kOffset + can::EstPos::kStride * can::EstPos::kCount) {
+    const std::uint32_t within = (offset - can::EstPos::kOffset) % can::EstPos::kStride;
+    const std::string prefix = "Est" + std::to_string((offset - can::EstPos::kOffset) / can::EstPos::kStride) + "_";
+    if (within == 0) return prefix + "Pos";
+    if (within == can::EstMotion::kOffset - can::EstPos::kOffset) return prefix + "Motion";
+    if (within == can::EstStdPose::kOffset - can::EstPos::kOffset) return prefix + "Std";
+  }
+  return "offset " + std::to_string(offset);
+}
+
+}  // namespace tetap::sim

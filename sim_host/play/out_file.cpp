@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "sim_host/play/out_file.hpp"
+
+#include <cerrno>
+#include <charconv>
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <stdexcept>
+
+namespace tetap::sim {
+
+Line& Line::integer(std::int64_t value, int width) {
+  std::array<char, 24> digits{};
+  const bool negative = value < 0;
+  const std::uint64_t size_of_it = negative ? ~static_cast<std::uint64_t>(value) + 1 : static_cast<std::uint64_t>(value);
+  const char* end = std::to_chars(digits.data(), digits.data() + digits.size(), size_of_it).ptr;
+  if (negative) put('-');
+  for (auto n = static_cast<int>(end - digits.data()); n < width; ++n) put('0');
+  return text({digits.data(), end});
+}
+
+Line& Line::fixed(std::int64_t value, int decimals) {
+  std::int64_t unit = 1;
+  for (int i = 0; i < decimals; ++i) unit *= 10;
+  if (value < 0) put('-');
+  const std::int64_t whole = value / unit, part = value % unit;
+  integer(whole < 0 ? -whole : whole);
+  return decimals > 0 ? put('.').integer(part < 0 ? -part : part, decimals) : *this;
+}
+
+Line& Line::real(double value, int decimals) {
+  static constexpr std::array<double, 7> kUnit{1, 10, 100, 1e3, 1e4, 1e5, 1e6};
+  const double scaled = value * kUnit[static_cast<std::size_t>(decimals) % kUnit.size()];
+  if (!(std::fabs(scaled) < 1e15)) return *this;
+  return fixed(std::llround(scaled), decimals);
+}
+
+Line& Line::hex(std::uint32_t value, int digits) {
+  for (int shift = 4 * (digits - 1); shift >= 0; shift -= 4) put("0123456789ABCDEF"[value >> shift & 0xF]);
+  return *this;
+}
+
+OutFile::OutFile(const std::string& path, Hash hash) : path_(path), file_(std::fopen(path.c_str(), "wb")) {
+  if (!file_) throw std::runtime_error(path + ": cannot be written: " + std::strerror(errno));
+  std::setvbuf(file_.get(), nullptr, _IONBF, 0);
+  buffer_.reserve(kBlock);
+  if (hash == Hash::kSha256) hash_.emplace();
+}
+
+void OutFile::spill() {
+  if (hash_) hash_->add(buffer_);
+  if (std::fwrite(buffer_.data(), 1, buffer_.size(), file_.get()) != buffer_.size())
+    throw std::runtime_error(path_ + ": cannot be written: " + std::strerror(errno));
+  buffer_.clear();
+}
+
+void OutFile::flush() { spill(); }
+
+std::string OutFile::close() {
+  spill();
+  if (std::fclose(file_.release()) != 0) throw std::runtime_error(path_ + ": cannot be written: " + std::strerror(errno));
+  return hash_ ? hash_->hex() : std::string{};
+}
+
+void make_folder(const std::string& path) {
+  std::error_code error;
+  std::filesystem::create_directories(path, error);
+  if (error || !std::filesystem::is_directory(path))
+    throw std::runtime_error(path + ": cannot be made: " + (error ? error.message() : "a file of that name is in the way"));
+}
+
+}  // namespace tetap::sim

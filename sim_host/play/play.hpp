@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: Apache-2.0
+// The log player as a function of its command line and a link to the node, so that one program plays over SocketCAN and another to a
+// firmware in its own process.
+#pragma once
+
+#include "sim_host/play/arguments.hpp"
+#include "sim_host/play/lockstep.hpp"
+#include "sim_host/play/perturb.hpp"
+#include "sim_host/play/realtime.hpp"
+#include "sim_host/play/session.hpp"
+
+#include <cstdint>
+#include <cstdio>
+#include <string>
+
+namespace tetap::sim {
+
+enum class PlayMode : std::uint8_t { kAutomatic, kLockstep, kRealtime, kAsRecorded };
+
+struct PlayOptions {
+  std::string log;
+  std::string interface;
+  std::string folder;
+  std::string robot;
+  PlayMode mode = PlayMode::kAutomatic;
+  ScriptOptions script;
+  LogOptions reading;
+  LockstepOptions lockstep;
+  RealtimeOptions realtime;
+  Perturbation perturbation;
+  bool memory = false;  ///< the node is in this process
+  bool raw = false;
+  bool quiet = false;
+};
+
+[[nodiscard]] const char* play_help();
+
+/// Takes the player's options out of the command line, LOG included, and refuses what is left; throws UsageError.
+[[nodiscard]] PlayOptions play_options(Arguments& arguments);
+
+/// Reads the log and settles the mode: a log with the node's own frames in it is a record to be repeated.
+[[nodiscard]] Log load_for(PlayOptions& options);
+
+/// Warnings about the log, one line each.
+void warn_about(const Log& log, const char* program);
+
+/// Plays; returns the exit status. Throws std::runtime_error for what cannot be begun.
+template <Link L>
+int play(L& link, PlayOptions options, const std::string& bus, const char* program) {
+  const Log log = load_for(options);
+  warn_about(log, program);
+  SessionOptions about{.program = program, .folder = options.folder, .base = options.script.base, .raw = options.raw, .mode = "lockstep",
+                       .bus = bus, .robot = options.robot, .log = options.log, .quiet = options.quiet};
+  const auto note_log = [&log](Session& session) {
+    session.note("malformed_lines", std::to_string(log.malformed));
+    session.note("frames_not_data", std::to_string(log.not_data));
+    session.note("frames_back_in_time", std::to_string(log.back_in_time));
+  };
+
+  if (options.mode == PlayMode::kRealtime) {
+    const auto inputs = inputs_of(log.frames, options.script);
+    if (inputs.empty()) throw std::runtime_error(options.log + ": no input frames of this id base");
+    const Perturbed sent = perturb(inputs, options.perturbation);
+    about.mode = "realtime";
+    Session session(about);
+    note_log(session);
+    session.note("seed", std::to_string(options.perturbation.seed));
+    session.note("frames_dropped", std::to_string(sent.dropped));
+    session.note("frames_duplicated", std::to_string(sent.duplicated));
+    session.note("frames_reordered", std::to_string(sent.reordered));
+    return session.run([&] { play_realtime(link, sent.frames, session, options.realtime, session.counts()); });
+  }
+
+  if (options.mode == PlayMode::kAsRecorded) {
+    Recording recording = recording_of(log, options.script);
+    if (recording.inputs_differ_at)
+      std::fprintf(stderr, "%s: %s: from the epoch at %s on the node consumed other input frames than the log holds\n", program,
+                   options.log.c_str(), in_seconds(*recording.inputs_differ_at).c_str());
+    about.mode = "as-recorded";
+    about.ticks = recording.script.ticks();
+    Session session(about, &recording);
+    note_log(session);
+    return session.run([&] { play_lockstep(link, recording.script, session, options.lockstep, session.counts()); });
+  }
+
+  Script script = script_of(log.frames, options.script);
+  if (script.ticks() == 0) throw std::runtime_error(options.log + ": no input frames of this id base");
+  about.ticks = script.ticks();
+  Session session(about);
+  note_log(session);
+  return session.run([&] { play_lockstep(link, script, session, options.lockstep, session.counts()); });
+}
+
+}  // namespace tetap::sim

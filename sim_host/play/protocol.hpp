@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the host programs know of a node's block of ids: which frames are inputs, sync frames, answers; and the frames of one epoch
+// collected into one.
+#pragma once
+
+#include "base/can_frame.hpp"
+#include "base/time.hpp"
+#include "can/codec.hpp"
+#include "config/messages.hpp"
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+
+namespace tetap::sim {
+
+inline constexpr std::uint32_t kInputOffsets = 0x20;  ///< offsets below are inputs, the others of the block are the node's
+inline constexpr std::uint64_t kTimeMask = 0xFFFFFFFFFFFF;
+
+/// Position within the node's block; nothing when the frame is not of this block.
+[[nodiscard]] constexpr std::optional<std::uint32_t> offset_in_block(const base::CanFrame& frame, std::uint32_t base) {
+  if (frame.extended || frame.id < base || frame.id >= base + can::kBlock) return std::nullopt;
+  return frame.id - base;
+}
+/// A frame the node consumes and counts: of its inputs, sync frames excepted.
+[[nodiscard]] constexpr bool is_counted_input(const base::CanFrame& frame, std::uint32_t base) {
+  const auto offset = offset_in_block(frame, base);
+  return offset && *offset < kInputOffsets && *offset != can::InSync::kOffset;
+}
+/// Loop times and the program's version differ between runs that are otherwise the same; everything else must not.
+[[nodiscard]] constexpr bool is_deterministic(std::uint32_t offset) {
+  return offset >= kInputOffsets && offset != can::EstDiagLoop::kOffset && offset != can::EstVersion::kOffset;
+}
+
+[[nodiscard]] constexpr base::CanFrame sync_frame(std::uint32_t base, can::SyncKind kind, base::Micros time, std::uint8_t counter) {
+  return can::frame(base, can::InSync{.time_us = static_cast<std::uint64_t>(time.us) & kTimeMask, .ctr = counter, .kind = kind});
+}
+[[nodiscard]] constexpr bool same_bus_time(std::uint64_t bus_us, base::Micros time) {
+  return bus_us == (static_cast<std::uint64_t>(time.us) & kTimeMask);
+}
+/// The full time nearest to `reference` with these 48 low bits.
+[[nodiscard]] constexpr base::Micros extend_bus_time(std::uint64_t bus_us, base::Micros reference) {
+  const std::uint64_t ahead = (bus_us - static_cast<std::uint64_t>(reference.us)) & kTimeMask;
+  const auto offset = static_cast<std::int64_t>(ahead) - (ahead > kTimeMask / 2 ? static_cast<std::int64_t>(kTimeMask) + 1 : 0);
+  return {reference.us + offset};
+}
+
+/// Everything a node sent for one tick, from Est_Epoch to Est_StateCrc.
+struct NodeEpoch {
+  std::optional<can::EstEpoch> head;         ///< missing: its frame was lost
+  can::EstStateCrc tail;
+  std::size_t received = 0;                  ///< frames, tail included
+  std::span<const base::CanFrame> frames;    ///< the first 256 of them, in order of arrival; valid until the next frame
+};
+
+class EpochCollector {
+ public:
+  explicit EpochCollector(std::uint32_t base) : base_(base) {}
+
+  /// Between two epochs: the answer to a Begin frame comes only then.
+  [[nodiscard]] bool idle() const { return received_ == 0; }
+  [[nodiscard]] bool is_begin_answer(const base::CanFrame& frame) const {
+    return idle() && frame.id == base_ + can::EstVersion::kOffset && !frame.extended;
+  }
+
+  /// A frame from the bus; the finished epoch when this was its last one. Frames of others are ignored.
+  std::optional<NodeEpoch> add(const base::CanFrame& frame) {
+    const auto offset = offset_in_block(frame, base_);
+    if (!offset || *offset < kInputOffsets || is_begin_answer(frame)) return std::nullopt;
+    if (*offset == can::EstEpoch::kOffset) begin(can::decode<can::EstEpoch>(can::payload(frame)));
+    if (received_ < frames_.size()) frames_[received_] = frame;
+    ++received_;
+    if (*offset != can::EstStateCrc::kOffset) return std::nullopt;
+    const auto tail = can::decode<can::EstStateCrc>(can::payload(frame));
+    if (!tail) return std::nullopt;
+    const NodeEpoch done{.head = head_, .tail = *tail, .received = received_,
+                         .frames = std::span(frames_).first(received_ < frames_.size() ? received_ : frames_.size())};
+    reset();
+    return done;
+  }
+  void reset() {
+    received_ = 0;
+    head_.reset();
+  }
+  /// How many epochs were begun and never closed: their last frame was lost.
+  [[nodiscard]] std::uint64_t unclosed() const { return unclosed_; }
+  [[nodiscard]] const std::optional<can::EstEpoch>& head() const { return head_; }
+  [[nodiscard]] std::size_t received() const { return received_; }
+
+ private:
+  void begin(const std::optional<can::EstEpoch>& head) {
+    if (!head || (head_ && head_->time_us == head->time_us)) return;  // a duplicate counts as one frame too many
+    if (received_ > 0 && head_) ++unclosed_;
+    reset();
+    head_ = head;
+  }
+
+  std::uint32_t base_;
+  std::optional<can::EstEpoch> head_;
+  std::size_t received_ = 0;
+  std::uint64_t unclosed_ = 0;
+  std::array<base::CanFrame, 256> frames_{};
+};
+
+}  // namespace tetap::sim

@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: Apache-2.0
+// Playing at the speed of the log: every frame at its time. The node ticks on Tick frames, or on its own timer after one Clock frame;
+// then what it does depends on real time, and the record of the run is what can be repeated (as_recorded).
+#pragma once
+
+#include "sim_host/play/conversation.hpp"
+#include "sim_host/play/log.hpp"
+
+#include <algorithm>
+#include <span>
+
+namespace tetap::sim {
+
+enum class Sync : std::uint8_t { kTick, kClock };
+
+struct RealtimeOptions {
+  std::uint32_t base = 0x300;
+  Sync sync = Sync::kTick;
+  base::Micros period{10'000};
+  bool begin = true;             ///< start the node with a Begin frame; else it is taken as it is
+  Patience patience;
+};
+
+/// Frames in the order of sending. Throws RunError when the node does not answer.
+template <Link L, Sink K>
+void play_realtime(L& link, std::span<const TimedFrame> frames, K& sink, const RealtimeOptions& options, Counts& counts) {
+  if (frames.empty()) return;
+  Conversation<L, K> node(link, sink, options.base, counts);
+  RealtimeLedger ledger(counts);
+  const base::Micros period = options.period;
+  base::Micros tick{std::max((frames.front().time.us + period.us - 1) / period.us, std::int64_t{1}) * period.us};
+  const base::Micros end = std::max(frames.back().time + period, tick);
+  base::Micros last_answer = hal::monotonic_clock();
+  const auto receive = [&](base::Micros reference) {
+    node.drain([&](const NodeEpoch& epoch) {
+      ledger.answered(epoch);
+      last_answer = hal::monotonic_clock();
+      sink.epoch(epoch, epoch.head ? extend_bus_time(epoch.head->time_us, reference) : reference);
+    });
+  };
+
+  ledger.begin(options.begin);
+  if (options.begin) {
+    node.begin(tick - period, options.patience);
+  } else {
+    while (!ledger.known()) {
+      if (hal::monotonic_clock() - last_answer > options.patience.begin) throw RunError("no node is ticking on this bus");
+      link.wait({20'000});
+      receive(tick);
+    }
+  }
+
+  const base::Micros began = hal::monotonic_clock();
+  const base::Micros first = std::min(frames.front().time, tick) - period;
+  const auto log_time = [&] { return first + (hal::monotonic_clock() - began); };
+  if (options.sync == Sync::kClock) {
+    node.sync(can::SyncKind::kClock, first);
+    ++counts.syncs;
+    link.flush();
+  }
+  last_answer = began;
+  std::size_t next = 0;
+  base::Micros quiet_end = end + base::Micros{std::max<std::int64_t>(period.us * 5, 1'000'000)};
+  for (base::Micros now = log_time(); now < quiet_end; now = log_time()) {
+    for (bool due = true; due;) {
+      const bool frame_due = next < frames.size() && frames[next].time <= now;
+      const bool tick_due = options.sync == Sync::kTick && tick <= end && tick <= now;
+      due = frame_due || tick_due;
+      if (frame_due && (!tick_due || frames[next].time <= tick)) {
+        node.send(frames[next++].frame);
+        ++counts.inputs;
+      } else if (tick_due) {
+        node.sync(can::SyncKind::kTick, tick);
+        ++counts.syncs;
+        tick += period;
+      }
+    }
+    link.flush();
+    receive(now);
+    const bool all_sent = next == frames.size() && (options.sync == Sync::kClock || tick > end);
+    if (all_sent && now > end + period && ledger.consumed() == counts.inputs) break;
+    if (hal::monotonic_clock() - last_answer > options.patience.epoch + period)
+      throw RunError("the node has not ticked for " + in_seconds(options.patience.epoch) + ", at " + in_seconds(now) + " of the log");
+    base::Micros until{20'000};
+    if (next < frames.size()) until = std::min(until, frames[next].time - log_time());
+    if (options.sync == Sync::kTick && tick <= end) until = std::min(until, tick - log_time());
+    if (until.us > 0) link.wait(until);
+    receive(now);
+  }
+  ledger.close();
+  counts.overflows = link.faults().rx_overflow;
+}
+
+}  // namespace tetap::sim

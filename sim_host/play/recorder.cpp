@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "sim_host/play/recorder.hpp"
+
+#include "hal/port/linux/clock.hpp"
+#include "sim_host/play/candump.hpp"
+#include "sim_host/play/names.hpp"
+
+#include <limits>
+
+namespace tetap::sim {
+
+namespace {
+
+constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+
+constexpr double millimetres(std::int32_t raw) { return raw == can::EstPos::kXNotAvailable ? kNone : raw * can::EstPos::kXScale; }
+
+}  // namespace
+
+Recorder::Recorder(const RecorderOptions& options)
+    : options_(options),
+      estimates_log_((make_folder(options.folder), options.folder + "/estimates.log"), OutFile::Hash::kSha256),
+      estimates_(options.folder + "/estimates.csv"),
+      innovations_(options.folder + "/innovations.csv"),
+      status_(options.folder + "/status.csv") {
+  if (options.raw) raw_.emplace(options.folder + "/raw.log");
+  estimates_.write(
+      "epoch,time_s,estimator,kind,x_m,y_m,yaw_rad,speed_mps,yaw_rate_radps,std_x_m,std_y_m,std_yaw_rad,corr_xy,corr_x_yaw,corr_y_yaw,"
+      "pos_valid,hdg_valid\n");
+  innovations_.write("epoch,time_s,estimator,sensor,inst,verdict,dof,nis,ratio,age_ms,landmark\n");
+  status_.write("epoch,time_s,mode,used,faults,reset_ctr,reset_cause\n");
+}
+
+void Recorder::raw_line(const base::CanFrame& frame, base::Micros time) {
+  line_.clear();
+  append_log_line(line_, time, options_.interface, frame);
+  raw_->write(line_.view());
+}
+
+void Recorder::sent(const base::CanFrame& frame) {
+  ++totals_.frames_sent;
+  totals_.bits_sent += worst_case_bits(frame);
+  if (raw_) raw_line(frame, hal::wall_clock());
+}
+
+void Recorder::received(const base::CanFrame& frame, std::optional<base::Micros> arrival) {
+  ++totals_.frames_received;
+  totals_.bits_received += worst_case_bits(frame);
+  if (raw_) raw_line(frame, arrival ? *arrival : hal::wall_clock());
+}
+
+Line& Recorder::row(base::Micros time) {
+  line_.clear();
+  return line_.integer(static_cast<std::int64_t>(number_)).put(',').fixed(time.us, 6).put(',');
+}
+
+void Recorder::epoch(const NodeEpoch& epoch, base::Micros time) {
+  number_ += restarted_ ? 1U : static_cast<std::uint8_t>(epoch.tail.epoch - last_epoch_);
+  restarted_ = false;
+  last_epoch_ = epoch.tail.epoch;
+  time_ = time;
+  if (totals_.epochs++ == 0) totals_.first = time;
+  totals_.last = time;
+  totals_.state_crc = epoch.tail.crc;
+  const base::Micros bus_time{static_cast<std::int64_t>(static_cast<std::uint64_t>(time.us) & kTimeMask)};
+  instances_ = {};
+  for (const base::CanFrame& f : epoch.frames) {
+    frame(f);
+    if (!is_deterministic(f.id - options_.base)) continue;
+    line_.clear();
+    append_log_line(line_, bus_time, "vcan0", f);  // the same name everywhere, so that files can be compared
+    estimates_log_.write(line_.view());
+  }
+  for (std::size_t k = 0; k < instances_.size(); ++k)
+    if (instances_[k].position) estimate_row(k, instances_[k]);
+}
+
+void Recorder::frame(const base::CanFrame& f) {
+  const std::uint32_t offset = f.id - options_.base;
+  const auto payload = can::payload(f);
+  if (offset == can::EstInnov::kOffset) {
+    if (const auto innovation = can::decode<can::EstInnov>(payload)) innovation_row(*innovation);
+  } else if (offset == can::EstStatus::kOffset) {
+    if (const auto status = can::decode<can::EstStatus>(payload)) status_row(*status);
+  } else if (offset >= can::EstPos::kOffset) {
+    const std::size_t k = (offset - can::EstPos::kOffset) / can::EstPos::kStride;
+    if (k >= instances_.size()) return;
+    Instance& instance = instances_[k];
+    if (offset == can::offset_of<can::EstPos>(k)) {
+      instance.position = can::decode<can::EstPos>(payload);
+      totals_.estimates += instance.position ? 1 : 0;
+    } else if (offset == can::offset_of<can::EstMotion>(k)) {
+      instance.motion = can::decode<can::EstMotion>(payload);
+    } else if (offset == can::offset_of<can::EstStdPose>(k)) {
+      if (const auto pose = can::decode<can::EstStdPose>(payload)) instance.deviation = pose;
+      if (const auto more = can::decode<can::EstStdMore>(payload)) instance.correlation = more;
+    }
+  }
+}
+
+void Recorder::estimate_row(std::size_t k, const Instance& e) {
+  const auto motion = [&](float can::EstMotion::*field) { return e.motion ? double{(*e.motion).*field} : kNone; };
+  const auto deviation = [&](float can::EstStdPose::*field) { return e.deviation ? double{(*e.deviation).*field} : kNone; };
+  const auto correlation = [&](float can::EstStdMore::*field) { return e.correlation ? double{(*e.correlation).*field} : kNone; };
+  row(time_).integer(static_cast<std::int64_t>(k)).put(',').text(name(e.position->kind));
+  line_.put(',').real(millimetres(e.position->x_raw), 3).put(',').real(millimetres(e.position->y_raw), 3);
+  line_.put(',').real(motion(&can::EstMotion::yaw_rad), 4).put(',').real(motion(&can::EstMotion::speed_mps), 3);
+  line_.put(',').real(motion(&can::EstMotion::yaw_rate_radps), 4);
+  for (const auto field : {&can::EstStdPose::std_x_m, &can::EstStdPose::std_y_m, &can::EstStdPose::std_yaw_rad, &can::EstStdPose::corr_xy})
+    line_.put(',').real(deviation(field), 4);
+  for (const auto field : {&can::EstStdMore::corr_x_yaw, &can::EstStdMore::corr_y_yaw}) line_.put(',').real(correlation(field), 4);
+  line_.put(',');
+  if (e.motion) line_.put(e.motion->pos_valid ? '1' : '0').put(',').put(e.motion->hdg_valid ? '1' : '0');
+  else line_.put(',');
+  estimates_.write(line_.put('\n').view());
+}
+
+void Recorder::innovation_row(const can::EstInnov& i) {
+  row(time_).integer(i.estimator).put(',').text(name(i.sensor)).put(',').integer(i.inst).put(',').text(name(i.verdict));
+  line_.put(',').integer(i.dof).put(',').real(double{i.nis}, 2).put(',').real(double{i.ratio}, 2).put(',').real(double{i.age_ms}, 0).put(',');
+  if (i.id != can::EstInnov::kIdNotAvailable) line_.integer(i.id);
+  innovations_.write(line_.put('\n').view());
+}
+
+void Recorder::status_row(const can::EstStatus& s) {
+  row(time_).text(name(s.mode)).put(',').integer(s.used).put(',').integer(s.faults).put(',').integer(s.reset_ctr).put(',');
+  status_.write(line_.text(name(s.reset_cause)).put('\n').view());
+}
+
+void Recorder::flush() {
+  for (OutFile* file : {&estimates_log_, &estimates_, &innovations_, &status_}) file->flush();
+  if (raw_) raw_->flush();
+}
+
+const Recorder::Totals& Recorder::finish() {
+  totals_.estimates_sha256 = estimates_log_.close();
+  for (OutFile* file : {&estimates_, &innovations_, &status_}) file->close();
+  if (raw_) raw_->close();
+  return totals_;
+}
+
+}  // namespace tetap::sim

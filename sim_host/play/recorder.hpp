@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: Apache-2.0
+// Writes what a node said: estimates.log (candump format, stamped with the epoch's time, only frames that are the same in every run of
+// the same input), estimates.csv, innovations.csv, status.csv, and on request raw.log (everything on the bus as it came).
+#pragma once
+
+#include "sim_host/play/out_file.hpp"
+#include "sim_host/play/protocol.hpp"
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+
+namespace tetap::sim {
+
+struct RecorderOptions {
+  std::string folder;
+  std::uint32_t base = 0x300;
+  bool raw = false;
+  std::string interface = "vcan0";  ///< as written in raw.log
+};
+
+/// Bits of a classic frame on the wire with worst-case stuffing and interframe space (ISO 11898-1; Davis et al., Real-Time Systems
+/// 35, 2007, eq. 1 and its extended form).
+[[nodiscard]] constexpr std::uint64_t worst_case_bits(const base::CanFrame& frame) {
+  const std::uint64_t data = 8U * frame.size, stuffed = (frame.extended ? 54U : 34U) + data;
+  return stuffed + (stuffed - 1) / 4 + 13;
+}
+
+class Recorder {
+ public:
+  struct Totals {
+    std::uint64_t epochs = 0;
+    std::uint64_t estimates = 0;       ///< Est<k>_Pos frames
+    std::uint64_t frames_sent = 0;     ///< by us
+    std::uint64_t frames_received = 0; ///< anything on the bus
+    std::uint64_t bits_sent = 0;
+    std::uint64_t bits_received = 0;
+    std::uint32_t state_crc = 0;       ///< the last
+    base::Micros first, last;          ///< epochs
+    std::string estimates_sha256;      ///< after finish()
+  };
+
+  /// Makes the folder and the files; throws when that is not possible.
+  explicit Recorder(const RecorderOptions& options);
+
+  void restarted() { restarted_ = true; }
+  void sent(const base::CanFrame& frame);
+  /// `arrival`: for raw.log; without it now.
+  void received(const base::CanFrame& frame, std::optional<base::Micros> arrival = std::nullopt);
+  void epoch(const NodeEpoch& epoch, base::Micros time);
+  /// Writes out what is buffered, so that a long recording can be looked at.
+  void flush();
+  /// Ends all files; throws when one could not be written whole.
+  const Totals& finish();
+  [[nodiscard]] const Totals& totals() const { return totals_; }
+
+ private:
+  struct Instance {
+    std::optional<can::EstPos> position;
+    std::optional<can::EstMotion> motion;
+    std::optional<can::EstStdPose> deviation;
+    std::optional<can::EstStdMore> correlation;
+  };
+  void frame(const base::CanFrame& frame);
+  void estimate_row(std::size_t k, const Instance& instance);
+  void innovation_row(const can::EstInnov& innovation);
+  void status_row(const can::EstStatus& status);
+  Line& row(base::Micros time);
+  void raw_line(const base::CanFrame& frame, base::Micros time);
+
+  RecorderOptions options_;
+  OutFile estimates_log_, estimates_, innovations_, status_;
+  std::optional<OutFile> raw_;
+  Line line_;
+  std::array<Instance, can::EstPos::kCount> instances_{};
+  std::uint64_t number_ = 0;  ///< of the epoch
+  std::uint8_t last_epoch_ = 0;
+  bool restarted_ = true;
+  base::Micros time_;
+  Totals totals_;
+};
+
+}  // namespace tetap::sim

@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a player sends: for every tick its input frames, then the tick. Made from a log, from a simulated world, or from the record of
+// another run.
+#pragma once
+
+#include "base/can_frame.hpp"
+#include "base/time.hpp"
+#include "sim_host/play/log.hpp"
+
+#include <concepts>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+namespace tetap::sim {
+
+/// One tick to be played. The span is valid until the source is asked again.
+struct Tick {
+  base::Micros time;
+  std::span<const base::CanFrame> inputs;  ///< sent before the tick, ids of the node that is played to
+  std::optional<base::Micros> begin;       ///< before all: the node starts as after power-on, at this time
+};
+
+template <class S>
+concept Source = requires(S& source, Tick& tick) {
+  /// Fills in the next tick; false: no more.
+  { source.next(tick) } -> std::same_as<bool>;
+};
+
+/// A source that is all in memory.
+class Script {
+ public:
+  void add_input(const base::CanFrame& frame) { inputs_.push_back(frame); }
+  /// A tick after the inputs added so far.
+  void add_tick(base::Micros time, std::optional<base::Micros> begin = std::nullopt) { ticks_.push_back({time, begin, inputs_.size()}); }
+
+  bool next(Tick& tick) {
+    if (next_ == ticks_.size()) return false;
+    const std::size_t first = next_ == 0 ? 0 : ticks_[next_ - 1].end;
+    const Entry& entry = ticks_[next_++];
+    tick = {.time = entry.time, .inputs = std::span(inputs_).subspan(first, entry.end - first), .begin = entry.begin};
+    return true;
+  }
+  void rewind() { next_ = 0; }
+
+  [[nodiscard]] std::size_t ticks() const { return ticks_.size(); }
+  [[nodiscard]] std::size_t inputs() const { return inputs_.size(); }
+  [[nodiscard]] base::Micros first() const { return ticks_.empty() ? base::Micros{} : ticks_.front().time; }
+  [[nodiscard]] base::Micros last() const { return ticks_.empty() ? base::Micros{} : ticks_.back().time; }
+
+ private:
+  struct Entry {
+    base::Micros time;
+    std::optional<base::Micros> begin;
+    std::size_t end;  ///< of its inputs
+  };
+  std::vector<base::CanFrame> inputs_;
+  std::vector<Entry> ticks_;
+  std::size_t next_ = 0;
+};
+
+static_assert(Source<Script>);
+
+struct ScriptOptions {
+  std::uint32_t base = 0x300;      ///< of the node that is played to
+  std::uint32_t log_base = 0x300;  ///< of the ids in the log
+  base::Micros period{10'000};
+};
+
+/// The log's input frames with the ids of the node, sync frames left out.
+[[nodiscard]] std::vector<TimedFrame> inputs_of(std::span<const TimedFrame> log, const ScriptOptions& options);
+
+/// When there are Tick or Step frames in the log, those are the ticks. Else a grid of whole periods from the first frame on, and a
+/// frame belongs to the first tick at or after its time; a frame earlier than its predecessor belongs to that one's tick. A pause of
+/// more than a minute is skipped, so the node sees time jump.
+[[nodiscard]] Script script_of(std::span<const TimedFrame> log, const ScriptOptions& options);
+
+}  // namespace tetap::sim

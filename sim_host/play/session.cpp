@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "sim_host/play/session.hpp"
+
+#include <unistd.h>
+
+#include <cstdio>
+
+namespace tetap::sim {
+
+namespace {
+
+std::string number(double value, int decimals) {
+  Line line;
+  line.real(value, decimals);
+  return line.view().empty() ? "null" : std::string(line.view());
+}
+
+double to_seconds(base::Micros span) { return static_cast<double>(span.us) * 1e-6; }
+
+}  // namespace
+
+std::string quoted(std::string_view text) {
+  std::string out = "\"";
+  for (const char c : text) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (c == '"' || c == '\\') out += '\\';
+    if (byte >= 0x20) {
+      out += c;
+    } else {
+      Line escape;
+      escape.text("\\u").hex(byte, 4);
+      out += escape.view();
+    }
+  }
+  return out + '"';
+}
+
+Session::Session(const SessionOptions& options, const Recording* recording)
+    : options_(options),
+      recorder_({.folder = options.folder, .base = options.base, .raw = options.raw,
+                 .interface = options.bus == "memory" ? "vcan0" : options.bus}),
+      recording_(recording),
+      terminal_(isatty(STDERR_FILENO) == 1) {
+  if (recording != nullptr) comparison_.emplace(*recording, options.base);
+}
+
+void Session::show_progress() {
+  const base::Micros now = hal::monotonic_clock();
+  if (options_.quiet || now - shown_ < base::Micros{terminal_ ? 250'000 : 5'000'000}) return;
+  shown_ = now;
+  const Recorder::Totals& t = recorder_.totals();
+  const double played = to_seconds(t.last - t.first);
+  const double share = options_.ticks > 0 ? 100.0 * static_cast<double>(t.epochs) / static_cast<double>(options_.ticks) : 0;
+  Line line;
+  if (terminal_) line.put('\r');
+  line.text(options_.program).text(": ").real(played, 1).text(" s played");
+  if (options_.ticks > 0) line.text(", ").real(share, 0).text(" %");
+  line.text(", ").real(played / to_seconds(now - began_), 1).text(" x real time, ").integer(static_cast<std::int64_t>(counts_.lost()));
+  line.text(" frames lost ").text(terminal_ ? "  " : "\n");
+  std::fwrite(line.view().data(), 1, line.view().size(), stderr);
+}
+
+std::string Session::complaint() const {
+  if (!error_.empty()) return error_;
+  const auto count = [](std::uint64_t n) { return std::to_string(n); };
+  if (counts_.lost() > 0)
+    return count(counts_.lost()) + " frames lost (" + count(counts_.lost_inputs) + " to the node, " + count(counts_.lost_outputs) +
+           " from it, of these " + count(counts_.overflows) + " in our own socket)";
+  if (counts_.extra() > 0)
+    return count(counts_.extra()) + " frames too many (" + count(counts_.extra_inputs) + " to the node, " + count(counts_.extra_outputs) +
+           " from it): is there another sender on this bus?";
+  if (!comparison_) return {};
+  if (comparison_->different() > 0)
+    return count(comparison_->different()) + " of " + count(comparison_->compared()) + " epochs differ from the recording; first " +
+           comparison_->first_difference();
+  if (comparison_->missing() > 0) return count(comparison_->missing()) + " recorded epochs were not repeated";
+  if (recording_->missing_outputs > 0) return "the recording itself lacks " + count(recording_->missing_outputs) + " frames of the node";
+  return {};
+}
+
+int Session::finish() {
+  const double wall_s = to_seconds(hal::monotonic_clock() - began_);
+  recorder_.finish();
+  if (terminal_ && !options_.quiet) std::fputs("\r\033[K", stderr);
+  write_json(wall_s);
+  const std::string wrong = complaint();
+  if (!wrong.empty()) std::fprintf(stderr, "%s: %s\n", options_.program.c_str(), wrong.c_str());
+  return wrong.empty() ? 0 : 1;
+}
+
+void Session::write_json(double wall_s) {
+  const Recorder::Totals& t = recorder_.totals();
+  const double duration_s = t.epochs > 0 ? to_seconds(t.last - t.first) : 0;
+  const auto load = [&](std::uint64_t bits) {
+    return number(duration_s > 0 ? 100.0 * static_cast<double>(bits) / (duration_s * options_.bitrate) : 0, 2);
+  };
+  const auto count = [](std::uint64_t n) { return std::to_string(n); };
+  Line crc;
+  crc.hex(t.state_crc, 8);
+  std::vector<std::pair<std::string, std::string>> fields{
+      {"mode", quoted(options_.mode)},
+      {"bus", quoted(options_.bus)},
+      {"robot", quoted(options_.robot)},
+      {"log", quoted(options_.log)},
+      {"frames_in", count(counts_.inputs)},
+      {"frames_lost", count(counts_.lost())},
+      {"frames_lost_in", count(counts_.lost_inputs)},
+      {"frames_lost_out", count(counts_.lost_outputs)},
+      {"frames_extra", count(counts_.extra())},
+      {"frames_out", count(counts_.outputs)},
+      {"estimates_out", count(t.estimates)},
+      {"epochs", count(t.epochs)},
+      {"duration_s", number(duration_s, 3)},
+      {"wall_s", number(wall_s, 3)},
+      {"times_realtime", number(wall_s > 0 ? duration_s / wall_s : 0, 2)},
+      {"bus_load_percent", load(t.bits_sent + t.bits_received)},
+      {"node_load_percent", load(t.bits_received)},
+      {"estimates_sha256", quoted(t.estimates_sha256)},
+      {"state_crc_last", quoted(crc.view())},
+  };
+  if (comparison_) {
+    fields.emplace_back("epochs_compared", count(comparison_->compared()));
+    fields.emplace_back("epochs_different", count(comparison_->different()));
+    fields.emplace_back("first_difference", quoted(comparison_->first_difference()));
+  }
+  fields.insert(fields.end(), notes_.begin(), notes_.end());
+  if (!error_.empty()) fields.emplace_back("error", quoted(error_));
+  OutFile file(options_.folder + "/run.json");
+  file.write("{\n");
+  for (std::size_t i = 0; i < fields.size(); ++i)
+    file.write("  " + quoted(fields[i].first) + ": " + fields[i].second + (i + 1 < fields.size() ? ",\n" : "\n"));
+  file.write("}\n");
+  file.close();
+}
+
+}  // namespace tetap::sim

@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: Apache-2.0
+// One run of a node seen from the host: the sink that records, compares and shows progress, and at the end says in run.json, in one
+// line, and in the exit status how it went.
+#pragma once
+
+#include "hal/port/linux/clock.hpp"
+#include "sim_host/play/ledger.hpp"
+#include "sim_host/play/link.hpp"
+#include "sim_host/play/recorder.hpp"
+#include "sim_host/play/recording.hpp"
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace tetap::sim {
+
+struct SessionOptions {
+  std::string program;             ///< for messages
+  std::string folder;
+  std::uint32_t base = 0x300;
+  bool raw = false;
+  std::string mode;                ///< lockstep, realtime, as-recorded
+  std::string bus;                 ///< interface, or memory
+  std::string robot;
+  std::string log;                 ///< path, or what was simulated
+  std::uint64_t ticks = 0;         ///< expected, for the progress line; 0: unknown
+  double bitrate = 500'000;        ///< for the bus load
+  bool quiet = false;
+};
+
+class Session {
+ public:
+  /// `recording`: every epoch is held against it; it has to outlive the session.
+  explicit Session(const SessionOptions& options, const Recording* recording = nullptr);
+
+  void restarted() { recorder_.restarted(); }
+  void sent(const base::CanFrame& frame) { recorder_.sent(frame); }
+  void received(const base::CanFrame& frame) { recorder_.received(frame); }
+  void epoch(const NodeEpoch& epoch, base::Micros time) {
+    recorder_.epoch(epoch, time);
+    if (comparison_) comparison_->epoch(epoch, time);
+    if (recorder_.totals().epochs % 64 == 0) show_progress();
+  }
+
+  [[nodiscard]] Counts& counts() { return counts_; }
+  [[nodiscard]] Recorder& recorder() { return recorder_; }
+  /// Another line for run.json: `value` is JSON (a number, or a quoted string).
+  void note(std::string key, std::string value) { notes_.emplace_back(std::move(key), std::move(value)); }
+
+  /// Plays with `play()` and turns a RunError into a message. Returns the exit status: 0, or 1 when frames were lost, came twice, or
+  /// differ from the recording.
+  template <class Play>
+  int run(Play&& play) {
+    try {
+      play();
+    } catch (const RunError& error) {
+      error_ = error.what();
+    }
+    return finish();
+  }
+  int finish();
+
+ private:
+  void show_progress();
+  [[nodiscard]] std::string complaint() const;
+  void write_json(double wall_s);
+
+  SessionOptions options_;
+  Recorder recorder_;
+  std::optional<Comparison> comparison_;
+  const Recording* recording_;
+  Counts counts_;
+  std::vector<std::pair<std::string, std::string>> notes_;
+  std::string error_;
+  base::Micros began_ = hal::monotonic_clock();
+  base::Micros shown_ = began_;
+  bool terminal_ = false;
+};
+
+/// Text as a JSON string, quotes included.
+[[nodiscard]] std::string quoted(std::string_view text);
+
+}  // namespace tetap::sim

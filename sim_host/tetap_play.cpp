@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+// tetap-play: plays a candump log to a node, on a CAN interface or in its own process, and records what it answers.
+#include "sim_host/in_process.hpp"
+#include "sim_host/play/play.hpp"
+
+#include <cstdio>
+#include <exception>
+
+int main(int count, char** values) {
+  try {
+    using namespace tetap;
+    sim::Arguments arguments(count, values);
+    if (arguments.flag("--help") || arguments.flag("-h")) return std::fputs(sim::play_help(), stdout), 0;
+    const sim::PlayOptions options = sim::play_options(arguments);
+    if (options.memory)
+      return sim::with_node_in_process(options.robot, options.script.base,
+                                       [&](auto& link) { return sim::play(link, options, "memory", "tetap-play"); });
+    hal::SocketCan can(options.interface);
+    return sim::play(can, options, options.interface, "tetap-play");
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "tetap-play: %s\n", error.what());
+    return 2;
+  }
+}

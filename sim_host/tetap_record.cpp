@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: Apache-2.0
+// tetap-record: writes down everything on a CAN interface (raw.log) and what one node says (estimates.log and CSV files) until it is
+// interrupted.
+#include "hal/port/linux/socket_can.hpp"
+#include "sim_host/play/arguments.hpp"
+#include "sim_host/play/session.hpp"
+
+#include <csignal>
+#include <cstdio>
+#include <exception>
+#include <string>
+
+namespace {
+
+using namespace tetap;
+
+constexpr const char* kHelp = R"(usage: tetap-record [--can IFACE] [OPTION]...
+
+Records a CAN interface until interrupted (^C, SIGTERM): everything as candump would (raw.log), and what a node says
+(estimates.log, estimates.csv, innovations.csv, status.csv, run.json).
+
+  --can IFACE     (default vcan0)
+  --base ID       first id of the node's block (default 0x300)
+  --out DIR       (default out/record)
+  --duration S    stop by itself after so many seconds
+  --quiet         no progress line
+
+Exit status: 0; 1 frames were lost; 2 bad usage or no bus.
+)";
+
+volatile std::sig_atomic_t stop = 0;
+
+void on_signal(int) { stop = 1; }
+
+int record(sim::Arguments& arguments) {
+  const std::string interface = arguments.text("--can").value_or("vcan0");
+  const sim::SessionOptions about{.program = "tetap-record", .folder = arguments.text("--out").value_or("out/record"),
+                                  .base = sim::base_argument(arguments), .raw = true, .mode = "record", .bus = interface,
+                                  .quiet = arguments.flag("--quiet")};
+  const base::Micros duration{static_cast<std::int64_t>(arguments.real("--duration", 0, 0, 1e7) * 1e6)};
+  arguments.finish();
+  hal::SocketCan can(interface, {.arrival_times = true});
+  sim::Session session(about);
+  sim::EpochCollector collector(about.base);
+  sim::RealtimeLedger ledger(session.counts());
+  const base::Micros began = hal::monotonic_clock();
+  base::Micros written = began;
+  while (stop == 0 && (duration.us == 0 || hal::monotonic_clock() - began < duration)) {
+    can.wait({100'000});
+    while (const auto frame = can.receive()) {
+      session.recorder().received(*frame, can.last_arrival());
+      if (collector.is_begin_answer(*frame)) {  // the node starts anew
+        ledger.begin(true);
+        session.restarted();
+      }
+      if (const auto epoch = collector.add(*frame)) {
+        ledger.answered(*epoch);
+        session.epoch(*epoch, {epoch->head ? static_cast<std::int64_t>(epoch->head->time_us) : session.recorder().totals().last.us});
+      }
+    }
+    const base::Micros now = hal::monotonic_clock();
+    if (now - written < base::Micros{1'000'000}) continue;
+    session.recorder().flush();
+    written = now;
+  }
+  session.counts().overflows = can.faults().rx_overflow;
+  if (session.counts().lost_outputs < session.counts().overflows) session.counts().lost_outputs = session.counts().overflows;
+  session.note("interface_down", std::to_string(can.faults().bus_off));
+  return session.finish();
+}
+
+}  // namespace
+
+int main(int count, char** values) {
+  std::signal(SIGINT, on_signal);
+  std::signal(SIGTERM, on_signal);
+  try {
+    sim::Arguments arguments(count, values);
+    if (arguments.flag("--help") || arguments.flag("-h")) return std::fputs(kHelp, stdout), 0;
+    return record(arguments);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "tetap-record: %s\n", error.what());
+    return 2;
+  }
+}

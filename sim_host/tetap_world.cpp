@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: Apache-2.0
+// tetap-world: the simulated world's sensors on a CAN bus, and what the node makes of them on record beside the truth.
+#include "sim_host/in_process.hpp"
+#include "sim_host/options.hpp"
+#include "sim_host/play/lockstep.hpp"
+#include "sim_host/play/realtime.hpp"
+#include "sim_host/play/session.hpp"
+#include "sim_host/world_source.hpp"
+
+#include <cstdio>
+#include <exception>
+#include <string>
+
+namespace {
+
+using namespace tetap;
+
+std::string help() {
+  return
+
+      std::string("usage: tetap-world [OPTION]...\n\nDrives a simulated rover over its course, sends what its sensors say, and records the node's answers.\n\n"
+      "  --can IFACE        the interface the node is on (default vcan0)\n"
+      "  --memory           run a node in this process instead, without a bus\n"
+      "  --robot NAME       what the node is (default rover)\n"
+      "  --out DIR          for the record, truth.csv and truth.json (default out/sim)\n"
+      "  --seed N           every draw follows from it (default 1)\n"
+      "  --duration S       at most so long (default: the whole course)\n"
+      "  --matched          only errors that the filters model\n"
+      "  --fault NAME[@START[+DURATION]]   seconds; several with commas:\n") + sim::fault_help() +
+      "  --realtime         at the speed of the world, with Tick frames; else lockstep, as fast as the node can\n"
+      "  --window N         lockstep: ticks in flight (default 8)\n"
+      "  --emulated         the node runs on an emulated core: be patient\n"
+      "  --base ID          first id of the node's block (default 0x300)\n"
+      "  --raw              also write raw.log\n"
+      "  --quiet            no progress line\n";
+}
+
+void write_truth(const std::string& folder, const sim::WorldSource& source) {
+  sim::OutFile file(folder + "/truth.csv");
+  sim::Line line;
+  file.write("time_s,x_m,y_m,yaw_rad\n");
+  for (const sim::Truth& t : source.truth()) {
+    line.clear();
+    line.fixed(t.time.us, 6).text(",").real(t.x_m, 6).text(",").real(t.y_m, 6).text(",").real(t.yaw_rad, 6).text("\n");
+    file.write(line.view());
+  }
+  file.close();
+  sim::OutFile json(folder + "/truth.json");
+  std::string text = "{\n  \"truth\": \"simulated world\",\n  \"landmarks\": [";
+  bool first = true;
+  for (const sim::Landmark& mark : source.world().map()) {
+    char entry[96];
+    std::snprintf(entry, sizeof entry, "%s\n    {\"id\": %d, \"x_m\": %.3f, \"y_m\": %.3f}", first ? "" : ",", static_cast<int>(mark.id), mark.x_m, mark.y_m);
+    text += entry;
+    first = false;
+  }
+  json.write(text + "\n  ]\n}\n");
+  json.close();
+}
+
+struct Run {
+  sim::World::Options world;
+  std::uint64_t seed = 1;
+  base::Micros limit;
+  bool realtime = false;
+  std::string faults;
+  sim::SessionOptions session;
+  sim::LockstepOptions lockstep;
+};
+
+template <sim::Link L>
+int drive(L& link, const Run& run) {
+  sim::WorldSource source(sim::World(run.world, run.seed), run.session.base, base::Micros{10'000}, run.limit);
+  auto about = run.session;
+  about.ticks = static_cast<std::uint64_t>(std::min(run.limit, source.world().duration()).us / 10'000);
+  sim::Session session(about);
+  session.note("seed", std::to_string(run.seed));
+  session.note("fault", sim::quoted(run.faults));
+  session.note("matched", run.world.mismatched ? "false" : "true");
+  const int status = session.run([&] {
+    if (!run.realtime) return sim::play_lockstep(link, source, session, run.lockstep, session.counts());
+    std::vector<sim::TimedFrame> frames;
+    sim::Tick tick;
+    while (source.next(tick))
+      for (const auto& frame : tick.inputs) frames.push_back({.time = tick.time, .frame = frame});
+    sim::RealtimeOptions options{.base = about.base};
+    sim::play_realtime(link, frames, session, options, session.counts());
+  });
+  write_truth(about.folder, source);
+  return status;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) try {
+  const sim::Options options(argc, argv, {"can", "robot", "out", "seed", "duration", "fault", "window", "base"},
+                             {"memory", "matched", "realtime", "emulated", "raw", "quiet"}, help().c_str());
+  if (!options.words().empty()) throw std::runtime_error("'" + options.words().front() + "': an option begins with --");
+  Run run;
+  const std::string interface = options.text("can", "vcan0");
+  const bool memory = options.has("memory");
+  const std::string robot = options.text("robot", "rover");
+  run.seed = static_cast<std::uint64_t>(options.number("seed", 1));
+  run.limit = {static_cast<std::int64_t>(options.number("duration", 86'400) * 1e6)};
+  run.world.mismatched = !options.has("matched");
+  for (const std::string& given : options.all("fault")) {
+    const sim::FaultsParsed parsed = sim::parse_faults(given);
+    if (!parsed.error.empty()) throw std::runtime_error(parsed.error);
+    run.world.faults.insert(run.world.faults.end(), parsed.settings.begin(), parsed.settings.end());
+    run.faults += (run.faults.empty() ? "" : ",") + given;
+  }
+  run.realtime = options.has("realtime");
+  run.lockstep.window = static_cast<std::size_t>(options.number("window", 8));
+  if (options.has("emulated")) run.lockstep.patience = sim::kEmulatedPatience;
+  run.lockstep.base = options.base();
+  run.session = {.program = "tetap-world",
+                 .folder = options.text("out", "out/sim"),
+                 .base = options.base(),
+                 .raw = options.has("raw"),
+                 .mode = run.realtime ? "realtime" : "lockstep",
+                 .bus = memory ? "memory" : interface,
+                 .robot = robot,
+                 .log = "simulated world",
+                 .quiet = options.has("quiet")};
+  if (memory) return sim::with_node_in_process(robot, options.base(), [&](auto& link) { return drive(link, run); });
+  hal::SocketCan can(interface);
+  return drive(can, run);
+} catch (const std::exception& error) {
+  std::fprintf(stderr, "tetap-world: %s\n", error.what());
+  return 2;
+}
