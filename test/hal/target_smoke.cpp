@@ -17,6 +17,12 @@ constexpr std::uint32_t kFault = 0x7F1;
 volatile std::uint32_t initialised = 0x600DDA7A;
 volatile std::uint32_t zeroed;
 
+template <class Can>
+std::uint32_t unsupported(const Can& can) {
+  if constexpr (requires { can.rx_unsupported(); }) return can.rx_unsupported();
+  return 0;
+}
+
 void report(Board& board, std::uint32_t echoed) {
   const auto faults = board.can.faults();
   const auto stack = Board::stack();
@@ -24,6 +30,7 @@ void report(Board& board, std::uint32_t echoed) {
   tetap::hal::Text<> line;
   line.add("smoke: ms ").dec(static_cast<std::uint32_t>(now_us / 1000)).add(" echoed ").dec(echoed);
   line.add(" rx_overflow ").dec(faults.rx_overflow).add(" tx_full ").dec(faults.tx_full).add(" bus_off ").dec(faults.bus_off);
+  line.add(" unsupported ").dec(unsupported(board.can));
   line.add(" stack ").dec(stack.used).add(" of ").dec(stack.reserved).add('\n');
   board.print(line.c_str());
 }
@@ -36,12 +43,8 @@ int main() {
   std::uint32_t echoed = 0;
 #if !defined(TETAP_BOARD_ZYNQMP_R5)
   static tetap::hal::mps2::semihosting::CommandLine<512> arguments;
-  char* word[3] = {};
-  for (std::size_t i = 0, n = 0; arguments.text[i] != '\0'; ++i) {
-    if ((i == 0 || arguments.text[i - 1] == '\0') && n < 3) word[n++] = &arguments.text[i];
-    if (arguments.text[i] == ' ') arguments.text[i] = '\0';
-  }
-  if (!board.can.open(word[1], word[2])) {
+  const auto words = arguments.words<3>();
+  if (!board.can.open(words[1], words[2])) {
     board.print("smoke: cannot open the files\n");
     return 1;
   }

@@ -54,6 +54,8 @@ class CanController {
       if (clock_->now() < back_at_) return;
       configure();
     }
+    if (count_ == 0 && !received_) rest(machine_);
+    received_ = false;
     // Bounded by the ring, so a controller that never fills cannot hold the loop.
     while (count_ > 0 && (registers_.read(kStatus) & kStatusTxFull) == 0) {
       const CanWords words = to_words(machine_, ring_[first_]);
@@ -72,6 +74,7 @@ class CanController {
       const std::uint32_t interrupts = registers_.read(kInterrupts);
       if ((interrupts & (kBusOff | kRxOverflow)) != 0) note_faults(interrupts);
       if ((interrupts & kRxNotEmpty) == 0) return std::nullopt;
+      received_ = true;
       // All four words are read whatever the size; the last one takes the message out of the FIFO.
       CanWords words;
       words.id = registers_.read(kRxId);
@@ -130,7 +133,7 @@ class CanController {
       ++faults_.rx_overflow;  // one event; how many frames it cost the controller does not say
       registers_.write(kInterruptClear, kRxOverflow);
     }
-    if ((interrupts & kBusOff) != 0 && !away_) {
+    if ((interrupts & kBusOff) != 0) {
       ++faults_.bus_off;
       registers_.write(kReset, 0);  // leaves the bus; received frames stay readable, those in the transmit FIFO are given up at restart
       registers_.write(kInterruptClear, kBusOff);
@@ -143,7 +146,8 @@ class CanController {
   Clock* clock_;
   CanConfig config_{};
   Machine machine_ = Machine::kSilicon;
-  bool away_ = false;  // between bus-off and the restart
+  bool received_ = false;  // since the last flush()
+  bool away_ = false;      // between bus-off and the restart
   base::Micros back_at_{};
   std::array<base::CanFrame, kTransmitCapacity> ring_{};
   std::size_t first_ = 0;

@@ -4,7 +4,8 @@
 #include "hal/port/support/text.hpp"
 #include "hal/port/zynqmp_r5/board.hpp"
 
-int main();
+// ISO C++ does not let a program call main by that name.
+int image_main() asm("main");
 
 extern "C" {
 
@@ -70,7 +71,7 @@ TETAP_EXCEPTION(tetap_fiq, 7, 4)
 
 void tetap_start() {
   tetap::hal::load_sections();
-  main();
+  image_main();
   for (;;) asm volatile("wfi");
 }
 

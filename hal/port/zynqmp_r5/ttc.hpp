@@ -23,62 +23,39 @@ class Ttc {
 
   void start(Machine machine) {
     machine_ = machine;
-    const bool silicon = machine == Machine::kSilicon;
     registers_.write(kCounterControl1, kCounterDisable);
-    registers_.write(kClockControl1, prescale(silicon ? kSiliconPrescale : kEmulatedPrescale));
-    registers_.write(kClockControl2, prescale(kCoarsePrescale));
+    registers_.write(kClockControl1, (shape().prescale - 1) << 1 | 1U);
     registers_.write(kCounterControl1, kCounterReset);
-    registers_.write(kCounterControl2, kCounterReset);
     last_ = 0;
-    coarse_last_ = 0;
   }
 
-  /// To be called at least every 171 s on silicon, every 32 s in the emulator.
+  /// To be called before the counter has gone round: at least every 171 s on silicon, every 4 s in the emulator.
   [[nodiscard]] base::Micros now() {
-    if (machine_ == Machine::kSilicon) {
-      const std::uint32_t count = registers_.read(kCounter1);
-      ticks_ += count - last_;
-      last_ = count;
-      return {static_cast<std::int64_t>(ticks_ / kSiliconTicksPer_us)};
-    }
-    const std::uint32_t count = registers_.read(kCounter1) & 0xFFFFU;
-    ticks_ += (count - last_) & 0xFFFFU;
+    const std::uint32_t count = registers_.read(kCounter1);
+    ticks_ += (count - last_) & shape().mask;
     last_ = count;
-    // 16 bits wrap every 63 ms, and an emulated core may stand still longer than that. Counter 2 runs 512 times slower; the time whose
-    // low bits are those of counter 1 and which is nearest to it is right however long the pause. Read seldom, because each read
-    // of the emulated counter rounds its time down a little.
-    if (ticks_ - checked_ >= kCheckEvery) {
-      const std::uint32_t coarse = registers_.read(kCounter2) & 0xFFFFU;
-      coarse_ticks_ += (coarse - coarse_last_) & 0xFFFFU;
-      coarse_last_ = coarse;
-      const auto reference = static_cast<std::int64_t>(coarse_ticks_ << (kCoarsePrescale - kEmulatedPrescale));
-      const std::int64_t extended = base::extend(count, 16, base::Micros{reference}).us;
-      if (extended > static_cast<std::int64_t>(ticks_)) ticks_ = static_cast<std::uint64_t>(extended);
-      checked_ = ticks_;
-    }
-    return {static_cast<std::int64_t>((ticks_ << kEmulatedPrescale) / kEmulatedClock_MHz)};
+    return {static_cast<std::int64_t>((ticks_ << shape().prescale) / shape().clock_MHz)};
   }
 
  private:
   // UG1087, module TTC: offsets and bits used here.
-  static constexpr std::uint32_t kClockControl1 = 0x00, kClockControl2 = 0x04, kCounterControl1 = 0x0C, kCounterControl2 = 0x10;
-  static constexpr std::uint32_t kCounter1 = 0x18, kCounter2 = 0x1C, kInterval1 = 0x24;
-  static constexpr std::uint32_t kCounterDisable = 1U << 0, kCounterReset = 1U << 4;  // counting up over the whole range otherwise
-  static constexpr unsigned kSiliconClock_MHz = 100, kEmulatedClock_MHz = 133;
-  static constexpr unsigned kSiliconPrescale = 2, kEmulatedPrescale = 7, kCoarsePrescale = 16;  // the clock is divided by 2 to this
-  static constexpr std::uint64_t kSiliconTicksPer_us = kSiliconClock_MHz >> kSiliconPrescale;
-  static_assert((kSiliconTicksPer_us << kSiliconPrescale) == kSiliconClock_MHz, "a whole number of ticks in a microsecond");
-  static constexpr std::uint64_t kCheckEvery = 1U << 14;  // 16 ms
+  static constexpr std::uint32_t kClockControl1 = 0x00, kCounterControl1 = 0x0C, kCounter1 = 0x18, kInterval1 = 0x24;
+  static constexpr std::uint32_t kCounterDisable = 1U << 0, kCounterReset = 1U << 4;  // counts up over its whole range otherwise
 
-  [[nodiscard]] static constexpr std::uint32_t prescale(unsigned power) { return (power - 1) << 1 | 1U; }
+  struct Shape {
+    std::uint32_t prescale;  ///< the clock is divided by 2 to this
+    std::uint32_t clock_MHz;
+    std::uint32_t mask;      ///< the bits the counter has
+  };
+  static constexpr Shape kSilicon{.prescale = 2, .clock_MHz = 100, .mask = 0xFFFF'FFFF};
+  // 62 us a tick: with a finer one, 16 bits go round faster than a core may stand still on a busy computer.
+  static constexpr Shape kEmulated{.prescale = 13, .clock_MHz = 133, .mask = 0xFFFF};
+  [[nodiscard]] constexpr const Shape& shape() const { return machine_ == Machine::kSilicon ? kSilicon : kEmulated; }
 
   Registers registers_;
   Machine machine_ = Machine::kSilicon;
   std::uint64_t ticks_ = 0;
-  std::uint64_t checked_ = 0;
-  std::uint64_t coarse_ticks_ = 0;
   std::uint32_t last_ = 0;
-  std::uint32_t coarse_last_ = 0;
 };
 
 }  // namespace tetap::hal::zynqmp_r5
