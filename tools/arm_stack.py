@@ -73,7 +73,7 @@ class Code:
             if s.defined and (s.function or label):
                 names.setdefault(s.address, []).append(s)
         self.starts = sorted(names)
-        self.names = {a: [s.name for s in sorted(symbols, key=lambda s: (s.untyped, s.bind == 0))] for a, symbols in names.items()}
+        self.names = {a: [s.name for s in sorted(symbols, key=lambda s: (s.untyped, s.bind == 0, not s.name.startswith("__aeabi_")))] for a, symbols in names.items()}
 
     def owner(self, address):
         """Start of the function that an address lies in."""

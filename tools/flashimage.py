@@ -59,7 +59,7 @@ class Symbol:
 
     def __init__(self, name, value, size, kind, bind, shndx):
         self.name, self.size, self.bind = name, size, bind
-        self.function, self.object, self.untyped = kind == 2, kind == 1, kind == 0
+        self.function, self.object, self.untyped, self.file = kind == 2, kind == 1, kind == 0, kind == 4
         self.thumb = self.function and bool(value & 1)
         self.address = value & ~1 if self.function else value
         self.defined, self.absolute, self.shndx = shndx != 0, shndx == 0xFFF1, shndx
@@ -109,7 +109,7 @@ class Image:
                 self.symbols.append(Symbol(text(strings, name), value, size, info & 15, info >> 4, shndx))
         if not self.symbols:
             raise ToolError(f"{self.path}: has no symbol table (stripped)")
-        self.symbols = [s for s in self.symbols if s.name]
+        self.symbols = [s for s in self.symbols if s.name and not s.file]
         self.by_name = {s.name: s for s in self.symbols if s.defined}
         profile = next((s for s in self.sections if s.name == ".ARM.attributes"), None)
         attributes = run(PREFIX + "readelf", "-A", self.path) if profile else ""
