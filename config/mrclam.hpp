@@ -20,7 +20,8 @@ inline constexpr app::Numbers numbers{
                .noise = {.speed = 0.002F, .yaw_rate = 0.0005F, .yaw_rate_per_yaw_rate = 0.01F, .yaw_rate_per_speed = 0.0005F},
                .hold = app::Hold::kForward,
                .delay_us = 200'000,      // from command to motion: the likelihood is flat between 0.2 and 0.3 s
-               .yaw_rate_scale = 0.95F},  // turns come out short; flat between 0.90 and 0.97
+               .yaw_rate_scale = 0.95F,   // turns come out short; flat between 0.90 and 0.97
+               .timeout_us = 5'000'000},   // a command holds until the next
     .landmark = {.sigma_range_m = 0.1F, .sigma_range_per_m = 0.05F, .sigma_bearing_rad = 0.02F, .gate_scale = 1.5F},
     .recovery = {.after_us = 0, .at_least = 5, .inflate_position_m = 0.3F, .inflate_yaw_rad = 0.5F},
 };

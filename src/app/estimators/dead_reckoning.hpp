@@ -59,6 +59,7 @@ class DeadReckoning {
     sink(held_.second);
     sink(applied_left_m_);
     sink(applied_right_m_);
+    sink(applied_yaw_rad_);
     sink(gyro_bias_radps_);
     sink(gyro_rate_radps_);
     sink(last_input_.us);
@@ -82,9 +83,9 @@ class DeadReckoning {
     return held_.kind == Held::Kind::kWheels ? (held_.second - held_.first_mps) / n.wheels.drive.track_m : held_.second;
   }
   [[nodiscard]] model::PlanarIncrement held_increment(float dt_s, const Numbers& n) const;
-  void turn_by_gyro(model::PlanarIncrement& increment, float dyaw_rad, float dt_s, const Numbers& n) const {
+  static void turn(model::PlanarIncrement& increment, float dyaw_rad, float variance) {
     increment.dyaw_rad = dyaw_rad;
-    increment.var_dyaw = n.gyro.noise * dt_s;
+    increment.var_dyaw = variance;
     increment.cov_ds_dyaw = 0;
   }
   void untravelled() { applied_left_m_ = applied_right_m_ = 0; }
@@ -100,6 +101,8 @@ class DeadReckoning {
   bool moving_ = true;
   float applied_left_m_ = 0;   ///< travel extrapolated since the last counts, taken off when the next ones come
   float applied_right_m_ = 0;
+  base::Micros gyro_time_;     ///< stamp of the last IMU sample
+  float applied_yaw_rad_ = 0;  ///< turn extrapolated since then
   float gyro_rate_radps_ = 0;
   float gyro_bias_radps_ = 0;
 };
@@ -120,7 +123,7 @@ inline model::PlanarIncrement DeadReckoning::held_increment(float dt_s, const Nu
       break;
     }
   }
-  if (n.gyro.use != 0) turn_by_gyro(increment, gyro_rate_radps_ * dt_s, dt_s, n);
+  if (n.gyro.use != 0) turn(increment, gyro_rate_radps_ * dt_s, n.gyro.noise * dt_s);
   return increment;
 }
 
@@ -139,16 +142,18 @@ inline void DeadReckoning::propagate(base::Micros t, const Numbers& n) {
     applied_left_m_ += held_.first_mps * dt_s;
     applied_right_m_ += held_.second * dt_s;
   }
+  if (n.gyro.use != 0) applied_yaw_rad_ += gyro_rate_radps_ * dt_s;
 }
 
 inline void DeadReckoning::fuse(const WheelCounts& now, base::Micros stamp, const Numbers& n) {
   const auto& drive = n.wheels.drive;
+  if (n.gyro.use != 0) propagate(stamp, n);  // the turn up to here; what the counts add is length
   const bool usable = have_counts_ && stamp > counts_time_ && stamp - counts_time_ <= base::Micros{n.wheels.timeout_us};
   if (usable) {
     const float left_m = drive.left_m(model::count_difference(now.left, counts_.left));
     const float right_m = drive.right_m(model::count_difference(now.right, counts_.right));
     model::PlanarIncrement increment = drive.increment(left_m - applied_left_m_, right_m - applied_right_m_);
-    if (n.gyro.use != 0) turn_by_gyro(increment, 0.0F, 0.0F, n);
+    if (n.gyro.use != 0) turn(increment, 0.0F, 0.0F);
     filter.predict(increment);
     const float per_s = 1.0F / base::seconds(stamp - counts_time_);
     held_ = {.kind = Held::Kind::kWheels, .first_mps = left_m * per_s, .second = right_m * per_s};
@@ -189,7 +194,17 @@ inline void DeadReckoning::fuse(const ImuSample& sample, base::Micros stamp, con
     gyro_bias_radps_ += (raw_radps - gyro_bias_radps_) * (interval_s / n.gyro.bias_time_s);
   }
   gyro_rate_radps_ = raw_radps - gyro_bias_radps_;
+  // What was extrapolated since the sample before is taken off; a gap between the samples is filled with this one's rate.
   propagate(stamp, n);
+  const base::Micros span = stamp - gyro_time_;
+  const bool follows = gyro_time_.us != 0 && span.us > 0 && span <= base::Micros{n.wheels.timeout_us};
+  if (follows) {
+    model::PlanarIncrement correction;
+    turn(correction, gyro_rate_radps_ * base::seconds(span) - applied_yaw_rad_, 0.0F);
+    filter.predict(correction);
+  }
+  applied_yaw_rad_ = 0;
+  gyro_time_ = stamp;
 }
 
 inline Estimate DeadReckoning::estimate(const Numbers& n) const {

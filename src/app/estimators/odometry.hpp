@@ -20,10 +20,9 @@ class Odometry {
                         : model::PlanarPose{},
                   kStartSigma, kStartSigma);
   }
-  /// A given pose moves the odometry's origin: its covariance is that of the way since.
   void set_pose(base::Micros t, const SetPose& given, const Context& with) {
     motion_.propagate(t, with.numbers);
-    motion_.start(t, given.pose, kStartSigma, kStartSigma);
+    motion_.start(t, given.pose, given.sigma_position_m, given.sigma_yaw_rad);
   }
 
   void advance(base::Micros t, const Context&) { motion_.advance(t); }
