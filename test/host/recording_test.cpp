@@ -1,0 +1,286 @@
+// SPDX-License-Identifier: Apache-2.0
+// Records of runs are made with the stand-in node in every way a run can go, and repeated.
+#include "sim_host/play/recording.hpp"
+
+#include "host/stand_in_node.hpp"
+#include "sim_host/play/lockstep.hpp"
+#include "sim_host/play/realtime.hpp"
+
+#include <gtest/gtest.h>
+
+#include <random>
+#include <stdexcept>
+#include <string>
+
+namespace tetap::sim {
+namespace {
+
+using test::KeepAll;
+using test::StandInNode;
+
+/// A node that ticks on its own while frames come as they like. The log sees frames in the order of the bus; the node takes up to
+/// `lag` of them later than its epoch's frames appear.
+struct FreeRun {
+  Log log;
+  std::mt19937_64 draw{9};
+  hal::MemoryBus bus;
+  hal::MemoryCan node_end = bus.node_end();
+  hal::MemoryCan our_end = bus.player_end();
+  StandInNode<hal::MemoryCan> node{node_end, 0x300};
+  std::int64_t now_us = 1'000'000;
+
+  void note(const base::CanFrame& f) { log.frames.push_back({{now_us++}, f}); }
+  void outputs() {
+    while (const auto f = our_end.receive()) note(*f);
+  }
+  void begin(std::int64_t time_us) {
+    const auto frame = sync_frame(0x300, can::SyncKind::kBegin, {time_us}, 0);
+    note(frame);
+    static_cast<void>(our_end.send(frame));
+    node.poll();
+    outputs();
+  }
+  void inputs(std::size_t count) {
+    for (std::size_t i = 0; i < count; ++i) {
+      const base::CanFrame f{.id = 0x301 + static_cast<std::uint32_t>(draw() % 0x1F), .size = 8,
+                             .data = {static_cast<std::uint8_t>(draw()), static_cast<std::uint8_t>(draw())}};
+      note(f);
+      static_cast<void>(our_end.send(f));
+    }
+  }
+  void ticks(int count, std::int64_t from_us) {
+    for (int i = 0; i < count; ++i) {
+      inputs(draw() % 6);
+      node.poll();
+      inputs(draw() % 3);  // on the bus before the epoch's frames, and not in them
+      node.tick(from_us + i * 10'000);
+      outputs();
+    }
+  }
+};
+
+struct Repeated {
+  Counts counts;
+  std::uint64_t compared, different, missing;
+  std::string first;
+};
+
+Repeated repeat(const Recording& recording, std::uint32_t base = 0x300, std::uint32_t flaw = 0) {
+  Recording copy = recording;
+  hal::MemoryBus bus;
+  hal::MemoryCan end = bus.node_end();
+  StandInNode node(end, base);
+  node.loop_time_us = 4711;  // differs from run to run, and must not matter
+  node.state_flaw = flaw;
+  MemoryLink link(bus, [&node] { node.poll(); });
+  Comparison comparison(copy, base);
+  struct Both : KeepAll {
+    Comparison* comparison = nullptr;
+    void epoch(const NodeEpoch& e, base::Micros t) { comparison->epoch(e, t); }
+  } sink;
+  sink.comparison = &comparison;
+  Repeated r{};
+  play_lockstep(link, copy.script, sink, {.base = base}, r.counts);
+  r.compared = comparison.compared();
+  r.different = comparison.different();
+  r.missing = comparison.missing();
+  r.first = comparison.first_difference();
+  return r;
+}
+
+std::string refusal(const Log& log) {
+  try {
+    static_cast<void>(recording_of(log, {}));
+  } catch (const std::runtime_error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(Recording, AFreeRunIsRepeatedByteForByte) {
+  FreeRun run;
+  run.begin(500'000);
+  run.ticks(2000, 1'000'000);
+  const Recording recording = recording_of(run.log, {});
+  EXPECT_EQ(recording.epochs.size(), 2000U);
+  EXPECT_FALSE(recording.inputs_differ_at);
+  const Repeated r = repeat(recording);
+  EXPECT_EQ(r.compared, 2000U);
+  EXPECT_EQ(r.different, 0U) << r.first;
+  EXPECT_EQ(r.counts.lost() + r.counts.extra() + r.missing, 0U);
+}
+
+TEST(Recording, ItIsRepeatedOnANodeWithOtherIds) {
+  FreeRun run;
+  run.begin(0);
+  run.ticks(100, 1'000'000);
+  const Repeated r = repeat(recording_of(run.log, {.base = 0x500, .log_base = 0x300}), 0x500);
+  EXPECT_EQ(r.compared, 100U);
+  EXPECT_EQ(r.different, 0U) << r.first;
+}
+
+TEST(Recording, MoreInputsThanTheCounterHoldsAreNoTrouble) {
+  FreeRun run;
+  run.begin(0);
+  run.ticks(20'000, 1'000'000);
+  ASSERT_GT(run.node.consumed(), 65'536U);
+  const Repeated r = repeat(recording_of(run.log, {}));
+  EXPECT_EQ(r.compared, 20'000U);
+  EXPECT_EQ(r.different, 0U) << r.first;
+}
+
+TEST(Recording, ANodeSwitchedOnWhileFramesFlowIsFoundByItsOwnCrc) {
+  FreeRun run;
+  run.inputs(40);  // nobody there yet
+  while (run.node_end.receive()) continue;
+  run.inputs(7);
+  run.ticks(50, 10'000);
+  const Recording recording = recording_of(run.log, {});
+  EXPECT_FALSE(recording.inputs_differ_at);
+  const Repeated r = repeat(recording);
+  EXPECT_EQ(r.compared, 50U);
+  EXPECT_EQ(r.different, 0U) << r.first;
+}
+
+TEST(Recording, ANodeThatWasRestartedIsRestartedAgain) {
+  FreeRun run;
+  run.begin(0);
+  run.ticks(30, 1'000'000);
+  run.inputs(3);
+  run.node.poll();
+  run.begin(77);
+  run.begin(78);
+  run.ticks(300, 5'000'000);
+  Recording recording = recording_of(run.log, {});
+  std::vector<std::int64_t> begins;
+  Tick tick;
+  while (recording.script.next(tick))
+    if (tick.begin) begins.push_back(tick.begin->us);
+  EXPECT_EQ(begins, (std::vector<std::int64_t>{0, 78}));
+  recording.script.rewind();
+  const Repeated r = repeat(recording);
+  EXPECT_EQ(r.compared, 330U);
+  EXPECT_EQ(r.different, 0U) << r.first;
+}
+
+TEST(Recording, ANodeThatComputesSomethingElseIsNoticedInItsFirstEpoch) {
+  FreeRun run;
+  run.begin(0);
+  run.ticks(20, 1'000'000);
+  const Repeated r = repeat(recording_of(run.log, {}), 0x300, 1);
+  EXPECT_EQ(r.different, 20U);
+  EXPECT_EQ(r.first.find("epoch 1 at 1.000 s: recorded Est_StateCrc "), 0U) << r.first;
+}
+
+TEST(Recording, OneInputBitChangedIsNoticed) {
+  FreeRun run;
+  run.begin(0);
+  run.ticks(200, 1'000'000);
+  for (std::size_t i = run.log.frames.size() / 2;; ++i)
+    if (is_counted_input(run.log.frames[i].frame, 0x300)) {
+      run.log.frames[i].frame.data[5] ^= 1;
+      break;
+    }
+  const Recording recording = recording_of(run.log, {});
+  EXPECT_TRUE(recording.inputs_differ_at);
+  const Repeated r = repeat(recording);
+  EXPECT_GT(r.different, 50U);
+  EXPECT_LT(r.different, 150U) << "before the change all is equal";
+}
+
+TEST(Recording, AFrameOfTheNodeMissingInTheRecordIsCountedAndShown) {
+  FreeRun run;
+  run.begin(0);
+  run.ticks(50, 1'000'000);
+  auto& frames = run.log.frames;
+  std::size_t seen = 0;
+  for (auto f = frames.begin(); f != frames.end(); ++f)
+    if (f->frame.id == 0x328 && ++seen == 20) {
+      frames.erase(f);
+      break;
+    }
+  const Recording recording = recording_of(run.log, {});
+  EXPECT_EQ(recording.missing_outputs, 1U);
+  const Repeated r = repeat(recording);
+  EXPECT_EQ(r.different, 1U);
+  EXPECT_EQ(r.first.find("epoch 20 at 1.190 s: recorded Est0_Motion"), 0U) << r.first;
+}
+
+TEST(Recording, WhatCannotBeRepeatedIsRefusedWithTheReason) {
+  FreeRun run;
+  run.begin(0);
+  run.ticks(50, 1'000'000);
+  const auto without = [&run](std::uint32_t id, std::size_t which) {
+    Log log = run.log;
+    std::size_t seen = 0;
+    std::erase_if(log.frames, [&](const TimedFrame& f) { return f.frame.id == id && ++seen == which; });
+    return log;
+  };
+  EXPECT_NE(refusal(without(0x320, 10)).find("lacks its first frame"), std::string::npos) << refusal(without(0x320, 10));
+  EXPECT_NE(refusal(without(0x321, 10)).find("lacks its last frame"), std::string::npos) << refusal(without(0x321, 10));
+  Log late = run.log;
+  late.frames.erase(late.frames.begin(), late.frames.begin() + 120);
+  EXPECT_NE(refusal(late).find("begins after the node's start"), std::string::npos) << refusal(late);
+  Log inputs_gone = run.log;
+  std::erase_if(inputs_gone.frames, [](const TimedFrame& f) { return is_counted_input(f.frame, 0x300); });
+  EXPECT_NE(refusal(inputs_gone).find("more input frames"), std::string::npos) << refusal(inputs_gone);
+  Log hole = run.log;
+  std::size_t epoch = 0;
+  std::erase_if(hole.frames, [&](const TimedFrame& f) {
+    epoch += f.frame.id == 0x320 ? 1 : 0;
+    return epoch == 20 && f.frame.id >= 0x320;
+  });
+  EXPECT_NE(refusal(hole).find("epochs are missing"), std::string::npos) << refusal(hole);
+}
+
+TEST(Recording, ALogWithoutNodeIsNone) {
+  FreeRun run;
+  run.inputs(10);
+  EXPECT_FALSE(is_recording(run.log.frames, 0x300));
+  run.node.poll();
+  run.ticks(1, 1);
+  EXPECT_TRUE(is_recording(run.log.frames, 0x300));
+  EXPECT_FALSE(is_recording(run.log.frames, 0x340));
+}
+
+TEST(Realtime, FramesKeepTheirOrderAndNoneIsLost) {
+  hal::MemoryBus bus;
+  hal::MemoryCan end = bus.node_end();
+  StandInNode node(end, 0x300);
+  MemoryLink link(bus, [&node] { node.poll(); });
+  std::vector<TimedFrame> frames;
+  for (int i = 0; i < 200; ++i) frames.push_back({{5'000'000 + i * 1'000}, {.id = 0x308, .size = 8, .data = {static_cast<std::uint8_t>(i)}}});
+  KeepAll sink;
+  Counts counts;
+  play_realtime(link, frames, sink, {.base = 0x300}, counts);
+  EXPECT_EQ(counts.inputs, 200U);
+  EXPECT_EQ(node.consumed(), 200U);
+  EXPECT_EQ(counts.lost() + counts.extra(), 0U);
+  EXPECT_GE(counts.epochs, 20U);
+  for (std::size_t i = 1; i < sink.times.size(); ++i) EXPECT_EQ(sink.times[i].us - sink.times[i - 1].us, 10'000);
+}
+
+TEST(Realtime, LostFramesAreCountedInBothDirections) {
+  hal::MemoryBus bus;
+  hal::MemoryCan end = bus.node_end();
+  std::uint64_t lost_in = 0, lost_out = 0;
+  StandInNode node(end, 0x300, {.into = [&, n = 0U](std::uint64_t, const base::CanFrame& f) mutable {
+                                  return f.id != 0x300 && ++n % 10 == 0 ? (++lost_in, 0) : 1;
+                                },
+                                .out_of = [&, n = 0U](std::uint64_t, const base::CanFrame& f) mutable {
+                                  return f.id == 0x328 && ++n % 5 == 0 ? (++lost_out, 0) : 1;
+                                }});
+  MemoryLink link(bus, [&node] { node.poll(); });
+  std::vector<TimedFrame> frames;
+  for (int i = 0; i < 200; ++i) frames.push_back({{i * 1'000}, {.id = 0x308, .size = 8}});
+  KeepAll sink;
+  Counts counts;
+  play_realtime(link, frames, sink, {.base = 0x300}, counts);
+  EXPECT_EQ(counts.lost_inputs, lost_in);
+  EXPECT_EQ(counts.lost_outputs, lost_out);
+  EXPECT_GT(lost_in, 10U);
+  EXPECT_GT(lost_out, 2U);
+}
+
+}  // namespace
+}  // namespace tetap::sim
