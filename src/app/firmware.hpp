@@ -2,6 +2,7 @@
 // The product: one object, one poll(). A port's main() is this object and a loop.
 #pragma once
 
+#include "app/exercise.hpp"
 #include "app/node.hpp"
 #include "app/pacer.hpp"
 #include "hal/board.hpp"
@@ -15,6 +16,13 @@ class Firmware {
  public:
   Firmware(Board& board, const Numbers& numbers, const Version& version)
       : board_(board), numbers_(numbers), node_(numbers, version), pacer_(base::Micros{numbers.loop.period_us}) {}
+
+  /// Runs the exercise on this very node, then powers it on anew. For boot: the hash says whether this core computes as all others do.
+  [[nodiscard]] std::uint32_t self_check(std::uint32_t epochs) {
+    const std::uint32_t hash = Exercise(node_, numbers_.can_base, 1).run(epochs);
+    node_.power_on({});
+    return hash;
+  }
 
   /// Takes what has arrived, ticks when it is time, hands on what is to be sent. Call it in a loop, as often as you like.
   void poll() {

@@ -42,6 +42,13 @@ class Inbox {
   template <class Out>
   void on_frame(std::uint8_t offset, const base::CanFrame& frame, base::Micros reference, Counters& counters, Out&& out);
 
+  void power_on() {
+    for (Partial& partial : partials_) partial.missing = 0;
+    set_pos_.reset();
+    set_yaw_.reset();
+    last_counter_.fill(0xFF);
+  }
+
   /// At each tick: half samples older than `patience` are given up and counted.
   void expire(base::Micros now, base::Micros patience, Counters& counters) {
     for (Partial& partial : partials_)
@@ -106,10 +113,13 @@ inline Inbox::Partial& Inbox::slot(can::Sensor sensor, std::uint8_t instance, st
     if (better) chosen = &partial;
   }
   if (chosen->missing != 0) ++counters.incomplete;
-  *chosen = Partial{.missing = frames, .since = reference};
+  chosen->missing = frames;
+  chosen->since = reference;
+  chosen->sample.stamp = {};
   chosen->sample.sensor = sensor;
   chosen->sample.instance = instance;
   chosen->sample.sequence = sequence;
+  chosen->sample.bits = 0;
   return *chosen;
 }
 

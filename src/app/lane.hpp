@@ -83,7 +83,9 @@ class Lane {
     return statistics_[static_cast<std::size_t>(sensor) * kInstances + instance];
   }
   [[nodiscard]] const SensorStatistics& statistics(std::size_t index) const { return statistics_[index]; }
-  void clear_statistics() { statistics_ = {}; }
+  void clear_statistics() {
+    for (SensorStatistics& s : statistics_) s = {};
+  }
 
   template <class Sink>
   void each_bit(Sink&& sink) const { now_.each_bit(sink); }

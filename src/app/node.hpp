@@ -98,17 +98,20 @@ class Node {
 
 template <class Estimators, std::size_t Capacity>
 void Node<Estimators, Capacity>::power_on(base::Micros t) {
-  site_ = {};
+  // Cleared in place: a fresh object assigned over the old one would pass over the stack.
+  site_.map.clear();
+  site_.frame = {};
+  site_.origin = can::OriginSource::kNone;
   const GnssNumbers& g = numbers_.gnss;
   if (g.origin_configured != 0) {
     site_.frame = nav::LocalFrame(g.origin_latitude_2ndeg, g.origin_longitude_2ndeg, g.origin_height_m);
     site_.origin = can::OriginSource::kConfigured;
   }
-  timeline_ = {};
-  inbox_ = {};
+  timeline_.power_on();
+  inbox_.power_on();
   counters_ = {};
   publisher_.power_on();
-  pending_map_ = {};
+  pending_map_.size = 0;
   pending_reset_ = {};
   pending_pose_.reset();
   now_ = closed_until_ = restarted_at_ = t;

@@ -75,7 +75,7 @@ class Publisher {
   void power_on() {
     epoch_ = 0;
     frames_ = status_counter_ = page_ = identity_ = statistic_ = 0;
-    events_ = {};
+    events_.size = 0;
     last_second_ = {};
     troubled_until_ = 0;
     troubles_ = 0;

@@ -48,6 +48,7 @@ class Timeline {
     size_ -= count;
   }
   constexpr void clear() { size_ = 0; }
+  constexpr void power_on() { size_ = 0, high_water_ = 0; }
 
   [[nodiscard]] constexpr Entry& operator[](std::size_t i) { return entries_[i]; }
   [[nodiscard]] constexpr const Entry& operator[](std::size_t i) const { return entries_[i]; }

@@ -10,7 +10,6 @@
 int main() {
   using Board = tetap::hal::mps2::Board;
   static Board board;
-  tetap::hal::print_boot_line(board, tetap::robot::kName);
   static tetap::hal::mps2::semihosting::CommandLine<512> arguments;
   const auto words = arguments.template words<3>();
   if (!board.can.open(words[1], words[2])) {
@@ -18,6 +17,7 @@ int main() {
     return 1;
   }
   static tetap::app::Firmware<Board, tetap::robot::chosen::Estimators> firmware{board, tetap::robot::chosen::numbers, tetap::kVersion};
+  tetap::hal::print_boot_line(board, tetap::robot::kName, firmware);
   while (!board.can.at_end()) firmware.poll();
   tetap::hal::print_stack_line(board);
   return board.can.close() ? 0 : 1;

@@ -9,6 +9,14 @@
 
 namespace tetap::hal {
 
+/// Epochs of the self-check at boot: 5 s of a robot's life, some tens of milliseconds of a core's.
+inline constexpr std::uint32_t kBootEpochs = 500;
+
+template <class Board, class Firmware>
+void print_boot_line(const Board& board, const char* robot, Firmware& firmware) {
+  board.print(Text<>{}.add("tetap: robot ").add(robot).add(", bits ").hex(firmware.self_check(kBootEpochs)).add('\n').c_str());
+}
+
 template <class Board>
 void print_stack_line(const Board& board) {
   const auto stack = Board::stack();
