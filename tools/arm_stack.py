@@ -16,7 +16,7 @@ LITERAL = re.compile(r"[@;] ?\(?(?:0x)?([0-9a-f]+)\b")
 
 
 class Instruction:
-    __slots__ = ("address", "root", "condition", "operands", "next", "literal", "target")
+    __slots__ = ("address", "root", "condition", "operands", "next", "literal", "adr", "target")
 
     def __init__(self, address, mnemonic, text):
         mnemonic = mnemonic.removesuffix(".n").removesuffix(".w")
@@ -28,6 +28,8 @@ class Instruction:
         if "[pc" in self.operands and comment and self.root in ("ldr", "ldrd"):
             found = LITERAL.search(comment.group())
             self.literal = int(found.group(1), 16) if found else None
+        adr = re.search(r"\(adr \w+, ([0-9a-f]+)", comment.group()) if comment else None
+        self.adr = int(adr.group(1), 16) if adr else None
         place = re.match(r"(?:\w+, )?([0-9a-f]+) <", self.operands) if self.root in ("b", "bl", "blx", "cbz", "cbnz") else None
         self.target = int(place.group(1), 16) if place else None
 
@@ -252,7 +254,7 @@ class Walker:
                 return [((image.word(i.literal) or 0) & ~1, state, None)] + otherwise
             if "sp" in rest:
                 flow.returns = True
-            elif "pc" in rest:
+            elif "pc" in rest or self.table_inside(i, rest, state):
                 tables[code.owner(i.address)] = state
             else:
                 flow.calls[i.address] = Call(i.address, state.depth, state.base, None, str(i))
@@ -308,6 +310,13 @@ class Walker:
         self.track(i, root, parts, state)
         return following(state)
 
+    def table_inside(self, i, operand, state):
+        """Whether 'ldr pc, [rT, rI, lsl #2]' reads a table that lies within the function itself."""
+        base = re.match(r"\[(\w+),", operand)
+        address = state.constants.get(base.group(1)) if base else None
+        start = self.code.owner(i.address)
+        return address is not None and start <= address < self.code.end(start)
+
     def stack_pointer(self, i, root, parts, state):
         where = f"{self.code.name(i.address)} at {i}"
         amount = immediate(parts[-1])
@@ -357,6 +366,8 @@ class Walker:
             constant = (state.constants[destination] & 0xFFFF) | amount << 16
         elif root == "ldr" and i.literal is not None:
             constant = self.code.image.word(i.literal)
+        elif i.adr is not None:
+            constant = i.adr
         elif root in ("add", "adds", "sub", "subs") and amount is not None:
             source = parts[1] if len(parts) == 3 else destination
             change = amount if root.startswith("sub") else -amount

@@ -171,6 +171,18 @@ def archive_reasons(map_path):
     return {m: (by, symbol) for m, by, symbol in re.findall(r"^(\S+\))\s+(\S+) \((\S+)\)$", head, re.M)}
 
 
+def shorten(readable, most=110):
+    """A readable symbol that fits a line: template arguments and parameters that are too long become '...'."""
+    while len(readable) > most:
+        shorter = re.sub(r"<[^<>]{4,}>", "<...>", readable, count=1)
+        shorter = re.sub(r"\([^()]{4,}\)", "(...)", shorter, count=1) if shorter == readable else shorter
+        shorter = re.sub(r"<\.\.\.>(?=.*<\.\.\.>)", "<>", shorter, count=1) if shorter == readable else shorter
+        if shorter == readable:
+            return readable[:most - 3] + "..."
+        readable = shorter
+    return readable
+
+
 def table(headings, rows, align=None):
     """Rows as aligned text; columns whose cells are numbers go to the right."""
     cells = [[f"{c:,}".replace(",", " ") if isinstance(c, int) and not isinstance(c, bool) else str(c) for c in row] for row in rows]
