@@ -14,7 +14,9 @@ static_assert(CanBus<Controller>);
 constexpr CanConfig kConfig{.timing = can_bit_timing(100'000'000, 500'000)};
 
 base::CanFrame numbered(std::uint32_t number) {
-  return {.id = number & 0x7FFU, .size = 4, .data = {static_cast<std::uint8_t>(number), static_cast<std::uint8_t>(number >> 8), 0xA5, 0x5A}};
+  return {.id = number & 0x7FFU,
+          .size = 4,
+          .data = {static_cast<std::uint8_t>(number), static_cast<std::uint8_t>(number >> 8), 0xA5, 0x5A}};
 }
 
 class CanControllerTest : public testing::TestWithParam<Machine> {
@@ -143,7 +145,8 @@ TEST_P(CanControllerTest, FiltersLetThroughWhatTheyNameAndSurviveARestart) {
   config.filter_count = 2;
   can.start(GetParam(), config);
   for (int pass = 0; pass < 2; ++pass) {
-    for (const base::CanFrame& frame : {base::CanFrame{.id = 0x13F, .size = 1}, base::CanFrame{.id = 0x140, .size = 1}, base::CanFrame{.id = 0x100, .extended = true, .size = 1},
+    for (const base::CanFrame& frame : {base::CanFrame{.id = 0x13F, .size = 1}, base::CanFrame{.id = 0x140, .size = 1},
+                                        base::CanFrame{.id = 0x100, .extended = true, .size = 1},
                                         base::CanFrame{.id = 0x1234'5678, .extended = true, .size = 1}}) {
       chip.arrive(to_words(GetParam(), frame));
     }

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// The other end of the echo test: can_echo_peer IFACE ROUNDS BURST. Each round sends BURST frames, standard and extended in turn, sizes 1
-// to 8, pseudo-random data, and waits for every one to come back under identifier + 1 with the same bytes in the same order.
-// Prints the rounds per second; exit status 1 when a frame is lost, changed or out of order.
+// The other end of the echo test: can_echo_peer IFACE ROUNDS BURST. Each round sends BURST frames, standard and
+// extended in turn, sizes 1 to 8, pseudo-random data, and waits for every one to come back under identifier + 1 with
+// the same bytes in the same order. Prints the rounds per second; exit status 1 when a frame is lost, changed or out of
+// order.
 #include <linux/can.h>
 #include <linux/can/raw.h>
 #include <net/if.h>
@@ -47,7 +48,8 @@ int main(int argc, char** argv) {
   sockaddr_can address{};
   address.can_family = AF_CAN;
   address.can_ifindex = static_cast<int>(if_nametoindex(argv[1]));
-  if (socket < 0 || address.can_ifindex == 0 || bind(socket, reinterpret_cast<sockaddr*>(&address), sizeof address) != 0) {
+  if (socket < 0 || address.can_ifindex == 0 ||
+      bind(socket, reinterpret_cast<sockaddr*>(&address), sizeof address) != 0) {
     return std::fprintf(stderr, "can_echo_peer: %s: %s\n", argv[1], std::strerror(errno)), 2;
   }
 
@@ -65,19 +67,24 @@ int main(int argc, char** argv) {
   std::uint32_t number = 0;
   for (std::uint32_t round = 0; round < rounds; ++round) {
     for (std::uint32_t i = 0; i < burst; ++i) {
-      if (!send(socket, make(number + i))) return std::fprintf(stderr, "can_echo_peer: send: %s\n", std::strerror(errno)), 1;
+      if (!send(socket, make(number + i)))
+        return std::fprintf(stderr, "can_echo_peer: send: %s\n", std::strerror(errno)), 1;
     }
     for (std::uint32_t i = 0; i < burst; ++i, ++number) {
       can_frame want = make(number);
       ++want.can_id;
-      if (!receive(socket, got, 2000)) return std::fprintf(stderr, "can_echo_peer: frame %u of %u: no echo\n", number, rounds * burst), 1;
+      if (!receive(socket, got, 2000))
+        return std::fprintf(stderr, "can_echo_peer: frame %u of %u: no echo\n", number, rounds * burst), 1;
       if (got.can_id != want.can_id || got.len != want.len || std::memcmp(got.data, want.data, want.len) != 0) {
-        return std::fprintf(stderr, "can_echo_peer: frame %u: sent %08X, came back as %08X or with other data\n", number, want.can_id - 1, got.can_id), 1;
+        return std::fprintf(stderr, "can_echo_peer: frame %u: sent %08X, came back as %08X or with other data\n",
+                            number, want.can_id - 1, got.can_id),
+               1;
       }
     }
   }
   const double elapsed_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  std::printf("can_echo_peer: %u frames echoed, none lost; %.0f rounds/s with %u frames each way\n", number, rounds / elapsed_s, burst);
+  std::printf("can_echo_peer: %u frames echoed, none lost; %.0f rounds/s with %u frames each way\n", number,
+              rounds / elapsed_s, burst);
   close(socket);
   return 0;
 }

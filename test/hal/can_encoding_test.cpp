@@ -41,11 +41,14 @@ TEST(CanEncoding, RandomFramesOfEveryKindAndSizeComeBack) {
 }
 
 TEST(CanEncoding, SiliconPutsTheFieldsWhereTheDataSheetHasThem) {
-  // UG1085 table 20-3: IDH 31:21, SRRRTR 20, IDE 19, IDL 18:1, RTR 0; DLC 31:28; DB0 31:24 .. DB3 7:0, DB4 31:24 .. DB7 7:0.
+  // UG1085 table 20-3: IDH 31:21, SRRRTR 20, IDE 19, IDL 18:1, RTR 0; DLC 31:28; DB0 31:24 .. DB3 7:0, DB4 31:24 .. DB7
+  // 7:0.
   const base::CanFrame standard{.id = 0x123, .size = 5, .data = {0x11, 0x22, 0x33, 0x44, 0x55}};
-  EXPECT_EQ(to_words(Machine::kSilicon, standard), (CanWords{.id = 0x2460'0000, .dlc = 0x5000'0000, .data1 = 0x1122'3344, .data2 = 0x5500'0000}));
+  EXPECT_EQ(to_words(Machine::kSilicon, standard),
+            (CanWords{.id = 0x2460'0000, .dlc = 0x5000'0000, .data1 = 0x1122'3344, .data2 = 0x5500'0000}));
   const base::CanFrame all_ones{.id = 0x1FFF'FFFF, .extended = true, .size = 8, .data = {1, 2, 3, 4, 5, 6, 7, 8}};
-  EXPECT_EQ(to_words(Machine::kSilicon, all_ones), (CanWords{.id = 0xFFFF'FFFE, .dlc = 0x8000'0000, .data1 = 0x0102'0304, .data2 = 0x0506'0708}));
+  EXPECT_EQ(to_words(Machine::kSilicon, all_ones),
+            (CanWords{.id = 0xFFFF'FFFE, .dlc = 0x8000'0000, .data1 = 0x0102'0304, .data2 = 0x0506'0708}));
   // The eleven bits sent first are the upper ones of the 29: 0x48D, then SRR and IDE, then the lower eighteen: 0x05678.
   const base::CanFrame extended{.id = 0x1234'5678, .extended = true};
   EXPECT_EQ(to_words(Machine::kSilicon, extended).id, 0x48DU << 21 | 1U << 20 | 1U << 19 | 0x5678U << 1);
@@ -63,7 +66,10 @@ TEST(CanEncoding, TheEmulatorsWordsAreLinuxsFrameInMemory) {
     std::memcpy(linux_frame.data, frame.data.data(), frame.size);
     std::uint32_t data[2];
     std::memcpy(data, linux_frame.data, sizeof data);
-    EXPECT_EQ(words, (CanWords{.id = linux_frame.can_id, .dlc = std::uint32_t{frame.size} << 28, .data1 = data[0], .data2 = data[1]}));
+    EXPECT_EQ(
+        words,
+        (CanWords{
+            .id = linux_frame.can_id, .dlc = std::uint32_t{frame.size} << 28, .data1 = data[0], .data2 = data[1]}));
   }
 }
 
@@ -106,8 +112,11 @@ TEST(CanEncoding, AFilterPassesExactlyTheDataFramesItNames) {
       const bool extended = (random() & 1U) != 0;
       const std::uint32_t all = extended ? 0x1FFF'FFFFU : 0x7FFU;
       // Sparse masks, so that about half of the frames pass.
-      const AcceptanceFilter filter{.id = static_cast<std::uint32_t>(random()) & all, .mask = 1U << random() % 11, .extended = extended};
-      const CanIdentifier from{.id = static_cast<std::uint32_t>(random()) & all, .extended = random() % 4 != 0 ? extended : !extended, .remote = random() % 4 == 0};
+      const AcceptanceFilter filter{
+          .id = static_cast<std::uint32_t>(random()) & all, .mask = 1U << random() % 11, .extended = extended};
+      const CanIdentifier from{.id = static_cast<std::uint32_t>(random()) & all,
+                               .extended = random() % 4 != 0 ? extended : !extended,
+                               .remote = random() % 4 == 0};
       const std::uint32_t id = from.id & (from.extended ? 0x1FFF'FFFFU : 0x7FFU);
       const bool wanted = from.extended == extended && !from.remote && ((id ^ filter.id) & filter.mask) == 0;
       const AcceptanceWords words = to_words(machine, filter);

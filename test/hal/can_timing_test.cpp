@@ -11,10 +11,14 @@ struct Case {
   std::uint32_t bit_rate;
   CanBitTiming timing;
 };
-constexpr Case kCases[] = {{100'000'000, 1'000'000, can_bit_timing(100'000'000, 1'000'000)}, {100'000'000, 500'000, can_bit_timing(100'000'000, 500'000)},
-                           {100'000'000, 250'000, can_bit_timing(100'000'000, 250'000)},     {100'000'000, 125'000, can_bit_timing(100'000'000, 125'000)},
-                           {24'000'000, 500'000, can_bit_timing(24'000'000, 500'000)},       {80'000'000, 1'000'000, can_bit_timing(80'000'000, 1'000'000)},
-                           {8'000'000, 1'000'000, can_bit_timing(8'000'000, 1'000'000)},     {40'000'000, 10'000, can_bit_timing(40'000'000, 10'000)}};
+constexpr Case kCases[] = {{100'000'000, 1'000'000, can_bit_timing(100'000'000, 1'000'000)},
+                           {100'000'000, 500'000, can_bit_timing(100'000'000, 500'000)},
+                           {100'000'000, 250'000, can_bit_timing(100'000'000, 250'000)},
+                           {100'000'000, 125'000, can_bit_timing(100'000'000, 125'000)},
+                           {24'000'000, 500'000, can_bit_timing(24'000'000, 500'000)},
+                           {80'000'000, 1'000'000, can_bit_timing(80'000'000, 1'000'000)},
+                           {8'000'000, 1'000'000, can_bit_timing(8'000'000, 1'000'000)},
+                           {40'000'000, 10'000, can_bit_timing(40'000'000, 10'000)}};
 
 TEST(CanTiming, GivesTheBitRateExactlyWithinTheWidthsOfTheFields) {
   for (const auto& [reference_hz, bit_rate, timing] : kCases) {

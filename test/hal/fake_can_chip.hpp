@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A model of the ZynqMP CAN controller as UG1085 and UG1087 describe it, and of QEMU's where that differs: register by register, with
-// faults that have names. What leaves the transmit FIFO for the bus is kept in `wire`; `arrive` puts words into the receive FIFO.
+// A model of the ZynqMP CAN controller as UG1085 and UG1087 describe it, and of QEMU's where that differs: register by
+// register, with faults that have names. What leaves the transmit FIFO for the bus is kept in `wire`; `arrive` puts
+// words into the receive FIFO.
 #pragma once
 
 #include "hal/port/zynqmp_r5/can_encoding.hpp"
@@ -12,7 +13,11 @@
 
 namespace tetap::hal::zynqmp_r5 {
 
-enum class Fault { kNone, kBusStuck /* nothing leaves the transmit FIFO */, kNoModeChange /* the status register never follows */ };
+enum class Fault {
+  kNone,
+  kBusStuck /* nothing leaves the transmit FIFO */,
+  kNoModeChange /* the status register never follows */
+};
 
 class FakeCanChip {
  public:
@@ -45,18 +50,25 @@ class FakeCanChip {
   std::uint32_t read(std::uint32_t offset) {
     ++accesses;
     switch (offset) {
-      case kSr: return (on_the_bus() || fault == Fault::kNoModeChange ? 0U : 1U) | (tx_.size() == kDepth ? 1U << 10 : 0U) | (fault == Fault::kNoModeChange ? 1U << 11 : 0U);
-      case kIsr: return interrupts_;
-      case 0x50: return rx_.empty() ? 0 : rx_.front().id;
-      case 0x54: return rx_.empty() ? 0 : rx_.front().dlc;
-      case 0x58: return rx_.empty() ? 0 : rx_.front().data1;
+      case kSr:
+        return (on_the_bus() || fault == Fault::kNoModeChange ? 0U : 1U) | (tx_.size() == kDepth ? 1U << 10 : 0U) |
+               (fault == Fault::kNoModeChange ? 1U << 11 : 0U);
+      case kIsr:
+        return interrupts_;
+      case 0x50:
+        return rx_.empty() ? 0 : rx_.front().id;
+      case 0x54:
+        return rx_.empty() ? 0 : rx_.front().dlc;
+      case 0x58:
+        return rx_.empty() ? 0 : rx_.front().data1;
       case 0x5C: {
         if (rx_.empty()) return 0;
         const std::uint32_t word = rx_.front().data2;
         rx_.pop_front();
         return word;
       }
-      default: return registers_[offset];
+      default:
+        return registers_[offset];
     }
   }
 
@@ -81,14 +93,22 @@ class FakeCanChip {
         interrupts_ &= ~value;
         if (!rx_.empty()) interrupts_ |= kRxNotEmpty;
         return;
-      case 0x30: pending_.id = value; return;
-      case 0x34: pending_.dlc = value; return;
-      case 0x38: pending_.data1 = value; return;
+      case 0x30:
+        pending_.id = value;
+        return;
+      case 0x34:
+        pending_.dlc = value;
+        return;
+      case 0x38:
+        pending_.data1 = value;
+        return;
       case 0x3C:
         pending_.data2 = value;
         if (tx_.size() < kDepth) tx_.push_back(pending_);
         return;
-      default: registers_[offset] = value; return;
+      default:
+        registers_[offset] = value;
+        return;
     }
   }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The smallest image that uses all of a board: says it is up, answers every CAN frame with the same data under identifier + 1, and on
-// a frame with identifier 7F0 reports the clock, the stack and the counters. Run by r5_echo_test.sh and mps2_smoke_test.sh.
+// The smallest image that uses all of a board: says it is up, answers every CAN frame with the same data under
+// identifier + 1, and on a frame with identifier 7F0 reports the clock, the stack and the counters. Run by
+// r5_echo_test.sh and mps2_smoke_test.sh.
 #if defined(TETAP_BOARD_ZYNQMP_R5)
 #include "hal/port/zynqmp_r5/board.hpp"
 using tetap::hal::zynqmp_r5::Board;
@@ -29,7 +30,12 @@ void report(Board& board, std::uint32_t echoed) {
   const auto now_us = static_cast<std::uint64_t>(board.now().us);
   tetap::hal::Text<> line;
   line.add("smoke: ms ").dec(static_cast<std::uint32_t>(now_us / 1000)).add(" echoed ").dec(echoed);
-  line.add(" rx_overflow ").dec(faults.rx_overflow).add(" tx_full ").dec(faults.tx_full).add(" bus_off ").dec(faults.bus_off);
+  line.add(" rx_overflow ")
+      .dec(faults.rx_overflow)
+      .add(" tx_full ")
+      .dec(faults.tx_full)
+      .add(" bus_off ")
+      .dec(faults.bus_off);
   line.add(" unsupported ").dec(unsupported(board.can));
   line.add(" stack ").dec(stack.used).add(" of ").dec(stack.reserved).add('\n');
   board.print(line.c_str());

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// ARM's MPS2 board as QEMU runs it: mps2-an500 is a Cortex-M7, mps2-an386 a Cortex-M4F. For tests and counts, not for a robot.
-// Registers: ARM DUI 0959 (CMSDK, "Cortex-M System Design Kit"), chapter 4: APB timer and UART; 25 MHz on both boards.
+// ARM's MPS2 board as QEMU runs it: mps2-an500 is a Cortex-M7, mps2-an386 a Cortex-M4F. For tests and counts, not for a
+// robot. Registers: ARM DUI 0959 (CMSDK, "Cortex-M System Design Kit"), chapter 4: APB timer and UART; 25 MHz on both
+// boards.
 #pragma once
 
 #include "hal/board.hpp"

@@ -12,7 +12,12 @@ namespace tetap::hal::mps2 {
 
 /// The frame in one line of a candump log; empty for anything else (remote, CAN FD and error frames too).
 [[nodiscard]] constexpr std::optional<base::CanFrame> parse_candump(const char* line, std::size_t size) {
-  const auto nibble = [](char c) { return c >= '0' && c <= '9' ? c - '0' : c >= 'A' && c <= 'F' ? c - 'A' + 10 : c >= 'a' && c <= 'f' ? c - 'a' + 10 : -1; };
+  const auto nibble = [](char c) {
+    return c >= '0' && c <= '9'   ? c - '0'
+           : c >= 'A' && c <= 'F' ? c - 'A' + 10
+           : c >= 'a' && c <= 'f' ? c - 'a' + 10
+                                  : -1;
+  };
   std::size_t at = size;  // the frame is the third word
   for (std::size_t i = 0, words = 0; i + 1 < size; ++i) {
     if (line[i] == ' ' && line[i + 1] != ' ' && ++words == 2) {
@@ -22,7 +27,8 @@ namespace tetap::hal::mps2 {
   }
   base::CanFrame frame;
   std::size_t digits = 0;
-  for (; at < size && nibble(line[at]) >= 0 && digits < 9; ++at, ++digits) frame.id = frame.id << 4 | static_cast<std::uint32_t>(nibble(line[at]));
+  for (; at < size && nibble(line[at]) >= 0 && digits < 9; ++at, ++digits)
+    frame.id = frame.id << 4 | static_cast<std::uint32_t>(nibble(line[at]));
   if (at >= size || line[at] != '#' || (digits != 3 && digits != 8)) return std::nullopt;
   frame.extended = digits == 8;
   if (frame.id > (frame.extended ? 0x1FFF'FFFFU : 0x7FFU)) return std::nullopt;

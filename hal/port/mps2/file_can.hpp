@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A CAN bus made of two files in candump's log form, "(seconds) interface 123#DEADBEEF": what the node receives comes from one, what it
-// sends goes to the other. For runs of the whole firmware on an emulated core that has no CAN controller. A line that is not a data
-// frame is counted as a lost frame (rx_overflow) and passed over.
+// A CAN bus made of two files in candump's log form, "(seconds) interface 123#DEADBEEF": what the node receives comes
+// from one, what it sends goes to the other. For runs of the whole firmware on an emulated core that has no CAN
+// controller. A line that is not a data frame is counted as a lost frame (rx_overflow) and passed over.
 #pragma once
 
 #include "base/can_frame.hpp"
@@ -35,7 +35,9 @@ class FileCan {
 
   [[nodiscard]] bool at_end() const { return end_; }
   [[nodiscard]] std::uint32_t sent() const { return sent_; }
-  [[nodiscard]] std::uint32_t hash() const { return hash_; }  ///< FNV-1a over identifier, size and data of every frame sent
+  [[nodiscard]] std::uint32_t hash() const {
+    return hash_;
+  }  ///< FNV-1a over identifier, size and data of every frame sent
 
   [[nodiscard]] std::optional<base::CanFrame> receive() {
     while (!end_) {
@@ -94,7 +96,8 @@ class FileCan {
     while (digits-- > 0) put("0123456789ABCDEF"[(value >> (4 * digits)) & 15U]);
   }
   void drain() {
-    if (out_size_ > 0 && out_ != semihosting::kNoFile) good_ = semihosting::write(out_, out_buffer_.data(), out_size_) && good_;
+    if (out_size_ > 0 && out_ != semihosting::kNoFile)
+      good_ = semihosting::write(out_, out_buffer_.data(), out_size_) && good_;
     out_size_ = 0;
   }
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Exit status, arguments and files of the computer that runs the emulator. "Semihosting for AArch32 and AArch64" (ARM IHI 0092), chapter 6.
+// Exit status, arguments and files of the computer that runs the emulator. "Semihosting for AArch32 and AArch64" (ARM
+// IHI 0092), chapter 6.
 #pragma once
 
 #include <array>

@@ -11,7 +11,8 @@ extern "C" {
 [[noreturn]] void tetap_start();
 [[noreturn]] void tetap_fault(const std::uint32_t* frame, std::uint32_t exception);
 
-// The exception number picks the name, so every entry but the first two is the same. The stacked frame holds the program counter at [6].
+// The exception number picks the name, so every entry but the first two is the same. The stacked frame holds the
+// program counter at [6].
 [[gnu::naked, gnu::used]] void tetap_vector() {
   asm volatile(
       "mov r0, sp\n"
@@ -30,7 +31,8 @@ extern "C" {
       "str r1, [r0]\n"
       "dsb\n"
       "isb\n"
-      "mov r0, #0\n"  // FPSCR: round to nearest, subnormals kept (FZ = 0), NaN payloads kept (DN = 0), as everywhere else
+      "mov r0, #0\n"  // FPSCR: round to nearest, subnormals kept (FZ = 0), NaN payloads kept (DN = 0), as everywhere
+                      // else
       "vmsr fpscr, r0\n"
       "ldr r0, =__stack_bottom\n"
       "ldr r1, =__stack_top\n"
@@ -50,8 +52,8 @@ struct Vectors {
 [[gnu::used, gnu::section(".vectors")]] constinit const Vectors tetap_vectors{
     .stack_top = __stack_top,
     .reset = tetap_reset,
-    .others = {tetap_vector, tetap_vector, tetap_vector, tetap_vector, tetap_vector, tetap_vector, tetap_vector, tetap_vector, tetap_vector,
-               tetap_vector, tetap_vector, tetap_vector, tetap_vector, tetap_vector}};
+    .others = {tetap_vector, tetap_vector, tetap_vector, tetap_vector, tetap_vector, tetap_vector, tetap_vector,
+               tetap_vector, tetap_vector, tetap_vector, tetap_vector, tetap_vector, tetap_vector, tetap_vector}};
 
 void tetap_start() {
   tetap::hal::load_sections();

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// What every flashed image does before main() and can say about itself after: sections copied and zeroed, the stack painted and measured.
-// The symbols come from the port's link.ld; the paint is put there by the port's reset code, which has no stack yet.
+// What every flashed image does before main() and can say about itself after: sections copied and zeroed, the stack
+// painted and measured. The symbols come from the port's link.ld; the paint is put there by the port's reset code,
+// which has no stack yet.
 #pragma once
 
 #include <cstdint>
@@ -20,8 +21,10 @@ inline constexpr std::uint32_t kStackPaint = 0xA5A5A5A5;
 
 /// .data from where it was flashed, .bss to zero. There is nothing else to run: link.ld refuses static constructors.
 inline void load_sections() {
-  std::memcpy(__data_start, __data_load, reinterpret_cast<std::uintptr_t>(__data_end) - reinterpret_cast<std::uintptr_t>(__data_start));
-  std::memset(__bss_start, 0, reinterpret_cast<std::uintptr_t>(__bss_end) - reinterpret_cast<std::uintptr_t>(__bss_start));
+  std::memcpy(__data_start, __data_load,
+              reinterpret_cast<std::uintptr_t>(__data_end) - reinterpret_cast<std::uintptr_t>(__data_start));
+  std::memset(__bss_start, 0,
+              reinterpret_cast<std::uintptr_t>(__bss_end) - reinterpret_cast<std::uintptr_t>(__bss_start));
 }
 
 struct StackUse {
@@ -30,7 +33,8 @@ struct StackUse {
 };
 
 [[nodiscard]] inline StackUse stack_use() {
-  const auto reserved = reinterpret_cast<std::uintptr_t>(__stack_top) - reinterpret_cast<std::uintptr_t>(__stack_bottom);
+  const auto reserved =
+      reinterpret_cast<std::uintptr_t>(__stack_top) - reinterpret_cast<std::uintptr_t>(__stack_bottom);
   const volatile std::uint32_t* word = __stack_bottom;
   std::uintptr_t clean = 0;
   while (clean < reserved && *word == kStackPaint) {

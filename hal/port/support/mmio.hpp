@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A block of memory-mapped 32-bit registers. Drivers take it as a template parameter, so host tests hand them a model of the chip.
+// A block of memory-mapped 32-bit registers. Drivers take it as a template parameter, so host tests hand them a model
+// of the chip.
 #pragma once
 
 #include <cstdint>

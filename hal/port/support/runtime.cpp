@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// libgcc's division helpers refer to the unwinder, which would bring abort() and malloc() into the image. Nothing here unwinds.
+// libgcc's division helpers refer to the unwinder, which would bring abort() and malloc() into the image. Nothing here
+// unwinds.
 
 extern "C" {
 void __aeabi_unwind_cpp_pr0();

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The Cortex-R5F of a Zynq UltraScale+ (ZCU102, Kria) with its first CAN controller, timer and serial port. Addresses: UG1085 table
-// "PS I/O Peripherals Registers". Clocks and pins are set up by the first-stage boot loader; the reference clocks are those of its defaults.
+// The Cortex-R5F of a Zynq UltraScale+ (ZCU102, Kria) with its first CAN controller, timer and serial port. Addresses:
+// UG1085 table "PS I/O Peripherals Registers". Clocks and pins are set up by the first-stage boot loader; the reference
+// clocks are those of its defaults.
 #pragma once
 
 #include "hal/board.hpp"

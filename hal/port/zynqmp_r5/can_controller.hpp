@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Driver of the ZynqMP CAN controller, polled: FIFOs of 64 frames each way, a software ring in front of the transmit FIFO.
-// UG1085 chapter "CAN Controller", UG1087 module "CAN". Registers and Clock are template parameters so that a model stands in on the host.
+// Driver of the ZynqMP CAN controller, polled: FIFOs of 64 frames each way, a software ring in front of the transmit
+// FIFO. UG1085 chapter "CAN Controller", UG1087 module "CAN". Registers and Clock are template parameters so that a
+// model stands in on the host.
 #pragma once
 
 #include "base/time.hpp"
@@ -26,8 +27,8 @@ class CanController {
  public:
   static constexpr std::size_t kTransmitCapacity = 128;  ///< frames in the ring, on top of the 64 in the controller
   static constexpr int kFifoDepth = 64;
-  /// How long the node stays away after bus-off. ISO 11898-1 asks for 128 times 11 recessive bits (2.8 ms at 500 kbit/s idle);
-  /// a fault that comes back at once must not keep the bus from everybody else.
+  /// How long the node stays away after bus-off. ISO 11898-1 asks for 128 times 11 recessive bits (2.8 ms at 500 kbit/s
+  /// idle); a fault that comes back at once must not keep the bus from everybody else.
   static constexpr base::Micros kBusOffHold{100'000};
 
   constexpr CanController(Registers registers, Clock& clock) : registers_{registers}, clock_{&clock} {}
@@ -102,7 +103,8 @@ class CanController {
   static constexpr std::uint32_t kResetSrst = 1U << 0, kResetCen = 1U << 1;
   static constexpr std::uint32_t kStatusFilterBusy = 1U << 11, kStatusTxFull = 1U << 10, kStatusConfig = 1U << 0;
   static constexpr std::uint32_t kBusOff = 1U << 9, kRxNotEmpty = 1U << 7, kRxOverflow = 1U << 6;
-  static constexpr int kPatience = 1000;  // reads until a mode change must have happened (a few reference clocks on silicon)
+  static constexpr int kPatience =
+      1000;  // reads until a mode change must have happened (a few reference clocks on silicon)
 
   void configure() {
     registers_.write(kReset, kResetSrst);  // FIFOs empty, configuration mode, CEN = 0
@@ -135,7 +137,9 @@ class CanController {
     }
     if ((interrupts & kBusOff) != 0) {
       ++faults_.bus_off;
-      registers_.write(kReset, 0);  // leaves the bus; received frames stay readable, those in the transmit FIFO are given up at restart
+      registers_.write(
+          kReset,
+          0);  // leaves the bus; received frames stay readable, those in the transmit FIFO are given up at restart
       registers_.write(kInterruptClear, kBusOff);
       away_ = true;
       back_at_ = clock_->now() + kBusOffHold;

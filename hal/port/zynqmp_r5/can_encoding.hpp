@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A CAN frame as the four words of the ZynqMP controller's FIFOs, and acceptance filters, which use the same identifier word.
-// UG1085 (v2.4) chapter "CAN Controller", section "Message Format", table 20-3; UG1087 CAN registers TXFIFO_ID, RXFIFO_ID, AFMR, AFIR.
+// A CAN frame as the four words of the ZynqMP controller's FIFOs, and acceptance filters, which use the same identifier
+// word. UG1085 (v2.4) chapter "CAN Controller", section "Message Format", table 20-3; UG1087 CAN registers TXFIFO_ID,
+// RXFIFO_ID, AFMR, AFIR.
 #pragma once
 
 #include "base/can_frame.hpp"
@@ -41,7 +42,8 @@ inline constexpr std::uint32_t kRtr = 1U << 0;
 [[nodiscard]] constexpr std::uint32_t id_word(CanIdentifier of) {
   if (!of.extended) return (of.id & 0x7FFU) << kIdHighShift | (of.remote ? kSrrRtr : 0);
   // For extended frames SRR is sent recessive (1) whether remote or not.
-  return ((of.id >> 18) & 0x7FFU) << kIdHighShift | kSrrRtr | kIde | (of.id & kIdLowMask) << kIdLowShift | (of.remote ? kRtr : 0);
+  return ((of.id >> 18) & 0x7FFU) << kIdHighShift | kSrrRtr | kIde | (of.id & kIdLowMask) << kIdLowShift |
+         (of.remote ? kRtr : 0);
 }
 
 [[nodiscard]] constexpr CanIdentifier identifier(std::uint32_t word) {
@@ -68,7 +70,9 @@ inline constexpr std::uint32_t kError = 1U << 29;
 
 [[nodiscard]] constexpr CanIdentifier identifier(std::uint32_t word) {
   const bool extended = (word & kExtended) != 0;
-  return {.id = word & (extended ? 0x1FFF'FFFFU : 0x7FFU), .extended = extended, .remote = (word & (kRemote | kError)) != 0};
+  return {.id = word & (extended ? 0x1FFF'FFFFU : 0x7FFU),
+          .extended = extended,
+          .remote = (word & (kRemote | kError)) != 0};
 }
 
 [[nodiscard]] constexpr unsigned byte_shift(unsigned byte) { return 8U * byte; }
@@ -89,7 +93,8 @@ inline constexpr std::uint8_t kMaxSize = 8;
 /// What is written to TXFIFO_ID, _DLC, _DATA1, _DATA2. Unused data bytes are zero.
 [[nodiscard]] constexpr CanWords to_words(Machine machine, const base::CanFrame& frame) {
   const std::uint8_t size = frame.size < kMaxSize ? frame.size : kMaxSize;
-  CanWords words{.id = id_word(machine, {.id = frame.id, .extended = frame.extended}), .dlc = std::uint32_t{size} << kDlcShift};
+  CanWords words{.id = id_word(machine, {.id = frame.id, .extended = frame.extended}),
+                 .dlc = std::uint32_t{size} << kDlcShift};
   for (unsigned i = 0; i < size; ++i) {
     (i < 4 ? words.data1 : words.data2) |= std::uint32_t{frame.data[i]} << byte_shift(machine, i % 4);
   }
@@ -98,7 +103,8 @@ inline constexpr std::uint8_t kMaxSize = 8;
 
 /// What was read from the RXFIFO registers; empty for a remote frame, which carries no data.
 [[nodiscard]] constexpr std::optional<base::CanFrame> to_frame(Machine machine, const CanWords& words) {
-  const CanIdentifier from = machine == Machine::kSilicon ? silicon::identifier(words.id) : emulated::identifier(words.id);
+  const CanIdentifier from =
+      machine == Machine::kSilicon ? silicon::identifier(words.id) : emulated::identifier(words.id);
   if (from.remote) return std::nullopt;
   base::CanFrame frame{.id = from.id, .extended = from.extended};
   const std::uint32_t dlc = words.dlc >> kDlcShift;  // 9..15 mean eight bytes (ISO 11898-1, classical frames)
@@ -125,11 +131,14 @@ struct AcceptanceWords {
 
 [[nodiscard]] constexpr AcceptanceWords to_words(Machine machine, const AcceptanceFilter& filter) {
   const CanIdentifier wanted{.id = filter.id, .extended = filter.extended};
-  const std::uint32_t id_bits = id_word(machine, {.id = filter.mask, .extended = filter.extended}) ^ id_word(machine, {.id = 0, .extended = filter.extended});
-  // Frame size and data-not-remote are always compared; the bits that say so are those the identifier word sets for them.
-  const std::uint32_t kind_bits = machine == Machine::kEmulated ? emulated::kExtended | emulated::kRemote | emulated::kError
-                                  : filter.extended             ? silicon::kIde | silicon::kRtr
-                                                                : silicon::kIde | silicon::kSrrRtr;
+  const std::uint32_t id_bits = id_word(machine, {.id = filter.mask, .extended = filter.extended}) ^
+                                id_word(machine, {.id = 0, .extended = filter.extended});
+  // Frame size and data-not-remote are always compared; the bits that say so are those the identifier word sets for
+  // them.
+  const std::uint32_t kind_bits = machine == Machine::kEmulated
+                                      ? emulated::kExtended | emulated::kRemote | emulated::kError
+                                  : filter.extended ? silicon::kIde | silicon::kRtr
+                                                    : silicon::kIde | silicon::kSrrRtr;
   return {.mask = id_bits | kind_bits, .id = id_word(machine, wanted)};
 }
 

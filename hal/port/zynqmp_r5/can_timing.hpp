@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Bit timing of the ZynqMP CAN controller, worked out by the compiler. UG1085 chapter "CAN Controller", section "Time Quanta Clock":
-// bit rate = reference clock / ((BRP + 1) (3 + TS1 + TS2)); UG1087 CAN registers BRPR and BTR give the widths of the fields.
+// Bit timing of the ZynqMP CAN controller, worked out by the compiler. UG1085 chapter "CAN Controller", section "Time
+// Quanta Clock": bit rate = reference clock / ((BRP + 1) (3 + TS1 + TS2)); UG1087 CAN registers BRPR and BTR give the
+// widths of the fields.
 #pragma once
 
 #include <cstdint>
@@ -25,8 +26,8 @@ namespace detail {
 inline void no_exact_bit_timing_for_this_clock() {}
 }  // namespace detail
 
-/// The exact timing with the sample point nearest to, and not above, 87.5 % (CiA 301), at least two quanta after it and as many
-/// quanta as possible; no exact timing is a compile error.
+/// The exact timing with the sample point nearest to, and not above, 87.5 % (CiA 301), at least two quanta after it and
+/// as many quanta as possible; no exact timing is a compile error.
 [[nodiscard]] consteval CanBitTiming can_bit_timing(std::uint32_t reference_hz, std::uint32_t bit_rate) {
   constexpr std::uint32_t kMaxSegment1 = 16, kMaxSegment2 = 8, kMaxJump = 4, kMaxPrescaler = 256, kMinQuanta = 8;
   for (std::uint32_t quanta = 1 + kMaxSegment1 + kMaxSegment2; quanta >= kMinQuanta; --quanta) {
@@ -38,7 +39,10 @@ inline void no_exact_bit_timing_for_this_clock() {}
     if (quanta - 1 - segment1 < 2) segment1 = quanta - 3;
     const std::uint32_t segment2 = quanta - 1 - segment1;
     if (segment2 > kMaxSegment2) continue;
-    return {.prescaler = prescaler, .segment1 = segment1, .segment2 = segment2, .jump = segment2 < kMaxJump ? segment2 : kMaxJump};
+    return {.prescaler = prescaler,
+            .segment1 = segment1,
+            .segment2 = segment2,
+            .jump = segment2 < kMaxJump ? segment2 : kMaxJump};
   }
   detail::no_exact_bit_timing_for_this_clock();
   return {};

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Vectors, reset and exceptions of the Cortex-R5F. ARM DDI 0460 (Cortex-R5 TRM) chapters 2 and 4, ARM DDI 0406 section B1.
+// Vectors, reset and exceptions of the Cortex-R5F. ARM DDI 0460 (Cortex-R5 TRM) chapters 2 and 4, ARM DDI 0406 section
+// B1.
 #include "hal/port/support/image.hpp"
 #include "hal/port/support/text.hpp"
 #include "hal/port/zynqmp_r5/board.hpp"
@@ -38,7 +39,8 @@ extern "C" {
       "isb\n"
       "mov r0, #(1 << 30)\n"
       "vmsr fpexc, r0\n"
-      "mov r0, #0\n"  // FPSCR: round to nearest, subnormals kept (FZ = 0), NaN payloads kept (DN = 0), as everywhere else
+      "mov r0, #0\n"  // FPSCR: round to nearest, subnormals kept (FZ = 0), NaN payloads kept (DN = 0), as everywhere
+                      // else
       "vmsr fpscr, r0\n"
       "ldr r0, =__stack_bottom\n"
       "ldr r1, =__stack_top\n"
@@ -51,14 +53,16 @@ extern "C" {
 }
 
 // Each mode has its own stack pointer; one small stack is enough, because nothing returns from here.
-#define TETAP_EXCEPTION(name, kind, offset)   \
-  [[gnu::naked, gnu::used]] void name() {     \
-    asm volatile(                             \
-        "ldr sp, =__exception_stack_top\n"    \
-        "mov r0, #" #kind "\n"                \
-        "sub r1, lr, #" #offset "\n"          \
-        "b tetap_exception\n"                 \
-        ".ltorg\n");                          \
+#define TETAP_EXCEPTION(name, kind, offset) \
+  [[gnu::naked, gnu::used]] void name() {   \
+    asm volatile(                           \
+        "ldr sp, =__exception_stack_top\n"  \
+        "mov r0, #" #kind                   \
+        "\n"                                \
+        "sub r1, lr, #" #offset             \
+        "\n"                                \
+        "b tetap_exception\n"               \
+        ".ltorg\n");                        \
   }
 TETAP_EXCEPTION(tetap_undefined, 1, 4)
 TETAP_EXCEPTION(tetap_svc, 2, 4)
@@ -76,8 +80,9 @@ void tetap_start() {
 }
 
 void tetap_exception(std::uint32_t kind, std::uint32_t address) {
-  constexpr const char* kNames[] = {"reset", "undefined instruction", "supervisor call", "prefetch abort",
-                                    "data abort", "reserved", "interrupt", "fast interrupt"};
+  constexpr const char* kNames[] = {
+      "reset",     "undefined instruction", "supervisor call", "prefetch abort", "data abort", "reserved",
+      "interrupt", "fast interrupt"};
   std::uint32_t fault_address = 0;
   std::uint32_t fault_status = 0;
   asm volatile("mrc p15, 0, %0, c6, c0, 0" : "=r"(fault_address));  // DFAR

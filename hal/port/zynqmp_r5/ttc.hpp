@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Microseconds since start from the triple timer counter. UG1085 chapter "Timers and Counters", section "Triple-Timer Counters";
-// UG1087 module "TTC". Silicon: 32 bits from LPD_LSBUS_CLK, 100 MHz. QEMU 7.2: the 16-bit counter of the older Zynq at 133 MHz.
+// Microseconds since start from the triple timer counter. UG1085 chapter "Timers and Counters", section "Triple-Timer
+// Counters"; UG1087 module "TTC". Silicon: 32 bits from LPD_LSBUS_CLK, 100 MHz. QEMU 7.2: the 16-bit counter of the
+// older Zynq at 133 MHz.
 #pragma once
 
 #include "base/time.hpp"
@@ -40,12 +41,13 @@ class Ttc {
  private:
   // UG1087, module TTC: offsets and bits used here.
   static constexpr std::uint32_t kClockControl1 = 0x00, kCounterControl1 = 0x0C, kCounter1 = 0x18, kInterval1 = 0x24;
-  static constexpr std::uint32_t kCounterDisable = 1U << 0, kCounterReset = 1U << 4;  // counts up over its whole range otherwise
+  static constexpr std::uint32_t kCounterDisable = 1U << 0,
+                                 kCounterReset = 1U << 4;  // counts up over its whole range otherwise
 
   struct Shape {
     std::uint32_t prescale;  ///< the clock is divided by 2 to this
     std::uint32_t clock_MHz;
-    std::uint32_t mask;      ///< the bits the counter has
+    std::uint32_t mask;  ///< the bits the counter has
   };
   static constexpr Shape kSilicon{.prescale = 2, .clock_MHz = 100, .mask = 0xFFFF'FFFF};
   // 62 us a tick: with a finer one, 16 bits go round faster than a core may stand still on a busy computer.

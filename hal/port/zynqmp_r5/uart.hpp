@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The serial port as a place to say things: 115200 baud 8N1, polled. UG1085 chapter "UART Controller", UG1087 module "UART".
+// The serial port as a place to say things: 115200 baud 8N1, polled. UG1085 chapter "UART Controller", UG1087 module
+// "UART".
 #pragma once
 
 #include "hal/port/support/mmio.hpp"
@@ -29,8 +30,10 @@ struct Uart {
   }
 
  private:
-  static constexpr std::uint32_t kControl = 0x00, kMode = 0x04, kBaudGenerator = 0x18, kChannelStatus = 0x2C, kFifo = 0x30, kBaudDivider = 0x34;
-  static constexpr std::uint32_t kTransmitOff = 1U << 5, kTransmitOn = 1U << 4, kReceiveOff = 1U << 3, kReceiveOn = 1U << 2;
+  static constexpr std::uint32_t kControl = 0x00, kMode = 0x04, kBaudGenerator = 0x18, kChannelStatus = 0x2C,
+                                 kFifo = 0x30, kBaudDivider = 0x34;
+  static constexpr std::uint32_t kTransmitOff = 1U << 5, kTransmitOn = 1U << 4, kReceiveOff = 1U << 3,
+                                 kReceiveOn = 1U << 2;
   static constexpr std::uint32_t kNoParity = 4U << 3, kTxFull = 1U << 4;
   static constexpr int kPatience = 10'000;
 };
