@@ -1,20 +1,26 @@
 // SPDX-License-Identifier: Apache-2.0
-// Marks workloads in an image so that tools/count can count their instructions in QEMU. Between begin and end only what is counted:
-// input arrays and calls of public headers that the firmware instantiates too. A workload is named where it stands:
+// Marks workloads in an image so that tools/count can count their instructions in QEMU. Between begin and end only what
+// is counted: input arrays and calls of public headers that the firmware instantiates too. A workload is named where it
+// stands:
 //
 //   tetap::count::calibrate();                                       // once, first: what the markers themselves cost
-//   for (const auto& z : kInput) {                                   // any number of times: worst and mean are reported
+//   for (const auto& z : kInput) {                                   // any number of times: worst and mean are
+//   reported
 //     const tetap::count::Region<struct ekf_update> region;          // name in the table: ekf_update
 //     filter.fuse(z);
 //   }
-//   tetap::count::opaque(filter);                                    // the result is used, so nothing is optimised away
-//   tetap::count::finish();                                          // ends the emulator; without it the run counts as crashed
+//                                                                    // (used in two places: declare `struct
+//                                                                    ekf_update;` above both)
+//   tetap::count::opaque(filter);                                    // the result is used, so nothing is optimised
+//   away tetap::count::finish();                                          // ends the emulator; without it the run
+//   counts as crashed
 #pragma once
 
 namespace tetap::count {
 
-/// The plugin recognises these functions by their addresses; the name is read from the symbol. noipa: the compiler may neither inline
-/// nor merge them nor know what they do to memory, so no work on objects in memory moves across a marker.
+/// The plugin recognises these functions by their addresses; the name is read from the symbol. noipa: the compiler may
+/// neither inline nor merge them nor know what they do to memory, so no work on objects in memory moves across a
+/// marker.
 template <class Name>
 [[gnu::noipa]] void begin() {
   asm volatile("" : : : "memory");
@@ -34,7 +40,8 @@ class [[nodiscard]] Region {
   Region& operator=(const Region&) = delete;
 };
 
-/// Makes the compiler forget what it knows of an object: it was written, it is read. For inputs before and results after a region.
+/// Makes the compiler forget what it knows of an object: it was written, it is read. For inputs before and results
+/// after a region.
 template <class T>
 [[gnu::always_inline]] inline void opaque(T& object) {
   asm volatile("" : "+m"(object) : : "memory");

@@ -20,8 +20,11 @@ FLAGS = ["-std=c++20", "-O2", "-ffp-contract=off", "-fno-math-errno", "-ffunctio
          "-DEIGEN_DONT_VECTORIZE", "-DEIGEN_NO_MALLOC", "-DEIGEN_CACHEFRIENDLY_PRODUCT_THRESHOLD=64", "-DEIGEN_NO_DEBUG",
          "-isystem", "/usr/include/eigen3", "-I" + ROOT, "-I" + os.path.join(ROOT, "src"), "-fstack-usage", "-fcallgraph-info=su"]
 
+# libgcc's divisions refer to the unwinder, as in hal/port/support/runtime.cpp.
 START = {"m": """
 #include <cstdint>
+extern "C" void __aeabi_unwind_cpp_pr0();
+[[gnu::weak]] void __aeabi_unwind_cpp_pr0() {}
 extern "C" std::uint32_t __stack_bottom[], __stack_top[], __data_start[], __data_end[], __data_load[], __bss_start[], __bss_end[];
 void work();
 extern "C" void print_stack() {
@@ -52,6 +55,8 @@ extern "C" [[gnu::naked, gnu::used]] void tetap_reset() {
 struct Vectors { const void* top; void (*reset)(); void (*others[14])(); };
 [[gnu::used, gnu::section(".vectors")]] constinit const Vectors vectors{__stack_top, tetap_reset, {tetap_vector, tetap_vector}};
 """, "r": """
+extern "C" void __aeabi_unwind_cpp_pr0();
+[[gnu::weak]] void __aeabi_unwind_cpp_pr0() {}
 void work();
 extern "C" int main() { work(); return 0; }
 extern "C" [[gnu::naked, gnu::used, gnu::section(".vectors")]] void _start() { asm volatile("b reset\\n b .\\n b .\\n b .\\n b .\\n"); }
@@ -75,22 +80,25 @@ class ImageTest(unittest.TestCase):
                 file.write(text)
         return path
 
+    def build(self, command):
+        done = subprocess.run(command, capture_output=True, text=True)
+        self.assertEqual((done.returncode, done.stderr), (0, ""))
+
     def image(self, program, core="m7", name="image", flags=(), link=()):
         """Path of the image of a program whose work() is called."""
-        folder = self.path(f"{name}-{core}")
-        os.makedirs(folder)
+        folder = tempfile.mkdtemp(prefix=f"{name}-{core}-", dir=self.folder)
         objects = []
         for file, text in ((f"{name}.cpp", program), ("start.cpp", START[core[0]])):
             source = os.path.join(folder, file)
             with open(source, "w", encoding="utf-8") as out:
                 out.write(text)
             objects.append(source.replace(".cpp", ".obj"))
-            subprocess.run(["arm-none-eabi-g++"] + FLAGS + CORES[core] + list(flags) + ["-c", source, "-o", objects[-1]], check=True)
+            self.build(["arm-none-eabi-g++"] + FLAGS + CORES[core] + list(flags) + ["-c", source, "-o", objects[-1]])
         script = os.path.join(ROOT, "hal", "port", "zynqmp_r5" if core == "r5" else "mps2", "link.ld")
         elf = os.path.join(folder, name + ".elf")
-        subprocess.run(["arm-none-eabi-g++"] + CORES[core] + ["-nostdlib", "-nostartfiles", "-T", script, "-Wl,--gc-sections",
+        self.build(["arm-none-eabi-g++"] + CORES[core] + ["-nostdlib", "-nostartfiles", "-T", script, "-Wl,--gc-sections",
                         "-Wl,-Map=" + elf.replace(".elf", ".map"), "-Wl,--defsym=_stack_size=8192", "-o", elf] + objects + list(link) +
-                       ["-Wl,--start-group", "-lc", "-lgcc", "-Wl,--end-group"], check=True)
+                       ["-Wl,--start-group", "-lc", "-lgcc", "-Wl,--end-group"])
         return elf
 
     def run_tool(self, tool, *arguments):

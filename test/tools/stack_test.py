@@ -61,7 +61,7 @@ void work() { sink = choose(which); }
 POINTER = """
 volatile int sink, which;
 [[gnu::noinline]] static int small(int n) { volatile int a[4] = {n}; return a[0]; }
-[[gnu::noinline]] static int large(int n) { volatile int a[200]; a[0] = a[150] = n; return a[n & 127]; }
+[[gnu::noinline]] static int large(int n) { volatile int a[200]; a[0] = n; a[150] = n; return a[n & 127]; }
 int (*const table[2])(int) = {small, large};
 [[gnu::noinline]] int dispatch(int i) { return table[i & 1](i) + 1; }
 void work() { sink = dispatch(which); sink = dispatch(which + 1); }

@@ -1,13 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-// QEMU TCG plugin: counts the instructions that a guest executes inside named regions (test/count/markers.hpp), one line per execution,
-// and on request finds the deepest address of the stack that is written. tools/count builds it, writes its orders and reads its answers.
+// QEMU TCG plugin: counts the instructions that a guest executes inside named regions (test/count/markers.hpp), one
+// line per execution, and on request finds the deepest address of the stack that is written. tools/count builds it,
+// writes its orders and reads its answers.
 //
 // -plugin region.so,orders=FILE,answers=FILE       orders, one a line, addresses in hexadecimal:
 //   code FIRST END         only instructions in such a range are counted, so other cores of the machine do not disturb
 //   region NAME BEGIN END  addresses of the two markers
 //   finish ADDRESS         executing this ends QEMU with status 0
-//   stack BOTTOM TOP START watch stores to this range (slow) from the execution of START on, when the stack has been painted
-// answers: `region NAME INSTRUCTIONS PAIRS` (PAIRS: other regions that began and ended inside), `stack LOWEST`, `error TEXT`, `finished`.
+//   stack BOTTOM TOP START watch stores to this range (slow) from the execution of START on, when the stack has been
+//   painted
+// answers: `region NAME INSTRUCTIONS PAIRS` (PAIRS: other regions that began and ended inside), `stack LOWEST`, `error
+// TEXT`, `finished`.
 //
 // Debian 12 ships no qemu-plugin.h; these are the prototypes needed, as in QEMU 7.2 "QEMU TCG Plugins", API version 1.
 #include <inttypes.h>
@@ -31,9 +34,11 @@ typedef void (*ExecutionCallback)(unsigned, void*);
 typedef void (*MemoryCallback)(unsigned, qemu_plugin_meminfo_t, uint64_t, void*);
 typedef void (*ExitCallback)(qemu_plugin_id_t, void*);
 void qemu_plugin_register_vcpu_tb_trans_cb(qemu_plugin_id_t, TranslationCallback);
-void qemu_plugin_register_vcpu_insn_exec_cb(struct qemu_plugin_insn*, ExecutionCallback, enum qemu_plugin_cb_flags, void*);
+void qemu_plugin_register_vcpu_insn_exec_cb(struct qemu_plugin_insn*, ExecutionCallback, enum qemu_plugin_cb_flags,
+                                            void*);
 void qemu_plugin_register_vcpu_insn_exec_inline(struct qemu_plugin_insn*, enum qemu_plugin_op, void*, uint64_t);
-void qemu_plugin_register_vcpu_mem_cb(struct qemu_plugin_insn*, MemoryCallback, enum qemu_plugin_cb_flags, enum qemu_plugin_mem_rw, void*);
+void qemu_plugin_register_vcpu_mem_cb(struct qemu_plugin_insn*, MemoryCallback, enum qemu_plugin_cb_flags,
+                                      enum qemu_plugin_mem_rw, void*);
 void qemu_plugin_register_atexit_cb(qemu_plugin_id_t, ExitCallback, void*);
 size_t qemu_plugin_tb_n_insns(const struct qemu_plugin_tb*);
 struct qemu_plugin_insn* qemu_plugin_tb_get_insn(const struct qemu_plugin_tb*, size_t);
@@ -86,7 +91,8 @@ static void on_end(unsigned cpu, void* data) {
     return;
   }
   region->active = false;
-  fprintf(answers, "region %s %" PRIu64 " %" PRIu64 "\n", region->name, instructions - region->count_at_begin, pairs - region->pairs_at_begin);
+  fprintf(answers, "region %s %" PRIu64 " %" PRIu64 "\n", region->name, instructions - region->count_at_begin,
+          pairs - region->pairs_at_begin);
   ++pairs;
 }
 
@@ -127,12 +133,16 @@ static void translate(qemu_plugin_id_t id, struct qemu_plugin_tb* block) {
     const uint64_t address = qemu_plugin_insn_vaddr(instruction);
     if (!is_counted(address)) continue;
     for (size_t r = 0; r < region_count; ++r) {
-      if (address == regions[r].begin) qemu_plugin_register_vcpu_insn_exec_cb(instruction, on_begin, QEMU_PLUGIN_CB_NO_REGS, &regions[r]);
-      if (address == regions[r].end) qemu_plugin_register_vcpu_insn_exec_cb(instruction, on_end, QEMU_PLUGIN_CB_NO_REGS, &regions[r]);
+      if (address == regions[r].begin)
+        qemu_plugin_register_vcpu_insn_exec_cb(instruction, on_begin, QEMU_PLUGIN_CB_NO_REGS, &regions[r]);
+      if (address == regions[r].end)
+        qemu_plugin_register_vcpu_insn_exec_cb(instruction, on_end, QEMU_PLUGIN_CB_NO_REGS, &regions[r]);
     }
     if (address == finish) qemu_plugin_register_vcpu_insn_exec_cb(instruction, on_finish, QEMU_PLUGIN_CB_NO_REGS, NULL);
-    if (address == stack_start) qemu_plugin_register_vcpu_insn_exec_cb(instruction, on_stack_start, QEMU_PLUGIN_CB_NO_REGS, NULL);
-    if (stack.end != 0) qemu_plugin_register_vcpu_mem_cb(instruction, on_store, QEMU_PLUGIN_CB_NO_REGS, QEMU_PLUGIN_MEM_W, NULL);
+    if (address == stack_start)
+      qemu_plugin_register_vcpu_insn_exec_cb(instruction, on_stack_start, QEMU_PLUGIN_CB_NO_REGS, NULL);
+    if (stack.end != 0)
+      qemu_plugin_register_vcpu_mem_cb(instruction, on_store, QEMU_PLUGIN_CB_NO_REGS, QEMU_PLUGIN_MEM_W, NULL);
     qemu_plugin_register_vcpu_insn_exec_inline(instruction, QEMU_PLUGIN_INLINE_ADD_U64, &instructions, 1);
   }
 }
@@ -160,7 +170,8 @@ static bool read_order(const char* line) {
   return sscanf(line, "finish %" SCNx64, &finish) == 1;
 }
 
-__attribute__((visibility("default"))) int qemu_plugin_install(qemu_plugin_id_t id, const qemu_info_t* info, int argc, char** argv) {
+__attribute__((visibility("default"))) int qemu_plugin_install(qemu_plugin_id_t id, const qemu_info_t* info, int argc,
+                                                               char** argv) {
   (void)info;
   FILE* orders = NULL;
   for (int i = 0; i < argc; ++i) {
