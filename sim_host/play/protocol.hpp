@@ -84,15 +84,13 @@ class EpochCollector {
     received_ = 0;
     head_.reset();
   }
-  /// How many epochs were begun and never closed: their last frame was lost.
-  [[nodiscard]] std::uint64_t unclosed() const { return unclosed_; }
+  /// Of the epoch that is under way.
   [[nodiscard]] const std::optional<can::EstEpoch>& head() const { return head_; }
   [[nodiscard]] std::size_t received() const { return received_; }
 
  private:
   void begin(const std::optional<can::EstEpoch>& head) {
     if (!head || (head_ && head_->time_us == head->time_us)) return;  // a duplicate counts as one frame too many
-    if (received_ > 0 && head_) ++unclosed_;
     reset();
     head_ = head;
   }
@@ -100,7 +98,6 @@ class EpochCollector {
   std::uint32_t base_;
   std::optional<can::EstEpoch> head_;
   std::size_t received_ = 0;
-  std::uint64_t unclosed_ = 0;
   std::array<base::CanFrame, 256> frames_{};
 };
 

@@ -99,9 +99,9 @@ void Recorder::frame(const base::CanFrame& f) {
 }
 
 void Recorder::estimate_row(std::size_t k, const Instance& e) {
-  const auto motion = [&](float can::EstMotion::*field) { return e.motion ? double{(*e.motion).*field} : kNone; };
-  const auto deviation = [&](float can::EstStdPose::*field) { return e.deviation ? double{(*e.deviation).*field} : kNone; };
-  const auto correlation = [&](float can::EstStdMore::*field) { return e.correlation ? double{(*e.correlation).*field} : kNone; };
+  const auto motion = [&](float can::EstMotion::*field) { return e.motion ? static_cast<double>((*e.motion).*field) : kNone; };
+  const auto deviation = [&](float can::EstStdPose::*field) { return e.deviation ? static_cast<double>((*e.deviation).*field) : kNone; };
+  const auto correlation = [&](float can::EstStdMore::*field) { return e.correlation ? static_cast<double>((*e.correlation).*field) : kNone; };
   row(time_).integer(static_cast<std::int64_t>(k)).put(',').text(name(e.position->kind));
   line_.put(',').real(millimetres(e.position->x_raw), 3).put(',').real(millimetres(e.position->y_raw), 3);
   line_.put(',').real(motion(&can::EstMotion::yaw_rad), 4).put(',').real(motion(&can::EstMotion::speed_mps), 3);
@@ -117,7 +117,7 @@ void Recorder::estimate_row(std::size_t k, const Instance& e) {
 
 void Recorder::innovation_row(const can::EstInnov& i) {
   row(time_).integer(i.estimator).put(',').text(name(i.sensor)).put(',').integer(i.inst).put(',').text(name(i.verdict));
-  line_.put(',').integer(i.dof).put(',').real(double{i.nis}, 2).put(',').real(double{i.ratio}, 2).put(',').real(double{i.age_ms}, 0).put(',');
+  line_.put(',').integer(i.dof).put(',').real(static_cast<double>(i.nis), 2).put(',').real(static_cast<double>(i.ratio), 2).put(',').real(static_cast<double>(i.age_ms), 0).put(',');
   if (i.id != can::EstInnov::kIdNotAvailable) line_.integer(i.id);
   innovations_.write(line_.put('\n').view());
 }

@@ -46,7 +46,7 @@ std::optional<std::size_t> disagreement(const Segment& segment, std::size_t star
 /// Where in the log the node's consumption begins. With a Begin frame that is known; a node that was switched on while frames were
 /// flowing took some of those before its first epoch, and its own CRC of them tells which.
 std::size_t find_start(const Segment& segment, std::uint32_t log_base) {
-  constexpr std::size_t kEnough = 32;
+  constexpr std::size_t kEnough = 32;  // epochs; 16 bits of CRC each
   if (segment.begin) return 0;
   const Segment::Entry& first = segment.entries.front();
   if (first.tail.in_count > first.inputs_before) return 0;

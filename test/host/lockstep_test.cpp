@@ -139,6 +139,19 @@ TEST(Lockstep, LostEndsOfEpochsAreCountedWhileTheWindowGoesOn) {
   EXPECT_EQ(o.counts.epochs, kTicks - lost);
 }
 
+TEST(Lockstep, TwoEpochsThatRunIntoOneAreToldApartByTheirNumber) {
+  int end = 0, head = 0;
+  const Outcome o = run({.into = {}, .out_of = [&](std::uint64_t, const base::CanFrame& f) {
+                           if (f.id == 0x321) return ++end == 500 ? 0 : 1;
+                           return f.id == 0x320 && ++head == 501 ? 0 : 1;
+                         }});
+  EXPECT_EQ(o.error, "");
+  EXPECT_EQ(o.counts.lost_inputs, 0U) << "the node made every tick";
+  EXPECT_GE(o.counts.lost_outputs, 1U);
+  EXPECT_EQ(o.counts.epochs, kTicks - 1U);
+  EXPECT_EQ(o.kept.times[499].us, 5'010'000);
+}
+
 TEST(Lockstep, DoubledEndsOfEpochsAreCounted) {
   std::uint64_t doubled = 0;
   const Outcome o = run({.into = {}, .out_of = [&, n = 0U](std::uint64_t, const base::CanFrame& f) mutable {

@@ -56,7 +56,7 @@ TEST(Line, NumbersAreWhatPrintfWrites) {
 
 TEST(Line, WhatIsNoNumberIsNothing) {
   Line line;
-  line.real(std::nan(""), 3).real(INFINITY, 3).real(-1e300, 3);
+  line.real(std::nan(""), 3).real(std::numeric_limits<double>::infinity(), 3).real(-1e300, 3);
   EXPECT_EQ(line.view(), "");
   line.integer(std::numeric_limits<std::int64_t>::min()).put(' ').hex(0xAB, 4);
   EXPECT_EQ(line.view(), "-9223372036854775808 00AB");

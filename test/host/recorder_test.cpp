@@ -87,6 +87,16 @@ TEST_F(Folder, EstimatesAreTheSameBytesForEveryWindow) {
   EXPECT_EQ(read(path_ + "/a/estimates.csv"), read(path_ + "/b/estimates.csv"));
 }
 
+TEST_F(Folder, EpochsAreNumberedOnWhenTheNodeIsRestarted) {
+  Script s = script(300);
+  for (int i = 0; i < 3; ++i) s.add_tick({9'000'000 + i * 10'000}, i == 0 ? std::optional(base::Micros{8'000'000}) : std::nullopt);
+  EXPECT_EQ(play(s), 0);
+  const std::string estimates = read(path_ + "/estimates.csv");
+  EXPECT_EQ(line(estimates, 300).find("300,3.990000,0,"), 0U) << line(estimates, 300);
+  EXPECT_EQ(line(estimates, 301).find("301,9.000000,0,"), 0U) << line(estimates, 301);
+  EXPECT_EQ(line(estimates, 303).find("303,9.020000,0,"), 0U) << line(estimates, 303);
+}
+
 TEST_F(Folder, TheRawLogIsARecordingOfTheRun) {
   EXPECT_EQ(play(script(100)), 0);
   const Recording recording = recording_of(read_log(path_ + "/raw.log"), {});
