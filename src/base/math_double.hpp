@@ -1,0 +1,159 @@
+// SPDX-License-Identifier: Apache-2.0
+// The elementary functions in double, to 2 ulp: for geodesy, and for tests that judge. Same rule: + - * / sqrt and integers in one fixed
+// order. Methods: Cody & Waite reduction (1980, ch. 8), Taylor and minimax series; log by 2 atanh(f/(2+f)) (Tang, ACM TOMS 16(4), 1990).
+#pragma once
+
+#include <bit>
+#include <cstdint>
+#include <initializer_list>
+#include <limits>
+#include <type_traits>
+
+namespace tetap::base {
+
+struct SinCosDouble {
+  double sin = 0, cos = 1;
+};
+
+namespace detail {
+
+inline constexpr double kNanDouble = std::numeric_limits<double>::quiet_NaN();
+inline constexpr double kInfinityDouble = std::numeric_limits<double>::infinity();
+[[nodiscard]] constexpr std::uint64_t bits(double x) { return std::bit_cast<std::uint64_t>(x); }
+[[nodiscard]] constexpr double double_from(std::uint64_t u) { return std::bit_cast<double>(u); }
+inline constexpr std::uint64_t kSignDouble = std::uint64_t{1} << 63;
+inline constexpr std::uint64_t kInfinityBitsDouble = std::uint64_t{0x7ff} << 52;
+[[nodiscard]] constexpr bool is_finite_double(double x) { return (bits(x) & ~kSignDouble) < kInfinityBitsDouble; }
+
+/// sin on |hi + lo| <= pi/4.
+[[nodiscard]] constexpr double sin_series(double hi, double lo) {
+  const double z = hi * hi;
+  double p = 0;
+  for (const double n : {342.0, 272.0, 210.0, 156.0, 110.0, 72.0, 42.0, 20.0}) p = (1.0 - p * z) / n;  // 1/((2k)(2k+1)) nested
+  p = 1.0 - p * z;
+  return hi + (lo * (1.0 - 0.5 * z) - hi * z * p / 6.0);
+}
+[[nodiscard]] constexpr double cos_series(double hi, double lo) {
+  const double z = hi * hi;
+  const double half = 0.5 * z;
+  const double head = 1.0 - half;
+  double p = 0;
+  for (const double n : {306.0, 240.0, 182.0, 132.0, 90.0, 56.0, 30.0}) p = (1.0 - p * z) / n;
+  p = (1.0 - p * z) / 24.0;
+  return head + (((1.0 - head) - half) + (z * z * p - hi * lo));
+}
+
+}  // namespace detail
+
+/// Square root: the hardware's, exact; also in constant expressions (Newton to the last bit).
+[[nodiscard]] constexpr double sqrt(double x) {
+  if (!std::is_constant_evaluated()) return __builtin_sqrt(x);
+  if (!(x > 0.0) || !(x < detail::kInfinityDouble)) return x == 0.0 || x == detail::kInfinityDouble ? x : detail::kNanDouble;  // NOLINT
+  double root = detail::double_from((detail::bits(x) >> 1) + (std::uint64_t{0x3ff} << 51));
+  for (int i = 0; i < 6; ++i) root = 0.5 * (root + x / root);
+  return root;
+}
+
+/// |x| <= 2^20; beyond, and for NaN and infinity, both are NaN.
+[[nodiscard]] constexpr SinCosDouble sincos(double x) {
+  if (!(x <= 1048576.0 && x >= -1048576.0)) return {detail::kNanDouble, detail::kNanDouble};
+  constexpr double kRound = 0x1.8p+52;
+  const double n = (x * 0x1.45f306dc9c883p-1 + kRound) - kRound;
+  // pi/2 in parts of 33 bits: n (21 bits) times the first two is exact.
+  constexpr double kFirst = 0x1.921fb54400000p+0, kSecond = 0x1.0b4611a600000p-34, kThird = 0x1.3198a2e037073p-69;
+  const double r = x - n * kFirst;
+  const double s = r - n * kSecond;
+  const double w = n * kThird - ((r - s) - n * kSecond);
+  const double hi = s - w;
+  const double lo = (s - hi) - w;
+  const double sine = detail::sin_series(hi, lo);
+  const double cosine = detail::cos_series(hi, lo);
+  const auto quadrant = static_cast<std::uint32_t>(static_cast<std::int32_t>(n)) & 3U;
+  const double sin_value = (quadrant & 1U) != 0 ? cosine : sine;
+  const double cos_value = (quadrant & 1U) != 0 ? sine : cosine;
+  return {(quadrant & 2U) != 0 ? -sin_value : sin_value, ((quadrant + 1U) & 2U) != 0 ? -cos_value : cos_value};
+}
+[[nodiscard]] constexpr double sin(double x) { return sincos(x).sin; }
+[[nodiscard]] constexpr double cos(double x) { return sincos(x).cos; }
+
+/// exp; overflow gives infinity, underflow runs through the subnormals to 0.
+[[nodiscard]] constexpr double exp(double x) {
+  if (!(x == x)) return detail::kNanDouble;  // NOLINT
+  if (x > 709.782712893384) return detail::kInfinityDouble;
+  if (x < -745.2) return 0.0;
+  constexpr double kRound = 0x1.8p+52;
+  const double n = (x * 0x1.71547652b82fep+0 + kRound) - kRound;
+  const double hi = x - n * 0x1.62e42fee00000p-1;
+  const double lo = n * 0x1.a39ef35793c76p-33;
+  const double r = hi - lo;
+  const double tail = (hi - r) - lo;
+  double p = 1.0 / 14.0;
+  for (double k = 13.0; k > 2.0; k -= 1.0) p = (1.0 + r * p) / k;
+  p = 0.5 * (1.0 + r * p);
+  const double value = 1.0 + (r + (r * r * p + tail));
+  const auto power = static_cast<std::int32_t>(n);
+  const auto scale = [](std::int32_t k) { return detail::double_from(static_cast<std::uint64_t>(k + 1023) << 52); };
+  return value * scale(power / 2) * scale(power - power / 2);
+}
+
+/// log; log(+-0) = -infinity, NaN below.
+[[nodiscard]] constexpr double log(double x) {
+  std::uint64_t u = detail::bits(x);
+  if ((u & ~detail::kSignDouble) == 0) return -detail::kInfinityDouble;
+  if (u > detail::kInfinityBitsDouble) return detail::kNanDouble;
+  if (u == detail::kInfinityBitsDouble) return x;
+  std::int32_t bias = 0;
+  if (u < std::uint64_t{1} << 52) u = detail::bits(x * 0x1p+54), bias = -54;
+  constexpr std::uint64_t kSqrtHalf = 0x3fe6'a09e'667f'3bcdU;
+  const std::uint64_t shifted = u + (0x3ff0'0000'0000'0000U - kSqrtHalf);
+  const auto k = static_cast<double>(static_cast<std::int32_t>(shifted >> 52) - 1023 + bias);
+  const double f = detail::double_from((shifted & 0x000f'ffff'ffff'ffffU) + kSqrtHalf) - 1.0;
+  const double s = f / (2.0 + f);
+  const double z = s * s;
+  double series = 0;
+  for (double n = 25.0; n > 1.0; n -= 2.0) series = z * (2.0 / n + series);
+  const double half = 0.5 * f * f;
+  return k * 0x1.62e42fee00000p-1 - ((half - (s * (half + series) + k * 0x1.a39ef35793c76p-33)) - f);
+}
+
+/// Angle of (x, y); special cases as in ISO C annex F.
+[[nodiscard]] constexpr double atan2(double y, double x) {
+  constexpr double kPi = 0x1.921fb54442d18p+1, kPiLow = 0x1.1a62633145c07p-53;
+  if (!(x == x) || !(y == y)) return detail::kNanDouble;  // NOLINT
+  const bool left = (detail::bits(x) & detail::kSignDouble) != 0;
+  const std::uint64_t sign = detail::bits(y) & detail::kSignDouble;
+  const double ax = detail::double_from(detail::bits(x) & ~detail::kSignDouble);
+  const double ay = detail::double_from(detail::bits(y) & ~detail::kSignDouble);
+  const auto with_sign = [sign](double angle) { return detail::double_from(detail::bits(angle) | sign); };
+  if (ay <= 0.0) return with_sign(left ? kPi : 0.0);
+  if (!detail::is_finite_double(ax) || !detail::is_finite_double(ay)) {
+    if (!detail::is_finite_double(ax) && !detail::is_finite_double(ay)) return with_sign(left ? 0.75 * kPi : 0.25 * kPi);
+    return with_sign(!detail::is_finite_double(ay) ? 0.5 * kPi : left ? kPi : 0.0);
+  }
+  const bool steep = ay > ax;
+  double high = steep ? ay : ax;
+  double low = steep ? ax : ay;
+  if (high > 0x1p+1000) high *= 0x1p-60, low *= 0x1p-60;
+  if (high < 0x1p-900) high *= 0x1p+100, low *= 0x1p+100;
+  // Beyond tan(pi/8) the angle is taken from the diagonal: atan(q) = pi/4 + atan((low - high)/(low + high)).
+  const bool diagonal = low > 0.41421356237309503 * high;
+  const double q = diagonal ? (low - high) / (low + high) : low / high;
+  const double z = q * q;
+  double p = 0;
+  for (const double c : {-0x1.a933ba46b543ep-7, 0x1.e51628ad085b9p-6, -0x1.4c2db6e3358f1p-5, 0x1.817a9cddcf63fp-5, -0x1.ae89003812f0bp-5, 0x1.e1d2a07610252p-5,
+                         -0x1.11108cb6d07bfp-4, 0x1.3b13aaf7cfbd5p-4, -0x1.745d171266892p-4, 0x1.c71c71c60c87bp-4, -0x1.2492492490a05p-3, 0x1.9999999999970p-3,
+                         -0x1.5555555555555p-2})
+    p = c + z * p;
+  const double more = q * z * p;
+  if (!diagonal && !steep && !left) return with_sign(q + more);
+  // base + turn * (q + more), the base in two parts; quarter turns are exact multiples of kPi's parts.
+  const double quarters = (diagonal ? (steep ? 1.0 : 1.0) : 0.0);
+  const double base_quarters = left ? (steep ? 2.0 + quarters : 4.0 - quarters) : (steep ? 2.0 - quarters : quarters);
+  const double turn = steep != left ? -1.0 : 1.0;
+  const double base = base_quarters * 0.25 * kPi;
+  const double base_low = base_quarters * 0.25 * kPiLow;
+  const double sum = base + turn * q;
+  return with_sign(sum + (((base - sum) + turn * q) + (base_low + turn * more)));
+}
+
+}  // namespace tetap::base
