@@ -24,6 +24,7 @@ inline constexpr double kInfinityDouble = std::numeric_limits<double>::infinity(
 inline constexpr std::uint64_t kSignDouble = std::uint64_t{1} << 63;
 inline constexpr std::uint64_t kInfinityBitsDouble = std::uint64_t{0x7ff} << 52;
 [[nodiscard]] constexpr bool is_finite_double(double x) { return (bits(x) & ~kSignDouble) < kInfinityBitsDouble; }
+[[nodiscard]] constexpr bool is_nan_double(double x) { return (bits(x) & ~kSignDouble) > kInfinityBitsDouble; }
 
 /// sin on |hi + lo| <= pi/4.
 [[nodiscard]] constexpr double sin_series(double hi, double lo) {
@@ -48,7 +49,10 @@ inline constexpr std::uint64_t kInfinityBitsDouble = std::uint64_t{0x7ff} << 52;
 /// Square root: the hardware's, exact; also in constant expressions (Newton to the last bit).
 [[nodiscard]] constexpr double sqrt(double x) {
   if (!std::is_constant_evaluated()) return __builtin_sqrt(x);
-  if (!(x > 0.0) || !(x < detail::kInfinityDouble)) return x == 0.0 || x == detail::kInfinityDouble ? x : detail::kNanDouble;  // NOLINT
+  if (!(x > 0.0) || !(x < detail::kInfinityDouble)) {
+    const bool zero_or_infinite = (detail::bits(x) & ~detail::kSignDouble) == 0 || detail::bits(x) == detail::kInfinityBitsDouble;
+    return zero_or_infinite ? x : detail::kNanDouble;
+  }
   double root = detail::double_from((detail::bits(x) >> 1) + (std::uint64_t{0x3ff} << 51));
   for (int i = 0; i < 6; ++i) root = 0.5 * (root + x / root);
   return root;
@@ -78,7 +82,7 @@ inline constexpr std::uint64_t kInfinityBitsDouble = std::uint64_t{0x7ff} << 52;
 
 /// exp; overflow gives infinity, underflow runs through the subnormals to 0.
 [[nodiscard]] constexpr double exp(double x) {
-  if (!(x == x)) return detail::kNanDouble;  // NOLINT
+  if (detail::is_nan_double(x)) return detail::kNanDouble;
   if (x > 709.782712893384) return detail::kInfinityDouble;
   if (x < -745.2) return 0.0;
   constexpr double kRound = 0x1.8p+52;
@@ -119,7 +123,7 @@ inline constexpr std::uint64_t kInfinityBitsDouble = std::uint64_t{0x7ff} << 52;
 /// Angle of (x, y); special cases as in ISO C annex F.
 [[nodiscard]] constexpr double atan2(double y, double x) {
   constexpr double kPi = 0x1.921fb54442d18p+1, kPiLow = 0x1.1a62633145c07p-53;
-  if (!(x == x) || !(y == y)) return detail::kNanDouble;  // NOLINT
+  if (detail::is_nan_double(x) || detail::is_nan_double(y)) return detail::kNanDouble;
   const bool left = (detail::bits(x) & detail::kSignDouble) != 0;
   const std::uint64_t sign = detail::bits(y) & detail::kSignDouble;
   const double ax = detail::double_from(detail::bits(x) & ~detail::kSignDouble);
@@ -147,7 +151,7 @@ inline constexpr std::uint64_t kInfinityBitsDouble = std::uint64_t{0x7ff} << 52;
   const double more = q * z * p;
   if (!diagonal && !steep && !left) return with_sign(q + more);
   // base + turn * (q + more), the base in two parts; quarter turns are exact multiples of kPi's parts.
-  const double quarters = (diagonal ? (steep ? 1.0 : 1.0) : 0.0);
+  const double quarters = diagonal ? 1.0 : 0.0;
   const double base_quarters = left ? (steep ? 2.0 + quarters : 4.0 - quarters) : (steep ? 2.0 - quarters : quarters);
   const double turn = steep != left ? -1.0 : 1.0;
   const double base = base_quarters * 0.25 * kPi;
