@@ -219,5 +219,10 @@ def read_budgets(path=None):
         raise ToolError(f"{path}:{error.lineno}: {error.msg}") from None
 
 
+def key(result, image):
+    """Name of an image in a JSON file; its path when another of that name is there (one robot on several cores)."""
+    return image.name if image.name not in result else os.path.relpath(image.path, ROOT)
+
+
 def add_out_argument(parser):
     parser.add_argument("--out", metavar="DIR", help="folder of the JSON file (default: out/ of the repository)")
