@@ -27,6 +27,8 @@ function(tetap_image)
     RUNTIME_OUTPUT_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR})
   target_include_directories(${ARG_NAME} PRIVATE ${PROJECT_SOURCE_DIR}/src ${PROJECT_SOURCE_DIR})
   target_compile_options(${ARG_NAME} PRIVATE -fstack-usage -fcallgraph-info=su)
+  # A compiler cache keeps objects but not their call graphs.
+  set_target_properties(${ARG_NAME} PROPERTIES CXX_COMPILER_LAUNCHER "")
   string(TOUPPER ${folder} board_macro)
   target_compile_definitions(${ARG_NAME} PRIVATE TETAP_BOARD_${board_macro})
   target_link_libraries(${ARG_NAME} PRIVATE tetap_flashed_flags ${ARG_LIBRARIES})

@@ -46,16 +46,40 @@ inline constexpr std::uint64_t kInfinityBitsDouble = std::uint64_t{0x7ff} << 52;
 
 }  // namespace detail
 
-/// Square root: the hardware's, exact; also in constant expressions (Newton to the last bit).
-[[nodiscard]] constexpr double sqrt(double x) {
-  if (!std::is_constant_evaluated()) return __builtin_sqrt(x);
-  if (!(x > 0.0) || !(x < detail::kInfinityDouble)) {
-    const bool zero_or_infinite = (detail::bits(x) & ~detail::kSignDouble) == 0 || detail::bits(x) == detail::kInfinityBitsDouble;
-    return zero_or_infinite ? x : detail::kNanDouble;
+namespace detail {
+
+/// Correctly rounded, digit by digit in integers: for constant expressions, and for cores without a double-precision unit.
+[[nodiscard]] constexpr double sqrt_by_integers(double x) {
+  std::uint64_t u = bits(x);
+  if ((u & ~kSignDouble) == 0 || u == kInfinityBitsDouble) return x;
+  if (u > kInfinityBitsDouble) return kNanDouble;
+  std::int32_t bias = 0;
+  if (u < std::uint64_t{1} << 52) u = bits(x * 0x1p+54), bias = -54;
+  const auto exponent = static_cast<std::int32_t>(u >> 52) - 1023 + bias;
+  std::uint64_t mantissa = (u & 0x000f'ffff'ffff'ffffU) | (std::uint64_t{1} << 52);
+  const std::int32_t half = exponent >= 0 ? exponent / 2 : (exponent - 1) / 2;  // downwards
+  if (exponent != 2 * half) mantissa <<= 1;
+  std::uint64_t root = 0;
+  std::uint64_t rest = 0;
+  for (int pair = 26; pair >= -27; --pair) {  // 54 digits: one more than the result has
+    rest = (rest << 2) | (pair >= 0 ? (mantissa >> (2 * pair)) & 3U : 0U);
+    const std::uint64_t trial = (root << 2) | 1U;
+    root <<= 1;
+    if (rest >= trial) rest -= trial, root |= 1U;
   }
-  double root = detail::double_from((detail::bits(x) >> 1) + (std::uint64_t{0x3ff} << 51));
-  for (int i = 0; i < 6; ++i) root = 0.5 * (root + x / root);
-  return root;
+  // An odd root is above the half: a tie would need 54 digits exactly, and their square has 107.
+  return double_from((((root + 1) >> 1) & 0x000f'ffff'ffff'ffffU) + (static_cast<std::uint64_t>(half + 1023) << 52) +
+                     ((((root + 1) >> 1) >> 53) << 52));
+}
+
+}  // namespace detail
+
+/// Correctly rounded; sqrt(-0) = -0, negative gives NaN.
+[[nodiscard]] constexpr double sqrt(double x) {
+#if !defined(__ARM_FP) || (__ARM_FP & 8) != 0
+  if (!std::is_constant_evaluated()) return detail::bits(x) > detail::kInfinityBitsDouble && x < 0.0 ? detail::kNanDouble : __builtin_sqrt(x);
+#endif
+  return detail::sqrt_by_integers(x);
 }
 
 /// |x| <= 2^20; beyond, and for NaN and infinity, both are NaN.
@@ -122,17 +146,17 @@ inline constexpr std::uint64_t kInfinityBitsDouble = std::uint64_t{0x7ff} << 52;
 
 /// Angle of (x, y); special cases as in ISO C annex F.
 [[nodiscard]] constexpr double atan2(double y, double x) {
-  constexpr double kPi = 0x1.921fb54442d18p+1, kPiLow = 0x1.1a62633145c07p-53;
+  constexpr double kHalfTurn = 0x1.921fb54442d18p+1, kHalfTurnLow = 0x1.1a62633145c07p-53;
   if (detail::is_nan_double(x) || detail::is_nan_double(y)) return detail::kNanDouble;
   const bool left = (detail::bits(x) & detail::kSignDouble) != 0;
   const std::uint64_t sign = detail::bits(y) & detail::kSignDouble;
   const double ax = detail::double_from(detail::bits(x) & ~detail::kSignDouble);
   const double ay = detail::double_from(detail::bits(y) & ~detail::kSignDouble);
   const auto with_sign = [sign](double angle) { return detail::double_from(detail::bits(angle) | sign); };
-  if (ay <= 0.0) return with_sign(left ? kPi : 0.0);
+  if (ay <= 0.0) return with_sign(left ? kHalfTurn : 0.0);
   if (!detail::is_finite_double(ax) || !detail::is_finite_double(ay)) {
-    if (!detail::is_finite_double(ax) && !detail::is_finite_double(ay)) return with_sign(left ? 0.75 * kPi : 0.25 * kPi);
-    return with_sign(!detail::is_finite_double(ay) ? 0.5 * kPi : left ? kPi : 0.0);
+    if (!detail::is_finite_double(ax) && !detail::is_finite_double(ay)) return with_sign(left ? 0.75 * kHalfTurn : 0.25 * kHalfTurn);
+    return with_sign(!detail::is_finite_double(ay) ? 0.5 * kHalfTurn : left ? kHalfTurn : 0.0);
   }
   const bool steep = ay > ax;
   double high = steep ? ay : ax;
@@ -150,12 +174,12 @@ inline constexpr std::uint64_t kInfinityBitsDouble = std::uint64_t{0x7ff} << 52;
     p = c + z * p;
   const double more = q * z * p;
   if (!diagonal && !steep && !left) return with_sign(q + more);
-  // base + turn * (q + more), the base in two parts; quarter turns are exact multiples of kPi's parts.
+  // base + turn * (q + more), the base in two parts; quarter turns are exact multiples of kHalfTurn's parts.
   const double quarters = diagonal ? 1.0 : 0.0;
   const double base_quarters = left ? (steep ? 2.0 + quarters : 4.0 - quarters) : (steep ? 2.0 - quarters : quarters);
   const double turn = steep != left ? -1.0 : 1.0;
-  const double base = base_quarters * 0.25 * kPi;
-  const double base_low = base_quarters * 0.25 * kPiLow;
+  const double base = base_quarters * 0.25 * kHalfTurn;
+  const double base_low = base_quarters * 0.25 * kHalfTurnLow;
   const double sum = base + turn * q;
   return with_sign(sum + (((base - sum) + turn * q) + (base_low + turn * more)));
 }
