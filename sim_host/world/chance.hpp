@@ -35,6 +35,8 @@ enum class Stream : std::uint32_t {
   kFaultLoss,
 };
 
+/// Counter-based: draw n of a stream is a function of (seed, stream, n). SplitMix64 with its output mix (Steele, Lea,
+/// Flood, "Fast splittable pseudorandom number generators", OOPSLA 2014); normal draws after Box and Muller, 1958.
 class Chance {
  public:
   Chance(std::uint64_t seed, Stream stream)
