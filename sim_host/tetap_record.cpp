@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// tetap-record: writes down everything on a CAN interface (raw.log) and what one node says (estimates.log and CSV files) until it is
-// interrupted.
+// tetap-record: writes down everything on a CAN interface (raw.log) and what one node says (estimates.log and CSV
+// files) until it is interrupted.
 #include "hal/port/linux/socket_can.hpp"
 #include "sim_host/play/arguments.hpp"
 #include "sim_host/play/session.hpp"
@@ -34,8 +34,12 @@ void on_signal(int) { stop = 1; }
 
 int record(sim::Arguments& arguments) {
   const std::string interface = arguments.text("--can").value_or("vcan0");
-  const sim::SessionOptions about{.program = "tetap-record", .folder = arguments.text("--out").value_or("out/record"),
-                                  .base = sim::base_argument(arguments), .raw = true, .mode = "record", .bus = interface,
+  const sim::SessionOptions about{.program = "tetap-record",
+                                  .folder = arguments.text("--out").value_or("out/record"),
+                                  .base = sim::base_argument(arguments),
+                                  .raw = true,
+                                  .mode = "record",
+                                  .bus = interface,
                                   .quiet = arguments.flag("--quiet")};
   const base::Micros duration{static_cast<std::int64_t>(arguments.real("--duration", 0, 0, 1e7) * 1e6)};
   arguments.finish();
@@ -55,7 +59,8 @@ int record(sim::Arguments& arguments) {
       }
       if (const auto epoch = collector.add(*frame)) {
         ledger.answered(*epoch);
-        session.epoch(*epoch, {epoch->head ? static_cast<std::int64_t>(epoch->head->time_us) : session.recorder().totals().last.us});
+        session.epoch(*epoch, {epoch->head ? static_cast<std::int64_t>(epoch->head->time_us)
+                                           : session.recorder().totals().last.us});
       }
     }
     const base::Micros now = hal::monotonic_clock();
@@ -64,7 +69,8 @@ int record(sim::Arguments& arguments) {
     written = now;
   }
   session.counts().overflows = can.faults().rx_overflow;
-  if (session.counts().lost_outputs < session.counts().overflows) session.counts().lost_outputs = session.counts().overflows;
+  if (session.counts().lost_outputs < session.counts().overflows)
+    session.counts().lost_outputs = session.counts().overflows;
   session.note("interface_down", std::to_string(can.faults().bus_off));
   return session.finish();
 }

@@ -57,7 +57,8 @@ class Arguments {
     double value = 0;
     const auto [end, error] = std::from_chars(given->data(), given->data() + given->size(), value);
     if (error != std::errc{} || end != given->data() + given->size() || !(value >= low && value <= high))
-      throw UsageError(std::string(name) + " needs a number from " + plain(low) + " to " + plain(high) + ", not '" + *given + "'");
+      throw UsageError(std::string(name) + " needs a number from " + plain(low) + " to " + plain(high) + ", not '" +
+                       *given + "'");
     return value;
   }
   /// Decimal, or hexadecimal after 0x.
@@ -70,8 +71,8 @@ class Arguments {
     std::uint64_t value = 0;
     const auto [end, error] = std::from_chars(first, last, value, hex ? 16 : 10);
     if (error != std::errc{} || end != last || first == last || value < low || value > high)
-      throw UsageError(std::string(name) + " needs a whole number from " + std::to_string(low) + " to " + std::to_string(high) + ", not '" +
-                       *given + "'");
+      throw UsageError(std::string(name) + " needs a whole number from " + std::to_string(low) + " to " +
+                       std::to_string(high) + ", not '" + *given + "'");
     return value;
   }
   /// The next argument that is no option. Ask for it after all options.
@@ -94,14 +95,16 @@ class Arguments {
  private:
   static std::string plain(double value) {
     std::string text(32, '\0');
-    text.resize(static_cast<std::size_t>(std::to_chars(text.data(), text.data() + text.size(), value).ptr - text.data()));
+    text.resize(
+        static_cast<std::size_t>(std::to_chars(text.data(), text.data() + text.size(), value).ptr - text.data()));
     return text;
   }
   std::vector<std::string> left_;
 };
 
 /// A node's id base, for every program alike: its whole block within 11 bits.
-[[nodiscard]] inline std::uint32_t base_argument(Arguments& arguments, std::string_view name = "--base", std::uint32_t otherwise = 0x300) {
+[[nodiscard]] inline std::uint32_t base_argument(Arguments& arguments, std::string_view name = "--base",
+                                                 std::uint32_t otherwise = 0x300) {
   return static_cast<std::uint32_t>(arguments.integer(name, otherwise, 0, 0x7C0));
 }
 

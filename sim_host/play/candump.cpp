@@ -86,7 +86,9 @@ std::string_view parse_bytes(Cursor& in, std::size_t limit, base::BasicCanFrame<
   return {};
 }
 
-bool is_fd_size(std::uint8_t n) { return n <= 8 || n == 12 || n == 16 || n == 20 || n == 24 || n == 32 || n == 48 || n == 64; }
+bool is_fd_size(std::uint8_t n) {
+  return n <= 8 || n == 12 || n == 16 || n == 20 || n == 24 || n == 32 || n == 48 || n == 64;
+}
 
 std::string_view parse_payload(Cursor& in, LogLine& line) {
   if (in.eat('#')) {
@@ -106,7 +108,8 @@ std::string_view parse_payload(Cursor& in, LogLine& line) {
   if (const auto reason = parse_bytes(in, 8, line.frame); !reason.empty()) return reason;
   if (in.eat('_')) {  // a raw length code above 8
     const std::string_view code = in.take([](char c) { return hex_digit(c) >= 0; });
-    if (code.size() != 1 || hex_digit(code[0]) < 9 || line.frame.size != 8) return "a raw length code is 9 to F, after 8 bytes";
+    if (code.size() != 1 || hex_digit(code[0]) < 9 || line.frame.size != 8)
+      return "a raw length code is 9 to F, after 8 bytes";
   }
   return {};
 }
@@ -131,7 +134,8 @@ std::variant<LogLine, BadLine> parse_log_line(std::string_view text) {
   line.interface = in.take([](char c) { return !blank(c) && c != '#'; });
   if (line.interface.empty() || line.interface.size() > 15) return BadLine{"no name of an interface after the time"};
   if (!in.eat_blanks()) return BadLine{"no space after the interface"};
-  if (const auto reason = parse_id(in.take([](char c) { return hex_digit(c) >= 0; }), line); !reason.empty()) return BadLine{reason};
+  if (const auto reason = parse_id(in.take([](char c) { return hex_digit(c) >= 0; }), line); !reason.empty())
+    return BadLine{reason};
   if (!in.eat('#')) return BadLine{"no '#' after the id"};
   if (const auto reason = parse_payload(in, line); !reason.empty()) return BadLine{reason};
   if (in.eat_blanks() && !in.empty()) {
@@ -143,7 +147,13 @@ std::variant<LogLine, BadLine> parse_log_line(std::string_view text) {
 }
 
 void append_log_line(Line& out, base::Micros time, std::string_view interface, const base::CanFrame& frame) {
-  out.put('(').integer(time.us / 1'000'000, 10).put('.').integer(time.us % 1'000'000, 6).text(") ").text(interface).put(' ');
+  out.put('(')
+      .integer(time.us / 1'000'000, 10)
+      .put('.')
+      .integer(time.us % 1'000'000, 6)
+      .text(") ")
+      .text(interface)
+      .put(' ');
   out.hex(frame.id, frame.extended ? 8 : 3).put('#');
   for (std::size_t i = 0; i < frame.size && i < frame.data.size(); ++i) out.hex(frame.data[i], 2);
   out.put('\n');

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Lines of `candump -L`: "(seconds.micros) interface id#data", standard and extended ids, remote frames "#R", CAN FD "##<flags>data",
-// optional direction " R" or " T". Format as in can-utils lib.c (parse_canframe, sprint_canframe).
+// Lines of `candump -L`: "(seconds.micros) interface id#data", standard and extended ids, remote frames "#R", CAN FD
+// "##<flags>data", optional direction " R" or " T". Format as in can-utils lib.c (parse_canframe, sprint_canframe).
 #pragma once
 
 #include "base/can_frame.hpp"
@@ -17,9 +17,9 @@ struct LogLine {
   enum class Kind : std::uint8_t { kData, kRemote, kError, kFd };
 
   base::Micros time;
-  std::string_view interface;      ///< points into the text that was parsed
+  std::string_view interface;  ///< points into the text that was parsed
   Kind kind = Kind::kData;
-  base::BasicCanFrame<64> frame;   ///< data frames have at most 8 bytes
+  base::BasicCanFrame<64> frame;  ///< data frames have at most 8 bytes
   std::uint8_t fd_flags = 0;
 
   /// For a data frame only.

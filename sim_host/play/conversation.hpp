@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What lockstep and real-time playing share: sending without loss, sync frames with their counter, and starting a node (Begin until it
-// answers with its version).
+// What lockstep and real-time playing share: sending without loss, sync frames with their counter, and starting a node
+// (Begin until it answers with its version).
 #pragma once
 
 #include "hal/port/linux/clock.hpp"
@@ -21,9 +21,9 @@ namespace tetap::sim {
 }
 
 struct Patience {
-  base::Micros epoch{2'000'000};    ///< for the answer to a tick
-  base::Micros begin{15'000'000};   ///< for the answer to Begin: a node may be booting
-  base::Micros repeat{200'000};     ///< Begin is sent again after so long
+  base::Micros epoch{2'000'000};   ///< for the answer to a tick
+  base::Micros begin{15'000'000};  ///< for the answer to Begin: a node may be booting
+  base::Micros repeat{200'000};    ///< Begin is sent again after so long
 };
 /// An emulated core boots in its own time.
 inline constexpr Patience kEmulatedPatience{.epoch = {20'000'000}, .begin = {120'000'000}, .repeat = {1'000'000}};
@@ -31,7 +31,8 @@ inline constexpr Patience kEmulatedPatience{.epoch = {20'000'000}, .begin = {120
 template <Link L, Sink K>
 class Conversation {
  public:
-  Conversation(L& link, K& sink, std::uint32_t base, Counts& counts) : link_(link), sink_(sink), collector_(base), counts_(counts), base_(base) {}
+  Conversation(L& link, K& sink, std::uint32_t base, Counts& counts)
+      : link_(link), sink_(sink), collector_(base), counts_(counts), base_(base) {}
 
   void send(const base::CanFrame& frame) {
     if (!link_.send(frame)) send_later(frame);
@@ -74,7 +75,8 @@ class Conversation {
   void send_later(const base::CanFrame& frame) {
     const base::Micros began = hal::monotonic_clock();
     do {
-      if (hal::monotonic_clock() - began > base::Micros{2'000'000}) throw RunError("the bus takes no frames: is the interface up?");
+      if (hal::monotonic_clock() - began > base::Micros{2'000'000})
+        throw RunError("the bus takes no frames: is the interface up?");
       link_.wait({1000});
     } while (!link_.send(frame));
   }

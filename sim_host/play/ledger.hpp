@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Double-entry book-keeping of a run: what was sent against what the node says it consumed (Est_StateCrc.InCount), what the node says
-// it sent (Frames, Epoch) against what arrived. So every frame lost anywhere is a number, not a surprise.
+// Double-entry book-keeping of a run: what was sent against what the node says it consumed (Est_StateCrc.InCount), what
+// the node says it sent (Frames, Epoch) against what arrived. So every frame lost anywhere is a number, not a surprise.
 #pragma once
 
 #include "sim_host/play/protocol.hpp"
@@ -14,15 +14,16 @@
 namespace tetap::sim {
 
 struct Counts {
-  std::uint64_t inputs = 0;          ///< frames sent for the node to consume
-  std::uint64_t syncs = 0;           ///< sync frames sent
-  std::uint64_t outputs = 0;         ///< frames of the node that arrived in its epochs
-  std::uint64_t epochs = 0;          ///< that arrived to their last frame
-  std::uint64_t lost_inputs = 0;     ///< sent and never consumed, sync frames included
-  std::uint64_t extra_inputs = 0;    ///< consumed and never sent (by us): a duplicate, or another sender
-  std::uint64_t lost_outputs = 0;    ///< sent by the node and never arrived; an epoch without its last frame counts as one
-  std::uint64_t extra_outputs = 0;   ///< arrived more often than sent
-  std::uint64_t overflows = 0;       ///< of lost_outputs, those our own socket dropped, as far as known
+  std::uint64_t inputs = 0;        ///< frames sent for the node to consume
+  std::uint64_t syncs = 0;         ///< sync frames sent
+  std::uint64_t outputs = 0;       ///< frames of the node that arrived in its epochs
+  std::uint64_t epochs = 0;        ///< that arrived to their last frame
+  std::uint64_t lost_inputs = 0;   ///< sent and never consumed, sync frames included
+  std::uint64_t extra_inputs = 0;  ///< consumed and never sent (by us): a duplicate, or another sender
+  std::uint64_t lost_outputs =
+      0;  ///< sent by the node and never arrived; an epoch without its last frame counts as one
+  std::uint64_t extra_outputs = 0;  ///< arrived more often than sent
+  std::uint64_t overflows = 0;      ///< of lost_outputs, those our own socket dropped, as far as known
 
   [[nodiscard]] std::uint64_t lost() const { return lost_inputs + lost_outputs; }
   [[nodiscard]] std::uint64_t extra() const { return extra_inputs + extra_outputs; }

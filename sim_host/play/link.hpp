@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The player's end of a bus: a CAN controller that can also wait. SocketCan is one; a bus inside the process waits by letting the
-// other side run.
+// The player's end of a bus: a CAN controller that can also wait. SocketCan is one; a bus inside the process waits by
+// letting the other side run.
 #pragma once
 
 #include "hal/can_bus.hpp"
@@ -31,7 +31,9 @@ class MemoryLink {
   bool send(const base::CanFrame& frame) { return can_.send(frame); }
   std::optional<base::CanFrame> receive() { return can_.receive(); }
   void flush() {}
-  [[nodiscard]] hal::CanFaults faults() const { return {.rx_overflow = 0, .tx_full = 0, .bus_off = 0}; }  // a full queue is waited for
+  [[nodiscard]] hal::CanFaults faults() const {
+    return {.rx_overflow = 0, .tx_full = 0, .bus_off = 0};
+  }  // a full queue is waited for
   void wait(base::Micros) { pump_(); }
 
  private:
@@ -42,10 +44,10 @@ class MemoryLink {
 /// Who looks on: recorder, comparison, progress.
 template <class K>
 concept Sink = requires(K& sink, const base::CanFrame& frame, const NodeEpoch& epoch, base::Micros time) {
-  { sink.restarted() } -> std::same_as<void>;          ///< the node begins at its power-on state
-  { sink.sent(frame) } -> std::same_as<void>;          ///< by us
-  { sink.received(frame) } -> std::same_as<void>;      ///< anything on the bus
-  { sink.epoch(epoch, time) } -> std::same_as<void>;   ///< of the node, at this time
+  { sink.restarted() } -> std::same_as<void>;         ///< the node begins at its power-on state
+  { sink.sent(frame) } -> std::same_as<void>;         ///< by us
+  { sink.received(frame) } -> std::same_as<void>;     ///< anything on the bus
+  { sink.epoch(epoch, time) } -> std::same_as<void>;  ///< of the node, at this time
 };
 
 /// A run that cannot go on: what was waited for, and what came.

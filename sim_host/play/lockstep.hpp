@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Playing as fast as the node can: for every tick its input frames and a Step, and up to `window` ticks ahead of the answers. Nothing is
-// sent that the node has not promised to keep up with, so nothing is lost silently, whatever the speed.
+// Playing as fast as the node can: for every tick its input frames and a Step, and up to `window` ticks ahead of the
+// answers. Nothing is sent that the node has not promised to keep up with, so nothing is lost silently, whatever the
+// speed.
 #pragma once
 
 #include "sim_host/play/conversation.hpp"
@@ -10,8 +11,8 @@ namespace tetap::sim {
 
 struct LockstepOptions {
   std::uint32_t base = 0x300;
-  std::size_t window = 8;             ///< ticks in flight; 1 for a controller with few receive buffers
-  std::size_t burst = 0;              ///< frames sent at once before `burst_gap`; 0: all
+  std::size_t window = 8;  ///< ticks in flight; 1 for a controller with few receive buffers
+  std::size_t burst = 0;   ///< frames sent at once before `burst_gap`; 0: all
   base::Micros burst_gap{0};
   Patience patience;
 };
@@ -69,11 +70,13 @@ void play_lockstep(L& link, S& source, K& sink, const LockstepOptions& options, 
     if (quiet_since == kNever) quiet_since = now;
     if (now - quiet_since < options.patience.epoch) continue;
     const bool begun = node.collector().head().has_value() || !node.collector().idle();
-    throw RunError("no answer to the tick at " + in_seconds(ledger.oldest()) + " within " + in_seconds(options.patience.epoch) + ": " +
-                   (begun ? "the epoch's last frame (Est_StateCrc) is missing, " + std::to_string(node.collector().received()) +
-                                " of its frames came"
+    throw RunError("no answer to the tick at " + in_seconds(ledger.oldest()) + " within " +
+                   in_seconds(options.patience.epoch) + ": " +
+                   (begun ? "the epoch's last frame (Est_StateCrc) is missing, " +
+                                std::to_string(node.collector().received()) + " of its frames came"
                           : std::string("no frame of the epoch came")) +
-                   "; " + std::to_string(counts.epochs) + " epochs before it, " + std::to_string(counts.lost()) + " frames lost so far");
+                   "; " + std::to_string(counts.epochs) + " epochs before it, " + std::to_string(counts.lost()) +
+                   " frames lost so far");
   }
   counts.overflows = link.faults().rx_overflow;
 }

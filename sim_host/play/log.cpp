@@ -50,8 +50,8 @@ Log parse_log(std::string_view text, const std::string& name, const LogOptions& 
       add_line(log, *good, options, latest);
       continue;
     }
-    const std::string message =
-        name + ":" + std::to_string(number) + ": " + std::string(std::get<BadLine>(parsed).reason) + ": '" + excerpt(line) + "'";
+    const std::string message = name + ":" + std::to_string(number) + ": " +
+                                std::string(std::get<BadLine>(parsed).reason) + ": '" + excerpt(line) + "'";
     if (!options.keep_going) throw std::runtime_error(message);
     if (log.malformed++ == 0) log.first_malformed = message;
   }
@@ -73,7 +73,8 @@ Log read_log(const std::string& path, const LogOptions& options) {
   if (std::ferror(file.get()) != 0) refuse(std::string("cannot be read: ") + std::strerror(errno));
   Log log = parse_log(text, path, options);
   if (log.frames.empty())
-    refuse(log.other_interface > 0 ? "no frame of interface " + options.interface : std::string("no CAN data frame in it"));
+    refuse(
+        log.other_interface > 0 ? "no frame of interface " + options.interface : std::string("no CAN data frame in it"));
   return log;
 }
 

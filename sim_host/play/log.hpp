@@ -18,8 +18,8 @@ struct TimedFrame {
 };
 
 struct LogOptions {
-  std::string interface;     ///< only frames of this interface; empty: of all
-  bool keep_going = false;   ///< count malformed lines instead of stopping at the first
+  std::string interface;    ///< only frames of this interface; empty: of all
+  bool keep_going = false;  ///< count malformed lines instead of stopping at the first
 };
 
 struct Log {
@@ -32,7 +32,8 @@ struct Log {
   std::uint64_t back_in_time = 0;  ///< frames earlier than the one before
 };
 
-/// Throws std::runtime_error("name:line: reason: 'text'") at the first malformed line unless told to keep going. Blank lines are skipped.
+/// Throws std::runtime_error("name:line: reason: 'text'") at the first malformed line unless told to keep going. Blank
+/// lines are skipped.
 [[nodiscard]] Log parse_log(std::string_view text, const std::string& name, const LogOptions& options = {});
 
 /// Reads the file; throws when it cannot be read or has no data frame.

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The DBC's words for enum values and messages, for CSV files and error messages. Judge: the tests read them from config/tetap.dbc.
+// The DBC's words for enum values and messages, for CSV files and error messages. Judge: the tests read them from
+// config/tetap.dbc.
 #pragma once
 
 #include "config/messages.hpp"
@@ -14,29 +15,32 @@ namespace tetap::sim {
 
 /// "?" for a code that has no name.
 [[nodiscard]] constexpr std::string_view name(can::Sensor value) {
-  constexpr std::array<std::string_view, 7> kNames{"Imu",         "WheelCounts",  "WheelSpeed",  "BodySpeed",
+  constexpr std::array<std::string_view, 7> kNames{"Imu",          "WheelCounts",  "WheelSpeed",  "BodySpeed",
                                                    "RangeBearing", "GnssPosition", "GnssVelocity"};
   const auto i = static_cast<std::size_t>(value);
   return value == can::Sensor::kNotAvailable ? "NotAvailable" : i < kNames.size() ? kNames[i] : "?";
 }
 [[nodiscard]] constexpr std::string_view name(can::Verdict value) {
-  constexpr std::array<std::string_view, 8> kNames{"Accepted", "Rejected",  "NotUsed",   "TooLate", "UnknownLandmark",
-                                                   "Singular", "NotFinite", "Stale"};
+  constexpr std::array<std::string_view, 8> kNames{"Accepted",        "Rejected", "NotUsed",   "TooLate",
+                                                   "UnknownLandmark", "Singular", "NotFinite", "Stale"};
   const auto i = static_cast<std::size_t>(value);
   return i < kNames.size() ? kNames[i] : "?";
 }
 [[nodiscard]] constexpr std::string_view name(can::Mode value) {
-  constexpr std::array<std::string_view, 7> kNames{"Boot", "WaitingForPose", "Aligning", "Nominal", "DeadReckoning", "Degraded", "Fault"};
+  constexpr std::array<std::string_view, 7> kNames{"Boot",          "WaitingForPose", "Aligning", "Nominal",
+                                                   "DeadReckoning", "Degraded",       "Fault"};
   const auto i = static_cast<std::size_t>(value);
   return i < kNames.size() ? kNames[i] : "?";
 }
 [[nodiscard]] constexpr std::string_view name(can::ResetCause value) {
-  constexpr std::array<std::string_view, 6> kNames{"PowerOn", "Command", "SetPose", "TimeJump", "NotFinite", "NotPositive"};
+  constexpr std::array<std::string_view, 6> kNames{"PowerOn",  "Command",   "SetPose",
+                                                   "TimeJump", "NotFinite", "NotPositive"};
   const auto i = static_cast<std::size_t>(value);
   return i < kNames.size() ? kNames[i] : "?";
 }
 [[nodiscard]] constexpr std::string_view name(can::EstimatorKind value) {
-  constexpr std::array<std::string_view, 8> kNames{"None", "Odometry", "Ekf", "Kf", "Ukf", "Particle", "Inertial", "Attitude"};
+  constexpr std::array<std::string_view, 8> kNames{"None", "Odometry", "Ekf",      "Kf",
+                                                   "Ukf",  "Particle", "Inertial", "Attitude"};
   const auto i = static_cast<std::size_t>(value);
   return i < kNames.size() ? kNames[i] : "?";
 }

@@ -13,7 +13,8 @@ namespace tetap::sim {
 Line& Line::integer(std::int64_t value, int width) {
   std::array<char, 24> digits{};
   const bool negative = value < 0;
-  const std::uint64_t size_of_it = negative ? ~static_cast<std::uint64_t>(value) + 1 : static_cast<std::uint64_t>(value);
+  const std::uint64_t size_of_it =
+      negative ? ~static_cast<std::uint64_t>(value) + 1 : static_cast<std::uint64_t>(value);
   const char* end = std::to_chars(digits.data(), digits.data() + digits.size(), size_of_it).ptr;
   if (negative) put('-');
   for (auto n = static_cast<int>(end - digits.data()); n < width; ++n) put('0');
@@ -59,7 +60,8 @@ void OutFile::flush() { spill(); }
 
 std::string OutFile::close() {
   spill();
-  if (std::fclose(file_.release()) != 0) throw std::runtime_error(path_ + ": cannot be written: " + std::strerror(errno));
+  if (std::fclose(file_.release()) != 0)
+    throw std::runtime_error(path_ + ": cannot be written: " + std::strerror(errno));
   return hash_ ? hash_->hex() : std::string{};
 }
 
@@ -67,7 +69,8 @@ void make_folder(const std::string& path) {
   std::error_code error;
   std::filesystem::create_directories(path, error);
   if (error || !std::filesystem::is_directory(path))
-    throw std::runtime_error(path + ": cannot be made: " + (error ? error.message() : "a file of that name is in the way"));
+    throw std::runtime_error(path +
+                             ": cannot be made: " + (error ? error.message() : "a file of that name is in the way"));
 }
 
 }  // namespace tetap::sim

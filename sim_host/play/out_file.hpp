@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Text output that keeps up with runs at hundreds of times real time: lines are made by hand in a small buffer, files are written in
-// blocks. A write that fails (disk full) is an error, not a short file.
+// Text output that keeps up with runs at hundreds of times real time: lines are made by hand in a small buffer, files
+// are written in blocks. A write that fails (disk full) is an error, not a short file.
 #pragma once
 
 #include "sim_host/play/sha256.hpp"

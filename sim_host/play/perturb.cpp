@@ -30,7 +30,8 @@ Perturbed perturb(std::span<const TimedFrame> frames, const Perturbation& how) {
   };
   std::vector<bool> swap_with_next;
   for (const TimedFrame& entry : frames) {
-    const double drop = draws.uniform(), delay = draws.uniform(), twice = draws.uniform(), second = draws.uniform(), swap = draws.uniform();
+    const double drop = draws.uniform(), delay = draws.uniform(), twice = draws.uniform(), second = draws.uniform(),
+                 swap = draws.uniform();
     if (drop < how.drop) {
       ++result.dropped;
       continue;
@@ -48,7 +49,8 @@ Perturbed perturb(std::span<const TimedFrame> frames, const Perturbation& how) {
     ++result.reordered;
     swap_with_next[i + 1] = false;  // each frame moves once
   }
-  std::stable_sort(result.frames.begin(), result.frames.end(), [](const TimedFrame& a, const TimedFrame& b) { return a.time < b.time; });
+  std::stable_sort(result.frames.begin(), result.frames.end(),
+                   [](const TimedFrame& a, const TimedFrame& b) { return a.time < b.time; });
   return result;
 }
 

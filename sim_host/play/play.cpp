@@ -61,9 +61,13 @@ PlayOptions play_options(Arguments& arguments) {
   o.raw = arguments.flag("--raw");
   o.quiet = arguments.flag("--quiet");
 
-  const bool lockstep = arguments.flag("--lockstep"), realtime = arguments.flag("--realtime"), recorded = arguments.flag("--as-recorded");
+  const bool lockstep = arguments.flag("--lockstep"), realtime = arguments.flag("--realtime"),
+             recorded = arguments.flag("--as-recorded");
   if (lockstep + realtime + recorded > 1) throw UsageError("only one of --lockstep, --realtime, --as-recorded");
-  o.mode = lockstep ? PlayMode::kLockstep : realtime ? PlayMode::kRealtime : recorded ? PlayMode::kAsRecorded : PlayMode::kAutomatic;
+  o.mode = lockstep   ? PlayMode::kLockstep
+           : realtime ? PlayMode::kRealtime
+           : recorded ? PlayMode::kAsRecorded
+                      : PlayMode::kAutomatic;
   o.lockstep.base = o.realtime.base = o.script.base;
   o.realtime.period = o.script.period;
   o.lockstep.window = static_cast<std::size_t>(arguments.integer("--window", 8, 1, 128));
@@ -80,7 +84,8 @@ PlayOptions play_options(Arguments& arguments) {
   o.perturbation.duplicate = arguments.real("--duplicate", 0, 0, 1);
   o.perturbation.reorder = arguments.real("--reorder", 0, 0, 1);
   o.perturbation.seed = arguments.integer("--seed", 1, 0, ~std::uint64_t{0});
-  if (o.perturbation.any() && !realtime) throw UsageError("--jitter-ms, --drop, --duplicate and --reorder need --realtime");
+  if (o.perturbation.any() && !realtime)
+    throw UsageError("--jitter-ms, --drop, --duplicate and --reorder need --realtime");
 
   const auto log = arguments.positional();
   arguments.finish();
@@ -97,10 +102,15 @@ Log load_for(PlayOptions& options) {
 }
 
 void warn_about(const Log& log, const char* program) {
-  const auto warn = [program](const std::string& text) { std::fprintf(stderr, "%s: warning: %s\n", program, text.c_str()); };
-  if (log.malformed > 0) warn(std::to_string(log.malformed) + " malformed lines skipped, the first: " + log.first_malformed);
-  if (log.not_data > 0) warn(log.name + ": " + std::to_string(log.not_data) + " remote, error or CAN FD frames skipped");
-  if (log.back_in_time > 0) warn(log.name + ": " + std::to_string(log.back_in_time) + " frames are earlier than one before them");
+  const auto warn = [program](const std::string& text) {
+    std::fprintf(stderr, "%s: warning: %s\n", program, text.c_str());
+  };
+  if (log.malformed > 0)
+    warn(std::to_string(log.malformed) + " malformed lines skipped, the first: " + log.first_malformed);
+  if (log.not_data > 0)
+    warn(log.name + ": " + std::to_string(log.not_data) + " remote, error or CAN FD frames skipped");
+  if (log.back_in_time > 0)
+    warn(log.name + ": " + std::to_string(log.back_in_time) + " frames are earlier than one before them");
 }
 
 }  // namespace tetap::sim

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The log player as a function of its command line and a link to the node, so that one program plays over SocketCAN and another to a
-// firmware in its own process.
+// The log player as a function of its command line and a link to the node, so that one program plays over SocketCAN and
+// another to a firmware in its own process.
 #pragma once
 
 #include "sim_host/play/arguments.hpp"
@@ -49,8 +49,15 @@ template <Link L>
 int play(L& link, PlayOptions options, const std::string& bus, const char* program) {
   const Log log = load_for(options);
   warn_about(log, program);
-  SessionOptions about{.program = program, .folder = options.folder, .base = options.script.base, .raw = options.raw, .mode = "lockstep",
-                       .bus = bus, .robot = options.robot, .log = options.log, .quiet = options.quiet};
+  SessionOptions about{.program = program,
+                       .folder = options.folder,
+                       .base = options.script.base,
+                       .raw = options.raw,
+                       .mode = "lockstep",
+                       .bus = bus,
+                       .robot = options.robot,
+                       .log = options.log,
+                       .quiet = options.quiet};
   const auto note_log = [&log](Session& session) {
     session.note("malformed_lines", std::to_string(log.malformed));
     session.note("frames_not_data", std::to_string(log.not_data));
@@ -74,12 +81,13 @@ int play(L& link, PlayOptions options, const std::string& bus, const char* progr
   if (options.mode == PlayMode::kAsRecorded) {
     Recording recording = recording_of(log, options.script);
     if (recording.inputs_differ_at)
-      std::fprintf(stderr, "%s: %s: from the epoch at %s on the node consumed other input frames than the log holds\n", program,
-                   options.log.c_str(), in_seconds(*recording.inputs_differ_at).c_str());
+      std::fprintf(stderr, "%s: %s: from the epoch at %s on the node consumed other input frames than the log holds\n",
+                   program, options.log.c_str(), in_seconds(*recording.inputs_differ_at).c_str());
     about.mode = "as-recorded";
     about.ticks = recording.script.ticks();
     Session session(about, &recording);
     note_log(session);
+    session.note("epochs_before_start", std::to_string(recording.skipped_epochs));
     return session.run([&] { play_lockstep(link, recording.script, session, options.lockstep, session.counts()); });
   }
 

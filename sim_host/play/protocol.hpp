@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the host programs know of a node's block of ids: which frames are inputs, sync frames, answers; and the frames of one epoch
-// collected into one.
+// What the host programs know of a node's block of ids: which frames are inputs, sync frames, answers; and the frames
+// of one epoch collected into one.
 #pragma once
 
 #include "base/can_frame.hpp"
@@ -16,7 +16,8 @@
 
 namespace tetap::sim {
 
-inline constexpr std::uint32_t kInputOffsets = 0x20;  ///< offsets below are inputs, the others of the block are the node's
+inline constexpr std::uint32_t kInputOffsets =
+    0x20;  ///< offsets below are inputs, the others of the block are the node's
 inline constexpr std::uint64_t kTimeMask = 0xFFFFFFFFFFFF;
 
 /// Position within the node's block; nothing when the frame is not of this block.
@@ -34,8 +35,10 @@ inline constexpr std::uint64_t kTimeMask = 0xFFFFFFFFFFFF;
   return offset >= kInputOffsets && offset != can::EstDiagLoop::kOffset && offset != can::EstVersion::kOffset;
 }
 
-[[nodiscard]] constexpr base::CanFrame sync_frame(std::uint32_t base, can::SyncKind kind, base::Micros time, std::uint8_t counter) {
-  return can::frame(base, can::InSync{.time_us = static_cast<std::uint64_t>(time.us) & kTimeMask, .ctr = counter, .kind = kind});
+[[nodiscard]] constexpr base::CanFrame sync_frame(std::uint32_t base, can::SyncKind kind, base::Micros time,
+                                                  std::uint8_t counter) {
+  return can::frame(
+      base, can::InSync{.time_us = static_cast<std::uint64_t>(time.us) & kTimeMask, .ctr = counter, .kind = kind});
 }
 [[nodiscard]] constexpr bool same_bus_time(std::uint64_t bus_us, base::Micros time) {
   return bus_us == (static_cast<std::uint64_t>(time.us) & kTimeMask);
@@ -43,16 +46,17 @@ inline constexpr std::uint64_t kTimeMask = 0xFFFFFFFFFFFF;
 /// The full time nearest to `reference` with these 48 low bits.
 [[nodiscard]] constexpr base::Micros extend_bus_time(std::uint64_t bus_us, base::Micros reference) {
   const std::uint64_t ahead = (bus_us - static_cast<std::uint64_t>(reference.us)) & kTimeMask;
-  const auto offset = static_cast<std::int64_t>(ahead) - (ahead > kTimeMask / 2 ? static_cast<std::int64_t>(kTimeMask) + 1 : 0);
+  const auto offset =
+      static_cast<std::int64_t>(ahead) - (ahead > kTimeMask / 2 ? static_cast<std::int64_t>(kTimeMask) + 1 : 0);
   return {reference.us + offset};
 }
 
 /// Everything a node sent for one tick, from Est_Epoch to Est_StateCrc.
 struct NodeEpoch {
-  std::optional<can::EstEpoch> head;         ///< missing: its frame was lost
+  std::optional<can::EstEpoch> head;  ///< missing: its frame was lost
   can::EstStateCrc tail;
-  std::size_t received = 0;                  ///< frames, tail included
-  std::span<const base::CanFrame> frames;    ///< the first 256 of them, in order of arrival; valid until the next frame
+  std::size_t received = 0;                ///< frames, tail included
+  std::span<const base::CanFrame> frames;  ///< the first 256 of them, in order of arrival; valid until the next frame
 };
 
 class EpochCollector {
@@ -75,7 +79,9 @@ class EpochCollector {
     if (*offset != can::EstStateCrc::kOffset) return std::nullopt;
     const auto tail = can::decode<can::EstStateCrc>(can::payload(frame));
     if (!tail) return std::nullopt;
-    const NodeEpoch done{.head = head_, .tail = *tail, .received = received_,
+    const NodeEpoch done{.head = head_,
+                         .tail = *tail,
+                         .received = received_,
                          .frames = std::span(frames_).first(received_ < frames_.size() ? received_ : frames_.size())};
     reset();
     return done;

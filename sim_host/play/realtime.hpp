@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Playing at the speed of the log: every frame at its time. The node ticks on Tick frames, or on its own timer after one Clock frame;
-// then what it does depends on real time, and the record of the run is what can be repeated (as_recorded).
+// Playing at the speed of the log: every frame at its time. The node ticks on Tick frames, or on its own timer after
+// one Clock frame; then what it does depends on real time, and the record of the run is what can be repeated
+// (as_recorded).
 #pragma once
 
 #include "sim_host/play/conversation.hpp"
@@ -17,13 +18,14 @@ struct RealtimeOptions {
   std::uint32_t base = 0x300;
   Sync sync = Sync::kTick;
   base::Micros period{10'000};
-  bool begin = true;             ///< start the node with a Begin frame; else it is taken as it is
+  bool begin = true;  ///< start the node with a Begin frame; else it is taken as it is
   Patience patience;
 };
 
 /// Frames in the order of sending. Throws RunError when the node does not answer.
 template <Link L, Sink K>
-void play_realtime(L& link, std::span<const TimedFrame> frames, K& sink, const RealtimeOptions& options, Counts& counts) {
+void play_realtime(L& link, std::span<const TimedFrame> frames, K& sink, const RealtimeOptions& options,
+                   Counts& counts) {
   if (frames.empty()) return;
   Conversation<L, K> node(link, sink, options.base, counts);
   RealtimeLedger ledger(counts);
@@ -44,7 +46,8 @@ void play_realtime(L& link, std::span<const TimedFrame> frames, K& sink, const R
     node.begin(tick - period, options.patience);
   } else {
     while (!ledger.known()) {
-      if (hal::monotonic_clock() - last_answer > options.patience.begin) throw RunError("no node is ticking on this bus");
+      if (hal::monotonic_clock() - last_answer > options.patience.begin)
+        throw RunError("no node is ticking on this bus");
       link.wait({20'000});
       receive(tick);
     }
@@ -80,7 +83,8 @@ void play_realtime(L& link, std::span<const TimedFrame> frames, K& sink, const R
     const bool all_sent = next == frames.size() && (options.sync == Sync::kClock || tick > end);
     if (all_sent && now > end + period && ledger.consumed() == counts.inputs) break;
     if (hal::monotonic_clock() - last_answer > options.patience.epoch + period)
-      throw RunError("the node has not ticked for " + in_seconds(options.patience.epoch) + ", at " + in_seconds(now) + " of the log");
+      throw RunError("the node has not ticked for " + in_seconds(options.patience.epoch) + ", at " + in_seconds(now) +
+                     " of the log");
     base::Micros until{20'000};
     if (next < frames.size()) until = std::min(until, frames[next].time - log_time());
     if (options.sync == Sync::kTick && tick <= end) until = std::min(until, tick - log_time());

@@ -13,7 +13,9 @@ namespace {
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
-constexpr double millimetres(std::int32_t raw) { return raw == can::EstPos::kXNotAvailable ? kNone : raw * can::EstPos::kXScale; }
+constexpr double millimetres(std::int32_t raw) {
+  return raw == can::EstPos::kXNotAvailable ? kNone : raw * can::EstPos::kXScale;
+}
 
 }  // namespace
 
@@ -25,7 +27,8 @@ Recorder::Recorder(const RecorderOptions& options)
       status_(options.folder + "/status.csv") {
   if (options.raw) raw_.emplace(options.folder + "/raw.log");
   estimates_.write(
-      "epoch,time_s,estimator,kind,x_m,y_m,yaw_rad,speed_mps,yaw_rate_radps,std_x_m,std_y_m,std_yaw_rad,corr_xy,corr_x_yaw,corr_y_yaw,"
+      "epoch,time_s,estimator,kind,x_m,y_m,yaw_rad,speed_mps,yaw_rate_radps,std_x_m,std_y_m,std_yaw_rad,corr_xy,corr_x_"
+      "yaw,corr_y_yaw,"
       "pos_valid,hdg_valid\n");
   innovations_.write("epoch,time_s,estimator,sensor,inst,verdict,dof,nis,ratio,age_ms,landmark\n");
   status_.write("epoch,time_s,mode,used,faults,reset_ctr,reset_cause\n");
@@ -99,31 +102,57 @@ void Recorder::frame(const base::CanFrame& f) {
 }
 
 void Recorder::estimate_row(std::size_t k, const Instance& e) {
-  const auto motion = [&](float can::EstMotion::*field) { return e.motion ? static_cast<double>((*e.motion).*field) : kNone; };
-  const auto deviation = [&](float can::EstStdPose::*field) { return e.deviation ? static_cast<double>((*e.deviation).*field) : kNone; };
-  const auto correlation = [&](float can::EstStdMore::*field) { return e.correlation ? static_cast<double>((*e.correlation).*field) : kNone; };
+  const auto motion = [&](float can::EstMotion::*field) {
+    return e.motion ? static_cast<double>((*e.motion).*field) : kNone;
+  };
+  const auto deviation = [&](float can::EstStdPose::*field) {
+    return e.deviation ? static_cast<double>((*e.deviation).*field) : kNone;
+  };
+  const auto correlation = [&](float can::EstStdMore::*field) {
+    return e.correlation ? static_cast<double>((*e.correlation).*field) : kNone;
+  };
   row(time_).integer(static_cast<std::int64_t>(k)).put(',').text(name(e.position->kind));
   line_.put(',').real(millimetres(e.position->x_raw), 3).put(',').real(millimetres(e.position->y_raw), 3);
   line_.put(',').real(motion(&can::EstMotion::yaw_rad), 4).put(',').real(motion(&can::EstMotion::speed_mps), 3);
   line_.put(',').real(motion(&can::EstMotion::yaw_rate_radps), 4);
-  for (const auto field : {&can::EstStdPose::std_x_m, &can::EstStdPose::std_y_m, &can::EstStdPose::std_yaw_rad, &can::EstStdPose::corr_xy})
+  for (const auto field :
+       {&can::EstStdPose::std_x_m, &can::EstStdPose::std_y_m, &can::EstStdPose::std_yaw_rad, &can::EstStdPose::corr_xy})
     line_.put(',').real(deviation(field), 4);
-  for (const auto field : {&can::EstStdMore::corr_x_yaw, &can::EstStdMore::corr_y_yaw}) line_.put(',').real(correlation(field), 4);
+  for (const auto field : {&can::EstStdMore::corr_x_yaw, &can::EstStdMore::corr_y_yaw})
+    line_.put(',').real(correlation(field), 4);
   line_.put(',');
-  if (e.motion) line_.put(e.motion->pos_valid ? '1' : '0').put(',').put(e.motion->hdg_valid ? '1' : '0');
-  else line_.put(',');
+  if (e.motion)
+    line_.put(e.motion->pos_valid ? '1' : '0').put(',').put(e.motion->hdg_valid ? '1' : '0');
+  else
+    line_.put(',');
   estimates_.write(line_.put('\n').view());
 }
 
 void Recorder::innovation_row(const can::EstInnov& i) {
   row(time_).integer(i.estimator).put(',').text(name(i.sensor)).put(',').integer(i.inst).put(',').text(name(i.verdict));
-  line_.put(',').integer(i.dof).put(',').real(static_cast<double>(i.nis), 2).put(',').real(static_cast<double>(i.ratio), 2).put(',').real(static_cast<double>(i.age_ms), 0).put(',');
+  line_.put(',')
+      .integer(i.dof)
+      .put(',')
+      .real(static_cast<double>(i.nis), 2)
+      .put(',')
+      .real(static_cast<double>(i.ratio), 2)
+      .put(',')
+      .real(static_cast<double>(i.age_ms), 0)
+      .put(',');
   if (i.id != can::EstInnov::kIdNotAvailable) line_.integer(i.id);
   innovations_.write(line_.put('\n').view());
 }
 
 void Recorder::status_row(const can::EstStatus& s) {
-  row(time_).text(name(s.mode)).put(',').integer(s.used).put(',').integer(s.faults).put(',').integer(s.reset_ctr).put(',');
+  row(time_)
+      .text(name(s.mode))
+      .put(',')
+      .integer(s.used)
+      .put(',')
+      .integer(s.faults)
+      .put(',')
+      .integer(s.reset_ctr)
+      .put(',');
   status_.write(line_.text(name(s.reset_cause)).put('\n').view());
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Writes what a node said: estimates.log (candump format, stamped with the epoch's time, only frames that are the same in every run of
-// the same input), estimates.csv, innovations.csv, status.csv, and on request raw.log (everything on the bus as it came).
+// Writes what a node said: estimates.log (candump format, stamped with the epoch's time, only frames that are the same
+// in every run of the same input), estimates.csv, innovations.csv, status.csv, and on request raw.log (everything on
+// the bus as it came).
 #pragma once
 
 #include "sim_host/play/out_file.hpp"
@@ -20,8 +21,8 @@ struct RecorderOptions {
   std::string interface = "vcan0";  ///< as written in raw.log
 };
 
-/// Bits of a classic frame on the wire with worst-case stuffing and interframe space (ISO 11898-1; Davis et al., Real-Time Systems
-/// 35, 2007, eq. 1 and its extended form).
+/// Bits of a classic frame on the wire with worst-case stuffing and interframe space (ISO 11898-1; Davis et al.,
+/// Real-Time Systems 35, 2007, eq. 1 and its extended form).
 [[nodiscard]] constexpr std::uint64_t worst_case_bits(const base::CanFrame& frame) {
   const std::uint64_t data = 8U * frame.size, stuffed = (frame.extended ? 54U : 34U) + data;
   return stuffed + (stuffed - 1) / 4 + 13;
@@ -31,14 +32,14 @@ class Recorder {
  public:
   struct Totals {
     std::uint64_t epochs = 0;
-    std::uint64_t estimates = 0;       ///< Est<k>_Pos frames
-    std::uint64_t frames_sent = 0;     ///< by us
-    std::uint64_t frames_received = 0; ///< anything on the bus
+    std::uint64_t estimates = 0;        ///< Est<k>_Pos frames
+    std::uint64_t frames_sent = 0;      ///< by us
+    std::uint64_t frames_received = 0;  ///< anything on the bus
     std::uint64_t bits_sent = 0;
     std::uint64_t bits_received = 0;
-    std::uint32_t state_crc = 0;       ///< the last
-    base::Micros first, last;          ///< epochs
-    std::string estimates_sha256;      ///< after finish()
+    std::uint32_t state_crc = 0;   ///< the last
+    base::Micros first, last;      ///< epochs
+    std::string estimates_sha256;  ///< after finish()
   };
 
   /// Makes the folder and the files; throws when that is not possible.

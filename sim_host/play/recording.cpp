@@ -24,11 +24,13 @@ struct Segment {
   std::optional<base::Micros> begin;
   std::vector<base::CanFrame> inputs;
   std::vector<Entry> entries;
+  bool skipped = false;  ///< the log begins in the middle of it: what the node knew by then is unknown
 };
 
-/// Follows the tally of the node over the first `limit` entries, its first input being inputs[start]; the place of the first
-/// disagreement.
-std::optional<std::size_t> disagreement(const Segment& segment, std::size_t start, std::uint32_t log_base, std::size_t limit) {
+/// Follows the tally of the node over the first `limit` entries, its first input being inputs[start]; the place of the
+/// first disagreement.
+std::optional<std::size_t> disagreement(const Segment& segment, std::size_t start, std::uint32_t log_base,
+                                        std::size_t limit) {
   app::InputTally tally;
   std::size_t next = start;
   for (std::size_t e = 0; e < segment.entries.size() && e < limit; ++e) {
@@ -43,8 +45,8 @@ std::optional<std::size_t> disagreement(const Segment& segment, std::size_t star
   return std::nullopt;
 }
 
-/// Where in the log the node's consumption begins. With a Begin frame that is known; a node that was switched on while frames were
-/// flowing took some of those before its first epoch, and its own CRC of them tells which.
+/// Where in the log the node's consumption begins. With a Begin frame that is known; a node that was switched on while
+/// frames were flowing took some of those before its first epoch, and its own CRC of them tells which.
 std::size_t find_start(const Segment& segment, std::uint32_t log_base) {
   constexpr std::size_t kEnough = 32;  // epochs; 16 bits of CRC each
   if (segment.begin) return 0;
@@ -65,12 +67,16 @@ class Builder {
   Recording build() {
     for (const TimedFrame& entry : log_.frames) add(entry);
     close_segment();
+    if (result_.epochs.empty() && result_.skipped_epochs > 0)
+      refuse("it begins after the node's start: no Begin frame, and its first epoch is not the node's first");
     if (result_.epochs.empty()) refuse("no whole epoch of a node in it");
     return std::move(result_);
   }
 
  private:
-  [[noreturn]] void refuse(const std::string& why) const { throw std::runtime_error(log_.name + ": cannot be repeated exactly: " + why); }
+  [[noreturn]] void refuse(const std::string& why) const {
+    throw std::runtime_error(log_.name + ": cannot be repeated exactly: " + why);
+  }
 
   void add(const TimedFrame& entry) {
     const base::CanFrame& frame = entry.frame;
@@ -85,7 +91,8 @@ class Builder {
     }
     if (begin_ && collector_.is_begin_answer(frame)) start_segment();
     if (*offset == can::EstEpoch::kOffset) {
-      if (!collector_.idle() && collector_.head()) refuse("the epoch before " + in_seconds(entry.time) + " lacks its last frame");
+      if (!collector_.idle() && collector_.head() && !segment_.skipped)
+        refuse("the epoch before " + in_seconds(entry.time) + " lacks its last frame");
       inputs_before_ = segment_.inputs.size();
     }
     if (const auto epoch = collector_.add(frame)) add_epoch(*epoch, entry.time);
@@ -103,14 +110,15 @@ class Builder {
   }
 
   void add_epoch(const NodeEpoch& epoch, base::Micros logged) {
-    if (!epoch.head) refuse("the epoch at " + in_seconds(logged) + " lacks its first frame");
     const std::size_t number = segment_.entries.size() + 1;
-    if (epoch.tail.epoch != static_cast<std::uint8_t>(number)) {
-      if (number == 1) refuse("it begins after the node's start (no Begin frame, and the first epoch is not the node's first)");
-      refuse("epochs are missing before " + in_seconds(logged));
-    }
+    const bool next_one = epoch.tail.epoch == static_cast<std::uint8_t>(number);
+    if (number == 1 && !segment_.begin && (!next_one || !epoch.head)) segment_.skipped = true;
+    if (segment_.skipped) return void(++result_.skipped_epochs);
+    if (!epoch.head) refuse("the epoch at " + in_seconds(logged) + " lacks its first frame");
+    if (!next_one) refuse("epochs are missing before " + in_seconds(logged));
     if (epoch.received < epoch.tail.frames) result_.missing_outputs += epoch.tail.frames - epoch.received;
-    Segment::Entry entry{.tail = epoch.tail, .in_crc = epoch.head->in_crc, .inputs_before = inputs_before_, .epoch = {}};
+    Segment::Entry entry{
+        .tail = epoch.tail, .in_crc = epoch.head->in_crc, .inputs_before = inputs_before_, .epoch = {}};
     entry.epoch.time = {static_cast<std::int64_t>(epoch.head->time_us)};
     entry.epoch.first = result_.outputs.size();
     for (const base::CanFrame& frame : epoch.frames)
@@ -122,7 +130,8 @@ class Builder {
   void close_segment() {
     if (segment_.entries.empty()) return;
     const std::size_t start = find_start(segment_, options_.log_base);
-    if (const auto e = disagreement(segment_, start, options_.log_base, segment_.entries.size()); e && !result_.inputs_differ_at)
+    if (const auto e = disagreement(segment_, start, options_.log_base, segment_.entries.size());
+        e && !result_.inputs_differ_at)
       result_.inputs_differ_at = segment_.entries[*e].epoch.time;
     std::size_t next = start;
     std::uint16_t consumed = 0;
@@ -135,7 +144,8 @@ class Builder {
         frame.id = frame.id - options_.log_base + options_.base;
         result_.script.add_input(frame);
       }
-      result_.script.add_tick(entry.epoch.time, first ? std::optional(segment_.begin.value_or(base::Micros{})) : std::nullopt);
+      result_.script.add_tick(entry.epoch.time,
+                              first ? std::optional(segment_.begin.value_or(base::Micros{})) : std::nullopt);
       result_.epochs.push_back(entry.epoch);
       first = false;
     }
@@ -157,8 +167,9 @@ class Builder {
 }  // namespace
 
 bool is_recording(std::span<const TimedFrame> log, std::uint32_t log_base) {
-  return std::any_of(log.begin(), log.end(),
-                     [&](const TimedFrame& e) { return offset_in_block(e.frame, log_base) == can::EstStateCrc::kOffset; });
+  return std::any_of(log.begin(), log.end(), [&](const TimedFrame& e) {
+    return offset_in_block(e.frame, log_base) == can::EstStateCrc::kOffset;
+  });
 }
 
 Recording recording_of(const Log& log, const ScriptOptions& options) { return Builder(log, options).build(); }
@@ -184,8 +195,8 @@ void Comparison::epoch(const NodeEpoch& epoch, base::Micros time) {
   const auto differs = [&](const base::CanFrame* recorded, const base::CanFrame* now) {
     ++different_;
     if (!first_difference_.empty()) return;
-    first_difference_ = "epoch " + std::to_string(number) + " at " + in_seconds(time) + ": recorded " + text_of(recorded, recording_.base) +
-                        ", now " + text_of(now, base_);
+    first_difference_ = "epoch " + std::to_string(number) + " at " + in_seconds(time) + ": recorded " +
+                        text_of(recorded, recording_.base) + ", now " + text_of(now, base_);
   };
   for (const base::CanFrame& frame : epoch.frames) {
     if (!is_deterministic(frame.id - base_)) continue;

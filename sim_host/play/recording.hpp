@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A log that holds a node's own frames is the record of a run. From it follows what the node consumed before each tick (DESIGN.md 4.2),
-// so the run can be played again exactly, and what it answered can be compared byte for byte.
+// A log that holds a node's own frames is the record of a run. From it follows what the node consumed before each tick
+// (DESIGN.md 4.2), so the run can be played again exactly, and what it answered can be compared byte for byte.
 #pragma once
 
 #include "sim_host/play/protocol.hpp"
@@ -24,16 +24,19 @@ struct Recording {
   Script script;
   std::vector<base::CanFrame> outputs;  ///< the node's deterministic frames
   std::vector<RecordedEpoch> epochs;
-  std::uint32_t base = 0;               ///< of the recorded node
-  std::uint64_t missing_outputs = 0;    ///< frames the node said it sent and the log does not hold
-  /// Where the inputs in the log first differ from what the node says it consumed (Est_Epoch.InCrc): a frame was lost between them.
+  std::uint32_t base = 0;             ///< of the recorded node
+  std::uint64_t skipped_epochs = 0;   ///< of a node that was running already and was restarted later in the log
+  std::uint64_t missing_outputs = 0;  ///< frames the node said it sent and the log does not hold
+  /// Where the inputs in the log first differ from what the node says it consumed (Est_Epoch.InCrc): a frame was lost
+  /// between them.
   std::optional<base::Micros> inputs_differ_at;
 };
 
 /// True if a node with this base speaks in the log.
 [[nodiscard]] bool is_recording(std::span<const TimedFrame> log, std::uint32_t log_base);
 
-/// Throws std::runtime_error when the run cannot be repeated: the node's start is not in the log, or epochs are missing.
+/// Throws std::runtime_error when the run cannot be repeated: the node's start is not in the log, or epochs are
+/// missing.
 [[nodiscard]] Recording recording_of(const Log& log, const ScriptOptions& options);
 
 /// A sink's part: holds each epoch against the recorded one.

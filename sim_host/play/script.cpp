@@ -37,9 +37,13 @@ Script on_its_own_ticks(std::span<const TimedFrame> log, const ScriptOptions& op
 
 Script on_a_grid(std::span<const TimedFrame> log, const ScriptOptions& options) {
   Script script;
-  const auto at_or_after = [&](base::Micros t) { return base::Micros{(t.us + options.period.us - 1) / options.period.us * options.period.us}; };
+  const auto at_or_after = [&](base::Micros t) {
+    return base::Micros{(t.us + options.period.us - 1) / options.period.us * options.period.us};
+  };
   std::optional<base::Micros> tick;
-  const auto add_tick = [&] { script.add_tick(*tick, script.ticks() == 0 ? std::optional(*tick - options.period) : std::nullopt); };
+  const auto add_tick = [&] {
+    script.add_tick(*tick, script.ticks() == 0 ? std::optional(*tick - options.period) : std::nullopt);
+  };
   for (const TimedFrame& entry : log) {
     if (!is_counted_input(entry.frame, options.log_base)) continue;
     if (!tick) tick = std::max(at_or_after(entry.time), options.period);
@@ -63,7 +67,8 @@ std::vector<TimedFrame> inputs_of(std::span<const TimedFrame> log, const ScriptO
 }
 
 Script script_of(std::span<const TimedFrame> log, const ScriptOptions& options) {
-  const bool has_ticks = std::any_of(log.begin(), log.end(), [&](const TimedFrame& e) { return tick_of(e.frame, options.log_base).has_value(); });
+  const bool has_ticks = std::any_of(
+      log.begin(), log.end(), [&](const TimedFrame& e) { return tick_of(e.frame, options.log_base).has_value(); });
   return has_ticks ? on_its_own_ticks(log, options) : on_a_grid(log, options);
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a player sends: for every tick its input frames, then the tick. Made from a log, from a simulated world, or from the record of
-// another run.
+// What a player sends: for every tick its input frames, then the tick. Made from a log, from a simulated world, or from
+// the record of another run.
 #pragma once
 
 #include "base/can_frame.hpp"
@@ -34,7 +34,9 @@ class Script {
  public:
   void add_input(const base::CanFrame& frame) { inputs_.push_back(frame); }
   /// A tick after the inputs added so far.
-  void add_tick(base::Micros time, std::optional<base::Micros> begin = std::nullopt) { ticks_.push_back({time, begin, inputs_.size()}); }
+  void add_tick(base::Micros time, std::optional<base::Micros> begin = std::nullopt) {
+    ticks_.push_back({time, begin, inputs_.size()});
+  }
 
   bool next(Tick& tick) {
     if (next_ == ticks_.size()) return false;
@@ -72,9 +74,9 @@ struct ScriptOptions {
 /// The log's input frames with the ids of the node, sync frames left out.
 [[nodiscard]] std::vector<TimedFrame> inputs_of(std::span<const TimedFrame> log, const ScriptOptions& options);
 
-/// When there are Tick or Step frames in the log, those are the ticks. Else a grid of whole periods from the first frame on, and a
-/// frame belongs to the first tick at or after its time; a frame earlier than its predecessor belongs to that one's tick. A pause of
-/// more than a minute is skipped, so the node sees time jump.
+/// When there are Tick or Step frames in the log, those are the ticks. Else a grid of whole periods from the first
+/// frame on, and a frame belongs to the first tick at or after its time; a frame earlier than its predecessor belongs
+/// to that one's tick. A pause of more than a minute is skipped, so the node sees time jump.
 [[nodiscard]] Script script_of(std::span<const TimedFrame> log, const ScriptOptions& options);
 
 }  // namespace tetap::sim

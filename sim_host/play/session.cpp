@@ -37,7 +37,9 @@ std::string quoted(std::string_view text) {
 
 Session::Session(const SessionOptions& options, const Recording* recording)
     : options_(options),
-      recorder_({.folder = options.folder, .base = options.base, .raw = options.raw,
+      recorder_({.folder = options.folder,
+                 .base = options.base,
+                 .raw = options.raw,
                  .interface = options.bus == "memory" ? "vcan0" : options.bus}),
       recording_(recording),
       terminal_(isatty(STDERR_FILENO) == 1) {
@@ -50,12 +52,16 @@ void Session::show_progress() {
   shown_ = now;
   const Recorder::Totals& t = recorder_.totals();
   const double played = to_seconds(t.last - t.first);
-  const double share = options_.ticks > 0 ? 100.0 * static_cast<double>(t.epochs) / static_cast<double>(options_.ticks) : 0;
+  const double share =
+      options_.ticks > 0 ? 100.0 * static_cast<double>(t.epochs) / static_cast<double>(options_.ticks) : 0;
   Line line;
   if (terminal_) line.put('\r');
   line.text(options_.program).text(": ").real(played, 1).text(" s played");
   if (options_.ticks > 0) line.text(", ").real(share, 0).text(" %");
-  line.text(", ").real(played / to_seconds(now - began_), 1).text(" x real time, ").integer(static_cast<std::int64_t>(counts_.lost()));
+  line.text(", ")
+      .real(played / to_seconds(now - began_), 1)
+      .text(" x real time, ")
+      .integer(static_cast<std::int64_t>(counts_.lost()));
   line.text(" frames lost ").text(terminal_ ? "  " : "\n");
   std::fwrite(line.view().data(), 1, line.view().size(), stderr);
 }
@@ -64,17 +70,18 @@ std::string Session::complaint() const {
   if (!error_.empty()) return error_;
   const auto count = [](std::uint64_t n) { return std::to_string(n); };
   if (counts_.lost() > 0)
-    return count(counts_.lost()) + " frames lost (" + count(counts_.lost_inputs) + " to the node, " + count(counts_.lost_outputs) +
-           " from it, of these " + count(counts_.overflows) + " in our own socket)";
+    return count(counts_.lost()) + " frames lost (" + count(counts_.lost_inputs) + " to the node, " +
+           count(counts_.lost_outputs) + " from it, of these " + count(counts_.overflows) + " in our own socket)";
   if (counts_.extra() > 0)
-    return count(counts_.extra()) + " frames too many (" + count(counts_.extra_inputs) + " to the node, " + count(counts_.extra_outputs) +
-           " from it): is there another sender on this bus?";
+    return count(counts_.extra()) + " frames too many (" + count(counts_.extra_inputs) + " to the node, " +
+           count(counts_.extra_outputs) + " from it): is there another sender on this bus?";
   if (!comparison_) return {};
   if (comparison_->different() > 0)
-    return count(comparison_->different()) + " of " + count(comparison_->compared()) + " epochs differ from the recording; first " +
-           comparison_->first_difference();
+    return count(comparison_->different()) + " of " + count(comparison_->compared()) +
+           " epochs differ from the recording; first " + comparison_->first_difference();
   if (comparison_->missing() > 0) return count(comparison_->missing()) + " recorded epochs were not repeated";
-  if (recording_->missing_outputs > 0) return "the recording itself lacks " + count(recording_->missing_outputs) + " frames of the node";
+  if (recording_->missing_outputs > 0)
+    return "the recording itself lacks " + count(recording_->missing_outputs) + " frames of the node";
   return {};
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// One run of a node seen from the host: the sink that records, compares and shows progress, and at the end says in run.json, in one
-// line, and in the exit status how it went.
+// One run of a node seen from the host: the sink that records, compares and shows progress, and at the end says in
+// run.json, in one line, and in the exit status how it went.
 #pragma once
 
 #include "hal/port/linux/clock.hpp"
@@ -18,16 +18,16 @@
 namespace tetap::sim {
 
 struct SessionOptions {
-  std::string program;             ///< for messages
+  std::string program;  ///< for messages
   std::string folder;
   std::uint32_t base = 0x300;
   bool raw = false;
-  std::string mode;                ///< lockstep, realtime, as-recorded
-  std::string bus;                 ///< interface, or memory
+  std::string mode;  ///< lockstep, realtime, as-recorded
+  std::string bus;   ///< interface, or memory
   std::string robot;
-  std::string log;                 ///< path, or what was simulated
-  std::uint64_t ticks = 0;         ///< expected, for the progress line; 0: unknown
-  double bitrate = 500'000;        ///< for the bus load
+  std::string log;           ///< path, or what was simulated
+  std::uint64_t ticks = 0;   ///< expected, for the progress line; 0: unknown
+  double bitrate = 500'000;  ///< for the bus load
   bool quiet = false;
 };
 
@@ -50,8 +50,8 @@ class Session {
   /// Another line for run.json: `value` is JSON (a number, or a quoted string).
   void note(std::string key, std::string value) { notes_.emplace_back(std::move(key), std::move(value)); }
 
-  /// Plays with `play()` and turns a RunError into a message. Returns the exit status: 0, or 1 when frames were lost, came twice, or
-  /// differ from the recording.
+  /// Plays with `play()` and turns a RunError into a message. Returns the exit status: 0, or 1 when frames were lost,
+  /// came twice, or differ from the recording.
   template <class Play>
   int run(Play&& play) {
     try {

@@ -99,10 +99,13 @@ TEST(LogLine, AnyBytesAreEitherALineOrRefused) {
   for (int i = 0; i < 200'000; ++i) {
     std::string text = i % 2 == 0 ? "(1.5) can0 123#1122" : "";
     for (std::uint64_t n = draw() % 24; n > 0; --n)
-      text.insert(draw() % (text.size() + 1), 1, i % 3 == 0 ? static_cast<char>(draw()) : alphabet[draw() % alphabet.size()]);
+      text.insert(draw() % (text.size() + 1), 1,
+                  i % 3 == 0 ? static_cast<char>(draw()) : alphabet[draw() % alphabet.size()]);
     const auto parsed = parse_log_line(text);
-    if (const auto* line = std::get_if<LogLine>(&parsed)) EXPECT_LE(line->frame.size, 64);
-    else EXPECT_FALSE(std::get<BadLine>(parsed).reason.empty());
+    if (const auto* line = std::get_if<LogLine>(&parsed))
+      EXPECT_LE(line->frame.size, 64);
+    else
+      EXPECT_FALSE(std::get<BadLine>(parsed).reason.empty());
   }
 }
 
@@ -121,8 +124,9 @@ TEST(Log, AMalformedLineStopsWithFileLineReasonAndText) {
 }
 
 TEST(Log, FramesThatAreNoneOfOursAreCountedNotPlayed) {
-  const Log log = parse_log("(2.0) a 301#11\n(1.0) a 301#11\n(3.0) b 301#11\n(3.0) a 301#R\n(4.0) a 301##1\n(5.0) a 20000001#00", "x",
-                            {.interface = "a", .keep_going = false});
+  const Log log =
+      parse_log("(2.0) a 301#11\n(1.0) a 301#11\n(3.0) b 301#11\n(3.0) a 301#R\n(4.0) a 301##1\n(5.0) a 20000001#00",
+                "x", {.interface = "a", .keep_going = false});
   EXPECT_EQ(log.frames.size(), 2U);
   EXPECT_EQ(log.back_in_time, 1U);
   EXPECT_EQ(log.other_interface, 1U);

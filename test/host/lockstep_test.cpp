@@ -54,7 +54,9 @@ Outcome run(Sabotage sabotage = {}, std::size_t window = 8, Script script = regu
 }
 
 bool is_input(const base::CanFrame& f) { return f.id == 0x308; }
-bool is_step(const base::CanFrame& f) { return f.id == 0x300 && f.data[7] == static_cast<std::uint8_t>(can::SyncKind::kStep); }
+bool is_step(const base::CanFrame& f) {
+  return f.id == 0x300 && f.data[7] == static_cast<std::uint8_t>(can::SyncKind::kStep);
+}
 
 class Window : public testing::TestWithParam<std::size_t> {};
 INSTANTIATE_TEST_SUITE_P(Sizes, Window, testing::Values(1U, 2U, 8U, 64U));
@@ -76,9 +78,10 @@ TEST_P(Window, ACleanRunLosesNothingAndIsTheSameForEveryWindow) {
 
 TEST_P(Window, EveryInputLostOnItsWayIsCounted) {
   std::set<std::uint64_t> lost;
-  const Outcome o = run({.into = [&, n = 0U](std::uint64_t, const base::CanFrame& f) mutable {
-                           return is_input(f) && ++n % 37 == 0 ? (lost.insert(n), 0) : 1;
-                         },
+  const Outcome o = run({.into =
+                             [&, n = 0U](std::uint64_t, const base::CanFrame& f) mutable {
+                               return is_input(f) && ++n % 37 == 0 ? (lost.insert(n), 0) : 1;
+                             },
                          .out_of = {}},
                         GetParam());
   EXPECT_EQ(o.error, "");
@@ -90,9 +93,10 @@ TEST_P(Window, EveryInputLostOnItsWayIsCounted) {
 
 TEST_P(Window, EveryInputConsumedTwiceIsCounted) {
   std::uint64_t doubled = 0;
-  const Outcome o = run({.into = [&, n = 0U](std::uint64_t, const base::CanFrame& f) mutable {
-                           return is_input(f) && ++n % 41 == 0 ? (++doubled, 2) : 1;
-                         },
+  const Outcome o = run({.into =
+                             [&, n = 0U](std::uint64_t, const base::CanFrame& f) mutable {
+                               return is_input(f) && ++n % 41 == 0 ? (++doubled, 2) : 1;
+                             },
                          .out_of = {}},
                         GetParam());
   EXPECT_EQ(o.counts.extra_inputs, doubled);
@@ -102,12 +106,14 @@ TEST_P(Window, EveryInputConsumedTwiceIsCounted) {
 TEST_P(Window, EveryOutputLostOrDoubledWithinAnEpochIsCounted) {
   std::uint64_t lost = 0, doubled = 0;
   const Outcome o = run({.into = {},
-                         .out_of = [&, n = 0U](std::uint64_t, const base::CanFrame& f) mutable {
-                           if (f.id == 0x321 || f.id == 0x326) return 1;  // the epoch's end and the answer to Begin get through
-                           ++n;
-                           if (n % 23 == 0) return ++lost, 0;
-                           return n % 29 == 0 ? (++doubled, 2) : 1;
-                         }},
+                         .out_of =
+                             [&, n = 0U](std::uint64_t, const base::CanFrame& f) mutable {
+                               if (f.id == 0x321 || f.id == 0x326)
+                                 return 1;  // the epoch's end and the answer to Begin get through
+                               ++n;
+                               if (n % 23 == 0) return ++lost, 0;
+                               return n % 29 == 0 ? (++doubled, 2) : 1;
+                             }},
                         GetParam());
   EXPECT_EQ(o.error, "");
   // A frame lost and another one doubled in one epoch look like none: the two periods meet in an epoch now and then.
@@ -163,10 +169,10 @@ TEST(Lockstep, DoubledEndsOfEpochsAreCounted) {
 
 TEST(Lockstep, ALostSyncFrameIsALostInput) {
   std::uint64_t lost = 0;
-  const Outcome o = run({.into = [&, n = 0U](std::uint64_t, const base::CanFrame& f) mutable {
-                           return is_step(f) && ++n % 100 == 50 ? (++lost, 0) : 1;
-                         },
-                         .out_of = {}});
+  const Outcome o = run(
+      {.into = [&, n = 0U](std::uint64_t,
+                           const base::CanFrame& f) mutable { return is_step(f) && ++n % 100 == 50 ? (++lost, 0) : 1; },
+       .out_of = {}});
   EXPECT_EQ(o.error, "");
   EXPECT_EQ(o.counts.lost_inputs, lost);
   EXPECT_EQ(o.counts.lost_outputs, 0U);
@@ -174,11 +180,16 @@ TEST(Lockstep, ALostSyncFrameIsALostInput) {
 }
 
 TEST(Lockstep, ANodeThatStopsAnsweringIsReportedWithWhatIsMissing) {
-  const Outcome step = run({.into = [n = 0](std::uint64_t, const base::CanFrame& f) mutable { return is_step(f) && ++n > 10 ? 0 : 1; },
-                            .out_of = {}}, 1);
+  const Outcome step =
+      run({.into = [n = 0](std::uint64_t, const base::CanFrame& f) mutable { return is_step(f) && ++n > 10 ? 0 : 1; },
+           .out_of = {}},
+          1);
   EXPECT_NE(step.error.find("no answer to the tick at 0.110 s"), std::string::npos) << step.error;
   EXPECT_NE(step.error.find("no frame of the epoch came; 10 epochs before it"), std::string::npos) << step.error;
-  const Outcome end = run({.into = {}, .out_of = [n = 0](std::uint64_t, const base::CanFrame& f) mutable { return f.id == 0x321 && ++n > 4 ? 0 : 1; }}, 1);
+  const Outcome end = run(
+      {.into = {},
+       .out_of = [n = 0](std::uint64_t, const base::CanFrame& f) mutable { return f.id == 0x321 && ++n > 4 ? 0 : 1; }},
+      1);
   EXPECT_NE(end.error.find("Est_StateCrc) is missing, 4 of its frames came"), std::string::npos) << end.error;
 }
 

@@ -45,9 +45,16 @@ class Folder : public testing::Test {
     hal::MemoryCan end = bus.node_end();
     StandInNode node(end, 0x300, std::move(sabotage));
     MemoryLink link(bus, [&node] { node.poll(); });
-    Session session({.program = "test", .folder = folder.empty() ? path_ : folder, .raw = true, .mode = "lockstep", .bus = "memory",
-                     .robot = "none", .log = "a \"log\"", .quiet = true});
-    return session.run([&] { play_lockstep(link, script, session, {.base = 0x300, .window = window}, session.counts()); });
+    Session session({.program = "test",
+                     .folder = folder.empty() ? path_ : folder,
+                     .raw = true,
+                     .mode = "lockstep",
+                     .bus = "memory",
+                     .robot = "none",
+                     .log = "a \"log\"",
+                     .quiet = true});
+    return session.run(
+        [&] { play_lockstep(link, script, session, {.base = 0x300, .window = window}, session.counts()); });
   }
   static Script script(int ticks) {
     Script s;
@@ -64,7 +71,8 @@ TEST_F(Folder, ARunLeavesItsFilesBehind) {
   const std::string estimates = read(path_ + "/estimates.csv");
   EXPECT_EQ(line(estimates, 0).find("epoch,time_s,estimator,kind,x_m,y_m,yaw_rad"), 0U);
   EXPECT_EQ(line(estimates, 1), "1,1.000000,0,Odometry,0.001,-0.001,0.5000,-1.250,0.0000,,,,,,,1,0");
-  EXPECT_EQ(line(estimates, 5), "5,1.040000,0,Odometry,0.005,-0.005,0.5000,-1.250,0.0000,0.2500,0.5000,0.1000,-0.5000,,,1,0");
+  EXPECT_EQ(line(estimates, 5),
+            "5,1.040000,0,Odometry,0.005,-0.005,0.5000,-1.250,0.0000,0.2500,0.5000,0.1000,-0.5000,,,1,0");
   EXPECT_EQ(line(estimates, 21), "");
   const std::string log = read(path_ + "/estimates.log");
   EXPECT_EQ(line(log, 0).find("(0000000001.000000) vcan0 320#40420F000000"), 0U);
@@ -72,8 +80,8 @@ TEST_F(Folder, ARunLeavesItsFilesBehind) {
   EXPECT_EQ(log.find(" 326#"), std::string::npos);
   EXPECT_NE(read(path_ + "/raw.log").find(" 325#"), std::string::npos);
   const std::string json = read(path_ + "/run.json");
-  for (const char* text : {"\"frames_in\": 20,", "\"frames_lost\": 0,", "\"estimates_out\": 20,", "\"epochs\": 20,", "\"duration_s\": 0.190,",
-                           "\"log\": \"a \\\"log\\\"\","})
+  for (const char* text : {"\"frames_in\": 20,", "\"frames_lost\": 0,", "\"estimates_out\": 20,", "\"epochs\": 20,",
+                           "\"duration_s\": 0.190,", "\"log\": \"a \\\"log\\\"\","})
     EXPECT_NE(json.find(text), std::string::npos) << text << " in " << json;
   Sha256 hash;
   hash.add(log);
@@ -89,7 +97,8 @@ TEST_F(Folder, EstimatesAreTheSameBytesForEveryWindow) {
 
 TEST_F(Folder, EpochsAreNumberedOnWhenTheNodeIsRestarted) {
   Script s = script(300);
-  for (int i = 0; i < 3; ++i) s.add_tick({9'000'000 + i * 10'000}, i == 0 ? std::optional(base::Micros{8'000'000}) : std::nullopt);
+  for (int i = 0; i < 3; ++i)
+    s.add_tick({9'000'000 + i * 10'000}, i == 0 ? std::optional(base::Micros{8'000'000}) : std::nullopt);
   EXPECT_EQ(play(s), 0);
   const std::string estimates = read(path_ + "/estimates.csv");
   EXPECT_EQ(line(estimates, 300).find("300,3.990000,0,"), 0U) << line(estimates, 300);
@@ -105,7 +114,9 @@ TEST_F(Folder, TheRawLogIsARecordingOfTheRun) {
 }
 
 TEST_F(Folder, ALostFrameMakesTheRunFail) {
-  EXPECT_EQ(play(script(100), {.into = [](std::uint64_t n, const base::CanFrame&) { return n == 51 ? 0 : 1; }, .out_of = {}}), 1);
+  EXPECT_EQ(
+      play(script(100), {.into = [](std::uint64_t n, const base::CanFrame&) { return n == 51 ? 0 : 1; }, .out_of = {}}),
+      1);
   EXPECT_NE(read(path_ + "/run.json").find("\"frames_lost\": 1,"), std::string::npos);
 }
 
@@ -114,7 +125,8 @@ TEST_F(Folder, AnyBytesFromTheNodeAreWrittenWithoutHarm) {
   EpochCollector collector(0x300);
   std::mt19937_64 draw(6);
   for (int i = 0; i < 100'000; ++i) {
-    base::CanFrame f{.id = 0x2F0 + static_cast<std::uint32_t>(draw() % 0x60), .extended = draw() % 50 == 0,
+    base::CanFrame f{.id = 0x2F0 + static_cast<std::uint32_t>(draw() % 0x60),
+                     .extended = draw() % 50 == 0,
                      .size = static_cast<std::uint8_t>(draw() % 10 == 0 ? draw() % 9 : 8)};
     if (draw() % 8 == 0) f.id = 0x321;
     for (std::size_t b = 0; b < 8; ++b) f.data[b] = draw() % 4 == 0 ? 0xFF : static_cast<std::uint8_t>(draw());
@@ -149,7 +161,8 @@ struct Dbc {
       words >> kind >> table;
       if (kind == "VAL_TABLE_")
         for (int value = 0; words >> value >> text;) tables[table][value] = text.substr(1, text.size() - 2);
-      if (kind == "BO_" && words >> text) messages[static_cast<std::uint32_t>(std::stoul(table))] = text.substr(0, text.size() - 1);
+      if (kind == "BO_" && words >> text)
+        messages[static_cast<std::uint32_t>(std::stoul(table))] = text.substr(0, text.size() - 1);
     }
   }
 };

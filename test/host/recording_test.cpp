@@ -19,8 +19,8 @@ namespace {
 using test::KeepAll;
 using test::StandInNode;
 
-/// A node that ticks on its own while frames come as they like. The log sees frames in the order of the bus; the node takes up to
-/// `lag` of them later than its epoch's frames appear.
+/// A node that ticks on its own while frames come as they like. The log sees frames in the order of the bus; the node
+/// takes up to `lag` of them later than its epoch's frames appear.
 struct FreeRun {
   Log log;
   std::mt19937_64 draw{9};
@@ -43,7 +43,8 @@ struct FreeRun {
   }
   void inputs(std::size_t count) {
     for (std::size_t i = 0; i < count; ++i) {
-      const base::CanFrame f{.id = 0x301 + static_cast<std::uint32_t>(draw() % 0x1F), .size = 8,
+      const base::CanFrame f{.id = 0x301 + static_cast<std::uint32_t>(draw() % 0x1F),
+                             .size = 8,
                              .data = {static_cast<std::uint8_t>(draw()), static_cast<std::uint8_t>(draw())}};
       note(f);
       static_cast<void>(our_end.send(f));
@@ -164,6 +165,23 @@ TEST(Recording, ANodeThatWasRestartedIsRestartedAgain) {
   EXPECT_EQ(r.different, 0U) << r.first;
 }
 
+TEST(Recording, WhatTheNodeDidBeforeTheLogBeganIsLeftOutWhenItIsRestarted) {
+  for (const std::ptrdiff_t cut : {100, 101, 102, 103, 104, 105, 106, 107, 108}) {  // also in the middle of an epoch
+    FreeRun run;
+    run.begin(0);
+    run.ticks(30, 1'000'000);
+    run.begin(5'000'000);
+    run.ticks(40, 6'000'000);
+    run.log.frames.erase(run.log.frames.begin(), run.log.frames.begin() + cut);
+    const Recording recording = recording_of(run.log, {});
+    EXPECT_EQ(recording.epochs.size(), 40U);
+    EXPECT_GT(recording.skipped_epochs, 10U);
+    const Repeated r = repeat(recording);
+    EXPECT_EQ(r.compared, 40U);
+    EXPECT_EQ(r.different, 0U) << r.first;
+  }
+}
+
 TEST(Recording, ANodeThatComputesSomethingElseIsNoticedInItsFirstEpoch) {
   FreeRun run;
   run.begin(0);
@@ -217,7 +235,8 @@ TEST(Recording, WhatCannotBeRepeatedIsRefusedWithTheReason) {
     std::erase_if(log.frames, [&](const TimedFrame& f) { return f.frame.id == id && ++seen == which; });
     return log;
   };
-  EXPECT_NE(refusal(without(0x320, 10)).find("lacks its first frame"), std::string::npos) << refusal(without(0x320, 10));
+  EXPECT_NE(refusal(without(0x320, 10)).find("lacks its first frame"), std::string::npos)
+      << refusal(without(0x320, 10));
   EXPECT_NE(refusal(without(0x321, 10)).find("lacks its last frame"), std::string::npos) << refusal(without(0x321, 10));
   Log late = run.log;
   late.frames.erase(late.frames.begin(), late.frames.begin() + 120);
@@ -251,10 +270,12 @@ TEST(Realtime, FramesAndTicksKeepTheOrderOfTheLogHoweverLateTheyAre) {
   std::uint64_t polls = 0;
   MemoryLink link(bus, [&] {
     node.poll();
-    if (++polls % 50 == 0) hal::sleep_for({35'000});  // a machine that was busy with something else: much is due at once
+    if (++polls % 50 == 0)
+      hal::sleep_for({35'000});  // a machine that was busy with something else: much is due at once
   });
   std::vector<TimedFrame> frames;
-  for (int i = 0; i < 200; ++i) frames.push_back({{5'000'000 + i * 1'000}, {.id = 0x308, .size = 8, .data = {static_cast<std::uint8_t>(i)}}});
+  for (int i = 0; i < 200; ++i)
+    frames.push_back({{5'000'000 + i * 1'000}, {.id = 0x308, .size = 8, .data = {static_cast<std::uint8_t>(i)}}});
   KeepAll sink;
   Counts counts;
   play_realtime(link, frames, sink, {.base = 0x300}, counts);
@@ -270,7 +291,8 @@ TEST(Realtime, FramesAndTicksKeepTheOrderOfTheLogHoweverLateTheyAre) {
     }
     const auto sync = f.id == 0x300 ? can::decode<can::InSync>(can::payload(f)) : std::nullopt;
     if (!sync || sync->kind != can::SyncKind::kTick) continue;
-    EXPECT_EQ(sent, std::min<std::size_t>((sync->time_us - 5'000'000) / 1'000 + 1, 200)) << "before the tick at " << sync->time_us;
+    EXPECT_EQ(sent, std::min<std::size_t>((sync->time_us - 5'000'000) / 1'000 + 1, 200))
+        << "before the tick at " << sync->time_us;
   }
 }
 
@@ -278,12 +300,15 @@ TEST(Realtime, LostFramesAreCountedInBothDirections) {
   hal::MemoryBus bus;
   hal::MemoryCan end = bus.node_end();
   std::uint64_t lost_in = 0, lost_out = 0;
-  StandInNode node(end, 0x300, {.into = [&, n = 0U](std::uint64_t, const base::CanFrame& f) mutable {
-                                  return f.id != 0x300 && ++n % 10 == 0 ? (++lost_in, 0) : 1;
-                                },
-                                .out_of = [&, n = 0U](std::uint64_t, const base::CanFrame& f) mutable {
-                                  return f.id == 0x328 && ++n % 5 == 0 ? (++lost_out, 0) : 1;
-                                }});
+  StandInNode node(end, 0x300,
+                   {.into =
+                        [&, n = 0U](std::uint64_t, const base::CanFrame& f) mutable {
+                          return f.id != 0x300 && ++n % 10 == 0 ? (++lost_in, 0) : 1;
+                        },
+                    .out_of =
+                        [&, n = 0U](std::uint64_t, const base::CanFrame& f) mutable {
+                          return f.id == 0x328 && ++n % 5 == 0 ? (++lost_out, 0) : 1;
+                        }});
   MemoryLink link(bus, [&node] { node.poll(); });
   std::vector<TimedFrame> frames;
   for (int i = 0; i < 200; ++i) frames.push_back({{i * 1'000}, {.id = 0x308, .size = 8}});

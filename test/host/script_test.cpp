@@ -39,7 +39,10 @@ std::vector<Played> all(Script script) {
 
 TEST(Script, AFrameBelongsToTheFirstTickAtOrAfterIt) {
   const std::vector<TimedFrame> log{input(1'003'000, 1), input(1'010'000, 2), input(1'010'001, 3), input(1'045'000, 4)};
-  const std::vector<Played> expected{{1'010'000, {1, 2}, true}, {1'020'000, {3}, false}, {1'030'000, {}, false}, {1'040'000, {}, false},
+  const std::vector<Played> expected{{1'010'000, {1, 2}, true},
+                                     {1'020'000, {3}, false},
+                                     {1'030'000, {}, false},
+                                     {1'040'000, {}, false},
                                      {1'050'000, {4}, false}};
   EXPECT_EQ(all(script_of(log, {})), expected);
 }
@@ -57,7 +60,9 @@ TEST(Script, TimeThatJumpsByYearsDoesNotMakeMillionsOfTicks) {
 }
 
 TEST(Script, TicksInTheLogAreTheTicks) {
-  std::vector<TimedFrame> log{input(1'000, 1), {{2'000}, sync_frame(0x300, can::SyncKind::kTick, {7'000'000}, 0)}, input(2'500, 2),
+  std::vector<TimedFrame> log{input(1'000, 1),
+                              {{2'000}, sync_frame(0x300, can::SyncKind::kTick, {7'000'000}, 0)},
+                              input(2'500, 2),
                               {{3'000}, sync_frame(0x300, can::SyncKind::kClock, {1}, 1)},
                               {{4'000}, sync_frame(0x300, can::SyncKind::kStep, {7'012'345}, 2)}};
   const std::vector<Played> expected{{7'000'000, {1}, true}, {7'012'345, {2}, false}};
@@ -65,8 +70,9 @@ TEST(Script, TicksInTheLogAreTheTicks) {
 }
 
 TEST(Script, OnlyInputsOfTheNodesBlockArePlayedUnderItsIds) {
-  const std::vector<TimedFrame> log{input(1, 1, 0x2FF), input(2, 2, 0x301), input(3, 3, 0x31F), input(4, 4, 0x320), input(5, 5, 0x340),
-                                    {{6}, {.id = 0x308, .extended = true, .size = 1, .data = {6}}}};
+  const std::vector<TimedFrame> log{input(1, 1, 0x2FF), input(2, 2, 0x301),
+                                    input(3, 3, 0x31F), input(4, 4, 0x320),
+                                    input(5, 5, 0x340), {{6}, {.id = 0x308, .extended = true, .size = 1, .data = {6}}}};
   Script script = script_of(log, {.base = 0x480, .log_base = 0x300});
   Tick tick;
   ASSERT_TRUE(script.next(tick));
@@ -97,7 +103,8 @@ std::vector<TimedFrame> regular(int n) {
 int number(const TimedFrame& f) { return f.frame.data[0] + 256 * f.frame.data[1]; }
 
 bool same(const std::vector<TimedFrame>& a, const std::vector<TimedFrame>& b) {
-  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const auto& x, const auto& y) { return x.time == y.time && x.frame == y.frame; });
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(),
+                    [](const auto& x, const auto& y) { return x.time == y.time && x.frame == y.frame; });
 }
 
 TEST(Perturb, FollowsFromTheSeedAlone) {
@@ -116,12 +123,15 @@ TEST(Perturb, NothingAskedForChangesNothing) {
 
 TEST(Perturb, EveryFrameIsAccountedFor) {
   const auto frames = regular(20'000);
-  const Perturbed result = perturb(frames, {.seed = 3, .jitter_ms = 5, .drop = 0.01, .duplicate = 0.03, .reorder = 0.02});
+  const Perturbed result =
+      perturb(frames, {.seed = 3, .jitter_ms = 5, .drop = 0.01, .duplicate = 0.03, .reorder = 0.02});
   EXPECT_EQ(result.frames.size(), frames.size() - result.dropped + result.duplicated);
   std::map<int, int> copies;
   for (const TimedFrame& f : result.frames) ++copies[number(f)];
   EXPECT_EQ(copies.size(), frames.size() - result.dropped);
-  EXPECT_EQ(static_cast<std::uint64_t>(std::count_if(copies.begin(), copies.end(), [](const auto& c) { return c.second == 2; })), result.duplicated);
+  EXPECT_EQ(static_cast<std::uint64_t>(
+                std::count_if(copies.begin(), copies.end(), [](const auto& c) { return c.second == 2; })),
+            result.duplicated);
   // Binomial: five standard deviations on either side.
   EXPECT_NEAR(static_cast<double>(result.dropped), 200, 71);
   EXPECT_NEAR(static_cast<double>(result.duplicated), 594, 121);
@@ -148,7 +158,8 @@ TEST(Perturb, SwitchingOneEffectOnLeavesTheDrawsOfTheOthers) {
     for (const TimedFrame& f : perturb(frames, how).frames) there[static_cast<std::size_t>(number(f))] = true;
     return there;
   };
-  EXPECT_EQ(dropped({.seed = 1, .drop = 0.1}), dropped({.seed = 1, .jitter_ms = 9, .drop = 0.1, .duplicate = 0.2, .reorder = 0.3}));
+  EXPECT_EQ(dropped({.seed = 1, .drop = 0.1}),
+            dropped({.seed = 1, .jitter_ms = 9, .drop = 0.1, .duplicate = 0.2, .reorder = 0.3}));
 }
 
 TEST(Perturb, ReorderingChangesPlacesOfNeighboursOnly) {
@@ -180,7 +191,8 @@ TEST(Arguments, WhatIsNotUnderstoodIsNamed) {
   EXPECT_EQ(message({"--window"}, window), "--window needs a value");
   EXPECT_EQ(message({"--window", "3x"}, window), "--window needs a whole number from 1 to 128, not '3x'");
   EXPECT_EQ(message({"--window", "-3"}, window), "--window needs a whole number from 1 to 128, not '-3'");
-  EXPECT_EQ(message({"--drop", "nan"}, [](Arguments& a) { a.real("--drop", 0, 0, 1); }), "--drop needs a number from 0 to 1, not 'nan'");
+  EXPECT_EQ(message({"--drop", "nan"}, [](Arguments& a) { a.real("--drop", 0, 0, 1); }),
+            "--drop needs a number from 0 to 1, not 'nan'");
   EXPECT_EQ(message({"a", "b"}, [](Arguments& a) { a.positional(); }), "one argument too many: b (--help lists them)");
 }
 

@@ -21,8 +21,11 @@ namespace tetap::hal {
 namespace {
 
 base::CanFrame numbered(std::uint32_t n) {
-  return {.id = 0x100 + n % 0x100, .extended = n % 3 == 0, .size = 8,
-          .data = {static_cast<std::uint8_t>(n), static_cast<std::uint8_t>(n >> 8), static_cast<std::uint8_t>(n >> 16)}};
+  return {
+      .id = 0x100 + n % 0x100,
+      .extended = n % 3 == 0,
+      .size = 8,
+      .data = {static_cast<std::uint8_t>(n), static_cast<std::uint8_t>(n >> 8), static_cast<std::uint8_t>(n >> 16)}};
 }
 
 std::string refusal(const std::string& interface) {
@@ -49,7 +52,8 @@ std::optional<base::CanFrame> next(SocketCan& can) {
 TEST(SocketCan, FramesGoBothWaysAndNobodyHearsHimself) {
   SocketCan a("vcan0"), b("vcan0");
   for (std::uint8_t size = 0; size <= 8; ++size) {
-    const base::CanFrame there{.id = 0x7FF, .size = size, .data = {}}, back{.id = 0x1FFFFFFF, .extended = true, .size = size, .data = {}};
+    const base::CanFrame there{.id = 0x7FF, .size = size, .data = {}},
+        back{.id = 0x1FFFFFFF, .extended = true, .size = size, .data = {}};
     ASSERT_TRUE(a.send(there));
     a.flush();
     EXPECT_EQ(next(b), there);
@@ -131,7 +135,9 @@ TEST(SocketCan, ReceivingNeverWaitsAndWaitingEnds) {
 }
 
 TEST(SocketCan, AnInterfaceThatIsMissingDownOrNoneIsNamedWithTheCommandThatHelps) {
-  EXPECT_EQ(refusal("vcan77"), "CAN interface vcan77 does not exist; make it with: ip link add dev vcan77 type vcan && ip link set up vcan77");
+  EXPECT_EQ(
+      refusal("vcan77"),
+      "CAN interface vcan77 does not exist; make it with: ip link add dev vcan77 type vcan && ip link set up vcan77");
   EXPECT_NE(refusal("lo").find("interface lo is not a CAN interface"), std::string::npos) << refusal("lo");
   EXPECT_NE(refusal("").find("not a name for an interface"), std::string::npos);
   EXPECT_NE(refusal("a-name-that-is-too-long").find("not a name for an interface"), std::string::npos);
@@ -208,7 +214,8 @@ TEST_P(Throughput, LockstepOverVcanLosesNothing) {
   waitpid(child, nullptr, 0);
   EXPECT_EQ(counts.lost() + counts.extra(), 0U);
   EXPECT_EQ(counts.epochs, static_cast<std::uint64_t>(kTicks));
-  std::printf("window %zu: %.0f epochs/s, %.1f x real time, %.0f frames/s\n", GetParam(), kTicks / wall_s, kTicks * 0.01 / wall_s,
+  std::printf("window %zu: %.0f epochs/s, %.1f x real time, %.0f frames/s\n", GetParam(), kTicks / wall_s,
+              kTicks * 0.01 / wall_s,
               static_cast<double>(sink.sent_frames.size() + sink.received_frames.size()) / wall_s);
 }
 

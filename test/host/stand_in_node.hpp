@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A node for tests of the player: answers Begin and each Step or Tick as the firmware does, from a CRC over its inputs instead of an
-// estimate, and loses or doubles frames on demand.
+// A node for tests of the player: answers Begin and each Step or Tick as the firmware does, from a CRC over its inputs
+// instead of an estimate, and loses or doubles frames on demand.
 #pragma once
 
 #include "app/inbox.hpp"
@@ -23,7 +23,8 @@ struct Sabotage {
 template <hal::CanBus Bus>
 class StandInNode {
  public:
-  StandInNode(Bus& bus, std::uint32_t base, Sabotage sabotage = {}) : bus_(bus), base_(base), sabotage_(std::move(sabotage)) {}
+  StandInNode(Bus& bus, std::uint32_t base, Sabotage sabotage = {})
+      : bus_(bus), base_(base), sabotage_(std::move(sabotage)) {}
 
   void poll() {
     while (const auto frame = bus_.receive()) {
@@ -36,14 +37,22 @@ class StandInNode {
     tally_.close_epoch();
     ++epoch_;
     frames_ = 0;
-    send(can::EstEpoch{.time_us = static_cast<std::uint64_t>(time_us), .in_crc = static_cast<std::uint16_t>(tally_.running())});
-    send(can::EstPos{.x_raw = static_cast<std::int32_t>(tally_.count()), .y_raw = -static_cast<std::int32_t>(epoch_),
-                     .epoch = static_cast<std::uint8_t>(epoch_ & 0xF), .kind = can::EstimatorKind::kOdometry}, 0);
-    send(can::EstMotion{.yaw_rad = 0.5F, .speed_mps = -1.25F, .yaw_rate_radps = 0.0F, .epoch = 0, .pos_valid = true}, 0);
-    if (epoch_ % 5 == 0) send(can::EstStdPose{.epoch = 0, .std_x_m = 0.25F, .std_y_m = 0.5F, .std_yaw_rad = 0.1F, .corr_xy = -0.5F}, 0);
+    send(can::EstEpoch{.time_us = static_cast<std::uint64_t>(time_us),
+                       .in_crc = static_cast<std::uint16_t>(tally_.running())});
+    send(can::EstPos{.x_raw = static_cast<std::int32_t>(tally_.count()),
+                     .y_raw = -static_cast<std::int32_t>(epoch_),
+                     .epoch = static_cast<std::uint8_t>(epoch_ & 0xF),
+                     .kind = can::EstimatorKind::kOdometry},
+         0);
+    send(can::EstMotion{.yaw_rad = 0.5F, .speed_mps = -1.25F, .yaw_rate_radps = 0.0F, .epoch = 0, .pos_valid = true},
+         0);
+    if (epoch_ % 5 == 0)
+      send(can::EstStdPose{.epoch = 0, .std_x_m = 0.25F, .std_y_m = 0.5F, .std_yaw_rad = 0.1F, .corr_xy = -0.5F}, 0);
     if (epoch_ % 10 == 0) send(can::EstDiagLoop{.loop_max_us = loop_time_us, .loop_mean_us = 3});
-    send(can::EstStateCrc{.crc = tally_.running() ^ state_flaw, .in_count = static_cast<std::uint16_t>(tally_.count()),
-                          .epoch = static_cast<std::uint8_t>(epoch_), .frames = static_cast<std::uint8_t>(frames_ + 1)});
+    send(can::EstStateCrc{.crc = tally_.running() ^ state_flaw,
+                          .in_count = static_cast<std::uint16_t>(tally_.count()),
+                          .epoch = static_cast<std::uint8_t>(epoch_),
+                          .frames = static_cast<std::uint8_t>(frames_ + 1)});
   }
   [[nodiscard]] std::uint64_t consumed() const { return tally_.count(); }
 

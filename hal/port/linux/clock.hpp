@@ -22,7 +22,8 @@ namespace tetap::hal {
 
 inline void sleep_for(base::Micros span) {
   if (span.us <= 0) return;
-  const timespec t{.tv_sec = static_cast<time_t>(span.us / 1'000'000), .tv_nsec = static_cast<long>(span.us % 1'000'000) * 1000};
+  const timespec t{.tv_sec = static_cast<time_t>(span.us / 1'000'000),
+                   .tv_nsec = static_cast<long>(span.us % 1'000'000) * 1000};
   clock_nanosleep(CLOCK_MONOTONIC, 0, &t, nullptr);
 }
 

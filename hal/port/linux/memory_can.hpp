@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A bus inside one process: two ends and a queue each way. For campaigns of thousands of runs with the same frames, codec and firmware.
+// A bus inside one process: two ends and a queue each way. For campaigns of thousands of runs with the same frames,
+// codec and firmware.
 #pragma once
 
 #include "hal/board.hpp"

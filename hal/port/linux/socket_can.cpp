@@ -35,7 +35,8 @@ union Control {
 };
 
 std::string how_to_make(const std::string& interface) {
-  if (interface.rfind("vcan", 0) == 0) return "ip link add dev " + interface + " type vcan && ip link set up " + interface;
+  if (interface.rfind("vcan", 0) == 0)
+    return "ip link add dev " + interface + " type vcan && ip link set up " + interface;
   return "ip link set " + interface + " up type can bitrate 500000";
 }
 
@@ -158,7 +159,8 @@ void SocketCan::flush() {
     if (reason == EINTR) continue;
     const bool full = reason == ENOBUFS || reason == EAGAIN || reason == EWOULDBLOCK;
     if (full && monotonic_clock() - began < kPatience) {
-      // A full transmit queue (ENOBUFS) does not show in poll(): a short sleep is what the kernel's documentation asks for.
+      // A full transmit queue (ENOBUFS) does not show in poll(): a short sleep is what the kernel's documentation asks
+      // for.
       if (reason == ENOBUFS) {
         sleep_for({200});
       } else {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A CAN controller on Linux: a raw SocketCAN socket read and written in batches (recvmmsg, sendmmsg), so that a slow kernel is asked
-// once for many frames. Frames lost in the socket's buffer are counted by the kernel (SO_RXQ_OVFL), not guessed.
+// A CAN controller on Linux: a raw SocketCAN socket read and written in batches (recvmmsg, sendmmsg), so that a slow
+// kernel is asked once for many frames. Frames lost in the socket's buffer are counted by the kernel (SO_RXQ_OVFL), not
+// guessed.
 #pragma once
 
 #include "base/can_frame.hpp"
@@ -22,22 +23,23 @@ struct SocketCanOptions {
 
 class SocketCan {
  public:
-  /// Throws std::runtime_error with one line that names the interface and the command that helps: no such interface, down, not CAN,
-  /// no SocketCAN in this kernel.
+  /// Throws std::runtime_error with one line that names the interface and the command that helps: no such interface,
+  /// down, not CAN, no SocketCAN in this kernel.
   explicit SocketCan(const std::string& interface, SocketCanOptions options = {});
   ~SocketCan();
   SocketCan(const SocketCan&) = delete;
   SocketCan& operator=(const SocketCan&) = delete;
 
-  /// Collects; a full batch is handed on at once. Waits for room in the kernel. False: the interface is down, the frame is not taken.
+  /// Collects; a full batch is handed on at once. Waits for room in the kernel. False: the interface is down, the frame
+  /// is not taken.
   bool send(const base::CanFrame& frame);
   /// Data frames of others, in order of arrival. Remote and error frames are counted and skipped.
   std::optional<base::CanFrame> receive();
   void flush();
   [[nodiscard]] CanFaults faults() const { return faults_; }
 
-  /// Hands on what was collected, then sleeps until a frame is there or the time is over. An interface that was removed is looked for
-  /// here.
+  /// Hands on what was collected, then sleeps until a frame is there or the time is over. An interface that was removed
+  /// is looked for here.
   void wait(base::Micros timeout);
 
   /// When the frame last returned by receive() arrived, since 1970; only with `arrival_times`.
@@ -71,7 +73,7 @@ class SocketCan {
   base::Micros last_arrival_;
   base::Micros next_attempt_;
   bool down_ = false;
-  bool lost_ = false;               ///< the interface is gone: the socket has to be bound anew
+  bool lost_ = false;  ///< the interface is gone: the socket has to be bound anew
 };
 
 static_assert(CanBus<SocketCan>);
