@@ -3,6 +3,7 @@
 // as they were.
 #pragma once
 
+#include "base/random.hpp"
 #include "base/time.hpp"
 #include "sim_host/world/math.hpp"
 
@@ -35,26 +36,18 @@ enum class Stream : std::uint32_t {
   kFaultLoss,
 };
 
-/// Counter-based: draw n of a stream is a function of (seed, stream, n). SplitMix64 with its output mix (Steele, Lea,
-/// Flood, "Fast splittable pseudorandom number generators", OOPSLA 2014); normal draws after Box and Muller, 1958.
 class Chance {
  public:
-  Chance(std::uint64_t seed, Stream stream)
-      : key_{seed * 0x9E3779B97F4A7C15U + static_cast<std::uint32_t>(stream) + 1} {}
+  Chance(std::uint64_t seed, Stream stream) : random_{seed, static_cast<std::uint64_t>(stream)} {}
 
-  /// In (0, 1).
+  /// In (0, 1), with 52 bits.
   [[nodiscard]] double uniform() {
-    std::uint64_t z = key_ * 0xD1342543DE82EF95U + (++counter_) * 0x9E3779B97F4A7C15U;
-    z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9U;
-    z = (z ^ (z >> 27)) * 0x94D049BB133111EBU;
-    z ^= z >> 31;
-    return (static_cast<double>(z >> 12) + 0.5) * 0x1p-52;
+    const std::uint64_t high = random_.next() >> 6;
+    const std::uint64_t low = random_.next() >> 6;
+    return (static_cast<double>(high << 26 | low) + 0.5) * 0x1p-52;
   }
   [[nodiscard]] double uniform(double low, double high) { return low + (high - low) * uniform(); }
-  [[nodiscard]] double normal() {
-    const double radius = sim::sqrt(-2 * sim::log(uniform()));
-    return radius * sim::cos(2 * kPi * uniform());
-  }
+  [[nodiscard]] double normal() { return static_cast<double>(random_.normal()); }
   [[nodiscard]] double normal(double sigma) { return sigma * normal(); }
   [[nodiscard]] bool happens(double probability) { return uniform() < probability; }
   [[nodiscard]] base::Micros between(base::Micros low, base::Micros high) {
@@ -62,8 +55,7 @@ class Chance {
   }
 
  private:
-  std::uint64_t key_;
-  std::uint64_t counter_ = 0;
+  base::Random random_;
 };
 
 /// First-order Gauss-Markov process: stationary with standard deviation `sigma`, autocorrelation exp(-|t|/tau)
