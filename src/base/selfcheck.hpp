@@ -26,7 +26,7 @@ class WordHash {
     (*this)(static_cast<std::uint32_t>(word >> 32));
   }
   constexpr void operator()(std::int64_t word) { (*this)(static_cast<std::uint64_t>(word)); }
-  constexpr void operator()(double number) { (*this)(bits(number)); }
+  constexpr void operator()(double number) { (*this)(std::bit_cast<std::uint64_t>(number)); }
   [[nodiscard]] constexpr std::uint32_t value() const { return state_; }
 
  private:
@@ -59,7 +59,7 @@ template <class F>
 template <class F>
 [[nodiscard]] constexpr std::uint32_t hash_of_doubles(std::uint32_t n, F&& f) {
   WordHash hash;
-  for (std::uint32_t i = 0; i < n; ++i) f(hash, double_from(i * 0x9E37'79B9'7F4A'7C15U));
+  for (std::uint32_t i = 0; i < n; ++i) f(hash, std::bit_cast<double>(i * std::uint64_t{0x9E37'79B9'7F4A'7C15U}));
   return hash.value();
 }
 
@@ -96,7 +96,10 @@ void check_functions(std::uint32_t n, Report&& report) {
            h(both.sin);
            h(both.cos);
          }));
-  report("atan2_double", hash_of_doubles(few, [](WordHash& h, double x) { h(atan2(x, double_from(std::rotl(bits(x), 32) ^ bits(x)))); }));
+  report("atan2_double", hash_of_doubles(few, [](WordHash& h, double y) {
+           const auto u = std::bit_cast<std::uint64_t>(y);  // the other one: its fraction stirred, its exponent near
+           h(atan2(y, std::bit_cast<double>(u ^ (u << 31 & 0x80FF'FFFF'FFFF'FFFFU))));
+         }));
   report("exp_double", hash_of_doubles(few, [](WordHash& h, double x) { h(exp(x)); }));
   report("log_double", hash_of_doubles(few, [](WordHash& h, double x) { h(log(x)); }));
   report("sqrt_double", hash_of_doubles(few, [](WordHash& h, double x) { h(sqrt(x)); }));

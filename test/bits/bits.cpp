@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: Apache-2.0
+// One program for every compiler and core: prints "bits: NAME HASH" for each function and filter, first of a short form, then of the whole
+// one. tools/bits compares the lines. An image takes no arguments; whoever has read enough ends the emulator.
+#include "app/node.hpp"
+#include "base/selfcheck.hpp"
+#include "config/husky.hpp"
+#include "config/labyrinth.hpp"
+#include "config/mrclam.hpp"
+#include "config/rover.hpp"
+#include "filters.hpp"
+#include "hal/port/support/boot_line.hpp"
+#include "hal/port/support/text.hpp"
+#include "recorded_world.hpp"
+
+#if defined(TETAP_BOARD_ZYNQMP_R5)
+#include "hal/port/zynqmp_r5/board.hpp"
+using Board = tetap::hal::zynqmp_r5::Board;
+#elif defined(TETAP_BOARD_MPS2)
+#include "hal/port/mps2/board.hpp"
+using Board = tetap::hal::mps2::Board;
+#else
+#include <cstdio>
+struct Board {
+  void print(const char* text) const {
+    std::fputs(text, stdout);
+    std::fflush(stdout);
+  }
+};
+#endif
+
+namespace {
+
+using namespace tetap;
+
+/// The recorded run; hashed as Exercise does it: everything that does not depend on real time, the state's CRC in every epoch.
+template <class Node>
+std::uint32_t recorded(Node& node, std::uint32_t can_base) {
+  base::WordHash hash;
+  node.power_on({bits::kRecordedBegin_us});
+  const bits::RecordedFrame* next = bits::kRecordedFrames;
+  for (const bits::RecordedTick& tick : bits::kRecordedTicks) {
+    for (std::uint32_t i = 0; i < tick.frames; ++i) node.on_frame((next++)->frame(can_base));
+    node.tick({tick.time_us}, {}, [&](const base::CanFrame& frame) {
+      const std::uint32_t offset = frame.id - can_base;
+      if (offset == can::EstVersion::kOffset || offset == can::EstDiagLoop::kOffset) return;
+      hash(offset);
+      for (std::size_t i = 0; i < frame.size; ++i) hash(std::uint32_t{frame.data[i]});
+    });
+  }
+  return hash.value();
+}
+
+struct Length {
+  const char* name;
+  std::uint32_t values;
+  std::uint32_t steps;
+};
+constexpr Length kShort{.name = "short", .values = 1U << 18, .steps = 2'000};
+constexpr Length kWhole{.name = "whole", .values = 1U << 24, .steps = 100'000};
+
+class Program {
+ public:
+  explicit Program(Board& board) : board_(board) {}
+
+  void run(const Length& length) {
+    board_.print(hal::Text<>{}.add("bits: begin ").add(length.name).add('\n').c_str());
+    base::check_functions(length.values, [this](const char* name, std::uint32_t hash) { line(name, "", hash); });
+    line("kalman_constant_velocity", "", bits::kalman_constant_velocity(length.steps));
+    line("kalman_dense", "", bits::kalman_dense(length.steps));
+    line("ekf_planar", "", bits::ekf_planar(length.steps));
+    line("dead_reckoning", "", bits::dead_reckoning(length.steps));
+    line("geodesy", "", bits::geodesy(length.steps));
+    static app::Node<robot::rover::Estimators> rover{robot::rover::numbers, {}};
+    static app::Node<robot::mrclam::Estimators> mrclam{robot::mrclam::numbers, {}};
+    static app::Node<robot::husky::Estimators> husky{robot::husky::numbers, {}};
+    static app::Node<robot::labyrinth::Estimators> labyrinth{robot::labyrinth::numbers, {}};
+    node("rover", rover, robot::rover::numbers, length.steps);
+    node("mrclam", mrclam, robot::mrclam::numbers, length.steps);
+    node("husky", husky, robot::husky::numbers, length.steps);
+    node("labyrinth", labyrinth, robot::labyrinth::numbers, length.steps);
+    line("recorded_", "rover", recorded(rover, robot::rover::numbers.can_base));
+    board_.print(hal::Text<>{}.add("bits: end ").add(length.name).add('\n').c_str());
+  }
+
+ private:
+  /// boot_: what a flash image of this robot says of itself at boot.
+  template <class Node>
+  void node(const char* robot, Node& node, const app::Numbers& numbers, std::uint32_t steps) {
+    line("boot_", robot, app::Exercise(node, numbers.can_base, 1).run(hal::kBootEpochs));
+    line("node_", robot, app::Exercise(node, numbers.can_base, 2).run(steps));
+  }
+  void line(const char* kind, const char* name, std::uint32_t hash) {
+    board_.print(hal::Text<>{}.add("bits: ").add(kind).add(name).add(' ').hex(hash).add('\n').c_str());
+  }
+  Board& board_;
+};
+
+}  // namespace
+
+int main() {
+  static Board board;
+  Program program(board);
+  program.run(kShort);
+  program.run(kWhole);
+#if defined(TETAP_BOARD_ZYNQMP_R5)
+  for (;;) {
+  }
+#endif
+}
