@@ -22,7 +22,7 @@ std::string help() {
       "  --can IFACE        the interface the node is on (default vcan0)\n"
       "  --memory           run a node in this process instead, without a bus\n"
       "  --robot NAME       what the node is (default rover)\n"
-      "  --out DIR          for the record, truth.csv and truth.json (default out/sim)\n"
+      "  --out DIR          for the record and truth.csv (default out/sim)\n"
       "  --seed N           every draw follows from it (default 1)\n"
       "  --duration S       at most so long (default: the whole course)\n"
       "  --matched          only errors that the filters model\n"
@@ -35,6 +35,17 @@ std::string help() {
       "  --quiet            no progress line\n";
 }
 
+/// The landmark map as the report draws it.
+std::string landmarks_json(const sim::World& world) {
+  std::string text;
+  for (const sim::Landmark& mark : world.map()) {
+    char entry[96];
+    std::snprintf(entry, sizeof entry, R"(%s{"id": %d, "x_m": %.3f, "y_m": %.3f})", text.empty() ? "" : ", ", static_cast<int>(mark.id), mark.x_m, mark.y_m);
+    text += entry;
+  }
+  return "[" + text + "]";
+}
+
 void write_truth(const std::string& folder, const sim::WorldSource& source) {
   sim::OutFile file(folder + "/truth.csv");
   sim::Line line;
@@ -45,17 +56,6 @@ void write_truth(const std::string& folder, const sim::WorldSource& source) {
     file.write(line.view());
   }
   file.close();
-  sim::OutFile json(folder + "/truth.json");
-  std::string text = "{\n  \"truth\": \"simulated world\",\n  \"landmarks\": [";
-  bool first = true;
-  for (const sim::Landmark& mark : source.world().map()) {
-    char entry[96];
-    std::snprintf(entry, sizeof entry, "%s\n    {\"id\": %d, \"x_m\": %.3f, \"y_m\": %.3f}", first ? "" : ",", static_cast<int>(mark.id), mark.x_m, mark.y_m);
-    text += entry;
-    first = false;
-  }
-  json.write(text + "\n  ]\n}\n");
-  json.close();
 }
 
 struct Run {
@@ -76,6 +76,7 @@ int drive(L& link, const Run& run) {
   sim::Session session(about);
   session.note("seed", std::to_string(run.seed));
   session.note("fault", sim::quoted(run.faults));
+  session.note("landmarks", landmarks_json(source.world()));
   session.note("matched", run.world.mismatched ? "false" : "true");
   const int status = session.run([&] {
     if (!run.realtime) return sim::play_lockstep(link, source, session, run.lockstep, session.counts());

@@ -19,12 +19,12 @@ namespace detail {
 
 inline constexpr double kNanDouble = std::numeric_limits<double>::quiet_NaN();
 inline constexpr double kInfinityDouble = std::numeric_limits<double>::infinity();
-[[nodiscard]] constexpr std::uint64_t bits(double x) { return std::bit_cast<std::uint64_t>(x); }
+[[nodiscard]] constexpr std::uint64_t double_bits(double x) { return std::bit_cast<std::uint64_t>(x); }
 [[nodiscard]] constexpr double double_from(std::uint64_t u) { return std::bit_cast<double>(u); }
 inline constexpr std::uint64_t kSignDouble = std::uint64_t{1} << 63;
 inline constexpr std::uint64_t kInfinityBitsDouble = std::uint64_t{0x7ff} << 52;
-[[nodiscard]] constexpr bool is_finite_double(double x) { return (bits(x) & ~kSignDouble) < kInfinityBitsDouble; }
-[[nodiscard]] constexpr bool is_nan_double(double x) { return (bits(x) & ~kSignDouble) > kInfinityBitsDouble; }
+[[nodiscard]] constexpr bool is_finite_double(double x) { return (double_bits(x) & ~kSignDouble) < kInfinityBitsDouble; }
+[[nodiscard]] constexpr bool is_nan_double(double x) { return (double_bits(x) & ~kSignDouble) > kInfinityBitsDouble; }
 
 /// sin on |hi + lo| <= pi/4.
 [[nodiscard]] constexpr double sin_series(double hi, double lo) {
@@ -50,11 +50,11 @@ namespace detail {
 
 /// Correctly rounded, digit by digit in integers: for constant expressions, and for cores without a double-precision unit.
 [[nodiscard]] constexpr double sqrt_by_integers(double x) {
-  std::uint64_t u = bits(x);
+  std::uint64_t u = double_bits(x);
   if ((u & ~kSignDouble) == 0 || u == kInfinityBitsDouble) return x;
   if (u > kInfinityBitsDouble) return kNanDouble;
   std::int32_t bias = 0;
-  if (u < std::uint64_t{1} << 52) u = bits(x * 0x1p+54), bias = -54;
+  if (u < std::uint64_t{1} << 52) u = double_bits(x * 0x1p+54), bias = -54;
   const auto exponent = static_cast<std::int32_t>(u >> 52) - 1023 + bias;
   std::uint64_t mantissa = (u & 0x000f'ffff'ffff'ffffU) | (std::uint64_t{1} << 52);
   const std::int32_t half = exponent >= 0 ? exponent / 2 : (exponent - 1) / 2;  // downwards
@@ -77,7 +77,7 @@ namespace detail {
 /// Correctly rounded; sqrt(-0) = -0, negative gives NaN.
 [[nodiscard]] constexpr double sqrt(double x) {
 #if !defined(__ARM_FP) || (__ARM_FP & 8) != 0
-  if (!std::is_constant_evaluated()) return detail::bits(x) > detail::kInfinityBitsDouble && x < 0.0 ? detail::kNanDouble : __builtin_sqrt(x);
+  if (!std::is_constant_evaluated()) return detail::double_bits(x) > detail::kInfinityBitsDouble && x < 0.0 ? detail::kNanDouble : __builtin_sqrt(x);
 #endif
   return detail::sqrt_by_integers(x);
 }
@@ -126,12 +126,12 @@ namespace detail {
 
 /// log; log(+-0) = -infinity, NaN below.
 [[nodiscard]] constexpr double log(double x) {
-  std::uint64_t u = detail::bits(x);
+  std::uint64_t u = detail::double_bits(x);
   if ((u & ~detail::kSignDouble) == 0) return -detail::kInfinityDouble;
   if (u > detail::kInfinityBitsDouble) return detail::kNanDouble;
   if (u == detail::kInfinityBitsDouble) return x;
   std::int32_t bias = 0;
-  if (u < std::uint64_t{1} << 52) u = detail::bits(x * 0x1p+54), bias = -54;
+  if (u < std::uint64_t{1} << 52) u = detail::double_bits(x * 0x1p+54), bias = -54;
   constexpr std::uint64_t kSqrtHalf = 0x3fe6'a09e'667f'3bcdU;
   const std::uint64_t shifted = u + (0x3ff0'0000'0000'0000U - kSqrtHalf);
   const auto k = static_cast<double>(static_cast<std::int32_t>(shifted >> 52) - 1023 + bias);
@@ -148,11 +148,11 @@ namespace detail {
 [[nodiscard]] constexpr double atan2(double y, double x) {
   constexpr double kHalfTurn = 0x1.921fb54442d18p+1, kHalfTurnLow = 0x1.1a62633145c07p-53;
   if (detail::is_nan_double(x) || detail::is_nan_double(y)) return detail::kNanDouble;
-  const bool left = (detail::bits(x) & detail::kSignDouble) != 0;
-  const std::uint64_t sign = detail::bits(y) & detail::kSignDouble;
-  const double ax = detail::double_from(detail::bits(x) & ~detail::kSignDouble);
-  const double ay = detail::double_from(detail::bits(y) & ~detail::kSignDouble);
-  const auto with_sign = [sign](double angle) { return detail::double_from(detail::bits(angle) | sign); };
+  const bool left = (detail::double_bits(x) & detail::kSignDouble) != 0;
+  const std::uint64_t sign = detail::double_bits(y) & detail::kSignDouble;
+  const double ax = detail::double_from(detail::double_bits(x) & ~detail::kSignDouble);
+  const double ay = detail::double_from(detail::double_bits(y) & ~detail::kSignDouble);
+  const auto with_sign = [sign](double angle) { return detail::double_from(detail::double_bits(angle) | sign); };
   if (ay <= 0.0) return with_sign(left ? kHalfTurn : 0.0);
   if (!detail::is_finite_double(ax) || !detail::is_finite_double(ay)) {
     if (!detail::is_finite_double(ax) && !detail::is_finite_double(ay)) return with_sign(left ? 0.75 * kHalfTurn : 0.25 * kHalfTurn);
