@@ -13,7 +13,7 @@ LOG   ?=
 TRUTH ?=
 export ROBOT BOARD BUS SEED FAULT REALTIME LOG TRUTH
 
-.PHONY: help sim test quick proof replay firmware size heap stack count bits check setup host arm
+.PHONY: help sim test quick proof replay firmware size heap stack count bits check dbc setup host arm
 
 help: ## this list
 	@echo "tetap: state estimation on the robot's own microcontroller"; echo
@@ -55,6 +55,9 @@ bits: setup ## the same bits from every compiler, option and core
 
 check: setup host ## format, tidy, layers, DBC fresh
 	@tools/check
+
+dbc: setup ## config/messages.hpp and config/messages.md from config/tetap.dbc
+	@tools/dbc config/tetap.dbc --header config/messages.hpp --table config/messages.md
 
 setup:
 	@tools/setup
