@@ -77,14 +77,17 @@ namespace detail {
 /// Correctly rounded; sqrt(-0) = -0, negative gives NaN.
 [[nodiscard]] constexpr double sqrt(double x) {
 #if !defined(__ARM_FP) || (__ARM_FP & 8) != 0
-  if (!std::is_constant_evaluated()) return detail::double_bits(x) > detail::kInfinityBitsDouble && x < 0.0 ? detail::kNanDouble : __builtin_sqrt(x);
+  const std::uint64_t u = detail::double_bits(x);
+  if (u > detail::kInfinityBitsDouble && u != detail::kSignDouble) return detail::kNanDouble;  // the instruction keeps a NaN's payload
+  if (!std::is_constant_evaluated()) return __builtin_sqrt(x);
 #endif
   return detail::sqrt_by_integers(x);
 }
 
-/// |x| <= 2^20; beyond, and for NaN and infinity, both are NaN.
+/// |x| <= 2^20; beyond, and for NaN and infinity, both are NaN. sin(-0) = -0.
 [[nodiscard]] constexpr SinCosDouble sincos(double x) {
   if (!(x <= 1048576.0 && x >= -1048576.0)) return {detail::kNanDouble, detail::kNanDouble};
+  if (detail::double_bits(x) << 1 == 0) return {x, 1.0};  // the sums below would lose the sign of zero
   constexpr double kRound = 0x1.8p+52;
   const double n = (x * 0x1.45f306dc9c883p-1 + kRound) - kRound;
   // pi/2 in parts of 33 bits: n (21 bits) times the first two is exact.
