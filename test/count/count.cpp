@@ -1,0 +1,215 @@
+// SPDX-License-Identifier: Apache-2.0
+// The workloads whose instructions tools/count counts and tools/budgets.json bounds. Inputs are arrays made beforehand; what is between
+// the markers are calls of headers that the firmware is made of.
+#include "app/node.hpp"
+#include "base/random.hpp"
+#include "config/rover.hpp"
+#include "filter/kalman.hpp"
+#include "markers.hpp"
+#include "model/constant_velocity.hpp"
+#include "model/range_bearing.hpp"
+#include "recorded_world.hpp"
+
+#if defined(TETAP_BOARD_ZYNQMP_R5)
+#include "hal/port/zynqmp_r5/board.hpp"
+using Board = tetap::hal::zynqmp_r5::Board;
+#else
+#include "hal/port/mps2/board.hpp"
+using Board = tetap::hal::mps2::Board;
+#endif
+
+#include <array>
+
+namespace {
+
+using namespace tetap;
+using count::opaque;
+using count::Region;
+
+constexpr std::size_t kSteps = 256;
+
+/// Roughly normal, standard deviation 1: four uniform numbers of a linear congruential generator (Knuth, TAOCP 2, sec. 3.3.4).
+class Noise {
+ public:
+  float operator()() {
+    float sum = -2.0F;
+    for (int i = 0; i < 4; ++i) sum += uniform();
+    return sum * 1.7320508F;
+  }
+  float uniform() {
+    state_ = state_ * 1'664'525U + 1'013'904'223U;
+    return static_cast<float>(static_cast<std::int32_t>(state_ >> 8)) * 0x1p-24F;
+  }
+
+ private:
+  std::uint32_t state_ = 1;
+};
+
+/// Constant velocity, 4 states, 2 measured: one prediction and one gated update.
+void constant_velocity() {
+  static std::array<filter::Vector<float, 2>, kSteps> z;
+  Noise noise;
+  for (std::size_t k = 0; k < kSteps; ++k) {
+    const float t_s = 0.1F * static_cast<float>(k);
+    z[k] = {t_s + 0.5F * noise(), 0.5F * t_s + 0.5F * noise()};
+  }
+  filter::Kalman<float, 4> kf;
+  kf.p = filter::Symmetric<float, 4>::diagonal({10, 10, 10, 10});
+  for (const auto& position : z) {
+    const Region<struct w1_kf> region;
+    kf.predict(model::ConstantVelocity<float>{.dt_s = 0.1F, .acceleration_variance = 0.1F});
+    static_cast<void>(kf.update(filter::DirectMeasurement<float, 4, 0, 2>{.z = position, .variance = {0.25F, 0.25F}}, filter::chi_square_99(2)));
+  }
+  opaque(kf);
+}
+
+/// Unicycle and range-bearing to one landmark: one prediction and one gated update; then the update alone.
+void planar() {
+  struct Input {
+    float yaw_rate_radps, range_m, bearing_rad;
+  };
+  static std::array<Input, kSteps> inputs;
+  const model::UnicycleNoise process{.speed = 0.01F, .yaw_rate = 0.001F};
+  const model::Landmark landmark{.x = base::Anchored{}.plus(60.0F), .y = base::Anchored{}.plus(20.0F)};
+  Noise noise;
+  model::PlanarPose truth;
+  for (std::size_t k = 0; k < kSteps; ++k) {
+    const float rate = 0.3F * base::cos(0.05F * static_cast<float>(k));
+    truth = model::Unicycle{.forward_mps = 1.0F, .yaw_rate_radps = rate, .noise = process}.increment(0.1F).predict(truth);
+    const model::Sight sight(truth, landmark, {});
+    inputs[k] = {.yaw_rate_radps = rate, .range_m = sight.range_m() + 0.1F * noise(), .bearing_rad = sight.bearing_rad(truth, {}) + 0.02F * noise()};
+  }
+  const auto seen = [&](const Input& input) {
+    return model::RangeBearing{.range_m = input.range_m, .bearing_rad = input.bearing_rad, .sigma_range_m = 0.1F, .sigma_bearing_rad = 0.02F, .landmark = landmark};
+  };
+  filter::Ekf<model::PlanarPose> ekf;
+  ekf.p = filter::Symmetric<float, 3>::diagonal({0.1F, 0.1F, 0.05F});
+  for (const Input& input : inputs) {
+    const Region<struct w2_ekf> region;
+    ekf.predict(model::Unicycle{.forward_mps = 1.0F, .yaw_rate_radps = input.yaw_rate_radps, .noise = process}.increment(0.1F));
+    static_cast<void>(ekf.update(seen(input), filter::chi_square_99(2)));
+  }
+  opaque(ekf);
+  ekf = {};
+  ekf.p = filter::Symmetric<float, 3>::diagonal({0.1F, 0.1F, 0.05F});
+  for (const Input& input : inputs) {
+    ekf.predict(model::Unicycle{.forward_mps = 1.0F, .yaw_rate_radps = input.yaw_rate_radps, .noise = process}.increment(0.1F));
+    const model::RangeBearing measurement = seen(input);
+    const Region<struct fuse_range_bearing> region;
+    static_cast<void>(ekf.update(measurement, filter::chi_square_99(2)));
+  }
+  opaque(ekf);
+}
+
+/// Odometry: counts and a gyroscope, as the rover has them.
+void dead_reckoning() {
+  static std::array<app::WheelCounts, kSteps> counts;
+  static std::array<app::ImuSample, kSteps> imu;
+  Noise noise;
+  app::WheelCounts now;
+  for (std::size_t k = 0; k < kSteps; ++k) {
+    now.left = static_cast<std::uint16_t>(now.left + 32 + static_cast<std::int32_t>(4.0F * noise.uniform()));
+    now.right = static_cast<std::uint16_t>(now.right + 33 + static_cast<std::int32_t>(4.0F * noise.uniform()));
+    counts[k] = now;
+    imu[k] = {.interval = {10'000}, .dangle_b_rad = {0.0F, 0.0F, 0.003F + 1e-4F * noise()}};
+  }
+  app::Numbers by_wheels = robot::rover::numbers;
+  by_wheels.gyro.use = 0;
+  app::DeadReckoning motion;
+  motion.start({1'000'000}, {}, 0.1F, 0.05F);
+  for (std::size_t k = 0; k < kSteps; ++k) {
+    const Region<struct dead_reckoning_counts> region;
+    motion.fuse(counts[k], {1'010'000 + 10'000 * static_cast<std::int64_t>(k)}, by_wheels);
+  }
+  opaque(motion);
+  motion = {};
+  motion.start({1'000'000}, {}, 0.1F, 0.05F);
+  for (std::size_t k = 0; k < kSteps; ++k) {
+    const base::Micros stamp{1'010'000 + 10'000 * static_cast<std::int64_t>(k)};
+    motion.fuse(counts[k], stamp, robot::rover::numbers);
+    const Region<struct dead_reckoning_gyro> region;
+    motion.fuse(imu[k], stamp + base::Micros{5'000}, robot::rover::numbers);
+  }
+  opaque(motion);
+}
+
+/// One call each, arguments as filters have them.
+void functions() {
+  static std::array<float, kSteps> angle, first, second;
+  Noise noise;
+  for (std::size_t k = 0; k < kSteps; ++k) {
+    angle[k] = 100.0F * noise();
+    first[k] = 10.0F * noise();
+    second[k] = 10.0F * noise();
+  }
+  for (std::size_t k = 0; k < kSteps; ++k) {
+    float x = angle[k], y = first[k], z = second[k];
+    {
+      const Region<struct sincos> region;
+      base::SinCos both = base::sincos(x);
+      opaque(both);
+    }
+    {
+      const Region<struct atan2> region;
+      float result = base::atan2(y, z);
+      opaque(result);
+    }
+    {
+      const Region<struct exp> region;
+      float result = base::exp(y);
+      opaque(result);
+    }
+    float positive = base::abs(y) + 1e-6F;
+    opaque(positive);
+    {
+      const Region<struct log> region;
+      float result = base::log(positive);
+      opaque(result);
+    }
+    base::PhiloxCounter counter{static_cast<std::uint32_t>(k), 0, 1, 2};
+    base::PhiloxKey key{3, 4};
+    opaque(counter);
+    opaque(key);
+    {
+      const Region<struct philox> region;
+      counter = base::philox(counter, key);
+      opaque(counter);
+    }
+  }
+}
+
+/// The rover's node on 20 s of the simulated world: the tick, one input frame, and both together.
+void whole_node() {
+  static app::Node<robot::rover::Estimators> node{robot::rover::numbers, {}};
+  const std::uint32_t can_base = robot::rover::numbers.can_base;
+  node.power_on({bits::kRecordedBegin_us});
+  base::CanFrame last;
+  const bits::RecordedFrame* next = bits::kRecordedFrames;
+  for (const bits::RecordedTick& tick : bits::kRecordedTicks) {
+    static std::array<base::CanFrame, bits::kMostFrames> inputs;
+    for (std::uint32_t i = 0; i < tick.frames; ++i) inputs[i] = (next++)->frame(can_base);
+    const Region<struct node_epoch> epoch;
+    for (std::uint32_t i = 0; i < tick.frames; ++i) {
+      const Region<struct node_frame> region;
+      node.on_frame(inputs[i]);
+    }
+    const Region<struct node_tick> region;
+    node.tick({tick.time_us}, {}, [&](const base::CanFrame& frame) { last = frame; });
+  }
+  opaque(last);
+}
+
+}  // namespace
+
+int main() {
+  static Board board;
+  count::calibrate();
+  constant_velocity();
+  planar();
+  dead_reckoning();
+  functions();
+  whole_node();
+  board.print("count: done\n");
+  count::finish();
+  return 0;
+}
