@@ -39,13 +39,13 @@ firmware: setup ## the flash image: BOARD=zynqmp_r5 ROBOT=rover, with its size t
 	@tools/firmware
 
 size: arm ## flash and RAM per section of every image against the budgets
-	@tools/size --all
+	@tools/images size
 
 heap: arm ## no allocator in any linked image
-	@tools/heap --all
+	@tools/images heap
 
-stack: arm ## worst-case stack from the call graph, against the painted high-water mark
-	@tools/stack --all
+stack: arm host ## worst-case stack from the call graph, against the painted high-water mark
+	@tools/images stack
 
 count: arm ## instructions per workload and per tick on the emulated cores, against the budgets
 	@tools/count --all

@@ -11,8 +11,9 @@ int main() {
   static Board board;
   static tetap::app::Firmware<Board, tetap::robot::chosen::Estimators> firmware{board, tetap::robot::chosen::numbers, tetap::kVersion};
   tetap::hal::print_boot_line(board, tetap::robot::kName, firmware);
+  tetap::hal::print_stack_line(board);
   for (std::uint32_t polls = 0;; ++polls) {
     firmware.poll();
-    if ((polls & 0xF'FFFF) == 0xF'FFFF) tetap::hal::print_stack_line(board);
+    if ((polls & 0xFFFF) == 0xFFFF) tetap::hal::print_stack_line(board);
   }
 }
