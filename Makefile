@@ -13,14 +13,14 @@ LOG   ?=
 TRUTH ?=
 export ROBOT BOARD BUS SEED FAULT REALTIME LOG TRUTH
 
-.PHONY: help sim test quick proof replay firmware size heap stack count bits check dbc setup host arm
+.PHONY: help sim test quick proof replay firmware size heap stack count bits check dbc setup host programs arm
 
 help: ## this list
 	@echo "tetap: state estimation on the robot's own microcontroller"; echo
 	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | while IFS=$$'\t' read -r name text; do printf '  make %-9s %s\n' "$$name" "$$text"; done
 	@echo; echo "  ROBOT=$(ROBOT) BOARD=$(BOARD) BUS=$(BUS) SEED=$(SEED) FAULT= REALTIME= LOG= TRUTH="
 
-sim: setup host ## the simulated world over vcan0: table, report, pictures in out/sim (SEED= FAULT= REALTIME=1 BOARD=zynqmp_r5 BUS=memory)
+sim: setup programs ## the simulated world over vcan0: table, report, pictures in out/sim (SEED= FAULT= REALTIME=1 BOARD=zynqmp_r5 BUS=memory)
 	@tools/sim
 
 test: setup ## every proof on short prefixes, with a table of where the time went
@@ -32,7 +32,7 @@ quick: setup host ## host unit tests only
 proof: setup ## the whole lengths: exhaustive functions, full logs, long runs
 	@tools/prove whole
 
-replay: setup host ## a recorded log over vcan0: LOG=run.log [TRUTH=run.truth.csv] ROBOT=mrclam|husky|labyrinth|rover [BOARD=] [BUS=memory]
+replay: setup programs ## a recorded log over vcan0: LOG=run.log [TRUTH=run.truth.csv] ROBOT=mrclam|husky|labyrinth|rover [BOARD=] [BUS=memory]
 	@tools/replay
 
 firmware: setup ## the flash image: BOARD=zynqmp_r5 ROBOT=rover, with its size table
@@ -64,6 +64,9 @@ setup:
 
 host:
 	@tools/build host
+
+programs: setup
+	@tools/build host:tetap-node,tetap-play,tetap-world,tetap-record
 
 arm: setup
 	@tools/build r5 m7 m4f
