@@ -23,12 +23,13 @@ namespace tetap::bits {
 /// stand in order.
 struct Chance {
   base::Random random;
+  app::Dice dice{2026};
 
   float normal() { return random.normal(); }
   float spread() { return 2.0F * random.uniform() - 1.0F; }
   /// In [-limit, limit).
-  std::int64_t within(std::int64_t limit) { return static_cast<std::int64_t>(random.next() >> 6) * limit / (1 << 25) - limit; }
-  bool one_in(std::uint32_t n) { return random.next() % n == 0; }
+  std::int64_t within(std::int64_t limit) { return static_cast<std::int64_t>(dice.roll() >> 6) * limit / (1 << 25) - limit; }
+  bool one_in(std::uint32_t n) { return dice.one_in(n); }
   /// Noise of a sensor: one in forty is an outlier.
   float noise(float sigma) { return sigma * (one_in(40) ? 25.0F : 1.0F) * normal(); }
 };
@@ -52,7 +53,7 @@ void hash_vector(base::WordHash& hash, const filter::Vector<float, N>& x) {
 /// Constant velocity in the plane, position measured.
 [[nodiscard]] inline std::uint32_t kalman_constant_velocity(std::uint32_t steps) {
   base::WordHash hash;
-  Chance chance{base::Random{1, 1}};
+  Chance chance{.random = base::Random{1, 1}};
   filter::Kalman<float, 4> kf;
   float x_m = 0, y_m = 0;
   for (std::uint32_t k = 0; k < steps; ++k) {
@@ -78,7 +79,7 @@ void hash_vector(base::WordHash& hash, const filter::Vector<float, N>& x) {
 /// Eight states with a dense transition, four measured at once: sums long enough for a compiler or library to reorder.
 [[nodiscard]] inline std::uint32_t kalman_dense(std::uint32_t steps) {
   base::WordHash hash;
-  Chance chance{base::Random{1, 2}};
+  Chance chance{.random = base::Random{1, 2}};
   filter::Kalman<float, 8> kf;
   filter::LinearMotion<float, 8> motion;
   for (std::uint32_t k = 0; k < steps; ++k) {
@@ -105,7 +106,7 @@ void hash_vector(base::WordHash& hash, const filter::Vector<float, N>& x) {
 /// The planar pose with every motion and measurement model there is, 50 km from the origin.
 [[nodiscard]] inline std::uint32_t ekf_planar(std::uint32_t steps) {
   base::WordHash hash;
-  Chance chance{base::Random{1, 3}};
+  Chance chance{.random = base::Random{1, 3}};
   filter::Ekf<model::PlanarPose> ekf;
   const model::UnicycleNoise noise{.speed = 1e-3F, .speed_per_speed = 1e-2F, .yaw_rate = 1e-3F, .yaw_rate_per_yaw_rate = 1e-2F};
   const model::DifferentialDrive drive{.left_radius_m = 0.1F, .right_radius_m = 0.1F, .track_m = 0.5F, .counts_per_turn = 2000.0F, .noise_left = 0.002F, .noise_right = 0.002F};
@@ -134,7 +135,7 @@ void hash_vector(base::WordHash& hash, const filter::Vector<float, N>& x) {
     const float range_m = sight.range_m() + chance.noise(0.1F);
     const float bearing_rad = sight.bearing_rad(truth, mounting) + chance.noise(0.02F);
     const float gate1 = filter::chi_square_99(1), gate2 = filter::chi_square_99(2);
-    switch (chance.random.next() % 5) {
+    switch (chance.dice.below(5)) {
       case 0:
         hash_innovation(hash, ekf.update(model::RangeBearing{.range_m = range_m, .bearing_rad = bearing_rad, .sigma_range_m = 0.1F, .sigma_bearing_rad = 0.02F, .landmark = landmark, .mounting = mounting}, gate2));
         break;
@@ -158,23 +159,23 @@ void hash_vector(base::WordHash& hash, const filter::Vector<float, N>& x) {
 /// Odometry from counts, wheel speeds, body speeds and a gyroscope, with gaps and samples in the wrong order.
 [[nodiscard]] inline std::uint32_t dead_reckoning(std::uint32_t steps) {
   base::WordHash hash;
-  Chance chance{base::Random{1, 4}};
+  Chance chance{.random = base::Random{1, 4}};
   app::Numbers numbers = robot::rover::numbers;
   app::DeadReckoning motion;
   std::int64_t now_us = 0;
   app::WheelCounts counts;
   for (std::uint32_t k = 0; k < steps; ++k) {
     if (k % 1000 == 0 || chance.one_in(700)) {
-      numbers.gyro.use = static_cast<std::int32_t>(chance.random.next() & 1);
+      numbers.gyro.use = static_cast<std::int32_t>(chance.dice.below(2));
       numbers.wheels.hold = chance.one_in(2) ? app::Hold::kForward : app::Hold::kBackward;
       motion = {};
       motion.start({now_us}, model::PlanarPose{.yaw_rad = 3.0F * chance.spread()}, 0.1F, 0.05F);
     }
     now_us += chance.one_in(200) ? 700'000 : 10'000;
-    const base::Micros stamp{now_us - static_cast<std::int64_t>(chance.random.next() % 20'000)};
-    counts.left = static_cast<std::uint16_t>(counts.left + 30 + chance.random.next() % 20);
-    counts.right = static_cast<std::uint16_t>(counts.right + 30 + chance.random.next() % 25);
-    switch (chance.random.next() % 8) {
+    const base::Micros stamp{now_us - static_cast<std::int64_t>(chance.dice.below(20'000))};
+    counts.left = static_cast<std::uint16_t>(counts.left + 30 + chance.dice.below(20));
+    counts.right = static_cast<std::uint16_t>(counts.right + 30 + chance.dice.below(25));
+    switch (chance.dice.below(8)) {
       case 0: motion.fuse(app::WheelSpeeds{.left_mps = chance.spread(), .right_mps = chance.spread()}, stamp, numbers); break;
       case 1: motion.fuse(app::BodySpeed{.forward_mps = chance.spread(), .yaw_rate_radps = chance.spread()}, stamp, numbers); break;
       default: motion.fuse(counts, stamp, numbers); break;
@@ -194,7 +195,7 @@ void hash_vector(base::WordHash& hash, const filter::Vector<float, N>& x) {
 /// WGS84 to the local plane: the one place where double is flashed.
 [[nodiscard]] inline std::uint32_t geodesy(std::uint32_t steps) {
   base::WordHash hash;
-  Chance chance{base::Random{1, 5}};
+  Chance chance{.random = base::Random{1, 5}};
   nav::LocalFrame frame;
   for (std::uint32_t k = 0; k < steps; ++k) {
     if (k % 16 == 0) {
