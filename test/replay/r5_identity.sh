@@ -1,0 +1,68 @@
+#!/bin/bash
+# SPDX-License-Identifier: Apache-2.0
+# r5_identity.sh SECONDS: the R5 image in QEMU on a private vcan against the host program in memory, on the first SECONDS of every
+# recorded MRCLAM robot that out/recorded holds and of the simulated world: the estimate frames and state CRCs must be equal, byte for
+# byte; the path must move, and one flipped input bit must change the state CRC on both.
+set -u
+. "$(dirname "$0")/../../tools/run_lib.sh"
+cd "$root" || exit 2
+seconds=${1:-20}
+out=out/r5
+mkdir -p $out
+
+# The first SECONDS of a log; with a last argument, bit 5 of the 4th data byte of the 300th BodySpeed or WheelCounts frame flipped.
+prefix() { awk -v s="$2" 'substr($1, 2) + 0 <= s + 1' "$1"; }
+flip() { awk '$3 ~ /^30[68]#/ && ++n == 300 { d = substr($3, 11, 2); v = index("0123456789ABCDEF", substr(d, 1, 1)) - 1; v = (v % 4 >= 2) ? v - 2 : v + 2
+  $3 = substr($3, 1, 10) substr("0123456789ABCDEF", v + 1, 1) substr($3, 12) } { print }' "$1"; }
+
+if [ "${1:-}" = --inside ]; then
+  failed=0
+  for robot in rover mrclam; do
+    node_start zynqmp_r5 $robot vcan0 || exit 2
+    for log in $out/*_"$robot".log; do
+      [ -e "$log" ] || continue
+      name=$(basename "$log" .log)
+      # shellcheck disable=SC2046
+      "$programs/tetap-play" "$log" --can vcan0 --robot $robot --out "$out/$name.board" --quiet $(player_options zynqmp_r5) || { failed=1; node_stop 1; node_start zynqmp_r5 $robot vcan0; }
+    done
+    node_stop
+  done
+  exit $failed
+fi
+
+rm -rf "${out:?}"/*
+"$programs/tetap-world" --memory --duration "$seconds" --raw --quiet --out $out/world >/dev/null || exit 1
+# Times of arrival in memory mean nothing, so the ticks (Step frames) of the run go into the log too.
+grep -E ' 3[01][0-9A-F]#' $out/world/raw.log >$out/world_rover.log
+for truth in out/recorded/mrclam*.truth.csv; do
+  [ -e "$truth" ] || continue
+  name=$(basename "$truth" .truth.csv)
+  prefix "out/recorded/$name.log" "$seconds" >"$out/${name}_mrclam.log"
+done
+[ ! -e $out/mrclam1_mrclam.log ] || flip $out/mrclam1_mrclam.log >$out/flipped_mrclam.log
+flip $out/world_rover.log >$out/flipped_rover.log
+
+for log in $out/*_{rover,mrclam}.log; do
+  [ -e "$log" ] || continue
+  name=$(basename "$log" .log)
+  "$programs/tetap-play" "$log" --memory --robot "${name##*_}" --out "$out/$name.host" --quiet || exit 1
+done
+tools/with-vcan --private -t 1500 "$0" --inside || exit 1
+
+failed=0
+for host in "$out"/*.host; do
+  name=$(basename "$host" .host)
+  epochs=$(grep -c ' 320#' "$host/estimates.log")
+  moves=$(awk -F, '$3 == 1 && $5 != "" { if (n++ == 0) { x = $5; y = $6 } d = ($5 - x) ^ 2 + ($6 - y) ^ 2; if (d > m) m = d } END { printf "%.2f", sqrt(m) }' "$host/estimates.csv")
+  if cmp -s "$host/estimates.log" "$out/$name.board/estimates.log"; then verdict=equal; else verdict=DIFFERENT; failed=1; fi
+  awk -v m="$moves" -v e="$epochs" -v s="$seconds" 'BEGIN { exit !(m > 0.3 && e >= 100 * s - 60) }' || { verdict="$verdict, but it does not move or is too short"; failed=1; }
+  printf '  %-18s %6d epochs, moves %6s m, state CRC %s: %s\n' "$name" "$epochs" "$moves" "$(grep -o '"state_crc_last": "[0-9A-F]*"' "$host/run.json" | cut -d'"' -f4)" "$verdict"
+done
+for pair in "mrclam1_mrclam flipped_mrclam" "world_rover flipped_rover"; do
+  set -- $pair
+  for side in host board; do
+    [ -e "$out/$1.$side/estimates.log" ] || continue
+    if cmp -s "$out/$1.$side/estimates.log" "$out/$2.$side/estimates.log"; then echo "  one flipped bit in $1 changes nothing on $side"; failed=1; fi
+  done
+done
+exit $failed
