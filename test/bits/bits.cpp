@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// One program for every compiler and core: prints "bits: NAME HASH" for each function and filter, first of a short form, then of the whole
-// one. tools/bits compares the lines. An image takes no arguments; whoever has read enough ends the emulator.
+// One program for every compiler and core: prints "bits: NAME HASH" for each function and filter, first of a short
+// form, then of the whole one. tools/bits compares the lines. An image takes no arguments; whoever has read enough ends
+// the emulator.
 #include "app/node.hpp"
 #include "base/selfcheck.hpp"
 #include "config/husky.hpp"
@@ -32,7 +33,8 @@ namespace {
 
 using namespace tetap;
 
-/// The recorded run; hashed as Exercise does it: everything that does not depend on real time, the state's CRC in every epoch.
+/// The recorded run; hashed as Exercise does it: everything that does not depend on real time, the state's CRC in every
+/// epoch.
 template <class Node>
 std::uint32_t recorded(Node& node, std::uint32_t can_base) {
   base::WordHash hash;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Every filter on random input with outliers and resets; the raw bits of state, covariance and innovation hashed at every step.
+// Every filter on random input with outliers and resets; the raw bits of state, covariance and innovation hashed at
+// every step.
 #pragma once
 
 #include "app/estimators/dead_reckoning.hpp"
@@ -19,8 +20,8 @@
 
 namespace tetap::bits {
 
-/// A generator of numbers and of incidents. Two draws never stand in one argument list: compilers order those as they like; in braces they
-/// stand in order.
+/// A generator of numbers and of incidents. Two draws never stand in one argument list: compilers order those as they
+/// like; in braces they stand in order.
 struct Chance {
   base::Random random;
   app::Dice dice{2026};
@@ -28,7 +29,9 @@ struct Chance {
   float normal() { return random.normal(); }
   float spread() { return 2.0F * random.uniform() - 1.0F; }
   /// In [-limit, limit).
-  std::int64_t within(std::int64_t limit) { return static_cast<std::int64_t>(dice.roll() >> 6) * limit / (1 << 25) - limit; }
+  std::int64_t within(std::int64_t limit) {
+    return static_cast<std::int64_t>(dice.roll() >> 6) * limit / (1 << 25) - limit;
+  }
   bool one_in(std::uint32_t n) { return dice.one_in(n); }
   /// Noise of a sensor: one in forty is an outlier.
   float noise(float sigma) { return sigma * (one_in(40) ? 25.0F : 1.0F) * normal(); }
@@ -66,9 +69,10 @@ void hash_vector(base::WordHash& hash, const filter::Vector<float, N>& x) {
     x_m += 1.0F * dt_s;
     y_m += 0.3F * dt_s;
     kf.predict(model::ConstantVelocity<float>{.dt_s = dt_s, .acceleration_variance = 0.1F});
-    const auto innovation = kf.update(
-        filter::DirectMeasurement<float, 4, 0, 2>{.z = {x_m + chance.noise(0.5F), y_m + chance.noise(0.5F)}, .variance = {0.25F, 0.25F}},
-        filter::chi_square_99(2));
+    const auto innovation =
+        kf.update(filter::DirectMeasurement<float, 4, 0, 2>{.z = {x_m + chance.noise(0.5F), y_m + chance.noise(0.5F)},
+                                                            .variance = {0.25F, 0.25F}},
+                  filter::chi_square_99(2));
     hash_innovation(hash, innovation);
     hash_vector<4>(hash, kf.x.value);
     hash_covariance(hash, kf);
@@ -93,8 +97,9 @@ void hash_vector(base::WordHash& hash, const filter::Vector<float, N>& x) {
     }
     kf.predict(motion);
     const auto innovation = kf.update(
-        filter::DirectMeasurement<float, 8, 0, 2, 5, 7>{.z = {chance.noise(0.3F), chance.noise(0.3F), chance.noise(0.3F), chance.noise(0.3F)},
-                                                        .variance = {0.09F, 0.09F, 0.16F, 0.04F}},
+        filter::DirectMeasurement<float, 8, 0, 2, 5, 7>{
+            .z = {chance.noise(0.3F), chance.noise(0.3F), chance.noise(0.3F), chance.noise(0.3F)},
+            .variance = {0.09F, 0.09F, 0.16F, 0.04F}},
         filter::chi_square_99(4));
     hash_innovation(hash, innovation);
     hash_vector<8>(hash, kf.x.value);
@@ -108,8 +113,14 @@ void hash_vector(base::WordHash& hash, const filter::Vector<float, N>& x) {
   base::WordHash hash;
   Chance chance{.random = base::Random{1, 3}};
   filter::Ekf<model::PlanarPose> ekf;
-  const model::UnicycleNoise noise{.speed = 1e-3F, .speed_per_speed = 1e-2F, .yaw_rate = 1e-3F, .yaw_rate_per_yaw_rate = 1e-2F};
-  const model::DifferentialDrive drive{.left_radius_m = 0.1F, .right_radius_m = 0.1F, .track_m = 0.5F, .counts_per_turn = 2000.0F, .noise_left = 0.002F, .noise_right = 0.002F};
+  const model::UnicycleNoise noise{
+      .speed = 1e-3F, .speed_per_speed = 1e-2F, .yaw_rate = 1e-3F, .yaw_rate_per_yaw_rate = 1e-2F};
+  const model::DifferentialDrive drive{.left_radius_m = 0.1F,
+                                       .right_radius_m = 0.1F,
+                                       .track_m = 0.5F,
+                                       .counts_per_turn = 2000.0F,
+                                       .noise_left = 0.002F,
+                                       .noise_right = 0.002F};
   const model::PlanarMounting mounting{.x_b_m = 0.2F, .y_b_m = -0.1F, .yaw_rad = 0.3F};
   constexpr std::int64_t kFar_um = 50'000'000'000;
   model::PlanarPose truth;
@@ -119,15 +130,19 @@ void hash_vector(base::WordHash& hash, const filter::Vector<float, N>& x) {
   };
   for (std::uint32_t k = 0; k < steps; ++k) {
     if (k % 1000 == 0 || chance.one_in(700)) {
-      truth = {.x = base::Anchored::from_um(kFar_um), .y = base::Anchored::from_um(-kFar_um), .yaw_rad = 3.0F * chance.spread()};
+      truth = {.x = base::Anchored::from_um(kFar_um),
+               .y = base::Anchored::from_um(-kFar_um),
+               .yaw_rad = 3.0F * chance.spread()};
       ekf.x = truth.plus({0.3F * chance.normal(), 0.3F * chance.normal(), 0.1F * chance.normal()});
       ekf.p = filter::Symmetric<float, 3>::diagonal({0.1F, 0.1F, 0.01F});
     }
     const std::array<float, 2> speeds{chance.spread(), chance.spread()};
     if (k % 2 == 0) {
-      move(model::Unicycle{.forward_mps = 1.0F + speeds[0], .yaw_rate_radps = speeds[1], .noise = noise}.increment(0.1F));
+      move(model::Unicycle{.forward_mps = 1.0F + speeds[0], .yaw_rate_radps = speeds[1], .noise = noise}.increment(
+          0.1F));
     } else {
-      move(drive.increment(0.1F + 0.05F * speeds[0], 0.1F + 0.05F * speeds[1], k % 3 == 0 ? model::Arc::kMidpoint : model::Arc::kExact));
+      move(drive.increment(0.1F + 0.05F * speeds[0], 0.1F + 0.05F * speeds[1],
+                           k % 3 == 0 ? model::Arc::kMidpoint : model::Arc::kExact));
     }
     const model::Landmark landmark{.x = base::Anchored::from_um(kFar_um).plus(40.0F * chance.spread()),
                                    .y = base::Anchored::from_um(-kFar_um).plus(40.0F * chance.spread())};
@@ -137,14 +152,37 @@ void hash_vector(base::WordHash& hash, const filter::Vector<float, N>& x) {
     const float gate1 = filter::chi_square_99(1), gate2 = filter::chi_square_99(2);
     switch (chance.dice.below(5)) {
       case 0:
-        hash_innovation(hash, ekf.update(model::RangeBearing{.range_m = range_m, .bearing_rad = bearing_rad, .sigma_range_m = 0.1F, .sigma_bearing_rad = 0.02F, .landmark = landmark, .mounting = mounting}, gate2));
+        hash_innovation(hash, ekf.update(model::RangeBearing{.range_m = range_m,
+                                                             .bearing_rad = bearing_rad,
+                                                             .sigma_range_m = 0.1F,
+                                                             .sigma_bearing_rad = 0.02F,
+                                                             .landmark = landmark,
+                                                             .mounting = mounting},
+                                         gate2));
         break;
-      case 1: hash_innovation(hash, ekf.update(model::Range{.range_m = range_m, .sigma_range_m = 0.1F, .landmark = landmark, .mounting = mounting}, gate1)); break;
-      case 2: hash_innovation(hash, ekf.update(model::Bearing{.bearing_rad = bearing_rad, .sigma_bearing_rad = 0.02F, .landmark = landmark, .mounting = mounting}, gate1)); break;
+      case 1:
+        hash_innovation(
+            hash,
+            ekf.update(
+                model::Range{.range_m = range_m, .sigma_range_m = 0.1F, .landmark = landmark, .mounting = mounting},
+                gate1));
+        break;
+      case 2:
+        hash_innovation(hash, ekf.update(model::Bearing{.bearing_rad = bearing_rad,
+                                                        .sigma_bearing_rad = 0.02F,
+                                                        .landmark = landmark,
+                                                        .mounting = mounting},
+                                         gate1));
+        break;
       case 3:
-        hash_innovation(hash, ekf.update(model::GnssPosition{.x = truth.x.plus(chance.noise(1.0F)), .y = truth.y.plus(chance.noise(1.0F)), .sigma_m = 1.0F, .antenna_x_b_m = 0.3F}, gate2));
+        hash_innovation(hash, ekf.update(model::GnssPosition{.x = truth.x.plus(chance.noise(1.0F)),
+                                                             .y = truth.y.plus(chance.noise(1.0F)),
+                                                             .sigma_m = 1.0F,
+                                                             .antenna_x_b_m = 0.3F},
+                                         gate2));
         break;
-      default: break;
+      default:
+        break;
     }
     hash(ekf.x.x.anchor_um);
     hash(ekf.x.x.offset_m);
@@ -176,11 +214,18 @@ void hash_vector(base::WordHash& hash, const filter::Vector<float, N>& x) {
     counts.left = static_cast<std::uint16_t>(counts.left + 30 + chance.dice.below(20));
     counts.right = static_cast<std::uint16_t>(counts.right + 30 + chance.dice.below(25));
     switch (chance.dice.below(8)) {
-      case 0: motion.fuse(app::WheelSpeeds{.left_mps = chance.spread(), .right_mps = chance.spread()}, stamp, numbers); break;
-      case 1: motion.fuse(app::BodySpeed{.forward_mps = chance.spread(), .yaw_rate_radps = chance.spread()}, stamp, numbers); break;
-      default: motion.fuse(counts, stamp, numbers); break;
+      case 0:
+        motion.fuse(app::WheelSpeeds{.left_mps = chance.spread(), .right_mps = chance.spread()}, stamp, numbers);
+        break;
+      case 1:
+        motion.fuse(app::BodySpeed{.forward_mps = chance.spread(), .yaw_rate_radps = chance.spread()}, stamp, numbers);
+        break;
+      default:
+        motion.fuse(counts, stamp, numbers);
+        break;
     }
-    motion.fuse(app::ImuSample{.interval = {10'000}, .dangle_b_rad = {0.0F, 0.0F, 0.01F * chance.normal()}}, stamp, numbers);
+    motion.fuse(app::ImuSample{.interval = {10'000}, .dangle_b_rad = {0.0F, 0.0F, 0.01F * chance.normal()}}, stamp,
+                numbers);
     motion.advance({now_us});
     motion.each_bit(hash);
     const app::Estimate ahead = motion.estimate(numbers);
@@ -202,7 +247,8 @@ void hash_vector(base::WordHash& hash, const filter::Vector<float, N>& x) {
       const std::array<std::int64_t, 2> origin{chance.within(45'000'000'000), chance.within(90'000'000'000)};
       frame = nav::LocalFrame(origin[0], origin[1], 4000.0F * chance.spread());
     }
-    const std::array<std::int64_t, 2> fix{frame.latitude_2ndeg() + chance.within(50'000'000), frame.longitude_2ndeg() + chance.within(50'000'000)};
+    const std::array<std::int64_t, 2> fix{frame.latitude_2ndeg() + chance.within(50'000'000),
+                                          frame.longitude_2ndeg() + chance.within(50'000'000)};
     const nav::Local local = frame.to_local(fix[0], fix[1], 4000.0F * chance.spread());
     hash(local.east_um);
     hash(local.north_um);

@@ -6,7 +6,8 @@
 
 #include <cstdint>
 
-// The Cortex-R5's tightly coupled memory has no room for the record beside the program; there it lies in a section of its own.
+// The Cortex-R5's tightly coupled memory has no room for the record beside the program; there it lies in a section of
+// its own.
 #if defined(TETAP_BOARD_ZYNQMP_R5)
 #define TETAP_RECORDED [[gnu::section(".recorded")]]
 #else

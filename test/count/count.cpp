@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The workloads whose instructions tools/count counts and tools/budgets.json bounds. Inputs are arrays made beforehand; what is between
-// the markers are calls of headers that the firmware is made of.
+// The workloads whose instructions tools/count counts and tools/budgets.json bounds. Inputs are arrays made beforehand;
+// what is between the markers are calls of headers that the firmware is made of.
 #include "app/node.hpp"
 #include "base/random.hpp"
 #include "config/rover.hpp"
@@ -28,7 +28,8 @@ using count::Region;
 
 constexpr std::size_t kSteps = 256;
 
-/// Roughly normal, standard deviation 1: four uniform numbers of a linear congruential generator (Knuth, TAOCP 2, sec. 3.3.4).
+/// Roughly normal, standard deviation 1: four uniform numbers of a linear congruential generator (Knuth, TAOCP 2,
+/// sec. 3.3.4).
 class Noise {
  public:
   float operator()() {
@@ -58,7 +59,8 @@ void constant_velocity() {
   for (const auto& position : z) {
     const Region<struct w1_kf> region;
     kf.predict(model::ConstantVelocity<float>{.dt_s = 0.1F, .acceleration_variance = 0.1F});
-    static_cast<void>(kf.update(filter::DirectMeasurement<float, 4, 0, 2>{.z = position, .variance = {0.25F, 0.25F}}, filter::chi_square_99(2)));
+    static_cast<void>(kf.update(filter::DirectMeasurement<float, 4, 0, 2>{.z = position, .variance = {0.25F, 0.25F}},
+                                filter::chi_square_99(2)));
   }
   opaque(kf);
 }
@@ -75,25 +77,34 @@ void planar() {
   model::PlanarPose truth;
   for (std::size_t k = 0; k < kSteps; ++k) {
     const float rate = 0.3F * base::cos(0.05F * static_cast<float>(k));
-    truth = model::Unicycle{.forward_mps = 1.0F, .yaw_rate_radps = rate, .noise = process}.increment(0.1F).predict(truth);
+    truth =
+        model::Unicycle{.forward_mps = 1.0F, .yaw_rate_radps = rate, .noise = process}.increment(0.1F).predict(truth);
     const model::Sight sight(truth, landmark, {});
-    inputs[k] = {.yaw_rate_radps = rate, .range_m = sight.range_m() + 0.1F * noise(), .bearing_rad = sight.bearing_rad(truth, {}) + 0.02F * noise()};
+    inputs[k] = {.yaw_rate_radps = rate,
+                 .range_m = sight.range_m() + 0.1F * noise(),
+                 .bearing_rad = sight.bearing_rad(truth, {}) + 0.02F * noise()};
   }
   const auto seen = [&](const Input& input) {
-    return model::RangeBearing{.range_m = input.range_m, .bearing_rad = input.bearing_rad, .sigma_range_m = 0.1F, .sigma_bearing_rad = 0.02F, .landmark = landmark};
+    return model::RangeBearing{.range_m = input.range_m,
+                               .bearing_rad = input.bearing_rad,
+                               .sigma_range_m = 0.1F,
+                               .sigma_bearing_rad = 0.02F,
+                               .landmark = landmark};
   };
   filter::Ekf<model::PlanarPose> ekf;
   ekf.p = filter::Symmetric<float, 3>::diagonal({0.1F, 0.1F, 0.05F});
   for (const Input& input : inputs) {
     const Region<struct w2_ekf> region;
-    ekf.predict(model::Unicycle{.forward_mps = 1.0F, .yaw_rate_radps = input.yaw_rate_radps, .noise = process}.increment(0.1F));
+    ekf.predict(
+        model::Unicycle{.forward_mps = 1.0F, .yaw_rate_radps = input.yaw_rate_radps, .noise = process}.increment(0.1F));
     static_cast<void>(ekf.update(seen(input), filter::chi_square_99(2)));
   }
   opaque(ekf);
   ekf = {};
   ekf.p = filter::Symmetric<float, 3>::diagonal({0.1F, 0.1F, 0.05F});
   for (const Input& input : inputs) {
-    ekf.predict(model::Unicycle{.forward_mps = 1.0F, .yaw_rate_radps = input.yaw_rate_radps, .noise = process}.increment(0.1F));
+    ekf.predict(
+        model::Unicycle{.forward_mps = 1.0F, .yaw_rate_radps = input.yaw_rate_radps, .noise = process}.increment(0.1F));
     const model::RangeBearing measurement = seen(input);
     const Region<struct fuse_range_bearing> region;
     static_cast<void>(ekf.update(measurement, filter::chi_square_99(2)));

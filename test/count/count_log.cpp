@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Instructions of every tick of a MRCLAM robot's node over a recorded log: IN.log, a candump log with sync frames, is the argument.
+// Instructions of every tick of a MRCLAM robot's node over a recorded log: IN.log, a candump log with sync frames, is
+// the argument.
 #include "app/node.hpp"
 #include "config/mrclam.hpp"
 #include "hal/port/mps2/board.hpp"
