@@ -16,6 +16,8 @@ template <class... F>
 struct Cases : F... {
   using F::operator()...;
 };
+template <class... F>
+Cases(F...) -> Cases<F...>;
 
 /// Appends the measurement's frames, but not those that are lost on the way.
 inline void encode(std::uint32_t base, const Measurement& m, std::vector<base::CanFrame>& out) {

@@ -65,9 +65,9 @@ class Symmetric {
 
  private:
   static constexpr std::size_t index(int r, int c) {
-    const int low = r < c ? r : c;
-    const int high = r < c ? c : r;
-    return static_cast<std::size_t>(high * (high + 1) / 2 + low);
+    const auto low = static_cast<std::size_t>(r < c ? r : c);
+    const auto high = static_cast<std::size_t>(r < c ? c : r);
+    return high * (high + 1) / 2 + low;
   }
   std::array<Scalar, static_cast<std::size_t>(N) * (N + 1) / 2> packed_{};
 };
