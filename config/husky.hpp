@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Clearpath Husky A200 of robot_localization's test bag: skid-steered, wheel odometry 10 Hz, IMU 30 Hz, GNSS 2.5 Hz. Yaw rate from the
-// gyroscope, because skidding wheels do not tell it.
+// Clearpath Husky A200 of robot_localization's test bag: skid-steered, wheel odometry 10 Hz, IMU 30 Hz, GNSS 2.5 Hz.
+// Yaw rate from the gyroscope, because skidding wheels do not tell it.
 #pragma once
 
 #include "app/estimators/odometry.hpp"
@@ -13,8 +13,9 @@ using Estimators = app::Estimators<app::Odometry, app::PoseEkf>;
 
 inline constexpr app::Numbers numbers{
     .loop = {.window_us = 200'000, .ahead_us = 200'000},
-    .wheels = {.drive = {.left_radius_m = 0.165F, .right_radius_m = 0.165F, .track_m = 0.545F, .counts_per_turn = 78000.0F},
-               .noise = {.speed = 0.0001F, .speed_per_speed = 0.002F, .yaw_rate = 0.0001F, .yaw_rate_per_yaw_rate = 0.01F}},
+    .wheels =
+        {.drive = {.left_radius_m = 0.165F, .right_radius_m = 0.165F, .track_m = 0.545F, .counts_per_turn = 78000.0F},
+         .noise = {.speed = 0.0001F, .speed_per_speed = 0.002F, .yaw_rate = 0.0001F, .yaw_rate_per_yaw_rate = 0.01F}},
     // The sensor is mounted x right, y up, z backwards: gravity at rest and the turns of the wheels both say so.
     .gyro = {.use = 1, .up_s = {0, 1, 0}, .noise = 0.0001F},
     .gnss = {.sigma_floor_m = 0.5F, .sigma_scale = 2.0F},

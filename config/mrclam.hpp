@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// The five robots of the UTIAS MRCLAM data sets (Leung, Halpern, Barfoot, Liu, IJRR 2011): iRobot Create, commanded speeds at 67 Hz,
-// landmarks by a camera's barcodes, map and start pose given on the bus. One configuration for all robots.
+// The five robots of the UTIAS MRCLAM data sets (Leung, Halpern, Barfoot, Liu, IJRR 2011): iRobot Create, commanded
+// speeds at 67 Hz, landmarks by a camera's barcodes, map and start pose given on the bus. One configuration for all
+// robots.
 //
-// How the numbers were found: by the likelihood of the innovations over the five robots of Dataset 7 (sum of NIS and log det S, NIS
-// capped at 20), not by the distance to the truth; rounded to one digit.
+// How the numbers were found: by the likelihood of the innovations over the five robots of Dataset 7 (sum of NIS and
+// log det S, NIS capped at 20), not by the distance to the truth; rounded to one digit.
 #pragma once
 
 #include "app/estimators/odometry.hpp"
@@ -16,12 +17,13 @@ using Estimators = app::Estimators<app::Odometry, app::PoseEkf>;
 
 inline constexpr app::Numbers numbers{
     .loop = {.window_us = 200'000, .ahead_us = 400'000},
-    .wheels = {.drive = {.left_radius_m = 0.033F, .right_radius_m = 0.033F, .track_m = 0.235F, .counts_per_turn = 508.8F},
-               .noise = {.speed = 0.002F, .yaw_rate = 0.0005F, .yaw_rate_per_yaw_rate = 0.01F, .yaw_rate_per_speed = 0.0005F},
-               .hold = app::Hold::kForward,
-               .delay_us = 200'000,      // from command to motion: the likelihood is flat between 0.2 and 0.3 s
-               .yaw_rate_scale = 0.95F,   // turns come out short; flat between 0.90 and 0.97
-               .timeout_us = 5'000'000},   // a command holds until the next
+    .wheels =
+        {.drive = {.left_radius_m = 0.033F, .right_radius_m = 0.033F, .track_m = 0.235F, .counts_per_turn = 508.8F},
+         .noise = {.speed = 0.002F, .yaw_rate = 0.0005F, .yaw_rate_per_yaw_rate = 0.01F, .yaw_rate_per_speed = 0.0005F},
+         .hold = app::Hold::kForward,
+         .delay_us = 200'000,       // from command to motion: the likelihood is flat between 0.2 and 0.3 s
+         .yaw_rate_scale = 0.95F,   // turns come out short; flat between 0.90 and 0.97
+         .timeout_us = 5'000'000},  // a command holds until the next
     .landmark = {.sigma_range_m = 0.1F, .sigma_range_per_m = 0.05F, .sigma_bearing_rad = 0.02F, .gate_scale = 1.5F},
     .recovery = {.after_us = 0, .at_least = 5, .inflate_position_m = 0.3F, .inflate_yaw_rad = 0.5F},
 };

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The default robot: a differential-drive rover with encoders, an IMU, a GNSS receiver and a camera that knows landmarks, as simulated
-// by sim_host/world. Geometry is what the drawing says; the world's wheels are unequal and its track is wider.
+// The default robot: a differential-drive rover with encoders, an IMU, a GNSS receiver and a camera that knows
+// landmarks, as simulated by sim_host/world. Geometry is what the drawing says; the world's wheels are unequal and its
+// track is wider.
 #pragma once
 
 #include "app/estimators/odometry.hpp"
@@ -14,7 +15,8 @@ using Estimators = app::Estimators<app::Odometry, app::PoseEkf>;
 inline constexpr app::Numbers numbers{
     // GNSS fixes come 80 to 120 ms late, camera sightings 20 to 60 ms: all inside the window.
     .loop = {.period_us = 10'000, .window_us = 200'000, .ahead_us = 200'000},
-    // k: slip and unequal wheels make the error of a wheel grow by 4 cm per root metre; the drawing gives radius, track and encoder.
+    // k: slip and unequal wheels make the error of a wheel grow by 4 cm per root metre; the drawing gives radius, track
+    // and encoder.
     .wheels = {.drive = {.left_radius_m = 0.10F,
                          .right_radius_m = 0.10F,
                          .track_m = 0.50F,

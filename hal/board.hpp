@@ -11,7 +11,8 @@ namespace tetap::hal {
 
 template <class B>
 concept Board = requires(B& board) {
-  /// Microseconds since start: monotonic, at least 100 us resolution. Only the loop reads it, and only to decide when to tick.
+  /// Microseconds since start: monotonic, at least 100 us resolution. Only the loop reads it, and only to decide when
+  /// to tick.
   { board.now() } -> std::same_as<base::Micros>;
   requires CanBus<decltype(B::can)>;
 };

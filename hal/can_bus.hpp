@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the firmware asks of a CAN controller. Frames are copied; the port owns filters, bit timing and bus-off recovery.
+// What the firmware asks of a CAN controller. Frames are copied; the port owns filters, bit timing and bus-off
+// recovery.
 #pragma once
 
 #include "base/can_frame.hpp"

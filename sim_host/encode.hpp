@@ -29,35 +29,63 @@ inline void encode(std::uint32_t base, const Measurement& m, std::vector<base::C
   };
   const Cases write{
       [&](const app::ImuSample& v) {
-        put(can::ImuGyro{.ang_x_rad = v.dangle_b_rad[0], .ang_y_rad = v.dangle_b_rad[1], .ang_z_rad = v.dangle_b_rad[2], .seq = seq}, m.instance);
-        put(can::ImuAccel{.vel_x_mps = v.dvelocity_b_mps[0], .vel_y_mps = v.dvelocity_b_mps[1], .vel_z_mps = v.dvelocity_b_mps[2], .seq = seq},
+        put(can::ImuGyro{.ang_x_rad = v.dangle_b_rad[0],
+                         .ang_y_rad = v.dangle_b_rad[1],
+                         .ang_z_rad = v.dangle_b_rad[2],
+                         .seq = seq},
             m.instance);
-        put(can::ImuTime{.stamp_us = stamp, .interval_us = static_cast<std::uint16_t>(v.interval.us), .clip_gyro = v.clipped_gyro,
-                         .clip_accel = v.clipped_accel, .temp_degC = v.temperature_degC, .seq = seq},
+        put(can::ImuAccel{.vel_x_mps = v.dvelocity_b_mps[0],
+                          .vel_y_mps = v.dvelocity_b_mps[1],
+                          .vel_z_mps = v.dvelocity_b_mps[2],
+                          .seq = seq},
+            m.instance);
+        put(can::ImuTime{.stamp_us = stamp,
+                         .interval_us = static_cast<std::uint16_t>(v.interval.us),
+                         .clip_gyro = v.clipped_gyro,
+                         .clip_accel = v.clipped_accel,
+                         .temp_degC = v.temperature_degC,
+                         .seq = seq},
             m.instance);
       },
       [&](const app::WheelCounts& v) {
         put(can::InWheelCounts{.stamp_us = stamp, .seq = seq, .inst = m.instance, .left = v.left, .right = v.right});
       },
       [&](const app::WheelSpeeds& v) {
-        put(can::InWheelSpeed{.stamp_us = stamp, .seq = seq, .inst = m.instance, .left_mps = v.left_mps, .right_mps = v.right_mps});
+        put(can::InWheelSpeed{
+            .stamp_us = stamp, .seq = seq, .inst = m.instance, .left_mps = v.left_mps, .right_mps = v.right_mps});
       },
       [&](const app::BodySpeed& v) {
-        put(can::InBodySpeed{.stamp_us = stamp, .seq = seq, .inst = m.instance, .forward_mps = v.forward_mps, .yaw_rate_radps = v.yaw_rate_radps});
+        put(can::InBodySpeed{.stamp_us = stamp,
+                             .seq = seq,
+                             .inst = m.instance,
+                             .forward_mps = v.forward_mps,
+                             .yaw_rate_radps = v.yaw_rate_radps});
       },
       [&](const app::GnssPosition& v) {
         put(can::InGnssLat{.stamp_us = stamp, .seq = seq, .inst = m.instance, .lat_raw = v.latitude_2ndeg});
         put(can::InGnssLon{.stamp_us = stamp, .seq = seq, .inst = m.instance, .lon_raw = v.longitude_2ndeg});
-        put(can::InGnssAlt{.stamp_us = stamp, .seq = seq, .inst = m.instance, .height_m = v.height_m, .fix = static_cast<can::GnssFix>(v.fix),
+        put(can::InGnssAlt{.stamp_us = stamp,
+                           .seq = seq,
+                           .inst = m.instance,
+                           .height_m = v.height_m,
+                           .fix = static_cast<can::GnssFix>(v.fix),
                            .num_sv = v.satellites});
-        put(can::InGnssAcc{.stamp_us = stamp, .seq = seq, .inst = m.instance, .hor_m = v.horizontal_acc_m, .ver_m = v.vertical_acc_m});
+        put(can::InGnssAcc{
+            .stamp_us = stamp, .seq = seq, .inst = m.instance, .hor_m = v.horizontal_acc_m, .ver_m = v.vertical_acc_m});
       },
       [&](const app::GnssVelocity& v) {
-        put(can::InGnssVelEN{.stamp_us = stamp, .seq = seq, .inst = m.instance, .east_mps = v.v_n_mps[0], .north_mps = v.v_n_mps[1]});
-        put(can::InGnssVelU{.stamp_us = stamp, .seq = seq, .inst = m.instance, .up_mps = v.v_n_mps[2], .acc_mps = v.acc_mps});
+        put(can::InGnssVelEN{
+            .stamp_us = stamp, .seq = seq, .inst = m.instance, .east_mps = v.v_n_mps[0], .north_mps = v.v_n_mps[1]});
+        put(can::InGnssVelU{
+            .stamp_us = stamp, .seq = seq, .inst = m.instance, .up_mps = v.v_n_mps[2], .acc_mps = v.acc_mps});
       },
       [&](const app::LandmarkSighting& v) {
-        put(can::InRangeBearing{.stamp_us = stamp, .seq = seq, .inst = m.instance, .id = v.landmark, .range_m = v.range_m, .bearing_rad = v.bearing_rad});
+        put(can::InRangeBearing{.stamp_us = stamp,
+                                .seq = seq,
+                                .inst = m.instance,
+                                .id = v.landmark,
+                                .range_m = v.range_m,
+                                .bearing_rad = v.bearing_rad});
       }};
   std::visit(write, m.value);
 }

@@ -16,8 +16,10 @@ namespace tetap::sim {
 
 class Options {
  public:
-  /// Prints `help` and leaves with status 0 on --help. Throws std::runtime_error on what is not known or lacks its value.
-  Options(int argc, char** argv, std::initializer_list<std::string_view> valued, std::initializer_list<std::string_view> flags, const char* help) {
+  /// Prints `help` and leaves with status 0 on --help. Throws std::runtime_error on what is not known or lacks its
+  /// value.
+  Options(int argc, char** argv, std::initializer_list<std::string_view> valued,
+          std::initializer_list<std::string_view> flags, const char* help) {
     for (int i = 1; i < argc; ++i) {
       const std::string_view word = argv[i];
       if (word == "--help" || word == "-h") {
@@ -47,8 +49,12 @@ class Options {
   }
 
   [[nodiscard]] bool has(const std::string& name) const { return values_.contains(name); }
-  [[nodiscard]] std::string text(const std::string& name, const std::string& otherwise) const { return has(name) ? values_.at(name).back() : otherwise; }
-  [[nodiscard]] std::vector<std::string> all(const std::string& name) const { return has(name) ? values_.at(name) : std::vector<std::string>{}; }
+  [[nodiscard]] std::string text(const std::string& name, const std::string& otherwise) const {
+    return has(name) ? values_.at(name).back() : otherwise;
+  }
+  [[nodiscard]] std::vector<std::string> all(const std::string& name) const {
+    return has(name) ? values_.at(name) : std::vector<std::string>{};
+  }
   [[nodiscard]] const std::vector<std::string>& words() const { return words_; }
   [[nodiscard]] double number(const std::string& name, double otherwise) const {
     if (!has(name)) return otherwise;

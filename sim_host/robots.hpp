@@ -21,7 +21,8 @@ template <class F>
   if (name == "rover") return f(std::type_identity<robot::rover::Estimators>{}, robot::rover::numbers), true;
   if (name == "mrclam") return f(std::type_identity<robot::mrclam::Estimators>{}, robot::mrclam::numbers), true;
   if (name == "husky") return f(std::type_identity<robot::husky::Estimators>{}, robot::husky::numbers), true;
-  if (name == "labyrinth") return f(std::type_identity<robot::labyrinth::Estimators>{}, robot::labyrinth::numbers), true;
+  if (name == "labyrinth")
+    return f(std::type_identity<robot::labyrinth::Estimators>{}, robot::labyrinth::numbers), true;
   return false;
 }
 

@@ -18,14 +18,16 @@ volatile std::sig_atomic_t stop_asked = 0;
 void ask_to_stop(int) { stop_asked = 1; }
 
 constexpr const char* kHelp =
-    "usage: tetap-node [OPTION]...\n\nThe firmware as a Linux program on SocketCAN. Ends on INT or TERM with status 0.\n\n"
+    "usage: tetap-node [OPTION]...\n\nThe firmware as a Linux program on SocketCAN. Ends on INT or TERM with status "
+    "0.\n\n"
     "  --can IFACE    the interface (default vcan0)\n"
     "  --robot NAME   husky, labyrinth, mrclam or rover (default rover)\n"
     "  --base ID      first id of the node's block of 64 (default 0x300)\n";
 
 template <class Estimators>
 void run(tetap::hal::LinuxBoard& board, const tetap::app::Numbers& numbers) {
-  const auto firmware = std::make_unique<tetap::app::Firmware<tetap::hal::LinuxBoard, Estimators>>(board, numbers, tetap::kVersion);
+  const auto firmware =
+      std::make_unique<tetap::app::Firmware<tetap::hal::LinuxBoard, Estimators>>(board, numbers, tetap::kVersion);
   while (stop_asked == 0) {
     firmware->poll();
     board.can.wait(tetap::base::Micros{500});
@@ -43,7 +45,8 @@ int main(int argc, char** argv) try {
   tetap::sim::for_robot(robot, [&]<class Estimators>(std::type_identity<Estimators>, tetap::app::Numbers numbers) {
     numbers.can_base = options.base();
     tetap::hal::LinuxBoard board(interface);
-    std::fprintf(stderr, "tetap-node: robot %s on %s, ids %03X to %03X\n", robot.c_str(), interface.c_str(), numbers.can_base, numbers.can_base + 0x3F);
+    std::fprintf(stderr, "tetap-node: robot %s on %s, ids %03X to %03X\n", robot.c_str(), interface.c_str(),
+                 numbers.can_base, numbers.can_base + 0x3F);
     run<Estimators>(board, numbers);
   });
   return 0;

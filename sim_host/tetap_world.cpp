@@ -18,15 +18,18 @@ using namespace tetap;
 std::string help() {
   return
 
-      std::string("usage: tetap-world [OPTION]...\n\nDrives a simulated rover over its course, sends what its sensors say, and records the node's answers.\n\n"
-      "  --can IFACE        the interface the node is on (default vcan0)\n"
-      "  --memory           run a node in this process instead, without a bus\n"
-      "  --robot NAME       what the node is (default rover)\n"
-      "  --out DIR          for the record and truth.csv (default out/sim)\n"
-      "  --seed N           every draw follows from it (default 1)\n"
-      "  --duration S       at most so long (default: the whole course)\n"
-      "  --matched          only errors that the filters model\n"
-      "  --fault NAME[@START[+DURATION]]   seconds; several with commas:\n") + sim::fault_help() +
+      std::string(
+          "usage: tetap-world [OPTION]...\n\nDrives a simulated rover over its course, sends what its sensors say, and "
+          "records the node's answers.\n\n"
+          "  --can IFACE        the interface the node is on (default vcan0)\n"
+          "  --memory           run a node in this process instead, without a bus\n"
+          "  --robot NAME       what the node is (default rover)\n"
+          "  --out DIR          for the record and truth.csv (default out/sim)\n"
+          "  --seed N           every draw follows from it (default 1)\n"
+          "  --duration S       at most so long (default: the whole course)\n"
+          "  --matched          only errors that the filters model\n"
+          "  --fault NAME[@START[+DURATION]]   seconds; several with commas:\n") +
+      sim::fault_help() +
       "  --realtime         at the speed of the world, with Tick frames; else lockstep, as fast as the node can\n"
       "  --window N         lockstep: ticks in flight (default 8)\n"
       "  --emulated         the node runs on an emulated core: be patient\n"
@@ -40,7 +43,8 @@ std::string landmarks_json(const sim::World& world) {
   std::string text;
   for (const sim::Landmark& mark : world.map()) {
     char entry[96];
-    std::snprintf(entry, sizeof entry, R"(%s{"id": %d, "x_m": %.3f, "y_m": %.3f})", text.empty() ? "" : ", ", static_cast<int>(mark.id), mark.x_m, mark.y_m);
+    std::snprintf(entry, sizeof entry, R"(%s{"id": %d, "x_m": %.3f, "y_m": %.3f})", text.empty() ? "" : ", ",
+                  static_cast<int>(mark.id), mark.x_m, mark.y_m);
     text += entry;
   }
   return "[" + text + "]";

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The simulated world as a source of ticks: what its sensors send, as frames. The truth is kept for the report and never sent.
+// The simulated world as a source of ticks: what its sensors send, as frames. The truth is kept for the report and
+// never sent.
 #pragma once
 
 #include "sim_host/encode.hpp"
@@ -15,7 +16,10 @@ namespace tetap::sim {
 class WorldSource {
  public:
   WorldSource(World world, std::uint32_t base, base::Micros period, base::Micros limit)
-      : world_(std::move(world)), base_(base), period_(period), next_(world_.start() + period),
+      : world_(std::move(world)),
+        base_(base),
+        period_(period),
+        next_(world_.start() + period),
         end_(world_.start() + (limit < world_.duration() ? limit : world_.duration())) {}
 
   /// The first tick brings the landmark map and the start pose.
@@ -39,11 +43,17 @@ class WorldSource {
  private:
   void introduce() {
     for (const Landmark& mark : world_.map())
-      frames_.push_back(can::frame(base_, can::InMapEntry{.id = mark.id, .x_raw = millimetres(mark.x_m), .y_raw = millimetres(mark.y_m)}));
+      frames_.push_back(can::frame(
+          base_, can::InMapEntry{.id = mark.id, .x_raw = millimetres(mark.x_m), .y_raw = millimetres(mark.y_m)}));
     const StartPose start = world_.start_pose();
-    frames_.push_back(can::frame(base_, can::protect(can::CmdSetPos{.ctr = 1, .x_raw = millimetres(start.x_m) / 2, .y_raw = millimetres(start.y_m) / 2})));
-    frames_.push_back(can::frame(base_, can::protect(can::CmdSetYaw{.ctr = 1, .yaw_rad = static_cast<float>(start.yaw_rad), .std_pos_m = static_cast<float>(start.sigma_m),
-                                                                    .std_yaw_rad = static_cast<float>(start.sigma_yaw_rad)})));
+    frames_.push_back(
+        can::frame(base_, can::protect(can::CmdSetPos{
+                              .ctr = 1, .x_raw = millimetres(start.x_m) / 2, .y_raw = millimetres(start.y_m) / 2})));
+    frames_.push_back(
+        can::frame(base_, can::protect(can::CmdSetYaw{.ctr = 1,
+                                                      .yaw_rad = static_cast<float>(start.yaw_rad),
+                                                      .std_pos_m = static_cast<float>(start.sigma_m),
+                                                      .std_yaw_rad = static_cast<float>(start.sigma_yaw_rad)})));
   }
   static std::int32_t millimetres(double m) { return static_cast<std::int32_t>(std::lround(m * 1000.0)); }
 

@@ -14,7 +14,7 @@ namespace tetap::app {
 struct Estimate {
   base::Micros time;
   model::PlanarPose pose;
-  filter::Symmetric<float, 3> p;     ///< of (x, y, yaw)
+  filter::Symmetric<float, 3> p;  ///< of (x, y, yaw)
   float forward_mps = 0;
   float yaw_rate_radps = 0;
   bool position_valid = false;

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// A run of the node on made-up input with everything that happens to a node: outliers, late, early, doubled and broken frames, half
-// samples, resets, jumps of time. Its hash over every deterministic byte sent (the state CRCs among them) is the same wherever the
-// arithmetic is the same: `make bits` compares it across compilers and cores, and an image prints a short form at boot.
+// A run of the node on made-up input with everything that happens to a node: outliers, late, early, doubled and broken
+// frames, half samples, resets, jumps of time. Its hash over every deterministic byte sent (the state CRCs among them)
+// is the same wherever the arithmetic is the same: `make bits` compares it across compilers and cores, and an image
+// prints a short form at boot.
 #pragma once
 
 #include "app/node.hpp"
@@ -23,7 +24,9 @@ class Dice {
   constexpr std::uint32_t below(std::uint32_t n) { return roll() % n; }
   constexpr bool one_in(std::uint32_t n) { return below(n) == 0; }
   /// In [-1, 1), 2^16 values.
-  constexpr float spread() { return (static_cast<float>(static_cast<std::int32_t>(below(65536))) - 32768.0F) * (1.0F / 32768.0F); }
+  constexpr float spread() {
+    return (static_cast<float>(static_cast<std::int32_t>(below(65536))) - 32768.0F) * (1.0F / 32768.0F);
+  }
 
  private:
   std::uint32_t state_;
@@ -34,7 +37,8 @@ class Exercise {
  public:
   Exercise(Node& node, std::uint32_t can_base, std::uint32_t seed) : node_(node), base_(can_base), dice_(seed) {}
 
-  /// Powers the node on and runs so many epochs; FNV-1a over what it sent, diagnostics of real time and version left out.
+  /// Powers the node on and runs so many epochs; FNV-1a over what it sent, diagnostics of real time and version left
+  /// out.
   std::uint32_t run(std::uint32_t epochs) {
     node_.power_on({kStart_us});
     now_us_ = kStart_us;
@@ -70,37 +74,60 @@ class Exercise {
   void feed(std::uint32_t k) {
     const auto seq = static_cast<std::uint8_t>(k & 15);
     if (k % 900 == 0) introduce();
-    if (dice_.one_in(1500)) put(can::protect(can::CmdReset{.ctr = seq, .what = static_cast<can::ResetWhat>(dice_.below(3))}));
+    if (dice_.one_in(1500))
+      put(can::protect(can::CmdReset{.ctr = seq, .what = static_cast<can::ResetWhat>(dice_.below(3))}));
     left_ += 40 + dice_.below(20) - dice_.below(20);
     right_ += 42 + dice_.below(20) - dice_.below(20);
-    put(can::InWheelCounts{.stamp_us = stamp(), .seq = seq, .left = static_cast<std::uint16_t>(left_), .right = static_cast<std::uint16_t>(right_)});
-    if (dice_.one_in(3)) put(can::InBodySpeed{.stamp_us = stamp(), .seq = seq, .forward_mps = 1.0F + dice_.spread(), .yaw_rate_radps = dice_.spread()});
-    if (dice_.one_in(4)) put(can::InWheelSpeed{.stamp_us = stamp(), .seq = seq, .left_mps = 1.0F + dice_.spread(), .right_mps = 1.0F + dice_.spread()});
+    put(can::InWheelCounts{.stamp_us = stamp(),
+                           .seq = seq,
+                           .left = static_cast<std::uint16_t>(left_),
+                           .right = static_cast<std::uint16_t>(right_)});
+    if (dice_.one_in(3))
+      put(can::InBodySpeed{
+          .stamp_us = stamp(), .seq = seq, .forward_mps = 1.0F + dice_.spread(), .yaw_rate_radps = dice_.spread()});
+    if (dice_.one_in(4))
+      put(can::InWheelSpeed{
+          .stamp_us = stamp(), .seq = seq, .left_mps = 1.0F + dice_.spread(), .right_mps = 1.0F + dice_.spread()});
     const std::uint32_t imu_stamp = stamp();
-    put(can::ImuGyro{.ang_x_rad = 1e-3F * dice_.spread(), .ang_y_rad = 1e-3F * dice_.spread(), .ang_z_rad = 5e-3F * dice_.spread(), .seq = seq});
-    put(can::ImuAccel{.vel_x_mps = 0.01F * dice_.spread(), .vel_y_mps = 0.01F * dice_.spread(), .vel_z_mps = 0.098F, .seq = seq});
+    put(can::ImuGyro{.ang_x_rad = 1e-3F * dice_.spread(),
+                     .ang_y_rad = 1e-3F * dice_.spread(),
+                     .ang_z_rad = 5e-3F * dice_.spread(),
+                     .seq = seq});
+    put(can::ImuAccel{
+        .vel_x_mps = 0.01F * dice_.spread(), .vel_y_mps = 0.01F * dice_.spread(), .vel_z_mps = 0.098F, .seq = seq});
     put(can::ImuTime{.stamp_us = imu_stamp, .interval_us = 10'000, .seq = seq});
     for (std::uint32_t i = dice_.below(3); i > 0; --i) {
       const float wild = dice_.one_in(20) ? 20.0F : 1.0F;
-      put(can::InRangeBearing{.stamp_us = stamp(), .seq = static_cast<std::uint8_t>((seq + i) & 15), .id = static_cast<std::uint8_t>(dice_.below(10)),
+      put(can::InRangeBearing{.stamp_us = stamp(),
+                              .seq = static_cast<std::uint8_t>((seq + i) & 15),
+                              .id = static_cast<std::uint8_t>(dice_.below(10)),
                               .range_m = dice_.one_in(9) ? base::kNan : 6.0F + 5.0F * wild * dice_.spread(),
                               .bearing_rad = dice_.one_in(9) ? base::kNan : 3.2F * dice_.spread()});
     }
     if (k % 20 == 7) {
       const std::uint32_t t = stamp();
       const std::int64_t jump = dice_.one_in(20) ? 500'000 : 5'000;
-      put(can::InGnssLat{.stamp_us = t, .seq = seq, .lat_raw = 24'131'000'000 + jump * static_cast<std::int32_t>(dice_.below(10))});
-      put(can::InGnssLon{.stamp_us = t, .seq = seq, .lon_raw = 5'834'000'000 - jump * static_cast<std::int32_t>(dice_.below(10))});
-      put(can::InGnssAlt{.stamp_us = t, .seq = seq, .height_m = 500.0F + dice_.spread(), .fix = static_cast<can::GnssFix>(dice_.below(7)), .num_sv = 9});
+      put(can::InGnssLat{
+          .stamp_us = t, .seq = seq, .lat_raw = 24'131'000'000 + jump * static_cast<std::int32_t>(dice_.below(10))});
+      put(can::InGnssLon{
+          .stamp_us = t, .seq = seq, .lon_raw = 5'834'000'000 - jump * static_cast<std::int32_t>(dice_.below(10))});
+      put(can::InGnssAlt{.stamp_us = t,
+                         .seq = seq,
+                         .height_m = 500.0F + dice_.spread(),
+                         .fix = static_cast<can::GnssFix>(dice_.below(7)),
+                         .num_sv = 9});
       put(can::InGnssAcc{.stamp_us = t, .seq = seq, .hor_m = 1.5F + dice_.spread(), .ver_m = 3.0F});
     }
   }
   void introduce() {
     for (std::uint8_t id = 0; id < 8; ++id)
-      put(can::InMapEntry{.id = id, .x_raw = static_cast<std::int32_t>(dice_.below(20'000)) - 10'000, .y_raw = static_cast<std::int32_t>(dice_.below(20'000)) - 10'000});
+      put(can::InMapEntry{.id = id,
+                          .x_raw = static_cast<std::int32_t>(dice_.below(20'000)) - 10'000,
+                          .y_raw = static_cast<std::int32_t>(dice_.below(20'000)) - 10'000});
     const auto ctr = static_cast<std::uint8_t>(dice_.below(16));
     put(can::protect(can::CmdSetPos{.ctr = ctr, .x_raw = static_cast<std::int32_t>(dice_.below(4'000)), .y_raw = 0}));
-    put(can::protect(can::CmdSetYaw{.ctr = ctr, .yaw_rad = 3.0F * dice_.spread(), .std_pos_m = 0.5F, .std_yaw_rad = 0.2F}));
+    put(can::protect(
+        can::CmdSetYaw{.ctr = ctr, .yaw_rad = 3.0F * dice_.spread(), .std_pos_m = 0.5F, .std_yaw_rad = 0.2F}));
   }
   void hash(const base::CanFrame& frame) {
     const std::uint32_t offset = frame.id - base_;

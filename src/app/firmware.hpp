@@ -17,14 +17,16 @@ class Firmware {
   Firmware(Board& board, const Numbers& numbers, const Version& version)
       : board_(board), numbers_(numbers), node_(numbers, version), pacer_(base::Micros{numbers.loop.period_us}) {}
 
-  /// Runs the exercise on this very node, then powers it on anew. For boot: the hash says whether this core computes as all others do.
+  /// Runs the exercise on this very node, then powers it on anew. For boot: the hash says whether this core computes as
+  /// all others do.
   [[nodiscard]] std::uint32_t self_check(std::uint32_t epochs) {
     const std::uint32_t hash = Exercise(node_, numbers_.can_base, 1).run(epochs);
     node_.power_on({});
     return hash;
   }
 
-  /// Takes what has arrived, ticks when it is time, hands on what is to be sent. Call it in a loop, as often as you like.
+  /// Takes what has arrived, ticks when it is time, hands on what is to be sent. Call it in a loop, as often as you
+  /// like.
   void poll() {
     while (const auto frame = board_.can.receive()) on_frame(*frame);
     if (const auto t = pacer_.on_poll(board_.now(), health_)) tick(*t);
@@ -58,7 +60,9 @@ class Firmware {
     health_.mean_us += (static_cast<float>(us) - health_.mean_us) * 0.01F;
   }
 
-  void send(const base::CanFrame& frame) { static_cast<void>(board_.can.send(frame)); }  // refused frames: CanFaults::tx_full
+  void send(const base::CanFrame& frame) {
+    static_cast<void>(board_.can.send(frame));
+  }  // refused frames: CanFaults::tx_full
 
   Board& board_;
   const Numbers& numbers_;

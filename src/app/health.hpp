@@ -11,15 +11,15 @@ namespace tetap::app {
 
 /// Counters that follow from the frames and ticks alone: equal in every replay.
 struct Counters {
-  std::uint16_t too_late = 0;        ///< sample older than the window
-  std::uint16_t too_early = 0;       ///< stamp further ahead than a sample may wait
+  std::uint16_t too_late = 0;   ///< sample older than the window
+  std::uint16_t too_early = 0;  ///< stamp further ahead than a sample may wait
   std::uint16_t duplicate = 0;
-  std::uint16_t incomplete = 0;      ///< a sample of several frames of which one never came
-  std::uint16_t malformed = 0;       ///< wrong length, or an input id that means nothing
-  std::uint16_t out_of_range = 0;    ///< a value that must be there is marked not available
-  std::uint16_t not_used = 0;        ///< no estimator takes this kind of sample
-  std::uint16_t no_time = 0;         ///< came before the first tick
-  std::uint16_t command_refused = 0; ///< CRC wrong or counter repeated
+  std::uint16_t incomplete = 0;       ///< a sample of several frames of which one never came
+  std::uint16_t malformed = 0;        ///< wrong length, or an input id that means nothing
+  std::uint16_t out_of_range = 0;     ///< a value that must be there is marked not available
+  std::uint16_t not_used = 0;         ///< no estimator takes this kind of sample
+  std::uint16_t no_time = 0;          ///< came before the first tick
+  std::uint16_t command_refused = 0;  ///< CRC wrong or counter repeated
   std::uint16_t map_full = 0;
   std::uint16_t timeline_full = 0;
   std::uint16_t events_dropped = 0;
@@ -33,8 +33,8 @@ struct LoopHealth {
   float mean_us = 0;             ///< running mean
   std::uint16_t ticks_late = 0;  ///< periods skipped because a tick overran
   std::uint16_t sync_lost = 0;
-  std::uint16_t sync_back = 0;   ///< sync frames whose time was not after the last tick
-  std::uint16_t sync_jump = 0;   ///< sync frames too far ahead
+  std::uint16_t sync_back = 0;  ///< sync frames whose time was not after the last tick
+  std::uint16_t sync_jump = 0;  ///< sync frames too far ahead
   hal::CanFaults bus;
 };
 

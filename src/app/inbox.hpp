@@ -37,10 +37,12 @@ inline constexpr std::int64_t kNoAngle = std::numeric_limits<std::int64_t>::min(
 
 class Inbox {
  public:
-  /// Everything of an input frame but what it means: called with the offset within the node's block. Out gets sample(Sample),
-  /// map_entry(MapEntry), set_pose(SetPose), reset(can::ResetWhat). `reference` is the time stamps are extended around.
+  /// Everything of an input frame but what it means: called with the offset within the node's block. Out gets
+  /// sample(Sample), map_entry(MapEntry), set_pose(SetPose), reset(can::ResetWhat). `reference` is the time stamps are
+  /// extended around.
   template <class Out>
-  void on_frame(std::uint8_t offset, const base::CanFrame& frame, base::Micros reference, Counters& counters, Out&& out);
+  void on_frame(std::uint8_t offset, const base::CanFrame& frame, base::Micros reference, Counters& counters,
+                Out&& out);
 
   void power_on() {
     for (Partial& partial : partials_) partial.missing = 0;
@@ -64,15 +66,16 @@ class Inbox {
   };
   static constexpr std::uint8_t kImuFrames = 0b111, kPositionFrames = 0b1111, kVelocityFrames = 0b11;
 
-  Partial& slot(can::Sensor sensor, std::uint8_t instance, std::uint8_t sequence, std::uint8_t frames, base::Micros reference,
-                Counters& counters);
+  Partial& slot(can::Sensor sensor, std::uint8_t instance, std::uint8_t sequence, std::uint8_t frames,
+                base::Micros reference, Counters& counters);
   template <class Out>
   void complete(Partial& partial, std::uint8_t frame_bit, std::uint32_t bits, Counters& counters, Out& out);
   template <class Out>
-  void imu(std::uint8_t offset, const base::CanFrame& frame, std::uint32_t bits, base::Micros reference, Counters& counters, Out& out);
+  void imu(std::uint8_t offset, const base::CanFrame& frame, std::uint32_t bits, base::Micros reference,
+           Counters& counters, Out& out);
   template <class Message, class Fill, class Out>
-  void gnss(const base::CanFrame& frame, can::Sensor sensor, std::uint8_t frames, std::uint8_t frame_bit, std::uint32_t bits,
-            base::Micros reference, Counters& counters, Out& out, Fill&& fill);
+  void gnss(const base::CanFrame& frame, can::Sensor sensor, std::uint8_t frames, std::uint8_t frame_bit,
+            std::uint32_t bits, base::Micros reference, Counters& counters, Out& out, Fill&& fill);
   template <class Out>
   void command(std::uint8_t offset, const base::CanFrame& frame, Counters& counters, Out& out);
 
@@ -84,7 +87,8 @@ class Inbox {
 
 /// A whole sample from one frame.
 template <class Message>
-[[nodiscard]] constexpr Sample stamped(const Message& message, can::Sensor sensor, std::uint32_t bits, base::Micros reference) {
+[[nodiscard]] constexpr Sample stamped(const Message& message, can::Sensor sensor, std::uint32_t bits,
+                                       base::Micros reference) {
   Sample sample;
   sample.stamp = base::extend(message.stamp_us, 20, reference);
   sample.sensor = sensor;
@@ -103,8 +107,8 @@ template <class Message>
   return crc.value();
 }
 
-inline Inbox::Partial& Inbox::slot(can::Sensor sensor, std::uint8_t instance, std::uint8_t sequence, std::uint8_t frames,
-                                   base::Micros reference, Counters& counters) {
+inline Inbox::Partial& Inbox::slot(can::Sensor sensor, std::uint8_t instance, std::uint8_t sequence,
+                                   std::uint8_t frames, base::Micros reference, Counters& counters) {
   Partial* chosen = &partials_[0];
   for (Partial& partial : partials_) {
     const Sample& s = partial.sample;
@@ -135,8 +139,8 @@ void Inbox::complete(Partial& partial, std::uint8_t frame_bit, std::uint32_t bit
 }
 
 template <class Out>
-void Inbox::imu(std::uint8_t offset, const base::CanFrame& frame, std::uint32_t bits, base::Micros reference, Counters& counters,
-                Out& out) {
+void Inbox::imu(std::uint8_t offset, const base::CanFrame& frame, std::uint32_t bits, base::Micros reference,
+                Counters& counters, Out& out) {
   const auto instance = static_cast<std::uint8_t>((offset - can::ImuGyro::kOffset) / can::ImuGyro::kStride);
   const auto part = static_cast<std::uint8_t>((offset - can::ImuGyro::kOffset) % can::ImuGyro::kStride);
   if (part == 0) {
@@ -168,8 +172,8 @@ void Inbox::imu(std::uint8_t offset, const base::CanFrame& frame, std::uint32_t 
 }
 
 template <class Message, class Fill, class Out>
-void Inbox::gnss(const base::CanFrame& frame, can::Sensor sensor, std::uint8_t frames, std::uint8_t frame_bit, std::uint32_t bits,
-                 base::Micros reference, Counters& counters, Out& out, Fill&& fill) {
+void Inbox::gnss(const base::CanFrame& frame, can::Sensor sensor, std::uint8_t frames, std::uint8_t frame_bit,
+                 std::uint32_t bits, base::Micros reference, Counters& counters, Out& out, Fill&& fill) {
   const auto message = can::decode<Message>(can::payload(frame));
   if (!message) return void(++counters.malformed);
   Partial& partial = slot(sensor, message->inst, message->seq, frames, reference, counters);
@@ -225,7 +229,8 @@ void Inbox::command(std::uint8_t offset, const base::CanFrame& frame, Counters& 
 }
 
 template <class Out>
-void Inbox::on_frame(std::uint8_t offset, const base::CanFrame& frame, base::Micros reference, Counters& counters, Out&& out) {
+void Inbox::on_frame(std::uint8_t offset, const base::CanFrame& frame, base::Micros reference, Counters& counters,
+                     Out&& out) {
   const auto bytes = can::payload(frame);
   const std::uint32_t bits = frame_crc(offset, frame);
   // One frame, one sample: decode, refuse what must be there and is not, stamp, fill.
@@ -244,7 +249,8 @@ void Inbox::on_frame(std::uint8_t offset, const base::CanFrame& frame, base::Mic
   switch (offset) {
     case can::CmdReset::kOffset:
     case can::CmdSetPos::kOffset:
-    case can::CmdSetYaw::kOffset: return command(offset, frame, counters, out);
+    case can::CmdSetYaw::kOffset:
+      return command(offset, frame, counters, out);
     case can::InMapEntry::kOffset: {
       const auto entry = can::decode<can::InMapEntry>(bytes);
       if (!entry) return void(++counters.malformed);
@@ -276,11 +282,13 @@ void Inbox::on_frame(std::uint8_t offset, const base::CanFrame& frame, base::Mic
         return base::is_finite(m.range_m) || base::is_finite(m.bearing_rad);
       });
     case can::InGnssLat::kOffset:
-      return gnss<can::InGnssLat>(frame, Sensor::kGnssPosition, kPositionFrames, 0b0001, bits, reference, counters, out,
-                                  [](const auto& m, auto& p) { return p.gnss_position.latitude_2ndeg = m.lat_raw, m.lat_raw != kNoAngle; });
+      return gnss<can::InGnssLat>(
+          frame, Sensor::kGnssPosition, kPositionFrames, 0b0001, bits, reference, counters, out,
+          [](const auto& m, auto& p) { return p.gnss_position.latitude_2ndeg = m.lat_raw, m.lat_raw != kNoAngle; });
     case can::InGnssLon::kOffset:
-      return gnss<can::InGnssLon>(frame, Sensor::kGnssPosition, kPositionFrames, 0b0010, bits, reference, counters, out,
-                                  [](const auto& m, auto& p) { return p.gnss_position.longitude_2ndeg = m.lon_raw, m.lon_raw != kNoAngle; });
+      return gnss<can::InGnssLon>(
+          frame, Sensor::kGnssPosition, kPositionFrames, 0b0010, bits, reference, counters, out,
+          [](const auto& m, auto& p) { return p.gnss_position.longitude_2ndeg = m.lon_raw, m.lon_raw != kNoAngle; });
     case can::InGnssAlt::kOffset:
       return gnss<can::InGnssAlt>(frame, Sensor::kGnssPosition, kPositionFrames, 0b0100, bits, reference, counters, out,
                                   [](const auto& m, auto& p) {
@@ -310,7 +318,8 @@ void Inbox::on_frame(std::uint8_t offset, const base::CanFrame& frame, base::Mic
                                      p.gnss_velocity.acc_mps = m.acc_mps;
                                      return true;
                                    });
-    default: ++counters.malformed;
+    default:
+      ++counters.malformed;
   }
 }
 

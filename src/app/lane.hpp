@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // One estimator in the firmware: its current state, its state at the far end of the window, and its statistics.
-// A late sample is fused at its own time by starting again from `past` and repeating what came since: the result is the one that
-// would have been had the sample been on time. Costs: twice the estimator's memory; a burst only when something is late.
+// A late sample is fused at its own time by starting again from `past` and repeating what came since: the result is the
+// one that would have been had the sample been on time. Costs: twice the estimator's memory; a burst only when
+// something is late.
 #pragma once
 
 #include "app/context.hpp"
@@ -28,7 +29,7 @@ concept Estimator = requires(E& e, const E& view, base::Micros t, const Context&
 struct SensorStatistics {
   std::uint16_t accepted = 0;
   std::uint16_t rejected = 0;
-  float nis_mean = 0;          ///< running mean over the last 50 or so compared measurements
+  float nis_mean = 0;  ///< running mean over the last 50 or so compared measurements
   std::uint8_t refused_in_a_row = 0;
   bool compared = false;
   base::Micros last_accepted;
@@ -88,7 +89,9 @@ class Lane {
   }
 
   template <class Sink>
-  void each_bit(Sink&& sink) const { now_.each_bit(sink); }
+  void each_bit(Sink&& sink) const {
+    now_.each_bit(sink);
+  }
 
  private:
   static Innovation fuse_into(E& estimator, const Sample& sample, const Context& with) {

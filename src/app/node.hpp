@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The firmware without board and clock: frames and ticks in, frames out. The same sequence of on_frame() and tick() calls gives the
-// same bits on every machine; everything that follows from real time stays outside (Pacer, LoopHealth).
+// The firmware without board and clock: frames and ticks in, frames out. The same sequence of on_frame() and tick()
+// calls gives the same bits on every machine; everything that follows from real time stays outside (Pacer, LoopHealth).
 #pragma once
 
 #include "app/inbox.hpp"
@@ -27,7 +27,9 @@ struct Estimators {
 template <class Estimators, std::size_t TimelineCapacity = 96>
 class Node {
  public:
-  Node(const Numbers& numbers, const Version& version) : numbers_(numbers), publisher_(numbers, version) { power_on(base::Micros{}); }
+  Node(const Numbers& numbers, const Version& version) : numbers_(numbers), publisher_(numbers, version) {
+    power_on(base::Micros{});
+  }
 
   /// As after power-on, with the given time: what a Begin frame asks for.
   void power_on(base::Micros t);
@@ -40,7 +42,9 @@ class Node {
   void tick(base::Micros t, const LoopHealth& loop, Send&& send);
 
   template <class Send>
-  void send_version(Send&& send) { publisher_.send_version(send); }
+  void send_version(Send&& send) {
+    publisher_.send_version(send);
+  }
 
   /// Called by the inbox.
   void sample(const Sample& sample);
@@ -88,9 +92,9 @@ class Node {
   std::optional<SetPose> pending_pose_;
 
   base::Micros now_;
-  base::Micros closed_until_;         ///< samples up to here can no longer be fused
+  base::Micros closed_until_;  ///< samples up to here can no longer be fused
   bool ticked_ = false;
-  InputTally tally_;                  ///< of the input frames
+  InputTally tally_;  ///< of the input frames
   std::uint8_t resets_ = 0;
   can::ResetCause reset_cause_ = can::ResetCause::kPowerOn;
   base::Micros restarted_at_;
@@ -220,7 +224,8 @@ void Node<Estimators, Capacity>::close_window() {
   each_lane([](auto& lane) { lane.close(); });
   std::size_t consumed = 0;
   while (consumed < timeline_.size() && timeline_[consumed].consumed) ++consumed;
-  if (consumed > 0 && timeline_[consumed - 1].sample.stamp > closed_until_) closed_until_ = timeline_[consumed - 1].sample.stamp;
+  if (consumed > 0 && timeline_[consumed - 1].sample.stamp > closed_until_)
+    closed_until_ = timeline_[consumed - 1].sample.stamp;
   timeline_.drop_front(consumed);
 }
 
@@ -300,7 +305,8 @@ void Node<Estimators, Capacity>::find_origin(const Sample& sample) {
   if (site_.origin != can::OriginSource::kNone || sample.sensor != can::Sensor::kGnssPosition) return;
   const GnssPosition& fix = sample.payload.gnss_position;
   if (fix.fix < GnssFix::k2d) return;
-  site_.frame = nav::LocalFrame(fix.latitude_2ndeg, fix.longitude_2ndeg, base::is_finite(fix.height_m) ? fix.height_m : 0.0F);
+  site_.frame =
+      nav::LocalFrame(fix.latitude_2ndeg, fix.longitude_2ndeg, base::is_finite(fix.height_m) ? fix.height_m : 0.0F);
   site_.origin = can::OriginSource::kFirstFix;
 }
 
@@ -318,7 +324,8 @@ void Node<Estimators, Capacity>::check_health() {
   bool positive = true;
   each_lane([&](const auto& lane) {
     const Estimate e = lane.estimate(context());
-    finite = finite && base::is_finite(e.pose.yaw_rad) && base::is_finite(e.pose.x.offset_m) && base::is_finite(e.pose.y.offset_m);
+    finite = finite && base::is_finite(e.pose.yaw_rad) && base::is_finite(e.pose.x.offset_m) &&
+             base::is_finite(e.pose.y.offset_m);
     positive = positive && e.p.positive_definite();
   });
   if (finite && positive) return;
@@ -351,7 +358,8 @@ Summary Node<Estimators, Capacity>::summary() const {
             .origin_known = site_.origin != can::OriginSource::kNone,
             .resets = resets_,
             .cause = reset_cause_,
-            .restarted = resets_ > 0 && now_ - restarted_at_ < base::Micros{1'000'000} && reset_cause_ != can::ResetCause::kSetPose};
+            .restarted = resets_ > 0 && now_ - restarted_at_ < base::Micros{1'000'000} &&
+                         reset_cause_ != can::ResetCause::kSetPose};
   for (std::size_t sensor = 0; sensor < kSensors; ++sensor)
     for (std::size_t i = 0; i < kInstances; ++i) {
       const SensorStatistics& stat = primary.statistics(sensor * kInstances + i);

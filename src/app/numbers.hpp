@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// All numbers of a robot in one struct, passed by const reference. Types and sizes are template arguments; everything that can be tuned
-// is here, has a unit, and is part of the hash in the version frame, so a replay with other numbers says so.
+// All numbers of a robot in one struct, passed by const reference. Types and sizes are template arguments; everything
+// that can be tuned is here, has a unit, and is part of the hash in the version frame, so a replay with other numbers
+// says so.
 #pragma once
 
 #include "base/crc.hpp"
@@ -29,41 +30,41 @@ enum class Hold : std::int32_t {
 
 struct WheelNumbers {
   model::DifferentialDrive drive;
-  model::UnicycleNoise noise;             ///< for BodySpeed samples
-  float wheel_speed_noise = 0;            ///< m^2/s per wheel: white noise of WheelSpeed samples, at standstill
+  model::UnicycleNoise noise;   ///< for BodySpeed samples
+  float wheel_speed_noise = 0;  ///< m^2/s per wheel: white noise of WheelSpeed samples, at standstill
   Hold hold = Hold::kBackward;
-  std::int32_t delay_us = 0;              ///< from a BodySpeed sample's stamp to the motion it speaks of: a command's dead time
-  float speed_scale = 1;                  ///< true speed over stated speed, of BodySpeed samples
+  std::int32_t delay_us = 0;  ///< from a BodySpeed sample's stamp to the motion it speaks of: a command's dead time
+  float speed_scale = 1;      ///< true speed over stated speed, of BodySpeed samples
   float yaw_rate_scale = 1;
-  std::int32_t timeout_us = 500'000;      ///< without a sample for longer: assume standstill, grow the covariance fast
-  float timeout_noise = 1.0F;             ///< m^2/s and rad^2/s then
+  std::int32_t timeout_us = 500'000;  ///< without a sample for longer: assume standstill, grow the covariance fast
+  float timeout_noise = 1.0F;         ///< m^2/s and rad^2/s then
 };
 
 struct GyroNumbers {
-  std::int32_t use = 0;                   ///< 0: yaw rate from the wheels, 1: from IMU instance 0
-  std::array<float, 3> up_s{0, 0, 1};     ///< the body's z axis as a unit vector in sensor axes: row 3 of R_bs
-  float noise = 0;                        ///< rad^2/s: angular random walk squared, plus vibration
-  float bias_time_s = 20;                 ///< time constant of the bias average at standstill
-  float standstill_mps = 0.002F;          ///< wheels slower than this for one second mean standstill
+  std::int32_t use = 0;                ///< 0: yaw rate from the wheels, 1: from IMU instance 0
+  std::array<float, 3> up_s{0, 0, 1};  ///< the body's z axis as a unit vector in sensor axes: row 3 of R_bs
+  float noise = 0;                     ///< rad^2/s: angular random walk squared, plus vibration
+  float bias_time_s = 20;              ///< time constant of the bias average at standstill
+  float standstill_mps = 0.002F;       ///< wheels slower than this for one second mean standstill
 };
 
 struct LandmarkNumbers {
-  model::PlanarMounting mounting;         ///< of the sensor
+  model::PlanarMounting mounting;  ///< of the sensor
   float sigma_range_m = 0.1F;
-  float sigma_range_per_m = 0;            ///< grows with range
+  float sigma_range_per_m = 0;  ///< grows with range
   float sigma_bearing_rad = 0.02F;
-  float sigma_range_only_m = 0.1F;        ///< when no bearing comes with it
-  float gate_scale = 1;                   ///< times the 99 % chi-square quantile
+  float sigma_range_only_m = 0.1F;  ///< when no bearing comes with it
+  float gate_scale = 1;             ///< times the 99 % chi-square quantile
 };
 
 struct GnssNumbers {
   float antenna_x_b_m = 0;
   float antenna_y_b_m = 0;
-  float sigma_floor_m = 0.5F;             ///< the receiver's own accuracy is not believed below this
-  float sigma_scale = 1;                  ///< times the receiver's own accuracy; its errors are correlated in time
+  float sigma_floor_m = 0.5F;  ///< the receiver's own accuracy is not believed below this
+  float sigma_scale = 1;       ///< times the receiver's own accuracy; its errors are correlated in time
   float gate_scale = 1;
-  float align_distance_m = 8;             ///< travel by GNSS before a heading is derived from it
-  std::int32_t origin_configured = 0;     ///< 0: the first fix is the origin
+  float align_distance_m = 8;          ///< travel by GNSS before a heading is derived from it
+  std::int32_t origin_configured = 0;  ///< 0: the first fix is the origin
   std::int64_t origin_latitude_2ndeg = 0;
   std::int64_t origin_longitude_2ndeg = 0;
   float origin_height_m = 0;
@@ -71,7 +72,7 @@ struct GnssNumbers {
 
 /// The state at start; sigma_yaw_rad >= pi means the heading is not known.
 struct StartNumbers {
-  std::int32_t known = 0;                 ///< 0: wait for a set-pose command or, with GNSS, align
+  std::int32_t known = 0;  ///< 0: wait for a set-pose command or, with GNSS, align
   float x_m = 0;
   float y_m = 0;
   float yaw_rad = 0;
@@ -82,21 +83,21 @@ struct StartNumbers {
 /// A sensor that was refused this long comes back by inflating the position's and heading's variance, once per period.
 struct RecoveryNumbers {
   std::int32_t after_us = 3'000'000;
-  std::int32_t at_least = 10;             ///< rejections in a row
+  std::int32_t at_least = 10;  ///< rejections in a row
   float inflate_position_m = 1;
   float inflate_yaw_rad = 0.2F;
 };
 
 /// Ticks between frames; 0 = never.
 struct PublishNumbers {
-  std::int32_t pose_every = 1;            ///< estimate 1: position and motion
+  std::int32_t pose_every = 1;  ///< estimate 1: position and motion
   std::int32_t std_every = 5;
-  std::int32_t side_every = 10;           ///< every other estimate, all of its frames
+  std::int32_t side_every = 10;  ///< every other estimate, all of its frames
   std::int32_t status_every = 10;
-  std::int32_t statistics_every = 13;     ///< one sensor at a time
-  std::int32_t diagnostics_every = 12;    ///< one page at a time
-  std::int32_t identity_every = 25;       ///< version and origin, one frame at a time
-  std::int32_t event_every = 2;           ///< at most one innovation per so many ticks
+  std::int32_t statistics_every = 13;   ///< one sensor at a time
+  std::int32_t diagnostics_every = 12;  ///< one page at a time
+  std::int32_t identity_every = 25;     ///< version and origin, one frame at a time
+  std::int32_t event_every = 2;         ///< at most one innovation per so many ticks
 };
 
 struct Numbers {
@@ -120,22 +121,23 @@ constexpr void each_number(const Numbers& n, Sink&& sink) {
   all(d.left_radius_m, d.right_radius_m, d.track_m, d.counts_per_turn, d.noise_left, d.noise_right);
   const auto& u = n.wheels.noise;
   all(u.speed, u.speed_per_speed, u.yaw_rate, u.yaw_rate_per_yaw_rate, u.yaw_rate_per_speed);
-  all(n.wheels.wheel_speed_noise, static_cast<std::int32_t>(n.wheels.hold), n.wheels.delay_us,
-      n.wheels.speed_scale, n.wheels.yaw_rate_scale, n.wheels.timeout_us, n.wheels.timeout_noise);
-  all(n.gyro.use, n.gyro.up_s[0], n.gyro.up_s[1], n.gyro.up_s[2], n.gyro.noise, n.gyro.bias_time_s, n.gyro.standstill_mps);
+  all(n.wheels.wheel_speed_noise, static_cast<std::int32_t>(n.wheels.hold), n.wheels.delay_us, n.wheels.speed_scale,
+      n.wheels.yaw_rate_scale, n.wheels.timeout_us, n.wheels.timeout_noise);
+  all(n.gyro.use, n.gyro.up_s[0], n.gyro.up_s[1], n.gyro.up_s[2], n.gyro.noise, n.gyro.bias_time_s,
+      n.gyro.standstill_mps);
   const auto& l = n.landmark;
   all(l.mounting.x_b_m, l.mounting.y_b_m, l.mounting.yaw_rad, l.sigma_range_m, l.sigma_range_per_m, l.sigma_bearing_rad,
       l.sigma_range_only_m, l.gate_scale);
   const auto& g = n.gnss;
-  all(g.antenna_x_b_m, g.antenna_y_b_m, g.sigma_floor_m, g.sigma_scale, g.gate_scale, g.align_distance_m, g.origin_configured,
-      g.origin_latitude_2ndeg, g.origin_longitude_2ndeg, g.origin_height_m);
+  all(g.antenna_x_b_m, g.antenna_y_b_m, g.sigma_floor_m, g.sigma_scale, g.gate_scale, g.align_distance_m,
+      g.origin_configured, g.origin_latitude_2ndeg, g.origin_longitude_2ndeg, g.origin_height_m);
   const auto& s = n.start;
   all(s.known, s.x_m, s.y_m, s.yaw_rad, s.sigma_position_m, s.sigma_yaw_rad);
   const auto& r = n.recovery;
   all(r.after_us, r.at_least, r.inflate_position_m, r.inflate_yaw_rad);
   const auto& p = n.publish;
-  all(p.pose_every, p.std_every, p.side_every, p.status_every, p.statistics_every, p.diagnostics_every, p.identity_every,
-      p.event_every);
+  all(p.pose_every, p.std_every, p.side_every, p.status_every, p.statistics_every, p.diagnostics_every,
+      p.identity_every, p.event_every);
 }
 
 }  // namespace tetap::app

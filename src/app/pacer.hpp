@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// When to tick: on the board's own timer, on the bus's sync frames, or in lockstep with a player. The only part of the firmware that
-// knows real time, and it decides nothing but the sequence of ticks, which every epoch frame states.
+// When to tick: on the board's own timer, on the bus's sync frames, or in lockstep with a player. The only part of the
+// firmware that knows real time, and it decides nothing but the sequence of ticks, which every epoch frame states.
 #pragma once
 
 #include "app/health.hpp"
@@ -14,11 +14,12 @@ namespace tetap::app {
 
 /// Rules.
 ///   Clock frame: sets the clock's offset; ticks stay the own timer's, at whole periods of the bus's time.
-///   Tick frame:  tick at its time. Missing for three periods: hold over on the own timer. Back after three in a row that are one
+///   Tick frame:  tick at its time. Missing for three periods: hold over on the own timer. Back after three in a row
+///   that are one
 ///                period (+-10 %) apart and ahead of the last tick.
 ///   Step frame:  tick at its time, whatever it is; no own timer until a Tick or Clock frame comes.
-///   A Tick whose time is not ahead of the last tick, or more than kFarthest periods ahead, is refused and counted, until three in a
-///   row agree.
+///   A Tick whose time is not ahead of the last tick, or more than kFarthest periods ahead, is refused and counted,
+///   until three in a row agree.
 class Pacer {
  public:
   explicit constexpr Pacer(base::Micros period) : period_(period) {}
@@ -35,8 +36,10 @@ class Pacer {
         state_ = can::SyncState::kLockstep;
         last_tick_ = time;
         return time;
-      case can::SyncKind::kClock: return set_clock(time, now), std::nullopt;
-      case can::SyncKind::kTick: return follow(time, now, health);
+      case can::SyncKind::kClock:
+        return set_clock(time, now), std::nullopt;
+      case can::SyncKind::kTick:
+        return follow(time, now, health);
     }
     return std::nullopt;
   }
@@ -66,7 +69,9 @@ class Pacer {
  private:
   static constexpr std::int64_t kFarthest = 50;
   [[nodiscard]] constexpr base::Micros times(std::int64_t n) const { return {n * period_.us}; }
-  [[nodiscard]] constexpr base::Micros next_multiple(base::Micros t) const { return {(t.us / period_.us + 1) * period_.us}; }
+  [[nodiscard]] constexpr base::Micros next_multiple(base::Micros t) const {
+    return {(t.us / period_.us + 1) * period_.us};
+  }
 
   /// A small correction keeps the sequence of ticks; a large one, or the first, begins it anew at a whole period.
   constexpr void set_clock(base::Micros time, base::Micros now) {
@@ -92,7 +97,8 @@ class Pacer {
       if (state_ != can::SyncState::kFollowing) return std::nullopt;
     }
     ever_followed_ = true;
-    if (state_ == can::SyncState::kHoldover && back) return std::nullopt;  // its own ticks are ahead: wait until the bus is
+    if (state_ == can::SyncState::kHoldover && back)
+      return std::nullopt;  // its own ticks are ahead: wait until the bus is
     state_ = can::SyncState::kFollowing;
     last_sync_arrival_ = now;
     offset_ = time - now;
@@ -102,7 +108,7 @@ class Pacer {
 
   base::Micros period_;
   can::SyncState state_ = can::SyncState::kOwnTimer;
-  base::Micros offset_;             ///< bus time minus board time
+  base::Micros offset_;  ///< bus time minus board time
   base::Micros last_tick_;
   base::Micros next_tick_;
   base::Micros last_sync_;          ///< time stated in the last Tick frame, believed or not

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// From estimates, records and counters to frames: what goes out in which epoch. The schedule is counted in epochs, so it is the same
-// in every replay.
+// From estimates, records and counters to frames: what goes out in which epoch. The schedule is counted in epochs, so
+// it is the same in every replay.
 #pragma once
 
 #include "app/estimate.hpp"
@@ -23,8 +23,8 @@ struct Version {
   std::uint32_t git = 0;
 };
 
-/// Input frames consumed: how many, and a CRC-32 over them. Within an epoch the order of arrival leaves no trace: the frames' own
-/// CRCs are summed, and the sum goes into the running CRC.
+/// Input frames consumed: how many, and a CRC-32 over them. Within an epoch the order of arrival leaves no trace: the
+/// frames' own CRCs are summed, and the sum goes into the running CRC.
 class InputTally {
  public:
   constexpr void add(std::uint32_t frame_crc) {
@@ -56,11 +56,11 @@ struct Summary {
   bool heading_valid = false;
   bool velocity_valid = false;
   bool origin_known = false;
-  std::uint16_t used = 0;      ///< a bit per sensor kind accepted within the last second
+  std::uint16_t used = 0;  ///< a bit per sensor kind accepted within the last second
   bool rejecting = false;
   std::uint8_t resets = 0;
   can::ResetCause cause = can::ResetCause::kPowerOn;
-  bool restarted = false;      ///< within the last second, by ourselves
+  bool restarted = false;  ///< within the last second, by ourselves
 };
 
 template <std::size_t EstimatorCount>
@@ -115,10 +115,13 @@ class Publisher {
   template <class Send>
   void events(Send& send);
   template <class Send>
-  void send_version(Send& send) { put(can::EstVersion{.git = version_.git, .config = config_}, send); }
+  void send_version(Send& send) {
+    put(can::EstVersion{.git = version_.git, .config = config_}, send);
+  }
 
   /// Queues the record of a measurement. When the queue is full an accepted one makes room for one that was not.
-  void event(const Innovation& innovation, const Sample& sample, std::size_t instance, base::Micros now, Counters& counters);
+  void event(const Innovation& innovation, const Sample& sample, std::size_t instance, base::Micros now,
+             Counters& counters);
 
  private:
   struct Events {
@@ -148,14 +151,15 @@ class Publisher {
   std::uint32_t identity_ = 0;
   std::uint32_t statistic_ = 0;
   Events events_;
-  Counters last_second_;                ///< the counters one to two seconds ago
-  std::uint32_t troubled_until_ = 0;    ///< epoch
-  std::uint16_t troubles_ = 0;          ///< fault bits raised since
+  Counters last_second_;              ///< the counters one to two seconds ago
+  std::uint32_t troubled_until_ = 0;  ///< epoch
+  std::uint16_t troubles_ = 0;        ///< fault bits raised since
 };
 
 template <std::size_t N>
 template <class Send>
-void Publisher<N>::estimate(std::size_t instance, can::EstimatorKind kind, bool primary, const Estimate& e, Send& send) {
+void Publisher<N>::estimate(std::size_t instance, can::EstimatorKind kind, bool primary, const Estimate& e,
+                            Send& send) {
   const PublishNumbers& p = numbers_.publish;
   const auto side = static_cast<std::int32_t>(3 * instance);  // spreads the estimators' slow frames over the epochs
   const auto millimetres = [](const base::Anchored& a) {
@@ -163,7 +167,8 @@ void Publisher<N>::estimate(std::size_t instance, can::EstimatorKind kind, bool 
     return static_cast<std::int32_t>((um + (um < 0 ? -500 : 500)) / 1000);
   };
   if (every(primary ? p.pose_every : p.side_every, side)) {
-    put(can::EstPos{.x_raw = millimetres(e.pose.x), .y_raw = millimetres(e.pose.y), .epoch = tag(), .kind = kind}, send, instance);
+    put(can::EstPos{.x_raw = millimetres(e.pose.x), .y_raw = millimetres(e.pose.y), .epoch = tag(), .kind = kind}, send,
+        instance);
     put(can::EstMotion{.yaw_rad = e.pose.yaw_rad,
                        .speed_mps = e.forward_mps,
                        .yaw_rate_radps = e.yaw_rate_radps,
@@ -177,7 +182,8 @@ void Publisher<N>::estimate(std::size_t instance, can::EstimatorKind kind, bool 
     const float x = base::sqrt(e.p(0, 0));
     const float y = base::sqrt(e.p(1, 1));
     const float yaw = base::sqrt(e.p(2, 2));
-    put(can::EstStdPose{.epoch = tag(), .std_x_m = x, .std_y_m = y, .std_yaw_rad = yaw, .corr_xy = e.p(0, 1) / (x * y)}, send, instance);
+    put(can::EstStdPose{.epoch = tag(), .std_x_m = x, .std_y_m = y, .std_yaw_rad = yaw, .corr_xy = e.p(0, 1) / (x * y)},
+        send, instance);
     put(can::EstStdMore{.epoch = tag(),
                         .corr_x_yaw = e.p(0, 2) / (x * yaw),
                         .corr_y_yaw = e.p(1, 2) / (y * yaw),
@@ -192,7 +198,9 @@ template <class Send>
 void Publisher<N>::status(const Summary& s, Send& send) {
   if (!every(numbers_.publish.status_every, 1)) return;
   std::uint16_t faults = epoch_ < troubled_until_ ? troubles_ : std::uint16_t{0};
-  const auto raise = [&faults](can::Fault fault, bool is) { faults = static_cast<std::uint16_t>(faults | (is ? 1U << static_cast<unsigned>(fault) : 0U)); };
+  const auto raise = [&faults](can::Fault fault, bool is) {
+    faults = static_cast<std::uint16_t>(faults | (is ? 1U << static_cast<unsigned>(fault) : 0U));
+  };
   raise(can::Fault::kInputStale, !s.velocity_valid);
   raise(can::Fault::kRejecting, s.rejecting);
   raise(can::Fault::kRestarted, s.restarted);
@@ -220,7 +228,11 @@ void Publisher<N>::statistics(const Lanes& lanes, base::Micros now, Send& send) 
     const std::size_t estimator = index / kPerLane;
     const SensorStatistics* stat = nullptr;
     std::size_t lane_index = 0;
-    std::apply([&](const auto&... lane) { ((lane_index++ == estimator ? void(stat = &lane.statistics(index % kPerLane)) : void()), ...); }, lanes);
+    std::apply(
+        [&](const auto&... lane) {
+          ((lane_index++ == estimator ? void(stat = &lane.statistics(index % kPerLane)) : void()), ...);
+        },
+        lanes);
     if (stat == nullptr || (stat->accepted == 0 && stat->rejected == 0)) continue;
     const float age_s = base::seconds(now - stat->last_accepted);
     put(can::EstSensorStat{.sensor = static_cast<can::Sensor>(index % kPerLane / kInstances),
@@ -240,13 +252,15 @@ template <std::size_t N>
 void Publisher<N>::note_troubles(const Counters& now) {
   const Counters& then = last_second_;
   std::uint16_t raised = 0;
-  const auto raise = [&raised](can::Fault fault, bool is) { raised = static_cast<std::uint16_t>(raised | (is ? 1U << static_cast<unsigned>(fault) : 0U)); };
+  const auto raise = [&raised](can::Fault fault, bool is) {
+    raised = static_cast<std::uint16_t>(raised | (is ? 1U << static_cast<unsigned>(fault) : 0U));
+  };
   raise(can::Fault::kIncomplete, now.incomplete != then.incomplete);
   raise(can::Fault::kTooLate, now.too_late != then.too_late);
-  raise(can::Fault::kMalformed, now.malformed != then.malformed || now.out_of_range != then.out_of_range || now.no_time != then.no_time ||
-                               now.too_early != then.too_early);
+  raise(can::Fault::kMalformed, now.malformed != then.malformed || now.out_of_range != then.out_of_range ||
+                                    now.no_time != then.no_time || now.too_early != then.too_early);
   raise(can::Fault::kCapacity, now.map_full != then.map_full || now.timeline_full != then.timeline_full ||
-                              now.events_dropped != then.events_dropped);
+                                   now.events_dropped != then.events_dropped);
   raise(can::Fault::kCommandRefused, now.command_refused != then.command_refused);
   if (raised != 0) {
     const std::uint32_t second = static_cast<std::uint32_t>(1'000'000 / numbers_.loop.period_us);
@@ -270,20 +284,35 @@ void Publisher<N>::diagnostics(const Counters& c, const LoopHealth& l, std::uint
                            .sync = l.sync},
           send);
       break;
-    case 1: put(can::EstDiagTicks{.ticks_late = l.ticks_late, .sync_lost = l.sync_lost, .sync_back = l.sync_back}, send); break;
-    case 2:
-      put(can::EstDiagQueues{.timeline_high = timeline_high, .events_high = c.events_high_water, .events_dropped = c.events_dropped}, send);
+    case 1:
+      put(can::EstDiagTicks{.ticks_late = l.ticks_late, .sync_lost = l.sync_lost, .sync_back = l.sync_back}, send);
       break;
-    case 3: put(can::EstDiagOrder{.too_late = c.too_late, .too_early = c.too_early, .duplicate = c.duplicate}, send); break;
-    case 4: put(can::EstDiagFrames{.incomplete = c.incomplete, .malformed = c.malformed, .out_of_range = c.out_of_range}, send); break;
+    case 2:
+      put(
+          can::EstDiagQueues{
+              .timeline_high = timeline_high, .events_high = c.events_high_water, .events_dropped = c.events_dropped},
+          send);
+      break;
+    case 3:
+      put(can::EstDiagOrder{.too_late = c.too_late, .too_early = c.too_early, .duplicate = c.duplicate}, send);
+      break;
+    case 4:
+      put(can::EstDiagFrames{.incomplete = c.incomplete, .malformed = c.malformed, .out_of_range = c.out_of_range},
+          send);
+      break;
     case 5:
       put(can::EstDiagBus{.rx_overflow = static_cast<std::uint16_t>(l.bus.rx_overflow),
                           .tx_full = static_cast<std::uint16_t>(l.bus.tx_full),
                           .bus_off = static_cast<std::uint16_t>(l.bus.bus_off)},
           send);
       break;
-    case 6: put(can::EstDiagRefused{.not_used = c.not_used, .no_time = c.no_time, .cmd_refused = c.command_refused}, send); break;
-    default: put(can::EstDiagCapacity{.map_full = c.map_full, .sync_jump = l.sync_jump, .timeline_full = c.timeline_full}, send); break;
+    case 6:
+      put(can::EstDiagRefused{.not_used = c.not_used, .no_time = c.no_time, .cmd_refused = c.command_refused}, send);
+      break;
+    default:
+      put(can::EstDiagCapacity{.map_full = c.map_full, .sync_jump = l.sync_jump, .timeline_full = c.timeline_full},
+          send);
+      break;
   }
 }
 
@@ -292,15 +321,24 @@ template <class Send>
 void Publisher<N>::identity(const Site& site, Send& send) {
   if (!every(numbers_.publish.identity_every, 7)) return;
   switch (identity_++ % 4) {
-    case 0: send_version(send); break;
-    case 1: put(can::EstOriginLat{.source = site.origin, .lat_raw = site.frame.latitude_2ndeg()}, send); break;
-    case 2: put(can::EstOriginLon{.source = site.origin, .lon_raw = site.frame.longitude_2ndeg()}, send); break;
-    default: put(can::EstOriginHeight{.source = site.origin, .height_m = site.frame.height_m()}, send); break;
+    case 0:
+      send_version(send);
+      break;
+    case 1:
+      put(can::EstOriginLat{.source = site.origin, .lat_raw = site.frame.latitude_2ndeg()}, send);
+      break;
+    case 2:
+      put(can::EstOriginLon{.source = site.origin, .lon_raw = site.frame.longitude_2ndeg()}, send);
+      break;
+    default:
+      put(can::EstOriginHeight{.source = site.origin, .height_m = site.frame.height_m()}, send);
+      break;
   }
 }
 
 template <std::size_t N>
-void Publisher<N>::event(const Innovation& innovation, const Sample& sample, std::size_t instance, base::Micros now, Counters& counters) {
+void Publisher<N>::event(const Innovation& innovation, const Sample& sample, std::size_t instance, base::Micros now,
+                         Counters& counters) {
   const can::EstInnov message{.estimator = static_cast<std::uint8_t>(instance),
                               .sensor = sample.sensor,
                               .inst = sample.instance,

@@ -15,8 +15,8 @@ struct Sample {
   can::Sensor sensor = can::Sensor::kNotAvailable;  ///< says which member of the payload is there
   std::uint8_t instance = 0;
   std::uint8_t sequence = 0;
-  std::uint8_t detail = 0;   ///< tells apart what one sensor saw at one moment: the landmark
-  std::uint32_t bits = 0;    ///< sum of the CRC-32 of the frames it came in: stands for the payload in hashes
+  std::uint8_t detail = 0;  ///< tells apart what one sensor saw at one moment: the landmark
+  std::uint32_t bits = 0;   ///< sum of the CRC-32 of the frames it came in: stands for the payload in hashes
 
   union Payload {
     constexpr Payload() : imu{} {}
@@ -43,14 +43,29 @@ struct Sample {
 template <class F>
 constexpr bool visit(const Sample& sample, F&& f) {
   switch (sample.sensor) {
-    case can::Sensor::kImu: f(sample.payload.imu); return true;
-    case can::Sensor::kWheelCounts: f(sample.payload.counts); return true;
-    case can::Sensor::kWheelSpeed: f(sample.payload.wheel_speeds); return true;
-    case can::Sensor::kBodySpeed: f(sample.payload.body_speed); return true;
-    case can::Sensor::kRangeBearing: f(sample.payload.sighting); return true;
-    case can::Sensor::kGnssPosition: f(sample.payload.gnss_position); return true;
-    case can::Sensor::kGnssVelocity: f(sample.payload.gnss_velocity); return true;
-    case can::Sensor::kNotAvailable: return false;
+    case can::Sensor::kImu:
+      f(sample.payload.imu);
+      return true;
+    case can::Sensor::kWheelCounts:
+      f(sample.payload.counts);
+      return true;
+    case can::Sensor::kWheelSpeed:
+      f(sample.payload.wheel_speeds);
+      return true;
+    case can::Sensor::kBodySpeed:
+      f(sample.payload.body_speed);
+      return true;
+    case can::Sensor::kRangeBearing:
+      f(sample.payload.sighting);
+      return true;
+    case can::Sensor::kGnssPosition:
+      f(sample.payload.gnss_position);
+      return true;
+    case can::Sensor::kGnssVelocity:
+      f(sample.payload.gnss_velocity);
+      return true;
+    case can::Sensor::kNotAvailable:
+      return false;
   }
   return false;
 }

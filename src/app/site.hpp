@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the robot knows of its surroundings and all estimators share: the origin of the local plane and the landmark map.
+// What the robot knows of its surroundings and all estimators share: the origin of the local plane and the landmark
+// map.
 #pragma once
 
 #include "config/messages.hpp"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Samples in the order in which they were true: those waiting for their tick, and the recent past kept so that a late one can still
-// be fused at its own time.
+// Samples in the order in which they were true: those waiting for their tick, and the recent past kept so that a late
+// one can still be fused at its own time.
 #pragma once
 
 #include "app/sample.hpp"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A coordinate as integer anchor plus small float offset: the float keeps micrometres however far the origin is, and the filter
-// arithmetic stays in float.
+// A coordinate as integer anchor plus small float offset: the float keeps micrometres however far the origin is, and
+// the filter arithmetic stays in float.
 #pragma once
 
 #include "base/float_bits.hpp"
@@ -45,8 +45,9 @@ struct Anchored {
   [[nodiscard]] constexpr std::int64_t um() const { return anchor_um + micrometres(offset_m); }
 
  private:
-  /// Moves the anchor so that the offset is small again. The step 256 m is exact in float and in micrometres, and x - 256 is exact
-  /// for x in [128, 512] (Sterbenz), so no bit of the position is lost. A jump beyond is re-anchored whole.
+  /// Moves the anchor so that the offset is small again. The step 256 m is exact in float and in micrometres, and x -
+  /// 256 is exact for x in [128, 512] (Sterbenz), so no bit of the position is lost. A jump beyond is re-anchored
+  /// whole.
   constexpr void settle() {
     constexpr float kStep_m = 256.0F;
     constexpr std::int64_t kStep_um = 256'000'000;

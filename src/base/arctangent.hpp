@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// atan2 in float, from + - * / in one fixed order: the same bits on every target. The quotient is carried with its remainder (Dekker's
-// exact product, Numer. Math. 18, 1971), because a quotient rounded once would alone cost half a place. Polynomial: minimax in z = q^2.
+// atan2 in float, from + - * / in one fixed order: the same bits on every target. The quotient is carried with its
+// remainder (Dekker's exact product, Numer. Math. 18, 1971), because a quotient rounded once would alone cost half a
+// place. Polynomial: minimax in z = q^2.
 #pragma once
 
 #include "base/float_bits.hpp"
@@ -35,8 +36,9 @@ struct Exact {
       -0x1.55553ep-2F +
       z * (0x1.9991fep-3F +
            z * (-0x1.2421b6p-3F +
-                z * (0x1.c09a00p-4F +
-                     z * (-0x1.583496p-4F + z * (0x1.dac9fap-5F + z * (-0x1.fed196p-6F + z * (0x1.65a69ep-7F + z * -0x1.d63074p-10F)))))));
+                z * (0x1.c09a00p-4F + z * (-0x1.583496p-4F +
+                                           z * (0x1.dac9fap-5F + z * (-0x1.fed196p-6F +
+                                                                      z * (0x1.65a69ep-7F + z * -0x1.d63074p-10F)))))));
   const float more = q * z * series + rest / (1.0F + z);
   const float value = q + more;
   return {value, more - (value - q)};
@@ -49,18 +51,21 @@ struct Exact {
   const bool left = (bits(x) & kSignBit) != 0;
   const bool y_infinite = (bits(y) & ~kSignBit) == kInfinityBits;
   const bool x_infinite = (bits(x) & ~kSignBit) == kInfinityBits;
-  float angle = left ? kPi : 0.0F;                                      // y zero, or x infinite
+  float angle = left ? kPi : 0.0F;                                                          // y zero, or x infinite
   if (y_infinite) angle = x_infinite ? (left ? 0x1.2d97c8p+1F : 0x1.921fb6p-1F) : kHalfPi;  // 3 pi/4, pi/4, pi/2
   if (!y_infinite && !x_infinite && (bits(y) & ~kSignBit) != 0) angle = kHalfPi;            // x zero
   return from_bits(bits(angle) ^ sign);
 }
 
 /// 2^n for -126 <= n <= 127.
-[[nodiscard]] constexpr float power_of_two(std::int32_t n) { return from_bits(static_cast<std::uint32_t>(n + 127) << 23); }
+[[nodiscard]] constexpr float power_of_two(std::int32_t n) {
+  return from_bits(static_cast<std::uint32_t>(n + 127) << 23);
+}
 
 }  // namespace detail
 
-/// Angle of the point (x, y) from the x axis, in [-kPi, kPi]. Within 1.6 ulp, subnormal results included; special cases as in ISO C.
+/// Angle of the point (x, y) from the x axis, in [-kPi, kPi]. Within 1.6 ulp, subnormal results included; special cases
+/// as in ISO C.
 [[nodiscard]] constexpr float atan2(float y, float x) {
   const std::uint32_t ay = bits(y) & ~kSignBit;
   const std::uint32_t ax = bits(x) & ~kSignBit;
@@ -69,14 +74,16 @@ struct Exact {
   const bool left = (bits(x) & kSignBit) != 0;
   float high = from_bits(steep ? ay : ax);
   float low = from_bits(steep ? ax : ay);
-  // Both brought near 1, so that the exact product neither overflows nor underflows. A subnormal larger one first becomes normal.
+  // Both brought near 1, so that the exact product neither overflows nor underflows. A subnormal larger one first
+  // becomes normal.
   if (bits(high) < 0x0080'0000U) high *= 0x1p+24F, low *= 0x1p+24F;
   const auto exponent = static_cast<std::int32_t>(bits(high) >> 23) - 127;
   const bool tiny = static_cast<std::int32_t>(bits(high) >> 23) - static_cast<std::int32_t>(bits(low) >> 23) > 13;
   const float half_scale = detail::power_of_two(-exponent / 2);
   const float other_scale = detail::power_of_two(-exponent - (-exponent / 2));
   detail::Exact angle{};
-  if (tiny) {  // atan(q) is q less q^3/3, below a third of q's last place; the division may end among the subnormals and rounds once
+  if (tiny) {  // atan(q) is q less q^3/3, below a third of q's last place; the division may end among the subnormals
+               // and rounds once
     const float q = low / high;
     if (!steep && !left) return from_bits(bits(q) | (bits(y) & kSignBit));
     angle = {q, 0.0F};

@@ -11,7 +11,7 @@ namespace tetap::base {
 /// Capacity is 8 for classic CAN, 64 for CAN FD; nothing else in the code knows the number.
 template <std::size_t Capacity>
 struct BasicCanFrame {
-  std::uint32_t id = 0;   ///< 11 bits, or 29 when `extended`
+  std::uint32_t id = 0;  ///< 11 bits, or 29 when `extended`
   bool extended = false;
   std::uint8_t size = 0;  ///< bytes used of `data`, <= Capacity
   std::array<std::uint8_t, Capacity> data{};

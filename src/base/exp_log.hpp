@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // exp and log in float, from + - * / and integers in one fixed order: the same bits on every target.
-// Reduction by multiples of ln 2 in two parts; exp by a polynomial, log by log(1+f) = 2 atanh(f / (2+f)) with the exact f taken out
-// (P. T. P. Tang, ACM TOMS 16(4), 1990, has the idea). Coefficients as in trig.hpp. Errors: test/base/math_test.cpp.
+// Reduction by multiples of ln 2 in two parts; exp by a polynomial, log by log(1+f) = 2 atanh(f / (2+f)) with the exact
+// f taken out (P. T. P. Tang, ACM TOMS 16(4), 1990, has the idea). Coefficients as in trig.hpp. Errors:
+// test/base/math_test.cpp.
 #pragma once
 
 #include "base/float_bits.hpp"
@@ -33,7 +34,7 @@ struct Scaled {
 [[nodiscard, gnu::noinline]] constexpr float exp_far(float x) {
   const std::uint32_t u = bits(x);
   if (is_nan(x)) return kNan;
-  if (u < kSignBit && u > 0x42b1'7217U) return kInfinity;     // 88.72284: above 2^128 less half a place
+  if (u < kSignBit && u > 0x42b1'7217U) return kInfinity;          // 88.72284: above 2^128 less half a place
   if (u > kSignBit && u > (kSignBit | 0x42cf'f1b4U)) return 0.0F;  // -103.97208: below 2^-150
   const Scaled y = exp_scaled(x);
   if (u < kSignBit) return from_bits(bits(y.value) + (y.power << 23));

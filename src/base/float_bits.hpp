@@ -22,9 +22,9 @@ inline constexpr std::uint32_t kInfinityBits = 0x7f80'0000U;
 inline constexpr float kNan = from_bits(0x7fc0'0000U);
 inline constexpr float kInfinity = from_bits(kInfinityBits);
 
-inline constexpr float kPi = 0x1.921fb6p+1F;         ///< nearest float; 8.7e-8 above pi
-inline constexpr float kHalfPi = 0x1.921fb6p+0F;     ///< nearest float; 4.4e-8 above pi/2
-inline constexpr float kPiLow = -0x1.777a5cp-24F;    ///< pi - kPi
+inline constexpr float kPi = 0x1.921fb6p+1F;       ///< nearest float; 8.7e-8 above pi
+inline constexpr float kHalfPi = 0x1.921fb6p+0F;   ///< nearest float; 4.4e-8 above pi/2
+inline constexpr float kPiLow = -0x1.777a5cp-24F;  ///< pi - kPi
 inline constexpr float kHalfPiLow = -0x1.777a5cp-25F;
 
 [[nodiscard]] constexpr bool is_nan(float x) { return (bits(x) & ~kSignBit) > kInfinityBits; }
@@ -55,7 +55,8 @@ inline constexpr float kHalfPiLow = -0x1.777a5cp-25F;
 
 namespace detail {
 
-/// Correctly rounded square root of a positive finite float by integers: for constant expressions, where the instruction is not at hand.
+/// Correctly rounded square root of a positive finite float by integers: for constant expressions, where the
+/// instruction is not at hand.
 [[nodiscard]] constexpr float sqrt_by_integers(std::uint32_t u) {
   const int shift = std::countl_zero(u) - 8;  // subnormals are normalised, normals keep their implicit bit
   std::uint64_t m = u >> 23 == 0 ? u << shift : (u & 0x007f'ffffU) | 0x0080'0000U;

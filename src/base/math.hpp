@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The elementary functions in float: no libm, no double, the same bits on every target (see the files for method and error).
+// The elementary functions in float: no libm, no double, the same bits on every target (see the files for method and
+// error).
 #pragma once
 
 #include "base/arctangent.hpp"

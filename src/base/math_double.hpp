@@ -168,14 +168,18 @@ namespace detail {
   if (high < 0x1p-900) high *= 0x1p+100, low *= 0x1p+100;
   // Beyond tan(pi/8) the angle is taken from the diagonal: atan(q) = pi/4 + atan((low - high)/(low + high)).
   const bool diagonal = low > 0.41421356237309503 * high;
-  const double q = diagonal ? (low - high) / (low + high) : low / high;
+  const double top = diagonal ? low - high : low;
+  const double bottom = diagonal ? low + high : high;
+  const double q = top / bottom;
   const double z = q * q;
+  // What the roundings of sum and difference took (exact, as |high| >= |low|): alone they would cost more than a place.
+  const double lost = diagonal ? ((low - (top + high)) - q * (low - (bottom - high))) / (bottom + bottom * z) : 0.0;
   double p = 0;
   for (const double c : {-0x1.a933ba46b543ep-7, 0x1.e51628ad085b9p-6, -0x1.4c2db6e3358f1p-5, 0x1.817a9cddcf63fp-5, -0x1.ae89003812f0bp-5, 0x1.e1d2a07610252p-5,
                          -0x1.11108cb6d07bfp-4, 0x1.3b13aaf7cfbd5p-4, -0x1.745d171266892p-4, 0x1.c71c71c60c87bp-4, -0x1.2492492490a05p-3, 0x1.9999999999970p-3,
                          -0x1.5555555555555p-2})
     p = c + z * p;
-  const double more = q * z * p;
+  const double more = q * z * p + lost;
   if (!diagonal && !steep && !left) return with_sign(q + more);
   // base + turn * (q + more), the base in two parts; quarter turns are exact multiples of kHalfTurn's parts.
   const double quarters = diagonal ? 1.0 : 0.0;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Counter-based random numbers: Philox4x32-10 (Salmon, Moraes, Dror, Shaw, "Parallel random numbers: as easy as 1, 2, 3", SC'11). The
-// whole state is a key and a counter, so any draw can be repeated, and a stream per purpose costs nothing.
+// Counter-based random numbers: Philox4x32-10 (Salmon, Moraes, Dror, Shaw, "Parallel random numbers: as easy as 1, 2,
+// 3", SC'11). The whole state is a key and a counter, so any draw can be repeated, and a stream per purpose costs
+// nothing.
 #pragma once
 
 #include "base/math.hpp"
@@ -36,15 +37,19 @@ class Random {
   constexpr std::uint32_t next() {
     if (drawn_ % 4 == 0) {
       const std::uint64_t block = drawn_ / 4;
-      words_ = philox({static_cast<std::uint32_t>(block), static_cast<std::uint32_t>(block >> 32), stream_[0], stream_[1]}, key_);
+      words_ = philox(
+          {static_cast<std::uint32_t>(block), static_cast<std::uint32_t>(block >> 32), stream_[0], stream_[1]}, key_);
     }
     return words_[drawn_++ % 4];
   }
   /// In [0, 1), multiples of 2^-24.
   constexpr float uniform() { return static_cast<float>(static_cast<std::int32_t>(next() >> 8)) * 0x1p-24F; }
   /// In (0, 1], multiples of 2^-24.
-  constexpr float uniform_positive() { return static_cast<float>(static_cast<std::int32_t>(next() >> 8) + 1) * 0x1p-24F; }
-  /// Standard normal, by Box & Muller (Ann. Math. Stat. 29(2), 1958) from our own log, sqrt and cos: two words each; |value| < 5.8.
+  constexpr float uniform_positive() {
+    return static_cast<float>(static_cast<std::int32_t>(next() >> 8) + 1) * 0x1p-24F;
+  }
+  /// Standard normal, by Box & Muller (Ann. Math. Stat. 29(2), 1958) from our own log, sqrt and cos: two words each;
+  /// |value| < 5.8.
   constexpr float normal() {
     const float radius = sqrt(-2.0F * log(uniform_positive()));
     return radius * cos(6.28318531F * uniform());

@@ -17,16 +17,16 @@ struct Micros {
   constexpr Micros& operator+=(Micros b) { return us += b.us, *this; }
 };
 
-/// The span in seconds, for |span| <= 2147 s; longer ones saturate there, so the conversion from integer stays the hardware's
-/// single correctly rounded instruction on every target.
+/// The span in seconds, for |span| <= 2147 s; longer ones saturate there, so the conversion from integer stays the
+/// hardware's single correctly rounded instruction on every target.
 [[nodiscard]] constexpr float seconds(Micros span) {
   constexpr std::int64_t kLimit_us = 2'147'000'000;
   const std::int64_t us = span.us > kLimit_us ? kLimit_us : span.us < -kLimit_us ? -kLimit_us : span.us;
   return static_cast<float>(static_cast<std::int32_t>(us)) * 1e-6F;
 }
 
-/// The full time nearest to `reference` whose low `bits` bits are `low`: how a stamp of few bits on the bus becomes absolute.
-/// Right as long as the truth is less than half a wrap away from the reference.
+/// The full time nearest to `reference` whose low `bits` bits are `low`: how a stamp of few bits on the bus becomes
+/// absolute. Right as long as the truth is less than half a wrap away from the reference.
 [[nodiscard]] constexpr Micros extend(std::uint32_t low, int bits, Micros reference) {
   const std::uint64_t wrap = std::uint64_t{1} << bits;
   const auto ahead = (low - static_cast<std::uint64_t>(reference.us)) & (wrap - 1);

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// sin, cos, atan2 and the wrap of an angle in float, from + - * / and integers in one fixed order: the same bits on every target.
-// Reduction: Cody & Waite (Software Manual for the Elementary Functions, 1980, ch. 8) up to 4096 rad, Payne & Hanek (ACM SIGNUM
-// Newsletter 18(1), 1983) beyond, so every finite float is reduced. Coefficients: minimax, rounded to float by lattice reduction
-// (Brisebarre & Chevillard, ARITH 2007). Largest errors, in units of the last place of the true value: see test/base/math_test.cpp.
+// sin, cos, atan2 and the wrap of an angle in float, from + - * / and integers in one fixed order: the same bits on
+// every target. Reduction: Cody & Waite (Software Manual for the Elementary Functions, 1980, ch. 8) up to 4096 rad,
+// Payne & Hanek (ACM SIGNUM Newsletter 18(1), 1983) beyond, so every finite float is reduced. Coefficients: minimax,
+// rounded to float by lattice reduction (Brisebarre & Chevillard, ARITH 2007). Largest errors, in units of the last
+// place of the true value: see test/base/math_test.cpp.
 #pragma once
 
 #include "base/float_bits.hpp"
@@ -23,7 +24,8 @@ struct Reduced {
 
 inline constexpr std::uint32_t kCodyWaiteLimit = bits(4096.0F);
 
-/// |x| <= 4096. pi/2 is cut so that n times each of the first three parts is exact for n < 2^12, and so are the differences.
+/// |x| <= 4096. pi/2 is cut so that n times each of the first three parts is exact for n < 2^12, and so are the
+/// differences.
 [[nodiscard]] constexpr Reduced reduce_near(float x) {
   constexpr float kRound = 0x1.8p+23F;  // adding it leaves the nearest integer in the low bits of the sum
   const float shifted = x * 0x1.45f306p-1F + kRound;
@@ -46,12 +48,14 @@ inline constexpr std::uint32_t kTwoOverPi[8] = {0x0000'0000U, 0xa2f9'836eU, 0x4e
   const std::uint32_t* const word = &kTwoOverPi[position / 32];
   const std::uint32_t shift = position % 32;
   const auto window = [word, shift](int i) { return (word[i] << shift) | (word[i + 1] >> 1 >> (31 - shift)); };
-  const std::uint64_t turns = ((m * window(0)) << 32) + m * window(1) + ((m * window(2)) >> 32);  // 2^64 is a whole turn
+  const std::uint64_t turns =
+      ((m * window(0)) << 32) + m * window(1) + ((m * window(2)) >> 32);  // 2^64 is a whole turn
   const std::uint64_t quadrant = (turns + (std::uint64_t{1} << 61)) >> 62;
   std::uint64_t fraction = turns - (quadrant << 62);  // of a quadrant, in units of 2^-62, signed
   const std::uint32_t sign = static_cast<std::uint32_t>(fraction >> 32) & kSignBit;
   if (sign != 0) fraction = 0 - fraction;
-  const int zeros = std::countl_zero(fraction);  // no float is within 2^-32 of a multiple of pi/2, so 30 and more bits remain
+  const int zeros =
+      std::countl_zero(fraction);  // no float is within 2^-32 of a multiple of pi/2, so 30 and more bits remain
   const std::uint64_t angle = ((fraction << zeros) >> 32) * 0xc90f'daa2U;  // pi/2 in units of 2^-31
   const float scale = from_bits((static_cast<std::uint32_t>(127 + 9 - zeros - 30) << 23) | sign);
   const float head = static_cast<float>(static_cast<std::int32_t>(angle >> 40)) * scale;
@@ -110,8 +114,9 @@ inline constexpr std::uint32_t kTwoOverPi[8] = {0x0000'0000U, 0xa2f9'836eU, 0x4e
   return from_bits(bits(value) ^ (((r.quadrant + 1U) << 30) & kSignBit));
 }
 
-/// x less whole turns, in (-kPi, kPi]: x itself where it is inside, else the nearest float to the true remainder or its neighbour
-/// (an error below 0.2 urad, mostly of the rounding; none is added by |x|). -kPi becomes kPi. kNan for NaN and infinity.
+/// x less whole turns, in (-kPi, kPi]: x itself where it is inside, else the nearest float to the true remainder or its
+/// neighbour (an error below 0.2 urad, mostly of the rounding; none is added by |x|). -kPi becomes kPi. kNan for NaN
+/// and infinity.
 [[nodiscard]] constexpr float wrap_angle(float x) {
   const std::uint32_t magnitude = bits(x) & ~kSignBit;
   if (magnitude < bits(kPi)) return x;

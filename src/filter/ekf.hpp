@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Extended Kalman filter on any manifold state (Bar-Shalom, Li, Kirubarajan 2001, sec. 10.3; error-state form: Sola 2017, sec. 6).
+// Extended Kalman filter on any manifold state (Bar-Shalom, Li, Kirubarajan 2001, sec. 10.3; error-state form: Sola
+// 2017, sec. 6).
 #pragma once
 
 #include "filter/state.hpp"
@@ -29,7 +30,8 @@ class Ekf {
   template <MeasurementModel<State> Measurement>
   [[nodiscard]] Innovation<Scalar, Measurement::kDimension> update(const Measurement& measurement, Scalar gate) {
     const auto result = filter::update<Scalar, kErrors, Measurement::kDimension, Measurement::kTouches.size()>(
-        p, measurement.jacobian(x), Measurement::kTouches, measurement.residual(measurement.predict(x)), measurement.noise(), gate);
+        p, measurement.jacobian(x), Measurement::kTouches, measurement.residual(measurement.predict(x)),
+        measurement.noise(), gate);
     if (result.innovation.verdict == Verdict::kAccepted) x = x.plus(result.dx);
     return result.innovation;
   }

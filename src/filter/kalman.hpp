@@ -14,7 +14,9 @@ struct LinearMotion {
   Matrix<Scalar, N, N> f = Matrix<Scalar, N, N>::Identity();
   Symmetric<Scalar, N> q;
 
-  [[nodiscard]] VectorState<Scalar, N> predict(const VectorState<Scalar, N>& x) const { return {f.lazyProduct(x.value)}; }
+  [[nodiscard]] VectorState<Scalar, N> predict(const VectorState<Scalar, N>& x) const {
+    return {f.lazyProduct(x.value)};
+  }
   [[nodiscard]] Matrix<Scalar, N, N> jacobian(const VectorState<Scalar, N>&) const { return f; }
   [[nodiscard]] Symmetric<Scalar, N> noise(const VectorState<Scalar, N>&) const { return q; }
 };

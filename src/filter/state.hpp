@@ -24,14 +24,18 @@ concept MotionModel = State<S> && requires(const M& model, const S& x) {
   { model.noise(x) } -> std::same_as<Symmetric<typename S::Scalar, S::kErrors>>;
 };
 
-/// A model holds one measurement z. kTouches names the error states its Jacobian has columns for, so that a sparse update costs what
-/// it must. residual() is z minus z_hat, wrapped where a component is an angle. noise() are variances of independent components.
+/// A model holds one measurement z. kTouches names the error states its Jacobian has columns for, so that a sparse
+/// update costs what it must. residual() is z minus z_hat, wrapped where a component is an angle. noise() are variances
+/// of independent components.
 template <class M, class S>
-concept MeasurementModel = State<S> && requires(const M& model, const S& x, const Vector<typename S::Scalar, M::kDimension>& z_hat) {
+concept MeasurementModel = State<S> &&
+    requires(const M& model, const S& x, const Vector<typename S::Scalar, M::kDimension>& z_hat) {
   { model.predict(x) } -> std::same_as<Vector<typename S::Scalar, M::kDimension>>;
   { model.residual(z_hat) } -> std::same_as<Vector<typename S::Scalar, M::kDimension>>;
   { model.noise() } -> std::same_as<Vector<typename S::Scalar, M::kDimension>>;
-  { model.jacobian(x) } -> std::same_as<Matrix<typename S::Scalar, M::kDimension, static_cast<int>(M::kTouches.size())>>;
+  {
+    model.jacobian(x)
+    } -> std::same_as<Matrix<typename S::Scalar, M::kDimension, static_cast<int>(M::kTouches.size())>>;
 };
 
 /// A state that is just N numbers.

@@ -12,10 +12,10 @@ namespace tetap::model {
 struct DifferentialDrive {
   float left_radius_m = 0;
   float right_radius_m = 0;
-  float track_m = 0;           ///< between the wheels' contact points
-  float counts_per_turn = 1;   ///< encoder counts per turn of the wheel
-  float noise_left = 0;        ///< k_l: variance of the travelled distance per metre [m]
-  float noise_right = 0;       ///< k_r
+  float track_m = 0;          ///< between the wheels' contact points
+  float counts_per_turn = 1;  ///< encoder counts per turn of the wheel
+  float noise_left = 0;       ///< k_l: variance of the travelled distance per metre [m]
+  float noise_right = 0;      ///< k_r
 
   /// Travel of a wheel for a difference of counts: 2 pi r / N * n.
   [[nodiscard]] constexpr float left_m(std::int32_t counts) const { return travel_m(left_radius_m, counts); }
@@ -41,7 +41,8 @@ struct DifferentialDrive {
   }
 };
 
-/// The difference of two readings of a wrapping 16-bit counter: right while the wheel turns less than half the range between them.
+/// The difference of two readings of a wrapping 16-bit counter: right while the wheel turns less than half the range
+/// between them.
 [[nodiscard]] constexpr std::int32_t count_difference(std::uint16_t now, std::uint16_t before) {
   const auto ahead = static_cast<std::uint16_t>(now - before);
   return ahead < 0x8000 ? static_cast<std::int32_t>(ahead) : static_cast<std::int32_t>(ahead) - 0x10000;

@@ -13,13 +13,14 @@ struct GnssPosition {
   static constexpr int kDimension = 2;
   static constexpr std::array<int, 3> kTouches{0, 1, 2};
 
-  base::Anchored x;        ///< the fix, east
-  base::Anchored y;        ///< north
-  float sigma_m = 0;       ///< 1 sigma per axis
+  base::Anchored x;   ///< the fix, east
+  base::Anchored y;   ///< north
+  float sigma_m = 0;  ///< 1 sigma per axis
   float antenna_x_b_m = 0;
   float antenna_y_b_m = 0;
 
-  /// The antenna's place minus the fix: positions are differenced as anchored numbers, so no digit is lost far from the origin.
+  /// The antenna's place minus the fix: positions are differenced as anchored numbers, so no digit is lost far from the
+  /// origin.
   [[nodiscard]] filter::Vector<float, 2> predict(const PlanarPose& pose) const {
     const auto lever_n = lever(pose);
     return {pose.x.minus(x) + lever_n(0), pose.y.minus(y) + lever_n(1)};

@@ -33,7 +33,8 @@ struct Sight {
     lever_y_m = heading.sin * mounting.x_b_m + heading.cos * mounting.y_b_m;
     dx_m = landmark.x.minus(pose.x) - lever_x_m;
     dy_m = landmark.y.minus(pose.y) - lever_y_m;
-    // One centimetre: nearer than any landmark can be seen, and far enough from zero for the divisions of the Jacobians.
+    // One centimetre: nearer than any landmark can be seen, and far enough from zero for the divisions of the
+    // Jacobians.
     const float square = dx_m * dx_m + dy_m * dy_m;
     range2_m2 = square > 1e-4F ? square : 1e-4F;
   }

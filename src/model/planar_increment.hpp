@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The planar motion every wheeled model ends in: a path length ds and a turn dyaw along a circular arc, with their covariance.
-// Midpoint form: Siegwart, Nourbakhsh, Scaramuzza 2011, eq. 5.7-5.9. The exact arc replaces ds by the chord ds sin(h)/h, h = dyaw/2.
+// The planar motion every wheeled model ends in: a path length ds and a turn dyaw along a circular arc, with their
+// covariance. Midpoint form: Siegwart, Nourbakhsh, Scaramuzza 2011, eq. 5.7-5.9. The exact arc replaces ds by the chord
+// ds sin(h)/h, h = dyaw/2.
 #pragma once
 
 #include "base/math.hpp"

@@ -23,7 +23,9 @@ struct Range {
   [[nodiscard]] filter::Vector<float, 1> residual(const filter::Vector<float, 1>& z_hat) const {
     return filter::Vector<float, 1>(range_m - z_hat(0));
   }
-  [[nodiscard]] filter::Vector<float, 1> noise() const { return filter::Vector<float, 1>(sigma_range_m * sigma_range_m); }
+  [[nodiscard]] filter::Vector<float, 1> noise() const {
+    return filter::Vector<float, 1>(sigma_range_m * sigma_range_m);
+  }
   [[nodiscard]] filter::Matrix<float, 1, 3> jacobian(const PlanarPose& pose) const {
     return Sight(pose, landmark, mounting).range_row();
   }

@@ -9,11 +9,11 @@ namespace tetap::model {
 
 /// Densities: the variance gathered per second.
 struct UnicycleNoise {
-  float speed = 0;                 ///< m^2/s at standstill
-  float speed_per_speed = 0;       ///< m^2/s per m/s: grows with |v|
-  float yaw_rate = 0;              ///< rad^2/s at standstill
-  float yaw_rate_per_yaw_rate = 0; ///< rad^2/s per rad/s
-  float yaw_rate_per_speed = 0;    ///< rad^2/s per m/s
+  float speed = 0;                  ///< m^2/s at standstill
+  float speed_per_speed = 0;        ///< m^2/s per m/s: grows with |v|
+  float yaw_rate = 0;               ///< rad^2/s at standstill
+  float yaw_rate_per_yaw_rate = 0;  ///< rad^2/s per rad/s
+  float yaw_rate_per_speed = 0;     ///< rad^2/s per m/s
 };
 
 struct Unicycle {

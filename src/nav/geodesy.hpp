@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Latitude, longitude, height to the local level plane (east, north, up) and back, on WGS84 (NIMA TR8350.2, table 3.1).
-// Through ECEF (Torge & Mueller 2012, sec. 4.1.3), in the bit-identical double of src/base: the only place where double is used.
+// Through ECEF (Torge & Mueller 2012, sec. 4.1.3), in the bit-identical double of src/base: the only place where double
+// is used.
 #pragma once
 
 #include "base/math.hpp"
@@ -15,7 +16,8 @@ inline constexpr double kFlattening = 1.0 / 298.257223563;
 inline constexpr double kEccentricity2 = kFlattening * (2.0 - kFlattening);
 inline constexpr double kRadPer2ndeg = 2e-9 * 3.14159265358979323846 / 180.0;
 
-/// Relative to an origin, integer micrometres. Not valid: further than 1000 km from the origin, or not a place on Earth.
+/// Relative to an origin, integer micrometres. Not valid: further than 1000 km from the origin, or not a place on
+/// Earth.
 struct Local {
   std::int64_t east_um = 0;
   std::int64_t north_um = 0;
@@ -39,7 +41,8 @@ class LocalFrame {
   [[nodiscard]] constexpr float height_m() const { return height_m_; }
 
   /// A height that is not available counts as the origin's.
-  [[nodiscard]] constexpr Local to_local(std::int64_t latitude_2ndeg, std::int64_t longitude_2ndeg, float height_m) const {
+  [[nodiscard]] constexpr Local to_local(std::int64_t latitude_2ndeg, std::int64_t longitude_2ndeg,
+                                         float height_m) const {
     constexpr std::int64_t kQuarterTurn = 45'000'000'000;
     if (latitude_2ndeg > kQuarterTurn || latitude_2ndeg < -kQuarterTurn || longitude_2ndeg > 4 * kQuarterTurn ||
         longitude_2ndeg < -4 * kQuarterTurn) {
@@ -69,7 +72,9 @@ class LocalFrame {
             (n * (1.0 - kEccentricity2) + height) * latitude.sin};
   }
   static constexpr bool near(double m) { return m > -1e6 && m < 1e6; }
-  static constexpr std::int64_t micrometres(double m) { return static_cast<std::int64_t>(m * 1e6 + (m < 0 ? -0.5 : 0.5)); }
+  static constexpr std::int64_t micrometres(double m) {
+    return static_cast<std::int64_t>(m * 1e6 + (m < 0 ? -0.5 : 0.5));
+  }
 
   std::int64_t latitude_2ndeg_ = 0;
   std::int64_t longitude_2ndeg_ = 0;

@@ -15,14 +15,21 @@ namespace tetap::test {
 using Frames = std::vector<base::CanFrame>;
 
 inline constexpr app::Numbers kNumbers{
-    .wheels = {.drive = {.left_radius_m = 0.1F, .right_radius_m = 0.1F, .track_m = 0.5F, .counts_per_turn = 2000, .noise_left = 1e-4F, .noise_right = 1e-4F},
+    .wheels = {.drive = {.left_radius_m = 0.1F,
+                         .right_radius_m = 0.1F,
+                         .track_m = 0.5F,
+                         .counts_per_turn = 2000,
+                         .noise_left = 1e-4F,
+                         .noise_right = 1e-4F},
                .noise = {.speed = 1e-3F, .yaw_rate = 1e-3F}},
     .landmark = {.sigma_range_m = 0.1F, .sigma_bearing_rad = 0.02F},
 };
 
 class Bench {
  public:
-  explicit Bench(const app::Numbers& numbers = kNumbers) : node(numbers, {.git = 0x12345678}) { node.power_on({kStart_us}); }
+  explicit Bench(const app::Numbers& numbers = kNumbers) : node(numbers, {.git = 0x12345678}) {
+    node.power_on({kStart_us});
+  }
 
   /// One epoch: frames in this order, then the tick. The frames that came out.
   Frames epoch(const Frames& in) {
@@ -45,23 +52,33 @@ class Bench {
 };
 
 template <class Message>
-base::CanFrame in(const Message& message, std::size_t instance = 0) { return can::frame(0x300, message, instance); }
+base::CanFrame in(const Message& message, std::size_t instance = 0) {
+  return can::frame(0x300, message, instance);
+}
 
 inline std::uint32_t stamp(std::int64_t us) { return static_cast<std::uint32_t>(us & 0xFFFFF); }
 
 inline base::CanFrame body_speed(std::int64_t at_us, float forward_mps, float yaw_rate_radps, int seq = 0) {
-  return in(can::InBodySpeed{.stamp_us = stamp(at_us), .seq = static_cast<std::uint8_t>(seq & 15), .forward_mps = forward_mps, .yaw_rate_radps = yaw_rate_radps});
+  return in(can::InBodySpeed{.stamp_us = stamp(at_us),
+                             .seq = static_cast<std::uint8_t>(seq & 15),
+                             .forward_mps = forward_mps,
+                             .yaw_rate_radps = yaw_rate_radps});
 }
 inline base::CanFrame sighting(std::int64_t at_us, int landmark, float range_m, float bearing_rad, int seq = 0) {
-  return in(can::InRangeBearing{.stamp_us = stamp(at_us), .seq = static_cast<std::uint8_t>(seq & 15), .id = static_cast<std::uint8_t>(landmark), .range_m = range_m, .bearing_rad = bearing_rad});
+  return in(can::InRangeBearing{.stamp_us = stamp(at_us),
+                                .seq = static_cast<std::uint8_t>(seq & 15),
+                                .id = static_cast<std::uint8_t>(landmark),
+                                .range_m = range_m,
+                                .bearing_rad = bearing_rad});
 }
 inline base::CanFrame map_entry(int id, int x_mm, int y_mm) {
   return in(can::InMapEntry{.id = static_cast<std::uint8_t>(id), .x_raw = x_mm, .y_raw = y_mm});
 }
 inline Frames set_pose(int counter, int x_mm, int y_mm, float yaw_rad, float sigma_m = 0.1F, float sigma_rad = 0.05F) {
   const auto ctr = static_cast<std::uint8_t>(counter & 15);
-  return {in(can::protect(can::CmdSetPos{.ctr = ctr, .x_raw = x_mm / 2, .y_raw = y_mm / 2})),
-          in(can::protect(can::CmdSetYaw{.ctr = ctr, .yaw_rad = yaw_rad, .std_pos_m = sigma_m, .std_yaw_rad = sigma_rad}))};
+  return {
+      in(can::protect(can::CmdSetPos{.ctr = ctr, .x_raw = x_mm / 2, .y_raw = y_mm / 2})),
+      in(can::protect(can::CmdSetYaw{.ctr = ctr, .yaw_rad = yaw_rad, .std_pos_m = sigma_m, .std_yaw_rad = sigma_rad}))};
 }
 
 /// The last message of this kind in the frames, if any.

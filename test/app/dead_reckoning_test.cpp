@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "bench.hpp"
 
-#include <cmath>
 #include <gtest/gtest.h>
+#include <cmath>
 
 namespace tetap::test {
 namespace {
@@ -17,12 +17,14 @@ TEST(DeadReckoning, CountsDriveACircleHome) {
   motion.start({0}, {}, 0.001F, 0.001F);
   // left 3000 and right 5000 counts a second: v = 1.2566 m/s, yaw rate = 1.2566 rad/s, radius 1 m: home after 5 s
   for (int k = 0; k <= 500; ++k)
-    motion.fuse(app::WheelCounts{.left = static_cast<std::uint16_t>(30 * k), .right = static_cast<std::uint16_t>(50 * k)}, {10'000 * k}, kNumbers);
+    motion.fuse(
+        app::WheelCounts{.left = static_cast<std::uint16_t>(30 * k), .right = static_cast<std::uint16_t>(50 * k)},
+        {10'000 * k}, kNumbers);
   motion.advance({5'000'000});
   const auto e = motion.estimate(kNumbers);
   EXPECT_NEAR(x_of(e), 0.0, 2e-3);
   EXPECT_NEAR(y_of(e), 0.0, 2e-3);
-  EXPECT_NEAR(static_cast<double>(e.forward_mps), 0.2 * M_PI / 2000 * 4000 , 1e-4);
+  EXPECT_NEAR(static_cast<double>(e.forward_mps), 0.2 * M_PI / 2000 * 4000, 1e-4);
   EXPECT_TRUE(e.p.positive_definite());
 }
 
@@ -31,7 +33,8 @@ TEST(DeadReckoning, AnUpdateBetweenCountsDoesNotCountTravelTwice) {
   for (auto* motion : {&plain, &interrupted}) motion->start({0}, {}, 0.01F, 0.01F);
   for (int k = 0; k <= 200; ++k) {
     if (k > 0) interrupted.propagate({10'000 * k - 4'000}, kNumbers);  // where a measurement would be fused
-    const app::WheelCounts counts{.left = static_cast<std::uint16_t>(33 * k), .right = static_cast<std::uint16_t>(31 * k + (k % 7))};
+    const app::WheelCounts counts{.left = static_cast<std::uint16_t>(33 * k),
+                                  .right = static_cast<std::uint16_t>(31 * k + (k % 7))};
     plain.fuse(counts, {10'000 * k}, kNumbers);
     interrupted.fuse(counts, {10'000 * k}, kNumbers);
   }
@@ -46,7 +49,8 @@ TEST(DeadReckoning, ExtrapolationToTheTickDoesNotChangeTheState) {
   DeadReckoning a, b;
   for (auto* motion : {&a, &b}) motion->start({0}, {}, 0.01F, 0.01F);
   for (int k = 1; k < 100; ++k) {
-    for (auto* motion : {&a, &b}) motion->fuse(app::BodySpeed{.forward_mps = 1.0F, .yaw_rate_radps = 0.3F}, {15'000 * k}, kNumbers);
+    for (auto* motion : {&a, &b})
+      motion->fuse(app::BodySpeed{.forward_mps = 1.0F, .yaw_rate_radps = 0.3F}, {15'000 * k}, kNumbers);
     a.advance({15'000 * k + 5'000});
     static_cast<void>(a.estimate(kNumbers));
   }
@@ -95,7 +99,8 @@ TEST(DeadReckoning, TheGyroscopeTurnsAndItsBiasIsLearntAtRest) {
     for (int k = 0; k < 100; ++k) {
       t += 10'000;
       motion.fuse(app::ImuSample{.interval = {10'000}, .dangle_b_rad = {0, 0, (rate_radps + bias) * 0.01F}}, {t}, n);
-      motion.fuse(app::BodySpeed{.forward_mps = forward_mps, .yaw_rate_radps = -5.0F}, {t}, n);  // wheels that skid tell nothing
+      motion.fuse(app::BodySpeed{.forward_mps = forward_mps, .yaw_rate_radps = -5.0F}, {t},
+                  n);  // wheels that skid tell nothing
     }
   };
   for (int k = 0; k < 9; ++k) second(0.0F, 0.0F);

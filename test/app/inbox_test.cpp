@@ -38,9 +38,12 @@ TEST(Inbox, ExtendsTwentyBitStampsAroundTheReference) {
 
 TEST(Inbox, PutsAFixTogetherFromFourFramesInAnyOrder) {
   const auto s = stamp(9'990'000);
-  const Frames frames{in(can::InGnssLat{.stamp_us = s, .seq = 4, .inst = 1, .lat_raw = 21'187'906'000}), in(can::InGnssLon{.stamp_us = s, .seq = 4, .inst = 1, .lon_raw = -35'573'697'333}),
-                      in(can::InGnssAlt{.stamp_us = s, .seq = 4, .inst = 1, .height_m = 7.3F, .fix = can::GnssFix::kFix3D, .num_sv = 9}),
-                      in(can::InGnssAcc{.stamp_us = s, .seq = 4, .inst = 1, .hor_m = 0.9F, .ver_m = 1.8F})};
+  const Frames frames{
+      in(can::InGnssLat{.stamp_us = s, .seq = 4, .inst = 1, .lat_raw = 21'187'906'000}),
+      in(can::InGnssLon{.stamp_us = s, .seq = 4, .inst = 1, .lon_raw = -35'573'697'333}),
+      in(can::InGnssAlt{
+          .stamp_us = s, .seq = 4, .inst = 1, .height_m = 7.3F, .fix = can::GnssFix::kFix3D, .num_sv = 9}),
+      in(can::InGnssAcc{.stamp_us = s, .seq = 4, .inst = 1, .hor_m = 0.9F, .ver_m = 1.8F})};
   for (const auto& order : {std::vector{0, 1, 2, 3}, std::vector{3, 1, 0, 2}}) {
     Desk desk;
     for (const int i : order) desk.put(frames[static_cast<std::size_t>(i)]);
@@ -100,7 +103,13 @@ TEST(Inbox, AnImuSampleCarriesIncrementsIntervalAndClips) {
   Desk desk;
   desk.put(in(can::ImuGyro{.ang_x_rad = 0.001F, .ang_y_rad = -0.002F, .ang_z_rad = 0.003F, .seq = 9}, 2));
   desk.put(in(can::ImuAccel{.vel_x_mps = 0.1F, .vel_y_mps = 0.2F, .vel_z_mps = 0.0981F, .seq = 9}, 2));
-  desk.put(in(can::ImuTime{.stamp_us = stamp(9'999'000), .interval_us = 5'000, .clip_gyro = 3, .clip_accel = 1, .temp_degC = 30.5F, .seq = 9}, 2));
+  desk.put(in(can::ImuTime{.stamp_us = stamp(9'999'000),
+                           .interval_us = 5'000,
+                           .clip_gyro = 3,
+                           .clip_accel = 1,
+                           .temp_degC = 30.5F,
+                           .seq = 9},
+              2));
   ASSERT_EQ(desk.out.samples.size(), 1U);
   const auto& s = desk.out.samples[0];
   EXPECT_EQ(s.instance, 2);

@@ -1,16 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a user of the node relies on: order and lateness leave no trace, every epoch is accounted for, commands mean what they say.
+// What a user of the node relies on: order and lateness leave no trace, every epoch is accounted for, commands mean
+// what they say.
 #include "bench.hpp"
 
+#include <gtest/gtest.h>
 #include <algorithm>
 #include <cmath>
-#include <gtest/gtest.h>
 #include <random>
 
 namespace tetap::test {
 namespace {
 
-/// A drive past two landmarks; each epoch has a speed sample, and every fifth a few sightings with a stamp between the ticks.
+/// A drive past two landmarks; each epoch has a speed sample, and every fifth a few sightings with a stamp between the
+/// ticks.
 std::vector<Frames> drive(int epochs) {
   std::vector<Frames> all;
   std::mt19937 random(3);
@@ -26,7 +28,8 @@ std::vector<Frames> drive(int epochs) {
     frames.push_back(body_speed(t - 3'000, 0.5F + 0.01F * normal(random), 0.2F, k));
     if (k > 2 && k % 5 == 0)
       for (int i = 0; i < 3; ++i)
-        frames.push_back(sighting(t - 7'000 + 1'000 * i, i == 1 ? 9 : 7, 4.0F + 0.1F * normal(random), 0.5F + 0.1F * normal(random), i));
+        frames.push_back(sighting(t - 7'000 + 1'000 * i, i == 1 ? 9 : 7, 4.0F + 0.1F * normal(random),
+                                  0.5F + 0.1F * normal(random), i));
     all.push_back(frames);
   }
   return all;
@@ -80,7 +83,9 @@ TEST(Node, BeyondTheWindowASampleIsRefusedCountedAndSaid) {
   const Frames later = bench.idle(100);
   EXPECT_EQ(last<can::EstDiagOrder>(later)->too_late, 1);
   const auto events = all<can::EstInnov>(later);
-  EXPECT_EQ(std::count_if(events.begin(), events.end(), [](const auto& e) { return e.verdict == can::Verdict::kTooLate; }), 1);
+  EXPECT_EQ(
+      std::count_if(events.begin(), events.end(), [](const auto& e) { return e.verdict == can::Verdict::kTooLate; }),
+      1);
 }
 
 TEST(Node, ADuplicateFrameChangesTheTallyAndNothingElse) {
@@ -105,7 +110,8 @@ TEST(Node, EveryInputBitReachesTheTallyAndTheStateCrc) {
   for (int bit = 26; bit < 64; ++bit) {  // the values of a speed sample
     auto flipped = epochs;
     auto& data = flipped[20].front().data;
-    data[static_cast<std::size_t>(bit / 8)] = static_cast<std::uint8_t>(data[static_cast<std::size_t>(bit / 8)] ^ (1U << (bit % 8)));
+    data[static_cast<std::size_t>(bit / 8)] =
+        static_cast<std::uint8_t>(data[static_cast<std::size_t>(bit / 8)] ^ (1U << (bit % 8)));
     Bench bench;
     const Frames got = run(bench, flipped);
     EXPECT_NE(last<can::EstEpoch>(got)->in_crc, last<can::EstEpoch>(expected)->in_crc) << bit;
@@ -194,7 +200,8 @@ TEST(Node, AnUnknownLandmarkIsNamedAndNotUsed) {
   bench.epoch({sighting(bench.now_us + 5'000, 33, 2.0F, 0.0F)});
   const auto events = all<can::EstInnov>(bench.idle(40));
   ASSERT_FALSE(events.empty());
-  EXPECT_TRUE(std::any_of(events.begin(), events.end(), [](const auto& e) { return e.id == 33 && e.verdict == can::Verdict::kUnknownLandmark; }));
+  EXPECT_TRUE(std::any_of(events.begin(), events.end(),
+                          [](const auto& e) { return e.id == 33 && e.verdict == can::Verdict::kUnknownLandmark; }));
 }
 
 TEST(Node, TimeThatGoesBackOrJumpsRestartsAndSaysSo) {
@@ -213,10 +220,13 @@ TEST(Node, HalfAnImuSampleIsNeverMixedWithAnother) {
   bench.idle(2);
   const auto gyro = [](int seq) { return in(can::ImuGyro{.seq = static_cast<std::uint8_t>(seq)}); };
   const auto accel = [](int seq) { return in(can::ImuAccel{.seq = static_cast<std::uint8_t>(seq)}); };
-  const auto time = [&](int seq) { return in(can::ImuTime{.stamp_us = stamp(bench.now_us), .interval_us = 10'000, .seq = static_cast<std::uint8_t>(seq)}); };
-  bench.epoch({gyro(1), accel(1)});            // its time never comes
-  bench.epoch({gyro(2), accel(2), time(2)});   // whole
-  bench.epoch({time(3), gyro(3)});             // its acceleration never comes
+  const auto time = [&](int seq) {
+    return in(
+        can::ImuTime{.stamp_us = stamp(bench.now_us), .interval_us = 10'000, .seq = static_cast<std::uint8_t>(seq)});
+  };
+  bench.epoch({gyro(1), accel(1)});           // its time never comes
+  bench.epoch({gyro(2), accel(2), time(2)});  // whole
+  bench.epoch({time(3), gyro(3)});            // its acceleration never comes
   const Frames out = bench.idle(150);
   EXPECT_EQ(last<can::EstDiagFrames>(out)->incomplete, 2);
 }

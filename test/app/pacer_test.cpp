@@ -41,7 +41,8 @@ TEST(Pacer, InLockstepOnlyStepsTick) {
   EXPECT_EQ(pacer.on_sync(SyncKind::kBegin, {1'000'000}, {0}, health), std::nullopt);
   EXPECT_EQ(pacer.on_poll({60'000'000}, health), std::nullopt);
   EXPECT_EQ(pacer.on_sync(SyncKind::kStep, {1'010'000}, {60'000'000}, health)->us, 1'010'000);
-  EXPECT_EQ(pacer.on_sync(SyncKind::kStep, {1'007'000}, {60'000'001}, health)->us, 1'007'000) << "whatever the time: the node judges";
+  EXPECT_EQ(pacer.on_sync(SyncKind::kStep, {1'007'000}, {60'000'001}, health)->us, 1'007'000)
+      << "whatever the time: the node judges";
 }
 
 TEST(Pacer, FollowsHoldsOverAfterThreePeriodsAndComesBack) {
@@ -108,7 +109,8 @@ TEST(Pacer, TheClockFrameMovesTheTicksToTheBussTimeAndSmallCorrectionsKeepThem) 
   EXPECT_EQ(ticks, (std::vector<std::int64_t>{510'000, 520'000, 530'000, 540'000}));
   EXPECT_FALSE(pacer.on_sync(SyncKind::kClock, {547'000}, {50'000}, health));  // 3 ms back
   poll_until(80'000);
-  for (std::size_t i = 1; i < ticks.size(); ++i) EXPECT_EQ(ticks[i] - ticks[i - 1], 10'000) << "no tick twice, none missing";
+  for (std::size_t i = 1; i < ticks.size(); ++i)
+    EXPECT_EQ(ticks[i] - ticks[i - 1], 10'000) << "no tick twice, none missing";
   EXPECT_EQ(health.ticks_late, 0);
 }
 

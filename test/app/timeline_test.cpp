@@ -1,15 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/timeline.hpp"
 
-#include <algorithm>
 #include <gtest/gtest.h>
+#include <algorithm>
 #include <random>
 #include <vector>
 
 namespace tetap {
 namespace {
 
-app::Sample sample(std::int64_t us, can::Sensor sensor = can::Sensor::kBodySpeed, int instance = 0, int sequence = 0, int detail = 0) {
+app::Sample sample(std::int64_t us, can::Sensor sensor = can::Sensor::kBodySpeed, int instance = 0, int sequence = 0,
+                   int detail = 0) {
   app::Sample s;
   s.stamp = {us};
   s.sensor = sensor;

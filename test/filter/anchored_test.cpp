@@ -29,7 +29,8 @@ TEST(Anchored, OffsetStaysSmallAndSumsAreTheIntegers) {
 }
 
 TEST(Anchored, DifferencesDoNotDependOnTheAnchor) {
-  const base::Anchored a{.anchor_um = 7'000'000'123, .offset_m = 1.5F}, b{.anchor_um = 6'999'000'000, .offset_m = -2.25F};
+  const base::Anchored a{.anchor_um = 7'000'000'123, .offset_m = 1.5F},
+      b{.anchor_um = 6'999'000'000, .offset_m = -2.25F};
   EXPECT_NEAR(a.minus(b), 1.000123F + 3.75F, 1e-6F);
   const base::Anchored a2 = base::Anchored::from_um(a.um()), b2 = base::Anchored::from_um(b.um());
   EXPECT_NEAR(a2.minus(b2), a.minus(b), 1e-6F);

@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// In a world that is exactly what the filter models, NEES and NIS must lie in their two-sided 95 % intervals: too good is a failure too.
+// In a world that is exactly what the filter models, NEES and NIS must lie in their two-sided 95 % intervals: too good
+// is a failure too.
+#include "support/consistency.hpp"
 #include "filter/ekf.hpp"
 #include "model/constant_velocity.hpp"
 #include "model/range_bearing.hpp"
 #include "model/unicycle.hpp"
-#include "support/consistency.hpp"
 
-#include <Eigen/Dense>
 #include <gtest/gtest.h>
+#include <Eigen/Dense>
 #include <random>
 
 namespace tetap {
@@ -16,8 +17,8 @@ namespace {
 constexpr int kRuns = 200;
 constexpr int kSteps = 100;
 
-/// Share of the steps whose average over the runs lies inside the interval: 95 % are expected, and 90 to 99 % demanded, because
-/// neighbouring steps are not independent.
+/// Share of the steps whose average over the runs lies inside the interval: 95 % are expected, and 90 to 99 % demanded,
+/// because neighbouring steps are not independent.
 struct Share {
   int inside = 0, all = 0;
   void add(bool is) { inside += is ? 1 : 0, ++all; }
@@ -40,8 +41,9 @@ TEST(Consistency, ConstantVelocityKalman) {
         truth(axis + 1) += 0.1 * a;
       }
       kf.predict(motion);
-      const filter::DirectMeasurement<float, 4, 0, 2> z{
-          .z = {static_cast<float>(truth(0) + 0.5 * normal(random)), static_cast<float>(truth(2) + 0.5 * normal(random))}, .variance = {0.25F, 0.25F}};
+      const filter::DirectMeasurement<float, 4, 0, 2> z{.z = {static_cast<float>(truth(0) + 0.5 * normal(random)),
+                                                              static_cast<float>(truth(2) + 0.5 * normal(random))},
+                                                        .variance = {0.25F, 0.25F}};
       nis[static_cast<std::size_t>(k)] += static_cast<double>(kf.update(z, 1e9F).nis) / kRuns;
       const Eigen::Vector4d e = kf.x.value.cast<double>() - truth;
       nees[static_cast<std::size_t>(k)] += e.dot(kf.p.dense().cast<double>().inverse() * e) / kRuns;
@@ -60,7 +62,8 @@ TEST(Consistency, PlanarEkfWithRangeAndBearing) {
   std::mt19937 random(11);
   std::normal_distribution<double> normal;
   std::vector<double> nees(kSteps), nis(kSteps);
-  const model::Landmark marks[] = {{base::Anchored{}.plus(6), base::Anchored{}.plus(2)}, {base::Anchored{}.plus(-3), base::Anchored{}.plus(4)}};
+  const model::Landmark marks[] = {{base::Anchored{}.plus(6), base::Anchored{}.plus(2)},
+                                   {base::Anchored{}.plus(-3), base::Anchored{}.plus(4)}};
   const model::UnicycleNoise noise{.speed = 0.01F, .yaw_rate = 0.005F};
   for (int run = 0; run < kRuns; ++run) {
     filter::Ekf<model::PlanarPose> ekf;
@@ -77,14 +80,17 @@ TEST(Consistency, PlanarEkfWithRangeAndBearing) {
       yaw += dyaw;
       ekf.predict(increment);
       const model::Landmark& mark = marks[k % 2];
-      const double dx = static_cast<double>(mark.x.minus(base::Anchored{})) - x, dy = static_cast<double>(mark.y.minus(base::Anchored{})) - y;
-      const model::RangeBearing z{.range_m = static_cast<float>(std::hypot(dx, dy) + 0.1 * normal(random)),
-                                  .bearing_rad = static_cast<float>(std::remainder(std::atan2(dy, dx) - yaw + 0.03 * normal(random), 2 * M_PI)),
-                                  .sigma_range_m = 0.1F,
-                                  .sigma_bearing_rad = 0.03F,
-                                  .landmark = mark};
+      const double dx = static_cast<double>(mark.x.minus(base::Anchored{})) - x,
+                   dy = static_cast<double>(mark.y.minus(base::Anchored{})) - y;
+      const model::RangeBearing z{
+          .range_m = static_cast<float>(std::hypot(dx, dy) + 0.1 * normal(random)),
+          .bearing_rad = static_cast<float>(std::remainder(std::atan2(dy, dx) - yaw + 0.03 * normal(random), 2 * M_PI)),
+          .sigma_range_m = 0.1F,
+          .sigma_bearing_rad = 0.03F,
+          .landmark = mark};
       nis[static_cast<std::size_t>(k)] += static_cast<double>(ekf.update(z, 1e9F).nis) / kRuns;
-      const Eigen::Vector3d e(static_cast<double>(ekf.x.x.minus(base::Anchored{})) - x, static_cast<double>(ekf.x.y.minus(base::Anchored{})) - y,
+      const Eigen::Vector3d e(static_cast<double>(ekf.x.x.minus(base::Anchored{})) - x,
+                              static_cast<double>(ekf.x.y.minus(base::Anchored{})) - y,
                               std::remainder(static_cast<double>(ekf.x.yaw_rad) - yaw, 2 * M_PI));
       nees[static_cast<std::size_t>(k)] += e.dot(ekf.p.dense().cast<double>().inverse() * e) / kRuns;
     }

@@ -22,7 +22,8 @@ TEST(Kalman, WorkedExampleStepByStep) {
   EXPECT_NEAR(kf.p(0, 1), 1.0F, 1e-6F);
   EXPECT_NEAR(kf.p(1, 1), 10.001F, 1e-5F);
 
-  const filter::DirectMeasurement<float, 2, 0> position{.z = Vector<float, 1>(0.5F), .variance = Vector<float, 1>(0.5F)};
+  const filter::DirectMeasurement<float, 2, 0> position{.z = Vector<float, 1>(0.5F),
+                                                        .variance = Vector<float, 1>(0.5F)};
   const auto innovation = kf.update(position, 9.0F);
   EXPECT_EQ(innovation.verdict, filter::Verdict::kAccepted);
   EXPECT_NEAR(innovation.nu(0), 0.5F, 1e-7F);
@@ -35,8 +36,9 @@ TEST(Kalman, WorkedExampleStepByStep) {
 }
 
 TEST(Kalman, ConvergesToTheRiccatiSolutionOfTheAlphaBetaFilter) {
-  // Steady state of the piecewise-constant acceleration model (Kalata 1984): tracking index L = sigma_w T^2 / sigma_v gives
-  // beta = (L^2 + 4 L - L sqrt(L^2 + 8 L)) / 4 ... with r = (4 + L - sqrt(8 L + L^2)) / 4: alpha = 1 - r^2, beta = 2 (2 - alpha) - 4 sqrt(1 - alpha).
+  // Steady state of the piecewise-constant acceleration model (Kalata 1984): tracking index L = sigma_w T^2 / sigma_v
+  // gives beta = (L^2 + 4 L - L sqrt(L^2 + 8 L)) / 4 ... with r = (4 + L - sqrt(8 L + L^2)) / 4: alpha = 1 - r^2, beta
+  // = 2 (2 - alpha) - 4 sqrt(1 - alpha).
   constexpr float kDt = 0.1F, kAcceleration = 4.0F, kVariance = 0.25F;
   filter::Ekf<model::ConstantVelocity<float>::State> kf;
   kf.p = filter::Symmetric<float, 4>::diagonal({10, 10, 10, 10});

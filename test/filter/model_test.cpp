@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Every model inherits the same laws: name it in a list with a few examples, and its Jacobian, its noise and "a perfect measurement
-// changes nothing" are tested.
+// Every model inherits the same laws: name it in a list with a few examples, and its Jacobian, its noise and "a perfect
+// measurement changes nothing" are tested.
 #include "filter/ekf.hpp"
 #include "model/bearing.hpp"
 #include "model/constant_velocity.hpp"
@@ -11,8 +11,8 @@
 #include "model/unicycle.hpp"
 #include "support/numeric_jacobian.hpp"
 
-#include <cmath>
 #include <gtest/gtest.h>
+#include <cmath>
 #include <vector>
 
 namespace tetap {
@@ -23,13 +23,16 @@ using model::PlanarPose;
 PlanarPose pose(float x_m, float y_m, float yaw_rad) {
   return {.x = base::Anchored{}.plus(x_m), .y = base::Anchored{}.plus(y_m), .yaw_rad = yaw_rad};
 }
-model::Landmark landmark(float x_m, float y_m) { return {.x = base::Anchored{}.plus(x_m), .y = base::Anchored{}.plus(y_m)}; }
+model::Landmark landmark(float x_m, float y_m) {
+  return {.x = base::Anchored{}.plus(x_m), .y = base::Anchored{}.plus(y_m)};
+}
 
 std::vector<PlanarPose> poses() {
   return {pose(0, 0, 0), pose(1, -2, 1.5F), pose(-3, 4, -3.1F), pose(5, 5, 3.1F), pose(0.1F, 0, -1.5708F)};
 }
 
-// -- measurement models ------------------------------------------------------------------------------------------------------------
+// -- measurement models
+// ------------------------------------------------------------------------------------------------------------
 
 template <class Model>
 struct Examples;
@@ -39,7 +42,8 @@ constexpr model::PlanarMounting kMounting{.x_b_m = 0.3F, .y_b_m = -0.1F, .yaw_ra
 template <>
 struct Examples<model::RangeBearing> {
   static model::RangeBearing at(const PlanarPose& x) {
-    model::RangeBearing m{.sigma_range_m = 0.1F, .sigma_bearing_rad = 0.02F, .landmark = landmark(2, 7), .mounting = kMounting};
+    model::RangeBearing m{
+        .sigma_range_m = 0.1F, .sigma_bearing_rad = 0.02F, .landmark = landmark(2, 7), .mounting = kMounting};
     const auto z = m.predict(x);
     return m.range_m = z(0), m.bearing_rad = z(1), m;
   }
@@ -81,7 +85,8 @@ TYPED_TEST(MeasurementLaws, JacobianEqualsCentralDifferences) {
     const auto numeric = test::numeric_measurement_jacobian(m, x, 0.01F);
     for (int r = 0; r < TypeParam::kDimension; ++r) {
       filter::Vector<float, 3> row = filter::Vector<float, 3>::Zero();
-      for (std::size_t k = 0; k < TypeParam::kTouches.size(); ++k) row(TypeParam::kTouches[k]) = h(r, static_cast<int>(k));
+      for (std::size_t k = 0; k < TypeParam::kTouches.size(); ++k)
+        row(TypeParam::kTouches[k]) = h(r, static_cast<int>(k));
       for (int c = 0; c < 3; ++c) EXPECT_NEAR(row(c), numeric(r, c), 2e-3F * (1 + std::abs(row(c)))) << r << c;
     }
   }
@@ -120,7 +125,8 @@ TYPED_TEST(MeasurementLaws, SensorFarFromTheOriginSeesTheSame) {
 
 TEST(RangeBearing, BearingIsMeasuredFromAheadCounterClockwise) {
   const model::RangeBearing m{.landmark = landmark(0, 5)};
-  EXPECT_NEAR(m.predict(pose(0, 0, 0))(1), 1.5708F, 1e-5F) << "a landmark to the north of a robot looking east is on its left";
+  EXPECT_NEAR(m.predict(pose(0, 0, 0))(1), 1.5708F, 1e-5F)
+      << "a landmark to the north of a robot looking east is on its left";
   EXPECT_NEAR(m.predict(pose(0, 0, 1.5708F))(1), 0.0F, 1e-5F);
   EXPECT_FLOAT_EQ(m.predict(pose(3, 1, 0))(0), 5.0F);
 }
@@ -130,13 +136,15 @@ TEST(RangeBearing, ResidualTakesTheShortWayRound) {
   EXPECT_NEAR(m.residual({1.0F, -3.1F})(1), 6.2F - 6.2831853F, 1e-5F);
 }
 
-// -- motion models -----------------------------------------------------------------------------------------------------------------
+// -- motion models
+// -----------------------------------------------------------------------------------------------------------------
 
 std::vector<model::PlanarIncrement> increments() {
   std::vector<model::PlanarIncrement> all;
   for (const model::Arc arc : {model::Arc::kExact, model::Arc::kMidpoint})
     for (const float dyaw : {0.0F, 1e-4F, 0.05F, -0.19F, 0.21F, 1.5F, -3.0F})
-      all.push_back({.ds_m = 0.7F, .dyaw_rad = dyaw, .var_ds = 0.01F, .cov_ds_dyaw = 0.001F, .var_dyaw = 0.02F, .arc = arc});
+      all.push_back(
+          {.ds_m = 0.7F, .dyaw_rad = dyaw, .var_ds = 0.01F, .cov_ds_dyaw = 0.001F, .var_dyaw = 0.02F, .arc = arc});
   return all;
 }
 
@@ -186,7 +194,8 @@ TEST(PlanarIncrement, MidpointApproachesTheArcWithTheThirdPowerOfTheTurn) {
 }
 
 TEST(DifferentialDrive, CountsBecomeTravelByTheWheelsCircumference) {
-  const model::DifferentialDrive drive{.left_radius_m = 0.1F, .right_radius_m = 0.2F, .track_m = 0.5F, .counts_per_turn = 1000};
+  const model::DifferentialDrive drive{
+      .left_radius_m = 0.1F, .right_radius_m = 0.2F, .track_m = 0.5F, .counts_per_turn = 1000};
   EXPECT_NEAR(drive.left_m(1000), 0.6283185F, 1e-6F);
   EXPECT_NEAR(drive.right_m(-500), -0.6283185F, 1e-6F);
 }
@@ -201,7 +210,8 @@ TEST(DifferentialDrive, CovarianceIsTheTextbooks) {
   EXPECT_NEAR(increment.dyaw_rad, dyaw, 1e-6F);
   const float c = std::cos(yaw + dyaw / 2), s = std::sin(yaw + dyaw / 2), b = 0.4F;
   Eigen::Matrix<float, 3, 2> j;  // columns: right, left
-  j << 0.5F * c - ds / (2 * b) * s, 0.5F * c + ds / (2 * b) * s, 0.5F * s + ds / (2 * b) * c, 0.5F * s - ds / (2 * b) * c, 1 / b, -1 / b;
+  j << 0.5F * c - ds / (2 * b) * s, 0.5F * c + ds / (2 * b) * s, 0.5F * s + ds / (2 * b) * c,
+      0.5F * s - ds / (2 * b) * c, 1 / b, -1 / b;
   const Eigen::Matrix2f q = Eigen::Vector2f(0.003F * right, 0.002F * left).asDiagonal();
   Eigen::Matrix3f f = Eigen::Matrix3f::Identity();
   f(0, 2) = -ds * s;
@@ -218,11 +228,17 @@ TEST(DifferentialDrive, CountersWrapBothWays) {
   EXPECT_EQ(model::count_difference(7, 7), 0);
   for (std::int32_t step : {1, -1, 32767, -32768, 12345})
     for (std::uint32_t from : {0U, 1U, 40000U, 65535U})
-      EXPECT_EQ(model::count_difference(static_cast<std::uint16_t>(from + static_cast<std::uint32_t>(step)), static_cast<std::uint16_t>(from)), step);
+      EXPECT_EQ(model::count_difference(static_cast<std::uint16_t>(from + static_cast<std::uint32_t>(step)),
+                                        static_cast<std::uint16_t>(from)),
+                step);
 }
 
 TEST(Unicycle, NoiseGrowsWithTimeAndMotion) {
-  const model::UnicycleNoise noise{.speed = 0.1F, .speed_per_speed = 0.2F, .yaw_rate = 0.3F, .yaw_rate_per_yaw_rate = 0.4F, .yaw_rate_per_speed = 0.5F};
+  const model::UnicycleNoise noise{.speed = 0.1F,
+                                   .speed_per_speed = 0.2F,
+                                   .yaw_rate = 0.3F,
+                                   .yaw_rate_per_yaw_rate = 0.4F,
+                                   .yaw_rate_per_speed = 0.5F};
   const auto i = model::Unicycle{.forward_mps = -2, .yaw_rate_radps = -3, .noise = noise}.increment(0.5F);
   EXPECT_FLOAT_EQ(i.ds_m, -1.0F);
   EXPECT_FLOAT_EQ(i.dyaw_rad, -1.5F);

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "filter/symmetric.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <gtest/gtest.h>
+#include <Eigen/Eigenvalues>
 #include <limits>
 #include <random>
 
@@ -14,7 +14,8 @@ filter::Symmetric<float, N> random_covariance(std::mt19937& random, float scale 
   std::normal_distribution<float> normal;
   filter::Matrix<float, N, N> a;
   for (int i = 0; i < N * N; ++i) a(i / N, i % N) = normal(random) * scale;
-  return filter::Symmetric<float, N>::upper_of(a.lazyProduct(a.transpose()) + filter::Matrix<float, N, N>::Identity() * 0.01F);
+  return filter::Symmetric<float, N>::upper_of(a.lazyProduct(a.transpose()) +
+                                               filter::Matrix<float, N, N>::Identity() * 0.01F);
 }
 
 TEST(Symmetric, OneNumberIsReadAndWrittenFromBothSides) {
@@ -38,7 +39,8 @@ TEST(Symmetric, PropagateIsFPFtPlusQ) {
   for (int i = 0; i < 100; ++i) {
     const auto p = random_covariance<4>(random), q = random_covariance<4>(random, 0.1F);
     filter::Matrix<float, 4, 4> f = random_covariance<4>(random).dense();
-    const Eigen::Matrix4d expected = f.cast<double>() * p.dense().cast<double>() * f.cast<double>().transpose() + q.dense().cast<double>();
+    const Eigen::Matrix4d expected =
+        f.cast<double>() * p.dense().cast<double>() * f.cast<double>().transpose() + q.dense().cast<double>();
     const Eigen::Matrix4d got = filter::propagate(p, f, q).dense().cast<double>();
     EXPECT_LT((got - expected).norm(), 1e-6 * expected.norm());
   }

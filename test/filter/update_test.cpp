@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "filter/update.hpp"
 
-#include <Eigen/Dense>
 #include <gtest/gtest.h>
+#include <Eigen/Dense>
 #include <limits>
 #include <random>
 
@@ -113,8 +113,9 @@ TEST(Update, NotFiniteOrSingularIsRefusedAndChangesNothing) {
     }
   }
   Covariance nothing;
-  const auto singular = filter::update<float, 5, 3>(nothing, filter::Matrix<float, 3, 3>::Identity(), kTouches, filter::Vector<float, 3>::Zero(),
-                                                    filter::Vector<float, 3>::Zero(), 9.0F);
+  const auto singular =
+      filter::update<float, 5, 3>(nothing, filter::Matrix<float, 3, 3>::Identity(), kTouches,
+                                  filter::Vector<float, 3>::Zero(), filter::Vector<float, 3>::Zero(), 9.0F);
   EXPECT_EQ(singular.innovation.verdict, filter::Verdict::kSingular);
 }
 

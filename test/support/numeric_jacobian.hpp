@@ -18,8 +18,8 @@ auto numeric_motion_jacobian(const Model& model, const State& x, float h) {
   return f;
 }
 
-/// d z_hat / d error state of a measurement model, all states (columns outside kTouches must come out zero). Differences go through
-/// residual(), which wraps angles: residual(z-) - residual(z+) would not, so z is moved instead.
+/// d z_hat / d error state of a measurement model, all states (columns outside kTouches must come out zero).
+/// Differences go through residual(), which wraps angles: residual(z-) - residual(z+) would not, so z is moved instead.
 template <class State, class Model>
 auto numeric_measurement_jacobian(const Model& model, const State& x, float h) {
   filter::Matrix<float, Model::kDimension, State::kErrors> jacobian;
@@ -27,7 +27,8 @@ auto numeric_measurement_jacobian(const Model& model, const State& x, float h) {
     filter::Vector<float, State::kErrors> dx = filter::Vector<float, State::kErrors>::Zero();
     dx(c) = h;
     // residual(z_hat) = z - z_hat, so the difference of residuals has the sign turned.
-    jacobian.col(c) = (model.residual(model.predict(x.plus(-dx))) - model.residual(model.predict(x.plus(dx)))) / (2.0F * h);
+    jacobian.col(c) =
+        (model.residual(model.predict(x.plus(-dx))) - model.residual(model.predict(x.plus(dx)))) / (2.0F * h);
   }
   return jacobian;
 }

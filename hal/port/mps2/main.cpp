@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The firmware on an emulated Cortex-M, fed from a candump log through semihosting: arguments IN.log OUT.log (either may be missing).
-// For on-target proofs: same bytes as the host, stack high-water mark, instructions per tick.
+// The firmware on an emulated Cortex-M, fed from a candump log through semihosting: arguments IN.log OUT.log (either
+// may be missing). For on-target proofs: same bytes as the host, stack high-water mark, instructions per tick.
 #include "app/firmware.hpp"
 #include "hal/port/mps2/board.hpp"
 #include "hal/port/support/boot_line.hpp"
@@ -16,7 +16,8 @@ int main() {
     board.print("tetap: cannot open the files\n");
     return 1;
   }
-  static tetap::app::Firmware<Board, tetap::robot::chosen::Estimators> firmware{board, tetap::robot::chosen::numbers, tetap::kVersion};
+  static tetap::app::Firmware<Board, tetap::robot::chosen::Estimators> firmware{board, tetap::robot::chosen::numbers,
+                                                                                tetap::kVersion};
   tetap::hal::print_boot_line(board, tetap::robot::kName, firmware);
   while (!board.can.at_end()) firmware.poll();
   tetap::hal::print_stack_line(board);

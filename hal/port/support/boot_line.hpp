@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The lines an image prints about itself: at boot the robot and the hashes of the self-check (the same on every target; anybody with
-// a board can compare them with `make bits`), later the stack's high-water mark.
+// The lines an image prints about itself: at boot the robot and the hashes of the self-check (the same on every target;
+// anybody with a board can compare them with `make bits`), later the stack's high-water mark.
 #pragma once
 
 #include "hal/port/support/text.hpp"
@@ -14,7 +14,8 @@ inline constexpr std::uint32_t kBootEpochs = 500;
 
 template <class Board, class Firmware>
 void print_boot_line(const Board& board, const char* robot, Firmware& firmware) {
-  board.print(Text<>{}.add("tetap: robot ").add(robot).add(", bits ").hex(firmware.self_check(kBootEpochs)).add('\n').c_str());
+  board.print(
+      Text<>{}.add("tetap: robot ").add(robot).add(", bits ").hex(firmware.self_check(kBootEpochs)).add('\n').c_str());
 }
 
 template <class Board>

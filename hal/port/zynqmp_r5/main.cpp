@@ -9,7 +9,8 @@
 int main() {
   using Board = tetap::hal::zynqmp_r5::Board;
   static Board board;
-  static tetap::app::Firmware<Board, tetap::robot::chosen::Estimators> firmware{board, tetap::robot::chosen::numbers, tetap::kVersion};
+  static tetap::app::Firmware<Board, tetap::robot::chosen::Estimators> firmware{board, tetap::robot::chosen::numbers,
+                                                                                tetap::kVersion};
   tetap::hal::print_boot_line(board, tetap::robot::kName, firmware);
   tetap::hal::print_stack_line(board);
   for (std::uint32_t polls = 0;; ++polls) {

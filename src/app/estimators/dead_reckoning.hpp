@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Pose from wheels, and from a gyroscope where the robot has one: the motion half that every planar estimator shares.
-// The state only changes when a sample is fused; advance() moves the time for which estimate() extrapolates, so a tick never
-// splits an integration and the pose after n counts is the textbook's to the bit.
+// The state only changes when a sample is fused; advance() moves the time for which estimate() extrapolates, so a tick
+// never splits an integration and the pose after n counts is the textbook's to the bit.
 #pragma once
 
 #include "app/estimate.hpp"
@@ -99,7 +99,7 @@ class DeadReckoning {
   WheelCounts counts_;
   bool have_counts_ = false;
   bool moving_ = true;
-  float applied_left_m_ = 0;   ///< travel extrapolated since the last counts, taken off when the next ones come
+  float applied_left_m_ = 0;  ///< travel extrapolated since the last counts, taken off when the next ones come
   float applied_right_m_ = 0;
   base::Micros gyro_time_;     ///< stamp of the last IMU sample
   float applied_yaw_rad_ = 0;  ///< turn extrapolated since then
@@ -110,10 +110,12 @@ class DeadReckoning {
 inline model::PlanarIncrement DeadReckoning::held_increment(float dt_s, const Numbers& n) const {
   model::PlanarIncrement increment;
   switch (held_.kind) {
-    case Held::Kind::kNone: break;
+    case Held::Kind::kNone:
+      break;
     case Held::Kind::kBody:
-      increment = model::Unicycle{.forward_mps = held_.first_mps, .yaw_rate_radps = held_.second, .noise = n.wheels.noise}
-                      .increment(dt_s);
+      increment =
+          model::Unicycle{.forward_mps = held_.first_mps, .yaw_rate_radps = held_.second, .noise = n.wheels.noise}
+              .increment(dt_s);
       break;
     case Held::Kind::kWheels: {
       increment = n.wheels.drive.increment(held_.first_mps * dt_s, held_.second * dt_s);
@@ -173,7 +175,8 @@ inline void DeadReckoning::fuse_speed(const Held& held, base::Micros stamp, cons
   held_ = held;
   const base::Micros before = last_input_;
   last_input_ = stamp;
-  if (n.wheels.hold == Hold::kBackward && !first && stamp - before <= base::Micros{n.wheels.timeout_us}) propagate(stamp, n);
+  if (n.wheels.hold == Hold::kBackward && !first && stamp - before <= base::Micros{n.wheels.timeout_us})
+    propagate(stamp, n);
   if (stamp > time_) time_ = stamp;
 }
 
@@ -184,7 +187,8 @@ inline void DeadReckoning::fuse(const ImuSample& sample, base::Micros stamp, con
                            n.gyro.up_s[2] * sample.dangle_b_rad[2]) /
                           interval_s;
   const float forward = forward_mps();
-  const bool still = held_.kind != Held::Kind::kNone && forward < n.gyro.standstill_mps && -forward < n.gyro.standstill_mps;
+  const bool still =
+      held_.kind != Held::Kind::kNone && forward < n.gyro.standstill_mps && -forward < n.gyro.standstill_mps;
   if (!still) {
     moving_ = true;
   } else if (moving_) {
@@ -194,7 +198,8 @@ inline void DeadReckoning::fuse(const ImuSample& sample, base::Micros stamp, con
     gyro_bias_radps_ += (raw_radps - gyro_bias_radps_) * (interval_s / n.gyro.bias_time_s);
   }
   gyro_rate_radps_ = raw_radps - gyro_bias_radps_;
-  // What was extrapolated since the sample before is taken off; a gap between the samples is filled with this one's rate.
+  // What was extrapolated since the sample before is taken off; a gap between the samples is filled with this one's
+  // rate.
   propagate(stamp, n);
   const base::Micros span = stamp - gyro_time_;
   const bool follows = gyro_time_.us != 0 && span.us > 0 && span <= base::Micros{n.wheels.timeout_us};

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Heading from motion: while the heading is unknown, dead reckoning runs in a frame of its own; once GNSS has seen the robot travel far
-// enough, the direction of that travel in both frames gives the turn between them.
+// Heading from motion: while the heading is unknown, dead reckoning runs in a frame of its own; once GNSS has seen the
+// robot travel far enough, the direction of that travel in both frames gives the turn between them.
 #pragma once
 
 #include "app/context.hpp"
@@ -13,9 +13,10 @@ namespace tetap::app {
 
 class GnssAlignment {
  public:
-  /// A fix and the dead-reckoned pose at its time. A pose once |travel by GNSS| >= distance_m and dead reckoning agrees on the length
-  /// within a quarter plus three sigma; else the walk is begun again when it has become too long.
-  [[nodiscard]] std::optional<SetPose> add(const model::GnssPosition& fix, const model::PlanarPose& reckoned, float distance_m) {
+  /// A fix and the dead-reckoned pose at its time. A pose once |travel by GNSS| >= distance_m and dead reckoning agrees
+  /// on the length within a quarter plus three sigma; else the walk is begun again when it has become too long.
+  [[nodiscard]] std::optional<SetPose> add(const model::GnssPosition& fix, const model::PlanarPose& reckoned,
+                                           float distance_m) {
     if (!begun_) return begin(fix, reckoned), std::nullopt;
     const float east_m = fix.x.minus(first_x_);
     const float north_m = fix.y.minus(first_y_);

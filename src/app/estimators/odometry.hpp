@@ -16,7 +16,9 @@ class Odometry {
     const StartNumbers& s = with.numbers.start;
     const bool known = s.known != 0;
     motion_.start(t,
-                  known ? model::PlanarPose{.x = base::Anchored{}.plus(s.x_m), .y = base::Anchored{}.plus(s.y_m), .yaw_rad = s.yaw_rad}
+                  known ? model::PlanarPose{.x = base::Anchored{}.plus(s.x_m),
+                                            .y = base::Anchored{}.plus(s.y_m),
+                                            .yaw_rad = s.yaw_rad}
                         : model::PlanarPose{},
                   kStartSigma, kStartSigma);
   }
@@ -28,7 +30,9 @@ class Odometry {
   void advance(base::Micros t, const Context&) { motion_.advance(t); }
 
   template <class Input>
-    requires requires(DeadReckoning& motion, const Input& input, const Numbers& n) { motion.fuse(input, base::Micros{}, n); }
+  requires requires(DeadReckoning& motion, const Input& input, const Numbers& n) {
+    motion.fuse(input, base::Micros{}, n);
+  }
   Innovation fuse(const Input& input, base::Micros stamp, const Context& with) {
     motion_.fuse(input, stamp, with.numbers);
     return {.verdict = can::Verdict::kAccepted};
@@ -37,10 +41,13 @@ class Odometry {
   [[nodiscard]] Estimate estimate(const Context& with) const { return motion_.estimate(with.numbers); }
   [[nodiscard]] can::Mode mode(const Context&) const { return can::Mode::kDeadReckoning; }
   template <class Sink>
-  void each_bit(Sink&& sink) const { motion_.each_bit(sink); }
+  void each_bit(Sink&& sink) const {
+    motion_.each_bit(sink);
+  }
 
  private:
-  static constexpr float kStartSigma = 1e-3F;  // a millimetre and a milliradian: of the definition of the origin, not of the world
+  static constexpr float kStartSigma =
+      1e-3F;  // a millimetre and a milliradian: of the definition of the origin, not of the world
   DeadReckoning motion_;
 };
 

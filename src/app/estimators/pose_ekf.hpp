@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The planar pose by extended Kalman filter: dead reckoning corrected by known landmarks and GNSS, with a gate and a rule for
-// getting back in when everything is refused.
+// The planar pose by extended Kalman filter: dead reckoning corrected by known landmarks and GNSS, with a gate and a
+// rule for getting back in when everything is refused.
 #pragma once
 
 #include "app/context.hpp"
@@ -22,9 +22,10 @@ class PoseEkf {
   void restart(base::Micros t, const Context& with) {
     *this = {};
     const StartNumbers& s = with.numbers.start;
-    const SetPose start{.pose = {.x = base::Anchored{}.plus(s.x_m), .y = base::Anchored{}.plus(s.y_m), .yaw_rad = s.yaw_rad},
-                        .sigma_position_m = s.sigma_position_m,
-                        .sigma_yaw_rad = s.sigma_yaw_rad};
+    const SetPose start{
+        .pose = {.x = base::Anchored{}.plus(s.x_m), .y = base::Anchored{}.plus(s.y_m), .yaw_rad = s.yaw_rad},
+        .sigma_position_m = s.sigma_position_m,
+        .sigma_yaw_rad = s.sigma_yaw_rad};
     if (s.known != 0) {
       set_pose(t, start, with);
     } else {
@@ -43,7 +44,9 @@ class PoseEkf {
   void advance(base::Micros t, const Context&) { motion_.advance(t), now_ = t; }
 
   template <class Input>
-    requires requires(DeadReckoning& motion, const Input& input, const Numbers& n) { motion.fuse(input, base::Micros{}, n); }
+  requires requires(DeadReckoning& motion, const Input& input, const Numbers& n) {
+    motion.fuse(input, base::Micros{}, n);
+  }
   Innovation fuse(const Input& input, base::Micros stamp, const Context& with) {
     motion_.fuse(input, stamp, with.numbers);
     return {.verdict = can::Verdict::kAccepted};
@@ -101,8 +104,8 @@ class PoseEkf {
 };
 
 template <class Model>
-Innovation PoseEkf::measure(const Model& model, Source source, float gate_scale, base::Micros stamp, const Context& with,
-                            std::uint8_t landmark) {
+Innovation PoseEkf::measure(const Model& model, Source source, float gate_scale, base::Micros stamp,
+                            const Context& with, std::uint8_t landmark) {
   const auto result = motion_.filter.update(model, gate_scale * filter::chi_square_99(Model::kDimension));
   Refused& refused = refused_[source];
   if (result.verdict == filter::Verdict::kAccepted) {
