@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+// libFuzzer: the candump reader and what is made of a log. Any text is a log, or one clear message; what was read,
+// written and read again is the same.
+#include "sim_host/play/candump.hpp"
+#include "sim_host/play/log.hpp"
+#include "sim_host/play/recording.hpp"
+
+#include <cstdio>
+#include <cstdlib>
+#include <stdexcept>
+#include <string_view>
+
+namespace tetap {
+namespace {
+
+[[noreturn]] void fail(const char* what, std::string_view detail) {
+  std::fprintf(stderr, "fuzz_log: %s: %.*s\n", what, static_cast<int>(detail.size()), detail.data());
+  std::abort();
+}
+
+void check_message(std::string_view message) {
+  if (!message.starts_with("fuzz.log:")) fail("a message without file and line", message);
+  for (const char c : message)
+    if (c < ' ' || c > '~') fail("a message with control characters", message);
+}
+
+void check_round_trip(const sim::TimedFrame& entry) {
+  sim::Line line;
+  sim::append_log_line(line, entry.time, "vcan0", entry.frame);
+  const sim::Log again = sim::parse_log(line.view(), "again");
+  if (again.frames.size() != 1) fail("written, but not read", line.view());
+  const base::CanFrame& frame = again.frames[0].frame;
+  if (again.frames[0].time != entry.time || frame.id != entry.frame.id || frame.extended != entry.frame.extended ||
+      frame.size != entry.frame.size || frame.data != entry.frame.data)
+    fail("read as something else than was written", line.view());
+}
+
+}  // namespace
+}  // namespace tetap
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace tetap;
+  const std::string_view text(reinterpret_cast<const char*>(data), size);
+  const sim::Log log = sim::parse_log(text, "fuzz.log", {.keep_going = true});  // never throws
+  if ((log.malformed > 0) != !log.first_malformed.empty())
+    fail("malformed lines without a message", log.first_malformed);
+  if (log.malformed > 0) check_message(log.first_malformed);
+  try {
+    const sim::Log strict = sim::parse_log(text, "fuzz.log");
+    if (log.malformed > 0) fail("a malformed line was accepted", log.first_malformed);
+    if (strict.frames.size() != log.frames.size()) fail("two readings differ", "");
+  } catch (const std::runtime_error& error) {
+    if (error.what() != log.first_malformed) fail("another message than when going on", error.what());
+  }
+  for (const sim::TimedFrame& entry : log.frames) check_round_trip(entry);
+
+  // A pause of a minute is played in full: a long period keeps the number of its ticks small.
+  const sim::ScriptOptions options{.period = base::Micros{1'000'000}};
+  const sim::Script script = sim::script_of(log.frames, options);
+  if (script.inputs() != sim::inputs_of(log.frames, options).size())
+    fail("inputs were lost on the way to the script", "");
+  if (!sim::is_recording(log.frames, options.log_base)) return 0;
+  try {
+    static_cast<void>(sim::recording_of(log, options));
+  } catch (const std::runtime_error& error) {
+    if (!std::string_view(error.what()).starts_with("fuzz.log: ")) fail("a message without the file", error.what());
+  }
+  return 0;
+}
