@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The elementary functions in double, to 2 ulp: for geodesy, and for tests that judge. Same rule: + - * / sqrt and integers in one fixed
-// order. Methods: Cody & Waite reduction (1980, ch. 8), Taylor and minimax series; log by 2 atanh(f/(2+f)) (Tang, ACM TOMS 16(4), 1990).
+// The elementary functions in double, to 2 ulp: for geodesy, and for tests that judge. Same rule: + - * / sqrt and
+// integers in one fixed order. Methods: Cody & Waite reduction (1980, ch. 8), Taylor and minimax series; log by 2
+// atanh(f/(2+f)) (Tang, ACM TOMS 16(4), 1990).
 #pragma once
 
 #include <bit>
@@ -23,14 +24,17 @@ inline constexpr double kInfinityDouble = std::numeric_limits<double>::infinity(
 [[nodiscard]] constexpr double double_from(std::uint64_t u) { return std::bit_cast<double>(u); }
 inline constexpr std::uint64_t kSignDouble = std::uint64_t{1} << 63;
 inline constexpr std::uint64_t kInfinityBitsDouble = std::uint64_t{0x7ff} << 52;
-[[nodiscard]] constexpr bool is_finite_double(double x) { return (double_bits(x) & ~kSignDouble) < kInfinityBitsDouble; }
+[[nodiscard]] constexpr bool is_finite_double(double x) {
+  return (double_bits(x) & ~kSignDouble) < kInfinityBitsDouble;
+}
 [[nodiscard]] constexpr bool is_nan_double(double x) { return (double_bits(x) & ~kSignDouble) > kInfinityBitsDouble; }
 
 /// sin on |hi + lo| <= pi/4.
 [[nodiscard]] constexpr double sin_series(double hi, double lo) {
   const double z = hi * hi;
   double p = 0;
-  for (const double n : {342.0, 272.0, 210.0, 156.0, 110.0, 72.0, 42.0, 20.0}) p = (1.0 - p * z) / n;  // 1/((2k)(2k+1)) nested
+  for (const double n : {342.0, 272.0, 210.0, 156.0, 110.0, 72.0, 42.0, 20.0})
+    p = (1.0 - p * z) / n;  // 1/((2k)(2k+1)) nested
   p = 1.0 - p * z;
   return hi + (lo * (1.0 - 0.5 * z) - hi * z * p / 6.0);
 }
@@ -48,7 +52,8 @@ inline constexpr std::uint64_t kInfinityBitsDouble = std::uint64_t{0x7ff} << 52;
 
 namespace detail {
 
-/// Correctly rounded, digit by digit in integers: for constant expressions, and for cores without a double-precision unit.
+/// Correctly rounded, digit by digit in integers: for constant expressions, and for cores without a double-precision
+/// unit.
 [[nodiscard]] constexpr double sqrt_by_integers(double x) {
   std::uint64_t u = double_bits(x);
   if ((u & ~kSignDouble) == 0 || u == kInfinityBitsDouble) return x;
@@ -78,7 +83,8 @@ namespace detail {
 [[nodiscard]] constexpr double sqrt(double x) {
 #if !defined(__ARM_FP) || (__ARM_FP & 8) != 0
   const std::uint64_t u = detail::double_bits(x);
-  if (u > detail::kInfinityBitsDouble && u != detail::kSignDouble) return detail::kNanDouble;  // the instruction keeps a NaN's payload
+  if (u > detail::kInfinityBitsDouble && u != detail::kSignDouble)
+    return detail::kNanDouble;  // the instruction keeps a NaN's payload
   if (!std::is_constant_evaluated()) return __builtin_sqrt(x);
 #endif
   return detail::sqrt_by_integers(x);
@@ -158,7 +164,8 @@ namespace detail {
   const auto with_sign = [sign](double angle) { return detail::double_from(detail::double_bits(angle) | sign); };
   if (ay <= 0.0) return with_sign(left ? kHalfTurn : 0.0);
   if (!detail::is_finite_double(ax) || !detail::is_finite_double(ay)) {
-    if (!detail::is_finite_double(ax) && !detail::is_finite_double(ay)) return with_sign(left ? 0.75 * kHalfTurn : 0.25 * kHalfTurn);
+    if (!detail::is_finite_double(ax) && !detail::is_finite_double(ay))
+      return with_sign(left ? 0.75 * kHalfTurn : 0.25 * kHalfTurn);
     return with_sign(!detail::is_finite_double(ay) ? 0.5 * kHalfTurn : left ? kHalfTurn : 0.0);
   }
   const bool steep = ay > ax;
@@ -175,9 +182,10 @@ namespace detail {
   // What the roundings of sum and difference took (exact, as |high| >= |low|): alone they would cost more than a place.
   const double lost = diagonal ? ((low - (top + high)) - q * (low - (bottom - high))) / (bottom + bottom * z) : 0.0;
   double p = 0;
-  for (const double c : {-0x1.a933ba46b543ep-7, 0x1.e51628ad085b9p-6, -0x1.4c2db6e3358f1p-5, 0x1.817a9cddcf63fp-5, -0x1.ae89003812f0bp-5, 0x1.e1d2a07610252p-5,
-                         -0x1.11108cb6d07bfp-4, 0x1.3b13aaf7cfbd5p-4, -0x1.745d171266892p-4, 0x1.c71c71c60c87bp-4, -0x1.2492492490a05p-3, 0x1.9999999999970p-3,
-                         -0x1.5555555555555p-2})
+  for (const double c :
+       {-0x1.a933ba46b543ep-7, 0x1.e51628ad085b9p-6, -0x1.4c2db6e3358f1p-5, 0x1.817a9cddcf63fp-5, -0x1.ae89003812f0bp-5,
+        0x1.e1d2a07610252p-5, -0x1.11108cb6d07bfp-4, 0x1.3b13aaf7cfbd5p-4, -0x1.745d171266892p-4, 0x1.c71c71c60c87bp-4,
+        -0x1.2492492490a05p-3, 0x1.9999999999970p-3, -0x1.5555555555555p-2})
     p = c + z * p;
   const double more = q * z * p + lost;
   if (!diagonal && !steep && !left) return with_sign(q + more);

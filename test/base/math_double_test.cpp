@@ -159,7 +159,8 @@ TEST(Atan2Double, IsWithinTwoUlpOnRandomAndStructuredPairs) {
     check(5, from_raw(raw(small) + b % 17 - 8), x);
     check(5, x, from_raw((raw(small) + b % 17 - 8) ^ (b & kSign)));
   }
-  // Just above tan(pi/8), where sum and difference of the operands lose most: two pairs that plain rounding gets wrong by more than 2 ulp.
+  // Just above tan(pi/8), where sum and difference of the operands lose most: two pairs that plain rounding gets wrong
+  // by more than 2 ulp.
   check(5, 0x1.6c0d997634ba7p-1, 0x1.b61523762544bp+0);
   check(5, 0x1.6a8ed2365c6adp-1, 0x1.b5906167337eap+0);
   for (std::size_t kind = 0; kind < worst.size(); ++kind)
