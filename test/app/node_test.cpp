@@ -157,6 +157,16 @@ TEST(Node, SetPoseMovesTheEstimateAndIsAnnounced) {
   EXPECT_EQ(last<can::EstStatus>(out)->reset_cause, can::ResetCause::kSetPose);
 }
 
+TEST(Node, APoseGivenWithAllSigmasZeroIsTakenAndKept) {
+  Bench bench;
+  bench.idle(5);
+  Frames out = bench.epoch(set_pose(1, 2'000, 3'000, 0.5F, 0.0F, 0.0F));
+  for (const auto& frame : bench.idle(20)) out.push_back(frame);
+  EXPECT_EQ(last<can::EstStatus>(out)->reset_cause, can::ResetCause::kSetPose);
+  EXPECT_EQ(last<can::EstStatus>(out)->reset_ctr, 1);
+  EXPECT_EQ(last<can::EstPos>(out, 1)->x_raw, 2'000);
+}
+
 TEST(Node, ACommandWithAWrongCrcOrARepeatedCounterIsRefused) {
   Bench bench;
   auto pose = set_pose(3, 1000, 0, 0.0F);

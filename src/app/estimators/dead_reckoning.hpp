@@ -19,9 +19,11 @@ class DeadReckoning {
   filter::Ekf<model::PlanarPose> filter;
 
   void start(base::Micros t, const model::PlanarPose& pose, float sigma_position_m, float sigma_yaw_rad) {
-    const float variance = sigma_position_m * sigma_position_m;
+    const float position_m = sigma_position_m > kFinest_m ? sigma_position_m : kFinest_m;
+    const float yaw_rad = sigma_yaw_rad > kFinest_rad ? sigma_yaw_rad : kFinest_rad;
+    const float variance = position_m * position_m;
     filter.x = pose;
-    filter.p = filter::Symmetric<float, 3>::diagonal({variance, variance, sigma_yaw_rad * sigma_yaw_rad});
+    filter.p = filter::Symmetric<float, 3>::diagonal({variance, variance, yaw_rad * yaw_rad});
     if (t > time_) time_ = t;
     untravelled();
   }
@@ -66,6 +68,9 @@ class DeadReckoning {
   }
 
  private:
+  /// A sigma of 0 on the bus means less than half a step of the signal; and the covariance has to stay positive.
+  static constexpr float kFinest_m = 0.5e-3F, kFinest_rad = 0.1e-3F;
+
   /// The last speeds heard of; what the robot is assumed to keep doing.
   struct Held {
     enum class Kind : std::uint8_t { kNone, kBody, kWheels };
