@@ -1,0 +1,133 @@
+#!/bin/bash
+# SPDX-License-Identifier: Apache-2.0
+# Bad input to every program and tool at the command line: a status that is not 0, and exactly one line on standard error that says
+# where and what. The bus that is missing or down is tried on a private vcan.
+set -u
+. "$(dirname "$0")/../../tools/run_lib.sh"
+cd "$root" || exit 2
+self=test/replay/bad_input_test.sh
+work=${BAD_INPUT_WORK:-}
+failed=0 count=0
+
+# refused NAME PATTERN COMMAND...: the one line has to match the pattern (extended regular expression).
+refused() {
+  local name=$1 pattern=$2 status lines
+  shift 2
+  "$@" >"$work/stdout" 2>"$work/stderr" </dev/null
+  status=$?
+  lines=$(grep -cv '^with-vcan: ' "$work/stderr")
+  count=$((count + 1))
+  if [ $status = 0 ] || [ $status -ge 124 ]; then
+    echo "WRONG  $name: status $status"
+  elif [ "$lines" != 1 ]; then
+    echo "WRONG  $name: $lines lines on standard error"
+  elif ! grep -qE -- "$pattern" "$work/stderr"; then
+    echo "WRONG  $name: the line does not say '$pattern'"
+  else
+    return 0
+  fi
+  sed 's/^/         /' "$work/stderr" | head -5
+  failed=$((failed + 1))
+}
+
+log_with() { printf '%s\n' "(1.000000) vcan0 308#0000000000000000" "(1.010000) vcan0 308#0000000000000000" "$@" >"$work/bad.log"; }
+
+on_the_bus() { # inside a private vcan0
+  local node
+  refused "a node on a bus that is not there" 'tetap-node: CAN interface nocan0 does not exist' "$programs/tetap-node" --can nocan0
+  refused "a player on a bus that is not there" 'tetap-play: CAN interface nocan0 does not exist' "$programs/tetap-play" "$work/good.log" --can nocan0
+  ip link set vcan0 down
+  refused "a node on a bus that is down" 'tetap-node: CAN interface vcan0 is down' "$programs/tetap-node"
+  refused "a player on a bus that is down" 'tetap-play: CAN interface vcan0 is down' "$programs/tetap-play" "$work/good.log" --out "$work/out"
+  refused "a world on a bus that is down" 'tetap-world: CAN interface vcan0 is down' "$programs/tetap-world" --can vcan0 --duration 1 --out "$work/out"
+  refused "a recorder on a bus that is down" 'tetap-record: CAN interface vcan0 is down' "$programs/tetap-record" --out "$work/out"
+  [ ! -e build/r5/hal/port/tetap-zynqmp_r5-rover.elf ] ||
+    refused "an image in QEMU on a bus that is down" 'qemu-r5: vcan0: .*down' tools/qemu-r5 build/r5/hal/port/tetap-zynqmp_r5-rover.elf --can vcan0
+  ip link set vcan0 up
+  # A node whose bus goes away and comes back keeps its service.
+  "$programs/tetap-node" 2>"$work/node" & node=$!
+  sleep 0.3
+  ip link set vcan0 down; sleep 0.3; ip link set vcan0 up; sleep 0.3
+  count=$((count + 1))
+  if ! "$programs/tetap-play" "$work/good.log" --out "$work/out" --quiet 2>"$work/stderr"; then
+    echo "WRONG  a node whose bus was down for a moment does not answer afterwards"; cat "$work/node" "$work/stderr"; failed=$((failed + 1))
+  fi
+  kill $node; wait $node
+}
+
+if [ "${1:-}" = --inside ]; then
+  on_the_bus
+  echo "$count $failed" >"$work/inside"
+  exit 0
+fi
+
+work=$(mktemp -d "${TMPDIR:-/tmp}/tetap-bad.XXXXXX") || exit 2
+trap 'rm -rf "$work"' EXIT
+export BAD_INPUT_WORK=$work
+play() { "$programs/tetap-play" "$work/bad.log" --memory --robot mrclam --out "$work/out" --quiet "$@"; }
+log_with; cp "$work/bad.log" "$work/good.log"
+
+# Logs
+log_with "(1.020000) vcan0 308#00000000000000"; "$programs/tetap-play" "$work/bad.log" --memory --robot mrclam --out "$work/out" --quiet || {
+  echo "WRONG  a frame that is too short is the node's to count"; failed=$((failed + 1)); }
+log_with "(1.020000) vcan0 308#0"; refused "half a byte" 'bad.log:3: an odd number of data digits' play
+log_with "(1.020000) vcan0 308#000000000000000000"; refused "nine bytes" 'bad.log:3: more than 8 data bytes' play
+log_with "" "(1.02) vcan0"; refused "a truncated line" 'bad.log:4: no space after the interface' play
+log_with "(abc) vcan0 308#00"; refused "no time" 'bad.log:3: the time is not' play
+log_with "(1.020000) vcan0 FFF#00"; refused "an id beyond 11 bits" 'bad.log:3: a 3-digit id' play
+log_with $'\x01\x02\xff'; refused "bytes that are no text" "bad.log:3: .*'\?\?\?'" play
+: >"$work/bad.log"; refused "an empty log" 'bad.log: no CAN data frame' play
+echo "(1.000000) vcan0 123#00" >"$work/bad.log"; refused "a log without the node's inputs" 'bad.log: no input frames' play
+log_with; refused "a log that is no record" 'bad.log: cannot be repeated' play --as-recorded
+refused "no such log" 'nowhere.log: cannot be read: No such file' "$programs/tetap-play" "$work/nowhere.log" --memory --robot mrclam
+refused "a folder for a log" 'cannot be read: Is a directory' "$programs/tetap-play" "$work" --memory --robot mrclam
+refused "an output folder that cannot be" "$work/good.log/x" "$programs/tetap-play" "$work/good.log" --memory --robot mrclam --out "$work/good.log/x" --quiet
+
+# Command lines
+robots='there are: husky labyrinth mrclam rover'
+refused "a robot that does not exist (player)" "no robot 'tank'; $robots" "$programs/tetap-play" "$work/good.log" --memory --robot tank
+refused "a robot that does not exist (node)" "no robot 'tank'; $robots" "$programs/tetap-node" --robot tank
+refused "a robot that does not exist (world)" "no robot 'tank'; $robots" "$programs/tetap-world" --memory --robot tank --out "$work/out"
+for program in play node world record; do
+  refused "an unknown option (tetap-$program)" "tetap-$program: .*--frobnicate" "$programs/tetap-$program" --frobnicate
+done
+refused "an option without its value" '--robot' "$programs/tetap-play" "$work/good.log" --memory --robot
+refused "a number that is none" '--period' play --period soon
+refused "jitter in lockstep" '--realtime' play --jitter-ms 5
+refused "an id base off its grid" '0x301' "$programs/tetap-node" --base 0x301
+refused "an unknown fault" "fault.*'?meteor" "$programs/tetap-world" --memory --fault meteor --out "$work/out"
+refused "a seed that is no number" '--seed' "$programs/tetap-world" --memory --seed x --out "$work/out"
+
+# Tools
+refused "replay without a log" 'replay: which log' env -u LOG tools/replay
+refused "replay of no such log" 'replay: nowhere.log: no such file' env LOG=nowhere.log tools/replay
+refused "replay against no such truth" 'replay: nowhere.csv: no such file' env LOG="$work/good.log" TRUTH=nowhere.csv tools/replay
+refused "replay on a bus of another kind" "replay: BUS=lin" env LOG="$work/good.log" BUS=lin tools/replay
+refused "replay of a board in memory" 'BUS=memory' env LOG="$work/good.log" BUS=memory BOARD=zynqmp_r5 tools/replay
+refused "replay for no such robot" "no robot 'tank'" env LOG="$work/good.log" BUS=memory ROBOT=tank OUT="$work/out" tools/replay
+refused "replay on no such board" "no board 'arduino'" env LOG="$work/good.log" BOARD=arduino OUT="$work/out" tools/replay
+refused "sim on no such board" "no board 'arduino'" env BOARD=arduino OUT="$work/out" tools/sim
+refused "sim with an unknown fault" 'meteor' env BUS=memory FAULT=meteor OUT="$work/out" tools/sim
+refused "firmware for no such board" "no board 'arduino'; there are: zynqmp_r5" env BOARD=arduino tools/firmware
+refused "firmware for no such robot" "no robot 'tank'; there are: .*mrclam" env BOARD=zynqmp_r5 ROBOT=tank tools/firmware
+refused "a report on nothing" 'nowhere' tools/report "$work/nowhere"
+"$programs/tetap-play" "$work/good.log" --memory --robot mrclam --out "$work/run" --quiet || failed=$((failed + 1))
+refused "a report against no such truth" 'nowhere.csv' tools/report "$work/run" --truth "$work/nowhere.csv" --no-pictures
+printf 'time_s,x_m\n1,2\n' >"$work/bad.csv"
+refused "a report against a truth without its columns" 'bad.csv' tools/report "$work/run" --truth "$work/bad.csv" --no-pictures
+refused "no such DBC" 'nowhere.dbc' tools/dbc "$work/nowhere.dbc" --load
+sed 's/^ SG_ SetYaw_StdPos : 29|/ SG_ SetYaw_StdPos : 20|/' config/tetap.dbc >"$work/overlap.dbc"
+refused "a DBC with overlapping signals" 'overlap.dbc:[0-9]+: .*SetYaw' tools/dbc "$work/overlap.dbc" --load
+refused "a recorded set that is not there (mrclam)" 'nowhere' tools/import_mrclam "$work/nowhere" 1 "$work/m"
+refused "a recorded set that is not there (husky)" 'nowhere' tools/import_husky "$work/nowhere" "$work/m"
+refused "a recorded set that is not there (labyrinth)" 'nowhere' tools/import_labyrinth "$work/nowhere" "$work/m"
+log_with "(1.0) vcan0 3"; refused "decode of a malformed line" ':3: ' bash -c 'tools/decode <"$0"' "$work/bad.log"
+refused "no such preset" "no preset 'nothing'; there are: .*host" tools/build nothing
+refused "no such image" 'nowhere.elf: no such file' tools/qemu-r5 "$work/nowhere.elf"
+refused "qemu on a bus that is not there" 'nocan0: no such interface' tools/qemu-r5 "$programs/tetap-node" --can nocan0
+refused "prove what?" 'usage: prove' tools/prove everything
+
+tools/with-vcan --private -q -t 120 $self --inside
+read -r bus_count bus_failed <"$work/inside" || { echo "WRONG  the part on the bus did not come to its end"; exit 1; }
+echo "$((count + bus_count)) kinds of bad input, $((failed + bus_failed)) not refused as they should be"
+[ $((failed + bus_failed)) = 0 ]
