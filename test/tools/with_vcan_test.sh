@@ -26,7 +26,7 @@ until_true() { # at most 10 s
   return 1
 }
 
-listening() { grep -q vcan0 /proc/net/can/rcvlist_all 2>/dev/null; }
+listening() { grep -qE '^ +vcan0 ' /proc/net/can/rcvlist_all 2>/dev/null; } # not "(vcan0: no entry)"
 
 # Sends a frame on vcan0 with one program and prints it as another one saw it.
 see_frame() { # FRAME
