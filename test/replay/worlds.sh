@@ -1,0 +1,33 @@
+#!/bin/bash
+# SPDX-License-Identifier: Apache-2.0
+# worlds.sh SEEDS SECONDS: the simulated world from many seeds, and once with every fault it knows, by the g++ and the clang++ program in
+# memory: the same bytes, no frame lost, and neither two seeds nor any fault give the bytes of another.
+set -u
+. "$(dirname "$0")/../../tools/run_lib.sh"
+cd "$root" || exit 2
+seeds=$1 seconds=$2
+out=out/worlds
+rm -rf "$out"; mkdir -p "$out"
+failed=0
+run() { # NAME OPTION...
+  local name=$1 compiler folder lost
+  shift
+  for compiler in host clang; do
+    folder="$out/$name.$compiler"
+    "build/$compiler/sim_host/tetap-world" --memory --quiet --out "$folder" "$@" >/dev/null || { echo "  $name ($compiler) failed"; failed=1; return; }
+    lost=$(grep -o '"frames_lost": [0-9]*' "$folder/run.json" | cut -d' ' -f2)
+    [ "$lost" = 0 ] || { echo "  $name ($compiler): $lost frames lost"; failed=1; }
+  done
+  cmp -s "$out/$name.host/estimates.log" "$out/$name.clang/estimates.log" || { echo "  $name: g++ and clang++ DIFFER"; failed=1; }
+  sha256sum <"$out/$name.host/estimates.log" >>"$out/hashes"
+  rm -rf "$out/$name.clang"
+}
+for seed in $(seq 1 "$seeds"); do run "seed$seed" --seed "$seed" --duration "$seconds"; done
+faults=$("$programs/tetap-world" --help | sed -n 's/^  \([a-z_]*\) *@[0-9].*/\1/p')
+[ "$(wc -w <<<"$faults")" -ge 15 ] || { echo "  tetap-world --help lists fewer than 15 faults"; failed=1; }
+for fault in $faults; do run "$fault" --seed 1 --duration "$seconds" --fault "$fault@10"; done
+runs=$(wc -l <"$out/hashes")
+distinct=$(sort -u "$out/hashes" | wc -l)
+echo "  $runs worlds of $seconds s: $seeds seeds, $(wc -w <<<"$faults") faults; $distinct different records"
+[ "$distinct" = "$runs" ] || { echo "  two of them are the same"; failed=1; }
+exit $failed
