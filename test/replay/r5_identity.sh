@@ -66,7 +66,7 @@ for host in "$out"/*.host; do
   first=$out/${name/again_/_}.host
   cmp -s "$host/estimates.log" "$first/estimates.log" || { verdict="$verdict, but DIFFERENT from the run before"; failed=1; }
   awk -v m="$moves" -v e="$epochs" -v s="$seconds" 'BEGIN { exit !(m > 0.3 && e >= 100 * s - 60) }' || { verdict="$verdict, but it does not move or is too short"; failed=1; }
-  printf '  %-18s %6d epochs, moves %6s m, state CRC %s: %s\n' "$name" "$epochs" "$moves" "$(grep -o '"state_crc_last": "[0-9A-F]*"' "$host/run.json" | cut -d'"' -f4)" "$verdict"
+  printf '  %-20s %6d epochs, moves %6s m, state CRC %s: %s\n' "$name" "$epochs" "$moves" "$(grep -o '"state_crc_last": "[0-9A-F]*"' "$host/run.json" | cut -d'"' -f4)" "$verdict"
 done
 # The running CRC of the inputs differs at once; what must differ is the state: the first 32 bits of Est_StateCrc.
 states() { sed -n 's/.* 321#\(.\{8\}\).*/\1/p' "$1"; }
