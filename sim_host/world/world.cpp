@@ -94,7 +94,7 @@ void World::emit(Value value, std::uint8_t sequence, base::Micros stamp_late, ba
                                   .arrival = at + stamp_late + latency,
                                   .sequence = sequence,
                                   .lost_parts = static_cast<std::uint8_t>(lost),
-                                  .value = std::move(value)},
+                                  .value = value},
                       made_++});
   std::push_heap(pending_.begin(), pending_.end(), [](const Pending& a, const Pending& b) {
     return later(a.measurement.arrival, a.order, b.measurement.arrival, b.order);
@@ -145,7 +145,7 @@ void World::advance_to(base::Micros t, std::vector<Measurement>& arrived) {
   };
   while (!pending_.empty() && pending_.front().measurement.arrival <= t) {
     std::pop_heap(pending_.begin(), pending_.end(), by_arrival);
-    arrived.push_back(std::move(pending_.back().measurement));
+    arrived.push_back(pending_.back().measurement);
     pending_.pop_back();
   }
 }
