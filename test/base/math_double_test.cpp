@@ -21,7 +21,9 @@ namespace {
 using test::mixed;
 using test::ulp_error;
 
-constexpr double kLimit_ulp = 2.0;
+// The promise is 2 ulp. Held here is the largest error in some 10^7 samples, rounded up, so that accuracy is not lost
+// unnoticed: sin and cos 1.063 (0.78 but beside multiples of pi/2), exp 0.87, log 0.83, atan2 1.47.
+constexpr double kSinLimit_ulp = 1.1, kExpLimit_ulp = 0.95, kLogLimit_ulp = 0.9, kAtan2Limit_ulp = 1.5;
 constexpr double kInf = std::numeric_limits<double>::infinity();
 constexpr double kLargest = std::numeric_limits<double>::max(), kSmallestNormal = std::numeric_limits<double>::min();
 constexpr double kSmallest = std::numeric_limits<double>::denorm_min();
@@ -67,8 +69,8 @@ TEST(SinCosDouble, AreWithinTwoUlpFromTheSmallestToTwoToThe20) {
     error((2.0 * test::fraction_of(mixed(~i)) - 1.0) * (i % 2 == 0 ? 4.0 : kReduced));
   }
   for (const double x : {kSmallest, kSmallestNormal, 0x1p-300, 0x1p-27, 0x1p-26, kReduced}) error(x), error(-x);
-  EXPECT_LE(error.sine.ulp, kLimit_ulp) << error.sine.where;
-  EXPECT_LE(error.cosine.ulp, kLimit_ulp) << error.cosine.where;
+  EXPECT_LE(error.sine.ulp, kSinLimit_ulp) << error.sine.where;
+  EXPECT_LE(error.cosine.ulp, kSinLimit_ulp) << error.cosine.where;
   RecordProperty("sin_ulp", std::to_string(error.sine.ulp));
   RecordProperty("cos_ulp", std::to_string(error.cosine.ulp));
 }
@@ -85,15 +87,15 @@ TEST(SinCosDouble, AreWithinTwoUlpAtTheDoublesNearestToEveryQuarterTurn) {
       error(x);
     }
   }
-  EXPECT_LE(error.sine.ulp, kLimit_ulp) << error.sine.where;
-  EXPECT_LE(error.cosine.ulp, kLimit_ulp) << error.cosine.where;
+  EXPECT_LE(error.sine.ulp, kSinLimit_ulp) << error.sine.where;
+  EXPECT_LE(error.cosine.ulp, kSinLimit_ulp) << error.cosine.where;
 }
 
 TEST(SinCosDouble, AreWithinTwoUlpWhereTheQuadrantChanges) {
   SinCosError error;
   for (int n = 1; n < 40'000; n += 2) for_neighbours(n * 0.78539816339744831, 3, error);
-  EXPECT_LE(error.sine.ulp, kLimit_ulp) << error.sine.where;
-  EXPECT_LE(error.cosine.ulp, kLimit_ulp) << error.cosine.where;
+  EXPECT_LE(error.sine.ulp, kSinLimit_ulp) << error.sine.where;
+  EXPECT_LE(error.cosine.ulp, kSinLimit_ulp) << error.cosine.where;
 }
 
 TEST(SinCosDouble, SineIsOddAndCosineEvenToTheBitAndEachAloneTheSame) {
@@ -120,7 +122,7 @@ TEST(ExpDouble, IsWithinTwoUlpIntoTheSubnormalsAndUpToTheLargest) {
   for (const double x : {709.782712893384, 708.3964185322641, 745.1332191019411, 745.2, 0.34657359027997264})
     for_neighbours(x, 2000, [&](double y) { check(y), check(-y); });
   for (const double x : {0.0, kSmallest, kLargest, kInf}) check(x), check(-x);
-  EXPECT_LE(worst.ulp, kLimit_ulp) << worst.where;
+  EXPECT_LE(worst.ulp, kExpLimit_ulp) << worst.where;
   RecordProperty("exp_ulp", std::to_string(worst.ulp));
 }
 
@@ -135,7 +137,7 @@ TEST(LogDouble, IsWithinTwoUlpSubnormalsIncluded) {
   for (const double x : {0.0, 1.0, 0.70710678118654752, 1.4142135623730951, kSmallestNormal})
     for_neighbours(x, 2000, check);
   for (const double x : {kLargest, kInf, -0.0, -1.0, -kSmallest, -kInf}) check(x);
-  EXPECT_LE(worst.ulp, kLimit_ulp) << worst.where;
+  EXPECT_LE(worst.ulp, kLogLimit_ulp) << worst.where;
   RecordProperty("log_ulp", std::to_string(worst.ulp));
 }
 
@@ -164,7 +166,7 @@ TEST(Atan2Double, IsWithinTwoUlpOnRandomAndStructuredPairs) {
   check(5, 0x1.6c0d997634ba7p-1, 0x1.b61523762544bp+0);
   check(5, 0x1.6a8ed2365c6adp-1, 0x1.b5906167337eap+0);
   for (std::size_t kind = 0; kind < worst.size(); ++kind)
-    EXPECT_LE(worst[kind].ulp, kLimit_ulp)
+    EXPECT_LE(worst[kind].ulp, kAtan2Limit_ulp)
         << "kind " << kind << ": " << worst[kind].where.first << " " << worst[kind].where.second;
 }
 
@@ -181,7 +183,7 @@ std::vector<double> corners() {
 TEST(Atan2Double, IsWithinTwoUlpOnEveryPairOfCorners) {
   for (const double y : corners())
     for (const double x : corners())
-      EXPECT_LE(ulp_error(atan2(y, x), std::atan2(wide(y), wide(x))), kLimit_ulp) << y << " " << x;
+      EXPECT_LE(ulp_error(atan2(y, x), std::atan2(wide(y), wide(x))), kAtan2Limit_ulp) << y << " " << x;
 }
 
 TEST(Atan2Double, IsTheNearestDoubleInEveryCaseThatIsoCAnnexFNames) {

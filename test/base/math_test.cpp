@@ -19,7 +19,11 @@ namespace {
 
 using test::ulp_error;
 
-constexpr double kSinLimit_ulp = 1.5, kExpLimit_ulp = 1.5, kAtan2Limit_ulp = 1.6;
+// The promise is 1.5 ulp, for atan2 1.6. Held here is what math_exhaustive found, rounded up, so that accuracy is not
+// lost unnoticed: sin 0.9163, cos 0.9118, exp 0.9886, log 0.8399, wrap_angle 0.7517 over every float, atan2 1.3663 on
+// 10^9 pairs.
+constexpr double kSinLimit_ulp = 0.92, kExpLimit_ulp = 0.99, kLogLimit_ulp = 0.84, kWrapLimit_ulp = 0.76,
+                 kAtan2Limit_ulp = 1.40;
 constexpr double kPiDouble = 0x1.921fb54442d18p+1;
 constexpr float kSmallest = 0x1p-149F, kSmallestNormal = 0x1p-126F, kLargest = 0x1.fffffep+127F;
 
@@ -159,7 +163,7 @@ TEST(Log, IsWithinOneAndAHalfUlpSubnormalsIncluded) {
   for_neighbours(kLargest, 1, check);
   for (int k = -126; k <= 127; ++k)
     for_neighbours(std::ldexp(0x1.6a09e6p-1F, k), 50, check);  // where the exponent is split off
-  EXPECT_LE(worst.ulp, kExpLimit_ulp) << worst.where;
+  EXPECT_LE(worst.ulp, kLogLimit_ulp) << worst.where;
   RecordProperty("log_ulp", std::to_string(worst.ulp));
 }
 
@@ -287,6 +291,12 @@ TEST(WrapAngle, IsInMinusPiToPiAndThereAlready) {
   });
   EXPECT_EQ(bits(wrap_angle(-kPi)), bits(kPi));
   EXPECT_EQ(bits(wrap_angle(kPi)), bits(kPi));
+  // The floats nearest to half a turn of all (3e-9 to 2e-8 rad beyond, then before): both kPi and -kPi would be the
+  // nearest float.
+  for (const float x : {0x1.f37c8ap+96F, 0x1.47d0fep+35F, 0x1.f9cbe2p+8F, 0x1.628d4cp+41F, 0x1.b08c4ap+112F}) {
+    EXPECT_EQ(bits(wrap_angle(x)), bits(kPi)) << x;
+    EXPECT_EQ(bits(wrap_angle(-x)), bits(kPi)) << -x;
+  }
 }
 
 TEST(WrapAngle, TakesWholeTurnsAwayAndNothingElse) {
@@ -303,7 +313,7 @@ TEST(WrapAngle, TakesWholeTurnsAwayAndNothingElse) {
   for_encodings(bits(kPi), kInfinityBits, kStride, check);
   for (int n = 1; n <= 5300; ++n) for_neighbours(static_cast<float>(n * (kPiDouble / 4.0)), 3, check);
   for_neighbours(4096.0F, 100, check);
-  EXPECT_LE(worst.ulp, 1.5) << worst.where;  // the nearest float or its neighbour
+  EXPECT_LE(worst.ulp, kWrapLimit_ulp) << worst.where;  // so the nearest float or its neighbour
 }
 
 TEST(WrapAngle, IsOddButForHalfATurn) {
