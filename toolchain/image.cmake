@@ -23,6 +23,11 @@ function(tetap_image)
   set(output ${CMAKE_CURRENT_BINARY_DIR}/${ARG_OUTPUT})
 
   add_executable(${ARG_NAME} ${ARG_SOURCES} ${port}/${folder}/startup.cpp ${port}/support/runtime.cpp)
+  if(TETAP_CORE STREQUAL "m4f")
+    target_sources(${ARG_NAME} PRIVATE ${port}/support/double_sum.cpp)
+    target_link_options(${ARG_NAME} PRIVATE
+      -Wl,--wrap=__aeabi_dadd -Wl,--wrap=__aeabi_dsub -Wl,--wrap=__aeabi_drsub)
+  endif()
   set_target_properties(${ARG_NAME} PROPERTIES OUTPUT_NAME ${ARG_OUTPUT} SUFFIX .elf LINK_DEPENDS ${script}
     RUNTIME_OUTPUT_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR})
   target_include_directories(${ARG_NAME} PRIVATE ${PROJECT_SOURCE_DIR}/src ${PROJECT_SOURCE_DIR})
