@@ -6,6 +6,7 @@
 #include "config/labyrinth.hpp"
 #include "config/mrclam.hpp"
 #include "config/rover.hpp"
+#include "sim_host/matched_rover.hpp"
 
 #include <string>
 #include <string_view>
@@ -13,12 +14,13 @@
 
 namespace tetap::sim {
 
-inline constexpr std::string_view kRobotNames = "husky labyrinth mrclam rover";
+inline constexpr std::string_view kRobotNames = "husky labyrinth mrclam rover rover_matched";
 
 /// Calls f(std::type_identity<Estimators>, numbers) for the robot of that name; false when there is none.
 template <class F>
 [[nodiscard]] bool with_robot(std::string_view name, F&& f) {
   if (name == "rover") return f(std::type_identity<robot::rover::Estimators>{}, robot::rover::numbers), true;
+  if (name == "rover_matched") return f(std::type_identity<robot::rover::Estimators>{}, matched_rover()), true;
   if (name == "mrclam") return f(std::type_identity<robot::mrclam::Estimators>{}, robot::mrclam::numbers), true;
   if (name == "husky") return f(std::type_identity<robot::husky::Estimators>{}, robot::husky::numbers), true;
   if (name == "labyrinth")

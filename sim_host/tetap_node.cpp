@@ -21,7 +21,7 @@ constexpr const char* kHelp =
     "usage: tetap-node [OPTION]...\n\nThe firmware as a Linux program on SocketCAN. Ends on INT or TERM with status "
     "0.\n\n"
     "  --can IFACE    the interface (default vcan0)\n"
-    "  --robot NAME   husky, labyrinth, mrclam or rover (default rover)\n"
+    "  --robot NAME   husky, labyrinth, mrclam, rover or rover_matched (default rover)\n"
     "  --base ID      first id of the node's block of 64 (default 0x300)\n";
 
 template <class Estimators>

@@ -186,8 +186,8 @@ def errors(rows, truth):
     return np.where(position, dx, np.nan), np.where(position, dy, np.nan), np.where(position & heading, dyaw, np.nan)
 
 
-def nees(rows, dx, dy, dyaw, dof):
-    """Normalised squared error of the rows with a published covariance and a known error; and how many covariances were of no use."""
+def nees_by_row(rows, dx, dy, dyaw, dof):
+    """Normalised squared error of each row; NaN without a published covariance or a known error. And how many covariances were of no use."""
     std = np.stack([rows["std_x_m"], rows["std_y_m"], rows["std_yaw_rad"]], axis=1)[:, :dof]
     error = np.stack([dx, dy, dyaw], axis=1)[:, :dof]
     correlation = np.empty((len(error), dof, dof))
@@ -196,12 +196,21 @@ def nees(rows, dx, dy, dyaw, dof):
     for (i, j), name in pairs.items():
         if j < dof:
             correlation[:, i, j] = correlation[:, j, i] = rows[name]
-    known = np.isfinite(std).all(axis=1) & np.isfinite(error).all(axis=1) & np.isfinite(correlation).all(axis=(1, 2))
-    std, error, correlation = std[known], error[known], correlation[known]
-    positive = (std > 0).all(axis=1) & (np.linalg.eigvalsh(correlation)[:, 0] > 1e-6) if len(std) else np.zeros(0, dtype=bool)
-    scaled = (error[positive] / std[positive])[:, :, None]
-    values = (scaled * np.linalg.solve(correlation[positive], scaled)).sum(axis=(1, 2))
+    known = np.flatnonzero(np.isfinite(std).all(axis=1) & np.isfinite(error).all(axis=1) & np.isfinite(correlation).all(axis=(1, 2)))
+    positive = (std[known] > 0).all(axis=1)
+    if len(known):
+        positive &= np.linalg.eigvalsh(correlation[known])[:, 0] > 1e-6
+    use = known[positive]
+    scaled = (error[use] / std[use])[:, :, None]
+    values = np.full(len(error), np.nan)
+    values[use] = (scaled * np.linalg.solve(correlation[use], scaled)).sum(axis=(1, 2))
     return values, int(np.count_nonzero(~positive))
+
+
+def nees(rows, dx, dy, dyaw, dof):
+    """The same of the rows that have one."""
+    values, unusable = nees_by_row(rows, dx, dy, dyaw, dof)
+    return values[np.isfinite(values)], unusable
 
 
 def rms(values):
