@@ -2,7 +2,7 @@
 // One estimator in the firmware: its current state, its state at the far end of the window, and its statistics.
 // A late sample is fused at its own time by starting again from `past` and repeating what came since: the result is the
 // one that would have been had the sample been on time. Costs: twice the estimator's memory; a burst only when
-// something is late.
+// something is late that this estimator takes.
 #pragma once
 
 #include "app/context.hpp"
@@ -12,6 +12,7 @@
 #include <array>
 #include <concepts>
 #include <cstdint>
+#include <type_traits>
 
 namespace tetap::app {
 
@@ -52,6 +53,12 @@ class Lane {
     past_ = now_;
   }
 
+  /// Whether this kind of sample means anything to the estimator.
+  [[nodiscard]] static bool takes(const Sample& sample) {
+    bool taken = false;
+    visit(sample, [&]<class Payload>(const Payload&) { taken = kTakes<Payload>; });
+    return taken;
+  }
   /// Fuses into the current state; the record is what the bus is told.
   Innovation fuse(const Sample& sample, const Context& with) { return fuse_into(now_, sample, with); }
   /// The sample leaves the window: the far end takes it.
@@ -94,10 +101,14 @@ class Lane {
   }
 
  private:
+  template <class Payload>
+  static constexpr bool kTakes = requires(E& e, const Payload& payload, base::Micros stamp, const Context& with) {
+    e.fuse(payload, stamp, with);
+  };
   static Innovation fuse_into(E& estimator, const Sample& sample, const Context& with) {
     Innovation innovation;
     visit(sample, [&](const auto& payload) {
-      if constexpr (requires { estimator.fuse(payload, sample.stamp, with); })
+      if constexpr (kTakes<std::remove_cvref_t<decltype(payload)>>)
         innovation = estimator.fuse(payload, sample.stamp, with);
     });
     return innovation;

@@ -12,6 +12,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <tuple>
+#include <type_traits>
 #include <utility>
 
 namespace tetap::app {
@@ -73,12 +74,16 @@ class Node {
   void apply_map();
   void apply_commands();
   void consume();
-  void fuse(std::size_t entry);
+  template <class Lane>
+  [[nodiscard]] bool came_late(std::size_t due) const;
+  void fuse(std::size_t entry, const std::array<bool, kCount>& again);
   void find_origin(const Sample& sample);
   void retire();
-  void check_health();
+  using Estimates = std::array<Estimate, kCount>;
+  [[nodiscard]] Estimates estimate() const;
+  [[nodiscard]] bool healthy(const Estimates& estimates);
   [[nodiscard]] std::uint32_t state_crc() const;
-  [[nodiscard]] Summary summary() const;
+  [[nodiscard]] Summary summary(const Estimate& estimate) const;
 
   const Numbers& numbers_;
   typename Estimators::Lanes lanes_;
@@ -185,16 +190,17 @@ void Node<Estimators, Capacity>::tick(base::Micros t, const LoopHealth& loop, Se
   consume();
   apply_commands();
   each_lane([&](auto& lane) { lane.advance(now_, context()); });
-  check_health();
+  Estimates estimates = estimate();
+  if (!healthy(estimates)) estimates = estimate();
 
   publisher_.begin(now_, tally_, send);
   std::size_t instance = 0;
   each_lane([&](const auto& lane) {
     using E = typename std::remove_cvref_t<decltype(lane)>::Type;
-    publisher_.estimate(instance, E::kKind, instance == kPrimary, lane.estimate(context()), send);
+    publisher_.estimate(instance, E::kKind, instance == kPrimary, estimates[instance], send);
     ++instance;
   });
-  publisher_.status(summary(), send);
+  publisher_.status(summary(estimates[kPrimary]), send);
   publisher_.statistics(lanes_, now_, send);
   publisher_.diagnostics(counters_, loop, timeline_.high_water(), send);
   publisher_.identity(site_, send);
@@ -269,35 +275,56 @@ void Node<Estimators, Capacity>::apply_commands() {
   }
 }
 
+/// Whether something new belongs before something that the lane has fused already.
 template <class Estimators, std::size_t Capacity>
-void Node<Estimators, Capacity>::consume() {
-  const std::size_t due = timeline_.until(now_);
-  std::size_t first_new = 0;
-  while (first_new < due && timeline_[first_new].consumed) ++first_new;
-  bool late = false;
-  for (std::size_t i = first_new; i < due; ++i) late = late || timeline_[i].consumed;
-  if (late) each_lane([](auto& lane) { lane.rewind(); });
-  for (std::size_t i = late ? 0 : first_new; i < due; ++i) fuse(i);
+template <class Lane>
+bool Node<Estimators, Capacity>::came_late(std::size_t due) const {
+  bool is_new = false;
+  for (std::size_t i = 0; i < due; ++i) {
+    if (!Lane::takes(timeline_[i].sample)) continue;
+    if (!timeline_[i].consumed) {
+      is_new = true;
+    } else if (is_new) {
+      return true;
+    }
+  }
+  return false;
 }
 
 template <class Estimators, std::size_t Capacity>
-void Node<Estimators, Capacity>::fuse(std::size_t i) {
+void Node<Estimators, Capacity>::consume() {
+  const std::size_t due = timeline_.until(now_);
+  std::array<bool, kCount> again{};
+  std::size_t instance = 0;
+  each_lane([&](auto& lane) {
+    bool& repeat = again[instance++];
+    repeat = came_late<std::remove_cvref_t<decltype(lane)>>(due);
+    if (repeat) lane.rewind();
+  });
+  for (std::size_t i = 0; i < due; ++i) fuse(i, again);
+}
+
+template <class Estimators, std::size_t Capacity>
+void Node<Estimators, Capacity>::fuse(std::size_t i, const std::array<bool, kCount>& again) {
   auto& entry = timeline_[i];
-  find_origin(entry.sample);
+  const bool is_new = !entry.consumed;
+  if (is_new) find_origin(entry.sample);
   std::size_t instance = 0;
   bool taken = false;
   each_lane([&](auto& lane) {
-    const Innovation innovation = lane.fuse(entry.sample, context());
-    if (!entry.reported) {
-      lane.account(entry.sample, innovation);
-      taken = taken || innovation.verdict != can::Verdict::kNotUsed;
-      if (innovation.dof > 0 || innovation.verdict > can::Verdict::kNotUsed)
-        publisher_.event(innovation, entry.sample, instance, now_, counters_);
+    if (is_new || again[instance]) {
+      const Innovation innovation = lane.fuse(entry.sample, context());
+      if (is_new) {
+        lane.account(entry.sample, innovation);
+        taken = taken || innovation.verdict != can::Verdict::kNotUsed;
+        if (innovation.dof > 0 || innovation.verdict > can::Verdict::kNotUsed)
+          publisher_.event(innovation, entry.sample, instance, now_, counters_);
+      }
     }
     ++instance;
   });
-  if (!entry.reported && !taken) ++counters_.not_used;
-  entry.consumed = entry.reported = true;
+  if (is_new && !taken) ++counters_.not_used;
+  entry.consumed = true;
 }
 
 template <class Estimators, std::size_t Capacity>
@@ -317,40 +344,41 @@ void Node<Estimators, Capacity>::retire() {
   if (edge > closed_until_) closed_until_ = edge;
 }
 
-/// A broken invariant (NaN, a covariance that is none) restarts the estimator from its defined start, and says so.
 template <class Estimators, std::size_t Capacity>
-void Node<Estimators, Capacity>::check_health() {
+auto Node<Estimators, Capacity>::estimate() const -> Estimates {
+  return std::apply([this](const auto&... lane) { return std::array{lane.estimate(context())...}; }, lanes_);
+}
+
+/// A broken invariant (NaN, a covariance that is none) restarts the estimators from their defined start, and says so.
+template <class Estimators, std::size_t Capacity>
+bool Node<Estimators, Capacity>::healthy(const Estimates& estimates) {
   bool finite = true;
   bool positive = true;
-  each_lane([&](const auto& lane) {
-    const Estimate e = lane.estimate(context());
+  for (const Estimate& e : estimates) {
     finite = finite && base::is_finite(e.pose.yaw_rad) && base::is_finite(e.pose.x.offset_m) &&
              base::is_finite(e.pose.y.offset_m);
     positive = positive && e.p.positive_definite();
-  });
-  if (finite && positive) return;
+  }
+  if (finite && positive) return true;
   close_window();
   restart(now_, finite ? can::ResetCause::kNotPositive : can::ResetCause::kNotFinite);
   each_lane([&](auto& lane) { lane.advance(now_, context()); });
+  return false;
 }
 
 template <class Estimators, std::size_t Capacity>
 std::uint32_t Node<Estimators, Capacity>::state_crc() const {
   base::BitCrc crc;
   std::apply([&](const auto&... lane) { (lane.each_bit(crc), ...); }, lanes_);
-  for (std::size_t i = 0; i < timeline_.size(); ++i) {
-    crc(timeline_[i].sample.stamp.us);
-    crc(timeline_[i].sample.bits);
-  }
+  crc(timeline_.digest());
   crc(static_cast<std::uint32_t>(site_.origin));
   site_.map.each_bit(crc);
   return crc.value();
 }
 
 template <class Estimators, std::size_t Capacity>
-Summary Node<Estimators, Capacity>::summary() const {
+Summary Node<Estimators, Capacity>::summary(const Estimate& estimate) const {
   const auto& primary = std::get<kPrimary>(lanes_);
-  const Estimate estimate = primary.estimate(context());
   Summary s{.mode = primary.mode(context()),
             .position_valid = estimate.position_valid,
             .heading_valid = estimate.heading_valid,

@@ -19,8 +19,7 @@ class Timeline {
  public:
   struct Entry {
     Sample sample;
-    bool consumed = false;  ///< the current estimate has it
-    bool reported = false;  ///< its record went out
+    bool consumed = false;  ///< the current estimate has it and its record went out
   };
 
   /// Keeps the order; a sample equal in stamp, kind, instance, sequence and detail is a duplicate.
@@ -49,6 +48,20 @@ class Timeline {
   }
   constexpr void clear() { size_ = 0; }
   constexpr void power_on() { size_ = 0, high_water_ = 0; }
+
+  /// Of the content, in order: a polynomial in an odd number modulo 2^32. A sample's payload is in its frames' CRC
+  /// already, so this has only to tell which samples there are.
+  [[nodiscard]] constexpr std::uint32_t digest() const {
+    constexpr std::uint32_t kOdd = 0x01000193;
+    std::uint32_t sum = static_cast<std::uint32_t>(size_);
+    for (std::size_t i = 0; i < size_; ++i) {
+      const auto stamp = static_cast<std::uint64_t>(entries_[i].sample.stamp.us);
+      sum = sum * kOdd + static_cast<std::uint32_t>(stamp);
+      sum = sum * kOdd + static_cast<std::uint32_t>(stamp >> 32);
+      sum = sum * kOdd + entries_[i].sample.bits;
+    }
+    return sum;
+  }
 
   [[nodiscard]] constexpr Entry& operator[](std::size_t i) { return entries_[i]; }
   [[nodiscard]] constexpr const Entry& operator[](std::size_t i) const { return entries_[i]; }

@@ -21,17 +21,28 @@ class Ekf {
   /// x = f(x), P = F P F^T + Q.
   template <MotionModel<State> Motion>
   void predict(const Motion& motion) {
-    const auto f = motion.jacobian(x);
-    p = propagate(p, f, motion.noise(x));
-    x = motion.predict(x);
+    if constexpr (requires { motion.step(x); }) {
+      const Step<State> step = motion.step(x);
+      p = propagate(p, step.f, step.q);
+      x = step.x;
+    } else {
+      p = propagate(p, motion.jacobian(x), motion.noise(x));
+      x = motion.predict(x);
+    }
   }
 
   /// Joint gate, then sequential scalar updates; a measurement that is rejected changes nothing.
   template <MeasurementModel<State> Measurement>
   [[nodiscard]] Innovation<Scalar, Measurement::kDimension> update(const Measurement& measurement, Scalar gate) {
+    constexpr int kColumns = static_cast<int>(Measurement::kTouches.size());
+    Linearised<Scalar, Measurement::kDimension, kColumns> at;
+    if constexpr (requires { measurement.linearised(x); }) {
+      at = measurement.linearised(x);
+    } else {
+      at = {.z_hat = measurement.predict(x), .h = measurement.jacobian(x)};
+    }
     const auto result = filter::update<Scalar, kErrors, Measurement::kDimension, Measurement::kTouches.size()>(
-        p, measurement.jacobian(x), Measurement::kTouches, measurement.residual(measurement.predict(x)),
-        measurement.noise(), gate);
+        p, at.h, Measurement::kTouches, measurement.residual(at.z_hat), measurement.noise(), gate);
     if (result.innovation.verdict == Verdict::kAccepted) x = x.plus(result.dx);
     return result.innovation;
   }

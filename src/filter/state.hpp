@@ -16,6 +16,20 @@ concept State = requires(const S& x, const Vector<typename S::Scalar, S::kErrors
   { x.minus(x) } -> std::same_as<Vector<typename S::Scalar, S::kErrors>>;
 };
 
+/// What a motion model gives when asked for everything at once (step()), and a measurement model (linearised()): for
+/// models whose parts share work, trigonometry mostly. The filter asks for the whole where a model has it.
+template <class S>
+struct Step {
+  S x;
+  Matrix<typename S::Scalar, S::kErrors, S::kErrors> f;
+  Symmetric<typename S::Scalar, S::kErrors> q;
+};
+template <class Scalar, int M, int K>
+struct Linearised {
+  Vector<Scalar, M> z_hat;
+  Matrix<Scalar, M, K> h;
+};
+
 /// x+ = predict(x), with F = d predict / d error state and the process noise Q added over the step.
 template <class M, class S>
 concept MotionModel = State<S> && requires(const M& model, const S& x) {

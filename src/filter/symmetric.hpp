@@ -24,13 +24,16 @@ class Symmetric {
   constexpr Symmetric() = default;
   static constexpr Symmetric diagonal(const std::array<Scalar, N>& variances) {
     Symmetric result;
+#pragma GCC unroll 16
     for (int i = 0; i < N; ++i) result(i, i) = variances[static_cast<std::size_t>(i)];
     return result;
   }
   /// The upper half of a square matrix; what is below the diagonal is not looked at.
   static Symmetric upper_of(const Matrix<Scalar, N, N>& full) {
     Symmetric result;
+#pragma GCC unroll 16
     for (int c = 0; c < N; ++c)
+#pragma GCC unroll 16
       for (int r = 0; r <= c; ++r) result(r, c) = full(r, c);
     return result;
   }
@@ -41,7 +44,9 @@ class Symmetric {
 
   [[nodiscard]] Matrix<Scalar, N, N> dense() const {
     Matrix<Scalar, N, N> full;
+#pragma GCC unroll 16
     for (int c = 0; c < N; ++c)
+#pragma GCC unroll 16
       for (int r = 0; r < N; ++r) full(r, c) = (*this)(r, c);
     return full;
   }
@@ -49,13 +54,17 @@ class Symmetric {
   /// True when an L L^T factor with pivots above zero exists (and so no entry is NaN).
   [[nodiscard]] bool positive_definite() const {
     Symmetric l = *this;
+#pragma GCC unroll 16
     for (int j = 0; j < N; ++j) {
+#pragma GCC unroll 16
       for (int i = 0; i < j; ++i) {
         Scalar sum = l(i, j);
+#pragma GCC unroll 16
         for (int k = 0; k < i; ++k) sum -= l(k, i) * l(k, j);
         l(i, j) = sum / l(i, i);
       }
       Scalar pivot = l(j, j);
+#pragma GCC unroll 16
       for (int k = 0; k < j; ++k) pivot -= l(k, j) * l(k, j);
       if (!(pivot > Scalar{0}) || !(pivot < Scalar{1e30F})) return false;
       l(j, j) = base::sqrt(pivot);
@@ -78,7 +87,9 @@ template <class Scalar, int N>
                                              const Symmetric<Scalar, N>& q) {
   const Matrix<Scalar, N, N> fp = f.lazyProduct(p.dense());
   Symmetric<Scalar, N> result = q;
+#pragma GCC unroll 16
   for (int c = 0; c < N; ++c)
+#pragma GCC unroll 16
     for (int r = 0; r <= c; ++r) result(r, c) += fp.row(r).dot(f.row(c));
   return result;
 }

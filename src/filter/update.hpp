@@ -48,28 +48,38 @@ template <class Scalar, int N, int M, std::size_t K>
   record.gate = gate;
 
   Matrix<Scalar, N, M> g;  // begins as P H^T, becomes G column by column
+#pragma GCC unroll 16
   for (int m = 0; m < M; ++m)
+#pragma GCC unroll 16
     for (int n = 0; n < N; ++n) {
       Scalar sum = 0;
+#pragma GCC unroll 16
       for (std::size_t k = 0; k < K; ++k) sum += p(n, touches[k]) * h(m, static_cast<int>(k));
       g(n, m) = sum;
     }
+#pragma GCC unroll 16
   for (int c = 0; c < M; ++c)
+#pragma GCC unroll 16
     for (int r = 0; r <= c; ++r) {
       Scalar sum = r == c ? noise(c) : Scalar{0};
+#pragma GCC unroll 16
       for (std::size_t k = 0; k < K; ++k) sum += h(r, static_cast<int>(k)) * g(touches[k], c);
       record.s(r, c) = sum;
     }
 
   Symmetric<Scalar, M> l;  // l(i, j), i <= j, is L_ji
   Vector<Scalar, M> y;
+#pragma GCC unroll 16
   for (int j = 0; j < M; ++j) {
+#pragma GCC unroll 16
     for (int i = 0; i < j; ++i) {
       Scalar sum = record.s(i, j);
+#pragma GCC unroll 16
       for (int k = 0; k < i; ++k) sum -= l(k, i) * l(k, j);
       l(i, j) = sum / l(i, i);
     }
     Scalar pivot = record.s(j, j);
+#pragma GCC unroll 16
     for (int k = 0; k < j; ++k) pivot -= l(k, j) * l(k, j);
     if (!(pivot > Scalar{0}) || !(pivot < Scalar{1e30F})) {
       record.verdict = pivot <= Scalar{0} ? Verdict::kSingular : Verdict::kNotFinite;
@@ -77,6 +87,7 @@ template <class Scalar, int N, int M, std::size_t K>
     }
     l(j, j) = base::sqrt(pivot);
     Scalar sum = nu(j);
+#pragma GCC unroll 16
     for (int k = 0; k < j; ++k) sum -= l(k, j) * y(k);
     y(j) = sum / l(j, j);
   }
@@ -88,20 +99,26 @@ template <class Scalar, int N, int M, std::size_t K>
   }
   record.verdict = Verdict::kAccepted;
 
+#pragma GCC unroll 16
   for (int j = 0; j < M; ++j) {
     const Scalar inverse = Scalar{1} / l(j, j);
+#pragma GCC unroll 16
     for (int n = 0; n < N; ++n) {
       Scalar sum = g(n, j);
+#pragma GCC unroll 16
       for (int k = 0; k < j; ++k) sum -= g(n, k) * l(k, j);
       g(n, j) = sum * inverse;
     }
   }
+#pragma GCC unroll 16
   for (int n = 0; n < N; ++n) result.dx(n) = g.row(n).dot(y.transpose());
+#pragma GCC unroll 16
   for (int c = 0; c < N; ++c) {
     // In float the difference can lose every digit when the measurement is 10^7 times better than the prediction; a
     // variance never falls below the rounding error of what it was, so P stays positive where the exact result would
     // be.
     const Scalar floor = p(c, c) * Scalar{2.4e-7F};
+#pragma GCC unroll 16
     for (int r = 0; r <= c; ++r) p(r, c) -= g.row(r).dot(g.row(c));
     if (!(p(c, c) > floor)) p(c, c) = floor;
   }

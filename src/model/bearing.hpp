@@ -17,17 +17,17 @@ struct Bearing {
   Landmark landmark;
   PlanarMounting mounting;
 
-  [[nodiscard]] filter::Vector<float, 1> predict(const PlanarPose& pose) const {
-    return filter::Vector<float, 1>(Sight(pose, landmark, mounting).bearing_rad(pose, mounting));
-  }
+  [[nodiscard]] filter::Vector<float, 1> predict(const PlanarPose& pose) const { return linearised(pose).z_hat; }
   [[nodiscard]] filter::Vector<float, 1> residual(const filter::Vector<float, 1>& z_hat) const {
     return filter::Vector<float, 1>(base::wrap_angle(bearing_rad - z_hat(0)));
   }
   [[nodiscard]] filter::Vector<float, 1> noise() const {
     return filter::Vector<float, 1>(sigma_bearing_rad * sigma_bearing_rad);
   }
-  [[nodiscard]] filter::Matrix<float, 1, 3> jacobian(const PlanarPose& pose) const {
-    return Sight(pose, landmark, mounting).bearing_row();
+  [[nodiscard]] filter::Matrix<float, 1, 3> jacobian(const PlanarPose& pose) const { return linearised(pose).h; }
+  [[nodiscard]] filter::Linearised<float, 1, 3> linearised(const PlanarPose& pose) const {
+    const Sight sight(pose, landmark, mounting);
+    return {.z_hat = filter::Vector<float, 1>(sight.bearing_rad(pose, mounting)), .h = sight.bearing_row()};
   }
 };
 

@@ -21,24 +21,18 @@ struct GnssPosition {
 
   /// The antenna's place minus the fix: positions are differenced as anchored numbers, so no digit is lost far from the
   /// origin.
-  [[nodiscard]] filter::Vector<float, 2> predict(const PlanarPose& pose) const {
-    const auto lever_n = lever(pose);
-    return {pose.x.minus(x) + lever_n(0), pose.y.minus(y) + lever_n(1)};
-  }
+  [[nodiscard]] filter::Vector<float, 2> predict(const PlanarPose& pose) const { return linearised(pose).z_hat; }
   [[nodiscard]] filter::Vector<float, 2> residual(const filter::Vector<float, 2>& z_hat) const { return -z_hat; }
   [[nodiscard]] filter::Vector<float, 2> noise() const { return {sigma_m * sigma_m, sigma_m * sigma_m}; }
-  [[nodiscard]] filter::Matrix<float, 2, 3> jacobian(const PlanarPose& pose) const {
-    const auto lever_n = lever(pose);
-    filter::Matrix<float, 2, 3> h;
-    h << 1.0F, 0.0F, -lever_n(1), 0.0F, 1.0F, lever_n(0);
-    return h;
-  }
-
- private:
-  [[nodiscard]] filter::Vector<float, 2> lever(const PlanarPose& pose) const {
+  [[nodiscard]] filter::Matrix<float, 2, 3> jacobian(const PlanarPose& pose) const { return linearised(pose).h; }
+  [[nodiscard]] filter::Linearised<float, 2, 3> linearised(const PlanarPose& pose) const {
     const base::SinCos heading = base::sincos(pose.yaw_rad);
-    return {heading.cos * antenna_x_b_m - heading.sin * antenna_y_b_m,
-            heading.sin * antenna_x_b_m + heading.cos * antenna_y_b_m};
+    const float lever_x_n_m = heading.cos * antenna_x_b_m - heading.sin * antenna_y_b_m;
+    const float lever_y_n_m = heading.sin * antenna_x_b_m + heading.cos * antenna_y_b_m;
+    filter::Linearised<float, 2, 3> at;
+    at.z_hat = {pose.x.minus(x) + lever_x_n_m, pose.y.minus(y) + lever_y_n_m};
+    at.h << 1.0F, 0.0F, -lever_y_n_m, 0.0F, 1.0F, lever_x_n_m;
+    return at;
   }
 };
 

@@ -22,41 +22,16 @@ struct PlanarIncrement {
   Arc arc = Arc::kExact;
 
   /// The pose after the increment.
-  [[nodiscard]] PlanarPose predict(const PlanarPose& from) const {
-    const Terms t = terms(from.yaw_rad);
-    return {.x = from.x.plus(ds_m * t.chord * t.direction.cos),
-            .y = from.y.plus(ds_m * t.chord * t.direction.sin),
-            .yaw_rad = base::wrap_angle(from.yaw_rad + dyaw_rad)};
-  }
-
+  [[nodiscard]] PlanarPose predict(const PlanarPose& from) const { return predict(from, terms(from.yaw_rad)); }
   /// F: the error in yaw swings the chord.
   [[nodiscard]] filter::Matrix<float, 3, 3> jacobian(const PlanarPose& from) const {
-    const Terms t = terms(from.yaw_rad);
-    filter::Matrix<float, 3, 3> f = filter::Matrix<float, 3, 3>::Identity();
-    f(0, 2) = -ds_m * t.chord * t.direction.sin;
-    f(1, 2) = ds_m * t.chord * t.direction.cos;
-    return f;
+    return jacobian(terms(from.yaw_rad));
   }
-
   /// Q = G cov(ds, dyaw) G^T with G = d pose / d (ds, dyaw).
-  [[nodiscard]] filter::Symmetric<float, 3> noise(const PlanarPose& from) const {
+  [[nodiscard]] filter::Symmetric<float, 3> noise(const PlanarPose& from) const { return noise(terms(from.yaw_rad)); }
+  [[nodiscard]] filter::Step<PlanarPose> step(const PlanarPose& from) const {
     const Terms t = terms(from.yaw_rad);
-    filter::Matrix<float, 3, 2> g;
-    g(0, 0) = t.chord * t.direction.cos;
-    g(1, 0) = t.chord * t.direction.sin;
-    g(2, 0) = 0.0F;
-    g(0, 1) = 0.5F * ds_m * (t.chord_slope * t.direction.cos - t.chord * t.direction.sin);
-    g(1, 1) = 0.5F * ds_m * (t.chord_slope * t.direction.sin + t.chord * t.direction.cos);
-    g(2, 1) = 1.0F;
-    filter::Matrix<float, 2, 3> cov_gt;  // cov(ds, dyaw) G^T
-    for (int c = 0; c < 3; ++c) {
-      cov_gt(0, c) = var_ds * g(c, 0) + cov_ds_dyaw * g(c, 1);
-      cov_gt(1, c) = cov_ds_dyaw * g(c, 0) + var_dyaw * g(c, 1);
-    }
-    filter::Symmetric<float, 3> q;
-    for (int c = 0; c < 3; ++c)
-      for (int r = 0; r <= c; ++r) q(r, c) = g(r, 0) * cov_gt(0, c) + g(r, 1) * cov_gt(1, c);
-    return q;
+    return {.x = predict(from, t), .f = jacobian(t), .q = noise(t)};
   }
 
  private:
@@ -79,6 +54,36 @@ struct PlanarIncrement {
       t.chord_slope = (half.cos - t.chord) / h;
     }
     return t;
+  }
+  [[nodiscard]] PlanarPose predict(const PlanarPose& from, const Terms& t) const {
+    return {.x = from.x.plus(ds_m * t.chord * t.direction.cos),
+            .y = from.y.plus(ds_m * t.chord * t.direction.sin),
+            .yaw_rad = base::wrap_angle(from.yaw_rad + dyaw_rad)};
+  }
+  [[nodiscard]] filter::Matrix<float, 3, 3> jacobian(const Terms& t) const {
+    filter::Matrix<float, 3, 3> f = filter::Matrix<float, 3, 3>::Identity();
+    f(0, 2) = -ds_m * t.chord * t.direction.sin;
+    f(1, 2) = ds_m * t.chord * t.direction.cos;
+    return f;
+  }
+  [[nodiscard]] filter::Symmetric<float, 3> noise(const Terms& t) const {
+    filter::Matrix<float, 3, 2> g;
+    g(0, 0) = t.chord * t.direction.cos;
+    g(1, 0) = t.chord * t.direction.sin;
+    g(2, 0) = 0.0F;
+    g(0, 1) = 0.5F * ds_m * (t.chord_slope * t.direction.cos - t.chord * t.direction.sin);
+    g(1, 1) = 0.5F * ds_m * (t.chord_slope * t.direction.sin + t.chord * t.direction.cos);
+    g(2, 1) = 1.0F;
+    filter::Matrix<float, 2, 3> cov_gt;  // cov(ds, dyaw) G^T
+    filter::Symmetric<float, 3> q;
+#pragma GCC unroll 16
+    for (int c = 0; c < 3; ++c) {
+      cov_gt(0, c) = var_ds * g(c, 0) + cov_ds_dyaw * g(c, 1);
+      cov_gt(1, c) = cov_ds_dyaw * g(c, 0) + var_dyaw * g(c, 1);
+#pragma GCC unroll 16
+      for (int r = 0; r <= c; ++r) q(r, c) = g(r, 0) * cov_gt(0, c) + g(r, 1) * cov_gt(1, c);
+    }
+    return q;
   }
 };
 

@@ -19,22 +19,21 @@ struct RangeBearing {
   Landmark landmark;
   PlanarMounting mounting;
 
-  [[nodiscard]] filter::Vector<float, 2> predict(const PlanarPose& pose) const {
-    const Sight sight(pose, landmark, mounting);
-    return {sight.range_m(), sight.bearing_rad(pose, mounting)};
-  }
+  [[nodiscard]] filter::Vector<float, 2> predict(const PlanarPose& pose) const { return linearised(pose).z_hat; }
   [[nodiscard]] filter::Vector<float, 2> residual(const filter::Vector<float, 2>& z_hat) const {
     return {range_m - z_hat(0), base::wrap_angle(bearing_rad - z_hat(1))};
   }
   [[nodiscard]] filter::Vector<float, 2> noise() const {
     return {sigma_range_m * sigma_range_m, sigma_bearing_rad * sigma_bearing_rad};
   }
-  [[nodiscard]] filter::Matrix<float, 2, 3> jacobian(const PlanarPose& pose) const {
+  [[nodiscard]] filter::Matrix<float, 2, 3> jacobian(const PlanarPose& pose) const { return linearised(pose).h; }
+  [[nodiscard]] filter::Linearised<float, 2, 3> linearised(const PlanarPose& pose) const {
     const Sight sight(pose, landmark, mounting);
-    filter::Matrix<float, 2, 3> h;
-    h.row(0) = sight.range_row();
-    h.row(1) = sight.bearing_row();
-    return h;
+    filter::Linearised<float, 2, 3> at;
+    at.z_hat = {sight.range_m(), sight.bearing_rad(pose, mounting)};
+    at.h.row(0) = sight.range_row();
+    at.h.row(1) = sight.bearing_row();
+    return at;
   }
 };
 
