@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the ICM-42688-P's driver says about its chip: a state, a reason for everything that went wrong, a count of each.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string_view>
+
+namespace tetap::drivers::icm42688 {
+
+enum class State : std::uint8_t {
+  kPowerUp,
+  kReset,
+  kIdentify,
+  kConfigure,
+  kVerify,
+  kWarmUp,
+  kRunning,
+  kSelfTest,
+  kMisconfigured  ///< settings the chip cannot have: nothing is ever sent
+};
+
+enum class Reason : std::uint8_t {
+  kBusFault,         ///< a transfer failed
+  kResetIncomplete,  ///< no "reset done" after the time it may take
+  kWrongIdentity,    ///< WHO_AM_I is not that of this chip
+  kConfigRefused,    ///< a register did not keep what was written
+  kConfigChanged,    ///< a register changed while running: configured again
+  kBankLost,         ///< the chip was in another bank than it was put into
+  kFifoOverflow,     ///< samples were lost in the chip: polled too rarely
+  kBadCount,         ///< more bytes than the FIFO can hold, or a broken packet
+  kBadHeader,        ///< a packet of another kind than configured: FIFO flushed
+  kFifoShort,        ///< fewer packets than counted
+  kInvalidSample,    ///< the chip's marker for "no data"
+  kRateChanged,      ///< the header said so
+  kLostSamples,      ///< stamps with a gap, in samples
+  kBadStamp,         ///< a stamp that did not go on: the sample was dropped
+  kStale,            ///< no sample for too long
+  kStuckAccel,       ///< the same values for too long; withheld until they move
+  kStuckGyro,
+  kClippedAccel,  ///< at the end of the range; delivered and marked
+  kClippedGyro,
+  kClockOff,  ///< the chip's clock is further off than it may be
+  kSelfTestFailed,
+  kCount
+};
+
+inline constexpr auto kReasons = static_cast<std::size_t>(Reason::kCount);
+
+[[nodiscard]] constexpr std::string_view name(Reason reason) {
+  constexpr std::array<std::string_view, kReasons> kNames = {"bus fault",
+                                                             "reset incomplete",
+                                                             "wrong identity",
+                                                             "configuration refused",
+                                                             "configuration changed",
+                                                             "bank lost",
+                                                             "FIFO overflow",
+                                                             "bad FIFO count",
+                                                             "bad packet header",
+                                                             "FIFO shorter than counted",
+                                                             "no-data marker",
+                                                             "data rate changed",
+                                                             "samples lost",
+                                                             "bad stamp",
+                                                             "stale",
+                                                             "accel stuck",
+                                                             "gyro stuck",
+                                                             "accel clipped",
+                                                             "gyro clipped",
+                                                             "clock off",
+                                                             "self test failed"};
+  return reason < Reason::kCount ? kNames[static_cast<std::size_t>(reason)] : std::string_view{"?"};
+}
+
+struct Health {
+  State state = State::kPowerUp;
+  Reason last = Reason::kCount;  ///< kCount: nothing yet
+  std::uint32_t samples = 0;     ///< delivered since the start
+  std::uint32_t restarts = 0;
+  std::array<std::uint16_t, kReasons> counts{};  ///< saturating
+
+  [[nodiscard]] constexpr std::uint16_t of(Reason reason) const { return counts[static_cast<std::size_t>(reason)]; }
+
+  constexpr void add(Reason reason, std::uint32_t times = 1) {
+    auto& count = counts[static_cast<std::size_t>(reason)];
+    const std::uint32_t sum = count + (times > 0xFFFF ? 0xFFFF : times);
+    count = static_cast<std::uint16_t>(sum > 0xFFFF ? 0xFFFF : sum);
+    last = reason;
+  }
+};
+
+}  // namespace tetap::drivers::icm42688

@@ -1,0 +1,148 @@
+// SPDX-License-Identifier: Apache-2.0
+// From the packets of one reading to samples: stamps unwrapped and put on the MCU's clock, gaps, markers, values that
+// do not move, the ends of the range, the body's axes. DS-000347: 12.7 (ticks), 5.5 (delay of the filter).
+#pragma once
+
+#include "drivers/imu/clock_map.hpp"
+#include "drivers/imu/icm42688/health.hpp"
+#include "drivers/imu/icm42688/packet.hpp"
+#include "drivers/imu/reading.hpp"
+
+namespace tetap::drivers::icm42688 {
+
+class Stream {
+ public:
+  explicit constexpr Stream(const Settings& settings)
+      : settings_(settings), scales_(scales(settings)), clock_(settings.tick_q32()) {}
+
+  [[nodiscard]] constexpr std::int32_t clock_error_ppm() const { return clock_.rate_error_ppm(); }
+
+  /// The FIFO was emptied or the chip restarted: the next sample follows nothing.
+  constexpr void interrupt() {
+    follows_ = false;
+    same_accel_ = same_gyro_ = 0;
+  }
+
+  /// `packets`, oldest first, are the first of `waiting` that were in the FIFO at `now`.
+  template <class Sink>
+  constexpr void take(std::span<const Packet> packets, int waiting, base::Micros now, Health& health, Sink&& sink) {
+    if (packets.empty()) return;
+    std::int64_t ticks = unwrap(packets[0].ticks, waiting, now);
+    std::int64_t newest = ticks;
+    for (std::size_t i = 1; i < packets.size(); ++i) newest += since(packets[i - 1].ticks, packets[i].ticks);
+    // Only when nothing is left behind is the newest sample a fresh one.
+    if (static_cast<int>(packets.size()) == waiting) watch_clock(newest, now, health);
+    for (std::size_t i = 0; i < packets.size(); ++i) {
+      if (i > 0) ticks += since(packets[i - 1].ticks, packets[i].ticks);
+      one(packets[i], ticks, health, sink);
+    }
+    taken_ = now;
+  }
+
+ private:
+  /// Signed: a stamp that goes back is a bad one, not nearly a whole turn.
+  [[nodiscard]] static constexpr std::int16_t since(std::uint16_t before, std::uint16_t after) {
+    return static_cast<std::int16_t>(after - before);
+  }
+
+  /// A stamp from the future is a bad one, unless all of them are: then the clock jumped.
+  constexpr void watch_clock(std::int64_t newest, base::Micros now, Health& health) {
+    if (clock_.observe(newest, now)) {
+      refused_ = 0;
+    } else if (++refused_ >= kRefusals) {
+      refused_ = 0;
+      interrupt();
+      clock_.start(newest, now);
+    }
+    const bool off = clock_.rate_at_limit();
+    if (off && !clock_off_) health.add(Reason::kClockOff);
+    clock_off_ = off;
+  }
+
+  /// The oldest of `waiting` packets: on from the last one, by as many turns of the counter as the MCU's clock saw.
+  constexpr std::int64_t unwrap(std::uint16_t low, int waiting, base::Micros now) {
+    constexpr std::int64_t kTurn = 0x1'0000;
+    const base::Micros oldest = now - base::Micros{settings_.period_ns() * (waiting - 1) / 1000};
+    if (!clock_.running() || now - taken_ > kLongGap) {
+      clock_.start(low, oldest);
+      follows_ = false;
+      return low;
+    }
+    const std::int64_t expected = clock_.ticks(oldest);
+    // The nearest to what the clock expects; half a turn is 35 ms at least.
+    const std::int64_t off = (low - expected) & (kTurn - 1);
+    return expected + off - (off >= kTurn / 2 ? kTurn : 0);
+  }
+
+  /// Everything but the measured values. False: the sample has no time of its own.
+  constexpr bool stamp(const Packet& packet, std::int64_t ticks, ImuReading& reading, Health& health) {
+    if (packet.rate_changed && follows_) health.add(Reason::kRateChanged);
+    reading.stamp = clock_.time(ticks) - base::Micros{group_delay_us(settings_)};
+    reading.interval = base::Micros{settings_.period_ns() / 1000};
+    reading.after_gap = true;
+    if (!follows_) return true;
+    if (ticks <= last_ticks_) return health.add(Reason::kBadStamp), false;
+    const std::int64_t elapsed_us = (clock_.time(ticks) - clock_.time(last_ticks_)).us;
+    const std::int64_t periods = (elapsed_us * 2000 + settings_.period_ns()) / (2 * settings_.period_ns());
+    if (periods > 1) {
+      health.add(Reason::kLostSamples, static_cast<std::uint32_t>(periods - 1));
+      return true;
+    }
+    // From stamp to stamp, so that intervals add up to time exactly; never back.
+    if (reading.stamp <= last_stamp_) reading.stamp = last_stamp_ + base::Micros{1};
+    reading.interval = reading.stamp - last_stamp_;
+    reading.after_gap = after_withheld_;
+    return true;
+  }
+
+  template <class Sink>
+  constexpr void one(const Packet& packet, std::int64_t ticks, Health& health, Sink&& sink) {
+    ImuReading reading{};
+    if (!stamp(packet, ticks, reading, health)) return;
+    last_ticks_ = ticks;
+    last_stamp_ = reading.stamp;
+    follows_ = true;
+    after_withheld_ = true;
+    if (packet.kind != PacketKind::kSample) return health.add(Reason::kInvalidSample);
+    const bool stuck_accel = stuck(packet.accel, last_accel_, same_accel_, settings_.stuck_accel_samples);
+    const bool stuck_gyro = stuck(packet.gyro, last_gyro_, same_gyro_, settings_.stuck_gyro_samples);
+    if (stuck_accel) health.add(Reason::kStuckAccel);
+    if (stuck_gyro) health.add(Reason::kStuckGyro);
+    if (stuck_accel || stuck_gyro) return;
+    after_withheld_ = false;
+    reading.rate_b_radps = settings_.mounting.to_body(scaled(packet.gyro, scales_.rate_radps));
+    reading.force_b_mps2 = settings_.mounting.to_body(scaled(packet.accel, scales_.force_mps2));
+    reading.temperature_degC = temperature_degC(packet, scales_);
+    reading.clipped_gyro = beyond(packet.gyro, scales_.gyro_limit);
+    reading.clipped_accel = beyond(packet.accel, scales_.accel_limit);
+    if (reading.clipped_gyro) health.add(Reason::kClippedGyro);
+    if (reading.clipped_accel) health.add(Reason::kClippedAccel);
+    ++health.samples;
+    sink(static_cast<const ImuReading&>(reading));
+  }
+
+  [[nodiscard]] static constexpr bool stuck(const std::array<std::int32_t, 3>& now, std::array<std::int32_t, 3>& last,
+                                            std::uint16_t& same, std::uint16_t limit) {
+    same = now == last ? static_cast<std::uint16_t>(same + (same < 0xFFFF)) : std::uint16_t{0};
+    last = now;
+    return limit != 0 && same >= limit;
+  }
+
+  static constexpr base::Micros kLongGap{1'000'000};
+  static constexpr std::uint8_t kRefusals = 8;
+
+  Settings settings_;
+  Scales scales_;
+  ClockMap clock_;
+  base::Micros taken_{};
+  base::Micros last_stamp_{};
+  std::int64_t last_ticks_ = 0;
+  std::array<std::int32_t, 3> last_accel_{}, last_gyro_{};
+  std::uint16_t same_accel_ = 0, same_gyro_ = 0;
+  std::uint8_t refused_ = 0;
+  bool follows_ = false;         ///< a sample with a stamp came before
+  bool after_withheld_ = false;  ///< and was not delivered
+  bool clock_off_ = false;
+};
+
+}  // namespace tetap::drivers::icm42688

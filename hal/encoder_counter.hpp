@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a driver asks of a timer in quadrature mode: its free-running count and, where the timer can capture it, the
+// time of the last edge that was counted.
+#pragma once
+
+#include "base/time.hpp"
+
+#include <concepts>
+#include <cstdint>
+#include <optional>
+
+namespace tetap::hal {
+
+/// One consistent pair: if an edge may fall between reading the two, the port reads again.
+template <class Counter>
+struct EncoderReading {
+  Counter count = 0;                        ///< wraps at its own width
+  std::optional<base::Micros> last_edge{};  ///< on the clock of Board::now(); empty: not captured
+};
+
+template <class E>
+concept EncoderCounter = (std::same_as<typename E::Counter, std::uint16_t> ||
+                          std::same_as<typename E::Counter, std::uint32_t>)&&requires(E& encoder) {
+  { encoder.read() } -> std::same_as<EncoderReading<typename E::Counter>>;
+};
+
+}  // namespace tetap::hal
