@@ -8,10 +8,9 @@
 
 namespace tetap::sim {
 
-/// Everything that is not noise is the rover's.
-[[nodiscard]] inline app::Numbers matched_rover() {
-  const World::Options options;
-  const Numbers world = matched(options.numbers);
+/// For a world whose only errors are matched()'s. Everything that is not noise is the rover's.
+[[nodiscard]] inline app::Numbers matched_rover(const World::Options& options = {.mismatched = false}) {
+  const Numbers world = options.mismatched ? options.numbers : matched(options.numbers);
   const auto single = [](double x) { return static_cast<float>(x); };
   app::Numbers n = robot::rover::numbers;
   n.wheels.drive.counts_per_turn = single(world.wheels.counts_per_turn);

@@ -50,14 +50,17 @@ std::string landmarks_json(const sim::World& world) {
   return "[" + text + "]";
 }
 
-void write_truth(const std::string& folder, const sim::WorldSource& source) {
+/// In lockstep each row is an epoch of the node, whatever became of the clock of the bus.
+void write_truth(const std::string& folder, const sim::WorldSource& source, bool lockstep) {
   sim::OutFile file(folder + "/truth.csv");
   sim::Line line;
-  file.write("time_s,x_m,y_m,yaw_rad\n");
+  file.write(lockstep ? "time_s,x_m,y_m,yaw_rad,epoch\n" : "time_s,x_m,y_m,yaw_rad\n");
+  std::int64_t epoch = 0;
   for (const sim::Truth& t : source.truth()) {
     line.clear();
-    line.fixed(t.time.us, 6).text(",").real(t.x_m, 6).text(",").real(t.y_m, 6).text(",").real(t.yaw_rad, 6).text("\n");
-    file.write(line.view());
+    line.fixed(t.time.us, 6).text(",").real(t.x_m, 6).text(",").real(t.y_m, 6).text(",").real(t.yaw_rad, 6);
+    if (lockstep) line.text(",").integer(++epoch);
+    file.write(line.text("\n").view());
   }
   file.close();
 }
@@ -91,7 +94,7 @@ int drive(L& link, const Run& run) {
     sim::RealtimeOptions options{.base = about.base};
     sim::play_realtime(link, frames, session, options, session.counts());
   });
-  write_truth(about.folder, source);
+  write_truth(about.folder, source, !run.realtime);
   return status;
 }
 

@@ -21,7 +21,7 @@ ESTIMATES = ["epoch", "time_s", "estimator", "kind", "x_m", "y_m", "yaw_rad", "s
              "std_yaw_rad", "corr_xy", "corr_x_yaw", "corr_y_yaw", "pos_valid", "hdg_valid"]
 INNOVATIONS = ["epoch", "time_s", "estimator", "sensor", "inst", "verdict", "dof", "nis", "ratio", "age_ms", "landmark"]
 STATUS = ["epoch", "time_s", "mode", "used", "faults", "reset_ctr", "reset_cause"]
-TRUTH = ["time_s", "x_m", "y_m", "yaw_rad"]
+TRUTH = ["time_s", "x_m", "y_m", "yaw_rad"]  # and perhaps "epoch"
 
 ENUMERATIONS = {"kind": "EstimatorKind", "sensor": "Sensor", "verdict": "Verdict", "mode": "Mode", "reset_cause": "ResetCause"}
 
@@ -40,8 +40,9 @@ def code_names():
     return {table: {code: name for name, code in codes.items()} for table, codes in bus_writer.Dbc().tables.items()}
 
 
-def read_table(path, columns):
-    """Columns of a CSV file as arrays of floats by name. Empty: NaN. Names of the bus's enumerations stand for their numbers."""
+def read_table(path, columns, also=()):
+    """Columns of a CSV file as arrays of floats by name, and those of `also` that it has. Empty: NaN. Names of the bus's enumerations stand
+    for their numbers."""
     try:
         with open(path, "rb") as file:
             data = file.read().replace(b"\r\n", b"\n")
@@ -62,7 +63,7 @@ def read_table(path, columns):
     values = _parse(body, len(names))
     if values is None:
         values = _parse_names(body, names, path, first_line)
-    return {name: values[:, names.index(name)] for name in columns}
+    return {name: values[:, names.index(name)] for name in [*columns, *also] if name in names}
 
 
 def _parse(body, width):
@@ -143,11 +144,17 @@ def read_json(path):
 
 
 class Truth:
-    """Where the robot was, by time. `about` is the JSON beside NAME.truth.csv, when there is one."""
+    """Where the robot was, by time. `about` is the JSON beside NAME.truth.csv, when there is one.
+
+    A simulated world says for each row which of the node's epochs it belongs to: then the rows are paired by epoch, because a fault may have
+    made the clock of the bus jump, which the truth does not."""
 
     def __init__(self, path, max_gap_s=None):
         self.path = path
-        rows = read_table(path, TRUTH)
+        rows = read_table(path, TRUTH, ["epoch"])
+        self.epoch = rows.get("epoch")
+        if self.epoch is not None and not (np.diff(self.epoch) > 0).all():
+            raise BadInput(f"{path}: row {int(np.argmin(np.diff(self.epoch) > 0)) + 2}: epoch does not grow")
         self.time_s, self.x_m, self.y_m, self.yaw_rad = (rows[name] for name in TRUTH)
         if len(self.time_s) < 2:
             raise BadInput(f"{path}: fewer than two rows")
@@ -162,6 +169,14 @@ class Truth:
         beside = path[:-len(".truth.csv")] + ".json" if path.endswith(".truth.csv") else ""
         self.about = read_json(beside) if beside and os.path.exists(beside) else {}
         self.is_reference = self.about.get("truth") == "gps track"
+
+    def of(self, rows):
+        """x, y, yaw for rows of estimates."""
+        if self.epoch is None:
+            return self.at(rows["time_s"])
+        found = np.clip(np.searchsorted(self.epoch, rows["epoch"]), 0, len(self.epoch) - 1)
+        known = self.epoch[found] == rows["epoch"]
+        return tuple(np.where(known, column[found], np.nan) for column in (self.x_m, self.y_m, self.yaw_rad))
 
     def at(self, time_s):
         """x, y, yaw at the times given, linear in between; NaN outside of the truth and in its gaps."""
@@ -180,7 +195,7 @@ class Truth:
 
 def errors(rows, truth):
     """Estimate minus truth of one estimator's rows: dx, dy, dyaw; NaN where there is no truth or the estimate is not valid."""
-    x, y, yaw = truth.at(rows["time_s"])
+    x, y, yaw = truth.of(rows)
     dx, dy, dyaw = rows["x_m"] - x, rows["y_m"] - y, wrapped(rows["yaw_rad"] - yaw)
     position, heading = rows["pos_valid"] == 1, rows["hdg_valid"] == 1
     return np.where(position, dx, np.nan), np.where(position, dy, np.nan), np.where(position & heading, dyaw, np.nan)
