@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The fake ICM-42688-P held to the data sheet (TDK DS-000347 revision 1.8): what must be true of the chip whatever the
 // driver, law by law. Numbers in the comments are its sections.
+#include "hal/spi_device.hpp"
 #include "support/fakes/icm42688_host.hpp"
 
 #include <gtest/gtest.h>
@@ -11,6 +12,8 @@ namespace tetap::fakes {
 namespace {
 
 using namespace icm42688;
+
+static_assert(hal::SpiDevice<Icm42688>);
 
 constexpr double g = kStandardGravity_mps2;
 
