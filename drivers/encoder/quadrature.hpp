@@ -114,20 +114,19 @@ class Quadrature {
     if (moved == 0) return decay(now);
     const std::int64_t size = moved < 0 ? -moved : moved;
     const int direction = moved < 0 ? -1 : 1;
-    if (edge && (*edge > now || *edge <= edge_)) {
-      health_.add(EncoderReason::kBadEdge);
-      edge.reset();
-    }
+    const base::Micros seen = edge.value_or(now);
+    const bool timed = edge.has_value() && seen <= now && seen > edge_;
+    if (edge.has_value() && !timed) health_.add(EncoderReason::kBadEdge);
     const bool turned = direction_ != 0 && direction != direction_;
-    if (edge && edge_timed_ && size < settings_.edge_timing_below) {
+    if (timed && edge_timed_ && size < settings_.edge_timing_below) {
       // The first edge after turning is the last one before it, seen from the other side: between them nothing moved.
-      speed_ = static_cast<float>(turned ? moved - direction : moved) / base::seconds(*edge - edge_);
+      speed_ = static_cast<float>(turned ? moved - direction : moved) / base::seconds(seen - edge_);
     } else {
       speed_ = static_cast<float>(moved) / base::seconds(elapsed);
     }
     direction_ = direction;
-    edge_timed_ = edge.has_value();
-    edge_ = edge ? *edge : now;
+    edge_timed_ = timed;
+    edge_ = timed ? seen : now;
   }
 
   constexpr void decay(base::Micros now) {

@@ -17,7 +17,9 @@ class ClockMap {
 
   [[nodiscard]] constexpr bool running() const { return running_; }
 
-  /// Forgets where it was, keeps the rate it learned.
+  /// The ticks will begin anew: the place is forgotten, the rate stays.
+  constexpr void stop() { running_ = false; }
+
   constexpr void start(std::int64_t ticks, base::Micros now) {
     running_ = true;
     anchor_ticks_ = ticks;
@@ -43,8 +45,11 @@ class ClockMap {
   /// The newest sample had `ticks` when the clock said `now`. False: too far in the future, not used.
   constexpr bool observe(std::int64_t ticks, base::Micros now) {
     const std::int64_t late_us = (now - time(ticks)).us;
-    if (late_us < -kImplausible_us) return false;
-    if (late_us < 0) {  // it would have been read before it existed
+    if (late_us < -(rate_known_ ? kSettled_us : kUnsettled_us)) return false;
+    const std::int64_t doubted_us = doubted_us_;
+    doubted_us_ = late_us < -kDoubt_us ? late_us : 0;
+    if (late_us < -kDoubt_us && doubted_us >= -kDoubt_us) return true;  // one stamp alone moves nothing by so much
+    if (late_us < 0) {                                                  // it would have been read before it existed
       anchor_ += base::Micros{late_us};
       pulled_us_ += late_us;
       least_us_ = 0;
@@ -68,7 +73,10 @@ class ClockMap {
   static constexpr std::int64_t kFirstWindow_us = 32'000;
   static constexpr std::int64_t kLastWindow_us = 1'024'000;
   static constexpr std::int64_t kLimitParts = 16;  // 6 %
-  static constexpr std::int64_t kImplausible_us = 20'000;
+  static constexpr std::int64_t kUnsettled_us = 20'000;
+  static constexpr std::int64_t kSettled_us = 1'000;
+  static constexpr std::int64_t kDoubt_us = 5'000;
+  static constexpr std::int64_t kLost_us = 3'000;  ///< no reading of a window closer than that: learn anew
   static constexpr std::int64_t kNone_us = 1'000'000;
 
   constexpr void open_window(std::int64_t ticks) {
@@ -80,6 +88,10 @@ class ClockMap {
 
   constexpr void close_window(std::int64_t ticks) {
     const bool settled = window_us_ >= kLastWindow_us;
+    if (settled && least_us_ > kLost_us) {
+      rate_known_ = false;
+      return start(ticks, time(ticks) + base::Micros{least_us_});
+    }
     const std::int64_t moved_us = least_us_ + pulled_us_;
     // The line goes on from where it is, so that no interval is torn by a change of rate.
     const std::int64_t ahead = (ticks - anchor_ticks_) * (rate_ + slew_) + fraction_;
@@ -89,13 +101,15 @@ class ClockMap {
     const std::int64_t span = ticks - window_ticks_;
     if (span > 0) {
       const std::int64_t error = (moved_us << 32) / span;
-      rate_ += settled ? error / 8 : error;
+      // After a restart only the place has to be found again.
+      rate_ += settled ? error / 8 : rate_known_ ? 0 : error;
       const std::int64_t limit = nominal_ / kLimitParts;
       rate_ = rate_ > nominal_ + limit ? nominal_ + limit : rate_ < nominal_ - limit ? nominal_ - limit : rate_;
       slew_ = settled ? (least_us_ << 32) / (2 * span) : 0;
       slew_ = slew_ > limit ? limit : slew_;
       if (!settled) anchor_ += base::Micros{least_us_};
     }
+    rate_known_ |= settled;
     if (!settled) window_us_ *= 2;
     open_window(ticks);
   }
@@ -111,7 +125,9 @@ class ClockMap {
   std::int64_t window_us_ = kFirstWindow_us;
   std::int64_t least_us_ = kNone_us;  ///< the lowest pair of the window, above the line
   std::int64_t pulled_us_ = 0;        ///< what the line was pulled down within the window
+  std::int64_t doubted_us_ = 0;
   bool running_ = false;
+  bool rate_known_ = false;  ///< once settled
 };
 
 }  // namespace tetap::drivers

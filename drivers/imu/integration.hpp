@@ -23,7 +23,7 @@ struct StampedImu {
 
 class ImuIntegrator {
  public:
-  /// So many readings make one increment.
+  /// So many readings make one increment, or as many as fit into the 65 ms that a sample can say.
   explicit constexpr ImuIntegrator(std::uint8_t readings) : readings_(readings > 0 ? readings : std::uint8_t{1}) {}
 
   /// An increment, when this reading completes one. A gap ends the one begun, without what is missing: then the next
@@ -38,11 +38,14 @@ class ImuIntegrator {
     }
     step(reading);
     // A gap and a full interval at once happen only with one reading each; the gap's remainder is empty then.
-    if (count_ >= readings_) out = finish();
+    const bool full = (interval_ + reading.interval).us > kMost_us;
+    if (count_ >= readings_ || full) out = finish();
     return out;
   }
 
  private:
+  static constexpr std::int64_t kMost_us = 0xFFFF;
+
   constexpr void step(const ImuReading& reading) {
     const float dt_s = base::seconds(reading.interval);
     const Vector3 dalpha = scaled_sum(before_.rate_b_radps, reading.rate_b_radps, 0.5F * dt_s);
@@ -68,7 +71,7 @@ class ImuIntegrator {
 
   constexpr StampedImu finish() {
     StampedImu out{.stamp = before_.stamp};
-    out.sample.interval = interval_;
+    out.sample.interval_us = static_cast<std::uint16_t>(interval_.us);
     const Vector3 turned = cross(alpha_, velocity_);  // part 2 (2): the rotation of the axes while pushed
     for (std::size_t i = 0; i < 3; ++i) {
       out.sample.dangle_b_rad[i] = alpha_[i] + coning_[i];

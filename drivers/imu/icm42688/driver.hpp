@@ -91,7 +91,7 @@ class Driver {
 
   constexpr void restart(base::Micros now, base::Micros wait) {
     ++health_.restarts;
-    stream_.interrupt();
+    stream_.restart();
     go(State::kPowerUp, now + wait);
   }
 
@@ -176,7 +176,7 @@ class Driver {
     if (running() && now >= check_due_) check(now);
   }
 
-  /// True if samples came.
+  /// True if samples came that are newer than the last.
   template <class Sink>
   constexpr bool drain(int packets, base::Micros now, Sink&& sink) {
     std::array<std::uint8_t, kBatch * 20> bytes{};
@@ -199,8 +199,8 @@ class Driver {
         health_.add(kind == PacketKind::kEmpty ? Reason::kFifoShort : Reason::kBadHeader);
         break;
       }
-      stream_.take(std::span<const Packet>(parsed).first(static_cast<std::size_t>(good)), packets, now, health_, sink);
-      any |= good > 0;
+      any |= stream_.take(std::span<const Packet>(parsed).first(static_cast<std::size_t>(good)), packets, now, health_,
+                          sink);
       packets -= count;
       if (good == count) continue;
       if (parsed[static_cast<std::size_t>(good)].kind == PacketKind::kForeign) {

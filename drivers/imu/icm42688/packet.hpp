@@ -71,11 +71,10 @@ inline constexpr std::int32_t kMarker16 = -32'768, kMarker20 = -524'288;
 
 /// Numbers per unit, and where the sensor ends.
 struct Scales {
-  float rate_radps;   ///< per count
-  float force_mps2;   ///< per count
-  float temperature;  ///< degrees per count
-  std::int32_t gyro_limit;
-  std::int32_t accel_limit;
+  float rate_radps;    ///< per count
+  float force_mps2;    ///< per count
+  float temperature;   ///< degrees per count
+  std::int32_t limit;  ///< counts, of both
 };
 
 inline constexpr float kStandardGravity_mps2 = 9.80665F;
@@ -83,14 +82,15 @@ inline constexpr float kRadiansPerDegree = 0.0174532925F;
 
 [[nodiscard]] constexpr Scales scales(const Settings& s) {
   if (s.resolution == Resolution::k20bit) {
-    // 6.1: 131 per deg/s and 8192 per g. The limits are the specified ranges, 1998 deg/s and 15.98 g, not the code's.
-    return {kRadiansPerDegree / 131.0F, kStandardGravity_mps2 / 8192.0F, 1.0F / 132.48F, 261'738, 130'940};
+    // 6.1: 131 per deg/s of 19 bits and 8192 per g of 18: the one and the two bits below them are always 0. Full scale
+    // is that of the code, so the upper 16 bits are the packet of 16 bits.
+    return {kRadiansPerDegree / (2 * 131.0F), kStandardGravity_mps2 / (4 * 8192.0F), 1.0F / 132.48F, 524'256};
   }
   // Tables 1 and 2; 14.34: -32766 is the lowest valid value.
   constexpr float kPerDps[8] = {16.4F, 32.8F, 65.5F, 131.0F, 262.0F, 524.3F, 1048.6F, 2097.2F};
   constexpr float kPerG[4] = {2048.0F, 4096.0F, 8192.0F, 16384.0F};
   return {kRadiansPerDegree / kPerDps[static_cast<std::size_t>(s.gyro_range)],
-          kStandardGravity_mps2 / kPerG[static_cast<std::size_t>(s.accel_range)], 1.0F / 2.07F, 32'766, 32'766};
+          kStandardGravity_mps2 / kPerG[static_cast<std::size_t>(s.accel_range)], 1.0F / 2.07F, 32'766};
 }
 
 [[nodiscard]] constexpr bool beyond(const std::array<std::int32_t, 3>& counts, std::int32_t limit) {
@@ -106,8 +106,10 @@ inline constexpr float kRadiansPerDegree = 0.0174532925F;
           static_cast<float>(counts[2]) * unit};
 }
 
-[[nodiscard]] constexpr float temperature_degC(const Packet& packet, const Scales& scale) {
-  if (packet.temperature == kMarker16) return base::kNan;
+/// NaN where the chip marks it invalid; in eight bits that is also the end of the range.
+[[nodiscard]] constexpr float temperature_degC(const Packet& packet, Resolution resolution, const Scales& scale) {
+  const std::int16_t marker = resolution == Resolution::k20bit ? std::int16_t{-32'768} : std::int16_t{-128};
+  if (packet.temperature == marker) return base::kNan;
   return static_cast<float>(packet.temperature) * scale.temperature + 25.0F;
 }
 

@@ -82,11 +82,13 @@ inline constexpr Register kIntSource0{0, 0x65};  // 14.51
 inline constexpr std::uint8_t kIntSources = 0x7F, kThresholdToInt1 = 0x04;
 
 inline constexpr Register kSelfTestConfig{0, 0x70};  // 14.57
-inline constexpr std::uint8_t kSelfTestGyro = 0x07, kSelfTestAccel = 0x78;
+inline constexpr std::uint8_t kSelfTestFields = 0x7F, kSelfTestGyro = 0x07, kSelfTestAccel = 0x78;
 inline constexpr Register kWhoAmI{0, 0x75};  // 14.58
 inline constexpr std::uint8_t kIdentity = 0x47;
 
 // Bank 1
+inline constexpr Register kSensorConfig0{1, 0x03};  // 15.1
+inline constexpr std::uint8_t kAxesOff = 0x3F;
 inline constexpr Register kGyroConfigStatic2{1, 0x0B};  // 15.2
 inline constexpr std::uint8_t kGyroFilters = 0x03, kGyroAntiAliasOff = 0x02;
 inline constexpr Register kGyroConfigStatic3{1, 0x0C};  // 15.3, 5.3
@@ -103,5 +105,8 @@ inline constexpr std::uint8_t kAccelFilters = 0x7F, kAccelAntiAliasOff = 0x01;
 inline constexpr Register kAccelConfigStatic3{2, 0x04};  // 16.2
 inline constexpr Register kAccelConfigStatic4{2, 0x05};  // 16.3
 inline constexpr Register kXaStData{2, 0x3B};            // 16.4 to 16.6
+
+// Bank 4
+inline constexpr Register kOffsetUser0{4, 0x77};  // 18.18 to 18.26, 5.4
 
 }  // namespace tetap::drivers::icm42688

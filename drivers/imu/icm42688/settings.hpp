@@ -52,8 +52,8 @@ struct Settings {
   std::uint8_t watermark_packets = 1;   ///< INT1 pulses when so many wait
   std::uint32_t external_clock_Hz = 0;  ///< on pin 9, 31 to 50 kHz; 0: the chip's own, 3 % (table 4)
   Mounting mounting{};
-  std::uint16_t stuck_accel_samples = 100;  ///< the same three values so often in a row are a fault; 0: never
-  std::uint16_t stuck_gyro_samples = 2000;  ///< its noise is below one count of 16 bits when filtered hard
+  std::uint16_t stuck_accel_samples = 100;  ///< one axis with the same value so often in a row is a fault; 0: never
+  std::uint16_t stuck_gyro_samples = 2000;  ///< 0 when filtered below 25 Hz at 16 bits: less noise than a count
 
   /// Bytes of one packet in the FIFO (6.4).
   [[nodiscard]] constexpr int packet_size() const { return resolution == Resolution::k20bit ? 20 : 16; }
@@ -149,11 +149,12 @@ struct Field {
   std::uint8_t value;
 };
 
-inline constexpr std::size_t kFieldCount = 27;
+inline constexpr std::size_t kFieldCount = 38;
 
 /// In the order of writing. The last starts the sensors; all others are written while they are off (12.9).
 [[nodiscard]] constexpr std::array<Field, kFieldCount> fields(const Settings& s) {
   const auto byte = [](auto value) { return static_cast<std::uint8_t>(value); };
+  const auto offset = [&](int nth) { return Field{{kOffsetUser0.bank, byte(kOffsetUser0.address + nth)}, 0xFF, 0}; };
   const auto order = byte(s.order);
   const auto bandwidth = byte(s.bandwidth);
   const bool fast = s.period_ns() <= 250'000;
@@ -180,6 +181,9 @@ inline constexpr std::size_t kFieldCount = 27;
       {kIntConfig0, kIntClearFields, kThresholdClearsOnFifoRead},
       {kIntConfig1, kIntTiming, fast ? kIntFastPulse : byte(0)},
       {kIntSource0, kIntSources, kThresholdToInt1},
+      // Nobody sets these, and a bit that fell over in one would be a bias or a dead axis without a word.
+      {kSelfTestConfig, kSelfTestFields, 0},
+      {kSensorConfig0, kAxesOff, 0},
       {kGyroConfigStatic2, kGyroFilters, filtered ? byte(0) : kGyroAntiAliasOff},
       {kGyroConfigStatic3, kGyroDelt, filtered ? s.anti_alias.delt : byte(1)},
       {kGyroConfigStatic4, 0xFF, byte(s.anti_alias.delt_squared & 0xFF)},
@@ -188,6 +192,15 @@ inline constexpr std::size_t kFieldCount = 27;
       {kAccelConfigStatic2, kAccelFilters, filtered ? byte(s.anti_alias.delt << 1) : byte(2 | kAccelAntiAliasOff)},
       {kAccelConfigStatic3, 0xFF, byte(s.anti_alias.delt_squared & 0xFF)},
       {kAccelConfigStatic4, 0xFF, square_high},
+      offset(0),
+      offset(1),
+      offset(2),
+      offset(3),
+      offset(4),
+      offset(5),
+      offset(6),
+      offset(7),
+      offset(8),
       {kFifoConfig, kFifoMode, kFifoStream},
       {kPwrMgmt0, kPowerFields, kBothLowNoise},
   }};

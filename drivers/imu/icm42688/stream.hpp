@@ -17,29 +17,42 @@ class Stream {
 
   [[nodiscard]] constexpr std::int32_t clock_error_ppm() const { return clock_.rate_error_ppm(); }
 
-  /// The FIFO was emptied or the chip restarted: the next sample follows nothing.
-  constexpr void interrupt() {
-    follows_ = false;
-    same_accel_ = same_gyro_ = 0;
+  /// The chip was reset, and its ticks with it.
+  constexpr void restart() {
+    interrupt();
+    clock_.stop();
   }
 
-  /// `packets`, oldest first, are the first of `waiting` that were in the FIFO at `now`.
+  /// The FIFO was emptied: the next sample follows nothing.
+  constexpr void interrupt() {
+    follows_ = false;
+    accel_ = gyro_ = {};
+  }
+
+  /// `packets`, oldest first, are the first of `waiting` that were in the FIFO at `now`. True: time went on.
   template <class Sink>
-  constexpr void take(std::span<const Packet> packets, int waiting, base::Micros now, Health& health, Sink&& sink) {
-    if (packets.empty()) return;
+  constexpr bool take(std::span<const Packet> packets, int waiting, base::Micros now, Health& health, Sink&& sink) {
+    if (packets.empty()) return false;
     std::int64_t ticks = unwrap(packets[0].ticks, waiting, now);
     std::int64_t newest = ticks;
     for (std::size_t i = 1; i < packets.size(); ++i) newest += since(packets[i - 1].ticks, packets[i].ticks);
     // Only when nothing is left behind is the newest sample a fresh one.
     if (static_cast<int>(packets.size()) == waiting) watch_clock(newest, now, health);
+    bool went_on = false;
     for (std::size_t i = 0; i < packets.size(); ++i) {
       if (i > 0) ticks += since(packets[i - 1].ticks, packets[i].ticks);
-      one(packets[i], ticks, health, sink);
+      went_on |= one(packets[i], ticks, now, health, sink);
     }
-    taken_ = now;
+    if (went_on) taken_ = now;
+    return went_on;
   }
 
  private:
+  struct Repeats {
+    std::array<std::int32_t, 3> value{};
+    std::array<std::uint16_t, 3> times{};
+  };
+
   /// Signed: a stamp that goes back is a bad one, not nearly a whole turn.
   [[nodiscard]] static constexpr std::int16_t since(std::uint16_t before, std::uint16_t after) {
     return static_cast<std::int16_t>(after - before);
@@ -96,39 +109,48 @@ class Stream {
   }
 
   template <class Sink>
-  constexpr void one(const Packet& packet, std::int64_t ticks, Health& health, Sink&& sink) {
+  constexpr bool one(const Packet& packet, std::int64_t ticks, base::Micros now, Health& health, Sink&& sink) {
     ImuReading reading{};
-    if (!stamp(packet, ticks, reading, health)) return;
+    if (clock_.time(ticks) > now + kAhead) return health.add(Reason::kBadStamp), false;
+    if (!stamp(packet, ticks, reading, health)) return false;
     last_ticks_ = ticks;
     last_stamp_ = reading.stamp;
     follows_ = true;
     after_withheld_ = true;
-    if (packet.kind != PacketKind::kSample) return health.add(Reason::kInvalidSample);
-    const bool stuck_accel = stuck(packet.accel, last_accel_, same_accel_, settings_.stuck_accel_samples);
-    const bool stuck_gyro = stuck(packet.gyro, last_gyro_, same_gyro_, settings_.stuck_gyro_samples);
+    if (packet.kind != PacketKind::kSample) return health.add(Reason::kInvalidSample), true;
+    const bool stuck_accel = stuck(packet.accel, accel_, settings_.stuck_accel_samples);
+    const bool stuck_gyro = stuck(packet.gyro, gyro_, settings_.stuck_gyro_samples);
     if (stuck_accel) health.add(Reason::kStuckAccel);
     if (stuck_gyro) health.add(Reason::kStuckGyro);
-    if (stuck_accel || stuck_gyro) return;
+    if (stuck_accel || stuck_gyro) return true;
     after_withheld_ = false;
     reading.rate_b_radps = settings_.mounting.to_body(scaled(packet.gyro, scales_.rate_radps));
     reading.force_b_mps2 = settings_.mounting.to_body(scaled(packet.accel, scales_.force_mps2));
-    reading.temperature_degC = temperature_degC(packet, scales_);
-    reading.clipped_gyro = beyond(packet.gyro, scales_.gyro_limit);
-    reading.clipped_accel = beyond(packet.accel, scales_.accel_limit);
+    reading.temperature_degC = temperature_degC(packet, settings_.resolution, scales_);
+    reading.clipped_gyro = beyond(packet.gyro, scales_.limit);
+    reading.clipped_accel = beyond(packet.accel, scales_.limit);
     if (reading.clipped_gyro) health.add(Reason::kClippedGyro);
     if (reading.clipped_accel) health.add(Reason::kClippedAccel);
     ++health.samples;
     sink(static_cast<const ImuReading&>(reading));
+    return true;
   }
 
-  [[nodiscard]] static constexpr bool stuck(const std::array<std::int32_t, 3>& now, std::array<std::int32_t, 3>& last,
-                                            std::uint16_t& same, std::uint16_t limit) {
-    same = now == last ? static_cast<std::uint16_t>(same + (same < 0xFFFF)) : std::uint16_t{0};
-    last = now;
-    return limit != 0 && same >= limit;
+  /// Any axis that repeats itself so often: a living sensor has noise.
+  [[nodiscard]] static constexpr bool stuck(const std::array<std::int32_t, 3>& now, Repeats& repeats,
+                                            std::uint16_t limit) {
+    bool any = false;
+    for (std::size_t i = 0; i < 3; ++i) {
+      auto& times = repeats.times[i];
+      times = now[i] != repeats.value[i] ? std::uint16_t{0} : static_cast<std::uint16_t>(times + (times < 0xFFFF));
+      any |= limit != 0 && times >= limit;
+    }
+    repeats.value = now;
+    return any;
   }
 
   static constexpr base::Micros kLongGap{1'000'000};
+  static constexpr base::Micros kAhead{200};  ///< of a chip that is read while `now` grows old
   static constexpr std::uint8_t kRefusals = 8;
 
   Settings settings_;
@@ -137,8 +159,7 @@ class Stream {
   base::Micros taken_{};
   base::Micros last_stamp_{};
   std::int64_t last_ticks_ = 0;
-  std::array<std::int32_t, 3> last_accel_{}, last_gyro_{};
-  std::uint16_t same_accel_ = 0, same_gyro_ = 0;
+  Repeats accel_{}, gyro_{};
   std::uint8_t refused_ = 0;
   bool follows_ = false;         ///< a sample with a stamp came before
   bool after_withheld_ = false;  ///< and was not delivered

@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "drivers/imu/clock_map.hpp"
+
+#include <gtest/gtest.h>
+
+#include "base/random.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+
+namespace tetap::drivers {
+namespace {
+
+constexpr std::int64_t kNominal = (std::int64_t{1} << 32) * 32 / 30;
+
+struct Followed {
+  double worst_us = 0;       ///< of the line against the truth, once settled
+  double worst_step_us = 0;  ///< of the distance between two samples against the true one
+  std::int32_t ppm = 0;
+};
+
+/// A clock `ppm` fast, a sample each millisecond of it, read up to `jitter_us` after it exists.
+Followed follow(double ppm, std::uint32_t jitter_us, int seconds) {
+  ClockMap map(kNominal);
+  base::Random random(7);
+  Followed run;
+  std::int64_t before = 0;
+  for (int k = 0; k < seconds * 1000; ++k) {
+    const double true_us = 5e6 + 1000.0 * k / (1 + ppm * 1e-6);
+    const auto ticks = static_cast<std::int64_t>(std::floor(937.5 * k));
+    const auto read_us =
+        static_cast<std::int64_t>(std::ceil(true_us)) + static_cast<std::int64_t>(random.next() % (jitter_us + 1));
+    if (!map.running()) map.start(ticks, {read_us});
+    EXPECT_TRUE(map.observe(ticks, {read_us}));
+    const std::int64_t stamp = map.time(ticks).us;
+    EXPECT_LE(stamp, read_us);
+    if (k > seconds * 500) {
+      run.worst_us = std::max(run.worst_us, std::abs(static_cast<double>(stamp) - true_us));
+      run.worst_step_us =
+          std::max(run.worst_step_us, std::abs(static_cast<double>(stamp - before) - 1000 / (1 + ppm * 1e-6)));
+    }
+    before = stamp;
+  }
+  run.ppm = map.rate_error_ppm();
+  return run;
+}
+
+TEST(ClockMap, FindsRateAndOffsetOfAClockThatIsOff) {
+  for (const double ppm : {-40'000.0, -15'000.0, -50.0, 0.0, 50.0, 15'000.0, 40'000.0}) {
+    const Followed run = follow(ppm, 300, 30);
+    EXPECT_LT(run.worst_us, 60) << ppm;
+    EXPECT_LT(run.worst_step_us, 50) << ppm;
+    EXPECT_NEAR(run.ppm, -1e6 * ppm / (1e6 + ppm), 60) << ppm;
+  }
+}
+
+TEST(ClockMap, IsAsGoodAsItsLuckiestReadings) {
+  EXPECT_LT(follow(10'000, 0, 20).worst_us, 4);
+  EXPECT_LT(follow(10'000, 900, 20).worst_us, 150);
+}
+
+TEST(ClockMap, TicksIsTheInverseOfTime) {
+  ClockMap map(kNominal);
+  map.start(123'456, {777'000});
+  for (std::int64_t us = -5'000'000; us < 5'000'000; us += 9'973) {
+    EXPECT_LE(std::abs(map.time(map.ticks({us})).us - us), 2);
+  }
+}
+
+TEST(ClockMap, ASampleFromTheFutureIsRefusedAndMovesNothing) {
+  ClockMap map(kNominal);
+  map.start(0, {1'000'000});
+  const std::int64_t before = map.time(10'000).us;
+  EXPECT_FALSE(map.observe(60'000, {1'001'000}));
+  EXPECT_EQ(map.time(10'000).us, before);
+}
+
+TEST(ClockMap, NeverLeavesWhatAnOscillatorCanDo) {
+  const Followed run = follow(150'000, 100, 10);
+  EXPECT_LE(std::abs(run.ppm), 62'500);
+}
+
+}  // namespace
+}  // namespace tetap::drivers
