@@ -68,6 +68,8 @@ class Icm42688 {
   /// Whether samples are delayed and smoothed by the user filters' group delay (5.5); otherwise they are of their
   /// instant.
   void set_filters(bool on) { filters_ = on; }
+  /// Called before each transfer, so that time can pass between two of them; it may call advance().
+  void set_before_transfer(std::function<void()> passes) { before_transfer_ = std::move(passes); }
   /// Bytes of FIFO memory the read cache adds (6.3): 0, 1 or 2 packets.
   void set_read_cache(int packets) { fifo_.read_cache_packets = packets; }
   /// The factory's self-test codes, x y z; 0 is a part without one.
@@ -143,6 +145,7 @@ class Icm42688 {
   icm42688::RegisterFile registers_;
   icm42688::Fifo fifo_;
   MotionAt motion_ = [](double) { return Motion{}; };
+  std::function<void()> before_transfer_;
   Counters counters_;
   std::array<int, index(Rule::kCount)> rules_{};
   std::array<bool, index(Fault::kCount)> active_{};

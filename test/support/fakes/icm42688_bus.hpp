@@ -18,6 +18,7 @@ inline bool Icm42688::strikes(Fault fault) {
 
 inline bool Icm42688::transfer(std::span<const std::uint8_t> out, std::span<std::uint8_t> in) {
   using namespace icm42688;
+  if (before_transfer_) before_transfer_();
   ++counters_.transfers;
   if (strikes(Fault::kBusDead) || out.empty()) return false;
   if (strikes(Fault::kBusStuckLow)) return std::ranges::fill(in, std::uint8_t{0x00}), true;

@@ -119,6 +119,28 @@ TEST(Icm42688Rules, StoppedClocksStopTheSamples) {
   }
 }
 
+TEST(Icm42688Rules, AfterAnyTrafficABrownOutBringsBackAWorkingChip) {
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    PlainHost host;
+    base::Random random{seed};
+    for (int i = 0; i < 2'000; ++i) {
+      const auto byte = [&] { return static_cast<std::uint8_t>(random.next()); };
+      std::vector<std::uint8_t> out(1 + random.next() % 3);
+      for (std::uint8_t& b : out) b = byte();
+      std::vector<std::uint8_t> in(random.next() % 80);
+      (void)host.chip.transfer(out, in);
+      host.wait_us(random.next() % 300);
+    }
+    host.chip.inject(Fault::kBrownOut);
+    host.wait_us(1'000);
+    for (const Register& r : kRegisters) EXPECT_EQ(host.chip.peek(r.bank, r.address), r.reset);
+    host.start_clean();
+    host.wait_us(5'000);
+    EXPECT_EQ(host.count(), 5);
+    EXPECT_EQ(packet_3(host.read(kFifoData, 16)).accel, (std::array<int, 3>{0, 0, 2048}));
+  }
+}
+
 // --- Faults
 
 TEST(Icm42688Faults, ADeadBusSaysSoFromTheChosenTransferForAsManyAsChosen) {

@@ -130,6 +130,8 @@ inline void Icm42688::put(std::vector<std::uint8_t>& packet, int value) const { 
 
 /// 6.1, 6.2, 6.4. A sensor that is in the packet but has no new sample is marked invalid, or repeats its last valid one
 /// (12.8): "when accel and gyro are enabled with different ODRs", when one is off, while one still starts up.
+/// The header's stamp bits are 11 only for the packet after an FSYNC edge, as 6.2 says; the table of 6.4 prints 11 for
+/// all packets once FIFO_TMST_FSYNC_EN is set.
 inline void Icm42688::write_packet(Picos at, bool accel_new, bool gyro_new) {
   using namespace icm42688;
   const std::uint8_t content = registers_[kFifoConfig1];

@@ -60,7 +60,7 @@ struct Motion {
 /// sent as -32766.
 inline constexpr int kInvalid16 = -32768;
 inline constexpr int kInvalid20 = -524288;
-inline constexpr int kInvalid8 = -128;
+inline constexpr int kInvalid8 = -128;  // of FIFO_TEMP_DATA; from TDK's own driver (Icm426xxDefs.h), the sheet has none
 
 [[nodiscard]] inline int to_16_bits(double of_full_scale, bool hold_last) {
   const double counts = std::clamp(std::round(of_full_scale * 32768.0), -32768.0, 32767.0);

@@ -185,17 +185,17 @@ TEST(Icm42688Samples, TemperatureKeepsBothItsScales) {
 TEST(Icm42688Samples, UserOffsetsAreAddedAxisByAxis) {
   PlainHost host;
   host.bank(4);
-  const std::array<std::uint8_t, 9> bytes = {0x20, 0xFF, 0xE0, 0x40, 0x00, 0xD0, 0x30, 0xFF, 0x38};
+  const std::array<std::uint8_t, 9> bytes = {0x20, 0xEF, 0xE0, 0x40, 0x10, 0xD0, 0x30, 0xDE, 0x38};
   for (std::uint8_t i = 0; i < 9; ++i) host.write(static_cast<std::uint8_t>(kOffsetUser0 + i), bytes[i]);
   host.bank(0);
   host.write(kPwrMgmt0, 0x0F);
   host.wait_us(50'000);
   EXPECT_NEAR(host.word(kGyroDataX1), (0xF20 - 4096) / 32.0 * 16.384, 0.51);  // -7 dps
-  EXPECT_NEAR(host.word(kGyroDataX1 + 2), -1.0 * 16.384, 0.51);
+  EXPECT_NEAR(host.word(kGyroDataX1 + 2), (0xEE0 - 4096) / 32.0 * 16.384, 0.51);
   EXPECT_NEAR(host.word(kGyroDataX1 + 4), 2.0 * 16.384, 0.51);
-  EXPECT_NEAR(host.word(kAccelDataX1), 0.0005 * 0x0D0 * 2048, 0.51);
-  EXPECT_NEAR(host.word(kAccelDataX1 + 2), 0.0005 * (0xF30 - 4096) * 2048, 0.51);
-  EXPECT_NEAR(host.word(kAccelDataX1 + 4), (1.0 + 0.0005 * (0xF38 - 4096)) * 2048, 0.51);
+  EXPECT_NEAR(host.word(kAccelDataX1), 0.0005 * 0x1D0 * 2048, 0.51);
+  EXPECT_NEAR(host.word(kAccelDataX1 + 2), 0.0005 * (0xE30 - 4096) * 2048, 0.51);
+  EXPECT_NEAR(host.word(kAccelDataX1 + 4), (1.0 + 0.0005 * (0xD38 - 4096)) * 2048, 0.51);
 }
 
 TEST(Icm42688Samples, TheUserFilterDelaysAsItsTableSays) {
@@ -461,6 +461,65 @@ TEST(Icm42688Fifo, ASensorWithoutNewSampleIsMarkedOrRepeatsItsLast) {
     EXPECT_EQ(gyro_new, hold ? n : 21);
     EXPECT_EQ(packet_3(bytes).gyro[0], hold ? 0 : -32768);  // nothing yet to hold
   }
+}
+
+TEST(Icm42688Fifo, AnAxisThatIsSwitchedOffIsMarkedAlone) {
+  for (int axis = 0; axis < 6; ++axis) {
+    PlainHost host;
+    host.bank(1);
+    host.write(kSensorConfig0, static_cast<std::uint8_t>(0x80 | 1 << axis));
+    host.bank(0);
+    host.start_clean();
+    host.wait_us(1'000);
+    const Packet3 p = packet_3(host.read(kFifoData, 16));
+    for (int i = 0; i < 6; ++i) {
+      const int value = i < 3 ? p.accel[static_cast<std::size_t>(i)] : p.gyro[static_cast<std::size_t>(i - 3)];
+      EXPECT_EQ(value == -32768, i == axis);
+    }
+  }
+}
+
+TEST(Icm42688Fifo, AbortAndResetBeginsTheRateAnew) {
+  PlainHost host;
+  host.start_clean();
+  host.wait_us(700);
+  host.write(kSignalPathReset, 0x08);
+  host.wait_us(999);
+  EXPECT_EQ(host.count(), 0);
+  host.wait_us(1);
+  EXPECT_EQ(host.count(), 1);
+}
+
+TEST(Icm42688Fifo, StampsCanBeDeltasOrAbsent) {
+  struct Case {
+    std::uint8_t tmst;
+    int header, low, high;
+  };
+  for (const Case& c : {Case{0x27, 0x68, 937, 938}, Case{0x22, 0x60, 0, 0}}) {
+    PlainHost host;
+    host.write(kTmstConfig, c.tmst);
+    host.start_clean();
+    host.wait_us(10'000);
+    const auto bytes = host.read(kFifoData, 160);
+    for (std::size_t i = 0; i < 10; ++i) {
+      const Packet3 p = packet_3(bytes, 16 * i);
+      EXPECT_EQ(p.header, c.header);
+      EXPECT_GE(p.stamp, c.low);
+      EXPECT_LE(p.stamp, c.high);
+    }
+  }
+}
+
+TEST(Icm42688Fifo, APacketMayArriveBetweenTheCountAndTheData) {
+  PlainHost host;
+  host.start_clean();
+  host.wait_us(4'900);
+  host.chip.set_before_transfer([&] { host.wait_us(150); });
+  EXPECT_EQ(host.count(), 5);
+  const auto bytes = host.read(kFifoData, 80);
+  EXPECT_EQ(bytes[64], 0x68);
+  host.wait_us(700);
+  EXPECT_EQ(host.count(), 1);
 }
 
 TEST(Icm42688Fifo, AChangedRateIsAnnouncedInOnePacketHeader) {
