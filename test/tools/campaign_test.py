@@ -1,0 +1,157 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: Apache-2.0
+"""tools/campaign: its averages against drawn errors and published quantiles, pairing by epoch, bad input, and runs of the real program."""
+import importlib.machinery
+import importlib.util
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import unittest
+
+import numpy as np
+
+ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+TOOLS = os.path.join(ROOT, "tools")
+sys.path.insert(0, TOOLS)
+sys.dont_write_bytecode = True
+
+import report_metrics as metrics  # noqa: E402
+
+LOADER = importlib.machinery.SourceFileLoader("campaign", os.path.join(TOOLS, "campaign"))
+campaign = importlib.util.module_from_spec(importlib.util.spec_from_loader("campaign", LOADER))
+LOADER.exec_module(campaign)
+
+PROGRAMS = os.environ.get("TETAP_PROGRAMS", os.path.join(ROOT, "build/host/sim_host"))
+
+
+def drawn(seeds, times, scale=1.0, source=1):
+    """Runs whose poses err as they say, times `scale`."""
+    random = np.random.default_rng(source)
+    return [{"epochs": np.arange(times) * 5.0, "nees": scale * random.chisquare(campaign.DOF, times)} for _ in range(seeds)]
+
+
+class Averages(unittest.TestCase):
+    def test_the_interval_is_the_published_one(self):
+        # Abramowitz and Stegun, table 26.8: chi-square of 30 degrees of freedom, 16.7908 and 46.9792.
+        low, high = campaign.interval(30, 10)
+        self.assertAlmostEqual(low, 1.67908, 4)
+        self.assertAlmostEqual(high, 4.69792, 4)
+
+    def test_honest_errors_are_inside_at_95_percent_of_the_times(self):
+        result = campaign.anees(drawn(30, 4000))
+        self.assertAlmostEqual(result["inside"], 0.95, delta=0.015)
+        self.assertAlmostEqual(result["above"], 0.025, delta=0.01)
+        self.assertAlmostEqual(result["below"], 0.025, delta=0.01)
+        self.assertLess(abs(result["mean"] - 3), 2 * result["mean_plus_minus"])
+
+    def test_too_sure_is_above_and_too_modest_is_below(self):
+        sure, modest = campaign.anees(drawn(30, 1000, 2.0)), campaign.anees(drawn(30, 1000, 0.5))
+        self.assertGreater(sure["above"], 0.95)
+        self.assertGreater(modest["below"], 0.95)
+        self.assertGreater(sure["mean"] - 3, sure["mean_plus_minus"])
+        self.assertLess(modest["mean"] - 3, -modest["mean_plus_minus"])
+
+    def test_errors_that_last_for_the_whole_run_widen_the_interval_of_the_mean(self):
+        random = np.random.default_rng(3)
+        lasting = [{"epochs": np.arange(1000.0), "nees": np.full(1000, random.chisquare(3))} for _ in range(30)]
+        self.assertGreater(campaign.anees(lasting)["mean_plus_minus"], 10 * campaign.anees(drawn(30, 1000))["mean_plus_minus"])
+
+    def test_only_times_that_every_seed_has_are_averaged(self):
+        runs = drawn(3, 10)
+        runs[1]["nees"][4] = np.nan
+        runs[2] = {key: values[:8] for key, values in runs[2].items()}
+        result = campaign.anees(runs)
+        self.assertEqual(result["times"], 7)
+        use = [0, 1, 2, 3, 5, 6, 7]
+        self.assertAlmostEqual(result["mean"], np.mean([one["nees"][use] for one in runs]))
+        runs[0]["nees"][:] = np.nan
+        self.assertIsNone(campaign.anees(runs))
+
+    def test_nis_counts_what_was_rejected_too(self):
+        names = {"Sensor": {4: "RangeBearing", 5: "GnssPosition"}}
+        table = {"estimator": np.array([1, 1, 1, 0, 1]), "sensor": np.array([4, 4, 5, 4, 4]), "verdict": np.array([0, 1, 0, 0, 2]),
+                 "dof": np.array([2, 2, 2, 2, 0]), "nis": np.array([1.0, 20.0, 3.0, 7.0, np.nan])}
+        result = campaign.sensors([{"sensors": campaign.innovations(table, 1, names)}] * 2)
+        self.assertEqual(result["RangeBearing"]["compared"], 4)
+        self.assertEqual(result["RangeBearing"]["nis_mean"], 10.5)
+        self.assertEqual(result["RangeBearing"]["nis_mean_accepted"], 1.0)
+        self.assertEqual(result["RangeBearing"]["rejected_share"], 0.5)
+        self.assertEqual(result["GnssPosition"]["nis_expected"], 2.0)
+
+    def test_a_fault_lasts_as_long_as_it_says(self):
+        known = {"gnss_jump": (60.0, 10.0)}
+        self.assertEqual(campaign.fault_times("gnss_jump", known), (60, 70))
+        self.assertEqual(campaign.fault_times("gnss_jump@5", known), (5, 15))
+        self.assertEqual(campaign.fault_times("gnss_jump@5+2.5", known), (5, 7.5))
+        for wrong in ("nope", "gnss_jump@", "gnss_jump@x", "gnss_jump@1+", "gnss_jump,gnss_jump"):
+            self.assertRaises(metrics.BadInput, campaign.fault_times, wrong, known)
+
+
+class WithFiles(unittest.TestCase):
+    def setUp(self):
+        self.directory = tempfile.mkdtemp()
+        self.addCleanup(shutil.rmtree, self.directory, ignore_errors=True)
+
+    def campaign(self, *arguments):
+        return subprocess.run([os.path.join(TOOLS, "campaign"), "--out", self.directory, *arguments], capture_output=True, text=True,
+                              timeout=300, env={**os.environ, "TETAP_PROGRAMS": PROGRAMS})
+
+    def truth(self, text):
+        path = os.path.join(self.directory, "truth.csv")
+        with open(path, "w", encoding="utf-8") as file:
+            file.write(text)
+        return path
+
+    def test_truth_with_epochs_is_paired_by_epoch_whatever_the_clock_says(self):
+        truth = metrics.Truth(self.truth("time_s,x_m,y_m,yaw_rad,epoch\n1.0,1,10,0.1,1\n1.1,2,20,0.2,2\n1.2,3,30,0.3,3\n"))
+        rows = {"epoch": np.array([3.0, 1.0, 9.0]), "time_s": np.array([99.0, 1.2, 1.0])}
+        x, y, yaw = truth.of(rows)
+        np.testing.assert_array_equal(x, [3, 1, np.nan])
+        np.testing.assert_array_equal(y, [30, 10, np.nan])
+        np.testing.assert_array_equal(yaw, [0.3, 0.1, np.nan])
+        with self.assertRaisesRegex(metrics.BadInput, "row 3: epoch does not grow"):
+            metrics.Truth(self.truth("time_s,x_m,y_m,yaw_rad,epoch\n1.0,1,10,0.1,1\n1.1,2,20,0.2,2\n1.2,3,30,0.3,2\n"))
+
+    @unittest.skipUnless(os.access(os.path.join(PROGRAMS, "tetap-world"), os.X_OK), "tetap-world is not built")
+    def test_a_small_campaign_of_the_real_program(self):
+        result = self.campaign("--seeds", "3", "--duration", "15")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        with open(os.path.join(self.directory, "campaign.json"), encoding="utf-8") as file:
+            cases = json.load(file)["cases"]
+        self.assertEqual([(case["world"], case["robot"]) for case in cases], [("matched", "rover_matched"), ("mismatched", "rover")])
+        for case in cases:
+            self.assertEqual(case["seeds"], 3)
+            for name in ("odometry", "fused"):
+                self.assertGreater(case[name]["position_rmse_m"]["median"], 0)
+                self.assertGreaterEqual(case[name]["position_rmse_m"]["worst"], case[name]["position_rmse_m"]["median"])
+                self.assertGreater(case[name]["anees"]["times"], 100)
+            self.assertEqual(set(case["fused"]["sensors"]), {"GnssPosition", "RangeBearing"})
+            self.assertLess(case["fused"]["position_rmse_m"]["worst"], case["odometry"]["position_rmse_m"]["worst"])
+        self.assertEqual(os.listdir(self.directory), ["campaign.json"])  # the runs' own files are gone
+
+    @unittest.skipUnless(os.access(os.path.join(PROGRAMS, "tetap-world"), os.X_OK), "tetap-world is not built")
+    def test_the_error_during_a_fault_and_the_error_after_it_are_told_apart(self):
+        result = self.campaign("--seeds", "2", "--duration", "50", "--world", "matched", "--fault", "slip_left@15+2")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        with open(os.path.join(self.directory, "campaign.json"), encoding="utf-8") as file:
+            case = json.load(file)["cases"][0]
+        self.assertGreater(case["fused"]["largest_error_m"]["median"], 0.3)
+        self.assertLess(case["fused"]["position_rmse_after_m"]["worst"], 0.1)
+        self.assertGreater(case["odometry"]["position_rmse_after_m"]["median"], 0.5)  # which nothing brings back
+
+    @unittest.skipUnless(os.access(os.path.join(PROGRAMS, "tetap-world"), os.X_OK), "tetap-world is not built")
+    def test_bad_input_is_one_line_and_a_status(self):
+        for arguments, words in ((["--fault", "nope"], "known are: gnss_jump"), (["--seeds", "0"], "must be 1 or more"),
+                                 (["--fault", "gnss_jump", "--duration", "20"], "longer --duration"),
+                                 (["--robot", "nope", "--seeds", "1", "--duration", "2"], "no robot 'nope'")):
+            result = self.campaign(*arguments)
+            self.assertNotEqual(result.returncode, 0, arguments)
+            self.assertIn(words, result.stderr)
+            self.assertNotIn("Traceback", result.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()
