@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // A fake quadrature encoder on a timer's counter: two square waves a quarter period apart, counted on every edge of
 // both, up or down by the level of the other (STMicroelectronics RM0365, general-purpose timers, Encoder interface
-// mode, table 118 "Counting direction versus encoder signals"), with the time of the last counted edge captured. Fails in named
-// ways at the wires, so what the counter then does is what the counting table makes of it.
+// mode, table 118 "Counting direction versus encoder signals"), with the time of the last counted edge captured. Fails
+// in named ways at the wires, so what the counter then does is what the counting table makes of it.
 //
 //   Encoder<std::uint16_t> encoder;                                  // satisfies hal::EncoderCounter
 //   encoder.set_motion([](double s) { return 4000.0 * s; });         // position in edges, by host time
