@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// The ICM-42688-P over SPI, as a machine that is polled and never waits: reset, identity, configuration written and
-// read back, then the FIFO with time stamps, every register checked in turn while it runs, a restart for whatever does
-// not heal. DS-000347 rev. 1.8; sections at the places. Poll it at INT1 or at any pace that empties 2 kB in time.
+// The ICM-42688-P over SPI, as a machine that is polled and never waits: the start, then the FIFO with time stamps,
+// every register checked in turn while it runs, a restart for whatever does not heal. DS-000347 rev. 1.8; sections at
+// the places. Poll it at INT1 or at any pace that empties 2 kB in time.
 #pragma once
 
-#include "drivers/imu/icm42688/bus.hpp"
-#include "drivers/imu/icm42688/health.hpp"
-#include "drivers/imu/icm42688/packet.hpp"
 #include "drivers/imu/icm42688/self_test.hpp"
+#include "drivers/imu/icm42688/startup.hpp"
 #include "drivers/imu/icm42688/stream.hpp"
 
 namespace tetap::drivers::icm42688 {
@@ -16,38 +14,34 @@ template <hal::SpiDevice Spi>
 class Driver {
  public:
   constexpr Driver(Spi& spi, const Settings& settings)
-      : bus_(spi), settings_(settings), fields_(fields(settings)), stream_(settings) {
+      : bus_(spi), settings_(settings), startup_(settings), stream_(settings) {
     if (!settings.valid()) health_.state = State::kMisconfigured;
   }
 
-  /// `sink(const ImuReading&)` is called for every sample, oldest first. At most a few transfers, never a wait.
+  /// `sink(const ImuReading&)` is called for every sample, oldest first. A few transfers at most, never a wait.
   template <class Sink>
   constexpr void poll(base::Micros now, Sink&& sink) {
-    if (!started_) {
-      started_ = true;
-      due_ = now + kPowerUpTime;
+    if (health_.state == State::kMisconfigured) return;
+    if (!polled_) {
+      polled_ = true;
+      startup_.begin(now + kPowerUpTime, health_);
     }
-    if (now < due_) return;
-    switch (health_.state) {
-      case State::kPowerUp:
-        return reset(now);
-      case State::kReset:
-        return await_reset(now);
-      case State::kIdentify:
-        return identify(now);
-      case State::kConfigure:
-        return configure(now);
-      case State::kVerify:
-        return verify(now);
-      case State::kWarmUp:
-        return warm_up(now);
-      case State::kRunning:
-        return run(now, sink);
-      case State::kSelfTest:
-        return self_test(now);
-      case State::kMisconfigured:
+    if (health_.state == State::kRunning) return run(now, sink);
+    if (health_.state == State::kSelfTest) return self_test(now);
+    switch (startup_.step(bus_, now, health_)) {
+      case Startup::Progress::kBusy:
         return;
+      case Startup::Progress::kFailed:
+        return restart(now, kRetryTime);
+      case Startup::Progress::kRunning:
+        break;
     }
+    health_.state = State::kRunning;
+    stream_.interrupt();
+    check_due_ = now + kCheckTime;
+    heard_ = now;
+    asked_again_ = false;
+    checked_ = 0;
   }
 
   [[nodiscard]] constexpr const Health& health() const { return health_; }
@@ -62,97 +56,23 @@ class Driver {
   }
   [[nodiscard]] constexpr const SelfTestResult& self_test_result() const { return self_test_.result(); }
 
-  /// What the chip's clock runs at, against the MCU's.
+  /// What the chip's tick is longer than nominal, by the MCU's clock.
   [[nodiscard]] constexpr std::int32_t clock_error_ppm() const { return stream_.clock_error_ppm(); }
 
  private:
   static constexpr base::Micros kPowerUpTime{3'000};  // table 4: 1 ms, after a ramp of up to 3 ms that may be going on
-  static constexpr base::Micros kResetTime{1'000};    // 14.1
-  static constexpr base::Micros kResetLimit{50'000};  // ours: no answer by then is an answer
-  static constexpr base::Micros kWarmUpTime{50'000};  // 14.36: on for at least 45 ms; table 1: 30 ms to start
   static constexpr base::Micros kRetryTime{100'000};
   static constexpr base::Micros kCheckTime{5'000};  // one register each
-  static constexpr int kFieldsPerPoll = 4;
-  static constexpr int kBatch = 8;         // packets per transfer
-  static constexpr int kBatches = 4;       // transfers per poll
-  static constexpr int kFifoBytes = 2080;  // 6.3: the most it can ever hold
+  static constexpr int kBatch = 8;                  // packets per transfer
+  static constexpr int kBatches = 4;                // transfers per poll
+  static constexpr int kFifoBytes = 2080;           // 6.3: the most it can ever hold
 
-  constexpr bool ok(BusResult result) {
-    if (result == BusResult::kDone) return true;
-    health_.add(result == BusResult::kFault ? Reason::kBusFault : Reason::kBankLost);
-    return false;
-  }
-
-  constexpr void go(State state, base::Micros due) {
-    health_.state = state;
-    due_ = due;
-    next_ = 0;
-  }
+  constexpr bool ok(BusResult result) { return Startup::ok(result, health_); }
 
   constexpr void restart(base::Micros now, base::Micros wait) {
     ++health_.restarts;
     stream_.restart();
-    go(State::kPowerUp, now + wait);
-  }
-
-  constexpr void reset(base::Micros now) {
-    bus_.forget_bank();
-    if (!ok(bus_.write(kDeviceConfig, kSoftReset))) return restart(now, kRetryTime);
-    bus_.forget_bank();  // the chip is in bank 0 now (14.59), but it may not have heard us
-    reset_limit_ = now + kResetLimit;
-    // 14.1: no other access for 1 ms; one more for a clock that is read in steps.
-    go(State::kReset, now + kResetTime + base::Micros{1'000});
-  }
-
-  constexpr void await_reset(base::Micros now) {
-    std::uint8_t status = 0;
-    if (ok(bus_.read(kIntStatus, status)) && (status & kResetDone) != 0 && status != 0xFF) {
-      return go(State::kIdentify, now);
-    }
-    if (now < reset_limit_) return;
-    health_.add(Reason::kResetIncomplete);
-    restart(now, kRetryTime);
-  }
-
-  constexpr void identify(base::Micros now) {
-    std::uint8_t identity = 0;
-    if (!ok(bus_.read(kWhoAmI, identity))) return restart(now, kRetryTime);
-    if (identity == kIdentity) return go(State::kConfigure, now);
-    health_.add(Reason::kWrongIdentity);
-    restart(now, kRetryTime);
-  }
-
-  /// All but the last field, which starts the sensors.
-  constexpr void configure(base::Micros now) {
-    for (int i = 0; i < kFieldsPerPoll && next_ + 1 < kFieldCount; ++i, ++next_) {
-      const Field& field = fields_[next_];
-      if (!ok(bus_.modify(field.where, field.mask, field.value))) return restart(now, kRetryTime);
-    }
-    if (next_ + 1 == kFieldCount) go(State::kVerify, now);
-  }
-
-  constexpr void verify(base::Micros now) {
-    for (int i = 0; i < kFieldsPerPoll && next_ + 1 < kFieldCount; ++i, ++next_) {
-      const Compared compared = compare(fields_[next_]);
-      if (compared == Compared::kNoAnswer) return restart(now, kRetryTime);
-      if (compared == Compared::kEqual) continue;
-      health_.add(Reason::kConfigRefused);
-      return restart(now, kRetryTime);
-    }
-    if (next_ + 1 < kFieldCount) return;
-    const Field& start = fields_[kFieldCount - 1];
-    if (!ok(bus_.modify(start.where, start.mask, start.value))) return restart(now, kRetryTime);
-    go(State::kWarmUp, now + kWarmUpTime);
-  }
-
-  /// What came before the gyroscope's drive was ready is thrown away.
-  constexpr void warm_up(base::Micros now) {
-    std::uint8_t old_status = 0;  // 14.21: reading clears; the FIFO may have been full meanwhile
-    if (!flush() || !ok(bus_.read(kIntStatus, old_status))) return restart(now, kRetryTime);
-    go(State::kRunning, now);
-    check_due_ = now + kCheckTime;
-    heard_ = now;
-    asked_again_ = false;
+    startup_.begin(now + wait, health_);
   }
 
   template <class Sink>
@@ -181,40 +101,38 @@ class Driver {
   constexpr bool drain(int packets, base::Micros now, Sink&& sink) {
     std::array<std::uint8_t, kBatch * 20> bytes{};
     const auto size = static_cast<std::size_t>(settings_.packet_size());
-    bool any = false;
+    bool went_on = false;
     for (int batch = 0; batch < kBatches && packets > 0; ++batch) {
-      const int count = packets < kBatch ? packets : kBatch;
-      const std::span<std::uint8_t> part = std::span(bytes).first(static_cast<std::size_t>(count) * size);
+      const auto count = static_cast<std::size_t>(packets < kBatch ? packets : kBatch);
+      const std::span<std::uint8_t> part = std::span(bytes).first(count * size);
       if (!ok(bus_.read(kFifoData, part))) {
-        static_cast<void>(flush());  // how far the reading got is not known
-        return any;
+        flush();  // how far the reading got is not known
+        return went_on;
       }
       std::array<Packet, kBatch> parsed{};
-      int good = 0;
+      std::size_t good = 0;
+      PacketKind kind = PacketKind::kSample;
       for (; good < count; ++good) {
-        parsed[static_cast<std::size_t>(good)] =
-            parse(part.subspan(static_cast<std::size_t>(good) * size, size), settings_.resolution);
-        const PacketKind kind = parsed[static_cast<std::size_t>(good)].kind;
-        if (kind == PacketKind::kSample || kind == PacketKind::kInvalid) continue;
-        health_.add(kind == PacketKind::kEmpty ? Reason::kFifoShort : Reason::kBadHeader);
-        break;
+        parsed[good] = parse(part.subspan(good * size, size), settings_.resolution);
+        kind = parsed[good].kind;
+        if (kind == PacketKind::kEmpty || kind == PacketKind::kForeign) break;
       }
-      any |= stream_.take(std::span<const Packet>(parsed).first(static_cast<std::size_t>(good)), packets, now, health_,
-                          sink);
-      packets -= count;
+      went_on |= stream_.take(std::span<const Packet>(parsed).first(good), packets, now, health_, sink);
+      packets -= static_cast<int>(count);
       if (good == count) continue;
-      if (parsed[static_cast<std::size_t>(good)].kind == PacketKind::kForeign) {
+      health_.add(kind == PacketKind::kEmpty ? Reason::kFifoShort : Reason::kBadHeader);
+      if (kind == PacketKind::kForeign) {
         bus_.forget_bank();
-        static_cast<void>(flush());
+        flush();
       }
-      return any;
+      return went_on;
     }
-    return any;
+    return went_on;
   }
 
-  constexpr bool flush() {
+  constexpr void flush() {
     stream_.interrupt();
-    return ok(bus_.write(kSignalPathReset, kFifoFlush));  // 14.33
+    static_cast<void>(ok(bus_.write(kSignalPathReset, kFifoFlush)));  // 14.33; if it fails, headers will say so again
   }
 
   /// Silence: first the bank is selected again, then everything.
@@ -231,27 +149,19 @@ class Driver {
     }
   }
 
-  enum class Compared : std::uint8_t { kEqual, kDifferent, kNoAnswer };
-
-  constexpr Compared compare(const Field& field) {
-    std::uint8_t value = 0;
-    if (!ok(bus_.read(field.where, value))) return Compared::kNoAnswer;
-    return (value & field.mask) == field.value ? Compared::kEqual : Compared::kDifferent;
-  }
-
-  /// In turn: the bank, the identity, every field but the first, which says "off".
+  /// In turn: the bank, every field but the first, which says "off", the identity.
   constexpr void check(base::Micros now) {
     check_due_ = now + kCheckTime;
-    if (next_ == 0) {
+    const std::size_t nth = checked_;
+    checked_ = nth < kFieldCount ? nth + 1 : 0;
+    if (nth == 0) {
       static_cast<void>(ok(bus_.confirm_bank()));
-    } else {
-      const Compared compared = compare(next_ < kFieldCount ? fields_[next_] : Field{kWhoAmI, 0xFF, kIdentity});
-      if (compared == Compared::kDifferent) {
-        health_.add(Reason::kConfigChanged);
-        return restart(now, base::Micros{0});
-      }
+      return;
     }
-    next_ = next_ < kFieldCount ? next_ + 1 : 0;
+    const Field& field = nth < kFieldCount ? startup_.wanted()[nth] : kIdentityField;
+    if (Startup::compare(bus_, field, health_) != Compared::kDifferent) return;
+    health_.add(Reason::kConfigChanged);
+    restart(now, base::Micros{0});
   }
 
   constexpr void self_test(base::Micros now) {
@@ -261,15 +171,17 @@ class Driver {
     restart(now, base::Micros{0});
   }
 
+  static constexpr Field kIdentityField{kWhoAmI, 0xFF, kIdentity};
+
   Bus<Spi> bus_;
   Settings settings_;
-  std::array<Field, kFieldCount> fields_;
+  Startup startup_;
   Stream stream_;
   SelfTest self_test_{};
   Health health_{};
-  base::Micros due_{}, reset_limit_{}, check_due_{}, heard_{};
-  std::size_t next_ = 0;  ///< field that is written, verified or checked next
-  bool started_ = false;
+  base::Micros check_due_{}, heard_{};
+  std::size_t checked_ = 0;
+  bool polled_ = false;
   bool asked_again_ = false;
 };
 

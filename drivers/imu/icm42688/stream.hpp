@@ -13,7 +13,7 @@ namespace tetap::drivers::icm42688 {
 class Stream {
  public:
   explicit constexpr Stream(const Settings& settings)
-      : settings_(settings), scales_(scales(settings)), clock_(settings.tick_q32()) {}
+      : settings_(settings), scales_(scales(settings)), clock_(settings.tick_q32()), delay_{group_delay_us(settings)} {}
 
   [[nodiscard]] constexpr std::int32_t clock_error_ppm() const { return clock_.rate_error_ppm(); }
 
@@ -90,14 +90,14 @@ class Stream {
   /// Everything but the measured values. False: the sample has no time of its own.
   constexpr bool stamp(const Packet& packet, std::int64_t ticks, ImuReading& reading, Health& health) {
     if (packet.rate_changed && follows_) health.add(Reason::kRateChanged);
-    reading.stamp = clock_.time(ticks) - base::Micros{group_delay_us(settings_)};
+    reading.stamp = clock_.time(ticks) - delay_;
     reading.interval = base::Micros{settings_.period_ns() / 1000};
     reading.after_gap = true;
     if (!follows_) return true;
     if (ticks <= last_ticks_) return health.add(Reason::kBadStamp), false;
     const std::int64_t elapsed_us = (clock_.time(ticks) - clock_.time(last_ticks_)).us;
-    const std::int64_t periods = (elapsed_us * 2000 + settings_.period_ns()) / (2 * settings_.period_ns());
-    if (periods > 1) {
+    if (elapsed_us * 2000 >= 3 * settings_.period_ns()) {
+      const std::int64_t periods = (elapsed_us * 2000 + settings_.period_ns()) / (2 * settings_.period_ns());
       health.add(Reason::kLostSamples, static_cast<std::uint32_t>(periods - 1));
       return true;
     }
@@ -156,6 +156,7 @@ class Stream {
   Settings settings_;
   Scales scales_;
   ClockMap clock_;
+  base::Micros delay_;
   base::Micros taken_{};
   base::Micros last_stamp_{};
   std::int64_t last_ticks_ = 0;
