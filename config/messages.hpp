@@ -17,15 +17,15 @@ inline constexpr std::uint32_t kBlock = 0x40;  ///< ids of one node: offsets bel
 enum class SyncKind : std::uint8_t { kTick = 0, kStep = 1, kClock = 2, kBegin = 3 };
 enum class ResetWhat : std::uint8_t { kEstimators = 0, kCounters = 1, kLandmarkMap = 2 };
 enum class GnssFix : std::uint8_t { kNone = 0, kTimeOnly = 1, kFix2D = 2, kFix3D = 3, kDifferential = 4, kRtkFloat = 5, kRtkFixed = 6, kNotAvailable = 15 };
-enum class Mode : std::uint8_t { kBoot = 0, kWaitingForPose = 1, kAligning = 2, kNominal = 3, kDeadReckoning = 4, kDegraded = 5, kFault = 6 };
-enum class ResetCause : std::uint8_t { kPowerOn = 0, kCommand = 1, kSetPose = 2, kTimeJump = 3, kNotFinite = 4, kNotPositive = 5 };
-enum class Sensor : std::uint8_t { kImu = 0, kWheelCounts = 1, kWheelSpeed = 2, kBodySpeed = 3, kRangeBearing = 4, kGnssPosition = 5, kGnssVelocity = 6, kNotAvailable = 15 };
+enum class Mode : std::uint8_t { kBoot = 0, kWaitingForPose = 1, kAligning = 2, kNominal = 3, kDeadReckoning = 4, kDegraded = 5, kFault = 6, kWaitingForImu = 7, kLevelling = 8, kFindingHeading = 9 };
+enum class ResetCause : std::uint8_t { kPowerOn = 0, kCommand = 1, kSetPose = 2, kTimeJump = 3, kNotFinite = 4, kNotPositive = 5, kPositionJump = 6, kHeadingWrong = 7 };
+enum class Sensor : std::uint8_t { kImu = 0, kWheelCounts = 1, kWheelSpeed = 2, kBodySpeed = 3, kRangeBearing = 4, kGnssPosition = 5, kGnssVelocity = 6, kMagnetometer = 7, kBarometer = 8, kHeading = 9, kNotAvailable = 15 };
 enum class Verdict : std::uint8_t { kAccepted = 0, kRejected = 1, kNotUsed = 2, kTooLate = 3, kUnknownLandmark = 4, kSingular = 5, kNotFinite = 6, kStale = 7 };
 enum class SyncState : std::uint8_t { kOwnTimer = 0, kFollowing = 1, kHoldover = 2, kLockstep = 3 };
 enum class OriginSource : std::uint8_t { kNone = 0, kConfigured = 1, kFirstFix = 2 };
 enum class EstimatorKind : std::uint8_t { kNone = 0, kOdometry = 1, kEkf = 2, kKf = 3, kUkf = 4, kParticle = 5, kInertial = 6, kAttitude = 7 };
 /// Bit numbers of Status_Faults.
-enum class Fault : std::uint8_t { kInputStale = 0, kRejecting = 1, kIncomplete = 2, kTooLate = 3, kMalformed = 4, kCapacity = 5, kCommandRefused = 6, kRestarted = 7 };
+enum class Fault : std::uint8_t { kInputStale = 0, kRejecting = 1, kIncomplete = 2, kTooLate = 3, kMalformed = 4, kCapacity = 5, kCommandRefused = 6, kRestarted = 7, kWheelSlip = 8, kImuClipped = 9, kVibration = 10, kSensorStuck = 11, kMagneticDisturbance = 12, kAttitudeDisagrees = 13 };
 
 /// Time from the host. Tick: the node ticks at this time and falls back on its own timer when frames are missing for
 /// 3 periods. Step: the same in lockstep, ticks come from these frames only. Clock: sets the node's clock, no tick.
@@ -486,6 +486,84 @@ struct ImuTime {
     visit(At<kClipAccel>{}, m.clip_accel);
     visit(At<kTemp>{}, m.temp_degC);
     visit(At<kSeq>{}, m.seq);
+  }
+};
+
+/// Magnetic flux density, sensor axes turned into the body by the mounting.
+struct InMag {
+  static constexpr std::uint8_t kOffset = 0x1C, kSize = 8;
+  static constexpr Signal kStamp{.start = 0, .length = 20, .wraps = true};
+  static constexpr Signal kSeq{.start = 20, .length = 4, .wraps = true};
+  static constexpr Signal kInst{.start = 24, .length = 2};
+  static constexpr Signal kFluxX{.start = 26, .length = 12, .is_signed = true, .has_gap = true, .per_unit = 10};
+  static constexpr Signal kFluxY{.start = 38, .length = 12, .is_signed = true, .has_gap = true, .per_unit = 10};
+  static constexpr Signal kFluxZ{.start = 50, .length = 12, .is_signed = true, .has_gap = true, .per_unit = 10};
+
+  std::uint32_t stamp_us = 0;  ///< low 20 bits of the microsecond of validity
+  std::uint8_t seq = 0;  ///< sample counter of this sensor and instance; modulo 2^4
+  std::uint8_t inst = 0;  ///< instance of this kind of sensor, from 0; 0 to 3
+  float flux_x_uT = 0;  ///< along body x; +-204.7 uT in steps of 0.1; NaN: not available
+  float flux_y_uT = 0;  ///< along body y; +-204.7 uT in steps of 0.1; NaN: not available
+  float flux_z_uT = 0;  ///< along body z; +-204.7 uT in steps of 0.1; NaN: not available
+
+  template <class Self, class Visit>
+  static constexpr void each(Self& m, Visit&& visit) {
+    visit(At<kStamp>{}, m.stamp_us);
+    visit(At<kSeq>{}, m.seq);
+    visit(At<kInst>{}, m.inst);
+    visit(At<kFluxX>{}, m.flux_x_uT);
+    visit(At<kFluxY>{}, m.flux_y_uT);
+    visit(At<kFluxZ>{}, m.flux_z_uT);
+  }
+};
+
+/// Air pressure.
+struct InBaro {
+  static constexpr std::uint8_t kOffset = 0x1D, kSize = 8;
+  static constexpr Signal kStamp{.start = 0, .length = 20, .wraps = true};
+  static constexpr Signal kSeq{.start = 20, .length = 4, .wraps = true};
+  static constexpr Signal kInst{.start = 24, .length = 2};
+  static constexpr Signal kPressure{.start = 26, .length = 18, .has_gap = true, .per_unit = 2};
+  static constexpr Signal kTemp{.start = 44, .length = 12, .is_signed = true, .has_gap = true, .per_unit = 20};
+
+  std::uint32_t stamp_us = 0;  ///< low 20 bits of the microsecond of validity
+  std::uint8_t seq = 0;  ///< sample counter of this sensor and instance; modulo 2^4
+  std::uint8_t inst = 0;  ///< instance of this kind of sensor, from 0; 0 to 3
+  float pressure_Pa = 0;  ///< static pressure; 0 to 131071 Pa in steps of 0.5; NaN: not available
+  float temp_degC = 0;  ///< of the sensor; +-102.35 degC in steps of 0.05; NaN: not available
+
+  template <class Self, class Visit>
+  static constexpr void each(Self& m, Visit&& visit) {
+    visit(At<kStamp>{}, m.stamp_us);
+    visit(At<kSeq>{}, m.seq);
+    visit(At<kInst>{}, m.inst);
+    visit(At<kPressure>{}, m.pressure_Pa);
+    visit(At<kTemp>{}, m.temp_degC);
+  }
+};
+
+/// Heading from outside, of two GNSS antennas for instance; the configuration says how the baseline lies on the body.
+struct InHeading {
+  static constexpr std::uint8_t kOffset = 0x1E, kSize = 8;
+  static constexpr Signal kStamp{.start = 0, .length = 20, .wraps = true};
+  static constexpr Signal kSeq{.start = 20, .length = 4, .wraps = true};
+  static constexpr Signal kInst{.start = 24, .length = 2};
+  static constexpr Signal kAngle{.start = 26, .length = 17, .is_signed = true, .has_gap = true, .per_unit = 20000};
+  static constexpr Signal kAcc{.start = 43, .length = 14, .has_gap = true, .per_unit = 5000};
+
+  std::uint32_t stamp_us = 0;  ///< low 20 bits of the microsecond of validity
+  std::uint8_t seq = 0;  ///< sample counter of this sensor and instance; modulo 2^4
+  std::uint8_t inst = 0;  ///< instance of this kind of sensor, from 0; 0 to 3
+  float angle_rad = 0;  ///< of the baseline, map frame: 0 = east, counter-clockwise; +-3.27675 rad in steps of 0.00005; NaN: not available
+  float acc_rad = 0;  ///< 1-sigma; 0 to 3.2764 rad in steps of 0.0002; NaN: not available
+
+  template <class Self, class Visit>
+  static constexpr void each(Self& m, Visit&& visit) {
+    visit(At<kStamp>{}, m.stamp_us);
+    visit(At<kSeq>{}, m.seq);
+    visit(At<kInst>{}, m.inst);
+    visit(At<kAngle>{}, m.angle_rad);
+    visit(At<kAcc>{}, m.acc_rad);
   }
 };
 
@@ -963,6 +1041,55 @@ struct EstMotion {
   }
 };
 
+/// Estimator: attitude as a unit quaternion that turns body axes into the map frame. Instances 0 to 3, ids 6 apart.
+struct EstAtt {
+  static constexpr std::uint8_t kOffset = 0x2A, kSize = 8;
+  static constexpr std::uint8_t kStride = 6, kCount = 4;
+  static constexpr Signal kW{.start = 0, .length = 15, .is_signed = true, .has_gap = true, .per_unit = 12500};
+  static constexpr Signal kX{.start = 15, .length = 15, .is_signed = true, .has_gap = true, .per_unit = 12500};
+  static constexpr Signal kY{.start = 30, .length = 15, .is_signed = true, .has_gap = true, .per_unit = 12500};
+  static constexpr Signal kZ{.start = 45, .length = 15, .is_signed = true, .has_gap = true, .per_unit = 12500};
+  static constexpr Signal kEpoch{.start = 60, .length = 4, .wraps = true};
+
+  float w = 0;  ///< real part; +-1.31064 in steps of 0.00008; NaN: not available
+  float x = 0;  ///< imaginary part, x; +-1.31064 in steps of 0.00008; NaN: not available
+  float y = 0;  ///< imaginary part, y; +-1.31064 in steps of 0.00008; NaN: not available
+  float z = 0;  ///< imaginary part, z; +-1.31064 in steps of 0.00008; NaN: not available
+  std::uint8_t epoch = 0;  ///< low bits of the epoch, the same in all frames of one epoch
+
+  template <class Self, class Visit>
+  static constexpr void each(Self& m, Visit&& visit) {
+    visit(At<kW>{}, m.w);
+    visit(At<kX>{}, m.x);
+    visit(At<kY>{}, m.y);
+    visit(At<kZ>{}, m.z);
+    visit(At<kEpoch>{}, m.epoch);
+  }
+};
+
+/// Estimator: velocity of the body origin, map frame. Instances 0 to 3, ids 6 apart.
+struct EstVel {
+  static constexpr std::uint8_t kOffset = 0x2B, kSize = 8;
+  static constexpr std::uint8_t kStride = 6, kCount = 4;
+  static constexpr Signal kEast{.start = 0, .length = 19, .is_signed = true, .has_gap = true, .per_unit = 1000};
+  static constexpr Signal kNorth{.start = 19, .length = 19, .is_signed = true, .has_gap = true, .per_unit = 1000};
+  static constexpr Signal kUp{.start = 38, .length = 19, .is_signed = true, .has_gap = true, .per_unit = 1000};
+  static constexpr Signal kEpoch{.start = 57, .length = 4, .wraps = true};
+
+  float east_mps = 0;  ///< towards east; +-262.143 m/s in steps of 0.001; NaN: not available
+  float north_mps = 0;  ///< towards north; +-262.143 m/s in steps of 0.001; NaN: not available
+  float up_mps = 0;  ///< towards up; +-262.143 m/s in steps of 0.001; NaN: not available
+  std::uint8_t epoch = 0;  ///< low bits of the epoch, the same in all frames of one epoch
+
+  template <class Self, class Visit>
+  static constexpr void each(Self& m, Visit&& visit) {
+    visit(At<kEast>{}, m.east_mps);
+    visit(At<kNorth>{}, m.north_mps);
+    visit(At<kUp>{}, m.up_mps);
+    visit(At<kEpoch>{}, m.epoch);
+  }
+};
+
 /// Estimator: 1-sigma and correlations, one page per frame. Instances 0 to 3, ids 6 apart. Page 0.
 struct EstStdPose {
   static constexpr std::uint8_t kOffset = 0x2C, kSize = 8;
@@ -1019,6 +1146,200 @@ struct EstStdMore {
   }
 };
 
+/// Estimator: what only an inertial estimator has, one page per frame. Instances 0 to 3, ids 6 apart. Page 0.
+struct EstStateHeight {
+  static constexpr std::uint8_t kOffset = 0x2D, kSize = 8;
+  static constexpr std::uint8_t kStride = 6, kCount = 4;
+  static constexpr Signal kMux{.start = 0, .length = 3};
+  static constexpr std::uint8_t kPage = 0;
+  static constexpr Signal kEpoch{.start = 3, .length = 4, .wraps = true};
+  static constexpr Signal kHeight{.start = 7, .length = 24, .is_signed = true, .has_gap = true, .per_unit = 500};
+  static constexpr Signal kStdHeight{.start = 31, .length = 16, .has_gap = true, .per_unit = 2000};
+
+  std::uint8_t epoch = 0;  ///< low bits of the epoch, the same in all frames of one epoch
+  float height_m = 0;  ///< above the origin; +-16777.214 m in steps of 0.002; NaN: not available
+  float std_height_m = 0;  ///< 1-sigma of Height; 0 to 32.767 m in steps of 0.0005; NaN: not available
+
+  template <class Self, class Visit>
+  static constexpr void each(Self& m, Visit&& visit) {
+    visit(At<kEpoch>{}, m.epoch);
+    visit(At<kHeight>{}, m.height_m);
+    visit(At<kStdHeight>{}, m.std_height_m);
+  }
+};
+
+/// Estimator: what only an inertial estimator has, one page per frame. Instances 0 to 3, ids 6 apart. Page 1.
+struct EstStateAccBias {
+  static constexpr std::uint8_t kOffset = 0x2D, kSize = 8;
+  static constexpr std::uint8_t kStride = 6, kCount = 4;
+  static constexpr Signal kMux{.start = 0, .length = 3};
+  static constexpr std::uint8_t kPage = 1;
+  static constexpr Signal kEpoch{.start = 3, .length = 4, .wraps = true};
+  static constexpr Signal kAccBiasX{.start = 7, .length = 16, .is_signed = true, .has_gap = true, .per_unit = 5000};
+  static constexpr Signal kAccBiasY{.start = 23, .length = 16, .is_signed = true, .has_gap = true, .per_unit = 5000};
+  static constexpr Signal kAccBiasZ{.start = 39, .length = 16, .is_signed = true, .has_gap = true, .per_unit = 5000};
+
+  std::uint8_t epoch = 0;  ///< low bits of the epoch, the same in all frames of one epoch
+  float acc_bias_x_mps2 = 0;  ///< accelerometer bias along body x; +-6.5534 m/s2 in steps of 0.0002; NaN: not available
+  float acc_bias_y_mps2 = 0;  ///< accelerometer bias along body y; +-6.5534 m/s2 in steps of 0.0002; NaN: not available
+  float acc_bias_z_mps2 = 0;  ///< accelerometer bias along body z; +-6.5534 m/s2 in steps of 0.0002; NaN: not available
+
+  template <class Self, class Visit>
+  static constexpr void each(Self& m, Visit&& visit) {
+    visit(At<kEpoch>{}, m.epoch);
+    visit(At<kAccBiasX>{}, m.acc_bias_x_mps2);
+    visit(At<kAccBiasY>{}, m.acc_bias_y_mps2);
+    visit(At<kAccBiasZ>{}, m.acc_bias_z_mps2);
+  }
+};
+
+/// Estimator: what only an inertial estimator has, one page per frame. Instances 0 to 3, ids 6 apart. Page 2.
+struct EstStateGyroBias {
+  static constexpr std::uint8_t kOffset = 0x2D, kSize = 8;
+  static constexpr std::uint8_t kStride = 6, kCount = 4;
+  static constexpr Signal kMux{.start = 0, .length = 3};
+  static constexpr std::uint8_t kPage = 2;
+  static constexpr Signal kEpoch{.start = 3, .length = 4, .wraps = true};
+  static constexpr Signal kGyroBiasX{.start = 7, .length = 16, .is_signed = true, .has_gap = true, .per_unit = 100000};
+  static constexpr Signal kGyroBiasY{.start = 23, .length = 16, .is_signed = true, .has_gap = true, .per_unit = 100000};
+  static constexpr Signal kGyroBiasZ{.start = 39, .length = 16, .is_signed = true, .has_gap = true, .per_unit = 100000};
+
+  std::uint8_t epoch = 0;  ///< low bits of the epoch, the same in all frames of one epoch
+  float gyro_bias_x_radps = 0;  ///< gyroscope bias along body x; +-0.32767 rad/s in steps of 0.00001; NaN: not available
+  float gyro_bias_y_radps = 0;  ///< gyroscope bias along body y; +-0.32767 rad/s in steps of 0.00001; NaN: not available
+  float gyro_bias_z_radps = 0;  ///< gyroscope bias along body z; +-0.32767 rad/s in steps of 0.00001; NaN: not available
+
+  template <class Self, class Visit>
+  static constexpr void each(Self& m, Visit&& visit) {
+    visit(At<kEpoch>{}, m.epoch);
+    visit(At<kGyroBiasX>{}, m.gyro_bias_x_radps);
+    visit(At<kGyroBiasY>{}, m.gyro_bias_y_radps);
+    visit(At<kGyroBiasZ>{}, m.gyro_bias_z_radps);
+  }
+};
+
+/// Estimator: what only an inertial estimator has, one page per frame. Instances 0 to 3, ids 6 apart. Page 3.
+struct EstStateStdVel {
+  static constexpr std::uint8_t kOffset = 0x2D, kSize = 8;
+  static constexpr std::uint8_t kStride = 6, kCount = 4;
+  static constexpr Signal kMux{.start = 0, .length = 3};
+  static constexpr std::uint8_t kPage = 3;
+  static constexpr Signal kEpoch{.start = 3, .length = 4, .wraps = true};
+  static constexpr Signal kStdVelEast{.start = 7, .length = 16, .has_gap = true, .per_unit = 1000};
+  static constexpr Signal kStdVelNorth{.start = 23, .length = 16, .has_gap = true, .per_unit = 1000};
+  static constexpr Signal kStdVelUp{.start = 39, .length = 16, .has_gap = true, .per_unit = 1000};
+
+  std::uint8_t epoch = 0;  ///< low bits of the epoch, the same in all frames of one epoch
+  float std_vel_east_mps = 0;  ///< 1-sigma of the velocity towards east; 0 to 65.534 m/s in steps of 0.001; NaN: not available
+  float std_vel_north_mps = 0;  ///< 1-sigma of the velocity towards north; 0 to 65.534 m/s in steps of 0.001; NaN: not available
+  float std_vel_up_mps = 0;  ///< 1-sigma of the velocity towards up; 0 to 65.534 m/s in steps of 0.001; NaN: not available
+
+  template <class Self, class Visit>
+  static constexpr void each(Self& m, Visit&& visit) {
+    visit(At<kEpoch>{}, m.epoch);
+    visit(At<kStdVelEast>{}, m.std_vel_east_mps);
+    visit(At<kStdVelNorth>{}, m.std_vel_north_mps);
+    visit(At<kStdVelUp>{}, m.std_vel_up_mps);
+  }
+};
+
+/// Estimator: what only an inertial estimator has, one page per frame. Instances 0 to 3, ids 6 apart. Page 4.
+struct EstStateStdTilt {
+  static constexpr std::uint8_t kOffset = 0x2D, kSize = 8;
+  static constexpr std::uint8_t kStride = 6, kCount = 4;
+  static constexpr Signal kMux{.start = 0, .length = 3};
+  static constexpr std::uint8_t kPage = 4;
+  static constexpr Signal kEpoch{.start = 3, .length = 4, .wraps = true};
+  static constexpr Signal kStdTiltEast{.start = 7, .length = 16, .has_gap = true, .per_unit = 10000};
+  static constexpr Signal kStdTiltNorth{.start = 23, .length = 16, .has_gap = true, .per_unit = 10000};
+
+  std::uint8_t epoch = 0;  ///< low bits of the epoch, the same in all frames of one epoch
+  float std_tilt_east_rad = 0;  ///< 1-sigma of the turn about the axis that points east; 0 to 6.5534 rad in steps of 0.0001; NaN: not available
+  float std_tilt_north_rad = 0;  ///< 1-sigma of the turn about the axis that points north; 0 to 6.5534 rad in steps of 0.0001; NaN: not available
+
+  template <class Self, class Visit>
+  static constexpr void each(Self& m, Visit&& visit) {
+    visit(At<kEpoch>{}, m.epoch);
+    visit(At<kStdTiltEast>{}, m.std_tilt_east_rad);
+    visit(At<kStdTiltNorth>{}, m.std_tilt_north_rad);
+  }
+};
+
+/// Estimator: what only an inertial estimator has, one page per frame. Instances 0 to 3, ids 6 apart. Page 5.
+struct EstStateStdAccBias {
+  static constexpr std::uint8_t kOffset = 0x2D, kSize = 8;
+  static constexpr std::uint8_t kStride = 6, kCount = 4;
+  static constexpr Signal kMux{.start = 0, .length = 3};
+  static constexpr std::uint8_t kPage = 5;
+  static constexpr Signal kEpoch{.start = 3, .length = 4, .wraps = true};
+  static constexpr Signal kStdAccBiasX{.start = 7, .length = 16, .has_gap = true, .per_unit = 10000};
+  static constexpr Signal kStdAccBiasY{.start = 23, .length = 16, .has_gap = true, .per_unit = 10000};
+  static constexpr Signal kStdAccBiasZ{.start = 39, .length = 16, .has_gap = true, .per_unit = 10000};
+
+  std::uint8_t epoch = 0;  ///< low bits of the epoch, the same in all frames of one epoch
+  float std_acc_bias_x_mps2 = 0;  ///< 1-sigma of the accelerometer bias along body x; 0 to 6.5534 m/s2 in steps of 0.0001; NaN: not available
+  float std_acc_bias_y_mps2 = 0;  ///< 1-sigma of the accelerometer bias along body y; 0 to 6.5534 m/s2 in steps of 0.0001; NaN: not available
+  float std_acc_bias_z_mps2 = 0;  ///< 1-sigma of the accelerometer bias along body z; 0 to 6.5534 m/s2 in steps of 0.0001; NaN: not available
+
+  template <class Self, class Visit>
+  static constexpr void each(Self& m, Visit&& visit) {
+    visit(At<kEpoch>{}, m.epoch);
+    visit(At<kStdAccBiasX>{}, m.std_acc_bias_x_mps2);
+    visit(At<kStdAccBiasY>{}, m.std_acc_bias_y_mps2);
+    visit(At<kStdAccBiasZ>{}, m.std_acc_bias_z_mps2);
+  }
+};
+
+/// Estimator: what only an inertial estimator has, one page per frame. Instances 0 to 3, ids 6 apart. Page 6.
+struct EstStateStdGyroBias {
+  static constexpr std::uint8_t kOffset = 0x2D, kSize = 8;
+  static constexpr std::uint8_t kStride = 6, kCount = 4;
+  static constexpr Signal kMux{.start = 0, .length = 3};
+  static constexpr std::uint8_t kPage = 6;
+  static constexpr Signal kEpoch{.start = 3, .length = 4, .wraps = true};
+  static constexpr Signal kStdGyroBiasX{.start = 7, .length = 16, .has_gap = true, .per_unit = 500000};
+  static constexpr Signal kStdGyroBiasY{.start = 23, .length = 16, .has_gap = true, .per_unit = 500000};
+  static constexpr Signal kStdGyroBiasZ{.start = 39, .length = 16, .has_gap = true, .per_unit = 500000};
+
+  std::uint8_t epoch = 0;  ///< low bits of the epoch, the same in all frames of one epoch
+  float std_gyro_bias_x_radps = 0;  ///< 1-sigma of the gyroscope bias along body x; 0 to 0.131068 rad/s in steps of 0.000002; NaN: not available
+  float std_gyro_bias_y_radps = 0;  ///< 1-sigma of the gyroscope bias along body y; 0 to 0.131068 rad/s in steps of 0.000002; NaN: not available
+  float std_gyro_bias_z_radps = 0;  ///< 1-sigma of the gyroscope bias along body z; 0 to 0.131068 rad/s in steps of 0.000002; NaN: not available
+
+  template <class Self, class Visit>
+  static constexpr void each(Self& m, Visit&& visit) {
+    visit(At<kEpoch>{}, m.epoch);
+    visit(At<kStdGyroBiasX>{}, m.std_gyro_bias_x_radps);
+    visit(At<kStdGyroBiasY>{}, m.std_gyro_bias_y_radps);
+    visit(At<kStdGyroBiasZ>{}, m.std_gyro_bias_z_radps);
+  }
+};
+
+/// Estimator: what only an inertial estimator has, one page per frame. Instances 0 to 3, ids 6 apart. Page 7.
+struct EstStateJump {
+  static constexpr std::uint8_t kOffset = 0x2D, kSize = 8;
+  static constexpr std::uint8_t kStride = 6, kCount = 4;
+  static constexpr Signal kMux{.start = 0, .length = 3};
+  static constexpr std::uint8_t kPage = 7;
+  static constexpr Signal kEpoch{.start = 3, .length = 4, .wraps = true};
+  static constexpr Signal kJumpX{.start = 7, .length = 18, .is_signed = true, .has_gap = true, .per_unit = 100};
+  static constexpr Signal kJumpY{.start = 25, .length = 18, .is_signed = true, .has_gap = true, .per_unit = 100};
+  static constexpr Signal kJumpYaw{.start = 43, .length = 14, .is_signed = true, .has_gap = true, .per_unit = 2000};
+
+  std::uint8_t epoch = 0;  ///< low bits of the epoch, the same in all frames of one epoch
+  float jump_x_m = 0;  ///< last reset: step of the position towards east; +-1310.71 m in steps of 0.01; NaN: not available
+  float jump_y_m = 0;  ///< last reset: step of the position towards north; +-1310.71 m in steps of 0.01; NaN: not available
+  float jump_yaw_rad = 0;  ///< last reset: step of the heading; +-4.0955 rad in steps of 0.0005; NaN: not available
+
+  template <class Self, class Visit>
+  static constexpr void each(Self& m, Visit&& visit) {
+    visit(At<kEpoch>{}, m.epoch);
+    visit(At<kJumpX>{}, m.jump_x_m);
+    visit(At<kJumpY>{}, m.jump_y_m);
+    visit(At<kJumpYaw>{}, m.jump_yaw_rad);
+  }
+};
+
 /// Every message struct as a template argument list, for code that treats them all alike.
 template <template <class...> class List>
 using AllMessages = List<
@@ -1040,6 +1361,9 @@ using AllMessages = List<
     ImuGyro,
     ImuAccel,
     ImuTime,
+    InMag,
+    InBaro,
+    InHeading,
     EstEpoch,
     EstStateCrc,
     EstStatus,
@@ -1059,7 +1383,17 @@ using AllMessages = List<
     EstOriginHeight,
     EstPos,
     EstMotion,
+    EstAtt,
+    EstVel,
     EstStdPose,
-    EstStdMore>;
+    EstStdMore,
+    EstStateHeight,
+    EstStateAccBias,
+    EstStateGyroBias,
+    EstStateStdVel,
+    EstStateStdTilt,
+    EstStateStdAccBias,
+    EstStateStdGyroBias,
+    EstStateJump>;
 
 }  // namespace tetap::can

@@ -40,7 +40,7 @@ inline void encode(std::uint32_t base, const Measurement& m, std::vector<base::C
                           .seq = seq},
             m.instance);
         put(can::ImuTime{.stamp_us = stamp,
-                         .interval_us = static_cast<std::uint16_t>(v.interval.us),
+                         .interval_us = v.interval_us,
                          .clip_gyro = v.clipped_gyro,
                          .clip_accel = v.clipped_accel,
                          .temp_degC = v.temperature_degC,

@@ -323,7 +323,7 @@ def stride(messages):
 
 
 UNIT_SUFFIX = {"": "", "1": "", "m": "_m", "rad": "_rad", "m/s": "_mps", "rad/s": "_radps", "us": "_us", "ms": "_ms",
-               "s": "_s", "deg": "_deg", "degC": "_degC"}
+               "s": "_s", "deg": "_deg", "degC": "_degC", "uT": "_uT", "Pa": "_Pa", "m/s2": "_mps2"}
 
 
 def plain(number):

@@ -15,8 +15,9 @@ namespace tetap::sim {
 
 /// "?" for a code that has no name.
 [[nodiscard]] constexpr std::string_view name(can::Sensor value) {
-  constexpr std::array<std::string_view, 7> kNames{"Imu",          "WheelCounts",  "WheelSpeed",  "BodySpeed",
-                                                   "RangeBearing", "GnssPosition", "GnssVelocity"};
+  constexpr std::array<std::string_view, 10> kNames{"Imu",          "WheelCounts",  "WheelSpeed",   "BodySpeed",
+                                                    "RangeBearing", "GnssPosition", "GnssVelocity", "Magnetometer",
+                                                    "Barometer",    "Heading"};
   const auto i = static_cast<std::size_t>(value);
   return value == can::Sensor::kNotAvailable ? "NotAvailable" : i < kNames.size() ? kNames[i] : "?";
 }
@@ -27,14 +28,15 @@ namespace tetap::sim {
   return i < kNames.size() ? kNames[i] : "?";
 }
 [[nodiscard]] constexpr std::string_view name(can::Mode value) {
-  constexpr std::array<std::string_view, 7> kNames{"Boot",          "WaitingForPose", "Aligning", "Nominal",
-                                                   "DeadReckoning", "Degraded",       "Fault"};
+  constexpr std::array<std::string_view, 10> kNames{"Boot",          "WaitingForPose", "Aligning", "Nominal",
+                                                    "DeadReckoning", "Degraded",       "Fault",    "WaitingForImu",
+                                                    "Levelling",     "FindingHeading"};
   const auto i = static_cast<std::size_t>(value);
   return i < kNames.size() ? kNames[i] : "?";
 }
 [[nodiscard]] constexpr std::string_view name(can::ResetCause value) {
-  constexpr std::array<std::string_view, 6> kNames{"PowerOn",  "Command",   "SetPose",
-                                                   "TimeJump", "NotFinite", "NotPositive"};
+  constexpr std::array<std::string_view, 8> kNames{"PowerOn",   "Command",     "SetPose",      "TimeJump",
+                                                   "NotFinite", "NotPositive", "PositionJump", "HeadingWrong"};
   const auto i = static_cast<std::size_t>(value);
   return i < kNames.size() ? kNames[i] : "?";
 }
@@ -56,6 +58,9 @@ namespace tetap::sim {
     const std::string prefix = "Est" + std::to_string((offset - can::EstPos::kOffset) / can::EstPos::kStride) + "_";
     if (within == 0) return prefix + "Pos";
     if (within == can::EstMotion::kOffset - can::EstPos::kOffset) return prefix + "Motion";
+    if (within == can::EstAtt::kOffset - can::EstPos::kOffset) return prefix + "Att";
+    if (within == can::EstVel::kOffset - can::EstPos::kOffset) return prefix + "Vel";
+    if (within == can::EstStateHeight::kOffset - can::EstPos::kOffset) return prefix + "State";
     if (within == can::EstStdPose::kOffset - can::EstPos::kOffset) return prefix + "Std";
   }
   return "offset " + std::to_string(offset);

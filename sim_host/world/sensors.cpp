@@ -86,8 +86,8 @@ void Imu::sense(const Motion& motion, double speed_mps, base::Micros now, const 
 app::ImuSample Imu::sample(base::Micros now, const Faults& faults) {
   const double root = sim::sqrt(period_s_);
   const double share = magnitude(speed_mps_) / kReferenceSpeed_mps;
-  app::ImuSample s{.interval = {static_cast<std::int64_t>(period_s_ * 1e6 + 0.5)},
-                   .temperature_degC = single(numbers_.temperature_degC),
+  app::ImuSample s{.temperature_degC = single(numbers_.temperature_degC),
+                   .interval_us = static_cast<std::uint16_t>(period_s_ * 1e6 + 0.5),
                    .clipped_gyro = static_cast<std::uint8_t>(clipped_gyro_),
                    .clipped_accel = static_cast<std::uint8_t>(clipped_accel_)};
   const bool stepped = faults.active(Fault::kGyroBiasStep, now);

@@ -163,7 +163,7 @@ void Inbox::imu(std::uint8_t offset, const base::CanFrame& frame, std::uint32_t 
     Partial& partial = slot(can::Sensor::kImu, instance, time->seq, kImuFrames, reference, counters);
     partial.sample.stamp = base::extend(time->stamp_us, 20, reference);
     ImuSample& imu = partial.sample.payload.imu;
-    imu.interval = {static_cast<std::int64_t>(time->interval_us)};
+    imu.interval_us = time->interval_us;
     imu.temperature_degC = time->temp_degC;
     imu.clipped_gyro = time->clip_gyro;
     imu.clipped_accel = time->clip_accel;
@@ -280,6 +280,21 @@ void Inbox::on_frame(std::uint8_t offset, const base::CanFrame& frame, base::Mic
         s.payload.sighting = {.landmark = m.id, .range_m = m.range_m, .bearing_rad = m.bearing_rad};
         s.detail = m.id;
         return base::is_finite(m.range_m) || base::is_finite(m.bearing_rad);
+      });
+    case can::InMag::kOffset:
+      return single(std::type_identity<can::InMag>{}, Sensor::kMagnetometer, [](const auto& m, Sample& s) {
+        s.payload.magnetic = {.flux_b_uT = {m.flux_x_uT, m.flux_y_uT, m.flux_z_uT}};
+        return all_finite(m.flux_x_uT, m.flux_y_uT, m.flux_z_uT);
+      });
+    case can::InBaro::kOffset:
+      return single(std::type_identity<can::InBaro>{}, Sensor::kBarometer, [](const auto& m, Sample& s) {
+        s.payload.pressure = {.pressure_Pa = m.pressure_Pa, .temperature_degC = m.temp_degC};
+        return base::is_finite(m.pressure_Pa);
+      });
+    case can::InHeading::kOffset:
+      return single(std::type_identity<can::InHeading>{}, Sensor::kHeading, [](const auto& m, Sample& s) {
+        s.payload.heading = {.yaw_rad = m.angle_rad, .acc_rad = m.acc_rad};
+        return base::is_finite(m.angle_rad);
       });
     case can::InGnssLat::kOffset:
       return gnss<can::InGnssLat>(

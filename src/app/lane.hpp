@@ -1,8 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// One estimator in the firmware: its current state, its state at the far end of the window, and its statistics.
+// One estimator in the firmware, with its statistics, in one of two ways.
+// A plain one has its current state and its state at the far end of the window.
 // A late sample is fused at its own time by starting again from `past` and repeating what came since: the result is the
 // one that would have been had the sample been on time. Costs: twice the estimator's memory; a burst only when
 // something is late that this estimator takes.
+// A delayed one (kDelayed) has its state at the far end of the window only: samples reach it in their order when they
+// leave the window, each once, and the present is that state carried over what the window holds. Costs: that carrying
+// in every tick, never a burst; its records are late by the window.
 #pragma once
 
 #include "app/context.hpp"
@@ -21,13 +25,19 @@ concept Estimator = requires(E& e, const E& view, base::Micros t, const Context&
   { E::kKind } -> std::convertible_to<can::EstimatorKind>;
   { e.restart(t, with) } -> std::same_as<void>;
   { e.set_pose(t, pose, with) } -> std::same_as<void>;
-  { e.advance(t, with) } -> std::same_as<void>;
   { view.estimate(with) } -> std::same_as<Estimate>;
   { view.mode(with) } -> std::same_as<can::Mode>;
 };
 
+template <class E>
+inline constexpr bool kIsDelayed = requires {
+  requires E::kDelayed;
+};
+
 /// What became of one sensor's samples.
 struct SensorStatistics {
+  can::Sensor sensor = can::Sensor::kNotAvailable;  ///< not available: the entry is free
+  std::uint8_t instance = 0;
   std::uint16_t accepted = 0;
   std::uint16_t rejected = 0;
   float nis_mean = 0;  ///< running mean over the last 50 or so compared measurements
@@ -36,21 +46,22 @@ struct SensorStatistics {
   base::Micros last_accepted;
 };
 
-inline constexpr std::size_t kSensors = 7;
-inline constexpr std::size_t kInstances = 4;
+/// Kinds and instances of sensors that one estimator keeps apart; what comes beyond shares the last entry.
+inline constexpr std::size_t kStatistics = 12;
 
 template <Estimator E>
 class Lane {
  public:
   using Type = E;
+  static constexpr bool kDelayed = kIsDelayed<E>;
 
   void restart(base::Micros t, const Context& with) {
     now_.restart(t, with);
-    past_ = now_;
+    close();
   }
   void set_pose(base::Micros t, const SetPose& pose, const Context& with) {
     now_.set_pose(t, pose, with);
-    past_ = now_;
+    close();
   }
 
   /// Whether this kind of sample means anything to the estimator.
@@ -62,13 +73,25 @@ class Lane {
   /// Fuses into the current state; the record is what the bus is told.
   Innovation fuse(const Sample& sample, const Context& with) { return fuse_into(now_, sample, with); }
   /// The sample leaves the window: the far end takes it.
-  void retire(const Sample& sample, const Context& with) { static_cast<void>(fuse_into(past_, sample, with)); }
+  void retire(const Sample& sample, const Context& with) requires(!kDelayed) {
+    static_cast<void>(fuse_into(past_, sample, with));
+  }
   /// Back to the far end of the window.
-  void rewind() { now_ = past_; }
+  void rewind() requires(!kDelayed) { now_ = past_; }
   /// What is now can no longer be changed by late samples.
-  void close() { past_ = now_; }
+  void close() {
+    if constexpr (!kDelayed) past_ = now_;
+  }
 
-  void advance(base::Micros t, const Context& with) { now_.advance(t, with); }
+  /// `window` calls its argument with each sample in the window, in order.
+  template <class Window>
+  void advance(base::Micros t, const Context& with, Window&& window) {
+    if constexpr (kDelayed) {
+      now_.advance(t, with, window);
+    } else {
+      now_.advance(t, with);
+    }
+  }
   [[nodiscard]] Estimate estimate(const Context& with) const { return now_.estimate(with); }
   [[nodiscard]] can::Mode mode(const Context& with) const { return now_.mode(with); }
 
@@ -88,9 +111,15 @@ class Lane {
     }
   }
   [[nodiscard]] SensorStatistics& statistics(can::Sensor sensor, std::uint8_t instance) {
-    return statistics_[static_cast<std::size_t>(sensor) * kInstances + instance];
+    std::size_t i = 0;
+    while (i + 1 < kStatistics && statistics_[i].sensor != can::Sensor::kNotAvailable &&
+           (statistics_[i].sensor != sensor || statistics_[i].instance != instance))
+      ++i;
+    statistics_[i].sensor = sensor;
+    statistics_[i].instance = instance;
+    return statistics_[i];
   }
-  [[nodiscard]] const SensorStatistics& statistics(std::size_t index) const { return statistics_[index]; }
+  [[nodiscard]] const std::array<SensorStatistics, kStatistics>& statistics() const { return statistics_; }
   void clear_statistics() {
     for (SensorStatistics& s : statistics_) s = {};
   }
@@ -114,9 +143,11 @@ class Lane {
     return innovation;
   }
 
-  E now_;
-  E past_;
-  std::array<SensorStatistics, kSensors * kInstances> statistics_{};
+  struct Nothing {};
+
+  E now_;  ///< of a delayed estimator: the far end
+  [[no_unique_address]] std::conditional_t<kDelayed, Nothing, E> past_;
+  std::array<SensorStatistics, kStatistics> statistics_{};
 };
 
 }  // namespace tetap::app

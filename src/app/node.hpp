@@ -69,8 +69,14 @@ class Node {
     std::apply([&](auto&... lane) { (f(lane), ...); }, lanes_);
   }
   void restart(base::Micros t, can::ResetCause cause);
+  void advance();
   void close_window();
-  bool retire_oldest();
+  /// How a plain estimator's far end follows: by the samples that leave, or at once, as a copy of its present.
+  enum class Past : std::uint8_t { kFollows, kIsNow };
+  void retire_until(base::Micros t, Past past = Past::kFollows);
+  void retire(const Sample& sample, Past past = Past::kFollows);
+  template <class Lane>
+  void note(Lane& lane, std::size_t instance, const Sample& sample, const Innovation& innovation);
   void apply_map();
   void apply_commands();
   void consume();
@@ -78,7 +84,6 @@ class Node {
   [[nodiscard]] bool came_late(std::size_t due) const;
   void fuse(std::size_t entry, const std::array<bool, kCount>& again);
   void find_origin(const Sample& sample);
-  void retire();
   using Estimates = std::array<Estimate, kCount>;
   [[nodiscard]] Estimates estimate() const;
   [[nodiscard]] bool healthy(const Estimates& estimates);
@@ -153,7 +158,11 @@ void Node<Estimators, Capacity>::sample(const Sample& arrived) {
   }
   if (sample.stamp > now_ + base::Micros{numbers_.loop.ahead_us}) return void(++counters_.too_early);
   Insert result = timeline_.insert(sample);
-  if (result == Insert::kFull && retire_oldest()) result = timeline_.insert(sample);
+  if (result == Insert::kFull && timeline_.consumed(0)) {
+    retire(timeline_[0]);
+    timeline_.drop_front(1);
+    result = timeline_.insert(sample);
+  }
   if (result == Insert::kDuplicate) ++counters_.duplicate;
   if (result == Insert::kFull) ++counters_.timeline_full;
 }
@@ -189,7 +198,7 @@ void Node<Estimators, Capacity>::tick(base::Micros t, const LoopHealth& loop, Se
   apply_map();
   consume();
   apply_commands();
-  each_lane([&](auto& lane) { lane.advance(now_, context()); });
+  advance();
   Estimates estimates = estimate();
   if (!healthy(estimates)) estimates = estimate();
 
@@ -205,7 +214,9 @@ void Node<Estimators, Capacity>::tick(base::Micros t, const LoopHealth& loop, Se
   publisher_.diagnostics(counters_, loop, timeline_.high_water(), send);
   publisher_.identity(site_, send);
   publisher_.events(send);
-  retire();
+  const base::Micros edge = now_ - base::Micros{numbers_.loop.window_us};
+  retire_until(edge);
+  if (edge > closed_until_) closed_until_ = edge;
   publisher_.end(state_crc(), tally_, send);
 }
 
@@ -224,24 +235,52 @@ void Node<Estimators, Capacity>::restart(base::Micros t, can::ResetCause cause) 
   if (cause == can::ResetCause::kPowerOn) closed_until_ = t - base::Micros{numbers_.loop.window_us};
 }
 
+template <class Estimators, std::size_t Capacity>
+void Node<Estimators, Capacity>::advance() {
+  const auto window = [this](auto&& each) {
+    for (std::size_t i = 0; i < timeline_.size() && timeline_.consumed(i); ++i) each(timeline_[i]);
+  };
+  each_lane([&](auto& lane) { lane.advance(now_, context(), window); });
+}
+
 /// What was consumed becomes final: the far end of the window moves up to now.
 template <class Estimators, std::size_t Capacity>
 void Node<Estimators, Capacity>::close_window() {
-  each_lane([](auto& lane) { lane.close(); });
-  std::size_t consumed = 0;
-  while (consumed < timeline_.size() && timeline_[consumed].consumed) ++consumed;
-  if (consumed > 0 && timeline_[consumed - 1].sample.stamp > closed_until_)
-    closed_until_ = timeline_[consumed - 1].sample.stamp;
-  timeline_.drop_front(consumed);
+  retire_until(now_, Past::kIsNow);
+}
+
+/// Consumed samples with stamps up to t leave the window.
+template <class Estimators, std::size_t Capacity>
+void Node<Estimators, Capacity>::retire_until(base::Micros t, Past past) {
+  std::size_t count = 0;
+  while (count < timeline_.size() && timeline_.consumed(count) && timeline_[count].stamp <= t)
+    retire(timeline_[count++], past);
+  timeline_.drop_front(count);
+  if (past == Past::kIsNow) each_lane([](auto& lane) { lane.close(); });
 }
 
 template <class Estimators, std::size_t Capacity>
-bool Node<Estimators, Capacity>::retire_oldest() {
-  if (timeline_.size() == 0 || !timeline_[0].consumed) return false;
-  each_lane([&](auto& lane) { lane.retire(timeline_[0].sample, context()); });
-  if (timeline_[0].sample.stamp > closed_until_) closed_until_ = timeline_[0].sample.stamp;
-  timeline_.drop_front(1);
-  return true;
+void Node<Estimators, Capacity>::retire(const Sample& sample, Past past) {
+  std::size_t instance = 0;
+  each_lane([&](auto& lane) {
+    if constexpr (std::remove_cvref_t<decltype(lane)>::kDelayed) {
+      note(lane, instance, sample, lane.fuse(sample, context()));
+    } else if (past == Past::kFollows) {
+      lane.retire(sample, context());
+    }
+    ++instance;
+  });
+  if (sample.stamp > closed_until_) closed_until_ = sample.stamp;
+}
+
+/// The record goes into the statistics, and out when it says something.
+template <class Estimators, std::size_t Capacity>
+template <class Lane>
+void Node<Estimators, Capacity>::note(Lane& lane, std::size_t instance, const Sample& sample,
+                                      const Innovation& innovation) {
+  lane.account(sample, innovation);
+  if (innovation.dof > 0 || innovation.verdict > can::Verdict::kNotUsed)
+    publisher_.event(innovation, sample, instance, now_, counters_);
 }
 
 template <class Estimators, std::size_t Capacity>
@@ -279,10 +318,11 @@ void Node<Estimators, Capacity>::apply_commands() {
 template <class Estimators, std::size_t Capacity>
 template <class Lane>
 bool Node<Estimators, Capacity>::came_late(std::size_t due) const {
+  if (Lane::kDelayed) return false;
   bool is_new = false;
   for (std::size_t i = 0; i < due; ++i) {
-    if (!Lane::takes(timeline_[i].sample)) continue;
-    if (!timeline_[i].consumed) {
+    if (!Lane::takes(timeline_[i])) continue;
+    if (!timeline_.consumed(i)) {
       is_new = true;
     } else if (is_new) {
       return true;
@@ -299,32 +339,35 @@ void Node<Estimators, Capacity>::consume() {
   each_lane([&](auto& lane) {
     bool& repeat = again[instance++];
     repeat = came_late<std::remove_cvref_t<decltype(lane)>>(due);
-    if (repeat) lane.rewind();
+    if constexpr (!std::remove_cvref_t<decltype(lane)>::kDelayed) {
+      if (repeat) lane.rewind();
+    }
   });
   for (std::size_t i = 0; i < due; ++i) fuse(i, again);
 }
 
 template <class Estimators, std::size_t Capacity>
 void Node<Estimators, Capacity>::fuse(std::size_t i, const std::array<bool, kCount>& again) {
-  auto& entry = timeline_[i];
-  const bool is_new = !entry.consumed;
-  if (is_new) find_origin(entry.sample);
+  const Sample& sample = timeline_[i];
+  const bool is_new = !timeline_.consumed(i);
+  if (is_new) find_origin(sample);
   std::size_t instance = 0;
   bool taken = false;
   each_lane([&](auto& lane) {
-    if (is_new || again[instance]) {
-      const Innovation innovation = lane.fuse(entry.sample, context());
+    using Lane = std::remove_cvref_t<decltype(lane)>;
+    if constexpr (Lane::kDelayed) {
+      taken = taken || Lane::takes(sample);
+    } else if (is_new || again[instance]) {
+      const Innovation innovation = lane.fuse(sample, context());
       if (is_new) {
-        lane.account(entry.sample, innovation);
         taken = taken || innovation.verdict != can::Verdict::kNotUsed;
-        if (innovation.dof > 0 || innovation.verdict > can::Verdict::kNotUsed)
-          publisher_.event(innovation, entry.sample, instance, now_, counters_);
+        note(lane, instance, sample, innovation);
       }
     }
     ++instance;
   });
   if (is_new && !taken) ++counters_.not_used;
-  entry.consumed = true;
+  timeline_.consume(i);
 }
 
 template <class Estimators, std::size_t Capacity>
@@ -335,13 +378,6 @@ void Node<Estimators, Capacity>::find_origin(const Sample& sample) {
   site_.frame =
       nav::LocalFrame(fix.latitude_2ndeg, fix.longitude_2ndeg, base::is_finite(fix.height_m) ? fix.height_m : 0.0F);
   site_.origin = can::OriginSource::kFirstFix;
-}
-
-template <class Estimators, std::size_t Capacity>
-void Node<Estimators, Capacity>::retire() {
-  const base::Micros edge = now_ - base::Micros{numbers_.loop.window_us};
-  while (timeline_.size() > 0 && timeline_[0].consumed && timeline_[0].sample.stamp <= edge) retire_oldest();
-  if (edge > closed_until_) closed_until_ = edge;
 }
 
 template <class Estimators, std::size_t Capacity>
@@ -362,7 +398,7 @@ bool Node<Estimators, Capacity>::healthy(const Estimates& estimates) {
   if (finite && positive) return true;
   close_window();
   restart(now_, finite ? can::ResetCause::kNotPositive : can::ResetCause::kNotFinite);
-  each_lane([&](auto& lane) { lane.advance(now_, context()); });
+  advance();
   return false;
 }
 
@@ -388,13 +424,11 @@ Summary Node<Estimators, Capacity>::summary(const Estimate& estimate) const {
             .cause = reset_cause_,
             .restarted = resets_ > 0 && now_ - restarted_at_ < base::Micros{1'000'000} &&
                          reset_cause_ != can::ResetCause::kSetPose};
-  for (std::size_t sensor = 0; sensor < kSensors; ++sensor)
-    for (std::size_t i = 0; i < kInstances; ++i) {
-      const SensorStatistics& stat = primary.statistics(sensor * kInstances + i);
-      const bool used = stat.accepted > 0 && now_ - stat.last_accepted < base::Micros{1'000'000};
-      if (used) s.used = static_cast<std::uint16_t>(s.used | (1U << sensor));
-      s.rejecting = s.rejecting || stat.refused_in_a_row >= 3;
-    }
+  for (const SensorStatistics& stat : primary.statistics()) {
+    const bool used = stat.accepted > 0 && now_ - stat.last_accepted < base::Micros{1'000'000};
+    if (used) s.used = static_cast<std::uint16_t>(s.used | (1U << static_cast<unsigned>(stat.sensor)));
+    s.rejecting = s.rejecting || stat.refused_in_a_row >= 3;
+  }
   return s;
 }
 

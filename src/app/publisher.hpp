@@ -222,21 +222,20 @@ template <std::size_t N>
 template <class Lanes, class Send>
 void Publisher<N>::statistics(const Lanes& lanes, base::Micros now, Send& send) {
   if (!every(numbers_.publish.statistics_every, 5)) return;
-  constexpr std::size_t kPerLane = kSensors * kInstances;
-  for (std::size_t tried = 0; tried < kPerLane * N; ++tried) {
-    const std::size_t index = statistic_++ % (kPerLane * N);
-    const std::size_t estimator = index / kPerLane;
+  for (std::size_t tried = 0; tried < kStatistics * N; ++tried) {
+    const std::size_t index = statistic_++ % (kStatistics * N);
+    const std::size_t estimator = index / kStatistics;
     const SensorStatistics* stat = nullptr;
     std::size_t lane_index = 0;
     std::apply(
         [&](const auto&... lane) {
-          ((lane_index++ == estimator ? void(stat = &lane.statistics(index % kPerLane)) : void()), ...);
+          ((lane_index++ == estimator ? void(stat = &lane.statistics()[index % kStatistics]) : void()), ...);
         },
         lanes);
     if (stat == nullptr || (stat->accepted == 0 && stat->rejected == 0)) continue;
     const float age_s = base::seconds(now - stat->last_accepted);
-    put(can::EstSensorStat{.sensor = static_cast<can::Sensor>(index % kPerLane / kInstances),
-                           .inst = static_cast<std::uint8_t>(index % kInstances),
+    put(can::EstSensorStat{.sensor = stat->sensor,
+                           .inst = stat->instance,
                            .estimator = static_cast<std::uint8_t>(estimator),
                            .accepted = stat->accepted,
                            .rejected = static_cast<std::uint16_t>(stat->rejected & 0xFFFU),

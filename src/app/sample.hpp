@@ -27,7 +27,12 @@ struct Sample {
     GnssPosition gnss_position;
     GnssVelocity gnss_velocity;
     LandmarkSighting sighting;
+    MagneticFlux magnetic;
+    AirPressure pressure;
+    OutsideHeading heading;
   } payload;
+
+  static_assert(sizeof(Payload) == 32, "a window of them is most of the memory");
 
   /// The order in which samples are consumed, whatever the order of arrival.
   [[nodiscard]] constexpr std::strong_ordering order(const Sample& other) const {
@@ -63,6 +68,15 @@ constexpr bool visit(const Sample& sample, F&& f) {
       return true;
     case can::Sensor::kGnssVelocity:
       f(sample.payload.gnss_velocity);
+      return true;
+    case can::Sensor::kMagnetometer:
+      f(sample.payload.magnetic);
+      return true;
+    case can::Sensor::kBarometer:
+      f(sample.payload.pressure);
+      return true;
+    case can::Sensor::kHeading:
+      f(sample.payload.heading);
       return true;
     case can::Sensor::kNotAvailable:
       return false;

@@ -12,10 +12,10 @@ namespace tetap::app {
 
 /// Increments over `interval`, so that a driver sampling faster can integrate coning and sculling.
 struct ImuSample {
-  base::Micros interval;                   ///< the span the increments cover; it ends at the stamp
   std::array<float, 3> dangle_b_rad{};     ///< integrated angular rate
   std::array<float, 3> dvelocity_b_mps{};  ///< integrated specific force
   float temperature_degC = 0;              ///< NaN: not available
+  std::uint16_t interval_us = 0;           ///< the span the increments cover; it ends at the stamp
   std::uint8_t clipped_gyro = 0;           ///< raw samples at full scale within the interval
   std::uint8_t clipped_accel = 0;
 };
@@ -65,6 +65,22 @@ struct GnssVelocity {
 };
 
 /// A landmark seen from the body: range, bearing (0 = ahead, counter-clockwise) or both; NaN: not measured.
+/// Magnetic flux density along the body's axes.
+struct MagneticFlux {
+  std::array<float, 3> flux_b_uT{};
+};
+
+struct AirPressure {
+  float pressure_Pa = 0;
+  float temperature_degC = 0;  ///< NaN: not available
+};
+
+/// Heading of a baseline on the body, from a receiver with two antennas for instance.
+struct OutsideHeading {
+  float yaw_rad = 0;
+  float acc_rad = 0;  ///< 1 sigma; NaN: not available
+};
+
 struct LandmarkSighting {
   std::uint8_t landmark = 0;
   float range_m = 0;

@@ -17,19 +17,18 @@ enum class Insert : std::uint8_t { kTaken, kDuplicate, kFull };
 template <std::size_t Capacity>
 class Timeline {
  public:
-  struct Entry {
-    Sample sample;
-    bool consumed = false;  ///< the current estimate has it and its record went out
-  };
-
   /// Keeps the order; a sample equal in stamp, kind, instance, sequence and detail is a duplicate.
   [[nodiscard]] constexpr Insert insert(const Sample& sample) {
     std::size_t at = size_;
-    while (at > 0 && entries_[at - 1].sample.order(sample) > 0) --at;
-    if (at > 0 && entries_[at - 1].sample.order(sample) == 0) return Insert::kDuplicate;
+    while (at > 0 && samples_[at - 1].order(sample) > 0) --at;
+    if (at > 0 && samples_[at - 1].order(sample) == 0) return Insert::kDuplicate;
     if (size_ == Capacity) return Insert::kFull;
-    for (std::size_t i = size_; i > at; --i) entries_[i] = entries_[i - 1];
-    entries_[at] = Entry{.sample = sample};
+    for (std::size_t i = size_; i > at; --i) {
+      samples_[i] = samples_[i - 1];
+      consumed_[i] = consumed_[i - 1];
+    }
+    samples_[at] = sample;
+    consumed_[at] = false;
     ++size_;
     if (size_ > high_water_) high_water_ = static_cast<std::uint16_t>(size_);
     return Insert::kTaken;
@@ -38,12 +37,15 @@ class Timeline {
   /// How many samples have a stamp <= t.
   [[nodiscard]] constexpr std::size_t until(base::Micros t) const {
     std::size_t n = size_;
-    while (n > 0 && entries_[n - 1].sample.stamp > t) --n;
+    while (n > 0 && samples_[n - 1].stamp > t) --n;
     return n;
   }
 
   constexpr void drop_front(std::size_t count) {
-    for (std::size_t i = count; i < size_; ++i) entries_[i - count] = entries_[i];
+    for (std::size_t i = count; i < size_; ++i) {
+      samples_[i - count] = samples_[i];
+      consumed_[i - count] = consumed_[i];
+    }
     size_ -= count;
   }
   constexpr void clear() { size_ = 0; }
@@ -55,21 +57,24 @@ class Timeline {
     constexpr std::uint32_t kOdd = 0x01000193;
     std::uint32_t sum = static_cast<std::uint32_t>(size_);
     for (std::size_t i = 0; i < size_; ++i) {
-      const auto stamp = static_cast<std::uint64_t>(entries_[i].sample.stamp.us);
+      const auto stamp = static_cast<std::uint64_t>(samples_[i].stamp.us);
       sum = sum * kOdd + static_cast<std::uint32_t>(stamp);
       sum = sum * kOdd + static_cast<std::uint32_t>(stamp >> 32);
-      sum = sum * kOdd + entries_[i].sample.bits;
+      sum = sum * kOdd + samples_[i].bits;
     }
     return sum;
   }
 
-  [[nodiscard]] constexpr Entry& operator[](std::size_t i) { return entries_[i]; }
-  [[nodiscard]] constexpr const Entry& operator[](std::size_t i) const { return entries_[i]; }
+  [[nodiscard]] constexpr const Sample& operator[](std::size_t i) const { return samples_[i]; }
+  /// The current estimate has it, and its record went out.
+  [[nodiscard]] constexpr bool consumed(std::size_t i) const { return consumed_[i]; }
+  constexpr void consume(std::size_t i) { consumed_[i] = true; }
   [[nodiscard]] constexpr std::size_t size() const { return size_; }
   [[nodiscard]] constexpr std::uint16_t high_water() const { return high_water_; }
 
  private:
-  std::array<Entry, Capacity> entries_{};
+  std::array<Sample, Capacity> samples_{};
+  std::array<bool, Capacity> consumed_{};
   std::size_t size_ = 0;
   std::uint16_t high_water_ = 0;
 };

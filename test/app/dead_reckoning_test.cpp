@@ -98,7 +98,7 @@ TEST(DeadReckoning, TheGyroscopeTurnsAndItsBiasIsLearntAtRest) {
   const auto second = [&](float forward_mps, float rate_radps) {
     for (int k = 0; k < 100; ++k) {
       t += 10'000;
-      motion.fuse(app::ImuSample{.interval = {10'000}, .dangle_b_rad = {0, 0, (rate_radps + bias) * 0.01F}}, {t}, n);
+      motion.fuse(app::ImuSample{.dangle_b_rad = {0, 0, (rate_radps + bias) * 0.01F}, .interval_us = 10'000}, {t}, n);
       motion.fuse(app::BodySpeed{.forward_mps = forward_mps, .yaw_rate_radps = -5.0F}, {t},
                   n);  // wheels that skid tell nothing
     }

@@ -113,7 +113,7 @@ TEST(Inbox, AnImuSampleCarriesIncrementsIntervalAndClips) {
   ASSERT_EQ(desk.out.samples.size(), 1U);
   const auto& s = desk.out.samples[0];
   EXPECT_EQ(s.instance, 2);
-  EXPECT_EQ(s.payload.imu.interval.us, 5'000);
+  EXPECT_EQ(s.payload.imu.interval_us, 5'000);
   EXPECT_NEAR(s.payload.imu.dangle_b_rad[1], -0.002F, 1e-6F);
   EXPECT_NEAR(s.payload.imu.dvelocity_b_mps[2], 0.0981F, 1e-5F);
   EXPECT_EQ(s.payload.imu.clipped_gyro, 3);

@@ -32,7 +32,7 @@ TEST(Timeline, SortsByStampKindInstanceSequenceAndDetail) {
     std::shuffle(shuffled.begin(), shuffled.end(), random);
     app::Timeline<32> timeline;
     for (const auto& s : shuffled) ASSERT_EQ(timeline.insert(s), app::Insert::kTaken);
-    for (std::size_t i = 0; i < all.size(); ++i) EXPECT_TRUE(timeline[i].sample.order(all[i]) == 0);
+    for (std::size_t i = 0; i < all.size(); ++i) EXPECT_TRUE(timeline[i].order(all[i]) == 0);
   }
 }
 
@@ -47,7 +47,7 @@ TEST(Timeline, RefusesDuplicatesAndOverflowWithoutLosingAnything) {
   EXPECT_EQ(timeline.high_water(), 3U);
   EXPECT_EQ(timeline.until({2}), 1U);
   timeline.drop_front(1);
-  EXPECT_EQ(timeline[0].sample.stamp.us, 3);
+  EXPECT_EQ(timeline[0].stamp.us, 3);
 }
 
 }  // namespace

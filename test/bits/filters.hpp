@@ -224,7 +224,7 @@ void hash_vector(base::WordHash& hash, const filter::Vector<float, N>& x) {
         motion.fuse(counts, stamp, numbers);
         break;
     }
-    motion.fuse(app::ImuSample{.interval = {10'000}, .dangle_b_rad = {0.0F, 0.0F, 0.01F * chance.normal()}}, stamp,
+    motion.fuse(app::ImuSample{.dangle_b_rad = {0.0F, 0.0F, 0.01F * chance.normal()}, .interval_us = 10'000}, stamp,
                 numbers);
     motion.advance({now_us});
     motion.each_bit(hash);

@@ -122,7 +122,7 @@ void dead_reckoning() {
     now.left = static_cast<std::uint16_t>(now.left + 32 + static_cast<std::int32_t>(4.0F * noise.uniform()));
     now.right = static_cast<std::uint16_t>(now.right + 33 + static_cast<std::int32_t>(4.0F * noise.uniform()));
     counts[k] = now;
-    imu[k] = {.interval = {10'000}, .dangle_b_rad = {0.0F, 0.0F, 0.003F + 1e-4F * noise()}};
+    imu[k] = {.dangle_b_rad = {0.0F, 0.0F, 0.003F + 1e-4F * noise()}, .interval_us = 10'000};
   }
   app::Numbers by_wheels = robot::rover::numbers;
   by_wheels.gyro.use = 0;

@@ -33,7 +33,7 @@ class Hash {
 
  private:
   void fields(const app::ImuSample& s) {
-    add(static_cast<std::uint64_t>(s.interval.us));
+    add(std::uint64_t{s.interval_us});
     for (const float x : s.dangle_b_rad) add(x);
     for (const float x : s.dvelocity_b_mps) add(x);
     add(s.temperature_degC);

@@ -356,7 +356,7 @@ TEST(World, each_sensor_comes_at_its_rate_with_a_running_sequence) {
         EXPECT_EQ(m.stamp.us - stamp[0], 1'000'000 / imu_hz);
       }
       if (const auto* s = std::get_if<app::ImuSample>(&m.value)) {
-        EXPECT_EQ(s->interval.us, 1'000'000 / imu_hz);
+        EXPECT_EQ(s->interval_us, 1'000'000 / imu_hz);
       }
       sequence[kind] = m.sequence;
       stamp[kind] = m.stamp.us;

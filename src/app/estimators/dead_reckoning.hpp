@@ -186,8 +186,9 @@ inline void DeadReckoning::fuse_speed(const Held& held, base::Micros stamp, cons
 }
 
 inline void DeadReckoning::fuse(const ImuSample& sample, base::Micros stamp, const Numbers& n) {
-  if (n.gyro.use == 0 || sample.interval.us <= 0 || sample.interval > base::Micros{n.wheels.timeout_us}) return;
-  const float interval_s = base::seconds(sample.interval);
+  const base::Micros interval{sample.interval_us};
+  if (n.gyro.use == 0 || interval.us == 0 || interval > base::Micros{n.wheels.timeout_us}) return;
+  const float interval_s = base::seconds(interval);
   const float raw_radps = (n.gyro.up_s[0] * sample.dangle_b_rad[0] + n.gyro.up_s[1] * sample.dangle_b_rad[1] +
                            n.gyro.up_s[2] * sample.dangle_b_rad[2]) /
                           interval_s;
