@@ -63,16 +63,16 @@ class Quadrature {
     const base::Micros elapsed = now - taken_;
     if (elapsed.us <= 0) return;
     const float most = settings_.most_counts_per_s * base::seconds(elapsed) + 2.0F;
-    if (most >= kHalfTurn) {
+    if (!(most < kHalfTurn)) {
       health_.add(EncoderReason::kAmbiguous);
       return rebase(reading, now);
     }
     // The difference modulo the counter's width is right for every wrap, as long as it is below half a turn.
     const auto raw = static_cast<Difference>(static_cast<Counter>(reading.count - count_));
     const std::int64_t moved = settings_.inverted ? -std::int64_t{raw} : std::int64_t{raw};
-    if (static_cast<float>(moved < 0 ? -moved : moved) > most) return refuse(reading, now);
+    if (beyond(moved, most)) return refuse(reading, now);
     suspects_ = 0;
-    measure(moved, elapsed, reading.last_edge, now);
+    measure(static_cast<std::int32_t>(moved), elapsed, reading.last_edge, now);
     total_ += moved;
     count_ = reading.count;
     taken_ = now;
@@ -86,6 +86,11 @@ class Quadrature {
  private:
   static constexpr float kHalfTurn = static_cast<float>(std::uint64_t{1} << (8 * sizeof(Counter) - 1));
   static constexpr int kSuspects = 5;
+
+  /// `most` is below half a turn, so it fits the integer.
+  [[nodiscard]] static constexpr bool beyond(std::int64_t moved, float most) {
+    return (moved < 0 ? -moved : moved) > static_cast<std::int32_t>(most);
+  }
 
   constexpr void rebase(const hal::EncoderReading<Counter>& reading, base::Micros now) {
     count_ = reading.count;
@@ -101,8 +106,7 @@ class Quadrature {
     health_.add(EncoderReason::kJump);
     const auto step = static_cast<Difference>(static_cast<Counter>(reading.count - suspect_));
     const float most = settings_.most_counts_per_s * base::seconds(now - suspected_) + 2.0F;
-    const std::int64_t size = step < 0 ? -std::int64_t{step} : std::int64_t{step};
-    suspects_ = suspects_ > 0 && static_cast<float>(size) <= most ? suspects_ + 1 : 1;
+    suspects_ = suspects_ > 0 && most < kHalfTurn && !beyond(step, most) ? suspects_ + 1 : 1;
     suspect_ = reading.count;
     suspected_ = now;
     if (suspects_ < kSuspects) return;
@@ -110,9 +114,9 @@ class Quadrature {
     rebase(reading, now);
   }
 
-  constexpr void measure(std::int64_t moved, base::Micros elapsed, std::optional<base::Micros> edge, base::Micros now) {
+  constexpr void measure(std::int32_t moved, base::Micros elapsed, std::optional<base::Micros> edge, base::Micros now) {
     if (moved == 0) return decay(now);
-    const std::int64_t size = moved < 0 ? -moved : moved;
+    const std::int32_t size = moved < 0 ? -moved : moved;
     const int direction = moved < 0 ? -1 : 1;
     const base::Micros seen = edge.value_or(now);
     const bool timed = edge.has_value() && seen <= now && seen > edge_;

@@ -6,6 +6,7 @@
 
 #include "base/random.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 
@@ -176,6 +177,19 @@ TYPED_TEST(QuadratureOf, EdgeTimesThatCannotBeAreNotUsed) {
     EXPECT_NEAR(this->encoder.counts_per_s(), 200, 1.0);
   }
   EXPECT_EQ(this->encoder.health().of(EncoderReason::kBadEdge), 2);
+}
+
+TEST(Quadrature, AnEdgeWithoutATimeIsNoStartForTheNext) {
+  Wheel<std::uint16_t> wheel;
+  Quadrature<std::uint16_t> encoder;
+  float most = 0;
+  for (int i = 0; i < 500; ++i) {
+    wheel.turn(130, 5000);
+    wheel.captures = i % 3 != 0;
+    encoder.update(wheel.read(), wheel.now);
+    most = std::max(most, encoder.counts_per_s());
+  }
+  EXPECT_LE(most, 200.01F);  // one count a tick: all that can be said without a time
 }
 
 TEST(Quadrature, APauseInWhichSixteenBitsMayHaveTurnedIsSaid) {

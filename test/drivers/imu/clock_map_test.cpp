@@ -60,6 +60,21 @@ TEST(ClockMap, IsAsGoodAsItsLuckiestReadings) {
   EXPECT_LT(follow(10'000, 900, 20).worst_us, 150);
 }
 
+TEST(ClockMap, AReadingThatPulledTheLineDownIsForgottenWithinSeconds) {
+  ClockMap map(kNominal);
+  const auto ticks = [](std::int64_t ms) { return ms * 15 / 16 * 1000; };
+  map.start(0, {0});
+  for (std::int64_t ms = 0; ms < 16'000; ms += 16) EXPECT_TRUE(map.observe(ticks(ms), {ms * 1000}));
+  EXPECT_TRUE(map.observe(ticks(16'000), {16'000'000 - 900}));
+  EXPECT_EQ(map.time(ticks(16'000)).us, 16'000'000 - 900);
+  for (std::int64_t ms = 16'016; ms < 26'000; ms += 16) {
+    EXPECT_TRUE(map.observe(ticks(ms), {ms * 1000}));
+    if (ms > 22'000) {
+      EXPECT_NEAR(static_cast<double>(map.time(ticks(ms)).us), static_cast<double>(ms * 1000), 150);
+    }
+  }
+}
+
 TEST(ClockMap, TicksIsTheInverseOfTime) {
   ClockMap map(kNominal);
   map.start(123'456, {777'000});
