@@ -13,7 +13,10 @@ namespace tetap::drivers::icm42688 {
 class Stream {
  public:
   explicit constexpr Stream(const Settings& settings)
-      : settings_(settings), scales_(scales(settings)), clock_(settings.tick_q32()), delay_{group_delay_us(settings)} {}
+      : settings_(settings),
+        scales_(scales(settings)),
+        clock_(settings.tick_q32()),
+        delay_{group_delay_us(settings) + settings.more_delay_us} {}
 
   [[nodiscard]] constexpr std::int32_t clock_error_ppm() const { return clock_.rate_error_ppm(); }
 
@@ -113,9 +116,11 @@ class Stream {
     ImuReading reading{};
     if (clock_.time(ticks) > now + kAhead) return health.add(Reason::kBadStamp), false;
     if (!stamp(packet, ticks, reading, health)) return false;
+    // Whatever happened to the chip or its ticks, time goes on for those who listen.
+    if (stamped_ && reading.stamp <= last_stamp_) return health.add(Reason::kBadStamp), false;
     last_ticks_ = ticks;
     last_stamp_ = reading.stamp;
-    follows_ = true;
+    follows_ = stamped_ = true;
     after_withheld_ = true;
     if (packet.kind != PacketKind::kSample) return health.add(Reason::kInvalidSample), true;
     const bool stuck_accel = stuck(packet.accel, accel_, settings_.stuck_accel_samples);
@@ -162,6 +167,7 @@ class Stream {
   std::int64_t last_ticks_ = 0;
   Repeats accel_{}, gyro_{};
   std::uint8_t refused_ = 0;
+  bool stamped_ = false;         ///< ever
   bool follows_ = false;         ///< a sample with a stamp came before
   bool after_withheld_ = false;  ///< and was not delivered
   bool clock_off_ = false;

@@ -269,6 +269,54 @@ TEST(Icm42688Fault, FlippedBitsNeverStopItNorTurnTimeBack) {
   EXPECT_GT(healed, 35);
 }
 
+/// Not a chip at all: any bytes, any failures, now and then what a chip would say.
+struct Nonsense {
+  bool transfer(std::span<const std::uint8_t> out, std::span<std::uint8_t> in) {
+    for (std::uint8_t& byte : in) {
+      byte = static_cast<std::uint8_t>(random.next() >> 24);
+      if (random.next() % 4 == 0) byte = 0x68;
+    }
+    if (in.size() == 1 && random.next() % 500 != 0) in[0] = expected(out[0] & 0x7F);
+    if (in.size() == 3) in[1] = static_cast<std::uint8_t>(random.next() % 9);
+    if ((out[0] & 0x80) == 0 && out.size() > 1) memory[bank & 7][out[0]] = out[1];
+    if ((out[0] & 0x80) == 0 && out[0] == 0x76) bank = out[1];
+    return random.next() % 2000 != 0;
+  }
+  [[nodiscard]] std::uint8_t expected(int address) const {
+    if (address == 0x75) return 0x47;
+    if (address == 0x2D) return 0x18;
+    if (address == 0x76) return bank;
+    return memory[bank & 7][static_cast<std::size_t>(address)];
+  }
+  base::Random random{1};
+  std::array<std::array<std::uint8_t, 128>, 8> memory{};
+  std::uint8_t bank = 0;
+};
+
+TEST(Icm42688Fault, AnythingOnTheBusIsSurvivedAndTimeNeverRunsBack) {
+  std::uint32_t samples = 0;
+  for (std::uint32_t seed = 1; seed <= 20; ++seed) {
+    Nonsense bus{.random = base::Random{seed}};
+    Driver<Nonsense> driver(bus, {.resolution = seed % 2 == 0 ? Resolution::k20bit : Resolution::k16bit});
+    ImuReading last{.stamp = {-1'000'000}};
+    std::int64_t now_us = 0;
+    for (int i = 0; i < 20'000; ++i) {
+      now_us += 1000;
+      if (i % 5000 == 4000) static_cast<void>(driver.request_self_test({now_us}));
+      driver.poll({now_us}, [&](const ImuReading& r) {
+        EXPECT_GT(r.stamp, last.stamp);
+        EXPECT_LE(r.stamp.us, now_us);
+        EXPECT_GT(r.interval.us, 0);
+        for (std::size_t k = 0; k < 3; ++k)
+          EXPECT_TRUE(std::isfinite(r.rate_b_radps[k]) && std::isfinite(r.force_b_mps2[k]));
+        last = r;
+      });
+    }
+    samples += driver.health().samples;
+  }
+  EXPECT_GT(samples, 0U) << "or it was no test of samples";
+}
+
 TEST(Icm42688Fault, EveryReasonHasItsOwnWords) {
   for (std::size_t i = 0; i < kReasons; ++i) {
     EXPECT_FALSE(name(static_cast<Reason>(i)).empty());
