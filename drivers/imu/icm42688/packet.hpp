@@ -62,7 +62,11 @@ inline constexpr std::int32_t kMarker16 = -32'768, kMarker20 = -524'288;
     packet.gyro[i] = gyro;
     if (accel == marker || gyro == marker) packet.kind = PacketKind::kInvalid;
   }
-  packet.temperature = wide ? signed_big_endian(bytes[13], bytes[14]) : static_cast<std::int8_t>(bytes[13]);
+  if (wide) {
+    packet.temperature = signed_big_endian(bytes[13], bytes[14]);
+  } else {
+    packet.temperature = static_cast<std::int8_t>(bytes[13]);
+  }
   packet.ticks = wide ? big_endian(bytes[15], bytes[16]) : big_endian(bytes[14], bytes[15]);
   // 6.2: in a packet of 20 bytes without this bit the extension is not new.
   if (wide && layout != kHeader20) packet.kind = PacketKind::kInvalid;

@@ -212,7 +212,8 @@ TEST(Icm42688Fault, MarkersForNoDataAreNotSamples) {
     // SENSOR_CONFIG0 (15.1) switches one axis off, until the driver finds it.
     bench.chip.inject(Fault::kRegisterChanges, {.bank = 1, .address = 0x03, .value = 0x90});
     bench.readings.clear();
-    while (bench.driver.health().restarts == 0) bench.run(1000);
+    for (int i = 0; i < 1000 && bench.driver.health().restarts == 0; ++i) bench.run(1000);
+    EXPECT_EQ(bench.driver.health().restarts, 1U);
     EXPECT_TRUE(bench.readings.empty());
     EXPECT_GT(bench.of(Reason::kInvalidSample), 3);
     EXPECT_LT(bench.of(Reason::kInvalidSample), 250);
