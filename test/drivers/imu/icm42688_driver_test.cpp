@@ -308,6 +308,24 @@ TEST(Icm42688, APauseLongerThanATurnOfTheStampIsAGapOfTheRightLength) {
   }
 }
 
+TEST(Icm42688, TheInterruptRisesAtTheWatermarkAndFallsWhenRead) {
+  for (const Resolution resolution : {Resolution::k16bit, Resolution::k20bit}) {
+    Bench bench{{.resolution = resolution, .watermark_packets = 5}};
+    ASSERT_TRUE(bench.start());
+    bench.run(20'000);
+    for (int round = 0; round < 10; ++round) {
+      EXPECT_FALSE(bench.chip.int1());
+      int waiting = 0;
+      const int before = bench.chip.counters().packets_written;
+      for (; waiting < 10 && !bench.chip.int1(); ++waiting) bench.chip.advance({bench.now_us += 1000});
+      EXPECT_EQ(bench.chip.counters().packets_written - before, 5);
+      bench.readings.clear();
+      bench.run(1, 1);
+      EXPECT_EQ(bench.readings.size(), 5U);
+    }
+  }
+}
+
 TEST(Icm42688, FewTransfersAPoll) {
   Bench bench;
   ASSERT_TRUE(bench.start());
