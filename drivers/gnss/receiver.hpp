@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: Apache-2.0
+// A GNSS receiver that speaks UBX, NMEA or both, fed byte by byte: reports of whole epochs come out, the same ones
+// however the bytes are divided. What was refused is counted with its reason.
+#pragma once
+
+#include "drivers/gnss/framer.hpp"
+#include "drivers/gnss/nmea/epoch.hpp"
+#include "drivers/gnss/ubx/epoch.hpp"
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+namespace tetap::drivers::gnss {
+
+namespace ubx {
+
+/// UBX-ACK-ACK and UBX-ACK-NAK: which message the receiver took, or refused.
+struct Acknowledge {
+  std::uint8_t message_class = 0;
+  std::uint8_t message_id = 0;
+  bool accepted = false;
+};
+/// UBX-MON-VER arrived: a receiver that understands UBX at this baud rate.
+struct Identified {};
+
+}  // namespace ubx
+
+struct ReceiverSettings {
+  bool nmea_checksum_required = true;  ///< false: for old receivers that send none
+};
+
+/// A handler is called with a Report and, where it takes them, with ubx::Acknowledge and ubx::Identified.
+template <std::size_t Capacity = 1029>
+class GnssReceiver {
+ public:
+  explicit constexpr GnssReceiver(const ReceiverSettings& settings = {}) : settings_(settings) {}
+
+  template <class Handler>
+  constexpr void on_byte(std::uint8_t byte, Handler&& handler) {
+    Router<Handler> router{*this, handler};
+    framer_.on_byte(byte, health_, settings_.nmea_checksum_required, router);
+  }
+  template <class Handler>
+  constexpr void on_bytes(std::span<const std::uint8_t> bytes, Handler&& handler) {
+    for (const std::uint8_t byte : bytes) on_byte(byte, handler);
+  }
+
+  /// The line was quiet for longer than any pause within a frame: what is incomplete will not be completed.
+  template <class Handler>
+  constexpr void on_gap(Handler&& handler) {
+    Router<Handler> router{*this, handler};
+    framer_.on_gap(health_, settings_.nmea_checksum_required, router);
+  }
+
+  /// No more bytes: hands on the epochs that could still have grown.
+  template <class Handler>
+  constexpr void finish(Handler&& handler) {
+    Router<Handler> router{*this, handler};
+    if (framer_.within_frame()) framer_.on_gap(health_, settings_.nmea_checksum_required, router);
+    ubx_.finish(router);
+    nmea_.finish(router);
+  }
+
+  [[nodiscard]] constexpr const Health& health() const { return health_; }
+  [[nodiscard]] constexpr bool within_frame() const { return framer_.within_frame(); }
+
+ private:
+  template <class Handler>
+  struct Router {
+    GnssReceiver& receiver;
+    Handler& handler;
+
+    constexpr void ubx(std::uint8_t message_class, std::uint8_t id, std::span<const std::uint8_t> payload) {
+      if (message_class == ubx::kClassNav) {
+        receiver.ubx_.on_nav(id, payload, receiver.health_, *this);
+      } else if (message_class == ubx::kClassAck && id <= 1) {
+        if (payload.size() != 2) return receiver.health_.add(Reason::kUbxLength);
+        tell(ubx::Acknowledge{payload[0], payload[1], id == 1});
+      } else if (message_class == ubx::kClassMon && id == 0x04 && payload.size() >= 40) {
+        tell(ubx::Identified{});
+      }
+    }
+    constexpr void nmea(nmea::Text text) { receiver.nmea_.on_sentence(text, receiver.health_, *this); }
+
+    /// Of a receiver that says the same in two protocols, the more exact one is heard.
+    constexpr void operator()(const Report& report) {
+      constexpr std::uint8_t kEpochsOfNmeaToWait = 3;
+      if (report.protocol == Protocol::kUbx) {
+        receiver.nmea_held_back_ = kEpochsOfNmeaToWait;
+      } else if (receiver.nmea_held_back_ > 0) {
+        --receiver.nmea_held_back_;
+        return receiver.health_.add(Reason::kSecondProtocol);
+      }
+      handler(report);
+    }
+
+    template <class Event>
+    constexpr void tell(const Event& event) {
+      if constexpr (requires { handler(event); }) handler(event);
+    }
+  };
+
+  ReceiverSettings settings_;
+  Framer<Capacity> framer_{};
+  ubx::Epoch ubx_{};
+  nmea::Epoch nmea_{};
+  Health health_{};
+  std::uint8_t nmea_held_back_ = 0;
+};
+
+}  // namespace tetap::drivers::gnss

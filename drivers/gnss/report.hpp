@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: Apache-2.0
+// One epoch of a GNSS receiver, whichever protocol it spoke, in SI units and the frame n (east, north, up); and the
+// samples that estimators take from it. What the receiver did not say is NaN or empty.
+#pragma once
+
+#include "app/samples.hpp"
+#include "base/float_bits.hpp"
+#include "base/math.hpp"
+
+#include <array>
+#include <cstdint>
+#include <optional>
+
+namespace tetap::drivers::gnss {
+
+enum class Protocol : std::uint8_t { kUbx, kNmea };
+
+/// UTC as the receiver said it. The second may be 60.
+struct Utc {
+  std::uint16_t year = 0;
+  std::uint8_t month = 0, day = 0, hour = 0, minute = 0, second = 0;
+  std::int32_t nano = 0;  ///< u-blox rounds the second, so this may be negative (UBX-NAV-PVT, field nano)
+  bool date_valid = false;
+  bool time_valid = false;
+
+  friend constexpr bool operator==(const Utc&, const Utc&) = default;
+};
+
+/// Upper triangle in the order EE, EN, EU, NN, NU, UU.
+using Covariance = std::array<float, 6>;
+
+struct Report {
+  Protocol protocol = Protocol::kUbx;
+  app::GnssFix fix = app::GnssFix::kNone;
+  std::uint8_t satellites = 0;
+  bool has_position = false;             ///< the two angles below mean something
+  std::optional<std::uint32_t> itow_ms;  ///< GPS time of week; UBX only
+  Utc utc{};
+  std::int64_t latitude_2ndeg = 0;  ///< units of 2e-9 deg, WGS84
+  std::int64_t longitude_2ndeg = 0;
+  float height_m = base::kNan;      ///< above the ellipsoid
+  float height_msl_m = base::kNan;  ///< above mean sea level, by the receiver's geoid
+  float horizontal_acc_m = base::kNan;
+  float vertical_acc_m = base::kNan;
+  std::array<float, 3> v_n_mps{base::kNan, base::kNan, base::kNan};
+  float speed_mps = base::kNan;   ///< over ground
+  float course_rad = base::kNan;  ///< clockwise from north, as receivers say it
+  float speed_acc_mps = base::kNan;
+  float course_acc_rad = base::kNan;
+  float pdop = base::kNan, hdop = base::kNan, vdop = base::kNan;
+  std::optional<Covariance> position_cov_m2;
+  std::optional<Covariance> velocity_cov_m2ps2;
+
+  /// A place on Earth that the receiver itself calls valid.
+  [[nodiscard]] constexpr bool usable() const { return has_position && fix >= app::GnssFix::k2d; }
+};
+
+/// What a filter may fuse; empty: this epoch has no position, or none the receiver vouches for. From the covariance,
+/// where it came, the accuracies are the axes' own; else the receiver's figure is passed on as it is.
+[[nodiscard]] constexpr std::optional<app::GnssPosition> position_of(const Report& report) {
+  if (!report.usable()) return {};
+  app::GnssPosition p{.latitude_2ndeg = report.latitude_2ndeg,
+                      .longitude_2ndeg = report.longitude_2ndeg,
+                      .height_m = report.fix == app::GnssFix::k2d ? base::kNan : report.height_m,
+                      .horizontal_acc_m = report.horizontal_acc_m,
+                      .vertical_acc_m = report.vertical_acc_m,
+                      .fix = report.fix,
+                      .satellites = report.satellites};
+  if (const auto& c = report.position_cov_m2) {
+    p.horizontal_acc_m = base::sqrt(0.5F * ((*c)[0] + (*c)[3]));
+    p.vertical_acc_m = base::sqrt((*c)[5]);
+  }
+  return p;
+}
+
+/// Up may be NaN: NMEA has no vertical speed.
+[[nodiscard]] constexpr std::optional<app::GnssVelocity> velocity_of(const Report& report) {
+  if (report.fix < app::GnssFix::k2d || base::is_nan(report.v_n_mps[0]) || base::is_nan(report.v_n_mps[1])) return {};
+  app::GnssVelocity v{.v_n_mps = report.v_n_mps, .acc_mps = report.speed_acc_mps};
+  if (const auto& c = report.velocity_cov_m2ps2) {
+    v.acc_mps = base::sqrt(((*c)[0] + (*c)[3] + (*c)[5]) * (1.0F / 3.0F));
+  }
+  return v;
+}
+
+}  // namespace tetap::drivers::gnss

@@ -1,0 +1,215 @@
+// SPDX-License-Identifier: Apache-2.0
+// Puts the UBX navigation messages of one time of week together into one report: NAV-PVT and NAV-COV of a current
+// receiver, or what an old one sends instead (NAV-SOL, -POSLLH, -VELNED, -STATUS, -DOP, -TIMEUTC; sources in nav.hpp).
+#pragma once
+
+#include "drivers/gnss/ecef.hpp"
+#include "drivers/gnss/epoch_end.hpp"
+#include "drivers/gnss/health.hpp"
+#include "drivers/gnss/ubx/nav.hpp"
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+
+namespace tetap::drivers::gnss::ubx {
+
+[[nodiscard]] constexpr std::uint32_t bit(Nav nav) { return 1U << static_cast<unsigned>(nav); }
+
+class Epoch {
+ public:
+  template <class Sink>
+  constexpr void on_nav(std::uint8_t id, std::span<const std::uint8_t> payload, Health& health, Sink& sink) {
+    std::size_t kind = 0;
+    while (kind < kNavKinds && kNavMessages[kind].id != id) ++kind;
+    if (kind == kNavKinds) return;
+    const auto nav = static_cast<Nav>(kind);
+    if (payload.size() != kNavMessages[kind].length && !(nav == Nav::kPvt && payload.size() == kOldPvtLength)) {
+      return health.add(Reason::kUbxLength);
+    }
+    const Fields f{payload};
+    if (!open_ || f.u4(0) != report_.itow_ms) begin(f.u4(0), sink);
+    seen_ |= 1U << kind;
+    take(nav, f, health);
+    if (end_.arrived(kind) || nav == Nav::kEndOfEpoch) finish(sink);
+  }
+
+  /// Hands on what there is: a new epoch began, or the input is at its end.
+  template <class Sink>
+  constexpr void finish(Sink& sink) {
+    if (!open_ || done_) return;
+    done_ = true;
+    constexpr std::uint32_t kSolution =
+        bit(Nav::kPvt) | bit(Nav::kPosLlh) | bit(Nav::kSol) | bit(Nav::kPosEcef) | bit(Nav::kStatus);
+    if ((seen_ & kSolution) == 0) return;
+    if (!has(Nav::kPvt)) compose();
+    sink(static_cast<const Report&>(report_));
+  }
+
+ private:
+  [[nodiscard]] constexpr bool has(Nav nav) const { return (seen_ & bit(nav)) != 0; }
+
+  template <class Sink>
+  constexpr void begin(std::uint32_t itow_ms, Sink& sink) {
+    finish(sink);
+    end_.begin();
+    report_ = {};
+    report_.itow_ms = itow_ms;
+    seen_ = 0;
+    open_ = true;
+    done_ = false;
+    position_m_.reset();
+    velocity_mps_.reset();
+    from_sol_ = false;
+  }
+
+  constexpr void take(Nav nav, const Fields& f, Health& health) {
+    switch (nav) {
+      case Nav::kPvt:
+        return pvt(f, health);
+      case Nav::kCov:
+        return cov(f, health);
+      case Nav::kSol:
+        return sol(f);
+      case Nav::kDop:
+        report_.pdop = f.su2(6, kCenti);
+        report_.vdop = f.su2(10, kCenti);
+        report_.hdop = f.su2(12, kCenti);
+        return;
+      case Nav::kTimeUtc: {
+        const bool resolved = (f.u1(19) & 0x04) != 0;
+        if (!has(Nav::kPvt) && !set_utc(f, 12, resolved, resolved, f.i4(8), report_.utc)) health.add(Reason::kBadTime);
+        return;
+      }
+      case Nav::kTimeGps:
+        if ((f.u1(11) & 0x07) == 0x07 && !report_.utc.time_valid) {
+          report_.utc = utc_of_gps(f.i2(8), f.u4(0), static_cast<std::int8_t>(f.u1(10)));
+          report_.utc.nano += in_range(f.i4(4), 500'000) ? f.i4(4) : 0;
+        }
+        return;
+      default:
+        if (!has(Nav::kPvt)) old(nav, f, health);
+    }
+  }
+
+  constexpr void pvt(const Fields& f, Health& health) {
+    Report& r = report_;
+    const std::uint8_t valid = f.u1(11), flags = f.u1(21);
+    if (!set_utc(f, 4, (valid & 1) != 0, (valid & 2) != 0, f.i4(16), r.utc)) health.add(Reason::kBadTime);
+    r.fix = fix_of(f.u1(20), (flags & 1) != 0, (flags & 2) != 0, flags >> 6);
+    r.satellites = f.u1(23);
+    // flags3, bit 0: latitude, longitude and heights are not valid.
+    r.has_position = (f.u2(78) & 1) == 0 && f.u1(20) >= 1 && f.u1(20) <= 4;
+    if (r.has_position && !set_angles(f.i4(28), f.i4(24), r)) refuse_position(health);
+    if (r.has_position) {
+      r.height_m = f.si4(32, kMilli);
+      r.height_msl_m = f.si4(36, kMilli);
+    }
+    r.horizontal_acc_m = f.su4(40, kMilli);
+    r.vertical_acc_m = f.su4(44, kMilli);
+    set_velocity(f.si4(48, kMilli), f.si4(52, kMilli), f.si4(56, kMilli), health);
+    r.speed_mps = f.si4(60, kMilli);
+    r.course_rad = f.si4(64, k1e5degPerRad);
+    r.speed_acc_mps = f.su4(68, kMilli);
+    r.course_acc_rad = f.su4(72, k1e5degPerRad);
+    r.pdop = f.su2(76, kCenti);
+  }
+
+  constexpr void cov(const Fields& f, Health& health) {
+    if (f.u1(4) != 0) return health.add(Reason::kUbxVersion);
+    if (f.u1(5) != 0) report_.position_cov_m2 = covariance_enu(f, 16);
+    if (f.u1(6) != 0) report_.velocity_cov_m2ps2 = covariance_enu(f, 40);
+  }
+
+  /// Position and velocity of NAV-SOL are Earth-centred; better messages of the same epoch take precedence.
+  constexpr void sol(const Fields& f) {
+    if (has(Nav::kPvt)) return;
+    report_.fix = fix_of(f.u1(10), (f.u1(11) & 1) != 0, (f.u1(11) & 2) != 0, 0);
+    report_.satellites = f.u1(47);
+    report_.pdop = f.su2(44, kCenti);
+    if (!has(Nav::kPosLlh) && f.u1(10) >= 1 && f.u1(10) <= 4) {
+      position_m_ = centi3(f, 12);
+      velocity_mps_ = centi3(f, 28);
+      report_.speed_acc_mps = f.su4(40, kCenti);
+    }
+    position_acc_m_ = f.su4(24, kCenti);
+    from_sol_ = true;
+  }
+
+  constexpr void old(Nav nav, const Fields& f, Health& health) {
+    Report& r = report_;
+    if (nav == Nav::kPosLlh) {
+      if (!set_angles(f.i4(8), f.i4(4), r)) return refuse_position(health);
+      r.height_m = f.si4(12, kMilli);
+      r.height_msl_m = f.si4(16, kMilli);
+      r.horizontal_acc_m = f.su4(20, kMilli);
+      r.vertical_acc_m = f.su4(24, kMilli);
+    } else if (nav == Nav::kVelNed) {
+      set_velocity(f.si4(4, kCenti), f.si4(8, kCenti), f.si4(12, kCenti), health);
+      r.speed_mps = f.su4(20, kCenti);
+      r.course_rad = f.si4(24, k1e5degPerRad);
+      r.speed_acc_mps = f.su4(28, kCenti);
+      r.course_acc_rad = f.su4(32, k1e5degPerRad);
+    } else if (nav == Nav::kStatus && !from_sol_) {
+      r.fix = fix_of(f.u1(4), (f.u1(5) & 1) != 0, (f.u1(5) & 2) != 0, 0);
+    } else if (nav == Nav::kPosEcef && !from_sol_) {
+      position_m_ = centi3(f, 4);
+      position_acc_m_ = f.su4(16, kCenti);
+    } else if (nav == Nav::kVelEcef && !from_sol_) {
+      velocity_mps_ = centi3(f, 4);
+      r.speed_acc_mps = f.su4(16, kCenti);
+    }
+  }
+
+  /// From Earth-centred coordinates, where no message said it better.
+  constexpr void compose() {
+    Report& r = report_;
+    if (!position_m_.has_value()) return;
+    const auto at = geodetic_of(*position_m_);
+    if (!at.has_value()) return;
+    if (!has(Nav::kPosLlh)) {
+      r.latitude_2ndeg = at->latitude_2ndeg;
+      r.longitude_2ndeg = at->longitude_2ndeg;
+      r.has_position = true;
+      r.height_m = static_cast<float>(at->height_m);
+      // pAcc is of three dimensions; nothing says how it divides.
+      r.horizontal_acc_m = r.vertical_acc_m = position_acc_m_;
+    }
+    if (!has(Nav::kVelNed) && velocity_mps_.has_value()) {
+      const Vector3 v = level_of(*at, *velocity_mps_);
+      r.v_n_mps = {static_cast<float>(v[0]), static_cast<float>(v[1]), static_cast<float>(v[2])};
+      r.speed_mps = base::sqrt(r.v_n_mps[0] * r.v_n_mps[0] + r.v_n_mps[1] * r.v_n_mps[1]);
+      r.course_rad = base::atan2(r.v_n_mps[0], r.v_n_mps[1]);
+    }
+  }
+
+  constexpr void set_velocity(float north, float east, float down, Health& health) {
+    constexpr float kFastest_mps = 1000.0F;  // receivers stop at 500 m/s
+    if (base::max(base::max(base::abs(north), base::abs(east)), base::abs(down)) > kFastest_mps) {
+      return health.add(Reason::kOutOfRange);
+    }
+    set_velocity_ned(north, east, down, report_);
+  }
+
+  constexpr void refuse_position(Health& health) {
+    report_.has_position = false;
+    health.add(Reason::kOutOfRange);
+  }
+
+  static constexpr bool in_range(std::int32_t x, std::int32_t limit) { return x >= -limit && x <= limit; }
+  static constexpr Vector3 centi3(const Fields& f, std::size_t at) {
+    return {f.i4(at) * 0.01, f.i4(at + 4) * 0.01, f.i4(at + 8) * 0.01};
+  }
+
+  Report report_{};
+  EpochEnd<kNavKinds> end_{};
+  std::optional<Vector3> position_m_, velocity_mps_;  ///< Earth-centred
+  float position_acc_m_ = base::kNan;
+  std::uint32_t seen_ = 0;
+  bool open_ = false;
+  bool done_ = false;
+  bool from_sol_ = false;
+};
+
+}  // namespace tetap::drivers::gnss::ubx
