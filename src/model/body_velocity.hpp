@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+// The velocity of a point of the body in the body's own axes, and how the errors of inertial navigation show in it:
+// what wheels and the non-holonomic constraint measure (Dissanayake et al. 2001, IEEE T-RA 17(5)).
+#pragma once
+
+#include "filter/state.hpp"
+#include "nav/ins_state.hpp"
+
+namespace tetap::model {
+
+struct BodyVelocity {
+  nav::Vector3 v_b_mps;  ///< R^T v + w x lever
+  /// By velocity (3), attitude (3) and gyroscope bias (3).
+  filter::Matrix<float, 3, 9> h;
+
+  BodyVelocity(const nav::InsState& at, const nav::Vector3& gyro_b_radps, const nav::Vector3& lever_b_m) {
+    const nav::Matrix3 r_bn = at.q_nb.matrix().transpose();
+    v_b_mps = r_bn * at.v_n_mps + nav::cross(gyro_b_radps - at.b_g_radps, lever_b_m);
+    h << r_bn, r_bn.lazyProduct(nav::skew(at.v_n_mps)), nav::skew(lever_b_m);
+  }
+};
+
+}  // namespace tetap::model

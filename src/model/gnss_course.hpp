@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+// Course over ground of a body that moves the way it looks: heading for robots without a compass. Its error is that of
+// the velocity across, over the speed.
+#pragma once
+
+#include "model/direction.hpp"
+
+namespace tetap::model {
+
+struct GnssCourse : DirectionMeasurement {
+  /// From a velocity over ground; not defined at standstill (the angle is NaN, the update refuses it). `slip_rad`: how
+  /// far the body may look beside its way. The velocity's own error is in it: not to be fused beside that velocity.
+  GnssCourse(float east_mps, float north_mps, float sigma_mps, float slip_rad, bool backwards = false) {
+    const float speed2 = east_mps * east_mps + north_mps * north_mps;
+    const bool moves = speed2 > sigma_mps * sigma_mps;
+    vector_b = {backwards ? -1.0F : 1.0F, 0.0F, 0.0F};
+    angle_rad = moves ? base::atan2(north_mps, east_mps) : base::kNan;
+    sigma_rad = moves ? base::sqrt(sigma_mps * sigma_mps / speed2 + slip_rad * slip_rad) : 0.0F;
+  }
+};
+
+}  // namespace tetap::model

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+// Normal gravity on and above the WGS84 ellipsoid, and the Earth's rotation (NIMA TR8350.2, eq. 4-1 and 4-3, table 3.1
+// and 3.4). Computed once, when the origin is known.
+#pragma once
+
+#include "nav/geodesy.hpp"
+#include "nav/so3.hpp"
+
+namespace tetap::nav {
+
+/// m/s^2 downwards; height above the ellipsoid. Within 1e-6 m/s^2 of the closed form up to 20 km.
+[[nodiscard]] constexpr double normal_gravity(double latitude_rad, double height_m) {
+  constexpr double kEquator_mps2 = 9.7803253359;
+  constexpr double kSomigliana = 0.00193185265241;
+  constexpr double kCentrifugal = 0.00344978650684;  // omega^2 a^2 b / GM
+  const double s = base::sin(latitude_rad);
+  const double s2 = s * s;
+  const double surface = kEquator_mps2 * (1.0 + kSomigliana * s2) / base::sqrt(1.0 - kEccentricity2 * s2);
+  const double up = height_m / kSemiMajor_m;
+  return surface * (1.0 - 2.0 * (1.0 + kFlattening + kCentrifugal - 2.0 * kFlattening * s2) * up + 3.0 * up * up);
+}
+
+/// What the Earth does to a body at rest on it, in the local plane. Over 100 km the plumb line turns by 16 mrad against
+/// the plane; transport rate and that turn are left to the tilt states.
+struct Earth {
+  float gravity_mps2 = 9.80665F;
+  Vector3 rate_n_radps = Vector3::Zero();  ///< zero: not modelled
+
+  [[nodiscard]] static Earth at(const LocalFrame& origin, bool with_rotation) {
+    constexpr double kRate_radps = 7.292115e-5;
+    const double latitude = static_cast<double>(origin.latitude_2ndeg()) * kRadPer2ndeg;
+    Earth earth;
+    earth.gravity_mps2 = static_cast<float>(normal_gravity(latitude, static_cast<double>(origin.height_m())));
+    if (with_rotation) {
+      const base::SinCosDouble at = base::sincos(latitude);
+      earth.rate_n_radps = {0.0F, static_cast<float>(kRate_radps * at.cos), static_cast<float>(kRate_radps * at.sin)};
+    }
+    return earth;
+  }
+  [[nodiscard]] bool rotates() const { return rate_n_radps.squaredNorm() > 0.0F; }
+};
+
+}  // namespace tetap::nav

@@ -1,0 +1,181 @@
+// SPDX-License-Identifier: Apache-2.0
+// The filter as a whole: what it refuses, that it stays finite and positive definite, that the anchor does not matter.
+#include "nav/ins.hpp"
+
+#include "model/gnss_fix_3d.hpp"
+#include "model/gnss_velocity_3d.hpp"
+#include "model/height.hpp"
+#include "true_body.hpp"
+
+#include <gtest/gtest.h>
+
+namespace tetap {
+namespace {
+
+using nav::ImuIncrement;
+using nav::ImuVerdict;
+using nav::Ins;
+using nav::InsState;
+using nav::Vector3;
+
+Ins::Covariance start_covariance() {
+  return Ins::Covariance::diagonal(
+      {4, 4, 9, 0.1F, 0.1F, 0.1F, 3e-4F, 3e-4F, 0.01F, 2e-3F, 2e-3F, 2e-3F, 1e-6F, 1e-6F, 1e-6F});
+}
+ImuIncrement at_rest() { return ImuIncrement::constant({0, 0, 0}, {0, 0, 9.80665F}, {5'000}); }
+
+using test::same;
+
+TEST(Ins, RefusesEveryBadIncrementByNameAndKeepsItsState) {
+  Ins ins;
+  ins.start({}, start_covariance());
+  static_cast<void>(ins.predict(at_rest()));
+  ins.predict_covariance();
+  const InsState x = ins.x;
+  const auto p = ins.p.packed();
+  const auto refused = [&](const ImuIncrement& imu, ImuVerdict why) {
+    EXPECT_EQ(ins.predict(imu), why);
+    EXPECT_TRUE(same(ins.x, x));
+    ins.predict_covariance();
+    EXPECT_EQ(ins.p.packed(), p);
+  };
+  for (int i = 0; i < 6; ++i)
+    for (const float bad : {base::kNan, base::kInfinity, -base::kInfinity, 3.4e38F, -3.4e38F, 6.0F}) {
+      ImuIncrement imu = at_rest();
+      (i < 3 ? imu.dtheta_b_rad(i) : imu.dv_b_mps(i - 3)) = bad;
+      refused(imu, base::is_finite(bad) ? ImuVerdict::kTooFast : ImuVerdict::kNotFinite);
+    }
+  for (const std::int64_t dt_us : {std::int64_t{0}, std::int64_t{-5000}, std::int64_t{200'001}, INT64_MAX, INT64_MIN}) {
+    ImuIncrement imu = at_rest();
+    imu.dt = {dt_us};
+    refused(imu, ImuVerdict::kBadInterval);
+  }
+  ImuIncrement smallest = at_rest();
+  smallest.dtheta_b_rad = Vector3::Constant(1e-45F);
+  EXPECT_EQ(ins.predict(smallest), ImuVerdict::kAccepted);
+}
+
+TEST(Ins, AMillionStepsWithoutAMeasurementStayFiniteAndPositiveDefinite) {
+  for (const bool thrust : {false, true}) {
+    Ins ins;
+    ins.start({}, start_covariance());
+    int refused = 0;
+    const auto imu = thrust ? ImuIncrement::constant({0.1F, -0.2F, 3.0F}, {20, 5, 30}, {5'000}) : at_rest();
+    for (int i = 0; i < 1'000'000; ++i) {
+      if (ins.predict(imu) == ImuVerdict::kDiverged) ++refused;
+      ins.predict_covariance();
+      if (i % 100 == 0) {
+        ASSERT_GT(test::least_correlation(ins.p), 0.0) << i;
+        ASSERT_TRUE(ins.x.finite());
+      }
+    }
+    EXPECT_EQ(refused > 0, thrust);
+    for (int i = 0; i < 15; ++i) {
+      const float most = nav::kInsMostSigma[static_cast<std::size_t>(i / 3)];
+      EXPECT_LT(ins.p(i, i), most * most * 1.2F) << i;
+    }
+    if (!thrust) {
+      EXPECT_GT(ins.p(0, 0), 1e11F) << "after 5000 s it knows nothing, and says so";
+    }
+  }
+}
+
+TEST(Ins, AGapWithoutIncrementsWidensWhatTheGapMayHaveChanged) {
+  Ins ins;
+  ins.start({}, start_covariance());
+  ins.x.v_n_mps = {2, 0, 0};
+  ins.predict_without_imu({1'000'000}, 1.0F, 0.2F);
+  EXPECT_NEAR(test::metres(ins.x.x), 2.0, 1e-5);
+  // A force of 1 m/s^2 that changes every 0.1 s.
+  EXPECT_NEAR(ins.p(3, 3), 0.1F + 0.1F, 0.01F);
+  EXPECT_NEAR(ins.p(8, 8), 0.01F + 0.04F * 0.1F, 1e-4F);
+  EXPECT_TRUE(ins.p.positive_definite());
+  ins.predict_without_imu({INT64_MAX}, 1.0F, 0.2F);
+  EXPECT_TRUE(ins.p.positive_definite());
+  EXPECT_TRUE(ins.x.finite());
+}
+
+TEST(Ins, AnOutlierIsRejectedAndChangesNothing) {
+  Ins ins;
+  ins.start({}, start_covariance());
+  const auto p = ins.p.packed();
+  const auto far =
+      ins.update(model::GnssFix3d{.x = test::anchored(100), .sigma_horizontal_m = 1, .sigma_vertical_m = 1},
+                 filter::chi_square_99(3));
+  EXPECT_EQ(far.verdict, filter::Verdict::kRejected);
+  EXPECT_NEAR(far.nis, 100 * 100 / 5.0F, 1);
+  EXPECT_EQ(ins.p.packed(), p);
+  EXPECT_TRUE(same(ins.x, {}));
+}
+
+TEST(Ins, ACorrectionOfKilometresArrivesWhole) {
+  Ins ins;
+  auto p = start_covariance();
+  p(0, 0) = p(1, 1) = 1e10F;
+  ins.start({}, p);
+  const auto fix = model::GnssFix3d{.x = test::anchored(31'234.567),
+                                    .y = test::anchored(-4'321.5),
+                                    .sigma_horizontal_m = 0.01F,
+                                    .sigma_vertical_m = 1};
+  static_cast<void>(ins.update(fix, 1e9F));
+  EXPECT_NEAR(test::metres(ins.x.x), 31'234.567, 0.05);
+  EXPECT_NEAR(test::metres(ins.x.y), -4'321.5, 0.05);
+}
+
+/// The same drive at the origin and 50 km away: the same bits in everything but the anchor.
+TEST(Ins, TheAnchorDoesNotMatterToTheBit) {
+  Ins near, far;
+  InsState away{.x = {.anchor_um = 50'000'000'000}, .y = {.anchor_um = -30'000'000'000}};
+  near.start({}, start_covariance());
+  far.start(away, start_covariance());
+  test::Normal normal(12);
+  for (int i = 0; i < 20'000; ++i) {
+    const auto imu = ImuIncrement::constant((0.3 * normal.vector()).cast<float>(),
+                                            (Eigen::Vector3d(0, 0, 9.8) + 2 * normal.vector()).cast<float>(), {5'000});
+    static_cast<void>(near.predict(imu));
+    static_cast<void>(far.predict(imu));
+    if (i % 40 == 0) {
+      model::GnssFix3d fix{.sigma_horizontal_m = 1, .sigma_vertical_m = 2, .antenna_b_m = {0.3F, 0, 1}};
+      const double e = normal(), n = normal();
+      fix.x = test::anchored(e), fix.y = test::anchored(n);
+      static_cast<void>(near.update(fix, 1e9F));
+      fix.x.anchor_um += away.x.anchor_um, fix.y.anchor_um += away.y.anchor_um;
+      static_cast<void>(far.update(fix, 1e9F));
+    }
+  }
+  far.x.x.anchor_um -= away.x.anchor_um;
+  far.x.y.anchor_um -= away.y.anchor_um;
+  EXPECT_TRUE(same(near.x, far.x));
+  EXPECT_EQ(near.x.x.anchor_um, far.x.x.anchor_um);
+  EXPECT_EQ(near.p.packed(), far.p.packed());
+}
+
+TEST(Ins, ZeroAndHugeCovariancesAndPerfectSensorsLeaveItFinite) {
+  for (const float size : {0.0F, 1e-30F, 1e-12F, 1.0F, 1e12F, 1e30F})
+    for (const float sigma : {0.0F, 1e-20F, 1e-6F, 1.0F, 1e10F, 1e20F}) {
+      Ins ins;
+      Ins::Covariance p;
+      for (int i = 0; i < 15; ++i) p(i, i) = size;
+      ins.start({}, p);
+      for (int i = 0; i < 200; ++i) {
+        ASSERT_EQ(ins.predict(at_rest()), ImuVerdict::kAccepted);
+        const model::GnssFix3d fix{.x = test::anchored(0.01 * (i % 7)),
+                                   .sigma_horizontal_m = sigma,
+                                   .sigma_vertical_m = sigma,
+                                   .antenna_b_m = {1, 0, 1}};
+        static_cast<void>(ins.update(fix, 1e12F));
+        static_cast<void>(
+            ins.update(model::GnssVelocity3d{.sigma_horizontal_mps = sigma, .sigma_vertical_mps = sigma}, 1e12F));
+        ASSERT_TRUE(ins.x.finite()) << size << ' ' << sigma << ' ' << i;
+      }
+      EXPECT_TRUE(ins.p.positive_definite()) << size << ' ' << sigma;
+    }
+}
+
+TEST(Ins, TheFilterIsSmall) {
+  EXPECT_LE(sizeof(Ins), 1024U);
+  EXPECT_LE(sizeof(InsState), 104U);
+}
+
+}  // namespace
+}  // namespace tetap
