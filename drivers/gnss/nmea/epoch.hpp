@@ -72,7 +72,7 @@ class Epoch {
     std::optional<std::int32_t> quality, satellites, dimension;
     char rmc_status = '\0', rmc_mode = '\0';
     float altitude_m = base::kNan, separation_m = base::kNan;
-    float speed_mps = base::kNan, course_rad = base::kNan;
+    float speed_mps = base::kNan, course_rad = base::kNan, vtg_speed_mps = base::kNan, vtg_course_rad = base::kNan;
     float gga_hdop = base::kNan, pdop = base::kNan, hdop = base::kNan, vdop = base::kNan;
     float horizontal_acc_m = base::kNan, vertical_acc_m = base::kNan;
     bool stamped = false;
@@ -121,21 +121,26 @@ class Epoch {
     constexpr float kRadPerDeg = 0.017453293F;
     switch (kind) {
       case Sentence::kGga: {
-        p.gga_latitude = f.angle(2, 'N', 'S', 90);
-        p.gga_longitude = f.angle(4, 'E', 'W', 180);
         p.quality = f.integer(6, 0, 9);
+        // Without a fix the place is empty, the last one, or nonsense such as 8960.0000.
+        if (p.quality.value_or(0) != 0) {
+          p.gga_latitude = f.angle(2, 'N', 'S', 90);
+          p.gga_longitude = f.angle(4, 'E', 'W', 180);
+          p.altitude_m = f.milli(9);
+          p.separation_m = f.milli(11);
+        }
         p.satellites = f.integer(7, 0, 255);
         p.gga_hdop = f.milli(8);
-        p.altitude_m = f.milli(9);
-        p.separation_m = f.milli(11);
         return f.time(1, t);
       }
       case Sentence::kRmc: {
         p.rmc_status = f.letter(2);
-        p.rmc_latitude = f.angle(3, 'N', 'S', 90);
-        p.rmc_longitude = f.angle(5, 'E', 'W', 180);
-        p.speed_mps = f.ten_micro(7) * kMpsPerKnot;
-        p.course_rad = f.ten_micro(8) * kRadPerDeg;
+        if (p.rmc_status == 'A') {
+          p.rmc_latitude = f.angle(3, 'N', 'S', 90);
+          p.rmc_longitude = f.angle(5, 'E', 'W', 180);
+          p.speed_mps = f.ten_micro(7) * kMpsPerKnot;
+          p.course_rad = f.ten_micro(8) * kRadPerDeg;
+        }
         if (const auto ddmmyy = f[9].size() == 6 ? f.integer(9, 0, 311'299) : std::nullopt) {
           const int yy = *ddmmyy % 100;
           f.date(*ddmmyy / 10'000, *ddmmyy / 100 % 100, yy + (yy < 80 ? 2000 : 1900), t);
@@ -146,8 +151,8 @@ class Epoch {
       case Sentence::kVtg:
         // Before NMEA 2.0 there were no letters after the numbers.
         if (f.letter(2) == 'T') {
-          take(f.ten_micro(5) * kMpsPerKnot, p.speed_mps);
-          take(f.ten_micro(1) * kRadPerDeg, p.course_rad);
+          p.vtg_speed_mps = f.ten_micro(5) * kMpsPerKnot;
+          p.vtg_course_rad = f.ten_micro(1) * kRadPerDeg;
         }
         return false;
       case Sentence::kGsa:
@@ -172,12 +177,10 @@ class Epoch {
     }
     return false;
   }
-  static constexpr void take(float from, float& into) {
-    if (!base::is_nan(from)) into = from;
-  }
 
   /// GGA field 6: 0 none, 2 differential, 4 RTK, 5 RTK float, 6 dead reckoning, 7 typed in, 8 simulator. The last three
-  /// measure nothing; neither does what RMC marks with V, or with one of the letters of these.
+  /// measure nothing; nor does a receiver that uses no satellite, nor what RMC marks with V, or with one of the letters
+  /// of these.
   [[nodiscard]] constexpr app::GnssFix fix() const {
     using app::GnssFix;
     const Parts& p = parts_;
@@ -185,7 +188,7 @@ class Epoch {
     if (!known || (p.rmc_status != '\0' && p.rmc_status != 'A')) return GnssFix::kNone;
     if (p.rmc_mode == 'N' || p.rmc_mode == 'E' || p.rmc_mode == 'M' || p.rmc_mode == 'S') return GnssFix::kNone;
     const int quality = p.quality.value_or(1);
-    if (quality == 0 || quality >= 6) return GnssFix::kNone;
+    if (quality == 0 || quality >= 6 || p.satellites == 0) return GnssFix::kNone;
     if (p.dimension && *p.dimension == 1) return GnssFix::kNone;
     if (quality == 4) return GnssFix::kRtkFixed;
     if (quality == 5) return GnssFix::kRtkFloat;
@@ -207,14 +210,16 @@ class Epoch {
     r.height_m = p.altitude_m + p.separation_m;
     r.horizontal_acc_m = p.horizontal_acc_m;
     r.vertical_acc_m = p.vertical_acc_m;
-    r.speed_mps = p.speed_mps;
-    r.course_rad = p.course_rad;
+    // RMC says what time it speaks of, VTG does not: it comes where it comes.
+    const bool rmc_speed = !base::is_nan(p.speed_mps);
+    r.speed_mps = rmc_speed ? p.speed_mps : p.vtg_speed_mps;
+    r.course_rad = rmc_speed ? p.course_rad : p.vtg_course_rad;
     // At standstill receivers leave the course empty; a velocity of zero has none.
-    if (!base::is_nan(p.speed_mps) && !(p.speed_mps > 0)) {
+    if (!base::is_nan(r.speed_mps) && !(r.speed_mps > 0)) {
       r.v_n_mps = {0, 0, base::kNan};
-    } else if (!base::is_nan(p.speed_mps) && !base::is_nan(p.course_rad)) {
-      const auto course = base::sincos(p.course_rad);
-      r.v_n_mps = {p.speed_mps * course.sin, p.speed_mps * course.cos, base::kNan};
+    } else if (!base::is_nan(r.speed_mps) && !base::is_nan(r.course_rad)) {
+      const auto course = base::sincos(r.course_rad);
+      r.v_n_mps = {r.speed_mps * course.sin, r.speed_mps * course.cos, base::kNan};
     }
     r.pdop = p.pdop;
     r.hdop = base::is_nan(p.hdop) ? p.gga_hdop : p.hdop;

@@ -8,16 +8,111 @@ and every other field that both give. gpsd prints a TPV whenever it learnt somet
 fix is compared with all its TPVs of one time and must agree with one of them, field by field.
 What differs is listed in EXPECTED with its reason and exact count; any other number, also a smaller one, fails."""
 import json
+import math
 import os
+import shutil
 import subprocess
 import sys
 
-EXPECTED = {}
+# Kinds of difference:
+#   last     our fix of the last epoch in the file: gpsd reports an epoch with the sentence that it has learnt to be the last, or never
+#   first    our fix of the first epoch: gpsd has not learnt yet which sentence is the last of an epoch
+#   undated  our fix before the first date: gpsd prints no time of day without a date, or no TPV
+#   extra    another fix of ours at a time the judge does not have
+#   untimed  the judge's position without a time that is none of ours
+#   missing  the judge's position at a time that is none of ours
+#   place, or a field's name: at the same time, but not equal
+RMC = "gpsd's last word is RMC's place, which has a digit less than GGA's"
+FROZEN = ("gpsd keeps the first epoch's latitude, longitude and speed, while the ECEF fields of its TPV go on: judged by those, of 1 cm")
+
+# Log: what differs from .chk, what from gpsdecode, why (where the kinds above do not say it).
+EXPECTED = {
+    "neo-m8n.log": ({"last": 1, "untimed": 1}, {"last": 1},
+        "gpsd's first TPV, of GGA alone, has no time"),
+    "ublox-lea-4t.log": ({"first": 1, "missing": 1}, {"first": 1, "missing": 1},
+        "before NAV-TIMEGPS says 15 leap seconds gpsd takes today's 18 for the first epoch; ours is NAV-TIMEUTC's"),
+    "ublox-lea-5h.log": ({"extra": 1}, {"first": 1, "extra": 1},
+        "two recordings in one file: gpsd drops the epoch at the seam"),
+    "GPSmap-76S.log": ({"untimed": 2}, {},
+        "GGA quality 8, simulator: no fix for us, one for gpsd"),
+    "april6_2019.log": ({"untimed": 1}, {"last": 1},
+        "a date of '2208-1': gpsd takes the rest of the sentence, we nothing"),
+    "bt451.log": ({"extra": 1, "last": 1, "untimed": 1}, {"extra": 1, "last": 1},
+        "several recordings in one file: gpsd drops the epoch at a seam; its TPV without a time is of GLL"),
+    "foretrex-201.log": ({"missing": 3}, {"first": 1, "missing": 3},
+        "GGA of quality 2 with 0 satellites: no fix for us, one for gpsd"),
+    "garmin-geko201.log": ({"untimed": 3}, {},
+        "GGA quality 8, simulator: no fix for us, one for gpsd"),
+    "garmin38.log": ({"untimed": 2}, {},
+        "gpsd uses GLL, which comes before the first GGA"),
+    "garmin48.log": ({"missing": 6}, {"first": 1, "missing": 6},
+        "gpsd uses GLL, which here has a time of its own"),
+    "gp-320fw-2019-03-28.log": ({}, {"extra": 1},
+        "gpsd drops an epoch in which a sentence comes that did not come in the one before"),
+    "gp-320fw-2019-04-06-overflow.log": ({"extra": 1}, {"extra": 1},
+        "gpsd drops an epoch in which a sentence comes that did not come in the one before"),
+    "gr601-w.log": ({"untimed": 1}, {},
+        "gpsd uses GLL, which comes before the first GGA"),
+    "hemi.log": ({"speed": 5}, {"speed": 5},
+        "gpsd reports at GGA, before VTG comes, and makes a speed from two positions"),
+    "humminbird-M37.log": ({"extra": 1}, {"first": 1, "extra": 1, "missing": 7},
+        "GGA, RMC and GLL take turns, each second another: gpsd uses GLL too and drops the first RMC"),
+    "mtk-3301.log": ({"untimed": 1}, {"untimed": 1},
+        "GGA quality empty or 0 and RMC marked V, with a place: no fix for us, one for gpsd by GSA"),
+    "myguide-3100.log": ({"untimed": 2}, {"untimed": 2},
+        "GGA quality empty and RMC marked V, with a place: no fix for us, one for gpsd by GSA"),
+    "rst39.log": ({"extra": 1}, {"first": 1, "extra": 1},
+        "gpsd drops the second epoch, the first without RMC"),
+    "tn204.log": ({"extra": 1}, {"first": 1, "extra": 1},
+        "gpsd drops the second epoch, the first with GLL"),
+    "tr737A+.log": ({"untimed": 1}, {"untimed": 1},
+        "GGA quality 0 with a place: no fix for us, one for gpsd by GSA"),
+}
+for log in """ublox-8.log ait250.log ch-4701.log gps-360.log isync.log pharos-360.log venus634lp.log""".split():
+    EXPECTED[log] = ({"last": 1}, {"first": 1, "last": 1}, "")
+for log in """ac12.log ac12_binary.log bt-q818.log bu353-glonass.log bu353s4.log ch-4711.log com-1289.log eXplorist210.log et-332.log
+        firefly-II.log garmin-10x.log garmin17n.log gp-320fw-2019-04-07-coldboot.log gpslim236.log gr8013-w.log hab-gpspi.log
+        hp58534a.log iTrek.log magellan-ec10.log magellan315.log mr-350p.log mt3339.log mtk-3329.log navika-100-fix.log
+        nd-1005.log nl2008u.log nl402u.log nokia-ld-4w.log oncore.log polarx2.log saab-r4.log sirfstarv-nmea.log skytraq-dgps.log
+        skytraq-fix.log skytraq-fixB.log telit-he910.log tomtom-mkII.log triton400.log ublox-lea-4s.log""".split():
+    EXPECTED[log] = ({}, {"first": 1}, "")
+for log in """tcp-test.log tcp-torture.log udp-test.log""".split():
+    EXPECTED[log] = ({}, {"last": 1}, "")
+for log in """ublox-zed-f9p_hpg1.11.log""".split():
+    EXPECTED[log] = ({"first": 1}, {"first": 1}, "")
+
+# Logs without a sentence or message that we make a fix of.
 NOT_SPOKEN = {}
+for what, names in (
+    ("SiRF binary", """bu303-moving bu303-nofix bu303-stillfix bu303b-nofix sirfstarv ublox-sirf1"""),
+    ("Garmin binary", """garmin18x-bin"""),
+    ("GeoStar binary", """geostar-geos1m-binary"""),
+    ("iTalk binary", """italk-binary"""),
+    ("NavCom binary", """navcom"""),
+    ("SkyTraq binary", """skytraq-bin"""),
+    ("SuperStar binary", """superstar2"""),
+    ("Rockwell Zodiac binary", """zodiac"""),
+    ("Trimble TSIP", """trimble-lassen_iq-3dfix trimble-lassen_iq-playacar trimble-lassen_iq trimble-lasseniq-bin2d trimble-smt-360
+         trimble-smtx"""),
+    ("RTCM only", """naujoks-rtcm2 rtcm2.bend rtcm2 rtcm3.2 rtcm3.bndm rtcm3"""),
+    ("no receiver: text", """naujoks-ntrip ntrip_sourcetable passthrough"""),
+    ("GLL only", """sounder"""),
+    ("a compass", """tnt-revolution"""),
+    ("faults of a maker's own sentences only", """skytraq-err"""),
+):
+    NOT_SPOKEN.update((name + ".log", what) for name in names.split())
+# Other angles than the unit of the last digit, deg.
+COARSE = {
+    "ac12.log": (8.5e-7, RMC), "ac12_binary.log": (8.5e-7, RMC), "tcp-test.log": (8.5e-7, RMC), "tcp-torture.log": (8.5e-7, RMC),
+    "udp-test.log": (8.5e-7, RMC),
+    "ublox-zed-f9p-hp.log": (6e-8, "gpsd goes on to NAV-HPPOSLLH, of 1e-9 deg; NAV-PVT has 1e-7"),
+    "ublox-neo-m8t.log": (2e-7, FROZEN), "ublox-lea-4t.log": (2e-7, FROZEN),
+}
 # field of ours, field of a TPV, tolerance in the unit
 FIELDS = (("msl", "altMSL", 0.0011), ("height", "altHAE", 0.0011), ("speed", "speed", 0.00101), ("course", "track", 0.0002),
-          ("up", "climb", 0.0011), ("north", "velN", 0.0011), ("east", "velE", 0.0011))
-ANGLE = 2.1e-9  # deg: our unit is 2e-9, gpsd prints 1e-9
+          ("north", "velN", 0.0011),
+          ("east", "velE", 0.0011), ("down", "velD", 0.0011))
+ANGLE = 2.1e-9  # deg: our unit is 2e-9, gpsd prints 1e-9; velocities in n only from UBX: those of NMEA are speed and course
 
 
 def lines_of(text):
@@ -42,24 +137,52 @@ def same_time(a, b):
     return a is None or b is None or abs((a - b + 43200) % 86400 - 43200) < 0.0011
 
 
-def same_angle(a, b):
-    return abs(a - b) < ANGLE
+def geodetic(x, y, z):
+    """WGS84 latitude, longitude in deg and height in m, by fixed-point iteration."""
+    a, f = 6378137.0, 1 / 298.257223563
+    e2, p = f * (2 - f), math.hypot(x, y)
+    latitude, n = math.atan2(z, p * (1 - e2)), a
+    for _ in range(20):
+        n = a / math.sqrt(1 - e2 * math.sin(latitude) ** 2)
+        latitude = math.atan2(z + e2 * n * math.sin(latitude), p)
+    height = p * math.cos(latitude) + z * math.sin(latitude) - a * a / n
+    return math.degrees(latitude), math.degrees(math.atan2(y, x)), height
 
 
-def tpvs_of(text):
-    return [(time_of_day(t), t) for t in lines_of(text) if t.get("class") == "TPV" and t.get("mode", 0) >= 2 and "lat" in t and "lon" in t]
+def tpvs_of(text, from_ecef):
+    out = []
+    for t in lines_of(text):
+        if t.get("class") != "TPV" or t.get("mode", 0) < 2 or "lat" not in t or "lon" not in t:
+            continue
+        if from_ecef:
+            t["lat"], t["lon"], t["altHAE"] = geodetic(t["ecefx"], t["ecefy"], t["ecefz"])
+            for field in ("altMSL", "speed", "track"):
+                t.pop(field, None)
+            if "ecefvx" in t:
+                v = (t["ecefvx"], t["ecefvy"], t["ecefvz"])
+                b, a = math.radians(t["lat"]), math.radians(t["lon"])
+                out_v = math.cos(a) * v[0] + math.sin(a) * v[1]
+                t["velE"] = math.cos(a) * v[1] - math.sin(a) * v[0]
+                t["velN"] = math.cos(b) * v[2] - math.sin(b) * out_v
+                t["velD"] = -math.cos(b) * out_v - math.sin(b) * v[2]
+        out.append((time_of_day(t), t))
+    return out
 
 
-def compare(ours, tpvs):
+def compare(ours, tpvs, angle):
     """Counts of (equal, what differs: list of texts)."""
+    def same_angle(a, b):
+        return abs(a - b) < angle
+
     different, equal = [], 0
     for mine in ours:
         at = mine.get("tod_s")
         same = [t for time, t in tpvs if same_time(time, at)]
-        if not same:
-            different.append(f"extra: {at} not among the judge's times")
-            continue
         here = [t for t in same if same_angle(t["lat"], mine["lat"]) and same_angle(t["lon"], mine["lon"])]
+        if not here and all("time" not in t for t in same):
+            kind = "last" if mine is ours[-1] else "first" if mine is ours[0] else "extra" if "date" in mine else "undated"
+            different.append(f"{kind}: {at} not among the judge's times")
+            continue
         if not here:
             different.append(f"place: {at} {mine['lat']} {mine['lon']} judge {same[-1]['lat']} {same[-1]['lon']}")
             continue
@@ -68,13 +191,13 @@ def compare(ours, tpvs):
             values = [t[theirs] for t in here if theirs in t]
             if field in mine and values:
                 error = min(abs((v - mine[field] + 180) % 360 - 180) if field == "course" else abs(v - mine[field]) for v in values)
-                if error > tolerance + 1e-6 * abs(mine[field]):
+                if error > (0.02 if field == "height" and angle > 1e-7 else tolerance) + 1e-6 * abs(mine[field]):
                     wrong.append(f"{field}: {at} {mine[field]} judge {values}")
         different += wrong
         equal += not wrong
     for at, t in tpvs:
         if not any(same_time(at, m.get("tod_s")) and same_angle(t["lat"], m["lat"]) and same_angle(t["lon"], m["lon"]) for m in ours):
-            different.append(f"missing: {at} {t['lat']} {t['lon']} mode {t['mode']}")
+            different.append(f"{'untimed' if at is None else 'missing'}: {at} {t['lat']} {t['lon']} mode {t['mode']}")
     return equal, different
 
 
@@ -87,31 +210,61 @@ def main():
         print(f"no {data}: skipped")
         return 77
     logs = sorted(os.path.join(data, d, f) for d in ("dev", "other") for f in os.listdir(os.path.join(data, d)) if f.endswith(".log"))
-    failures, totals = [], {"chk": [0, 0], "gpsdecode": [0, 0]}
+    if shutil.which("gpsdecode") is None:
+        print("no gpsdecode (Debian's gpsd-tools): skipped")
+        return 77
+    failures, totals = [], {"chk": [0, 0, 0], "gpsdecode": [0, 0, 0]}
+    spoken, fixes = 0, 0
     for path in logs:
         name = os.path.basename(path)
         if len(args) > 1 and name not in args[1:]:
             continue
         out = lines_of(subprocess.run([args[0], path], capture_output=True, text=True, check=True).stdout)
         ours = [r for r in out[:-1] if r["fix"] >= 2 and "lat" in r]
+        for r in ours:
+            if "up" in r:
+                r["down"] = -r["up"]
+            if r["protocol"] == "NMEA":
+                for axis in ("north", "east"):
+                    r.pop(axis, None)
+            elif abs(math.hypot(r["north"], r["east"]) - r["speed"]) > 0.01:
+                failures.append(f"{name}: speed {r['speed']} is not that of the velocity")
+        if len(out) == 1:
+            if name not in NOT_SPOKEN:
+                failures.append(f"{name}: no report")
+            print(f"{name}: neither UBX nor NMEA fixes: {NOT_SPOKEN.get(name)}")
+            continue
+        if name in NOT_SPOKEN:
+            failures.append(f"{name}: {len(out) - 1} reports, but is listed as without")
         with open(path, "rb") as log:
             decoded = subprocess.run(["gpsdecode"], stdin=log, capture_output=True, timeout=60, check=False).stdout.decode(errors="replace")
+        angle, why = COARSE.get(name, (ANGLE, ""))
         with open(path + ".chk", errors="replace") as chk:
-            judges = {"chk": tpvs_of(chk.read()), "gpsdecode": tpvs_of(decoded)}
+            judges = {"chk": tpvs_of(chk.read(), why == FROZEN), "gpsdecode": tpvs_of(decoded, why == FROZEN)}
+        spoken, fixes = spoken + 1, fixes + len(ours)
+        expected = EXPECTED.get(name, ({}, {}, ""))
         row = []
-        for judge, tpvs in judges.items():
-            equal, different = compare(ours, tpvs)
+        for number, (judge, tpvs) in enumerate(judges.items()):
+            equal, different = compare(ours, tpvs, angle)
             kinds = {}
             for text in different:
                 kind = text.split(":")[0]
                 kinds[kind] = kinds.get(kind, 0) + 1
             totals[judge][0] += equal
-            totals[judge][1] += len(different)
-            row.append(f"{judge} {equal}/{len(ours)} {kinds or ''} of {len(tpvs)} TPV")
+            totals[judge][1] += len(ours) - equal
+            totals[judge][2] += sum(n for kind, n in kinds.items() if kind in ("missing", "untimed"))
+            row.append(f"{judge} {equal} of {len(ours)} equal{' ' + str(kinds) if kinds else ''}")
+            if kinds != expected[number]:
+                failures.append(f"{name}: {judge}: {kinds}, expected {expected[number]}")
+                different = different[:10]
+                failures += ["    " + text for text in different]
             if verbose:
-                print("\n".join(f"   {judge} {t}" for t in different[:6]))
-        print(f"{name}: reports {len(out) - 1} fixes {len(ours)}; " + "; ".join(row))
-    print(totals)
+                print("\n".join(f"   {judge} {t}" for t in different))
+        reason = "; ".join(r for r in (expected[2], why) if r)
+        print(f"{name}: " + "; ".join(row) + (f" ({reason})" if reason else ""))
+    for judge, (equal, different, missing) in totals.items():
+        print(f"{judge}: {spoken} logs, {fixes} fixes: {equal} equal, {different} different, {missing} that are none of ours")
+    print("\n".join(failures))
     return 1 if failures else 0
 
 
