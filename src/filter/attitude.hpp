@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: Apache-2.0
+// Attitude from gyroscope, accelerometer and, where there is one, magnetometer: a complementary filter whose slow part
+// is a low-pass of the accelerometer in axes that hardly turn, so that motion averages out before it is believed
+// (Laidig & Seel 2023, Information Fusion 91; measured facts and equations, own design). The gyroscope turns q_lb; the
+// low-passed accelerometer, carried in the level axes l, turns it back to level; heading is a separate angle from l to
+// n (east, north, up); the bias is estimated beside. Time is an argument; every sample may have its own interval.
+#pragma once
+
+#include "filter/attitude_bias.hpp"
+#include "filter/attitude_heading.hpp"
+
+#include <cstdint>
+
+namespace tetap::filter {
+
+enum class AttitudeVerdict : std::uint8_t { kAccepted, kAccelerometerRefused, kRefused };
+
+class Attitude {
+ public:
+  Attitude() : Attitude(AttitudeOptions{}) {}
+  explicit Attitude(const AttitudeOptions& options) : o_(options), bias_(options), heading_(options) {}
+
+  /// A sample of both that were constant over the last dt_s. kRefused: no numbers, or no time, and nothing has changed;
+  /// kAccelerometerRefused: clipped or in free fall, the gyroscope alone was used.
+  [[nodiscard]] AttitudeVerdict step(const Vector3& w_b_radps, const Vector3& f_b_mps2, float dt_s) {
+    if (!(dt_s > 0.0F && dt_s <= kLongest_s) || !within(w_b_radps, kFastest_radps)) return AttitudeVerdict::kRefused;
+    const float f2 = dot(f_b_mps2, f_b_mps2);
+    if (!(f2 < base::kInfinity)) return AttitudeVerdict::kRefused;
+    const bool usable = f2 > kLeastForce_mps2 * kLeastForce_mps2 && inside(f_b_mps2, o_.accelerometer_limit_mps2);
+    if (!started_) {
+      if (!usable) return AttitudeVerdict::kRefused;
+      q_lb_ = levelled(f_b_mps2);
+      started_ = true;
+    } else {
+      q_lb_ = turned(q_lb_, (0.5F * dt_s) * (w_b_radps - bias_.value()));
+      if (!inside(w_b_radps, o_.gyroscope_limit_radps)) average_anew();
+    }
+    rest_.step(o_, w_b_radps, f_b_mps2, dt_s);
+    if (!usable) return AttitudeVerdict::kAccelerometerRefused;
+    level(f_b_mps2, dt_s);
+    return AttitudeVerdict::kAccepted;
+  }
+
+  /// The magnetometer's sample of the last step's time, in any unit; dt_s since the one before. False if no direction.
+  bool magnetometer(const Vector3& m_b, float dt_s) {
+    const float m2 = dot(m_b, m_b);
+    if (!started_ || !(m2 > 0.0F && m2 < base::kInfinity) || !(dt_s > 0.0F)) return false;
+    const bool turning = !within(rest_.rate_b_radps(), o_.field_motion_radps);
+    heading_.step(o_, Rows(q_lb_) * m_b, turning, dt_s < 1.0F ? dt_s : 1.0F);
+    return true;
+  }
+
+  [[nodiscard]] bool started() const { return started_; }
+  /// Turns b into n: z is up; with a heading x is east, without one the heading is free and drifts with the bias.
+  [[nodiscard]] Quaternion q_nb() const { return (heading_.q() * q_lb_).renormalised(); }
+  [[nodiscard]] const Vector3& bias_b_radps() const { return bias_.value(); }
+  [[nodiscard]] float bias_sigma_radps() const { return bias_.sigma_radps(); }
+  [[nodiscard]] bool at_rest() const { return rest_.at_rest(); }
+  [[nodiscard]] bool heading_known() const { return heading_.known(); }
+  [[nodiscard]] bool magnetometer_disturbed() const { return heading_.disturbed(); }
+  [[nodiscard]] bool accelerometer_disturbed() const { return off_; }
+
+ private:
+  static constexpr float kLongest_s = 0.2F, kFastest_radps = 100.0F, kLeastForce_mps2 = 0.1F;
+
+  [[nodiscard]] static bool inside(const Vector3& v, float limit) {
+    return base::abs(v(0)) < limit && base::abs(v(1)) < limit && base::abs(v(2)) < limit;
+  }
+
+  /// The turn of the last moments is lost: the slow sensors set the attitude again, by a mean that begins here.
+  void average_anew() {
+    age_s_ = o_.relevel_s;
+    heading_.average_anew(o_.relevel_s);
+  }
+
+  void level(const Vector3& f_b, float dt_s) {
+    const Rows r(q_lb_);
+    const Vector3 f_l = r * f_b;
+    const bool starting = age_s_ < o_.tau_inclination_s;
+    if (starting) {  // a mean over what there is, so that the first second is as good as its samples
+      age_s_ += dt_s;
+      const float share = dt_s / age_s_;
+      up_.value += share * (f_l - up_.value);
+      bias_.follow_average(r, share);
+    } else {
+      const float k = LowPass<3>::factor(o_.tau_inclination_s, dt_s);
+      up_.step(f_l, k);
+      bias_.follow(r, k);
+    }
+    const float n2 = dot(up_.value, up_.value);
+    if (!(n2 > kLeastForce_mps2 * kLeastForce_mps2)) return;
+    // The turn about a horizontal axis that brings it upright: for small angles the cross product with the vertical.
+    const float scale = 1.0F / base::sqrt(n2);
+    float x = scale * up_.value(1);
+    float y = -scale * up_.value(0);
+    const float tilt2 = x * x + y * y;
+    const float most = starting ? 1.0F : o_.inclination_limit_radps * dt_s;
+    bool hold = false;
+    off_ = tilt2 > most * most;
+    if (off_ && held_s_ < o_.inclination_hold_s) {
+      held_s_ += dt_s;
+      const bool far = tilt2 > o_.inclination_reject_rad * o_.inclination_reject_rad;
+      hold = far;
+      const float cut = far ? 0.0F : most / base::sqrt(tilt2);
+      x *= cut;
+      y *= cut;
+    } else if (off_) {
+      held_s_ = 0.0F;
+      average_anew();
+    } else {
+      held_s_ = held_s_ > dt_s ? held_s_ - dt_s : 0.0F;
+    }
+    correct_bias(r, off_, x / dt_s, y / dt_s, dt_s);
+    if (!hold) turn_level(x, y);
+  }
+
+  void correct_bias(const Rows& r, bool off, float x_radps, float y_radps, float dt_s) {
+    bias_.grow(dt_s);
+    if (rest_.at_rest())
+      bias_.correct_at_rest(rest_.rate_b_radps(), dt_s);
+    else if (!off)
+      bias_.correct_in_motion(r, x_radps, y_radps, dt_s);
+  }
+
+  /// Turns the level axes by (x, y, 0): q and what is carried in them.
+  void turn_level(float x, float y) {
+    q_lb_ = (Quaternion{1.0F, 0.5F * x, 0.5F * y, 0.0F} * q_lb_).renormalised();
+    const auto tilt = [x, y](Vector3& v) {
+      v = Vector3{v(0) + y * v(2), v(1) - x * v(2), v(2) + (x * v(1) - y * v(0))};
+    };
+    tilt(up_.value);
+    tilt(up_.slope);
+  }
+
+  AttitudeOptions o_;
+  Quaternion q_lb_{};
+  LowPass<3> up_;
+  RestDetector rest_;
+  GyroscopeBias bias_;
+  MagneticHeading heading_;
+  float age_s_ = 0.0F, held_s_ = 0.0F;
+  bool started_ = false, off_ = false;
+};
+
+}  // namespace tetap::filter
