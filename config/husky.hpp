@@ -6,12 +6,13 @@
 #include "app/estimators/odometry.hpp"
 #include "app/estimators/pose_ekf.hpp"
 #include "app/node.hpp"
+#include "app/numbers_check.hpp"
 
 namespace tetap::robot::husky {
 
 using Estimators = app::Estimators<app::Odometry, app::PoseEkf>;
 
-inline constexpr app::Numbers numbers{
+inline constexpr app::Numbers numbers = app::checked({
     .loop = {.window_us = 200'000, .ahead_us = 200'000},
     .wheels =
         {.drive = {.left_radius_m = 0.165F, .right_radius_m = 0.165F, .track_m = 0.545F, .counts_per_turn = 78000.0F},
@@ -19,6 +20,6 @@ inline constexpr app::Numbers numbers{
     // The sensor is mounted x right, y up, z backwards: gravity at rest and the turns of the wheels both say so.
     .gyro = {.use = 1, .up_s = {0, 1, 0}, .noise = 0.0001F},
     .gnss = {.sigma_floor_m = 0.5F, .sigma_scale = 2.0F},
-};
+});
 
 }  // namespace tetap::robot::husky

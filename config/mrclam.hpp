@@ -10,12 +10,13 @@
 #include "app/estimators/odometry.hpp"
 #include "app/estimators/pose_ekf.hpp"
 #include "app/node.hpp"
+#include "app/numbers_check.hpp"
 
 namespace tetap::robot::mrclam {
 
 using Estimators = app::Estimators<app::Odometry, app::PoseEkf>;
 
-inline constexpr app::Numbers numbers{
+inline constexpr app::Numbers numbers = app::checked({
     .loop = {.window_us = 200'000, .ahead_us = 400'000},
     .wheels =
         {.drive = {.left_radius_m = 0.033F, .right_radius_m = 0.033F, .track_m = 0.235F, .counts_per_turn = 508.8F},
@@ -26,6 +27,6 @@ inline constexpr app::Numbers numbers{
          .timeout_us = 5'000'000},  // a command holds until the next
     .landmark = {.sigma_range_m = 0.1F, .sigma_range_per_m = 0.05F, .sigma_bearing_rad = 0.02F, .gate_scale = 1.5F},
     .recovery = {.after_us = 0, .at_least = 5, .inflate_position_m = 0.3F, .inflate_yaw_rad = 0.5F},
-};
+});
 
 }  // namespace tetap::robot::mrclam

@@ -7,12 +7,13 @@
 #include "app/estimators/odometry.hpp"
 #include "app/estimators/pose_ekf.hpp"
 #include "app/node.hpp"
+#include "app/numbers_check.hpp"
 
 namespace tetap::robot::rover {
 
 using Estimators = app::Estimators<app::Odometry, app::PoseEkf>;
 
-inline constexpr app::Numbers numbers{
+inline constexpr app::Numbers numbers = app::checked({
     // GNSS fixes come 80 to 120 ms late, camera sightings 20 to 60 ms: all inside the window.
     .loop = {.period_us = 10'000, .window_us = 200'000, .ahead_us = 200'000},
     // k: slip and unequal wheels make the error of a wheel grow by 4 cm per root metre; the drawing gives radius, track
@@ -28,6 +29,6 @@ inline constexpr app::Numbers numbers{
     .landmark = {.sigma_range_m = 0.12F, .sigma_range_per_m = 0.02F, .sigma_bearing_rad = 0.025F},
     // The receiver's error wanders over a minute: weight it down by what a fix repeats of the one before.
     .gnss = {.sigma_floor_m = 0.3F, .sigma_scale = 4.0F},
-};
+});
 
 }  // namespace tetap::robot::rover

@@ -288,7 +288,7 @@ void Node<Estimators, Capacity>::apply_map() {
   if (pending_map_.size == 0) return;
   close_window();
   for (std::size_t i = 0; i < pending_map_.size; ++i)
-    if (!site_.map.put(pending_map_.entries[i].id, pending_map_.entries[i].landmark)) ++counters_.map_full;
+    if (!site_.map.put(pending_map_.entries[i])) ++counters_.map_full;
   pending_map_.size = 0;
 }
 

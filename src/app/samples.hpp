@@ -34,7 +34,7 @@ struct WheelSpeeds {
 
 struct BodySpeed {
   float forward_mps = 0;
-  float yaw_rate_radps = 0;
+  float yaw_rate_radps = 0;  ///< NaN: not available
 };
 
 enum class GnssFix : std::uint8_t {

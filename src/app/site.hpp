@@ -10,25 +10,34 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 
 namespace tetap::app {
+
+/// A landmark as the bus states it, in whole millimetres: a third of the memory of a model::Landmark.
+struct MapEntry {
+  std::int32_t x_mm = 0;
+  std::int32_t y_mm = 0;
+  std::uint8_t id = 0;
+};
 
 /// Known landmarks by id. When full, a new id is refused (put() false); a known id is moved.
 template <std::size_t Capacity>
 class LandmarkMap {
  public:
-  [[nodiscard]] constexpr bool put(std::uint8_t id, const model::Landmark& landmark) {
+  [[nodiscard]] constexpr bool put(const MapEntry& entry) {
     for (std::size_t i = 0; i < size_; ++i)
-      if (ids_[i] == id) return landmarks_[i] = landmark, true;
+      if (entries_[i].id == entry.id) return entries_[i] = entry, true;
     if (size_ == Capacity) return false;
-    ids_[size_] = id;
-    landmarks_[size_++] = landmark;
+    entries_[size_++] = entry;
     return true;
   }
-  [[nodiscard]] constexpr const model::Landmark* find(std::uint8_t id) const {
+  [[nodiscard]] constexpr std::optional<model::Landmark> find(std::uint8_t id) const {
     for (std::size_t i = 0; i < size_; ++i)
-      if (ids_[i] == id) return &landmarks_[i];
-    return nullptr;
+      if (entries_[i].id == id)
+        return model::Landmark{.x = base::Anchored::from_um(std::int64_t{entries_[i].x_mm} * 1000),
+                               .y = base::Anchored::from_um(std::int64_t{entries_[i].y_mm} * 1000)};
+    return std::nullopt;
   }
   constexpr void clear() { size_ = 0; }
   [[nodiscard]] constexpr std::size_t size() const { return size_; }
@@ -36,15 +45,14 @@ class LandmarkMap {
   template <class Sink>
   constexpr void each_bit(Sink&& sink) const {
     for (std::size_t i = 0; i < size_; ++i) {
-      sink(static_cast<std::uint32_t>(ids_[i]));
-      sink(landmarks_[i].x.um());
-      sink(landmarks_[i].y.um());
+      sink(static_cast<std::uint32_t>(entries_[i].id));
+      sink(entries_[i].x_mm);
+      sink(entries_[i].y_mm);
     }
   }
 
  private:
-  std::array<std::uint8_t, Capacity> ids_{};
-  std::array<model::Landmark, Capacity> landmarks_{};
+  std::array<MapEntry, Capacity> entries_{};
   std::size_t size_ = 0;
 };
 

@@ -120,5 +120,30 @@ TEST(Inbox, AnImuSampleCarriesIncrementsIntervalAndClips) {
   EXPECT_NEAR(s.payload.imu.temperature_degC, 30.5F, 0.05F);
 }
 
+// The sequence comes round in 16 samples: a frame that waits for a lost one must not meet the frames of a later sample.
+TEST(Inbox, ALostImuFrameCostsOneSampleAndShiftsNone) {
+  for (const std::int64_t period_us : {10'000, 5'000, 2'500})
+    for (const int lost : {0, 1, 2}) {
+      Desk desk;
+      for (int k = 0; k < 60; ++k) {
+        const std::int64_t t = 10'000'000 + k * period_us;
+        const std::int64_t tick = t / 10'000 * 10'000;
+        const auto seq = static_cast<std::uint8_t>(k % 16);
+        const float angle_rad = 1e-4F * static_cast<float>(k);
+        if (k != 5 || lost != 0) desk.put(in(can::ImuGyro{.ang_z_rad = angle_rad, .seq = seq}, 0), tick);
+        if (k != 5 || lost != 1) desk.put(in(can::ImuAccel{.vel_x_mps = 10 * angle_rad, .seq = seq}, 0), tick);
+        if (k != 5 || lost != 2)
+          desk.put(in(can::ImuTime{.stamp_us = stamp(t), .interval_us = 2'500, .seq = seq}, 0), tick);
+      }
+      ASSERT_EQ(desk.out.samples.size(), 59U) << period_us << " " << lost;
+      EXPECT_EQ(desk.counters.incomplete, 1) << period_us << " " << lost;
+      for (const app::Sample& s : desk.out.samples) {
+        const float expected_rad = 1e-4F * static_cast<float>((s.stamp.us - 10'000'000) / period_us);
+        ASSERT_NEAR(s.payload.imu.dangle_b_rad[2], expected_rad, 1e-6F) << period_us << " " << lost;
+        ASSERT_NEAR(s.payload.imu.dvelocity_b_mps[0], 10 * expected_rad, 1e-5F) << period_us << " " << lost;
+      }
+    }
+}
+
 }  // namespace
 }  // namespace tetap::test

@@ -27,7 +27,8 @@ void expect_as_the_host(std::uint64_t a, std::uint64_t b) {
 
 TEST(DoubleSum, IsTheHostsOnEveryPairOfCorners) {
   std::vector<std::uint64_t> corners;
-  for (const std::uint64_t exponent : {0, 1, 2, 52, 53, 54, 1022, 1023, 1024, 1075, 1076, 2045, 2046, 2047})
+  for (const std::uint64_t exponent :
+       {0U, 1U, 2U, 52U, 53U, 54U, 1022U, 1023U, 1024U, 1075U, 1076U, 2045U, 2046U, 2047U})
     for (const std::uint64_t fraction : {0x0ULL, 0x1ULL, 0x2ULL, 0x3ULL, 0x8'0000'0000'0000ULL, 0x8'0000'0000'0001ULL,
                                          0x7'FFFF'FFFF'FFFFULL, 0xF'FFFF'FFFF'FFFEULL, 0xF'FFFF'FFFF'FFFFULL})
       for (const std::uint64_t sign : {std::uint64_t{0}, kSign}) corners.push_back(sign | exponent << 52 | fraction);

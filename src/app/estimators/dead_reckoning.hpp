@@ -35,9 +35,12 @@ class DeadReckoning {
     fuse_speed({.kind = Held::Kind::kWheels, .first_mps = speeds.left_mps, .second = speeds.right_mps}, stamp, n);
   }
   void fuse(const BodySpeed& speed, base::Micros stamp, const Numbers& n) {
+    // A speedometer alone says nothing of the turn: that has to come from a gyroscope.
+    const bool turns = base::is_finite(speed.yaw_rate_radps);
+    if (!turns && n.gyro.use == 0) return;
     fuse_speed({.kind = Held::Kind::kBody,
                 .first_mps = n.wheels.speed_scale * speed.forward_mps,
-                .second = n.wheels.yaw_rate_scale * speed.yaw_rate_radps},
+                .second = turns ? n.wheels.yaw_rate_scale * speed.yaw_rate_radps : 0.0F},
                stamp, n);
   }
   void fuse(const ImuSample& sample, base::Micros stamp, const Numbers& n);

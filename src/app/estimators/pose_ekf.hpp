@@ -12,6 +12,7 @@
 #include "model/range_bearing.hpp"
 
 #include <array>
+#include <optional>
 
 namespace tetap::app {
 
@@ -88,8 +89,15 @@ class PoseEkf {
     base::Micros since;
   };
   static constexpr float kUnknown_m = 1000;
+  static constexpr float kLost_rad = 1;
   static constexpr float kUnknown_rad = 1.8138F;  // pi/sqrt(3): sigma of a heading that could be anything
 
+  /// A heading that could be anything is looked for afresh: a filter that linearises about it would never find it.
+  void give_up_when_lost() {
+    if (phase_ != Phase::kTracking || !(motion_.filter.p(2, 2) > kLost_rad * kLost_rad)) return;
+    phase_ = Phase::kWaiting;
+    alignment_ = {};
+  }
   template <class Model>
   Innovation measure(const Model& model, Source source, float gate_scale, base::Micros stamp, const Context& with,
                      std::uint8_t landmark = 0xFF);
@@ -129,10 +137,11 @@ inline void PoseEkf::recover(Refused& refused, base::Micros stamp, const Recover
 
 inline Innovation PoseEkf::fuse(const LandmarkSighting& sighting, base::Micros stamp, const Context& with) {
   const LandmarkNumbers& n = with.numbers.landmark;
-  const model::Landmark* landmark = with.site.map.find(sighting.landmark);
-  if (landmark == nullptr) return {.verdict = can::Verdict::kUnknownLandmark, .landmark = sighting.landmark};
-  if (phase_ != Phase::kTracking) return {.verdict = can::Verdict::kNotUsed, .landmark = sighting.landmark};
+  const std::optional<model::Landmark> landmark = with.site.map.find(sighting.landmark);
+  if (!landmark) return {.verdict = can::Verdict::kUnknownLandmark, .landmark = sighting.landmark};
   motion_.propagate(stamp, with.numbers);
+  give_up_when_lost();
+  if (phase_ != Phase::kTracking) return {.verdict = can::Verdict::kNotUsed, .landmark = sighting.landmark};
   const bool has_range = base::is_finite(sighting.range_m);
   const bool has_bearing = base::is_finite(sighting.bearing_rad);
   if (has_range && has_bearing) {
@@ -174,6 +183,7 @@ inline Innovation PoseEkf::fuse(const GnssPosition& fix, base::Micros stamp, con
                                   .antenna_x_b_m = n.antenna_x_b_m,
                                   .antenna_y_b_m = n.antenna_y_b_m};
   motion_.propagate(stamp, with.numbers);
+  give_up_when_lost();
   if (phase_ == Phase::kTracking) return measure(model, kGnss, n.gate_scale, stamp, with);
 
   phase_ = Phase::kAligning;

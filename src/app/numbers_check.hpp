@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: Apache-2.0
+// A robot's numbers are refused where they are written: `constexpr Numbers numbers = checked({...})` does not compile
+// when one of them makes no sense, and the compiler's message names it.
+#pragma once
+
+#include "app/numbers.hpp"
+
+namespace tetap::app {
+
+namespace detail {
+/// Not constexpr on purpose: to reach it ends a constant expression, with the text in the compiler's message.
+inline void this_number_makes_no_sense(const char* /*which*/) {}
+
+consteval void require(bool holds, const char* which) {
+  if (!holds) this_number_makes_no_sense(which);
+}
+/// Finite and above (or not below) zero; false for NaN.
+consteval bool positive(float x) { return x > 0 && x < 1e30F; }
+consteval bool not_negative(float x) { return x >= 0 && x < 1e30F; }
+consteval bool finite(float x) { return x > -1e30F && x < 1e30F; }
+}  // namespace detail
+
+consteval Numbers checked(const Numbers& n) {
+  using detail::finite;
+  using detail::not_negative;
+  using detail::positive;
+  using detail::require;
+  require(n.can_base % 64 == 0 && n.can_base <= 0x7C0, "can_base: a multiple of 64 up to 0x7C0");
+  require(n.loop.period_us > 0 && n.loop.period_us <= 100'000, "loop.period_us: 1 to 100000");
+  require(n.loop.window_us >= n.loop.period_us && n.loop.window_us <= 500'000, "loop.window_us: the period to 500000");
+  require(n.loop.ahead_us >= 0 && n.loop.ahead_us <= 500'000, "loop.ahead_us: 0 to 500000");
+
+  const auto& d = n.wheels.drive;
+  require(positive(d.left_radius_m), "wheels.drive.left_radius_m: above 0");
+  require(positive(d.right_radius_m), "wheels.drive.right_radius_m: above 0");
+  require(positive(d.track_m), "wheels.drive.track_m: above 0");
+  require(positive(d.counts_per_turn), "wheels.drive.counts_per_turn: above 0");
+  require(not_negative(d.noise_left) && not_negative(d.noise_right),
+          "wheels.drive.noise_left, noise_right: not below 0");
+  const auto& u = n.wheels.noise;
+  require(not_negative(u.speed) && not_negative(u.speed_per_speed) && not_negative(u.yaw_rate) &&
+              not_negative(u.yaw_rate_per_yaw_rate) && not_negative(u.yaw_rate_per_speed),
+          "wheels.noise: densities not below 0");
+  require(not_negative(n.wheels.wheel_speed_noise), "wheels.wheel_speed_noise: not below 0");
+  require(n.wheels.delay_us >= 0 && n.wheels.delay_us <= 500'000, "wheels.delay_us: 0 to 500000");
+  require(positive(n.wheels.speed_scale) && positive(n.wheels.yaw_rate_scale), "wheels scales: above 0");
+  require(n.wheels.timeout_us > 0, "wheels.timeout_us: above 0");
+  require(positive(n.wheels.timeout_noise), "wheels.timeout_noise: above 0");
+
+  const auto& up = n.gyro.up_s;
+  const float norm2 = up[0] * up[0] + up[1] * up[1] + up[2] * up[2];
+  require(norm2 > 0.99F && norm2 < 1.01F, "gyro.up_s: a unit vector");
+  require(not_negative(n.gyro.noise), "gyro.noise: not below 0");
+  require(positive(n.gyro.bias_time_s), "gyro.bias_time_s: above 0");
+  require(positive(n.gyro.standstill_mps), "gyro.standstill_mps: above 0");
+
+  const auto& l = n.landmark;
+  require(positive(l.sigma_range_m), "landmark.sigma_range_m: above 0");
+  require(not_negative(l.sigma_range_per_m), "landmark.sigma_range_per_m: not below 0");
+  require(positive(l.sigma_bearing_rad), "landmark.sigma_bearing_rad: above 0");
+  require(positive(l.sigma_range_only_m), "landmark.sigma_range_only_m: above 0");
+  require(positive(l.gate_scale), "landmark.gate_scale: above 0");
+
+  const auto& g = n.gnss;
+  require(finite(g.antenna_x_b_m) && finite(g.antenna_y_b_m), "gnss.antenna_x_b_m, antenna_y_b_m: finite");
+  require(positive(g.sigma_floor_m), "gnss.sigma_floor_m: above 0");
+  require(positive(g.sigma_scale), "gnss.sigma_scale: above 0");
+  require(positive(g.gate_scale), "gnss.gate_scale: above 0");
+  require(positive(g.align_distance_m), "gnss.align_distance_m: above 0");
+
+  require(positive(n.start.sigma_position_m), "start.sigma_position_m: above 0");
+  require(positive(n.start.sigma_yaw_rad), "start.sigma_yaw_rad: above 0");
+  require(n.recovery.after_us >= 0 && n.recovery.at_least >= 1, "recovery.after_us not below 0, at_least from 1");
+  require(positive(n.recovery.inflate_position_m) && positive(n.recovery.inflate_yaw_rad),
+          "recovery.inflate_*: above 0");
+  return n;
+}
+
+}  // namespace tetap::app
