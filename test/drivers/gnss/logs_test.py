@@ -211,7 +211,7 @@ def main():
         return 77
     logs = sorted(os.path.join(data, d, f) for d in ("dev", "other") for f in os.listdir(os.path.join(data, d)) if f.endswith(".log"))
     if shutil.which("gpsdecode") is None:
-        print("no gpsdecode (Debian's gpsd-tools): skipped")
+        print("no gpsdecode (Debian's gpsd-clients): skipped")
         return 77
     failures, totals = [], {"chk": [0, 0, 0], "gpsdecode": [0, 0, 0]}
     spoken, fixes = 0, 0

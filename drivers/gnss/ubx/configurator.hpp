@@ -1,0 +1,377 @@
+// SPDX-License-Identifier: Apache-2.0
+// Brings a u-blox receiver to send NAV-PVT and NAV-COV at the wanted rate and baud rate, and NMEA no more: finds its
+// baud rate, tries CFG-VALSET (M9, F9, M10), then the older CFG messages (M6 to M8), each acknowledged, with time-outs
+// and bounded retries. Runs on while the receiver does: one that lost its power is configured again.
+#pragma once
+
+#include "base/time.hpp"
+#include "drivers/gnss/receiver.hpp"
+#include "drivers/gnss/ubx/message.hpp"
+#include "hal/byte_stream.hpp"
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string_view>
+
+namespace tetap::drivers::gnss::ubx {
+
+struct Settings {
+  std::uint32_t baud = 115'200;
+  std::uint16_t period_ms = 200;
+  DynamicModel model = DynamicModel::kAutomotive;
+  bool covariance = true;
+  base::Micros reply_timeout{300'000};  ///< on top of the time that a long reply takes on the line
+  std::uint8_t tries = 3;               ///< of each message
+  std::uint8_t rounds = 4;              ///< through all baud rates
+  base::Micros lost_after{3'000'000};   ///< so long without an epoch: start again
+  base::Micros rest{10'000'000};        ///< after giving up, before the next attempt
+};
+
+enum class ConfigState : std::uint8_t { kSearch, kApply, kChangeBaud, kRunning, kGaveUp, kMisconfigured };
+
+inline constexpr std::array<std::string_view, 6> kConfigStateNames = {"searching", "applying", "changing baud rate",
+                                                                      "running",   "gave up",  "misconfigured"};
+[[nodiscard]] constexpr std::string_view name(ConfigState state) {
+  return kConfigStateNames[static_cast<std::size_t>(state)];
+}
+
+enum class ConfigReason : std::uint8_t {
+  kNoAnswer,    ///< a round through all baud rates without a receiver
+  kTimeout,     ///< a message without acknowledgement in time
+  kRefused,     ///< a message that the receiver did not take
+  kLegacy,      ///< no CFG-VALSET: the older messages
+  kNoPvt,       ///< no NAV-PVT: the older messages instead
+  kBaudKept,    ///< silent after the change of baud rate: the one found stays
+  kLost,        ///< silent while running: configured again
+  kLateAnswer,  ///< an acknowledgement that nothing waited for
+  kCount
+};
+
+inline constexpr std::array<std::string_view, static_cast<std::size_t>(ConfigReason::kCount)> kConfigReasonNames = {
+    "no answer",  "timeout",        "refused",       "older messages",
+    "no NAV-PVT", "baud rate kept", "receiver lost", "late answer"};
+[[nodiscard]] constexpr std::string_view name(ConfigReason reason) {
+  return reason < ConfigReason::kCount ? kConfigReasonNames[static_cast<std::size_t>(reason)] : std::string_view{"?"};
+}
+
+/// What is asked of the receiver, in this order; the last five only where there is no NAV-PVT.
+enum class Step : std::uint8_t {
+  kPorts,
+  kBaud,
+  kRate,
+  kPvt,
+  kCov,
+  kModel,
+  kPosLlh,
+  kVelNed,
+  kSol,
+  kDop,
+  kTimeUtc,
+  kDone
+};
+
+[[nodiscard]] constexpr bool valid(const Settings& s) {
+  // An epoch of NAV-PVT and NAV-COV, ten bits a byte, within half the period.
+  const std::uint32_t bits = s.covariance ? 1720 : 1000;
+  return s.baud >= 9600 && s.baud <= 921'600 && s.period_ms >= 25 && s.period_ms <= 10'000 && s.tries > 0 &&
+         s.rounds > 0 && s.reply_timeout.us > 0 && bits * 2000 <= s.baud * s.period_ms &&
+         s.lost_after.us > 2000 * std::int64_t{s.period_ms} && s.rest.us >= 0;
+}
+
+template <hal::ByteStream Port>
+class Configurator {
+ public:
+  /// Those that receivers are found at, the factory's first. Lines without a baud rate (USB, DDC) have one try.
+  static constexpr std::array<std::uint32_t, 7> kBauds{38'400, 9600, 115'200, 57'600, 230'400, 460'800, 921'600};
+
+  constexpr Configurator(Port& port, const Settings& settings) : port_(&port), settings_(settings) {
+    if (!valid(settings_)) state_ = ConfigState::kMisconfigured;
+  }
+
+  /// Advances by what time it is; called at the pace of the loop.
+  constexpr void poll(base::Micros now) {
+    if (state_ == ConfigState::kMisconfigured) return;
+    if (!started_) {
+      started_ = true;
+      begin_search(now);
+    }
+    write(now);
+    if (!sent_ && now < deadline_) return;
+    switch (state_) {
+      case ConfigState::kSearch:
+        if (now >= deadline_) next_baud(now);
+        return;
+      case ConfigState::kApply:
+        if (now >= deadline_) on_silence(now);
+        return;
+      case ConfigState::kChangeBaud:
+        if (now >= deadline_) verify_baud(now);
+        return;
+      case ConfigState::kRunning:
+        if (now - last_report_ >= settings_.lost_after) {
+          add(ConfigReason::kLost);
+          begin_search(now);
+        }
+        return;
+      case ConfigState::kGaveUp:
+        if (now >= deadline_) begin_search(now);
+        return;
+      case ConfigState::kMisconfigured:
+        return;
+    }
+  }
+
+  constexpr void on_identified(base::Micros now) {
+    if (state_ == ConfigState::kSearch) {
+      apply(Step::kPorts, now);
+    } else if (state_ == ConfigState::kChangeBaud && changed_) {
+      baud_ = settings_.baud;
+      apply(Step::kRate, now);
+    }
+  }
+
+  /// Acknowledgements name a message, not which one of its kind: after a retry an old one may still be on its way, and
+  /// the step waits for silence before the next goes out.
+  constexpr void on_acknowledge(const Acknowledge& ack, base::Micros now) {
+    const bool ours = state_ == ConfigState::kApply && !settling_ && ack.message_class == message_.message_class() &&
+                      ack.message_id == message_.id();
+    if (!ours) {
+      if (ack.message_class == kClassCfg && state_ != ConfigState::kChangeBaud) add(ConfigReason::kLateAnswer);
+      return;
+    }
+    if (ack.accepted) {
+      if (step_ == Step::kPvt) has_pvt_ = true;
+    } else if (!refused(now)) {
+      return;
+    }
+    if (tries_ > 1) {
+      settling_ = true;  // the tries were a wait() apart, and so are their answers
+      deadline_ = now + base::Micros{wait().us * tries_};
+    } else {
+      apply(next(step_), now);
+    }
+  }
+
+  constexpr void on_report(base::Micros now) { last_report_ = now; }
+
+  [[nodiscard]] constexpr ConfigState state() const { return state_; }
+  [[nodiscard]] constexpr std::uint32_t baud() const { return baud_; }
+  [[nodiscard]] constexpr bool legacy() const { return legacy_; }
+  [[nodiscard]] constexpr std::uint16_t of(ConfigReason reason) const {
+    return counts_[static_cast<std::size_t>(reason)];
+  }
+  /// What the receiver did not take since it was found.
+  [[nodiscard]] constexpr bool was_refused(Step step) const {
+    return (refused_ >> static_cast<unsigned>(step) & 1) != 0;
+  }
+
+ private:
+  static constexpr bool kHasBaud = hal::SerialPort<Port>;
+
+  constexpr void begin_search(base::Micros now) {
+    state_ = ConfigState::kSearch;
+    round_ = 0;
+    candidate_ = 0;
+    keep_baud_ = !kHasBaud;
+    listen(settings_.baud, now);
+  }
+
+  /// At this baud rate, who is there?
+  constexpr void listen(std::uint32_t baud, base::Micros now) {
+    baud_ = baud;
+    if constexpr (kHasBaud) port_->set_baud(baud);
+    legacy_ = has_pvt_ = settling_ = changed_ = false;
+    refused_ = 0;
+    send(poll_version(), now);
+  }
+
+  /// First the wanted one, then the list.
+  constexpr void next_baud(base::Micros now) {
+    if (candidate_ < kBauds.size() && kHasBaud) return listen(kBauds[candidate_++], now);
+    add(ConfigReason::kNoAnswer);
+    end_round(now);
+  }
+
+  constexpr void end_round(base::Micros now) {
+    ++round_;
+    if (round_ >= settings_.rounds) {
+      state_ = ConfigState::kGaveUp;
+      sent_ = true;
+      deadline_ = now + settings_.rest;
+      return;
+    }
+    candidate_ = 0;
+    listen(settings_.baud, now);
+  }
+
+  constexpr void apply(Step step, base::Micros now) {
+    step_ = step;
+    tries_ = 1;
+    settling_ = false;
+    if (step == Step::kDone) {
+      state_ = ConfigState::kRunning;
+      last_report_ = now;
+      return;
+    }
+    state_ = step == Step::kBaud ? ConfigState::kChangeBaud : ConfigState::kApply;
+    changed_ = false;
+    send(request(step), now);
+  }
+
+  constexpr void on_silence(base::Micros now) {
+    if (settling_) return apply(next(step_), now);
+    add(ConfigReason::kTimeout);
+    if (tries_ < settings_.tries) {
+      ++tries_;
+      return send(message_, now);
+    }
+    // A receiver that says nothing to what it does not know.
+    if (step_ == Step::kPorts && !legacy_) return fall_back(now);
+    next_attempt(now);
+  }
+
+  /// From the beginning, but a bounded number of times.
+  constexpr void next_attempt(base::Micros now) {
+    state_ = ConfigState::kSearch;
+    end_round(now);
+  }
+
+  constexpr void fall_back(base::Micros now) {
+    legacy_ = true;
+    add(ConfigReason::kLegacy);
+    apply(Step::kPorts, now);
+  }
+
+  /// False: this step is done with in another way.
+  constexpr bool refused(base::Micros now) {
+    if (step_ == Step::kPorts && !legacy_) return fall_back(now), false;
+    add(ConfigReason::kRefused);
+    refused_ = static_cast<std::uint16_t>(refused_ | 1U << static_cast<unsigned>(step_));
+    if (step_ == Step::kPorts || (step_ == Step::kPvt && !legacy_)) return next_attempt(now), false;
+    if (step_ == Step::kPvt) add(ConfigReason::kNoPvt);
+    return true;
+  }
+
+  /// The request was sent at the old rate and may be answered at either; only what is heard at the new one counts.
+  constexpr void verify_baud(base::Micros now) {
+    if (!changed_) {
+      changed_ = true;
+      tries_ = 1;
+      if constexpr (kHasBaud) port_->set_baud(settings_.baud);
+      return send(poll_version(), now);
+    }
+    if (tries_ < settings_.tries) {
+      ++tries_;
+      return send(message_, now);
+    }
+    add(ConfigReason::kBaudKept);
+    keep_baud_ = true;
+    next_attempt(now);
+  }
+
+  [[nodiscard]] constexpr Step next(Step step) const {
+    switch (step) {
+      case Step::kPorts:
+        return baud_ != settings_.baud && !keep_baud_ ? Step::kBaud : Step::kRate;
+      case Step::kBaud:
+        return Step::kRate;
+      case Step::kRate:
+        return Step::kPvt;
+      case Step::kPvt:
+        return settings_.covariance && !legacy_ ? Step::kCov : Step::kModel;
+      case Step::kCov:
+        return Step::kModel;
+      case Step::kModel:
+        return has_pvt_ ? Step::kDone : Step::kPosLlh;
+      default:
+        return static_cast<Step>(static_cast<std::uint8_t>(step) + 1);
+    }
+  }
+
+  [[nodiscard]] constexpr Message request(Step step) const {
+    switch (step) {
+      case Step::kPorts:
+        return legacy_
+                   ? legacy_port(baud_)
+                   : ValSet().set(Key::kUart1InUbx, 1).set(Key::kUart1OutUbx, 1).set(Key::kUart1OutNmea, 0).finish();
+      case Step::kBaud:
+        return legacy_ ? legacy_port(settings_.baud) : ValSet().set(Key::kUart1BaudRate, settings_.baud).finish();
+      case Step::kRate:
+        return legacy_
+                   ? legacy_rate(settings_.period_ms)
+                   : ValSet().set(Key::kRateMeasurement_ms, settings_.period_ms).set(Key::kRateNavigation, 1).finish();
+      case Step::kPvt:
+        return legacy_ ? legacy_enable(Nav::kPvt) : ValSet().set(Key::kNavPvtUart1, 1).finish();
+      case Step::kCov:
+        return ValSet().set(Key::kNavCovUart1, 1).finish();
+      case Step::kModel:
+        return legacy_ ? legacy_model(settings_.model)
+                       : ValSet().set(Key::kDynamicModel, static_cast<std::uint32_t>(settings_.model)).finish();
+      case Step::kPosLlh:
+        return legacy_enable(Nav::kPosLlh);
+      case Step::kVelNed:
+        return legacy_enable(Nav::kVelNed);
+      case Step::kSol:
+        return legacy_enable(Nav::kSol);
+      case Step::kDop:
+        return legacy_enable(Nav::kDop);
+      default:
+        return legacy_enable(Nav::kTimeUtc);
+    }
+  }
+
+  constexpr void send(const Message& message, base::Micros now) {
+    message_ = message;
+    written_ = 0;
+    sent_ = false;
+    deadline_ = now + wait();
+    write(now);
+  }
+
+  /// As much as the line takes; time runs from the last byte on.
+  constexpr void write(base::Micros now) {
+    if (sent_) return;
+    const auto rest = message_.bytes().subspan(written_);
+    const std::size_t taken = port_->write(rest);
+    written_ += taken < rest.size() ? taken : rest.size();
+    sent_ = written_ == message_.bytes().size();
+    if (taken > 0) deadline_ = now + wait();
+  }
+
+  /// A reply queues behind what the receiver sends anyway: a thousand bytes of ten bits.
+  [[nodiscard]] constexpr base::Micros wait() const {
+    constexpr std::int64_t kQueue_bits = 10'000;
+    return settings_.reply_timeout + base::Micros{kQueue_bits * 1'000'000 / baud_};
+  }
+
+  constexpr void add(ConfigReason reason) {
+    auto& count = counts_[static_cast<std::size_t>(reason)];
+    if (count < 0xFFFF) ++count;
+  }
+
+  Port* port_;
+  Settings settings_;
+  Message message_{};
+  base::Micros deadline_{};
+  base::Micros last_report_{};
+  std::size_t written_ = 0;
+  std::size_t candidate_ = 0;
+  std::uint32_t baud_ = 9600;
+  std::array<std::uint16_t, static_cast<std::size_t>(ConfigReason::kCount)> counts_{};
+  std::uint16_t refused_ = 0;
+  std::uint8_t tries_ = 0;
+  std::uint8_t round_ = 0;
+  ConfigState state_ = ConfigState::kSearch;
+  Step step_ = Step::kPorts;
+  bool started_ = false;
+  bool sent_ = true;
+  bool legacy_ = false;
+  bool has_pvt_ = false;
+  bool keep_baud_ = false;
+  bool changed_ = false;   ///< this side listens at the new baud rate
+  bool settling_ = false;  ///< answered, waiting for answers to earlier tries
+};
+
+}  // namespace tetap::drivers::gnss::ubx

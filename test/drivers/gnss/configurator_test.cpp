@@ -1,0 +1,240 @@
+// SPDX-License-Identifier: Apache-2.0
+// The driver on a line with a fake u-blox receiver: whatever generation, baud rate and fault, it ends up running or
+// says why not, after a bounded number of requests.
+#include "drivers/gnss/driver.hpp"
+#include "drivers/gnss/fake_ublox.hpp"
+
+#include <gtest/gtest.h>
+
+#include <vector>
+
+namespace tetap::drivers::gnss {
+namespace {
+
+using test::FakeUblox;
+using test::Generation;
+using ubx::ConfigReason;
+using ubx::ConfigState;
+using ubx::Step;
+
+static_assert(hal::SerialPort<FakeUblox>);
+
+struct Bench {
+  explicit Bench(Generation generation, std::uint32_t baud = 9600, const DriverSettings& settings = {})
+      : receiver(generation, baud), driver(receiver, settings) {}
+
+  /// Until it stands still in the state, or for so long.
+  bool until(ConfigState state, double most_s) {
+    for (const auto end = now + base::Micros{static_cast<std::int64_t>(most_s * 1e6)}; now < end;) {
+      step();
+      if (driver.configurator().state() == state) return true;
+    }
+    return false;
+  }
+  void step() {
+    now += base::Micros{2'000};
+    receiver.advance(now);
+    driver.poll(now, [&](const Report& r, base::Micros stamp) {
+      reports.push_back(r);
+      stamps.push_back(stamp);
+    });
+  }
+  void run(double s) {
+    for (const auto end = now + base::Micros{static_cast<std::int64_t>(s * 1e6)}; now < end;) step();
+  }
+  [[nodiscard]] int count(ConfigReason reason) const { return driver.configurator().of(reason); }
+
+  FakeUblox receiver;
+  GnssDriver<FakeUblox> driver;
+  base::Micros now{};
+  std::vector<Report> reports;
+  std::vector<base::Micros> stamps;
+};
+
+void expect_configured(const Bench& bench) {
+  EXPECT_EQ(bench.driver.configurator().state(), ConfigState::kRunning);
+  EXPECT_EQ(bench.receiver.baud(), 115'200U);
+  EXPECT_EQ(bench.receiver.period_ms(), 200);
+  EXPECT_FALSE(bench.receiver.nmea());
+  EXPECT_EQ(bench.receiver.model(), 4);
+}
+
+TEST(GnssConfiguration, AReceiverWithKeysIsConfiguredFromEveryBaudRate) {
+  for (const std::uint32_t baud : {9600U, 38'400U, 57'600U, 115'200U, 230'400U, 460'800U, 921'600U}) {
+    SCOPED_TRACE(baud);
+    Bench bench(Generation::kM10, baud);
+    ASSERT_TRUE(bench.until(ConfigState::kRunning, 20));
+    expect_configured(bench);
+    EXPECT_TRUE(bench.receiver.enabled(0x07));
+    EXPECT_TRUE(bench.receiver.enabled(0x36));
+    EXPECT_FALSE(bench.driver.configurator().legacy());
+    bench.run(1);
+    bench.reports.clear();
+    bench.run(5);
+    EXPECT_NEAR(static_cast<double>(bench.reports.size()), 25, 2);
+  }
+}
+
+TEST(GnssConfiguration, AReceiverWithoutKeysIsConfiguredByTheOlderMessages) {
+  for (const bool silent : {false, true}) {
+    Bench bench(Generation::kM8);
+    bench.receiver.faults.silent_to_unknown = silent;
+    ASSERT_TRUE(bench.until(ConfigState::kRunning, 30));
+    expect_configured(bench);
+    EXPECT_TRUE(bench.driver.configurator().legacy());
+    EXPECT_EQ(bench.count(ConfigReason::kLegacy), 1);
+    EXPECT_TRUE(bench.receiver.enabled(0x07));
+    bench.run(3);
+    EXPECT_GT(bench.reports.size(), 10U);
+  }
+}
+
+TEST(GnssConfiguration, AReceiverWithoutNavPvtIsHeardByItsOlderMessages) {
+  Bench bench(Generation::kM6);
+  ASSERT_TRUE(bench.until(ConfigState::kRunning, 30));
+  expect_configured(bench);
+  EXPECT_EQ(bench.count(ConfigReason::kNoPvt), 1);
+  for (const auto id : std::to_array<std::uint8_t>({0x02, 0x12, 0x06, 0x04, 0x21}))
+    EXPECT_TRUE(bench.receiver.enabled(id)) << int{id};
+  bench.run(3);
+  ASSERT_GT(bench.reports.size(), 10U);
+  EXPECT_EQ(bench.reports.back().fix, app::GnssFix::k3d);
+}
+
+TEST(GnssConfiguration, ARefusedOptionIsSaidAndTheRestIsConfigured) {
+  Bench bench(Generation::kM10);
+  bench.receiver.faults.refused_keys = {0x20910084, 0x20110021};
+  ASSERT_TRUE(bench.until(ConfigState::kRunning, 20));
+  EXPECT_TRUE(bench.receiver.enabled(0x07));
+  EXPECT_EQ(bench.count(ConfigReason::kRefused), 2);
+  EXPECT_TRUE(bench.driver.configurator().was_refused(Step::kCov));
+  EXPECT_TRUE(bench.driver.configurator().was_refused(Step::kModel));
+  EXPECT_FALSE(bench.driver.configurator().was_refused(Step::kPvt));
+}
+
+TEST(GnssConfiguration, AReceiverThatRefusesNavPvtIsGivenUpAfterBoundedRounds) {
+  Bench bench(Generation::kM10);
+  bench.receiver.faults.refused_keys = {0x20910007};
+  ASSERT_TRUE(bench.until(ConfigState::kGaveUp, 120));
+  EXPECT_EQ(bench.count(ConfigReason::kRefused), ubx::Settings{}.rounds);
+}
+
+TEST(GnssConfiguration, LostAcknowledgementsAreAskedForAgain) {
+  Bench bench(Generation::kM10, 115'200);
+  bench.receiver.faults.swallow_acks = 2;
+  ASSERT_TRUE(bench.until(ConfigState::kRunning, 20));
+  EXPECT_EQ(bench.count(ConfigReason::kTimeout), 2);
+  expect_configured(bench);
+}
+
+TEST(GnssConfiguration, AnAnswerToAnEarlierTryIsNotTakenForTheNextStep) {
+  Bench bench(Generation::kM10, 115'200);
+  ASSERT_TRUE(bench.until(ConfigState::kApply, 5));
+  bench.receiver.faults.delay = base::Micros{500'000};  // the time-out is 387 ms
+  bench.receiver.faults.refused_keys = {0x20910084};    // if taken for one step later, another step looks refused
+  ASSERT_TRUE(bench.until(ConfigState::kRunning, 60));
+  expect_configured(bench);
+  EXPECT_GT(bench.count(ConfigReason::kTimeout), 0);
+  EXPECT_GT(bench.count(ConfigReason::kLateAnswer), 0);
+  EXPECT_TRUE(bench.driver.configurator().was_refused(Step::kCov));
+  EXPECT_FALSE(bench.driver.configurator().was_refused(Step::kModel));
+  EXPECT_FALSE(bench.driver.configurator().was_refused(Step::kPvt));
+}
+
+TEST(GnssConfiguration, ASilentReceiverIsGivenUpWithBoundedRequestsAndTriedAgainLater) {
+  Bench bench(Generation::kM10);
+  bench.receiver.faults.mute = true;
+  ASSERT_TRUE(bench.until(ConfigState::kGaveUp, 120));
+  EXPECT_EQ(bench.count(ConfigReason::kNoAnswer), ubx::Settings{}.rounds);
+  const int requests = bench.receiver.requests();
+  EXPECT_LT(requests, 20);
+  bench.run(5);
+  EXPECT_EQ(bench.receiver.requests(), requests) << "it rests";
+  bench.receiver.faults.mute = false;
+  EXPECT_TRUE(bench.until(ConfigState::kRunning, 40));
+}
+
+TEST(GnssConfiguration, AReceiverThatLostItsPowerIsConfiguredAgain) {
+  Bench bench(Generation::kM10);
+  ASSERT_TRUE(bench.until(ConfigState::kRunning, 20));
+  bench.run(2);
+  bench.receiver.power_cycle(38'400);
+  bench.run(1);
+  ASSERT_TRUE(bench.until(ConfigState::kSearch, 5));
+  EXPECT_EQ(bench.count(ConfigReason::kLost), 1);
+  ASSERT_TRUE(bench.until(ConfigState::kRunning, 30));
+  expect_configured(bench);
+}
+
+TEST(GnssConfiguration, ABaudRateAtWhichNothingIsHeardIsNotKept) {
+  Bench bench(Generation::kM10, 9600);
+  bench.receiver.faults.deaf_after_baud_change = true;
+  ASSERT_FALSE(bench.until(ConfigState::kRunning, 10));
+  EXPECT_EQ(bench.count(ConfigReason::kBaudKept), 1);
+  // Someone resets it.
+  bench.receiver.faults.deaf_after_baud_change = false;
+  bench.receiver.power_cycle(9600);
+  ASSERT_TRUE(bench.until(ConfigState::kRunning, 40));
+  EXPECT_EQ(bench.receiver.baud(), 9600U) << "the rate it was found at stays";
+  EXPECT_TRUE(bench.receiver.enabled(0x07));
+}
+
+TEST(GnssConfiguration, ALineThatTakesThreeBytesAtATimeIsEnoughAndOneThatTakesNoneIsSaid) {
+  Bench bench(Generation::kM10);
+  bench.receiver.faults.write_at_most = 3;
+  EXPECT_TRUE(bench.until(ConfigState::kRunning, 20));
+  Bench stuck(Generation::kM10);
+  stuck.receiver.faults.write_at_most = 0;
+  EXPECT_TRUE(stuck.until(ConfigState::kGaveUp, 120));
+  EXPECT_GT(stuck.count(ConfigReason::kNoAnswer), 0);
+}
+
+TEST(GnssConfiguration, SettingsThatTheLineCannotCarrySendNothing) {
+  DriverSettings settings;
+  settings.ubx.baud = 9600;
+  settings.ubx.period_ms = 100;
+  EXPECT_FALSE(ubx::valid(settings.ubx));
+  Bench bench(Generation::kM10, 9600, settings);
+  bench.run(3);
+  EXPECT_EQ(bench.driver.configurator().state(), ConfigState::kMisconfigured);
+  EXPECT_EQ(bench.receiver.requests(), 0);
+}
+
+TEST(GnssConfiguration, WithConfigurationOffNothingIsSent) {
+  DriverSettings settings;
+  settings.configure = false;
+  Bench bench(Generation::kM10, 9600, settings);
+  bench.run(5);
+  EXPECT_EQ(bench.receiver.requests(), 0);
+  EXPECT_GT(bench.driver.health().nmea_frames, 0U);
+}
+
+TEST(GnssConfiguration, StatesAndReasonsHaveNames) {
+  for (std::size_t i = 0; i < static_cast<std::size_t>(ConfigReason::kCount); ++i)
+    EXPECT_GT(name(static_cast<ConfigReason>(i)).size(), 3U);
+  EXPECT_EQ(name(ConfigState::kGaveUp), "gave up");
+  EXPECT_EQ(name(ConfigReason::kLateAnswer), "late answer");
+}
+
+TEST(GnssEpochClock, StampsAreAsRegularAsTheReceiverAndNeverLate) {
+  EpochClock clock(base::Micros{60'000});
+  for (std::int64_t i = 0; i < 500; ++i) {
+    const std::int64_t truth_us = 7'000'000 + i * 200'000;
+    const std::int64_t wait_us = i * 24'721 % 40'000;
+    const std::int64_t at = clock.stamp({i * 200'000}, {truth_us + 60'000 + wait_us}).us;
+    EXPECT_GE(at, truth_us);
+    EXPECT_LE(at, truth_us + wait_us);
+    EXPECT_LE(at - truth_us, i > 32 ? 2'500 : 40'000) << i;
+  }
+}
+
+TEST(GnssEpochClock, TheEndOfTheWeekAndARestartAreNotTornApart) {
+  EpochClock clock(base::Micros{0});
+  for (std::int64_t i = 0; i < 50; ++i)
+    EXPECT_EQ(clock.stamp({604'790'000'000 + i * 200'000}, {i * 200'000}).us, i * 200'000);
+  for (std::int64_t i = 50; i < 99; ++i)
+    EXPECT_EQ(clock.stamp({i * 200'000 - 10'000'000}, {i * 200'000}).us, i * 200'000);
+}
+
+}  // namespace
+}  // namespace tetap::drivers::gnss
