@@ -96,7 +96,7 @@ class FakeUblox {
               id,
               static_cast<std::uint8_t>(payload.size()),
               static_cast<std::uint8_t>(payload.size() >> 8)};
-    out.insert(out.end(), payload.begin(), payload.end());
+    for (const std::uint8_t byte : payload) out.push_back(byte);
     unsigned a = 0, b = 0;
     for (std::size_t i = 2; i < out.size(); ++i) b += a += out[i];
     out.push_back(static_cast<std::uint8_t>(a));

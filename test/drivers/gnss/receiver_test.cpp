@@ -26,7 +26,7 @@ Bytes ubx_frame(std::uint8_t message_class, std::uint8_t id, const Bytes& payloa
             id,
             static_cast<std::uint8_t>(payload.size() & 0xFF),
             static_cast<std::uint8_t>(payload.size() >> 8)};
-  out.insert(out.end(), payload.begin(), payload.end());
+  for (const std::uint8_t byte : payload) out.push_back(byte);
   unsigned a = 0, b = 0;
   for (std::size_t i = 2; i < out.size(); ++i) b += a += out[i];
   out.push_back(static_cast<std::uint8_t>(a));
@@ -45,7 +45,7 @@ Bytes sentence(const std::string& text) {
 
 Bytes rtcm_frame(const Bytes& payload) {
   Bytes out{0xD3, static_cast<std::uint8_t>(payload.size() >> 8), static_cast<std::uint8_t>(payload.size() & 0xFF)};
-  out.insert(out.end(), payload.begin(), payload.end());
+  for (const std::uint8_t byte : payload) out.push_back(byte);
   const std::uint32_t crc = crc24q(out);
   for (const int shift : {16, 8, 0}) out.push_back(static_cast<std::uint8_t>(crc >> shift));
   return out;
