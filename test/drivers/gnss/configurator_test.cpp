@@ -141,6 +141,23 @@ TEST(GnssConfiguration, AnAnswerToAnEarlierTryIsNotTakenForTheNextStep) {
   EXPECT_FALSE(bench.driver.configurator().was_refused(Step::kPvt));
 }
 
+TEST(GnssConfiguration, AnAcknowledgementOfAnotherMessageIsNotTaken) {
+  Bench bench(Generation::kM10, 115'200);
+  ubx::Configurator<FakeUblox> configurator(bench.receiver, {});
+  configurator.poll({0});
+  configurator.on_identified({1'000});
+  for (int i = 0; i < 20; ++i) {
+    configurator.on_acknowledge({.message_class = 0x06, .message_id = 0x08, .accepted = true}, {2'000});
+    configurator.on_acknowledge({.message_class = 0x13, .message_id = 0x8A, .accepted = true}, {2'000});
+    configurator.on_acknowledge({.message_class = 0x06, .message_id = 0x01, .accepted = false}, {2'000});
+  }
+  EXPECT_EQ(bench.receiver.requests(), 2) << "who is there, and the first step";
+  EXPECT_EQ(configurator.state(), ConfigState::kApply);
+  EXPECT_FALSE(configurator.legacy());
+  configurator.on_acknowledge({.message_class = 0x06, .message_id = 0x8A, .accepted = true}, {3'000});
+  EXPECT_EQ(bench.receiver.requests(), 3);
+}
+
 TEST(GnssConfiguration, ASilentReceiverIsGivenUpWithBoundedRequestsAndTriedAgainLater) {
   Bench bench(Generation::kM10);
   bench.receiver.faults.mute = true;

@@ -482,6 +482,14 @@ TEST(Nmea, QualityStatusAndModeDecideTheFix) {
   for (const char* mode : {"N", "E", "M", "S"}) EXPECT_EQ(fix("1", "A", mode, "3"), GnssFix::kNone) << mode;
 }
 
+TEST(Nmea, AFixWithoutSatellitesIsNone) {
+  std::string gga = kGga;
+  gga.replace(gga.find(",12,"), 4, ",00,");
+  EXPECT_EQ(only(sentence(gga)).fix, GnssFix::kNone);
+  gga.replace(gga.find(",00,"), 4, ",,");
+  EXPECT_EQ(only(sentence(gga)).fix, GnssFix::k3d) << "not said";
+}
+
 TEST(Nmea, EmptyFieldsAreNoErrorAndNoFix) {
   const Heard heard =
       hear(sentence("GNRMC,,V,,,,,,,,,,N") + sentence("GNVTG,,,,,,,,,N") + sentence("GNGGA,,,,,,0,00,99.99,,,,,,") +
