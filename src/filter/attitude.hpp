@@ -23,17 +23,20 @@ class Attitude {
   /// A sample of both that were constant over the last dt_s. kRefused: no numbers, or no time, and nothing has changed;
   /// kAccelerometerRefused: clipped or in free fall, the gyroscope alone was used.
   [[nodiscard]] AttitudeVerdict step(const Vector3& w_b_radps, const Vector3& f_b_mps2, float dt_s) {
-    if (!(dt_s > 0.0F && dt_s <= kLongest_s) || !within(w_b_radps, kFastest_radps)) return AttitudeVerdict::kRefused;
+    const float w2 = dot(w_b_radps, w_b_radps);
     const float f2 = dot(f_b_mps2, f_b_mps2);
-    if (!(f2 < base::kInfinity)) return AttitudeVerdict::kRefused;
-    const bool usable = f2 > kLeastForce_mps2 * kLeastForce_mps2 && inside(f_b_mps2, o_.accelerometer_limit_mps2);
+    if (!(dt_s > 0.0F && dt_s <= kLongest_s && w2 <= kFastest_radps * kFastest_radps && f2 < base::kInfinity))
+      return AttitudeVerdict::kRefused;
+    const float most = o_.accelerometer_limit_mps2;
+    const bool usable = f2 > kLeastForce_mps2 * kLeastForce_mps2 && f2 < most * most;
     if (!started_) {
       if (!usable) return AttitudeVerdict::kRefused;
       q_lb_ = levelled(f_b_mps2);
       started_ = true;
     } else {
       q_lb_ = turned(q_lb_, (0.5F * dt_s) * (w_b_radps - bias_.value()));
-      if (!inside(w_b_radps, o_.gyroscope_limit_radps)) average_anew();
+      const float clip = o_.gyroscope_limit_radps;
+      if (w2 > clip * clip && !inside(w_b_radps, clip)) average_anew();
     }
     rest_.step(o_, w_b_radps, f_b_mps2, dt_s);
     if (!usable) return AttitudeVerdict::kAccelerometerRefused;
@@ -52,7 +55,7 @@ class Attitude {
 
   [[nodiscard]] bool started() const { return started_; }
   /// Turns b into n: z is up; with a heading x is east, without one the heading is free and drifts with the bias.
-  [[nodiscard]] Quaternion q_nb() const { return (heading_.q() * q_lb_).renormalised(); }
+  [[nodiscard]] Quaternion q_nb() const { return heading_.turned(q_lb_); }
   [[nodiscard]] const Vector3& bias_b_radps() const { return bias_.value(); }
   [[nodiscard]] float bias_sigma_radps() const { return bias_.sigma_radps(); }
   [[nodiscard]] bool at_rest() const { return rest_.at_rest(); }
@@ -76,16 +79,14 @@ class Attitude {
   void level(const Vector3& f_b, float dt_s) {
     const Rows r(q_lb_);
     const Vector3 f_l = r * f_b;
-    const bool starting = age_s_ < o_.tau_inclination_s;
-    if (starting) {  // a mean over what there is, so that the first second is as good as its samples
+    float share = 0.0F;
+    if (age_s_ <
+        o_.tau_inclination_s) {  // a mean over what there is, so that the first second is as good as its samples
       age_s_ += dt_s;
-      const float share = dt_s / age_s_;
+      share = dt_s / age_s_;
       up_.value += share * (f_l - up_.value);
-      bias_.follow_average(r, share);
     } else {
-      const float k = LowPass<3>::factor(o_.tau_inclination_s, dt_s);
-      up_.step(f_l, k);
-      bias_.follow(r, k);
+      up_.step(f_l, LowPass<3>::factor(o_.tau_inclination_s, dt_s));
     }
     const float n2 = dot(up_.value, up_.value);
     if (!(n2 > kLeastForce_mps2 * kLeastForce_mps2)) return;
@@ -94,7 +95,7 @@ class Attitude {
     float x = scale * up_.value(1);
     float y = -scale * up_.value(0);
     const float tilt2 = x * x + y * y;
-    const float most = starting ? 1.0F : o_.inclination_limit_radps * dt_s;
+    const float most = share > 0.0F ? 1.0F : o_.inclination_limit_radps * dt_s;
     bool hold = false;
     off_ = tilt2 > most * most;
     if (off_ && held_s_ < o_.inclination_hold_s) {
@@ -110,21 +111,18 @@ class Attitude {
     } else {
       held_s_ = held_s_ > dt_s ? held_s_ - dt_s : 0.0F;
     }
-    correct_bias(r, off_, x / dt_s, y / dt_s, dt_s);
+    const float rate = 1.0F / dt_s;
+    bias_.step(o_, r, {.x_radps = rate * x, .y_radps = rate * y, .usable = !off_, .average_share = share}, rest_, dt_s);
     if (!hold) turn_level(x, y);
-  }
-
-  void correct_bias(const Rows& r, bool off, float x_radps, float y_radps, float dt_s) {
-    bias_.grow(dt_s);
-    if (rest_.at_rest())
-      bias_.correct_at_rest(rest_.rate_b_radps(), dt_s);
-    else if (!off)
-      bias_.correct_in_motion(r, x_radps, y_radps, dt_s);
   }
 
   /// Turns the level axes by (x, y, 0): q and what is carried in them.
   void turn_level(float x, float y) {
-    q_lb_ = (Quaternion{1.0F, 0.5F * x, 0.5F * y, 0.0F} * q_lb_).renormalised();
+    const Quaternion q = q_lb_;
+    const float hx = 0.5F * x, hy = 0.5F * y;
+    q_lb_ = Quaternion{q.w - (hx * q.x + hy * q.y), q.x + (hx * q.w + hy * q.z), q.y + (hy * q.w - hx * q.z),
+                       q.z + (hx * q.y - hy * q.x)}
+                .renormalised();
     const auto tilt = [x, y](Vector3& v) {
       v = Vector3{v(0) + y * v(2), v(1) - x * v(2), v(2) + (x * v(1) - y * v(0))};
     };

@@ -45,34 +45,30 @@ class GyroscopeBias {
         rest_(square(square(o.bias_rest_sigma_radps)) / walk_),
         limit_(o.bias_limit_radps) {}
 
-  /// What the low-passed accelerometer was compared with, kept in step with it. k: the factor of its low-pass.
-  void follow(const Rows& r, float k) {
-    Vector<float, 8> now;
-    now << r.x, r.y, dot(r.x, bias_), dot(r.y, bias_);
-    lagged_.step(now, k);
-  }
-  /// The same while the accelerometer's low-pass is still an average that starts.
-  void follow_average(const Rows& r, float share) {
-    Vector<float, 8> now;
-    now << r.x, r.y, dot(r.x, bias_), dot(r.y, bias_);
-    lagged_.value += share * (now - lagged_.value);
-  }
+  /// What the levelling did in a step: the rate at which it turned the attitude about the horizontal axes of n.
+  struct Levelling {
+    float x_radps, y_radps;
+    bool usable;          ///< neither limited nor held
+    float average_share;  ///< of a step in the mean that starts the low-pass; 0 when the low-pass runs
+  };
 
-  void grow(float dt_s) {
-    for (int i = 0; i < 3; ++i)
-      if (p_(i, i) < most_) p_(i, i) += walk_ * dt_s;
-  }
-  /// In motion: the accelerometer turns the attitude at (x, y) about the horizontal axes of n.
-  void correct_in_motion(const Rows& r, float x_radps, float y_radps, float dt_s) {
-    const auto& l = lagged_.value;
-    update({l(0), l(1), l(2)}, l(6) - x_radps, motion_, dt_s);
-    update({l(3), l(4), l(5)}, l(7) - y_radps, motion_, dt_s);
-    update(r.z, 0.0F, vertical_, dt_s);
-  }
-  void correct_at_rest(const Vector3& rate_b_radps, float dt_s) {
-    update({1.0F, 0.0F, 0.0F}, rate_b_radps(0), rest_, dt_s);
-    update({0.0F, 1.0F, 0.0F}, rate_b_radps(1), rest_, dt_s);
-    update({0.0F, 0.0F, 1.0F}, rate_b_radps(2), rest_, dt_s);
+  /// A fifth of the work per step, in turns, each as if for five steps: what is compared is low-passed over seconds.
+  void step(const AttitudeOptions& o, const Rows& r, const Levelling& levelling, const RestDetector& rest, float dt_s) {
+    phase_ = phase_ < 4 ? phase_ + 1 : 0;
+    const float span_s = 5.0F * dt_s;
+    if (phase_ == 0) bias_ = {limited(bias_(0)), limited(bias_(1)), limited(bias_(2))};
+    if (phase_ == 0) return x_.follow(o, r.x, bias_, levelling.average_share, span_s);
+    if (phase_ == 1) return y_.follow(o, r.y, bias_, levelling.average_share, span_s);
+    if (phase_ == 2) grow(span_s);
+    const int axis = phase_ - 2;
+    if (rest.at_rest()) {
+      update({axis == 0 ? 1.0F : 0.0F, axis == 1 ? 1.0F : 0.0F, axis == 2 ? 1.0F : 0.0F}, rest.rate_b_radps()(axis),
+             rest_, span_s);
+    } else if (levelling.usable) {
+      if (axis == 0) update(x_.row(), x_.along() - levelling.x_radps, motion_, span_s);
+      if (axis == 1) update(y_.row(), y_.along() - levelling.y_radps, motion_, span_s);
+      if (axis == 2) update(r.z, 0.0F, vertical_, span_s);
+    }
   }
 
   [[nodiscard]] const Vector3& value() const { return bias_; }
@@ -81,6 +77,24 @@ class GyroscopeBias {
 
  private:
   static constexpr float square(float x) { return x * x; }
+  /// A row of the rotation matrix, and its product with the bias taken off, kept in step with the accelerometer.
+  struct Lagged {
+    LowPass<4> low_pass;
+
+    void follow(const AttitudeOptions& o, const Vector3& r, const Vector3& bias, float average_share, float span_s) {
+      const Vector<float, 4> now{r(0), r(1), r(2), dot(r, bias)};
+      if (average_share > 0.0F)
+        low_pass.value += (average_share < 0.2F ? 5.0F * average_share : 1.0F) * (now - low_pass.value);
+      else
+        low_pass.step(now, LowPass<4>::factor(o.tau_inclination_s, span_s));
+    }
+    [[nodiscard]] Vector3 row() const { return {low_pass.value(0), low_pass.value(1), low_pass.value(2)}; }
+    [[nodiscard]] float along() const { return low_pass.value(3); }
+  };
+  void grow(float dt_s) {
+    for (int i = 0; i < 3; ++i)
+      if (p_(i, i) < most_) p_(i, i) += walk_ * dt_s;
+  }
   [[nodiscard]] float limited(float x) const { return x > limit_ ? limit_ : x < -limit_ ? -limit_ : x; }
 
   /// z = h . bias + noise of the given density: variance density/dt over a step. A scalar Kalman update; the steady
@@ -92,9 +106,7 @@ class GyroscopeBias {
     const float gain = dt_s / (density + dt_s * dot(h, ph));
     const Vector3 k = gain * ph;
     const float innovation = limited(z - dot(h, bias_));
-    bias_(0) = limited(bias_(0) + k(0) * innovation);
-    bias_(1) = limited(bias_(1) + k(1) * innovation);
-    bias_(2) = limited(bias_(2) + k(2) * innovation);
+    bias_ += innovation * k;
     p_(0, 0) = p00 - k(0) * ph(0);
     p_(0, 1) = p01 - k(0) * ph(1);
     p_(0, 2) = p02 - k(0) * ph(2);
@@ -105,8 +117,9 @@ class GyroscopeBias {
 
   Vector3 bias_ = Vector3::Zero();
   Symmetric<float, 3> p_;
-  LowPass<8> lagged_;  ///< first two rows of the rotation matrix, and their products with the bias taken off
+  Lagged x_, y_;
   float most_, walk_, motion_, vertical_, rest_, limit_;
+  int phase_ = 4;  ///< the first steps fill x_ and y_
 };
 
 }  // namespace tetap::filter

@@ -13,22 +13,28 @@ namespace tetap::filter {
 class MagneticHeading {
  public:
   explicit MagneticHeading(const AttitudeOptions& o)
-      : tan_dip_(base::sin(o.field_dip_rad) / base::cos(o.field_dip_rad)),
+      : norm2_low_((1.0F - o.field_norm_share) * (1.0F - o.field_norm_share)),
+        norm2_high_((1.0F + o.field_norm_share) * (1.0F + o.field_norm_share)),
+        tan_dip_(base::sin(o.field_dip_rad) / base::cos(o.field_dip_rad)),
         declination_(base::sincos(o.declination_rad)) {}
 
   /// m_l: the field in axes that are level, heading free. turning: the body moves enough to tell a field from a magnet.
   void step(const AttitudeOptions& o, const Vector3& m_l, bool turning, float dt_s) {
     const float h2 = m_l(0) * m_l(0) + m_l(1) * m_l(1);
-    if (!(h2 > 0.0F)) return;
-    check_field(o, {base::sqrt(h2), m_l(2)}, turning, dt_s);
+    const float horizontal = base::sqrt(h2);
+    if (!(horizontal > 0.0F)) return;
+    check_field(o, {horizontal, m_l(2)}, turning, dt_s);
     const float gain = weight(o, dt_s);
-    if (gain <= 0.0F) return;
+    if (!(gain > 0.0F)) return;
+    // Cosine and sine of the turn that brings the field to where the declination says, by the half-angle formula
+    // t = tan(turn/2): a share of a turn is that share of t, exact for all of it and for small ones.
     const float east = cos_ * m_l(0) - sin_ * m_l(1);
     const float north = sin_ * m_l(0) + cos_ * m_l(1);
-    // The turn that brings it to where the declination says.
-    const float error = base::atan2(declination_.cos * east - declination_.sin * north,
-                                    declination_.sin * east + declination_.cos * north);
-    turn(gain * error);
+    const float sine = east * declination_.cos - north * declination_.sin;
+    const float cosine = horizontal + (east * declination_.sin + north * declination_.cos);
+    const float most = kMostHalfTan * cosine;
+    const float half_tan = sine > most ? kMostHalfTan : sine < -most ? -kMostHalfTan : sine / cosine;
+    turn(gain * half_tan);
   }
 
   /// What the gyroscope carried is lost: a mean over the samples again, as if it had begun age_s ago.
@@ -37,60 +43,72 @@ class MagneticHeading {
   [[nodiscard]] bool known() const { return started_; }
   [[nodiscard]] bool disturbed() const { return disturbed_; }
   [[nodiscard]] float disturbed_s() const { return rejected_s_; }
-  /// Turns the level axes into n.
-  [[nodiscard]] Quaternion q() const {
-    // Half the angle without trigonometry; the branch keeps the root away from zero.
-    return cos_ > -0.5F ? Quaternion{1.0F + cos_, 0.0F, 0.0F, sin_}.normalised()
-                        : Quaternion{sin_, 0.0F, 0.0F, 1.0F - cos_}.normalised();
+  /// Level axes to n: the turn about the vertical, then q.
+  [[nodiscard]] Quaternion turned(const Quaternion& q_lb) const {
+    // Half the angle without trigonometry; either form keeps the root away from zero.
+    const bool ahead = cos_ > 0.0F;
+    const float large = ahead ? 1.0F + cos_ : 1.0F - cos_;
+    const float scale = 1.0F / base::sqrt(large * large + sin_ * sin_);
+    const float w = scale * (ahead ? large : sin_), z = scale * (ahead ? sin_ : large);
+    return {w * q_lb.w - z * q_lb.z, w * q_lb.x - z * q_lb.y, w * q_lb.y + z * q_lb.x, w * q_lb.z + z * q_lb.w};
   }
 
  private:
   using Field = Vector<float, 2>;  ///< horizontal, up
 
-  [[nodiscard]] bool alike(const AttitudeOptions& o, const Field& a, const Field& b) const {
+  [[nodiscard]] bool alike(const Field& a, const Field& b) const {
     const float a2 = a(0) * a(0) + a(1) * a(1);
     const float b2 = b(0) * b(0) + b(1) * b(1);
-    const float low = 1.0F - o.field_norm_share, high = 1.0F + o.field_norm_share;
     const float across = a(0) * b(1) - a(1) * b(0);
-    const float along = a(0) * b(0) + a(1) * b(1);
-    return a2 > low * low * b2 && a2 < high * high * b2 && base::abs(across) < tan_dip_ * along;
+    const float along = tan_dip_ * (a(0) * b(0) + a(1) * b(1));
+    return a2 > norm2_low_ * b2 && a2 < norm2_high_ * b2 && across < along && -across < along;
   }
 
+  /// Half of the work per sample, in turns: against the reference, and towards the next one.
   void check_field(const AttitudeOptions& o, const Field& sample, bool turning, float dt_s) {
     if (!started_) field_.start(sample), candidate_ = sample;
-    field_.step(sample, LowPass<2>::factor(o.tau_field_s, dt_s));
-    const Field& now = field_.value;
-    const float share = dt_s / (o.tau_reference_s + dt_s);
-    if (has_reference_ && alike(o, now, reference_)) {
-      undisturbed_s_ += dt_s;
-      if (undisturbed_s_ >= o.field_undisturbed_s) {
-        undisturbed_s_ = o.field_undisturbed_s;
-        disturbed_ = false;
-        reference_ += share * (now - reference_);
-      }
+    const float span_s = 2.0F * dt_s;
+    const float share = span_s / (o.tau_reference_s + span_s);
+    odd_ = !odd_;
+    if (odd_) {
+      field_.step(sample, LowPass<2>::factor(o.tau_field_s, span_s));
+      compare(o, share, span_s);
     } else {
+      look_for_reference(o, turning, share, span_s);
+    }
+  }
+  void compare(const AttitudeOptions& o, float share, float span_s) {
+    if (!has_reference_ || !alike(field_.value, reference_)) {
       undisturbed_s_ = 0.0F;
       disturbed_ = has_reference_;
+      return;
     }
-    if (alike(o, now, candidate_)) {
-      // Motion alone shows that a field is the same everywhere; until there was some, the first one has to do.
-      if (turning || !has_reference_) candidate_s_ += dt_s;
-      moved_s_ += turning ? dt_s : 0.0F;
-      candidate_ += share * (now - candidate_);
-      const float needed_s = !has_reference_ || provisional_ ? o.field_first_s : o.field_new_s;
-      if ((!has_reference_ || disturbed_) && candidate_s_ >= needed_s) {
-        provisional_ = !has_reference_ && moved_s_ < o.field_first_s;
-        reference_ = candidate_;
-        has_reference_ = true;
-        disturbed_ = false;
-        undisturbed_s_ = o.field_undisturbed_s;
-        candidate_s_ = 0.0F;
-      }
-      // Confirmed by motion in it.
-      if (provisional_ && !disturbed_ && moved_s_ >= o.field_first_s) provisional_ = false;
-    } else {
-      moved_s_ = 0.0F;
-      candidate_ = now;
+    undisturbed_s_ += span_s;
+    if (undisturbed_s_ < o.field_undisturbed_s) return;
+    undisturbed_s_ = o.field_undisturbed_s;
+    disturbed_ = false;
+    reference_ += share * (field_.value - reference_);
+  }
+  /// Motion alone shows that a field is the same everywhere; until there was some, the first one has to do.
+  void look_for_reference(const AttitudeOptions& o, bool turning, float share, float span_s) {
+    if (!alike(field_.value, candidate_)) {
+      candidate_ = field_.value;
+      candidate_s_ = moved_s_ = 0.0F;
+      return;
+    }
+    candidate_ += share * (field_.value - candidate_);
+    if (turning || !has_reference_) candidate_s_ += span_s;
+    if (turning) moved_s_ += span_s;
+    const bool moved = moved_s_ >= o.field_first_s;
+    if (has_reference_ && !disturbed_) {
+      if (moved) provisional_ = false;
+      candidate_s_ = 0.0F;
+    } else if (candidate_s_ >= (has_reference_ && !provisional_ ? o.field_new_s : o.field_first_s)) {
+      provisional_ = !moved;
+      reference_ = candidate_;
+      has_reference_ = true;
+      disturbed_ = false;
+      undisturbed_s_ = o.field_undisturbed_s;
       candidate_s_ = 0.0F;
     }
   }
@@ -116,22 +134,27 @@ class MagneticHeading {
     return dt_s / average_s_;
   }
 
-  void turn(float angle) {
-    const base::SinCos by = base::sincos(angle);
-    const float c = cos_ * by.cos - sin_ * by.sin;
-    const float s = sin_ * by.cos + cos_ * by.sin;
-    const float scale = 1.5F - 0.5F * (c * c + s * s);
-    cos_ = c * scale;
-    sin_ = s * scale;
+  /// By an angle given as the tangent of its half.
+  void turn(float half_tan) {
+    const float t2 = half_tan * half_tan;
+    const float scale = 1.0F / (1.0F + t2);
+    const float by_cos = (1.0F - t2) * scale, by_sin = (half_tan + half_tan) * scale;
+    const float c = cos_ * by_cos - sin_ * by_sin;
+    const float s = sin_ * by_cos + cos_ * by_sin;
+    const float unit = 1.5F - 0.5F * (c * c + s * s);
+    cos_ = c * unit;
+    sin_ = s * unit;
   }
 
+  static constexpr float kMostHalfTan = 1e4F;  ///< all but 0.01 degrees of half a turn
+  float norm2_low_, norm2_high_;
   float tan_dip_;
   base::SinCos declination_;
   float cos_ = 1.0F, sin_ = 0.0F;
   LowPass<2> field_;
   Field reference_ = Field::Zero(), candidate_ = Field::Zero();
   float undisturbed_s_ = 0.0F, candidate_s_ = 0.0F, rejected_s_ = 0.0F, average_s_ = 0.0F, moved_s_ = 0.0F;
-  bool started_ = false, has_reference_ = false, disturbed_ = false, provisional_ = false;
+  bool started_ = false, has_reference_ = false, disturbed_ = false, provisional_ = false, odd_ = false;
 };
 
 }  // namespace tetap::filter

@@ -18,7 +18,7 @@ struct LowPass {
     const float k = 1.41421356F * dt_s / tau_s;
     return k < 0.5F ? k : 0.5F;
   }
-  void step(const Vector<float, N>& x, float k) {
+  [[gnu::always_inline]] void step(const Vector<float, N>& x, float k) {
     const float rest = 1.0F - 1.41421356F * k;
     slope = rest * slope + k * (x - value);
     value += k * slope;

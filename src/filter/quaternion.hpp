@@ -20,7 +20,7 @@ using Vector3 = Vector<float, 3>;
 struct Quaternion {
   float w = 1, x = 0, y = 0, z = 0;
 
-  friend constexpr Quaternion operator*(const Quaternion& a, const Quaternion& b) {
+  [[gnu::always_inline]] friend constexpr Quaternion operator*(const Quaternion& a, const Quaternion& b) {
     return {a.w * b.w - a.x * b.x - a.y * b.y - a.z * b.z, a.w * b.x + a.x * b.w + a.y * b.z - a.z * b.y,
             a.w * b.y - a.x * b.z + a.y * b.w + a.z * b.x, a.w * b.z + a.x * b.y - a.y * b.x + a.z * b.w};
   }

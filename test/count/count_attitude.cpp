@@ -97,6 +97,27 @@ void attitude(const std::array<Sample, kSamples>& samples) {
     opaque(q_nb);
   }
   opaque(nine);
+  // Whatever goes wrong: a long push sideways, a field that is not the Earth's, a start and a gyroscope that clips.
+  filter::Attitude upset;
+  int sample = 0;
+  for (int round = 0; round < 12; ++round)
+    for (const Sample& s : samples) {
+      const bool pushed = round >= 3 && round < 7, clipped = round == 9 && sample % 16 == 0;
+      filter::Vector3 rate = s.rate, force = s.force, field = s.field;
+      if (pushed) force(0) += 12.0F;
+      if (clipped) rate(1) = 35.0F;
+      if (round >= 5) field *= 1.0F + 0.2F * static_cast<float>(sample / 300 % 3);
+      opaque(rate);
+      opaque(force);
+      opaque(field);
+      ++sample;
+      const Region<struct ahrs9_upset> region;
+      static_cast<void>(upset.step(rate, force, kStep_s));
+      upset.magnetometer(field, kStep_s);
+      q_nb = upset.q_nb();
+      opaque(q_nb);
+    }
+  opaque(upset);
   // At rest the bias comes from the gyroscope itself.
   for (int k = 0; k < 400; ++k) static_cast<void>(nine.step(filter::Vector3::Zero(), {0.0F, 0.0F, 9.81F}, kStep_s));
   for (std::size_t k = 0; k < kSamples; ++k) {
