@@ -6,79 +6,14 @@
 
 #include "base/time.hpp"
 #include "drivers/gnss/receiver.hpp"
-#include "drivers/gnss/ubx/message.hpp"
+#include "drivers/gnss/ubx/configuration.hpp"
 #include "hal/byte_stream.hpp"
 
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <span>
-#include <string_view>
 
 namespace tetap::drivers::gnss::ubx {
-
-struct Settings {
-  std::uint32_t baud = 115'200;
-  std::uint16_t period_ms = 200;
-  DynamicModel model = DynamicModel::kAutomotive;
-  bool covariance = true;
-  base::Micros reply_timeout{300'000};  ///< on top of the time that a long reply takes on the line
-  std::uint8_t tries = 3;               ///< of each message
-  std::uint8_t rounds = 4;              ///< through all baud rates
-  base::Micros lost_after{3'000'000};   ///< so long without an epoch: start again
-  base::Micros rest{10'000'000};        ///< after giving up, before the next attempt
-};
-
-enum class ConfigState : std::uint8_t { kSearch, kApply, kChangeBaud, kRunning, kGaveUp, kMisconfigured };
-
-inline constexpr std::array<std::string_view, 6> kConfigStateNames = {"searching", "applying", "changing baud rate",
-                                                                      "running",   "gave up",  "misconfigured"};
-[[nodiscard]] constexpr std::string_view name(ConfigState state) {
-  return kConfigStateNames[static_cast<std::size_t>(state)];
-}
-
-enum class ConfigReason : std::uint8_t {
-  kNoAnswer,    ///< a round through all baud rates without a receiver
-  kTimeout,     ///< a message without acknowledgement in time
-  kRefused,     ///< a message that the receiver did not take
-  kLegacy,      ///< no CFG-VALSET: the older messages
-  kNoPvt,       ///< no NAV-PVT: the older messages instead
-  kBaudKept,    ///< silent after the change of baud rate: the one found stays
-  kLost,        ///< silent while running: configured again
-  kLateAnswer,  ///< an acknowledgement that nothing waited for
-  kCount
-};
-
-inline constexpr std::array<std::string_view, static_cast<std::size_t>(ConfigReason::kCount)> kConfigReasonNames = {
-    "no answer",  "timeout",        "refused",       "older messages",
-    "no NAV-PVT", "baud rate kept", "receiver lost", "late answer"};
-[[nodiscard]] constexpr std::string_view name(ConfigReason reason) {
-  return reason < ConfigReason::kCount ? kConfigReasonNames[static_cast<std::size_t>(reason)] : std::string_view{"?"};
-}
-
-/// What is asked of the receiver, in this order; the last five only where there is no NAV-PVT.
-enum class Step : std::uint8_t {
-  kPorts,
-  kBaud,
-  kRate,
-  kPvt,
-  kCov,
-  kModel,
-  kPosLlh,
-  kVelNed,
-  kSol,
-  kDop,
-  kTimeUtc,
-  kDone
-};
-
-[[nodiscard]] constexpr bool valid(const Settings& s) {
-  // An epoch of NAV-PVT and NAV-COV, ten bits a byte, within half the period.
-  const std::uint32_t bits = s.covariance ? 1720 : 1000;
-  return s.baud >= 9600 && s.baud <= 921'600 && s.period_ms >= 25 && s.period_ms <= 10'000 && s.tries > 0 &&
-         s.rounds > 0 && s.reply_timeout.us > 0 && bits * 2000 <= s.baud * s.period_ms &&
-         s.lost_after.us > 2000 * std::int64_t{s.period_ms} && s.rest.us >= 0;
-}
 
 template <hal::ByteStream Port>
 class Configurator {
@@ -217,7 +152,7 @@ class Configurator {
     }
     state_ = step == Step::kBaud ? ConfigState::kChangeBaud : ConfigState::kApply;
     changed_ = false;
-    send(request(step), now);
+    send(request(step, settings_, legacy_, baud_), now);
   }
 
   constexpr void on_silence(base::Micros now) {
@@ -287,38 +222,6 @@ class Configurator {
         return has_pvt_ ? Step::kDone : Step::kPosLlh;
       default:
         return static_cast<Step>(static_cast<std::uint8_t>(step) + 1);
-    }
-  }
-
-  [[nodiscard]] constexpr Message request(Step step) const {
-    switch (step) {
-      case Step::kPorts:
-        return legacy_
-                   ? legacy_port(baud_)
-                   : ValSet().set(Key::kUart1InUbx, 1).set(Key::kUart1OutUbx, 1).set(Key::kUart1OutNmea, 0).finish();
-      case Step::kBaud:
-        return legacy_ ? legacy_port(settings_.baud) : ValSet().set(Key::kUart1BaudRate, settings_.baud).finish();
-      case Step::kRate:
-        return legacy_
-                   ? legacy_rate(settings_.period_ms)
-                   : ValSet().set(Key::kRateMeasurement_ms, settings_.period_ms).set(Key::kRateNavigation, 1).finish();
-      case Step::kPvt:
-        return legacy_ ? legacy_enable(Nav::kPvt) : ValSet().set(Key::kNavPvtUart1, 1).finish();
-      case Step::kCov:
-        return ValSet().set(Key::kNavCovUart1, 1).finish();
-      case Step::kModel:
-        return legacy_ ? legacy_model(settings_.model)
-                       : ValSet().set(Key::kDynamicModel, static_cast<std::uint32_t>(settings_.model)).finish();
-      case Step::kPosLlh:
-        return legacy_enable(Nav::kPosLlh);
-      case Step::kVelNed:
-        return legacy_enable(Nav::kVelNed);
-      case Step::kSol:
-        return legacy_enable(Nav::kSol);
-      case Step::kDop:
-        return legacy_enable(Nav::kDop);
-      default:
-        return legacy_enable(Nav::kTimeUtc);
     }
   }
 
