@@ -2,10 +2,12 @@
 // The robots a host program can be: all of them, chosen by name. (A flash image holds one.)
 #pragma once
 
+#include "config/car.hpp"
 #include "config/husky.hpp"
 #include "config/labyrinth.hpp"
 #include "config/mrclam.hpp"
 #include "config/rover.hpp"
+#include "config/rover_inertial.hpp"
 #include "sim_host/matched_rover.hpp"
 
 #include <string>
@@ -14,12 +16,15 @@
 
 namespace tetap::sim {
 
-inline constexpr std::string_view kRobotNames = "husky labyrinth mrclam rover rover_matched";
+inline constexpr std::string_view kRobotNames = "car husky labyrinth mrclam rover rover_inertial rover_matched";
 
 /// Calls f(std::type_identity<Estimators>, numbers) for the robot of that name; false when there is none.
 template <class F>
 [[nodiscard]] bool with_robot(std::string_view name, F&& f) {
   if (name == "rover") return f(std::type_identity<robot::rover::Estimators>{}, robot::rover::numbers), true;
+  if (name == "rover_inertial")
+    return f(std::type_identity<robot::rover_inertial::Estimators>{}, robot::rover_inertial::numbers), true;
+  if (name == "car") return f(std::type_identity<robot::car::Estimators>{}, robot::car::numbers), true;
   if (name == "rover_matched") return f(std::type_identity<robot::rover::Estimators>{}, matched_rover()), true;
   if (name == "mrclam") return f(std::type_identity<robot::mrclam::Estimators>{}, robot::mrclam::numbers), true;
   if (name == "husky") return f(std::type_identity<robot::husky::Estimators>{}, robot::husky::numbers), true;

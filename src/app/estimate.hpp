@@ -6,6 +6,7 @@
 #include "config/messages.hpp"
 #include "filter/update.hpp"
 #include "model/planar_pose.hpp"
+#include "nav/ins_state.hpp"
 
 #include <cstdint>
 
@@ -20,6 +21,13 @@ struct Estimate {
   bool position_valid = false;
   bool heading_valid = false;
   bool velocity_valid = false;
+};
+
+/// What an inertial estimator has beyond that: the state at the present, the covariance of the far end of its window.
+struct InertialEstimate {
+  nav::InsState state;
+  filter::Symmetric<float, nav::InsState::kErrors> p;
+  bool valid = false;
 };
 
 /// One measurement (or input) and what became of it. dof 0: an input that is integrated, not compared.

@@ -93,6 +93,8 @@ class Lane {
     }
   }
   [[nodiscard]] Estimate estimate(const Context& with) const { return now_.estimate(with); }
+  [[nodiscard]] InertialEstimate inertial(const Context& with) const requires requires(const E& e) { e.inertial(with); }
+  { return now_.inertial(with); }
   [[nodiscard]] can::Mode mode(const Context& with) const { return now_.mode(with); }
 
   void account(const Sample& sample, const Innovation& innovation) {

@@ -207,6 +207,7 @@ void Node<Estimators, Capacity>::tick(base::Micros t, const LoopHealth& loop, Se
   each_lane([&](const auto& lane) {
     using E = typename std::remove_cvref_t<decltype(lane)>::Type;
     publisher_.estimate(instance, E::kKind, instance == kPrimary, estimates[instance], send);
+    if constexpr (requires { lane.inertial(context()); }) publisher_.inertial(instance, lane.inertial(context()), send);
     ++instance;
   });
   publisher_.status(summary(estimates[kPrimary]), send);
@@ -279,7 +280,9 @@ template <class Lane>
 void Node<Estimators, Capacity>::note(Lane& lane, std::size_t instance, const Sample& sample,
                                       const Innovation& innovation) {
   lane.account(sample, innovation);
-  if (innovation.dof > 0 || innovation.verdict > can::Verdict::kNotUsed)
+  // What comes with every tick would drown the rest: of accepted wheels the statistics are enough.
+  const bool ordinary = innovation.verdict == can::Verdict::kAccepted && sample.sensor <= can::Sensor::kBodySpeed;
+  if ((innovation.dof > 0 && !ordinary) || innovation.verdict > can::Verdict::kNotUsed)
     publisher_.event(innovation, sample, instance, now_, counters_);
 }
 

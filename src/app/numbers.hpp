@@ -60,6 +60,8 @@ struct LandmarkNumbers {
 struct GnssNumbers {
   float antenna_x_b_m = 0;
   float antenna_y_b_m = 0;
+  float antenna_z_b_m = 0;
+  float sigma_velocity_floor_mps = 0.1F;
   float sigma_floor_m = 0.5F;  ///< the receiver's own accuracy is not believed below this
   float sigma_scale = 1;       ///< times the receiver's own accuracy; its errors are correlated in time
   float gate_scale = 1;
@@ -68,6 +70,31 @@ struct GnssNumbers {
   std::int64_t origin_latitude_2ndeg = 0;
   std::int64_t origin_longitude_2ndeg = 0;
   float origin_height_m = 0;
+};
+
+/// Inertial navigation: the sensor's data sheet, and how well the robot keeps to its wheels.
+struct InertialNumbers {
+  std::int32_t imu = 0;  ///< which instance
+  /// From the sensor's axes into the body's, row by row: x forward, y left, z up.
+  std::array<float, 9> mounting_bs{1, 0, 0, 0, 1, 0, 0, 0, 1};
+  float gyro_radps_rthz = 5e-5F;        ///< ICM-42688-P, DS-000347 table 1: 0.0028 deg/s/sqrt(Hz)
+  float accel_mps2_rthz = 7e-4F;        ///< table 2: 70 ug/sqrt(Hz)
+  float gyro_bias_radps2_rthz = 1e-5F;  ///< random walk of the bias
+  float accel_bias_mps3_rthz = 2e-4F;
+  float gyro_turn_on_radps = 0.01F;  ///< 1 sigma of the bias at start
+  float accel_turn_on_mps2 = 0.2F;
+  float start_tilt_rad = 0.05F;  ///< 1 sigma of levelling
+  float level_s = 1;             ///< how long gravity is looked at
+  float gap_mps2 = 3;            ///< what may have happened while samples were missing
+  float gap_radps = 1;
+  float still_radps = 0.03F;  ///< turning slower than this, wheels still: standing
+  float still_mps = 0.005F;
+  float wheel_mps = 0.02F;    ///< 1 sigma of the wheels' speed at standstill
+  float slip_share = 0.02F;   ///< and what grows with speed
+  float lateral_mps = 0.05F;  ///< how well it does not move sideways
+  float vertical_mps = 0.05F;
+  float axle_x_b_m = 0;  ///< the axle that does not steer
+  float wheel_gate_scale = 1;
 };
 
 /// The state at start; sigma_yaw_rad >= pi means the heading is not known.
@@ -97,6 +124,8 @@ struct PublishNumbers {
   std::int32_t statistics_every = 13;   ///< one sensor at a time
   std::int32_t diagnostics_every = 12;  ///< one page at a time
   std::int32_t identity_every = 25;     ///< version and origin, one frame at a time
+  std::int32_t attitude_every = 5;      ///< attitude and velocity of an inertial estimate
+  std::int32_t state_every = 6;         ///< one page of the rest of it at a time
   std::int32_t event_every = 2;         ///< at most one innovation per so many ticks
 };
 
@@ -107,6 +136,7 @@ struct Numbers {
   GyroNumbers gyro;
   LandmarkNumbers landmark;
   GnssNumbers gnss;
+  InertialNumbers inertial;
   StartNumbers start;
   RecoveryNumbers recovery;
   PublishNumbers publish;
@@ -129,15 +159,21 @@ constexpr void each_number(const Numbers& n, Sink&& sink) {
   all(l.mounting.x_b_m, l.mounting.y_b_m, l.mounting.yaw_rad, l.sigma_range_m, l.sigma_range_per_m, l.sigma_bearing_rad,
       l.sigma_range_only_m, l.gate_scale);
   const auto& g = n.gnss;
-  all(g.antenna_x_b_m, g.antenna_y_b_m, g.sigma_floor_m, g.sigma_scale, g.gate_scale, g.align_distance_m,
-      g.origin_configured, g.origin_latitude_2ndeg, g.origin_longitude_2ndeg, g.origin_height_m);
+  all(g.antenna_x_b_m, g.antenna_y_b_m, g.antenna_z_b_m, g.sigma_velocity_floor_mps, g.sigma_floor_m, g.sigma_scale,
+      g.gate_scale, g.align_distance_m, g.origin_configured, g.origin_latitude_2ndeg, g.origin_longitude_2ndeg,
+      g.origin_height_m);
+  const auto& i = n.inertial;
+  for (const float m : i.mounting_bs) sink(m);
+  all(i.imu, i.gyro_radps_rthz, i.accel_mps2_rthz, i.gyro_bias_radps2_rthz, i.accel_bias_mps3_rthz,
+      i.gyro_turn_on_radps, i.accel_turn_on_mps2, i.start_tilt_rad, i.level_s, i.gap_mps2, i.gap_radps, i.still_radps,
+      i.still_mps, i.wheel_mps, i.slip_share, i.lateral_mps, i.vertical_mps, i.axle_x_b_m, i.wheel_gate_scale);
   const auto& s = n.start;
   all(s.known, s.x_m, s.y_m, s.yaw_rad, s.sigma_position_m, s.sigma_yaw_rad);
   const auto& r = n.recovery;
   all(r.after_us, r.at_least, r.inflate_position_m, r.inflate_yaw_rad);
   const auto& p = n.publish;
   all(p.pose_every, p.std_every, p.side_every, p.status_every, p.statistics_every, p.diagnostics_every,
-      p.identity_every, p.event_every);
+      p.identity_every, p.attitude_every, p.state_every, p.event_every);
 }
 
 }  // namespace tetap::app

@@ -31,9 +31,11 @@ consteval Numbers checked(const Numbers& n) {
   require(n.loop.ahead_us >= 0 && n.loop.ahead_us <= 500'000, "loop.ahead_us: 0 to 500000");
 
   const auto& d = n.wheels.drive;
-  require(positive(d.left_radius_m), "wheels.drive.left_radius_m: above 0");
-  require(positive(d.right_radius_m), "wheels.drive.right_radius_m: above 0");
-  require(positive(d.track_m), "wheels.drive.track_m: above 0");
+  // All zero: the robot has no wheels of its own to count.
+  const bool wheels = !(d.left_radius_m <= 0 && d.left_radius_m >= 0 && d.track_m <= 0 && d.track_m >= 0);
+  require(!wheels || positive(d.left_radius_m), "wheels.drive.left_radius_m: above 0");
+  require(!wheels || positive(d.right_radius_m), "wheels.drive.right_radius_m: above 0");
+  require(!wheels || positive(d.track_m), "wheels.drive.track_m: above 0");
   require(positive(d.counts_per_turn), "wheels.drive.counts_per_turn: above 0");
   require(not_negative(d.noise_left) && not_negative(d.noise_right),
           "wheels.drive.noise_left, noise_right: not below 0");

@@ -74,7 +74,7 @@ class Publisher {
 
   void power_on() {
     epoch_ = 0;
-    frames_ = status_counter_ = page_ = identity_ = statistic_ = 0;
+    frames_ = status_counter_ = page_ = identity_ = statistic_ = state_page_ = 0;
     events_.size = 0;
     last_second_ = {};
     troubled_until_ = 0;
@@ -104,6 +104,8 @@ class Publisher {
 
   template <class Send>
   void estimate(std::size_t instance, can::EstimatorKind kind, bool primary, const Estimate& e, Send& send);
+  template <class Send>
+  void inertial(std::size_t instance, const InertialEstimate& e, Send& send);
   template <class Send>
   void status(const Summary& summary, Send& send);
   template <class Lanes, class Send>
@@ -150,6 +152,7 @@ class Publisher {
   std::uint32_t page_ = 0;
   std::uint32_t identity_ = 0;
   std::uint32_t statistic_ = 0;
+  std::uint32_t state_page_ = 0;
   Events events_;
   Counters last_second_;              ///< the counters one to two seconds ago
   std::uint32_t troubled_until_ = 0;  ///< epoch
@@ -190,6 +193,65 @@ void Publisher<N>::estimate(std::size_t instance, can::EstimatorKind kind, bool 
                         .std_speed_mps = base::kNan,
                         .std_yaw_rate_radps = base::kNan},
         send, instance);
+  }
+}
+
+/// Attitude and velocity; of the rest one page at a time.
+template <std::size_t N>
+template <class Send>
+void Publisher<N>::inertial(std::size_t instance, const InertialEstimate& e, Send& send) {
+  if (!e.valid) return;
+  const nav::InsState& x = e.state;
+  const auto std = [&e](int i) { return base::sqrt(e.p(i, i)); };
+  if (every(numbers_.publish.attitude_every, 2)) {
+    put(can::EstAtt{.w = x.q_nb.w, .x = x.q_nb.x, .y = x.q_nb.y, .z = x.q_nb.z, .epoch = tag()}, send, instance);
+    put(can::EstVel{.east_mps = x.v_n_mps(0), .north_mps = x.v_n_mps(1), .up_mps = x.v_n_mps(2), .epoch = tag()}, send,
+        instance);
+  }
+  if (!every(numbers_.publish.state_every, 4)) return;
+  switch (state_page_++ % 7) {
+    case 0:
+      put(can::EstStateHeight{.epoch = tag(), .height_m = base::metres(x.z.um()), .std_height_m = std(2)}, send,
+          instance);
+      break;
+    case 1:
+      put(can::EstStateAccBias{.epoch = tag(),
+                               .acc_bias_x_mps2 = x.b_a_mps2(0),
+                               .acc_bias_y_mps2 = x.b_a_mps2(1),
+                               .acc_bias_z_mps2 = x.b_a_mps2(2)},
+          send, instance);
+      break;
+    case 2:
+      put(can::EstStateGyroBias{.epoch = tag(),
+                                .gyro_bias_x_radps = x.b_g_radps(0),
+                                .gyro_bias_y_radps = x.b_g_radps(1),
+                                .gyro_bias_z_radps = x.b_g_radps(2)},
+          send, instance);
+      break;
+    case 3:
+      put(
+          can::EstStateStdVel{
+              .epoch = tag(), .std_vel_east_mps = std(3), .std_vel_north_mps = std(4), .std_vel_up_mps = std(5)},
+          send, instance);
+      break;
+    case 4:
+      put(can::EstStateStdTilt{.epoch = tag(), .std_tilt_east_rad = std(6), .std_tilt_north_rad = std(7)}, send,
+          instance);
+      break;
+    case 5:
+      put(can::EstStateStdAccBias{.epoch = tag(),
+                                  .std_acc_bias_x_mps2 = std(9),
+                                  .std_acc_bias_y_mps2 = std(10),
+                                  .std_acc_bias_z_mps2 = std(11)},
+          send, instance);
+      break;
+    default:
+      put(can::EstStateStdGyroBias{.epoch = tag(),
+                                   .std_gyro_bias_x_radps = std(12),
+                                   .std_gyro_bias_y_radps = std(13),
+                                   .std_gyro_bias_z_radps = std(14)},
+          send, instance);
+      break;
   }
 }
 

@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: Apache-2.0
+// How inertial navigation begins: levels from gravity, then waits for a place and a heading: a given pose, an outside
+// heading, or the way GNSS shows it goes (course over ground when fast enough, or the chord between fixes).
+#pragma once
+
+#include "app/numbers.hpp"
+#include "model/gnss_fix_3d.hpp"
+#include "model/planar_pose.hpp"
+#include "nav/ins.hpp"
+
+namespace tetap::app {
+
+class InertialStart {
+ public:
+  /// An IMU sample before the filter runs; true once it is known where down is.
+  bool level(const nav::ImuIncrement& imu, const InertialNumbers& n) {
+    const float dt_s = base::seconds(imu.dt);
+    // The attitude so far turns with the gyroscope, and leans towards where the specific force says up is.
+    turned_ = (turned_ * nav::exp_quaternion(imu.dtheta_b_rad)).renormalised();
+    const nav::Vector3 up_n = turned_.rotate(imu.dv_b_mps);
+    const float norm = base::sqrt(up_n.squaredNorm());
+    if (norm < 3.0F * dt_s) return levelled_s_ >= n.level_s;
+    const float memory_s = levelled_s_ < n.level_s ? levelled_s_ + dt_s : 5.0F * n.level_s;
+    const nav::Vector3 lean = nav::cross(up_n / norm, nav::Vector3{0.0F, 0.0F, 1.0F});
+    const float share = dt_s / memory_s;
+    // Before the first sample anything may be up: the whole turn at once, then ever smaller shares of what is left.
+    turned_ = (nav::exp_quaternion(levelled_s_ > 0.0F ? nav::Vector3(lean * share) : whole_turn(up_n / norm)) * turned_)
+                  .renormalised();
+    still_ += (imu.dtheta_b_rad / dt_s - still_) * share;
+    levelled_s_ += dt_s;
+    return levelled_s_ >= n.level_s;
+  }
+  void place(const model::PlanarPose& pose, float sigma_m, float sigma_yaw_rad) {
+    at_ = {.x = pose.x, .y = pose.y, .z = at_.z, .sigma_horizontal_m = sigma_m, .sigma_vertical_m = 10.0F};
+    placed_ = true;
+    if (sigma_yaw_rad < 1.0F) heading(pose.yaw_rad, sigma_yaw_rad);
+  }
+  void fix(const model::GnssFix3d& fix, base::Micros stamp, float align_distance_m) {
+    const float dt_s = base::seconds(stamp - fixed_at_);
+    if (fixed_ && !has_velocity_ && dt_s > 0.01F && dt_s < 5.0F) {  // between the last two fixes
+      v_n_mps_ = nav::Vector3{fix.x.minus(at_.x), fix.y.minus(at_.y), 0.0F} / dt_s;
+      sigma_v_mps_ = 1.5F * fix.sigma_horizontal_m / dt_s + 2.0F;
+    }
+    fixed_at_ = stamp;
+    if (placed_ && fixed_ && !headed_) {
+      const float east = fix.x.minus(first_.x), north = fix.y.minus(first_.y);
+      const float chord2 = east * east + north * north;
+      const float needed =
+          align_distance_m > 4.0F * fix.sigma_horizontal_m ? align_distance_m : 4.0F * fix.sigma_horizontal_m;
+      if (chord2 > needed * needed) course(east, north, 1.5F * fix.sigma_horizontal_m);
+    }
+    if (!fixed_) first_ = fix;
+    fixed_ = true;
+    at_ = fix;
+    placed_ = true;
+  }
+  void velocity(const nav::Vector3& v_n_mps, float sigma_mps) {
+    has_velocity_ = true;
+    v_n_mps_ = v_n_mps;
+    sigma_v_mps_ = sigma_mps;
+    const float speed2 = v_n_mps(0) * v_n_mps(0) + v_n_mps(1) * v_n_mps(1);
+    if (!headed_ && speed2 > 1.0F && speed2 > 100.0F * sigma_mps * sigma_mps) course(v_n_mps(0), v_n_mps(1), sigma_mps);
+  }
+  void heading(float yaw_rad, float sigma_rad) {
+    yaw_rad_ = yaw_rad;
+    sigma_yaw_rad_ = sigma_rad;
+    headed_ = true;
+  }
+  [[nodiscard]] bool levelling() const { return levelled_s_ > 0.0F; }
+  [[nodiscard]] bool placed() const { return placed_; }
+  [[nodiscard]] bool ready() const { return placed_ && headed_; }
+
+  /// Starts the filter; `again`: it ran before, so tilt and biases are its own.
+  void begin(nav::Ins& ins, const InertialNumbers& n, bool again) {
+    nav::InsState x = again ? ins.x : nav::InsState{};
+    x.x = at_.x, x.y = at_.y, x.z = at_.z;
+    const nav::Quaternion level = again ? ins.x.q_nb : turned_;
+    const float turn = base::wrap_angle(yaw_rad_ - nav::euler(level).yaw_rad);
+    x.q_nb = (nav::exp_quaternion({0.0F, 0.0F, turn}) * level).renormalised();
+    if (!again) x.v_n_mps = v_n_mps_;
+    const float h = at_.sigma_horizontal_m * at_.sigma_horizontal_m, v = at_.sigma_vertical_m * at_.sigma_vertical_m;
+    const float speed = sigma_v_mps_ * sigma_v_mps_, tilt = n.start_tilt_rad * n.start_tilt_rad;
+    const float a = n.accel_turn_on_mps2 * n.accel_turn_on_mps2, g = n.gyro_turn_on_radps * n.gyro_turn_on_radps;
+    ins.start(x, nav::Ins::Covariance::diagonal(
+                     {h, h, v, speed, speed, speed, tilt, tilt, sigma_yaw_rad_ * sigma_yaw_rad_, a, a, a, g, g, g}));
+  }
+  template <class Sink>
+  void each_bit(Sink&& sink) const {
+    sink(turned_.w);
+    sink(turned_.x);
+    sink(turned_.y);
+    sink(turned_.z);
+    sink(levelled_s_);
+    sink(at_.x.um());
+    sink(at_.y.um());
+    sink(yaw_rad_);
+    sink(static_cast<std::uint32_t>((placed_ ? 1U : 0U) | (headed_ ? 2U : 0U) | (fixed_ ? 4U : 0U)));
+  }
+
+ private:
+  /// The turn that brings a unit vector upright; upside down it goes over x.
+  static nav::Vector3 whole_turn(const nav::Vector3& up) {
+    const nav::Vector3 axis = nav::cross(up, nav::Vector3{0.0F, 0.0F, 1.0F});
+    const float s = base::sqrt(axis.squaredNorm());
+    if (s < 1e-3F) return up(2) > 0.0F ? nav::Vector3(nav::Vector3::Zero()) : nav::Vector3{3.14159265F, 0.0F, 0.0F};
+    return axis * (base::atan2(s, up(2)) / s);
+  }
+  /// Forward is the way it goes.
+  void course(float east, float north, float sigma) {
+    const float length = base::sqrt(east * east + north * north);
+    constexpr float kSlip_rad = 0.1F;  // a curve between the fixes, a crab's walk
+    heading(base::atan2(north, east), base::sqrt(sigma * sigma / (length * length) + kSlip_rad * kSlip_rad));
+  }
+
+  nav::Quaternion turned_;
+  nav::Vector3 still_ = nav::Vector3::Zero();
+  float levelled_s_ = 0;
+  model::GnssFix3d at_, first_;
+  nav::Vector3 v_n_mps_ = nav::Vector3::Zero();
+  float sigma_v_mps_ = 3;
+  base::Micros fixed_at_;
+  float yaw_rad_ = 0, sigma_yaw_rad_ = 3;
+  bool placed_ = false, headed_ = false, fixed_ = false, has_velocity_ = false;
+};
+
+}  // namespace tetap::app
