@@ -12,6 +12,7 @@ namespace tetap::model {
 
 struct GnssVelocity3d {
   static constexpr int kDimension = 3;
+  static constexpr bool kDirect = true;
   static constexpr std::array<int, 9> kTouches{3, 4, 5, 6, 7, 8, 12, 13, 14};
 
   nav::Vector3 v_n_mps = nav::Vector3::Zero();  ///< east, north, up
@@ -24,6 +25,8 @@ struct GnssVelocity3d {
   [[nodiscard]] filter::Vector<float, 3> residual(const filter::Vector<float, 3>& z_hat) const {
     return v_n_mps - z_hat;
   }
+  /// Whether there is a lever arm.
+  [[nodiscard]] bool has_rest() const { return !(antenna_b_m.squaredNorm() <= 0.0F); }
   [[nodiscard]] filter::Vector<float, 3> noise() const {
     const float horizontal = sigma_horizontal_mps * sigma_horizontal_mps;
     return {horizontal, horizontal, sigma_vertical_mps * sigma_vertical_mps};

@@ -11,13 +11,14 @@ namespace tetap::model {
 
 struct Height {
   static constexpr int kDimension = 1;
+  static constexpr bool kDirect = true;
   static constexpr std::array<int, 1> kTouches{2};
 
   base::Anchored z;  ///< up, of the body's origin
   float sigma_m = 0;
 
   [[nodiscard]] filter::Vector<float, 1> predict(const nav::InsState& at) const {
-    return filter::Vector<float, 1>{at.z.minus(z)};
+    return filter::Vector<float, 1>{nav::difference(at.z, z)};
   }
   [[nodiscard]] filter::Vector<float, 1> residual(const filter::Vector<float, 1>& z_hat) const { return -z_hat; }
   [[nodiscard]] filter::Vector<float, 1> noise() const { return filter::Vector<float, 1>{sigma_m * sigma_m}; }

@@ -11,6 +11,7 @@ namespace tetap::model {
 
 struct ZeroRate {
   static constexpr int kDimension = 3;
+  static constexpr bool kDirect = true;
   static constexpr std::array<int, 3> kTouches{12, 13, 14};
 
   nav::Vector3 gyro_b_radps = nav::Vector3::Zero();  ///< mean over the standstill

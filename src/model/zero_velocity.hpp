@@ -11,6 +11,7 @@ namespace tetap::model {
 
 struct ZeroVelocity {
   static constexpr int kDimension = 3;
+  static constexpr bool kDirect = true;
   static constexpr std::array<int, 3> kTouches{3, 4, 5};
 
   float sigma_mps = 0;  ///< what may go unnoticed at standstill, per axis

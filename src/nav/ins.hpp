@@ -3,8 +3,8 @@
 // increment, covariance prediction whenever the caller wants one, measurements through the update all filters share.
 #pragma once
 
+#include "filter/sparse_update.hpp"
 #include "filter/state.hpp"
-#include "filter/update.hpp"
 #include "nav/ins_covariance.hpp"
 #include "nav/strapdown.hpp"
 
@@ -36,10 +36,8 @@ class Ins {
   [[nodiscard]] ImuVerdict predict(const ImuIncrement& imu) {
     const ImuVerdict verdict = imu.check();
     if (verdict != ImuVerdict::kAccepted) return verdict;
-    InsState moved = x;
-    const StrapdownStep step = strapdown(moved, imu, earth);
-    if (!(moved.v_n_mps.squaredNorm() < kMostSpeed_mps * kMostSpeed_mps)) return ImuVerdict::kDiverged;
-    x = moved;
+    if (!(x.v_n_mps.squaredNorm() < kMostSpeed_mps * kMostSpeed_mps)) return ImuVerdict::kDiverged;
+    const StrapdownStep step = strapdown(x, imu, earth);
     pending_.dt_s += step.dt_s;
     pending_.dv_n_mps += step.dv_n_mps;
     pending_.r_dt += step.r_nb * step.dt_s;
@@ -52,16 +50,19 @@ class Ins {
     if (!(pending_.dt_s > 0.0F)) return;
     const float dt_s = pending_.dt_s;
     const auto variance = [dt_s](float density) { return density * density * dt_s; };
-    const auto keep = [dt_s](float time_s) { return time_s > dt_s ? 1.0F - dt_s / time_s : 1.0F; };
     const float more = vibration > 1.0F && vibration < 1e4F ? vibration : 1.0F;
     pending_.var_v = variance(more * noise.accel_mps2_rthz);
     pending_.var_theta = variance(more * noise.gyro_radps_rthz);
     pending_.var_b_a = variance(noise.accel_bias_mps3_rthz);
     pending_.var_b_g = variance(noise.gyro_bias_radps2_rthz);
-    pending_.keep_b_a = keep(noise.accel_bias_time_s);
-    pending_.keep_b_g = keep(noise.gyro_bias_time_s);
-    x.b_a_mps2 *= pending_.keep_b_a;
-    x.b_g_radps *= pending_.keep_b_g;
+    if (noise.accel_bias_time_s > dt_s) {
+      pending_.keep_b_a = 1.0F - dt_s / noise.accel_bias_time_s;
+      x.b_a_mps2 *= pending_.keep_b_a;
+    }
+    if (noise.gyro_bias_time_s > dt_s) {
+      pending_.keep_b_g = 1.0F - dt_s / noise.gyro_bias_time_s;
+      x.b_g_radps *= pending_.keep_b_g;
+    }
     if (noise.motion_sigma > 0.0F) keep_motion(pending_);
     nav::predict_covariance(p, pending_);
     pending_ = {};
@@ -89,24 +90,26 @@ class Ins {
   template <filter::MeasurementModel<InsState> Measurement>
   [[nodiscard]] filter::Innovation<float, Measurement::kDimension> update(const Measurement& measurement, float gate) {
     constexpr int kM = Measurement::kDimension;
-    predict_covariance();
-    filter::Linearised<float, kM, static_cast<int>(Measurement::kTouches.size())> at;
-    if constexpr (requires { measurement.linearised(x); }) {
-      at = measurement.linearised(x);
-    } else {
-      at = {.z_hat = measurement.predict(x), .h = measurement.jacobian(x)};
+    if (pending_.dt_s > 0.0F) predict_covariance();
+    filter::SparseUpdate<float, kErrors, kM> result;
+    constexpr int kColumns = static_cast<int>(Measurement::kTouches.size());
+    bool rest = !filter::Direct<Measurement> || kColumns > kM;
+    if constexpr (requires { measurement.has_rest(); }) rest = measurement.has_rest();
+    if (rest) {
+      filter::Linearised<float, kM, kColumns> at;
+      if constexpr (requires { measurement.linearised(x); }) {
+        at = measurement.linearised(x);
+      } else {
+        at = {.z_hat = measurement.predict(x), .h = measurement.jacobian(x)};
+      }
+      filter::sparse_update<Measurement>(p, at.h, measurement.residual(at.z_hat), measurement.noise(), gate, result);
+    } else if constexpr (filter::Direct<Measurement>) {
+      filter::group_update<Measurement>(p, measurement.residual(measurement.predict(x)), measurement.noise(), gate,
+                                        result);
     }
-    const auto result = filter::update<float, kErrors, kM, Measurement::kTouches.size()>(
-        p, at.h, Measurement::kTouches, measurement.residual(at.z_hat), measurement.noise(), gate);
     if (result.innovation.verdict != filter::Verdict::kAccepted) return result.innovation;
-    x = x.plus(result.dx);
-    // A measurement 10^4 times as sharp as the prediction leaves few digits of P.
-    const auto variances = measurement.noise();
-    for (int m = 0; m < kM; ++m) {
-      if (variances(m) > 1e-4F * result.innovation.s(m, m)) continue;
-      condition(p);
-      break;
-    }
+    x.correct(result.dx);
+    if (result.sharp && !condition(p)) ++conditioned_;
     return result.innovation;
   }
 
@@ -114,8 +117,9 @@ class Ins {
   void start(const InsState& at, const Covariance& covariance) {
     x = at;
     p = covariance;
+    condition(p);
     pending_ = {};
-    since_ = 0;
+    watch_ = {};
   }
 
   /// How often the covariance had to be put right (see condition()).
@@ -125,7 +129,6 @@ class Ins {
   static constexpr float kMostSpeed_mps = 1000.0F;
   static constexpr std::int64_t kGapStep_us = 100'000, kMostGap_us = 60'000'000;
   static constexpr float kGapStep_s = 0.1F;
-  static constexpr std::uint32_t kEvery = 16;
 
   /// Sensor noise taken for acceleration would let the filter believe that it sees its heading at standstill: v gains
   /// theta x (dv + noise), and every noisy sample looks like a known push whose direction was then observed. The
@@ -138,16 +141,18 @@ class Ins {
     step.dv_n_mps(1) *= share;
   }
 
-  /// The check costs as much as a prediction, so it is made now and then; what rounding does in between is far below
-  /// its margin.
+  /// Looks after the condition of P a little at every step: a round takes 102 of them, and rounding takes several
+  /// hundred to use up the margin. Only when it fails the whole is done at once.
   void maintain() {
-    if (++since_ < kEvery) return;
-    since_ = 0;
-    if (!condition(p)) ++conditioned_;
+    if (watch_.idle()) return watch_.begin(p);
+    if (watch_.advance(8) != InsFactor::Progress::kBad) return;
+    condition(p);
+    ++conditioned_;
+    watch_ = {};
   }
 
   InsCovarianceStep<float> pending_{};
-  std::uint32_t since_ = 0;
+  InsFactor watch_{};
   std::uint32_t conditioned_ = 0;
 };
 

@@ -9,21 +9,39 @@
 
 namespace tetap::nav {
 
+namespace detail {
+
+/// The whole metres of m go into the anchor, the rest comes back; both exact. Beyond 2e9 m (and NaN): nothing is left.
+constexpr float carry(base::Anchored& coordinate, float m) {
+  if (!(m < 2e9F && m > -2e9F)) return 0.0F;
+  const auto whole = static_cast<std::int32_t>(m);
+  coordinate.anchor_um += std::int64_t{whole} * 1'000'000;
+  return m - static_cast<float>(whole);
+}
+[[gnu::noinline]] constexpr void move_far(base::Anchored& coordinate, float d_m) {
+  coordinate.offset_m = carry(coordinate, coordinate.offset_m + carry(coordinate, d_m));
+}
+
+}  // namespace detail
+
 /// Moves a coordinate by d metres, |d| < 2e9, and keeps its offset within one metre: a float step of 60 nm, so that at
-/// 400 Hz a creep of 1 mm/s still adds up (in an offset of 100 m it would be rounded away). Whole metres are exact in
-/// both parts.
+/// 400 Hz a creep of 1 mm/s still adds up (in an offset of 100 m it would be rounded away).
 constexpr void move(base::Anchored& coordinate, float d_m) {
-  const auto carry = [&](float m) {
-    const auto whole = static_cast<std::int32_t>(m);
-    coordinate.anchor_um += std::int64_t{whole} * 1'000'000;
-    return m - static_cast<float>(whole);
-  };
-  if (d_m > 1.0F || d_m < -1.0F) d_m = d_m < 2e9F && d_m > -2e9F ? carry(d_m) : 0.0F;
-  coordinate.offset_m += d_m;
-  if (coordinate.offset_m > 1.0F || coordinate.offset_m < -1.0F) {
-    const float offset = coordinate.offset_m;
-    coordinate.offset_m = offset < 2e9F && offset > -2e9F ? carry(offset) : 0.0F;
+  const float offset_m = coordinate.offset_m + d_m;
+  if (offset_m <= 1.0F && offset_m >= -1.0F) {
+    coordinate.offset_m = offset_m;
+  } else {
+    detail::move_far(coordinate, d_m);
   }
+}
+
+/// a minus b in metres: the bits of a.minus(b), without its division of 64 bits where 32 are enough (2 km).
+[[nodiscard]] constexpr float difference(const base::Anchored& a, const base::Anchored& b) {
+  const std::int64_t um = a.anchor_um - b.anchor_um;
+  const auto low = static_cast<std::int32_t>(um);
+  if (low != um) return a.minus(b);
+  return (static_cast<float>(low / 1'000'000) + static_cast<float>(low % 1'000'000) * 1e-6F) +
+         (a.offset_m - b.offset_m);
 }
 
 struct InsState {
@@ -39,20 +57,23 @@ struct InsState {
   Vector3 b_a_mps2 = Vector3::Zero();   ///< in b; the sensor shows specific force + bias
   Vector3 b_g_radps = Vector3::Zero();  ///< in b
 
+  void correct(const Error& dx) {
+    move(x, dx(0));
+    move(y, dx(1));
+    move(z, dx(2));
+    v_n_mps += dx.segment<3>(kVelocity);
+    q_nb = (exp_quaternion(dx.segment<3>(kAttitude)) * q_nb).renormalised();
+    b_a_mps2 += dx.segment<3>(kAccelBias);
+    b_g_radps += dx.segment<3>(kGyroBias);
+  }
   [[nodiscard]] InsState plus(const Error& dx) const {
     InsState moved = *this;
-    move(moved.x, dx(0));
-    move(moved.y, dx(1));
-    move(moved.z, dx(2));
-    moved.v_n_mps += dx.segment<3>(kVelocity);
-    moved.q_nb = (exp_quaternion(dx.segment<3>(kAttitude)) * q_nb).renormalised();
-    moved.b_a_mps2 += dx.segment<3>(kAccelBias);
-    moved.b_g_radps += dx.segment<3>(kGyroBias);
+    moved.correct(dx);
     return moved;
   }
   [[nodiscard]] Error minus(const InsState& other) const {
     Error dx;
-    dx.segment<3>(kPosition) << x.minus(other.x), y.minus(other.y), z.minus(other.z);
+    dx.segment<3>(kPosition) << difference(x, other.x), difference(y, other.y), difference(z, other.z);
     dx.segment<3>(kVelocity) = v_n_mps - other.v_n_mps;
     dx.segment<3>(kAttitude) = log_quaternion(q_nb * other.q_nb.conjugate());
     dx.segment<3>(kAccelBias) = b_a_mps2 - other.b_a_mps2;

@@ -7,7 +7,12 @@
 #include "filter/kalman.hpp"
 #include "markers.hpp"
 #include "model/constant_velocity.hpp"
+#include "model/gnss_fix_3d.hpp"
+#include "model/gnss_velocity_3d.hpp"
 #include "model/range_bearing.hpp"
+#include "model/wheel_speed.hpp"
+#include "nav/ins.hpp"
+#include "nav/preintegration.hpp"
 #include "recorded_world.hpp"
 
 #if defined(TETAP_BOARD_ZYNQMP_R5)
@@ -144,6 +149,99 @@ void dead_reckoning() {
   opaque(motion);
 }
 
+/// Inertial navigation at 100 Hz: strapdown, covariance, three velocities and three positions every step, each three
+/// with its joint gate; a rover that speeds up, brakes and turns. Then the parts one by one, with a lever arm.
+void inertial() {
+  struct Input {
+    nav::ImuIncrement imu;
+    model::GnssVelocity3d velocity;
+    model::GnssFix3d fix;
+  };
+  static std::array<Input, kSteps> inputs;
+  Noise noise;
+  nav::InsState truth;
+  const nav::Earth earth;
+  const auto noisy = [&noise](float sigma) { return nav::Vector3{sigma * noise(), sigma * noise(), sigma * noise()}; };
+  for (std::size_t k = 0; k < kSteps; ++k) {
+    const float t_s = 0.01F * static_cast<float>(k);
+    const nav::Vector3 w_b_radps{0.0F, 0.0F, 0.5F * base::sin(2.0F * t_s)};
+    const nav::Vector3 f_b_mps2{base::cos(t_s), w_b_radps(2) * truth.v_n_mps.norm(), earth.gravity_mps2};
+    const base::Micros dt{10'000};
+    nav::strapdown(truth, nav::ImuIncrement::constant(w_b_radps, f_b_mps2, dt), earth);
+    Input& input = inputs[k];
+    input.imu = nav::ImuIncrement::constant(w_b_radps + noisy(0.015F), f_b_mps2 + noisy(0.35F), dt);
+    input.velocity = {.v_n_mps = truth.v_n_mps + noisy(0.3F), .sigma_horizontal_mps = 0.3F, .sigma_vertical_mps = 0.3F};
+    const nav::Vector3 error_m = noisy(0.5F);
+    input.fix = {.x = truth.x.plus(error_m(0)),
+                 .y = truth.y.plus(error_m(1)),
+                 .z = truth.z.plus(error_m(2)),
+                 .sigma_horizontal_m = 0.5F,
+                 .sigma_vertical_m = 0.5F};
+  }
+  const auto begin = [] {
+    nav::Ins ins;
+    ins.noise = {.gyro_radps_rthz = 0.0015F, .accel_mps2_rthz = 0.035F};
+    ins.start({}, nav::Ins::Covariance::diagonal(
+                      {1, 1, 1, 0.1F, 0.1F, 0.1F, 0.01F, 0.01F, 0.1F, 0.01F, 0.01F, 0.01F, 1e-5F, 1e-5F, 1e-5F}));
+    return ins;
+  };
+  const float gate = filter::chi_square_99(3);
+  static nav::Ins ins;
+  ins = begin();
+  for (const Input& input : inputs) {
+    const Region<struct w5_ins> region;
+    static_cast<void>(ins.predict(input.imu));
+    ins.predict_covariance();
+    static_cast<void>(ins.update(input.velocity, gate));
+    static_cast<void>(ins.update(input.fix, gate));
+  }
+  opaque(ins);
+  static nav::ImuChunk chunk;
+  ins = begin();
+  chunk = nav::ImuChunk::with_biases_of(ins.x);
+  for (Input& input : inputs) {
+    input.fix.antenna_b_m = input.velocity.antenna_b_m = {0.3F, -0.1F, 0.8F};
+    input.velocity.gyro_b_radps = {0.0F, 0.01F, 0.3F};
+    {
+      const Region<struct ins_strapdown> region;
+      static_cast<void>(ins.predict(input.imu));
+    }
+    {
+      const Region<struct ins_covariance> region;
+      ins.predict_covariance();
+    }
+    {
+      const Region<struct ins_velocity> region;
+      static_cast<void>(ins.update(input.velocity, 1e9F));
+    }
+    {
+      const Region<struct ins_fix> region;
+      static_cast<void>(ins.update(input.fix, 1e9F));
+    }
+    {
+      const Region<struct ins_wheels> region;
+      static_cast<void>(ins.update(model::WheelSpeed{.forward_mps = 1.0F,
+                                                     .sigma_forward_mps = 0.1F,
+                                                     .sigma_lateral_mps = 0.1F,
+                                                     .sigma_vertical_mps = 0.1F,
+                                                     .axle_b_m = {-0.2F, 0.0F, 0.0F},
+                                                     .gyro_b_radps = input.velocity.gyro_b_radps},
+                                   1e9F));
+    }
+    {
+      const Region<struct ins_chunk_add> region;
+      chunk.add(input.imu);
+    }
+    nav::InsState now;
+    {
+      const Region<struct ins_chunk_apply> region;
+      now = chunk.apply(ins.x, earth);
+    }
+    opaque(now);
+  }
+  opaque(ins);
+}
+
 /// One call each, arguments as filters have them.
 void functions() {
   static std::array<float, kSteps> angle, first, second;
@@ -217,6 +315,7 @@ int main() {
   count::calibrate();
   constant_velocity();
   planar();
+  inertial();
   dead_reckoning();
   functions();
   whole_node();

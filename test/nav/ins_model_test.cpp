@@ -163,6 +163,36 @@ TYPED_TEST(InsMeasurementLaws, APerfectMeasurementLeavesTheStateAndShrinksTheCov
   }
 }
 
+/// The update made for many states against the one all filters share, from a covariance with every correlation.
+TYPED_TEST(InsMeasurementLaws, IsFusedAsTheSharedUpdateDoesIt) {
+  constexpr int kM = TypeParam::kDimension;
+  test::Normal normal(11);
+  for (const InsState& x : states()) {
+    filter::Symmetric<float, 15> p;
+    Eigen::Matrix<double, 15, 15> a;
+    for (int i = 0; i < 225; ++i) a(i / 15, i % 15) = normal();
+    const Eigen::Matrix<double, 15, 15> full = 0.01 * a * a.transpose();
+    p = filter::Symmetric<float, 15>::upper_of(full.cast<float>());
+    auto m = Example<TypeParam>::at(x);
+    for (const bool lever : {true, false}) {
+      if constexpr (requires { m.antenna_b_m; }) {
+        if (!lever) m.antenna_b_m.setZero();
+      }
+      filter::Symmetric<float, 15> p_shared = p;
+      const auto shared = filter::update<float, 15, kM, TypeParam::kTouches.size()>(
+          p_shared, m.jacobian(x), TypeParam::kTouches, m.residual(m.predict(x)), m.noise(), 1e9F);
+      nav::Ins ins;
+      ins.start(x, p);
+      const auto record = ins.update(m, 1e9F);
+      ASSERT_EQ(record.verdict, filter::Verdict::kAccepted);
+      EXPECT_NEAR(record.nis, shared.innovation.nis, 1e-4F * (1 + shared.innovation.nis));
+      EXPECT_LT((record.s.dense() - shared.innovation.s.dense()).norm(), 1e-5F * shared.innovation.s.dense().norm());
+      EXPECT_LT((ins.x.minus(x) - shared.dx).norm(), 1e-4F * (1 + shared.dx.norm()));
+      EXPECT_LT((ins.p.dense() - p_shared.dense()).norm(), 1e-5F * p.dense().norm());
+    }
+  }
+}
+
 TYPED_TEST(InsMeasurementLaws, FarFromTheOriginItSeesTheSame) {
   for (const InsState& x : states()) {
     const auto near = Example<TypeParam>::at(x);

@@ -173,7 +173,7 @@ TEST(Ins, ZeroAndHugeCovariancesAndPerfectSensorsLeaveItFinite) {
 }
 
 TEST(Ins, TheFilterIsSmall) {
-  EXPECT_LE(sizeof(Ins), 1024U);
+  EXPECT_LE(sizeof(Ins), 1280U);
   EXPECT_LE(sizeof(InsState), 104U);
 }
 
