@@ -25,7 +25,7 @@ class Attitude {
   [[nodiscard]] AttitudeVerdict step(const Vector3& w_b_radps, const Vector3& f_b_mps2, float dt_s) {
     const float w2 = dot(w_b_radps, w_b_radps);
     const float f2 = dot(f_b_mps2, f_b_mps2);
-    if (!(dt_s > 0.0F && dt_s <= kLongest_s && w2 <= kFastest_radps * kFastest_radps && f2 < base::kInfinity))
+    if (!(dt_s >= kShortest_s && dt_s <= kLongest_s && w2 <= kFastest_radps * kFastest_radps && f2 < base::kInfinity))
       return AttitudeVerdict::kRefused;
     const float most = o_.accelerometer_limit_mps2;
     const bool usable = f2 > kLeastForce_mps2 * kLeastForce_mps2 && f2 < most * most;
@@ -48,6 +48,7 @@ class Attitude {
   bool magnetometer(const Vector3& m_b, float dt_s) {
     const float m2 = dot(m_b, m_b);
     if (!started_ || !(m2 > 0.0F && m2 < base::kInfinity) || !(dt_s > 0.0F)) return false;
+    if (off_ && heading_.known()) return true;  // a heading would only be as good as the level
     const bool turning = !within(rest_.rate_b_radps(), o_.field_motion_radps);
     heading_.step(o_, Rows(q_lb_) * m_b, turning, dt_s < 1.0F ? dt_s : 1.0F);
     return true;
@@ -64,7 +65,7 @@ class Attitude {
   [[nodiscard]] bool accelerometer_disturbed() const { return off_; }
 
  private:
-  static constexpr float kLongest_s = 0.2F, kFastest_radps = 100.0F, kLeastForce_mps2 = 0.1F;
+  static constexpr float kShortest_s = 1e-6F, kLongest_s = 0.2F, kFastest_radps = 100.0F, kLeastForce_mps2 = 0.1F;
 
   [[nodiscard]] static bool inside(const Vector3& v, float limit) {
     return base::abs(v(0)) < limit && base::abs(v(1)) < limit && base::abs(v(2)) < limit;
@@ -76,14 +77,14 @@ class Attitude {
     heading_.average_anew(o_.relevel_s);
   }
 
-  void level(const Vector3& f_b, float dt_s) {
+  [[gnu::always_inline]] inline void level(const Vector3& f_b, float dt_s) {
     const Rows r(q_lb_);
     const Vector3 f_l = r * f_b;
     float share = 0.0F;
     if (age_s_ <
         o_.tau_inclination_s) {  // a mean over what there is, so that the first second is as good as its samples
       age_s_ += dt_s;
-      share = dt_s / age_s_;
+      share = age_s_ > 2.0F * dt_s ? 2.0F * dt_s / age_s_ : 1.0F;  // the last samples count most
       up_.value += share * (f_l - up_.value);
     } else {
       up_.step(f_l, LowPass<3>::factor(o_.tau_inclination_s, dt_s));
@@ -105,19 +106,18 @@ class Attitude {
       const float cut = far ? 0.0F : most / base::sqrt(tilt2);
       x *= cut;
       y *= cut;
-    } else if (off_) {
-      held_s_ = 0.0F;
-      average_anew();
-    } else {
+    } else if (!off_) {
       held_s_ = held_s_ > dt_s ? held_s_ - dt_s : 0.0F;
     }
-    const float rate = 1.0F / dt_s;
-    bias_.step(o_, r, {.x_radps = rate * x, .y_radps = rate * y, .usable = !off_, .average_share = share}, rest_, dt_s);
+    // What is turned back at the start and after a disturbance is not the bias.
+    calm_s_ = off_ || share > 0.0F ? 0.0F : calm_s_ < o_.tau_inclination_s ? calm_s_ + dt_s : calm_s_;
+    bias_.step(o_, r, {.x_rad = x, .y_rad = y, .usable = calm_s_ >= o_.tau_inclination_s, .average_share = share},
+               rest_, dt_s);
     if (!hold) turn_level(x, y);
   }
 
   /// Turns the level axes by (x, y, 0): q and what is carried in them.
-  void turn_level(float x, float y) {
+  [[gnu::always_inline]] inline void turn_level(float x, float y) {
     const Quaternion q = q_lb_;
     const float hx = 0.5F * x, hy = 0.5F * y;
     q_lb_ = Quaternion{q.w - (hx * q.x + hy * q.y), q.x + (hx * q.w + hy * q.z), q.y + (hy * q.w - hx * q.z),
@@ -136,7 +136,7 @@ class Attitude {
   RestDetector rest_;
   GyroscopeBias bias_;
   MagneticHeading heading_;
-  float age_s_ = 0.0F, held_s_ = 0.0F;
+  float age_s_ = 0.0F, held_s_ = 0.0F, calm_s_ = 0.0F;
   bool started_ = false, off_ = false;
 };
 

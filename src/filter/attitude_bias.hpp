@@ -13,7 +13,8 @@ namespace tetap::filter {
 /// At rest: gyroscope and accelerometer have stayed near their own low-passed values for a while.
 class RestDetector {
  public:
-  void step(const AttitudeOptions& o, const Vector3& w_b_radps, const Vector3& f_b_mps2, float dt_s) {
+  [[gnu::always_inline]] inline void step(const AttitudeOptions& o, const Vector3& w_b_radps, const Vector3& f_b_mps2,
+                                          float dt_s) {
     if (!started_) rate_.start(w_b_radps), force_.start(f_b_mps2), started_ = true;
     const float k = LowPass<3>::factor(o.tau_rest_s, dt_s);
     rate_.step(w_b_radps, k);
@@ -45,15 +46,16 @@ class GyroscopeBias {
         rest_(square(square(o.bias_rest_sigma_radps)) / walk_),
         limit_(o.bias_limit_radps) {}
 
-  /// What the levelling did in a step: the rate at which it turned the attitude about the horizontal axes of n.
+  /// What the levelling did in a step: how far it turned the attitude about the horizontal axes of n.
   struct Levelling {
-    float x_radps, y_radps;
+    float x_rad, y_rad;
     bool usable;          ///< neither limited nor held
     float average_share;  ///< of a step in the mean that starts the low-pass; 0 when the low-pass runs
   };
 
   /// A fifth of the work per step, in turns, each as if for five steps: what is compared is low-passed over seconds.
-  void step(const AttitudeOptions& o, const Rows& r, const Levelling& levelling, const RestDetector& rest, float dt_s) {
+  [[gnu::always_inline]] inline void step(const AttitudeOptions& o, const Rows& r, const Levelling& levelling,
+                                          const RestDetector& rest, float dt_s) {
     phase_ = phase_ < 4 ? phase_ + 1 : 0;
     const float span_s = 5.0F * dt_s;
     if (phase_ == 0) bias_ = {limited(bias_(0)), limited(bias_(1)), limited(bias_(2))};
@@ -62,12 +64,13 @@ class GyroscopeBias {
     if (phase_ == 2) grow(span_s);
     const int axis = phase_ - 2;
     if (rest.at_rest()) {
-      update({axis == 0 ? 1.0F : 0.0F, axis == 1 ? 1.0F : 0.0F, axis == 2 ? 1.0F : 0.0F}, rest.rate_b_radps()(axis),
-             rest_, span_s);
+      const Vector3 h{axis == 0 ? 1.0F : 0.0F, axis == 1 ? 1.0F : 0.0F, axis == 2 ? 1.0F : 0.0F};
+      update(h, rest.rate_b_radps()(axis), rest_, span_s);
+    } else if (levelling.usable && axis == 2) {
+      update(r.z, 0.0F, vertical_, span_s);
     } else if (levelling.usable) {
-      if (axis == 0) update(x_.row(), x_.along() - levelling.x_radps, motion_, span_s);
-      if (axis == 1) update(y_.row(), y_.along() - levelling.y_radps, motion_, span_s);
-      if (axis == 2) update(r.z, 0.0F, vertical_, span_s);
+      const Lagged& lagged = axis == 0 ? x_ : y_;
+      update(lagged.row(), lagged.along() - (axis == 0 ? levelling.x_rad : levelling.y_rad) / dt_s, motion_, span_s);
     }
   }
 

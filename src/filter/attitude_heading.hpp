@@ -23,33 +23,38 @@ class MagneticHeading {
     const float h2 = m_l(0) * m_l(0) + m_l(1) * m_l(1);
     const float horizontal = base::sqrt(h2);
     if (!(horizontal > 0.0F)) return;
-    check_field(o, {horizontal, m_l(2)}, turning, dt_s);
+    // Strength and dip say nothing while the level is still being found.
+    if (average_s_ >= kSettled_s || !started_) check_field(o, {horizontal, m_l(2)}, turning, dt_s);
     const float gain = weight(o, dt_s);
     if (!(gain > 0.0F)) return;
     // Cosine and sine of the turn that brings the field to where the declination says, by the half-angle formula
     // t = tan(turn/2): a share of a turn is that share of t, exact for all of it and for small ones.
-    const float east = cos_ * m_l(0) - sin_ * m_l(1);
-    const float north = sin_ * m_l(0) + cos_ * m_l(1);
+    const float c = half_.cos * half_.cos - half_.sin * half_.sin;
+    const float s = 2.0F * half_.cos * half_.sin;
+    const float east = c * m_l(0) - s * m_l(1);
+    const float north = s * m_l(0) + c * m_l(1);
     const float sine = east * declination_.cos - north * declination_.sin;
     const float cosine = horizontal + (east * declination_.sin + north * declination_.cos);
-    const float most = kMostHalfTan * cosine;
-    const float half_tan = sine > most ? kMostHalfTan : sine < -most ? -kMostHalfTan : sine / cosine;
+    // Nearly opposite a share of t would be most of the turn; the start alone goes all the way.
+    const float most = gain < 1.0F ? 4.0F : 1e5F;
+    const float limit = most * cosine;
+    const float half_tan = sine >= limit ? most : sine <= -limit ? -most : sine / cosine;
     turn(gain * half_tan);
   }
 
   /// What the gyroscope carried is lost: a mean over the samples again, as if it had begun age_s ago.
-  void average_anew(float age_s) { average_s_ = age_s; }
+  void average_anew(float age_s) {
+    average_s_ = age_s;
+    rejected_s_ = undisturbed_s_ = 0.0F;
+    disturbed_ = false;
+  }
 
   [[nodiscard]] bool known() const { return started_; }
   [[nodiscard]] bool disturbed() const { return disturbed_; }
   [[nodiscard]] float disturbed_s() const { return rejected_s_; }
   /// Level axes to n: the turn about the vertical, then q.
   [[nodiscard]] Quaternion turned(const Quaternion& q_lb) const {
-    // Half the angle without trigonometry; either form keeps the root away from zero.
-    const bool ahead = cos_ > 0.0F;
-    const float large = ahead ? 1.0F + cos_ : 1.0F - cos_;
-    const float scale = 1.0F / base::sqrt(large * large + sin_ * sin_);
-    const float w = scale * (ahead ? large : sin_), z = scale * (ahead ? sin_ : large);
+    const float w = half_.cos, z = half_.sin;
     return {w * q_lb.w - z * q_lb.z, w * q_lb.x - z * q_lb.y, w * q_lb.y + z * q_lb.x, w * q_lb.z + z * q_lb.w};
   }
 
@@ -65,7 +70,8 @@ class MagneticHeading {
   }
 
   /// Half of the work per sample, in turns: against the reference, and towards the next one.
-  void check_field(const AttitudeOptions& o, const Field& sample, bool turning, float dt_s) {
+  [[gnu::always_inline]] inline void check_field(const AttitudeOptions& o, const Field& sample, bool turning,
+                                                 float dt_s) {
     if (!started_) field_.start(sample), candidate_ = sample;
     const float span_s = 2.0F * dt_s;
     const float share = span_s / (o.tau_reference_s + span_s);
@@ -131,26 +137,22 @@ class MagneticHeading {
     rejected_s_ = rejected_s_ > 2.0F * dt_s ? rejected_s_ - 2.0F * dt_s : 0.0F;
     if (average_s_ >= o.tau_heading_s) return steady;
     average_s_ += dt_s;
-    return dt_s / average_s_;
+    return average_s_ > 3.0F * dt_s ? 3.0F * dt_s / average_s_ : 1.0F;  // the last samples count most
   }
 
   /// By an angle given as the tangent of its half.
   void turn(float half_tan) {
-    const float t2 = half_tan * half_tan;
-    const float scale = 1.0F / (1.0F + t2);
-    const float by_cos = (1.0F - t2) * scale, by_sin = (half_tan + half_tan) * scale;
-    const float c = cos_ * by_cos - sin_ * by_sin;
-    const float s = sin_ * by_cos + cos_ * by_sin;
-    const float unit = 1.5F - 0.5F * (c * c + s * s);
-    cos_ = c * unit;
-    sin_ = s * unit;
+    const float c = half_.cos - half_.sin * half_tan;
+    const float s = half_.sin + half_.cos * half_tan;
+    const float scale = 1.0F / base::sqrt(c * c + s * s);
+    half_ = {.sin = s * scale, .cos = c * scale};
   }
 
-  static constexpr float kMostHalfTan = 1e4F;  ///< all but 0.01 degrees of half a turn
+  static constexpr float kSettled_s = 1.0F;
   float norm2_low_, norm2_high_;
   float tan_dip_;
   base::SinCos declination_;
-  float cos_ = 1.0F, sin_ = 0.0F;
+  base::SinCos half_{.sin = 0.0F, .cos = 1.0F};  ///< of half the heading of the level axes
   LowPass<2> field_;
   Field reference_ = Field::Zero(), candidate_ = Field::Zero();
   float undisturbed_s_ = 0.0F, candidate_s_ = 0.0F, rejected_s_ = 0.0F, average_s_ = 0.0F, moved_s_ = 0.0F;

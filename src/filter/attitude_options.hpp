@@ -17,7 +17,7 @@ struct AttitudeOptions {
   /// this is neither and is followed no faster ...
   float inclination_limit_radps = 3.0F * kDegree;
   /// ... and not at all when that has left it this far off, but for a time; then it is believed.
-  float inclination_reject_rad = 6.0F * kDegree;
+  float inclination_reject_rad = 3.0F * kDegree;
   float inclination_hold_s = 10.0F;
   /// A gyroscope at the end of its range (2000 degrees/s less 2 %) has lost the attitude: the mean over the slow
   /// sensors begins anew, as if it were this old.
