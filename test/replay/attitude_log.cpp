@@ -54,8 +54,9 @@ class Madgwick {
   std::array<double, 4> q{1, 0, 0, 0};  ///< body to (north, west, up)
 
   void step(const Row& row, bool nine) {
-    const double dt = row.dt_s;
-    const std::array<double, 4> omega{0, row.gyro[0], row.gyro[1], row.gyro[2]};
+    const auto dt = static_cast<double>(row.dt_s);
+    const std::array<double, 4> omega{0, static_cast<double>(row.gyro[0]), static_cast<double>(row.gyro[1]),
+                                      static_cast<double>(row.gyro[2])};
     std::array<double, 4> rate = product(q, omega);
     for (double& r : rate) r *= 0.5;
     std::array<double, 4> gradient{};
@@ -88,7 +89,8 @@ class Madgwick {
         a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1], a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0]};
   }
   static std::array<double, 3> unit(const std::array<float, 3>& v) {
-    const double x = v[0], y = v[1], z = v[2], n = std::sqrt(x * x + y * y + z * z);
+    const auto x = static_cast<double>(v[0]), y = static_cast<double>(v[1]), z = static_cast<double>(v[2]);
+    const double n = std::sqrt(x * x + y * y + z * z);
     return {x / n, y / n, z / n};
   }
   static Matrix matrix(const std::array<double, 4>& p) {
