@@ -19,6 +19,7 @@ struct SetPose {
   model::PlanarPose pose;
   float sigma_position_m = 0;
   float sigma_yaw_rad = 0;
+  std::uint8_t counter = 0;  ///< of the command it came with
 };
 
 }  // namespace tetap::app

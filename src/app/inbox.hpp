@@ -41,15 +41,27 @@ class Inbox {
 
   void power_on() {
     for (Partial& partial : partials_) partial.missing = 0;
-    set_pos_.reset();
-    set_yaw_.reset();
+    halves_ = {};
     last_counter_.fill(0xFF);
   }
 
-  /// At each tick: half samples older than `patience` are given up and counted.
+  /// At each tick: half samples and half commands older than `patience`, or from a time still to come, are given up
+  /// and counted.
   void expire(base::Micros now, base::Micros patience, Counters& counters) {
+    const auto old = [&](base::Micros since) { return now - since > patience || since > now; };
     for (Partial& partial : partials_)
-      if (partial.missing != 0 && now - partial.since > patience) partial.missing = 0, ++counters.incomplete;
+      if (partial.missing != 0 && old(partial.since)) give_up(partial, counters);
+    for (PoseHalves& halves : halves_)
+      if (halves.waits() && old(halves.since)) {
+        halves = {};
+        ++counters.command_refused;
+      }
+  }
+  /// Time has jumped: whatever is half belongs to another time.
+  void forget(Counters& counters) {
+    for (Partial& partial : partials_)
+      if (partial.missing != 0) give_up(partial, counters);
+    halves_ = {};
   }
 
  private:
@@ -59,7 +71,19 @@ class Inbox {
     std::uint8_t missing = 0;
     base::Micros since;
   };
-  static constexpr base::Micros kImuPatience{20'000};
+  /// A set-pose command of which one frame is there.
+  struct PoseHalves {
+    std::optional<can::CmdSetPos> position;
+    std::optional<can::CmdSetYaw> yaw;
+    std::uint8_t counter = 0;
+    base::Micros since;
+    [[nodiscard]] constexpr bool waits() const { return position.has_value() || yaw.has_value(); }
+  };
+  static void give_up(Partial& partial, Counters& counters) {
+    partial.missing = 0;
+    ++counters.incomplete;
+  }
+  static constexpr base::Micros kImuPatience{50'000};
   static constexpr std::uint8_t kImuFrames = 0b111, kPositionFrames = 0b1111, kVelocityFrames = 0b11;
 
   Partial& slot(can::Sensor sensor, std::uint8_t instance, std::uint8_t sequence, std::uint8_t frames,
@@ -73,11 +97,10 @@ class Inbox {
   void gnss(const base::CanFrame& frame, can::Sensor sensor, std::uint8_t frames, std::uint8_t frame_bit,
             std::uint32_t bits, base::Micros reference, Counters& counters, Out& out, Fill&& fill);
   template <class Out>
-  void command(std::uint8_t offset, const base::CanFrame& frame, Counters& counters, Out& out);
+  void command(std::uint8_t offset, const base::CanFrame& frame, base::Micros reference, Counters& counters, Out& out);
 
   std::array<Partial, 16> partials_{};
-  std::optional<can::CmdSetPos> set_pos_;
-  std::optional<can::CmdSetYaw> set_yaw_;
+  std::array<PoseHalves, 4> halves_{};
   std::array<std::uint8_t, 2> last_counter_{0xFF, 0xFF};  ///< of reset and of set pose
 };
 
@@ -108,12 +131,19 @@ inline Inbox::Partial& Inbox::slot(can::Sensor sensor, std::uint8_t instance, st
   Partial* chosen = &partials_[0];
   for (Partial& partial : partials_) {
     const Sample& s = partial.sample;
-    if (partial.missing != 0 && s.sensor == sensor && s.instance == instance && s.sequence == sequence) {
-      // IMU frames but one have no stamp, and their sequence comes round in 16 samples, 40 ms at 400 Hz: what is half
-      // this old belongs to a sample of then, of which a frame was lost.
-      if (sensor != can::Sensor::kImu || reference - partial.since <= kImuPatience) return partial;
-      chosen = &partial;
-      break;
+    const bool same = partial.missing != 0 && s.sensor == sensor && s.instance == instance;
+    // IMU frames but one have no stamp, and their sequence comes round in 16 samples. A half that is four or more
+    // samples behind has lost a frame for good (frames are not reordered that far), and must not meet those that come
+    // when its number comes again; nor may one that is old.
+    if (same && sensor == can::Sensor::kImu) {
+      const int behind = (sequence - s.sequence) & 0x0F;
+      if ((behind >= 4 && behind <= 12) || reference - partial.since > kImuPatience) {
+        give_up(partial, counters);
+      } else if (behind == 0) {
+        return partial;
+      }
+    } else if (same && s.sequence == sequence) {
+      return partial;
     }
     const bool better = chosen->missing != 0 && (partial.missing == 0 || partial.since < chosen->since);
     if (better) chosen = &partial;
@@ -199,24 +229,39 @@ void Inbox::gnss(const base::CanFrame& frame, can::Sensor sensor, std::uint8_t f
 }
 
 template <class Out>
-void Inbox::command(std::uint8_t offset, const base::CanFrame& frame, Counters& counters, Out& out) {
+void Inbox::command(std::uint8_t offset, const base::CanFrame& frame, base::Micros reference, Counters& counters,
+                    Out& out) {
   const auto counter = static_cast<std::uint8_t>(frame.data[1] & 0x0F);
   std::uint8_t& last = last_counter_[offset == can::CmdReset::kOffset ? 0 : 1];
   if (!can::e2e_valid(offset, can::payload(frame)) || counter == last) return void(++counters.command_refused);
   if (offset == can::CmdReset::kOffset) {
     const auto reset = can::decode<can::CmdReset>(can::payload(frame));
     if (!reset) return void(++counters.malformed);
+    if (reset->what > can::ResetWhat::kLandmarkMap) return void(++counters.out_of_range);
     last = counter;
     out.reset(reset->what);
     return;
   }
-  if (offset == can::CmdSetPos::kOffset) set_pos_ = can::decode<can::CmdSetPos>(can::payload(frame));
-  if (offset == can::CmdSetYaw::kOffset) set_yaw_ = can::decode<can::CmdSetYaw>(can::payload(frame));
-  if (!set_pos_ || !set_yaw_ || set_pos_->ctr != set_yaw_->ctr) return;
-  const can::CmdSetPos position = *set_pos_;
-  const can::CmdSetYaw yaw = *set_yaw_;
-  set_pos_.reset();
-  set_yaw_.reset();
+  PoseHalves* halves = &halves_[0];
+  for (PoseHalves& candidate : halves_) {
+    if (candidate.waits() && candidate.counter == counter) {
+      halves = &candidate;
+      break;
+    }
+    if (halves->waits() && (!candidate.waits() || candidate.since < halves->since)) halves = &candidate;
+  }
+  if (halves->waits() && halves->counter != counter) {  // more at once than there is room for
+    *halves = {};
+    ++counters.command_refused;
+  }
+  if (!halves->waits()) halves->since = reference;
+  halves->counter = counter;
+  if (offset == can::CmdSetPos::kOffset) halves->position = can::decode<can::CmdSetPos>(can::payload(frame));
+  if (offset == can::CmdSetYaw::kOffset) halves->yaw = can::decode<can::CmdSetYaw>(can::payload(frame));
+  if (!halves->position || !halves->yaw) return;
+  const can::CmdSetPos position = *halves->position;
+  const can::CmdSetYaw yaw = *halves->yaw;
+  *halves = {};
   last = counter;
   constexpr std::int64_t kUmPerStep = 2000;
   const bool heading = base::is_finite(yaw.std_yaw_rad) && base::is_finite(yaw.yaw_rad);
@@ -227,7 +272,8 @@ void Inbox::command(std::uint8_t offset, const base::CanFrame& frame, Counters& 
                                 .y = base::Anchored::from_um(position.y_raw * kUmPerStep),
                                 .yaw_rad = heading ? yaw.yaw_rad : 0.0F},
                        .sigma_position_m = yaw.std_pos_m,
-                       .sigma_yaw_rad = heading ? yaw.std_yaw_rad : 4.0F});
+                       .sigma_yaw_rad = heading ? yaw.std_yaw_rad : 4.0F,
+                       .counter = counter});
 }
 
 template <class Out>
@@ -252,7 +298,7 @@ void Inbox::on_frame(std::uint8_t offset, const base::CanFrame& frame, base::Mic
     case can::CmdReset::kOffset:
     case can::CmdSetPos::kOffset:
     case can::CmdSetYaw::kOffset:
-      return command(offset, frame, counters, out);
+      return command(offset, frame, reference, counters, out);
     case can::InMapEntry::kOffset: {
       const auto entry = can::decode<can::InMapEntry>(bytes);
       if (!entry) return void(++counters.malformed);

@@ -50,8 +50,11 @@ class Node {
   /// Called by the inbox.
   void sample(const Sample& sample);
   void map_entry(const MapEntry& entry);
-  void set_pose(const SetPose& pose) { pending_pose_ = pose; }
-  void reset(can::ResetWhat what) { pending_reset_[static_cast<std::size_t>(what) % pending_reset_.size()] = true; }
+  /// Of two within an epoch the one with the later counter stands, whichever came first.
+  void set_pose(const SetPose& pose) {
+    if (!pending_pose_ || ((pose.counter - pending_pose_->counter) & 0x0F) < 8) pending_pose_ = pose;
+  }
+  void reset(can::ResetWhat what) { pending_reset_[static_cast<std::size_t>(what)] = true; }
 
  private:
   static constexpr std::size_t kCount = Estimators::kCount;
@@ -70,16 +73,16 @@ class Node {
   }
   void restart(base::Micros t, can::ResetCause cause);
   void advance();
-  void close_window();
+  void close_window(base::Micros t);
   /// How a plain estimator's far end follows: by the samples that leave, or at once, as a copy of its present.
   enum class Past : std::uint8_t { kFollows, kIsNow };
   void retire_until(base::Micros t, Past past = Past::kFollows);
   void retire(const Sample& sample, Past past = Past::kFollows);
   template <class Lane>
   void note(Lane& lane, std::size_t instance, const Sample& sample, const Innovation& innovation);
-  void apply_map();
+  void apply_map(base::Micros before);
   void apply_commands();
-  void consume();
+  void consume(base::Micros t);
   template <class Lane>
   [[nodiscard]] bool came_late(std::size_t due) const;
   void fuse(std::size_t entry, const std::array<bool, kCount>& again);
@@ -172,7 +175,12 @@ void Node<Estimators, Capacity>::map_entry(const MapEntry& entry) {
   PendingMap& pending = pending_map_;
   std::size_t at = pending.size;
   while (at > 0 && pending.entries[at - 1].id >= entry.id) --at;
-  if (at < pending.size && pending.entries[at].id == entry.id) return void(pending.entries[at] = entry);
+  if (at < pending.size && pending.entries[at].id == entry.id) {
+    MapEntry& there = pending.entries[at];  // of two within an epoch the one further east (or north) stands
+    const bool beyond = entry.x_mm != there.x_mm ? entry.x_mm > there.x_mm : entry.y_mm > there.y_mm;
+    if (beyond) there = entry;
+    return;
+  }
   if (pending.size == kMapCapacity) {  // the highest ids are the ones refused, in whatever order they come
     ++counters_.map_full;
     if (at == pending.size) return;
@@ -192,11 +200,12 @@ void Node<Estimators, Capacity>::tick(base::Micros t, const LoopHealth& loop, Se
   } else if (t <= now_ || t - now_ > kLongestStep) {
     restart(t, can::ResetCause::kTimeJump);
   }
+  const base::Micros before = now_;
   now_ = t;
   tally_.close_epoch();
   inbox_.expire(now_, base::Micros{numbers_.loop.window_us}, counters_);
-  apply_map();
-  consume();
+  apply_map(before);
+  consume(now_);
   apply_commands();
   advance();
   Estimates estimates = estimate();
@@ -230,6 +239,7 @@ void Node<Estimators, Capacity>::restart(base::Micros t, can::ResetCause cause) 
   }
   each_lane([&](auto& lane) { lane.restart(t, context()); });
   if (cause == can::ResetCause::kTimeJump) {
+    inbox_.forget(counters_);
     timeline_.clear();
     closed_until_ = t - base::Micros{numbers_.loop.period_us};
   }
@@ -244,10 +254,11 @@ void Node<Estimators, Capacity>::advance() {
   each_lane([&](auto& lane) { lane.advance(now_, context(), window); });
 }
 
-/// What was consumed becomes final: the far end of the window moves up to now.
+/// What was consumed becomes final, and so does the time up to t: nothing from before it is fused any more.
 template <class Estimators, std::size_t Capacity>
-void Node<Estimators, Capacity>::close_window() {
-  retire_until(now_, Past::kIsNow);
+void Node<Estimators, Capacity>::close_window(base::Micros t) {
+  retire_until(t, Past::kIsNow);
+  if (t > closed_until_) closed_until_ = t;
 }
 
 /// Consumed samples with stamps up to t leave the window.
@@ -287,9 +298,10 @@ void Node<Estimators, Capacity>::note(Lane& lane, std::size_t instance, const Sa
 }
 
 template <class Estimators, std::size_t Capacity>
-void Node<Estimators, Capacity>::apply_map() {
+void Node<Estimators, Capacity>::apply_map(base::Micros before) {
   if (pending_map_.size == 0) return;
-  close_window();
+  consume(before);  // what came late belongs to the map as it was
+  close_window(before);
   for (std::size_t i = 0; i < pending_map_.size; ++i)
     if (!site_.map.put(pending_map_.entries[i])) ++counters_.map_full;
   pending_map_.size = 0;
@@ -305,11 +317,11 @@ void Node<Estimators, Capacity>::apply_commands() {
     each_lane([](auto& lane) { lane.clear_statistics(); });
   }
   if (asked(What::kEstimators)) {
-    close_window();
+    close_window(now_);
     restart(now_, can::ResetCause::kCommand);
   }
   if (pending_pose_) {
-    close_window();
+    close_window(now_);
     each_lane([&](auto& lane) { lane.set_pose(now_, *pending_pose_, context()); });
     pending_pose_.reset();
     ++resets_;
@@ -335,8 +347,8 @@ bool Node<Estimators, Capacity>::came_late(std::size_t due) const {
 }
 
 template <class Estimators, std::size_t Capacity>
-void Node<Estimators, Capacity>::consume() {
-  const std::size_t due = timeline_.until(now_);
+void Node<Estimators, Capacity>::consume(base::Micros t) {
+  const std::size_t due = timeline_.until(t);
   std::array<bool, kCount> again{};
   std::size_t instance = 0;
   each_lane([&](auto& lane) {
@@ -399,7 +411,7 @@ bool Node<Estimators, Capacity>::healthy(const Estimates& estimates) {
     positive = positive && e.p.positive_definite();
   }
   if (finite && positive) return true;
-  close_window();
+  close_window(now_);
   restart(now_, finite ? can::ResetCause::kNotPositive : can::ResetCause::kNotFinite);
   advance();
   return false;

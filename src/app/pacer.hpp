@@ -30,10 +30,12 @@ class Pacer {
     switch (kind) {
       case can::SyncKind::kBegin:
         state_ = can::SyncState::kLockstep;
+        on_bus_time_ = true;
         last_tick_ = time;
         return std::nullopt;
       case can::SyncKind::kStep:
         state_ = can::SyncState::kLockstep;
+        on_bus_time_ = true;
         last_tick_ = time;
         return time;
       case can::SyncKind::kClock:
@@ -53,12 +55,15 @@ class Pacer {
       state_ = can::SyncState::kHoldover;
       in_a_row_ = 0;
       next_tick_ = last_tick_ + period_;
+      waited_ = 3;
     }
     if (next_tick_.us == 0) next_tick_ = next_multiple(now + offset_);
     const base::Micros bus_now = now + offset_;
     if (bus_now < next_tick_) return std::nullopt;
     const std::int64_t behind = (bus_now - next_tick_).us / period_.us;
-    health.ticks_late = static_cast<std::uint16_t>(health.ticks_late + behind);
+    // The periods that hold-over waited for a sync frame are not the loop's lateness.
+    health.ticks_late = static_cast<std::uint16_t>(health.ticks_late + (behind > waited_ ? behind - waited_ : 0));
+    waited_ = 0;
     last_tick_ = next_tick_ + times(behind);
     next_tick_ = last_tick_ + period_;
     return last_tick_;
@@ -88,7 +93,7 @@ class Pacer {
     const bool regular = step.us * 10 >= period_.us * 9 && step.us * 10 <= period_.us * 11;
     in_a_row_ = regular ? in_a_row_ + 1 : 0;
     last_sync_ = time;
-    const bool first = !ever_followed_;
+    const bool first = !on_bus_time_;
     const bool back = time <= last_tick_;
     const bool far = time > last_tick_ + times(kFarthest);
     if (!first && in_a_row_ < 2) {
@@ -96,9 +101,12 @@ class Pacer {
       if (far) return ++health.sync_jump, std::nullopt;
       if (state_ != can::SyncState::kFollowing) return std::nullopt;
     }
-    ever_followed_ = true;
+    on_bus_time_ = true;
     if (state_ == can::SyncState::kHoldover && back)
       return std::nullopt;  // its own ticks are ahead: wait until the bus is
+    // Two frames a period apart that are taken at nearly one moment: the loop was not there when the first one came.
+    if (state_ == can::SyncState::kFollowing && regular && (now - last_sync_arrival_).us * 2 < period_.us)
+      ++health.ticks_late;
     state_ = can::SyncState::kFollowing;
     last_sync_arrival_ = now;
     offset_ = time - now;
@@ -114,7 +122,8 @@ class Pacer {
   base::Micros last_sync_;          ///< time stated in the last Tick frame, believed or not
   base::Micros last_sync_arrival_;  ///< board time of the last one believed
   std::int32_t in_a_row_ = 0;       ///< Tick frames one period apart
-  bool ever_followed_ = false;
+  std::int64_t waited_ = 0;         ///< periods that went by before hold-over began
+  bool on_bus_time_ = false;        ///< the time of ticks has been the bus's before
 };
 
 }  // namespace tetap::app

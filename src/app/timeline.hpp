@@ -21,7 +21,11 @@ class Timeline {
   [[nodiscard]] constexpr Insert insert(const Sample& sample) {
     std::size_t at = size_;
     while (at > 0 && samples_[at - 1].order(sample) > 0) --at;
-    if (at > 0 && samples_[at - 1].order(sample) == 0) return Insert::kDuplicate;
+    if (at > 0 && samples_[at - 1].order(sample) == 0) {
+      // Two that claim to be one sample and differ: the one whose frames have the smaller sum, whichever came first.
+      if (!consumed_[at - 1] && sample.bits < samples_[at - 1].bits) samples_[at - 1] = sample;
+      return Insert::kDuplicate;
+    }
     if (size_ == Capacity) return Insert::kFull;
     for (std::size_t i = size_; i > at; --i) {
       samples_[i] = samples_[i - 1];

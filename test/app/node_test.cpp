@@ -176,7 +176,8 @@ TEST(Node, ACommandWithAWrongCrcOrARepeatedCounterIsRefused) {
   bench.epoch(set_pose(4, 9000, 0, 0.0F));  // heard already
   const Frames out = bench.idle(120);
   EXPECT_EQ(last<can::EstPos>(out, 1)->x_raw, 2000);
-  EXPECT_EQ(last<can::EstDiagRefused>(out)->cmd_refused, 3);
+  EXPECT_EQ(last<can::EstDiagRefused>(out)->cmd_refused,
+            4);  // and the good half of the first command, that waited for the other
 }
 
 TEST(Node, ResetRestartsTheEstimators) {

@@ -23,6 +23,7 @@ class DeadReckoning {
     const float yaw_rad = sigma_yaw_rad > kFinest_rad ? sigma_yaw_rad : kFinest_rad;
     const float variance = position_m * position_m;
     filter.x = pose;
+    filter.x.yaw_rad = base::wrap_angle(pose.yaw_rad);
     filter.p = filter::Symmetric<float, 3>::diagonal({variance, variance, yaw_rad * yaw_rad});
     if (t > time_) time_ = t;
     untravelled();
@@ -30,20 +31,22 @@ class DeadReckoning {
 
   void advance(base::Micros t) { out_time_ = t; }
 
-  void fuse(const WheelCounts& now, base::Micros stamp, const Numbers& n);
-  void fuse(const WheelSpeeds& speeds, base::Micros stamp, const Numbers& n) {
-    fuse_speed({.kind = Held::Kind::kWheels, .first_mps = speeds.left_mps, .second = speeds.right_mps}, stamp, n);
+  /// False: the sample says nothing to this robot (a speed without a turn, an IMU that is not used).
+  bool fuse(const WheelCounts& now, base::Micros stamp, const Numbers& n);
+  bool fuse(const WheelSpeeds& speeds, base::Micros stamp, const Numbers& n) {
+    return fuse_speed({.kind = Held::Kind::kWheels, .first_mps = speeds.left_mps, .second = speeds.right_mps}, stamp,
+                      n);
   }
-  void fuse(const BodySpeed& speed, base::Micros stamp, const Numbers& n) {
+  bool fuse(const BodySpeed& speed, base::Micros stamp, const Numbers& n) {
     // A speedometer alone says nothing of the turn: that has to come from a gyroscope.
     const bool turns = base::is_finite(speed.yaw_rate_radps);
-    if (!turns && n.gyro.use == 0) return;
-    fuse_speed({.kind = Held::Kind::kBody,
-                .first_mps = n.wheels.speed_scale * speed.forward_mps,
-                .second = turns ? n.wheels.yaw_rate_scale * speed.yaw_rate_radps : 0.0F},
-               stamp, n);
+    if (!turns && n.gyro.use == 0) return false;
+    return fuse_speed({.kind = Held::Kind::kBody,
+                       .first_mps = n.wheels.speed_scale * speed.forward_mps,
+                       .second = turns ? n.wheels.yaw_rate_scale * speed.yaw_rate_radps : 0.0F},
+                      stamp, n);
   }
-  void fuse(const ImuSample& sample, base::Micros stamp, const Numbers& n);
+  bool fuse(const ImuSample& sample, base::Micros stamp, const Numbers& n);
 
   /// Brings the state to t with what is held; called before a measurement is fused at its own time.
   void propagate(base::Micros t, const Numbers& n);
@@ -68,6 +71,12 @@ class DeadReckoning {
     sink(gyro_bias_radps_);
     sink(gyro_rate_radps_);
     sink(last_input_.us);
+    sink(static_cast<std::uint32_t>(held_.kind));
+    sink(static_cast<std::uint32_t>((have_counts_ ? 1U : 0U) | (moving_ ? 2U : 0U)));
+    sink(static_cast<std::uint32_t>(counts_.left) << 16 | counts_.right);
+    sink(counts_time_.us);
+    sink(still_since_.us);
+    sink(gyro_time_.us);
   }
 
  private:
@@ -82,7 +91,7 @@ class DeadReckoning {
     float second = 0;     ///< yaw rate [rad/s], or the right wheel's speed
   };
 
-  void fuse_speed(const Held& held, base::Micros stamp, const Numbers& n);
+  bool fuse_speed(const Held& held, base::Micros stamp, const Numbers& n);
   [[nodiscard]] float forward_mps() const {
     return held_.kind == Held::Kind::kWheels ? 0.5F * (held_.first_mps + held_.second) : held_.first_mps;
   }
@@ -139,23 +148,31 @@ inline model::PlanarIncrement DeadReckoning::held_increment(float dt_s, const Nu
 
 inline void DeadReckoning::propagate(base::Micros t, const Numbers& n) {
   if (t <= time_) return;
-  const float dt_s = base::seconds(t - time_);
-  time_ = t;
-  if (held_.kind == Held::Kind::kNone) return;  // nothing was ever heard of motion: standing where it was put
-  if (t - last_input_ > base::Micros{n.wheels.timeout_us}) {
-    const float grown = n.wheels.timeout_noise * dt_s;
-    filter.predict(model::PlanarIncrement{.var_ds = grown, .var_dyaw = grown});
+  if (held_.kind == Held::Kind::kNone) {  // nothing was ever heard of motion: standing where it was put
+    time_ = t;
     return;
   }
-  filter.predict(held_increment(dt_s, n));
-  if (held_.kind == Held::Kind::kWheels) {
-    applied_left_m_ += held_.first_mps * dt_s;
-    applied_right_m_ += held_.second * dt_s;
+  // What was held counts until the time-out, as it was published; after that anything may have happened.
+  const base::Micros silent = last_input_ + base::Micros{n.wheels.timeout_us};
+  const base::Micros held_until = t < silent ? t : silent;
+  if (time_ < held_until) {
+    const float dt_s = base::seconds(held_until - time_);
+    filter.predict(held_increment(dt_s, n));
+    if (held_.kind == Held::Kind::kWheels) {
+      applied_left_m_ += held_.first_mps * dt_s;
+      applied_right_m_ += held_.second * dt_s;
+    }
+    if (n.gyro.use != 0) applied_yaw_rad_ += gyro_rate_radps_ * dt_s;
+    time_ = held_until;
   }
-  if (n.gyro.use != 0) applied_yaw_rad_ += gyro_rate_radps_ * dt_s;
+  if (time_ < t) {
+    const float grown = n.wheels.timeout_noise * base::seconds(t - time_);
+    filter.predict(model::PlanarIncrement{.var_ds = grown, .var_dyaw = grown});
+    time_ = t;
+  }
 }
 
-inline void DeadReckoning::fuse(const WheelCounts& now, base::Micros stamp, const Numbers& n) {
+inline bool DeadReckoning::fuse(const WheelCounts& now, base::Micros stamp, const Numbers& n) {
   const auto& drive = n.wheels.drive;
   if (n.gyro.use != 0) propagate(stamp, n);  // the turn up to here; what the counts add is length
   const bool usable = have_counts_ && stamp > counts_time_ && stamp - counts_time_ <= base::Micros{n.wheels.timeout_us};
@@ -168,6 +185,7 @@ inline void DeadReckoning::fuse(const WheelCounts& now, base::Micros stamp, cons
     const float per_s = 1.0F / base::seconds(stamp - counts_time_);
     held_ = {.kind = Held::Kind::kWheels, .first_mps = left_m * per_s, .second = right_m * per_s};
   } else {
+    if (have_counts_) propagate(stamp, n);  // the doubt of the gap stays; its way is not known
     held_ = {.kind = Held::Kind::kWheels};
   }
   if (stamp > time_) time_ = stamp;
@@ -175,22 +193,23 @@ inline void DeadReckoning::fuse(const WheelCounts& now, base::Micros stamp, cons
   counts_ = now;
   counts_time_ = last_input_ = stamp;
   have_counts_ = true;
+  return true;
 }
 
-inline void DeadReckoning::fuse_speed(const Held& held, base::Micros stamp, const Numbers& n) {
+inline bool DeadReckoning::fuse_speed(const Held& held, base::Micros stamp, const Numbers& n) {
   const bool first = held_.kind == Held::Kind::kNone;
-  if (n.wheels.hold == Hold::kForward || first) propagate(stamp, n);
+  const bool gap = stamp - last_input_ > base::Micros{n.wheels.timeout_us};
+  if (n.wheels.hold == Hold::kForward || first || gap) propagate(stamp, n);
   held_ = held;
-  const base::Micros before = last_input_;
   last_input_ = stamp;
-  if (n.wheels.hold == Hold::kBackward && !first && stamp - before <= base::Micros{n.wheels.timeout_us})
-    propagate(stamp, n);
+  if (n.wheels.hold == Hold::kBackward) propagate(stamp, n);
   if (stamp > time_) time_ = stamp;
+  return true;
 }
 
-inline void DeadReckoning::fuse(const ImuSample& sample, base::Micros stamp, const Numbers& n) {
+inline bool DeadReckoning::fuse(const ImuSample& sample, base::Micros stamp, const Numbers& n) {
   const base::Micros interval{sample.interval_us};
-  if (n.gyro.use == 0 || interval.us == 0 || interval > base::Micros{n.wheels.timeout_us}) return;
+  if (n.gyro.use == 0 || interval.us == 0 || interval > base::Micros{n.wheels.timeout_us}) return false;
   const float interval_s = base::seconds(interval);
   const float raw_radps = (n.gyro.up_s[0] * sample.dangle_b_rad[0] + n.gyro.up_s[1] * sample.dangle_b_rad[1] +
                            n.gyro.up_s[2] * sample.dangle_b_rad[2]) /
@@ -219,6 +238,7 @@ inline void DeadReckoning::fuse(const ImuSample& sample, base::Micros stamp, con
   }
   applied_yaw_rad_ = 0;
   gyro_time_ = stamp;
+  return true;
 }
 
 inline Estimate DeadReckoning::estimate(const Numbers& n) const {

@@ -44,6 +44,7 @@ class GnssAlignment {
     sink(first_y_.um());
     sink(reckoned_.x.um());
     sink(reckoned_.y.um());
+    sink(reckoned_.yaw_rad);
     sink(first_sigma_m_);
   }
 

@@ -36,8 +36,8 @@ class Odometry {
     motion.fuse(input, base::Micros{}, n);
   }
   Innovation fuse(const Input& input, base::Micros stamp, const Context& with) {
-    motion_.fuse(input, stamp, with.numbers);
-    return {.verdict = can::Verdict::kAccepted};
+    const bool used = motion_.fuse(input, stamp, with.numbers);
+    return {.verdict = used ? can::Verdict::kAccepted : can::Verdict::kNotUsed};
   }
 
   /// Counted from where it began; valid as a place on the map once that is known.

@@ -38,6 +38,7 @@ class PoseEkf {
     const bool heading = given.sigma_yaw_rad < 3.14F;  // false for NaN too
     motion_.start(t, given.pose, given.sigma_position_m, heading ? given.sigma_yaw_rad : kUnknown_rad);
     phase_ = heading ? Phase::kTracking : Phase::kWaiting;
+    alignment_ = {};
     last_absolute_ = t;
     refused_ = {};
   }
@@ -49,8 +50,8 @@ class PoseEkf {
     motion.fuse(input, base::Micros{}, n);
   }
   Innovation fuse(const Input& input, base::Micros stamp, const Context& with) {
-    motion_.fuse(input, stamp, with.numbers);
-    return {.verdict = can::Verdict::kAccepted};
+    const bool used = motion_.fuse(input, stamp, with.numbers);
+    return {.verdict = used ? can::Verdict::kAccepted : can::Verdict::kNotUsed};
   }
 
   Innovation fuse(const LandmarkSighting& sighting, base::Micros stamp, const Context& with);
