@@ -3,6 +3,7 @@
 // form, then of the whole one. tools/bits compares the lines. An image takes no arguments; whoever has read enough ends
 // the emulator.
 #include "app/node.hpp"
+#include "attitude.hpp"
 #include "base/selfcheck.hpp"
 #include "config/husky.hpp"
 #include "config/labyrinth.hpp"
@@ -72,6 +73,7 @@ class Program {
     line("ekf_planar", "", bits::ekf_planar(length.steps));
     line("dead_reckoning", "", bits::dead_reckoning(length.steps));
     line("geodesy", "", bits::geodesy(length.steps));
+    line("attitude", "", bits::attitude(length.steps));
     static app::Node<robot::rover::Estimators> rover{robot::rover::numbers, {}};
     static app::Node<robot::mrclam::Estimators> mrclam{robot::mrclam::numbers, {}};
     static app::Node<robot::husky::Estimators> husky{robot::husky::numbers, {}};
