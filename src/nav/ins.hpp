@@ -119,7 +119,7 @@ class Ins {
     p = covariance;
     condition(p);
     pending_ = {};
-    watch_ = {};
+    watch_.stop();
   }
 
   /// How often the covariance had to be put right (see condition()).
@@ -148,7 +148,7 @@ class Ins {
     if (watch_.advance(8) != InsFactor::Progress::kBad) return;
     condition(p);
     ++conditioned_;
-    watch_ = {};
+    watch_.stop();
   }
 
   InsCovarianceStep<float> pending_{};

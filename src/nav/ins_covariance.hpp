@@ -113,6 +113,7 @@ class InsFactor {
     return row_ < InsState::kErrors ? Progress::kBusy : Progress::kGood;
   }
   [[nodiscard]] bool idle() const { return row_ >= InsState::kErrors; }
+  void stop() { row_ = InsState::kErrors; }
 
  private:
   filter::Symmetric<float, InsState::kErrors> l_;  ///< the diagonal holds 1 / L_jj where it is done
