@@ -97,12 +97,10 @@ class Attitude {
     float y = -scale * up_.value(0);
     const float tilt2 = x * x + y * y;
     const float most = share > 0.0F ? 1.0F : o_.inclination_limit_radps * dt_s;
-    bool hold = false;
     off_ = tilt2 > most * most;
     if (off_ && held_s_ < o_.inclination_hold_s) {
       held_s_ += dt_s;
       const bool far = tilt2 > o_.inclination_reject_rad * o_.inclination_reject_rad;
-      hold = far;
       const float cut = far ? 0.0F : most / base::sqrt(tilt2);
       x *= cut;
       y *= cut;
@@ -113,7 +111,7 @@ class Attitude {
     calm_s_ = off_ || share > 0.0F ? 0.0F : calm_s_ < o_.tau_inclination_s ? calm_s_ + dt_s : calm_s_;
     bias_.step(o_, r, {.x_rad = x, .y_rad = y, .usable = calm_s_ >= o_.tau_inclination_s, .average_share = share},
                rest_, dt_s);
-    if (!hold) turn_level(x, y);
+    turn_level(x, y);
   }
 
   /// Turns the level axes by (x, y, 0): q and what is carried in them.

@@ -412,6 +412,35 @@ TEST(Attitude, takes_another_homogeneous_field_for_its_reference_after_motion_in
   EXPECT_LT(worst_error_deg(filter, motion, 10.0), 1.0);
 }
 
+/// Rests or tumbles for 20 s in one field, then turns too slowly for a field to be told from a magnet, in another.
+double error_after_another_field_deg(bool moved_before) {
+  Motion motion;
+  motion.field_n = turn(Vec::UnitZ(), 40.0 * kDegree) * Vec(0.0, 25.0, -40.0);
+  motion.rate_radps = [moved_before](double t) {
+    return t > 20.0 ? Vec(0.0, 0.0, 10.0 * kDegree) : moved_before ? tumbling(t) : Vec(Vec::Zero());
+  };
+  Attitude filter;
+  worst_error_deg(filter, motion, 20.0);
+  motion.field_n = Vec(0.0, 17.0, -46.0);
+  worst_error_deg(filter, motion, 50.0);
+  return degrees_between(wide(filter.q_nb()), motion.truth);
+}
+TEST(Attitude, defends_a_reference_for_long_only_when_motion_has_confirmed_it) {
+  EXPECT_LT(error_after_another_field_deg(false), 10.0);
+  EXPECT_GT(error_after_another_field_deg(true), 35.0);
+}
+
+TEST(MagneticHeading, is_a_number_when_the_field_turns_to_the_exact_opposite) {
+  const AttitudeOptions options;
+  MagneticHeading heading(options);
+  heading.step(options, {0.0F, 17.0F, -46.0F}, false, kDt_s);
+  for (int k = 0; k < 10'000; ++k) {
+    heading.step(options, {0.0F, -17.0F, -46.0F}, false, kDt_s);
+    ASSERT_TRUE(finite(heading.turned({})));
+  }
+  EXPECT_NEAR(base::abs(heading.turned({}).z), 1.0F, 1e-3F);
+}
+
 TEST(Attitude, leaves_a_reference_that_was_wrong_at_the_start) {
   Motion motion;  // rests beside a magnet, then moves away
   motion.rate_radps = [](double t) { return t < 20.0 ? Vec(Vec::Zero()) : tumbling(t); };
@@ -445,6 +474,9 @@ TEST(Attitude, stays_finite_and_says_no_to_what_is_no_measurement) {
         if (!std::isfinite(value) && field < 6) {
           ASSERT_EQ(verdict, AttitudeVerdict::kRefused);
         }
+        if (field == 9) {
+          ASSERT_EQ(verdict, AttitudeVerdict::kRefused) << value;
+        }
         const bool heard = filter.magnetometer(s.field, field_dt_s);
         if (!std::isfinite(value) && field >= 6 && field < 9) {
           ASSERT_FALSE(heard);
@@ -471,6 +503,15 @@ TEST(Attitude, knows_its_bias_no_better_than_a_hundred_thousand_steps_can_tell) 
 }
 
 // --- The parts.
+
+TEST(Quaternion, levelled_brings_any_direction_up_also_the_exact_opposite) {
+  for (const Vector3& up_b : {Vector3{0.0F, 0.0F, -9.81F}, Vector3{0.0F, 1e-6F, -9.81F}, Vector3{-4.0F, 0.0F, -9.0F},
+                              Vector3{0.0F, 0.0F, 2.0F}, Vector3{1.0F, 0.0F, 0.0F}, Vector3{0.0F, -30.0F, 0.0F}}) {
+    const Vector3 up_n = Rows(levelled(up_b)) * up_b;
+    EXPECT_NEAR(up_n(2), up_b.norm(), 1e-5F);
+    EXPECT_LT(std::hypot(up_n(0), up_n(1)), 1e-5F);
+  }
+}
 
 TEST(Quaternion, turned_is_the_exponential) {
   std::mt19937 engine(5);
@@ -528,7 +569,7 @@ TEST(Mahony, converges_to_the_truth_and_to_the_bias) {
 
 TEST(Mahony, stays_finite_whatever_comes) {
   Mahony filter;
-  for (const float value : {NAN, INFINITY, -INFINITY, 0.0F, 3e38F, -3e38F, 1e-45F})
+  for (const float value : {NAN, INFINITY, -INFINITY, 0.0F, 3e38F, -3e38F, 1e-45F, 1e5F})
     for (int field = 0; field < 10; ++field) {
       Sample s{{0.1F, 0.2F, 0.3F}, {1.0F, 2.0F, 9.0F}, {5.0F, 17.0F, -46.0F}};
       float dt_s = kDt_s;
