@@ -287,6 +287,11 @@ class Walker:
                 state.copies.pop(r, None)
                 state.constants.pop(r, None)
             return following(state)
+        if i.root in ("ldm", "ldmia", "ldmfd", "ldmib") and first == "sp" and not {"sp", "pc"} & set(registers(rest)[1]):
+            for r in registers(rest)[1]:  # read beside the stack pointer, which stays
+                state.copies.pop(r, None)
+                state.constants.pop(r, None)
+            return following(state)
         if (i.root.startswith(("ldm", "pop"))) and "pc" in registers(rest)[1]:
             flow.returns = True
             return otherwise
