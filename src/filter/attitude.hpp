@@ -81,10 +81,10 @@ class Attitude {
     const Rows r(q_lb_);
     const Vector3 f_l = r * f_b;
     float share = 0.0F;
-    if (age_s_ <
-        o_.tau_inclination_s) {  // a mean over what there is, so that the first second is as good as its samples
+    if (age_s_ < o_.tau_inclination_s) {
+      // A mean over what there is, the last samples counting most: the first second is as good as its samples.
       age_s_ += dt_s;
-      share = age_s_ > 2.0F * dt_s ? 2.0F * dt_s / age_s_ : 1.0F;  // the last samples count most
+      share = age_s_ > 2.0F * dt_s ? 2.0F * dt_s / age_s_ : 1.0F;
       up_.value += share * (f_l - up_.value);
     } else {
       up_.step(f_l, LowPass<3>::factor(o_.tau_inclination_s, dt_s));

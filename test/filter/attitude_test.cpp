@@ -324,13 +324,15 @@ TEST(Attitude, holds_through_a_long_push_and_recovers) {
 
 TEST(Attitude, believes_the_accelerometer_in_the_end) {
   // The body is knocked over and the gyroscope has not seen it.
-  Motion motion;
-  Attitude filter;
-  worst_error_deg(filter, motion, 10.0);
-  motion.truth = motion.truth * turn(Vec(1, 1, 0), 40.0 * kDegree);
-  worst_error_deg(filter, motion, 25.0);
-  EXPECT_LT(inclination_deg(wide(filter.q_nb()), motion.truth), 0.5);
-  EXPECT_FALSE(filter.accelerometer_disturbed());
+  for (const double degrees : {4.0, 40.0, 120.0, 179.0, 180.0}) {
+    Motion motion;
+    Attitude filter;
+    worst_error_deg(filter, motion, 10.0);
+    motion.truth = motion.truth * turn(Vec(1, 1, 0), degrees * kDegree);
+    worst_error_deg(filter, motion, 45.0);
+    EXPECT_LT(inclination_deg(wide(filter.q_nb()), motion.truth), 0.5) << degrees;
+    EXPECT_FALSE(filter.accelerometer_disturbed());
+  }
 }
 
 TEST(Attitude, leaves_out_samples_that_clip) {
