@@ -15,6 +15,9 @@ import bus_writer
 from bus_writer import BadInput
 
 NAMES = {0: "odometry", 1: "fused", 2: "estimator2", 3: "estimator3"}
+TICK_S = 0.01  # of the simulated world
+MOST_NEES = 100.0  # above this mean, or with more than this share of a sensor rejected, the report warns: no tuning is so far off
+MOST_REJECTED, LEAST_TESTED = 1.0 / 3.0, 10
 LEAST_GAP_S = 0.2  # truth rows further apart than this, or than 2.5 times their usual distance, are not interpolated between
 
 ESTIMATES = ["epoch", "time_s", "estimator", "kind", "x_m", "y_m", "yaw_rad", "speed_mps", "yaw_rate_radps", "std_x_m", "std_y_m",
@@ -38,6 +41,50 @@ def wrapped(angle_rad):
 def code_names():
     """Names of the bus's enumerations, by table and number, as the DBC has them."""
     return {table: {code: name for name, code in codes.items()} for table, codes in bus_writer.Dbc().tables.items()}
+
+
+def limits(message, signal):
+    """(step, largest) value that a signal of the bus can say."""
+    one = bus_writer.Dbc().messages[message].signals[signal]
+    return one.scale, one.raw_max * one.scale + one.offset
+
+
+class Fault:
+    """One fault of the simulated world: NAME@START+DURATION in run.json, seconds from the start of the run. Without times only the name."""
+
+    def __init__(self, text):
+        self.name, _, when = text.strip().partition("@")
+        start, _, duration = when.partition("+")
+        try:
+            self.start_s, self.duration_s = float(start), float(duration)
+        except ValueError:
+            self.start_s = self.duration_s = None
+
+    @property
+    def words(self):
+        if self.start_s is None:
+            return self.name
+        return f"{self.name} at {self.start_s:g} s" + (f" for {self.duration_s:g} s" if self.duration_s else "")
+
+
+def faults(run):
+    """The faults that the world had, in the order given."""
+    text = run.about.get("fault") or ""
+    return [Fault(one) for one in text.split(",") if one.strip()] if isinstance(text, str) and text != "none" else []
+
+
+def fault_spans(run):
+    """(name, start, end) of the faults on the run's own clock. The world ticks once per epoch and epoch 1 is its first tick, so a fault is
+    found by epoch: its own clock may be what jumps."""
+    order = np.argsort(run.estimates["epoch"], kind="stable")
+    epoch, time_s = run.estimates["epoch"][order], run.estimates["time_s"][order]
+    spans = []
+    for one in faults(run):
+        if one.start_s is not None:
+            ends = [one.start_s / TICK_S, (one.start_s + one.duration_s) / TICK_S]
+            start, end = np.interp(ends, epoch, time_s)
+            spans.append((one.name, float(start), float(end)))
+    return spans
 
 
 def read_table(path, columns, also=()):
@@ -296,6 +343,23 @@ def judge(run, estimator, truth, names):
     return result
 
 
+def warnings_of(run, judged):
+    """What makes the numbers of the run doubtful as a whole. Odometry is left out: it drifts, and nothing tests it."""
+    cause = f"fault {', '.join(one.words for one in faults(run))}" if faults(run) else (
+        f"is {run.about['robot']} the robot of this log?" if run.about.get("robot") else "the wrong robot for this log?")
+    found = []
+    for one in judged:
+        if one["kind"] == "Odometry":
+            continue
+        for sensor, counts in one["measurements"].items():
+            tested = counts["accepted"] + counts["rejected"]
+            if tested >= LEAST_TESTED and counts["rejected"] > MOST_REJECTED * tested:
+                found.append(f"{one['name']} rejected {counts['rejected']} of {tested} {sensor} measurements")
+        if one["nees_mean"] is not None and one["nees_mean"] > MOST_NEES:
+            found.append(f"NEES mean of {one['name']} is {one['nees_mean']:.0f}, not {one['nees_dof']}")
+    return [f"{'; '.join(found)} ({cause})"] if found else []
+
+
 def summary(run, truth):
     """All of summary.json: what the player wrote, then what was computed here."""
     names = code_names()
@@ -303,9 +367,9 @@ def summary(run, truth):
     result["truth"] = None if truth is None else {
         "file": os.path.basename(truth.path), "kind": truth.about.get("truth", "truth"), "is_reference": truth.is_reference,
         "has_yaw": truth.has_yaw, "max_gap_s": truth.max_gap_s}
-    for estimator in run.estimators:
-        one = judge(run, estimator, truth, names)
-        result[one["name"]] = one
+    judged = [judge(run, estimator, truth, names) for estimator in run.estimators]
+    result.update({one["name"]: one for one in judged})
+    result["warnings"] = warnings_of(run, judged)
     best = result.get("fused") or result[NAMES.get(run.estimators[-1], f"estimator{run.estimators[-1]}")]
     result["position_rmse_m"], result["heading_rmse_deg"] = best["position_rmse_m"], best["heading_rmse_deg"]
     return result

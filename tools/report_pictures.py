@@ -9,17 +9,20 @@ from matplotlib.collections import EllipseCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from matplotlib.ticker import NullLocator
 
 import report_metrics as metrics
 
 INK, GREY, FAINT = "#262626", "#6b6b6b", "#e3e3e3"
 TRUTH, ODOMETRY, FUSED = "#3c3c3c", "#e69f00", "#0072b2"
 LANDMARK, REJECTED = "#009e73", "#d55e00"
+FAULT_SHADE = "#f6d9c8"
 ESTIMATORS = {0: ODOMETRY, 1: FUSED, 2: "#cc79a7", 3: "#56b4e9"}
 LABELS = {0: "odometry", 1: "fused", 2: "estimator 2", 3: "estimator 3"}
 MODES = {"Boot": "#f2f2f2", "WaitingForPose": "#d9d9d9", "Aligning": "#f0e442", "Nominal": "#9fd3c0", "DeadReckoning": "#e69f00",
          "Degraded": "#cc79a7", "Fault": "#d55e00"}
 DPI = 120
+MOST_BANDS = 4.0  # an error of more usual bands than this gets an axis with two scales
 MOST_POINTS = 20_000  # per line; more than a picture has columns
 
 
@@ -51,6 +54,36 @@ def legend(axes, **arguments):
 
 def save(fig, path):
     fig.savefig(path, dpi=DPI, facecolor="white")
+
+
+def shade_faults(axes, run):
+    """The time of each fault of the world; a line where it was an instant. A handle for the legend, or none."""
+    spans = metrics.fault_spans(run)
+    for _, start, end in spans:
+        if end > start:
+            axes.axvspan(start, end, color=FAULT_SHADE, linewidth=0, zorder=0)
+        else:
+            axes.axvline(start, color=REJECTED, linewidth=1.2, linestyle=(0, (4, 2)), zorder=1)
+    if not spans:
+        return []
+    if all(end == start for _, start, end in spans):
+        return [Line2D([], [], color=REJECTED, linewidth=1.2, linestyle=(0, (4, 2)), label="fault")]
+    return [Patch(facecolor=FAULT_SHADE, label="fault")]
+
+
+def two_scales(axes, usual, largest):
+    """Linear up to `usual`, logarithmic beyond it, so that a jump does not flatten everything else."""
+    axes.set_yscale("symlog", linthresh=usual, linscale=1.6)
+    axes.set_ylim(-1.3 * largest, 1.3 * largest)
+    near = 10.0 ** np.floor(np.log10(usual))
+    near *= max(one for one in (1, 2, 5) if one * near <= usual)
+    far = [m * 10.0 ** k for k in range(-4, 6) for m in ((1, 10) if largest > 20 * usual else (1, 3)) if 1.6 * usual < m * 10.0 ** k <= 1.3 * largest]
+    ticks = sorted({near, *far})
+    axes.set_yticks([-one for one in reversed(ticks)] + [0.0] + ticks)
+    axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
+    axes.yaxis.set_minor_locator(NullLocator())
+    for side in (-usual, usual):
+        axes.axhline(side, color=GREY, linewidth=0.6, linestyle=(0, (1, 2)))
 
 
 def _broken_at_gaps(time_s, *columns):
@@ -162,14 +195,19 @@ def errors(run, truth, estimator, title):
             share = np.mean(np.abs(value[both]) <= 3 * std[both] * scale)
             one.annotate(f"{100 * share:.1f} % inside ±3σ", (1.0, 1.0), xycoords="axes fraction", ha="right", va="bottom", fontsize=9, color=GREY)
             # A start with a wide band would flatten all that follows: the axis shows all errors and the usual band.
-            limit = 1.15 * max(float(np.nanmax(np.abs(value))), float(np.quantile(band, 0.95)))
-            one.set_ylim(-limit, limit)
+            usual, largest = 1.15 * float(np.quantile(band, 0.8)), float(np.nanmax(np.abs(value)))
+            if largest > MOST_BANDS * usual > 0:
+                two_scales(one, usual, largest)
+            else:
+                limit = 1.15 * max(largest, float(np.quantile(band, 0.95)))
+                one.set_ylim(-limit, limit)
+        shades = shade_faults(one, run)
         one.set_ylabel(label)
     axes[-1].set_xlabel("time [s]")
     handles = [Line2D([], [], color=color, linewidth=1.2), Patch(color=color, alpha=0.16)]
     kind = "difference" if truth.is_reference else "error"
-    axes[0].legend(handles, [f"{LABELS[estimator]}: {kind}", "±3σ as published"], frameon=False, fontsize=9, labelcolor=INK, ncol=2,
-                   loc="lower left", bbox_to_anchor=(0.0, 0.93), borderaxespad=0.0, handlelength=1.6)
+    axes[0].legend(handles + shades, [f"{LABELS[estimator]}: {kind}", "±3σ as published"] + ["fault"] * len(shades), frameon=False, fontsize=9, labelcolor=INK, ncol=3,
+                   loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.0, handlelength=1.6)
     axes[0].set_title(title, loc="left", fontsize=11.5, color=INK, pad=24)
     return fig
 
@@ -186,16 +224,24 @@ def nis(run, estimator, names, title):
     sensors = sensors_with_nis(run, estimator)
     fig, axes = figure(9.0, 2.3 * len(sensors) + 0.7, title, len(sensors), sharex=True)
     rows = run.innovations
+    floor, largest = metrics.limits("Est_Innov", "Nis")
+    any_most, shades = False, []
     for one, sensor in zip(axes, sensors):
         mine = (rows["estimator"] == estimator) & (rows["sensor"] == sensor) & np.isfinite(rows["nis"])
-        floor = 1e-2
         value = np.maximum(rows["nis"], floor)
+        most = mine & (value >= largest - floor / 2)
         accepted, rejected = mine & (rows["verdict"] == 0), mine & (rows["verdict"] == 1)
+        shades = shade_faults(one, run)
+        for limit in (floor, largest) if most.any() else (floor,):
+            one.axhline(limit, color=GREY, linewidth=0.7, linestyle=(0, (1, 2)))
         many = accepted.sum() > 3000
         one.plot(rows["time_s"][accepted], value[accepted], linestyle="none", marker=".", markersize=2.5 if many else 4,
                  color=ESTIMATORS[estimator], alpha=0.5, markeredgewidth=0)
-        one.plot(rows["time_s"][rejected], value[rejected], linestyle="none", marker="x", markersize=5, color=REJECTED, markeredgewidth=1.2,
-                 zorder=4)
+        below_limit = rejected & ~most
+        one.plot(rows["time_s"][below_limit], value[below_limit], linestyle="none", marker="x", markersize=5, color=REJECTED,
+                 markeredgewidth=1.2, zorder=4)
+        one.plot(rows["time_s"][most], value[most], linestyle="none", marker="^", markersize=6, color=REJECTED, markeredgewidth=0, zorder=4)
+        any_most |= bool(most.any())
         for dof in np.unique(rows["dof"][mine]):
             bound = metrics.chi_square(0.95, max(int(dof), 1))
             one.axhline(bound, color=INK, linewidth=1.0, linestyle=(0, (5, 3)))
@@ -208,13 +254,17 @@ def nis(run, estimator, names, title):
         dofs = " and ".join(str(int(dof)) for dof in np.unique(rows["dof"][mine]))
         one.annotate(f"{name} ({dofs} dof): {100 * below:.1f} % below the line, {int(rejected.sum())} rejected", (0.0, 1.0),
                      xycoords="axes fraction", xytext=(0, 4), textcoords="offset points", ha="left", va="bottom", fontsize=9, color=GREY)
-    axes[0].set_title(title, loc="left", fontsize=11.5, color=INK, pad=24)
+    axes[0].set_title(title, loc="left", fontsize=11.5, color=INK, pad=36)
     axes[-1].set_xlabel("time [s]")
     handles = [Line2D([], [], color=ESTIMATORS[estimator], marker=".", markersize=8, linestyle="none"),
                Line2D([], [], color=REJECTED, marker="x", markersize=6, linestyle="none"),
                Line2D([], [], color=INK, linewidth=1.0, linestyle=(0, (5, 3)))]
-    legend(axes[0], handles=handles, labels=["accepted", "rejected by the gate", "95 % of a right model"], ncol=3, loc="lower right",
-           bbox_to_anchor=(1.0, 1.0), columnspacing=1.4)
+    labels = ["accepted", "rejected by the gate", "95 % of a right model"]
+    if any_most:
+        handles.append(Line2D([], [], color=REJECTED, marker="^", markersize=6, linestyle="none"))
+        labels.append(f"{largest:.0f} or more")
+    legend(axes[0], handles=handles + shades, labels=labels + ["fault"] * len(shades), ncol=len(labels) + len(shades), loc="lower left",
+           bbox_to_anchor=(0.0, 1.12), columnspacing=1.4)
     return fig
 
 
@@ -251,6 +301,7 @@ def timeline(run, names, title):
         handles.append(Patch(facecolor=color, edgecolor=GREY, linewidth=0.4, label=name))
     for number, (_, on, color) in enumerate(lines[1:], 1):
         axes.broken_barh(_spans(time_s, on, period), (number - 0.18, 0.36), facecolors=color, linewidth=0.8, edgecolors=color)
+    handles += shade_faults(axes, run)
     changes = np.flatnonzero(np.diff(rows["reset_ctr"]) != 0) + 1
     for row in changes:
         axes.axvline(time_s[row], color=INK, linewidth=1.0, linestyle=(0, (2, 2)))

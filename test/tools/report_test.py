@@ -224,6 +224,10 @@ class Innovations(Case):
         self.assertAlmostEqual(landmarks["nis_mean_with_rejected"], 8.0)
         self.assertAlmostEqual(landmarks["nis_inside_95"], 2 / 3)
         self.assertEqual(measured["GnssPosition"], {"accepted": 0, "rejected": 0, "other": 1, "verdicts": {"TooLate": 1}})
+        table = self.report("--no-pictures").stdout
+        for line in (r"RangeBearing accepted / rejected +2 / 1\n", r"RangeBearing of no landmark on the map +1\n", r"GnssPosition too late +1\n",
+                     r"RangeBearing NIS mean, accepted \(2 expected\) .* 2\.00", r"RangeBearing NIS mean, with rejected .* 8\.00"):
+            self.assertRegex(table, line)
 
     def test_names_of_the_bus_s_enumerations_stand_for_their_numbers(self):
         time_s, zero = 1 + 0.01 * np.arange(10), np.zeros(10)
@@ -232,6 +236,96 @@ class Innovations(Case):
         self.write("innovations.csv", f"{header}\n0,1,1,RangeBearing,0,NotFinite,2,,,5,7\n0,1,1,RangeBearing,0,Accepted,2,1.5,0.1,5,7\n")
         measured = self.summary()["fused"]["measurements"]
         self.assertEqual(measured["RangeBearing"]["verdicts"], {"Accepted": 1, "NotFinite": 1})
+
+
+class Warnings(Case):
+    time_s, zero = 1 + 0.01 * np.arange(40), np.zeros(40)
+
+    def run_with(self, rejected, error_m=0.0, estimator=1, about=RUN):
+        truth = self.truth(self.time_s, self.zero, self.zero, self.zero)
+        self.estimates(self.time_s, self.zero + error_m, self.zero, self.zero, estimator=estimator, std=[(0.1, 0.1, 0.1)] * 40,
+                       corr=[(0, 0, 0)] * 40)
+        self.write("run.json", json.dumps(about))
+        self.write_rows("innovations.csv", metrics.INNOVATIONS,
+                        [[n, t, estimator, 4, 0, int(n < rejected), 2, 1.0, 0.1, 5, 7] for n, t in enumerate(self.time_s[:30])])
+        result = self.report("--no-pictures", "--truth", truth)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        lines = [line for line in result.stdout.splitlines() if line.startswith("warning:")]
+        self.assertEqual(["warning: " + one for one in json.loads(text_of(self.path("summary.json")))["warnings"]], lines)
+        return lines
+
+    def test_more_than_a_third_rejected_is_one_warning_and_a_third_is_none(self):
+        self.assertEqual(self.run_with(rejected=10), [])
+        self.assertEqual(self.run_with(rejected=11),
+                         ["warning: fused rejected 11 of 30 RangeBearing measurements (is rover the robot of this log?)"])
+
+    def test_an_estimate_far_outside_of_what_it_says_is_warned_of_on_the_same_line(self):
+        self.assertEqual(self.run_with(0, error_m=0.99), [])  # NEES 98
+        self.assertEqual(self.run_with(0, error_m=1.01), ["warning: NEES mean of fused is 102, not 3 (is rover the robot of this log?)"])
+        self.assertEqual(len(self.run_with(11, error_m=1.01)), 1)
+
+    def test_odometry_may_drift_and_a_known_fault_is_named_instead_of_the_robot(self):
+        self.assertEqual(self.run_with(0, error_m=2.0, estimator=0), [])
+        self.assertIn("(fault kidnapped at 20 s)", self.run_with(0, error_m=2.0, about={**RUN, "fault": "kidnapped@20+0"})[0])
+
+
+class Faults(Case):
+    def test_fault_times_are_told_by_epoch_also_when_the_clock_of_the_run_jumps(self):
+        time_s = np.where(np.arange(300) >= 200, 4.0, 1.0) + 0.01 * np.arange(300)
+        zero = np.zeros(300)
+        self.estimates(time_s, zero, zero, zero)  # epoch n is at time_s[n]
+        self.write("run.json", json.dumps({**RUN, "fault": "clock_jump@1+1.5,kidnapped@0.5+0,gnss_jump"}))
+        run = metrics.Run(self.directory)
+        spans = metrics.fault_spans(run)
+        self.assertEqual([name for name, _, _ in spans], ["clock_jump", "kidnapped"])
+        np.testing.assert_allclose([span[1:] for span in spans], [(2.0, 6.5), (1.5, 1.5)], atol=1e-9)
+        self.assertEqual([one.words for one in metrics.faults(run)], ["clock_jump at 1 s for 1.5 s", "kidnapped at 0.5 s", "gnss_jump"])
+        result = self.report()
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn("fault: clock_jump at 1 s for 1.5 s, kidnapped at 0.5 s, gnss_jump\n", result.stdout)
+
+    def test_no_fault_is_no_line(self):
+        zero = np.zeros(20)
+        for none in ("", "none"):
+            self.estimates(1 + 0.01 * np.arange(20), zero, zero, zero)
+            self.write("run.json", json.dumps({**RUN, "fault": none}))
+            self.assertNotIn("fault:", self.report("--no-pictures").stdout)
+
+
+class Axes(Case):
+    def errors_picture(self, jump_m):
+        import report_pictures
+        n = 400
+        time_s, zero = 1 + 0.01 * np.arange(n), np.zeros(n)
+        truth = metrics.Truth(self.truth(time_s, zero, zero, zero))
+        self.estimates(time_s, np.where(np.arange(n) == 200, jump_m, 0.01), zero, zero, std=[(0.1, 0.1, 0.1)] * n, corr=[(0, 0, 0)] * n)
+        self.write("run.json", json.dumps({**RUN, "fault": "kidnapped@2+1"}))
+        return report_pictures.errors(metrics.Run(self.directory), truth, 1, "t").axes
+
+    def test_a_jump_leaves_the_band_visible_and_is_visible_itself(self):
+        x, y = self.errors_picture(8.0)[:2]
+        self.assertEqual((x.get_yscale(), y.get_yscale()), ("symlog", "linear"))
+        at = x.transAxes.inverted().transform(x.transData.transform([(0, 0.0), (0, 0.3), (0, 8.0)]))[:, 1]
+        self.assertGreater(at[1] - at[0], 0.15)  # 3 sigma above the middle, as a share of the height
+        self.assertLess(at[2], 1.0)
+        self.assertGreater(at[2] - at[1], 0.1)
+
+    def test_without_a_jump_the_axis_is_linear(self):
+        self.assertEqual(self.errors_picture(0.4)[0].get_yscale(), "linear")
+
+    def test_the_largest_value_of_the_bus_is_marked_as_so_much_or_more(self):
+        import report_pictures
+        zero = np.zeros(20)
+        self.estimates(1 + 0.01 * np.arange(20), zero, zero, zero)
+        smallest, largest = metrics.limits("Est_Innov", "Nis")
+        self.assertEqual(smallest, 0.01)
+        for nis, marked in ((largest, 1), (largest - 1, 0)):
+            self.write_rows("innovations.csv", metrics.INNOVATIONS,
+                            [[n, 1 + n, 1, 4, 0, int(n == 3), 2, nis if n == 3 else 1.0, 0.1, 5, 7] for n in range(10)])
+            axes = report_pictures.nis(metrics.Run(self.directory), 1, metrics.code_names(), "t").axes[0]
+            points = {line.get_marker(): len(line.get_xdata()) for line in axes.lines if line.get_linestyle() == "None"}
+            self.assertEqual((points["^"], points["x"]), (marked, 1 - marked))
+            self.assertEqual("655 or more" in [text.get_text() for text in axes.get_legend().get_texts()], bool(marked))
 
 
 class Pictures(Case):
@@ -263,7 +357,7 @@ class Pictures(Case):
                 head = file.read(24)
             self.assertEqual(head[:8], b"\x89PNG\r\n\x1a\n")
             self.assertGreater(int.from_bytes(head[16:20], "big"), 800)
-        for text in ("position RMSE", "fused", "odometry", "RangeBearing accepted / rejected / other"):
+        for text in ("position RMSE", "fused", "odometry", "RangeBearing accepted / rejected", "RangeBearing NIS mean, with rejected", "NisMean on the bus"):
             self.assertIn(text, page)
             self.assertIn(text, result.stdout)
 
