@@ -206,8 +206,8 @@ def errors(run, truth, estimator, title):
     axes[-1].set_xlabel("time [s]")
     handles = [Line2D([], [], color=color, linewidth=1.2), Patch(color=color, alpha=0.16)]
     kind = "difference" if truth.is_reference else "error"
-    axes[0].legend(handles + shades, [f"{LABELS[estimator]}: {kind}", "±3σ as published"] + ["fault"] * len(shades), frameon=False, fontsize=9, labelcolor=INK, ncol=3,
-                   loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.0, handlelength=1.6)
+    axes[0].legend(handles + shades, [f"{LABELS[estimator]}: {kind}", "±3σ as published"] + ["fault"] * len(shades), frameon=False, fontsize=9,
+                   labelcolor=INK, ncol=3, loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.0, handlelength=1.6)
     axes[0].set_title(title, loc="left", fontsize=11.5, color=INK, pad=24)
     return fig
 

@@ -357,7 +357,8 @@ class Pictures(Case):
                 head = file.read(24)
             self.assertEqual(head[:8], b"\x89PNG\r\n\x1a\n")
             self.assertGreater(int.from_bytes(head[16:20], "big"), 800)
-        for text in ("position RMSE", "fused", "odometry", "RangeBearing accepted / rejected", "RangeBearing NIS mean, with rejected", "NisMean on the bus"):
+        for text in ("position RMSE", "fused", "odometry", "RangeBearing accepted / rejected",
+                     "RangeBearing NIS mean, with rejected", "NisMean on the bus"):
             self.assertIn(text, page)
             self.assertIn(text, result.stdout)
 
