@@ -32,11 +32,12 @@ namespace detail {
 template <class Scalar, int N, int M>
 struct Gains {
   std::array<Scalar, static_cast<std::size_t>(N) * M> value;
-  [[gnu::always_inline]] constexpr Scalar& operator()(int n, int m) {
-    return value[static_cast<std::size_t>(n * M + m)];
-  }
-  [[gnu::always_inline]] constexpr const Scalar& operator()(int n, int m) const {
-    return value[static_cast<std::size_t>(n * M + m)];
+  [[gnu::always_inline]] constexpr Scalar& operator()(int n, int m) { return value[at(n, m)]; }
+  [[gnu::always_inline]] constexpr const Scalar& operator()(int n, int m) const { return value[at(n, m)]; }
+
+ private:
+  [[gnu::always_inline]] static constexpr std::size_t at(int n, int m) {
+    return static_cast<std::size_t>(n) * M + static_cast<std::size_t>(m);
   }
 };
 
@@ -59,7 +60,8 @@ template <class Scalar, int N, int M>
       unroll<kFrom, kEnd>([&](auto c) __attribute__((always_inline)) {
         Scalar rest = p(r, c);
         unroll<0, M>([&](auto m) __attribute__((always_inline)) {
-          rest -= row[static_cast<std::size_t>(m)] * column[static_cast<std::size_t>((c - kBegin) * M + m)];
+          rest -= row[static_cast<std::size_t>(m)] *
+                  column[static_cast<std::size_t>(c - kBegin) * M + static_cast<std::size_t>(m)];
         });
         sum[static_cast<std::size_t>(c - kBegin)] = rest;
       });

@@ -40,8 +40,8 @@ constexpr void move(base::Anchored& coordinate, float d_m) {
   const std::int64_t um = a.anchor_um - b.anchor_um;
   const auto low = static_cast<std::int32_t>(um);
   if (low != um) return a.minus(b);
-  return (static_cast<float>(low / 1'000'000) + static_cast<float>(low % 1'000'000) * 1e-6F) +
-         (a.offset_m - b.offset_m);
+  const std::int32_t whole_m = low / 1'000'000;
+  return (static_cast<float>(whole_m) + static_cast<float>(low % 1'000'000) * 1e-6F) + (a.offset_m - b.offset_m);
 }
 
 struct InsState {
