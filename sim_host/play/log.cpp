@@ -23,10 +23,13 @@ std::string excerpt(std::string_view text) {
   return text.size() > kLongest ? shown + "..." : shown;
 }
 
-void add_line(Log& log, const LogLine& line, const LogOptions& options, base::Micros& latest) {
+void add_line(Log& log, const LogLine& line, std::uint64_t number, const LogOptions& options, base::Micros& latest) {
+  constexpr base::Micros kLongGap{60'000'000};
   if (!options.interface.empty() && line.interface != options.interface) return void(++log.other_interface);
   if (line.kind != LogLine::Kind::kData) return void(++log.not_data);
   if (line.time < latest) ++log.back_in_time;
+  if (!log.frames.empty() && kLongGap < line.time - latest && log.gaps++ == 0)
+    log.first_gap = log.name + ":" + std::to_string(number);
   if (latest < line.time) latest = line.time;
   log.frames.push_back({line.time, line.classic()});
 }
@@ -47,7 +50,7 @@ Log parse_log(std::string_view text, const std::string& name, const LogOptions& 
     if (line.find_first_not_of(" \t\r") == std::string_view::npos) continue;
     const auto parsed = parse_log_line(line);
     if (const auto* good = std::get_if<LogLine>(&parsed)) {
-      add_line(log, *good, options, latest);
+      add_line(log, *good, number, options, latest);
       continue;
     }
     const std::string message = name + ":" + std::to_string(number) + ": " +

@@ -30,6 +30,8 @@ struct Log {
   std::uint64_t not_data = 0;      ///< remote, error and CAN FD frames
   std::uint64_t other_interface = 0;
   std::uint64_t back_in_time = 0;  ///< frames earlier than the one before
+  std::uint64_t gaps = 0;          ///< of more than a minute between frames
+  std::string first_gap;           ///< "file:line"
 };
 
 /// Throws std::runtime_error("name:line: reason: 'text'") at the first malformed line unless told to keep going. Blank

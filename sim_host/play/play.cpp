@@ -111,6 +111,9 @@ void warn_about(const Log& log, const char* program) {
     warn(log.name + ": " + std::to_string(log.not_data) + " remote, error or CAN FD frames skipped");
   if (log.back_in_time > 0)
     warn(log.name + ": " + std::to_string(log.back_in_time) + " frames are earlier than one before them");
+  if (log.gaps > 0)
+    warn(log.first_gap + ": more than a minute after the frame before" +
+         (log.gaps > 1 ? ", the first of " + std::to_string(log.gaps) + " such gaps" : std::string()));
 }
 
 }  // namespace tetap::sim

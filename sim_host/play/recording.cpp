@@ -138,6 +138,8 @@ class Builder {
     bool first = true;
     for (const Segment::Entry& entry : segment_.entries) {
       for (; consumed != entry.tail.in_count; ++consumed) {
+        if (segment_.inputs.empty() && result_.epochs.empty())
+          throw std::runtime_error(log_.name + ": no input frames in this log, only what a node said");
         if (next == segment_.inputs.size())
           refuse("the node consumed more input frames until " + in_seconds(entry.epoch.time) + " than the log holds");
         base::CanFrame frame = segment_.inputs[next++];
