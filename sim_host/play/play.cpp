@@ -16,7 +16,6 @@ Plays a log to a node and records what it answers.
   --log-interface I   play only frames logged from this interface
   --keep-going        count malformed lines of the log instead of stopping at the first
   --memory            to a node of --robot NAME in this process instead, without a bus
-  --memory            no bus: a node of --robot runs in this process
   --robot NAME        with --memory: what the node is; else only written into run.json
   --raw               also write raw.log: everything on the bus as it came
   --quiet             no progress line

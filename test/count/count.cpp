@@ -3,6 +3,7 @@
 // what is between the markers are calls of headers that the firmware is made of.
 #include "app/node.hpp"
 #include "base/random.hpp"
+#include "board.hpp"
 #include "config/rover.hpp"
 #include "filter/kalman.hpp"
 #include "markers.hpp"
@@ -14,14 +15,6 @@
 #include "nav/ins.hpp"
 #include "nav/preintegration.hpp"
 #include "recorded_world.hpp"
-
-#if defined(TETAP_BOARD_ZYNQMP_R5)
-#include "hal/port/zynqmp_r5/board.hpp"
-using Board = tetap::hal::zynqmp_r5::Board;
-#else
-#include "hal/port/mps2/board.hpp"
-using Board = tetap::hal::mps2::Board;
-#endif
 
 #include <array>
 

@@ -1,18 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // The attitude filters' workloads: a body that tumbles at 100 Hz, so that nothing is at rest and every branch of the
 // steady filter is taken; the start of a filter is over before the counting begins.
+#include "board.hpp"
 #include "filter/attitude.hpp"
 #include "filter/complementary.hpp"
 #include "filter/mahony.hpp"
 #include "markers.hpp"
-
-#if defined(TETAP_BOARD_ZYNQMP_R5)
-#include "hal/port/zynqmp_r5/board.hpp"
-using Board = tetap::hal::zynqmp_r5::Board;
-#else
-#include "hal/port/mps2/board.hpp"
-using Board = tetap::hal::mps2::Board;
-#endif
 
 namespace {
 

@@ -26,7 +26,6 @@ class InertialStart {
     // Before the first sample anything may be up: the whole turn at once, then ever smaller shares of what is left.
     turned_ = (nav::exp_quaternion(levelled_s_ > 0.0F ? nav::Vector3(lean * share) : whole_turn(up_n / norm)) * turned_)
                   .renormalised();
-    still_ += (imu.dtheta_b_rad / dt_s - still_) * share;
     levelled_s_ += dt_s;
     return levelled_s_ >= n.level_s;
   }
@@ -113,7 +112,6 @@ class InertialStart {
   }
 
   nav::Quaternion turned_;
-  nav::Vector3 still_ = nav::Vector3::Zero();
   float levelled_s_ = 0;
   model::GnssFix3d at_, first_;
   nav::Vector3 v_n_mps_ = nav::Vector3::Zero();
