@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+// Inertial navigation, part: one measurement through its gate, and what follows from being refused for long.
+#pragma once
+
+#include "app/estimators/inertial.hpp"
+
+namespace tetap::app {
+
+template <class Model>
+Innovation Inertial::measure(const Model& model, Source source, float gate_scale, base::Micros stamp,
+                             const Context& with) {
+  const auto result = ins_.update(model, gate_scale * filter::chi_square_99(Model::kDimension));
+  Refused& refused = refused_[source];
+  if (result.verdict == filter::Verdict::kAccepted) {
+    refused.in_a_row = 0;
+    if (source == kPosition) last_position_ = stamp;
+  } else if (result.verdict == filter::Verdict::kRejected) {
+    if (refused.in_a_row++ == 0) refused.since = stamp;
+    if (refused.in_a_row >= with.numbers.recovery.at_least &&
+        stamp - refused.since >= base::Micros{with.numbers.recovery.after_us})
+      recover(result.nu, source, with.numbers.recovery);
+  }
+  return record(result);
+}
+
+/// What was refused that long is right and the filter wrong, or the filter will refuse it again: its doubts grow by
+/// what it was off.
+template <int M>
+void Inertial::recover(const filter::Vector<float, M>& nu, Source source, const RecoveryNumbers& n) {
+  if constexpr (M == 3) {
+    for (int i = 0; i < 3; ++i) {
+      if (source == kPosition) ins_.p(i, i) += nu(i) * nu(i);
+      if (source == kVelocity) ins_.p(3 + i, 3 + i) += nu(i) * nu(i);
+    }
+  }
+  for (int i = 3; i < 6; ++i) ins_.p(i, i) += 0.25F;
+  ins_.p(8, 8) += n.inflate_yaw_rad * n.inflate_yaw_rad;
+  refused_[source] = {};
+}
+
+}  // namespace tetap::app

@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+// Inertial navigation, part: what is published, and the bits of the state.
+#pragma once
+
+#include "app/estimators/inertial.hpp"
+
+namespace tetap::app {
+
+inline InertialEstimate Inertial::inertial(const Context&) const {
+  return {.state = phase_ == Phase::kTracking ? ahead_.apply(ins_.x, ins_.earth) : ins_.x,
+          .p = ins_.p,
+          .valid = phase_ == Phase::kTracking};
+}
+
+inline Estimate Inertial::estimate(const Context& with) const {
+  const InertialEstimate full = inertial(with);
+  const nav::InsState& x = full.state;
+  const nav::Vector3 v_b = x.q_nb.conjugate().rotate(x.v_n_mps);
+  const nav::Vector3 w_n = x.q_nb.rotate(last_rate_b_radps_ - x.b_g_radps);
+  constexpr std::array<int, 3> kPlanar{0, 1, 8};
+  filter::Symmetric<float, 3> p;
+  for (int c = 0; c < 3; ++c)
+    for (int r = 0; r <= c; ++r)
+      p(r, c) = full.p(kPlanar[static_cast<std::size_t>(r)], kPlanar[static_cast<std::size_t>(c)]);
+  // Position is uncertain at the present by what the velocity was at the far end, too.
+  const float ahead_s = base::seconds(ahead_.dt);
+  p(0, 0) += ahead_s * (2.0F * full.p(0, 3) + ahead_s * full.p(3, 3));
+  p(1, 1) += ahead_s * (2.0F * full.p(1, 4) + ahead_s * full.p(4, 4));
+  p(0, 1) += ahead_s * (full.p(0, 4) + full.p(1, 3) + ahead_s * full.p(3, 4));
+  p(0, 2) += ahead_s * full.p(3, 8);
+  p(1, 2) += ahead_s * full.p(4, 8);
+  return {.time = now_,
+          .pose = {.x = x.x, .y = x.y, .yaw_rad = nav::euler(x.q_nb).yaw_rad},
+          .p = p,
+          .forward_mps = v_b(0),
+          .yaw_rate_radps = w_n(2),
+          .position_valid = full.valid,
+          .heading_valid = full.valid,
+          .velocity_valid = full.valid};
+}
+
+template <class Sink>
+void Inertial::each_bit(Sink&& sink) const {
+  const nav::InsState& x = ins_.x;
+  for (const base::Anchored* coordinate : {&x.x, &x.y, &x.z}) {
+    sink(coordinate->anchor_um);
+    sink(coordinate->offset_m);
+  }
+  for (int i = 0; i < 3; ++i) {
+    sink(x.v_n_mps(i));
+    sink(x.b_a_mps2(i));
+    sink(x.b_g_radps(i));
+    sink(still_rate_radps_(i));
+  }
+  sink(x.q_nb.w);
+  sink(x.q_nb.x);
+  sink(x.q_nb.y);
+  sink(x.q_nb.z);
+  for (const float v : ins_.p.packed()) sink(v);
+  sink(static_cast<std::uint32_t>(phase_));
+  start_.each_bit(sink);
+  sink(time_.us);
+  sink(last_position_.us);
+  sink(moved_.us);
+  sink(still_s_);
+  for (const Refused& refused : refused_) {
+    sink(refused.in_a_row);
+    sink(refused.since.us);
+  }
+}
+
+}  // namespace tetap::app
