@@ -2,24 +2,20 @@
 // From frames to samples and commands: decodes, puts samples of several frames together, counts what does not fit.
 #pragma once
 
-#include "app/context.hpp"
+#include "app/assembly.hpp"
+#include "app/commands.hpp"
 #include "app/health.hpp"
 #include "app/sample.hpp"
 #include "base/crc.hpp"
 #include "can/codec.hpp"
-#include "can/e2e.hpp"
 #include "config/messages.hpp"
 
-#include <array>
 #include <cstdint>
 #include <limits>
-#include <optional>
 #include <type_traits>
 
 namespace tetap::app {
 
-/// What the codec gives for "not available" where a field is an integer of steps.
-inline constexpr std::int32_t kNoSteps = std::numeric_limits<std::int32_t>::min();
 inline constexpr std::int64_t kNoAngle = std::numeric_limits<std::int64_t>::min();
 
 [[nodiscard]] constexpr bool all_finite(auto... values) { return (base::is_finite(values) && ...); }
@@ -40,68 +36,32 @@ class Inbox {
                 Out&& out);
 
   void power_on() {
-    for (Partial& partial : partials_) partial.missing = 0;
-    halves_ = {};
-    last_counter_.fill(0xFF);
+    assembly_.power_on();
+    commands_.power_on();
   }
-
-  /// At each tick: half samples and half commands older than `patience`, or from a time still to come, are given up
-  /// and counted.
+  /// At each tick: halves older than `patience`, or from a time still to come, are given up and counted.
   void expire(base::Micros now, base::Micros patience, Counters& counters) {
-    const auto old = [&](base::Micros since) { return now - since > patience || since > now; };
-    for (Partial& partial : partials_)
-      if (partial.missing != 0 && old(partial.since)) give_up(partial, counters);
-    for (PoseHalves& halves : halves_)
-      if (halves.waits() && old(halves.since)) {
-        halves = {};
-        ++counters.command_refused;
-      }
+    assembly_.expire(now, patience, counters);
+    commands_.expire(now, patience, counters);
   }
   /// Time has jumped: whatever is half belongs to another time.
   void forget(Counters& counters) {
-    for (Partial& partial : partials_)
-      if (partial.missing != 0) give_up(partial, counters);
-    halves_ = {};
+    assembly_.forget(counters);
+    commands_.forget();
   }
 
  private:
-  /// A sample of which some frames are there. missing: a bit per frame still to come; 0: the slot is free.
-  struct Partial {
-    Sample sample;
-    std::uint8_t missing = 0;
-    base::Micros since;
-  };
-  /// A set-pose command of which one frame is there.
-  struct PoseHalves {
-    std::optional<can::CmdSetPos> position;
-    std::optional<can::CmdSetYaw> yaw;
-    std::uint8_t counter = 0;
-    base::Micros since;
-    [[nodiscard]] constexpr bool waits() const { return position.has_value() || yaw.has_value(); }
-  };
-  static void give_up(Partial& partial, Counters& counters) {
-    partial.missing = 0;
-    ++counters.incomplete;
-  }
-  static constexpr base::Micros kImuPatience{50'000};
   static constexpr std::uint8_t kImuFrames = 0b111, kPositionFrames = 0b1111, kVelocityFrames = 0b11;
 
-  Partial& slot(can::Sensor sensor, std::uint8_t instance, std::uint8_t sequence, std::uint8_t frames,
-                base::Micros reference, Counters& counters);
-  template <class Out>
-  void complete(Partial& partial, std::uint8_t frame_bit, std::uint32_t bits, Counters& counters, Out& out);
   template <class Out>
   void imu(std::uint8_t offset, const base::CanFrame& frame, std::uint32_t bits, base::Micros reference,
            Counters& counters, Out& out);
   template <class Message, class Fill, class Out>
   void gnss(const base::CanFrame& frame, can::Sensor sensor, std::uint8_t frames, std::uint8_t frame_bit,
             std::uint32_t bits, base::Micros reference, Counters& counters, Out& out, Fill&& fill);
-  template <class Out>
-  void command(std::uint8_t offset, const base::CanFrame& frame, base::Micros reference, Counters& counters, Out& out);
 
-  std::array<Partial, 16> partials_{};
-  std::array<PoseHalves, 4> halves_{};
-  std::array<std::uint8_t, 2> last_counter_{0xFF, 0xFF};  ///< of reset and of set pose
+  Assembly assembly_;
+  Commands commands_;
 };
 
 /// A whole sample from one frame.
@@ -126,50 +86,6 @@ template <class Message>
   return crc.value();
 }
 
-inline Inbox::Partial& Inbox::slot(can::Sensor sensor, std::uint8_t instance, std::uint8_t sequence,
-                                   std::uint8_t frames, base::Micros reference, Counters& counters) {
-  Partial* chosen = &partials_[0];
-  for (Partial& partial : partials_) {
-    const Sample& s = partial.sample;
-    const bool same = partial.missing != 0 && s.sensor == sensor && s.instance == instance;
-    // IMU frames but one have no stamp, and their sequence comes round in 16 samples. A half that is four or more
-    // samples behind has lost a frame for good (frames are not reordered that far), and must not meet those that come
-    // when its number comes again; nor may one that is old.
-    if (same && sensor == can::Sensor::kImu) {
-      const int behind = (sequence - s.sequence) & 0x0F;
-      if ((behind >= 4 && behind <= 12) || reference - partial.since > kImuPatience) {
-        give_up(partial, counters);
-      } else if (behind == 0) {
-        return partial;
-      }
-    } else if (same && s.sequence == sequence) {
-      return partial;
-    }
-    const bool better = chosen->missing != 0 && (partial.missing == 0 || partial.since < chosen->since);
-    if (better) chosen = &partial;
-  }
-  if (chosen->missing != 0) ++counters.incomplete;
-  chosen->missing = frames;
-  chosen->since = reference;
-  chosen->sample.stamp = {};
-  chosen->sample.sensor = sensor;
-  chosen->sample.instance = instance;
-  chosen->sample.sequence = sequence;
-  chosen->sample.bits = 0;
-  return *chosen;
-}
-
-template <class Out>
-void Inbox::complete(Partial& partial, std::uint8_t frame_bit, std::uint32_t bits, Counters& counters, Out& out) {
-  if ((partial.missing & frame_bit) == 0) {
-    ++counters.duplicate;
-    return;
-  }
-  partial.missing = static_cast<std::uint8_t>(partial.missing & ~frame_bit);
-  partial.sample.bits += bits;
-  if (partial.missing == 0) out.sample(partial.sample);
-}
-
 template <class Out>
 void Inbox::imu(std::uint8_t offset, const base::CanFrame& frame, std::uint32_t bits, base::Micros reference,
                 Counters& counters, Out& out) {
@@ -179,27 +95,30 @@ void Inbox::imu(std::uint8_t offset, const base::CanFrame& frame, std::uint32_t 
     const auto gyro = can::decode<can::ImuGyro>(can::payload(frame));
     if (!gyro) return void(++counters.malformed);
     if (!all_finite(gyro->ang_x_rad, gyro->ang_y_rad, gyro->ang_z_rad)) return void(++counters.out_of_range);
-    Partial& partial = slot(can::Sensor::kImu, instance, gyro->seq, kImuFrames, reference, counters);
+    Assembly::Partial& partial =
+        assembly_.slot(can::Sensor::kImu, instance, gyro->seq, kImuFrames, reference, counters);
     partial.sample.payload.imu.dangle_b_rad = {gyro->ang_x_rad, gyro->ang_y_rad, gyro->ang_z_rad};
-    complete(partial, 0b001, bits, counters, out);
+    assembly_.complete(partial, 0b001, bits, counters, out);
   } else if (part == 1) {
     const auto accel = can::decode<can::ImuAccel>(can::payload(frame));
     if (!accel) return void(++counters.malformed);
     if (!all_finite(accel->vel_x_mps, accel->vel_y_mps, accel->vel_z_mps)) return void(++counters.out_of_range);
-    Partial& partial = slot(can::Sensor::kImu, instance, accel->seq, kImuFrames, reference, counters);
+    Assembly::Partial& partial =
+        assembly_.slot(can::Sensor::kImu, instance, accel->seq, kImuFrames, reference, counters);
     partial.sample.payload.imu.dvelocity_b_mps = {accel->vel_x_mps, accel->vel_y_mps, accel->vel_z_mps};
-    complete(partial, 0b010, bits, counters, out);
+    assembly_.complete(partial, 0b010, bits, counters, out);
   } else {
     const auto time = can::decode<can::ImuTime>(can::payload(frame));
     if (!time) return void(++counters.malformed);
-    Partial& partial = slot(can::Sensor::kImu, instance, time->seq, kImuFrames, reference, counters);
+    Assembly::Partial& partial =
+        assembly_.slot(can::Sensor::kImu, instance, time->seq, kImuFrames, reference, counters);
     partial.sample.stamp = base::extend(time->stamp_us, 20, reference);
     ImuSample& imu = partial.sample.payload.imu;
     imu.interval_us = time->interval_us;
     imu.temperature_degC = time->temp_degC;
     imu.clipped_gyro = time->clip_gyro;
     imu.clipped_accel = time->clip_accel;
-    complete(partial, 0b100, bits, counters, out);
+    assembly_.complete(partial, 0b100, bits, counters, out);
   }
 }
 
@@ -208,7 +127,7 @@ void Inbox::gnss(const base::CanFrame& frame, can::Sensor sensor, std::uint8_t f
                  std::uint32_t bits, base::Micros reference, Counters& counters, Out& out, Fill&& fill) {
   const auto message = can::decode<Message>(can::payload(frame));
   if (!message) return void(++counters.malformed);
-  Partial& partial = slot(sensor, message->inst, message->seq, frames, reference, counters);
+  Assembly::Partial& partial = assembly_.slot(sensor, message->inst, message->seq, frames, reference, counters);
   const base::Micros stamp = base::extend(message->stamp_us, 20, reference);
   Sample& sample = partial.sample;
   if (partial.missing == frames) {
@@ -224,56 +143,12 @@ void Inbox::gnss(const base::CanFrame& frame, can::Sensor sensor, std::uint8_t f
     sample.stamp = stamp;
     sample.bits = 0;
   }
-  if (!fill(*message, sample.payload)) return void((++counters.out_of_range, partial.missing = 0));
-  complete(partial, frame_bit, bits, counters, out);
-}
-
-template <class Out>
-void Inbox::command(std::uint8_t offset, const base::CanFrame& frame, base::Micros reference, Counters& counters,
-                    Out& out) {
-  const auto counter = static_cast<std::uint8_t>(frame.data[1] & 0x0F);
-  std::uint8_t& last = last_counter_[offset == can::CmdReset::kOffset ? 0 : 1];
-  if (!can::e2e_valid(offset, can::payload(frame)) || counter == last) return void(++counters.command_refused);
-  if (offset == can::CmdReset::kOffset) {
-    const auto reset = can::decode<can::CmdReset>(can::payload(frame));
-    if (!reset) return void(++counters.malformed);
-    if (reset->what > can::ResetWhat::kLandmarkMap) return void(++counters.out_of_range);
-    last = counter;
-    out.reset(reset->what);
+  if (!fill(*message, sample.payload)) {
+    ++counters.out_of_range;
+    partial.missing = 0;
     return;
   }
-  PoseHalves* halves = &halves_[0];
-  for (PoseHalves& candidate : halves_) {
-    if (candidate.waits() && candidate.counter == counter) {
-      halves = &candidate;
-      break;
-    }
-    if (halves->waits() && (!candidate.waits() || candidate.since < halves->since)) halves = &candidate;
-  }
-  if (halves->waits() && halves->counter != counter) {  // more at once than there is room for
-    *halves = {};
-    ++counters.command_refused;
-  }
-  if (!halves->waits()) halves->since = reference;
-  halves->counter = counter;
-  if (offset == can::CmdSetPos::kOffset) halves->position = can::decode<can::CmdSetPos>(can::payload(frame));
-  if (offset == can::CmdSetYaw::kOffset) halves->yaw = can::decode<can::CmdSetYaw>(can::payload(frame));
-  if (!halves->position || !halves->yaw) return;
-  const can::CmdSetPos position = *halves->position;
-  const can::CmdSetYaw yaw = *halves->yaw;
-  *halves = {};
-  last = counter;
-  constexpr std::int64_t kUmPerStep = 2000;
-  const bool heading = base::is_finite(yaw.std_yaw_rad) && base::is_finite(yaw.yaw_rad);
-  if (position.x_raw == kNoSteps || position.y_raw == kNoSteps || !base::is_finite(yaw.std_pos_m)) {
-    return void(++counters.out_of_range);
-  }
-  out.set_pose(SetPose{.pose = {.x = base::Anchored::from_um(position.x_raw * kUmPerStep),
-                                .y = base::Anchored::from_um(position.y_raw * kUmPerStep),
-                                .yaw_rad = heading ? yaw.yaw_rad : 0.0F},
-                       .sigma_position_m = yaw.std_pos_m,
-                       .sigma_yaw_rad = heading ? yaw.std_yaw_rad : 4.0F,
-                       .counter = counter});
+  assembly_.complete(partial, frame_bit, bits, counters, out);
 }
 
 template <class Out>
@@ -298,7 +173,7 @@ void Inbox::on_frame(std::uint8_t offset, const base::CanFrame& frame, base::Mic
     case can::CmdReset::kOffset:
     case can::CmdSetPos::kOffset:
     case can::CmdSetYaw::kOffset:
-      return command(offset, frame, reference, counters, out);
+      return commands_.on_frame(offset, frame, reference, counters, out);
     case can::InMapEntry::kOffset: {
       const auto entry = can::decode<can::InMapEntry>(bytes);
       if (!entry) return void(++counters.malformed);

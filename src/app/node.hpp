@@ -3,27 +3,19 @@
 // calls gives the same bits on every machine; everything that follows from real time stays outside (Pacer, LoopHealth).
 #pragma once
 
+#include "app/history.hpp"
 #include "app/inbox.hpp"
-#include "app/lane.hpp"
 #include "app/publisher.hpp"
-#include "app/timeline.hpp"
+#include "app/tally.hpp"
 
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <tuple>
+#include <optional>
 #include <type_traits>
 #include <utility>
 
 namespace tetap::app {
-
-/// The estimators a robot runs, in the order of their output instances; the last is the one the status speaks of.
-template <Estimator... E>
-struct Estimators {
-  static_assert(sizeof...(E) >= 1 && sizeof...(E) <= 4, "the bus has four output instances");
-  using Lanes = std::tuple<Lane<E>...>;
-  static constexpr std::size_t kCount = sizeof...(E);
-};
 
 template <class Estimators, std::size_t TimelineCapacity = 96>
 class Node {
@@ -57,8 +49,9 @@ class Node {
   void reset(can::ResetWhat what) { pending_reset_[static_cast<std::size_t>(what)] = true; }
 
  private:
-  static constexpr std::size_t kCount = Estimators::kCount;
-  static constexpr std::size_t kPrimary = kCount - 1;
+  using History = app::History<Estimators, TimelineCapacity>;
+  using Estimates = typename History::Estimates;
+  static constexpr std::size_t kPrimary = History::kPrimary;
   static constexpr base::Micros kLongestStep{500'000};
   /// Map entries wait here for their tick, sorted by id, so that the order of arrival has no effect.
   struct PendingMap {
@@ -67,45 +60,34 @@ class Node {
   };
 
   [[nodiscard]] Context context() const { return {.numbers = numbers_, .site = site_}; }
-  template <class F>
-  void each_lane(F&& f) {
-    std::apply([&](auto&... lane) { (f(lane), ...); }, lanes_);
-  }
   void restart(base::Micros t, can::ResetCause cause);
-  void advance();
+  void consume(base::Micros t);
   void close_window(base::Micros t);
-  /// How a plain estimator's far end follows: by the samples that leave, or at once, as a copy of its present.
-  enum class Past : std::uint8_t { kFollows, kIsNow };
-  void retire_until(base::Micros t, Past past = Past::kFollows);
-  void retire(const Sample& sample, Past past = Past::kFollows);
-  template <class Lane>
-  void note(Lane& lane, std::size_t instance, const Sample& sample, const Innovation& innovation);
   void apply_map(base::Micros before);
   void apply_commands();
-  void consume(base::Micros t);
-  template <class Lane>
-  [[nodiscard]] bool came_late(std::size_t due) const;
-  void fuse(std::size_t entry, const std::array<bool, kCount>& again);
   void find_origin(const Sample& sample);
-  using Estimates = std::array<Estimate, kCount>;
-  [[nodiscard]] Estimates estimate() const;
+  void note(std::size_t instance, const Sample& sample, const Innovation& innovation);
+  /// note(), for whoever makes records.
+  [[nodiscard]] auto noting() {
+    return [this](std::size_t instance, const Sample& sample, const Innovation& innovation) {
+      note(instance, sample, innovation);
+    };
+  }
   [[nodiscard]] bool healthy(const Estimates& estimates);
   [[nodiscard]] std::uint32_t state_crc() const;
   [[nodiscard]] Summary summary(const Estimate& estimate) const;
 
   const Numbers& numbers_;
-  typename Estimators::Lanes lanes_;
+  History history_;
   Site site_;
-  Timeline<TimelineCapacity> timeline_;
   Inbox inbox_;
   Counters counters_;
-  Publisher<kCount> publisher_;
+  Publisher<Estimators::kCount> publisher_;
   PendingMap pending_map_;
   std::array<bool, 3> pending_reset_{};
   std::optional<SetPose> pending_pose_;
 
   base::Micros now_;
-  base::Micros closed_until_;  ///< samples up to here can no longer be fused
   bool ticked_ = false;
   InputTally tally_;  ///< of the input frames
   std::uint8_t resets_ = 0;
@@ -124,22 +106,18 @@ void Node<Estimators, Capacity>::power_on(base::Micros t) {
     site_.frame = nav::LocalFrame(g.origin_latitude_2ndeg, g.origin_longitude_2ndeg, g.origin_height_m);
     site_.origin = can::OriginSource::kConfigured;
   }
-  timeline_.power_on();
   inbox_.power_on();
   counters_ = {};
   publisher_.power_on();
   pending_map_.size = 0;
   pending_reset_ = {};
   pending_pose_.reset();
-  now_ = closed_until_ = restarted_at_ = t;
+  now_ = restarted_at_ = t;
   ticked_ = false;
   tally_ = {};
   resets_ = 0;
   reset_cause_ = can::ResetCause::kPowerOn;
-  each_lane([&](auto& lane) {
-    lane.restart(t, context());
-    lane.clear_statistics();
-  });
+  history_.power_on(t, context());
 }
 
 template <class Estimators, std::size_t Capacity>
@@ -154,18 +132,13 @@ void Node<Estimators, Capacity>::sample(const Sample& arrived) {
   Sample sample = arrived;
   if (sample.sensor == can::Sensor::kBodySpeed) sample.stamp += base::Micros{numbers_.wheels.delay_us};
   if (!ticked_ && now_.us == 0) return void(++counters_.no_time);
-  if (sample.stamp <= closed_until_) {
+  if (sample.stamp <= history_.closed_until()) {
     ++counters_.too_late;
     publisher_.event({.verdict = can::Verdict::kTooLate}, sample, kPrimary, now_, counters_);
     return;
   }
   if (sample.stamp > now_ + base::Micros{numbers_.loop.ahead_us}) return void(++counters_.too_early);
-  Insert result = timeline_.insert(sample);
-  if (result == Insert::kFull && timeline_.consumed(0)) {
-    retire(timeline_[0]);
-    timeline_.drop_front(1);
-    result = timeline_.insert(sample);
-  }
+  const Insert result = history_.insert(sample, context(), noting());
   if (result == Insert::kDuplicate) ++counters_.duplicate;
   if (result == Insert::kFull) ++counters_.timeline_full;
 }
@@ -207,26 +180,24 @@ void Node<Estimators, Capacity>::tick(base::Micros t, const LoopHealth& loop, Se
   apply_map(before);
   consume(now_);
   apply_commands();
-  advance();
-  Estimates estimates = estimate();
-  if (!healthy(estimates)) estimates = estimate();
+  history_.advance(now_, context());
+  Estimates estimates = history_.estimates(context());
+  if (!healthy(estimates)) estimates = history_.estimates(context());
 
   publisher_.begin(now_, tally_, send);
   std::size_t instance = 0;
-  each_lane([&](const auto& lane) {
+  history_.each_lane([&](const auto& lane) {
     using E = typename std::remove_cvref_t<decltype(lane)>::Type;
     publisher_.estimate(instance, E::kKind, instance == kPrimary, estimates[instance], send);
     if constexpr (requires { lane.inertial(context()); }) publisher_.inertial(instance, lane.inertial(context()), send);
     ++instance;
   });
   publisher_.status(summary(estimates[kPrimary]), send);
-  publisher_.statistics(lanes_, now_, send);
-  publisher_.diagnostics(counters_, loop, timeline_.high_water(), send);
+  publisher_.statistics(history_.lanes(), now_, send);
+  publisher_.diagnostics(counters_, loop, history_.high_water(), send);
   publisher_.identity(site_, send);
   publisher_.events(send);
-  const base::Micros edge = now_ - base::Micros{numbers_.loop.window_us};
-  retire_until(edge);
-  if (edge > closed_until_) closed_until_ = edge;
+  history_.retire_until(now_ - base::Micros{numbers_.loop.window_us}, context(), noting());
   publisher_.end(state_crc(), tally_, send);
 }
 
@@ -237,61 +208,25 @@ void Node<Estimators, Capacity>::restart(base::Micros t, can::ResetCause cause) 
     reset_cause_ = cause;
     restarted_at_ = t;
   }
-  each_lane([&](auto& lane) { lane.restart(t, context()); });
+  history_.restart(t, context());
   if (cause == can::ResetCause::kTimeJump) {
     inbox_.forget(counters_);
-    timeline_.clear();
-    closed_until_ = t - base::Micros{numbers_.loop.period_us};
+    history_.clear();
+    history_.open_from(t - base::Micros{numbers_.loop.period_us});
   }
-  if (cause == can::ResetCause::kPowerOn) closed_until_ = t - base::Micros{numbers_.loop.window_us};
-}
-
-template <class Estimators, std::size_t Capacity>
-void Node<Estimators, Capacity>::advance() {
-  const auto window = [this](auto&& each) {
-    for (std::size_t i = 0; i < timeline_.size() && timeline_.consumed(i); ++i) each(timeline_[i]);
-  };
-  each_lane([&](auto& lane) { lane.advance(now_, context(), window); });
+  if (cause == can::ResetCause::kPowerOn) history_.open_from(t - base::Micros{numbers_.loop.window_us});
 }
 
 /// What was consumed becomes final, and so does the time up to t: nothing from before it is fused any more.
 template <class Estimators, std::size_t Capacity>
 void Node<Estimators, Capacity>::close_window(base::Micros t) {
-  retire_until(t, Past::kIsNow);
-  if (t > closed_until_) closed_until_ = t;
+  history_.close_window(t, context(), noting());
 }
 
-/// Consumed samples with stamps up to t leave the window.
+/// The record goes out when it says something. What comes with every tick would drown the rest: of accepted wheels the
+/// statistics are enough.
 template <class Estimators, std::size_t Capacity>
-void Node<Estimators, Capacity>::retire_until(base::Micros t, Past past) {
-  std::size_t count = 0;
-  while (count < timeline_.size() && timeline_.consumed(count) && timeline_[count].stamp <= t)
-    retire(timeline_[count++], past);
-  timeline_.drop_front(count);
-  if (past == Past::kIsNow) each_lane([](auto& lane) { lane.close(); });
-}
-
-template <class Estimators, std::size_t Capacity>
-void Node<Estimators, Capacity>::retire(const Sample& sample, Past past) {
-  std::size_t instance = 0;
-  each_lane([&](auto& lane) {
-    if constexpr (std::remove_cvref_t<decltype(lane)>::kDelayed) {
-      note(lane, instance, sample, lane.fuse(sample, context()));
-    } else if (past == Past::kFollows) {
-      lane.retire(sample, context());
-    }
-    ++instance;
-  });
-  if (sample.stamp > closed_until_) closed_until_ = sample.stamp;
-}
-
-/// The record goes into the statistics, and out when it says something.
-template <class Estimators, std::size_t Capacity>
-template <class Lane>
-void Node<Estimators, Capacity>::note(Lane& lane, std::size_t instance, const Sample& sample,
-                                      const Innovation& innovation) {
-  lane.account(sample, innovation);
-  // What comes with every tick would drown the rest: of accepted wheels the statistics are enough.
+void Node<Estimators, Capacity>::note(std::size_t instance, const Sample& sample, const Innovation& innovation) {
   const bool ordinary = innovation.verdict == can::Verdict::kAccepted && sample.sensor <= can::Sensor::kBodySpeed;
   if ((innovation.dof > 0 && !ordinary) || innovation.verdict > can::Verdict::kNotUsed)
     publisher_.event(innovation, sample, instance, now_, counters_);
@@ -314,7 +249,7 @@ void Node<Estimators, Capacity>::apply_commands() {
   if (asked(What::kLandmarkMap)) site_.map.clear();
   if (asked(What::kCounters)) {
     counters_ = {};
-    each_lane([](auto& lane) { lane.clear_statistics(); });
+    history_.each_lane([](auto& lane) { lane.clear_statistics(); });
   }
   if (asked(What::kEstimators)) {
     close_window(now_);
@@ -322,67 +257,18 @@ void Node<Estimators, Capacity>::apply_commands() {
   }
   if (pending_pose_) {
     close_window(now_);
-    each_lane([&](auto& lane) { lane.set_pose(now_, *pending_pose_, context()); });
+    history_.each_lane([&](auto& lane) { lane.set_pose(now_, *pending_pose_, context()); });
     pending_pose_.reset();
     ++resets_;
     reset_cause_ = can::ResetCause::kSetPose;
   }
 }
 
-/// Whether something new belongs before something that the lane has fused already.
-template <class Estimators, std::size_t Capacity>
-template <class Lane>
-bool Node<Estimators, Capacity>::came_late(std::size_t due) const {
-  if (Lane::kDelayed) return false;
-  bool is_new = false;
-  for (std::size_t i = 0; i < due; ++i) {
-    if (!Lane::takes(timeline_[i])) continue;
-    if (!timeline_.consumed(i)) {
-      is_new = true;
-    } else if (is_new) {
-      return true;
-    }
-  }
-  return false;
-}
-
 template <class Estimators, std::size_t Capacity>
 void Node<Estimators, Capacity>::consume(base::Micros t) {
-  const std::size_t due = timeline_.until(t);
-  std::array<bool, kCount> again{};
-  std::size_t instance = 0;
-  each_lane([&](auto& lane) {
-    bool& repeat = again[instance++];
-    repeat = came_late<std::remove_cvref_t<decltype(lane)>>(due);
-    if constexpr (!std::remove_cvref_t<decltype(lane)>::kDelayed) {
-      if (repeat) lane.rewind();
-    }
-  });
-  for (std::size_t i = 0; i < due; ++i) fuse(i, again);
-}
-
-template <class Estimators, std::size_t Capacity>
-void Node<Estimators, Capacity>::fuse(std::size_t i, const std::array<bool, kCount>& again) {
-  const Sample& sample = timeline_[i];
-  const bool is_new = !timeline_.consumed(i);
-  if (is_new) find_origin(sample);
-  std::size_t instance = 0;
-  bool taken = false;
-  each_lane([&](auto& lane) {
-    using Lane = std::remove_cvref_t<decltype(lane)>;
-    if constexpr (Lane::kDelayed) {
-      taken = taken || Lane::takes(sample);
-    } else if (is_new || again[instance]) {
-      const Innovation innovation = lane.fuse(sample, context());
-      if (is_new) {
-        taken = taken || innovation.verdict != can::Verdict::kNotUsed;
-        note(lane, instance, sample, innovation);
-      }
-    }
-    ++instance;
-  });
-  if (is_new && !taken) ++counters_.not_used;
-  timeline_.consume(i);
+  const std::uint16_t not_used = history_.consume(
+      t, context(), [this](const Sample& sample) { find_origin(sample); }, noting());
+  counters_.not_used = static_cast<std::uint16_t>(counters_.not_used + not_used);
 }
 
 template <class Estimators, std::size_t Capacity>
@@ -393,11 +279,6 @@ void Node<Estimators, Capacity>::find_origin(const Sample& sample) {
   site_.frame =
       nav::LocalFrame(fix.latitude_2ndeg, fix.longitude_2ndeg, base::is_finite(fix.height_m) ? fix.height_m : 0.0F);
   site_.origin = can::OriginSource::kFirstFix;
-}
-
-template <class Estimators, std::size_t Capacity>
-auto Node<Estimators, Capacity>::estimate() const -> Estimates {
-  return std::apply([this](const auto&... lane) { return std::array{lane.estimate(context())...}; }, lanes_);
 }
 
 /// A broken invariant (NaN, a covariance that is none) restarts the estimators from their defined start, and says so.
@@ -413,15 +294,14 @@ bool Node<Estimators, Capacity>::healthy(const Estimates& estimates) {
   if (finite && positive) return true;
   close_window(now_);
   restart(now_, finite ? can::ResetCause::kNotPositive : can::ResetCause::kNotFinite);
-  advance();
+  history_.advance(now_, context());
   return false;
 }
 
 template <class Estimators, std::size_t Capacity>
 std::uint32_t Node<Estimators, Capacity>::state_crc() const {
   base::BitCrc crc;
-  std::apply([&](const auto&... lane) { (lane.each_bit(crc), ...); }, lanes_);
-  crc(timeline_.digest());
+  history_.each_bit(crc);
   crc(static_cast<std::uint32_t>(site_.origin));
   site_.map.each_bit(crc);
   return crc.value();
@@ -429,7 +309,7 @@ std::uint32_t Node<Estimators, Capacity>::state_crc() const {
 
 template <class Estimators, std::size_t Capacity>
 Summary Node<Estimators, Capacity>::summary(const Estimate& estimate) const {
-  const auto& primary = std::get<kPrimary>(lanes_);
+  const auto& primary = history_.primary();
   Summary s{.mode = primary.mode(context()),
             .position_valid = estimate.position_valid,
             .heading_valid = estimate.heading_valid,

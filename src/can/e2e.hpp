@@ -39,25 +39,4 @@ template <Protected M>
   return message;
 }
 
-/// What a counter says, given the last one accepted.
-enum class Continuity : std::uint8_t { kFirst, kNext, kRepeated, kSkipped };
-
-class CounterCheck {
- public:
-  /// Takes the counter of a frame whose CRC was right.
-  constexpr Continuity accept(std::uint8_t ctr) {
-    const auto step = static_cast<std::uint8_t>((ctr - last_) & 0xF);
-    const Continuity verdict = last_ == kNone ? Continuity::kFirst
-                               : step == 1    ? Continuity::kNext
-                               : step == 0    ? Continuity::kRepeated
-                                              : Continuity::kSkipped;
-    last_ = ctr & 0xF;
-    return verdict;
-  }
-
- private:
-  static constexpr std::uint8_t kNone = 0xFF;
-  std::uint8_t last_ = kNone;
-};
-
 }  // namespace tetap::can

@@ -56,16 +56,5 @@ TEST(Protection, CoversTheOffsetThenBytesOneToSeven) {
   EXPECT_EQ(crc.value(), 0xDF);
 }
 
-TEST(Counter, TellsFirstNextRepeatedAndSkipped) {
-  CounterCheck check;
-  EXPECT_EQ(check.accept(14), Continuity::kFirst);
-  EXPECT_EQ(check.accept(15), Continuity::kNext);
-  EXPECT_EQ(check.accept(0), Continuity::kNext) << "modulo 16";
-  EXPECT_EQ(check.accept(0), Continuity::kRepeated);
-  EXPECT_EQ(check.accept(2), Continuity::kSkipped);
-  EXPECT_EQ(check.accept(3), Continuity::kNext) << "goes on from the one that came";
-  EXPECT_EQ(check.accept(2), Continuity::kSkipped) << "back is not next";
-}
-
 }  // namespace
 }  // namespace tetap::can

@@ -1,0 +1,213 @@
+// SPDX-License-Identifier: Apache-2.0
+// The rule of order and lateness: samples are consumed in the order in which they were true, late ones at their own
+// time, and what left the window is final. Holds the estimators and the samples of the window.
+#pragma once
+
+#include "app/health.hpp"
+#include "app/lane.hpp"
+#include "app/timeline.hpp"
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <tuple>
+#include <type_traits>
+#include <utility>
+
+namespace tetap::app {
+
+/// The estimators a robot runs, in the order of their output instances; the last is the one the status speaks of.
+template <Estimator... E>
+struct Estimators {
+  static_assert(sizeof...(E) >= 1 && sizeof...(E) <= 4, "the bus has four output instances");
+  using Lanes = std::tuple<Lane<E>...>;
+  static constexpr std::size_t kCount = sizeof...(E);
+};
+
+/// `Note` is called with (instance, sample, innovation) for every record.
+template <class Estimators, std::size_t Capacity>
+class History {
+ public:
+  static constexpr std::size_t kCount = Estimators::kCount;
+  static constexpr std::size_t kPrimary = kCount - 1;
+
+  void power_on(base::Micros t, const Context& with) {
+    timeline_.power_on();
+    closed_until_ = t;
+    each_lane([&](auto& lane) {
+      lane.restart(t, with);
+      lane.clear_statistics();
+    });
+  }
+  void restart(base::Micros t, const Context& with) {
+    each_lane([&](auto& lane) { lane.restart(t, with); });
+  }
+  void clear() { timeline_.clear(); }
+  /// The window begins after t.
+  void open_from(base::Micros t) { closed_until_ = t; }
+
+  /// Samples up to here can no longer be fused.
+  [[nodiscard]] base::Micros closed_until() const { return closed_until_; }
+
+  /// Into its place in the window; when that is full the oldest consumed sample makes room.
+  template <class Note>
+  [[nodiscard]] Insert insert(const Sample& sample, const Context& with, Note&& note);
+
+  /// Everything true until t goes into the estimators; on_new(sample) comes before a sample's first use. Gives how many
+  /// new samples no estimator takes.
+  template <class OnNew, class Note>
+  std::uint16_t consume(base::Micros t, const Context& with, OnNew&& on_new, Note&& note);
+
+  /// What was true until t leaves the window and becomes final.
+  template <class Note>
+  void retire_until(base::Micros t, const Context& with, Note&& note) {
+    leave_until(t, Past::kFollows, with, note);
+  }
+  /// The same at once: nothing from before t is fused any more, and plain estimators' past is their present.
+  template <class Note>
+  void close_window(base::Micros t, const Context& with, Note&& note) {
+    leave_until(t, Past::kIsNow, with, note);
+    each_lane([](auto& lane) { lane.close(); });
+  }
+
+  /// Brings every estimator to t.
+  void advance(base::Micros t, const Context& with) {
+    const auto window = [this](auto&& each) {
+      for (std::size_t i = 0; i < timeline_.size() && timeline_.consumed(i); ++i) each(timeline_[i]);
+    };
+    each_lane([&](auto& lane) { lane.advance(t, with, window); });
+  }
+
+  using Estimates = std::array<Estimate, kCount>;
+  [[nodiscard]] Estimates estimates(const Context& with) const {
+    return std::apply([&](const auto&... lane) { return std::array{lane.estimate(with)...}; }, lanes_);
+  }
+  template <class F>
+  void each_lane(F&& f) {
+    std::apply([&](auto&... lane) { (f(lane), ...); }, lanes_);
+  }
+  template <class F>
+  void each_lane(F&& f) const {
+    std::apply([&](const auto&... lane) { (f(lane), ...); }, lanes_);
+  }
+  [[nodiscard]] const auto& lanes() const { return lanes_; }
+  [[nodiscard]] const auto& primary() const { return std::get<kPrimary>(lanes_); }
+  [[nodiscard]] std::uint16_t high_water() const { return timeline_.high_water(); }
+
+  template <class Sink>
+  void each_bit(Sink&& sink) const {
+    each_lane([&](const auto& lane) { lane.each_bit(sink); });
+    sink(timeline_.digest());
+  }
+
+ private:
+  /// How a plain estimator's far end follows: by the samples that leave, or at once, as a copy of its present.
+  enum class Past : std::uint8_t { kFollows, kIsNow };
+
+  template <class Note>
+  void leave_until(base::Micros t, Past past, const Context& with, Note& note);
+  template <class Note>
+  void leave(const Sample& sample, Past past, const Context& with, Note& note);
+  template <class Lane>
+  [[nodiscard]] bool came_late(std::size_t due) const;
+
+  typename Estimators::Lanes lanes_;
+  Timeline<Capacity> timeline_;
+  base::Micros closed_until_;
+};
+
+template <class Estimators, std::size_t Capacity>
+template <class Note>
+Insert History<Estimators, Capacity>::insert(const Sample& sample, const Context& with, Note&& note) {
+  const Insert result = timeline_.insert(sample);
+  if (result != Insert::kFull || !timeline_.consumed(0)) return result;
+  leave(timeline_[0], Past::kFollows, with, note);
+  timeline_.drop_front(1);
+  return timeline_.insert(sample);
+}
+
+template <class Estimators, std::size_t Capacity>
+template <class Note>
+void History<Estimators, Capacity>::leave_until(base::Micros t, Past past, const Context& with, Note& note) {
+  std::size_t count = 0;
+  while (count < timeline_.size() && timeline_.consumed(count) && timeline_[count].stamp <= t)
+    leave(timeline_[count++], past, with, note);
+  timeline_.drop_front(count);
+  if (t > closed_until_) closed_until_ = t;
+}
+
+template <class Estimators, std::size_t Capacity>
+template <class Note>
+void History<Estimators, Capacity>::leave(const Sample& sample, Past past, const Context& with, Note& note) {
+  std::size_t instance = 0;
+  each_lane([&](auto& lane) {
+    if constexpr (std::remove_cvref_t<decltype(lane)>::kDelayed) {
+      const Innovation innovation = lane.fuse(sample, with);
+      lane.account(sample, innovation);
+      note(instance, sample, innovation);
+    } else if (past == Past::kFollows) {
+      lane.retire(sample, with);
+    }
+    ++instance;
+  });
+  if (sample.stamp > closed_until_) closed_until_ = sample.stamp;
+}
+
+/// Whether something new belongs before something that the lane has fused already.
+template <class Estimators, std::size_t Capacity>
+template <class Lane>
+bool History<Estimators, Capacity>::came_late(std::size_t due) const {
+  if (Lane::kDelayed) return false;
+  bool is_new = false;
+  for (std::size_t i = 0; i < due; ++i) {
+    if (!Lane::takes(timeline_[i])) continue;
+    if (!timeline_.consumed(i)) {
+      is_new = true;
+    } else if (is_new) {
+      return true;
+    }
+  }
+  return false;
+}
+
+template <class Estimators, std::size_t Capacity>
+template <class OnNew, class Note>
+std::uint16_t History<Estimators, Capacity>::consume(base::Micros t, const Context& with, OnNew&& on_new, Note&& note) {
+  const std::size_t due = timeline_.until(t);
+  std::array<bool, kCount> again{};
+  std::size_t instance = 0;
+  each_lane([&](auto& lane) {
+    bool& repeat = again[instance++];
+    repeat = came_late<std::remove_cvref_t<decltype(lane)>>(due);
+    if constexpr (!std::remove_cvref_t<decltype(lane)>::kDelayed) {
+      if (repeat) lane.rewind();
+    }
+  });
+  std::uint16_t not_used = 0;
+  for (std::size_t i = 0; i < due; ++i) {
+    const Sample& sample = timeline_[i];
+    const bool is_new = !timeline_.consumed(i);
+    if (is_new) on_new(sample);
+    instance = 0;
+    bool taken = false;
+    each_lane([&](auto& lane) {
+      using Lane = std::remove_cvref_t<decltype(lane)>;
+      if constexpr (Lane::kDelayed) {
+        taken = taken || Lane::takes(sample);
+      } else if (is_new || again[instance]) {
+        const Innovation innovation = lane.fuse(sample, with);
+        if (is_new) {
+          taken = taken || innovation.verdict != can::Verdict::kNotUsed;
+          lane.account(sample, innovation);
+          note(instance, sample, innovation);
+        }
+      }
+      ++instance;
+    });
+    if (is_new && !taken) ++not_used;
+    timeline_.consume(i);
+  }
+  return not_used;
+}
+
+}  // namespace tetap::app

@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: Apache-2.0
+// Messages of several pages, one page at a time: counters, and what an inertial estimator has beyond pose and velocity.
+#pragma once
+
+#include "app/estimate.hpp"
+#include "app/health.hpp"
+#include "base/math.hpp"
+#include "config/messages.hpp"
+
+#include <cstdint>
+
+namespace tetap::app {
+
+/// put(message) is called once.
+template <class Put>
+void put_diagnostics(std::uint32_t page, const Counters& c, const LoopHealth& l, std::uint16_t timeline_high,
+                     Put&& put) {
+  constexpr std::uint32_t kLongest = 0xFFFFFE;
+  switch (page % 8) {
+    case 0:
+      put(can::EstDiagLoop{.loop_max_us = l.longest_us < kLongest ? l.longest_us : kLongest,
+                           .loop_mean_us = static_cast<std::uint16_t>(l.mean_us < 65534.0F ? l.mean_us : 65534.0F),
+                           .sync = l.sync});
+      break;
+    case 1:
+      put(can::EstDiagTicks{.ticks_late = l.ticks_late, .sync_lost = l.sync_lost, .sync_back = l.sync_back});
+      break;
+    case 2:
+      put(can::EstDiagQueues{
+          .timeline_high = timeline_high, .events_high = c.events_high_water, .events_dropped = c.events_dropped});
+      break;
+    case 3:
+      put(can::EstDiagOrder{.too_late = c.too_late, .too_early = c.too_early, .duplicate = c.duplicate});
+      break;
+    case 4:
+      put(can::EstDiagFrames{.incomplete = c.incomplete, .malformed = c.malformed, .out_of_range = c.out_of_range});
+      break;
+    case 5:
+      put(can::EstDiagBus{.rx_overflow = static_cast<std::uint16_t>(l.bus.rx_overflow),
+                          .tx_full = static_cast<std::uint16_t>(l.bus.tx_full),
+                          .bus_off = static_cast<std::uint16_t>(l.bus.bus_off)});
+      break;
+    case 6:
+      put(can::EstDiagRefused{.not_used = c.not_used, .no_time = c.no_time, .cmd_refused = c.command_refused});
+      break;
+    default:
+      put(can::EstDiagCapacity{.map_full = c.map_full, .sync_jump = l.sync_jump, .timeline_full = c.timeline_full});
+      break;
+  }
+}
+
+template <class Put>
+void put_state_page(std::uint32_t page, const InertialEstimate& e, std::uint8_t tag, Put&& put) {
+  const nav::InsState& x = e.state;
+  const auto std = [&e](int i) { return base::sqrt(e.p(i, i)); };
+  switch (page % 7) {
+    case 0:
+      put(can::EstStateHeight{.epoch = tag, .height_m = base::metres(x.z.um()), .std_height_m = std(2)});
+      break;
+    case 1:
+      put(can::EstStateAccBias{.epoch = tag,
+                               .acc_bias_x_mps2 = x.b_a_mps2(0),
+                               .acc_bias_y_mps2 = x.b_a_mps2(1),
+                               .acc_bias_z_mps2 = x.b_a_mps2(2)});
+      break;
+    case 2:
+      put(can::EstStateGyroBias{.epoch = tag,
+                                .gyro_bias_x_radps = x.b_g_radps(0),
+                                .gyro_bias_y_radps = x.b_g_radps(1),
+                                .gyro_bias_z_radps = x.b_g_radps(2)});
+      break;
+    case 3:
+      put(can::EstStateStdVel{
+          .epoch = tag, .std_vel_east_mps = std(3), .std_vel_north_mps = std(4), .std_vel_up_mps = std(5)});
+      break;
+    case 4:
+      put(can::EstStateStdTilt{.epoch = tag, .std_tilt_east_rad = std(6), .std_tilt_north_rad = std(7)});
+      break;
+    case 5:
+      put(can::EstStateStdAccBias{
+          .epoch = tag, .std_acc_bias_x_mps2 = std(9), .std_acc_bias_y_mps2 = std(10), .std_acc_bias_z_mps2 = std(11)});
+      break;
+    default:
+      put(can::EstStateStdGyroBias{.epoch = tag,
+                                   .std_gyro_bias_x_radps = std(12),
+                                   .std_gyro_bias_y_radps = std(13),
+                                   .std_gyro_bias_z_radps = std(14)});
+      break;
+  }
+}
+
+}  // namespace tetap::app
