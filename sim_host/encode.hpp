@@ -86,6 +86,21 @@ inline void encode(std::uint32_t base, const Measurement& m, std::vector<base::C
                                 .id = v.landmark,
                                 .range_m = v.range_m,
                                 .bearing_rad = v.bearing_rad});
+      },
+      [&](const app::MagneticFlux& v) {
+        put(can::InMag{.stamp_us = stamp,
+                       .seq = seq,
+                       .inst = m.instance,
+                       .flux_x_uT = v.flux_b_uT[0],
+                       .flux_y_uT = v.flux_b_uT[1],
+                       .flux_z_uT = v.flux_b_uT[2]});
+      },
+      [&](const app::AirPressure& v) {
+        put(can::InBaro{.stamp_us = stamp,
+                        .seq = seq,
+                        .inst = m.instance,
+                        .pressure_Pa = v.pressure_Pa,
+                        .temp_degC = v.temperature_degC});
       }};
   std::visit(write, m.value);
 }

@@ -4,6 +4,7 @@
 #pragma once
 
 #include "config/rover.hpp"
+#include "config/rover_inertial.hpp"
 #include "sim_host/world/world.hpp"
 
 namespace tetap::sim {
@@ -28,6 +29,30 @@ namespace tetap::sim {
   n.gnss.origin_latitude_2ndeg = origin.latitude_2ndeg;
   n.gnss.origin_longitude_2ndeg = origin.longitude_2ndeg;
   n.gnss.origin_height_m = single(origin.height_m);
+  return n;
+}
+
+/// Likewise the rover with inertial navigation, for a world with matched_inertial()'s errors.
+[[nodiscard]] inline app::Numbers matched_inertial_rover() {
+  const World::Options options{.mismatched = false, .inertial = true};
+  const Numbers world = matched_inertial(options.numbers);
+  const auto single = [](double x) { return static_cast<float>(x); };
+  const double walk_rthz = sim::sqrt(2 / world.imu.walk_tau_s);
+  app::Numbers n = robot::rover_inertial::numbers;
+  const app::Numbers planar = matched_rover();
+  n.wheels = planar.wheels;
+  n.gyro = planar.gyro;
+  n.gnss = planar.gnss;
+  n.gnss.sigma_velocity_floor_mps = 0;
+  n.inertial.gyro_radps_rthz = single(world.imu.gyro_noise);
+  n.inertial.accel_mps2_rthz = single(world.imu.accel_noise[2]);
+  n.inertial.gyro_bias_radps2_rthz = single(world.imu.gyro_walk_radps * walk_rthz);
+  n.inertial.accel_bias_mps3_rthz = single(world.imu.accel_walk_mps2 * walk_rthz);
+  n.inertial.gyro_turn_on_radps = single(world.imu.gyro_walk_radps);
+  n.inertial.accel_turn_on_mps2 = single(world.imu.accel_walk_mps2);
+  n.inertial.wheel_mps = 0.001F;
+  n.inertial.slip_share = single(world.wheels.noise_share / sim::sqrt(2));  // of the mean of two wheels
+  n.inertial.lateral_mps = n.inertial.vertical_mps = single(world.rover.jitter_mps);
   return n;
 }
 

@@ -16,7 +16,8 @@
 
 namespace tetap::sim {
 
-inline constexpr std::string_view kRobotNames = "car husky labyrinth mrclam rover rover_inertial rover_matched";
+inline constexpr std::string_view kRobotNames =
+    "car husky labyrinth mrclam rover rover_inertial rover_inertial_matched rover_matched";
 
 /// Calls f(std::type_identity<Estimators>, numbers) for the robot of that name; false when there is none.
 template <class F>
@@ -26,6 +27,8 @@ template <class F>
     return f(std::type_identity<robot::rover_inertial::Estimators>{}, robot::rover_inertial::numbers), true;
   if (name == "car") return f(std::type_identity<robot::car::Estimators>{}, robot::car::numbers), true;
   if (name == "rover_matched") return f(std::type_identity<robot::rover::Estimators>{}, matched_rover()), true;
+  if (name == "rover_inertial_matched")
+    return f(std::type_identity<robot::rover_inertial::Estimators>{}, matched_inertial_rover()), true;
   if (name == "mrclam") return f(std::type_identity<robot::mrclam::Estimators>{}, robot::mrclam::numbers), true;
   if (name == "husky") return f(std::type_identity<robot::husky::Estimators>{}, robot::husky::numbers), true;
   if (name == "labyrinth")

@@ -5,8 +5,10 @@
 #include "sim_host/play/lockstep.hpp"
 #include "sim_host/play/realtime.hpp"
 #include "sim_host/play/session.hpp"
+#include "sim_host/sent.hpp"
 #include "sim_host/world_source.hpp"
 
+#include <cmath>
 #include <cstdio>
 #include <exception>
 #include <string>
@@ -28,6 +30,11 @@ std::string help() {
           "  --seed N           every draw follows from it (default 1)\n"
           "  --duration S       at most so long (default: the whole course)\n"
           "  --matched          only errors that the filters model\n"
+          "  --course NAME      yard (default) or road: 1.1 km at 5 m/s\n"
+          "  --laps N           the course so many times (default 1)\n"
+          "  --imu-hz N         IMU samples a second (default 100)\n"
+          "  --gnss-m S         1 sigma of GNSS positions per horizontal axis (default 0.85)\n"
+          "  --no-pose          the node is not told where it starts\n"
           "  --fault NAME[@START[+DURATION]]   seconds; several with commas:\n") +
       sim::fault_help() +
       "  --realtime         at the speed of the world, with Tick frames; else lockstep, as fast as the node can\n"
@@ -54,11 +61,18 @@ std::string landmarks_json(const sim::World& world) {
 void write_truth(const std::string& folder, const sim::WorldSource& source, bool lockstep) {
   sim::OutFile file(folder + "/truth.csv");
   sim::Line line;
-  file.write(lockstep ? "time_s,x_m,y_m,yaw_rad,epoch\n" : "time_s,x_m,y_m,yaw_rad\n");
+  file.write(
+      "time_s,x_m,y_m,yaw_rad,z_m,roll_rad,pitch_rad,v_east_mps,v_north_mps,v_up_mps,gyro_bias_x_radps,gyro_bias_y_"
+      "radps,"
+      "gyro_bias_z_radps,acc_bias_x_mps2,acc_bias_y_mps2,acc_bias_z_mps2");
+  file.write(lockstep ? ",epoch\n" : "\n");
   std::int64_t epoch = 0;
   for (const sim::Truth& t : source.truth()) {
     line.clear();
     line.fixed(t.time.us, 6).text(",").real(t.x_m, 6).text(",").real(t.y_m, 6).text(",").real(t.yaw_rad, 6);
+    for (const double x : {t.z_m, t.roll_rad, t.pitch_rad}) line.text(",").real(x, 6);
+    for (const sim::Vector3& v : {t.v_n_mps, t.gyro_bias_b_radps, t.accel_bias_b_mps2})
+      for (const double x : v) line.text(",").real(x, 6);
     if (lockstep) line.text(",").integer(++epoch);
     file.write(line.text("\n").view());
   }
@@ -70,6 +84,7 @@ struct Run {
   std::uint64_t seed = 1;
   base::Micros limit;
   bool realtime = false;
+  bool told_pose = true;
   std::string faults;
   sim::SessionOptions session;
   sim::LockstepOptions lockstep;
@@ -77,7 +92,8 @@ struct Run {
 
 template <sim::Link L>
 int drive(L& link, const Run& run) {
-  sim::WorldSource source(sim::World(run.world, run.seed), run.session.base, base::Micros{10'000}, run.limit);
+  sim::WorldSource source(sim::World(run.world, run.seed), run.session.base, base::Micros{10'000}, run.limit,
+                          run.told_pose);
   auto about = run.session;
   about.ticks = static_cast<std::uint64_t>(std::min(run.limit, source.world().duration()).us / 10'000);
   sim::Session session(about);
@@ -98,11 +114,39 @@ int drive(L& link, const Run& run) {
   return status;
 }
 
+int counted(const sim::Options& options, const char* name, int otherwise, int least, int most) {
+  const double given = options.number(name, otherwise);
+  if (!(given >= least && given <= most && given - std::floor(given) <= 0))
+    throw std::runtime_error(std::string("--") + name + ": a whole number from " + std::to_string(least) + " to " +
+                             std::to_string(most));
+  return static_cast<int>(given);
+}
+
+void set_world(const sim::Options& options, sim::World::Options& world) {
+  const std::string course = options.text("course", "yard");
+  const int laps = counted(options, "laps", 1, 1, 1000);
+  if (course == "road") {
+    world.course = sim::road_course(laps);
+    world.limits.speed_mps = 5;
+  } else if (course == "yard") {
+    world.course = sim::default_course(laps);
+  } else {
+    throw std::runtime_error("--course " + course + ": it is yard or road");
+  }
+  world.numbers.imu.rate_hz = counted(options, "imu-hz", world.numbers.imu.rate_hz, 1, 2000);
+  if (!options.has("gnss-m")) return;
+  const double gnss_m = options.number("gnss-m", 0);
+  if (!(gnss_m >= 0.001 && gnss_m <= 100)) throw std::runtime_error("--gnss-m: from 0.001 to 100 m");
+  world.numbers.gnss = sim::with_error(world.numbers.gnss, gnss_m);
+}
+
 }  // namespace
 
 int main(int argc, char** argv) try {
-  const sim::Options options(argc, argv, {"can", "robot", "out", "seed", "duration", "fault", "window", "base"},
-                             {"memory", "matched", "realtime", "emulated", "raw", "quiet"}, help().c_str());
+  const sim::Options options(
+      argc, argv,
+      {"can", "robot", "out", "seed", "duration", "fault", "window", "base", "course", "laps", "imu-hz", "gnss-m"},
+      {"memory", "matched", "realtime", "emulated", "raw", "quiet", "no-pose"}, help().c_str());
   if (!options.words().empty()) throw std::runtime_error("'" + options.words().front() + "': an option begins with --");
   Run run;
   const std::string interface = options.text("can", "vcan0");
@@ -111,6 +155,9 @@ int main(int argc, char** argv) try {
   run.seed = static_cast<std::uint64_t>(options.number("seed", 1));
   run.limit = {static_cast<std::int64_t>(options.number("duration", 86'400) * 1e6)};
   run.world.mismatched = !options.has("matched");
+  run.told_pose = !options.has("no-pose");
+  set_world(options, run.world);
+  sim::send_only(sim::sent_to(robot), run.world);
   for (const std::string& given : options.all("fault")) {
     const sim::FaultsParsed parsed = sim::parse_faults(given);
     if (!parsed.error.empty()) throw std::runtime_error(parsed.error);

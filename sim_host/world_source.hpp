@@ -15,8 +15,9 @@ namespace tetap::sim {
 
 class WorldSource {
  public:
-  WorldSource(World world, std::uint32_t base, base::Micros period, base::Micros limit)
+  WorldSource(World world, std::uint32_t base, base::Micros period, base::Micros limit, bool told_pose = true)
       : world_(std::move(world)),
+        told_pose_(told_pose && !world_.faults().active(Fault::kMovingStart, {})),
         base_(base),
         period_(period),
         next_(world_.start() + period),
@@ -45,6 +46,7 @@ class WorldSource {
     for (const Landmark& mark : world_.map())
       frames_.push_back(can::frame(
           base_, can::InMapEntry{.id = mark.id, .x_raw = millimetres(mark.x_m), .y_raw = millimetres(mark.y_m)}));
+    if (!told_pose_) return;
     const StartPose start = world_.start_pose();
     frames_.push_back(
         can::frame(base_, can::protect(can::CmdSetPos{
@@ -58,6 +60,7 @@ class WorldSource {
   static std::int32_t millimetres(double m) { return static_cast<std::int32_t>(std::lround(m * 1000.0)); }
 
   World world_;
+  bool told_pose_;
   std::uint32_t base_;
   base::Micros period_;
   base::Micros next_;

@@ -13,6 +13,15 @@ namespace {
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
+/// The name of a code of the bus, or its number where this program does not know it.
+template <class Code>
+void put_name(Line& line, Code code) {
+  if (name(code) == "?")
+    line.integer(static_cast<std::int64_t>(code));
+  else
+    line.text(name(code));
+}
+
 constexpr double millimetres(std::int32_t raw) {
   return raw == can::EstPos::kXNotAvailable ? kNone : raw * can::EstPos::kXScale;
 }
@@ -23,14 +32,25 @@ Recorder::Recorder(const RecorderOptions& options)
     : options_(options),
       estimates_log_((make_folder(options.folder), options.folder + "/estimates.log"), OutFile::Hash::kSha256),
       estimates_(options.folder + "/estimates.csv"),
+      states_(options.folder + "/states.csv"),
       innovations_(options.folder + "/innovations.csv"),
+      sensors_(options.folder + "/sensors.csv"),
       status_(options.folder + "/status.csv") {
   if (options.raw) raw_.emplace(options.folder + "/raw.log");
   estimates_.write(
       "epoch,time_s,estimator,kind,x_m,y_m,yaw_rad,speed_mps,yaw_rate_radps,std_x_m,std_y_m,std_yaw_rad,corr_xy,corr_x_"
       "yaw,corr_y_yaw,"
       "pos_valid,hdg_valid\n");
+  states_.write(
+      "epoch,time_s,estimator,q_w,q_x,q_y,q_z,v_east_mps,v_north_mps,v_up_mps,height_m,std_height_m,acc_bias_x_mps2,"
+      "acc_"
+      "bias_y_mps2,acc_bias_z_mps2,gyro_bias_x_radps,gyro_bias_y_radps,gyro_bias_z_radps,std_v_east_mps,std_v_north_"
+      "mps,"
+      "std_v_up_mps,std_tilt_east_rad,std_tilt_north_rad,std_acc_bias_x_mps2,std_acc_bias_y_mps2,std_acc_bias_z_mps2,"
+      "std_"
+      "gyro_bias_x_radps,std_gyro_bias_y_radps,std_gyro_bias_z_radps,jump_x_m,jump_y_m,jump_yaw_rad\n");
   innovations_.write("epoch,time_s,estimator,sensor,inst,verdict,dof,nis,ratio,age_ms,landmark\n");
+  sensors_.write("epoch,time_s,estimator,sensor,inst,accepted,rejected,nis_mean,age_s\n");
   status_.write("epoch,time_s,mode,used,faults,reset_ctr,reset_cause\n");
 }
 
@@ -67,6 +87,7 @@ void Recorder::epoch(const NodeEpoch& epoch, base::Micros time) {
   totals_.state_crc = epoch.tail.crc;
   const base::Micros bus_time{static_cast<std::int64_t>(static_cast<std::uint64_t>(time.us) & kTimeMask)};
   instances_ = {};
+  states_now_ = {};
   for (const base::CanFrame& f : epoch.frames) {
     frame(f);
     if (!is_deterministic(f.id - options_.base)) continue;
@@ -76,6 +97,8 @@ void Recorder::epoch(const NodeEpoch& epoch, base::Micros time) {
   }
   for (std::size_t k = 0; k < instances_.size(); ++k)
     if (instances_[k].position) estimate_row(k, instances_[k]);
+  for (std::size_t k = 0; k < states_now_.size(); ++k)
+    if (states_now_[k].said) state_row(k, states_now_[k]);
 }
 
 void Recorder::frame(const base::CanFrame& f) {
@@ -83,6 +106,8 @@ void Recorder::frame(const base::CanFrame& f) {
   const auto payload = can::payload(f);
   if (offset == can::EstInnov::kOffset) {
     if (const auto innovation = can::decode<can::EstInnov>(payload)) innovation_row(*innovation);
+  } else if (offset == can::EstSensorStat::kOffset) {
+    if (const auto statistics = can::decode<can::EstSensorStat>(payload)) sensor_row(*statistics);
   } else if (offset == can::EstStatus::kOffset) {
     if (const auto status = can::decode<can::EstStatus>(payload)) status_row(*status);
   } else if (offset >= can::EstPos::kOffset) {
@@ -97,8 +122,53 @@ void Recorder::frame(const base::CanFrame& f) {
     } else if (offset == can::offset_of<can::EstStdPose>(k)) {
       if (const auto pose = can::decode<can::EstStdPose>(payload)) instance.deviation = pose;
       if (const auto more = can::decode<can::EstStdMore>(payload)) instance.correlation = more;
+    } else {
+      state(states_now_[k], offset - static_cast<std::uint32_t>(k * can::EstPos::kStride), payload);
     }
   }
+}
+
+void Recorder::state(State& state, std::uint32_t offset, std::span<const std::uint8_t> payload) {
+  if (!state.said) state.values.fill(kNone);
+  const auto put = [&state](std::size_t column, auto... values) {
+    for (const float value : {values...}) state.values[column++] = static_cast<double>(value);
+    state.said = true;
+  };
+  const auto page = [&]<class Page>(std::size_t column, auto Page::*... fields) {
+    if (const auto found = can::decode<Page>(payload)) put(column, (*found).*fields...);
+  };
+  if (offset == can::EstAtt::kOffset)
+    page(0, &can::EstAtt::w, &can::EstAtt::x, &can::EstAtt::y, &can::EstAtt::z);
+  else if (offset == can::EstVel::kOffset)
+    page(4, &can::EstVel::east_mps, &can::EstVel::north_mps, &can::EstVel::up_mps);
+  if (offset != can::EstStateHeight::kOffset) return;
+  page(7, &can::EstStateHeight::height_m, &can::EstStateHeight::std_height_m);
+  using can::EstStateAccBias, can::EstStateGyroBias, can::EstStateStdVel, can::EstStateStdTilt;
+  using can::EstStateStdAccBias, can::EstStateStdGyroBias, can::EstStateJump;
+  page(9, &EstStateAccBias::acc_bias_x_mps2, &EstStateAccBias::acc_bias_y_mps2, &EstStateAccBias::acc_bias_z_mps2);
+  page(12, &EstStateGyroBias::gyro_bias_x_radps, &EstStateGyroBias::gyro_bias_y_radps,
+       &EstStateGyroBias::gyro_bias_z_radps);
+  page(15, &EstStateStdVel::std_vel_east_mps, &EstStateStdVel::std_vel_north_mps, &EstStateStdVel::std_vel_up_mps);
+  page(18, &EstStateStdTilt::std_tilt_east_rad, &EstStateStdTilt::std_tilt_north_rad);
+  page(20, &EstStateStdAccBias::std_acc_bias_x_mps2, &EstStateStdAccBias::std_acc_bias_y_mps2,
+       &EstStateStdAccBias::std_acc_bias_z_mps2);
+  page(23, &EstStateStdGyroBias::std_gyro_bias_x_radps, &EstStateStdGyroBias::std_gyro_bias_y_radps,
+       &EstStateStdGyroBias::std_gyro_bias_z_radps);
+  page(26, &EstStateJump::jump_x_m, &EstStateJump::jump_y_m, &EstStateJump::jump_yaw_rad);
+}
+
+void Recorder::state_row(std::size_t k, const State& state) {
+  row(time_).integer(static_cast<std::int64_t>(k));
+  for (const double value : state.values) line_.put(',').real(value, 6);
+  states_.write(line_.put('\n').view());
+}
+
+void Recorder::sensor_row(const can::EstSensorStat& s) {
+  row(time_).integer(s.estimator).put(',');
+  put_name(line_, s.sensor);
+  line_.put(',').integer(s.inst).put(',').integer(s.accepted).put(',').integer(s.rejected).put(',');
+  line_.real(static_cast<double>(s.nis_mean), 2).put(',').real(static_cast<double>(s.age_s), 2);
+  sensors_.write(line_.put('\n').view());
 }
 
 void Recorder::estimate_row(std::size_t k, const Instance& e) {
@@ -111,7 +181,8 @@ void Recorder::estimate_row(std::size_t k, const Instance& e) {
   const auto correlation = [&](float can::EstStdMore::*field) {
     return e.correlation ? static_cast<double>((*e.correlation).*field) : kNone;
   };
-  row(time_).integer(static_cast<std::int64_t>(k)).put(',').text(name(e.position->kind));
+  row(time_).integer(static_cast<std::int64_t>(k)).put(',');
+  put_name(line_, e.position->kind);
   line_.put(',').real(millimetres(e.position->x_raw), 3).put(',').real(millimetres(e.position->y_raw), 3);
   line_.put(',').real(motion(&can::EstMotion::yaw_rad), 4).put(',').real(motion(&can::EstMotion::speed_mps), 3);
   line_.put(',').real(motion(&can::EstMotion::yaw_rate_radps), 4);
@@ -129,7 +200,10 @@ void Recorder::estimate_row(std::size_t k, const Instance& e) {
 }
 
 void Recorder::innovation_row(const can::EstInnov& i) {
-  row(time_).integer(i.estimator).put(',').text(name(i.sensor)).put(',').integer(i.inst).put(',').text(name(i.verdict));
+  row(time_).integer(i.estimator).put(',');
+  put_name(line_, i.sensor);
+  line_.put(',').integer(i.inst).put(',');
+  put_name(line_, i.verdict);
   line_.put(',')
       .integer(i.dof)
       .put(',')
@@ -144,26 +218,21 @@ void Recorder::innovation_row(const can::EstInnov& i) {
 }
 
 void Recorder::status_row(const can::EstStatus& s) {
-  row(time_)
-      .text(name(s.mode))
-      .put(',')
-      .integer(s.used)
-      .put(',')
-      .integer(s.faults)
-      .put(',')
-      .integer(s.reset_ctr)
-      .put(',');
-  status_.write(line_.text(name(s.reset_cause)).put('\n').view());
+  row(time_);
+  put_name(line_, s.mode);
+  line_.put(',').integer(s.used).put(',').integer(s.faults).put(',').integer(s.reset_ctr).put(',');
+  put_name(line_, s.reset_cause);
+  status_.write(line_.put('\n').view());
 }
 
 void Recorder::flush() {
-  for (OutFile* file : {&estimates_log_, &estimates_, &innovations_, &status_}) file->flush();
+  for (OutFile* file : {&estimates_log_, &estimates_, &states_, &innovations_, &sensors_, &status_}) file->flush();
   if (raw_) raw_->flush();
 }
 
 const Recorder::Totals& Recorder::finish() {
   totals_.estimates_sha256 = estimates_log_.close();
-  for (OutFile* file : {&estimates_, &innovations_, &status_}) file->close();
+  for (OutFile* file : {&estimates_, &states_, &innovations_, &sensors_, &status_}) file->close();
   if (raw_) raw_->close();
   return totals_;
 }

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Writes what a node said: estimates.log (candump format, stamped with the epoch's time, only frames that are the same
-// in every run of the same input), estimates.csv, innovations.csv, status.csv, and on request raw.log (everything on
-// the bus as it came).
+// in every run of the same input), estimates.csv, states.csv (what an inertial or attitude estimator says beyond a
+// pose), innovations.csv, sensors.csv (statistics by sensor), status.csv, and on request raw.log (everything on the bus
+// as it came).
 #pragma once
 
 #include "sim_host/play/out_file.hpp"
@@ -10,6 +11,7 @@
 #include <array>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 
 namespace tetap::sim {
@@ -63,18 +65,28 @@ class Recorder {
     std::optional<can::EstStdPose> deviation;
     std::optional<can::EstStdMore> correlation;
   };
+  /// A row of states.csv: empty is what this epoch does not say.
+  struct State {
+    static constexpr std::size_t kColumns = 29;
+    std::array<double, kColumns> values{};
+    bool said = false;
+  };
   void frame(const base::CanFrame& frame);
   void estimate_row(std::size_t k, const Instance& instance);
+  void state(State& state, std::uint32_t offset, std::span<const std::uint8_t> payload);
+  void state_row(std::size_t k, const State& state);
+  void sensor_row(const can::EstSensorStat& statistics);
   void innovation_row(const can::EstInnov& innovation);
   void status_row(const can::EstStatus& status);
   Line& row(base::Micros time);
   void raw_line(const base::CanFrame& frame, base::Micros time);
 
   RecorderOptions options_;
-  OutFile estimates_log_, estimates_, innovations_, status_;
+  OutFile estimates_log_, estimates_, states_, innovations_, sensors_, status_;
   std::optional<OutFile> raw_;
   Line line_;
   std::array<Instance, can::EstPos::kCount> instances_{};
+  std::array<State, can::EstPos::kCount> states_now_{};
   std::uint64_t number_ = 0;  ///< of the epoch
   std::uint8_t last_epoch_ = 0;
   bool restarted_ = true;

@@ -34,6 +34,12 @@ enum class Stream : std::uint32_t {
   kSurvey,
   kFaultOutlier,
   kFaultLoss,
+  kMagnetometer,
+  kMagnetometerTurnOn,
+  kMagnetometerLatency,
+  kBarometer,
+  kBarometerLatency,
+  kJitter,
 };
 
 class Chance {

@@ -63,6 +63,29 @@ Course default_course() {
   };
 }
 
+Course default_course(int laps) {
+  Course course = default_course();
+  const std::vector<Waypoint> lap(course.waypoints.begin() + 1, course.waypoints.end());
+  for (int k = 1; k < laps; ++k) course.waypoints.insert(course.waypoints.end(), lap.begin(), lap.end());
+  return course;
+}
+
+Course road_course(int laps) {
+  Course course{.waypoints = {{.x_m = 0, .y_m = 0, .stop_s = 10}}, .landmarks = {{1, 100, -5}, {2, 205, 100}}};
+  for (int k = 0; k < laps; ++k)
+    for (const Waypoint& at : {Waypoint{.x_m = 200, .y_m = 0, .radius_m = 40},
+                               {.x_m = 200, .y_m = 200, .radius_m = 40},
+                               {.x_m = 100, .y_m = 200, .radius_m = 40},
+                               {.x_m = 100, .y_m = 100, .radius_m = 40},
+                               {.x_m = 0, .y_m = 100, .radius_m = 40},
+                               {.x_m = 0, .y_m = 220, .radius_m = 40},
+                               {.x_m = -100, .y_m = 220, .radius_m = 40},
+                               {.x_m = -100, .y_m = 0, .radius_m = 40},
+                               {.x_m = -10, .y_m = 0, .stop_s = k + 1 == laps ? 8.0 : 5.0}})
+      course.waypoints.push_back(at);
+  return course;
+}
+
 Course circle_course(double radius_m, int turns) {
   const double r = radius_m;
   Course course{.waypoints = {{.x_m = -5, .y_m = 0, .stop_s = 2}}, .landmarks = {{1, 0, r}}};

@@ -39,6 +39,11 @@ struct Course {
 /// Proving ground of 52 m x 30 m: straights, two skid pads (one each way), slalom, hairpin, standstill at the start, in
 /// the middle, at the end.
 [[nodiscard]] Course default_course();
+/// The same, driven so many times; a standstill between.
+[[nodiscard]] Course default_course(int laps);
+/// A road of 1.1 km for 5 m/s and more, driven so many times: long curves both ways, standstill at the start and once a
+/// lap.
+[[nodiscard]] Course road_course(int laps);
 /// A straight lead-in and full circles to the left, for laws that have closed forms.
 [[nodiscard]] Course circle_course(double radius_m, int turns);
 

@@ -37,6 +37,15 @@ constexpr std::array kTable{
     FaultInfo{Fault::kLostFrames, "lost_frames", 60, 20, "each frame is lost with a probability of 20 %"},
     FaultInfo{Fault::kKidnapped, "kidnapped", 20, 0,
               "rover is set down 8 m further along its course, unseen by wheels and IMU"},
+    FaultInfo{Fault::kGnssFar, "gnss_far", 60, 232,
+              "no GNSS for 211 s, then 105 fixes 800 m too far west with an unchanged accuracy figure"},
+    FaultInfo{Fault::kWheelSpin, "wheel_spin", 70, 5,
+              "right wheel spins on ice: its rim runs 2 m/s faster than it rolls"},
+    FaultInfo{Fault::kVibration, "vibration", 60, 20,
+              "a loose mount shakes the IMU with 20 m/s^2 and 1 rad/s at 97 Hz, within its ranges"},
+    FaultInfo{Fault::kMagDisturbance, "mag_disturbance", 60, 20, "steel beside the way: 30 uT towards east on top"},
+    FaultInfo{Fault::kMovingStart, "moving_start", 0, 30,
+              "no sensor speaks; where it begins at 0, no start pose is told either: a start in motion"},
 };
 
 std::string names() {

@@ -33,6 +33,11 @@ enum class Fault : std::uint8_t {
   kClockJump,
   kLostFrames,
   kKidnapped,
+  kGnssFar,
+  kWheelSpin,
+  kVibration,
+  kMagDisturbance,
+  kMovingStart,
 };
 
 struct FaultInfo {
@@ -61,6 +66,13 @@ struct FaultNumbers {
   static constexpr std::int64_t kClockJump_us = 3'000'000;
   static constexpr double kLossShare = 0.2;
   static constexpr double kKidnapped_m = 8;  ///< along the course
+  static constexpr std::int64_t kFarSilent_us = 211'000'000;
+  static constexpr int kFarFixes = 105;
+  static constexpr double kFar_m = 800;        ///< to the west
+  static constexpr double kFreeWheel_mps = 2;  ///< of the rim, on top of its rolling
+  static constexpr double kShake_mps2 = 20;    ///< amplitude, within the ranges
+  static constexpr double kShake_radps = 1;
+  static constexpr double kIron_uT = 30;  ///< towards east: a steel door, a car
 };
 
 [[nodiscard]] std::span<const FaultInfo> fault_table();

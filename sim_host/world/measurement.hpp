@@ -12,7 +12,7 @@
 namespace tetap::sim {
 
 using Value = std::variant<app::ImuSample, app::WheelCounts, app::WheelSpeeds, app::BodySpeed, app::GnssPosition,
-                           app::GnssVelocity, app::LandmarkSighting>;
+                           app::GnssVelocity, app::LandmarkSighting, app::MagneticFlux, app::AirPressure>;
 
 struct Measurement {
   base::Micros stamp;

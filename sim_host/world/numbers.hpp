@@ -36,6 +36,8 @@ struct RoverNumbers {
   double ground_tau_s = 0.4;
   double driver_wander_m = 0.08;  ///< lateral, Gauss-Markov: no two runs drive the same line [own]
   double driver_wander_tau_s = 6;
+  double jitter_mps = 0;  ///< of the body sideways and up while it moves, white for sensors (see matched_inertial())
+  double jitter_tau_s = 0.005;
   double start_m = 0.05;  ///< 1 sigma per axis of where the rover really stands at the start [own]
   double start_rad = 0.02;
 };
@@ -71,6 +73,7 @@ struct WheelSensorNumbers {
   WheelOutput output = WheelOutput::kCounts;
   double counts_per_turn = 2000;     ///< 500 lines, four edges: 0.31 mm of travel
   double noise_m = 0;                ///< k: variance of the measured travel per metre; the filters' own error model
+  double noise_share = 0;            ///< 1 sigma of each reading's travel, as a share of it
   base::Micros stamp_late_max{100};  ///< stamped by software up to this much after the counters were latched [own]
   base::Micros phase{8'500};
   base::Micros latency_min{300}, latency_max{900};
@@ -83,7 +86,8 @@ struct GnssNumbers {
   double correlated_tau_s = 60;  ///< multipath and atmosphere [own; minutes in the literature]
   double vertical_factor = 1.6;  ///< height error over horizontal [own: usual geometry]
   double velocity_mps = 0.05;    ///< white, per axis [F9P]
-  double accuracy_error = 0.2;   ///< 1 sigma of the receiver's own accuracy figure against the truth, slow [own]
+  double velocity_vertical_factor = 1;
+  double accuracy_error = 0.2;  ///< 1 sigma of the receiver's own accuracy figure against the truth, slow [own]
   std::array<double, 3> antenna_b_m{0, 0, 0.4};
   double outage_every_s = 90;  ///< mean time between outages; 0: none [own]
   double outage_min_s = 2, outage_max_s = 8;
@@ -93,6 +97,32 @@ struct GnssNumbers {
   base::Micros quiet_start{20'000'000};  ///< no outage or glitch before, so that a first fix is a fix
   base::Micros phase{104'000};
   base::Micros latency_min{80'000}, latency_max{120'000};
+};
+
+/// The Earth's field is that of the default origin, rounded, as the IGRF has it (48.6 uT, 64.2 deg down, 4 deg east).
+struct MagnetometerNumbers {
+  int rate_hz = 0;  ///< 0: none
+  double field_uT = 48.6;
+  double dip_rad = radians(64.2);
+  double declination_rad = radians(4.0);
+  double noise_uT = 0.3;      ///< white, per axis [own: usual for a small AMR sensor]
+  double hard_iron_uT = 0.8;  ///< 1 sigma per axis: what a calibration leaves [own]
+  double scale = 0.01;        ///< 1 sigma per axis: soft iron left over [own]
+  double local_uT = 1.0;      ///< 1 sigma per axis: iron in the ground, passed at walking speed [own]
+  double local_tau_s = 5;
+  base::Micros phase{11'500};
+  base::Micros latency_min{500}, latency_max{2'000};
+};
+
+struct BarometerNumbers {
+  int rate_hz = 0;         ///< 0: none
+  double noise_Pa = 2;     ///< white: 17 cm [own: usual for a small sensor without filter]
+  double turn_on_Pa = 50;  ///< 1 sigma of its absolute error [own: likewise]
+  double drift_Pa = 30;    ///< weather and warming up, Gauss-Markov 1 sigma [own]
+  double drift_tau_s = 1800;
+  double temperature_degC = 24;
+  base::Micros phase{57'000};
+  base::Micros latency_min{5'000}, latency_max{15'000};
 };
 
 struct CameraNumbers {
@@ -117,6 +147,8 @@ struct Numbers {
   WheelSensorNumbers wheels;
   GnssNumbers gnss;
   CameraNumbers camera;
+  MagnetometerNumbers magnetometer;
+  BarometerNumbers barometer;
 };
 
 /// Only white noise of the stated sigma and encoder noise k |ds|: nothing a filter does not model. Accuracy figures are
@@ -139,6 +171,39 @@ struct Numbers {
   n.gnss.antenna_b_m = {};
   n.camera.sigma_range_per_m = n.camera.scale_error = n.camera.mount_error_rad = 0;
   n.camera.wrong_id_probability = n.camera.survey_m = 0;
+  n.magnetometer.hard_iron_uT = n.magnetometer.scale = n.magnetometer.local_uT = 0;
+  n.magnetometer.phase = {18'500};
+  n.barometer.drift_Pa = 0;
+  n.barometer.phase = {58'500};
+  return n;
+}
+
+/// What an inertial filter models exactly: matched(), and on top biases that wander at random (a Gauss-Markov process
+/// much slower than the run is that: its first draw is the turn-on bias, and it drives 2 sigma^2 / tau), wheels whose
+/// error is a share of their travel, and a body that moves sideways and up a little, which a filter takes for the noise
+/// of the non-holonomic constraint.
+[[nodiscard]] inline Numbers matched_inertial(Numbers n) {
+  const ImuNumbers imu = n.imu;
+  const double gnss_m = sim::sqrt(n.gnss.white_m * n.gnss.white_m + n.gnss.correlated_m * n.gnss.correlated_m);
+  n = matched(n);
+  n.gnss.white_m = gnss_m;
+  n.imu.gyro_walk_radps = imu.gyro_turn_on_radps;
+  n.imu.accel_walk_mps2 = imu.accel_turn_on_mps2;
+  n.imu.walk_tau_s = 1e5;
+  n.imu.accel_range_mps2 = 16 * kG0;  // the jitter is steep
+  n.imu.accel_noise = {imu.accel_noise[2], imu.accel_noise[2], imu.accel_noise[2]};
+  n.wheels.noise_m = 0;
+  n.wheels.noise_share = 0.03;
+  n.rover.jitter_mps = 0.02;
+  n.gnss.velocity_vertical_factor = 1.5;
+  return n;
+}
+
+/// Errors of GNSS positions of so much in all, per horizontal axis, with the same share of white noise.
+[[nodiscard]] inline GnssNumbers with_error(GnssNumbers n, double sigma_m) {
+  const double by = sigma_m / sim::sqrt(n.white_m * n.white_m + n.correlated_m * n.correlated_m);
+  n.white_m *= by;
+  n.correlated_m *= by;
   return n;
 }
 
@@ -146,6 +211,8 @@ struct Numbers {
 [[nodiscard]] inline Numbers without_latency(Numbers n) {
   n.imu.latency_min = n.imu.latency_max = n.wheels.latency_min = n.wheels.latency_max = {};
   n.gnss.latency_min = n.gnss.latency_max = n.camera.latency_min = n.camera.latency_max = {};
+  n.magnetometer.latency_min = n.magnetometer.latency_max = {};
+  n.barometer.latency_min = n.barometer.latency_max = {};
   return n;
 }
 

@@ -4,6 +4,7 @@
 namespace tetap::sim {
 namespace {
 
+constexpr double kStep_s = 500e-6;
 constexpr int kDriverTicks = 20;  // the driver decides every 10 ms
 constexpr double kDriver_s = 0.010;
 constexpr double kAccelerationLag_s = 0.10;  // motor current and load
@@ -41,11 +42,14 @@ Rover::Rover(const RoverNumbers& numbers, const Plan& plan, std::uint64_t seed, 
       driver_chance_{seed, Stream::kDriver},
       ground_chance_{seed, Stream::kGround},
       slip_chance_{seed, Stream::kSlip},
+      jitter_chance_{seed, Stream::kJitter},
       wander_{numbers.driver_wander_m, numbers.driver_wander_tau_s, kDriver_s, driver_chance_},
       ground_roll_{numbers.ground_rad, numbers.ground_tau_s, kDriver_s, ground_chance_},
       ground_pitch_{numbers.ground_rad, numbers.ground_tau_s, kDriver_s, ground_chance_},
       slip_left_{numbers.slip_random, numbers.slip_random_tau_s, kDriver_s, slip_chance_},
-      slip_right_{numbers.slip_random, numbers.slip_random_tau_s, kDriver_s, slip_chance_} {
+      slip_right_{numbers.slip_random, numbers.slip_random_tau_s, kDriver_s, slip_chance_},
+      side_jitter_{numbers.jitter_mps, numbers.jitter_tau_s, kStep_s, jitter_chance_},
+      up_jitter_{numbers.jitter_mps, numbers.jitter_tau_s, kStep_s, jitter_chance_} {
   Chance start{seed, Stream::kStart};
   const PathPoint at = plan.path(0);
   x_m_ = at.x_m + start.normal(numbers.start_m);
@@ -84,6 +88,19 @@ void Rover::shake() {
   slip_right_.next(slip_chance_);
 }
 
+void Rover::jitter() {
+  if (numbers_.jitter_mps <= 0) return;
+  const double moving = clamp(magnitude(speed_mps_) / 0.5, 0, 1);
+  const double side = moving * side_jitter_.next(jitter_chance_);
+  const double up = moving * up_jitter_.next(jitter_chance_);
+  const Direction d = direction(yaw_rad_);
+  x_m_ -= 0.5 * kStep_s * (side_mps_ + side) * d.sin;
+  y_m_ += 0.5 * kStep_s * (side_mps_ + side) * d.cos;
+  z_m_ += 0.5 * kStep_s * (up_mps_ + up);
+  side_mps_ = side;
+  up_mps_ = up;
+}
+
 Motion Rover::step(base::Micros since_start) {
   if (tick_ == 0) {
     drive(since_start);
@@ -95,6 +112,7 @@ Motion Rover::step(base::Micros since_start) {
   const Truth before = truth();
   const double h_s = 500e-6 / substeps_;
   for (int k = 0; k < substeps_; ++k) integrate(h_s, motion);
+  jitter();
   const Truth after = truth();
   for (std::size_t i = 0; i < 3; ++i) {
     motion.acceleration_n_mps2[i] = (after.v_n_mps[i] - before.v_n_mps[i]) / 500e-6;
@@ -161,17 +179,17 @@ void Rover::integrate(double h_s, Motion& motion) {
 
 Truth Rover::truth() const {
   const Direction d = direction(yaw_rad_);
-  const double drift = -numbers_.side_slip_s * speed_mps_ * yaw_rate_radps_;
+  const double drift = side_mps_ - numbers_.side_slip_s * speed_mps_ * yaw_rate_radps_;
   return {.time = {},
           .x_m = x_m_,
           .y_m = y_m_,
-          .z_m = 0,
+          .z_m = z_m_,
           .roll_rad = roll_rad_,
           .pitch_rad = pitch_rad_,
           .yaw_rad = wrap(yaw_rad_),
           .speed_mps = speed_mps_,
           .yaw_rate_radps = yaw_rate_radps_,
-          .v_n_mps = {speed_mps_ * d.cos - drift * d.sin, speed_mps_ * d.sin + drift * d.cos, 0}};
+          .v_n_mps = {speed_mps_ * d.cos - drift * d.sin, speed_mps_ * d.sin + drift * d.cos, up_mps_}};
 }
 
 }  // namespace tetap::sim

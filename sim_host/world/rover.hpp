@@ -24,6 +24,8 @@ struct Truth {
   double speed_mps = 0;                             ///< forward
   double yaw_rate_radps = 0;
   Vector3 v_n_mps{};
+  Vector3 gyro_bias_b_radps{};  ///< what the IMU shows too much
+  Vector3 accel_bias_b_mps2{};  ///< likewise, level and at rest: the share of gravity in it that its scale error makes
 };
 
 /// Between the start and the end of one step.
@@ -61,6 +63,7 @@ class Rover {
   void drive(base::Micros since_start);
   void shake();
   void integrate(double h_s, Motion& motion);
+  void jitter();
 
   RoverNumbers numbers_;
   const Plan* plan_;
@@ -72,11 +75,13 @@ class Rover {
   double speed_mps_ = 0, acceleration_mps2_ = 0, yaw_rate_radps_ = 0;
   double roll_rad_ = 0, roll_rate_radps_ = 0, pitch_rad_ = 0, pitch_rate_radps_ = 0;
 
+  double z_m_ = 0, side_mps_ = 0, up_mps_ = 0;  // the body's jitter
+
   bool parked_ = true;
   double wanted_acceleration_mps2_ = 0, wanted_yaw_rate_radps_ = 0;
 
-  Chance driver_chance_, ground_chance_, slip_chance_;
-  GaussMarkov wander_, ground_roll_, ground_pitch_, slip_left_, slip_right_;
+  Chance driver_chance_, ground_chance_, slip_chance_, jitter_chance_;
+  GaussMarkov wander_, ground_roll_, ground_pitch_, slip_left_, slip_right_, side_jitter_, up_jitter_;
   int tick_ = 0;  // of kStep, within the driver's 10 ms
 };
 

@@ -59,14 +59,15 @@ void Imu::sense(const Motion& motion, double speed_mps, base::Micros now, const 
     force[i] = (force[i] + share * numbers_.vibration_mps2 * shape[i]) * (1 + accel_scale_[i]);
     rate[i] = (rate[i] + share * numbers_.vibration_radps * shape[i]) * (1 + gyro_scale_[i]);
   }
-  if (const auto on = faults.since(Fault::kImuClipping, now)) {
-    constexpr double kShake_radps = 2 * kPi * 97;  // a loose mount
-    const double shake = sim::sin(kShake_radps * static_cast<double>(on->us) * 1e-6);
-    for (std::size_t i = 0; i < 3; ++i) {
-      force[i] += FaultNumbers::kClipVibration_mps2 * shake;
-      rate[i] += FaultNumbers::kClipVibration_radps * shake;
-    }
-  }
+  const auto shake = [&](Fault fault, double by_mps2, double by_radps) {
+    const auto on = faults.since(fault, now);
+    if (!on) return;
+    constexpr double kLoose_radps = 2 * kPi * 97;  // a loose mount
+    const double swing = sim::sin(kLoose_radps * static_cast<double>(on->us) * 1e-6);
+    for (std::size_t i = 0; i < 3; ++i) force[i] += by_mps2 * swing, rate[i] += by_radps * swing;
+  };
+  shake(Fault::kImuClipping, FaultNumbers::kClipVibration_mps2, FaultNumbers::kClipVibration_radps);
+  shake(Fault::kVibration, FaultNumbers::kShake_mps2, FaultNumbers::kShake_radps);
 
   bool gyro_clips = false;
   bool accel_clips = false;
@@ -90,10 +91,10 @@ app::ImuSample Imu::sample(base::Micros now, const Faults& faults) {
                    .interval_us = static_cast<std::uint16_t>(period_s_ * 1e6 + 0.5),
                    .clipped_gyro = static_cast<std::uint8_t>(clipped_gyro_),
                    .clipped_accel = static_cast<std::uint8_t>(clipped_accel_)};
-  const bool stepped = faults.active(Fault::kGyroBiasStep, now);
+  stepped_ = faults.active(Fault::kGyroBiasStep, now);
   for (std::size_t i = 0; i < 3; ++i) {
     double gyro_bias = gyro_bias_[i] + gyro_walk_[i].next(noise_);
-    if (stepped && i == 2) gyro_bias += FaultNumbers::kGyroStep_radps;
+    if (stepped_ && i == 2) gyro_bias += FaultNumbers::kGyroStep_radps;
     const double accel_bias = accel_bias_[i] + accel_walk_[i].next(noise_);
     const double angle_noise = noise_.normal(numbers_.gyro_noise * root);
     const double velocity_noise =
@@ -105,6 +106,20 @@ app::ImuSample Imu::sample(base::Micros now, const Faults& faults) {
   clipped_gyro_ = clipped_accel_ = 0;
   if (!faults.active(Fault::kImuStuck, now)) last_ = s;
   return last_;
+}
+
+Vector3 Imu::gyro_bias_radps() const {
+  Vector3 bias;
+  for (std::size_t i = 0; i < 3; ++i) bias[i] = gyro_bias_[i] + gyro_walk_[i].value();
+  if (stepped_) bias[2] += FaultNumbers::kGyroStep_radps;
+  return bias;
+}
+
+Vector3 Imu::accel_bias_mps2() const {
+  Vector3 bias;
+  for (std::size_t i = 0; i < 3; ++i) bias[i] = accel_bias_[i] + accel_walk_[i].value();
+  bias[2] += accel_scale_[2] * gravity_mps2_;
+  return bias;
 }
 
 Wheels::Wheels(const WheelSensorNumbers& numbers, const RoverNumbers& rover, std::uint64_t seed)
@@ -125,6 +140,7 @@ void Wheels::sense(const Motion& motion, base::Micros now, const Faults& faults)
   double right_m = motion.rim_right_m;
   if (faults.active(Fault::kSlipLeft, now)) left_m += FaultNumbers::kSpin_mps * kStep_s;
   if (faults.active(Fault::kSlipRight, now)) right_m += FaultNumbers::kSpin_mps * kStep_s;
+  if (faults.active(Fault::kWheelSpin, now)) right_m += FaultNumbers::kFreeWheel_mps * kStep_s;
   if (faults.active(Fault::kWheelStuck, now)) left_m = 0;
   if (const auto on = faults.since(Fault::kEncoderDropout, now); on && on->us / FaultNumbers::kDropout_us % 2 == 0)
     right_m = 0;
@@ -136,7 +152,8 @@ void Wheels::sense(const Motion& motion, base::Micros now, const Faults& faults)
 
 void Wheels::read() {
   for (Wheel* wheel : {&left_, &right_}) {
-    wheel->travel_m += chance_.normal() * sim::sqrt(numbers_.noise_m * magnitude(wheel->unread_m));
+    const double share_m = numbers_.noise_share * wheel->unread_m;
+    wheel->travel_m += chance_.normal() * sim::sqrt(numbers_.noise_m * magnitude(wheel->unread_m) + share_m * share_m);
     wheel->unread_m = 0;
     wheel->read = wheel->count;
     wheel->count = static_cast<std::int64_t>(sim::floor(wheel->travel_m / wheel->metres_per_count));
@@ -203,7 +220,8 @@ void Gnss::advance_errors(base::Micros now) {
 Gnss::Reading Gnss::sample(const Truth& truth, const Vector3& rate_b, base::Micros now, const Faults& faults) {
   advance_errors(now);
   const Vector3 white = three(noise_, numbers_.white_m);
-  const Vector3 velocity_noise = three(noise_, numbers_.velocity_mps);
+  Vector3 velocity_noise = three(noise_, numbers_.velocity_mps);
+  velocity_noise[2] *= numbers_.velocity_vertical_factor;
 
   const Vector3& l = numbers_.antenna_b_m;
   const Vector3 attitude{truth.roll_rad, truth.pitch_rad, truth.yaw_rad};
@@ -218,6 +236,9 @@ Gnss::Reading Gnss::sample(const Truth& truth, const Vector3& rate_b, base::Micr
   if (faults.active(Fault::kGnssJump, now)) at_m[0] += FaultNumbers::kJump_m;
   if (const auto on = faults.since(Fault::kGnssRamp, now))
     at_m[1] += FaultNumbers::kRamp_mps * static_cast<double>(on->us) * 1e-6;
+  const auto lost = faults.since(Fault::kGnssFar, now);
+  const bool silent = lost && lost->us < FaultNumbers::kFarSilent_us;
+  if (lost && !silent && far_fixes_++ < FaultNumbers::kFarFixes) at_m[0] -= FaultNumbers::kFar_m;
   if (faults.active(Fault::kGnssWrongHeight, now)) at_m[2] += FaultNumbers::kHeight_m;
 
   const double believed = clamp(1 + accuracy_.value(), 0.5, 2);
@@ -239,18 +260,62 @@ Gnss::Reading Gnss::sample(const Truth& truth, const Vector3& rate_b, base::Micr
 
   if (now < outage_until_ && last_.position) {
     // A receiver that lost the sky goes on talking: its last position, and the word that it is none.
-    app::GnssPosition lost = *last_.position;
-    lost.fix = app::GnssFix::kNone;
-    lost.satellites = 2;
-    lost.horizontal_acc_m = lost.vertical_acc_m = kNone;
-    reading = {.position = lost, .velocity = std::nullopt};
+    app::GnssPosition none = *last_.position;
+    none.fix = app::GnssFix::kNone;
+    none.satellites = 2;
+    none.horizontal_acc_m = none.vertical_acc_m = kNone;
+    reading = {.position = none, .velocity = std::nullopt};
   } else if (faults.active(Fault::kGnssFrozen, now) && last_.position) {
     reading = last_;
   } else {
     last_ = reading;
   }
-  if (faults.active(Fault::kGnssOutage, now)) return {};
+  if (silent || faults.active(Fault::kGnssOutage, now)) return {};
   return reading;
+}
+
+Magnetometer::Magnetometer(const MagnetometerNumbers& numbers, std::uint64_t seed)
+    : numbers_{numbers},
+      field_n_uT_{numbers.field_uT * sim::cos(numbers.dip_rad) * sim::sin(numbers.declination_rad),
+                  numbers.field_uT * sim::cos(numbers.dip_rad) * sim::cos(numbers.declination_rad),
+                  -numbers.field_uT * sim::sin(numbers.dip_rad)},
+      noise_{seed, Stream::kMagnetometer},
+      local_{GaussMarkov{numbers.local_uT, numbers.local_tau_s, period_s(numbers.rate_hz), noise_},
+             GaussMarkov{numbers.local_uT, numbers.local_tau_s, period_s(numbers.rate_hz), noise_},
+             GaussMarkov{numbers.local_uT, numbers.local_tau_s, period_s(numbers.rate_hz), noise_}} {
+  Chance turn_on{seed, Stream::kMagnetometerTurnOn};
+  hard_iron_uT_ = three(turn_on, numbers.hard_iron_uT);
+  scale_ = three(turn_on, numbers.scale);
+}
+
+app::MagneticFlux Magnetometer::sample(const Truth& truth, base::Micros now, const Faults& faults) {
+  Vector3 field_n = field_n_uT_;
+  // Iron in the ground passes by at the rover's speed; where it stands, nothing changes.
+  for (std::size_t i = 0; i < 3; ++i)
+    field_n[i] += magnitude(truth.speed_mps) > 0.05 ? local_[i].next(noise_) : local_[i].value();
+  if (faults.active(Fault::kMagDisturbance, now)) field_n[0] += FaultNumbers::kIron_uT;
+  const Vector3 field_b = to_body({truth.roll_rad, truth.pitch_rad, truth.yaw_rad}, field_n);
+  const Vector3 white = three(noise_, numbers_.noise_uT);
+  app::MagneticFlux flux;
+  for (std::size_t i = 0; i < 3; ++i)
+    flux.flux_b_uT[i] = single(field_b[i] * (1 + scale_[i]) + hard_iron_uT_[i] + white[i]);
+  return flux;
+}
+
+Barometer::Barometer(const BarometerNumbers& numbers, double origin_height_m, std::uint64_t seed)
+    : numbers_{numbers},
+      origin_height_m_{origin_height_m},
+      noise_{seed, Stream::kBarometer},
+      offset_Pa_{noise_.normal(numbers.turn_on_Pa)},
+      drift_{numbers.drift_Pa, numbers.drift_tau_s, period_s(numbers.rate_hz), noise_} {}
+
+app::AirPressure Barometer::sample(const Truth& truth) {
+  // Troposphere: 101325 Pa, 288.15 K, 6.5 K/km.
+  const double share = 1 - 0.0065 / 288.15 * (origin_height_m_ + truth.z_m);
+  const double standard_Pa = 101'325 * sim::exp(5.25588 * base::log(share));
+  const double noise_Pa = noise_.normal(numbers_.noise_Pa);
+  return {.pressure_Pa = single(standard_Pa + offset_Pa_ + drift_.next(noise_) + noise_Pa),
+          .temperature_degC = single(numbers_.temperature_degC)};
 }
 
 Camera::Camera(const CameraNumbers& numbers, std::vector<Landmark> landmarks, std::uint64_t seed)

@@ -22,6 +22,9 @@ class Imu {
   Imu(const ImuNumbers& numbers, double wheel_radius_m, const Wgs84& earth, std::uint64_t seed);
   void sense(const Motion& motion, double speed_mps, base::Micros now, const Faults& faults);
   [[nodiscard]] app::ImuSample sample(base::Micros now, const Faults& faults);
+  /// As of the last sample, as the truth has them.
+  [[nodiscard]] Vector3 gyro_bias_radps() const;
+  [[nodiscard]] Vector3 accel_bias_mps2() const;
 
  private:
   using Processes = std::array<GaussMarkov, 3>;
@@ -39,6 +42,7 @@ class Imu {
   double lug_phase_rad_ = 0;
   double speed_mps_ = 0;
   int clipped_gyro_ = 0, clipped_accel_ = 0;
+  bool stepped_ = false;
   app::ImuSample last_;
 };
 
@@ -89,8 +93,37 @@ class Gnss {
   GaussMarkov accuracy_;
   base::Micros outage_until_;
   int glitch_fixes_ = 0;
+  int far_fixes_ = 0;  ///< of the fault
   std::array<double, 2> glitch_m_{};
   Reading last_;
+};
+
+/// The Earth's field as the body's axes see it, and the iron near by.
+class Magnetometer {
+ public:
+  Magnetometer(const MagnetometerNumbers& numbers, std::uint64_t seed);
+  [[nodiscard]] app::MagneticFlux sample(const Truth& truth, base::Micros now, const Faults& faults);
+
+ private:
+  MagnetometerNumbers numbers_;
+  Vector3 field_n_uT_;
+  Chance noise_;
+  Vector3 hard_iron_uT_{}, scale_{};
+  std::array<GaussMarkov, 3> local_;
+};
+
+/// Static pressure: the standard atmosphere (ISO 2533) at the body's height, and how far weather and sensor are off it.
+class Barometer {
+ public:
+  Barometer(const BarometerNumbers& numbers, double origin_height_m, std::uint64_t seed);
+  [[nodiscard]] app::AirPressure sample(const Truth& truth);
+
+ private:
+  BarometerNumbers numbers_;
+  double origin_height_m_;
+  Chance noise_;
+  double offset_Pa_;
+  GaussMarkov drift_;
 };
 
 /// Range and bearing to landmarks with known identity.

@@ -29,12 +29,14 @@ bool later(base::Micros a_arrival, std::uint64_t a_order, base::Micros b_arrival
 
 Numbers World::effective(const Options& options) {
   Numbers n = options.numbers;
-  if (!options.mismatched) n = matched(n);
+  if (!options.mismatched) n = options.inertial ? matched_inertial(n) : matched(n);
   if (!options.latency) n = without_latency(n);
   check_rate("IMU", n.imu.rate_hz);
   check_rate("wheel", n.wheels.rate_hz);
   check_rate("GNSS", n.gnss.rate_hz);
   check_rate("landmark", n.camera.rate_hz);
+  check_rate("magnetometer", n.magnetometer.rate_hz);
+  check_rate("barometer", n.barometer.rate_hz);
   if (options.substeps < 1) throw std::invalid_argument("substeps must be 1 or more");
   return n;
 }
@@ -50,15 +52,21 @@ World::World(const Options& options, std::uint64_t seed)
       wheels_{numbers_.wheels, numbers_.rover, seed},
       gnss_{numbers_.gnss, *earth_, seed},
       camera_{numbers_.camera, options.course.landmarks, seed},
+      magnetometer_{numbers_.magnetometer, seed},
+      barometer_{numbers_.barometer, options.origin.height_m, seed},
       imu_latency_{seed, Stream::kImuLatency},
       wheel_latency_{seed, Stream::kWheelLatency},
       gnss_latency_{seed, Stream::kGnssLatency},
       camera_latency_{seed, Stream::kCameraLatency},
+      magnetometer_latency_{seed, Stream::kMagnetometerLatency},
+      barometer_latency_{seed, Stream::kBarometerLatency},
       loss_{seed, Stream::kFaultLoss} {}
 
 Truth World::truth() const {
   Truth t = rover_.truth();
   t.time = start_ + now_;
+  t.gyro_bias_b_radps = imu_.gyro_bias_radps();
+  t.accel_bias_b_mps2 = imu_.accel_bias_mps2();
   return t;
 }
 
@@ -83,6 +91,7 @@ void World::kidnap() {
 }
 
 void World::emit(Value value, std::uint8_t sequence, base::Micros stamp_late, base::Micros latency) {
+  if (faults_.active(Fault::kMovingStart, now_)) return;
   const base::Micros at = start_ + now_;
   base::Micros stamp = at + stamp_late + clock_offset_at(now_);
   if (faults_.active(Fault::kStaleStamps, now_)) stamp = stamp - base::Micros{FaultNumbers::kStale_us};
@@ -136,6 +145,12 @@ void World::step() {
     for (const auto& sighting : camera_.sample(truth(), now_, faults_))
       emit(sighting, sighting_sequence_++, {}, latency);
   }
+  if (due(n.magnetometer.rate_hz, n.magnetometer.phase, now_))
+    emit(magnetometer_.sample(truth(), now_, faults_), magnetometer_sequence_++, {},
+         magnetometer_latency_.between(n.magnetometer.latency_min, n.magnetometer.latency_max));
+  if (due(n.barometer.rate_hz, n.barometer.phase, now_))
+    emit(barometer_.sample(truth()), barometer_sequence_++, {},
+         barometer_latency_.between(n.barometer.latency_min, n.barometer.latency_max));
 }
 
 void World::advance_to(base::Micros t, std::vector<Measurement>& arrived) {

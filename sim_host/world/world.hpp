@@ -28,6 +28,7 @@ class World {
  public:
   struct Options {
     bool mismatched = true;  ///< false: only errors that filters model, see matched()
+    bool inertial = false;   ///< and not mismatched: what an inertial filter models, see matched_inertial()
     bool latency = true;     ///< false: everything arrives at its stamp
     Numbers numbers;
     Course course = default_course();
@@ -56,6 +57,7 @@ class World {
   [[nodiscard]] std::span<const Landmark> map() const { return camera_.map(); }
   [[nodiscard]] const GeodeticOrigin& origin() const { return earth_->origin(); }
   [[nodiscard]] const Numbers& numbers() const { return numbers_; }
+  [[nodiscard]] const Faults& faults() const { return faults_; }
   [[nodiscard]] const Plan& plan() const { return *plan_; }
 
  private:
@@ -80,11 +82,13 @@ class World {
   Wheels wheels_;
   Gnss gnss_;
   Camera camera_;
-  Chance imu_latency_, wheel_latency_, gnss_latency_, camera_latency_, loss_;
+  Magnetometer magnetometer_;
+  Barometer barometer_;
+  Chance imu_latency_, wheel_latency_, gnss_latency_, camera_latency_, magnetometer_latency_, barometer_latency_, loss_;
   base::Micros now_;  ///< since the start
   Vector3 rate_b_radps_{};
   std::uint8_t imu_sequence_ = 0, wheel_sequence_ = 0, position_sequence_ = 0, velocity_sequence_ = 0,
-               sighting_sequence_ = 0;
+               sighting_sequence_ = 0, magnetometer_sequence_ = 0, barometer_sequence_ = 0;
   std::uint64_t made_ = 0;
   std::vector<Pending> pending_;
 };

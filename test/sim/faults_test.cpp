@@ -26,6 +26,8 @@ struct Recording {
   std::map<Key, Measurement> all;
   explicit Recording(std::vector<FaultSetting> faults, World::Options options = {}) {
     options.faults = std::move(faults);
+    options.numbers.magnetometer.rate_hz = 20;
+    options.numbers.barometer.rate_hz = 10;
     std::map<std::pair<std::size_t, std::int64_t>, int> nth;
     for (const auto& m : run(options, 21, kLength)) all.emplace(key(m, nth), m);
   }
@@ -67,7 +69,7 @@ std::int16_t difference(std::uint16_t a, std::uint16_t b) { return static_cast<s
 
 bool lasts_beyond(Fault f) {  // a counter that missed or gained turns, a rover that is elsewhere
   return f == Fault::kSlipLeft || f == Fault::kSlipRight || f == Fault::kWheelStuck || f == Fault::kEncoderDropout ||
-         f == Fault::kKidnapped;
+         f == Fault::kWheelSpin || f == Fault::kKidnapped;
 }
 
 class EveryFault : public testing::TestWithParam<FaultInfo> {};
@@ -111,7 +113,8 @@ TEST_P(EveryFault, is_understood_by_name_with_and_without_its_times) {
   EXPECT_EQ(timed.settings.at(0).duration.us, 250'000);
   EXPECT_NE(fault_help().find(name), std::string::npos);
   EXPECT_EQ(info(GetParam().fault).name, name);
-  EXPECT_LE(GetParam().start_s + GetParam().duration_s, 200) << "its default lies within the course";
+  const double laps = GetParam().fault == Fault::kGnssFar ? 2 : 1;
+  EXPECT_LE(GetParam().start_s + GetParam().duration_s, laps * 200) << "its default lies within the course";
 }
 
 INSTANTIATE_TEST_SUITE_P(Faults, EveryFault, testing::ValuesIn(fault_table().begin(), fault_table().end()),
@@ -197,6 +200,73 @@ TEST(Faults, a_spinning_wheel_counts_a_metre_a_second_too_much_and_only_it) {
       ASSERT_NEAR(left ? more_left : more_right, expected, 3);
       ASSERT_EQ(left ? more_right : more_left, 0);
     }
+  }
+}
+
+TEST(Faults, a_wheel_on_ice_counts_two_metres_a_second_too_much_and_only_it) {
+  const double per_metre = 2000 / (2 * kPi * 0.1) / 0.9975;
+  for (const auto& [t, a, b] : pairs<app::WheelCounts>(Recording{only(Fault::kWheelSpin)})) {
+    const double on_s = clamp(static_cast<double>((t - kFrom).us) * 1e-6, 0, 6);
+    ASSERT_NEAR(static_cast<std::uint16_t>(b.right - a.right), 2 * on_s * per_metre, 5);
+    ASSERT_EQ(a.left, b.left);
+  }
+}
+
+TEST(Faults, gnss_far_is_silent_for_211_s_then_105_fixes_are_800_m_west_and_the_next_is_right) {
+  World::Options options;
+  options.course = default_course(2);
+  options.numbers.gnss.glitch_probability = options.numbers.gnss.outage_every_s = 0;
+  const auto right = run(options, 3, seconds_us(320));
+  options.faults = {{Fault::kGnssFar, kFrom, seconds_us(260)}};
+  const auto wrong = run(options, 3, seconds_us(320));
+  std::map<std::int64_t, app::GnssPosition> fixes;
+  for (const auto& m : right)
+    if (const auto* fix = std::get_if<app::GnssPosition>(&m.value)) fixes[m.stamp.us] = *fix;
+  int far = 0;
+  std::int64_t last_far = 0, next_right = 0;
+  for (const auto& m : wrong) {
+    const auto* fix = std::get_if<app::GnssPosition>(&m.value);
+    if (fix == nullptr) continue;
+    const base::Micros at = m.stamp - options.start;
+    ASSERT_FALSE(at >= kFrom && at < kFrom + seconds_us(211));
+    const double west = enu(fixes.at(m.stamp.us))[0] - enu(*fix)[0];
+    if (west > 1) {
+      ASSERT_NEAR(west, 800, 0.01);
+      ASSERT_EQ(fix->horizontal_acc_m, fixes.at(m.stamp.us).horizontal_acc_m);
+      ++far;
+      last_far = m.stamp.us;
+    } else if (far > 0 && next_right == 0) {
+      next_right = m.stamp.us;
+    }
+  }
+  EXPECT_EQ(far, 105);
+  EXPECT_EQ(next_right - last_far, 200'000);
+}
+
+TEST(Faults, vibration_stays_within_the_ranges_and_is_felt) {
+  int felt = 0;
+  for (const auto& [t, a, b] : pairs<app::ImuSample>(Recording{only(Fault::kVibration)})) {
+    ASSERT_EQ(b.clipped_accel + b.clipped_gyro, 0);
+    felt += !same(Measurement{.value = a}, Measurement{.value = b}) ? 1 : 0;
+  }
+  EXPECT_NEAR(felt, 600, 2);
+}
+
+TEST(Faults, a_magnetic_disturbance_adds_its_field_wherever_the_rover_looks) {
+  for (const auto& [t, a, b] : pairs<app::MagneticFlux>(Recording{only(Fault::kMagDisturbance)})) {
+    double square = 0;
+    for (std::size_t i = 0; i < 3; ++i) {
+      const double more = static_cast<double>(b.flux_b_uT[i]) - static_cast<double>(a.flux_b_uT[i]);
+      square += more * more;
+    }
+    ASSERT_NEAR(sim::sqrt(square), inside(t) ? FaultNumbers::kIron_uT : 0, 1.5);
+  }
+}
+
+TEST(Faults, a_start_in_motion_is_silence_of_every_sensor) {
+  for (const auto& [key, m] : Recording{only(Fault::kMovingStart)}.all) {
+    const base::Micros at = m.stamp - World::Options{}.start;
+    ASSERT_FALSE(at > kFrom + base::Micros{100} && at < kFrom + kLasts) << at.us;
   }
 }
 

@@ -52,6 +52,10 @@ class Hash {
     for (const float x : s.v_n_mps) add(x);
     add(s.acc_mps);
   }
+  void fields(const app::MagneticFlux& s) {
+    for (const float x : s.flux_b_uT) add(x);
+  }
+  void fields(const app::AirPressure& s) { add(s.pressure_Pa), add(s.temperature_degC); }
   void fields(const app::LandmarkSighting& s) { add(std::uint64_t{s.landmark}), add(s.range_m), add(s.bearing_rad); }
 
   std::uint64_t hash_ = 0xCBF29CE484222325U;
