@@ -6,6 +6,7 @@
 
 #include "base/crc.hpp"
 #include "base/time.hpp"
+#include "filter/attitude_options.hpp"
 #include "model/differential_drive.hpp"
 #include "model/landmark.hpp"
 #include "model/unicycle.hpp"
@@ -97,6 +98,39 @@ struct InertialNumbers {
   float wheel_gate_scale = 1;
 };
 
+/// The magnetometer: its calibration, and what of it is believed. Field of the body = mounting * soft iron * (flux -
+/// hard iron), the last two in the sensor's own axes.
+struct MagneticNumbers {
+  std::int32_t use = 0;
+  float declination_rad = 0;  ///< of magnetic from true north, eastward positive
+  std::array<float, 3> hard_iron_uT{0, 0, 0};
+  std::array<float, 9> soft_iron{1, 0, 0, 0, 1, 0, 0, 0, 1};    ///< row by row
+  std::array<float, 9> mounting_bs{1, 0, 0, 0, 1, 0, 0, 0, 1};  ///< from the sensor's axes into the body's, row by row
+  float sigma_rad = 0.1F;                                       ///< 1 sigma of a heading, as if each were independent
+  float gate_scale = 1;
+  float norm_uT = 0;        ///< of the field after calibration; 0: as found at the start
+  float norm_share = 0.1F;  ///< off by more of it, the field is disturbed
+  float dip_rad = 0.15F;    ///< the same for its angle below the horizon, from what was found at the start
+  /// A field that stays the same for so long, somewhere else than the one known, becomes the known one.
+  float field_new_s = 20;
+};
+
+/// The barometer, zeroed where the height was first known.
+struct BaroNumbers {
+  std::int32_t use = 0;
+  float sigma_m = 0.5F;       ///< of a height, as if each were independent
+  float drift_m_rts = 0.05F;  ///< of its zero: random walk by weather, m per root second
+  float gate_scale = 1;
+  float zero_sigma_m = 10;  ///< how unknown the zero becomes when it is found anew
+};
+
+/// When two attitudes differ enough, for long enough, one of them is wrong.
+struct DisagreementNumbers {
+  float tilt_rad = 0.1F;
+  float heading_rad = 0.35F;
+  std::int32_t after_us = 2'000'000;
+};
+
 /// The state at start; sigma_yaw_rad >= pi means the heading is not known.
 struct StartNumbers {
   std::int32_t known = 0;  ///< 0: wait for a set-pose command or, with GNSS, align
@@ -137,6 +171,10 @@ struct Numbers {
   LandmarkNumbers landmark;
   GnssNumbers gnss;
   InertialNumbers inertial;
+  MagneticNumbers magnetic;
+  BaroNumbers baro;
+  filter::AttitudeOptions attitude;  ///< its declination is the magnetometer's
+  DisagreementNumbers disagreement;
   StartNumbers start;
   RecoveryNumbers recovery;
   PublishNumbers publish;
@@ -167,6 +205,14 @@ constexpr void each_number(const Numbers& n, Sink&& sink) {
   all(i.imu, i.gyro_radps_rthz, i.accel_mps2_rthz, i.gyro_bias_radps2_rthz, i.accel_bias_mps3_rthz,
       i.gyro_turn_on_radps, i.accel_turn_on_mps2, i.start_tilt_rad, i.level_s, i.gap_mps2, i.gap_radps, i.still_radps,
       i.still_mps, i.wheel_mps, i.slip_share, i.lateral_mps, i.vertical_mps, i.axle_x_b_m, i.wheel_gate_scale);
+  const auto& m = n.magnetic;
+  for (const float v : m.hard_iron_uT) sink(v);
+  for (const float v : m.soft_iron) sink(v);
+  for (const float v : m.mounting_bs) sink(v);
+  all(m.use, m.declination_rad, m.sigma_rad, m.gate_scale, m.norm_uT, m.norm_share, m.dip_rad, m.field_new_s);
+  all(n.baro.use, n.baro.sigma_m, n.baro.drift_m_rts, n.baro.gate_scale, n.baro.zero_sigma_m);
+  n.attitude.each(sink);
+  all(n.disagreement.tilt_rad, n.disagreement.heading_rad, n.disagreement.after_us);
   const auto& s = n.start;
   all(s.known, s.x_m, s.y_m, s.yaw_rad, s.sigma_position_m, s.sigma_yaw_rad);
   const auto& r = n.recovery;

@@ -18,6 +18,18 @@ consteval void require(bool holds, const char* which) {
 consteval bool positive(float x) { return x > 0 && x < 1e30F; }
 consteval bool not_negative(float x) { return x >= 0 && x < 1e30F; }
 consteval bool finite(float x) { return x > -1e30F && x < 1e30F; }
+consteval float determinant(const std::array<float, 9>& m) {
+  return m[0] * (m[4] * m[8] - m[5] * m[7]) - m[1] * (m[3] * m[8] - m[5] * m[6]) + m[2] * (m[3] * m[7] - m[4] * m[6]);
+}
+/// Orthogonal and not a mirror, to a thousandth.
+consteval bool rotation(const std::array<float, 9>& m) {
+  for (std::size_t i = 0; i < 3; ++i)
+    for (std::size_t j = 0; j < 3; ++j) {
+      const float off = m[3 * i] * m[3 * j] + m[3 * i + 1] * m[3 * j + 1] + m[3 * i + 2] * m[3 * j + 2] - (i == j);
+      if (!(off > -2e-3F && off < 2e-3F)) return false;
+    }
+  return determinant(m) > 0;
+}
 }  // namespace detail
 
 consteval Numbers checked(const Numbers& n) {
@@ -69,6 +81,28 @@ consteval Numbers checked(const Numbers& n) {
   require(positive(g.sigma_scale), "gnss.sigma_scale: above 0");
   require(positive(g.gate_scale), "gnss.gate_scale: above 0");
   require(positive(g.align_distance_m), "gnss.align_distance_m: above 0");
+
+  const auto& m = n.magnetic;
+  require(m.declination_rad > -3.2F && m.declination_rad < 3.2F, "magnetic.declination_rad: -pi to pi");
+  require(finite(m.hard_iron_uT[0]) && finite(m.hard_iron_uT[1]) && finite(m.hard_iron_uT[2]),
+          "magnetic.hard_iron_uT: finite");
+  require(positive(detail::determinant(m.soft_iron)), "magnetic.soft_iron: a matrix that mirrors nothing");
+  require(detail::rotation(m.mounting_bs), "magnetic.mounting_bs: a rotation");
+  require(positive(m.sigma_rad) && positive(m.gate_scale), "magnetic.sigma_rad, gate_scale: above 0");
+  require(not_negative(m.norm_uT), "magnetic.norm_uT: not below 0");
+  require(m.norm_share > 0 && m.norm_share < 1, "magnetic.norm_share: between 0 and 1");
+  require(m.dip_rad > 0 && m.dip_rad < 1.5F, "magnetic.dip_rad: between 0 and 1.5");
+  require(positive(m.field_new_s), "magnetic.field_new_s: above 0");
+  require(positive(n.baro.sigma_m) && positive(n.baro.gate_scale), "baro.sigma_m, gate_scale: above 0");
+  require(not_negative(n.baro.drift_m_rts), "baro.drift_m_rts: not below 0");
+  require(positive(n.baro.zero_sigma_m), "baro.zero_sigma_m: above 0");
+  require(!(n.attitude.declination_rad < 0 || n.attitude.declination_rad > 0),
+          "attitude.declination_rad: give it as magnetic.declination_rad");
+  bool options = true;
+  n.attitude.each([&options](float option) { options = options && option >= 0 && option < 1e30F; });
+  require(options, "attitude: options finite, not below 0");
+  require(positive(n.disagreement.tilt_rad) && positive(n.disagreement.heading_rad) && n.disagreement.after_us >= 0,
+          "disagreement: angles above 0, after_us not below 0");
 
   require(positive(n.start.sigma_position_m), "start.sigma_position_m: above 0");
   require(positive(n.start.sigma_yaw_rad), "start.sigma_yaw_rad: above 0");
