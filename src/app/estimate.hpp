@@ -4,6 +4,7 @@
 
 #include "base/time.hpp"
 #include "config/messages.hpp"
+#include "filter/quaternion.hpp"
 #include "filter/update.hpp"
 #include "model/planar_pose.hpp"
 #include "nav/ins_state.hpp"
@@ -28,6 +29,14 @@ struct InertialEstimate {
   nav::InsState state;
   filter::Symmetric<float, nav::InsState::kErrors> p;
   bool valid = false;
+};
+
+/// What an attitude estimator has: the present, and what of it is believed.
+struct AttitudeEstimate {
+  filter::Quaternion q_nb;
+  bool valid = false;            ///< tilt, at least
+  bool heading_valid = false;    ///< else the heading is free and drifts
+  bool field_disturbed = false;  ///< the magnetometer is not followed
 };
 
 /// One measurement (or input) and what became of it. dof 0: an input that is integrated, not compared.

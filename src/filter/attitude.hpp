@@ -21,14 +21,16 @@ class Attitude {
   explicit Attitude(const AttitudeOptions& options) : o_(options), bias_(options), heading_(options) {}
 
   /// A sample of both that were constant over the last dt_s. kRefused: no numbers, or no time, and nothing has changed;
-  /// kAccelerometerRefused: clipped or in free fall, the gyroscope alone was used.
-  [[nodiscard]] AttitudeVerdict step(const Vector3& w_b_radps, const Vector3& f_b_mps2, float dt_s) {
+  /// kAccelerometerRefused: clipped (`force_usable` false says so of a mean that hides it) or in free fall, the
+  /// gyroscope alone was used.
+  [[nodiscard]] AttitudeVerdict step(const Vector3& w_b_radps, const Vector3& f_b_mps2, float dt_s,
+                                     bool force_usable = true) {
     const float w2 = dot(w_b_radps, w_b_radps);
     const float f2 = dot(f_b_mps2, f_b_mps2);
     if (!(dt_s >= kShortest_s && dt_s <= kLongest_s && w2 <= kFastest_radps * kFastest_radps && f2 < base::kInfinity))
       return AttitudeVerdict::kRefused;
     const float most = o_.accelerometer_limit_mps2;
-    const bool usable = f2 > kLeastForce_mps2 * kLeastForce_mps2 && f2 < most * most;
+    const bool usable = force_usable && f2 > kLeastForce_mps2 * kLeastForce_mps2 && f2 < most * most;
     if (!started_) {
       if (!usable) return AttitudeVerdict::kRefused;
       q_lb_ = levelled(f_b_mps2);
@@ -36,7 +38,7 @@ class Attitude {
     } else {
       q_lb_ = turned(q_lb_, (0.5F * dt_s) * (w_b_radps - bias_.value()));
       const float clip = o_.gyroscope_limit_radps;
-      if (w2 > clip * clip && !inside(w_b_radps, clip)) average_anew();
+      if (w2 > clip * clip && !inside(w_b_radps, clip)) turn_lost();
     }
     rest_.step(o_, w_b_radps, f_b_mps2, dt_s);
     if (!usable) return AttitudeVerdict::kAccelerometerRefused;
@@ -54,6 +56,12 @@ class Attitude {
     return true;
   }
 
+  /// The turn of the last moments is lost: the slow sensors set the attitude again, by a mean that begins here.
+  void turn_lost() {
+    age_s_ = o_.relevel_s;
+    heading_.average_anew(o_.relevel_s);
+  }
+
   [[nodiscard]] bool started() const { return started_; }
   /// Turns b into n: z is up; with a heading x is east, without one the heading is free and drifts with the bias.
   [[nodiscard]] Quaternion q_nb() const { return heading_.turned(q_lb_); }
@@ -62,6 +70,7 @@ class Attitude {
   [[nodiscard]] bool at_rest() const { return rest_.at_rest(); }
   [[nodiscard]] bool heading_known() const { return heading_.known(); }
   [[nodiscard]] bool magnetometer_disturbed() const { return heading_.disturbed(); }
+  [[nodiscard]] float magnetometer_disturbed_s() const { return heading_.disturbed_s(); }
   [[nodiscard]] bool accelerometer_disturbed() const { return off_; }
 
  private:
@@ -69,12 +78,6 @@ class Attitude {
 
   [[nodiscard]] static bool inside(const Vector3& v, float limit) {
     return base::abs(v(0)) < limit && base::abs(v(1)) < limit && base::abs(v(2)) < limit;
-  }
-
-  /// The turn of the last moments is lost: the slow sensors set the attitude again, by a mean that begins here.
-  void average_anew() {
-    age_s_ = o_.relevel_s;
-    heading_.average_anew(o_.relevel_s);
   }
 
   [[gnu::always_inline]] inline void level(const Vector3& f_b, float dt_s) {
