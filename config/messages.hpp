@@ -1094,18 +1094,18 @@ struct EstVel {
 struct EstStdPose {
   static constexpr std::uint8_t kOffset = 0x2C, kSize = 8;
   static constexpr std::uint8_t kStride = 6, kCount = 4;
-  static constexpr Signal kMux{.start = 0, .length = 2};
+  static constexpr Signal kMux{.start = 0, .length = 1};
   static constexpr std::uint8_t kPage = 0;
-  static constexpr Signal kEpoch{.start = 2, .length = 4, .wraps = true};
-  static constexpr Signal kStdX{.start = 6, .length = 16, .has_gap = true, .per_unit = 2000};
-  static constexpr Signal kStdY{.start = 22, .length = 16, .has_gap = true, .per_unit = 2000};
-  static constexpr Signal kStdYaw{.start = 38, .length = 14, .has_gap = true, .per_unit = 5000};
+  static constexpr Signal kEpoch{.start = 1, .length = 4, .wraps = true};
+  static constexpr Signal kStdX{.start = 5, .length = 16, .has_gap = true, .per_unit = 2000};
+  static constexpr Signal kStdY{.start = 21, .length = 16, .has_gap = true, .per_unit = 2000};
+  static constexpr Signal kStdYaw{.start = 37, .length = 15, .has_gap = true, .per_unit = 10000};
   static constexpr Signal kCorrXY{.start = 52, .length = 12, .is_signed = true, .has_gap = true, .per_unit = 2000};
 
   std::uint8_t epoch = 0;  ///< low bits of the epoch, the same in all frames of one epoch
   float std_x_m = 0;  ///< 1-sigma of X; 0 to 32.767 m in steps of 0.0005; NaN: not available
   float std_y_m = 0;  ///< 1-sigma of Y; 0 to 32.767 m in steps of 0.0005; NaN: not available
-  float std_yaw_rad = 0;  ///< 1-sigma of Yaw; 0 to 3.2764 rad in steps of 0.0002; NaN: not available
+  float std_yaw_rad = 0;  ///< 1-sigma of Yaw; 0 to 3.2766 rad in steps of 0.0001; NaN: not available
   float corr_xy = 0;  ///< correlation of X and Y; +-1.0235 in steps of 0.0005; NaN: not available
 
   template <class Self, class Visit>
@@ -1122,9 +1122,9 @@ struct EstStdPose {
 struct EstStdMore {
   static constexpr std::uint8_t kOffset = 0x2C, kSize = 8;
   static constexpr std::uint8_t kStride = 6, kCount = 4;
-  static constexpr Signal kMux{.start = 0, .length = 2};
+  static constexpr Signal kMux{.start = 0, .length = 1};
   static constexpr std::uint8_t kPage = 1;
-  static constexpr Signal kEpoch{.start = 2, .length = 4, .wraps = true};
+  static constexpr Signal kEpoch{.start = 1, .length = 4, .wraps = true};
   static constexpr Signal kCorrXYaw{.start = 6, .length = 12, .is_signed = true, .has_gap = true, .per_unit = 2000};
   static constexpr Signal kCorrYYaw{.start = 18, .length = 12, .is_signed = true, .has_gap = true, .per_unit = 2000};
   static constexpr Signal kStdSpeed{.start = 30, .length = 16, .has_gap = true, .per_unit = 1000};
@@ -1150,11 +1150,11 @@ struct EstStdMore {
 struct EstStateHeight {
   static constexpr std::uint8_t kOffset = 0x2D, kSize = 8;
   static constexpr std::uint8_t kStride = 6, kCount = 4;
-  static constexpr Signal kMux{.start = 0, .length = 3};
+  static constexpr Signal kMux{.start = 0, .length = 4};
   static constexpr std::uint8_t kPage = 0;
-  static constexpr Signal kEpoch{.start = 3, .length = 4, .wraps = true};
-  static constexpr Signal kHeight{.start = 7, .length = 24, .is_signed = true, .has_gap = true, .per_unit = 500};
-  static constexpr Signal kStdHeight{.start = 31, .length = 16, .has_gap = true, .per_unit = 2000};
+  static constexpr Signal kEpoch{.start = 4, .length = 4, .wraps = true};
+  static constexpr Signal kHeight{.start = 8, .length = 24, .is_signed = true, .has_gap = true, .per_unit = 500};
+  static constexpr Signal kStdHeight{.start = 32, .length = 16, .has_gap = true, .per_unit = 2000};
 
   std::uint8_t epoch = 0;  ///< low bits of the epoch, the same in all frames of one epoch
   float height_m = 0;  ///< above the origin; +-16777.214 m in steps of 0.002; NaN: not available
@@ -1172,12 +1172,12 @@ struct EstStateHeight {
 struct EstStateAccBias {
   static constexpr std::uint8_t kOffset = 0x2D, kSize = 8;
   static constexpr std::uint8_t kStride = 6, kCount = 4;
-  static constexpr Signal kMux{.start = 0, .length = 3};
+  static constexpr Signal kMux{.start = 0, .length = 4};
   static constexpr std::uint8_t kPage = 1;
-  static constexpr Signal kEpoch{.start = 3, .length = 4, .wraps = true};
-  static constexpr Signal kAccBiasX{.start = 7, .length = 16, .is_signed = true, .has_gap = true, .per_unit = 5000};
-  static constexpr Signal kAccBiasY{.start = 23, .length = 16, .is_signed = true, .has_gap = true, .per_unit = 5000};
-  static constexpr Signal kAccBiasZ{.start = 39, .length = 16, .is_signed = true, .has_gap = true, .per_unit = 5000};
+  static constexpr Signal kEpoch{.start = 4, .length = 4, .wraps = true};
+  static constexpr Signal kAccBiasX{.start = 8, .length = 16, .is_signed = true, .has_gap = true, .per_unit = 5000};
+  static constexpr Signal kAccBiasY{.start = 24, .length = 16, .is_signed = true, .has_gap = true, .per_unit = 5000};
+  static constexpr Signal kAccBiasZ{.start = 40, .length = 16, .is_signed = true, .has_gap = true, .per_unit = 5000};
 
   std::uint8_t epoch = 0;  ///< low bits of the epoch, the same in all frames of one epoch
   float acc_bias_x_mps2 = 0;  ///< accelerometer bias along body x; +-6.5534 m/s2 in steps of 0.0002; NaN: not available
@@ -1197,12 +1197,12 @@ struct EstStateAccBias {
 struct EstStateGyroBias {
   static constexpr std::uint8_t kOffset = 0x2D, kSize = 8;
   static constexpr std::uint8_t kStride = 6, kCount = 4;
-  static constexpr Signal kMux{.start = 0, .length = 3};
+  static constexpr Signal kMux{.start = 0, .length = 4};
   static constexpr std::uint8_t kPage = 2;
-  static constexpr Signal kEpoch{.start = 3, .length = 4, .wraps = true};
-  static constexpr Signal kGyroBiasX{.start = 7, .length = 16, .is_signed = true, .has_gap = true, .per_unit = 100000};
-  static constexpr Signal kGyroBiasY{.start = 23, .length = 16, .is_signed = true, .has_gap = true, .per_unit = 100000};
-  static constexpr Signal kGyroBiasZ{.start = 39, .length = 16, .is_signed = true, .has_gap = true, .per_unit = 100000};
+  static constexpr Signal kEpoch{.start = 4, .length = 4, .wraps = true};
+  static constexpr Signal kGyroBiasX{.start = 8, .length = 16, .is_signed = true, .has_gap = true, .per_unit = 100000};
+  static constexpr Signal kGyroBiasY{.start = 24, .length = 16, .is_signed = true, .has_gap = true, .per_unit = 100000};
+  static constexpr Signal kGyroBiasZ{.start = 40, .length = 16, .is_signed = true, .has_gap = true, .per_unit = 100000};
 
   std::uint8_t epoch = 0;  ///< low bits of the epoch, the same in all frames of one epoch
   float gyro_bias_x_radps = 0;  ///< gyroscope bias along body x; +-0.32767 rad/s in steps of 0.00001; NaN: not available
@@ -1222,12 +1222,12 @@ struct EstStateGyroBias {
 struct EstStateStdVel {
   static constexpr std::uint8_t kOffset = 0x2D, kSize = 8;
   static constexpr std::uint8_t kStride = 6, kCount = 4;
-  static constexpr Signal kMux{.start = 0, .length = 3};
+  static constexpr Signal kMux{.start = 0, .length = 4};
   static constexpr std::uint8_t kPage = 3;
-  static constexpr Signal kEpoch{.start = 3, .length = 4, .wraps = true};
-  static constexpr Signal kStdVelEast{.start = 7, .length = 16, .has_gap = true, .per_unit = 1000};
-  static constexpr Signal kStdVelNorth{.start = 23, .length = 16, .has_gap = true, .per_unit = 1000};
-  static constexpr Signal kStdVelUp{.start = 39, .length = 16, .has_gap = true, .per_unit = 1000};
+  static constexpr Signal kEpoch{.start = 4, .length = 4, .wraps = true};
+  static constexpr Signal kStdVelEast{.start = 8, .length = 16, .has_gap = true, .per_unit = 1000};
+  static constexpr Signal kStdVelNorth{.start = 24, .length = 16, .has_gap = true, .per_unit = 1000};
+  static constexpr Signal kStdVelUp{.start = 40, .length = 16, .has_gap = true, .per_unit = 1000};
 
   std::uint8_t epoch = 0;  ///< low bits of the epoch, the same in all frames of one epoch
   float std_vel_east_mps = 0;  ///< 1-sigma of the velocity towards east; 0 to 65.534 m/s in steps of 0.001; NaN: not available
@@ -1247,11 +1247,11 @@ struct EstStateStdVel {
 struct EstStateStdTilt {
   static constexpr std::uint8_t kOffset = 0x2D, kSize = 8;
   static constexpr std::uint8_t kStride = 6, kCount = 4;
-  static constexpr Signal kMux{.start = 0, .length = 3};
+  static constexpr Signal kMux{.start = 0, .length = 4};
   static constexpr std::uint8_t kPage = 4;
-  static constexpr Signal kEpoch{.start = 3, .length = 4, .wraps = true};
-  static constexpr Signal kStdTiltEast{.start = 7, .length = 16, .has_gap = true, .per_unit = 10000};
-  static constexpr Signal kStdTiltNorth{.start = 23, .length = 16, .has_gap = true, .per_unit = 10000};
+  static constexpr Signal kEpoch{.start = 4, .length = 4, .wraps = true};
+  static constexpr Signal kStdTiltEast{.start = 8, .length = 16, .has_gap = true, .per_unit = 10000};
+  static constexpr Signal kStdTiltNorth{.start = 24, .length = 16, .has_gap = true, .per_unit = 10000};
 
   std::uint8_t epoch = 0;  ///< low bits of the epoch, the same in all frames of one epoch
   float std_tilt_east_rad = 0;  ///< 1-sigma of the turn about the axis that points east; 0 to 6.5534 rad in steps of 0.0001; NaN: not available
@@ -1269,12 +1269,12 @@ struct EstStateStdTilt {
 struct EstStateStdAccBias {
   static constexpr std::uint8_t kOffset = 0x2D, kSize = 8;
   static constexpr std::uint8_t kStride = 6, kCount = 4;
-  static constexpr Signal kMux{.start = 0, .length = 3};
+  static constexpr Signal kMux{.start = 0, .length = 4};
   static constexpr std::uint8_t kPage = 5;
-  static constexpr Signal kEpoch{.start = 3, .length = 4, .wraps = true};
-  static constexpr Signal kStdAccBiasX{.start = 7, .length = 16, .has_gap = true, .per_unit = 10000};
-  static constexpr Signal kStdAccBiasY{.start = 23, .length = 16, .has_gap = true, .per_unit = 10000};
-  static constexpr Signal kStdAccBiasZ{.start = 39, .length = 16, .has_gap = true, .per_unit = 10000};
+  static constexpr Signal kEpoch{.start = 4, .length = 4, .wraps = true};
+  static constexpr Signal kStdAccBiasX{.start = 8, .length = 16, .has_gap = true, .per_unit = 10000};
+  static constexpr Signal kStdAccBiasY{.start = 24, .length = 16, .has_gap = true, .per_unit = 10000};
+  static constexpr Signal kStdAccBiasZ{.start = 40, .length = 16, .has_gap = true, .per_unit = 10000};
 
   std::uint8_t epoch = 0;  ///< low bits of the epoch, the same in all frames of one epoch
   float std_acc_bias_x_mps2 = 0;  ///< 1-sigma of the accelerometer bias along body x; 0 to 6.5534 m/s2 in steps of 0.0001; NaN: not available
@@ -1294,12 +1294,12 @@ struct EstStateStdAccBias {
 struct EstStateStdGyroBias {
   static constexpr std::uint8_t kOffset = 0x2D, kSize = 8;
   static constexpr std::uint8_t kStride = 6, kCount = 4;
-  static constexpr Signal kMux{.start = 0, .length = 3};
+  static constexpr Signal kMux{.start = 0, .length = 4};
   static constexpr std::uint8_t kPage = 6;
-  static constexpr Signal kEpoch{.start = 3, .length = 4, .wraps = true};
-  static constexpr Signal kStdGyroBiasX{.start = 7, .length = 16, .has_gap = true, .per_unit = 500000};
-  static constexpr Signal kStdGyroBiasY{.start = 23, .length = 16, .has_gap = true, .per_unit = 500000};
-  static constexpr Signal kStdGyroBiasZ{.start = 39, .length = 16, .has_gap = true, .per_unit = 500000};
+  static constexpr Signal kEpoch{.start = 4, .length = 4, .wraps = true};
+  static constexpr Signal kStdGyroBiasX{.start = 8, .length = 16, .has_gap = true, .per_unit = 500000};
+  static constexpr Signal kStdGyroBiasY{.start = 24, .length = 16, .has_gap = true, .per_unit = 500000};
+  static constexpr Signal kStdGyroBiasZ{.start = 40, .length = 16, .has_gap = true, .per_unit = 500000};
 
   std::uint8_t epoch = 0;  ///< low bits of the epoch, the same in all frames of one epoch
   float std_gyro_bias_x_radps = 0;  ///< 1-sigma of the gyroscope bias along body x; 0 to 0.131068 rad/s in steps of 0.000002; NaN: not available
@@ -1319,12 +1319,12 @@ struct EstStateStdGyroBias {
 struct EstStateJump {
   static constexpr std::uint8_t kOffset = 0x2D, kSize = 8;
   static constexpr std::uint8_t kStride = 6, kCount = 4;
-  static constexpr Signal kMux{.start = 0, .length = 3};
+  static constexpr Signal kMux{.start = 0, .length = 4};
   static constexpr std::uint8_t kPage = 7;
-  static constexpr Signal kEpoch{.start = 3, .length = 4, .wraps = true};
-  static constexpr Signal kJumpX{.start = 7, .length = 18, .is_signed = true, .has_gap = true, .per_unit = 100};
-  static constexpr Signal kJumpY{.start = 25, .length = 18, .is_signed = true, .has_gap = true, .per_unit = 100};
-  static constexpr Signal kJumpYaw{.start = 43, .length = 14, .is_signed = true, .has_gap = true, .per_unit = 2000};
+  static constexpr Signal kEpoch{.start = 4, .length = 4, .wraps = true};
+  static constexpr Signal kJumpX{.start = 8, .length = 18, .is_signed = true, .has_gap = true, .per_unit = 100};
+  static constexpr Signal kJumpY{.start = 26, .length = 18, .is_signed = true, .has_gap = true, .per_unit = 100};
+  static constexpr Signal kJumpYaw{.start = 44, .length = 14, .is_signed = true, .has_gap = true, .per_unit = 2000};
 
   std::uint8_t epoch = 0;  ///< low bits of the epoch, the same in all frames of one epoch
   float jump_x_m = 0;  ///< last reset: step of the position towards east; +-1310.71 m in steps of 0.01; NaN: not available
@@ -1337,6 +1337,53 @@ struct EstStateJump {
     visit(At<kJumpX>{}, m.jump_x_m);
     visit(At<kJumpY>{}, m.jump_y_m);
     visit(At<kJumpYaw>{}, m.jump_yaw_rad);
+  }
+};
+
+/// Estimator: what only an inertial estimator has, one page per frame. Instances 0 to 3, ids 6 apart. Page 8.
+struct EstStateDisagreement {
+  static constexpr std::uint8_t kOffset = 0x2D, kSize = 8;
+  static constexpr std::uint8_t kStride = 6, kCount = 4;
+  static constexpr Signal kMux{.start = 0, .length = 4};
+  static constexpr std::uint8_t kPage = 8;
+  static constexpr Signal kEpoch{.start = 4, .length = 4, .wraps = true};
+  static constexpr Signal kDisagreeTilt{.start = 8, .length = 16, .has_gap = true, .per_unit = 10000};
+  static constexpr Signal kDisagreeYaw{.start = 24, .length = 17, .is_signed = true, .has_gap = true, .per_unit = 20000};
+
+  std::uint8_t epoch = 0;  ///< low bits of the epoch, the same in all frames of one epoch
+  float disagree_tilt_rad = 0;  ///< angle between this estimator's up and that of the primary one; 0 to 6.5534 rad in steps of 0.0001; NaN: not available
+  float disagree_yaw_rad = 0;  ///< heading of this estimator minus that of the primary one; +-3.27675 rad in steps of 0.00005; NaN: not available
+
+  template <class Self, class Visit>
+  static constexpr void each(Self& m, Visit&& visit) {
+    visit(At<kEpoch>{}, m.epoch);
+    visit(At<kDisagreeTilt>{}, m.disagree_tilt_rad);
+    visit(At<kDisagreeYaw>{}, m.disagree_yaw_rad);
+  }
+};
+
+/// Estimator: what only an inertial estimator has, one page per frame. Instances 0 to 3, ids 6 apart. Page 9.
+struct EstStateImuHealth {
+  static constexpr std::uint8_t kOffset = 0x2D, kSize = 8;
+  static constexpr std::uint8_t kStride = 6, kCount = 4;
+  static constexpr Signal kMux{.start = 0, .length = 4};
+  static constexpr std::uint8_t kPage = 9;
+  static constexpr Signal kEpoch{.start = 4, .length = 4, .wraps = true};
+  static constexpr Signal kVibAccel{.start = 8, .length = 16, .has_gap = true, .per_unit = 500};
+  static constexpr Signal kVibGyro{.start = 24, .length = 16, .has_gap = true, .per_unit = 5000};
+  static constexpr Signal kClipped{.start = 40, .length = 16, .wraps = true};
+
+  std::uint8_t epoch = 0;  ///< low bits of the epoch, the same in all frames of one epoch
+  float vib_accel_mps2 = 0;  ///< RMS of the specific force above 10 Hz or so; 0 to 131.068 m/s2 in steps of 0.002; NaN: not available
+  float vib_gyro_radps = 0;  ///< RMS of the turn rate above 10 Hz or so; 0 to 13.1068 rad/s in steps of 0.0002; NaN: not available
+  std::uint16_t clipped = 0;  ///< IMU samples with a clipped axis
+
+  template <class Self, class Visit>
+  static constexpr void each(Self& m, Visit&& visit) {
+    visit(At<kEpoch>{}, m.epoch);
+    visit(At<kVibAccel>{}, m.vib_accel_mps2);
+    visit(At<kVibGyro>{}, m.vib_gyro_radps);
+    visit(At<kClipped>{}, m.clipped);
   }
 };
 
@@ -1394,6 +1441,8 @@ using AllMessages = List<
     EstStateStdTilt,
     EstStateStdAccBias,
     EstStateStdGyroBias,
-    EstStateJump>;
+    EstStateJump,
+    EstStateDisagreement,
+    EstStateImuHealth>;
 
 }  // namespace tetap::can

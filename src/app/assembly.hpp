@@ -47,7 +47,7 @@ class Assembly {
   }
   static constexpr base::Micros kImuPatience{50'000};
 
-  std::array<Partial, 16> partials_{};
+  std::array<Partial, 8> partials_{};
 };
 
 inline Assembly::Partial& Assembly::slot(can::Sensor sensor, std::uint8_t instance, std::uint8_t sequence,

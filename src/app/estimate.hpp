@@ -24,11 +24,29 @@ struct Estimate {
   bool velocity_valid = false;
 };
 
+/// An estimator's own step that nothing measured: it found itself wrong, and went where its sensors had been for long.
+struct Jump {
+  float east_m = 0;
+  float north_m = 0;
+  float yaw_rad = 0;
+  can::ResetCause cause = can::ResetCause::kPositionJump;
+  std::uint8_t count = 0;  ///< of such steps since the start
+};
+
+/// How the IMU fares.
+struct ImuHealth {
+  float vibration_mps2 = base::kNan;   ///< RMS of what is too fast to be motion
+  float vibration_radps = base::kNan;  ///< likewise
+  std::uint16_t clipped = 0;           ///< samples with a clipped axis
+};
+
 /// What an inertial estimator has beyond that: the state at the present, the covariance of the far end of its window.
 struct InertialEstimate {
   nav::InsState state;
   filter::Symmetric<float, nav::InsState::kErrors> p;
   bool valid = false;
+  Jump jump;
+  ImuHealth imu;
 };
 
 /// What an attitude estimator has: the present, and what of it is believed.
@@ -38,6 +56,11 @@ struct AttitudeEstimate {
   bool heading_valid = false;    ///< else the heading is free and drifts
   bool field_disturbed = false;  ///< the magnetometer is not followed
 };
+
+[[nodiscard]] inline AttitudeEstimate attitude_of(const InertialEstimate& e) {
+  const nav::Quaternion& q = e.state.q_nb;
+  return {.q_nb = {q.w, q.x, q.y, q.z}, .valid = e.valid, .heading_valid = e.valid};
+}
 
 /// One measurement (or input) and what became of it. dof 0: an input that is integrated, not compared.
 struct Innovation {

@@ -4,6 +4,7 @@
 
 #include "app/exercise.hpp"
 #include "app/node.hpp"
+#include "app/outlet.hpp"
 #include "app/pacer.hpp"
 #include "hal/board.hpp"
 
@@ -20,9 +21,11 @@ class Firmware {
   /// Runs the exercise on this very node, then powers it on anew. For boot: the hash says whether this core computes as
   /// all others do.
   [[nodiscard]] std::uint32_t self_check(std::uint32_t epochs) {
-    const std::uint32_t hash = Exercise(node_, numbers_.can_base, 1).run(epochs);
+    FrameHash hash(numbers_.can_base);
+    Outlet outlet(board_.can, hash);
+    Exercise(node_, numbers_.can_base, 1).run(epochs, outlet);
     node_.power_on({});
-    return hash;
+    return hash.value();
   }
 
   /// Takes what has arrived, ticks when it is time, hands on what is to be sent. Call it in a loop, as often as you
@@ -50,7 +53,8 @@ class Firmware {
     const base::Micros time{static_cast<std::int64_t>(sync->time_us)};
     if (sync->kind == can::SyncKind::kBegin) {
       node_.power_on(time);
-      node_.send_version([this](const base::CanFrame& out) { send(out); });
+      Outlet outlet(board_.can);
+      node_.send_version(outlet);
     }
     if (const auto t = pacer_.on_sync(sync->kind, time, board_.now(), health_)) tick(*t);
   }
@@ -59,16 +63,13 @@ class Firmware {
     const base::Micros began = board_.now();
     health_.sync = pacer_.state();
     health_.bus = board_.can.faults();
-    node_.tick(t, health_, [this](const base::CanFrame& out) { send(out); });
+    Outlet outlet(board_.can);
+    node_.tick(t, health_, outlet);
     const std::int64_t took_us = (board_.now() - began).us;
     const auto us = static_cast<std::uint32_t>(took_us < 0 ? 0 : took_us > 1'000'000 ? 1'000'000 : took_us);
     if (us > health_.longest_us) health_.longest_us = us;
     health_.mean_us += (static_cast<float>(us) - health_.mean_us) * 0.01F;
   }
-
-  void send(const base::CanFrame& frame) {
-    static_cast<void>(board_.can.send(frame));
-  }  // refused frames: CanFaults::tx_full
 
   Board& board_;
   const Numbers& numbers_;

@@ -22,6 +22,8 @@ struct Estimators {
   static_assert(sizeof...(E) >= 1 && sizeof...(E) <= 4, "the bus has four output instances");
   using Lanes = std::tuple<Lane<E>...>;
   static constexpr std::size_t kCount = sizeof...(E);
+  template <class Payload>
+  static constexpr bool kTakes = (Lane<E>::template kTakes<Payload> || ...);
 };
 
 /// `Note` is called with (instance, sample, innovation) for every record.
@@ -30,6 +32,9 @@ class History {
  public:
   static constexpr std::size_t kCount = Estimators::kCount;
   static constexpr std::size_t kPrimary = kCount - 1;
+  /// Whether any estimator takes this kind of sample.
+  template <class Payload>
+  static constexpr bool kTakes = Estimators::template kTakes<Payload>;
 
   void power_on(base::Micros t, const Context& with) {
     timeline_.power_on();

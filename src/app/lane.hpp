@@ -40,7 +40,7 @@ struct SensorStatistics {
   std::uint8_t instance = 0;
   std::uint16_t accepted = 0;
   std::uint16_t rejected = 0;
-  float nis_mean = 0;  ///< running mean over the last 50 or so compared measurements
+  float nis_mean = 0;  ///< per degree of freedom, over the last 50 or so compared measurements
   std::uint8_t refused_in_a_row = 0;
   bool compared = false;
   base::Micros last_accepted;
@@ -54,6 +54,10 @@ class Lane {
  public:
   using Type = E;
   static constexpr bool kDelayed = kIsDelayed<E>;
+  template <class Payload>
+  static constexpr bool kTakes = requires(E& e, const Payload& payload, base::Micros stamp, const Context& with) {
+    e.fuse(payload, stamp, with);
+  };
 
   void restart(base::Micros t, const Context& with) {
     now_.restart(t, with);
@@ -95,6 +99,18 @@ class Lane {
   [[nodiscard]] Estimate estimate(const Context& with) const { return now_.estimate(with); }
   [[nodiscard]] InertialEstimate inertial(const Context& with) const requires requires(const E& e) { e.inertial(with); }
   { return now_.inertial(with); }
+  [[nodiscard]] AttitudeEstimate attitude(const Context& with) const requires requires(const E& e) { e.attitude(with); }
+  { return now_.attitude(with); }
+  /// What the estimator itself did about its state, for the status.
+  [[nodiscard]] Jump jump() const {
+    if constexpr (requires { now_.jump(); }) return now_.jump();
+    return {};
+  }
+  /// Bits of can::Fault that the estimator sees.
+  [[nodiscard]] std::uint16_t faults() const {
+    if constexpr (requires { now_.faults(); }) return now_.faults();
+    return 0;
+  }
   [[nodiscard]] can::Mode mode(const Context& with) const { return now_.mode(with); }
 
   void account(const Sample& sample, const Innovation& innovation) {
@@ -108,7 +124,8 @@ class Lane {
       if (s.refused_in_a_row < 255) ++s.refused_in_a_row;
     }
     if (innovation.dof > 0) {
-      s.nis_mean = s.compared ? s.nis_mean + (innovation.nis - s.nis_mean) * 0.02F : innovation.nis;
+      const float nis = innovation.nis / static_cast<float>(innovation.dof);
+      s.nis_mean = s.compared ? s.nis_mean + (nis - s.nis_mean) * 0.02F : nis;
       s.compared = true;
     }
   }
@@ -132,10 +149,6 @@ class Lane {
   }
 
  private:
-  template <class Payload>
-  static constexpr bool kTakes = requires(E& e, const Payload& payload, base::Micros stamp, const Context& with) {
-    e.fuse(payload, stamp, with);
-  };
   static Innovation fuse_into(E& estimator, const Sample& sample, const Context& with) {
     Innovation innovation;
     visit(sample, [&](const auto& payload) {

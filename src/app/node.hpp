@@ -5,6 +5,7 @@
 
 #include "app/history.hpp"
 #include "app/inbox.hpp"
+#include "app/landmarks.hpp"
 #include "app/publisher.hpp"
 #include "app/tally.hpp"
 
@@ -41,7 +42,7 @@ class Node {
 
   /// Called by the inbox.
   void sample(const Sample& sample);
-  void map_entry(const MapEntry& entry);
+  void map_entry(const MapEntry& entry) { landmarks_.add(entry, counters_); }
   /// Of two within an epoch the one with the later counter stands, whichever came first.
   void set_pose(const SetPose& pose) {
     if (!pending_pose_ || ((pose.counter - pending_pose_->counter) & 0x0F) < 8) pending_pose_ = pose;
@@ -53,11 +54,7 @@ class Node {
   using Estimates = typename History::Estimates;
   static constexpr std::size_t kPrimary = History::kPrimary;
   static constexpr base::Micros kLongestStep{500'000};
-  /// Map entries wait here for their tick, sorted by id, so that the order of arrival has no effect.
-  struct PendingMap {
-    std::array<MapEntry, kMapCapacity> entries{};
-    std::size_t size = 0;
-  };
+  using Landmarks = std::conditional_t<Estimators::template kTakes<LandmarkSighting>, app::Landmarks, app::NoLandmarks>;
 
   [[nodiscard]] Context context() const { return {.numbers = numbers_, .site = site_}; }
   void restart(base::Micros t, can::ResetCause cause);
@@ -74,6 +71,8 @@ class Node {
     };
   }
   [[nodiscard]] bool healthy(const Estimates& estimates);
+  [[nodiscard]] Disagreement judge();
+  void note_jump();
   [[nodiscard]] std::uint32_t state_crc() const;
   [[nodiscard]] Summary summary(const Estimate& estimate) const;
 
@@ -83,7 +82,7 @@ class Node {
   Inbox inbox_;
   Counters counters_;
   Publisher<Estimators::kCount> publisher_;
-  PendingMap pending_map_;
+  [[no_unique_address]] Landmarks landmarks_;
   std::array<bool, 3> pending_reset_{};
   std::optional<SetPose> pending_pose_;
 
@@ -93,12 +92,14 @@ class Node {
   std::uint8_t resets_ = 0;
   can::ResetCause reset_cause_ = can::ResetCause::kPowerOn;
   base::Micros restarted_at_;
+  std::uint8_t jumps_ = 0;  ///< of the primary estimator, so many are in resets_
+  DisagreementWatch disagreement_;
 };
 
 template <class Estimators, std::size_t Capacity>
 void Node<Estimators, Capacity>::power_on(base::Micros t) {
   // Cleared in place: a fresh object assigned over the old one would pass over the stack.
-  site_.map.clear();
+  landmarks_.power_on(site_);
   site_.frame = {};
   site_.origin = can::OriginSource::kNone;
   const GnssNumbers& g = numbers_.gnss;
@@ -109,7 +110,6 @@ void Node<Estimators, Capacity>::power_on(base::Micros t) {
   inbox_.power_on();
   counters_ = {};
   publisher_.power_on();
-  pending_map_.size = 0;
   pending_reset_ = {};
   pending_pose_.reset();
   now_ = restarted_at_ = t;
@@ -118,6 +118,8 @@ void Node<Estimators, Capacity>::power_on(base::Micros t) {
   resets_ = 0;
   reset_cause_ = can::ResetCause::kPowerOn;
   history_.power_on(t, context());
+  disagreement_.restart(t);
+  jumps_ = 0;
 }
 
 template <class Estimators, std::size_t Capacity>
@@ -144,27 +146,6 @@ void Node<Estimators, Capacity>::sample(const Sample& arrived) {
 }
 
 template <class Estimators, std::size_t Capacity>
-void Node<Estimators, Capacity>::map_entry(const MapEntry& entry) {
-  PendingMap& pending = pending_map_;
-  std::size_t at = pending.size;
-  while (at > 0 && pending.entries[at - 1].id >= entry.id) --at;
-  if (at < pending.size && pending.entries[at].id == entry.id) {
-    MapEntry& there = pending.entries[at];  // of two within an epoch the one further east (or north) stands
-    const bool beyond = entry.x_mm != there.x_mm ? entry.x_mm > there.x_mm : entry.y_mm > there.y_mm;
-    if (beyond) there = entry;
-    return;
-  }
-  if (pending.size == kMapCapacity) {  // the highest ids are the ones refused, in whatever order they come
-    ++counters_.map_full;
-    if (at == pending.size) return;
-    --pending.size;
-  }
-  for (std::size_t i = pending.size; i > at; --i) pending.entries[i] = pending.entries[i - 1];
-  pending.entries[at] = entry;
-  ++pending.size;
-}
-
-template <class Estimators, std::size_t Capacity>
 template <class Send>
 void Node<Estimators, Capacity>::tick(base::Micros t, const LoopHealth& loop, Send&& send) {
   if (!ticked_) {
@@ -184,12 +165,19 @@ void Node<Estimators, Capacity>::tick(base::Micros t, const LoopHealth& loop, Se
   Estimates estimates = history_.estimates(context());
   if (!healthy(estimates)) estimates = history_.estimates(context());
 
+  const Disagreement apart = judge();
+  note_jump();
+
   publisher_.begin(now_, tally_, send);
   std::size_t instance = 0;
   history_.each_lane([&](const auto& lane) {
     using E = typename std::remove_cvref_t<decltype(lane)>::Type;
     publisher_.estimate(instance, E::kKind, instance == kPrimary, estimates[instance], send);
-    if constexpr (requires { lane.inertial(context()); }) publisher_.inertial(instance, lane.inertial(context()), send);
+    if constexpr (requires { lane.inertial(context()); })
+      publisher_.inertial(
+          instance, [&] { return lane.inertial(context()); }, send);
+    if constexpr (requires { lane.attitude(context()); })
+      publisher_.attitude(instance, lane.attitude(context()), apart, send);
     ++instance;
   });
   publisher_.status(summary(estimates[kPrimary]), send);
@@ -209,6 +197,8 @@ void Node<Estimators, Capacity>::restart(base::Micros t, can::ResetCause cause) 
     restarted_at_ = t;
   }
   history_.restart(t, context());
+  disagreement_.restart(t);
+  jumps_ = 0;
   if (cause == can::ResetCause::kTimeJump) {
     inbox_.forget(counters_);
     history_.clear();
@@ -234,19 +224,17 @@ void Node<Estimators, Capacity>::note(std::size_t instance, const Sample& sample
 
 template <class Estimators, std::size_t Capacity>
 void Node<Estimators, Capacity>::apply_map(base::Micros before) {
-  if (pending_map_.size == 0) return;
+  if (!landmarks_.waiting()) return;
   consume(before);  // what came late belongs to the map as it was
   close_window(before);
-  for (std::size_t i = 0; i < pending_map_.size; ++i)
-    if (!site_.map.put(pending_map_.entries[i])) ++counters_.map_full;
-  pending_map_.size = 0;
+  landmarks_.apply(counters_);
 }
 
 template <class Estimators, std::size_t Capacity>
 void Node<Estimators, Capacity>::apply_commands() {
   using What = can::ResetWhat;
   const auto asked = [this](What what) { return std::exchange(pending_reset_[static_cast<std::size_t>(what)], false); };
-  if (asked(What::kLandmarkMap)) site_.map.clear();
+  if (asked(What::kLandmarkMap)) landmarks_.clear();
   if (asked(What::kCounters)) {
     counters_ = {};
     history_.each_lane([](auto& lane) { lane.clear_statistics(); });
@@ -298,12 +286,38 @@ bool Node<Estimators, Capacity>::healthy(const Estimates& estimates) {
   return false;
 }
 
+/// How far the attitude estimator is from the primary one; nothing where one of them has no attitude.
+template <class Estimators, std::size_t Capacity>
+Disagreement Node<Estimators, Capacity>::judge() {
+  Disagreement apart;
+  if constexpr (requires { history_.primary().inertial(context()); }) {
+    history_.each_lane([&](const auto& lane) {
+      if constexpr (requires { lane.attitude(context()); })
+        apart = disagreement(lane.attitude(context()), attitude_of(history_.primary().inertial(context())));
+    });
+    disagreement_.step(apart, now_, numbers_.disagreement);
+  }
+  return apart;
+}
+
+/// A step the primary estimator made of itself counts as a reset, with its cause.
+template <class Estimators, std::size_t Capacity>
+void Node<Estimators, Capacity>::note_jump() {
+  const Jump jump = history_.primary().jump();
+  if (jump.count == jumps_) return;
+  resets_ = static_cast<std::uint8_t>(resets_ + static_cast<std::uint8_t>(jump.count - jumps_));
+  jumps_ = jump.count;
+  reset_cause_ = jump.cause;
+  restarted_at_ = now_;
+}
+
 template <class Estimators, std::size_t Capacity>
 std::uint32_t Node<Estimators, Capacity>::state_crc() const {
   base::BitCrc crc;
   history_.each_bit(crc);
   crc(static_cast<std::uint32_t>(site_.origin));
-  site_.map.each_bit(crc);
+  disagreement_.each_bit(crc);
+  landmarks_.each_bit(crc);
   return crc.value();
 }
 
@@ -319,6 +333,13 @@ Summary Node<Estimators, Capacity>::summary(const Estimate& estimate) const {
             .cause = reset_cause_,
             .restarted = resets_ > 0 && now_ - restarted_at_ < base::Micros{1'000'000} &&
                          reset_cause_ != can::ResetCause::kSetPose};
+  FaultSet faults{primary.faults()};
+  faults.raise(can::Fault::kAttitudeDisagrees, disagreement_.disagrees());
+  history_.each_lane([&](const auto& lane) {
+    if constexpr (requires { lane.attitude(context()); })
+      faults.raise(can::Fault::kMagneticDisturbance, lane.attitude(context()).field_disturbed);
+  });
+  s.faults = faults.bits;
   for (const SensorStatistics& stat : primary.statistics()) {
     const bool used = stat.accepted > 0 && now_ - stat.last_accepted < base::Micros{1'000'000};
     if (used) s.used = static_cast<std::uint16_t>(s.used | (1U << static_cast<unsigned>(stat.sensor)));

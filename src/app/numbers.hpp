@@ -64,7 +64,8 @@ struct GnssNumbers {
   float antenna_z_b_m = 0;
   float sigma_velocity_floor_mps = 0.1F;
   float sigma_floor_m = 0.5F;  ///< the receiver's own accuracy is not believed below this
-  float sigma_scale = 1;       ///< times the receiver's own accuracy; its errors are correlated in time
+  float sigma_scale = 1;       ///< times the receiver's own accuracy
+  float correlation_s = 0;     ///< inertial: how long the receiver's errors last; 0: a new one with every fix
   float gate_scale = 1;
   float align_distance_m = 8;          ///< travel by GNSS before a heading is derived from it
   std::int32_t origin_configured = 0;  ///< 0: the first fix is the origin
@@ -142,11 +143,16 @@ struct StartNumbers {
 };
 
 /// A sensor that was refused this long comes back by inflating the position's and heading's variance, once per period.
+/// Not so GNSS position in the inertial filter: what it refuses becomes true only by persisting.
 struct RecoveryNumbers {
   std::int32_t after_us = 3'000'000;
   std::int32_t at_least = 10;  ///< rejections in a row
   float inflate_position_m = 1;
   float inflate_yaw_rad = 0.2F;
+  std::int32_t persist_us = 60'000'000;  ///< refused fixes that agree for longer are a jump that is true,
+  std::int32_t persist_fixes = 120;      ///< and if there are so many of them
+  std::int32_t confirm_fixes = 5;        ///< that agree, before one decides where the filter is
+  float frozen_m = 0.5F;                 ///< way with the same coordinates: the receiver repeats itself
 };
 
 /// Ticks between frames; 0 = never.
@@ -198,8 +204,8 @@ constexpr void each_number(const Numbers& n, Sink&& sink) {
       l.sigma_range_only_m, l.gate_scale);
   const auto& g = n.gnss;
   all(g.antenna_x_b_m, g.antenna_y_b_m, g.antenna_z_b_m, g.sigma_velocity_floor_mps, g.sigma_floor_m, g.sigma_scale,
-      g.gate_scale, g.align_distance_m, g.origin_configured, g.origin_latitude_2ndeg, g.origin_longitude_2ndeg,
-      g.origin_height_m);
+      g.correlation_s, g.gate_scale, g.align_distance_m, g.origin_configured, g.origin_latitude_2ndeg,
+      g.origin_longitude_2ndeg, g.origin_height_m);
   const auto& i = n.inertial;
   for (const float m : i.mounting_bs) sink(m);
   all(i.imu, i.gyro_radps_rthz, i.accel_mps2_rthz, i.gyro_bias_radps2_rthz, i.accel_bias_mps3_rthz,
@@ -216,7 +222,8 @@ constexpr void each_number(const Numbers& n, Sink&& sink) {
   const auto& s = n.start;
   all(s.known, s.x_m, s.y_m, s.yaw_rad, s.sigma_position_m, s.sigma_yaw_rad);
   const auto& r = n.recovery;
-  all(r.after_us, r.at_least, r.inflate_position_m, r.inflate_yaw_rad);
+  all(r.after_us, r.at_least, r.inflate_position_m, r.inflate_yaw_rad, r.persist_us, r.persist_fixes, r.confirm_fixes,
+      r.frozen_m);
   const auto& p = n.publish;
   all(p.pose_every, p.std_every, p.side_every, p.status_every, p.statistics_every, p.diagnostics_every,
       p.identity_every, p.attitude_every, p.state_every, p.event_every);

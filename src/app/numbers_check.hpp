@@ -79,6 +79,7 @@ consteval Numbers checked(const Numbers& n) {
   require(finite(g.antenna_x_b_m) && finite(g.antenna_y_b_m), "gnss.antenna_x_b_m, antenna_y_b_m: finite");
   require(positive(g.sigma_floor_m), "gnss.sigma_floor_m: above 0");
   require(positive(g.sigma_scale), "gnss.sigma_scale: above 0");
+  require(g.correlation_s >= 0 && g.correlation_s <= 3600, "gnss.correlation_s: 0 to 3600");
   require(positive(g.gate_scale), "gnss.gate_scale: above 0");
   require(positive(g.align_distance_m), "gnss.align_distance_m: above 0");
 
@@ -109,6 +110,11 @@ consteval Numbers checked(const Numbers& n) {
   require(n.recovery.after_us >= 0 && n.recovery.at_least >= 1, "recovery.after_us not below 0, at_least from 1");
   require(positive(n.recovery.inflate_position_m) && positive(n.recovery.inflate_yaw_rad),
           "recovery.inflate_*: above 0");
+  require(n.recovery.persist_us > 0 && n.recovery.persist_fixes >= 2,
+          "recovery.persist_us above 0, persist_fixes from 2");
+  require(n.recovery.confirm_fixes >= 2 && n.recovery.confirm_fixes <= n.recovery.persist_fixes,
+          "recovery.confirm_fixes: 2 to persist_fixes");
+  require(positive(n.recovery.frozen_m), "recovery.frozen_m: above 0");
   return n;
 }
 

@@ -53,7 +53,7 @@ template <class Put>
 void put_state_page(std::uint32_t page, const InertialEstimate& e, std::uint8_t tag, Put&& put) {
   const nav::InsState& x = e.state;
   const auto std = [&e](int i) { return base::sqrt(e.p(i, i)); };
-  switch (page % 7) {
+  switch (page % 9) {
     case 0:
       put(can::EstStateHeight{.epoch = tag, .height_m = base::metres(x.z.um()), .std_height_m = std(2)});
       break;
@@ -80,11 +80,21 @@ void put_state_page(std::uint32_t page, const InertialEstimate& e, std::uint8_t 
       put(can::EstStateStdAccBias{
           .epoch = tag, .std_acc_bias_x_mps2 = std(9), .std_acc_bias_y_mps2 = std(10), .std_acc_bias_z_mps2 = std(11)});
       break;
-    default:
+    case 6:
       put(can::EstStateStdGyroBias{.epoch = tag,
                                    .std_gyro_bias_x_radps = std(12),
                                    .std_gyro_bias_y_radps = std(13),
                                    .std_gyro_bias_z_radps = std(14)});
+      break;
+    case 7:
+      put(can::EstStateJump{
+          .epoch = tag, .jump_x_m = e.jump.east_m, .jump_y_m = e.jump.north_m, .jump_yaw_rad = e.jump.yaw_rad});
+      break;
+    default:
+      put(can::EstStateImuHealth{.epoch = tag,
+                                 .vib_accel_mps2 = e.imu.vibration_mps2,
+                                 .vib_gyro_radps = e.imu.vibration_radps,
+                                 .clipped = e.imu.clipped});
       break;
   }
 }

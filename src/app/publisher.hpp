@@ -3,6 +3,7 @@
 // it is the same in every replay.
 #pragma once
 
+#include "app/disagreement.hpp"
 #include "app/estimate.hpp"
 #include "app/event_queue.hpp"
 #include "app/health.hpp"
@@ -36,6 +37,7 @@ struct Summary {
   bool origin_known = false;
   std::uint16_t used = 0;  ///< a bit per sensor kind accepted within the last second
   bool rejecting = false;
+  std::uint16_t faults = 0;  ///< bits of can::Fault that estimators see
   std::uint8_t resets = 0;
   can::ResetCause cause = can::ResetCause::kPowerOn;
   bool restarted = false;  ///< within the last second, by ourselves
@@ -80,8 +82,11 @@ class Publisher {
 
   template <class Send>
   void estimate(std::size_t instance, can::EstimatorKind kind, bool primary, const Estimate& e, Send& send);
+  /// `inertial` gives the estimate when it is asked for.
+  template <class Inertial, class Send>
+  void inertial(std::size_t instance, Inertial&& inertial, Send& send);
   template <class Send>
-  void inertial(std::size_t instance, const InertialEstimate& e, Send& send);
+  void attitude(std::size_t instance, const AttitudeEstimate& e, const Disagreement& from_primary, Send& send);
   template <class Send>
   void status(const Summary& summary, Send& send);
   template <class Lanes, class Send>
@@ -168,17 +173,36 @@ void Publisher<N>::estimate(std::size_t instance, can::EstimatorKind kind, bool 
 
 /// Attitude and velocity; of the rest one page at a time.
 template <std::size_t N>
-template <class Send>
-void Publisher<N>::inertial(std::size_t instance, const InertialEstimate& e, Send& send) {
+template <class Inertial, class Send>
+void Publisher<N>::inertial(std::size_t instance, Inertial&& inertial, Send& send) {
+  const bool motion = every(numbers_.publish.attitude_every, 2);
+  const bool page = every(numbers_.publish.state_every, 4);
+  if (!motion && !page) return;
+  const InertialEstimate e = inertial();
   if (!e.valid) return;
   const nav::InsState& x = e.state;
-  if (every(numbers_.publish.attitude_every, 2)) {
+  if (motion) {
     put(can::EstAtt{.w = x.q_nb.w, .x = x.q_nb.x, .y = x.q_nb.y, .z = x.q_nb.z, .epoch = tag()}, send, instance);
     put(can::EstVel{.east_mps = x.v_n_mps(0), .north_mps = x.v_n_mps(1), .up_mps = x.v_n_mps(2), .epoch = tag()}, send,
         instance);
   }
-  if (!every(numbers_.publish.state_every, 4)) return;
-  put_state_page(state_page_++, e, tag(), [&](const auto& page) { put(page, send, instance); });
+  if (page) put_state_page(state_page_++, e, tag(), [&](const auto& message) { put(message, send, instance); });
+}
+
+/// Attitude, and how far it is from the primary estimator's.
+template <std::size_t N>
+template <class Send>
+void Publisher<N>::attitude(std::size_t instance, const AttitudeEstimate& e, const Disagreement& from_primary,
+                            Send& send) {
+  if (!e.valid) return;
+  const PublishNumbers& p = numbers_.publish;
+  if (every(p.attitude_every, 7))
+    put(can::EstAtt{.w = e.q_nb.w, .x = e.q_nb.x, .y = e.q_nb.y, .z = e.q_nb.z, .epoch = tag()}, send, instance);
+  if (every(p.side_every, 1))
+    put(
+        can::EstStateDisagreement{
+            .epoch = tag(), .disagree_tilt_rad = from_primary.tilt_rad, .disagree_yaw_rad = from_primary.heading_rad},
+        send, instance);
 }
 
 template <std::size_t N>
@@ -186,6 +210,7 @@ template <class Send>
 void Publisher<N>::status(const Summary& s, Send& send) {
   if (!every(numbers_.publish.status_every, 1)) return;
   FaultSet faults = troubles_.faults(epoch_);
+  faults.bits = static_cast<std::uint16_t>(faults.bits | s.faults);
   faults.raise(can::Fault::kInputStale, !s.velocity_valid);
   faults.raise(can::Fault::kRejecting, s.rejecting);
   faults.raise(can::Fault::kRestarted, s.restarted);

@@ -61,7 +61,7 @@ inline constexpr std::size_t kMapCapacity = 64;
 struct Site {
   can::OriginSource origin = can::OriginSource::kNone;
   nav::LocalFrame frame;
-  LandmarkMap<kMapCapacity> map;
+  const LandmarkMap<kMapCapacity>* map = nullptr;  ///< of a robot with an estimator that takes landmarks
 };
 
 }  // namespace tetap::app

@@ -138,7 +138,8 @@ inline void PoseEkf::recover(Refused& refused, base::Micros stamp, const Recover
 
 inline Innovation PoseEkf::fuse(const LandmarkSighting& sighting, base::Micros stamp, const Context& with) {
   const LandmarkNumbers& n = with.numbers.landmark;
-  const std::optional<model::Landmark> landmark = with.site.map.find(sighting.landmark);
+  const std::optional<model::Landmark> landmark =
+      with.site.map != nullptr ? with.site.map->find(sighting.landmark) : std::nullopt;
   if (!landmark) return {.verdict = can::Verdict::kUnknownLandmark, .landmark = sighting.landmark};
   motion_.propagate(stamp, with.numbers);
   give_up_when_lost();
