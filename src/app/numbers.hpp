@@ -107,22 +107,22 @@ struct MagneticNumbers {
   std::array<float, 3> hard_iron_uT{0, 0, 0};
   std::array<float, 9> soft_iron{1, 0, 0, 0, 1, 0, 0, 0, 1};    ///< row by row
   std::array<float, 9> mounting_bs{1, 0, 0, 0, 1, 0, 0, 0, 1};  ///< from the sensor's axes into the body's, row by row
-  float sigma_rad = 0.1F;                                       ///< 1 sigma of a heading, as if each were independent
+  float sigma_rad = 0.1F;  ///< of a heading, all its errors together: no better is ever believed
   float gate_scale = 1;
   float norm_uT = 0;        ///< of the field after calibration; 0: as found at the start
   float norm_share = 0.1F;  ///< off by more of it, the field is disturbed
   float dip_rad = 0.15F;    ///< the same for its angle below the horizon, from what was found at the start
-  /// A field that stays the same for so long, somewhere else than the one known, becomes the known one.
+  /// In motion for so long in a field that stays the same, but is not the one known: that is the known one then.
   float field_new_s = 20;
 };
 
-/// The barometer, zeroed where the height was first known.
+/// The barometer: its zero is found, and followed, where the height is known better by other means.
 struct BaroNumbers {
   std::int32_t use = 0;
-  float sigma_m = 0.5F;       ///< of a height, as if each were independent
-  float drift_m_rts = 0.05F;  ///< of its zero: random walk by weather, m per root second
+  float sigma_m = 0.3F;       ///< of one height, white
+  float drift_m_rts = 0.1F;   ///< of its zero: weather, warming up; m per root second
+  float scale_share = 0.05F;  ///< of a change of height: air that is not the standard atmosphere
   float gate_scale = 1;
-  float zero_sigma_m = 10;  ///< how unknown the zero becomes when it is found anew
 };
 
 /// When two attitudes differ enough, for long enough, one of them is wrong.
@@ -216,7 +216,7 @@ constexpr void each_number(const Numbers& n, Sink&& sink) {
   for (const float v : m.soft_iron) sink(v);
   for (const float v : m.mounting_bs) sink(v);
   all(m.use, m.declination_rad, m.sigma_rad, m.gate_scale, m.norm_uT, m.norm_share, m.dip_rad, m.field_new_s);
-  all(n.baro.use, n.baro.sigma_m, n.baro.drift_m_rts, n.baro.gate_scale, n.baro.zero_sigma_m);
+  all(n.baro.use, n.baro.sigma_m, n.baro.drift_m_rts, n.baro.scale_share, n.baro.gate_scale);
   n.attitude.each(sink);
   all(n.disagreement.tilt_rad, n.disagreement.heading_rad, n.disagreement.after_us);
   const auto& s = n.start;

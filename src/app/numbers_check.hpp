@@ -95,8 +95,8 @@ consteval Numbers checked(const Numbers& n) {
   require(m.dip_rad > 0 && m.dip_rad < 1.5F, "magnetic.dip_rad: between 0 and 1.5");
   require(positive(m.field_new_s), "magnetic.field_new_s: above 0");
   require(positive(n.baro.sigma_m) && positive(n.baro.gate_scale), "baro.sigma_m, gate_scale: above 0");
-  require(not_negative(n.baro.drift_m_rts), "baro.drift_m_rts: not below 0");
-  require(positive(n.baro.zero_sigma_m), "baro.zero_sigma_m: above 0");
+  require(not_negative(n.baro.drift_m_rts) && not_negative(n.baro.scale_share),
+          "baro.drift_m_rts, scale_share: not below 0");
   require(!(n.attitude.declination_rad < 0 || n.attitude.declination_rad > 0),
           "attitude.declination_rad: give it as magnetic.declination_rad");
   bool options = true;
