@@ -25,15 +25,20 @@ std::string help() {
           "records the node's answers.\n\n"
           "  --can IFACE        the interface the node is on (default vcan0)\n"
           "  --memory           run a node in this process instead, without a bus\n"
-          "  --robot NAME       what the node is (default rover)\n"
+          "  --robot NAME       what the node is (default rover): " +
+          std::string(sim::kRobotNames) +
+          "\n"
           "  --out DIR          for the record and truth.csv (default out/sim)\n"
           "  --seed N           every draw follows from it (default 1)\n"
           "  --duration S       at most so long (default: the whole course)\n"
           "  --matched          only errors that the filters model\n"
-          "  --course NAME      yard (default) or road: 1.1 km at 5 m/s\n"
+          "  --course NAME      yard (default), road: 1.1 km at 5 m/s, or stand: it stays where it is\n"
+          "  --east M           the course so far east of the origin\n"
           "  --laps N           the course so many times (default 1)\n"
           "  --imu-hz N         IMU samples a second (default 100)\n"
           "  --gnss-m S         1 sigma of GNSS positions per horizontal axis (default 0.85)\n"
+          "  --gnss-hz N        fixes a second (default 5)\n"
+          "  --no-wheels        no wheel says anything\n"
           "  --no-pose          the node is not told where it starts\n"
           "  --fault NAME[@START[+DURATION]]   seconds; several with commas:\n") +
       sim::fault_help() +
@@ -128,11 +133,21 @@ void set_world(const sim::Options& options, sim::World::Options& world) {
   if (course == "road") {
     world.course = sim::road_course(laps);
     world.limits.speed_mps = 5;
+  } else if (course == "stand") {
+    world.course = {.waypoints = {{.x_m = 0, .y_m = 0, .stop_s = 86'400}, {.x_m = 1, .y_m = 0, .stop_s = 1}},
+                    .landmarks = {}};
   } else if (course == "yard") {
     world.course = sim::default_course(laps);
   } else {
-    throw std::runtime_error("--course " + course + ": it is yard or road");
+    throw std::runtime_error("--course " + course + ": it is yard, road or stand");
   }
+  const double east_m = options.number("east", 0);
+  if (!(std::fabs(east_m) <= 60'000))
+    throw std::runtime_error("--east: at most 60 km, which is what a pose on the bus can say");
+  for (sim::Waypoint& at : world.course.waypoints) at.x_m += east_m;
+  for (sim::Landmark& mark : world.course.landmarks) mark.x_m += east_m;
+  if (options.has("no-wheels")) world.numbers.wheels.rate_hz = 0;
+  world.numbers.gnss.rate_hz = counted(options, "gnss-hz", world.numbers.gnss.rate_hz, 1, 100);
   world.numbers.imu.rate_hz = counted(options, "imu-hz", world.numbers.imu.rate_hz, 1, 2000);
   if (!options.has("gnss-m")) return;
   const double gnss_m = options.number("gnss-m", 0);
@@ -143,10 +158,11 @@ void set_world(const sim::Options& options, sim::World::Options& world) {
 }  // namespace
 
 int main(int argc, char** argv) try {
-  const sim::Options options(
-      argc, argv,
-      {"can", "robot", "out", "seed", "duration", "fault", "window", "base", "course", "laps", "imu-hz", "gnss-m"},
-      {"memory", "matched", "realtime", "emulated", "raw", "quiet", "no-pose"}, help().c_str());
+  const sim::Options options(argc, argv,
+                             {"can", "robot", "out", "seed", "duration", "fault", "window", "base", "course", "laps",
+                              "imu-hz", "gnss-m", "gnss-hz", "east"},
+                             {"memory", "matched", "realtime", "emulated", "raw", "quiet", "no-pose", "no-wheels"},
+                             help().c_str());
   if (!options.words().empty()) throw std::runtime_error("'" + options.words().front() + "': an option begins with --");
   Run run;
   const std::string interface = options.text("can", "vcan0");

@@ -2,7 +2,9 @@
 """What a recorded run says about its estimators: reading the recorder's tables, comparing with truth.
 
 NEES and its bounds: Bar-Shalom, Li, Kirubarajan, "Estimation with Applications to Tracking and Navigation", section 5.4. The covariance is the
-published one (1-sigma and correlations of Est<k>_Std), so what is judged is what a user of the bus gets.
+published one (1-sigma and correlations of Est<k>_Std, the 1-sigma of Est<k>_State), so what is judged is what a user of the bus gets. Velocity,
+attitude and biases are published without correlations: their NEES is the sum of squared errors in units of their own sigmas, whose mean is the
+number of them all the same.
 """
 import json
 import os
@@ -14,17 +16,28 @@ from scipy.special import chdtri
 import bus_writer
 from bus_writer import BadInput
 
-NAMES = {0: "odometry", 1: "fused", 2: "estimator2", 3: "estimator3"}
 TICK_S = 0.01  # of the simulated world
 MOST_NEES = 100.0  # above this mean, or with more than this share of a sensor rejected, the report warns: no tuning is so far off
 MOST_REJECTED, LEAST_TESTED = 1.0 / 3.0, 10
+HELD_S = 0.6  # a page of an inertial estimate comes every 0.4 s or so: its numbers count for no longer than this
 LEAST_GAP_S = 0.2  # truth rows further apart than this, or than 2.5 times their usual distance, are not interpolated between
 
 ESTIMATES = ["epoch", "time_s", "estimator", "kind", "x_m", "y_m", "yaw_rad", "speed_mps", "yaw_rate_radps", "std_x_m", "std_y_m",
              "std_yaw_rad", "corr_xy", "corr_x_yaw", "corr_y_yaw", "pos_valid", "hdg_valid"]
 INNOVATIONS = ["epoch", "time_s", "estimator", "sensor", "inst", "verdict", "dof", "nis", "ratio", "age_ms", "landmark"]
 STATUS = ["epoch", "time_s", "mode", "used", "faults", "reset_ctr", "reset_cause"]
-TRUTH = ["time_s", "x_m", "y_m", "yaw_rad"]  # and perhaps "epoch"
+SENSORS = ["epoch", "time_s", "estimator", "sensor", "inst", "accepted", "rejected", "nis_mean", "age_s"]
+Q, VELOCITY, AXES = ["q_w", "q_x", "q_y", "q_z"], ["v_east_mps", "v_north_mps", "v_up_mps"], "xyz"
+ACC_BIAS, GYRO_BIAS = [f"acc_bias_{a}_mps2" for a in AXES], [f"gyro_bias_{a}_radps" for a in AXES]
+STD_TILT = ["std_tilt_east_rad", "std_tilt_north_rad"]
+STATES = ["epoch", "time_s", "estimator", *Q, *VELOCITY, "height_m", "std_height_m", *ACC_BIAS, *GYRO_BIAS, *(f"std_{v}" for v in VELOCITY), *STD_TILT,
+          *(f"std_{b}" for b in ACC_BIAS), *(f"std_{b}" for b in GYRO_BIAS), "jump_x_m", "jump_y_m", "jump_yaw_rad"]
+TRUTH = ["time_s", "x_m", "y_m", "yaw_rad"]  # and perhaps "epoch" and these
+TRUTH_MORE = ["z_m", "roll_rad", "pitch_rad", *VELOCITY, *GYRO_BIAS, *ACC_BIAS]
+BLOCKS = ["position", "velocity", "attitude", "gyro bias", "acc bias"]
+STEPS = {"position": ("Est2_Std", "StdX"), "velocity": ("Est2_State", "StdVelEast"), "attitude": ("Est2_State", "StdTiltEast"),
+         "gyro bias": ("Est2_State", "StdGyroBiasX"), "acc bias": ("Est2_State", "StdAccBiasX")}
+UNITS = {"position": "m", "velocity": "m/s", "attitude": "rad", "gyro bias": "rad/s", "acc bias": "m/s2"}
 
 ENUMERATIONS = {"kind": "EstimatorKind", "sensor": "Sensor", "verdict": "Verdict", "mode": "Mode", "reset_cause": "ResetCause"}
 
@@ -162,7 +175,16 @@ class Run:
             raise BadInput(f"{directory}/estimates.csv: no estimate in it")
         self.innovations = self._optional(directory, "innovations.csv", INNOVATIONS)
         self.status = self._optional(directory, "status.csv", STATUS)
+        self.states = self._optional(directory, "states.csv", STATES)
+        self.sensors = self._optional(directory, "sensors.csv", SENSORS)
         self.estimators = sorted(int(one) for one in np.unique(self.estimates["estimator"]))
+        self.kinds = {k: self._kind(k) for k in self.estimators}
+        self.names = names_of(self.kinds)
+        self.best = max(self.estimators, key=lambda k: (self.names[k] == "fused", k))
+
+    def _kind(self, estimator):
+        code = int(self.estimates["kind"][self.estimates["estimator"] == estimator][-1])
+        return code_names()["EstimatorKind"].get(code, str(code))
 
     @staticmethod
     def _optional(directory, name, columns):
@@ -175,6 +197,43 @@ class Run:
         """Rows of one estimator."""
         mask = self.estimates["estimator"] == estimator
         return {name: column[mask] for name, column in self.estimates.items()}
+
+    def states_of(self, estimator):
+        """The estimator's attitudes, one row each, and beside them what was said last of everything else, where that is not too old; None
+        where it publishes none."""
+        mask = self.states["estimator"] == estimator
+        rows = {name: column[mask] for name, column in self.states.items()}
+        at = np.flatnonzero(np.isfinite(rows["q_w"])) if mask.any() else np.empty(0, dtype=int)
+        if len(at) == 0:
+            return None
+        held = {name: rows[name][at] for name in ("epoch", "time_s", *Q)}
+        for name in STATES[3 + len(Q):]:
+            held[name] = held_at(rows["epoch"], rows[name], held["epoch"], HELD_S / TICK_S)
+        pose = self.of(estimator)
+        for name in ("x_m", "y_m", "std_x_m", "std_y_m", "std_yaw_rad", "corr_xy", "pos_valid", "hdg_valid"):
+            held[name] = held_at(pose["epoch"], pose[name], held["epoch"], HELD_S / TICK_S)
+        return held
+
+
+def names_of(kinds):
+    """What the estimators are called: odometry, attitude, and fused for the best of the others: an inertial one before any other."""
+    others = [k for k, kind in kinds.items() if kind not in ("Odometry", "Attitude")]
+    best = max(others, key=lambda k: (kinds[k] == "Inertial", -k), default=None)
+    names = {}
+    for k, kind in kinds.items():
+        wanted = "fused" if k == best else {"Odometry": "odometry", "Attitude": "attitude"}.get(kind, f"estimator{k}")
+        names[k] = wanted if wanted not in names.values() else f"estimator{k}"
+    return names
+
+
+def held_at(epoch, values, at, longest):
+    """The last known value at or before each of `at`; NaN where it is older than `longest` epochs or there is none."""
+    known = np.flatnonzero(np.isfinite(values))
+    if len(known) == 0:
+        return np.full(len(at), np.nan)
+    last = np.searchsorted(epoch[known], at, side="right") - 1
+    found = known[np.maximum(last, 0)]
+    return np.where((last >= 0) & (at - epoch[found] <= longest), values[found], np.nan)
 
 
 def read_json(path):
@@ -198,7 +257,8 @@ class Truth:
 
     def __init__(self, path, max_gap_s=None):
         self.path = path
-        rows = read_table(path, TRUTH, ["epoch"])
+        rows = read_table(path, TRUTH, ["epoch", *TRUTH_MORE])
+        self.more = {name: rows[name] for name in TRUTH_MORE} if all(name in rows for name in TRUTH_MORE) else None
         self.epoch = rows.get("epoch")
         if self.epoch is not None and not (np.diff(self.epoch) > 0).all():
             raise BadInput(f"{path}: row {int(np.argmin(np.diff(self.epoch) > 0)) + 2}: epoch does not grow")
@@ -225,6 +285,15 @@ class Truth:
         known = self.epoch[found] == rows["epoch"]
         return tuple(np.where(known, column[found], np.nan) for column in (self.x_m, self.y_m, self.yaw_rad))
 
+    def more_of(self, epochs):
+        """All that a simulated world says, for these epochs; None where the truth says only a pose."""
+        if self.more is None or self.epoch is None:
+            return None
+        found = np.clip(np.searchsorted(self.epoch, epochs), 0, len(self.epoch) - 1)
+        known = self.epoch[found] == epochs
+        columns = {"x_m": self.x_m, "y_m": self.y_m, "yaw_rad": self.yaw_rad, **self.more}
+        return {name: np.where(known, column[found], np.nan) for name, column in columns.items()}
+
     def at(self, time_s):
         """x, y, yaw at the times given, linear in between; NaN outside of the truth and in its gaps."""
         after = np.clip(np.searchsorted(self.time_s, time_s), 1, len(self.time_s) - 1)
@@ -246,6 +315,77 @@ def errors(rows, truth):
     dx, dy, dyaw = rows["x_m"] - x, rows["y_m"] - y, wrapped(rows["yaw_rad"] - yaw)
     position, heading = rows["pos_valid"] == 1, rows["hdg_valid"] == 1
     return np.where(position, dx, np.nan), np.where(position, dy, np.nan), np.where(position & heading, dyaw, np.nan)
+
+
+def product(p, q):
+    """Of quaternions, (w, x, y, z) in rows."""
+    (a, b, c, d), (w, x, y, z) = p.T, q.T
+    return np.stack([a * w - b * x - c * y - d * z, a * x + b * w + c * z - d * y, a * y - b * z + c * w + d * x, a * z + b * y - c * x + d * w], axis=1)
+
+
+def turns(q, reference):
+    """The turn from `reference` to `q` about east, north and up: rotation vectors of q reference*."""
+    d = product(q, reference * [1, -1, -1, -1])
+    d = d * np.where(d[:, :1] < 0, -1.0, 1.0) / np.linalg.norm(d, axis=1, keepdims=True)
+    length = np.linalg.norm(d[:, 1:], axis=1, keepdims=True)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return d[:, 1:] * np.where(length > 1e-9, 2 * np.arctan2(length, d[:, :1]) / length, 2.0)
+
+
+def quaternion(roll, pitch, yaw):
+    """Rz(yaw) Ry(pitch) Rx(roll), as the world has it."""
+    def about(axis, angle):
+        q = np.zeros((len(angle), 4))
+        q[:, 0], q[:, 1 + axis] = np.cos(angle / 2), np.sin(angle / 2)
+        return q
+    return product(product(about(2, yaw), about(1, pitch)), about(0, roll))
+
+
+class Blocks:
+    """Errors of an inertial estimate by block, and the sigmas it published: `error[name]` and `sigma[name]` with three columns and a row for
+    every attitude; position east, north, up; attitude about east, north and up."""
+
+    def __init__(self, states, true):
+        def three(source, names):
+            return np.stack([source[name] for name in names], axis=1)
+        self.epoch, self.time_s = states["epoch"], states["time_s"]
+        self.corr_xy = states["corr_xy"]
+        self.error = {"position": three(states, ["x_m", "y_m", "height_m"]) - three(true, ["x_m", "y_m", "z_m"])}
+        self.sigma = {"position": three(states, ["std_x_m", "std_y_m", "std_height_m"])}
+        self.error["attitude"] = turns(three(states, Q), quaternion(true["roll_rad"], true["pitch_rad"], true["yaw_rad"]))
+        self.sigma["attitude"] = three(states, [*STD_TILT, "std_yaw_rad"])
+        for name, columns in (("velocity", VELOCITY), ("gyro bias", GYRO_BIAS), ("acc bias", ACC_BIAS)):
+            self.error[name] = three(states, columns) - three(true, columns)
+            self.sigma[name] = three(states, [f"std_{one}" for one in columns])
+        # A sigma of 0 is one below half a step of the bus.
+        for name, (message, signal) in STEPS.items():
+            self.sigma[name] = np.maximum(self.sigma[name], 0.5 * limits(message, signal)[0])
+        invalid = states["pos_valid"] != 1
+        for error in self.error.values():
+            error[invalid] = np.nan
+
+    def nees(self, name):
+        """Of every row; NaN where something of it is not known."""
+        with np.errstate(invalid="ignore", divide="ignore"):
+            scaled = self.error[name] / self.sigma[name]
+            values = (scaled ** 2).sum(axis=1)
+            if name == "position":
+                # Of x and y the correlation is published.
+                r = np.clip(self.corr_xy, -0.999, 0.999)
+                values += (r * r * (scaled[:, 0] ** 2 + scaled[:, 1] ** 2) - 2 * r * scaled[:, 0] * scaled[:, 1]) / (1 - r * r)
+        return np.where(np.isfinite(values), values, np.nan)
+
+    def outside(self, name, sigmas=3.0):
+        """Rows with an error beyond that many of its published sigmas, in any of the three."""
+        with np.errstate(invalid="ignore"):
+            return (np.abs(self.error[name]) > sigmas * self.sigma[name]).any(axis=1)
+
+
+def blocks(run, estimator, truth):
+    """None where the estimator or the truth says no more than a pose."""
+    states = run.states_of(estimator)
+    true = truth.more_of(states["epoch"]) if truth is not None and states is not None else None
+    return None if true is None else Blocks(states, true)
 
 
 def nees_by_row(rows, dx, dy, dyaw, dof):
@@ -280,6 +420,24 @@ def rms(values):
     return float(np.sqrt(np.mean(values ** 2))) if len(values) else None
 
 
+def bus_nis(run, estimator, names):
+    """Of each sensor the bus's own mean NIS per degree of freedom over the run, 1 expected, and its counts at the end."""
+    result = {}
+    mine = run.sensors["estimator"] == estimator
+    for sensor in np.unique(run.sensors["sensor"][mine]):
+        rows = np.flatnonzero(mine & (run.sensors["sensor"] == sensor))
+        nis = run.sensors["nis_mean"][rows]
+        result[names["Sensor"].get(int(sensor), str(int(sensor)))] = {
+            "nis_per_dof": float(np.nanmean(nis)) if np.isfinite(nis).any() else None,
+            "accepted": unwrapped(run.sensors["accepted"][rows], 65536), "rejected": unwrapped(run.sensors["rejected"][rows], 4096)}
+    return result
+
+
+def unwrapped(counts, modulus):
+    """How far a counter came that starts at 0 and wraps."""
+    return int(np.mod(np.diff(np.concatenate([[0], counts])), modulus).sum())
+
+
 def measurements(innovations, estimator, names):
     """By sensor: accepted, rejected, other, and the innovations' NIS, as published in Est_Innov."""
     result = {}
@@ -307,10 +465,13 @@ def judge(run, estimator, truth, names):
     """The metrics of one estimator. Without truth: what can be said without."""
     rows = run.of(estimator)
     valid = rows["pos_valid"] == 1
-    result = {"name": NAMES.get(estimator, f"estimator{estimator}"),
-              "kind": names["EstimatorKind"].get(int(rows["kind"][-1]), str(int(rows["kind"][-1]))),
+    result = {"name": run.names[estimator], "kind": run.kinds[estimator],
               "epochs": int(len(valid)), "epochs_not_valid": int((~valid).sum()),
               "measurements": measurements(run.innovations, estimator, names)}
+    for sensor, counts in bus_nis(run, estimator, names).items():
+        if counts["nis_per_dof"] is not None:
+            one = result["measurements"].setdefault(sensor, {"accepted": 0, "rejected": 0, "other": 0, "verdicts": {}})
+            one.update(bus_nis_per_dof=counts["nis_per_dof"], bus_accepted=counts["accepted"], bus_rejected=counts["rejected"])
     if valid.any():
         last = np.flatnonzero(valid)[-1]
         result["end"] = {"time_s": float(rows["time_s"][last]), "x_m": float(rows["x_m"][last]), "y_m": float(rows["y_m"][last]),
@@ -333,6 +494,9 @@ def judge(run, estimator, truth, names):
         result["final_heading_error_deg"] = float(np.degrees(dyaw[np.isfinite(dyaw)][-1]))
     if truth.is_reference:  # the reference is fused itself and has errors of its own: consistency with it says nothing
         return result
+    found = blocks(run, estimator, truth)
+    if found is not None:
+        result["blocks"] = {name: block_figures(found, name) for name in BLOCKS}
     dof = 3 if truth.has_yaw else 2
     values, unusable = nees(rows, dx, dy, dyaw, dof)
     result.update(nees_dof=dof, nees_epochs=len(values), nees_covariances_not_usable=unusable)
@@ -341,6 +505,17 @@ def judge(run, estimator, truth, names):
         result.update(nees_mean=float(values.mean()), nees_inside_95=float((values <= chi_square(0.95, dof)).mean()),
                       nees_inside_two_sided_95=float(((values >= low) & (values <= high)).mean()))
     return result
+
+
+def block_figures(found, name):
+    """RMSE of each of the three, NEES (3 expected), and the share of times at which all three are inside 3 sigma."""
+    values = found.nees(name)
+    known = np.isfinite(values)
+    low, high = chi_square(0.025, 3), chi_square(0.975, 3)
+    return {"unit": UNITS[name], "rmse": [rms(column) for column in found.error[name].T],
+            "nees_mean": float(values[known].mean()) if known.any() else None,
+            "nees_inside_two_sided_95": float(((values[known] >= low) & (values[known] <= high)).mean()) if known.any() else None,
+            "inside_3_sigma": float(1 - found.outside(name)[known].mean()) if known.any() else None}
 
 
 def warnings_of(run, judged):
@@ -370,6 +545,6 @@ def summary(run, truth):
     judged = [judge(run, estimator, truth, names) for estimator in run.estimators]
     result.update({one["name"]: one for one in judged})
     result["warnings"] = warnings_of(run, judged)
-    best = result.get("fused") or result[NAMES.get(run.estimators[-1], f"estimator{run.estimators[-1]}")]
+    best = result[run.names[run.best]]
     result["position_rmse_m"], result["heading_rmse_deg"] = best["position_rmse_m"], best["heading_rmse_deg"]
     return result

@@ -17,13 +17,17 @@ INK, GREY, FAINT = "#262626", "#6b6b6b", "#e3e3e3"
 TRUTH, ODOMETRY, FUSED = "#3c3c3c", "#e69f00", "#0072b2"
 LANDMARK, REJECTED = "#009e73", "#d55e00"
 FAULT_SHADE = "#f6d9c8"
-ESTIMATORS = {0: ODOMETRY, 1: FUSED, 2: "#cc79a7", 3: "#56b4e9"}
-LABELS = {0: "odometry", 1: "fused", 2: "estimator 2", 3: "estimator 3"}
+ESTIMATORS = {"odometry": ODOMETRY, "fused": FUSED, "attitude": "#cc79a7"}
+OTHER = "#56b4e9"
 MODES = {"Boot": "#f2f2f2", "WaitingForPose": "#d9d9d9", "Aligning": "#f0e442", "Nominal": "#9fd3c0", "DeadReckoning": "#e69f00",
          "Degraded": "#cc79a7", "Fault": "#d55e00"}
 DPI = 120
 MOST_BANDS = 4.0  # an error of more usual bands than this gets an axis with two scales
 MOST_POINTS = 20_000  # per line; more than a picture has columns
+
+
+def color_of(run, estimator):
+    return ESTIMATORS.get(run.names[estimator], OTHER)
 
 
 def thinned(count):
@@ -111,7 +115,7 @@ def covariance_ellipses(rows, share, count):
 
 def path(run, truth, landmarks, title):
     """Truth, odometry and fused estimate in the plane."""
-    tracks = {k: run.of(k) for k in run.estimators}
+    tracks = {k: run.of(k) for k in run.estimators if run.kinds[k] != "Attitude"}
     xs, ys = [], []
     for rows in tracks.values():
         valid = rows["pos_valid"] == 1
@@ -138,21 +142,21 @@ def path(run, truth, landmarks, title):
         if not valid.any():
             continue
         ex, ey = _broken_at_gaps(rows["time_s"][valid], rows["x_m"][valid], rows["y_m"][valid])
-        axes.plot(ex[thinned(len(ex))], ey[thinned(len(ey))], color=ESTIMATORS[k], linewidth=1.1, label=LABELS[k], zorder=3 + k * 0.1)
-    best = 1 if 1 in tracks else run.estimators[-1]
+        axes.plot(ex[thinned(len(ex))], ey[thinned(len(ey))], color=color_of(run, k), linewidth=1.1, label=run.names[k], zorder=3 + k * 0.1)
+    best = run.best
     centres, widths, heights, angles = covariance_ellipses(tracks[best], 0.95, 28)
     if len(centres):
         axes.add_collection(EllipseCollection(widths, heights, angles, units="xy", offsets=centres, offset_transform=axes.transData,
-                                              facecolor="none", edgecolor=ESTIMATORS[best], linewidth=0.9, zorder=4))
+                                              facecolor="none", edgecolor=color_of(run, best), linewidth=0.9, zorder=4))
     handles, labels = axes.get_legend_handles_labels()
     if len(centres):
-        handles.append(Line2D([], [], marker="o", markersize=8, linestyle="none", markerfacecolor="none", markeredgecolor=ESTIMATORS[best]))
-        labels.append(f"95 % ellipse ({LABELS[best]})")
+        handles.append(Line2D([], [], marker="o", markersize=8, linestyle="none", markerfacecolor="none", markeredgecolor=color_of(run, best)))
+        labels.append(f"95 % ellipse ({run.names[best]})")
     for k, rows in tracks.items():
         valid = np.flatnonzero(rows["pos_valid"] == 1)
         if len(valid):
             last = valid[-1]
-            axes.plot(rows["x_m"][last], rows["y_m"][last], marker="s", markersize=7, color=ESTIMATORS[k], markeredgecolor="white", zorder=7)
+            axes.plot(rows["x_m"][last], rows["y_m"][last], marker="s", markersize=7, color=color_of(run, k), markeredgecolor="white", zorder=7)
     if truth is not None:
         axes.plot(truth.x_m[-1], truth.y_m[-1], marker="s", markersize=7, color=TRUTH, markeredgecolor="white", zorder=6)
         first = truth.x_m[0], truth.y_m[0]
@@ -179,7 +183,7 @@ def errors(run, truth, estimator, title):
     if truth.has_yaw:
         parts.append(("yaw [deg]", dyaw, rows["std_yaw_rad"], 180.0 / np.pi))
     fig, axes = figure(9.0, 1.9 * len(parts) + 0.7, title, len(parts), sharex=True)
-    color = ESTIMATORS[estimator]
+    color = color_of(run, estimator)
     time_s = rows["time_s"]
     for one, (label, error, std, scale) in zip(axes, parts):
         known = np.isfinite(std) & (rows["pos_valid"] == 1)
@@ -206,7 +210,7 @@ def errors(run, truth, estimator, title):
     axes[-1].set_xlabel("time [s]")
     handles = [Line2D([], [], color=color, linewidth=1.2), Patch(color=color, alpha=0.16)]
     kind = "difference" if truth.is_reference else "error"
-    axes[0].legend(handles + shades, [f"{LABELS[estimator]}: {kind}", "±3σ as published"] + ["fault"] * len(shades), frameon=False, fontsize=9,
+    axes[0].legend(handles + shades, [f"{run.names[estimator]}: {kind}", "±3σ as published"] + ["fault"] * len(shades), frameon=False, fontsize=9,
                    labelcolor=INK, ncol=3, loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.0, handlelength=1.6)
     axes[0].set_title(title, loc="left", fontsize=11.5, color=INK, pad=24)
     return fig
@@ -236,7 +240,7 @@ def nis(run, estimator, names, title):
             one.axhline(limit, color=GREY, linewidth=0.7, linestyle=(0, (1, 2)))
         many = accepted.sum() > 3000
         one.plot(rows["time_s"][accepted], value[accepted], linestyle="none", marker=".", markersize=2.5 if many else 4,
-                 color=ESTIMATORS[estimator], alpha=0.5, markeredgewidth=0)
+                 color=color_of(run, estimator), alpha=0.5, markeredgewidth=0)
         below_limit = rejected & ~most
         one.plot(rows["time_s"][below_limit], value[below_limit], linestyle="none", marker="x", markersize=5, color=REJECTED,
                  markeredgewidth=1.2, zorder=4)
@@ -256,7 +260,7 @@ def nis(run, estimator, names, title):
                      xycoords="axes fraction", xytext=(0, 4), textcoords="offset points", ha="left", va="bottom", fontsize=9, color=GREY)
     axes[0].set_title(title, loc="left", fontsize=11.5, color=INK, pad=36)
     axes[-1].set_xlabel("time [s]")
-    handles = [Line2D([], [], color=ESTIMATORS[estimator], marker=".", markersize=8, linestyle="none"),
+    handles = [Line2D([], [], color=color_of(run, estimator), marker=".", markersize=8, linestyle="none"),
                Line2D([], [], color=REJECTED, marker="x", markersize=6, linestyle="none"),
                Line2D([], [], color=INK, linewidth=1.0, linestyle=(0, (5, 3)))]
     labels = ["accepted", "rejected by the gate", "95 % of a right model"]

@@ -37,7 +37,7 @@ struct RoverNumbers {
   double driver_wander_m = 0.08;  ///< lateral, Gauss-Markov: no two runs drive the same line [own]
   double driver_wander_tau_s = 6;
   double jitter_mps = 0;  ///< of the body sideways and up while it moves, white for sensors (see matched_inertial())
-  double jitter_tau_s = 0.005;
+  double jitter_tau_s = 0.002;
   double start_m = 0.05;  ///< 1 sigma per axis of where the rover really stands at the start [own]
   double start_rad = 0.02;
 };
@@ -194,8 +194,12 @@ struct Numbers {
   n.imu.accel_noise = {imu.accel_noise[2], imu.accel_noise[2], imu.accel_noise[2]};
   n.wheels.noise_m = 0;
   n.wheels.noise_share = 0.03;
-  n.rover.jitter_mps = 0.02;
+  n.rover.jitter_mps = 0.005;
   n.gnss.velocity_vertical_factor = 1.5;
+  // On the node's ticks and at once: what the body does between a sample and the tick is in no filter's covariance.
+  n.imu.phase = n.wheels.phase = {};
+  n.imu.latency_min = n.imu.latency_max = n.wheels.latency_min = n.wheels.latency_max = {};
+  n.gnss.phase = {100'000};
   return n;
 }
 

@@ -18,6 +18,7 @@ TOOLS = os.path.join(ROOT, "tools")
 sys.path.insert(0, TOOLS)
 sys.dont_write_bytecode = True
 
+import campaign_metrics as judge  # noqa: E402
 import report_metrics as metrics  # noqa: E402
 
 LOADER = importlib.machinery.SourceFileLoader("campaign", os.path.join(TOOLS, "campaign"))
@@ -30,25 +31,25 @@ PROGRAMS = os.environ.get("TETAP_PROGRAMS", os.path.join(ROOT, "build/host/sim_h
 def drawn(seeds, times, scale=1.0, source=1):
     """Runs whose poses err as they say, times `scale`."""
     random = np.random.default_rng(source)
-    return [{"epochs": np.arange(times) * 5.0, "nees": scale * random.chisquare(campaign.DOF, times)} for _ in range(seeds)]
+    return [{"epochs": np.arange(times) * 5.0, "nees": scale * random.chisquare(judge.DOF, times)} for _ in range(seeds)]
 
 
 class Averages(unittest.TestCase):
     def test_the_interval_is_the_published_one(self):
         # Abramowitz and Stegun, table 26.8: chi-square of 30 degrees of freedom, 16.7908 and 46.9792.
-        low, high = campaign.interval(30, 10)
+        low, high = judge.interval(30, 10)
         self.assertAlmostEqual(low, 1.67908, 4)
         self.assertAlmostEqual(high, 4.69792, 4)
 
     def test_honest_errors_are_inside_at_95_percent_of_the_times(self):
-        result = campaign.anees(drawn(30, 4000))
+        result = judge.anees(drawn(30, 4000))
         self.assertAlmostEqual(result["inside"], 0.95, delta=0.015)
         self.assertAlmostEqual(result["above"], 0.025, delta=0.01)
         self.assertAlmostEqual(result["below"], 0.025, delta=0.01)
         self.assertLess(abs(result["mean"] - 3), 2 * result["mean_plus_minus"])
 
     def test_too_sure_is_above_and_too_modest_is_below(self):
-        sure, modest = campaign.anees(drawn(30, 1000, 2.0)), campaign.anees(drawn(30, 1000, 0.5))
+        sure, modest = judge.anees(drawn(30, 1000, 2.0)), judge.anees(drawn(30, 1000, 0.5))
         self.assertGreater(sure["above"], 0.95)
         self.assertGreater(modest["below"], 0.95)
         self.assertGreater(sure["mean"] - 3, sure["mean_plus_minus"])
@@ -57,24 +58,24 @@ class Averages(unittest.TestCase):
     def test_errors_that_last_for_the_whole_run_widen_the_interval_of_the_mean(self):
         random = np.random.default_rng(3)
         lasting = [{"epochs": np.arange(1000.0), "nees": np.full(1000, random.chisquare(3))} for _ in range(30)]
-        self.assertGreater(campaign.anees(lasting)["mean_plus_minus"], 10 * campaign.anees(drawn(30, 1000))["mean_plus_minus"])
+        self.assertGreater(judge.anees(lasting)["mean_plus_minus"], 10 * judge.anees(drawn(30, 1000))["mean_plus_minus"])
 
     def test_only_times_that_every_seed_has_are_averaged(self):
         runs = drawn(3, 10)
         runs[1]["nees"][4] = np.nan
         runs[2] = {key: values[:8] for key, values in runs[2].items()}
-        result = campaign.anees(runs)
+        result = judge.anees(runs)
         self.assertEqual(result["times"], 7)
         use = [0, 1, 2, 3, 5, 6, 7]
         self.assertAlmostEqual(result["mean"], np.mean([one["nees"][use] for one in runs]))
         runs[0]["nees"][:] = np.nan
-        self.assertIsNone(campaign.anees(runs))
+        self.assertIsNone(judge.anees(runs))
 
     def test_nis_counts_what_was_rejected_too(self):
         names = {"Sensor": {4: "RangeBearing", 5: "GnssPosition"}}
         table = {"estimator": np.array([1, 1, 1, 0, 1]), "sensor": np.array([4, 4, 5, 4, 4]), "verdict": np.array([0, 1, 0, 0, 2]),
                  "dof": np.array([2, 2, 2, 2, 0]), "nis": np.array([1.0, 20.0, 3.0, 7.0, np.nan])}
-        result = campaign.sensors([{"sensors": campaign.innovations(table, 1, names)}] * 2)
+        result = judge.sensors([{"sensors": judge.innovations(table, 1, names)}] * 2)
         self.assertEqual(result["RangeBearing"]["compared"], 4)
         self.assertEqual(result["RangeBearing"]["nis_mean"], 10.5)
         self.assertEqual(result["RangeBearing"]["nis_mean_accepted"], 1.0)
@@ -88,6 +89,54 @@ class Averages(unittest.TestCase):
         self.assertEqual(campaign.fault_times("gnss_jump@5+2.5", known), (5, 7.5))
         for wrong in ("nope", "gnss_jump@", "gnss_jump@x", "gnss_jump@1+", "gnss_jump,gnss_jump"):
             self.assertRaises(metrics.BadInput, campaign.fault_times, wrong, known)
+
+
+class Faults(unittest.TestCase):
+    """What is said of a fault, from rows made by hand: 10 s before it, 5 s of it, 20 s after."""
+    at = np.arange(0, 35, 0.05)
+    start, end = 10.0, 15.0
+
+    def rows(self, sigma):
+        n = len(self.at)
+        return {"epoch": self.at / metrics.TICK_S, "std_x_m": np.full(n, sigma), "std_y_m": np.full(n, sigma)}
+
+    def honesty(self, error, sigma=0.1):
+        zero = np.zeros(len(self.at))
+        return judge.honesty(self.rows(sigma), np.where((self.at >= 11) & (self.at < 14), error, 0.0), zero, None, self.at, self.start, self.end)
+
+    def test_an_error_that_the_sigmas_deny_is_found_with_its_length_and_size(self):
+        bad, good = self.honesty(0.9), self.honesty(0.29)
+        self.assertAlmostEqual(bad["too_sure_s"], 2.95, places=6)
+        self.assertAlmostEqual(bad["worst_ratio"], 3.0)
+        self.assertAlmostEqual(bad["three_sigma_m"], 0.3)
+        self.assertEqual(good["too_sure_s"], 0.0)
+        self.assertEqual(self.honesty(0.9, sigma=0.31)["too_sure_s"], 0.0)
+
+    def test_what_was_wrong_before_the_fault_is_not_held_against_it(self):
+        zero = np.zeros(len(self.at))
+        result = judge.honesty(self.rows(0.1), np.where(self.at < 9, 5.0, 0.0), zero, None, self.at, self.start, self.end)
+        self.assertEqual((result["too_sure_s"], result["worst_ratio"]), (0.0, 0.0))
+
+    def test_words_count_from_the_fault_and_only_those_that_were_not_said_before(self):
+        class Status:
+            status = {"epoch": self.at / metrics.TICK_S, "mode": np.where(self.at >= 12, 4.0, 3.0),
+                      "faults": np.where(self.at >= 10.5, 0b11, 0b01).astype(float), "reset_ctr": (self.at >= 14).astype(float),
+                      "reset_cause": np.full(len(self.at), 6.0)}
+        names = {"Mode": {3: "Nominal", 4: "DeadReckoning"}, "Fault": {0: "Always", 1: "Rejecting"}, "ResetCause": {6: "PositionJump"}}
+        words = judge.said(Status, names, self.start, self.end)
+        self.assertEqual(set(words), {"Rejecting", "DeadReckoning", "reset: PositionJump"})
+        self.assertAlmostEqual(words["Rejecting"], 0.5, places=6)
+        self.assertAlmostEqual(words["reset: PositionJump"], 4.0, places=6)
+
+    def test_the_way_driven_and_the_way_astray_are_those_of_the_fault(self):
+        class Truth:
+            x_m, y_m = 5 * np.arange(0, 35.001, 0.01), np.zeros(3501)
+        epochs = np.arange(1, 3502, 5)
+        dx = np.where(epochs * 0.01 > 12, 0.4, 0.1)
+        result = judge.outage({"epoch": epochs}, dx, np.zeros(len(epochs)), Truth, self.start, self.end, np.arange(0, 35.001, 0.01))
+        self.assertAlmostEqual(result["driven_m"], 25.0, places=6)
+        self.assertAlmostEqual(result["astray_m"], 0.3)
+        self.assertAlmostEqual(result["error_at_end_m"], 0.4)
 
 
 class WithFiles(unittest.TestCase):
