@@ -4,16 +4,16 @@
 #pragma once
 
 #include "config/rover.hpp"
-#include "config/rover_inertial.hpp"
+#include "config/rover_landmarks.hpp"
 #include "sim_host/world/world.hpp"
 
 namespace tetap::sim {
 
 /// For a world whose only errors are matched()'s. Everything that is not noise is the rover's.
-[[nodiscard]] inline app::Numbers matched_rover(const World::Options& options = {.mismatched = false}) {
+[[nodiscard]] inline app::Numbers matched_landmarks_rover(const World::Options& options = {.mismatched = false}) {
   const Numbers world = options.mismatched ? options.numbers : matched(options.numbers);
   const auto single = [](double x) { return static_cast<float>(x); };
-  app::Numbers n = robot::rover::numbers;
+  app::Numbers n = robot::rover_landmarks::numbers;
   n.wheels.drive.counts_per_turn = single(world.wheels.counts_per_turn);
   n.wheels.drive.noise_left = n.wheels.drive.noise_right = single(world.wheels.noise_m);
   n.gyro.noise = single(world.imu.gyro_noise * world.imu.gyro_noise);
@@ -33,13 +33,13 @@ namespace tetap::sim {
 }
 
 /// Likewise the rover with inertial navigation, for a world with matched_inertial()'s errors.
-[[nodiscard]] inline app::Numbers matched_inertial_rover() {
+[[nodiscard]] inline app::Numbers matched_rover() {
   const World::Options options{.mismatched = false, .inertial = true};
   const Numbers world = matched_inertial(options.numbers);
   const auto single = [](double x) { return static_cast<float>(x); };
   const double walk_rthz = sim::sqrt(2 / world.imu.walk_tau_s);
-  app::Numbers n = robot::rover_inertial::numbers;
-  const app::Numbers planar = matched_rover();
+  app::Numbers n = robot::rover::numbers;
+  const app::Numbers planar = matched_landmarks_rover();
   n.wheels = planar.wheels;
   n.gyro = planar.gyro;
   n.gnss = planar.gnss;

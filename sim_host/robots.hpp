@@ -7,7 +7,7 @@
 #include "config/labyrinth.hpp"
 #include "config/mrclam.hpp"
 #include "config/rover.hpp"
-#include "config/rover_inertial.hpp"
+#include "config/rover_landmarks.hpp"
 #include "sim_host/matched_rover.hpp"
 
 #include <string>
@@ -17,18 +17,18 @@
 namespace tetap::sim {
 
 inline constexpr std::string_view kRobotNames =
-    "car husky labyrinth mrclam rover rover_inertial rover_inertial_matched rover_matched";
+    "car husky labyrinth mrclam rover rover_landmarks rover_landmarks_matched rover_matched";
 
 /// Calls f(std::type_identity<Estimators>, numbers) for the robot of that name; false when there is none.
 template <class F>
 [[nodiscard]] bool with_robot(std::string_view name, F&& f) {
   if (name == "rover") return f(std::type_identity<robot::rover::Estimators>{}, robot::rover::numbers), true;
-  if (name == "rover_inertial")
-    return f(std::type_identity<robot::rover_inertial::Estimators>{}, robot::rover_inertial::numbers), true;
+  if (name == "rover_landmarks")
+    return f(std::type_identity<robot::rover_landmarks::Estimators>{}, robot::rover_landmarks::numbers), true;
   if (name == "car") return f(std::type_identity<robot::car::Estimators>{}, robot::car::numbers), true;
+  if (name == "rover_landmarks_matched")
+    return f(std::type_identity<robot::rover_landmarks::Estimators>{}, matched_landmarks_rover()), true;
   if (name == "rover_matched") return f(std::type_identity<robot::rover::Estimators>{}, matched_rover()), true;
-  if (name == "rover_inertial_matched")
-    return f(std::type_identity<robot::rover_inertial::Estimators>{}, matched_inertial_rover()), true;
   if (name == "mrclam") return f(std::type_identity<robot::mrclam::Estimators>{}, robot::mrclam::numbers), true;
   if (name == "husky") return f(std::type_identity<robot::husky::Estimators>{}, robot::husky::numbers), true;
   if (name == "labyrinth")

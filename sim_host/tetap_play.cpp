@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // tetap-play: plays a candump log to a node, on a CAN interface or in its own process, and records what it answers.
 #include "sim_host/in_process.hpp"
+#include "sim_host/numbers_words.hpp"
 #include "sim_host/play/play.hpp"
 
 #include <cstdio>
@@ -11,7 +12,10 @@ int main(int count, char** values) {
     using namespace tetap;
     sim::Arguments arguments(count, values);
     if (arguments.flag("--help") || arguments.flag("-h")) return std::fputs(sim::play_help(), stdout), 0;
-    const sim::PlayOptions options = sim::play_options(arguments);
+    sim::PlayOptions options = sim::play_options(arguments);
+    static_cast<void>(sim::with_robot(options.robot, [&options](auto, const app::Numbers& numbers) {
+      options.numbers = sim::numbers_words(numbers);
+    }));
     if (options.memory)
       return sim::with_node_in_process(options.robot, options.script.base,
                                        [&](auto& link) { return sim::play(link, options, "memory", "tetap-play"); });

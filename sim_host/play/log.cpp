@@ -31,7 +31,12 @@ void add_line(Log& log, const LogLine& line, std::uint64_t number, const LogOpti
   if (!log.frames.empty() && kLongGap < line.time - latest && log.gaps++ == 0)
     log.first_gap = log.name + ":" + std::to_string(number);
   if (latest < line.time) latest = line.time;
-  log.frames.push_back({line.time, line.classic()});
+  const base::CanFrame frame = line.classic();
+  constexpr std::uint32_t kInputs = 0x20;
+  const bool input = !frame.extended && frame.id >= options.base && frame.id < options.base + kInputs;
+  if (input && frame.size != 8 && log.wrong_length++ == 0)
+    log.first_wrong_length = log.name + ":" + std::to_string(number);
+  log.frames.push_back({line.time, frame});
 }
 
 }  // namespace

@@ -18,8 +18,9 @@ struct TimedFrame {
 };
 
 struct LogOptions {
-  std::string interface;    ///< only frames of this interface; empty: of all
-  bool keep_going = false;  ///< count malformed lines instead of stopping at the first
+  std::string interface;       ///< only frames of this interface; empty: of all
+  bool keep_going = false;     ///< count malformed lines instead of stopping at the first
+  std::uint32_t base = 0x300;  ///< of the node; its inputs have eight bytes
 };
 
 struct Log {
@@ -30,6 +31,8 @@ struct Log {
   std::uint64_t not_data = 0;      ///< remote, error and CAN FD frames
   std::uint64_t other_interface = 0;
   std::uint64_t back_in_time = 0;  ///< frames earlier than the one before
+  std::uint64_t wrong_length = 0;  ///< input frames that have not eight bytes: the node will count them as malformed
+  std::string first_wrong_length;  ///< "file:line"
   std::uint64_t gaps = 0;          ///< of more than a minute between frames
   std::string first_gap;           ///< "file:line"
 };

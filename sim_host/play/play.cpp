@@ -94,6 +94,7 @@ PlayOptions play_options(Arguments& arguments) {
 }
 
 Log load_for(PlayOptions& options) {
+  options.reading.base = options.script.log_base;
   Log log = read_log(options.log, options.reading);
   if (options.mode == PlayMode::kAutomatic)
     options.mode = is_recording(log.frames, options.script.log_base) ? PlayMode::kAsRecorded : PlayMode::kLockstep;
@@ -110,6 +111,9 @@ void warn_about(const Log& log, const char* program) {
     warn(log.name + ": " + std::to_string(log.not_data) + " remote, error or CAN FD frames skipped");
   if (log.back_in_time > 0)
     warn(log.name + ": " + std::to_string(log.back_in_time) + " frames are earlier than one before them");
+  if (log.wrong_length > 0)
+    warn(log.first_wrong_length + ": an input frame that has not 8 bytes; the node refuses and counts it (Malformed)" +
+         (log.wrong_length > 1 ? ", the first of " + std::to_string(log.wrong_length) : std::string()));
   if (log.gaps > 0)
     warn(log.first_gap + ": more than a minute after the frame before" +
          (log.gaps > 1 ? ", the first of " + std::to_string(log.gaps) + " such gaps" : std::string()));

@@ -28,6 +28,7 @@ struct PlayOptions {
   LockstepOptions lockstep;
   RealtimeOptions realtime;
   Perturbation perturbation;
+  std::string numbers;  ///< in words, for run.json
   bool memory = false;  ///< the node is in this process
   bool raw = false;
   bool quiet = false;
@@ -58,10 +59,12 @@ int play(L& link, PlayOptions options, const std::string& bus, const char* progr
                        .robot = options.robot,
                        .log = options.log,
                        .quiet = options.quiet};
-  const auto note_log = [&log](Session& session) {
+  const auto note_log = [&log, &numbers = options.numbers](Session& session) {
     session.note("malformed_lines", std::to_string(log.malformed));
     session.note("frames_not_data", std::to_string(log.not_data));
     session.note("frames_back_in_time", std::to_string(log.back_in_time));
+    session.note("frames_of_wrong_length", std::to_string(log.wrong_length));
+    if (!numbers.empty()) session.note("numbers", quoted(numbers));
   };
 
   if (options.mode == PlayMode::kRealtime) {
@@ -81,8 +84,12 @@ int play(L& link, PlayOptions options, const std::string& bus, const char* progr
   if (options.mode == PlayMode::kAsRecorded) {
     Recording recording = recording_of(log, options.script);
     if (recording.inputs_differ_at)
-      std::fprintf(stderr, "%s: %s: from the epoch at %s on the node consumed other input frames than the log holds\n",
-                   program, options.log.c_str(), in_seconds(*recording.inputs_differ_at).c_str());
+      std::fprintf(
+          stderr, "%s: %s: from the epoch at %s on the node consumed other input frames than the log holds%s\n",
+          program, options.log.c_str(), in_seconds(*recording.inputs_differ_at).c_str(),
+          recording.rx_overflow == 0
+              ? ""
+              : (": its receiver had lost " + std::to_string(recording.rx_overflow) + " (RxOverflow)").c_str());
     about.mode = "as-recorded";
     about.ticks = recording.script.ticks();
     Session session(about, &recording);

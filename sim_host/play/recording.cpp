@@ -95,6 +95,10 @@ class Builder {
         refuse("the epoch before " + in_seconds(entry.time) + " lacks its last frame");
       inputs_before_ = segment_.inputs.size();
     }
+    if (*offset == can::EstVersion::kOffset)
+      if (const auto version = can::decode<can::EstVersion>(can::payload(frame))) result_.config = version->config;
+    if (*offset == can::EstDiagBus::kOffset)
+      if (const auto bus = can::decode<can::EstDiagBus>(can::payload(frame))) result_.rx_overflow = bus->rx_overflow;
     if (const auto epoch = collector_.add(frame)) add_epoch(*epoch, entry.time);
   }
 
@@ -201,6 +205,8 @@ void Comparison::epoch(const NodeEpoch& epoch, base::Micros time) {
                         text_of(recorded, recording_.base) + ", now " + text_of(now, base_);
   };
   for (const base::CanFrame& frame : epoch.frames) {
+    if (frame.id - base_ == can::EstVersion::kOffset)
+      if (const auto version = can::decode<can::EstVersion>(can::payload(frame))) config_ = version->config;
     if (!is_deterministic(frame.id - base_)) continue;
     const base::CanFrame* recorded = at < expected.count ? &recording_.outputs[expected.first + at] : nullptr;
     ++at;

@@ -30,6 +30,8 @@ struct Recording {
   /// Where the inputs in the log first differ from what the node says it consumed (Est_Epoch.InCrc): a frame was lost
   /// between them.
   std::optional<base::Micros> inputs_differ_at;
+  std::uint16_t rx_overflow = 0;        ///< frames that the recorded node's receiver lost, as it said last
+  std::optional<std::uint32_t> config;  ///< hash of the numbers it ran with, as it said last
 };
 
 /// True if a node with this base speaks in the log.
@@ -50,6 +52,8 @@ class Comparison {
   [[nodiscard]] std::uint64_t different() const { return different_; }
   [[nodiscard]] std::uint64_t missing() const { return recording_.epochs.size() - compared_; }
   [[nodiscard]] const std::string& first_difference() const { return first_difference_; }
+  /// Whether this node says it runs with other numbers than the recorded one did.
+  [[nodiscard]] bool other_numbers() const { return config_ && recording_.config && *config_ != *recording_.config; }
 
  private:
   const Recording& recording_;
@@ -58,6 +62,7 @@ class Comparison {
   std::uint64_t compared_ = 0;
   std::uint64_t different_ = 0;
   std::string first_difference_;
+  std::optional<std::uint32_t> config_;
 };
 
 }  // namespace tetap::sim

@@ -77,7 +77,9 @@ std::string Session::complaint() const {
            count(counts_.extra_outputs) + " from it): is there another sender on this bus?";
   if (!comparison_) return {};
   if (comparison_->different() > 0)
-    return count(comparison_->different()) + " of " + count(comparison_->compared()) +
+    return (comparison_->other_numbers() ? "the recorded node ran with other numbers (Est_Version.Config): "
+                                         : std::string()) +
+           count(comparison_->different()) + " of " + count(comparison_->compared()) +
            " epochs differ from the recording; first " + comparison_->first_difference();
   if (comparison_->missing() > 0) return count(comparison_->missing()) + " recorded epochs were not repeated";
   if (recording_->missing_outputs > 0)

@@ -84,7 +84,7 @@ refused "a folder for a log" 'cannot be read: Is a directory' "$programs/tetap-p
 refused "an output folder that cannot be" "$work/good.log/x" "$programs/tetap-play" "$work/good.log" --memory --robot mrclam --out "$work/good.log/x" --quiet
 
 # Command lines
-robots='there are: car husky labyrinth mrclam rover rover_inertial rover_matched'
+robots='there are: car husky labyrinth mrclam rover rover_landmarks rover_landmarks_matched rover_matched'
 refused "a robot that does not exist (player)" "no robot 'tank'; $robots" "$programs/tetap-play" "$work/good.log" --memory --robot tank
 refused "a robot that does not exist (node)" "no robot 'tank'; $robots" "$programs/tetap-node" --robot tank
 refused "a robot that does not exist (world)" "no robot 'tank'; $robots" "$programs/tetap-world" --memory --robot tank --out "$work/out"

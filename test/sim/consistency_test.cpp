@@ -152,7 +152,7 @@ struct Published {
 constexpr std::size_t kOdometry = 0, kFused = 1;
 
 Judgement judge(const std::vector<Recorded>& runs, const app::Numbers& numbers, std::size_t estimator = kFused) {
-  using Node = app::Node<robot::rover::Estimators>;
+  using Node = app::Node<robot::rover_landmarks::Estimators>;
   Judgement result;
   std::vector<double> sums(runs.front().epochs.size());  // of the seeds, by epoch
   std::vector<double> means;                             // of the times, by seed
@@ -220,14 +220,14 @@ void expect_consistent(const Judgement& j, std::size_t sensors) {
 
 TEST(Consistency, poses_and_innovations_are_as_uncertain_as_the_node_says) {
   const auto runs = record(as_made());
-  expect_consistent(judge(runs, matched_rover()), 2);
-  expect_consistent(judge(runs, matched_rover(), kOdometry), 0);
+  expect_consistent(judge(runs, matched_landmarks_rover()), 2);
+  expect_consistent(judge(runs, matched_landmarks_rover(), kOdometry), 0);
 }
 
 TEST(Consistency, and_so_they_are_where_every_noise_matters) {
   const auto runs = record(noisy());
-  expect_consistent(judge(runs, matched_rover(noisy())), 2);
-  expect_consistent(judge(runs, matched_rover(noisy()), kOdometry), 0);
+  expect_consistent(judge(runs, matched_landmarks_rover(noisy())), 2);
+  expect_consistent(judge(runs, matched_landmarks_rover(noisy()), kOdometry), 0);
 }
 
 TEST(Consistency, a_noise_that_is_half_or_double_is_noticed) {
@@ -243,10 +243,10 @@ TEST(Consistency, a_noise_that_is_half_or_double_is_noticed) {
       Case{"gnss", [](app::Numbers& n, float k) { n.gnss.sigma_scale *= k; }},
   };
   const auto runs = record(noisy());
-  ASSERT_TRUE(judge(runs, matched_rover(noisy())).consistent());
+  ASSERT_TRUE(judge(runs, matched_landmarks_rover(noisy())).consistent());
   for (const Case& one : cases)
     for (const float k : {0.5F, 2.0F}) {
-      app::Numbers numbers = matched_rover(noisy());
+      app::Numbers numbers = matched_landmarks_rover(noisy());
       one.scale(numbers, k);
       const Judgement j = judge(runs, numbers);
       std::printf("%-8s x %.1f: %s\n", one.name, static_cast<double>(k), words(j).c_str());

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+// The rover of rover.hpp on the plane: wheels and gyroscope, a camera that knows landmarks, and GNSS, in an EKF of
+// three states.
+#pragma once
+
+#include "app/estimators/odometry.hpp"
+#include "app/estimators/pose_ekf.hpp"
+#include "app/node.hpp"
+#include "app/numbers_check.hpp"
+#include "config/rover.hpp"
+
+namespace tetap::robot::rover_landmarks {
+
+using Estimators = app::Estimators<app::Odometry, app::PoseEkf>;
+
+inline constexpr app::Numbers numbers = app::checked([] {
+  app::Numbers n = rover::numbers;
+  n.landmark = {.sigma_range_m = 0.12F, .sigma_range_per_m = 0.02F, .sigma_bearing_rad = 0.025F};
+  // The receiver's error wanders over a minute: weight it down by what a fix repeats of the one before. The landmarks
+  // say where the plane is.
+  n.gnss = {.sigma_floor_m = 0.3F, .sigma_scale = 4.0F};
+  n.publish = {};
+  return n;
+}());
+
+}  // namespace tetap::robot::rover_landmarks
