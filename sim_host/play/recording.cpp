@@ -197,6 +197,9 @@ void Comparison::epoch(const NodeEpoch& epoch, base::Micros time) {
   const RecordedEpoch& expected = recording_.epochs[next_];
   const std::size_t number = ++next_;
   ++compared_;
+  for (const base::CanFrame& frame : epoch.frames)
+    if (frame.id - base_ == can::EstVersion::kOffset)
+      if (const auto version = can::decode<can::EstVersion>(can::payload(frame))) config_ = version->config;
   std::size_t at = 0;
   const auto differs = [&](const base::CanFrame* recorded, const base::CanFrame* now) {
     ++different_;
@@ -205,8 +208,6 @@ void Comparison::epoch(const NodeEpoch& epoch, base::Micros time) {
                         text_of(recorded, recording_.base) + ", now " + text_of(now, base_);
   };
   for (const base::CanFrame& frame : epoch.frames) {
-    if (frame.id - base_ == can::EstVersion::kOffset)
-      if (const auto version = can::decode<can::EstVersion>(can::payload(frame))) config_ = version->config;
     if (!is_deterministic(frame.id - base_)) continue;
     const base::CanFrame* recorded = at < expected.count ? &recording_.outputs[expected.first + at] : nullptr;
     ++at;
