@@ -3,6 +3,7 @@
 // 2017, sec. 6).
 #pragma once
 
+#include "filter/condition.hpp"
 #include "filter/state.hpp"
 #include "filter/update.hpp"
 
@@ -18,16 +19,13 @@ class Ekf {
   State x{};
   Symmetric<Scalar, kErrors> p{};
 
-  /// x = f(x), P = F P F^T + Q.
+  /// x = f(x), P = F P F^T + Q. False, and nothing has changed, when either would be no number, or P beyond all sizes.
   template <MotionModel<State> Motion>
-  void predict(const Motion& motion) {
+  bool predict(const Motion& motion) {
     if constexpr (requires { motion.step(x); }) {
-      const Step<State> step = motion.step(x);
-      p = propagate(p, step.f, step.q);
-      x = step.x;
+      return adopt(motion.step(x));
     } else {
-      p = propagate(p, motion.jacobian(x), motion.noise(x));
-      x = motion.predict(x);
+      return adopt({.x = motion.predict(x), .f = motion.jacobian(x), .q = motion.noise(x)});
     }
   }
 
@@ -43,8 +41,20 @@ class Ekf {
     }
     const auto result = filter::update<Scalar, kErrors, Measurement::kDimension, Measurement::kTouches.size()>(
         p, at.h, Measurement::kTouches, measurement.residual(at.z_hat), measurement.noise(), gate);
-    if (result.innovation.verdict == Verdict::kAccepted) x = x.plus(result.dx);
+    if (result.innovation.verdict != Verdict::kAccepted) return result.innovation;
+    x = x.plus(result.dx);
+    if (!well_conditioned(p)) restore(p);
     return result.innovation;
+  }
+
+ private:
+  bool adopt(const Step<State>& next) {
+    const Symmetric<Scalar, kErrors> covariance = propagate(p, next.f, next.q);
+    if (!next.q.no_variance_below_zero() || !covariance.bounded() || !next.x.finite()) return false;
+    p = covariance;
+    x = next.x;
+    if (!well_conditioned(p)) restore(p);
+    return true;
   }
 };
 

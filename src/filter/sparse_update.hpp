@@ -102,7 +102,7 @@ template <int kGroup, class Scalar, int N, int M>
   }
   record.nis = y.dot(y);
   if (!(record.nis < Scalar{1e30F})) return;  // NaN or beyond every gate: kNotFinite
-  if (record.nis > record.gate) {
+  if (!(record.nis <= record.gate)) {
     record.verdict = Verdict::kRejected;
     return;
   }

@@ -13,6 +13,7 @@ namespace tetap::filter {
 template <class S>
 concept State = requires(const S& x, const Vector<typename S::Scalar, S::kErrors>& dx) {
   { x.plus(dx) } -> std::same_as<S>;
+  { x.finite() } -> std::same_as<bool>;
   { x.minus(x) } -> std::same_as<Vector<typename S::Scalar, S::kErrors>>;
 };
 
@@ -61,6 +62,12 @@ struct VectorState {
 
   [[nodiscard]] VectorState plus(const Vector<Scalar, N>& dx) const { return {value + dx}; }
   [[nodiscard]] Vector<Scalar, N> minus(const VectorState& other) const { return value - other.value; }
+  [[nodiscard]] bool finite() const {
+    Scalar nothing = 0;
+#pragma GCC unroll 16
+    for (int i = 0; i < N; ++i) nothing += value(i) * Scalar{0};  // NaN of NaN and infinities
+    return nothing >= Scalar{0};
+  }
 };
 
 }  // namespace tetap::filter

@@ -51,6 +51,22 @@ class Symmetric {
     return full;
   }
 
+  /// No entry is NaN or infinite, nor any variance above 2e30: if this is a covariance, the sum over its upper half is
+  /// at least half of its trace.
+  [[nodiscard]] constexpr bool bounded() const {
+    Scalar sum = 0;
+#pragma GCC unroll 16
+    for (const Scalar v : packed_) sum += v;
+    return sum < Scalar{1e30F} && sum > Scalar{-1e30F};
+  }
+
+  [[nodiscard]] constexpr bool no_variance_below_zero() const {
+    bool none = true;
+#pragma GCC unroll 16
+    for (int i = 0; i < N; ++i) none = none && (*this)(i, i) >= Scalar{0};
+    return none;
+  }
+
   /// True when an L L^T factor with pivots above zero exists (and so no entry is NaN).
   [[nodiscard]] bool positive_definite() const {
     Symmetric l = *this;

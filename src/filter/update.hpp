@@ -93,7 +93,7 @@ template <class Scalar, int N, int M, std::size_t K>
   }
   record.nis = y.dot(y);
   if (!(record.nis < Scalar{1e30F})) return result;  // NaN or beyond every gate: kNotFinite
-  if (record.nis > gate) {
+  if (!(record.nis <= gate)) {
     record.verdict = Verdict::kRejected;
     return result;
   }

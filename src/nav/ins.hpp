@@ -113,13 +113,16 @@ class Ins {
     return result.innovation;
   }
 
-  /// Begins anew; whatever was pending is forgotten.
-  void start(const InsState& at, const Covariance& covariance) {
+  /// Begins anew; whatever was pending is forgotten. False, and nothing has changed, when the state is no number; a
+  /// covariance is put right.
+  bool start(const InsState& at, const Covariance& covariance) {
+    if (!at.finite()) return false;
     x = at;
     p = covariance;
     condition(p);
     pending_ = {};
     watch_.stop();
+    return true;
   }
 
   /// How often the covariance had to be put right (see condition()).

@@ -76,7 +76,7 @@ inline void predict_covariance(filter::Symmetric<Scalar, InsState::kErrors>& p, 
 }
 
 /// The largest standard deviations the filter keeps: beyond them it knows nothing, and float would overflow in the end.
-inline constexpr std::array<float, 5> kInsMostSigma{1e6F, 1e4F, 4.0F, 100.0F, 10.0F};
+inline constexpr std::array<float, 5> kInsMostSigma{1e6F, 1e4F, 4.0F, 10.0F, 1.0F};
 
 /// The factor of P less a share of its diagonal, made element by element: it exists when no eigenvalue of the
 /// correlations is below that share, which is what float can tell from nothing; and no variance is above its limit. A
@@ -137,6 +137,19 @@ inline bool condition(filter::Symmetric<float, InsState::kErrors>& p) {
     const float scale = !small && p(i, i) < 1e36F ? most / base::sqrt(p(i, i)) : 0.0F;  // neither for NaN
     for (int j = 0; j < kN; ++j) p(i, j) = scale > 0.0F ? p(i, j) * scale : 0.0F;
     p(i, i) = small ? kLeast : most * most;
+  }
+  // Over the second that may pass until the watch has seen all of P, each group takes on the doubt of the one that
+  // feeds it; with much less of its own it would end with none that float can tell from rounding.
+  constexpr float kOwn = 1e-6F, kGravity2 = 100.0F;
+  for (int i = 0; i < 3; ++i) {
+    const auto at_least = [&p](int of, float variance) {
+      if (p(of, of) < variance) p(of, of) = variance;
+    };
+    at_least(InsState::kAttitude + i, kOwn * p(InsState::kGyroBias + i, InsState::kGyroBias + i));
+    at_least(InsState::kVelocity + i, kOwn * p(InsState::kAccelBias + i, InsState::kAccelBias + i));
+    for (int k = 0; k < 3; ++k)
+      at_least(InsState::kVelocity + i, kOwn * kGravity2 * p(InsState::kAttitude + k, InsState::kAttitude + k));
+    at_least(InsState::kPosition + i, kOwn * p(InsState::kVelocity + i, InsState::kVelocity + i));
   }
   for (const float share : {8e-5F, 8e-4F, 8e-3F, 0.08F, 0.2F, 1.0F}) {
     InsFactor factor;
