@@ -49,7 +49,7 @@ class Attitude {
   /// The magnetometer's sample of the last step's time, in any unit; dt_s since the one before. False if no direction.
   bool magnetometer(const Vector3& m_b, float dt_s) {
     const float m2 = dot(m_b, m_b);
-    if (!started_ || !(m2 > 0.0F && m2 < base::kInfinity) || !(dt_s > 0.0F)) return false;
+    if (!started_ || !(m2 > 0.0F && m2 < kStrongest2) || !(dt_s > 0.0F)) return false;
     if (off_ && heading_.known()) return true;  // a heading would only be as good as the level
     const bool turning = !within(rest_.rate_b_radps(), o_.field_motion_radps);
     heading_.step(o_, Rows(q_lb_) * m_b, turning, dt_s < 1.0F ? dt_s : 1.0F);
@@ -75,6 +75,7 @@ class Attitude {
 
  private:
   static constexpr float kShortest_s = 1e-6F, kLongest_s = 0.2F, kFastest_radps = 100.0F, kLeastForce_mps2 = 0.1F;
+  static constexpr float kStrongest2 = 1e30F;  ///< in any unit; the squares of what is made of it are numbers
 
   [[nodiscard]] static bool inside(const Vector3& v, float limit) {
     return base::abs(v(0)) < limit && base::abs(v(1)) < limit && base::abs(v(2)) < limit;
@@ -121,9 +122,9 @@ class Attitude {
   [[gnu::always_inline]] inline void turn_level(float x, float y) {
     const Quaternion q = q_lb_;
     const float hx = 0.5F * x, hy = 0.5F * y;
-    q_lb_ = Quaternion{q.w - (hx * q.x + hy * q.y), q.x + (hx * q.w + hy * q.z), q.y + (hy * q.w - hx * q.z),
-                       q.z + (hx * q.y - hy * q.x)}
-                .renormalised();
+    const Quaternion next{q.w - (hx * q.x + hy * q.y), q.x + (hx * q.w + hy * q.z), q.y + (hy * q.w - hx * q.z),
+                          q.z + (hx * q.y - hy * q.x)};
+    q_lb_ = hx * hx + hy * hy < 2.5e-3F ? next.renormalised() : next.normalised();  // Newton's step near 1
     const auto tilt = [x, y](Vector3& v) {
       v = Vector3{v(0) + y * v(2), v(1) - x * v(2), v(2) + (x * v(1) - y * v(0))};
     };

@@ -10,13 +10,22 @@ namespace tetap::filter {
 
 /// alpha = tau/(tau + dt) of a step; 0 (the slow sensor alone) unless both are positive numbers.
 [[nodiscard]] constexpr float complementary_weight(float tau_s, float dt_s) {
-  return tau_s > 0.0F && dt_s > 0.0F && dt_s < base::kInfinity ? tau_s / (tau_s + dt_s) : 0.0F;
+  const float sum_s = tau_s + dt_s;
+  return tau_s > 0.0F && dt_s > 0.0F && sum_s < base::kInfinity ? tau_s / sum_s : 0.0F;
 }
 
-/// 1/(tau s + 1). The first sample is the start.
+namespace detail {
+/// A number whose differences are numbers, and a weight.
+[[nodiscard]] constexpr bool filterable(float x, float alpha) {
+  return x < 1e30F && x > -1e30F && alpha >= 0.0F && alpha <= 1.0F;
+}
+}  // namespace detail
+
+/// 1/(tau s + 1). The first sample is the start; what is no number changes nothing.
 class FirstOrderLowPass {
  public:
   float step(float x, float alpha) {
+    if (!detail::filterable(x, alpha)) return value_;
     value_ = started_ ? alpha * value_ + (1.0F - alpha) * x : x;
     started_ = true;
     return value_;
@@ -31,6 +40,7 @@ class FirstOrderLowPass {
 class FirstOrderHighPass {
  public:
   float step(float x, float alpha) {
+    if (!detail::filterable(x, alpha)) return value_;
     value_ = started_ ? alpha * (value_ + (x - last_)) : 0.0F;
     last_ = x;
     started_ = true;

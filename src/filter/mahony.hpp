@@ -12,20 +12,23 @@ class Mahony {
   /// Gains in rad/s per unit of error, and per second of that.
   float kp = 0.74F, ki = 0.0012F;
 
-  /// One step with gyroscope and accelerometer. Free fall leaves the gyroscope alone to turn.
-  void step(const Vector3& w_b_radps, const Vector3& f_b, float dt_s) {
+  /// One step with gyroscope and accelerometer. Free fall leaves the gyroscope alone to turn. False, and nothing has
+  /// changed, for what no sensor says and for no time.
+  bool step(const Vector3& w_b_radps, const Vector3& f_b, float dt_s) {
     const float f2 = dot(f_b, f_b);
-    if (!sane(w_b_radps, f2, dt_s)) return;
+    if (!sane(w_b_radps, f2, dt_s)) return false;
     const Scaled error = vertical_error(f_b, f2);
     turn(w_b_radps, error.v, error.by, dt_s);
+    return true;
   }
 
   /// The same with a magnetometer: the field is expected with its horizontal part to the north, whatever its dip.
-  void step(const Vector3& w_b_radps, const Vector3& f_b, const Vector3& m_b, float dt_s) {
+  bool step(const Vector3& w_b_radps, const Vector3& f_b, const Vector3& m_b, float dt_s) {
     const float f2 = dot(f_b, f_b);
-    if (!sane(w_b_radps, f2, dt_s)) return;
+    if (!sane(w_b_radps, f2, dt_s)) return false;
     const Scaled error = vertical_error(f_b, f2);
     turn(w_b_radps, error.by * error.v + field_error(m_b), 1.0F, dt_s);
+    return true;
   }
 
   void start(const Quaternion& q_nb) { q_nb_ = q_nb, bias_radps_ = Vector3::Zero(); }
