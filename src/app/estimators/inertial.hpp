@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // Inertial navigation in the firmware: an error-state filter at the far end of the window (its samples come in order,
 // each once), carried to the present by the IMU samples that the window holds. Fuses GNSS position and velocity, wheels
-// with the non-holonomic constraint, standstill, and an outside heading.
+// with the non-holonomic constraint, standstill, headings from outside, a magnetometer and a barometer.
 #pragma once
 
 #include "app/context.hpp"
 #include "app/estimate.hpp"
+#include "app/estimators/baro_zero.hpp"
+#include "app/estimators/field_guard.hpp"
 #include "app/estimators/inertial_start.hpp"
 #include "app/sample.hpp"
 #include "nav/ins.hpp"
@@ -46,6 +48,8 @@ class Inertial {
   Innovation fuse(const GnssPosition& fix, base::Micros stamp, const Context& with);
   Innovation fuse(const GnssVelocity& velocity, base::Micros stamp, const Context& with);
   Innovation fuse(const OutsideHeading& heading, base::Micros stamp, const Context& with);
+  Innovation fuse(const MagneticFlux& flux, base::Micros stamp, const Context& with);
+  Innovation fuse(const AirPressure& air, base::Micros stamp, const Context& with);
 
   /// The present: what the filter has, carried over the samples of the window.
   template <class Window>
@@ -133,12 +137,15 @@ class Inertial {
   nav::Vector3 still_rate_radps_ = nav::Vector3::Zero();  ///< mean since it stands
   float still_s_ = 0;
   std::array<Refused, kSources> refused_{};
+  FieldGuard field_;
+  BaroZero baro_;
 };
 
 }  // namespace tetap::app
 
 #include "app/estimators/inertial_gnss.hpp"     // IWYU pragma: keep
 #include "app/estimators/inertial_heading.hpp"  // IWYU pragma: keep
+#include "app/estimators/inertial_height.hpp"   // IWYU pragma: keep
 #include "app/estimators/inertial_imu.hpp"      // IWYU pragma: keep
 #include "app/estimators/inertial_measure.hpp"  // IWYU pragma: keep
 #include "app/estimators/inertial_output.hpp"   // IWYU pragma: keep

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// Inertial navigation, part: headings from outside.
+// Inertial navigation, part: headings from outside, and from a magnetometer.
 #pragma once
 
 #include "app/estimators/inertial.hpp"
 #include "app/estimators/inertial_measure.hpp"
 #include "model/dual_heading.hpp"
+#include "model/magnetic_heading.hpp"
 
 namespace tetap::app {
 
@@ -15,8 +16,60 @@ inline Innovation Inertial::fuse(const OutsideHeading& heading, base::Micros sta
     start_.heading(heading.yaw_rad, sigma);
     return {.verdict = can::Verdict::kAccepted};
   }
-  return measure(model::DualHeading({1.0F, 0.0F, 0.0F}, heading.yaw_rad, sigma), kHeadings,
-                 with.numbers.gnss.gate_scale, stamp, with);
+  const model::DirectionMeasurement direction = model::DualHeading({1.0F, 0.0F, 0.0F}, heading.yaw_rad, sigma);
+  return measure(direction, kHeadings, with.numbers.gnss.gate_scale, stamp, with);
+}
+
+/// The errors of a magnetometer last, so its headings never make the filter's better than sigma_rad: each is given the
+/// variance that would end there. While the heading is better known already, they are compared and nothing more.
+[[gnu::noinline]] inline Innovation Inertial::fuse(const MagneticFlux& flux, base::Micros stamp, const Context& with) {
+  const MagneticNumbers& n = with.numbers.magnetic;
+  if (n.use == 0 || phase_ == Phase::kWaiting) return {};
+  // In the body's axes at the state's time, that of the last IMU sample.
+  const bool tracking = phase_ == Phase::kTracking;
+  const nav::Vector3 rate = tracking ? nav::Vector3(rate_b_radps_ - ins_.x.b_g_radps) : rate_b_radps_;
+  const nav::Vector3 shown = field_b_uT(flux, n);
+  const nav::Vector3 field = shown + nav::cross(rate * base::seconds(stamp - time_), shown);
+  const nav::Vector3 field_n = (tracking ? ins_.x.q_nb : start_.attitude()).rotate(field);
+  const float horizontal2 = field_n(0) * field_n(0) + field_n(1) * field_n(1);
+  if (!(horizontal2 > 0.0F && field.squaredNorm() < 1e12F)) return {.verdict = can::Verdict::kNotFinite};
+  const bool moving = tracking && (ins_.x.v_n_mps.squaredNorm() > 0.25F || rate.squaredNorm() > 0.04F);
+  const float off = field_.step({.horizontal_uT = base::sqrt(horizontal2), .up_uT = field_n(2)}, moving, stamp, n);
+  if (!(off <= 1.0F)) return {.verdict = can::Verdict::kRejected, .dof = 2, .nis = off, .gate = 1.0F};
+
+  model::DirectionMeasurement direction = model::MagneticHeading(field, n.declination_rad, n.sigma_rad);
+  if (!tracking) {
+    start_.field(field_n, direction.angle_rad, n.sigma_rad);
+    return {.verdict = can::Verdict::kAccepted};
+  }
+  const auto at = direction.linearised(ins_.x);
+  const float nu = direction.residual(at.z_hat)(0);
+  float p = 0;
+  for (int c = 0; c < 3; ++c)
+    for (int r = 0; r < 3; ++r) p += at.h(0, r) * ins_.p(6 + r, 6 + c) * at.h(0, c);
+  const float floor = n.sigma_rad * n.sigma_rad;
+  const float gate = n.gate_scale * filter::chi_square_99(1);
+  Innovation result{.verdict = can::Verdict::kAccepted, .dof = 1, .nis = nu * nu / (p + floor), .gate = gate};
+  if (!(result.nis < 1e30F)) return {.verdict = can::Verdict::kNotFinite};  // a field straight down
+  const bool agrees = result.nis <= gate;
+  const base::Micros after{with.numbers.recovery.after_us};
+  if (field_.lasts(agrees, stamp, after)) {
+    // With GNSS the filter's heading is the better one. Without, nothing else says where north is.
+    if (agrees || stamp - last_position_ < after) {
+      field_.believe(agrees, stamp);
+    } else {
+      ins_.p(8, 8) += nu * nu;
+      field_.believe(true, stamp);
+    }
+  }
+  if (!agrees) result.verdict = can::Verdict::kRejected;
+  if (agrees && !field_.believed()) result.verdict = can::Verdict::kNotUsed;
+  constexpr float kWorth = 1.05F;  // of its variance the heading has to be off, for an update to change anything
+  if (result.verdict == can::Verdict::kAccepted && p > kWorth * floor) {
+    direction.sigma_rad = base::sqrt(variance_towards(floor, p));
+    static_cast<void>(ins_.update(direction, base::kInfinity));
+  }
+  return result;
 }
 
 }  // namespace tetap::app

@@ -67,6 +67,8 @@ void Inertial::each_bit(Sink&& sink) const {
     sink(refused.in_a_row);
     sink(refused.since.us);
   }
+  field_.each_bit(sink);
+  baro_.each_bit(sink);
 }
 
 }  // namespace tetap::app

@@ -26,6 +26,7 @@ class InertialStart {
     // Before the first sample anything may be up: the whole turn at once, then ever smaller shares of what is left.
     turned_ = (nav::exp_quaternion(levelled_s_ > 0.0F ? nav::Vector3(lean * share) : whole_turn(up_n / norm)) * turned_)
                   .renormalised();
+    if (!(levelled_s_ > 0.0F)) level_yaw_rad_ = nav::euler(turned_).yaw_rad;
     levelled_s_ += dt_s;
     return levelled_s_ >= n.level_s;
   }
@@ -62,9 +63,17 @@ class InertialStart {
   }
   void heading(float yaw_rad, float sigma_rad) {
     yaw_rad_ = yaw_rad;
+    level_yaw_rad_ = nav::euler(turned_).yaw_rad;
     sigma_yaw_rad_ = sigma_rad;
     headed_ = true;
   }
+  /// A field in level axes that should point to angle_rad from east; a heading found in another way is not given up.
+  void field(const nav::Vector3& field_n, float angle_rad, float sigma_rad) {
+    if (headed_ && !(sigma_rad <= sigma_yaw_rad_)) return;
+    const float turn = angle_rad - base::atan2(field_n(1), field_n(0));
+    heading(base::wrap_angle(nav::euler(turned_).yaw_rad + turn), sigma_rad);
+  }
+  [[nodiscard]] const nav::Quaternion& attitude() const { return turned_; }
   [[nodiscard]] bool levelling() const { return levelled_s_ > 0.0F; }
   [[nodiscard]] bool placed() const { return placed_; }
   [[nodiscard]] bool ready() const { return placed_ && headed_; }
@@ -74,7 +83,8 @@ class InertialStart {
     nav::InsState x = again ? ins.x : nav::InsState{};
     x.x = at_.x, x.y = at_.y, x.z = at_.z;
     const nav::Quaternion level = again ? ins.x.q_nb : turned_;
-    const float turn = base::wrap_angle(yaw_rad_ - nav::euler(level).yaw_rad);
+    // A heading found before is carried to the present by the gyroscope.
+    const float turn = base::wrap_angle(yaw_rad_ - (again ? nav::euler(level).yaw_rad : level_yaw_rad_));
     x.q_nb = (nav::exp_quaternion({0.0F, 0.0F, turn}) * level).renormalised();
     if (!again) x.v_n_mps = v_n_mps_;
     const float h = at_.sigma_horizontal_m * at_.sigma_horizontal_m, v = at_.sigma_vertical_m * at_.sigma_vertical_m;
@@ -117,7 +127,7 @@ class InertialStart {
   nav::Vector3 v_n_mps_ = nav::Vector3::Zero();
   float sigma_v_mps_ = 3;
   base::Micros fixed_at_;
-  float yaw_rad_ = 0, sigma_yaw_rad_ = 3;
+  float yaw_rad_ = 0, level_yaw_rad_ = 0, sigma_yaw_rad_ = 3;  ///< the second: of turned_, when the first was found
   bool placed_ = false, headed_ = false, fixed_ = false, has_velocity_ = false;
 };
 
