@@ -18,6 +18,7 @@
 #include "can/e2e.hpp"
 
 #include <array>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 
@@ -45,11 +46,23 @@ struct Summary {
 
 template <std::size_t EstimatorCount>
 class Publisher {
+  /// At start only, of more than a hundred numbers: small, not fast.
+  struct NumbersCrc {
+    base::BitCrc crc;
+    [[gnu::noinline]] void operator()(std::uint32_t word) { crc(word); }
+    void operator()(std::int32_t word) { (*this)(static_cast<std::uint32_t>(word)); }
+    void operator()(float number) { (*this)(std::bit_cast<std::uint32_t>(number)); }
+    void operator()(std::int64_t word) {
+      (*this)(static_cast<std::uint32_t>(static_cast<std::uint64_t>(word)));
+      (*this)(static_cast<std::uint32_t>(static_cast<std::uint64_t>(word) >> 32));
+    }
+  };
+
  public:
   Publisher(const Numbers& numbers, const Version& version) : numbers_(numbers), version_(version) {
-    base::BitCrc crc;
+    NumbersCrc crc;
     each_number(numbers, crc);
-    config_ = crc.value();
+    config_ = crc.crc.value();
   }
 
   void power_on() {

@@ -111,8 +111,8 @@ class FileCan {
   std::uint32_t sent_ = 0;
   std::uint32_t hash_ = 2'166'136'261U;
   CanFaults faults_{};
-  std::array<char, 4096> in_buffer_{};
-  std::array<char, 8192> out_buffer_{};
+  std::array<char, 256> in_buffer_{};
+  std::array<char, 512> out_buffer_{};
 };
 
 static_assert(hal::CanBus<FileCan>);
