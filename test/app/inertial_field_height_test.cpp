@@ -62,7 +62,8 @@ class Robot {
   double yaw_rate_radps = 0, acceleration_mps2 = 0;
   double declination_rad = 0;
   bool gnss = true, baro = true, magnetometer = true;
-  double unseen_turn_radps = 0;  ///< of the world, that the gyroscope does not show
+  double unseen_turn_radps = 0;                   ///< of the world, that the gyroscope does not show
+  double field_noise_uT = 0.3, flux_after_s = 0;  ///< how long after an IMU sample the magnetometer's is taken
   nav::Vector3 accel_bias_mps2 = nav::Vector3::Zero();
   std::function<nav::Vector3(const nav::Vector3&)> disturb = [](const nav::Vector3& m_b) { return m_b; };
   std::function<double(double)> weather_Pa = [](double) { return 0.0; };
@@ -123,11 +124,13 @@ class Robot {
     advance();
   }
   void take_flux(const nav::Quaternion& q_nb) {
+    const nav::Quaternion seen = nav::exp_quaternion({0.0F, 0.0F, narrow(flux_after_s * yaw_rate_radps)}) * q_nb;
     const double h = kField_uT * std::cos(kDip_rad);
     const nav::Vector3 m_n{narrow(h * std::sin(declination_rad)), narrow(h * std::cos(declination_rad)),
                            narrow(-kField_uT * std::sin(kDip_rad))};
-    const nav::Vector3 m = disturb(q_nb.conjugate().rotate(m_n)) + field_noise_(0.3);
-    last_flux = estimator.fuse(MagneticFlux{.flux_b_uT = {m(0), m(1), m(2)}}, {us}, with());
+    const nav::Vector3 m = disturb(seen.conjugate().rotate(m_n)) + field_noise_(field_noise_uT);
+    last_flux =
+        estimator.fuse(MagneticFlux{.flux_b_uT = {m(0), m(1), m(2)}}, {us + std::llround(flux_after_s * 1e6)}, with());
     ++fluxes;
     rejected += last_flux.verdict == can::Verdict::kRejected;
   }
@@ -261,6 +264,19 @@ TEST(InertialMagnetometer, leaves_a_given_heading_that_is_better_than_its_own) {
   ASSERT_TRUE(robot.tracking());
   EXPECT_NEAR(robot.heading_off_deg(), 0.05 / kDegree, 0.3);
   EXPECT_LT(robot.heading_sigma_rad(), 0.02);
+}
+
+TEST(InertialMagnetometer, knows_what_it_turned_since_the_gyroscopes_last_sample) {
+  Numbers n = numbers();
+  n.magnetic.sigma_rad = 0.005F;
+  Robot robot(n);
+  robot.run(3);
+  robot.field_noise_uT = 0;
+  robot.flux_after_s = 0.009;
+  robot.yaw_rate_radps = 2;
+  robot.run(10);
+  EXPECT_LT(robot.last_flux.nis, 1.0F);  // it turns by four sigma in 9 ms
+  EXPECT_LT(robot.heading_off_deg(), 0.5);
 }
 
 TEST(InertialMagnetometer, never_makes_the_heading_better_known_than_a_compass_can) {

@@ -21,7 +21,7 @@ class FieldGuard {
   };
 
   /// How far the sample is from the known field: squared, in units of what is allowed; above 1 (or NaN): disturbed.
-  float step(const Field& f, bool moving, base::Micros stamp, const MagneticNumbers& n) {
+  [[gnu::noinline]] float step(const Field& f, bool moving, base::Micros stamp, const MagneticNumbers& n) {
     const base::Micros since = stamp - last_;
     last_ = stamp;
     const float off = compare(f, moving && since <= kGap ? base::seconds(since) : 0.0F, n);

@@ -68,7 +68,7 @@ class InertialStart {
     headed_ = true;
   }
   /// A field in level axes that should point to angle_rad from east; a heading found in another way is not given up.
-  void field(const nav::Vector3& field_n, float angle_rad, float sigma_rad) {
+  [[gnu::noinline]] void field(const nav::Vector3& field_n, float angle_rad, float sigma_rad) {
     if (headed_ && !(sigma_rad <= sigma_yaw_rad_)) return;
     const float turn = angle_rad - base::atan2(field_n(1), field_n(0));
     heading(base::wrap_angle(nav::euler(turned_).yaw_rad + turn), sigma_rad);
