@@ -8,13 +8,16 @@
 #include "app/estimate.hpp"
 #include "app/estimators/baro_zero.hpp"
 #include "app/estimators/field_guard.hpp"
+#include "app/estimators/fix_trust.hpp"
 #include "app/estimators/inertial_start.hpp"
 #include "app/sample.hpp"
+#include "model/gnss_fix_3d.hpp"
 #include "nav/ins.hpp"
 #include "nav/preintegration.hpp"
 
 #include <array>
 #include <cstdint>
+#include <memory>
 
 namespace tetap::app {
 
@@ -24,7 +27,7 @@ class Inertial {
   static constexpr bool kDelayed = true;
 
   void restart(base::Micros t, const Context& with) {
-    *this = {};
+    std::construct_at(this);  // in place: a fresh one assigned over the old would pass over the stack
     time_ = t;
     noise_of(with.numbers.inertial);
     const StartNumbers& s = with.numbers.start;
@@ -67,6 +70,9 @@ class Inertial {
     });
   }
 
+  /// The last step that fixes which persisted made the position take.
+  [[nodiscard]] const Jump& jump() const { return jump_; }
+
   [[nodiscard]] Estimate estimate(const Context& with) const;
   [[nodiscard]] InertialEstimate inertial(const Context& with) const;
   [[nodiscard]] can::Mode mode(const Context&) const {
@@ -87,7 +93,7 @@ class Inertial {
 
  private:
   enum class Phase : std::uint8_t { kWaiting, kHeading, kTracking };
-  enum Source : std::size_t { kPosition, kVelocity, kWheels, kHeadings, kSources };
+  enum Source : std::size_t { kPosition, kHeight, kVelocity, kWheels, kHeadings, kSources };
   struct Refused {
     std::int32_t in_a_row = 0;
     base::Micros since;
@@ -115,6 +121,11 @@ class Inertial {
   void begin(const Context& with);
   void stand(base::Micros stamp, const Context& with);
   Innovation forward(const Forward& speed, base::Micros stamp, const Context& with);
+  [[nodiscard]] bool believe(const nav::Vector3& nu, const nav::Vector3& r, bool agrees, base::Micros stamp,
+                             const RecoveryNumbers& rules);
+  Innovation weigh(model::GnssFix3d& fix, base::Micros stamp, const Context& with);
+  void refused_or_not(Source source, bool refused, base::Micros stamp);
+  void step(int first, int count, const nav::Vector3& by_m, const nav::Vector3& variance_m2);
   template <class Model>
   Innovation measure(const Model& model, Source source, float gate_scale, base::Micros stamp, const Context& with);
   template <int M>
@@ -137,6 +148,12 @@ class Inertial {
   nav::Vector3 still_rate_radps_ = nav::Vector3::Zero();  ///< mean since it stands
   float still_s_ = 0;
   std::array<Refused, kSources> refused_{};
+  FirstFixes first_fixes_;
+  FrozenFix frozen_;
+  Claim place_, height_;                 ///< of fixes that are not taken
+  std::array<float, 2> led_m_{};         ///< by how much the last fixes moved the position
+  bool doubted_ = false, back_ = false;  ///< so is that; the last jump may be taken back
+  Jump jump_;
   FieldGuard field_;
   BaroZero baro_;
 };

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Inertial navigation, part: GNSS position and velocity.
+// Inertial navigation, part: GNSS position and velocity. A fix is judged by the receiver's own accuracy and weighed by
+// how long its errors last; what follows from refusing it is in fix_trust.hpp.
 #pragma once
 
 #include "app/estimators/inertial.hpp"
@@ -8,6 +9,51 @@
 #include "model/gnss_velocity_3d.hpp"
 
 namespace tetap::app {
+
+/// Normalised innovation squared of a fix: of all of it, and of its horizontal part alone.
+struct FixNis {
+  float joint = base::kNan;
+  float level = base::kNan;
+};
+
+/// S = H P H^T + R = L L^T, y = L^-1 nu: with up last, the horizontal part's NIS is on the way to the joint one.
+[[gnu::noinline]] inline FixNis nis_of(const nav::Ins::Covariance& p, const filter::Matrix<float, 3, 6>& h,
+                                       const nav::Vector3& nu, const nav::Vector3& r) {
+  constexpr auto& kTouches = model::GnssFix3d::kTouches;
+  const auto touch = [](int k) { return kTouches[static_cast<std::size_t>(k)]; };
+  nav::Matrix3 l;
+  nav::Vector3 y;
+  FixNis nis;
+  float sum = 0;
+  for (int i = 0; i < 3; ++i) {
+    filter::Vector<float, 6> hp;
+#pragma GCC unroll 1
+    for (int c = 0; c < 6; ++c) {
+      hp(c) = 0;
+#pragma GCC unroll 1
+      for (int k = 0; k < 6; ++k) hp(c) += h(i, k) * p(touch(k), touch(c));
+    }
+    y(i) = nu(i);
+    for (int j = 0; j <= i; ++j) {
+      float s = i == j ? r(i) : 0.0F;
+#pragma GCC unroll 1
+      for (int k = 0; k < 6; ++k) s += hp(k) * h(j, k);
+      for (int k = 0; k < j; ++k) s -= l(i, k) * l(j, k);
+      if (j < i) {
+        l(i, j) = s / l(j, j);
+        y(i) -= l(i, j) * y(j);
+      } else {
+        if (!(s > 0.0F)) return {};
+        l(i, i) = base::sqrt(s);
+        y(i) /= l(i, i);
+      }
+    }
+    sum += y(i) * y(i);
+    if (i == 1) nis.level = sum;
+  }
+  nis.joint = sum;
+  return nis;
+}
 
 inline Innovation Inertial::fuse(const GnssPosition& fix, base::Micros stamp, const Context& with) {
   const GnssNumbers& n = with.numbers.gnss;
@@ -25,7 +71,9 @@ inline Innovation Inertial::fuse(const GnssPosition& fix, base::Micros stamp, co
                          .sigma_vertical_m = sigma(fix.vertical_acc_m, 20.0F),
                          .antenna_b_m = {n.antenna_x_b_m, n.antenna_y_b_m, n.antenna_z_b_m}};
   if (phase_ != Phase::kTracking) {
+    if (!first_fixes_.hear(fix, stamp, with.numbers.recovery.confirm_fixes)) return {};
     start_.fix(model, stamp, n.align_distance_m);
+    last_position_ = stamp;
     return {.verdict = can::Verdict::kAccepted};
   }
   // The fix is true at its own time, the state at that of the last IMU sample: moved by the velocity in between.
@@ -33,7 +81,103 @@ inline Innovation Inertial::fuse(const GnssPosition& fix, base::Micros stamp, co
   nav::move(model.x, -ins_.x.v_n_mps(0) * later_s);
   nav::move(model.y, -ins_.x.v_n_mps(1) * later_s);
   nav::move(model.z, -ins_.x.v_n_mps(2) * later_s);
-  return measure(model, kPosition, n.gate_scale, stamp, with);
+  if (frozen_.hear(fix, nav::difference(model.x, ins_.x.x), nav::difference(model.y, ins_.x.y),
+                   with.numbers.recovery.frozen_m))
+    return {.verdict = can::Verdict::kStale};
+  return weigh(model, stamp, with);
+}
+
+/// A fix decides where the filter is when the filter's variance is so many times that of the fix.
+inline constexpr float kDecides = 4.0F;
+
+/// The joint gate; where it fails, that of the horizontal part alone. A fix that would decide where the filter is has
+/// to be confirmed by others; one that is refused may persist.
+[[gnu::noinline]] inline Innovation Inertial::weigh(model::GnssFix3d& fix, base::Micros stamp, const Context& with) {
+  const RecoveryNumbers& rules = with.numbers.recovery;
+  const GnssNumbers& n = with.numbers.gnss;
+  ins_.predict_covariance();
+  const auto at = fix.linearised(ins_.x);
+  const nav::Vector3 nu = -at.z_hat, r = fix.noise();
+  const FixNis nis = nis_of(ins_.p, at.h, nu, r);
+  if (!(nis.joint < 1e30F)) return {.verdict = can::Verdict::kNotFinite};
+  const bool whole = nis.joint <= n.gate_scale * filter::chi_square_99(3);
+  const bool level = whole || nis.level <= n.gate_scale * filter::chi_square_99(2);
+  Innovation record{
+      .verdict = can::Verdict::kAccepted, .dof = 3, .nis = nis.joint, .gate = n.gate_scale * filter::chi_square_99(3)};
+  refused_or_not(kPosition, !level, stamp);
+
+  if (!level || ins_.p(0, 0) + ins_.p(1, 1) > 2.0F * kDecides * r(0)) {
+    record.verdict = level ? can::Verdict::kNotUsed : can::Verdict::kRejected;
+    if (!believe(nu, r, level, stamp, rules)) return record;
+    record.verdict = can::Verdict::kAccepted;
+  }
+  place_.forget();
+
+  bool height = whole;
+  refused_or_not(kHeight, !height, stamp);
+  if (!whole || ins_.p(2, 2) > kDecides * r(2)) {
+    height_.hear(stamp, nu(2), 0.0F, r(2), ins_.p(2, 2));
+    height = whole ? height_.confirmed(rules.confirm_fixes) : height_.persisted(rules.persist_us, rules.persist_fixes);
+    if (height && !whole) step(2, 1, {0.0F, 0.0F, height_.east_m()}, r);
+  }
+  if (height) height_.forget();
+
+  const float more = repeated(base::seconds(stamp - last_position_), n.correlation_s);
+  fix.sigma_horizontal_m *= base::sqrt(more);
+  fix.sigma_vertical_m *= base::sqrt(more);
+  if (!height) {                    // the horizontal part alone
+    nav::move(fix.z, at.z_hat(2));  // says what is expected, and hardly anything
+    fix.sigma_vertical_m = 1e4F;
+    record.dof = 2;
+    record.nis = nis.level;
+    record.gate = n.gate_scale * filter::chi_square_99(2);
+  }
+  last_position_ = stamp;
+  const base::Anchored was[2]{ins_.x.x, ins_.x.y};
+  if (ins_.update(fix, base::kInfinity).verdict != filter::Verdict::kAccepted) record.verdict = can::Verdict::kSingular;
+  led_m_ = {0.9F * led_m_[0] + nav::difference(ins_.x.x, was[0]), 0.9F * led_m_[1] + nav::difference(ins_.x.y, was[1])};
+  doubted_ = false;
+  return record;
+}
+
+/// Of a fix that is refused, or (`agrees`) would decide where the filter is: whether it is to be believed now.
+[[gnu::noinline]] inline bool Inertial::believe(const nav::Vector3& nu, const nav::Vector3& r, bool agrees,
+                                                base::Micros stamp, const RecoveryNumbers& rules) {
+  const float p_level = ins_.p(0, 0) + ins_.p(1, 1);
+  place_.hear(stamp, nu(0), nu(1), r(0), p_level);
+  const bool confirmed = place_.confirmed(rules.confirm_fixes);
+  if (agrees) return confirmed;
+  if (confirmed && !doubted_) {  // the fixes before may have begun to lead it away
+    for (int i = 0; i < 2; ++i)
+      ins_.p(i, i) += led_m_[static_cast<std::size_t>(i)] * led_m_[static_cast<std::size_t>(i)];
+    doubted_ = true;
+  }
+  // Back to where a jump came from: dead reckoning before it and fixes after it say the same.
+  const bool back = confirmed && back_ && place_.says(-jump_.east_m, -jump_.north_m, 2.0F * r(0) + p_level);
+  if (back || place_.persisted(rules.persist_us, rules.persist_fixes)) {
+    step(0, 2, {place_.east_m(), place_.north_m(), 0.0F}, r);
+    ins_.p(8, 8) += rules.inflate_yaw_rad * rules.inflate_yaw_rad;
+    height_.forget();
+    back_ = !back;
+    return true;
+  }
+  // Nothing agrees with anything for long: the filter is no judge of how it moves.
+  const base::Micros despair{4 * std::int64_t{rules.persist_us}};
+  if (stamp - refused_[kPosition].since >= despair) recover(nu, kPosition, rules);
+  return false;
+}
+
+/// The coordinates from `first` on are where fixes have been for long, and as uncertain as a fix.
+[[gnu::noinline]] inline void Inertial::step(int first, int count, const nav::Vector3& by_m,
+                                             const nav::Vector3& variance_m2) {
+  const std::array<base::Anchored*, 3> coordinates{&ins_.x.x, &ins_.x.y, &ins_.x.z};
+  for (int i = first; i < first + count; ++i) {
+    nav::move(*coordinates[static_cast<std::size_t>(i)], by_m(i));
+    for (int k = 0; k < nav::Ins::kErrors; ++k) ins_.p(i, k) = 0;
+    ins_.p(i, i) = variance_m2(i);
+  }
+  ins_.start(ins_.x, ins_.p);
+  jump_ = {.east_m = by_m(0), .north_m = by_m(1), .count = static_cast<std::uint8_t>(jump_.count + 1)};
 }
 
 inline Innovation Inertial::fuse(const GnssVelocity& velocity, base::Micros stamp, const Context& with) {
@@ -46,6 +190,7 @@ inline Innovation Inertial::fuse(const GnssVelocity& velocity, base::Micros stam
     start_.velocity(v_n, sigma);
     return {.verdict = can::Verdict::kAccepted};
   }
+  if (frozen_.frozen()) return {.verdict = can::Verdict::kStale};
   return measure(model::GnssVelocity3d{.v_n_mps = v_n,
                                        .sigma_horizontal_mps = sigma,
                                        .sigma_vertical_mps = 1.5F * sigma,

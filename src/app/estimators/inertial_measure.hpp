@@ -10,17 +10,23 @@ template <class Model>
 Innovation Inertial::measure(const Model& model, Source source, float gate_scale, base::Micros stamp,
                              const Context& with) {
   const auto result = ins_.update(model, gate_scale * filter::chi_square_99(Model::kDimension));
-  Refused& refused = refused_[source];
-  if (result.verdict == filter::Verdict::kAccepted) {
-    refused.in_a_row = 0;
-    if (source == kPosition) last_position_ = stamp;
-  } else if (result.verdict == filter::Verdict::kRejected) {
-    if (refused.in_a_row++ == 0) refused.since = stamp;
-    if (refused.in_a_row >= with.numbers.recovery.at_least &&
-        stamp - refused.since >= base::Micros{with.numbers.recovery.after_us})
-      recover(result.nu, source, with.numbers.recovery);
-  }
+  if (result.verdict > filter::Verdict::kRejected) return record(result);
+  const bool rejected = result.verdict == filter::Verdict::kRejected;
+  refused_or_not(source, rejected, stamp);
+  const Refused& refused = refused_[source];
+  if (rejected && refused.in_a_row >= with.numbers.recovery.at_least &&
+      stamp - refused.since >= base::Micros{with.numbers.recovery.after_us})
+    recover(result.nu, source, with.numbers.recovery);
   return record(result);
+}
+
+inline void Inertial::refused_or_not(Source source, bool refused, base::Micros stamp) {
+  Refused& r = refused_[source];
+  if (!refused) {
+    r.in_a_row = 0;
+  } else if (r.in_a_row++ == 0) {
+    r.since = stamp;
+  }
 }
 
 /// What was refused that long is right and the filter wrong, or the filter will refuse it again: its doubts grow by

@@ -9,7 +9,8 @@ namespace tetap::app {
 inline InertialEstimate Inertial::inertial(const Context&) const {
   return {.state = phase_ == Phase::kTracking ? ahead_.apply(ins_.x, ins_.earth) : ins_.x,
           .p = ins_.p,
-          .valid = phase_ == Phase::kTracking};
+          .valid = phase_ == Phase::kTracking,
+          .jump = jump_};
 }
 
 inline Estimate Inertial::estimate(const Context& with) const {
@@ -67,6 +68,15 @@ void Inertial::each_bit(Sink&& sink) const {
     sink(refused.in_a_row);
     sink(refused.since.us);
   }
+  first_fixes_.each_bit(sink);
+  frozen_.each_bit(sink);
+  place_.each_bit(sink);
+  height_.each_bit(sink);
+  sink(led_m_[0]);
+  sink(led_m_[1]);
+  sink(jump_.east_m);
+  sink(jump_.north_m);
+  sink(static_cast<std::uint32_t>(jump_.count | (doubted_ ? 256U : 0U) | (back_ ? 512U : 0U)));
   field_.each_bit(sink);
   baro_.each_bit(sink);
 }

@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: Apache-2.0
+// Whom to believe when GNSS fixes and the filter disagree: what is refused becomes true only by persisting. Errors of a
+// receiver last (multipath, atmosphere), and a receiver can repeat itself. Nothing of the filter is in here.
+#pragma once
+
+#include "app/samples.hpp"
+#include "base/exp_log.hpp"
+#include "base/math.hpp"
+#include "base/time.hpp"
+
+#include <bit>
+#include <cstdint>
+
+namespace tetap::app {
+
+/// What fixes that are not taken say: "you are off by this much", since when, and how often they said it. The filter
+/// goes on without them meanwhile, so they say the same only if they move as it does.
+class Claim {
+ public:
+  /// One more fix: by how much the filter is off, the variance of the fix, and that of the filter (both axes together,
+  /// which grows while it goes on alone). What contradicts the claim so far is left out; so many in a row are a new
+  /// one.
+  [[gnu::noinline]] void hear(base::Micros stamp, float east_m, float north_m, float fix_m2, float filter_m2) {
+    const float d_east_m = east_m - east_m_, d_north_m = north_m - north_m_;
+    const float grown_m2 = filter_m2 > begun_m2_ ? filter_m2 - begun_m2_ : 0.0F;
+    const bool same = d_east_m * d_east_m + d_north_m * d_north_m <= kBound * (2.0F * fix_m2 + grown_m2);
+    if (fixes_ == 0 || (!same && ++against_ >= kAgainst)) {
+      *this = {};
+      since_ = stamp;
+      east_m_ = east_m;
+      north_m_ = north_m;
+      begun_m2_ = filter_m2;
+    } else if (!same) {
+      return;
+    }
+    against_ = 0;
+    if (fixes_ < kMost) ++fixes_;
+    last_ = stamp;
+    const float share = 1.0F / static_cast<float>(fixes_);
+    east_m_ += share * (east_m - east_m_);
+    north_m_ += share * (north_m - north_m_);
+  }
+  void forget() { *this = {}; }
+
+  [[nodiscard]] bool confirmed(std::int32_t fixes) const { return fixes_ >= fixes; }
+  [[nodiscard]] bool persisted(std::int32_t for_us, std::int32_t fixes) const {
+    return fixes_ >= fixes && last_ - since_ >= base::Micros{for_us};
+  }
+  /// Whether they say what (east, north) says.
+  [[nodiscard]] bool says(float east_m, float north_m, float variance_m2) const {
+    const float d_east_m = east_m_ - east_m, d_north_m = north_m_ - north_m;
+    return d_east_m * d_east_m + d_north_m * d_north_m <= kBound * variance_m2;
+  }
+  /// The mean of what they said.
+  [[nodiscard]] float east_m() const { return east_m_; }
+  [[nodiscard]] float north_m() const { return north_m_; }
+
+  template <class Sink>
+  void each_bit(Sink&& sink) const {
+    sink(since_.us);
+    sink(last_.us);
+    sink(east_m_);
+    sink(north_m_);
+    sink(begun_m2_);
+    sink(fixes_);
+    sink(static_cast<std::uint32_t>(against_));
+  }
+
+ private:
+  static constexpr float kBound = 13.816F;  ///< chi-square, 2 degrees of freedom, 99.9 %
+  static constexpr std::uint8_t kAgainst = 5;
+  static constexpr std::int32_t kMost = 1'000'000;
+
+  base::Micros since_, last_;
+  float east_m_ = 0, north_m_ = 0;
+  float begun_m2_ = 0;
+  std::int32_t fixes_ = 0;
+  std::uint8_t against_ = 0;
+};
+
+/// Notices fixes that stay where they are, to the last digit, while the filter moves on.
+class FrozenFix {
+ public:
+  /// By how much the filter is off, as this fix says: of the same fix, it changes by what the filter moves.
+  bool hear(const GnssPosition& fix, float east_m, float north_m, float limit_m) {
+    const std::uint32_t coordinates = static_cast<std::uint32_t>(fix.latitude_2ndeg) +
+                                      2'654'435'761U * static_cast<std::uint32_t>(fix.longitude_2ndeg) +
+                                      40'503U * std::bit_cast<std::uint32_t>(fix.height_m);
+    if (coordinates != coordinates_) {
+      *this = {};
+      coordinates_ = coordinates;
+      east_m_ = east_m;
+      north_m_ = north_m;
+    }
+    const float d_east_m = east_m - east_m_, d_north_m = north_m - north_m_;
+    frozen_ = frozen_ || d_east_m * d_east_m + d_north_m * d_north_m > limit_m * limit_m;
+    return frozen_;
+  }
+  [[nodiscard]] bool frozen() const { return frozen_; }
+
+  template <class Sink>
+  void each_bit(Sink&& sink) const {
+    sink(coordinates_);
+    sink(east_m_);
+    sink(north_m_);
+    sink(static_cast<std::uint32_t>(frozen_));
+  }
+
+ private:
+  std::uint32_t coordinates_ = 0;
+  float east_m_ = 0, north_m_ = 0;
+  bool frozen_ = false;
+};
+
+/// Before there is a filter: fixes count when so many in a row follow each other no faster than anything drives. A
+/// first fix that is a glitch begins nothing.
+class FirstFixes {
+ public:
+  [[gnu::noinline]] bool hear(const GnssPosition& fix, base::Micros stamp, std::int32_t needed) {
+    const float sigma_m = base::is_finite(fix.horizontal_acc_m) ? fix.horizontal_acc_m : 10.0F;
+    const float far_m = 4.0F * sigma_m + kFastest_mps * base::seconds(stamp - last_);
+    const float north_m = metres(fix.latitude_2ndeg - latitude_2ndeg_);
+    const float latitude_rad = static_cast<float>(fix.latitude_2ndeg / 1'000) * (2e-6F * 0.0174532925F);
+    const float east_m = metres(fix.longitude_2ndeg - longitude_2ndeg_) * base::cos(latitude_rad);
+    const bool follows = fixes_ > 0 && stamp > last_ && east_m * east_m + north_m * north_m <= far_m * far_m;
+    fixes_ = follows ? (fixes_ < needed ? fixes_ + 1 : needed) : 1;
+    latitude_2ndeg_ = fix.latitude_2ndeg;
+    longitude_2ndeg_ = fix.longitude_2ndeg;
+    last_ = stamp;
+    return fixes_ >= needed;
+  }
+  void forget() { *this = {}; }
+
+  template <class Sink>
+  void each_bit(Sink&& sink) const {
+    sink(latitude_2ndeg_);
+    sink(longitude_2ndeg_);
+    sink(last_.us);
+    sink(fixes_);
+  }
+
+ private:
+  static constexpr float kFastest_mps = 60;
+  static float metres(std::int64_t d_2ndeg) { return static_cast<float>(d_2ndeg) * (2e-9F * 111'320.0F); }
+
+  std::int64_t latitude_2ndeg_ = 0, longitude_2ndeg_ = 0;
+  base::Micros last_;
+  std::int32_t fixes_ = 0;
+};
+
+/// By how much the variance of a fix whose error lasts for `correlation_s` grows when the one before was `since_s` ago:
+/// with phi = exp(-t / tau), z_k - phi z_(k-1) has a white error of variance (1 - phi^2) r and sees (1 - phi) of the
+/// position: (1 + phi) / (1 - phi) (Bryson & Henrikson 1968, measurement differencing). A fix after a long silence
+/// counts in full, and many in a row together as much as one every 2 tau.
+[[nodiscard]] constexpr float repeated(float since_s, float correlation_s) {
+  if (!(correlation_s > 0.0F) || !(since_s < 10.0F * correlation_s)) return 1.0F;
+  const float phi = base::exp(-(since_s > 1e-3F ? since_s : 1e-3F) / correlation_s);
+  return (1.0F + phi) / (1.0F - phi);
+}
+
+}  // namespace tetap::app
