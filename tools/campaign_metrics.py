@@ -29,11 +29,13 @@ def judged(run, truth, job):
         one = {"position_rmse_m": metrics.rms(distance), "heading_rmse_rad": metrics.rms(dyaw), "unusable": unusable,
                "epochs": rows["epoch"][published], "nees": nees[published], "valid_share": float(np.isfinite(distance).mean()),
                "sensors": innovations(run.innovations, k, names), "bus": metrics.bus_nis(run, k, names)}
-        found = metrics.blocks(run, k, truth)
+        found, attitude = metrics.blocks(run, k, truth), metrics.attitude_errors(run, k, truth)
+        if attitude is not None:
+            one["tilt_rmse_rad"], one["turn_rmse_rad"] = metrics.rms(attitude[2]), metrics.rms(attitude[3])
         if found is not None:
             one["blocks"] = {name: {"epochs": found.epoch, "nees": found.nees(name), "rmse": metrics.rms(np.linalg.norm(found.error[name], axis=1)),
                                     "inside_3_sigma": inside(found, name)} for name in metrics.BLOCKS}
-        if job["fault"]:
+        if job.get("fault_times"):
             at = since_start[rows["epoch"].astype(int) - 1]
             start, end = job["fault_times"]
             during, after = (at >= start) & (at < end + SETTLED_S), at >= end + SETTLED_S
@@ -42,7 +44,7 @@ def judged(run, truth, job):
             one.update(outage(rows, dx, dy, truth, start, end, since_start))
             one.update(honesty(rows, dx, dy, found, at, start, end))
         result["estimators"][run.names[k]] = one
-    if job["fault"]:
+    if job.get("fault_times"):
         result["said"] = said(run, names, *job["fault_times"])
     return result
 
@@ -202,12 +204,18 @@ def averaged(case, runs):
         entry = {"position_rmse_m": spread([one["position_rmse_m"] for one in mine]), "heading_rmse_deg": degrees("heading_rmse_rad"),
                  "valid_share": float(np.mean([one["valid_share"] for one in mine])), "anees": anees(mine),
                  "covariances_not_usable": sum(one["unusable"] for one in mine), "sensors": sensors(mine), "bus": bus_sensors(mine)}
+        if "tilt_rmse_rad" in mine[0]:
+            entry.update(tilt_rmse_deg=degrees("tilt_rmse_rad"), attitude_heading_rmse_deg=degrees("turn_rmse_rad"))
+        for sensor, counts in entry["bus"].items():
+            framed = entry["sensors"].get(sensor)
+            if framed and counts["accepted"] > metrics.MOST_FRAMED * framed["compared"]:
+                del entry["sensors"][sensor]  # it has frames about what was rejected only
         if "blocks" in mine[0]:
             entry["blocks"] = {block: {"anees": anees([one["blocks"][block] for one in mine]), "unit": metrics.UNITS[block],
                                        "rmse": spread([one["blocks"][block]["rmse"] for one in mine]),
                                        "inside_3_sigma": float(np.mean([one["blocks"][block]["inside_3_sigma"] or 0 for one in mine]))}
                                for block in metrics.BLOCKS}
-        if case["fault"]:
+        if case.get("fault_times"):
             entry.update(largest_error_m=spread([one["during_max_m"] for one in mine]), largest_heading_error_deg=degrees("during_max_rad"),
                          position_rmse_after_m=spread([one["after_rmse_m"] for one in mine]), heading_rmse_after_deg=degrees("after_rmse_rad"),
                          largest_3_sigma_m=spread([one["three_sigma_m"] for one in mine]),
@@ -218,7 +226,7 @@ def averaged(case, runs):
                          astray_percent=spread([None if one["astray_m"] is None or one["driven_m"] < 1 else 100 * one["astray_m"] / one["driven_m"]
                                                 for one in mine]))
         result[name] = entry
-    if case["fault"]:
+    if case.get("fault_times"):
         words = sorted({word for one in runs for word in one["said"]})
         result["said"] = {word: {"seeds": sum(word in one["said"] for one in runs),
                                  "after_s": spread([one["said"].get(word) for one in runs])} for word in words}

@@ -18,8 +18,9 @@ from bus_writer import BadInput
 
 TICK_S = 0.01  # of the simulated world
 MOST_NEES = 100.0  # above this mean, or with more than this share of a sensor rejected, the report warns: no tuning is so far off
+MOST_FRAMED = 1.5  # a sensor with so many more measurements than frames about them is judged by the node's own counts
 MOST_REJECTED, LEAST_TESTED = 1.0 / 3.0, 10
-HELD_S = 0.6  # a page of an inertial estimate comes every 0.4 s or so: its numbers count for no longer than this
+HELD_S = 1.5  # a page of an inertial estimate comes once a second: its numbers count for no longer than this
 LEAST_GAP_S = 0.2  # truth rows further apart than this, or than 2.5 times their usual distance, are not interpolated between
 
 ESTIMATES = ["epoch", "time_s", "estimator", "kind", "x_m", "y_m", "yaw_rad", "speed_mps", "yaw_rate_radps", "std_x_m", "std_y_m",
@@ -31,7 +32,8 @@ Q, VELOCITY, AXES = ["q_w", "q_x", "q_y", "q_z"], ["v_east_mps", "v_north_mps", 
 ACC_BIAS, GYRO_BIAS = [f"acc_bias_{a}_mps2" for a in AXES], [f"gyro_bias_{a}_radps" for a in AXES]
 STD_TILT = ["std_tilt_east_rad", "std_tilt_north_rad"]
 STATES = ["epoch", "time_s", "estimator", *Q, *VELOCITY, "height_m", "std_height_m", *ACC_BIAS, *GYRO_BIAS, *(f"std_{v}" for v in VELOCITY), *STD_TILT,
-          *(f"std_{b}" for b in ACC_BIAS), *(f"std_{b}" for b in GYRO_BIAS), "jump_x_m", "jump_y_m", "jump_yaw_rad"]
+          *(f"std_{b}" for b in ACC_BIAS), *(f"std_{b}" for b in GYRO_BIAS), "jump_x_m", "jump_y_m", "jump_yaw_rad",
+          "disagree_tilt_rad", "disagree_yaw_rad", "vib_accel_mps2", "vib_gyro_radps", "clipped"]
 TRUTH = ["time_s", "x_m", "y_m", "yaw_rad"]  # and perhaps "epoch" and these
 TRUTH_MORE = ["z_m", "roll_rad", "pitch_rad", *VELOCITY, *GYRO_BIAS, *ACC_BIAS]
 BLOCKS = ["position", "velocity", "attitude", "gyro bias", "acc bias"]
@@ -383,10 +385,39 @@ class Blocks:
 
 def blocks(run, estimator, truth):
     """None where the estimator or the truth says no more than a pose."""
-    states = run.states_of(estimator)
+    states = run.states_of(estimator) if run.kinds[estimator] != "Attitude" else None
     true = truth.more_of(states["epoch"]) if truth is not None and states is not None else None
     return None if true is None else Blocks(states, true)
 
+
+def attitude_errors(run, estimator, truth):
+    """(time, epoch, tilt, heading) of whoever publishes an attitude: the angle between true and estimated up, and the turn about the vertical, as
+    `disagreement` of the firmware has them; None without."""
+    states = run.states_of(estimator)
+    true = truth.more_of(states["epoch"]) if truth is not None and states is not None else None
+    if true is None:
+        return None
+    q = np.stack([states[name] for name in Q], axis=1)
+    return states["time_s"], states["epoch"], *apart(q, quaternion(true["roll_rad"], true["pitch_rad"], true["yaw_rad"]))
+
+
+def apart(q, reference):
+    """(tilt, heading) from `reference` to `q`."""
+    d = product(q, reference * [1, -1, -1, -1])
+    tilt = 2 * np.arctan2(np.hypot(d[:, 1], d[:, 2]), np.hypot(d[:, 0], d[:, 3]))
+    return tilt, wrapped(2 * np.arctan2(d[:, 3], d[:, 0]))
+
+
+def disagreement(run):
+    """(time, tilt, heading) between the attitude filter and the best estimate, where both publish an attitude at the same epoch; None else."""
+    other = next((k for k in run.estimators if run.kinds[k] == "Attitude"), None)
+    a, b = (None, None) if other is None else (run.states_of(other), run.states_of(run.best))
+    if a is None or b is None:
+        return None
+    # Each is held until its next: they need not come in the same epoch, only within a tenth of a second.
+    columns = [held_at(a["epoch"], a[name], b["epoch"], 0.1 / TICK_S) for name in Q]
+    tilt, heading = apart(np.stack([b[name] for name in Q], axis=1), np.stack(columns, axis=1))
+    return b["time_s"], tilt, wrapped(-heading)
 
 def nees_by_row(rows, dx, dy, dyaw, dof):
     """Normalised squared error of each row; NaN without a published covariance or a known error. And how many covariances were of no use."""
@@ -438,6 +469,10 @@ def unwrapped(counts, modulus):
     return int(np.mod(np.diff(np.concatenate([[0], counts])), modulus).sum())
 
 
+def degrees(value):
+    return None if value is None else float(np.degrees(value))
+
+
 def measurements(innovations, estimator, names):
     """By sensor: accepted, rejected, other, and the innovations' NIS, as published in Est_Innov."""
     result = {}
@@ -471,7 +506,9 @@ def judge(run, estimator, truth, names):
     for sensor, counts in bus_nis(run, estimator, names).items():
         if counts["nis_per_dof"] is not None:
             one = result["measurements"].setdefault(sensor, {"accepted": 0, "rejected": 0, "other": 0, "verdicts": {}})
-            one.update(bus_nis_per_dof=counts["nis_per_dof"], bus_accepted=counts["accepted"], bus_rejected=counts["rejected"])
+            one["bus_nis_per_dof"] = counts["nis_per_dof"]
+            if counts["accepted"] + counts["rejected"] > MOST_FRAMED * (one["accepted"] + one["rejected"]):
+                one.update(accepted=counts["accepted"], rejected=counts["rejected"], counted="by the node: too fast for a frame each")
     if valid.any():
         last = np.flatnonzero(valid)[-1]
         result["end"] = {"time_s": float(rows["time_s"][last]), "x_m": float(rows["x_m"][last]), "y_m": float(rows["y_m"][last]),
@@ -481,6 +518,10 @@ def judge(run, estimator, truth, names):
     result.update(empty, epochs_with_truth=0)
     if truth is None:
         return result
+    attitude = attitude_errors(run, estimator, truth)
+    if attitude is not None:
+        _, _, tilt, turn = attitude
+        result.update(tilt_rmse_deg=degrees(rms(tilt)), attitude_heading_rmse_deg=degrees(rms(turn)))
     dx, dy, dyaw = errors(rows, truth)
     distance = np.hypot(dx, dy)
     known = np.flatnonzero(np.isfinite(distance))

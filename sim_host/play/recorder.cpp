@@ -43,12 +43,10 @@ Recorder::Recorder(const RecorderOptions& options)
       "pos_valid,hdg_valid\n");
   states_.write(
       "epoch,time_s,estimator,q_w,q_x,q_y,q_z,v_east_mps,v_north_mps,v_up_mps,height_m,std_height_m,acc_bias_x_mps2,"
-      "acc_"
-      "bias_y_mps2,acc_bias_z_mps2,gyro_bias_x_radps,gyro_bias_y_radps,gyro_bias_z_radps,std_v_east_mps,std_v_north_"
-      "mps,"
-      "std_v_up_mps,std_tilt_east_rad,std_tilt_north_rad,std_acc_bias_x_mps2,std_acc_bias_y_mps2,std_acc_bias_z_mps2,"
-      "std_"
-      "gyro_bias_x_radps,std_gyro_bias_y_radps,std_gyro_bias_z_radps,jump_x_m,jump_y_m,jump_yaw_rad\n");
+      "acc_bias_y_mps2,acc_bias_z_mps2,gyro_bias_x_radps,gyro_bias_y_radps,gyro_bias_z_radps,std_v_east_mps,"
+      "std_v_north_mps,std_v_up_mps,std_tilt_east_rad,std_tilt_north_rad,std_acc_bias_x_mps2,std_acc_bias_y_mps2,"
+      "std_acc_bias_z_mps2,std_gyro_bias_x_radps,std_gyro_bias_y_radps,std_gyro_bias_z_radps,jump_x_m,jump_y_m,"
+      "jump_yaw_rad,disagree_tilt_rad,disagree_yaw_rad,vib_accel_mps2,vib_gyro_radps,clipped\n");
   innovations_.write("epoch,time_s,estimator,sensor,inst,verdict,dof,nis,ratio,age_ms,landmark\n");
   sensors_.write("epoch,time_s,estimator,sensor,inst,accepted,rejected,nis_mean,age_s\n");
   status_.write("epoch,time_s,mode,used,faults,reset_ctr,reset_cause\n");
@@ -131,7 +129,7 @@ void Recorder::frame(const base::CanFrame& f) {
 void Recorder::state(State& state, std::uint32_t offset, std::span<const std::uint8_t> payload) {
   if (!state.said) state.values.fill(kNone);
   const auto put = [&state](std::size_t column, auto... values) {
-    for (const float value : {values...}) state.values[column++] = static_cast<double>(value);
+    for (const double value : {static_cast<double>(values)...}) state.values[column++] = value;
     state.said = true;
   };
   const auto page = [&]<class Page>(std::size_t column, auto Page::*... fields) {
@@ -144,6 +142,7 @@ void Recorder::state(State& state, std::uint32_t offset, std::span<const std::ui
   if (offset != can::EstStateHeight::kOffset) return;
   page(7, &can::EstStateHeight::height_m, &can::EstStateHeight::std_height_m);
   using can::EstStateAccBias, can::EstStateGyroBias, can::EstStateStdVel, can::EstStateStdTilt;
+  using can::EstStateDisagreement, can::EstStateImuHealth;
   using can::EstStateStdAccBias, can::EstStateStdGyroBias, can::EstStateJump;
   page(9, &EstStateAccBias::acc_bias_x_mps2, &EstStateAccBias::acc_bias_y_mps2, &EstStateAccBias::acc_bias_z_mps2);
   page(12, &EstStateGyroBias::gyro_bias_x_radps, &EstStateGyroBias::gyro_bias_y_radps,
@@ -155,6 +154,8 @@ void Recorder::state(State& state, std::uint32_t offset, std::span<const std::ui
   page(23, &EstStateStdGyroBias::std_gyro_bias_x_radps, &EstStateStdGyroBias::std_gyro_bias_y_radps,
        &EstStateStdGyroBias::std_gyro_bias_z_radps);
   page(26, &EstStateJump::jump_x_m, &EstStateJump::jump_y_m, &EstStateJump::jump_yaw_rad);
+  page(29, &EstStateDisagreement::disagree_tilt_rad, &EstStateDisagreement::disagree_yaw_rad);
+  page(31, &EstStateImuHealth::vib_accel_mps2, &EstStateImuHealth::vib_gyro_radps, &EstStateImuHealth::clipped);
 }
 
 void Recorder::state_row(std::size_t k, const State& state) {
