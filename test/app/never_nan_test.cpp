@@ -1,0 +1,330 @@
+// SPDX-License-Identifier: Apache-2.0
+// Every estimator behind everything that a sample or a frame can say: finite states, covariances that are positive
+// definite (judge: eigenvalues in double), and no restart because an invariant broke.
+#include "support/never_nan.hpp"
+#include "app/estimators/attitude.hpp"
+#include "app/estimators/inertial.hpp"
+#include "app/estimators/odometry.hpp"
+#include "app/estimators/pose_ekf.hpp"
+#include "app/exercise.hpp"
+#include "app/node.hpp"
+#include "app/plausible.hpp"
+#include "bench.hpp"
+#include "config/rover.hpp"
+
+#include <gtest/gtest.h>
+#include <limits>
+#include <vector>
+
+namespace tetap {
+namespace {
+
+using test::kHostile;
+using test::least_eigenvalue;
+
+app::Numbers hostile_numbers() {
+  app::Numbers n = robot::rover::numbers;
+  n.landmark = {.sigma_range_m = 0.1F, .sigma_bearing_rad = 0.02F};
+  n.gnss.antenna_x_b_m = 0.3F, n.gnss.antenna_z_b_m = 1.0F;
+  n.start = {.known = 1};
+  return n;
+}
+const app::Numbers kNumbers = hostile_numbers();
+
+/// The estimators with nothing in front of them: what a wired driver would hand its samples to.
+class Wired {
+ public:
+  using History = app::History<app::Estimators<app::Odometry, app::PoseEkf, app::Attitude, app::Inertial>, 96>;
+
+  Wired() {
+    const app::GnssNumbers& g = kNumbers.gnss;
+    site_.frame = nav::LocalFrame(g.origin_latitude_2ndeg, g.origin_longitude_2ndeg, g.origin_height_m);
+    site_.origin = can::OriginSource::kConfigured;
+    site_.map = &map_;
+    EXPECT_TRUE(map_.put({.x_mm = 5000, .y_mm = 2000, .id = 1}));
+    history_.power_on(now_, context());
+  }
+  /// False: refused at the door.
+  bool offer(const app::Sample& sample) {
+    if (!app::plausible(sample)) return false;
+    if (sample.stamp > history_.closed_until() && sample.stamp <= now_ + base::Micros{200'000})
+      static_cast<void>(history_.insert(sample, context(), note));
+    return true;
+  }
+  void tick() {
+    now_ += base::Micros{10'000};
+    history_.consume(
+        now_, context(), [](const app::Sample&) {}, note);
+    history_.advance(now_, context());
+    history_.retire_until(now_ - base::Micros{200'000}, context(), note);
+  }
+  /// Everything at once, or what is wrong.
+  void judge() {
+    for (const app::Estimate& e : history_.estimates(context())) {
+      EXPECT_TRUE(base::is_finite(e.pose.x.offset_m) && base::is_finite(e.pose.y.offset_m));
+      EXPECT_TRUE(base::is_finite(e.pose.yaw_rad));
+      EXPECT_TRUE(base::is_finite(e.forward_mps) && base::is_finite(e.yaw_rate_radps));
+      EXPECT_GT(least_eigenvalue(e.p), 0);
+    }
+    history_.each_lane([&](const auto& lane) {
+      if constexpr (requires { lane.inertial(context()); }) {
+        const app::InertialEstimate e = lane.inertial(context());
+        EXPECT_TRUE(e.state.finite());
+        EXPECT_NEAR(e.state.q_nb.norm2(), 1.0F, 1e-3F);
+        if (e.valid) {
+          EXPECT_GT(least_eigenvalue(e.p), 0);
+        }
+      }
+    });
+  }
+  [[nodiscard]] bool navigates() {
+    bool valid = false;
+    history_.each_lane([&](const auto& lane) {
+      if constexpr (requires { lane.inertial(context()); }) valid = lane.inertial(context()).valid;
+    });
+    return valid;
+  }
+  [[nodiscard]] base::Micros now() const { return now_; }
+
+ private:
+  [[nodiscard]] app::Context context() const { return {.numbers = kNumbers, .site = site_}; }
+  static void note(std::size_t, const app::Sample&, const app::Innovation&) {}
+
+  History history_;
+  app::Site site_;
+  app::LandmarkMap<app::kMapCapacity> map_;
+  base::Micros now_{5'000'000};
+};
+
+template <class Payload>
+void put(app::Sample& sample, const Payload& payload) {
+  app::visit(sample, [&payload]<class T>(const T& there) {
+    if constexpr (std::is_same_v<T, Payload>) const_cast<T&>(there) = payload;  // NOLINT: the sample is not const
+  });
+}
+template <class Payload>
+app::Sample sample_of(can::Sensor sensor, base::Micros stamp, const Payload& payload) {
+  app::Sample sample;
+  sample.stamp = stamp;
+  sample.sensor = sensor;
+  put(sample, payload);
+  return sample;
+}
+
+/// What good sensors say of a robot that drives a curve.
+std::vector<app::Sample> good(int k, base::Micros t) {
+  using can::Sensor;
+  const auto counts = static_cast<std::uint16_t>(32 * k);
+  std::vector<app::Sample> all{
+      sample_of(
+          Sensor::kImu, t,
+          app::ImuSample{.dangle_b_rad = {0, 0, 0.001F}, .dvelocity_b_mps = {0, 0, 0.0981F}, .interval_us = 10'000}),
+      sample_of(Sensor::kWheelCounts, t, app::WheelCounts{.left = counts, .right = counts}),
+      sample_of(Sensor::kMagnetometer, t, app::MagneticFlux{.flux_b_uT = {17, 3, -46}})};
+  if (k % 20 == 7) {
+    const app::GnssNumbers& g = kNumbers.gnss;
+    all.push_back(sample_of(Sensor::kGnssPosition, t,
+                            app::GnssPosition{.latitude_2ndeg = g.origin_latitude_2ndeg,
+                                              .longitude_2ndeg = g.origin_longitude_2ndeg + 100 * k,
+                                              .height_m = 520,
+                                              .horizontal_acc_m = 1.5F,
+                                              .vertical_acc_m = 3,
+                                              .fix = app::GnssFix::k3d}));
+    all.push_back(sample_of(Sensor::kGnssVelocity, t, app::GnssVelocity{.v_n_mps = {1, 0, 0}, .acc_mps = 0.2F}));
+    all.push_back(sample_of(Sensor::kBarometer, t, app::AirPressure{.pressure_Pa = 95'000, .temperature_degC = 15}));
+    all.push_back(sample_of(Sensor::kHeading, t, app::OutsideHeading{.yaw_rad = 0.01F, .acc_rad = 0.02F}));
+    all.push_back(sample_of(Sensor::kWheelSpeed, t, app::WheelSpeeds{.left_mps = 1, .right_mps = 1}));
+    all.push_back(sample_of(Sensor::kBodySpeed, t, app::BodySpeed{.forward_mps = 1, .yaw_rate_radps = 0.1F}));
+    all.push_back(sample_of(Sensor::kRangeBearing, t,
+                            app::LandmarkSighting{.landmark = 1, .range_m = 5.3F, .bearing_rad = 0.4F}));
+  }
+  return all;
+}
+
+/// The floats of a payload, and which of them may be not available.
+struct Field {
+  float* value;
+  bool optional = false;
+};
+std::vector<Field> fields_of(app::Sample& s) {
+  using can::Sensor;
+  auto& p = s.payload;
+  switch (s.sensor) {
+    case Sensor::kImu: {
+      auto &a = p.imu.dangle_b_rad, &v = p.imu.dvelocity_b_mps;
+      return {{&a[0]}, {&a[1]}, {&a[2]}, {&v[0]}, {&v[1]}, {&v[2]}};
+    }
+    case Sensor::kWheelSpeed:
+      return {{&p.wheel_speeds.left_mps}, {&p.wheel_speeds.right_mps}};
+    case Sensor::kBodySpeed:
+      return {{&p.body_speed.forward_mps}, {&p.body_speed.yaw_rate_radps, true}};
+    case Sensor::kGnssPosition:
+      return {{&p.gnss_position.height_m, true},
+              {&p.gnss_position.horizontal_acc_m, true},
+              {&p.gnss_position.vertical_acc_m, true}};
+    case Sensor::kGnssVelocity: {
+      auto& v = p.gnss_velocity.v_n_mps;
+      return {{&v[0]}, {&v[1]}, {&v[2], true}, {&p.gnss_velocity.acc_mps, true}};
+    }
+    case Sensor::kRangeBearing:
+      return {{&p.sighting.range_m, true}, {&p.sighting.bearing_rad, true}};
+    case Sensor::kMagnetometer: {
+      auto& m = p.magnetic.flux_b_uT;
+      return {{&m[0]}, {&m[1]}, {&m[2]}};
+    }
+    case Sensor::kBarometer:
+      return {{&p.pressure.pressure_Pa}};
+    case Sensor::kHeading:
+      return {{&p.heading.yaw_rad}, {&p.heading.acc_rad, true}};
+    default:
+      return {};
+  }
+}
+/// Also the sizes at which plausible() draws its line.
+std::vector<float> values() {
+  std::vector<float> all(kHostile.begin(), kHostile.end());
+  for (const float limit : {10.0F, 20.0F, 100.0F, 200.0F, 1e3F, 1e4F, 1e5F, 1e6F})
+    all.insert(all.end(), {limit, -limit});
+  return all;
+}
+
+/// A run in which from tick `from` on, for two seconds, this field of every sample of this kind has this value.
+void run_broken(can::Sensor sensor, std::size_t field, float value, int from) {
+  Wired wired;
+  for (int k = 0; k < from + 400; ++k) {
+    const base::Micros t = wired.now() + base::Micros{5'000};
+    for (app::Sample& sample : good(k, t)) {
+      const bool broken = sample.sensor == sensor && k >= from && k < from + 200;
+      if (broken) {
+        const Field of = fields_of(sample)[field];
+        *of.value = value;
+        const bool taken = wired.offer(sample);
+        if (!base::is_finite(value) && !(of.optional && base::is_nan(value))) {
+          EXPECT_FALSE(taken);
+        }
+      } else {
+        EXPECT_TRUE(wired.offer(sample));
+      }
+    }
+    wired.tick();
+    if (k % 40 == 39) wired.judge();
+  }
+  EXPECT_TRUE(wired.navigates());
+}
+
+TEST(NeverNan, EveryFieldOfEverySampleWhileStartingAndWhileNavigating) {
+  std::vector<app::Sample> kinds = good(7, {});
+  for (app::Sample& kind : kinds)
+    for (std::size_t field = 0; field < fields_of(kind).size(); ++field)
+      for (const float value : values())
+        for (const int from : {0, 300}) {
+          SCOPED_TRACE(testing::Message() << "sensor " << static_cast<int>(kind.sensor) << " field " << field << " = "
+                                          << value << " from " << from);
+          run_broken(kind.sensor, field, value, from);
+          if (HasFailure()) return;
+        }
+}
+
+TEST(NeverNan, StaleAndFutureStampsOfEverySensor) {
+  std::vector<app::Sample> kinds = good(7, {});
+  for (const app::Sample& kind : kinds)
+    for (const std::int64_t off_us : std::initializer_list<std::int64_t>{-10'000'000'000, -600'000, -200'001, -150'000,
+                                                                         150'000, 200'001, 600'000, 10'000'000'000}) {
+      Wired wired;
+      for (int k = 0; k < 500; ++k) {
+        const base::Micros t = wired.now() + base::Micros{5'000};
+        for (app::Sample& sample : good(k, t)) {
+          if (sample.sensor == kind.sensor && k > 200 && k < 400) sample.stamp += base::Micros{off_us};
+          EXPECT_TRUE(wired.offer(sample));
+        }
+        wired.tick();
+        if (k % 20 == 0) wired.judge();
+      }
+      EXPECT_TRUE(wired.navigates()) << static_cast<int>(kind.sensor) << ' ' << off_us;
+    }
+}
+
+/// Frames whose payload is random bits, among good ones; commands with a right CRC among them.
+TEST(NeverNan, RandomBitsInEveryInputFrame) {
+  using Node = app::Node<app::Estimators<app::Odometry, app::PoseEkf, app::Attitude, app::Inertial>>;
+  for (std::uint32_t seed = 1; seed <= 4; ++seed) {
+    static Node node{kNumbers, {}};
+    app::Dice dice(seed * 7919);
+    std::int64_t now_us = 1'000'000;
+    node.power_on({now_us});
+    const std::uint32_t base = kNumbers.can_base;
+    std::uint32_t statuses = 0, fused = 0;
+    for (int k = 0; k < 4'000; ++k) {
+      now_us += 10'000;
+      const auto seq = static_cast<std::uint8_t>(k & 15);
+      const auto stamp = [&] { return static_cast<std::uint32_t>((now_us - dice.below(9'000)) & 0xFFFFF); };
+      const auto bits = [&] { return dice.roll(); };
+      const auto send = [&](base::CanFrame frame, bool random) {
+        // Stamp, sequence and instance stay, so that the rest is taken for a sample.
+        if (random)
+          for (std::size_t i = 3; i < 8; ++i) frame.data[i] = static_cast<std::uint8_t>(bits() >> 11);
+        node.on_frame(frame);
+      };
+      // IMU: mostly good, or nothing would ever be navigated.
+      const bool wild = dice.one_in(4);
+      base::CanFrame part = can::frame(base, can::ImuGyro{.ang_z_rad = 0.001F, .seq = seq});
+      if (wild && dice.one_in(2))
+        for (std::size_t i = 0; i < 7; ++i) part.data[i] = static_cast<std::uint8_t>(bits() >> 11);
+      node.on_frame(part);
+      part = can::frame(base, can::ImuAccel{.vel_z_mps = 0.0981F, .seq = seq});
+      if (wild && dice.one_in(2))
+        for (std::size_t i = 0; i < 7; ++i) part.data[i] = static_cast<std::uint8_t>(bits() >> 11);
+      node.on_frame(part);
+      send(can::frame(base, can::ImuTime{.stamp_us = stamp(), .interval_us = 10'000, .seq = seq}),
+           wild && dice.one_in(3));
+      if (dice.one_in(2)) send(can::frame(base, can::InWheelCounts{.stamp_us = stamp(), .seq = seq}), true);
+      if (dice.one_in(3)) send(can::frame(base, can::InWheelSpeed{.stamp_us = stamp(), .seq = seq}), true);
+      if (dice.one_in(3)) send(can::frame(base, can::InBodySpeed{.stamp_us = stamp(), .seq = seq}), true);
+      if (dice.one_in(3)) send(can::frame(base, can::InRangeBearing{.stamp_us = stamp(), .seq = seq}), true);
+      if (dice.one_in(3)) send(can::frame(base, can::InMag{.stamp_us = stamp(), .seq = seq}), true);
+      if (dice.one_in(5)) send(can::frame(base, can::InBaro{.stamp_us = stamp(), .seq = seq}), true);
+      if (dice.one_in(9)) send(can::frame(base, can::InHeading{.stamp_us = stamp(), .seq = seq}), true);
+      if (dice.one_in(5)) {
+        const std::uint32_t t = stamp();
+        const bool place = dice.one_in(3);  // else where the robot is, with random accuracies
+        send(can::frame(base, can::InGnssLat{.stamp_us = t, .seq = seq, .lat_raw = 24'131'350'000}), place);
+        send(can::frame(base, can::InGnssLon{.stamp_us = t, .seq = seq, .lon_raw = 5'834'150'000}), place);
+        send(can::frame(
+                 base, can::InGnssAlt{.stamp_us = t, .seq = seq, .height_m = 520, .fix = static_cast<can::GnssFix>(3)}),
+             dice.one_in(3));
+        send(can::frame(base, can::InGnssAcc{.stamp_us = t, .seq = seq}), true);
+      }
+      if (dice.one_in(5)) {
+        const std::uint32_t t = stamp();
+        send(can::frame(base, can::InGnssVelEN{.stamp_us = t, .seq = seq}), true);
+        send(can::frame(base, can::InGnssVelU{.stamp_us = t, .seq = seq}), true);
+      }
+      if (dice.one_in(20)) send(can::frame(base, can::InMapEntry{.id = static_cast<std::uint8_t>(bits() >> 24)}), true);
+      if (dice.one_in(200)) {
+        const auto ctr = static_cast<std::uint8_t>(bits() & 15);
+        for (base::CanFrame frame :
+             {can::frame(base, can::CmdSetPos{.ctr = ctr}), can::frame(base, can::CmdSetYaw{.ctr = ctr})}) {
+          for (std::size_t i = 2; i < 8; ++i) frame.data[i] = static_cast<std::uint8_t>(bits() >> 11);
+          frame.data[0] = can::e2e_crc(static_cast<std::uint8_t>(frame.id - base), frame.data);
+          node.on_frame(frame);
+        }
+      }
+      node.tick({now_us}, {}, [&](const base::CanFrame& frame) {
+        const std::uint32_t offset = frame.id - base;
+        if (offset == can::EstInnov::kOffset) ++fused;
+        if (offset != can::EstStatus::kOffset) return;
+        const auto status = can::decode<can::EstStatus>(can::payload(frame));
+        ASSERT_TRUE(status.has_value());
+        ++statuses;
+        EXPECT_NE(status->reset_cause, can::ResetCause::kNotFinite) << seed << ' ' << k;
+        EXPECT_NE(status->reset_cause, can::ResetCause::kNotPositive) << seed << ' ' << k;
+      });
+      if (HasFailure()) return;
+    }
+    EXPECT_GT(statuses, 100U);
+    EXPECT_GT(fused, 500U);
+  }
+}
+
+}  // namespace
+}  // namespace tetap
