@@ -4,6 +4,8 @@
 
 #include "config/car.hpp"
 #include "config/husky.hpp"
+#include "config/husky_inertial.hpp"
+#include "config/iris.hpp"
 #include "config/labyrinth.hpp"
 #include "config/mrclam.hpp"
 #include "config/rover.hpp"
@@ -17,7 +19,7 @@
 namespace tetap::sim {
 
 inline constexpr std::string_view kRobotNames =
-    "car husky labyrinth mrclam rover rover_landmarks rover_landmarks_matched rover_matched";
+    "car husky husky_inertial iris labyrinth mrclam rover rover_landmarks rover_landmarks_matched rover_matched";
 
 /// Calls f(std::type_identity<Estimators>, numbers) for the robot of that name; false when there is none.
 template <class F>
@@ -31,6 +33,9 @@ template <class F>
   if (name == "rover_matched") return f(std::type_identity<robot::rover::Estimators>{}, matched_rover()), true;
   if (name == "mrclam") return f(std::type_identity<robot::mrclam::Estimators>{}, robot::mrclam::numbers), true;
   if (name == "husky") return f(std::type_identity<robot::husky::Estimators>{}, robot::husky::numbers), true;
+  if (name == "husky_inertial")
+    return f(std::type_identity<robot::husky_inertial::Estimators>{}, robot::husky_inertial::numbers), true;
+  if (name == "iris") return f(std::type_identity<robot::iris::Estimators>{}, robot::iris::numbers), true;
   if (name == "labyrinth")
     return f(std::type_identity<robot::labyrinth::Estimators>{}, robot::labyrinth::numbers), true;
   return false;
