@@ -37,6 +37,9 @@ class Inertial {
   }
   void set_pose(base::Micros, const SetPose& given, const Context& with) {
     start_.place(given.pose, given.sigma_position_m, given.sigma_yaw_rad);
+    place_.forget();
+    height_.forget();
+    back_ = false;
     if (phase_ == Phase::kTracking) begin(with);
   }
 

@@ -10,6 +10,9 @@
 
 namespace tetap::app {
 
+/// The sigma of a height that is not there.
+inline constexpr float kNoHeight_m = 1e3F;
+
 /// Normalised innovation squared of a fix: of all of it, and of its horizontal part alone.
 struct FixNis {
   float joint = base::kNan;
@@ -58,7 +61,9 @@ struct FixNis {
 inline Innovation Inertial::fuse(const GnssPosition& fix, base::Micros stamp, const Context& with) {
   const GnssNumbers& n = with.numbers.gnss;
   if (fix.fix < GnssFix::k2d || with.site.origin == can::OriginSource::kNone) return {};
-  const nav::Local local = with.site.frame.to_local(fix.latitude_2ndeg, fix.longitude_2ndeg, fix.height_m);
+  const bool has_height = base::is_finite(fix.height_m);
+  const nav::Local local = with.site.frame.to_local(fix.latitude_2ndeg, fix.longitude_2ndeg,
+                                                    has_height ? fix.height_m : with.site.frame.height_m());
   if (!local.valid) return {.verdict = can::Verdict::kNotFinite};
   const auto sigma = [&n](float own, float otherwise) {
     const float scaled = base::is_finite(own) ? n.sigma_scale * own : otherwise;
@@ -68,7 +73,7 @@ inline Innovation Inertial::fuse(const GnssPosition& fix, base::Micros stamp, co
                          .y = base::Anchored::from_um(local.north_um),
                          .z = base::Anchored::from_um(local.up_um),
                          .sigma_horizontal_m = sigma(fix.horizontal_acc_m, 10.0F),
-                         .sigma_vertical_m = sigma(fix.vertical_acc_m, 20.0F),
+                         .sigma_vertical_m = has_height ? sigma(fix.vertical_acc_m, 20.0F) : kNoHeight_m,
                          .antenna_b_m = {n.antenna_x_b_m, n.antenna_y_b_m, n.antenna_z_b_m}};
   if (phase_ != Phase::kTracking) {
     if (!first_fixes_.hear(fix, stamp, with.numbers.recovery.confirm_fixes)) return {};
@@ -99,7 +104,7 @@ inline constexpr float kDecides = 4.0F;
   const auto at = fix.linearised(ins_.x);
   const nav::Vector3 nu = -at.z_hat, r = fix.noise();
   const FixNis nis = nis_of(ins_.p, at.h, nu, r);
-  if (!(nis.joint < 1e30F)) return {.verdict = can::Verdict::kNotFinite};
+  if (!(nis.joint < 1e30F && r(0) < 1e12F && r(2) < 1e12F)) return {.verdict = can::Verdict::kNotFinite};
   const bool whole = nis.joint <= n.gate_scale * filter::chi_square_99(3);
   const bool level = whole || nis.level <= n.gate_scale * filter::chi_square_99(2);
   Innovation record{
@@ -118,7 +123,10 @@ inline constexpr float kDecides = 4.0F;
   if (!whole || ins_.p(2, 2) > kDecides * r(2)) {
     height_.hear(stamp, nu(2), 0.0F, r(2), ins_.p(2, 2));
     height = whole ? height_.confirmed(rules.confirm_fixes) : height_.persisted(rules.persist_us, rules.persist_fixes);
-    if (height && !whole) step(2, 1, {0.0F, 0.0F, height_.east_m()}, r);
+    if (height && !whole) {
+      step(2, 1, {0.0F, 0.0F, height_.east_m()}, r);
+      back_ = false;
+    }
   }
   if (height) height_.forget();
 
@@ -127,14 +135,15 @@ inline constexpr float kDecides = 4.0F;
   fix.sigma_vertical_m *= base::sqrt(more);
   if (!height) {                    // the horizontal part alone
     nav::move(fix.z, at.z_hat(2));  // says what is expected, and hardly anything
-    fix.sigma_vertical_m = 1e4F;
+    fix.sigma_vertical_m = kNoHeight_m;
     record.dof = 2;
     record.nis = nis.level;
     record.gate = n.gate_scale * filter::chi_square_99(2);
   }
-  last_position_ = stamp;
   const base::Anchored was[2]{ins_.x.x, ins_.x.y};
-  if (ins_.update(fix, base::kInfinity).verdict != filter::Verdict::kAccepted) record.verdict = can::Verdict::kSingular;
+  const auto result = ins_.update(fix, base::kInfinity);
+  if (result.verdict != filter::Verdict::kAccepted) return app::record(result);
+  last_position_ = stamp;
   led_m_ = {0.9F * led_m_[0] + nav::difference(ins_.x.x, was[0]), 0.9F * led_m_[1] + nav::difference(ins_.x.y, was[1])};
   doubted_ = false;
   return record;

@@ -1,0 +1,209 @@
+// SPDX-License-Identifier: Apache-2.0
+// The rules of trust by themselves: when fixes say the same, when they repeat themselves, when the first ones count,
+// and how much a fix is worth that repeats the error of the one before.
+#include "app/estimators/fix_trust.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <random>
+
+namespace tetap::app {
+namespace {
+
+constexpr base::Micros kPeriod{200'000};
+constexpr std::int32_t kPersist_us = 60'000'000, kPersistFixes = 120;
+
+/// Fixes with the stated sigma; each test says by how much the filter is off at a time.
+class Speaker {
+ public:
+  template <class Off>
+  void speak(Claim& claim, int fixes, Off&& off, float sigma_m = 1, float filter_m2 = 0) {
+    for (int i = 0; i < fixes; ++i, now += kPeriod) {
+      const auto [east, north] = off(base::seconds(now));
+      claim.hear(now, east + sigma_m * normal_(engine_), north + sigma_m * normal_(engine_), sigma_m * sigma_m,
+                 filter_m2);
+    }
+  }
+  base::Micros now;
+
+ private:
+  std::mt19937 engine_{7};
+  std::normal_distribution<float> normal_;
+};
+using Off = std::array<float, 2>;
+constexpr auto kFar = [](float) { return Off{100, -30}; };
+
+TEST(Claim, PersistsWhenItIsRepeatedForLongEnoughAndOftenEnough) {
+  Claim claim;
+  Speaker speaker;
+  speaker.speak(claim, 300, kFar);
+  EXPECT_FALSE(claim.persisted(kPersist_us, kPersistFixes)) << "59.8 s";
+  speaker.speak(claim, 1, kFar);
+  EXPECT_TRUE(claim.persisted(kPersist_us, kPersistFixes));
+  EXPECT_NEAR(claim.east_m(), 100.0F, 0.3F) << "the mean of what they said";
+  EXPECT_NEAR(claim.north_m(), -30.0F, 0.3F);
+  EXPECT_FALSE(claim.persisted(kPersist_us, 302)) << "not often enough";
+}
+
+TEST(Claim, ARampNeverPersistsHoweverLongItLasts) {
+  for (const float speed_mps : {0.2F, 1.0F, 10.0F}) {
+    Claim claim;
+    Speaker speaker;
+    for (int i = 0; i < 3000; ++i) {
+      speaker.speak(claim, 1, [&](float t) { return Off{0, speed_mps * t}; });
+      ASSERT_FALSE(claim.persisted(kPersist_us, kPersistFixes)) << speed_mps << " m/s after " << i;
+    }
+  }
+}
+
+TEST(Claim, WhatHoldsAfterARampPersistsFromThenOn) {
+  Claim claim;
+  Speaker speaker;
+  const auto ramp = [](float t) { return Off{0, t < 40 ? t : 40}; };
+  speaker.speak(claim, 200, ramp);
+  speaker.speak(claim, 250, ramp);
+  EXPECT_FALSE(claim.persisted(kPersist_us, kPersistFixes)) << "90 s, but only 50 s the same";
+  speaker.speak(claim, 70, ramp);
+  EXPECT_TRUE(claim.persisted(kPersist_us, kPersistFixes));
+  EXPECT_NEAR(claim.north_m(), 40.0F, 1.0F);
+}
+
+TEST(Claim, AFewThatContradictItAreLeftOutManyBeginAnother) {
+  Claim claim;
+  Speaker speaker;
+  speaker.speak(claim, 100, kFar);
+  speaker.speak(claim, 4, [](float) { return Off{-500, 0}; });
+  speaker.speak(claim, 200, kFar);
+  EXPECT_TRUE(claim.persisted(kPersist_us, kPersistFixes));
+  EXPECT_NEAR(claim.east_m(), 100.0F, 0.3F) << "what contradicts is not in the mean";
+  speaker.speak(claim, 5, [](float) { return Off{-500, 0}; });
+  EXPECT_FALSE(claim.confirmed(2));
+  EXPECT_NEAR(claim.east_m(), -500.0F, 5.0F);
+}
+
+TEST(Claim, TheFilterMayDriftMeanwhileByItsOwnUncertaintyAndNoFurther) {
+  const auto drift = [](float t) { return Off{0.2F * t, 0}; };  // 12 m in a minute
+  Claim judged, excused;
+  Speaker speaker;
+  for (int i = 0; i < 301; ++i, speaker.now += kPeriod) {
+    const float t = base::seconds(speaker.now), off = drift(t)[0];
+    judged.hear(speaker.now, off, 0, 1.0F, 4.0F);
+    excused.hear(speaker.now, off, 0, 1.0F, 4.0F + 0.1F * t * t);
+  }
+  EXPECT_FALSE(judged.persisted(kPersist_us, kPersistFixes));
+  EXPECT_TRUE(excused.persisted(kPersist_us, kPersistFixes));
+}
+
+TEST(Claim, SaysWhatAnotherSaidWithinTheirUncertainty) {
+  Claim claim;
+  Speaker speaker;
+  speaker.speak(claim, 20, kFar);
+  EXPECT_TRUE(claim.says(101, -31, 2));
+  EXPECT_FALSE(claim.says(107, -30, 2));
+  EXPECT_FALSE(claim.says(-100, 30, 2));
+}
+
+GnssPosition fix_at(std::int64_t latitude_2ndeg, std::int64_t longitude_2ndeg, float height_m = 500) {
+  return {.latitude_2ndeg = latitude_2ndeg,
+          .longitude_2ndeg = longitude_2ndeg,
+          .height_m = height_m,
+          .horizontal_acc_m = 1,
+          .vertical_acc_m = 2,
+          .fix = GnssFix::k3d};
+}
+constexpr std::int64_t kLatitude = 24'131'350'000, kLongitude = 5'834'150'000;
+constexpr double kMetre_2ndeg = 1 / (2e-9 * 111'320);  ///< to the north
+
+TEST(FrozenFix, TheSameCoordinatesAreFrozenOnceTheFilterHasMovedOn) {
+  FrozenFix frozen;
+  const GnssPosition same = fix_at(kLatitude, kLongitude);
+  EXPECT_FALSE(frozen.hear(same, 0.3F, 0.0F, 0.5F));
+  EXPECT_FALSE(frozen.hear(same, -0.1F, 0.0F, 0.5F)) << "0.4 m";
+  EXPECT_TRUE(frozen.hear(same, -0.3F, 0.0F, 0.5F)) << "0.6 m";
+  EXPECT_TRUE(frozen.hear(same, 0.3F, 0.0F, 0.5F)) << "a robot that comes back thaws nothing";
+  EXPECT_FALSE(frozen.hear(fix_at(kLatitude, kLongitude + 1), -3.0F, 0.0F, 0.5F)) << "the last digit differs";
+  EXPECT_FALSE(frozen.frozen());
+}
+
+TEST(FrozenFix, StandingStillIsNotFrozenAndEachCoordinateCounts) {
+  FrozenFix frozen;
+  for (int i = 0; i < 1000; ++i) EXPECT_FALSE(frozen.hear(fix_at(kLatitude, kLongitude), 1.0F, 2.0F, 0.5F));
+  for (int i = 1; i < 30; ++i) {
+    const auto off = static_cast<float>(i);
+    EXPECT_FALSE(frozen.hear(fix_at(kLatitude + i, kLongitude), off, 0, 0.5F));
+    EXPECT_FALSE(frozen.hear(fix_at(kLatitude + i, kLongitude - i - 1), off + 0.9F, 0, 0.5F));
+    EXPECT_FALSE(frozen.hear(fix_at(kLatitude + i, kLongitude - i - 1, off), off, 0, 0.5F));
+  }
+}
+
+TEST(FirstFixes, CountWhenSoManyFollowEachOther) {
+  FirstFixes first;
+  base::Micros now{1'000'000};
+  for (int i = 1; i <= 10; ++i, now += kPeriod)
+    EXPECT_EQ(first.hear(fix_at(kLatitude + i, kLongitude), now, 5), i >= 5) << i;
+}
+
+TEST(FirstFixes, AGlitchFirstOrInTheMiddleBeginsNothing) {
+  for (const int glitch : {1, 3, 4}) {
+    FirstFixes first;
+    base::Micros now{1'000'000};
+    for (int i = 1; i <= 20; ++i, now += kPeriod) {
+      const auto off = static_cast<std::int64_t>(i == glitch ? 100 * kMetre_2ndeg : 0);
+      const int after = i > glitch ? i - glitch : 0;
+      EXPECT_EQ(first.hear(fix_at(kLatitude, kLongitude + off), now, 5), after >= 5) << i;
+    }
+  }
+}
+
+TEST(FirstFixes, MayComeFromACarAndFromSlowReceivers) {
+  for (const std::int64_t period_us : {100'000, 1'000'000}) {
+    FirstFixes first;
+    bool counts = false;
+    for (int i = 0; i < 5; ++i) {
+      const double way_m = 40e-6 * static_cast<double>(i * period_us);
+      counts = first.hear(fix_at(kLatitude + static_cast<std::int64_t>(way_m * kMetre_2ndeg), kLongitude),
+                          {1'000'000 + i * period_us}, 5);
+    }
+    EXPECT_TRUE(counts);
+  }
+}
+
+/// The mean of n samples of a Gauss-Markov error of variance 1 has this variance (sum over all covariances).
+double variance_of_mean(int n, double phi) {
+  double sum = n;
+  for (int k = 1; k < n; ++k) sum += 2 * (n - k) * std::pow(phi, k);
+  return sum / n / n;
+}
+
+TEST(Repeated, ManyFixesTellAsMuchAsTheirErrorsLeave) {
+  // One in full, then n - 1 that repeat: the filter's own sum of information against the true variance of their mean.
+  for (const float tau_s : {1.0F, 10.0F, 60.0F})
+    for (const double lasting : {10.0, 30.0, 100.0}) {
+      const int n = static_cast<int>(lasting * static_cast<double>(tau_s) / 0.2);
+      const double information = 1 + (n - 1) / static_cast<double>(repeated(0.2F, tau_s));
+      const double truth = variance_of_mean(n, std::exp(-0.2 / static_cast<double>(tau_s)));
+      EXPECT_NEAR(1 / information, truth, 0.25 * truth) << tau_s << " s, " << n;
+      EXPECT_GE(1 / information, 0.75 * truth);
+    }
+}
+
+TEST(Repeated, AFixAfterALongSilenceAndWhiteErrorsCountInFull) {
+  EXPECT_EQ(repeated(0.2F, 0.0F), 1.0F);
+  EXPECT_NEAR(repeated(300.0F, 60.0F), 1.0F, 0.02F);
+  EXPECT_EQ(repeated(1e6F, 60.0F), 1.0F);
+  EXPECT_NEAR(repeated(0.2F, 60.0F), 600.0F, 1.0F);
+  float last = repeated(0.0F, 60.0F);
+  EXPECT_TRUE(base::is_finite(last)) << "two fixes under one stamp";
+  for (float t = 0.1F; t < 700.0F; t *= 1.3F) {
+    EXPECT_LT(repeated(t, 60.0F), last * 1.0001F);
+    last = repeated(t, 60.0F);
+    EXPECT_GE(last, 1.0F);
+  }
+  EXPECT_EQ(repeated(base::kNan, 60.0F), 1.0F);
+}
+
+}  // namespace
+}  // namespace tetap::app
