@@ -7,12 +7,16 @@
 #include "app/estimators/attitude.hpp"
 #include "app/estimators/inertial.hpp"
 #include "app/estimators/odometry.hpp"
+#include "app/estimators/only.hpp"
 #include "app/node.hpp"
 #include "app/numbers_check.hpp"
 
 namespace tetap::robot::rover {
 
-using Estimators = app::Estimators<app::Odometry, app::Attitude, app::Inertial>;
+// It has no magnetometer, barometer or second antenna, so nothing that fuses them is flashed.
+using Attitude = app::Only<app::Attitude, app::ImuSample>;
+using Inertial = app::Only<app::Inertial, app::ImuSample, app::WheelCounts, app::GnssPosition, app::GnssVelocity>;
+using Estimators = app::Estimators<app::Odometry, Attitude, Inertial>;
 
 inline constexpr app::Numbers numbers = app::checked({
     // GNSS fixes come 80 to 120 ms late: all inside the window.

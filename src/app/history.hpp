@@ -84,8 +84,9 @@ class History {
   }
 
   using Estimates = std::array<Estimate, kCount>;
-  [[nodiscard]] Estimates estimates(const Context& with) const {
-    return std::apply([&](const auto&... lane) { return std::array{lane.estimate(with)...}; }, lanes_);
+  void estimate(const Context& with, Estimates& estimates) const {
+    std::size_t instance = 0;
+    each_lane([&](const auto& lane) { estimates[instance++] = lane.estimate(with); });
   }
   template <class F>
   void each_lane(F&& f) {

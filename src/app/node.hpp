@@ -71,7 +71,7 @@ class Node {
     };
   }
   [[nodiscard]] bool healthy(const Estimates& estimates);
-  [[nodiscard]] Disagreement judge();
+  [[nodiscard]] [[gnu::noinline]] Disagreement judge();
   void note_jump();
   [[nodiscard]] std::uint32_t state_crc() const;
   [[nodiscard]] Summary summary(const Estimate& estimate) const;
@@ -162,8 +162,9 @@ void Node<Estimators, Capacity>::tick(base::Micros t, const LoopHealth& loop, Se
   consume(now_);
   apply_commands();
   history_.advance(now_, context());
-  Estimates estimates = history_.estimates(context());
-  if (!healthy(estimates)) estimates = history_.estimates(context());
+  Estimates estimates;
+  history_.estimate(context(), estimates);
+  if (!healthy(estimates)) history_.estimate(context(), estimates);
 
   const Disagreement apart = judge();
   note_jump();

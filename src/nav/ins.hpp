@@ -82,15 +82,43 @@ class Ins {
                                   .var_v = sigma_mps2 * sigma_mps2 * dt_s * kGapStep_s,
                                   .var_theta = sigma_radps * sigma_radps * dt_s * kGapStep_s});
     }
-    condition(p);
+    condition(p, watch_);
   }
 
   /// Joint gate, then sequential scalar updates; a measurement that is not accepted changes nothing. The covariance is
   /// brought up to date first.
   template <filter::MeasurementModel<InsState> Measurement>
   [[nodiscard]] filter::Innovation<float, Measurement::kDimension> update(const Measurement& measurement, float gate) {
-    constexpr int kM = Measurement::kDimension;
     if (pending_.dt_s > 0.0F) predict_covariance();
+    return update_now(measurement, gate);
+  }
+
+  /// Begins anew; whatever was pending is forgotten. False, and nothing has changed, when the state is no number; a
+  /// covariance is put right.
+  bool start(const InsState& at, const Covariance& covariance) {
+    if (!at.finite()) return false;
+    p = covariance;
+    return start_with_p(at);
+  }
+  /// The same with independent errors; nothing of the covariance's size passes over the stack.
+  bool start(const InsState& at, const std::array<float, InsState::kErrors>& variances) {
+    if (!at.finite()) return false;
+    for (int c = 0; c < InsState::kErrors; ++c) {
+      for (int r = 0; r < c; ++r) p(r, c) = 0;
+      p(c, c) = variances[static_cast<std::size_t>(c)];
+    }
+    return start_with_p(at);
+  }
+
+  /// How often the covariance had to be put right (see condition()).
+  [[nodiscard]] std::uint32_t conditioned() const { return conditioned_; }
+
+ private:
+  /// Apart from the prediction, so that the two are not on the stack together.
+  template <class Measurement>
+  [[gnu::noinline]] filter::Innovation<float, Measurement::kDimension> update_now(const Measurement& measurement,
+                                                                                  float gate) {
+    constexpr int kM = Measurement::kDimension;
     filter::SparseUpdate<float, kErrors, kM> result;
     constexpr int kColumns = static_cast<int>(Measurement::kTouches.size());
     bool rest = !filter::Direct<Measurement> || kColumns > kM;
@@ -109,26 +137,16 @@ class Ins {
     }
     if (result.innovation.verdict != filter::Verdict::kAccepted) return result.innovation;
     x.correct(result.dx);
-    if (result.sharp && !condition(p)) ++conditioned_;
+    if (result.sharp && !condition(p, watch_)) ++conditioned_;
     return result.innovation;
   }
 
-  /// Begins anew; whatever was pending is forgotten. False, and nothing has changed, when the state is no number; a
-  /// covariance is put right.
-  bool start(const InsState& at, const Covariance& covariance) {
-    if (!at.finite()) return false;
+  bool start_with_p(const InsState& at) {
     x = at;
-    p = covariance;
-    condition(p);
+    condition(p, watch_);
     pending_ = {};
-    watch_.stop();
     return true;
   }
-
-  /// How often the covariance had to be put right (see condition()).
-  [[nodiscard]] std::uint32_t conditioned() const { return conditioned_; }
-
- private:
   static constexpr float kMostSpeed_mps = 1000.0F;
   static constexpr std::int64_t kGapStep_us = 100'000, kMostGap_us = 60'000'000;
   static constexpr float kGapStep_s = 0.1F;
@@ -149,9 +167,8 @@ class Ins {
   void maintain() {
     if (watch_.idle()) return watch_.begin(p);
     if (watch_.advance(8) != InsFactor::Progress::kBad) return;
-    condition(p);
+    condition(p, watch_);
     ++conditioned_;
-    watch_.stop();
   }
 
   InsCovarianceStep<float> pending_{};

@@ -124,8 +124,8 @@ class InsFactor {
 /// Puts P back among the matrices that float can hold as positive definite, whatever it was: all correlations are made
 /// smaller by a little (which adds that share to every conditional variance), by more if that is not enough, and in the
 /// end by all. Variances above kInsMostSigma are scaled back with their rows, which keeps every correlation.
-/// True when P was fine as it was.
-inline bool condition(filter::Symmetric<float, InsState::kErrors>& p) {
+/// True when P was fine as it was. `factor` is room to work in.
+inline bool condition(filter::Symmetric<float, InsState::kErrors>& p, InsFactor& factor) {
   constexpr int kN = InsState::kErrors;
   constexpr float kLeast = 1e-20F;  // below, products of variances leave the normal numbers
   bool fine = true;
@@ -152,9 +152,10 @@ inline bool condition(filter::Symmetric<float, InsState::kErrors>& p) {
     at_least(InsState::kPosition + i, kOwn * p(InsState::kVelocity + i, InsState::kVelocity + i));
   }
   for (const float share : {8e-5F, 8e-4F, 8e-3F, 0.08F, 0.2F, 1.0F}) {
-    InsFactor factor;
     factor.begin(p);
-    if (factor.advance(1'000'000) == InsFactor::Progress::kGood) return fine;
+    const bool good = factor.advance(1'000'000) == InsFactor::Progress::kGood;
+    factor.stop();
+    if (good) return fine;
     fine = false;
     for (int c = 0; c < kN; ++c)
       for (int r = 0; r < c; ++r) p(r, c) = share < 1.0F ? p(r, c) * (1.0F - share) : 0.0F;

@@ -143,6 +143,8 @@ TEST(InsCovariance, SeveralStepsAtOnceAreNearlyTheSameAsEachInTurn) {
   for (int i = 0; i < 15; ++i) EXPECT_NEAR(once(i, i) / each(i, i), 1.0, 0.01) << i;
 }
 
+nav::InsFactor room;
+
 TEST(Condition, LeavesAGoodCovarianceAlone) {
   test::Normal normal(9);
   for (int run = 0; run < 20; ++run) {
@@ -150,7 +152,7 @@ TEST(Condition, LeavesAGoodCovarianceAlone) {
     good.diagonal() *= 1.01;
     auto p = symmetric<float>(good);
     const auto before = p.packed();
-    EXPECT_TRUE(nav::condition(p));
+    EXPECT_TRUE(nav::condition(p, room));
     EXPECT_EQ(p.packed(), before);
   }
 }
@@ -168,7 +170,7 @@ TEST(Condition, MakesAnySymmetricMatrixPositiveDefinite) {
     if (run % 4 == 2) full(run % 15, run % 15) = -full(run % 15, run % 15);
     if (run % 4 == 3) full *= 1e9;
     auto p = symmetric<float>(full);
-    EXPECT_FALSE(nav::condition(p));
+    EXPECT_FALSE(nav::condition(p, room));
     EXPECT_TRUE(p.positive_definite()) << run;
     EXPECT_GT(test::least_correlation(p), 0.0) << run;
     for (int i = 0; i < 15; ++i) {
@@ -181,7 +183,7 @@ TEST(Condition, MakesAnySymmetricMatrixPositiveDefinite) {
 TEST(Condition, CapsAVarianceAndKeepsItsCorrelations) {
   auto p = filter::Symmetric<float, 15>::diagonal({1, 1, 1, 1, 1, 1, 1, 1, 400, 1, 1, 1, 1, 1, 25});
   p(8, 14) = 0.9F * 20 * 5;
-  nav::condition(p);
+  nav::condition(p, room);
   EXPECT_NEAR(p(8, 8), 16.0F, 1e-5F);
   EXPECT_NEAR(p(8, 14) / std::sqrt(p(8, 8) * p(14, 14)), 0.9F, 1e-5F);
 }

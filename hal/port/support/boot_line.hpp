@@ -12,10 +12,16 @@ namespace tetap::hal {
 /// Epochs of the self-check at boot: 5 s of a robot's life, some tens of milliseconds of a core's.
 inline constexpr std::uint32_t kBootEpochs = 500;
 
+/// Apart, so that its text is not on the stack while the firmware runs.
+template <class Board>
+[[gnu::noinline]] void print_bits(const Board& board, const char* robot, std::uint32_t bits) {
+  board.print(Text<>{}.add("tetap: robot ").add(robot).add(", bits ").hex(bits).add('\n').c_str());
+}
+
 template <class Board, class Firmware>
 void print_boot_line(const Board& board, const char* robot, Firmware& firmware) {
-  board.print(
-      Text<>{}.add("tetap: robot ").add(robot).add(", bits ").hex(firmware.self_check(kBootEpochs)).add('\n').c_str());
+  const std::uint32_t bits = firmware.self_check(kBootEpochs);
+  print_bits(board, robot, bits);
 }
 
 template <class Board>

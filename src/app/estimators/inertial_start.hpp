@@ -90,8 +90,8 @@ class InertialStart {
     const float h = at_.sigma_horizontal_m * at_.sigma_horizontal_m, v = at_.sigma_vertical_m * at_.sigma_vertical_m;
     const float speed = sigma_v_mps_ * sigma_v_mps_, tilt = n.start_tilt_rad * n.start_tilt_rad;
     const float a = n.accel_turn_on_mps2 * n.accel_turn_on_mps2, g = n.gyro_turn_on_radps * n.gyro_turn_on_radps;
-    ins.start(x, nav::Ins::Covariance::diagonal(
-                     {h, h, v, speed, speed, speed, tilt, tilt, sigma_yaw_rad_ * sigma_yaw_rad_, a, a, a, g, g, g}));
+    ins.start(x,
+              std::array{h, h, v, speed, speed, speed, tilt, tilt, sigma_yaw_rad_ * sigma_yaw_rad_, a, a, a, g, g, g});
   }
   template <class Sink>
   void each_bit(Sink&& sink) const {
