@@ -60,12 +60,13 @@ class Wired {
   }
   /// Everything at once, or what is wrong.
   void judge() {
-    for (const app::Estimate& e : history_.estimates(context())) {
+    history_.each_lane([&](const auto& lane) {
+      const app::Estimate e = lane.estimate(context());
       EXPECT_TRUE(base::is_finite(e.pose.x.offset_m) && base::is_finite(e.pose.y.offset_m));
       EXPECT_TRUE(base::is_finite(e.pose.yaw_rad));
       EXPECT_TRUE(base::is_finite(e.forward_mps) && base::is_finite(e.yaw_rate_radps));
       EXPECT_GT(least_eigenvalue(e.p), 0);
-    }
+    });
     history_.each_lane([&](const auto& lane) {
       if constexpr (requires { lane.inertial(context()); }) {
         const app::InertialEstimate e = lane.inertial(context());
