@@ -559,6 +559,72 @@ def block_figures(found, name):
             "inside_3_sigma": float(1 - found.outside(name)[known].mean()) if known.any() else None}
 
 
+QUIET_S = 2.0  # rejections less than this apart are told as one
+MISSED_S = 1.0  # a sensor is missed after so long
+RESET_WORDS = {"PositionJump": "position moved by", "HeadingWrong": "heading turned by"}
+
+
+def story(run):
+    """What happened, in words: (time, text), from what the node said of itself and what its best estimate refused."""
+    names = code_names()
+    told = []
+    status = run.status
+    at = status["time_s"]
+    for i in np.flatnonzero(np.diff(status["mode"], prepend=np.nan) != 0) if len(at) else []:
+        told.append((at[i], f"mode {names['Mode'].get(int(status['mode'][i]), int(status['mode'][i]))}"))
+    for bit in range(16):
+        on = np.nan_to_num(status["faults"]).astype(np.int64) >> bit & 1
+        edges = np.flatnonzero(np.diff(on, prepend=0, append=0))
+        spans = [[at[a], at[min(b, len(at) - 1)]] for a, b in zip(edges[::2], edges[1::2])]
+        for start, end in joined(spans, QUIET_S):
+            told.append((start, f"fault {names['Fault'].get(bit, f'bit {bit}')}, for {end - start:.1f} s"))
+    for bit, sensor in names["Sensor"].items():
+        used = np.nan_to_num(status["used"]).astype(np.int64) >> bit & 1
+        first = int(np.argmax(used))
+        edges = first + np.flatnonzero(np.diff(1 - used[first:], append=0))[:] if used.any() else []
+        for a, b in zip(edges[::2], edges[1::2]):
+            if at[b] - at[a] > MISSED_S:
+                told.append((at[a + 1], f"{sensor} gives nothing that is used, for {at[b] - at[a]:.1f} s"))
+    for i in np.flatnonzero(np.diff(status["reset_ctr"]) != 0) + 1 if len(at) else []:
+        cause = names["ResetCause"].get(int(status["reset_cause"][i]), "?")
+        told.append((at[i], f"reset: {cause}{jump_words(run, at[i], cause)}"))
+    rows = run.innovations
+    for sensor in np.unique(rows["sensor"][rows["estimator"] == run.best]):
+        for verdict in np.unique(rows["verdict"]):
+            mine = (rows["estimator"] == run.best) & (rows["sensor"] == sensor) & (rows["verdict"] == verdict)
+            if verdict == 0 or not mine.any():
+                continue
+            times = rows["time_s"][mine]
+            word = names["Verdict"].get(int(verdict), "?")
+            for start, end in joined([[t, t] for t in times], QUIET_S):
+                count = int(((times >= start) & (times <= end)).sum())
+                what = f"{names['Sensor'].get(int(sensor), int(sensor))} {word}"
+                told.append((start, f"{what}, {count} times until {end:.1f} s" if count > 1 else what))
+    return sorted(told, key=lambda one: one[0])
+
+
+def joined(spans, apart_s):
+    """Spans (start, end) in order of time, those less than `apart_s` apart as one."""
+    result = []
+    for start, end in spans:
+        if result and start - result[-1][1] < apart_s:
+            result[-1][1] = end
+        else:
+            result.append([start, end])
+    return result
+
+
+def jump_words(run, time_s, cause):
+    """How large the step was that came with a reset, as the page says that follows it."""
+    rows = run.states
+    after = np.flatnonzero((rows["estimator"] == run.best) & (rows["time_s"] >= time_s) & np.isfinite(rows["jump_x_m"]))
+    if len(after) == 0 or cause not in RESET_WORDS:
+        return ""
+    i = after[0]
+    return (f", {RESET_WORDS[cause]} {np.degrees(rows['jump_yaw_rad'][i]):.1f} deg" if cause == "HeadingWrong" else
+            f", {RESET_WORDS[cause]} {rows['jump_x_m'][i]:.2f} m east, {rows['jump_y_m'][i]:.2f} m north")
+
+
 def warnings_of(run, judged):
     """What makes the numbers of the run doubtful as a whole. Odometry is left out: it drifts, and nothing tests it."""
     cause = f"fault {', '.join(one.words for one in faults(run))}" if faults(run) else (

@@ -20,9 +20,10 @@ FAULT_SHADE = "#f6d9c8"
 ESTIMATORS = {"odometry": ODOMETRY, "fused": FUSED, "attitude": "#cc79a7"}
 OTHER = "#56b4e9"
 MODES = {"Boot": "#f2f2f2", "WaitingForPose": "#d9d9d9", "Aligning": "#f0e442", "Nominal": "#9fd3c0", "DeadReckoning": "#e69f00",
-         "Degraded": "#cc79a7", "Fault": "#d55e00"}
+         "Degraded": "#cc79a7", "Fault": "#d55e00", "WaitingForImu": "#bdbdbd", "Levelling": "#b3cde3", "FindingHeading": "#8da0cb"}
 DPI = 120
 MOST_BANDS = 4.0  # an error of more usual bands than this gets an axis with two scales
+LARGEST_ELLIPSE = 0.25  # of the picture
 MOST_POINTS = 20_000  # per line; more than a picture has columns
 
 
@@ -34,11 +35,11 @@ def thinned(count):
     return slice(None, None, max(1, count // MOST_POINTS))
 
 
-def figure(width, height, title, rows=1, **arguments):
-    """A figure with its title at the left, and its axes in the house's style."""
+def figure(width, height, title, rows=1, columns=1, **arguments):
+    """A figure with its title at the left, and its axes in the house's style, row by row."""
     fig = Figure(figsize=(width, height), dpi=DPI, layout="constrained")
     FigureCanvasAgg(fig)
-    axes = fig.subplots(rows, 1, squeeze=False, **arguments)[:, 0]
+    axes = fig.subplots(rows, columns, squeeze=False, **arguments).ravel()
     for one in axes:
         one.spines[["top", "right"]].set_visible(False)
         one.spines[["left", "bottom"]].set_color(GREY)
@@ -145,6 +146,9 @@ def path(run, truth, landmarks, title):
         axes.plot(ex[thinned(len(ex))], ey[thinned(len(ey))], color=color_of(run, k), linewidth=1.1, label=run.names[k], zorder=3 + k * 0.1)
     best = run.best
     centres, widths, heights, angles = covariance_ellipses(tracks[best], 0.95, 28)
+    # One that is as large as the picture, from before the start was known, would hide the rest.
+    fit = np.asarray(widths) <= LARGEST_ELLIPSE * max(np.ptp(x), np.ptp(y)) if len(x) else []
+    centres, widths, heights, angles = (np.asarray(one)[fit] for one in (centres, widths, heights, angles))
     if len(centres):
         axes.add_collection(EllipseCollection(widths, heights, angles, units="xy", offsets=centres, offset_transform=axes.transData,
                                               facecolor="none", edgecolor=color_of(run, best), linewidth=0.9, zorder=4))
@@ -223,6 +227,18 @@ def sensors_with_nis(run, estimator):
     return [int(one) for one in np.unique(rows["sensor"][tested])]
 
 
+def counted_by_node(run, estimator, sensor, framed):
+    """(time, mean NIS per degree of freedom, accepted, rejected) as the node says them of a sensor that is too fast for a frame per measurement;
+    None of the others."""
+    mine = (run.sensors["estimator"] == estimator) & (run.sensors["sensor"] == sensor) & np.isfinite(run.sensors["nis_mean"])
+    if not mine.any():
+        return None
+    accepted, refused = metrics.unwrapped(run.sensors["accepted"][mine], 65536), metrics.unwrapped(run.sensors["rejected"][mine], 4096)
+    if accepted + refused <= metrics.MOST_FRAMED * framed.sum():
+        return None
+    return run.sensors["time_s"][mine], run.sensors["nis_mean"][mine], accepted, refused
+
+
 def nis(run, estimator, names, title):
     """Normalised innovation squared of each sensor over time: how surprising each measurement was."""
     sensors = sensors_with_nis(run, estimator)
@@ -253,6 +269,16 @@ def nis(run, estimator, names, title):
         one.set_ylim(floor * 0.7, max(30.0, 1.6 * float(value[mine].max())))
         one.set_ylabel("NIS")
         one.grid(True, which="minor", axis="y", color=FAINT, linewidth=0.3)
+        counted = counted_by_node(run, estimator, sensor, mine)
+        if counted is not None:
+            time_s, mean, accepted, refused = counted
+            dof = int(np.median(rows["dof"][mine]))
+            one.plot(time_s, np.maximum(mean * dof, floor), color=color_of(run, estimator), linewidth=1.0)
+            one.set_ylim(floor * 0.7, max(30.0, 1.6 * float(max(value[mine].max(), np.nanmax(mean * dof)))))
+            one.annotate(f"{names['Sensor'].get(sensor, sensor)} ({dof} dof): {accepted} accepted, {refused} rejected; too many for a frame each: "
+                         "the line is the node's own mean of the last 50", (0.0, 1.0), xycoords="axes fraction", xytext=(0, 4),
+                         textcoords="offset points", ha="left", va="bottom", fontsize=9, color=GREY)
+            continue
         below = np.mean(rows["nis"][accepted | rejected] <= metrics.chi_square(0.95, max(int(np.median(rows["dof"][mine])), 1)))
         name = names["Sensor"].get(sensor, str(sensor))
         dofs = " and ".join(str(int(dof)) for dof in np.unique(rows["dof"][mine]))
@@ -280,8 +306,16 @@ def _spans(time_s, on, period):
     return [(time_s[a], until[b] - time_s[a]) for a, b in zip(start, end)]
 
 
+def rejections(run, names):
+    """Sensor to the times at which the best estimate rejected a measurement of it."""
+    rows = run.innovations
+    refused = (rows["estimator"] == run.best) & (rows["verdict"] == 1)
+    return {names["Sensor"].get(int(sensor), str(int(sensor))): rows["time_s"][refused & (rows["sensor"] == sensor)]
+            for sensor in np.unique(rows["sensor"][refused])}
+
+
 def timeline(run, names, title):
-    """What the node said of itself: mode, sensors in use, faults, restarts."""
+    """What the node said of itself: mode, sensors in use and what of them was refused, faults, restarts."""
     rows = run.status
     time_s = rows["time_s"]
     period = float(np.median(np.diff(time_s))) if len(time_s) > 1 else 0.1
@@ -294,6 +328,8 @@ def timeline(run, names, title):
                 yield names.get(table, {}).get(bit, f"bit {bit}"), on
 
     used = list(bits("used", "Sensor"))
+    refused = rejections(run, names)
+    used += [(name, np.zeros(len(time_s), dtype=bool)) for name in refused if name not in [one for one, _ in used]]
     faults = list(bits("faults", "Fault"))
     lines = [("mode", None, None)] + [(f"{name} used", on, FUSED) for name, on in used] + [(f"fault {name}", on, REJECTED) for name, on in faults]
     fig, (axes,) = figure(9.0, 1.5 + 0.34 * len(lines), title)
@@ -305,6 +341,11 @@ def timeline(run, names, title):
         handles.append(Patch(facecolor=color, edgecolor=GREY, linewidth=0.4, label=name))
     for number, (_, on, color) in enumerate(lines[1:], 1):
         axes.broken_barh(_spans(time_s, on, period), (number - 0.18, 0.36), facecolors=color, linewidth=0.8, edgecolors=color)
+    for number, (name, _) in enumerate(used, 1):
+        at = refused.get(name, np.empty(0))
+        axes.plot(at, np.full(len(at), number - 0.3), linestyle="none", marker="|", markersize=5, color=REJECTED, markeredgewidth=1.0)
+    if any(len(at) for at in refused.values()):
+        handles.append(Line2D([], [], linestyle="none", marker="|", markersize=8, color=REJECTED, markeredgewidth=1.2, label="rejected"))
     handles += shade_faults(axes, run)
     changes = np.flatnonzero(np.diff(rows["reset_ctr"]) != 0) + 1
     for row in changes:

@@ -439,5 +439,114 @@ class BadInput(Case):
         self.refused("t.truth.csv", "fewer than two rows", truth=self.truth([1], [0], [0]))
 
 
+class Inertial(Case):
+    """What is said of all fifteen states, against draws and closed forms."""
+    count = 4000
+    std = {"velocity": 0.05, "attitude": 0.01, "gyro bias": 2e-4, "acc bias": 0.02}
+
+    def inertial(self, scale=1.0, turn=0.0):
+        """A robot at rest at the origin whose estimate errs as it says, times `scale`; `turn`: by how much it is off about the vertical too."""
+        random = np.random.default_rng(5)
+        n = self.count
+        epoch = 1.0 + np.arange(n)
+        time_s = 0.01 * epoch
+        draw = {name: scale * random.normal(0, sigma, (n, 3)) for name, sigma in self.std.items()}
+        rows = [[epoch[i], time_s[i], 2, 6, *(scale * random.normal(0, 0.3, 2)), 0, 0, 0, 0.3, 0.3, self.std["attitude"], 0, 0, 0, 1, 1] for i in range(n)]
+        self.write_rows("estimates.csv", metrics.ESTIMATES, rows)
+        angle = draw["attitude"] + [0, 0, turn]
+        length = np.linalg.norm(angle, axis=1, keepdims=True)
+        q = np.hstack([np.cos(length / 2), angle / length * np.sin(length / 2)])
+        sigmas = {"velocity": self.std["velocity"], "gyro bias": self.std["gyro bias"], "acc bias": self.std["acc bias"]}
+        up = scale * random.normal(0, 0.5, n)
+        self.write_rows("states.csv", metrics.STATES, [
+            [epoch[i], time_s[i], 2, *q[i], *draw["velocity"][i], up[i], 0.5, *draw["acc bias"][i], *draw["gyro bias"][i], *[sigmas["velocity"]] * 3,
+             *[self.std["attitude"]] * 2, *[sigmas["acc bias"]] * 3, *[sigmas["gyro bias"]] * 3, *[None] * 8] for i in range(n)])
+        self.write("run.json", json.dumps(RUN))
+        self.write_rows("t.truth.csv", [*metrics.TRUTH, "epoch", *metrics.TRUTH_MORE],
+                        [[time_s[i], 0, 0, 0, epoch[i], *[0] * len(metrics.TRUTH_MORE)] for i in range(n)])
+        return self.path("t.truth.csv")
+
+    def test_honest_errors_of_every_block_have_a_nees_of_three(self):
+        fused = self.summary("--truth", self.inertial())["fused"]
+        self.assertEqual(fused["kind"], "Inertial")
+        for name in metrics.BLOCKS:
+            self.assertAlmostEqual(fused["blocks"][name]["nees_mean"], 3.0, delta=0.25, msg=name)
+            self.assertAlmostEqual(fused["blocks"][name]["nees_inside_two_sided_95"], 0.95, delta=0.015, msg=name)
+            self.assertGreater(fused["blocks"][name]["inside_3_sigma"], 0.98, name)
+
+    def test_errors_twice_as_large_as_said_have_four_times_the_nees(self):
+        fused = self.summary("--truth", self.inertial(2.0))["fused"]
+        for name in metrics.BLOCKS:
+            self.assertAlmostEqual(fused["blocks"][name]["nees_mean"], 12.0, delta=1.0, msg=name)
+            self.assertLess(fused["blocks"][name]["inside_3_sigma"], 0.75, name)
+
+    def test_a_turn_about_the_vertical_is_heading_and_no_tilt(self):
+        fused = self.summary("--truth", self.inertial(1e-6, turn=0.3))["fused"]
+        self.assertAlmostEqual(fused["attitude_heading_rmse_deg"], np.degrees(0.3), places=3)
+        self.assertLess(fused["tilt_rmse_deg"], 1e-3)
+
+    def test_turns_compose_as_rotations_do_and_the_vertical_is_the_last_axis(self):
+        random = np.random.default_rng(9)
+        roll, pitch, yaw = random.uniform(-1, 1, (3, 500))
+        q = metrics.quaternion(roll, pitch, yaw)
+        small = random.normal(0, 0.1, (500, 3))
+        angle = np.linalg.norm(small, axis=1, keepdims=True)
+        turned = metrics.product(np.hstack([np.cos(angle / 2), small / angle * np.sin(angle / 2)]), q)
+        np.testing.assert_allclose(metrics.turns(turned, q), small, atol=1e-12)
+        np.testing.assert_allclose(metrics.turns(-turned, q), small, atol=1e-12)  # the same attitude
+        # R_nb of yaw alone takes forward to (cos, sin, 0).
+        w, _, _, z = metrics.quaternion(np.zeros(1), np.zeros(1), np.array([0.7]))[0]
+        self.assertAlmostEqual(w * w - z * z, np.cos(0.7))
+        self.assertAlmostEqual(2 * w * z, np.sin(0.7))
+
+    def test_tilt_and_heading_apart_are_those_of_the_firmware(self):
+        one = np.array([[1.0, 0, 0, 0]])
+        tilted = np.array([[np.cos(0.1), np.sin(0.1), 0, 0]])
+        headed = np.array([[np.cos(0.2), 0, 0, np.sin(0.2)]])
+        for q, expected in ((one, (0, 0)), (tilted, (0.2, 0)), (headed, (0, 0.4)), (metrics.product(tilted, headed), (0.2, 0.4))):
+            tilt, heading = metrics.apart(q, one)
+            self.assertAlmostEqual(tilt[0], expected[0])
+            self.assertAlmostEqual(heading[0], expected[1])
+
+    def test_a_page_counts_until_it_is_too_old(self):
+        held = metrics.held_at(np.array([1.0, 5, 9, 30]), np.array([0.1, np.nan, 0.3, np.nan]), np.array([0.0, 1, 8, 9, 19, 20]), 10)
+        np.testing.assert_array_equal(held, [np.nan, 0.1, 0.1, 0.3, 0.3, np.nan])
+
+    def test_the_best_is_called_fused_whatever_its_place(self):
+        self.assertEqual(metrics.names_of({0: "Odometry", 1: "Attitude", 2: "Inertial"}), {0: "odometry", 1: "attitude", 2: "fused"})
+        self.assertEqual(metrics.names_of({0: "Odometry", 1: "Ekf"}), {0: "odometry", 1: "fused"})
+        self.assertEqual(metrics.names_of({0: "Odometry", 1: "Ekf", 2: "Inertial"}), {0: "odometry", 1: "estimator1", 2: "fused"})
+        self.assertEqual(metrics.names_of({0: "Odometry"}), {0: "odometry"})
+
+    def test_counters_that_wrap_go_on(self):
+        self.assertEqual(metrics.unwrapped(np.array([65000.0, 65500, 400, 1000]), 65536), 66536)
+
+    def test_what_happened_is_told_in_words_and_in_order(self):
+        self.inertial()
+        row = [100, 1.0, 2, 5, 0, 1, 3, 99.0, 8.0, 100, None]
+        self.write_rows("innovations.csv", metrics.INNOVATIONS, [[100 + i, 1.0 + 0.2 * i, *row[2:]] for i in range(5)] + [[900, 9.0, *row[2:]]])
+        self.write_rows("status.csv", metrics.STATUS, [[i * 10, 0.1 * i, 5 if 12 <= i < 20 else 3, 0 if 40 <= i < 55 else 32, 2 if 12 <= i < 20 else 0, int(i >= 30), 6]
+                                                       for i in range(1, 60)])
+        self.write_rows("states.csv", metrics.STATES, [[310, 3.1, 2, *[None] * 26, 99.5, -0.25, 0.01, *[None] * 5]])
+        told = metrics.story(metrics.Run(self.directory))
+        words = [text for _, text in told]
+        self.assertEqual([t for t, _ in told], sorted(t for t, _ in told))
+        self.assertIn("GnssPosition Rejected, 5 times until 1.8 s", words)
+        self.assertIn("GnssPosition Rejected", words)
+        self.assertIn("mode Degraded", words)
+        self.assertIn("GnssPosition gives nothing that is used, for 1.5 s", words)
+        self.assertIn("fault Rejecting, for 0.8 s", words)
+        self.assertIn("reset: PositionJump, position moved by 99.50 m east, -0.25 m north", words)
+
+    def test_the_pictures_of_an_inertial_run_are_drawn(self):
+        truth = self.inertial()
+        result = self.report("--truth", truth)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        for name in ("errors", "biases", "path"):
+            with open(self.path(name + ".png"), "rb") as picture:
+                self.assertEqual(picture.read(8), b"\x89PNG\r\n\x1a\n")
+        self.assertIn("Biases of the IMU", text_of(self.path("report.html")))
+
+
 if __name__ == "__main__":
     unittest.main()
