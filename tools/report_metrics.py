@@ -580,8 +580,11 @@ def story(run):
             told.append((start, f"fault {names['Fault'].get(bit, f'bit {bit}')}, for {end - start:.1f} s"))
     for bit, sensor in names["Sensor"].items():
         used = np.nan_to_num(status["used"]).astype(np.int64) >> bit & 1
+        if not used.any():
+            continue
         first = int(np.argmax(used))
-        edges = first + np.flatnonzero(np.diff(1 - used[first:], append=0))[:] if used.any() else []
+        edges = first + np.flatnonzero(np.diff(used[first:]) != 0)  # down, up, down, ...
+        edges = np.append(edges, len(at) - 1) if len(edges) % 2 else edges
         for a, b in zip(edges[::2], edges[1::2]):
             if at[b] - at[a] > MISSED_S:
                 told.append((at[a + 1], f"{sensor} gives nothing that is used, for {at[b] - at[a]:.1f} s"))
