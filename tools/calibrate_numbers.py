@@ -1,0 +1,142 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the parts of a calibration hand back: numbers with 1 sigma and their place in app::Numbers, residuals, notes; or why there is none."""
+import dataclasses
+import os
+import re
+
+import numpy as np
+
+from bus_writer import BadInput
+
+ROOT = os.path.dirname(os.path.dirname(os.path.realpath(__file__)))
+STRUCTS = ("src/app/numbers.hpp", "src/model/differential_drive.hpp")
+
+
+class Refusal(Exception):
+    """The data does not give this number: why, and what to record."""
+
+    def __init__(self, why, record):
+        super().__init__(f"{why} Record: {record}")
+        self.why, self.record = why, record
+
+
+@dataclasses.dataclass
+class Number:
+    """One number or a list of them. `field`: where it belongs in app::Numbers ("" : nowhere); `scale`: shown = value * scale, in `unit`."""
+
+    name: str
+    value: np.ndarray
+    sigma: np.ndarray
+    unit: str
+    field: str = ""
+    labels: tuple = ("",)
+    digits: int = 5
+    exists: bool = False
+
+    def __post_init__(self):
+        self.value, self.sigma = np.atleast_1d(np.asarray(self.value, float)).ravel(), np.atleast_1d(np.asarray(self.sigma, float)).ravel()
+        if len(self.sigma) != len(self.value):
+            raise ValueError(f"{self.name}: {len(self.value)} values, {len(self.sigma)} sigmas")
+        if not (np.isfinite(self.value).all() and np.isfinite(self.sigma).all() and (self.sigma >= 0).all()):
+            raise Refusal(f"{self.name} does not come out as a finite number.", "a longer log with more variety")
+
+
+class Part:
+    """What one part of the calibration found."""
+
+    def __init__(self, name, title):
+        self.name, self.title = name, title
+        self.numbers, self.notes, self.refusals, self.residuals = [], [], [], []
+        self.draw = self.draw_more = None  # functions of one pair of axes
+
+    def add(self, *arguments, **keywords):
+        self.numbers.append(Number(*arguments, **keywords))
+
+    def number(self, name):
+        return next(number for number in self.numbers if number.name == name)
+
+    def residual(self, what, before, after, unit):
+        if not np.isfinite([before, after]).all():
+            raise Refusal(f"The residual ({what}) is no finite number.", "a longer log with more variety")
+        self.residuals.append((what, before, after, unit))
+
+    def refuse(self, what, refusal):
+        self.refusals.append((what, refusal.why, refusal.record))
+
+
+class Robot:
+    """What a robot's header says now (designated initialisers), as far as a calibration compares with it or needs it."""
+
+    def __init__(self, name=None):
+        self.name, self.text = name, ""
+        if name:
+            path = os.path.join(ROOT, "config", f"{name}.hpp")
+            try:
+                with open(path, encoding="utf-8") as file:
+                    self.text = re.sub(r"//.*", "", file.read())
+            except OSError as error:
+                raise BadInput(f"{path}: {error.strerror}") from None
+            if "app::Numbers" not in self.text:
+                raise BadInput(f"{path}: no robot: no app::Numbers in it")
+        self.given = {}
+
+    def number(self, field, default=None):
+        if field in self.given:
+            return self.given[field]
+        found = re.search(r"\.%s\s*=\s*([-+\d.eE]+)F?\s*[,}]" % re.escape(field), self.text)
+        return float(found[1]) if found else default
+
+
+def known_fields():
+    """Names of everything that app::Numbers has."""
+    words = set()
+    for path in STRUCTS:
+        with open(os.path.join(ROOT, path), encoding="utf-8") as file:
+            words |= set(re.findall(r"\b([a-z]\w*)\s*(?:=|\{|;)", file.read()))
+    return words
+
+
+def literal(value, digits):
+    text = f"{value:.{digits}g}"
+    return text + ("F" if "." in text or "e" in text else ".0F")
+
+
+def snippet(parts):
+    """The numbers as designated initialisers of app::Numbers, in its order; what has no field yet is named in comments."""
+    known = known_fields()
+    tree, without = {}, []
+    for part in parts:
+        for number in part.numbers:
+            if not number.field:
+                continue
+            values = ", ".join(literal(value, number.digits) for value in number.value)
+            text = values if len(number.value) == 1 else "{" + values + "}"
+            steps = number.field.split(".")
+            number.exists = all(step in known for step in steps)
+            if not number.exists:
+                without.append(f"// no field yet: {number.field} = {text}")
+                continue
+            node = tree
+            for step in steps[:-1]:
+                node = node.setdefault(step, {})
+            node[steps[-1]] = text
+
+    def order(node, path):
+        text = ""
+        for path in STRUCTS:
+            with open(os.path.join(ROOT, path), encoding="utf-8") as file:
+                text += file.read()
+        body = text[text.find("struct Numbers"):] if node is tree else text
+        return sorted(node, key=lambda name: body.find(f" {name}" + (";" if node is tree else "")))
+
+    def lines(node, indent):
+        result = []
+        for name in order(node, ""):
+            value = node[name]
+            if isinstance(value, dict):
+                result += [f"{indent}.{name} = {{"] + lines(value, indent + "    ") + [f"{indent}}},"]
+            else:
+                result.append(f"{indent}.{name} = {value},")
+        return result
+
+    return "\n".join(lines(tree, "    ") + ["    " + line for line in without])
