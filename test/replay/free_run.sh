@@ -37,13 +37,16 @@ timed_world() {
 rm -rf "$out"; mkdir -p "$out"
 if [ "$log" = world ]; then timed_world >"$out/input.log"; else awk -v s="$seconds" 'substr($1, 2) + 0 <= s + 1' "$log" >"$out/input.log"; fi || exit 1
 tools/with-vcan --private -q -t $((seconds * 4 + 120)) "$0" "$board" "$robot" "$log" "$seconds" --inside || exit 1
+# What the node itself said of the run in its last diagnostics.
+grep ' 325#' "$record" | tail -30 | tools/decode >"$out/diagnostics.txt"
+said() { grep -oE " $1=[^ ]*" "$out/diagnostics.txt" | tail -1 | cut -d= -f2; }
+# An emulator that does not get its share of the processor is a receiver that is too slow: the run shows nothing, either way.
+lost=$(said RxOverflow)
+[ "${lost:-0}" = 0 ] || { echo "  busy: the emulated receiver lost ${lost} frames, so the record is not what the node consumed"; exit 75; }
 "$programs/tetap-play" "$record" --as-recorded --memory --robot "$robot" --out "$out/desk" --quiet || { echo "the desk replay differs from the run"; exit 1; }
 "$programs/tetap-play" "$out/input.log" --memory --robot "$robot" --out "$out/lockstep" --quiet || exit 1
 
 json() { grep -o "\"$1\": [^,]*" "$out/$2/run.json" | head -1 | cut -d' ' -f2 | tr -d '"'; }
-# What the node itself said of the run in its last diagnostics.
-grep ' 325#' "$record" | tail -30 | tools/decode >"$out/diagnostics.txt"
-said() { grep -oE " $1=[^ ]*" "$out/diagnostics.txt" | tail -1 | cut -d= -f2; }
 compared=$(json epochs_compared desk)
 echo "  $board $robot: dropped $(json frames_dropped live), doubled $(json frames_duplicated live), reordered $(json frames_reordered live);" \
   "the node: $(said Sync), late $(said TooLate), duplicate $(said Duplicate), incomplete $(said Incomplete), ticks late $(said TicksLate);" \
