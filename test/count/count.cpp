@@ -288,7 +288,7 @@ void whole_node() {
   base::CanFrame last;
   const bits::RecordedFrame* next = bits::kRecordedFrames;
   for (const bits::RecordedTick& tick : bits::kRecordedTicks) {
-    static std::array<base::CanFrame, bits::kMostFrames> inputs;
+    static std::array<base::CanFrame, bits::kRecordedMostFrames> inputs;
     for (std::uint32_t i = 0; i < tick.frames; ++i) inputs[i] = (next++)->frame(can_base);
     const Region<struct node_epoch> epoch;
     for (std::uint32_t i = 0; i < tick.frames; ++i) {
