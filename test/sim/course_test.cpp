@@ -127,5 +127,33 @@ TEST(Course, a_course_that_cannot_be_driven_is_refused_with_the_waypoint) {
   EXPECT_NE(message({{.x_m = 0}}), "");
 }
 
+TEST(Course, laps_follow_each_other_with_a_standstill_between) {
+  const Plan once{default_course(), {}};
+  const Plan thrice{default_course(3), {}};
+  EXPECT_NEAR(static_cast<double>(thrice.duration().us) / static_cast<double>(once.duration().us), 3, 0.15);
+  EXPECT_GE(thrice.duration().us, 600'000'000);
+  int standstills = 0;
+  bool parked = false;
+  for (base::Micros t; t < thrice.duration(); t += base::Micros{100'000}) {
+    const bool now = thrice.at(t).parked;
+    standstills += now && !parked ? 1 : 0;
+    parked = now;
+  }
+  EXPECT_EQ(standstills, 7);  // start, and twice a lap
+}
+
+TEST(Course, the_road_is_driven_at_five_metres_a_second_for_a_minute_and_more) {
+  const Plan plan{road_course(2), {.speed_mps = 5}};
+  int fast = 0;
+  int longest = 0;
+  for (base::Micros t; t < plan.duration(); t += base::Micros{100'000}) {
+    fast = plan.at(t).speed_mps > 4.9 ? fast + 1 : 0;
+    longest = std::max(longest, fast);
+  }
+  EXPECT_GE(longest, 900);
+  for (base::Micros t{300'000'000}; t < base::Micros{360'000'000}; t += base::Micros{100'000})
+    ASSERT_GT(plan.at(t).speed_mps, 4.9) << t.us;
+}
+
 }  // namespace
 }  // namespace tetap::sim

@@ -402,5 +402,134 @@ TEST(Camera, noise_misses_and_wrong_names_come_as_often_as_stated) {
   }
 }
 
+TEST(Imu, the_biases_of_the_truth_are_what_it_shows_too_much) {
+  ImuNumbers numbers;
+  numbers.gyro_noise = 0;
+  numbers.accel_noise = {};
+  numbers.earth_rotation = false;
+  Imu imu{numbers, 0.1, kEarth, 3};
+  base::Micros now;
+  const Faults step{{{Fault::kGyroBiasStep, seconds_us(1), seconds_us(1)}}};
+  for (int i = 0; i < 300; ++i) {
+    for (int k = 0; k < 20; ++k) imu.sense({}, 0, now += Rover::kStep, step);
+    const app::ImuSample s = imu.sample(now, step);
+    const Vector3 gyro = imu.gyro_bias_radps();
+    const Vector3 accel = imu.accel_bias_mps2();
+    for (std::size_t a = 0; a < 3; ++a) {
+      ASSERT_NEAR(static_cast<double>(s.dangle_b_rad[a]) * 100, gyro[a], 1e-7);
+      ASSERT_NEAR(static_cast<double>(s.dvelocity_b_mps[a]) * 100, accel[a] + (a == 2 ? kEarth.gravity_mps2() : 0),
+                  1e-5);
+    }
+  }
+}
+
+TEST(Wheels, an_error_that_is_a_share_of_each_readings_travel_has_that_size_and_no_memory) {
+  WheelSensorNumbers numbers;
+  numbers.counts_per_turn = 2e6;
+  numbers.noise_share = 0.03;
+  numbers.output = WheelOutput::kWheelSpeeds;
+  Wheels wheels{numbers, matched(Numbers{}).rover, 5};
+  std::vector<double> errors;
+  Motion motion;
+  motion.rim_left_m = motion.rim_right_m = 0.001;  // 2 m/s
+  base::Micros now;
+  for (int i = 0; i < 40'000; ++i) {
+    for (int k = 0; k < 20; ++k) wheels.sense(motion, now += Rover::kStep, kNoFaults);
+    errors.push_back(static_cast<double>(wheels.wheel_speeds().left_mps) - 2);
+  }
+  EXPECT_NEAR(statistics(errors).mean, 0, 0.001);
+  EXPECT_NEAR(statistics(errors).variance / (0.06 * 0.06), 1, 0.03);
+  EXPECT_NEAR(correlation(errors, 1), 0, 0.02);
+}
+
+MagnetometerNumbers perfect_magnetometer() {
+  MagnetometerNumbers n;
+  n.rate_hz = 20;
+  n.noise_uT = n.hard_iron_uT = n.scale = n.local_uT = 0;
+  return n;
+}
+
+TEST(Magnetometer, a_perfect_one_points_to_magnetic_north_whatever_the_attitude) {
+  const MagnetometerNumbers numbers = perfect_magnetometer();
+  Magnetometer magnetometer{numbers, 1};
+  for (const Vector3& attitude : {Vector3{0, 0, 0}, {0, 0, 1.2}, {0.2, -0.1, -2.5}, {-0.3, 0.4, 3.0}}) {
+    Truth truth;
+    truth.roll_rad = attitude[0], truth.pitch_rad = attitude[1], truth.yaw_rad = attitude[2];
+    const app::MagneticFlux flux = magnetometer.sample(truth, {}, kNoFaults);
+    const auto wide = [&flux](std::size_t i) { return static_cast<double>(flux.flux_b_uT[i]); };
+    const Vector3 n = to_level(attitude, {wide(0), wide(1), wide(2)});
+    EXPECT_NEAR(sim::atan2(n[0], n[1]), numbers.declination_rad, 1e-6);  // from north towards east
+    EXPECT_NEAR(sim::atan2(-n[2], sim::sqrt(n[0] * n[0] + n[1] * n[1])), numbers.dip_rad, 1e-6);
+    EXPECT_NEAR(sim::sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]), numbers.field_uT, 1e-4);
+  }
+}
+
+TEST(Magnetometer, its_errors_are_as_large_as_stated) {
+  MagnetometerNumbers numbers = perfect_magnetometer();
+  numbers.noise_uT = 0.3;
+  Magnetometer noisy{numbers, 2};
+  Magnetometer clean{perfect_magnetometer(), 2};
+  std::vector<double> noise;
+  for (int i = 0; i < 20'000; ++i)
+    noise.push_back(static_cast<double>(noisy.sample({}, {}, kNoFaults).flux_b_uT[0]) -
+                    static_cast<double>(clean.sample({}, {}, kNoFaults).flux_b_uT[0]));
+  EXPECT_NEAR(statistics(noise).variance / 0.09, 1, 0.05);
+  numbers.noise_uT = 0;
+  numbers.hard_iron_uT = 0.8;
+  std::vector<double> iron;
+  for (std::uint64_t seed = 0; seed < 2'000; ++seed) {
+    Magnetometer one{numbers, seed};
+    const float first = one.sample({}, {}, kNoFaults).flux_b_uT[1];
+    ASSERT_EQ(one.sample({}, {}, kNoFaults).flux_b_uT[1], first) << "it stays";
+    iron.push_back(static_cast<double>(first) - static_cast<double>(clean.sample({}, {}, kNoFaults).flux_b_uT[1]));
+  }
+  EXPECT_NEAR(statistics(iron).mean, 0, 0.06);
+  EXPECT_NEAR(statistics(iron).variance / 0.64, 1, 0.1);
+}
+
+TEST(Magnetometer, iron_in_the_ground_changes_while_the_rover_drives_and_not_while_it_stands) {
+  MagnetometerNumbers numbers = perfect_magnetometer();
+  numbers.local_uT = 1;
+  Magnetometer magnetometer{numbers, 4};
+  Truth truth;
+  const auto flux = [&] { return static_cast<double>(magnetometer.sample(truth, {}, kNoFaults).flux_b_uT[0]); };
+  const double parked = flux();
+  for (int i = 0; i < 100; ++i) ASSERT_EQ(flux(), parked);
+  truth.speed_mps = 1;
+  std::vector<double> driving;
+  for (int i = 0; i < 100'000; ++i) driving.push_back(flux());
+  EXPECT_NEAR(statistics(driving).variance, 1, 0.15);
+}
+
+TEST(Barometer, a_perfect_one_is_the_standard_atmosphere) {
+  BarometerNumbers numbers;
+  numbers.rate_hz = 10;
+  numbers.noise_Pa = numbers.turn_on_Pa = numbers.drift_Pa = 0;
+  // ISO 2533, table 5: 95 460.8 Pa at 500 m, 89 874.6 Pa at 1000 m (of geopotential height).
+  EXPECT_NEAR(static_cast<double>(Barometer(numbers, 500, 1).sample({}).pressure_Pa), 95'460.8, 2);
+  EXPECT_NEAR(static_cast<double>(Barometer(numbers, 1000, 1).sample({}).pressure_Pa), 89'874.6, 2);
+  Truth higher;
+  higher.z_m = 10;
+  const double per_metre = (static_cast<double>(Barometer(numbers, 520, 1).sample(higher).pressure_Pa) -
+                            static_cast<double>(Barometer(numbers, 520, 1).sample({}).pressure_Pa)) /
+                           10;
+  EXPECT_NEAR(per_metre, -11.43, 0.05);
+}
+
+TEST(Barometer, noise_offset_and_drift_are_as_large_as_stated) {
+  BarometerNumbers numbers;
+  numbers.rate_hz = 10;
+  std::vector<double> offsets, noise;
+  for (std::uint64_t seed = 0; seed < 1'000; ++seed) {
+    Barometer barometer{numbers, 520, seed};
+    const auto pressure = [&] { return static_cast<double>(barometer.sample({}).pressure_Pa); };
+    const double first = pressure();
+    offsets.push_back(first);
+    noise.push_back(pressure() - first);
+  }
+  EXPECT_NEAR(statistics(offsets).variance / (50.0 * 50 + 30 * 30 + 2 * 2), 1, 0.12);
+  EXPECT_NEAR(statistics(noise).variance / 8, 1, 0.15);  // of two readings; the drift is slow
+}
+
 }  // namespace
 }  // namespace tetap::sim

@@ -458,5 +458,45 @@ TEST(World, a_rate_that_is_no_divisor_is_refused) {
   EXPECT_THROW((World{options, 1}), std::invalid_argument);
 }
 
+TEST(World, in_the_world_matched_to_an_inertial_filter_the_body_moves_sideways_and_up_without_memory) {
+  World world{{.mismatched = false, .inertial = true}, 9};
+  const double sigma = world.numbers().rover.jitter_mps;
+  std::vector<Measurement> ignored;
+  std::vector<double> side, up;
+  double x_m = 0;
+  double z_m = 0;
+  Truth before = world.truth();
+  for (base::Micros t = world.start(); t < world.start() + seconds_us(90); t += base::Micros{500}) {
+    world.advance_to(t, ignored);
+    const Truth now = world.truth();
+    x_m += 0.5 * 500e-6 * (before.v_n_mps[0] + now.v_n_mps[0]);
+    z_m += 0.5 * 500e-6 * (before.v_n_mps[2] + now.v_n_mps[2]);
+    before = now;
+    const Direction d = direction(now.yaw_rad);
+    if (magnitude(now.speed_mps) < 0.6 || t.us % 10'000 != 0) continue;
+    side.push_back(now.v_n_mps[1] * d.cos - now.v_n_mps[0] * d.sin);
+    up.push_back(now.v_n_mps[2]);
+  }
+  for (const auto& series : {side, up}) {
+    EXPECT_NEAR(statistics(series).variance / (sigma * sigma), 1, 0.06);
+    EXPECT_NEAR(correlation(series, 1), 0, 0.04);
+  }
+  EXPECT_NEAR(z_m, before.z_m, 1e-6);
+  EXPECT_NEAR(x_m, before.x_m - World({.mismatched = false, .inertial = true}, 9).truth().x_m, 2e-3);
+}
+
+TEST(World, a_gnss_error_that_is_asked_for_is_the_whole_error_in_every_world) {
+  World::Options options;
+  options.numbers.gnss = with_error(options.numbers.gnss, 1.5);
+  const GnssNumbers& n = options.numbers.gnss;
+  EXPECT_NEAR(n.white_m * n.white_m + n.correlated_m * n.correlated_m, 2.25, 1e-12);
+  EXPECT_NEAR(n.white_m / n.correlated_m, GnssNumbers{}.white_m / GnssNumbers{}.correlated_m, 1e-12);
+  options.mismatched = false;
+  options.inertial = true;
+  const World world{options, 1};
+  EXPECT_NEAR(world.numbers().gnss.white_m, 1.5, 1e-12);
+  EXPECT_EQ(world.numbers().gnss.correlated_m, 0);
+}
+
 }  // namespace
 }  // namespace tetap::sim
