@@ -97,6 +97,8 @@ struct InertialNumbers {
   float vertical_mps = 0.05F;
   float axle_x_b_m = 0;  ///< the axle that does not steer
   float wheel_gate_scale = 1;
+  /// Without a wheel speed for so long, it does at least not move sideways or up, said this often; 0: it may.
+  std::int32_t constrain_every_us = 0;
 };
 
 /// The magnetometer: its calibration, and what of it is believed. Field of the body = mounting * soft iron * (flux -
@@ -211,7 +213,8 @@ constexpr void each_number(const Numbers& n, Sink&& sink) {
   for (const float m : i.mounting_bs) sink(m);
   all(i.imu, i.gyro_radps_rthz, i.accel_mps2_rthz, i.gyro_bias_radps2_rthz, i.accel_bias_mps3_rthz,
       i.gyro_turn_on_radps, i.accel_turn_on_mps2, i.start_tilt_rad, i.level_s, i.gap_mps2, i.gap_radps, i.still_radps,
-      i.still_mps, i.wheel_mps, i.slip_share, i.lateral_mps, i.vertical_mps, i.axle_x_b_m, i.wheel_gate_scale);
+      i.still_mps, i.wheel_mps, i.slip_share, i.lateral_mps, i.vertical_mps, i.axle_x_b_m, i.wheel_gate_scale,
+      i.constrain_every_us);
   const auto& m = n.magnetic;
   for (const float v : m.hard_iron_uT) sink(v);
   for (const float v : m.soft_iron) sink(v);

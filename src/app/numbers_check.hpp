@@ -83,6 +83,7 @@ consteval Numbers checked(const Numbers& n) {
   require(positive(g.gate_scale), "gnss.gate_scale: above 0");
   require(positive(g.align_distance_m), "gnss.align_distance_m: above 0");
 
+  require(n.inertial.constrain_every_us >= 0, "inertial.constrain_every_us: not below 0");
   const auto& m = n.magnetic;
   require(m.declination_rad > -3.2F && m.declination_rad < 3.2F, "magnetic.declination_rad: -pi to pi");
   require(finite(m.hard_iron_uT[0]) && finite(m.hard_iron_uT[1]) && finite(m.hard_iron_uT[2]),

@@ -124,6 +124,7 @@ class Inertial {
   void begin(const Context& with);
   void stand(base::Micros stamp, const Context& with);
   Innovation forward(const Forward& speed, base::Micros stamp, const Context& with);
+  void constrain(base::Micros stamp, const Context& with);
   [[nodiscard]] bool believe(const nav::Vector3& nu, const nav::Vector3& r, bool agrees, base::Micros stamp,
                              const RecoveryNumbers& rules);
   Innovation weigh(model::GnssFix3d& fix, base::Micros stamp, const Context& with);
@@ -142,6 +143,7 @@ class Inertial {
   base::Micros now_;   ///< of the estimate
   base::Micros last_position_;
   base::Micros counts_time_;
+  base::Micros constrained_;  ///< last stamp at which wheels, or that there are some, were fused
   base::Micros moved_;  ///< last stamp at which something moved
   base::Micros stood_;  ///< last stamp at which standing still was fused
   WheelCounts counts_;

@@ -29,6 +29,7 @@ inline Innovation Inertial::fuse(const ImuSample& sample, base::Micros stamp, co
   still_s_ += dt_s;
   still_rate_radps_ += (rate_b_radps_ - still_rate_radps_) * (dt_s / (still_s_ > dt_s ? still_s_ : dt_s));
   stand(stamp, with);
+  constrain(stamp, with);
   return {.verdict = can::Verdict::kAccepted};
 }
 

@@ -28,6 +28,7 @@ inline Innovation Inertial::fuse(const WheelCounts& counts, base::Micros stamp, 
 inline Innovation Inertial::forward(const Forward& speed, base::Micros stamp, const Context& with) {
   const InertialNumbers& n = with.numbers.inertial;
   if (phase_ != Phase::kTracking) return {.verdict = can::Verdict::kAccepted};
+  constrained_ = stamp;
   const float slip = n.slip_share * (speed.mps < 0 ? -speed.mps : speed.mps);
   const float sigma = base::sqrt(n.wheel_mps * n.wheel_mps + slip * slip + speed.sigma_mps * speed.sigma_mps);
   return measure(model::WheelSpeed{.forward_mps = speed.mps,
@@ -37,6 +38,14 @@ inline Innovation Inertial::forward(const Forward& speed, base::Micros stamp, co
                                    .axle_b_m = {n.axle_x_b_m, 0.0F, 0.0F},
                                    .gyro_b_radps = rate_b_radps_},
                  kWheels, n.wheel_gate_scale, stamp, with);
+}
+
+/// A wheel speed of which nothing is known: the non-holonomic constraint is what it leaves.
+inline void Inertial::constrain(base::Micros stamp, const Context& with) {
+  const base::Micros every{with.numbers.inertial.constrain_every_us};
+  if (every.us <= 0 || stamp - constrained_ < every) return;
+  constexpr float kUnknown_mps = 1e4F;
+  static_cast<void>(forward({.sigma_mps = kUnknown_mps}, stamp, with));
 }
 
 }  // namespace tetap::app
