@@ -451,7 +451,8 @@ class Inertial(Case):
         epoch = 1.0 + np.arange(n)
         time_s = 0.01 * epoch
         draw = {name: scale * random.normal(0, sigma, (n, 3)) for name, sigma in self.std.items()}
-        rows = [[epoch[i], time_s[i], 2, 6, *(scale * random.normal(0, 0.3, 2)), 0, 0, 0, 0.3, 0.3, self.std["attitude"], 0, 0, 0, 1, 1] for i in range(n)]
+        xy = scale * random.multivariate_normal([0, 0], 0.09 * np.array([[1, 0.9], [0.9, 1]]), n)
+        rows = [[epoch[i], time_s[i], 2, 6, *xy[i], 0, 0, 0, 0.3, 0.3, self.std["attitude"], 0.9, 0, 0, 1, 1] for i in range(n)]
         self.write_rows("estimates.csv", metrics.ESTIMATES, rows)
         angle = draw["attitude"] + [0, 0, turn]
         length = np.linalg.norm(angle, axis=1, keepdims=True)
