@@ -20,6 +20,7 @@ struct FixNis {
 };
 
 /// S = H P H^T + R = L L^T, y = L^-1 nu: with up last, the horizontal part's NIS is on the way to the joint one.
+/// The first three columns of H are the identity.
 [[gnu::noinline]] inline FixNis nis_of(const nav::Ins::Covariance& p, const filter::Matrix<float, 3, 6>& h,
                                        const nav::Vector3& nu, const nav::Vector3& r) {
   constexpr auto& kTouches = model::GnssFix3d::kTouches;
@@ -32,15 +33,15 @@ struct FixNis {
     filter::Vector<float, 6> hp;
 #pragma GCC unroll 1
     for (int c = 0; c < 6; ++c) {
-      hp(c) = 0;
+      hp(c) = p(i, touch(c));
 #pragma GCC unroll 1
-      for (int k = 0; k < 6; ++k) hp(c) += h(i, k) * p(touch(k), touch(c));
+      for (int k = 3; k < 6; ++k) hp(c) += h(i, k) * p(touch(k), touch(c));
     }
     y(i) = nu(i);
     for (int j = 0; j <= i; ++j) {
-      float s = i == j ? r(i) : 0.0F;
+      float s = i == j ? hp(j) + r(i) : hp(j);
 #pragma GCC unroll 1
-      for (int k = 0; k < 6; ++k) s += hp(k) * h(j, k);
+      for (int k = 3; k < 6; ++k) s += hp(k) * h(j, k);
       for (int k = 0; k < j; ++k) s -= l(i, k) * l(j, k);
       if (j < i) {
         l(i, j) = s / l(j, j);
