@@ -23,14 +23,18 @@ namespace tetap::app {
 
 class BaroZero {
  public:
-  /// Of the zero to a sample's time and height.
-  void predict(float altitude_m, base::Micros stamp, const BaroNumbers& n) {
-    const float dt_s = base::seconds(stamp - last_);
-    const float climbed = n.scale_share * (altitude_m - altitude_m_);
-    if (dt_s > 0.0F) p_ += n.drift_m_rts * n.drift_m_rts * dt_s + climbed * climbed;
-    if (stamp - last_ > kGap) agreed_ = stamp;
+  /// Of the zero to a sample's time.
+  void predict(base::Micros stamp, const BaroNumbers& n) {
+    const base::Micros since = stamp - last_;
+    if (since.us > 0) p_ += n.drift_m_rts * n.drift_m_rts * base::seconds(since);
+    if (since > kGap) agreed_ = stamp;
     last_ = stamp;
-    altitude_m_ = altitude_m;
+  }
+  /// Of a height above the zero, at this one: air that is not the standard's is off by a share of what was climbed
+  /// since the zero was found.
+  [[nodiscard]] float variance(float altitude_m, const BaroNumbers& n) const {
+    const float air_m = n.scale_share * (altitude_m - altitude_m_);
+    return p_ + air_m * air_m;
   }
   void set(float altitude_m, float zero_m, float variance, base::Micros stamp) {
     altitude_m_ = altitude_m;
@@ -39,15 +43,15 @@ class BaroZero {
     last_ = agreed_ = stamp;
     known_ = true;
   }
-  /// By a height of variance p_z < variance() that says the zero should be `nu` higher.
-  void correct(float nu, float p_z, float white) {
-    const float k = p_ / (p_ + variance_towards(p_z, p_) + white);
+  /// From its variance p by a height of variance p_z < p that says the zero should be `nu` higher.
+  void correct(float nu, float p, float p_z, float white, float altitude_m) {
+    const float k = p / (p + variance_towards(p_z, p) + white);
     zero_m_ += k * nu;
-    p_ -= k * p_;
+    p_ = p - k * p;
+    altitude_m_ = altitude_m;
   }
   [[nodiscard]] bool known() const { return known_; }
   [[nodiscard]] float zero_m() const { return zero_m_; }
-  [[nodiscard]] float variance() const { return p_; }
   void agreed(base::Micros stamp) { agreed_ = stamp; }
   [[nodiscard]] base::Micros refused_for(base::Micros stamp) const { return stamp - agreed_; }
 
@@ -63,7 +67,8 @@ class BaroZero {
 
  private:
   static constexpr base::Micros kGap{1'000'000};  ///< of silence does not count as refused
-  float zero_m_ = 0, p_ = 0, altitude_m_ = 0;
+  float zero_m_ = 0, p_ = 0;
+  float altitude_m_ = 0;  ///< where the zero was found
   bool known_ = false;
   base::Micros last_, agreed_;
 };

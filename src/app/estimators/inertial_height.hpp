@@ -21,8 +21,8 @@ namespace tetap::app {
     baro_.set(altitude_m, altitude_m - height_m, p_z + white, stamp);
     return {.verdict = can::Verdict::kAccepted};
   }
-  baro_.predict(altitude_m, stamp, n);
-  const float p_b = baro_.variance();
+  baro_.predict(stamp, n);
+  const float p_b = baro_.variance(altitude_m, n);
   const float nu = altitude_m - baro_.zero_m() - height_m;
   const float gate = n.gate_scale * filter::chi_square_99(1);
   Innovation result{.verdict = can::Verdict::kRejected, .dof = 1, .nis = nu * nu / (p_z + p_b + white), .gate = gate};
@@ -40,7 +40,7 @@ namespace tetap::app {
     const model::Height model{.z = ins_.x.z.plus(nu), .sigma_m = base::sqrt(white + variance_towards(p_b, p_z))};
     static_cast<void>(ins_.update(model, base::kInfinity));
   } else if (p_b > kWorth * p_z) {
-    baro_.correct(nu, p_z, white);
+    baro_.correct(nu, p_b, p_z, white, altitude_m);
   }
   return result;
 }
