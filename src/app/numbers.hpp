@@ -89,14 +89,23 @@ struct InertialNumbers {
   float level_s = 1;             ///< how long gravity is looked at
   float gap_mps2 = 3;            ///< what may have happened while samples were missing
   float gap_radps = 1;
-  float still_radps = 0.03F;  ///< turning slower than this, wheels still: standing
-  float still_mps = 0.005F;
-  float wheel_mps = 0.02F;    ///< 1 sigma of the wheels' speed at standstill
-  float slip_share = 0.02F;   ///< and what grows with speed
-  float lateral_mps = 0.05F;  ///< how well it does not move sideways
+  float gap_wheels_radps = 0.1F;    ///< the same for turning, while wheels show how it turns
+  std::int32_t stuck_samples = 10;  ///< repeated so often, a sample is one of a stuck sensor; 0: never
+  std::int32_t stale_us = 100'000;  ///< without a sample for longer: bridged
+  float vibration_mps2 = 4;         ///< RMS up to which the noise densities hold; beyond, they grow with it
+  float vibration_radps = 0.4F;     ///< likewise
+  float calm_mps2 = 0.1F;           ///< RMS below which it may be standing, where wheels do not tell
+  float calm_radps = 0.01F;
+  float still_radps = 0.03F;    ///< turning slower than this, wheels still: standing
+  float still_mps = 0.005F;     ///< 1 sigma of standing as wheels tell it,
+  float still_gnss_mps = 0.1F;  ///< and as IMU and GNSS velocity do
+  float wheel_mps = 0.02F;      ///< 1 sigma of the wheels' speed at standstill
+  float slip_share = 0.02F;     ///< and what grows with speed
+  float lateral_mps = 0.05F;    ///< how well it does not move sideways
   float vertical_mps = 0.05F;
   float axle_x_b_m = 0;  ///< the axle that does not steer
   float wheel_gate_scale = 1;
+  float slip_mps = 0.15F;  ///< off by more of it and 4 sigma, for long enough, a wheel is spinning; 0: not watched
   /// Without a wheel speed for so long, it does at least not move sideways or up, said this often; 0: it may.
   std::int32_t constrain_every_us = 0;
 };
@@ -214,7 +223,8 @@ constexpr void each_number(const Numbers& n, Sink&& sink) {
   all(i.imu, i.gyro_radps_rthz, i.accel_mps2_rthz, i.gyro_bias_radps2_rthz, i.accel_bias_mps3_rthz,
       i.gyro_turn_on_radps, i.accel_turn_on_mps2, i.start_tilt_rad, i.level_s, i.gap_mps2, i.gap_radps, i.still_radps,
       i.still_mps, i.wheel_mps, i.slip_share, i.lateral_mps, i.vertical_mps, i.axle_x_b_m, i.wheel_gate_scale,
-      i.constrain_every_us);
+      i.constrain_every_us, i.gap_wheels_radps, i.stuck_samples, i.stale_us, i.vibration_mps2, i.vibration_radps,
+      i.calm_mps2, i.calm_radps, i.still_gnss_mps, i.slip_mps);
   const auto& m = n.magnetic;
   for (const float v : m.hard_iron_uT) sink(v);
   for (const float v : m.soft_iron) sink(v);

@@ -84,6 +84,15 @@ consteval Numbers checked(const Numbers& n) {
   require(positive(g.align_distance_m), "gnss.align_distance_m: above 0");
 
   require(n.inertial.constrain_every_us >= 0, "inertial.constrain_every_us: not below 0");
+  const auto& i = n.inertial;
+  require(i.stuck_samples >= 0 && i.stuck_samples <= 255, "inertial.stuck_samples: 0 to 255");
+  require(i.stale_us > 0 && i.stale_us <= 10'000'000, "inertial.stale_us: 1 to 10000000");
+  require(positive(i.vibration_mps2) && positive(i.vibration_radps), "inertial.vibration_*: above 0");
+  require(not_negative(i.calm_mps2) && not_negative(i.calm_radps), "inertial.calm_*: not below 0");
+  require(positive(i.gap_wheels_radps), "inertial.gap_wheels_radps: above 0");
+  require(positive(i.still_mps) && positive(i.still_gnss_mps), "inertial.still_mps, still_gnss_mps: above 0");
+  require(not_negative(i.slip_mps) && not_negative(i.slip_share), "inertial.slip_*: not below 0");
+
   const auto& m = n.magnetic;
   require(m.declination_rad > -3.2F && m.declination_rad < 3.2F, "magnetic.declination_rad: -pi to pi");
   require(finite(m.hard_iron_uT[0]) && finite(m.hard_iron_uT[1]) && finite(m.hard_iron_uT[2]),

@@ -9,7 +9,9 @@
 #include "app/estimators/baro_zero.hpp"
 #include "app/estimators/field_guard.hpp"
 #include "app/estimators/fix_trust.hpp"
+#include "app/estimators/imu_watch.hpp"
 #include "app/estimators/inertial_start.hpp"
+#include "app/estimators/slip_watch.hpp"
 #include "app/sample.hpp"
 #include "model/gnss_fix_3d.hpp"
 #include "nav/ins.hpp"
@@ -45,12 +47,8 @@ class Inertial {
 
   Innovation fuse(const ImuSample& sample, base::Micros stamp, const Context& with);
   Innovation fuse(const WheelCounts& counts, base::Micros stamp, const Context& with);
-  Innovation fuse(const WheelSpeeds& speeds, base::Micros stamp, const Context& with) {
-    return forward({.mps = 0.5F * (speeds.left_mps + speeds.right_mps)}, stamp, with);
-  }
-  Innovation fuse(const BodySpeed& speed, base::Micros stamp, const Context& with) {
-    return forward({.mps = with.numbers.wheels.speed_scale * speed.forward_mps}, stamp, with);
-  }
+  Innovation fuse(const WheelSpeeds& speeds, base::Micros stamp, const Context& with);
+  Innovation fuse(const BodySpeed& speed, base::Micros stamp, const Context& with);
   Innovation fuse(const GnssPosition& fix, base::Micros stamp, const Context& with);
   Innovation fuse(const GnssVelocity& velocity, base::Micros stamp, const Context& with);
   Innovation fuse(const OutsideHeading& heading, base::Micros stamp, const Context& with);
@@ -59,20 +57,10 @@ class Inertial {
 
   /// The present: what the filter has, carried over the samples of the window.
   template <class Window>
-  void advance(base::Micros t, const Context& with, Window&& window) {
-    now_ = t;
-    ahead_ = nav::ImuChunk::with_biases_of(ins_.x);
-    last_rate_b_radps_ = rate_b_radps_;
-    if (phase_ != Phase::kTracking) return;
-    window([&](const Sample& sample) {
-      if (sample.sensor != can::Sensor::kImu || sample.instance != with.numbers.inertial.imu) return;
-      const nav::ImuIncrement increment = increment_of(sample.payload.imu, with.numbers.inertial);
-      if (increment.check() != nav::ImuVerdict::kAccepted) return;
-      ahead_.add(increment);
-      last_rate_b_radps_ = increment.dtheta_b_rad / base::seconds(increment.dt);
-    });
-  }
+  void advance(base::Micros t, const Context& with, Window&& window);
 
+  /// Bits of can::Fault: what is wrong with the IMU and the wheels.
+  [[nodiscard]] std::uint16_t faults() const;
   /// The last step that fixes which persisted made the position take.
   [[nodiscard]] const Jump& jump() const { return jump_; }
 
@@ -87,6 +75,12 @@ class Inertial {
       case Phase::kTracking:
         break;
     }
+    constexpr base::Micros kLately{1'000'000};
+    if (blind_ || imu_.stuck_lately(time_) || (bridged_.us > 0 && time_ - bridged_ < kLately)) {
+      const bool carried = time_ - counts_time_ < kLately || time_ - last_position_ < base::Micros{3'000'000};
+      return carried ? can::Mode::kDegraded : can::Mode::kWaitingForImu;
+    }
+    if (slip_.slip() != SlipWatch::Slip::kNone) return can::Mode::kDegraded;
     for (const Refused& refused : refused_)
       if (refused.in_a_row >= 3) return can::Mode::kDegraded;
     return time_ - last_position_ > base::Micros{3'000'000} ? can::Mode::kDeadReckoning : can::Mode::kNominal;
@@ -123,6 +117,14 @@ class Inertial {
   }
   void begin(const Context& with);
   void stand(base::Micros stamp, const Context& with);
+  [[nodiscard]] bool resting(base::Micros stamp, const Context& with) const;
+  void hear_ground(const nav::Vector3& v_n_mps, float sigma_mps, base::Micros stamp, const Context& with);
+  [[nodiscard]] bool turn_known(base::Micros at) const;
+  [[nodiscard]] bool without_imu() const;
+  void bridge(base::Micros gap, const Context& with);
+  void doubt(float sigma_mps, float sigma_rad);
+  [[nodiscard]] nav::ImuIncrement unseen(base::Micros gap, const nav::Vector3& w_b_radps) const;
+  Innovation roll(const SlipWatch::Wheels& wheels, float sigma_mps, base::Micros stamp, const Context& with);
   Innovation forward(const Forward& speed, base::Micros stamp, const Context& with);
   void constrain(base::Micros stamp, const Context& with);
   [[nodiscard]] bool believe(const nav::Vector3& nu, const nav::Vector3& r, bool agrees, base::Micros stamp,
@@ -150,8 +152,19 @@ class Inertial {
   bool have_counts_ = false;
   nav::Vector3 rate_b_radps_ = nav::Vector3::Zero();  ///< as the gyroscope shows it, at the filter's time
   nav::Vector3 last_rate_b_radps_ = nav::Vector3::Zero();
-  nav::Vector3 still_rate_radps_ = nav::Vector3::Zero();  ///< mean since it stands
+  nav::Vector3 still_rate_radps_ = nav::Vector3::Zero();  ///< mean over the last still_s_ of standing
   float still_s_ = 0;
+  nav::Vector3 ground_mps_ = nav::Vector3::Zero();  ///< mean of GNSS velocities since the IMU is calm
+  std::int32_t grounds_ = 0;
+  base::Micros ground_;   ///< last of them
+  base::Micros calm_;     ///< since when the IMU shows no motion; 0: it does
+  base::Micros bridged_;  ///< up to where the filter last went without IMU
+  base::Micros wheels_;   ///< last stamp at which wheels said how it turns,
+  float wheel_turn_radps_ = 0;
+  bool blind_ = false;     ///< the present is without IMU
+  bool unusable_ = false;  ///< the last IMU sample was
+  ImuWatch imu_;
+  SlipWatch slip_;
   std::array<Refused, kSources> refused_{};
   FirstFixes first_fixes_;
   FrozenFix frozen_;

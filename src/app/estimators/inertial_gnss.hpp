@@ -201,6 +201,7 @@ inline Innovation Inertial::fuse(const GnssVelocity& velocity, base::Micros stam
     return {.verdict = can::Verdict::kAccepted};
   }
   if (frozen_.frozen()) return {.verdict = can::Verdict::kStale};
+  hear_ground(v_n, sigma, stamp, with);
   return measure(model::GnssVelocity3d{.v_n_mps = v_n,
                                        .sigma_horizontal_mps = sigma,
                                        .sigma_vertical_mps = 1.5F * sigma,

@@ -9,28 +9,162 @@
 namespace tetap::app {
 
 inline Innovation Inertial::fuse(const ImuSample& sample, base::Micros stamp, const Context& with) {
-  const nav::ImuIncrement increment = increment_of(sample, with.numbers.inertial);
+  const InertialNumbers& n = with.numbers.inertial;
+  nav::ImuIncrement increment = increment_of(sample, n);
   if (increment.check() != nav::ImuVerdict::kAccepted) return {.verdict = can::Verdict::kNotFinite};
   const float dt_s = base::seconds(increment.dt);
+  const bool was_stuck = imu_.stuck();
+  if (!imu_.hear(sample, stamp, n)) {
+    // Those before it were taken for what they said.
+    const float false_s = static_cast<float>(n.stuck_samples) * dt_s;
+    if (!was_stuck && phase_ == Phase::kTracking) doubt(n.gap_mps2 * false_s, n.gap_radps * false_s);
+    return {.verdict = can::Verdict::kStale};
+  }
+  // At full scale a gyroscope does not show its turn. Where wheels do, it is as if it were not there.
+  if (phase_ == Phase::kTracking && sample.clipped_gyro > 0 && turn_known(stamp)) {
+    unusable_ = true;
+    return {.verdict = can::Verdict::kNotUsed};
+  }
   rate_b_radps_ = increment.dtheta_b_rad / dt_s;
   if (phase_ != Phase::kTracking) {
     time_ = stamp;
-    if (start_.level(increment, with.numbers.inertial)) phase_ = Phase::kHeading;
+    if (start_.level(increment, n)) phase_ = Phase::kHeading;
     if (phase_ == Phase::kHeading && start_.ready()) begin(with);
     return {.verdict = can::Verdict::kAccepted};
   }
-  // Lost samples: what is missing between the last and the begin of this one is bridged.
+  // Lost samples: what is missing between the last and the begin of this one is bridged. What was bridged already it
+  // does not tell again.
   const base::Micros gap = stamp - increment.dt - time_;
-  if (gap > base::Micros{1'500})
-    ins_.predict_without_imu(gap, with.numbers.inertial.gap_mps2, with.numbers.inertial.gap_radps);
+  unusable_ = false;
+  if (2 * gap.us < -increment.dt.us) return {.verdict = can::Verdict::kStale};
+  if (gap > base::Micros{1'500}) {
+    const nav::Vector3 shown = rate_b_radps_;
+    bridge(gap, with);
+    if (gap <= base::Micros{n.stale_us}) bridged_ = {};  // a few lost are not an IMU that is
+    rate_b_radps_ = shown;
+  }
   if (ins_.predict(increment) != nav::ImuVerdict::kAccepted) return {.verdict = can::Verdict::kNotFinite};
-  ins_.predict_covariance(sample.clipped_accel + sample.clipped_gyro > 0 ? 10.0F : 1.0F);
+  ins_.predict_covariance(imu_.noise_factor(n));
+  // Clipped increments are used, and are as uncertain as none.
+  const float growth = base::sqrt(dt_s * 0.1F);
+  if (sample.clipped_accel > 0 || sample.clipped_gyro > 0)
+    doubt(n.gap_mps2 * growth, sample.clipped_gyro > 0 ? n.gap_radps * growth : 0.0F);
   time_ = stamp;
   still_s_ += dt_s;
   still_rate_radps_ += (rate_b_radps_ - still_rate_radps_) * (dt_s / (still_s_ > dt_s ? still_s_ : dt_s));
   stand(stamp, with);
   constrain(stamp, with);
   return {.verdict = can::Verdict::kAccepted};
+}
+
+/// Velocity and attitude may be off by this, too.
+[[gnu::noinline]] inline void Inertial::doubt(float sigma_mps, float sigma_rad) {
+  for (int i = 3; i < 6; ++i) {
+    ins_.p(i, i) += sigma_mps * sigma_mps;
+    ins_.p(3 + i, 3 + i) += sigma_rad * sigma_rad;
+  }
+}
+
+/// Wheels have said of late how it turns.
+inline bool Inertial::turn_known(base::Micros at) const {
+  return wheels_.us > 0 && at - wheels_ < base::Micros{200'000} && slip_.slip() == SlipWatch::Slip::kNone;
+}
+
+/// The last that the filter went was without IMU.
+inline bool Inertial::without_imu() const {
+  return imu_.stuck() || unusable_ || (bridged_.us > 0 && bridged_ == time_);
+}
+
+/// Goes on without IMU: the velocity stays what it is in the body, which turns as the wheels say, or not at all.
+[[gnu::noinline]] inline void Inertial::bridge(base::Micros gap, const Context& with) {
+  const InertialNumbers& n = with.numbers.inertial;
+  const bool wheels = turn_known(time_);
+  const float dt_s = base::seconds(gap);
+  ins_.predict_without_imu(gap, n.gap_mps2, wheels ? n.gap_wheels_radps : n.gap_radps);
+  nav::Vector3 w_b = nav::Vector3::Zero();
+  if (wheels) {
+    w_b(2) = wheel_turn_radps_;
+    const nav::Quaternion turn = nav::exp_quaternion(ins_.x.q_nb.rotate(w_b) * dt_s);
+    ins_.x.q_nb = (turn * ins_.x.q_nb).renormalised();
+    ins_.x.v_n_mps = turn.rotate(ins_.x.v_n_mps);
+    // Both wheels slip by their share, each on its own, for about a second the same.
+    const float slip = n.slip_share * n.slip_share * 2.0F * ins_.x.v_n_mps.squaredNorm();
+    const float track_m = with.numbers.wheels.drive.track_m;
+    ins_.p(8, 8) += slip / (track_m * track_m) * dt_s;
+  }
+  rate_b_radps_ = ins_.x.b_g_radps + w_b;
+  time_ += gap;
+  bridged_ = time_;
+  still_s_ = 0;
+  calm_ = {};
+}
+
+/// What an IMU would have shown that went on straight, level as it was, but for a turn.
+inline nav::ImuIncrement Inertial::unseen(base::Micros gap, const nav::Vector3& w_b_radps) const {
+  const float dt_s = base::seconds(gap);
+  const nav::Quaternion n_b = (ins_.x.q_nb * ahead_.q).conjugate();
+  const nav::Vector3 v_b = n_b.rotate(ins_.x.v_n_mps);
+  const nav::Vector3 f_b = n_b.rotate({0.0F, 0.0F, ins_.earth.gravity_mps2}) + nav::cross(w_b_radps, v_b);
+  return {.dtheta_b_rad = (ins_.x.b_g_radps + w_b_radps) * dt_s, .dv_b_mps = (ins_.x.b_a_mps2 + f_b) * dt_s, .dt = gap};
+}
+
+template <class Window>
+void Inertial::advance(base::Micros t, const Context& with, Window&& window) {
+  const InertialNumbers& n = with.numbers.inertial;
+  now_ = t;
+  if (phase_ == Phase::kTracking) {
+    // Where nothing comes any more that the filter could still fuse: up to there it goes without.
+    const base::Micros far = t - base::Micros{with.numbers.loop.window_us + with.numbers.loop.period_us};
+    if (far > time_ && (imu_.stuck() || unusable_ || imu_.stale(far, n))) {
+      bridge(far - time_, with);
+      stand(time_, with);
+    }
+  }
+  ahead_ = nav::ImuChunk::with_biases_of(ins_.x);
+  last_rate_b_radps_ = rate_b_radps_;
+  if (phase_ != Phase::kTracking) return;
+  Repeats repeats = imu_.repeats();
+  base::Micros last = time_;
+  const auto go_on = [&](base::Micros until) {
+    const base::Micros gap = until - (time_ + ahead_.dt);
+    if (gap <= base::Micros{1'500}) return;
+    nav::Vector3 w_b = nav::Vector3::Zero();
+    if (gap <= base::Micros{n.stale_us}) {
+      w_b = last_rate_b_radps_ - ins_.x.b_g_radps;
+    } else if (turn_known(time_)) {
+      w_b(2) = wheel_turn_radps_;
+    }
+    ahead_.add(unseen(gap, w_b));
+  };
+  window([&](const Sample& sample) {
+    if (sample.sensor != can::Sensor::kImu || sample.instance != n.imu) return;
+    if (repeats.hear(sample.payload.imu, n.stuck_samples)) return;
+    if (sample.payload.imu.clipped_gyro > 0 && turn_known(time_)) return;
+    const nav::ImuIncrement increment = increment_of(sample.payload.imu, n);
+    if (increment.check() != nav::ImuVerdict::kAccepted) return;
+    const base::Micros begin = sample.stamp - increment.dt;
+    if (2 * (begin - (time_ + ahead_.dt)).us < -increment.dt.us) return;
+    go_on(begin);
+    ahead_.add(increment);
+    last = sample.stamp;
+    last_rate_b_radps_ = increment.dtheta_b_rad / base::seconds(increment.dt);
+  });
+  go_on(t);
+  blind_ = t - last > base::Micros{n.stale_us};
+}
+
+/// For the status of the present.
+inline std::uint16_t Inertial::faults() const {
+  std::uint16_t bits = 0;
+  const auto raise = [&bits](can::Fault fault, bool is) {
+    if (is) bits = static_cast<std::uint16_t>(bits | 1U << static_cast<unsigned>(fault));
+  };
+  raise(can::Fault::kWheelSlip, slip_.slip() != SlipWatch::Slip::kNone);
+  raise(can::Fault::kImuClipped, imu_.clipped_lately(time_));
+  raise(can::Fault::kVibration, imu_.shaken());
+  raise(can::Fault::kSensorStuck, imu_.stuck());
+  raise(can::Fault::kInputStale, blind_ && !imu_.stuck() && !unusable_);
+  return bits;
 }
 
 /// The filter begins where the start found the robot.
@@ -43,24 +177,49 @@ inline void Inertial::begin(const Context& with) {
   still_s_ = 0;
 }
 
-/// Wheels that have not turned for half a second: no velocity, and the gyroscope's mean is its bias.
+/// Standing: wheels that have not turned for half a second; without wheels, see resting(). Then there is no velocity,
+/// and what the gyroscope shows is its bias. What goes unnoticed at standstill may be the same all the time: it is told
+/// only to a filter that knows less, and each mean of the gyroscope has samples of its own.
 inline void Inertial::stand(base::Micros stamp, const Context& with) {
   const InertialNumbers& n = with.numbers.inertial;
   constexpr base::Micros kQuiet{500'000}, kEvery{100'000};
-  const bool quiet = have_counts_ && stamp - counts_time_ < kEvery && stamp - moved_ > kQuiet;
+  const bool gyro = !without_imu();
   const nav::Vector3 turn = rate_b_radps_ - ins_.x.b_g_radps;
+  if (!gyro || !imu_.calm(n)) {
+    calm_ = {};
+  } else if (calm_.us == 0) {
+    calm_ = stamp;
+    grounds_ = 0;
+  }
+  const bool wheels = have_counts_ && stamp - counts_time_ < kEvery;
+  const bool quiet = wheels ? stamp - moved_ > kQuiet && slip_.slip() == SlipWatch::Slip::kNone : resting(stamp, with);
   if (!quiet || turn.squaredNorm() > n.still_radps * n.still_radps) {
     still_s_ = 0;
     return;
   }
-  if (stamp - stood_ < kEvery) return;
-  stood_ = stamp;
-  static_cast<void>(ins_.update(model::ZeroVelocity{.sigma_mps = n.still_mps}, filter::chi_square_99(3) * 4.0F));
-  if (still_s_ < 0.5F) return;
-  // The mean over the standstill so far; successive means share their samples, so the sigma is that of the last tenth.
-  const float sigma = 3.0F * n.gyro_radps_rthz * base::sqrt(10.0F);
-  static_cast<void>(ins_.update(model::ZeroRate{.gyro_b_radps = still_rate_radps_, .sigma_radps = sigma},
-                                filter::chi_square_99(3) * 4.0F));
+  const auto gate = [](int dof) { return filter::chi_square_99(dof) * 4.0F; };
+  const float sigma = wheels ? n.still_mps : n.still_gnss_mps;
+  if (stamp - stood_ >= kEvery) {
+    stood_ = stamp;
+    const float least = sigma * sigma;
+    if (ins_.p(3, 3) > least || ins_.p(4, 4) > least || ins_.p(5, 5) > least)
+      static_cast<void>(ins_.update(model::ZeroVelocity{.sigma_mps = sigma}, gate(3)));
+  }
+  constexpr float kMean_s = 0.5F;
+  if (still_s_ < kMean_s || !gyro) return;
+  const float sigma_radps = 2.0F * n.gyro_radps_rthz * base::sqrt(1.0F / still_s_);
+  static_cast<void>(
+      ins_.update(model::ZeroRate{.gyro_b_radps = still_rate_radps_, .sigma_radps = sigma_radps}, gate(3)));
+  still_s_ = 0;
+}
+
+/// The IMU has shown for a second nothing but its own noise, which it also does at constant velocity; and the mean of
+/// what GNSS said of it meanwhile is none.
+inline bool Inertial::resting(base::Micros stamp, const Context& with) const {
+  const float most = with.numbers.inertial.still_gnss_mps;
+  constexpr base::Micros kLong{1'000'000};
+  return calm_.us > 0 && stamp - calm_ > kLong && grounds_ >= 5 && stamp - ground_ < kLong &&
+         ground_mps_.squaredNorm() < most * most;
 }
 
 }  // namespace tetap::app

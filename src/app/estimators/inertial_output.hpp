@@ -10,7 +10,8 @@ inline InertialEstimate Inertial::inertial(const Context&) const {
   return {.state = phase_ == Phase::kTracking ? ahead_.apply(ins_.x, ins_.earth) : ins_.x,
           .p = ins_.p,
           .valid = phase_ == Phase::kTracking,
-          .jump = jump_};
+          .jump = jump_,
+          .imu = imu_.health()};
 }
 
 inline Estimate Inertial::estimate(const Context& with) const {
@@ -64,6 +65,12 @@ void Inertial::each_bit(Sink&& sink) const {
   sink(last_position_.us);
   sink(moved_.us);
   sink(still_s_);
+  for (const base::Micros at : {ground_, calm_, bridged_, wheels_}) sink(at.us);
+  for (int i = 0; i < 3; ++i) sink(ground_mps_(i));
+  sink(grounds_);
+  sink(wheel_turn_radps_);
+  imu_.each_bit(sink);
+  slip_.each_bit(sink);
   for (const Refused& refused : refused_) {
     sink(refused.in_a_row);
     sink(refused.since.us);

@@ -20,9 +20,80 @@ inline Innovation Inertial::fuse(const WheelCounts& counts, base::Micros stamp, 
   if (!usable || left != 0 || right != 0) moved_ = stamp;
   if (!usable) return {.verdict = can::Verdict::kAccepted};
   const float per_s = 1.0F / base::seconds(interval);
-  return forward(
-      {.mps = 0.5F * (drive.left_m(left) + drive.right_m(right)) * per_s, .sigma_mps = 0.41F * drive.left_m(1) * per_s},
-      stamp, with);
+  const SlipWatch::Wheels wheels{.left_mps = drive.left_m(left) * per_s, .right_mps = drive.right_m(right) * per_s};
+  return roll(wheels, 0.41F * drive.left_m(1) * per_s, stamp, with);
+}
+
+inline Innovation Inertial::fuse(const WheelSpeeds& speeds, base::Micros stamp, const Context& with) {
+  return roll({.left_mps = speeds.left_mps, .right_mps = speeds.right_mps}, 0.0F, stamp, with);
+}
+
+/// No wheels to compare: only its gate judges it.
+inline Innovation Inertial::fuse(const BodySpeed& speed, base::Micros stamp, const Context& with) {
+  return forward({.mps = with.numbers.wheels.speed_scale * speed.forward_mps}, stamp, with);
+}
+
+/// Two wheels, as far as they roll: their mean; of one that rolls while the other spins, what the gyroscope leaves of
+/// it at the middle of the axle; of two that spin nothing.
+inline Innovation Inertial::roll(const SlipWatch::Wheels& wheels, float sigma_mps, base::Micros stamp,
+                                 const Context& with) {
+  const InertialNumbers& n = with.numbers.inertial;
+  const float track_m = with.numbers.wheels.drive.track_m;
+  if (!base::is_finite(wheels.left_mps) || !base::is_finite(wheels.right_mps))
+    return {.verdict = can::Verdict::kNotFinite};
+  const float mean = 0.5F * (wheels.left_mps + wheels.right_mps);
+  if (phase_ != Phase::kTracking || !(track_m > 0)) return forward({.mps = mean, .sigma_mps = sigma_mps}, stamp, with);
+  // Without a gyroscope the wheels are all that shows turning, and cannot be judged by it.
+  const bool gyro = !without_imu();
+  const nav::Vector3 w_b = rate_b_radps_ - ins_.x.b_g_radps;
+  const nav::Vector3 v_b = ins_.x.q_nb.conjugate().rotate(ins_.x.v_n_mps);
+  const float turn = gyro ? track_m * w_b(2) : wheels.right_mps - wheels.left_mps;
+  const float worst = ins_.p(3, 3) > ins_.p(4, 4) ? ins_.p(3, 3) : ins_.p(4, 4);
+  const auto slip =
+      slip_.hear(wheels, {.forward_mps = v_b(0), .sigma_mps = base::sqrt(worst), .turn_mps = turn}, stamp, n);
+  if (slip == SlipWatch::Slip::kNone) {
+    wheels_ = stamp;
+    wheel_turn_radps_ = (wheels.right_mps - wheels.left_mps) / track_m;
+    return forward({.mps = mean, .sigma_mps = sigma_mps}, stamp, with);
+  }
+  if (slip == SlipWatch::Slip::kBoth) {
+    refused_or_not(kWheels, true, stamp);
+    // Where GNSS holds the filter's velocity the wheels are wrong; without it, the filter may as well be.
+    if (stamp - last_position_ > base::Micros{1'000'000} &&
+        stamp - refused_[kWheels].since >= base::Micros{with.numbers.recovery.after_us}) {
+      recover(nav::Vector3(nav::Vector3::Zero()), kWheels, with.numbers.recovery);
+      doubt(mean - v_b(0), 0.0F);
+      slip_.forget();
+    }
+    return {.verdict = can::Verdict::kRejected};
+  }
+  if (!gyro) return {.verdict = can::Verdict::kRejected};
+  const float one = slip == SlipWatch::Slip::kLeft ? wheels.right_mps - 0.5F * turn : wheels.left_mps + 0.5F * turn;
+  constexpr float kOne = 1.42F;  // of one wheel, not the mean of two
+  const float alone = kOne * n.slip_share * v_b(0);
+  return forward({.mps = one, .sigma_mps = base::sqrt(2.0F * sigma_mps * sigma_mps + alone * alone)}, stamp, with);
+}
+
+/// GNSS velocity: what the wheels, and standing still, are held against.
+[[gnu::noinline]] inline void Inertial::hear_ground(const nav::Vector3& v_n_mps, float sigma_mps, base::Micros stamp,
+                                                    const Context& with) {
+  if (calm_.us > 0) {
+    ++grounds_;
+    const auto share = 1.0F / static_cast<float>(grounds_ < 25 ? grounds_ : 25);
+    ground_mps_ += (v_n_mps - ground_mps_) * share;
+  }
+  ground_ = stamp;
+  const nav::Vector3 antenna_b{with.numbers.gnss.antenna_x_b_m - with.numbers.inertial.axle_x_b_m,
+                               with.numbers.gnss.antenna_y_b_m, with.numbers.gnss.antenna_z_b_m};
+  const nav::Vector3 w_b = rate_b_radps_ - ins_.x.b_g_radps;
+  const nav::Vector3 v_b = ins_.x.q_nb.conjugate().rotate(v_n_mps) - nav::cross(w_b, antenna_b);
+  // A heading that is not known turns speed ahead into speed sideways: its doubt counts here.
+  const float v2 = v_n_mps(0) * v_n_mps(0) + v_n_mps(1) * v_n_mps(1);
+  const float yaw2 = ins_.p(8, 8) < 1.0F ? ins_.p(8, 8) : 1.0F;
+  if (slip_.ground(v_b(0), base::sqrt(sigma_mps * sigma_mps + v2 * yaw2 * yaw2), stamp, with.numbers.inertial)) {
+    const float off = base::sqrt(nav::Vector3(v_n_mps - ins_.x.v_n_mps).squaredNorm());
+    doubt(off, 0.0F);
+  }
 }
 
 inline Innovation Inertial::forward(const Forward& speed, base::Micros stamp, const Context& with) {
