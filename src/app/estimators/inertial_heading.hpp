@@ -44,9 +44,13 @@ inline Innovation Inertial::fuse(const OutsideHeading& heading, base::Micros sta
   }
   const auto at = direction.linearised(ins_.x);
   const float nu = direction.residual(at.z_hat)(0);
-  float p = 0;
-  for (int c = 0; c < 3; ++c)
-    for (int r = 0; r < 3; ++r) p += at.h(0, r) * ins_.p(6 + r, 6 + c) * at.h(0, c);
+  float p = 0, with_yaw = 0;  // of the direction; of it with the heading
+  for (int c = 0; c < 3; ++c) {
+    float column = 0;
+    for (int r = 0; r < 3; ++r) column += at.h(0, r) * ins_.p(6 + r, 6 + c);
+    p += column * at.h(0, c);
+    with_yaw = column;
+  }
   const float floor = n.sigma_rad * n.sigma_rad;
   const float gate = n.gate_scale * filter::chi_square_99(1);
   Innovation result{.verdict = can::Verdict::kAccepted, .dof = 1, .nis = nu * nu / (p + floor), .gate = gate};
@@ -65,8 +69,10 @@ inline Innovation Inertial::fuse(const OutsideHeading& heading, base::Micros sta
   if (!agrees) result.verdict = can::Verdict::kRejected;
   if (agrees && !field_.believed()) result.verdict = can::Verdict::kNotUsed;
   constexpr float kWorth = 1.05F;  // of its variance the heading has to be off, for an update to change anything
-  if (result.verdict == can::Verdict::kAccepted && p > kWorth * floor) {
-    direction.sigma_rad = base::sqrt(variance_towards(floor, p));
+  const float p_yaw = ins_.p(8, 8);
+  if (result.verdict == can::Verdict::kAccepted && p_yaw > kWorth * floor) {
+    const float ends_there = with_yaw * with_yaw / (p_yaw - floor) - p;
+    direction.sigma_rad = base::sqrt(ends_there > floor ? ends_there : floor);
     static_cast<void>(ins_.update(direction, base::kInfinity));
   }
   return result;
