@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -188,6 +189,22 @@ TEST(Repeated, ManyFixesTellAsMuchAsTheirErrorsLeave) {
       EXPECT_NEAR(1 / information, truth, 0.25 * truth) << tau_s << " s, " << n;
       EXPECT_GE(1 / information, 0.75 * truth);
     }
+}
+
+TEST(Repeated, WhatAFilterMakesOfThemIsNeverWorseThanItSays) {
+  // The first fix has the weight 1, the others 1 / repeated(): the variance of that mean, from all covariances.
+  const double phi = std::exp(-0.2 / 20), weight = 1 / static_cast<double>(repeated(0.2F, 20.0F));
+  double sum = 0, squares = 0, with_last = 0, worst = 0;  // of the weights; of the mean; of the sum with the last
+  for (int n = 0; n < 5000; ++n) {
+    const double w = n == 0 ? 1 : weight;
+    with_last *= phi;
+    squares += 2 * w * with_last + w * w;
+    with_last += w;
+    sum += w;
+    worst = std::max(worst, squares / (sum * sum) * sum);
+  }
+  EXPECT_LT(worst, static_cast<double>(kNoLookingBack));
+  EXPECT_GT(worst, 0.98 * static_cast<double>(kNoLookingBack)) << "and no more is added than is needed";
 }
 
 TEST(Repeated, AFixAfterALongSilenceAndWhiteErrorsCountInFull) {

@@ -148,6 +148,10 @@ class FirstFixes {
   std::int32_t fixes_ = 0;
 };
 
+/// A filter that cannot look back gives the first of many such fixes the weight of two (the best weights share it with
+/// the last): its variance is up to a fifth above what the sum of their information promises.
+inline constexpr float kNoLookingBack = 1.22F;
+
 /// By how much the variance of a fix whose error lasts for `correlation_s` grows when the one before was `since_s` ago:
 /// with phi = exp(-t / tau), z_k - phi z_(k-1) has a white error of variance (1 - phi^2) r and sees (1 - phi) of the
 /// position: (1 + phi) / (1 - phi) (Bryson & Henrikson 1968, measurement differencing). A fix after a long silence

@@ -131,7 +131,8 @@ inline constexpr float kDecides = 4.0F;
   }
   if (height) height_.forget();
 
-  const float more = repeated(base::seconds(stamp - last_position_), n.correlation_s);
+  const float more =
+      n.correlation_s > 0.0F ? kNoLookingBack * repeated(base::seconds(stamp - last_position_), n.correlation_s) : 1.0F;
   fix.sigma_horizontal_m *= base::sqrt(more);
   fix.sigma_vertical_m *= base::sqrt(more);
   if (!height) {                    // the horizontal part alone
