@@ -22,7 +22,7 @@ OUTLIER = 5.0           # times the scatter
 
 
 def _sphere(count):
-    """Evenly spread directions (Fibonacci lattice; Gonzalez, "Measurement of areas on a sphere using Fibonacci and latitude-longitude lattices", 2010)."""
+    """Evenly spread directions (A. Gonzalez, "Measurement of areas on a sphere using Fibonacci and latitude-longitude lattices", 2010)."""
     k = np.arange(count)
     z = 1 - (2 * k + 1) / count
     angle = np.pi * (1 + 5**0.5) * k
@@ -81,7 +81,8 @@ def magnetometer(log):
         raise Refusal(f"{len(m)} magnetometer samples, 100 are needed.", how)
     extent = np.sqrt(np.linalg.eigvalsh(np.cov(m.T)))
     strength = np.median(np.linalg.norm(m, axis=1))
-    flat = (f"The magnetometer's readings spread over {2 * extent[2]:.1f} x {2 * extent[1]:.1f} x {2 * extent[0]:.1f} uT of a field of about {strength:.0f} uT: "
+    flat = (f"The magnetometer's readings spread over {2 * extent[2]:.1f} x {2 * extent[1]:.1f} x {2 * extent[0]:.1f} uT of a field of about "
+            f"{strength:.0f} uT: "
             "not enough attitudes for an ellipsoid.")
     if extent[0] < 0.1 * strength and extent[2] < 0.3 * strength:
         raise Refusal(flat, how)
@@ -121,11 +122,12 @@ def magnetometer(log):
             break
     centred = u[keep][np.unique(index, return_index=True)[1]]  # one direction of each cell
     if len(centred) < LEAST_CELLS:
-        raise Refusal(f"The field was seen from {len(centred)} of {CELLS} directions, {LEAST_CELLS} are needed: not enough attitudes for an ellipsoid.", how)
+        raise Refusal(f"The field was seen from {len(centred)} of {CELLS} directions, {LEAST_CELLS} are needed: "
+                      "not enough attitudes for an ellipsoid.", how)
     spread, axes = np.linalg.eigh(np.cov(centred.T))
     if spread[0] < LEAST_SPREAD:
-        raise Refusal(f"The field was seen from {len(centred)} of {CELLS} directions, too few of them along {AXES[int(np.argmax(np.abs(axes[:, 0])))]} "
-                      f"(spread {spread[0]:.3f} of 0.333): not enough attitudes for an ellipsoid.", how)
+        raise Refusal(f"The field was seen from {len(centred)} of {CELLS} directions, too few of them along "
+                      f"{AXES[int(np.argmax(np.abs(axes[:, 0])))]} (spread {spread[0]:.3f} of 0.333): not enough attitudes for an ellipsoid.", how)
     s = _soft(p)
     if np.linalg.eigvalsh(s).min() <= 0:
         raise Refusal("The readings do not lie on an ellipsoid.", how)
@@ -149,7 +151,8 @@ def magnetometer(log):
     part.residual(f"|m| - its median, {keep.sum()} samples", (raw[keep] - np.median(raw[keep])).std(), (fitted[keep] - field).std(), "uT")
     if not keep.all():
         part.notes.append(f"{np.count_nonzero(~keep)} of {len(m)} samples left out as disturbed")
-    part.notes.append("a rotation of the magnetometer against the IMU does not show in an ellipsoid, nor does the strength of the field: S has determinant 1")
+    part.notes.append("a rotation of the magnetometer against the IMU does not show in an ellipsoid, nor does the strength of the field: "
+                      "S has determinant 1")
 
     def draw(axes):
         t = log.mag.t

@@ -164,7 +164,8 @@ def _forward(log, part, up, bias, matrix, sigma_tilt, how):
     # d R = -[d theta]x R: each element moves with the two rotations that are not about its row's axis
     spread = np.sqrt(np.stack([(sd[2] * rotation[1]) ** 2 + (sd[1] * rotation[2]) ** 2, (sd[2] * rotation[0]) ** 2 + (sd[0] * rotation[2]) ** 2,
                                (sd[1] * rotation[0]) ** 2 + (sd[0] * rotation[1]) ** 2]))
-    roll, pitch, yaw = np.arctan2(rotation[2, 1], rotation[2, 2]), np.arcsin(np.clip(-rotation[2, 0], -1, 1)), np.arctan2(rotation[1, 0], rotation[0, 0])
+    roll, yaw = np.arctan2(rotation[2, 1], rotation[2, 2]), np.arctan2(rotation[1, 0], rotation[0, 0])
+    pitch = np.arcsin(np.clip(-rotation[2, 0], -1, 1))
     part.add("sensor in the body:", np.degrees([roll, pitch, yaw]), np.degrees(sd), "deg", "", ("roll", "pitch", "yaw"))
     part.add("mounting_bs, body axis by sensor axis:", rotation, spread, "1", "inertial.mounting_bs",
              tuple(f"{b}{s}" for b in AXES for s in AXES))

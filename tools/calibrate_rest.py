@@ -276,10 +276,11 @@ def gyroscope(log, rests, where):
         part.refuse("temperature slope", Refusal("The temperature of the IMU is not available on this bus (In_Imu<n>Time.Temp).",
                                                  "with a driver that fills Temp"))
     elif np.ptp(temps) < LEAST_DEGC:
-        part.refuse("temperature slope", Refusal(f"The temperature at rest changes by {np.ptp(temps):.1f} degC only, {LEAST_DEGC:g} degC are needed.",
+        part.refuse("temperature slope", Refusal(f"The temperature at rest changes by {np.ptp(temps):.1f} degC only, {LEAST_DEGC:g} are needed.",
                                                  "rest from a cold start until the sensor is warm (ten minutes or more)"))
     elif len(count) < 6:
-        part.refuse("temperature slope", Refusal(f"Only {len(count)} pieces of rest of {SLOPE_BLOCK_S:g} s.", "a minute or more of rest while it warms up"))
+        part.refuse("temperature slope", Refusal(f"Only {len(count)} pieces of rest of {SLOPE_BLOCK_S:g} s.",
+                                                 "a minute or more of rest while it warms up"))
     else:
         at = float(weight @ temps)
         design = np.stack([np.ones(len(temps)), temps - at], axis=1)
@@ -296,7 +297,8 @@ def gyroscope(log, rests, where):
     sigma = np.sqrt(np.maximum(noise, wander) ** 2 + earth**2)
     part.numbers.insert(0, Number("gyroscope bias", bias, sigma, "rad/s", "inertial.gyro_bias_radps", AXES))
     flat = true - bias - (0 if slope is None else (temp - at)[:, None] * slope)
-    part.residual(f"turn rate at rest, {BLOCK_S:g} s means ({total:.0f} s in {len(rests)} rests)", np.sqrt((rate**2).mean()), np.sqrt((flat**2).mean()), "rad/s")
+    part.residual(f"turn rate at rest, {BLOCK_S:g} s means ({total:.0f} s in {len(rests)} rests)",
+                  np.sqrt((rate**2).mean()), np.sqrt((flat**2).mean()), "rad/s")
     part.notes.append("the Earth turns too: " + ("its vertical part is taken out, the rest is in the 1 sigma" if where is not None
                                                  else "its 7.3e-5 rad/s are in the 1 sigma (no GNSS: latitude not known)"))
 
