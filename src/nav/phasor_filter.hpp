@@ -52,26 +52,28 @@ class PhasorFilter {
   }
   /// x_i += c x_j, i != j: any F is a few of these.
   [[gnu::noinline]] void add(int i, Complex c, int j) {
+    const Row of_j = row(j);
     x_[at(i)] = x_[at(i)] + c * x_[at(j)];
-    const Complex ij = covariance(i, j);
-    const float jj = own_[at(j)];
-    own_[at(i)] += 2.0F * (c * ij.conjugate()).re + c.norm2() * jj;
-    for (int k = 0; k < N; ++k)
-      if (k != i) put(i, k, covariance(i, k) + c * covariance(j, k));
+    own_[at(i)] += 2.0F * (c * of_j[at(i)]).re + c.norm2() * own_[at(j)];
+    Complex* pair = &pair_[packed(0, i)];
+    for (int k = 0; k < i; ++k, ++pair) *pair = *pair + (c * of_j[at(k)]).conjugate();
+    for (int k = i + 1; k < N; pair += k, ++k) pair[i] = pair[i] + c * of_j[at(k)];
   }
   /// x_i *= c.
   [[gnu::noinline]] void scale(int i, float c) {
     x_[at(i)] = x_[at(i)] * c;
     own_[at(i)] *= c * c;
-    for (int k = 0; k < N; ++k)
-      if (k != i) put(i, k, covariance(i, k) * c);
+    Complex* pair = &pair_[packed(0, i)];
+    for (int k = 0; k < i; ++k, ++pair) *pair = *pair * c;
+    for (int k = i + 1; k < N; pair += k, ++k) pair[i] = pair[i] * c;
   }
   void add_noise(int i, float variance) { own_[at(i)] += variance; }
   /// Noise of this variance along a direction: x += n direction.
   [[gnu::noinline]] void spread(const std::array<Complex, N>& direction, float variance) {
+    auto pair = pair_.begin();
     for (int c = 0; c < N; ++c) {
-      const Complex much = direction[at(c)] * variance;
-      for (int r = 0; r < c; ++r) put(r, c, covariance(r, c) + direction[at(r)] * much.conjugate());
+      const Complex much = (direction[at(c)] * variance).conjugate();
+      for (int r = 0; r < c; ++r, ++pair) *pair = *pair + direction[at(r)] * much;
       own_[at(c)] += variance * direction[at(c)].norm2();
     }
   }
@@ -80,20 +82,23 @@ class PhasorFilter {
   /// A measurement z = x_i + c x_j + noise (i != j), E|noise|^2 = r. Refused above the gate on 2 |nu|^2 / S, a
   /// chi-square of two degrees.
   [[nodiscard, gnu::noinline]] Verdict update(int i, Complex c, int j, Complex z, float r, float gate) {
-    std::array<Complex, N> ph{};  // P H^H
-    for (int k = 0; k < N; ++k) ph[at(k)] = covariance(k, i) + covariance(k, j) * c.conjugate();
-    const float s = ph[at(i)].re + (c * ph[at(j)]).re + r;
+    Row hp = row(i);  // H P
+    const Row of_j = row(j);
+    for (int k = 0; k < N; ++k) hp[at(k)] = hp[at(k)] + c * of_j[at(k)];
+    const float s = hp[at(i)].re + (c.conjugate() * hp[at(j)]).re + r;
     if (!(s > 0.0F && s < 1e12F)) return Verdict::kSingular;
     const Complex nu = z - x_[at(i)] - c * x_[at(j)];
     if (!(2.0F * nu.norm2() <= gate * s)) return Verdict::kRefused;
     const float inverse = 1.0F / s;
     bool positive = true;
+    auto pair = pair_.begin();
     for (int k = 0; k < N; ++k) {
-      const Complex gain = ph[at(k)] * inverse;
+      const Complex gain = hp[at(k)].conjugate() * inverse;
       x_[at(k)] = x_[at(k)] + gain * nu;
-      for (int l = k + 1; l < N; ++l) put(k, l, covariance(k, l) - gain * ph[at(l)].conjugate());
-      own_[at(k)] -= gain.re * ph[at(k)].re + gain.im * ph[at(k)].im;
+      own_[at(k)] -= gain.re * hp[at(k)].re - gain.im * hp[at(k)].im;
       positive = positive && own_[at(k)] >= 0.0F;
+      const Complex column = hp[at(k)] * inverse;
+      for (int l = 0; l < k; ++l, ++pair) *pair = *pair - hp[at(l)].conjugate() * column;
     }
     return positive ? Verdict::kAccepted : Verdict::kSingular;
   }
@@ -106,6 +111,17 @@ class PhasorFilter {
   }
 
  private:
+  using Row = std::array<Complex, N>;
+
+  /// E[x_j x_k^*] for every k.
+  [[nodiscard, gnu::noinline]] Row row(int j) const {
+    Row result;
+    const Complex* pair = &pair_[packed(0, j)];
+    for (int k = 0; k < j; ++k, ++pair) result[at(k)] = pair->conjugate();
+    result[at(j)] = {own_[at(j)], 0.0F};
+    for (int k = j + 1; k < N; pair += k, ++k) result[at(k)] = pair[j];
+    return result;
+  }
   static constexpr std::size_t at(int i) { return static_cast<std::size_t>(i); }
   static constexpr std::size_t packed(int r, int c) { return at(c * (c - 1) / 2 + r); }
   [[gnu::noinline]] void put(int r, int c, Complex value) {
