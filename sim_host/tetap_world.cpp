@@ -8,6 +8,7 @@
 #include "sim_host/sent.hpp"
 #include "sim_host/world_source.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <exception>
@@ -34,7 +35,7 @@ std::string help() {
           "  --matched          only errors that the filters model\n"
           "  --course NAME      yard (default), road: 1.1 km at 5 m/s, or stand: it stays where it is\n"
           "  --east M           the course so far east of the origin\n"
-          "  --laps N           the course so many times (default 1)\n"
+          "  --laps N           the course so many times (default 1; 2 for gnss_far)\n"
           "  --imu-hz N         IMU samples a second (default 100)\n"
           "  --gnss-m S         1 sigma of GNSS positions per horizontal axis (default 0.85)\n"
           "  --gnss-hz N        fixes a second (default 5)\n"
@@ -129,7 +130,10 @@ int counted(const sim::Options& options, const char* name, int otherwise, int le
 
 void set_world(const sim::Options& options, sim::World::Options& world) {
   const std::string course = options.text("course", "yard");
-  const int laps = counted(options, "laps", 1, 1, 1000);
+  // Four minutes of one fault, and what comes after it, take two laps.
+  const bool far = std::any_of(world.faults.begin(), world.faults.end(),
+                               [](const sim::FaultSetting& s) { return s.fault == sim::Fault::kGnssFar; });
+  const int laps = counted(options, "laps", far ? 2 : 1, 1, 1000);
   if (course == "road") {
     world.course = sim::road_course(laps);
     world.limits.speed_mps = 5;
@@ -172,14 +176,14 @@ int main(int argc, char** argv) try {
   run.limit = {static_cast<std::int64_t>(options.number("duration", 86'400) * 1e6)};
   run.world.mismatched = !options.has("matched");
   run.told_pose = !options.has("no-pose");
-  set_world(options, run.world);
-  sim::send_only(sim::sent_to(robot), run.world);
   for (const std::string& given : options.all("fault")) {
     const sim::FaultsParsed parsed = sim::parse_faults(given);
     if (!parsed.error.empty()) throw std::runtime_error(parsed.error);
     run.world.faults.insert(run.world.faults.end(), parsed.settings.begin(), parsed.settings.end());
     run.faults += (run.faults.empty() ? "" : ",") + given;
   }
+  set_world(options, run.world);
+  sim::send_only(sim::sent_to(robot), run.world);
   run.realtime = options.has("realtime");
   run.lockstep.window = static_cast<std::size_t>(options.number("window", 8));
   if (options.has("emulated")) run.lockstep.patience = sim::kEmulatedPatience;
