@@ -61,6 +61,7 @@ class ImuWatch {
     return true;
   }
   [[nodiscard]] bool stuck() const { return stuck_; }
+  [[nodiscard]] base::Micros heard() const { return heard_; }
   /// The last sample that said something is that old.
   [[nodiscard]] bool stale(base::Micros at, const InertialNumbers& n) const {
     return begun() && at - heard_ > base::Micros{n.stale_us};

@@ -39,8 +39,9 @@ inline Innovation Inertial::fuse(const ImuSample& sample, base::Micros stamp, co
   if (2 * gap.us < -increment.dt.us) return {.verdict = can::Verdict::kStale};
   if (gap > base::Micros{1'500}) {
     const nav::Vector3 shown = rate_b_radps_;
+    const base::Micros before = bridged_;
     bridge(gap, with);
-    if (gap <= base::Micros{n.stale_us}) bridged_ = {};  // a few lost are not an IMU that is
+    if (gap <= base::Micros{n.stale_us}) bridged_ = before;  // a few lost are not an IMU that is
     rate_b_radps_ = shown;
   }
   if (ins_.predict(increment) != nav::ImuVerdict::kAccepted) return {.verdict = can::Verdict::kNotFinite};
@@ -124,7 +125,7 @@ void Inertial::advance(base::Micros t, const Context& with, Window&& window) {
   last_rate_b_radps_ = rate_b_radps_;
   if (phase_ != Phase::kTracking) return;
   Repeats repeats = imu_.repeats();
-  base::Micros last = time_;
+  base::Micros last = imu_.heard();
   const auto go_on = [&](base::Micros until) {
     const base::Micros gap = until - (time_ + ahead_.dt);
     if (gap <= base::Micros{1'500}) return;
@@ -150,7 +151,7 @@ void Inertial::advance(base::Micros t, const Context& with, Window&& window) {
     last_rate_b_radps_ = increment.dtheta_b_rad / base::seconds(increment.dt);
   });
   go_on(t);
-  blind_ = t - last > base::Micros{n.stale_us};
+  blind_ = unusable_ || t - last > base::Micros{n.stale_us};
 }
 
 /// For the status of the present.

@@ -31,6 +31,14 @@ inline Estimate Inertial::estimate(const Context& with) const {
   p(0, 1) += ahead_s * (full.p(0, 4) + full.p(1, 3) + ahead_s * full.p(3, 4));
   p(0, 2) += ahead_s * full.p(3, 8);
   p(1, 2) += ahead_s * full.p(4, 8);
+  if (blind_) {  // as the filter grows where it has no IMU
+    const InertialNumbers& n = with.numbers.inertial;
+    const float turned = ahead_s * (turn_known(time_) ? n.gap_wheels_radps : n.gap_radps);
+    const float went = 0.5F * ahead_s * ahead_s * n.gap_mps2;
+    p(0, 0) += went * went;
+    p(1, 1) += went * went;
+    p(2, 2) += turned * turned;
+  }
   return {.time = now_,
           .pose = {.x = x.x, .y = x.y, .yaw_rad = nav::euler(x.q_nb).yaw_rad},
           .p = p,

@@ -4,6 +4,7 @@
 
 #include "app/estimators/inertial.hpp"
 #include "app/estimators/inertial_measure.hpp"
+#include "base/math.hpp"
 #include "model/wheel_speed.hpp"
 
 namespace tetap::app {
@@ -21,7 +22,11 @@ inline Innovation Inertial::fuse(const WheelCounts& counts, base::Micros stamp, 
   if (!usable) return {.verdict = can::Verdict::kAccepted};
   const float per_s = 1.0F / base::seconds(interval);
   const SlipWatch::Wheels wheels{.left_mps = drive.left_m(left) * per_s, .right_mps = drive.right_m(right) * per_s};
-  return roll(wheels, 0.41F * drive.left_m(1) * per_s, stamp, with);
+  // One count over the interval; and what slip and radii make of the way since, as odometry has it (noise in m^2 per
+  // m).
+  const float count_mps = 0.41F * drive.left_m(1) * per_s;
+  const float way = drive.noise_left * base::abs(wheels.left_mps) + drive.noise_right * base::abs(wheels.right_mps);
+  return roll(wheels, base::sqrt(count_mps * count_mps + 0.25F * way * per_s), stamp, with);
 }
 
 inline Innovation Inertial::fuse(const WheelSpeeds& speeds, base::Micros stamp, const Context& with) {
@@ -47,13 +52,14 @@ inline Innovation Inertial::roll(const SlipWatch::Wheels& wheels, float sigma_mp
   const bool gyro = !without_imu();
   const nav::Vector3 w_b = rate_b_radps_ - ins_.x.b_g_radps;
   const nav::Vector3 v_b = ins_.x.q_nb.conjugate().rotate(ins_.x.v_n_mps);
-  const float turn = gyro ? track_m * w_b(2) : wheels.right_mps - wheels.left_mps;
+  const float turn = gyro ? track_m * w_b(2) : track_m * wheel_turn_radps_;
   const float worst = ins_.p(3, 3) > ins_.p(4, 4) ? ins_.p(3, 3) : ins_.p(4, 4);
   const auto slip =
       slip_.hear(wheels, {.forward_mps = v_b(0), .sigma_mps = base::sqrt(worst), .turn_mps = turn}, stamp, n);
   if (slip == SlipWatch::Slip::kNone) {
     wheels_ = stamp;
-    wheel_turn_radps_ = (wheels.right_mps - wheels.left_mps) / track_m;
+    constexpr float kShare = 0.2F;  // a count is much within one interval, and little over some
+    wheel_turn_radps_ += kShare * ((wheels.right_mps - wheels.left_mps) / track_m - wheel_turn_radps_);
     return forward({.mps = mean, .sigma_mps = sigma_mps}, stamp, with);
   }
   if (slip == SlipWatch::Slip::kBoth) {
