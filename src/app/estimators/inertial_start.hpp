@@ -32,12 +32,12 @@ class InertialStart {
   }
   void place(const model::PlanarPose& pose, float sigma_m, float sigma_yaw_rad) {
     at_ = {.x = pose.x, .y = pose.y, .z = at_.z, .sigma_horizontal_m = sigma_m, .sigma_vertical_m = 10.0F};
-    placed_ = true;
+    placed_ = given_ = true;
     if (sigma_yaw_rad < 1.0F) heading(pose.yaw_rad, sigma_yaw_rad);
   }
   void fix(const model::GnssFix3d& fix, base::Micros stamp, float align_distance_m) {
     const float dt_s = base::seconds(stamp - fixed_at_);
-    if (fixed_ && !has_velocity_ && dt_s > 0.01F && dt_s < 5.0F) {  // between the last two fixes
+    if (fixed_ && !given_ && !has_velocity_ && dt_s > 0.01F && dt_s < 5.0F) {  // between the last two fixes
       v_n_mps_ = nav::Vector3{fix.x.minus(at_.x), fix.y.minus(at_.y), 0.0F} / dt_s;
       sigma_v_mps_ = 1.5F * fix.sigma_horizontal_m / dt_s + 2.0F;
     }
@@ -51,14 +51,21 @@ class InertialStart {
     }
     if (!fixed_) first_ = fix;
     fixed_ = true;
+    if (given_ && headed_ && at_.sigma_horizontal_m < fix.sigma_horizontal_m) {  // a pose from outside that is better
+      at_.z = fix.z;
+      at_.sigma_vertical_m = fix.sigma_vertical_m;
+      return;
+    }
     at_ = fix;
     placed_ = true;
+    given_ = false;
   }
   void velocity(const nav::Vector3& v_n_mps, float sigma_mps) {
     has_velocity_ = true;
     v_n_mps_ = v_n_mps;
     sigma_v_mps_ = sigma_mps;
     const float speed2 = v_n_mps(0) * v_n_mps(0) + v_n_mps(1) * v_n_mps(1);
+    if (speed2 > 0.25F + 9.0F * sigma_mps * sigma_mps) given_ = false;  // it has gone from where it was said to be
     if (!headed_ && speed2 > 1.0F && speed2 > 100.0F * sigma_mps * sigma_mps) course(v_n_mps(0), v_n_mps(1), sigma_mps);
   }
   void heading(float yaw_rad, float sigma_rad) {
@@ -103,7 +110,8 @@ class InertialStart {
     sink(at_.x.um());
     sink(at_.y.um());
     sink(yaw_rad_);
-    sink(static_cast<std::uint32_t>((placed_ ? 1U : 0U) | (headed_ ? 2U : 0U) | (fixed_ ? 4U : 0U)));
+    sink(static_cast<std::uint32_t>((placed_ ? 1U : 0U) | (headed_ ? 2U : 0U) | (fixed_ ? 4U : 0U) |
+                                    (given_ ? 8U : 0U)));
   }
 
  private:
@@ -129,6 +137,7 @@ class InertialStart {
   base::Micros fixed_at_;
   float yaw_rad_ = 0, level_yaw_rad_ = 0, sigma_yaw_rad_ = 3;  ///< the second: of turned_, when the first was found
   bool placed_ = false, headed_ = false, fixed_ = false, has_velocity_ = false;
+  bool given_ = false;  ///< where it is was said, not found
 };
 
 }  // namespace tetap::app
