@@ -165,17 +165,16 @@ inline constexpr float kDecides = 4.0F;
   }
   // Back to where a jump came from: dead reckoning before it and fixes after it say the same.
   const bool back = confirmed && back_ && place_.says(-jump_.east_m, -jump_.north_m, 2.0F * r(0) + p_level);
-  if (back || place_.persisted(rules.persist_us, rules.persist_fixes)) {
-    step(0, 2, {place_.east_m(), place_.north_m(), 0.0F}, r);
-    ins_.p(8, 8) += rules.inflate_yaw_rad * rules.inflate_yaw_rad;
-    height_.forget();
-    back_ = !back;
-    return true;
-  }
-  // Nothing agrees with anything for long: the filter is no judge of how it moves.
+  // Fixes that agree with nothing for very long: the filter is no judge of how it moves.
   const base::Micros despair{4 * std::int64_t{rules.persist_us}};
-  if (stamp - refused_[kPosition].since >= despair) recover(nu, kPosition, rules);
-  return false;
+  const bool lost = confirmed && stamp - refused_[kPosition].since >= despair;
+  if (!back && !lost && !place_.persisted(rules.persist_us, rules.persist_fixes)) return false;
+  step(0, 2, {place_.east_m(), place_.north_m(), 0.0F}, r);
+  ins_.p(8, 8) += rules.inflate_yaw_rad * rules.inflate_yaw_rad;
+  height_.forget();
+  refused_[kPosition] = {};
+  back_ = !back;
+  return true;
 }
 
 /// The coordinates from `first` on are where fixes have been for long, and as uncertain as a fix.

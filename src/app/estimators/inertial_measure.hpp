@@ -34,10 +34,8 @@ inline void Inertial::refused_or_not(Source source, bool refused, base::Micros s
 template <int M>
 void Inertial::recover(const filter::Vector<float, M>& nu, Source source, const RecoveryNumbers& n) {
   if constexpr (M == 3) {
-    for (int i = 0; i < 3; ++i) {
-      if (source == kPosition) ins_.p(i, i) += nu(i) * nu(i);
-      if (source == kVelocity) ins_.p(3 + i, 3 + i) += nu(i) * nu(i);
-    }
+    if (source == kVelocity)
+      for (int i = 0; i < 3; ++i) ins_.p(3 + i, 3 + i) += nu(i) * nu(i);
   }
   for (int i = 3; i < 6; ++i) ins_.p(i, i) += 0.25F;
   ins_.p(8, 8) += n.inflate_yaw_rad * n.inflate_yaw_rad;
