@@ -32,7 +32,8 @@ inline constexpr app::Numbers numbers = app::checked({
     // ICM-42688-P: 0.0028 deg/s/sqrt(Hz) is 2.4e-9 rad^2/s; vibration and a 0.3 % scale error ask for more.
     .gyro = {.use = 1, .up_s = {0, 0, 1}, .noise = 4e-6F, .bias_time_s = 3},
     // Without landmarks the plane is only as well known as its origin: surveyed here, not the first fix.
-    .gnss = {.sigma_floor_m = 0.3F,
+    .gnss = {.antenna_z_b_m = 0.4F,
+             .sigma_floor_m = 0.3F,
              .correlation_s =
                  60,  // the receiver's error wanders over a minute: what a fix repeats of the one before weighs less
              .origin_configured = 1,
@@ -42,7 +43,7 @@ inline constexpr app::Numbers numbers = app::checked({
     // The vibration of a wheeled robot is far above the data sheet's noise. The gyroscope's scale is off by 0.3 %: in a
     // corner of
     // 0.5 rad/s that lasts 4 s that is 6 mrad, every 10 s or so, which is a random walk of 2 mrad per root second.
-    .inertial = {.gyro_radps_rthz = 2e-3F, .accel_mps2_rthz = 2e-2F},
+    .inertial = {.gyro_radps_rthz = 2e-3F, .accel_mps2_rthz = 2e-2F, .constrain_every_us = 20'000},
     // Three estimators share the bus: 580 frames/s at most.
     .publish = {.std_every = 10, .side_every = 20, .attitude_every = 10, .state_every = 10},
 });

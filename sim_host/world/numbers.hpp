@@ -192,8 +192,6 @@ struct Numbers {
   n.imu.walk_tau_s = 1e5;
   n.imu.accel_range_mps2 = 16 * kG0;  // the jitter is steep
   n.imu.accel_noise = {imu.accel_noise[2], imu.accel_noise[2], imu.accel_noise[2]};
-  n.wheels.noise_m = 0;
-  n.wheels.noise_share = 0.03;
   n.rover.jitter_mps = 0.005;
   n.gnss.velocity_vertical_factor = 1.5;
   // On the node's ticks and at once: what the body does between a sample and the tick is in no filter's covariance.

@@ -151,6 +151,7 @@ class Lane {
  private:
   static Innovation fuse_into(E& estimator, const Sample& sample, const Context& with) {
     Innovation innovation;
+    if (sample.sensor == can::Sensor::kImu && sample.instance != with.numbers.inertial.imu) return innovation;
     visit(sample, [&](const auto& payload) {
       if constexpr (kTakes<std::remove_cvref_t<decltype(payload)>>)
         innovation = estimator.fuse(payload, sample.stamp, with);

@@ -214,11 +214,13 @@ void Node<Estimators, Capacity>::close_window(base::Micros t) {
   history_.close_window(t, context(), noting());
 }
 
-/// The record goes out when it says something. What comes with every tick would drown the rest: of accepted wheels the
-/// statistics are enough.
+/// The record goes out when it says something. What comes with every tick or so would drown the rest: of accepted
+/// wheels, magnetometers and barometers the statistics are enough.
 template <class Estimators, std::size_t Capacity>
 void Node<Estimators, Capacity>::note(std::size_t instance, const Sample& sample, const Innovation& innovation) {
-  const bool ordinary = innovation.verdict == can::Verdict::kAccepted && sample.sensor <= can::Sensor::kBodySpeed;
+  const bool frequent = sample.sensor <= can::Sensor::kBodySpeed || sample.sensor == can::Sensor::kMagnetometer ||
+                        sample.sensor == can::Sensor::kBarometer;
+  const bool ordinary = innovation.verdict == can::Verdict::kAccepted && frequent;
   if ((innovation.dof > 0 && !ordinary) || innovation.verdict > can::Verdict::kNotUsed)
     publisher_.event(innovation, sample, instance, now_, counters_);
 }

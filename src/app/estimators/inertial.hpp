@@ -13,13 +13,13 @@
 #include "app/estimators/inertial_start.hpp"
 #include "app/estimators/slip_watch.hpp"
 #include "app/sample.hpp"
+#include "base/renew.hpp"
 #include "model/gnss_fix_3d.hpp"
 #include "nav/ins.hpp"
 #include "nav/preintegration.hpp"
 
 #include <array>
 #include <cstdint>
-#include <memory>
 
 namespace tetap::app {
 
@@ -29,7 +29,7 @@ class Inertial {
   static constexpr bool kDelayed = true;
 
   void restart(base::Micros t, const Context& with) {
-    std::construct_at(this);  // in place: a fresh one assigned over the old would pass over the stack
+    base::renew(*this);
     time_ = t;
     noise_of(with.numbers.inertial);
     const StartNumbers& s = with.numbers.start;
@@ -124,7 +124,9 @@ class Inertial {
   void bridge(base::Micros gap, const Context& with);
   void doubt(float sigma_mps, float sigma_rad);
   [[nodiscard]] nav::ImuIncrement unseen(base::Micros gap, const nav::Vector3& w_b_radps) const;
-  Innovation roll(const SlipWatch::Wheels& wheels, float sigma_mps, base::Micros stamp, const Context& with);
+  Innovation roll(const SlipWatch::Wheels& wheels, float sigma_mps, float later_mps, base::Micros stamp,
+                  const Context& with);
+  [[nodiscard]] float forward_mps() const { return ins_.x.q_nb.conjugate().rotate(ins_.x.v_n_mps)(0); }
   Innovation forward(const Forward& speed, base::Micros stamp, const Context& with);
   void constrain(base::Micros stamp, const Context& with);
   [[nodiscard]] bool believe(const nav::Vector3& nu, const nav::Vector3& r, bool agrees, base::Micros stamp,
@@ -150,6 +152,7 @@ class Inertial {
   base::Micros stood_;        ///< last stamp at which standing still was fused
   WheelCounts counts_;
   bool have_counts_ = false;
+  float counted_forward_mps_ = base::kNan;            ///< the filter's speed when they were fused
   nav::Vector3 rate_b_radps_ = nav::Vector3::Zero();  ///< as the gyroscope shows it, at the filter's time
   nav::Vector3 last_rate_b_radps_ = nav::Vector3::Zero();
   nav::Vector3 still_rate_radps_ = nav::Vector3::Zero();  ///< mean over the last still_s_ of standing

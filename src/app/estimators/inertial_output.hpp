@@ -77,6 +77,7 @@ void Inertial::each_bit(Sink&& sink) const {
   for (int i = 0; i < 3; ++i) sink(ground_mps_(i));
   sink(grounds_);
   sink(wheel_turn_radps_);
+  sink(counted_forward_mps_);
   imu_.each_bit(sink);
   slip_.each_bit(sink);
   for (const Refused& refused : refused_) {

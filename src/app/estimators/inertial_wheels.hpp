@@ -19,18 +19,27 @@ inline Innovation Inertial::fuse(const WheelCounts& counts, base::Micros stamp, 
   counts_time_ = stamp;
   have_counts_ = true;
   if (!usable || left != 0 || right != 0) moved_ = stamp;
-  if (!usable) return {.verdict = can::Verdict::kAccepted};
+  if (!usable) {
+    counted_forward_mps_ = base::kNan;
+    return {.verdict = can::Verdict::kAccepted};
+  }
   const float per_s = 1.0F / base::seconds(interval);
   const SlipWatch::Wheels wheels{.left_mps = drive.left_m(left) * per_s, .right_mps = drive.right_m(right) * per_s};
   // One count over the interval; and what slip and radii make of the way since, as odometry has it (noise in m^2 per
   // m).
   const float count_mps = 0.41F * drive.left_m(1) * per_s;
   const float way = drive.noise_left * base::abs(wheels.left_mps) + drive.noise_right * base::abs(wheels.right_mps);
-  return roll(wheels, base::sqrt(count_mps * count_mps + 0.25F * way * per_s), stamp, with);
+  // Counts are the mean over the interval, the state is at its end: half of what it gained in between is added.
+  const float gained_mps = forward_mps() - counted_forward_mps_;
+  const Innovation record =
+      roll(wheels, base::sqrt(count_mps * count_mps + 0.25F * way * per_s),
+           base::is_finite(gained_mps) && phase_ == Phase::kTracking ? 0.5F * gained_mps : 0.0F, stamp, with);
+  counted_forward_mps_ = forward_mps();
+  return record;
 }
 
 inline Innovation Inertial::fuse(const WheelSpeeds& speeds, base::Micros stamp, const Context& with) {
-  return roll({.left_mps = speeds.left_mps, .right_mps = speeds.right_mps}, 0.0F, stamp, with);
+  return roll({.left_mps = speeds.left_mps, .right_mps = speeds.right_mps}, 0.0F, 0.0F, stamp, with);
 }
 
 /// No wheels to compare: only its gate judges it.
@@ -40,7 +49,7 @@ inline Innovation Inertial::fuse(const BodySpeed& speed, base::Micros stamp, con
 
 /// Two wheels, as far as they roll: their mean; of one that rolls while the other spins, what the gyroscope leaves of
 /// it at the middle of the axle; of two that spin nothing.
-inline Innovation Inertial::roll(const SlipWatch::Wheels& wheels, float sigma_mps, base::Micros stamp,
+inline Innovation Inertial::roll(const SlipWatch::Wheels& wheels, float sigma_mps, float later_mps, base::Micros stamp,
                                  const Context& with) {
   const InertialNumbers& n = with.numbers.inertial;
   const float track_m = with.numbers.wheels.drive.track_m;
@@ -60,7 +69,7 @@ inline Innovation Inertial::roll(const SlipWatch::Wheels& wheels, float sigma_mp
     wheels_ = stamp;
     constexpr float kShare = 0.2F;  // a count is much within one interval, and little over some
     wheel_turn_radps_ += kShare * ((wheels.right_mps - wheels.left_mps) / track_m - wheel_turn_radps_);
-    return forward({.mps = mean, .sigma_mps = sigma_mps}, stamp, with);
+    return forward({.mps = mean + later_mps, .sigma_mps = sigma_mps}, stamp, with);
   }
   if (slip == SlipWatch::Slip::kBoth) {
     refused_or_not(kWheels, true, stamp);
@@ -77,7 +86,8 @@ inline Innovation Inertial::roll(const SlipWatch::Wheels& wheels, float sigma_mp
   const float one = slip == SlipWatch::Slip::kLeft ? wheels.right_mps - 0.5F * turn : wheels.left_mps + 0.5F * turn;
   constexpr float kOne = 1.42F;  // of one wheel, not the mean of two
   const float alone = kOne * n.slip_share * v_b(0);
-  return forward({.mps = one, .sigma_mps = base::sqrt(2.0F * sigma_mps * sigma_mps + alone * alone)}, stamp, with);
+  return forward({.mps = one + later_mps, .sigma_mps = base::sqrt(2.0F * sigma_mps * sigma_mps + alone * alone)}, stamp,
+                 with);
 }
 
 /// GNSS velocity: what the wheels, and standing still, are held against.

@@ -74,7 +74,7 @@ class SlipWatch {
     sink(off_right_mps_);
     sink(heard_.us);
     sink(seen_.us);
-    sink(static_cast<std::uint32_t>(static_cast<unsigned>(slip_) | ground_ << 8U));
+    sink(static_cast<std::uint32_t>(static_cast<unsigned>(slip_) | static_cast<unsigned>(ground_) << 8U));
   }
 
  private:
