@@ -12,7 +12,12 @@
 #include "filters.hpp"
 #include "hal/port/support/boot_line.hpp"
 #include "hal/port/support/text.hpp"
+#include "inertial.hpp"
 #include "recorded_world.hpp"
+
+#include <array>
+#include <cstddef>
+#include <new>
 
 #if defined(TETAP_BOARD_ZYNQMP_R5)
 #include "hal/port/zynqmp_r5/board.hpp"
@@ -74,36 +79,43 @@ class Program {
     line("dead_reckoning", "", bits::dead_reckoning(length.steps));
     line("geodesy", "", bits::geodesy(length.steps));
     line("attitude", "", bits::attitude(length.steps));
-    static app::Node<robot::rover::Estimators> rover{robot::rover::numbers, {}};
-    static app::Node<robot::mrclam::Estimators> mrclam{robot::mrclam::numbers, {}};
-    static app::Node<robot::husky::Estimators> husky{robot::husky::numbers, {}};
-    static app::Node<robot::labyrinth::Estimators> labyrinth{robot::labyrinth::numbers, {}};
-    node("rover", rover, robot::rover::numbers, length.steps);
-    node("mrclam", mrclam, robot::mrclam::numbers, length.steps);
-    node("husky", husky, robot::husky::numbers, length.steps);
-    node("labyrinth", labyrinth, robot::labyrinth::numbers, length.steps);
+    line("ins", "", fresh<bits::InsRun>().run(length.steps));
+    line("inertial", "", fresh<bits::InertialRun>().run(length.steps));
+    node<robot::rover::Estimators>("rover", robot::rover::numbers, length.steps);
+    node<robot::mrclam::Estimators>("mrclam", robot::mrclam::numbers, length.steps);
+    node<robot::husky::Estimators>("husky", robot::husky::numbers, length.steps);
+    node<robot::labyrinth::Estimators>("labyrinth", robot::labyrinth::numbers, length.steps);
+    auto& rover = fresh<app::Node<robot::rover::Estimators>>(robot::rover::numbers, app::Version{});
     line("recorded_", "rover", recorded(rover, robot::rover::numbers.can_base));
     board_.print(hal::Text<>{}.add("bits: end ").add(length.name).add('\n').c_str());
   }
 
  private:
   /// boot_: what a flash image of this robot says of itself at boot.
-  template <class Node>
-  void node(const char* robot, Node& node, const app::Numbers& numbers, std::uint32_t steps) {
+  template <class Estimators>
+  void node(const char* robot, const app::Numbers& numbers, std::uint32_t steps) {
+    auto& node = fresh<app::Node<Estimators>>(numbers, app::Version{});
     line("boot_", robot, app::Exercise(node, numbers.can_base, 1).run(hal::kBootEpochs));
     line("node_", robot, app::Exercise(node, numbers.can_base, 2).run(steps));
+  }
+  /// One after the other in the same memory: a core that has little holds all of them.
+  template <class T, class... Arguments>
+  [[nodiscard]] T& fresh(const Arguments&... arguments) {
+    static_assert(sizeof(T) <= sizeof memory_);
+    return *new (static_cast<void*>(memory_.data())) T{arguments...};
   }
   void line(const char* kind, const char* name, std::uint32_t hash) {
     board_.print(hal::Text<>{}.add("bits: ").add(kind).add(name).add(' ').hex(hash).add('\n').c_str());
   }
   Board& board_;
+  alignas(8) std::array<std::byte, 16 * 1024> memory_{};
 };
 
 }  // namespace
 
 int main() {
   static Board board;
-  Program program(board);
+  static Program program(board);
   program.run(kShort);
   program.run(kWhole);
 #if defined(TETAP_BOARD_ZYNQMP_R5)
