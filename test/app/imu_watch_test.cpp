@@ -168,7 +168,8 @@ TEST(ImuWatch, NoiseGrowsInProportionToVibrationBeyondWhatTheNumbersHoldFor) {
 /// On a circle or straight on at a constant speed, or standing; GNSS at 5 Hz, IMU and wheels at 100.
 class Robot {
  public:
-  explicit Robot(double speed_mps, double turn_radps = 0) : v_(speed_mps), w_(turn_radps) {
+  explicit Robot(double speed_mps, double turn_radps = 0, float bias_walk = 1e-5F) : v_(speed_mps), w_(turn_radps) {
+    n.inertial.gyro_bias_radps2_rthz = bias_walk;
     n.loop.window_us = 0;
     n.wheels.drive = {.left_radius_m = 0.1F, .right_radius_m = 0.1F, .track_m = 0.5F, .counts_per_turn = 2000};
     n.inertial.gyro_radps_rthz = 1e-4F, n.inertial.accel_mps2_rthz = 2e-3F;
@@ -187,6 +188,7 @@ class Robot {
   std::int64_t us = 1'000'000;
   double worst_ratio = 0, worst_m = 0;
   int nominal = 0;
+  Innovation of_wheels;
 
   void run(double duration_s) {
     for (int i = 0; i < std::lround(duration_s * 100); ++i) step();
@@ -230,7 +232,7 @@ class Robot {
       const auto count = [](double m) {
         return static_cast<std::uint16_t>(std::llround(m / (6.283185307 * 0.1 / 2000)) & 0xFFFF);
       };
-      estimator.fuse(WheelCounts{.left = count(left_m_), .right = count(right_m_)}, {us}, with());
+      of_wheels = estimator.fuse(WheelCounts{.left = count(left_m_), .right = count(right_m_)}, {us}, with());
     }
     if (gnss && us % 200'000 == 0) {
       const auto z = [&] { return static_cast<double>(normal_(engine_)); };
@@ -316,6 +318,8 @@ TEST(ImuHealth, AClippedGyroscopeIsReplacedByWheelsAndWithoutThemIsAsUncertainAs
     EXPECT_GT(r->sigma(8), 3 * before);
     EXPECT_LT(std::abs(r->yaw_off_rad()), 3 * r->sigma(8));
   }
+  EXPECT_LT(a.sigma(8), 0.5 * b.sigma(8));
+  EXPECT_NEAR(a.estimator.estimate(a.with()).yaw_rate_radps, 0.4F, 0.05F) << "as the wheels show it";
   EXPECT_LT(std::abs(a.yaw_off_rad()), 0.1) << "it did not show 0.8 rad";
 }
 
@@ -328,7 +332,10 @@ TEST(ImuHealth, OneSpinningWheelIsSaidAtOnceAndCostsNearlyNothing) {
   EXPECT_TRUE(r.says(can::Fault::kWheelSlip));
   EXPECT_EQ(r.mode(), can::Mode::kDegraded);
   r.gnss = false;  // the other wheel and the gyroscope alone
-  r.run(4.9);
+  for (int i = 0; i < 490; ++i) {
+    r.run(0.01);
+    ASSERT_EQ(r.of_wheels.verdict, can::Verdict::kAccepted) << i;
+  }
   EXPECT_NEAR(r.off_m(), before, 0.15);
   r.spin_mps = 0;
   r.gnss = true;
@@ -358,13 +365,13 @@ TEST(Standstill, IsFoundWithoutWheelsAndTheGyroscopesBiasLearnt) {
 
 TEST(Standstill, DoesNotMakeItSurerThanItsSamplesCan) {
   for (const bool wheels : {true, false}) {
-    Robot r(0);
+    Robot r(0, 0, 1e-8F);
     r.wheels = wheels;
     r.run(60);
     // The mean of 60 s of white noise of this density; and what may go unnoticed is no smaller for being looked at.
     EXPECT_GT(r.sigma(14), static_cast<double>(r.n.inertial.gyro_radps_rthz) / std::sqrt(60.0));
     if (wheels) {
-      EXPECT_GT(r.sigma(3), 0.2 * static_cast<double>(r.n.inertial.still_mps));
+      EXPECT_GT(r.sigma(3), 0.5 * static_cast<double>(r.n.inertial.still_mps));
     }
   }
 }
