@@ -85,9 +85,10 @@ struct InertialNumbers {
   float accel_bias_mps3_rthz = 2e-4F;
   float gyro_turn_on_radps = 0.01F;  ///< 1 sigma of the bias at start
   float accel_turn_on_mps2 = 0.2F;
-  float start_tilt_rad = 0.05F;  ///< 1 sigma of levelling
-  float level_s = 1;             ///< how long gravity is looked at
-  float gap_mps2 = 3;            ///< what may have happened while samples were missing
+  float start_tilt_rad = 0.05F;     ///< 1 sigma of levelling
+  std::int32_t starts_forward = 0;  ///< 1: it never starts in reverse, so its course is its heading
+  float level_s = 1;                ///< how long gravity is looked at
+  float gap_mps2 = 3;               ///< what may have happened while samples were missing
   float gap_radps = 1;
   float gap_wheels_radps = 0.1F;    ///< the same for turning, while wheels show how it turns
   std::int32_t stuck_samples = 10;  ///< repeated so often, a sample is one of a stuck sensor; 0: never
@@ -221,10 +222,10 @@ constexpr void each_number(const Numbers& n, Sink&& sink) {
   const auto& i = n.inertial;
   for (const float m : i.mounting_bs) sink(m);
   all(i.imu, i.gyro_radps_rthz, i.accel_mps2_rthz, i.gyro_bias_radps2_rthz, i.accel_bias_mps3_rthz,
-      i.gyro_turn_on_radps, i.accel_turn_on_mps2, i.start_tilt_rad, i.level_s, i.gap_mps2, i.gap_radps, i.still_radps,
-      i.still_mps, i.wheel_mps, i.slip_share, i.lateral_mps, i.vertical_mps, i.axle_x_b_m, i.wheel_gate_scale,
-      i.constrain_every_us, i.gap_wheels_radps, i.stuck_samples, i.stale_us, i.vibration_mps2, i.vibration_radps,
-      i.calm_mps2, i.calm_radps, i.still_gnss_mps, i.slip_mps);
+      i.gyro_turn_on_radps, i.accel_turn_on_mps2, i.start_tilt_rad, i.level_s, i.starts_forward, i.gap_mps2,
+      i.gap_radps, i.still_radps, i.still_mps, i.wheel_mps, i.slip_share, i.lateral_mps, i.vertical_mps, i.axle_x_b_m,
+      i.wheel_gate_scale, i.constrain_every_us, i.gap_wheels_radps, i.stuck_samples, i.stale_us, i.vibration_mps2,
+      i.vibration_radps, i.calm_mps2, i.calm_radps, i.still_gnss_mps, i.slip_mps);
   const auto& m = n.magnetic;
   for (const float v : m.hard_iron_uT) sink(v);
   for (const float v : m.soft_iron) sink(v);

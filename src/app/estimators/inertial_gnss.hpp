@@ -78,7 +78,7 @@ inline Innovation Inertial::fuse(const GnssPosition& fix, base::Micros stamp, co
                          .antenna_b_m = {n.antenna_x_b_m, n.antenna_y_b_m, n.antenna_z_b_m}};
   if (phase_ != Phase::kTracking) {
     if (!first_fixes_.hear(fix, stamp, with.numbers.recovery.confirm_fixes)) return {};
-    start_.fix(model, stamp, n.align_distance_m);
+    start_.fix(model, stamp, with.numbers);
     last_position_ = stamp;
     return {.verdict = can::Verdict::kAccepted};
   }
@@ -197,7 +197,7 @@ inline Innovation Inertial::fuse(const GnssVelocity& velocity, base::Micros stam
   const float own = base::is_finite(velocity.acc_mps) ? velocity.acc_mps : 0.5F;
   const float sigma = own > n.sigma_velocity_floor_mps ? own : n.sigma_velocity_floor_mps;
   if (phase_ != Phase::kTracking) {
-    start_.velocity(v_n, sigma);
+    start_.velocity(v_n, sigma, with.numbers);
     return {.verdict = can::Verdict::kAccepted};
   }
   if (frozen_.frozen()) return {.verdict = can::Verdict::kStale};

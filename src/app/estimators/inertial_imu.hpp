@@ -27,6 +27,7 @@ inline Innovation Inertial::fuse(const ImuSample& sample, base::Micros stamp, co
   }
   rate_b_radps_ = increment.dtheta_b_rad / dt_s;
   if (phase_ != Phase::kTracking) {
+    if (stamp - increment.dt - time_ > base::Micros{1'500}) start_.gap(stamp - increment.dt - time_);
     time_ = stamp;
     if (start_.level(increment, n)) phase_ = Phase::kHeading;
     if (phase_ == Phase::kHeading && start_.ready()) begin(with);

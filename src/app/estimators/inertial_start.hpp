@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // How inertial navigation begins: levels from gravity, then waits for a place and a heading: a given pose, an outside
-// heading, or the way GNSS shows it goes (course over ground when fast enough, or the chord between fixes).
+// heading, a magnetometer's, or what the motion shows (nav/yaw_finder.hpp), forwards or in reverse. Of a robot that
+// starts forwards for sure the course of GNSS is enough (fast velocity, or the chord between fixes).
 #pragma once
 
 #include "app/numbers.hpp"
 #include "model/gnss_fix_3d.hpp"
 #include "model/planar_pose.hpp"
 #include "nav/ins.hpp"
+#include "nav/yaw_finder.hpp"
 
 namespace tetap::app {
 
@@ -27,29 +29,47 @@ class InertialStart {
     turned_ = (nav::exp_quaternion(levelled_s_ > 0.0F ? nav::Vector3(lean * share) : whole_turn(up_n / norm)) * turned_)
                   .renormalised();
     if (!(levelled_s_ > 0.0F)) level_yaw_rad_ = nav::euler(turned_).yaw_rad;
+    const bool before = levelled_s_ >= n.level_s;
     levelled_s_ += dt_s;
-    return levelled_s_ >= n.level_s;
+    const bool level = levelled_s_ >= n.level_s;
+    if (level && !before) {
+      finder_.restart(turned_);
+    } else if (level && !headed_) {
+      static_cast<void>(finder_.predict(imu));
+      if (finder_.ready()) heading(finder_.yaw_rad(), finder_.sigma_rad());
+    }
+    return level;
+  }
+  /// Increments are missing.
+  void gap(base::Micros gap) {
+    if (levelled_s_ > 0.0F && !headed_) finder_.predict_without_imu(gap);
+  }
+  /// Wheels: where it points it goes.
+  void forward(float mps, float sigma_mps, float axle_x_b_m) {
+    if (!headed_) finder_.fuse_forward_speed(mps, sigma_mps, {axle_x_b_m, 0.0F});
   }
   void place(const model::PlanarPose& pose, float sigma_m, float sigma_yaw_rad) {
     at_ = {.x = pose.x, .y = pose.y, .z = at_.z, .sigma_horizontal_m = sigma_m, .sigma_vertical_m = 10.0F};
     placed_ = given_ = true;
     if (sigma_yaw_rad < 1.0F) heading(pose.yaw_rad, sigma_yaw_rad);
   }
-  void fix(const model::GnssFix3d& fix, base::Micros stamp, float align_distance_m) {
+  void fix(const model::GnssFix3d& fix, base::Micros stamp, const Numbers& numbers) {
     const float dt_s = base::seconds(stamp - fixed_at_);
     if (fixed_ && !given_ && !has_velocity_ && dt_s > 0.01F && dt_s < 5.0F) {  // between the last two fixes
       v_n_mps_ = nav::Vector3{fix.x.minus(at_.x), fix.y.minus(at_.y), 0.0F} / dt_s;
       sigma_v_mps_ = 1.5F * fix.sigma_horizontal_m / dt_s + 2.0F;
     }
     fixed_at_ = stamp;
-    if (placed_ && fixed_ && !headed_) {
-      const float east = fix.x.minus(first_.x), north = fix.y.minus(first_.y);
-      const float chord2 = east * east + north * north;
-      const float needed =
-          align_distance_m > 4.0F * fix.sigma_horizontal_m ? align_distance_m : 4.0F * fix.sigma_horizontal_m;
-      if (chord2 > needed * needed) course(east, north, 1.5F * fix.sigma_horizontal_m);
+    if (!headed_ && !has_velocity_)
+      finder_.fuse_position(fix.x, fix.y, fix.sigma_horizontal_m, {fix.antenna_b_m(0), fix.antenna_b_m(1)});
+    if (numbers.inertial.starts_forward != 0 && fixed_ && !headed_) {
+      const float east = fix.x.minus(first_x_), north = fix.y.minus(first_y_);
+      const float needed = numbers.gnss.align_distance_m > 4.0F * fix.sigma_horizontal_m
+                               ? numbers.gnss.align_distance_m
+                               : 4.0F * fix.sigma_horizontal_m;
+      if (east * east + north * north > needed * needed) course(east, north, 1.5F * fix.sigma_horizontal_m);
     }
-    if (!fixed_) first_ = fix;
+    if (!fixed_) first_x_ = fix.x, first_y_ = fix.y;
     fixed_ = true;
     if (given_ && headed_ && at_.sigma_horizontal_m < fix.sigma_horizontal_m) {  // a pose from outside that is better
       at_.z = fix.z;
@@ -60,13 +80,16 @@ class InertialStart {
     placed_ = true;
     given_ = false;
   }
-  void velocity(const nav::Vector3& v_n_mps, float sigma_mps) {
+  void velocity(const nav::Vector3& v_n_mps, float sigma_mps, const Numbers& n) {
     has_velocity_ = true;
     v_n_mps_ = v_n_mps;
     sigma_v_mps_ = sigma_mps;
     const float speed2 = v_n_mps(0) * v_n_mps(0) + v_n_mps(1) * v_n_mps(1);
     if (speed2 > 0.25F + 9.0F * sigma_mps * sigma_mps) given_ = false;  // it has gone from where it was said to be
-    if (!headed_ && speed2 > 1.0F && speed2 > 100.0F * sigma_mps * sigma_mps) course(v_n_mps(0), v_n_mps(1), sigma_mps);
+    if (headed_) return;
+    if (n.inertial.starts_forward != 0 && speed2 > 1.0F && speed2 > 100.0F * sigma_mps * sigma_mps)
+      return course(v_n_mps(0), v_n_mps(1), sigma_mps);
+    finder_.fuse_velocity(v_n_mps(0), v_n_mps(1), sigma_mps, {n.gnss.antenna_x_b_m, n.gnss.antenna_y_b_m});
   }
   void heading(float yaw_rad, float sigma_rad) {
     yaw_rad_ = yaw_rad;
@@ -110,6 +133,7 @@ class InertialStart {
     sink(at_.x.um());
     sink(at_.y.um());
     sink(yaw_rad_);
+    finder_.each_bit(sink);
     sink(static_cast<std::uint32_t>((placed_ ? 1U : 0U) | (headed_ ? 2U : 0U) | (fixed_ ? 4U : 0U) |
                                     (given_ ? 8U : 0U)));
   }
@@ -131,12 +155,14 @@ class InertialStart {
 
   nav::Quaternion turned_;
   float levelled_s_ = 0;
-  model::GnssFix3d at_, first_;
+  model::GnssFix3d at_;
+  base::Anchored first_x_, first_y_;
   nav::Vector3 v_n_mps_ = nav::Vector3::Zero();
   float sigma_v_mps_ = 3;
   base::Micros fixed_at_;
   float yaw_rad_ = 0, level_yaw_rad_ = 0, sigma_yaw_rad_ = 3;  ///< the second: of turned_, when the first was found
   bool placed_ = false, headed_ = false, fixed_ = false, has_velocity_ = false;
+  nav::YawFinder finder_;
   bool given_ = false;  ///< where it is was said, not found
 };
 

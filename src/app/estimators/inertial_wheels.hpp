@@ -114,7 +114,10 @@ inline Innovation Inertial::roll(const SlipWatch::Wheels& wheels, float sigma_mp
 
 inline Innovation Inertial::forward(const Forward& speed, base::Micros stamp, const Context& with) {
   const InertialNumbers& n = with.numbers.inertial;
-  if (phase_ != Phase::kTracking) return {.verdict = can::Verdict::kAccepted};
+  if (phase_ != Phase::kTracking) {
+    start_.forward(speed.mps, n.wheel_mps + n.slip_share * base::abs(speed.mps), n.axle_x_b_m);
+    return {.verdict = can::Verdict::kAccepted};
+  }
   constrained_ = stamp;
   const float slip = n.slip_share * (speed.mps < 0 ? -speed.mps : speed.mps);
   const float sigma = base::sqrt(n.wheel_mps * n.wheel_mps + slip * slip + speed.sigma_mps * speed.sigma_mps);
