@@ -6,6 +6,7 @@
 #include "app/history.hpp"
 #include "app/inbox.hpp"
 #include "app/landmarks.hpp"
+#include "app/plausible.hpp"
 #include "app/publisher.hpp"
 #include "app/tally.hpp"
 
@@ -134,6 +135,7 @@ void Node<Estimators, Capacity>::sample(const Sample& arrived) {
   Sample sample = arrived;
   if (sample.sensor == can::Sensor::kBodySpeed) sample.stamp += base::Micros{numbers_.wheels.delay_us};
   if (!ticked_ && now_.us == 0) return void(++counters_.no_time);
+  if (!plausible(sample)) return void(++counters_.out_of_range);
   if (sample.stamp <= history_.closed_until()) {
     ++counters_.too_late;
     publisher_.event({.verdict = can::Verdict::kTooLate}, sample, kPrimary, now_, counters_);

@@ -28,6 +28,12 @@ def replay(programs, out, name, robot):
         return json.load(file)
 
 
+def summary_numbers(out):
+    """Q, R and gates, as the player says them."""
+    with open(os.path.join(out, "mrclam1", "run.json"), encoding="utf-8") as file:
+        return json.load(file)["numbers"]
+
+
 def main():
     programs, out = sys.argv[1:3]
     if not os.path.isdir(os.path.join(DATA, "mrclam")):
@@ -50,6 +56,7 @@ def main():
         bound(f"{name} heading RMSE [deg]", summary["heading_rmse_deg"], heading / 2, heading)
         bound(f"{name} frames lost", summary["frames_lost"], 0, 0)
         print(f"  {name} times real time {summary['times_realtime']:.0f} (a benchmark, not a test)")
+    print(f"  mrclam, one configuration for all robots: {summary_numbers(out)}")
     run("tools/import_husky", os.path.join(DATA, "husky"), os.path.join(out, "husky"))
     summary = replay(programs, out, "husky", "husky")
     bound("husky RMS from the GPS track [m]", summary["fused"]["position_rmse_m"] or 0.0, 0.9, 2.5)

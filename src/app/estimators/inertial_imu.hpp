@@ -45,7 +45,12 @@ inline Innovation Inertial::fuse(const ImuSample& sample, base::Micros stamp, co
     if (gap <= base::Micros{n.stale_us}) bridged_ = before;  // a few lost are not an IMU that is
     rate_b_radps_ = shown;
   }
-  if (ins_.predict(increment) != nav::ImuVerdict::kAccepted) return {.verdict = can::Verdict::kNotFinite};
+  const nav::ImuVerdict verdict = ins_.predict(increment);
+  if (verdict == nav::ImuVerdict::kDiverged) restart(stamp, with);  // faster than anything drives: it begins anew
+  if (verdict != nav::ImuVerdict::kAccepted) {
+    time_ = stamp;
+    return {.verdict = can::Verdict::kNotFinite};
+  }
   ins_.predict_covariance(imu_.noise_factor(n));
   // Clipped increments are used, and are as uncertain as none.
   const float growth = base::sqrt(dt_s * 0.1F);
