@@ -19,6 +19,7 @@ class Drive {
  public:
   explicit Drive(std::int32_t constrain_every_us, std::int64_t wheels_every_us = 0) {
     n.inertial.lateral_mps = n.inertial.vertical_mps = 0.1F;
+    n.inertial.stuck_samples = 0;  // an IMU without noise repeats itself
     site.frame = nav::LocalFrame(24'131'350'000, 5'834'150'000, 500.0F);
     site.origin = can::OriginSource::kConfigured;
     gravity_mps2_ = nav::Earth::at(site.frame, false).gravity_mps2;

@@ -117,9 +117,10 @@ std::vector<app::Sample> good(int k, base::Micros t) {
   using can::Sensor;
   const auto counts = static_cast<std::uint16_t>(32 * k);
   std::vector<app::Sample> all{
-      sample_of(
-          Sensor::kImu, t,
-          app::ImuSample{.dangle_b_rad = {0, 0, 0.001F}, .dvelocity_b_mps = {0, 0, 0.0981F}, .interval_us = 10'000}),
+      sample_of(Sensor::kImu, t,
+                app::ImuSample{.dangle_b_rad = {0, 0, 0.001F + 1e-6F * static_cast<float>(k % 7)},  // not stuck
+                               .dvelocity_b_mps = {0, 0, 0.0981F + 1e-5F * static_cast<float>(k % 5)},
+                               .interval_us = 10'000}),
       sample_of(Sensor::kWheelCounts, t, app::WheelCounts{.left = counts, .right = counts}),
       sample_of(Sensor::kMagnetometer, t, app::MagneticFlux{.flux_b_uT = {17, 3, -46}})};
   if (k % 20 == 7) {
