@@ -1,8 +1,8 @@
-# tetap_image(NAME target BOARD zynqmp_r5|mps2_m7|mps2_m4f SOURCES main.cpp ... [LIBRARIES tetap_app ...] [STACK bytes] [OUTPUT name])
+# tetap_image(NAME target BOARD zynqmp_r5|mps2_m7|mps2_m4f SOURCES main.cpp ... [LIBRARIES tetap_app ...] [STACK bytes] [OUTPUT name] [DATA ddr])
 # makes NAME.elf .bin .hex .map in the binary directory, or OUTPUT.elf ... when another file name is wanted. Beside every object of
 # the image lie its .su and .ci (stack use and call graph, GCC's VCG form): CMakeFiles/NAME.dir/.
 function(tetap_image)
-  cmake_parse_arguments(ARG "" "NAME;BOARD;STACK;OUTPUT" "SOURCES;LIBRARIES" ${ARGN})
+  cmake_parse_arguments(ARG "" "NAME;BOARD;STACK;OUTPUT;DATA" "SOURCES;LIBRARIES" ${ARGN})
   foreach(needed NAME BOARD SOURCES)
     if(NOT ARG_${needed})
       message(FATAL_ERROR "tetap_image: ${needed} is missing")
@@ -40,7 +40,8 @@ function(tetap_image)
   # Of the C library only what the compiler itself calls (memcpy, memset, memmove, memcmp) can be linked: nothing supplies _sbrk, so
   # malloc fails to link, and libm is not there at all.
   target_link_options(${ARG_NAME} PRIVATE -nostdlib -nostartfiles -T ${script} -Wl,--gc-sections -Wl,--print-memory-usage
-    -Wl,--fatal-warnings -Wl,-Map=${output}.map $<$<BOOL:${ARG_STACK}>:-Wl,--defsym=_stack_size=${ARG_STACK}>)
+    -Wl,--fatal-warnings -Wl,-Map=${output}.map $<$<BOOL:${ARG_STACK}>:-Wl,--defsym=_stack_size=${ARG_STACK}>
+    $<$<STREQUAL:${ARG_DATA},ddr>:-Wl,--defsym=_data_in_ddr=1>)
   target_link_libraries(${ARG_NAME} PRIVATE -Wl,--start-group -lc -lgcc -Wl,--end-group)
   add_custom_command(TARGET ${ARG_NAME} POST_BUILD
     COMMAND ${CMAKE_OBJCOPY} -O binary ${output}.elf ${output}.bin

@@ -25,7 +25,8 @@ consteval float determinant(const std::array<float, 9>& m) {
 consteval bool rotation(const std::array<float, 9>& m) {
   for (std::size_t i = 0; i < 3; ++i)
     for (std::size_t j = 0; j < 3; ++j) {
-      const float off = m[3 * i] * m[3 * j] + m[3 * i + 1] * m[3 * j + 1] + m[3 * i + 2] * m[3 * j + 2] - (i == j);
+      const float off =
+          m[3 * i] * m[3 * j] + m[3 * i + 1] * m[3 * j + 1] + m[3 * i + 2] * m[3 * j + 2] - (i == j ? 1.0F : 0.0F);
       if (!(off > -2e-3F && off < 2e-3F)) return false;
     }
   return determinant(m) > 0;

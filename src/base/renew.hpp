@@ -9,9 +9,6 @@
 namespace tetap::base {
 
 template <class T>
-  requires(std::is_trivially_destructible_v<T>)
-void renew(T& object) {
-  ::new (static_cast<void*>(&object)) T();
-}
+requires(std::is_trivially_destructible_v<T>) void renew(T& object) { ::new (static_cast<void*>(&object)) T(); }
 
 }  // namespace tetap::base

@@ -66,11 +66,11 @@ TEST(NonHolonomicConstraint, HoldsSidewaysSpeedWhereTheAccelerometerAloneRunsAwa
     drive.run(5, 1, 0);
     drive.sideways_error_mps2 = 0.05F;
     drive.run(30, 0, 0);
-    const double sideways_mps = std::fabs(drive.velocity_b_mps()(1));
+    const float sideways_mps = std::fabs(drive.velocity_b_mps()(1));
     if (every_us == 0) {
-      EXPECT_GT(sideways_mps, 1.0);
+      EXPECT_GT(sideways_mps, 1.0F);
     } else {
-      EXPECT_LT(sideways_mps, 0.1);
+      EXPECT_LT(sideways_mps, 0.1F);
     }
   }
 }

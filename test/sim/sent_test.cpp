@@ -25,7 +25,7 @@ std::map<std::uint32_t, int> sent_frames(const std::string& robot, double second
 }
 
 struct Deaf {
-  static constexpr can::EstimatorKind kKind = can::EstimatorKind::kEkf;
+  [[maybe_unused]] static constexpr can::EstimatorKind kKind = can::EstimatorKind::kEkf;
 };
 struct Compass : Deaf {
   app::Innovation fuse(const app::MagneticFlux&, base::Micros, const app::Context&) { return {}; }

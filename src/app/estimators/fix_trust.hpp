@@ -120,7 +120,8 @@ class FirstFixes {
     const float sigma_m = base::is_finite(fix.horizontal_acc_m) ? fix.horizontal_acc_m : 10.0F;
     const float far_m = 4.0F * sigma_m + kFastest_mps * base::seconds(stamp - last_);
     const float north_m = metres(fix.latitude_2ndeg - latitude_2ndeg_);
-    const float latitude_rad = static_cast<float>(fix.latitude_2ndeg / 1'000) * (2e-6F * 0.0174532925F);
+    const std::int64_t latitude_2udeg = fix.latitude_2ndeg / 1'000;
+    const float latitude_rad = static_cast<float>(latitude_2udeg) * (2e-6F * 0.0174532925F);
     const float east_m = metres(fix.longitude_2ndeg - longitude_2ndeg_) * base::cos(latitude_rad);
     const bool follows = fixes_ > 0 && stamp > last_ && east_m * east_m + north_m * north_m <= far_m * far_m;
     fixes_ = follows ? (fixes_ < needed ? fixes_ + 1 : needed) : 1;
