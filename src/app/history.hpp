@@ -7,6 +7,7 @@
 #include "app/lane.hpp"
 #include "app/timeline.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -190,7 +191,10 @@ std::uint16_t History<Estimators, Capacity>::consume(base::Micros t, const Conte
     }
   });
   std::uint16_t not_used = 0;
-  for (std::size_t i = 0; i < due; ++i) {
+  std::size_t first = 0;  // what is before it, everyone has
+  if (std::none_of(again.begin(), again.end(), [](bool a) { return a; }))
+    while (first < due && timeline_.consumed(first)) ++first;
+  for (std::size_t i = first; i < due; ++i) {
     const Sample& sample = timeline_[i];
     const bool is_new = !timeline_.consumed(i);
     if (is_new) on_new(sample);

@@ -38,12 +38,9 @@ struct ImuIncrement {
     if (dt.us <= 0 || dt.us > 200'000) return ImuVerdict::kBadInterval;
     const float dt_s = base::seconds(dt);
     const float angle = 100.0F * dt_s, speed = 1000.0F * dt_s;
-    bool inside = true;  // false for NaN
-    for (int i = 0; i < 3; ++i) {
-      inside = inside && dtheta_b_rad(i) < angle && dtheta_b_rad(i) > -angle;
-      inside = inside && dv_b_mps(i) < speed && dv_b_mps(i) > -speed;
-    }
-    if (inside) return ImuVerdict::kAccepted;
+    // Of the norms, so that the axes in which they are told do not matter; false for NaN.
+    if (dtheta_b_rad.squaredNorm() < angle * angle && dv_b_mps.squaredNorm() < speed * speed)
+      return ImuVerdict::kAccepted;
     return is_finite(dtheta_b_rad) && is_finite(dv_b_mps) ? ImuVerdict::kTooFast : ImuVerdict::kNotFinite;
   }
 };

@@ -30,6 +30,10 @@ class Ins {
   Covariance p = Covariance::diagonal({1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1});
   InsNoise noise{};
   Earth earth{};
+  float vibration = 1;  ///< scales the noise density of gyroscope and accelerometer
+
+  /// How much of the state's time the covariance does not have yet.
+  [[nodiscard]] float pending_s() const { return pending_.dt_s; }
 
   /// Moves the state; the covariance waits for predict_covariance(). Whatever is not accepted changes nothing: the
   /// caller has a gap in time, to be bridged with predict_without_imu().
@@ -45,8 +49,8 @@ class Ins {
   }
 
   /// Brings the covariance to the state's time: after every increment, or once for several (up to some 50 ms; the
-  /// measurement that comes needs it). `vibration` scales the noise density of gyroscope and accelerometer.
-  void predict_covariance(float vibration = 1.0F) {
+  /// measurement that comes needs it).
+  void predict_covariance() {
     if (!(pending_.dt_s > 0.0F)) return;
     const float dt_s = pending_.dt_s;
     const auto variance = [dt_s](float density) { return density * density * dt_s; };

@@ -84,7 +84,10 @@ class InsRun {
     hash_(static_cast<std::uint32_t>(verdict));
     if (verdict != nav::ImuVerdict::kAccepted) return;
     chunk_.add(shown);
-    if (!chance_.one_in(3)) ins_.predict_covariance(chance_.one_in(20) ? 10.0F : 1.0F);
+    if (!chance_.one_in(3)) {
+      ins_.vibration = chance_.one_in(20) ? 10.0F : 1.0F;
+      ins_.predict_covariance();
+    }
   }
   template <class Model>
   void fuse(const Model& model) {

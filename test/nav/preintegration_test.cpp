@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "nav/preintegration.hpp"
 
+#include "nav/imu_gather.hpp"
 #include "true_body.hpp"
 
 #include <gtest/gtest.h>
@@ -84,6 +85,55 @@ TEST(Preintegration, AFewChunksInTurnGiveTheCurrentState) {
   for (const auto& sample : samples) nav::strapdown(x, sample, earth);
   for (std::size_t k = 0; k < 5; ++k) chunked = folded(samples, 20 * k, 20 * (k + 1), begin()).apply(chunked, earth);
   expect_near(chunked, x, 3e-6F, 1e-5F, 2e-6F);
+}
+
+/// Two-speed: gathered spans into a chunk, against every sample into it.
+TEST(Preintegration, GatheredSpansGiveWhatTheirSamplesGive) {
+  const auto samples = wild_samples(100, 5);
+  nav::ImuGather gather;
+  ImuChunk fast = ImuChunk::with_biases_of(begin());
+  int spans = 0;
+  for (const auto& sample : samples) {
+    gather.add(sample);
+    if (!gather.full()) continue;
+    fast.add(gather.take());
+    EXPECT_TRUE(gather.empty());
+    ++spans;
+  }
+  if (!gather.empty()) fast.add(gather.take());
+  const ImuChunk whole = folded(samples, 0, samples.size(), begin());
+  EXPECT_EQ(fast.dt, whole.dt);
+  EXPECT_LT(spans, 20);                                                                 // of 100 samples
+  expect_near(fast.apply(begin(), {}), whole.apply(begin(), {}), 5e-3F, 4e-4F, 1e-4F);  // half a second of tumbling
+  // Without the cross terms it would not be: the plain sums of the same spans.
+  ImuChunk plain = ImuChunk::with_biases_of(begin());
+  for (std::size_t k = 0; k < samples.size(); k += 10) {
+    ImuIncrement sum;
+    for (std::size_t i = k; i < k + 10; ++i) {
+      sum.dtheta_b_rad += samples[i].dtheta_b_rad;
+      sum.dv_b_mps += samples[i].dv_b_mps;
+      sum.dt += samples[i].dt;
+    }
+    plain.add(sum);
+  }
+  const auto off = plain.apply(begin(), {}).minus(whole.apply(begin(), {}));
+  EXPECT_GT(off.segment<3>(3).norm(), 2e-3F);
+  EXPECT_GT(off.segment<3>(6).norm(), 2e-4F);
+}
+
+TEST(Preintegration, ASpanIsFullAtItsTimeOrItsAngle) {
+  const auto steps_until_full = [](float rate_radps) {
+    nav::ImuGather gather;
+    int steps = 0;
+    while (!gather.full()) {
+      gather.add(ImuIncrement::constant({0, 0, rate_radps}, {0, 0, 9.8F}, {1'000}));
+      ++steps;
+    }
+    return steps;
+  };
+  EXPECT_EQ(steps_until_full(1), 50);
+  EXPECT_EQ(steps_until_full(-30), 7);
+  EXPECT_EQ(steps_until_full(300), 1);
 }
 
 /// A robot's motion, biases corrected after the chunk was made: what is left is of second order.

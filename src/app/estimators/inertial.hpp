@@ -15,6 +15,7 @@
 #include "app/sample.hpp"
 #include "base/renew.hpp"
 #include "model/gnss_fix_3d.hpp"
+#include "nav/imu_gather.hpp"
 #include "nav/ins.hpp"
 #include "nav/preintegration.hpp"
 
@@ -100,14 +101,19 @@ class Inertial {
     float sigma_mps = 0;  ///< of counting: what one count is over the interval
   };
 
-  static nav::ImuIncrement increment_of(const ImuSample& sample, const InertialNumbers& n) {
-    const auto body = [&m = n.mounting_bs](const std::array<float, 3>& s) {
-      return nav::Vector3{m[0] * s[0] + m[1] * s[1] + m[2] * s[2], m[3] * s[0] + m[4] * s[1] + m[5] * s[2],
-                          m[6] * s[0] + m[7] * s[1] + m[8] * s[2]};
-    };
-    return {.dtheta_b_rad = body(sample.dangle_b_rad),
-            .dv_b_mps = body(sample.dvelocity_b_mps),
-            .dt = base::Micros{sample.interval_us}};
+  /// In the axes of the sensor.
+  static nav::ImuIncrement shown_by(const ImuSample& sample) {
+    const auto& a = sample.dangle_b_rad;
+    const auto& v = sample.dvelocity_b_mps;
+    return {.dtheta_b_rad = {a[0], a[1], a[2]}, .dv_b_mps = {v[0], v[1], v[2]}, .dt = base::Micros{sample.interval_us}};
+  }
+  static nav::Vector3 mounted(const nav::Vector3& s, const InertialNumbers& n) {
+    const auto& m = n.mounting_bs;
+    return {m[0] * s(0) + m[1] * s(1) + m[2] * s(2), m[3] * s(0) + m[4] * s(1) + m[5] * s(2),
+            m[6] * s(0) + m[7] * s(1) + m[8] * s(2)};
+  }
+  static nav::ImuIncrement mounted(const nav::ImuIncrement& s, const InertialNumbers& n) {
+    return {.dtheta_b_rad = mounted(s.dtheta_b_rad, n), .dv_b_mps = mounted(s.dv_b_mps, n), .dt = s.dt};
   }
   void noise_of(const InertialNumbers& n) {
     ins_.noise = {.gyro_radps_rthz = n.gyro_radps_rthz,

@@ -10,7 +10,7 @@ namespace tetap::app {
 
 inline Innovation Inertial::fuse(const ImuSample& sample, base::Micros stamp, const Context& with) {
   const InertialNumbers& n = with.numbers.inertial;
-  nav::ImuIncrement increment = increment_of(sample, n);
+  const nav::ImuIncrement increment = mounted(shown_by(sample), n);
   if (increment.check() != nav::ImuVerdict::kAccepted) return {.verdict = can::Verdict::kNotFinite};
   const float dt_s = base::seconds(increment.dt);
   const bool was_stuck = imu_.stuck();
@@ -51,7 +51,9 @@ inline Innovation Inertial::fuse(const ImuSample& sample, base::Micros stamp, co
     time_ = stamp;
     return {.verdict = can::Verdict::kNotFinite};
   }
-  ins_.predict_covariance(imu_.noise_factor(n));
+  constexpr float kEvery_s = 7.5e-3F;  // a measurement that comes earlier does it itself
+  ins_.vibration = imu_.noise_factor(n);
+  if (ins_.pending_s() >= kEvery_s) ins_.predict_covariance();
   // Clipped increments are used, and are as uncertain as none.
   const float growth = base::sqrt(dt_s * 0.1F);
   if (sample.clipped_accel > 0 || sample.clipped_gyro > 0)
@@ -131,32 +133,48 @@ void Inertial::advance(base::Micros t, const Context& with, Window&& window) {
   last_rate_b_radps_ = rate_b_radps_;
   if (phase_ != Phase::kTracking) return;
   Repeats repeats = imu_.repeats();
+  const ImuSample* newest = nullptr;
   base::Micros last = imu_.heard();
+  base::Micros reached = time_;
+  nav::ImuGather gather;  // in the axes of the sensor
+  const auto fold = [&]() {
+    if (!gather.empty()) ahead_.add(mounted(gather.take(), n));
+  };
+  const auto rate = [&](const ImuSample& s) {
+    return nav::Vector3(mounted(shown_by(s).dtheta_b_rad, n) / base::seconds(base::Micros{s.interval_us}));
+  };
   const auto go_on = [&](base::Micros until) {
-    const base::Micros gap = until - (time_ + ahead_.dt);
+    const base::Micros gap = until - reached;
     if (gap <= base::Micros{1'500}) return;
+    fold();
     nav::Vector3 w_b = nav::Vector3::Zero();
     if (gap <= base::Micros{n.stale_us}) {
-      w_b = last_rate_b_radps_ - ins_.x.b_g_radps;
+      w_b = (newest == nullptr ? rate_b_radps_ : rate(*newest)) - ins_.x.b_g_radps;
     } else if (turn_known(time_)) {
       w_b(2) = wheel_turn_radps_;
     }
     ahead_.add(unseen(gap, w_b));
+    reached += gap;
   };
   window([&](const Sample& sample) {
     if (sample.sensor != can::Sensor::kImu || sample.instance != n.imu) return;
-    if (repeats.hear(sample.payload.imu, n.stuck_samples)) return;
-    if (sample.payload.imu.clipped_gyro > 0 && turn_known(time_)) return;
-    const nav::ImuIncrement increment = increment_of(sample.payload.imu, n);
+    const ImuSample& imu = sample.payload.imu;
+    if (repeats.hear(imu, n.stuck_samples)) return;
+    if (imu.clipped_gyro > 0 && turn_known(time_)) return;
+    const nav::ImuIncrement increment = shown_by(imu);
     if (increment.check() != nav::ImuVerdict::kAccepted) return;
     const base::Micros begin = sample.stamp - increment.dt;
-    if (2 * (begin - (time_ + ahead_.dt)).us < -increment.dt.us) return;
+    if (2 * (begin - reached).us < -increment.dt.us) return;
     go_on(begin);
-    ahead_.add(increment);
+    gather.add(increment);
+    if (gather.full()) fold();
+    reached += increment.dt;
     last = sample.stamp;
-    last_rate_b_radps_ = increment.dtheta_b_rad / base::seconds(increment.dt);
+    newest = &imu;
   });
   go_on(t);
+  fold();
+  if (newest != nullptr) last_rate_b_radps_ = rate(*newest);
   blind_ = unusable_ || t - last > base::Micros{n.stale_us};
 }
 
