@@ -248,12 +248,12 @@ class Load(Folder):
         for bitrate, frames, percent, verdict in rows:
             self.assertAlmostEqual(percent, 100 * frames * 135 / bitrate, delta=0.1)
             self.assertEqual(verdict, "ok")
-        self.assertEqual(rows[0], (500000, 560, 15.1, "ok"))
+        self.assertEqual(rows[0], (500000, 585, 15.8, "ok"))
         self.assertEqual([frames - rows[1][1] for _, frames, _, _ in rows[1:]], [0, 300, 900], "three frames per IMU sample")
 
     def test_too_many_frames_fail_with_the_line_that_says_so(self):
         busy = self.path("busy.dbc")
-        write(busy, read(DBC).replace('"GenMsgCycleTime" BO_ 812 50;', '"GenMsgCycleTime" BO_ 812 2;'))
+        write(busy, read(DBC).replace('"GenMsgCycleTime" BO_ 812 100;', '"GenMsgCycleTime" BO_ 812 2;'))
         result = run(TOOL, busy, "--load")
         self.assertEqual(result.returncode, 1)
         self.assertEqual(self.ROW.findall(result.stdout)[0][4], "TOO MUCH")
