@@ -43,6 +43,9 @@ namespace tetap::sim {
   n.wheels = planar.wheels;
   n.gyro = planar.gyro;
   n.gnss = planar.gnss;
+  n.gnss.antenna_x_b_m = single(world.gnss.antenna_b_m[0]);
+  n.gnss.antenna_y_b_m = single(world.gnss.antenna_b_m[1]);
+  n.gnss.antenna_z_b_m = single(world.gnss.antenna_b_m[2]);
   n.gnss.sigma_velocity_floor_mps = 0;
   n.inertial.gyro_radps_rthz = single(world.imu.gyro_noise);
   n.inertial.accel_mps2_rthz = single(world.imu.accel_noise[2]);

@@ -33,7 +33,8 @@ struct ImuIncrement {
             .dv_b_mps = dv_b_mps + turned.rotate(next.dv_b_mps),
             .dt = dt + next.dt};
   }
-  /// What no robot does is refused, so that the state stays finite whatever comes: 100 rad/s, 1000 m/s^2, 0.2 s.
+  /// What no robot does is refused, so that the state stays finite whatever comes: 100 rad/s, 1000 m/s^2 (norms), 0.2
+  /// s.
   [[nodiscard]] ImuVerdict check() const {
     if (dt.us <= 0 || dt.us > 200'000) return ImuVerdict::kBadInterval;
     const float dt_s = base::seconds(dt);

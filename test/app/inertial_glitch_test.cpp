@@ -57,6 +57,7 @@ class Drive {
   double white_m = 1, lasting_m = 0, lasting_s = 60;
   std::int64_t gnss_every_us = 200'000;
   bool wheels = true, gnss_velocity = true;
+  double pushed_at_start_mps2 = 0;  ///< forwards while it levels, so that it takes a slope for level
   /// What the world does to a fix; false: it does not come.
   struct Fix {
     double east_m = 0, north_m = 0, up_m = 0;
@@ -108,7 +109,8 @@ class Drive {
     east_m += speed_mps * std::cos(middle) * dt + std::exchange(unseen_east_m, 0);
     north_m += speed_mps * std::sin(middle) * dt;
     const auto shake = [this](double sigma) { return static_cast<float>(sigma * normal_imu_(engine_imu_)); };
-    const double pushed = time_s() < 0.015 ? 0 : speed_mps - last_mps_;
+    const double pushed =
+        (time_s() < 0.015 ? 0 : speed_mps - last_mps_) + (time_s() < 1.05 ? pushed_at_start_mps2 * dt : 0);
     last_mps_ = speed_mps;
     estimator.fuse(
         ImuSample{.dangle_b_rad = {shake(2e-5), shake(2e-5), static_cast<float>(turn_radps * dt) + shake(2e-5)},
@@ -514,6 +516,47 @@ TEST(NeverNan, NoAccuracyAndNoCoordinateBreaksIt) {
         ASSERT_TRUE(now.state.finite()) << acc << ' ' << height << ' ' << latitude;
         ASSERT_TRUE(now.p.positive_definite()) << acc << ' ' << height << ' ' << latitude;
       }
+}
+
+/// Seven degrees off and sure of them to a third of one: nothing that comes later agrees with it. It has to notice that
+/// it is wrong itself, and begin anew.
+TEST(InertialDivergence, AWrongStartIsNotFlownAwayWith) {
+  for (const unsigned seed : {1U, 2U, 3U}) {
+    Numbers n = numbers();
+    n.inertial.start_tilt_rad = 0.005F;
+    n.inertial.accel_turn_on_mps2 = 0.02F;
+    n.inertial.wheel_mps = 0.001F;
+    n.inertial.slip_share = 0;
+    n.inertial.lateral_mps = n.inertial.vertical_mps = 0.005F;
+    Drive d(n, seed);
+    d.pushed_at_start_mps2 = 1.2;
+    d.place();
+    d.run(60);
+    EXPECT_GT(d.worst_sigmas, 5.0);  // it was wrong and sure
+    EXPECT_LT(d.worst_m, 60.0);      // a minute of 1.2 m/s^2 is two kilometres
+    d.clear();
+    d.run(60);
+    EXPECT_TRUE(d.tracking());
+    EXPECT_LT(d.worst_m, 3.0);
+    EXPECT_LT(d.worst_sigmas, 4.5);
+  }
+}
+
+/// A receiver that is wrong in place and speed for as long as it likes: the wheels say that the filter is right.
+TEST(InertialDivergence, AReceiverThatLiesInAllItSaysStartsNothingAnew) {
+  Drive d = settled();
+  d.tamper = [](Drive::Fix& fix) {
+    fix.east_m += 300;
+    return true;
+  };
+  d.gnss_velocity = false;
+  for (int i = 0; i < 150; ++i) {
+    d.run(0.2);
+    d.estimator.fuse(GnssVelocity{.v_n_mps = {25, -10, 0}, .acc_mps = 0.05F}, {d.us}, d.with());
+  }
+  EXPECT_TRUE(d.tracking());
+  EXPECT_EQ(d.estimator.jump().count, 0);
+  EXPECT_LT(d.worst_m, 3.0);
 }
 
 }  // namespace

@@ -83,6 +83,14 @@ bool decodes(std::uint32_t offset, std::span<const std::uint8_t> p) {
         return one_of<can::EstMotion>(p);
       case can::EstStdPose::kOffset:
         return one_of<can::EstStdPose, can::EstStdMore>(p);
+      case can::EstAtt::kOffset:
+        return one_of<can::EstAtt>(p);
+      case can::EstVel::kOffset:
+        return one_of<can::EstVel>(p);
+      case can::EstStateHeight::kOffset:
+        return one_of<can::EstStateHeight, can::EstStateAccBias, can::EstStateGyroBias, can::EstStateStdVel,
+                      can::EstStateStdTilt, can::EstStateStdAccBias, can::EstStateStdGyroBias, can::EstStateJump,
+                      can::EstStateDisagreement, can::EstStateImuHealth>(p);
       default:
         return false;
     }

@@ -122,10 +122,12 @@ class Inertial {
                   .accel_bias_mps3_rthz = n.accel_bias_mps3_rthz};
   }
   void begin(const Context& with);
+  void begin_anew(base::Micros t, const Context& with);
   void stand(base::Micros stamp, const Context& with);
   [[nodiscard]] bool resting(base::Micros stamp, const Context& with) const;
   void hear_ground(const nav::Vector3& v_n_mps, float sigma_mps, base::Micros stamp, const Context& with);
   [[nodiscard]] bool turn_known(base::Micros at) const;
+  [[nodiscard]] bool wheels_agree(base::Micros at) const;
   [[nodiscard]] bool without_imu() const;
   void bridge(base::Micros gap, const Context& with);
   void doubt(float sigma_mps, float sigma_rad);
@@ -143,7 +145,7 @@ class Inertial {
   template <class Model>
   Innovation measure(const Model& model, Source source, float gate_scale, base::Micros stamp, const Context& with);
   template <int M>
-  void recover(const filter::Vector<float, M>& nu, Source source, const RecoveryNumbers& n);
+  void recover(const filter::Vector<float, M>& nu, Source source, const Numbers& n);
 
   nav::Ins ins_;
   nav::ImuChunk ahead_;
@@ -158,7 +160,7 @@ class Inertial {
   base::Micros stood_;        ///< last stamp at which standing still was fused
   WheelCounts counts_;
   bool have_counts_ = false;
-  float counted_forward_mps_ = base::kNan;            ///< the filter's speed when they were fused
+  float gained_mps_ = base::kNan;                     ///< forward, by the IMU, since they were fused; NaN: not known
   nav::Vector3 rate_b_radps_ = nav::Vector3::Zero();  ///< as the gyroscope shows it, at the filter's time
   nav::Vector3 last_rate_b_radps_ = nav::Vector3::Zero();
   nav::Vector3 still_rate_radps_ = nav::Vector3::Zero();  ///< mean over the last still_s_ of standing
@@ -175,6 +177,7 @@ class Inertial {
   ImuWatch imu_;
   SlipWatch slip_;
   std::array<Refused, kSources> refused_{};
+  std::uint8_t recoveries_ = 0;  ///< of the velocity, since a fix was accepted
   FirstFixes first_fixes_;
   FrozenFix frozen_;
   Claim place_, height_;                 ///< of fixes that are not taken

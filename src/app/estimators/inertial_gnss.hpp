@@ -146,6 +146,7 @@ inline constexpr float kDecides = 4.0F;
   const auto result = ins_.update(fix, base::kInfinity);
   if (result.verdict != filter::Verdict::kAccepted) return app::record(result);
   last_position_ = stamp;
+  recoveries_ = 0;
   led_m_ = {0.9F * led_m_[0] + nav::difference(ins_.x.x, was[0]), 0.9F * led_m_[1] + nav::difference(ins_.x.y, was[1])};
   doubted_ = false;
   return record;
@@ -202,6 +203,11 @@ inline Innovation Inertial::fuse(const GnssVelocity& velocity, base::Micros stam
   }
   if (frozen_.frozen()) return {.verdict = can::Verdict::kStale};
   hear_ground(v_n, sigma, stamp, with);
+  // A receiver and a filter that say another direction: either may be wrong, and the filter gives way after a while.
+  // Another speed than that which wheels agree with: the receiver is.
+  const float level = base::sqrt(v_n(0) * v_n(0) + v_n(1) * v_n(1)), rolled = base::abs(forward_mps());
+  if (wheels_agree(stamp) && base::abs(level - rolled) > 4.0F * sigma + 0.2F * rolled + 0.5F)
+    refused_[kVelocity].since = stamp;
   return measure(model::GnssVelocity3d{.v_n_mps = v_n,
                                        .sigma_horizontal_mps = sigma,
                                        .sigma_vertical_mps = 1.5F * sigma,

@@ -45,8 +45,11 @@ inline Innovation Inertial::fuse(const ImuSample& sample, base::Micros stamp, co
     if (gap <= base::Micros{n.stale_us}) bridged_ = before;  // a few lost are not an IMU that is
     rate_b_radps_ = shown;
   }
+  const nav::Quaternion& q = ins_.x.q_nb;
+  const float up_b = 2.0F * (q.x * q.z - q.w * q.y);  // what of gravity's reaction an accelerometer shows forward
+  gained_mps_ += increment.dv_b_mps(0) - (ins_.x.b_a_mps2(0) + up_b * ins_.earth.gravity_mps2) * dt_s;
   const nav::ImuVerdict verdict = ins_.predict(increment);
-  if (verdict == nav::ImuVerdict::kDiverged) restart(stamp, with);  // faster than anything drives: it begins anew
+  if (verdict == nav::ImuVerdict::kDiverged) begin_anew(stamp, with);  // faster than anything drives
   if (verdict != nav::ImuVerdict::kAccepted) {
     time_ = stamp;
     return {.verdict = can::Verdict::kNotFinite};
@@ -104,6 +107,7 @@ inline bool Inertial::without_imu() const {
   rate_b_radps_ = ins_.x.b_g_radps + w_b;
   time_ += gap;
   bridged_ = time_;
+  gained_mps_ = base::kNan;
   still_s_ = 0;
   calm_ = {};
 }
@@ -192,6 +196,19 @@ inline std::uint16_t Inertial::faults() const {
   return bits;
 }
 
+/// As after power on, but nothing is known of where it is. By how much it steps will be seen only then.
+[[gnu::noinline]] inline void Inertial::begin_anew(base::Micros t, const Context& with) {
+  const auto count = static_cast<std::uint8_t>(jump_.count + 1);
+  base::renew(*this);
+  time_ = t;
+  noise_of(with.numbers.inertial);
+  jump_ = {.east_m = base::kNan,
+           .north_m = base::kNan,
+           .yaw_rad = base::kNan,
+           .cause = can::ResetCause::kDiverged,
+           .count = count};
+}
+
 /// The filter begins where the start found the robot.
 inline void Inertial::begin(const Context& with) {
   if (with.site.origin != can::OriginSource::kNone) ins_.earth = nav::Earth::at(with.site.frame, false);
@@ -200,6 +217,7 @@ inline void Inertial::begin(const Context& with) {
   last_position_ = time_;
   refused_ = {};
   still_s_ = 0;
+  gained_mps_ = base::kNan;
 }
 
 /// Standing: wheels that have not turned for half a second; without wheels, see resting(). Then there is no velocity,

@@ -16,7 +16,10 @@ Innovation Inertial::measure(const Model& model, Source source, float gate_scale
   const Refused& refused = refused_[source];
   if (rejected && refused.in_a_row >= with.numbers.recovery.at_least &&
       stamp - refused.since >= base::Micros{with.numbers.recovery.after_us})
-    recover(result.nu, source, with.numbers.recovery);
+    recover(result.nu, source, with.numbers);
+  // Neither velocity nor place nor wheels, whatever it doubts: what it is wrong about is more than that.
+  constexpr std::uint8_t kPatience = 3;
+  if (recoveries_ >= kPatience && refused_[kPosition].in_a_row > 0 && !wheels_agree(stamp)) begin_anew(stamp, with);
   return record(result);
 }
 
@@ -32,13 +35,21 @@ inline void Inertial::refused_or_not(Source source, bool refused, base::Micros s
 /// What was refused that long is right and the filter wrong, or the filter will refuse it again: its doubts grow by
 /// what it was off.
 template <int M>
-void Inertial::recover(const filter::Vector<float, M>& nu, Source source, const RecoveryNumbers& n) {
+void Inertial::recover(const filter::Vector<float, M>& nu, Source source, const Numbers& n) {
   if constexpr (M == 3) {
-    if (source == kVelocity)
-      for (int i = 0; i < 3; ++i) ins_.p(3 + i, 3 + i) += nu(i) * nu(i);
+    if (source == kVelocity) {
+      ++recoveries_;
+      // What keeps pulling it away is gravity, taken for motion: it knows its tilt no better than at the start.
+      const float tilt = n.inertial.start_tilt_rad, bias = n.inertial.accel_turn_on_mps2;
+      for (int i = 0; i < 3; ++i) {
+        ins_.p(3 + i, 3 + i) += nu(i) * nu(i);
+        ins_.p(9 + i, 9 + i) += bias * bias;
+        if (i < 2) ins_.p(6 + i, 6 + i) += tilt * tilt;
+      }
+    }
   }
   for (int i = 3; i < 6; ++i) ins_.p(i, i) += 0.25F;
-  ins_.p(8, 8) += n.inflate_yaw_rad * n.inflate_yaw_rad;
+  ins_.p(8, 8) += n.recovery.inflate_yaw_rad * n.recovery.inflate_yaw_rad;
   refused_[source] = {};
 }
 

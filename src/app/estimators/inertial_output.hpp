@@ -77,7 +77,7 @@ void Inertial::each_bit(Sink&& sink) const {
   for (int i = 0; i < 3; ++i) sink(ground_mps_(i));
   sink(grounds_);
   sink(wheel_turn_radps_);
-  sink(counted_forward_mps_);
+  sink(gained_mps_);
   imu_.each_bit(sink);
   slip_.each_bit(sink);
   for (const Refused& refused : refused_) {
@@ -92,6 +92,7 @@ void Inertial::each_bit(Sink&& sink) const {
   sink(led_m_[1]);
   sink(jump_.east_m);
   sink(jump_.north_m);
+  sink(static_cast<std::uint32_t>(recoveries_));
   sink(static_cast<std::uint32_t>(jump_.count | (doubted_ ? 256U : 0U) | (back_ ? 512U : 0U)));
   field_.each_bit(sink);
   baro_.each_bit(sink);

@@ -19,23 +19,18 @@ inline Innovation Inertial::fuse(const WheelCounts& counts, base::Micros stamp, 
   counts_time_ = stamp;
   have_counts_ = true;
   if (!usable || left != 0 || right != 0) moved_ = stamp;
-  if (!usable) {
-    counted_forward_mps_ = base::kNan;
-    return {.verdict = can::Verdict::kAccepted};
-  }
+  // Counts are the mean over the interval, the state is at its end: half of what it gained in between is added. By the
+  // IMU, for what measurements corrected meanwhile was not gained.
+  const float later_mps = base::is_finite(gained_mps_) ? 0.5F * gained_mps_ : 0.0F;
+  gained_mps_ = 0;
+  if (!usable) return {.verdict = can::Verdict::kAccepted};
   const float per_s = 1.0F / base::seconds(interval);
   const SlipWatch::Wheels wheels{.left_mps = drive.left_m(left) * per_s, .right_mps = drive.right_m(right) * per_s};
   // One count over the interval; and what slip and radii make of the way since, as odometry has it (noise in m^2 per
   // m).
   const float count_mps = 0.41F * drive.left_m(1) * per_s;
   const float way = drive.noise_left * base::abs(wheels.left_mps) + drive.noise_right * base::abs(wheels.right_mps);
-  // Counts are the mean over the interval, the state is at its end: half of what it gained in between is added.
-  const float gained_mps = forward_mps() - counted_forward_mps_;
-  const Innovation record =
-      roll(wheels, base::sqrt(count_mps * count_mps + 0.25F * way * per_s),
-           base::is_finite(gained_mps) && phase_ == Phase::kTracking ? 0.5F * gained_mps : 0.0F, stamp, with);
-  counted_forward_mps_ = forward_mps();
-  return record;
+  return roll(wheels, base::sqrt(count_mps * count_mps + 0.25F * way * per_s), later_mps, stamp, with);
 }
 
 inline Innovation Inertial::fuse(const WheelSpeeds& speeds, base::Micros stamp, const Context& with) {
@@ -76,7 +71,7 @@ inline Innovation Inertial::roll(const SlipWatch::Wheels& wheels, float sigma_mp
     // Where GNSS holds the filter's velocity the wheels are wrong; without it, the filter may as well be.
     if (stamp - last_position_ > base::Micros{1'000'000} &&
         stamp - refused_[kWheels].since >= base::Micros{with.numbers.recovery.after_us}) {
-      recover(nav::Vector3(nav::Vector3::Zero()), kWheels, with.numbers.recovery);
+      recover(nav::Vector3(nav::Vector3::Zero()), kWheels, with.numbers);
       doubt(mean - v_b(0), 0.0F);
       slip_.forget();
     }
@@ -99,6 +94,10 @@ inline Innovation Inertial::roll(const SlipWatch::Wheels& wheels, float sigma_mp
     ground_mps_ += (v_n_mps - ground_mps_) * share;
   }
   ground_ = stamp;
+  // Wheels that lose grip at once by more than that are seen by the IMU; what only GNSS saw is the receiver's.
+  constexpr float kUnseen_mps = 3;
+  const float off2 = nav::Vector3(v_n_mps - ins_.x.v_n_mps).squaredNorm();
+  if (off2 > kUnseen_mps * kUnseen_mps && wheels_agree(stamp)) return;
   const nav::Vector3 antenna_b{with.numbers.gnss.antenna_x_b_m - with.numbers.inertial.axle_x_b_m,
                                with.numbers.gnss.antenna_y_b_m, with.numbers.gnss.antenna_z_b_m};
   const nav::Vector3 w_b = rate_b_radps_ - ins_.x.b_g_radps;
@@ -106,10 +105,8 @@ inline Innovation Inertial::roll(const SlipWatch::Wheels& wheels, float sigma_mp
   // A heading that is not known turns speed ahead into speed sideways: its doubt counts here.
   const float v2 = v_n_mps(0) * v_n_mps(0) + v_n_mps(1) * v_n_mps(1);
   const float yaw2 = ins_.p(8, 8) < 1.0F ? ins_.p(8, 8) : 1.0F;
-  if (slip_.ground(v_b(0), base::sqrt(sigma_mps * sigma_mps + v2 * yaw2 * yaw2), stamp, with.numbers.inertial)) {
-    const float off = base::sqrt(nav::Vector3(v_n_mps - ins_.x.v_n_mps).squaredNorm());
-    doubt(off, 0.0F);
-  }
+  if (slip_.ground(v_b(0), base::sqrt(sigma_mps * sigma_mps + v2 * yaw2 * yaw2), stamp, with.numbers.inertial))
+    doubt(base::sqrt(off2), 0.0F);
 }
 
 inline Innovation Inertial::forward(const Forward& speed, base::Micros stamp, const Context& with) {
@@ -128,6 +125,12 @@ inline Innovation Inertial::forward(const Forward& speed, base::Micros stamp, co
                                    .axle_b_m = {n.axle_x_b_m, 0.0F, 0.0F},
                                    .gyro_b_radps = rate_b_radps_},
                  kWheels, n.wheel_gate_scale, stamp, with);
+}
+
+/// They came of late, do not spin, and the filter goes as fast as they say.
+inline bool Inertial::wheels_agree(base::Micros at) const {
+  return counts_time_.us > 0 && at - counts_time_ < base::Micros{1'000'000} && refused_[kWheels].in_a_row == 0 &&
+         slip_.slip() == SlipWatch::Slip::kNone;
 }
 
 /// A wheel speed of which nothing is known: the non-holonomic constraint is what it leaves.
