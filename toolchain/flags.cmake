@@ -14,8 +14,8 @@ target_compile_options(tetap_flags INTERFACE
   # Designated initialisers leave the rest to the defaults, on purpose.
   -Wno-missing-field-initializers)
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND "${CMAKE_CXX_FLAGS} ${CMAKE_CXX_FLAGS_RELEASE}" MATCHES "-march=|-mfma")
-  # GCC 12 vectorises a*b -+ c*d to vfmaddsub where the host has it, whatever -ffp-contract says; clang does not.
-  target_compile_options(tetap_flags INTERFACE -fno-tree-slp-vectorize)
+  # GCC 12 vectorises a*b -+ c*d, in a row and in loops, to vfmaddsub where the host has it, whatever -ffp-contract says; clang does not.
+  target_compile_options(tetap_flags INTERFACE -fno-tree-vectorize)
 endif()
 target_compile_definitions(tetap_flags INTERFACE
   # Blocked products and triangular solves link malloc whatever the sizes; the threshold keeps products coefficient-wise.

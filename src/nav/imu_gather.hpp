@@ -28,7 +28,7 @@ class ImuGather {
   }
   /// What was gathered; empty afterwards.
   [[nodiscard]] ImuIncrement take() {
-    const ImuIncrement all = sum_;
+    ImuIncrement all = sum_;
     sum_ = {};
     return all;
   }

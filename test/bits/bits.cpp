@@ -101,14 +101,15 @@ class Program {
   /// One after the other in the same memory: a core that has little holds all of them.
   template <class T, class... Arguments>
   [[nodiscard]] T& fresh(const Arguments&... arguments) {
-    static_assert(sizeof(T) <= sizeof memory_);
+    static_assert(sizeof(T) <= sizeof memory_ && alignof(T) <= kAlignment);
     return *new (static_cast<void*>(memory_.data())) T{arguments...};
   }
   void line(const char* kind, const char* name, std::uint32_t hash) {
     board_.print(hal::Text<>{}.add("bits: ").add(kind).add(name).add(' ').hex(hash).add('\n').c_str());
   }
   Board& board_;
-  alignas(8) std::array<std::byte, 16 * 1024> memory_{};
+  static constexpr std::size_t kAlignment = 32;  // what a vectorised Eigen wants, for --show-red
+  alignas(kAlignment) std::array<std::byte, 16 * 1024> memory_{};
 };
 
 }  // namespace

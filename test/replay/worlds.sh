@@ -25,7 +25,16 @@ run() { # NAME OPTION...
 for seed in $(seq 1 "$seeds"); do run "seed$seed" --seed "$seed" --duration "$seconds"; done
 faults=$("$programs/tetap-world" --help | sed -n 's/^  \([a-z_]*\) *@[0-9].*/\1/p')
 [ "$(wc -w <<<"$faults")" -ge 15 ] || { echo "  tetap-world --help lists fewer than 15 faults"; failed=1; }
-for fault in $faults; do run "$fault" --seed 1 --duration "$seconds" --fault "$fault@10"; done
+for fault in $faults; do
+  case $fault in  # a robot that has the sensor it falls on
+    landmark_*) robot=rover_landmarks ;;
+    mag_*) robot=iris ;;
+    *) robot=rover ;;
+  esac
+  at=10
+  [ "$fault" = gnss_outage ] && at=10+5  # shorter than the outage that gnss_far begins with
+  run "$fault" --robot $robot --seed 1 --duration "$seconds" --fault "$fault@$at"
+done
 runs=$(wc -l <"$out/hashes")
 distinct=$(sort -u "$out/hashes" | wc -l)
 echo "  $runs worlds of $seconds s: $seeds seeds, $(wc -w <<<"$faults") faults; $distinct different records"
