@@ -114,6 +114,18 @@ class Ins {
     return start_with_p(at);
   }
 
+  /// The covariance, and what is to be added to it still.
+  template <class Sink>
+  void each_bit_of_p(Sink&& sink) const {
+    for (const float v : p.packed()) sink(v);
+    sink(pending_.dt_s);
+    for (int i = 0; i < 3; ++i) {
+      sink(pending_.dv_n_mps(i));
+      for (int k = 0; k < 3; ++k) sink(pending_.r_dt(i, k));
+    }
+    sink(vibration);
+  }
+
   /// How often the covariance had to be put right (see condition()).
   [[nodiscard]] std::uint32_t conditioned() const { return conditioned_; }
 

@@ -48,7 +48,7 @@ for name in "${names[@]}"; do
     cmp -s "$out/$name.g++1/estimates.log" "$out/$name.$run/estimates.log" || verdict="$run DIFFERS"
   done
   cmp -s "$out/$name.memory/estimates.log" "$out/$name.vcan/estimates.log" || verdict="vcan DIFFERS from memory"
-  moves=$(awk -F, 'NR > 1 && $5 != "" { if (n++ == 0) { x = $5; y = $6 } d = ($5 - x) ^ 2 + ($6 - y) ^ 2; if (d > m) m = d } END { printf "%.2f", sqrt(m) }' \
+  moves=$(awk -F, 'NR > 1 && $5 != "" { if (!($3 in x)) { x[$3] = $5; y[$3] = $6 } d = ($5 - x[$3]) ^ 2 + ($6 - y[$3]) ^ 2; if (d > m) m = d } END { printf "%.2f", sqrt(m) }' \
     "$out/$name.g++1/estimates.csv")
   epochs=$(number g++1 epochs)
   awk -v m="$moves" -v e="$epochs" 'BEGIN { exit !(m > 0.3 && e > 1000) }' || verdict="$verdict, but it does not move or is too short"

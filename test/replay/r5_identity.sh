@@ -61,7 +61,7 @@ failed=0
 for host in "$out"/*.host; do
   name=$(basename "$host" .host)
   epochs=$(grep -c ' 320#' "$host/estimates.log")
-  moves=$(awk -F, 'NR > 1 && $5 != "" { if (n++ == 0) { x = $5; y = $6 } d = ($5 - x) ^ 2 + ($6 - y) ^ 2; if (d > m) m = d } END { printf "%.2f", sqrt(m) }' "$host/estimates.csv")
+  moves=$(awk -F, 'NR > 1 && $5 != "" { if (!($3 in x)) { x[$3] = $5; y[$3] = $6 } d = ($5 - x[$3]) ^ 2 + ($6 - y[$3]) ^ 2; if (d > m) m = d } END { printf "%.2f", sqrt(m) }' "$host/estimates.csv")
   if cmp -s "$host/estimates.log" "$out/$name.board/estimates.log"; then verdict=equal; else verdict=DIFFERENT; failed=1; fi
   first=$out/${name/again_/_}.host
   cmp -s "$host/estimates.log" "$first/estimates.log" || { verdict="$verdict, but DIFFERENT from the run before"; failed=1; }

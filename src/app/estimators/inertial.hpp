@@ -122,12 +122,13 @@ class Inertial {
                   .accel_bias_mps3_rthz = n.accel_bias_mps3_rthz};
   }
   void begin(const Context& with);
-  void begin_anew(base::Micros t, const Context& with);
+  void begin_anew(base::Micros t, can::ResetCause cause, const Context& with);
+  [[nodiscard]] bool looks_wrong(float level_mps, float sigma_mps, base::Micros stamp, const Context& with);
   void stand(base::Micros stamp, const Context& with);
   [[nodiscard]] bool resting(base::Micros stamp, const Context& with) const;
   void hear_ground(const nav::Vector3& v_n_mps, float sigma_mps, base::Micros stamp, const Context& with);
   [[nodiscard]] bool turn_known(base::Micros at) const;
-  [[nodiscard]] bool wheels_agree(base::Micros at) const;
+  [[nodiscard]] bool wheels_agree(base::Micros at, const Context& with) const;
   [[nodiscard]] bool without_imu() const;
   void bridge(base::Micros gap, const Context& with);
   void doubt(float sigma_mps, float sigma_rad);
@@ -177,6 +178,7 @@ class Inertial {
   ImuWatch imu_;
   SlipWatch slip_;
   std::array<Refused, kSources> refused_{};
+  base::Micros wrong_way_;       ///< since when receiver and wheels say that it looks another way; 0: they do not
   std::uint8_t recoveries_ = 0;  ///< of the velocity, since a fix was accepted
   FirstFixes first_fixes_;
   FrozenFix frozen_;

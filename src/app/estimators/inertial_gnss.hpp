@@ -191,6 +191,19 @@ inline constexpr float kDecides = 4.0F;
   jump_ = {.east_m = by_m(0), .north_m = by_m(1), .count = static_cast<std::uint8_t>(jump_.count + 1)};
 }
 
+/// Receiver and wheels have agreed for long on a speed that the filter does not have forwards: by 60 degrees or more it
+/// looks another way. Both wheels would have to spin exactly as fast as it goes.
+[[gnu::noinline]] inline bool Inertial::looks_wrong(float level_mps, float sigma_mps, base::Micros stamp,
+                                                    const Context& with) {
+  const float rolled = slip_.mean_mps(), off = base::abs(forward_mps() - rolled);
+  const bool wrong = slip_.slip() == SlipWatch::Slip::kBoth && level_mps > 4.0F * sigma_mps + 0.3F &&
+                     base::abs(level_mps - base::abs(rolled)) < 3.0F * sigma_mps + 0.05F * level_mps &&
+                     off > 0.5F * level_mps;
+  if (!wrong) wrong_way_ = {};
+  if (wrong && wrong_way_.us == 0) wrong_way_ = stamp;
+  return wrong && stamp - wrong_way_ >= base::Micros{with.numbers.recovery.after_us};
+}
+
 inline Innovation Inertial::fuse(const GnssVelocity& velocity, base::Micros stamp, const Context& with) {
   const GnssNumbers& n = with.numbers.gnss;
   const nav::Vector3 v_n{velocity.v_n_mps[0], velocity.v_n_mps[1],
@@ -206,8 +219,12 @@ inline Innovation Inertial::fuse(const GnssVelocity& velocity, base::Micros stam
   // A receiver and a filter that say another direction: either may be wrong, and the filter gives way after a while.
   // Another speed than that which wheels agree with: the receiver is.
   const float level = base::sqrt(v_n(0) * v_n(0) + v_n(1) * v_n(1)), rolled = base::abs(forward_mps());
-  if (wheels_agree(stamp) && base::abs(level - rolled) > 4.0F * sigma + 0.2F * rolled + 0.5F)
+  if (wheels_agree(stamp, with) && base::abs(level - rolled) > 4.0F * sigma + 0.2F * rolled + 0.5F)
     refused_[kVelocity].since = stamp;
+  if (looks_wrong(level, sigma, stamp, with)) {
+    begin_anew(stamp, can::ResetCause::kHeadingWrong, with);
+    return {.verdict = can::Verdict::kRejected};
+  }
   return measure(model::GnssVelocity3d{.v_n_mps = v_n,
                                        .sigma_horizontal_mps = sigma,
                                        .sigma_vertical_mps = 1.5F * sigma,

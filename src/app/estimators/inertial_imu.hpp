@@ -49,7 +49,8 @@ inline Innovation Inertial::fuse(const ImuSample& sample, base::Micros stamp, co
   const float up_b = 2.0F * (q.x * q.z - q.w * q.y);  // what of gravity's reaction an accelerometer shows forward
   gained_mps_ += increment.dv_b_mps(0) - (ins_.x.b_a_mps2(0) + up_b * ins_.earth.gravity_mps2) * dt_s;
   const nav::ImuVerdict verdict = ins_.predict(increment);
-  if (verdict == nav::ImuVerdict::kDiverged) begin_anew(stamp, with);  // faster than anything drives
+  if (verdict == nav::ImuVerdict::kDiverged)
+    begin_anew(stamp, can::ResetCause::kDiverged, with);  // faster than anything drives
   if (verdict != nav::ImuVerdict::kAccepted) {
     time_ = stamp;
     return {.verdict = can::Verdict::kNotFinite};
@@ -197,16 +198,12 @@ inline std::uint16_t Inertial::faults() const {
 }
 
 /// As after power on, but nothing is known of where it is. By how much it steps will be seen only then.
-[[gnu::noinline]] inline void Inertial::begin_anew(base::Micros t, const Context& with) {
+[[gnu::noinline]] inline void Inertial::begin_anew(base::Micros t, can::ResetCause cause, const Context& with) {
   const auto count = static_cast<std::uint8_t>(jump_.count + 1);
   base::renew(*this);
   time_ = t;
   noise_of(with.numbers.inertial);
-  jump_ = {.east_m = base::kNan,
-           .north_m = base::kNan,
-           .yaw_rad = base::kNan,
-           .cause = can::ResetCause::kDiverged,
-           .count = count};
+  jump_ = {.east_m = base::kNan, .north_m = base::kNan, .yaw_rad = base::kNan, .cause = cause, .count = count};
 }
 
 /// The filter begins where the start found the robot.

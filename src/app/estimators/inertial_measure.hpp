@@ -19,7 +19,9 @@ Innovation Inertial::measure(const Model& model, Source source, float gate_scale
     recover(result.nu, source, with.numbers);
   // Neither velocity nor place nor wheels, whatever it doubts: what it is wrong about is more than that.
   constexpr std::uint8_t kPatience = 3;
-  if (recoveries_ >= kPatience && refused_[kPosition].in_a_row > 0 && !wheels_agree(stamp)) begin_anew(stamp, with);
+  if (recoveries_ >= kPatience && refused_[kPosition].in_a_row >= with.numbers.recovery.at_least &&
+      !wheels_agree(stamp, with))
+    begin_anew(stamp, can::ResetCause::kDiverged, with);
   return record(result);
 }
 
@@ -38,7 +40,11 @@ template <int M>
 void Inertial::recover(const filter::Vector<float, M>& nu, Source source, const Numbers& n) {
   if constexpr (M == 3) {
     if (source == kVelocity) {
-      ++recoveries_;
+      if (refused_[kPosition].in_a_row == 0) {
+        recoveries_ = 0;
+      } else if (recoveries_ < 255) {
+        ++recoveries_;
+      }
       // What keeps pulling it away is gravity, taken for motion: it knows its tilt no better than at the start.
       const float tilt = n.inertial.start_tilt_rad, bias = n.inertial.accel_turn_on_mps2;
       for (int i = 0; i < 3; ++i) {

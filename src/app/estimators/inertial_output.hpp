@@ -66,15 +66,21 @@ void Inertial::each_bit(Sink&& sink) const {
   sink(x.q_nb.x);
   sink(x.q_nb.y);
   sink(x.q_nb.z);
-  for (const float v : ins_.p.packed()) sink(v);
+  ins_.each_bit_of_p(sink);
   sink(static_cast<std::uint32_t>(phase_));
   start_.each_bit(sink);
   sink(time_.us);
   sink(last_position_.us);
   sink(moved_.us);
   sink(still_s_);
-  for (const base::Micros at : {ground_, calm_, bridged_, wheels_}) sink(at.us);
-  for (int i = 0; i < 3; ++i) sink(ground_mps_(i));
+  for (const base::Micros at : {ground_, calm_, bridged_, wheels_, counts_time_, constrained_, stood_, wrong_way_})
+    sink(at.us);
+  for (int i = 0; i < 3; ++i) {
+    sink(ground_mps_(i));
+    sink(rate_b_radps_(i));
+  }
+  sink(static_cast<std::uint32_t>(counts_.left | counts_.right << 16U));
+  sink(static_cast<std::uint32_t>((have_counts_ ? 1U : 0U) | (unusable_ ? 2U : 0U)));
   sink(grounds_);
   sink(wheel_turn_radps_);
   sink(gained_mps_);

@@ -132,10 +132,17 @@ class InertialStart {
     sink(levelled_s_);
     sink(at_.x.um());
     sink(at_.y.um());
-    sink(yaw_rad_);
+    for (const float v : {yaw_rad_, level_yaw_rad_, sigma_yaw_rad_, sigma_v_mps_}) sink(v);
+    for (int i = 0; i < 3; ++i) sink(v_n_mps_(i));
+    sink(first_x_.um());
+    sink(first_y_.um());
+    sink(at_.z.um());
+    sink(at_.sigma_horizontal_m);
+    sink(at_.sigma_vertical_m);
+    sink(fixed_at_.us);
     finder_.each_bit(sink);
     sink(static_cast<std::uint32_t>((placed_ ? 1U : 0U) | (headed_ ? 2U : 0U) | (fixed_ ? 4U : 0U) |
-                                    (given_ ? 8U : 0U)));
+                                    (given_ ? 8U : 0U) | (has_velocity_ ? 16U : 0U)));
   }
 
  private:

@@ -97,7 +97,7 @@ inline Innovation Inertial::roll(const SlipWatch::Wheels& wheels, float sigma_mp
   // Wheels that lose grip at once by more than that are seen by the IMU; what only GNSS saw is the receiver's.
   constexpr float kUnseen_mps = 3;
   const float off2 = nav::Vector3(v_n_mps - ins_.x.v_n_mps).squaredNorm();
-  if (off2 > kUnseen_mps * kUnseen_mps && wheels_agree(stamp)) return;
+  if (off2 > kUnseen_mps * kUnseen_mps && wheels_agree(stamp, with)) return;
   const nav::Vector3 antenna_b{with.numbers.gnss.antenna_x_b_m - with.numbers.inertial.axle_x_b_m,
                                with.numbers.gnss.antenna_y_b_m, with.numbers.gnss.antenna_z_b_m};
   const nav::Vector3 w_b = rate_b_radps_ - ins_.x.b_g_radps;
@@ -127,9 +127,12 @@ inline Innovation Inertial::forward(const Forward& speed, base::Micros stamp, co
                  kWheels, n.wheel_gate_scale, stamp, with);
 }
 
-/// They came of late, do not spin, and the filter goes as fast as they say.
-inline bool Inertial::wheels_agree(base::Micros at) const {
-  return counts_time_.us > 0 && at - counts_time_ < base::Micros{1'000'000} && refused_[kWheels].in_a_row == 0 &&
+/// They came of late, do not spin, and the filter goes as fast as they say. Not for ever: it may be pinned to them on a
+/// ferry, and fixes that are refused for long are right.
+inline bool Inertial::wheels_agree(base::Micros at, const Context& with) const {
+  const Refused& fixes = refused_[kPosition];
+  if (fixes.in_a_row > 0 && at - fixes.since >= base::Micros{with.numbers.recovery.persist_us}) return false;
+  return wheels_.us > 0 && at - wheels_ < base::Micros{1'000'000} && refused_[kWheels].in_a_row == 0 &&
          slip_.slip() == SlipWatch::Slip::kNone;
 }
 
@@ -138,7 +141,10 @@ inline void Inertial::constrain(base::Micros stamp, const Context& with) {
   const base::Micros every{with.numbers.inertial.constrain_every_us};
   if (every.us <= 0 || stamp - constrained_ < every) return;
   constexpr float kUnknown_mps = 1e4F;
+  // That it does not move sideways says nothing for wheels that spin.
+  const Refused spinning = refused_[kWheels];
   static_cast<void>(forward({.sigma_mps = kUnknown_mps}, stamp, with));
+  if (slip_.slip() == SlipWatch::Slip::kBoth) refused_[kWheels] = spinning;
 }
 
 }  // namespace tetap::app

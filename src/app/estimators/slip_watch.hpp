@@ -58,13 +58,15 @@ class SlipWatch {
   bool ground(float forward_mps, float sigma_mps, base::Micros stamp, const InertialNumbers& n) {
     if (!(n.slip_mps > 0) || stamp - heard_ > kGap) return false;
     const bool off = magnitude(mean_mps_ - forward_mps) > allowed(forward_mps, n) + 3.0F * sigma_mps;
-    if (!off || stamp - grounded_ > kGap) ground_ = 0;
+    if (!off || stamp - grounded_ > kGroundGap) ground_ = 0;
     grounded_ = stamp;
     if (!off || ground_ >= kTwice) return false;
     return ++ground_ == kTwice && slip_ == Slip::kNone;
   }
 
   [[nodiscard]] Slip slip() const { return slip_; }
+  /// What both wheels said last, in the mean.
+  [[nodiscard]] float mean_mps() const { return mean_mps_; }
   /// Begins anew: what was off is what the filter had wrong.
   void forget() { *this = {}; }
 
@@ -72,13 +74,13 @@ class SlipWatch {
   void each_bit(Sink&& sink) const {
     sink(off_left_mps_);
     sink(off_right_mps_);
-    sink(heard_.us);
-    sink(seen_.us);
+    sink(mean_mps_);
+    for (const base::Micros at : {heard_, seen_, grounded_}) sink(at.us);
     sink(static_cast<std::uint32_t>(static_cast<unsigned>(slip_) | static_cast<unsigned>(ground_) << 8U));
   }
 
  private:
-  static constexpr base::Micros kGap{500'000}, kClear{300'000};
+  static constexpr base::Micros kGap{500'000}, kClear{300'000}, kGroundGap{2'500'000};
   static constexpr float kSmooth_s = 0.1F;
   static constexpr std::uint8_t kTwice = 2;
 
