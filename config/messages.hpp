@@ -1250,12 +1250,12 @@ struct EstStateStdTilt {
   static constexpr Signal kMux{.start = 0, .length = 4};
   static constexpr std::uint8_t kPage = 4;
   static constexpr Signal kEpoch{.start = 4, .length = 4, .wraps = true};
-  static constexpr Signal kStdTiltEast{.start = 8, .length = 16, .has_gap = true, .per_unit = 10000};
-  static constexpr Signal kStdTiltNorth{.start = 24, .length = 16, .has_gap = true, .per_unit = 10000};
+  static constexpr Signal kStdTiltEast{.start = 8, .length = 16, .has_gap = true, .per_unit = 50000};
+  static constexpr Signal kStdTiltNorth{.start = 24, .length = 16, .has_gap = true, .per_unit = 50000};
 
   std::uint8_t epoch = 0;  ///< low bits of the epoch, the same in all frames of one epoch
-  float std_tilt_east_rad = 0;  ///< 1-sigma of the turn about the axis that points east; 0 to 6.5534 rad in steps of 0.0001; NaN: not available
-  float std_tilt_north_rad = 0;  ///< 1-sigma of the turn about the axis that points north; 0 to 6.5534 rad in steps of 0.0001; NaN: not available
+  float std_tilt_east_rad = 0;  ///< 1-sigma of the turn about the axis that points east; 0 to 1.31068 rad in steps of 0.00002; NaN: not available
+  float std_tilt_north_rad = 0;  ///< 1-sigma of the turn about the axis that points north; 0 to 1.31068 rad in steps of 0.00002; NaN: not available
 
   template <class Self, class Visit>
   static constexpr void each(Self& m, Visit&& visit) {

@@ -71,15 +71,27 @@ void Imu::sense(const Motion& motion, double speed_mps, base::Micros now, const 
 
   bool gyro_clips = false;
   bool accel_clips = false;
-  const auto add = [](double& sum, double raw, double range, bool& clips) {
-    const double limited = clamp(raw, -range, range);
+  const auto within = [](double raw, double range, bool& clips) {
     clips = clips || magnitude(raw) > range;
-    sum += limited * kStep_s;
+    return clamp(raw, -range, range) * kStep_s;
   };
+  Vector3 turn{}, push{};
   for (std::size_t i = 0; i < 3; ++i) {
-    add(angle_[i], rate[i], numbers_.gyro_range_radps, gyro_clips);
-    add(velocity_[i], force[i], numbers_.accel_range_mps2, accel_clips);
+    turn[i] = within(rate[i], numbers_.gyro_range_radps, gyro_clips);
+    push[i] = within(force[i], numbers_.accel_range_mps2, accel_clips);
   }
+  // As a driver does that reads the sensor at 1 kHz: coning and sculling, so that both are told in the axes at the
+  // begin of the sample (Savage 1998; to first order of the angle within it).
+  const auto cross = [](const Vector3& u, const Vector3& v, std::size_t i) {
+    const std::size_t j = (i + 1) % 3, k = (i + 2) % 3;
+    return u[j] * v[k] - u[k] * v[j];
+  };
+  Vector3 turned = angle_;
+  for (std::size_t i = 0; i < 3; ++i) turned[i] += 0.5 * turn[i];
+  for (std::size_t i = 0; i < 3; ++i) velocity_[i] += push[i] + cross(turned, push, i);
+  Vector3 next{};
+  for (std::size_t i = 0; i < 3; ++i) next[i] = angle_[i] + turn[i] + 0.5 * cross(angle_, turn, i);
+  angle_ = next;
   clipped_gyro_ += gyro_clips ? 1 : 0;
   clipped_accel_ += accel_clips ? 1 : 0;
 }

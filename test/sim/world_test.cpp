@@ -138,7 +138,7 @@ TEST(World, unequal_wheels_and_a_wrong_track_show_in_the_counts_as_large_as_stat
   EXPECT_NEAR((turns[1] - turns[0]) / 0.5, 8 * kPi * 1.01, 0.01);
 }
 
-/// Straight navigation equations over the world's IMU increments: body increments, rotation by the middle attitude.
+/// Straight navigation equations over the world's IMU increments: what was gained is told in the axes at the begin.
 struct Strapdown {
   Vector3 attitude{};  // roll, pitch, yaw
   Vector3 v{}, p{};
@@ -154,12 +154,12 @@ struct Strapdown {
       const double lean = r.sin * w[1] + r.cos * w[2];
       return Vector3{w[0] + lean * q.sin / q.cos, r.cos * w[1] - r.sin * w[2], lean / q.cos};
     };
+    const Vector3 dv = to_level(attitude, f);
     const Vector3 half = rates(attitude);
     Vector3 middle;
     for (std::size_t i = 0; i < 3; ++i) middle[i] = attitude[i] + 0.5 * half[i];
     const Vector3 full = rates(middle);
     for (std::size_t i = 0; i < 3; ++i) attitude[i] += full[i];
-    const Vector3 dv = to_level(middle, f);
     for (std::size_t i = 0; i < 3; ++i) {
       const double change = dv[i] - (i == 2 ? gravity * t : 0);
       p[i] += (v[i] + 0.5 * change) * t;
