@@ -27,13 +27,13 @@ inline constexpr app::Numbers numbers = app::checked({
          .gyro_turn_on_radps = 0.02F,
          .accel_turn_on_mps2 = 0.3F,
          .start_tilt_rad = 0.1F,
-         .starts_forward =
-             1,  // out of a parking place, forwards (the log shows it)
-                 // How far the velocity by IMU and GNSS alone is from the speedometer's, from no slip and no jump, 1
-                 // sigma over the same 145 s (0.54, 0.5 and 0.4 m/s). That is more than the innovations ask for (mean
-                 // NIS per degree of freedom 0.34; 1.06 with 0.2 m/s): the speedometer is 0.2 s late, so its errors
-                 // last as long as a manoeuvre, and with 0.2 m/s and the plain gate the cuts in these 145 s end further
-                 // off (54, 3, 42, 75 m for 38, 2, 15, 21 m) and outside of 3 sigma.
+         // Out of a parking place, forwards (the log shows it).
+         .starts_forward = 1,
+         // How far the velocity by IMU and GNSS alone is from the speedometer's, from no slip and no jump, 1 sigma over
+         // the same 145 s (0.54, 0.5 and 0.4 m/s). That is more than the innovations ask for (mean NIS per degree of
+         // freedom 0.34; 1.06 with 0.2 m/s): the speedometer is 0.2 s late, so its errors last as long as a manoeuvre,
+         // and with 0.2 m/s and the plain gate the cuts in these 145 s end further off (54, 3, 42, 75 m for 38, 2, 15,
+         // 21 m) and outside of 3 sigma.
          .wheel_mps = 0.5F,
          .slip_share = 0.03F,
          .lateral_mps = 0.5F,

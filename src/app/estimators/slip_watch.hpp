@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Which of two wheels rolls, and which only turns: each against what the gyroscope and the filter's velocity say its
-// rim should do, and both against GNSS velocity, which is of the ground. Encoders
-// against what other sensors say of the body: Ward and Iagnemma 2008, IEEE T-RO 24(4).
+// rim should do, and both against GNSS velocity, which is of the ground. Encoders against what other sensors say of the
+// body: Ward and Iagnemma 2008, IEEE T-RO 24(4).
 #pragma once
 
 #include "app/numbers.hpp"
