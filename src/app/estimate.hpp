@@ -43,7 +43,7 @@ struct ImuHealth {
 /// What an inertial estimator has beyond that: the state at the present, the covariance of the far end of its window.
 struct InertialEstimate {
   nav::InsState state;
-  filter::Symmetric<float, nav::InsState::kErrors> p;
+  const filter::Symmetric<float, nav::InsState::kErrors>& p;  ///< the estimator's own: as long as nothing changes it
   bool valid = false;
   Jump jump;
   ImuHealth imu;

@@ -64,7 +64,8 @@ class History {
   template <class OnNew, class Note>
   std::uint16_t consume(base::Micros t, const Context& with, OnNew&& on_new, Note&& note);
 
-  /// What was true until t leaves the window and becomes final.
+  /// What was true until t leaves the window and becomes final; what a delayed estimator would rather have in the next
+  /// tick, and all that follows, then.
   template <class Note>
   void retire_until(base::Micros t, const Context& with, Note&& note) {
     leave_until(t, Past::kFollows, with, note);
@@ -78,9 +79,7 @@ class History {
 
   /// Brings every estimator to t.
   void advance(base::Micros t, const Context& with) {
-    const auto window = [this](auto&& each) {
-      for (std::size_t i = 0; i < timeline_.size() && timeline_.consumed(i); ++i) each(timeline_[i]);
-    };
+    const Window window(timeline_, timeline_.until(t));
     each_lane([&](auto& lane) { lane.advance(t, with, window); });
   }
 
@@ -115,6 +114,7 @@ class History {
   void leave_until(base::Micros t, Past past, const Context& with, Note& note);
   template <class Note>
   void leave(const Sample& sample, Past past, const Context& with, Note& note);
+  [[nodiscard]] bool rests(const Sample& sample, const Context& with) const;
   template <class Lane>
   [[nodiscard]] bool came_late(std::size_t due) const;
 
@@ -137,8 +137,10 @@ template <class Estimators, std::size_t Capacity>
 template <class Note>
 void History<Estimators, Capacity>::leave_until(base::Micros t, Past past, const Context& with, Note& note) {
   std::size_t count = 0;
-  while (count < timeline_.size() && timeline_.consumed(count) && timeline_[count].stamp <= t)
+  while (count < timeline_.size() && timeline_.consumed(count) && timeline_[count].stamp <= t) {
+    if (past == Past::kFollows && rests(timeline_[count], with)) break;
     leave(timeline_[count++], past, with, note);
+  }
   timeline_.drop_front(count);
   if (t > closed_until_) closed_until_ = t;
 }
@@ -160,13 +162,20 @@ void History<Estimators, Capacity>::leave(const Sample& sample, Past past, const
   if (sample.stamp > closed_until_) closed_until_ = sample.stamp;
 }
 
+template <class Estimators, std::size_t Capacity>
+bool History<Estimators, Capacity>::rests(const Sample& sample, const Context& with) const {
+  bool rests = false;
+  each_lane([&](const auto& lane) { rests = rests || lane.rests(sample, with); });
+  return rests;
+}
+
 /// Whether something new belongs before something that the lane has fused already.
 template <class Estimators, std::size_t Capacity>
 template <class Lane>
 bool History<Estimators, Capacity>::came_late(std::size_t due) const {
   if (Lane::kDelayed) return false;
   bool is_new = false;
-  for (std::size_t i = 0; i < due; ++i) {
+  for (std::size_t i = timeline_.known(); i < due; ++i) {
     if (!Lane::takes(timeline_[i])) continue;
     if (!timeline_.consumed(i)) {
       is_new = true;
@@ -191,12 +200,12 @@ std::uint16_t History<Estimators, Capacity>::consume(base::Micros t, const Conte
     }
   });
   std::uint16_t not_used = 0;
-  std::size_t first = 0;  // what is before it, everyone has
-  if (std::none_of(again.begin(), again.end(), [](bool a) { return a; }))
-    while (first < due && timeline_.consumed(first)) ++first;
-  for (std::size_t i = first; i < due; ++i) {
-    const Sample& sample = timeline_[i];
+  // What is before that, everyone has.
+  const bool anew = std::any_of(again.begin(), again.end(), [](bool a) { return a; });
+  for (std::size_t i = anew ? 0 : timeline_.known(); i < due; ++i) {
     const bool is_new = !timeline_.consumed(i);
+    if (!is_new && !anew) continue;
+    const Sample& sample = timeline_[i];
     if (is_new) on_new(sample);
     instance = 0;
     bool taken = false;
@@ -204,6 +213,7 @@ std::uint16_t History<Estimators, Capacity>::consume(base::Micros t, const Conte
       using Lane = std::remove_cvref_t<decltype(lane)>;
       if constexpr (Lane::kDelayed) {
         taken = taken || Lane::takes(sample);
+        if (is_new) lane.arrived(sample, with);
       } else if (is_new || again[instance]) {
         const Innovation innovation = lane.fuse(sample, with);
         if (is_new) {
@@ -214,7 +224,8 @@ std::uint16_t History<Estimators, Capacity>::consume(base::Micros t, const Conte
       }
       ++instance;
     });
-    if (is_new && !taken) ++not_used;
+    if (!is_new) continue;
+    if (!taken) ++not_used;
     timeline_.consume(i);
   }
   return not_used;

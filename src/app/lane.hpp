@@ -6,7 +6,7 @@
 // something is late that this estimator takes.
 // A delayed one (kDelayed) has its state at the far end of the window only: samples reach it in their order when they
 // leave the window, each once, and the present is that state carried over what the window holds. Costs: that carrying
-// in every tick, never a burst; its records are late by the window.
+// in every tick, never a burst (what is due it may also leave for the next tick); its records are late by the window.
 #pragma once
 
 #include "app/context.hpp"
@@ -87,9 +87,19 @@ class Lane {
     if constexpr (!kDelayed) past_ = now_;
   }
 
-  /// `window` calls its argument with each sample in the window, in order.
+  /// A sample is new in the window.
+  void arrived(const Sample& sample, const Context& with) requires kDelayed {
+    if constexpr (requires { now_.arrived(sample, with); }) now_.arrived(sample, with);
+  }
+  /// A delayed estimator has done enough in this tick: the sample, true long enough ago, waits for the next.
+  [[nodiscard]] bool rests(const Sample& sample, const Context& with) const {
+    if constexpr (requires { now_.rests(sample, with); }) return now_.rests(sample, with);
+    return false;
+  }
+
+  /// `window` is what the estimators have of the samples in the window, in order.
   template <class Window>
-  void advance(base::Micros t, const Context& with, Window&& window) {
+  void advance(base::Micros t, const Context& with, const Window& window) {
     if constexpr (kDelayed) {
       now_.advance(t, with, window);
     } else {

@@ -12,7 +12,6 @@ class ImuGather {
   /// Third order is left out: of a turn of this size, up to 0.08 % of it where its axis moves, and 0.02 % of the
   /// velocity gained.
   static constexpr float kMost_rad = 0.2F;
-  static constexpr base::Micros kMost{50'000};
 
   [[gnu::always_inline]] void add(const ImuIncrement& next) {
     const Vector3& turn = sum_.dtheta_b_rad;
@@ -23,9 +22,8 @@ class ImuGather {
   }
   [[nodiscard]] bool empty() const { return sum_.dt.us == 0; }
   /// It has to be taken before the next one is added.
-  [[nodiscard]] bool full() const {
-    return sum_.dt >= kMost || sum_.dtheta_b_rad.squaredNorm() > kMost_rad * kMost_rad;
-  }
+  [[nodiscard]] bool full() const { return sum_.dtheta_b_rad.squaredNorm() > kMost_rad * kMost_rad; }
+  [[nodiscard]] const ImuIncrement& sum() const { return sum_; }
   /// What was gathered; empty afterwards.
   [[nodiscard]] ImuIncrement take() {
     ImuIncrement all = sum_;

@@ -80,6 +80,19 @@ struct InsState {
     dx.segment<3>(kGyroBias) = b_g_radps - other.b_g_radps;
     return dx;
   }
+  template <class Sink>
+  void each_bit(Sink&& sink) const {
+    for (const base::Anchored* coordinate : {&x, &y, &z}) {
+      sink(coordinate->anchor_um);
+      sink(coordinate->offset_m);
+    }
+    for (int i = 0; i < 3; ++i) {
+      sink(v_n_mps(i));
+      sink(b_a_mps2(i));
+      sink(b_g_radps(i));
+    }
+    for (const float v : {q_nb.w, q_nb.x, q_nb.y, q_nb.z}) sink(v);
+  }
   [[nodiscard]] bool finite() const {
     return base::is_finite(x.offset_m) && base::is_finite(y.offset_m) && base::is_finite(z.offset_m) &&
            is_finite(v_n_mps) && base::is_finite(q_nb.norm2()) && is_finite(b_a_mps2) && is_finite(b_g_radps);

@@ -90,9 +90,7 @@ class Body {
       leave(window_.front());
       window_.erase(window_.begin());
     }
-    estimator.advance({now_us}, with(), [this](auto&& each) {
-      for (const Sample& s : window_) each(s);
-    });
+    estimator.advance({now_us}, with(), window_);
   }
   void sample() {
     if (now_us % kTick_us == 0 && flux_after_us > 0) take_flux();
@@ -320,7 +318,7 @@ TEST(AttitudeEstimator, takes_the_present_from_its_own_imu_only) {
   body.run(5);
   Sample other{.stamp = {body.now_us}, .sensor = can::Sensor::kImu, .instance = 1};
   other.payload.imu = {.dangle_b_rad = {0.0F, 0.0F, 0.3F}, .interval_us = 5000};
-  body.estimator.advance({body.now_us}, body.with(), [&](auto&& each) { each(other); });
+  body.estimator.advance({body.now_us}, body.with(), std::vector<Sample>{other});
   EXPECT_LT(body.degrees_off(), 0.1F);
 }
 

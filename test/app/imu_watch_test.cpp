@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <cmath>
 #include <random>
+#include <vector>
 
 namespace tetap::app {
 namespace {
@@ -252,7 +253,7 @@ class Robot {
                        .acc_mps = 0.05F},
           {us}, with());
     }
-    estimator.advance({us}, with(), [](auto&&) {});
+    estimator.advance({us}, with(), std::vector<Sample>{});
     if (mode() == can::Mode::kNominal) ++nominal;
     worst_m = std::max(worst_m, off_m());
     worst_ratio = std::max(worst_ratio, off_m() / (3 * std::max(sigma(0), sigma(1))));

@@ -8,6 +8,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <vector>
 
 namespace tetap::app {
 namespace {
@@ -41,7 +42,7 @@ class Drive {
       if (wheels_every_us > 0 && us % wheels_every_us == 0)
         static_cast<void>(estimator.fuse(WheelSpeeds{.left_mps = speed_mps, .right_mps = speed_mps}, {us}, with()));
     }
-    estimator.advance({us}, with(), [](auto&&) {});
+    estimator.advance({us}, with(), std::vector<Sample>{});
   }
   [[nodiscard]] Context with() const { return {n, site}; }
   [[nodiscard]] nav::Vector3 velocity_b_mps() const {

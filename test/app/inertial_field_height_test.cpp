@@ -86,9 +86,7 @@ class Robot {
   }
   [[nodiscard]] double height_sigma_m() const { return std::sqrt(static_cast<double>(now().p(2, 2))); }
   [[nodiscard]] double time_s() const { return 1e-6 * static_cast<double>(us - kBegin_us); }
-  void advance() {
-    estimator.advance({us}, with(), [](auto&&) {});
-  }
+  void advance() { estimator.advance({us}, with(), std::vector<Sample>{}); }
 
  private:
   static constexpr std::int64_t kBegin_us = 3'000'000, kImu_us = 10'000;

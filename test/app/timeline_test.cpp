@@ -50,5 +50,40 @@ TEST(Timeline, RefusesDuplicatesAndOverflowWithoutLosingAnything) {
   EXPECT_EQ(timeline[0].stamp.us, 3);
 }
 
+/// Against a sorted list, long enough for the ring to go round many times.
+TEST(Timeline, IsAListThatNeverMovesWhatStays) {
+  std::mt19937 random(2);
+  const auto below = [&](int n) { return std::uniform_int_distribution<int>(0, n - 1)(random); };
+  app::Timeline<16> timeline;
+  std::vector<std::pair<app::Sample, bool>> model;
+  for (int i = 0; i < 20'000; ++i) {
+    const app::Sample s = sample(100 * i + below(900), can::Sensor::kBodySpeed, 0, i % 256);
+    const auto result = timeline.insert(s);
+    ASSERT_EQ(result, model.size() == 16 ? app::Insert::kFull : app::Insert::kTaken);
+    if (result == app::Insert::kTaken) {
+      const auto at = std::find_if(model.begin(), model.end(), [&](const auto& m) { return m.first.order(s) > 0; });
+      model.insert(at, {s, false});
+    }
+    if (below(2) == 0 && !model.empty()) {
+      const auto k = static_cast<std::size_t>(below(static_cast<int>(model.size())));
+      timeline.consume(k);
+      model[k].second = true;
+    }
+    if (below(3) == 0 || model.size() == 16) {
+      const auto count = static_cast<std::size_t>(below(static_cast<int>(model.size()) + 1));
+      timeline.drop_front(count);
+      model.erase(model.begin(), model.begin() + static_cast<std::ptrdiff_t>(count));
+    }
+    ASSERT_EQ(timeline.size(), model.size());
+    const bool all = std::all_of(model.begin(), model.end(), [](const auto& m) { return m.second; });
+    ASSERT_EQ(timeline.known() == model.size(), all);
+    for (std::size_t k = 0; k < timeline.known(); ++k) ASSERT_TRUE(model[k].second) << i;
+    for (std::size_t k = 0; k < model.size(); ++k) {
+      ASSERT_TRUE(timeline[k].order(model[k].first) == 0);
+      ASSERT_EQ(timeline.consumed(k), model[k].second);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace tetap

@@ -16,8 +16,8 @@
 #include "model/wheel_speed.hpp"
 #include "model/zero_rate.hpp"
 #include "model/zero_velocity.hpp"
+#include "nav/imu_gather.hpp"
 #include "nav/ins.hpp"
-#include "nav/preintegration.hpp"
 
 #include <array>
 #include <cstdint>
@@ -48,8 +48,8 @@ class InsRun {
       hash_state(hash_, ins_.x);
       hash_covariance(hash_, ins_);
       if (k % 50 == 49) {
-        hash_state(hash_, chunk_.apply(ins_.x, ins_.earth));
-        chunk_ = nav::ImuChunk::with_biases_of(ins_.x);
+        hash_state(hash_, gathered_);
+        gathered_ = ins_.x;
       }
     }
     hash_(ins_.conditioned());
@@ -67,7 +67,7 @@ class InsRun {
     begin.b_g_radps = noises(chance_, 0.01F);
     ins_.start(begin, nav::Ins::Covariance::diagonal(
                           {4, 4, 9, 0.1F, 0.1F, 0.1F, 3e-4F, 3e-4F, 0.01F, 4e-2F, 4e-2F, 4e-2F, 1e-4F, 1e-4F, 1e-4F}));
-    chunk_ = nav::ImuChunk::with_biases_of(ins_.x);
+    gathered_ = ins_.x;
   }
   void drive() {
     const base::Micros dt{5'000 + static_cast<std::int64_t>(chance_.dice.below(1'000))};
@@ -83,7 +83,9 @@ class InsRun {
     const nav::ImuVerdict verdict = ins_.predict(shown);
     hash_(static_cast<std::uint32_t>(verdict));
     if (verdict != nav::ImuVerdict::kAccepted) return;
-    chunk_.add(shown);
+    gather_.add(shown);
+    if (gather_.full() || gather_.sum().dt > base::Micros{60'000})
+      nav::strapdown(gathered_, gather_.take(), ins_.earth);
     if (!chance_.one_in(3)) {
       ins_.vibration = chance_.one_in(20) ? 10.0F : 1.0F;
       ins_.predict_covariance();
@@ -141,7 +143,8 @@ class InsRun {
   base::WordHash hash_;
   Chance chance_{.random = base::Random{1, 7}};
   nav::Ins ins_;
-  nav::ImuChunk chunk_;
+  nav::InsState gathered_;
+  nav::ImuGather gather_;
   nav::InsState truth_;
   nav::Vector3 rate_ = nav::Vector3::Zero(), push_ = nav::Vector3::Zero(), gyro_ = nav::Vector3::Zero();
 };

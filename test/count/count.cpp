@@ -13,7 +13,6 @@
 #include "model/range_bearing.hpp"
 #include "model/wheel_speed.hpp"
 #include "nav/ins.hpp"
-#include "nav/preintegration.hpp"
 #include "recorded_world.hpp"
 
 #include <array>
@@ -189,9 +188,7 @@ void inertial() {
     static_cast<void>(ins.update(input.fix, gate));
   }
   opaque(ins);
-  static nav::ImuChunk chunk;
   ins = begin();
-  chunk = nav::ImuChunk::with_biases_of(ins.x);
   for (Input& input : inputs) {
     input.fix.antenna_b_m = input.velocity.antenna_b_m = {0.3F, -0.1F, 0.8F};
     input.velocity.gyro_b_radps = {0.0F, 0.01F, 0.3F};
@@ -221,16 +218,6 @@ void inertial() {
                                                      .gyro_b_radps = input.velocity.gyro_b_radps},
                                    1e9F));
     }
-    {
-      const Region<struct ins_chunk_add> region;
-      chunk.add(input.imu);
-    }
-    nav::InsState now;
-    {
-      const Region<struct ins_chunk_apply> region;
-      now = chunk.apply(ins.x, earth);
-    }
-    opaque(now);
   }
   opaque(ins);
 }

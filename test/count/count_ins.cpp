@@ -58,11 +58,13 @@ class Navigator {
         t, context(), [](const app::Sample&) {}, noting()));
     history_.advance(t, context());
     estimate_ = history_.primary().estimate(context());
-    inertial_ = history_.primary().inertial(context());
+    const app::InertialEstimate inertial = history_.primary().inertial(context());
+    state_ = inertial.state;
+    valid_ = inertial.valid;
     history_.retire_until(t - base::Micros{kNumbers.loop.window_us}, context(), noting());
   }
   [[nodiscard]] std::uint32_t accepted(can::Sensor sensor) const { return accepted_[static_cast<std::size_t>(sensor)]; }
-  [[nodiscard]] bool valid() const { return inertial_.valid; }
+  [[nodiscard]] bool valid() const { return valid_; }
 
  private:
   [[nodiscard]] app::Context context() const { return {.numbers = kNumbers, .site = site_}; }
@@ -72,7 +74,8 @@ class Navigator {
   app::Counters counters_;
   app::Site site_;
   app::Estimate estimate_;
-  app::InertialEstimate inertial_;
+  nav::InsState state_;
+  bool valid_ = false;
   app::Innovation record_;
   std::array<std::uint32_t, 16> accepted_{};  ///< by sensor
   base::Micros now_;

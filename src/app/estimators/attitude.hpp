@@ -34,7 +34,7 @@ class Attitude {
   Innovation fuse(const MagneticFlux& sample, base::Micros stamp, const Context& with);
 
   template <class Window>
-  void advance(base::Micros t, const Context& with, Window&& window);
+  void advance(base::Micros t, const Context& with, const Window& window);
 
   [[nodiscard]] AttitudeEstimate attitude(const Context&) const {
     return {.q_nb = q_nb(),
@@ -109,7 +109,7 @@ inline Innovation Attitude::fuse(const MagneticFlux& sample, base::Micros stamp,
 /// The turns of the window in the sensor's axes, one after the other, and into the body's at the end. (1 - h^2/3, h)
 /// is the quaternion of a turn 2h to h^5/45, but for its length.
 template <class Window>
-void Attitude::advance(base::Micros t, const Context& with, Window&& window) {
+void Attitude::advance(base::Micros t, const Context& with, const Window& window) {
   now_ = t;
   last_imu_ = time_;
   last_rate_b_radps_ = rate_b_radps_;
@@ -119,19 +119,20 @@ void Attitude::advance(base::Micros t, const Context& with, Window&& window) {
   const filter::Vector3 bias_s_radps = transposed_times(mounting, filter_.bias_b_radps());
   filter::Quaternion q;
   const ImuSample* last = nullptr;
-  window([&](const Sample& sample) {
-    if (sample.sensor != can::Sensor::kImu || sample.instance != with.numbers.inertial.imu) return;
+  for (std::size_t i = 0; i < window.size(); ++i) {
+    const Sample& sample = window[i];
+    if (sample.sensor != can::Sensor::kImu || sample.instance != with.numbers.inertial.imu) continue;
     const ImuSample& imu = sample.payload.imu;
     const float half_s = 0.5F * base::seconds(base::Micros{imu.interval_us});
     const filter::Vector3 h{0.5F * imu.dangle_b_rad[0] - half_s * bias_s_radps(0),
                             0.5F * imu.dangle_b_rad[1] - half_s * bias_s_radps(1),
                             0.5F * imu.dangle_b_rad[2] - half_s * bias_s_radps(2)};
     const float h2 = filter::dot(h, h);
-    if (!(h2 < (kFastest_radps * kFastest_radps) * half_s * half_s)) return;
+    if (!(h2 < (kFastest_radps * kFastest_radps) * half_s * half_s)) continue;
     q = q * filter::Quaternion{1.0F - h2 * (1.0F / 3.0F), h(0), h(1), h(2)};
     last_imu_ = sample.stamp;
     last = &imu;
-  });
+  }
   if (last == nullptr) return;
   const filter::Vector3 v = times(mounting, {q.x, q.y, q.z});
   ahead_ = filter::Quaternion{q.w, v(0), v(1), v(2)}.normalised();

@@ -26,6 +26,17 @@ class Repeats {
     count(accel_, last_accel_, s.dvelocity_b_mps);
     return n > 0 && (gyro_ >= n || accel_ >= n);
   }
+  /// After a sample that repeats nothing.
+  [[nodiscard]] static Repeats after(const ImuSample& s) {
+    Repeats r;
+    r.last_gyro_ = s.dangle_b_rad;
+    r.last_accel_ = s.dvelocity_b_mps;
+    return r;
+  }
+  /// The gyroscope or the accelerometer shows what it showed in the sample before.
+  [[nodiscard]] static bool repeats(const ImuSample& s, const ImuSample& before) {
+    return same_bits(s.dangle_b_rad, before.dangle_b_rad) || same_bits(s.dvelocity_b_mps, before.dvelocity_b_mps);
+  }
   template <class Sink>
   void each_bit(Sink&& sink) const {
     for (const float v : last_gyro_) sink(v);

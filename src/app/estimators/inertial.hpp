@@ -6,6 +6,7 @@
 
 #include "app/context.hpp"
 #include "app/estimate.hpp"
+#include "app/estimators/ahead.hpp"
 #include "app/estimators/baro_zero.hpp"
 #include "app/estimators/field_guard.hpp"
 #include "app/estimators/fix_trust.hpp"
@@ -15,9 +16,7 @@
 #include "app/sample.hpp"
 #include "base/renew.hpp"
 #include "model/gnss_fix_3d.hpp"
-#include "nav/imu_gather.hpp"
 #include "nav/ins.hpp"
-#include "nav/preintegration.hpp"
 
 #include <array>
 #include <cstdint>
@@ -56,9 +55,16 @@ class Inertial {
   Innovation fuse(const MagneticFlux& flux, base::Micros stamp, const Context& with);
   Innovation fuse(const AirPressure& air, base::Micros stamp, const Context& with);
 
+  void arrived(const Sample& sample, const Context& with) {
+    if (!is_of(sample, with.numbers.inertial)) return;
+    if (ahead_.arrived(sample.stamp)) corrected();
+    ++arrived_;
+  }
   /// The present: what the filter has, carried over the samples of the window.
   template <class Window>
-  void advance(base::Micros t, const Context& with, Window&& window);
+  void advance(base::Micros t, const Context& with, const Window& window);
+  /// Measurements are most of the work, so a tick takes one: what is due waits for the next.
+  [[nodiscard]] bool rests(const Sample& sample, const Context& with) const;
 
   /// Bits of can::Fault: what is wrong with the IMU and the wheels.
   [[nodiscard]] std::uint16_t faults() const;
@@ -101,20 +107,6 @@ class Inertial {
     float sigma_mps = 0;  ///< of counting: what one count is over the interval
   };
 
-  /// In the axes of the sensor.
-  static nav::ImuIncrement shown_by(const ImuSample& sample) {
-    const auto& a = sample.dangle_b_rad;
-    const auto& v = sample.dvelocity_b_mps;
-    return {.dtheta_b_rad = {a[0], a[1], a[2]}, .dv_b_mps = {v[0], v[1], v[2]}, .dt = base::Micros{sample.interval_us}};
-  }
-  static nav::Vector3 mounted(const nav::Vector3& s, const InertialNumbers& n) {
-    const auto& m = n.mounting_bs;
-    return {m[0] * s(0) + m[1] * s(1) + m[2] * s(2), m[3] * s(0) + m[4] * s(1) + m[5] * s(2),
-            m[6] * s(0) + m[7] * s(1) + m[8] * s(2)};
-  }
-  static nav::ImuIncrement mounted(const nav::ImuIncrement& s, const InertialNumbers& n) {
-    return {.dtheta_b_rad = mounted(s.dtheta_b_rad, n), .dv_b_mps = mounted(s.dv_b_mps, n), .dt = s.dt};
-  }
   void noise_of(const InertialNumbers& n) {
     ins_.noise = {.gyro_radps_rthz = n.gyro_radps_rthz,
                   .accel_mps2_rthz = n.accel_mps2_rthz,
@@ -123,16 +115,29 @@ class Inertial {
   }
   void begin(const Context& with);
   void begin_anew(base::Micros t, can::ResetCause cause, const Context& with);
-  [[nodiscard]] bool looks_wrong(float level_mps, float sigma_mps, base::Micros stamp, const Context& with);
+  [[nodiscard]] bool looks_wrong(const nav::Vector3& v_n_mps, float level_mps, float sigma_mps, base::Micros stamp,
+                                 const Context& with);
   void stand(base::Micros stamp, const Context& with);
   [[nodiscard]] bool resting(base::Micros stamp, const Context& with) const;
   void hear_ground(const nav::Vector3& v_n_mps, float sigma_mps, base::Micros stamp, const Context& with);
   [[nodiscard]] bool turn_known(base::Micros at) const;
   [[nodiscard]] bool wheels_agree(base::Micros at, const Context& with) const;
   [[nodiscard]] bool without_imu() const;
+  /// Counts that come so soon after the last are left to the difference of the next.
+  [[nodiscard]] bool gathers(base::Micros at, const Context& with) const {
+    return have_counts_ && at > counts_time_ && at - counts_time_ < base::Micros{with.numbers.inertial.counts_every_us};
+  }
   void bridge(base::Micros gap, const Context& with);
   void doubt(float sigma_mps, float sigma_rad);
-  [[nodiscard]] nav::ImuIncrement unseen(base::Micros gap, const nav::Vector3& w_b_radps) const;
+  [[nodiscard]] std::int32_t work_of(const Sample& sample, const Context& with) const;
+  /// What is to be said every so often can be in this tick, or has waited long enough.
+  [[nodiscard]] bool can_do(base::Micros since, base::Micros every) const {
+    return work_left_ >= kMeasurement || since.us >= 2 * every.us;
+  }
+  /// The state at the far end is not what it was predicted to be.
+  void corrected() {
+    if (corrected_ == 0) corrected_ = 1;
+  }
   Innovation roll(const SlipWatch::Wheels& wheels, float sigma_mps, float later_mps, base::Micros stamp,
                   const Context& with);
   [[nodiscard]] float forward_mps() const { return ins_.x.q_nb.conjugate().rotate(ins_.x.v_n_mps)(0); }
@@ -144,12 +149,27 @@ class Inertial {
   void refused_or_not(Source source, bool refused, base::Micros stamp);
   void step(int first, int count, const nav::Vector3& by_m, const nav::Vector3& variance_m2);
   template <class Model>
+  [[nodiscard]] filter::Innovation<float, Model::kDimension> update(const Model& model, float gate) {
+    work_left_ -= kMeasurement;
+    corrected();
+    return ins_.update(model, gate);
+  }
+  template <class Model>
   Innovation measure(const Model& model, Source source, float gate_scale, base::Micros stamp, const Context& with);
   template <int M>
   void recover(const filter::Vector<float, M>& nu, Source source, const Numbers& n);
 
+  /// Work of a tick, in IMU samples: what keeps pace with the IMU, and one measurement; or, after that, all that is
+  /// ahead carried anew. One measurement more where the far end is far behind.
+  static constexpr std::int32_t kMeasurement = 5;
+
   nav::Ins ins_;
-  nav::ImuChunk ahead_;
+  Ahead ahead_;
+  nav::InsState present_;
+  std::int32_t work_left_ = 0;  ///< in this tick
+  std::int32_t arrived_ = 0;    ///< IMU samples since the last
+  bool anew_ = false;           ///< this tick carried all that is ahead anew
+  std::uint8_t corrected_ = 0;  ///< ticks since the far end was, and what is ahead of it does not have it; 0: it does
   InertialStart start_;
   Phase phase_ = Phase::kWaiting;
   base::Micros time_;  ///< of the filter's state
@@ -163,7 +183,6 @@ class Inertial {
   bool have_counts_ = false;
   float gained_mps_ = base::kNan;                     ///< forward, by the IMU, since they were fused; NaN: not known
   nav::Vector3 rate_b_radps_ = nav::Vector3::Zero();  ///< as the gyroscope shows it, at the filter's time
-  nav::Vector3 last_rate_b_radps_ = nav::Vector3::Zero();
   nav::Vector3 still_rate_radps_ = nav::Vector3::Zero();  ///< mean over the last still_s_ of standing
   float still_s_ = 0;
   nav::Vector3 ground_mps_ = nav::Vector3::Zero();  ///< mean of GNSS velocities since the IMU is calm
@@ -198,4 +217,5 @@ class Inertial {
 #include "app/estimators/inertial_imu.hpp"      // IWYU pragma: keep
 #include "app/estimators/inertial_measure.hpp"  // IWYU pragma: keep
 #include "app/estimators/inertial_output.hpp"   // IWYU pragma: keep
+#include "app/estimators/inertial_present.hpp"  // IWYU pragma: keep
 #include "app/estimators/inertial_wheels.hpp"   // IWYU pragma: keep

@@ -19,36 +19,44 @@ struct FixNis {
   float level = base::kNan;
 };
 
-/// S = H P H^T + R = L L^T, y = L^-1 nu: with up last, the horizontal part's NIS is on the way to the joint one.
-/// The first three columns of H are the identity.
-[[gnu::noinline]] inline FixNis nis_of(const nav::Ins::Covariance& p, const filter::Matrix<float, 3, 6>& h,
+/// S = H P H^T + R = L L^T, y = L^-1 nu: with up last, the horizontal part's NIS is on the way to the joint one. H is
+/// (1 A) over position and attitude, A v = v x lever.
+[[gnu::noinline]] inline FixNis nis_of(const nav::Ins::Covariance& p, const nav::Vector3& lever_n_m,
                                        const nav::Vector3& nu, const nav::Vector3& r) {
-  constexpr auto& kTouches = model::GnssFix3d::kTouches;
-  const auto touch = [](int k) { return kTouches[static_cast<std::size_t>(k)]; };
+  constexpr int kTilt = model::GnssFix3d::kTouches[3];
+  const auto tilt_with = [&p](int c) { return nav::Vector3(p(kTilt, c), p(kTilt + 1, c), p(kTilt + 2, c)); };
+  std::array<nav::Vector3, 3> rows;  // of A P over attitude, then of A times its transpose
+  for (int c = 0; c < 3; ++c) {
+    const nav::Vector3 column = nav::cross(tilt_with(kTilt + c), lever_n_m);
+    for (int i = 0; i < 3; ++i) rows[static_cast<std::size_t>(i)](c) = column(i);
+  }
+  nav::Matrix3 s;
+  for (int i = 0; i < 3; ++i) {
+    const nav::Vector3 own = nav::cross(rows[static_cast<std::size_t>(i)], lever_n_m);
+    for (int j = 0; j <= i; ++j) s(i, j) = p(i, j) + own(j);
+  }
+  for (int c = 0; c < 3; ++c) {
+    const nav::Vector3 seen = nav::cross(tilt_with(c), lever_n_m);  // row, with the position's column c
+    for (int i = 0; i < 3; ++i) {
+      if (i >= c) s(i, c) += seen(i);
+      if (i <= c) s(c, i) += seen(i);
+    }
+  }
   nav::Matrix3 l;
   nav::Vector3 y;
   FixNis nis;
   float sum = 0;
   for (int i = 0; i < 3; ++i) {
-    filter::Vector<float, 6> hp;
-#pragma GCC unroll 1
-    for (int c = 0; c < 6; ++c) {
-      hp(c) = p(i, touch(c));
-#pragma GCC unroll 1
-      for (int k = 3; k < 6; ++k) hp(c) += h(i, k) * p(touch(k), touch(c));
-    }
     y(i) = nu(i);
     for (int j = 0; j <= i; ++j) {
-      float s = i == j ? hp(j) + r(i) : hp(j);
-#pragma GCC unroll 1
-      for (int k = 3; k < 6; ++k) s += hp(k) * h(j, k);
-      for (int k = 0; k < j; ++k) s -= l(i, k) * l(j, k);
+      float rest = i == j ? s(i, i) + r(i) : s(i, j);
+      for (int k = 0; k < j; ++k) rest -= l(i, k) * l(j, k);
       if (j < i) {
-        l(i, j) = s / l(j, j);
+        l(i, j) = rest / l(j, j);
         y(i) -= l(i, j) * y(j);
       } else {
-        if (!(s > 0.0F)) return {};
-        l(i, i) = base::sqrt(s);
+        if (!(rest > 0.0F)) return {};
+        l(i, i) = base::sqrt(rest);
         y(i) /= l(i, i);
       }
     }
@@ -104,7 +112,7 @@ inline constexpr float kDecides = 4.0F;
   ins_.predict_covariance();
   const auto at = fix.linearised(ins_.x);
   const nav::Vector3 nu = -at.z_hat, r = fix.noise();
-  const FixNis nis = nis_of(ins_.p, at.h, nu, r);
+  const FixNis nis = nis_of(ins_.p, {at.h(1, 5), -at.h(0, 5), at.h(0, 4)}, nu, r);
   if (!(nis.joint < 1e30F && r(0) < 1e12F && r(2) < 1e12F)) return {.verdict = can::Verdict::kNotFinite};
   const bool whole = nis.joint <= n.gate_scale * filter::chi_square_99(3);
   const bool level = whole || nis.level <= n.gate_scale * filter::chi_square_99(2);
@@ -143,7 +151,7 @@ inline constexpr float kDecides = 4.0F;
     record.gate = n.gate_scale * filter::chi_square_99(2);
   }
   const base::Anchored was[2]{ins_.x.x, ins_.x.y};
-  const auto result = ins_.update(fix, base::kInfinity);
+  const auto result = update(fix, base::kInfinity);
   if (result.verdict != filter::Verdict::kAccepted) return app::record(result);
   last_position_ = stamp;
   recoveries_ = 0;
@@ -188,17 +196,20 @@ inline constexpr float kDecides = 4.0F;
     ins_.p(i, i) = variance_m2(i);
   }
   ins_.start(ins_.x, ins_.p);
+  corrected();
   jump_ = {.east_m = by_m(0), .north_m = by_m(1), .count = static_cast<std::uint8_t>(jump_.count + 1)};
 }
 
-/// Receiver and wheels have agreed for long on a speed that the filter does not have forwards: by 60 degrees or more it
-/// looks another way. Both wheels would have to spin exactly as fast as it goes.
-[[gnu::noinline]] inline bool Inertial::looks_wrong(float level_mps, float sigma_mps, base::Micros stamp,
-                                                    const Context& with) {
-  const float rolled = slip_.mean_mps(), off = base::abs(forward_mps() - rolled);
-  const bool wrong = slip_.slip() == SlipWatch::Slip::kBoth && level_mps > 4.0F * sigma_mps + 0.3F &&
+/// Receiver and wheels have agreed for long on a speed, but not on where it goes: nothing drives half a radian
+/// sideways, so the filter looks another way than it believes.
+[[gnu::noinline]] inline bool Inertial::looks_wrong(const nav::Vector3& v_n_mps, float level_mps, float sigma_mps,
+                                                    base::Micros stamp, const Context& with) {
+  constexpr float kCosine = 0.88F;
+  const float rolled = slip_.mean_mps(stamp);
+  const float ahead = ins_.x.q_nb.conjugate().rotate(v_n_mps)(0) * (rolled < 0.0F ? -1.0F : 1.0F);
+  const bool wrong = level_mps > 4.0F * sigma_mps + 0.3F &&
                      base::abs(level_mps - base::abs(rolled)) < 3.0F * sigma_mps + 0.05F * level_mps &&
-                     off > 0.5F * level_mps;
+                     ahead < kCosine * level_mps - sigma_mps;
   if (!wrong) wrong_way_ = {};
   if (wrong && wrong_way_.us == 0) wrong_way_ = stamp;
   return wrong && stamp - wrong_way_ >= base::Micros{with.numbers.recovery.after_us};
@@ -221,7 +232,7 @@ inline Innovation Inertial::fuse(const GnssVelocity& velocity, base::Micros stam
   const float level = base::sqrt(v_n(0) * v_n(0) + v_n(1) * v_n(1)), rolled = base::abs(forward_mps());
   if (wheels_agree(stamp, with) && base::abs(level - rolled) > 4.0F * sigma + 0.2F * rolled + 0.5F)
     refused_[kVelocity].since = stamp;
-  if (looks_wrong(level, sigma, stamp, with)) {
+  if (looks_wrong(v_n, level, sigma, stamp, with)) {
     begin_anew(stamp, can::ResetCause::kHeadingWrong, with);
     return {.verdict = can::Verdict::kRejected};
   }

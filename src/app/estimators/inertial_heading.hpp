@@ -73,7 +73,7 @@ inline Innovation Inertial::fuse(const OutsideHeading& heading, base::Micros sta
   if (result.verdict == can::Verdict::kAccepted && p_yaw > kWorth * floor) {
     const float ends_there = with_yaw * with_yaw / (p_yaw - floor) - p;
     direction.sigma_rad = base::sqrt(ends_there > floor ? ends_there : floor);
-    static_cast<void>(ins_.update(direction, base::kInfinity));
+    static_cast<void>(update(direction, base::kInfinity));
   }
   return result;
 }

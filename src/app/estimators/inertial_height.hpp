@@ -38,7 +38,7 @@ namespace tetap::app {
   constexpr float kWorth = 1.05F;  // of its variance the other has to be off, for an update to change anything
   if (p_z > kWorth * p_b) {
     const model::Height model{.z = ins_.x.z.plus(nu), .sigma_m = base::sqrt(white + variance_towards(p_b, p_z))};
-    static_cast<void>(ins_.update(model, base::kInfinity));
+    static_cast<void>(update(model, base::kInfinity));
   } else if (p_b > kWorth * p_z) {
     baro_.correct(nu, p_b, p_z, white, altitude_m);
   }

@@ -10,6 +10,7 @@ namespace tetap::app {
 
 inline Innovation Inertial::fuse(const ImuSample& sample, base::Micros stamp, const Context& with) {
   const InertialNumbers& n = with.numbers.inertial;
+  --work_left_;
   const nav::ImuIncrement increment = mounted(shown_by(sample), n);
   if (increment.check() != nav::ImuVerdict::kAccepted) return {.verdict = can::Verdict::kNotFinite};
   const float dt_s = base::seconds(increment.dt);
@@ -37,8 +38,8 @@ inline Innovation Inertial::fuse(const ImuSample& sample, base::Micros stamp, co
   // does not tell again.
   const base::Micros gap = stamp - increment.dt - time_;
   unusable_ = false;
-  if (2 * gap.us < -increment.dt.us) return {.verdict = can::Verdict::kStale};
-  if (gap > base::Micros{1'500}) {
+  if (overlaps(gap, increment.dt)) return {.verdict = can::Verdict::kStale};
+  if (gap > kImuJitter) {
     const nav::Vector3 shown = rate_b_radps_;
     const base::Micros before = bridged_;
     bridge(gap, with);
@@ -55,14 +56,16 @@ inline Innovation Inertial::fuse(const ImuSample& sample, base::Micros stamp, co
     time_ = stamp;
     return {.verdict = can::Verdict::kNotFinite};
   }
-  constexpr float kEvery_s = 7.5e-3F;  // a measurement that comes earlier does it itself
+  // A measurement brings it up to date; where this tick may take one, it is left to that.
+  const float every_s = anew_ ? 7.5e-3F : 20e-3F;
   ins_.vibration = imu_.noise_factor(n);
-  if (ins_.pending_s() >= kEvery_s) ins_.predict_covariance();
+  if (ins_.pending_s() >= every_s) ins_.predict_covariance();
   // Clipped increments are used, and are as uncertain as none.
   const float growth = base::sqrt(dt_s * 0.1F);
   if (sample.clipped_accel > 0 || sample.clipped_gyro > 0)
     doubt(n.gap_mps2 * growth, sample.clipped_gyro > 0 ? n.gap_radps * growth : 0.0F);
   time_ = stamp;
+  if (stamp > ahead_.heard()) corrected();  // it left before the present had it
   still_s_ += dt_s;
   still_rate_radps_ += (rate_b_radps_ - still_rate_radps_) * (dt_s / (still_s_ > dt_s ? still_s_ : dt_s));
   stand(stamp, with);
@@ -105,82 +108,13 @@ inline bool Inertial::without_imu() const {
     const float track_m = with.numbers.wheels.drive.track_m;
     ins_.p(8, 8) += slip / (track_m * track_m) * dt_s;
   }
+  corrected();
   rate_b_radps_ = ins_.x.b_g_radps + w_b;
   time_ += gap;
   bridged_ = time_;
   gained_mps_ = base::kNan;
   still_s_ = 0;
   calm_ = {};
-}
-
-/// What an IMU would have shown that went on straight, level as it was, but for a turn.
-inline nav::ImuIncrement Inertial::unseen(base::Micros gap, const nav::Vector3& w_b_radps) const {
-  const float dt_s = base::seconds(gap);
-  const nav::Quaternion n_b = (ins_.x.q_nb * ahead_.q).conjugate();
-  const nav::Vector3 v_b = n_b.rotate(ins_.x.v_n_mps);
-  const nav::Vector3 f_b = n_b.rotate({0.0F, 0.0F, ins_.earth.gravity_mps2}) + nav::cross(w_b_radps, v_b);
-  return {.dtheta_b_rad = (ins_.x.b_g_radps + w_b_radps) * dt_s, .dv_b_mps = (ins_.x.b_a_mps2 + f_b) * dt_s, .dt = gap};
-}
-
-template <class Window>
-void Inertial::advance(base::Micros t, const Context& with, Window&& window) {
-  const InertialNumbers& n = with.numbers.inertial;
-  now_ = t;
-  if (phase_ == Phase::kTracking) {
-    // Where nothing comes any more that the filter could still fuse: up to there it goes without.
-    const base::Micros far = t - base::Micros{with.numbers.loop.window_us + with.numbers.loop.period_us};
-    if (far > time_ && (imu_.stuck() || unusable_ || imu_.stale(far, n))) {
-      bridge(far - time_, with);
-      stand(time_, with);
-    }
-  }
-  ahead_ = nav::ImuChunk::with_biases_of(ins_.x);
-  last_rate_b_radps_ = rate_b_radps_;
-  if (phase_ != Phase::kTracking) return;
-  Repeats repeats = imu_.repeats();
-  const ImuSample* newest = nullptr;
-  base::Micros last = imu_.heard();
-  base::Micros reached = time_;
-  nav::ImuGather gather;  // in the axes of the sensor
-  const auto fold = [&]() {
-    if (!gather.empty()) ahead_.add(mounted(gather.take(), n));
-  };
-  const auto rate = [&](const ImuSample& s) {
-    return nav::Vector3(mounted(shown_by(s).dtheta_b_rad, n) / base::seconds(base::Micros{s.interval_us}));
-  };
-  const auto go_on = [&](base::Micros until) {
-    const base::Micros gap = until - reached;
-    if (gap <= base::Micros{1'500}) return;
-    fold();
-    nav::Vector3 w_b = nav::Vector3::Zero();
-    if (gap <= base::Micros{n.stale_us}) {
-      w_b = (newest == nullptr ? rate_b_radps_ : rate(*newest)) - ins_.x.b_g_radps;
-    } else if (turn_known(time_)) {
-      w_b(2) = wheel_turn_radps_;
-    }
-    ahead_.add(unseen(gap, w_b));
-    reached += gap;
-  };
-  window([&](const Sample& sample) {
-    if (sample.sensor != can::Sensor::kImu || sample.instance != n.imu) return;
-    const ImuSample& imu = sample.payload.imu;
-    if (repeats.hear(imu, n.stuck_samples)) return;
-    if (imu.clipped_gyro > 0 && turn_known(time_)) return;
-    const nav::ImuIncrement increment = shown_by(imu);
-    if (increment.check() != nav::ImuVerdict::kAccepted) return;
-    const base::Micros begin = sample.stamp - increment.dt;
-    if (2 * (begin - reached).us < -increment.dt.us) return;
-    go_on(begin);
-    gather.add(increment);
-    if (gather.full()) fold();
-    reached += increment.dt;
-    last = sample.stamp;
-    newest = &imu;
-  });
-  go_on(t);
-  fold();
-  if (newest != nullptr) last_rate_b_radps_ = rate(*newest);
-  blind_ = unusable_ || t - last > base::Micros{n.stale_us};
 }
 
 /// For the status of the present.
@@ -215,6 +149,8 @@ inline void Inertial::begin(const Context& with) {
   refused_ = {};
   still_s_ = 0;
   gained_mps_ = base::kNan;
+  work_left_ = 0;     // the covariance is looked at from end to end
+  corrected_ = 0xFF;  // and where it is now has to be known at once
 }
 
 /// Standing: wheels that have not turned for half a second; without wheels, see resting(). Then there is no velocity,
@@ -239,17 +175,16 @@ inline void Inertial::stand(base::Micros stamp, const Context& with) {
   }
   const auto gate = [](int dof) { return filter::chi_square_99(dof) * 4.0F; };
   const float sigma = wheels ? n.still_mps : n.still_gnss_mps;
-  if (stamp - stood_ >= kEvery) {
+  if (stamp - stood_ >= kEvery && can_do(stamp - stood_, kEvery)) {
     stood_ = stamp;
     const float least = sigma * sigma;
     if (ins_.p(3, 3) > least || ins_.p(4, 4) > least || ins_.p(5, 5) > least)
-      static_cast<void>(ins_.update(model::ZeroVelocity{.sigma_mps = sigma}, gate(3)));
+      static_cast<void>(update(model::ZeroVelocity{.sigma_mps = sigma}, gate(3)));
   }
   constexpr float kMean_s = 0.5F;
-  if (still_s_ < kMean_s || !gyro) return;
+  if (still_s_ < kMean_s || !gyro || (work_left_ < kMeasurement && still_s_ < 2.0F * kMean_s)) return;
   const float sigma_radps = 2.0F * n.gyro_radps_rthz * base::sqrt(1.0F / still_s_);
-  static_cast<void>(
-      ins_.update(model::ZeroRate{.gyro_b_radps = still_rate_radps_, .sigma_radps = sigma_radps}, gate(3)));
+  static_cast<void>(update(model::ZeroRate{.gyro_b_radps = still_rate_radps_, .sigma_radps = sigma_radps}, gate(3)));
   still_s_ = 0;
 }
 

@@ -9,7 +9,7 @@ namespace tetap::app {
 template <class Model>
 Innovation Inertial::measure(const Model& model, Source source, float gate_scale, base::Micros stamp,
                              const Context& with) {
-  const auto result = ins_.update(model, gate_scale * filter::chi_square_99(Model::kDimension));
+  const auto result = update(model, gate_scale * filter::chi_square_99(Model::kDimension));
   if (result.verdict > filter::Verdict::kRejected) return record(result);
   const bool rejected = result.verdict == filter::Verdict::kRejected;
   refused_or_not(source, rejected, stamp);

@@ -7,7 +7,7 @@
 namespace tetap::app {
 
 inline InertialEstimate Inertial::inertial(const Context&) const {
-  return {.state = phase_ == Phase::kTracking ? ahead_.apply(ins_.x, ins_.earth) : ins_.x,
+  return {.state = phase_ == Phase::kTracking ? present_ : ins_.x,
           .p = ins_.p,
           .valid = phase_ == Phase::kTracking,
           .jump = jump_,
@@ -18,14 +18,14 @@ inline Estimate Inertial::estimate(const Context& with) const {
   const InertialEstimate full = inertial(with);
   const nav::InsState& x = full.state;
   const nav::Vector3 v_b = x.q_nb.conjugate().rotate(x.v_n_mps);
-  const nav::Vector3 w_n = x.q_nb.rotate(last_rate_b_radps_ - x.b_g_radps);
+  const nav::Vector3 w_n = x.q_nb.rotate(ahead_.place().rate_b_radps - x.b_g_radps);
   constexpr std::array<int, 3> kPlanar{0, 1, 8};
   filter::Symmetric<float, 3> p;
   for (int c = 0; c < 3; ++c)
     for (int r = 0; r <= c; ++r)
       p(r, c) = full.p(kPlanar[static_cast<std::size_t>(r)], kPlanar[static_cast<std::size_t>(c)]);
   // Position is uncertain at the present by what the velocity was at the far end, too.
-  const float ahead_s = base::seconds(ahead_.dt);
+  const float ahead_s = base::seconds(now_ - time_);
   p(0, 0) += ahead_s * (2.0F * full.p(0, 3) + ahead_s * full.p(3, 3));
   p(1, 1) += ahead_s * (2.0F * full.p(1, 4) + ahead_s * full.p(4, 4));
   p(0, 1) += ahead_s * (full.p(0, 4) + full.p(1, 3) + ahead_s * full.p(3, 4));
@@ -51,21 +51,9 @@ inline Estimate Inertial::estimate(const Context& with) const {
 
 template <class Sink>
 void Inertial::each_bit(Sink&& sink) const {
-  const nav::InsState& x = ins_.x;
-  for (const base::Anchored* coordinate : {&x.x, &x.y, &x.z}) {
-    sink(coordinate->anchor_um);
-    sink(coordinate->offset_m);
-  }
-  for (int i = 0; i < 3; ++i) {
-    sink(x.v_n_mps(i));
-    sink(x.b_a_mps2(i));
-    sink(x.b_g_radps(i));
-    sink(still_rate_radps_(i));
-  }
-  sink(x.q_nb.w);
-  sink(x.q_nb.x);
-  sink(x.q_nb.y);
-  sink(x.q_nb.z);
+  ins_.x.each_bit(sink);
+  ahead_.each_bit(sink);
+  for (int i = 0; i < 3; ++i) sink(still_rate_radps_(i));
   ins_.each_bit_of_p(sink);
   sink(static_cast<std::uint32_t>(phase_));
   start_.each_bit(sink);
@@ -80,7 +68,7 @@ void Inertial::each_bit(Sink&& sink) const {
     sink(rate_b_radps_(i));
   }
   sink(static_cast<std::uint32_t>(counts_.left | counts_.right << 16U));
-  sink(static_cast<std::uint32_t>((have_counts_ ? 1U : 0U) | (unusable_ ? 2U : 0U)));
+  sink(static_cast<std::uint32_t>((have_counts_ ? 1U : 0U) | (unusable_ ? 2U : 0U) | unsigned{corrected_} << 8U));
   sink(grounds_);
   sink(wheel_turn_radps_);
   sink(gained_mps_);

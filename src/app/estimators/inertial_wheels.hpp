@@ -12,6 +12,10 @@ namespace tetap::app {
 inline Innovation Inertial::fuse(const WheelCounts& counts, base::Micros stamp, const Context& with) {
   const auto& drive = with.numbers.wheels.drive;
   const base::Micros interval = stamp - counts_time_;
+  if (gathers(stamp, with)) {
+    if (counts.left != counts_.left || counts.right != counts_.right) moved_ = stamp;
+    return {.verdict = can::Verdict::kAccepted};
+  }
   const bool usable = have_counts_ && interval.us > 0 && interval <= base::Micros{with.numbers.wheels.timeout_us};
   const std::int32_t left = model::count_difference(counts.left, counts_.left);
   const std::int32_t right = model::count_difference(counts.right, counts_.right);
@@ -139,7 +143,7 @@ inline bool Inertial::wheels_agree(base::Micros at, const Context& with) const {
 /// A wheel speed of which nothing is known: the non-holonomic constraint is what it leaves.
 inline void Inertial::constrain(base::Micros stamp, const Context& with) {
   const base::Micros every{with.numbers.inertial.constrain_every_us};
-  if (every.us <= 0 || stamp - constrained_ < every) return;
+  if (every.us <= 0 || stamp - constrained_ < every || !can_do(stamp - constrained_, every)) return;
   constexpr float kUnknown_mps = 1e4F;
   // That it does not move sideways says nothing for wheels that spin.
   const Refused spinning = refused_[kWheels];

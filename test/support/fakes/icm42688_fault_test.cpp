@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include <functional>
+#include <ostream>
 #include <set>
 
 namespace tetap::fakes {
@@ -19,6 +20,7 @@ struct RuleCase {
   Rule rule;
   std::function<void(PlainHost&)> breaks;
 };
+void PrintTo(const RuleCase& one, std::ostream* out) { *out << name(one.rule); }
 
 class Icm42688Rules : public ::testing::TestWithParam<RuleCase> {};
 

@@ -1,0 +1,192 @@
+// SPDX-License-Identifier: Apache-2.0
+// From the far end of the window to the present: a state carried over the IMU samples that the window holds. What is
+// new is added; only when the far end itself was corrected is all of it carried anew, over a handful of cells.
+#pragma once
+
+#include "app/estimators/imu_cells.hpp"
+#include "nav/strapdown.hpp"
+
+#include <cstdint>
+
+namespace tetap::app {
+
+inline nav::Vector3 mounted(const nav::Vector3& s, const InertialNumbers& n) {
+  const auto& m = n.mounting_bs;
+  return {m[0] * s(0) + m[1] * s(1) + m[2] * s(2), m[3] * s(0) + m[4] * s(1) + m[5] * s(2),
+          m[6] * s(0) + m[7] * s(1) + m[8] * s(2)};
+}
+inline nav::ImuIncrement mounted(const nav::ImuIncrement& s, const InertialNumbers& n) {
+  return {.dtheta_b_rad = mounted(s.dtheta_b_rad, n), .dv_b_mps = mounted(s.dv_b_mps, n), .dt = s.dt};
+}
+
+class Ahead {
+ public:
+  /// What it is carried with. Wheels may know how it turns where the gyroscope is at full scale, or silent.
+  struct With {
+    const InertialNumbers& numbers;
+    const nav::Earth& earth;
+    bool turn_known;
+    float wheel_turn_radps;
+  };
+  struct Place {
+    nav::InsState x;
+    base::Micros reached;  ///< by the intervals of samples and of what was missing
+    base::Micros last;     ///< stamp of the last sample that said something
+    Repeats repeats;
+    nav::Vector3 rate_b_radps = nav::Vector3::Zero();  ///< as the gyroscope showed it last
+  };
+
+  /// A sample is new in the window. True: it came late, and the state was carried on without it.
+  [[nodiscard]] bool arrived(base::Micros stamp) {
+    cells_.arrived(stamp);
+    return stamp <= heard_;
+  }
+  /// What is in the window will be needed.
+  template <class Window>
+  void watch(const Window& window, const InertialNumbers& n) {
+    cells_.follow(window, n);
+  }
+  /// Anew, from the far end.
+  template <class Window>
+  void carry_from(const Place& far, const Window& window, const With& with);
+  /// On, over what came since.
+  template <class Window>
+  void carry_on(const Window& window, const With& with);
+  /// At a time after the last sample: it goes on straight, level as it was, but for its turn.
+  [[nodiscard]] nav::InsState at(base::Micros t, const With& with) const {
+    nav::InsState x = place_.x;
+    const base::Micros gap = t - place_.reached;
+    if (gap > kImuJitter) static_cast<void>(nav::strapdown(x, unseen(gap, with), with.earth));
+    return x;
+  }
+  [[nodiscard]] const Place& place() const { return place_; }
+  /// Stamp of the last sample it has, whatever that said.
+  [[nodiscard]] base::Micros heard() const { return heard_; }
+
+  template <class Sink>
+  void each_bit(Sink&& sink) const {
+    place_.x.each_bit(sink);
+    place_.repeats.each_bit(sink);
+    sink(place_.reached.us);
+    sink(place_.last.us);
+    sink(heard_.us);
+    for (int i = 0; i < 3; ++i) sink(place_.rate_b_radps(i));
+  }
+
+ private:
+  [[nodiscard]] nav::ImuIncrement unseen(base::Micros gap, const With& with) const;
+  void fold(const With& with) {
+    if (!gather_.empty())
+      static_cast<void>(nav::strapdown(place_.x, mounted(gather_.take(), with.numbers), with.earth));
+  }
+  void hear(const Sample& sample, const With& with, const ImuSample*& newest);
+  [[nodiscard]] static nav::Vector3 rate_of(const ImuSample& s, const InertialNumbers& n) {
+    return mounted(shown_by(s).dtheta_b_rad, n) / base::seconds(base::Micros{s.interval_us});
+  }
+
+  Place place_;
+  base::Micros heard_;
+  ImuCells cells_;
+  nav::ImuGather gather_;  ///< of samples that x does not have yet; empty between calls
+};
+
+/// What an IMU would have shown that went on straight. A gap of a few samples does not end a turn.
+inline nav::ImuIncrement Ahead::unseen(base::Micros gap, const With& with) const {
+  const nav::InsState& x = place_.x;
+  nav::Vector3 w_b = nav::Vector3::Zero();
+  if (gap <= base::Micros{with.numbers.stale_us}) {
+    w_b = place_.rate_b_radps - x.b_g_radps;
+  } else if (with.turn_known) {
+    w_b(2) = with.wheel_turn_radps;
+  }
+  const nav::Quaternion n_b = x.q_nb.conjugate();
+  const nav::Vector3 f_b = n_b.rotate({0.0F, 0.0F, with.earth.gravity_mps2}) + nav::cross(w_b, n_b.rotate(x.v_n_mps));
+  const float dt_s = base::seconds(gap);
+  const nav::Vector3 dtheta = (x.b_g_radps + w_b) * dt_s;
+  const nav::Vector3 dv = (x.b_a_mps2 + f_b) * dt_s;
+  return {.dtheta_b_rad = dtheta, .dv_b_mps = dv + 0.5F * nav::cross(dtheta, dv), .dt = gap};
+}
+
+inline void Ahead::hear(const Sample& sample, const With& with, const ImuSample*& newest) {
+  const InertialNumbers& n = with.numbers;
+  const ImuSample& imu = sample.payload.imu;
+  heard_ = sample.stamp;
+  if (place_.repeats.hear(imu, n.stuck_samples)) return;
+  if (imu.clipped_gyro > 0 && with.turn_known) return;
+  const nav::ImuIncrement increment = shown_by(imu);
+  if (increment.check() != nav::ImuVerdict::kAccepted) return;
+  const base::Micros gap = sample.stamp - increment.dt - place_.reached;
+  if (overlaps(gap, increment.dt)) return;
+  if (gap > kImuJitter) {
+    fold(with);
+    if (newest != nullptr) place_.rate_b_radps = rate_of(*newest, n);
+    static_cast<void>(nav::strapdown(place_.x, unseen(gap, with), with.earth));
+    place_.reached += gap;
+  }
+  if (gather_.full()) fold(with);
+  gather_.add(increment);
+  place_.reached += increment.dt;
+  place_.last = sample.stamp;
+  newest = &imu;
+}
+
+template <class Window>
+void Ahead::carry_on(const Window& window, const With& with) {
+  std::size_t i = window.size();
+  while (i > 0 && window[i - 1].stamp > heard_) --i;
+  const ImuSample* newest = nullptr;
+  for (; i < window.size(); ++i)
+    if (is_of(window[i], with.numbers)) hear(window[i], with, newest);
+  fold(with);
+  if (newest != nullptr) place_.rate_b_radps = rate_of(*newest, with.numbers);
+  cells_.follow(window, with.numbers);
+}
+
+template <class Window>
+void Ahead::carry_from(const Place& far, const Window& window, const With& with) {
+  const InertialNumbers& n = with.numbers;
+  place_ = far;
+  cells_.follow(window, n);
+  std::size_t i = 0;
+  const ImuSample* newest = nullptr;
+  const auto hear_until = [&](base::Micros until) {
+    for (; i < window.size(); ++i) {
+      const Sample& sample = window[i];
+      if (sample.stamp > until) return;
+      if (is_of(sample, n)) hear(sample, with, newest);
+    }
+  };
+  // The place on the grid that begins to leave sample by sample; then cells, but for those in which one has to be
+  // looked at by itself; then what there was no cell for.
+  hear_until(cells_.leaving_until());
+  bool skipped = false;
+  const auto look_back = [&](base::Micros until) {
+    if (!skipped) return;
+    skipped = false;
+    while (i < window.size() && window[i].stamp <= until) ++i;
+    std::size_t at = i;
+    while (!is_of(window[at - 1], n)) --at;
+    newest = &window[at - 1].payload.imu;
+    place_.repeats = Repeats::after(*newest);
+  };
+  for (std::size_t c = 0; c < cells_.size(); ++c) {
+    const ImuCell& cell = cells_[c];
+    fold(with);
+    if (cell.plain() && cell.follows(place_.reached)) {
+      gather_ = cell.gather;
+      place_.reached += gather_.sum().dt;
+      place_.last = heard_ = cell.last();
+      skipped = true;
+    } else {
+      look_back(place_.last);
+      hear_until(cell.last());
+    }
+  }
+  fold(with);
+  look_back(place_.last);
+  hear_until({std::numeric_limits<std::int64_t>::max()});
+  fold(with);
+  if (newest != nullptr) place_.rate_b_radps = rate_of(*newest, n);
+}
+
+}  // namespace tetap::app

@@ -1,0 +1,314 @@
+// SPDX-License-Identifier: Apache-2.0
+// The present carried over the window, and how the work at its far end is shared out among ticks.
+#include "app/estimators/ahead.hpp"
+
+#include "app/estimators/inertial.hpp"
+#include "app/history.hpp"
+
+#include <gtest/gtest.h>
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <map>
+#include <random>
+#include <vector>
+
+namespace tetap::app {
+namespace {
+
+constexpr std::int64_t kImu_us = 5'000, kTick_us = 10'000, kWindow_us = 200'000;
+
+Sample imu_sample(std::int64_t us, const nav::Vector3& w_b_radps, const nav::Vector3& f_b_mps2,
+                  std::int64_t dt_us = kImu_us) {
+  const auto shown = nav::ImuIncrement::constant(w_b_radps, f_b_mps2, {dt_us});
+  Sample s;
+  s.stamp = {us};
+  s.sensor = can::Sensor::kImu;
+  const auto& a = shown.dtheta_b_rad;
+  const auto& v = shown.dv_b_mps;
+  s.payload.imu = {.dangle_b_rad = {a(0), a(1), a(2)},
+                   .dvelocity_b_mps = {v(0), v(1), v(2)},
+                   .interval_us = static_cast<std::uint16_t>(dt_us)};
+  return s;
+}
+
+std::vector<std::uint32_t> bits_of(const nav::InsState& x) {
+  std::vector<std::uint32_t> all;
+  x.each_bit([&]<class T>(T value) {
+    if constexpr (sizeof(T) == 8) {
+      all.push_back(static_cast<std::uint32_t>(value));
+      all.push_back(static_cast<std::uint32_t>(static_cast<std::uint64_t>(value) >> 32));
+    } else {
+      all.push_back(std::bit_cast<std::uint32_t>(value));
+    }
+  });
+  return all;
+}
+
+/// A window into which samples come, late ones too, and which they leave.
+class Feed {
+ public:
+  explicit Feed(unsigned seed, bool wild) : random_(seed), wild_(wild) {}
+
+  void tick() {
+    now_us += kTick_us;
+    for (std::int64_t us = now_us - kTick_us + kImu_us; us <= now_us; us += kImu_us) produce(us);
+    for (auto it = waiting_.begin(); it != waiting_.end();) {
+      if (one_in(3)) {
+        put(*it);
+        it = waiting_.erase(it);
+      } else {
+        ++it;
+      }
+    }
+    std::size_t gone = 0;
+    while (gone < window.size() && window[gone].stamp.us <= now_us - kWindow_us) {
+      if (window[gone].sensor == can::Sensor::kImu) {
+        far.last = window[gone].stamp;
+        static_cast<void>(far.repeats.hear(window[gone].payload.imu, 10));
+      }
+      ++gone;
+    }
+    window.erase(window.begin(), window.begin() + static_cast<std::ptrdiff_t>(gone));
+    far.reached = far.last;
+  }
+  [[nodiscard]] bool one_in(int n) { return std::uniform_int_distribution<int>(1, n)(random_) == 1; }
+  [[nodiscard]] float normal() { return std::normal_distribution<float>()(random_); }
+
+  std::vector<Sample> window;
+  std::vector<std::int64_t> arrived_us;
+  Ahead::Place far;
+  std::int64_t now_us = 7'000'000;
+
+ private:
+  void put(const Sample& s) {
+    if (s.stamp.us <= now_us - kWindow_us) return;
+    const auto at = std::find_if(window.begin(), window.end(), [&](const Sample& w) { return w.order(s) > 0; });
+    window.insert(at, s);
+    arrived_us.push_back(s.stamp.us);
+  }
+  void produce(std::int64_t us) {
+    if (wild_ && one_in(60)) fast_ = !fast_;
+    const nav::Vector3 w = (fast_ ? 8.0F : 0.5F) * nav::Vector3(normal(), normal(), normal());
+    Sample s = imu_sample(us + (wild_ ? static_cast<std::int64_t>(40 * normal()) : 0), w, {normal(), normal(), 9.8F});
+    if (wild_) {
+      if (one_in(80)) return;  // lost
+      if (one_in(90)) s.payload.imu.dangle_b_rad[1] = std::nanf("");
+      if (one_in(90)) s.payload.imu.clipped_gyro = 1;
+      if (one_in(90)) s.payload.imu.interval_us = static_cast<std::uint16_t>(one_in(2) ? 0 : 12'000);
+      if (one_in(40)) repeating_ = 14;
+      if (repeating_ > 0 && !window.empty()) {
+        --repeating_;
+        s.payload.imu = last_;
+      }
+      last_ = s.payload.imu;
+      if (one_in(25)) {
+        Sample other = s;
+        other.sensor = can::Sensor::kWheelCounts;
+        put(other);
+      }
+      if (one_in(50)) return waiting_.push_back(s);
+    }
+    put(s);
+  }
+
+  std::mt19937 random_;
+  bool wild_, fast_ = false;
+  int repeating_ = 0;
+  ImuSample last_;
+  std::vector<Sample> waiting_;
+};
+
+Ahead::With with(const InertialNumbers& n, const nav::Earth& earth, bool turn_known = true) {
+  return {.numbers = n, .earth = earth, .turn_known = turn_known, .wheel_turn_radps = 0.1F};
+}
+
+/// Lost, late, repeated, clipped, broken samples, tumbling and calm: what grew sample by sample over the ticks has the
+/// bits of what is made at once of the same window.
+TEST(Ahead, ItsCellsAreNoMoreThanACache) {
+  const InertialNumbers n;
+  const nav::Earth earth;
+  for (unsigned seed = 1; seed <= 20; ++seed) {
+    Feed feed(seed, true);
+    Ahead grown;
+    for (int i = 0; i < 400; ++i) {
+      feed.tick();
+      for (const std::int64_t us : feed.arrived_us) static_cast<void>(grown.arrived({us}));
+      feed.arrived_us.clear();
+      const bool turn_known = !feed.one_in(4);
+      if (feed.one_in(3)) {
+        grown.carry_on(feed.window, with(n, earth, turn_known));
+        continue;
+      }
+      grown.carry_from(feed.far, feed.window, with(n, earth, turn_known));
+      Ahead fresh;
+      fresh.carry_from(feed.far, feed.window, with(n, earth, turn_known));
+      ASSERT_EQ(bits_of(grown.place().x), bits_of(fresh.place().x)) << seed << ' ' << i;
+      ASSERT_EQ(grown.place().reached, fresh.place().reached);
+      ASSERT_EQ(grown.place().last, fresh.place().last);
+    }
+  }
+}
+
+/// Over cells, or on from tick to tick: where every sample by itself leads.
+TEST(Ahead, LeadsWhereSampleBySampleStrapdownLeads) {
+  const InertialNumbers n;
+  const nav::Earth earth;
+  Feed feed(3, false);
+  for (int i = 0; i < 25; ++i) feed.tick();
+  Ahead anew, on;
+  on.carry_from(feed.far, feed.window, with(n, earth));
+  for (int i = 0; i < 10; ++i) {
+    feed.tick();
+    on.carry_on(feed.window, with(n, earth));
+  }
+  // Both from where the window began.
+  nav::InsState each;
+  Feed again(3, false);
+  for (int i = 0; i < 25; ++i) again.tick();
+  for (const Sample& s : again.window) nav::strapdown(each, shown_by(s.payload.imu), earth);
+  for (const Sample& s : feed.window)
+    if (s.stamp > again.window.back().stamp) nav::strapdown(each, shown_by(s.payload.imu), earth);
+  const auto off = on.at({feed.now_us}, with(n, earth)).minus(each);
+  EXPECT_LT(off.head<3>().norm(), 2e-3F);
+  EXPECT_LT(off.segment<3>(3).norm(), 1e-3F);
+  EXPECT_LT(off.segment<3>(6).norm(), 1e-4F);
+
+  anew.carry_from(feed.far, feed.window, with(n, earth));
+  each = {};
+  for (const Sample& s : feed.window) nav::strapdown(each, shown_by(s.payload.imu), earth);
+  const auto off_anew = anew.place().x.minus(each);
+  EXPECT_LT(off_anew.head<3>().norm(), 2e-3F);
+  EXPECT_LT(off_anew.segment<3>(3).norm(), 1e-3F);
+  EXPECT_LT(off_anew.segment<3>(6).norm(), 1e-4F);
+}
+
+TEST(Ahead, SaysWhenASampleComesThatItWentOnWithout) {
+  const InertialNumbers n;
+  const nav::Earth earth;
+  Ahead ahead;
+  std::vector<Sample> window{imu_sample(105'000, {0, 0, 1}, {0, 0, 9.8F}),
+                             imu_sample(115'000, {0, 0, 1}, {0, 0, 9.8F})};
+  for (const Sample& s : window) EXPECT_FALSE(ahead.arrived(s.stamp));
+  ahead.carry_from({.reached = {100'000}, .last = {100'000}}, window, with(n, earth));
+  EXPECT_FALSE(ahead.arrived({120'000}));
+  EXPECT_TRUE(ahead.arrived({110'000}));
+}
+
+/// What is missing at the end is gone on through: the turn is kept for a few samples, then the wheels' word taken.
+TEST(Ahead, GoesOnStraightThroughWhatIsMissing) {
+  InertialNumbers n;
+  nav::Earth earth;
+  Ahead ahead;
+  nav::InsState x;
+  x.v_n_mps = {2, 0, 0};
+  const std::vector<Sample> window{imu_sample(105'000, {0, 0, 1}, {0, 2, earth.gravity_mps2})};
+  ahead.carry_from({.x = x, .reached = {100'000}, .last = {100'000}}, window, with(n, earth));
+  const auto after = [&](std::int64_t us, bool known) { return ahead.at({105'000 + us}, with(n, earth, known)); };
+  EXPECT_NEAR(nav::euler(after(50'000, false).q_nb).yaw_rad, 0.055F, 1e-4F);
+  EXPECT_NEAR(after(50'000, false).v_n_mps.norm(), 2.0F, 1e-3F);
+  EXPECT_NEAR(nav::euler(after(400'000, true).q_nb).yaw_rad, 0.005F + 0.04F, 1e-4F);
+  EXPECT_NEAR(nav::euler(after(400'000, false).q_nb).yaw_rad, 0.005F, 1e-4F);
+  EXPECT_NEAR(after(400'000, false).v_n_mps.norm(), 2.0F, 1e-3F);
+}
+
+/// The node's part between inbox and publisher, driving straight at 1 m/s.
+class Ticks {
+ public:
+  explicit Ticks(const Numbers& of) : n_(of) {
+    site_.frame = nav::LocalFrame(24'131'350'000, 5'834'150'000, 500.0F);
+    site_.origin = can::OriginSource::kConfigured;
+    history_.power_on({us_}, context());
+    history_.each_lane([&](auto& lane) {
+      lane.set_pose({us_}, {.pose = {}, .sigma_position_m = 0.1F, .sigma_yaw_rad = 0.01F}, context());
+    });
+  }
+  /// Measurements taken in the tick.
+  int tick(std::int64_t imu_us, std::int64_t wheels_us, std::int64_t gnss_us) {
+    const std::int64_t end = us_ + kTick_us;
+    for (us_ += 1'000; us_ <= end; us_ += 1'000) {
+      const float t_s = 1e-6F * static_cast<float>(us_ - kBegin_us);
+      if (us_ % imu_us == 0) insert(imu_sample(us_, {shake(), shake(), shake()}, {shake(), shake(), 9.806F}, imu_us));
+      if (us_ % wheels_us == 0) {
+        Sample s;
+        s.sensor = can::Sensor::kWheelCounts;
+        const auto count = static_cast<std::uint16_t>(std::lround(t_s / (6.2831853F * 0.1F) * 2000.0F));
+        s.payload.counts = {.left = count, .right = count};
+        insert(s);
+      }
+      if (us_ % gnss_us == 0) {
+        Sample s;
+        s.sensor = can::Sensor::kGnssVelocity;
+        s.payload.gnss_velocity = {.v_n_mps = {1, 0, 0}, .acc_mps = 0.1F};
+        insert(s);
+      }
+    }
+    us_ = end;
+    int taken = 0;
+    const auto note = [&](std::size_t, const Sample& s, const Innovation& record) {
+      late_us = std::max(late_us, us_ - kWindow_us - s.stamp.us);
+      if (record.dof > 0) ++taken, ++fused[s.sensor];
+    };
+    static_cast<void>(history_.consume(
+        {us_}, context(), [](const Sample&) {}, note));
+    history_.advance({us_}, context());
+    history_.retire_until({us_ - kWindow_us}, context(), note);
+    return taken;
+  }
+  std::int64_t late_us = 0;  ///< of what left, behind the end of the window, at most
+  std::map<can::Sensor, int> fused;
+
+ private:
+  static constexpr std::int64_t kBegin_us = 10'000'000;
+  void insert(Sample s) {
+    s.stamp = {us_};
+    s.sequence = static_cast<std::uint8_t>(us_ / 1000);
+    static_cast<void>(history_.insert(s, context(), [](std::size_t, const Sample&, const Innovation&) {}));
+  }
+  float shake() { return 0.01F * std::normal_distribution<float>()(random_); }
+  [[nodiscard]] Context context() const { return {n_, site_}; }
+
+  Numbers n_;
+  Site site_;
+  History<Estimators<Inertial>, 200> history_;
+  std::int64_t us_ = kBegin_us;
+  std::mt19937 random_{1};
+};
+
+Numbers rover_like() {
+  Numbers n;
+  n.wheels.drive = {.left_radius_m = 0.1F, .right_radius_m = 0.1F, .track_m = 0.5F, .counts_per_turn = 2000};
+  return n;
+}
+
+/// Wheels and GNSS at the same moments: a tick takes one, none is lost, and the far end does not fall behind.
+TEST(InertialWork, ATickTakesOneMeasurement) {
+  Ticks ticks(rover_like());
+  int most = 0, ahead = 0;
+  for (int i = 0; i < 200; ++i) ticks.tick(5'000, 10'000, 200'000);  // the start, and standing until it moved
+  ticks.fused.clear();
+  ticks.late_us = 0;
+  for (int i = 0; i < 1000; ++i) most = std::max(most, ticks.tick(5'000, 10'000, 200'000));
+  ahead = ticks.fused[can::Sensor::kWheelCounts];
+  EXPECT_EQ(most, 1);
+  EXPECT_NEAR(ticks.fused[can::Sensor::kGnssVelocity], 50, 1);
+  EXPECT_NEAR(ahead, 500, 2);  // of 1000: a difference over two
+  EXPECT_LT(ticks.late_us, 50'000);
+}
+
+/// More than a tick takes: two then, and it stays within what is allowed.
+TEST(InertialWork, WhatIsFarBehindIsCaughtUpWith) {
+  Numbers n = rover_like();
+  n.inertial.counts_every_us = 0;
+  Ticks ticks(n);
+  for (int i = 0; i < 200; ++i) ticks.tick(2'000, 10'000, 50'000);
+  ticks.fused.clear();
+  ticks.late_us = 0;
+  for (int i = 0; i < 1000; ++i) ticks.tick(2'000, 10'000, 50'000);
+  EXPECT_NEAR(ticks.fused[can::Sensor::kWheelCounts], 1000, 8);
+  EXPECT_NEAR(ticks.fused[can::Sensor::kGnssVelocity], 200, 3);
+  EXPECT_LT(ticks.late_us, 110'000);
+}
+
+}  // namespace
+}  // namespace tetap::app
