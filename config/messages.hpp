@@ -1045,16 +1045,16 @@ struct EstMotion {
 struct EstAtt {
   static constexpr std::uint8_t kOffset = 0x2A, kSize = 8;
   static constexpr std::uint8_t kStride = 6, kCount = 4;
-  static constexpr Signal kW{.start = 0, .length = 15, .is_signed = true, .has_gap = true, .per_unit = 12500};
-  static constexpr Signal kX{.start = 15, .length = 15, .is_signed = true, .has_gap = true, .per_unit = 12500};
-  static constexpr Signal kY{.start = 30, .length = 15, .is_signed = true, .has_gap = true, .per_unit = 12500};
-  static constexpr Signal kZ{.start = 45, .length = 15, .is_signed = true, .has_gap = true, .per_unit = 12500};
+  static constexpr Signal kW{.start = 0, .length = 15, .is_signed = true, .has_gap = true, .per_unit = 16000};
+  static constexpr Signal kX{.start = 15, .length = 15, .is_signed = true, .has_gap = true, .per_unit = 16000};
+  static constexpr Signal kY{.start = 30, .length = 15, .is_signed = true, .has_gap = true, .per_unit = 16000};
+  static constexpr Signal kZ{.start = 45, .length = 15, .is_signed = true, .has_gap = true, .per_unit = 16000};
   static constexpr Signal kEpoch{.start = 60, .length = 4, .wraps = true};
 
-  float w = 0;  ///< real part; +-1.31064 in steps of 0.00008; NaN: not available
-  float x = 0;  ///< imaginary part, x; +-1.31064 in steps of 0.00008; NaN: not available
-  float y = 0;  ///< imaginary part, y; +-1.31064 in steps of 0.00008; NaN: not available
-  float z = 0;  ///< imaginary part, z; +-1.31064 in steps of 0.00008; NaN: not available
+  float w = 0;  ///< real part; +-1.0239375 in steps of 0.0000625; NaN: not available
+  float x = 0;  ///< imaginary part, x; +-1.0239375 in steps of 0.0000625; NaN: not available
+  float y = 0;  ///< imaginary part, y; +-1.0239375 in steps of 0.0000625; NaN: not available
+  float z = 0;  ///< imaginary part, z; +-1.0239375 in steps of 0.0000625; NaN: not available
   std::uint8_t epoch = 0;  ///< low bits of the epoch, the same in all frames of one epoch
 
   template <class Self, class Visit>
@@ -1071,14 +1071,14 @@ struct EstAtt {
 struct EstVel {
   static constexpr std::uint8_t kOffset = 0x2B, kSize = 8;
   static constexpr std::uint8_t kStride = 6, kCount = 4;
-  static constexpr Signal kEast{.start = 0, .length = 19, .is_signed = true, .has_gap = true, .per_unit = 1000};
-  static constexpr Signal kNorth{.start = 19, .length = 19, .is_signed = true, .has_gap = true, .per_unit = 1000};
-  static constexpr Signal kUp{.start = 38, .length = 19, .is_signed = true, .has_gap = true, .per_unit = 1000};
+  static constexpr Signal kEast{.start = 0, .length = 19, .is_signed = true, .has_gap = true, .per_unit = 2000};
+  static constexpr Signal kNorth{.start = 19, .length = 19, .is_signed = true, .has_gap = true, .per_unit = 2000};
+  static constexpr Signal kUp{.start = 38, .length = 19, .is_signed = true, .has_gap = true, .per_unit = 2000};
   static constexpr Signal kEpoch{.start = 57, .length = 4, .wraps = true};
 
-  float east_mps = 0;  ///< towards east; +-262.143 m/s in steps of 0.001; NaN: not available
-  float north_mps = 0;  ///< towards north; +-262.143 m/s in steps of 0.001; NaN: not available
-  float up_mps = 0;  ///< towards up; +-262.143 m/s in steps of 0.001; NaN: not available
+  float east_mps = 0;  ///< towards east; +-131.0715 m/s in steps of 0.0005; NaN: not available
+  float north_mps = 0;  ///< towards north; +-131.0715 m/s in steps of 0.0005; NaN: not available
+  float up_mps = 0;  ///< towards up; +-131.0715 m/s in steps of 0.0005; NaN: not available
   std::uint8_t epoch = 0;  ///< low bits of the epoch, the same in all frames of one epoch
 
   template <class Self, class Visit>
@@ -1175,14 +1175,14 @@ struct EstStateAccBias {
   static constexpr Signal kMux{.start = 0, .length = 4};
   static constexpr std::uint8_t kPage = 1;
   static constexpr Signal kEpoch{.start = 4, .length = 4, .wraps = true};
-  static constexpr Signal kAccBiasX{.start = 8, .length = 16, .is_signed = true, .has_gap = true, .per_unit = 5000};
-  static constexpr Signal kAccBiasY{.start = 24, .length = 16, .is_signed = true, .has_gap = true, .per_unit = 5000};
-  static constexpr Signal kAccBiasZ{.start = 40, .length = 16, .is_signed = true, .has_gap = true, .per_unit = 5000};
+  static constexpr Signal kAccBiasX{.start = 8, .length = 18, .is_signed = true, .has_gap = true, .per_unit = 20000};
+  static constexpr Signal kAccBiasY{.start = 26, .length = 18, .is_signed = true, .has_gap = true, .per_unit = 20000};
+  static constexpr Signal kAccBiasZ{.start = 44, .length = 18, .is_signed = true, .has_gap = true, .per_unit = 20000};
 
   std::uint8_t epoch = 0;  ///< low bits of the epoch, the same in all frames of one epoch
-  float acc_bias_x_mps2 = 0;  ///< accelerometer bias along body x; +-6.5534 m/s2 in steps of 0.0002; NaN: not available
-  float acc_bias_y_mps2 = 0;  ///< accelerometer bias along body y; +-6.5534 m/s2 in steps of 0.0002; NaN: not available
-  float acc_bias_z_mps2 = 0;  ///< accelerometer bias along body z; +-6.5534 m/s2 in steps of 0.0002; NaN: not available
+  float acc_bias_x_mps2 = 0;  ///< accelerometer bias along body x; +-6.55355 m/s2 in steps of 0.00005; NaN: not available
+  float acc_bias_y_mps2 = 0;  ///< accelerometer bias along body y; +-6.55355 m/s2 in steps of 0.00005; NaN: not available
+  float acc_bias_z_mps2 = 0;  ///< accelerometer bias along body z; +-6.55355 m/s2 in steps of 0.00005; NaN: not available
 
   template <class Self, class Visit>
   static constexpr void each(Self& m, Visit&& visit) {
@@ -1200,14 +1200,14 @@ struct EstStateGyroBias {
   static constexpr Signal kMux{.start = 0, .length = 4};
   static constexpr std::uint8_t kPage = 2;
   static constexpr Signal kEpoch{.start = 4, .length = 4, .wraps = true};
-  static constexpr Signal kGyroBiasX{.start = 8, .length = 16, .is_signed = true, .has_gap = true, .per_unit = 100000};
-  static constexpr Signal kGyroBiasY{.start = 24, .length = 16, .is_signed = true, .has_gap = true, .per_unit = 100000};
-  static constexpr Signal kGyroBiasZ{.start = 40, .length = 16, .is_signed = true, .has_gap = true, .per_unit = 100000};
+  static constexpr Signal kGyroBiasX{.start = 8, .length = 18, .is_signed = true, .has_gap = true, .per_unit = 400000};
+  static constexpr Signal kGyroBiasY{.start = 26, .length = 18, .is_signed = true, .has_gap = true, .per_unit = 400000};
+  static constexpr Signal kGyroBiasZ{.start = 44, .length = 18, .is_signed = true, .has_gap = true, .per_unit = 400000};
 
   std::uint8_t epoch = 0;  ///< low bits of the epoch, the same in all frames of one epoch
-  float gyro_bias_x_radps = 0;  ///< gyroscope bias along body x; +-0.32767 rad/s in steps of 0.00001; NaN: not available
-  float gyro_bias_y_radps = 0;  ///< gyroscope bias along body y; +-0.32767 rad/s in steps of 0.00001; NaN: not available
-  float gyro_bias_z_radps = 0;  ///< gyroscope bias along body z; +-0.32767 rad/s in steps of 0.00001; NaN: not available
+  float gyro_bias_x_radps = 0;  ///< gyroscope bias along body x; +-0.3276775 rad/s in steps of 0.0000025; NaN: not available
+  float gyro_bias_y_radps = 0;  ///< gyroscope bias along body y; +-0.3276775 rad/s in steps of 0.0000025; NaN: not available
+  float gyro_bias_z_radps = 0;  ///< gyroscope bias along body z; +-0.3276775 rad/s in steps of 0.0000025; NaN: not available
 
   template <class Self, class Visit>
   static constexpr void each(Self& m, Visit&& visit) {
@@ -1225,14 +1225,14 @@ struct EstStateStdVel {
   static constexpr Signal kMux{.start = 0, .length = 4};
   static constexpr std::uint8_t kPage = 3;
   static constexpr Signal kEpoch{.start = 4, .length = 4, .wraps = true};
-  static constexpr Signal kStdVelEast{.start = 8, .length = 16, .has_gap = true, .per_unit = 1000};
-  static constexpr Signal kStdVelNorth{.start = 24, .length = 16, .has_gap = true, .per_unit = 1000};
-  static constexpr Signal kStdVelUp{.start = 40, .length = 16, .has_gap = true, .per_unit = 1000};
+  static constexpr Signal kStdVelEast{.start = 8, .length = 18, .has_gap = true, .per_unit = 10000};
+  static constexpr Signal kStdVelNorth{.start = 26, .length = 18, .has_gap = true, .per_unit = 10000};
+  static constexpr Signal kStdVelUp{.start = 44, .length = 18, .has_gap = true, .per_unit = 10000};
 
   std::uint8_t epoch = 0;  ///< low bits of the epoch, the same in all frames of one epoch
-  float std_vel_east_mps = 0;  ///< 1-sigma of the velocity towards east; 0 to 65.534 m/s in steps of 0.001; NaN: not available
-  float std_vel_north_mps = 0;  ///< 1-sigma of the velocity towards north; 0 to 65.534 m/s in steps of 0.001; NaN: not available
-  float std_vel_up_mps = 0;  ///< 1-sigma of the velocity towards up; 0 to 65.534 m/s in steps of 0.001; NaN: not available
+  float std_vel_east_mps = 0;  ///< 1-sigma of the velocity towards east; 0 to 26.2142 m/s in steps of 0.0001; NaN: not available
+  float std_vel_north_mps = 0;  ///< 1-sigma of the velocity towards north; 0 to 26.2142 m/s in steps of 0.0001; NaN: not available
+  float std_vel_up_mps = 0;  ///< 1-sigma of the velocity towards up; 0 to 26.2142 m/s in steps of 0.0001; NaN: not available
 
   template <class Self, class Visit>
   static constexpr void each(Self& m, Visit&& visit) {
@@ -1250,12 +1250,12 @@ struct EstStateStdTilt {
   static constexpr Signal kMux{.start = 0, .length = 4};
   static constexpr std::uint8_t kPage = 4;
   static constexpr Signal kEpoch{.start = 4, .length = 4, .wraps = true};
-  static constexpr Signal kStdTiltEast{.start = 8, .length = 16, .has_gap = true, .per_unit = 50000};
-  static constexpr Signal kStdTiltNorth{.start = 24, .length = 16, .has_gap = true, .per_unit = 50000};
+  static constexpr Signal kStdTiltEast{.start = 8, .length = 20, .has_gap = true, .per_unit = 500000};
+  static constexpr Signal kStdTiltNorth{.start = 28, .length = 20, .has_gap = true, .per_unit = 500000};
 
   std::uint8_t epoch = 0;  ///< low bits of the epoch, the same in all frames of one epoch
-  float std_tilt_east_rad = 0;  ///< 1-sigma of the turn about the axis that points east; 0 to 1.31068 rad in steps of 0.00002; NaN: not available
-  float std_tilt_north_rad = 0;  ///< 1-sigma of the turn about the axis that points north; 0 to 1.31068 rad in steps of 0.00002; NaN: not available
+  float std_tilt_east_rad = 0;  ///< 1-sigma of the turn about the axis that points east; 0 to 2.097148 rad in steps of 0.000002; NaN: not available
+  float std_tilt_north_rad = 0;  ///< 1-sigma of the turn about the axis that points north; 0 to 2.097148 rad in steps of 0.000002; NaN: not available
 
   template <class Self, class Visit>
   static constexpr void each(Self& m, Visit&& visit) {
@@ -1272,14 +1272,14 @@ struct EstStateStdAccBias {
   static constexpr Signal kMux{.start = 0, .length = 4};
   static constexpr std::uint8_t kPage = 5;
   static constexpr Signal kEpoch{.start = 4, .length = 4, .wraps = true};
-  static constexpr Signal kStdAccBiasX{.start = 8, .length = 16, .has_gap = true, .per_unit = 10000};
-  static constexpr Signal kStdAccBiasY{.start = 24, .length = 16, .has_gap = true, .per_unit = 10000};
-  static constexpr Signal kStdAccBiasZ{.start = 40, .length = 16, .has_gap = true, .per_unit = 10000};
+  static constexpr Signal kStdAccBiasX{.start = 8, .length = 18, .has_gap = true, .per_unit = 100000};
+  static constexpr Signal kStdAccBiasY{.start = 26, .length = 18, .has_gap = true, .per_unit = 100000};
+  static constexpr Signal kStdAccBiasZ{.start = 44, .length = 18, .has_gap = true, .per_unit = 100000};
 
   std::uint8_t epoch = 0;  ///< low bits of the epoch, the same in all frames of one epoch
-  float std_acc_bias_x_mps2 = 0;  ///< 1-sigma of the accelerometer bias along body x; 0 to 6.5534 m/s2 in steps of 0.0001; NaN: not available
-  float std_acc_bias_y_mps2 = 0;  ///< 1-sigma of the accelerometer bias along body y; 0 to 6.5534 m/s2 in steps of 0.0001; NaN: not available
-  float std_acc_bias_z_mps2 = 0;  ///< 1-sigma of the accelerometer bias along body z; 0 to 6.5534 m/s2 in steps of 0.0001; NaN: not available
+  float std_acc_bias_x_mps2 = 0;  ///< 1-sigma of the accelerometer bias along body x; 0 to 2.62142 m/s2 in steps of 0.00001; NaN: not available
+  float std_acc_bias_y_mps2 = 0;  ///< 1-sigma of the accelerometer bias along body y; 0 to 2.62142 m/s2 in steps of 0.00001; NaN: not available
+  float std_acc_bias_z_mps2 = 0;  ///< 1-sigma of the accelerometer bias along body z; 0 to 2.62142 m/s2 in steps of 0.00001; NaN: not available
 
   template <class Self, class Visit>
   static constexpr void each(Self& m, Visit&& visit) {

@@ -44,6 +44,8 @@ struct ImuHealth {
 struct InertialEstimate {
   nav::InsState state;
   const filter::Symmetric<float, nav::InsState::kErrors>& p;  ///< the estimator's own: as long as nothing changes it
+  float velocity_m2ps2 = 0;  ///< variance per axis that the IMU's noise adds to p from its time to the present,
+  float tilt_rad2 = 0;       ///< and to the attitude's
   bool valid = false;
   Jump jump;
   ImuHealth imu;

@@ -114,7 +114,7 @@ class History {
   void leave_until(base::Micros t, Past past, const Context& with, Note& note);
   template <class Note>
   void leave(const Sample& sample, Past past, const Context& with, Note& note);
-  [[nodiscard]] bool rests(const Sample& sample, const Context& with) const;
+  [[nodiscard]] bool rests(const Sample& sample, const Context& with);
   template <class Lane>
   [[nodiscard]] bool came_late(std::size_t due) const;
 
@@ -163,9 +163,9 @@ void History<Estimators, Capacity>::leave(const Sample& sample, Past past, const
 }
 
 template <class Estimators, std::size_t Capacity>
-bool History<Estimators, Capacity>::rests(const Sample& sample, const Context& with) const {
+bool History<Estimators, Capacity>::rests(const Sample& sample, const Context& with) {
   bool rests = false;
-  each_lane([&](const auto& lane) { rests = rests || lane.rests(sample, with); });
+  each_lane([&](auto& lane) { rests = lane.rests(sample, with) || rests; });
   return rests;
 }
 

@@ -92,8 +92,8 @@ class Lane {
     if constexpr (requires { now_.arrived(sample, with); }) now_.arrived(sample, with);
   }
   /// A delayed estimator has done enough in this tick: the sample, true long enough ago, waits for the next.
-  [[nodiscard]] bool rests(const Sample& sample, const Context& with) const {
-    if constexpr (requires { now_.rests(sample, with); }) return now_.rests(sample, with);
+  [[nodiscard]] bool rests(const Sample& sample, const Context& with) {
+    if constexpr (requires { now_.rests(sample, with); }) return takes(sample) && now_.rests(sample, with);
     return false;
   }
 

@@ -105,7 +105,7 @@ struct InertialNumbers {
   float lateral_mps = 0.05F;    ///< how well it does not move sideways
   float vertical_mps = 0.05F;
   float axle_x_b_m = 0;                   ///< the axle that does not steer
-  std::int32_t counts_every_us = 15'000;  ///< counts are compared no more often: at 100 Hz every second one
+  std::int32_t wheels_every_us = 15'000;  ///< wheels are fused no more often: at 100 Hz every second sample
   float wheel_gate_scale = 1;
   float slip_mps = 0.15F;  ///< off by more of it and 4 sigma, for long enough, a wheel is spinning; 0: not watched
   /// Without a wheel speed for so long, it does at least not move sideways or up, said this often; 0: it may.
@@ -225,7 +225,7 @@ constexpr void each_number(const Numbers& n, Sink&& sink) {
   all(i.imu, i.gyro_radps_rthz, i.accel_mps2_rthz, i.gyro_bias_radps2_rthz, i.accel_bias_mps3_rthz,
       i.gyro_turn_on_radps, i.accel_turn_on_mps2, i.start_tilt_rad, i.level_s, i.starts_forward, i.gap_mps2,
       i.gap_radps, i.still_radps, i.still_mps, i.wheel_mps, i.slip_share, i.lateral_mps, i.vertical_mps, i.axle_x_b_m,
-      i.wheel_gate_scale, i.counts_every_us, i.constrain_every_us, i.gap_wheels_radps, i.stuck_samples, i.stale_us,
+      i.wheel_gate_scale, i.wheels_every_us, i.constrain_every_us, i.gap_wheels_radps, i.stuck_samples, i.stale_us,
       i.vibration_mps2, i.vibration_radps, i.calm_mps2, i.calm_radps, i.still_gnss_mps, i.slip_mps);
   const auto& m = n.magnetic;
   for (const float v : m.hard_iron_uT) sink(v);

@@ -86,8 +86,8 @@ consteval Numbers checked(const Numbers& n) {
 
   require(n.inertial.constrain_every_us >= 0, "inertial.constrain_every_us: not below 0");
   const auto& i = n.inertial;
-  require(i.counts_every_us >= 0 && i.counts_every_us <= n.wheels.timeout_us,
-          "inertial.counts_every_us: 0 to wheels.timeout_us");
+  require(i.wheels_every_us >= 0 && 2 * std::int64_t{i.wheels_every_us} <= n.wheels.timeout_us,
+          "inertial.wheels_every_us: 0 to half of wheels.timeout_us");
   require(i.stuck_samples >= 0 && i.stuck_samples <= 255, "inertial.stuck_samples: 0 to 255");
   require(i.stale_us > 0 && i.stale_us <= 10'000'000, "inertial.stale_us: 1 to 10000000");
   require(positive(i.vibration_mps2) && positive(i.vibration_radps), "inertial.vibration_*: above 0");

@@ -52,7 +52,7 @@ void put_diagnostics(std::uint32_t page, const Counters& c, const LoopHealth& l,
 template <class Put>
 void put_state_page(std::uint32_t page, const InertialEstimate& e, std::uint8_t tag, Put&& put) {
   const nav::InsState& x = e.state;
-  const auto std = [&e](int i) { return base::sqrt(e.p(i, i)); };
+  const auto std = [&e](int i, float more = 0.0F) { return base::sqrt(e.p(i, i) + more); };
   switch (page % 9) {
     case 0:
       put(can::EstStateHeight{.epoch = tag, .height_m = base::metres(x.z.um()), .std_height_m = std(2)});
@@ -70,11 +70,14 @@ void put_state_page(std::uint32_t page, const InertialEstimate& e, std::uint8_t 
                                 .gyro_bias_z_radps = x.b_g_radps(2)});
       break;
     case 3:
-      put(can::EstStateStdVel{
-          .epoch = tag, .std_vel_east_mps = std(3), .std_vel_north_mps = std(4), .std_vel_up_mps = std(5)});
+      put(can::EstStateStdVel{.epoch = tag,
+                              .std_vel_east_mps = std(3, e.velocity_m2ps2),
+                              .std_vel_north_mps = std(4, e.velocity_m2ps2),
+                              .std_vel_up_mps = std(5, e.velocity_m2ps2)});
       break;
     case 4:
-      put(can::EstStateStdTilt{.epoch = tag, .std_tilt_east_rad = std(6), .std_tilt_north_rad = std(7)});
+      put(can::EstStateStdTilt{
+          .epoch = tag, .std_tilt_east_rad = std(6, e.tilt_rad2), .std_tilt_north_rad = std(7, e.tilt_rad2)});
       break;
     case 5:
       put(can::EstStateStdAccBias{

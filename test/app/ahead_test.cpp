@@ -150,6 +150,38 @@ TEST(Ahead, ItsCellsAreNoMoreThanACache) {
   }
 }
 
+/// The same worlds, against every sample looked at by itself: what was reached, and by which sample, is exactly the
+/// same; the sums differ by rounding and by what second order leaves of a wild turn.
+TEST(Ahead, ItsCellsSayWhatTheirSamplesSay) {
+  const InertialNumbers n;
+  const nav::Earth earth;
+  int told = 0;
+  for (unsigned seed = 1; seed <= 20; ++seed) {
+    Feed feed(seed, true);
+    for (int i = 0; i < 200; ++i) {
+      feed.tick();
+      const bool turn_known = !feed.one_in(4);
+      Ahead cells, each;
+      cells.carry_from(feed.far, feed.window, with(n, earth, turn_known));
+      each.carry_from(feed.far, std::vector<Sample>{}, with(n, earth, turn_known));
+      each.carry_on(feed.window, with(n, earth, turn_known));
+      ASSERT_EQ(cells.place().reached, each.place().reached) << seed << ' ' << i;
+      ASSERT_EQ(cells.place().last, each.place().last);
+      ASSERT_EQ(cells.heard(), each.heard());
+      ASSERT_EQ(cells.place().rate_b_radps, each.place().rate_b_radps);
+      const auto bits = [](const Repeats& r) {
+        std::vector<std::uint32_t> all;
+        r.each_bit([&](auto v) { all.push_back(std::bit_cast<std::uint32_t>(v)); });
+        return all;
+      };
+      ASSERT_EQ(bits(cells.place().repeats), bits(each.place().repeats));
+      ASSERT_LT(cells.place().x.minus(each.place().x).norm(), 0.05F);
+      if (cells.place().reached.us > feed.far.reached.us) ++told;
+    }
+  }
+  EXPECT_GT(told, 3000);
+}
+
 /// Over cells, or on from tick to tick: where every sample by itself leads.
 TEST(Ahead, LeadsWhereSampleBySampleStrapdownLeads) {
   const InertialNumbers n;
@@ -223,13 +255,30 @@ class Ticks {
       lane.set_pose({us_}, {.pose = {}, .sigma_position_m = 0.1F, .sigma_yaw_rad = 0.01F}, context());
     });
   }
+  bool imu = true, speeds = false, stuck = false;
+  std::int64_t unused_us = 0;  ///< a magnetometer that is not used
   /// Measurements taken in the tick.
   int tick(std::int64_t imu_us, std::int64_t wheels_us, std::int64_t gnss_us) {
     const std::int64_t end = us_ + kTick_us;
     for (us_ += 1'000; us_ <= end; us_ += 1'000) {
       const float t_s = 1e-6F * static_cast<float>(us_ - kBegin_us);
-      if (us_ % imu_us == 0) insert(imu_sample(us_, {shake(), shake(), shake()}, {shake(), shake(), 9.806F}, imu_us));
-      if (us_ % wheels_us == 0) {
+      if (imu && us_ % imu_us == 0) {
+        if (!stuck) last_ = imu_sample(us_, {shake(), shake(), shake()}, {shake(), shake(), 9.806F}, imu_us);
+        insert(last_);
+      }
+      if (unused_us > 0 && us_ % unused_us == 0) {
+        Sample s;
+        s.sensor = can::Sensor::kMagnetometer;
+        s.payload.magnetic = {.flux_b_uT = {20, 0, -40}};
+        insert(s);
+      }
+      if (speeds && us_ % wheels_us == 0) {
+        Sample s;
+        s.sensor = can::Sensor::kWheelSpeed;
+        s.payload.wheel_speeds = {.left_mps = 1, .right_mps = 1};
+        insert(s);
+      }
+      if (!speeds && us_ % wheels_us == 0) {
         Sample s;
         s.sensor = can::Sensor::kWheelCounts;
         const auto count = static_cast<std::uint16_t>(std::lround(t_s / (6.2831853F * 0.1F) * 2000.0F));
@@ -255,6 +304,7 @@ class Ticks {
     history_.retire_until({us_ - kWindow_us}, context(), note);
     return taken;
   }
+  [[nodiscard]] Estimate now() const { return history_.primary().estimate(context()); }
   std::int64_t late_us = 0;  ///< of what left, behind the end of the window, at most
   std::map<can::Sensor, int> fused;
 
@@ -265,6 +315,7 @@ class Ticks {
     s.sequence = static_cast<std::uint8_t>(us_ / 1000);
     static_cast<void>(history_.insert(s, context(), [](std::size_t, const Sample&, const Innovation&) {}));
   }
+  Sample last_;
   float shake() { return 0.01F * std::normal_distribution<float>()(random_); }
   [[nodiscard]] Context context() const { return {n_, site_}; }
 
@@ -299,7 +350,7 @@ TEST(InertialWork, ATickTakesOneMeasurement) {
 /// More than a tick takes: two then, and it stays within what is allowed.
 TEST(InertialWork, WhatIsFarBehindIsCaughtUpWith) {
   Numbers n = rover_like();
-  n.inertial.counts_every_us = 0;
+  n.inertial.wheels_every_us = 0;
   Ticks ticks(n);
   for (int i = 0; i < 200; ++i) ticks.tick(2'000, 10'000, 50'000);
   ticks.fused.clear();
@@ -308,6 +359,43 @@ TEST(InertialWork, WhatIsFarBehindIsCaughtUpWith) {
   EXPECT_NEAR(ticks.fused[can::Sensor::kWheelCounts], 1000, 8);
   EXPECT_NEAR(ticks.fused[can::Sensor::kGnssVelocity], 200, 3);
   EXPECT_LT(ticks.late_us, 110'000);
+}
+
+TEST(InertialWork, SpeedsAtAHighRateAreThinnedNotQueued) {
+  Ticks ticks(rover_like());
+  ticks.speeds = true;
+  for (int i = 0; i < 200; ++i) ticks.tick(5'000, 5'000, 100'000);
+  ticks.late_us = 0;
+  for (int i = 0; i < 1000; ++i) ticks.tick(5'000, 5'000, 100'000);
+  EXPECT_LT(ticks.late_us, 70'000);
+}
+
+TEST(InertialWork, WhatIsNotUsedCostsNothing) {
+  Ticks ticks(rover_like());
+  ticks.unused_us = 10'000;
+  for (int i = 0; i < 200; ++i) ticks.tick(5'000, 20'000, 200'000);
+  ticks.late_us = 0;
+  for (int i = 0; i < 1000; ++i) ticks.tick(5'000, 20'000, 200'000);
+  EXPECT_LT(ticks.late_us, 40'000);
+}
+
+/// Without an IMU, or with one that repeats itself, and with measurements waiting: it goes on without, and is no less
+/// sure than wheels and GNSS make it.
+TEST(InertialWork, AnImuThatDiesIsGoneOnWithout) {
+  for (const bool stuck : {false, true}) {
+    Numbers n = rover_like();
+    n.inertial.wheels_every_us = 0;
+    Ticks ticks(n);
+    ticks.speeds = true;
+    for (int i = 0; i < 300; ++i) ticks.tick(5'000, 10'000, 50'000);
+    ticks.stuck = stuck;
+    ticks.imu = stuck;
+    for (int i = 0; i < 600; ++i) ticks.tick(5'000, 10'000, 50'000);
+    const Estimate e = ticks.now();
+    EXPECT_NEAR(e.pose.x.minus({}), 8.0F, 0.1F) << stuck;  // the first of nine seconds it levels
+    EXPECT_NEAR(e.forward_mps, 1.0F, 0.05F) << stuck;
+    EXPECT_LT(e.p(0, 0), 1.0F) << stuck;
+  }
 }
 
 }  // namespace

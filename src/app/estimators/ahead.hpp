@@ -111,10 +111,10 @@ inline void Ahead::hear(const Sample& sample, const With& with, const ImuSample*
   const InertialNumbers& n = with.numbers;
   const ImuSample& imu = sample.payload.imu;
   heard_ = sample.stamp;
-  if (place_.repeats.hear(imu, n.stuck_samples)) return;
-  if (imu.clipped_gyro > 0 && with.turn_known) return;
   const nav::ImuIncrement increment = shown_by(imu);
   if (increment.check() != nav::ImuVerdict::kAccepted) return;
+  if (place_.repeats.hear(imu, n.stuck_samples)) return;
+  if (imu.clipped_gyro > 0 && with.turn_known) return;
   const base::Micros gap = sample.stamp - increment.dt - place_.reached;
   if (overlaps(gap, increment.dt)) return;
   if (gap > kImuJitter) {

@@ -111,8 +111,9 @@ class ImuCells {
   bool add(const Sample& sample, const ImuSample& before) {
     const ImuSample& imu = sample.payload.imu;
     const nav::ImuIncrement increment = shown_by(imu);
-    const bool plain =
-        imu.clipped_gyro == 0 && !Repeats::repeats(imu, before) && increment.check() == nav::ImuVerdict::kAccepted;
+    constexpr auto kAccepted = nav::ImuVerdict::kAccepted;
+    const bool plain = imu.clipped_gyro == 0 && increment.check() == kAccepted && !Repeats::repeats(imu, before) &&
+                       shown_by(before).check() == kAccepted;
     const ImuCell* open = size_ > 0 ? &(*this)[size_ - 1] : nullptr;
     if (open == nullptr || grid(open->last()) != grid(sample.stamp) || (open->plain() && open->gather.full())) {
       if (size_ == kMost) return false;

@@ -64,7 +64,7 @@ class Inertial {
   template <class Window>
   void advance(base::Micros t, const Context& with, const Window& window);
   /// Measurements are most of the work, so a tick takes one: what is due waits for the next.
-  [[nodiscard]] bool rests(const Sample& sample, const Context& with) const;
+  [[nodiscard]] bool rests(const Sample& sample, const Context& with);
 
   /// Bits of can::Fault: what is wrong with the IMU and the wheels.
   [[nodiscard]] std::uint16_t faults() const;
@@ -115,7 +115,8 @@ class Inertial {
   }
   void begin(const Context& with);
   void begin_anew(base::Micros t, can::ResetCause cause, const Context& with);
-  [[nodiscard]] bool looks_wrong(const nav::Vector3& v_n_mps, float level_mps, float sigma_mps, base::Micros stamp,
+  [[nodiscard]] nav::Vector3 axle_mps(const nav::Vector3& v_n_mps, const Context& with) const;
+  [[nodiscard]] bool looks_wrong(const nav::Vector3& v_b_mps, float level_mps, float sigma_mps, base::Micros stamp,
                                  const Context& with);
   void stand(base::Micros stamp, const Context& with);
   [[nodiscard]] bool resting(base::Micros stamp, const Context& with) const;
@@ -123,9 +124,15 @@ class Inertial {
   [[nodiscard]] bool turn_known(base::Micros at) const;
   [[nodiscard]] bool wheels_agree(base::Micros at, const Context& with) const;
   [[nodiscard]] bool without_imu() const;
-  /// Counts that come so soon after the last are left to the difference of the next.
-  [[nodiscard]] bool gathers(base::Micros at, const Context& with) const {
-    return have_counts_ && at > counts_time_ && at - counts_time_ < base::Micros{with.numbers.inertial.counts_every_us};
+  /// Wheels that are heard so soon after the last: counts are left to the difference of the next, speeds left out.
+  [[nodiscard]] bool gathers(const Sample& sample, const Context& with) const {
+    const base::Micros every{with.numbers.inertial.wheels_every_us};
+    if (sample.sensor == can::Sensor::kWheelCounts) return have_counts_ && is_soon(sample.stamp, counts_time_, every);
+    return (sample.sensor == can::Sensor::kWheelSpeed || sample.sensor == can::Sensor::kBodySpeed) &&
+           is_soon(sample.stamp, constrained_, every);
+  }
+  [[nodiscard]] static constexpr bool is_soon(base::Micros at, base::Micros last, base::Micros every) {
+    return at > last && at - last < every;
   }
   void bridge(base::Micros gap, const Context& with);
   void doubt(float sigma_mps, float sigma_rad);
@@ -160,7 +167,7 @@ class Inertial {
   void recover(const filter::Vector<float, M>& nu, Source source, const Numbers& n);
 
   /// Work of a tick, in IMU samples: what keeps pace with the IMU, and one measurement; or, after that, all that is
-  /// ahead carried anew. One measurement more where the far end is far behind.
+  /// ahead carried anew. More of them the farther the far end is behind.
   static constexpr std::int32_t kMeasurement = 5;
 
   nav::Ins ins_;
@@ -168,8 +175,7 @@ class Inertial {
   nav::InsState present_;
   std::int32_t work_left_ = 0;  ///< in this tick
   std::int32_t arrived_ = 0;    ///< IMU samples since the last
-  bool anew_ = false;           ///< this tick carried all that is ahead anew
-  std::uint8_t corrected_ = 0;  ///< ticks since the far end was, and what is ahead of it does not have it; 0: it does
+  base::Micros anew_at_;        ///< when all that is ahead was carried anew last
   InertialStart start_;
   Phase phase_ = Phase::kWaiting;
   base::Micros time_;  ///< of the filter's state
@@ -192,12 +198,16 @@ class Inertial {
   base::Micros bridged_;  ///< up to where the filter last went without IMU
   base::Micros wheels_;   ///< last stamp at which wheels said how it turns,
   float wheel_turn_radps_ = 0;
-  bool blind_ = false;     ///< the present is without IMU
-  bool unusable_ = false;  ///< the last IMU sample was
+  bool blind_ = false;          ///< the present is without IMU
+  bool unusable_ = false;       ///< the last IMU sample was
+  bool anew_ = false;           ///< it was in this tick
+  bool waits_ = false;          ///< something that was due was left for the next tick
+  std::uint8_t corrected_ = 0;  ///< ticks since the far end was, and what is ahead of it does not have it; 0: it does
   ImuWatch imu_;
   SlipWatch slip_;
   std::array<Refused, kSources> refused_{};
-  base::Micros wrong_way_;       ///< since when receiver and wheels say that it looks another way; 0: they do not
+  Refused wrong_way_;            ///< that it looks where it does, by receiver and wheels
+  base::Micros wrong_way_at_;    ///< last of that
   std::uint8_t recoveries_ = 0;  ///< of the velocity, since a fix was accepted
   FirstFixes first_fixes_;
   FrozenFix frozen_;

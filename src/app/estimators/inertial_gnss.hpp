@@ -202,17 +202,21 @@ inline constexpr float kDecides = 4.0F;
 
 /// Receiver and wheels have agreed for long on a speed, but not on where it goes: nothing drives half a radian
 /// sideways, so the filter looks another way than it believes.
-[[gnu::noinline]] inline bool Inertial::looks_wrong(const nav::Vector3& v_n_mps, float level_mps, float sigma_mps,
+[[gnu::noinline]] inline bool Inertial::looks_wrong(const nav::Vector3& v_b_mps, float level_mps, float sigma_mps,
                                                     base::Micros stamp, const Context& with) {
   constexpr float kCosine = 0.88F;
+  constexpr base::Micros kLately{2'500'000};
   const float rolled = slip_.mean_mps(stamp);
-  const float ahead = ins_.x.q_nb.conjugate().rotate(v_n_mps)(0) * (rolled < 0.0F ? -1.0F : 1.0F);
+  const float ahead = rolled < 0.0F ? -v_b_mps(0) : v_b_mps(0);
   const bool wrong = level_mps > 4.0F * sigma_mps + 0.3F &&
                      base::abs(level_mps - base::abs(rolled)) < 3.0F * sigma_mps + 0.05F * level_mps &&
                      ahead < kCosine * level_mps - sigma_mps;
-  if (!wrong) wrong_way_ = {};
-  if (wrong && wrong_way_.us == 0) wrong_way_ = stamp;
-  return wrong && stamp - wrong_way_ >= base::Micros{with.numbers.recovery.after_us};
+  if (!wrong || stamp - wrong_way_at_ > kLately) wrong_way_ = {};
+  if (!wrong) return false;
+  if (wrong_way_.in_a_row++ == 0) wrong_way_.since = stamp;
+  wrong_way_at_ = stamp;
+  const RecoveryNumbers& rules = with.numbers.recovery;
+  return wrong_way_.in_a_row >= rules.at_least && stamp - wrong_way_.since >= base::Micros{rules.after_us};
 }
 
 inline Innovation Inertial::fuse(const GnssVelocity& velocity, base::Micros stamp, const Context& with) {
@@ -229,10 +233,11 @@ inline Innovation Inertial::fuse(const GnssVelocity& velocity, base::Micros stam
   hear_ground(v_n, sigma, stamp, with);
   // A receiver and a filter that say another direction: either may be wrong, and the filter gives way after a while.
   // Another speed than that which wheels agree with: the receiver is.
-  const float level = base::sqrt(v_n(0) * v_n(0) + v_n(1) * v_n(1)), rolled = base::abs(forward_mps());
+  const nav::Vector3 v_b = axle_mps(v_n, with);
+  const float level = base::sqrt(v_b(0) * v_b(0) + v_b(1) * v_b(1)), rolled = base::abs(forward_mps());
   if (wheels_agree(stamp, with) && base::abs(level - rolled) > 4.0F * sigma + 0.2F * rolled + 0.5F)
     refused_[kVelocity].since = stamp;
-  if (looks_wrong(v_n, level, sigma, stamp, with)) {
+  if (looks_wrong(v_b, level, sigma, stamp, with)) {
     begin_anew(stamp, can::ResetCause::kHeadingWrong, with);
     return {.verdict = can::Verdict::kRejected};
   }

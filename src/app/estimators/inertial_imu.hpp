@@ -15,7 +15,9 @@ inline Innovation Inertial::fuse(const ImuSample& sample, base::Micros stamp, co
   if (increment.check() != nav::ImuVerdict::kAccepted) return {.verdict = can::Verdict::kNotFinite};
   const float dt_s = base::seconds(increment.dt);
   const bool was_stuck = imu_.stuck();
+  if (sample.clipped_gyro > 0) corrected();  // whether it is used may have been seen otherwise ahead
   if (!imu_.hear(sample, stamp, n)) {
+    if (!was_stuck) corrected();
     // Those before it were taken for what they said.
     const float false_s = static_cast<float>(n.stuck_samples) * dt_s;
     if (!was_stuck && phase_ == Phase::kTracking) doubt(n.gap_mps2 * false_s, n.gap_radps * false_s);
@@ -38,7 +40,10 @@ inline Innovation Inertial::fuse(const ImuSample& sample, base::Micros stamp, co
   // does not tell again.
   const base::Micros gap = stamp - increment.dt - time_;
   unusable_ = false;
-  if (overlaps(gap, increment.dt)) return {.verdict = can::Verdict::kStale};
+  if (overlaps(gap, increment.dt)) {
+    corrected();
+    return {.verdict = can::Verdict::kStale};
+  }
   if (gap > kImuJitter) {
     const nav::Vector3 shown = rate_b_radps_;
     const base::Micros before = bridged_;

@@ -7,8 +7,12 @@
 namespace tetap::app {
 
 inline InertialEstimate Inertial::inertial(const Context&) const {
+  const float ahead_s = phase_ == Phase::kTracking ? base::seconds(now_ - time_) : 0.0F;
+  const float accel = ins_.vibration * ins_.noise.accel_mps2_rthz, gyro = ins_.vibration * ins_.noise.gyro_radps_rthz;
   return {.state = phase_ == Phase::kTracking ? present_ : ins_.x,
           .p = ins_.p,
+          .velocity_m2ps2 = accel * accel * ahead_s,
+          .tilt_rad2 = gyro * gyro * ahead_s,
           .valid = phase_ == Phase::kTracking,
           .jump = jump_,
           .imu = imu_.health()};
@@ -17,15 +21,16 @@ inline InertialEstimate Inertial::inertial(const Context&) const {
 inline Estimate Inertial::estimate(const Context& with) const {
   const InertialEstimate full = inertial(with);
   const nav::InsState& x = full.state;
+  const bool tracking = phase_ == Phase::kTracking;
   const nav::Vector3 v_b = x.q_nb.conjugate().rotate(x.v_n_mps);
-  const nav::Vector3 w_n = x.q_nb.rotate(ahead_.place().rate_b_radps - x.b_g_radps);
+  const nav::Vector3 w_n = x.q_nb.rotate((tracking ? ahead_.place().rate_b_radps : rate_b_radps_) - x.b_g_radps);
   constexpr std::array<int, 3> kPlanar{0, 1, 8};
   filter::Symmetric<float, 3> p;
   for (int c = 0; c < 3; ++c)
     for (int r = 0; r <= c; ++r)
       p(r, c) = full.p(kPlanar[static_cast<std::size_t>(r)], kPlanar[static_cast<std::size_t>(c)]);
   // Position is uncertain at the present by what the velocity was at the far end, too.
-  const float ahead_s = base::seconds(now_ - time_);
+  const float ahead_s = tracking ? base::seconds(now_ - time_) : 0.0F;
   p(0, 0) += ahead_s * (2.0F * full.p(0, 3) + ahead_s * full.p(3, 3));
   p(1, 1) += ahead_s * (2.0F * full.p(1, 4) + ahead_s * full.p(4, 4));
   p(0, 1) += ahead_s * (full.p(0, 4) + full.p(1, 3) + ahead_s * full.p(3, 4));
@@ -61,14 +66,18 @@ void Inertial::each_bit(Sink&& sink) const {
   sink(last_position_.us);
   sink(moved_.us);
   sink(still_s_);
-  for (const base::Micros at : {ground_, calm_, bridged_, wheels_, counts_time_, constrained_, stood_, wrong_way_})
+  for (const base::Micros at : {ground_, calm_, bridged_, wheels_, counts_time_, constrained_, stood_, wrong_way_.since,
+                                wrong_way_at_, anew_at_})
     sink(at.us);
   for (int i = 0; i < 3; ++i) {
     sink(ground_mps_(i));
     sink(rate_b_radps_(i));
   }
   sink(static_cast<std::uint32_t>(counts_.left | counts_.right << 16U));
-  sink(static_cast<std::uint32_t>((have_counts_ ? 1U : 0U) | (unusable_ ? 2U : 0U) | unsigned{corrected_} << 8U));
+  const unsigned flags = (have_counts_ ? 1U : 0U) | (unusable_ ? 2U : 0U) | (anew_ ? 4U : 0U) | (waits_ ? 8U : 0U);
+  sink(static_cast<std::uint32_t>(flags | unsigned{corrected_} << 8U));
+  sink(work_left_);
+  sink(wrong_way_.in_a_row);
   sink(grounds_);
   sink(wheel_turn_radps_);
   sink(gained_mps_);

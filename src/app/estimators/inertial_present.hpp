@@ -7,15 +7,19 @@
 
 namespace tetap::app {
 
-/// In IMU samples.
+/// In IMU samples: what is switched off or only gathered costs nothing.
 inline std::int32_t Inertial::work_of(const Sample& sample, const Context& with) const {
-  if (sample.sensor == can::Sensor::kImu) return 1;
-  return sample.sensor == can::Sensor::kWheelCounts && gathers(sample.stamp, with) ? 0 : kMeasurement;
+  const bool off = (sample.sensor == can::Sensor::kMagnetometer && with.numbers.magnetic.use == 0) ||
+                   (sample.sensor == can::Sensor::kBarometer && with.numbers.baro.use == 0);
+  if (off || gathers(sample, with)) return 0;
+  return sample.sensor == can::Sensor::kImu ? 1 : kMeasurement;
 }
 
 /// Whether the sample asks for more than this tick has left.
-inline bool Inertial::rests(const Sample& sample, const Context& with) const {
-  return phase_ == Phase::kTracking && work_left_ < work_of(sample, with);
+inline bool Inertial::rests(const Sample& sample, const Context& with) {
+  if (phase_ != Phase::kTracking || work_left_ >= work_of(sample, with)) return false;
+  waits_ = true;
+  return true;
 }
 
 template <class Window>
@@ -23,38 +27,45 @@ void Inertial::advance(base::Micros t, const Context& with, const Window& window
   const InertialNumbers& n = with.numbers.inertial;
   now_ = t;
   const base::Micros due = t - base::Micros{with.numbers.loop.window_us};
-  work_left_ = arrived_ + 1;
+  work_left_ = arrived_;
   arrived_ = 0;
   if (phase_ != Phase::kTracking) return ahead_.watch(window, n);
   // Where nothing comes any more that the filter could still fuse: up to there it goes without.
-  const base::Micros far = due - base::Micros{with.numbers.loop.period_us};
-  const bool all = window.size() == 0 || window[0].stamp > far;
-  if (all && far > time_ && (imu_.stuck() || unusable_ || imu_.stale(far, n))) {
+  base::Micros far = due - base::Micros{with.numbers.loop.period_us};
+  if (window.size() > 0) {
+    const Sample& next = window[0];
+    const base::Micros begin = next.stamp - base::Micros{is_of(next, n) ? next.payload.imu.interval_us : 0};
+    if (begin < far) far = begin;
+  }
+  if (far > time_ && (imu_.stuck() || unusable_ || imu_.stale(far, n))) {
     bridge(far - time_, with);
     stand(time_, with);
   }
   const Ahead::With how{
       .numbers = n, .earth = ins_.earth, .turn_known = turn_known(time_), .wheel_turn_radps = wheel_turn_radps_};
+  // Intervals need not add up to the stamps, so even what nothing corrects is not carried on for ever.
+  constexpr base::Micros kLongest{500'000};
+  if (t - anew_at_ >= kLongest) corrected();
   constexpr std::uint8_t kPatience = 3;
-  bool waiting = false;
-  for (std::size_t i = 0; corrected_ > 0 && i < window.size(); ++i) {
-    const Sample& sample = window[i];
-    if (sample.stamp > due) break;
-    waiting = waiting || work_of(sample, with) >= kMeasurement;
-  }
-  anew_ = corrected_ > kPatience || (corrected_ > 0 && !waiting);
+  anew_ = corrected_ > kPatience || (corrected_ > 0 && !waits_);
+  waits_ = false;
   if (anew_) {
     corrected_ = 0;
+    anew_at_ = t;
     ahead_.carry_from(
         {.x = ins_.x, .reached = time_, .last = imu_.heard(), .repeats = imu_.repeats(), .rate_b_radps = rate_b_radps_},
         window, how);
   } else {
     if (corrected_ > 0) ++corrected_;
-    work_left_ += kMeasurement;
+    work_left_ += kMeasurement + 1;
     ahead_.carry_on(window, how);
   }
-  constexpr base::Micros kMostBehind{60'000};
-  if (window.size() > 0 && due - window[0].stamp > kMostBehind) work_left_ += kMeasurement;
+  // The farther behind, the more.
+  constexpr base::Micros kBehind{60'000};
+  if (window.size() > 0 && due - window[0].stamp > kBehind) {
+    const std::int64_t more = 1 + ((due - window[0].stamp - kBehind).us >> 14);
+    work_left_ += kMeasurement * static_cast<std::int32_t>(more < 20 ? more : 20);
+  }
   present_ = ahead_.at(t, how);
   blind_ = unusable_ || t - ahead_.place().last > base::Micros{n.stale_us};
 }

@@ -12,7 +12,7 @@ namespace tetap::app {
 inline Innovation Inertial::fuse(const WheelCounts& counts, base::Micros stamp, const Context& with) {
   const auto& drive = with.numbers.wheels.drive;
   const base::Micros interval = stamp - counts_time_;
-  if (gathers(stamp, with)) {
+  if (have_counts_ && is_soon(stamp, counts_time_, base::Micros{with.numbers.inertial.wheels_every_us})) {
     if (counts.left != counts_.left || counts.right != counts_.right) moved_ = stamp;
     return {.verdict = can::Verdict::kAccepted};
   }
@@ -38,11 +38,15 @@ inline Innovation Inertial::fuse(const WheelCounts& counts, base::Micros stamp, 
 }
 
 inline Innovation Inertial::fuse(const WheelSpeeds& speeds, base::Micros stamp, const Context& with) {
+  if (is_soon(stamp, constrained_, base::Micros{with.numbers.inertial.wheels_every_us}))
+    return {.verdict = can::Verdict::kAccepted};
   return roll({.left_mps = speeds.left_mps, .right_mps = speeds.right_mps}, 0.0F, 0.0F, stamp, with);
 }
 
 /// No wheels to compare: only its gate judges it.
 inline Innovation Inertial::fuse(const BodySpeed& speed, base::Micros stamp, const Context& with) {
+  if (is_soon(stamp, constrained_, base::Micros{with.numbers.inertial.wheels_every_us}))
+    return {.verdict = can::Verdict::kAccepted};
   return forward({.mps = with.numbers.wheels.speed_scale * speed.forward_mps}, stamp, with);
 }
 
@@ -89,6 +93,14 @@ inline Innovation Inertial::roll(const SlipWatch::Wheels& wheels, float sigma_mp
                  with);
 }
 
+/// What the receiver says of the middle of the axle, in the body.
+inline nav::Vector3 Inertial::axle_mps(const nav::Vector3& v_n_mps, const Context& with) const {
+  const GnssNumbers& n = with.numbers.gnss;
+  const nav::Vector3 antenna_b{n.antenna_x_b_m - with.numbers.inertial.axle_x_b_m, n.antenna_y_b_m, n.antenna_z_b_m};
+  const nav::Vector3 w_b = rate_b_radps_ - ins_.x.b_g_radps;
+  return ins_.x.q_nb.conjugate().rotate(v_n_mps) - nav::cross(w_b, antenna_b);
+}
+
 /// GNSS velocity: what the wheels, and standing still, are held against.
 [[gnu::noinline]] inline void Inertial::hear_ground(const nav::Vector3& v_n_mps, float sigma_mps, base::Micros stamp,
                                                     const Context& with) {
@@ -102,10 +114,7 @@ inline Innovation Inertial::roll(const SlipWatch::Wheels& wheels, float sigma_mp
   constexpr float kUnseen_mps = 3;
   const float off2 = nav::Vector3(v_n_mps - ins_.x.v_n_mps).squaredNorm();
   if (off2 > kUnseen_mps * kUnseen_mps && wheels_agree(stamp, with)) return;
-  const nav::Vector3 antenna_b{with.numbers.gnss.antenna_x_b_m - with.numbers.inertial.axle_x_b_m,
-                               with.numbers.gnss.antenna_y_b_m, with.numbers.gnss.antenna_z_b_m};
-  const nav::Vector3 w_b = rate_b_radps_ - ins_.x.b_g_radps;
-  const nav::Vector3 v_b = ins_.x.q_nb.conjugate().rotate(v_n_mps) - nav::cross(w_b, antenna_b);
+  const nav::Vector3 v_b = axle_mps(v_n_mps, with);
   // A heading that is not known turns speed ahead into speed sideways: its doubt counts here.
   const float v2 = v_n_mps(0) * v_n_mps(0) + v_n_mps(1) * v_n_mps(1);
   const float yaw2 = ins_.p(8, 8) < 1.0F ? ins_.p(8, 8) : 1.0F;
