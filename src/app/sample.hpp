@@ -44,6 +44,10 @@ struct Sample {
   }
 };
 
+[[nodiscard]] constexpr bool is_imu(const Sample& sample, std::int32_t instance) {
+  return sample.sensor == can::Sensor::kImu && sample.instance == instance;
+}
+
 /// Calls f with the payload that is there; false when there is none.
 template <class F>
 constexpr bool visit(const Sample& sample, F&& f) {

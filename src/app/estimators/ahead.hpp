@@ -4,19 +4,17 @@
 #pragma once
 
 #include "app/estimators/imu_cells.hpp"
+#include "app/magnetic_field.hpp"
 #include "nav/strapdown.hpp"
 
 #include <cstdint>
+#include <limits>
 
 namespace tetap::app {
 
-inline nav::Vector3 mounted(const nav::Vector3& s, const InertialNumbers& n) {
-  const auto& m = n.mounting_bs;
-  return {m[0] * s(0) + m[1] * s(1) + m[2] * s(2), m[3] * s(0) + m[4] * s(1) + m[5] * s(2),
-          m[6] * s(0) + m[7] * s(1) + m[8] * s(2)};
-}
 inline nav::ImuIncrement mounted(const nav::ImuIncrement& s, const InertialNumbers& n) {
-  return {.dtheta_b_rad = mounted(s.dtheta_b_rad, n), .dv_b_mps = mounted(s.dv_b_mps, n), .dt = s.dt};
+  return {
+      .dtheta_b_rad = times(n.mounting_bs, s.dtheta_b_rad), .dv_b_mps = times(n.mounting_bs, s.dv_b_mps), .dt = s.dt};
 }
 
 class Ahead {
@@ -81,7 +79,7 @@ class Ahead {
   }
   void hear(const Sample& sample, const With& with, const ImuSample*& newest);
   [[nodiscard]] static nav::Vector3 rate_of(const ImuSample& s, const InertialNumbers& n) {
-    return mounted(shown_by(s).dtheta_b_rad, n) / base::seconds(base::Micros{s.interval_us});
+    return times(n.mounting_bs, shown_by(s).dtheta_b_rad) / base::seconds(base::Micros{s.interval_us});
   }
 
   Place place_;
@@ -160,10 +158,10 @@ void Ahead::carry_from(const Place& far, const Window& window, const With& with)
   // looked at by itself; then what there was no cell for.
   hear_until(cells_.leaving_until());
   bool skipped = false;
-  const auto look_back = [&](base::Micros until) {
+  const auto look_back = [&]() {
     if (!skipped) return;
     skipped = false;
-    while (i < window.size() && window[i].stamp <= until) ++i;
+    while (i < window.size() && window[i].stamp <= place_.last) ++i;
     std::size_t at = i;
     while (!is_of(window[at - 1], n)) --at;
     newest = &window[at - 1].payload.imu;
@@ -178,12 +176,12 @@ void Ahead::carry_from(const Place& far, const Window& window, const With& with)
       place_.last = heard_ = cell.last();
       skipped = true;
     } else {
-      look_back(place_.last);
+      look_back();
       hear_until(cell.last());
     }
   }
   fold(with);
-  look_back(place_.last);
+  look_back();
   hear_until({std::numeric_limits<std::int64_t>::max()});
   fold(with);
   if (newest != nullptr) place_.rate_b_radps = rate_of(*newest, n);

@@ -121,7 +121,7 @@ void Attitude::advance(base::Micros t, const Context& with, const Window& window
   const ImuSample* last = nullptr;
   for (std::size_t i = 0; i < window.size(); ++i) {
     const Sample& sample = window[i];
-    if (sample.sensor != can::Sensor::kImu || sample.instance != with.numbers.inertial.imu) continue;
+    if (!is_imu(sample, with.numbers.inertial.imu)) continue;
     const ImuSample& imu = sample.payload.imu;
     const float half_s = 0.5F * base::seconds(base::Micros{imu.interval_us});
     const filter::Vector3 h{0.5F * imu.dangle_b_rad[0] - half_s * bias_s_radps(0),

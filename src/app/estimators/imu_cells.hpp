@@ -21,9 +21,7 @@ inline nav::ImuIncrement shown_by(const ImuSample& sample) {
   const auto& v = sample.dvelocity_b_mps;
   return {.dtheta_b_rad = {a[0], a[1], a[2]}, .dv_b_mps = {v[0], v[1], v[2]}, .dt = base::Micros{sample.interval_us}};
 }
-constexpr bool is_of(const Sample& sample, const InertialNumbers& n) {
-  return sample.sensor == can::Sensor::kImu && sample.instance == n.imu;
-}
+constexpr bool is_of(const Sample& sample, const InertialNumbers& n) { return is_imu(sample, n.imu); }
 /// From the end of a sample to the begin of the next, longer is a gap: drivers' clocks jitter.
 inline constexpr base::Micros kImuJitter{1'500};
 /// A sample that begins before the last has ended by more than half of itself tells again what was told.

@@ -120,22 +120,23 @@ class Inertial {
                                  const Context& with);
   void stand(base::Micros stamp, const Context& with);
   [[nodiscard]] bool resting(base::Micros stamp, const Context& with) const;
-  void hear_ground(const nav::Vector3& v_n_mps, float sigma_mps, base::Micros stamp, const Context& with);
+  void hear_ground(const nav::Vector3& v_n_mps, const nav::Vector3& v_b_mps, float sigma_mps, base::Micros stamp,
+                   const Context& with);
   [[nodiscard]] bool turn_known(base::Micros at) const;
   [[nodiscard]] bool wheels_agree(base::Micros at, const Context& with) const;
   [[nodiscard]] bool without_imu() const;
   /// Wheels that are heard so soon after the last: counts are left to the difference of the next, speeds left out.
-  [[nodiscard]] bool gathers(const Sample& sample, const Context& with) const {
-    const base::Micros every{with.numbers.inertial.wheels_every_us};
-    if (sample.sensor == can::Sensor::kWheelCounts) return have_counts_ && is_soon(sample.stamp, counts_time_, every);
-    return (sample.sensor == can::Sensor::kWheelSpeed || sample.sensor == can::Sensor::kBodySpeed) &&
-           is_soon(sample.stamp, constrained_, every);
+  [[nodiscard]] bool counts_soon(base::Micros at, const Context& with) const {
+    return have_counts_ && is_soon(at, counts_time_, with);
   }
-  [[nodiscard]] static constexpr bool is_soon(base::Micros at, base::Micros last, base::Micros every) {
-    return at > last && at - last < every;
+  [[nodiscard]] bool speed_soon(base::Micros at, const Context& with) const { return is_soon(at, constrained_, with); }
+  [[nodiscard]] static constexpr bool is_soon(base::Micros at, base::Micros last, const Context& with) {
+    return at > last && at - last < base::Micros{with.numbers.inertial.wheels_every_us};
   }
   void bridge(base::Micros gap, const Context& with);
   void doubt(float sigma_mps, float sigma_rad);
+  /// From the filter's time to the present; 0 while there is no filter.
+  [[nodiscard]] float ahead_s() const { return phase_ == Phase::kTracking ? base::seconds(now_ - time_) : 0.0F; }
   [[nodiscard]] std::int32_t work_of(const Sample& sample, const Context& with) const;
   /// What is to be said every so often can be in this tick, or has waited long enough.
   [[nodiscard]] bool can_do(base::Micros since, base::Micros every) const {
@@ -200,7 +201,7 @@ class Inertial {
   float wheel_turn_radps_ = 0;
   bool blind_ = false;          ///< the present is without IMU
   bool unusable_ = false;       ///< the last IMU sample was
-  bool anew_ = false;           ///< it was in this tick
+  bool anew_ = false;           ///< all that is ahead was carried anew in this tick
   bool waits_ = false;          ///< something that was due was left for the next tick
   std::uint8_t corrected_ = 0;  ///< ticks since the far end was, and what is ahead of it does not have it; 0: it does
   ImuWatch imu_;

@@ -230,10 +230,10 @@ inline Innovation Inertial::fuse(const GnssVelocity& velocity, base::Micros stam
     return {.verdict = can::Verdict::kAccepted};
   }
   if (frozen_.frozen()) return {.verdict = can::Verdict::kStale};
-  hear_ground(v_n, sigma, stamp, with);
+  const nav::Vector3 v_b = axle_mps(v_n, with);
+  hear_ground(v_n, v_b, sigma, stamp, with);
   // A receiver and a filter that say another direction: either may be wrong, and the filter gives way after a while.
   // Another speed than that which wheels agree with: the receiver is.
-  const nav::Vector3 v_b = axle_mps(v_n, with);
   const float level = base::sqrt(v_b(0) * v_b(0) + v_b(1) * v_b(1)), rolled = base::abs(forward_mps());
   if (wheels_agree(stamp, with) && base::abs(level - rolled) > 4.0F * sigma + 0.2F * rolled + 0.5F)
     refused_[kVelocity].since = stamp;

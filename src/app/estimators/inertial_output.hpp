@@ -7,12 +7,11 @@
 namespace tetap::app {
 
 inline InertialEstimate Inertial::inertial(const Context&) const {
-  const float ahead_s = phase_ == Phase::kTracking ? base::seconds(now_ - time_) : 0.0F;
   const float accel = ins_.vibration * ins_.noise.accel_mps2_rthz, gyro = ins_.vibration * ins_.noise.gyro_radps_rthz;
   return {.state = phase_ == Phase::kTracking ? present_ : ins_.x,
           .p = ins_.p,
-          .velocity_m2ps2 = accel * accel * ahead_s,
-          .tilt_rad2 = gyro * gyro * ahead_s,
+          .velocity_m2ps2 = accel * accel * ahead_s(),
+          .tilt_rad2 = gyro * gyro * ahead_s(),
           .valid = phase_ == Phase::kTracking,
           .jump = jump_,
           .imu = imu_.health()};
@@ -30,7 +29,7 @@ inline Estimate Inertial::estimate(const Context& with) const {
     for (int r = 0; r <= c; ++r)
       p(r, c) = full.p(kPlanar[static_cast<std::size_t>(r)], kPlanar[static_cast<std::size_t>(c)]);
   // Position is uncertain at the present by what the velocity was at the far end, too.
-  const float ahead_s = tracking ? base::seconds(now_ - time_) : 0.0F;
+  const float ahead_s = this->ahead_s();
   p(0, 0) += ahead_s * (2.0F * full.p(0, 3) + ahead_s * full.p(3, 3));
   p(1, 1) += ahead_s * (2.0F * full.p(1, 4) + ahead_s * full.p(4, 4));
   p(0, 1) += ahead_s * (full.p(0, 4) + full.p(1, 3) + ahead_s * full.p(3, 4));

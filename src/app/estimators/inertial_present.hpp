@@ -11,7 +11,10 @@ namespace tetap::app {
 inline std::int32_t Inertial::work_of(const Sample& sample, const Context& with) const {
   const bool off = (sample.sensor == can::Sensor::kMagnetometer && with.numbers.magnetic.use == 0) ||
                    (sample.sensor == can::Sensor::kBarometer && with.numbers.baro.use == 0);
-  if (off || gathers(sample, with)) return 0;
+  const bool speed = sample.sensor == can::Sensor::kWheelSpeed || sample.sensor == can::Sensor::kBodySpeed;
+  if (off || (sample.sensor == can::Sensor::kWheelCounts && counts_soon(sample.stamp, with)) ||
+      (speed && speed_soon(sample.stamp, with)))
+    return 0;
   return sample.sensor == can::Sensor::kImu ? 1 : kMeasurement;
 }
 

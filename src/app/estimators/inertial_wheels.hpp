@@ -12,7 +12,7 @@ namespace tetap::app {
 inline Innovation Inertial::fuse(const WheelCounts& counts, base::Micros stamp, const Context& with) {
   const auto& drive = with.numbers.wheels.drive;
   const base::Micros interval = stamp - counts_time_;
-  if (have_counts_ && is_soon(stamp, counts_time_, base::Micros{with.numbers.inertial.wheels_every_us})) {
+  if (counts_soon(stamp, with)) {
     if (counts.left != counts_.left || counts.right != counts_.right) moved_ = stamp;
     return {.verdict = can::Verdict::kAccepted};
   }
@@ -38,15 +38,13 @@ inline Innovation Inertial::fuse(const WheelCounts& counts, base::Micros stamp, 
 }
 
 inline Innovation Inertial::fuse(const WheelSpeeds& speeds, base::Micros stamp, const Context& with) {
-  if (is_soon(stamp, constrained_, base::Micros{with.numbers.inertial.wheels_every_us}))
-    return {.verdict = can::Verdict::kAccepted};
+  if (speed_soon(stamp, with)) return {.verdict = can::Verdict::kAccepted};
   return roll({.left_mps = speeds.left_mps, .right_mps = speeds.right_mps}, 0.0F, 0.0F, stamp, with);
 }
 
 /// No wheels to compare: only its gate judges it.
 inline Innovation Inertial::fuse(const BodySpeed& speed, base::Micros stamp, const Context& with) {
-  if (is_soon(stamp, constrained_, base::Micros{with.numbers.inertial.wheels_every_us}))
-    return {.verdict = can::Verdict::kAccepted};
+  if (speed_soon(stamp, with)) return {.verdict = can::Verdict::kAccepted};
   return forward({.mps = with.numbers.wheels.speed_scale * speed.forward_mps}, stamp, with);
 }
 
@@ -102,8 +100,8 @@ inline nav::Vector3 Inertial::axle_mps(const nav::Vector3& v_n_mps, const Contex
 }
 
 /// GNSS velocity: what the wheels, and standing still, are held against.
-[[gnu::noinline]] inline void Inertial::hear_ground(const nav::Vector3& v_n_mps, float sigma_mps, base::Micros stamp,
-                                                    const Context& with) {
+[[gnu::noinline]] inline void Inertial::hear_ground(const nav::Vector3& v_n_mps, const nav::Vector3& v_b_mps,
+                                                    float sigma_mps, base::Micros stamp, const Context& with) {
   if (calm_.us > 0) {
     ++grounds_;
     const auto share = 1.0F / static_cast<float>(grounds_ < 25 ? grounds_ : 25);
@@ -114,11 +112,10 @@ inline nav::Vector3 Inertial::axle_mps(const nav::Vector3& v_n_mps, const Contex
   constexpr float kUnseen_mps = 3;
   const float off2 = nav::Vector3(v_n_mps - ins_.x.v_n_mps).squaredNorm();
   if (off2 > kUnseen_mps * kUnseen_mps && wheels_agree(stamp, with)) return;
-  const nav::Vector3 v_b = axle_mps(v_n_mps, with);
   // A heading that is not known turns speed ahead into speed sideways: its doubt counts here.
   const float v2 = v_n_mps(0) * v_n_mps(0) + v_n_mps(1) * v_n_mps(1);
   const float yaw2 = ins_.p(8, 8) < 1.0F ? ins_.p(8, 8) : 1.0F;
-  if (slip_.ground(v_b(0), base::sqrt(sigma_mps * sigma_mps + v2 * yaw2 * yaw2), stamp, with.numbers.inertial))
+  if (slip_.ground(v_b_mps(0), base::sqrt(sigma_mps * sigma_mps + v2 * yaw2 * yaw2), stamp, with.numbers.inertial))
     doubt(base::sqrt(off2), 0.0F);
 }
 
