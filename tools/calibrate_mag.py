@@ -144,9 +144,9 @@ def magnetometer(log):
     hard_sigma = np.sqrt(np.diag(covariance))[:3]
     if hard_sigma.max() > MOST_HARD * field or soft_sigma[:9].max() > MOST_SOFT:
         raise Refusal(f"Hard iron comes out to {hard_sigma.max():.1f} uT and soft iron to {soft_sigma[:9].max():.3f} only (1 sigma).", how)
-    part.add("hard iron", p[:3], hard_sigma, "uT", "magnetometer.hard_iron_ut", AXES, 4)
-    part.add("soft iron: m = S (raw - hard)", s * field, soft_sigma[:9], "1", "magnetometer.soft_iron", tuple(a + b for a in AXES for b in AXES))
-    part.add("field strength", field, soft_sigma[9], "uT")
+    part.add("hard iron", p[:3], hard_sigma, "uT", "magnetic.hard_iron_uT", AXES, 4)
+    part.add("soft iron: m = S (raw - hard)", s * field, soft_sigma[:9], "1", "magnetic.soft_iron", tuple(a + b for a in AXES for b in AXES))
+    part.add("field strength", field, soft_sigma[9], "uT", "magnetic.norm_uT")
     raw, fitted = np.linalg.norm(m, axis=1), np.linalg.norm((m - p[:3]) @ (s * field), axis=1)
     part.residual(f"|m| - its median, {keep.sum()} samples", (raw[keep] - np.median(raw[keep])).std(), (fitted[keep] - field).std(), "uT")
     if not keep.all():

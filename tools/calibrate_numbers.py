@@ -22,7 +22,7 @@ class Refusal(Exception):
 
 @dataclasses.dataclass
 class Number:
-    """One number or a list of them. `field`: where it belongs in app::Numbers ("" : nowhere); `scale`: shown = value * scale, in `unit`."""
+    """One number or a list of them. `field`: where it belongs in app::Numbers ("": nowhere); `scale`: shown = value * scale, in `unit`."""
 
     name: str
     value: np.ndarray
@@ -31,7 +31,6 @@ class Number:
     field: str = ""
     labels: tuple = ("",)
     digits: int = 5
-    exists: bool = False
 
     def __post_init__(self):
         self.value, self.sigma = np.atleast_1d(np.asarray(self.value, float)).ravel(), np.atleast_1d(np.asarray(self.sigma, float)).ravel()
@@ -87,13 +86,16 @@ class Robot:
         return float(found[1]) if found else default
 
 
-def known_fields():
-    """Names of everything that app::Numbers has."""
-    words = set()
+def structs():
+    """Of each struct that app::Numbers is made of: its members in order, name -> type."""
+    found = {}
     for path in STRUCTS:
         with open(os.path.join(ROOT, path), encoding="utf-8") as file:
-            words |= set(re.findall(r"\b([a-z]\w*)\s*(?:=|\{|;)", file.read()))
-    return words
+            text = re.sub(r"//.*", "", file.read())
+        for name, body in re.findall(r"^struct (\w+) \{\n(.*?)^\};", text, re.MULTILINE | re.DOTALL):
+            found[name] = {member: kind.split("::")[-1]
+                           for kind, member in re.findall(r"^  ([\w:]+(?:<[^>]*>)?) (\w+)(?: = [^;]*|\{[^;]*\})?;", body, re.MULTILINE)}
+    return found
 
 
 def literal(value, digits):
@@ -102,41 +104,23 @@ def literal(value, digits):
 
 
 def snippet(parts):
-    """The numbers as designated initialisers of app::Numbers, in its order; what has no field yet is named in comments."""
-    known = known_fields()
-    tree, without = {}, []
-    for part in parts:
-        for number in part.numbers:
-            if not number.field:
-                continue
-            values = ", ".join(literal(value, number.digits) for value in number.value)
-            text = values if len(number.value) == 1 else "{" + values + "}"
-            steps = number.field.split(".")
-            number.exists = all(step in known for step in steps)
-            if not number.exists:
-                without.append(f"// no field yet: {number.field} = {text}")
-                continue
-            node = tree
-            for step in steps[:-1]:
-                node = node.setdefault(step, {})
-            node[steps[-1]] = text
+    """The numbers as designated initialisers of app::Numbers, in its order."""
+    known, values = structs(), {}
+    for number in (number for part in parts for number in part.numbers if number.field):
+        text = ", ".join(literal(value, number.digits) for value in number.value)
+        values[number.field] = text if len(number.value) == 1 else "{" + text + "}"
 
-    def order(node, path):
-        text = ""
-        for path in STRUCTS:
-            with open(os.path.join(ROOT, path), encoding="utf-8") as file:
-                text += file.read()
-        body = text[text.find("struct Numbers"):] if node is tree else text
-        return sorted(node, key=lambda name: body.find(f" {name}" + (";" if node is tree else "")))
-
-    def lines(node, indent):
+    def lines(struct, path, indent):
         result = []
-        for name in order(node, ""):
-            value = node[name]
-            if isinstance(value, dict):
-                result += [f"{indent}.{name} = {{"] + lines(value, indent + "    ") + [f"{indent}}},"]
-            else:
-                result.append(f"{indent}.{name} = {value},")
+        for member, kind in known[struct].items():
+            field = f"{path}{member}"
+            if field in values:
+                result.append(f"{indent}.{member} = {values.pop(field)},")
+            elif any(name.startswith(f"{field}.") for name in values):
+                result += [f"{indent}.{member} = {{"] + lines(kind, f"{field}.", indent + "    ") + [f"{indent}}},"]
         return result
 
-    return "\n".join(lines(tree, "    ") + ["    " + line for line in without])
+    text = "\n".join(lines("Numbers", "", "    "))
+    if values:
+        raise LookupError(f"app::Numbers has no {', '.join(values)}")
+    return text

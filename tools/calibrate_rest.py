@@ -199,7 +199,7 @@ def accelerometer(log, rests, g_mps2, sigma_g_mps2, box_deg):
         raise Refusal(f"{len(groups)} positions, but they do not tell bias from scale along {', '.join(bad)} "
                       f"(1 sigma {sd[:3].max():.2g} m/s2 and {sd[3:6].max():.2g}).", f"rest of 5 s with these faces up: {missing_text}")
     scale = np.hypot(sd[3:6], sigma_g_mps2 / g_mps2)
-    part.add("accelerometer bias", fit.x[:3], sd[:3], "m/s2", "inertial.accel_bias_mps2", AXES)
+    part.add("accelerometer bias", fit.x[:3], sd[:3], "m/s2", "imu.accel_bias_mps2", AXES)
     seen_cross = sd[6:9] < 0.5 * CROSS_AXIS
     matrix = _triangle(fit.x)
     if not seen_cross.all():
@@ -209,7 +209,7 @@ def accelerometer(log, rests, g_mps2, sigma_g_mps2, box_deg):
     part.add("accelerometer scale", fit.x[3:6], scale, "1", "", AXES)
     part.add("accelerometer misalignment", fit.x[6:9], sd[6:9], "rad", "", ("xy", "xz", "yz"))
     matrix_sigma = np.array([[scale[0], sd[6], sd[7]], [0, scale[1], sd[8]], [0, 0, scale[2]]])
-    part.add("accelerometer matrix: f = T (raw - bias)", matrix, matrix_sigma, "1", "inertial.accel_matrix",
+    part.add("accelerometer matrix: f = T (raw - bias)", matrix, matrix_sigma, "1", "imu.accel_matrix",
              tuple(a + b for a in AXES for b in AXES), 6)
     before = np.linalg.norm(force, axis=1) - g_mps2
     after = np.linalg.norm((force - fit.x[:3]) @ matrix.T, axis=1) - g_mps2
@@ -292,10 +292,10 @@ def gyroscope(log, rests, where):
         bias, slope = both
         spread = np.sqrt(variance[:, None] * np.diag(normal))
         wander = np.maximum(spread[:, 0], noise)
-        part.add("gyroscope bias slope", slope, spread[:, 1], "rad/s/degC", "inertial.gyro_bias_slope_radps_per_degC", AXES)
-        part.add("gyroscope bias holds at", at, 0.0, "degC", "inertial.gyro_bias_at_degC")
+        part.add("gyroscope bias slope", slope, spread[:, 1], "rad/s/degC", "imu.gyro_bias_slope_radps_per_degC", AXES)
+        part.add("gyroscope bias holds at", at, 0.0, "degC", "imu.gyro_bias_at_degC")
     sigma = np.sqrt(np.maximum(noise, wander) ** 2 + earth**2)
-    part.numbers.insert(0, Number("gyroscope bias", bias, sigma, "rad/s", "inertial.gyro_bias_radps", AXES))
+    part.numbers.insert(0, Number("gyroscope bias", bias, sigma, "rad/s", "imu.gyro_bias_radps", AXES))
     flat = true - bias - (0 if slope is None else (temp - at)[:, None] * slope)
     part.residual(f"turn rate at rest, {BLOCK_S:g} s means ({total:.0f} s in {len(rests)} rests)",
                   np.sqrt((rate**2).mean()), np.sqrt((flat**2).mean()), "rad/s")

@@ -113,7 +113,8 @@ class _Text:
 
     def __init__(self, path):
         try:
-            raw = open(path, "rb").read()
+            with open(path, "rb") as file:
+                raw = file.read()
         except OSError as error:
             raise Refused("%s: %s" % (path, error.strerror))
         self.path, self.message_line, self.signal_line, self.signals = path, {}, {}, []

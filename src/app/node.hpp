@@ -3,6 +3,7 @@
 // calls gives the same bits on every machine; everything that follows from real time stays outside (Pacer, LoopHealth).
 #pragma once
 
+#include "app/calibrate.hpp"
 #include "app/history.hpp"
 #include "app/inbox.hpp"
 #include "app/landmarks.hpp"
@@ -133,9 +134,9 @@ void Node<Estimators, Capacity>::on_frame(const base::CanFrame& frame) {
 template <class Estimators, std::size_t Capacity>
 void Node<Estimators, Capacity>::sample(const Sample& arrived) {
   Sample sample = arrived;
-  if (sample.sensor == can::Sensor::kBodySpeed) sample.stamp += base::Micros{numbers_.wheels.delay_us};
   if (!ticked_ && now_.us == 0) return void(++counters_.no_time);
   if (!plausible(sample)) return void(++counters_.out_of_range);
+  calibrate(sample, numbers_);
   if (sample.stamp <= history_.closed_until()) {
     ++counters_.too_late;
     publisher_.event({.verdict = can::Verdict::kTooLate}, sample, kPrimary, now_, counters_);

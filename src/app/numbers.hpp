@@ -37,8 +37,21 @@ struct WheelNumbers {
   std::int32_t delay_us = 0;  ///< from a BodySpeed sample's stamp to the motion it speaks of: a command's dead time
   float speed_scale = 1;      ///< true speed over stated speed, of BodySpeed samples
   float yaw_rate_scale = 1;
+  float left_speed_scale = 1;  ///< the same of WheelSpeeds samples
+  float right_speed_scale = 1;
   std::int32_t timeout_us = 500'000;  ///< without a sample for longer: assume standstill, grow the covariance fast
   float timeout_noise = 1.0F;         ///< m^2/s and rad^2/s then
+};
+
+/// The IMU's own errors as tools/calibrate finds them, in its own axes: specific force = accel_matrix (raw -
+/// accel_bias), turn rate = raw - gyro_bias - slope (temperature - at); without a temperature the slope is not used.
+/// What estimators publish as a bias is what is left.
+struct ImuNumbers {
+  std::array<float, 3> accel_bias_mps2{0, 0, 0};
+  std::array<float, 9> accel_matrix{1, 0, 0, 0, 1, 0, 0, 0, 1};  ///< scale and misalignment, row by row
+  std::array<float, 3> gyro_bias_radps{0, 0, 0};
+  std::array<float, 3> gyro_bias_slope_radps_per_degC{0, 0, 0};
+  float gyro_bias_at_degC = 25;
 };
 
 struct GyroNumbers {
@@ -187,6 +200,7 @@ struct Numbers {
   std::uint32_t can_base = 0x300;
   LoopNumbers loop;
   WheelNumbers wheels;
+  ImuNumbers imu;  ///< of the one that is used: inertial.imu
   GyroNumbers gyro;
   LandmarkNumbers landmark;
   GnssNumbers gnss;
@@ -210,7 +224,13 @@ constexpr void each_number(const Numbers& n, Sink&& sink) {
   const auto& u = n.wheels.noise;
   all(u.speed, u.speed_per_speed, u.yaw_rate, u.yaw_rate_per_yaw_rate, u.yaw_rate_per_speed);
   all(n.wheels.wheel_speed_noise, static_cast<std::int32_t>(n.wheels.hold), n.wheels.delay_us, n.wheels.speed_scale,
-      n.wheels.yaw_rate_scale, n.wheels.timeout_us, n.wheels.timeout_noise);
+      n.wheels.yaw_rate_scale, n.wheels.left_speed_scale, n.wheels.right_speed_scale, n.wheels.timeout_us,
+      n.wheels.timeout_noise);
+  for (const float v : n.imu.accel_bias_mps2) sink(v);
+  for (const float v : n.imu.accel_matrix) sink(v);
+  for (const float v : n.imu.gyro_bias_radps) sink(v);
+  for (const float v : n.imu.gyro_bias_slope_radps_per_degC) sink(v);
+  sink(n.imu.gyro_bias_at_degC);
   all(n.gyro.use, n.gyro.up_s[0], n.gyro.up_s[1], n.gyro.up_s[2], n.gyro.noise, n.gyro.bias_time_s,
       n.gyro.standstill_mps);
   const auto& l = n.landmark;

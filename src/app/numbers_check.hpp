@@ -31,6 +31,14 @@ consteval bool rotation(const std::array<float, 9>& m) {
     }
   return determinant(m) > 0;
 }
+/// A sensor's scale and misalignment: the turn into the body's axes is another number.
+consteval bool nearly_one(const std::array<float, 9>& m) {
+  for (std::size_t i = 0; i < 9; ++i) {
+    const float off = m[i] - (i % 4 == 0 ? 1.0F : 0.0F);
+    if (!(off > -0.2F && off < 0.2F)) return false;
+  }
+  return true;
+}
 }  // namespace detail
 
 consteval Numbers checked(const Numbers& n) {
@@ -58,9 +66,22 @@ consteval Numbers checked(const Numbers& n) {
           "wheels.noise: densities not below 0");
   require(not_negative(n.wheels.wheel_speed_noise), "wheels.wheel_speed_noise: not below 0");
   require(n.wheels.delay_us >= 0 && n.wheels.delay_us <= 500'000, "wheels.delay_us: 0 to 500000");
-  require(positive(n.wheels.speed_scale) && positive(n.wheels.yaw_rate_scale), "wheels scales: above 0");
+  require(positive(n.wheels.speed_scale) && positive(n.wheels.yaw_rate_scale) && positive(n.wheels.left_speed_scale) &&
+              positive(n.wheels.right_speed_scale),
+          "wheels scales: above 0");
   require(n.wheels.timeout_us > 0, "wheels.timeout_us: above 0");
   require(positive(n.wheels.timeout_noise), "wheels.timeout_noise: above 0");
+
+  const auto within = [](const std::array<float, 3>& values, float limit) {
+    for (const float v : values)
+      if (!(v > -limit && v < limit)) return false;
+    return true;
+  };
+  require(within(n.imu.accel_bias_mps2, 10) && within(n.imu.gyro_bias_radps, 1),
+          "imu.accel_bias_mps2, gyro_bias_radps: within 10 m/s^2 and 1 rad/s");
+  require(within(n.imu.gyro_bias_slope_radps_per_degC, 0.1F), "imu.gyro_bias_slope_radps_per_degC: within 0.1");
+  require(n.imu.gyro_bias_at_degC > -100 && n.imu.gyro_bias_at_degC < 200, "imu.gyro_bias_at_degC: -100 to 200");
+  require(detail::nearly_one(n.imu.accel_matrix), "imu.accel_matrix: within 0.2 of no change, in every place");
 
   const auto& up = n.gyro.up_s;
   const float norm2 = up[0] * up[0] + up[1] * up[1] + up[2] * up[2];
@@ -86,6 +107,13 @@ consteval Numbers checked(const Numbers& n) {
 
   require(n.inertial.constrain_every_us >= 0, "inertial.constrain_every_us: not below 0");
   const auto& i = n.inertial;
+  require(detail::rotation(i.mounting_bs), "inertial.mounting_bs: a rotation");
+  require(i.imu >= 0 && i.imu <= 3, "inertial.imu: 0 to 3");
+  require(positive(i.gyro_radps_rthz) && positive(i.accel_mps2_rthz) && not_negative(i.gyro_bias_radps2_rthz) &&
+              not_negative(i.accel_bias_mps3_rthz),
+          "inertial: noise densities above 0, random walks not below");
+  require(positive(i.gyro_turn_on_radps) && positive(i.accel_turn_on_mps2) && positive(i.start_tilt_rad),
+          "inertial.gyro_turn_on_radps, accel_turn_on_mps2, start_tilt_rad: above 0");
   require(i.wheels_every_us >= 0 && 2 * std::int64_t{i.wheels_every_us} <= n.wheels.timeout_us,
           "inertial.wheels_every_us: 0 to half of wheels.timeout_us");
   require(i.stuck_samples >= 0 && i.stuck_samples <= 255, "inertial.stuck_samples: 0 to 255");

@@ -31,6 +31,7 @@ with contextlib.redirect_stdout(io.StringIO()):
     import calibrate_log
     import calibrate_mag
     import calibrate_mounting
+    import calibrate_numbers
     import calibrate_rest
     import calibrate_wheels
     from calibrate_numbers import Refusal, Robot
@@ -497,12 +498,35 @@ class Program(unittest.TestCase):
         path = drive(1, np.eye(3), duration_s=120).write(self.at)
         done = tool(path, "--robot", "rover", "--out", os.path.join(self.at, "c"), status=0)
         snippet = done.stdout.split("hpp:\n")[1].split("\nwritten")[0]
+        self.compiles(snippet, "numbers.wheels.drive.track_m > 0.4F && numbers.inertial.mounting_bs[8] > 0.99F")
+
+    def compiles(self, snippet, assertion):
         source = os.path.join(self.at, "robot.cpp")
         with open(source, "w", encoding="utf-8") as file:
-            file.write('#include "app/numbers.hpp"\nconstexpr tetap::app::Numbers numbers = {\n' + snippet + "\n};\n"
-                       "static_assert(numbers.wheels.drive.track_m > 0.4F && numbers.inertial.mounting_bs[8] > 0.99F);\n")
+            file.write('#include "app/numbers_check.hpp"\nconstexpr tetap::app::Numbers numbers = tetap::app::checked({\n' + snippet + "\n});\n"
+                       f"static_assert({assertion});\n")
         subprocess.run(["g++", "-std=c++20", "-fsyntax-only", "-Wall", "-Werror", "-I", os.path.join(ROOT, "src"), "-I", ROOT,
                         "-isystem", "/usr/include/eigen3", source], check=True)
+
+    def test_every_number_that_a_part_gives_is_one_that_the_firmware_has(self):
+        random = chance(2)
+        matrix, bias = accelerometer_truth(random)
+        log = read(held_still(Made(), random, FACES, matrix, bias, np.array([0.003, 0, 0])))
+        magnetic, hard, _ = Magnetometer("tumbling").log(1, Magnetometer.tumbling(1))
+        warm = Gyroscope("warming").warming(1, 20)[0]
+        parts = [calibrate_mag.magnetometer(magnetic), warm, calibrate_rest.accelerometer(log, calibrate_rest.find(log), G, 1e-3, 1.0)]
+        for kind in ("wheel speeds", "counts"):
+            driven = read(drive(1, np.eye(3), duration_s=120, kind=kind))
+            parts.append(calibrate_wheels.wheels(driven, np.array([0.0, 0.0, 1.0]), calibrate_numbers.Robot("rover"), None))
+        self.compiles(calibrate_numbers.snippet(parts),
+                      f"numbers.magnetic.hard_iron_uT[0] * {hard[0]:.3f}F > 0 && numbers.magnetic.norm_uT > 40 && numbers.imu.accel_matrix[0] > 0.9F"
+                      " && numbers.imu.gyro_bias_slope_radps_per_degC[2] > 1e-4F && numbers.wheels.left_speed_scale > 0.9F")
+
+    def test_a_number_that_the_firmware_does_not_have_is_an_error(self):
+        part = calibrate_numbers.Part("gyro", "gyroscope")
+        part.add("bias", 1.0, 0.1, "rad/s", "gyro.no_such_number")
+        with self.assertRaisesRegex(LookupError, "gyro.no_such_number"):
+            calibrate_numbers.snippet([part])
 
     def test_a_part_asked_for_and_refused_is_a_failure(self):
         path = held_still(Made(), chance(1), FACES[:3], np.eye(3), np.zeros(3), np.zeros(3)).write(self.at)

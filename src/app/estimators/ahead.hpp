@@ -4,7 +4,7 @@
 #pragma once
 
 #include "app/estimators/imu_cells.hpp"
-#include "app/magnetic_field.hpp"
+#include "app/rows.hpp"
 #include "nav/strapdown.hpp"
 
 #include <cstdint>

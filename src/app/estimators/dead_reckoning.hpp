@@ -41,10 +41,9 @@ class DeadReckoning {
     // A speedometer alone says nothing of the turn: that has to come from a gyroscope.
     const bool turns = base::is_finite(speed.yaw_rate_radps);
     if (!turns && n.gyro.use == 0) return false;
-    return fuse_speed({.kind = Held::Kind::kBody,
-                       .first_mps = n.wheels.speed_scale * speed.forward_mps,
-                       .second = turns ? n.wheels.yaw_rate_scale * speed.yaw_rate_radps : 0.0F},
-                      stamp, n);
+    return fuse_speed(
+        {.kind = Held::Kind::kBody, .first_mps = speed.forward_mps, .second = turns ? speed.yaw_rate_radps : 0.0F},
+        stamp, n);
   }
   bool fuse(const ImuSample& sample, base::Micros stamp, const Numbers& n);
 

@@ -45,7 +45,7 @@ inline Innovation Inertial::fuse(const WheelSpeeds& speeds, base::Micros stamp, 
 /// No wheels to compare: only its gate judges it.
 inline Innovation Inertial::fuse(const BodySpeed& speed, base::Micros stamp, const Context& with) {
   if (speed_soon(stamp, with)) return {.verdict = can::Verdict::kAccepted};
-  return forward({.mps = with.numbers.wheels.speed_scale * speed.forward_mps}, stamp, with);
+  return forward({.mps = speed.forward_mps}, stamp, with);
 }
 
 /// Two wheels, as far as they roll: their mean; of one that rolls while the other spins, what the gyroscope leaves of
