@@ -38,7 +38,7 @@ struct InSync {
   static constexpr Signal kKind{.start = 56, .length = 2};
 
   std::uint64_t time_us = 0;  ///< time of the tick, in the time base of all stamps; modulo 2^48
-  std::uint8_t ctr = 0;  ///< counts sync frames; a gap is counted as lost
+  std::uint8_t ctr = 0;  ///< counts sync frames; a gap is counted (Diag_SyncGap)
   SyncKind kind = SyncKind::kTick;  ///< what the node does with the time
 
   template <class Self, class Visit>
@@ -728,7 +728,8 @@ struct EstSensorStat {
   }
 };
 
-/// Diagnostics of the node, one page per frame. Counters wrap. Page 0.
+/// Diagnostics of the node, one page per frame. Counters wrap. Pages 2, 3, 4, 6 and 7 follow from the frames alone:
+/// the same in every replay. Page 0.
 struct EstDiagLoop {
   static constexpr std::uint8_t kOffset = 0x25, kSize = 8;
   static constexpr Signal kMux{.start = 0, .length = 4};
@@ -736,21 +737,25 @@ struct EstDiagLoop {
   static constexpr Signal kLoopMax{.start = 8, .length = 24};
   static constexpr Signal kLoopMean{.start = 32, .length = 16};
   static constexpr Signal kSync{.start = 48, .length = 4};
+  static constexpr Signal kTxHigh{.start = 52, .length = 12};
 
   std::uint32_t loop_max_us = 0;  ///< longest tick since start; 0 to 16777215
   std::uint16_t loop_mean_us = 0;  ///< running mean of the duration of a tick; 0 to 65535
   SyncState sync = SyncState::kOwnTimer;  ///< where ticks come from
+  std::uint16_t tx_high = 0;  ///< most frames that waited in the controller's transmit queue at once, since start; 0 to 4095
 
   template <class Self, class Visit>
   static constexpr void each(Self& m, Visit&& visit) {
     visit(At<kLoopMax>{}, m.loop_max_us);
     visit(At<kLoopMean>{}, m.loop_mean_us);
     visit(At<kSync>{}, m.sync);
+    visit(At<kTxHigh>{}, m.tx_high);
   }
   friend constexpr bool operator==(const EstDiagLoop&, const EstDiagLoop&) = default;
 };
 
-/// Diagnostics of the node, one page per frame. Counters wrap. Page 1.
+/// Diagnostics of the node, one page per frame. Counters wrap. Pages 2, 3, 4, 6 and 7 follow from the frames alone:
+/// the same in every replay. Page 1.
 struct EstDiagTicks {
   static constexpr std::uint8_t kOffset = 0x25, kSize = 8;
   static constexpr Signal kMux{.start = 0, .length = 4};
@@ -759,7 +764,7 @@ struct EstDiagTicks {
   static constexpr Signal kSyncLost{.start = 24, .length = 16, .wraps = true};
   static constexpr Signal kSyncBack{.start = 40, .length = 16, .wraps = true};
 
-  std::uint16_t ticks_late = 0;  ///< ticks begun late or overrun, since start
+  std::uint16_t ticks_late = 0;  ///< ticks that took longer than their period or could not begin in it, since start
   std::uint16_t sync_lost = 0;  ///< times sync frames were missing for 3 periods, since start
   std::uint16_t sync_back = 0;  ///< sync frames whose time was not ahead of the last tick, since start
 
@@ -772,7 +777,8 @@ struct EstDiagTicks {
   friend constexpr bool operator==(const EstDiagTicks&, const EstDiagTicks&) = default;
 };
 
-/// Diagnostics of the node, one page per frame. Counters wrap. Page 2.
+/// Diagnostics of the node, one page per frame. Counters wrap. Pages 2, 3, 4, 6 and 7 follow from the frames alone:
+/// the same in every replay. Page 2.
 struct EstDiagQueues {
   static constexpr std::uint8_t kOffset = 0x25, kSize = 8;
   static constexpr Signal kMux{.start = 0, .length = 4};
@@ -794,7 +800,8 @@ struct EstDiagQueues {
   friend constexpr bool operator==(const EstDiagQueues&, const EstDiagQueues&) = default;
 };
 
-/// Diagnostics of the node, one page per frame. Counters wrap. Page 3.
+/// Diagnostics of the node, one page per frame. Counters wrap. Pages 2, 3, 4, 6 and 7 follow from the frames alone:
+/// the same in every replay. Page 3.
 struct EstDiagOrder {
   static constexpr std::uint8_t kOffset = 0x25, kSize = 8;
   static constexpr Signal kMux{.start = 0, .length = 4};
@@ -816,7 +823,8 @@ struct EstDiagOrder {
   friend constexpr bool operator==(const EstDiagOrder&, const EstDiagOrder&) = default;
 };
 
-/// Diagnostics of the node, one page per frame. Counters wrap. Page 4.
+/// Diagnostics of the node, one page per frame. Counters wrap. Pages 2, 3, 4, 6 and 7 follow from the frames alone:
+/// the same in every replay. Page 4.
 struct EstDiagFrames {
   static constexpr std::uint8_t kOffset = 0x25, kSize = 8;
   static constexpr Signal kMux{.start = 0, .length = 4};
@@ -838,7 +846,8 @@ struct EstDiagFrames {
   friend constexpr bool operator==(const EstDiagFrames&, const EstDiagFrames&) = default;
 };
 
-/// Diagnostics of the node, one page per frame. Counters wrap. Page 5.
+/// Diagnostics of the node, one page per frame. Counters wrap. Pages 2, 3, 4, 6 and 7 follow from the frames alone:
+/// the same in every replay. Page 5.
 struct EstDiagBus {
   static constexpr std::uint8_t kOffset = 0x25, kSize = 8;
   static constexpr Signal kMux{.start = 0, .length = 4};
@@ -860,7 +869,8 @@ struct EstDiagBus {
   friend constexpr bool operator==(const EstDiagBus&, const EstDiagBus&) = default;
 };
 
-/// Diagnostics of the node, one page per frame. Counters wrap. Page 6.
+/// Diagnostics of the node, one page per frame. Counters wrap. Pages 2, 3, 4, 6 and 7 follow from the frames alone:
+/// the same in every replay. Page 6.
 struct EstDiagRefused {
   static constexpr std::uint8_t kOffset = 0x25, kSize = 8;
   static constexpr Signal kMux{.start = 0, .length = 4};
@@ -882,26 +892,47 @@ struct EstDiagRefused {
   friend constexpr bool operator==(const EstDiagRefused&, const EstDiagRefused&) = default;
 };
 
-/// Diagnostics of the node, one page per frame. Counters wrap. Page 7.
+/// Diagnostics of the node, one page per frame. Counters wrap. Pages 2, 3, 4, 6 and 7 follow from the frames alone:
+/// the same in every replay. Page 7.
 struct EstDiagCapacity {
   static constexpr std::uint8_t kOffset = 0x25, kSize = 8;
   static constexpr Signal kMux{.start = 0, .length = 4};
   static constexpr std::uint8_t kPage = 7;
   static constexpr Signal kMapFull{.start = 8, .length = 16, .wraps = true};
-  static constexpr Signal kSyncJump{.start = 24, .length = 16, .wraps = true};
-  static constexpr Signal kTimelineFull{.start = 40, .length = 16, .wraps = true};
+  static constexpr Signal kTimelineFull{.start = 24, .length = 16, .wraps = true};
 
   std::uint16_t map_full = 0;  ///< map entries refused because the map was full, since start
-  std::uint16_t sync_jump = 0;  ///< sync frames too far ahead of the last tick, since start
   std::uint16_t timeline_full = 0;  ///< samples dropped because the timeline was full, since start
 
   template <class Self, class Visit>
   static constexpr void each(Self& m, Visit&& visit) {
     visit(At<kMapFull>{}, m.map_full);
-    visit(At<kSyncJump>{}, m.sync_jump);
     visit(At<kTimelineFull>{}, m.timeline_full);
   }
   friend constexpr bool operator==(const EstDiagCapacity&, const EstDiagCapacity&) = default;
+};
+
+/// Diagnostics of the node, one page per frame. Counters wrap. Pages 2, 3, 4, 6 and 7 follow from the frames alone:
+/// the same in every replay. Page 8.
+struct EstDiagSync {
+  static constexpr std::uint8_t kOffset = 0x25, kSize = 8;
+  static constexpr Signal kMux{.start = 0, .length = 4};
+  static constexpr std::uint8_t kPage = 8;
+  static constexpr Signal kSyncJump{.start = 8, .length = 16, .wraps = true};
+  static constexpr Signal kSyncGap{.start = 24, .length = 16, .wraps = true};
+  static constexpr Signal kSyncBad{.start = 40, .length = 16, .wraps = true};
+
+  std::uint16_t sync_jump = 0;  ///< sync frames too far ahead of the last tick, since start
+  std::uint16_t sync_gap = 0;  ///< sync frames that by their counter were sent and never came, since start
+  std::uint16_t sync_bad = 0;  ///< sync frames of wrong length, since start
+
+  template <class Self, class Visit>
+  static constexpr void each(Self& m, Visit&& visit) {
+    visit(At<kSyncJump>{}, m.sync_jump);
+    visit(At<kSyncGap>{}, m.sync_gap);
+    visit(At<kSyncBad>{}, m.sync_bad);
+  }
+  friend constexpr bool operator==(const EstDiagSync&, const EstDiagSync&) = default;
 };
 
 /// What runs on the node.
@@ -1127,13 +1158,13 @@ struct EstStdMore {
   static constexpr Signal kEpoch{.start = 1, .length = 4, .wraps = true};
   static constexpr Signal kCorrXYaw{.start = 6, .length = 12, .is_signed = true, .has_gap = true, .per_unit = 2000};
   static constexpr Signal kCorrYYaw{.start = 18, .length = 12, .is_signed = true, .has_gap = true, .per_unit = 2000};
-  static constexpr Signal kStdSpeed{.start = 30, .length = 16, .has_gap = true, .per_unit = 1000};
+  static constexpr Signal kStdSpeed{.start = 30, .length = 16, .has_gap = true, .per_unit = 5000};
   static constexpr Signal kStdYawRate{.start = 46, .length = 16, .has_gap = true, .per_unit = 5000};
 
   std::uint8_t epoch = 0;  ///< low bits of the epoch, the same in all frames of one epoch
   float corr_x_yaw = 0;  ///< correlation of X and Yaw; +-1.0235 in steps of 0.0005; NaN: not available
   float corr_y_yaw = 0;  ///< correlation of Y and Yaw; +-1.0235 in steps of 0.0005; NaN: not available
-  float std_speed_mps = 0;  ///< 1-sigma of Speed; 0 to 65.534 m/s in steps of 0.001; NaN: not available
+  float std_speed_mps = 0;  ///< 1-sigma of Speed; 0 to 13.1068 m/s in steps of 0.0002; NaN: not available
   float std_yaw_rate_radps = 0;  ///< 1-sigma of YawRate; 0 to 13.1068 rad/s in steps of 0.0002; NaN: not available
 
   template <class Self, class Visit>
@@ -1424,6 +1455,7 @@ using AllMessages = List<
     EstDiagBus,
     EstDiagRefused,
     EstDiagCapacity,
+    EstDiagSync,
     EstVersion,
     EstOriginLat,
     EstOriginLon,

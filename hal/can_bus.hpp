@@ -16,6 +16,7 @@ struct CanFaults {
   std::uint32_t rx_overflow = 0;  ///< frames the controller or the socket had to drop
   std::uint32_t tx_full = 0;      ///< frames send() refused
   std::uint32_t bus_off = 0;      ///< times the controller left the bus, or the interface was down
+  std::uint32_t tx_high = 0;      ///< most frames that waited to be sent at once
 };
 
 template <class B>

@@ -24,7 +24,8 @@ HELD_S = 1.5  # a page of an inertial estimate comes once a second: its numbers 
 LEAST_GAP_S = 0.2  # truth rows further apart than this, or than 2.5 times their usual distance, are not interpolated between
 
 ESTIMATES = ["epoch", "time_s", "estimator", "kind", "x_m", "y_m", "yaw_rad", "speed_mps", "yaw_rate_radps", "std_x_m", "std_y_m",
-             "std_yaw_rad", "corr_xy", "corr_x_yaw", "corr_y_yaw", "pos_valid", "hdg_valid"]
+             "std_yaw_rad", "corr_xy", "corr_x_yaw", "corr_y_yaw", "pos_valid", "hdg_valid",
+             "std_speed_mps", "std_yaw_rate_radps"]
 INNOVATIONS = ["epoch", "time_s", "estimator", "sensor", "inst", "verdict", "dof", "nis", "ratio", "age_ms", "landmark"]
 STATUS = ["epoch", "time_s", "mode", "used", "faults", "reset_ctr", "reset_cause"]
 SENSORS = ["epoch", "time_s", "estimator", "sensor", "inst", "accepted", "rejected", "nis_mean", "age_s"]

@@ -30,9 +30,17 @@ inline constexpr std::uint64_t kTimeMask = 0xFFFFFFFFFFFF;
   const auto offset = offset_in_block(frame, base);
   return offset && *offset < kInputOffsets && *offset != can::InSync::kOffset;
 }
-/// Loop times and the program's version differ between runs that are otherwise the same; everything else must not.
-[[nodiscard]] constexpr bool is_deterministic(std::uint32_t offset) {
-  return offset >= kInputOffsets && offset != can::EstDiagLoop::kOffset && offset != can::EstVersion::kOffset;
+/// What the loop and the controller saw of real time and the program's version differ between runs that are otherwise
+/// the same; everything else must not: of the diagnostics, counters that follow from the frames (app::Counters).
+[[nodiscard]] constexpr bool is_deterministic(const base::CanFrame& frame, std::uint32_t base) {
+  const std::uint32_t offset = frame.id - base;
+  if (offset == can::EstDiagLoop::kOffset) {
+    const auto bytes = can::payload(frame);
+    return can::decode<can::EstDiagQueues>(bytes) || can::decode<can::EstDiagOrder>(bytes) ||
+           can::decode<can::EstDiagFrames>(bytes) || can::decode<can::EstDiagRefused>(bytes) ||
+           can::decode<can::EstDiagCapacity>(bytes);
+  }
+  return offset >= kInputOffsets && offset != can::EstVersion::kOffset;
 }
 
 [[nodiscard]] constexpr base::CanFrame sync_frame(std::uint32_t base, can::SyncKind kind, base::Micros time,

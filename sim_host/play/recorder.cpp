@@ -40,7 +40,7 @@ Recorder::Recorder(const RecorderOptions& options)
   estimates_.write(
       "epoch,time_s,estimator,kind,x_m,y_m,yaw_rad,speed_mps,yaw_rate_radps,std_x_m,std_y_m,std_yaw_rad,corr_xy,corr_x_"
       "yaw,corr_y_yaw,"
-      "pos_valid,hdg_valid\n");
+      "pos_valid,hdg_valid,std_speed_mps,std_yaw_rate_radps\n");
   states_.write(
       "epoch,time_s,estimator,q_w,q_x,q_y,q_z,v_east_mps,v_north_mps,v_up_mps,height_m,std_height_m,acc_bias_x_mps2,"
       "acc_bias_y_mps2,acc_bias_z_mps2,gyro_bias_x_radps,gyro_bias_y_radps,gyro_bias_z_radps,std_v_east_mps,"
@@ -88,7 +88,7 @@ void Recorder::epoch(const NodeEpoch& epoch, base::Micros time) {
   states_now_ = {};
   for (const base::CanFrame& f : epoch.frames) {
     frame(f);
-    if (!is_deterministic(f.id - options_.base)) continue;
+    if (!is_deterministic(f, options_.base)) continue;
     line_.clear();
     append_log_line(line_, bus_time, "vcan0", f);  // the same name everywhere, so that files can be compared
     estimates_log_.write(line_.view());
@@ -197,6 +197,8 @@ void Recorder::estimate_row(std::size_t k, const Instance& e) {
     line_.put(e.motion->pos_valid ? '1' : '0').put(',').put(e.motion->hdg_valid ? '1' : '0');
   else
     line_.put(',');
+  for (const auto field : {&can::EstStdMore::std_speed_mps, &can::EstStdMore::std_yaw_rate_radps})
+    line_.put(',').real(correlation(field), 4);
   estimates_.write(line_.put('\n').view());
 }
 

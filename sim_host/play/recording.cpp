@@ -126,7 +126,7 @@ class Builder {
     entry.epoch.time = {static_cast<std::int64_t>(epoch.head->time_us)};
     entry.epoch.first = result_.outputs.size();
     for (const base::CanFrame& frame : epoch.frames)
-      if (is_deterministic(frame.id - options_.log_base)) result_.outputs.push_back(frame);
+      if (is_deterministic(frame, options_.log_base)) result_.outputs.push_back(frame);
     entry.epoch.count = result_.outputs.size() - entry.epoch.first;
     segment_.entries.push_back(entry);
   }
@@ -208,7 +208,7 @@ void Comparison::epoch(const NodeEpoch& epoch, base::Micros time) {
                         text_of(recorded, recording_.base) + ", now " + text_of(now, base_);
   };
   for (const base::CanFrame& frame : epoch.frames) {
-    if (!is_deterministic(frame.id - base_)) continue;
+    if (!is_deterministic(frame, base_)) continue;
     const base::CanFrame* recorded = at < expected.count ? &recording_.outputs[expected.first + at] : nullptr;
     ++at;
     const bool same = recorded != nullptr && recorded->size == frame.size && recorded->data == frame.data &&

@@ -19,6 +19,8 @@ struct Estimate {
   filter::Symmetric<float, 3> p;  ///< of (x, y, yaw)
   float forward_mps = 0;
   float yaw_rate_radps = 0;
+  float forward_m2ps2 = base::kNan;     ///< variance of forward_mps; NaN: not known
+  float yaw_rate_rad2ps2 = base::kNan;  ///< of yaw_rate_radps
   bool position_valid = false;
   bool heading_valid = false;
   bool velocity_valid = false;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Records of measurements that wait for their frame: at most one goes out in so many ticks.
+// Records of measurements that wait for their frame: at most one goes out in so many ticks. Within a tick they come in
+// the order of the samples; what is refused between ticks is put in that order here, so that no arrival leaves a trace.
 #pragma once
 
 #include "app/estimate.hpp"
@@ -15,9 +16,11 @@ namespace tetap::app {
 
 class EventQueue {
  public:
-  void power_on() { size_ = 0; }
+  void power_on() { size_ = first_ = 0; }
+  void tick_begins() { first_ = kNone; }
+  void tick_ends() { first_ = size_; }
 
-  /// When the queue is full an accepted one makes room for one that was not.
+  /// When the queue is full an accepted one makes room for one that was not; else the last refused has none.
   void add(const Innovation& innovation, const Sample& sample, std::size_t instance, base::Micros now,
            Counters& counters);
 
@@ -25,14 +28,25 @@ class EventQueue {
   /// The oldest; not empty.
   [[nodiscard]] can::EstInnov take() {
     const can::EstInnov first = queue_[0];
-    for (std::size_t i = 1; i < size_; ++i) queue_[i - 1] = queue_[i];
-    --size_;
+    remove(0);
     return first;
   }
 
  private:
-  std::array<can::EstInnov, 16> queue_{};
+  static constexpr std::size_t kCapacity = 16, kNone = kCapacity + 1;
+  /// By the time at which they were true; the rest only makes it an order.
+  [[nodiscard]] static bool before(const can::EstInnov& a, const can::EstInnov& b) {
+    if (a.age_ms > b.age_ms || a.age_ms < b.age_ms) return a.age_ms > b.age_ms;
+    return a.sensor != b.sensor ? a.sensor < b.sensor : a.inst < b.inst;
+  }
+  void remove(std::size_t i) {
+    for (++i; i < size_; ++i) queue_[i - 1] = queue_[i];
+    --size_;
+  }
+
+  std::array<can::EstInnov, kCapacity> queue_{};
   std::size_t size_ = 0;
+  std::size_t first_ = 0;  ///< of those since the last tick, which are kept in order; within a tick there are none
 };
 
 inline void EventQueue::add(const Innovation& innovation, const Sample& sample, std::size_t instance, base::Micros now,
@@ -47,16 +61,23 @@ inline void EventQueue::add(const Innovation& innovation, const Sample& sample, 
                               .ratio = innovation.gate > 0.0F ? innovation.nis / innovation.gate : base::kNan,
                               .id = innovation.landmark,
                               .epoch = 0};
-  if (size_ == queue_.size()) {
+  if (size_ == kCapacity) {
     ++counters.events_dropped;
     if (innovation.verdict == can::Verdict::kAccepted) return;
     std::size_t victim = 0;
     while (victim < size_ && queue_[victim].verdict != can::Verdict::kAccepted) ++victim;
-    if (victim == size_) return;
-    for (std::size_t i = victim + 1; i < size_; ++i) queue_[i - 1] = queue_[i];
-    --size_;
+    if (victim < size_) {
+      if (victim < first_ && first_ != kNone) --first_;
+    } else if (first_ < size_ && before(message, queue_[size_ - 1])) {
+      victim = size_ - 1;
+    } else {
+      return;
+    }
+    remove(victim);
   }
-  queue_[size_++] = message;
+  std::size_t at = size_++;
+  for (; at > first_ && before(message, queue_[at - 1]); --at) queue_[at] = queue_[at - 1];
+  queue_[at] = message;
   if (size_ > counters.events_high_water) counters.events_high_water = static_cast<std::uint16_t>(size_);
 }
 

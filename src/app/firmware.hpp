@@ -49,7 +49,8 @@ class Firmware {
     if (frame.extended || frame.id < numbers_.can_base || frame.id >= numbers_.can_base + kInputs) return;
     if (frame.id != numbers_.can_base + can::InSync::kOffset) return node_.on_frame(frame);
     const auto sync = can::decode<can::InSync>(can::payload(frame));
-    if (!sync) return;
+    if (!sync) return void(++health_.sync_bad);
+    count_sync(*sync);
     const base::Micros time{static_cast<std::int64_t>(sync->time_us)};
     if (sync->kind == can::SyncKind::kBegin) {
       node_.power_on(time);
@@ -57,6 +58,16 @@ class Firmware {
       node_.send_version(outlet);
     }
     if (const auto t = pacer_.on_sync(sync->kind, time, board_.now(), health_)) tick(*t);
+  }
+
+  /// What the counter says never came. A repeated frame is no gap, nor is one that comes out of its order.
+  void count_sync(const can::InSync& sync) {
+    const auto step = static_cast<std::uint8_t>(sync.ctr - sync_counter_);
+    const bool anew = !counts_sync_ || sync.kind == can::SyncKind::kBegin;
+    if (!anew && step >= 0x80) return;
+    if (!anew && step > 1) health_.sync_gap = static_cast<std::uint16_t>(health_.sync_gap + step - 1);
+    sync_counter_ = sync.ctr;
+    counts_sync_ = true;
   }
 
   void tick(base::Micros t) {
@@ -68,6 +79,7 @@ class Firmware {
     const std::int64_t took_us = (board_.now() - began).us;
     const auto us = static_cast<std::uint32_t>(took_us < 0 ? 0 : took_us > 1'000'000 ? 1'000'000 : took_us);
     if (us > health_.longest_us) health_.longest_us = us;
+    if (took_us > numbers_.loop.period_us) ++health_.ticks_late;
     health_.mean_us += (static_cast<float>(us) - health_.mean_us) * 0.01F;
   }
 
@@ -76,6 +88,8 @@ class Firmware {
   Node<Estimators> node_;
   Pacer pacer_;
   LoopHealth health_;
+  std::uint8_t sync_counter_ = 0;
+  bool counts_sync_ = false;  ///< a sync frame has been there
 };
 
 }  // namespace tetap::app

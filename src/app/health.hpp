@@ -31,10 +31,12 @@ struct LoopHealth {
   can::SyncState sync = can::SyncState::kOwnTimer;
   std::uint32_t longest_us = 0;  ///< tick, since start
   float mean_us = 0;             ///< running mean
-  std::uint16_t ticks_late = 0;  ///< periods skipped because a tick overran
+  std::uint16_t ticks_late = 0;  ///< took longer than their period, or could not begin in it
   std::uint16_t sync_lost = 0;
   std::uint16_t sync_back = 0;  ///< sync frames whose time was not after the last tick
   std::uint16_t sync_jump = 0;  ///< sync frames too far ahead
+  std::uint16_t sync_gap = 0;   ///< sync frames that were sent, by their counter, and never came
+  std::uint16_t sync_bad = 0;   ///< sync frames of wrong length
   hal::CanFaults bus;
 };
 

@@ -151,6 +151,7 @@ void Node<Estimators, Capacity>::sample(const Sample& arrived) {
 template <class Estimators, std::size_t Capacity>
 template <class Send>
 void Node<Estimators, Capacity>::tick(base::Micros t, const LoopHealth& loop, Send&& send) {
+  publisher_.tick_begins();
   if (!ticked_) {
     restart(t, can::ResetCause::kPowerOn);
     ticked_ = true;

@@ -21,6 +21,7 @@ struct LoopNumbers {
   std::int32_t period_us = 10'000;   ///< of the tick, in sample time
   std::int32_t window_us = 200'000;  ///< how late a sample may come and still be fused at its own time
   std::int32_t ahead_us = 200'000;   ///< how far ahead of the tick a stamp may be and still wait
+  float turn_radps2 = 0.5F;          ///< 1 sigma of what turns it faster or slower: a yaw rate is as old as its sample
 };
 
 /// How a speed sample relates to its stamp.
@@ -218,7 +219,7 @@ struct Numbers {
 template <class Sink>
 constexpr void each_number(const Numbers& n, Sink&& sink) {
   const auto all = [&sink](const auto&... values) { (sink(values), ...); };
-  all(n.can_base, n.loop.period_us, n.loop.window_us, n.loop.ahead_us);
+  all(n.can_base, n.loop.period_us, n.loop.window_us, n.loop.ahead_us, n.loop.turn_radps2);
   const auto& d = n.wheels.drive;
   all(d.left_radius_m, d.right_radius_m, d.track_m, d.counts_per_turn, d.noise_left, d.noise_right);
   const auto& u = n.wheels.noise;

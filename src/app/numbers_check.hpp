@@ -50,6 +50,7 @@ consteval Numbers checked(const Numbers& n) {
   require(n.loop.period_us > 0 && n.loop.period_us <= 100'000, "loop.period_us: 1 to 100000");
   require(n.loop.window_us >= n.loop.period_us && n.loop.window_us <= 500'000, "loop.window_us: the period to 500000");
   require(n.loop.ahead_us >= 0 && n.loop.ahead_us <= 500'000, "loop.ahead_us: 0 to 500000");
+  require(not_negative(n.loop.turn_radps2), "loop.turn_radps2: not below 0");
 
   const auto& d = n.wheels.drive;
   // All zero: the robot has no wheels of its own to count.

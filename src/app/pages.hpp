@@ -16,11 +16,12 @@ template <class Put>
 void put_diagnostics(std::uint32_t page, const Counters& c, const LoopHealth& l, std::uint16_t timeline_high,
                      Put&& put) {
   constexpr std::uint32_t kLongest = 0xFFFFFE;
-  switch (page % 8) {
+  switch (page % 9) {
     case 0:
       put(can::EstDiagLoop{.loop_max_us = l.longest_us < kLongest ? l.longest_us : kLongest,
                            .loop_mean_us = static_cast<std::uint16_t>(l.mean_us < 65534.0F ? l.mean_us : 65534.0F),
-                           .sync = l.sync});
+                           .sync = l.sync,
+                           .tx_high = static_cast<std::uint16_t>(l.bus.tx_high < 0xFFF ? l.bus.tx_high : 0xFFF)});
       break;
     case 1:
       put(can::EstDiagTicks{.ticks_late = l.ticks_late, .sync_lost = l.sync_lost, .sync_back = l.sync_back});
@@ -43,8 +44,11 @@ void put_diagnostics(std::uint32_t page, const Counters& c, const LoopHealth& l,
     case 6:
       put(can::EstDiagRefused{.not_used = c.not_used, .no_time = c.no_time, .cmd_refused = c.command_refused});
       break;
+    case 7:
+      put(can::EstDiagCapacity{.map_full = c.map_full, .timeline_full = c.timeline_full});
+      break;
     default:
-      put(can::EstDiagCapacity{.map_full = c.map_full, .sync_jump = l.sync_jump, .timeline_full = c.timeline_full});
+      put(can::EstDiagSync{.sync_jump = l.sync_jump, .sync_gap = l.sync_gap, .sync_bad = l.sync_bad});
       break;
   }
 }

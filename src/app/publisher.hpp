@@ -72,6 +72,8 @@ class Publisher {
     troubles_.power_on();
   }
 
+  /// What is noted until end() comes in the order of the samples, and not of their arrival.
+  void tick_begins() { events_.tick_begins(); }
   /// First frame of the epoch.
   template <class Send>
   void begin(base::Micros now, const InputTally& tally, Send& send) {
@@ -91,6 +93,7 @@ class Publisher {
                          .epoch = static_cast<std::uint8_t>(epoch_),
                          .frames = static_cast<std::uint8_t>(frames_ + 1)},
         send);
+    events_.tick_ends();
   }
 
   template <class Send>
@@ -178,8 +181,8 @@ void Publisher<N>::estimate(std::size_t instance, can::EstimatorKind kind, bool 
     put(can::EstStdMore{.epoch = tag(),
                         .corr_x_yaw = e.p(0, 2) / (x * yaw),
                         .corr_y_yaw = e.p(1, 2) / (y * yaw),
-                        .std_speed_mps = base::kNan,
-                        .std_yaw_rate_radps = base::kNan},
+                        .std_speed_mps = base::sqrt(e.forward_m2ps2),
+                        .std_yaw_rate_radps = base::sqrt(e.yaw_rate_rad2ps2)},
         send, instance);
   }
 }

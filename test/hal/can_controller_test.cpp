@@ -66,7 +66,7 @@ TEST_P(CanControllerTest, AStuckBusFillsTheRingAndIsSaidNotWaitedFor) {
   }
   EXPECT_EQ(taken, FakeCanChip::kDepth + Controller::kTransmitCapacity);
   EXPECT_EQ(can.faults().tx_full, 1000 - taken);
-  EXPECT_EQ(can.tx_high_water(), Controller::kTransmitCapacity);
+  EXPECT_EQ(can.faults().tx_high, Controller::kTransmitCapacity);
   EXPECT_LT(chip.accesses - before, 10'000U);
 }
 

@@ -70,9 +70,9 @@ TEST_F(Folder, ARunLeavesItsFilesBehind) {
   EXPECT_EQ(play(script(20)), 0);
   const std::string estimates = read(path_ + "/estimates.csv");
   EXPECT_EQ(line(estimates, 0).find("epoch,time_s,estimator,kind,x_m,y_m,yaw_rad"), 0U);
-  EXPECT_EQ(line(estimates, 1), "1,1.000000,0,Odometry,0.001,-0.001,0.5000,-1.250,0.0000,,,,,,,1,0");
+  EXPECT_EQ(line(estimates, 1), "1,1.000000,0,Odometry,0.001,-0.001,0.5000,-1.250,0.0000,,,,,,,1,0,,");
   EXPECT_EQ(line(estimates, 5),
-            "5,1.040000,0,Odometry,0.005,-0.005,0.5000,-1.250,0.0000,0.2500,0.5000,0.1000,-0.5000,,,1,0");
+            "5,1.040000,0,Odometry,0.005,-0.005,0.5000,-1.250,0.0000,0.2500,0.5000,0.1000,-0.5000,,,1,0,,");
   EXPECT_EQ(line(estimates, 21), "");
   const std::string log = read(path_ + "/estimates.log");
   EXPECT_EQ(line(log, 0).find("(0000000001.000000) vcan0 320#40420F000000"), 0U);
@@ -137,7 +137,7 @@ TEST_F(Folder, AnyBytesFromTheNodeAreWrittenWithoutHarm) {
   EXPECT_EQ(totals.frames_received, 100'000U);
   EXPECT_GT(totals.epochs, 1000U);
   std::istringstream csv(read(path_ + "/estimates.csv"));
-  for (std::string row; std::getline(csv, row);) EXPECT_EQ(std::count(row.begin(), row.end(), ','), 16) << row;
+  for (std::string row; std::getline(csv, row);) EXPECT_EQ(std::count(row.begin(), row.end(), ','), 18) << row;
   std::istringstream innovations(read(path_ + "/innovations.csv"));
   for (std::string row; std::getline(innovations, row);) EXPECT_EQ(std::count(row.begin(), row.end(), ','), 10) << row;
 }

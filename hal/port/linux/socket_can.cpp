@@ -142,6 +142,7 @@ bool SocketCan::send(const base::CanFrame& frame) {
     return false;
   }
   batches_->out_frames[to_send_++] = to_kernel(frame);
+  faults_.tx_high = std::max(faults_.tx_high, static_cast<std::uint32_t>(to_send_));
   return true;
 }
 

@@ -46,7 +46,7 @@ class CanController {
     }
     ring_[(first_ + count_) % kTransmitCapacity] = frame;
     ++count_;
-    if (count_ > high_water_) high_water_ = count_;
+    if (count_ > faults_.tx_high) faults_.tx_high = static_cast<std::uint32_t>(count_);
     return true;
   }
 
@@ -91,7 +91,6 @@ class CanController {
 
   [[nodiscard]] CanFaults faults() const { return faults_; }
   [[nodiscard]] std::uint32_t rx_unsupported() const { return unsupported_; }  ///< remote frames, counted and dropped
-  [[nodiscard]] std::size_t tx_high_water() const { return high_water_; }      ///< most frames the ring ever held
 
  private:
   // UG1087, module CAN: offsets and bits used here.
@@ -156,7 +155,6 @@ class CanController {
   std::array<base::CanFrame, kTransmitCapacity> ring_{};
   std::size_t first_ = 0;
   std::size_t count_ = 0;
-  std::size_t high_water_ = 0;
   CanFaults faults_{};
   std::uint32_t unsupported_ = 0;
 };

@@ -244,11 +244,24 @@ inline Estimate DeadReckoning::estimate(const Numbers& n) const {
   DeadReckoning ahead = *this;
   ahead.propagate(out_time_, n);
   const bool fresh = held_.kind != Held::Kind::kNone && out_time_ - last_input_ <= base::Micros{n.wheels.timeout_us};
+  // Of the motion over one period: what it adds to the pose, and the steps of the counters.
+  const float period_s = base::seconds(base::Micros{n.loop.period_us});
+  const model::PlanarIncrement one = held_increment(period_s, n);
+  const float step_m = have_counts_ ? 0.41F * n.wheels.drive.left_m(1) : 0.0F;
+  const float track_m = n.wheels.drive.track_m;
+  const bool gyro = n.gyro.use != 0;
+  const float step_rad = gyro || !have_counts_ ? 0.0F : step_m / track_m;
+  // Samples are means, too: true in their middle.
+  const float aged =
+      n.loop.turn_radps2 * (base::seconds(out_time_ - (gyro ? gyro_time_ : last_input_)) + 0.5F * period_s);
+  const float per_s2 = 1.0F / (period_s * period_s);
   return {.time = out_time_,
           .pose = ahead.filter.x,
           .p = ahead.filter.p,
           .forward_mps = fresh ? forward_mps() : 0.0F,
           .yaw_rate_radps = fresh ? yaw_rate_radps(n) : 0.0F,
+          .forward_m2ps2 = fresh ? (one.var_ds + 0.5F * step_m * step_m) * per_s2 : base::kNan,
+          .yaw_rate_rad2ps2 = fresh ? (one.var_dyaw + 2.0F * step_rad * step_rad) * per_s2 + aged * aged : base::kNan,
           .position_valid = true,
           .heading_valid = true,
           .velocity_valid = fresh};

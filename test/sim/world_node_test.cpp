@@ -1,0 +1,163 @@
+// SPDX-License-Identifier: Apache-2.0
+// The node with the simulated world's frames: samples of several frames, late fixes, faults. Order of arrival leaves no
+// trace; and the 1 sigma of the motion says how far it is off.
+#include "app/node.hpp"
+#include "sim_host/matched_rover.hpp"
+#include "sim_host/world_source.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <map>
+#include <memory>
+#include <ostream>
+#include <random>
+#include <string>
+#include <vector>
+
+namespace tetap::sim {
+namespace {
+
+constexpr base::Micros kPeriod{10'000};
+
+struct Epoch {
+  std::vector<base::CanFrame> inputs;
+  Tick tick;
+  Truth truth;
+};
+
+std::vector<Epoch> made(const World::Options& options, std::uint64_t seed, int seconds) {
+  WorldSource source(World(options, seed), app::Numbers{}.can_base, kPeriod, base::Micros{1'000'000LL * seconds});
+  std::vector<Epoch> epochs;
+  Tick tick;
+  while (source.next(tick)) {
+    Epoch& one = epochs.emplace_back();
+    one.inputs.assign(tick.inputs.begin(), tick.inputs.end());
+    one.tick = tick;
+    one.truth = source.truth().back();
+  }
+  return epochs;
+}
+
+struct Robot {
+  const char* name;
+  app::Numbers numbers;
+  bool inertial;
+};
+void PrintTo(const Robot& robot, std::ostream* out) { *out << robot.name; }
+
+/// The first frame of `a` that `b` has not got, as its id and bytes.
+std::string first_difference(const std::vector<base::CanFrame>& a, const std::vector<base::CanFrame>& b) {
+  std::size_t i = 0;
+  while (i < a.size() && i < b.size() && a[i] == b[i]) ++i;
+  if (i == a.size() && i == b.size()) return "";
+  std::string text = "frame " + std::to_string(i) + ":";
+  for (const auto* frames : {&a, &b}) {
+    char part[16];
+    const base::CanFrame none{};
+    const base::CanFrame& f = i < frames->size() ? (*frames)[i] : none;
+    std::snprintf(part, sizeof part, " %03X#", static_cast<unsigned>(f.id));
+    text += part;
+    for (std::size_t k = 0; k < f.size; ++k)
+      std::snprintf(part, sizeof part, "%02X", unsigned{f.data[k]}), text += part;
+  }
+  return text;
+}
+
+/// hear(k, frame) gets every frame of epoch k.
+template <class Estimators, class Hear>
+void run_as(const app::Numbers& numbers, const std::vector<Epoch>& epochs, Hear& hear) {
+  const auto node = std::make_unique<app::Node<Estimators>>(numbers, app::Version{});
+  for (std::size_t k = 0; k < epochs.size(); ++k) {
+    if (epochs[k].tick.begin) node->power_on(*epochs[k].tick.begin);
+    for (const base::CanFrame& frame : epochs[k].inputs) node->on_frame(frame);
+    node->tick(epochs[k].tick.time, {}, [&](const base::CanFrame& frame) { hear(k, frame); });
+  }
+}
+template <class Hear>
+void run(const Robot& robot, const std::vector<Epoch>& epochs, Hear&& hear) {
+  if (robot.inertial) return run_as<robot::rover::Estimators>(robot.numbers, epochs, hear);
+  run_as<robot::rover_landmarks::Estimators>(robot.numbers, epochs, hear);
+}
+
+std::vector<base::CanFrame> outputs(const Robot& robot, const std::vector<Epoch>& epochs) {
+  std::vector<base::CanFrame> all;
+  run(robot, epochs, [&all](std::size_t, const base::CanFrame& frame) { all.push_back(frame); });
+  return all;
+}
+
+class Order : public ::testing::TestWithParam<Robot> {};
+
+// IMU samples of three frames, fixes of four and two that come late, lost frames, another clock for a while.
+TEST_P(Order, OfArrivalWithinAnEpochHasNoEffectOnAnyByte) {
+  World::Options options;
+  options.numbers.imu.rate_hz = 200;
+  options.faults = {{Fault::kLostFrames, base::Micros{4'000'000}, base::Micros{6'000'000}},
+                    {Fault::kGnssJump, base::Micros{12'000'000}, base::Micros{4'000'000}},
+                    {Fault::kStaleStamps, base::Micros{18'000'000}, base::Micros{2'000'000}},
+                    {Fault::kClockJump, base::Micros{22'000'000}, base::Micros{3'000'000}}};
+  std::vector<Epoch> epochs = made(options, 3, 30);
+  const std::vector<base::CanFrame> straight = outputs(GetParam(), epochs);
+  std::mt19937 engine{5};
+  for (int trial = 0; trial < 3; ++trial) {
+    std::size_t moved = 0;
+    for (Epoch& epoch : epochs) {
+      const auto before = epoch.inputs;
+      std::shuffle(epoch.inputs.begin(), epoch.inputs.end(), engine);
+      moved += epoch.inputs != before ? 1 : 0;
+    }
+    ASSERT_GT(moved, epochs.size() / 2);
+    EXPECT_EQ(first_difference(outputs(GetParam(), epochs), straight), "") << "shuffle " << trial;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Robots, Order,
+                         ::testing::Values(Robot{"rover", robot::rover::numbers, true},
+                                           Robot{"rover_landmarks", robot::rover_landmarks::numbers, false}),
+                         [](const auto& which) { return std::string(which.param.name); });
+
+// In the matched world, over the drive: the normalised square of an error whose 1 sigma is right is 1 in the mean.
+TEST(Motion, TheOneSigmaOfSpeedAndTurnRateIsThatOfTheirErrors) {
+  for (const Robot& robot :
+       {Robot{"rover", matched_rover(), true}, Robot{"rover_landmarks", matched_landmarks_rover(), false}}) {
+    struct Sum {
+      double speed = 0, rate = 0, count = 0;
+    };
+    std::map<std::size_t, Sum> sums;
+    for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+      const std::vector<Epoch> epochs = made({.mismatched = false, .inertial = robot.inertial}, seed, 60);
+      std::map<std::size_t, can::EstMotion> motion;
+      run(robot, epochs, [&](std::size_t k, const base::CanFrame& frame) {
+        if (k < 500) return;  // it stands, then drives
+        for (std::size_t i = 0; i < 4; ++i) {
+          if (frame.id == 0x300 + can::offset_of<can::EstMotion>(i))
+            if (const auto said = can::decode<can::EstMotion>(can::payload(frame))) motion[i] = *said;
+          if (frame.id != 0x300 + can::offset_of<can::EstStdMore>(i)) continue;
+          const auto std = can::decode<can::EstStdMore>(can::payload(frame));
+          if (!std || !motion[i].vel_valid || std->std_speed_mps < 1e-3F) continue;  // steps of the bus: 1 mm/s
+          const auto square = [](float said, double truth, float sigma) {
+            const double z = (static_cast<double>(said) - truth) / static_cast<double>(sigma);
+            return z * z;
+          };
+          Sum& sum = sums[i];
+          sum.speed += square(motion[i].speed_mps, epochs[k].truth.speed_mps, std->std_speed_mps);
+          sum.rate += square(motion[i].yaw_rate_radps, epochs[k].truth.yaw_rate_radps, std->std_yaw_rate_radps);
+          sum.count += 1;
+        }
+      });
+    }
+    EXPECT_GE(sums.size(), 2U) << robot.name;
+    for (const auto& [i, sum] : sums) {
+      std::printf("%s, estimator %zu: mean squares of speed %.2f, turn rate %.2f over %.0f\n", robot.name, i,
+                  sum.speed / sum.count, sum.rate / sum.count, sum.count);
+      EXPECT_GT(sum.count, 500);
+      EXPECT_NEAR(sum.speed / sum.count, 1.0, 0.5) << robot.name << i;
+      EXPECT_NEAR(sum.rate / sum.count, 1.0, 0.7) << robot.name << i;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace tetap::sim
