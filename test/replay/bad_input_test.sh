@@ -91,6 +91,8 @@ refused "an output folder that cannot be" "$work/good.log/x" "$programs/tetap-pl
 robots='there are: car .*mrclam rover .*rover_matched'
 refused "a robot that does not exist (player)" "no robot 'tank'; $robots" "$programs/tetap-play" "$work/good.log" --memory --robot tank
 refused "a robot that does not exist (node)" "no robot 'tank'; $robots" "$programs/tetap-node" --robot tank
+refused "a robot that does not exist (player, over a bus)" "no robot 'tank'; $robots" "$programs/tetap-play" "$work/good.log" --robot tank
+refused "a robot that does not exist (world, over a bus)" "no robot 'tank'; $robots" "$programs/tetap-world" --robot tank --out "$work/out"
 refused "a robot that does not exist (world)" "no robot 'tank'; $robots" "$programs/tetap-world" --memory --robot tank --out "$work/out"
 for program in play node world record; do
   refused "an unknown option (tetap-$program)" "tetap-$program: .*--frobnicate" "$programs/tetap-$program" --frobnicate
@@ -98,9 +100,39 @@ done
 refused "an option without its value" '--robot' "$programs/tetap-play" "$work/good.log" --memory --robot
 refused "a number that is none" '--period' play --period soon
 refused "jitter in lockstep" '--realtime' play --jitter-ms 5
-refused "an id base off its grid" '0x301' "$programs/tetap-node" --base 0x301
+refused "an id base off its grid (node)" "tetap-node: --base .*'0x301'" "$programs/tetap-node" --base 0x301
+refused "an id base off its grid (player)" "tetap-play: --base .*'0x301'" "$programs/tetap-play" "$work/good.log" --memory --robot mrclam --base 0x301
+refused "a log's id base off its grid" "tetap-play: --log-base .*'0x301'" "$programs/tetap-play" "$work/good.log" --memory --robot mrclam --log-base 0x301
+refused "an id base off its grid (world)" "tetap-world: --base .*'0x301'" "$programs/tetap-world" --memory --base 0x301 --out "$work/out"
+refused "an id base off its grid (recorder)" "tetap-record: --base .*'0x301'" "$programs/tetap-record" --base 0x301
+refused "a word that is no option (node)" 'tetap-node: .*vcan1' "$programs/tetap-node" vcan1
+refused "a word that is no option (world)" 'tetap-world: .*vcan1' "$programs/tetap-world" --memory vcan1 --out "$work/out"
+refused "a second log" 'tetap-play: .*vcan1' play vcan1
 refused "an unknown fault" "fault.*'?meteor" "$programs/tetap-world" --memory --fault meteor --out "$work/out"
-refused "a seed that is no number" '--seed' "$programs/tetap-world" --memory --seed x --out "$work/out"
+number() {  # OPTION VALUE...: each is refused with the option and the value named
+  local option=$1 value
+  shift
+  for value in "$@"; do
+    refused "$option $value (world)" "tetap-world: $option needs .*'$value'" "$programs/tetap-world" --memory --quiet --out "$work/out" "$option" "$value"
+  done
+}
+number --seed x -1 nan 1e30 1.7 ''
+number --duration soon nan inf -5 0 1e30
+number --window 0 -3 129 1e9
+number --laps 0 1.5 1e30
+number --imu-hz 0 nan
+number --gnss-hz 0 5.5
+number --gnss-m 0 nan
+number --east nan 60001
+# Every robot that there is stands in every program's help.
+every_robot=$(grep -oE 'name == "[a-z_]+"' sim_host/robots.hpp | cut -d'"' -f2)
+[ "$(wc -w <<<"$every_robot")" -ge 10 ] || { echo "WRONG  sim_host/robots.hpp names fewer than 10 robots"; failed=$((failed + 1)); }
+for robot in $every_robot; do
+  for program in node play world; do
+    count=$((count + 1))
+    "$programs/tetap-$program" --help | grep -qwF -- "$robot" || { echo "WRONG  tetap-$program --help does not name $robot"; failed=$((failed + 1)); }
+  done
+done
 
 # Tools
 refused "replay without a log" 'replay: which log' env -u LOG tools/replay
