@@ -53,6 +53,11 @@ on_the_bus() { # inside a private vcan0
     echo "WRONG  a node whose bus was down for a moment does not answer afterwards"; cat "$work/node" "$work/stderr"; failed=$((failed + 1))
   fi
   kill $node; wait $node
+  # A node that ends is noticed at once, not after the player's patience, and what it said is shown.
+  refused "a node that ends at once" 'node ended .status 2.: qemu-r5: .*nowhere.elf: no such file' timeout 12 env TETAP_IMAGE="$work/nowhere.elf" \
+    LOG="$work/good.log" ROBOT=rover BOARD=zynqmp_r5 OUT="$work/out" PLAY=--quiet tools/replay --inside
+  refused "a node that ends at once (sim)" 'node ended .status 2.: qemu-r5: .*nowhere.elf: no such file' timeout 12 env TETAP_IMAGE="$work/nowhere.elf" \
+    ROBOT=rover BOARD=zynqmp_r5 OUT="$work/out" WORLD=--quiet tools/sim --inside
 }
 
 if [ "${1:-}" = --inside ]; then
@@ -141,6 +146,22 @@ refused "replay against no such truth" 'replay: nowhere.csv: no such file' env L
 refused "replay on a bus of another kind" "replay: BUS=lin" env LOG="$work/good.log" BUS=lin tools/replay
 refused "replay of a board in memory" 'BUS=memory' env LOG="$work/good.log" BUS=memory BOARD=zynqmp_r5 tools/replay
 refused "replay for no such robot" "no robot 'tank'" env LOG="$work/good.log" BUS=memory ROBOT=tank OUT="$work/out" tools/replay
+refused "replay for no such robot over a bus" "no robot 'tank'; $robots" timeout 20 env LOG="$work/good.log" ROBOT=tank OUT="$work/out" tools/replay
+refused "sim for no such robot over a bus" "no robot 'tank'; $robots" timeout 20 env ROBOT=tank OUT="$work/out" tools/sim
+refused "sim for no such robot on a board" "no robot 'tank'; $robots" timeout 20 env ROBOT=tank BOARD=zynqmp_r5 OUT="$work/out" tools/sim
+refused "sim from seed -1" "--seed .*'-1'" env BUS=memory SEED=-1 OUT="$work/out" tools/sim
+# An image is built before it is started: a cmake that only notes what it is asked for, and fails.
+mkdir "$work/bin"
+printf '#!/bin/sh\necho "$@" >>"%s/asked"\n[ "$1" != --build ]\n' "$work" >"$work/bin/cmake"
+chmod +x "$work/bin/cmake"
+for tool in replay sim; do
+  refused "$tool of a robot without an image" "no image of robot 'rover_matched'; there are: .*husky_inertial" \
+    timeout 20 env LOG="$work/good.log" ROBOT=rover_matched BOARD=zynqmp_r5 OUT="$work/out" tools/$tool
+  : >"$work/asked"
+  refused "$tool of an image that cannot be built" 'build: preset r5 failed' \
+    timeout 20 env PATH="$work/bin:$PATH" LOG="$work/good.log" ROBOT=husky BOARD=zynqmp_r5 OUT="$work/out" tools/$tool
+  grep -q -- '^--build build/r5 --target tetap-zynqmp_r5-husky$' "$work/asked" || { echo "WRONG  $tool does not build the image it is to run"; failed=$((failed + 1)); }
+done
 refused "replay on no such board" "no board 'arduino'" env LOG="$work/good.log" BOARD=arduino OUT="$work/out" tools/replay
 refused "sim on no such board" "no board 'arduino'" env BOARD=arduino OUT="$work/out" tools/sim
 refused "sim with an unknown fault" 'meteor' env BUS=memory FAULT=meteor OUT="$work/out" tools/sim
