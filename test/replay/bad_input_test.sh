@@ -166,7 +166,17 @@ refused "replay on no such board" "no board 'arduino'" env LOG="$work/good.log" 
 refused "sim on no such board" "no board 'arduino'" env BOARD=arduino OUT="$work/out" tools/sim
 refused "sim with an unknown fault" 'meteor' env BUS=memory FAULT=meteor OUT="$work/out" tools/sim
 refused "firmware for no such board" "no board 'arduino'; there are: zynqmp_r5" env BOARD=arduino tools/firmware
-refused "firmware for no such robot" "no robot 'tank'; there are: .*mrclam" env BOARD=zynqmp_r5 ROBOT=tank tools/firmware
+refused "firmware for no such robot" "no image of robot 'tank'; there are: .*mrclam" env BOARD=zynqmp_r5 ROBOT=tank tools/firmware
+# An image that is over its budget, or allocates, is no firmware: in a tree whose tools say yes, but for one.
+mkdir -p "$work/tree/hal/port" "$work/tree/config"
+cp -r tools "$work/tree" && cp hal/port/CMakeLists.txt "$work/tree/hal/port" && cp config/*.hpp "$work/tree/config"
+for tool in heap layers size stack; do
+  for one in build heap layers size stack; do printf '#!/bin/sh\n' >"$work/tree/tools/$one"; done
+  printf '#!/bin/sh\ncase $* in *tetap-zynqmp_r5-husky.elf*) echo "$0: no" >&2; exit 1 ;; esac\n' >"$work/tree/tools/$tool"
+  mkdir -p "$work/tree/build/r5/hal/port"
+  touch "$work/tree/build/r5/hal/port/tetap-zynqmp_r5-husky".{elf,bin,hex,map}
+  refused "firmware that fails its proof ($tool)" "tools/$tool: no" env BOARD=zynqmp_r5 ROBOT=husky "$work/tree/tools/firmware"
+done
 refused "a report on nothing" 'nowhere' tools/report "$work/nowhere"
 "$programs/tetap-play" "$work/good.log" --memory --robot mrclam --out "$work/run" --quiet || failed=$((failed + 1))
 refused "a report against no such truth" 'nowhere.csv' tools/report "$work/run" --truth "$work/nowhere.csv" --no-pictures
