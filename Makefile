@@ -35,7 +35,7 @@ proof: setup ## the whole lengths: exhaustive functions, full logs, long runs
 replay: setup programs ## a recorded log over vcan0: LOG=run.log [TRUTH=run.truth.csv] ROBOT=mrclam|husky|labyrinth|rover [BOARD=] [BUS=memory]
 	@tools/replay
 
-firmware: setup ## the flash image: BOARD=zynqmp_r5 ROBOT=rover, with its size table
+firmware: setup ## the flash image: BOARD=zynqmp_r5 ROBOT=rover, with its size table, no heap and stack proved
 	@tools/firmware
 
 size: arm ## flash and RAM per section of every image against the budgets

@@ -9,16 +9,9 @@
 #include "version.hpp"
 
 #include <memory>
-#include <stdexcept>
 #include <string>
 
 namespace tetap::sim {
-
-/// Throws std::runtime_error with the names that exist when there is no such robot.
-template <class F>
-void for_robot(const std::string& name, F&& f) {
-  if (!with_robot(name, f)) throw std::runtime_error("no robot '" + name + "'; there are: " + std::string(kRobotNames));
-}
 
 /// Calls play(link) with a link to a node of that robot in this process; its status.
 template <class Play>

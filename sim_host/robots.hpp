@@ -12,6 +12,7 @@
 #include "config/rover_landmarks.hpp"
 #include "sim_host/matched_rover.hpp"
 
+#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <type_traits>
@@ -39,6 +40,12 @@ template <class F>
   if (name == "labyrinth")
     return f(std::type_identity<robot::labyrinth::Estimators>{}, robot::labyrinth::numbers), true;
   return false;
+}
+
+/// Throws std::runtime_error with the names that exist when there is no such robot.
+template <class F>
+void for_robot(const std::string& name, F&& f) {
+  if (!with_robot(name, f)) throw std::runtime_error("no robot '" + name + "'; there are: " + std::string(kRobotNames));
 }
 
 }  // namespace tetap::sim

@@ -29,12 +29,12 @@ template <class... E>
           .inertial = ((E::kKind == can::EstimatorKind::kInertial) || ...)};
 }
 
-/// All of them where the name is not known: a node on a bus may be any.
+/// Throws std::runtime_error when there is no such robot.
 [[nodiscard]] inline Sent sent_to(const std::string& robot) {
-  Sent sent{.landmarks = true};
-  static_cast<void>(with_robot(robot, [&]<class Estimators>(std::type_identity<Estimators>, const app::Numbers&) {
+  Sent sent;
+  for_robot(robot, [&]<class Estimators>(std::type_identity<Estimators>, const app::Numbers&) {
     sent = sent_to(Estimators{});
-  }));
+  });
   return sent;
 }
 

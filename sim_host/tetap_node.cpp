@@ -3,10 +3,11 @@
 #include "app/firmware.hpp"
 #include "hal/port/linux/board.hpp"
 #include "sim_host/in_process.hpp"
-#include "sim_host/options.hpp"
+#include "sim_host/play/arguments.hpp"
 #include "version.hpp"
 
 #include <csignal>
+#include <cstdint>
 #include <cstdio>
 #include <exception>
 #include <memory>
@@ -17,12 +18,19 @@ namespace {
 volatile std::sig_atomic_t stop_asked = 0;
 void ask_to_stop(int) { stop_asked = 1; }
 
-constexpr const char* kHelp =
-    "usage: tetap-node [OPTION]...\n\nThe firmware as a Linux program on SocketCAN. Ends on INT or TERM with status "
-    "0.\n\n"
-    "  --can IFACE    the interface (default vcan0)\n"
-    "  --robot NAME   husky, labyrinth, mrclam, rover or rover_matched (default rover)\n"
-    "  --base ID      first id of the node's block of 64 (default 0x300)\n";
+std::string help() {
+  return R"(usage: tetap-node [OPTION]...
+
+The firmware as a Linux program on SocketCAN. Ends on INT or TERM with status 0.
+
+  --can IFACE    the interface (default vcan0)
+  --robot NAME   what it is (default rover):
+                 )" +
+         std::string(tetap::sim::kRobotNames) + R"(
+  --base ID      first id of the node's block of 64 (default 0x300)
+  --list-robots  print the names of the robots, nothing else
+)";
+}
 
 template <class Estimators>
 void run(tetap::hal::LinuxBoard& board, const tetap::app::Numbers& numbers) {
@@ -37,13 +45,17 @@ void run(tetap::hal::LinuxBoard& board, const tetap::app::Numbers& numbers) {
 }  // namespace
 
 int main(int argc, char** argv) try {
-  const tetap::sim::Options options(argc, argv, {"can", "robot", "base"}, {}, kHelp);
-  const std::string interface = options.text("can", "vcan0");
-  const std::string robot = options.text("robot", "rover");
+  tetap::sim::Arguments arguments(argc, argv);
+  if (arguments.flag("--help") || arguments.flag("-h")) return std::fputs(help().c_str(), stdout), 0;
+  if (arguments.flag("--list-robots")) return std::printf("%s\n", std::string(tetap::sim::kRobotNames).c_str()), 0;
+  const std::string interface = arguments.text("--can").value_or("vcan0");
+  const std::string robot = arguments.text("--robot").value_or("rover");
+  const std::uint32_t base = arguments.base();
+  arguments.finish();
   std::signal(SIGINT, ask_to_stop);
   std::signal(SIGTERM, ask_to_stop);
   tetap::sim::for_robot(robot, [&]<class Estimators>(std::type_identity<Estimators>, tetap::app::Numbers numbers) {
-    numbers.can_base = options.base();
+    numbers.can_base = base;
     tetap::hal::LinuxBoard board(interface);
     std::fprintf(stderr, "tetap-node: robot %s on %s, ids %03X to %03X\n", robot.c_str(), interface.c_str(),
                  numbers.can_base, numbers.can_base + 0x3F);

@@ -11,11 +11,12 @@ int main(int count, char** values) {
   try {
     using namespace tetap;
     sim::Arguments arguments(count, values);
-    if (arguments.flag("--help") || arguments.flag("-h")) return std::fputs(sim::play_help(), stdout), 0;
+    if (arguments.flag("--help") || arguments.flag("-h"))
+      return std::fputs(sim::play_help(sim::kRobotNames).c_str(), stdout), 0;
     sim::PlayOptions options = sim::play_options(arguments);
-    static_cast<void>(sim::with_robot(options.robot, [&options](auto, const app::Numbers& numbers) {
-      options.numbers = sim::numbers_words(numbers);
-    }));
+    if (!options.robot.empty())
+      sim::for_robot(options.robot,
+                     [&options](auto, const app::Numbers& numbers) { options.numbers = sim::numbers_words(numbers); });
     if (options.memory)
       return sim::with_node_in_process(options.robot, options.script.base,
                                        [&](auto& link) { return sim::play(link, options, "memory", "tetap-play"); });

@@ -36,7 +36,7 @@ int record(sim::Arguments& arguments) {
   const std::string interface = arguments.text("--can").value_or("vcan0");
   const sim::SessionOptions about{.program = "tetap-record",
                                   .folder = arguments.text("--out").value_or("out/record"),
-                                  .base = sim::base_argument(arguments),
+                                  .base = arguments.base(),
                                   .raw = true,
                                   .mode = "record",
                                   .bus = interface,

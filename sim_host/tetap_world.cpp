@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // tetap-world: the simulated world's sensors on a CAN bus, and what the node makes of them on record beside the truth.
 #include "sim_host/in_process.hpp"
-#include "sim_host/options.hpp"
+#include "sim_host/play/arguments.hpp"
 #include "sim_host/play/lockstep.hpp"
 #include "sim_host/play/realtime.hpp"
 #include "sim_host/play/session.hpp"
@@ -9,10 +9,11 @@
 #include "sim_host/world_source.hpp"
 
 #include <algorithm>
-#include <cmath>
+#include <cstdint>
 #include <cstdio>
 #include <exception>
 #include <string>
+#include <string_view>
 
 namespace {
 
@@ -120,20 +121,18 @@ int drive(L& link, const Run& run) {
   return status;
 }
 
-int counted(const sim::Options& options, const char* name, int otherwise, int least, int most) {
-  const double given = options.number(name, otherwise);
-  if (!(given >= least && given <= most && given - std::floor(given) <= 0))
-    throw std::runtime_error(std::string("--") + name + ": a whole number from " + std::to_string(least) + " to " +
-                             std::to_string(most));
-  return static_cast<int>(given);
+/// From 1 to `most`.
+int counted(sim::Arguments& arguments, std::string_view name, int otherwise, int most) {
+  return static_cast<int>(
+      arguments.integer(name, static_cast<std::uint64_t>(otherwise), 1, static_cast<std::uint64_t>(most)));
 }
 
-void set_world(const sim::Options& options, sim::World::Options& world) {
-  const std::string course = options.text("course", "yard");
+void set_world(sim::Arguments& arguments, sim::World::Options& world) {
+  const std::string course = arguments.text("--course").value_or("yard");
   // Four minutes of one fault, and what comes after it, take two laps.
   const bool far = std::any_of(world.faults.begin(), world.faults.end(),
                                [](const sim::FaultSetting& s) { return s.fault == sim::Fault::kGnssFar; });
-  const int laps = counted(options, "laps", far ? 2 : 1, 1, 1000);
+  const int laps = counted(arguments, "--laps", far ? 2 : 1, 1000);
   if (course == "road") {
     world.course = sim::road_course(laps);
     world.limits.speed_mps = 5;
@@ -145,59 +144,53 @@ void set_world(const sim::Options& options, sim::World::Options& world) {
   } else {
     throw std::runtime_error("--course " + course + ": it is yard, road or stand");
   }
-  const double east_m = options.number("east", 0);
-  if (!(std::fabs(east_m) <= 60'000))
-    throw std::runtime_error("--east: at most 60 km, which is what a pose on the bus can say");
+  const double east_m = arguments.real("--east", 0, -60'000, 60'000);  // what a pose on the bus can say
   for (sim::Waypoint& at : world.course.waypoints) at.x_m += east_m;
   for (sim::Landmark& mark : world.course.landmarks) mark.x_m += east_m;
-  if (options.has("no-wheels")) world.numbers.wheels.rate_hz = 0;
-  world.numbers.gnss.rate_hz = counted(options, "gnss-hz", world.numbers.gnss.rate_hz, 1, 100);
-  world.numbers.imu.rate_hz = counted(options, "imu-hz", world.numbers.imu.rate_hz, 1, 2000);
-  if (!options.has("gnss-m")) return;
-  const double gnss_m = options.number("gnss-m", 0);
-  if (!(gnss_m >= 0.001 && gnss_m <= 100)) throw std::runtime_error("--gnss-m: from 0.001 to 100 m");
-  world.numbers.gnss = sim::with_error(world.numbers.gnss, gnss_m);
+  if (arguments.flag("--no-wheels")) world.numbers.wheels.rate_hz = 0;
+  world.numbers.gnss.rate_hz = counted(arguments, "--gnss-hz", world.numbers.gnss.rate_hz, 100);
+  world.numbers.imu.rate_hz = counted(arguments, "--imu-hz", world.numbers.imu.rate_hz, 2000);
+  const double gnss_m = arguments.real("--gnss-m", 0, 0.001, 100);
+  if (gnss_m > 0) world.numbers.gnss = sim::with_error(world.numbers.gnss, gnss_m);
 }
 
 }  // namespace
 
 int main(int argc, char** argv) try {
-  const sim::Options options(argc, argv,
-                             {"can", "robot", "out", "seed", "duration", "fault", "window", "base", "course", "laps",
-                              "imu-hz", "gnss-m", "gnss-hz", "east"},
-                             {"memory", "matched", "realtime", "emulated", "raw", "quiet", "no-pose", "no-wheels"},
-                             help().c_str());
-  if (!options.words().empty()) throw std::runtime_error("'" + options.words().front() + "': an option begins with --");
+  sim::Arguments arguments(argc, argv);
+  if (arguments.flag("--help") || arguments.flag("-h")) return std::fputs(help().c_str(), stdout), 0;
   Run run;
-  const std::string interface = options.text("can", "vcan0");
-  const bool memory = options.has("memory");
-  const std::string robot = options.text("robot", "rover");
-  run.seed = static_cast<std::uint64_t>(options.number("seed", 1));
-  run.limit = {static_cast<std::int64_t>(options.number("duration", 86'400) * 1e6)};
-  run.world.mismatched = !options.has("matched");
-  run.told_pose = !options.has("no-pose");
-  for (const std::string& given : options.all("fault")) {
+  const std::string interface = arguments.text("--can").value_or("vcan0");
+  const bool memory = arguments.flag("--memory");
+  const std::string robot = arguments.text("--robot").value_or("rover");
+  const std::uint32_t base = arguments.base();
+  run.seed = arguments.integer("--seed", 1, 0, ~std::uint64_t{0});
+  run.limit = {static_cast<std::int64_t>(arguments.real("--duration", 86'400, 0.01, 1e7) * 1e6)};
+  run.world.mismatched = !arguments.flag("--matched");
+  run.told_pose = !arguments.flag("--no-pose");
+  for (const std::string& given : arguments.texts("--fault")) {
     const sim::FaultsParsed parsed = sim::parse_faults(given);
     if (!parsed.error.empty()) throw std::runtime_error(parsed.error);
     run.world.faults.insert(run.world.faults.end(), parsed.settings.begin(), parsed.settings.end());
     run.faults += (run.faults.empty() ? "" : ",") + given;
   }
-  set_world(options, run.world);
+  set_world(arguments, run.world);
   sim::send_only(sim::sent_to(robot), run.world);
-  run.realtime = options.has("realtime");
-  run.lockstep.window = static_cast<std::size_t>(options.number("window", 8));
-  if (options.has("emulated")) run.lockstep.patience = sim::kEmulatedPatience;
-  run.lockstep.base = options.base();
+  run.realtime = arguments.flag("--realtime");
+  run.lockstep.window = arguments.window();
+  if (arguments.flag("--emulated")) run.lockstep.patience = sim::kEmulatedPatience;
+  run.lockstep.base = base;
   run.session = {.program = "tetap-world",
-                 .folder = options.text("out", "out/sim"),
-                 .base = options.base(),
-                 .raw = options.has("raw"),
+                 .folder = arguments.text("--out").value_or("out/sim"),
+                 .base = base,
+                 .raw = arguments.flag("--raw"),
                  .mode = run.realtime ? "realtime" : "lockstep",
                  .bus = memory ? "memory" : interface,
                  .robot = robot,
                  .log = "simulated world",
-                 .quiet = options.has("quiet")};
-  if (memory) return sim::with_node_in_process(robot, options.base(), [&](auto& link) { return drive(link, run); });
+                 .quiet = arguments.flag("--quiet")};
+  arguments.finish();
+  if (memory) return sim::with_node_in_process(robot, base, [&](auto& link) { return drive(link, run); });
   hal::SocketCan can(interface);
   return drive(can, run);
 } catch (const std::exception& error) {

@@ -26,30 +26,30 @@ class Arguments {
   explicit Arguments(std::vector<std::string> values) : left_(std::move(values)) {}
 
   /// True if `--name` is there.
-  bool flag(std::string_view name) {
-    for (std::size_t i = 0; i < left_.size(); ++i) {
-      if (left_[i] != name) continue;
-      left_.erase(left_.begin() + static_cast<std::ptrdiff_t>(i));
-      return true;
-    }
-    return false;
-  }
-  /// The text after `--name`, or of `--name=text`.
-  std::optional<std::string> text(std::string_view name) {
-    for (std::size_t i = 0; i < left_.size(); ++i) {
+  bool flag(std::string_view name) { return std::erase(left_, name) > 0; }
+  /// The text after each `--name`, or of each `--name=text`.
+  std::vector<std::string> texts(std::string_view name) {
+    std::vector<std::string> values;
+    for (std::size_t i = 0; i < left_.size();) {
       const auto at = left_.begin() + static_cast<std::ptrdiff_t>(i);
       if (left_[i].size() > name.size() && left_[i].starts_with(name) && left_[i][name.size()] == '=') {
-        std::string value = left_[i].substr(name.size() + 1);
+        values.push_back(left_[i].substr(name.size() + 1));
         left_.erase(at);
-        return value;
+      } else if (left_[i] == name) {
+        if (i + 1 == left_.size()) throw UsageError(std::string(name) + " needs a value");
+        values.push_back(left_[i + 1]);
+        left_.erase(at, at + 2);
+      } else {
+        ++i;
       }
-      if (left_[i] != name) continue;
-      if (i + 1 == left_.size()) throw UsageError(std::string(name) + " needs a value");
-      std::string value = left_[i + 1];
-      left_.erase(at, at + 2);
-      return value;
     }
-    return std::nullopt;
+    return values;
+  }
+  /// The last of them: what is appended to a command line overrides what a script put there.
+  std::optional<std::string> text(std::string_view name) {
+    auto values = texts(name);
+    if (values.empty()) return std::nullopt;
+    return std::move(values.back());
   }
   double real(std::string_view name, double otherwise, double low, double high) {
     const auto given = text(name);
@@ -65,16 +65,23 @@ class Arguments {
   std::uint64_t integer(std::string_view name, std::uint64_t otherwise, std::uint64_t low, std::uint64_t high) {
     const auto given = text(name);
     if (!given) return otherwise;
-    const bool hex = given->starts_with("0x") || given->starts_with("0X");
-    const char* first = given->data() + (hex ? 2 : 0);
-    const char* last = given->data() + given->size();
-    std::uint64_t value = 0;
-    const auto [end, error] = std::from_chars(first, last, value, hex ? 16 : 10);
-    if (error != std::errc{} || end != last || first == last || value < low || value > high)
+    const auto value = whole(*given);
+    if (!value || *value < low || *value > high)
       throw UsageError(std::string(name) + " needs a whole number from " + std::to_string(low) + " to " +
                        std::to_string(high) + ", not '" + *given + "'");
-    return value;
+    return *value;
   }
+  /// A node's id base: its block of 64 on its grid and within 11 bits.
+  std::uint32_t base(std::string_view name = "--base", std::uint32_t otherwise = 0x300) {
+    const auto given = text(name);
+    if (!given) return otherwise;
+    const auto value = whole(*given);
+    if (!value || *value % 0x40 != 0 || *value > 0x7C0)
+      throw UsageError(std::string(name) + " needs a multiple of 0x40 up to 0x7C0, not '" + *given + "'");
+    return static_cast<std::uint32_t>(*value);
+  }
+  /// Ticks in flight in lockstep.
+  std::size_t window() { return static_cast<std::size_t>(integer("--window", 8, 1, 128)); }
   /// The next argument that is no option. Ask for it after all options.
   std::optional<std::string> positional() {
     for (std::size_t i = 0; i < left_.size(); ++i) {
@@ -93,6 +100,15 @@ class Arguments {
   }
 
  private:
+  static std::optional<std::uint64_t> whole(const std::string& text) {
+    const bool hex = text.starts_with("0x") || text.starts_with("0X");
+    const char* first = text.data() + (hex ? 2 : 0);
+    const char* last = text.data() + text.size();
+    std::uint64_t value = 0;
+    const auto [end, error] = std::from_chars(first, last, value, hex ? 16 : 10);
+    if (error != std::errc{} || end != last) return std::nullopt;
+    return value;
+  }
   static std::string plain(double value) {
     std::string text(32, '\0');
     text.resize(
@@ -101,11 +117,5 @@ class Arguments {
   }
   std::vector<std::string> left_;
 };
-
-/// A node's id base, for every program alike: its whole block within 11 bits.
-[[nodiscard]] inline std::uint32_t base_argument(Arguments& arguments, std::string_view name = "--base",
-                                                 std::uint32_t otherwise = 0x300) {
-  return static_cast<std::uint32_t>(arguments.integer(name, otherwise, 0, 0x7C0));
-}
 
 }  // namespace tetap::sim

@@ -3,7 +3,7 @@
 
 namespace tetap::sim {
 
-const char* play_help() {
+std::string play_help(std::string_view robots) {
   return R"(usage: tetap-play LOG [OPTION]...
 
 Plays a log to a node and records what it answers.
@@ -16,7 +16,9 @@ Plays a log to a node and records what it answers.
   --log-interface I   play only frames logged from this interface
   --keep-going        count malformed lines of the log instead of stopping at the first
   --memory            to a node of --robot NAME in this process instead, without a bus
-  --robot NAME        with --memory: what the node is; else only written into run.json
+  --robot NAME        with --memory: what the node is; else only written into run.json:
+                      )" +
+         std::string(robots) + R"(
   --raw               also write raw.log: everything on the bus as it came
   --quiet             no progress line
 
@@ -49,8 +51,8 @@ PlayOptions play_options(Arguments& arguments) {
   o.memory = arguments.flag("--memory");
   o.robot = arguments.text("--robot").value_or("");
   o.folder = arguments.text("--out").value_or("out/play");
-  o.script.base = base_argument(arguments);
-  o.script.log_base = base_argument(arguments, "--log-base", o.script.base);
+  o.script.base = arguments.base();
+  o.script.log_base = arguments.base("--log-base", o.script.base);
   const auto milliseconds = [&arguments](std::string_view name, double otherwise, double low) {
     return base::Micros{static_cast<std::int64_t>(arguments.real(name, otherwise, low, 1000) * 1000 + 0.5)};
   };
@@ -69,7 +71,7 @@ PlayOptions play_options(Arguments& arguments) {
                       : PlayMode::kAutomatic;
   o.lockstep.base = o.realtime.base = o.script.base;
   o.realtime.period = o.script.period;
-  o.lockstep.window = static_cast<std::size_t>(arguments.integer("--window", 8, 1, 128));
+  o.lockstep.window = arguments.window();
   o.lockstep.burst = static_cast<std::size_t>(arguments.integer("--burst", 0, 1, 10'000));
   o.lockstep.burst_gap = milliseconds("--burst-gap", 5, 0);
   if (arguments.flag("--emulated")) o.lockstep.patience = o.realtime.patience = kEmulatedPatience;

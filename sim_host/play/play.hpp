@@ -12,6 +12,7 @@
 #include <cstdint>
 #include <cstdio>
 #include <string>
+#include <string_view>
 
 namespace tetap::sim {
 
@@ -34,7 +35,8 @@ struct PlayOptions {
   bool quiet = false;
 };
 
-[[nodiscard]] const char* play_help();
+/// `robots`: the names that there are.
+[[nodiscard]] std::string play_help(std::string_view robots);
 
 /// Takes the player's options out of the command line, LOG included, and refuses what is left; throws UsageError.
 [[nodiscard]] PlayOptions play_options(Arguments& arguments);

@@ -193,7 +193,23 @@ TEST(Arguments, WhatIsNotUnderstoodIsNamed) {
   EXPECT_EQ(message({"--window", "-3"}, window), "--window needs a whole number from 1 to 128, not '-3'");
   EXPECT_EQ(message({"--drop", "nan"}, [](Arguments& a) { a.real("--drop", 0, 0, 1); }),
             "--drop needs a number from 0 to 1, not 'nan'");
+  const auto base = [](Arguments& a) { static_cast<void>(a.base()); };
+  EXPECT_EQ(message({"--base", "0x340"}, base), "");
+  EXPECT_EQ(message({"--base=0x7C0"}, base), "");
+  EXPECT_EQ(message({"--base", "0x301"}, base), "--base needs a multiple of 0x40 up to 0x7C0, not '0x301'");
+  EXPECT_EQ(message({"--base", "0x800"}, base), "--base needs a multiple of 0x40 up to 0x7C0, not '0x800'");
+  EXPECT_EQ(message({"--base", "0x"}, base), "--base needs a multiple of 0x40 up to 0x7C0, not '0x'");
   EXPECT_EQ(message({"a", "b"}, [](Arguments& a) { a.positional(); }), "one argument too many: b (--help lists them)");
+}
+
+TEST(Arguments, TheLastOfSeveralCountsAndAllCanBeHad) {
+  Arguments arguments({"--seed", "1", "--quiet", "--fault=a", "--seed=2", "--quiet", "--fault", "b"});
+  EXPECT_EQ(arguments.integer("--seed", 9, 0, 10), 2U);
+  EXPECT_EQ(arguments.texts("--fault"), (std::vector<std::string>{"a", "b"}));
+  EXPECT_TRUE(arguments.flag("--quiet"));
+  EXPECT_FALSE(arguments.flag("--quiet"));
+  EXPECT_FALSE(arguments.text("--seed"));
+  EXPECT_NO_THROW(arguments.finish());
 }
 
 }  // namespace

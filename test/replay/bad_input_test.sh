@@ -53,6 +53,11 @@ on_the_bus() { # inside a private vcan0
     echo "WRONG  a node whose bus was down for a moment does not answer afterwards"; cat "$work/node" "$work/stderr"; failed=$((failed + 1))
   fi
   kill $node; wait $node
+  # A node that ends is noticed at once, not after the player's patience, and what it said is shown.
+  refused "a node that ends at once" 'node ended .status 2.: qemu-r5: .*nowhere.elf: no such file' timeout 12 env TETAP_IMAGE="$work/nowhere.elf" \
+    LOG="$work/good.log" ROBOT=rover BOARD=zynqmp_r5 OUT="$work/out" PLAY=--quiet tools/replay --inside
+  refused "a node that ends at once (sim)" 'node ended .status 2.: qemu-r5: .*nowhere.elf: no such file' timeout 12 env TETAP_IMAGE="$work/nowhere.elf" \
+    ROBOT=rover BOARD=zynqmp_r5 OUT="$work/out" WORLD=--quiet tools/sim --inside
 }
 
 if [ "${1:-}" = --inside ]; then
@@ -91,6 +96,8 @@ refused "an output folder that cannot be" "$work/good.log/x" "$programs/tetap-pl
 robots='there are: car .*mrclam rover .*rover_matched'
 refused "a robot that does not exist (player)" "no robot 'tank'; $robots" "$programs/tetap-play" "$work/good.log" --memory --robot tank
 refused "a robot that does not exist (node)" "no robot 'tank'; $robots" "$programs/tetap-node" --robot tank
+refused "a robot that does not exist (player, over a bus)" "no robot 'tank'; $robots" "$programs/tetap-play" "$work/good.log" --robot tank
+refused "a robot that does not exist (world, over a bus)" "no robot 'tank'; $robots" "$programs/tetap-world" --robot tank --out "$work/out"
 refused "a robot that does not exist (world)" "no robot 'tank'; $robots" "$programs/tetap-world" --memory --robot tank --out "$work/out"
 for program in play node world record; do
   refused "an unknown option (tetap-$program)" "tetap-$program: .*--frobnicate" "$programs/tetap-$program" --frobnicate
@@ -98,9 +105,39 @@ done
 refused "an option without its value" '--robot' "$programs/tetap-play" "$work/good.log" --memory --robot
 refused "a number that is none" '--period' play --period soon
 refused "jitter in lockstep" '--realtime' play --jitter-ms 5
-refused "an id base off its grid" '0x301' "$programs/tetap-node" --base 0x301
+refused "an id base off its grid (node)" "tetap-node: --base .*'0x301'" "$programs/tetap-node" --base 0x301
+refused "an id base off its grid (player)" "tetap-play: --base .*'0x301'" "$programs/tetap-play" "$work/good.log" --memory --robot mrclam --base 0x301
+refused "a log's id base off its grid" "tetap-play: --log-base .*'0x301'" "$programs/tetap-play" "$work/good.log" --memory --robot mrclam --log-base 0x301
+refused "an id base off its grid (world)" "tetap-world: --base .*'0x301'" "$programs/tetap-world" --memory --base 0x301 --out "$work/out"
+refused "an id base off its grid (recorder)" "tetap-record: --base .*'0x301'" "$programs/tetap-record" --base 0x301
+refused "a word that is no option (node)" 'tetap-node: .*vcan1' "$programs/tetap-node" vcan1
+refused "a word that is no option (world)" 'tetap-world: .*vcan1' "$programs/tetap-world" --memory vcan1 --out "$work/out"
+refused "a second log" 'tetap-play: .*vcan1' play vcan1
 refused "an unknown fault" "fault.*'?meteor" "$programs/tetap-world" --memory --fault meteor --out "$work/out"
-refused "a seed that is no number" '--seed' "$programs/tetap-world" --memory --seed x --out "$work/out"
+number() {  # OPTION VALUE...: each is refused with the option and the value named
+  local option=$1 value
+  shift
+  for value in "$@"; do
+    refused "$option $value (world)" "tetap-world: $option needs .*'$value'" "$programs/tetap-world" --memory --quiet --out "$work/out" "$option" "$value"
+  done
+}
+number --seed x -1 nan 1e30 1.7 ''
+number --duration soon nan inf -5 0 1e30
+number --window 0 -3 129 1e9
+number --laps 0 1.5 1e30
+number --imu-hz 0 nan
+number --gnss-hz 0 5.5
+number --gnss-m 0 nan
+number --east nan 60001
+# Every robot that there is stands in every program's help.
+every_robot=$(grep -oE 'name == "[a-z_]+"' sim_host/robots.hpp | cut -d'"' -f2)
+[ "$(wc -w <<<"$every_robot")" -ge 10 ] || { echo "WRONG  sim_host/robots.hpp names fewer than 10 robots"; failed=$((failed + 1)); }
+for robot in $every_robot; do
+  for program in node play world; do
+    count=$((count + 1))
+    "$programs/tetap-$program" --help | grep -qwF -- "$robot" || { echo "WRONG  tetap-$program --help does not name $robot"; failed=$((failed + 1)); }
+  done
+done
 
 # Tools
 refused "replay without a log" 'replay: which log' env -u LOG tools/replay
@@ -109,11 +146,37 @@ refused "replay against no such truth" 'replay: nowhere.csv: no such file' env L
 refused "replay on a bus of another kind" "replay: BUS=lin" env LOG="$work/good.log" BUS=lin tools/replay
 refused "replay of a board in memory" 'BUS=memory' env LOG="$work/good.log" BUS=memory BOARD=zynqmp_r5 tools/replay
 refused "replay for no such robot" "no robot 'tank'" env LOG="$work/good.log" BUS=memory ROBOT=tank OUT="$work/out" tools/replay
+refused "replay for no such robot over a bus" "no robot 'tank'; $robots" timeout 20 env LOG="$work/good.log" ROBOT=tank OUT="$work/out" tools/replay
+refused "sim for no such robot over a bus" "no robot 'tank'; $robots" timeout 20 env ROBOT=tank OUT="$work/out" tools/sim
+refused "sim for no such robot on a board" "no robot 'tank'; $robots" timeout 20 env ROBOT=tank BOARD=zynqmp_r5 OUT="$work/out" tools/sim
+refused "sim from seed -1" "--seed .*'-1'" env BUS=memory SEED=-1 OUT="$work/out" tools/sim
+# An image is built before it is started: a cmake that only notes what it is asked for, and fails.
+mkdir "$work/bin"
+printf '#!/bin/sh\necho "$@" >>"%s/asked"\n[ "$1" != --build ]\n' "$work" >"$work/bin/cmake"
+chmod +x "$work/bin/cmake"
+for tool in replay sim; do
+  refused "$tool of a robot without an image" "no image of robot 'rover_matched'; there are: .*husky_inertial" \
+    timeout 20 env LOG="$work/good.log" ROBOT=rover_matched BOARD=zynqmp_r5 OUT="$work/out" tools/$tool
+  : >"$work/asked"
+  refused "$tool of an image that cannot be built" 'build: preset r5 failed' \
+    timeout 20 env PATH="$work/bin:$PATH" LOG="$work/good.log" ROBOT=husky BOARD=zynqmp_r5 OUT="$work/out" tools/$tool
+  grep -q -- '^--build build/r5 --target tetap-zynqmp_r5-husky$' "$work/asked" || { echo "WRONG  $tool does not build the image it is to run"; failed=$((failed + 1)); }
+done
 refused "replay on no such board" "no board 'arduino'" env LOG="$work/good.log" BOARD=arduino OUT="$work/out" tools/replay
 refused "sim on no such board" "no board 'arduino'" env BOARD=arduino OUT="$work/out" tools/sim
 refused "sim with an unknown fault" 'meteor' env BUS=memory FAULT=meteor OUT="$work/out" tools/sim
 refused "firmware for no such board" "no board 'arduino'; there are: zynqmp_r5" env BOARD=arduino tools/firmware
-refused "firmware for no such robot" "no robot 'tank'; there are: .*mrclam" env BOARD=zynqmp_r5 ROBOT=tank tools/firmware
+refused "firmware for no such robot" "no image of robot 'tank'; there are: .*mrclam" env BOARD=zynqmp_r5 ROBOT=tank tools/firmware
+# An image that is over its budget, or allocates, is no firmware: in a tree whose tools say yes, but for one.
+mkdir -p "$work/tree/hal/port" "$work/tree/config"
+cp -r tools "$work/tree" && cp hal/port/CMakeLists.txt "$work/tree/hal/port" && cp config/*.hpp "$work/tree/config"
+for tool in heap layers size stack; do
+  for one in build heap layers size stack; do printf '#!/bin/sh\n' >"$work/tree/tools/$one"; done
+  printf '#!/bin/sh\ncase $* in *tetap-zynqmp_r5-husky.elf*) echo "$0: no" >&2; exit 1 ;; esac\n' >"$work/tree/tools/$tool"
+  mkdir -p "$work/tree/build/r5/hal/port"
+  touch "$work/tree/build/r5/hal/port/tetap-zynqmp_r5-husky".{elf,bin,hex,map}
+  refused "firmware that fails its proof ($tool)" "tools/$tool: no" env BOARD=zynqmp_r5 ROBOT=husky "$work/tree/tools/firmware"
+done
 refused "a report on nothing" 'nowhere' tools/report "$work/nowhere"
 "$programs/tetap-play" "$work/good.log" --memory --robot mrclam --out "$work/run" --quiet || failed=$((failed + 1))
 refused "a report against no such truth" 'nowhere.csv' tools/report "$work/run" --truth "$work/nowhere.csv" --no-pictures

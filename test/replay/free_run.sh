@@ -16,7 +16,7 @@ if [ "${5:-}" = --inside ]; then
   sleep 0.3
   node_start "$board" "$robot" vcan0 || exit 2
   # shellcheck disable=SC2046
-  "$programs/tetap-play" "$out/input.log" --can vcan0 --robot "$robot" --out "$out/live" --quiet --realtime --sync clock --jitter-ms 15 --drop 0.01 \
+  with_node "$programs/tetap-play" "$out/input.log" --can vcan0 --robot "$robot" --out "$out/live" --quiet --realtime --sync clock --jitter-ms 15 --drop 0.01 \
     --duplicate 0.01 --reorder 0.02 --seed 1 $(player_options "$board" | sed 's/--window 1//')
   node_stop $?
   kill "$recorder"; wait "$recorder" 2>/dev/null

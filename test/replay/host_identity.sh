@@ -22,7 +22,7 @@ if [ "${1:-}" = --inside ]; then
       robot=$(robot_of "$name")
       node_start linux "$robot" vcan0 || exit 2
     fi
-    "$programs/tetap-play" "$out/$name.log" --can vcan0 --robot "$robot" --out "$out/$name.vcan" --quiet || failed=1
+    with_node "$programs/tetap-play" "$out/$name.log" --can vcan0 --robot "$robot" --out "$out/$name.vcan" --quiet || { failed=1; robot=; }
   done
   node_stop
   exit $failed

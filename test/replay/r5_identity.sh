@@ -28,7 +28,7 @@ if [ "${1:-}" = --inside ]; then
       name=$(basename "$log" .log)
       [ -n "${node:-}" ] || node_start zynqmp_r5 "$(robot_of "$name")" vcan0 || exit 2
       # shellcheck disable=SC2046
-      "$programs/tetap-play" "$log" --can vcan0 --robot "$(robot_of "$name")" --out "$out/$name.board" --quiet $(player_options zynqmp_r5) || { failed=1; node_stop 1; }
+      with_node "$programs/tetap-play" "$log" --can vcan0 --robot "$(robot_of "$name")" --out "$out/$name.board" --quiet $(player_options zynqmp_r5) || { failed=1; node_stop 1; }
     done
     node_stop
   done
