@@ -28,6 +28,8 @@ inline constexpr app::Numbers numbers = app::checked({
     // nothing of the declination that its simulator used, and at 47 N 9 E the Earth's is 0.05 rad.
     .magnetic = {.use = 1, .declination_rad = 0.01F},
     .baro = {.use = 1},
+    // Many sensors, so many innovations: within 600 frames/s (test/replay/worlds.sh).
+    .publish = {.std_every = 10, .state_every = 10},
 });
 
 }  // namespace tetap::robot::iris

@@ -2,6 +2,7 @@
 // tetap-node: the firmware as a Linux program on SocketCAN. It stands in for the board.
 #include "app/firmware.hpp"
 #include "hal/port/linux/board.hpp"
+#include "hal/port/support/boot_line.hpp"
 #include "sim_host/in_process.hpp"
 #include "sim_host/play/arguments.hpp"
 #include "version.hpp"
@@ -29,6 +30,7 @@ The firmware as a Linux program on SocketCAN. Ends on INT or TERM with status 0.
          std::string(tetap::sim::kRobotNames) + R"(
   --base ID      first id of the node's block of 64 (default 0x300)
   --list-robots  print the names of the robots, nothing else
+  --boot-line    print what a flash image of this robot says of its core at boot, nothing else
 )";
 }
 
@@ -42,6 +44,13 @@ void run(tetap::hal::LinuxBoard& board, const tetap::app::Numbers& numbers) {
   }
 }
 
+template <class Estimators>
+void print_boot_line(const std::string& robot, const tetap::app::Numbers& numbers) {
+  const auto node = std::make_unique<tetap::app::Node<Estimators>>(numbers, tetap::app::Version{});
+  const std::uint32_t bits = tetap::app::Exercise(*node, numbers.can_base, 1).run(tetap::hal::kBootEpochs);
+  std::printf("tetap: robot %s, bits %08x\n", robot.c_str(), bits);
+}
+
 }  // namespace
 
 int main(int argc, char** argv) try {
@@ -51,10 +60,12 @@ int main(int argc, char** argv) try {
   const std::string interface = arguments.text("--can").value_or("vcan0");
   const std::string robot = arguments.text("--robot").value_or("rover");
   const std::uint32_t base = arguments.base();
+  const bool boot_line = arguments.flag("--boot-line");
   arguments.finish();
   std::signal(SIGINT, ask_to_stop);
   std::signal(SIGTERM, ask_to_stop);
   tetap::sim::for_robot(robot, [&]<class Estimators>(std::type_identity<Estimators>, tetap::app::Numbers numbers) {
+    if (boot_line) return print_boot_line<Estimators>(robot, numbers);
     numbers.can_base = base;
     tetap::hal::LinuxBoard board(interface);
     std::fprintf(stderr, "tetap-node: robot %s on %s, ids %03X to %03X\n", robot.c_str(), interface.c_str(),
