@@ -19,11 +19,15 @@ struct Estimate {
   filter::Symmetric<float, 3> p;  ///< of (x, y, yaw)
   float forward_mps = 0;
   float yaw_rate_radps = 0;
-  float forward_m2ps2 = base::kNan;     ///< variance of forward_mps; NaN: not known
-  float yaw_rate_rad2ps2 = base::kNan;  ///< of yaw_rate_radps
   bool position_valid = false;
   bool heading_valid = false;
   bool velocity_valid = false;
+};
+
+/// How uncertain the motion is, when somebody asks.
+struct MotionVariance {
+  float forward_m2ps2 = base::kNan;     ///< of Estimate::forward_mps; NaN: not known
+  float yaw_rate_rad2ps2 = base::kNan;  ///< of Estimate::yaw_rate_radps
 };
 
 /// An estimator's own step that nothing measured: it found itself wrong, and went where its sensors had been for long.

@@ -107,6 +107,10 @@ class Lane {
     }
   }
   [[nodiscard]] Estimate estimate(const Context& with) const { return now_.estimate(with); }
+  [[nodiscard]] MotionVariance motion_variance(const Context& with) const {
+    if constexpr (requires { now_.motion_variance(with); }) return now_.motion_variance(with);
+    return {};
+  }
   [[nodiscard]] InertialEstimate inertial(const Context& with) const requires requires(const E& e) { e.inertial(with); }
   { return now_.inertial(with); }
   [[nodiscard]] AttitudeEstimate attitude(const Context& with) const requires requires(const E& e) { e.attitude(with); }

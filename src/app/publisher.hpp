@@ -96,8 +96,10 @@ class Publisher {
     events_.tick_ends();
   }
 
-  template <class Send>
-  void estimate(std::size_t instance, can::EstimatorKind kind, bool primary, const Estimate& e, Send& send);
+  /// `variance` gives that of the motion when it is asked for.
+  template <class Variance, class Send>
+  void estimate(std::size_t instance, can::EstimatorKind kind, bool primary, const Estimate& e, Variance&& variance,
+                Send& send);
   /// `inertial` gives the estimate when it is asked for.
   template <class Inertial, class Send>
   void inertial(std::size_t instance, Inertial&& inertial, Send& send);
@@ -151,9 +153,9 @@ class Publisher {
 };
 
 template <std::size_t N>
-template <class Send>
+template <class Variance, class Send>
 void Publisher<N>::estimate(std::size_t instance, can::EstimatorKind kind, bool primary, const Estimate& e,
-                            Send& send) {
+                            Variance&& variance, Send& send) {
   const PublishNumbers& p = numbers_.publish;
   const auto side = static_cast<std::int32_t>(3 * instance);  // spreads the estimators' slow frames over the epochs
   const auto millimetres = [](const base::Anchored& a) {
@@ -178,11 +180,12 @@ void Publisher<N>::estimate(std::size_t instance, can::EstimatorKind kind, bool 
     const float yaw = base::sqrt(e.p(2, 2));
     put(can::EstStdPose{.epoch = tag(), .std_x_m = x, .std_y_m = y, .std_yaw_rad = yaw, .corr_xy = e.p(0, 1) / (x * y)},
         send, instance);
+    const MotionVariance motion = variance();
     put(can::EstStdMore{.epoch = tag(),
                         .corr_x_yaw = e.p(0, 2) / (x * yaw),
                         .corr_y_yaw = e.p(1, 2) / (y * yaw),
-                        .std_speed_mps = base::sqrt(e.forward_m2ps2),
-                        .std_yaw_rate_radps = base::sqrt(e.yaw_rate_rad2ps2)},
+                        .std_speed_mps = base::sqrt(motion.forward_m2ps2),
+                        .std_yaw_rate_radps = base::sqrt(motion.yaw_rate_rad2ps2)},
         send, instance);
   }
 }

@@ -52,6 +52,7 @@ class DeadReckoning {
 
   /// State and covariance extrapolated to the time of the last advance().
   [[nodiscard]] Estimate estimate(const Numbers& n) const;
+  [[nodiscard]] MotionVariance motion_variance(const Numbers& n) const;
 
   template <class Sink>
   void each_bit(Sink&& sink) const {
@@ -91,6 +92,10 @@ class DeadReckoning {
   };
 
   bool fuse_speed(const Held& held, base::Micros stamp, const Numbers& n);
+  /// What it holds is recent enough to be called the motion.
+  [[nodiscard]] bool fresh(const Numbers& n) const {
+    return held_.kind != Held::Kind::kNone && out_time_ - last_input_ <= base::Micros{n.wheels.timeout_us};
+  }
   [[nodiscard]] float forward_mps() const {
     return held_.kind == Held::Kind::kWheels ? 0.5F * (held_.first_mps + held_.second) : held_.first_mps;
   }
@@ -243,7 +248,19 @@ inline bool DeadReckoning::fuse(const ImuSample& sample, base::Micros stamp, con
 inline Estimate DeadReckoning::estimate(const Numbers& n) const {
   DeadReckoning ahead = *this;
   ahead.propagate(out_time_, n);
-  const bool fresh = held_.kind != Held::Kind::kNone && out_time_ - last_input_ <= base::Micros{n.wheels.timeout_us};
+  const bool fresh = this->fresh(n);
+  return {.time = out_time_,
+          .pose = ahead.filter.x,
+          .p = ahead.filter.p,
+          .forward_mps = fresh ? forward_mps() : 0.0F,
+          .yaw_rate_radps = fresh ? yaw_rate_radps(n) : 0.0F,
+          .position_valid = true,
+          .heading_valid = true,
+          .velocity_valid = fresh};
+}
+
+inline MotionVariance DeadReckoning::motion_variance(const Numbers& n) const {
+  if (!fresh(n)) return {};
   // Of the motion over one period: what it adds to the pose, and the steps of the counters.
   const float period_s = base::seconds(base::Micros{n.loop.period_us});
   const model::PlanarIncrement one = held_increment(period_s, n);
@@ -255,16 +272,8 @@ inline Estimate DeadReckoning::estimate(const Numbers& n) const {
   const float aged =
       n.loop.turn_radps2 * (base::seconds(out_time_ - (gyro ? gyro_time_ : last_input_)) + 0.5F * period_s);
   const float per_s2 = 1.0F / (period_s * period_s);
-  return {.time = out_time_,
-          .pose = ahead.filter.x,
-          .p = ahead.filter.p,
-          .forward_mps = fresh ? forward_mps() : 0.0F,
-          .yaw_rate_radps = fresh ? yaw_rate_radps(n) : 0.0F,
-          .forward_m2ps2 = fresh ? (one.var_ds + 0.5F * step_m * step_m) * per_s2 : base::kNan,
-          .yaw_rate_rad2ps2 = fresh ? (one.var_dyaw + 2.0F * step_rad * step_rad) * per_s2 + aged * aged : base::kNan,
-          .position_valid = true,
-          .heading_valid = true,
-          .velocity_valid = fresh};
+  return {.forward_m2ps2 = (one.var_ds + 0.5F * step_m * step_m) * per_s2,
+          .yaw_rate_rad2ps2 = (one.var_dyaw + 2.0F * step_rad * step_rad) * per_s2 + aged * aged};
 }
 
 }  // namespace tetap::app

@@ -72,6 +72,7 @@ class Inertial {
   [[nodiscard]] const Jump& jump() const { return jump_; }
 
   [[nodiscard]] Estimate estimate(const Context& with) const;
+  [[nodiscard]] MotionVariance motion_variance(const Context& with) const;
   [[nodiscard]] InertialEstimate inertial(const Context& with) const;
   [[nodiscard]] can::Mode mode(const Context&) const {
     switch (phase_) {

@@ -43,9 +43,21 @@ inline Estimate Inertial::estimate(const Context& with) const {
     p(1, 1) += went * went;
     p(2, 2) += turned * turned;
   }
-  // Forward is along body x, and the turn rate about up: as rows in the axes in which v and the bias are uncertain.
-  const nav::Vector3 ahead_n = x.q_nb.rotate({1.0F, 0.0F, 0.0F});
-  const nav::Vector3 up_b = x.q_nb.conjugate().rotate({0.0F, 0.0F, 1.0F});
+  return {.time = now_,
+          .pose = {.x = x.x, .y = x.y, .yaw_rad = nav::euler(x.q_nb).yaw_rad},
+          .p = p,
+          .forward_mps = v_b(0),
+          .yaw_rate_radps = w_n(2),
+          .position_valid = full.valid,
+          .heading_valid = full.valid,
+          .velocity_valid = full.valid};
+}
+
+/// Forward is along body x, and the turn rate about up: as rows in the axes in which velocity and bias are uncertain.
+inline MotionVariance Inertial::motion_variance(const Context& with) const {
+  const InertialEstimate full = inertial(with);
+  if (!full.valid) return {};
+  const nav::Quaternion& q = full.state.q_nb;
   const auto along = [&full](const nav::Vector3& row, int first) {
     float sum = 0;
     for (int c = 0; c < 3; ++c)
@@ -54,18 +66,12 @@ inline Estimate Inertial::estimate(const Context& with) const {
   };
   const float gyro = with.numbers.inertial.gyro_radps_rthz;
   const float period_s = base::seconds(base::Micros{with.numbers.loop.period_us});
-  const float age_s = base::seconds(now_ - (tracking ? ahead_.place().last : time_)) + 0.5F * period_s;
+  // A sample is a mean, true in its middle.
+  const float age_s = base::seconds(now_ - ahead_.place().last) + 0.5F * period_s;
   const float aged = with.numbers.loop.turn_radps2 * age_s;
-  return {.time = now_,
-          .pose = {.x = x.x, .y = x.y, .yaw_rad = nav::euler(x.q_nb).yaw_rad},
-          .p = p,
-          .forward_mps = v_b(0),
-          .yaw_rate_radps = w_n(2),
-          .forward_m2ps2 = full.valid ? along(ahead_n, 3) + full.velocity_m2ps2 : base::kNan,
-          .yaw_rate_rad2ps2 = full.valid ? along(up_b, 12) + gyro * gyro / period_s + aged * aged : base::kNan,
-          .position_valid = full.valid,
-          .heading_valid = full.valid,
-          .velocity_valid = full.valid};
+  return {
+      .forward_m2ps2 = along(q.rotate({1.0F, 0.0F, 0.0F}), 3) + full.velocity_m2ps2,
+      .yaw_rate_rad2ps2 = along(q.conjugate().rotate({0.0F, 0.0F, 1.0F}), 12) + gyro * gyro / period_s + aged * aged};
 }
 
 template <class Sink>

@@ -46,6 +46,9 @@ class Odometry {
     estimate.position_valid = estimate.heading_valid = bound_;
     return estimate;
   }
+  [[nodiscard]] MotionVariance motion_variance(const Context& with) const {
+    return motion_.motion_variance(with.numbers);
+  }
   [[nodiscard]] can::Mode mode(const Context&) const { return can::Mode::kDeadReckoning; }
   template <class Sink>
   void each_bit(Sink&& sink) const {

@@ -62,6 +62,9 @@ class PoseEkf {
     estimate.position_valid = estimate.heading_valid = phase_ == Phase::kTracking;
     return estimate;
   }
+  [[nodiscard]] MotionVariance motion_variance(const Context& with) const {
+    return motion_.motion_variance(with.numbers);
+  }
   [[nodiscard]] can::Mode mode(const Context&) const {
     if (phase_ == Phase::kWaiting) return can::Mode::kWaitingForPose;
     if (phase_ == Phase::kAligning) return can::Mode::kAligning;
