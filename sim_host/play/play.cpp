@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sim_host/play/play.hpp"
 
+#include <cmath>
+
 namespace tetap::sim {
 
 const char* play_help() {
@@ -52,7 +54,7 @@ PlayOptions play_options(Arguments& arguments) {
   o.script.base = base_argument(arguments);
   o.script.log_base = base_argument(arguments, "--log-base", o.script.base);
   const auto milliseconds = [&arguments](std::string_view name, double otherwise, double low) {
-    return base::Micros{static_cast<std::int64_t>(arguments.real(name, otherwise, low, 1000) * 1000 + 0.5)};
+    return base::Micros{std::llround(arguments.real(name, otherwise, low, 1000) * 1000)};
   };
   o.script.period = milliseconds("--period", 10, 1);
   o.reading.interface = arguments.text("--log-interface").value_or("");
