@@ -10,6 +10,10 @@ BASE = 0x300          # the id base the DBC is written for
 BLOCK = 0x40          # ids of one node
 NOT_AVAILABLE = "NotAvailable"
 NAME_LIMIT = 32
+SEND_TYPES = ("Cyclic", "Event", "NoMsgSendType")
+# What a signal without a unit may be, beside an enum, a mask, a page and a single bit: a checksum, a sequence or a name in numbers.
+# How many there are of something has unit 1.
+NO_QUANTITY = re.compile(r"(Crc|Ctr|Seq|Epoch|Id|Inst|Estimator|Git|Config)$")
 FAMILY = re.compile(r"^((?:In_Imu|Est))(\d)(_?\w+)$")   # one struct for all instances: In_Imu0Gyro, Est1_Pos
 
 
@@ -59,7 +63,11 @@ class Signal:
     @property
     def physical(self):
         """A quantity (float, NaN when not available), not a count or a code."""
-        return self.scale != 1 or (self.gap and self.unit != "")
+        return self.scale != 1 or (self.gap and self.unit not in ("", "1"))
+
+    @property
+    def needs_unit(self):
+        return not (self.enum or self.bit_names or self.is_mux or self.length == 1 or NO_QUANTITY.search(self.field))
 
     def where(self):
         return "%s %s" % (self.message.name, self.name)
@@ -73,8 +81,7 @@ class Message:
         self.offset = self.id - BASE
         self.comment = (frame.comment or "").strip()
         self.sender = frame.transmitters[0] if frame.transmitters else ""
-        self.cycle_ms = int(attribute.get("GenMsgCycleTime", 0) or 0)
-        self.delay_ms = int(attribute.get("GenMsgDelayTime", 0) or 0)
+        self.cycle_ms, self.delay_ms = (self._milliseconds(attribute, name) for name in ("GenMsgCycleTime", "GenMsgDelayTime"))
         self.send_type = attribute.get("GenMsgSendType", "")
         self.protected = attribute.get("Protection", "None") != "None"
         self.page_names = attribute.get("PageNames", "").split()
@@ -82,6 +89,12 @@ class Message:
         family = FAMILY.match(self.name)
         self.family = family.group(1) + family.group(3) if family else None
         self.instance = int(family.group(2)) if family else 0
+
+    @staticmethod
+    def _milliseconds(attribute, name):
+        """None when the DBC does not say, the text when it is no whole number."""
+        text = attribute.get(name)
+        return int(text) if text and re.fullmatch(r"-?\d+", str(text)) else text
 
     @property
     def mux(self):
@@ -207,6 +220,7 @@ def _check(database, text):
             refuse("no comment (CM_ BO_)")
         if "_" not in message.name:
             refuse("name has no prefix (In_, Cmd_, Est_)")
+        _check_sending(message, refuse)
         _check_pages(message, refuse)
         for signal in message.signals:
             _check_signal(signal, database, lambda reason, signal=signal: refuse(reason, signal))
@@ -216,6 +230,26 @@ def _check(database, text):
             if layout != [("Crc", 0, 8), ("Ctr", 8, 4)]:
                 refuse("protected, but does not begin with Crc 0|8 and Ctr 8|4")
     _check_families(database, text)
+
+
+def _check_sending(message, refuse):
+    """The bus load is the sum of what is said here, so nothing is left unsaid."""
+    cycle, delay, kind = message.cycle_ms, message.delay_ms, message.send_type
+    if kind not in SEND_TYPES:
+        refuse("GenMsgSendType is %s, not one of %s" % ("'%s'" % kind if kind else "missing", " ".join(SEND_TYPES)))
+    for name, value in (("GenMsgCycleTime", cycle), ("GenMsgDelayTime", delay)):
+        if value is not None and not (isinstance(value, int) and 0 <= value <= 65535):
+            refuse("%s '%s' is no whole number in 0..65535" % (name, value))
+    if kind == "Cyclic" and not cycle:
+        refuse("cyclic, but without GenMsgCycleTime")
+    if kind != "Cyclic" and cycle:
+        refuse("GenMsgCycleTime %d, but not cyclic" % cycle)
+    if kind == "Event" and delay is None:
+        refuse("on event, but without GenMsgDelayTime (0: too seldom to count)")
+    if kind == "Event" and delay == 0 and message.sender == "TETAP":
+        refuse("on event from the node, so GenMsgDelayTime must not be 0")
+    if kind != "Event" and delay:
+        refuse("GenMsgDelayTime %d, but not on event" % delay)
 
 
 def _check_pages(message, refuse):
@@ -248,8 +282,6 @@ def _check_signal(signal, database, refuse):
         refuse("no comment (CM_ SG_)")
     if '"' in signal.comment or "\n" in signal.comment:
         refuse("comment is not one plain line")
-    if signal.scale != 1 and not signal.unit:
-        refuse("no unit (a ratio has unit 1)")
     if signal.unit not in UNIT_SUFFIX:
         refuse("unit '%s' is not one of %s" % (signal.unit, " ".join(u for u in UNIT_SUFFIX if u)))
     if signal.scale != 1 and signal.gap_code is None:
@@ -268,6 +300,8 @@ def _check_signal(signal, database, refuse):
             refuse("enum, so it must be unsigned, of scale 1 and at most 8 bits")
     elif set(signal.values) - {signal.gap_code}:
         refuse("VAL_ without EnumType")
+    if not signal.unit and (signal.scale != 1 or signal.needs_unit):
+        refuse("no unit (a ratio and a count have unit 1)")
     for raw, name in signal.values.items():
         if not re.fullmatch(r"[A-Z]\w*", name):
             refuse("VAL_ %d \"%s\" is no PascalCase name" % (raw, name))

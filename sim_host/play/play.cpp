@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sim_host/play/play.hpp"
 
+#include <cmath>
+
 namespace tetap::sim {
 
 std::string play_help(std::string_view robots) {
@@ -54,7 +56,7 @@ PlayOptions play_options(Arguments& arguments) {
   o.script.base = arguments.base();
   o.script.log_base = arguments.base("--log-base", o.script.base);
   const auto milliseconds = [&arguments](std::string_view name, double otherwise, double low) {
-    return base::Micros{static_cast<std::int64_t>(arguments.real(name, otherwise, low, 1000) * 1000 + 0.5)};
+    return base::Micros{std::llround(arguments.real(name, otherwise, low, 1000) * 1000)};
   };
   o.script.period = milliseconds("--period", 10, 1);
   o.reading.interface = arguments.text("--log-interface").value_or("");

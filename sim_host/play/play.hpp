@@ -66,7 +66,7 @@ int play(L& link, PlayOptions options, const std::string& bus, const char* progr
     session.note("frames_not_data", std::to_string(log.not_data));
     session.note("frames_back_in_time", std::to_string(log.back_in_time));
     session.note("frames_of_wrong_length", std::to_string(log.wrong_length));
-    if (!numbers.empty()) session.note("numbers", quoted(numbers));
+    if (!numbers.empty()) session.note("numbers", sim::quoted(numbers));
   };
 
   if (options.mode == PlayMode::kRealtime) {

@@ -107,10 +107,10 @@ void Session::write_json(double wall_s) {
   Line crc;
   crc.hex(t.state_crc, 8);
   std::vector<std::pair<std::string, std::string>> fields{
-      {"mode", quoted(options_.mode)},
-      {"bus", quoted(options_.bus)},
-      {"robot", quoted(options_.robot)},
-      {"log", quoted(options_.log)},
+      {"mode", sim::quoted(options_.mode)},
+      {"bus", sim::quoted(options_.bus)},
+      {"robot", sim::quoted(options_.robot)},
+      {"log", sim::quoted(options_.log)},
       {"frames_in", count(counts_.inputs)},
       {"frames_lost", count(counts_.lost())},
       {"frames_lost_in", count(counts_.lost_inputs)},
@@ -124,20 +124,20 @@ void Session::write_json(double wall_s) {
       {"times_realtime", number(wall_s > 0 ? duration_s / wall_s : 0, 2)},
       {"bus_load_percent", load(t.bits_sent + t.bits_received)},
       {"node_load_percent", load(t.bits_received)},
-      {"estimates_sha256", quoted(t.estimates_sha256)},
-      {"state_crc_last", quoted(crc.view())},
+      {"estimates_sha256", sim::quoted(t.estimates_sha256)},
+      {"state_crc_last", sim::quoted(crc.view())},
   };
   if (comparison_) {
     fields.emplace_back("epochs_compared", count(comparison_->compared()));
     fields.emplace_back("epochs_different", count(comparison_->different()));
-    fields.emplace_back("first_difference", quoted(comparison_->first_difference()));
+    fields.emplace_back("first_difference", sim::quoted(comparison_->first_difference()));
   }
   fields.insert(fields.end(), notes_.begin(), notes_.end());
-  if (!error_.empty()) fields.emplace_back("error", quoted(error_));
+  if (!error_.empty()) fields.emplace_back("error", sim::quoted(error_));
   OutFile file(options_.folder + "/run.json");
   file.write("{\n");
   for (std::size_t i = 0; i < fields.size(); ++i)
-    file.write("  " + quoted(fields[i].first) + ": " + fields[i].second + (i + 1 < fields.size() ? ",\n" : "\n"));
+    file.write("  " + sim::quoted(fields[i].first) + ": " + fields[i].second + (i + 1 < fields.size() ? ",\n" : "\n"));
   file.write("}\n");
   file.close();
 }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sim_host/world/faults.hpp"
 
+#include "sim_host/world/math.hpp"
+
 #include <algorithm>
 #include <array>
 #include <charconv>
@@ -59,10 +61,10 @@ std::optional<base::Micros> parse_seconds(std::string_view text) {
   double value = 0;
   const auto [end, code] = std::from_chars(text.data(), text.data() + text.size(), value, std::chars_format::fixed);
   if (code != std::errc{} || end != text.data() + text.size() || !(value >= 0 && value <= 1e6)) return std::nullopt;
-  return base::Micros{static_cast<std::int64_t>(value * 1e6 + 0.5)};
+  return base::Micros{static_cast<std::int64_t>(sim::floor(value * 1e6 + 0.5))};
 }
 
-base::Micros micros(double seconds) { return {static_cast<std::int64_t>(seconds * 1e6 + 0.5)}; }
+base::Micros micros(double seconds) { return {static_cast<std::int64_t>(sim::floor(seconds * 1e6 + 0.5))}; }
 
 }  // namespace
 

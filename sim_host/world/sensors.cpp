@@ -100,7 +100,7 @@ app::ImuSample Imu::sample(base::Micros now, const Faults& faults) {
   const double root = sim::sqrt(period_s_);
   const double share = magnitude(speed_mps_) / kReferenceSpeed_mps;
   app::ImuSample s{.temperature_degC = single(numbers_.temperature_degC),
-                   .interval_us = static_cast<std::uint16_t>(period_s_ * 1e6 + 0.5),
+                   .interval_us = static_cast<std::uint16_t>(sim::floor(period_s_ * 1e6 + 0.5)),
                    .clipped_gyro = static_cast<std::uint8_t>(clipped_gyro_),
                    .clipped_accel = static_cast<std::uint8_t>(clipped_accel_)};
   stepped_ = faults.active(Fault::kGyroBiasStep, now);

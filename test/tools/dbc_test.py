@@ -12,11 +12,16 @@ import select
 import signal
 import struct
 import subprocess
+import sys
 import tempfile
 import time
 import unittest
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.realpath(__file__))))
+sys.dont_write_bytecode = True
+sys.path.insert(0, os.path.join(ROOT, "tools"))
+import tetap_dbc  # noqa: E402
+
 DBC = os.path.join(ROOT, "config", "tetap.dbc")
 TOOL = os.path.join(ROOT, "tools", "dbc")
 DECODE = os.path.join(ROOT, "tools", "decode")
@@ -63,6 +68,19 @@ class Refusals(Folder):
             self.assertIn(part, result.stderr)
         return result.stderr
 
+    def each_refused(self, choose, lose, reason, least):
+        """Every one that `choose` takes from a message is refused without what `lose` takes from it; one reading serves them all."""
+        database = tetap_dbc.read(DBC)
+        text = tetap_dbc._Text(DBC)
+        chosen = [(m, thing) for m in database.messages for thing in choose(m)]
+        self.assertGreaterEqual(len(chosen), least)
+        for message, thing in chosen:
+            before = dict(vars(thing))
+            lose(thing)
+            with self.subTest(message=message.name, thing=thing.name), self.assertRaisesRegex(tetap_dbc.Refused, "%s.*%s" % (thing.name, reason)):
+                tetap_dbc._check(database, text)
+            vars(thing).update(before)
+
     def test_the_dbc_itself_is_accepted(self):
         result = run(TOOL, DBC)
         self.assertEqual((result.returncode, result.stderr), (0, ""))
@@ -105,6 +123,18 @@ class Refusals(Folder):
     def test_missing_unit(self):
         self.refused('SG_ BodySpeed_Forward : 26|19@1- (0.0001,0) [-26.2143|26.2143] "m/s"',
                      'SG_ BodySpeed_Forward : 26|19@1- (0.0001,0) [-26.2143|26.2143] ""', "BodySpeed_Forward", "no unit")
+
+    def test_missing_unit_of_what_has_scale_one(self):
+        for start in ("Sync_Time : 0|48@1+ (1,0) [0|281474976710655]", "WheelCounts_Stamp : 0|20@1+ (1,0) [0|1048575]",
+                      "Innov_Age : 14|10@1+ (1,0) [0|1022]", "WheelCounts_Left : 26|16@1+ (1,0) [0|65535]"):
+            with self.subTest(start):
+                unit = re.search(re.escape(start) + r' ("\S+")', read(DBC)).group(1)
+                self.refused("%s %s" % (start, unit), '%s ""' % start, start.split()[0], "no unit")
+
+    def test_no_signal_that_has_a_unit_may_lose_it(self):
+        def lose(signal):
+            signal.unit = ""
+        self.each_refused(lambda m: [s for s in m.signals if s.unit], lose, "no unit", 300)
 
     def test_unknown_unit(self):
         self.refused('SG_ BodySpeed_Forward : 26|19@1- (0.0001,0) [-26.2143|26.2143] "m/s"',
@@ -169,6 +199,32 @@ class Refusals(Folder):
         result = run(TOOL, broken)
         self.assertEqual(result.returncode, 1)
         self.assertIn("Est3_Motion: id is not at an even distance from Est0_Motion", result.stderr)
+
+    def test_cycle_time_that_is_missing_or_zero_or_negative(self):
+        line = 'BA_ "GenMsgCycleTime" BO_ 800 10;'
+        self.refused(line, "", "Est_Epoch", "without GenMsgCycleTime")
+        self.refused(line, line.replace("10", "0"), "Est_Epoch", "without GenMsgCycleTime")
+        self.refused(line, line.replace("10", "-10"), "Est_Epoch", "'-10' is no whole number in 0..65535")
+        self.refused(line, line.replace("10", "70000"), "Est_Epoch", "'70000' is no whole number in 0..65535")
+        self.refused(line, line.replace("10", "10.5"), "Est_Epoch", "'10.5' is no whole number in 0..65535")
+
+    def test_interval_of_an_event_that_is_missing_or_zero_or_negative(self):
+        line = 'BA_ "GenMsgDelayTime" BO_ 803 20;'
+        self.refused(line, "", "Est_Innov", "without GenMsgDelayTime")
+        self.refused(line, line.replace("20", "0"), "Est_Innov", "must not be 0")
+        self.refused(line, line.replace("20", "-20"), "Est_Innov", "'-20' is no whole number in 0..65535")
+        self.refused('BA_ "GenMsgDelayTime" BO_ 777 20;', "", "In_RangeBearing", "without GenMsgDelayTime")
+
+    def test_send_type_that_is_missing_or_another_than_the_times_say(self):
+        line = 'BA_ "GenMsgSendType" BO_ 800 0;'
+        self.refused(line, "", "Est_Epoch", "GenMsgSendType is missing")
+        self.refused(line, line.replace("800 0", "800 1"), "Est_Epoch", "GenMsgCycleTime 10, but not cyclic")
+        self.refused('BA_ "GenMsgSendType" BO_ 803 1;', 'BA_ "GenMsgSendType" BO_ 803 2;', "Est_Innov", "GenMsgDelayTime 20, but not on event")
+
+    def test_no_message_may_lose_its_interval(self):
+        def lose(message):
+            message.cycle_ms = message.delay_ms = None
+        self.each_refused(lambda m: [m] if m.cycle_ms or m.delay_ms else [], lose, "without GenMsg", 35)
 
     def test_protected_message_without_a_crc_in_front(self):
         self.refused("BA_ \"Protection\" BO_ 770 1;", "BA_ \"Protection\" BO_ 776 1;", "In_BodySpeed", "Crc 0|8")
@@ -280,7 +336,7 @@ class Field:
         self.has_gap = self.gap_code is not None and "EnumType" not in source.attributes
         self.wraps = source.attributes.get("Overflow") == "Wraps"
         self.steps = self.factor != 1 and self.size > 24
-        self.quantity = not self.steps and (self.factor != 1 or self.has_gap and source.unit != "")
+        self.quantity = not self.steps and (self.factor != 1 or self.has_gap and source.unit not in ("", "1"))
         self.low, self.high = (decimal.Decimal(x) / (self.factor if self.steps else 1) for x in (source.min, source.max))
         bits = next(n for n in (8, 16, 32, 64) if self.size <= n)
         self.not_available = "nan" if self.quantity else -(1 << (bits - 1)) if source.is_signed else (1 << bits) - 1

@@ -3,6 +3,7 @@
 # tools/layers goes red on one seeded violation of each rule, stays green on its look-alikes, and the repository itself is green.
 import os
 import re
+import shutil
 import subprocess
 import sys
 import unittest
@@ -157,6 +158,20 @@ static_assert(noexcept(f())); std::string_view s; std::optional<int> o; using Ve
         clock = self.image('extern "C" [[gnu::noinline]] long clock() { asm volatile(""); return 3; } volatile long x; void work() { x = clock(); }', name="clock")
         self.assertIn("clock: clock", self.run_tool("layers", "--image", clock)[1])
         self.assertEqual(self.run_tool("layers", "--image", "/nowhere.elf")[0], 2)
+
+    def test_the_build_of_one_program_or_image_rejects_it_before_anything_is_compiled(self):
+        tree = self.path("tree")
+        shutil.copytree(ROOT, tree, ignore=lambda folder, names: (".git", "build", "out") if folder == ROOT else ())
+        with open(os.path.join(tree, "src/can/signal.hpp"), "a", encoding="utf-8") as file:
+            file.write('#include "filter/update.hpp"\n')
+        for target in ("host:tetap-world", "r5:tetap-zynqmp_r5-rover"):
+            with self.subTest(target):
+                done = subprocess.run([os.path.join(tree, "tools", "build"), target], capture_output=True, text=True)
+                self.assertEqual(done.returncode, 1, done.stderr)
+                self.assertRegex(done.stderr, r'src/can/signal.hpp:\d+: #include "filter/update.hpp": against the arrows: src/can -> src/base')
+                built = os.path.join(tree, "build", target.split(":")[0])
+                objects = [f for top, _, files in os.walk(built) for f in files if f.endswith((".o", ".obj")) and "CompilerId" not in top]
+                self.assertEqual(objects, [])
 
     def test_this_repository_is_clean(self):
         done = subprocess.run([os.path.join(TOOLS, "layers")], capture_output=True, text=True, cwd=ROOT)

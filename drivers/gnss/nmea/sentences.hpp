@@ -15,7 +15,7 @@ namespace tetap::drivers::gnss::nmea {
 
 enum class Sentence : std::uint8_t { kGga, kRmc, kVtg, kGsa, kGst, kZda, kCount };
 inline constexpr std::size_t kSentences = static_cast<std::size_t>(Sentence::kCount);
-inline constexpr std::array<std::array<char, 3>, kSentences> kFormatters{
+inline constexpr std::array<std::array<std::uint8_t, 3>, kSentences> kFormatters{
     {{'G', 'G', 'A'}, {'R', 'M', 'C'}, {'V', 'T', 'G'}, {'G', 'S', 'A'}, {'G', 'S', 'T'}, {'Z', 'D', 'A'}}};
 
 /// "GPGGA", "GNRMC", ...; sentences of one maker begin with P and are not for us.

@@ -65,7 +65,7 @@ inline constexpr std::int32_t kMarker16 = -32'768, kMarker20 = -524'288;
   if (wide) {
     packet.temperature = signed_big_endian(bytes[13], bytes[14]);
   } else {
-    packet.temperature = static_cast<std::int8_t>(bytes[13]);
+    packet.temperature = static_cast<std::int8_t>(bytes[13]);  // NOLINT(bugprone-signed-char-misuse): it has a sign
   }
   packet.ticks = wide ? big_endian(bytes[15], bytes[16]) : big_endian(bytes[14], bytes[15]);
   // 6.2: in a packet of 20 bytes without this bit the extension is not new.

@@ -9,9 +9,11 @@
 
 extern "C" {
 // Addresses only: the linker gives these names a place, nothing is stored under them.
+// NOLINTBEGIN(bugprone-reserved-identifier): link.ld makes these names
 extern std::uint32_t __data_start[], __data_end[], __data_load[];
 extern std::uint32_t __bss_start[], __bss_end[];
 extern std::uint32_t __stack_bottom[], __stack_top[];
+// NOLINTEND(bugprone-reserved-identifier)
 }
 
 namespace tetap::hal {
