@@ -177,9 +177,10 @@ void Node<Estimators, Capacity>::tick(base::Micros t, const LoopHealth& loop, Se
   std::size_t instance = 0;
   history_.each_lane([&](const auto& lane) {
     using E = typename std::remove_cvref_t<decltype(lane)>::Type;
-    publisher_.estimate(
-        instance, E::kKind, instance == kPrimary, estimates[instance], [&] { return lane.motion_variance(context()); },
-        send);
+    const bool primary = instance == kPrimary;
+    const MotionVariance motion =
+        publisher_.says_sigma(instance, primary) ? lane.motion_variance(context()) : MotionVariance{};
+    publisher_.estimate(instance, E::kKind, primary, estimates[instance], motion, send);
     if constexpr (requires { lane.inertial(context()); })
       publisher_.inertial(
           instance, [&] { return lane.inertial(context()); }, send);

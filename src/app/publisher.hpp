@@ -96,10 +96,14 @@ class Publisher {
     events_.tick_ends();
   }
 
-  /// `variance` gives that of the motion when it is asked for.
-  template <class Variance, class Send>
-  void estimate(std::size_t instance, can::EstimatorKind kind, bool primary, const Estimate& e, Variance&& variance,
-                Send& send);
+  /// This estimator's 1 sigma go out in this epoch: the motion's variance is needed then.
+  [[nodiscard]] bool says_sigma(std::size_t instance, bool primary) const {
+    const PublishNumbers& p = numbers_.publish;
+    return every(primary ? p.std_every : p.side_every, side(instance));
+  }
+  template <class Send>
+  void estimate(std::size_t instance, can::EstimatorKind kind, bool primary, const Estimate& e,
+                const MotionVariance& motion, Send& send);
   /// `inertial` gives the estimate when it is asked for.
   template <class Inertial, class Send>
   void inertial(std::size_t instance, Inertial&& inertial, Send& send);
@@ -135,6 +139,8 @@ class Publisher {
   [[nodiscard]] bool every(std::int32_t ticks, std::int32_t phase = 0) const {
     return ticks > 0 && (epoch_ + static_cast<std::uint32_t>(phase)) % static_cast<std::uint32_t>(ticks) == 0;
   }
+  /// Spreads the estimators' slow frames over the epochs.
+  [[nodiscard]] static std::int32_t side(std::size_t instance) { return static_cast<std::int32_t>(3 * instance); }
   [[nodiscard]] std::uint8_t tag() const { return static_cast<std::uint8_t>(epoch_ & 0x0F); }
 
   const Numbers& numbers_;
@@ -153,16 +159,15 @@ class Publisher {
 };
 
 template <std::size_t N>
-template <class Variance, class Send>
+template <class Send>
 void Publisher<N>::estimate(std::size_t instance, can::EstimatorKind kind, bool primary, const Estimate& e,
-                            Variance&& variance, Send& send) {
+                            const MotionVariance& motion, Send& send) {
   const PublishNumbers& p = numbers_.publish;
-  const auto side = static_cast<std::int32_t>(3 * instance);  // spreads the estimators' slow frames over the epochs
   const auto millimetres = [](const base::Anchored& a) {
     const std::int64_t um = a.um();
     return static_cast<std::int32_t>((um + (um < 0 ? -500 : 500)) / 1000);
   };
-  if (every(primary ? p.pose_every : p.side_every, side)) {
+  if (every(primary ? p.pose_every : p.side_every, side(instance))) {
     put(can::EstPos{.x_raw = millimetres(e.pose.x), .y_raw = millimetres(e.pose.y), .epoch = tag(), .kind = kind}, send,
         instance);
     put(can::EstMotion{.yaw_rad = e.pose.yaw_rad,
@@ -174,13 +179,12 @@ void Publisher<N>::estimate(std::size_t instance, can::EstimatorKind kind, bool 
                        .vel_valid = e.velocity_valid},
         send, instance);
   }
-  if (every(primary ? p.std_every : p.side_every, side)) {
+  if (says_sigma(instance, primary)) {
     const float x = base::sqrt(e.p(0, 0));
     const float y = base::sqrt(e.p(1, 1));
     const float yaw = base::sqrt(e.p(2, 2));
     put(can::EstStdPose{.epoch = tag(), .std_x_m = x, .std_y_m = y, .std_yaw_rad = yaw, .corr_xy = e.p(0, 1) / (x * y)},
         send, instance);
-    const MotionVariance motion = variance();
     put(can::EstStdMore{.epoch = tag(),
                         .corr_x_yaw = e.p(0, 2) / (x * yaw),
                         .corr_y_yaw = e.p(1, 2) / (y * yaw),

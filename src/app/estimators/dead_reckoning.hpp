@@ -259,7 +259,7 @@ inline Estimate DeadReckoning::estimate(const Numbers& n) const {
           .velocity_valid = fresh};
 }
 
-inline MotionVariance DeadReckoning::motion_variance(const Numbers& n) const {
+[[gnu::noinline]] inline MotionVariance DeadReckoning::motion_variance(const Numbers& n) const {
   if (!fresh(n)) return {};
   // Of the motion over one period: what it adds to the pose, and the steps of the counters.
   const float period_s = base::seconds(base::Micros{n.loop.period_us});

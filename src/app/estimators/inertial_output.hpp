@@ -54,7 +54,7 @@ inline Estimate Inertial::estimate(const Context& with) const {
 }
 
 /// Forward is along body x, and the turn rate about up: as rows in the axes in which velocity and bias are uncertain.
-inline MotionVariance Inertial::motion_variance(const Context& with) const {
+[[gnu::noinline]] inline MotionVariance Inertial::motion_variance(const Context& with) const {
   const InertialEstimate full = inertial(with);
   if (!full.valid) return {};
   const nav::Quaternion& q = full.state.q_nb;
