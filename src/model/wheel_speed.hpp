@@ -19,6 +19,7 @@ struct WheelSpeed {
   float sigma_vertical_mps = 0;
   nav::Vector3 axle_b_m = nav::Vector3::Zero();      ///< the middle of the axle that does not steer
   nav::Vector3 gyro_b_radps = nav::Vector3::Zero();  ///< as the sensor shows it
+  bool moves = true;                                 ///< beyond doubt: then its direction tells attitude
 
   [[nodiscard]] filter::Vector<float, 3> predict(const nav::InsState& at) const { return linearised(at).z_hat; }
   [[nodiscard]] filter::Vector<float, 3> residual(const filter::Vector<float, 3>& z_hat) const {
@@ -30,7 +31,7 @@ struct WheelSpeed {
   }
   [[nodiscard]] filter::Matrix<float, 3, 9> jacobian(const nav::InsState& at) const { return linearised(at).h; }
   [[nodiscard]] filter::Linearised<float, 3, 9> linearised(const nav::InsState& at) const {
-    const BodyVelocity body(at, gyro_b_radps, axle_b_m);
+    const BodyVelocity body(at, gyro_b_radps, axle_b_m, moves);
     return {.z_hat = body.v_b_mps, .h = body.h};
   }
 };
@@ -43,6 +44,7 @@ struct NonHolonomic {
   float sigma_vertical_mps = 0;
   nav::Vector3 axle_b_m = nav::Vector3::Zero();
   nav::Vector3 gyro_b_radps = nav::Vector3::Zero();  ///< as the sensor shows it
+  bool moves = true;                                 ///< beyond doubt: then its direction tells attitude
 
   [[nodiscard]] filter::Vector<float, 2> predict(const nav::InsState& at) const { return linearised(at).z_hat; }
   [[nodiscard]] filter::Vector<float, 2> residual(const filter::Vector<float, 2>& z_hat) const { return -z_hat; }
@@ -51,7 +53,7 @@ struct NonHolonomic {
   }
   [[nodiscard]] filter::Matrix<float, 2, 9> jacobian(const nav::InsState& at) const { return linearised(at).h; }
   [[nodiscard]] filter::Linearised<float, 2, 9> linearised(const nav::InsState& at) const {
-    const BodyVelocity body(at, gyro_b_radps, axle_b_m);
+    const BodyVelocity body(at, gyro_b_radps, axle_b_m, moves);
     return {.z_hat = body.v_b_mps.tail<2>(), .h = body.h.bottomRows<2>()};
   }
 };

@@ -159,5 +159,34 @@ TEST(Motion, TheOneSigmaOfSpeedAndTurnRateIsThatOfTheirErrors) {
   }
 }
 
+// With fixes of 1 cm, wheels that stand and a gyroscope: nothing of that tells a heading, nor takes it away.
+TEST(Standstill, NeitherTellsAHeadingNorCostsOne) {
+  for (const Robot& robot : {Robot{"rover", robot::rover::numbers, true}, Robot{"matched", matched_rover(), true}}) {
+    World::Options options{.mismatched = robot.name == std::string("rover"), .inertial = true};
+    options.course.waypoints.front().stop_s = 1e6;
+    options.numbers.gnss = with_error(options.numbers.gnss, 0.01);
+    options.numbers.gnss.rate_hz = 10;
+    const std::vector<Epoch> epochs = made(options, 2, 300);
+    ASSERT_EQ(epochs.size(), 30'000U);
+    EXPECT_LT(std::abs(epochs.back().truth.x_m - epochs.front().truth.x_m), 1e-6);
+    std::map<std::size_t, float> sigma_rad, yaw_rad;  // by epoch
+    run(robot, epochs, [&](std::size_t k, const base::CanFrame& frame) {
+      constexpr std::size_t kFused = 2;
+      if (frame.id == 0x300 + can::offset_of<can::EstStdPose>(kFused))
+        if (const auto std = can::decode<can::EstStdPose>(can::payload(frame))) sigma_rad[k] = std->std_yaw_rad;
+      if (frame.id == 0x300 + can::offset_of<can::EstMotion>(kFused))
+        if (const auto said = can::decode<can::EstMotion>(can::payload(frame))) yaw_rad[k] = said->yaw_rad;
+    });
+    const auto from_s = [](const std::map<std::size_t, float>& said, std::size_t s) {
+      return said.lower_bound(100 * s)->second;
+    };
+    const float before = from_s(sigma_rad, 15), after = from_s(sigma_rad, 299);
+    std::printf("%s: 1 sigma of the heading %.4f rad, after five minutes at rest %.4f\n", robot.name,
+                static_cast<double>(before), static_cast<double>(after));
+    EXPECT_NEAR(after / before, 1.0F, 0.03F) << robot.name;
+    EXPECT_NEAR(from_s(yaw_rad, 299), from_s(yaw_rad, 15), 0.1F * before) << robot.name;
+  }
+}
+
 }  // namespace
 }  // namespace tetap::sim

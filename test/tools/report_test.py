@@ -60,7 +60,7 @@ class Case(unittest.TestCase):
             s = [None] * 3 if std is None or std[n] is None else std[n]
             c = [None] * 3 if corr is None or std[n] is None else corr[n]
             ok = 1 if valid is None else valid[n]
-            rows.append([n, t, estimator, 1 + estimator, x[n], y[n], yaw[n], 0.5, 0.1, *s, *c, ok, ok])
+            rows.append([n, t, estimator, 1 + estimator, x[n], y[n], yaw[n], 0.5, 0.1, *s, *c, ok, ok, 0.05, 0.02])
         self.write_rows("estimates.csv", metrics.ESTIMATES, rows)
         self.write("run.json", json.dumps(RUN))
         return rows
@@ -411,7 +411,7 @@ class BadInput(Case):
         good = text_of(self.path("estimates.csv"))
         lines = good.splitlines()
         for text, words in ((good.replace("pos_valid", "valid", 1), ("estimates.csv:1", "no column 'pos_valid'")),
-                            ("\n".join(lines[:3] + [lines[3] + ",1"] + lines[4:]) + "\n", ("estimates.csv:4", "18 columns, expected 17")),
+                            ("\n".join(lines[:3] + [lines[3] + ",1"] + lines[4:]) + "\n", ("estimates.csv:4", "20 columns, expected 19")),
                             ("\n".join(lines[:3] + [lines[3].replace("1.02,", "later,")] + lines[4:]) + "\n", ("estimates.csv:4", "later")),
                             ("\n".join(lines[:3] + [lines[3][:20]]), ("estimates.csv:4", "columns")),
                             (lines[0] + "\n", ("estimates.csv", "no estimate in it")),
@@ -452,7 +452,7 @@ class Inertial(Case):
         time_s = 0.01 * epoch
         draw = {name: scale * random.normal(0, sigma, (n, 3)) for name, sigma in self.std.items()}
         xy = scale * random.multivariate_normal([0, 0], 0.09 * np.array([[1, 0.9], [0.9, 1]]), n)
-        rows = [[epoch[i], time_s[i], 2, 6, *xy[i], 0, 0, 0, 0.3, 0.3, self.std["attitude"], 0.9, 0, 0, 1, 1] for i in range(n)]
+        rows = [[epoch[i], time_s[i], 2, 6, *xy[i], 0, 0, 0, 0.3, 0.3, self.std["attitude"], 0.9, 0, 0, 1, 1, 0.05, 0.02] for i in range(n)]
         self.write_rows("estimates.csv", metrics.ESTIMATES, rows)
         angle = draw["attitude"] + [0, 0, turn]
         length = np.linalg.norm(angle, axis=1, keepdims=True)

@@ -120,6 +120,7 @@ class Inertial {
   [[nodiscard]] bool looks_wrong(const nav::Vector3& v_b_mps, float level_mps, float sigma_mps, base::Micros stamp,
                                  const Context& with);
   void stand(base::Micros stamp, const Context& with);
+  void hold_heading(float gate, const InertialNumbers& n);
   [[nodiscard]] bool resting(base::Micros stamp, const Context& with) const;
   void hear_ground(const nav::Vector3& v_n_mps, const nav::Vector3& v_b_mps, float sigma_mps, base::Micros stamp,
                    const Context& with);
@@ -191,8 +192,13 @@ class Inertial {
   bool have_counts_ = false;
   float gained_mps_ = base::kNan;                     ///< forward, by the IMU, since they were fused; NaN: not known
   nav::Vector3 rate_b_radps_ = nav::Vector3::Zero();  ///< as the gyroscope shows it, at the filter's time
-  nav::Vector3 still_rate_radps_ = nav::Vector3::Zero();  ///< mean over the last still_s_ of standing
-  float still_s_ = 0;
+  /// Mean of the gyroscope over so much standing.
+  struct Still {
+    nav::Vector3 rate_radps = nav::Vector3::Zero();
+    float s = 0;
+  };
+  Still still_;                                     ///< since the last
+  Still waiting_;                                   ///< until it is known that the robot had not begun to move
   nav::Vector3 ground_mps_ = nav::Vector3::Zero();  ///< mean of GNSS velocities since the IMU is calm
   std::int32_t grounds_ = 0;
   base::Micros ground_;   ///< last of them

@@ -71,8 +71,8 @@ inline Innovation Inertial::fuse(const ImuSample& sample, base::Micros stamp, co
     doubt(n.gap_mps2 * growth, sample.clipped_gyro > 0 ? n.gap_radps * growth : 0.0F);
   time_ = stamp;
   if (stamp > ahead_.heard()) corrected();  // it left before the present had it
-  still_s_ += dt_s;
-  still_rate_radps_ += (rate_b_radps_ - still_rate_radps_) * (dt_s / (still_s_ > dt_s ? still_s_ : dt_s));
+  still_.s += dt_s;
+  still_.rate_radps += (rate_b_radps_ - still_.rate_radps) * (dt_s / (still_.s > dt_s ? still_.s : dt_s));
   stand(stamp, with);
   constrain(stamp, with);
   return {.verdict = can::Verdict::kAccepted};
@@ -118,7 +118,7 @@ inline bool Inertial::without_imu() const {
   time_ += gap;
   bridged_ = time_;
   gained_mps_ = base::kNan;
-  still_s_ = 0;
+  still_.s = waiting_.s = 0;
   calm_ = {};
 }
 
@@ -152,7 +152,7 @@ inline void Inertial::begin(const Context& with) {
   phase_ = Phase::kTracking;
   last_position_ = time_;
   refused_ = {};
-  still_s_ = 0;
+  still_.s = waiting_.s = 0;
   gained_mps_ = base::kNan;
   work_left_ = 0;     // the covariance is looked at from end to end
   corrected_ = 0xFF;  // and where it is now has to be known at once
@@ -175,7 +175,7 @@ inline void Inertial::stand(base::Micros stamp, const Context& with) {
   const bool wheels = have_counts_ && stamp - counts_time_ < kEvery;
   const bool quiet = wheels ? stamp - moved_ > kQuiet && slip_.slip() == SlipWatch::Slip::kNone : resting(stamp, with);
   if (!quiet || turn.squaredNorm() > n.still_radps * n.still_radps) {
-    still_s_ = 0;
+    still_.s = waiting_.s = 0;
     return;
   }
   const auto gate = [](int dof) { return filter::chi_square_99(dof) * 4.0F; };
@@ -186,11 +186,37 @@ inline void Inertial::stand(base::Micros stamp, const Context& with) {
     if (ins_.p(3, 3) > least || ins_.p(4, 4) > least || ins_.p(5, 5) > least)
       static_cast<void>(update(model::ZeroVelocity{.sigma_mps = sigma}, gate(3)));
   }
-  constexpr float kMean_s = 0.5F;
-  if (still_s_ < kMean_s || !gyro || (work_left_ < kMeasurement && still_s_ < 2.0F * kMean_s)) return;
-  const float sigma_radps = 2.0F * n.gyro_radps_rthz * base::sqrt(1.0F / still_s_);
-  static_cast<void>(update(model::ZeroRate{.gyro_b_radps = still_rate_radps_, .sigma_radps = sigma_radps}, gate(3)));
-  still_s_ = 0;
+  // A turn of less than one count is not seen at once: a mean is told when standing has lasted a little longer.
+  constexpr float kMean_s = 0.5F, kLonger_s = 0.25F;
+  if (still_.s < kLonger_s || !gyro || (work_left_ < kMeasurement && still_.s < kMean_s)) return;
+  if (waiting_.s > 0.0F) {
+    hold_heading(gate(3), n);
+    waiting_.s = 0;
+  } else if (still_.s >= kMean_s) {
+    waiting_ = std::exchange(still_, {});
+  }
+}
+
+/// What the gyroscope showed since is its bias and its noise, and by the same noise the heading is wrong by now: the
+/// two are correlated (Bar-Shalom, Li, Kirubarajan 2001, sec. 8.3: the measurement's noise with the process'). With
+/// that the heading is turned back to what it was, and an hour at rest costs it nothing. Of tilt the accelerometer has
+/// seen some of that noise already, nobody knows how much: there the measurement counts for less instead.
+[[gnu::noinline]] inline void Inertial::hold_heading(float gate, const InertialNumbers& n) {
+  const float density = n.gyro_radps_rthz * n.gyro_radps_rthz;
+  const nav::Vector3 up_b = ins_.x.q_nb.conjugate().rotate({0.0F, 0.0F, 1.0F});
+  if (ins_.pending_s() > 0.0F) ins_.predict_covariance();
+  // Unless something told the heading so well meanwhile that the noise is not in it any more.
+  const float shared = ins_.p(8, 8) > 4.0F * density * waiting_.s ? density : 0.0F;
+  nav::Vector3 doubt;
+  for (int i = 0; i < 3; ++i) {
+    ins_.p(8, 12 + i) -= shared * up_b(i);
+    doubt(i) = 4.0F - 3.0F * up_b(i) * up_b(i);
+  }
+  static_cast<void>(update(
+      model::ZeroRate{
+          .gyro_b_radps = waiting_.rate_radps, .sigma_radps = base::sqrt(density / waiting_.s), .doubt = doubt},
+      gate));
+  for (int i = 0; i < 3; ++i) ins_.p(8, 12 + i) += shared * up_b(i);
 }
 
 /// The IMU has shown for a second nothing but its own noise, which it also does at constant velocity; and the mean of

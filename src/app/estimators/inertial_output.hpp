@@ -78,14 +78,16 @@ template <class Sink>
 void Inertial::each_bit(Sink&& sink) const {
   ins_.x.each_bit(sink);
   ahead_.each_bit(sink);
-  for (int i = 0; i < 3; ++i) sink(still_rate_radps_(i));
+  for (const Still& still : {still_, waiting_}) {
+    for (int i = 0; i < 3; ++i) sink(still.rate_radps(i));
+    sink(still.s);
+  }
   ins_.each_bit_of_p(sink);
   sink(static_cast<std::uint32_t>(phase_));
   start_.each_bit(sink);
   sink(time_.us);
   sink(last_position_.us);
   sink(moved_.us);
-  sink(still_s_);
   for (const base::Micros at : {ground_, calm_, bridged_, wheels_, counts_time_, constrained_, stood_, wrong_way_.since,
                                 wrong_way_at_, anew_at_})
     sink(at.us);

@@ -75,8 +75,10 @@ inline Innovation Inertial::roll(const SlipWatch::Wheels& wheels, float sigma_mp
   if (slip == SlipWatch::Slip::kBoth) {
     refused_or_not(kWheels, true, stamp);
     // Where GNSS holds the filter's velocity the wheels are wrong; without it, the filter may as well be.
-    if (stamp - last_position_ > base::Micros{1'000'000} &&
-        stamp - refused_[kWheels].since >= base::Micros{with.numbers.recovery.after_us}) {
+    constexpr base::Micros kLately{1'000'000};
+    const bool held =
+        stamp - last_position_ <= kLately || (stamp - ground_ <= kLately && refused_[kVelocity].in_a_row == 0);
+    if (!held && stamp - refused_[kWheels].since >= base::Micros{with.numbers.recovery.after_us}) {
       recover(nav::Vector3(nav::Vector3::Zero()), kWheels, with.numbers);
       doubt(mean - v_b(0), 0.0F);
       slip_.forget();
@@ -128,12 +130,14 @@ inline Innovation Inertial::forward(const Forward& speed, base::Micros stamp, co
   constrained_ = stamp;
   const float slip = n.slip_share * (speed.mps < 0 ? -speed.mps : speed.mps);
   const float sigma = base::sqrt(n.wheel_mps * n.wheel_mps + slip * slip + speed.sigma_mps * speed.sigma_mps);
+  const float variance = ins_.p(3, 3) + ins_.p(4, 4) + ins_.p(5, 5);
   return measure(model::WheelSpeed{.forward_mps = speed.mps,
                                    .sigma_forward_mps = sigma,
                                    .sigma_lateral_mps = n.lateral_mps,
                                    .sigma_vertical_mps = n.vertical_mps,
                                    .axle_b_m = {n.axle_x_b_m, 0.0F, 0.0F},
-                                   .gyro_b_radps = rate_b_radps_},
+                                   .gyro_b_radps = rate_b_radps_,
+                                   .moves = ins_.x.v_n_mps.squaredNorm() > 9.0F * variance},
                  kWheels, n.wheel_gate_scale, stamp, with);
 }
 
