@@ -107,6 +107,7 @@ class Inertial {
     float mps = 0;
     float sigma_mps = 0;  ///< of counting: what one count is over the interval
   };
+  static constexpr float kUnknown_mps = 1e4F;  ///< the sigma of a wheel speed of which nothing is known
 
   void noise_of(const InertialNumbers& n) {
     ins_.noise = {.gyro_radps_rthz = n.gyro_radps_rthz,

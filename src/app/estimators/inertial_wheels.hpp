@@ -130,15 +130,19 @@ inline Innovation Inertial::forward(const Forward& speed, base::Micros stamp, co
   constrained_ = stamp;
   const float slip = n.slip_share * (speed.mps < 0 ? -speed.mps : speed.mps);
   const float sigma = base::sqrt(n.wheel_mps * n.wheel_mps + slip * slip + speed.sigma_mps * speed.sigma_mps);
+  // Where wheels say nothing the filter has to be sure that it stands, or goes.
+  constexpr float kSure_mps = 0.1F;
   const float variance = ins_.p(3, 3) + ins_.p(4, 4) + ins_.p(5, 5);
-  return measure(model::WheelSpeed{.forward_mps = speed.mps,
-                                   .sigma_forward_mps = sigma,
-                                   .sigma_lateral_mps = n.lateral_mps,
-                                   .sigma_vertical_mps = n.vertical_mps,
-                                   .axle_b_m = {n.axle_x_b_m, 0.0F, 0.0F},
-                                   .gyro_b_radps = rate_b_radps_,
-                                   .moves = ins_.x.v_n_mps.squaredNorm() > 9.0F * variance},
-                 kWheels, n.wheel_gate_scale, stamp, with);
+  const bool goes = variance > kSure_mps * kSure_mps || ins_.x.v_n_mps.squaredNorm() > 9.0F * variance;
+  return measure(
+      model::WheelSpeed{.forward_mps = speed.mps,
+                        .sigma_forward_mps = sigma,
+                        .sigma_lateral_mps = n.lateral_mps,
+                        .sigma_vertical_mps = n.vertical_mps,
+                        .axle_b_m = {n.axle_x_b_m, 0.0F, 0.0F},
+                        .gyro_b_radps = rate_b_radps_,
+                        .moves = speed.sigma_mps < kUnknown_mps ? base::abs(speed.mps) > 2.0F * n.wheel_mps : goes},
+      kWheels, n.wheel_gate_scale, stamp, with);
 }
 
 /// They came of late, do not spin, and the filter goes as fast as they say. Not for ever: it may be pinned to them on a
@@ -154,7 +158,6 @@ inline bool Inertial::wheels_agree(base::Micros at, const Context& with) const {
 inline void Inertial::constrain(base::Micros stamp, const Context& with) {
   const base::Micros every{with.numbers.inertial.constrain_every_us};
   if (every.us <= 0 || stamp - constrained_ < every || !can_do(stamp - constrained_, every)) return;
-  constexpr float kUnknown_mps = 1e4F;
   // That it does not move sideways says nothing for wheels that spin.
   const Refused spinning = refused_[kWheels];
   static_cast<void>(forward({.sigma_mps = kUnknown_mps}, stamp, with));
