@@ -923,7 +923,7 @@ struct EstDiagSync {
   static constexpr Signal kSyncBad{.start = 40, .length = 16, .wraps = true};
 
   std::uint16_t sync_jump = 0;  ///< sync frames too far ahead of the last tick, since start
-  std::uint16_t sync_gap = 0;  ///< sync frames that by their counter were sent and never came, since start
+  std::uint16_t sync_gap = 0;  ///< sync frames that by their counter (modulo 256) were sent and never came, since start; a sender that starts anew without Begin looks like a gap
   std::uint16_t sync_bad = 0;  ///< sync frames of wrong length, since start
 
   template <class Self, class Visit>

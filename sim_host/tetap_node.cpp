@@ -56,12 +56,13 @@ void print_boot_line(const std::string& robot, const tetap::app::Numbers& number
 int main(int argc, char** argv) try {
   tetap::sim::Arguments arguments(argc, argv);
   if (arguments.flag("--help") || arguments.flag("-h")) return std::fputs(help().c_str(), stdout), 0;
-  if (arguments.flag("--list-robots")) return std::printf("%s\n", std::string(tetap::sim::kRobotNames).c_str()), 0;
+  const bool list_robots = arguments.flag("--list-robots");
   const std::string interface = arguments.text("--can").value_or("vcan0");
   const std::string robot = arguments.text("--robot").value_or("rover");
   const std::uint32_t base = arguments.base();
   const bool boot_line = arguments.flag("--boot-line");
   arguments.finish();
+  if (list_robots) return std::printf("%s\n", std::string(tetap::sim::kRobotNames).c_str()), 0;
   std::signal(SIGINT, ask_to_stop);
   std::signal(SIGTERM, ask_to_stop);
   tetap::sim::for_robot(robot, [&]<class Estimators>(std::type_identity<Estimators>, tetap::app::Numbers numbers) {

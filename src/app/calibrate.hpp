@@ -10,18 +10,11 @@
 
 namespace tetap::app {
 
-/// Off the temperature that the bias was taken at; 0 when it is not available. In whole steps of 1/4 degC: a sensor
-/// that is stuck must not look alive by the noise of its thermometer.
-[[nodiscard]] inline float warmer_degC(float temperature_degC, const ImuNumbers& n) {
-  const float steps = 4.0F * (temperature_degC - n.gyro_bias_at_degC);
-  if (!(steps > -4000.0F && steps < 4000.0F)) return 0.0F;  // NaN, too
-  return 0.25F * static_cast<float>(static_cast<std::int32_t>(steps + (steps < 0.0F ? -0.5F : 0.5F)));
-}
-
 /// Increments without bias: f = T (raw - b), w = raw - b(temperature). tools/calibrate finds these numbers.
 inline void calibrate(ImuSample& s, const ImuNumbers& n) {
   const float dt_s = base::seconds(base::Micros{s.interval_us});
-  const float warmer = warmer_degC(s.temperature_degC, n);
+  const float now = s.temperature_degC;
+  const float warmer = now > -300.0F && now < 300.0F ? now - n.gyro_bias_at_degC : 0.0F;  // NaN: not available
   filter::Vector3 dv;
   for (std::size_t i = 0; i < 3; ++i) {
     s.dangle_b_rad[i] -= (n.gyro_bias_radps[i] + n.gyro_bias_slope_radps_per_degC[i] * warmer) * dt_s;

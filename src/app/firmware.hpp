@@ -60,13 +60,15 @@ class Firmware {
     if (const auto t = pacer_.on_sync(sync->kind, time, board_.now(), health_)) tick(*t);
   }
 
-  /// What the counter says never came. A repeated frame is no gap, nor is one that comes out of its order.
+  /// What the counter says never came, modulo 256. A repeated frame is no gap, nor is one that comes out of its order:
+  /// its time is not later.
   void count_sync(const can::InSync& sync) {
     const auto step = static_cast<std::uint8_t>(sync.ctr - sync_counter_);
     const bool anew = !counts_sync_ || sync.kind == can::SyncKind::kBegin;
-    if (!anew && step >= 0x80) return;
-    if (!anew && step > 1) health_.sync_gap = static_cast<std::uint16_t>(health_.sync_gap + step - 1);
+    if (!anew && (step == 0 || (step >= 0x80 && sync.time_us <= sync_time_us_))) return;
+    if (!anew) health_.sync_gap = static_cast<std::uint16_t>(health_.sync_gap + step - 1);
     sync_counter_ = sync.ctr;
+    sync_time_us_ = sync.time_us;
     counts_sync_ = true;
   }
 
@@ -88,6 +90,7 @@ class Firmware {
   Node<Estimators> node_;
   Pacer pacer_;
   LoopHealth health_;
+  std::uint64_t sync_time_us_ = 0;
   std::uint8_t sync_counter_ = 0;
   bool counts_sync_ = false;  ///< a sync frame has been there
 };

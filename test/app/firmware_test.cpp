@@ -112,6 +112,20 @@ TEST_F(Loop, SyncFramesThatNeverCameAreCountedByTheirCounter) {
   EXPECT_EQ(said<can::EstDiagSync>().sync_gap, 3);
 }
 
+TEST_F(Loop, ALongLossOfSyncIsCountedAndSoIsAShortOneAfterIt) {
+  std::int64_t time_us = 5'000'000;
+  int counter = 0;
+  sync(can::SyncKind::kBegin, time_us, counter);
+  const auto after = [&](int frames) { sync(can::SyncKind::kStep, time_us += 10'000 * frames, counter += frames); };
+  for (int k = 0; k < 20; ++k) after(1);
+  after(201);
+  for (int k = 0; k < 120; ++k) after(1);
+  EXPECT_EQ(said<can::EstDiagSync>().sync_gap, 200);
+  after(6);
+  for (int k = 0; k < 120; ++k) after(1);
+  EXPECT_EQ(said<can::EstDiagSync>().sync_gap, 205);
+}
+
 TEST_F(Loop, SyncFramesOfWrongLengthAreCountedAndChangeNothing) {
   std::int64_t time_us = 5'000'000;
   sync(can::SyncKind::kBegin, time_us, 0);

@@ -12,6 +12,7 @@
 #include <cstdio>
 #include <map>
 #include <memory>
+#include <optional>
 #include <ostream>
 #include <random>
 #include <string>
@@ -136,7 +137,7 @@ TEST(Motion, TheOneSigmaOfSpeedAndTurnRateIsThatOfTheirErrors) {
             if (const auto said = can::decode<can::EstMotion>(can::payload(frame))) motion[i] = *said;
           if (frame.id != 0x300 + can::offset_of<can::EstStdMore>(i)) continue;
           const auto std = can::decode<can::EstStdMore>(can::payload(frame));
-          if (!std || !motion[i].vel_valid || std->std_speed_mps < 1e-3F) continue;  // steps of the bus: 1 mm/s
+          if (!std || !motion[i].vel_valid || std->std_speed_mps < 1e-3F) continue;  // Speed itself has steps of 1 mm/s
           const auto square = [](float said, double truth, float sigma) {
             const double z = (static_cast<double>(said) - truth) / static_cast<double>(sigma);
             return z * z;
@@ -156,6 +157,41 @@ TEST(Motion, TheOneSigmaOfSpeedAndTurnRateIsThatOfTheirErrors) {
       EXPECT_NEAR(sum.speed / sum.count, 1.0, 0.5) << robot.name << i;
       EXPECT_NEAR(sum.rate / sum.count, 1.0, 0.7) << robot.name << i;
     }
+  }
+}
+
+// Where the IMU repeats itself wheels tell the turn, or nothing does: that is said, too.
+TEST(Motion, TheOneSigmaOfSpeedAndTurnRateGrowsWithTheirErrorsWhereTheImuIsStuck) {
+  for (const bool wheels : {true, false}) {
+    double speed = 0, rate = 0, count = 0;
+    for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+      World::Options options;
+      options.faults = {{Fault::kImuStuck, base::Micros{40'000'000}, base::Micros{10'000'000}}};
+      if (!wheels) options.numbers.wheels.rate_hz = 0;
+      const std::vector<Epoch> epochs = made(options, seed, 52);
+      std::optional<can::EstMotion> motion;
+      run(Robot{"rover", robot::rover::numbers, true}, epochs, [&](std::size_t k, const base::CanFrame& frame) {
+        constexpr std::size_t kFused = 2;
+        if (frame.id == 0x300 + can::offset_of<can::EstMotion>(kFused))
+          motion = can::decode<can::EstMotion>(can::payload(frame));
+        if (k < 4100 || k > 4990 || frame.id != 0x300 + can::offset_of<can::EstStdMore>(kFused)) return;
+        const auto std = can::decode<can::EstStdMore>(can::payload(frame));
+        if (!std || !motion) return;
+        const auto square = [](double error, float sigma) {
+          return error * error / static_cast<double>(sigma * sigma);
+        };
+        speed += square(static_cast<double>(motion->speed_mps) - epochs[k].truth.speed_mps, std->std_speed_mps);
+        rate += square(static_cast<double>(motion->yaw_rate_radps) - epochs[k].truth.yaw_rate_radps,
+                       std->std_yaw_rate_radps);
+        count += 1;
+      });
+    }
+    std::printf("IMU stuck, %s wheels: mean squares of speed %.2f, turn rate %.2f over %.0f\n",
+                wheels ? "with" : "without", speed / count, rate / count, count);
+    EXPECT_GT(count, 100);
+    EXPECT_LT(speed / count, 4.0);
+    EXPECT_LT(rate / count, 4.0);
+    EXPECT_GT(rate / count, wheels ? 0.02 : 0.001) << "nor is everything possible";
   }
 }
 

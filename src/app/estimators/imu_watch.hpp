@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // How an IMU fares: stuck (the same samples again and again), stale (none), clipped, shaken. A gyroscope or an
-// accelerometer whose noise spans quanta does not show three equal axes twice by chance, let alone ten times.
+// accelerometer whose noise spans quanta does not show three equal axes twice by chance, let alone ten times. Equal is
+// what differs by less than half a step of the bus: calibration moves a stuck one by less (jitter of the interval,
+// noise of the thermometer).
 #pragma once
 
 #include "app/estimate.hpp"
@@ -18,12 +20,12 @@ class Repeats {
  public:
   /// True when this one is the n-th repetition or beyond; 0: never.
   bool hear(const ImuSample& s, std::int32_t n) {
-    const auto count = [](std::uint8_t& same, std::array<float, 3>& last, const std::array<float, 3>& now) {
-      same = same_bits(last, now) ? static_cast<std::uint8_t>(same < 255 ? same + 1 : 255) : std::uint8_t{0};
+    const auto count = [](std::uint8_t& same, std::array<float, 3>& last, const std::array<float, 3>& now, float step) {
+      same = alike(last, now, step) ? static_cast<std::uint8_t>(same < 255 ? same + 1 : 255) : std::uint8_t{0};
       last = now;
     };
-    count(gyro_, last_gyro_, s.dangle_b_rad);
-    count(accel_, last_accel_, s.dvelocity_b_mps);
+    count(gyro_, last_gyro_, s.dangle_b_rad, kStep_rad);
+    count(accel_, last_accel_, s.dvelocity_b_mps, kStep_mps);
     return n > 0 && (gyro_ >= n || accel_ >= n);
   }
   /// After a sample that repeats nothing.
@@ -35,7 +37,8 @@ class Repeats {
   }
   /// The gyroscope or the accelerometer shows what it showed in the sample before.
   [[nodiscard]] static bool repeats(const ImuSample& s, const ImuSample& before) {
-    return same_bits(s.dangle_b_rad, before.dangle_b_rad) || same_bits(s.dvelocity_b_mps, before.dvelocity_b_mps);
+    return alike(s.dangle_b_rad, before.dangle_b_rad, kStep_rad) ||
+           alike(s.dvelocity_b_mps, before.dvelocity_b_mps, kStep_mps);
   }
   template <class Sink>
   void each_bit(Sink&& sink) const {
@@ -45,9 +48,10 @@ class Repeats {
   }
 
  private:
-  static bool same_bits(const std::array<float, 3>& a, const std::array<float, 3>& b) {
+  static constexpr float kStep_rad = 4e-7F, kStep_mps = 4e-6F;  ///< steps of the bus: 1e-6 rad, 1e-5 m/s
+  static bool alike(const std::array<float, 3>& a, const std::array<float, 3>& b, float step) {
     for (std::size_t i = 0; i < 3; ++i)
-      if (a[i] < b[i] || a[i] > b[i]) return false;
+      if (a[i] - b[i] > step || b[i] - a[i] > step) return false;
     return true;
   }
   std::array<float, 3> last_gyro_{}, last_accel_{};

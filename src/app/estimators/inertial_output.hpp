@@ -53,25 +53,40 @@ inline Estimate Inertial::estimate(const Context& with) const {
           .velocity_valid = full.valid};
 }
 
-/// Forward is along body x, and the turn rate about up: as rows in the axes in which velocity and bias are uncertain.
+/// Of the speed ahead, x_b . R^T v: by velocity and, as far as it does not go where it looks, by attitude; to second
+/// order by a heading in doubt. Of the turn: what tells it, and how long ago.
 [[gnu::noinline]] inline MotionVariance Inertial::motion_variance(const Context& with) const {
   const InertialEstimate full = inertial(with);
   if (!full.valid) return {};
+  const InertialNumbers& n = with.numbers.inertial;
   const nav::Quaternion& q = full.state.q_nb;
-  const auto along = [&full](const nav::Vector3& row, int first) {
-    float sum = 0;
-    for (int c = 0; c < 3; ++c)
-      for (int r = 0; r < 3; ++r) sum += row(r) * row(c) * full.p(first + r, first + c);
-    return sum;
-  };
-  const float gyro = with.numbers.inertial.gyro_radps_rthz;
+  const nav::Vector3& v = full.state.v_n_mps;
+  const nav::Vector3 ahead_n = q.rotate({1.0F, 0.0F, 0.0F}), by_turn = nav::cross(ahead_n, v);
+  const std::array<float, 6> row{ahead_n(0), ahead_n(1), ahead_n(2), by_turn(0), by_turn(1), by_turn(2)};
+  MotionVariance variance{.forward_m2ps2 = full.velocity_m2ps2, .yaw_rate_rad2ps2 = 0};
+  for (int c = 0; c < 6; ++c)
+    for (int r = 0; r < 6; ++r)
+      variance.forward_m2ps2 +=
+          row[static_cast<std::size_t>(r)] * row[static_cast<std::size_t>(c)] * full.p(3 + r, 3 + c);
+  const float yaw_rad2 = full.p(8, 8) < 1.0F ? full.p(8, 8) : 1.0F;
+  variance.forward_m2ps2 += 0.5F * v.squaredNorm() * yaw_rad2 * yaw_rad2;
+  if (blind_) {
+    const float went_mps = n.gap_mps2 * ahead_s();
+    const float turn_radps = turn_known(time_) ? n.gap_wheels_radps : n.gap_radps;
+    variance.forward_m2ps2 += went_mps * went_mps;
+    variance.yaw_rate_rad2ps2 = turn_radps * turn_radps;
+    return variance;
+  }
+  const nav::Vector3 up_b = q.conjugate().rotate({0.0F, 0.0F, 1.0F});
+  for (int c = 0; c < 3; ++c)
+    for (int r = 0; r < 3; ++r) variance.yaw_rate_rad2ps2 += up_b(r) * up_b(c) * full.p(12 + r, 12 + c);
+  const float gyro = ins_.vibration * n.gyro_radps_rthz;
   const float period_s = base::seconds(base::Micros{with.numbers.loop.period_us});
   // A sample is a mean, true in its middle.
   const float age_s = base::seconds(now_ - ahead_.place().last) + 0.5F * period_s;
   const float aged = with.numbers.loop.turn_radps2 * age_s;
-  return {
-      .forward_m2ps2 = along(q.rotate({1.0F, 0.0F, 0.0F}), 3) + full.velocity_m2ps2,
-      .yaw_rate_rad2ps2 = along(q.conjugate().rotate({0.0F, 0.0F, 1.0F}), 12) + gyro * gyro / period_s + aged * aged};
+  variance.yaw_rate_rad2ps2 += gyro * gyro / period_s + aged * aged;
+  return variance;
 }
 
 template <class Sink>
