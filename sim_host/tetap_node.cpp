@@ -44,11 +44,16 @@ void run(tetap::hal::LinuxBoard& board, const tetap::app::Numbers& numbers) {
   }
 }
 
+/// Prints as a board does.
+struct Console {
+  static void print(const char* text) { std::fputs(text, stdout); }
+};
+
 template <class Estimators>
 void print_boot_line(const std::string& robot, const tetap::app::Numbers& numbers) {
   const auto node = std::make_unique<tetap::app::Node<Estimators>>(numbers, tetap::app::Version{});
   const std::uint32_t bits = tetap::app::Exercise(*node, numbers.can_base, 1).run(tetap::hal::kBootEpochs);
-  std::printf("tetap: robot %s, bits %08x\n", robot.c_str(), bits);
+  tetap::hal::print_bits(Console{}, robot.c_str(), bits);
 }
 
 }  // namespace

@@ -6,7 +6,6 @@
 #include "app/numbers.hpp"
 #include "app/rows.hpp"
 #include "app/sample.hpp"
-#include "base/math.hpp"
 
 namespace tetap::app {
 

@@ -126,6 +126,12 @@ class Inertial {
   void hear_ground(const nav::Vector3& v_n_mps, const nav::Vector3& v_b_mps, float sigma_mps, base::Micros stamp,
                    const Context& with);
   [[nodiscard]] bool turn_known(base::Micros at) const;
+  /// 1 sigma of how it turns while no gyroscope says so.
+  [[nodiscard]] float unseen_turn_radps(const InertialNumbers& n) const {
+    return turn_known(time_) ? n.gap_wheels_radps : n.gap_radps;
+  }
+  /// Variance of the heading, as far as a small angle is meant: what is not known at all turns by one radian.
+  [[nodiscard]] float heading_rad2() const { return ins_.p(8, 8) < 1.0F ? ins_.p(8, 8) : 1.0F; }
   [[nodiscard]] bool wheels_agree(base::Micros at, const Context& with) const;
   [[nodiscard]] bool without_imu() const;
   /// Wheels that are heard so soon after the last: counts are left to the difference of the next, speeds left out.

@@ -101,7 +101,7 @@ inline bool Inertial::without_imu() const {
   const InertialNumbers& n = with.numbers.inertial;
   const bool wheels = turn_known(time_);
   const float dt_s = base::seconds(gap);
-  ins_.predict_without_imu(gap, n.gap_mps2, wheels ? n.gap_wheels_radps : n.gap_radps);
+  ins_.predict_without_imu(gap, n.gap_mps2, unseen_turn_radps(n));
   nav::Vector3 w_b = nav::Vector3::Zero();
   if (wheels) {
     w_b(2) = wheel_turn_radps_;

@@ -37,7 +37,7 @@ inline Estimate Inertial::estimate(const Context& with) const {
   p(1, 2) += ahead_s * full.p(4, 8);
   if (blind_) {  // as the filter grows where it has no IMU
     const InertialNumbers& n = with.numbers.inertial;
-    const float turned = ahead_s * (turn_known(time_) ? n.gap_wheels_radps : n.gap_radps);
+    const float turned = ahead_s * unseen_turn_radps(n);
     const float went = 0.5F * ahead_s * ahead_s * n.gap_mps2;
     p(0, 0) += went * went;
     p(1, 1) += went * went;
@@ -68,11 +68,11 @@ inline Estimate Inertial::estimate(const Context& with) const {
     for (int r = 0; r < 6; ++r)
       variance.forward_m2ps2 +=
           row[static_cast<std::size_t>(r)] * row[static_cast<std::size_t>(c)] * full.p(3 + r, 3 + c);
-  const float yaw_rad2 = full.p(8, 8) < 1.0F ? full.p(8, 8) : 1.0F;
+  const float yaw_rad2 = heading_rad2();
   variance.forward_m2ps2 += 0.5F * v.squaredNorm() * yaw_rad2 * yaw_rad2;
   if (blind_) {
     const float went_mps = n.gap_mps2 * ahead_s();
-    const float turn_radps = turn_known(time_) ? n.gap_wheels_radps : n.gap_radps;
+    const float turn_radps = unseen_turn_radps(n);
     variance.forward_m2ps2 += went_mps * went_mps;
     variance.yaw_rate_rad2ps2 = turn_radps * turn_radps;
     return variance;
