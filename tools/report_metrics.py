@@ -40,6 +40,9 @@ TRUTH_MORE = ["z_m", "roll_rad", "pitch_rad", *VELOCITY, *GYRO_BIAS, *ACC_BIAS]
 BLOCKS = ["position", "velocity", "attitude", "gyro bias", "acc bias"]
 STEPS = {"position": ("Est2_Std", "StdX"), "velocity": ("Est2_State", "StdVelEast"), "attitude": ("Est2_State", "StdTiltEast"),
          "gyro bias": ("Est2_State", "StdGyroBiasX"), "acc bias": ("Est2_State", "StdAccBiasX")}
+# Of the values: what they were rounded by is no error of the estimate. Twice that of a quaternion's component is an angle.
+VALUE_STEPS = {"position": [("Est2_Pos", "X", 1), ("Est2_Pos", "Y", 1), ("Est2_State", "Height", 1)], "velocity": [("Est2_Vel", "East", 1)],
+               "attitude": [("Est2_Att", "X", 2)], "gyro bias": [("Est2_State", "GyroBiasX", 1)], "acc bias": [("Est2_State", "AccBiasX", 1)]}
 UNITS = {"position": "m", "velocity": "m/s", "attitude": "rad", "gyro bias": "rad/s", "acc bias": "m/s2"}
 
 ENUMERATIONS = {"kind": "EstimatorKind", "sensor": "Sensor", "verdict": "Verdict", "mode": "Mode", "reset_cause": "ResetCause"}
@@ -345,7 +348,7 @@ def quaternion(roll, pitch, yaw):
 
 
 class Blocks:
-    """Errors of an inertial estimate by block, and the sigmas it published: `error[name]` and `sigma[name]` with three columns and a row for
+    """Errors of an inertial estimate by block, and the sigmas it published, with the bus's rounding of the estimate: `error[name]` and `sigma[name]` with three columns and a row for
     every attitude; position east, north, up; attitude about east, north and up."""
 
     def __init__(self, states, true):
@@ -362,7 +365,8 @@ class Blocks:
             self.sigma[name] = three(states, [f"std_{one}" for one in columns])
         # A sigma of 0 is one below half a step of the bus.
         for name, (message, signal) in STEPS.items():
-            self.sigma[name] = np.maximum(self.sigma[name], 0.5 * limits(message, signal)[0])
+            rounded = np.array([times * limits(*value)[0] / np.sqrt(12.0) for *value, times in VALUE_STEPS[name]])
+            self.sigma[name] = np.hypot(np.maximum(self.sigma[name], 0.5 * limits(message, signal)[0]), rounded)
         invalid = states["pos_valid"] != 1
         for error in self.error.values():
             error[invalid] = np.nan

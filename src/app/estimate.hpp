@@ -2,11 +2,13 @@
 // What estimators give: an estimate with its uncertainty, and a record of every measurement they were offered.
 #pragma once
 
+#include "base/math.hpp"
 #include "base/time.hpp"
 #include "config/messages.hpp"
 #include "filter/quaternion.hpp"
 #include "filter/update.hpp"
 #include "model/planar_pose.hpp"
+#include "nav/ins_covariance_entry.hpp"
 #include "nav/ins_state.hpp"
 
 #include <cstdint>
@@ -46,15 +48,25 @@ struct ImuHealth {
   std::uint16_t clipped = 0;           ///< samples with a clipped axis
 };
 
-/// What an inertial estimator has beyond that: the state at the present, the covariance of the far end of its window.
+/// What an inertial estimator has beyond that: the state at the present, the covariance of the far end of its window
+/// and how to carry an entry of it to the present.
 struct InertialEstimate {
   nav::InsState state;
   const filter::Symmetric<float, nav::InsState::kErrors>& p;  ///< the estimator's own: as long as nothing changes it
-  float velocity_m2ps2 = 0;  ///< variance per axis that the IMU's noise adds to p from its time to the present,
-  float tilt_rad2 = 0;       ///< and to the attitude's
+  nav::InsCovarianceStep<float> ahead;                        ///< from the time of p to the present
   bool valid = false;
   Jump jump;
   ImuHealth imu;
+
+  /// Of errors kI and kJ (nav::InsState), at the present.
+  template <int kI, int kJ = kI>
+  [[nodiscard]] float covariance() const {
+    return nav::predicted_covariance<kI, kJ>(p, ahead);
+  }
+  template <int kI>
+  [[nodiscard]] float sigma() const {
+    return base::sqrt(covariance<kI>());
+  }
 };
 
 /// What an attitude estimator has: the present, and what of it is believed.

@@ -56,10 +56,9 @@ void put_diagnostics(std::uint32_t page, const Counters& c, const LoopHealth& l,
 template <class Put>
 void put_state_page(std::uint32_t page, const InertialEstimate& e, std::uint8_t tag, Put&& put) {
   const nav::InsState& x = e.state;
-  const auto std = [&e](int i, float more = 0.0F) { return base::sqrt(e.p(i, i) + more); };
   switch (page % 9) {
     case 0:
-      put(can::EstStateHeight{.epoch = tag, .height_m = base::metres(x.z.um()), .std_height_m = std(2)});
+      put(can::EstStateHeight{.epoch = tag, .height_m = base::metres(x.z.um()), .std_height_m = e.sigma<2>()});
       break;
     case 1:
       put(can::EstStateAccBias{.epoch = tag,
@@ -75,23 +74,24 @@ void put_state_page(std::uint32_t page, const InertialEstimate& e, std::uint8_t 
       break;
     case 3:
       put(can::EstStateStdVel{.epoch = tag,
-                              .std_vel_east_mps = std(3, e.velocity_m2ps2),
-                              .std_vel_north_mps = std(4, e.velocity_m2ps2),
-                              .std_vel_up_mps = std(5, e.velocity_m2ps2)});
+                              .std_vel_east_mps = e.sigma<3>(),
+                              .std_vel_north_mps = e.sigma<4>(),
+                              .std_vel_up_mps = e.sigma<5>()});
       break;
     case 4:
-      put(can::EstStateStdTilt{
-          .epoch = tag, .std_tilt_east_rad = std(6, e.tilt_rad2), .std_tilt_north_rad = std(7, e.tilt_rad2)});
+      put(can::EstStateStdTilt{.epoch = tag, .std_tilt_east_rad = e.sigma<6>(), .std_tilt_north_rad = e.sigma<7>()});
       break;
     case 5:
-      put(can::EstStateStdAccBias{
-          .epoch = tag, .std_acc_bias_x_mps2 = std(9), .std_acc_bias_y_mps2 = std(10), .std_acc_bias_z_mps2 = std(11)});
+      put(can::EstStateStdAccBias{.epoch = tag,
+                                  .std_acc_bias_x_mps2 = e.sigma<9>(),
+                                  .std_acc_bias_y_mps2 = e.sigma<10>(),
+                                  .std_acc_bias_z_mps2 = e.sigma<11>()});
       break;
     case 6:
       put(can::EstStateStdGyroBias{.epoch = tag,
-                                   .std_gyro_bias_x_radps = std(12),
-                                   .std_gyro_bias_y_radps = std(13),
-                                   .std_gyro_bias_z_radps = std(14)});
+                                   .std_gyro_bias_x_radps = e.sigma<12>(),
+                                   .std_gyro_bias_y_radps = e.sigma<13>(),
+                                   .std_gyro_bias_z_radps = e.sigma<14>()});
       break;
     case 7:
       put(can::EstStateJump{

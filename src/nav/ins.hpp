@@ -52,25 +52,25 @@ class Ins {
   /// measurement that comes needs it).
   void predict_covariance() {
     if (!(pending_.dt_s > 0.0F)) return;
-    const float dt_s = pending_.dt_s;
-    const auto variance = [dt_s](float density) { return density * density * dt_s; };
-    const float more = vibration > 1.0F && vibration < 1e4F ? vibration : 1.0F;
-    pending_.var_v = variance(more * noise.accel_mps2_rthz);
-    pending_.var_theta = variance(more * noise.gyro_radps_rthz);
-    pending_.var_b_a = variance(noise.accel_bias_mps3_rthz);
-    pending_.var_b_g = variance(noise.gyro_bias_radps2_rthz);
-    if (noise.accel_bias_time_s > dt_s) {
-      pending_.keep_b_a = 1.0F - dt_s / noise.accel_bias_time_s;
-      x.b_a_mps2 *= pending_.keep_b_a;
-    }
-    if (noise.gyro_bias_time_s > dt_s) {
-      pending_.keep_b_g = 1.0F - dt_s / noise.gyro_bias_time_s;
-      x.b_g_radps *= pending_.keep_b_g;
-    }
+    make_noise(pending_);
+    x.b_a_mps2 *= pending_.keep_b_a;
+    x.b_g_radps *= pending_.keep_b_g;
     if (noise.motion_sigma > 0.0F) keep_motion(pending_);
     nav::predict_covariance(p, pending_);
     pending_ = {};
     maintain();
+  }
+
+  /// The step that would bring the covariance to the time of a state that was carried on from x over ahead_s, about as
+  /// `present` is turned.
+  [[nodiscard]] InsCovarianceStep<float> step_to(const InsState& present, float ahead_s) const {
+    InsCovarianceStep<float> step = pending_;
+    step.dt_s += ahead_s;
+    step.dv_n_mps += present.v_n_mps - x.v_n_mps;
+    step.dv_n_mps(2) += earth.gravity_mps2 * ahead_s;
+    step.r_dt += present.q_nb.matrix() * ahead_s;
+    make_noise(step);
+    return step;
   }
 
   /// A gap in the increments: the velocity is kept, and the noise is that of a robot that may have done anything of
@@ -166,6 +166,19 @@ class Ins {
   static constexpr float kMostSpeed_mps = 1000.0F;
   static constexpr std::int64_t kGapStep_us = 100'000, kMostGap_us = 60'000'000;
   static constexpr float kGapStep_s = 0.1F;
+
+  /// What drives the errors over the step's time.
+  void make_noise(InsCovarianceStep<float>& step) const {
+    const float dt_s = step.dt_s;
+    const auto variance = [dt_s](float density) { return density * density * dt_s; };
+    const float more = vibration > 1.0F && vibration < 1e4F ? vibration : 1.0F;
+    step.var_v = variance(more * noise.accel_mps2_rthz);
+    step.var_theta = variance(more * noise.gyro_radps_rthz);
+    step.var_b_a = variance(noise.accel_bias_mps3_rthz);
+    step.var_b_g = variance(noise.gyro_bias_radps2_rthz);
+    if (noise.accel_bias_time_s > dt_s) step.keep_b_a = 1.0F - dt_s / noise.accel_bias_time_s;
+    if (noise.gyro_bias_time_s > dt_s) step.keep_b_g = 1.0F - dt_s / noise.gyro_bias_time_s;
+  }
 
   /// Sensor noise taken for acceleration would let the filter believe that it sees its heading at standstill: v gains
   /// theta x (dv + noise), and every noisy sample looks like a known push whose direction was then observed. The

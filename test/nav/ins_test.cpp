@@ -5,6 +5,7 @@
 #include "model/gnss_fix_3d.hpp"
 #include "model/gnss_velocity_3d.hpp"
 #include "model/height.hpp"
+#include "nav/ins_covariance_entry.hpp"
 #include "true_body.hpp"
 
 #include <gtest/gtest.h>
@@ -78,6 +79,39 @@ TEST(Ins, AMillionStepsWithoutAMeasurementStayFiniteAndPositiveDefinite) {
       EXPECT_GT(ins.p(0, 0), 1e11F) << "after 5000 s it knows nothing, and says so";
     }
   }
+}
+
+/// What is published of the covariance while the filter itself is behind: as if it had been carried sample by sample.
+TEST(Ins, TheStepToThePresentIsThatOfEverySampleOnTheWay) {
+  Ins far;
+  far.noise.motion_sigma = 0;
+  far.start({}, start_covariance());
+  const auto go = [](Ins& ins) {
+    const auto imu = ImuIncrement::constant({0.02F, -0.01F, 0.4F}, {1.5F, -0.7F, 9.9F}, {5'000});
+    EXPECT_EQ(ins.predict(imu), ImuVerdict::kAccepted);
+  };
+  for (int i = 0; i < 400; ++i) {
+    go(far);
+    if (i % 2 == 1) far.predict_covariance();
+    if (i % 20 == 19) {
+      static_cast<void>(far.update(
+          model::GnssVelocity3d{.v_n_mps = far.x.v_n_mps, .sigma_horizontal_mps = 0.1F, .sigma_vertical_mps = 0.1F},
+          1e6F));
+    }
+  }
+  for (int i = 0; i < 3; ++i) go(far);  // what the covariance does not have yet is part of the way
+  Ins near = far;
+  for (int i = 0; i < 60; ++i) {
+    near.predict_covariance();
+    go(near);
+  }
+  near.predict_covariance();
+  const auto step = far.step_to(near.x, 0.3F);
+  filter::unroll<0, 15>([&](auto i) {
+    const float published = nav::predicted_covariance<i, i>(far.p, step);
+    EXPECT_NEAR(published, near.p(i, i), 0.02F * near.p(i, i)) << int{i};
+  });
+  EXPECT_GT(near.p(3, 3), 1.1F * far.p(3, 3)) << "or nothing was shown";
 }
 
 TEST(Ins, AGapWithoutIncrementsWidensWhatTheGapMayHaveChanged) {

@@ -200,15 +200,19 @@ inline void Inertial::stand(base::Micros stamp, const Context& with) {
 /// What the gyroscope showed since is its bias and its noise, and by the same noise the heading is wrong by now: the
 /// two are correlated (Bar-Shalom, Li, Kirubarajan 2001, sec. 8.3: the measurement's noise with the process'). With
 /// that the heading is turned back to what it was, and an hour at rest costs it nothing. Of tilt the accelerometer has
-/// seen some of that noise already, nobody knows how much: there the measurement counts for less instead.
+/// seen some of that noise already, nobody knows how much: there the measurement counts for less instead. The mean is
+/// that of some time ago: what the bias wandered since is in its variance, and not told by it.
 [[gnu::noinline]] inline void Inertial::hold_heading(float gate, const InertialNumbers& n) {
   const float density = n.gyro_radps_rthz * n.gyro_radps_rthz;
   const nav::Vector3 up_b = ins_.x.q_nb.conjugate().rotate({0.0F, 0.0F, 1.0F});
   if (ins_.pending_s() > 0.0F) ins_.predict_covariance();
   // Unless something told the heading so well meanwhile that the noise is not in it any more.
   const float shared = ins_.p(8, 8) > 4.0F * density * waiting_.s ? density : 0.0F;
-  nav::Vector3 doubt;
+  const float walk = n.gyro_bias_radps2_rthz * n.gyro_bias_radps2_rthz * (0.5F * waiting_.s + still_.s);
+  nav::Vector3 doubt, since;
   for (int i = 0; i < 3; ++i) {
+    since(i) = ins_.p(12 + i, 12 + i) > 4.0F * walk ? walk : 0.0F;
+    ins_.p(12 + i, 12 + i) -= since(i);
     ins_.p(8, 12 + i) -= shared * up_b(i);
     doubt(i) = 4.0F - 3.0F * up_b(i) * up_b(i);
   }
@@ -216,7 +220,10 @@ inline void Inertial::stand(base::Micros stamp, const Context& with) {
       model::ZeroRate{
           .gyro_b_radps = waiting_.rate_radps, .sigma_radps = base::sqrt(density / waiting_.s), .doubt = doubt},
       gate));
-  for (int i = 0; i < 3; ++i) ins_.p(8, 12 + i) += shared * up_b(i);
+  for (int i = 0; i < 3; ++i) {
+    ins_.p(8, 12 + i) += shared * up_b(i);
+    ins_.p(12 + i, 12 + i) += since(i);
+  }
 }
 
 /// The IMU has shown for a second nothing but its own noise, which it also does at constant velocity; and the mean of

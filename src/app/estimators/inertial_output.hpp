@@ -6,42 +6,41 @@
 
 namespace tetap::app {
 
-inline InertialEstimate Inertial::inertial(const Context&) const {
-  const float accel = ins_.vibration * ins_.noise.accel_mps2_rthz, gyro = ins_.vibration * ins_.noise.gyro_radps_rthz;
-  return {.state = phase_ == Phase::kTracking ? present_ : ins_.x,
-          .p = ins_.p,
-          .velocity_m2ps2 = accel * accel * ahead_s(),
-          .tilt_rad2 = gyro * gyro * ahead_s(),
-          .valid = phase_ == Phase::kTracking,
-          .jump = jump_,
-          .imu = imu_.health()};
+inline InertialEstimate Inertial::inertial(const Context& with) const {
+  const bool tracking = phase_ == Phase::kTracking;
+  const nav::InsState& present = tracking ? present_ : ins_.x;
+  InertialEstimate full{.state = present,
+                        .p = ins_.p,
+                        .ahead = ins_.step_to(present, ahead_s()),
+                        .valid = tracking,
+                        .jump = jump_,
+                        .imu = imu_.health()};
+  if (blind_) {  // as the filter grows where it has no IMU
+    const InertialNumbers& n = with.numbers.inertial;
+    const float turned = ahead_s() * unseen_turn_radps(n), gained = ahead_s() * n.gap_mps2;
+    full.ahead.var_v += gained * gained;
+    full.ahead.var_theta += turned * turned;
+  }
+  return full;
 }
 
 inline Estimate Inertial::estimate(const Context& with) const {
   const InertialEstimate full = inertial(with);
   const nav::InsState& x = full.state;
-  const bool tracking = phase_ == Phase::kTracking;
   const nav::Vector3 v_b = x.q_nb.conjugate().rotate(x.v_n_mps);
-  const nav::Vector3 w_n = x.q_nb.rotate((tracking ? ahead_.place().rate_b_radps : rate_b_radps_) - x.b_g_radps);
-  constexpr std::array<int, 3> kPlanar{0, 1, 8};
+  const nav::Vector3 w_n = x.q_nb.rotate((full.valid ? ahead_.place().rate_b_radps : rate_b_radps_) - x.b_g_radps);
+  constexpr int kX = nav::InsState::kPosition, kY = kX + 1, kYaw = nav::InsState::kAttitude + 2;
   filter::Symmetric<float, 3> p;
-  for (int c = 0; c < 3; ++c)
-    for (int r = 0; r <= c; ++r)
-      p(r, c) = full.p(kPlanar[static_cast<std::size_t>(r)], kPlanar[static_cast<std::size_t>(c)]);
-  // Position is uncertain at the present by what the velocity was at the far end, too.
-  const float ahead_s = this->ahead_s();
-  p(0, 0) += ahead_s * (2.0F * full.p(0, 3) + ahead_s * full.p(3, 3));
-  p(1, 1) += ahead_s * (2.0F * full.p(1, 4) + ahead_s * full.p(4, 4));
-  p(0, 1) += ahead_s * (full.p(0, 4) + full.p(1, 3) + ahead_s * full.p(3, 4));
-  p(0, 2) += ahead_s * full.p(3, 8);
-  p(1, 2) += ahead_s * full.p(4, 8);
-  if (blind_) {  // as the filter grows where it has no IMU
-    const InertialNumbers& n = with.numbers.inertial;
-    const float turned = ahead_s * unseen_turn_radps(n);
-    const float went = 0.5F * ahead_s * ahead_s * n.gap_mps2;
+  p(0, 0) = full.covariance<kX>();
+  p(0, 1) = full.covariance<kX, kY>();
+  p(1, 1) = full.covariance<kY>();
+  p(0, 2) = full.covariance<kX, kYaw>();
+  p(1, 2) = full.covariance<kY, kYaw>();
+  p(2, 2) = full.covariance<kYaw>();
+  if (blind_) {
+    const float went = 0.5F * ahead_s() * ahead_s() * with.numbers.inertial.gap_mps2;
     p(0, 0) += went * went;
     p(1, 1) += went * went;
-    p(2, 2) += turned * turned;
   }
   return {.time = now_,
           .pose = {.x = x.x, .y = x.y, .yaw_rad = nav::euler(x.q_nb).yaw_rad},
@@ -53,39 +52,51 @@ inline Estimate Inertial::estimate(const Context& with) const {
           .velocity_valid = full.valid};
 }
 
-/// Of the speed ahead, x_b . R^T v: by velocity and, as far as it does not go where it looks, by attitude; to second
-/// order by a heading in doubt. Of the turn: what tells it, and how long ago.
+namespace detail {
+
+/// row P row^T of the errors from kFirst on.
+template <int kFirst, std::size_t kN>
+[[nodiscard]] inline float quadratic(const nav::Ins::Covariance& p, const std::array<float, kN>& row) {
+  float sum = 0;
+  for (std::size_t c = 0; c < kN; ++c)
+    for (std::size_t r = 0; r < kN; ++r)
+      sum += row[r] * row[c] * p(kFirst + static_cast<int>(r), kFirst + static_cast<int>(c));
+  return sum;
+}
+
+}  // namespace detail
+
+/// Of the speed ahead, x_b . R^T v at the present: by velocity, attitude (as far as it does not go where it looks, and
+/// by what it took for acceleration since) and the accelerometer's bias; to second order by a heading in doubt. Of the
+/// turn: what tells it, and how long ago.
 [[gnu::noinline]] inline MotionVariance Inertial::motion_variance(const Context& with) const {
   const InertialEstimate full = inertial(with);
   if (!full.valid) return {};
   const InertialNumbers& n = with.numbers.inertial;
   const nav::Quaternion& q = full.state.q_nb;
   const nav::Vector3& v = full.state.v_n_mps;
-  const nav::Vector3 ahead_n = q.rotate({1.0F, 0.0F, 0.0F}), by_turn = nav::cross(ahead_n, v);
-  const std::array<float, 6> row{ahead_n(0), ahead_n(1), ahead_n(2), by_turn(0), by_turn(1), by_turn(2)};
-  MotionVariance variance{.forward_m2ps2 = full.velocity_m2ps2, .yaw_rate_rad2ps2 = 0};
-  for (int c = 0; c < 6; ++c)
-    for (int r = 0; r < 6; ++r)
-      variance.forward_m2ps2 +=
-          row[static_cast<std::size_t>(r)] * row[static_cast<std::size_t>(c)] * full.p(3 + r, 3 + c);
+  const nav::Vector3 ahead_n = q.rotate({1.0F, 0.0F, 0.0F});
+  const nav::Vector3 by_turn = nav::cross(ahead_n, nav::Vector3(v - full.ahead.dv_n_mps));
+  const std::array<float, 7> speed{ahead_n(0), ahead_n(1), ahead_n(2),      by_turn(0),
+                                   by_turn(1), by_turn(2), -full.ahead.dt_s};
   const float yaw_rad2 = heading_rad2();
-  variance.forward_m2ps2 += 0.5F * v.squaredNorm() * yaw_rad2 * yaw_rad2;
+  MotionVariance variance{.forward_m2ps2 = detail::quadratic<nav::InsState::kVelocity>(full.p, speed) +
+                                           full.ahead.var_v + 0.5F * v.squaredNorm() * yaw_rad2 * yaw_rad2,
+                          .yaw_rate_rad2ps2 = 0};
   if (blind_) {
-    const float went_mps = n.gap_mps2 * ahead_s();
     const float turn_radps = unseen_turn_radps(n);
-    variance.forward_m2ps2 += went_mps * went_mps;
     variance.yaw_rate_rad2ps2 = turn_radps * turn_radps;
     return variance;
   }
   const nav::Vector3 up_b = q.conjugate().rotate({0.0F, 0.0F, 1.0F});
-  for (int c = 0; c < 3; ++c)
-    for (int r = 0; r < 3; ++r) variance.yaw_rate_rad2ps2 += up_b(r) * up_b(c) * full.p(12 + r, 12 + c);
+  const std::array<float, 3> turn{up_b(0), up_b(1), up_b(2)};
   const float gyro = ins_.vibration * n.gyro_radps_rthz;
   const float period_s = base::seconds(base::Micros{with.numbers.loop.period_us});
   // A sample is a mean, true in its middle.
   const float age_s = base::seconds(now_ - ahead_.place().last) + 0.5F * period_s;
   const float aged = with.numbers.loop.turn_radps2 * age_s;
-  variance.yaw_rate_rad2ps2 += gyro * gyro / period_s + aged * aged;
+  variance.yaw_rate_rad2ps2 =
+      detail::quadratic<nav::InsState::kGyroBias>(full.p, turn) + gyro * gyro / period_s + aged * aged;
   return variance;
 }
 
