@@ -48,6 +48,7 @@ namespace tetap::sim {
   n.gnss.antenna_z_b_m = single(world.gnss.antenna_b_m[2]);
   n.gnss.sigma_velocity_floor_mps = 0;
   n.inertial.gyro_radps_rthz = single(world.imu.gyro_noise);
+  n.inertial.gyro_scale = 0;
   n.inertial.accel_mps2_rthz = single(world.imu.accel_noise[2]);
   n.inertial.gyro_bias_radps2_rthz = single(world.imu.gyro_walk_radps * walk_rthz);
   n.inertial.accel_bias_mps3_rthz = single(world.imu.accel_walk_mps2 * walk_rthz);

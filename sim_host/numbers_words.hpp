@@ -30,6 +30,7 @@ namespace tetap::sim {
   add("k right", n.wheels.drive.noise_right);
   if (n.gyro.use != 0) add("gyro", n.gyro.noise);
   add("IMU gyro", n.inertial.gyro_radps_rthz);
+  add("IMU gyro scale", n.inertial.gyro_scale);
   add("IMU accel", n.inertial.accel_mps2_rthz);
   begin("R (1 sigma)");
   add("range m", n.landmark.sigma_range_m);

@@ -95,6 +95,7 @@ struct InertialNumbers {
   std::array<float, 9> mounting_bs{1, 0, 0, 0, 1, 0, 0, 0, 1};
   float gyro_radps_rthz = 5e-5F;        ///< ICM-42688-P, DS-000347 table 1: 0.0028 deg/s/sqrt(Hz)
   float accel_mps2_rthz = 7e-4F;        ///< table 2: 70 ug/sqrt(Hz)
+  float gyro_scale = 0.003F;            ///< 1 sigma of its scale; table 1: 0.5 % at most
   float gyro_bias_radps2_rthz = 1e-5F;  ///< random walk of the bias
   float accel_bias_mps3_rthz = 2e-4F;
   float gyro_turn_on_radps = 0.01F;  ///< 1 sigma of the bias at start
@@ -243,7 +244,7 @@ constexpr void each_number(const Numbers& n, Sink&& sink) {
       g.origin_longitude_2ndeg, g.origin_height_m);
   const auto& i = n.inertial;
   for (const float m : i.mounting_bs) sink(m);
-  all(i.imu, i.gyro_radps_rthz, i.accel_mps2_rthz, i.gyro_bias_radps2_rthz, i.accel_bias_mps3_rthz,
+  all(i.imu, i.gyro_radps_rthz, i.gyro_scale, i.accel_mps2_rthz, i.gyro_bias_radps2_rthz, i.accel_bias_mps3_rthz,
       i.gyro_turn_on_radps, i.accel_turn_on_mps2, i.start_tilt_rad, i.level_s, i.starts_forward, i.gap_mps2,
       i.gap_radps, i.still_radps, i.still_mps, i.wheel_mps, i.slip_share, i.lateral_mps, i.vertical_mps, i.axle_x_b_m,
       i.wheel_gate_scale, i.wheels_every_us, i.constrain_every_us, i.gap_wheels_radps, i.stuck_samples, i.stale_us,

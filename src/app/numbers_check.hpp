@@ -113,6 +113,7 @@ consteval Numbers checked(const Numbers& n) {
   require(positive(i.gyro_radps_rthz) && positive(i.accel_mps2_rthz) && not_negative(i.gyro_bias_radps2_rthz) &&
               not_negative(i.accel_bias_mps3_rthz),
           "inertial: noise densities above 0, random walks not below");
+  require(i.gyro_scale >= 0 && i.gyro_scale < 0.2F, "inertial.gyro_scale: 0 to 0.2, of one");
   require(positive(i.gyro_turn_on_radps) && positive(i.accel_turn_on_mps2) && positive(i.start_tilt_rad),
           "inertial.gyro_turn_on_radps, accel_turn_on_mps2, start_tilt_rad: above 0");
   require(i.wheels_every_us >= 0 && 2 * std::int64_t{i.wheels_every_us} <= n.wheels.timeout_us,

@@ -8,6 +8,8 @@
 #include "nav/ins_covariance.hpp"
 #include "nav/strapdown.hpp"
 
+#include <utility>
+
 namespace tetap::nav {
 
 /// One sigma of what drives the errors. A time constant of zero makes the bias a random walk.
@@ -18,6 +20,7 @@ struct InsNoise {
   float accel_bias_mps3_rthz = 1e-4F;   ///< m/s^3/sqrt(Hz)
   float gyro_bias_time_s = 0;
   float accel_bias_time_s = 0;
+  float gyro_scale = 0;    ///< how wrong the gyroscope's scale may be, as a share of every turn
   float motion_sigma = 3;  ///< what the accelerometer shows counts as motion beyond so many sigma of its noise
 };
 
@@ -45,6 +48,7 @@ class Ins {
     pending_.dt_s += step.dt_s;
     pending_.dv_n_mps += step.dv_n_mps;
     pending_.r_dt += step.r_nb * step.dt_s;
+    turned_rad_ += step.r_nb.row(2).dot(imu.dtheta_b_rad - x.b_g_radps * step.dt_s);
     return verdict;
   }
 
@@ -56,6 +60,7 @@ class Ins {
     x.b_a_mps2 *= pending_.keep_b_a;
     x.b_g_radps *= pending_.keep_b_g;
     if (noise.motion_sigma > 0.0F) keep_motion(pending_);
+    p(8, 8) += scale_rad2(pending_);
     nav::predict_covariance(p, pending_);
     pending_ = {};
     maintain();
@@ -119,6 +124,7 @@ class Ins {
   void each_bit_of_p(Sink&& sink) const {
     for (const float v : p.packed()) sink(v);
     sink(pending_.dt_s);
+    sink(turned_rad_);
     for (int i = 0; i < 3; ++i) {
       sink(pending_.dv_n_mps(i));
       for (int k = 0; k < 3; ++k) sink(pending_.r_dt(i, k));
@@ -157,10 +163,20 @@ class Ins {
     return result.innovation;
   }
 
+  /// A turn about the vertical, where nothing levels it, is wrong by a share that stays the same while the turn does:
+  /// after a full circle as wrong as with so much noise on the way. What noise explains is no turn.
+  float scale_rad2(const InsCovarianceStep<float>& step) {
+    const float turned = std::exchange(turned_rad_, 0.0F);
+    const float beyond = base::abs(turned) - 3.0F * base::sqrt(step.var_theta);
+    constexpr float kCircle_rad = 6.2831853F;
+    return beyond > 0.0F ? kCircle_rad * noise.gyro_scale * noise.gyro_scale * beyond : 0.0F;
+  }
+
   bool start_with_p(const InsState& at) {
     x = at;
     condition(p, watch_);
     pending_ = {};
+    turned_rad_ = 0;
     return true;
   }
   static constexpr float kMostSpeed_mps = 1000.0F;
@@ -201,6 +217,7 @@ class Ins {
   }
 
   InsCovarianceStep<float> pending_{};
+  float turned_rad_ = 0;  ///< about the vertical, over the same time
   InsFactor watch_{};
   std::uint32_t conditioned_ = 0;
 };

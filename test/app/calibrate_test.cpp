@@ -95,7 +95,7 @@ TEST(Calibrate, DoesNotMakeAStuckSensorLookAlive) {
 // One step of the bus is a difference.
 TEST(Calibrate, ASensorThatMovesByOneStepIsNotStuck) {
   Repeats repeats;
-  for (int k = 0; k < 50; ++k) {
+  for (std::size_t k = 0; k < 50; ++k) {
     ImuSample s{.temperature_degC = 40, .interval_us = 5000};
     s.dangle_b_rad[k % 3] = k % 2 == 0 ? 1e-6F : 0.0F;
     s.dvelocity_b_mps[k % 3] = k % 2 == 0 ? 1e-5F : 0.0F;

@@ -70,7 +70,7 @@ void expect_dense(double tolerance) {
     if constexpr (std::is_same_v<Scalar, float>) {
       filter::unroll<0, 15>([&](auto r) {
         filter::unroll<0, 15>(
-            [&](auto c) { entries(int{r}, int{c}) = double{nav::predicted_covariance<r, c>(p, step)}; });
+            [&](auto c) { entries(int{r}, int{c}) = static_cast<double>(nav::predicted_covariance<r, c>(p, step)); });
       });
     }
     nav::predict_covariance(p, step);

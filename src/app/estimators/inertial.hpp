@@ -113,7 +113,8 @@ class Inertial {
     ins_.noise = {.gyro_radps_rthz = n.gyro_radps_rthz,
                   .accel_mps2_rthz = n.accel_mps2_rthz,
                   .gyro_bias_radps2_rthz = n.gyro_bias_radps2_rthz,
-                  .accel_bias_mps3_rthz = n.accel_bias_mps3_rthz};
+                  .accel_bias_mps3_rthz = n.accel_bias_mps3_rthz,
+                  .gyro_scale = n.gyro_scale};
   }
   void begin(const Context& with);
   void begin_anew(base::Micros t, can::ResetCause cause, const Context& with);
