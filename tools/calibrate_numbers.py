@@ -86,6 +86,31 @@ class Robot:
         return float(found[1]) if found else default
 
 
+    def now(self, field):
+        """The values of one of the fields a calibration finds, as the header has them or app::Numbers by itself; None without a robot."""
+        if not self.name:
+            return None
+        member = field.split(".")[-1]
+        if member == "mounting_bs" and field.startswith("magnetic."):
+            return None
+        found = re.search(r"\.%s\s*=\s*\{([^{}]*)\}" % re.escape(member), self.text)
+        if found:
+            return np.array([float(one.strip().rstrip("F")) for one in found[1].split(",") if one.strip()])
+        one = self.number(member)
+        return np.array([one]) if one is not None else UNSET.get(member)
+
+    def has(self, number):
+        """What it says now is no further off than two of its sigmas, each: nothing to change."""
+        now = self.now(number.field) if number.field else None
+        return now is not None and len(now) == len(number.value) and bool((np.abs(number.value - now) <= 2 * number.sigma).all())
+
+
+# What app::Numbers has where a header says nothing (test/tools/calibrate_test.py compares).
+UNSET = {"mounting_bs": np.eye(3).ravel(), "up_s": np.array([0.0, 0.0, 1.0]), "accel_bias_mps2": np.zeros(3), "gyro_bias_radps": np.zeros(3),
+         "accel_matrix": np.eye(3).ravel(), "speed_scale": np.ones(1), "left_speed_scale": np.ones(1), "right_speed_scale": np.ones(1),
+         "yaw_rate_scale": np.ones(1)}
+
+
 def structs():
     """Of each struct that app::Numbers is made of: its members in order, name -> type."""
     found = {}
@@ -103,10 +128,12 @@ def literal(value, digits):
     return text + ("F" if "." in text or "e" in text else ".0F")
 
 
-def snippet(parts):
-    """The numbers as designated initialisers of app::Numbers, in its order."""
+def snippet(parts, robot=None):
+    """The numbers as designated initialisers of app::Numbers, in its order; without those that the robot has already."""
     known, values = structs(), {}
     for number in (number for part in parts for number in part.numbers if number.field):
+        if robot is not None and robot.has(number):
+            continue
         text = ", ".join(literal(value, number.digits) for value in number.value)
         values[number.field] = text if len(number.value) == 1 else "{" + text + "}"
 

@@ -348,7 +348,7 @@ def quaternion(roll, pitch, yaw):
 
 
 class Blocks:
-    """Errors of an inertial estimate by block, and the sigmas it published, with the bus's rounding of the estimate: `error[name]` and `sigma[name]` with three columns and a row for
+    """Errors of an inertial estimate by block, and the sigmas it published: `error[name]` and `sigma[name]` with three columns and a row for
     every attitude; position east, north, up; attitude about east, north and up."""
 
     def __init__(self, states, true):
@@ -363,10 +363,12 @@ class Blocks:
         for name, columns in (("velocity", VELOCITY), ("gyro bias", GYRO_BIAS), ("acc bias", ACC_BIAS)):
             self.error[name] = three(states, columns) - three(true, columns)
             self.sigma[name] = three(states, [f"std_{one}" for one in columns])
-        # A sigma of 0 is one below half a step of the bus.
+        # A sigma of 0 is one below half a step of the bus; the estimate itself is rounded, too, which only the NEES has to know.
+        self._judged = {}
         for name, (message, signal) in STEPS.items():
+            self.sigma[name] = np.maximum(self.sigma[name], 0.5 * limits(message, signal)[0])
             rounded = np.array([times * limits(*value)[0] / np.sqrt(12.0) for *value, times in VALUE_STEPS[name]])
-            self.sigma[name] = np.hypot(np.maximum(self.sigma[name], 0.5 * limits(message, signal)[0]), rounded)
+            self._judged[name] = np.hypot(self.sigma[name], rounded)
         invalid = states["pos_valid"] != 1
         for error in self.error.values():
             error[invalid] = np.nan
@@ -374,7 +376,7 @@ class Blocks:
     def nees(self, name):
         """Of every row; NaN where something of it is not known."""
         with np.errstate(invalid="ignore", divide="ignore"):
-            scaled = self.error[name] / self.sigma[name]
+            scaled = self.error[name] / self._judged[name]
             values = (scaled ** 2).sum(axis=1)
             if name == "position":
                 # Of x and y the correlation is published.
@@ -647,7 +649,11 @@ def warnings_of(run, judged):
                 found.append(f"{one['name']} rejected {counts['rejected']} of {tested} {sensor} measurements")
         if one["nees_mean"] is not None and one["nees_mean"] > MOST_NEES:
             found.append(f"NEES mean of {one['name']} is {one['nees_mean']:.0f}, not {one['nees_dof']}")
-    return [f"{'; '.join(found)} ({cause})"] if found else []
+        if one["kind"] != "Attitude" and one["epochs"] == one["epochs_not_valid"]:
+            found.append(f"{one['name']} never had a valid position")
+    length_s = float(run.estimates["time_s"][-1] - run.estimates["time_s"][0])
+    late = [f"{one.words}, after the end of the run ({length_s:.0f} s)" for one in faults(run) if one.start_s is not None and one.start_s > length_s]
+    return ([f"{'; '.join(found)} ({cause})"] if found else []) + [f"fault {one}: it did not happen" for one in late]
 
 
 def summary(run, truth):

@@ -11,6 +11,7 @@ import contextlib
 import io
 import json
 import os
+import re
 import subprocess
 import sys
 import tempfile
@@ -496,7 +497,7 @@ class Program(unittest.TestCase):
 
     def test_the_snippet_compiles_into_a_robots_numbers(self):
         path = drive(1, np.eye(3), duration_s=120).write(self.at)
-        done = tool(path, "--robot", "rover", "--out", os.path.join(self.at, "c"), status=0)
+        done = tool(path, "--counts-per-turn", "2000", "--out", os.path.join(self.at, "c"), status=0)
         snippet = done.stdout.split("hpp:\n")[1].split("\nwritten")[0]
         self.compiles(snippet, "numbers.wheels.drive.track_m > 0.4F && numbers.inertial.mounting_bs[8] > 0.99F")
 
@@ -521,6 +522,29 @@ class Program(unittest.TestCase):
         self.compiles(calibrate_numbers.snippet(parts),
                       f"numbers.magnetic.hard_iron_uT[0] * {hard[0]:.3f}F > 0 && numbers.magnetic.norm_uT > 40 && numbers.imu.accel_matrix[0] > 0.9F"
                       " && numbers.imu.gyro_bias_slope_radps_per_degC[2] > 1e-4F && numbers.wheels.left_speed_scale > 0.9F")
+
+    def test_what_a_robot_has_within_two_sigma_is_not_advised(self):
+        robot = calibrate_numbers.Robot("rover")
+        part = calibrate_numbers.Part("mounting", "mounting")
+        track = robot.number("track_m")
+        part.add("up", [0.018, 0, 0.99984], [0.01, 0.01, 0.001], "1", "gyro.up_s", tuple("xyz"))
+        part.add("track", track + 0.019, 0.01, "m", "wheels.drive.track_m")
+        part.add("bias", [0, 0, 0.021], [0.01, 0.01, 0.01], "rad/s", "imu.gyro_bias_radps", tuple("xyz"))
+        self.assertEqual([robot.has(number) for number in part.numbers], [True, True, False])
+        text = calibrate_numbers.snippet([part], robot)
+        self.assertIn("gyro_bias_radps = {0.0F, 0.0F, 0.021F}", text)
+        self.assertNotIn("up_s", text)
+        self.assertNotIn("track", text)
+        self.assertIn("track", calibrate_numbers.snippet([part], calibrate_numbers.Robot()), "nobody knows what that robot has")
+
+    def test_what_a_header_does_not_say_is_what_the_firmware_has_by_itself(self):
+        with open(os.path.join(ROOT, "src/app/numbers.hpp"), encoding="utf-8") as file:
+            text = file.read()
+        for member, value in calibrate_numbers.UNSET.items():
+            given = re.findall(r" %s(?: = ([^;]*)|\{([^}]*)\});" % member, text)
+            self.assertTrue(given, member)
+            for one in given:
+                self.assertEqual([float(v) for v in "".join(one).rstrip("F").split(",")], value.tolist(), member)
 
     def test_a_number_that_the_firmware_does_not_have_is_an_error(self):
         part = calibrate_numbers.Part("gyro", "gyroscope")

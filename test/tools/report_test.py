@@ -269,6 +269,21 @@ class Warnings(Case):
         self.assertIn("(fault kidnapped at 20 s)", self.run_with(0, error_m=2.0, about={**RUN, "fault": "kidnapped@20+0"})[0])
 
 
+    def test_a_robot_that_never_knew_where_it_is_may_be_the_wrong_one(self):
+        self.estimates(self.time_s, self.zero, self.zero, self.zero, valid=[0] * 40)
+        self.assertIn("warning: fused never had a valid position (is rover the robot of this log?)\n", self.report("--no-pictures").stdout)
+
+    def test_a_fault_after_the_end_did_not_happen(self):
+        lines = self.run_with(0, about={**RUN, "fault": "kidnapped@20+0,imu_stuck@0.1+3"})
+        self.assertEqual(lines, ["warning: fault kidnapped at 20 s, after the end of the run (0 s): it did not happen"])
+
+    def test_what_a_repeated_log_was_compared_by_is_one_line(self):
+        self.estimates(self.time_s, self.zero, self.zero, self.zero)
+        self.assertNotIn("repeated", self.report("--no-pictures").stdout)
+        self.write("run.json", json.dumps({**RUN, "epochs_compared": 21368, "epochs_different": 0}))
+        self.assertIn("\nrepeated: 21368 epochs compared with the log's own, byte for byte, 0 different\n", self.report("--no-pictures").stdout)
+
+
 class Faults(Case):
     def test_fault_times_are_told_by_epoch_also_when_the_clock_of_the_run_jumps(self):
         time_s = np.where(np.arange(300) >= 200, 4.0, 1.0) + 0.01 * np.arange(300)
