@@ -74,7 +74,8 @@ class Robot:
                 with open(path, encoding="utf-8") as file:
                     self.text = re.sub(r"//.*", "", file.read())
             except OSError as error:
-                raise BadInput(f"{path}: {error.strerror}") from None
+                known = sorted(one[:-4] for one in os.listdir(os.path.dirname(path)) if one.endswith(".hpp") and one != "messages.hpp")
+                raise BadInput(f"config/{name}.hpp: {error.strerror}; there are: {', '.join(known)}") from None
             if "app::Numbers" not in self.text:
                 raise BadInput(f"{path}: no robot: no app::Numbers in it")
         self.given = {}
