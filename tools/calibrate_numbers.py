@@ -86,7 +86,6 @@ class Robot:
         found = re.search(r"\.%s\s*=\s*([-+\d.eE]+)F?\s*[,}]" % re.escape(field), self.text)
         return float(found[1]) if found else default
 
-
     def now(self, field):
         """The values of one of the fields a calibration finds, as the header has them or app::Numbers by itself; None without a robot."""
         if not self.name:

@@ -268,7 +268,6 @@ class Warnings(Case):
         self.assertEqual(self.run_with(0, error_m=2.0, estimator=0), [])
         self.assertIn("(fault kidnapped at 20 s)", self.run_with(0, error_m=2.0, about={**RUN, "fault": "kidnapped@20+0"})[0])
 
-
     def test_a_robot_that_never_knew_where_it_is_may_be_the_wrong_one(self):
         self.estimates(self.time_s, self.zero, self.zero, self.zero, valid=[0] * 40)
         self.assertIn("warning: fused never had a valid position (is rover the robot of this log?)\n", self.report("--no-pictures").stdout)
