@@ -54,6 +54,7 @@ struct InertialEstimate {
   nav::InsState state;
   const filter::Symmetric<float, nav::InsState::kErrors>& p;  ///< the estimator's own: as long as nothing changes it
   nav::InsCovarianceStep<float> ahead;                        ///< from the time of p to the present
+  float unseen_m2 = 0;                                        ///< of the position, where no IMU saw it go
   bool valid = false;
   Jump jump;
   ImuHealth imu;
@@ -61,7 +62,8 @@ struct InertialEstimate {
   /// Of errors kI and kJ (nav::InsState), at the present.
   template <int kI, int kJ = kI>
   [[nodiscard]] float covariance() const {
-    return nav::predicted_covariance<kI, kJ>(p, ahead);
+    const float unseen = kI == kJ && kI < 3 ? unseen_m2 : 0.0F;
+    return nav::predicted_covariance<kI, kJ>(p, ahead) + unseen;
   }
   template <int kI>
   [[nodiscard]] float sigma() const {

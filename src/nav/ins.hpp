@@ -7,8 +7,7 @@
 #include "filter/state.hpp"
 #include "nav/ins_covariance.hpp"
 #include "nav/strapdown.hpp"
-
-#include <utility>
+#include "nav/turned_scale.hpp"
 
 namespace tetap::nav {
 
@@ -48,7 +47,7 @@ class Ins {
     pending_.dt_s += step.dt_s;
     pending_.dv_n_mps += step.dv_n_mps;
     pending_.r_dt += step.r_nb * step.dt_s;
-    turned_rad_ += step.r_nb.row(2).dot(imu.dtheta_b_rad - x.b_g_radps * step.dt_s);
+    pending_.shown_rad += step.r_nb.row(2).dot(imu.dtheta_b_rad);
     return verdict;
   }
 
@@ -56,25 +55,27 @@ class Ins {
   /// measurement that comes needs it).
   void predict_covariance() {
     if (!(pending_.dt_s > 0.0F)) return;
-    make_noise(pending_);
-    x.b_a_mps2 *= pending_.keep_b_a;
-    x.b_g_radps *= pending_.keep_b_g;
-    if (noise.motion_sigma > 0.0F) keep_motion(pending_);
-    p(8, 8) += scale_rad2(pending_);
-    nav::predict_covariance(p, pending_);
+    InsCovarianceStep<float> step =
+        noise_over(pending_, pending_.dt_s, turned_.turn(pending_turn_rad(), noise.gyro_scale));
+    x.b_a_mps2 *= step.keep_b_a;
+    x.b_g_radps *= step.keep_b_g;
+    if (noise.motion_sigma > 0.0F) keep_motion(step);
+    nav::predict_covariance(p, step);
     pending_ = {};
     maintain();
   }
 
-  /// The step that would bring the covariance to the time of a state that was carried on from x over ahead_s, about as
-  /// `present` is turned.
-  [[nodiscard]] InsCovarianceStep<float> step_to(const InsState& present, float ahead_s) const {
-    InsCovarianceStep<float> step = pending_;
-    step.dt_s += ahead_s;
+  /// The step that would bring the covariance to the time of a state that was carried on from x, ahead_s after it, in
+  /// the navigation frame; about as `present` is turned. Noise of the sensor counts as motion here (see motion_sigma).
+  [[nodiscard, gnu::always_inline]] InsCovarianceStep<float> step_to(const InsState& present, float ahead_s) const {
+    // Twice the vertical part of present q_nb times x.q_nb's inverse: x was carried there, so their signs agree.
+    const Quaternion &to = present.q_nb, &from = x.q_nb;
+    const float half_rad = (to.z * from.w - to.w * from.z) + (to.y * from.x - to.x * from.y);
+    InsCovarianceStep<float> step = noise_over(
+        pending_, pending_.dt_s + ahead_s, turned_.would_add(pending_turn_rad() + 2.0F * half_rad, noise.gyro_scale));
     step.dv_n_mps += present.v_n_mps - x.v_n_mps;
     step.dv_n_mps(2) += earth.gravity_mps2 * ahead_s;
     step.r_dt += present.q_nb.matrix() * ahead_s;
-    make_noise(step);
     return step;
   }
 
@@ -124,7 +125,8 @@ class Ins {
   void each_bit_of_p(Sink&& sink) const {
     for (const float v : p.packed()) sink(v);
     sink(pending_.dt_s);
-    sink(turned_rad_);
+    sink(pending_.shown_rad);
+    turned_.each_bit(sink);
     for (int i = 0; i < 3; ++i) {
       sink(pending_.dv_n_mps(i));
       for (int k = 0; k < 3; ++k) sink(pending_.r_dt(i, k));
@@ -163,37 +165,43 @@ class Ins {
     return result.innovation;
   }
 
-  /// A turn about the vertical, where nothing levels it, is wrong by a share that stays the same while the turn does:
-  /// after a full circle as wrong as with so much noise on the way. What noise explains is no turn.
-  float scale_rad2(const InsCovarianceStep<float>& step) {
-    const float turned = std::exchange(turned_rad_, 0.0F);
-    const float beyond = base::abs(turned) - 3.0F * base::sqrt(step.var_theta);
-    constexpr float kCircle_rad = 6.2831853F;
-    return beyond > 0.0F ? kCircle_rad * noise.gyro_scale * noise.gyro_scale * beyond : 0.0F;
-  }
-
   bool start_with_p(const InsState& at) {
     x = at;
     condition(p, watch_);
     pending_ = {};
-    turned_rad_ = 0;
+    turned_ = {};
     return true;
   }
   static constexpr float kMostSpeed_mps = 1000.0F;
   static constexpr std::int64_t kGapStep_us = 100'000, kMostGap_us = 60'000'000;
   static constexpr float kGapStep_s = 0.1F;
 
-  /// What drives the errors over the step's time.
-  void make_noise(InsCovarianceStep<float>& step) const {
-    const float dt_s = step.dt_s;
+  /// What the state was moved by since the covariance was.
+  struct Pending {
+    float dt_s = 0;
+    Vector3 dv_n_mps = Vector3::Zero();
+    Matrix3 r_dt = Matrix3::Zero();
+    float shown_rad = 0;  ///< about the vertical, by a gyroscope with its bias
+  };
+
+  [[nodiscard]] float pending_turn_rad() const { return pending_.shown_rad - pending_.r_dt.row(2).dot(x.b_g_radps); }
+
+  /// With what drives the errors over dt_s.
+  [[nodiscard, gnu::always_inline]] InsCovarianceStep<float> noise_over(const Pending& way, float dt_s,
+                                                                        float var_yaw) const {
     const auto variance = [dt_s](float density) { return density * density * dt_s; };
+    const auto keep = [dt_s](float time_s) { return time_s > dt_s ? 1.0F - dt_s / time_s : 1.0F; };
     const float more = vibration > 1.0F && vibration < 1e4F ? vibration : 1.0F;
-    step.var_v = variance(more * noise.accel_mps2_rthz);
-    step.var_theta = variance(more * noise.gyro_radps_rthz);
-    step.var_b_a = variance(noise.accel_bias_mps3_rthz);
-    step.var_b_g = variance(noise.gyro_bias_radps2_rthz);
-    if (noise.accel_bias_time_s > dt_s) step.keep_b_a = 1.0F - dt_s / noise.accel_bias_time_s;
-    if (noise.gyro_bias_time_s > dt_s) step.keep_b_g = 1.0F - dt_s / noise.gyro_bias_time_s;
+    return {.dt_s = dt_s,
+            .dv_n_mps = way.dv_n_mps,
+            .r_dt = way.r_dt,
+            .var_v = variance(more * noise.accel_mps2_rthz),
+            .var_theta = variance(more * noise.gyro_radps_rthz),
+            .var_b_a = variance(noise.accel_bias_mps3_rthz),
+            .var_b_g = variance(noise.gyro_bias_radps2_rthz),
+            .var_yaw = var_yaw,
+            .keep_b_a = keep(noise.accel_bias_time_s),
+            .keep_b_g = keep(noise.gyro_bias_time_s)};
   }
 
   /// Sensor noise taken for acceleration would let the filter believe that it sees its heading at standstill: v gains
@@ -216,8 +224,8 @@ class Ins {
     ++conditioned_;
   }
 
-  InsCovarianceStep<float> pending_{};
-  float turned_rad_ = 0;  ///< about the vertical, over the same time
+  Pending pending_{};
+  TurnedScale turned_{};
   InsFactor watch_{};
   std::uint32_t conditioned_ = 0;
 };

@@ -17,6 +17,7 @@ struct InsCovarianceStep {
   filter::Vector<Scalar, 3> dv_n_mps = filter::Vector<Scalar, 3>::Zero();
   filter::Matrix<Scalar, 3, 3> r_dt = filter::Matrix<Scalar, 3, 3>::Zero();  ///< sum of R_nb dt
   Scalar var_v = 0, var_theta = 0, var_b_a = 0, var_b_g = 0;                 ///< added per axis over the step
+  Scalar var_yaw = 0;                                                        ///< about the vertical, besides
   Scalar keep_b_a = 1, keep_b_g = 1;  ///< what is left of a bias after it (Gauss-Markov); 1: random walk
 };
 
@@ -73,6 +74,7 @@ inline void predict_covariance(filter::Symmetric<Scalar, InsState::kErrors>& p, 
     p(kA + i, kA + i) += step.var_b_a;
     p(kG + i, kG + i) += step.var_b_g;
   });
+  p(kT + 2, kT + 2) += step.var_yaw;
 }
 
 /// The largest standard deviations the filter keeps: beyond them it knows nothing, and float would overflow in the end.

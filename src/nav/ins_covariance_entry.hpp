@@ -69,6 +69,7 @@ template <int kI, int kJ>
   if constexpr (kI == kJ) {
     const std::array<float, 5> noise{0.0F, step.var_v, step.var_theta, step.var_b_a, step.var_b_g};
     sum += noise[static_cast<std::size_t>(kI / 3)];
+    if constexpr (kI == InsState::kAttitude + 2) sum += step.var_yaw;
   }
   return sum;
 }

@@ -146,6 +146,7 @@ TEST(Ahead, ItsCellsAreNoMoreThanACache) {
       ASSERT_EQ(bits_of(grown.place().x), bits_of(fresh.place().x)) << seed << ' ' << i;
       ASSERT_EQ(grown.place().reached, fresh.place().reached);
       ASSERT_EQ(grown.place().last, fresh.place().last);
+      ASSERT_EQ(grown.place().unseen_s, fresh.place().unseen_s);
     }
   }
 }
@@ -305,6 +306,9 @@ class Ticks {
     return taken;
   }
   [[nodiscard]] Estimate now() const { return history_.primary().estimate(context()); }
+  [[nodiscard]] float sigma_mps() const {
+    return base::sqrt(history_.primary().motion_variance(context()).forward_m2ps2);
+  }
   std::int64_t late_us = 0;  ///< of what left, behind the end of the window, at most
   std::map<can::Sensor, int> fused;
 
@@ -377,6 +381,24 @@ TEST(InertialWork, WhatIsNotUsedCostsNothing) {
   ticks.late_us = 0;
   for (int i = 0; i < 1000; ++i) ticks.tick(5'000, 20'000, 200'000);
   EXPECT_LT(ticks.late_us, 40'000);
+}
+
+/// Back after 150 ms, the IMU does not say what happened meanwhile: until wheels have told the far end that lies
+/// behind.
+TEST(InertialWork, AHoleInTheWindowIsDoubtedUntilTheFarEndHasCrossedIt) {
+  Ticks ticks(rover_like());
+  for (int i = 0; i < 300; ++i) ticks.tick(5'000, 10'000, 200'000);
+  const float before = ticks.sigma_mps();
+  ticks.imu = false;
+  for (int i = 0; i < 15; ++i) ticks.tick(5'000, 10'000, 200'000);
+  EXPECT_GT(ticks.sigma_mps(), 5.0F * before);
+  ticks.imu = true;
+  for (int i = 0; i < 15; ++i) {
+    ticks.tick(5'000, 10'000, 200'000);
+    EXPECT_GT(ticks.sigma_mps(), 5.0F * before) << i;
+  }
+  for (int i = 0; i < 200; ++i) ticks.tick(5'000, 10'000, 200'000);
+  EXPECT_LT(ticks.sigma_mps(), 1.5F * before);
 }
 
 /// Without an IMU, or with one that repeats itself, and with measurements waiting: it goes on without, and is no less

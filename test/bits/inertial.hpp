@@ -178,6 +178,10 @@ class InertialRun {
           const app::InertialEstimate full = lane.inertial(context());
           hash_state(hash_, full.state);
           for (const float v : full.p.packed()) hash_(v);
+          filter::unroll<0, nav::InsState::kErrors>([&](auto i) { hash_(full.template covariance<i>()); });
+          const app::MotionVariance motion = lane.motion_variance(context());
+          hash_(motion.forward_m2ps2);
+          hash_(motion.yaw_rate_rad2ps2);
         }
       });
       history_.each_bit(hash_);

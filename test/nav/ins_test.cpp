@@ -84,8 +84,11 @@ TEST(Ins, AMillionStepsWithoutAMeasurementStayFiniteAndPositiveDefinite) {
 /// What is published of the covariance while the filter itself is behind: as if it had been carried sample by sample.
 TEST(Ins, TheStepToThePresentIsThatOfEverySampleOnTheWay) {
   Ins far;
-  far.noise.motion_sigma = 0;
-  far.start({}, start_covariance());
+  far.noise.motion_sigma = 0;  // between samples there is motion here
+  far.noise.gyro_scale = 0.003F;
+  auto p = start_covariance();
+  p(8, 8) = 1e-6F, p(14, 14) = 1e-10F;
+  far.start({}, p);
   const auto go = [](Ins& ins) {
     const auto imu = ImuIncrement::constant({0.02F, -0.01F, 0.4F}, {1.5F, -0.7F, 9.9F}, {5'000});
     EXPECT_EQ(ins.predict(imu), ImuVerdict::kAccepted);
@@ -112,6 +115,7 @@ TEST(Ins, TheStepToThePresentIsThatOfEverySampleOnTheWay) {
     EXPECT_NEAR(published, near.p(i, i), 0.02F * near.p(i, i)) << int{i};
   });
   EXPECT_GT(near.p(3, 3), 1.1F * far.p(3, 3)) << "or nothing was shown";
+  EXPECT_GT(step.var_yaw, 0.05F * near.p(8, 8));
 }
 
 /// A gyroscope that is wrong by 0.3 % is wrong by 19 mrad after a circle, however fast; at rest it is by nothing.

@@ -32,6 +32,7 @@ class Ahead {
     base::Micros last;     ///< stamp of the last sample that said something
     Repeats repeats;
     nav::Vector3 rate_b_radps = nav::Vector3::Zero();  ///< as the gyroscope showed it last
+    float unseen_s = 0;                                ///< of the way, where samples are missing or clipped
   };
 
   /// A sample is new in the window. True: it came late, and the state was carried on without it.
@@ -69,6 +70,7 @@ class Ahead {
     sink(place_.last.us);
     sink(heard_.us);
     for (int i = 0; i < 3; ++i) sink(place_.rate_b_radps(i));
+    sink(place_.unseen_s);
   }
 
  private:
@@ -120,7 +122,9 @@ inline void Ahead::hear(const Sample& sample, const With& with, const ImuSample*
     if (newest != nullptr) place_.rate_b_radps = rate_of(*newest, n);
     static_cast<void>(nav::strapdown(place_.x, unseen(gap, with), with.earth));
     place_.reached += gap;
+    place_.unseen_s += base::seconds(gap);
   }
+  if (imu.clipped_accel > 0 || imu.clipped_gyro > 0) place_.unseen_s += base::seconds(increment.dt);
   if (gather_.full()) fold(with);
   gather_.add(increment);
   place_.reached += increment.dt;

@@ -201,7 +201,8 @@ inline void Inertial::stand(base::Micros stamp, const Context& with) {
 /// two are correlated (Bar-Shalom, Li, Kirubarajan 2001, sec. 8.3: the measurement's noise with the process'). With
 /// that the heading is turned back to what it was, and an hour at rest costs it nothing. Of tilt the accelerometer has
 /// seen some of that noise already, nobody knows how much: there the measurement counts for less instead. The mean is
-/// that of some time ago: what the bias wandered since is in its variance, and not told by it.
+/// that of some time ago: what the bias wandered since is in its variance, and not told by it (what of the heading came
+/// of that wander is left out: it is smaller by a thousand).
 [[gnu::noinline]] inline void Inertial::hold_heading(float gate, const InertialNumbers& n) {
   const float density = n.gyro_radps_rthz * n.gyro_radps_rthz;
   const nav::Vector3 up_b = ins_.x.q_nb.conjugate().rotate({0.0F, 0.0F, 1.0F});
@@ -211,7 +212,8 @@ inline void Inertial::stand(base::Micros stamp, const Context& with) {
   const float walk = n.gyro_bias_radps2_rthz * n.gyro_bias_radps2_rthz * (0.5F * waiting_.s + still_.s);
   nav::Vector3 doubt, since;
   for (int i = 0; i < 3; ++i) {
-    since(i) = ins_.p(12 + i, 12 + i) > 4.0F * walk ? walk : 0.0F;
+    const float half = 0.5F * ins_.p(12 + i, 12 + i);
+    since(i) = walk < half ? walk : half;
     ins_.p(12 + i, 12 + i) -= since(i);
     ins_.p(8, 12 + i) -= shared * up_b(i);
     doubt(i) = 4.0F - 3.0F * up_b(i) * up_b(i);

@@ -6,50 +6,60 @@
 
 namespace tetap::app {
 
+/// What of the way to the present no IMU saw, as the filter will grow there: over all of it, or over what is missing.
+/// Variance of velocity per (m/s^2)^2, of attitude per (rad/s)^2.
+inline float Inertial::unseen_s2() const {
+  constexpr float kLasts_s = 0.1F;  // Ins::predict_without_imu
+  return blind_ ? ahead_s() * ahead_s() : kLasts_s * ahead_.place().unseen_s;
+}
+inline float Inertial::unseen_m2(const InertialNumbers& n) const {
+  const float went_m = 0.5F * ahead_s() * ahead_s() * n.gap_mps2;
+  return blind_ ? went_m * went_m : 0.0F;
+}
+
+/// From the time of the covariance to the present. In place: a pose needs little of it.
+[[gnu::always_inline]] inline nav::InsCovarianceStep<float> Inertial::step_ahead(const InertialNumbers& n) const {
+  nav::InsCovarianceStep<float> step = ins_.step_to(now_x(), ahead_s());
+  const float s2 = unseen_s2(), turn_radps = unseen_turn_radps(n);
+  step.var_v += s2 * n.gap_mps2 * n.gap_mps2;
+  step.var_theta += s2 * turn_radps * turn_radps;
+  return step;
+}
+
 inline InertialEstimate Inertial::inertial(const Context& with) const {
-  const bool tracking = phase_ == Phase::kTracking;
-  const nav::InsState& present = tracking ? present_ : ins_.x;
-  InertialEstimate full{.state = present,
-                        .p = ins_.p,
-                        .ahead = ins_.step_to(present, ahead_s()),
-                        .valid = tracking,
-                        .jump = jump_,
-                        .imu = imu_.health()};
-  if (blind_) {  // as the filter grows where it has no IMU
-    const InertialNumbers& n = with.numbers.inertial;
-    const float turned = ahead_s() * unseen_turn_radps(n), gained = ahead_s() * n.gap_mps2;
-    full.ahead.var_v += gained * gained;
-    full.ahead.var_theta += turned * turned;
-  }
-  return full;
+  const InertialNumbers& n = with.numbers.inertial;
+  return {.state = now_x(),
+          .p = ins_.p,
+          .ahead = step_ahead(n),
+          .unseen_m2 = unseen_m2(n),
+          .valid = phase_ == Phase::kTracking,
+          .jump = jump_,
+          .imu = imu_.health()};
 }
 
 inline Estimate Inertial::estimate(const Context& with) const {
-  const InertialEstimate full = inertial(with);
-  const nav::InsState& x = full.state;
+  const nav::InsState& x = now_x();
+  const bool valid = phase_ == Phase::kTracking;
+  const nav::InsCovarianceStep<float> ahead = step_ahead(with.numbers.inertial);
   const nav::Vector3 v_b = x.q_nb.conjugate().rotate(x.v_n_mps);
-  const nav::Vector3 w_n = x.q_nb.rotate((full.valid ? ahead_.place().rate_b_radps : rate_b_radps_) - x.b_g_radps);
+  const nav::Vector3 w_n = x.q_nb.rotate((valid ? ahead_.place().rate_b_radps : rate_b_radps_) - x.b_g_radps);
   constexpr int kX = nav::InsState::kPosition, kY = kX + 1, kYaw = nav::InsState::kAttitude + 2;
+  const float unseen = unseen_m2(with.numbers.inertial);
   filter::Symmetric<float, 3> p;
-  p(0, 0) = full.covariance<kX>();
-  p(0, 1) = full.covariance<kX, kY>();
-  p(1, 1) = full.covariance<kY>();
-  p(0, 2) = full.covariance<kX, kYaw>();
-  p(1, 2) = full.covariance<kY, kYaw>();
-  p(2, 2) = full.covariance<kYaw>();
-  if (blind_) {
-    const float went = 0.5F * ahead_s() * ahead_s() * with.numbers.inertial.gap_mps2;
-    p(0, 0) += went * went;
-    p(1, 1) += went * went;
-  }
+  p(0, 0) = nav::predicted_covariance<kX, kX>(ins_.p, ahead) + unseen;
+  p(0, 1) = nav::predicted_covariance<kX, kY>(ins_.p, ahead);
+  p(1, 1) = nav::predicted_covariance<kY, kY>(ins_.p, ahead) + unseen;
+  p(0, 2) = nav::predicted_covariance<kX, kYaw>(ins_.p, ahead);
+  p(1, 2) = nav::predicted_covariance<kY, kYaw>(ins_.p, ahead);
+  p(2, 2) = nav::predicted_covariance<kYaw, kYaw>(ins_.p, ahead);
   return {.time = now_,
           .pose = {.x = x.x, .y = x.y, .yaw_rad = nav::euler(x.q_nb).yaw_rad},
           .p = p,
           .forward_mps = v_b(0),
           .yaw_rate_radps = w_n(2),
-          .position_valid = full.valid,
-          .heading_valid = full.valid,
-          .velocity_valid = full.valid};
+          .position_valid = valid,
+          .heading_valid = valid,
+          .velocity_valid = valid};
 }
 
 namespace detail {
@@ -79,7 +89,7 @@ template <int kFirst, std::size_t kN>
   const nav::Vector3 by_turn = nav::cross(ahead_n, nav::Vector3(v - full.ahead.dv_n_mps));
   const std::array<float, 7> speed{ahead_n(0), ahead_n(1), ahead_n(2),      by_turn(0),
                                    by_turn(1), by_turn(2), -full.ahead.dt_s};
-  const float yaw_rad2 = heading_rad2();
+  const float heading = full.covariance<nav::InsState::kAttitude + 2>(), yaw_rad2 = heading < 1.0F ? heading : 1.0F;
   MotionVariance variance{.forward_m2ps2 = detail::quadratic<nav::InsState::kVelocity>(full.p, speed) +
                                            full.ahead.var_v + 0.5F * v.squaredNorm() * yaw_rad2 * yaw_rad2,
                           .yaw_rate_rad2ps2 = 0};
