@@ -4,7 +4,6 @@
 
 #include "nav/ins.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <array>
 #include <cmath>
@@ -91,15 +90,6 @@ inline bool same(const nav::InsState& a, const nav::InsState& b) {
   };
   return a.x.anchor_um == b.x.anchor_um && a.y.anchor_um == b.y.anchor_um && a.z.anchor_um == b.z.anchor_um &&
          numbers(a) == numbers(b);
-}
-
-/// The smallest eigenvalue of the correlations, by the judge: above zero means positive definite.
-inline double least_correlation(const filter::Symmetric<float, 15>& p) {
-  using Full = Eigen::Matrix<double, 15, 15>;
-  const Full full = p.dense().cast<double>();
-  const Eigen::Matrix<double, 15, 1> size = full.diagonal().cwiseSqrt().cwiseInverse();
-  const Full scaled = size.asDiagonal() * full * size.asDiagonal();
-  return Eigen::SelfAdjointEigenSolver<Full>(scaled, Eigen::EigenvaluesOnly).eigenvalues()(0);
 }
 
 /// Repeatable normal numbers.

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a broken sensor may hand over, and the judge of what is left after it: eigenvalues in double.
+// What a broken sensor may hand over, and what has to hold after it.
 #pragma once
 
 #include "filter/update.hpp"
+#include "support/least_eigenvalue.hpp"
 
 #include <gtest/gtest.h>
-#include <Eigen/Eigenvalues>
 #include <array>
 #include <limits>
 #include <vector>
@@ -26,18 +26,6 @@ inline constexpr std::array<float, 11> kHostile{
     1.8446742e19F,
     -1.8446742e19F,
 };
-
-/// The smallest eigenvalue of the correlations: above zero means positive definite. Below any when something is no
-/// number.
-template <int N>
-double least_eigenvalue(const filter::Symmetric<float, N>& p) {
-  using Full = Eigen::Matrix<double, N, N>;
-  const Full full = p.dense().template cast<double>();
-  if (!full.allFinite() || !(full.diagonal().minCoeff() > 0)) return -std::numeric_limits<double>::infinity();
-  const Eigen::Matrix<double, N, 1> size = full.diagonal().cwiseSqrt().cwiseInverse();
-  return Eigen::SelfAdjointEigenSolver<Full>(size.asDiagonal() * full * size.asDiagonal(), Eigen::EigenvaluesOnly)
-      .eigenvalues()(0);
-}
 
 /// The floats of a model, so that each can be broken in turn.
 using Fields = std::vector<float*>;
