@@ -54,7 +54,7 @@ namespace tetap::sim {
   n.inertial.accel_bias_mps3_rthz = single(world.imu.accel_walk_mps2 * walk_rthz);
   n.inertial.gyro_turn_on_radps = single(world.imu.gyro_walk_radps);
   n.inertial.accel_turn_on_mps2 = single(world.imu.accel_walk_mps2);
-  n.inertial.wheel_mps = 0.001F;
+  n.inertial.wheel_mps = single(world.rover.jitter_ahead_mps);
   n.inertial.slip_share = 0;  // the wheels' noise is that of odometry: k metres squared per metre
   n.inertial.lateral_mps = n.inertial.vertical_mps = single(world.rover.jitter_mps);
   // Bus or not, a judge wants sigmas beside their errors.

@@ -36,7 +36,8 @@ struct RoverNumbers {
   double ground_tau_s = 0.4;
   double driver_wander_m = 0.08;  ///< lateral, Gauss-Markov: no two runs drive the same line [own]
   double driver_wander_tau_s = 6;
-  double jitter_mps = 0;  ///< of the body sideways and up while it moves, white for sensors (see matched_inertial())
+  double jitter_mps = 0;  ///< of the body sideways and up, at rest too; white for sensors (see matched_inertial())
+  double jitter_ahead_mps = 0;
   double jitter_tau_s = 0.002;
   double start_m = 0.05;  ///< 1 sigma per axis of where the rover really stands at the start [own]
   double start_rad = 0.02;
@@ -180,8 +181,8 @@ struct Numbers {
 
 /// What an inertial filter models exactly: matched(), and on top biases that wander at random (a Gauss-Markov process
 /// much slower than the run is that: its first draw is the turn-on bias, and it drives 2 sigma^2 / tau), wheels whose
-/// error is a share of their travel, and a body that moves sideways and up a little, which a filter takes for the noise
-/// of the non-holonomic constraint.
+/// error is a share of their travel, and a body that trembles, at rest as well: sideways and up as much as a filter
+/// takes for the noise of the non-holonomic constraint, ahead as much as it takes for that of the wheels.
 [[nodiscard]] inline Numbers matched_inertial(Numbers n) {
   const ImuNumbers imu = n.imu;
   const double gnss_m = sim::sqrt(n.gnss.white_m * n.gnss.white_m + n.gnss.correlated_m * n.gnss.correlated_m);
@@ -193,6 +194,7 @@ struct Numbers {
   n.imu.accel_range_mps2 = 16 * kG0;  // the jitter is steep
   n.imu.accel_noise = {imu.accel_noise[2], imu.accel_noise[2], imu.accel_noise[2]};
   n.rover.jitter_mps = 0.005;
+  n.rover.jitter_ahead_mps = 0.001;
   n.gnss.velocity_vertical_factor = 1.5;
   // On the node's ticks and at once: what the body does between a sample and the tick is in no filter's covariance.
   n.imu.phase = n.wheels.phase = {};

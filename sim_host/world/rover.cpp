@@ -49,7 +49,8 @@ Rover::Rover(const RoverNumbers& numbers, const Plan& plan, std::uint64_t seed, 
       slip_left_{numbers.slip_random, numbers.slip_random_tau_s, kDriver_s, slip_chance_},
       slip_right_{numbers.slip_random, numbers.slip_random_tau_s, kDriver_s, slip_chance_},
       side_jitter_{numbers.jitter_mps, numbers.jitter_tau_s, kStep_s, jitter_chance_},
-      up_jitter_{numbers.jitter_mps, numbers.jitter_tau_s, kStep_s, jitter_chance_} {
+      up_jitter_{numbers.jitter_mps, numbers.jitter_tau_s, kStep_s, jitter_chance_},
+      ahead_jitter_{numbers.jitter_ahead_mps, numbers.jitter_tau_s, kStep_s, jitter_chance_} {
   Chance start{seed, Stream::kStart};
   const PathPoint at = plan.path(0);
   x_m_ = at.x_m + start.normal(numbers.start_m);
@@ -90,15 +91,16 @@ void Rover::shake() {
 
 void Rover::jitter() {
   if (numbers_.jitter_mps <= 0) return;
-  const double moving = clamp(magnitude(speed_mps_) / 0.5, 0, 1);
-  const double side = moving * side_jitter_.next(jitter_chance_);
-  const double up = moving * up_jitter_.next(jitter_chance_);
+  const double side = side_jitter_.next(jitter_chance_);
+  const double up = up_jitter_.next(jitter_chance_);
+  const double ahead = ahead_jitter_.next(jitter_chance_);
   const Direction d = direction(yaw_rad_);
-  x_m_ -= 0.5 * kStep_s * (side_mps_ + side) * d.sin;
-  y_m_ += 0.5 * kStep_s * (side_mps_ + side) * d.cos;
+  x_m_ += 0.5 * kStep_s * ((ahead_mps_ + ahead) * d.cos - (side_mps_ + side) * d.sin);
+  y_m_ += 0.5 * kStep_s * ((ahead_mps_ + ahead) * d.sin + (side_mps_ + side) * d.cos);
   z_m_ += 0.5 * kStep_s * (up_mps_ + up);
   side_mps_ = side;
   up_mps_ = up;
+  ahead_mps_ = ahead;
 }
 
 Motion Rover::step(base::Micros since_start) {
@@ -179,6 +181,7 @@ void Rover::integrate(double h_s, Motion& motion) {
 
 Truth Rover::truth() const {
   const Direction d = direction(yaw_rad_);
+  const double speed = speed_mps_ + ahead_mps_;
   const double drift = side_mps_ - numbers_.side_slip_s * speed_mps_ * yaw_rate_radps_;
   return {.time = {},
           .x_m = x_m_,
@@ -187,9 +190,9 @@ Truth Rover::truth() const {
           .roll_rad = roll_rad_,
           .pitch_rad = pitch_rad_,
           .yaw_rad = wrap(yaw_rad_),
-          .speed_mps = speed_mps_,
+          .speed_mps = speed,
           .yaw_rate_radps = yaw_rate_radps_,
-          .v_n_mps = {speed_mps_ * d.cos - drift * d.sin, speed_mps_ * d.sin + drift * d.cos, up_mps_}};
+          .v_n_mps = {speed * d.cos - drift * d.sin, speed * d.sin + drift * d.cos, up_mps_}};
 }
 
 }  // namespace tetap::sim

@@ -75,13 +75,13 @@ class Rover {
   double speed_mps_ = 0, acceleration_mps2_ = 0, yaw_rate_radps_ = 0;
   double roll_rad_ = 0, roll_rate_radps_ = 0, pitch_rad_ = 0, pitch_rate_radps_ = 0;
 
-  double z_m_ = 0, side_mps_ = 0, up_mps_ = 0;  // the body's jitter
+  double z_m_ = 0, side_mps_ = 0, up_mps_ = 0, ahead_mps_ = 0;  // the body's jitter
 
   bool parked_ = true;
   double wanted_acceleration_mps2_ = 0, wanted_yaw_rate_radps_ = 0;
 
   Chance driver_chance_, ground_chance_, slip_chance_, jitter_chance_;
-  GaussMarkov wander_, ground_roll_, ground_pitch_, slip_left_, slip_right_, side_jitter_, up_jitter_;
+  GaussMarkov wander_, ground_roll_, ground_pitch_, slip_left_, slip_right_, side_jitter_, up_jitter_, ahead_jitter_;
   int tick_ = 0;  // of kStep, within the driver's 10 ms
 };
 

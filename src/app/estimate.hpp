@@ -36,6 +36,7 @@ struct MotionVariance {
 struct Jump {
   float east_m = 0;
   float north_m = 0;
+  float up_m = 0;
   float yaw_rad = 0;
   can::ResetCause cause = can::ResetCause::kPositionJump;
   std::uint8_t count = 0;  ///< of such steps since the start
@@ -54,7 +55,6 @@ struct InertialEstimate {
   nav::InsState state;
   const filter::Symmetric<float, nav::InsState::kErrors>& p;  ///< the estimator's own: as long as nothing changes it
   nav::InsCovarianceStep<float> ahead;                        ///< from the time of p to the present
-  float unseen_m2 = 0;                                        ///< of the position, where no IMU saw it go
   bool valid = false;
   Jump jump;
   ImuHealth imu;
@@ -62,8 +62,7 @@ struct InertialEstimate {
   /// Of errors kI and kJ (nav::InsState), at the present.
   template <int kI, int kJ = kI>
   [[nodiscard]] float covariance() const {
-    const float unseen = kI == kJ && kI < 3 ? unseen_m2 : 0.0F;
-    return nav::predicted_covariance<kI, kJ>(p, ahead) + unseen;
+    return nav::predicted_covariance<kI, kJ>(p, ahead);
   }
   template <int kI>
   [[nodiscard]] float sigma() const {

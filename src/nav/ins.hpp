@@ -33,6 +33,10 @@ class Ins {
   InsNoise noise{};
   Earth earth{};
   float vibration = 1;  ///< scales the noise density of gyroscope and accelerometer
+  /// Known to stand: what its accelerometer shows beside gravity is no motion, however much it trembles.
+  bool stands = false;
+  /// By the last increment, for what is true a little later than the state; none where there was none.
+  Vector3 accel_n_mps2 = Vector3::Zero();
 
   /// How much of the state's time the covariance does not have yet.
   [[nodiscard]] float pending_s() const { return pending_.dt_s; }
@@ -48,6 +52,8 @@ class Ins {
     pending_.dv_n_mps += step.dv_n_mps;
     pending_.r_dt += step.r_nb * step.dt_s;
     pending_.shown_rad += step.r_nb.row(2).dot(imu.dtheta_b_rad);
+    accel_n_mps2 = step.dv_n_mps / step.dt_s;
+    accel_n_mps2(2) -= earth.gravity_mps2;
     return verdict;
   }
 
@@ -92,6 +98,7 @@ class Ins {
                                   .var_v = sigma_mps2 * sigma_mps2 * dt_s * kGapStep_s,
                                   .var_theta = sigma_radps * sigma_radps * dt_s * kGapStep_s});
     }
+    accel_n_mps2 = Vector3::Zero();
     condition(p, watch_);
   }
 
@@ -132,6 +139,8 @@ class Ins {
       for (int k = 0; k < 3; ++k) sink(pending_.r_dt(i, k));
     }
     sink(vibration);
+    sink(stands ? 1.0F : 0.0F);
+    for (int i = 0; i < 3; ++i) sink(accel_n_mps2(i));
   }
 
   /// How often the covariance had to be put right (see condition()).
@@ -142,7 +151,8 @@ class Ins {
   template <class Measurement>
   [[gnu::noinline]] filter::Innovation<float, Measurement::kDimension> update_now(const Measurement& measurement,
                                                                                   float gate) {
-    constexpr int kM = Measurement::kDimension;
+    constexpr int kM = Measurement::kDimension, kYaw = InsState::kAttitude + 2;
+    const float yaw_rad2 = p(kYaw, kYaw);
     filter::SparseUpdate<float, kErrors, kM> result;
     constexpr int kColumns = static_cast<int>(Measurement::kTouches.size());
     bool rest = !filter::Direct<Measurement> || kColumns > kM;
@@ -161,6 +171,7 @@ class Ins {
     }
     if (result.innovation.verdict != filter::Verdict::kAccepted) return result.innovation;
     x.correct(result.dx);
+    turned_.told(p(kYaw, kYaw) / yaw_rad2);
     if (result.sharp && !condition(p, watch_)) ++conditioned_;
     return result.innovation;
   }
@@ -170,6 +181,8 @@ class Ins {
     condition(p, watch_);
     pending_ = {};
     turned_ = {};
+    stands = false;
+    accel_n_mps2 = Vector3::Zero();
     return true;
   }
   static constexpr float kMostSpeed_mps = 1000.0F;
@@ -210,7 +223,7 @@ class Ins {
   void keep_motion(InsCovarianceStep<float>& step) const {
     const float energy = step.dv_n_mps(0) * step.dv_n_mps(0) + step.dv_n_mps(1) * step.dv_n_mps(1);
     const float explained = noise.motion_sigma * noise.motion_sigma * step.var_v;
-    const float share = energy > explained ? 1.0F - explained / energy : 0.0F;
+    const float share = energy > explained && !stands ? 1.0F - explained / energy : 0.0F;
     step.dv_n_mps(0) *= share;
     step.dv_n_mps(1) *= share;
   }

@@ -16,7 +16,7 @@ struct InsCovarianceStep {
   Scalar dt_s = 0;
   filter::Vector<Scalar, 3> dv_n_mps = filter::Vector<Scalar, 3>::Zero();
   filter::Matrix<Scalar, 3, 3> r_dt = filter::Matrix<Scalar, 3, 3>::Zero();  ///< sum of R_nb dt
-  Scalar var_v = 0, var_theta = 0, var_b_a = 0, var_b_g = 0;                 ///< added per axis over the step
+  Scalar var_p = 0, var_v = 0, var_theta = 0, var_b_a = 0, var_b_g = 0;      ///< added per axis over the step
   Scalar var_yaw = 0;                                                        ///< about the vertical, besides
   Scalar keep_b_a = 1, keep_b_g = 1;  ///< what is left of a bias after it (Gauss-Markov); 1: random walk
 };
@@ -69,6 +69,7 @@ inline void predict_covariance(filter::Symmetric<Scalar, InsState::kErrors>& p, 
     }
   }
   filter::unroll<0, 3>([&](auto i) __attribute__((always_inline)) {
+    p(i, i) += step.var_p;
     p(kV + i, kV + i) += step.var_v;
     p(kT + i, kT + i) += step.var_theta;
     p(kA + i, kA + i) += step.var_b_a;

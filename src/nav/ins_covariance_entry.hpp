@@ -67,7 +67,7 @@ template <int kI, int kJ>
     sum += by_i[i] * row;
   });
   if constexpr (kI == kJ) {
-    const std::array<float, 5> noise{0.0F, step.var_v, step.var_theta, step.var_b_a, step.var_b_g};
+    const std::array<float, 5> noise{step.var_p, step.var_v, step.var_theta, step.var_b_a, step.var_b_g};
     sum += noise[static_cast<std::size_t>(kI / 3)];
     if constexpr (kI == InsState::kAttitude + 2) sum += step.var_yaw;
   }

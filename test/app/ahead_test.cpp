@@ -95,6 +95,7 @@ class Feed {
       if (one_in(80)) return;  // lost
       if (one_in(90)) s.payload.imu.dangle_b_rad[1] = std::nanf("");
       if (one_in(90)) s.payload.imu.clipped_gyro = 1;
+      if (one_in(90)) s.payload.imu.clipped_accel = 1;
       if (one_in(90)) s.payload.imu.interval_us = static_cast<std::uint16_t>(one_in(2) ? 0 : 12'000);
       if (one_in(40)) repeating_ = 14;
       if (repeating_ > 0 && !window.empty()) {
@@ -147,6 +148,7 @@ TEST(Ahead, ItsCellsAreNoMoreThanACache) {
       ASSERT_EQ(grown.place().reached, fresh.place().reached);
       ASSERT_EQ(grown.place().last, fresh.place().last);
       ASSERT_EQ(grown.place().unseen_s, fresh.place().unseen_s);
+      ASSERT_EQ(grown.place().unseen_turn_s, fresh.place().unseen_turn_s);
     }
   }
 }
@@ -168,6 +170,8 @@ TEST(Ahead, ItsCellsSayWhatTheirSamplesSay) {
       each.carry_on(feed.window, with(n, earth, turn_known));
       ASSERT_EQ(cells.place().reached, each.place().reached) << seed << ' ' << i;
       ASSERT_EQ(cells.place().last, each.place().last);
+      ASSERT_EQ(cells.place().unseen_s, each.place().unseen_s) << "lost or clipped";
+      ASSERT_EQ(cells.place().unseen_turn_s, each.place().unseen_turn_s);
       ASSERT_EQ(cells.heard(), each.heard());
       ASSERT_EQ(cells.place().rate_b_radps, each.place().rate_b_radps);
       const auto bits = [](const Repeats& r) {

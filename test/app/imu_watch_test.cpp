@@ -306,6 +306,26 @@ TEST(ImuHealth, WithoutImuAndWheelsTheDoubtGrowsUntilNothingCarriesIt) {
   EXPECT_LT(r.worst_ratio, 1);
 }
 
+// Two samples may come late; what has not come after that was not seen, at the end of the window as anywhere in it.
+TEST(ImuHealth, AHoleAtTheEndIsDoubtedBeforeItIsASilence) {
+  Robot r(1.5, 0.4);
+  r.run(20);
+  r.wheels = r.gnss = r.imu = false;
+  const auto sigma_mps = [&] { return std::sqrt(static_cast<double>(r.now().covariance<3>())); };
+  const double before_mps = sigma_mps();
+  r.run(0.02);
+  EXPECT_LT(sigma_mps(), 1.1 * before_mps);
+  r.run(0.03);
+  EXPECT_FALSE(r.says(can::Fault::kInputStale));
+  const auto gap_mps2 = static_cast<double>(r.n.inertial.gap_mps2);
+  EXPECT_NEAR(sigma_mps(), std::hypot(before_mps, gap_mps2 * std::sqrt(0.1 * 0.05)), 0.1 * sigma_mps());
+  EXPECT_NEAR(static_cast<double>(r.now().ahead.var_p), 0.1 * 0.05 * std::pow(gap_mps2 * 0.5 * 0.05, 2), 1e-6)
+      << "a way not seen, too";
+  r.imu = true;
+  r.run(0.01);
+  EXPECT_LT(std::abs(r.yaw_off_rad()), 3 * r.sigma(8));
+}
+
 TEST(ImuHealth, AClippedGyroscopeIsReplacedByWheelsAndWithoutThemIsAsUncertainAsNone) {
   Robot a(1.5, 0.4), b(1.5, 0.4);
   b.wheels = false;

@@ -2,6 +2,7 @@
 // The filter as a whole: what it refuses, that it stays finite and positive definite, that the anchor does not matter.
 #include "nav/ins.hpp"
 
+#include "model/dual_heading.hpp"
 #include "model/gnss_fix_3d.hpp"
 #include "model/gnss_velocity_3d.hpp"
 #include "model/height.hpp"
@@ -80,6 +81,30 @@ TEST(Ins, AMillionStepsWithoutAMeasurementStayFiniteAndPositiveDefinite) {
       EXPECT_GT(ins.p(0, 0), 1e11F) << "after 5000 s it knows nothing, and says so";
     }
   }
+}
+
+/// A circle to the left, a compass, a circle to the right: what the compass said of the way there it did not say of the
+/// way back.
+TEST(Ins, AHeadingThatIsToldDoesNotPayForTheWayBack) {
+  Ins ins;
+  ins.noise.gyro_scale = 0.003F;
+  auto p = start_covariance();
+  p(8, 8) = 1e-6F, p(14, 14) = 1e-12F;
+  ins.start({}, p);
+  const auto circle = [&ins](float radps) {
+    for (int i = 0; i < 3142; ++i) {
+      EXPECT_EQ(ins.predict(ImuIncrement::constant({0, 0, radps}, {0, 0, 9.80665F}, {5'000})), ImuVerdict::kAccepted);
+      ins.predict_covariance();
+    }
+  };
+  constexpr float kCircle_rad = 0.003F * 6.2832F;
+  circle(0.4F);
+  EXPECT_NEAR(std::sqrt(ins.p(8, 8)), kCircle_rad, 0.1F * kCircle_rad);
+  for (int i = 0; i < 10; ++i)
+    static_cast<void>(ins.update(model::DualHeading({1, 0, 0}, nav::euler(ins.x.q_nb).yaw_rad, 0.001F), 1e6F));
+  EXPECT_LT(std::sqrt(ins.p(8, 8)), 0.05F * kCircle_rad);
+  circle(-0.4F);
+  EXPECT_NEAR(std::sqrt(ins.p(8, 8)), kCircle_rad, 0.1F * kCircle_rad);
 }
 
 /// What is published of the covariance while the filter itself is behind: as if it had been carried sample by sample.

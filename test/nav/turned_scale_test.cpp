@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 #include <cmath>
 #include <functional>
+#include <vector>
 
 namespace tetap {
 namespace {
@@ -30,15 +31,60 @@ TEST(TurnedScale, ACornerAndACircleCostWhatTheyDoAtAnyRateAndCadence) {
 
 TEST(TurnedScale, WeavingAndNoiseCostLittle) {
   // 0.3 rad/s at 0.5 Hz for ten minutes: 0.1 rad to either side. What it does is 0.1.
-  EXPECT_LT(sigma_after(600, 0.01, [](double t) { return 0.3 * std::cos(3.14159265 * t); }), 4.0);
+  EXPECT_LT(sigma_after(600, 0.01, [](double t) { return 0.3 * std::cos(3.14159265 * t); }), 0.2);
   EXPECT_EQ(sigma_after(3600, 0.01, [](double t) { return std::lround(t / 0.01) % 2 == 0 ? 0.5 : -0.5; }), 0.0);
 }
 
-/// Less than it does: receivers tell a heading on the way.
-TEST(TurnedScale, EveryFurtherCircleCostsMoreThanOneAndLessThanTheSum) {
-  const double ten = sigma_after(62.831853, 0.01, [](double) { return 1.0; }) / 6.2831853;
-  EXPECT_GT(ten, std::sqrt(10.0));
-  EXPECT_LT(ten, 10.0);
+TEST(TurnedScale, TenCirclesCostTenTimesOne) {
+  EXPECT_NEAR(sigma_after(62.831853, 0.01, [](double) { return 1.0; }) / 6.2831853, 10.0, 0.01);
+}
+
+/// What the heading's variance would be with the scale as a state that is never corrected: 2 x 2, written out.
+struct Considered {
+  double p = 0, c = 0;
+  void turn(double by, double scale) {
+    p += by * (2 * c + scale * scale * by);
+    c += scale * scale * by;
+  }
+  void measured(double r) {
+    const double left = r / (p + r);
+    p *= left;
+    c *= left;
+  }
+};
+
+/// A circle, the heading told, the circle back: the way back is wrong by the scale as the way there was.
+TEST(TurnedScale, TurnsAndWhatIsToldOfTheHeadingAreThoseOfAConsideredScale) {
+  constexpr double kS = static_cast<double>(kScale);
+  struct Leg {
+    double turn_rad;
+    double told_rad2;  ///< variance of a heading told after it; 0: none is
+  };
+  const std::vector<std::vector<Leg>> drives{
+      {{6.28, 1e-8}, {-6.28, 0}},
+      {{6.28, 1e-4}, {-3.14, 0}, {-3.14, 1e-5}, {9.0, 0}},
+      {{-1.5, 0}, {3.0, 1e-5}, {-3.0, 0}, {1.5, 0}, {25.0, 1e-5}, {-25.0, 0}},
+  };
+  for (const auto& drive : drives) {
+    Considered law;
+    nav::TurnedScale scale;
+    double variance = 0;
+    for (const Leg& leg : drive) {
+      for (int i = 0; i < 100; ++i) {
+        law.turn(leg.turn_rad / 100, kS);
+        variance += static_cast<double>(scale.turn(static_cast<float>(leg.turn_rad / 100), kScale));
+      }
+      if (leg.told_rad2 > 0) {
+        const double left = leg.told_rad2 / (variance + leg.told_rad2);
+        law.measured(leg.told_rad2);
+        scale.told(static_cast<float>(left));
+        variance *= left;
+      }
+      // On a way back P keeps what it had; it is never too sure, and after all of it as large again as it has to be.
+      EXPECT_GE(variance, 0.97 * law.p) << leg.turn_rad;
+    }
+    EXPECT_NEAR(variance, law.p, 0.05 * law.p);
+  }
 }
 
 TEST(TurnedScale, WhatIsToldAheadIsWhatItWillCost) {

@@ -458,11 +458,13 @@ TEST(World, a_rate_that_is_no_divisor_is_refused) {
   EXPECT_THROW((World{options, 1}), std::invalid_argument);
 }
 
-TEST(World, in_the_world_matched_to_an_inertial_filter_the_body_moves_sideways_and_up_without_memory) {
-  World world{{.mismatched = false, .inertial = true}, 9};
-  const double sigma = world.numbers().rover.jitter_mps;
+TEST(World, in_the_world_matched_to_an_inertial_filter_the_body_trembles_without_memory_also_at_rest) {
+  World::Options options{.mismatched = false, .inertial = true};
+  options.course.waypoints.front().stop_s = 45;
+  World world{options, 9};
+  const double sigma = world.numbers().rover.jitter_mps, sigma_ahead = world.numbers().rover.jitter_ahead_mps;
   std::vector<Measurement> ignored;
-  std::vector<double> side, up;
+  std::vector<double> side, up, ahead;
   double x_m = 0;
   double z_m = 0;
   Truth before = world.truth();
@@ -473,11 +475,15 @@ TEST(World, in_the_world_matched_to_an_inertial_filter_the_body_moves_sideways_a
     z_m += 0.5 * 500e-6 * (before.v_n_mps[2] + now.v_n_mps[2]);
     before = now;
     const Direction d = direction(now.yaw_rad);
-    if (magnitude(now.speed_mps) < 0.6 || t.us % 10'000 != 0) continue;
+    if (t.us % 10'000 != 0) continue;
     side.push_back(now.v_n_mps[1] * d.cos - now.v_n_mps[0] * d.sin);
     up.push_back(now.v_n_mps[2]);
+    if (t < world.start() + seconds_us(40)) {
+      ahead.push_back(now.speed_mps / sigma_ahead * sigma);
+      EXPECT_NEAR(now.v_n_mps[0] * d.cos + now.v_n_mps[1] * d.sin, now.speed_mps, 1e-12);
+    }
   }
-  for (const auto& series : {side, up}) {
+  for (const auto& series : {side, up, ahead}) {
     EXPECT_NEAR(statistics(series).variance / (sigma * sigma), 1, 0.06);
     EXPECT_NEAR(correlation(series, 1), 0, 0.04);
   }

@@ -32,7 +32,8 @@ class Ahead {
     base::Micros last;     ///< stamp of the last sample that said something
     Repeats repeats;
     nav::Vector3 rate_b_radps = nav::Vector3::Zero();  ///< as the gyroscope showed it last
-    float unseen_s = 0;                                ///< of the way, where samples are missing or clipped
+    /// Of the way: where no acceleration was seen (samples are missing or clipped), and where no turn.
+    float unseen_s = 0, unseen_turn_s = 0;
   };
 
   /// A sample is new in the window. True: it came late, and the state was carried on without it.
@@ -71,6 +72,7 @@ class Ahead {
     sink(heard_.us);
     for (int i = 0; i < 3; ++i) sink(place_.rate_b_radps(i));
     sink(place_.unseen_s);
+    sink(place_.unseen_turn_s);
   }
 
  private:
@@ -123,8 +125,10 @@ inline void Ahead::hear(const Sample& sample, const With& with, const ImuSample*
     static_cast<void>(nav::strapdown(place_.x, unseen(gap, with), with.earth));
     place_.reached += gap;
     place_.unseen_s += base::seconds(gap);
+    place_.unseen_turn_s += base::seconds(gap);
   }
   if (imu.clipped_accel > 0 || imu.clipped_gyro > 0) place_.unseen_s += base::seconds(increment.dt);
+  if (imu.clipped_gyro > 0) place_.unseen_turn_s += base::seconds(increment.dt);
   if (gather_.full()) fold(with);
   gather_.add(increment);
   place_.reached += increment.dt;

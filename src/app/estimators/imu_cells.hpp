@@ -110,8 +110,8 @@ class ImuCells {
     const ImuSample& imu = sample.payload.imu;
     const nav::ImuIncrement increment = shown_by(imu);
     constexpr auto kAccepted = nav::ImuVerdict::kAccepted;
-    const bool plain = imu.clipped_gyro == 0 && increment.check() == kAccepted && !Repeats::repeats(imu, before) &&
-                       shown_by(before).check() == kAccepted;
+    const bool plain = imu.clipped_gyro == 0 && imu.clipped_accel == 0 && increment.check() == kAccepted &&
+                       !Repeats::repeats(imu, before) && shown_by(before).check() == kAccepted;
     const ImuCell* open = size_ > 0 ? &(*this)[size_ - 1] : nullptr;
     if (open == nullptr || grid(open->last()) != grid(sample.stamp) || (open->plain() && open->gather.full())) {
       if (size_ == kMost) return false;

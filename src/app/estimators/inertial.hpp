@@ -148,8 +148,7 @@ class Inertial {
   /// From the filter's time to the present; 0 while there is no filter.
   [[nodiscard]] float ahead_s() const { return phase_ == Phase::kTracking ? base::seconds(now_ - time_) : 0.0F; }
   [[nodiscard]] const nav::InsState& now_x() const { return phase_ == Phase::kTracking ? present_ : ins_.x; }
-  [[nodiscard]] float unseen_s2() const;
-  [[nodiscard]] float unseen_m2(const InertialNumbers& n) const;
+  [[nodiscard]] float unseen_s2(float unseen_s) const;
   [[nodiscard]] nav::InsCovarianceStep<float> step_ahead(const InertialNumbers& n) const;
   [[nodiscard]] std::int32_t work_of(const Sample& sample, const Context& with) const;
   /// What is to be said every so often can be in this tick, or has waited long enough.

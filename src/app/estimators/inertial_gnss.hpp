@@ -197,7 +197,7 @@ inline constexpr float kDecides = 4.0F;
   }
   ins_.start(ins_.x, ins_.p);
   corrected();
-  jump_ = {.east_m = by_m(0), .north_m = by_m(1), .count = static_cast<std::uint8_t>(jump_.count + 1)};
+  jump_ = {.east_m = by_m(0), .north_m = by_m(1), .up_m = by_m(2), .count = static_cast<std::uint8_t>(jump_.count + 1)};
 }
 
 /// Receiver and wheels have agreed for long on a speed, but not on where it goes: nothing drives half a radian
@@ -221,8 +221,8 @@ inline constexpr float kDecides = 4.0F;
 
 inline Innovation Inertial::fuse(const GnssVelocity& velocity, base::Micros stamp, const Context& with) {
   const GnssNumbers& n = with.numbers.gnss;
-  const nav::Vector3 v_n{velocity.v_n_mps[0], velocity.v_n_mps[1],
-                         base::is_finite(velocity.v_n_mps[2]) ? velocity.v_n_mps[2] : 0.0F};
+  nav::Vector3 v_n{velocity.v_n_mps[0], velocity.v_n_mps[1],
+                   base::is_finite(velocity.v_n_mps[2]) ? velocity.v_n_mps[2] : 0.0F};
   const float own = base::is_finite(velocity.acc_mps) ? velocity.acc_mps : 0.5F;
   const float sigma = own > n.sigma_velocity_floor_mps ? own : n.sigma_velocity_floor_mps;
   if (phase_ != Phase::kTracking) {
@@ -230,6 +230,7 @@ inline Innovation Inertial::fuse(const GnssVelocity& velocity, base::Micros stam
     return {.verdict = can::Verdict::kAccepted};
   }
   if (frozen_.frozen()) return {.verdict = can::Verdict::kStale};
+  v_n -= ins_.accel_n_mps2 * base::seconds(stamp - time_);  // to the time of the last IMU sample, as the state is
   const nav::Vector3 v_b = axle_mps(v_n, with);
   hear_ground(v_n, v_b, sigma, stamp, with);
   // A receiver and a filter that say another direction: either may be wrong, and the filter gives way after a while.

@@ -16,7 +16,10 @@ inline Innovation Inertial::fuse(const OutsideHeading& heading, base::Micros sta
     start_.heading(heading.yaw_rad, sigma);
     return {.verdict = can::Verdict::kAccepted};
   }
-  const model::DirectionMeasurement direction = model::DualHeading({1.0F, 0.0F, 0.0F}, heading.yaw_rad, sigma);
+  // To the time of the last IMU sample, as the state is.
+  const float turn_radps = ins_.x.q_nb.rotate(rate_b_radps_ - ins_.x.b_g_radps)(2);
+  const float yaw_rad = base::wrap_angle(heading.yaw_rad - turn_radps * base::seconds(stamp - time_));
+  const model::DirectionMeasurement direction = model::DualHeading({1.0F, 0.0F, 0.0F}, yaw_rad, sigma);
   return measure(direction, kHeadings, with.numbers.gnss.gate_scale, stamp, with);
 }
 

@@ -15,7 +15,8 @@ inline Innovation Inertial::fuse(const ImuSample& sample, base::Micros stamp, co
   if (increment.check() != nav::ImuVerdict::kAccepted) return {.verdict = can::Verdict::kNotFinite};
   const float dt_s = base::seconds(increment.dt);
   const bool was_stuck = imu_.stuck();
-  if (sample.clipped_gyro > 0) corrected();  // whether it is used may have been seen otherwise ahead
+  // Whether it is used may have been seen otherwise ahead; and it is no longer what is doubted there.
+  if (sample.clipped_gyro > 0 || sample.clipped_accel > 0) corrected();
   if (!imu_.hear(sample, stamp, n)) {
     if (!was_stuck) corrected();
     // Those before it were taken for what they said.
@@ -136,13 +137,21 @@ inline std::uint16_t Inertial::faults() const {
   return bits;
 }
 
-/// As after power on, but nothing is known of where it is. By how much it steps will be seen only then.
+/// As after power on, but nothing is known of where it is. By how much it steps will be seen when it has begun again:
+/// from the last that was published.
 [[gnu::noinline]] inline void Inertial::begin_anew(base::Micros t, can::ResetCause cause, const Context& with) {
   const auto count = static_cast<std::uint8_t>(jump_.count + 1);
+  const nav::InsState last = present_;
   base::renew(*this);
   time_ = t;
   noise_of(with.numbers.inertial);
-  jump_ = {.east_m = base::kNan, .north_m = base::kNan, .yaw_rad = base::kNan, .cause = cause, .count = count};
+  present_ = last;
+  jump_ = {.east_m = base::kNan,
+           .north_m = base::kNan,
+           .up_m = base::kNan,
+           .yaw_rad = base::kNan,
+           .cause = cause,
+           .count = count};
 }
 
 /// The filter begins where the start found the robot.
@@ -150,6 +159,12 @@ inline void Inertial::begin(const Context& with) {
   if (with.site.origin != can::OriginSource::kNone) ins_.earth = nav::Earth::at(with.site.frame, false);
   start_.begin(ins_, with.numbers.inertial, phase_ == Phase::kTracking);
   phase_ = Phase::kTracking;
+  if (!base::is_finite(jump_.yaw_rad)) {  // see begin_anew()
+    jump_.east_m = nav::difference(ins_.x.x, present_.x);
+    jump_.north_m = nav::difference(ins_.x.y, present_.y);
+    jump_.up_m = nav::difference(ins_.x.z, present_.z);
+    jump_.yaw_rad = base::wrap_angle(nav::euler(ins_.x.q_nb).yaw_rad - nav::euler(present_.q_nb).yaw_rad);
+  }
   last_position_ = time_;
   refused_ = {};
   still_.s = waiting_.s = 0;
@@ -174,7 +189,8 @@ inline void Inertial::stand(base::Micros stamp, const Context& with) {
   }
   const bool wheels = have_counts_ && stamp - counts_time_ < kEvery;
   const bool quiet = wheels ? stamp - moved_ > kQuiet && slip_.slip() == SlipWatch::Slip::kNone : resting(stamp, with);
-  if (!quiet || turn.squaredNorm() > n.still_radps * n.still_radps) {
+  ins_.stands = quiet && turn.squaredNorm() <= n.still_radps * n.still_radps;
+  if (!ins_.stands) {
     still_.s = waiting_.s = 0;
     return;
   }

@@ -6,23 +6,24 @@
 
 namespace tetap::app {
 
-/// What of the way to the present no IMU saw, as the filter will grow there: over all of it, or over what is missing.
-/// Variance of velocity per (m/s^2)^2, of attitude per (rad/s)^2.
-inline float Inertial::unseen_s2() const {
+/// What of the way to the present no IMU saw, as the filter will grow there: over all of it, or over what is missing,
+/// at its end, too. Variance of velocity per (m/s^2)^2, or of attitude per (rad/s)^2.
+inline float Inertial::unseen_s2(float unseen_s) const {
   constexpr float kLasts_s = 0.1F;  // Ins::predict_without_imu
-  return blind_ ? ahead_s() * ahead_s() : kLasts_s * ahead_.place().unseen_s;
-}
-inline float Inertial::unseen_m2(const InertialNumbers& n) const {
-  const float went_m = 0.5F * ahead_s() * ahead_s() * n.gap_mps2;
-  return blind_ ? went_m * went_m : 0.0F;
+  constexpr base::Micros kHole{25'000};
+  if (blind_) return ahead_s() * ahead_s();
+  const base::Micros open = now_ - ahead_.place().reached;
+  return kLasts_s * (unseen_s + (open > kHole ? base::seconds(open) : 0.0F));
 }
 
 /// From the time of the covariance to the present. In place: a pose needs little of it.
 [[gnu::always_inline]] inline nav::InsCovarianceStep<float> Inertial::step_ahead(const InertialNumbers& n) const {
   nav::InsCovarianceStep<float> step = ins_.step_to(now_x(), ahead_s());
-  const float s2 = unseen_s2(), turn_radps = unseen_turn_radps(n);
-  step.var_v += s2 * n.gap_mps2 * n.gap_mps2;
-  step.var_theta += s2 * turn_radps * turn_radps;
+  const float unseen_m2ps2 = unseen_s2(ahead_.place().unseen_s) * n.gap_mps2 * n.gap_mps2;
+  const float turn_radps = unseen_turn_radps(n), half_s = 0.5F * ahead_s();
+  step.var_p += half_s * half_s * unseen_m2ps2;
+  step.var_v += unseen_m2ps2;
+  step.var_theta += unseen_s2(ahead_.place().unseen_turn_s) * turn_radps * turn_radps;
   return step;
 }
 
@@ -31,7 +32,6 @@ inline InertialEstimate Inertial::inertial(const Context& with) const {
   return {.state = now_x(),
           .p = ins_.p,
           .ahead = step_ahead(n),
-          .unseen_m2 = unseen_m2(n),
           .valid = phase_ == Phase::kTracking,
           .jump = jump_,
           .imu = imu_.health()};
@@ -44,11 +44,10 @@ inline Estimate Inertial::estimate(const Context& with) const {
   const nav::Vector3 v_b = x.q_nb.conjugate().rotate(x.v_n_mps);
   const nav::Vector3 w_n = x.q_nb.rotate((valid ? ahead_.place().rate_b_radps : rate_b_radps_) - x.b_g_radps);
   constexpr int kX = nav::InsState::kPosition, kY = kX + 1, kYaw = nav::InsState::kAttitude + 2;
-  const float unseen = unseen_m2(with.numbers.inertial);
   filter::Symmetric<float, 3> p;
-  p(0, 0) = nav::predicted_covariance<kX, kX>(ins_.p, ahead) + unseen;
+  p(0, 0) = nav::predicted_covariance<kX, kX>(ins_.p, ahead);
   p(0, 1) = nav::predicted_covariance<kX, kY>(ins_.p, ahead);
-  p(1, 1) = nav::predicted_covariance<kY, kY>(ins_.p, ahead) + unseen;
+  p(1, 1) = nav::predicted_covariance<kY, kY>(ins_.p, ahead);
   p(0, 2) = nav::predicted_covariance<kX, kYaw>(ins_.p, ahead);
   p(1, 2) = nav::predicted_covariance<kY, kYaw>(ins_.p, ahead);
   p(2, 2) = nav::predicted_covariance<kYaw, kYaw>(ins_.p, ahead);

@@ -31,9 +31,14 @@ inline Innovation Inertial::fuse(const WheelCounts& counts, base::Micros stamp, 
   const float per_s = 1.0F / base::seconds(interval);
   const SlipWatch::Wheels wheels{.left_mps = drive.left_m(left) * per_s, .right_mps = drive.right_m(right) * per_s};
   // One count over the interval; and what slip and radii make of the way since, as odometry has it (noise in m^2 per
-  // m).
+  // m). The way is the filter's: by the counts', those that err to the slow side would count for more.
   const float count_mps = 0.41F * drive.left_m(1) * per_s;
-  const float way = drive.noise_left * base::abs(wheels.left_mps) + drive.noise_right * base::abs(wheels.right_mps);
+  const bool tracking = phase_ == Phase::kTracking;
+  const float mean_mps = tracking ? forward_mps() : 0.5F * (wheels.left_mps + wheels.right_mps);
+  const float half_mps = tracking ? 0.5F * drive.track_m * (rate_b_radps_(2) - ins_.x.b_g_radps(2))
+                                  : 0.5F * (wheels.right_mps - wheels.left_mps);
+  const float way =
+      drive.noise_left * base::abs(mean_mps - half_mps) + drive.noise_right * base::abs(mean_mps + half_mps);
   return roll(wheels, base::sqrt(count_mps * count_mps + 0.25F * way * per_s), later_mps, stamp, with);
 }
 
@@ -128,21 +133,26 @@ inline Innovation Inertial::forward(const Forward& speed, base::Micros stamp, co
     return {.verdict = can::Verdict::kAccepted};
   }
   constrained_ = stamp;
-  const float slip = n.slip_share * (speed.mps < 0 ? -speed.mps : speed.mps);
-  const float sigma = base::sqrt(n.wheel_mps * n.wheel_mps + slip * slip + speed.sigma_mps * speed.sigma_mps);
+  const float variance = ins_.p(3, 3) + ins_.p(4, 4) + ins_.p(5, 5);
+  // As fast as the filter goes, or may: by the reading, readings that err to the slow side would count for more.
+  const float own_mps = forward_mps();
+  const float slip2 = n.slip_share * n.slip_share * (own_mps * own_mps + variance);
+  const float sigma = base::sqrt(n.wheel_mps * n.wheel_mps + slip2 + speed.sigma_mps * speed.sigma_mps);
+  // The reading is true at its own time, the state at that of the last IMU sample.
+  const float ahead_mps = ins_.x.q_nb.conjugate().rotate(ins_.accel_n_mps2)(0);
   // Where wheels say nothing the filter has to be sure that it stands, or goes.
   constexpr float kSure_mps = 0.1F;
-  const float variance = ins_.p(3, 3) + ins_.p(4, 4) + ins_.p(5, 5);
-  const bool goes = variance > kSure_mps * kSure_mps || ins_.x.v_n_mps.squaredNorm() > 9.0F * variance;
-  return measure(
-      model::WheelSpeed{.forward_mps = speed.mps,
-                        .sigma_forward_mps = sigma,
-                        .sigma_lateral_mps = n.lateral_mps,
-                        .sigma_vertical_mps = n.vertical_mps,
-                        .axle_b_m = {n.axle_x_b_m, 0.0F, 0.0F},
-                        .gyro_b_radps = rate_b_radps_,
-                        .moves = speed.sigma_mps < kUnknown_mps ? base::abs(speed.mps) > 2.0F * n.wheel_mps : goes},
-      kWheels, n.wheel_gate_scale, stamp, with);
+  const bool goes = speed.sigma_mps < kUnknown_mps
+                        ? base::abs(speed.mps) > 2.0F * n.wheel_mps
+                        : variance > kSure_mps * kSure_mps || ins_.x.v_n_mps.squaredNorm() > 9.0F * variance;
+  return measure(model::WheelSpeed{.forward_mps = speed.mps - ahead_mps * base::seconds(stamp - time_),
+                                   .sigma_forward_mps = sigma,
+                                   .sigma_lateral_mps = n.lateral_mps,
+                                   .sigma_vertical_mps = n.vertical_mps,
+                                   .axle_b_m = {n.axle_x_b_m, 0.0F, 0.0F},
+                                   .gyro_b_radps = rate_b_radps_,
+                                   .moves = goes && !ins_.stands},
+                 kWheels, n.wheel_gate_scale, stamp, with);
 }
 
 /// They came of late, do not spin, and the filter goes as fast as they say. Not for ever: it may be pinned to them on a
