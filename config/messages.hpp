@@ -900,14 +900,17 @@ struct EstDiagCapacity {
   static constexpr std::uint8_t kPage = 7;
   static constexpr Signal kMapFull{.start = 8, .length = 16, .wraps = true};
   static constexpr Signal kTimelineFull{.start = 24, .length = 16, .wraps = true};
+  static constexpr Signal kWindowShort{.start = 40, .length = 16, .wraps = true};
 
   std::uint16_t map_full = 0;  ///< map entries refused because the map was full, since start
   std::uint16_t timeline_full = 0;  ///< samples dropped because the timeline was full, since start
+  std::uint16_t window_short = 0;  ///< samples that left the window before their time because the timeline was full, since start
 
   template <class Self, class Visit>
   static constexpr void each(Self& m, Visit&& visit) {
     visit(At<kMapFull>{}, m.map_full);
     visit(At<kTimelineFull>{}, m.timeline_full);
+    visit(At<kWindowShort>{}, m.window_short);
   }
   friend constexpr bool operator==(const EstDiagCapacity&, const EstDiagCapacity&) = default;
 };
@@ -1186,16 +1189,19 @@ struct EstStateHeight {
   static constexpr Signal kEpoch{.start = 4, .length = 4, .wraps = true};
   static constexpr Signal kHeight{.start = 8, .length = 24, .is_signed = true, .has_gap = true, .per_unit = 500};
   static constexpr Signal kStdHeight{.start = 32, .length = 16, .has_gap = true, .per_unit = 2000};
+  static constexpr Signal kJumpZ{.start = 48, .length = 16, .is_signed = true, .has_gap = true, .per_unit = 20};
 
   std::uint8_t epoch = 0;  ///< low bits of the epoch, the same in all frames of one epoch
   float height_m = 0;  ///< above the origin; +-16777.214 m in steps of 0.002; NaN: not available
   float std_height_m = 0;  ///< 1-sigma of Height; 0 to 32.767 m in steps of 0.0005; NaN: not available
+  float jump_z_m = 0;  ///< last reset: step of the height; +-1638.35 m in steps of 0.05; NaN: not available
 
   template <class Self, class Visit>
   static constexpr void each(Self& m, Visit&& visit) {
     visit(At<kEpoch>{}, m.epoch);
     visit(At<kHeight>{}, m.height_m);
     visit(At<kStdHeight>{}, m.std_height_m);
+    visit(At<kJumpZ>{}, m.jump_z_m);
   }
 };
 

@@ -34,7 +34,7 @@ ACC_BIAS, GYRO_BIAS = [f"acc_bias_{a}_mps2" for a in AXES], [f"gyro_bias_{a}_rad
 STD_TILT = ["std_tilt_east_rad", "std_tilt_north_rad"]
 STATES = ["epoch", "time_s", "estimator", *Q, *VELOCITY, "height_m", "std_height_m", *ACC_BIAS, *GYRO_BIAS, *(f"std_{v}" for v in VELOCITY), *STD_TILT,
           *(f"std_{b}" for b in ACC_BIAS), *(f"std_{b}" for b in GYRO_BIAS), "jump_x_m", "jump_y_m", "jump_yaw_rad",
-          "disagree_tilt_rad", "disagree_yaw_rad", "vib_accel_mps2", "vib_gyro_radps", "clipped"]
+          "disagree_tilt_rad", "disagree_yaw_rad", "vib_accel_mps2", "vib_gyro_radps", "clipped", "jump_z_m"]
 TRUTH = ["time_s", "x_m", "y_m", "yaw_rad"]  # and perhaps "epoch" and these
 TRUTH_MORE = ["z_m", "roll_rad", "pitch_rad", *VELOCITY, *GYRO_BIAS, *ACC_BIAS]
 BLOCKS = ["position", "velocity", "attitude", "gyro bias", "acc bias"]
@@ -632,7 +632,7 @@ def jump_words(run, time_s, cause):
         return ""
     i = after[0]
     return (f", {RESET_WORDS[cause]} {np.degrees(rows['jump_yaw_rad'][i]):.1f} deg" if cause == "HeadingWrong" else
-            f", {RESET_WORDS[cause]} {rows['jump_x_m'][i]:.2f} m east, {rows['jump_y_m'][i]:.2f} m north")
+            f", {RESET_WORDS[cause]} {rows['jump_x_m'][i]:.2f} m east, {rows['jump_y_m'][i]:.2f} m north, {rows['jump_z_m'][i]:.2f} m up")
 
 
 def warnings_of(run, judged):

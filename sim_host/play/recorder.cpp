@@ -46,7 +46,7 @@ Recorder::Recorder(const RecorderOptions& options)
       "acc_bias_y_mps2,acc_bias_z_mps2,gyro_bias_x_radps,gyro_bias_y_radps,gyro_bias_z_radps,std_v_east_mps,"
       "std_v_north_mps,std_v_up_mps,std_tilt_east_rad,std_tilt_north_rad,std_acc_bias_x_mps2,std_acc_bias_y_mps2,"
       "std_acc_bias_z_mps2,std_gyro_bias_x_radps,std_gyro_bias_y_radps,std_gyro_bias_z_radps,jump_x_m,jump_y_m,"
-      "jump_yaw_rad,disagree_tilt_rad,disagree_yaw_rad,vib_accel_mps2,vib_gyro_radps,clipped\n");
+      "jump_yaw_rad,disagree_tilt_rad,disagree_yaw_rad,vib_accel_mps2,vib_gyro_radps,clipped,jump_z_m\n");
   innovations_.write("epoch,time_s,estimator,sensor,inst,verdict,dof,nis,ratio,age_ms,landmark\n");
   sensors_.write("epoch,time_s,estimator,sensor,inst,accepted,rejected,nis_mean,age_s\n");
   status_.write("epoch,time_s,mode,used,faults,reset_ctr,reset_cause\n");
@@ -141,6 +141,7 @@ void Recorder::state(State& state, std::uint32_t offset, std::span<const std::ui
     page(4, &can::EstVel::east_mps, &can::EstVel::north_mps, &can::EstVel::up_mps);
   if (offset != can::EstStateHeight::kOffset) return;
   page(7, &can::EstStateHeight::height_m, &can::EstStateHeight::std_height_m);
+  page(34, &can::EstStateHeight::jump_z_m);
   using can::EstStateAccBias, can::EstStateGyroBias, can::EstStateStdVel, can::EstStateStdTilt;
   using can::EstStateDisagreement, can::EstStateImuHealth;
   using can::EstStateStdAccBias, can::EstStateStdGyroBias, can::EstStateJump;

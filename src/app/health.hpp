@@ -22,6 +22,7 @@ struct Counters {
   std::uint16_t command_refused = 0;  ///< CRC wrong or counter repeated
   std::uint16_t map_full = 0;
   std::uint16_t timeline_full = 0;
+  std::uint16_t window_short = 0;  ///< samples that left the window before their time: a newer one needed the room
   std::uint16_t events_dropped = 0;
   std::uint16_t events_high_water = 0;
 };

@@ -130,7 +130,8 @@ Insert History<Estimators, Capacity>::insert(const Sample& sample, const Context
   if (result != Insert::kFull || !timeline_.consumed(0)) return result;
   leave(timeline_[0], Past::kFollows, with, note);
   timeline_.drop_front(1);
-  return timeline_.insert(sample);
+  const Insert again = timeline_.insert(sample);
+  return again == Insert::kTaken ? Insert::kMadeRoom : again;
 }
 
 template <class Estimators, std::size_t Capacity>

@@ -20,7 +20,7 @@
 
 namespace tetap::app {
 
-template <class Estimators, std::size_t TimelineCapacity = 96>
+template <class Estimators, std::size_t TimelineCapacity = 88>
 class Node {
  public:
   Node(const Numbers& numbers, const Version& version) : numbers_(numbers), publisher_(numbers, version) {
@@ -146,6 +146,7 @@ void Node<Estimators, Capacity>::sample(const Sample& arrived) {
   const Insert result = history_.insert(sample, context(), noting());
   if (result == Insert::kDuplicate) ++counters_.duplicate;
   if (result == Insert::kFull) ++counters_.timeline_full;
+  if (result == Insert::kMadeRoom) ++counters_.window_short;
 }
 
 template <class Estimators, std::size_t Capacity>

@@ -45,7 +45,8 @@ void put_diagnostics(std::uint32_t page, const Counters& c, const LoopHealth& l,
       put(can::EstDiagRefused{.not_used = c.not_used, .no_time = c.no_time, .cmd_refused = c.command_refused});
       break;
     case 7:
-      put(can::EstDiagCapacity{.map_full = c.map_full, .timeline_full = c.timeline_full});
+      put(can::EstDiagCapacity{
+          .map_full = c.map_full, .timeline_full = c.timeline_full, .window_short = c.window_short});
       break;
     default:
       put(can::EstDiagSync{.sync_jump = l.sync_jump, .sync_gap = l.sync_gap, .sync_bad = l.sync_bad});
@@ -58,7 +59,8 @@ void put_state_page(std::uint32_t page, const InertialEstimate& e, std::uint8_t 
   const nav::InsState& x = e.state;
   switch (page % 9) {
     case 0:
-      put(can::EstStateHeight{.epoch = tag, .height_m = base::metres(x.z.um()), .std_height_m = e.sigma<2>()});
+      put(can::EstStateHeight{
+          .epoch = tag, .height_m = base::metres(x.z.um()), .std_height_m = e.sigma<2>(), .jump_z_m = e.jump.up_m});
       break;
     case 1:
       put(can::EstStateAccBias{.epoch = tag,

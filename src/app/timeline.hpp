@@ -11,7 +11,8 @@
 
 namespace tetap::app {
 
-enum class Insert : std::uint8_t { kTaken, kDuplicate, kFull };
+/// kMadeRoom: taken, and for it the oldest left before its time.
+enum class Insert : std::uint8_t { kTaken, kDuplicate, kFull, kMadeRoom };
 
 /// When full, insert() refuses; the caller then retires the oldest consumed sample and tries again, or counts the loss.
 template <std::size_t Capacity>

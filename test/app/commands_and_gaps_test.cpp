@@ -8,6 +8,8 @@
 
 #include <algorithm>
 #include <limits>
+#include <memory>
+#include <optional>
 
 namespace tetap::test {
 namespace {
@@ -125,6 +127,33 @@ TEST(Commands, AYawBeyondHalfATurnIsPublishedWrapped) {
   Bench bench;
   bench.epoch(set_pose(1, 0, 0, 3.25F));
   EXPECT_NEAR(last<can::EstMotion>(bench.idle(2), 1)->yaw_rad, 3.25 - 6.2831853, 1e-3);
+}
+
+// More samples than there is room for: none is lost, the window is shorter, and that is said.
+TEST(Gaps, AWindowThatIsTooSmallForItsSamplesIsSaidToBeShort) {
+  const auto node =
+      std::make_unique<app::Node<app::Estimators<app::Odometry, app::PoseEkf>, 16>>(kNumbers, app::Version{});
+  std::int64_t now_us = Bench::kStart_us;
+  node->power_on({now_us});
+  std::optional<can::EstDiagCapacity> capacity;
+  std::optional<can::EstDiagOrder> order;
+  const auto tick = [&] {
+    now_us += 10'000;
+    node->tick({now_us}, {}, [&](const base::CanFrame& frame) {
+      if (const auto found = last<can::EstDiagCapacity>({frame})) capacity = found;
+      if (const auto found = last<can::EstDiagOrder>({frame})) order = found;
+    });
+  };
+  tick();
+  for (int i = 0; i < 18; ++i) {  // 180 ms of a window of 200
+    node->on_frame(body_speed(now_us + 5'000, 1.0F, 0.0F, i));
+    tick();
+  }
+  node->on_frame(body_speed(Bench::kStart_us + 16'000, 1.0F, 0.0F, 7));  // in the window, but for the room
+  for (int i = 0; i < 2'000; ++i) tick();
+  EXPECT_EQ(capacity->window_short, 2);
+  EXPECT_EQ(capacity->timeline_full, 0);
+  EXPECT_EQ(order->too_late, 1);
 }
 
 TEST(Gaps, SilentWheelsMoveNothingBackAndTheirDoubtStays) {

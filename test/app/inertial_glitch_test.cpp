@@ -434,6 +434,7 @@ TEST(Glitch, AHeightThatPersistsIsTaken) {
   d.run(62);
   EXPECT_EQ(d.estimator.jump().count, 1);
   EXPECT_EQ(d.estimator.jump().east_m, 0.0F);
+  EXPECT_NEAR(d.estimator.jump().up_m, 47.0F, 3.0F);
   EXPECT_NEAR(d.height_error_m(), 47, 3);
 }
 
@@ -550,6 +551,9 @@ TEST(InertialDivergence, AWrongHeadingIsNotFlownAwayWith) {
     if (std::abs(off_rad) > 1.2) {
       EXPECT_EQ(d.estimator.jump().count, 1) << off_rad;
       EXPECT_EQ(d.estimator.jump().cause, can::ResetCause::kHeadingWrong);
+      const auto turned_rad = static_cast<double>(d.estimator.jump().yaw_rad);
+      EXPECT_GT(std::abs(turned_rad), 0.5) << off_rad << ": by how much it stepped is said";
+      EXPECT_TRUE(std::isfinite(d.estimator.jump().east_m) && std::isfinite(d.estimator.jump().up_m));
     }
     EXPECT_EQ(d.estimator.mode(d.with()), can::Mode::kNominal) << off_rad;
     d.clear();

@@ -542,7 +542,7 @@ class Inertial(Case):
         self.write_rows("innovations.csv", metrics.INNOVATIONS, [[100 + i, 1.0 + 0.2 * i, *row[2:]] for i in range(5)] + [[900, 9.0, *row[2:]]])
         self.write_rows("status.csv", metrics.STATUS, [[i * 10, 0.1 * i, 5 if 12 <= i < 20 else 3, 0 if 40 <= i < 55 else 32, 2 if 12 <= i < 20 else 0, int(i >= 30), 6]
                                                        for i in range(1, 60)])
-        self.write_rows("states.csv", metrics.STATES, [[310, 3.1, 2, *[None] * 26, 99.5, -0.25, 0.01, *[None] * 5]])
+        self.write_rows("states.csv", metrics.STATES, [[310, 3.1, 2, *[None] * 26, 99.5, -0.25, 0.01, *[None] * 5, 3.5]])
         told = metrics.story(metrics.Run(self.directory))
         words = [text for _, text in told]
         self.assertEqual([t for t, _ in told], sorted(t for t, _ in told))
@@ -551,7 +551,7 @@ class Inertial(Case):
         self.assertIn("mode Degraded", words)
         self.assertIn("GnssPosition gives nothing that is used, for 1.5 s", words)
         self.assertIn("fault Rejecting, for 0.8 s", words)
-        self.assertIn("reset: PositionJump, position moved by 99.50 m east, -0.25 m north", words)
+        self.assertIn("reset: PositionJump, position moved by 99.50 m east, -0.25 m north, 3.50 m up", words)
 
     def test_the_pictures_of_an_inertial_run_are_drawn(self):
         truth = self.inertial()
