@@ -18,7 +18,7 @@ enum class SyncKind : std::uint8_t { kTick = 0, kStep = 1, kClock = 2, kBegin = 
 enum class ResetWhat : std::uint8_t { kEstimators = 0, kCounters = 1, kLandmarkMap = 2 };
 enum class GnssFix : std::uint8_t { kNone = 0, kTimeOnly = 1, kFix2D = 2, kFix3D = 3, kDifferential = 4, kRtkFloat = 5, kRtkFixed = 6, kNotAvailable = 15 };
 enum class Mode : std::uint8_t { kBoot = 0, kWaitingForPose = 1, kAligning = 2, kNominal = 3, kDeadReckoning = 4, kDegraded = 5, kFault = 6, kWaitingForImu = 7, kLevelling = 8, kFindingHeading = 9 };
-enum class ResetCause : std::uint8_t { kPowerOn = 0, kCommand = 1, kSetPose = 2, kTimeJump = 3, kNotFinite = 4, kNotPositive = 5, kPositionJump = 6, kHeadingWrong = 7, kDiverged = 8 };
+enum class ResetCause : std::uint8_t { kPowerOn = 0, kCommand = 1, kSetPose = 2, kTimeJump = 3, kNotFinite = 4, kNotPositive = 5, kPositionJump = 6, kHeadingWrong = 7, kDiverged = 8, kBarometerZero = 9, kMagneticField = 10 };
 enum class Sensor : std::uint8_t { kImu = 0, kWheelCounts = 1, kWheelSpeed = 2, kBodySpeed = 3, kRangeBearing = 4, kGnssPosition = 5, kGnssVelocity = 6, kMagnetometer = 7, kBarometer = 8, kHeading = 9, kNotAvailable = 15 };
 enum class Verdict : std::uint8_t { kAccepted = 0, kRejected = 1, kNotUsed = 2, kTooLate = 3, kUnknownLandmark = 4, kSingular = 5, kNotFinite = 6, kStale = 7 };
 enum class SyncState : std::uint8_t { kOwnTimer = 0, kFollowing = 1, kHoldover = 2, kLockstep = 3 };

@@ -81,8 +81,11 @@ struct GnssNumbers {
   float sigma_scale = 1;       ///< times the receiver's own accuracy
   float correlation_s = 0;     ///< inertial: how long the receiver's errors last; 0: a new one with every fix
   float gate_scale = 1;
-  float align_distance_m = 8;          ///< travel by GNSS before a heading is derived from it
-  std::int32_t origin_configured = 0;  ///< 0: the first fix is the origin
+  float align_distance_m = 8;  ///< travel by GNSS before a heading is derived from it
+  /// Of a receiver with two antennas: from the first to the second. Its heading is that of this line.
+  std::array<float, 3> baseline_b_m{1, 0, 0};
+  std::int32_t heading_stuck_samples = 50;  ///< repeated so often to the last bit, a heading is a stuck one; 0: never
+  std::int32_t origin_configured = 0;       ///< 0: the first fix is the origin
   std::int64_t origin_latitude_2ndeg = 0;
   std::int64_t origin_longitude_2ndeg = 0;
   float origin_height_m = 0;
@@ -103,6 +106,7 @@ struct InertialNumbers {
   float start_tilt_rad = 0.05F;     ///< 1 sigma of levelling
   std::int32_t starts_forward = 0;  ///< 1: it never starts in reverse, so its course is its heading
   float level_s = 1;                ///< how long gravity is looked at
+  std::int32_t earth_rate = 0;      ///< 1: a gyroscope good enough to feel the Earth turn, 15 deg/h
   float gap_mps2 = 3;               ///< what may have happened while samples were missing
   float gap_radps = 1;
   float gap_wheels_radps = 0.1F;    ///< the same for turning, while wheels show how it turns
@@ -142,6 +146,7 @@ struct MagneticNumbers {
   float dip_rad = 0.15F;    ///< the same for its angle below the horizon, from what was found at the start
   /// In motion for so long in a field that stays the same, but is not the one known: that is the known one then.
   float field_new_s = 20;
+  std::int32_t stuck_samples = 50;  ///< repeated so often to the last bit, a field is that of a stuck sensor; 0: never
 };
 
 /// The barometer: its zero is found, and followed, where the height is known better by other means.
@@ -151,6 +156,7 @@ struct BaroNumbers {
   float drift_m_rts = 0.1F;   ///< of its zero: weather, warming up; m per root second
   float scale_share = 0.05F;  ///< of a change of height: air that is not the standard atmosphere
   float gate_scale = 1;
+  std::int32_t stuck_samples = 50;  ///< repeated so often to the last bit, a pressure is that of a stuck one; 0: never
 };
 
 /// When two attitudes differ enough, for long enough, one of them is wrong. A curve that lasts tilts what only knows an
@@ -241,20 +247,22 @@ constexpr void each_number(const Numbers& n, Sink&& sink) {
   const auto& g = n.gnss;
   all(g.antenna_x_b_m, g.antenna_y_b_m, g.antenna_z_b_m, g.sigma_velocity_floor_mps, g.sigma_floor_m, g.sigma_scale,
       g.correlation_s, g.gate_scale, g.align_distance_m, g.origin_configured, g.origin_latitude_2ndeg,
-      g.origin_longitude_2ndeg, g.origin_height_m);
+      g.origin_longitude_2ndeg, g.origin_height_m, g.baseline_b_m[0], g.baseline_b_m[1], g.baseline_b_m[2],
+      g.heading_stuck_samples);
   const auto& i = n.inertial;
   for (const float m : i.mounting_bs) sink(m);
   all(i.imu, i.gyro_radps_rthz, i.gyro_scale, i.accel_mps2_rthz, i.gyro_bias_radps2_rthz, i.accel_bias_mps3_rthz,
       i.gyro_turn_on_radps, i.accel_turn_on_mps2, i.start_tilt_rad, i.level_s, i.starts_forward, i.gap_mps2,
       i.gap_radps, i.still_radps, i.still_mps, i.wheel_mps, i.slip_share, i.lateral_mps, i.vertical_mps, i.axle_x_b_m,
       i.wheel_gate_scale, i.wheels_every_us, i.constrain_every_us, i.gap_wheels_radps, i.stuck_samples, i.stale_us,
-      i.vibration_mps2, i.vibration_radps, i.calm_mps2, i.calm_radps, i.still_gnss_mps, i.slip_mps);
+      i.earth_rate, i.vibration_mps2, i.vibration_radps, i.calm_mps2, i.calm_radps, i.still_gnss_mps, i.slip_mps);
   const auto& m = n.magnetic;
   for (const float v : m.hard_iron_uT) sink(v);
   for (const float v : m.soft_iron) sink(v);
   for (const float v : m.mounting_bs) sink(v);
-  all(m.use, m.declination_rad, m.sigma_rad, m.gate_scale, m.norm_uT, m.norm_share, m.dip_rad, m.field_new_s);
-  all(n.baro.use, n.baro.sigma_m, n.baro.drift_m_rts, n.baro.scale_share, n.baro.gate_scale);
+  all(m.use, m.declination_rad, m.sigma_rad, m.gate_scale, m.norm_uT, m.norm_share, m.dip_rad, m.field_new_s,
+      m.stuck_samples);
+  all(n.baro.use, n.baro.sigma_m, n.baro.drift_m_rts, n.baro.scale_share, n.baro.gate_scale, n.baro.stuck_samples);
   n.attitude.each(sink);
   all(n.disagreement.tilt_rad, n.disagreement.heading_rad, n.disagreement.after_us);
   const auto& s = n.start;

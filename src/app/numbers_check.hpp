@@ -119,6 +119,14 @@ consteval Numbers checked(const Numbers& n) {
   require(i.wheels_every_us >= 0 && 2 * std::int64_t{i.wheels_every_us} <= n.wheels.timeout_us,
           "inertial.wheels_every_us: 0 to half of wheels.timeout_us");
   require(i.stuck_samples >= 0 && i.stuck_samples <= 255, "inertial.stuck_samples: 0 to 255");
+  require(i.earth_rate == 0 || i.earth_rate == 1, "inertial.earth_rate: 0 or 1");
+  const auto& line = n.gnss.baseline_b_m;
+  require(within(line, 100.0F) && line[0] * line[0] + line[1] * line[1] > 1e-4F,
+          "gnss.baseline_b_m: below 100 m, and not upright");
+  require(n.gnss.heading_stuck_samples >= 0 && n.gnss.heading_stuck_samples <= 255,
+          "gnss.heading_stuck_samples: 0 to 255");
+  require(n.magnetic.stuck_samples >= 0 && n.magnetic.stuck_samples <= 255, "magnetic.stuck_samples: 0 to 255");
+  require(n.baro.stuck_samples >= 0 && n.baro.stuck_samples <= 255, "baro.stuck_samples: 0 to 255");
   require(i.stale_us > 0 && i.stale_us <= 10'000'000, "inertial.stale_us: 1 to 10000000");
   require(positive(i.vibration_mps2) && positive(i.vibration_radps), "inertial.vibration_*: above 0");
   require(not_negative(i.calm_mps2) && not_negative(i.calm_radps), "inertial.calm_*: not below 0");

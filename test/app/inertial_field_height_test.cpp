@@ -373,8 +373,11 @@ TEST(InertialMagnetometer, takes_a_new_field_for_known_after_motion_in_it_not_be
   EXPECT_EQ(robot.last_flux.verdict, can::Verdict::kRejected);
   drive(robot, static_cast<double>(robot.n.magnetic.field_new_s) - 2);
   EXPECT_EQ(robot.last_flux.verdict, can::Verdict::kRejected);
+  EXPECT_EQ(robot.estimator.jump().count, 0);
   drive(robot, 4);
   EXPECT_NE(robot.last_flux.verdict, can::Verdict::kRejected);
+  EXPECT_EQ(robot.estimator.jump().count, 1) << "and says so";
+  EXPECT_EQ(robot.estimator.jump().cause, can::ResetCause::kMagneticField);
 }
 
 TEST(InertialMagnetometer, waits_for_a_field_of_the_configured_strength) {
@@ -493,6 +496,7 @@ TEST(InertialBarometer, takes_a_door_for_a_new_zero_not_for_a_climb) {
     EXPECT_EQ(robot.last_air.dof, 1);
     robot.run(1e-6 * static_cast<double>(robot.n.recovery.after_us));
     EXPECT_EQ(robot.last_air.verdict, can::Verdict::kAccepted);
+    EXPECT_EQ(robot.estimator.jump().cause, can::ResetCause::kBarometerZero) << "and says so";
     EXPECT_NEAR(robot.height_off_m(), before_m, 1.0) << gnss;
   }
 }

@@ -122,7 +122,8 @@ std::vector<app::Sample> good(int k, base::Micros t) {
                                .dvelocity_b_mps = {0, 0, 0.0981F + 1e-5F * static_cast<float>(k % 5)},
                                .interval_us = 10'000}),
       sample_of(Sensor::kWheelCounts, t, app::WheelCounts{.left = counts, .right = counts}),
-      sample_of(Sensor::kMagnetometer, t, app::MagneticFlux{.flux_b_uT = {17, 3, -46}})};
+      sample_of(Sensor::kMagnetometer, t,
+                app::MagneticFlux{.flux_b_uT = {17 + 0.02F * static_cast<float>(k % 7), 3, -46}})};
   if (k % 20 == 7) {
     const app::GnssNumbers& g = kNumbers.gnss;
     all.push_back(sample_of(Sensor::kGnssPosition, t,
@@ -133,7 +134,9 @@ std::vector<app::Sample> good(int k, base::Micros t) {
                                               .vertical_acc_m = 3,
                                               .fix = app::GnssFix::k3d}));
     all.push_back(sample_of(Sensor::kGnssVelocity, t, app::GnssVelocity{.v_n_mps = {1, 0, 0}, .acc_mps = 0.2F}));
-    all.push_back(sample_of(Sensor::kBarometer, t, app::AirPressure{.pressure_Pa = 95'000, .temperature_degC = 15}));
+    all.push_back(
+        sample_of(Sensor::kBarometer, t,
+                  app::AirPressure{.pressure_Pa = 95'000 + static_cast<float>(k % 3), .temperature_degC = 15}));
     all.push_back(sample_of(Sensor::kHeading, t, app::OutsideHeading{.yaw_rad = 0.01F, .acc_rad = 0.02F}));
     all.push_back(sample_of(Sensor::kWheelSpeed, t, app::WheelSpeeds{.left_mps = 1, .right_mps = 1}));
     all.push_back(sample_of(Sensor::kBodySpeed, t, app::BodySpeed{.forward_mps = 1, .yaw_rate_radps = 0.1F}));
@@ -190,20 +193,17 @@ std::vector<float> values() {
   return all;
 }
 
-/// A run in which from tick `from` on, for two seconds, this field of every sample of this kind has this value.
-void run_broken(can::Sensor sensor, std::size_t field, float value, int from) {
+/// A run in which from tick `from` on, for two seconds, every sample of this kind is spoilt; `taken` hears whether that
+/// one was let in.
+template <class Spoil, class Taken>
+void run_spoilt(can::Sensor sensor, int from, Spoil&& spoil, Taken&& taken) {
   Wired wired;
   for (int k = 0; k < from + 400; ++k) {
     const base::Micros t = wired.now() + base::Micros{5'000};
     for (app::Sample& sample : good(k, t)) {
-      const bool broken = sample.sensor == sensor && k >= from && k < from + 200;
-      if (broken) {
-        const Field of = fields_of(sample)[field];
-        *of.value = value;
-        const bool taken = wired.offer(sample);
-        if (!base::is_finite(value) && !(of.optional && base::is_nan(value))) {
-          EXPECT_FALSE(taken);
-        }
+      if (sample.sensor == sensor && k >= from && k < from + 200) {
+        spoil(sample);
+        taken(wired.offer(sample));
       } else {
         EXPECT_TRUE(wired.offer(sample));
       }
@@ -212,6 +212,22 @@ void run_broken(can::Sensor sensor, std::size_t field, float value, int from) {
     if (k % 40 == 39) wired.judge();
   }
   EXPECT_TRUE(wired.navigates());
+}
+/// This field has this value.
+void run_broken(can::Sensor sensor, std::size_t field, float value, int from) {
+  bool optional = false;
+  run_spoilt(
+      sensor, from,
+      [&](app::Sample& sample) {
+        const Field of = fields_of(sample)[field];
+        *of.value = value;
+        optional = of.optional;
+      },
+      [&](bool taken) {
+        if (!base::is_finite(value) && !(optional && base::is_nan(value))) {
+          EXPECT_FALSE(taken);
+        }
+      });
 }
 
 TEST(NeverNan, EveryFieldOfEverySampleWhileStartingAndWhileNavigating) {
@@ -225,6 +241,85 @@ TEST(NeverNan, EveryFieldOfEverySampleWhileStartingAndWhileNavigating) {
           run_broken(kind.sensor, field, value, from);
           if (HasFailure()) return;
         }
+}
+
+/// What is counted, and what a thermometer says.
+TEST(NeverNan, EveryIntegerOfEverySampleWhileStartingAndWhileNavigating) {
+  using can::Sensor;
+  struct Spoilt {
+    const char* what;
+    Sensor sensor;
+    void (*spoil)(app::Sample&);
+  };
+  constexpr auto kMost = std::numeric_limits<std::int64_t>::max(), kLeast = std::numeric_limits<std::int64_t>::min();
+  const std::vector<Spoilt> all{
+      {"no interval", Sensor::kImu, [](app::Sample& s) { s.payload.imu.interval_us = 0; }},
+      {"1 us", Sensor::kImu, [](app::Sample& s) { s.payload.imu.interval_us = 1; }},
+      {"the longest interval", Sensor::kImu, [](app::Sample& s) { s.payload.imu.interval_us = 0xFFFF; }},
+      {"all clipped", Sensor::kImu,
+       [](app::Sample& s) { s.payload.imu.clipped_gyro = s.payload.imu.clipped_accel = 255; }},
+      {"no temperature", Sensor::kImu, [](app::Sample& s) { s.payload.imu.temperature_degC = base::kNan; }},
+      {"infinitely hot", Sensor::kImu, [](app::Sample& s) { s.payload.imu.temperature_degC = base::kInfinity; }},
+      {"counts that stay", Sensor::kWheelCounts, [](app::Sample& s) { s.payload.counts = {}; }},
+      {"counts that leap", Sensor::kWheelCounts,
+       [](app::Sample& s) {
+         s.payload.counts = {.left = static_cast<std::uint16_t>(s.stamp.us & 0xFFFF), .right = 0x8000};
+       }},
+      {"beyond the pole", Sensor::kGnssPosition,
+       [](app::Sample& s) { s.payload.gnss_position.latitude_2ndeg = kMost; }},
+      {"beyond the other", Sensor::kGnssPosition,
+       [](app::Sample& s) { s.payload.gnss_position.latitude_2ndeg = kLeast; }},
+      {"round the world", Sensor::kGnssPosition,
+       [](app::Sample& s) { s.payload.gnss_position.longitude_2ndeg = kMost; }},
+      {"and back", Sensor::kGnssPosition, [](app::Sample& s) { s.payload.gnss_position.longitude_2ndeg = kLeast; }},
+      {"the pole", Sensor::kGnssPosition,
+       [](app::Sample& s) { s.payload.gnss_position.latitude_2ndeg = 45'000'000'000; }},
+      {"nowhere", Sensor::kGnssPosition,
+       [](app::Sample& s) { s.payload.gnss_position.latitude_2ndeg = s.payload.gnss_position.longitude_2ndeg = 0; }},
+      {"no thermometer", Sensor::kBarometer, [](app::Sample& s) { s.payload.pressure.temperature_degC = base::kNan; }},
+      {"absolute zero", Sensor::kBarometer, [](app::Sample& s) { s.payload.pressure.temperature_degC = -274; }},
+      {"no such landmark", Sensor::kRangeBearing, [](app::Sample& s) { s.payload.sighting.landmark = 255; }},
+  };
+  for (const Spoilt& one : all)
+    for (const int from : {0, 300}) {
+      SCOPED_TRACE(testing::Message() << one.what << " from " << from);
+      run_spoilt(one.sensor, from, one.spoil, [](bool) {});
+      if (HasFailure()) return;
+    }
+}
+
+/// Past the rule of lateness: whatever an estimator is handed, and however it is dated.
+TEST(NeverNan, StampsOfAnyAgeInTheInertialEstimatorItself) {
+  const app::GnssNumbers& g = kNumbers.gnss;
+  app::Site site;
+  site.frame = nav::LocalFrame(g.origin_latitude_2ndeg, g.origin_longitude_2ndeg, g.origin_height_m);
+  site.origin = can::OriginSource::kConfigured;
+  const app::Context with{.numbers = kNumbers, .site = site};
+  for (const app::Sample& kind : good(7, {}))
+    for (const std::int64_t off_us : std::initializer_list<std::int64_t>{-1'000'000'000'000, -10'000'000, -200'001, -1,
+                                                                         1, 200'001, 10'000'000, 1'000'000'000'000}) {
+      SCOPED_TRACE(testing::Message() << "sensor " << static_cast<int>(kind.sensor) << ", " << off_us << " us");
+      app::Inertial estimator;
+      base::Micros now{2'000'000'000'000};
+      estimator.restart(now, with);
+      for (int k = 0; k < 600; ++k) {
+        now += base::Micros{10'000};
+        for (const app::Sample& sample : good(k, now)) {
+          const bool odd = sample.sensor == kind.sensor && k >= 300 && k < 320;
+          app::visit(sample, [&](const auto& payload) {
+            if constexpr (requires { estimator.fuse(payload, now, with); })
+              static_cast<void>(estimator.fuse(payload, odd ? now + base::Micros{off_us} : now, with));
+          });
+        }
+        estimator.advance(now, with, std::vector<app::Sample>{});
+        if (k % 20 != 0) continue;
+        const app::InertialEstimate e = estimator.inertial(with);
+        ASSERT_TRUE(e.state.finite()) << k;
+        if (e.valid) {
+          ASSERT_GT(least_eigenvalue(e.p), 0) << k;
+        }
+      }
+    }
 }
 
 TEST(NeverNan, StaleAndFutureStampsOfEverySensor) {

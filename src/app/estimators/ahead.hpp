@@ -59,6 +59,10 @@ class Ahead {
     if (gap > kImuJitter) static_cast<void>(nav::strapdown(x, unseen(gap, with), with.earth));
     return x;
   }
+  /// Makes that the present.
+  void reach(base::Micros t, const With& with) { present_ = at(t, with); }
+  [[nodiscard]] const nav::InsState& present() const { return present_; }
+  void remember(const nav::InsState& last) { present_ = last; }
   [[nodiscard]] const Place& place() const { return place_; }
   /// Stamp of the last sample it has, whatever that said.
   [[nodiscard]] base::Micros heard() const { return heard_; }
@@ -87,6 +91,7 @@ class Ahead {
   }
 
   Place place_;
+  nav::InsState present_;
   base::Micros heard_;
   ImuCells cells_;
   nav::ImuGather gather_;  ///< of samples that x does not have yet; empty between calls

@@ -24,10 +24,14 @@ class FieldGuard {
   [[gnu::noinline]] float step(const Field& f, bool moving, base::Micros stamp, const MagneticNumbers& n) {
     const base::Micros since = stamp - last_;
     last_ = stamp;
+    renewed_ = false;
     const float off = compare(f, moving && since <= kGap ? base::seconds(since) : 0.0F, n);
     if (!(off <= 1.0F) || since > kGap) since_ = stamp;
     return off;
   }
+
+  /// Another field has been taken for the known one by the last step().
+  [[nodiscard]] bool renewed() const { return renewed_; }
 
   /// Whether its headings are used. They stop to be when they have contradicted for `after` what better sensors say,
   /// and are again when they have agreed for as long.
@@ -77,6 +81,7 @@ class FieldGuard {
     if (other_s_ < n.field_new_s) return off;
     field_ = other_;
     other_s_ = 0;
+    renewed_ = true;
     return apart(f, field_, n);
   }
   /// Squared as well.
@@ -98,7 +103,7 @@ class FieldGuard {
 
   Field field_, other_;
   float other_s_ = 0;
-  bool known_ = false, refused_ = false;
+  bool known_ = false, refused_ = false, renewed_ = false;
   base::Micros last_, since_;
 };
 

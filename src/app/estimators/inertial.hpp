@@ -12,6 +12,7 @@
 #include "app/estimators/fix_trust.hpp"
 #include "app/estimators/imu_watch.hpp"
 #include "app/estimators/inertial_start.hpp"
+#include "app/estimators/same_again.hpp"
 #include "app/estimators/slip_watch.hpp"
 #include "app/sample.hpp"
 #include "base/renew.hpp"
@@ -118,6 +119,11 @@ class Inertial {
   }
   void begin(const Context& with);
   void begin_anew(base::Micros t, can::ResetCause cause, const Context& with);
+  /// Something was taken anew that moves nothing at once.
+  void say(can::ResetCause cause) {
+    jump_ = {.cause = cause, .count = static_cast<std::uint8_t>(jump_.count + 1)};
+    back_ = false;
+  }
   [[nodiscard]] nav::Vector3 axle_mps(const nav::Vector3& v_n_mps, const Context& with) const;
   [[nodiscard]] bool looks_wrong(const nav::Vector3& v_b_mps, float level_mps, float sigma_mps, base::Micros stamp,
                                  const Context& with);
@@ -147,7 +153,7 @@ class Inertial {
   void doubt(float sigma_mps, float sigma_rad);
   /// From the filter's time to the present; 0 while there is no filter.
   [[nodiscard]] float ahead_s() const { return phase_ == Phase::kTracking ? base::seconds(now_ - time_) : 0.0F; }
-  [[nodiscard]] const nav::InsState& now_x() const { return phase_ == Phase::kTracking ? present_ : ins_.x; }
+  [[nodiscard]] const nav::InsState& now_x() const { return phase_ == Phase::kTracking ? ahead_.present() : ins_.x; }
   [[nodiscard]] float unseen_s2(float unseen_s) const;
   [[nodiscard]] nav::InsCovarianceStep<float> step_ahead(const InertialNumbers& n) const;
   [[nodiscard]] std::int32_t work_of(const Sample& sample, const Context& with) const;
@@ -186,7 +192,6 @@ class Inertial {
 
   nav::Ins ins_;
   Ahead ahead_;
-  nav::InsState present_;
   std::int32_t work_left_ = 0;  ///< in this tick
   std::int32_t arrived_ = 0;    ///< IMU samples since the last
   base::Micros anew_at_;        ///< when all that is ahead was carried anew last
@@ -236,6 +241,10 @@ class Inertial {
   Jump jump_;
   FieldGuard field_;
   BaroZero baro_;
+  SameAgain<3> fluxes_;
+  SameAgain<1> pressures_, headings_;
+  float rolled_mps_ = 0;  ///< as wheels or a speedometer said last,
+  base::Micros rolled_;   ///< and when
 };
 
 }  // namespace tetap::app

@@ -206,7 +206,7 @@ inline constexpr float kDecides = 4.0F;
                                                     base::Micros stamp, const Context& with) {
   constexpr float kCosine = 0.88F;
   constexpr base::Micros kLately{2'500'000};
-  const float rolled = slip_.mean_mps(stamp);
+  const float rolled = stamp - rolled_ < base::Micros{500'000} ? rolled_mps_ : 0.0F;
   const float ahead = rolled < 0.0F ? -v_b_mps(0) : v_b_mps(0);
   const bool wrong = level_mps > 4.0F * sigma_mps + 0.3F &&
                      base::abs(level_mps - base::abs(rolled)) < 3.0F * sigma_mps + 0.05F * level_mps &&

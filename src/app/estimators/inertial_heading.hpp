@@ -12,15 +12,21 @@ namespace tetap::app {
 inline Innovation Inertial::fuse(const OutsideHeading& heading, base::Micros stamp, const Context& with) {
   const float own = base::is_finite(heading.acc_rad) ? heading.acc_rad : 0.1F;
   const float sigma = own > 0.005F ? own : 0.005F;
+  const GnssNumbers& n = with.numbers.gnss;
+  if (!base::is_finite(heading.yaw_rad)) return {.verdict = can::Verdict::kNotFinite};
+  if (headings_.hear({heading.yaw_rad}, n.heading_stuck_samples)) return {.verdict = can::Verdict::kStale};
+  const nav::Vector3 baseline_b_m{n.baseline_b_m[0], n.baseline_b_m[1], n.baseline_b_m[2]};
   if (phase_ != Phase::kTracking) {
-    start_.heading(heading.yaw_rad, sigma);
+    const nav::Vector3 line = start_.attitude().rotate(baseline_b_m);
+    const float yaw_rad = heading.yaw_rad - base::atan2(line(1), line(0)) + nav::euler(start_.attitude()).yaw_rad;
+    start_.heading(base::wrap_angle(yaw_rad), sigma);
     return {.verdict = can::Verdict::kAccepted};
   }
   // To the time of the last IMU sample, as the state is.
   const float turn_radps = ins_.x.q_nb.rotate(rate_b_radps_ - ins_.x.b_g_radps)(2);
   const float yaw_rad = base::wrap_angle(heading.yaw_rad - turn_radps * base::seconds(stamp - time_));
-  const model::DirectionMeasurement direction = model::DualHeading({1.0F, 0.0F, 0.0F}, yaw_rad, sigma);
-  return measure(direction, kHeadings, with.numbers.gnss.gate_scale, stamp, with);
+  const model::DirectionMeasurement direction = model::DualHeading(baseline_b_m, yaw_rad, sigma);
+  return measure(direction, kHeadings, n.gate_scale, stamp, with);
 }
 
 /// The errors of a magnetometer last, so its headings never make the filter's better than sigma_rad: each is given the
@@ -36,8 +42,10 @@ inline Innovation Inertial::fuse(const OutsideHeading& heading, base::Micros sta
   const nav::Vector3 field_n = (tracking ? ins_.x.q_nb : start_.attitude()).rotate(field);
   const float horizontal2 = field_n(0) * field_n(0) + field_n(1) * field_n(1);
   if (!(horizontal2 > 0.0F && field.squaredNorm() < 1e12F)) return {.verdict = can::Verdict::kNotFinite};
+  if (fluxes_.hear(flux.flux_b_uT, n.stuck_samples)) return {.verdict = can::Verdict::kStale};
   const bool moving = tracking && (ins_.x.v_n_mps.squaredNorm() > 0.25F || rate.squaredNorm() > 0.04F);
   const float off = field_.step({.horizontal_uT = base::sqrt(horizontal2), .up_uT = field_n(2)}, moving, stamp, n);
+  if (field_.renewed()) say(can::ResetCause::kMagneticField);
   if (!(off <= 1.0F)) return {.verdict = can::Verdict::kRejected, .dof = 2, .nis = off, .gate = 1.0F};
 
   model::DirectionMeasurement direction = model::MagneticHeading(field, n.declination_rad, n.sigma_rad);
@@ -67,6 +75,7 @@ inline Innovation Inertial::fuse(const OutsideHeading& heading, base::Micros sta
     } else {
       ins_.p(8, 8) += nu * nu;
       field_.believe(true, stamp);
+      say(can::ResetCause::kMagneticField);
     }
   }
   if (!agrees) result.verdict = can::Verdict::kRejected;

@@ -12,6 +12,7 @@ namespace tetap::app {
   if (n.use == 0 || phase_ != Phase::kTracking) return {};
   constexpr float kLeast_Pa = 22'700;  // the model ends at 11 km
   if (!(air.pressure_Pa >= kLeast_Pa && air.pressure_Pa < 2e5F)) return {.verdict = can::Verdict::kNotFinite};
+  if (pressures_.hear({air.pressure_Pa}, n.stuck_samples)) return {.verdict = can::Verdict::kStale};
   const float altitude_m = pressure_altitude_m(air.pressure_Pa);
   // The height at the sample's time; the state's is that of the last IMU sample.
   const float height_m = nav::difference(ins_.x.z, {}) + ins_.x.v_n_mps(2) * base::seconds(stamp - time_);
@@ -29,8 +30,10 @@ namespace tetap::app {
   if (!(result.nis < 1e30F)) return {.verdict = can::Verdict::kNotFinite};
   if (result.nis > gate) {
     // A door, a hatch, a gust: pressure that stays different is a new zero.
-    if (baro_.refused_for(stamp) >= base::Micros{with.numbers.recovery.after_us})
+    if (baro_.refused_for(stamp) >= base::Micros{with.numbers.recovery.after_us}) {
       baro_.set(altitude_m, altitude_m - height_m, p_z + white, stamp);
+      say(can::ResetCause::kBarometerZero);
+    }
     return result;
   }
   result.verdict = can::Verdict::kAccepted;

@@ -132,7 +132,7 @@ inline std::uint16_t Inertial::faults() const {
   raise(can::Fault::kWheelSlip, slip_.slip() != SlipWatch::Slip::kNone);
   raise(can::Fault::kImuClipped, imu_.clipped_lately(time_));
   raise(can::Fault::kVibration, imu_.shaken());
-  raise(can::Fault::kSensorStuck, imu_.stuck());
+  raise(can::Fault::kSensorStuck, imu_.stuck() || fluxes_.stuck() || pressures_.stuck() || headings_.stuck());
   raise(can::Fault::kInputStale, blind_ && !imu_.stuck() && !unusable_);
   return bits;
 }
@@ -141,11 +141,11 @@ inline std::uint16_t Inertial::faults() const {
 /// from the last that was published.
 [[gnu::noinline]] inline void Inertial::begin_anew(base::Micros t, can::ResetCause cause, const Context& with) {
   const auto count = static_cast<std::uint8_t>(jump_.count + 1);
-  const nav::InsState last = present_;
+  const nav::InsState last = ahead_.present();
   base::renew(*this);
   time_ = t;
   noise_of(with.numbers.inertial);
-  present_ = last;
+  ahead_.remember(last);
   jump_ = {.east_m = base::kNan,
            .north_m = base::kNan,
            .up_m = base::kNan,
@@ -156,14 +156,16 @@ inline std::uint16_t Inertial::faults() const {
 
 /// The filter begins where the start found the robot.
 inline void Inertial::begin(const Context& with) {
-  if (with.site.origin != can::OriginSource::kNone) ins_.earth = nav::Earth::at(with.site.frame, false);
+  if (with.site.origin != can::OriginSource::kNone)
+    ins_.earth = nav::Earth::at(with.site.frame, with.numbers.inertial.earth_rate != 0);
   start_.begin(ins_, with.numbers.inertial, phase_ == Phase::kTracking);
   phase_ = Phase::kTracking;
   if (!base::is_finite(jump_.yaw_rad)) {  // see begin_anew()
-    jump_.east_m = nav::difference(ins_.x.x, present_.x);
-    jump_.north_m = nav::difference(ins_.x.y, present_.y);
-    jump_.up_m = nav::difference(ins_.x.z, present_.z);
-    jump_.yaw_rad = base::wrap_angle(nav::euler(ins_.x.q_nb).yaw_rad - nav::euler(present_.q_nb).yaw_rad);
+    const nav::InsState& last = ahead_.present();
+    jump_.east_m = nav::difference(ins_.x.x, last.x);
+    jump_.north_m = nav::difference(ins_.x.y, last.y);
+    jump_.up_m = nav::difference(ins_.x.z, last.z);
+    jump_.yaw_rad = base::wrap_angle(nav::euler(ins_.x.q_nb).yaw_rad - nav::euler(last.q_nb).yaw_rad);
   }
   last_position_ = time_;
   refused_ = {};
@@ -234,10 +236,10 @@ inline void Inertial::stand(base::Micros stamp, const Context& with) {
     ins_.p(8, 12 + i) -= shared * up_b(i);
     doubt(i) = 4.0F - 3.0F * up_b(i) * up_b(i);
   }
+  // What stands turns with the Earth.
+  const nav::Vector3 still_b = waiting_.rate_radps - ins_.x.q_nb.conjugate().rotate(ins_.earth.rate_n_radps);
   static_cast<void>(update(
-      model::ZeroRate{
-          .gyro_b_radps = waiting_.rate_radps, .sigma_radps = base::sqrt(density / waiting_.s), .doubt = doubt},
-      gate));
+      model::ZeroRate{.gyro_b_radps = still_b, .sigma_radps = base::sqrt(density / waiting_.s), .doubt = doubt}, gate));
   for (int i = 0; i < 3; ++i) {
     ins_.p(8, 12 + i) += shared * up_b(i);
     ins_.p(12 + i, 12 + i) += since(i);

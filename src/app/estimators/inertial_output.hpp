@@ -156,6 +156,11 @@ void Inertial::each_bit(Sink&& sink) const {
   sink(static_cast<std::uint32_t>(jump_.count | (doubted_ ? 256U : 0U) | (back_ ? 512U : 0U)));
   field_.each_bit(sink);
   baro_.each_bit(sink);
+  fluxes_.each_bit(sink);
+  pressures_.each_bit(sink);
+  headings_.each_bit(sink);
+  sink(rolled_mps_);
+  sink(rolled_.us);
 }
 
 }  // namespace tetap::app

@@ -69,7 +69,7 @@ void Inertial::advance(base::Micros t, const Context& with, const Window& window
     const std::int64_t more = 1 + ((due - window[0].stamp - kBehind).us >> 14);
     work_left_ += kMeasurement * static_cast<std::int32_t>(more < 20 ? more : 20);
   }
-  present_ = ahead_.at(t, how);
+  ahead_.reach(t, how);
   blind_ = unusable_ || t - ahead_.place().last > base::Micros{n.stale_us};
 }
 

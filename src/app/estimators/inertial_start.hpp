@@ -5,6 +5,7 @@
 #pragma once
 
 #include "app/numbers.hpp"
+#include "model/gnss_course.hpp"
 #include "model/gnss_fix_3d.hpp"
 #include "model/planar_pose.hpp"
 #include "nav/ins.hpp"
@@ -155,9 +156,9 @@ class InertialStart {
   }
   /// Forward is the way it goes.
   void course(float east, float north, float sigma) {
-    const float length = base::sqrt(east * east + north * north);
     constexpr float kSlip_rad = 0.1F;  // a curve between the fixes, a crab's walk
-    heading(base::atan2(north, east), base::sqrt(sigma * sigma / (length * length) + kSlip_rad * kSlip_rad));
+    const model::GnssCourse course(east, north, sigma, kSlip_rad);
+    heading(course.angle_rad, course.sigma_rad);
   }
 
   nav::Quaternion turned_;

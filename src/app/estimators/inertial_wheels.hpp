@@ -50,6 +50,8 @@ inline Innovation Inertial::fuse(const WheelSpeeds& speeds, base::Micros stamp, 
 /// No wheels to compare: only its gate judges it.
 inline Innovation Inertial::fuse(const BodySpeed& speed, base::Micros stamp, const Context& with) {
   if (speed_soon(stamp, with)) return {.verdict = can::Verdict::kAccepted};
+  rolled_mps_ = speed.forward_mps;
+  rolled_ = stamp;
   return forward({.mps = speed.forward_mps}, stamp, with);
 }
 
@@ -62,6 +64,8 @@ inline Innovation Inertial::roll(const SlipWatch::Wheels& wheels, float sigma_mp
   if (!base::is_finite(wheels.left_mps) || !base::is_finite(wheels.right_mps))
     return {.verdict = can::Verdict::kNotFinite};
   const float mean = 0.5F * (wheels.left_mps + wheels.right_mps);
+  rolled_mps_ = mean;
+  rolled_ = stamp;
   if (phase_ != Phase::kTracking || !(track_m > 0)) return forward({.mps = mean, .sigma_mps = sigma_mps}, stamp, with);
   // Without a gyroscope the wheels are all that shows turning, and cannot be judged by it.
   const bool gyro = !without_imu();

@@ -65,8 +65,6 @@ class SlipWatch {
   }
 
   [[nodiscard]] Slip slip() const { return slip_; }
-  /// What both wheels said last, in the mean; 0 when that is long ago.
-  [[nodiscard]] float mean_mps(base::Micros at) const { return at - heard_ > kGap ? 0.0F : mean_mps_; }
   /// Begins anew: what was off is what the filter had wrong.
   void forget() { *this = {}; }
 

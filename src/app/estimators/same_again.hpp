@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+// A sensor that shows to the last bit what it showed before, again and again: stuck. One whose noise spans its steps
+// does that a few times by chance, and not fifty.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+namespace tetap::app {
+
+template <std::size_t kSize>
+class SameAgain {
+ public:
+  /// Finite readings. True when this one is the n-th repetition or beyond; n = 0: never.
+  bool hear(const std::array<float, kSize>& now, std::int32_t n) {
+    bool same = true;
+    for (std::size_t i = 0; i < kSize; ++i) same = same && now[i] <= last_[i] && now[i] >= last_[i];
+    last_ = now;
+    times_ = same ? static_cast<std::uint8_t>(times_ < 255 ? times_ + 1 : 255) : std::uint8_t{0};
+    stuck_ = n > 0 && times_ >= n;
+    return stuck_;
+  }
+  [[nodiscard]] bool stuck() const { return stuck_; }
+  template <class Sink>
+  void each_bit(Sink&& sink) const {
+    for (const float v : last_) sink(v);
+    sink(static_cast<std::uint32_t>(times_ | (stuck_ ? 256U : 0U)));
+  }
+
+ private:
+  std::array<float, kSize> last_{};
+  std::uint8_t times_ = 0;
+  bool stuck_ = false;
+};
+
+}  // namespace tetap::app

@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a robot may have that the rover has not: a pair of antennas that does not point ahead, a gyroscope that feels
+// the Earth turn; and sensors that show the same for ever.
+#include "app/estimators/inertial.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+#include <vector>
+
+namespace tetap::app {
+namespace {
+
+constexpr double kPi = 3.14159265358979;
+
+/// Stands at 48 degrees north, level, and looks to yaw_rad; its place is given, its heading comes from elsewhere.
+class Stand {
+ public:
+  explicit Stand(const Numbers& of) : n(of) {
+    site.frame = nav::LocalFrame(24'000'000'000, 5'500'000'000, 500.0F);
+    site.origin = can::OriginSource::kConfigured;
+    gravity_mps2_ = nav::Earth::at(site.frame, false).gravity_mps2;
+    estimator.restart({us}, with());
+    estimator.set_pose({us}, {.pose = {}, .sigma_position_m = 0.1F, .sigma_yaw_rad = 4.0F}, with());
+  }
+  Numbers n;
+  Site site;
+  Inertial estimator;
+  double yaw_rad = 0;
+  nav::Vector3 shown_radps = nav::Vector3::Zero();  ///< by a gyroscope without bias
+  bool wheels = true;
+  std::int64_t us = 1'000'000;
+
+  void run(double duration_s) {
+    for (const std::int64_t end = us + std::llround(duration_s * 1e6); us < end;) {
+      us += 10'000;
+      const auto noise = [this](double sigma) { return static_cast<float>(sigma * normal_(engine_)); };
+      estimator.fuse(
+          ImuSample{.dangle_b_rad = {0.01F * shown_radps(0) + noise(1e-6), 0.01F * shown_radps(1) + noise(1e-6),
+                                     0.01F * shown_radps(2) + noise(1e-6)},
+                    .dvelocity_b_mps = {noise(1e-4), noise(1e-4), 0.01F * gravity_mps2_ + noise(1e-4)},
+                    .interval_us = 10'000},
+          {us}, with());
+      if (wheels) estimator.fuse(WheelCounts{}, {us}, with());
+      estimator.advance({us}, with(), std::vector<Sample>{});
+    }
+  }
+  Innovation heading(double line_rad) {
+    return estimator.fuse(
+        OutsideHeading{.yaw_rad = static_cast<float>(std::remainder(line_rad + 1e-3 * normal_(engine_), 2 * kPi)),
+                       .acc_rad = 0.01F},
+        {us}, with());
+  }
+  [[nodiscard]] Context with() const { return {n, site}; }
+  [[nodiscard]] double yaw_off_rad() const {
+    return std::remainder(static_cast<double>(estimator.estimate(with()).pose.yaw_rad) - yaw_rad, 2 * kPi);
+  }
+  [[nodiscard]] bool says_stuck() const {
+    return (estimator.faults() >> static_cast<unsigned>(can::Fault::kSensorStuck) & 1U) != 0;
+  }
+
+ private:
+  float gravity_mps2_ = 0;
+  std::mt19937 engine_{3};
+  std::normal_distribution<double> normal_;
+};
+
+Numbers numbers() {
+  Numbers n;
+  n.wheels.drive = {.left_radius_m = 0.1F, .right_radius_m = 0.1F, .track_m = 0.5F, .counts_per_turn = 2000};
+  n.magnetic.use = n.baro.use = 1;
+  return n;
+}
+
+// Antennas across the body, the second to the left: their line points 90 degrees to the left of where the robot looks.
+TEST(InertialOptions, ABaselineAcrossTheBodyIsNoHeadingOfTheBody) {
+  Numbers n = numbers();
+  n.gnss.baseline_b_m = {0, 0.8F, 0};
+  Stand stand(n);
+  stand.yaw_rad = 2.8;
+  for (int i = 0; i < 30; ++i) {
+    stand.run(0.5);
+    stand.heading(stand.yaw_rad + kPi / 2);
+    if (i < 6) continue;
+    ASSERT_TRUE(stand.estimator.estimate(stand.with()).heading_valid) << i;
+    ASSERT_NEAR(stand.yaw_off_rad(), 0, 0.005) << i;
+  }
+}
+
+// A gyroscope at rest shows the Earth: 4.9e-5 rad/s towards north, 5.4e-5 up at 48 degrees. Told of it, the filter
+// finds no bias; told nothing, it takes it for one.
+TEST(InertialOptions, AGyroscopeThatFeelsTheEarthHasNoBiasOfIt) {
+  constexpr float kRate = 7.292115e-5F;
+  const auto cosine = static_cast<float>(std::cos(48 * kPi / 180)), sine = static_cast<float>(std::sin(48 * kPi / 180));
+  for (const bool told : {true, false}) {
+    Numbers n = numbers();
+    n.inertial.earth_rate = told ? 1 : 0;
+    n.inertial.gyro_radps_rthz = 2e-6F;
+    n.inertial.gyro_bias_radps2_rthz = 1e-8F;
+    Stand stand(n);  // looks east, so north is to its left
+    stand.shown_radps = {0, kRate * cosine, kRate * sine};
+    for (int i = 0; i < 60; ++i) {
+      stand.run(1);
+      stand.heading(0);
+    }
+    const nav::Vector3 bias = stand.estimator.inertial(stand.with()).state.b_g_radps;
+    EXPECT_NEAR(bias(1), told ? 0.0F : kRate * cosine, 5e-6F) << told;
+    EXPECT_NEAR(bias(2), told ? 0.0F : kRate * sine, 5e-6F) << told;
+  }
+}
+
+TEST(InertialOptions, SensorsThatShowTheSameForEverAreStuckAndSaidToBe) {
+  Stand stand(numbers());
+  for (int i = 0; i < 6; ++i) {
+    stand.run(0.5);
+    stand.heading(0);
+  }
+  const auto until_stale = [&](auto&& fuse) {
+    for (int i = 0; i < 200; ++i) {
+      stand.run(0.02);
+      if (fuse() == can::Verdict::kStale) return i;
+    }
+    return 200;
+  };
+  const auto at = [&] { return base::Micros{stand.us}; };
+  EXPECT_FALSE(stand.says_stuck());
+  EXPECT_EQ(until_stale([&] {
+              return stand.estimator.fuse(MagneticFlux{.flux_b_uT = {0, -20, -40}}, at(), stand.with()).verdict;
+            }),
+            50);
+  EXPECT_TRUE(stand.says_stuck());
+  static_cast<void>(stand.estimator.fuse(MagneticFlux{.flux_b_uT = {0, -20.1F, -40}}, at(), stand.with()));
+  EXPECT_FALSE(stand.says_stuck()) << "it moves again";
+  EXPECT_EQ(
+      until_stale([&] { return stand.estimator.fuse(AirPressure{.pressure_Pa = 95'000}, at(), stand.with()).verdict; }),
+      50);
+  EXPECT_TRUE(stand.says_stuck());
+  static_cast<void>(stand.estimator.fuse(AirPressure{.pressure_Pa = 95'001}, at(), stand.with()));
+  EXPECT_EQ(
+      until_stale([&] {
+        return stand.estimator.fuse(OutsideHeading{.yaw_rad = 0.01F, .acc_rad = 0.01F}, at(), stand.with()).verdict;
+      }),
+      50);
+  EXPECT_TRUE(stand.says_stuck());
+}
+
+}  // namespace
+}  // namespace tetap::app
