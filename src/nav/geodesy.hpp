@@ -6,6 +6,7 @@
 #include "base/wgs84.hpp"
 
 #include <cstdint>
+#include <optional>
 
 namespace tetap::nav {
 
@@ -47,11 +48,21 @@ class LocalFrame {
     return {.east_um = micrometres(east), .north_um = micrometres(north), .up_um = micrometres(up), .valid = true};
   }
 
+  /// Longitude in [-180, 180] deg; at a pole any. The latitude and longitude are rounded to the bus's 2e-9 deg, a tenth
+  /// of a millimetre each. Empty: not valid, further than 1000 km from the origin, or more than 350 km underground.
+  [[nodiscard]] constexpr std::optional<base::Geodetic> to_geodetic(const Local& at) const {
+    const base::Enu d{.east = metres(at.east_um), .north = metres(at.north_um), .up = metres(at.up_um)};
+    if (!at.valid || !near(d.east) || !near(d.north) || !near(d.up)) return {};
+    const base::Ecef p = level_.to_ecef(d);
+    return base::geodetic_of({origin_m_.x + p.x, origin_m_.y + p.y, origin_m_.z + p.z});
+  }
+
  private:
   static constexpr bool near(double m) { return m > -1e6 && m < 1e6; }
   static constexpr std::int64_t micrometres(double m) {
     return static_cast<std::int64_t>(m * 1e6 + (m < 0 ? -0.5 : 0.5));
   }
+  static constexpr double metres(std::int64_t um) { return static_cast<double>(um) * 1e-6; }
 
   std::int64_t latitude_2ndeg_ = 0;
   std::int64_t longitude_2ndeg_ = 0;
