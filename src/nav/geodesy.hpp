@@ -1,20 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// Latitude, longitude, height to the local level plane (east, north, up) and back, on WGS84 (NIMA TR8350.2, table 3.1).
-// Through ECEF (Torge & Mueller 2012, sec. 4.1.3), in the bit-identical double of src/base: the only place where double
-// is used.
+// Latitude, longitude, height to the local level plane (east, north, up) of an origin and back, by way of ECEF.
 #pragma once
 
 #include "base/math.hpp"
-#include "base/math_double.hpp"
+#include "base/wgs84.hpp"
 
 #include <cstdint>
+#include <optional>
 
 namespace tetap::nav {
-
-inline constexpr double kSemiMajor_m = 6378137.0;
-inline constexpr double kFlattening = 1.0 / 298.257223563;
-inline constexpr double kEccentricity2 = kFlattening * (2.0 - kFlattening);
-inline constexpr double kRadPer2ndeg = 2e-9 * 3.14159265358979323846 / 180.0;
 
 /// Relative to an origin, integer micrometres. Not valid: further than 1000 km from the origin, or not a place on
 /// Earth.
@@ -32,9 +26,8 @@ class LocalFrame {
       : latitude_2ndeg_(latitude_2ndeg),
         longitude_2ndeg_(longitude_2ndeg),
         height_m_(height_m),
-        latitude_(base::sincos(static_cast<double>(latitude_2ndeg) * kRadPer2ndeg)),
-        longitude_(base::sincos(static_cast<double>(longitude_2ndeg) * kRadPer2ndeg)),
-        origin_(ecef(latitude_, longitude_, static_cast<double>(height_m))) {}
+        level_(latitude_2ndeg, longitude_2ndeg),
+        origin_m_(base::ecef_m(level_, static_cast<double>(height_m))) {}
 
   [[nodiscard]] constexpr std::int64_t latitude_2ndeg() const { return latitude_2ndeg_; }
   [[nodiscard]] constexpr std::int64_t longitude_2ndeg() const { return longitude_2ndeg_; }
@@ -49,39 +42,33 @@ class LocalFrame {
       return {};
     }
     const double height = base::is_finite(height_m) ? static_cast<double>(height_m) : static_cast<double>(height_m_);
-    const auto p = ecef(base::sincos(static_cast<double>(latitude_2ndeg) * kRadPer2ndeg),
-                        base::sincos(static_cast<double>(longitude_2ndeg) * kRadPer2ndeg), height);
-    const double dx = p.x - origin_.x;
-    const double dy = p.y - origin_.y;
-    const double dz = p.z - origin_.z;
-    const double outward = longitude_.cos * dx + longitude_.sin * dy;
-    const double east = longitude_.cos * dy - longitude_.sin * dx;
-    const double north = latitude_.cos * dz - latitude_.sin * outward;
-    const double up = latitude_.cos * outward + latitude_.sin * dz;
+    const auto p = base::ecef_m(base::Level(latitude_2ndeg, longitude_2ndeg), height);
+    const auto [east, north, up] = level_.to_enu({p.x - origin_m_.x, p.y - origin_m_.y, p.z - origin_m_.z});
     if (!near(east) || !near(north) || !near(up)) return {};
     return {.east_um = micrometres(east), .north_um = micrometres(north), .up_um = micrometres(up), .valid = true};
   }
 
- private:
-  struct Ecef {
-    double x = 0, y = 0, z = 0;
-  };
-  static constexpr Ecef ecef(const base::SinCosDouble& latitude, const base::SinCosDouble& longitude, double height) {
-    const double n = kSemiMajor_m / base::sqrt(1.0 - kEccentricity2 * latitude.sin * latitude.sin);
-    return {(n + height) * latitude.cos * longitude.cos, (n + height) * latitude.cos * longitude.sin,
-            (n * (1.0 - kEccentricity2) + height) * latitude.sin};
+  /// Longitude in [-180, 180] deg; at a pole any. The latitude and longitude are rounded to the bus's 2e-9 deg, a tenth
+  /// of a millimetre each. Empty: not valid, further than 1000 km from the origin, or more than 350 km underground.
+  [[nodiscard]] constexpr std::optional<base::Geodetic> to_geodetic(const Local& at) const {
+    const base::Enu d{.east = metres(at.east_um), .north = metres(at.north_um), .up = metres(at.up_um)};
+    if (!at.valid || !near(d.east) || !near(d.north) || !near(d.up)) return {};
+    const base::Ecef p = level_.to_ecef(d);
+    return base::geodetic_of({origin_m_.x + p.x, origin_m_.y + p.y, origin_m_.z + p.z});
   }
+
+ private:
   static constexpr bool near(double m) { return m > -1e6 && m < 1e6; }
   static constexpr std::int64_t micrometres(double m) {
     return static_cast<std::int64_t>(m * 1e6 + (m < 0 ? -0.5 : 0.5));
   }
+  static constexpr double metres(std::int64_t um) { return static_cast<double>(um) * 1e-6; }
 
   std::int64_t latitude_2ndeg_ = 0;
   std::int64_t longitude_2ndeg_ = 0;
   float height_m_ = 0;
-  base::SinCosDouble latitude_{};
-  base::SinCosDouble longitude_{};
-  Ecef origin_{};
+  base::Level level_{};
+  base::Ecef origin_m_{};
 };
 
 }  // namespace tetap::nav

@@ -3,6 +3,7 @@
 // and 3.4). Computed once, when the origin is known.
 #pragma once
 
+#include "base/wgs84.hpp"
 #include "nav/geodesy.hpp"
 #include "nav/so3.hpp"
 
@@ -15,9 +16,10 @@ namespace tetap::nav {
   constexpr double kCentrifugal = 0.00344978650684;  // omega^2 a^2 b / GM
   const double s = base::sin(latitude_rad);
   const double s2 = s * s;
-  const double surface = kEquator_mps2 * (1.0 + kSomigliana * s2) / base::sqrt(1.0 - kEccentricity2 * s2);
-  const double up = height_m / kSemiMajor_m;
-  return surface * (1.0 - 2.0 * (1.0 + kFlattening + kCentrifugal - 2.0 * kFlattening * s2) * up + 3.0 * up * up);
+  const double surface = kEquator_mps2 * (1.0 + kSomigliana * s2) / base::sqrt(1.0 - base::kEccentricity2 * s2);
+  const double up = height_m / base::kSemiMajor_m;
+  return surface *
+         (1.0 - 2.0 * (1.0 + base::kFlattening + kCentrifugal - 2.0 * base::kFlattening * s2) * up + 3.0 * up * up);
 }
 
 /// What the Earth does to a body at rest on it, in the local plane. Over 100 km the plumb line turns by 16 mrad against
@@ -28,7 +30,7 @@ struct Earth {
 
   [[nodiscard]] static Earth at(const LocalFrame& origin, bool with_rotation) {
     constexpr double kRate_radps = 7.292115e-5;
-    const double latitude = static_cast<double>(origin.latitude_2ndeg()) * kRadPer2ndeg;
+    const double latitude = static_cast<double>(origin.latitude_2ndeg()) * base::kRadPer2ndeg;
     Earth earth;
     earth.gravity_mps2 = static_cast<float>(normal_gravity(latitude, static_cast<double>(origin.height_m())));
     if (with_rotation) {

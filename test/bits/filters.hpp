@@ -237,7 +237,7 @@ void hash_vector(base::WordHash& hash, const filter::Vector<float, N>& x) {
   return hash.value();
 }
 
-/// WGS84 to the local plane: the one place where double is flashed.
+/// WGS84 to the local plane and back: the one place where double is flashed.
 [[nodiscard]] inline std::uint32_t geodesy(std::uint32_t steps) {
   base::WordHash hash;
   Chance chance{.random = base::Random{1, 5}};
@@ -253,6 +253,12 @@ void hash_vector(base::WordHash& hash, const filter::Vector<float, N>& x) {
     hash(local.east_um);
     hash(local.north_um);
     hash(static_cast<std::uint32_t>(local.valid));
+    const auto back = frame.to_geodetic(local);
+    hash(static_cast<std::uint32_t>(back.has_value()));
+    if (!back.has_value()) continue;
+    hash(back->latitude_2ndeg);
+    hash(back->longitude_2ndeg);
+    hash(back->height_m);
   }
   return hash.value();
 }

@@ -20,7 +20,7 @@ TEST(Gravity, AveragesOverTheEllipsoidToThePublishedMean) {
   constexpr int kSteps = 20'000;
   for (int i = 0; i < kSteps; ++i) {
     const double latitude = (i + 0.5) / kSteps * M_PI / 2;
-    const double w2 = 1 - nav::kEccentricity2 * std::sin(latitude) * std::sin(latitude);
+    const double w2 = 1 - base::kEccentricity2 * std::sin(latitude) * std::sin(latitude);
     const double element = std::cos(latitude) / (w2 * w2);
     weighted += element * nav::normal_gravity(latitude, 0.0);
     area += element;

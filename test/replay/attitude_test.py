@@ -4,8 +4,10 @@
 
 Bounds: BROAD with one configuration, mean total RMSE <= 2.2 degrees and every trial below Madgwick's published figure. The metric is
 judged by the published figures of Mahony's filter, which this repository has too."""
+import contextlib
 import importlib.machinery
 import importlib.util
+import io
 import os
 import subprocess
 import sys
@@ -54,6 +56,20 @@ class Metric(unittest.TestCase):
         wrong = attitude.product(np.array([about(generator.normal(size=3), 10) for _ in truth]), moved)
         left = attitude.errors(attitude.without_constant_frames(wrong, truth), truth)["total"]
         self.assertGreater(np.sqrt(np.mean(left ** 2)), 9)
+
+
+class Markdown(unittest.TestCase):
+    def test_a_column_per_trial_and_the_mean_a_line_per_part(self):
+        def trial(name):
+            return attitude.Trial(name, [0.01], np.zeros((1, 3)), np.zeros((1, 3)), np.zeros((1, 3)), None, np.array([True]))
+        parts = {"total": 2.0, "heading": 1.5, "inclination": 1.0}
+        results = {("02_slow", "tetap9"): parts, ("07_fast", "tetap9"): {name: 2 * value for name, value in parts.items()}}
+        printed = io.StringIO()
+        with contextlib.redirect_stdout(printed):
+            attitude.print_markdown([trial("02_slow"), trial("07_fast")], ["tetap9"], results, {"other": {"02_slow": {"total": 7.0}}})
+        self.assertEqual(printed.getvalue().splitlines(), [
+            "| RMSE [deg], trial | 02 | 07 | mean |", "|---|---|---|---|", "| tetap9, total | 2.00 | 4.00 | 3.00 |", "| tetap9, heading | 1.50 | 3.00 | 2.25 |",
+            "| tetap9, inclination | 1.00 | 2.00 | 1.50 |", "| other, total | 7.00 |  | 7.00 |"])
 
 
 class Tool(unittest.TestCase):

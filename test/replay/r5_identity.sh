@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 # r5_identity.sh SECONDS: the R5 image in QEMU on a private vcan against the host program in memory, on the first SECONDS of every
 # recorded MRCLAM robot that out/recorded holds and of the simulated world, and on half of that of the inertial logs in out/inertial_runs (car,
-# PX4, Husky; their images are built here): the estimate frames and state CRCs must be equal, byte for byte, in two runs of each; the path must
-# move, and one flipped input bit must change the state CRC on both.
+# PX4, Husky; their images are built here), and in the whole form of the simulated world with an IMU of 200 Hz: the estimate frames and state CRCs
+# must be equal, byte for byte, in two runs of each (of the last one in one); the path must move, and one flipped input bit must change the state CRC
+# on both.
 set -u
 . "$(dirname "$0")/../../tools/run_lib.sh"
 cd "$root" || exit 2
@@ -38,9 +39,13 @@ fi
 rm -rf "${out:?}"/*
 images=()
 [ -e out/recorded/mrclam1.log ] || echo "  no recorded runs in out/recorded (set TETAP_DATA): the simulated world only"
-"$programs/tetap-world" --memory --duration "$seconds" --raw --quiet --out $out/world >/dev/null || exit 1
-# Times of arrival in memory mean nothing, so the ticks (Step frames) of the run go into the log too.
-grep -E ' 3[01][0-9A-F]#' $out/world/raw.log >$out/world_rover.log
+# The inputs of a simulated run. Times of arrival in memory mean nothing, so its ticks (Step frames) go into the log too.
+world() {  # NAME OPTION...
+  "$programs/tetap-world" --memory --duration "$seconds" --raw --quiet --out "$out/$1" "${@:2}" >/dev/null || return 1
+  grep -E ' 3[01][0-9A-F]#' "$out/$1/raw.log" >"$out/${1}_rover.log"
+}
+world world || exit 1
+[ "$seconds" -le 20 ] || world world200 --imu-hz 200 || exit 1
 for truth in out/recorded/mrclam*.truth.csv; do
   [ -e "$truth" ] || continue
   name=$(basename "$truth" .truth.csv)

@@ -3,7 +3,7 @@
 // receiver, or what an old one sends instead (NAV-SOL, -POSLLH, -VELNED, -STATUS, -DOP, -TIMEUTC; sources in nav.hpp).
 #pragma once
 
-#include "drivers/gnss/ecef.hpp"
+#include "base/wgs84.hpp"
 #include "drivers/gnss/epoch_end.hpp"
 #include "drivers/gnss/health.hpp"
 #include "drivers/gnss/ubx/nav.hpp"
@@ -166,7 +166,7 @@ class Epoch {
   constexpr void compose() {
     Report& r = report_;
     if (!position_m_.has_value()) return;
-    const auto at = geodetic_of(*position_m_);
+    const auto at = base::geodetic_of(*position_m_);
     if (!at.has_value()) return;
     if (!has(Nav::kPosLlh)) {
       r.latitude_2ndeg = at->latitude_2ndeg;
@@ -177,8 +177,8 @@ class Epoch {
       r.horizontal_acc_m = r.vertical_acc_m = position_acc_m_;
     }
     if (!has(Nav::kVelNed) && velocity_mps_.has_value()) {
-      const Vector3 v = level_of(*at, *velocity_mps_);
-      r.v_n_mps = {static_cast<float>(v[0]), static_cast<float>(v[1]), static_cast<float>(v[2])};
+      const base::Enu v = base::Level(at->latitude_2ndeg, at->longitude_2ndeg).to_enu(*velocity_mps_);
+      r.v_n_mps = {static_cast<float>(v.east), static_cast<float>(v.north), static_cast<float>(v.up)};
       r.speed_mps = base::sqrt(r.v_n_mps[0] * r.v_n_mps[0] + r.v_n_mps[1] * r.v_n_mps[1]);
       r.course_rad = base::atan2(r.v_n_mps[0], r.v_n_mps[1]);
     }
@@ -198,13 +198,13 @@ class Epoch {
   }
 
   static constexpr bool in_range(std::int32_t x, std::int32_t limit) { return x >= -limit && x <= limit; }
-  static constexpr Vector3 centi3(const Fields& f, std::size_t at) {
+  static constexpr base::Ecef centi3(const Fields& f, std::size_t at) {
     return {f.i4(at) * 0.01, f.i4(at + 4) * 0.01, f.i4(at + 8) * 0.01};
   }
 
   Report report_{};
   EpochEnd<kNavKinds> end_{};
-  std::optional<Vector3> position_m_, velocity_mps_;  ///< Earth-centred
+  std::optional<base::Ecef> position_m_, velocity_mps_;
   float position_acc_m_ = base::kNan;
   std::uint32_t seen_ = 0;
   bool open_ = false;

@@ -368,30 +368,6 @@ TEST(Ubx, TheOlderMessagesOfAnEpochMakeOneReport) {
   EXPECT_EQ(r.utc, (Utc{2011, 10, 24, 12, 51, 8, 5, true, true}));
 }
 
-TEST(Ecef, GoesBackToTheLatitudeLongitudeAndHeightItWasMadeFrom) {
-  const double a = 6378137.0, f = 1 / 298.257223563, e2 = f * (2 - f), deg = M_PI / 180;
-  for (double lat = -90; lat <= 90; lat += 7.5) {
-    for (double lon = -180; lon < 180; lon += 45.5) {
-      for (const double h : {-400.0, 0.0, 9'000.0, 400'000.0, 20'000'000.0}) {
-        const double n = a / std::sqrt(1 - e2 * std::sin(lat * deg) * std::sin(lat * deg));
-        const Vector3 p{(n + h) * std::cos(lat * deg) * std::cos(lon * deg),
-                        (n + h) * std::cos(lat * deg) * std::sin(lon * deg), (n * (1 - e2) + h) * std::sin(lat * deg)};
-        const auto g = geodetic_of(p);
-        ASSERT_TRUE(g.has_value());
-        EXPECT_NEAR(static_cast<double>(g->latitude_2ndeg) * 2e-9, lat, 3e-9);
-        const bool pole = std::abs(lat) > 89;  // there every longitude is right
-        EXPECT_NEAR(static_cast<double>(g->longitude_2ndeg) * 2e-9, lon, pole ? 360 : 3e-9) << lat;
-        EXPECT_NEAR(g->height_m, h, 1e-3);
-        const Vector3 up{std::cos(lat * deg) * std::cos(lon * deg), std::cos(lat * deg) * std::sin(lon * deg),
-                         std::sin(lat * deg)};
-        EXPECT_NEAR(level_of(*g, up)[2], 1, 1e-9);
-      }
-    }
-  }
-  EXPECT_FALSE(geodetic_of({0, 0, 0}).has_value());
-  EXPECT_FALSE(geodetic_of({1e9, 0, 0}).has_value());
-}
-
 TEST(Calendar, GpsWeeksBecomeUtc) {
   EXPECT_EQ(utc_of_gps(0, 0, 0), (Utc{1980, 1, 6, 0, 0, 0, 0, true, true}));
   EXPECT_EQ(utc_of_gps(2024, 420'964'000, 18), (Utc{2018, 10, 25, 20, 55, 46, 0, true, true}));
