@@ -61,6 +61,48 @@ TEST(QuadratureFault, SpeedFollowsAWheelThatSwingsThroughZero) {
   EXPECT_EQ(bench.behind(), 0);
 }
 
+TEST(QuadratureFault, TheTotalGoesOnWhereTheCounterTurnsRound) {
+  for (const double speed : {60'000.0, -60'000.0}) {
+    Bench<std::uint16_t> bench;
+    bench.encoder.set_speed(speed);
+    bench.run(3'000'000);
+    EXPECT_GT(std::abs(bench.driver.counts()), 2 * 65'536);
+    EXPECT_EQ(bench.behind(), 0);
+  }
+}
+
+TEST(QuadratureFault, RockingOnOneEdgeIsNoSpeed) {
+  Bench<std::uint16_t> bench;
+  bench.encoder.set_motion([](double s) { return 1.0 + 0.3 * std::sin(45.0 * s); });
+  bench.run(500'000);  // the first edges have no edge before them
+  const std::int64_t before = bench.driver.counts();
+  bench.fastest = 0;
+  bench.run(3'000'000);
+  EXPECT_EQ(bench.fastest, 0);
+  EXPECT_LE(std::abs(bench.driver.counts() - before), 1);
+}
+
+TEST(QuadratureFault, ExchangedWiresAreTurnedRoundByTheSettingInDistanceAndSpeed) {
+  Bench<std::uint16_t> bench({.inverted = true});
+  bench.encoder.inject(EncoderFault::kSwapped);
+  bench.encoder.set_speed(2000);
+  bench.run(1'000'000);
+  EXPECT_EQ(bench.behind(), 0);
+  EXPECT_NEAR(bench.driver.counts_per_s(), 2000, 10);
+}
+
+TEST(QuadratureFault, ACaptureThatStandsStillIsSaidAndSpeedComesFromTheTick) {
+  Bench<std::uint16_t> bench;
+  bench.encoder.set_speed(1000);
+  bench.run(500'000);
+  bench.encoder.inject(EncoderFault::kCaptureStuck);
+  bench.run(500'000);
+  EXPECT_GT(bench.driver.health().of(EncoderReason::kBadEdge), 50);
+  EXPECT_NEAR(bench.driver.counts_per_s(), 1000, 201);
+  EXPECT_LT(bench.fastest, 1201);
+  EXPECT_EQ(bench.behind(), 0);
+}
+
 TEST(QuadratureFault, AJumpIsRefusedThenFollowedAndOnlyTheJumpIsMissing) {
   for (const std::int32_t counts : {30'000, -30'000, 20'000}) {
     Bench<std::uint16_t> bench;

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The driver on a line with a fake u-blox receiver: whatever generation, baud rate and fault, it ends up running or
 // says why not, after a bounded number of requests.
-#include "drivers/gnss/driver.hpp"
-#include "drivers/gnss/fake_ublox.hpp"
+#include "drivers/gnss/gnss_bench.hpp"
 
 #include <gtest/gtest.h>
 
@@ -11,58 +10,25 @@
 namespace tetap::drivers::gnss {
 namespace {
 
-using test::FakeUblox;
-using test::Generation;
-using ubx::ConfigReason;
-using ubx::ConfigState;
 using ubx::Step;
-
-static_assert(hal::SerialPort<FakeUblox>);
-
-struct Bench {
-  explicit Bench(Generation generation, std::uint32_t baud = 9600, const DriverSettings& settings = {})
-      : receiver(generation, baud), driver(receiver, settings) {}
-
-  /// Until it stands still in the state, or for so long.
-  bool until(ConfigState state, double most_s) {
-    for (const auto end = now + base::Micros{static_cast<std::int64_t>(most_s * 1e6)}; now < end;) {
-      step();
-      if (driver.configurator().state() == state) return true;
-    }
-    return false;
-  }
-  void step() {
-    now += base::Micros{2'000};
-    receiver.advance(now);
-    driver.poll(now, [&](const Report& r, base::Micros stamp) {
-      reports.push_back(r);
-      stamps.push_back(stamp);
-    });
-  }
-  void run(double s) {
-    for (const auto end = now + base::Micros{static_cast<std::int64_t>(s * 1e6)}; now < end;) step();
-  }
-  [[nodiscard]] int count(ConfigReason reason) const { return driver.configurator().of(reason); }
-
-  FakeUblox receiver;
-  GnssDriver<FakeUblox> driver;
-  base::Micros now{};
-  std::vector<Report> reports;
-  std::vector<base::Micros> stamps;
-};
 
 void expect_configured(const Bench& bench) {
   EXPECT_EQ(bench.driver.configurator().state(), ConfigState::kRunning);
   EXPECT_EQ(bench.receiver.baud(), 115'200U);
-  EXPECT_EQ(bench.receiver.period_ms(), 200);
-  EXPECT_FALSE(bench.receiver.nmea());
-  EXPECT_EQ(bench.receiver.model(), 4);
+  EXPECT_EQ(bench.receiver.ram(key("CFG-RATE-MEAS")), 200U);
+  EXPECT_EQ(bench.receiver.ram(key("CFG-RATE-NAV")), 1U);
+  EXPECT_EQ(bench.receiver.ram(key("CFG-RATE-TIMEREF")), 1U) << "GPS time";
+  EXPECT_EQ(bench.receiver.ram(key("CFG-UART1OUTPROT-UBX")), 1U);
+  EXPECT_EQ(bench.receiver.ram(key("CFG-UART1OUTPROT-NMEA")), 0U);
+  EXPECT_EQ(bench.receiver.ram(key("CFG-NAVSPG-DYNMODEL")), 4U);
+  EXPECT_EQ(bench.receiver.stored(), 0U) << "nothing outlives the power, so no memory wears";
+  EXPECT_EQ(bench.receiver.broken_rules(), 0);
 }
 
 TEST(GnssConfiguration, AReceiverWithKeysIsConfiguredFromEveryBaudRate) {
   for (const std::uint32_t baud : {9600U, 38'400U, 57'600U, 115'200U, 230'400U, 460'800U, 921'600U}) {
     SCOPED_TRACE(baud);
-    Bench bench(Generation::kM10, baud);
+    Bench bench(Generation::kKeys, baud);
     ASSERT_TRUE(bench.until(ConfigState::kRunning, 20));
     expect_configured(bench);
     EXPECT_TRUE(bench.receiver.enabled(0x07));
@@ -102,8 +68,8 @@ TEST(GnssConfiguration, AReceiverWithoutNavPvtIsHeardByItsOlderMessages) {
 }
 
 TEST(GnssConfiguration, ARefusedOptionIsSaidAndTheRestIsConfigured) {
-  Bench bench(Generation::kM10);
-  bench.receiver.faults.refused_keys = {0x20910084, 0x20110021};
+  Bench bench(Generation::kKeys);
+  bench.receiver.faults.unknown_keys = {key("CFG-MSGOUT-UBX_NAV_COV_UART1"), key("CFG-NAVSPG-DYNMODEL")};
   ASSERT_TRUE(bench.until(ConfigState::kRunning, 20));
   EXPECT_TRUE(bench.receiver.enabled(0x07));
   EXPECT_EQ(bench.count(ConfigReason::kRefused), 2);
@@ -113,14 +79,14 @@ TEST(GnssConfiguration, ARefusedOptionIsSaidAndTheRestIsConfigured) {
 }
 
 TEST(GnssConfiguration, AReceiverThatRefusesNavPvtIsGivenUpAfterBoundedRounds) {
-  Bench bench(Generation::kM10);
-  bench.receiver.faults.refused_keys = {0x20910007};
+  Bench bench(Generation::kKeys);
+  bench.receiver.faults.unknown_keys = {key("CFG-MSGOUT-UBX_NAV_PVT_UART1")};
   ASSERT_TRUE(bench.until(ConfigState::kGaveUp, 120));
   EXPECT_EQ(bench.count(ConfigReason::kRefused), ubx::Settings{}.rounds);
 }
 
 TEST(GnssConfiguration, LostAcknowledgementsAreAskedForAgain) {
-  Bench bench(Generation::kM10, 115'200);
+  Bench bench(Generation::kKeys, 115'200);
   bench.receiver.faults.swallow_acks = 2;
   ASSERT_TRUE(bench.until(ConfigState::kRunning, 20));
   EXPECT_EQ(bench.count(ConfigReason::kTimeout), 2);
@@ -128,10 +94,11 @@ TEST(GnssConfiguration, LostAcknowledgementsAreAskedForAgain) {
 }
 
 TEST(GnssConfiguration, AnAnswerToAnEarlierTryIsNotTakenForTheNextStep) {
-  Bench bench(Generation::kM10, 115'200);
+  Bench bench(Generation::kKeys, 115'200);
   ASSERT_TRUE(bench.until(ConfigState::kApply, 5));
   bench.receiver.faults.delay = base::Micros{500'000};  // the time-out is 387 ms
-  bench.receiver.faults.refused_keys = {0x20910084};    // if taken for one step later, another step looks refused
+  // If taken for one step later, another step looks refused.
+  bench.receiver.faults.unknown_keys = {key("CFG-MSGOUT-UBX_NAV_COV_UART1")};
   ASSERT_TRUE(bench.until(ConfigState::kRunning, 60));
   expect_configured(bench);
   EXPECT_GT(bench.count(ConfigReason::kTimeout), 0);
@@ -142,8 +109,8 @@ TEST(GnssConfiguration, AnAnswerToAnEarlierTryIsNotTakenForTheNextStep) {
 }
 
 TEST(GnssConfiguration, AnAcknowledgementOfAnotherMessageIsNotTaken) {
-  Bench bench(Generation::kM10, 115'200);
-  ubx::Configurator<FakeUblox> configurator(bench.receiver, {});
+  Bench bench(Generation::kKeys, 115'200);
+  ubx::Configurator<fakes::Ublox> configurator(bench.receiver, {});
   configurator.poll({0});
   configurator.on_identified({1'000});
   for (int i = 0; i < 20; ++i) {
@@ -159,7 +126,7 @@ TEST(GnssConfiguration, AnAcknowledgementOfAnotherMessageIsNotTaken) {
 }
 
 TEST(GnssConfiguration, ASilentReceiverIsGivenUpWithBoundedRequestsAndTriedAgainLater) {
-  Bench bench(Generation::kM10);
+  Bench bench(Generation::kKeys);
   bench.receiver.faults.mute = true;
   ASSERT_TRUE(bench.until(ConfigState::kGaveUp, 120));
   EXPECT_EQ(bench.count(ConfigReason::kNoAnswer), ubx::Settings{}.rounds);
@@ -172,7 +139,7 @@ TEST(GnssConfiguration, ASilentReceiverIsGivenUpWithBoundedRequestsAndTriedAgain
 }
 
 TEST(GnssConfiguration, AReceiverThatLostItsPowerIsConfiguredAgain) {
-  Bench bench(Generation::kM10);
+  Bench bench(Generation::kKeys);
   ASSERT_TRUE(bench.until(ConfigState::kRunning, 20));
   bench.run(2);
   bench.receiver.power_cycle(38'400);
@@ -184,7 +151,7 @@ TEST(GnssConfiguration, AReceiverThatLostItsPowerIsConfiguredAgain) {
 }
 
 TEST(GnssConfiguration, ABaudRateAtWhichNothingIsHeardIsNotKept) {
-  Bench bench(Generation::kM10, 9600);
+  Bench bench(Generation::kKeys, 9600);
   bench.receiver.faults.deaf_after_baud_change = true;
   ASSERT_FALSE(bench.until(ConfigState::kRunning, 10));
   EXPECT_EQ(bench.count(ConfigReason::kBaudKept), 1);
@@ -197,10 +164,10 @@ TEST(GnssConfiguration, ABaudRateAtWhichNothingIsHeardIsNotKept) {
 }
 
 TEST(GnssConfiguration, ALineThatTakesThreeBytesAtATimeIsEnoughAndOneThatTakesNoneIsSaid) {
-  Bench bench(Generation::kM10);
+  Bench bench(Generation::kKeys);
   bench.receiver.faults.write_at_most = 3;
   EXPECT_TRUE(bench.until(ConfigState::kRunning, 20));
-  Bench stuck(Generation::kM10);
+  Bench stuck(Generation::kKeys);
   stuck.receiver.faults.write_at_most = 0;
   EXPECT_TRUE(stuck.until(ConfigState::kGaveUp, 120));
   EXPECT_GT(stuck.count(ConfigReason::kNoAnswer), 0);
@@ -211,7 +178,7 @@ TEST(GnssConfiguration, SettingsThatTheLineCannotCarrySendNothing) {
   settings.ubx.baud = 9600;
   settings.ubx.period_ms = 100;
   EXPECT_FALSE(ubx::valid(settings.ubx));
-  Bench bench(Generation::kM10, 9600, settings);
+  Bench bench(Generation::kKeys, 9600, settings);
   bench.run(3);
   EXPECT_EQ(bench.driver.configurator().state(), ConfigState::kMisconfigured);
   EXPECT_EQ(bench.receiver.requests(), 0);
@@ -220,7 +187,7 @@ TEST(GnssConfiguration, SettingsThatTheLineCannotCarrySendNothing) {
 TEST(GnssConfiguration, WithConfigurationOffNothingIsSent) {
   DriverSettings settings;
   settings.configure = false;
-  Bench bench(Generation::kM10, 9600, settings);
+  Bench bench(Generation::kKeys, 9600, settings);
   bench.run(5);
   EXPECT_EQ(bench.receiver.requests(), 0);
   EXPECT_GT(bench.driver.health().nmea_frames, 0U);

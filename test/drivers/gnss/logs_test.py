@@ -4,9 +4,12 @@
 beside them (.log.chk) and against gpsdecode on the same bytes. Data: $TETAP_DATA/gpsd; without it or gpsdecode exit 77: skipped.
 
 Equal means, with half a unit of the last digit printed on either side: a fix of ours has the judge's time of day, latitude and longitude,
-and every other field that both give. gpsd prints a TPV whenever it learnt something, also with fields of the epoch before; therefore a
-fix is compared with all its TPVs of one time and must agree with one of them, field by field.
+and every other field that both give: also the date (gpsd moves old ones on by 1024 weeks, so modulo those) and errors as GST and UBX
+estimate them. gpsd prints a TPV whenever it learnt something, also with fields of the epoch before; therefore a fix is compared with all
+its TPVs of one time and must agree with one of them, field by field. Dilution of precision has no time with gpsd: what its SKYs say has
+to be in our reports, in the same order.
 What differs is listed in EXPECTED with its reason and exact count; any other number, also a smaller one, fails."""
+import datetime
 import json
 import math
 import os
@@ -22,6 +25,7 @@ import sys
 #   untimed  the judge's position without a time that is none of ours
 #   missing  the judge's position at a time that is none of ours
 #   place, or a field's name: at the same time, but not equal
+#   dilution the judge's, not in our reports
 RMC = "gpsd's last word is RMC's place, which has a digit less than GGA's"
 FROZEN = ("gpsd keeps the first epoch's latitude, longitude and speed, while the ECEF fields of its TPV go on: judged by those, of 1 cm")
 
@@ -31,14 +35,17 @@ EXPECTED = {
         "gpsd's first TPV, of GGA alone, has no time"),
     "ublox-lea-4t.log": ({"first": 1, "missing": 1}, {"first": 1, "missing": 1},
         "before NAV-TIMEGPS says 15 leap seconds gpsd takes today's 18 for the first epoch; ours is NAV-TIMEUTC's"),
+    "ublox-neo-m8n.log": ({"dilution": 5}, {"dilution": 5},
+        "without NAV-DOP gpsd computes all three from the satellites' places; ours is NAV-PVT's pDOP"),
     "ublox-lea-5h.log": ({"extra": 1}, {"first": 1, "extra": 1},
         "two recordings in one file: gpsd drops the epoch at the seam"),
     "GPSmap-76S.log": ({"untimed": 2}, {},
         "GGA quality 8, simulator: no fix for us, one for gpsd"),
     "april6_2019.log": ({"untimed": 1}, {"last": 1},
         "a date of '2208-1': gpsd takes the rest of the sentence, we nothing"),
-    "bt451.log": ({"extra": 1, "last": 1, "untimed": 1}, {"extra": 1, "last": 1},
-        "several recordings in one file: gpsd drops the epoch at a seam; its TPV without a time is of GLL"),
+    "bt451.log": ({"extra": 1, "day": 1, "last": 1, "untimed": 1}, {"extra": 1, "day": 1, "last": 1},
+        "several recordings in one file: gpsd drops the epoch at a seam and takes the earlier time after it for the next day's; "
+        "its TPV without a time is of GLL"),
     "foretrex-201.log": ({"missing": 3}, {"first": 1, "missing": 3},
         "GGA of quality 2 with 0 satellites: no fix for us, one for gpsd"),
     "garmin-geko201.log": ({"untimed": 3}, {},
@@ -59,8 +66,8 @@ EXPECTED = {
         "GGA, RMC and GLL take turns, each second another: gpsd uses GLL too and drops the first RMC"),
     "mtk-3301.log": ({"untimed": 1}, {"untimed": 1},
         "GGA quality empty or 0 and RMC marked V, with a place: no fix for us, one for gpsd by GSA"),
-    "myguide-3100.log": ({"untimed": 2}, {"untimed": 2},
-        "GGA quality empty and RMC marked V, with a place: no fix for us, one for gpsd by GSA"),
+    "myguide-3100.log": ({"untimed": 2, "dilution": 1}, {"untimed": 2, "dilution": 1},
+        "GGA quality empty and RMC marked V, with a place: no fix for us, one for gpsd by GSA; the first GSA comes before any time"),
     "rst39.log": ({"extra": 1}, {"first": 1, "extra": 1},
         "gpsd drops the second epoch, the first without RMC"),
     "tn204.log": ({"extra": 1}, {"first": 1, "extra": 1},
@@ -76,8 +83,9 @@ for log in """ac12.log ac12_binary.log bt-q818.log bu353-glonass.log bu353s4.log
         nd-1005.log nl2008u.log nl402u.log nokia-ld-4w.log oncore.log polarx2.log saab-r4.log sirfstarv-nmea.log skytraq-dgps.log
         skytraq-fix.log skytraq-fixB.log telit-he910.log tomtom-mkII.log triton400.log ublox-lea-4s.log""".split():
     EXPECTED[log] = ({}, {"first": 1}, "")
-for log in """tcp-test.log tcp-torture.log udp-test.log""".split():
+for log in """tcp-test.log udp-test.log""".split():
     EXPECTED[log] = ({}, {"last": 1}, "")
+EXPECTED["tcp-torture.log"] = ({"dilution": 1}, {"last": 1, "dilution": 1}, "the first GGA is broken, so GSA comes before any time")
 for log in """ublox-zed-f9p_hpg1.11.log""".split():
     EXPECTED[log] = ({"first": 1}, {"first": 1}, "")
 
@@ -111,7 +119,9 @@ COARSE = {
 # field of ours, field of a TPV, tolerance in the unit
 FIELDS = (("msl", "altMSL", 0.0011), ("height", "altHAE", 0.0011), ("speed", "speed", 0.00101), ("course", "track", 0.0002),
           ("north", "velN", 0.0011),
-          ("east", "velE", 0.0011), ("down", "velD", 0.0011))
+          ("east", "velE", 0.0011), ("down", "velD", 0.0011), ("day", "day", 0.1), ("gst_h", "gst_h", 0.0011), ("gst_v", "gst_v", 0.0011),
+          ("hacc", "eph", 0.0011), ("vacc", "epv", 0.0011), ("sacc", "eps", 0.0051))
+MODELLED = ("eph", "epv", "eps")  # where the receiver does not say them gpsd makes a model of its errors
 ANGLE = 2.1e-9  # deg: our unit is 2e-9, gpsd prints 1e-9; velocities in n only from UBX: those of NMEA are speed and course
 
 
@@ -124,6 +134,11 @@ def lines_of(text):
             except ValueError:
                 pass
     return out
+
+
+def day(date):
+    """Modulo 1024 weeks, as a GPS receiver knows it."""
+    return datetime.date.fromisoformat(date).toordinal() % (7 * 1024)
 
 
 def time_of_day(tpv):
@@ -150,13 +165,19 @@ def geodetic(x, y, z):
 
 
 def tpvs_of(text, from_ecef):
-    out = []
-    for t in lines_of(text):
+    out, lines = [], lines_of(text)
+    errors = {t["time"]: t for t in lines if t.get("class") == "GST" and {"time", "lat", "lon", "alt"} <= t.keys()}
+    for t in lines:
         if t.get("class") != "TPV" or t.get("mode", 0) < 2 or "lat" not in t or "lon" not in t:
             continue
+        if "time" in t:
+            t["day"] = day(t["time"][:10])
+        if t.get("time") in errors:
+            gst = errors[t["time"]]
+            t["gst_h"], t["gst_v"] = math.sqrt((gst["lat"] ** 2 + gst["lon"] ** 2) / 2), gst["alt"]
         if from_ecef:
             t["lat"], t["lon"], t["altHAE"] = geodetic(t["ecefx"], t["ecefy"], t["ecefz"])
-            for field in ("altMSL", "speed", "track"):
+            for field in ("altMSL", "speed", "track") + MODELLED:
                 t.pop(field, None)
             if "ecefvx" in t:
                 v = (t["ecefvx"], t["ecefvy"], t["ecefvz"])
@@ -201,6 +222,24 @@ def compare(ours, tpvs, angle):
     return equal, different
 
 
+def compare_dilution(reports, text):
+    """What the judge's SKYs say of it, without those that we did not say, later than the one before or with it."""
+    different, at, skies = [], 0, 0
+    for sky in lines_of(text):
+        values = {name: sky[name] for name in ("pdop", "hdop", "vdop") if name in sky}
+        if sky.get("class") != "SKY" or not values:
+            continue
+        skies += 1
+        for number in range(at, len(reports)):
+            both = [name for name in values if name in reports[number]]
+            if both and all(abs(reports[number][name] - values[name]) < 0.0051 for name in both):
+                at = number
+                break
+        else:
+            different.append(f"dilution: {values} not in our reports")
+    return skies, different
+
+
 def main():
     verbose = "--verbose" in sys.argv
     args = [a for a in sys.argv[1:] if not a.startswith("--")]
@@ -213,7 +252,7 @@ def main():
     if shutil.which("gpsdecode") is None:
         print("no gpsdecode (Debian's gpsd-clients): skipped")
         return 77
-    failures, totals = [], {"chk": [0, 0, 0], "gpsdecode": [0, 0, 0]}
+    failures, totals = [], {"chk": [0] * 5, "gpsdecode": [0] * 5}
     spoken, fixes = 0, 0
     for path in logs:
         name = os.path.basename(path)
@@ -222,11 +261,16 @@ def main():
         out = lines_of(subprocess.run([args[0], path], capture_output=True, text=True, check=True).stdout)
         ours = [r for r in out[:-1] if r["fix"] >= 2 and "lat" in r]
         for r in ours:
+            if "date" in r:
+                r["day"] = day(r["date"])
             if "up" in r:
                 r["down"] = -r["up"]
             if r["protocol"] == "NMEA":
                 for axis in ("north", "east"):
                     r.pop(axis, None)
+                for ours_is, field in (("hacc", "gst_h"), ("vacc", "gst_v")):
+                    if ours_is in r:
+                        r[field] = r.pop(ours_is)
             elif abs(math.hypot(r["north"], r["east"]) - r["speed"]) > 0.01:
                 failures.append(f"{name}: speed {r['speed']} is not that of the velocity")
         if len(out) == 1:
@@ -240,12 +284,14 @@ def main():
             decoded = subprocess.run(["gpsdecode"], stdin=log, capture_output=True, timeout=60, check=False).stdout.decode(errors="replace")
         angle, why = COARSE.get(name, (ANGLE, ""))
         with open(path + ".chk", errors="replace") as chk:
-            judges = {"chk": tpvs_of(chk.read(), why == FROZEN), "gpsdecode": tpvs_of(decoded, why == FROZEN)}
+            judges = {"chk": chk.read(), "gpsdecode": decoded}
         spoken, fixes = spoken + 1, fixes + len(ours)
         expected = EXPECTED.get(name, ({}, {}, ""))
         row = []
-        for number, (judge, tpvs) in enumerate(judges.items()):
-            equal, different = compare(ours, tpvs, angle)
+        for number, (judge, text) in enumerate(judges.items()):
+            equal, different = compare(ours, tpvs_of(text, why == FROZEN), angle)
+            skies, dilution = compare_dilution(out[:-1], text)
+            different += dilution
             kinds = {}
             for text in different:
                 kind = text.split(":")[0]
@@ -253,6 +299,8 @@ def main():
             totals[judge][0] += equal
             totals[judge][1] += len(ours) - equal
             totals[judge][2] += sum(n for kind, n in kinds.items() if kind in ("missing", "untimed"))
+            totals[judge][3] += skies
+            totals[judge][4] += len(dilution)
             row.append(f"{judge} {equal} of {len(ours)} equal{' ' + str(kinds) if kinds else ''}")
             if kinds != expected[number]:
                 failures.append(f"{name}: {judge}: {kinds}, expected {expected[number]}")
@@ -262,8 +310,9 @@ def main():
                 print("\n".join(f"   {judge} {t}" for t in different))
         reason = "; ".join(r for r in (expected[2], why) if r)
         print(f"{name}: " + "; ".join(row) + (f" ({reason})" if reason else ""))
-    for judge, (equal, different, missing) in totals.items():
-        print(f"{judge}: {spoken} logs, {fixes} fixes: {equal} equal, {different} different, {missing} that are none of ours")
+    for judge, (equal, different, missing, skies, unlike) in totals.items():
+        print(f"{judge}: {spoken} logs, {fixes} fixes: {equal} equal, {different} different, {missing} that are none of ours; "
+              f"{skies} of its dilutions, {unlike} different")
     print("\n".join(failures))
     return 1 if failures else 0
 

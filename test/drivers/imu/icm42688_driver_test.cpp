@@ -161,20 +161,31 @@ TEST(Icm42688, NegativeAndPositiveMotionKeepTheirSignsOnEveryAxis) {
   }
 }
 
-TEST(Icm42688, TheMountingTurnsRateAndForceAlike) {
-  Bench bench{{.mounting = Mounting::of(Axis::kMinusY, Axis::kPlusX, Axis::kPlusZ),
-               .stuck_accel_samples = 0,
-               .stuck_gyro_samples = 0}};
-  bench.chip.set_motion({.rate_radps = {0.1, 0.2, 0.3}, .specific_force_mps2 = {1, 2, 3}});
-  ASSERT_TRUE(bench.start());
-  bench.run(10'000);
-  const ImuReading& r = bench.readings.back();
-  const float rate[] = {-0.2F, 0.1F, 0.3F};
-  const float force[] = {-2, 1, 3};
-  for (std::size_t i = 0; i < 3; ++i) {
-    EXPECT_NEAR(r.rate_b_radps[i], rate[i], 0.001F);
-    EXPECT_NEAR(r.force_b_mps2[i], force[i], 0.01F);
+TEST(Icm42688, EveryMountingTurnsRateAndForceAlikeInBothPackets) {
+  const std::array<double, 3> rate{0.1, 0.2, 0.3}, force{1, 2, 3};
+  const auto along = [](Axis axis, const std::array<double, 3>& v) {
+    const auto index = static_cast<std::size_t>(axis);
+    return index < 3 ? v[index] : -v[index - 3];
+  };
+  int mountings = 0;
+  for (int i = 0; i < 6 * 6 * 6; ++i) {
+    const Axis axes[] = {static_cast<Axis>(i % 6), static_cast<Axis>(i / 6 % 6), static_cast<Axis>(i / 36)};
+    const Mounting mounting = Mounting::of(axes[0], axes[1], axes[2]);  // what points forward, left, up
+    if (!mounting.valid()) continue;
+    ++mountings;
+    for (const Resolution resolution : {Resolution::k16bit, Resolution::k20bit}) {
+      Bench bench{{.resolution = resolution, .mounting = mounting, .stuck_accel_samples = 0, .stuck_gyro_samples = 0}};
+      bench.chip.set_motion({.rate_radps = rate, .specific_force_mps2 = force});
+      ASSERT_TRUE(bench.start());
+      bench.run(10'000);
+      const ImuReading& r = bench.readings.back();
+      for (std::size_t k = 0; k < 3; ++k) {
+        EXPECT_NEAR(r.rate_b_radps[k], along(axes[k], rate), 0.001) << i << ' ' << k;
+        EXPECT_NEAR(r.force_b_mps2[k], along(axes[k], force), 0.01) << i << ' ' << k;
+      }
+    }
   }
+  EXPECT_EQ(mountings, 24);
 }
 
 TEST(Icm42688, TheEndsOfTheRangeAreMarkedAndStillDelivered) {

@@ -37,12 +37,13 @@ enum class EncoderFault : std::uint8_t {
   kJump,          ///< at once, the count is off by `counts`
   kReset,         ///< at once, the count is 0
   kNoCapture,     ///< the timer gives no edge times
+  kCaptureStuck,  ///< the timer counts on and captures no more: the edge time stays what it was
   kCount
 };
 
 [[nodiscard]] constexpr std::string_view name(EncoderFault fault) {
-  constexpr std::string_view kNames[] = {"channel dead",  "stuck", "swapped", "glitches",  "spurious counts",
-                                         "missed pulses", "jump",  "reset",   "no capture"};
+  constexpr std::string_view kNames[] = {"channel dead",  "stuck", "swapped", "glitches",   "spurious counts",
+                                         "missed pulses", "jump",  "reset",   "no capture", "capture stuck"};
   return kNames[static_cast<std::size_t>(fault)];
 }
 
@@ -185,7 +186,7 @@ class Encoder {
   void edge(int direction, base::Micros at) {
     const int way = has(EncoderFault::kSwapped) ? -direction : direction;
     count_ = static_cast<Counter>(count_ + static_cast<Counter>(way));
-    last_edge_ = at;
+    if (!has(EncoderFault::kCaptureStuck)) last_edge_ = at;
   }
 
   void disturb(base::Micros step) {

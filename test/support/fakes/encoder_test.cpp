@@ -113,6 +113,17 @@ TEST(EncoderFaults, GlitchesMoveTheEdgeTimeAndNotTheCount) {
   EXPECT_NEAR(encoder.disturbances(), 500, 120);
 }
 
+TEST(EncoderFaults, AStuckCaptureLeavesTheEdgeTimeWhereItWasAndTheCountGoesOn) {
+  Encoder<std::uint32_t> encoder;
+  encoder.set_speed(1'000.0);
+  encoder.advance({100'500});
+  const auto before = encoder.read();
+  encoder.inject(EncoderFault::kCaptureStuck);
+  encoder.advance({200'500});
+  EXPECT_EQ(encoder.read().count, before.count + 100);
+  EXPECT_EQ(encoder.read().last_edge, before.last_edge);
+}
+
 TEST(EncoderFaults, SpuriousCountsWanderFromTheTruth) {
   Encoder<std::uint32_t> encoder;
   encoder.inject(EncoderFault::kSpurious, {.rate_Hz = 1'000.0, .seed = 3});
