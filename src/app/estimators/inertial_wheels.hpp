@@ -139,24 +139,25 @@ inline Innovation Inertial::forward(const Forward& speed, base::Micros stamp, co
   constrained_ = stamp;
   const float variance = ins_.p(3, 3) + ins_.p(4, 4) + ins_.p(5, 5);
   // As fast as the filter goes, or may: by the reading, readings that err to the slow side would count for more.
-  const float own_mps = forward_mps();
+  const nav::Vector3 ahead_n = ins_.x.q_nb.rotate({1.0F, 0.0F, 0.0F});
+  const float own_mps = ahead_n.dot(ins_.x.v_n_mps);
   const float slip2 = n.slip_share * n.slip_share * (own_mps * own_mps + variance);
   const float sigma = base::sqrt(n.wheel_mps * n.wheel_mps + slip2 + speed.sigma_mps * speed.sigma_mps);
-  // The reading is true at its own time, the state at that of the last IMU sample.
-  const float ahead_mps = ins_.x.q_nb.conjugate().rotate(ins_.accel_n_mps2)(0);
   // Where wheels say nothing the filter has to be sure that it stands, or goes.
   constexpr float kSure_mps = 0.1F;
   const bool goes = speed.sigma_mps < kUnknown_mps
                         ? base::abs(speed.mps) > 2.0F * n.wheel_mps
                         : variance > kSure_mps * kSure_mps || ins_.x.v_n_mps.squaredNorm() > 9.0F * variance;
-  return measure(model::WheelSpeed{.forward_mps = speed.mps - ahead_mps * base::seconds(stamp - time_),
-                                   .sigma_forward_mps = sigma,
-                                   .sigma_lateral_mps = n.lateral_mps,
-                                   .sigma_vertical_mps = n.vertical_mps,
-                                   .axle_b_m = {n.axle_x_b_m, 0.0F, 0.0F},
-                                   .gyro_b_radps = rate_b_radps_,
-                                   .moves = goes && !ins_.stands},
-                 kWheels, n.wheel_gate_scale, stamp, with);
+  // The reading is true at its own time, the state at that of the last IMU sample.
+  return measure(
+      model::WheelSpeed{.forward_mps = speed.mps - ahead_n.dot(ins_.accel_n_mps2) * base::seconds(stamp - time_),
+                        .sigma_forward_mps = sigma,
+                        .sigma_lateral_mps = n.lateral_mps,
+                        .sigma_vertical_mps = n.vertical_mps,
+                        .axle_b_m = {n.axle_x_b_m, 0.0F, 0.0F},
+                        .gyro_b_radps = rate_b_radps_,
+                        .moves = goes && !ins_.stands},
+      kWheels, n.wheel_gate_scale, stamp, with);
 }
 
 /// They came of late, do not spin, and the filter goes as fast as they say. Not for ever: it may be pinned to them on a
