@@ -590,6 +590,25 @@ class Program(unittest.TestCase):
             np.testing.assert_array_equal(getattr(slow, name).t, getattr(fast, name).t)
         self.assertAlmostEqual(fast.duration_s, 60.0, delta=0.05)
 
+    def test_what_the_node_said_by_its_own_clock_before_the_run_began_does_not_place_samples(self):
+        """A recording on a bus begins with a node that ticks by itself; its clock is not the run's."""
+        times = np.arange(1_010_000, 41_000_000, 10_000)
+        made = drive(3, np.eye(3), duration_s=40)
+        made.log.add("In_Sync", times, Time=times, Kind=1)
+        run = made.text()
+        alone = calibrate_log.Log(self.file(run), bus_writer.DEFAULT_DBC, 0x300)
+        begin = b"(0.999000) can0 300#40420F0000000003\n"
+
+        def own(from_us, to_us):
+            return b"".join(b"(0.5) can0 320#" + int(t).to_bytes(6, "little").hex().upper().encode() + b"0000\n" for t in range(from_us, to_us, 10_000))
+
+        for idle_us in (1_500_000, 2_600_000, 60_000_000):
+            log = calibrate_log.Log(self.file(own(idle_us - 500_000, idle_us) + begin + own(idle_us, idle_us + 10_000) + run), bus_writer.DEFAULT_DBC, 0x300)
+            for name in ("imu", "wheels", "gnss", "velocity"):
+                np.testing.assert_array_equal(getattr(log, name).t, getattr(alone, name).t)
+        self.one_line(["begins anew here", "two runs in one log"], self.file(run + begin + run))
+        self.one_line(["node's time goes back from 1.490 s to 0.000 s"], self.file(own(1_000_000, 1_500_000) + own(0, 100_000) + run))
+
     def test_no_log_makes_it_fall_over_or_print_a_nan(self):
         """Bytes of a good log changed at random: a result, a refusal or one line; nothing else."""
         good = bytearray(drive(1, np.eye(3), duration_s=40).text())
