@@ -450,7 +450,9 @@ class World(Judged):
                 out = os.path.join(directory, str(seed))
                 subprocess.run([WORLD, "--memory", "--raw", "--quiet", "--seed", str(seed), "--out", out], check=True, capture_output=True,
                                timeout=900)
-                tool(os.path.join(out, "raw.log"), "--robot", "rover", "--parts", "wheels", "--out", os.path.join(out, "c"), status=0)
+                done = tool(os.path.join(out, "raw.log"), "--robot", "rover", "--parts", "wheels", "--out", os.path.join(out, "c"), status=0)
+                # Each radius alone may be within two sigma of the drawing's; their difference is not.
+                self.assertRegex(done.stdout, r"\.left_radius_m = [\d.]+F,\n +\.right_radius_m = [\d.]+F,")
                 with open(os.path.join(out, "c.json"), encoding="utf-8") as file:
                     numbers = {n["name"]: n for n in json.load(file)["parts"]["wheels"]["numbers"]}
                 for name, truth in self.TRUTH.items():
@@ -531,7 +533,10 @@ class Program(unittest.TestCase):
         part.add("track", track + 0.019, 0.01, "m", "wheels.drive.track_m")
         part.add("bias", [0, 0, 0.021], [0.01, 0.01, 0.01], "rad/s", "imu.gyro_bias_radps", tuple("xyz"))
         self.assertEqual([robot.has(number) for number in part.numbers], [True, True, False])
+        part.add("right", robot.number("right_radius_m") + 1e-4, 1e-4, "m", "wheels.drive.right_radius_m", off=True)
+        self.assertFalse(robot.has(part.number("right")), "alone it is, together with the left one it is not")
         text = calibrate_numbers.snippet([part], robot)
+        self.assertIn("right_radius_m = 0.1001F", text)
         self.assertIn("gyro_bias_radps = {0.0F, 0.0F, 0.021F}", text)
         self.assertNotIn("up_s", text)
         self.assertNotIn("track", text)
