@@ -79,6 +79,9 @@ node_stop() {
   node=
 }
 
+# files_are_in DIR: the last line of a run.
+files_are_in() { echo "files: $1 (the next run to there overwrites them; OUT=DIR: another place)"; }
+
 # bytes_differ LOG: a proof of identity (r5_identity, free_run, host_identity, same_bytes, two_nodes, r5_echo) says in its log that bytes or
 # state CRCs are not what they have to be. That is what it is there to find, so it is never tried again.
 bytes_differ() {

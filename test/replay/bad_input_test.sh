@@ -142,6 +142,11 @@ for robot in $every_robot; do
   done
 done
 
+for robot in $every_robot; do
+  count=$((count + 1))
+  make --no-print-directory help | grep '^  robots: ' | grep -qwF -- "$robot" || { echo "WRONG  make help does not name $robot"; failed=$((failed + 1)); }
+done
+
 # Tools
 refused "replay without a log" 'replay: which log' env -u LOG tools/replay
 refused "replay of no such log" 'replay: nowhere.log: no such file' env LOG=nowhere.log tools/replay
