@@ -17,13 +17,14 @@ import sys
 from scipy.special import bdtr
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.realpath(__file__))))
-CHANCE = 0.99          # of a right filter to pass a bound on a number of seeds
+CHANCE = 0.99          # of passing a bound on a number of seeds where their share is what it is known to be
 ASTRAY_PERCENT = 0.7   # of the way, after a minute without GNSS
 SLIP_SAID_S, SLIP_ERROR_M = 0.5, 0.3
 RECEIVER_M = 1.2       # horizontal RMS of the world's own receiver: 0.85 m on each axis
 MODEL_SHARE = 0.1      # of 3, by which a mean NEES may be off: what the gate cuts off, what the bus rounds
 WITHIN_2 = 2.0         # a median of a few seeds is allowed to be off by this factor
 FIXES_HZ = 5
+TOO_SURE_SHARE = 0.02  # of many seeds, for more than a second: the world is not the filter's model; of a few, none
 # What README says is not met. Seeds of all that are too sure for more than a second, and how far an error goes beyond 3 sigma at the worst.
 KNOWN_TOO_SURE = {"gyro_bias_step": (0.25, 4), "kidnapped": (1, 30), "stale_stamps": (0.25, 3), "future_stamps": (0.25, 3), "clock_jump": (0.125, 3)}
 KNOWN_CONSTRAINT_ALONE = (0.3, 2)
@@ -71,7 +72,7 @@ def slip(case, checks):
     error = fused["largest_error_m"]
     checks.bound("largest error until 10 s after it [m], median", error["median"], 0.02, SLIP_ERROR_M)
     checks.known("the same, worst of all seeds", error["worst"], KNOWN_SLIP_WORST_M)
-    checks.bound("too sure for more than a second [seeds]", fused["too_sure_seeds"], 0, most(seeds, 0.01))
+    checks.bound("too sure for more than a second [seeds]", fused["too_sure_seeds"], 0, int(TOO_SURE_SHARE * seeds))
 
 
 def outage(case, checks):
@@ -83,7 +84,7 @@ def outage(case, checks):
     # A sigma ten times the error would be honest and of no use.
     checks.bound(what + "largest error over 3 sigma, median", fused["error_over_3_sigma"]["median"], 0.1, few)
     if wheels or matched:
-        checks.bound(what + "too sure for more than a second [seeds]", fused["too_sure_seeds"], 0, most(seeds, 0.01))
+        checks.bound(what + "too sure for more than a second [seeds]", fused["too_sure_seeds"], 0, int(TOO_SURE_SHARE * seeds))
     else:
         share, worst = KNOWN_CONSTRAINT_ALONE
         checks.known(what + "too sure [seeds]", fused["too_sure_seeds"], most(seeds, share))
@@ -92,13 +93,14 @@ def outage(case, checks):
 
 def gnss_fault(name, case, checks):
     """Refused, recovered from, and at no time an error that the sigmas deny."""
-    fused, seeds, duration_s = case["fused"], case["seeds"], case["fault_s"]
+    fused, seeds = case["fused"], case["seeds"]
+    start, end = case["fault_times_s"]
     checks.bound(f"{name}: too sure for more than a second [seeds]", fused["too_sure_seeds"], 0, 0)
     # No further off than dead reckoning goes in that time.
     checks.bound(f"{name}: largest error [m], worst", fused["largest_error_m"]["worst"], 0.05, 1 + 0.01 * fused["driven_m"]["median"])
     checks.bound(f"{name}: largest error of the height [m], worst", fused["largest_height_error_m"]["worst"], 0.1, 5)
     checks.bound(f"{name}: RMSE after it [m], median", fused["position_rmse_after_m"]["median"], 0.02, RECEIVER_M)
-    wrong = {"gnss_jump": FIXES_HZ * duration_s, "gnss_ramp": FIXES_HZ * duration_s, "gnss_far": 105}.get(name)
+    wrong = {"gnss_jump": FIXES_HZ * (end - start), "gnss_ramp": FIXES_HZ * (end - start), "gnss_far": 105}.get(name)
     if wrong:  # a ramp is inside the gate at first
         fixes = fused["sensors"]["GnssPosition"]
         checks.bound(f"{name}: fixes refused, of those that were wrong", fixes["rejected_share"] * fixes["compared"] / (wrong * seeds),
@@ -136,7 +138,7 @@ def matched(case, checks):
     for what, one in {"pose": fused, **fused["blocks"]}.items():
         slack = 3 * MODEL_SHARE + one["anees"]["mean_plus_minus"]
         checks.bound(f"matched: NEES of {what}, mean (3)", one["anees"]["mean"], 3 - slack, 3 + slack)
-        checks.known(f"matched: times inside 95 % of the NEES of {what} [%]", 100 * one["anees"]["inside"], 100, 60)
+        checks.known(f"matched: times inside 95 % of the NEES of {what} [%]", 100 * one["anees"]["inside"], 100, 50)
     for name, sensor in fused["sensors"].items():
         low, high = sensor["nis_interval"]
         checks.bound(f"matched: NIS of {name}, mean ({sensor['nis_expected']:g})", sensor["nis_mean"], 0.97 * low, 1.03 * high)
@@ -166,23 +168,16 @@ def rtk(cases, checks):
     checks.bound("rest: RMSE 50 km away over that at the origin", far / near, 0.8, 1.25)
 
 
-def with_times(cases, seconds):
-    for label, case in cases.items():
-        case["fault_s"] = seconds[label.rpartition(", ")[2].partition("@")[0]]
-    return cases
-
-
 def whole_form(out, checks):
     for case in campaign(out, "slip", "--scenario", "slip", "--world", "mismatched", "--seeds", "100").values():
         slip(case, checks)
     for world, seeds in (("mismatched", "50"), ("matched", "12")):
         for case in campaign(out, f"outage_{world}", "--scenario", "outage", "--world", world, "--seeds", seeds).values():
             outage(case, checks)
-    every = campaign(out, "faults", "--fault", "all", "--world", "mismatched", "--seeds", "8")
-    faults(with_times(every, {label.rpartition(", ")[2]: {"gnss_jump": 10}.get(label.rpartition(", ")[2], 30) for label in every}), checks)
+    faults(campaign(out, "faults", "--fault", "all", "--world", "mismatched", "--seeds", "8"), checks)
     for case in campaign(out, "matched", "--scenario", "consistency", "--world", "matched", "--seeds", "100").values():
         matched(case, checks)
-    for case in campaign(out, "mismatched", "--scenario", "consistency", "--world", "mismatched", "--seeds", "30").values():
+    for case in campaign(out, "mismatched", "--world", "mismatched", "--seeds", "30").values():
         mismatched(case, checks)
     rtk(campaign(out, "rtk", "--scenario", "rtk", "--world", "matched", "--seeds", "2"), checks)
 
@@ -192,9 +187,8 @@ def short_form(out, checks):
         slip(case, checks)
     for case in campaign(out, "outage", "--scenario", "outage", "--world", "mismatched", "--seeds", "2").values():
         outage(case, checks)
-    for name, seconds in (("gnss_jump", 5), ("gnss_wrong_height", 10)):
-        cases = campaign(out, name, "--fault", f"{name}@30+{seconds}", "--duration", "60", "--world", "mismatched", "--seeds", "2")
-        faults(with_times(cases, {name: seconds}), checks)
+    for fault in ("gnss_jump@30+5", "gnss_wrong_height@30+10"):
+        faults(campaign(out, fault.partition("@")[0], "--fault", fault, "--duration", "60", "--world", "mismatched", "--seeds", "2"), checks)
 
 
 def main():
