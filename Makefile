@@ -19,8 +19,10 @@ help: ## this list
 	@echo "tetap: state estimation on the robot's own microcontroller"; echo
 	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | while IFS=$$'\t' read -r name text; do printf '  make %-9s %s\n' "$$name" "$$text"; done
 	@echo; echo "  ROBOT=$(ROBOT) BOARD=$(BOARD) BUS=$(BUS) SEED=$(SEED) FAULT= REALTIME= LOG= TRUTH="
+	@echo "  robots: $$(sed -n '/kRobotNames =/,/;/s/.*"\(.*\)".*/\1/p' sim_host/robots.hpp)"
+	@echo "  flash images of: $$(sed -n 's/^foreach(robot \(.*\))$$/\1/p' hal/port/CMakeLists.txt)"
 
-sim: setup programs ## the simulated world over vcan0: table, report, pictures in out/sim (SEED= FAULT= REALTIME=1 BOARD=zynqmp_r5 BUS=memory)
+sim: setup programs ## the simulated world over vcan0: table, report, pictures in out/sim (SEED= FAULT= REALTIME=1 BOARD=zynqmp_r5 BUS=memory OUT=DIR)
 	@tools/sim
 
 test: setup ## every proof on short prefixes, with a table of where the time went
@@ -32,7 +34,7 @@ quick: setup host ## host unit tests only
 proof: setup ## the whole lengths: exhaustive functions, full logs, long runs
 	@tools/prove whole
 
-replay: setup programs ## a recorded log over vcan0: LOG=run.log [TRUTH=run.truth.csv] ROBOT=mrclam|husky|labyrinth|rover [BOARD=] [BUS=memory]
+replay: setup programs ## a recorded log over vcan0: LOG=run.log [TRUTH=run.truth.csv] ROBOT=NAME [BOARD=] [BUS=memory]
 	@tools/replay
 
 firmware: setup ## the flash image: BOARD=zynqmp_r5 ROBOT=rover, with its size table, no heap and stack proved

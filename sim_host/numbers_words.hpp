@@ -26,6 +26,7 @@ namespace tetap::sim {
   add("yaw rate", u.yaw_rate);
   add("yaw rate per yaw rate", u.yaw_rate_per_yaw_rate);
   add("yaw rate per speed", u.yaw_rate_per_speed);
+  add("wheel speed", n.wheels.wheel_speed_noise);
   add("k left", n.wheels.drive.noise_left);
   add("k right", n.wheels.drive.noise_right);
   if (n.gyro.use != 0) add("gyro", n.gyro.noise);

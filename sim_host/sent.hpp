@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which sensors a robot is sent: those that one of its estimators takes. The world has them all; a bus need not.
+// Which sensors a robot is sent: those that one of its estimators takes and its numbers use. The world has them all; a
+// bus need not. A fault of a sensor that is not sent cannot act.
 #pragma once
 
 #include "app/node.hpp"
@@ -17,33 +18,63 @@ concept Takes = requires(E& e, const Payload& payload, base::Micros stamp, const
 };
 
 struct Sent {
-  bool landmarks = false, magnetometer = false, barometer = false;
+  bool imu = false, landmarks = false, magnetometer = false, barometer = false;
   bool inertial = false;  ///< an inertial filter is there: what is a matched world for it is another one
+  friend bool operator==(const Sent&, const Sent&) = default;
 };
 
 template <class... E>
-[[nodiscard]] constexpr Sent sent_to(app::Estimators<E...>) {
-  return {.landmarks = (Takes<E, app::LandmarkSighting> || ...),
-          .magnetometer = (Takes<E, app::MagneticFlux> || ...),
-          .barometer = (Takes<E, app::AirPressure> || ...),
+[[nodiscard]] constexpr Sent sent_to(app::Estimators<E...>, const app::Numbers& n) {
+  // Those that live on an IMU; to the others its gyroscope is one way to know the turn.
+  constexpr bool kNeedsImu =
+      ((E::kKind == can::EstimatorKind::kInertial || E::kKind == can::EstimatorKind::kAttitude) || ...);
+  return {.imu = kNeedsImu || (n.gyro.use != 0 && (Takes<E, app::ImuSample> || ...)),
+          .landmarks = (Takes<E, app::LandmarkSighting> || ...),
+          .magnetometer = n.magnetic.use != 0 && (Takes<E, app::MagneticFlux> || ...),
+          .barometer = n.baro.use != 0 && (Takes<E, app::AirPressure> || ...),
           .inertial = ((E::kKind == can::EstimatorKind::kInertial) || ...)};
 }
 
 /// Throws std::runtime_error when there is no such robot.
 [[nodiscard]] inline Sent sent_to(const std::string& robot) {
   Sent sent;
-  for_robot(robot, [&]<class Estimators>(std::type_identity<Estimators>, const app::Numbers&) {
-    sent = sent_to(Estimators{});
+  for_robot(robot, [&]<class Estimators>(std::type_identity<Estimators>, const app::Numbers& numbers) {
+    sent = sent_to(Estimators{}, numbers);
   });
   return sent;
 }
 
 /// The world as that robot meets it.
 inline void send_only(const Sent& sent, World::Options& world) {
+  if (!sent.imu) world.numbers.imu.rate_hz = 0;
   if (!sent.landmarks) world.numbers.camera.rate_hz = 0, world.course.landmarks.clear();
   world.numbers.magnetometer.rate_hz = sent.magnetometer ? 20 : 0;
   world.numbers.barometer.rate_hz = sent.barometer ? 10 : 0;
   world.inertial = sent.inertial;
+}
+
+/// Names of the faults that act in that world, with a space between each.
+[[nodiscard]] inline std::string faults_that_act(const World::Options& world) {
+  std::string names;
+  for (const FaultInfo& row : fault_table())
+    if (can_act(row.fault, world)) (names += names.empty() ? "" : " ") += row.name;
+  return names;
+}
+
+/// Why one of the world's faults cannot act on that robot; empty where all can.
+[[nodiscard]] inline std::string cannot_act(const World::Options& world, const std::string& robot) {
+  for (const FaultSetting& setting : world.faults) {
+    if (can_act(setting.fault, world)) continue;
+    const FaultInfo& row = info(setting.fault);
+    const char* const lacks = row.falls_on == FallsOn::kImu         ? "IMU"
+                              : row.falls_on == FallsOn::kWheels    ? "wheels"
+                              : row.falls_on == FallsOn::kGnss      ? "GNSS"
+                              : row.falls_on == FallsOn::kLandmarks ? "landmarks"
+                                                                    : "magnetometer";
+    return "fault '" + std::string{row.name} + "': robot " + robot + " has no " + lacks +
+           "; faults that act on it: " + faults_that_act(world);
+  }
+  return "";
 }
 
 }  // namespace tetap::sim

@@ -44,6 +44,7 @@ std::string help() {
           "  --no-pose          the node is not told where it starts\n"
           "  --fault NAME[@START[+DURATION]]   seconds; several with commas:\n") +
       sim::fault_help() +
+      "  --list-faults      names of those that act on the robot, and nothing else\n"
       "  --realtime         at the speed of the world, with Tick frames; else lockstep, as fast as the node can\n"
       "  --window N         lockstep: ticks in flight (default 8)\n"
       "  --emulated         the node runs on an emulated core: be patient\n"
@@ -189,7 +190,10 @@ int main(int argc, char** argv) try {
                  .robot = robot,
                  .log = "simulated world",
                  .quiet = arguments.flag("--quiet")};
+  const bool list = arguments.flag("--list-faults");
   arguments.finish();
+  if (const std::string why = sim::cannot_act(run.world, robot); !why.empty()) throw std::runtime_error(why);
+  if (list) return std::printf("%s\n", sim::faults_that_act(run.world).c_str()), 0;
   if (memory) return sim::with_node_in_process(robot, base, [&](auto& link) { return drive(link, run); });
   hal::SocketCan can(interface);
   return drive(can, run);

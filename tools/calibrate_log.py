@@ -3,6 +3,7 @@
 
 A stamp holds the low 20 bits of a microsecond. It is extended around the node's own time (In_Sync, Est_Epoch) where the log has it, so a log
 that was recorded faster or slower than the world ran is right too; else around the time of reception, whose offset to the stamps is followed.
+A node that ticks by its own clock until a run begins (In_Sync of kind Begin) has said two times: only that of the run with the samples counts.
 Times are seconds since the first sample of any sensor.
 """
 import importlib.machinery
@@ -22,7 +23,7 @@ _LOADER.exec_module(decode)
 STAMP_SPAN = 1 << 20
 DENSE_US = 200_000      # node times closer together than this: a frame between two of them is placed by its order alone
 TOGETHER = 200          # frames of one sample are not further apart than so many frames
-BACK_US = 100_000       # stamps of one sensor may be out of order by so much: sorted and counted
+BACK_US = 100_000       # stamps of one sensor may be out of order by so much: sorted and counted; and so may the node's times
 WANTED = ("In_WheelCounts", "In_WheelSpeed", "In_BodySpeed", "In_GnssLat", "In_GnssLon", "In_GnssAlt", "In_GnssAcc", "In_GnssVelEN",
           "In_GnssVelU", "In_Mag")
 
@@ -71,10 +72,13 @@ def _time_us(text):
 
 
 def _rows(path, dbc, base):
-    """(rows by message name, node times): rows are (order, line, time of reception, payload)."""
+    """(rows by message name, node times, begins): rows and times are (order, line, time of reception, payload or time), begins the rows of
+    In_Sync that set the node's time anew."""
     by_id = {message.offset + base: message for message in dbc.messages}
     rows = {message.name: [] for message in dbc.messages}
-    nodes = []
+    kind = next(signal for message in dbc.messages if message.name == "In_Sync" for signal in message.signals if signal.enum == "SyncKind")
+    begin = next(code for code, word in dbc.tables["SyncKind"].items() if word == "Begin")
+    nodes, begins = [], []
     frames, others = 0, set()
     try:
         with open(path, "rb") as file:
@@ -98,13 +102,33 @@ def _rows(path, dbc, base):
                 log_us = _time_us(time)
                 rows[message.name].append((frames, number, -1 if log_us is None else log_us, word))
                 if message.name in ("In_Sync", "Est_Epoch"):
-                    nodes.append((frames, number, log_us, word & (1 << 48) - 1))
+                    nodes.append((frames, number, log_us, word & (1 << 48) - 1, message.name))
+                    if message.name == "In_Sync" and word >> kind.start & (1 << kind.length) - 1 == begin:
+                        begins.append(nodes[-1])
     except OSError as error:
         raise BadInput(f"{path}: {error.strerror}") from None
     if not frames:
         seen = ", ".join(f"{i:03X}" for i in sorted(others)[:8])
         raise BadInput(f"{path}: no frame of a node with base 0x{base:X}" + (f"; ids in it: {seen} ... (--base)" if seen else ": the log is empty"))
-    return rows, nodes
+    return rows, nodes, begins
+
+
+def _of_one_run(path, nodes, begins, samples):
+    """Of the node's times those of the run that the samples (order in the log, ascending) belong to."""
+    orders = [begin[0] for begin in begins]
+    runs = np.unique(np.searchsorted(orders, samples))  # 0: before the first begin
+    if not begins or not len(runs):
+        return nodes
+    if len(runs) > 1:
+        raise BadInput(f"{path}:{begins[runs[1] - 1][1]}: the node begins anew here, with sensors' samples before and after: two runs in one log, cut it here")
+    run = int(runs[0])
+    first, last = 0 if run == 0 else orders[run - 1], orders[run] if run < len(orders) else np.inf
+    mine = [one for one in nodes if first <= one[0] < last]
+    if run > 0:  # what it said by its old clock may come just after it was told the new one
+        begun = mine[0][3]
+        its = next((k for k, one in enumerate(mine[1:], 1) if begun <= one[3] <= begun + STAMP_SPAN), len(mine))
+        del mine[1:its]
+    return mine
 
 
 class Clock:
@@ -113,12 +137,15 @@ class Clock:
     def __init__(self, path, nodes):
         self.path = path
         self.nodes = nodes
-        for before, after in zip(nodes, nodes[1:]):
-            if after[3] < before[3] - 2_000_000:
+        last = {}
+        for after in nodes:
+            before = last.get(after[4], after)
+            last[after[4]] = after
+            if after[3] < before[3] - BACK_US:
                 raise BadInput(f"{path}:{after[1]}: the node's time goes back from {before[3] / 1e6:.3f} s to {after[3] / 1e6:.3f} s: "
                                "two runs in one log, cut it here")
         if nodes:
-            order, _, log_us, time_us = zip(*nodes)
+            order, _, log_us, time_us, _ = zip(*nodes)
             time_us = np.maximum.accumulate(np.array(time_us, dtype=np.int64))
             self.dense = np.diff(time_us).max(initial=0) <= DENSE_US or None in log_us
             self.key = np.array(order if self.dense else log_us, dtype=np.int64)
@@ -189,11 +216,12 @@ class Log:
             dbc = tetap_dbc.read(dbc_path)
         except tetap_dbc.Refused as refusal:
             raise BadInput(str(refusal)) from None
-        rows, nodes = _rows(path, dbc, base)
+        rows, nodes, begins = _rows(path, dbc, base)
         messages = {message.name: message for message in dbc.messages}
         names = WANTED + tuple(f"In_Imu{imu_instance}{kind}" for kind in ("Gyro", "Accel", "Time"))
         frames = {name: Frames(messages[name], rows[name]) for name in names}
-        clock = Clock(path, nodes)
+        samples = sorted(order for name in names for order in frames[name].order.tolist())
+        clock = Clock(path, _of_one_run(path, nodes, begins, samples))
         wanted, stamps = [], []
 
         def stamped(name, value):

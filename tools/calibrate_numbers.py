@@ -31,6 +31,7 @@ class Number:
     field: str = ""
     labels: tuple = ("",)
     digits: int = 5
+    off: bool = False  # together with its fellow, by more than two sigma, though perhaps not alone: two wheels' radii and their difference
 
     def __post_init__(self):
         self.value, self.sigma = np.atleast_1d(np.asarray(self.value, float)).ravel(), np.atleast_1d(np.asarray(self.sigma, float)).ravel()
@@ -101,6 +102,8 @@ class Robot:
 
     def has(self, number):
         """What it says now is no further off than two of its sigmas, each: nothing to change."""
+        if number.off:
+            return False
         now = self.now(number.field) if number.field else None
         return now is not None and len(now) == len(number.value) and bool((np.abs(number.value - now) <= 2 * number.sigma).all())
 

@@ -49,14 +49,19 @@ def _numbers(part, fit, run, how):
     elif sides and scaled and known:
         # r_left = r0 (1 + mean)(1 + difference/2): difference = (left - right) / mean on top of what is there now
         sign = {"left": 0.5, "right": -0.5}
+        # What both radii share is known worse than what they differ by: each may be within two sigma and their difference far beyond.
+        off = bool(run.nominal_known and abs(difference[0]) > 2 * difference[1])
+        if off:
+            part.notes.append(f"the wheels differ by {abs(difference[0] / difference[1]):.1f} sigma from what the numbers now say: "
+                              "left and right are to be changed together")
         for k, side in enumerate(("left", "right")):
             factor = fit.derived(lambda q, side=side: (1 + q["mean"]) * (1 + sign[side] * q["difference"]))
             if run.kind == "counts" and run.per_turn:
-                part.add(f"{side} wheel radius", run.radius[k] * factor[0], run.radius[k] * factor[1], "m", f"wheels.drive.{side}_radius_m")
+                part.add(f"{side} wheel radius", run.radius[k] * factor[0], run.radius[k] * factor[1], "m", f"wheels.drive.{side}_radius_m", off=off)
             elif run.kind == "counts":
                 part.add(f"{side} wheel, metres per count", run.step[k] * factor[0], run.step[k] * factor[1], "m")
             else:
-                part.add(f"{side} wheel, true speed over stated speed", *factor, "1", f"wheels.{side}_speed_scale")
+                part.add(f"{side} wheel, true speed over stated speed", *factor, "1", f"wheels.{side}_speed_scale", off=off)
         base = run.step if run.kind == "counts" else np.ones(2)
         total = fit.derived(lambda q: 2 * (base[0] * (1 + q["difference"] / 2) - base[1] * (1 - q["difference"] / 2))
                             / (base[0] * (1 + q["difference"] / 2) + base[1] * (1 - q["difference"] / 2)))

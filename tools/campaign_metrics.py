@@ -227,6 +227,7 @@ def averaged(case, runs):
                                                 for one in mine]))
         result[name] = entry
     if case.get("fault_times"):
+        result["fault_times_s"] = list(case["fault_times"])
         words = sorted({word for one in runs for word in one["said"]})
         result["said"] = {word: {"seeds": sum(word in one["said"] for one in runs),
                                  "after_s": spread([one["said"].get(word) for one in runs])} for word in words}

@@ -6,6 +6,7 @@ published one (1-sigma and correlations of Est<k>_Std, the 1-sigma of Est<k>_Sta
 attitude and biases are published without correlations: their NEES is the sum of squared errors in units of their own sigmas, whose mean is the
 number of them all the same.
 """
+import copy
 import json
 import os
 import warnings
@@ -90,6 +91,14 @@ def faults(run):
     """The faults that the world had, in the order given."""
     text = run.about.get("fault") or ""
     return [Fault(one) for one in text.split(",") if one.strip()] if isinstance(text, str) and text != "none" else []
+
+
+def start_s(run):
+    """When a simulated world's run began on the node's clock; 0 where the log has no other time than the node's."""
+    if "seed" not in run.about:
+        return 0.0
+    first = int(np.argmin(run.estimates["epoch"]))
+    return float(run.estimates["time_s"][first] - run.estimates["epoch"][first] * TICK_S)
 
 
 def fault_spans(run):
@@ -199,6 +208,14 @@ class Run:
             return read_table(path, columns)
         return {column: np.empty(0) for column in columns}
 
+    def since(self, start):
+        """The same, with times counted from `start` [s]."""
+        later = copy.copy(self)
+        for name in ("estimates", "innovations", "status", "states", "sensors"):
+            table = getattr(self, name)
+            setattr(later, name, {**table, "time_s": table["time_s"] - start})
+        return later
+
     def of(self, estimator):
         """Rows of one estimator."""
         mask = self.estimates["estimator"] == estimator
@@ -282,6 +299,12 @@ class Truth:
         beside = path[:-len(".truth.csv")] + ".json" if path.endswith(".truth.csv") else ""
         self.about = read_json(beside) if beside and os.path.exists(beside) else {}
         self.is_reference = self.about.get("truth") == "gps track"
+
+    def since(self, start):
+        """The same, with times counted from `start` [s]."""
+        later = copy.copy(self)
+        later.time_s = self.time_s - start
+        return later
 
     def of(self, rows):
         """x, y, yaw for rows of estimates."""

@@ -51,6 +51,9 @@ node_start() {
 # player_options BOARD: how a player has to treat a node on that board. An emulated controller has 64 receive buffers and no time of its own.
 player_options() { [ "$1" = linux ] || echo "--window 1 --emulated"; }
 
+# node_said: what it printed, without the line that says what runs.
+node_said() { grep -vE '^(qemu-r5: running |tetap-node: robot [a-z_]+ on )' "$node_log"; }
+
 # with_node COMMAND...: a player's run and its status; when the node ends first, so does the player, and what the node said is the error.
 with_node() {
   local status ended said
@@ -60,7 +63,7 @@ with_node() {
   wait -n -p ended "$node" "$player"
   status=$?
   [ "$ended" = "$node" ] || { player=; return $status; }
-  said=$(grep -v '^qemu-r5: running ' "$node_log")
+  said=$(node_said)
   node_stop 0
   sed "s/^/node ended (status $status): /" <<<"${said:-it said nothing}" >&2
   return 1
@@ -71,10 +74,13 @@ node_stop() {
   kill -TERM "$node" ${player:+"$player"} 2>/dev/null
   wait "$node" ${player:+"$player"} 2>/dev/null
   player=
-  [ "${1:-0}" = 0 ] || sed 's/^/node: /' "$node_log" >&2
+  [ "${1:-0}" = 0 ] || node_said | sed 's/^/node: /' >&2
   rm -f "$node_log"
   node=
 }
+
+# files_are_in DIR: the last line of a run.
+files_are_in() { echo "files: $1 (the next run to there overwrites them; OUT=DIR: another place)"; }
 
 # bytes_differ LOG: a proof of identity (r5_identity, free_run, host_identity, same_bytes, two_nodes, r5_echo) says in its log that bytes or
 # state CRCs are not what they have to be. That is what it is there to find, so it is never tried again.

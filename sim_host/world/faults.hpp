@@ -40,8 +40,12 @@ enum class Fault : std::uint8_t {
   kMovingStart,
 };
 
+/// The sensor a fault falls on: without it, the fault is none.
+enum class FallsOn : std::uint8_t { kAny, kImu, kWheels, kGnss, kLandmarks, kMagnetometer };
+
 struct FaultInfo {
   Fault fault;
+  FallsOn falls_on;
   std::string_view name;
   double start_s;     ///< unless the command line says otherwise
   double duration_s;  ///< 0: an instant

@@ -165,4 +165,23 @@ void World::advance_to(base::Micros t, std::vector<Measurement>& arrived) {
   }
 }
 
+bool can_act(Fault fault, const World::Options& options) {
+  const Numbers& n = options.numbers;
+  switch (info(fault).falls_on) {
+    case FallsOn::kAny:
+      return true;
+    case FallsOn::kImu:
+      return n.imu.rate_hz > 0;
+    case FallsOn::kWheels:
+      return n.wheels.rate_hz > 0;
+    case FallsOn::kGnss:
+      return n.gnss.rate_hz > 0;
+    case FallsOn::kLandmarks:
+      return n.camera.rate_hz > 0 && !options.course.landmarks.empty();
+    case FallsOn::kMagnetometer:
+      return n.magnetometer.rate_hz > 0;
+  }
+  return false;
+}
+
 }  // namespace tetap::sim

@@ -93,4 +93,7 @@ class World {
   std::vector<Pending> pending_;
 };
 
+/// Whether the sensor that the fault falls on is there.
+[[nodiscard]] bool can_act(Fault fault, const World::Options& options);
+
 }  // namespace tetap::sim

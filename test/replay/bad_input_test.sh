@@ -58,6 +58,9 @@ on_the_bus() { # inside a private vcan0
     LOG="$work/good.log" ROBOT=rover BOARD=zynqmp_r5 OUT="$work/out" PLAY=--quiet tools/replay --inside
   refused "a node that ends at once (sim)" 'node ended .status 2.: qemu-r5: .*nowhere.elf: no such file' timeout 12 env TETAP_IMAGE="$work/nowhere.elf" \
     ROBOT=rover BOARD=zynqmp_r5 OUT="$work/out" WORLD=--quiet tools/sim --inside
+  # What is wrong with a log is no fault of the node, and the line it began with is no part of it.
+  log_with rubbish
+  refused "a broken log to a node on the bus" "tetap-play: .*bad.log:3: .*'rubbish'" env LOG="$work/bad.log" ROBOT=mrclam BOARD=linux OUT="$work/out" tools/replay --inside
 }
 
 if [ "${1:-}" = --inside ]; then
@@ -139,6 +142,11 @@ for robot in $every_robot; do
   done
 done
 
+for robot in $every_robot; do
+  count=$((count + 1))
+  make --no-print-directory help | grep '^  robots: ' | grep -qwF -- "$robot" || { echo "WRONG  make help does not name $robot"; failed=$((failed + 1)); }
+done
+
 # Tools
 refused "replay without a log" 'replay: which log' env -u LOG tools/replay
 refused "replay of no such log" 'replay: nowhere.log: no such file' env LOG=nowhere.log tools/replay
@@ -165,6 +173,13 @@ done
 refused "replay on no such board" "no board 'arduino'" env LOG="$work/good.log" BOARD=arduino OUT="$work/out" tools/replay
 refused "sim on no such board" "no board 'arduino'" env BOARD=arduino OUT="$work/out" tools/sim
 refused "sim with an unknown fault" 'meteor' env BUS=memory FAULT=meteor OUT="$work/out" tools/sim
+refused "sim with an unknown fault over a bus" "fault 'meteor'" timeout 20 env FAULT=meteor OUT="$work/out" tools/sim
+refused "sim with a fault of a sensor it has not" "fault 'mag_disturbance': robot rover has no magnetometer; faults that act on it: gnss_jump" \
+  timeout 20 env FAULT=gnss_jump,mag_disturbance OUT="$work/out" tools/sim
+refused "sim with a fault of landmarks it has not" "fault 'landmark_outlier': robot iris has no landmarks; .* mag_disturbance" \
+  timeout 20 env ROBOT=iris FAULT=landmark_outlier@20+5 OUT="$work/out" tools/sim
+refused "a world with a fault of wheels it has not" "fault 'wheel_spin': robot rover has no wheels" \
+  "$programs/tetap-world" --memory --no-wheels --fault wheel_spin --out "$work/out"
 refused "firmware for no such board" "no board 'arduino'; there are: zynqmp_r5" env BOARD=arduino tools/firmware
 refused "firmware for no such robot" "no image of robot 'tank'; there are: .*mrclam" env BOARD=zynqmp_r5 ROBOT=tank tools/firmware
 # An image that is over its budget, or allocates, is no firmware: in a tree whose tools say yes, but for one.

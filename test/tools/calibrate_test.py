@@ -450,7 +450,9 @@ class World(Judged):
                 out = os.path.join(directory, str(seed))
                 subprocess.run([WORLD, "--memory", "--raw", "--quiet", "--seed", str(seed), "--out", out], check=True, capture_output=True,
                                timeout=900)
-                tool(os.path.join(out, "raw.log"), "--robot", "rover", "--parts", "wheels", "--out", os.path.join(out, "c"), status=0)
+                done = tool(os.path.join(out, "raw.log"), "--robot", "rover", "--parts", "wheels", "--out", os.path.join(out, "c"), status=0)
+                # Each radius alone may be within two sigma of the drawing's; their difference is not.
+                self.assertRegex(done.stdout, r"\.left_radius_m = [\d.]+F,\n +\.right_radius_m = [\d.]+F,")
                 with open(os.path.join(out, "c.json"), encoding="utf-8") as file:
                     numbers = {n["name"]: n for n in json.load(file)["parts"]["wheels"]["numbers"]}
                 for name, truth in self.TRUTH.items():
@@ -531,7 +533,10 @@ class Program(unittest.TestCase):
         part.add("track", track + 0.019, 0.01, "m", "wheels.drive.track_m")
         part.add("bias", [0, 0, 0.021], [0.01, 0.01, 0.01], "rad/s", "imu.gyro_bias_radps", tuple("xyz"))
         self.assertEqual([robot.has(number) for number in part.numbers], [True, True, False])
+        part.add("right", robot.number("right_radius_m") + 1e-4, 1e-4, "m", "wheels.drive.right_radius_m", off=True)
+        self.assertFalse(robot.has(part.number("right")), "alone it is, together with the left one it is not")
         text = calibrate_numbers.snippet([part], robot)
+        self.assertIn("right_radius_m = 0.1001F", text)
         self.assertIn("gyro_bias_radps = {0.0F, 0.0F, 0.021F}", text)
         self.assertNotIn("up_s", text)
         self.assertNotIn("track", text)
@@ -589,6 +594,25 @@ class Program(unittest.TestCase):
         for name in ("imu", "wheels", "gnss", "velocity"):
             np.testing.assert_array_equal(getattr(slow, name).t, getattr(fast, name).t)
         self.assertAlmostEqual(fast.duration_s, 60.0, delta=0.05)
+
+    def test_what_the_node_said_by_its_own_clock_before_the_run_began_does_not_place_samples(self):
+        """A recording on a bus begins with a node that ticks by itself; its clock is not the run's."""
+        times = np.arange(1_010_000, 41_000_000, 10_000)
+        made = drive(3, np.eye(3), duration_s=40)
+        made.log.add("In_Sync", times, Time=times, Kind=1)
+        run = made.text()
+        alone = calibrate_log.Log(self.file(run), bus_writer.DEFAULT_DBC, 0x300)
+        begin = b"(0.999000) can0 300#40420F0000000003\n"
+
+        def own(from_us, to_us):
+            return b"".join(b"(0.5) can0 320#" + int(t).to_bytes(6, "little").hex().upper().encode() + b"0000\n" for t in range(from_us, to_us, 10_000))
+
+        for idle_us in (1_500_000, 2_600_000, 60_000_000):
+            log = calibrate_log.Log(self.file(own(idle_us - 500_000, idle_us) + begin + own(idle_us, idle_us + 10_000) + run), bus_writer.DEFAULT_DBC, 0x300)
+            for name in ("imu", "wheels", "gnss", "velocity"):
+                np.testing.assert_array_equal(getattr(log, name).t, getattr(alone, name).t)
+        self.one_line(["begins anew here", "two runs in one log"], self.file(run + begin + run))
+        self.one_line(["node's time goes back from 1.490 s to 0.000 s"], self.file(own(1_000_000, 1_500_000) + own(0, 100_000) + run))
 
     def test_no_log_makes_it_fall_over_or_print_a_nan(self):
         """Bytes of a good log changed at random: a result, a refusal or one line; nothing else."""

@@ -195,6 +195,12 @@ class WithFiles(unittest.TestCase):
         self.assertGreater(case["odometry"]["position_rmse_after_m"]["median"], 0.5)  # which nothing brings back
 
     @unittest.skipUnless(os.access(os.path.join(PROGRAMS, "tetap-world"), os.X_OK), "tetap-world is not built")
+    def test_all_faults_are_those_of_sensors_that_the_robot_has(self):
+        known = set(campaign.fault_table())
+        self.assertEqual(known - set(campaign.faults_of("rover")), {"landmark_wrong_id", "landmark_outlier", "mag_disturbance"})
+        self.assertEqual(known - set(campaign.faults_of("iris")), {"landmark_wrong_id", "landmark_outlier"})
+
+    @unittest.skipUnless(os.access(os.path.join(PROGRAMS, "tetap-world"), os.X_OK), "tetap-world is not built")
     def test_bad_input_is_one_line_and_a_status(self):
         for arguments, words in ((["--fault", "nope"], "known are: gnss_jump"), (["--seeds", "0"], "must be 1 or more"),
                                  (["--fault", "gnss_jump", "--duration", "20"], "longer --duration"),

@@ -8,6 +8,7 @@ import tempfile
 import unittest
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.realpath(__file__))))
+WORLD = os.path.join(os.environ.get("TETAP_PROGRAMS", os.path.join(ROOT, "build/host/sim_host")), "tetap-world")
 
 
 def readme():
@@ -33,6 +34,18 @@ class Readme(unittest.TestCase):
         self.assertGreater(len(links), 5)
         for link in links:
             self.assertTrue(os.path.exists(os.path.join(ROOT, link)), link)
+
+    @unittest.skipUnless(os.access(WORLD, os.X_OK), "tetap-world is not built")
+    def test_the_faults_it_counts_are_those_there_are(self):
+        def said(*options):
+            return subprocess.run([WORLD, *options], check=True, capture_output=True, text=True).stdout
+
+        every = re.findall(r"^  ([a-z_]+) +@", said("--help"), re.M)
+        self.assertEqual(int(re.search(r"--help` lists (\d+) with their times", readme())[1]), len(every))
+        section = re.search(r"\n### What it does not do yet\n(.*?)\n## ", readme(), re.S)[1]
+        others = re.search(r"in the other (\d+) faults that act on a rover ", section)[1]
+        named = {fault for bullet in re.findall(r"^\* .*", section, re.M) for fault in every if f"`{fault}`" in bullet}
+        self.assertEqual(int(others), len(set(said("--list-faults").split()) - named))
 
 
 if __name__ == "__main__":

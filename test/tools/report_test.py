@@ -298,6 +298,27 @@ class Faults(Case):
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertIn("fault: clock_jump at 1 s for 1.5 s, kidnapped at 0.5 s, gnss_jump\n", result.stdout)
 
+    def test_pictures_and_words_count_from_the_start_of_the_worlds_run_as_its_faults_do(self):
+        """The node's clock begins the run at 1 s: a fault at 1 s is one of its second 2."""
+        time_s, zero = 1 + 0.01 * np.arange(300), np.zeros(300)  # epoch n at 1 s + n ticks
+        truth = self.truth(time_s, zero, zero, zero)
+        self.estimates(time_s, zero, zero, zero, std=[(0.1, 0.1, 0.1)] * 300, corr=[(0, 0, 0)] * 300)
+        epochs = np.arange(10, 300, 10)
+        self.write_rows("status.csv", metrics.STATUS, [[n, 1 + 0.01 * n, 4 if 100 <= n < 200 else 3, 1, 2 if 100 <= n < 200 else 0, 0, 0] for n in epochs])
+        about = {**RUN, "fault": "gnss_jump@1+1"}
+        self.write("run.json", json.dumps(about))
+        run = metrics.Run(self.directory)
+        shown = run.since(metrics.start_s(run))
+        self.assertEqual(metrics.start_s(run), 1.0)
+        np.testing.assert_allclose(metrics.fault_spans(shown)[0][1:], (1.0, 2.0), atol=1e-9)
+        np.testing.assert_array_equal(shown.of(1)["x_m"], run.of(1)["x_m"])
+        self.assertEqual(self.report("--truth", truth).returncode, 0)
+        self.assertIn('<td>1.0 s</td><td class="text">fault Rejecting, for 1.0 s</td>', text_of(self.path("report.html")))
+        # A log that no world was asked for has the node's time only.
+        del about["seed"]
+        self.write("run.json", json.dumps(about))
+        self.assertEqual(metrics.start_s(metrics.Run(self.directory)), 0.0)
+
     def test_no_fault_is_no_line(self):
         zero = np.zeros(20)
         for none in ("", "none"):

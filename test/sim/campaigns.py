@@ -1,0 +1,209 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: Apache-2.0
+"""The simulated campaigns of README, held: campaigns.py OUT [--whole].
+
+Runs tools/campaign as README names it and prints each figure beside its bounds. The bounds are what is required of the filter (a share of the
+way, a time, its own 3 sigma) or what chance leaves of it with so many seeds, never the figure that came out last time; two-sided, because an
+error far below what its sensors allow, or a sigma far above its error, is as wrong as the opposite. Where a requirement is known not to be met
+the line begins with "known:" and its bound is that it does not get worse.
+
+Short: a few seeds of what is quickest to go wrong. --whole: seeds enough for the shares. Needs tetap-world ($TETAP_PROGRAMS, or builds it)."""
+import argparse
+import json
+import os
+import subprocess
+import sys
+
+from scipy.special import bdtr
+
+ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.realpath(__file__))))
+CHANCE = 0.99          # of passing a bound on a number of seeds where their share is what it is known to be
+ASTRAY_PERCENT = 0.7   # of the way, after a minute without GNSS
+SLIP_SAID_S, SLIP_ERROR_M = 0.5, 0.3
+RECEIVER_M = 1.2       # horizontal RMS of the world's own receiver: 0.85 m on each axis
+MODEL_SHARE = 0.1      # of 3, by which a mean NEES may be off: what the gate cuts off, what the bus rounds
+WITHIN_2 = 2.0         # a median of a few seeds is allowed to be off by this factor
+FIXES_HZ = 5
+TOO_SURE_SHARE = 0.02  # of many seeds, for more than a second: the world is not the filter's model; of a few, none
+# What README says is not met. Seeds of all that are too sure for more than a second, and how far an error goes beyond 3 sigma at the worst.
+KNOWN_TOO_SURE = {"gyro_bias_step": (0.25, 4), "kidnapped": (1, 30), "stale_stamps": (0.25, 3), "future_stamps": (0.25, 3), "clock_jump": (0.125, 3)}
+KNOWN_CONSTRAINT_ALONE = (0.3, 2)
+KNOWN_SLIP_WORST_M = 0.6
+# A modest filter: half of what the mean NEES of each block was in the mismatched world.
+KNOWN_MODEST = {"position": 1.1, "velocity": 0.5, "attitude": 0.3, "gyro bias": 0.15, "acc bias": 0.8}
+
+
+def most(seeds, share):
+    """The largest number of seeds that chance leaves where each is one with that probability."""
+    return next(k for k in range(seeds + 1) if bdtr(k, seeds, share) >= CHANCE)
+
+
+class Checks:
+    def __init__(self):
+        self.wrong = []
+
+    def bound(self, what, value, low, high, known=False):
+        ok = value is not None and low <= value <= high
+        shown = "-" if value is None else f"{value:.3f}"
+        print(f"  {'known: ' if known else ''}{what:{54 if known else 61}} {shown:>8}   {low:.3g} .. {high:.3g}   {'ok' if ok else 'WRONG'}", flush=True)
+        if not ok:
+            self.wrong.append(what)
+
+    def known(self, what, value, high, low=0):
+        self.bound(what, value, low, high, known=True)
+
+
+def campaign(out, name, *options):
+    """The cases of one campaign by label."""
+    folder = os.path.join(out, name)
+    done = subprocess.run([os.path.join(ROOT, "tools/campaign"), *options, "--out", folder], capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        sys.exit(f"tools/campaign {' '.join(options)} failed:\n{done.stderr}")
+    print(f"tools/campaign {' '.join(options)}")
+    with open(os.path.join(folder, "campaign.json"), encoding="utf-8") as file:
+        return {case["label"]: case for case in json.load(file)["cases"]}
+
+
+def slip(case, checks):
+    fused, seeds = case["fused"], case["seeds"]
+    said = case["said"].get("WheelSlip")
+    checks.bound("one wheel spins: seeds in which WheelSlip is said", said and said["seeds"], seeds, seeds)
+    checks.bound("said after [s], worst", said and said["after_s"]["worst"], 0, SLIP_SAID_S)
+    error = fused["largest_error_m"]
+    checks.bound("largest error until 10 s after it [m], median", error["median"], 0.02, SLIP_ERROR_M)
+    checks.known("the same, worst of all seeds", error["worst"], KNOWN_SLIP_WORST_M)
+    checks.bound("too sure for more than a second [seeds]", fused["too_sure_seeds"], 0, int(TOO_SURE_SHARE * seeds))
+
+
+def outage(case, checks):
+    fused, seeds, few = case["fused"], case["seeds"], WITHIN_2 if case["seeds"] < 10 else 1
+    wheels, matched = "no wheels" not in case["label"], case["world"] == "matched"
+    what = f"{case['world']}, {'with wheels' if wheels else 'constraint alone'}: "
+    if wheels:
+        checks.bound(what + "astray at its end [% of the way], median", fused["astray_percent"]["median"], 0.02, few * ASTRAY_PERCENT)
+    # A sigma ten times the error would be honest and of no use.
+    checks.bound(what + "largest error over 3 sigma, median", fused["error_over_3_sigma"]["median"], 0.1, few)
+    if wheels or matched:
+        checks.bound(what + "too sure for more than a second [seeds]", fused["too_sure_seeds"], 0, int(TOO_SURE_SHARE * seeds))
+    else:
+        share, worst = KNOWN_CONSTRAINT_ALONE
+        checks.known(what + "too sure [seeds]", fused["too_sure_seeds"], most(seeds, share))
+        checks.known(what + "error over 3 sigma, worst", fused["error_over_3_sigma"]["worst"], worst)
+
+
+def gnss_fault(name, case, checks):
+    """Refused, recovered from, and at no time an error that the sigmas deny."""
+    fused, seeds = case["fused"], case["seeds"]
+    start, end = case["fault_times_s"]
+    checks.bound(f"{name}: too sure for more than a second [seeds]", fused["too_sure_seeds"], 0, 0)
+    # No further off than dead reckoning goes in that time.
+    checks.bound(f"{name}: largest error [m], worst", fused["largest_error_m"]["worst"], 0.05, 1 + 0.01 * fused["driven_m"]["median"])
+    checks.bound(f"{name}: largest error of the height [m], worst", fused["largest_height_error_m"]["worst"], 0.1, 5)
+    checks.bound(f"{name}: RMSE after it [m], median", fused["position_rmse_after_m"]["median"], 0.02, RECEIVER_M)
+    wrong = {"gnss_jump": FIXES_HZ * (end - start), "gnss_ramp": FIXES_HZ * (end - start), "gnss_far": 105}.get(name)
+    if wrong:  # a ramp is inside the gate at first
+        fixes = fused["sensors"]["GnssPosition"]
+        checks.bound(f"{name}: fixes refused, of those that were wrong", fixes["rejected_share"] * fixes["compared"] / (wrong * seeds),
+                     0.5 if name == "gnss_ramp" else 0.9, 3)
+
+
+def other_fault(name, case, plain, checks):
+    fused, seeds = case["fused"], case["seeds"]
+    if name in KNOWN_TOO_SURE:
+        share, worst = KNOWN_TOO_SURE[name]
+        checks.known(f"{name}: too sure for more than a second [seeds]", fused["too_sure_seeds"], most(seeds, share))
+        checks.known(f"{name}: error over 3 sigma, worst", fused["error_over_3_sigma"]["worst"], worst)
+        return
+    checks.bound(f"{name}: too sure for more than a second [seeds]", fused["too_sure_seeds"], 0, 0)
+    if name == "moving_start":  # nothing before it to come back to
+        checks.bound(f"{name}: RMSE after it [m], median", fused["position_rmse_after_m"]["median"], 0.02, RECEIVER_M)
+        return
+    without = plain["fused"]["position_rmse_after_m"]["median"]
+    checks.bound(f"{name}: RMSE after it over that without it, median", fused["position_rmse_after_m"]["median"] / without, 0.5, 2)
+
+
+def faults(cases, checks):
+    plain = next((case for label, case in cases.items() if label.endswith(", none")), None)
+    for label, case in cases.items():
+        name = label.rpartition(", ")[2].partition("@")[0]
+        if name.startswith("gnss_"):
+            gnss_fault(name, case, checks)
+        elif name != "none":
+            other_fault(name, case, plain, checks)
+
+
+def matched(case, checks):
+    """The filter's model is the world's: mean NEES 3 for the pose and every block, within what the seeds leave of it; NIS of every sensor."""
+    fused = case["fused"]
+    for what, one in {"pose": fused, **fused["blocks"]}.items():
+        slack = 3 * MODEL_SHARE + one["anees"]["mean_plus_minus"]
+        checks.bound(f"matched: NEES of {what}, mean (3)", one["anees"]["mean"], 3 - slack, 3 + slack)
+        checks.known(f"matched: times inside 95 % of the NEES of {what} [%]", 100 * one["anees"]["inside"], 100, 50)
+    for name, sensor in fused["sensors"].items():
+        low, high = sensor["nis_interval"]
+        checks.bound(f"matched: NIS of {name}, mean ({sensor['nis_expected']:g})", sensor["nis_mean"], 0.97 * low, 1.03 * high)
+    checks.bound("matched: covariances that are none", fused["covariances_not_usable"], 0, 0)
+
+
+def mismatched(case, checks):
+    """Never too sure on the whole; too modest is known."""
+    fused = case["fused"]
+    for what, one in fused["blocks"].items():
+        checks.known(f"mismatched: NEES of {what}, mean (3)", one["anees"]["mean"], 3 * (1 + MODEL_SHARE) + one["anees"]["mean_plus_minus"], KNOWN_MODEST[what])
+    checks.bound("mismatched: times too sure of the pose [%]", 100 * fused["anees"]["above"], 0, 5)
+    checks.bound("mismatched: covariances that are none", fused["covariances_not_usable"], 0, 0)
+
+
+def rtk(cases, checks):
+    """An hour at rest: neither drift nor a covariance that is none, and 50 km from the origin the same."""
+    for label, case in cases.items():
+        fused, where = case["fused"], label.partition(", ")[2]
+        checks.bound(f"rest, {where}: covariances that are none", fused["covariances_not_usable"], 0, 0)
+        checks.bound(f"rest, {where}: position RMSE [mm], worst", 1e3 * fused["position_rmse_m"]["worst"], 0.1, 5)  # of fixes of 10 mm
+        checks.bound(f"rest, {where}: heading RMSE over that of the start, worst", fused["heading_rmse_deg"]["worst"] / 1.15, 0, 3)
+        for block, one in fused["blocks"].items():
+            low, high = one["anees"]["interval"]  # errors last the hour: one draw a seed
+            checks.bound(f"rest, {where}: NEES of {block}, mean (3)", one["anees"]["mean"], low / 2, high)
+    near, far = (case["fused"]["position_rmse_m"]["median"] for case in cases.values())
+    checks.bound("rest: RMSE 50 km away over that at the origin", far / near, 0.8, 1.25)
+
+
+def whole_form(out, checks):
+    for case in campaign(out, "slip", "--scenario", "slip", "--world", "mismatched", "--seeds", "100").values():
+        slip(case, checks)
+    for world, seeds in (("mismatched", "50"), ("matched", "12")):
+        for case in campaign(out, f"outage_{world}", "--scenario", "outage", "--world", world, "--seeds", seeds).values():
+            outage(case, checks)
+    faults(campaign(out, "faults", "--fault", "all", "--world", "mismatched", "--seeds", "8"), checks)
+    for case in campaign(out, "matched", "--scenario", "consistency", "--world", "matched", "--seeds", "100").values():
+        matched(case, checks)
+    for case in campaign(out, "mismatched", "--world", "mismatched", "--seeds", "30").values():
+        mismatched(case, checks)
+    rtk(campaign(out, "rtk", "--scenario", "rtk", "--world", "matched", "--seeds", "2"), checks)
+
+
+def short_form(out, checks):
+    for case in campaign(out, "slip", "--scenario", "slip", "--world", "mismatched", "--seeds", "4", "--duration", "90").values():
+        slip(case, checks)
+    for case in campaign(out, "outage", "--scenario", "outage", "--world", "mismatched", "--seeds", "2").values():
+        outage(case, checks)
+    for fault in ("gnss_jump@30+5", "gnss_wrong_height@30+10"):
+        faults(campaign(out, fault.partition("@")[0], "--fault", fault, "--duration", "60", "--world", "mismatched", "--seeds", "2"), checks)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("out", metavar="OUT", help="for the campaigns' figures, a folder each")
+    parser.add_argument("--whole", action="store_true", help="with seeds enough for shares (ten minutes and more)")
+    arguments = parser.parse_args()
+    if "TETAP_PROGRAMS" not in os.environ:  # once, not for every campaign
+        subprocess.run([os.path.join(ROOT, "tools/build"), "host:tetap-world"], check=True)
+        os.environ["TETAP_PROGRAMS"] = os.path.join(ROOT, "build/host/sim_host")
+    checks = Checks()
+    (whole_form if arguments.whole else short_form)(arguments.out, checks)
+    print(f"wrong: {', '.join(checks.wrong)}" if checks.wrong else "all within bounds")
+    sys.exit(1 if checks.wrong else 0)
+
+
+if __name__ == "__main__":
+    main()
