@@ -26,7 +26,7 @@ WITHIN_2 = 2.0         # a median of a few seeds is allowed to be off by this fa
 FIXES_HZ = 5
 TOO_SURE_SHARE = 0.02  # of many seeds, for more than a second: the world is not the filter's model; of a few, none
 # What README says is not met. Seeds of all that are too sure for more than a second, and how far an error goes beyond 3 sigma at the worst.
-KNOWN_TOO_SURE = {"gyro_bias_step": (0.25, 4), "kidnapped": (1, 30), "stale_stamps": (0.25, 3), "future_stamps": (0.25, 3), "clock_jump": (0.125, 3)}
+KNOWN_TOO_SURE = {"gyro_bias_step": (1, 5), "kidnapped": (1, 30), "stale_stamps": (0.25, 3), "future_stamps": (0.25, 3), "clock_jump": (0.125, 3)}
 KNOWN_CONSTRAINT_ALONE = (0.3, 2)
 KNOWN_SLIP_WORST_M = 0.6
 # A modest filter: half of what the mean NEES of each block was in the mismatched world.

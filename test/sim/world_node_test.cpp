@@ -119,6 +119,53 @@ INSTANTIATE_TEST_SUITE_P(Robots, Order,
                                            Robot{"rover_landmarks", robot::rover_landmarks::numbers, false}),
                          [](const auto& which) { return std::string(which.param.name); });
 
+// An IMU at 200 Hz, a window of half a second: what the receiver said 480 ms ago is fused at its own time, so nothing
+// of the estimate tells when it came.
+TEST(Late, AFixOfAlmostHalfASecondAgoLeavesTheBytesOfOneOnTime) {
+  World::Options options;
+  options.numbers.imu.rate_hz = 200;
+  options.numbers = without_latency(options.numbers);
+  app::Numbers numbers = robot::rover::numbers;
+  numbers.loop.window_us = 500'000;
+  const std::vector<Epoch> on_time = made(options, 4, 40);
+  std::vector<Epoch> late = on_time;
+  const auto of_gnss = [](const base::CanFrame& frame) {
+    const auto offset = frame.id - 0x300;
+    return offset >= can::offset_of<can::InGnssLat>(0) && offset <= can::offset_of<can::InGnssVelU>(0);
+  };
+  constexpr std::size_t kLate = 48;
+  std::size_t moved = 0;
+  for (Epoch& epoch : late) std::erase_if(epoch.inputs, of_gnss);
+  for (std::size_t k = 0; k < on_time.size(); ++k)
+    for (const base::CanFrame& frame : on_time[k].inputs)
+      if (of_gnss(frame) && k + kLate < late.size()) late[k + kLate].inputs.push_back(frame), ++moved;
+  EXPECT_GT(moved, 500U);
+  const auto said = [&](const std::vector<Epoch>& epochs) {
+    std::vector<base::CanFrame> all;
+    const auto node = std::make_unique<app::Node<robot::rover::Estimators, 192>>(numbers, app::Version{});
+    std::size_t short_windows = 0;
+    for (const Epoch& epoch : epochs) {
+      if (epoch.tick.begin) node->power_on(*epoch.tick.begin);
+      for (const base::CanFrame& frame : epoch.inputs) node->on_frame(frame);
+      node->tick(epoch.tick.time, {}, [&](const base::CanFrame& frame) {
+        constexpr std::size_t kFused = 2;
+        if (const auto full = can::decode<can::EstDiagCapacity>(can::payload(frame));
+            frame.id == 0x300 + can::EstDiagCapacity::kOffset && full)
+          short_windows += full->window_short + full->timeline_full;
+        if (frame.id == 0x300 + can::offset_of<can::EstPos>(kFused) ||
+            frame.id == 0x300 + can::offset_of<can::EstMotion>(kFused) ||
+            frame.id == 0x300 + can::offset_of<can::EstStdPose>(kFused))
+          all.push_back(frame);
+      });
+    }
+    EXPECT_EQ(short_windows, 0U);
+    return all;
+  };
+  const auto straight = said(on_time);
+  EXPECT_GT(straight.size(), 4'000U);
+  EXPECT_EQ(first_difference(said(late), straight), "");
+}
+
 // In the matched world, over the drive: the normalised square of an error whose 1 sigma is right is 1 in the mean.
 TEST(Motion, TheOneSigmaOfSpeedAndTurnRateIsThatOfTheirErrors) {
   for (const Robot& robot :
