@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The line of numbers that stands under a table of results names every noise that the wheels' and the fixes' models have:
-// two configurations that differ there do not look the same.
+// The line of numbers that stands under a table of results names every noise that the wheels' and the fixes' models
+// have: two configurations that differ there do not look the same.
 #include "sim_host/numbers_words.hpp"
 
 #include <gtest/gtest.h>

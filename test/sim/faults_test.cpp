@@ -130,8 +130,9 @@ TEST(Faults, several_are_separated_by_commas_and_what_is_not_understood_is_named
   const std::string unknown = parse_faults("gnss_jump,gnss_jmp").error;
   EXPECT_NE(unknown.find("'gnss_jmp'"), std::string::npos);
   for (const auto& row : fault_table()) EXPECT_NE(unknown.find(row.name), std::string::npos);
-  for (const char* bad : {"gnss_jump@", "gnss_jump@x", "gnss_jump@5+", "gnss_jump@5+x", "gnss_jump@-1", "gnss_jump@1e9",
-                          "gnss_jump@nan", "gnss_jump@5 ", "gnss_jump@5+1+2", "gnss_jump@5+0", "gnss_jump,,slip_left", "@5"})
+  for (const char* bad :
+       {"gnss_jump@", "gnss_jump@x", "gnss_jump@5+", "gnss_jump@5+x", "gnss_jump@-1", "gnss_jump@1e9", "gnss_jump@nan",
+        "gnss_jump@5 ", "gnss_jump@5+1+2", "gnss_jump@5+0", "gnss_jump,,slip_left", "@5"})
     EXPECT_NE(parse_faults(bad).error, "") << bad;
 }
 
