@@ -127,7 +127,8 @@ template <class Estimators, std::size_t Capacity>
 template <class Note>
 Insert History<Estimators, Capacity>::insert(const Sample& sample, const Context& with, Note&& note) {
   const Insert result = timeline_.insert(sample);
-  if (result != Insert::kFull || !timeline_.consumed(0)) return result;
+  // What is older than all of them came too late for so small a window.
+  if (result != Insert::kFull || !timeline_.consumed(0) || sample.order(timeline_[0]) < 0) return result;
   leave(timeline_[0], Past::kFollows, with, note);
   timeline_.drop_front(1);
   const Insert again = timeline_.insert(sample);

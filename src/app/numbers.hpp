@@ -146,7 +146,7 @@ struct MagneticNumbers {
   float dip_rad = 0.15F;    ///< the same for its angle below the horizon, from what was found at the start
   /// In motion for so long in a field that stays the same, but is not the one known: that is the known one then.
   float field_new_s = 20;
-  std::int32_t stuck_samples = 50;  ///< repeated so often to the last bit, a field is that of a stuck sensor; 0: never
+  std::int32_t stuck_samples = 50;  ///< in motion, repeated so often to the last bit, a field is a stuck one; 0: never
 };
 
 /// The barometer: its zero is found, and followed, where the height is known better by other means.
@@ -156,7 +156,9 @@ struct BaroNumbers {
   float drift_m_rts = 0.1F;   ///< of its zero: weather, warming up; m per root second
   float scale_share = 0.05F;  ///< of a change of height: air that is not the standard atmosphere
   float gate_scale = 1;
-  std::int32_t stuck_samples = 50;  ///< repeated so often to the last bit, a pressure is that of a stuck one; 0: never
+  /// Repeated so often to the last bit (0.5 Pa on the bus), a pressure is a stuck one, where its noise is more than
+  /// that; 0: never.
+  std::int32_t stuck_samples = 0;
 };
 
 /// When two attitudes differ enough, for long enough, one of them is wrong. A curve that lasts tilts what only knows an

@@ -30,6 +30,7 @@ class Troubles {
     raised.raise(can::Fault::kMalformed, now.malformed != then.malformed || now.out_of_range != then.out_of_range ||
                                              now.no_time != then.no_time || now.too_early != then.too_early);
     raised.raise(can::Fault::kCapacity, now.map_full != then.map_full || now.timeline_full != then.timeline_full ||
+                                            now.window_short != then.window_short ||
                                             now.events_dropped != then.events_dropped);
     raised.raise(can::Fault::kCommandRefused, now.command_refused != then.command_refused);
     if (raised.bits != 0) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The WGS84 ellipsoid (NIMA TR8350.2, table 3.1): latitude, longitude, height to Earth-centred, Earth-fixed coordinates
 // (Torge & Mueller 2012, sec. 4.1.3) and back, and directions between ECEF and east, north, up. In bit-identical
-// double, the only place where double is flashed: a float holds 0.5 m of the Earth's radius.
+// double, as gravity by latitude is: a float holds 0.5 m of the Earth's radius.
 #pragma once
 
 #include "base/math_double.hpp"

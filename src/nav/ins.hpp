@@ -9,6 +9,8 @@
 #include "nav/strapdown.hpp"
 #include "nav/turned_scale.hpp"
 
+#include <algorithm>
+
 namespace tetap::nav {
 
 /// One sigma of what drives the errors. A time constant of zero makes the bias a random walk.
@@ -127,6 +129,9 @@ class Ins {
     return start_with_p(at);
   }
 
+  /// After p was written to from outside.
+  void recondition() { condition(p, watch_); }
+
   /// The covariance, and what is to be added to it still.
   template <class Sink>
   void each_bit_of_p(Sink&& sink) const {
@@ -152,7 +157,7 @@ class Ins {
   [[gnu::noinline]] filter::Innovation<float, Measurement::kDimension> update_now(const Measurement& measurement,
                                                                                   float gate) {
     constexpr int kM = Measurement::kDimension, kYaw = InsState::kAttitude + 2;
-    const float yaw_rad2 = p(kYaw, kYaw);
+    [[maybe_unused]] const float yaw_rad2 = p(kYaw, kYaw);
     filter::SparseUpdate<float, kErrors, kM> result;
     constexpr int kColumns = static_cast<int>(Measurement::kTouches.size());
     bool rest = !filter::Direct<Measurement> || kColumns > kM;
@@ -171,7 +176,10 @@ class Ins {
     }
     if (result.innovation.verdict != filter::Verdict::kAccepted) return result.innovation;
     x.correct(result.dx);
-    turned_.told(p(kYaw, kYaw) / yaw_rad2);
+    // What tells only of biases leaves what the scale has done to the heading.
+    constexpr bool kTellsHeading = std::any_of(Measurement::kTouches.begin(), Measurement::kTouches.end(),
+                                               [](int touched) { return touched < InsState::kAccelBias; });
+    if constexpr (kTellsHeading) turned_.told(p(kYaw, kYaw) / yaw_rad2);
     if (result.sharp && !condition(p, watch_)) ++conditioned_;
     return result.innovation;
   }
@@ -226,6 +234,7 @@ class Ins {
     const float share = energy > explained && !stands ? 1.0F - explained / energy : 0.0F;
     step.dv_n_mps(0) *= share;
     step.dv_n_mps(1) *= share;
+    if (stands) step.dv_n_mps(2) = earth.gravity_mps2 * step.dt_s;
   }
 
   /// Looks after the condition of P a little at every step: a round takes 102 of them, and rounding takes several

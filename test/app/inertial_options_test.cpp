@@ -70,6 +70,7 @@ Numbers numbers() {
   Numbers n;
   n.wheels.drive = {.left_radius_m = 0.1F, .right_radius_m = 0.1F, .track_m = 0.5F, .counts_per_turn = 2000};
   n.magnetic.use = n.baro.use = 1;
+  n.baro.stuck_samples = 50;
   return n;
 }
 
@@ -110,6 +111,25 @@ TEST(InertialOptions, AGyroscopeThatFeelsTheEarthHasNoBiasOfIt) {
   }
 }
 
+// The receiver's last known place first, then the true one, 150 km away: a way to the east is a course, however long.
+TEST(InertialOptions, AFirstWayThatIsLongIsACourse) {
+  Numbers n = numbers();
+  n.inertial.starts_forward = 1;
+  InertialStart start;
+  model::GnssFix3d fix{.sigma_horizontal_m = 1, .sigma_vertical_m = 2};
+  start.fix(fix, {1'000'000}, n);
+  fix.x = base::Anchored::from_um(150'000'000'000);
+  start.fix(fix, {2'000'000'000}, n);
+  ASSERT_TRUE(start.ready());
+  nav::Ins ins;
+  start.begin(ins, n.inertial, false);
+  EXPECT_NEAR(nav::euler(ins.x.q_nb).yaw_rad, 0.0F, 1e-6F);
+  EXPECT_NEAR(ins.x.x.minus({}), 150'000.0F, 0.1F);
+  start.heading(base::kNan, 0.1F);
+  start.begin(ins, n.inertial, false);
+  EXPECT_TRUE(ins.x.finite()) << "no heading is no reason to lose one";
+}
+
 TEST(InertialOptions, SensorsThatShowTheSameForEverAreStuckAndSaidToBe) {
   Stand stand(numbers());
   for (int i = 0; i < 6; ++i) {
@@ -125,10 +145,13 @@ TEST(InertialOptions, SensorsThatShowTheSameForEverAreStuckAndSaidToBe) {
   };
   const auto at = [&] { return base::Micros{stand.us}; };
   EXPECT_FALSE(stand.says_stuck());
-  EXPECT_EQ(until_stale([&] {
-              return stand.estimator.fuse(MagneticFlux{.flux_b_uT = {0, -20, -40}}, at(), stand.with()).verdict;
-            }),
-            50);
+  const auto flux = [&] {
+    return stand.estimator.fuse(MagneticFlux{.flux_b_uT = {0, -20, -40}}, at(), stand.with()).verdict;
+  };
+  EXPECT_EQ(until_stale(flux), 200) << "at rest a good one may";
+  stand.shown_radps = {0, 0, 0.5F};
+  EXPECT_EQ(until_stale(flux), 0) << "turning it may not";
+  stand.shown_radps = {0, 0, 0};
   EXPECT_TRUE(stand.says_stuck());
   static_cast<void>(stand.estimator.fuse(MagneticFlux{.flux_b_uT = {0, -20.1F, -40}}, at(), stand.with()));
   EXPECT_FALSE(stand.says_stuck()) << "it moves again";

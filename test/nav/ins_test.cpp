@@ -6,11 +6,14 @@
 #include "model/gnss_fix_3d.hpp"
 #include "model/gnss_velocity_3d.hpp"
 #include "model/height.hpp"
+#include "model/zero_rate.hpp"
+#include "model/zero_velocity.hpp"
 #include "nav/ins_covariance_entry.hpp"
 #include "support/least_eigenvalue.hpp"
 #include "true_body.hpp"
 
 #include <gtest/gtest.h>
+#include <utility>
 
 namespace tetap {
 namespace {
@@ -105,6 +108,48 @@ TEST(Ins, AHeadingThatIsToldDoesNotPayForTheWayBack) {
   EXPECT_LT(std::sqrt(ins.p(8, 8)), 0.05F * kCircle_rad);
   circle(-0.4F);
   EXPECT_NEAR(std::sqrt(ins.p(8, 8)), kCircle_rad, 0.1F * kCircle_rad);
+}
+
+/// What tells the bias tells the heading what the bias did to it, and nothing of what the scale did.
+TEST(Ins, ABiasThatIsToldLeavesTheScaleToTheHeading) {
+  Ins ins;
+  ins.noise.gyro_scale = 0.003F;
+  auto p = start_covariance();
+  p(8, 8) = 1e-6F, p(12, 12) = p(13, 13) = p(14, 14) = 1e-6F;
+  ins.start({}, p);
+  const auto circle = [&ins] {
+    for (int i = 0; i < 3142; ++i) {
+      EXPECT_EQ(ins.predict(ImuIncrement::constant({0, 0, 0.4F}, {0, 0, 9.80665F}, {5'000})), ImuVerdict::kAccepted);
+      ins.predict_covariance();
+    }
+  };
+  constexpr float kCircle_rad = 0.003F * 6.2832F;
+  circle();
+  EXPECT_GT(std::sqrt(ins.p(8, 8)), 1.2F * kCircle_rad) << "by the bias as well";
+  for (int i = 0; i < 10; ++i)
+    static_cast<void>(ins.update(model::ZeroRate{.gyro_b_radps = ins.x.b_g_radps, .sigma_radps = 1e-5F}, 1e6F));
+  EXPECT_NEAR(std::sqrt(ins.p(8, 8)), kCircle_rad, 0.1F * kCircle_rad);
+  circle();
+  EXPECT_NEAR(std::sqrt(ins.p(8, 8)), 2.0F * kCircle_rad, 0.1F * kCircle_rad);
+}
+
+/// A body that stands and is shaken up and down: what shakes it is no motion that would tell tilt from a bias.
+TEST(Ins, WhatTremblesAtRestTellsNoTilt) {
+  Ins ins;
+  ins.noise.motion_sigma = 3;
+  ins.start({}, start_covariance());
+  ins.stands = true;
+  float up = 0;
+  for (int i = 0; i < 60'000; ++i) {
+    const float was = std::exchange(up, i % 3 == 0 ? 0.005F : i % 3 == 1 ? -0.004F : -0.001F);
+    ImuIncrement imu = at_rest();
+    imu.dv_b_mps(2) += up - was;
+    EXPECT_EQ(ins.predict(imu), ImuVerdict::kAccepted);
+    if (i % 4 == 3) static_cast<void>(ins.update(model::ZeroVelocity{.sigma_mps = 0.005F}, 1e6F));
+  }
+  const float as_the_bias = start_covariance()(9, 9) / (9.80665F * 9.80665F);
+  EXPECT_NEAR(ins.p(6, 6), as_the_bias, 0.1F * as_the_bias);
+  EXPECT_NEAR(ins.p(7, 7), as_the_bias, 0.1F * as_the_bias);
 }
 
 /// What is published of the covariance while the filter itself is behind: as if it had been carried sample by sample.

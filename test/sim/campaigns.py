@@ -111,7 +111,8 @@ def other_fault(name, case, plain, checks):
     fused, seeds = case["fused"], case["seeds"]
     if name in KNOWN_TOO_SURE:
         share, worst = KNOWN_TOO_SURE[name]
-        checks.known(f"{name}: too sure for more than a second [seeds]", fused["too_sure_seeds"], most(seeds, share))
+        if share < 1:
+            checks.known(f"{name}: too sure for more than a second [seeds]", fused["too_sure_seeds"], most(seeds, share))
         checks.known(f"{name}: error over 3 sigma, worst", fused["error_over_3_sigma"]["worst"], worst)
         return
     checks.bound(f"{name}: too sure for more than a second [seeds]", fused["too_sure_seeds"], 0, 0)

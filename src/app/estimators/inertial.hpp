@@ -119,10 +119,17 @@ class Inertial {
   }
   void begin(const Context& with);
   void begin_anew(base::Micros t, can::ResetCause cause, const Context& with);
-  /// Something was taken anew that moves nothing at once.
+  /// Something was taken anew that moves nothing at once: the sizes stay those of the last step.
   void say(can::ResetCause cause) {
-    jump_ = {.cause = cause, .count = static_cast<std::uint8_t>(jump_.count + 1)};
-    back_ = false;
+    jump_.cause = cause;
+    jump_.count = static_cast<std::uint8_t>(jump_.count + 1);
+  }
+  void measure_step(const nav::InsState& next);
+  /// From the last IMU sample to a measurement; beyond a sample or two what that one showed says nothing any more.
+  [[nodiscard]] float later_s(base::Micros stamp) const {
+    constexpr base::Micros kMost{20'000};
+    const base::Micros later = stamp - time_;
+    return later < kMost && base::Micros{0} - later < kMost ? base::seconds(later) : 0.0F;
   }
   [[nodiscard]] nav::Vector3 axle_mps(const nav::Vector3& v_n_mps, const Context& with) const;
   [[nodiscard]] bool looks_wrong(const nav::Vector3& v_b_mps, float level_mps, float sigma_mps, base::Micros stamp,

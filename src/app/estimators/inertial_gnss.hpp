@@ -195,7 +195,7 @@ inline constexpr float kDecides = 4.0F;
     for (int k = 0; k < nav::Ins::kErrors; ++k) ins_.p(i, k) = 0;
     ins_.p(i, i) = variance_m2(i);
   }
-  ins_.start(ins_.x, ins_.p);
+  ins_.recondition();
   corrected();
   jump_ = {.east_m = by_m(0), .north_m = by_m(1), .up_m = by_m(2), .count = static_cast<std::uint8_t>(jump_.count + 1)};
 }
@@ -230,7 +230,7 @@ inline Innovation Inertial::fuse(const GnssVelocity& velocity, base::Micros stam
     return {.verdict = can::Verdict::kAccepted};
   }
   if (frozen_.frozen()) return {.verdict = can::Verdict::kStale};
-  v_n -= ins_.accel_n_mps2 * base::seconds(stamp - time_);  // to the time of the last IMU sample, as the state is
+  v_n -= ins_.accel_n_mps2 * later_s(stamp);  // to the time of the last IMU sample, as the state is
   const nav::Vector3 v_b = axle_mps(v_n, with);
   hear_ground(v_n, v_b, sigma, stamp, with);
   // A receiver and a filter that say another direction: either may be wrong, and the filter gives way after a while.

@@ -14,7 +14,7 @@ inline Innovation Inertial::fuse(const OutsideHeading& heading, base::Micros sta
   const float sigma = own > 0.005F ? own : 0.005F;
   const GnssNumbers& n = with.numbers.gnss;
   if (!base::is_finite(heading.yaw_rad)) return {.verdict = can::Verdict::kNotFinite};
-  if (headings_.hear({heading.yaw_rad}, n.heading_stuck_samples)) return {.verdict = can::Verdict::kStale};
+  if (headings_.hear({heading.yaw_rad}, n.heading_stuck_samples, stamp)) return {.verdict = can::Verdict::kStale};
   const nav::Vector3 baseline_b_m{n.baseline_b_m[0], n.baseline_b_m[1], n.baseline_b_m[2]};
   if (phase_ != Phase::kTracking) {
     const nav::Vector3 line = start_.attitude().rotate(baseline_b_m);
@@ -24,7 +24,7 @@ inline Innovation Inertial::fuse(const OutsideHeading& heading, base::Micros sta
   }
   // To the time of the last IMU sample, as the state is.
   const float turn_radps = ins_.x.q_nb.rotate(rate_b_radps_ - ins_.x.b_g_radps)(2);
-  const float yaw_rad = base::wrap_angle(heading.yaw_rad - turn_radps * base::seconds(stamp - time_));
+  const float yaw_rad = base::wrap_angle(heading.yaw_rad - turn_radps * later_s(stamp));
   const model::DirectionMeasurement direction = model::DualHeading(baseline_b_m, yaw_rad, sigma);
   return measure(direction, kHeadings, n.gate_scale, stamp, with);
 }
@@ -42,8 +42,9 @@ inline Innovation Inertial::fuse(const OutsideHeading& heading, base::Micros sta
   const nav::Vector3 field_n = (tracking ? ins_.x.q_nb : start_.attitude()).rotate(field);
   const float horizontal2 = field_n(0) * field_n(0) + field_n(1) * field_n(1);
   if (!(horizontal2 > 0.0F && field.squaredNorm() < 1e12F)) return {.verdict = can::Verdict::kNotFinite};
-  if (fluxes_.hear(flux.flux_b_uT, n.stuck_samples)) return {.verdict = can::Verdict::kStale};
   const bool moving = tracking && (ins_.x.v_n_mps.squaredNorm() > 0.25F || rate.squaredNorm() > 0.04F);
+  // At rest a good one shows the same for long.
+  if (fluxes_.hear(flux.flux_b_uT, moving ? n.stuck_samples : 0, stamp)) return {.verdict = can::Verdict::kStale};
   const float off = field_.step({.horizontal_uT = base::sqrt(horizontal2), .up_uT = field_n(2)}, moving, stamp, n);
   if (field_.renewed()) say(can::ResetCause::kMagneticField);
   if (!(off <= 1.0F)) return {.verdict = can::Verdict::kRejected, .dof = 2, .nis = off, .gate = 1.0F};

@@ -12,7 +12,7 @@ namespace tetap::app {
   if (n.use == 0 || phase_ != Phase::kTracking) return {};
   constexpr float kLeast_Pa = 22'700;  // the model ends at 11 km
   if (!(air.pressure_Pa >= kLeast_Pa && air.pressure_Pa < 2e5F)) return {.verdict = can::Verdict::kNotFinite};
-  if (pressures_.hear({air.pressure_Pa}, n.stuck_samples)) return {.verdict = can::Verdict::kStale};
+  if (pressures_.hear({air.pressure_Pa}, n.stuck_samples, stamp)) return {.verdict = can::Verdict::kStale};
   const float altitude_m = pressure_altitude_m(air.pressure_Pa);
   // The height at the sample's time; the state's is that of the last IMU sample.
   const float height_m = nav::difference(ins_.x.z, {}) + ins_.x.v_n_mps(2) * base::seconds(stamp - time_);

@@ -68,6 +68,7 @@ inline Innovation Inertial::fuse(const ImuSample& sample, base::Micros stamp, co
   if (ins_.pending_s() >= every_s) ins_.predict_covariance();
   // Clipped increments are used, and are as uncertain as none.
   const float growth = base::sqrt(dt_s * 0.1F);
+  if (sample.clipped_accel > 0) ins_.accel_n_mps2 = nav::Vector3::Zero();
   if (sample.clipped_accel > 0 || sample.clipped_gyro > 0)
     doubt(n.gap_mps2 * growth, sample.clipped_gyro > 0 ? n.gap_radps * growth : 0.0F);
   time_ = stamp;
@@ -132,7 +133,8 @@ inline std::uint16_t Inertial::faults() const {
   raise(can::Fault::kWheelSlip, slip_.slip() != SlipWatch::Slip::kNone);
   raise(can::Fault::kImuClipped, imu_.clipped_lately(time_));
   raise(can::Fault::kVibration, imu_.shaken());
-  raise(can::Fault::kSensorStuck, imu_.stuck() || fluxes_.stuck() || pressures_.stuck() || headings_.stuck());
+  raise(can::Fault::kSensorStuck,
+        imu_.stuck() || fluxes_.stuck(time_) || pressures_.stuck(time_) || headings_.stuck(time_));
   raise(can::Fault::kInputStale, blind_ && !imu_.stuck() && !unusable_);
   return bits;
 }
@@ -160,13 +162,6 @@ inline void Inertial::begin(const Context& with) {
     ins_.earth = nav::Earth::at(with.site.frame, with.numbers.inertial.earth_rate != 0);
   start_.begin(ins_, with.numbers.inertial, phase_ == Phase::kTracking);
   phase_ = Phase::kTracking;
-  if (!base::is_finite(jump_.yaw_rad)) {  // see begin_anew()
-    const nav::InsState& last = ahead_.present();
-    jump_.east_m = nav::difference(ins_.x.x, last.x);
-    jump_.north_m = nav::difference(ins_.x.y, last.y);
-    jump_.up_m = nav::difference(ins_.x.z, last.z);
-    jump_.yaw_rad = base::wrap_angle(nav::euler(ins_.x.q_nb).yaw_rad - nav::euler(last.q_nb).yaw_rad);
-  }
   last_position_ = time_;
   refused_ = {};
   still_.s = waiting_.s = 0;

@@ -152,6 +152,10 @@ void Inertial::each_bit(Sink&& sink) const {
   sink(led_m_[1]);
   sink(jump_.east_m);
   sink(jump_.north_m);
+  sink(jump_.up_m);
+  sink(jump_.yaw_rad);
+  sink(static_cast<std::uint32_t>(jump_.cause));
+  if (!base::is_finite(jump_.yaw_rad)) ahead_.present().each_bit(sink);
   sink(static_cast<std::uint32_t>(recoveries_));
   sink(static_cast<std::uint32_t>(jump_.count | (doubted_ ? 256U : 0U) | (back_ ? 512U : 0U)));
   field_.each_bit(sink);

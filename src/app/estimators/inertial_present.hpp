@@ -18,6 +18,15 @@ inline std::int32_t Inertial::work_of(const Sample& sample, const Context& with)
   return sample.sensor == can::Sensor::kImu ? 1 : kMeasurement;
 }
 
+/// From the last that was published before it began anew, see begin_anew().
+[[gnu::noinline]] inline void Inertial::measure_step(const nav::InsState& next) {
+  const nav::InsState& last = ahead_.present();
+  jump_.east_m = nav::difference(next.x, last.x);
+  jump_.north_m = nav::difference(next.y, last.y);
+  jump_.up_m = nav::difference(next.z, last.z);
+  jump_.yaw_rad = base::wrap_angle(nav::euler(next.q_nb).yaw_rad - nav::euler(last.q_nb).yaw_rad);
+}
+
 /// Whether the sample asks for more than this tick has left.
 inline bool Inertial::rests(const Sample& sample, const Context& with) {
   if (phase_ != Phase::kTracking || work_left_ >= work_of(sample, with)) return false;
@@ -69,6 +78,7 @@ void Inertial::advance(base::Micros t, const Context& with, const Window& window
     const std::int64_t more = 1 + ((due - window[0].stamp - kBehind).us >> 14);
     work_left_ += kMeasurement * static_cast<std::int32_t>(more < 20 ? more : 20);
   }
+  if (!base::is_finite(jump_.yaw_rad)) measure_step(ahead_.at(t, how));
   ahead_.reach(t, how);
   blind_ = unusable_ || t - ahead_.place().last > base::Micros{n.stale_us};
 }

@@ -93,6 +93,7 @@ class InertialStart {
     finder_.fuse_velocity(v_n_mps(0), v_n_mps(1), sigma_mps, {n.gnss.antenna_x_b_m, n.gnss.antenna_y_b_m});
   }
   void heading(float yaw_rad, float sigma_rad) {
+    if (!base::is_finite(yaw_rad)) return;
     yaw_rad_ = yaw_rad;
     level_yaw_rad_ = nav::euler(turned_).yaw_rad;
     sigma_yaw_rad_ = sigma_rad;
@@ -156,8 +157,9 @@ class InertialStart {
   }
   /// Forward is the way it goes.
   void course(float east, float north, float sigma) {
-    constexpr float kSlip_rad = 0.1F;  // a curve between the fixes, a crab's walk
-    const model::GnssCourse course(east, north, sigma, kSlip_rad);
+    const float length = base::sqrt(east * east + north * north);  // of a velocity, or of a way
+    constexpr float kSlip_rad = 0.1F;                              // a curve between the fixes, a crab's walk
+    const model::GnssCourse course(east / length, north / length, sigma / length, kSlip_rad);
     heading(course.angle_rad, course.sigma_rad);
   }
 

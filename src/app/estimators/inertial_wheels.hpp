@@ -149,15 +149,14 @@ inline Innovation Inertial::forward(const Forward& speed, base::Micros stamp, co
                         ? base::abs(speed.mps) > 2.0F * n.wheel_mps
                         : variance > kSure_mps * kSure_mps || ins_.x.v_n_mps.squaredNorm() > 9.0F * variance;
   // The reading is true at its own time, the state at that of the last IMU sample.
-  return measure(
-      model::WheelSpeed{.forward_mps = speed.mps - ahead_n.dot(ins_.accel_n_mps2) * base::seconds(stamp - time_),
-                        .sigma_forward_mps = sigma,
-                        .sigma_lateral_mps = n.lateral_mps,
-                        .sigma_vertical_mps = n.vertical_mps,
-                        .axle_b_m = {n.axle_x_b_m, 0.0F, 0.0F},
-                        .gyro_b_radps = rate_b_radps_,
-                        .moves = goes && !ins_.stands},
-      kWheels, n.wheel_gate_scale, stamp, with);
+  return measure(model::WheelSpeed{.forward_mps = speed.mps - ahead_n.dot(ins_.accel_n_mps2) * later_s(stamp),
+                                   .sigma_forward_mps = sigma,
+                                   .sigma_lateral_mps = n.lateral_mps,
+                                   .sigma_vertical_mps = n.vertical_mps,
+                                   .axle_b_m = {n.axle_x_b_m, 0.0F, 0.0F},
+                                   .gyro_b_radps = rate_b_radps_,
+                                   .moves = goes && !ins_.stands},
+                 kWheels, n.wheel_gate_scale, stamp, with);
 }
 
 /// They came of late, do not spin, and the filter goes as fast as they say. Not for ever: it may be pinned to them on a
