@@ -496,7 +496,7 @@ class Inertial(Case):
         up = scale * random.normal(0, 0.5, n)
         self.write_rows("states.csv", metrics.STATES, [
             [epoch[i], time_s[i], 2, *q[i], *draw["velocity"][i], up[i], 0.5, *draw["acc bias"][i], *draw["gyro bias"][i], *[sigmas["velocity"]] * 3,
-             *[self.std["attitude"]] * 2, *[sigmas["acc bias"]] * 3, *[sigmas["gyro bias"]] * 3, *[None] * 8] for i in range(n)])
+             *[self.std["attitude"]] * 2, *[sigmas["acc bias"]] * 3, *[sigmas["gyro bias"]] * 3, *[None] * 9] for i in range(n)])
         self.write("run.json", json.dumps(RUN))
         self.write_rows("t.truth.csv", [*metrics.TRUTH, "epoch", *metrics.TRUTH_MORE],
                         [[time_s[i], 0, 0, 0, epoch[i], *[0] * len(metrics.TRUTH_MORE)] for i in range(n)])
