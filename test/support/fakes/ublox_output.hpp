@@ -111,6 +111,11 @@ class Payload {
   Payload& r4(std::size_t at, double value) {
     return put(at, 4, std::bit_cast<std::uint32_t>(static_cast<float>(value)));
   }
+  /// year, month, day, hour, min, sec: seven bytes, the same in NAV-PVT and NAV-TIMEUTC.
+  Payload& calendar(std::size_t at, const Instant::Utc& utc) {
+    put(at, 2, utc.year).put(at + 2, 1, utc.month).put(at + 3, 1, utc.day);
+    return put(at + 4, 1, utc.hour).put(at + 5, 1, utc.minute).put(at + 6, 1, utc.second);
+  }
   [[nodiscard]] const Bytes& bytes() const { return bytes_; }
 
  private:
@@ -132,12 +137,7 @@ inline Bytes nav_pvt(const Solution& s, const Instant& t) {
   const int carrier = s.fix == Fix::kRtkFixed ? 2 : s.fix == Fix::kRtkFloat ? 1 : 0;  // carrSoln, bits 7 and 6
   return Payload(92)
       .put(0, 4, t.itow_ms)
-      .put(4, 2, utc.year)
-      .put(6, 1, utc.month)
-      .put(7, 1, utc.day)
-      .put(8, 1, utc.hour)
-      .put(9, 1, utc.minute)
-      .put(10, 1, utc.second)
+      .calendar(4, utc)
       .put(11, 1, 0x07)  // validDate, validTime, fullyResolved
       .put(12, 4, 25)
       .put(16, 4, utc.nano)
@@ -223,12 +223,7 @@ inline Bytes nav_timeutc(const Solution&, const Instant& t) {
       .put(0, 4, t.itow_ms)
       .put(4, 4, 25)
       .put(8, 4, utc.nano)
-      .put(12, 2, utc.year)
-      .put(14, 1, utc.month)
-      .put(15, 1, utc.day)
-      .put(16, 1, utc.hour)
-      .put(17, 1, utc.minute)
-      .put(18, 1, utc.second)
+      .calendar(12, utc)
       .put(19, 1, 0x07)  // validTOW, validWKN, validUTC
       .bytes();
 }
