@@ -1180,7 +1180,8 @@ struct EstStdMore {
   }
 };
 
-/// Estimator: what only an inertial estimator has, one page per frame. Instances 0 to 3, ids 6 apart. Page 0.
+/// Estimator: what only an inertial estimator has, one page per frame; sigmas and their correlations in one epoch.
+/// Instances 0 to 3, ids 6 apart. Page 0.
 struct EstStateHeight {
   static constexpr std::uint8_t kOffset = 0x2D, kSize = 8;
   static constexpr std::uint8_t kStride = 6, kCount = 4;
@@ -1205,7 +1206,8 @@ struct EstStateHeight {
   }
 };
 
-/// Estimator: what only an inertial estimator has, one page per frame. Instances 0 to 3, ids 6 apart. Page 1.
+/// Estimator: what only an inertial estimator has, one page per frame; sigmas and their correlations in one epoch.
+/// Instances 0 to 3, ids 6 apart. Page 1.
 struct EstStateAccBias {
   static constexpr std::uint8_t kOffset = 0x2D, kSize = 8;
   static constexpr std::uint8_t kStride = 6, kCount = 4;
@@ -1230,7 +1232,8 @@ struct EstStateAccBias {
   }
 };
 
-/// Estimator: what only an inertial estimator has, one page per frame. Instances 0 to 3, ids 6 apart. Page 2.
+/// Estimator: what only an inertial estimator has, one page per frame; sigmas and their correlations in one epoch.
+/// Instances 0 to 3, ids 6 apart. Page 2.
 struct EstStateGyroBias {
   static constexpr std::uint8_t kOffset = 0x2D, kSize = 8;
   static constexpr std::uint8_t kStride = 6, kCount = 4;
@@ -1255,7 +1258,8 @@ struct EstStateGyroBias {
   }
 };
 
-/// Estimator: what only an inertial estimator has, one page per frame. Instances 0 to 3, ids 6 apart. Page 3.
+/// Estimator: what only an inertial estimator has, one page per frame; sigmas and their correlations in one epoch.
+/// Instances 0 to 3, ids 6 apart. Page 3.
 struct EstStateStdVel {
   static constexpr std::uint8_t kOffset = 0x2D, kSize = 8;
   static constexpr std::uint8_t kStride = 6, kCount = 4;
@@ -1280,7 +1284,8 @@ struct EstStateStdVel {
   }
 };
 
-/// Estimator: what only an inertial estimator has, one page per frame. Instances 0 to 3, ids 6 apart. Page 4.
+/// Estimator: what only an inertial estimator has, one page per frame; sigmas and their correlations in one epoch.
+/// Instances 0 to 3, ids 6 apart. Page 4.
 struct EstStateStdTilt {
   static constexpr std::uint8_t kOffset = 0x2D, kSize = 8;
   static constexpr std::uint8_t kStride = 6, kCount = 4;
@@ -1302,7 +1307,8 @@ struct EstStateStdTilt {
   }
 };
 
-/// Estimator: what only an inertial estimator has, one page per frame. Instances 0 to 3, ids 6 apart. Page 5.
+/// Estimator: what only an inertial estimator has, one page per frame; sigmas and their correlations in one epoch.
+/// Instances 0 to 3, ids 6 apart. Page 5.
 struct EstStateStdAccBias {
   static constexpr std::uint8_t kOffset = 0x2D, kSize = 8;
   static constexpr std::uint8_t kStride = 6, kCount = 4;
@@ -1327,21 +1333,22 @@ struct EstStateStdAccBias {
   }
 };
 
-/// Estimator: what only an inertial estimator has, one page per frame. Instances 0 to 3, ids 6 apart. Page 6.
+/// Estimator: what only an inertial estimator has, one page per frame; sigmas and their correlations in one epoch.
+/// Instances 0 to 3, ids 6 apart. Page 6.
 struct EstStateStdGyroBias {
   static constexpr std::uint8_t kOffset = 0x2D, kSize = 8;
   static constexpr std::uint8_t kStride = 6, kCount = 4;
   static constexpr Signal kMux{.start = 0, .length = 4};
   static constexpr std::uint8_t kPage = 6;
   static constexpr Signal kEpoch{.start = 4, .length = 4, .wraps = true};
-  static constexpr Signal kStdGyroBiasX{.start = 8, .length = 16, .has_gap = true, .per_unit = 500000};
-  static constexpr Signal kStdGyroBiasY{.start = 24, .length = 16, .has_gap = true, .per_unit = 500000};
-  static constexpr Signal kStdGyroBiasZ{.start = 40, .length = 16, .has_gap = true, .per_unit = 500000};
+  static constexpr Signal kStdGyroBiasX{.start = 8, .length = 18, .has_gap = true, .per_unit = 2000000};
+  static constexpr Signal kStdGyroBiasY{.start = 26, .length = 18, .has_gap = true, .per_unit = 2000000};
+  static constexpr Signal kStdGyroBiasZ{.start = 44, .length = 18, .has_gap = true, .per_unit = 2000000};
 
   std::uint8_t epoch = 0;  ///< low bits of the epoch, the same in all frames of one epoch
-  float std_gyro_bias_x_radps = 0;  ///< 1-sigma of the gyroscope bias along body x; 0 to 0.131068 rad/s in steps of 0.000002; NaN: not available
-  float std_gyro_bias_y_radps = 0;  ///< 1-sigma of the gyroscope bias along body y; 0 to 0.131068 rad/s in steps of 0.000002; NaN: not available
-  float std_gyro_bias_z_radps = 0;  ///< 1-sigma of the gyroscope bias along body z; 0 to 0.131068 rad/s in steps of 0.000002; NaN: not available
+  float std_gyro_bias_x_radps = 0;  ///< 1-sigma of the gyroscope bias along body x; 0 to 0.131071 rad/s in steps of 0.0000005; NaN: not available
+  float std_gyro_bias_y_radps = 0;  ///< 1-sigma of the gyroscope bias along body y; 0 to 0.131071 rad/s in steps of 0.0000005; NaN: not available
+  float std_gyro_bias_z_radps = 0;  ///< 1-sigma of the gyroscope bias along body z; 0 to 0.131071 rad/s in steps of 0.0000005; NaN: not available
 
   template <class Self, class Visit>
   static constexpr void each(Self& m, Visit&& visit) {
@@ -1352,7 +1359,8 @@ struct EstStateStdGyroBias {
   }
 };
 
-/// Estimator: what only an inertial estimator has, one page per frame. Instances 0 to 3, ids 6 apart. Page 7.
+/// Estimator: what only an inertial estimator has, one page per frame; sigmas and their correlations in one epoch.
+/// Instances 0 to 3, ids 6 apart. Page 7.
 struct EstStateJump {
   static constexpr std::uint8_t kOffset = 0x2D, kSize = 8;
   static constexpr std::uint8_t kStride = 6, kCount = 4;
@@ -1377,7 +1385,8 @@ struct EstStateJump {
   }
 };
 
-/// Estimator: what only an inertial estimator has, one page per frame. Instances 0 to 3, ids 6 apart. Page 8.
+/// Estimator: what only an inertial estimator has, one page per frame; sigmas and their correlations in one epoch.
+/// Instances 0 to 3, ids 6 apart. Page 8.
 struct EstStateDisagreement {
   static constexpr std::uint8_t kOffset = 0x2D, kSize = 8;
   static constexpr std::uint8_t kStride = 6, kCount = 4;
@@ -1399,7 +1408,8 @@ struct EstStateDisagreement {
   }
 };
 
-/// Estimator: what only an inertial estimator has, one page per frame. Instances 0 to 3, ids 6 apart. Page 9.
+/// Estimator: what only an inertial estimator has, one page per frame; sigmas and their correlations in one epoch.
+/// Instances 0 to 3, ids 6 apart. Page 9.
 struct EstStateImuHealth {
   static constexpr std::uint8_t kOffset = 0x2D, kSize = 8;
   static constexpr std::uint8_t kStride = 6, kCount = 4;
@@ -1421,6 +1431,133 @@ struct EstStateImuHealth {
     visit(At<kVibAccel>{}, m.vib_accel_mps2);
     visit(At<kVibGyro>{}, m.vib_gyro_radps);
     visit(At<kClipped>{}, m.clipped);
+  }
+};
+
+/// Estimator: what only an inertial estimator has, one page per frame; sigmas and their correlations in one epoch.
+/// Instances 0 to 3, ids 6 apart. Page 10.
+struct EstStateCorrPos {
+  static constexpr std::uint8_t kOffset = 0x2D, kSize = 8;
+  static constexpr std::uint8_t kStride = 6, kCount = 4;
+  static constexpr Signal kMux{.start = 0, .length = 4};
+  static constexpr std::uint8_t kPage = 10;
+  static constexpr Signal kEpoch{.start = 4, .length = 4, .wraps = true};
+  static constexpr Signal kCorrXZ{.start = 8, .length = 16, .is_signed = true, .has_gap = true, .per_unit = 20000};
+  static constexpr Signal kCorrYZ{.start = 24, .length = 16, .is_signed = true, .has_gap = true, .per_unit = 20000};
+
+  std::uint8_t epoch = 0;  ///< low bits of the epoch, the same in all frames of one epoch
+  float corr_xz = 0;  ///< correlation of X and Height; +-1.63835 in steps of 0.00005; NaN: not available
+  float corr_yz = 0;  ///< correlation of Y and Height; +-1.63835 in steps of 0.00005; NaN: not available
+
+  template <class Self, class Visit>
+  static constexpr void each(Self& m, Visit&& visit) {
+    visit(At<kEpoch>{}, m.epoch);
+    visit(At<kCorrXZ>{}, m.corr_xz);
+    visit(At<kCorrYZ>{}, m.corr_yz);
+  }
+};
+
+/// Estimator: what only an inertial estimator has, one page per frame; sigmas and their correlations in one epoch.
+/// Instances 0 to 3, ids 6 apart. Page 11.
+struct EstStateCorrVel {
+  static constexpr std::uint8_t kOffset = 0x2D, kSize = 8;
+  static constexpr std::uint8_t kStride = 6, kCount = 4;
+  static constexpr Signal kMux{.start = 0, .length = 4};
+  static constexpr std::uint8_t kPage = 11;
+  static constexpr Signal kEpoch{.start = 4, .length = 4, .wraps = true};
+  static constexpr Signal kCorrVelEN{.start = 8, .length = 16, .is_signed = true, .has_gap = true, .per_unit = 20000};
+  static constexpr Signal kCorrVelEU{.start = 24, .length = 16, .is_signed = true, .has_gap = true, .per_unit = 20000};
+  static constexpr Signal kCorrVelNU{.start = 40, .length = 16, .is_signed = true, .has_gap = true, .per_unit = 20000};
+
+  std::uint8_t epoch = 0;  ///< low bits of the epoch, the same in all frames of one epoch
+  float corr_vel_en = 0;  ///< correlation of the velocities towards east and north; +-1.63835 in steps of 0.00005; NaN: not available
+  float corr_vel_eu = 0;  ///< correlation of the velocities towards east and up; +-1.63835 in steps of 0.00005; NaN: not available
+  float corr_vel_nu = 0;  ///< correlation of the velocities towards north and up; +-1.63835 in steps of 0.00005; NaN: not available
+
+  template <class Self, class Visit>
+  static constexpr void each(Self& m, Visit&& visit) {
+    visit(At<kEpoch>{}, m.epoch);
+    visit(At<kCorrVelEN>{}, m.corr_vel_en);
+    visit(At<kCorrVelEU>{}, m.corr_vel_eu);
+    visit(At<kCorrVelNU>{}, m.corr_vel_nu);
+  }
+};
+
+/// Estimator: what only an inertial estimator has, one page per frame; sigmas and their correlations in one epoch.
+/// Instances 0 to 3, ids 6 apart. Page 12.
+struct EstStateCorrTilt {
+  static constexpr std::uint8_t kOffset = 0x2D, kSize = 8;
+  static constexpr std::uint8_t kStride = 6, kCount = 4;
+  static constexpr Signal kMux{.start = 0, .length = 4};
+  static constexpr std::uint8_t kPage = 12;
+  static constexpr Signal kEpoch{.start = 4, .length = 4, .wraps = true};
+  static constexpr Signal kCorrTiltEN{.start = 8, .length = 16, .is_signed = true, .has_gap = true, .per_unit = 20000};
+  static constexpr Signal kCorrTiltEYaw{.start = 24, .length = 16, .is_signed = true, .has_gap = true, .per_unit = 20000};
+  static constexpr Signal kCorrTiltNYaw{.start = 40, .length = 16, .is_signed = true, .has_gap = true, .per_unit = 20000};
+
+  std::uint8_t epoch = 0;  ///< low bits of the epoch, the same in all frames of one epoch
+  float corr_tilt_en = 0;  ///< correlation of the turns about the axes that point east and north; +-1.63835 in steps of 0.00005; NaN: not available
+  float corr_tilt_e_yaw = 0;  ///< correlation of the turn about the axis that points east and the heading; +-1.63835 in steps of 0.00005; NaN: not available
+  float corr_tilt_n_yaw = 0;  ///< correlation of the turn about the axis that points north and the heading; +-1.63835 in steps of 0.00005; NaN: not available
+
+  template <class Self, class Visit>
+  static constexpr void each(Self& m, Visit&& visit) {
+    visit(At<kEpoch>{}, m.epoch);
+    visit(At<kCorrTiltEN>{}, m.corr_tilt_en);
+    visit(At<kCorrTiltEYaw>{}, m.corr_tilt_e_yaw);
+    visit(At<kCorrTiltNYaw>{}, m.corr_tilt_n_yaw);
+  }
+};
+
+/// Estimator: what only an inertial estimator has, one page per frame; sigmas and their correlations in one epoch.
+/// Instances 0 to 3, ids 6 apart. Page 13.
+struct EstStateCorrAccBias {
+  static constexpr std::uint8_t kOffset = 0x2D, kSize = 8;
+  static constexpr std::uint8_t kStride = 6, kCount = 4;
+  static constexpr Signal kMux{.start = 0, .length = 4};
+  static constexpr std::uint8_t kPage = 13;
+  static constexpr Signal kEpoch{.start = 4, .length = 4, .wraps = true};
+  static constexpr Signal kCorrAccBiasXY{.start = 8, .length = 16, .is_signed = true, .has_gap = true, .per_unit = 20000};
+  static constexpr Signal kCorrAccBiasXZ{.start = 24, .length = 16, .is_signed = true, .has_gap = true, .per_unit = 20000};
+  static constexpr Signal kCorrAccBiasYZ{.start = 40, .length = 16, .is_signed = true, .has_gap = true, .per_unit = 20000};
+
+  std::uint8_t epoch = 0;  ///< low bits of the epoch, the same in all frames of one epoch
+  float corr_acc_bias_xy = 0;  ///< correlation of the accelerometer biases along body x and y; +-1.63835 in steps of 0.00005; NaN: not available
+  float corr_acc_bias_xz = 0;  ///< correlation of the accelerometer biases along body x and z; +-1.63835 in steps of 0.00005; NaN: not available
+  float corr_acc_bias_yz = 0;  ///< correlation of the accelerometer biases along body y and z; +-1.63835 in steps of 0.00005; NaN: not available
+
+  template <class Self, class Visit>
+  static constexpr void each(Self& m, Visit&& visit) {
+    visit(At<kEpoch>{}, m.epoch);
+    visit(At<kCorrAccBiasXY>{}, m.corr_acc_bias_xy);
+    visit(At<kCorrAccBiasXZ>{}, m.corr_acc_bias_xz);
+    visit(At<kCorrAccBiasYZ>{}, m.corr_acc_bias_yz);
+  }
+};
+
+/// Estimator: what only an inertial estimator has, one page per frame; sigmas and their correlations in one epoch.
+/// Instances 0 to 3, ids 6 apart. Page 14.
+struct EstStateCorrGyroBias {
+  static constexpr std::uint8_t kOffset = 0x2D, kSize = 8;
+  static constexpr std::uint8_t kStride = 6, kCount = 4;
+  static constexpr Signal kMux{.start = 0, .length = 4};
+  static constexpr std::uint8_t kPage = 14;
+  static constexpr Signal kEpoch{.start = 4, .length = 4, .wraps = true};
+  static constexpr Signal kCorrGyroBiasXY{.start = 8, .length = 16, .is_signed = true, .has_gap = true, .per_unit = 20000};
+  static constexpr Signal kCorrGyroBiasXZ{.start = 24, .length = 16, .is_signed = true, .has_gap = true, .per_unit = 20000};
+  static constexpr Signal kCorrGyroBiasYZ{.start = 40, .length = 16, .is_signed = true, .has_gap = true, .per_unit = 20000};
+
+  std::uint8_t epoch = 0;  ///< low bits of the epoch, the same in all frames of one epoch
+  float corr_gyro_bias_xy = 0;  ///< correlation of the gyroscope biases along body x and y; +-1.63835 in steps of 0.00005; NaN: not available
+  float corr_gyro_bias_xz = 0;  ///< correlation of the gyroscope biases along body x and z; +-1.63835 in steps of 0.00005; NaN: not available
+  float corr_gyro_bias_yz = 0;  ///< correlation of the gyroscope biases along body y and z; +-1.63835 in steps of 0.00005; NaN: not available
+
+  template <class Self, class Visit>
+  static constexpr void each(Self& m, Visit&& visit) {
+    visit(At<kEpoch>{}, m.epoch);
+    visit(At<kCorrGyroBiasXY>{}, m.corr_gyro_bias_xy);
+    visit(At<kCorrGyroBiasXZ>{}, m.corr_gyro_bias_xz);
+    visit(At<kCorrGyroBiasYZ>{}, m.corr_gyro_bias_yz);
   }
 };
 
@@ -1481,6 +1618,11 @@ using AllMessages = List<
     EstStateStdGyroBias,
     EstStateJump,
     EstStateDisagreement,
-    EstStateImuHealth>;
+    EstStateImuHealth,
+    EstStateCorrPos,
+    EstStateCorrVel,
+    EstStateCorrTilt,
+    EstStateCorrAccBias,
+    EstStateCorrGyroBias>;
 
 }  // namespace tetap::can

@@ -43,7 +43,7 @@ inline constexpr app::Numbers numbers = app::checked({
     // The vibration of a wheeled robot is far above the data sheet's noise; so much for the gyroscope that a bias that
     // steps does not lead it far. What a wrong scale makes of turns is gyro_scale's.
     .inertial = {.gyro_radps_rthz = 2e-3F, .accel_mps2_rthz = 2e-2F, .constrain_every_us = 20'000},
-    // Three estimators share the bus: 585 frames/s at most (tools/dbc --load).
+    // Three estimators share the bus: 591 frames/s at most (tools/dbc --load).
     .publish = {.std_every = 10, .side_every = 20, .attitude_every = 10, .state_every = 10},
 });
 

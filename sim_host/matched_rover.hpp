@@ -58,8 +58,7 @@ namespace tetap::sim {
   n.inertial.slip_share = 0;  // the wheels' noise is that of odometry: k metres squared per metre
   n.inertial.lateral_mps = n.inertial.vertical_mps = single(world.rover.jitter_mps);
   // Bus or not, a judge wants sigmas beside their errors.
-  n.publish.std_every = n.publish.attitude_every = 5;
-  n.publish.state_every = 2;
+  n.publish.std_every = n.publish.attitude_every = n.publish.state_every = 5;
   return n;
 }
 

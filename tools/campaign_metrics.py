@@ -13,6 +13,7 @@ BEFORE_S = 20.0   # what the node said within so long before a fault is not said
 TOO_SURE_S = 1.0  # an error beyond 3 sigma for longer than this is one that was not reported
 DOF = 3           # x, y, yaw; and of each block
 SHARE = 0.95
+DRAWS, LEAST_TIMES, LEAST_SEEDS = 200, 20, 30  # of what chance makes of a filter that is right
 
 
 def judged(run, truth, job):
@@ -33,8 +34,12 @@ def judged(run, truth, job):
         if attitude is not None:
             one["tilt_rmse_rad"], one["turn_rmse_rad"] = metrics.rms(attitude[2]), metrics.rms(attitude[3])
         if found is not None:
-            one["blocks"] = {name: {"epochs": found.epoch, "nees": found.nees(name), "rmse": metrics.rms(np.linalg.norm(found.error[name], axis=1)),
-                                    "inside_3_sigma": inside(found, name)} for name in metrics.BLOCKS}
+            one["blocks"] = {}
+            for name in metrics.BLOCKS:
+                white = found.white(name)
+                said = np.isfinite(white).all(axis=1)
+                one["blocks"][name] = {"epochs": found.epoch[said], "white": white[said], "nees": (white[said] ** 2).sum(axis=1),
+                                       "rmse": metrics.rms(np.linalg.norm(found.error[name], axis=1)), "inside_3_sigma": inside(found, name)}
         if job.get("fault_times"):
             at = since_start[rows["epoch"].astype(int) - 1]
             start, end = job["fault_times"]
@@ -167,6 +172,25 @@ def anees(runs):
             "below": float((values < low).mean())}
 
 
+def by_chance(runs):
+    """The share of times inside that all but 5 % of campaigns with a filter that is right would exceed: errors that last make few independent
+    times of many. Such a campaign is drawn by mixing the seeds' own errors: they last as long as these, and their covariance at each time is
+    what was said of it. With few seeds it comes out a little low: chance makes correlations between times, too."""
+    common = sorted(set.intersection(*[set(one["epochs"]) for one in runs]))
+    if len(common) < LEAST_TIMES or len(runs) < LEAST_SEEDS:
+        return None
+    white = np.stack([one["white"][np.searchsorted(one["epochs"], common)] for one in runs])  # seed, time, axis
+    scatter = np.einsum("sti,stj->tij", white, white)
+    even = np.einsum("sti,tji->stj", white, np.linalg.inv(np.linalg.cholesky(scatter)))
+    low, high = interval(DOF * len(runs), len(runs))
+    random, shares = np.random.default_rng(1), []
+    for _ in range(DRAWS):
+        drawn = np.tensordot(random.standard_normal((len(runs), len(runs))), even, axes=1)
+        values = (drawn ** 2).sum(axis=2).mean(axis=0)
+        shares.append(((values >= low) & (values <= high)).mean())
+    return {"median": float(np.median(shares)), "least": float(np.quantile(shares, 1 - SHARE))}
+
+
 def sensors(runs):
     result = {}
     for sensor in sorted({name for one in runs for name in one["sensors"]}):
@@ -212,6 +236,7 @@ def averaged(case, runs):
                 del entry["sensors"][sensor]  # it has frames about what was rejected only
         if "blocks" in mine[0]:
             entry["blocks"] = {block: {"anees": anees([one["blocks"][block] for one in mine]), "unit": metrics.UNITS[block],
+                                       "by_chance": by_chance([one["blocks"][block] for one in mine]),
                                        "rmse": spread([one["blocks"][block]["rmse"] for one in mine]),
                                        "inside_3_sigma": float(np.mean([one["blocks"][block]["inside_3_sigma"] or 0 for one in mine]))}
                                for block in metrics.BLOCKS}

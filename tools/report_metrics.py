@@ -35,7 +35,8 @@ ACC_BIAS, GYRO_BIAS = [f"acc_bias_{a}_mps2" for a in AXES], [f"gyro_bias_{a}_rad
 STD_TILT = ["std_tilt_east_rad", "std_tilt_north_rad"]
 STATES = ["epoch", "time_s", "estimator", *Q, *VELOCITY, "height_m", "std_height_m", *ACC_BIAS, *GYRO_BIAS, *(f"std_{v}" for v in VELOCITY), *STD_TILT,
           *(f"std_{b}" for b in ACC_BIAS), *(f"std_{b}" for b in GYRO_BIAS), "jump_x_m", "jump_y_m", "jump_yaw_rad",
-          "disagree_tilt_rad", "disagree_yaw_rad", "vib_accel_mps2", "vib_gyro_radps", "clipped", "jump_z_m"]
+          "disagree_tilt_rad", "disagree_yaw_rad", "vib_accel_mps2", "vib_gyro_radps", "clipped", "jump_z_m", "corr_xz", "corr_yz", *(f"corr_v_{pair}" for pair in ("en", "eu", "nu")),
+          *(f"corr_tilt_{pair}" for pair in ("en", "e_yaw", "n_yaw")), *(f"corr_{of}_bias_{pair}" for of in ("acc", "gyro") for pair in ("xy", "xz", "yz"))]
 TRUTH = ["time_s", "x_m", "y_m", "yaw_rad"]  # and perhaps "epoch" and these
 TRUTH_MORE = ["z_m", "roll_rad", "pitch_rad", *VELOCITY, *GYRO_BIAS, *ACC_BIAS]
 BLOCKS = ["position", "velocity", "attitude", "gyro bias", "acc bias"]
@@ -44,6 +45,10 @@ STEPS = {"position": ("Est2_Std", "StdX"), "velocity": ("Est2_State", "StdVelEas
 # Of the values: what they were rounded by is no error of the estimate. Twice that of a quaternion's component is an angle.
 VALUE_STEPS = {"position": [("Est2_Pos", "X", 1), ("Est2_Pos", "Y", 1), ("Est2_State", "Height", 1)], "velocity": [("Est2_Vel", "East", 1)],
                "attitude": [("Est2_Att", "X", 2)], "gyro bias": [("Est2_State", "GyroBiasX", 1)], "acc bias": [("Est2_State", "AccBiasX", 1)]}
+# Of the first and second of the three, first and third, second and third.
+CORRELATIONS = {"position": ["corr_xy", "corr_xz", "corr_yz"], "velocity": ["corr_v_en", "corr_v_eu", "corr_v_nu"],
+                "attitude": ["corr_tilt_en", "corr_tilt_e_yaw", "corr_tilt_n_yaw"],
+                "gyro bias": [f"corr_gyro_bias_{pair}" for pair in ("xy", "xz", "yz")], "acc bias": [f"corr_acc_bias_{pair}" for pair in ("xy", "xz", "yz")]}
 UNITS = {"position": "m", "velocity": "m/s", "attitude": "rad", "gyro bias": "rad/s", "acc bias": "m/s2"}
 
 ENUMERATIONS = {"kind": "EstimatorKind", "sensor": "Sensor", "verdict": "Verdict", "mode": "Mode", "reset_cause": "ResetCause"}
@@ -232,6 +237,7 @@ class Run:
         held = {name: rows[name][at] for name in ("epoch", "time_s", *Q)}
         for name in STATES[3 + len(Q):]:
             held[name] = held_at(rows["epoch"], rows[name], held["epoch"], HELD_S / TICK_S)
+            held[f"new {name}"] = np.isfinite(rows[name][at])
         pose = self.of(estimator)
         for name in ("x_m", "y_m", "std_x_m", "std_y_m", "std_yaw_rad", "corr_xy", "pos_valid", "hdg_valid"):
             held[name] = held_at(pose["epoch"], pose[name], held["epoch"], HELD_S / TICK_S)
@@ -378,7 +384,6 @@ class Blocks:
         def three(source, names):
             return np.stack([source[name] for name in names], axis=1)
         self.epoch, self.time_s = states["epoch"], states["time_s"]
-        self.corr_xy = states["corr_xy"]
         self.error = {"position": three(states, ["x_m", "y_m", "height_m"]) - three(true, ["x_m", "y_m", "z_m"])}
         self.sigma = {"position": three(states, ["std_x_m", "std_y_m", "std_height_m"])}
         self.error["attitude"] = turns(three(states, Q), quaternion(true["roll_rad"], true["pitch_rad"], true["yaw_rad"]))
@@ -392,20 +397,32 @@ class Blocks:
             self.sigma[name] = np.maximum(self.sigma[name], 0.5 * limits(message, signal)[0])
             rounded = np.array([times * limits(*value)[0] / np.sqrt(12.0) for *value, times in VALUE_STEPS[name]])
             self._judged[name] = np.hypot(self.sigma[name], rounded)
+        self._correlation = {name: three(states, columns) for name, columns in CORRELATIONS.items()}
+        # The page with the correlations came in this very epoch: what turns and accelerates has another covariance a second later.
+        self._whole = {name: states[f"new {columns[1]}"] for name, columns in CORRELATIONS.items()}
         invalid = states["pos_valid"] != 1
         for error in self.error.values():
             error[invalid] = np.nan
 
+    def white(self, name):
+        """Errors in their own sigmas and without correlations, by the factor L of the covariance L L^T: independent with variance 1 where the
+        estimate is what it says. NaN in rows in whose epoch the whole covariance was not said, and where something of it is not known."""
+        use = np.flatnonzero(self._whole[name] & np.isfinite(self.error[name] + self._judged[name] + self._correlation[name]).all(axis=1))
+        # What the values were rounded by is independent: it is in the variances, and not in what two of them share.
+        share = self.sigma[name][use] / self._judged[name][use]
+        matrix = np.tile(np.eye(3), (len(use), 1, 1))
+        for column, (i, j) in enumerate(((0, 1), (0, 2), (1, 2))):
+            matrix[:, i, j] = matrix[:, j, i] = self._correlation[name][use, column] * share[:, i] * share[:, j]
+        # Correlations are rounded, too: below their step nothing is told from none.
+        short = np.maximum(0.0, limits("Est2_Std", "CorrXY")[0] - np.linalg.eigvalsh(matrix)[:, 0]) if len(use) else np.empty(0)
+        matrix += short[:, None, None] * np.eye(3)
+        values = np.full((len(self.epoch), 3), np.nan)
+        values[use] = np.linalg.solve(np.linalg.cholesky(matrix), (self.error[name][use] / self._judged[name][use])[:, :, None])[:, :, 0]
+        return values
+
     def nees(self, name):
-        """Of every row; NaN where something of it is not known."""
-        with np.errstate(invalid="ignore", divide="ignore"):
-            scaled = self.error[name] / self._judged[name]
-            values = (scaled ** 2).sum(axis=1)
-            if name == "position":
-                # Of x and y the correlation is published.
-                r = np.clip(self.corr_xy, -0.999, 0.999)
-                values += (r * r * (scaled[:, 0] ** 2 + scaled[:, 1] ** 2) - 2 * r * scaled[:, 0] * scaled[:, 1]) / (1 - r * r)
-        return np.where(np.isfinite(values), values, np.nan)
+        """Of every row; NaN where white() is."""
+        return (self.white(name) ** 2).sum(axis=1)
 
     def outside(self, name, sigmas=3.0):
         """Rows with an error beyond that many of its published sigmas, in any of the three."""
@@ -581,12 +598,12 @@ def judge(run, estimator, truth, names):
 def block_figures(found, name):
     """RMSE of each of the three, NEES (3 expected), and the share of times at which all three are inside 3 sigma."""
     values = found.nees(name)
-    known = np.isfinite(values)
+    known, both = np.isfinite(values), np.isfinite(found.error[name] + found.sigma[name]).all(axis=1)
     low, high = chi_square(0.025, 3), chi_square(0.975, 3)
     return {"unit": UNITS[name], "rmse": [rms(column) for column in found.error[name].T],
             "nees_mean": float(values[known].mean()) if known.any() else None,
             "nees_inside_two_sided_95": float(((values[known] >= low) & (values[known] <= high)).mean()) if known.any() else None,
-            "inside_3_sigma": float(1 - found.outside(name)[known].mean()) if known.any() else None}
+            "inside_3_sigma": float(1 - found.outside(name)[both].mean()) if both.any() else None}
 
 
 QUIET_S = 2.0  # rejections less than this apart are told as one

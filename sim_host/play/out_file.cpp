@@ -31,7 +31,7 @@ Line& Line::fixed(std::int64_t value, int decimals) {
 }
 
 Line& Line::real(double value, int decimals) {
-  static constexpr std::array<double, 7> kUnit{1, 10, 100, 1e3, 1e4, 1e5, 1e6};
+  static constexpr std::array<double, 8> kUnit{1, 10, 100, 1e3, 1e4, 1e5, 1e6, 1e7};
   const double scaled = value * kUnit[static_cast<std::size_t>(decimals) % kUnit.size()];
   if (!(std::fabs(scaled) < 1e15)) return *this;
   return fixed(std::llround(scaled), decimals);

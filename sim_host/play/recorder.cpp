@@ -46,7 +46,9 @@ Recorder::Recorder(const RecorderOptions& options)
       "acc_bias_y_mps2,acc_bias_z_mps2,gyro_bias_x_radps,gyro_bias_y_radps,gyro_bias_z_radps,std_v_east_mps,"
       "std_v_north_mps,std_v_up_mps,std_tilt_east_rad,std_tilt_north_rad,std_acc_bias_x_mps2,std_acc_bias_y_mps2,"
       "std_acc_bias_z_mps2,std_gyro_bias_x_radps,std_gyro_bias_y_radps,std_gyro_bias_z_radps,jump_x_m,jump_y_m,"
-      "jump_yaw_rad,disagree_tilt_rad,disagree_yaw_rad,vib_accel_mps2,vib_gyro_radps,clipped,jump_z_m\n");
+      "jump_yaw_rad,disagree_tilt_rad,disagree_yaw_rad,vib_accel_mps2,vib_gyro_radps,clipped,jump_z_m,corr_xz,corr_yz,"
+      "corr_v_en,corr_v_eu,corr_v_nu,corr_tilt_en,corr_tilt_e_yaw,corr_tilt_n_yaw,corr_acc_bias_xy,corr_acc_bias_xz,"
+      "corr_acc_bias_yz,corr_gyro_bias_xy,corr_gyro_bias_xz,corr_gyro_bias_yz\n");
   innovations_.write("epoch,time_s,estimator,sensor,inst,verdict,dof,nis,ratio,age_ms,landmark\n");
   sensors_.write("epoch,time_s,estimator,sensor,inst,accepted,rejected,nis_mean,age_s\n");
   status_.write("epoch,time_s,mode,used,faults,reset_ctr,reset_cause\n");
@@ -157,11 +159,20 @@ void Recorder::state(State& state, std::uint32_t offset, std::span<const std::ui
   page(26, &EstStateJump::jump_x_m, &EstStateJump::jump_y_m, &EstStateJump::jump_yaw_rad);
   page(29, &EstStateDisagreement::disagree_tilt_rad, &EstStateDisagreement::disagree_yaw_rad);
   page(31, &EstStateImuHealth::vib_accel_mps2, &EstStateImuHealth::vib_gyro_radps, &EstStateImuHealth::clipped);
+  using can::EstStateCorrPos, can::EstStateCorrVel, can::EstStateCorrTilt;
+  using can::EstStateCorrAccBias, can::EstStateCorrGyroBias;
+  page(35, &EstStateCorrPos::corr_xz, &EstStateCorrPos::corr_yz);
+  page(37, &EstStateCorrVel::corr_vel_en, &EstStateCorrVel::corr_vel_eu, &EstStateCorrVel::corr_vel_nu);
+  page(40, &EstStateCorrTilt::corr_tilt_en, &EstStateCorrTilt::corr_tilt_e_yaw, &EstStateCorrTilt::corr_tilt_n_yaw);
+  page(43, &EstStateCorrAccBias::corr_acc_bias_xy, &EstStateCorrAccBias::corr_acc_bias_xz,
+       &EstStateCorrAccBias::corr_acc_bias_yz);
+  page(46, &EstStateCorrGyroBias::corr_gyro_bias_xy, &EstStateCorrGyroBias::corr_gyro_bias_xz,
+       &EstStateCorrGyroBias::corr_gyro_bias_yz);
 }
 
 void Recorder::state_row(std::size_t k, const State& state) {
   row(time_).integer(static_cast<std::int64_t>(k));
-  for (const double value : state.values) line_.put(',').real(value, 6);
+  for (const double value : state.values) line_.put(',').real(value, 7);
   states_.write(line_.put('\n').view());
 }
 

@@ -67,7 +67,7 @@ class Recorder {
   };
   /// A row of states.csv: empty is what this epoch does not say.
   struct State {
-    static constexpr std::size_t kColumns = 35;
+    static constexpr std::size_t kColumns = 49;
     std::array<double, kColumns> values{};
     bool said = false;
   };

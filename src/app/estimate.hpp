@@ -11,6 +11,7 @@
 #include "nav/ins_covariance_entry.hpp"
 #include "nav/ins_state.hpp"
 
+#include <array>
 #include <cstdint>
 
 namespace tetap::app {
@@ -67,6 +68,20 @@ struct InertialEstimate {
   template <int kI>
   [[nodiscard]] float sigma() const {
     return base::sqrt(covariance<kI>());
+  }
+  /// Three errors that belong together (position, velocity, ...): 1 sigma of each, and their correlations.
+  struct Block {
+    std::array<float, 3> sigma;
+    float corr_01, corr_02, corr_12;
+  };
+  /// Of errors kFirst, kFirst + 1 and kFirst + 2.
+  template <int kFirst>
+  [[nodiscard]] Block block() const {
+    const std::array<float, 3> s{sigma<kFirst>(), sigma<kFirst + 1>(), sigma<kFirst + 2>()};
+    return {.sigma = s,
+            .corr_01 = covariance<kFirst, kFirst + 1>() / (s[0] * s[1]),
+            .corr_02 = covariance<kFirst, kFirst + 2>() / (s[0] * s[2]),
+            .corr_12 = covariance<kFirst + 1, kFirst + 2>() / (s[1] * s[2])};
   }
 };
 

@@ -54,14 +54,19 @@ void put_diagnostics(std::uint32_t page, const Counters& c, const LoopHealth& l,
   }
 }
 
+/// One page, and with the sigmas of three errors their correlations: a covariance whole, of one epoch.
 template <class Put>
 void put_state_page(std::uint32_t page, const InertialEstimate& e, std::uint8_t tag, Put&& put) {
   const nav::InsState& x = e.state;
+  using Block = InertialEstimate::Block;
   switch (page % 9) {
-    case 0:
+    case 0: {
+      const Block b = e.block<nav::InsState::kPosition>();
       put(can::EstStateHeight{
-          .epoch = tag, .height_m = base::metres(x.z.um()), .std_height_m = e.sigma<2>(), .jump_z_m = e.jump.up_m});
+          .epoch = tag, .height_m = base::metres(x.z.um()), .std_height_m = b.sigma[2], .jump_z_m = e.jump.up_m});
+      put(can::EstStateCorrPos{.epoch = tag, .corr_xz = b.corr_02, .corr_yz = b.corr_12});
       break;
+    }
     case 1:
       put(can::EstStateAccBias{.epoch = tag,
                                .acc_bias_x_mps2 = x.b_a_mps2(0),
@@ -74,27 +79,45 @@ void put_state_page(std::uint32_t page, const InertialEstimate& e, std::uint8_t 
                                 .gyro_bias_y_radps = x.b_g_radps(1),
                                 .gyro_bias_z_radps = x.b_g_radps(2)});
       break;
-    case 3:
+    case 3: {
+      const Block b = e.block<nav::InsState::kVelocity>();
       put(can::EstStateStdVel{.epoch = tag,
-                              .std_vel_east_mps = e.sigma<3>(),
-                              .std_vel_north_mps = e.sigma<4>(),
-                              .std_vel_up_mps = e.sigma<5>()});
+                              .std_vel_east_mps = b.sigma[0],
+                              .std_vel_north_mps = b.sigma[1],
+                              .std_vel_up_mps = b.sigma[2]});
+      put(can::EstStateCorrVel{
+          .epoch = tag, .corr_vel_en = b.corr_01, .corr_vel_eu = b.corr_02, .corr_vel_nu = b.corr_12});
       break;
-    case 4:
-      put(can::EstStateStdTilt{.epoch = tag, .std_tilt_east_rad = e.sigma<6>(), .std_tilt_north_rad = e.sigma<7>()});
+    }
+    case 4: {
+      const Block b = e.block<nav::InsState::kAttitude>();
+      put(can::EstStateStdTilt{.epoch = tag, .std_tilt_east_rad = b.sigma[0], .std_tilt_north_rad = b.sigma[1]});
+      put(can::EstStateCorrTilt{
+          .epoch = tag, .corr_tilt_en = b.corr_01, .corr_tilt_e_yaw = b.corr_02, .corr_tilt_n_yaw = b.corr_12});
       break;
-    case 5:
+    }
+    case 5: {
+      const Block b = e.block<nav::InsState::kAccelBias>();
       put(can::EstStateStdAccBias{.epoch = tag,
-                                  .std_acc_bias_x_mps2 = e.sigma<9>(),
-                                  .std_acc_bias_y_mps2 = e.sigma<10>(),
-                                  .std_acc_bias_z_mps2 = e.sigma<11>()});
+                                  .std_acc_bias_x_mps2 = b.sigma[0],
+                                  .std_acc_bias_y_mps2 = b.sigma[1],
+                                  .std_acc_bias_z_mps2 = b.sigma[2]});
+      put(can::EstStateCorrAccBias{
+          .epoch = tag, .corr_acc_bias_xy = b.corr_01, .corr_acc_bias_xz = b.corr_02, .corr_acc_bias_yz = b.corr_12});
       break;
-    case 6:
+    }
+    case 6: {
+      const Block b = e.block<nav::InsState::kGyroBias>();
       put(can::EstStateStdGyroBias{.epoch = tag,
-                                   .std_gyro_bias_x_radps = e.sigma<12>(),
-                                   .std_gyro_bias_y_radps = e.sigma<13>(),
-                                   .std_gyro_bias_z_radps = e.sigma<14>()});
+                                   .std_gyro_bias_x_radps = b.sigma[0],
+                                   .std_gyro_bias_y_radps = b.sigma[1],
+                                   .std_gyro_bias_z_radps = b.sigma[2]});
+      put(can::EstStateCorrGyroBias{.epoch = tag,
+                                    .corr_gyro_bias_xy = b.corr_01,
+                                    .corr_gyro_bias_xz = b.corr_02,
+                                    .corr_gyro_bias_yz = b.corr_12});
       break;
+    }
     case 7:
       put(can::EstStateJump{
           .epoch = tag, .jump_x_m = e.jump.east_m, .jump_y_m = e.jump.north_m, .jump_yaw_rad = e.jump.yaw_rad});

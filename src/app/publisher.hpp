@@ -194,12 +194,13 @@ void Publisher<N>::estimate(std::size_t instance, can::EstimatorKind kind, bool 
   }
 }
 
-/// Attitude and velocity; of the rest one page at a time.
+/// Attitude and velocity; of the rest one page at a time, in an epoch that has these where the periods allow it: what
+/// turns and accelerates is to be judged by the covariance of its own time.
 template <std::size_t N>
 template <class Inertial, class Send>
 void Publisher<N>::inertial(std::size_t instance, Inertial&& inertial, Send& send) {
   const bool motion = every(numbers_.publish.attitude_every, 2);
-  const bool page = every(numbers_.publish.state_every, 4);
+  const bool page = every(numbers_.publish.state_every, 2);
   if (!motion && !page) return;
   const InertialEstimate e = inertial();
   if (!e.valid) return;

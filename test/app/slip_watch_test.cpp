@@ -40,7 +40,9 @@ class Drive {
                       {.forward_mps = forward_mps + follow, .sigma_mps = sigma_mps, .turn_mps = kTrack_m * turn_radps},
                       {us_}, n);
   }
-  bool gnss(float sigma = 0.05F) { return watch.ground(forward_mps, sigma, {us_}, n); }
+  bool gnss(float sigma = 0.05F) {
+    return watch.ground(forward_mps, forward_mps + 0.5F * (left_slip_mps + right_slip_mps), sigma, {us_}, n);
+  }
 
  private:
   std::int64_t us_ = 1'000'000;

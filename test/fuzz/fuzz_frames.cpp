@@ -90,7 +90,8 @@ bool decodes(std::uint32_t offset, std::span<const std::uint8_t> p) {
       case can::EstStateHeight::kOffset:
         return one_of<can::EstStateHeight, can::EstStateAccBias, can::EstStateGyroBias, can::EstStateStdVel,
                       can::EstStateStdTilt, can::EstStateStdAccBias, can::EstStateStdGyroBias, can::EstStateJump,
-                      can::EstStateDisagreement, can::EstStateImuHealth>(p);
+                      can::EstStateDisagreement, can::EstStateImuHealth, can::EstStateCorrPos, can::EstStateCorrVel,
+                      can::EstStateCorrTilt, can::EstStateCorrAccBias, can::EstStateCorrGyroBias>(p);
       default:
         return false;
     }

@@ -276,15 +276,21 @@ def px4(programs, out, name, checks):
     turn, angle = quaternion_apart(q / np.linalg.norm(q, axis=1)[:, None], of("qw", "qx", "qy", "qz"))
     velocity = at(times, states, "v_east_mps", "v_north_mps", "v_up_mps") - of("ve_mps", "vn_mps", "vu_mps")
     position = np.concatenate([at(times, replay.poses, "x_m", "y_m"), at(times, states, "height_m")], axis=1) - of("x_m", "y_m", "z_m")
-    def squares(error, sigma):
-        return np.sum(np.square(error / sigma), axis=1)
 
-    # Velocity and attitude are published without correlations: squared errors in their own sigmas, as many in the mean all the same.
-    p = at(times, replay.poses, "std_x_m", "std_y_m", "corr_xy")
-    x, y, c = position[:, 0] / p[:, 0], position[:, 1] / p[:, 1], p[:, 2]
-    nees = {"position": (x ** 2 - 2 * c * x * y + y ** 2) / (1 - c ** 2) + squares(position[:, 2:], at(times, states, "std_height_m")),
-            "velocity": squares(velocity, at(times, states, "std_v_east_mps", "std_v_north_mps", "std_v_up_mps")),
-            "attitude": squares(turn, np.concatenate([at(times, states, "std_tilt_east_rad", "std_tilt_north_rad"), at(times, replay.poses, "std_yaw_rad")], axis=1))}
+    def squares(error, sigma, correlation):
+        matrix = np.tile(np.eye(3), (len(error), 1, 1))
+        for column, (i, j) in enumerate(((0, 1), (0, 2), (1, 2))):
+            matrix[:, i, j] = matrix[:, j, i] = correlation[:, column]
+        scaled = (error / sigma)[:, :, None]
+        return (scaled * np.linalg.solve(matrix, scaled)).sum(axis=(1, 2))
+
+    plane = at(times, replay.poses, "std_x_m", "std_y_m", "corr_xy", "std_yaw_rad")
+    nees = {"position": squares(position, np.concatenate([plane[:, :2], at(times, states, "std_height_m")], axis=1),
+                                np.concatenate([plane[:, 2:3], at(times, states, "corr_xz", "corr_yz")], axis=1)),
+            "velocity": squares(velocity, at(times, states, "std_v_east_mps", "std_v_north_mps", "std_v_up_mps"),
+                                at(times, states, "corr_v_en", "corr_v_eu", "corr_v_nu")),
+            "attitude": squares(turn, np.concatenate([at(times, states, "std_tilt_east_rad", "std_tilt_north_rad"), plane[:, 3:]], axis=1),
+                                at(times, states, "corr_tilt_en", "corr_tilt_e_yaw", "corr_tilt_n_yaw"))}
     print(f"PX4's log {name}, against PX4's own EKF2, from {CONVERGED_S:.0f} s on:")
     sensors = replay.sensors()
     sensor_lines(name, sensors)

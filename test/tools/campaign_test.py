@@ -60,6 +60,26 @@ class Averages(unittest.TestCase):
         lasting = [{"epochs": np.arange(1000.0), "nees": np.full(1000, random.chisquare(3))} for _ in range(30)]
         self.assertGreater(judge.anees(lasting)["mean_plus_minus"], 10 * judge.anees(drawn(30, 1000))["mean_plus_minus"])
 
+    def test_what_chance_leaves_of_a_right_filter_is_less_where_errors_last(self):
+        random = np.random.default_rng(4)
+        times, seeds = 1000, 30
+
+        def runs(keep, scale=1.0):
+            """First-order Gauss-Markov errors of variance scale^2 that keep so much of themselves from one time to the next."""
+            white = [random.standard_normal((seeds, 3))]
+            while len(white) < times:
+                white.append(keep * white[-1] + np.sqrt(1 - keep ** 2) * random.standard_normal((seeds, 3)))
+            return [{"epochs": np.arange(times), "white": scale * np.array(white)[:, k]} for k in range(seeds)]
+        short, long, sure = judge.by_chance(runs(0.0)), judge.by_chance(runs(0.99)), judge.by_chance(runs(0.99, 2.0))
+        self.assertAlmostEqual(short["median"], 0.95, delta=0.01)
+        # Thirty seeds show correlations between times that chance made: it comes out a little low.
+        self.assertAlmostEqual(short["least"], 0.95 - 1.64 * np.sqrt(0.05 * 0.95 / times), delta=0.03)
+        self.assertGreater(long["median"], 0.94)
+        self.assertTrue(0.70 < long["least"] < 0.91, long)
+        # What a right filter would have does not follow from how large the errors are.
+        self.assertAlmostEqual(sure["median"], long["median"], delta=0.02)
+        self.assertIsNone(judge.by_chance(runs(0.0)[:29]))
+
     def test_only_times_that_every_seed_has_are_averaged(self):
         runs = drawn(3, 10)
         runs[1]["nees"][4] = np.nan

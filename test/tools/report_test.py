@@ -477,26 +477,34 @@ class BadInput(Case):
 class Inertial(Case):
     """What is said of all fifteen states, against draws and closed forms."""
     count = 4000
-    std = {"velocity": 0.05, "attitude": 0.01, "gyro bias": 2e-4, "acc bias": 0.02}
+    std = {"position": 0.3, "velocity": 0.05, "attitude": 0.01, "gyro bias": 2e-4, "acc bias": 0.02}
+    # Of first and second, first and third, second and third.
+    corr = {"position": (0.9, 0.3, 0.2), "velocity": (-0.95, 0.3, -0.2), "attitude": (0.2, -0.6, 0.5), "gyro bias": (0.7, 0.1, 0.6), "acc bias": (0, 0, 0.98)}
 
-    def inertial(self, scale=1.0, turn=0.0):
-        """A robot at rest at the origin whose estimate errs as it says, times `scale`; `turn`: by how much it is off about the vertical too."""
+    def inertial(self, scale=1.0, turn=0.0, between=1.0):
+        """A robot at rest at the origin whose estimate errs as it says, times `scale`; `turn`: by how much it is off about the vertical too;
+        `between`: how much larger its velocity's error is in every second epoch, which says no covariance of it."""
         random = np.random.default_rng(5)
         n = self.count
         epoch = 1.0 + np.arange(n)
         time_s = 0.01 * epoch
-        draw = {name: scale * random.normal(0, sigma, (n, 3)) for name, sigma in self.std.items()}
-        xy = scale * random.multivariate_normal([0, 0], 0.09 * np.array([[1, 0.9], [0.9, 1]]), n)
-        rows = [[epoch[i], time_s[i], 2, 6, *xy[i], 0, 0, 0, 0.3, 0.3, self.std["attitude"], 0.9, 0, 0, 1, 1, 0.05, 0.02] for i in range(n)]
+        draw = {}
+        for name, sigma in self.std.items():
+            a, b, c = self.corr[name]
+            draw[name] = random.multivariate_normal([0, 0, 0], (scale * sigma) ** 2 * np.array([[1, a, b], [a, 1, c], [b, c, 1]]), n)
+        draw["velocity"][1::2] *= between
+        position = draw["position"]
+        rows = [[epoch[i], time_s[i], 2, 6, *position[i, :2], 0, 0, 0, 0.3, 0.3, self.std["attitude"], 0.9, 0, 0, 1, 1, 0.05, 0.02] for i in range(n)]
         self.write_rows("estimates.csv", metrics.ESTIMATES, rows)
         angle = draw["attitude"] + [0, 0, turn]
         length = np.linalg.norm(angle, axis=1, keepdims=True)
         q = np.hstack([np.cos(length / 2), angle / length * np.sin(length / 2)])
         sigmas = {"velocity": self.std["velocity"], "gyro bias": self.std["gyro bias"], "acc bias": self.std["acc bias"]}
-        up = scale * random.normal(0, 0.5, n)
         self.write_rows("states.csv", metrics.STATES, [
-            [epoch[i], time_s[i], 2, *q[i], *draw["velocity"][i], up[i], 0.5, *draw["acc bias"][i], *draw["gyro bias"][i], *[sigmas["velocity"]] * 3,
-             *[self.std["attitude"]] * 2, *[sigmas["acc bias"]] * 3, *[sigmas["gyro bias"]] * 3, *[None] * 9] for i in range(n)])
+            [epoch[i], time_s[i], 2, *q[i], *draw["velocity"][i], position[i, 2], 0.3, *draw["acc bias"][i], *draw["gyro bias"][i],
+             *[sigmas["velocity"]] * 3, *[self.std["attitude"]] * 2, *[sigmas["acc bias"]] * 3, *[sigmas["gyro bias"]] * 3, *[None] * 9,
+             *self.corr["position"][1:], *(self.corr["velocity"] if i % 2 == 0 or between == 1.0 else [None] * 3), *self.corr["attitude"],
+             *self.corr["acc bias"], *self.corr["gyro bias"]] for i in range(n)])
         self.write("run.json", json.dumps(RUN))
         self.write_rows("t.truth.csv", [*metrics.TRUTH, "epoch", *metrics.TRUTH_MORE],
                         [[time_s[i], 0, 0, 0, epoch[i], *[0] * len(metrics.TRUTH_MORE)] for i in range(n)])
@@ -515,6 +523,11 @@ class Inertial(Case):
         for name in metrics.BLOCKS:
             self.assertAlmostEqual(fused["blocks"][name]["nees_mean"], 12.0, delta=1.0, msg=name)
             self.assertLess(fused["blocks"][name]["inside_3_sigma"], 0.75, name)
+
+    def test_an_error_is_judged_by_the_covariance_of_its_own_epoch(self):
+        blocks = self.summary("--truth", self.inertial(between=10.0))["fused"]["blocks"]
+        self.assertAlmostEqual(blocks["velocity"]["nees_mean"], 3.0, delta=0.25)
+        self.assertLess(blocks["velocity"]["inside_3_sigma"], 0.8)  # of every epoch
 
     def test_a_turn_about_the_vertical_is_heading_and_no_tilt(self):
         fused = self.summary("--truth", self.inertial(1e-6, turn=0.3))["fused"]
@@ -563,7 +576,7 @@ class Inertial(Case):
         self.write_rows("innovations.csv", metrics.INNOVATIONS, [[100 + i, 1.0 + 0.2 * i, *row[2:]] for i in range(5)] + [[900, 9.0, *row[2:]]])
         self.write_rows("status.csv", metrics.STATUS, [[i * 10, 0.1 * i, 5 if 12 <= i < 20 else 3, 0 if 40 <= i < 55 else 32, 2 if 12 <= i < 20 else 0, int(i >= 30), 6]
                                                        for i in range(1, 60)])
-        self.write_rows("states.csv", metrics.STATES, [[310, 3.1, 2, *[None] * 26, 99.5, -0.25, 0.01, *[None] * 5, 3.5]])
+        self.write_rows("states.csv", metrics.STATES, [[310, 3.1, 2, *[None] * 26, 99.5, -0.25, 0.01, *[None] * 5, 3.5, *[None] * 14]])
         told = metrics.story(metrics.Run(self.directory))
         words = [text for _, text in told]
         self.assertEqual([t for t, _ in told], sorted(t for t, _ in told))

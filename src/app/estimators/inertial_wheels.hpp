@@ -126,7 +126,8 @@ inline nav::Vector3 Inertial::axle_mps(const nav::Vector3& v_n_mps, const Contex
   // A heading that is not known turns speed ahead into speed sideways: its doubt counts here.
   const float v2 = v_n_mps(0) * v_n_mps(0) + v_n_mps(1) * v_n_mps(1);
   const float yaw2 = heading_rad2();
-  if (slip_.ground(v_b_mps(0), base::sqrt(sigma_mps * sigma_mps + v2 * yaw2 * yaw2), stamp, with.numbers.inertial))
+  const float sigma = base::sqrt(sigma_mps * sigma_mps + v2 * yaw2 * yaw2);
+  if (slip_.ground(v_b_mps(0), rolled_mps_, sigma, stamp, with.numbers.inertial))
     doubt(base::sqrt(off2), 0.0F);
 }
 

@@ -28,6 +28,7 @@ class SameAgain {
   [[nodiscard]] bool stuck(base::Micros at) const { return stuck_ && at - heard_ < base::Micros{2'000'000}; }
   template <class Sink>
   void each_bit(Sink&& sink) const {
+    sink(heard_.us);
     for (const float v : last_) sink(v);
     sink(static_cast<std::uint32_t>(times_ | (stuck_ ? 256U : 0U)));
   }

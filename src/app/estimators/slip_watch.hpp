@@ -30,7 +30,6 @@ class SlipWatch {
     if (!(n.slip_mps > 0)) return Slip::kNone;
     const base::Micros since = stamp - heard_;
     heard_ = stamp;
-    mean_mps_ = 0.5F * (w.left_mps + w.right_mps);
     const float dt_s = since.us > 0 && since < kGap ? base::seconds(since) : 0.0F;
     const float share = dt_s / (kSmooth_s + dt_s);
     off_left_mps_ += share * (w.left_mps - m.forward_mps + 0.5F * m.turn_mps - off_left_mps_);
@@ -53,11 +52,11 @@ class SlipWatch {
     return slip_;
   }
 
-  /// What GNSS says the speed is. True when from now on it contradicts the wheels, so that what was taken from them is
-  /// as doubtful as they are: that is, for the second time in a row.
-  bool ground(float forward_mps, float sigma_mps, base::Micros stamp, const InertialNumbers& n) {
+  /// What GNSS says the speed is, and what wheels said last. True when from now on it contradicts them, so that what was
+  /// taken from them is as doubtful as they are: that is, for the second time in a row.
+  bool ground(float forward_mps, float rolled_mps, float sigma_mps, base::Micros stamp, const InertialNumbers& n) {
     if (!(n.slip_mps > 0) || stamp - heard_ > kGap) return false;
-    const bool off = magnitude(mean_mps_ - forward_mps) > allowed(forward_mps, n) + 3.0F * sigma_mps;
+    const bool off = magnitude(rolled_mps - forward_mps) > allowed(forward_mps, n) + 3.0F * sigma_mps;
     if (!off || stamp - grounded_ > kGroundGap) ground_ = 0;
     grounded_ = stamp;
     if (!off || ground_ >= kTwice) return false;
@@ -72,7 +71,6 @@ class SlipWatch {
   void each_bit(Sink&& sink) const {
     sink(off_left_mps_);
     sink(off_right_mps_);
-    sink(mean_mps_);
     for (const base::Micros at : {heard_, seen_, grounded_}) sink(at.us);
     sink(static_cast<std::uint32_t>(static_cast<unsigned>(slip_) | static_cast<unsigned>(ground_) << 8U));
   }
@@ -94,7 +92,7 @@ class SlipWatch {
     return left > right ? Slip::kLeft : Slip::kRight;
   }
 
-  float off_left_mps_ = 0, off_right_mps_ = 0, mean_mps_ = 0;
+  float off_left_mps_ = 0, off_right_mps_ = 0;
   base::Micros heard_, seen_, grounded_;
   Slip slip_ = Slip::kNone;
   std::uint8_t ground_ = 0;  ///< times in a row that GNSS contradicted
