@@ -1266,14 +1266,14 @@ struct EstStateStdVel {
   static constexpr Signal kMux{.start = 0, .length = 4};
   static constexpr std::uint8_t kPage = 3;
   static constexpr Signal kEpoch{.start = 4, .length = 4, .wraps = true};
-  static constexpr Signal kStdVelEast{.start = 8, .length = 18, .has_gap = true, .per_unit = 10000};
-  static constexpr Signal kStdVelNorth{.start = 26, .length = 18, .has_gap = true, .per_unit = 10000};
-  static constexpr Signal kStdVelUp{.start = 44, .length = 18, .has_gap = true, .per_unit = 10000};
+  static constexpr Signal kStdVelEast{.start = 8, .length = 18, .has_gap = true, .per_unit = 20000};
+  static constexpr Signal kStdVelNorth{.start = 26, .length = 18, .has_gap = true, .per_unit = 20000};
+  static constexpr Signal kStdVelUp{.start = 44, .length = 18, .has_gap = true, .per_unit = 20000};
 
   std::uint8_t epoch = 0;  ///< low bits of the epoch, the same in all frames of one epoch
-  float std_vel_east_mps = 0;  ///< 1-sigma of the velocity towards east; 0 to 26.2142 m/s in steps of 0.0001; NaN: not available
-  float std_vel_north_mps = 0;  ///< 1-sigma of the velocity towards north; 0 to 26.2142 m/s in steps of 0.0001; NaN: not available
-  float std_vel_up_mps = 0;  ///< 1-sigma of the velocity towards up; 0 to 26.2142 m/s in steps of 0.0001; NaN: not available
+  float std_vel_east_mps = 0;  ///< 1-sigma of the velocity towards east; 0 to 13.1071 m/s in steps of 0.00005; NaN: not available
+  float std_vel_north_mps = 0;  ///< 1-sigma of the velocity towards north; 0 to 13.1071 m/s in steps of 0.00005; NaN: not available
+  float std_vel_up_mps = 0;  ///< 1-sigma of the velocity towards up; 0 to 13.1071 m/s in steps of 0.00005; NaN: not available
 
   template <class Self, class Visit>
   static constexpr void each(Self& m, Visit&& visit) {

@@ -54,7 +54,8 @@ void put_diagnostics(std::uint32_t page, const Counters& c, const LoopHealth& l,
   }
 }
 
-/// One page, and with the sigmas of three errors their correlations: a covariance whole, of one epoch.
+/// One page, and with what has a covariance its sigmas and correlations: whole, and of one epoch. Two turns of nine stay
+/// free, for the bus has no more room (tools/dbc --load).
 template <class Put>
 void put_state_page(std::uint32_t page, const InertialEstimate& e, std::uint8_t tag, Put&& put) {
   const nav::InsState& x = e.state;
@@ -67,17 +68,23 @@ void put_state_page(std::uint32_t page, const InertialEstimate& e, std::uint8_t 
       put(can::EstStateCorrPos{.epoch = tag, .corr_xz = b.corr_02, .corr_yz = b.corr_12});
       break;
     }
-    case 1:
+    case 1: {
+      const Block b = e.block<nav::InsState::kAccelBias>();
       put(can::EstStateAccBias{.epoch = tag,
                                .acc_bias_x_mps2 = x.b_a_mps2(0),
                                .acc_bias_y_mps2 = x.b_a_mps2(1),
                                .acc_bias_z_mps2 = x.b_a_mps2(2)});
+      put(can::EstStateStdAccBias{.epoch = tag,
+                                  .std_acc_bias_x_mps2 = b.sigma[0],
+                                  .std_acc_bias_y_mps2 = b.sigma[1],
+                                  .std_acc_bias_z_mps2 = b.sigma[2]});
+      put(can::EstStateCorrAccBias{
+          .epoch = tag, .corr_acc_bias_xy = b.corr_01, .corr_acc_bias_xz = b.corr_02, .corr_acc_bias_yz = b.corr_12});
       break;
+    }
     case 2:
-      put(can::EstStateGyroBias{.epoch = tag,
-                                .gyro_bias_x_radps = x.b_g_radps(0),
-                                .gyro_bias_y_radps = x.b_g_radps(1),
-                                .gyro_bias_z_radps = x.b_g_radps(2)});
+      put(can::EstStateJump{
+          .epoch = tag, .jump_x_m = e.jump.east_m, .jump_y_m = e.jump.north_m, .jump_yaw_rad = e.jump.yaw_rad});
       break;
     case 3: {
       const Block b = e.block<nav::InsState::kVelocity>();
@@ -89,25 +96,12 @@ void put_state_page(std::uint32_t page, const InertialEstimate& e, std::uint8_t 
           .epoch = tag, .corr_vel_en = b.corr_01, .corr_vel_eu = b.corr_02, .corr_vel_nu = b.corr_12});
       break;
     }
-    case 4: {
-      const Block b = e.block<nav::InsState::kAttitude>();
-      put(can::EstStateStdTilt{.epoch = tag, .std_tilt_east_rad = b.sigma[0], .std_tilt_north_rad = b.sigma[1]});
-      put(can::EstStateCorrTilt{
-          .epoch = tag, .corr_tilt_en = b.corr_01, .corr_tilt_e_yaw = b.corr_02, .corr_tilt_n_yaw = b.corr_12});
-      break;
-    }
     case 5: {
-      const Block b = e.block<nav::InsState::kAccelBias>();
-      put(can::EstStateStdAccBias{.epoch = tag,
-                                  .std_acc_bias_x_mps2 = b.sigma[0],
-                                  .std_acc_bias_y_mps2 = b.sigma[1],
-                                  .std_acc_bias_z_mps2 = b.sigma[2]});
-      put(can::EstStateCorrAccBias{
-          .epoch = tag, .corr_acc_bias_xy = b.corr_01, .corr_acc_bias_xz = b.corr_02, .corr_acc_bias_yz = b.corr_12});
-      break;
-    }
-    case 6: {
       const Block b = e.block<nav::InsState::kGyroBias>();
+      put(can::EstStateGyroBias{.epoch = tag,
+                                .gyro_bias_x_radps = x.b_g_radps(0),
+                                .gyro_bias_y_radps = x.b_g_radps(1),
+                                .gyro_bias_z_radps = x.b_g_radps(2)});
       put(can::EstStateStdGyroBias{.epoch = tag,
                                    .std_gyro_bias_x_radps = b.sigma[0],
                                    .std_gyro_bias_y_radps = b.sigma[1],
@@ -118,15 +112,20 @@ void put_state_page(std::uint32_t page, const InertialEstimate& e, std::uint8_t 
                                     .corr_gyro_bias_yz = b.corr_12});
       break;
     }
-    case 7:
-      put(can::EstStateJump{
-          .epoch = tag, .jump_x_m = e.jump.east_m, .jump_y_m = e.jump.north_m, .jump_yaw_rad = e.jump.yaw_rad});
-      break;
-    default:
+    case 6:
       put(can::EstStateImuHealth{.epoch = tag,
                                  .vib_accel_mps2 = e.imu.vibration_mps2,
                                  .vib_gyro_radps = e.imu.vibration_radps,
                                  .clipped = e.imu.clipped});
+      break;
+    case 7: {
+      const Block b = e.block<nav::InsState::kAttitude>();
+      put(can::EstStateStdTilt{.epoch = tag, .std_tilt_east_rad = b.sigma[0], .std_tilt_north_rad = b.sigma[1]});
+      put(can::EstStateCorrTilt{
+          .epoch = tag, .corr_tilt_en = b.corr_01, .corr_tilt_e_yaw = b.corr_02, .corr_tilt_n_yaw = b.corr_12});
+      break;
+    }
+    default:
       break;
   }
 }
