@@ -37,8 +37,8 @@ def judged(run, truth, job):
             one["blocks"] = {}
             for name in metrics.BLOCKS:
                 white = found.white(name)
-                said = np.isfinite(white).all(axis=1)
-                one["blocks"][name] = {"epochs": found.epoch[said], "white": white[said], "nees": (white[said] ** 2).sum(axis=1),
+                whole = np.isfinite(white).all(axis=1)
+                one["blocks"][name] = {"epochs": found.epoch[whole], "white": white[whole], "nees": (white[whole] ** 2).sum(axis=1),
                                        "rmse": metrics.rms(np.linalg.norm(found.error[name], axis=1)), "inside_3_sigma": inside(found, name)}
         if job.get("fault_times"):
             at = since_start[rows["epoch"].astype(int) - 1]
