@@ -40,8 +40,8 @@ inline constexpr app::Numbers numbers = app::checked({
              .origin_latitude_2ndeg = 24'131'350'000,
              .origin_longitude_2ndeg = 5'834'150'000,
              .origin_height_m = 520},
-    // The vibration of a wheeled robot is far above the data sheet's noise: so much for the accelerometer at 5 m/s, less
-    // below; so much for the gyroscope that a bias that steps does not lead it far. What a wrong scale makes of turns is
+    // The vibration of a wheeled robot is far above the data sheet's noise: so much for the accelerometer as it is at 5
+    // m/s; so much for the gyroscope that a bias that steps does not lead it far. What a wrong scale makes of turns is
     // gyro_scale's.
     .inertial = {.gyro_radps_rthz = 2e-3F, .accel_mps2_rthz = 5e-2F, .constrain_every_us = 20'000},
     // Three estimators share the bus: 591 frames/s at most (tools/dbc --load).

@@ -2,9 +2,8 @@
 """What a recorded run says about its estimators: reading the recorder's tables, comparing with truth.
 
 NEES and its bounds: Bar-Shalom, Li, Kirubarajan, "Estimation with Applications to Tracking and Navigation", section 5.4. The covariance is the
-published one (1-sigma and correlations of Est<k>_Std, the 1-sigma of Est<k>_State), so what is judged is what a user of the bus gets. Velocity,
-attitude and biases are published without correlations: their NEES is the sum of squared errors in units of their own sigmas, whose mean is the
-number of them all the same.
+published one (1-sigma and correlations of Est<k>_Std and Est<k>_State), so what is judged is what a user of the bus gets; by block of three, in
+the epochs that say the block's covariance whole.
 """
 import copy
 import json
@@ -241,6 +240,7 @@ class Run:
         pose = self.of(estimator)
         for name in ("x_m", "y_m", "std_x_m", "std_y_m", "std_yaw_rad", "corr_xy", "pos_valid", "hdg_valid"):
             held[name] = held_at(pose["epoch"], pose[name], held["epoch"], HELD_S / TICK_S)
+            held[f"new {name}"] = np.isin(held["epoch"], pose["epoch"][np.isfinite(pose[name])])
         return held
 
 
@@ -398,8 +398,8 @@ class Blocks:
             rounded = np.array([times * limits(*value)[0] / np.sqrt(12.0) for *value, times in VALUE_STEPS[name]])
             self._judged[name] = np.hypot(self.sigma[name], rounded)
         self._correlation = {name: three(states, columns) for name, columns in CORRELATIONS.items()}
-        # The page with the correlations came in this very epoch: what turns and accelerates has another covariance a second later.
-        self._whole = {name: states[f"new {columns[1]}"] for name, columns in CORRELATIONS.items()}
+        # All of it was said in this very epoch: what turns and accelerates has another covariance a second later.
+        self._whole = {name: np.all([states[f"new {column}"] for column in columns], axis=0) for name, columns in CORRELATIONS.items()}
         invalid = states["pos_valid"] != 1
         for error in self.error.values():
             error[invalid] = np.nan
@@ -414,7 +414,8 @@ class Blocks:
         for column, (i, j) in enumerate(((0, 1), (0, 2), (1, 2))):
             matrix[:, i, j] = matrix[:, j, i] = self._correlation[name][use, column] * share[:, i] * share[:, j]
         # Correlations are rounded, too: below their step nothing is told from none.
-        short = np.maximum(0.0, limits("Est2_Std", "CorrXY")[0] - np.linalg.eigvalsh(matrix)[:, 0]) if len(use) else np.empty(0)
+        least = limits(*(("Est2_Std", "CorrXY") if name == "position" else ("Est2_State", "CorrVelEN")))[0]
+        short = np.maximum(0.0, least - np.linalg.eigvalsh(matrix)[:, 0]) if len(use) else np.empty(0)
         matrix += short[:, None, None] * np.eye(3)
         values = np.full((len(self.epoch), 3), np.nan)
         values[use] = np.linalg.solve(np.linalg.cholesky(matrix), (self.error[name][use] / self._judged[name][use])[:, :, None])[:, :, 0]

@@ -159,8 +159,8 @@ void Recorder::state(State& state, std::uint32_t offset, std::span<const std::ui
   page(26, &EstStateJump::jump_x_m, &EstStateJump::jump_y_m, &EstStateJump::jump_yaw_rad);
   page(29, &EstStateDisagreement::disagree_tilt_rad, &EstStateDisagreement::disagree_yaw_rad);
   page(31, &EstStateImuHealth::vib_accel_mps2, &EstStateImuHealth::vib_gyro_radps, &EstStateImuHealth::clipped);
-  using can::EstStateCorrPos, can::EstStateCorrVel, can::EstStateCorrTilt;
   using can::EstStateCorrAccBias, can::EstStateCorrGyroBias;
+  using can::EstStateCorrPos, can::EstStateCorrVel, can::EstStateCorrTilt;
   page(35, &EstStateCorrPos::corr_xz, &EstStateCorrPos::corr_yz);
   page(37, &EstStateCorrVel::corr_vel_en, &EstStateCorrVel::corr_vel_eu, &EstStateCorrVel::corr_vel_nu);
   page(40, &EstStateCorrTilt::corr_tilt_en, &EstStateCorrTilt::corr_tilt_e_yaw, &EstStateCorrTilt::corr_tilt_n_yaw);

@@ -65,23 +65,19 @@ struct InertialEstimate {
   [[nodiscard]] float covariance() const {
     return nav::predicted_covariance<kI, kJ>(p, ahead);
   }
-  template <int kI>
-  [[nodiscard]] float sigma() const {
-    return base::sqrt(covariance<kI>());
-  }
   /// Three errors that belong together (position, velocity, ...): 1 sigma of each, and their correlations.
   struct Block {
     std::array<float, 3> sigma;
     float corr_01, corr_02, corr_12;
   };
-  /// Of errors kFirst, kFirst + 1 and kFirst + 2.
-  template <int kFirst>
-  [[nodiscard]] Block block() const {
-    const std::array<float, 3> s{sigma<kFirst>(), sigma<kFirst + 1>(), sigma<kFirst + 2>()};
+  /// Of errors first, first + 1 and first + 2, at the present.
+  [[nodiscard]] Block block(int first) const {
+    const filter::Symmetric<float, 3> c = nav::predicted_block(p, ahead, first);
+    const std::array<float, 3> s{base::sqrt(c(0, 0)), base::sqrt(c(1, 1)), base::sqrt(c(2, 2))};
     return {.sigma = s,
-            .corr_01 = covariance<kFirst, kFirst + 1>() / (s[0] * s[1]),
-            .corr_02 = covariance<kFirst, kFirst + 2>() / (s[0] * s[2]),
-            .corr_12 = covariance<kFirst + 1, kFirst + 2>() / (s[1] * s[2])};
+            .corr_01 = c(0, 1) / (s[0] * s[1]),
+            .corr_02 = c(0, 2) / (s[0] * s[2]),
+            .corr_12 = c(1, 2) / (s[1] * s[2])};
   }
 };
 

@@ -202,7 +202,7 @@ struct PublishNumbers {
   std::int32_t diagnostics_every = 12;  ///< one page at a time
   std::int32_t identity_every = 25;     ///< version and origin, one frame at a time
   std::int32_t attitude_every = 5;      ///< attitude and velocity of an inertial estimate
-  std::int32_t state_every = 10;        ///< one page of the rest of it at a time: a multiple of attitude_every
+  std::int32_t state_every = 10;        ///< one page of the rest of it at a time; a multiple of both
   std::int32_t event_every = 2;         ///< at most one innovation per so many ticks
 };
 

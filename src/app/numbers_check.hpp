@@ -156,6 +156,10 @@ consteval Numbers checked(const Numbers& n) {
   require(positive(n.disagreement.tilt_rad) && positive(n.disagreement.heading_rad) && n.disagreement.after_us >= 0,
           "disagreement: angles above 0, after_us not below 0");
 
+  const PublishNumbers& p = n.publish;
+  require((p.attitude_every <= 0 || p.state_every % p.attitude_every == 0) &&
+              (p.std_every <= 0 || p.state_every % p.std_every == 0),
+          "publish.state_every: a multiple of attitude_every and std_every");
   require(positive(n.start.sigma_position_m), "start.sigma_position_m: above 0");
   require(positive(n.start.sigma_yaw_rad), "start.sigma_yaw_rad: above 0");
   require(n.recovery.after_us >= 0 && n.recovery.at_least >= 1, "recovery.after_us not below 0, at_least from 1");

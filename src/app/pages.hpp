@@ -54,22 +54,22 @@ void put_diagnostics(std::uint32_t page, const Counters& c, const LoopHealth& l,
   }
 }
 
-/// One page, and with what has a covariance its sigmas and correlations: whole, and of one epoch. Two turns of nine stay
-/// free, for the bus has no more room (tools/dbc --load).
+/// One page, and with what has a covariance its sigmas and correlations: whole, and of one epoch (with Est_Std, which
+/// has those of x, y and yaw). Two turns of nine stay free, for the bus has no more room (tools/dbc --load).
 template <class Put>
 void put_state_page(std::uint32_t page, const InertialEstimate& e, std::uint8_t tag, Put&& put) {
   const nav::InsState& x = e.state;
   using Block = InertialEstimate::Block;
   switch (page % 9) {
     case 0: {
-      const Block b = e.block<nav::InsState::kPosition>();
+      const Block b = e.block(nav::InsState::kPosition);
       put(can::EstStateHeight{
           .epoch = tag, .height_m = base::metres(x.z.um()), .std_height_m = b.sigma[2], .jump_z_m = e.jump.up_m});
       put(can::EstStateCorrPos{.epoch = tag, .corr_xz = b.corr_02, .corr_yz = b.corr_12});
       break;
     }
     case 1: {
-      const Block b = e.block<nav::InsState::kAccelBias>();
+      const Block b = e.block(nav::InsState::kAccelBias);
       put(can::EstStateAccBias{.epoch = tag,
                                .acc_bias_x_mps2 = x.b_a_mps2(0),
                                .acc_bias_y_mps2 = x.b_a_mps2(1),
@@ -87,17 +87,15 @@ void put_state_page(std::uint32_t page, const InertialEstimate& e, std::uint8_t 
           .epoch = tag, .jump_x_m = e.jump.east_m, .jump_y_m = e.jump.north_m, .jump_yaw_rad = e.jump.yaw_rad});
       break;
     case 3: {
-      const Block b = e.block<nav::InsState::kVelocity>();
-      put(can::EstStateStdVel{.epoch = tag,
-                              .std_vel_east_mps = b.sigma[0],
-                              .std_vel_north_mps = b.sigma[1],
-                              .std_vel_up_mps = b.sigma[2]});
+      const Block b = e.block(nav::InsState::kVelocity);
+      put(can::EstStateStdVel{
+          .epoch = tag, .std_vel_east_mps = b.sigma[0], .std_vel_north_mps = b.sigma[1], .std_vel_up_mps = b.sigma[2]});
       put(can::EstStateCorrVel{
           .epoch = tag, .corr_vel_en = b.corr_01, .corr_vel_eu = b.corr_02, .corr_vel_nu = b.corr_12});
       break;
     }
     case 5: {
-      const Block b = e.block<nav::InsState::kGyroBias>();
+      const Block b = e.block(nav::InsState::kGyroBias);
       put(can::EstStateGyroBias{.epoch = tag,
                                 .gyro_bias_x_radps = x.b_g_radps(0),
                                 .gyro_bias_y_radps = x.b_g_radps(1),
@@ -119,7 +117,7 @@ void put_state_page(std::uint32_t page, const InertialEstimate& e, std::uint8_t 
                                  .clipped = e.imu.clipped});
       break;
     case 7: {
-      const Block b = e.block<nav::InsState::kAttitude>();
+      const Block b = e.block(nav::InsState::kAttitude);
       put(can::EstStateStdTilt{.epoch = tag, .std_tilt_east_rad = b.sigma[0], .std_tilt_north_rad = b.sigma[1]});
       put(can::EstStateCorrTilt{
           .epoch = tag, .corr_tilt_en = b.corr_01, .corr_tilt_e_yaw = b.corr_02, .corr_tilt_n_yaw = b.corr_12});

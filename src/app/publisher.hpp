@@ -67,7 +67,7 @@ class Publisher {
 
   void power_on() {
     epoch_ = 0;
-    frames_ = status_counter_ = page_ = identity_ = statistic_ = state_page_ = 0;
+    frames_ = status_counter_ = page_ = identity_ = statistic_ = 0;
     events_.power_on();
     troubles_.power_on();
   }
@@ -99,7 +99,7 @@ class Publisher {
   /// This estimator's 1 sigma go out in this epoch: the motion's variance is needed then.
   [[nodiscard]] bool says_sigma(std::size_t instance, bool primary) const {
     const PublishNumbers& p = numbers_.publish;
-    return every(primary ? p.std_every : p.side_every, side(instance));
+    return primary ? every(p.std_every, kTogether) : every(p.side_every, side(instance));
   }
   template <class Send>
   void estimate(std::size_t instance, can::EstimatorKind kind, bool primary, const Estimate& e,
@@ -139,6 +139,8 @@ class Publisher {
   [[nodiscard]] bool every(std::int32_t ticks, std::int32_t phase = 0) const {
     return ticks > 0 && (epoch_ + static_cast<std::uint32_t>(phase)) % static_cast<std::uint32_t>(ticks) == 0;
   }
+  /// Phase of what is to be of one epoch: attitude, velocity, sigmas, pages of the primary estimator.
+  static constexpr std::int32_t kTogether = 2;
   /// Spreads the estimators' slow frames over the epochs.
   [[nodiscard]] static std::int32_t side(std::size_t instance) { return static_cast<std::int32_t>(3 * instance); }
   [[nodiscard]] std::uint8_t tag() const { return static_cast<std::uint8_t>(epoch_ & 0x0F); }
@@ -153,7 +155,6 @@ class Publisher {
   std::uint32_t page_ = 0;
   std::uint32_t identity_ = 0;
   std::uint32_t statistic_ = 0;
-  std::uint32_t state_page_ = 0;
   EventQueue events_;
   Troubles troubles_;
 };
@@ -194,13 +195,13 @@ void Publisher<N>::estimate(std::size_t instance, can::EstimatorKind kind, bool 
   }
 }
 
-/// Attitude and velocity; of the rest one page at a time, in an epoch that has these where the periods allow it: what
-/// turns and accelerates is to be judged by the covariance of its own time.
+/// Attitude and velocity; of the rest one page at a time, in an epoch that has these and Est_Std too (numbers_check):
+/// what turns and accelerates is to be judged by the covariance of its own time.
 template <std::size_t N>
 template <class Inertial, class Send>
 void Publisher<N>::inertial(std::size_t instance, Inertial&& inertial, Send& send) {
-  const bool motion = every(numbers_.publish.attitude_every, 2);
-  const bool page = every(numbers_.publish.state_every, 2);
+  const bool motion = every(numbers_.publish.attitude_every, kTogether);
+  const bool page = every(numbers_.publish.state_every, kTogether);
   if (!motion && !page) return;
   const InertialEstimate e = inertial();
   if (!e.valid) return;
@@ -210,7 +211,10 @@ void Publisher<N>::inertial(std::size_t instance, Inertial&& inertial, Send& sen
     put(can::EstVel{.east_mps = x.v_n_mps(0), .north_mps = x.v_n_mps(1), .up_mps = x.v_n_mps(2), .epoch = tag()}, send,
         instance);
   }
-  if (page) put_state_page(state_page_++, e, tag(), [&](const auto& message) { put(message, send, instance); });
+  if (!page) return;
+  // By the epoch, not by how often there was something to say: the same in every run, whenever its filter began.
+  const std::uint32_t turn = (epoch_ + kTogether) / static_cast<std::uint32_t>(numbers_.publish.state_every);
+  put_state_page(turn, e, tag(), [&](const auto& message) { put(message, send, instance); });
 }
 
 /// Attitude, and how far it is from the primary estimator's.

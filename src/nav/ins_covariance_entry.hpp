@@ -12,39 +12,36 @@ namespace tetap::nav {
 
 namespace detail {
 
-/// Row kI of F: the errors that make up error kI after the step, and by how much each.
-template <int kI>
-struct InsRow {
-  static constexpr int kAxis = kI % 3, kGroup = kI - kAxis;
-  static constexpr int kNext = (kAxis + 1) % 3, kLast = (kAxis + 2) % 3;
-  static constexpr auto kOf = [] {
-    constexpr int kV = InsState::kVelocity, kT = InsState::kAttitude, kA = InsState::kAccelBias,
-                  kG = InsState::kGyroBias;
-    if constexpr (kGroup == InsState::kPosition) {
-      return std::array<int, 2>{kI, kV + kAxis};
-    } else if constexpr (kGroup == kV) {
-      return std::array<int, 6>{kI, kT + kNext, kT + kLast, kA, kA + 1, kA + 2};
-    } else if constexpr (kGroup == kT) {
-      return std::array<int, 4>{kI, kG, kG + 1, kG + 2};
-    } else {
-      return std::array<int, 1>{kI};
-    }
-  }();
-  using By = std::array<float, kOf.size()>;
-
-  [[gnu::always_inline]] static By by(const InsCovarianceStep<float>& step) {
-    const auto& r = step.r_dt;
-    if constexpr (kGroup == InsState::kPosition) {
-      return {1.0F, step.dt_s};
-    } else if constexpr (kGroup == InsState::kVelocity) {
-      return {1.0F, step.dv_n_mps(kLast), -step.dv_n_mps(kNext), -r(kAxis, 0), -r(kAxis, 1), -r(kAxis, 2)};
-    } else if constexpr (kGroup == InsState::kAttitude) {
-      return {1.0F, -r(kAxis, 0), -r(kAxis, 1), -r(kAxis, 2)};
-    } else {
-      return {kGroup == InsState::kAccelBias ? step.keep_b_a : step.keep_b_g};
-    }
-  }
+/// Which errors make up error i after the step: those of row i of F.
+struct InsTerms {
+  std::array<int, 6> of{};
+  int count = 0;
 };
+constexpr InsTerms ins_terms(int i) {
+  constexpr int kV = InsState::kVelocity, kT = InsState::kAttitude, kA = InsState::kAccelBias, kG = InsState::kGyroBias;
+  const int axis = i % 3, next = (axis + 1) % 3, last = (axis + 2) % 3;
+  if (i < kV) return {.of = {i, kV + axis}, .count = 2};
+  if (i < kT) return {.of = {i, kT + next, kT + last, kA, kA + 1, kA + 2}, .count = 6};
+  if (i < kA) return {.of = {i, kG, kG + 1, kG + 2}, .count = 4};
+  return {.of = {i}, .count = 1};
+}
+/// And by how much the k-th of them.
+[[gnu::always_inline]] inline float ins_gain(int i, int k, const InsCovarianceStep<float>& step) {
+  const int axis = i % 3, next = (axis + 1) % 3, last = (axis + 2) % 3;
+  if (k == 0) {
+    if (i < InsState::kAccelBias) return 1.0F;
+    return i < InsState::kGyroBias ? step.keep_b_a : step.keep_b_g;
+  }
+  if (i < InsState::kVelocity) return step.dt_s;
+  if (i >= InsState::kAttitude) return -step.r_dt(axis, k - 1);
+  if (k == 1) return step.dv_n_mps(last);
+  return k == 2 ? -step.dv_n_mps(next) : -step.r_dt(axis, k - 3);
+}
+[[gnu::always_inline]] inline float ins_noise(int i, const InsCovarianceStep<float>& step) {
+  const std::array<float, 5> noise{step.var_p, step.var_v, step.var_theta, step.var_b_a, step.var_b_g};
+  const float own = noise[static_cast<std::size_t>(i / 3)];
+  return i == InsState::kAttitude + 2 ? own + step.var_yaw : own;
+}
 
 }  // namespace detail
 
@@ -52,26 +49,42 @@ struct InsRow {
 template <int kI, int kJ>
 [[nodiscard]] inline float predicted_covariance(const filter::Symmetric<float, InsState::kErrors>& p,
                                                 const InsCovarianceStep<float>& step) {
-  using I = detail::InsRow<kI>;
-  using J = detail::InsRow<kJ>;
-  constexpr int kSize = static_cast<int>(J::kOf.size());
-  const typename I::By by_i = I::by(step);
-  const typename J::By by_j = J::by(step);
+  constexpr detail::InsTerms kOfI = detail::ins_terms(kI), kOfJ = detail::ins_terms(kJ);
   float sum = 0;
-  filter::unroll<0, static_cast<int>(I::kOf.size())>([&](auto i) __attribute__((always_inline)) {
+  filter::unroll<0, kOfI.count>([&](auto i) __attribute__((always_inline)) {
     constexpr int kFrom = kI == kJ ? int{i} + 1 : 0;  // what is symmetric is added up once
+    const float by_i = detail::ins_gain(kI, i, step);
     float row = 0;
-    filter::unroll<kFrom, kSize>([&](auto j)
-                                     __attribute__((always_inline)) { row += by_j[j] * p(I::kOf[i], J::kOf[j]); });
-    if constexpr (kI == kJ) row = by_i[i] * p(I::kOf[i], I::kOf[i]) + 2.0F * row;
-    sum += by_i[i] * row;
+    filter::unroll<kFrom, kOfJ.count>([&](auto j) __attribute__((always_inline)) {
+      row += detail::ins_gain(kJ, j, step) * p(kOfI.of[i], kOfJ.of[j]);
+    });
+    if constexpr (kI == kJ) row = by_i * p(kOfI.of[i], kOfI.of[i]) + 2.0F * row;
+    sum += by_i * row;
   });
-  if constexpr (kI == kJ) {
-    const std::array<float, 5> noise{step.var_p, step.var_v, step.var_theta, step.var_b_a, step.var_b_g};
-    sum += noise[static_cast<std::size_t>(kI / 3)];
-    if constexpr (kI == InsState::kAttitude + 2) sum += step.var_yaw;
-  }
+  if constexpr (kI == kJ) sum += detail::ins_noise(kI, step);
   return sum;
+}
+
+/// The same of errors first, first + 1 and first + 2, in one piece of code for all of them: small, and not fast.
+[[nodiscard, gnu::noinline]] inline filter::Symmetric<float, 3> predicted_block(
+    const filter::Symmetric<float, InsState::kErrors>& p, const InsCovarianceStep<float>& step, int first) {
+  filter::Symmetric<float, 3> block;
+  for (int c = 0; c < 3; ++c) {
+    const detail::InsTerms of_c = detail::ins_terms(first + c);
+    for (int r = 0; r <= c; ++r) {
+      const detail::InsTerms of_r = detail::ins_terms(first + r);
+      float sum = r == c ? detail::ins_noise(first + c, step) : 0.0F;
+      for (int i = 0; i < of_r.count; ++i) {
+        float row = 0;
+        for (int j = 0; j < of_c.count; ++j)
+          row += detail::ins_gain(first + c, j, step) *
+                 p(of_r.of[static_cast<std::size_t>(i)], of_c.of[static_cast<std::size_t>(j)]);
+        sum += detail::ins_gain(first + r, i, step) * row;
+      }
+      block(r, c) = sum;
+    }
+  }
+  return block;
 }
 
 }  // namespace tetap::nav

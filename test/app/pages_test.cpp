@@ -4,8 +4,8 @@
 
 #include "can/codec.hpp"
 
-#include <Eigen/Core>
 #include <gtest/gtest.h>
+#include <Eigen/Core>
 
 #include <algorithm>
 #include <array>
@@ -103,8 +103,9 @@ TEST(StatePages, SayTheCovarianceOfThePresentWholeBlockByBlock) {
                 block(6), 2e-3, "attitude");
     const auto h = said.only<can::EstStateHeight>();
     const auto ch = said.only<can::EstStateCorrPos>();
-    expect_near(rebuilt({root(0), root(1), h.std_height_m}, {present(0, 1) / (root(0) * root(1)), ch.corr_xz, ch.corr_yz}),
-                block(0), 2e-3, "position");
+    expect_near(
+        rebuilt({root(0), root(1), h.std_height_m}, {present(0, 1) / (root(0) * root(1)), ch.corr_xz, ch.corr_yz}),
+        block(0), 2e-3, "position");
     const auto a = said.only<can::EstStateStdAccBias>();
     const auto ca = said.only<can::EstStateCorrAccBias>();
     expect_near(rebuilt({a.std_acc_bias_x_mps2, a.std_acc_bias_y_mps2, a.std_acc_bias_z_mps2},
@@ -119,10 +120,11 @@ TEST(StatePages, SayTheCovarianceOfThePresentWholeBlockByBlock) {
   }
 }
 
-/// Half a covariance cannot be judged, nor a bias by the sigma of another time: what belongs together comes together, and
-/// after nine turns all has come.
+/// Half a covariance cannot be judged, nor a bias by the sigma of another time: what belongs together comes together,
+/// and after nine turns all has come.
 TEST(StatePages, ValuesSigmasAndTheirCorrelationsComeTogether) {
-  const filter::Symmetric<float, 15> p = filter::Symmetric<float, 15>::diagonal({1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1});
+  const filter::Symmetric<float, 15> p =
+      filter::Symmetric<float, 15>::diagonal({1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1});
   const InertialEstimate e{.state = {}, .p = p, .ahead = {}, .valid = true};
   std::size_t frames = 0;
   for (std::uint32_t page = 0; page < 9; ++page) {

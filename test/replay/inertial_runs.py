@@ -284,13 +284,20 @@ def px4(programs, out, name, checks):
         scaled = (error / sigma)[:, :, None]
         return (scaled * np.linalg.solve(matrix, scaled)).sum(axis=(1, 2))
 
-    plane = at(times, replay.poses, "std_x_m", "std_y_m", "corr_xy", "std_yaw_rad")
-    nees = {"position": squares(position, np.concatenate([plane[:, :2], at(times, states, "std_height_m")], axis=1),
-                                np.concatenate([plane[:, 2:3], at(times, states, "corr_xz", "corr_yz")], axis=1)),
-            "velocity": squares(velocity, at(times, states, "std_v_east_mps", "std_v_north_mps", "std_v_up_mps"),
-                                at(times, states, "corr_v_en", "corr_v_eu", "corr_v_nu")),
-            "attitude": squares(turn, np.concatenate([at(times, states, "std_tilt_east_rad", "std_tilt_north_rad"), plane[:, 3:]], axis=1),
-                                at(times, states, "corr_tilt_en", "corr_tilt_e_yaw", "corr_tilt_n_yaw"))}
+    def covariance(error, sigmas, correlations):
+        """NEES at the times that say the whole covariance: names of its sigmas and correlations, of states.csv or of estimates.csv."""
+        page = next(one for one in correlations if one in states[0])
+        then = np.array([float(row["time_s"]) for row in states if row[page]])
+        then = then[(then > times[0]) & (then < times[-1])]
+
+        def said(names):
+            return np.concatenate([at(then, states if one in states[0] else replay.poses, one) for one in names], axis=1)
+        return squares(np.stack([np.interp(then, times, axis) for axis in error.T], axis=1), said(sigmas), said(correlations))
+
+    nees = {"position": covariance(position, ["std_x_m", "std_y_m", "std_height_m"], ["corr_xy", "corr_xz", "corr_yz"]),
+            "velocity": covariance(velocity, ["std_v_east_mps", "std_v_north_mps", "std_v_up_mps"], ["corr_v_en", "corr_v_eu", "corr_v_nu"]),
+            "attitude": covariance(turn, ["std_tilt_east_rad", "std_tilt_north_rad", "std_yaw_rad"],
+                                   ["corr_tilt_en", "corr_tilt_e_yaw", "corr_tilt_n_yaw"])}
     print(f"PX4's log {name}, against PX4's own EKF2, from {CONVERGED_S:.0f} s on:")
     sensors = replay.sensors()
     sensor_lines(name, sensors)

@@ -15,6 +15,7 @@
 #include <optional>
 #include <ostream>
 #include <random>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -118,6 +119,46 @@ INSTANTIATE_TEST_SUITE_P(Robots, Order,
                          ::testing::Values(Robot{"rover", robot::rover::numbers, true},
                                            Robot{"rover_landmarks", robot::rover_landmarks::numbers, false}),
                          [](const auto& which) { return std::string(which.param.name); });
+
+/// By epoch, the pages of Est_State; and whether attitude, velocity and Est_Std were in all of those epochs.
+struct SaidPages {
+  std::map<std::size_t, std::set<unsigned>> pages;
+  bool whole = true;
+};
+SaidPages pages_of(const std::vector<Epoch>& epochs) {
+  SaidPages said;
+  std::map<std::size_t, std::set<std::uint32_t>> offsets;
+  run({"rover", robot::rover::numbers, true}, epochs, [&](std::size_t k, const base::CanFrame& frame) {
+    const std::uint32_t offset = frame.id - robot::rover::numbers.can_base;
+    if (offset == can::offset_of<can::EstStateHeight>(2)) said.pages[k].insert(frame.data[0] & 0xFU);
+    if (offset == can::offset_of<can::EstStdPose>(2)) offsets[k].insert(offset + 100 * (frame.data[0] & 1U));
+    if (offset == can::offset_of<can::EstAtt>(2) || offset == can::offset_of<can::EstVel>(2)) offsets[k].insert(offset);
+  });
+  for (const auto& [k, pages] : said.pages) said.whole = said.whole && offsets[k].size() == 4;
+  return said;
+}
+
+// What is averaged over runs, or compared between a robot and its replay, has to come in the same epochs of each; and
+// what turns and accelerates is judged by the covariance of its own time.
+TEST(Covariance, ComesWithWhatItJudgesInTurnsThatTheEpochSays) {
+  World::Options late;
+  late.faults = {{Fault::kMovingStart, base::Micros{0}, base::Micros{3'270'000}}};
+  const SaidPages one = pages_of(made({}, 3, 20)), other = pages_of(made(late, 3, 20));
+  EXPECT_TRUE(one.whole && other.whole);
+  EXPECT_NE(one.pages.begin()->first, 0U);
+  std::size_t compared = 0, missing = 0;
+  for (const auto& [k, pages] : one.pages) {
+    const auto found = other.pages.find(k);
+    if (found == other.pages.end()) {
+      ++missing;
+      continue;
+    }
+    ++compared;
+    EXPECT_EQ(pages, found->second) << "epoch " << k;
+  }
+  EXPECT_GT(compared, 50U);
+  EXPECT_GT(missing, 3U) << "or both began at once";
+}
 
 // An IMU at 200 Hz, a window of half a second: what the receiver said 480 ms ago is fused at its own time, so nothing
 // of the estimate tells when it came.

@@ -304,7 +304,7 @@ class Load(Folder):
         for bitrate, frames, percent, verdict in rows:
             self.assertAlmostEqual(percent, 100 * frames * 135 / bitrate, delta=0.1)
             self.assertEqual(verdict, "ok")
-        self.assertEqual(rows[0], (500000, 585, 15.8, "ok"))
+        self.assertEqual(rows[0], (500000, 591, 15.9, "ok"))
         self.assertEqual([frames - rows[1][1] for _, frames, _, _ in rows[1:]], [0, 300, 900], "three frames per IMU sample")
 
     def test_too_many_frames_fail_with_the_line_that_says_so(self):
