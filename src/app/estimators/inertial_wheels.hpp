@@ -127,8 +127,7 @@ inline nav::Vector3 Inertial::axle_mps(const nav::Vector3& v_n_mps, const Contex
   const float v2 = v_n_mps(0) * v_n_mps(0) + v_n_mps(1) * v_n_mps(1);
   const float yaw2 = heading_rad2();
   const float sigma = base::sqrt(sigma_mps * sigma_mps + v2 * yaw2 * yaw2);
-  if (slip_.ground(v_b_mps(0), rolled_mps_, sigma, stamp, with.numbers.inertial))
-    doubt(base::sqrt(off2), 0.0F);
+  if (slip_.ground(v_b_mps(0), rolled_mps_, sigma, stamp, with.numbers.inertial)) doubt(base::sqrt(off2), 0.0F);
 }
 
 inline Innovation Inertial::forward(const Forward& speed, base::Micros stamp, const Context& with) {

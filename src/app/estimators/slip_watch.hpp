@@ -52,8 +52,8 @@ class SlipWatch {
     return slip_;
   }
 
-  /// What GNSS says the speed is, and what wheels said last. True when from now on it contradicts them, so that what was
-  /// taken from them is as doubtful as they are: that is, for the second time in a row.
+  /// What GNSS says the speed is, and what wheels said last. True when from now on it contradicts them, so that what
+  /// was taken from them is as doubtful as they are: that is, for the second time in a row.
   bool ground(float forward_mps, float rolled_mps, float sigma_mps, base::Micros stamp, const InertialNumbers& n) {
     if (!(n.slip_mps > 0) || stamp - heard_ > kGap) return false;
     const bool off = magnitude(rolled_mps - forward_mps) > allowed(forward_mps, n) + 3.0F * sigma_mps;
