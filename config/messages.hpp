@@ -631,7 +631,7 @@ struct EstStatus {
   bool vel_valid = false;  ///< 1: speed and yaw rate are estimated from live measurements
   bool origin = false;  ///< 1: the origin of the map frame is known, see Est_Origin
   std::uint16_t used = 0;  ///< sensors with a measurement accepted within the last second, bit = Sensor; modulo 2^12
-  std::uint16_t faults = 0;  ///< troubles of the last second, bit = Fault
+  std::uint16_t faults = 0;  ///< troubles of the last second, bit = Fault: 0 InputStale (nothing says how fast it goes), 1 Rejecting (a gate refuses a sensor), 2 Incomplete (a frame of a sample is lost), 3 TooLate (older than the window), 4 Malformed (frame or value that cannot be), 5 Capacity (a queue, map or window was full; Est_Diag says which), 6 CommandRefused, 7 Restarted (by itself), 8 WheelSlip (a wheel spins or is stuck), 9 ImuClipped (beyond its range), 10 Vibration (more than its noise is meant for), 11 SensorStuck (shows the same again and again), 12 MagneticDisturbance, 13 AttitudeDisagrees (attitude filter and primary estimator)
   std::uint8_t reset_ctr = 0;  ///< resets of the estimators since start
   ResetCause reset_cause = ResetCause::kPowerOn;  ///< cause of the last reset
 
@@ -1180,8 +1180,8 @@ struct EstStdMore {
   }
 };
 
-/// Estimator: what only an inertial estimator has, one page per frame; sigmas and their correlations in one epoch.
-/// Instances 0 to 3, ids 6 apart. Page 0.
+/// Estimator: what only an inertial estimator has, one page per frame. A covariance is said whole in one epoch: P_ij
+/// = CorrIJ StdI StdJ; each page comes once in nine turns. Instances 0 to 3, ids 6 apart. Page 0.
 struct EstStateHeight {
   static constexpr std::uint8_t kOffset = 0x2D, kSize = 8;
   static constexpr std::uint8_t kStride = 6, kCount = 4;
@@ -1206,8 +1206,8 @@ struct EstStateHeight {
   }
 };
 
-/// Estimator: what only an inertial estimator has, one page per frame; sigmas and their correlations in one epoch.
-/// Instances 0 to 3, ids 6 apart. Page 1.
+/// Estimator: what only an inertial estimator has, one page per frame. A covariance is said whole in one epoch: P_ij
+/// = CorrIJ StdI StdJ; each page comes once in nine turns. Instances 0 to 3, ids 6 apart. Page 1.
 struct EstStateAccBias {
   static constexpr std::uint8_t kOffset = 0x2D, kSize = 8;
   static constexpr std::uint8_t kStride = 6, kCount = 4;
@@ -1232,8 +1232,8 @@ struct EstStateAccBias {
   }
 };
 
-/// Estimator: what only an inertial estimator has, one page per frame; sigmas and their correlations in one epoch.
-/// Instances 0 to 3, ids 6 apart. Page 2.
+/// Estimator: what only an inertial estimator has, one page per frame. A covariance is said whole in one epoch: P_ij
+/// = CorrIJ StdI StdJ; each page comes once in nine turns. Instances 0 to 3, ids 6 apart. Page 2.
 struct EstStateGyroBias {
   static constexpr std::uint8_t kOffset = 0x2D, kSize = 8;
   static constexpr std::uint8_t kStride = 6, kCount = 4;
@@ -1258,8 +1258,8 @@ struct EstStateGyroBias {
   }
 };
 
-/// Estimator: what only an inertial estimator has, one page per frame; sigmas and their correlations in one epoch.
-/// Instances 0 to 3, ids 6 apart. Page 3.
+/// Estimator: what only an inertial estimator has, one page per frame. A covariance is said whole in one epoch: P_ij
+/// = CorrIJ StdI StdJ; each page comes once in nine turns. Instances 0 to 3, ids 6 apart. Page 3.
 struct EstStateStdVel {
   static constexpr std::uint8_t kOffset = 0x2D, kSize = 8;
   static constexpr std::uint8_t kStride = 6, kCount = 4;
@@ -1284,8 +1284,8 @@ struct EstStateStdVel {
   }
 };
 
-/// Estimator: what only an inertial estimator has, one page per frame; sigmas and their correlations in one epoch.
-/// Instances 0 to 3, ids 6 apart. Page 4.
+/// Estimator: what only an inertial estimator has, one page per frame. A covariance is said whole in one epoch: P_ij
+/// = CorrIJ StdI StdJ; each page comes once in nine turns. Instances 0 to 3, ids 6 apart. Page 4.
 struct EstStateStdTilt {
   static constexpr std::uint8_t kOffset = 0x2D, kSize = 8;
   static constexpr std::uint8_t kStride = 6, kCount = 4;
@@ -1307,8 +1307,8 @@ struct EstStateStdTilt {
   }
 };
 
-/// Estimator: what only an inertial estimator has, one page per frame; sigmas and their correlations in one epoch.
-/// Instances 0 to 3, ids 6 apart. Page 5.
+/// Estimator: what only an inertial estimator has, one page per frame. A covariance is said whole in one epoch: P_ij
+/// = CorrIJ StdI StdJ; each page comes once in nine turns. Instances 0 to 3, ids 6 apart. Page 5.
 struct EstStateStdAccBias {
   static constexpr std::uint8_t kOffset = 0x2D, kSize = 8;
   static constexpr std::uint8_t kStride = 6, kCount = 4;
@@ -1333,8 +1333,8 @@ struct EstStateStdAccBias {
   }
 };
 
-/// Estimator: what only an inertial estimator has, one page per frame; sigmas and their correlations in one epoch.
-/// Instances 0 to 3, ids 6 apart. Page 6.
+/// Estimator: what only an inertial estimator has, one page per frame. A covariance is said whole in one epoch: P_ij
+/// = CorrIJ StdI StdJ; each page comes once in nine turns. Instances 0 to 3, ids 6 apart. Page 6.
 struct EstStateStdGyroBias {
   static constexpr std::uint8_t kOffset = 0x2D, kSize = 8;
   static constexpr std::uint8_t kStride = 6, kCount = 4;
@@ -1359,8 +1359,8 @@ struct EstStateStdGyroBias {
   }
 };
 
-/// Estimator: what only an inertial estimator has, one page per frame; sigmas and their correlations in one epoch.
-/// Instances 0 to 3, ids 6 apart. Page 7.
+/// Estimator: what only an inertial estimator has, one page per frame. A covariance is said whole in one epoch: P_ij
+/// = CorrIJ StdI StdJ; each page comes once in nine turns. Instances 0 to 3, ids 6 apart. Page 7.
 struct EstStateJump {
   static constexpr std::uint8_t kOffset = 0x2D, kSize = 8;
   static constexpr std::uint8_t kStride = 6, kCount = 4;
@@ -1385,8 +1385,8 @@ struct EstStateJump {
   }
 };
 
-/// Estimator: what only an inertial estimator has, one page per frame; sigmas and their correlations in one epoch.
-/// Instances 0 to 3, ids 6 apart. Page 8.
+/// Estimator: what only an inertial estimator has, one page per frame. A covariance is said whole in one epoch: P_ij
+/// = CorrIJ StdI StdJ; each page comes once in nine turns. Instances 0 to 3, ids 6 apart. Page 8.
 struct EstStateDisagreement {
   static constexpr std::uint8_t kOffset = 0x2D, kSize = 8;
   static constexpr std::uint8_t kStride = 6, kCount = 4;
@@ -1408,8 +1408,8 @@ struct EstStateDisagreement {
   }
 };
 
-/// Estimator: what only an inertial estimator has, one page per frame; sigmas and their correlations in one epoch.
-/// Instances 0 to 3, ids 6 apart. Page 9.
+/// Estimator: what only an inertial estimator has, one page per frame. A covariance is said whole in one epoch: P_ij
+/// = CorrIJ StdI StdJ; each page comes once in nine turns. Instances 0 to 3, ids 6 apart. Page 9.
 struct EstStateImuHealth {
   static constexpr std::uint8_t kOffset = 0x2D, kSize = 8;
   static constexpr std::uint8_t kStride = 6, kCount = 4;
@@ -1434,8 +1434,8 @@ struct EstStateImuHealth {
   }
 };
 
-/// Estimator: what only an inertial estimator has, one page per frame; sigmas and their correlations in one epoch.
-/// Instances 0 to 3, ids 6 apart. Page 10.
+/// Estimator: what only an inertial estimator has, one page per frame. A covariance is said whole in one epoch: P_ij
+/// = CorrIJ StdI StdJ; each page comes once in nine turns. Instances 0 to 3, ids 6 apart. Page 10.
 struct EstStateCorrPos {
   static constexpr std::uint8_t kOffset = 0x2D, kSize = 8;
   static constexpr std::uint8_t kStride = 6, kCount = 4;
@@ -1457,8 +1457,8 @@ struct EstStateCorrPos {
   }
 };
 
-/// Estimator: what only an inertial estimator has, one page per frame; sigmas and their correlations in one epoch.
-/// Instances 0 to 3, ids 6 apart. Page 11.
+/// Estimator: what only an inertial estimator has, one page per frame. A covariance is said whole in one epoch: P_ij
+/// = CorrIJ StdI StdJ; each page comes once in nine turns. Instances 0 to 3, ids 6 apart. Page 11.
 struct EstStateCorrVel {
   static constexpr std::uint8_t kOffset = 0x2D, kSize = 8;
   static constexpr std::uint8_t kStride = 6, kCount = 4;
@@ -1483,8 +1483,8 @@ struct EstStateCorrVel {
   }
 };
 
-/// Estimator: what only an inertial estimator has, one page per frame; sigmas and their correlations in one epoch.
-/// Instances 0 to 3, ids 6 apart. Page 12.
+/// Estimator: what only an inertial estimator has, one page per frame. A covariance is said whole in one epoch: P_ij
+/// = CorrIJ StdI StdJ; each page comes once in nine turns. Instances 0 to 3, ids 6 apart. Page 12.
 struct EstStateCorrTilt {
   static constexpr std::uint8_t kOffset = 0x2D, kSize = 8;
   static constexpr std::uint8_t kStride = 6, kCount = 4;
@@ -1509,8 +1509,8 @@ struct EstStateCorrTilt {
   }
 };
 
-/// Estimator: what only an inertial estimator has, one page per frame; sigmas and their correlations in one epoch.
-/// Instances 0 to 3, ids 6 apart. Page 13.
+/// Estimator: what only an inertial estimator has, one page per frame. A covariance is said whole in one epoch: P_ij
+/// = CorrIJ StdI StdJ; each page comes once in nine turns. Instances 0 to 3, ids 6 apart. Page 13.
 struct EstStateCorrAccBias {
   static constexpr std::uint8_t kOffset = 0x2D, kSize = 8;
   static constexpr std::uint8_t kStride = 6, kCount = 4;
@@ -1535,8 +1535,8 @@ struct EstStateCorrAccBias {
   }
 };
 
-/// Estimator: what only an inertial estimator has, one page per frame; sigmas and their correlations in one epoch.
-/// Instances 0 to 3, ids 6 apart. Page 14.
+/// Estimator: what only an inertial estimator has, one page per frame. A covariance is said whole in one epoch: P_ij
+/// = CorrIJ StdI StdJ; each page comes once in nine turns. Instances 0 to 3, ids 6 apart. Page 14.
 struct EstStateCorrGyroBias {
   static constexpr std::uint8_t kOffset = 0x2D, kSize = 8;
   static constexpr std::uint8_t kStride = 6, kCount = 4;

@@ -14,6 +14,9 @@ SEND_TYPES = ("Cyclic", "Event", "NoMsgSendType")
 # What a signal without a unit may be, beside an enum, a mask, a page and a single bit: a checksum, a sequence or a name in numbers.
 # How many there are of something has unit 1.
 NO_QUANTITY = re.compile(r"(Crc|Ctr|Seq|Epoch|Id|Inst|Estimator|Git|Config)$")
+# How a line of a DBC begins, and what stands alone in its list of new symbols (NS_): anything else is dropped by readers without a word.
+LINE = re.compile(r"\s*($|VERSION\s|NS_\s*:|BS_\s*:|BU_\s*:|BO_\s|SG_\s|BO_TX_BU_\s|CM_\s|BA_\s|BA_DEF_\s|BA_DEF_DEF_\s|BA_REL_\s|BA_DEF_REL_\s|"
+                  r"VAL_\s|VAL_TABLE_\s|SIG_VALTYPE_\s|SIG_GROUP_\s|SG_MUL_VAL_\s|EV_\s|[A-Z_]+_\s*$)")
 FAMILY = re.compile(r"^((?:In_Imu|Est))(\d)(_?\w+)$")   # one struct for all instances: In_Imu0Gyro, Est1_Pos
 
 
@@ -132,12 +135,17 @@ class _Text:
             raise Refused("%s: %s" % (path, error.strerror))
         self.path, self.message_line, self.signal_line, self.signals = path, {}, {}, []
         names = {}
-        current = None
+        current, quoted = None, False
         for number, line in enumerate(raw.split(b"\n"), 1):
             try:
                 text = line.decode("ascii")
             except UnicodeDecodeError:
                 raise Refused("%s:%d: not ASCII; readers disagree about anything else" % (path, number))
+            if not quoted and not LINE.match(text):
+                raise Refused("%s:%d: no line of a DBC: %s" % (path, number, text.strip()))
+            within, quoted = quoted, quoted != (text.replace('\\"', "").count('"') % 2 == 1)
+            if within:  # a comment of several lines
+                continue
             message = re.match(r"\s*BO_\s+(\d+)\s+(\w+)\s*:", text)
             signal = re.match(r"\s*SG_\s+(\w+)", text)
             if re.match(r"\s*BO_\s", text) and not message:

@@ -200,6 +200,12 @@ class Refusals(Folder):
         self.assertEqual(result.returncode, 1)
         self.assertIn("Est3_Motion: id is not at an even distance from Est0_Motion", result.stderr)
 
+    def test_a_line_that_readers_would_drop_without_a_word(self):
+        self.refused(' SG_ Reset_What ', ' SGX_ Reset_What ', ": no line of a DBC: SGX_ Reset_What")
+        self.refused('\nBO_ 768 ', '\nthis is garbage\nBO_ 768 ', ": no line of a DBC: this is garbage")
+        # What stands within a comment of several lines is its, and refused as such.
+        self.refused('CM_ SG_ 802 Status_Faults "troubles', 'CM_ SG_ 802 Status_Faults "first\nthis is a comment\ntroubles', "comment is not one plain line")
+
     def test_cycle_time_that_is_missing_or_zero_or_negative(self):
         line = 'BA_ "GenMsgCycleTime" BO_ 800 10;'
         self.refused(line, "", "Est_Epoch", "without GenMsgCycleTime")
