@@ -177,7 +177,7 @@ TEST(GnssSolution, DateAndTimeAreThoseOfTheEpoch) {
           const Report& r = bench.reports[bench.reports.size() - back];
           const auto& epochs = bench.receiver.epochs();
           const Instant& truth = epochs[epochs.size() - back].instant;
-          auto utc = truth.utc(10'000'000);
+          auto utc = truth.utc();
           if (how != Speaks::kNmea) {
             ASSERT_EQ(r.itow_ms, truth.itow_ms);
           }

@@ -1,18 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a u-blox receiver says of a solution, message by message, byte by byte, from the manuals: ZED-F9P interface
-// description (UBX-18010854 R04; "sec." alone is of it), u-blox F9 HPG 1.32 interface description (UBX-22008968) for
-// NAV-COV, u-blox 8 / M8 protocol specification (UBX-13003221) for NAV-SOL. Knows no driver.
+// What a u-blox receiver says of one epoch, as bytes. Manuals: UBX-18010854 (R04) sec. 4 (NMEA), 5.2 to 5.4 (frames),
+// 5.14 (NAV); UBX-22008968 sec. 3.15.2 (NAV-COV); UBX-13003221 (NAV-SOL, NAV-VELNED); UBX-18010802 (UTC).
 #pragma once
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <chrono>
 #include <cmath>
-#include <cstddef>
 #include <cstdint>
 #include <cstdio>
+#include <cstring>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 namespace tetap::fakes::ublox {
@@ -43,6 +42,9 @@ struct Solution {
     const double course = std::atan2(v_mps[0], v_mps[1]) * 180 / M_PI;
     return course < 0 ? course + 360 : course;
   }
+  /// Valid and within the masks: what gnssFixOK says.
+  [[nodiscard]] bool valid() const { return fix >= Fix::k2d; }
+  [[nodiscard]] bool corrected() const { return fix >= Fix::kDifferential; }
 };
 
 /// When it was: GPS week, milliseconds of it, and what the epoch truly lies beside them.
@@ -56,65 +58,81 @@ struct Instant {
     int year, month, day, hour, minute, second;
     std::int64_t nano;
   };
-  /// Rounded to the nearest `grid_ns`, so that `nano` beyond the whole second may be negative (sec. 5.14.11, nano).
-  [[nodiscard]] Utc utc(std::int64_t grid_ns) const {
+
+  /// UBX-18010802, UTC representation: date and time come from rounding to 10 ms, the same in UBX and NMEA; nano is
+  /// what brings them back to the truth: -5 000 000 to 994 999 999.
+  [[nodiscard]] Utc utc() const {
     using namespace std::chrono;
-    const sys_days week_0 = sys_days{year{1980} / 1 / 6};  // IS-GPS-200, sec. 3.3.4
-    const std::int64_t seconds_ns = (std::int64_t{itow_ms} - 1000 * std::int64_t{leap_s}) * 1'000'000;
-    const std::int64_t exact_ns = seconds_ns + beside_ns;
-    const std::int64_t rounded_ns = (exact_ns + grid_ns / 2 + (exact_ns < 0 ? 1 - grid_ns : 0)) / grid_ns * grid_ns;
-    const std::int64_t second = (rounded_ns - (rounded_ns < 0 ? 999'999'999 : 0)) / 1'000'000'000;
-    const sys_seconds whole = week_0 + weeks{week} + seconds{second};
-    const sys_days day = floor<days>(whole);
-    const year_month_day date{day};
-    const hh_mm_ss time{whole - day};
-    return {.year = int{date.year()},
-            .month = static_cast<int>(unsigned{date.month()}),
-            .day = static_cast<int>(unsigned{date.day()}),
-            .hour = static_cast<int>(time.hours().count()),
-            .minute = static_cast<int>(time.minutes().count()),
-            .second = static_cast<int>(time.seconds().count()),
-            .nano = exact_ns - second * 1'000'000'000};
+    // IS-GPS-200 sec. 3.3.4: week 0 began at midnight before 6 January 1980; GPS time has no leap seconds.
+    constexpr sys_days kWeek0{year{1980} / January / 6};
+    const std::int64_t gps_ns = (std::int64_t{week} * 604'800'000 + itow_ms) * 1'000'000 + beside_ns;
+    const std::int64_t utc_ns = gps_ns - std::int64_t{leap_s} * 1'000'000'000;
+    constexpr std::int64_t kGrid_ns = 10'000'000;
+    const auto down = [](std::int64_t ns, std::int64_t grid) { return (ns >= 0 ? ns : ns - grid + 1) / grid; };
+    const std::int64_t shown_ns = down(utc_ns + kGrid_ns / 2, kGrid_ns) * kGrid_ns;
+    const std::int64_t whole_s = down(shown_ns, 1'000'000'000);
+    const sys_seconds at = sys_seconds{kWeek0} + seconds{whole_s};
+    const year_month_day date{floor<days>(at)};
+    const hh_mm_ss clock{at - floor<days>(at)};
+    return {static_cast<int>(date.year()),
+            static_cast<int>(static_cast<unsigned>(date.month())),
+            static_cast<int>(static_cast<unsigned>(date.day())),
+            static_cast<int>(clock.hours().count()),
+            static_cast<int>(clock.minutes().count()),
+            static_cast<int>(clock.seconds().count()),
+            utc_ns - whole_s * 1'000'000'000};
   }
 };
 
-// ---- UBX
+inline constexpr std::uint8_t kNav = 0x01;
+inline constexpr std::uint8_t kNavPosLlh = 0x02, kNavDop = 0x04, kNavSol = 0x06, kNavPvt = 0x07, kNavVelNed = 0x12,
+                              kNavTimeUtc = 0x21, kNavCov = 0x36;
 
-/// Sec. 5.2: preamble, class, ID, little-endian length of the payload; sec. 5.4: 8-bit Fletcher over class to payload.
+/// Sec. 5.4: Fletcher's sum over class, id, length and payload.
+inline std::array<std::uint8_t, 2> checksum(const std::uint8_t* from, std::size_t n) {
+  std::uint8_t a = 0, b = 0;
+  for (std::size_t i = 0; i < n; ++i) {
+    a = static_cast<std::uint8_t>(a + from[i]);
+    b = static_cast<std::uint8_t>(b + a);
+  }
+  return {a, b};
+}
+
+/// Sec. 5.2: two sync bytes, class, id, length without frame, payload, checksum.
 inline Bytes frame(std::uint8_t message_class, std::uint8_t id, const Bytes& payload) {
-  Bytes out{0xB5,
-            0x62,
-            message_class,
-            id,
-            static_cast<std::uint8_t>(payload.size()),
-            static_cast<std::uint8_t>(payload.size() >> 8)};
-  out.insert(out.end(), payload.begin(), payload.end());
-  unsigned a = 0, b = 0;
-  for (std::size_t i = 2; i < out.size(); ++i) b += a += out[i];
-  out.push_back(static_cast<std::uint8_t>(a));
-  out.push_back(static_cast<std::uint8_t>(b));
+  const auto n = payload.size();
+  Bytes out(n + 8);
+  const std::array<std::uint8_t, 6> head{
+      0xB5, 0x62, message_class, id, static_cast<std::uint8_t>(n & 0xFF), static_cast<std::uint8_t>(n >> 8)};
+  std::ranges::copy(head, out.begin());
+  std::ranges::copy(payload, out.begin() + 6);
+  std::ranges::copy(checksum(out.data() + 2, n + 4), out.end() - 2);
   return out;
 }
 
-/// A payload written by offset, little-endian (sec. 5.3).
+/// Puts numbers in the order of sec. 5.3.1: little endian, two's complement, IEEE 754.
 class Payload {
  public:
-  explicit Payload(std::size_t size) : bytes_(size, 0) {}
-  Payload& put(std::size_t at, std::size_t size, std::int64_t value) {
-    for (std::size_t i = 0; i < size; ++i) bytes_.at(at + i) = static_cast<std::uint8_t>(value >> (8 * i));
+  template <class T>
+  Payload& put(std::type_identity_t<T> value) {
+    std::array<std::uint8_t, sizeof(T)> raw;
+    std::memcpy(raw.data(), &value, sizeof(T));  // the machines that run this are little endian
+    bytes_.insert(bytes_.end(), raw.begin(), raw.end());
     return *this;
   }
-  /// In units of 1/`per`.
-  Payload& scaled(std::size_t at, std::size_t size, double value, double per) {
-    return put(at, size, std::llround(value * per));
-  }
-  Payload& r4(std::size_t at, double value) {
-    return put(at, 4, std::bit_cast<std::uint32_t>(static_cast<float>(value)));
-  }
-  /// year, month, day, hour, min, sec: seven bytes, the same in NAV-PVT and NAV-TIMEUTC.
-  Payload& calendar(std::size_t at, const Instant::Utc& utc) {
-    put(at, 2, utc.year).put(at + 2, 1, utc.month).put(at + 3, 1, utc.day);
-    return put(at + 4, 1, utc.hour).put(at + 5, 1, utc.minute).put(at + 6, 1, utc.second);
+  Payload& u1(std::uint32_t v) { return put<std::uint8_t>(static_cast<std::uint8_t>(v)); }
+  Payload& u2(std::uint32_t v) { return put<std::uint16_t>(static_cast<std::uint16_t>(v)); }
+  Payload& u4(std::uint32_t v) { return put<std::uint32_t>(v); }
+  Payload& i4(std::int64_t v) { return put<std::int32_t>(static_cast<std::int32_t>(v)); }
+  /// A number in units of 1 / `per_unit`, to the nearest.
+  Payload& i4(double v, double per_unit) { return i4(std::int64_t{std::llround(v * per_unit)}); }
+  Payload& u4(double v, double per_unit) { return u4(static_cast<std::uint32_t>(std::llround(v * per_unit))); }
+  Payload& u2(double v, double per_unit) { return u2(static_cast<std::uint32_t>(std::llround(v * per_unit))); }
+  Payload& r4(double v) { return put<float>(static_cast<float>(v)); }
+  Payload& zeros(std::size_t n) { return bytes_.insert(bytes_.end(), n, 0), *this; }
+  Payload& chars(const char* text, std::size_t n) {
+    for (std::size_t i = 0, end = std::strlen(text); i < n; ++i) u1(i < end ? static_cast<std::uint8_t>(text[i]) : 0);
+    return *this;
   }
   [[nodiscard]] const Bytes& bytes() const { return bytes_; }
 
@@ -122,230 +140,228 @@ class Payload {
   Bytes bytes_;
 };
 
-inline constexpr std::uint8_t kNav = 0x01;
-inline constexpr std::uint8_t kNavPosLlh = 0x02, kNavDop = 0x04, kNavSol = 0x06, kNavPvt = 0x07, kNavVelNed = 0x12,
-                              kNavTimeUtc = 0x21, kNavCov = 0x36;
+namespace detail {
 
-/// gpsFix, fixType: 0 none, 2 2D, 3 3D.
-inline int fix_type(Fix fix) { return fix == Fix::kNone ? 0 : fix == Fix::k2d ? 2 : 3; }
-inline bool fix_ok(Fix fix) { return fix >= Fix::k2d; }
-inline bool differential(Fix fix) { return fix >= Fix::kDifferential; }
+/// Sec. 5.14.11 fixType: does not say that the fix is valid, so kLimits has one as well.
+inline std::uint32_t fix_type(const Solution& s) { return s.fix == Fix::kNone ? 0U : s.fix == Fix::k2d ? 2U : 3U; }
 
-/// Sec. 5.14.11.
-inline Bytes nav_pvt(const Solution& s, const Instant& t) {
-  const auto utc = t.utc(10'000'000);
-  const int carrier = s.fix == Fix::kRtkFixed ? 2 : s.fix == Fix::kRtkFloat ? 1 : 0;  // carrSoln, bits 7 and 6
-  return Payload(92)
-      .put(0, 4, t.itow_ms)
-      .calendar(4, utc)
-      .put(11, 1, 0x07)  // validDate, validTime, fullyResolved
-      .put(12, 4, 25)
-      .put(16, 4, utc.nano)
-      .put(20, 1, fix_type(s.fix))
-      .put(21, 1, (fix_ok(s.fix) ? 1 : 0) | (differential(s.fix) ? 2 : 0) | carrier << 6)
-      .put(23, 1, s.satellites)
-      .scaled(24, 4, s.longitude_deg, 1e7)
-      .scaled(28, 4, s.latitude_deg, 1e7)
-      .scaled(32, 4, s.height_m, 1e3)
-      .scaled(36, 4, s.msl_m, 1e3)
-      .scaled(40, 4, s.horizontal_acc_m, 1e3)
-      .scaled(44, 4, s.vertical_acc_m, 1e3)
-      .scaled(48, 4, s.v_mps[1], 1e3)
-      .scaled(52, 4, s.v_mps[0], 1e3)
-      .scaled(56, 4, -s.v_mps[2], 1e3)
-      .scaled(60, 4, s.speed_mps(), 1e3)
-      .scaled(64, 4, s.course_deg(), 1e5)
-      .scaled(68, 4, s.speed_acc_mps, 1e3)
-      .scaled(72, 4, s.course_acc_deg, 1e5)
-      .scaled(76, 2, s.pdop, 1e2)
-      .put(78, 2, s.fix == Fix::kNone ? 1 : 0)  // flags3, invalidLlh (UBX-22008968, sec. 3.15)
-      .bytes();
+/// Open is what stands in the numbers without a fix: here the last ones stay, and only type and accuracy tell.
+inline Payload& accuracy(Payload& p, const Solution& s, double metres, double per_metre) {
+  return s.fix == Fix::kNone ? p.u4(0xFFFFFFFF) : p.u4(metres, per_metre);
 }
 
-/// UBX-22008968, sec. 3.15, UBX-NAV-COV: NN, NE, ND, EE, ED, DD of position, then of velocity.
-inline Bytes nav_cov(const Solution& s, const Instant& t) {
-  Payload p(64);
-  p.put(0, 4, t.itow_ms).put(5, 1, fix_ok(s.fix)).put(6, 1, fix_ok(s.fix));
-  const auto triangle = [&](std::size_t at, const Covariance& c) {
-    p.r4(at, c[3]).r4(at + 4, c[1]).r4(at + 8, -c[4]).r4(at + 12, c[0]).r4(at + 16, -c[2]).r4(at + 20, c[5]);
-  };
-  triangle(16, s.position_cov_m2);
-  triangle(40, s.velocity_cov_m2ps2);
+/// NMEA and UBX say 99.99 for a DOP that is not known.
+inline double dop(const Solution& s, double value) { return s.fix == Fix::kNone ? 99.99 : std::fmin(value, 99.99); }
+
+inline Payload& date_and_time(Payload& p, const Instant::Utc& u) {
+  const auto part = [](int v) { return static_cast<std::uint32_t>(v); };
+  p.u2(part(u.year)).u1(part(u.month)).u1(part(u.day));
+  return p.u1(part(u.hour)).u1(part(u.minute)).u1(part(u.second));
+}
+
+/// In NED: down is minus up, so the terms with one vertical part change sign.
+inline Payload& covariance(Payload& p, const Covariance& enu) {
+  const auto [ee, en, eu, nn, nu, uu] = enu;
+  return p.r4(nn).r4(en).r4(-nu).r4(ee).r4(-eu).r4(uu);
+}
+
+}  // namespace detail
+
+/// Sec. 5.14.11, 92 bytes.
+inline Bytes nav_pvt(const Instant& at, const Solution& s) {
+  Payload p;
+  const Instant::Utc utc = at.utc();
+  p.u4(at.itow_ms);
+  // Time is valid without a fix too, as after losing lock: a host must not take one for the other.
+  detail::date_and_time(p, utc).u1(0x07).u4(25).i4(utc.nano);
+  const std::uint32_t carrier = s.fix == Fix::kRtkFixed ? 2 : s.fix == Fix::kRtkFloat ? 1 : 0;
+  p.u1(detail::fix_type(s)).u1((s.valid() ? 1U : 0U) | (s.corrected() ? 2U : 0U) | carrier << 6);
+  p.u1(0xE0).u1(s.fix == Fix::kNone ? 0 : static_cast<std::uint32_t>(s.satellites));
+  p.i4(s.longitude_deg, 1e7).i4(s.latitude_deg, 1e7).i4(s.height_m, 1e3).i4(s.msl_m, 1e3);
+  detail::accuracy(p, s, s.horizontal_acc_m, 1e3);
+  detail::accuracy(p, s, s.vertical_acc_m, 1e3);
+  p.i4(s.v_mps[1], 1e3).i4(s.v_mps[0], 1e3).i4(-s.v_mps[2], 1e3);
+  p.i4(s.speed_mps(), 1e3).i4(s.course_deg(), 1e5);
+  detail::accuracy(p, s, s.speed_acc_mps, 1e3).u4(s.fix == Fix::kNone ? 180 : s.course_acc_deg, 1e5);
+  p.u2(detail::dop(s, s.pdop), 100);
+  // flags3 (HPG 1.32 sec. 3.15): invalidLlh; age of corrections up to 1 s. Reserved in older manuals.
+  p.u2((s.fix == Fix::kNone ? 1U : 0U) | (s.corrected() ? 1U : 0U) << 1).zeros(4);
+  // headVeh is the course when there is no heading of the vehicle.
+  return p.i4(s.course_deg(), 1e5).zeros(4).bytes();
+}
+
+/// UBX-22008968 sec. 3.15.2, 64 bytes. It knows no masks, so kLimits leaves it valid.
+inline Bytes nav_cov(const Instant& at, const Solution& s) {
+  Payload p;
+  const std::uint32_t valid = s.fix != Fix::kNone;
+  p.u4(at.itow_ms).u1(0).u1(valid).u1(valid).zeros(9);
+  detail::covariance(p, s.position_cov_m2);
+  return detail::covariance(p, s.velocity_cov_m2ps2).bytes();
+}
+
+/// Sec. 5.14.2, 18 bytes. What Solution does not say (time, north, east) is made up to fit.
+inline Bytes nav_dop(const Instant& at, const Solution& s) {
+  const double time = s.hdop, horizontal_part = s.hdop / std::sqrt(2.0);
+  Payload p;
+  p.u4(at.itow_ms);
+  for (const double v : {std::hypot(s.pdop, time), s.pdop, time, s.vdop, s.hdop, horizontal_part, horizontal_part}) {
+    p.u2(detail::dop(s, v), 100);
+  }
   return p.bytes();
 }
 
-/// Sec. 5.14.10.
-inline Bytes nav_posllh(const Solution& s, const Instant& t) {
-  return Payload(28)
-      .put(0, 4, t.itow_ms)
-      .scaled(4, 4, s.longitude_deg, 1e7)
-      .scaled(8, 4, s.latitude_deg, 1e7)
-      .scaled(12, 4, s.height_m, 1e3)
-      .scaled(16, 4, s.msl_m, 1e3)
-      .scaled(20, 4, s.horizontal_acc_m, 1e3)
-      .scaled(24, 4, s.vertical_acc_m, 1e3)
-      .bytes();
+/// Sec. 5.14.10, 28 bytes. Nothing in it says whether there is a fix.
+inline Bytes nav_posllh(const Instant& at, const Solution& s) {
+  Payload p;
+  p.u4(at.itow_ms).i4(s.longitude_deg, 1e7).i4(s.latitude_deg, 1e7).i4(s.height_m, 1e3).i4(s.msl_m, 1e3);
+  detail::accuracy(p, s, s.horizontal_acc_m, 1e3);
+  return detail::accuracy(p, s, s.vertical_acc_m, 1e3).bytes();
 }
 
-/// Sec. 5.14.2.
-inline Bytes nav_dop(const Solution& s, const Instant& t) {
-  return Payload(18)
-      .put(0, 4, t.itow_ms)
-      .scaled(4, 2, 1.1 * s.pdop, 1e2)
-      .scaled(6, 2, s.pdop, 1e2)
-      .scaled(8, 2, 0.9 * s.pdop, 1e2)
-      .scaled(10, 2, s.vdop, 1e2)
-      .scaled(12, 2, s.hdop, 1e2)
-      .scaled(14, 2, 0.8 * s.hdop, 1e2)
-      .scaled(16, 2, 0.7 * s.hdop, 1e2)
-      .bytes();
+/// UBX-13003221, NAV-SOL, 52 bytes: earth-centred, in cm and cm/s.
+inline Bytes nav_sol(const Instant& at, const Solution& s) {
+  constexpr double kA_m = 6378137.0, kE2 = 6.69437999014e-3;  // WGS 84
+  const double lat = s.latitude_deg * M_PI / 180, lon = s.longitude_deg * M_PI / 180;
+  const double sin_lat = std::sin(lat), cos_lat = std::cos(lat), sin_lon = std::sin(lon), cos_lon = std::cos(lon);
+  const double normal = kA_m / std::sqrt(1 - kE2 * sin_lat * sin_lat);
+  const double across = (normal + s.height_m) * cos_lat;
+  const auto [east, north, up] = s.v_mps;
+  const double outward = up * cos_lat - north * sin_lat;
+  Payload p;
+  p.u4(at.itow_ms).i4(std::int64_t{at.beside_ns}).u2(static_cast<std::uint32_t>(at.week));
+  // Week and time of week are known whenever the time is.
+  p.u1(detail::fix_type(s)).u1((s.valid() ? 1U : 0U) | (s.corrected() ? 2U : 0U) | 0x0CU);
+  p.i4(across * cos_lon, 100).i4(across * sin_lon, 100).i4((normal * (1 - kE2) + s.height_m) * sin_lat, 100);
+  detail::accuracy(p, s, std::hypot(s.horizontal_acc_m, s.vertical_acc_m), 100);
+  p.i4(outward * cos_lon - east * sin_lon, 100).i4(outward * sin_lon + east * cos_lon, 100);
+  p.i4(north * cos_lat + up * sin_lat, 100);
+  detail::accuracy(p, s, s.speed_acc_mps, 100);
+  p.u2(detail::dop(s, s.pdop), 100).zeros(1).u1(s.fix == Fix::kNone ? 0 : static_cast<std::uint32_t>(s.satellites));
+  return p.zeros(4).bytes();
 }
 
-/// Sec. 5.14, UBX-NAV-VELNED: cm/s.
-inline Bytes nav_velned(const Solution& s, const Instant& t) {
-  return Payload(36)
-      .put(0, 4, t.itow_ms)
-      .scaled(4, 4, s.v_mps[1], 1e2)
-      .scaled(8, 4, s.v_mps[0], 1e2)
-      .scaled(12, 4, -s.v_mps[2], 1e2)
-      .scaled(16, 4, std::hypot(s.speed_mps(), s.v_mps[2]), 1e2)
-      .scaled(20, 4, s.speed_mps(), 1e2)
-      .scaled(24, 4, s.course_deg(), 1e5)
-      .scaled(28, 4, s.speed_acc_mps, 1e2)
-      .scaled(32, 4, s.course_acc_deg, 1e5)
-      .bytes();
+/// UBX-13003221, NAV-VELNED, 36 bytes, in cm/s.
+inline Bytes nav_velned(const Instant& at, const Solution& s) {
+  Payload p;
+  p.u4(at.itow_ms).i4(s.v_mps[1], 100).i4(s.v_mps[0], 100).i4(-s.v_mps[2], 100);
+  p.u4(std::hypot(s.speed_mps(), s.v_mps[2]), 100).u4(s.speed_mps(), 100).i4(s.course_deg(), 1e5);
+  detail::accuracy(p, s, s.speed_acc_mps, 100);
+  return p.u4(s.fix == Fix::kNone ? 180 : s.course_acc_deg, 1e5).bytes();
 }
 
-/// Sec. 5.14, UBX-NAV-TIMEUTC.
-inline Bytes nav_timeutc(const Solution&, const Instant& t) {
-  const auto utc = t.utc(10'000'000);
-  return Payload(20)
-      .put(0, 4, t.itow_ms)
-      .put(4, 4, 25)
-      .put(8, 4, utc.nano)
-      .calendar(12, utc)
-      .put(19, 1, 0x07)  // validTOW, validWKN, validUTC
-      .bytes();
+/// NAV-TIMEUTC, 20 bytes; validTOW, validWKN, validUTC as NAV-PVT's flags of time.
+inline Bytes nav_timeutc(const Instant& at) {
+  Payload p;
+  const Instant::Utc utc = at.utc();
+  p.u4(at.itow_ms).u4(25).i4(utc.nano);
+  return detail::date_and_time(p, utc).u1(0x07).bytes();
 }
 
-/// UBX-13003221, sec. 32.17, UBX-NAV-SOL: Earth-centred, cm and cm/s (WGS84: NIMA TR8350.2, table 3.1).
-inline Bytes nav_sol(const Solution& s, const Instant& t) {
-  const double a = 6378137.0, f = 1 / 298.257223563, e2 = f * (2 - f);
-  const double b = s.latitude_deg * M_PI / 180, l = s.longitude_deg * M_PI / 180;
-  const double n = a / std::sqrt(1 - e2 * std::sin(b) * std::sin(b));
-  const double outward = -s.v_mps[1] * std::sin(b) + s.v_mps[2] * std::cos(b);
-  return Payload(52)
-      .put(0, 4, t.itow_ms)
-      .put(4, 4, t.beside_ns)
-      .put(8, 2, t.week)
-      .put(10, 1, fix_type(s.fix))
-      .put(11, 1, (fix_ok(s.fix) ? 1 : 0) | (differential(s.fix) ? 2 : 0) | 0x0C)
-      .scaled(12, 4, (n + s.height_m) * std::cos(b) * std::cos(l), 1e2)
-      .scaled(16, 4, (n + s.height_m) * std::cos(b) * std::sin(l), 1e2)
-      .scaled(20, 4, (n * (1 - e2) + s.height_m) * std::sin(b), 1e2)
-      .scaled(24, 4, std::hypot(s.horizontal_acc_m, s.vertical_acc_m), 1e2)
-      .scaled(28, 4, outward * std::cos(l) - s.v_mps[0] * std::sin(l), 1e2)
-      .scaled(32, 4, outward * std::sin(l) + s.v_mps[0] * std::cos(l), 1e2)
-      .scaled(36, 4, s.v_mps[1] * std::cos(b) + s.v_mps[2] * std::sin(b), 1e2)
-      .scaled(40, 4, s.speed_acc_mps, 1e2)
-      .scaled(44, 2, s.pdop, 1e2)
-      .put(47, 1, s.satellites)
-      .bytes();
+namespace nmea {
+
+template <class... A>
+std::string text(const char* format, A... values) {
+  std::array<char, 64> line;
+  std::snprintf(line.data(), line.size(), format, values...);
+  return line.data();
 }
 
-// ---- NMEA
-
-template <class... Values>
-std::string text(const char* format, Values... values) {
-  std::array<char, 128> out{};
-  const int size = std::snprintf(out.data(), out.size(), format, values...);
-  return {out.data(), static_cast<std::size_t>(size)};
-}
-
-/// Sec. 4.1.1: the checksum is of what is between $ and *, in two digits.
-inline Bytes sentence(const std::string& fields) {
+/// Sec. 4.1.1: exclusive or of all between $ and *. Talker GN, as more than one GNSS is on (sec. 4.1.7).
+inline std::string sentence(const std::string& body) {
+  const std::string inner = "GN" + body;
   unsigned sum = 0;
-  for (const char c : fields) sum ^= static_cast<unsigned char>(c);
-  const std::string whole = "$" + fields + text("*%02X\r\n", sum);
-  return {whole.begin(), whole.end()};
+  for (const char c : inner) sum ^= static_cast<unsigned char>(c);
+  return "$" + inner + text("*%02X\r\n", sum);
 }
 
-/// Sec. 4.1.5: degrees and minutes with five decimals, then the side; empty fields without a fix (sec. 4.1.8).
-inline std::string angle(bool valid, double deg, int digits, const char* sides) {
-  if (!valid) return ",";
-  constexpr std::int64_t kDegree = 60 * 100'000;
-  const std::int64_t whole = std::llround(std::abs(deg) * static_cast<double>(kDegree));
-  const auto minutes = static_cast<int>(whole % kDegree);
-  return text("%0*d%02d.%05d,%c", digits, static_cast<int>(whole / kDegree), minutes / 100'000, minutes % 100'000,
-              sides[deg < 0 ? 1 : 0]);
+/// hhmmss.ss, on the grid of 10 ms that utc() has rounded to.
+inline std::string time(const Instant& at) {
+  const Instant::Utc u = at.utc();
+  return text("%02d%02d%02d.%02d", u.hour, u.minute, u.second, static_cast<int>((u.nano + 5'000'000) / 10'000'000));
 }
-inline std::string place(const Solution& s) {
-  return angle(fix_ok(s.fix), s.latitude_deg, 2, "NS") + "," + angle(fix_ok(s.fix), s.longitude_deg, 3, "EW");
+
+/// ddmm.mmmmm and the letter of the half (sec. 4.1.5); counted in whole 1e-5 minutes, so 60 minutes never show.
+inline std::string angle(double deg, int digits, char positive, char negative) {
+  const long long units = std::llround(std::fabs(deg) * 6e6);
+  return text("%0*lld%02lld.%05lld,%c", digits, units / 6'000'000, units / 100'000 % 60, units % 100'000,
+              deg < 0 ? negative : positive);
 }
-inline std::string time_of_day(const Instant& t) {
-  const auto utc = t.utc(10'000'000);
-  return text("%02d%02d%02d.%02d", utc.hour, utc.minute, utc.second,
-              static_cast<int>((utc.nano + 5'000'000) / 10'000'000));
+
+/// Sec. 4.1.8: what is not valid is an empty field.
+inline std::string position(const Solution& s) {
+  if (!s.valid()) return ",,,";
+  return angle(s.latitude_deg, 2, 'N', 'S') + "," + angle(s.longitude_deg, 3, 'E', 'W');
 }
-inline std::string speed(const Solution& s, double per_mps) {
-  return fix_ok(s.fix) ? text("%.3f", s.speed_mps() * per_mps) : "";
+
+inline char status(const Solution& s) { return s.valid() ? 'A' : 'V'; }
+/// Sec. 4.1.6, NMEA 4.1: GLL and VTG have no letters for RTK, RMC has.
+inline char mode(const Solution& s) { return !s.valid() ? 'N' : s.corrected() ? 'D' : 'A'; }
+inline char rmc_mode(const Solution& s) {
+  return s.fix == Fix::kRtkFixed ? 'R' : s.fix == Fix::kRtkFloat ? 'F' : mode(s);
 }
-/// Left empty at standstill, where there is none.
-inline std::string course(const Solution& s) {
-  return fix_ok(s.fix) && s.speed_mps() > 0 ? text("%.2f", s.course_deg()) : "";
+inline int quality(const Solution& s) {
+  return s.fix == Fix::kRtkFixed ? 4 : s.fix == Fix::kRtkFloat ? 5 : !s.valid() ? 0 : s.corrected() ? 2 : 1;
 }
+
 inline constexpr double kKnotsPerMps = 3600.0 / 1852.0;
 
-/// Sec. 4.1.6, the table of NMEA 4.1: RTK is F or R in RMC and D in VTG and GLL.
-inline char pos_mode(Fix fix, bool rmc) {
-  if (!fix_ok(fix)) return 'N';
-  if (fix == Fix::kRtkFloat) return rmc ? 'F' : 'D';
-  if (fix == Fix::kRtkFixed) return rmc ? 'R' : 'D';
-  return fix == Fix::kDifferential ? 'D' : 'A';
+/// CFG-NMEA-OUT_FROZENCOG is off: a course that stands still is not output. The threshold is open: 0.1 m/s here.
+inline std::string course(const Solution& s) { return s.speed_mps() < 0.1 ? "" : text("%.2f", s.course_deg()); }
+
+/// Sec. 4.2.14 RMC. Magnetic variation is empty, navStatus always V.
+inline std::string rmc(const Instant& at, const Solution& s) {
+  const Instant::Utc u = at.utc();
+  std::string body = "RMC," + time(at) + "," + status(s) + "," + position(s) + ",";
+  body += s.valid() ? text("%.3f,", s.speed_mps() * kKnotsPerMps) + course(s) : ",";
+  return sentence(body + text(",%02d%02d%02d,,,%c,V", u.day, u.month, u.year % 100, rmc_mode(s)));
 }
 
-/// Sec. 4.2.14. The year has two digits; after the mode comes navStatus, always V.
-inline Bytes rmc(const Solution& s, const Instant& t, const char* talker = "GN") {
-  const auto utc = t.utc(10'000'000);
-  const std::string date = text("%02d%02d%02d", utc.day, utc.month, utc.year % 100);
-  return sentence(talker + std::string("RMC,") + time_of_day(t) + "," + (fix_ok(s.fix) ? "A," : "V,") + place(s) + "," +
-                  speed(s, kKnotsPerMps) + "," + course(s) + "," + date + ",,," + pos_mode(s.fix, true) + ",V");
+/// VTG; without a fix even the letters of the units go.
+inline std::string vtg(const Instant&, const Solution& s) {
+  if (!s.valid()) return sentence("VTG,,,,,,,,,N");
+  return sentence("VTG," + course(s) +
+                  text(",T,,M,%.3f,N,%.3f,K,%c", s.speed_mps() * kKnotsPerMps, s.speed_mps() * 3.6, mode(s)));
 }
-/// Sec. 4.2, VTG.
-inline Bytes vtg(const Solution& s, const Instant&, const char* talker = "GN") {
-  return sentence(talker + std::string("VTG,") + course(s) + ",T,,M," + speed(s, kKnotsPerMps) + ",N," + speed(s, 3.6) +
-                  ",K," + pos_mode(s.fix, false));
+
+/// Sec. 4.2.4 GGA. numSV goes to 12, however many there are.
+inline std::string gga(const Instant& at, const Solution& s) {
+  const int used = s.fix == Fix::kNone ? 0 : std::min(s.satellites, 12);
+  std::string body = "GGA," + time(at) + "," + position(s);
+  body += text(",%d,%02d,%.2f,", quality(s), used, detail::dop(s, s.hdop));
+  body += s.valid() ? text("%.1f,M,%.1f,M,", s.msl_m, s.height_m - s.msl_m) : ",,,,";
+  return sentence(body + (s.corrected() ? "1.0,0000" : ","));
 }
-/// Sec. 4.2, GGA: altitude above mean sea level, then what the geoid is above the ellipsoid.
-inline Bytes gga(const Solution& s, const Instant& t, const char* talker = "GN") {
-  constexpr int kQuality[] = {0, 0, 1, 1, 2, 5, 4};
-  const bool ok = fix_ok(s.fix);
-  return sentence(talker + std::string("GGA,") + time_of_day(t) + "," + place(s) + "," +
-                  text("%d,%02d,%.2f,", kQuality[static_cast<int>(s.fix)], std::min(s.satellites, 12), s.hdop) +
-                  (ok ? text("%.1f,M,%.1f,M", s.msl_m, s.height_m - s.msl_m) : ",,,") + ",,");
-}
-/// Sec. 4.2.11; once for each GNSS (sec. 4.1.7), here for GPS and GLONASS, with the system's number at the end.
-inline Bytes gsa(const Solution& s, const Instant&, const char* talker = "GN") {
-  const int mode = !fix_ok(s.fix) ? 1 : s.fix == Fix::k2d ? 2 : 3;
-  const std::string dop = text("%.2f,%.2f,%.2f", s.pdop, s.hdop, s.vdop);
-  Bytes both;
-  for (const auto& satellites : {std::string{"29,05,12,,,,,,,,,"}, std::string{"70,71,,,,,,,,,,"}}) {
-    const int system = satellites[0] == '2' ? 1 : 2;
-    const Bytes one = sentence(talker + text("GSA,A,%d,", mode) + satellites + "," + dop + text(",%d", system));
-    both.insert(both.end(), one.begin(), one.end());
+
+/// Sec. 4.2.11 and 4.1.7: one GSA for each GNSS, of at most 12 satellites; the last field says which.
+inline std::string gsa(const Instant&, const Solution& s) {
+  constexpr int kSystems = 4;
+  const int used = s.fix == Fix::kNone ? 0 : s.satellites;
+  std::string all;
+  for (int system = 0; system < kSystems; ++system) {
+    const int here = std::min(12, used / kSystems + (system < used % kSystems ? 1 : 0));
+    std::string body = text("GSA,A,%c", !s.valid() ? '1' : s.fix == Fix::k2d ? '2' : '3');
+    // GLONASS counts from 65, the others from 1 (appendix, satellite numbering).
+    for (int i = 0; i < 12; ++i) body += i < here ? text(",%02d", (system == 1 ? 65 : 1) + 2 * i) : ",";
+    body +=
+        text(",%.2f,%.2f,%.2f,%d", detail::dop(s, s.pdop), detail::dop(s, s.hdop), detail::dop(s, s.vdop), system + 1);
+    all += sentence(body);
   }
-  return both;
+  return all;
 }
-/// Sec. 4.2, GLL.
-inline Bytes gll(const Solution& s, const Instant& t, const char* talker = "GN") {
-  return sentence(talker + std::string("GLL,") + place(s) + "," + time_of_day(t) + "," + (fix_ok(s.fix) ? "A," : "V,") +
-                  pos_mode(s.fix, false));
+
+/// GLL: as the examples of sec. 4.1.8, the time stays without a fix.
+inline std::string gll(const Instant& at, const Solution& s) {
+  return sentence("GLL," + position(s) + "," + time(at) + "," + status(s) + "," + mode(s));
 }
-/// Sec. 4.2.12: the ellipse is not output; standard deviations of latitude, longitude, altitude, m.
-inline Bytes gst(const Solution& s, const Instant& t, const char* talker = "GN") {
-  const auto& c = s.position_cov_m2;
-  return sentence(talker + std::string("GST,") + time_of_day(t) + ",1.8,,,," +
-                  text("%.1f,%.1f,%.1f", std::sqrt(c[3]), std::sqrt(c[0]), std::sqrt(c[5])));
+
+/// Sec. 4.2.12 GST. The ellipse is empty in the manual's example, so here.
+inline std::string gst(const Instant& at, const Solution& s) {
+  std::string body = "GST," + time(at);
+  if (!s.valid()) return sentence(body + ",,,,,,,");
+  const Covariance& c = s.position_cov_m2;
+  return sentence(body + text(",1.8,,,,%.1f,%.1f,%.1f", std::sqrt(c[3]), std::sqrt(c[0]), std::sqrt(c[5])));
 }
+
+}  // namespace nmea
 
 }  // namespace tetap::fakes::ublox
