@@ -32,10 +32,14 @@ SENSORS = ["epoch", "time_s", "estimator", "sensor", "inst", "accepted", "reject
 Q, VELOCITY, AXES = ["q_w", "q_x", "q_y", "q_z"], ["v_east_mps", "v_north_mps", "v_up_mps"], "xyz"
 ACC_BIAS, GYRO_BIAS = [f"acc_bias_{a}_mps2" for a in AXES], [f"gyro_bias_{a}_radps" for a in AXES]
 STD_TILT = ["std_tilt_east_rad", "std_tilt_north_rad"]
+# Of the first and second of the three, first and third, second and third.
+CORRELATIONS = {"position": ["corr_xy", "corr_xz", "corr_yz"], "velocity": ["corr_v_en", "corr_v_eu", "corr_v_nu"],
+                "attitude": ["corr_tilt_en", "corr_tilt_e_yaw", "corr_tilt_n_yaw"],
+                "gyro bias": [f"corr_gyro_bias_{pair}" for pair in ("xy", "xz", "yz")], "acc bias": [f"corr_acc_bias_{pair}" for pair in ("xy", "xz", "yz")]}
 STATES = ["epoch", "time_s", "estimator", *Q, *VELOCITY, "height_m", "std_height_m", *ACC_BIAS, *GYRO_BIAS, *(f"std_{v}" for v in VELOCITY), *STD_TILT,
           *(f"std_{b}" for b in ACC_BIAS), *(f"std_{b}" for b in GYRO_BIAS), "jump_x_m", "jump_y_m", "jump_yaw_rad",
-          "disagree_tilt_rad", "disagree_yaw_rad", "vib_accel_mps2", "vib_gyro_radps", "clipped", "jump_z_m", "corr_xz", "corr_yz", *(f"corr_v_{pair}" for pair in ("en", "eu", "nu")),
-          *(f"corr_tilt_{pair}" for pair in ("en", "e_yaw", "n_yaw")), *(f"corr_{of}_bias_{pair}" for of in ("acc", "gyro") for pair in ("xy", "xz", "yz"))]
+          "disagree_tilt_rad", "disagree_yaw_rad", "vib_accel_mps2", "vib_gyro_radps", "clipped", "jump_z_m",
+          *CORRELATIONS["position"][1:], *(name for block in ("velocity", "attitude", "acc bias", "gyro bias") for name in CORRELATIONS[block])]
 TRUTH = ["time_s", "x_m", "y_m", "yaw_rad"]  # and perhaps "epoch" and these
 TRUTH_MORE = ["z_m", "roll_rad", "pitch_rad", *VELOCITY, *GYRO_BIAS, *ACC_BIAS]
 BLOCKS = ["position", "velocity", "attitude", "gyro bias", "acc bias"]
@@ -44,10 +48,6 @@ STEPS = {"position": ("Est2_Std", "StdX"), "velocity": ("Est2_State", "StdVelEas
 # Of the values: what they were rounded by is no error of the estimate. Twice that of a quaternion's component is an angle.
 VALUE_STEPS = {"position": [("Est2_Pos", "X", 1), ("Est2_Pos", "Y", 1), ("Est2_State", "Height", 1)], "velocity": [("Est2_Vel", "East", 1)],
                "attitude": [("Est2_Att", "X", 2)], "gyro bias": [("Est2_State", "GyroBiasX", 1)], "acc bias": [("Est2_State", "AccBiasX", 1)]}
-# Of the first and second of the three, first and third, second and third.
-CORRELATIONS = {"position": ["corr_xy", "corr_xz", "corr_yz"], "velocity": ["corr_v_en", "corr_v_eu", "corr_v_nu"],
-                "attitude": ["corr_tilt_en", "corr_tilt_e_yaw", "corr_tilt_n_yaw"],
-                "gyro bias": [f"corr_gyro_bias_{pair}" for pair in ("xy", "xz", "yz")], "acc bias": [f"corr_acc_bias_{pair}" for pair in ("xy", "xz", "yz")]}
 UNITS = {"position": "m", "velocity": "m/s", "attitude": "rad", "gyro bias": "rad/s", "acc bias": "m/s2"}
 
 ENUMERATIONS = {"kind": "EstimatorKind", "sensor": "Sensor", "verdict": "Verdict", "mode": "Mode", "reset_cause": "ResetCause"}
@@ -376,6 +376,20 @@ def quaternion(roll, pitch, yaw):
     return product(product(about(2, yaw), about(1, pitch)), about(0, roll))
 
 
+def correlation_matrices(of_01, of_02, of_12):
+    """One 3 x 3 matrix a row, of the columns of its three correlations."""
+    matrix = np.tile(np.eye(3), (len(of_01), 1, 1))
+    for (i, j), column in {(0, 1): of_01, (0, 2): of_02, (1, 2): of_12}.items():
+        matrix[:, i, j] = matrix[:, j, i] = column
+    return matrix
+
+
+def squares(error, sigma, correlation):
+    """Normalised squared error of each row: of errors and their sigmas, with a matrix of correlations each."""
+    scaled = (error / sigma)[:, :, None]
+    return (scaled * np.linalg.solve(correlation, scaled)).sum(axis=(1, 2))
+
+
 class Blocks:
     """Errors of an inertial estimate by block, and the sigmas it published: `error[name]` and `sigma[name]` with three columns and a row for
     every attitude; position east, north, up; attitude about east, north and up."""
@@ -409,10 +423,8 @@ class Blocks:
         estimate is what it says. NaN in rows in whose epoch the whole covariance was not said, and where something of it is not known."""
         use = np.flatnonzero(self._whole[name] & np.isfinite(self.error[name] + self._judged[name] + self._correlation[name]).all(axis=1))
         # What the values were rounded by is independent: it is in the variances, and not in what two of them share.
-        share = self.sigma[name][use] / self._judged[name][use]
-        matrix = np.tile(np.eye(3), (len(use), 1, 1))
-        for column, (i, j) in enumerate(((0, 1), (0, 2), (1, 2))):
-            matrix[:, i, j] = matrix[:, j, i] = self._correlation[name][use, column] * share[:, i] * share[:, j]
+        a, b, c = (self.sigma[name][use] / self._judged[name][use]).T
+        matrix = correlation_matrices(*(self._correlation[name][use].T * [a * b, a * c, b * c]))
         # Correlations are rounded, too: below their step nothing is told from none.
         least = limits(*(("Est2_Std", "CorrXY") if name == "position" else ("Est2_State", "CorrVelEN")))[0]
         short = np.maximum(0.0, least - np.linalg.eigvalsh(matrix)[:, 0]) if len(use) else np.empty(0)
@@ -471,20 +483,14 @@ def nees_by_row(rows, dx, dy, dyaw, dof):
     """Normalised squared error of each row; NaN without a published covariance or a known error. And how many covariances were of no use."""
     std = np.stack([rows["std_x_m"], rows["std_y_m"], rows["std_yaw_rad"]], axis=1)[:, :dof]
     error = np.stack([dx, dy, dyaw], axis=1)[:, :dof]
-    correlation = np.empty((len(error), dof, dof))
-    correlation[:, range(dof), range(dof)] = 1.0
-    pairs = {(0, 1): "corr_xy", (0, 2): "corr_x_yaw", (1, 2): "corr_y_yaw"}
-    for (i, j), name in pairs.items():
-        if j < dof:
-            correlation[:, i, j] = correlation[:, j, i] = rows[name]
+    correlation = correlation_matrices(rows["corr_xy"], rows["corr_x_yaw"], rows["corr_y_yaw"])[:, :dof, :dof]
     known = np.flatnonzero(np.isfinite(std).all(axis=1) & np.isfinite(error).all(axis=1) & np.isfinite(correlation).all(axis=(1, 2)))
     positive = (std[known] > 0).all(axis=1)
     if len(known):
         positive &= np.linalg.eigvalsh(correlation[known])[:, 0] > 1e-6
     use = known[positive]
-    scaled = (error[use] / std[use])[:, :, None]
     values = np.full(len(error), np.nan)
-    values[use] = (scaled * np.linalg.solve(correlation[use], scaled)).sum(axis=(1, 2))
+    values[use] = squares(error[use], std[use], correlation[use])
     return values, int(np.count_nonzero(~positive))
 
 

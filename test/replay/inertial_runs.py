@@ -26,6 +26,7 @@ sys.dont_write_bytecode = True
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.realpath(__file__))))
 sys.path.insert(0, os.path.join(ROOT, "tools"))
 import bus_writer  # noqa: E402
+import report_metrics as metrics  # noqa: E402
 
 DATA = os.environ.get("TETAP_DATA") or os.path.join(os.path.dirname(ROOT), "shared", "data")
 PLACES_S = (60, 80, 100, 120, 160, 175, 190, 205, 220, 230)
@@ -277,14 +278,7 @@ def px4(programs, out, name, checks):
     velocity = at(times, states, "v_east_mps", "v_north_mps", "v_up_mps") - of("ve_mps", "vn_mps", "vu_mps")
     position = np.concatenate([at(times, replay.poses, "x_m", "y_m"), at(times, states, "height_m")], axis=1) - of("x_m", "y_m", "z_m")
 
-    def squares(error, sigma, correlation):
-        matrix = np.tile(np.eye(3), (len(error), 1, 1))
-        for column, (i, j) in enumerate(((0, 1), (0, 2), (1, 2))):
-            matrix[:, i, j] = matrix[:, j, i] = correlation[:, column]
-        scaled = (error / sigma)[:, :, None]
-        return (scaled * np.linalg.solve(matrix, scaled)).sum(axis=(1, 2))
-
-    def covariance(error, sigmas, correlations):
+    def nees_of_block(error, sigmas, correlations):
         """NEES at the times that say the whole covariance: names of its sigmas and correlations, of states.csv or of estimates.csv."""
         page = next(one for one in correlations if one in states[0])
         then = np.array([float(row["time_s"]) for row in states if row[page]])
@@ -292,12 +286,13 @@ def px4(programs, out, name, checks):
 
         def said(names):
             return np.concatenate([at(then, states if one in states[0] else replay.poses, one) for one in names], axis=1)
-        return squares(np.stack([np.interp(then, times, axis) for axis in error.T], axis=1), said(sigmas), said(correlations))
+        error_then = np.stack([np.interp(then, times, axis) for axis in error.T], axis=1)
+        return metrics.squares(error_then, said(sigmas), metrics.correlation_matrices(*said(correlations).T))
 
-    nees = {"position": covariance(position, ["std_x_m", "std_y_m", "std_height_m"], ["corr_xy", "corr_xz", "corr_yz"]),
-            "velocity": covariance(velocity, ["std_v_east_mps", "std_v_north_mps", "std_v_up_mps"], ["corr_v_en", "corr_v_eu", "corr_v_nu"]),
-            "attitude": covariance(turn, ["std_tilt_east_rad", "std_tilt_north_rad", "std_yaw_rad"],
-                                   ["corr_tilt_en", "corr_tilt_e_yaw", "corr_tilt_n_yaw"])}
+    nees = {name: nees_of_block(error, sigmas, metrics.CORRELATIONS[name]) for name, error, sigmas in (
+        ("position", position, ["std_x_m", "std_y_m", "std_height_m"]),
+        ("velocity", velocity, [f"std_{one}" for one in metrics.VELOCITY]),
+        ("attitude", turn, [*metrics.STD_TILT, "std_yaw_rad"]))}
     print(f"PX4's log {name}, against PX4's own EKF2, from {CONVERGED_S:.0f} s on:")
     sensors = replay.sensors()
     sensor_lines(name, sensors)
