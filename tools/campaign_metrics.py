@@ -172,6 +172,17 @@ def anees(runs):
             "below": float((values < low).mean())}
 
 
+def repeated(each):
+    """Mean ANEES and share of times inside of campaigns with seeds of their own, each with Student's interval of the mean from the campaigns: what
+    lasts within a campaign is chance in its share, and no longer in their mean."""
+    def plus_minus(key):
+        return float(stdtrit(len(each) - 1, (1 + SHARE) / 2) * np.std([one[key] for one in each], ddof=1) / np.sqrt(len(each)))
+
+    inside = [one["inside"] for one in each]
+    return {"campaigns": len(each), "mean": float(np.mean([one["mean"] for one in each])), "mean_plus_minus": plus_minus("mean"),
+            "inside": float(np.mean(inside)), "inside_plus_minus": plus_minus("inside"), "least": min(inside), "most": max(inside)}
+
+
 def by_chance(runs):
     """The share of times inside that all but 5 % of campaigns with a filter that is right would exceed: errors that last make few independent
     times of many. Such a campaign is drawn by mixing the seeds' own errors: they last as long as these, and their covariance at each time is

@@ -17,7 +17,7 @@ concept Direct = requires {
 };
 
 /// What remains of a variance is at least noise over S of it; below this share P is left with few right digits.
-inline constexpr float kSharp = 1e-4F;
+inline constexpr float kSharp = 1e-3F;
 
 template <class Scalar, int N, int M>
 struct SparseUpdate {

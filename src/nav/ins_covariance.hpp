@@ -8,6 +8,8 @@
 #include "filter/unroll.hpp"
 #include "nav/ins_state.hpp"
 
+#include <limits>
+
 namespace tetap::nav {
 
 /// One step or several added up; Q per axis and isotropic, so it needs no rotation.
@@ -68,12 +70,16 @@ inline void predict_covariance(filter::Symmetric<Scalar, InsState::kErrors>& p, 
       for (int j = 0; j < InsState::kErrors; ++j) p(kA + i, j) *= j == kA + i ? keep * keep : keep;
     }
   }
+  // Rounding takes half a last digit from any direction at every step; a whole one of every variance makes up for it
+  // (at 200 Hz in a minute 0.14 % of a variance, 0.07 % of a sigma).
+  constexpr Scalar kDigit = Scalar{1} + std::numeric_limits<Scalar>::epsilon();
   filter::unroll<0, 3>([&](auto i) __attribute__((always_inline)) {
-    p(i, i) += step.var_p;
-    p(kV + i, kV + i) += step.var_v;
-    p(kT + i, kT + i) += step.var_theta;
-    p(kA + i, kA + i) += step.var_b_a;
-    p(kG + i, kG + i) += step.var_b_g;
+    const auto grow = [&p](int k, Scalar by) __attribute__((always_inline)) { p(k, k) = p(k, k) * kDigit + by; };
+    grow(i, step.var_p);
+    grow(kV + i, step.var_v);
+    grow(kT + i, step.var_theta);
+    grow(kA + i, step.var_b_a);
+    grow(kG + i, step.var_b_g);
   });
   p(kT + 2, kT + 2) += step.var_yaw;
 }

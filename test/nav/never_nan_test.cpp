@@ -15,7 +15,6 @@
 #include "true_body.hpp"
 
 #include <gtest/gtest.h>
-#include <algorithm>
 #include <cmath>
 
 namespace tetap {
@@ -195,14 +194,13 @@ TEST(NeverNan, MeasurementsOfEverySizeInEveryOrder) {
     return nav::Vector3(scale * normal.vector().cast<float>());
   };
   constexpr float kGate = 100.0F;  // the widest that makes sense: a state that obeys every outlier is no state
-  int accepted = 0, most_below = 0;
+  int accepted = 0;
   const auto count = [&accepted](const auto& record) { accepted += record.verdict == Verdict::kAccepted ? 1 : 0; };
-  for (int run = 0; run < 100; ++run) {
+  for (int run = 0; run < 1000; ++run) {
     nav::Ins ins;
     nav::Ins::Covariance p;
     for (int i = 0; i < 15; ++i) p(i, i) = size(8);
     ASSERT_TRUE(ins.start({}, p));
-    int below = 0;
     for (int i = 0; i < 300; ++i) {
       for (int k = i % 3; k > 0; --k) {
         static_cast<void>(ins.predict(driving()));
@@ -250,16 +248,10 @@ TEST(NeverNan, MeasurementsOfEverySizeInEveryOrder) {
       }
       ASSERT_TRUE(ins.x.finite()) << run << ' ' << i;
       ASSERT_NEAR(ins.x.q_nb.norm2(), 1.0F, 1e-4F) << run << ' ' << i;
-      // By rounding alone it may come to be as little below zero as float can tell, until the watch has come round.
-      const double least = least_eigenvalue(ins.p);
-      ASSERT_GT(least, -3e-7) << run << ' ' << i;
-      below = least > 0 ? 0 : below + 1;
-      ASSERT_LE(below, 102) << run << ' ' << i;
-      most_below = std::max(most_below, below);
+      ASSERT_GT(least_eigenvalue(ins.p), 0) << run << ' ' << i;
     }
   }
-  EXPECT_GT(accepted, 4'000);
-  EXPECT_LE(most_below, 10);
+  EXPECT_GT(accepted, 40'000);
 }
 
 TEST(NeverNan, AGapOfAnyKindLeavesTheFilterFiniteAndPositiveDefinite) {

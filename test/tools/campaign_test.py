@@ -60,6 +60,15 @@ class Averages(unittest.TestCase):
         lasting = [{"epochs": np.arange(1000.0), "nees": np.full(1000, random.chisquare(3))} for _ in range(30)]
         self.assertGreater(judge.anees(lasting)["mean_plus_minus"], 10 * judge.anees(drawn(30, 1000))["mean_plus_minus"])
 
+    def test_the_mean_of_many_campaigns_is_what_a_lasting_error_hides_in_each(self):
+        random = np.random.default_rng(5)
+        each = [judge.anees([{"epochs": np.arange(20.0), "nees": np.full(20, random.chisquare(3))} for _ in range(10)]) for _ in range(600)]
+        all_of_them = judge.repeated(each)
+        self.assertEqual((all_of_them["campaigns"], all_of_them["least"], all_of_them["most"]), (600, 0, 1))
+        self.assertLess(abs(all_of_them["inside"] - 0.95), all_of_them["inside_plus_minus"])
+        self.assertAlmostEqual(all_of_them["inside_plus_minus"], 1.96 * np.sqrt(0.05 * 0.95 / 600), delta=0.005)
+        self.assertLess(abs(all_of_them["mean"] - 3), all_of_them["mean_plus_minus"])
+
     def test_what_chance_leaves_of_a_right_filter_is_less_where_errors_last(self):
         random = np.random.default_rng(4)
         times, seeds = 1000, 30
@@ -203,6 +212,21 @@ class WithFiles(unittest.TestCase):
             self.assertLess(case["attitude"]["tilt_rmse_deg"]["worst"], 10)
             self.assertLess(case["fused"]["position_rmse_m"]["worst"], 3)
         self.assertEqual(os.listdir(self.directory), ["campaign.json"])  # the runs' own files are gone
+
+    @unittest.skipUnless(os.access(os.path.join(PROGRAMS, "tetap-world"), os.X_OK), "tetap-world is not built")
+    def test_a_campaign_that_is_repeated_has_other_seeds(self):
+        def cases(*options):
+            result = self.campaign("--duration", "12", "--world", "matched", *options)
+            self.assertEqual(result.returncode, 0, result.stderr)
+            with open(os.path.join(self.directory, "campaign.json"), encoding="utf-8") as file:
+                return json.load(file), result.stdout
+        (twice, shown), (four, _) = cases("--seeds", "2", "--repeat", "2"), cases("--seeds", "4")
+        self.assertEqual([case["label"] for case in twice["cases"]], ["matched, seeds 1 to 2", "matched, seeds 3 to 4"])
+        means = [case["fused"]["blocks"]["velocity"]["anees"]["mean"] for case in [*twice["cases"], *four["cases"]]]
+        self.assertAlmostEqual((means[0] + means[1]) / 2, means[2])
+        of_velocity = next(one for one in twice["repeated"] if (one["estimator"], one["block"]) == ("fused", "velocity"))
+        self.assertAlmostEqual(of_velocity["mean"], means[2])
+        self.assertIn("times inside [%], mean", shown)
 
     @unittest.skipUnless(os.access(os.path.join(PROGRAMS, "tetap-world"), os.X_OK), "tetap-world is not built")
     def test_the_error_during_a_fault_and_the_error_after_it_are_told_apart(self):
