@@ -81,12 +81,29 @@ class CountTest(ImageTest):
                 self.assertEqual(found, status, text)
                 self.assertIn(message, text)
 
+    def test_a_limit_holds_whatever_the_tolerance_and_update_does_not_go_beyond_it(self):
+        elf = self.image(PROGRAM)
+        exact = {"loop": 3003, "loop_mean": 836.2, "nothing": 0, "inner": 18, "inner_mean": 18, "outer": 36}
+        for limit, arguments, status, message in (
+                ({"loop": 3003}, [], 0, "3 003   3 003  3 003  ok"),
+                ({"loop": 3002}, [], 1, "FAIL m7 loop: 3003 instructions, above its limit of 3002"),
+                ({"loop_mean": 836}, [], 1, "FAIL m7 loop_mean: 836.2 instructions, above its limit of 836"),
+                ({"gone": 5}, [], 1, "m7 gone: has a limit but was not run"),
+                ({"loop": 3002}, ["--update"], 2, "is not written: m7 loop: 3003 instructions, above its limit of 3002")):
+            with self.subTest(message):
+                budgets = {"tolerance": 0.02, "limit": {"m7": limit, "r5": {"loop": 1}}, "m7": exact}
+                found, text = self.count(*arguments, f"m7={elf}", budgets=budgets)
+                self.assertEqual(found, status, text)
+                self.assertIn(message, text)
+                self.assertEqual(self.json("budgets.json")["instructions"], budgets)
+
     def test_update_keeps_the_other_budgets(self):
         elf = self.image(PROGRAM)
-        self.count(f"m7={elf}", budgets={"tolerance": 0.02, "m4f": {"kept": 7}, "m7": {"old": 1}})
+        self.count(f"m7={elf}", budgets={"tolerance": 0.02, "limit": {"m7": {"loop": 5000}}, "m4f": {"kept": 7}, "m7": {"old": 1}})
         self.assertEqual(self.count("--update", f"m7={elf}")[0], 0)
         budgets = self.json("budgets.json")["instructions"]
         self.assertEqual(budgets["m4f"], {"kept": 7})
+        self.assertEqual(budgets["limit"], {"m7": {"loop": 5000}})
         self.assertNotIn("old", budgets["m7"])
         self.assertEqual(budgets["m7"]["loop"], 3003)
 
