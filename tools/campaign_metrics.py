@@ -174,13 +174,18 @@ def anees(runs):
 
 def repeated(each):
     """Mean ANEES and share of times inside of campaigns with seeds of their own, each with Student's interval of the mean from the campaigns: what
-    lasts within a campaign is chance in its share, and no longer in their mean."""
+    lasts within a campaign is chance in its share, and no longer in their mean. None throughout where one of them says nothing (None)."""
+    if not all(each):
+        figures = ("mean", "mean_plus_minus", "inside", "inside_plus_minus", "inside_least", "inside_most")
+        return {"campaigns": len(each), **dict.fromkeys(figures)}
+
     def plus_minus(key):
         return float(stdtrit(len(each) - 1, (1 + SHARE) / 2) * np.std([one[key] for one in each], ddof=1) / np.sqrt(len(each)))
 
     inside = [one["inside"] for one in each]
     return {"campaigns": len(each), "mean": float(np.mean([one["mean"] for one in each])), "mean_plus_minus": plus_minus("mean"),
-            "inside": float(np.mean(inside)), "inside_plus_minus": plus_minus("inside"), "least": min(inside), "most": max(inside)}
+            "inside": float(np.mean(inside)), "inside_plus_minus": plus_minus("inside"), "inside_least": min(inside),
+            "inside_most": max(inside)}
 
 
 def by_chance(runs):
@@ -246,8 +251,9 @@ def averaged(case, runs):
             if framed and counts["accepted"] > metrics.MOST_FRAMED * framed["compared"]:
                 del entry["sensors"][sensor]  # it has frames about what was rejected only
         if "blocks" in mine[0]:
+            alone = case["repeat"] == 1  # the mean of several campaigns says without a draw what chance leaves of each
             entry["blocks"] = {block: {"anees": anees([one["blocks"][block] for one in mine]), "unit": metrics.UNITS[block],
-                                       "by_chance": by_chance([one["blocks"][block] for one in mine]),
+                                       "by_chance": by_chance([one["blocks"][block] for one in mine]) if alone else None,
                                        "rmse": spread([one["blocks"][block]["rmse"] for one in mine]),
                                        "inside_3_sigma": float(np.mean([one["blocks"][block]["inside_3_sigma"] or 0 for one in mine]))}
                                for block in metrics.BLOCKS}

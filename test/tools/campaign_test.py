@@ -64,10 +64,23 @@ class Averages(unittest.TestCase):
         random = np.random.default_rng(5)
         each = [judge.anees([{"epochs": np.arange(20.0), "nees": np.full(20, random.chisquare(3))} for _ in range(10)]) for _ in range(600)]
         all_of_them = judge.repeated(each)
-        self.assertEqual((all_of_them["campaigns"], all_of_them["least"], all_of_them["most"]), (600, 0, 1))
+        self.assertEqual((all_of_them["campaigns"], all_of_them["inside_least"], all_of_them["inside_most"]), (600, 0, 1))
         self.assertLess(abs(all_of_them["inside"] - 0.95), all_of_them["inside_plus_minus"])
         self.assertAlmostEqual(all_of_them["inside_plus_minus"], 1.96 * np.sqrt(0.05 * 0.95 / 600), delta=0.005)
         self.assertLess(abs(all_of_them["mean"] - 3), all_of_them["mean_plus_minus"])
+
+    def test_one_table_and_the_json_have_the_same_rows_of_repeated_campaigns(self):
+        honest = judge.anees(drawn(10, 100))
+        case = {"setting": "matched", "attitude": {"anees": None}, "fused": {"anees": honest, "blocks": {"position": {"anees": honest}, "velocity": {"anees": honest}}}}
+        silent = {"setting": "matched", "attitude": {"anees": None}, "fused": {"anees": honest, "blocks": {"position": {"anees": None}, "velocity": {"anees": honest}}}}
+        fault = {**case, "setting": "matched, gnss_jump", "said": {}}
+        rows = campaign.repeated_rows([case, silent, fault, fault])
+        self.assertEqual([(one["setting"], one["block"], one["mean"] is None) for one in rows],
+                         [("matched", "pose", False), ("matched", "position", True), ("matched", "velocity", False)])
+        self.assertEqual(set(rows[0]), set(rows[1]))
+        shown = campaign.repeated_table(rows).splitlines()
+        self.assertEqual(len(shown), 4)
+        self.assertEqual(shown[2].split(), ["matched", "fused", "position", "2", *["-"] * 5])
 
     def test_what_chance_leaves_of_a_right_filter_is_less_where_errors_last(self):
         random = np.random.default_rng(4)
@@ -226,6 +239,8 @@ class WithFiles(unittest.TestCase):
         self.assertAlmostEqual((means[0] + means[1]) / 2, means[2])
         of_velocity = next(one for one in twice["repeated"] if (one["estimator"], one["block"]) == ("fused", "velocity"))
         self.assertAlmostEqual(of_velocity["mean"], means[2])
+        self.assertEqual((twice["repeat"], four["repeat"], four["repeated"]), (2, 1, []))
+        self.assertEqual({case["setting"] for case in twice["cases"]}, {of_velocity["setting"]})
         self.assertIn("times inside [%], mean", shown)
 
     @unittest.skipUnless(os.access(os.path.join(PROGRAMS, "tetap-world"), os.X_OK), "tetap-world is not built")
@@ -246,7 +261,7 @@ class WithFiles(unittest.TestCase):
 
     @unittest.skipUnless(os.access(os.path.join(PROGRAMS, "tetap-world"), os.X_OK), "tetap-world is not built")
     def test_bad_input_is_one_line_and_a_status(self):
-        for arguments, words in ((["--fault", "nope"], "known are: gnss_jump"), (["--seeds", "0"], "must be 1 or more"),
+        for arguments, words in ((["--fault", "nope"], "known are: gnss_jump"), (["--seeds", "0"], "must be 1 or more"), (["--repeat", "0"], "must be 1 or more"),
                                  (["--fault", "gnss_jump", "--duration", "20"], "longer --duration"),
                                  (["--robot", "nope", "--seeds", "1", "--duration", "2"], "no robot 'nope'")):
             result = self.campaign(*arguments)
