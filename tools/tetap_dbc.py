@@ -302,12 +302,19 @@ def _check_signal(signal, database, refuse):
     if signal.enum:
         if signal.enum not in database.tables:
             refuse("EnumType %s is no VAL_TABLE_" % signal.enum)
-        if signal.values != database.tables[signal.enum]:
-            refuse("VAL_ %s VAL_TABLE_ %s" % ("differs from" if signal.values else "is missing, to be", signal.enum))
+        _check_names(signal, database.tables[signal.enum], "VAL_TABLE_ " + signal.enum, refuse)
         if signal.scale != 1 or signal.signed or signal.length > 8:
             refuse("enum, so it must be unsigned, of scale 1 and at most 8 bits")
+    elif signal.is_mux:
+        _check_names(signal, dict(zip(signal.message.pages, signal.message.page_names)), "PageNames", refuse)
+    elif signal.bit_names:
+        if signal.bit_names not in database.tables:
+            refuse("BitNames %s is no VAL_TABLE_" % signal.bit_names)
+        # Readers that know no masks show a word at least while one bit is set.
+        bits = {1 << bit: name for bit, name in database.tables[signal.bit_names].items() if name != NOT_AVAILABLE}
+        _check_names(signal, {0: "None", **bits}, "the bits of VAL_TABLE_ " + signal.bit_names, refuse)
     elif set(signal.values) - {signal.gap_code}:
-        refuse("VAL_ without EnumType")
+        refuse("VAL_ without EnumType, BitNames or pages")
     if not signal.unit and (signal.scale != 1 or signal.needs_unit):
         refuse("no unit (a ratio and a count have unit 1)")
     for raw, name in signal.values.items():
@@ -315,11 +322,14 @@ def _check_signal(signal, database, refuse):
             refuse("VAL_ %d \"%s\" is no PascalCase name" % (raw, name))
         if raw != signal.gap_code and not signal.steps[0] <= raw <= signal.steps[1]:
             refuse("VAL_ %d \"%s\" does not fit %d bits" % (raw, name, signal.length))
-    if signal.bit_names and signal.bit_names not in database.tables:
-        refuse("BitNames %s is no VAL_TABLE_" % signal.bit_names)
     low, high = (steps * signal.scale for steps in signal.steps)
     if (signal.low, signal.high) != (low, high):
         refuse("range [%s|%s] should be [%s|%s]" % (signal.low, signal.high, plain(low), plain(high)))
+
+
+def _check_names(signal, names, source, refuse):
+    if signal.values != names:
+        refuse("VAL_ %s %s" % ("differs from" if signal.values else "is missing, to be", source))
 
 
 def _check_overlaps(message, refuse):

@@ -159,6 +159,17 @@ class Refusals(Folder):
     def test_values_of_what_is_no_enum(self):
         self.refused('BA_ "EnumType" SG_ 768 Sync_Kind "SyncKind";', "", "Sync_Kind", "without EnumType")
 
+    def test_words_of_a_selector_are_its_page_names(self):
+        words = 'VAL_ 807 Origin_Sel 0 "Lat" 1 "Lon" 2 "Height" ;'
+        self.refused(words, "", "Origin_Sel", "VAL_ is missing, to be PageNames")
+        self.refused(words, words.replace('0 "Lat" 1 "Lon"', '0 "Lon" 1 "Lat"'), "Origin_Sel", "differs from PageNames")
+
+    def test_words_of_a_mask_are_its_bits(self):
+        words = re.search(r"VAL_ 802 Status_Faults .*\n", read(DBC)).group(0)
+        self.refused(words, "", "Status_Faults", "VAL_ is missing, to be the bits of VAL_TABLE_ Fault")
+        self.refused(words, words.replace('256 "WheelSlip"', '8 "WheelSlip"'), "Status_Faults", "differs from the bits")
+        self.refused(words, words.replace(' 256 "WheelSlip"', ""), "Status_Faults", "differs from the bits")
+
     def test_missing_code_for_not_available(self):
         self.refused('VAL_ 776 BodySpeed_Forward -262144 "NotAvailable" ;', "", "BodySpeed_Forward", "not available")
 
@@ -351,6 +362,20 @@ class Field:
         if not self.quantity:
             return int(text)
         return "nan" if "nan" in text else float32(float(text))
+
+
+class Words(unittest.TestCase):
+    """What a reader that knows only the DBC shows beside a number."""
+
+    def test_a_single_bit_of_a_mask_and_a_page_have_a_word(self):
+        database = {frame.arbitration_id.id: frame for frame in canmatrix_database().frames}
+
+        def word(frame_id, start, raw):
+            name = next(s.name for s in database[frame_id].signals if s.start_bit == start)
+            return database[frame_id].decode((raw << start).to_bytes(8, "little"))[name].named_value
+        self.assertEqual([word(802, 32, raw) for raw in (0, 1 << 8, 1 << 13)], ["None", "WheelSlip", "AttitudeDisagrees"])
+        self.assertEqual([word(802, 20, raw) for raw in (0, 1, 1 << 5)], ["None", "Imu", "GnssPosition"])
+        self.assertEqual([word(805, 0, 5), word(807, 0, 2), word(830, 0, 1), word(813, 0, 9)], ["Bus", "Height", "More", "ImuHealth"])
 
 
 @unittest.skipUnless(FRAMES, "TETAP_RANDOM_FRAMES is not set")
