@@ -8,6 +8,7 @@
 #include "sim_host/world/world.hpp"
 
 #include <concepts>
+#include <sstream>
 #include <string>
 
 namespace tetap::sim {
@@ -61,18 +62,35 @@ inline void send_only(const Sent& sent, World::Options& world) {
   return names;
 }
 
-/// Why one of the world's faults cannot act on that robot; empty where all can.
+/// Names of the robots on which that fault acts in that world, with a space between each.
+[[nodiscard]] inline std::string robots_it_acts_on(Fault fault, const World::Options& world) {
+  std::string names;
+  std::istringstream all{std::string{kRobotNames}};
+  for (std::string name; all >> name;) {
+    World::Options as_sent = world;
+    send_only(sent_to(name), as_sent);
+    if (can_act(fault, as_sent)) (names += names.empty() ? "" : " ") += name;
+  }
+  return names;
+}
+
+/// Why one of the faults of a world, from which nothing is taken yet, cannot act on that robot, what could, and on whom
+/// it would; empty where all can.
 [[nodiscard]] inline std::string cannot_act(const World::Options& world, const std::string& robot) {
+  World::Options as_sent = world;
+  send_only(sent_to(robot), as_sent);
   for (const FaultSetting& setting : world.faults) {
-    if (can_act(setting.fault, world)) continue;
+    if (can_act(setting.fault, as_sent)) continue;
     const FaultInfo& row = info(setting.fault);
     const char* const lacks = row.falls_on == FallsOn::kImu         ? "IMU"
                               : row.falls_on == FallsOn::kWheels    ? "wheels"
                               : row.falls_on == FallsOn::kGnss      ? "GNSS"
                               : row.falls_on == FallsOn::kLandmarks ? "landmarks"
                                                                     : "magnetometer";
+    const std::string robots = robots_it_acts_on(setting.fault, world);
     return "fault '" + std::string{row.name} + "': robot " + robot + " has no " + lacks +
-           "; faults that act on it: " + faults_that_act(world);
+           "; faults that act on it: " + faults_that_act(as_sent) +
+           (robots.empty() ? "; in this world it acts on none" : "; robots on which it acts: " + robots);
   }
   return "";
 }

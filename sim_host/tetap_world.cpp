@@ -176,6 +176,7 @@ int main(int argc, char** argv) try {
     run.faults += (run.faults.empty() ? "" : ",") + given;
   }
   set_world(arguments, run.world);
+  const std::string refused = sim::cannot_act(run.world, robot);
   sim::send_only(sim::sent_to(robot), run.world);
   run.realtime = arguments.flag("--realtime");
   run.lockstep.window = arguments.window();
@@ -192,7 +193,7 @@ int main(int argc, char** argv) try {
                  .quiet = arguments.flag("--quiet")};
   const bool list = arguments.flag("--list-faults");
   arguments.finish();
-  if (const std::string why = sim::cannot_act(run.world, robot); !why.empty()) throw std::runtime_error(why);
+  if (!refused.empty()) throw std::runtime_error(refused);
   if (list) return std::printf("%s\n", sim::faults_that_act(run.world).c_str()), 0;
   if (memory) return sim::with_node_in_process(robot, base, [&](auto& link) { return drive(link, run); });
   hal::SocketCan can(interface);

@@ -123,7 +123,8 @@ TEST(Sent, every_fault_that_a_robot_accepts_changes_what_it_is_sent_and_no_other
 
 TEST(Sent, what_cannot_act_is_said_with_what_can) {
   const auto why = [](const char* robot, Fault fault, bool wheels = true) {
-    World::Options options = Sending::options(robot, {{Fault::kLostFrames, {}, {}}, {fault, {}, {}}});
+    World::Options options;
+    options.faults = {{Fault::kLostFrames, {}, {}}, {fault, {}, {}}};
     if (!wheels) options.numbers.wheels.rate_hz = 0;
     return cannot_act(options, robot);
   };
@@ -134,6 +135,11 @@ TEST(Sent, what_cannot_act_is_said_with_what_can) {
   EXPECT_NE(why("rover", Fault::kSlipLeft, false).find("robot rover has no wheels; "), std::string::npos);
   EXPECT_EQ(why("rover", Fault::kSlipLeft), "");
   EXPECT_EQ(why("rover", Fault::kMagDisturbance).find("landmark"), std::string::npos);
+  EXPECT_TRUE(why("rover", Fault::kMagDisturbance).ends_with("; robots on which it acts: iris"));
+  EXPECT_NE(
+      why("iris", Fault::kLandmarkOutlier).find("; robots on which it acts: husky labyrinth mrclam rover_landmarks "),
+      std::string::npos);
+  EXPECT_TRUE(why("rover", Fault::kSlipLeft, false).ends_with("; in this world it acts on none"));
 }
 
 TEST(Sent, what_an_estimator_takes_is_found_at_compile_time) {
