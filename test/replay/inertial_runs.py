@@ -116,6 +116,8 @@ class Checks:
         self.wrong, self.report = [], {}
 
     def bound(self, what, value, low, high):
+        if what in self.report:
+            raise ValueError(f"two bounds are called '{what}'")
         ok = bool(low <= value <= high)
         self.report[what] = {"value": float(value), "low": float(low), "high": float(high), "ok": ok}
         print(f"  {what:58} {value:8.3f}   {low:.3f} .. {high:.3f}   {'ok' if ok else 'WRONG'}")
@@ -234,7 +236,7 @@ def skog(programs, out, whole, checks):
         held_out = np.array([row["error_m"] for row in mine if not row["calibrated_on"]])
         sound = [row for row in mine if not row["imu_hole"]]
         checks.bound(f"car: median error after {what} [m]", np.median(errors), *bounds)
-        checks.bound(f"car: the same of {len(held_out)} places not calibrated on [m]", np.median(held_out), bounds[0] / 2, bounds[1])
+        checks.bound(f"car: median error of {len(held_out)} places not calibrated on, {what} [m]", np.median(held_out), bounds[0] / 2, bounds[1])
         checks.bound(f"car: beyond 3 sigma of {len(sound)} without the hole, {what}", sum(row["beyond"] for row in sound), 0, 1)
         # The places overlap: no interval of independent samples, but far from 2 is far from honest.
         nees = [row["nees"] for row in sound if not row["sigma_limited"]]

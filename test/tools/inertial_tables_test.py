@@ -37,6 +37,15 @@ class ThreeSigma(unittest.TestCase):
         self.assertFalse(inertial_runs.judged(np.array([5.0, 0.0]), 100.0, 1.0, 0.0, 0.0)["beyond"])
 
 
+class Bounds(unittest.TestCase):
+    def test_each_has_a_name_of_its_own(self):
+        checks = inertial_runs.Checks()
+        checks.bound("one", 1, 0, 2)
+        checks.bound("other", 3, 0, 2)
+        self.assertEqual((list(checks.report), checks.wrong), (["one", "other"], ["other"]))
+        self.assertRaisesRegex(ValueError, "'one'", checks.bound, "one", 1, 0, 2)
+
+
 class Tables(unittest.TestCase):
     def test_every_place_is_a_line_and_what_is_beyond_is_bold_and_counted(self):
         rows = [row(60, 60, True, [0, 5]), row(160, 60, True, [1, 0]), row(60, 60, False, [2, 0]), row(160, 60, False, [0, 1])]
