@@ -25,6 +25,14 @@ struct Estimators {
   static constexpr std::size_t kCount = sizeof...(E);
   template <class Payload>
   static constexpr bool kTakes = (Lane<E>::template kTakes<Payload> || ...);
+  /// Places for the samples of the window: 200 ms of an IMU at 200 Hz with wheels at 100 Hz and GNSS need 64.
+  static constexpr std::size_t kSamples = 88;
+};
+
+/// The same with another number of places, for a faster IMU or a longer window (DESIGN.md, 4.3).
+template <std::size_t kPlaces, Estimator... E>
+struct EstimatorsWithPlaces : Estimators<E...> {
+  static constexpr std::size_t kSamples = kPlaces;
 };
 
 /// `Note` is called with (instance, sample, innovation) for every record.

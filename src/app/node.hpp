@@ -20,7 +20,7 @@
 
 namespace tetap::app {
 
-template <class Estimators, std::size_t TimelineCapacity = 88>
+template <class Estimators, std::size_t TimelineCapacity = Estimators::kSamples>
 class Node {
  public:
   Node(const Numbers& numbers, const Version& version) : numbers_(numbers), publisher_(numbers, version) {

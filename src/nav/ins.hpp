@@ -237,8 +237,8 @@ class Ins {
     if (stands) step.dv_n_mps(2) = earth.gravity_mps2 * step.dt_s;
   }
 
-  /// Looks after the condition of P a little at every step: a round takes 102 of them, and rounding takes several
-  /// hundred to use up the margin. Only when it fails the whole is done at once.
+  /// Looks after the condition of P a little at every step: a round takes 82 of them, so what goes wrong is found
+  /// within 164. Only when it fails the whole is done at once.
   void maintain() {
     if (watch_.idle()) return watch_.begin(p);
     if (watch_.advance(8) != InsFactor::Progress::kBad) return;

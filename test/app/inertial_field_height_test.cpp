@@ -62,6 +62,7 @@ class Robot {
   double yaw_rate_radps = 0, acceleration_mps2 = 0;
   double declination_rad = 0;
   bool gnss = true, baro = true, magnetometer = true;
+  bool gnss_climbs = true;                        ///< says how fast it climbs; NMEA does not
   double unseen_turn_radps = 0;                   ///< of the world, that the gyroscope does not show
   double field_noise_uT = 0.3, flux_after_s = 0;  ///< how long after an IMU sample the magnetometer's is taken
   nav::Vector3 accel_bias_mps2 = nav::Vector3::Zero();
@@ -153,11 +154,11 @@ class Robot {
         .fix = GnssFix::k3d};
     static_cast<void>(estimator.fuse(fix, {us}, with()));
     const nav::Vector3 v = noise_(0.1);
-    static_cast<void>(
-        estimator.fuse(GnssVelocity{.v_n_mps = {narrow(speed_mps * std::cos(yaw_rad)) + v(0),
-                                                narrow(speed_mps * std::sin(yaw_rad)) + v(1), narrow(climb_mps) + v(2)},
-                                    .acc_mps = 0.1F},
-                       {us}, with()));
+    static_cast<void>(estimator.fuse(GnssVelocity{.v_n_mps = {narrow(speed_mps * std::cos(yaw_rad)) + v(0),
+                                                              narrow(speed_mps * std::sin(yaw_rad)) + v(1),
+                                                              gnss_climbs ? narrow(climb_mps) + v(2) : base::kNan},
+                                                  .acc_mps = 0.1F},
+                                     {us}, with()));
   }
   [[nodiscard]] nav::Quaternion attitude() const {
     return nav::from_euler({.yaw_rad = narrow(yaw_rad), .pitch_rad = narrow(pitch_rad), .roll_rad = narrow(roll_rad)});
@@ -479,6 +480,32 @@ TEST(InertialBarometer, never_makes_the_height_better_known_than_its_zero) {
   const double drift_m = 10 * static_cast<double>(robot.n.baro.drift_m_rts);
   EXPECT_GT(robot.height_sigma_m(), 0.97 * std::hypot(at_outage_m, drift_m));
   EXPECT_LT(robot.height_sigma_m(), 1.25 * std::hypot(at_outage_m, drift_m));
+}
+
+TEST(InertialHeight, is_that_of_the_fixes_where_the_receiver_says_no_vertical_speed) {
+  for (const bool climbs_at_the_start : {false, true}) {
+    Robot robot;
+    robot.baro = robot.gnss_climbs = false;
+    if (climbs_at_the_start) robot.climb_mps = 2;
+    drive(robot, 60);
+    double worst = 0, sum = 0;
+    int count = 0;
+    for (const double rate_mps : {2.0, 0.0, -3.0, 1.0}) {
+      climb(robot, rate_mps);
+      for (int k = 0; k < 150; ++k) {
+        drive(robot, 0.2);
+        const auto now = robot.now();
+        const double off_mps = static_cast<double>(now.state.v_n_mps(2)) - robot.climb_mps;
+        const double share = off_mps / std::sqrt(static_cast<double>(now.p(5, 5)));
+        worst = std::max({worst, std::abs(share) / 3, std::abs(robot.height_off_m() / robot.height_sigma_m()) / 3});
+        sum += share * share;
+        ++count;
+      }
+    }
+    EXPECT_LT(worst, 1.2) << climbs_at_the_start;
+    EXPECT_LT(sum / count, 2.0) << climbs_at_the_start;
+    EXPECT_GT(sum / count, 0.05) << climbs_at_the_start;
+  }
 }
 
 TEST(InertialBarometer, takes_a_door_for_a_new_zero_not_for_a_climb) {

@@ -185,7 +185,7 @@ TEST(NeverNan, AnInertialStartFromNoNumbersIsRefused) {
 
 /// P and R of every size, all sensors in any order: what follows stays a covariance, and the state a number.
 TEST(NeverNan, MeasurementsOfEverySizeInEveryOrder) {
-  test::Normal normal(9);
+  test::Normal normal(0);
   const auto size = [&normal](double decades) {
     return static_cast<float>(std::pow(10.0, decades * std::tanh(normal())));
   };
@@ -197,6 +197,8 @@ TEST(NeverNan, MeasurementsOfEverySizeInEveryOrder) {
   int accepted = 0;
   const auto count = [&accepted](const auto& record) { accepted += record.verdict == Verdict::kAccepted ? 1 : 0; };
   for (int run = 0; run < 1000; ++run) {
+    // 4817 is where a measurement that is sharp takes what the digit of a step has not given yet.
+    normal = test::Normal(run == 0 ? 4817U : static_cast<unsigned>(run));
     nav::Ins ins;
     nav::Ins::Covariance p;
     for (int i = 0; i < 15; ++i) p(i, i) = size(8);

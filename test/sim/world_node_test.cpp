@@ -162,6 +162,34 @@ TEST(Covariance, ComesWithWhatItJudgesInTurnsThatTheEpochSays) {
 
 // An IMU at 200 Hz, a window of half a second: what the receiver said 480 ms ago is fused at its own time, so nothing
 // of the estimate tells when it came.
+template <std::size_t kPlaces>
+using RoverWith = app::EstimatorsWithPlaces<kPlaces, app::Odometry, robot::rover::Attitude, robot::rover::Inertial>;
+
+/// How often samples became final early for want of places.
+template <class Estimators>
+int windows_short(const std::vector<Epoch>& epochs) {
+  const auto node = std::make_unique<app::Node<Estimators>>(robot::rover::numbers, app::Version{});
+  int count = 0;
+  for (const Epoch& epoch : epochs) {
+    if (epoch.tick.begin) node->power_on(*epoch.tick.begin);
+    for (const base::CanFrame& frame : epoch.inputs) node->on_frame(frame);
+    node->tick(epoch.tick.time, {}, [&](const base::CanFrame& frame) {
+      if (frame.id != 0x300 + can::EstDiagCapacity::kOffset) return;
+      if (const auto full = can::decode<can::EstDiagCapacity>(can::payload(frame)); full)
+        count += full->window_short + full->timeline_full;
+    });
+  }
+  return count;
+}
+
+TEST(Late, AnImuAt400HzHasPlaceWhereTheRobotSaysSo) {
+  World::Options options;
+  options.numbers.imu.rate_hz = 400;
+  const std::vector<Epoch> epochs = made(options, 4, 20);
+  EXPECT_EQ(windows_short<RoverWith<112>>(epochs), 0);
+  EXPECT_GT(windows_short<robot::rover::Estimators>(epochs), 0) << "88 places hold 200 ms of 200 Hz";
+}
+
 TEST(Late, AFixOfAlmostHalfASecondAgoLeavesTheBytesOfOneOnTime) {
   World::Options options;
   options.numbers.imu.rate_hz = 200;
@@ -183,7 +211,7 @@ TEST(Late, AFixOfAlmostHalfASecondAgoLeavesTheBytesOfOneOnTime) {
   EXPECT_GT(moved, 500U);
   const auto said = [&](const std::vector<Epoch>& epochs) {
     std::vector<base::CanFrame> all;
-    const auto node = std::make_unique<app::Node<robot::rover::Estimators, 192>>(numbers, app::Version{});
+    const auto node = std::make_unique<app::Node<RoverWith<192>>>(numbers, app::Version{});
     std::size_t short_windows = 0;
     for (const Epoch& epoch : epochs) {
       if (epoch.tick.begin) node->power_on(*epoch.tick.begin);

@@ -12,6 +12,8 @@ namespace tetap::app {
 
 /// The sigma of a height that is not there.
 inline constexpr float kNoHeight_m = 1e3F;
+/// The same of a vertical speed: NMEA has none.
+inline constexpr float kNoClimb_mps = 1e3F;
 
 /// Normalised innovation squared of a fix: of all of it, and of its horizontal part alone.
 struct FixNis {
@@ -221,16 +223,17 @@ inline constexpr float kDecides = 4.0F;
 
 inline Innovation Inertial::fuse(const GnssVelocity& velocity, base::Micros stamp, const Context& with) {
   const GnssNumbers& n = with.numbers.gnss;
-  nav::Vector3 v_n{velocity.v_n_mps[0], velocity.v_n_mps[1],
-                   base::is_finite(velocity.v_n_mps[2]) ? velocity.v_n_mps[2] : 0.0F};
+  nav::Vector3 v_n{velocity.v_n_mps[0], velocity.v_n_mps[1], velocity.v_n_mps[2]};
+  const bool has_climb = base::is_finite(v_n(2));
   const float own = base::is_finite(velocity.acc_mps) ? velocity.acc_mps : 0.5F;
   const float sigma = own > n.sigma_velocity_floor_mps ? own : n.sigma_velocity_floor_mps;
   if (phase_ != Phase::kTracking) {
-    start_.velocity(v_n, sigma, with.numbers);
+    start_.velocity(v_n, sigma, has_climb, with.numbers);
     return {.verdict = can::Verdict::kAccepted};
   }
   if (frozen_.frozen()) return {.verdict = can::Verdict::kStale};
-  v_n -= ins_.accel_n_mps2 * later_s(stamp);  // to the time of the last IMU sample, as the state is
+  v_n -= ins_.accel_n_mps2 * later_s(stamp);   // to the time of the last IMU sample, as the state is
+  if (!has_climb) v_n(2) = ins_.x.v_n_mps(2);  // says what is expected, and hardly anything
   const nav::Vector3 v_b = axle_mps(v_n, with);
   hear_ground(v_n, v_b, sigma, stamp, with);
   // A receiver and a filter that say another direction: either may be wrong, and the filter gives way after a while.
@@ -242,12 +245,15 @@ inline Innovation Inertial::fuse(const GnssVelocity& velocity, base::Micros stam
     begin_anew(stamp, can::ResetCause::kHeadingWrong, with);
     return {.verdict = can::Verdict::kRejected};
   }
-  return measure(model::GnssVelocity3d{.v_n_mps = v_n,
-                                       .sigma_horizontal_mps = sigma,
-                                       .sigma_vertical_mps = 1.5F * sigma,
-                                       .antenna_b_m = {n.antenna_x_b_m, n.antenna_y_b_m, n.antenna_z_b_m},
-                                       .gyro_b_radps = rate_b_radps_},
-                 kVelocity, n.gate_scale, stamp, with);
+  const float gate = has_climb ? 1.0F : filter::chi_square_99(2) / filter::chi_square_99(3);
+  Innovation record = measure(model::GnssVelocity3d{.v_n_mps = v_n,
+                                                    .sigma_horizontal_mps = sigma,
+                                                    .sigma_vertical_mps = has_climb ? 1.5F * sigma : kNoClimb_mps,
+                                                    .antenna_b_m = {n.antenna_x_b_m, n.antenna_y_b_m, n.antenna_z_b_m},
+                                                    .gyro_b_radps = rate_b_radps_},
+                              kVelocity, gate * n.gate_scale, stamp, with);
+  if (!has_climb && record.dof == 3) record.dof = 2;
+  return record;
 }
 
 }  // namespace tetap::app

@@ -59,6 +59,7 @@ class InertialStart {
     if (fixed_ && !given_ && !has_velocity_ && dt_s > 0.01F && dt_s < 5.0F) {  // between the last two fixes
       v_n_mps_ = nav::Vector3{fix.x.minus(at_.x), fix.y.minus(at_.y), 0.0F} / dt_s;
       sigma_v_mps_ = 1.5F * fix.sigma_horizontal_m / dt_s + 2.0F;
+      sigma_climb_mps_ = kUnseenClimb_mps;
     }
     fixed_at_ = stamp;
     if (!headed_ && !has_velocity_)
@@ -81,10 +82,13 @@ class InertialStart {
     placed_ = true;
     given_ = false;
   }
-  void velocity(const nav::Vector3& v_n_mps, float sigma_mps, const Numbers& n) {
+  /// Without has_climb its vertical part is none.
+  void velocity(const nav::Vector3& v_n_mps, float sigma_mps, bool has_climb, const Numbers& n) {
     has_velocity_ = true;
     v_n_mps_ = v_n_mps;
+    if (!has_climb) v_n_mps_(2) = 0.0F;
     sigma_v_mps_ = sigma_mps;
+    sigma_climb_mps_ = has_climb ? sigma_mps : kUnseenClimb_mps;
     const float speed2 = v_n_mps(0) * v_n_mps(0) + v_n_mps(1) * v_n_mps(1);
     if (speed2 > 0.25F + 9.0F * sigma_mps * sigma_mps) given_ = false;  // it has gone from where it was said to be
     if (headed_) return;
@@ -120,10 +124,11 @@ class InertialStart {
     x.q_nb = (nav::exp_quaternion({0.0F, 0.0F, turn}) * level).renormalised();
     if (!again) x.v_n_mps = v_n_mps_;
     const float h = at_.sigma_horizontal_m * at_.sigma_horizontal_m, v = at_.sigma_vertical_m * at_.sigma_vertical_m;
-    const float speed = sigma_v_mps_ * sigma_v_mps_, tilt = n.start_tilt_rad * n.start_tilt_rad;
+    const float speed = sigma_v_mps_ * sigma_v_mps_, climb = sigma_climb_mps_ * sigma_climb_mps_;
+    const float tilt = n.start_tilt_rad * n.start_tilt_rad;
     const float a = n.accel_turn_on_mps2 * n.accel_turn_on_mps2, g = n.gyro_turn_on_radps * n.gyro_turn_on_radps;
     ins.start(x,
-              std::array{h, h, v, speed, speed, speed, tilt, tilt, sigma_yaw_rad_ * sigma_yaw_rad_, a, a, a, g, g, g});
+              std::array{h, h, v, speed, speed, climb, tilt, tilt, sigma_yaw_rad_ * sigma_yaw_rad_, a, a, a, g, g, g});
   }
   template <class Sink>
   void each_bit(Sink&& sink) const {
@@ -134,7 +139,7 @@ class InertialStart {
     sink(levelled_s_);
     sink(at_.x.um());
     sink(at_.y.um());
-    for (const float v : {yaw_rad_, level_yaw_rad_, sigma_yaw_rad_, sigma_v_mps_}) sink(v);
+    for (const float v : {yaw_rad_, level_yaw_rad_, sigma_yaw_rad_, sigma_v_mps_, sigma_climb_mps_}) sink(v);
     for (int i = 0; i < 3; ++i) sink(v_n_mps_(i));
     sink(first_x_.um());
     sink(first_y_.um());
@@ -168,7 +173,8 @@ class InertialStart {
   model::GnssFix3d at_;
   base::Anchored first_x_, first_y_;
   nav::Vector3 v_n_mps_ = nav::Vector3::Zero();
-  float sigma_v_mps_ = 3;
+  static constexpr float kUnseenClimb_mps = 5;
+  float sigma_v_mps_ = 3, sigma_climb_mps_ = 3;
   base::Micros fixed_at_;
   float yaw_rad_ = 0, level_yaw_rad_ = 0, sigma_yaw_rad_ = 3;  ///< the second: of turned_, when the first was found
   bool placed_ = false, headed_ = false, fixed_ = false, has_velocity_ = false;

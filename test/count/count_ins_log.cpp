@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+// Instructions of every tick of inertial navigation over a recorded log, from the start: a car's, a multirotor's.
+// Arguments: car or iris, and a candump log with sync frames.
+#include "config/car.hpp"
+#include "config/iris.hpp"
+#include "hal/port/mps2/board.hpp"
+#include "markers.hpp"
+#include "navigator.hpp"
+
+#include <string_view>
+
+namespace {
+
+using namespace tetap;
+
+/// True when the whole log was read and navigated.
+template <class Workload>
+[[gnu::noinline]] bool count_ticks(hal::mps2::Board& board, const app::Numbers& numbers) {
+  static count::Navigator<app::Inertial> navigator{numbers};
+  const std::uint32_t sync_id = numbers.can_base + can::InSync::kOffset;
+  while (const auto frame = board.can.receive()) {
+    const auto sync = frame->id == sync_id ? can::decode<can::InSync>(can::payload(*frame)) : std::nullopt;
+    if (!sync) {
+      navigator.on_frame(*frame);
+      continue;
+    }
+    const base::Micros time{static_cast<std::int64_t>(sync->time_us)};
+    if (sync->kind == can::SyncKind::kBegin) {
+      navigator.begin(time);
+    } else {
+      const count::Region<Workload> region;
+      navigator.tick(time);
+    }
+  }
+  count::opaque(navigator);
+  return board.can.faults().rx_overflow == 0 && navigator.valid() &&
+         navigator.accepted(can::Sensor::kGnssPosition) > 10;
+}
+
+}  // namespace
+
+int main() {
+  static hal::mps2::Board board;
+  static hal::mps2::semihosting::CommandLine<512> arguments;
+  const auto words = arguments.words<3>();
+  if (words[1] == nullptr || words[2] == nullptr || !board.can.open(words[2], nullptr)) {
+    board.print("count_ins_log: cannot open the log\n");
+    return 1;
+  }
+  count::calibrate();
+  const bool car = std::string_view(words[1]) == "car";
+  if (!(car ? count_ticks<struct ins_tick_car>(board, robot::car::numbers)
+            : count_ticks<struct ins_tick_iris>(board, robot::iris::numbers))) {
+    board.print("count_ins_log: the log was not navigated\n");
+    return 1;
+  }
+  count::finish();
+  return 0;
+}
