@@ -59,10 +59,16 @@ TEST(Glitch, AJumpThatPersistsIsTakenWithItsSizeAndCount) {
 TEST(Glitch, OneThatWasTakenIsTakenBackWithoutWaiting) {
   Drive d = settled();
   d.tamper = between(d, 60, 140, [](Drive::Fix& fix, double) { fix.east_m += 100; });
-  d.run(80);
+  d.run(79.9);
   ASSERT_EQ(d.estimator.jump().count, 1);
-  d.run(3);
-  EXPECT_EQ(d.estimator.jump().count, 2) << "dead reckoning from before says the same as the fixes now";
+  for (int fixes = 1; fixes <= 5; ++fixes) {
+    ASSERT_EQ(d.estimator.jump().count, 1) << fixes;
+    d.run(0.2);
+  }
+  EXPECT_EQ(d.estimator.jump().count, 2) << "dead reckoning from before says the same as five fixes now";
+  EXPECT_EQ(d.estimator.jump().cause, can::ResetCause::kPositionJump);
+  EXPECT_NEAR(d.estimator.jump().east_m, -100.0F, 3.0F);
+  EXPECT_NEAR(d.estimator.jump().north_m, 0.0F, 3.0F);
   EXPECT_LT(d.error_m(), 2.0);
   d.tamper = between(d, 143, 1e9, [](Drive::Fix& fix, double) { fix.east_m += 100; });
   d.run(30);
@@ -99,6 +105,7 @@ TEST(Glitch, WhereNothingAgreesForFourTimesAsLongItGoesToTheFixesAndSaysSo) {
   EXPECT_LT(d.error_m(), 2.0);
   d.run(4);
   EXPECT_EQ(d.estimator.jump().count, 1);
+  EXPECT_EQ(d.estimator.jump().cause, can::ResetCause::kPositionJump);
   EXPECT_NEAR(d.estimator.jump().east_m, 60 * 35, 5);
 }
 
