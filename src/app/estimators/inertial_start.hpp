@@ -36,9 +36,9 @@ class InertialStart {
     const bool level = levelled_s_ >= n.level_s;
     if (level && !before && !watches_) {
       finder_.restart(turned_);
-    } else if ((level || watches_) && !headed_) {
+    } else if (watches_ || (level && !headed_)) {
       static_cast<void>(finder_.predict(imu));
-      if (level && finder_.ready()) heading(finder_.yaw_rad(), finder_.sigma_rad());
+      if (level && !headed_ && finder_.ready()) heading(finder_.yaw_rad(), finder_.sigma_rad());
     }
     return level;
   }
