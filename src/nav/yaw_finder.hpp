@@ -52,8 +52,6 @@ class YawFinder {
   /// Forward speed of the wheels, reversing is negative: it goes where it points (non-holonomic). `axle_b_m`: the axle
   /// that does not steer, from the IMU. Taken at most ten times a second; what slips is refused without consequence.
   void fuse_forward_speed(float mps, float sigma_mps, Complex axle_b_m = {});
-  /// The gyroscope's mean while it surely stood still is its bias: what a rover that drives circles needs to know.
-  void stood(const Vector3& gyro_b_radps, float sigma_radps);
 
   [[nodiscard]] float yaw_rad() const;
   /// Of the yaw; that of a heading that may be any is pi / sqrt(3).

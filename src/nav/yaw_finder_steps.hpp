@@ -185,14 +185,6 @@ inline void YawFinder::fuse_forward_speed(float mps, float sigma_mps, Complex ax
   judge(measure(kV, v_b * -1.0F, {}, sigma_mps, square(dropped) + square(kWheelShare * mps)), false);
 }
 
-inline void YawFinder::stood(const Vector3& gyro_b_radps, float sigma_radps) {
-  if (!(gyro_b_radps.squaredNorm() < 0.04F && sigma_radps > 1e-6F && sigma_radps < 1.0F)) return;
-  flush();
-  bias_b_radps_ = gyro_b_radps;
-  filter_.set(kU, {}, 2.0F * square(sigma_radps));
-  filter_.set(kR, {}, 2.0F * square(kGravity * sigma_radps));
-}
-
 [[gnu::noinline]] inline float YawFinder::yaw_rad() const {
   const Complex z = filter_.value(kZ) * heading_;
   return base::atan2(z.im, z.re);

@@ -14,6 +14,7 @@
 
 #include <gtest/gtest.h>
 #include <limits>
+#include <optional>
 #include <vector>
 
 namespace tetap {
@@ -241,6 +242,52 @@ TEST(NeverNan, EveryFieldOfEverySampleWhileStartingAndWhileNavigating) {
           run_broken(kind.sensor, field, value, from);
           if (HasFailure()) return;
         }
+}
+
+/// What is refused at the door is counted, and the count is on the bus.
+TEST(NeverNan, EveryFieldThatIsRefusedIsSaid) {
+  using Node = app::Node<app::Estimators<app::Odometry, app::PoseEkf, app::Attitude, app::Inertial>>;
+  app::Numbers numbers = kNumbers;
+  numbers.publish.diagnostics_every = 1;
+  static Node node{numbers, {}};
+  std::int64_t now_us = 1'000'000;
+  node.power_on({now_us});
+  // Until the counters' page has come once more.
+  const auto counted = [&] {
+    std::optional<can::EstDiagFrames> page;
+    for (int k = 0; k < 20 && !page; ++k) {
+      now_us += 10'000;
+      node.tick({now_us}, {}, [&](const base::CanFrame& frame) {
+        if (frame.id - numbers.can_base == can::EstDiagFrames::kOffset)
+          page = can::decode<can::EstDiagFrames>(can::payload(frame));
+      });
+    }
+    EXPECT_TRUE(page.has_value());
+    return page ? *page : can::EstDiagFrames{};
+  };
+  int refused = 0, after = counted().out_of_range;
+  EXPECT_EQ(after, 0);
+  std::vector<app::Sample> kinds = good(7, {});
+  for (app::Sample& kind : kinds)
+    for (std::size_t field = 0; field < fields_of(kind).size(); ++field)
+      for (const float value : values()) {
+        app::Sample sample = kind;
+        const Field of = fields_of(sample)[field];
+        *of.value = value;
+        const bool nothing = !base::is_finite(value) && !(of.optional && base::is_nan(value));
+        if (nothing) {
+          EXPECT_FALSE(app::plausible(sample));
+        }
+        if (app::plausible(sample)) continue;
+        sample.stamp = {now_us - 1'000};
+        node.sample(sample);
+        const int before = after;
+        after = counted().out_of_range;
+        EXPECT_EQ(after, before + 1) << "sensor " << static_cast<int>(kind.sensor) << " field " << field << " = "
+                                     << value;
+        ++refused;
+      }
+  EXPECT_GT(refused, 200);
 }
 
 /// What is counted, and what a thermometer says.

@@ -134,6 +134,10 @@ class Inertial {
   [[nodiscard]] nav::Vector3 axle_mps(const nav::Vector3& v_n_mps, const Context& with) const;
   [[nodiscard]] bool looks_wrong(const nav::Vector3& v_b_mps, float level_mps, float sigma_mps, base::Micros stamp,
                                  const Context& with);
+  /// Neither wheels nor a speedometer were heard of late.
+  [[nodiscard]] bool alone(base::Micros at) const { return rolled_.us == 0 || at - rolled_ >= base::Micros{1'000'000}; }
+  [[nodiscard]] bool contradicted(base::Micros stamp, const Context& with);
+  [[nodiscard]] bool wrong_for_long(bool wrong, base::Micros stamp, const RecoveryNumbers& rules);
   void stand(base::Micros stamp, const Context& with);
   void hold_heading(float gate, const InertialNumbers& n);
   [[nodiscard]] bool resting(base::Micros stamp, const Context& with) const;
@@ -237,7 +241,7 @@ class Inertial {
   ImuWatch imu_;
   SlipWatch slip_;
   std::array<Refused, kSources> refused_{};
-  Refused wrong_way_;            ///< that it looks where it does, by receiver and wheels
+  Refused wrong_way_;            ///< that it looks where it does, by receiver and wheels, or by how it moves
   base::Micros wrong_way_at_;    ///< last of that
   std::uint8_t recoveries_ = 0;  ///< of the velocity, since a fix was accepted
   FirstFixes first_fixes_;

@@ -100,6 +100,11 @@ inline Innovation Inertial::fuse(const GnssPosition& fix, base::Micros stamp, co
   if (frozen_.hear(fix, nav::difference(model.x, ins_.x.x), nav::difference(model.y, ins_.x.y),
                    with.numbers.recovery.frozen_m))
     return {.verdict = can::Verdict::kStale};
+  start_.watch(model);
+  if (alone(stamp) && contradicted(stamp, with)) {
+    begin_anew(stamp, can::ResetCause::kHeadingWrong, with);
+    return {.verdict = can::Verdict::kRejected};
+  }
   return weigh(model, stamp, with);
 }
 
@@ -176,11 +181,19 @@ inline constexpr float kDecides = 4.0F;
   }
   // Back to where a jump came from: dead reckoning before it and fixes after it say the same.
   const bool back = confirmed && back_ && place_.says(-jump_.east_m, -jump_.north_m, 2.0F * r(0) + p_level);
-  // Fixes that agree with nothing for very long: the filter is no judge of how it moves.
-  const base::Micros despair{4 * std::int64_t{rules.persist_us}};
-  const bool lost = confirmed && stamp - refused_[kPosition].since >= despair;
+  // Fixes that agree with nothing for very long: the filter is no judge of how it moves. Sooner where nothing but its
+  // IMU says so, and what the fixes claim is not a jump that lasts.
+  const base::Micros refused = stamp - refused_[kPosition].since;
+  const bool told = !alone(stamp) || (ground_.us > 0 && stamp - ground_ < base::Micros{1'000'000});
+  const base::Micros despair{4 * std::int64_t{told ? rules.persist_us : rules.after_us}};
+  const bool lost =
+      confirmed && refused >= despair && (told || !place_.persisted(static_cast<std::int32_t>(refused.us / 2), 0));
   if (!back && !lost && !place_.persisted(rules.persist_us, rules.persist_fixes)) return false;
   step(0, 2, {place_.east_m(), place_.north_m(), 0.0F}, r);
+  if (lost && !told) {  // so it moved otherwise than it thought, all that time
+    const float way2_m2 = place_.east_m() * place_.east_m() + place_.north_m() * place_.north_m();
+    doubt(base::sqrt(way2_m2) / base::seconds(refused), 0.0F);
+  }
   ins_.p(8, 8) += rules.inflate_yaw_rad * rules.inflate_yaw_rad;
   height_.forget();
   refused_[kPosition] = {};
@@ -207,17 +220,26 @@ inline constexpr float kDecides = 4.0F;
 [[gnu::noinline]] inline bool Inertial::looks_wrong(const nav::Vector3& v_b_mps, float level_mps, float sigma_mps,
                                                     base::Micros stamp, const Context& with) {
   constexpr float kCosine = 0.88F;
-  constexpr base::Micros kLately{2'500'000};
   const float rolled = stamp - rolled_ < base::Micros{500'000} ? rolled_mps_ : 0.0F;
   const float ahead = rolled < 0.0F ? -v_b_mps(0) : v_b_mps(0);
   const bool wrong = level_mps > 4.0F * sigma_mps + 0.3F &&
                      base::abs(level_mps - base::abs(rolled)) < 3.0F * sigma_mps + 0.05F * level_mps &&
                      ahead < kCosine * level_mps - sigma_mps;
+  return wrong_for_long(wrong, stamp, with.numbers.recovery);
+}
+
+/// Of a robot without wheels: how it moves has shown for long another heading than the filter's.
+[[gnu::noinline]] inline bool Inertial::contradicted(base::Micros stamp, const Context& with) {
+  const bool wrong = start_.contradicts(nav::euler(ins_.x.q_nb).yaw_rad, base::sqrt(heading_rad2()));
+  return wrong_for_long(wrong, stamp, with.numbers.recovery);
+}
+
+inline bool Inertial::wrong_for_long(bool wrong, base::Micros stamp, const RecoveryNumbers& rules) {
+  constexpr base::Micros kLately{2'500'000};
   if (!wrong || stamp - wrong_way_at_ > kLately) wrong_way_ = {};
   if (!wrong) return false;
   if (wrong_way_.in_a_row++ == 0) wrong_way_.since = stamp;
   wrong_way_at_ = stamp;
-  const RecoveryNumbers& rules = with.numbers.recovery;
   return wrong_way_.in_a_row >= rules.at_least && stamp - wrong_way_.since >= base::Micros{rules.after_us};
 }
 
@@ -241,7 +263,8 @@ inline Innovation Inertial::fuse(const GnssVelocity& velocity, base::Micros stam
   const float level = base::sqrt(v_b(0) * v_b(0) + v_b(1) * v_b(1)), rolled = base::abs(forward_mps());
   if (wheels_agree(stamp, with) && base::abs(level - rolled) > 4.0F * sigma + 0.2F * rolled + 0.5F)
     refused_[kVelocity].since = stamp;
-  if (looks_wrong(v_b, level, sigma, stamp, with)) {
+  start_.watch(v_n, sigma, n);
+  if (alone(stamp) ? contradicted(stamp, with) : looks_wrong(v_b, level, sigma, stamp, with)) {
     begin_anew(stamp, can::ResetCause::kHeadingWrong, with);
     return {.verdict = can::Verdict::kRejected};
   }

@@ -77,6 +77,11 @@ inline Innovation Inertial::fuse(const ImuSample& sample, base::Micros stamp, co
   still_.rate_radps += (rate_b_radps_ - still_.rate_radps) * (dt_s / (still_.s > dt_s ? still_.s : dt_s));
   stand(stamp, with);
   constrain(stamp, with);
+  if (alone(stamp)) {
+    start_.watch(increment, ins_.x.q_nb);
+  } else {
+    start_.watch_no_more();
+  }
   return {.verdict = can::Verdict::kAccepted};
 }
 
@@ -116,6 +121,7 @@ inline bool Inertial::without_imu() const {
     ins_.p(8, 8) += slip / (track_m * track_m) * dt_s;
   }
   corrected();
+  start_.gap(gap);
   rate_b_radps_ = ins_.x.b_g_radps + w_b;
   time_ += gap;
   bridged_ = time_;
@@ -144,7 +150,9 @@ inline std::uint16_t Inertial::faults() const {
 [[gnu::noinline]] inline void Inertial::begin_anew(base::Micros t, can::ResetCause cause, const Context& with) {
   const auto count = static_cast<std::uint8_t>(jump_.count + 1);
   const nav::InsState last = ahead_.present();
+  const InertialStart before = start_;
   base::renew(*this);
+  start_.take_over(before);
   time_ = t;
   noise_of(with.numbers.inertial);
   ahead_.remember(last);

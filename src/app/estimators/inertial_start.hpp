@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // How inertial navigation begins: levels from gravity, then waits for a place and a heading: a given pose, an outside
 // heading, a magnetometer's, or what the motion shows (nav/yaw_finder.hpp), forwards or in reverse. Of a robot that
-// starts forwards for sure the course of GNSS is enough (fast velocity, or the chord between fixes).
+// starts forwards for sure the course of GNSS is enough (fast velocity, or the chord between fixes). Where no wheels
+// are heard, what finds a heading goes on beside the filter and judges its.
 #pragma once
 
 #include "app/numbers.hpp"
@@ -33,17 +34,46 @@ class InertialStart {
     const bool before = levelled_s_ >= n.level_s;
     levelled_s_ += dt_s;
     const bool level = levelled_s_ >= n.level_s;
-    if (level && !before) {
+    if (level && !before && !watches_) {
       finder_.restart(turned_);
-    } else if (level && !headed_) {
+    } else if (watches_ || (level && !headed_)) {
       static_cast<void>(finder_.predict(imu));
-      if (finder_.ready()) heading(finder_.yaw_rad(), finder_.sigma_rad());
+      if (level && !headed_ && finder_.ready()) heading(finder_.yaw_rad(), finder_.sigma_rad());
     }
     return level;
   }
   /// Increments are missing.
   void gap(base::Micros gap) {
-    if (levelled_s_ > 0.0F && !headed_) finder_.predict_without_imu(gap);
+    if (watches_ || (levelled_s_ > 0.0F && !headed_)) finder_.predict_without_imu(gap);
+  }
+  /// Beside a filter without wheels: what heading the motion shows is found once more, by nothing of the filter's.
+  void watch(const nav::ImuIncrement& imu, const nav::Quaternion& q_nb) {
+    if (!watches_) finder_.restart(q_nb);
+    watches_ = true;
+    static_cast<void>(finder_.predict(imu));
+  }
+  void watch(const model::GnssFix3d& fix) {
+    if (watches_ && !has_velocity_)
+      finder_.fuse_position(fix.x, fix.y, fix.sigma_horizontal_m, {fix.antenna_b_m(0), fix.antenna_b_m(1)});
+  }
+  void watch(const nav::Vector3& v_n_mps, float sigma_mps, const GnssNumbers& n) {
+    if (!watches_) return;
+    has_velocity_ = true;
+    finder_.fuse_velocity(v_n_mps(0), v_n_mps(1), sigma_mps, {n.antenna_x_b_m, n.antenna_y_b_m});
+  }
+  void watch_no_more() { watches_ = false; }
+  /// That filter's heading is another one. What is less than half a radian off, velocities pull round.
+  [[nodiscard]] bool contradicts(float yaw_rad, float sigma_rad) const {
+    constexpr float kSigmas = 5, kApart_rad = 0.5F;
+    return watches_ && finder_.against(yaw_rad, sigma_rad) > kSigmas &&
+           base::abs(base::wrap_angle(finder_.yaw_rad() - yaw_rad)) > kApart_rad;
+  }
+  /// As another began: what the motion has shown of the heading stays.
+  void take_over(const InertialStart& from) {
+    if (!from.watches_) return;
+    finder_ = from.finder_;
+    has_velocity_ = from.has_velocity_;
+    watches_ = true;
   }
   /// Wheels: where it points it goes.
   void forward(float mps, float sigma_mps, float axle_x_b_m) {
@@ -149,7 +179,7 @@ class InertialStart {
     sink(fixed_at_.us);
     finder_.each_bit(sink);
     sink(static_cast<std::uint32_t>((placed_ ? 1U : 0U) | (headed_ ? 2U : 0U) | (fixed_ ? 4U : 0U) |
-                                    (given_ ? 8U : 0U) | (has_velocity_ ? 16U : 0U)));
+                                    (given_ ? 8U : 0U) | (has_velocity_ ? 16U : 0U) | (watches_ ? 32U : 0U)));
   }
 
  private:
@@ -179,7 +209,8 @@ class InertialStart {
   float yaw_rad_ = 0, level_yaw_rad_ = 0, sigma_yaw_rad_ = 3;  ///< the second: of turned_, when the first was found
   bool placed_ = false, headed_ = false, fixed_ = false, has_velocity_ = false;
   nav::YawFinder finder_;
-  bool given_ = false;  ///< where it is was said, not found
+  bool watches_ = false;  ///< it runs beside the filter, or did
+  bool given_ = false;    ///< where it is was said, not found
 };
 
 }  // namespace tetap::app
