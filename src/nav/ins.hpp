@@ -237,11 +237,11 @@ class Ins {
     if (stands) step.dv_n_mps(2) = earth.gravity_mps2 * step.dt_s;
   }
 
-  /// Looks after the condition of P a little at every step: a round takes 82 of them, so what goes wrong is found
-  /// within 164. Only when it fails the whole is done at once.
+  /// Looks after the condition of P a little at every step: a round takes 121 of them, so what goes wrong is found
+  /// within 242. Only when it fails the whole is done at once.
   void maintain() {
     if (watch_.idle()) return watch_.begin(p);
-    if (watch_.advance(8) != InsFactor::Progress::kBad) return;
+    if (watch_.advance(3) != InsFactor::Progress::kBad) return;
     condition(p, watch_);
     ++conditioned_;
   }

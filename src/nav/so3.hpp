@@ -51,6 +51,14 @@ struct Quaternion {
     return r;
   }
   /// q v q*, cheaper than matrix() for one vector.
+  /// rotate({1, 0, 0}): where x of b points, in n.
+  [[nodiscard]] Vector3 rotated_x() const {
+    return {1.0F - 2.0F * (y * y + z * z), 2.0F * (x * y + w * z), 2.0F * (x * z - w * y)};
+  }
+  /// conjugate().rotate({0, 0, 1}): where z of n points, in b.
+  [[nodiscard]] Vector3 z_seen() const {
+    return {2.0F * (x * z - w * y), 2.0F * (y * z + w * x), 1.0F - 2.0F * (x * x + y * y)};
+  }
   [[nodiscard]] Vector3 rotate(const Vector3& v) const {
     const Vector3 u{x, y, z};
     const Vector3 t = 2.0F * cross(u, v);

@@ -69,6 +69,8 @@ TEST(So3, MatrixRotationAndProductAreThoseOfEigen) {
     const nav::Quaternion qa = test::as_float(a), qb = test::as_float(b);
     EXPECT_LT((qa.matrix().cast<double>() - a.toRotationMatrix()).norm(), 1e-6);
     EXPECT_LT((qa.rotate(v.cast<float>()).cast<double>() - a * v).norm(), 2e-6);
+    EXPECT_LT((qa.rotated_x().cast<double>() - a * Vector3d::UnitX()).norm(), 1e-6);
+    EXPECT_LT((qa.z_seen().cast<double>() - a.conjugate() * Vector3d::UnitZ()).norm(), 1e-6);
     EXPECT_LT(angle_between(qa * qb, a * b), 1e-6);
     EXPECT_LT(angle_between(qa * qa.conjugate(), Eigen::Quaterniond::Identity()), 1e-6);
     EXPECT_LT((nav::skew(v.cast<float>()) * nav::Vector3(1, 2, 3) - nav::cross(v.cast<float>(), {1, 2, 3})).norm(),

@@ -178,7 +178,7 @@ class Inertial {
   }
   Innovation roll(const SlipWatch::Wheels& wheels, float sigma_mps, float later_mps, base::Micros stamp,
                   const Context& with);
-  [[nodiscard]] float forward_mps() const { return ins_.x.q_nb.rotate({1.0F, 0.0F, 0.0F}).dot(ins_.x.v_n_mps); }
+  [[nodiscard]] float forward_mps() const { return ins_.x.q_nb.rotated_x().dot(ins_.x.v_n_mps); }
   Innovation forward(const Forward& speed, base::Micros stamp, const Context& with);
   void constrain(base::Micros stamp, const Context& with);
   [[nodiscard]] bool believe(const nav::Vector3& nu, const nav::Vector3& r, bool agrees, base::Micros stamp,

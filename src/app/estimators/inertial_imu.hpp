@@ -67,10 +67,11 @@ inline Innovation Inertial::fuse(const ImuSample& sample, base::Micros stamp, co
   ins_.vibration = imu_.noise_factor(n);
   if (ins_.pending_s() >= every_s) ins_.predict_covariance();
   // Clipped increments are used, and are as uncertain as none.
-  const float growth = base::sqrt(dt_s * 0.1F);
-  if (sample.clipped_accel > 0) ins_.accel_n_mps2 = nav::Vector3::Zero();
-  if (sample.clipped_accel > 0 || sample.clipped_gyro > 0)
+  if (sample.clipped_accel > 0 || sample.clipped_gyro > 0) {
+    const float growth = base::sqrt(dt_s * 0.1F);
+    if (sample.clipped_accel > 0) ins_.accel_n_mps2 = nav::Vector3::Zero();
     doubt(n.gap_mps2 * growth, sample.clipped_gyro > 0 ? n.gap_radps * growth : 0.0F);
+  }
   time_ = stamp;
   if (stamp > ahead_.heard()) corrected();  // it left before the present had it
   still_.s += dt_s;
@@ -226,7 +227,7 @@ inline void Inertial::stand(base::Micros stamp, const Context& with) {
 /// of that wander is left out: it is smaller by a thousand).
 [[gnu::noinline]] inline void Inertial::hold_heading(float gate, const InertialNumbers& n) {
   const float density = n.gyro_radps_rthz * n.gyro_radps_rthz;
-  const nav::Vector3 up_b = ins_.x.q_nb.conjugate().rotate({0.0F, 0.0F, 1.0F});
+  const nav::Vector3 up_b = ins_.x.q_nb.z_seen();
   if (ins_.pending_s() > 0.0F) ins_.predict_covariance();
   // Unless something told the heading so well meanwhile that the noise is not in it any more.
   const float shared = ins_.p(8, 8) > 4.0F * density * waiting_.s ? density : 0.0F;

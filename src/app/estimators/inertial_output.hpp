@@ -84,7 +84,7 @@ template <int kFirst, std::size_t kN>
   const InertialNumbers& n = with.numbers.inertial;
   const nav::Quaternion& q = full.state.q_nb;
   const nav::Vector3& v = full.state.v_n_mps;
-  const nav::Vector3 ahead_n = q.rotate({1.0F, 0.0F, 0.0F});
+  const nav::Vector3 ahead_n = q.rotated_x();
   const nav::Vector3 by_turn = nav::cross(ahead_n, nav::Vector3(v - full.ahead.dv_n_mps));
   const std::array<float, 7> speed{ahead_n(0), ahead_n(1), ahead_n(2),      by_turn(0),
                                    by_turn(1), by_turn(2), -full.ahead.dt_s};
@@ -97,7 +97,7 @@ template <int kFirst, std::size_t kN>
     variance.yaw_rate_rad2ps2 = turn_radps * turn_radps;
     return variance;
   }
-  const nav::Vector3 up_b = q.conjugate().rotate({0.0F, 0.0F, 1.0F});
+  const nav::Vector3 up_b = q.z_seen();
   const std::array<float, 3> turn{up_b(0), up_b(1), up_b(2)};
   const float gyro = ins_.vibration * n.gyro_radps_rthz;
   const float period_s = base::seconds(base::Micros{with.numbers.loop.period_us});

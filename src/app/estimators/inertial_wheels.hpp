@@ -139,7 +139,7 @@ inline Innovation Inertial::forward(const Forward& speed, base::Micros stamp, co
   constrained_ = stamp;
   const float variance = ins_.p(3, 3) + ins_.p(4, 4) + ins_.p(5, 5);
   // As fast as the filter goes, or may: by the reading, readings that err to the slow side would count for more.
-  const nav::Vector3 ahead_n = ins_.x.q_nb.rotate({1.0F, 0.0F, 0.0F});
+  const nav::Vector3 ahead_n = ins_.x.q_nb.rotated_x();
   const float own_mps = ahead_n.dot(ins_.x.v_n_mps);
   const float slip2 = n.slip_share * n.slip_share * (own_mps * own_mps + variance);
   const float sigma = base::sqrt(n.wheel_mps * n.wheel_mps + slip2 + speed.sigma_mps * speed.sigma_mps);
