@@ -196,6 +196,7 @@ void an_hour_of_standstill(double x_m, double y_m, const Vector3d& lever, float 
     }
     EXPECT_LT(worst, 5.5) << "no drift";
     EXPECT_GT(std::sqrt(r.ins.p(8, 8)), 0.7F * sigma_heading_rad) << "nobody measured the heading";
+    EXPECT_LT(std::sqrt(r.ins.p(8, 8)), 1.05F * sigma_heading_rad) << "at rest it costs a digit a step";
     std::printf(
         "standstill at (%g, %g) m: worst error %.2f of its sigma, 1 sigma %.2f mm, heading %.3f rad, conditioned %u "
         "times\n",

@@ -186,7 +186,7 @@ TEST(Late, AnImuAt400HzHasPlaceWhereTheRobotSaysSo) {
   World::Options options;
   options.numbers.imu.rate_hz = 400;
   const std::vector<Epoch> epochs = made(options, 4, 20);
-  EXPECT_EQ(windows_short<RoverWith<112>>(epochs), 0);
+  EXPECT_EQ(windows_short<RoverWith<128>>(epochs), 0);
   EXPECT_GT(windows_short<robot::rover::Estimators>(epochs), 0) << "88 places hold 200 ms of 200 Hz";
 }
 

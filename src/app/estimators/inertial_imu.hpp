@@ -221,7 +221,7 @@ inline void Inertial::stand(base::Micros stamp, const Context& with) {
 
 /// What the gyroscope showed since is its bias and its noise, and by the same noise the heading is wrong by now: the
 /// two are correlated (Bar-Shalom, Li, Kirubarajan 2001, sec. 8.3: the measurement's noise with the process'). With
-/// that the heading is turned back to what it was, and an hour at rest costs it nothing. Of tilt the accelerometer has
+/// that the heading is turned back to what it was, and an hour at rest costs it next to nothing. Of tilt the accelerometer has
 /// seen some of that noise already, nobody knows how much: there the measurement counts for less instead. The mean is
 /// that of some time ago: what the bias wandered since is in its variance, and not told by it (what of the heading came
 /// of that wander is left out: it is smaller by a thousand).
