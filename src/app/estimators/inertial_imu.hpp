@@ -221,10 +221,10 @@ inline void Inertial::stand(base::Micros stamp, const Context& with) {
 
 /// What the gyroscope showed since is its bias and its noise, and by the same noise the heading is wrong by now: the
 /// two are correlated (Bar-Shalom, Li, Kirubarajan 2001, sec. 8.3: the measurement's noise with the process'). With
-/// that the heading is turned back to what it was, and an hour at rest costs it next to nothing. Of tilt the accelerometer has
-/// seen some of that noise already, nobody knows how much: there the measurement counts for less instead. The mean is
-/// that of some time ago: what the bias wandered since is in its variance, and not told by it (what of the heading came
-/// of that wander is left out: it is smaller by a thousand).
+/// that the heading is turned back to what it was, and an hour at rest costs it next to nothing. Of tilt the
+/// accelerometer has seen some of that noise already, nobody knows how much: there the measurement counts for less
+/// instead. The mean is that of some time ago: what the bias wandered since is in its variance, and not told by it
+/// (what of the heading came of that wander is left out: it is smaller by a thousand).
 [[gnu::noinline]] inline void Inertial::hold_heading(float gate, const InertialNumbers& n) {
   const float density = n.gyro_radps_rthz * n.gyro_radps_rthz;
   const nav::Vector3 up_b = ins_.x.q_nb.z_seen();
