@@ -165,20 +165,17 @@ TEST(Covariance, ComesWithWhatItJudgesInTurnsThatTheEpochSays) {
 template <std::size_t kPlaces>
 using RoverWith = app::EstimatorsWithPlaces<kPlaces, app::Odometry, robot::rover::Attitude, robot::rover::Inertial>;
 
-/// How often samples became final early for want of places.
+/// How often samples became final early for want of places, if that frame says so.
+int short_windows(const base::CanFrame& frame) {
+  if (frame.id != 0x300 + can::EstDiagCapacity::kOffset) return 0;
+  const auto full = can::decode<can::EstDiagCapacity>(can::payload(frame));
+  return full ? full->window_short + full->timeline_full : 0;
+}
 template <class Estimators>
-int windows_short(const std::vector<Epoch>& epochs) {
-  const auto node = std::make_unique<app::Node<Estimators>>(robot::rover::numbers, app::Version{});
+int short_windows(const std::vector<Epoch>& epochs) {
   int count = 0;
-  for (const Epoch& epoch : epochs) {
-    if (epoch.tick.begin) node->power_on(*epoch.tick.begin);
-    for (const base::CanFrame& frame : epoch.inputs) node->on_frame(frame);
-    node->tick(epoch.tick.time, {}, [&](const base::CanFrame& frame) {
-      if (frame.id != 0x300 + can::EstDiagCapacity::kOffset) return;
-      if (const auto full = can::decode<can::EstDiagCapacity>(can::payload(frame)); full)
-        count += full->window_short + full->timeline_full;
-    });
-  }
+  const auto hear = [&count](std::size_t, const base::CanFrame& frame) { count += short_windows(frame); };
+  run_as<Estimators>(robot::rover::numbers, epochs, hear);
   return count;
 }
 
@@ -186,8 +183,8 @@ TEST(Late, AnImuAt400HzHasPlaceWhereTheRobotSaysSo) {
   World::Options options;
   options.numbers.imu.rate_hz = 400;
   const std::vector<Epoch> epochs = made(options, 4, 20);
-  EXPECT_EQ(windows_short<RoverWith<128>>(epochs), 0);
-  EXPECT_GT(windows_short<robot::rover::Estimators>(epochs), 0) << "88 places hold 200 ms of 200 Hz";
+  EXPECT_EQ(short_windows<RoverWith<128>>(epochs), 0);
+  EXPECT_GT(short_windows<robot::rover::Estimators>(epochs), 0) << "88 places hold 200 ms of 200 Hz";
 }
 
 TEST(Late, AFixOfAlmostHalfASecondAgoLeavesTheBytesOfOneOnTime) {
@@ -211,23 +208,17 @@ TEST(Late, AFixOfAlmostHalfASecondAgoLeavesTheBytesOfOneOnTime) {
   EXPECT_GT(moved, 500U);
   const auto said = [&](const std::vector<Epoch>& epochs) {
     std::vector<base::CanFrame> all;
-    const auto node = std::make_unique<app::Node<RoverWith<192>>>(numbers, app::Version{});
-    std::size_t short_windows = 0;
-    for (const Epoch& epoch : epochs) {
-      if (epoch.tick.begin) node->power_on(*epoch.tick.begin);
-      for (const base::CanFrame& frame : epoch.inputs) node->on_frame(frame);
-      node->tick(epoch.tick.time, {}, [&](const base::CanFrame& frame) {
-        constexpr std::size_t kFused = 2;
-        if (const auto full = can::decode<can::EstDiagCapacity>(can::payload(frame));
-            frame.id == 0x300 + can::EstDiagCapacity::kOffset && full)
-          short_windows += full->window_short + full->timeline_full;
-        if (frame.id == 0x300 + can::offset_of<can::EstPos>(kFused) ||
-            frame.id == 0x300 + can::offset_of<can::EstMotion>(kFused) ||
-            frame.id == 0x300 + can::offset_of<can::EstStdPose>(kFused))
-          all.push_back(frame);
-      });
-    }
-    EXPECT_EQ(short_windows, 0U);
+    int without_place = 0;
+    const auto hear = [&](std::size_t, const base::CanFrame& frame) {
+      constexpr std::size_t kFused = 2;
+      without_place += short_windows(frame);
+      if (frame.id == 0x300 + can::offset_of<can::EstPos>(kFused) ||
+          frame.id == 0x300 + can::offset_of<can::EstMotion>(kFused) ||
+          frame.id == 0x300 + can::offset_of<can::EstStdPose>(kFused))
+        all.push_back(frame);
+    };
+    run_as<RoverWith<192>>(numbers, epochs, hear);
+    EXPECT_EQ(without_place, 0);
     return all;
   };
   const auto straight = said(on_time);
