@@ -619,9 +619,9 @@ RESET_WORDS = {"PositionJump": "position moved by", "HeadingWrong": "heading tur
 
 
 def story(run):
-    """What happened, in words: (time, text), from what the node said of itself and what its best estimate refused."""
+    """What happened, in words: (time, text), from what the node said of itself, what its best estimate refused, and what the world did to it."""
     names = code_names()
-    told = []
+    told = [(start, f"the world: {name}" + (f", for {end - start:.1f} s" if end > start else "")) for name, start, end in fault_spans(run)]
     status = run.status
     at = status["time_s"]
     for i in np.flatnonzero(np.diff(status["mode"], prepend=np.nan) != 0) if len(at) else []:

@@ -314,6 +314,7 @@ class Faults(Case):
         np.testing.assert_array_equal(shown.of(1)["x_m"], run.of(1)["x_m"])
         self.assertEqual(self.report("--truth", truth).returncode, 0)
         self.assertIn('<td>1.0 s</td><td class="text">fault Rejecting, for 1.0 s</td>', text_of(self.path("report.html")))
+        self.assertIn('<td>1.0 s</td><td class="text">the world: gnss_jump, for 1.0 s</td>', text_of(self.path("report.html")))
         # A log that no world was asked for has the node's time only.
         del about["seed"]
         self.write("run.json", json.dumps(about))
@@ -577,7 +578,9 @@ class Inertial(Case):
         self.write_rows("status.csv", metrics.STATUS, [[i * 10, 0.1 * i, 5 if 12 <= i < 20 else 3, 0 if 40 <= i < 55 else 32, 2 if 12 <= i < 20 else 0, int(i >= 30), 6]
                                                        for i in range(1, 60)])
         self.write_rows("states.csv", metrics.STATES, [[310, 3.1, 2, *[None] * 26, 99.5, -0.25, 0.01, *[None] * 5, 3.5, *[None] * 14]])
-        told = metrics.story(metrics.Run(self.directory))
+        run = metrics.Run(self.directory)
+        run.about["fault"] = "wheel_spin@1+2,kidnapped@4+0,gnss_jump"
+        told = metrics.story(run)
         words = [text for _, text in told]
         self.assertEqual([t for t, _ in told], sorted(t for t, _ in told))
         self.assertIn("GnssPosition Rejected, 5 times until 1.8 s", words)
@@ -586,6 +589,9 @@ class Inertial(Case):
         self.assertIn("GnssPosition gives nothing that is used, for 1.5 s", words)
         self.assertIn("fault Rejecting, for 0.8 s", words)
         self.assertIn("reset: PositionJump, position moved by 99.50 m east, -0.25 m north, 3.50 m up", words)
+        self.assertIn("the world: wheel_spin, for 2.0 s", words)
+        self.assertIn("the world: kidnapped", words)
+        self.assertFalse([one for one in words if "gnss_jump" in one])  # nobody knows when
 
     def test_the_pictures_of_an_inertial_run_are_drawn(self):
         truth = self.inertial()
