@@ -682,8 +682,13 @@ def jump_words(run, time_s, cause):
             f", {RESET_WORDS[cause]} {rows['jump_x_m'][i]:.2f} m east, {rows['jump_y_m'][i]:.2f} m north, {rows['jump_z_m'][i]:.2f} m up")
 
 
+OF_THE_LOG = {"malformed_lines": "malformed lines skipped", "frames_not_data": "remote, error or CAN FD frames skipped",
+              "frames_back_in_time": "frames are earlier than one before them", "frames_of_wrong_length": "input frames have not 8 bytes"}
+
+
 def warnings_of(run, judged):
-    """What makes the numbers of the run doubtful as a whole. Odometry is left out: it drifts, and nothing tests it."""
+    """What makes the numbers of the run doubtful as a whole, its log first. Odometry is left out: it drifts, and nothing tests it."""
+    log = [f"{run.about[count]} {words}" for count, words in OF_THE_LOG.items() if run.about.get(count)]
     cause = f"fault {', '.join(one.words for one in faults(run))}" if faults(run) else (
         f"is {run.about['robot']} the robot of this log?" if run.about.get("robot") else "the wrong robot for this log?")
     found = []
@@ -700,7 +705,7 @@ def warnings_of(run, judged):
             found.append(f"{one['name']} never had a valid position")
     length_s = float(run.estimates["time_s"][-1] - run.estimates["time_s"][0])
     late = [f"{one.words}, after the end of the run ({length_s:.0f} s)" for one in faults(run) if one.start_s is not None and one.start_s > length_s]
-    return ([f"{'; '.join(found)} ({cause})"] if found else []) + [f"fault {one}: it did not happen" for one in late]
+    return log + ([f"{'; '.join(found)} ({cause})"] if found else []) + [f"fault {one}: it did not happen" for one in late]
 
 
 def summary(run, truth):

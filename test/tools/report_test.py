@@ -259,6 +259,12 @@ class Warnings(Case):
         self.assertEqual(self.run_with(rejected=11),
                          ["warning: fused rejected 11 of 30 RangeBearing measurements (is rover the robot of this log?)"])
 
+    def test_what_is_wrong_with_the_log_is_told_first(self):
+        counts = {"malformed_lines": 0, "frames_not_data": 1, "frames_back_in_time": 15000, "frames_of_wrong_length": 2}
+        self.assertEqual(self.run_with(rejected=0, about={**RUN, **counts}),
+                         ["warning: 1 remote, error or CAN FD frames skipped", "warning: 15000 frames are earlier than one before them",
+                          "warning: 2 input frames have not 8 bytes"])
+
     def test_an_estimate_far_outside_of_what_it_says_is_warned_of_on_the_same_line(self):
         self.assertEqual(self.run_with(0, error_m=0.99), [])  # NEES 98
         self.assertEqual(self.run_with(0, error_m=1.01), ["warning: NEES mean of fused is 102, not 3 (is rover the robot of this log?)"])
