@@ -13,7 +13,9 @@ namespace {
 
 class Body {
  public:
-  Body(double accel_mps2, double turn_radps) : accel_(accel_mps2), turn_(turn_radps) {
+  Body(double accel_mps2, double turn_radps, double begin_yaw_rad = 0)
+      : accel_(accel_mps2), turn_(turn_radps), begin_yaw_rad_(begin_yaw_rad) {
+    n_.gnss.sigma_floor_m = 0.02F;
     n_.inertial.gyro_radps_rthz = 1e-3F;
     n_.inertial.accel_mps2_rthz = 2e-2F;
     n_.inertial.axle_x_b_m = 0;
@@ -21,7 +23,10 @@ class Body {
     site_.origin = can::OriginSource::kConfigured;
     gravity_mps2_ = nav::Earth::at(site_.frame, false).gravity_mps2;
     estimator.restart({us_}, with());
-    estimator.set_pose({us_}, {.pose = {}, .sigma_position_m = 0.1F, .sigma_yaw_rad = 0.02F}, with());
+    estimator.set_pose(
+        {us_},
+        {.pose = {.yaw_rad = static_cast<float>(begin_yaw_rad)}, .sigma_position_m = 0.1F, .sigma_yaw_rad = 0.02F},
+        with());
     still_ = true;
     while (us_ < kBegin_us + 3'000'000) step();
     still_ = false;
@@ -43,10 +48,24 @@ class Body {
     return still_ ? 0.0 : accel_ * 1e-6 * static_cast<double>(at_us - begun_us_);
   }
   [[nodiscard]] double yaw(std::int64_t at_us) const {
-    return still_ ? 0.0 : turn_ * 1e-6 * static_cast<double>(at_us - begun_us_);
+    return still_ ? begin_yaw_rad_ : begin_yaw_rad_ + turn_ * 1e-6 * static_cast<double>(at_us - begun_us_);
+  }
+  /// Where it is that only drives straight on.
+  [[nodiscard]] nav::Local place(std::int64_t at_us) const {
+    const double way_um = still_ ? 0.0 : 0.5e6 * speed(at_us) * 1e-6 * static_cast<double>(at_us - begun_us_);
+    return {.east_um = std::llround(way_um * std::cos(begin_yaw_rad_)),
+            .north_um = std::llround(way_um * std::sin(begin_yaw_rad_)),
+            .up_um = 0,
+            .valid = true};
   }
   [[nodiscard]] double speed_error_mps() const {
     return static_cast<double>(estimator.estimate(with()).forward_mps) - speed(us_);
+  }
+  [[nodiscard]] std::array<float, 2> place_error_m() const {
+    const auto pose = estimator.estimate(with()).pose;
+    const nav::Local true_place = place(us_);
+    return {nav::difference(pose.x, base::Anchored::from_um(true_place.east_um)),
+            nav::difference(pose.y, base::Anchored::from_um(true_place.north_um))};
   }
   [[nodiscard]] double yaw_error_rad() const {
     return std::remainder(static_cast<double>(estimator.estimate(with()).pose.yaw_rad) - yaw(us_),
@@ -71,7 +90,7 @@ class Body {
     estimator.advance({us_}, with(), std::vector<Sample>{});
   }
 
-  double accel_, turn_;
+  double accel_, turn_, begin_yaw_rad_;
   Numbers n_;
   Site site_;
   float gravity_mps2_ = 0;
@@ -80,6 +99,25 @@ class Body {
 };
 
 float single(double x) { return static_cast<float>(x); }
+
+// 16 m/s for 9 ms are 14 cm.
+TEST(OwnMicrosecond, OfAFix) {
+  Body body(2.0, 0.0, 0.9);
+  body.run(8, [&](base::Micros at) {
+    const auto coordinates = body.with().site.frame.to_geodetic(body.place(at.us));
+    ASSERT_TRUE(coordinates);
+    static_cast<void>(body.estimator.fuse(GnssPosition{.latitude_2ndeg = coordinates->latitude_2ndeg,
+                                                       .longitude_2ndeg = coordinates->longitude_2ndeg,
+                                                       .height_m = single(coordinates->height_m),
+                                                       .horizontal_acc_m = 0.02F,
+                                                       .vertical_acc_m = 0.02F,
+                                                       .fix = GnssFix::k3d},
+                                          at, body.with()));
+  });
+  const auto [east_m, north_m] = body.place_error_m();
+  EXPECT_NEAR(east_m, 0.0F, 0.01F);
+  EXPECT_NEAR(north_m, 0.0F, 0.01F);
+}
 
 // 2 m/s^2 for 9 ms are 18 mm/s.
 TEST(OwnMicrosecond, OfAGnssVelocity) {
