@@ -211,6 +211,30 @@ TEST(Ins, AWrongScaleCostsTheHeadingAShareOfItsTurns) {
   }
 }
 
+/// The densities hold up to a vibration; beyond it both sensors' noise is that much larger, and no number is believed.
+TEST(Ins, WhatShakesItMakesBothSensorsNoisier) {
+  const auto grown = [](float vibration) {
+    Ins ins;
+    ins.start({}, start_covariance());
+    ins.noise = {.gyro_radps_rthz = 1e-2F, .accel_mps2_rthz = 0.3F};
+    ins.vibration = vibration;
+    const Ins::Covariance was = ins.p;
+    static_cast<void>(ins.predict(at_rest()));
+    ins.predict_covariance();
+    return std::pair{ins.p(4, 4) - was(4, 4), ins.p(6, 6) - was(6, 6)};
+  };
+  const auto [velocity, attitude] = grown(1.0F);
+  ASSERT_GT(velocity, 0.0F);
+  ASSERT_GT(attitude, 0.0F);
+  const auto [shaken_velocity, shaken_attitude] = grown(4.0F);
+  EXPECT_NEAR(shaken_velocity / velocity, 16.0F, 1.0F);
+  EXPECT_NEAR(shaken_attitude / attitude, 16.0F, 1.0F);
+  for (const float none : {0.0F, 0.5F, -4.0F, 1e9F, base::kNan, base::kInfinity}) {
+    EXPECT_EQ(grown(none).first, velocity) << none;
+    EXPECT_EQ(grown(none).second, attitude) << none;
+  }
+}
+
 TEST(Ins, AGapWithoutIncrementsWidensWhatTheGapMayHaveChanged) {
   Ins ins;
   ins.start({}, start_covariance());
