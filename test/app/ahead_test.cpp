@@ -247,6 +247,9 @@ TEST(Ahead, GoesOnStraightThroughWhatIsMissing) {
   EXPECT_NEAR(nav::euler(after(400'000, true).q_nb).yaw_rad, 0.005F + 0.04F, 1e-4F);
   EXPECT_NEAR(nav::euler(after(400'000, false).q_nb).yaw_rad, 0.005F, 1e-4F);
   EXPECT_NEAR(after(400'000, false).v_n_mps.norm(), 2.0F, 1e-3F);
+  // What it drives turns with it.
+  for (const nav::InsState& at : {after(50'000, false), after(400'000, true), after(400'000, false)})
+    EXPECT_NEAR(at.q_nb.conjugate().rotate(at.v_n_mps)(1), 0.0F, 5e-3F);
 }
 
 /// The node's part between inbox and publisher, driving straight at 1 m/s.

@@ -39,16 +39,16 @@ TEST(TurnedScale, TenCirclesCostTenTimesOne) {
   EXPECT_NEAR(sigma_after(62.831853, 0.01, [](double) { return 1.0; }) / 6.2831853, 10.0, 0.01);
 }
 
-/// What the heading's variance would be with the scale as a state that is never corrected: 2 x 2, written out.
+/// What the heading's variance is with the scale as a state that is never corrected: 2 x 2, written out, by the gain
+/// that the filter takes (Joseph's form: it may be another than the best).
 struct Considered {
   double p = 0, c = 0;
   void turn(double by, double scale) {
     p += by * (2 * c + scale * scale * by);
     c += scale * scale * by;
   }
-  void measured(double r) {
-    const double left = r / (p + r);
-    p *= left;
+  void measured(double r, double left) {
+    p = left * left * p + (1 - left) * (1 - left) * r;
     c *= left;
   }
 };
@@ -63,6 +63,7 @@ TEST(TurnedScale, TurnsAndWhatIsToldOfTheHeadingAreThoseOfAConsideredScale) {
   const std::vector<std::vector<Leg>> drives{
       {{6.28, 1e-8}, {-6.28, 0}},
       {{6.28, 1e-4}, {-3.14, 0}, {-3.14, 1e-5}, {9.0, 0}},
+      {{6.28, 0}, {-6.28, 1e-5}, {6.28, 0}},
       {{-1.5, 0}, {3.0, 1e-5}, {-3.0, 0}, {1.5, 0}, {25.0, 1e-5}, {-25.0, 0}},
   };
   for (const auto& drive : drives) {
@@ -76,7 +77,7 @@ TEST(TurnedScale, TurnsAndWhatIsToldOfTheHeadingAreThoseOfAConsideredScale) {
       }
       if (leg.told_rad2 > 0) {
         const double left = leg.told_rad2 / (variance + leg.told_rad2);
-        law.measured(leg.told_rad2);
+        law.measured(leg.told_rad2, left);
         scale.told(static_cast<float>(left));
         variance *= left;
       }
