@@ -94,6 +94,7 @@ class Drive {
                       static_cast<double>(now_.state.y.minus(other.now_.state.y)));
   }
   [[nodiscard]] double height_error_m() const { return std::abs(off(now_.state.z, up_m)); }
+  [[nodiscard]] double sigma_yaw_rad() const { return std::sqrt(static_cast<double>(now_.p(8, 8))); }
   [[nodiscard]] double sigma_m() const { return std::sqrt(static_cast<double>(now_.p(0, 0) + now_.p(1, 1)) / 2); }
   [[nodiscard]] bool tracking() const { return now_.valid; }
   [[nodiscard]] long counted(char verdict) const { return std::count(verdicts.begin(), verdicts.end(), verdict); }
