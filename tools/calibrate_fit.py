@@ -246,7 +246,7 @@ class Fit:
             inflation += 2 * max(0.0, float((normal[lag:] * normal[:-lag]).mean() / max((normal**2).mean(), 1e-9))) * (1 - lag / 4)
         far = np.abs(wheel) > 4 * np.sqrt(variance)
         self.wheel_variance = variance * inflation * np.where(far, 1e4, 1.0)
-        self.dropped["wheel"] = int(far.sum())
+        self.slips, self.dropped["wheel"] = far, int(far.sum())
         moving = path > 0.2 * path.max()
         self.path_noise = float(np.median((variance / np.maximum(path, 1e-9))[moving])) if moving.any() else 1e-3
 

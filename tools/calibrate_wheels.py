@@ -6,6 +6,7 @@ from calibrate_drive import WINDOW_S, Run
 from calibrate_fit import LEAST_DISTANCE_M, Fit
 from calibrate_numbers import Part, Refusal
 
+SILENT_S = 1.0  # without a fix for longer: nothing to draw
 LEAST_TURN_RAD = 2 * np.pi
 MOST_SCALE, MOST_TRACK, MOST_DIFFERENCE = 0.02, 0.05, 0.02  # 1 sigma, relative: with more the number is refused
 
@@ -115,10 +116,11 @@ def _state(part, fit, run):
     part.notes.append("estimated along: " + "; ".join(others))
 
     def draw(axes):
-        t = fit.fix_t
-        axes.plot(t, np.abs(old[0]), color="#e69f00", lw=1, label="before")
-        axes.plot(t, np.abs(new[0]), color="#0072b2", lw=1, label="after")
-        axes.axhline(np.hypot(white, one.slow) * np.sqrt(2), color="#6b6b6b", lw=1, ls=":", label="GNSS, 1 sigma")
+        silent = np.flatnonzero(np.diff(fit.fix_t) > SILENT_S) + 1  # no line through where no fixes are
+        t = np.insert(fit.fix_t, silent, np.nan)
+        for residual, colour, label in ((old[0], "#e69f00", "before"), (new[0], "#0072b2", "after")):
+            axes.plot(t, np.insert(np.abs(residual), silent, np.nan), color=colour, lw=1, label=label)
+        axes.axhline(np.hypot(white, one.slow) * np.sqrt(2), color="#6b6b6b", lw=1, ls=":", label="GNSS found, both axes")
         axes.set(xlabel="time [s]", ylabel="position residual [m]")
 
     part.draw = draw
@@ -128,8 +130,8 @@ def _state(part, fit, run):
     def draw_turn(axes):
         t = fit.run.t[0] + WINDOW_S * np.arange(1, len(new[2]) + 1)
         per_turn = np.degrees(1 / fit.track0)
-        axes.plot(t, np.cumsum(old[2]) * per_turn, color="#e69f00", lw=1.4, label="before")
-        axes.plot(t, np.cumsum(new[2]) * per_turn, color="#0072b2", lw=1.4, label="after")
-        axes.set(xlabel="time [s]", ylabel="heading, wheels'\nminus gyroscope's [deg]")
+        for residual, colour, label in ((old[2], "#e69f00", "before"), (new[2], "#0072b2", "after")):
+            axes.plot(t, np.cumsum(np.where(fit.slips, 0.0, residual)) * per_turn, color=colour, lw=1.4, label=label)
+        axes.set(xlabel="time [s]", ylabel="heading, wheels' minus\ngyroscope's, no slips [deg]")
 
     part.draw_more = draw_turn
