@@ -6,7 +6,6 @@ from calibrate_drive import WINDOW_S, Run
 from calibrate_fit import LEAST_DISTANCE_M, Fit
 from calibrate_numbers import Part, Refusal
 
-SILENT_S = 1.0  # without a fix for longer: nothing to draw
 LEAST_TURN_RAD = 2 * np.pi
 MOST_SCALE, MOST_TRACK, MOST_DIFFERENCE = 0.02, 0.05, 0.02  # 1 sigma, relative: with more the number is refused
 
@@ -116,10 +115,10 @@ def _state(part, fit, run):
     part.notes.append("estimated along: " + "; ".join(others))
 
     def draw(axes):
-        silent = np.flatnonzero(np.diff(fit.fix_t) > SILENT_S) + 1  # no line through where no fixes are
-        t = np.insert(fit.fix_t, silent, np.nan)
-        for residual, colour, label in ((old[0], "#e69f00", "before"), (new[0], "#0072b2", "after")):
-            axes.plot(t, np.insert(np.abs(residual), silent, np.nan), color=colour, lw=1, label=label)
+        import report_pictures  # matplotlib takes its time: only when there is something to draw
+        t, before, after = report_pictures.broken_at_gaps(fit.fix_t, fit.fix_t, np.abs(old[0]), np.abs(new[0]))
+        axes.plot(t, before, color="#e69f00", lw=1, label="before")
+        axes.plot(t, after, color="#0072b2", lw=1, label="after")
         axes.axhline(np.hypot(white, one.slow) * np.sqrt(2), color="#6b6b6b", lw=1, ls=":", label="GNSS found, both axes")
         axes.set(xlabel="time [s]", ylabel="position residual [m]")
 

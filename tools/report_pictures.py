@@ -91,7 +91,7 @@ def two_scales(axes, usual, largest):
         axes.axhline(side, color=GREY, linewidth=0.6, linestyle=(0, (1, 2)))
 
 
-def _broken_at_gaps(time_s, *columns):
+def broken_at_gaps(time_s, *columns):
     """Copies with a NaN where time jumps, so that no line is drawn across a gap."""
     steps = np.diff(time_s)
     gaps = np.flatnonzero(steps > 20 * max(float(np.median(steps)), 1e-3)) + 1 if len(steps) else []
@@ -133,7 +133,7 @@ def path(run, truth, landmarks, title):
                   color=LANDMARK, markeredgecolor="white", markeredgewidth=0.6, label="landmark", zorder=5)
     if truth is not None:
         name = "GPS track" if truth.is_reference else "truth"
-        tx, ty = _broken_at_gaps(truth.time_s, truth.x_m, truth.y_m)
+        tx, ty = broken_at_gaps(truth.time_s, truth.x_m, truth.y_m)
         style = {"marker": ".", "markersize": 5, "markeredgewidth": 0, "linewidth": 0.5, "alpha": 0.6} if truth.is_reference else {
             "linewidth": 2.6, "alpha": 0.45}
         axes.plot(tx[thinned(len(tx))], ty[thinned(len(ty))], color=TRUTH, label=name, zorder=2,
@@ -142,7 +142,7 @@ def path(run, truth, landmarks, title):
         valid = rows["pos_valid"] == 1
         if not valid.any():
             continue
-        ex, ey = _broken_at_gaps(rows["time_s"][valid], rows["x_m"][valid], rows["y_m"][valid])
+        ex, ey = broken_at_gaps(rows["time_s"][valid], rows["x_m"][valid], rows["y_m"][valid])
         axes.plot(ex[thinned(len(ex))], ey[thinned(len(ey))], color=color_of(run, k), linewidth=1.1, label=run.names[k], zorder=3 + k * 0.1)
     best = run.best
     centres, widths, heights, angles = covariance_ellipses(tracks[best], 0.95, 28)

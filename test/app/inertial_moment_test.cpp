@@ -45,20 +45,14 @@ class Body {
     }
     estimator.advance({us_}, with(), std::vector<Sample>{});
   }
-  [[nodiscard]] double speed(std::int64_t at_us) const {
-    return still_ ? 0.0 : accel_ * 1e-6 * static_cast<double>(at_us - begun_us_);
-  }
-  [[nodiscard]] double yaw(std::int64_t at_us) const {
-    return still_ ? begin_yaw_rad_ : begin_yaw_rad_ + turn_ * 1e-6 * static_cast<double>(at_us - begun_us_);
-  }
+  [[nodiscard]] double speed(std::int64_t at_us) const { return accel_ * driven_s(at_us); }
+  [[nodiscard]] double yaw(std::int64_t at_us) const { return begin_yaw_rad_ + turn_ * driven_s(at_us); }
   /// Where it is that only drives straight on.
   [[nodiscard]] nav::Local place(std::int64_t at_us) const {
-    const double way_um = still_ ? 0.0 : 0.5e6 * speed(at_us) * 1e-6 * static_cast<double>(at_us - begun_us_);
-    return {.east_um = std::llround(way_um * std::cos(begin_yaw_rad_)),
-            .north_um = std::llround(way_um * std::sin(begin_yaw_rad_)),
-            .up_um = still_ ? 0
-                            : std::llround(0.5e-6 * climb_ * static_cast<double>(at_us - begun_us_) *
-                                           static_cast<double>(at_us - begun_us_)),
+    const double half_um_per_mps2 = 0.5e6 * driven_s(at_us) * driven_s(at_us);
+    return {.east_um = std::llround(accel_ * std::cos(begin_yaw_rad_) * half_um_per_mps2),
+            .north_um = std::llround(accel_ * std::sin(begin_yaw_rad_) * half_um_per_mps2),
+            .up_um = std::llround(climb_ * half_um_per_mps2),
             .valid = true};
   }
   [[nodiscard]] double speed_error_mps() const {
@@ -82,6 +76,9 @@ class Body {
  private:
   static constexpr std::int64_t kStep_us = 10'000, kBegin_us = 1'000'000;
 
+  [[nodiscard]] double driven_s(std::int64_t at_us) const {
+    return still_ ? 0.0 : 1e-6 * static_cast<double>(at_us - begun_us_);
+  }
   void step() {
     us_ += kStep_us;
     odd_ = !odd_;

@@ -250,6 +250,7 @@ class WithFiles(unittest.TestCase):
         with open(os.path.join(self.directory, "campaign.json"), encoding="utf-8") as file:
             case = json.load(file)["cases"][0]
         fused = case["fused"]
+        self.assertGreater(fused["largest_error_m"]["median"], 0.1)
         self.assertGreater(fused["largest_error_m"]["median"], fused["position_rmse_after_m"]["median"])
         self.assertLess(fused["position_rmse_after_m"]["worst"], 0.3)
         self.assertGreater(case["odometry"]["position_rmse_after_m"]["median"], 0.5)  # which nothing brings back
