@@ -43,6 +43,7 @@ namespace tetap::sim {
   n.wheels = planar.wheels;
   n.gyro = planar.gyro;
   n.gnss = planar.gnss;
+  n.gnss.gate_scale = robot::rover::numbers.gnss.gate_scale;
   n.gnss.antenna_x_b_m = single(world.gnss.antenna_b_m[0]);
   n.gnss.antenna_y_b_m = single(world.gnss.antenna_b_m[1]);
   n.gnss.antenna_z_b_m = single(world.gnss.antenna_b_m[2]);

@@ -140,6 +140,72 @@ TEST(FrozenFix, StandingStillIsNotFrozenAndEachCoordinateCounts) {
   }
 }
 
+/// Fixes in the plane, off by `off` and an error that is new with each.
+class Drifting {
+ public:
+  explicit Drifting(float sigma_m) : sigma_m_(sigma_m) {}
+  float hear(float off_m, float filter_m2 = 0) {
+    fixes.hear(sigma_m_ * normal_(engine_), off_m + sigma_m_ * normal_(engine_));
+    return fixes.nis(sigma_m_ * sigma_m_, filter_m2, filter_m2);
+  }
+  DriftingFixes fixes;
+
+ private:
+  float sigma_m_;
+  std::mt19937 engine_{11};
+  std::normal_distribution<float> normal_;
+};
+
+TEST(DriftingFixes, IsChiSquareWhereEveryErrorIsNew) {
+  Drifting drifting(1.5F);
+  for (int i = 0; i < 200; ++i) drifting.hear(0);
+  constexpr int kFixes = 200'000;
+  double sum = 0;
+  int above = 0;
+  for (int i = 0; i < kFixes; ++i) {
+    const float nis = drifting.hear(0);
+    sum += static_cast<double>(nis);
+    above += nis > kChiSquare999Of2 ? 1 : 0;
+  }
+  // One in some ten fixes is independent of the last: 3 sigma of so many.
+  EXPECT_NEAR(sum / kFixes, 2.0, 3 * 2 / std::sqrt(kFixes / 20));
+  EXPECT_NEAR(above, 1e-3 * kFixes, 3 * std::sqrt(1e-3 * kFixes * 20));
+}
+
+TEST(DriftingFixes, ARampIsNoticedBeforeOneFixLeavesItsGateAndWhatStaysPassesAway) {
+  Drifting drifting(1.5F);
+  for (int i = 0; i < 200; ++i) drifting.hear(0);
+  int noticed = 0;
+  while (noticed < 100 && drifting.hear(0.2F * static_cast<float>(noticed)) <= kChiSquare999Of2) ++noticed;
+  EXPECT_GT(noticed, 3) << "at 5 Hz and 1 m/s";
+  EXPECT_LT(noticed, 22) << "4.5 m: the gate of one, 99 %";
+  const float there_m = 0.2F * static_cast<float>(noticed);
+  for (int i = 0; i < 100; ++i) drifting.hear(there_m);
+  EXPECT_LT(drifting.hear(there_m), kChiSquare999Of2) << "it has been there for 20 s";
+}
+
+TEST(DriftingFixes, WhatTheFilterDoesNotKnowMayBeTheReason) {
+  Drifting sure(1.0F), unsure(1.0F);
+  float of_sure = 0, of_unsure = 0;
+  for (int i = 0; i < 20; ++i) {
+    of_sure = sure.hear(0.2F * static_cast<float>(i));
+    of_unsure = unsure.hear(0.2F * static_cast<float>(i), 4.0F);
+  }
+  EXPECT_GT(of_sure, kChiSquare999Of2);
+  EXPECT_LT(of_unsure, 2.0F);
+}
+
+TEST(DriftingFixes, AVelocityVouchesForOneFix) {
+  DriftingFixes fixes;
+  EXPECT_FALSE(fixes.velocity_agreed()) << "none was heard";
+  fixes.velocity(true);
+  EXPECT_TRUE(fixes.velocity_agreed());
+  EXPECT_FALSE(fixes.velocity_agreed()) << "none since";
+  fixes.velocity(true);
+  fixes.velocity(false);
+  EXPECT_FALSE(fixes.velocity_agreed());
+}
+
 TEST(FirstFixes, CountWhenSoManyFollowEachOther) {
   FirstFixes first;
   base::Micros now{1'000'000};

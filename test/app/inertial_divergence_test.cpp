@@ -144,6 +144,24 @@ TEST(InertialDivergence, APositionReceiverAloneIsNotFlownAwayFrom) {
     }
 }
 
+/// The same, held to the line along which it believes to look: what it does not know is how far, not where to.
+TEST(InertialDivergence, NorWhereItIsHeldToAWrongLine) {
+  for (const unsigned seed : {1U, 2U, 3U})
+    for (const double speed_mps : {1.0, 5.0})
+      for (const double off_rad : {1.05, -1.57, 2.62}) {
+        SCOPED_TRACE(testing::Message() << "seed " << seed << ", off " << off_rad << ", " << speed_mps << " m/s");
+        Numbers n = rover_like();
+        n.inertial.constrain_every_us = 100'000;
+        Drive d(n, seed);
+        d.gnss_velocity = false;
+        const Alone all = drive_alone(d, off_rad, speed_mps);
+        EXPECT_LT(all.worst_m, speed_mps > 1.5 ? 250.0 : 60.0) << "to the first stop: 640 m and 370 m";
+        EXPECT_LT(all.worst_sigmas, 40.0) << "and 300 sigma";
+        EXPECT_LT(all.end_m, 12.0);
+        EXPECT_LT(all.end_sigmas, 4.5);
+      }
+}
+
 /// But what fixes say together is a jump, and has to last a minute.
 TEST(InertialDivergence, AJumpOfAPositionReceiverAloneIsRefused) {
   Drive d(numbers(), 1);

@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <functional>
@@ -144,6 +145,52 @@ TEST(Glitch, ARampHasHardlyAnyEffectWhereErrorsLastAndLittleWhereTheyAreNew) {
       EXPECT_EQ(d.estimator.jump().count, 0);
       EXPECT_LT(d.worst_sigmas, kHonest) << seed << ' ' << lasts;
     }
+}
+
+/// Of 20 drives with a receiver whose errors are new with each fix, through a ramp of 1 m/s for half a minute.
+struct Ramp {
+  double first_refused_s = 0, nees = 0;  ///< means over the drives
+  int of_drift = 0;                      ///< fixes refused for their drift, not for themselves
+};
+Ramp ramp(
+    double speed_mps, const std::function<void(Drive&)>& with = [](Drive&) {}) {
+  constexpr int kDrives = 20;
+  Ramp all;
+  for (unsigned seed = 1; seed <= kDrives; ++seed) {
+    Drive d(numbers(), seed);
+    with(d);
+    d.white_m = 1.5;
+    d.place();
+    d.run(60);
+    d.clear();
+    d.tamper = between(d, 60, 90, [speed_mps](Drive::Fix& fix, double t) { fix.north_m += speed_mps * t; });
+    double first_s = 30;
+    for (int i = 0; i < 200; ++i) {
+      d.run(0.2);
+      const bool refused = d.last_fix.verdict == can::Verdict::kRejected;
+      if (refused && d.last_fix.dof == 2) {
+        ++all.of_drift;
+        EXPECT_GT(d.last_fix.nis, d.last_fix.gate) << "by how much";
+      }
+      if (refused && d.counted('R') >= 3) first_s = std::min(first_s, 0.2 * i);
+    }
+    all.first_refused_s += first_s / kDrives;
+    all.nees += d.nees / d.judged / kDrives;
+  }
+  return all;
+}
+
+TEST(Glitch, ARampIsRefusedForItsDriftBeforeItHasLedTheFilterAway) {
+  const Ramp none = ramp(0), of_a_metre = ramp(1);
+  EXPECT_LT(none.of_drift, 20) << "of 4000";
+  EXPECT_GT(of_a_metre.of_drift, 100);
+  EXPECT_LT(of_a_metre.first_refused_s, 5) << "by the gate of one fix: 6";
+  EXPECT_LT(of_a_metre.nees, none.nees + 0.5) << "as honest as without";
+}
+
+TEST(Glitch, FixesWithoutAVelocityThatVouchesForTheFilterAreJudgedOneByOne) {
+  EXPECT_EQ(ramp(1, [](Drive& d) { d.gnss_velocity = false; }).of_drift, 0) << "the filter may be what drifts";
+  EXPECT_EQ(ramp(1, [](Drive& d) { d.n.gnss.correlation_s = 60; }).of_drift, 0) << "its errors wander themselves";
 }
 
 TEST(Glitch, WhatTheFixesLedItAwayByIsDoubted) {

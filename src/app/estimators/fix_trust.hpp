@@ -8,10 +8,14 @@
 #include "base/math.hpp"
 #include "base/time.hpp"
 
+#include <array>
 #include <bit>
 #include <cstdint>
+#include <utility>
 
 namespace tetap::app {
+
+inline constexpr float kChiSquare999Of2 = 13.816F;  ///< chi-square, 2 degrees of freedom, 99.9 %
 
 /// What fixes that are not taken say: "you are off by this much", since when, and how often they said it. The filter
 /// goes on without them meanwhile, so they say the same only if they move as it does.
@@ -67,7 +71,7 @@ class Claim {
   }
 
  private:
-  static constexpr float kBound = 13.816F;  ///< chi-square, 2 degrees of freedom, 99.9 %
+  static constexpr float kBound = kChiSquare999Of2;
   static constexpr std::uint8_t kAgainst = 5;
   static constexpr std::int32_t kMost = 1'000'000;
 
@@ -110,6 +114,52 @@ class FrozenFix {
   std::uint32_t coordinates_ = 0;
   float east_m_ = 0, north_m_ = 0;
   bool frozen_ = false;
+};
+
+/// Notices fixes that drift away while the receiver's own velocity goes along with the filter: the mean of what the
+/// last ten or so say the filter is off by, less that of the last thirty. Each of them alone may be inside its gate (a
+/// ramp, spoofing); what stays where it is, as a filter's own error does, leaves both means alike. Exponentially
+/// weighted means as in Roberts 1959 (control charts); innovations averaged against a slow fault: Diesel & Luu 1995.
+class DriftingFixes {
+ public:
+  void hear(float east_m, float north_m) {
+    follow(soon_m_, kSoon, east_m, north_m);
+    follow(late_m_, kLate, east_m, north_m);
+  }
+  /// The difference of both means, squared and normalised (2 degrees of freedom), of fixes whose errors are new with
+  /// each. What the filter does not know of its position counts in full.
+  [[nodiscard]] float nis(float fix_m2, float east_m2, float north_m2) const {
+    const float d_east_m = soon_m_[0] - late_m_[0], d_north_m = soon_m_[1] - late_m_[1];
+    const float of_fixes_m2 = kShare * fix_m2;
+    return d_east_m * d_east_m / (of_fixes_m2 + east_m2) + d_north_m * d_north_m / (of_fixes_m2 + north_m2);
+  }
+  /// Whether the receiver's velocity since the last fix was what the filter expected: asked once for each.
+  [[nodiscard]] bool velocity_agreed() { return std::exchange(velocity_agreed_, false); }
+  void velocity(bool agrees) { velocity_agreed_ = agrees; }
+  void forget() { *this = {}; }
+
+  template <class Sink>
+  void each_bit(Sink&& sink) const {
+    sink(soon_m_[0]);
+    sink(soon_m_[1]);
+    sink(late_m_[0]);
+    sink(late_m_[1]);
+    sink(static_cast<std::uint32_t>(velocity_agreed_));
+  }
+
+ private:
+  using Mean = std::array<float, 2>;
+  static constexpr float kSoon = 0.1F, kLate = 0.03F;  ///< what the newest counts for
+  /// Variance of the difference, of the variance of one: that of a mean is w / (2 - w), what two have in common
+  /// v w / (v + w - v w).
+  static constexpr float kShare =
+      kSoon / (2 - kSoon) + kLate / (2 - kLate) - 2 * kSoon * kLate / (kSoon + kLate - kSoon * kLate);
+  static void follow(Mean& mean_m, float weight, float east_m, float north_m) {
+    mean_m = {mean_m[0] + weight * (east_m - mean_m[0]), mean_m[1] + weight * (north_m - mean_m[1])};
+  }
+
+  Mean soon_m_{}, late_m_{};
+  bool velocity_agreed_ = false;
 };
 
 /// Before there is a filter: fixes count when so many in a row follow each other no faster than anything drives. A

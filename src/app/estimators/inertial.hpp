@@ -183,6 +183,7 @@ class Inertial {
   void constrain(base::Micros stamp, const Context& with);
   [[nodiscard]] bool believe(const nav::Vector3& nu, const nav::Vector3& r, bool agrees, base::Micros stamp,
                              const RecoveryNumbers& rules);
+  [[nodiscard]] bool drifts(const nav::Vector3& nu, const nav::Vector3& r, const GnssNumbers& n, Innovation& record);
   Innovation weigh(model::GnssFix3d& fix, base::Micros stamp, const Context& with);
   void refused_or_not(Source source, bool refused, base::Micros stamp);
   void step(int first, int count, const nav::Vector3& by_m, const nav::Vector3& variance_m2);
@@ -241,21 +242,22 @@ class Inertial {
   ImuWatch imu_;
   SlipWatch slip_;
   std::array<Refused, kSources> refused_{};
-  Refused wrong_way_;            ///< that it looks where it does, by receiver and wheels, or by how it moves
-  base::Micros wrong_way_at_;    ///< last of that
-  std::uint8_t recoveries_ = 0;  ///< of the velocity, since a fix was accepted
+  Refused wrong_way_;          ///< that it looks where it does, by receiver and wheels, or by how it moves
+  base::Micros wrong_way_at_;  ///< last of that
   FirstFixes first_fixes_;
   FrozenFix frozen_;
+  DriftingFixes drift_;
+  float rolled_mps_ = 0;                 ///< as wheels or a speedometer said last,
+  base::Micros rolled_;                  ///< and when
   Claim place_, height_;                 ///< of fixes that are not taken
   std::array<float, 2> led_m_{};         ///< by how much the last fixes moved the position
   bool doubted_ = false, back_ = false;  ///< so is that; the last jump may be taken back
+  std::uint8_t recoveries_ = 0;          ///< of the velocity, since a fix was accepted
   Jump jump_;
   FieldGuard field_;
   BaroZero baro_;
   SameAgain<3> fluxes_;
   SameAgain<1> pressures_, headings_;
-  float rolled_mps_ = 0;  ///< as wheels or a speedometer said last,
-  base::Micros rolled_;   ///< and when
 };
 
 }  // namespace tetap::app

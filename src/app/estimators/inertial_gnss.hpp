@@ -121,10 +121,11 @@ inline constexpr float kDecides = 4.0F;
   const nav::Vector3 nu = -at.z_hat, r = fix.noise();
   const FixNis nis = nis_of(ins_.p, {at.h(1, 5), -at.h(0, 5), at.h(0, 4)}, nu, r);
   if (!(nis.joint < 1e30F && r(0) < 1e12F && r(2) < 1e12F)) return {.verdict = can::Verdict::kNotFinite};
-  const bool whole = nis.joint <= n.gate_scale * filter::chi_square_99(3);
-  const bool level = whole || nis.level <= n.gate_scale * filter::chi_square_99(2);
+  bool whole = nis.joint <= n.gate_scale * filter::chi_square_99(3);
+  bool level = whole || nis.level <= n.gate_scale * filter::chi_square_99(2);
   Innovation record{
       .verdict = can::Verdict::kAccepted, .dof = 3, .nis = nis.joint, .gate = n.gate_scale * filter::chi_square_99(3)};
+  if (level && drifts(nu, r, n, record)) whole = level = false;
   refused_or_not(kPosition, !level, stamp);
 
   if (!level || ins_.p(0, 0) + ins_.p(1, 1) > 2.0F * kDecides * r(0)) {
@@ -167,11 +168,28 @@ inline constexpr float kDecides = 4.0F;
   return record;
 }
 
+/// Whether the fixes drift away, as far as their errors are new with each: those that last wander themselves. What is
+/// said of it is the drift's NIS, not that of the one fix.
+[[gnu::noinline]] inline bool Inertial::drifts(const nav::Vector3& nu, const nav::Vector3& r, const GnssNumbers& n,
+                                               Innovation& record) {
+  if (n.correlation_s > 0.0F) return false;
+  drift_.hear(nu(0), nu(1));
+  const float nis = drift_.nis(r(0), ins_.p(0, 0), ins_.p(1, 1)), gate = n.gate_scale * kChiSquare999Of2;
+  if (!drift_.velocity_agreed() || nis <= gate) return false;
+  record.dof = 2;
+  record.nis = nis;
+  record.gate = gate;
+  return true;
+}
+
 /// Of a fix that is refused, or (`agrees`) would decide where the filter is: whether it is to be believed now.
 [[gnu::noinline]] inline bool Inertial::believe(const nav::Vector3& nu, const nav::Vector3& r, bool agrees,
                                                 base::Micros stamp, const RecoveryNumbers& rules) {
   const float p_level = ins_.p(0, 0) + ins_.p(1, 1);
-  place_.hear(stamp, nu(0), nu(1), r(0), p_level);
+  // The filter may have moved otherwise than it thinks by as much as it doubts in any direction: the least eigenvalue
+  // counts, twice. One that is held to a line is wrong across it, however little it knows along it.
+  const float half = 0.5F * (ins_.p(0, 0) - ins_.p(1, 1)), both = ins_.p(0, 1);
+  place_.hear(stamp, nu(0), nu(1), r(0), p_level - 2.0F * base::sqrt(half * half + both * both));
   const bool confirmed = place_.confirmed(rules.confirm_fixes);
   if (agrees) return confirmed;
   if (confirmed && !doubted_) {  // the fixes before may have begun to lead it away
@@ -190,6 +208,7 @@ inline constexpr float kDecides = 4.0F;
       confirmed && refused >= despair && (told || !place_.persisted(static_cast<std::int32_t>(refused.us / 2), 0));
   if (!back && !lost && !place_.persisted(rules.persist_us, rules.persist_fixes)) return false;
   step(0, 2, {place_.east_m(), place_.north_m(), 0.0F}, r);
+  drift_.forget();
   if (lost && !told) {  // so it moved otherwise than it thought, all that time
     const float way2_m2 = place_.east_m() * place_.east_m() + place_.north_m() * place_.north_m();
     doubt(base::sqrt(way2_m2) / base::seconds(refused), 0.0F);
@@ -276,6 +295,7 @@ inline Innovation Inertial::fuse(const GnssVelocity& velocity, base::Micros stam
                                                     .gyro_b_radps = rate_b_radps_},
                               kVelocity, gate * n.gate_scale, stamp, with);
   if (!has_climb && record.dof == 3) record.dof = 2;
+  drift_.velocity(record.verdict == can::Verdict::kAccepted);
   return record;
 }
 

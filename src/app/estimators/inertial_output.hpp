@@ -146,6 +146,7 @@ void Inertial::each_bit(Sink&& sink) const {
   }
   first_fixes_.each_bit(sink);
   frozen_.each_bit(sink);
+  drift_.each_bit(sink);
   place_.each_bit(sink);
   height_.each_bit(sink);
   sink(led_m_[0]);
