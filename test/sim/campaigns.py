@@ -25,6 +25,7 @@ RECEIVER_M, POOR_RECEIVER_M = 0.85, 1.5  # 1 sigma on each horizontal axis: the 
 MODEL_SHARE = 0.1      # of 3, by which a mean NEES may be off: what the gate cuts off, what the bus rounds
 WITHIN_2 = 2.0         # a median of a few seeds is allowed to be off by this factor
 FIXES_HZ = 5
+RAMP_SAID_S = 5.5        # a ramp of 1 m/s by its drift; a fix of a poor receiver alone is outside its gate after 6 to 7.4 s
 TOO_SURE_SHARE = 0.02  # of many seeds, for more than a second: the world is not the filter's model; of a few, none
 # A right filter leaves 3 sigma, too, and its errors last: without any fault so many do (--fault none --world matched --gnss-m 1.5 --seeds 100).
 RIGHT_TOO_SURE_SHARE = 0.1
@@ -104,6 +105,8 @@ def gnss_fault(fault, case, receiver_m, checks):
         fixes = fused["sensors"]["GnssPosition"]
         checks.bound(f"{name}: fixes refused, of those that were wrong", fixes["rejected_share"] * fixes["compared"] / (wrong * seeds),
                      0.5 if fault == "gnss_ramp" else 0.9, 3)
+    if fault == "gnss_ramp" and case["world"] == "matched":
+        checks.bound(f"{name}: refused after [s], median", case["said"]["Rejecting"]["after_s"]["median"], 1, RAMP_SAID_S)
 
 
 def other_fault(name, case, plain, checks):
