@@ -169,7 +169,7 @@ TEST(DriftingFixes, IsChiSquareWhereEveryErrorIsNew) {
   }
   // One in some ten fixes is independent of the last: 3 sigma of so many.
   EXPECT_NEAR(sum / kFixes, 2.0, 3 * 2 / std::sqrt(kFixes / 20));
-  EXPECT_NEAR(above, 1e-3 * kFixes, 3 * std::sqrt(1e-3 * kFixes * 20));
+  EXPECT_NEAR(above, 1e-3 * kFixes, 3 * std::sqrt(1e-3 * kFixes * 10));
 }
 
 TEST(DriftingFixes, ARampIsNoticedBeforeOneFixLeavesItsGateAndWhatStaysPassesAway) {
@@ -195,15 +195,29 @@ TEST(DriftingFixes, WhatTheFilterDoesNotKnowMayBeTheReason) {
   EXPECT_LT(of_unsure, 2.0F);
 }
 
-TEST(DriftingFixes, AVelocityVouchesForOneFix) {
+TEST(DriftingFixes, EachAxisIsJudgedByItsOwnVariance) {
+  DriftingFixes east, north;
+  for (int i = 0; i < 10; ++i) east.hear(3, 0), north.hear(0, 3);
+  EXPECT_GT(east.nis(1, 0.01F, 100), kChiSquare999Of2);
+  EXPECT_LT(east.nis(1, 100, 0.01F), 1.0F);
+  EXPECT_GT(north.nis(1, 100, 0.01F), kChiSquare999Of2);
+  EXPECT_LT(north.nis(1, 0.01F, 100), 1.0F);
+}
+
+TEST(DriftingFixes, AVelocityVouchesForAFewFixes) {
   DriftingFixes fixes;
-  EXPECT_FALSE(fixes.velocity_agreed()) << "none was heard";
+  EXPECT_FALSE(fixes.vouched_for()) << "none was heard";
   fixes.velocity(true);
-  EXPECT_TRUE(fixes.velocity_agreed());
-  EXPECT_FALSE(fixes.velocity_agreed()) << "none since";
-  fixes.velocity(true);
+  for (int i = 0; i < 5; ++i) EXPECT_TRUE(fixes.vouched_for()) << "one a second, fixes five: " << i;
   fixes.velocity(false);
-  EXPECT_FALSE(fixes.velocity_agreed());
+  EXPECT_FALSE(fixes.vouched_for());
+  fixes.velocity(true);
+  int vouched = 0;
+  while (vouched < 100 && fixes.vouched_for()) ++vouched;
+  EXPECT_LT(vouched, 20) << "it has ended";
+  fixes.velocity(true);
+  fixes.forget();
+  EXPECT_FALSE(fixes.vouched_for());
 }
 
 TEST(FirstFixes, CountWhenSoManyFollowEachOther) {

@@ -183,9 +183,48 @@ Ramp ramp(
 TEST(Glitch, ARampIsRefusedForItsDriftBeforeItHasLedTheFilterAway) {
   const Ramp none = ramp(0), of_a_metre = ramp(1);
   EXPECT_LT(none.of_drift, 20) << "of 4000";
-  EXPECT_GT(of_a_metre.of_drift, 100);
+  EXPECT_GT(of_a_metre.of_drift, 100) << "five in each drive";
   EXPECT_LT(of_a_metre.first_refused_s, 5) << "by the gate of one fix: 6";
+  EXPECT_GT(of_a_metre.first_refused_s, 2) << "3 of a fix's sigma of 1.5 m";
+  EXPECT_LT(none.nees, 3.0) << "of two";
+  EXPECT_GT(none.nees, 1.0);
   EXPECT_LT(of_a_metre.nees, none.nees + 0.5) << "as honest as without";
+}
+
+TEST(Glitch, AnOffsetThatStaysInsideItsGateIsFollowedAfterAWhile) {
+  Drive d = settled();
+  d.tamper = between(d, 60, 1e9, [](Drive::Fix& fix, double t) { fix.north_m += std::min(t, 2.5); });
+  d.run(30);
+  d.verdicts.clear();
+  d.run(30);
+  EXPECT_LE(d.counted('R'), 6) << "but for the gate's hundredth: " << d.verdicts;
+  EXPECT_EQ(d.estimator.jump().count, 0);
+}
+
+/// After minutes without fixes the first that is believed moves the filter by many of a fix's sigmas; those it was off
+/// before are no drift. The same where somebody says where it is.
+TEST(Glitch, WhatMovedTheFilterIsNoDrift) {
+  for (const bool said : {false, true})
+    for (unsigned seed = 1; seed <= 5; ++seed) {
+      Numbers n = numbers();
+      n.inertial.slip_share = 0.5F;
+      Drive d(n, seed);
+      d.white_m = 0.1;
+      d.place();
+      d.run(60);
+      if (said) {
+        d.place(10, 10);
+      } else {
+        d.tamper = [](Drive::Fix&) { return false; };
+        d.run(60);
+        d.unseen_east_m = 1.5 * d.sigma_m();
+        d.tamper = [](Drive::Fix&) { return true; };
+      }
+      d.clear();
+      d.run(20);
+      EXPECT_GE(d.counted('n'), 2) << "more than one fix before it moves: " << d.verdicts;
+      EXPECT_LE(d.counted('R'), 4) << said << seed << ": " << d.verdicts;
+    }
 }
 
 TEST(Glitch, FixesWithoutAVelocityThatVouchesForTheFilterAreJudgedOneByOne) {

@@ -106,7 +106,9 @@ def gnss_fault(fault, case, receiver_m, checks):
         checks.bound(f"{name}: fixes refused, of those that were wrong", fixes["rejected_share"] * fixes["compared"] / (wrong * seeds),
                      0.5 if fault == "gnss_ramp" else 0.9, 3)
     if fault == "gnss_ramp" and case["world"] == "matched":
-        checks.bound(f"{name}: refused after [s], median", case["said"]["Rejecting"]["after_s"]["median"], 1, RAMP_SAID_S)
+        said = case["said"].get("Rejecting")
+        checks.bound(f"{name}: seeds in which Rejecting is said", said and said["seeds"], seeds, seeds)
+        checks.bound(f"{name}: said after [s], median", said and said["after_s"]["median"], 1, RAMP_SAID_S)
 
 
 def other_fault(name, case, plain, checks):

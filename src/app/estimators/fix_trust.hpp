@@ -11,7 +11,6 @@
 #include <array>
 #include <bit>
 #include <cstdint>
-#include <utility>
 
 namespace tetap::app {
 
@@ -21,9 +20,9 @@ inline constexpr float kChiSquare999Of2 = 13.816F;  ///< chi-square, 2 degrees o
 /// goes on without them meanwhile, so they say the same only if they move as it does.
 class Claim {
  public:
-  /// One more fix: by how much the filter is off, the variance of the fix, and that of the filter (both axes together,
-  /// which grows while it goes on alone). What contradicts the claim so far is left out; so many in a row are a new
-  /// one.
+  /// One more fix: by how much the filter is off, the variance of the fix on one axis, and that of the filter on two
+  /// (what it grows by while it goes on alone is what a claim may move by). What contradicts the claim so far is left
+  /// out; so many in a row are a new one.
   [[gnu::noinline]] void hear(base::Micros stamp, float east_m, float north_m, float fix_m2, float filter_m2) {
     const float d_east_m = east_m - east_m_, d_north_m = north_m - north_m_;
     const float grown_m2 = filter_m2 > begun_m2_ ? filter_m2 - begun_m2_ : 0.0F;
@@ -127,15 +126,16 @@ class DriftingFixes {
     follow(late_m_, kLate, east_m, north_m);
   }
   /// The difference of both means, squared and normalised (2 degrees of freedom), of fixes whose errors are new with
-  /// each. What the filter does not know of its position counts in full.
+  /// each. What the filter does not know of where the antenna is (variances to east and north) counts in full.
   [[nodiscard]] float nis(float fix_m2, float east_m2, float north_m2) const {
     const float d_east_m = soon_m_[0] - late_m_[0], d_north_m = soon_m_[1] - late_m_[1];
     const float of_fixes_m2 = kShare * fix_m2;
     return d_east_m * d_east_m / (of_fixes_m2 + east_m2) + d_north_m * d_north_m / (of_fixes_m2 + north_m2);
   }
-  /// Whether the receiver's velocity since the last fix was what the filter expected: asked once for each.
-  [[nodiscard]] bool velocity_agreed() { return std::exchange(velocity_agreed_, false); }
-  void velocity(bool agrees) { velocity_agreed_ = agrees; }
+  /// Whether the receiver's velocity was what the filter expects: it vouches for the next few fixes, for they may come
+  /// more often.
+  [[nodiscard]] bool vouched_for() { return vouches_ > 0 && vouches_-- > 0; }
+  void velocity(bool agrees) { vouches_ = agrees ? kFixesOfAVelocity : std::uint8_t{0}; }
   void forget() { *this = {}; }
 
   template <class Sink>
@@ -144,12 +144,13 @@ class DriftingFixes {
     sink(soon_m_[1]);
     sink(late_m_[0]);
     sink(late_m_[1]);
-    sink(static_cast<std::uint32_t>(velocity_agreed_));
+    sink(static_cast<std::uint32_t>(vouches_));
   }
 
  private:
   using Mean = std::array<float, 2>;
-  static constexpr float kSoon = 0.1F, kLate = 0.03F;  ///< what the newest counts for
+  static constexpr std::uint8_t kFixesOfAVelocity = 10;  ///< a receiver that says one a second
+  static constexpr float kSoon = 0.1F, kLate = 0.03F;    ///< what the newest counts for
   /// Variance of the difference, of the variance of one: that of a mean is w / (2 - w), what two have in common
   /// v w / (v + w - v w).
   static constexpr float kShare =
@@ -159,7 +160,7 @@ class DriftingFixes {
   }
 
   Mean soon_m_{}, late_m_{};
-  bool velocity_agreed_ = false;
+  std::uint8_t vouches_ = 0;
 };
 
 /// Before there is a filter: fixes count when so many in a row follow each other no faster than anything drives. A

@@ -24,6 +24,8 @@
 
 namespace tetap::app {
 
+struct FixNis;
+
 class Inertial {
  public:
   static constexpr can::EstimatorKind kKind = can::EstimatorKind::kInertial;
@@ -42,6 +44,7 @@ class Inertial {
     start_.place(given.pose, given.sigma_position_m, given.sigma_yaw_rad);
     place_.forget();
     height_.forget();
+    drift_.forget();
     back_ = false;
     if (phase_ == Phase::kTracking) begin(with);
   }
@@ -183,7 +186,8 @@ class Inertial {
   void constrain(base::Micros stamp, const Context& with);
   [[nodiscard]] bool believe(const nav::Vector3& nu, const nav::Vector3& r, bool agrees, base::Micros stamp,
                              const RecoveryNumbers& rules);
-  [[nodiscard]] bool drifts(const nav::Vector3& nu, const nav::Vector3& r, const GnssNumbers& n, Innovation& record);
+  [[nodiscard]] bool drifts(const nav::Vector3& nu, const nav::Vector3& r, const FixNis& of_fix, const GnssNumbers& n,
+                            Innovation& record);
   Innovation weigh(model::GnssFix3d& fix, base::Micros stamp, const Context& with);
   void refused_or_not(Source source, bool refused, base::Micros stamp);
   void step(int first, int count, const nav::Vector3& by_m, const nav::Vector3& variance_m2);

@@ -19,6 +19,7 @@ inline constexpr float kNoClimb_mps = 1e3F;
 struct FixNis {
   float joint = base::kNan;
   float level = base::kNan;
+  std::array<float, 2> expected_m2{};  ///< variances to east and north of where the filter expects the antenna
 };
 
 /// S = H P H^T + R = L L^T, y = L^-1 nu: with up last, the horizontal part's NIS is on the way to the joint one. H is
@@ -46,7 +47,7 @@ struct FixNis {
   }
   nav::Matrix3 l;
   nav::Vector3 y;
-  FixNis nis;
+  FixNis nis{.expected_m2 = {s(0, 0), s(1, 1)}};
   float sum = 0;
   for (int i = 0; i < 3; ++i) {
     y(i) = nu(i);
@@ -125,13 +126,14 @@ inline constexpr float kDecides = 4.0F;
   bool level = whole || nis.level <= n.gate_scale * filter::chi_square_99(2);
   Innovation record{
       .verdict = can::Verdict::kAccepted, .dof = 3, .nis = nis.joint, .gate = n.gate_scale * filter::chi_square_99(3)};
-  if (level && drifts(nu, r, n, record)) whole = level = false;
+  if (level && drifts(nu, r, nis, n, record)) whole = level = false;
   refused_or_not(kPosition, !level, stamp);
 
   if (!level || ins_.p(0, 0) + ins_.p(1, 1) > 2.0F * kDecides * r(0)) {
     record.verdict = level ? can::Verdict::kNotUsed : can::Verdict::kRejected;
     if (!believe(nu, r, level, stamp, rules)) return record;
     record.verdict = can::Verdict::kAccepted;
+    drift_.forget();  // the filter is not where they said that it is off
   }
   place_.forget();
 
@@ -170,12 +172,13 @@ inline constexpr float kDecides = 4.0F;
 
 /// Whether the fixes drift away, as far as their errors are new with each: those that last wander themselves. What is
 /// said of it is the drift's NIS, not that of the one fix.
-[[gnu::noinline]] inline bool Inertial::drifts(const nav::Vector3& nu, const nav::Vector3& r, const GnssNumbers& n,
-                                               Innovation& record) {
+[[gnu::noinline]] inline bool Inertial::drifts(const nav::Vector3& nu, const nav::Vector3& r, const FixNis& of_fix,
+                                               const GnssNumbers& n, Innovation& record) {
   if (n.correlation_s > 0.0F) return false;
   drift_.hear(nu(0), nu(1));
-  const float nis = drift_.nis(r(0), ins_.p(0, 0), ins_.p(1, 1)), gate = n.gate_scale * kChiSquare999Of2;
-  if (!drift_.velocity_agreed() || nis <= gate) return false;
+  const float nis = drift_.nis(r(0), of_fix.expected_m2[0], of_fix.expected_m2[1]);
+  const float gate = n.gate_scale * kChiSquare999Of2;
+  if (!drift_.vouched_for() || nis <= gate) return false;
   record.dof = 2;
   record.nis = nis;
   record.gate = gate;
@@ -186,10 +189,11 @@ inline constexpr float kDecides = 4.0F;
 [[gnu::noinline]] inline bool Inertial::believe(const nav::Vector3& nu, const nav::Vector3& r, bool agrees,
                                                 base::Micros stamp, const RecoveryNumbers& rules) {
   const float p_level = ins_.p(0, 0) + ins_.p(1, 1);
-  // The filter may have moved otherwise than it thinks by as much as it doubts in any direction: the least eigenvalue
-  // counts, twice. One that is held to a line is wrong across it, however little it knows along it.
+  // A filter that refuses fixes may have moved otherwise than it thinks by as much as it doubts in any direction (twice
+  // the least eigenvalue): one that is held to a line is wrong across it, however little it knows along it.
   const float half = 0.5F * (ins_.p(0, 0) - ins_.p(1, 1)), both = ins_.p(0, 1);
-  place_.hear(stamp, nu(0), nu(1), r(0), p_level - 2.0F * base::sqrt(half * half + both * both));
+  const float longer = agrees ? 0.0F : 2.0F * base::sqrt(half * half + both * both);
+  place_.hear(stamp, nu(0), nu(1), r(0), p_level - longer);
   const bool confirmed = place_.confirmed(rules.confirm_fixes);
   if (agrees) return confirmed;
   if (confirmed && !doubted_) {  // the fixes before may have begun to lead it away
@@ -208,7 +212,6 @@ inline constexpr float kDecides = 4.0F;
       confirmed && refused >= despair && (told || !place_.persisted(static_cast<std::int32_t>(refused.us / 2), 0));
   if (!back && !lost && !place_.persisted(rules.persist_us, rules.persist_fixes)) return false;
   step(0, 2, {place_.east_m(), place_.north_m(), 0.0F}, r);
-  drift_.forget();
   if (lost && !told) {  // so it moved otherwise than it thought, all that time
     const float way2_m2 = place_.east_m() * place_.east_m() + place_.north_m() * place_.north_m();
     doubt(base::sqrt(way2_m2) / base::seconds(refused), 0.0F);
