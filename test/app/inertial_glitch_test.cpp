@@ -147,7 +147,7 @@ TEST(Glitch, ARampHasHardlyAnyEffectWhereErrorsLastAndLittleWhereTheyAreNew) {
     }
 }
 
-/// Of 20 drives with a receiver whose errors are new with each fix, through a ramp of 1 m/s for half a minute.
+/// Of 20 drives with a receiver whose errors are new with each fix, which drift for half a minute.
 struct Ramp {
   double first_refused_s = 0, nees = 0;  ///< means over the drives
   int of_drift = 0;                      ///< fixes refused for their drift, not for themselves

@@ -26,7 +26,7 @@ class Claim {
   [[gnu::noinline]] void hear(base::Micros stamp, float east_m, float north_m, float fix_m2, float filter_m2) {
     const float d_east_m = east_m - east_m_, d_north_m = north_m - north_m_;
     const float grown_m2 = filter_m2 > begun_m2_ ? filter_m2 - begun_m2_ : 0.0F;
-    const bool same = d_east_m * d_east_m + d_north_m * d_north_m <= kBound * (2.0F * fix_m2 + grown_m2);
+    const bool same = d_east_m * d_east_m + d_north_m * d_north_m <= kChiSquare999Of2 * (2.0F * fix_m2 + grown_m2);
     if (fixes_ == 0 || (!same && ++against_ >= kAgainst)) {
       *this = {};
       since_ = stamp;
@@ -52,7 +52,7 @@ class Claim {
   /// Whether they say what (east, north) says.
   [[nodiscard]] bool says(float east_m, float north_m, float variance_m2) const {
     const float d_east_m = east_m_ - east_m, d_north_m = north_m_ - north_m;
-    return d_east_m * d_east_m + d_north_m * d_north_m <= kBound * variance_m2;
+    return d_east_m * d_east_m + d_north_m * d_north_m <= kChiSquare999Of2 * variance_m2;
   }
   /// The mean of what they said.
   [[nodiscard]] float east_m() const { return east_m_; }
@@ -70,7 +70,6 @@ class Claim {
   }
 
  private:
-  static constexpr float kBound = kChiSquare999Of2;
   static constexpr std::uint8_t kAgainst = 5;
   static constexpr std::int32_t kMost = 1'000'000;
 
@@ -134,7 +133,11 @@ class DriftingFixes {
   }
   /// Whether the receiver's velocity was what the filter expects: it vouches for the next few fixes, for they may come
   /// more often.
-  [[nodiscard]] bool vouched_for() { return vouches_ > 0 && vouches_-- > 0; }
+  [[nodiscard]] bool vouched_for() {
+    if (vouches_ == 0) return false;
+    --vouches_;
+    return true;
+  }
   void velocity(bool agrees) { vouches_ = agrees ? kFixesOfAVelocity : std::uint8_t{0}; }
   void forget() { *this = {}; }
 
