@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // tetap-world: the simulated world's sensors on a CAN bus, and what the node makes of them on record beside the truth.
+#include "sim_host/bias_left.hpp"
 #include "sim_host/in_process.hpp"
 #include "sim_host/play/arguments.hpp"
 #include "sim_host/play/lockstep.hpp"
 #include "sim_host/play/realtime.hpp"
 #include "sim_host/play/session.hpp"
+#include "sim_host/robots.hpp"
 #include "sim_host/sent.hpp"
 #include "sim_host/world_source.hpp"
 
@@ -65,9 +67,13 @@ std::string landmarks_json(const sim::World& world) {
   return "[" + text + "]";
 }
 
-/// In lockstep each row is an epoch of the node, whatever became of the clock of the bus.
-void write_truth(const std::string& folder, const sim::WorldSource& source, bool lockstep) {
-  sim::OutFile file(folder + "/truth.csv");
+/// In lockstep each row is an epoch of the node, whatever became of the clock of the bus. Biases are those that the
+/// robot's own calibration leaves.
+void write_truth(const sim::SessionOptions& about, const sim::WorldSource& source, bool lockstep) {
+  app::Numbers numbers;
+  sim::for_robot(about.robot, [&](auto, const app::Numbers& n) { numbers = n; });
+  const double temperature_degC = source.world().numbers().imu.temperature_degC;
+  sim::OutFile file(about.folder + "/truth.csv");
   sim::Line line;
   file.write(
       "time_s,x_m,y_m,yaw_rad,z_m,roll_rad,pitch_rad,v_east_mps,v_north_mps,v_up_mps,gyro_bias_x_radps,gyro_bias_y_"
@@ -75,7 +81,8 @@ void write_truth(const std::string& folder, const sim::WorldSource& source, bool
       "gyro_bias_z_radps,acc_bias_x_mps2,acc_bias_y_mps2,acc_bias_z_mps2");
   file.write(lockstep ? ",epoch\n" : "\n");
   std::int64_t epoch = 0;
-  for (const sim::Truth& t : source.truth()) {
+  for (const sim::Truth& seen : source.truth()) {
+    const sim::Truth t = sim::bias_left(seen, numbers, temperature_degC);
     line.clear();
     line.fixed(t.time.us, 6).text(",").real(t.x_m, 6).text(",").real(t.y_m, 6).text(",").real(t.yaw_rad, 6);
     for (const double x : {t.z_m, t.roll_rad, t.pitch_rad}) line.text(",").real(x, 6);
@@ -118,7 +125,7 @@ int drive(L& link, const Run& run) {
     sim::RealtimeOptions options{.base = about.base};
     sim::play_realtime(link, frames, session, options, session.counts());
   });
-  write_truth(about.folder, source, !run.realtime);
+  write_truth(about, source, !run.realtime);
   return status;
 }
 

@@ -32,6 +32,7 @@ class Number:
     labels: tuple = ("",)
     digits: int = 5
     off: bool = False  # together with its fellow, by more than two sigma, though perhaps not alone: two wheels' radii and their difference
+    offered: np.ndarray = None  # for the header, where that is not all of `value`: what is known well enough of it
 
     def __post_init__(self):
         self.value, self.sigma = np.atleast_1d(np.asarray(self.value, float)).ravel(), np.atleast_1d(np.asarray(self.sigma, float)).ravel()
@@ -137,7 +138,8 @@ def snippet(parts, robot=None):
     for number in (number for part in parts for number in part.numbers if number.field):
         if robot is not None and robot.has(number):
             continue
-        text = ", ".join(literal(value, number.digits) for value in number.value)
+        offered = number.value if number.offered is None else np.atleast_1d(number.offered)
+        text = ", ".join(literal(value, number.digits) for value in offered)
         values[number.field] = text if len(number.value) == 1 else "{" + text + "}"
 
     def lines(struct, path, indent):

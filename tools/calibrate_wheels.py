@@ -54,14 +54,21 @@ def _numbers(part, fit, run, how):
         if off:
             part.notes.append(f"the wheels differ by {abs(difference[0] / difference[1]):.1f} sigma from what the numbers now say: "
                               "left and right are to be changed together")
+        # A mean that may as well be what it is now stays: to follow it would carry its own error into both.
+        mean = fit.value("mean")
+        kept = off and abs(mean[0]) <= 2 * mean[1]
+        if kept:
+            part.notes.append(f"their mean is within {abs(mean[0] / mean[1]):.1f} sigma of what it is now and stays in the lines below")
         for k, side in enumerate(("left", "right")):
             factor = fit.derived(lambda q, side=side: (1 + q["mean"]) * (1 + sign[side] * q["difference"]))
+            offered = 1 + sign[side] * difference[0] if kept else factor[0]
             if run.kind == "counts" and run.per_turn:
-                part.add(f"{side} wheel radius", run.radius[k] * factor[0], run.radius[k] * factor[1], "m", f"wheels.drive.{side}_radius_m", off=off)
+                part.add(f"{side} wheel radius", run.radius[k] * factor[0], run.radius[k] * factor[1], "m", f"wheels.drive.{side}_radius_m", off=off,
+                         offered=run.radius[k] * offered)
             elif run.kind == "counts":
                 part.add(f"{side} wheel, metres per count", run.step[k] * factor[0], run.step[k] * factor[1], "m")
             else:
-                part.add(f"{side} wheel, true speed over stated speed", *factor, "1", f"wheels.{side}_speed_scale", off=off)
+                part.add(f"{side} wheel, true speed over stated speed", *factor, "1", f"wheels.{side}_speed_scale", off=off, offered=offered)
         base = run.step if run.kind == "counts" else np.ones(2)
         total = fit.derived(lambda q: 2 * (base[0] * (1 + q["difference"] / 2) - base[1] * (1 - q["difference"] / 2))
                             / (base[0] * (1 + q["difference"] / 2) + base[1] * (1 - q["difference"] / 2)))

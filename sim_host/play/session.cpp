@@ -80,7 +80,8 @@ std::string Session::complaint() const {
     return (comparison_->other_numbers() ? "the recorded node ran with other numbers (Est_Version.Config): "
                                          : std::string()) +
            count(comparison_->different()) + " of " + count(comparison_->compared()) +
-           " epochs differ from the recording; first " + comparison_->first_difference();
+           " epochs differ from the recording; first " + comparison_->first_difference() +
+           (comparison_->other_numbers() ? "; --lockstep plays its inputs alone (make replay PLAY=--lockstep)" : "");
   if (comparison_->missing() > 0) return count(comparison_->missing()) + " recorded epochs were not repeated";
   if (recording_->missing_outputs > 0)
     return "the recording itself lacks " + count(recording_->missing_outputs) + " frames of the node";
