@@ -14,6 +14,10 @@ namespace tetap::sim {
   const Numbers world = options.mismatched ? options.numbers : matched(options.numbers);
   const auto single = [](double x) { return static_cast<float>(x); };
   app::Numbers n = robot::rover_landmarks::numbers;
+  // The world's own, whatever a calibration made of the robot's.
+  n.imu = {};
+  n.wheels.drive.left_radius_m = n.wheels.drive.right_radius_m = single(world.rover.wheel_radius_m);
+  n.wheels.drive.track_m = single(world.rover.track_m);
   n.wheels.drive.counts_per_turn = single(world.wheels.counts_per_turn);
   n.wheels.drive.noise_left = n.wheels.drive.noise_right = single(world.wheels.noise_m);
   n.gyro.noise = single(world.imu.gyro_noise * world.imu.gyro_noise);
@@ -40,6 +44,7 @@ namespace tetap::sim {
   const double walk_rthz = sim::sqrt(2 / world.imu.walk_tau_s);
   app::Numbers n = robot::rover::numbers;
   const app::Numbers planar = matched_landmarks_rover();
+  n.imu = planar.imu;
   n.wheels = planar.wheels;
   n.gyro = planar.gyro;
   n.gnss = planar.gnss;
@@ -48,6 +53,7 @@ namespace tetap::sim {
   n.gnss.antenna_y_b_m = single(world.gnss.antenna_b_m[1]);
   n.gnss.antenna_z_b_m = single(world.gnss.antenna_b_m[2]);
   n.gnss.sigma_velocity_floor_mps = 0;
+  n.inertial.mounting_bs = app::InertialNumbers{}.mounting_bs;
   n.inertial.gyro_radps_rthz = single(world.imu.gyro_noise);
   n.inertial.gyro_scale = 0;
   n.inertial.accel_mps2_rthz = single(world.imu.accel_noise[2]);

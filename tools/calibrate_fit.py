@@ -141,6 +141,7 @@ class Fit:
 
     def _start(self):
         run = self.run
+        self.rescaled = False
         self.track0, bias, difference = 1.0, self.rest_rate or 0.0, 0.0
         moved = run.path[-1]
         if run.has_turn:
@@ -192,6 +193,7 @@ class Fit:
 
     def rescale(self, gain):
         run = self.run
+        self.rescaled = True
         run.forward, run.speed, run.acceleration = run.forward * gain, run.speed * gain, run.acceleration * gain
         run.path, run.lateral, run.quantum = run.path * gain, run.lateral * gain, run.quantum * gain
         if run.has_turn and run.kind != "body speed":

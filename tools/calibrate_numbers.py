@@ -38,6 +38,7 @@ class Number:
         self.value, self.sigma = np.atleast_1d(np.asarray(self.value, float)).ravel(), np.atleast_1d(np.asarray(self.sigma, float)).ravel()
         if len(self.sigma) != len(self.value):
             raise ValueError(f"{self.name}: {len(self.value)} values, {len(self.sigma)} sigmas")
+        self.offered = self.value if self.offered is None else np.atleast_1d(np.asarray(self.offered, float))
         if not (np.isfinite(self.value).all() and np.isfinite(self.sigma).all() and (self.sigma >= 0).all()):
             raise Refusal(f"{self.name} does not come out as a finite number.", "a longer log with more variety")
 
@@ -138,8 +139,7 @@ def snippet(parts, robot=None):
     for number in (number for part in parts for number in part.numbers if number.field):
         if robot is not None and robot.has(number):
             continue
-        offered = number.value if number.offered is None else np.atleast_1d(number.offered)
-        text = ", ".join(literal(value, number.digits) for value in offered)
+        text = ", ".join(literal(value, number.digits) for value in number.offered)
         values[number.field] = text if len(number.value) == 1 else "{" + text + "}"
 
     def lines(struct, path, indent):

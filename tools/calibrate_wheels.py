@@ -42,6 +42,7 @@ def _numbers(part, fit, run, how):
     sides = run.has_turn and run.kind != "body speed"
     difference = fit.value("difference") if run.has_turn else None
     known = run.has_turn and difference[1] <= MOST_DIFFERENCE
+    kept = False
     if sides and not known:
         part.refuse("wheel difference", Refusal(f"It comes out to {100 * difference[1]:.1f} % only (1 sigma).", how))
     if run.kind == "body speed" and scaled:
@@ -54,9 +55,8 @@ def _numbers(part, fit, run, how):
         if off:
             part.notes.append(f"the wheels differ by {abs(difference[0] / difference[1]):.1f} sigma from what the numbers now say: "
                               "left and right are to be changed together")
-        # A mean that may as well be what it is now stays: to follow it would carry its own error into both.
         mean = fit.value("mean")
-        kept = off and abs(mean[0]) <= 2 * mean[1]
+        kept = off and _mean_stays(fit, run)
         if kept:
             part.notes.append(f"their mean is within {abs(mean[0] / mean[1]):.1f} sigma of what it is now and stays in the lines below")
         for k, side in enumerate(("left", "right")):
@@ -68,7 +68,7 @@ def _numbers(part, fit, run, how):
             elif run.kind == "counts":
                 part.add(f"{side} wheel, metres per count", run.step[k] * factor[0], run.step[k] * factor[1], "m")
             else:
-                part.add(f"{side} wheel, true speed over stated speed", *factor, "1", f"wheels.{side}_speed_scale", off=off, offered=offered)
+                part.add(f"{side} wheel, true speed over stated speed", *factor, "1", f"wheels.{side}_speed_scale", off=off)
         base = run.step if run.kind == "counts" else np.ones(2)
         total = fit.derived(lambda q: 2 * (base[0] * (1 + q["difference"] / 2) - base[1] * (1 - q["difference"] / 2))
                             / (base[0] * (1 + q["difference"] / 2) + base[1] * (1 - q["difference"] / 2)))
@@ -83,9 +83,17 @@ def _numbers(part, fit, run, how):
         part.refuse("track" if sides else "yaw rate scale", Refusal(
             f"It turns by {np.degrees(fit.turned):.0f} deg in all and the number comes out to {100 * sigma_track:.1f} % (1 sigma).", how))
     elif sides:
-        part.add("track width", *fit.derived(lambda q: fit.track0 * (1 + q["track"])), "m", "wheels.drive.track_m")
+        # The gyroscope tells the ratio of radii and track: radii that stay where they are take a track that goes with them.
+        stays = fit.value("track")[0] if not kept else (1 + fit.value("track")[0]) / (1 + fit.value("mean")[0]) - 1
+        part.add("track width", *fit.derived(lambda q: fit.track0 * (1 + q["track"])), "m", "wheels.drive.track_m", offered=fit.track0 * (1 + stays))
     else:
         part.add("true yaw rate over stated yaw rate", *fit.derived(lambda q: (1 + q["mean"]) / (1 + q["track"])), "1", "wheels.yaw_rate_scale")
+
+
+def _mean_stays(fit, run):
+    """A mean of the radii that may as well be what it is now stays: to follow it would carry its own error into both."""
+    mean = fit.value("mean")
+    return run.kind == "counts" and bool(run.per_turn) and not fit.rescaled and abs(mean[0]) <= 2 * mean[1]
 
 
 def _rms(values):

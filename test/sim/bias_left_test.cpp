@@ -3,7 +3,6 @@
 #include "sim_host/bias_left.hpp"
 
 #include "app/calibrate.hpp"
-#include "config/rover.hpp"
 
 #include <gtest/gtest.h>
 
@@ -22,13 +21,13 @@ sim::Truth truth() {
 }
 
 TEST(BiasLeft, WithoutACalibrationIsTheWholeOfIt) {
-  const sim::Truth left = sim::bias_left(truth(), robot::rover::numbers, kWarm_degC);
+  const sim::Truth left = sim::bias_left(truth(), app::Numbers{}, kWarm_degC);
   EXPECT_EQ(left.gyro_bias_b_radps, kGyro_radps);
   EXPECT_EQ(left.accel_bias_b_mps2, kAccel_mps2);
 }
 
 TEST(BiasLeft, IsWhatTheFirmwareLeavesInASampleAtRest) {
-  app::Numbers n = robot::rover::numbers;
+  app::Numbers n;
   n.imu.gyro_bias_radps = {0.0015F, -0.002F, 0.001F};
   n.imu.gyro_bias_slope_radps_per_degC = {1e-5F, -2e-5F, 3e-5F};
   n.imu.accel_bias_mps2 = {0.04F, 0.01F, -0.02F};

@@ -455,12 +455,19 @@ class World(Judged):
                 # Each radius alone may be within two sigma of the drawing's; their difference is not.
                 offered = re.search(r"\.left_radius_m = ([\d.]+)F,\n +\.right_radius_m = ([\d.]+)F,", done.stdout)
                 self.assertTrue(offered, done.stdout)
+                left, right = float(offered[1]), float(offered[2])
                 # Their mean is that of the drawing: where it is found so, within two sigma, it is not moved by its own error.
                 if "stays in the lines below" in done.stdout:
-                    self.assertAlmostEqual((float(offered[1]) + float(offered[2])) / 2, 0.1, delta=2e-6)
+                    self.assertAlmostEqual((left + right) / 2, 0.1, delta=2e-6)
                     kept += 1
                 with open(os.path.join(out, "c.json"), encoding="utf-8") as file:
                     numbers = {n["name"]: n for n in json.load(file)["parts"]["wheels"]["numbers"]}
+                difference = numbers["wheel difference (left - right)/mean"]
+                self.assertAlmostEqual(2 * (left - right) / (left + right), difference["value"][0], delta=1e-4)  # five digits
+                track = numbers.get("track width")
+                if track and "stays in the lines below" in done.stdout:  # radii and track as the gyroscope ties them
+                    found = sum(numbers[f"{side} wheel radius"]["value"][0] for side in ("left", "right")) / 2
+                    self.assertAlmostEqual(track["offered"][0] / 0.1, track["value"][0] / found, delta=1e-3)
                 for name, truth in self.TRUTH.items():
                     value, sigma = numbers[name]["value"][0], numbers[name]["sigma"][0]
                     self.assertLess(abs(value - truth), 3 * sigma, f"seed {seed}: {name} {value} +- {sigma}")
