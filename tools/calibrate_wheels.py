@@ -35,34 +35,34 @@ def wheels(log, up, robot, bias=None):
 
 
 def _numbers(part, fit, run, how):
-    sigma_mean = fit.value("mean")[1]
-    scaled = sigma_mean <= MOST_SCALE
+    mean = fit.value("mean")
+    scaled = mean[1] <= MOST_SCALE
     if not scaled:
-        part.refuse("wheel radius", Refusal(f"It comes out to {100 * sigma_mean:.1f} % only (1 sigma).", how))
+        part.refuse("wheel radius", Refusal(f"It comes out to {100 * mean[1]:.1f} % only (1 sigma).", how))
     sides = run.has_turn and run.kind != "body speed"
     difference = fit.value("difference") if run.has_turn else None
     known = run.has_turn and difference[1] <= MOST_DIFFERENCE
-    kept = False
     if sides and not known:
         part.refuse("wheel difference", Refusal(f"It comes out to {100 * difference[1]:.1f} % only (1 sigma).", how))
+    both = sides and scaled and known
+    # What both radii share is known worse than what they differ by: each may be within two sigma and their difference far beyond.
+    off = bool(both and run.nominal_known and abs(difference[0]) > 2 * difference[1])
+    # A mean that may as well be what it is now stays: to follow it would carry its own error into both radii.
+    kept = off and run.kind == "counts" and bool(run.per_turn) and not fit.rescaled and abs(mean[0]) <= 2 * mean[1]
+    if off:
+        part.notes.append(f"the wheels differ by {abs(difference[0] / difference[1]):.1f} sigma from what the numbers now say: "
+                          "left and right are to be changed together")
+    if kept:
+        part.notes.append(f"their mean is within {abs(mean[0] / mean[1]):.1f} sigma of what it is now and stays in the lines below")
     if run.kind == "body speed" and scaled:
         part.add("true speed over stated speed", *fit.derived(lambda q: 1 + q["mean"]), "1", "wheels.speed_scale")
-    elif sides and scaled and known:
+    elif both:
         # r_left = r0 (1 + mean)(1 + difference/2): difference = (left - right) / mean on top of what is there now
         sign = {"left": 0.5, "right": -0.5}
-        # What both radii share is known worse than what they differ by: each may be within two sigma and their difference far beyond.
-        off = bool(run.nominal_known and abs(difference[0]) > 2 * difference[1])
-        if off:
-            part.notes.append(f"the wheels differ by {abs(difference[0] / difference[1]):.1f} sigma from what the numbers now say: "
-                              "left and right are to be changed together")
-        mean = fit.value("mean")
-        kept = off and _mean_stays(fit, run)
-        if kept:
-            part.notes.append(f"their mean is within {abs(mean[0] / mean[1]):.1f} sigma of what it is now and stays in the lines below")
         for k, side in enumerate(("left", "right")):
             factor = fit.derived(lambda q, side=side: (1 + q["mean"]) * (1 + sign[side] * q["difference"]))
-            offered = 1 + sign[side] * difference[0] if kept else factor[0]
             if run.kind == "counts" and run.per_turn:
+                offered = 1 + sign[side] * difference[0] if kept else factor[0]
                 part.add(f"{side} wheel radius", run.radius[k] * factor[0], run.radius[k] * factor[1], "m", f"wheels.drive.{side}_radius_m", off=off,
                          offered=run.radius[k] * offered)
             elif run.kind == "counts":
@@ -84,16 +84,10 @@ def _numbers(part, fit, run, how):
             f"It turns by {np.degrees(fit.turned):.0f} deg in all and the number comes out to {100 * sigma_track:.1f} % (1 sigma).", how))
     elif sides:
         # The gyroscope tells the ratio of radii and track: radii that stay where they are take a track that goes with them.
-        stays = fit.value("track")[0] if not kept else (1 + fit.value("track")[0]) / (1 + fit.value("mean")[0]) - 1
+        stays = fit.value("track")[0] if not kept else (1 + fit.value("track")[0]) / (1 + mean[0]) - 1
         part.add("track width", *fit.derived(lambda q: fit.track0 * (1 + q["track"])), "m", "wheels.drive.track_m", offered=fit.track0 * (1 + stays))
     else:
         part.add("true yaw rate over stated yaw rate", *fit.derived(lambda q: (1 + q["mean"]) / (1 + q["track"])), "1", "wheels.yaw_rate_scale")
-
-
-def _mean_stays(fit, run):
-    """A mean of the radii that may as well be what it is now stays: to follow it would carry its own error into both."""
-    mean = fit.value("mean")
-    return run.kind == "counts" and bool(run.per_turn) and not fit.rescaled and abs(mean[0]) <= 2 * mean[1]
 
 
 def _rms(values):

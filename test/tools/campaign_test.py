@@ -242,6 +242,9 @@ class WithFiles(unittest.TestCase):
         self.assertEqual((twice["repeat"], four["repeat"], four["repeated"]), (2, 1, []))
         self.assertEqual({case["setting"] for case in twice["cases"]}, {of_velocity["setting"]})
         self.assertIn("times inside [%], mean", shown)
+        later, _ = cases("--seeds", "2", "--first", "3")
+        self.assertEqual((later["first"], later["cases"][0]["label"]), (3, "matched, seeds 3 to 4"))
+        self.assertAlmostEqual(later["cases"][0]["fused"]["blocks"]["velocity"]["anees"]["mean"], means[1])
 
     @unittest.skipUnless(os.access(os.path.join(PROGRAMS, "tetap-world"), os.X_OK), "tetap-world is not built")
     def test_the_error_during_a_fault_and_the_error_after_it_are_told_apart(self):
@@ -264,6 +267,7 @@ class WithFiles(unittest.TestCase):
     @unittest.skipUnless(os.access(os.path.join(PROGRAMS, "tetap-world"), os.X_OK), "tetap-world is not built")
     def test_bad_input_is_one_line_and_a_status(self):
         for arguments, words in ((["--fault", "nope"], "known are: gnss_jump"), (["--seeds", "0"], "must be 1 or more"), (["--repeat", "0"], "must be 1 or more"),
+                                 (["--first", "0"], "must be 1 or more"),
                                  (["--fault", "gnss_jump", "--duration", "20"], "longer --duration"),
                                  (["--robot", "nope", "--seeds", "1", "--duration", "2"], "no robot 'nope'")):
             result = self.campaign(*arguments)
