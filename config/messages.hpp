@@ -626,8 +626,8 @@ struct EstStatus {
   std::uint8_t crc = 0;  ///< CRC-8 0x2F, init and final xor 0xFF, over the id offset and payload bytes 1 to 7
   std::uint8_t ctr = 0;  ///< counts the sender's frames of this message; modulo 2^4
   Mode mode = Mode::kBoot;  ///< what the node is doing
-  bool pos_valid = false;  ///< 1: position is bound to the map and its 1-sigma within the configured limit
-  bool hdg_valid = false;  ///< 1: heading is bound to the map and its 1-sigma within the configured limit
+  bool pos_valid = false;  ///< 1: position is bound to the map; how well is in the 1-sigma
+  bool hdg_valid = false;  ///< 1: heading is bound to the map; how well is in the 1-sigma
   bool vel_valid = false;  ///< 1: speed and yaw rate are estimated from live measurements
   bool origin = false;  ///< 1: the origin of the map frame is known, see Est_Origin
   std::uint16_t used = 0;  ///< sensors with a measurement accepted within the last second, bit = Sensor; modulo 2^12
@@ -1059,8 +1059,8 @@ struct EstMotion {
   float speed_mps = 0;  ///< forward speed of the body origin, negative backwards; +-32.767 m/s in steps of 0.001; NaN: not available
   float yaw_rate_radps = 0;  ///< positive counter-clockwise; +-16.3835 rad/s in steps of 0.0005; NaN: not available
   std::uint8_t epoch = 0;  ///< low bits of the epoch, the same in all frames of one epoch
-  bool pos_valid = false;  ///< 1: position is bound to the map and its 1-sigma within the configured limit
-  bool hdg_valid = false;  ///< 1: heading is bound to the map and its 1-sigma within the configured limit
+  bool pos_valid = false;  ///< 1: position is bound to the map; how well is in the 1-sigma
+  bool hdg_valid = false;  ///< 1: heading is bound to the map; how well is in the 1-sigma
   bool vel_valid = false;  ///< 1: speed and yaw rate are estimated from live measurements
 
   template <class Self, class Visit>

@@ -27,6 +27,9 @@ struct Estimate {
   bool velocity_valid = false;
 };
 
+/// 1 sigma of what could be anything: of a place, and of a heading (pi / sqrt(3): even over the circle).
+inline constexpr float kUnknown_m = 1000, kUnknown_rad = 1.8138F;
+
 /// How uncertain the motion is, when somebody asks.
 struct MotionVariance {
   float forward_m2ps2 = base::kNan;     ///< of Estimate::forward_mps; NaN: not known

@@ -2,6 +2,7 @@
 #include "bench.hpp"
 
 #include <gtest/gtest.h>
+#include <cmath>
 #include <vector>
 
 namespace tetap::test {
@@ -118,6 +119,28 @@ TEST(Inbox, AnImuSampleCarriesIncrementsIntervalAndClips) {
   EXPECT_NEAR(s.payload.imu.dvelocity_b_mps[2], 0.0981F, 1e-5F);
   EXPECT_EQ(s.payload.imu.clipped_gyro, 3);
   EXPECT_NEAR(s.payload.imu.temperature_degC, 30.5F, 0.05F);
+}
+
+TEST(Inbox, AHeadingFromOutsideIsOneSampleWithOrWithoutItsAccuracy) {
+  const float none = std::numeric_limits<float>::quiet_NaN();
+  Desk desk;
+  desk.put(
+      in(can::InHeading{.stamp_us = stamp(9'990'000), .seq = 11, .inst = 2, .angle_rad = -2.9F, .acc_rad = 0.02F}));
+  desk.put(in(can::InHeading{.stamp_us = stamp(9'995'000), .seq = 12, .inst = 2, .angle_rad = 1.5F, .acc_rad = none}));
+  desk.put(in(can::InHeading{.stamp_us = stamp(9'999'000), .seq = 13, .inst = 2, .angle_rad = none, .acc_rad = 0.02F}));
+  ASSERT_EQ(desk.out.samples.size(), 2U) << "no angle is no heading";
+  EXPECT_EQ(desk.counters.out_of_range, 1);
+  const auto& first = desk.out.samples[0];
+  EXPECT_EQ(first.sensor, can::Sensor::kHeading);
+  EXPECT_EQ(first.instance, 2);
+  EXPECT_EQ(first.sequence, 11);
+  EXPECT_EQ(first.stamp.us, 9'990'000);
+  EXPECT_NEAR(first.payload.heading.yaw_rad, -2.9F, 3e-5F);
+  EXPECT_NEAR(first.payload.heading.acc_rad, 0.02F, 1.1e-4F);
+  const auto& second = desk.out.samples[1];
+  EXPECT_EQ(second.stamp.us, 9'995'000);
+  EXPECT_NEAR(second.payload.heading.yaw_rad, 1.5F, 3e-5F);
+  EXPECT_TRUE(std::isnan(second.payload.heading.acc_rad)) << "not available is not exact";
 }
 
 // The sequence comes round in 16 samples: a frame that waits for a lost one must not meet the frames of a later sample.

@@ -262,6 +262,65 @@ TEST(Node, WithoutAnyInputItWaitsAndStaysFinite) {
   EXPECT_EQ(last<can::EstStatus>(out)->reset_ctr, 0);
 }
 
+/// An estimator with a bug: a speed breaks it.
+class Fragile {
+ public:
+  static constexpr can::EstimatorKind kKind = can::EstimatorKind::kKf;
+  static constexpr float kNotFinite_mps = 2, kNotPositive_mps = 3;
+
+  void restart(base::Micros, const app::Context&) {
+    estimate_ = {.p = filter::Symmetric<float, 3>::diagonal({1, 1, 1})};
+  }
+  void set_pose(base::Micros, const app::SetPose&, const app::Context&) {}
+  void advance(base::Micros, const app::Context&) {}
+  app::Innovation fuse(const app::BodySpeed& speed, base::Micros, const app::Context&) {
+    estimate_.forward_mps = speed.forward_mps;
+    if (speed.forward_mps > kNotPositive_mps - 0.5F) {
+      estimate_.p(1, 1) = -1;
+    } else if (speed.forward_mps > kNotFinite_mps - 0.5F) {
+      estimate_.pose.yaw_rad = base::kNan;
+    }
+    return {.verdict = can::Verdict::kAccepted};
+  }
+  [[nodiscard]] app::Estimate estimate(const app::Context&) const { return estimate_; }
+  [[nodiscard]] can::Mode mode(const app::Context&) const { return can::Mode::kNominal; }
+  template <class Sink>
+  void each_bit(Sink&& sink) const {
+    sink(estimate_.forward_mps);
+  }
+
+ private:
+  app::Estimate estimate_;
+};
+
+TEST(Node, ABrokenInvariantRestartsTheEstimatorsSaysWhichAndNeverReachesTheBus) {
+  for (const auto& [speed_mps, cause] : {std::pair{Fragile::kNotFinite_mps, can::ResetCause::kNotFinite},
+                                         std::pair{Fragile::kNotPositive_mps, can::ResetCause::kNotPositive}}) {
+    app::Node<app::Estimators<app::Odometry, Fragile>> node(kNumbers, {});
+    std::int64_t now_us = Bench::kStart_us;
+    node.power_on({now_us});
+    const auto epochs = [&](int count, float forward_mps) {
+      Frames out;
+      for (int k = 0; k < count; ++k) {
+        node.on_frame(body_speed(now_us + 5'000, forward_mps, 0, k));
+        now_us += 10'000;
+        node.tick({now_us}, {}, [&out](const base::CanFrame& frame) { out.push_back(frame); });
+      }
+      return out;
+    };
+    EXPECT_EQ(last<can::EstStatus>(epochs(30, 1))->reset_ctr, 0);
+    Frames out = epochs(1, speed_mps);
+    EXPECT_TRUE(base::is_finite(last<can::EstMotion>(out, 1)->yaw_rad));
+    EXPECT_NEAR(last<can::EstMotion>(out, 1)->speed_mps, 0, 1e-3F) << "as it begins";
+    out = epochs(20, 1);
+    const auto status = last<can::EstStatus>(out);
+    EXPECT_EQ(status->reset_ctr, 1);
+    EXPECT_EQ(status->reset_cause, cause);
+    EXPECT_NE(status->faults >> static_cast<unsigned>(can::Fault::kRestarted) & 1, 0);
+    EXPECT_NEAR(last<can::EstMotion>(out, 1)->speed_mps, 1, 1e-3F) << "it goes on";
+  }
+}
+
 TEST(Node, StatusCarriesAValidCrcAndACounter) {
   Bench bench;
   int expected = 0;

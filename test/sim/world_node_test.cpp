@@ -217,7 +217,7 @@ TEST(Late, AFixOfAlmostHalfASecondAgoLeavesTheBytesOfOneOnTime) {
           frame.id == 0x300 + can::offset_of<can::EstStdPose>(kFused))
         all.push_back(frame);
     };
-    run_as<RoverWith<192>>(numbers, epochs, hear);
+    run_as<RoverWith<176>>(numbers, epochs, hear);
     EXPECT_EQ(without_place, 0);
     return all;
   };

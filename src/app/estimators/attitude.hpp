@@ -141,7 +141,6 @@ void Attitude::advance(base::Micros t, const Context& with, const Window& window
 }
 
 inline Estimate Attitude::estimate(const Context& with) const {
-  constexpr float kUnknown_m = 1000, kUnknown_rad = 1.8138F;  // pi/sqrt(3): it could be anything
   const AttitudeEstimate now = attitude(with);
   const filter::Rows r(now.q_nb);
   const float drift_rad = filter_.bias_sigma_radps() * filter_.magnetometer_disturbed_s();

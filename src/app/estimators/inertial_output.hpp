@@ -45,12 +45,17 @@ inline Estimate Inertial::estimate(const Context& with) const {
   const nav::Vector3 w_n = x.q_nb.rotate((valid ? ahead_.place().rate_b_radps : rate_b_radps_) - x.b_g_radps);
   constexpr int kX = nav::InsState::kPosition, kY = kX + 1, kYaw = nav::InsState::kAttitude + 2;
   filter::Symmetric<float, 3> p;
-  p(0, 0) = nav::predicted_covariance<kX, kX>(ins_.p, ahead);
-  p(0, 1) = nav::predicted_covariance<kX, kY>(ins_.p, ahead);
-  p(1, 1) = nav::predicted_covariance<kY, kY>(ins_.p, ahead);
-  p(0, 2) = nav::predicted_covariance<kX, kYaw>(ins_.p, ahead);
-  p(1, 2) = nav::predicted_covariance<kY, kYaw>(ins_.p, ahead);
-  p(2, 2) = nav::predicted_covariance<kYaw, kYaw>(ins_.p, ahead);
+  if (valid) {
+    p(0, 0) = nav::predicted_covariance<kX, kX>(ins_.p, ahead);
+    p(0, 1) = nav::predicted_covariance<kX, kY>(ins_.p, ahead);
+    p(1, 1) = nav::predicted_covariance<kY, kY>(ins_.p, ahead);
+    p(0, 2) = nav::predicted_covariance<kX, kYaw>(ins_.p, ahead);
+    p(1, 2) = nav::predicted_covariance<kY, kYaw>(ins_.p, ahead);
+    p(2, 2) = nav::predicted_covariance<kYaw, kYaw>(ins_.p, ahead);
+  } else {
+    constexpr float kPlace = kUnknown_m * kUnknown_m;
+    p = filter::Symmetric<float, 3>::diagonal({kPlace, kPlace, kUnknown_rad * kUnknown_rad});
+  }
   return {.time = now_,
           .pose = {.x = x.x, .y = x.y, .yaw_rad = nav::euler(x.q_nb).yaw_rad},
           .p = p,

@@ -92,9 +92,7 @@ class PoseEkf {
     std::int32_t in_a_row = 0;
     base::Micros since;
   };
-  static constexpr float kUnknown_m = 1000;
   static constexpr float kLost_rad = 1;
-  static constexpr float kUnknown_rad = 1.8138F;  // pi/sqrt(3): sigma of a heading that could be anything
 
   /// A heading that could be anything is looked for afresh: a filter that linearises about it would never find it.
   void give_up_when_lost() {

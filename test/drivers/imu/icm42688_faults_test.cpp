@@ -36,6 +36,29 @@ TEST(Icm42688Fault, AStrangersIdentityIsNamedAndNeverConfigured) {
   EXPECT_TRUE(bench.driver.running());
 }
 
+// A sister part would take the same registers and count another scale: nothing but its name tells.
+TEST(Icm42688Fault, AnIdentityThatChangesWhileRunningEndsTheSamplesUntilItIsTheOwnAgain) {
+  Bench bench;
+  ASSERT_TRUE(bench.start());
+  bench.run(1'000'000);
+  ASSERT_EQ(bench.troubles(), 0) << "its own identity is no change";
+  bench.chip.inject(Fault::kWrongIdentity);
+  for (std::size_t i = 0; i <= kFieldCount && bench.driver.running(); ++i) bench.run(5'000);  // a round of checks
+  EXPECT_FALSE(bench.driver.running());
+  EXPECT_EQ(bench.of(Reason::kConfigChanged), 1);
+  EXPECT_EQ(bench.of(Reason::kWrongIdentity), 0) << "that is said of one that answers the start";
+  bench.readings.clear();
+  bench.run(1'000'000);
+  EXPECT_TRUE(bench.readings.empty());
+  EXPECT_EQ(bench.of(Reason::kConfigChanged), 1);
+  EXPECT_GT(bench.of(Reason::kWrongIdentity), 2) << "asked again and again";
+  bench.chip.clear(Fault::kWrongIdentity);
+  bench.run(500'000);
+  EXPECT_TRUE(bench.driver.running());
+  EXPECT_EQ(false_readings(bench), 0);
+  EXPECT_GT(bench.readings.back().stamp.us, bench.now_us - 5000);
+}
+
 TEST(Icm42688Fault, ADeadOrStuckBusAtTheStartIsSaidAndOutlived) {
   for (const Fault fault : {Fault::kBusDead, Fault::kBusStuckLow, Fault::kBusStuckHigh}) {
     Bench bench;
