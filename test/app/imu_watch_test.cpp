@@ -185,7 +185,7 @@ class Robot {
   Inertial estimator;
   bool imu = true, stuck = false, wheels = true, gnss = true;
   double spin_mps = 0;
-  std::uint8_t clipped_gyro = 0;
+  std::uint8_t clipped_gyro = 0, clipped_accel = 0;
   std::int64_t us = 1'000'000;
   double worst_ratio = 0, worst_m = 0;
   int nominal = 0;
@@ -217,7 +217,7 @@ class Robot {
     us += 10'000;
     if (imu) {
       if (!stuck) {
-        sample_ = {.interval_us = 10'000, .clipped_gyro = clipped_gyro};
+        sample_ = {.interval_us = 10'000, .clipped_gyro = clipped_gyro, .clipped_accel = clipped_accel};
         for (std::size_t i = 0; i < 3; ++i) {
           sample_.dangle_b_rad[i] = 1e-5F * normal_(engine_);
           sample_.dvelocity_b_mps[i] = 2e-4F * normal_(engine_);
@@ -342,6 +342,31 @@ TEST(ImuHealth, AClippedGyroscopeIsReplacedByWheelsAndWithoutThemIsAsUncertainAs
   EXPECT_LT(a.sigma(8), 0.5 * b.sigma(8));
   EXPECT_NEAR(a.estimator.estimate(a.with()).yaw_rate_radps, 0.4F, 0.05F) << "as the wheels show it";
   EXPECT_LT(std::abs(a.yaw_off_rad()), 0.1) << "it did not show 0.8 rad";
+}
+
+// The turn it still shows, so only the velocity is in doubt: by a walk of the force that may have gone unseen.
+TEST(ImuHealth, AClippedAccelerometerMakesTheVelocityDoubtedAndNothingOfTheTurn) {
+  Robot good(1.5, 0.4), clipped(1.5, 0.4);
+  for (Robot* r : {&good, &clipped}) {
+    r->run(20);
+    r->gnss = r->wheels = false;  // nothing but the IMU goes on
+    r->clipped_accel = r == &clipped ? 7 : 0;
+    r->run(1);
+  }
+  EXPECT_TRUE(clipped.says(can::Fault::kImuClipped));
+  EXPECT_FALSE(good.says(can::Fault::kImuClipped));
+  EXPECT_EQ(clipped.now().imu.clipped, 100);
+  const double unseen_mps = static_cast<double>(good.n.inertial.gap_mps2) * std::sqrt(0.1 * 1);
+  for (const int i : {3, 4, 5}) {
+    const double grown_mps = std::sqrt(std::pow(clipped.sigma(i), 2) - std::pow(good.sigma(i), 2));
+    EXPECT_NEAR(grown_mps, unseen_mps, 0.02 * unseen_mps) << i;
+  }
+  EXPECT_NEAR(clipped.sigma(8), good.sigma(8), 1e-4 * good.sigma(8));
+  clipped.gnss = clipped.wheels = true;
+  clipped.clipped_accel = 0;
+  clipped.run(5);
+  EXPECT_FALSE(clipped.says(can::Fault::kImuClipped));
+  EXPECT_LT(clipped.sigma(3), 0.1) << "and it is told again how fast it is";
 }
 
 TEST(ImuHealth, OneSpinningWheelIsSaidAtOnceAndCostsNearlyNothing) {

@@ -95,6 +95,10 @@ class Drive {
   }
   [[nodiscard]] double height_error_m() const { return std::abs(off(now_.state.z, up_m)); }
   [[nodiscard]] double sigma_yaw_rad() const { return std::sqrt(static_cast<double>(now_.p(8, 8))); }
+  [[nodiscard]] double yaw_error_rad() const {
+    return std::abs(
+        std::remainder(static_cast<double>(nav::euler(now_.state.q_nb).yaw_rad) - yaw_rad, 2 * 3.14159265358979));
+  }
   [[nodiscard]] double sigma_m() const { return std::sqrt(static_cast<double>(now_.p(0, 0) + now_.p(1, 1)) / 2); }
   [[nodiscard]] bool tracking() const { return now_.valid; }
   [[nodiscard]] long counted(char verdict) const { return std::count(verdicts.begin(), verdicts.end(), verdict); }

@@ -365,13 +365,24 @@ TEST(Glitch, AFirstFixThatIsOneDoesNotBecomeTheStart) {
       if (++fixes == bad) fix.east_m += 100;
       return true;
     };
-    d.run(12);
+    double worst_heading_rad = 0;  // of those it said to be valid
+    const auto run = [&](double duration_s) {
+      for (int i = 0; i < std::lround(duration_s * 100); ++i) {
+        d.run(0.01);
+        if (d.estimator.estimate(d.with()).heading_valid)
+          worst_heading_rad = std::max(worst_heading_rad, d.yaw_error_rad());
+      }
+    };
+    run(12);
     ASSERT_TRUE(d.tracking());
     EXPECT_LT(d.error_m(), 3.0);
     d.clear();
-    d.run(60);
+    run(60);
     EXPECT_LT(d.worst_sigmas, kHonest) << bad;
     EXPECT_EQ(d.estimator.jump().count, 0);
+    EXPECT_TRUE(d.estimator.estimate(d.with()).heading_valid) << bad;
+    EXPECT_LT(d.yaw_error_rad(), 3 * d.sigma_yaw_rad()) << bad;
+    EXPECT_LT(worst_heading_rad, 10 * 3.14159265358979 / 180) << bad;
   }
 }
 

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <optional>
 #include <random>
 #include <vector>
 
@@ -128,6 +129,45 @@ TEST(InertialOptions, AFirstWayThatIsLongIsACourse) {
   start.heading(base::kNan, 0.1F);
   start.begin(ins, n.inertial, false);
   EXPECT_TRUE(ins.x.finite()) << "no heading is no reason to lose one";
+}
+
+/// How a start at the map's origin begins that knows of one velocity over ground only; none: without a heading.
+std::optional<nav::Ins> begun_by(const nav::Vector3& v_n_mps, float sigma_mps, bool forwards = true) {
+  Numbers n = numbers();
+  n.inertial.starts_forward = forwards ? 1 : 0;
+  InertialStart start;
+  start.fix({.sigma_horizontal_m = 1, .sigma_vertical_m = 2}, {1'000'000}, n);
+  start.velocity(v_n_mps, sigma_mps, true, n);
+  if (!start.ready()) return std::nullopt;
+  nav::Ins ins;
+  start.begin(ins, n.inertial, false);
+  return ins;
+}
+
+TEST(InertialOptions, AFastVelocityIsTheCourseOfARobotThatStartsForwards) {
+  for (const float yaw_rad : {-2.5F, 0.0F, 0.6F, 2.0F}) {
+    const auto mps = [&](double speed) -> nav::Vector3 {
+      const auto yaw = static_cast<double>(yaw_rad);
+      return {static_cast<float>(speed * std::cos(yaw)), static_cast<float>(speed * std::sin(yaw)), 0.2F};
+    };
+    const auto sure = begun_by(mps(4), 1e-3F), rough = begun_by(mps(4), 0.39F);
+    ASSERT_TRUE(sure && rough) << yaw_rad;
+    EXPECT_NEAR(nav::euler(sure->x.q_nb).yaw_rad, yaw_rad, 1e-5F);
+    EXPECT_NEAR(nav::euler(rough->x.q_nb).yaw_rad, yaw_rad, 1e-5F);
+    // A robot looks a little beside its way; and what the velocity is wrong across, over the speed.
+    EXPECT_GT(std::sqrt(sure->p(8, 8)), 0.05F);
+    EXPECT_LT(std::sqrt(sure->p(8, 8)), 0.2F);
+    EXPECT_NEAR(std::sqrt(rough->p(8, 8) - sure->p(8, 8)), 0.39F / 4, 1e-4F);
+  }
+}
+
+TEST(InertialOptions, AVelocityTooSlowForItsAccuracyIsNoCourse) {
+  EXPECT_FALSE(begun_by({0.7F, 0.6F, 0}, 1e-3F)) << "less than a metre a second";
+  EXPECT_TRUE(begun_by({0.8F, 0.7F, 0}, 1e-3F));
+  EXPECT_FALSE(begun_by({1.5F, 1.5F, 0}, 0.22F)) << "less than ten of its sigma";
+  EXPECT_TRUE(begun_by({1.5F, 1.5F, 0}, 0.2F));
+  EXPECT_FALSE(begun_by({0, 0, 4}, 1e-3F)) << "up is no way to look";
+  EXPECT_FALSE(begun_by({3, 4, 0}, 1e-3F, false)) << "it may go in reverse";
 }
 
 TEST(InertialOptions, SensorsThatShowTheSameForEverAreStuckAndSaidToBe) {

@@ -226,6 +226,29 @@ TEST(Late, AFixOfAlmostHalfASecondAgoLeavesTheBytesOfOneOnTime) {
   EXPECT_EQ(first_difference(said(late), straight), "");
 }
 
+// The non-holonomic constraint comes with the wheels, every 20 ms; what is told for want of them at the same instants
+// would be the same trembling of the body a second time, and the velocity too sure by it.
+TEST(Constraint, WhatWheelsBringIsNotTakenTwice) {
+  World::Options options{.mismatched = false, .inertial = true};
+  options.numbers.imu.rate_hz = 200;
+  const std::vector<Epoch> epochs = made(options, 1, 40);
+  const auto sigma_up_mps = [&](std::int32_t constrain_every_us) {
+    app::Numbers numbers = matched_rover();
+    numbers.inertial.constrain_every_us = constrain_every_us;
+    float last = 0;
+    const auto hear = [&last](std::size_t, const base::CanFrame& frame) {
+      constexpr std::size_t kFused = 2;
+      if (frame.id != 0x300 + can::offset_of<can::EstStateStdVel>(kFused)) return;
+      if (const auto page = can::decode<can::EstStateStdVel>(can::payload(frame))) last = page->std_vel_up_mps;
+    };
+    run_as<robot::rover::Estimators>(numbers, epochs, hear);
+    return last;
+  };
+  const float alone = sigma_up_mps(0), both = sigma_up_mps(20'000);
+  EXPECT_GT(alone, 5e-4F);
+  EXPECT_NEAR(both / alone, 1.0F, 0.03F);
+}
+
 // In the matched world, over the drive: the normalised square of an error whose 1 sigma is right is 1 in the mean.
 TEST(Motion, TheOneSigmaOfSpeedAndTurnRateIsThatOfTheirErrors) {
   for (const Robot& robot :

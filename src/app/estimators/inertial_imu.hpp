@@ -29,6 +29,8 @@ inline Innovation Inertial::fuse(const ImuSample& sample, base::Micros stamp, co
     unusable_ = true;
     return {.verdict = can::Verdict::kNotUsed};
   }
+  // All that was true at the last sample has been fused: wheels bring the constraint with them, and twice is too sure.
+  if (phase_ == Phase::kTracking) constrain(time_, with);
   rate_b_radps_ = increment.dtheta_b_rad / dt_s;
   if (phase_ != Phase::kTracking) {
     if (stamp - increment.dt - time_ > base::Micros{1'500}) start_.gap(stamp - increment.dt - time_);
@@ -77,7 +79,6 @@ inline Innovation Inertial::fuse(const ImuSample& sample, base::Micros stamp, co
   still_.s += dt_s;
   still_.rate_radps += (rate_b_radps_ - still_.rate_radps) * (dt_s / (still_.s > dt_s ? still_.s : dt_s));
   stand(stamp, with);
-  constrain(stamp, with);
   if (alone(stamp)) {
     start_.watch(increment, ins_.x.q_nb);
   } else {

@@ -43,7 +43,7 @@ TEST(Icm42688Fault, AnIdentityThatChangesWhileRunningEndsTheSamplesUntilItIsTheO
   bench.run(1'000'000);
   ASSERT_EQ(bench.troubles(), 0) << "its own identity is no change";
   bench.chip.inject(Fault::kWrongIdentity);
-  for (std::size_t i = 0; i <= kFieldCount && bench.driver.running(); ++i) bench.run(5'000);  // a round of checks
+  for (std::size_t ms = 0; ms <= 5 * (kFieldCount + 1) && bench.driver.running(); ++ms) bench.run(1'000);  // a round
   EXPECT_FALSE(bench.driver.running());
   EXPECT_EQ(bench.of(Reason::kConfigChanged), 1);
   EXPECT_EQ(bench.of(Reason::kWrongIdentity), 0) << "that is said of one that answers the start";
