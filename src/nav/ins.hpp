@@ -68,6 +68,8 @@ class Ins {
     x.b_a_mps2 *= step.keep_b_a;
     x.b_g_radps *= step.keep_b_g;
     if (noise.motion_sigma > 0.0F) keep_motion(step);
+    const auto passed = static_cast<std::uint16_t>(pending_.dt_s < 1.0F ? pending_.dt_s * kHeldPerS : kHeld);
+    held_ = held_ > passed ? static_cast<std::uint16_t>(held_ - passed) : std::uint16_t{0};
     nav::predict_covariance(p, step);
     pending_ = {};
     maintain();
@@ -102,6 +104,13 @@ class Ins {
     }
     accel_n_mps2 = Vector3::Zero();
     condition(p, watch_);
+  }
+  /// What it turned by in such a gap, if something else shows it; in the navigation frame.
+  void turn_without_imu(const Quaternion& turn) {
+    x.q_nb = (turn * x.q_nb).renormalised();
+    const Vector3 v_n_mps = turn.rotate(x.v_n_mps);
+    move_errors(v_n_mps - x.v_n_mps);
+    x.v_n_mps = v_n_mps;
   }
 
   /// Joint gate, then sequential scalar updates; a measurement that is not accepted changes nothing. The covariance is
@@ -138,6 +147,7 @@ class Ins {
     for (const float v : p.packed()) sink(v);
     sink(pending_.dt_s);
     sink(pending_.shown_rad);
+    sink(std::uint32_t{held_});
     turned_.each_bit(sink);
     for (int i = 0; i < 3; ++i) {
       sink(pending_.dv_n_mps(i));
@@ -176,11 +186,13 @@ class Ins {
     }
     if (result.innovation.verdict != filter::Verdict::kAccepted) return result.innovation;
     x.correct(result.dx);
+    if constexpr (requires { measurement.moves; })
+      if (measurement.moves) hold_in_body(result.dx);
     // What tells only of biases leaves what the scale has done to the heading.
     constexpr bool kTellsHeading = std::any_of(Measurement::kTouches.begin(), Measurement::kTouches.end(),
                                                [](int touched) { return touched < InsState::kAccelBias; });
     if constexpr (kTellsHeading) turned_.told(p(kYaw, kYaw) / yaw_rad2);
-    if (result.sharp && !condition(p, watch_)) ++conditioned_;
+    if (result.sharp && !condition(p, watch_)) note_conditioned();
     return result.innovation;
   }
 
@@ -190,6 +202,7 @@ class Ins {
     pending_ = {};
     turned_ = {};
     stands = false;
+    held_ = 0;
     accel_n_mps2 = Vector3::Zero();
     return true;
   }
@@ -225,13 +238,28 @@ class Ins {
             .keep_b_g = keep(noise.gyro_bias_time_s)};
   }
 
+  /// What is measured in the body shows no heading: turned as a whole, the robot's way looks the same. The filter sees
+  /// it so as long as its errors of v move with v, by all of it: by the IMU, and by what such measurements took back of
+  /// it (the error of an invariant filter: Barrau & Bonnabel 2017; the rule: Huang, Mourikis, Roumeliotis 2010). What
+  /// tells v in the navigation frame is not counted; it does show a heading.
+  void hold_in_body(const filter::Vector<float, kErrors>& dx) {
+    held_ = kHeld;
+    move_errors({dx(InsState::kVelocity), dx(InsState::kVelocity + 1), dx(InsState::kVelocity + 2)});
+  }
+  /// Not by a leap: that is none of what a linear error describes, and more than float can carry through P.
+  void move_errors(const Vector3& dv_n_mps) {
+    if (dv_n_mps.squaredNorm() < kMostLeap_mps * kMostLeap_mps) pending_.dv_n_mps += dv_n_mps;
+  }
+
   /// Sensor noise taken for acceleration would let the filter believe that it sees its heading at standstill: v gains
   /// theta x (dv + noise), and every noisy sample looks like a known push whose direction was then observed. The
-  /// horizontal part of dv in F shrinks by the share of its energy that noise explains (James & Stein 1961).
+  /// horizontal part of dv in F shrinks by the share of its energy that noise explains (James & Stein 1961). Not where
+  /// v is held in the body: there that noise is taken back, and of a gentle curve every sample alone passes for noise.
   void keep_motion(InsCovarianceStep<float>& step) const {
     const float energy = step.dv_n_mps(0) * step.dv_n_mps(0) + step.dv_n_mps(1) * step.dv_n_mps(1);
     const float explained = noise.motion_sigma * noise.motion_sigma * step.var_v;
-    const float share = energy > explained && !stands ? 1.0F - explained / energy : 0.0F;
+    const float moved = held_ > 0 ? 1.0F : energy > explained ? 1.0F - explained / energy : 0.0F;
+    const float share = stands ? 0.0F : moved;
     step.dv_n_mps(0) *= share;
     step.dv_n_mps(1) *= share;
     if (stands) step.dv_n_mps(2) = earth.gravity_mps2 * step.dt_s;
@@ -243,13 +271,21 @@ class Ins {
     if (watch_.idle()) return watch_.begin(p);
     if (watch_.advance(3) != InsFactor::Progress::kBad) return;
     condition(p, watch_);
-    ++conditioned_;
+    note_conditioned();
+  }
+
+  void note_conditioned() {
+    if (conditioned_ < 0xFFFF) ++conditioned_;
   }
 
   Pending pending_{};
   TurnedScale turned_{};
   InsFactor watch_{};
-  std::uint32_t conditioned_ = 0;
+  /// So long yet what moves it counts in full, in 0.1 ms: wheels that slip for a while are heard again.
+  static constexpr float kHeldPerS = 10'000.0F, kMostLeap_mps = 3;
+  static constexpr std::uint16_t kHeld = 50'000;
+  std::uint16_t held_ = 0;
+  std::uint16_t conditioned_ = 0;
 };
 
 }  // namespace tetap::nav

@@ -6,6 +6,7 @@
 #include "model/gnss_fix_3d.hpp"
 #include "model/gnss_velocity_3d.hpp"
 #include "model/height.hpp"
+#include "model/wheel_speed.hpp"
 #include "model/zero_rate.hpp"
 #include "model/zero_velocity.hpp"
 #include "nav/ins_covariance_entry.hpp"
@@ -131,6 +132,41 @@ TEST(Ins, ABiasThatIsToldLeavesTheScaleToTheHeading) {
   EXPECT_NEAR(std::sqrt(ins.p(8, 8)), kCircle_rad, 0.1F * kCircle_rad);
   circle();
   EXPECT_NEAR(std::sqrt(ins.p(8, 8)), 2.0F * kCircle_rad, 0.1F * kCircle_rad);
+}
+
+/// Turned as a whole a way looks the same to wheels and IMU: they tell no heading, straight on or in curves, however
+/// gentle, of a sensor however noisy.
+TEST(Ins, WhatIsMeasuredInTheBodyTellsNoHeading) {
+  for (const float accel_mps2_rthz : {2e-3F, 2e-2F, 1e-1F})
+    for (const float turn_radps : {0.0F, 0.02F, 0.1F, 0.3F, 1.0F}) {
+      Ins ins;
+      ins.noise.accel_mps2_rthz = accel_mps2_rthz;
+      ins.noise.gyro_radps_rthz = 1e-4F;
+      constexpr float kSpeed_mps = 1.5F, kSigma_rad = 0.1F, kFirst_rad = 0.3F;
+      InsState x;
+      x.q_nb = nav::exp_quaternion({0, 0, kFirst_rad});
+      x.v_n_mps = x.q_nb.rotate({kSpeed_mps, 0, 0});
+      auto p = start_covariance();
+      p(8, 8) = kSigma_rad * kSigma_rad;
+      for (int i = 12; i < 15; ++i) p(i, i) = 1e-10F;  // so that turning does not hide what is told
+      for (int i = 3; i < 6; ++i) p(i, i) = 9;
+      ASSERT_TRUE(ins.start(x, p));
+      for (int i = 0; i < 6000; ++i) {
+        const float way = i / 1000 % 2 == 0 ? turn_radps : -turn_radps;
+        // Alternating pushes stand for the noise: those a noisy sensor shows are taken back by the wheels.
+        const float noise_mps2 = (i % 2 == 0 ? 3.0F : -3.0F) * accel_mps2_rthz;
+        const Vector3 turn{0, 0, way}, push{noise_mps2, kSpeed_mps * way - noise_mps2, ins.earth.gravity_mps2};
+        ASSERT_EQ(ins.predict(ImuIncrement::constant(turn, push, {10'000})), ImuVerdict::kAccepted);
+        static_cast<void>(ins.update(model::WheelSpeed{.forward_mps = kSpeed_mps,
+                                                       .sigma_forward_mps = 0.02F,
+                                                       .sigma_lateral_mps = 0.02F,
+                                                       .sigma_vertical_mps = 0.02F,
+                                                       .gyro_b_radps = turn},
+                                     1e6F));
+      }
+      EXPECT_GT(std::sqrt(ins.p(8, 8)), 0.95F * kSigma_rad) << turn_radps << " rad/s, " << accel_mps2_rthz;
+      EXPECT_LT(std::sqrt(ins.p(8, 8)), 1.1F * kSigma_rad) << turn_radps << " rad/s, " << accel_mps2_rthz;
+    }
 }
 
 /// A body that stands and is shaken up and down: what shakes it is no motion that would tell tilt from a bias.

@@ -41,6 +41,7 @@ class Inertial {
                    s.sigma_position_m, s.sigma_yaw_rad);
   }
   void set_pose(base::Micros, const SetPose& given, const Context& with) {
+    if (phase_ == Phase::kTracking) start_.stay(ins_.x, base::sqrt(heading_rad2()));
     start_.place(given.pose, given.sigma_position_m, given.sigma_yaw_rad);
     place_.forget();
     height_.forget();
@@ -238,6 +239,7 @@ class Inertial {
   base::Micros bridged_;  ///< up to where the filter last went without IMU
   base::Micros wheels_;   ///< last stamp at which wheels said how it turns,
   float wheel_turn_radps_ = 0;
+  bool speed_known_ = false;    ///< since it began: the constraint without wheels waits for that
   bool blind_ = false;          ///< the present is without IMU
   bool unusable_ = false;       ///< the last IMU sample was
   bool anew_ = false;           ///< all that is ahead was carried anew in this tick

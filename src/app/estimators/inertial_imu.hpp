@@ -114,9 +114,7 @@ inline bool Inertial::without_imu() const {
   nav::Vector3 w_b = nav::Vector3::Zero();
   if (wheels) {
     w_b(2) = wheel_turn_radps_;
-    const nav::Quaternion turn = nav::exp_quaternion(ins_.x.q_nb.rotate(w_b) * dt_s);
-    ins_.x.q_nb = (turn * ins_.x.q_nb).renormalised();
-    ins_.x.v_n_mps = turn.rotate(ins_.x.v_n_mps);
+    ins_.turn_without_imu(nav::exp_quaternion(ins_.x.q_nb.rotate(w_b) * dt_s));
     // Both wheels slip by their share, each on its own, for about a second the same.
     const float slip = n.slip_share * n.slip_share * 2.0F * ins_.x.v_n_mps.squaredNorm();
     const float track_m = with.numbers.wheels.drive.track_m;
@@ -170,9 +168,12 @@ inline std::uint16_t Inertial::faults() const {
 inline void Inertial::begin(const Context& with) {
   if (with.site.origin != can::OriginSource::kNone)
     ins_.earth = nav::Earth::at(with.site.frame, with.numbers.inertial.earth_rate != 0);
-  start_.begin(ins_, with.numbers.inertial, phase_ == Phase::kTracking);
+  constexpr base::Micros kLately{200'000};
+  const bool rolls = rolled_.us > 0 && time_ - rolled_ < kLately;
+  start_.begin(ins_, with.numbers.inertial, phase_ == Phase::kTracking, rolls ? rolled_mps_ : base::kNan);
   phase_ = Phase::kTracking;
   last_position_ = time_;
+  speed_known_ = !start_.fixed();
   refused_ = {};
   still_.s = waiting_.s = 0;
   gained_mps_ = base::kNan;

@@ -44,6 +44,7 @@ class InertialStart {
   }
   /// Increments are missing.
   void gap(base::Micros gap) {
+    if (gap > base::Micros{100'000}) fixed_ = false;  // it may have turned: the way begins anew
     if (watches_ || (levelled_s_ > 0.0F && !headed_)) finder_.predict_without_imu(gap);
   }
   /// Beside a filter without wheels: what heading the motion shows is found once more, by nothing of the filter's.
@@ -79,6 +80,11 @@ class InertialStart {
   void forward(float mps, float sigma_mps, float axle_x_b_m) {
     if (!headed_) finder_.fuse_forward_speed(mps, sigma_mps, {axle_x_b_m, 0.0F});
   }
+  /// While the filter runs: what place() does not say stays as it is.
+  void stay(const nav::InsState& x, float sigma_yaw_rad) {
+    heading(nav::euler(x.q_nb).yaw_rad, sigma_yaw_rad);
+    at_.z = x.z;
+  }
   void place(const model::PlanarPose& pose, float sigma_m, float sigma_yaw_rad) {
     at_ = {.x = pose.x, .y = pose.y, .z = at_.z, .sigma_horizontal_m = sigma_m, .sigma_vertical_m = 10.0F};
     placed_ = given_ = true;
@@ -92,16 +98,23 @@ class InertialStart {
       sigma_climb_mps_ = kUnseenClimb_mps;
     }
     fixed_at_ = stamp;
-    if (!headed_ && !has_velocity_)
-      finder_.fuse_position(fix.x, fix.y, fix.sigma_horizontal_m, {fix.antenna_b_m(0), fix.antenna_b_m(1)});
+    const float yaw = nav::euler(turned_).yaw_rad, turned = base::wrap_angle(yaw - first_yaw_rad_);
+    const bool arc_ends = base::abs(turned) > kArc_rad;
     if (numbers.inertial.starts_forward != 0 && fixed_ && !headed_) {
       const float east = fix.x.minus(first_x_), north = fix.y.minus(first_y_);
-      const float needed = numbers.gnss.align_distance_m > 4.0F * fix.sigma_horizontal_m
-                               ? numbers.gnss.align_distance_m
-                               : 4.0F * fix.sigma_horizontal_m;
-      if (east * east + north * north > needed * needed) course(east, north, 1.5F * fix.sigma_horizontal_m);
+      // Far beyond what two fixes of a robot that stands are ever apart, for it is asked at every fix. At the end of
+      // an arc, a way that is shorter but long enough, too.
+      const float share = arc_ends ? 0.25F : 1.0F;
+      const float distance = share * numbers.gnss.align_distance_m, noise = 6.0F * fix.sigma_horizontal_m;
+      const float needed = distance > noise ? distance : noise;
+      if (east * east + north * north > needed * needed) course(east, north, 1.5F * fix.sigma_horizontal_m, turned);
     }
-    if (!fixed_) first_x_ = fix.x, first_y_ = fix.y;
+    if (!headed_ && !has_velocity_)
+      finder_.fuse_position(fix.x, fix.y, fix.sigma_horizontal_m, {fix.antenna_b_m(0), fix.antenna_b_m(1)});
+    if (!fixed_ || arc_ends) {
+      first_x_ = fix.x, first_y_ = fix.y;
+      first_yaw_rad_ = yaw;
+    }
     fixed_ = true;
     if (given_ && headed_ && at_.sigma_horizontal_m < fix.sigma_horizontal_m) {  // a pose from outside that is better
       at_.z = fix.z;
@@ -123,7 +136,7 @@ class InertialStart {
     if (speed2 > 0.25F + 9.0F * sigma_mps * sigma_mps) given_ = false;  // it has gone from where it was said to be
     if (headed_) return;
     if (n.inertial.starts_forward != 0 && speed2 > 1.0F && speed2 > 100.0F * sigma_mps * sigma_mps)
-      return course(v_n_mps(0), v_n_mps(1), sigma_mps);
+      return course(v_n_mps(0), v_n_mps(1), sigma_mps, 0.0F);
     finder_.fuse_velocity(v_n_mps(0), v_n_mps(1), sigma_mps, {n.gnss.antenna_x_b_m, n.gnss.antenna_y_b_m});
   }
   void heading(float yaw_rad, float sigma_rad) {
@@ -142,19 +155,31 @@ class InertialStart {
   [[nodiscard]] const nav::Quaternion& attitude() const { return turned_; }
   [[nodiscard]] bool levelling() const { return levelled_s_ > 0.0F; }
   [[nodiscard]] bool placed() const { return placed_; }
+  /// Fixes come, and will tell how it moves.
+  [[nodiscard]] bool fixed() const { return fixed_; }
   [[nodiscard]] bool ready() const { return placed_ && headed_; }
 
-  /// Starts the filter; `again`: it ran before, so tilt and biases are its own.
-  void begin(nav::Ins& ins, const InertialNumbers& n, bool again) {
+  /// Starts the filter; `again`: it ran before, so tilt and biases are its own. rolled_mps: forward, by wheels; NaN:
+  /// none were heard.
+  void begin(nav::Ins& ins, const InertialNumbers& n, bool again, float rolled_mps = base::kNan) {
+    // Without a receiver's velocity it goes where it points: linearised about another direction wheels would seem to
+    // tell the heading.
+    const bool rolls = !again && !has_velocity_ && base::abs(rolled_mps) < kFastest_mps;
     nav::InsState x = again ? ins.x : nav::InsState{};
     x.x = at_.x, x.y = at_.y, x.z = at_.z;
     const nav::Quaternion level = again ? ins.x.q_nb : turned_;
     // A heading found before is carried to the present by the gyroscope.
     const float turn = base::wrap_angle(yaw_rad_ - (again ? nav::euler(level).yaw_rad : level_yaw_rad_));
     x.q_nb = (nav::exp_quaternion({0.0F, 0.0F, turn}) * level).renormalised();
-    if (!again) x.v_n_mps = v_n_mps_;
+    if (!again) x.v_n_mps = rolls ? x.q_nb.rotated_x() * rolled_mps : v_n_mps_;
     const float h = at_.sigma_horizontal_m * at_.sigma_horizontal_m, v = at_.sigma_vertical_m * at_.sigma_vertical_m;
-    const float speed = sigma_v_mps_ * sigma_v_mps_, climb = sigma_climb_mps_ * sigma_climb_mps_;
+    // Wheels may slip. Sideways three times what the heading makes of the speed, for the two are not correlated here
+    // and the constraint would take the rest for knowledge of the heading. A pose that was said says nothing of speed.
+    const float sideways_mps = rolls ? 3.0F * sigma_yaw_rad_ * rolled_mps : 0.0F;
+    const bool unseen = !again && !has_velocity_ && given_ && fixed_;
+    const float own_mps = rolls ? kSlip_mps : unseen ? kUnseen_mps : sigma_v_mps_;
+    const float speed = own_mps * own_mps + sideways_mps * sideways_mps;
+    const float climb = sigma_climb_mps_ * sigma_climb_mps_;
     const float tilt = n.start_tilt_rad * n.start_tilt_rad;
     const float a = n.accel_turn_on_mps2 * n.accel_turn_on_mps2, g = n.gyro_turn_on_radps * n.gyro_turn_on_radps;
     ins.start(x,
@@ -173,6 +198,7 @@ class InertialStart {
     for (int i = 0; i < 3; ++i) sink(v_n_mps_(i));
     sink(first_x_.um());
     sink(first_y_.um());
+    sink(first_yaw_rad_);
     sink(at_.z.um());
     sink(at_.sigma_horizontal_m);
     sink(at_.sigma_vertical_m);
@@ -190,21 +216,27 @@ class InertialStart {
     if (s < 1e-3F) return up(2) > 0.0F ? nav::Vector3(nav::Vector3::Zero()) : nav::Vector3{3.14159265F, 0.0F, 0.0F};
     return axis * (base::atan2(s, up(2)) / s);
   }
-  /// Forward is the way it goes.
-  void course(float east, float north, float sigma) {
+  /// Forward is the way it goes, or went: of an arc the chord points where the middle did.
+  void course(float east, float north, float sigma, float turned_rad) {
     const float length = base::sqrt(east * east + north * north);  // of a velocity, or of a way
-    constexpr float kSlip_rad = 0.1F;                              // a curve between the fixes, a crab's walk
-    const model::GnssCourse course(east / length, north / length, sigma / length, kSlip_rad);
-    heading(course.angle_rad, course.sigma_rad);
+    constexpr float kSlip_rad = 0.1F;                              // a crab's walk
+    const float uneven_rad = 0.25F * turned_rad;                   // not all of a way is an arc
+    const model::GnssCourse course(east / length, north / length, sigma / length,
+                                   base::sqrt(kSlip_rad * kSlip_rad + uneven_rad * uneven_rad));
+    heading(base::wrap_angle(course.angle_rad + 0.5F * turned_rad), course.sigma_rad);
   }
 
   nav::Quaternion turned_;
   float levelled_s_ = 0;
   model::GnssFix3d at_;
-  base::Anchored first_x_, first_y_;
+  base::Anchored first_x_, first_y_;  ///< where the way begins whose chord is the course
+  float first_yaw_rad_ = 0;
   nav::Vector3 v_n_mps_ = nav::Vector3::Zero();
   static constexpr float kUnseenClimb_mps = 5;
+  static constexpr float kArc_rad = 0.5F;  ///< of a way that turns more the chord is no course
   float sigma_v_mps_ = 3, sigma_climb_mps_ = 3;
+  static constexpr float kFastest_mps = 200;               ///< no wheels roll faster: a reading that is broken
+  static constexpr float kSlip_mps = 3, kUnseen_mps = 15;  ///< 1 sigma, as YawFinder has it
   base::Micros fixed_at_;
   float yaw_rad_ = 0, level_yaw_rad_ = 0, sigma_yaw_rad_ = 3;  ///< the second: of turned_, when the first was found
   bool placed_ = false, headed_ = false, fixed_ = false, has_velocity_ = false;

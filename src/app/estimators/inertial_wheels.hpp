@@ -172,6 +172,11 @@ inline bool Inertial::wheels_agree(base::Micros at, const Context& with) const {
 inline void Inertial::constrain(base::Micros stamp, const Context& with) {
   const base::Micros every{with.numbers.inertial.constrain_every_us};
   if (every.us <= 0 || stamp - constrained_ < every || !can_do(stamp - constrained_, every)) return;
+  // Of a start in motion: before its speed is known, each that is believed meanwhile would tell another heading.
+  constexpr float kKnown_mps = 0.2F, kShare = 0.2F;
+  const float known2 = kKnown_mps * kKnown_mps + kShare * kShare * ins_.x.v_n_mps.squaredNorm();
+  speed_known_ = speed_known_ || ins_.p(3, 3) + ins_.p(4, 4) < known2;
+  if (!speed_known_) return;
   // That it does not move sideways says nothing for wheels that spin.
   const Refused spinning = refused_[kWheels];
   static_cast<void>(forward({.sigma_mps = kUnknown_mps}, stamp, with));
