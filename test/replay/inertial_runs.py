@@ -199,7 +199,20 @@ def outage_line(row, marks=""):
           f"{row['nees_with_fix']:5.2f}{'   BEYOND' if row['beyond'] else ''}")
 
 
-def skog(programs, out, whole, checks):
+def everywhere(programs, log, every_s):
+    """Cuts of 60 s all along the drive: ten places are few, and their median is what chance makes of it."""
+    places = range(56, 232, every_s)
+    for speedometer in (True, False):
+        rows = outages(programs, log, [(start, 60, speedometer) for start in places])
+        errors = np.array([row["error_m"] for row in rows])
+        beyond = [row["start_s"] for row in rows if row["beyond"]]
+        holed = sum(start < IMU_HOLE_S < start + 60 for start in beyond)
+        print(f"GNSS cut for 60 s at {len(rows)} places, {'speedometer' if speedometer else 'non-holonomic constraint alone'}: "
+              f"error median {np.median(errors):.1f}, mean {np.mean(errors):.1f}, worst {np.max(errors):.1f} m; "
+              f"{len(beyond)} beyond 3 sigma, {holed} of them with the hole of the IMU")
+
+
+def skog(programs, out, whole, every_s, checks):
     path = os.path.join(out, "skog")
     run("tools/import_skog", os.path.join(DATA, "skog_gnss_ins"), path)
     log = CutLog(path, "car", SKOG_DELAY_S)
@@ -242,6 +255,8 @@ def skog(programs, out, whole, checks):
         nees = [row["nees"] for row in sound if not row["sigma_limited"]]
         if nees:
             checks.bound(f"car: mean NEES (of 2) without the hole, {what}", np.mean(nees), 0.1, 6)
+    if every_s:
+        everywhere(programs, log, every_s)
     return {"rms_m": rms(error), "sensors": sensors, "outages": rows}
 
 
@@ -351,6 +366,7 @@ def main():
     parser.add_argument("programs", metavar="PROGRAMS")
     parser.add_argument("out", metavar="OUT")
     parser.add_argument("--whole", action="store_true", help="cuts of 30 s too")
+    parser.add_argument("--every", type=int, default=0, metavar="S", help="Skog's car cut for 60 s every S seconds, too")
     parser.add_argument("--json", default=os.path.join(ROOT, "out", "inertial.json"), metavar="FILE")
     arguments = parser.parse_args()
     have = {name for name in ("skog_gnss_ins", "px4_ecl", "husky") if os.path.isdir(os.path.join(DATA, name))}
@@ -360,7 +376,7 @@ def main():
     os.makedirs(arguments.out, exist_ok=True)
     checks, result = Checks(), {}
     if "skog_gnss_ins" in have:
-        result["car"] = skog(arguments.programs, arguments.out, arguments.whole, checks)
+        result["car"] = skog(arguments.programs, arguments.out, arguments.whole, arguments.every, checks)
     if "px4_ecl" in have:
         logs = sorted(name[:-4] for name in os.listdir(os.path.join(DATA, "px4_ecl", "replay_data")) if name.endswith(".csv"))
         result["px4"] = {name: px4(arguments.programs, arguments.out, name, checks) for name in logs
