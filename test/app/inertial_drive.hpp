@@ -44,7 +44,7 @@ inline Numbers rover_like() {
 
 class Drive {
  public:
-  explicit Drive(const Numbers& of = numbers(), unsigned seed = 1) : n(of), engine_(seed) {
+  explicit Drive(const Numbers& of = numbers(), unsigned seed = 1) : n(of), engine_(seed), engine_imu_(98 + seed) {
     site.frame = nav::LocalFrame(24'131'350'000, 5'834'150'000, 500.0F);
     site.origin = can::OriginSource::kConfigured;
     gravity_mps2_ = nav::Earth::at(site.frame, false).gravity_mps2;
@@ -67,7 +67,8 @@ class Drive {
   double east_m = 0, north_m = 0, up_m = 0, yaw_rad = 0.3, speed_mps = 1, turn_radps = 0.05;
   double unseen_east_m = 0;  ///< it is carried, and no sensor of motion shows it
   double white_m = 1, lasting_m = 0, lasting_s = 60;
-  std::int64_t gnss_every_us = 200'000;
+  double gyro_bias_radps = 0;  ///< about the vertical
+  std::int64_t gnss_every_us = 200'000, speedometer_every_us = 10'000;
   bool wheels = true, speedometer = false, gnss_velocity = true;
   /// What the world does to a fix; false: it does not come.
   struct Fix {
@@ -127,13 +128,13 @@ class Drive {
     const auto shake = [this](double sigma) { return static_cast<float>(sigma * normal_imu_(engine_imu_)); };
     const double pushed = time_s() < 0.015 ? 0 : speed_mps - last_mps_;
     last_mps_ = speed_mps;
-    estimator.fuse(
-        ImuSample{.dangle_b_rad = {shake(2e-5), shake(2e-5), static_cast<float>(turn_radps * dt) + shake(2e-5)},
-                  .dvelocity_b_mps = {static_cast<float>(pushed) + shake(5e-4),
-                                      static_cast<float>(speed_mps * turn_radps * dt) + shake(5e-4),
-                                      gravity_mps2_ * static_cast<float>(dt) + shake(5e-4)},
-                  .interval_us = kStep_us},
-        {us}, with());
+    estimator.fuse(ImuSample{.dangle_b_rad = {shake(2e-5), shake(2e-5),
+                                              static_cast<float>((turn_radps + gyro_bias_radps) * dt) + shake(2e-5)},
+                             .dvelocity_b_mps = {static_cast<float>(pushed) + shake(5e-4),
+                                                 static_cast<float>(speed_mps * turn_radps * dt) + shake(5e-4),
+                                                 gravity_mps2_ * static_cast<float>(dt) + shake(5e-4)},
+                             .interval_us = kStep_us},
+                   {us}, with());
     if (wheels) {
       const double per_m = 20'000 / (2 * 3.14159265358979 * 0.1);
       left_ += (speed_mps - 0.25 * turn_radps) * dt * per_m;
@@ -142,7 +143,8 @@ class Drive {
                                  static_cast<std::uint16_t>(std::llround(right_))},
                      {us}, with());
     }
-    if (speedometer) estimator.fuse(BodySpeed{.forward_mps = static_cast<float>(speed_mps)}, {us}, with());
+    if (speedometer && (us - kBegin_us) % speedometer_every_us == 0)
+      estimator.fuse(BodySpeed{.forward_mps = static_cast<float>(speed_mps)}, {us}, with());
     if ((us - kBegin_us) % gnss_every_us == 0) receive();
     estimator.advance({us}, with(), std::vector<Sample>{});
     const InertialEstimate now = estimator.inertial(with());
@@ -193,7 +195,7 @@ class Drive {
 
   std::mt19937 engine_;
   std::normal_distribution<double> normal_;
-  std::mt19937 engine_imu_{99};  ///< of the IMU: an exact one would be a stuck one
+  std::mt19937 engine_imu_;  ///< of the IMU: an exact one would be a stuck one
   std::normal_distribution<double> normal_imu_;
   float gravity_mps2_ = 0;
   double left_ = 0, right_ = 0, last_mps_ = 1;

@@ -7,18 +7,34 @@
 namespace tetap::app {
 namespace {
 
+constexpr std::array<double, 3> kLater_s{5, 20, 40};
+
 struct Starts {
   int aligned = 0;
-  double nees = 0;  ///< of the heading, mean, so long after it was found
-  int beyond = 0;   ///< five sigma at any time
+  std::array<double, 3> nees{};  ///< of the heading, mean, so long after it was found
+  int beyond = 0;                ///< five sigma at any time
 };
 struct Way {
   bool wheels = true, forwards = true;
   double mps = 2, turn_radps = 0.05, fixes_m = 1, given_sigma_rad = 0;  ///< the last: 0, none is given
+  std::int64_t speedometer_every_us = 0;                                ///< 0: there is none
 };
 
-Starts moving(const Way& way, int seeds) {
-  constexpr double kLater_s = 5, kEnd_s = 72;
+void say_pose(Drive& d, double wrong_rad, double sigma_rad, float sigma_m = 0.5F) {
+  d.estimator.set_pose({d.us},
+                       {.pose = {.x = base::Anchored{}.plus(static_cast<float>(d.east_m)),
+                                 .y = base::Anchored{}.plus(static_cast<float>(d.north_m)),
+                                 .yaw_rad = static_cast<float>(d.yaw_rad + wrong_rad)},
+                        .sigma_position_m = sigma_m,
+                        .sigma_yaw_rad = static_cast<float>(sigma_rad)},
+                       d.with());
+}
+double drawn(unsigned seed, double sigma) {
+  std::mt19937 engine(seed);
+  return sigma * std::normal_distribution<double>()(engine);
+}
+
+Starts moving(const Way& way, int seeds, double end_s = 72) {
   Starts starts;
   for (unsigned seed = 1; seed <= static_cast<unsigned>(seeds); ++seed) {
     Numbers n = numbers();
@@ -29,51 +45,52 @@ Starts moving(const Way& way, int seeds) {
     d.turn_radps = way.turn_radps;
     d.white_m = way.fixes_m;
     d.wheels = way.wheels;
+    d.speedometer = way.speedometer_every_us > 0;
+    if (d.speedometer) d.speedometer_every_us = way.speedometer_every_us;
     d.gnss_velocity = false;
     d.yaw_rad = 0.7 * seed;
-    double found_s = kEnd_s, worst = 0, later = -1;
+    double found_s = end_s, worst = 0;
+    std::array<double, 3> later{-1, -1, -1};
     bool given = !(way.given_sigma_rad > 0);
-    while (d.time_s() < kEnd_s) {
+    while (d.time_s() < end_s && later.back() < 0) {
       d.run(0.01);
       if (!given && d.time_s() > 0.95) {  // levelled, and the first fixes were heard
         given = true;
-        std::mt19937 engine(seed);
-        const double wrong_rad = way.given_sigma_rad * std::normal_distribution<double>()(engine);
-        d.estimator.set_pose({d.us},
-                             {.pose = {.x = base::Anchored{}.plus(static_cast<float>(d.east_m)),
-                                       .y = base::Anchored{}.plus(static_cast<float>(d.north_m)),
-                                       .yaw_rad = static_cast<float>(d.yaw_rad + wrong_rad)},
-                              .sigma_position_m = 0.5F,
-                              .sigma_yaw_rad = static_cast<float>(way.given_sigma_rad)},
-                             d.with());
+        say_pose(d, drawn(seed, way.given_sigma_rad), way.given_sigma_rad);
       }
       if (!d.tracking()) continue;
       found_s = std::min(found_s, d.time_s());
       const double sigmas = d.yaw_error_rad() / d.sigma_yaw_rad();
       worst = std::max(worst, sigmas);
-      if (later < 0 && d.time_s() >= found_s + kLater_s) later = sigmas;
+      for (std::size_t i = 0; i < later.size(); ++i)
+        if (later[i] < 0 && d.time_s() >= found_s + kLater_s[i]) later[i] = sigmas;
     }
-    if (later < 0) continue;
+    if (later.back() < 0) continue;
     ++starts.aligned;
-    starts.nees += later * later;
+    for (std::size_t i = 0; i < later.size(); ++i) starts.nees[i] += later[i] * later[i];
     if (worst > 5) ++starts.beyond;
   }
-  if (starts.aligned > 0) starts.nees /= starts.aligned;
+  for (double& nees : starts.nees)
+    if (starts.aligned > 0) nees /= starts.aligned;
   return starts;
 }
 
-/// 99 % of the means of 40; modest by half may be what finds a heading.
-void expect_honest(const Way& way, int beyond, double nees = 1.66) {
+/// Of 40 a mean of 1.66 is exceeded by one in a hundred that are right; modest by half may be what finds a heading.
+void expect_honest(const Way& way, int beyond, double most = 1.66) {
   SCOPED_TRACE(testing::Message() << (way.wheels ? "wheels, " : "") << (way.forwards ? "forwards, " : "") << way.mps
                                   << " m/s, " << way.turn_radps << " rad/s, fixes of " << way.fixes_m << " m");
-  const Starts starts = moving(way, 40);
-  std::printf("  %s%s%.1f m/s, %.2f rad/s, fixes of %.1f m: aligned %d of 40, heading NEES %.2f, beyond 5 sigma %d\n",
-              way.wheels ? "wheels, " : "", way.forwards ? "forwards, " : "", way.mps, way.turn_radps, way.fixes_m,
-              starts.aligned, starts.nees, starts.beyond);
+  const Starts starts = moving(way, 40, 150);
+  std::printf(
+      "  %s%s%s%.1f m/s, %.2f rad/s, fixes of %.1f m: aligned %d of 40, heading NEES after 5, 20, 40 s %.2f %.2f "
+      "%.2f, beyond 5 sigma %d\n",
+      way.wheels ? "wheels, " : "", way.given_sigma_rad > 0 ? "given, " : "", way.forwards ? "forwards, " : "", way.mps,
+      way.turn_radps, way.fixes_m, starts.aligned, starts.nees[0], starts.nees[1], starts.nees[2], starts.beyond);
   EXPECT_EQ(starts.aligned, 40);
   EXPECT_LE(starts.beyond, beyond);
-  EXPECT_GT(starts.nees, 0.3);
-  EXPECT_LT(starts.nees, nees);
+  for (const double nees : starts.nees) {
+    EXPECT_GT(nees, 0.1);
+    EXPECT_LT(nees, most);
+  }
 }
 
 // Wheels tell how fast, not where to: linearised about the difference of two fixes they told a heading (up to 89 of 100
@@ -82,19 +99,19 @@ TEST(InertialMovingStart, WheelsWithoutGnssVelocityEndWithAnHonestHeading) {
   for (const bool forwards : {false, true})
     for (const double mps : {0.5, 2.0}) expect_honest({.forwards = forwards, .mps = mps}, 0);
   expect_honest({.mps = 2, .turn_radps = 0}, 0);
-  expect_honest({.mps = 2, .turn_radps = 0, .fixes_m = 3}, 2, 2.2);  // too sure by a third: README
+  expect_honest({.mps = 2, .turn_radps = 0, .fixes_m = 3}, 0);
   expect_honest({.mps = 2, .turn_radps = 0.2}, 0);
 }
 
-// The constraint without wheels waits until the speed is known to a fifth. (Told from the start, it made 36 of 40
-// headings too sure.)
+// The constraint without wheels waits until the speed is known. (Told from the start, it made 36 of 40 headings too
+// sure.)
 TEST(InertialMovingStart, TheConstraintAloneEndsWithAnHonestHeading) {
-  for (const double mps : {2.0, 10.0}) expect_honest({.wheels = false, .mps = mps}, 4);
+  for (const double mps : {2.0, 10.0}) expect_honest({.wheels = false, .mps = mps}, 1);
 }
 
 TEST(InertialMovingStart, NorIsAHeadingThatIsGivenInMotionMadeTooSure) {
   expect_honest({.mps = 2, .given_sigma_rad = 0.2}, 0);
-  expect_honest({.wheels = false, .mps = 2, .given_sigma_rad = 0.2}, 4);
+  expect_honest({.wheels = false, .mps = 2, .given_sigma_rad = 0.2}, 1, 2.5);  // too sure for a while: README
 }
 
 // A curve shows no heading to wheels. (The change of v in it was taken for noise and left out of the covariance: the
@@ -110,13 +127,7 @@ TEST(InertialMovingStart, CurvesTellNoHeading) {
         d.turn_radps = turn_radps;
         d.gnss_velocity = false;
         d.tamper = [fixes](Drive::Fix&) { return fixes; };
-        std::mt19937 engine(seed);
-        const double wrong_rad = 0.2 * std::normal_distribution<double>()(engine);
-        d.estimator.set_pose({d.us},
-                             {.pose = {.yaw_rad = static_cast<float>(d.yaw_rad + wrong_rad)},
-                              .sigma_position_m = 0.1F,
-                              .sigma_yaw_rad = 0.2F},
-                             d.with());
+        say_pose(d, drawn(seed, 0.2), 0.2, 0.1F);
         for (int i = 0; i < 9; ++i) {
           d.run(10);
           d.turn_radps = -d.turn_radps;
@@ -127,7 +138,7 @@ TEST(InertialMovingStart, CurvesTellNoHeading) {
       }
       std::printf("  curves of %.2f rad/s, %s: heading NEES %.2f, sigma %.1f deg\n", turn_radps,
                   fixes ? "positions alone" : "no fix", nees, sigma_rad * 57.3);
-      EXPECT_LT(nees, 1.88) << "99 % of the means";
+      EXPECT_LT(nees, 0.5) << "modest: nothing tells the bias, and here there is none";
       EXPECT_GT(sigma_rad, fixes ? 0.02 : 0.19) << "what nothing shows stays unknown";
       EXPECT_LT(sigma_rad, fixes ? 0.2 : 2.0);
     }
@@ -136,28 +147,124 @@ TEST(InertialMovingStart, CurvesTellNoHeading) {
 // What two fixes of a receiver are apart is no way.
 TEST(InertialMovingStart, ARobotThatStandsFindsNone) {
   for (const double fixes_m : {1.0, 3.0})
-    EXPECT_EQ(moving({.mps = 0, .turn_radps = 0, .fixes_m = fixes_m}, 20).aligned, 0) << fixes_m;
+    EXPECT_EQ(moving({.mps = 0, .turn_radps = 0, .fixes_m = fixes_m}, 10, 900).aligned, 0) << fixes_m;
+}
+
+// A speed that is heard once a second is a second old when the filter begins. (Left out as stale, 3 of 40 went beyond
+// five sigma at 20 m/s.)
+TEST(InertialMovingStart, ASlowSpeedometerWillDo) {
+  for (const double mps : {2.0, 20.0})
+    expect_honest({.wheels = false, .mps = mps, .speedometer_every_us = 1'000'000}, 0);
+}
+
+// What the gyroscope shows while the robot stands is no arc of its way. (Half of it went into the course: 14 deg.)
+TEST(InertialMovingStart, AGyroscopesBiasBeforeItDrivesOffIsNoCurve) {
+  for (const double bias_radps : {-0.0085, 0.0085}) {
+    constexpr int kSeeds = 40;
+    double mean_rad = 0, nees = 0;
+    for (unsigned seed = 1; seed <= kSeeds; ++seed) {
+      Numbers n = numbers();
+      n.inertial.starts_forward = 1;
+      n.inertial.gyro_turn_on_radps = 0.01F;
+      Drive d(n, seed);
+      d.wheels = d.gnss_velocity = false;
+      d.speed_mps = d.turn_radps = 0;
+      d.gyro_bias_radps = bias_radps;
+      d.yaw_rad = 0.7 * seed;
+      d.run(55);
+      ASSERT_FALSE(d.tracking());
+      d.speed_mps = 2;
+      while (d.time_s() < 120 && !d.tracking()) d.run(0.02);
+      ASSERT_TRUE(d.tracking());
+      const double yaw_rad = static_cast<double>(nav::euler(d.estimator.inertial(d.with()).state.q_nb).yaw_rad);
+      mean_rad += std::remainder(yaw_rad - d.yaw_rad, 2 * 3.14159265358979) / kSeeds;
+      nees += std::pow(d.yaw_error_rad() / d.sigma_yaw_rad(), 2) / kSeeds;
+    }
+    EXPECT_LT(std::abs(mean_rad), 0.08) << "three times what chance leaves of 40";
+    EXPECT_GT(nees, 0.42);
+    EXPECT_LT(nees, 1.66);
+  }
+}
+
+// Fixes of 3 m tell a slow robot's speed to some decimetres and never better: the constraint must not wait for that.
+TEST(InertialMovingStart, ASlowRobotHasItsConstraintToo) {
+  double mean_m = 0;
+  constexpr int kSeeds = 10;
+  for (unsigned seed = 1; seed <= kSeeds; ++seed) {
+    Numbers n = numbers();
+    n.inertial.accel_mps2_rthz = 5e-2F;
+    n.inertial.constrain_every_us = 20'000;
+    Drive d(n, seed);
+    d.wheels = d.gnss_velocity = false;
+    d.speed_mps = 0.5;
+    d.white_m = 3;
+    say_pose(d, 0, 0.05);
+    d.run(120);
+    d.tamper = [](Drive::Fix&) { return false; };
+    d.run(30);
+    EXPECT_LT(d.error_m(), 4 * d.sigma_m());
+    mean_m += d.error_m() / kSeeds;
+  }
+  EXPECT_LT(mean_m, 10.0) << "22 m where it waits";
+}
+
+// Without GNSS somebody says where it is: how it moves it knows better than at the start.
+TEST(InertialMovingStart, APlaceThatIsSaidLeavesTheSpeedKnown) {
+  for (const bool said : {false, true}) {
+    double squares_m2 = 0;
+    constexpr int kSeeds = 10;
+    for (unsigned seed = 1; seed <= kSeeds; ++seed) {
+      Numbers n = numbers();
+      n.inertial.constrain_every_us = 20'000;
+      Drive d(n, seed);
+      d.wheels = d.gnss_velocity = false;
+      d.speed_mps = 2;
+      d.run(0.95);
+      say_pose(d, 0, 0.02);
+      d.run(90);
+      d.tamper = [](Drive::Fix&) { return false; };
+      d.run(1);
+      if (said) say_pose(d, 0, 4, 3);
+      d.run(60);
+      squares_m2 += d.error_m() * d.error_m() / kSeeds;
+      EXPECT_LT(d.sigma_m(), 20.0);
+      EXPECT_LT(d.error_m(), 4 * d.sigma_m());
+    }
+    EXPECT_LT(std::sqrt(squares_m2), 12.0) << "24 to 450 m where all was begun anew";
+  }
+}
+
+// "Unknown" is no knowledge: a heading that is known worse stays so.
+TEST(InertialMovingStart, APlaceWithoutAHeadingMakesNoneSurer) {
+  Drive d(rover_like());
+  d.wheels = d.gnss_velocity = false;
+  d.speed_mps = d.turn_radps = 0;
+  d.white_m = 3;
+  d.run(3);
+  say_pose(d, 0, 0.8);
+  d.run(300);
+  const double before_rad = d.sigma_yaw_rad();
+  ASSERT_GT(before_rad, 1.2);
+  say_pose(d, 0, 4);
+  d.run(0.05);
+  EXPECT_NEAR(d.sigma_yaw_rad(), before_rad, 0.02);
 }
 
 // Half a turn after the start somebody says where it is, and neither heading nor height: those stay.
 TEST(InertialMovingStart, APlaceWithoutAHeadingLeavesItTheOneItHas) {
   Drive d(rover_like());
-  d.up_m = 0;
+  d.up_m = 30;
   d.place();
   d.run(20);
   d.turn_radps = 0.1;
   d.run(30);
-  d.up_m = 0;
-  d.estimator.set_pose({d.us},
-                       {.pose = {.x = base::Anchored{}.plus(static_cast<float>(d.east_m)),
-                                 .y = base::Anchored{}.plus(static_cast<float>(d.north_m))},
-                        .sigma_position_m = 3,
-                        .sigma_yaw_rad = 4},
-                       d.with());
+  const double height_m = d.height_error_m();
+  say_pose(d, -d.yaw_rad, 4, 3);
   d.clear();
   d.run(0.05);
   EXPECT_LT(d.yaw_error_rad(), 0.05);
   EXPECT_LT(d.sigma_yaw_rad(), 0.05);
+  EXPECT_NEAR(d.height_error_m(), height_m, 0.3);
   d.run(30);
   EXPECT_LT(d.yaw_error_rad(), 0.05);
   EXPECT_LT(d.worst_m, 1.5);

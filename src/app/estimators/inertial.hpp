@@ -41,13 +41,16 @@ class Inertial {
                    s.sigma_position_m, s.sigma_yaw_rad);
   }
   void set_pose(base::Micros, const SetPose& given, const Context& with) {
-    if (phase_ == Phase::kTracking) start_.stay(ins_.x, base::sqrt(heading_rad2()));
+    if (phase_ == Phase::kTracking) start_.stay(ins_.x, base::sqrt(ins_.p(8, 8)));
     start_.place(given.pose, given.sigma_position_m, given.sigma_yaw_rad);
     place_.forget();
     height_.forget();
     drift_.forget();
     back_ = false;
-    if (phase_ == Phase::kTracking) begin(with);
+    if (phase_ != Phase::kTracking) return;
+    if (InertialStart::is_heading(given.sigma_yaw_rad)) return begin(with);
+    ins_.place(given.pose.x, given.pose.y, given.sigma_position_m);
+    is_elsewhere();
   }
 
   Innovation fuse(const ImuSample& sample, base::Micros stamp, const Context& with);
@@ -122,6 +125,7 @@ class Inertial {
                   .gyro_scale = n.gyro_scale};
   }
   void begin(const Context& with);
+  void is_elsewhere();
   void begin_anew(base::Micros t, can::ResetCause cause, const Context& with);
   /// Something was taken anew that moves nothing at once: the sizes stay those of the last step.
   void say(can::ResetCause cause) {

@@ -88,8 +88,10 @@ class InertialStart {
   void place(const model::PlanarPose& pose, float sigma_m, float sigma_yaw_rad) {
     at_ = {.x = pose.x, .y = pose.y, .z = at_.z, .sigma_horizontal_m = sigma_m, .sigma_vertical_m = 10.0F};
     placed_ = given_ = true;
-    if (sigma_yaw_rad < 1.0F) heading(pose.yaw_rad, sigma_yaw_rad);
+    if (is_heading(sigma_yaw_rad)) heading(pose.yaw_rad, sigma_yaw_rad);
   }
+  /// Of a pose: else it says a place alone.
+  static constexpr bool is_heading(float sigma_yaw_rad) { return sigma_yaw_rad < 1.0F; }
   void fix(const model::GnssFix3d& fix, base::Micros stamp, const Numbers& numbers) {
     const float dt_s = base::seconds(stamp - fixed_at_);
     if (fixed_ && !given_ && !has_velocity_ && dt_s > 0.01F && dt_s < 5.0F) {  // between the last two fixes
@@ -100,22 +102,30 @@ class InertialStart {
     fixed_at_ = stamp;
     const float yaw = nav::euler(turned_).yaw_rad, turned = base::wrap_angle(yaw - first_yaw_rad_);
     const bool arc_ends = base::abs(turned) > kArc_rad;
+    bool far = false, near = true;
     if (numbers.inertial.starts_forward != 0 && fixed_ && !headed_) {
-      const float east = fix.x.minus(first_x_), north = fix.y.minus(first_y_);
-      // Far beyond what two fixes of a robot that stands are ever apart, for it is asked at every fix. At the end of
-      // an arc, a way that is shorter but long enough, too.
+      const float east = fix.x.minus(first_x_), north = fix.y.minus(first_y_), gone2 = east * east + north * north;
+      // Far beyond what two fixes of a robot that stands are ever apart, and twice, for it is asked at every fix. At
+      // the end of an arc, a way that is shorter but long enough, too.
       const float share = arc_ends ? 0.25F : 1.0F;
       const float distance = share * numbers.gnss.align_distance_m, noise = 6.0F * fix.sigma_horizontal_m;
       const float needed = distance > noise ? distance : noise;
-      if (east * east + north * north > needed * needed) course(east, north, 1.5F * fix.sigma_horizontal_m, turned);
+      far = gone2 > needed * needed && base::abs(turned) < 2.0F * kArc_rad;
+      near = gone2 < 0.1F * noise * noise;
+      way_s_ += dt_s;
+      if (far && far_) {
+        const float bias_rad = 0.5F * numbers.inertial.gyro_turn_on_radps * way_s_;
+        course(east, north, 1.5F * fix.sigma_horizontal_m, turned, bias_rad);
+      }
     }
-    if (!headed_ && !has_velocity_)
+    if (!headed_ && !has_velocity_ && !far)  // a fix as far as that is a course at the next, or an outlier
       finder_.fuse_position(fix.x, fix.y, fix.sigma_horizontal_m, {fix.antenna_b_m(0), fix.antenna_b_m(1)});
-    if (!fixed_ || arc_ends) {
-      first_x_ = fix.x, first_y_ = fix.y;
-      first_yaw_rad_ = yaw;
-    }
-    fixed_ = true;
+    const bool anew = !fixed_ || (arc_ends && far == far_);
+    if (anew) first_x_ = fix.x, first_y_ = fix.y;
+    // What the gyroscope shows before it has gone anywhere is its bias, or a turn on the spot: no arc.
+    if (anew || near) first_yaw_rad_ = yaw, way_s_ = 0;
+    far_ = far && !anew;
+    fixed_ = heard_ = true;
     if (given_ && headed_ && at_.sigma_horizontal_m < fix.sigma_horizontal_m) {  // a pose from outside that is better
       at_.z = fix.z;
       at_.sigma_vertical_m = fix.sigma_vertical_m;
@@ -136,7 +146,7 @@ class InertialStart {
     if (speed2 > 0.25F + 9.0F * sigma_mps * sigma_mps) given_ = false;  // it has gone from where it was said to be
     if (headed_) return;
     if (n.inertial.starts_forward != 0 && speed2 > 1.0F && speed2 > 100.0F * sigma_mps * sigma_mps)
-      return course(v_n_mps(0), v_n_mps(1), sigma_mps, 0.0F);
+      return course(v_n_mps(0), v_n_mps(1), sigma_mps);
     finder_.fuse_velocity(v_n_mps(0), v_n_mps(1), sigma_mps, {n.gnss.antenna_x_b_m, n.gnss.antenna_y_b_m});
   }
   void heading(float yaw_rad, float sigma_rad) {
@@ -155,8 +165,8 @@ class InertialStart {
   [[nodiscard]] const nav::Quaternion& attitude() const { return turned_; }
   [[nodiscard]] bool levelling() const { return levelled_s_ > 0.0F; }
   [[nodiscard]] bool placed() const { return placed_; }
-  /// Fixes come, and will tell how it moves.
-  [[nodiscard]] bool fixed() const { return fixed_; }
+  /// They will tell how it moves.
+  [[nodiscard]] bool hears_fixes() const { return heard_; }
   [[nodiscard]] bool ready() const { return placed_ && headed_; }
 
   /// Starts the filter; `again`: it ran before, so tilt and biases are its own. rolled_mps: forward, by wheels; NaN:
@@ -176,7 +186,7 @@ class InertialStart {
     // Wheels may slip. Sideways three times what the heading makes of the speed, for the two are not correlated here
     // and the constraint would take the rest for knowledge of the heading. A pose that was said says nothing of speed.
     const float sideways_mps = rolls ? 3.0F * sigma_yaw_rad_ * rolled_mps : 0.0F;
-    const bool unseen = !again && !has_velocity_ && given_ && fixed_;
+    const bool unseen = !again && !has_velocity_ && given_ && heard_;
     const float own_mps = rolls ? kSlip_mps : unseen ? kUnseen_mps : sigma_v_mps_;
     const float speed = own_mps * own_mps + sideways_mps * sideways_mps;
     const float climb = sigma_climb_mps_ * sigma_climb_mps_;
@@ -199,13 +209,15 @@ class InertialStart {
     sink(first_x_.um());
     sink(first_y_.um());
     sink(first_yaw_rad_);
+    sink(way_s_);
     sink(at_.z.um());
     sink(at_.sigma_horizontal_m);
     sink(at_.sigma_vertical_m);
     sink(fixed_at_.us);
     finder_.each_bit(sink);
     sink(static_cast<std::uint32_t>((placed_ ? 1U : 0U) | (headed_ ? 2U : 0U) | (fixed_ ? 4U : 0U) |
-                                    (given_ ? 8U : 0U) | (has_velocity_ ? 16U : 0U) | (watches_ ? 32U : 0U)));
+                                    (given_ ? 8U : 0U) | (has_velocity_ ? 16U : 0U) | (watches_ ? 32U : 0U) |
+                                    (heard_ ? 64U : 0U) | (far_ ? 128U : 0U)));
   }
 
  private:
@@ -217,32 +229,35 @@ class InertialStart {
     return axis * (base::atan2(s, up(2)) / s);
   }
   /// Forward is the way it goes, or went: of an arc the chord points where the middle did.
-  void course(float east, float north, float sigma, float turned_rad) {
+  void course(float east, float north, float sigma, float turned_rad = 0.0F, float bias_rad = 0.0F) {
     const float length = base::sqrt(east * east + north * north);  // of a velocity, or of a way
     constexpr float kSlip_rad = 0.1F;                              // a crab's walk
     const float uneven_rad = 0.25F * turned_rad;                   // not all of a way is an arc
     const model::GnssCourse course(east / length, north / length, sigma / length,
-                                   base::sqrt(kSlip_rad * kSlip_rad + uneven_rad * uneven_rad));
+                                   base::sqrt(kSlip_rad * kSlip_rad + uneven_rad * uneven_rad + bias_rad * bias_rad));
     heading(base::wrap_angle(course.angle_rad + 0.5F * turned_rad), course.sigma_rad);
   }
 
+  static constexpr float kArc_rad = 0.5F;     ///< of a way that turns more the chord is no course
+  static constexpr float kFastest_mps = 200;  ///< no wheels roll faster: a reading that is broken
+  static constexpr float kSlip_mps = 3;       ///< 1 sigma of wheels that slip or were read a second ago
+  static constexpr float kUnseen_mps = 15, kUnseenClimb_mps = 5;  ///< of what nothing was heard; as YawFinder has it
+
   nav::Quaternion turned_;
-  float levelled_s_ = 0;
   model::GnssFix3d at_;
-  base::Anchored first_x_, first_y_;  ///< where the way begins whose chord is the course
-  float first_yaw_rad_ = 0;
-  nav::Vector3 v_n_mps_ = nav::Vector3::Zero();
-  static constexpr float kUnseenClimb_mps = 5;
-  static constexpr float kArc_rad = 0.5F;  ///< of a way that turns more the chord is no course
-  float sigma_v_mps_ = 3, sigma_climb_mps_ = 3;
-  static constexpr float kFastest_mps = 200;               ///< no wheels roll faster: a reading that is broken
-  static constexpr float kSlip_mps = 3, kUnseen_mps = 15;  ///< 1 sigma, as YawFinder has it
   base::Micros fixed_at_;
+  nav::YawFinder finder_;
+  base::Anchored first_x_, first_y_;     ///< where the way begins whose chord is the course,
+  float first_yaw_rad_ = 0, way_s_ = 0;  ///< how it looked there, and how long ago that was
+  nav::Vector3 v_n_mps_ = nav::Vector3::Zero();
+  float sigma_v_mps_ = 3, sigma_climb_mps_ = 3;
+  float levelled_s_ = 0;
   float yaw_rad_ = 0, level_yaw_rad_ = 0, sigma_yaw_rad_ = 3;  ///< the second: of turned_, when the first was found
   bool placed_ = false, headed_ = false, fixed_ = false, has_velocity_ = false;
-  nav::YawFinder finder_;
+  bool heard_ = false;    ///< fixes were
   bool watches_ = false;  ///< it runs beside the filter, or did
   bool given_ = false;    ///< where it is was said, not found
+  bool far_ = false;      ///< the last fix was as far as a course needs
 };
 
 }  // namespace tetap::app

@@ -172,8 +172,9 @@ inline bool Inertial::wheels_agree(base::Micros at, const Context& with) const {
 inline void Inertial::constrain(base::Micros stamp, const Context& with) {
   const base::Micros every{with.numbers.inertial.constrain_every_us};
   if (every.us <= 0 || stamp - constrained_ < every || !can_do(stamp - constrained_, every)) return;
-  // Of a start in motion: before its speed is known, each that is believed meanwhile would tell another heading.
-  constexpr float kKnown_mps = 0.2F, kShare = 0.2F;
+  // Of a start in motion: before its speed is known, each that is believed meanwhile would tell another heading. (By
+  // 0.7 m/s that of a slow robot is known soon; without any bound a start at 10 m/s ends 60 degrees off.)
+  constexpr float kKnown_mps = 0.7F, kShare = 0.2F;
   const float known2 = kKnown_mps * kKnown_mps + kShare * kShare * ins_.x.v_n_mps.squaredNorm();
   speed_known_ = speed_known_ || ins_.p(3, 3) + ins_.p(4, 4) < known2;
   if (!speed_known_) return;
