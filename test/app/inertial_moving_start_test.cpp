@@ -193,6 +193,7 @@ TEST(InertialMovingStart, ASlowRobotHasItsConstraintToo) {
   for (unsigned seed = 1; seed <= kSeeds; ++seed) {
     Numbers n = numbers();
     n.inertial.accel_mps2_rthz = 5e-2F;
+    n.inertial.gyro_radps_rthz = 2e-3F;
     n.inertial.constrain_every_us = 20'000;
     Drive d(n, seed);
     d.wheels = d.gnss_velocity = false;
