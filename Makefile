@@ -13,6 +13,14 @@ LOG   ?=
 TRUTH ?=
 export ROBOT BOARD BUS SEED FAULT REALTIME LOG TRUTH
 
+# A misspelt name would be taken for the default without a word: FALUT=gnss_jump would run another world than its user thinks.
+settings := ROBOT BOARD BUS SEED FAULT REALTIME LOG TRUTH OUT WORLD PLAY REPORT TETAP_DATA
+given := $(foreach name,$(.VARIABLES),$(if $(findstring command line,$(origin $(name))),$(name)))
+unknown := $(filter-out $(settings) TETAP_% WITH_VCAN_% CMAKE_% CTEST_% CCACHE_% TMPDIR,$(given))
+ifneq ($(unknown),)
+$(error no setting $(unknown); there are: $(settings))
+endif
+
 .PHONY: help sim test quick proof replay firmware size heap stack count bits check dbc setup host programs arm
 
 help: ## this list

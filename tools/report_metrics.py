@@ -97,12 +97,17 @@ def faults(run):
     return [Fault(one) for one in text.split(",") if one.strip()] if isinstance(text, str) and text != "none" else []
 
 
+CALENDAR_S = 1e6  # eleven days: no node counts that far, a log whose stamps are of the calendar begins beyond it
+
+
 def start_s(run):
-    """When a simulated world's run began on the node's clock; 0 where the log has no other time than the node's."""
-    if "seed" not in run.about:
-        return 0.0
+    """What pictures and words count from: the start of a simulated world's run on the node's clock; the first estimate where a log's stamps are
+    seconds since 1970, of which nobody can read the last four digits on an axis; else 0, the node's own time."""
     first = int(np.argmin(run.estimates["epoch"]))
-    return float(run.estimates["time_s"][first] - run.estimates["epoch"][first] * TICK_S)
+    time_s = float(run.estimates["time_s"][first])
+    if "seed" in run.about:
+        return time_s - float(run.estimates["epoch"][first]) * TICK_S
+    return time_s if time_s > CALENDAR_S else 0.0
 
 
 def fault_spans(run):

@@ -157,6 +157,7 @@ refused "replay for no such robot" "no robot 'tank'" env LOG="$work/good.log" BU
 refused "replay for no such robot over a bus" "no robot 'tank'; $robots" timeout 20 env LOG="$work/good.log" ROBOT=tank OUT="$work/out" tools/replay
 refused "sim for no such robot over a bus" "no robot 'tank'; $robots" timeout 20 env ROBOT=tank OUT="$work/out" tools/sim
 refused "sim for no such robot on a board" "no robot 'tank'; $robots" timeout 20 env ROBOT=tank BOARD=zynqmp_r5 OUT="$work/out" tools/sim
+refused "a misspelt setting" 'no setting FALUT; there are: ROBOT .*FAULT' make -s FALUT=gnss_jump help
 refused "sim from seed -1" "--seed .*'-1'" env BUS=memory SEED=-1 OUT="$work/out" tools/sim
 # An image is built before it is started: a cmake that only notes what it is asked for, and fails.
 mkdir "$work/bin"

@@ -326,6 +326,16 @@ class Faults(Case):
         self.write("run.json", json.dumps(about))
         self.assertEqual(metrics.start_s(metrics.Run(self.directory)), 0.0)
 
+    def test_a_log_with_stamps_of_the_calendar_is_shown_from_its_first_estimate_and_says_which_that_is(self):
+        time_s, zero = 1763900000.25 + 0.01 * np.arange(300), np.zeros(300)
+        self.estimates(time_s, zero, zero, zero)
+        self.write_rows("status.csv", metrics.STATUS, [[n, time_s[n], 4 if 100 <= n < 200 else 3, 1, 2 if 100 <= n < 200 else 0, 0, 0] for n in range(10, 300, 10)])
+        self.write("run.json", json.dumps({key: value for key, value in RUN.items() if key != "seed"}))
+        self.assertEqual(self.report().returncode, 0)
+        page = text_of(self.path("report.html"))
+        self.assertIn('<td>1.0 s</td><td class="text">fault Rejecting, for 1.0 s</td>', page)
+        self.assertIn("1763900000.250000 s on the log", page)
+
     def test_no_fault_is_no_line(self):
         zero = np.zeros(20)
         for none in ("", "none"):
