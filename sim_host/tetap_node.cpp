@@ -3,8 +3,8 @@
 #include "app/firmware.hpp"
 #include "hal/port/linux/board.hpp"
 #include "hal/port/support/boot_line.hpp"
-#include "sim_host/in_process.hpp"
 #include "sim_host/play/arguments.hpp"
+#include "sim_host/robots.hpp"
 #include "version.hpp"
 
 #include <csignal>

@@ -3,6 +3,7 @@
 #include "sim_host/in_process.hpp"
 #include "sim_host/numbers_words.hpp"
 #include "sim_host/play/play.hpp"
+#include "sim_host/robots.hpp"
 
 #include <cstdio>
 #include <exception>

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "sim_host/in_process.hpp"
+
+#include "app/firmware.hpp"
+#include "sim_host/robots.hpp"
+#include "version.hpp"
+
+#include <memory>
+
+namespace tetap::sim {
+
+int with_node_in_process(const std::string& robot, std::uint32_t can_base,
+                         const std::function<int(InProcessLink&)>& play) {
+  int status = 2;
+  for_robot(robot, [&]<class Estimators>(std::type_identity<Estimators>, app::Numbers numbers) {
+    numbers.can_base = can_base;
+    hal::MemoryBus bus;
+    hal::MemoryBoard board(bus);
+    const auto firmware = std::make_unique<app::Firmware<hal::MemoryBoard, Estimators>>(board, numbers, kVersion);
+    InProcessLink link(bus, [&firmware] { firmware->poll(); });
+    status = play(link);
+  });
+  return status;
+}
+
+}  // namespace tetap::sim
