@@ -97,7 +97,7 @@ def faults(run):
     return [Fault(one) for one in text.split(",") if one.strip()] if isinstance(text, str) and text != "none" else []
 
 
-CALENDAR_S = 1e6  # eleven days: no node counts that far, a log whose stamps are of the calendar begins beyond it
+CALENDAR_S = 1e6  # eleven days: stamps beyond are of the calendar, or of a node that nobody wants to read from its start either
 
 
 def start_s(run):

@@ -89,7 +89,8 @@ class Ins {
     return step;
   }
 
-  /// Where it is was said: what else it knows stays.
+  /// Somebody said where it is in the plane (1 sigma per axis, metres): that is no longer correlated with anything, all
+  /// else that it knows stays.
   void place(const base::Anchored& east, const base::Anchored& north, float sigma_m) {
     x.x = east, x.y = north;
     for (const int i : {InsState::kPosition, InsState::kPosition + 1}) {

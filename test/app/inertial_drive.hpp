@@ -73,7 +73,8 @@ class Drive {
   /// What the world does to a fix; false: it does not come.
   struct Fix {
     double east_m = 0, north_m = 0, up_m = 0;
-    bool repeated = false;  ///< the last one again
+    float east_off_mps = 0;  ///< of the velocity that comes with it
+    bool repeated = false;   ///< the last one again
   };
   std::function<bool(Fix&)> tamper = [](Fix&) { return true; };
 
@@ -177,6 +178,7 @@ class Drive {
         .v_n_mps = {static_cast<float>(east_mps) + noise(), static_cast<float>(north_mps) + noise(), noise()},
         .acc_mps = 0.05F};
     if (!tamper(fix)) return;
+    velocity.v_n_mps[0] += fix.east_off_mps;
     const double cosine = std::cos(24'131'350'000 * 2e-9 * 3.14159265358979 / 180);
     const auto sigma = static_cast<float>(std::hypot(white_m, lasting_m));
     if (!fix.repeated) {

@@ -40,6 +40,26 @@ TEST(Glitch, AJumpIsRefusedAndTheFixesAfterItAreRightAtOnce) {
   }
 }
 
+TEST(Glitch, AVelocityThatIsOffIsRefusedAndMovesNothing) {
+  for (const bool wheels : {true, false}) {
+    Drive d = settled();
+    d.wheels = wheels;
+    d.tamper = between(d, 60, 63, [](Drive::Fix& fix, double) { fix.east_off_mps = 5; });
+    while (d.time_s() < 62.7) {
+      d.run(0.2);
+      if (d.time_s() < 60.3) continue;
+      EXPECT_EQ(d.last_velocity.verdict, can::Verdict::kRejected) << d.time_s();
+      EXPECT_GT(d.last_velocity.nis, 5 * d.last_velocity.gate);
+    }
+    EXPECT_EQ(d.counted('R'), 0) << "its places are right: " << d.verdicts;
+    d.run(5);
+    EXPECT_EQ(d.last_velocity.verdict, can::Verdict::kAccepted);
+    EXPECT_EQ(d.estimator.jump().count, 0);
+    EXPECT_LT(d.worst_m, 0.6) << (wheels ? "wheels" : "no wheels");
+    EXPECT_LT(d.worst_sigmas, kHonest);
+  }
+}
+
 TEST(Glitch, AJumpThatPersistsIsTakenWithItsSizeAndCount) {
   Drive d = settled();
   d.tamper = between(d, 60, 1e9, [](Drive::Fix& fix, double) { fix.east_m += 100, fix.north_m -= 40; });

@@ -29,6 +29,14 @@ inline Innovation Inertial::fuse(const OutsideHeading& heading, base::Micros sta
   return measure(direction, kHeadings, n.gate_scale, stamp, with);
 }
 
+[[gnu::noinline]] inline bool Inertial::agrees(const SetPose& given) {
+  constexpr float kSmall_rad = 0.3F;  // what is turned further than that no linear step turns rightly
+  if (!(ins_.p(8, 8) < kSmall_rad * kSmall_rad)) return false;
+  const model::DirectionMeasurement ahead =
+      model::DualHeading({1.0F, 0.0F, 0.0F}, given.pose.yaw_rad, given.sigma_yaw_rad);
+  return update(ahead, filter::chi_square_99(1)).verdict == filter::Verdict::kAccepted;
+}
+
 /// The errors of a magnetometer last, so its headings never make the filter's better than sigma_rad: each is given the
 /// variance that would end there. While the heading is better known already, they are compared and nothing more.
 [[gnu::noinline]] inline Innovation Inertial::fuse(const MagneticFlux& flux, base::Micros stamp, const Context& with) {

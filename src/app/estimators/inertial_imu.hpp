@@ -168,19 +168,18 @@ inline std::uint16_t Inertial::faults() const {
 inline void Inertial::begin(const Context& with) {
   if (with.site.origin != can::OriginSource::kNone)
     ins_.earth = nav::Earth::at(with.site.frame, with.numbers.inertial.earth_rate != 0);
-  constexpr base::Micros kLately{1'500'000};  // a speedometer may be as slow as that
-  const bool rolls = rolled_.us > 0 && time_ - rolled_ < kLately;
-  start_.begin(ins_, with.numbers.inertial, phase_ == Phase::kTracking, rolls ? rolled_mps_ : base::kNan);
+  start_.begin(ins_, with.numbers.inertial, phase_ == Phase::kTracking, alone(time_) ? base::kNan : rolled_mps_);
   phase_ = Phase::kTracking;
   speed_known_ = !start_.hears_fixes();
   still_.s = waiting_.s = 0;
   gained_mps_ = base::kNan;
+  refused_ = {};
   is_elsewhere();
 }
-/// What was refused was so by where it was believed to be.
+/// Places and heights that were refused were so by where it was believed to be.
 inline void Inertial::is_elsewhere() {
   last_position_ = time_;
-  refused_ = {};
+  refused_[kPosition] = refused_[kHeight] = {};
   work_left_ = 0;     // the covariance is looked at from end to end
   corrected_ = 0xFF;  // and where it is now has to be known at once
 }

@@ -165,7 +165,7 @@ class InertialStart {
   [[nodiscard]] const nav::Quaternion& attitude() const { return turned_; }
   [[nodiscard]] bool levelling() const { return levelled_s_ > 0.0F; }
   [[nodiscard]] bool placed() const { return placed_; }
-  /// They will tell how it moves.
+  /// Fixes came before the filter began: later ones will tell how it moves.
   [[nodiscard]] bool hears_fixes() const { return heard_; }
   [[nodiscard]] bool ready() const { return placed_ && headed_; }
 
@@ -241,7 +241,7 @@ class InertialStart {
   static constexpr float kArc_rad = 0.5F;     ///< of a way that turns more the chord is no course
   static constexpr float kFastest_mps = 200;  ///< no wheels roll faster: a reading that is broken
   static constexpr float kSlip_mps = 3;       ///< 1 sigma of wheels that slip or were read a second ago
-  static constexpr float kUnseen_mps = 15, kUnseenClimb_mps = 5;  ///< of what nothing was heard; as YawFinder has it
+  static constexpr float kUnseen_mps = 15, kUnseenClimb_mps = 5;  ///< 1 sigma of what nothing was heard
 
   nav::Quaternion turned_;
   model::GnssFix3d at_;

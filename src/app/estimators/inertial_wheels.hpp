@@ -172,11 +172,13 @@ inline bool Inertial::wheels_agree(base::Micros at, const Context& with) const {
 inline void Inertial::constrain(base::Micros stamp, const Context& with) {
   const base::Micros every{with.numbers.inertial.constrain_every_us};
   if (every.us <= 0 || stamp - constrained_ < every || !can_do(stamp - constrained_, every)) return;
-  // Of a start in motion: before its speed is known, each that is believed meanwhile would tell another heading. (By
-  // 0.7 m/s that of a slow robot is known soon; without any bound a start at 10 m/s ends 60 degrees off.)
-  constexpr float kKnown_mps = 0.7F, kShare = 0.2F;
-  const float known2 = kKnown_mps * kKnown_mps + kShare * kShare * ins_.x.v_n_mps.squaredNorm();
-  speed_known_ = speed_known_ || ins_.p(3, 3) + ins_.p(4, 4) < known2;
+  // Of a start in motion: linearised about a speed and a heading that are both in doubt it leaves out the product of
+  // the two doubts. While that is more than the mean of its noise over some samples, what is left out would be taken
+  // for a heading.
+  constexpr float kMean_s = 0.04F;
+  const float lateral = with.numbers.inertial.lateral_mps;
+  const float mean2 = lateral * lateral * base::seconds(every) / kMean_s;
+  speed_known_ = speed_known_ || (ins_.p(3, 3) + ins_.p(4, 4)) * ins_.p(8, 8) < mean2;
   if (!speed_known_) return;
   // That it does not move sideways says nothing for wheels that spin.
   const Refused spinning = refused_[kWheels];
