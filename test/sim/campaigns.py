@@ -148,9 +148,7 @@ def matched(case, checks):
     for what, one in {"pose": fused, **fused["blocks"]}.items():
         slack = 3 * MODEL_SHARE + one["anees"]["mean_plus_minus"]
         checks.bound(f"matched: NEES of {what}, mean (3)", one["anees"]["mean"], 3 - slack, 3 + slack)
-        # A position's errors last for minutes, so one campaign's share of it is chance more than anything (README: 69 % of the first hundred
-        # seeds, 91 and 96 % in the mean of ten campaigns each): held where it is, as the pose's, in which it is most.
-        if one.get("by_chance") and what != "position":
+        if one.get("by_chance"):
             # All but 5 % of right filters have more than `least`: twice as far from their median is none of them.
             chance = one["by_chance"]
             checks.bound(f"matched: times inside 95 % of the NEES of {what} [%]", 100 * one["anees"]["inside"],
