@@ -65,11 +65,13 @@ class Ins {
     if (!(pending_.dt_s > 0.0F)) return;
     InsCovarianceStep<float> step =
         noise_over(pending_, pending_.dt_s, turned_.turn(pending_turn_rad(), noise.gyro_scale));
-    x.b_a_mps2 *= step.keep_b_a;
-    x.b_g_radps *= step.keep_b_g;
+    if (step.keep_b_a < 1.0F) x.b_a_mps2 *= step.keep_b_a;
+    if (step.keep_b_g < 1.0F) x.b_g_radps *= step.keep_b_g;
     if (noise.motion_sigma > 0.0F) keep_motion(step);
     const auto passed = static_cast<std::uint16_t>(pending_.dt_s < 1.0F ? pending_.dt_s * kHeldPerS : kHeld);
     held_ = held_ > passed ? static_cast<std::uint16_t>(held_ - passed) : std::uint16_t{0};
+    constexpr int kTilt = InsState::kAttitude, kBiasUp = InsState::kAccelBias + 2;
+    p(kBiasUp, kBiasUp) += tilt_to_bias(p(kTilt, kTilt) + p(kTilt + 1, kTilt + 1)) * step.dt_s;
     nav::predict_covariance(p, step);
     pending_ = {};
     maintain();
@@ -265,10 +267,10 @@ class Ins {
   /// horizontal part of dv in F shrinks by the share of its energy that noise explains (James & Stein 1961). Not where
   /// v is held in the body: there that noise is taken back, and of a gentle curve every sample alone passes for noise.
   void keep_motion(InsCovarianceStep<float>& step) const {
+    if (held_ > 0 && !stands) return;
     const float energy = step.dv_n_mps(0) * step.dv_n_mps(0) + step.dv_n_mps(1) * step.dv_n_mps(1);
     const float explained = noise.motion_sigma * noise.motion_sigma * step.var_v;
-    const float moved = held_ > 0 ? 1.0F : energy > explained ? 1.0F - explained / energy : 0.0F;
-    const float share = stands ? 0.0F : moved;
+    const float share = !stands && energy > explained ? 1.0F - explained / energy : 0.0F;
     step.dv_n_mps(0) *= share;
     step.dv_n_mps(1) *= share;
     if (stands) step.dv_n_mps(2) = earth.gravity_mps2 * step.dt_s;
@@ -285,6 +287,16 @@ class Ins {
 
   void note_conditioned() {
     if (conditioned_ < 0xFFFF) ++conditioned_;
+  }
+
+  /// What F leaves out of a tilt that is off: gravity's g / 2 (theta_x^2 + theta_y^2) upward, which lasts as long as
+  /// the tilt is off and passes for bias. Its variance, g^2 / 2 (P_xx + P_yy)^2, comes in every 1.5 s, about as long as
+  /// the filter remembers that bias. (Without: its NEES, given the other two, 1.7 of 1 at the first standstill.)
+  static float tilt_to_bias(float tilt_rad2) {
+    constexpr float kMost_rad2 = 0.02F;     // beyond no tilt is small
+    constexpr float kDensity_mps2 = 5.66F;  // g / sqrt(2 x 1.5 s), per rad^2
+    const float small = tilt_rad2 < kMost_rad2 ? tilt_rad2 : kMost_rad2;
+    return kDensity_mps2 * kDensity_mps2 * (small * small);
   }
 
   Pending pending_{};

@@ -48,7 +48,7 @@ class Inertial {
     drift_.forget();
     back_ = false;
     if (phase_ != Phase::kTracking) return;
-    if (InertialStart::is_heading(given.sigma_yaw_rad) && !agrees(given)) return begin(with);
+    if (InertialStart::is_heading(given.sigma_yaw_rad) && !take_heading(given)) return begin(with);
     ins_.place(given.pose.x, given.pose.y, given.sigma_position_m);
     is_elsewhere();
   }
@@ -143,7 +143,7 @@ class Inertial {
   [[nodiscard]] bool looks_wrong(const nav::Vector3& v_b_mps, float level_mps, float sigma_mps, base::Micros stamp,
                                  const Context& with);
   /// A heading that is said and does not contradict the filter's own is a measurement: all else that it knows stays.
-  [[nodiscard]] bool agrees(const SetPose& given);
+  [[nodiscard]] bool take_heading(const SetPose& given);
   /// Neither wheels nor a speedometer, which may be as slow as one reading a second, were heard of late.
   [[nodiscard]] bool alone(base::Micros at) const { return rolled_.us == 0 || at - rolled_ >= base::Micros{1'500'000}; }
   [[nodiscard]] bool contradicted(base::Micros stamp, const Context& with);

@@ -29,7 +29,7 @@ inline Innovation Inertial::fuse(const OutsideHeading& heading, base::Micros sta
   return measure(direction, kHeadings, n.gate_scale, stamp, with);
 }
 
-[[gnu::noinline]] inline bool Inertial::agrees(const SetPose& given) {
+[[gnu::noinline]] inline bool Inertial::take_heading(const SetPose& given) {
   constexpr float kSmall_rad = 0.3F;  // what is turned further than that no linear step turns rightly
   if (!(ins_.p(8, 8) < kSmall_rad * kSmall_rad)) return false;
   const model::DirectionMeasurement ahead =
