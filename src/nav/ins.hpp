@@ -70,8 +70,7 @@ class Ins {
     if (noise.motion_sigma > 0.0F) keep_motion(step);
     const auto passed = static_cast<std::uint16_t>(pending_.dt_s < 1.0F ? pending_.dt_s * kHeldPerS : kHeld);
     held_ = held_ > passed ? static_cast<std::uint16_t>(held_ - passed) : std::uint16_t{0};
-    constexpr int kTilt = InsState::kAttitude, kBiasUp = InsState::kAccelBias + 2;
-    p(kBiasUp, kBiasUp) += tilt_to_bias(p(kTilt, kTilt) + p(kTilt + 1, kTilt + 1)) * step.dt_s;
+    doubt_bias_up(step.dt_s);
     nav::predict_covariance(p, step);
     pending_ = {};
     maintain();
@@ -289,14 +288,20 @@ class Ins {
     if (conditioned_ < 0xFFFF) ++conditioned_;
   }
 
-  /// What F leaves out of a tilt that is off: gravity's g / 2 (theta_x^2 + theta_y^2) upward, which lasts as long as
-  /// the tilt is off and passes for bias. Its variance, g^2 / 2 (P_xx + P_yy)^2, comes in every 1.5 s, about as long as
-  /// the filter remembers that bias. (Without: its NEES, given the other two, 1.7 of 1 at the first standstill.)
-  static float tilt_to_bias(float tilt_rad2) {
-    constexpr float kMost_rad2 = 0.02F;     // beyond no tilt is small
-    constexpr float kDensity_mps2 = 5.66F;  // g / sqrt(2 x 1.5 s), per rad^2
+  /// What F leaves out of a tilt that is off: what was levelled by an accelerometer leans by what that errs, and to
+  /// second order that is g/2 (theta_x^2 + theta_y^2) upward, for as long as it leans, and passes for bias. Its mean
+  /// square, g^2 / 2 (P_xx + P_yy)^2 where both axes are alike, comes in every 1.5 s, about as long as the filter
+  /// remembers that bias, but adds up to no more than some of it. (Without: the bias's NEES, given the other two, 1.7
+  /// of 1 at the first standstill.) Up is the body's: where it leans far, the doubt is in the wrong axis.
+  void doubt_bias_up(float dt_s) {
+    constexpr float kMost_rad2 = 0.02F;  // beyond no tilt is small
+    constexpr float kOff_mps2 = 6.934F;  // sqrt(g^2 / 2), per rad^2
+    constexpr float kAddsUp = 10, kOver_s = 1.5F;
+    constexpr int kTilt = InsState::kAttitude, kUp = InsState::kAccelBias + 2;
+    const float tilt_rad2 = p(kTilt, kTilt) + p(kTilt + 1, kTilt + 1);
     const float small = tilt_rad2 < kMost_rad2 ? tilt_rad2 : kMost_rad2;
-    return kDensity_mps2 * kDensity_mps2 * (small * small);
+    const float most = kAddsUp * kOff_mps2 * kOff_mps2 * (small * small);
+    if (p(kUp, kUp) < most) p(kUp, kUp) += most * (dt_s * (1.0F / (kAddsUp * kOver_s)));
   }
 
   Pending pending_{};

@@ -155,12 +155,12 @@ TEST(InsConsistency, MatchedWorldHasTheErrorsTheFilterSays) {
 }
 
 // Levelled by gravity, it leans by what its accelerometer errs. To first order that shows in no vertical velocity, to
-// second order it does, for as long as it leans. (Without the second order in its noise the NEES of the bias was 4.8.)
+// second order it does, for as long as it leans. (Without the second order in its noise the NEES of the bias was 4.5.)
 TEST(InsConsistency, WhatATiltHidesIsNotTakenForAVerticalBias) {
-  constexpr int kRuns = 200;
+  constexpr int kRuns = 400;
   const std::array<float, 15> sigma{0.1F,  0.1F,  0.1F,  0.01F, 0.01F, 0.01F, 0.05F, 0.05F,
                                     0.02F, 0.05F, 0.05F, 0.05F, 1e-4F, 1e-4F, 1e-4F};
-  std::array<double, 3> bias{}, velocity{}, tilt{};
+  std::array<double, 3> bias{}, up{}, velocity{}, tilt{};
   for (unsigned run = 0; run < kRuns; ++run) {
     Trial r(900 + run, sigma, standing(0, 0, 0.5 * run));
     nav::InsState level = r.ins.x;
@@ -181,17 +181,21 @@ TEST(InsConsistency, WhatATiltHidesIsNotTakenForAVerticalBias) {
           1e9F));
       if (k % 800 != 799) continue;
       const auto s = static_cast<std::size_t>(k / 800);
+      up[s] += (r.nees<3>(9) - r.nees<2>(9)) / kRuns;  // of the vertical bias, given the other two
       bias[s] += r.nees<3>(9) / kRuns, velocity[s] += r.nees<3>(3) / kRuns, tilt[s] += r.nees<2>(6) / kRuns;
     }
   }
-  // Of one draw a run: 3 +- 0.57 is exceeded by one in a thousand.
+  // Of 400 draws one in a thousand is off by more than 0.40 of 3, 0.33 of 2 and 0.23 of 1. By 0.15 more: the second
+  // order has no normal distribution.
   for (std::size_t s = 0; s < 3; ++s) {
     std::printf(
-        "at rest, after %zu s: NEES of the accelerometer's bias %.2f of 3, velocity %.2f of 3, tilt %.2f of 2\n",
-        4 * (s + 1), bias[s], velocity[s], tilt[s]);
-    EXPECT_NEAR(bias[s], 3, 0.57);
-    EXPECT_NEAR(velocity[s], 3, 0.57);
-    EXPECT_NEAR(tilt[s], 2, 0.47);
+        "at rest, after %zu s: NEES of the accelerometer's bias %.2f of 3 (up, given the others, %.2f of 1), "
+        "velocity %.2f of 3, tilt %.2f of 2\n",
+        4 * (s + 1), bias[s], up[s], velocity[s], tilt[s]);
+    EXPECT_NEAR(bias[s], 3, 0.55);
+    EXPECT_NEAR(up[s], 1, 0.38);
+    EXPECT_NEAR(velocity[s], 3, 0.55);
+    EXPECT_NEAR(tilt[s], 2, 0.48);
   }
 }
 
