@@ -683,8 +683,12 @@ def jump_words(run, time_s, cause):
     if len(after) == 0 or cause not in RESET_WORDS:
         return ""
     i = after[0]
-    return (f", {RESET_WORDS[cause]} {np.degrees(rows['jump_yaw_rad'][i]):.1f} deg" if cause == "HeadingWrong" else
-            f", {RESET_WORDS[cause]} {rows['jump_x_m'][i]:.2f} m east, {rows['jump_y_m'][i]:.2f} m north, {rows['jump_z_m'][i]:.2f} m up")
+    if cause == "HeadingWrong":
+        return f", {RESET_WORDS[cause]} {np.degrees(rows['jump_yaw_rad'][i]):.1f} deg"
+    # Its height is in another frame, which may be that of an epoch later.
+    later = np.flatnonzero((rows["estimator"] == run.best) & (rows["time_s"] >= time_s) & np.isfinite(rows["jump_z_m"]))
+    up = f", {rows['jump_z_m'][later[0]]:.2f} m up" if len(later) else ""
+    return f", {RESET_WORDS[cause]} {rows['jump_x_m'][i]:.2f} m east, {rows['jump_y_m'][i]:.2f} m north{up}"
 
 
 OF_THE_LOG = {"malformed_lines": "malformed lines skipped", "frames_not_data": "remote, error or CAN FD frames skipped",

@@ -607,6 +607,11 @@ class Inertial(Case):
         self.assertIn("reset: PositionJump, position moved by 99.50 m east, -0.25 m north, 3.50 m up", words)
         self.assertIn("the world: wheel_spin, for 2.0 s", words)
         self.assertIn("the world: kidnapped", words)
+        # The height of a jump is in another frame, here of an epoch later, or never said.
+        there = [310, 3.1, 2, *[None] * 26, 99.5, -0.25, 0.01, *[None] * 20]
+        for rows, up in (([there, [314, 3.14, 2, *[None] * 34, 3.5, *[None] * 14]], ", 3.50 m up"), ([there], "")):
+            self.write_rows("states.csv", metrics.STATES, rows)
+            self.assertIn("reset: PositionJump, position moved by 99.50 m east, -0.25 m north" + up, [text for _, text in metrics.story(metrics.Run(self.directory))])
         self.assertFalse([one for one in words if "gnss_jump" in one])  # nobody knows when
 
     def test_the_pictures_of_an_inertial_run_are_drawn(self):
