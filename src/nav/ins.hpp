@@ -3,6 +3,7 @@
 // increment, covariance prediction whenever the caller wants one, measurements through the update all filters share.
 #pragma once
 
+#include "base/trig.hpp"
 #include "filter/sparse_update.hpp"
 #include "filter/state.hpp"
 #include "nav/ins_covariance.hpp"
@@ -199,15 +200,18 @@ class Ins {
                                         result);
     }
     if (result.innovation.verdict != filter::Verdict::kAccepted) return result.innovation;
-    x.correct(result.dx);
-    if constexpr (requires { measurement.moves; })
-      if (measurement.moves) held_ = kHeld;
-    if (held_ > 0) move_errors(result.dx.template segment<3>(InsState::kVelocity));
-    // What tells only of biases leaves what the scale has done to the heading.
+    // What tells only of biases leaves what the scale has done to the heading; what is measured in the body shows none.
     constexpr bool kTellsHeading = std::any_of(Measurement::kTouches.begin(), Measurement::kTouches.end(),
                                                [](int touched) { return touched < InsState::kAccelBias; });
+    constexpr bool kInBody = requires { measurement.moves; };
     if constexpr (kTellsHeading) turned_.told(p(kYaw, kYaw) / yaw_rad2);
-    if (result.sharp && !condition(p, watch_)) note_conditioned();
+    bool turned = false;
+    if constexpr (kTellsHeading && !kInBody) turned = turn_tilt(result.dx);
+    x.correct(result.dx);
+    if constexpr (kInBody)
+      if (measurement.moves) held_ = kHeld;
+    if (held_ > 0) move_errors(result.dx.template segment<3>(InsState::kVelocity));
+    if ((result.sharp || turned) && !condition(p, watch_)) note_conditioned();
     return result.innovation;
   }
 
@@ -222,6 +226,8 @@ class Ins {
     return true;
   }
   static constexpr float kMostSpeed_mps = 1000.0F;
+  /// Of less the tilt does not turn, rounding is small, it is no angle.
+  static constexpr float kLeastTurn_rad = 5e-4F, kSmallTurn_rad = 0.05F, kMostTurn_rad = 10.0F;
   static constexpr std::int64_t kGapStep_us = 100'000, kMostGap_us = 60'000'000;
   static constexpr float kGapStep_s = 0.1F;
 
@@ -286,6 +292,53 @@ class Ins {
 
   void note_conditioned() {
     if (conditioned_ < 0xFFFF) ++conditioned_;
+  }
+
+  /// Tilt and the accelerometer's bias belong together in the body (g x tilt is what the bias shows, to a thousandth
+  /// of either), whatever the heading: when that is corrected, the errors of the tilt turn with it, and a correction of
+  /// the tilt is that of before. Else the bias would be seen from two sides that are none, as if the robot had turned.
+  /// True where rounding may have cost P its definiteness.
+  [[nodiscard]] bool turn_tilt(InsState::Error& dx) {
+    constexpr int kEast = InsState::kAttitude, kNorth = kEast + 1;
+    const float up_rad = dx(kNorth + 1), size_rad = base::abs(up_rad), east = dx(kEast);
+    if (!(size_rad > kLeastTurn_rad && size_rad < kMostTurn_rad)) return false;
+    dx(kEast) -= 0.5F * up_rad * dx(kNorth);  // Exp(up) Exp(tilt), to second order
+    dx(kNorth) += 0.5F * up_rad * east;
+    const bool far = size_rad > kSmallTurn_rad;
+    if (far) {
+      turn_tilt_far(up_rad);
+    } else {
+      turn_tilt_near(up_rad);
+    }
+    return far;
+  }
+  /// By two shears: the turn, but for half its square, in two thirds of the instructions.
+  [[gnu::noinline]] void turn_tilt_near(float up_rad) {
+    constexpr int kEast = InsState::kAttitude, kNorth = kEast + 1;
+    filter::unroll<0, kErrors>([&](auto j) __attribute__((always_inline)) {
+      if constexpr (j != kEast && j != kNorth) {
+        p(kNorth, j) += up_rad * p(kEast, j);
+        p(kEast, j) -= up_rad * p(kNorth, j);
+      }
+    });
+    const float before = p(kEast, kNorth), between = before + up_rad * p(kEast, kEast);
+    p(kNorth, kNorth) += up_rad * (before + between);
+    p(kEast, kNorth) = between - up_rad * p(kNorth, kNorth);
+    p(kEast, kEast) -= up_rad * (between + p(kEast, kNorth));
+  }
+  [[gnu::noinline]] void turn_tilt_far(float up_rad) {
+    constexpr int kEast = InsState::kAttitude, kNorth = kEast + 1;
+    const base::SinCos by = base::sincos(up_rad);
+    const float ee = p(kEast, kEast), en = p(kEast, kNorth), nn = p(kNorth, kNorth);
+    for (int j = 0; j < kErrors; ++j) {
+      const float e = p(kEast, j), n = p(kNorth, j);
+      p(kEast, j) = by.cos * e - by.sin * n;
+      p(kNorth, j) = by.cos * n + by.sin * e;
+    }
+    const float s2 = by.sin * by.sin, c2 = by.cos * by.cos, sc = by.sin * by.cos;
+    p(kEast, kEast) = c2 * ee - 2.0F * sc * en + s2 * nn;
+    p(kNorth, kNorth) = c2 * nn + 2.0F * sc * en + s2 * ee;
+    p(kEast, kNorth) = (c2 - s2) * en + sc * (ee - nn);
   }
 
   /// What F leaves out of a tilt that is off: what was levelled by an accelerometer leans by what that errs, and to

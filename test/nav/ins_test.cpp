@@ -169,6 +169,37 @@ TEST(Ins, WhatIsMeasuredInTheBodyTellsNoHeading) {
     }
 }
 
+/// Tilt and bias of what was levelled at rest are one error, in the body: so they stay when it is told its heading.
+TEST(Ins, TiltAndBiasStayTogetherWhenTheHeadingIsTold) {
+  for (const float wrong_rad : {-1.0F, -0.3F, -0.01F, 0.01F, 0.3F, 1.0F}) {
+    Ins ins;
+    auto p = start_covariance();
+    p(6, 6) = p(7, 7) = 2.5e-5F, p(8, 8) = 1, p(9, 9) = p(10, 10) = 2.5e-3F, p(9, 9) *= 4;
+    for (int i = 3; i < 6; ++i) p(i, i) = 1e-4F;
+    ASSERT_TRUE(ins.start({}, p));
+    // Of the acceleration that tilt and bias make together, in the body: theta x g - b.
+    const auto variance = [&ins] {
+      const Eigen::Matrix3d r = ins.x.q_nb.matrix().cast<double>();
+      Eigen::Matrix<double, 2, 15> h = Eigen::Matrix<double, 2, 15>::Zero();
+      Eigen::Matrix3d swing;
+      swing << 0, 9.80665, 0, -9.80665, 0, 0, 0, 0, 0;
+      h.block<2, 3>(0, 6) = (r.transpose() * swing).topRows<2>();
+      h(0, 9) = h(1, 10) = -1;
+      return Eigen::Matrix2d(h * ins.p.dense().cast<double>() * h.transpose());
+    };
+    for (int i = 0; i < 400; ++i) {
+      ASSERT_EQ(ins.predict(ImuIncrement::constant({0, 0, 0}, {0, 0, 9.80665F}, {10'000})), ImuVerdict::kAccepted);
+      static_cast<void>(ins.update(model::ZeroVelocity{.sigma_mps = 0.01F}, 1e6F));
+    }
+    const Eigen::Matrix2d before = variance();
+    EXPECT_LT(before.trace(), 1e-4) << "one error: alone each of them makes 0.05 m/s^2";
+    static_cast<void>(ins.update(model::DualHeading({1, 0, 0}, wrong_rad, 0.01F), 1e6F));
+    EXPECT_NEAR(nav::euler(ins.x.q_nb).yaw_rad, wrong_rad, 0.01F * base::abs(wrong_rad));
+    EXPECT_NEAR(variance().trace() / before.trace(), 1.0, 0.1) << wrong_rad;
+    EXPECT_TRUE(ins.p.positive_definite());
+  }
+}
+
 /// A body that stands and is shaken up and down: what shakes it is no motion that would tell tilt from a bias.
 TEST(Ins, WhatTremblesAtRestTellsNoTilt) {
   Ins ins;
