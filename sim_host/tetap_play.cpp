@@ -18,11 +18,14 @@ int main(int count, char** values) {
     if (!options.robot.empty())
       sim::for_robot(options.robot,
                      [&options](auto, const app::Numbers& numbers) { options.numbers = sim::numbers_words(numbers); });
+    // Before the bus, so that a log that cannot be read is said also where there is none.
+    const sim::Log log = sim::load_for(options);
     if (options.memory)
-      return sim::with_node_in_process(options.robot, options.script.base,
-                                       [&](auto& link) { return sim::play(link, options, "memory", "tetap-play"); });
+      return sim::with_node_in_process(options.robot, options.script.base, [&](auto& link) {
+        return sim::play(link, options, log, "memory", "tetap-play");
+      });
     hal::SocketCan can(options.interface);
-    return sim::play(can, options, options.interface, "tetap-play");
+    return sim::play(can, options, log, options.interface, "tetap-play");
   } catch (const std::exception& error) {
     std::fprintf(stderr, "tetap-play: %s\n", error.what());
     return 2;

@@ -47,10 +47,9 @@ struct PlayOptions {
 /// Warnings about the log, one line each.
 void warn_about(const Log& log, const char* program);
 
-/// Plays; returns the exit status. Throws std::runtime_error for what cannot be begun.
+/// Plays what `load_for` read; returns the exit status. Throws std::runtime_error for what cannot be begun.
 template <Link L>
-int play(L& link, PlayOptions options, const std::string& bus, const char* program) {
-  const Log log = load_for(options);
+int play(L& link, const PlayOptions& options, const Log& log, const std::string& bus, const char* program) {
   warn_about(log, program);
   SessionOptions about{.program = program,
                        .folder = options.folder,

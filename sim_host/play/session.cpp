@@ -77,8 +77,9 @@ std::string Session::complaint() const {
            count(counts_.extra_outputs) + " from it): is there another sender on this bus?";
   if (!comparison_) return {};
   if (comparison_->different() > 0)
-    return (comparison_->other_numbers() ? "the recorded node ran with other numbers (Est_Version.Config): "
-                                         : std::string()) +
+    return (comparison_->other_numbers()
+                ? "the recorded node was another robot or ran with other numbers (Est_Version.Config): "
+                : std::string()) +
            count(comparison_->different()) + " of " + count(comparison_->compared()) +
            " epochs differ from the recording; first " + comparison_->first_difference() +
            (comparison_->other_numbers() ? "; --lockstep plays its inputs alone (make replay PLAY=--lockstep)" : "");

@@ -88,10 +88,11 @@ log_with $'\x01\x02\xff'; refused "bytes that are no text" "bad.log:3: .*'\?\?\?
 : >"$work/bad.log"; refused "an empty log" 'bad.log: no CAN data frame' play
 echo "(1.000000) vcan0 123#00" >"$work/bad.log"; refused "a log without the node's inputs" 'bad.log: no input frames' play
 "$programs/tetap-world" --memory --quiet --raw --duration 2 --robot rover_landmarks --out "$work/recorded" >"$work/stdout" || failed=$((failed + 1))
-refused "a record of a node with other numbers" 'the recorded node ran with other numbers .Est_Version.Config.: .* differ.*; --lockstep plays' \
+refused "a record of a node with other numbers" 'the recorded node was another robot or ran with other numbers .Est_Version.Config.: .* differ.*; --lockstep plays' \
   "$programs/tetap-play" "$work/recorded/raw.log" --memory --robot rover_landmarks_matched --out "$work/out" --quiet
 log_with; refused "a log that is no record" 'bad.log: cannot be repeated' play --as-recorded
 refused "no such log" 'nowhere.log: cannot be read: No such file' "$programs/tetap-play" "$work/nowhere.log" --memory --robot mrclam
+refused "no such log (over a bus that is none)" 'nowhere.log: cannot be read: No such file' "$programs/tetap-play" "$work/nowhere.log" --can nobus0
 refused "a folder for a log" 'cannot be read: Is a directory' "$programs/tetap-play" "$work" --memory --robot mrclam
 refused "an output folder that cannot be" "$work/good.log/x" "$programs/tetap-play" "$work/good.log" --memory --robot mrclam --out "$work/good.log/x" --quiet
 
