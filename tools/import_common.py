@@ -200,24 +200,26 @@ class Recording:
         self.about["truth_rows"] = len(time_us)
 
     def write(self, out):
-        """OUT.log, OUT.truth.csv and OUT.json: all of them or, when anything fails, none."""
-        time_us, x_m, y_m, yaw_rad = self.truth
-        seconds, micros = np.divmod(time_us, 1_000_000)
-        yaws = [""] * len(time_us) if yaw_rad is None else [f"{yaw:.6f}" for yaw in yaw_rad]
-        truth = "time_s,x_m,y_m,yaw_rad\n" + "".join(
-            f"{s}.{us:06d},{x:.6f},{y:.6f},{yaw}\n" for s, us, x, y, yaw in zip(seconds, micros, x_m, y_m, yaws))
+        """OUT.log, OUT.truth.csv where there is one, and OUT.json: all of them or, when anything fails, none."""
         log = self.log.text()
         frame_times = self.log.frames()[0]
         self.about.update(messages=dict(sorted(self.log.counts.items())), frames=len(frame_times), limited=self.log.limited,
                           duration_s=float(frame_times[-1] - START_US) / 1e6, sources=self._files)
-        _replace_all({f"{out}.log": log, f"{out}.truth.csv": truth.encode(),
-                      f"{out}.json": (json.dumps(self.about, indent=2) + "\n").encode()})
+        truth = {} if self.truth is None else {f"{out}.truth.csv": self._truth_text().encode()}
+        _replace_all({f"{out}.log": log, **truth, f"{out}.json": (json.dumps(self.about, indent=2) + "\n").encode()})
         counts = ", ".join(f"{name} {count}" for name, count in self.about["messages"].items())
         print(f"{out}.log: {len(frame_times)} frames, {self.about['duration_s']:.1f} s ({counts})")
         for what, count in self.about["dropped"].items():
             print(f"  left out: {count} {what}")
         for what, count in self.log.limited.items():
             print(f"  limited to the signal's range: {count} values of {what}")
+
+    def _truth_text(self):
+        time_us, x_m, y_m, yaw_rad = self.truth
+        seconds, micros = np.divmod(time_us, 1_000_000)
+        yaws = [""] * len(time_us) if yaw_rad is None else [f"{yaw:.6f}" for yaw in yaw_rad]
+        return "time_s,x_m,y_m,yaw_rad\n" + "".join(
+            f"{s}.{us:06d},{x:.6f},{y:.6f},{yaw}\n" for s, us, x, y, yaw in zip(seconds, micros, x_m, y_m, yaws))
 
 
 def _sha256(path):

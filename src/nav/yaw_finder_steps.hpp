@@ -195,6 +195,7 @@ inline void YawFinder::fuse_forward_speed(float mps, float sigma_mps, Complex ax
   if (!ready()) return 0.0F;
   float apart = yaw_rad() - yaw_rad_other;
   if (apart < 0.0F) apart = -apart;
+  if (apart > 2.0F * base::kPi) apart -= 2.0F * base::kPi;
   if (apart > base::kPi) apart = 2.0F * base::kPi - apart;
   return apart / base::sqrt(square(sigma) + square(sigma_rad_other));
 }

@@ -347,6 +347,42 @@ TEST(InertialMagnetometer, is_not_turned_by_a_field_of_the_right_strength_and_di
   EXPECT_EQ(robot.last_flux.verdict, can::Verdict::kAccepted);
 }
 
+/// Wrong from the start, and of the right strength and dip: the heading begins with it and agrees with it, so no gate
+/// sees it. How the robot moves does: it is believed no more, and the heading pulled round, or begun anew with.
+TEST(InertialMagnetometer, that_is_wrong_from_the_start_leads_the_heading_only_until_the_robot_moves) {
+  for (const double off_rad : {0.75, -0.9, 1.2, -1.57, 2.6, 3.14}) {
+    SCOPED_TRACE(off_rad);
+    Robot robot;
+    robot.disturb = turned_by(off_rad);
+    robot.run(10);
+    ASSERT_TRUE(robot.tracking());
+    EXPECT_NEAR(robot.heading_off_deg(), std::abs(off_rad) / kDegree, 5) << "nothing else has shown it yet";
+    drive(robot, 40);
+    ASSERT_TRUE(robot.tracking());
+    EXPECT_EQ(robot.estimator.jump().count, std::abs(off_rad) < 1.3 ? 0 : 1)
+        << "begins anew where nothing pulls it round";
+    EXPECT_LT(robot.heading_off_deg(), 3.0);
+    EXPECT_LT(robot.heading_off_deg() * kDegree, 4 * robot.heading_sigma_rad());
+    EXPECT_NE(robot.last_flux.verdict, can::Verdict::kAccepted);
+    // Put right, it is used again once it has agreed for as long as it takes to be disbelieved.
+    robot.disturb = turned_by(0);
+    drive(robot, 1e-6 * static_cast<double>(robot.n.recovery.after_us) + 0.5);
+    EXPECT_EQ(robot.last_flux.verdict, can::Verdict::kAccepted);
+    EXPECT_LT(robot.heading_off_deg(), 3.0);
+  }
+}
+
+TEST(InertialMagnetometer, that_is_right_is_never_taken_for_one_that_leads_the_heading) {
+  for (const double off_rad : {0.0, 0.1, -0.1}) {
+    Robot robot;
+    robot.disturb = turned_by(off_rad);
+    robot.run(10);
+    drive(robot, 120);
+    EXPECT_EQ(robot.estimator.jump().count, 0) << off_rad;
+    EXPECT_EQ(robot.last_flux.verdict, can::Verdict::kAccepted) << off_rad;
+  }
+}
+
 TEST(InertialMagnetometer, brings_a_lost_heading_back_when_nothing_else_can) {
   Robot robot;
   drive(robot, 20);

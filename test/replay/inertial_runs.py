@@ -284,7 +284,7 @@ def px4(programs, out, name, checks):
     reference = np.genfromtxt(path + ".reference.csv", delimiter=",", names=True)
     states = replay.rows("states.csv")
     end = min(float(states[-1]["time_s"]), float(replay.poses[-1]["time_s"])) - 0.2
-    reference = reference[(reference["time_s"] > START_S + CONVERGED_S) & (reference["time_s"] < end)]
+    reference = reference[(reference["time_s"] > max(START_S, reference["time_s"][0]) + CONVERGED_S) & (reference["time_s"] < end)]
     times = reference["time_s"]
 
     def of(*names):

@@ -368,6 +368,30 @@ class BadInput(unittest.TestCase):
         messages = json.loads(text_of(self.out + ".json"))["messages"]
         self.assertEqual((messages["In_Imu0Gyro"], messages["In_GnssLat"], "In_Mag" in messages), (199, 5, False))
 
+    def test_what_a_px4_log_has_beside_is_counted_and_left_out(self):
+        more = ["200000,range,0.2,100", "200000,flow,0,0,0,0,0,0", "200000,vio,1,2,3", "250000,gps,0,0,0,0,0,0"]
+        lines = self.replay().replace("205000,imu,0,0,-9.8,0,0,0", "205000,imu,0,0,-9.8,0,0,0,").splitlines()  # PX4's reader lets a comma end the line
+        self.assertEqual(self.px4().returncode, 0)
+        expected = text_of(self.out + ".log")
+        done = self.px4("\n".join(more[:3] + lines[:200] + more[3:] + lines[200:]) + "\n")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual(text_of(self.out + ".log"), expected)
+        self.assertEqual(json.loads(text_of(self.out + ".json"))["dropped"],
+                         {"rows of range": 1, "rows of flow": 1, "rows of vio": 1, "fixes without a place": 1, "IMU samples without one before them": 1})
+
+    def test_a_px4_log_without_px4s_estimate_is_a_log_without_truth(self):
+        self.assertEqual(self.px4().returncode, 0)
+        expected = text_of(self.out + ".log")
+        for name in os.listdir(self.directory):
+            if name.startswith("out"):
+                os.remove(os.path.join(self.directory, name))
+        os.remove(os.path.join(self.set, "change_indication", "log.csv"))
+        done = run("import_px4", self.set, "log", self.out)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("nothing to compare with", done.stdout)
+        self.assertEqual(text_of(self.out + ".log"), expected)
+        self.assertEqual(sorted(os.listdir(self.directory)), ["out.json", "out.log", "set"])
+
     def test_px4s_log_names_file_line_and_reason(self):
         good = self.replay()
         cases = [(good.replace("205000,imu,0,0,-9.8,0,0,0", "205000,imu,0,0,-9.8,0,0"), "replay_data/log.csv:2", "5 numbers, imu has 6"),

@@ -250,9 +250,13 @@ inline constexpr float kDecides = 4.0F;
   return wrong_for_long(wrong, stamp, with.numbers.recovery);
 }
 
-/// Of a robot without wheels: how it moves has shown for long another heading than the filter's.
+/// Of a robot without wheels: how it moves has shown for long another heading than the filter's. Where a magnetometer
+/// that is no longer believed may have led it, velocities alone do not pull it round: the filter is too sure for that.
 [[gnu::noinline]] inline bool Inertial::contradicted(base::Micros stamp, const Context& with) {
-  const bool wrong = start_.contradicts(nav::euler(ins_.x.q_nb).yaw_rad, base::sqrt(heading_rad2()));
+  constexpr float kLed_rad = 0.1F, kLed = 3.0F;
+  const float yaw_rad = nav::euler(ins_.x.q_nb).yaw_rad, sigma_rad = base::sqrt(heading_rad2());
+  const bool wrong = field_.believed() ? start_.contradicts(yaw_rad, sigma_rad) > 0.0F
+                                       : start_.contradicts(yaw_rad, sigma_rad, kLed_rad, kLed) > 0.0F;
   return wrong_for_long(wrong, stamp, with.numbers.recovery);
 }
 

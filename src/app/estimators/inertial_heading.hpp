@@ -59,6 +59,7 @@ inline Innovation Inertial::fuse(const OutsideHeading& heading, base::Micros sta
 
   model::DirectionMeasurement direction = model::MagneticHeading(field, n.declination_rad, n.sigma_rad);
   if (!tracking) {
+    if (!field_.believed()) return {};
     start_.field(field_n, direction.angle_rad, n.sigma_rad);
     return {.verdict = can::Verdict::kAccepted};
   }
@@ -75,8 +76,17 @@ inline Innovation Inertial::fuse(const OutsideHeading& heading, base::Micros sta
   const float gate = n.gate_scale * filter::chi_square_99(1);
   Innovation result{.verdict = can::Verdict::kAccepted, .dof = 1, .nis = nu * nu / (p + floor), .gate = gate};
   if (!(result.nis < 1e30F)) return {.verdict = can::Verdict::kNotFinite};  // a field straight down
-  const bool agrees = result.nis <= gate;
   const base::Micros after{with.numbers.recovery.after_us};
+  // Of a robot without wheels how it moves judges the magnetometer, too: one that is wrong all the time leads the
+  // filter's heading, which then agrees with it.
+  const bool judged = alone(stamp) && stamp - last_position_ < after;
+  const float yaw_rad = nav::euler(ins_.x.q_nb).yaw_rad;
+  const float sigmas = judged ? start_.contradicts(yaw_rad + nu, n.sigma_rad) : 0.0F;
+  if (sigmas > 0.0F) {
+    result.nis = sigmas * sigmas;
+    result.gate = InertialStart::kSigmas * InertialStart::kSigmas;
+  }
+  const bool agrees = sigmas <= 0.0F && result.nis <= gate;
   if (field_.lasts(agrees, stamp, after)) {
     // With GNSS the filter's heading is the better one. Without, nothing else says where north is.
     if (agrees || stamp - last_position_ < after) {

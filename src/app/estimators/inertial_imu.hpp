@@ -153,6 +153,8 @@ inline std::uint16_t Inertial::faults() const {
   const InertialStart before = start_;
   base::renew(*this);
   start_.take_over(before);
+  // A magnetometer has led it there, or did not keep it from it: it has to agree with what is found first.
+  if (cause == can::ResetCause::kHeadingWrong) field_.believe(false, t);
   time_ = t;
   noise_of(with.numbers.inertial);
   ahead_.remember(last);
