@@ -58,7 +58,10 @@ class YawFinder {
   [[nodiscard]] float sigma_rad() const;
   /// Sigma below noise.ready_rad after five fixes; sigma is small only while phasor and model agree.
   [[nodiscard]] bool ready() const { return fixes_ >= kFixes && sigma_rad() < noise.ready_rad; }
-  /// How many sigma of the difference another heading (within two turns of zero) is away; 0 while not ready.
+  /// How far another heading is away; and in sigma of the difference, 0 while not ready.
+  [[nodiscard]] float apart_rad(float yaw_rad_other) const {
+    return base::abs(base::wrap_angle(yaw_rad() - yaw_rad_other));
+  }
   [[nodiscard]] float against(float yaw_rad_other, float sigma_rad_other) const;
   /// Of the gyroscope, about the vertical.
   [[nodiscard]] float bias_radps() const { return bias_b_radps_.dot(up_b_); }

@@ -193,11 +193,7 @@ inline void YawFinder::fuse_forward_speed(float mps, float sigma_mps, Complex ax
 [[gnu::noinline]] inline float YawFinder::against(float yaw_rad_other, float sigma_rad_other) const {
   const float sigma = sigma_rad();
   if (!ready()) return 0.0F;
-  float apart = yaw_rad() - yaw_rad_other;
-  if (apart < 0.0F) apart = -apart;
-  if (apart > 2.0F * base::kPi) apart -= 2.0F * base::kPi;
-  if (apart > base::kPi) apart = 2.0F * base::kPi - apart;
-  return apart / base::sqrt(square(sigma) + square(sigma_rad_other));
+  return apart_rad(yaw_rad_other) / base::sqrt(square(sigma) + square(sigma_rad_other));
 }
 
 [[gnu::noinline]] inline float YawFinder::sigma_rad() const {

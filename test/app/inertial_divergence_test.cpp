@@ -47,6 +47,32 @@ TEST(InertialDivergence, AWrongHeadingIsNotFlownAwayWith) {
   }
 }
 
+/// The heading was told wrong, and wheels show it; the magnetometer was right all the time. The robot stops where it is
+/// noticed, so nothing but the magnetometer can say the heading it begins anew with.
+TEST(InertialDivergence, WhereWheelsShowAWrongHeadingAMagnetometerThatIsRightIsBelieved) {
+  Numbers n = rover_like();
+  n.magnetic.use = 1;
+  Drive d(n);
+  d.yaw_rad -= 2.6;
+  d.place();
+  d.yaw_rad += 2.6;
+  const auto run = [&d](double duration_s) {
+    for (int k = 0; k < duration_s * 50; ++k) {
+      d.run(0.02);
+      const auto yaw_rad = static_cast<float>(d.yaw_rad);
+      static_cast<void>(d.estimator.fuse(
+          MagneticFlux{.flux_b_uT = {20 * base::sin(yaw_rad), 20 * base::cos(yaw_rad), -44}}, {d.us}, d.with()));
+    }
+  };
+  for (int k = 0; k < 600 && d.estimator.jump().count == 0; ++k) run(0.1);
+  ASSERT_EQ(d.estimator.jump().cause, can::ResetCause::kHeadingWrong);
+  d.speed_mps = d.turn_radps = 0;
+  run(10);
+  ASSERT_TRUE(d.tracking());
+  EXPECT_NEAR(std::remainder(static_cast<double>(d.estimator.estimate(d.with()).pose.yaw_rad) - d.yaw_rad, 6.283185307),
+              0, 0.1);
+}
+
 /// IMU and GNSS, no wheels. Stands, starts, drives straight, stops, starts again, turns; the heading is given wrong.
 struct Alone {
   double worst_m = 0, worst_sigmas = 0;  ///< of the position, all the way

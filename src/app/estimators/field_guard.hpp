@@ -36,6 +36,8 @@ class FieldGuard {
   /// Whether its headings are used. They stop to be when they have contradicted for `after` what better sensors say,
   /// and are again when they have agreed for as long.
   [[nodiscard]] bool believed() const { return !refused_; }
+  /// It is heard, and may have led the heading astray.
+  [[nodiscard]] bool misleads(base::Micros at) const { return refused_ && at - last_ <= kGap; }
   /// True: it has contradicted for that long, or agreed while it was not believed.
   [[nodiscard]] bool lasts(bool agrees, base::Micros stamp, base::Micros after) {
     if (agrees == believed()) since_ = stamp;

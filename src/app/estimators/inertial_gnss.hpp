@@ -255,9 +255,9 @@ inline constexpr float kDecides = 4.0F;
 [[gnu::noinline]] inline bool Inertial::contradicted(base::Micros stamp, const Context& with) {
   constexpr float kLed_rad = 0.1F, kLed = 3.0F;
   const float yaw_rad = nav::euler(ins_.x.q_nb).yaw_rad, sigma_rad = base::sqrt(heading_rad2());
-  const bool wrong = field_.believed() ? start_.contradicts(yaw_rad, sigma_rad) > 0.0F
-                                       : start_.contradicts(yaw_rad, sigma_rad, kLed_rad, kLed) > 0.0F;
-  return wrong_for_long(wrong, stamp, with.numbers.recovery);
+  const float sigmas = field_.misleads(stamp) ? start_.contradicts(yaw_rad, sigma_rad, kLed_rad, kLed)
+                                              : start_.contradicts(yaw_rad, sigma_rad);
+  return wrong_for_long(sigmas > 0.0F, stamp, with.numbers.recovery);
 }
 
 inline bool Inertial::wrong_for_long(bool wrong, base::Micros stamp, const RecoveryNumbers& rules) {

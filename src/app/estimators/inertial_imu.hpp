@@ -151,10 +151,12 @@ inline std::uint16_t Inertial::faults() const {
   const auto count = static_cast<std::uint8_t>(jump_.count + 1);
   const nav::InsState last = ahead_.present();
   const InertialStart before = start_;
+  const bool believed = field_.believed();
   base::renew(*this);
   start_.take_over(before);
-  // A magnetometer has led it there, or did not keep it from it: it has to agree with what is found first.
-  if (cause == can::ResetCause::kHeadingWrong) field_.believe(false, t);
+  // Where how it moves finds the heading once more, a magnetometer that led it astray, or did not keep it from that,
+  // has to agree first.
+  if (start_.watches() && (!believed || cause == can::ResetCause::kHeadingWrong)) field_.believe(false, t);
   time_ = t;
   noise_of(with.numbers.inertial);
   ahead_.remember(last);

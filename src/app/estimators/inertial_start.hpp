@@ -63,13 +63,14 @@ class InertialStart {
     finder_.fuse_velocity(v_n_mps(0), v_n_mps(1), sigma_mps, {n.antenna_x_b_m, n.antenna_y_b_m});
   }
   void watch_no_more() { watches_ = false; }
+  [[nodiscard]] bool watches() const { return watches_; }
   /// By how many sigma a heading, that filter's or a magnetometer's, is another one; 0: it is not. What is less than
   /// half a radian off, velocities pull round.
   [[nodiscard, gnu::noinline]] float contradicts(float yaw_rad, float sigma_rad, float apart_rad = 0.5F,
                                                  float least = kSigmas) const {
     if (!watches_) return 0.0F;
     const float sigmas = finder_.against(yaw_rad, sigma_rad);
-    const bool is = sigmas > least && base::abs(base::wrap_angle(finder_.yaw_rad() - yaw_rad)) > apart_rad;
+    const bool is = sigmas > least && finder_.apart_rad(yaw_rad) > apart_rad;
     return is ? sigmas : 0.0F;
   }
   static constexpr float kSigmas = 5;  ///< of what contradicts
