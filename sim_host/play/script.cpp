@@ -11,11 +11,12 @@ namespace {
 
 constexpr base::Micros kLongestPause{60'000'000};
 
-std::optional<can::InSync> tick_of(const base::CanFrame& frame, std::uint32_t base) {
+std::optional<can::InSync> sync_of(const base::CanFrame& frame, std::uint32_t base) {
   if (offset_in_block(frame, base) != can::InSync::kOffset) return std::nullopt;
-  const auto sync = can::decode<can::InSync>(can::payload(frame));
-  if (!sync || (sync->kind != can::SyncKind::kTick && sync->kind != can::SyncKind::kStep)) return std::nullopt;
-  return sync;
+  return can::decode<can::InSync>(can::payload(frame));
+}
+bool is_tick(const std::optional<can::InSync>& sync) {
+  return sync && (sync->kind == can::SyncKind::kTick || sync->kind == can::SyncKind::kStep);
 }
 
 base::CanFrame moved(base::CanFrame frame, const ScriptOptions& options) {
@@ -25,12 +26,14 @@ base::CanFrame moved(base::CanFrame frame, const ScriptOptions& options) {
 
 Script on_its_own_ticks(std::span<const TimedFrame> log, const ScriptOptions& options) {
   Script script;
+  std::optional<base::Micros> last;  // as the bus has it: the log's own clock may be another one
   for (const TimedFrame& entry : log) {
     if (is_counted_input(entry.frame, options.log_base)) script.add_input(moved(entry.frame, options));
-    if (const auto tick = tick_of(entry.frame, options.log_base)) {
-      const auto time = extend_bus_time(tick->time_us, entry.time);
-      script.add_tick(time, script.ticks() == 0 ? std::optional(time - options.period) : std::nullopt);
-    }
+    const auto sync = sync_of(entry.frame, options.log_base);
+    if (sync && sync->kind == can::SyncKind::kBegin) last = base::Micros{static_cast<std::int64_t>(sync->time_us)};
+    if (!is_tick(sync)) continue;
+    last = extend_bus_time(sync->time_us, last.value_or(entry.time));
+    script.add_tick(*last, script.ticks() == 0 ? std::optional(*last - options.period) : std::nullopt);
   }
   return script;
 }
@@ -67,8 +70,8 @@ std::vector<TimedFrame> inputs_of(std::span<const TimedFrame> log, const ScriptO
 }
 
 Script script_of(std::span<const TimedFrame> log, const ScriptOptions& options) {
-  const bool has_ticks = std::any_of(
-      log.begin(), log.end(), [&](const TimedFrame& e) { return tick_of(e.frame, options.log_base).has_value(); });
+  const bool has_ticks = std::any_of(log.begin(), log.end(),
+                                     [&](const TimedFrame& e) { return is_tick(sync_of(e.frame, options.log_base)); });
   return has_ticks ? on_its_own_ticks(log, options) : on_a_grid(log, options);
 }
 

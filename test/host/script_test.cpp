@@ -69,6 +69,16 @@ TEST(Script, TicksInTheLogAreTheTicks) {
   EXPECT_EQ(all(script_of(log, {})), expected);
 }
 
+TEST(Script, TicksCountFromTheBeginOfTheBusNotByTheClockOfTheLog) {
+  constexpr std::int64_t kToday_us = 1'795'555'498'360'954;  // candump's stamps are the calendar's
+  const std::vector<TimedFrame> log{{{kToday_us}, sync_frame(0x300, can::SyncKind::kBegin, {1'000'000}, 0)},
+                                    input(kToday_us + 10, 1),
+                                    {{kToday_us + 20}, sync_frame(0x300, can::SyncKind::kStep, {1'010'000}, 1)},
+                                    {{kToday_us + 30}, sync_frame(0x300, can::SyncKind::kStep, {1'020'000}, 2)}};
+  const std::vector<Played> expected{{1'010'000, {1}, true}, {1'020'000, {}, false}};
+  EXPECT_EQ(all(script_of(log, {})), expected);
+}
+
 TEST(Script, OnlyInputsOfTheNodesBlockArePlayedUnderItsIds) {
   const std::vector<TimedFrame> log{input(1, 1, 0x2FF), input(2, 2, 0x301),
                                     input(3, 3, 0x31F), input(4, 4, 0x320),
