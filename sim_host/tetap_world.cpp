@@ -35,7 +35,7 @@ std::string help() {
           "  --out DIR          for the record and truth.csv (default out/sim)\n"
           "  --seed N           every draw follows from it (default 1)\n"
           "  --duration S       at most so long (default: the whole course)\n"
-          "  --matched          only errors that the filters model\n"
+          "  --matched          only errors that the filters model; for robots rover_matched, rover_landmarks_matched\n"
           "  --course NAME      yard (default), road: 1.1 km at 5 m/s, or stand: it stays where it is\n"
           "  --east M           the course so far east of the origin\n"
           "  --laps N           the course so many times (default 1; 2 for gnss_far)\n"

@@ -370,25 +370,25 @@ class BadInput(unittest.TestCase):
 
     def test_what_a_px4_log_has_beside_is_counted_and_left_out(self):
         more = ["200000,range,0.2,100", "200000,flow,0,0,0,0,0,0", "200000,vio,1,2,3", "250000,gps,0,0,0,0,0,0"]
-        lines = self.replay().replace("205000,imu,0,0,-9.8,0,0,0", "205000,imu,0,0,-9.8,0,0,0,").splitlines()  # PX4's reader lets a comma end the line
+        # PX4's reader lets a comma end the line, and more numbers pass.
+        lines = self.replay().replace("205000,imu,0,0,-9.8,0,0,0", "205000,imu,0,0,-9.8,0,0,0,").replace("210000,imu,0,0,-9.8,0,0,0", "210000,imu,0,0,-9.8,0,0,0,7,8").splitlines()
         self.assertEqual(self.px4().returncode, 0)
         expected = text_of(self.out + ".log")
         done = self.px4("\n".join(more[:3] + lines[:200] + more[3:] + lines[200:]) + "\n")
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertEqual(text_of(self.out + ".log"), expected)
         self.assertEqual(json.loads(text_of(self.out + ".json"))["dropped"],
-                         {"rows of range": 1, "rows of flow": 1, "rows of vio": 1, "fixes without a place": 1, "IMU samples without one before them": 1})
+                         {"rows of range": 1, "rows of flow": 1, "rows of vio": 1, "fixes without a place": 1, "numbers beyond those of imu": 2,
+                          "IMU samples without one before them": 1})
 
     def test_a_px4_log_without_px4s_estimate_is_a_log_without_truth(self):
         self.assertEqual(self.px4().returncode, 0)
         expected = text_of(self.out + ".log")
-        for name in os.listdir(self.directory):
-            if name.startswith("out"):
-                os.remove(os.path.join(self.directory, name))
         os.remove(os.path.join(self.set, "change_indication", "log.csv"))
         done = run("import_px4", self.set, "log", self.out)
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertIn("nothing to compare with", done.stdout)
+        self.assertIn("truth.csv was of another log: removed", done.stdout)
         self.assertEqual(text_of(self.out + ".log"), expected)
         self.assertEqual(sorted(os.listdir(self.directory)), ["out.json", "out.log", "set"])
 
@@ -400,7 +400,8 @@ class BadInput(unittest.TestCase):
                  (good.replace("205000,imu,0", "205000,imu,nan"), "log.csv:2", "finite"),
                  (good.replace("205000,imu", "100000,imu"), "log.csv:2", "time goes back"),
                  (good.replace("85456000,473977000", "85456000,950000000", 1), "log.csv:201", "no such place"),
-                 (good.split("300000,gps")[0], "no row of gps"), ("", "no row of imu")]
+                 (good.split("300000,gps")[0], "no row of gps"), (good.replace("85456000,473977000", "0,0"), "none of its 5 rows of gps has a place"),
+                 ("", "no row of imu")]
         for text, *words in cases:
             with self.subTest(words=words):
                 self.refused(self.px4(text), *words)
