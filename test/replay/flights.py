@@ -8,14 +8,14 @@ What is asserted: a magnetometer that is right is used to the end; one that is w
 one the heading is found in motion. (From half a radian on: what is less, a magnetometer with a sigma of 0.1 rad may be off by.)"""
 import argparse
 import concurrent.futures
-import csv
 import os
-import subprocess
 import sys
 
 import numpy as np
 
-ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.realpath(__file__))))
+sys.dont_write_bytecode = True
+import inertial_runs  # noqa: E402
+
 STEP_S, HOVER_S, GRAVITY_MPS2 = 0.005, 15.0, 9.80665
 BEGIN_S = 2.0  # of a flight in the log: its first row's time, and import_px4's second before
 ORIGIN_DEG, ORIGIN_M = (47.397742, 8.545594), 488.0
@@ -99,27 +99,14 @@ def write_flight(folder, name, seed, field_turned_deg, seconds):
             file.write("\n".join(lines) + "\n")
 
 
-def run(*words):
-    done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True)
-    if done.returncode != 0:
-        sys.exit(f"{' '.join(words)} failed:\n{done.stdout}{done.stderr}")
-
-
 def flown(programs, out, field_turned_deg, seed, seconds):
     """Errors from LATE_S on: heading RMS and its published sigma [deg], velocity and place RMS; when it began; resets; how long the magnetometer was used."""
     name = f"{'none' if field_turned_deg is None else f'{field_turned_deg:03d}'}_{seed}"
     write_flight(out, name, seed, field_turned_deg, seconds)
     path = os.path.join(out, name)
-    run("tools/import_px4", out, name, path)
-    run(os.path.join(programs, "tetap-play"), path + ".log", "--memory", "--robot", "iris", "--out", path, "--quiet")
-
-    def table(file):
-        with open(os.path.join(path, file), encoding="utf-8") as text:
-            return list(csv.DictReader(text))
-
-    poses = [row for row in table("estimates.csv") if row["kind"] == "Inertial" and row["pos_valid"] == "1"]
-    if not poses:
-        sys.exit(f"{name}: the inertial estimate never became valid")
+    inertial_runs.run("tools/import_px4", out, name, path)
+    replay = inertial_runs.Replay(programs, path + ".log", "iris", path)
+    poses = replay.poses
     truth = np.genfromtxt(path + ".truth.csv", delimiter=",", names=True)
     truth = truth[(truth["time_s"] > BEGIN_S + LATE_S) & (truth["time_s"] < BEGIN_S + seconds - 1)]
 
@@ -129,10 +116,9 @@ def flown(programs, out, field_turned_deg, seed, seconds):
 
     apart = np.angle(np.exp(1j * (at("yaw_rad", np.unwrap) - truth["yaw_rad"])))
     place = np.hypot(at("x_m") - truth["x_m"], at("y_m") - truth["y_m"])  # the first fix, which is the origin, errs too
-    fluxes = [row for row in table("sensors.csv") if row["sensor"] == "Magnetometer" and row["estimator"] == poses[0]["estimator"]]
-    used = int(fluxes[-1]["accepted"]) if fluxes else 0
+    used = replay.sensors().get("Magnetometer", {"accepted": 0})["accepted"]
     return {"name": name, "heading_deg": float(np.degrees(np.sqrt(np.mean(apart**2)))), "sigma_deg": float(np.degrees(np.mean(at("std_yaw_rad")))),
-            "place_m": float(np.sqrt(np.mean(place**2))), "began_s": float(poses[0]["time_s"]) - BEGIN_S, "resets": int(table("status.csv")[-1]["reset_ctr"]),
+            "place_m": float(np.sqrt(np.mean(place**2))), "began_s": float(poses[0]["time_s"]) - BEGIN_S, "resets": int(inertial_runs.table(os.path.join(path, "status.csv"))[-1]["reset_ctr"]),
             "used_s": used / FIELD_HZ}
 
 
