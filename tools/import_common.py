@@ -200,7 +200,7 @@ class Recording:
         self.about["truth_rows"] = len(time_us)
 
     def write(self, out):
-        """OUT.log, OUT.truth.csv where there is one, and OUT.json: all of them or, when anything fails, none."""
+        """OUT.log, OUT.truth.csv where there is one, and OUT.json: all of them or, when anything fails, none. No older truth stays beside them."""
         log = self.log.text()
         frame_times = self.log.frames()[0]
         self.about.update(messages=dict(sorted(self.log.counts.items())), frames=len(frame_times), limited=self.log.limited,
@@ -208,6 +208,8 @@ class Recording:
         truth = {} if self.truth is None else {f"{out}.truth.csv": self._truth_text().encode()}
         _replace_all({f"{out}.log": log, **truth, f"{out}.json": (json.dumps(self.about, indent=2) + "\n").encode()})
         counts = ", ".join(f"{name} {count}" for name, count in self.about["messages"].items())
+        if self.truth is None:
+            remove_older(f"{out}.truth.csv")
         print(f"{out}.log: {len(frame_times)} frames, {self.about['duration_s']:.1f} s ({counts})")
         for what, count in self.about["dropped"].items():
             print(f"  left out: {count} {what}")
@@ -225,6 +227,13 @@ class Recording:
 def _sha256(path):
     with open(path, "rb") as file:
         return hashlib.sha256(file.read()).hexdigest()
+
+
+def remove_older(path):
+    """Another log's file by that name would be taken for this one's."""
+    if os.path.exists(path):
+        os.remove(path)
+        print(f"  {path} was of another log: removed")
 
 
 def _replace_all(contents):

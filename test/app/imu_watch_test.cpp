@@ -3,14 +3,13 @@
 // standing, in a small world of its own: each sample fused at its own time.
 #include "app/estimators/imu_watch.hpp"
 
-#include "app/estimators/inertial.hpp"
+#include "compiled_inertial.hpp"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
 #include <random>
-#include <vector>
 
 namespace tetap::app {
 namespace {
@@ -182,7 +181,7 @@ class Robot {
   }
   Numbers n;
   Site site;
-  Inertial estimator;
+  CompiledInertial estimator;
   bool imu = true, stuck = false, wheels = true, gnss = true;
   double spin_mps = 0;
   std::uint8_t clipped_gyro = 0, clipped_accel = 0;
@@ -253,7 +252,7 @@ class Robot {
                        .acc_mps = 0.05F},
           {us}, with());
     }
-    estimator.advance({us}, with(), std::vector<Sample>{});
+    estimator.advance({us}, with());
     if (mode() == can::Mode::kNominal) ++nominal;
     worst_m = std::max(worst_m, off_m());
     worst_ratio = std::max(worst_ratio, off_m() / (3 * std::max(sigma(0), sigma(1))));

@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // Inertial navigation without wheel speeds: that there are wheels is all that is known (the non-holonomic constraint).
 // A robot drives level curves; its accelerometer errs sideways.
-#include "app/estimators/inertial.hpp"
+#include "compiled_inertial.hpp"
 
 #include <gtest/gtest.h>
 
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <vector>
 
 namespace tetap::app {
 namespace {
@@ -42,7 +41,7 @@ class Drive {
       if (wheels_every_us > 0 && us % wheels_every_us == 0)
         static_cast<void>(estimator.fuse(WheelSpeeds{.left_mps = speed_mps, .right_mps = speed_mps}, {us}, with()));
     }
-    estimator.advance({us}, with(), std::vector<Sample>{});
+    estimator.advance({us}, with());
   }
   [[nodiscard]] Context with() const { return {n, site}; }
   [[nodiscard]] nav::Vector3 velocity_b_mps() const {
@@ -53,7 +52,7 @@ class Drive {
 
   Numbers n;
   Site site;
-  Inertial estimator;
+  CompiledInertial estimator;
   std::int64_t us = 1'000'000;
   float speed_mps = 0, sideways_error_mps2 = 0;
 

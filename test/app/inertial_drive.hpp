@@ -3,7 +3,7 @@
 // wheels are exact, its receiver errs as stated. Errors are judged against what the estimator says of itself.
 #pragma once
 
-#include "app/estimators/inertial.hpp"
+#include "compiled_inertial.hpp"
 
 #include <gtest/gtest.h>
 
@@ -15,7 +15,6 @@
 #include <random>
 #include <string>
 #include <utility>
-#include <vector>
 
 namespace tetap::app {
 
@@ -63,7 +62,7 @@ class Drive {
 
   Numbers n;
   Site site;
-  Inertial estimator;
+  CompiledInertial estimator;
   double east_m = 0, north_m = 0, up_m = 0, yaw_rad = 0.3, speed_mps = 1, turn_radps = 0.05;
   double unseen_east_m = 0;  ///< it is carried, and no sensor of motion shows it
   double white_m = 1, lasting_m = 0, lasting_s = 60;
@@ -147,7 +146,7 @@ class Drive {
     if (speedometer && (us - kBegin_us) % speedometer_every_us == 0)
       estimator.fuse(BodySpeed{.forward_mps = static_cast<float>(speed_mps)}, {us}, with());
     if ((us - kBegin_us) % gnss_every_us == 0) receive();
-    estimator.advance({us}, with(), std::vector<Sample>{});
+    estimator.advance({us}, with());
     const InertialEstimate now = estimator.inertial(with());
     now_ = {.state = now.state, .p = now.p, .valid = now.valid};
     if (!now_.valid) return;

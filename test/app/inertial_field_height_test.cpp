@@ -2,7 +2,7 @@
 // Magnetometer and barometer in the inertial estimator: what they find at the start, how far they are believed, what a
 // disturbance may do and how it ends. The world is a small one of its own: a robot that stands or drives curves, with
 // exact sensors but for what a test adds, each sample fused at its own time.
-#include "app/estimators/inertial.hpp"
+#include "compiled_inertial.hpp"
 
 #include <gtest/gtest.h>
 
@@ -54,7 +54,7 @@ class Robot {
 
   Numbers n;
   Site site;
-  Inertial estimator;
+  CompiledInertial estimator;
 
   // The truth, and what the sensors make of it.
   double yaw_rad = 0, east_m = 0, north_m = 0, up_m = 0, speed_mps = 0, climb_mps = 0;
@@ -87,7 +87,7 @@ class Robot {
   }
   [[nodiscard]] double height_sigma_m() const { return std::sqrt(static_cast<double>(now().p(2, 2))); }
   [[nodiscard]] double time_s() const { return 1e-6 * static_cast<double>(us - kBegin_us); }
-  void advance() { estimator.advance({us}, with(), std::vector<Sample>{}); }
+  void advance() { estimator.advance({us}, with()); }
 
  private:
   static constexpr std::int64_t kBegin_us = 3'000'000, kImu_us = 10'000;

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // Every measurement is true at its own microsecond: between two IMU samples, too. A body on a plane that speeds up and
 // turns, exact sensors but for what keeps an IMU from looking stuck; each measurement 9 ms after an IMU sample.
-#include "app/estimators/inertial.hpp"
+#include "compiled_inertial.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <vector>
 
 namespace tetap::app {
 namespace {
@@ -33,7 +32,7 @@ class Body {
     still_ = false;
     begun_us_ = us_;
   }
-  Inertial estimator;
+  CompiledInertial estimator;
 
   /// measure(stamp) 9 ms after every tenth IMU sample.
   template <class Measure>
@@ -43,7 +42,7 @@ class Body {
       step();
       if (k % 10 == 0) measure(base::Micros{us_ + 9'000});
     }
-    estimator.advance({us_}, with(), std::vector<Sample>{});
+    estimator.advance({us_}, with());
   }
   [[nodiscard]] double speed(std::int64_t at_us) const { return accel_ * driven_s(at_us); }
   [[nodiscard]] double yaw(std::int64_t at_us) const { return begin_yaw_rad_ + turn_ * driven_s(at_us); }
@@ -92,7 +91,7 @@ class Body {
                                                      alive},
                              .interval_us = kStep_us},
                    {us_}, with());
-    estimator.advance({us_}, with(), std::vector<Sample>{});
+    estimator.advance({us_}, with());
   }
 
   double accel_, turn_, begin_yaw_rad_, climb_;

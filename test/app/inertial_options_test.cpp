@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // What a robot may have that the rover has not: a pair of antennas that does not point ahead, a gyroscope that feels
 // the Earth turn; and sensors that show the same for ever.
-#include "app/estimators/inertial.hpp"
+#include "compiled_inertial.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <optional>
 #include <random>
-#include <vector>
 
 namespace tetap::app {
 namespace {
@@ -27,7 +26,7 @@ class Stand {
   }
   Numbers n;
   Site site;
-  Inertial estimator;
+  CompiledInertial estimator;
   double yaw_rad = 0;
   nav::Vector3 shown_radps = nav::Vector3::Zero();  ///< by a gyroscope without bias
   bool wheels = true;
@@ -44,7 +43,7 @@ class Stand {
                     .interval_us = 10'000},
           {us}, with());
       if (wheels) estimator.fuse(WheelCounts{}, {us}, with());
-      estimator.advance({us}, with(), std::vector<Sample>{});
+      estimator.advance({us}, with());
     }
   }
   Innovation heading(double line_rad) {

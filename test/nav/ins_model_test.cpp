@@ -164,23 +164,49 @@ TYPED_TEST(InsMeasurementLaws, APerfectMeasurementLeavesTheStateAndShrinksTheCov
   }
 }
 
-/// The update made for many states against the one all filters share, from a covariance with every correlation. What
-/// tells the heading from outside the body turns the errors of the tilt with it, its own correction by half.
+using Vector15 = filter::Vector<float, 15>;
+using Matrix15 = Eigen::Matrix<float, 15, 15>;
+
+nav::Ins::Covariance correlated(test::Normal& normal) {
+  Eigen::Matrix<double, 15, 15> a;
+  for (int i = 0; i < 225; ++i) a(i / 15, i % 15) = normal();
+  const Eigen::Matrix<double, 15, 15> full = 0.01 * a * a.transpose();
+  return nav::Ins::Covariance::upper_of(full.cast<float>());
+}
+
+/// The state moved by dx, the covariance as it was updated; a heading told from outside the body turns the errors of
+/// the tilt with it, its own correction by half.
+void expect_moved(const nav::Ins& ins, const InsState& from, const Vector15& dx, const nav::Ins::Covariance& updated,
+                  bool from_outside, float scale) {
+  Matrix15 turn = Matrix15::Identity(), half = turn;
+  const float up_rad = dx(8), size_rad = std::abs(up_rad);
+  if (from_outside && size_rad > 5e-4F) {
+    turn.block<2, 2>(6, 6) = Eigen::Rotation2Df(up_rad).matrix();
+    if (size_rad < 0.05F) {
+      Eigen::Matrix2f shears;
+      shears << 1 - up_rad * up_rad, -up_rad, up_rad, 1;
+      EXPECT_LT((turn.block<2, 2>(6, 6) - shears).norm(), up_rad * up_rad);
+      turn.block<2, 2>(6, 6) = shears;
+    }
+    half(7, 6) = 0.5F * up_rad, half(6, 7) = -0.5F * up_rad;
+  }
+  EXPECT_LT((ins.x.minus(from) - half * dx).norm(), 1e-4F * (1 + dx.norm()));
+  EXPECT_LT((ins.p.dense() - turn * updated.dense() * turn.transpose()).norm(), 1e-5F * scale);
+}
+
+/// The update made for many states against the one all filters share, from a covariance with every correlation.
 TYPED_TEST(InsMeasurementLaws, IsFusedAsTheSharedUpdateDoesIt) {
   constexpr int kM = TypeParam::kDimension;
+  constexpr bool kInBody = requires(TypeParam model) { model.moves; };
   test::Normal normal(11);
   for (const InsState& x : states()) {
-    filter::Symmetric<float, 15> p;
-    Eigen::Matrix<double, 15, 15> a;
-    for (int i = 0; i < 225; ++i) a(i / 15, i % 15) = normal();
-    const Eigen::Matrix<double, 15, 15> full = 0.01 * a * a.transpose();
-    p = filter::Symmetric<float, 15>::upper_of(full.cast<float>());
+    const nav::Ins::Covariance p = correlated(normal);
     auto m = Example<TypeParam>::at(x);
     for (const bool lever : {true, false}) {
       if constexpr (requires { m.antenna_b_m; }) {
         if (!lever) m.antenna_b_m.setZero();
       }
-      filter::Symmetric<float, 15> p_shared = p;
+      nav::Ins::Covariance p_shared = p;
       const auto shared = filter::update<float, 15, kM, TypeParam::kTouches.size()>(
           p_shared, m.jacobian(x), TypeParam::kTouches, m.residual(m.predict(x)), m.noise(), 1e9F);
       nav::Ins ins;
@@ -189,21 +215,8 @@ TYPED_TEST(InsMeasurementLaws, IsFusedAsTheSharedUpdateDoesIt) {
       ASSERT_EQ(record.verdict, filter::Verdict::kAccepted);
       EXPECT_NEAR(record.nis, shared.innovation.nis, 1e-4F * (1 + shared.innovation.nis));
       EXPECT_LT((record.s.dense() - shared.innovation.s.dense()).norm(), 1e-5F * shared.innovation.s.dense().norm());
-      Eigen::Matrix<float, 15, 15> turn = Eigen::Matrix<float, 15, 15>::Identity(), half = turn;
-      constexpr bool kInBody = requires { m.moves; };
-      const float up_rad = shared.dx(8), size_rad = std::abs(up_rad);
-      if (!kInBody && TypeParam::kTouches[0] < InsState::kAccelBias && size_rad > 5e-4F) {
-        turn.block<2, 2>(6, 6) = Eigen::Rotation2Df(up_rad).matrix();
-        if (size_rad < 0.05F) {
-          Eigen::Matrix2f shears;
-          shears << 1 - up_rad * up_rad, -up_rad, up_rad, 1;
-          EXPECT_LT((turn.block<2, 2>(6, 6) - shears).norm(), up_rad * up_rad);
-          turn.block<2, 2>(6, 6) = shears;
-        }
-        half(7, 6) = 0.5F * up_rad, half(6, 7) = -0.5F * up_rad;
-      }
-      EXPECT_LT((ins.x.minus(x) - half * shared.dx).norm(), 1e-4F * (1 + shared.dx.norm()));
-      EXPECT_LT((ins.p.dense() - turn * p_shared.dense() * turn.transpose()).norm(), 1e-5F * p.dense().norm());
+      expect_moved(ins, x, shared.dx, p_shared, !kInBody && TypeParam::kTouches[0] < InsState::kAccelBias,
+                   p.dense().norm());
     }
   }
 }
