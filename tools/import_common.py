@@ -200,7 +200,7 @@ class Recording:
         self.about["truth_rows"] = len(time_us)
 
     def write(self, out):
-        """OUT.log, OUT.truth.csv where there is one, and OUT.json: all of them or, when anything fails, none. No older truth stays beside them."""
+        """OUT.log, OUT.truth.csv where there is one, and OUT.json: all of them or, when anything fails, none. An older truth is set aside."""
         log = self.log.text()
         frame_times = self.log.frames()[0]
         self.about.update(messages=dict(sorted(self.log.counts.items())), frames=len(frame_times), limited=self.log.limited,
@@ -208,13 +208,13 @@ class Recording:
         truth = {} if self.truth is None else {f"{out}.truth.csv": self._truth_text().encode()}
         _replace_all({f"{out}.log": log, **truth, f"{out}.json": (json.dumps(self.about, indent=2) + "\n").encode()})
         counts = ", ".join(f"{name} {count}" for name, count in self.about["messages"].items())
-        if self.truth is None:
-            remove_older(f"{out}.truth.csv")
         print(f"{out}.log: {len(frame_times)} frames, {self.about['duration_s']:.1f} s ({counts})")
         for what, count in self.about["dropped"].items():
             print(f"  left out: {count} {what}")
         for what, count in self.log.limited.items():
             print(f"  limited to the signal's range: {count} values of {what}")
+        if self.truth is None:
+            set_aside(f"{out}.truth.csv")
 
     def _truth_text(self):
         time_us, x_m, y_m, yaw_rad = self.truth
@@ -229,11 +229,15 @@ def _sha256(path):
         return hashlib.sha256(file.read()).hexdigest()
 
 
-def remove_older(path):
-    """Another log's file by that name would be taken for this one's."""
-    if os.path.exists(path):
-        os.remove(path)
-        print(f"  {path} was of another log: removed")
+def set_aside(path):
+    """What is there by that name would be taken for this log's: it keeps its content as PATH.old."""
+    if not os.path.exists(path):
+        return
+    try:
+        os.replace(path, path + ".old")
+    except OSError as error:
+        raise BadInput(f"{path}: cannot be renamed to {path}.old: {error.strerror}") from None
+    print(f"  {path} is not of this log: now {path}.old")
 
 
 def _replace_all(contents):

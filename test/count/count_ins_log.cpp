@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Instructions of every tick of inertial navigation over a recorded log, from the start: a car's, a multirotor's.
-// Arguments: car or iris, and a candump log with sync frames.
+// Instructions of every tick of inertial navigation over a log, from the start: a rover's, a car's, a multirotor's.
+// Arguments: rover, car or iris, and a candump log with sync frames.
 #include "config/car.hpp"
 #include "config/iris.hpp"
+#include "config/rover.hpp"
 #include "hal/port/mps2/board.hpp"
 #include "markers.hpp"
 #include "navigator.hpp"
@@ -48,9 +49,11 @@ int main() {
     return 1;
   }
   count::calibrate();
-  const bool car = std::string_view(words[1]) == "car";
-  if (!(car ? count_ticks<struct ins_tick_car>(board, robot::car::numbers)
-            : count_ticks<struct ins_tick_iris>(board, robot::iris::numbers))) {
+  const std::string_view robot = words[1];
+  const bool navigated = robot == "rover" ? count_ticks<struct ins_tick_rover>(board, robot::rover::numbers)
+                         : robot == "car" ? count_ticks<struct ins_tick_car>(board, robot::car::numbers)
+                                          : count_ticks<struct ins_tick_iris>(board, robot::iris::numbers);
+  if (!navigated) {
     board.print("count_ins_log: the log was not navigated\n");
     return 1;
   }

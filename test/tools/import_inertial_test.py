@@ -388,9 +388,9 @@ class BadInput(unittest.TestCase):
         done = run("import_px4", self.set, "log", self.out)
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertIn("nothing to compare with", done.stdout)
-        self.assertIn("truth.csv was of another log: removed", done.stdout)
+        self.assertIn("truth.csv is not of this log: now", done.stdout)
         self.assertEqual(text_of(self.out + ".log"), expected)
-        self.assertEqual(sorted(os.listdir(self.directory)), ["out.json", "out.log", "set"])
+        self.assertEqual(sorted(os.listdir(self.directory)), ["out.json", "out.log", "out.reference.csv.old", "out.truth.csv.old", "set"])
 
     def test_px4s_log_names_file_line_and_reason(self):
         good = self.replay()

@@ -46,9 +46,9 @@ class Ahead {
   void watch(const Window& window, const InertialNumbers& n) {
     cells_.follow(window, n);
   }
-  /// Anew, from the far end.
+  /// Anew, from the far end. Whether cells of it had to be looked at sample by sample.
   template <class Window>
-  void carry_from(const Place& far, const Window& window, const With& with);
+  bool carry_from(const Place& far, const Window& window, const With& with);
   /// On, over what came since.
   template <class Window>
   void carry_on(const Window& window, const With& with);
@@ -154,7 +154,7 @@ void Ahead::carry_on(const Window& window, const With& with) {
 }
 
 template <class Window>
-void Ahead::carry_from(const Place& far, const Window& window, const With& with) {
+bool Ahead::carry_from(const Place& far, const Window& window, const With& with) {
   const InertialNumbers& n = with.numbers;
   place_ = far;
   cells_.follow(window, n);
@@ -171,6 +171,7 @@ void Ahead::carry_from(const Place& far, const Window& window, const With& with)
   // looked at by itself; then what there was no cell for.
   hear_until(cells_.leaving_until());
   bool skipped = false;
+  bool one_by_one = false;
   const auto look_back = [&]() {
     if (!skipped) return;
     skipped = false;
@@ -191,6 +192,7 @@ void Ahead::carry_from(const Place& far, const Window& window, const With& with)
     } else {
       look_back();
       hear_until(cell.last());
+      one_by_one = true;
     }
   }
   fold(with);
@@ -198,6 +200,7 @@ void Ahead::carry_from(const Place& far, const Window& window, const With& with)
   hear_until({std::numeric_limits<std::int64_t>::max()});
   fold(with);
   if (newest != nullptr) place_.rate_b_radps = rate_of(*newest, n);
+  return one_by_one;
 }
 
 }  // namespace tetap::app

@@ -162,9 +162,11 @@ class Inertial {
   [[nodiscard]] float heading_rad2() const { return ins_.p(8, 8) < 1.0F ? ins_.p(8, 8) : 1.0F; }
   [[nodiscard]] bool wheels_agree(base::Micros at, const Context& with) const;
   [[nodiscard]] bool without_imu() const;
-  /// Wheels that are heard so soon after the last: counts are left to the difference of the next, speeds left out.
+  /// Wheels that are heard so soon after the last: counts are left to the difference of the next, speeds left out. So
+  /// are counts while standing still waits to be told, which says more than that they do not change.
   [[nodiscard]] bool counts_soon(base::Micros at, const Context& with) const {
-    return have_counts_ && is_soon(at, counts_time_, with);
+    constexpr base::Micros kLongest{kStandEvery.us / 2};
+    return have_counts_ && (is_soon(at, counts_time_, with) || (stand_waits_ && at - counts_time_ < kLongest));
   }
   [[nodiscard]] bool speed_soon(base::Micros at, const Context& with) const { return is_soon(at, constrained_, with); }
   [[nodiscard]] static constexpr bool is_soon(base::Micros at, base::Micros last, const Context& with) {
@@ -212,6 +214,8 @@ class Inertial {
   /// Work of a tick, in IMU samples: what keeps pace with the IMU, and one measurement; or, after that, all that is
   /// ahead carried anew. More of them the farther the far end is behind.
   static constexpr std::int32_t kMeasurement = 5;
+  static constexpr std::int32_t kOfAFix = 2;           ///< to find its place, and whether it is to be trusted
+  static constexpr base::Micros kStandEvery{100'000};  ///< that it stands is told
 
   nav::Ins ins_;
   Ahead ahead_;
@@ -226,7 +230,7 @@ class Inertial {
   base::Micros counts_time_;
   base::Micros constrained_;  ///< last stamp at which wheels, or that there are some, were fused
   base::Micros moved_;        ///< last stamp at which something moved
-  base::Micros stood_;        ///< last stamp at which standing still was fused
+  base::Micros stood_;        ///< from here on it counts until that it stands is told
   WheelCounts counts_;
   bool have_counts_ = false;
   float gained_mps_ = base::kNan;                     ///< forward, by the IMU, since they were fused; NaN: not known
@@ -249,7 +253,9 @@ class Inertial {
   bool blind_ = false;          ///< the present is without IMU
   bool unusable_ = false;       ///< the last IMU sample was
   bool anew_ = false;           ///< all that is ahead was carried anew in this tick
+  bool one_by_one_ = false;     ///< and samples of it were looked at by themselves
   bool waits_ = false;          ///< something that was due was left for the next tick
+  bool stand_waits_ = false;    ///< that it stands was, or what the gyroscope shows then
   std::uint8_t corrected_ = 0;  ///< ticks since the far end was, and what is ahead of it does not have it; 0: it does
   ImuWatch imu_;
   SlipWatch slip_;

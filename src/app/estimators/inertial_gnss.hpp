@@ -72,6 +72,7 @@ struct FixNis {
 
 inline Innovation Inertial::fuse(const GnssPosition& fix, base::Micros stamp, const Context& with) {
   const GnssNumbers& n = with.numbers.gnss;
+  work_left_ -= kOfAFix;
   if (fix.fix < GnssFix::k2d || with.site.origin == can::OriginSource::kNone) return {};
   const bool has_height = base::is_finite(fix.height_m);
   const nav::Local local = with.site.frame.to_local(fix.latitude_2ndeg, fix.longitude_2ndeg,

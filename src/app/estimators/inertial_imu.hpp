@@ -65,7 +65,7 @@ inline Innovation Inertial::fuse(const ImuSample& sample, base::Micros stamp, co
     return {.verdict = can::Verdict::kNotFinite};
   }
   // A measurement brings it up to date; where this tick may take one, it is left to that.
-  const float every_s = anew_ ? 7.5e-3F : 20e-3F;
+  const float every_s = !anew_ ? 20e-3F : one_by_one_ ? 30e-3F : 7.5e-3F;
   ins_.vibration = imu_.noise_factor(n);
   if (ins_.pending_s() >= every_s) ins_.predict_covariance();
   // Clipped increments are used, and are as uncertain as none.
@@ -193,7 +193,8 @@ inline void Inertial::is_elsewhere() {
 /// only to a filter that knows less, and each mean of the gyroscope has samples of its own.
 inline void Inertial::stand(base::Micros stamp, const Context& with) {
   const InertialNumbers& n = with.numbers.inertial;
-  constexpr base::Micros kQuiet{500'000}, kEvery{100'000};
+  constexpr base::Micros kQuiet{500'000};
+  stand_waits_ = false;
   const bool gyro = !without_imu();
   const nav::Vector3 turn = rate_b_radps_ - ins_.x.b_g_radps;
   if (!gyro || !imu_.calm(n)) {
@@ -202,25 +203,35 @@ inline void Inertial::stand(base::Micros stamp, const Context& with) {
     calm_ = stamp;
     grounds_ = 0;
   }
-  const bool wheels = have_counts_ && stamp - counts_time_ < kEvery;
+  const bool wheels = have_counts_ && stamp - counts_time_ < kStandEvery;
   const bool quiet = wheels ? stamp - moved_ > kQuiet && slip_.slip() == SlipWatch::Slip::kNone : resting(stamp, with);
   ins_.stands = quiet && turn.squaredNorm() <= n.still_radps * n.still_radps;
   if (!ins_.stands) {
     still_.s = waiting_.s = 0;
+    stood_ = stamp - kStandEvery;
     return;
   }
   const auto gate = [](int dof) { return filter::chi_square_99(dof) * 4.0F; };
   const float sigma = wheels ? n.still_mps : n.still_gnss_mps;
-  if (stamp - stood_ >= kEvery && can_do(stamp - stood_, kEvery)) {
-    stood_ = stamp;
-    const float least = sigma * sigma;
-    if (ins_.p(3, 3) > least || ins_.p(4, 4) > least || ins_.p(5, 5) > least)
+  const float least = sigma * sigma;
+  if (stamp - stood_ >= kStandEvery) {
+    if (!(ins_.p(3, 3) > least || ins_.p(4, 4) > least || ins_.p(5, 5) > least)) {
+      stood_ = stamp;
+    } else if (can_do(stamp - stood_, kStandEvery)) {
+      stood_ = stamp;
       static_cast<void>(update(model::ZeroVelocity{.sigma_mps = sigma}, gate(3)));
+    } else {
+      stand_waits_ = true;
+    }
   }
   // A turn of less than one count is not seen at once: a mean is told when standing has lasted a little longer.
   constexpr float kMean_s = 0.5F, kLonger_s = 0.25F;
-  if (still_.s < kLonger_s || !gyro || (work_left_ < kMeasurement && still_.s < kMean_s)) return;
+  if (still_.s < kLonger_s || !gyro) return;
   if (waiting_.s > 0.0F) {
+    if (work_left_ < kMeasurement && still_.s < kMean_s) {
+      stand_waits_ = true;
+      return;
+    }
     hold_heading(gate(3), n);
     waiting_.s = 0;
   } else if (still_.s >= kMean_s) {

@@ -137,7 +137,7 @@ void Inertial::each_bit(Sink&& sink) const {
   }
   sink(static_cast<std::uint32_t>(counts_.left | counts_.right << 16U));
   const unsigned flags = (have_counts_ ? 1U : 0U) | (unusable_ ? 2U : 0U) | (anew_ ? 4U : 0U) | (waits_ ? 8U : 0U) |
-                         (speed_known_ ? 16U : 0U);
+                         (speed_known_ ? 16U : 0U) | (stand_waits_ ? 32U : 0U) | (one_by_one_ ? 64U : 0U);
   sink(static_cast<std::uint32_t>(flags | unsigned{corrected_} << 8U));
   sink(work_left_);
   sink(wrong_way_.in_a_row);

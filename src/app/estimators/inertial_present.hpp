@@ -9,13 +9,28 @@ namespace tetap::app {
 
 /// In IMU samples: what is switched off or only gathered costs nothing.
 inline std::int32_t Inertial::work_of(const Sample& sample, const Context& with) const {
-  const bool off = (sample.sensor == can::Sensor::kMagnetometer && with.numbers.magnetic.use == 0) ||
-                   (sample.sensor == can::Sensor::kBarometer && with.numbers.baro.use == 0);
-  const bool speed = sample.sensor == can::Sensor::kWheelSpeed || sample.sensor == can::Sensor::kBodySpeed;
-  if (off || (sample.sensor == can::Sensor::kWheelCounts && counts_soon(sample.stamp, with)) ||
-      (speed && speed_soon(sample.stamp, with)))
-    return 0;
-  return sample.sensor == can::Sensor::kImu ? 1 : kMeasurement;
+  if (sample.sensor == can::Sensor::kImu) return 1;
+  bool free = false;
+  switch (sample.sensor) {
+    case can::Sensor::kGnssPosition:
+      return kMeasurement + kOfAFix;
+    case can::Sensor::kWheelCounts:
+      free = counts_soon(sample.stamp, with);
+      break;
+    case can::Sensor::kWheelSpeed:
+    case can::Sensor::kBodySpeed:
+      free = speed_soon(sample.stamp, with);
+      break;
+    case can::Sensor::kMagnetometer:
+      free = with.numbers.magnetic.use == 0;
+      break;
+    case can::Sensor::kBarometer:
+      free = with.numbers.baro.use == 0;
+      break;
+    default:
+      break;
+  }
+  return free ? 0 : kMeasurement;
 }
 
 /// From the last that was published before it began anew, see begin_anew().
@@ -60,13 +75,15 @@ void Inertial::advance(base::Micros t, const Context& with, const Window& window
   if (t - anew_at_ >= kLongest) corrected();
   constexpr std::uint8_t kPatience = 3;
   anew_ = corrected_ > kPatience || (corrected_ > 0 && !waits_);
-  waits_ = false;
+  waits_ = one_by_one_ = false;
   if (anew_) {
     corrected_ = 0;
     anew_at_ = t;
-    ahead_.carry_from(
+    one_by_one_ = ahead_.carry_from(
         {.x = ins_.x, .reached = time_, .last = imu_.heard(), .repeats = imu_.repeats(), .rate_b_radps = rate_b_radps_},
         window, how);
+    // Then the far end leaves one of its own for later.
+    if (one_by_one_ && work_left_ > 1) --work_left_;
   } else {
     if (corrected_ > 0) ++corrected_;
     work_left_ += kMeasurement + 1;

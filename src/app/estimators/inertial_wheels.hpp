@@ -171,7 +171,7 @@ inline bool Inertial::wheels_agree(base::Micros at, const Context& with) const {
 /// A wheel speed of which nothing is known: the non-holonomic constraint is what it leaves.
 inline void Inertial::constrain(base::Micros stamp, const Context& with) {
   const base::Micros every{with.numbers.inertial.constrain_every_us};
-  if (every.us <= 0 || stamp - constrained_ < every || !can_do(stamp - constrained_, every)) return;
+  if (every.us <= 0 || stamp - constrained_ < every || stand_waits_ || !can_do(stamp - constrained_, every)) return;
   // Of a start in motion: linearised about a speed and a heading that are both in doubt it leaves out the product of
   // the two doubts. While that is more than the mean of its noise over some samples, what is left out would be taken
   // for a heading.
