@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The inertial estimator, compiled once for the tests that drive it: it is headers alone, and each file that calls it
-// would spend a quarter of a minute on it.
+// The inertial estimator, compiled once for the tests that drive it by itself (not in a node): it is headers alone, and
+// each file that calls it would spend a quarter of a minute on it.
 #pragma once
 
 #include "app/estimators/inertial.hpp"

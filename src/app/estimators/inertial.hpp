@@ -230,7 +230,7 @@ class Inertial {
   base::Micros counts_time_;
   base::Micros constrained_;  ///< last stamp at which wheels, or that there are some, were fused
   base::Micros moved_;        ///< last stamp at which something moved
-  base::Micros stood_;        ///< from here on it counts until that it stands is told
+  base::Micros stood_;        ///< last that it stands was told; while it moves such that it is due at once
   WheelCounts counts_;
   bool have_counts_ = false;
   float gained_mps_ = base::kNan;                     ///< forward, by the IMU, since they were fused; NaN: not known
