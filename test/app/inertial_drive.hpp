@@ -66,6 +66,7 @@ class Drive {
   double east_m = 0, north_m = 0, up_m = 0, yaw_rad = 0.3, speed_mps = 1, turn_radps = 0.05;
   double unseen_east_m = 0;  ///< it is carried, and no sensor of motion shows it
   double white_m = 1, lasting_m = 0, lasting_s = 60;
+  double believed = 1;         ///< the receiver's own accuracy figure, in what it is
   double gyro_bias_radps = 0;  ///< about the vertical
   std::int64_t gnss_every_us = 200'000, speedometer_every_us = 10'000;
   bool wheels = true, speedometer = false, gnss_velocity = true;
@@ -95,6 +96,7 @@ class Drive {
                       static_cast<double>(now_.state.y.minus(other.now_.state.y)));
   }
   [[nodiscard]] double height_error_m() const { return std::abs(off(now_.state.z, up_m)); }
+  [[nodiscard]] double height_sigma_m() const { return std::sqrt(static_cast<double>(now_.p(2, 2))); }
   [[nodiscard]] double sigma_yaw_rad() const { return std::sqrt(static_cast<double>(now_.p(8, 8))); }
   [[nodiscard]] double yaw_error_rad() const {
     return std::abs(
@@ -179,7 +181,7 @@ class Drive {
     if (!tamper(fix)) return;
     velocity.v_n_mps[0] += fix.east_off_mps;
     const double cosine = std::cos(24'131'350'000 * 2e-9 * 3.14159265358979 / 180);
-    const auto sigma = static_cast<float>(std::hypot(white_m, lasting_m));
+    const auto sigma = static_cast<float>(believed * std::hypot(white_m, lasting_m));
     if (!fix.repeated) {
       said_ = {.latitude_2ndeg = 24'131'350'000 + std::llround(fix.north_m * kMetre_2ndeg),
                .longitude_2ndeg = 5'834'150'000 + std::llround(fix.east_m * kMetre_2ndeg / cosine),

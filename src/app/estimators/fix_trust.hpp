@@ -207,6 +207,11 @@ class FirstFixes {
 /// the last): its variance is up to a fifth above what the sum of their information promises.
 inline constexpr float kNoLookingBack = 1.22F;
 
+/// 1 sigma of the place that the first of such fixes gives, in the receiver's own: those that follow hardly correct it,
+/// so it is as wrong for minutes as its accuracy figure was at that moment. With a figure that is off by a fifth (1
+/// sigma) 99.7 % of the errors are inside 3.7 of its sigmas, which are to be 3.
+inline constexpr float kFirstOfMany = 1.23F;
+
 /// By how much the variance of a fix whose error lasts for `correlation_s` grows when the one before was `since_s` ago:
 /// with phi = exp(-t / tau), z_k - phi z_(k-1) has a white error of variance (1 - phi^2) r and sees (1 - phi) of the
 /// position: (1 + phi) / (1 - phi) (Bryson & Henrikson 1968, measurement differencing). A fix after a long silence

@@ -5,6 +5,7 @@
 // are heard, what finds a heading goes on beside the filter and judges its.
 #pragma once
 
+#include "app/estimators/fix_trust.hpp"
 #include "app/numbers.hpp"
 #include "model/gnss_course.hpp"
 #include "model/gnss_fix_3d.hpp"
@@ -131,14 +132,16 @@ class InertialStart {
     if (anew || near) first_yaw_rad_ = yaw, way_s_ = 0;
     far_ = far && !anew;
     fixed_ = heard_ = true;
+    const float alone = numbers.gnss.correlation_s > 0.0F ? kFirstOfMany : 1.0F;
     if (given_ && headed_ && at_.sigma_horizontal_m < fix.sigma_horizontal_m) {  // a pose from outside that is better
       at_.z = fix.z;
-      at_.sigma_vertical_m = fix.sigma_vertical_m;
-      return;
+    } else {
+      at_ = fix;
+      at_.sigma_horizontal_m *= alone;
+      placed_ = true;
+      given_ = false;
     }
-    at_ = fix;
-    placed_ = true;
-    given_ = false;
+    at_.sigma_vertical_m = alone * fix.sigma_vertical_m;
   }
   /// Without has_climb its vertical part is none.
   void velocity(const nav::Vector3& v_n_mps, float sigma_mps, bool has_climb, const Numbers& n) {
