@@ -287,6 +287,24 @@ TEST(Repeated, WhatAFilterMakesOfThemIsNeverWorseThanItSays) {
   EXPECT_GT(worst, 0.98 * static_cast<double>(kNoLookingBack)) << "and no more is added than is needed";
 }
 
+/// Of errors of 1 sigma, the share within `factor` times an accuracy figure that is off by a fifth, from half to twice.
+double share_within(double factor) {
+  constexpr int kSteps = 12'000;
+  double share = 0, weights = 0;
+  for (int i = -kSteps; i <= kSteps; ++i) {
+    const double sigmas = 6.0 * i / kSteps, weight = std::exp(-0.5 * sigmas * sigmas);
+    share += weight * std::erf(factor * std::clamp(1 + 0.2 * sigmas, 0.5, 2.0) / std::sqrt(2.0));
+    weights += weight;
+  }
+  return share / weights;
+}
+
+TEST(FirstOfMany, ThreeSigmaHoldsWhatItPromisesWithAFigureThatIsOff) {
+  const double promised = std::erf(3 / std::sqrt(2.0)), three_sigma = 3 * static_cast<double>(kFirstOfMany);
+  EXPECT_GE(share_within(three_sigma), promised);
+  EXPECT_LT(share_within(0.98 * three_sigma), promised) << "and no more is added than is needed";
+}
+
 TEST(Repeated, AFixAfterALongSilenceAndWhiteErrorsCountInFull) {
   EXPECT_EQ(repeated(0.2F, 0.0F), 1.0F);
   EXPECT_NEAR(repeated(300.0F, 60.0F), 1.0F, 0.02F);

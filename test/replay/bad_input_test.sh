@@ -175,6 +175,7 @@ done
 refused "replay on no such board" "no board 'arduino'" env LOG="$work/good.log" BOARD=arduino OUT="$work/out" tools/replay
 refused "sim on no such board" "no board 'arduino'" env BOARD=arduino OUT="$work/out" tools/sim
 refused "sim with an unknown fault" 'meteor' env BUS=memory FAULT=meteor OUT="$work/out" tools/sim
+refused "sim with a fault whose start is no number" "fault 'gnss_jump@soon': START is not" env BUS=memory FAULT=gnss_jump@soon OUT="$work/out" tools/sim
 refused "sim with an unknown fault over a bus" "fault 'meteor'" timeout 20 env FAULT=meteor OUT="$work/out" tools/sim
 refused "sim with a fault of a sensor it has not" "fault 'mag_disturbance': robot rover has no magnetometer; faults that act on it: gnss_jump .*; robots on which it acts: iris" \
   timeout 20 env FAULT=gnss_jump,mag_disturbance OUT="$work/out" tools/sim

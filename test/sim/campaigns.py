@@ -22,6 +22,7 @@ CHANCE = 0.99          # of passing a bound on a number of seeds where their sha
 ASTRAY_PERCENT = 0.7   # of the way, after a minute without GNSS
 SLIP_SAID_S, SLIP_ERROR_M = 0.5, 0.3
 RECEIVER_M, POOR_RECEIVER_M = 0.85, 1.5  # 1 sigma on each horizontal axis: the world's own, and one that leaves a glitch more room
+UP_FACTOR, HEIGHT_SIGMAS = 1.6, 3  # 1 sigma of a fix's height in that, and how far off its own wander may leave the estimate
 MODEL_SHARE = 0.1      # of 3, by which a mean NEES may be off: what the gate cuts off, what the bus rounds
 MODEL_SHARE_OF_MANY = 0.03  # the same of ten campaigns: a third, as chance leaves a third as much
 ROWS = 6               # pose, position, velocity, attitude, both biases
@@ -30,8 +31,8 @@ WITHIN_2 = 2.0         # a median of a few seeds is allowed to be off by this fa
 FIXES_HZ = 5
 RAMP_SAID_S = 5.5        # a ramp of 1 m/s by its drift; a fix of a poor receiver alone is outside its gate after 6 to 7.4 s
 TOO_SURE_SHARE = 0.02  # of many seeds, for more than a second: the world is not the filter's model; of a few, none
-# A right filter leaves 3 sigma, too, and its errors last: without any fault so many do (--fault none --world matched --gnss-m 1.5 --seeds 240).
-RIGHT_TOO_SURE_SHARE = 0.07
+# A right filter's share, rounded up: three axes with some three independent errors each in 200 s, of which 1 in 370 is beyond 3 sigma.
+START_TOO_SURE_SHARE = 0.03
 # What README says is not met. Seeds of all that are too sure for more than a second, and how far an error goes beyond 3 sigma at the worst.
 KNOWN_TOO_SURE = {"gyro_bias_step": (1, 5), "kidnapped": (1, 30), "stale_stamps": (0.25, 3), "future_stamps": (0.25, 3), "clock_jump": (0.125, 3)}
 KNOWN_SLIP_WORST_M = 0.6
@@ -97,16 +98,17 @@ def outage(case, checks):
     checks.bound(what + "too sure for more than a second [seeds]", fused["too_sure_seeds"], 0, int(TOO_SURE_SHARE * seeds))
 
 
-def gnss_fault(fault, case, receiver_m, checks):
-    """Refused, recovered from, and at no time an error that the sigmas deny more often than they do without it."""
+def gnss_fault(fault, case, plain, receiver_m, checks):
+    """Refused, recovered from, and at no time an error that the sigmas deny more often than they do in the same drive without it; in the matched world,
+    where a right filter leaves its 3 sigma now and then, by chance in one or two of them."""
     fused, seeds = case["fused"], case["seeds"]
-    right = most(seeds, RIGHT_TOO_SURE_SHARE) if case["world"] == "matched" else 0
+    right = (plain["fused"]["too_sure_seeds"] if plain else 0) + (most(seeds, TOO_SURE_SHARE) if case["world"] == "matched" else 0)
     start, end = case["fault_times_s"]
     name = fault if receiver_m == RECEIVER_M else f"{case['world']}, GNSS of {receiver_m:g} m, {fault}"
     checks.bound(f"{name}: too sure for more than a second [seeds]", fused["too_sure_seeds"], 0, right)
     # No further off than dead reckoning goes in that time.
     checks.bound(f"{name}: largest error [m], worst", fused["largest_error_m"]["worst"], 0.05, 1 + 0.01 * fused["driven_m"]["median"])
-    checks.bound(f"{name}: largest error of the height [m], worst", fused["largest_height_error_m"]["worst"], 0.1, 5)
+    checks.bound(f"{name}: largest error of the height [m], worst", fused["largest_height_error_m"]["worst"], 0.1, HEIGHT_SIGMAS * UP_FACTOR * receiver_m)
     checks.bound(f"{name}: RMSE after it [m], median", fused["position_rmse_after_m"]["median"], 0.02, math.sqrt(2) * receiver_m)
     wrong = {"gnss_jump": FIXES_HZ * (end - start), "gnss_ramp": FIXES_HZ * (end - start), "gnss_far": 105}.get(fault)
     if wrong:  # a ramp is inside the gate at first
@@ -120,12 +122,13 @@ def gnss_fault(fault, case, receiver_m, checks):
 
 
 def start(case, checks):
-    """Its place is that of the first fixes, whose error stays: one draw a seed and axis."""
+    """Its place is that of the fix it begins with, whose error stays: one draw a seed and axis, so that the mean of 200 seeds is known to 0.35 (19 of
+    20). Told 1.23 squared times the variance (kFirstOfMany), of figures whose inverse square is 1.14 in the mean, what a fix leaves is 2.3 and what
+    the filter makes of the others some 20 % more; with the receiver's own figure it was 3.65."""
     fused, seeds = case["fused"], case["seeds"]
-    nees = fused["blocks"]["position"]["anees"]
-    checks.bound("start without a place: NEES of position, mean (3)", nees["mean"], 1, 3 + nees["mean_plus_minus"])
-    checks.bound("start without a place: too sure for more than a second [seeds]", fused["too_sure_seeds"], 0, most(seeds, RIGHT_TOO_SURE_SHARE))
-    checks.bound("start without a place: RMSE after a minute [m], median", fused["position_rmse_after_m"]["median"], 0.1, math.sqrt(2) * RECEIVER_M)
+    checks.bound("start without a place: NEES of position, mean (3)", fused["blocks"]["position"]["anees"]["mean"], 2, 3.35)
+    checks.bound("start without a place: too sure for more than a second [seeds]", fused["too_sure_seeds"], 0, most(seeds, START_TOO_SURE_SHARE))
+    checks.bound("start without a place: RMSE after 70 s [m], median", fused["position_rmse_after_m"]["median"], 0.1, math.sqrt(2) * RECEIVER_M)
 
 
 def other_fault(name, case, plain, checks):
@@ -150,13 +153,13 @@ def name_of(label):
 
 
 def faults(cases, checks, receiver_m=RECEIVER_M):
-    plain = next((case for label, case in cases.items() if label.endswith(", none")), None)
+    plain = {case["world"]: case for label, case in cases.items() if name_of(label) == "none"}
     for label, case in cases.items():
         name = name_of(label)
         if name.startswith("gnss_"):
-            gnss_fault(name, case, receiver_m, checks)
+            gnss_fault(name, case, plain.get(case["world"]), receiver_m, checks)
         elif name != "none":
-            other_fault(name, case, plain, checks)
+            other_fault(name, case, plain.get(case["world"]), checks)
 
 
 def matched(case, checks):
@@ -219,8 +222,8 @@ def whole_form(out, checks):
             outage(case, checks)
     faults(campaign(out, "faults", "--fault", "all", "--world", "mismatched", "--seeds", "8"), checks)
     faults(campaign(out, "glitch", "--scenario", "glitch", "--seeds", "8"), checks, POOR_RECEIVER_M)
-    for case in campaign(out, "start", "--scenario", "start", "--world", "mismatched", "--seeds", "30").values():
-        start(case, checks)
+    starts = campaign(out, "start", "--scenario", "start", "--world", "mismatched", "--seeds", "200")
+    start(starts["mismatched, no place, none"], checks)
     found = campaign_of(out, "matched", "--scenario", "consistency", "--world", "matched", "--seeds", "100", "--repeat", "10")
     for case in found["cases"]:
         matched(case, checks)

@@ -207,9 +207,10 @@ class FirstFixes {
 /// the last): its variance is up to a fifth above what the sum of their information promises.
 inline constexpr float kNoLookingBack = 1.22F;
 
-/// 1 sigma of the place that the first of such fixes gives, in the receiver's own: those that follow hardly correct it,
-/// so it is as wrong for minutes as its accuracy figure was at that moment. With a figure that is off by a fifth (1
-/// sigma) 99.7 % of the errors are inside 3.7 of its sigmas, which are to be 3.
+/// 1 sigma of the place where it begins (with a pose: of the height), in the accuracy figure of that moment: the fixes
+/// that follow hardly correct it, so a figure that is too small stays for minutes. That it is off by a fifth (1 sigma,
+/// from half to twice) is assumed, as of the simulated receiver; none was measured. Then 99.73 % of all errors are
+/// inside 3.68 times the figure, which is to be 3 sigma.
 inline constexpr float kFirstOfMany = 1.23F;
 
 /// By how much the variance of a fix whose error lasts for `correlation_s` grows when the one before was `since_s` ago:

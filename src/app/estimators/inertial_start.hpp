@@ -132,16 +132,16 @@ class InertialStart {
     if (anew || near) first_yaw_rad_ = yaw, way_s_ = 0;
     far_ = far && !anew;
     fixed_ = heard_ = true;
-    const float alone = numbers.gnss.correlation_s > 0.0F ? kFirstOfMany : 1.0F;
+    const float doubt = numbers.gnss.correlation_s > 0.0F ? kFirstOfMany : 1.0F;
     if (given_ && headed_ && at_.sigma_horizontal_m < fix.sigma_horizontal_m) {  // a pose from outside that is better
       at_.z = fix.z;
     } else {
       at_ = fix;
-      at_.sigma_horizontal_m *= alone;
+      at_.sigma_horizontal_m *= doubt;
       placed_ = true;
       given_ = false;
     }
-    at_.sigma_vertical_m = alone * fix.sigma_vertical_m;
+    at_.sigma_vertical_m = doubt * fix.sigma_vertical_m;
   }
   /// Without has_climb its vertical part is none.
   void velocity(const nav::Vector3& v_n_mps, float sigma_mps, bool has_climb, const Numbers& n) {
