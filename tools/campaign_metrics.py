@@ -251,9 +251,8 @@ def averaged(case, runs):
             if framed and counts["accepted"] > metrics.MOST_FRAMED * framed["compared"]:
                 del entry["sensors"][sensor]  # it has frames about what was rejected only
         if "blocks" in mine[0]:
-            alone = case["repeat"] == 1  # the mean of several campaigns says without a draw what chance leaves of each
             entry["blocks"] = {block: {"anees": anees([one["blocks"][block] for one in mine]), "unit": metrics.UNITS[block],
-                                       "by_chance": by_chance([one["blocks"][block] for one in mine]) if alone else None,
+                                       "by_chance": by_chance([one["blocks"][block] for one in mine]),
                                        "rmse": spread([one["blocks"][block]["rmse"] for one in mine]),
                                        "inside_3_sigma": float(np.mean([one["blocks"][block]["inside_3_sigma"] or 0 for one in mine]))}
                                for block in metrics.BLOCKS}
