@@ -65,7 +65,7 @@ inline void send_only(const Sent& sent, World::Options& world) {
 /// Names of the robots on which that fault acts in that world, with a space between each.
 [[nodiscard]] inline std::string robots_it_acts_on(Fault fault, const World::Options& world) {
   std::string names;
-  std::istringstream all{std::string{kRobotNames}};
+  std::istringstream all{kRobotNames};
   for (std::string name; all >> name;) {
     World::Options as_sent = world;
     send_only(sent_to(name), as_sent);

@@ -27,7 +27,7 @@ The firmware as a Linux program on SocketCAN. Ends on INT or TERM with status 0.
   --can IFACE    the interface (default vcan0)
   --robot NAME   what it is (default rover):
                  )" +
-         std::string(tetap::sim::kRobotNames) + R"(
+         tetap::sim::kRobotNames + R"(
   --base ID      first id of the node's block of 64 (default 0x300)
   --list-robots  print the names of the robots, nothing else
   --boot-line    print what a flash image of this robot says of its core at boot, nothing else
@@ -67,7 +67,7 @@ int main(int argc, char** argv) try {
   const std::uint32_t base = arguments.base();
   const bool boot_line = arguments.flag("--boot-line");
   arguments.finish();
-  if (list_robots) return std::printf("%s\n", std::string(tetap::sim::kRobotNames).c_str()), 0;
+  if (list_robots) return std::printf("%s\n", tetap::sim::kRobotNames.c_str()), 0;
   std::signal(SIGINT, ask_to_stop);
   std::signal(SIGTERM, ask_to_stop);
   tetap::sim::for_robot(robot, [&]<class Estimators>(std::type_identity<Estimators>, tetap::app::Numbers numbers) {

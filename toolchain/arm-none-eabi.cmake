@@ -1,4 +1,5 @@
-# Toolchain file of everything that is flashed. TETAP_CORE picks the core: r5 (Zynq UltraScale+), m7 or m4f (MPS2).
+# Toolchain file of everything that is flashed. A preset names the core, TETAP_CORE: r5, m7 or m4f, and the board, TETAP_BOARD: a folder of
+# hal/port (one for several cores: with _m7 or _m4f behind its name).
 set(CMAKE_SYSTEM_NAME Generic)
 set(CMAKE_SYSTEM_PROCESSOR arm)
 set(CMAKE_C_COMPILER arm-none-eabi-gcc)
@@ -16,17 +17,15 @@ list(APPEND CMAKE_TRY_COMPILE_PLATFORM_VARIABLES TETAP_CORE)
 if(TETAP_CORE STREQUAL "r5")
   # VFPv3-D16: no fused multiply-add.
   set(TETAP_CORE_FLAGS "-mcpu=cortex-r5 -mfpu=vfpv3-d16 -mfloat-abi=hard -marm")
-  set(TETAP_BOARD zynqmp_r5)
 elseif(TETAP_CORE STREQUAL "m7")
   set(TETAP_CORE_FLAGS "-mcpu=cortex-m7 -mfpu=fpv5-d16 -mfloat-abi=hard -mthumb")
-  set(TETAP_BOARD mps2_m7)
 elseif(TETAP_CORE STREQUAL "m4f")
   # Double precision is done in software (libgcc).
   set(TETAP_CORE_FLAGS "-mcpu=cortex-m4 -mfpu=fpv4-sp-d16 -mfloat-abi=hard -mthumb")
-  set(TETAP_BOARD mps2_m4f)
 else()
   message(FATAL_ERROR "TETAP_CORE is '${TETAP_CORE}'; it must be r5, m7 or m4f")
 endif()
+set(TETAP_BOARD "" CACHE STRING "a board of hal/port")
 foreach(language C CXX ASM)
   set(CMAKE_${language}_FLAGS_INIT "${TETAP_CORE_FLAGS}")
 endforeach()

@@ -22,7 +22,7 @@ robot_known() {
 }
 image_known() {
   local robots
-  robots=$(sed -n 's/^foreach(robot \(.*\))$/\1/p' "$root/hal/port/CMakeLists.txt")
+  robots=$(cd "$root/config" && for one in *.hpp; do [ "$one" = messages.hpp ] || echo "${one%.hpp}"; done | xargs)
   # shellcheck disable=SC2086
   one_of "$1" $robots || { echo "no image of robot '$1'; there are: $robots" >&2; return 2; }
 }
@@ -52,7 +52,7 @@ node_start() {
 player_options() { [ "$1" = linux ] || echo "--window 1 --emulated"; }
 
 # node_said: what it printed, without the line that says what runs.
-node_said() { grep -vE '^(qemu-r5: running |tetap-node: robot [a-z_]+ on )' "$node_log"; }
+node_said() { grep -vE '^(qemu-r5: running |tetap-node: robot [A-Za-z0-9_]+ on )' "$node_log"; }
 
 # with_node COMMAND...: a player's run and its status; when the node ends first, so does the player, and what the node said is the error.
 with_node() {

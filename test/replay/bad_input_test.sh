@@ -134,8 +134,8 @@ number --gnss-hz 0 5.5
 number --gnss-m 0 nan
 number --east nan 60001
 # Every robot that there is stands in every program's help.
-every_robot=$(grep -oE 'name == "[a-z_]+"' sim_host/robots.hpp | cut -d'"' -f2)
-[ "$(wc -w <<<"$every_robot")" -ge 10 ] || { echo "WRONG  sim_host/robots.hpp names fewer than 10 robots"; failed=$((failed + 1)); }
+every_robot=$("$programs/tetap-node" --list-robots)
+[ "$(wc -w <<<"$every_robot")" -ge 10 ] || { echo "WRONG  tetap-node lists fewer than 10 robots: $every_robot"; failed=$((failed + 1)); }
 for robot in $every_robot; do
   for program in node play world; do
     count=$((count + 1))
@@ -145,7 +145,7 @@ done
 
 for robot in $every_robot; do
   count=$((count + 1))
-  make --no-print-directory help | grep '^  robots: ' | grep -qwF -- "$robot" || { echo "WRONG  make help does not name $robot"; failed=$((failed + 1)); }
+  make --no-print-directory help | grep -E '^  (robots|and in simulation)' | grep -qwF -- "$robot" || { echo "WRONG  make help does not name $robot"; failed=$((failed + 1)); }
 done
 
 # Tools
@@ -186,8 +186,8 @@ refused "a world with a fault of wheels it has not" "fault 'wheel_spin': robot r
 refused "firmware for no such board" "no board 'arduino'; there are: zynqmp_r5" env BOARD=arduino tools/firmware
 refused "firmware for no such robot" "no image of robot 'tank'; there are: .*mrclam" env BOARD=zynqmp_r5 ROBOT=tank tools/firmware
 # An image that is over its budget, or allocates, is no firmware: in a tree whose tools say yes, but for one.
-mkdir -p "$work/tree/hal/port" "$work/tree/config"
-cp -r tools "$work/tree" && cp hal/port/CMakeLists.txt "$work/tree/hal/port" && cp config/*.hpp "$work/tree/config"
+mkdir -p "$work/tree/config"
+cp -r tools CMakePresets.json "$work/tree" && cp config/*.hpp "$work/tree/config"
 for tool in heap layers size stack; do
   for one in build heap layers size stack; do printf '#!/bin/sh\n' >"$work/tree/tools/$one"; done
   printf '#!/bin/sh\ncase $* in *tetap-zynqmp_r5-husky.elf*) echo "$0: no" >&2; exit 1 ;; esac\n' >"$work/tree/tools/$tool"

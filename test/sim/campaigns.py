@@ -35,8 +35,9 @@ RAMP_SAID_S = 5.5        # a ramp of 1 m/s by its drift; a fix of a poor receive
 TOO_SURE_SHARE = 0.02  # of many seeds, for more than a second: the world is not the filter's model; of a few, none
 # A right filter's share, rounded up: three axes with some three independent errors each in 200 s, of which 1 in 370 is beyond 3 sigma.
 START_TOO_SURE_SHARE = 0.03
-# What README says is not met. Seeds of all that are too sure for more than a second, and how far an error goes beyond 3 sigma at the worst.
-KNOWN_TOO_SURE = {"gyro_bias_step": (1, 5), "kidnapped": (1, 30), "stale_stamps": (0.25, 3), "future_stamps": (0.25, 3), "clock_jump": (0.125, 3)}
+# What README says is not met: the share of the seeds that is too sure for more than a second, and how far an error goes beyond 3 sigma at the worst.
+# And what loses its place, is as far off afterwards as a receiver is, and says so.
+KNOWN_TOO_SURE = {"gyro_bias_step": (1, 5), "kidnapped": (1, 30), "stale_stamps": (0, 1.25), "future_stamps": (0, 1.25), "clock_jump": (0, 1.25)}
 KNOWN_SLIP_WORST_M = 0.6
 # A modest filter: half of what the mean NEES of each block was in the mismatched world.
 KNOWN_MODEST = {"position": 1.1, "velocity": 0.2, "attitude": 0.3, "gyro bias": 0.45, "acc bias": 0.3}

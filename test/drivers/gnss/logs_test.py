@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
 """logs_test.py GNSS_LOG [--verbose]: real receivers' logs through the driver (GNSS_LOG prints its reports), against gpsd's expected results
-beside them (.log.chk) and against gpsdecode on the same bytes. Data: $TETAP_DATA/gpsd; without it or gpsdecode exit 77: skipped.
+beside them (.log.chk) and against gpsdecode on the same bytes. Data: $TETAP_DATA/gpsd and its folders; without it or gpsdecode exit 77: skipped.
 
 Equal means, with half a unit of the last digit printed on either side: a fix of ours has the judge's time of day, latitude and longitude,
 and every other field that both give: also the date (gpsd moves old ones on by 1024 weeks, so modulo those) and errors as GST and UBX
@@ -10,6 +10,7 @@ its TPVs of one time and must agree with one of them, field by field. Dilution o
 to be in our reports, in the same order.
 What differs is listed in EXPECTED with its reason and exact count; any other number, also a smaller one, fails."""
 import datetime
+import glob
 import json
 import math
 import os
@@ -248,7 +249,10 @@ def main():
     if not os.path.isdir(data):
         print(f"no {data}: skipped")
         return 77
-    logs = sorted(os.path.join(data, d, f) for d in ("dev", "other") for f in os.listdir(os.path.join(data, d)) if f.endswith(".log"))
+    logs = sorted(path for path in glob.glob(os.path.join(glob.escape(data), "**", "*.log"), recursive=True) if os.path.exists(path + ".chk"))
+    if not logs:
+        print(f"no log with its .log.chk in {data}: skipped")
+        return 77
     if shutil.which("gpsdecode") is None:
         print("no gpsdecode (Debian's gpsd-clients): skipped")
         return 77
