@@ -27,7 +27,7 @@ help: ## this list
 	@echo "tetap: state estimation on the robot's own microcontroller"; echo
 	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | while IFS=$$'\t' read -r name text; do printf '  make %-9s %s\n' "$$name" "$$text"; done
 	@echo; echo "  ROBOT=$(ROBOT) BOARD=$(BOARD) BUS=$(BUS) SEED=$(SEED) FAULT= REALTIME= LOG= TRUTH="
-	@echo "  robots: $(filter-out messages,$(basename $(notdir $(sort $(wildcard config/*.hpp))))) (a config/NAME.hpp of your own is one, too)"
+	@echo "  robots: $$(tools/robots) (a config/NAME.hpp of your own is one, too)"
 	@echo "  and in simulation alone, told all of the world's noise: rover_landmarks_matched rover_matched"
 
 sim: setup programs ## the simulated world over vcan0: table, report, pictures in out/sim (SEED= FAULT= REALTIME=1 BOARD=zynqmp_r5 BUS=memory OUT=DIR)

@@ -1,5 +1,5 @@
 # Toolchain file of everything that is flashed. A preset names the core, TETAP_CORE: r5, m7 or m4f, and the board, TETAP_BOARD: a folder of
-# hal/port (one for several cores: with _m7 or _m4f behind its name).
+# hal/port, or one for several cores with _m7 or _m4f behind its name.
 set(CMAKE_SYSTEM_NAME Generic)
 set(CMAKE_SYSTEM_PROCESSOR arm)
 set(CMAKE_C_COMPILER arm-none-eabi-gcc)
@@ -26,6 +26,11 @@ else()
   message(FATAL_ERROR "TETAP_CORE is '${TETAP_CORE}'; it must be r5, m7 or m4f")
 endif()
 set(TETAP_BOARD "" CACHE STRING "a board of hal/port")
+# The flags below are taken at the first configure only, so another core in an old folder would go by without a word.
+if(DEFINED CACHE{TETAP_CONFIGURED_CORE} AND NOT TETAP_CONFIGURED_CORE STREQUAL TETAP_CORE)
+  message(FATAL_ERROR "${CMAKE_BINARY_DIR} was configured for core ${TETAP_CONFIGURED_CORE}, the preset says ${TETAP_CORE}: remove that folder")
+endif()
+set(TETAP_CONFIGURED_CORE ${TETAP_CORE} CACHE INTERNAL "what the flags were made for")
 foreach(language C CXX ASM)
   set(CMAKE_${language}_FLAGS_INIT "${TETAP_CORE_FLAGS}")
 endforeach()

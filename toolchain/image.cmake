@@ -1,7 +1,13 @@
 # tetap_image(NAME target SOURCES main.cpp ... [LIBRARIES tetap_app ...] [STACK bytes] [OUTPUT name] [DATA ddr])
 # makes NAME.elf .bin .hex .map in the binary directory, or OUTPUT.elf ... when another file name is wanted. Beside every object of
 # the image lie its .su and .ci (stack use and call graph, GCC's VCG form): CMakeFiles/NAME.dir/.
-string(REGEX REPLACE "_(m7|m4f)$" "" TETAP_PORT "${TETAP_BOARD}")
+set(TETAP_PORT "${TETAP_BOARD}")
+if(NOT EXISTS ${PROJECT_SOURCE_DIR}/hal/port/${TETAP_PORT}/link.ld AND TETAP_BOARD MATCHES "^(.+)_(m7|m4f)$")
+  set(TETAP_PORT "${CMAKE_MATCH_1}")
+  if(NOT CMAKE_MATCH_2 STREQUAL TETAP_CORE)
+    message(FATAL_ERROR "TETAP_BOARD is '${TETAP_BOARD}', but TETAP_CORE is '${TETAP_CORE}'")
+  endif()
+endif()
 if(NOT TETAP_BOARD OR NOT EXISTS ${PROJECT_SOURCE_DIR}/hal/port/${TETAP_PORT}/link.ld)
   message(FATAL_ERROR "TETAP_BOARD is '${TETAP_BOARD}': there is no hal/port/${TETAP_PORT} with a link.ld (a preset of CMakePresets.json names the board)")
 endif()

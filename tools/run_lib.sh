@@ -22,7 +22,7 @@ robot_known() {
 }
 image_known() {
   local robots
-  robots=$(cd "$root/config" && for one in *.hpp; do [ "$one" = messages.hpp ] || echo "${one%.hpp}"; done | xargs)
+  robots=$("$root/tools/robots")
   # shellcheck disable=SC2086
   one_of "$1" $robots || { echo "no image of robot '$1'; there are: $robots" >&2; return 2; }
 }

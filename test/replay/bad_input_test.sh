@@ -134,8 +134,12 @@ number --gnss-hz 0 5.5
 number --gnss-m 0 nan
 number --east nan 60001
 # Every robot that there is stands in every program's help.
-every_robot=$("$programs/tetap-node" --list-robots)
-[ "$(wc -w <<<"$every_robot")" -ge 10 ] || { echo "WRONG  tetap-node lists fewer than 10 robots: $every_robot"; failed=$((failed + 1)); }
+every_robot=$({ tools/robots | tr ' ' '\n'; grep -oE 'name == "[A-Za-z0-9_]+"' sim_host/robots.hpp | cut -d'"' -f2; } | sort | xargs)
+listed=$("$programs/tetap-node" --list-robots | tr ' ' '\n' | sort | xargs)
+[ "$listed" = "$every_robot" ] && [ "$(wc -w <<<"$listed")" -ge 10 ] || { echo "WRONG  tetap-node lists '$listed', there are '$every_robot'"; failed=$((failed + 1)); }
+for robot in $every_robot; do
+  "$programs/tetap-node" --boot-line --robot "$robot" >"$work/stdout" || { echo "WRONG  tetap-node does not know $robot"; failed=$((failed + 1)); }
+done
 for robot in $every_robot; do
   for program in node play world; do
     count=$((count + 1))

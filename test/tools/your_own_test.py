@@ -1,7 +1,8 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
-"""A robot and a board of one's own, made with the lines of the README in a copy of the tree: CMake takes them, `make firmware` proves the image,
-a file that was not renamed is told in one sentence. In the whole form (form=whole) both are built, and the image's robot is the program's."""
+"""A robot and a board of one's own, made with the lines of the README in a copy of the tree (under names that nobody's tree has): CMake takes them,
+and what is named wrongly is told in one sentence. In the whole form (form=whole) README's `make` lines run, too: the robot drives in the simulated
+world, `make firmware` proves its image, and in the emulator that says at boot what the program says."""
 import os
 import re
 import shutil
@@ -11,6 +12,7 @@ import unittest
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.realpath(__file__))))
 WHOLE = os.environ.get("form") == "whole"
+ROBOT, BOARD = "robot9_of_test", "board9_of_test"
 
 
 class YourOwn(unittest.TestCase):
@@ -20,7 +22,8 @@ class YourOwn(unittest.TestCase):
         self.tree = os.path.join(self.folder.name, "tetap")
         shutil.copytree(ROOT, self.tree, ignore=lambda folder, _: {"build", "out", ".git"} if folder == ROOT else ())
         with open(os.path.join(ROOT, "README.md"), encoding="utf-8") as file:
-            self.section = re.search(r"\n## Make it yours\n(.*?)\n### ", file.read(), re.S)[1]
+            section = re.search(r"\n## Make it yours\n(.*?)\n### ", file.read(), re.S)[1]
+        self.section = re.sub(r"\bmyboard\b", BOARD, re.sub(r"\bmine\b", ROBOT, section))
 
     def run_here(self, *command, status=0):
         environment = {name: value for name, value in os.environ.items() if name not in ("TETAP_PROGRAMS", "MAKEFLAGS", "MAKELEVEL")}
@@ -28,51 +31,77 @@ class YourOwn(unittest.TestCase):
         self.assertEqual(done.returncode, status, done.stdout[-3000:] + done.stderr[-3000:])
         return done.stdout + done.stderr
 
-    def make(self, what):
-        """The README's lines that make a copy, of a robot or of a board."""
-        lines = re.findall(rf"^ +(cp .*{what}.*)$", self.section, re.M)
-        self.assertEqual(len(lines), 1, what)
-        self.run_here("bash", "-c", lines[0])
+    def line(self, pattern):
+        """The one line of README's section that is like this."""
+        lines = re.findall(rf"^ +({pattern}),?$", self.section, re.M)
+        self.assertEqual(len(lines), 1, pattern)
+        return lines[0]
+
+    def copy(self, what):
+        self.run_here("bash", "-c", self.line(f"cp .*{what}.*"))
 
     def robots(self):
         with open(os.path.join(self.tree, "build/host/sim_host/generated/configured_robots.hpp"), encoding="utf-8") as file:
             return re.search(r'kConfiguredRobots = "(.*)"', file.read())[1].split()
 
     def test_a_robot_is_a_file_in_config(self):
-        self.make("config/mine.hpp")
+        self.copy(f"config/{ROBOT}.hpp")
         self.run_here("cmake", "--preset", "host")
-        self.assertIn("mine", self.robots())
-        self.assertIn(" mine ", self.run_here("make", "help"))
+        self.assertIn(ROBOT, self.robots())
+        self.assertIn(f" {ROBOT} ", self.run_here("make", "help"))
+        sim = self.line(f"make sim .*ROBOT={ROBOT}.*")
         if WHOLE:
-            self.run_here("tools/build", "host:tetap-node")
-            self.assertIn("mine", self.run_here("build/host/sim_host/tetap-node", "--list-robots").split())
+            said = self.run_here("bash", "-c", f"{sim} BUS=memory WORLD='--duration 20' REPORT=--no-pictures")
+            self.assertIn(f"robot {ROBOT} on", said)
 
     def test_a_copy_with_the_name_of_another_is_told(self):
-        shutil.copy(os.path.join(self.tree, "config/rover.hpp"), os.path.join(self.tree, "config/mine.hpp"))
+        shutil.copy(os.path.join(self.tree, "config/rover.hpp"), os.path.join(self.tree, f"config/{ROBOT}.hpp"))
         said = self.run_here("tools/build", "host", status=1)
-        self.assertRegex(" ".join(said.split()), "config/mine.hpp: its namespace has to be tetap::robot::mine, as the file is named")
+        self.assertIn(f"config/{ROBOT}.hpp: a robot's file has one line 'namespace tetap::robot::{ROBOT} {{', as the file is named", " ".join(said.split()))
         self.assertLess(len(said.splitlines()), 7)
 
+    def test_a_name_that_no_namespace_can_have_is_told(self):
+        shutil.copy(os.path.join(self.tree, "config/rover.hpp"), os.path.join(self.tree, "config/rover.old.hpp"))
+        self.assertIn("config/rover.old.hpp: a robot's name has letters", " ".join(self.run_here("tools/build", "host", status=1).split()))
+
     def test_a_board_is_a_folder_and_a_preset(self):
-        self.make("config/mine.hpp")
-        self.make("hal/port/myboard")
-        preset = re.search(r'^ +(\{ "name": "myboard".*\}),?$', self.section, re.M)[1]
+        self.copy(f"config/{ROBOT}.hpp")
+        self.copy(f"hal/port/{BOARD}")
+        preset = self.line(rf'\{{ "name": "{BOARD}".*\}}')
         presets = os.path.join(self.tree, "CMakePresets.json")
         with open(presets, encoding="utf-8") as file:
             text = file.read()
         with open(presets, "w", encoding="utf-8") as file:
             file.write(text.replace('    { "name": "m7"', f'    {preset},\n    {{ "name": "m7"', 1))
-        self.run_here("cmake", "--preset", "myboard")
-        targets = self.run_here("cmake", "--build", "build/myboard", "--target", "help")
-        self.assertIn("tetap-myboard-mine:", targets)
+        self.run_here("cmake", "--preset", BOARD)
+        self.assertIn(f"tetap-{BOARD}-{ROBOT}:", self.run_here("cmake", "--build", f"build/{BOARD}", "--target", "help"))
+        # Its flags are made at the first configure: another core in that folder is refused.
+        said = self.run_here("cmake", "--preset", BOARD, "-DTETAP_CORE=m7", status=1)
+        self.assertIn("was configured for core r5, the preset says m7", " ".join(said.split()))
+        self.run_here("cmake", "--preset", BOARD, "-DTETAP_CORE=r5")
+        firmware = self.line(f"make firmware .*BOARD={BOARD}.*")
         if WHOLE:
-            said = self.run_here("make", "firmware", "BOARD=myboard", "ROBOT=mine")
-            self.assertRegex(said, "tetap-myboard-mine: ok, .* symbols")  # no heap
-            self.assertRegex(said, "tetap-myboard-mine: bound [0-9]+ of ")
+            said = self.run_here("bash", "-c", firmware)
+            self.assertRegex(said, f"tetap-{BOARD}-{ROBOT}: ok, .* symbols")  # no heap
+            self.assertRegex(said, f"tetap-{BOARD}-{ROBOT}: bound [0-9]+ of ")
+            self.run_here("tools/build", "host:tetap-node")
+            boot = self.run_here("build/host/sim_host/tetap-node", "--boot-line", "--robot", ROBOT).strip()
+            image = f"build/{BOARD}/hal/port/tetap-{BOARD}-{ROBOT}.elf"
+            self.assertIn(boot, self.run_here("tools/qemu-r5", image, "--then", "sleep", "3").splitlines())
+
+    def test_a_list_of_presets_that_is_none_is_told(self):
+        with open(os.path.join(self.tree, "CMakePresets.json"), "a", encoding="utf-8") as file:
+            file.write(",")
+        said = self.run_here("env", "BOARD=zynqmp_r5", "tools/firmware", status=2)
+        self.assertRegex(said, r"\Afirmware: CMakePresets.json: .*line [0-9]+.*\n\Z")
 
     def test_a_board_without_a_folder_is_told(self):
         said = self.run_here("cmake", "--preset", "r5", "-DTETAP_BOARD=arduino", status=1)
-        self.assertRegex(" ".join(said.split()), "TETAP_BOARD is 'arduino': there is no hal/port/arduino with a link.ld")
+        self.assertIn("TETAP_BOARD is 'arduino': there is no hal/port/arduino with a link.ld", " ".join(said.split()))
+
+    def test_a_core_that_is_not_its_board_s_is_told(self):
+        said = self.run_here("cmake", "--preset", "m7", "-DTETAP_CORE=m4f", status=1)
+        self.assertIn("TETAP_BOARD is 'mps2_m7', but TETAP_CORE is 'm4f'", " ".join(said.split()))
 
 
 if __name__ == "__main__":
