@@ -26,11 +26,10 @@ function(tetap_image)
     set(ARG_OUTPUT ${ARG_NAME})
   endif()
   set(port ${PROJECT_SOURCE_DIR}/hal/port)
-  set(folder ${TETAP_PORT})
-  set(script ${port}/${folder}/link.ld)
+  set(script ${port}/${TETAP_PORT}/link.ld)
   set(output ${CMAKE_CURRENT_BINARY_DIR}/${ARG_OUTPUT})
 
-  add_executable(${ARG_NAME} ${ARG_SOURCES} ${port}/${folder}/startup.cpp ${port}/support/runtime.cpp)
+  add_executable(${ARG_NAME} ${ARG_SOURCES} ${port}/${TETAP_PORT}/startup.cpp ${port}/support/runtime.cpp)
   if(TETAP_CORE STREQUAL "m4f")
     target_sources(${ARG_NAME} PRIVATE ${port}/support/double_sum.cpp)
     target_link_options(${ARG_NAME} PRIVATE
@@ -42,7 +41,7 @@ function(tetap_image)
   target_compile_options(${ARG_NAME} PRIVATE -fstack-usage -fcallgraph-info=su)
   # A compiler cache keeps objects but not their call graphs.
   set_target_properties(${ARG_NAME} PROPERTIES CXX_COMPILER_LAUNCHER "")
-  string(TOUPPER ${folder} board_macro)
+  string(TOUPPER ${TETAP_PORT} board_macro)
   target_compile_definitions(${ARG_NAME} PRIVATE TETAP_BOARD_${board_macro})
   target_link_libraries(${ARG_NAME} PRIVATE tetap_flashed_flags ${ARG_LIBRARIES})
   # Of the C library only what the compiler itself calls (memcpy, memset, memmove, memcmp) can be linked: nothing supplies _sbrk, so

@@ -3,6 +3,7 @@
 import dataclasses
 import os
 import re
+import subprocess
 
 import numpy as np
 
@@ -77,7 +78,7 @@ class Robot:
                 with open(path, encoding="utf-8") as file:
                     self.text = re.sub(r"//.*", "", file.read())
             except OSError as error:
-                known = sorted(one[:-4] for one in os.listdir(os.path.dirname(path)) if one.endswith(".hpp") and one != "messages.hpp")
+                known = subprocess.run([os.path.join(ROOT, "tools/robots")], check=True, capture_output=True, text=True).stdout.split()
                 raise BadInput(f"config/{name}.hpp: {error.strerror}; there are: {', '.join(known)}") from None
             if "app::Numbers" not in self.text:
                 raise BadInput(f"{path}: no robot: no app::Numbers in it")

@@ -67,6 +67,7 @@ class YourOwn(unittest.TestCase):
     def test_a_board_is_a_folder_and_a_preset(self):
         self.copy(f"config/{ROBOT}.hpp")
         self.copy(f"hal/port/{BOARD}")
+        self.assertEqual("", self.run_here("grep", "-r", "zynqmp_r5", f"hal/port/{BOARD}", status=1))
         preset = self.line(rf'\{{ "name": "{BOARD}".*\}}')
         presets = os.path.join(self.tree, "CMakePresets.json")
         with open(presets, encoding="utf-8") as file:
