@@ -21,7 +21,7 @@ ifneq ($(unknown),)
 $(error no setting $(unknown); there are: $(settings))
 endif
 
-.PHONY: help sim test quick proof replay firmware size heap stack count bits check dbc setup host programs arm
+.PHONY: help sim test quick proof replay firmware size heap stack count bits hashes check dbc setup host programs arm
 
 help: ## this list
 	@echo "tetap: state estimation on the robot's own microcontroller"; echo
@@ -62,6 +62,9 @@ count: arm ## instructions per workload and per tick on the emulated cores, agai
 
 bits: setup ## the same bits from every compiler, option and core: 2^24 values, 100000 steps (some 8 minutes)
 	@tools/bits --whole
+
+hashes: setup programs ## a hash of each estimate over simulated and recorded runs, in out/hashes.json
+	@tools/hashes
 
 check: setup host ## format, tidy, layers, DBC fresh
 	@tools/check
