@@ -27,59 +27,59 @@ help: ## this list
 	@echo "tetap: state estimation on the robot's own microcontroller"; echo
 	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | while IFS=$$'\t' read -r name text; do printf '  make %-9s %s\n' "$$name" "$$text"; done
 	@echo; echo "  ROBOT=$(ROBOT) BOARD=$(BOARD) BUS=$(BUS) SEED=$(SEED) FAULT= REALTIME= LOG= TRUTH="
-	@echo "  robots: $$(tools/robots) (a config/NAME.hpp of your own is one, too)"
+	@echo "  robots: $$(tools/run/list_robots) (a config/NAME.hpp of your own is one, too)"
 	@echo "  and in simulation alone, told all of the world's noise: rover_landmarks_matched rover_matched"
 
 sim: setup programs ## the simulated world over vcan0: table, report, pictures in out/sim (SEED= FAULT= REALTIME=1 BOARD=zynqmp_r5 BUS=memory OUT=DIR)
-	@tools/sim
+	@tools/run/simulate_world
 
 test: setup ## every proof on short prefixes, with a table of where the time went
-	@tools/prove short
+	@tools/proof/run_checks short
 
 quick: setup host ## host unit tests only
 	@ctest --preset quick
 
 proof: setup ## the whole lengths: exhaustive functions, full logs, long runs
-	@tools/prove whole
+	@tools/proof/run_checks whole
 
 replay: setup programs ## a recorded log over vcan0: LOG=run.log [TRUTH=run.truth.csv] ROBOT=NAME [BOARD=] [BUS=memory]
-	@tools/replay
+	@tools/run/replay_log
 
 firmware: setup ## the flash image: BOARD=zynqmp_r5 ROBOT=rover, with its size table, no heap and stack proved
-	@tools/firmware
+	@tools/run/build_firmware
 
 size: arm ## flash and RAM per section of every image against the budgets
-	@tools/images size
+	@tools/proof/check_images size
 
 heap: arm ## no allocator in any linked image
-	@tools/images heap
+	@tools/proof/check_images heap
 
 stack: arm host ## worst-case stack from the call graph, against the painted high-water mark
-	@tools/images stack
+	@tools/proof/check_images stack
 
 count: arm ## instructions per workload and per tick on the emulated cores, against the budgets
-	@tools/count --all
+	@tools/proof/count_instructions --all
 
 bits: setup ## the same bits from every compiler, option and core: 2^24 values, 100000 steps (some 8 minutes)
-	@tools/bits --whole
+	@tools/proof/compare_bits --whole
 
 hashes: setup programs ## a hash of each estimate over simulated and recorded runs, in out/hashes.json
-	@tools/hashes
+	@tools/proof/hash_estimates
 
 check: setup host ## format, tidy, layers, DBC fresh
-	@tools/check
+	@tools/proof/check_sources
 
 dbc: setup ## config/messages.hpp and config/messages.md from config/tetap.dbc
-	@tools/dbc config/tetap.dbc --header config/messages.hpp --table config/messages.md
+	@tools/can/generate_messages config/tetap.dbc --header config/messages.hpp --table config/messages.md
 
 setup:
-	@tools/setup
+	@tools/run/install_packages
 
 host:
-	@tools/build host
+	@tools/run/build_preset host
 
 programs: setup
-	@tools/build host:tetap-node,tetap-play,tetap-world,tetap-record
+	@tools/run/build_preset host:tetap-node,tetap-play,tetap-world,tetap-record
 
 arm: setup
-	@tools/build r5 m7 m4f
+	@tools/run/build_preset r5 m7 m4f

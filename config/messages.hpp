@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // clang-format off
-// Generated from config/tetap.dbc by tools/dbc: not to be edited. One struct per message or page; encode, decode and frame are in
+// Generated from config/tetap.dbc by tools/can/generate_messages: not to be edited. One struct per message or page; encode, decode and frame are in
 // can/codec.hpp. Fields are in the units of their suffix; `_raw` counts steps of the k..Scale next to it.
 #pragma once
 

@@ -48,7 +48,7 @@ inline constexpr app::Numbers numbers = app::checked({
     // gyro_scale's.
     .inertial =
         {.gyro_radps_rthz = 2e-3F, .accel_mps2_rthz = 5e-2F, .wheel_gate_scale = 1.6F, .constrain_every_us = 20'000},
-    // Three estimators share the bus: 591 frames/s at most (tools/dbc --load).
+    // Three estimators share the bus: 591 frames/s at most (tools/can/generate_messages --load).
     .publish = {.std_every = 10, .side_every = 20, .attitude_every = 10, .state_every = 10},
 });
 

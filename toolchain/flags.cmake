@@ -30,6 +30,6 @@ endif()
 # What is flashed, on top: no exceptions, no RTTI, nothing that needs a C++ runtime.
 add_library(tetap_flashed_flags INTERFACE)
 target_compile_options(tetap_flashed_flags INTERFACE
-  -fno-jump-tables  # a table is a jump that tools/stack would have to guess the bounds of
+  -fno-jump-tables  # a table is a jump that tools/proof/check_stack would have to guess the bounds of
   -fno-exceptions -fno-rtti -fno-threadsafe-statics -fno-use-cxa-atexit -fno-unwind-tables -fno-asynchronous-unwind-tables)
 target_link_libraries(tetap_flashed_flags INTERFACE tetap_flags)

@@ -1,4 +1,4 @@
-# The robots: every header of config/ but messages.hpp, which tools/dbc makes. TETAP_ROBOTS holds their names, sorted; tools/robots prints them.
+# The robots: every header of config/ but messages.hpp, which tools/can/generate_messages makes. TETAP_ROBOTS holds their names, sorted; tools/run/list_robots prints them.
 file(GLOB robot_headers CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/config/[A-Za-z]*.hpp)
 list(REMOVE_ITEM robot_headers ${PROJECT_SOURCE_DIR}/config/messages.hpp)
 list(SORT robot_headers)

@@ -44,7 +44,7 @@ struct WheelNumbers {
   float timeout_noise = 1.0F;         ///< m^2/s and rad^2/s then
 };
 
-/// The IMU's own errors as tools/calibrate finds them, in its own axes: specific force = accel_matrix (raw -
+/// The IMU's own errors as tools/calibrate/calibrate_robot finds them, in its own axes: specific force = accel_matrix (raw -
 /// accel_bias), turn rate = raw - gyro_bias - slope (temperature - at); without a temperature the slope is not used.
 /// What estimators publish as a bias is what is left.
 struct ImuNumbers {

@@ -55,7 +55,7 @@ void put_diagnostics(std::uint32_t page, const Counters& c, const LoopHealth& l,
 }
 
 /// One page, and with what has a covariance its sigmas and correlations: whole, and of one epoch (with Est_Std, which
-/// has those of x, y and yaw). Two turns of nine stay free, for the bus has no more room (tools/dbc --load).
+/// has those of x, y and yaw). Two turns of nine stay free, for the bus has no more room (tools/can/generate_messages --load).
 template <class Put>
 void put_state_page(std::uint32_t page, const InertialEstimate& e, std::uint8_t tag, Put&& put) {
   const nav::InsState& x = e.state;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The workloads whose instructions tools/count counts and tools/budgets.json bounds. Inputs are arrays made beforehand;
+// The workloads whose instructions tools/proof/count_instructions counts and tools/budgets.json bounds. Inputs are arrays made beforehand;
 // what is between the markers are calls of headers that the firmware is made of.
 #include "app/node.hpp"
 #include "base/random.hpp"

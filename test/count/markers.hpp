@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Marks workloads in an image so that tools/count can count their instructions in QEMU. Between begin and end only what
+// Marks workloads in an image so that tools/proof/count_instructions can count their instructions in QEMU. Between begin and end only what
 // is counted: input arrays and calls of public headers that the firmware instantiates too. A workload is named where it
 // stands:
 //
@@ -47,7 +47,7 @@ template <class T>
   asm volatile("" : "+m"(object) : : "memory");
 }
 
-/// An empty region, and one inside another: what tools/count subtracts from all others.
+/// An empty region, and one inside another: what tools/proof/count_instructions subtracts from all others.
 [[gnu::noipa]] inline void calibrate() {
   const Region<struct calibration_outer> outer;
   const Region<struct calibration_empty> empty;

@@ -4,7 +4,7 @@
 # counted, exit status, missing file and fault reported.
 set -u
 [ $# -eq 2 ] || { echo "usage: mps2_smoke_test.sh m7|m4f SMOKE.elf" >&2; exit 2; }
-run=("$(dirname "$0")/../../tools/qemu-mps2" --cpu "$1" -t 60 "$2")
+run=("$(dirname "$0")/../../tools/run/emulate_mps2" --cpu "$1" -t 60 "$2")
 work=$(mktemp -d) || exit 2
 trap 'rm -rf "$work"' EXIT
 fail() { echo "mps2_smoke_test: $*" >&2; cat "$work/said" >&2; exit 1; }

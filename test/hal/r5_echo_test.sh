@@ -9,7 +9,7 @@ here=$(cd "$(dirname "$0")" && pwd)
 tools=$here/../../tools
 if [ "${3:-}" != inside ]; then
   [ $# -eq 2 ] || { echo "usage: r5_echo_test.sh SMOKE.elf CAN_ECHO_PEER" >&2; exit 2; }
-  exec "$tools/with-vcan" --private -t 120 "$here/r5_echo_test.sh" "$(realpath "$1")" "$(realpath "$2")" inside
+  exec "$tools/run/provide_vcan" --private -t 120 "$here/r5_echo_test.sh" "$(realpath "$1")" "$(realpath "$2")" inside
 fi
 
 work=$(mktemp -d) || exit 2
@@ -25,7 +25,7 @@ sleep 0.3; cansend vcan0 7F0#00; sleep 0.3
 cansend vcan0 7F1#00; sleep 0.5
 DRIVE
 began_ms=$(now_ms)
-"$tools/qemu-r5" "$1" --can vcan0 -t 60 --then /bin/bash "$work/drive" "$2" 2>"$work/uart" || fail "the echo failed"
+"$tools/run/emulate_r5" "$1" --can vcan0 -t 60 --then /bin/bash "$work/drive" "$2" 2>"$work/uart" || fail "the echo failed"
 whole_ms=$(($(now_ms) - began_ms))
 
 mapfile -t reports < <(grep '^smoke: ms' "$work/uart")

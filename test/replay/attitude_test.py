@@ -17,7 +17,7 @@ import numpy as np
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 sys.dont_write_bytecode = True
-TOOL = os.path.join(ROOT, "tools", "attitude")
+TOOL = os.path.join(ROOT, "tools", "report", "compare_attitude")
 loader = importlib.machinery.SourceFileLoader("attitude", TOOL)
 attitude = importlib.util.module_from_spec(importlib.util.spec_from_loader("attitude", loader))
 loader.exec_module(attitude)

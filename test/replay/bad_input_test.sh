@@ -3,7 +3,7 @@
 # Bad input to every program and tool at the command line: a status that is not 0, and exactly one line on standard error that says
 # where and what. The bus that is missing or down is tried on a private vcan.
 set -u
-. "$(dirname "$0")/../../tools/run_lib.sh"
+. "$(dirname "$0")/../../tools/run/node_session.sh"
 cd "$root" || exit 2
 self=test/replay/bad_input_test.sh
 work=${BAD_INPUT_WORK:-}
@@ -15,7 +15,7 @@ refused() {
   shift 2
   "$@" >"$work/stdout" 2>"$work/stderr" </dev/null
   status=$?
-  lines=$(grep -cv '^with-vcan: ' "$work/stderr")
+  lines=$(grep -cv '^provide_vcan: ' "$work/stderr")
   count=$((count + 1))
   if [ $status = 0 ] || [ $status -ge 124 ]; then
     echo "WRONG  $name: status $status"
@@ -42,7 +42,7 @@ on_the_bus() { # inside a private vcan0
   refused "a world on a bus that is down" 'tetap-world: CAN interface vcan0 is down' "$programs/tetap-world" --can vcan0 --duration 1 --out "$work/out"
   refused "a recorder on a bus that is down" 'tetap-record: CAN interface vcan0 is down' "$programs/tetap-record" --out "$work/out"
   [ ! -e build/r5/hal/port/tetap-zynqmp_r5-rover.elf ] ||
-    refused "an image in QEMU on a bus that is down" 'qemu-r5: vcan0: .*down' tools/qemu-r5 build/r5/hal/port/tetap-zynqmp_r5-rover.elf --can vcan0
+    refused "an image in QEMU on a bus that is down" 'emulate_r5: vcan0: .*down' tools/run/emulate_r5 build/r5/hal/port/tetap-zynqmp_r5-rover.elf --can vcan0
   ip link set vcan0 up
   # A node whose bus goes away and comes back keeps its service.
   "$programs/tetap-node" 2>"$work/node" & node=$!
@@ -54,13 +54,13 @@ on_the_bus() { # inside a private vcan0
   fi
   kill $node; wait $node
   # A node that ends is noticed at once, not after the player's patience, and what it said is shown.
-  refused "a node that ends at once" 'node ended .status 2.: qemu-r5: .*nowhere.elf: no such file' timeout 12 env TETAP_IMAGE="$work/nowhere.elf" \
-    LOG="$work/good.log" ROBOT=rover BOARD=zynqmp_r5 OUT="$work/out" PLAY=--quiet tools/replay --inside
-  refused "a node that ends at once (sim)" 'node ended .status 2.: qemu-r5: .*nowhere.elf: no such file' timeout 12 env TETAP_IMAGE="$work/nowhere.elf" \
-    ROBOT=rover BOARD=zynqmp_r5 OUT="$work/out" WORLD=--quiet tools/sim --inside
+  refused "a node that ends at once" 'node ended .status 2.: emulate_r5: .*nowhere.elf: no such file' timeout 12 env TETAP_IMAGE="$work/nowhere.elf" \
+    LOG="$work/good.log" ROBOT=rover BOARD=zynqmp_r5 OUT="$work/out" PLAY=--quiet tools/run/replay_log --inside
+  refused "a node that ends at once (sim)" 'node ended .status 2.: emulate_r5: .*nowhere.elf: no such file' timeout 12 env TETAP_IMAGE="$work/nowhere.elf" \
+    ROBOT=rover BOARD=zynqmp_r5 OUT="$work/out" WORLD=--quiet tools/run/simulate_world --inside
   # What is wrong with a log is no fault of the node, and the line it began with is no part of it.
   log_with rubbish
-  refused "a broken log to a node on the bus" "tetap-play: .*bad.log:3: .*'rubbish'" env LOG="$work/bad.log" ROBOT=mrclam BOARD=linux OUT="$work/out" tools/replay --inside
+  refused "a broken log to a node on the bus" "tetap-play: .*bad.log:3: .*'rubbish'" env LOG="$work/bad.log" ROBOT=mrclam BOARD=linux OUT="$work/out" tools/run/replay_log --inside
 }
 
 if [ "${1:-}" = --inside ]; then
@@ -134,7 +134,7 @@ number --gnss-hz 0 5.5
 number --gnss-m 0 nan
 number --east nan 60001
 # Every robot that there is stands in every program's help.
-every_robot=$({ tools/robots | tr ' ' '\n'; grep -oE 'name == "[A-Za-z0-9_]+"' sim_host/robots.hpp | cut -d'"' -f2; } | sort | xargs)
+every_robot=$({ tools/run/list_robots | tr ' ' '\n'; grep -oE 'name == "[A-Za-z0-9_]+"' sim_host/robots.hpp | cut -d'"' -f2; } | sort | xargs)
 listed=$("$programs/tetap-node" --list-robots | tr ' ' '\n' | sort | xargs)
 [ "$listed" = "$every_robot" ] && [ "$(wc -w <<<"$listed")" -ge 10 ] || { echo "WRONG  tetap-node lists '$listed', there are '$every_robot'"; failed=$((failed + 1)); }
 for robot in $every_robot; do
@@ -153,70 +153,71 @@ for robot in $every_robot; do
 done
 
 # Tools
-refused "replay without a log" 'replay: which log' env -u LOG tools/replay
-refused "replay of no such log" 'replay: nowhere.log: no such file' env LOG=nowhere.log tools/replay
-refused "replay against no such truth" 'replay: nowhere.csv: no such file' env LOG="$work/good.log" TRUTH=nowhere.csv tools/replay
-refused "replay on a bus of another kind" "replay: BUS=lin" env LOG="$work/good.log" BUS=lin tools/replay
-refused "replay of a board in memory" 'BUS=memory' env LOG="$work/good.log" BUS=memory BOARD=zynqmp_r5 tools/replay
-refused "replay for no such robot" "no robot 'tank'" env LOG="$work/good.log" BUS=memory ROBOT=tank OUT="$work/out" tools/replay
-refused "replay for no such robot over a bus" "no robot 'tank'; $robots" timeout 20 env LOG="$work/good.log" ROBOT=tank OUT="$work/out" tools/replay
-refused "sim for no such robot over a bus" "no robot 'tank'; $robots" timeout 20 env ROBOT=tank OUT="$work/out" tools/sim
-refused "sim for no such robot on a board" "no robot 'tank'; $robots" timeout 20 env ROBOT=tank BOARD=zynqmp_r5 OUT="$work/out" tools/sim
+refused "replay without a log" 'replay: which log' env -u LOG tools/run/replay_log
+refused "replay of no such log" 'replay: nowhere.log: no such file' env LOG=nowhere.log tools/run/replay_log
+refused "replay against no such truth" 'replay: nowhere.csv: no such file' env LOG="$work/good.log" TRUTH=nowhere.csv tools/run/replay_log
+refused "replay on a bus of another kind" "replay: BUS=lin" env LOG="$work/good.log" BUS=lin tools/run/replay_log
+refused "replay of a board in memory" 'BUS=memory' env LOG="$work/good.log" BUS=memory BOARD=zynqmp_r5 tools/run/replay_log
+refused "replay for no such robot" "no robot 'tank'" env LOG="$work/good.log" BUS=memory ROBOT=tank OUT="$work/out" tools/run/replay_log
+refused "replay for no such robot over a bus" "no robot 'tank'; $robots" timeout 20 env LOG="$work/good.log" ROBOT=tank OUT="$work/out" tools/run/replay_log
+refused "sim for no such robot over a bus" "no robot 'tank'; $robots" timeout 20 env ROBOT=tank OUT="$work/out" tools/run/simulate_world
+refused "sim for no such robot on a board" "no robot 'tank'; $robots" timeout 20 env ROBOT=tank BOARD=zynqmp_r5 OUT="$work/out" tools/run/simulate_world
 refused "a misspelt setting" 'no setting FALUT; there are: ROBOT .*FAULT' make -s FALUT=gnss_jump help
-refused "sim from seed -1" "--seed .*'-1'" env BUS=memory SEED=-1 OUT="$work/out" tools/sim
+refused "sim from seed -1" "--seed .*'-1'" env BUS=memory SEED=-1 OUT="$work/out" tools/run/simulate_world
 # An image is built before it is started: a cmake that only notes what it is asked for, and fails.
 mkdir "$work/bin"
 printf '#!/bin/sh\necho "$@" >>"%s/asked"\n[ "$1" != --build ]\n' "$work" >"$work/bin/cmake"
 chmod +x "$work/bin/cmake"
-for tool in replay sim; do
+for program in replay_log simulate_world; do
+  tool=${program%%_*} tool=${tool/simulate/sim}
   refused "$tool of a robot without an image" "no image of robot 'rover_matched'; there are: .*husky_inertial" \
-    timeout 20 env LOG="$work/good.log" ROBOT=rover_matched BOARD=zynqmp_r5 OUT="$work/out" tools/$tool
+    timeout 20 env LOG="$work/good.log" ROBOT=rover_matched BOARD=zynqmp_r5 OUT="$work/out" tools/run/$program
   : >"$work/asked"
   refused "$tool of an image that cannot be built" 'build: preset r5 failed' \
-    timeout 20 env PATH="$work/bin:$PATH" LOG="$work/good.log" ROBOT=husky BOARD=zynqmp_r5 OUT="$work/out" tools/$tool
+    timeout 20 env PATH="$work/bin:$PATH" LOG="$work/good.log" ROBOT=husky BOARD=zynqmp_r5 OUT="$work/out" tools/run/$program
   grep -q -- '^--build build/r5 --target tetap-zynqmp_r5-husky$' "$work/asked" || { echo "WRONG  $tool does not build the image it is to run"; failed=$((failed + 1)); }
 done
-refused "replay on no such board" "no board 'arduino'" env LOG="$work/good.log" BOARD=arduino OUT="$work/out" tools/replay
-refused "sim on no such board" "no board 'arduino'" env BOARD=arduino OUT="$work/out" tools/sim
-refused "sim with an unknown fault" 'meteor' env BUS=memory FAULT=meteor OUT="$work/out" tools/sim
-refused "sim with a fault whose start is no number" "fault 'gnss_jump@soon': START is not" env BUS=memory FAULT=gnss_jump@soon OUT="$work/out" tools/sim
-refused "sim with an unknown fault over a bus" "fault 'meteor'" timeout 20 env FAULT=meteor OUT="$work/out" tools/sim
+refused "replay on no such board" "no board 'arduino'" env LOG="$work/good.log" BOARD=arduino OUT="$work/out" tools/run/replay_log
+refused "sim on no such board" "no board 'arduino'" env BOARD=arduino OUT="$work/out" tools/run/simulate_world
+refused "sim with an unknown fault" 'meteor' env BUS=memory FAULT=meteor OUT="$work/out" tools/run/simulate_world
+refused "sim with a fault whose start is no number" "fault 'gnss_jump@soon': START is not" env BUS=memory FAULT=gnss_jump@soon OUT="$work/out" tools/run/simulate_world
+refused "sim with an unknown fault over a bus" "fault 'meteor'" timeout 20 env FAULT=meteor OUT="$work/out" tools/run/simulate_world
 refused "sim with a fault of a sensor it has not" "fault 'mag_disturbance': robot rover has no magnetometer; faults that act on it: gnss_jump .*; robots on which it acts: iris" \
-  timeout 20 env FAULT=gnss_jump,mag_disturbance OUT="$work/out" tools/sim
+  timeout 20 env FAULT=gnss_jump,mag_disturbance OUT="$work/out" tools/run/simulate_world
 refused "sim with a fault of landmarks it has not" "fault 'landmark_outlier': robot iris has no landmarks; .* mag_disturbance.*; robots on which it acts: .* rover_landmarks" \
-  timeout 20 env ROBOT=iris FAULT=landmark_outlier@20+5 OUT="$work/out" tools/sim
+  timeout 20 env ROBOT=iris FAULT=landmark_outlier@20+5 OUT="$work/out" tools/run/simulate_world
 refused "a world with a fault of wheels it has not" "fault 'wheel_spin': robot rover has no wheels" \
   "$programs/tetap-world" --memory --no-wheels --fault wheel_spin --out "$work/out"
-refused "firmware for no such board" "no board 'arduino'; there are: zynqmp_r5" env BOARD=arduino tools/firmware
-refused "firmware for no such robot" "no image of robot 'tank'; there are: .*mrclam" env BOARD=zynqmp_r5 ROBOT=tank tools/firmware
+refused "firmware for no such board" "no board 'arduino'; there are: zynqmp_r5" env BOARD=arduino tools/run/build_firmware
+refused "firmware for no such robot" "no image of robot 'tank'; there are: .*mrclam" env BOARD=zynqmp_r5 ROBOT=tank tools/run/build_firmware
 # An image that is over its budget, or allocates, is no firmware: in a tree whose tools say yes, but for one.
 mkdir -p "$work/tree/config"
 cp -r tools CMakePresets.json "$work/tree" && cp config/*.hpp "$work/tree/config"
-for tool in heap layers size stack; do
-  for one in build heap layers size stack; do printf '#!/bin/sh\n' >"$work/tree/tools/$one"; done
+for tool in proof/check_{heap,layers,size,stack}; do
+  for one in run/build_preset proof/check_{heap,layers,size,stack}; do printf '#!/bin/sh\n' >"$work/tree/tools/$one"; done
   printf '#!/bin/sh\ncase $* in *tetap-zynqmp_r5-husky.elf*) echo "$0: no" >&2; exit 1 ;; esac\n' >"$work/tree/tools/$tool"
   mkdir -p "$work/tree/build/r5/hal/port"
   touch "$work/tree/build/r5/hal/port/tetap-zynqmp_r5-husky".{elf,bin,hex,map}
-  refused "firmware that fails its proof ($tool)" "tools/$tool: no" env BOARD=zynqmp_r5 ROBOT=husky "$work/tree/tools/firmware"
+  refused "firmware that fails its proof ($tool)" "tools/$tool: no" env BOARD=zynqmp_r5 ROBOT=husky "$work/tree/tools/run/build_firmware"
 done
-refused "a report on nothing" 'nowhere' tools/report "$work/nowhere"
+refused "a report on nothing" 'nowhere' tools/report/write_report "$work/nowhere"
 "$programs/tetap-play" "$work/good.log" --memory --robot mrclam --out "$work/run" --quiet || failed=$((failed + 1))
-refused "a report against no such truth" 'nowhere.csv' tools/report "$work/run" --truth "$work/nowhere.csv" --no-pictures
+refused "a report against no such truth" 'nowhere.csv' tools/report/write_report "$work/run" --truth "$work/nowhere.csv" --no-pictures
 printf 'time_s,x_m\n1,2\n' >"$work/bad.csv"
-refused "a report against a truth without its columns" 'bad.csv' tools/report "$work/run" --truth "$work/bad.csv" --no-pictures
-refused "no such DBC" 'nowhere.dbc' tools/dbc "$work/nowhere.dbc" --load
+refused "a report against a truth without its columns" 'bad.csv' tools/report/write_report "$work/run" --truth "$work/bad.csv" --no-pictures
+refused "no such DBC" 'nowhere.dbc' tools/can/generate_messages "$work/nowhere.dbc" --load
 sed 's/^ SG_ SetYaw_StdPos : 29|/ SG_ SetYaw_StdPos : 20|/' config/tetap.dbc >"$work/overlap.dbc"
-refused "a DBC with overlapping signals" 'overlap.dbc:[0-9]+: .*SetYaw' tools/dbc "$work/overlap.dbc" --load
-refused "a recorded set that is not there (mrclam)" 'nowhere' tools/import_mrclam "$work/nowhere" 1 "$work/m"
-refused "a recorded set that is not there (husky)" 'nowhere' tools/import_husky "$work/nowhere" "$work/m"
-refused "a recorded set that is not there (labyrinth)" 'nowhere' tools/import_labyrinth "$work/nowhere" "$work/m"
-log_with "(1.0) vcan0 3"; refused "decode of a malformed line" ':3: ' bash -c 'tools/decode <"$0"' "$work/bad.log"
-refused "no such preset" "no preset 'nothing'; there are: .*host" tools/build nothing
-refused "no such image" 'nowhere.elf: no such file' tools/qemu-r5 "$work/nowhere.elf"
-refused "qemu on a bus that is not there" 'nocan0: no such interface' tools/qemu-r5 "$programs/tetap-node" --can nocan0
-refused "prove what?" 'usage: prove' tools/prove everything
+refused "a DBC with overlapping signals" 'overlap.dbc:[0-9]+: .*SetYaw' tools/can/generate_messages "$work/overlap.dbc" --load
+refused "a recorded set that is not there (mrclam)" 'nowhere' tools/dataset/import_mrclam "$work/nowhere" 1 "$work/m"
+refused "a recorded set that is not there (husky)" 'nowhere' tools/dataset/import_husky "$work/nowhere" "$work/m"
+refused "a recorded set that is not there (labyrinth)" 'nowhere' tools/dataset/import_labyrinth "$work/nowhere" "$work/m"
+log_with "(1.0) vcan0 3"; refused "decode of a malformed line" ':3: ' bash -c 'tools/can/decode_log <"$0"' "$work/bad.log"
+refused "no such preset" "no preset 'nothing'; there are: .*host" tools/run/build_preset nothing
+refused "no such image" 'nowhere.elf: no such file' tools/run/emulate_r5 "$work/nowhere.elf"
+refused "qemu on a bus that is not there" 'nocan0: no such interface' tools/run/emulate_r5 "$programs/tetap-node" --can nocan0
+refused "run which checks?" 'usage: run_checks' tools/proof/run_checks everything
 
-tools/with-vcan --private -q -t 120 $self --inside
+tools/run/provide_vcan --private -q -t 120 $self --inside
 read -r bus_count bus_failed <"$work/inside" || { echo "WRONG  the part on the bus did not come to its end"; exit 1; }
 echo "$((count + bus_count)) kinds of bad input, $((failed + bus_failed)) not refused as they should be"
 [ $((failed + bus_failed)) = 0 ]

@@ -1,6 +1,6 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
-"""Flights that are made up, with their truth, through tools/import_px4 and robot `iris`: flights.py PROGRAMS OUT [--whole].
+"""Flights that are made up, with their truth, through tools/dataset/import_px4 and robot `iris`: flights.py PROGRAMS OUT [--whole].
 
 A multirotor hovers for 15 s and then flies about at up to some 8 m/s: thrust along its body's z, so a tilt is all that speeds it up. IMU with
 white noise and biases, receiver at 5 Hz, barometer, and a magnetometer that is right, turned about the body's z from the start, or not there.
@@ -104,7 +104,7 @@ def flown(programs, out, field_turned_deg, seed, seconds):
     name = f"{'none' if field_turned_deg is None else f'{field_turned_deg:03d}'}_{seed}"
     write_flight(out, name, seed, field_turned_deg, seconds)
     path = os.path.join(out, name)
-    inertial_runs.run("tools/import_px4", out, name, path)
+    inertial_runs.run("tools/dataset/import_px4", out, name, path)
     replay = inertial_runs.Replay(programs, path + ".log", "iris", path)
     poses = replay.poses
     truth = np.genfromtxt(path + ".truth.csv", delimiter=",", names=True)

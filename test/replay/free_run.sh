@@ -4,7 +4,7 @@
 # reordering, everything on the bus recorded with candump; then the record is played to the host program at the desk, which must give
 # the same bytes in every frame. LOG may be `world`: the simulated world's frames.
 set -u
-. "$(dirname "$0")/../../tools/run_lib.sh"
+. "$(dirname "$0")/../../tools/run/node_session.sh"
 cd "$root" || exit 2
 board=$1 robot=$2 log=$3 seconds=$4
 out=out/free/$board-$robot
@@ -36,9 +36,9 @@ timed_world() {
 
 rm -rf "$out"; mkdir -p "$out"
 if [ "$log" = world ]; then timed_world >"$out/input.log"; else awk -v s="$seconds" 'substr($1, 2) + 0 <= s + 1' "$log" >"$out/input.log"; fi || exit 1
-tools/with-vcan --private -q -t $((seconds * 4 + 120)) "$0" "$board" "$robot" "$log" "$seconds" --inside || exit 1
+tools/run/provide_vcan --private -q -t $((seconds * 4 + 120)) "$0" "$board" "$robot" "$log" "$seconds" --inside || exit 1
 # What the node itself said of the run in its last diagnostics.
-grep ' 325#' "$record" | tail -30 | tools/decode >"$out/diagnostics.txt"
+grep ' 325#' "$record" | tail -30 | tools/can/decode_log >"$out/diagnostics.txt"
 said() { grep -oE " $1=[^ ]*" "$out/diagnostics.txt" | tail -1 | cut -d= -f2; }
 # An emulator that does not get its share of the processor is a receiver that is too slow: the run shows nothing, either way.
 lost=$(said RxOverflow)

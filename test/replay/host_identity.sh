@@ -3,7 +3,7 @@
 # host_identity.sh SECONDS: every recorded run of out/recorded by the g++ program and by the clang++ program, each twice, in memory and
 # whole; then the first SECONDS of it over a private vcan. Always the same bytes; and the path moves.
 set -u
-. "$(dirname "$0")/../../tools/run_lib.sh"
+. "$(dirname "$0")/../../tools/run/node_session.sh"
 cd "$root" || exit 2
 seconds=${1:-20}
 out=out/host
@@ -39,7 +39,7 @@ for name in "${names[@]}"; do
   awk -v s="$seconds" 'NR == 1 { first = substr($1, 2) + 0 } substr($1, 2) + 0 <= first + s + 1' "out/recorded/$name.log" >"$out/$name.log"
   play "$programs" "$out/$name.log" memory
 done
-tools/with-vcan --private -q -t 3000 "$0" --inside || failed=1
+tools/run/provide_vcan --private -q -t 3000 "$0" --inside || failed=1
 
 number() { grep -o "\"$2\": [^,]*" "$out/$name.$1/run.json" | head -1 | cut -d' ' -f2; }
 for name in "${names[@]}"; do

@@ -24,9 +24,9 @@ import numpy as np
 
 sys.dont_write_bytecode = True
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.realpath(__file__))))
-sys.path.insert(0, os.path.join(ROOT, "tools"))
-import bus_writer  # noqa: E402
-import report_metrics as metrics  # noqa: E402
+sys.path.insert(0, os.path.join(ROOT, "tools", "python"))
+from tetap.can import bus_writer  # noqa: E402
+from tetap.report import metrics  # noqa: E402
 
 DATA = os.environ.get("TETAP_DATA") or os.path.join(os.path.dirname(ROOT), "shared", "data")
 PLACES_S = (60, 80, 100, 120, 160, 175, 190, 205, 220, 230)
@@ -214,10 +214,10 @@ def everywhere(programs, log, every_s):
 
 def skog(programs, out, whole, every_s, checks):
     path = os.path.join(out, "skog")
-    run("tools/import_skog", os.path.join(DATA, "skog_gnss_ins"), path)
+    run("tools/dataset/import_skog", os.path.join(DATA, "skog_gnss_ins"), path)
     log = CutLog(path, "car", SKOG_DELAY_S)
     if whole:  # what is cut out here is what the importer leaves out
-        run("tools/import_skog", os.path.join(DATA, "skog_gnss_ins"), path + ".cut", "--cut", "100,30", "--no-speedometer")
+        run("tools/dataset/import_skog", os.path.join(DATA, "skog_gnss_ins"), path + ".cut", "--cut", "100,30", "--no-speedometer")
         log.write(path + ".cut.mine", 100, 30, False, whole=True)
         with open(path + ".cut.log", "rb") as one, open(path + ".cut.mine", "rb") as other:
             def unstamped(data):  # the sequence numbers of what is left go on without a hole in the importer's
@@ -279,7 +279,7 @@ def at(times, rows, *names):
 
 def px4(programs, out, name, checks):
     path = os.path.join(out, name)
-    run("tools/import_px4", os.path.join(DATA, "px4_ecl"), name, path)
+    run("tools/dataset/import_px4", os.path.join(DATA, "px4_ecl"), name, path)
     replay = Replay(programs, path + ".log", "iris", path)
     reference = np.genfromtxt(path + ".reference.csv", delimiter=",", names=True)
     states = replay.rows("states.csv")
@@ -329,7 +329,7 @@ def px4(programs, out, name, checks):
 def husky(programs, out, whole, checks):
     folder = os.path.join(DATA, "husky")
     path = os.path.join(out, "husky_imu_frame")
-    run("tools/import_husky", folder, path, "--imu-frame")
+    run("tools/dataset/import_husky", folder, path, "--imu-frame")
     replay = Replay(programs, path + ".log", "husky_inertial", path)
     end, *sigmas = replay.at_end(float(replay.poses[-1]["time_s"]))
     at_end = judged(end - HUSKY_END_M, *sigmas, 0)
@@ -339,7 +339,7 @@ def husky(programs, out, whole, checks):
     sensor_lines("husky", odometry)
     checks.bound("husky: end point from robot_localization's [m]", at_end["error_m"], 0.02, HUSKY_TOLERANCE_M)
     path = os.path.join(out, "husky_gnss")
-    run("tools/import_husky", folder, path)
+    run("tools/dataset/import_husky", folder, path)
     replay = Replay(programs, path + ".log", "husky_inertial", path)
     error = replay.from_track(truth_of(path))
     sensors = replay.sensors()

@@ -6,7 +6,7 @@
 # must be equal, byte for byte, in two runs of each (of the last one in one); the path must move, and one flipped input bit must change the state CRC
 # on both.
 set -u
-. "$(dirname "$0")/../../tools/run_lib.sh"
+. "$(dirname "$0")/../../tools/run/node_session.sh"
 cd "$root" || exit 2
 seconds=${1:-20}
 out=out/r5
@@ -57,7 +57,7 @@ for run in skog_car iris_gps_iris husky_gnss_husky-inertial; do
   prefix "$log" $((seconds / 2)) >"$out/$run.log"
   images+=("tetap-zynqmp_r5-$(robot_of "$run")")
 done
-[ ${#images[@]} = 0 ] || tools/build "r5:$(IFS=,; echo "${images[*]}")" || exit 1
+[ ${#images[@]} = 0 ] || tools/run/build_preset "r5:$(IFS=,; echo "${images[*]}")" || exit 1
 [ ! -e $out/mrclam1_mrclam.log ] || flip $out/mrclam1_mrclam.log >$out/flipped_mrclam.log
 flip $out/world_rover.log >$out/flipped_rover.log
 # Second runs: of all where there is time, else of one recorded run and the world.
@@ -72,7 +72,7 @@ for log in $out/*_*.log; do
   name=$(basename "$log" .log)
   "$programs/tetap-play" "$log" --memory --robot "$(robot_of "$name")" --out "$out/$name.host" --quiet || exit 1
 done
-tools/with-vcan --private -q -t $((seconds * 40 + 300)) "$0" --inside || exit 1
+tools/run/provide_vcan --private -q -t $((seconds * 40 + 300)) "$0" --inside || exit 1
 
 failed=0
 for host in "$out"/*.host; do

@@ -23,7 +23,7 @@ def run(*words):
 def replay(programs, out, name, robot):
     folder = os.path.join(out, name)
     run(os.path.join(programs, "tetap-play"), f"{folder}.log", "--memory", "--robot", robot, "--out", folder, "--quiet")
-    run("tools/report", folder, "--truth", f"{folder}.truth.csv", "--no-pictures")
+    run("tools/report/write_report", folder, "--truth", f"{folder}.truth.csv", "--no-pictures")
     with open(os.path.join(folder, "summary.json"), encoding="utf-8") as file:
         return json.load(file)
 
@@ -50,17 +50,17 @@ def main():
 
     for robot, (position, heading) in MRCLAM.items():
         name = f"mrclam{robot}"
-        run("tools/import_mrclam", os.path.join(DATA, "mrclam", "MRCLAM_Dataset7"), str(robot), os.path.join(out, name))
+        run("tools/dataset/import_mrclam", os.path.join(DATA, "mrclam", "MRCLAM_Dataset7"), str(robot), os.path.join(out, name))
         summary = replay(programs, out, name, "mrclam")
         bound(f"{name} position RMSE [m]", summary["position_rmse_m"], position / 2, position)
         bound(f"{name} heading RMSE [deg]", summary["heading_rmse_deg"], heading / 2, heading)
         bound(f"{name} frames lost", summary["frames_lost"], 0, 0)
         print(f"  {name} times real time {summary['times_realtime']:.0f} (a benchmark, not a test)")
     print(f"  mrclam, one configuration for all robots: {summary_numbers(out)}")
-    run("tools/import_husky", os.path.join(DATA, "husky"), os.path.join(out, "husky"))
+    run("tools/dataset/import_husky", os.path.join(DATA, "husky"), os.path.join(out, "husky"))
     summary = replay(programs, out, "husky", "husky")
     bound("husky RMS from the GPS track [m]", summary["fused"]["position_rmse_m"] or 0.0, 0.9, 2.5)
-    run("tools/import_labyrinth", os.path.join(DATA, "tuc_labyrinth", "Indoor_UWB"), os.path.join(out, "labyrinth"))
+    run("tools/dataset/import_labyrinth", os.path.join(DATA, "tuc_labyrinth", "Indoor_UWB"), os.path.join(out, "labyrinth"))
     summary = replay(programs, out, "labyrinth", "labyrinth")
     bound("labyrinth odometry RMSE [m]", summary["odometry"]["position_rmse_m"], 0.1, 0.3)
     bound("labyrinth with ranges RMSE [m]", summary["fused"]["position_rmse_m"], 0.06, 0.18)

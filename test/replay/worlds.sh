@@ -3,7 +3,7 @@
 # worlds.sh SEEDS SECONDS: the simulated world from many seeds, and once with every fault it knows, by the g++ and the clang++ program in
 # memory: the same bytes, no frame lost, and neither two seeds nor any fault give the bytes of another. No robot sends more than 600 frames/s.
 set -u
-. "$(dirname "$0")/../../tools/run_lib.sh"
+. "$(dirname "$0")/../../tools/run/node_session.sh"
 cd "$root" || exit 2
 seeds=$1 seconds=$2
 out=out/worlds

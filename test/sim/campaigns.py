@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The simulated campaigns of README, held: campaigns.py OUT [--whole].
 
-Runs tools/campaign as README names it and prints each figure beside its bounds. The bounds are what is required of the filter (a share of the
+Runs tools/proof/run_campaign as README names it and prints each figure beside its bounds. The bounds are what is required of the filter (a share of the
 way, a time, its own 3 sigma) or what chance leaves of it with so many seeds, never the figure that came out last time; two-sided, because an
 error far below what its sensors allow, or a sigma far above its error, is as wrong as the opposite. Where a requirement is known not to be met
 the line begins with "known:" and its bound is that it does not get worse.
@@ -64,12 +64,12 @@ class Checks:
 
 
 def campaign_of(out, name, *options):
-    """What one call of tools/campaign found."""
+    """What one call of tools/proof/run_campaign found."""
     folder = os.path.join(out, name)
-    done = subprocess.run([os.path.join(ROOT, "tools/campaign"), *options, "--out", folder], capture_output=True, text=True, check=False)
+    done = subprocess.run([os.path.join(ROOT, "tools/proof/run_campaign"), *options, "--out", folder], capture_output=True, text=True, check=False)
     if done.returncode != 0:
-        sys.exit(f"tools/campaign {' '.join(options)} failed:\n{done.stderr}")
-    print(f"tools/campaign {' '.join(options)}")
+        sys.exit(f"tools/proof/run_campaign {' '.join(options)} failed:\n{done.stderr}")
+    print(f"tools/proof/run_campaign {' '.join(options)}")
     with open(os.path.join(folder, "campaign.json"), encoding="utf-8") as file:
         return json.load(file)
 
@@ -258,7 +258,7 @@ def main():
     parser.add_argument("--whole", action="store_true", help="with seeds enough for shares (an hour on 2 cores)")
     arguments = parser.parse_args()
     if "TETAP_PROGRAMS" not in os.environ:  # once, not for every campaign
-        subprocess.run([os.path.join(ROOT, "tools/build"), "host:tetap-world"], check=True)
+        subprocess.run([os.path.join(ROOT, "tools/run/build_preset"), "host:tetap-world"], check=True)
         os.environ["TETAP_PROGRAMS"] = os.path.join(ROOT, "build/host/sim_host")
     checks = Checks()
     (whole_form if arguments.whole else short_form)(arguments.out, checks)

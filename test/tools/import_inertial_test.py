@@ -16,11 +16,11 @@ import scipy.io
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 TOOLS = os.path.join(ROOT, "tools")
-sys.path.insert(0, TOOLS)
+sys.path.insert(0, os.path.join(TOOLS, "python"))
 sys.dont_write_bytecode = True
 
-import bus_writer  # noqa: E402
-import import_inertial  # noqa: E402
+from tetap.can import bus_writer  # noqa: E402
+from tetap.dataset import inertial  # noqa: E402
 
 DATA = os.environ.get("TETAP_DATA") or os.path.join(ROOT, "..", "shared", "data")
 START_US = 1_000_000
@@ -38,7 +38,7 @@ HUSKY, with_husky = needs("husky")
 
 
 def run(tool, *arguments):
-    return subprocess.run([os.path.join(TOOLS, tool), *map(str, arguments)], capture_output=True, text=True, timeout=120)
+    return subprocess.run([os.path.join(TOOLS, "dataset", tool), *map(str, arguments)], capture_output=True, text=True, timeout=120)
 
 
 def text_of(path):
@@ -111,7 +111,7 @@ class Imported(unittest.TestCase):
         valid, gyro = self.log.valid_us("In_Imu0Time")
         np.testing.assert_array_equal(valid - START_US, time_us[1:])
         dt = np.diff(time_us)
-        dt = np.where(dt > import_inertial.INTERVAL_MAX_US, int(np.median(dt)), dt)
+        dt = np.where(dt > inertial.INTERVAL_MAX_US, int(np.median(dt)), dt)
         np.testing.assert_array_equal(np.rint(gyro["Interval"]), dt)
         for name, letters, source in (("In_Imu0Gyro", "Ang", rate_frd), ("In_Imu0Accel", "Vel", force_frd)):
             _, values = self.log.of(name)
@@ -151,8 +151,8 @@ class Skog(Imported):
         _, acc = self.log.of("In_GnssAcc")
         np.testing.assert_array_equal(valid - START_US, np.rint(np.ravel(self.gnss.t) * 1e6))
         np.testing.assert_array_equal(arrival - valid, 100_000)
-        ecef = import_inertial.to_ecef(lat["Lat"], lon["Lon"], alt["Height"]) - import_inertial.to_ecef(59.35, 18.07, 30.0)[:, None]
-        enu = import_inertial.east_north_up(59.35, 18.07) @ ecef
+        ecef = inertial.to_ecef(lat["Lat"], lon["Lon"], alt["Height"]) - inertial.to_ecef(59.35, 18.07, 30.0)[:, None]
+        enu = inertial.east_north_up(59.35, 18.07) @ ecef
         np.testing.assert_allclose(enu, [self.gnss.pos_ned[1], self.gnss.pos_ned[0], -self.gnss.pos_ned[2]], atol=0.0015)
         np.testing.assert_allclose(acc["Hor"], 3 * self.gnss.HDOP / np.sqrt(2), atol=0.0026)
         np.testing.assert_allclose(acc["Ver"], 3 * self.gnss.VDOP, atol=0.0026)
@@ -276,12 +276,12 @@ class Geodesy(unittest.TestCase):
         enu[2] = generator.uniform(-100, 3000, 200)
         enu[:, 0] = 0
         for origin in ((59.35, 18.07, 30.0), (-33.9, 151.2, 10.0), (0.0, 179.99, 0.0)):
-            np.testing.assert_allclose(import_inertial.to_enu(*import_inertial.from_enu(enu, origin)), enu, atol=2e-6)
+            np.testing.assert_allclose(inertial.to_enu(*inertial.from_enu(enu, origin)), enu, atol=2e-6)
 
     def test_earth_centred_coordinates_are_those_of_the_ellipsoids_axes(self):
         # WGS84: equatorial radius 6378137 m, polar radius 6356752.3142 m (NIMA TR8350.2, table 3.3).
-        np.testing.assert_allclose(import_inertial.to_ecef(0, 0, 0), [6378137, 0, 0], atol=1e-6)
-        np.testing.assert_allclose(import_inertial.to_ecef(90, 0, 10), [0, 0, 6356762.3142], atol=1e-3)
+        np.testing.assert_allclose(inertial.to_ecef(0, 0, 0), [6378137, 0, 0], atol=1e-6)
+        np.testing.assert_allclose(inertial.to_ecef(90, 0, 10), [0, 0, 6356762.3142], atol=1e-3)
 
 
 class BadInput(unittest.TestCase):

@@ -18,11 +18,11 @@ import numpy as np
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 TOOLS = os.path.join(ROOT, "tools")
-sys.path.insert(0, TOOLS)
+sys.path.insert(0, os.path.join(TOOLS, "python"))
 sys.dont_write_bytecode = True
 
-import bus_writer  # noqa: E402
-import import_common  # noqa: E402
+from tetap.can import bus_writer  # noqa: E402
+from tetap.dataset import common  # noqa: E402
 
 with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
     import canmatrix.formats  # says on import which formats it lacks
@@ -57,7 +57,7 @@ def text_of(path):
 
 
 def run(tool, *arguments):
-    return subprocess.run([os.path.join(TOOLS, tool), *map(str, arguments)], capture_output=True, text=True, timeout=120)
+    return subprocess.run([os.path.join(TOOLS, "dataset", tool), *map(str, arguments)], capture_output=True, text=True, timeout=120)
 
 
 def needs(*parts):
@@ -163,7 +163,7 @@ class Times(unittest.TestCase):
         cases = {"1248446188.323": 1248446188323000, "1432235498.0390896": 1432235498039090, "-0.0000015": -2, "0.127943992614746": 127944,
                  "12": 12_000_000, "1e-3": 1000, "9007199254.740993": 9007199254740993}
         for text, expected in cases.items():
-            self.assertEqual(import_common.microseconds(text), expected, text)
+            self.assertEqual(common.microseconds(text), expected, text)
 
 
 class Imported(unittest.TestCase):
@@ -274,7 +274,7 @@ class Husky(Imported):
     def test_increments_over_their_interval_are_the_imu_s_readings(self):
         with open(os.path.join(HUSKY, "test1_imu_data.csv")) as file:
             file.readline()
-            rows = {import_common.microseconds(row["t_stamp"]): row for row in csv.DictReader(file)}
+            rows = {common.microseconds(row["t_stamp"]): row for row in csv.DictReader(file)}
         stamps = sorted(rows)
         offset = round(self.about["time_offset_s"] * 1e6)
         gyro, accel, time = self.of("In_Imu0Gyro"), self.of("In_Imu0Accel"), self.of("In_Imu0Time")

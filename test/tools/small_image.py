@@ -10,6 +10,7 @@ import unittest
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 TOOLS = os.path.join(ROOT, "tools")
+PROOF = os.path.join(TOOLS, "proof")
 CORES = {
     "m7": ["-mcpu=cortex-m7", "-mfpu=fpv5-d16", "-mfloat-abi=hard", "-mthumb"],
     "m4f": ["-mcpu=cortex-m4", "-mfpu=fpv4-sp-d16", "-mfloat-abi=hard", "-mthumb"],
@@ -103,8 +104,8 @@ class ImageTest(unittest.TestCase):
 
     def run_tool(self, tool, *arguments):
         """(status, everything printed) of a tool; JSON goes to the test's folder."""
-        out = [] if tool == "layers" else ["--out", self.folder]
-        done = subprocess.run([os.path.join(TOOLS, tool)] + out + list(arguments), capture_output=True, text=True)
+        out = [] if tool == "check_layers" else ["--out", self.folder]
+        done = subprocess.run([os.path.join(PROOF, tool)] + out + list(arguments), capture_output=True, text=True)
         self.assertNotIn("Traceback", done.stderr)
         return done.returncode, done.stdout + done.stderr
 

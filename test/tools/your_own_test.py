@@ -56,13 +56,13 @@ class YourOwn(unittest.TestCase):
 
     def test_a_copy_with_the_name_of_another_is_told(self):
         shutil.copy(os.path.join(self.tree, "config/rover.hpp"), os.path.join(self.tree, f"config/{ROBOT}.hpp"))
-        said = self.run_here("tools/build", "host", status=1)
+        said = self.run_here("tools/run/build_preset", "host", status=1)
         self.assertIn(f"config/{ROBOT}.hpp: a robot's file has one line 'namespace tetap::robot::{ROBOT} {{', as the file is named", " ".join(said.split()))
         self.assertLess(len(said.splitlines()), 7)
 
     def test_a_name_that_no_namespace_can_have_is_told(self):
         shutil.copy(os.path.join(self.tree, "config/rover.hpp"), os.path.join(self.tree, "config/rover.old.hpp"))
-        self.assertIn("config/rover.old.hpp: a robot's name has letters", " ".join(self.run_here("tools/build", "host", status=1).split()))
+        self.assertIn("config/rover.old.hpp: a robot's name has letters", " ".join(self.run_here("tools/run/build_preset", "host", status=1).split()))
 
     def test_a_board_is_a_folder_and_a_preset(self):
         self.copy(f"config/{ROBOT}.hpp")
@@ -85,15 +85,15 @@ class YourOwn(unittest.TestCase):
             said = self.run_here("bash", "-c", firmware)
             self.assertRegex(said, f"tetap-{BOARD}-{ROBOT}: ok, .* symbols")  # no heap
             self.assertRegex(said, f"tetap-{BOARD}-{ROBOT}: bound [0-9]+ of ")
-            self.run_here("tools/build", "host:tetap-node")
+            self.run_here("tools/run/build_preset", "host:tetap-node")
             boot = self.run_here("build/host/sim_host/tetap-node", "--boot-line", "--robot", ROBOT).strip()
             image = f"build/{BOARD}/hal/port/tetap-{BOARD}-{ROBOT}.elf"
-            self.assertIn(boot, self.run_here("tools/qemu-r5", image, "--then", "sleep", "3").splitlines())
+            self.assertIn(boot, self.run_here("tools/run/emulate_r5", image, "--then", "sleep", "3").splitlines())
 
     def test_a_list_of_presets_that_is_none_is_told(self):
         with open(os.path.join(self.tree, "CMakePresets.json"), "a", encoding="utf-8") as file:
             file.write(",")
-        said = self.run_here("env", "BOARD=zynqmp_r5", "tools/firmware", status=2)
+        said = self.run_here("env", "BOARD=zynqmp_r5", "tools/run/build_firmware", status=2)
         self.assertRegex(said, r"\Afirmware: CMakePresets.json: .*line [0-9]+.*\n\Z")
 
     def test_a_board_without_a_folder_is_told(self):

@@ -103,7 +103,7 @@ bool SocketCan::open_socket(std::string& why) {
   socket_ = socket(AF_CAN, SOCK_RAW | SOCK_CLOEXEC, CAN_RAW);
   if (socket_ < 0) {
     return refuse("CAN interface " + interface_ + ": this kernel has no SocketCAN (" + std::strerror(errno) +
-                  "); run the command under tools/with-vcan");
+                  "); run the command under tools/run/provide_vcan");
   }
   ifreq request{};
   if (interface_.empty() || interface_.size() >= sizeof request.ifr_name)

@@ -1,0 +1,88 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: Apache-2.0
+# tools/proof/compare_bits with programs that are not what they should be: every way in which a comparison could pass for the wrong reason.
+import contextlib
+import importlib.machinery
+import importlib.util
+import io
+import json
+import os
+import sys
+import tempfile
+import unittest
+
+sys.dont_write_bytecode = True
+TOOL = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "tools", "proof", "compare_bits")
+loader = importlib.machinery.SourceFileLoader("bits", TOOL)
+bits = importlib.util.module_from_spec(importlib.util.spec_from_loader("bits", loader))
+loader.exec_module(bits)
+GOOD = "bits: begin short\nbits: sin 00000001\nbits: boot_rover 00000002\nbits: end short\n"
+
+
+class BitsTest(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = folder.name
+        bits.BUILDS = {"one": ("host", {}, None), "two": ("host", {}, None)}
+        bits.REFERENCE, bits.RED, bits.TIMEOUT_S = "one", {"red": ("host", {}, None)}, {"short": 1, "whole": 1}
+        bits.build = lambda name, top: os.path.join(self.folder, name)
+
+    def compare(self, one, two, red=None, after=""):
+        for name, text in (("one", one), ("two", two), ("red", red or "")):
+            path = os.path.join(self.folder, name)
+            with open(path, "w", encoding="utf-8") as file:
+                file.write(f"#!/bin/sh\ncat <<'END'\n{text}END\n{after}\n")
+            os.chmod(path, 0o755)
+        said = io.StringIO()
+        with contextlib.redirect_stdout(said), contextlib.redirect_stderr(io.StringIO()):
+            status = bits.show_red("", self.folder) if red else bits.compare("short", "", self.folder)
+        return status, said.getvalue()
+
+    def test_equal_hashes_pass_and_are_written(self):
+        status, said = self.compare(GOOD, GOOD)
+        self.assertEqual(status, 0, said)
+        self.assertIn("tetap: robot rover, bits 00000002", said)
+        with open(os.path.join(self.folder, "bits.json"), encoding="utf-8") as file:
+            self.assertEqual(json.load(file)["sin"], {"one": "00000001", "two": "00000001"})
+
+    def test_one_hash_that_differs_fails_by_name(self):
+        status, said = self.compare(GOOD, GOOD.replace("00000001", "00000003"))
+        self.assertEqual(status, 1)
+        self.assertIn("FAIL sin: differs on two", said)
+
+    def test_a_line_missing_on_either_side_fails(self):
+        fewer = GOOD.replace("bits: sin 00000001\n", "")
+        for one, two in ((GOOD, fewer), (fewer, GOOD)):
+            status, said = self.compare(one, two)
+            self.assertEqual(status, 1)
+            self.assertIn("FAIL sin", said)
+
+    def test_a_program_that_ends_early_is_an_error(self):
+        with self.assertRaisesRegex(bits.BitsError, "two: ended before 'bits: end short'"):
+            self.compare(GOOD, GOOD.replace("bits: end short\n", ""))
+
+    def test_a_program_that_hangs_is_stopped(self):
+        with self.assertRaisesRegex(bits.BitsError, "two: was stopped after 1 s"):
+            self.compare(GOOD, GOOD.replace("bits: end short\n", ""), after="exec sleep 60")
+
+    def test_nothing_printed_is_not_equality(self):
+        empty = "bits: begin short\nbits: end short\n"
+        with self.assertRaisesRegex(bits.BitsError, "printed no hash"):
+            self.compare(empty, empty)
+
+    def test_one_name_twice_is_an_error(self):
+        with self.assertRaisesRegex(bits.BitsError, "two lines are called sin"):
+            self.compare(GOOD, GOOD.replace("bits: boot_rover", "bits: sin"))
+
+    def test_what_comes_after_the_form_is_not_read(self):
+        status, said = self.compare(GOOD, GOOD + "bits: begin whole\nbits: sin 00000009\n", after="exec sleep 60")
+        self.assertEqual(status, 0, said)
+
+    def test_show_red_fails_when_nothing_turns_red(self):
+        self.assertEqual(self.compare(GOOD, GOOD, red=GOOD)[0], 1)
+        self.assertEqual(self.compare(GOOD, GOOD, red=GOOD.replace("00000001", "00000003"))[0], 0)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,126 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: Apache-2.0
+"""What tools/can/encode_frame makes of words, tools/can/decode_log and canmatrix (which knows only the DBC) read back; what it cannot make is refused in one line."""
+import contextlib
+import importlib.machinery
+import importlib.util
+import io
+import os
+import random
+import re
+import subprocess
+import sys
+import unittest
+
+sys.dont_write_bytecode = True
+ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.realpath(__file__))))
+DBC = os.path.join(ROOT, "config", "tetap.dbc")
+TOOL = os.path.join(ROOT, "tools", "can", "encode_frame")
+with contextlib.redirect_stdout(io.StringIO()):  # canmatrix reports missing optional formats when imported
+    import canmatrix.formats
+
+
+def tool():
+    loader = importlib.machinery.SourceFileLoader("tetap_encode", TOOL)
+    module = importlib.util.module_from_spec(importlib.util.spec_from_loader("tetap_encode", loader))
+    loader.exec_module(module)
+    return module
+
+
+encode = tool()
+DATABASE = encode.bus_database.read(DBC)
+SOURCE = {frame.name: frame for frame in canmatrix.formats.loadp_flat(DBC, dbcImportEncoding="ascii").frames}
+
+
+def run(*words):
+    return subprocess.run((TOOL,) + words, capture_output=True, text=True, timeout=60)
+
+
+def crc_bitwise(data):
+    crc = 0xFF
+    for byte in data:
+        crc ^= byte
+        for _ in range(8):
+            crc = (crc << 1 ^ 0x2F) & 0xFF if crc & 0x80 else crc << 1
+    return crc ^ 0xFF
+
+
+def random_words(message, page, chance):
+    """(raw by field, the same as words)"""
+    raws, words = {}, []
+    for field in ([message.mux] if message.mux else []) + message.page_signals(page):
+        if message.protected and field.field == "Crc":
+            continue
+        low, high = field.steps
+        raw = page if field.is_mux else chance.choice(sorted(field.values)) if field.enum else chance.choice([low, high, chance.randint(low, high)])
+        raws[field.name] = raw
+        text = field.values[raw] if field.enum else str(raw * field.scale)
+        if field.is_mux and message.page_names:
+            text = message.page_names[message.pages.index(page)]
+        words.append("%s=%s" % (field.field, text))
+    return raws, words
+
+
+class Encode(unittest.TestCase):
+    def each(self):
+        chance = random.Random(1)
+        for message in DATABASE.messages:
+            for page in message.pages:
+                for _ in range(20):
+                    yield (message, page) + random_words(message, page, chance)
+
+    def test_canmatrix_reads_back_every_signal_of_every_message(self):
+        for message, _, raws, words in self.each():
+            offset, data = encode.encode(DATABASE, message.name, words)
+            self.assertEqual(offset, message.id - 0x300)
+            decoded = SOURCE[message.name].decode(bytes(data))
+            self.assertEqual({name: int(decoded[name].raw_value) for name in raws}, raws, words)
+
+    def test_our_decoder_says_the_words_again(self):
+        decoder = encode.decode.Decoder(DATABASE, None)
+        for message, page, raws, words in self.each():
+            offset, data = encode.encode(DATABASE, message.name, words)
+            text = decoder.words(0x300 + offset, data)
+            self.assertNotIn("(wrong)", text)
+            self.assertTrue(re.match(re.escape(message.name) + r"(\[| )", text), text)
+            for word in words:
+                field, value = word.split("=")
+                if any(s.field == field and s.enum for s in message.page_signals(page)):
+                    self.assertIn(" %s=%s" % (field, value), text)
+
+    def test_the_crc_is_that_of_the_offset_and_bytes_1_to_7(self):
+        protected = 0
+        for message, _, _, words in self.each():
+            if message.protected:
+                offset, data = encode.encode(DATABASE, message.name, words)
+                self.assertEqual(data[0], crc_bitwise(bytes([offset]) + data[1:]))
+                protected += 1
+        self.assertGreater(protected, 0)
+
+    def test_what_is_not_given_is_not_available(self):
+        text = encode.decode.Decoder(DATABASE, None).words(0x304, encode.encode(DATABASE, "Cmd_SetYaw", ["Yaw=0.5"])[1])
+        self.assertIn("StdPos=not available StdYaw=not available", text)
+
+    def test_the_line_is_a_frame_for_cansend_or_a_line_of_a_log(self):
+        self.assertRegex(run("In_MapEntry", "Id=7", "X=1", "Y=-2").stdout, r"^305#[0-9A-F]{16}\n$")
+        self.assertRegex(run("In_MapEntry", "Id=7", "X=1", "Y=-2", "--base", "0x340").stdout, r"^345#[0-9A-F]{16}\n$")
+        line = run("In_BodySpeed", "Inst=0", "Forward=1", "YawRate=0", "--time", "2.5").stdout
+        self.assertRegex(line, r"^\(2\.500000\) vcan0 308#[0-9A-F]{16}\n$")
+        self.assertEqual(int.from_bytes(bytes.fromhex(line.strip().split("#")[1]), "little") & 0xFFFFF, 2500000 % (1 << 20))
+
+    def test_bad_words_are_refused_in_one_line_that_says_why(self):
+        for words, reason in ((["In_Nothing"], "no message 'In_Nothing'"), (["In_MapEntry", "Id=7", "Z=1"], "no 'Z'; there are: Id X Y"),
+                              (["In_MapEntry", "Id=300"], "300 is out of range: 0 to 254"), (["In_MapEntry", "Id=1.5"], "no whole number"),
+                              (["Cmd_SetPos", "X=1e9", "Y=0"], "out of range: -67108.862 to 67108.862 m"),
+                              (["Cmd_SetPos", "X=nan", "Y=0"], "'nan' is no number"), (["Cmd_SetPos", "X"], "no Signal=value"),
+                              (["Cmd_SetPos", "X=1", "X=2"], "twice"), (["Cmd_SetPos", "Crc=1"], "worked out"),
+                              (["Cmd_Reset", "What=Everything"], "there are: Estimators Counters LandmarkMap"),
+                              (["Cmd_Reset"], "missing, and there is no code for not available: What"),
+                              (["Est_Diag"], "Page= is missing; there are: "), (["Est_Diag", "Page=15"], "no page 15")):
+            result = run(*words)
+            self.assertEqual((result.returncode, result.stdout, result.stderr.count("\n")), (1, "", 1), result)
+            self.assertIn(reason, result.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,628 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: Apache-2.0
+"""tools/report/write_report: metrics against laws and brute force, files it writes, bad input."""
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import unittest
+
+import numpy as np
+
+ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+TOOLS = os.path.join(ROOT, "tools")
+sys.path.insert(0, os.path.join(TOOLS, "python"))
+sys.dont_write_bytecode = True
+
+from tetap.report import metrics  # noqa: E402
+
+RUN = {"frames_in": 1234, "frames_lost": 0, "estimates_out": 777, "times_realtime": 12.5, "bus_load_percent": 9.25, "estimates_sha256": "ab" * 32,
+       "state_crc_last": "0x12345678", "bus": "memory", "way": "one process", "robot": "rover", "mode": "lockstep", "duration_s": 10.0, "seed": 7,
+       "fault": "none"}
+
+
+def text_of(path):
+    with open(path, encoding="utf-8") as file:
+        return file.read()
+
+
+class Case(unittest.TestCase):
+    def setUp(self):
+        self.directory = tempfile.mkdtemp()
+        self.addCleanup(shutil.rmtree, self.directory, ignore_errors=True)
+
+    def path(self, name):
+        return os.path.join(self.directory, name)
+
+    def write(self, name, text):
+        with open(self.path(name), "w", encoding="utf-8") as file:
+            file.write(text)
+
+    def write_rows(self, name, columns, rows):
+        def field(value):
+            return "" if value is None or value != value else f"{value:.12g}"
+        self.write(name, ",".join(columns) + "\n" + "".join(",".join(field(value) for value in row) + "\n" for row in rows))
+
+    def truth(self, time_s, x, y, yaw=None, about=None):
+        yaw = [None] * len(time_s) if yaw is None else yaw
+        self.write_rows("t.truth.csv", metrics.TRUTH, zip(time_s, x, y, yaw))
+        if about is not None:
+            self.write("t.json", json.dumps(about))
+        return self.path("t.truth.csv")
+
+    def estimates(self, time_s, x, y, yaw, estimator=1, std=None, corr=None, valid=None, more=()):
+        """One row per time; `std` and `corr` are rows of three, or None for rows without."""
+        rows = list(more)
+        for n, t in enumerate(time_s):
+            s = [None] * 3 if std is None or std[n] is None else std[n]
+            c = [None] * 3 if corr is None or std[n] is None else corr[n]
+            ok = 1 if valid is None else valid[n]
+            rows.append([n, t, estimator, 1 + estimator, x[n], y[n], yaw[n], 0.5, 0.1, *s, *c, ok, ok, 0.05, 0.02])
+        self.write_rows("estimates.csv", metrics.ESTIMATES, rows)
+        self.write("run.json", json.dumps(RUN))
+        return rows
+
+    def report(self, *arguments):
+        return subprocess.run([os.path.join(TOOLS, "report", "write_report"), self.directory, *arguments], capture_output=True, text=True, timeout=120)
+
+    def summary(self, *arguments):
+        result = self.report("--no-pictures", *arguments)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        return json.loads(text_of(self.path("summary.json")))
+
+
+class Errors(Case):
+    time_s = 1 + 0.01 * np.arange(500)
+
+    def test_an_estimate_that_is_the_truth_has_no_error_also_between_its_rows_and_where_yaw_wraps(self):
+        yaw = 3.0 + 0.1 * (self.time_s - 1)  # through +pi
+        truth_t = 1 + 0.03 * np.arange(170)
+        truth = self.truth(truth_t, 2 * truth_t, -truth_t, metrics.wrapped(3.0 + 0.1 * (truth_t - 1)))
+        self.estimates(self.time_s, 2 * self.time_s, -self.time_s, metrics.wrapped(yaw))
+        fused = self.summary("--truth", truth)["fused"]
+        for key in ("position_rmse_m", "final_error_m", "max_error_m", "heading_rmse_deg"):
+            self.assertLess(fused[key], 1e-6, key)
+        self.assertEqual(fused["epochs_with_truth"], 500)
+
+    def test_a_known_error_is_found_in_every_figure_and_at_the_top(self):
+        zero = np.zeros(500)
+        truth = self.truth(self.time_s, zero, zero, zero)
+        x = np.where(np.arange(500) == 499, 0.5, 0.3)
+        self.estimates(self.time_s, x, zero + 0.4, zero - 0.02)
+        summary = self.summary("--truth", truth)
+        fused = summary["fused"]
+        self.assertAlmostEqual(fused["position_rmse_m"], np.sqrt((499 * 0.25 + 0.41) / 500), places=9)
+        self.assertAlmostEqual(fused["final_error_m"], np.sqrt(0.41), places=9)
+        self.assertAlmostEqual(fused["max_error_m"], np.sqrt(0.41), places=9)
+        self.assertAlmostEqual(fused["heading_rmse_deg"], np.degrees(0.02), places=9)
+        self.assertAlmostEqual(fused["final_heading_error_deg"], -np.degrees(0.02), places=9)
+        self.assertEqual((summary["position_rmse_m"], summary["heading_rmse_deg"]), (fused["position_rmse_m"], fused["heading_rmse_deg"]))
+
+    def test_a_heading_across_the_wrap_is_near_and_not_a_turn_away(self):
+        zero = np.zeros(500)
+        truth = self.truth(self.time_s, zero, zero, zero + 3.13)
+        self.estimates(self.time_s, zero, zero, zero - 3.13)
+        self.assertAlmostEqual(self.summary("--truth", truth)["heading_rmse_deg"], np.degrees(2 * np.pi - 6.26), places=6)
+
+    def test_odometry_and_fused_are_told_apart(self):
+        zero = np.zeros(500)
+        truth = self.truth(self.time_s, zero, zero, zero)
+        odometry = self.estimates(self.time_s, zero + 3, zero + 4, zero, estimator=0)
+        self.estimates(self.time_s, zero + 1, zero, zero, more=odometry)
+        summary = self.summary("--truth", truth)
+        self.assertAlmostEqual(summary["odometry"]["position_rmse_m"], 5.0)
+        self.assertAlmostEqual(summary["fused"]["position_rmse_m"], 1.0)
+        self.assertAlmostEqual(summary["position_rmse_m"], 1.0)
+        self.assertEqual((summary["odometry"]["kind"], summary["fused"]["kind"]), ("Odometry", "Ekf"))
+
+    def test_nothing_is_compared_in_gaps_of_the_truth_nor_outside_of_it(self):
+        known = (self.time_s < 2.0) | (self.time_s > 2.5)
+        zero = np.zeros(500)
+        inside = known & (self.time_s > 1.4995) & (self.time_s < 5.0005)
+        truth = self.truth(self.time_s[inside], zero[inside], zero[inside], zero[inside])
+        x = np.where(inside, 0.1, 99.0)
+        self.estimates(self.time_s, x, zero, zero)
+        fused = self.summary("--truth", truth)["fused"]
+        self.assertAlmostEqual(fused["max_error_m"], 0.1)
+        self.assertEqual(fused["epochs_with_truth"], int(inside.sum()))
+        self.assertAlmostEqual(self.summary("--truth", truth, "--max-gap", "1.0")["fused"]["max_error_m"], 99.0)
+
+    def test_estimates_that_are_not_valid_are_counted_and_not_compared(self):
+        zero = np.zeros(500)
+        truth = self.truth(self.time_s, zero, zero, zero)
+        valid = (np.arange(500) >= 20).astype(int)
+        self.estimates(self.time_s, np.where(valid, 0.2, 50.0), zero, zero, valid=valid)
+        fused = self.summary("--truth", truth)["fused"]
+        self.assertEqual((fused["epochs"], fused["epochs_not_valid"]), (500, 20))
+        self.assertAlmostEqual(fused["max_error_m"], 0.2)
+
+    def test_without_truth_there_are_no_errors_and_no_failure(self):
+        zero = np.zeros(500)
+        self.estimates(self.time_s, zero, zero, zero)
+        summary = self.summary()
+        self.assertIsNone(summary["truth"])
+        self.assertIsNone(summary["position_rmse_m"])
+
+    def test_what_the_player_wrote_is_at_the_top_of_the_summary(self):
+        zero = np.zeros(500)
+        self.estimates(self.time_s, zero, zero, zero)
+        summary = self.summary()
+        for key, value in RUN.items():
+            self.assertEqual(summary[key], value, key)
+
+
+class Nees(Case):
+    def matched(self, yaw_known, count=4000, scale=1.0):
+        """Errors drawn from the covariance published every second epoch; those in between are absurd and must not count."""
+        generator = np.random.default_rng(3)
+        time_s = 1 + 0.01 * np.arange(count)
+        std = generator.uniform(0.02, 0.3, (count, 3))
+        mix = np.array([[1.0, 0.0, 0.0], [0.6, 0.8, 0.0], [-0.5, 0.3, np.sqrt(1 - 0.34)]])
+        r = mix @ mix.T
+        error = (generator.normal(size=(count, 3)) @ mix.T) * std * scale
+        published = [None if n % 2 else std[n] for n in range(count)]
+        error[1::2] = 100.0
+        zero = np.zeros(count)
+        truth = self.truth(time_s, zero, zero, zero if yaw_known else None)
+        self.estimates(time_s, error[:, 0], error[:, 1], metrics.wrapped(error[:, 2]), std=published, corr=[(r[0, 1], r[0, 2], r[1, 2])] * count)
+        brute = []
+        for n in range(0, count, 2):
+            p = np.outer(std[n], std[n]) * r
+            e = np.array([*error[n, :2], metrics.wrapped(error[n, 2])])
+            d = 3 if yaw_known else 2
+            brute.append(e[:d] @ np.linalg.inv(p[:d, :d]) @ e[:d])
+        return truth, np.array(brute)
+
+    def test_errors_drawn_from_the_published_covariance_are_consistent(self):
+        for yaw_known, dof in ((True, 3), (False, 2)):
+            truth, brute = self.matched(yaw_known)
+            fused = self.summary("--truth", truth)["fused"]
+            self.assertEqual((fused["nees_dof"], fused["nees_epochs"]), (dof, 2000))
+            self.assertAlmostEqual(fused["nees_mean"], brute.mean(), places=6)
+            # 2000 independent draws: mean within 4 sigma (variance 2 dof), shares within 4 sigma (binomial)
+            self.assertLess(abs(fused["nees_mean"] - dof), 4 * np.sqrt(2 * dof / 2000))
+            self.assertLess(abs(fused["nees_inside_95"] - 0.95), 0.02)
+            self.assertLess(abs(fused["nees_inside_two_sided_95"] - 0.95), 0.02)
+
+    def test_an_overconfident_estimate_is_seen_as_such(self):
+        truth, _ = self.matched(True, scale=2.0)
+        fused = self.summary("--truth", truth)["fused"]
+        self.assertGreater(fused["nees_mean"], 10.0)
+        self.assertLess(fused["nees_inside_95"], 0.7)
+
+    def test_a_timid_estimate_is_outside_of_the_two_sided_interval(self):
+        truth, _ = self.matched(True, scale=0.1)
+        fused = self.summary("--truth", truth)["fused"]
+        self.assertGreater(fused["nees_inside_95"], 0.999)
+        self.assertLess(fused["nees_inside_two_sided_95"], 0.1)
+
+    def test_a_covariance_that_is_none_is_counted_and_left_out(self):
+        time_s, zero = 1 + 0.01 * np.arange(4), np.zeros(4)
+        truth = self.truth(time_s, zero, zero, zero)
+        std = [(0.1, 0.1, 0.1), (0.0, 0.1, 0.1), (0.1, 0.1, 0.1), None]
+        self.estimates(time_s, zero + 0.1, zero, zero, std=std, corr=[(0, 0, 0), (0, 0, 0), (1.0, 0, 0), (0, 0, 0)])
+        fused = self.summary("--truth", truth)["fused"]
+        self.assertEqual((fused["nees_epochs"], fused["nees_covariances_not_usable"]), (1, 2))
+        self.assertAlmostEqual(fused["nees_mean"], 1.0)
+
+
+class Innovations(Case):
+    def test_verdicts_are_counted_by_sensor_and_nis_is_the_mean_of_the_accepted(self):
+        time_s, zero = 1 + 0.01 * np.arange(10), np.zeros(10)
+        self.estimates(time_s, zero, zero, zero)
+        rows = [[0, 1, 1, 4, 0, 0, 2, 1.0, 0.1, 5, 7], [1, 1, 1, 4, 0, 0, 2, 3.0, 0.1, 5, 7], [2, 1, 1, 4, 0, 1, 2, 20.0, 2.0, 5, 7],
+                [3, 1, 1, 4, 0, 4, 2, None, None, 5, 99], [4, 1, 1, 5, 0, 3, 2, None, None, 500, None], [5, 1, 0, 4, 0, 0, 2, 9.0, 1, 5, 7]]
+        self.write_rows("innovations.csv", metrics.INNOVATIONS, rows)
+        measured = self.summary()["fused"]["measurements"]
+        landmarks = measured["RangeBearing"]
+        self.assertEqual((landmarks["accepted"], landmarks["rejected"], landmarks["other"]), (2, 1, 1))
+        self.assertEqual(landmarks["verdicts"], {"Accepted": 2, "Rejected": 1, "UnknownLandmark": 1})
+        self.assertAlmostEqual(landmarks["nis_mean"], 2.0)
+        self.assertAlmostEqual(landmarks["nis_mean_with_rejected"], 8.0)
+        self.assertAlmostEqual(landmarks["nis_inside_95"], 2 / 3)
+        self.assertEqual(measured["GnssPosition"], {"accepted": 0, "rejected": 0, "other": 1, "verdicts": {"TooLate": 1}})
+        table = self.report("--no-pictures").stdout
+        for line in (r"RangeBearing accepted / rejected +2 / 1\n", r"RangeBearing of no landmark on the map +1\n", r"GnssPosition too late +1\n",
+                     r"RangeBearing NIS mean, accepted \(2 expected\) .* 2\.00", r"RangeBearing NIS mean, with rejected .* 8\.00"):
+            self.assertRegex(table, line)
+
+    def test_names_of_the_bus_s_enumerations_stand_for_their_numbers(self):
+        time_s, zero = 1 + 0.01 * np.arange(10), np.zeros(10)
+        self.estimates(time_s, zero, zero, zero)
+        header = ",".join(metrics.INNOVATIONS)
+        self.write("innovations.csv", f"{header}\n0,1,1,RangeBearing,0,NotFinite,2,,,5,7\n0,1,1,RangeBearing,0,Accepted,2,1.5,0.1,5,7\n")
+        measured = self.summary()["fused"]["measurements"]
+        self.assertEqual(measured["RangeBearing"]["verdicts"], {"Accepted": 1, "NotFinite": 1})
+
+
+class Warnings(Case):
+    time_s, zero = 1 + 0.01 * np.arange(40), np.zeros(40)
+
+    def run_with(self, rejected, error_m=0.0, estimator=1, about=RUN):
+        truth = self.truth(self.time_s, self.zero, self.zero, self.zero)
+        self.estimates(self.time_s, self.zero + error_m, self.zero, self.zero, estimator=estimator, std=[(0.1, 0.1, 0.1)] * 40,
+                       corr=[(0, 0, 0)] * 40)
+        self.write("run.json", json.dumps(about))
+        self.write_rows("innovations.csv", metrics.INNOVATIONS,
+                        [[n, t, estimator, 4, 0, int(n < rejected), 2, 1.0, 0.1, 5, 7] for n, t in enumerate(self.time_s[:30])])
+        result = self.report("--no-pictures", "--truth", truth)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        lines = [line for line in result.stdout.splitlines() if line.startswith("warning:")]
+        self.assertEqual(["warning: " + one for one in json.loads(text_of(self.path("summary.json")))["warnings"]], lines)
+        return lines
+
+    def test_more_than_a_third_rejected_is_one_warning_and_a_third_is_none(self):
+        self.assertEqual(self.run_with(rejected=10), [])
+        self.assertEqual(self.run_with(rejected=11),
+                         ["warning: fused rejected 11 of 30 RangeBearing measurements (is rover the robot of this log?)"])
+
+    def test_what_is_wrong_with_the_log_is_told_first(self):
+        counts = {"malformed_lines": 0, "frames_not_data": 1, "frames_back_in_time": 15000, "frames_of_wrong_length": 2}
+        self.assertEqual(self.run_with(rejected=0, about={**RUN, **counts}),
+                         ["warning: 1 remote, error or CAN FD frames skipped", "warning: 15000 frames are earlier than one before them",
+                          "warning: 2 input frames have not 8 bytes"])
+
+    def test_an_estimate_far_outside_of_what_it_says_is_warned_of_on_the_same_line(self):
+        self.assertEqual(self.run_with(0, error_m=0.99), [])  # NEES 98
+        self.assertEqual(self.run_with(0, error_m=1.01), ["warning: NEES mean of fused is 102, not 3 (is rover the robot of this log?)"])
+        self.assertEqual(len(self.run_with(11, error_m=1.01)), 1)
+
+    def test_odometry_may_drift_and_a_known_fault_is_named_instead_of_the_robot(self):
+        self.assertEqual(self.run_with(0, error_m=2.0, estimator=0), [])
+        self.assertIn("(fault kidnapped at 20 s)", self.run_with(0, error_m=2.0, about={**RUN, "fault": "kidnapped@20+0"})[0])
+
+    def test_a_robot_that_never_knew_where_it_is_may_be_the_wrong_one(self):
+        self.estimates(self.time_s, self.zero, self.zero, self.zero, valid=[0] * 40)
+        self.assertIn("warning: fused never had a valid position (is rover the robot of this log?)\n", self.report("--no-pictures").stdout)
+
+    def test_a_fault_after_the_end_did_not_happen(self):
+        lines = self.run_with(0, about={**RUN, "fault": "kidnapped@20+0,imu_stuck@0.1+3"})
+        self.assertEqual(lines, ["warning: fault kidnapped at 20 s, after the end of the run (0 s): it did not happen"])
+
+    def test_what_a_repeated_log_was_compared_by_is_one_line(self):
+        self.estimates(self.time_s, self.zero, self.zero, self.zero)
+        self.assertNotIn("repeated", self.report("--no-pictures").stdout)
+        self.write("run.json", json.dumps({**RUN, "epochs_compared": 21368, "epochs_different": 0}))
+        self.assertIn("\nrepeated: 21368 epochs compared with the log's own, byte for byte, 0 different\n", self.report("--no-pictures").stdout)
+
+
+class Faults(Case):
+    def test_fault_times_are_told_by_epoch_also_when_the_clock_of_the_run_jumps(self):
+        time_s = np.where(np.arange(300) >= 200, 4.0, 1.0) + 0.01 * np.arange(300)
+        zero = np.zeros(300)
+        self.estimates(time_s, zero, zero, zero)  # epoch n is at time_s[n]
+        self.write("run.json", json.dumps({**RUN, "fault": "clock_jump@1+1.5,kidnapped@0.5+0,gnss_jump"}))
+        run = metrics.Run(self.directory)
+        spans = metrics.fault_spans(run)
+        self.assertEqual([name for name, _, _ in spans], ["clock_jump", "kidnapped"])
+        np.testing.assert_allclose([span[1:] for span in spans], [(2.0, 6.5), (1.5, 1.5)], atol=1e-9)
+        self.assertEqual([one.words for one in metrics.faults(run)], ["clock_jump at 1 s for 1.5 s", "kidnapped at 0.5 s", "gnss_jump"])
+        result = self.report()
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn("fault: clock_jump at 1 s for 1.5 s, kidnapped at 0.5 s, gnss_jump\n", result.stdout)
+
+    def test_pictures_and_words_count_from_the_start_of_the_worlds_run_as_its_faults_do(self):
+        """The node's clock begins the run at 1 s: a fault at 1 s is one of its second 2."""
+        time_s, zero = 1 + 0.01 * np.arange(300), np.zeros(300)  # epoch n at 1 s + n ticks
+        truth = self.truth(time_s, zero, zero, zero)
+        self.estimates(time_s, zero, zero, zero, std=[(0.1, 0.1, 0.1)] * 300, corr=[(0, 0, 0)] * 300)
+        epochs = np.arange(10, 300, 10)
+        self.write_rows("status.csv", metrics.STATUS, [[n, 1 + 0.01 * n, 4 if 100 <= n < 200 else 3, 1, 2 if 100 <= n < 200 else 0, 0, 0] for n in epochs])
+        about = {**RUN, "fault": "gnss_jump@1+1"}
+        self.write("run.json", json.dumps(about))
+        run = metrics.Run(self.directory)
+        shown = run.since(metrics.start_s(run))
+        self.assertEqual(metrics.start_s(run), 1.0)
+        np.testing.assert_allclose(metrics.fault_spans(shown)[0][1:], (1.0, 2.0), atol=1e-9)
+        np.testing.assert_array_equal(shown.of(1)["x_m"], run.of(1)["x_m"])
+        self.assertEqual(self.report("--truth", truth).returncode, 0)
+        self.assertIn('<td>1.0 s</td><td class="text">fault Rejecting, for 1.0 s</td>', text_of(self.path("report.html")))
+        self.assertIn('<td>1.0 s</td><td class="text">the world: gnss_jump, for 1.0 s</td>', text_of(self.path("report.html")))
+        # A log that no world was asked for has the node's time only.
+        del about["seed"]
+        self.write("run.json", json.dumps(about))
+        self.assertEqual(metrics.start_s(metrics.Run(self.directory)), 0.0)
+
+    def test_a_log_with_stamps_of_the_calendar_is_shown_from_its_first_estimate_and_says_which_that_is(self):
+        time_s, zero = 1763900000.25 + 0.01 * np.arange(300), np.zeros(300)
+        self.estimates(time_s, zero, zero, zero)
+        self.write_rows("status.csv", metrics.STATUS, [[n, time_s[n], 4 if 100 <= n < 200 else 3, 1, 2 if 100 <= n < 200 else 0, 0, 0] for n in range(10, 300, 10)])
+        self.write("run.json", json.dumps({key: value for key, value in RUN.items() if key != "seed"}))
+        self.assertEqual(self.report().returncode, 0)
+        page = text_of(self.path("report.html"))
+        self.assertIn('<td>1.0 s</td><td class="text">fault Rejecting, for 1.0 s</td>', page)
+        self.assertIn("1763900000.250000 s on the log", page)
+
+    def test_no_fault_is_no_line(self):
+        zero = np.zeros(20)
+        for none in ("", "none"):
+            self.estimates(1 + 0.01 * np.arange(20), zero, zero, zero)
+            self.write("run.json", json.dumps({**RUN, "fault": none}))
+            self.assertNotIn("fault:", self.report("--no-pictures").stdout)
+
+
+class Axes(Case):
+    def errors_picture(self, jump_m):
+        from tetap.report import pictures
+        n = 400
+        time_s, zero = 1 + 0.01 * np.arange(n), np.zeros(n)
+        truth = metrics.Truth(self.truth(time_s, zero, zero, zero))
+        self.estimates(time_s, np.where(np.arange(n) == 200, jump_m, 0.01), zero, zero, std=[(0.1, 0.1, 0.1)] * n, corr=[(0, 0, 0)] * n)
+        self.write("run.json", json.dumps({**RUN, "fault": "kidnapped@2+1"}))
+        return pictures.errors(metrics.Run(self.directory), truth, 1, "t").axes
+
+    def test_a_jump_leaves_the_band_visible_and_is_visible_itself(self):
+        x, y = self.errors_picture(8.0)[:2]
+        self.assertEqual((x.get_yscale(), y.get_yscale()), ("symlog", "linear"))
+        at = x.transAxes.inverted().transform(x.transData.transform([(0, 0.0), (0, 0.3), (0, 8.0)]))[:, 1]
+        self.assertGreater(at[1] - at[0], 0.15)  # 3 sigma above the middle, as a share of the height
+        self.assertLess(at[2], 1.0)
+        self.assertGreater(at[2] - at[1], 0.1)
+
+    def test_without_a_jump_the_axis_is_linear(self):
+        self.assertEqual(self.errors_picture(0.4)[0].get_yscale(), "linear")
+
+    def test_the_largest_value_of_the_bus_is_marked_as_so_much_or_more(self):
+        from tetap.report import pictures
+        zero = np.zeros(20)
+        self.estimates(1 + 0.01 * np.arange(20), zero, zero, zero)
+        smallest, largest = metrics.limits("Est_Innov", "Nis")
+        self.assertEqual(smallest, 0.01)
+        for nis, marked in ((largest, 1), (largest - 1, 0)):
+            self.write_rows("innovations.csv", metrics.INNOVATIONS,
+                            [[n, 1 + n, 1, 4, 0, int(n == 3), 2, nis if n == 3 else 1.0, 0.1, 5, 7] for n in range(10)])
+            axes = pictures.nis(metrics.Run(self.directory), 1, metrics.code_names(), "t").axes[0]
+            points = {line.get_marker(): len(line.get_xdata()) for line in axes.lines if line.get_linestyle() == "None"}
+            self.assertEqual((points["^"], points["x"]), (marked, 1 - marked))
+            self.assertEqual("655 or more" in [text.get_text() for text in axes.get_legend().get_texts()], bool(marked))
+
+
+class Pictures(Case):
+    def run_with_everything(self, about=None, yaw=True):
+        time_s = 1 + 0.01 * np.arange(300)
+        x, y = np.cos(time_s), np.sin(time_s)
+        heading = metrics.wrapped(time_s + np.pi / 2)
+        truth = self.truth(time_s, x, y, heading if yaw else None, about)
+        std = [None if n % 5 else (0.1, 0.1, 0.05) for n in range(300)]
+        odometry = self.estimates(time_s, x + 0.1 * (time_s - 1), y, heading, estimator=0, std=std, corr=[(0.1, 0, 0)] * 300)
+        self.estimates(time_s, x + 0.02, y, heading, std=std, corr=[(0.1, 0, 0)] * 300, more=odometry)
+        self.write_rows("innovations.csv", metrics.INNOVATIONS,
+                        [[n, t, 1, 4, 0, int(n % 50 == 0), 2, 15.0 if n % 50 == 0 else 1.0, 0.1, 5, 7] for n, t in enumerate(time_s)])
+        self.write_rows("status.csv", metrics.STATUS, [[n, t, 3 if n > 50 else 1, 24, n // 250, n // 280, 2] for n, t in enumerate(time_s)])
+        return truth
+
+    def test_the_page_is_one_file_that_needs_no_network_and_shows_every_picture(self):
+        truth = self.run_with_everything({"truth": "vicon", "landmarks": [{"id": 7, "x_m": 2.0, "y_m": 1.0}]})
+        result = self.report("--truth", truth, "--title", "a <run> & its title")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        page = text_of(self.path("report.html"))
+        sources = re.findall(r'(?:src|href)="([^"]{0,30})', page)
+        self.assertEqual(len(sources), 4)
+        self.assertTrue(all(source.startswith("data:image/png;base64,") for source in sources))
+        self.assertNotIn("http", re.sub(r"base64,[^\"]*", "", page))
+        self.assertIn("a &lt;run&gt; &amp; its title", page)
+        for name in ("path", "errors", "nis", "timeline"):
+            with open(self.path(f"{name}.png"), "rb") as file:
+                head = file.read(24)
+            self.assertEqual(head[:8], b"\x89PNG\r\n\x1a\n")
+            self.assertGreater(int.from_bytes(head[16:20], "big"), 800)
+        for text in ("position RMSE", "fused", "odometry", "RangeBearing accepted / rejected",
+                     "RangeBearing NIS mean, with rejected", "NisMean on the bus"):
+            self.assertIn(text, page)
+            self.assertIn(text, result.stdout)
+
+    def test_without_pictures_only_the_summary_is_written(self):
+        truth = self.run_with_everything()
+        before = set(os.listdir(self.directory))
+        self.assertEqual(self.report("--truth", truth, "--no-pictures").returncode, 0)
+        self.assertEqual(set(os.listdir(self.directory)) - before, {"summary.json"})
+
+    def test_a_gps_track_is_called_a_reference_and_nothing_is_said_of_consistency(self):
+        truth = self.run_with_everything({"truth": "gps track"}, yaw=False)
+        result = self.report("--truth", truth)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn("end-point difference", result.stdout)
+        for word in ("RMSE", "NEES"):
+            self.assertNotIn(word, result.stdout)
+        summary = json.loads(text_of(self.path("summary.json")))
+        self.assertTrue(summary["truth"]["is_reference"])
+        self.assertIsNone(summary["fused"]["nees_mean"])
+        self.assertAlmostEqual(summary["odometry"]["final_error_m"], 0.1 * 2.99, places=6)
+        self.assertIn("not truth", text_of(self.path("report.html")))
+
+    def test_pictures_are_drawn_without_truth_innovations_or_any_valid_estimate(self):
+        time_s, zero = 1 + 0.01 * np.arange(20), np.zeros(20)
+        self.estimates(time_s, zero, zero, zero, valid=np.zeros(20))
+        result = self.report()
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertTrue(os.path.exists(self.path("path.png")))
+
+    def test_numbers_that_are_none_are_null_in_the_summary(self):
+        truth = self.run_with_everything(yaw=False)
+        self.report("--truth", truth, "--no-pictures")
+        text = text_of(self.path("summary.json"))
+        self.assertNotIn("NaN", text)
+        self.assertIsNone(json.loads(text)["heading_rmse_deg"])
+
+
+class BadInput(Case):
+    def refused(self, *words, truth=None):
+        result = self.report("--no-pictures", *(["--truth", truth] if truth else []))
+        self.assertEqual(result.returncode, 1, result.stderr)
+        self.assertEqual(result.stderr.count("\n"), 1, result.stderr)
+        for word in words:
+            self.assertIn(word, result.stderr)
+        self.assertFalse(os.path.exists(self.path("summary.json")))
+
+    def test_file_line_and_reason_are_named(self):
+        time_s, zero = 1 + 0.01 * np.arange(5), np.zeros(5)
+        self.estimates(time_s, zero, zero, zero)
+        good = text_of(self.path("estimates.csv"))
+        lines = good.splitlines()
+        for text, words in ((good.replace("pos_valid", "valid", 1), ("estimates.csv:1", "no column 'pos_valid'")),
+                            ("\n".join(lines[:3] + [lines[3] + ",1"] + lines[4:]) + "\n", ("estimates.csv:4", "20 columns, expected 19")),
+                            ("\n".join(lines[:3] + [lines[3].replace("1.02,", "later,")] + lines[4:]) + "\n", ("estimates.csv:4", "later")),
+                            ("\n".join(lines[:3] + [lines[3][:20]]), ("estimates.csv:4", "columns")),
+                            (lines[0] + "\n", ("estimates.csv", "no estimate in it")),
+                            ("", ("estimates.csv:1", "no column"))):
+            with self.subTest(words=words):
+                self.write("estimates.csv", text)
+                self.refused(*words)
+
+    def test_missing_or_broken_files_are_named(self):
+        self.refused("run.json", "No such file")
+        time_s, zero = 1 + 0.01 * np.arange(5), np.zeros(5)
+        self.estimates(time_s, zero, zero, zero)
+        self.write("run.json", "{\n  \"a\": ,\n}")
+        self.refused("run.json:2", "not JSON")
+        self.write("run.json", "[1]")
+        self.refused("run.json:1", "not a JSON object")
+        self.write("run.json", "{}")
+        self.refused("nowhere.csv", "No such file", truth=self.path("nowhere.csv"))
+
+    def test_a_truth_that_goes_back_or_has_no_position_is_refused(self):
+        time_s, zero = 1 + 0.01 * np.arange(5), np.zeros(5)
+        self.estimates(time_s, zero, zero, zero)
+        self.refused("t.truth.csv", "row 3: time goes back", truth=self.truth([1, 2, 1.5], [0] * 3, [0] * 3))
+        self.refused("t.truth.csv", "row 2 has no x_m", truth=self.truth([1, 2, 3], [0, None, 0], [0] * 3))
+        self.refused("t.truth.csv", "fewer than two rows", truth=self.truth([1], [0], [0]))
+
+
+class Inertial(Case):
+    """What is said of all fifteen states, against draws and closed forms."""
+    count = 4000
+    std = {"position": 0.3, "velocity": 0.05, "attitude": 0.01, "gyro bias": 2e-4, "acc bias": 0.02}
+    # Of first and second, first and third, second and third.
+    corr = {"position": (0.9, 0.3, 0.2), "velocity": (-0.95, 0.3, -0.2), "attitude": (0.2, -0.6, 0.5), "gyro bias": (0.7, 0.1, 0.6), "acc bias": (0, 0, 0.98)}
+
+    def inertial(self, scale=1.0, turn=0.0, between=1.0):
+        """A robot at rest at the origin whose estimate errs as it says, times `scale`; `turn`: by how much it is off about the vertical too;
+        `between`: how much larger its velocity's error is in every second epoch, which says no covariance of it."""
+        random = np.random.default_rng(5)
+        n = self.count
+        epoch = 1.0 + np.arange(n)
+        time_s = 0.01 * epoch
+        draw = {}
+        for name, sigma in self.std.items():
+            a, b, c = self.corr[name]
+            draw[name] = random.multivariate_normal([0, 0, 0], (scale * sigma) ** 2 * np.array([[1, a, b], [a, 1, c], [b, c, 1]]), n)
+        draw["velocity"][1::2] *= between
+        position = draw["position"]
+        rows = [[epoch[i], time_s[i], 2, 6, *position[i, :2], 0, 0, 0, 0.3, 0.3, self.std["attitude"], 0.9, 0, 0, 1, 1, 0.05, 0.02] for i in range(n)]
+        self.write_rows("estimates.csv", metrics.ESTIMATES, rows)
+        angle = draw["attitude"] + [0, 0, turn]
+        length = np.linalg.norm(angle, axis=1, keepdims=True)
+        q = np.hstack([np.cos(length / 2), angle / length * np.sin(length / 2)])
+        sigmas = {"velocity": self.std["velocity"], "gyro bias": self.std["gyro bias"], "acc bias": self.std["acc bias"]}
+        self.write_rows("states.csv", metrics.STATES, [
+            [epoch[i], time_s[i], 2, *q[i], *draw["velocity"][i], position[i, 2], 0.3, *draw["acc bias"][i], *draw["gyro bias"][i],
+             *[sigmas["velocity"]] * 3, *[self.std["attitude"]] * 2, *[sigmas["acc bias"]] * 3, *[sigmas["gyro bias"]] * 3, *[None] * 9,
+             *self.corr["position"][1:], *(self.corr["velocity"] if i % 2 == 0 or between == 1.0 else [None] * 3), *self.corr["attitude"],
+             *self.corr["acc bias"], *self.corr["gyro bias"]] for i in range(n)])
+        self.write("run.json", json.dumps(RUN))
+        self.write_rows("t.truth.csv", [*metrics.TRUTH, "epoch", *metrics.TRUTH_MORE],
+                        [[time_s[i], 0, 0, 0, epoch[i], *[0] * len(metrics.TRUTH_MORE)] for i in range(n)])
+        return self.path("t.truth.csv")
+
+    def test_honest_errors_of_every_block_have_a_nees_of_three(self):
+        fused = self.summary("--truth", self.inertial())["fused"]
+        self.assertEqual(fused["kind"], "Inertial")
+        for name in metrics.BLOCKS:
+            self.assertAlmostEqual(fused["blocks"][name]["nees_mean"], 3.0, delta=0.25, msg=name)
+            self.assertAlmostEqual(fused["blocks"][name]["nees_inside_two_sided_95"], 0.95, delta=0.015, msg=name)
+            self.assertGreater(fused["blocks"][name]["inside_3_sigma"], 0.98, name)
+
+    def test_errors_twice_as_large_as_said_have_four_times_the_nees(self):
+        fused = self.summary("--truth", self.inertial(2.0))["fused"]
+        for name in metrics.BLOCKS:
+            self.assertAlmostEqual(fused["blocks"][name]["nees_mean"], 12.0, delta=1.0, msg=name)
+            self.assertLess(fused["blocks"][name]["inside_3_sigma"], 0.75, name)
+
+    def test_an_error_is_judged_by_the_covariance_of_its_own_epoch(self):
+        blocks = self.summary("--truth", self.inertial(between=10.0))["fused"]["blocks"]
+        self.assertAlmostEqual(blocks["velocity"]["nees_mean"], 3.0, delta=0.25)
+        self.assertLess(blocks["velocity"]["inside_3_sigma"], 0.8)  # of every epoch
+
+    def test_a_turn_about_the_vertical_is_heading_and_no_tilt(self):
+        fused = self.summary("--truth", self.inertial(1e-6, turn=0.3))["fused"]
+        self.assertAlmostEqual(fused["attitude_heading_rmse_deg"], np.degrees(0.3), places=3)
+        self.assertLess(fused["tilt_rmse_deg"], 1e-3)
+
+    def test_turns_compose_as_rotations_do_and_the_vertical_is_the_last_axis(self):
+        random = np.random.default_rng(9)
+        roll, pitch, yaw = random.uniform(-1, 1, (3, 500))
+        q = metrics.quaternion(roll, pitch, yaw)
+        small = random.normal(0, 0.1, (500, 3))
+        angle = np.linalg.norm(small, axis=1, keepdims=True)
+        turned = metrics.product(np.hstack([np.cos(angle / 2), small / angle * np.sin(angle / 2)]), q)
+        np.testing.assert_allclose(metrics.turns(turned, q), small, atol=1e-12)
+        np.testing.assert_allclose(metrics.turns(-turned, q), small, atol=1e-12)  # the same attitude
+        # R_nb of yaw alone takes forward to (cos, sin, 0).
+        w, _, _, z = metrics.quaternion(np.zeros(1), np.zeros(1), np.array([0.7]))[0]
+        self.assertAlmostEqual(w * w - z * z, np.cos(0.7))
+        self.assertAlmostEqual(2 * w * z, np.sin(0.7))
+
+    def test_tilt_and_heading_apart_are_those_of_the_firmware(self):
+        one = np.array([[1.0, 0, 0, 0]])
+        tilted = np.array([[np.cos(0.1), np.sin(0.1), 0, 0]])
+        headed = np.array([[np.cos(0.2), 0, 0, np.sin(0.2)]])
+        for q, expected in ((one, (0, 0)), (tilted, (0.2, 0)), (headed, (0, 0.4)), (metrics.product(tilted, headed), (0.2, 0.4))):
+            tilt, heading = metrics.apart(q, one)
+            self.assertAlmostEqual(tilt[0], expected[0])
+            self.assertAlmostEqual(heading[0], expected[1])
+
+    def test_a_page_counts_until_it_is_too_old(self):
+        held = metrics.held_at(np.array([1.0, 5, 9, 30]), np.array([0.1, np.nan, 0.3, np.nan]), np.array([0.0, 1, 8, 9, 19, 20]), 10)
+        np.testing.assert_array_equal(held, [np.nan, 0.1, 0.1, 0.3, 0.3, np.nan])
+
+    def test_the_best_is_called_fused_whatever_its_place(self):
+        self.assertEqual(metrics.names_of({0: "Odometry", 1: "Attitude", 2: "Inertial"}), {0: "odometry", 1: "attitude", 2: "fused"})
+        self.assertEqual(metrics.names_of({0: "Odometry", 1: "Ekf"}), {0: "odometry", 1: "fused"})
+        self.assertEqual(metrics.names_of({0: "Odometry", 1: "Ekf", 2: "Inertial"}), {0: "odometry", 1: "estimator1", 2: "fused"})
+        self.assertEqual(metrics.names_of({0: "Odometry"}), {0: "odometry"})
+
+    def test_counters_that_wrap_go_on(self):
+        self.assertEqual(metrics.unwrapped(np.array([65000.0, 65500, 400, 1000]), 65536), 66536)
+
+    def test_what_happened_is_told_in_words_and_in_order(self):
+        self.inertial()
+        row = [100, 1.0, 2, 5, 0, 1, 3, 99.0, 8.0, 100, None]
+        self.write_rows("innovations.csv", metrics.INNOVATIONS, [[100 + i, 1.0 + 0.2 * i, *row[2:]] for i in range(5)] + [[900, 9.0, *row[2:]]])
+        self.write_rows("status.csv", metrics.STATUS, [[i * 10, 0.1 * i, 5 if 12 <= i < 20 else 3, 0 if 40 <= i < 55 else 32, 2 if 12 <= i < 20 else 0, int(i >= 30), 6]
+                                                       for i in range(1, 60)])
+        self.write_rows("states.csv", metrics.STATES, [[310, 3.1, 2, *[None] * 26, 99.5, -0.25, 0.01, *[None] * 5, 3.5, *[None] * 14]])
+        run = metrics.Run(self.directory)
+        run.about["fault"] = "wheel_spin@1+2,kidnapped@4+0,gnss_jump"
+        told = metrics.story(run)
+        words = [text for _, text in told]
+        self.assertEqual([t for t, _ in told], sorted(t for t, _ in told))
+        self.assertIn("GnssPosition Rejected, 5 times until 1.8 s", words)
+        self.assertIn("GnssPosition Rejected", words)
+        self.assertIn("mode Degraded", words)
+        self.assertIn("GnssPosition gives nothing that is used, for 1.5 s", words)
+        self.assertIn("fault Rejecting, for 0.8 s", words)
+        self.assertIn("reset: PositionJump, position moved by 99.50 m east, -0.25 m north, 3.50 m up", words)
+        self.assertIn("the world: wheel_spin, for 2.0 s", words)
+        self.assertIn("the world: kidnapped", words)
+        # The height of a jump is in another frame, here of an epoch later, or never said.
+        there = [310, 3.1, 2, *[None] * 26, 99.5, -0.25, 0.01, *[None] * 20]
+        for rows, up in (([there, [314, 3.14, 2, *[None] * 34, 3.5, *[None] * 14]], ", 3.50 m up"), ([there], "")):
+            self.write_rows("states.csv", metrics.STATES, rows)
+            self.assertIn("reset: PositionJump, position moved by 99.50 m east, -0.25 m north" + up, [text for _, text in metrics.story(metrics.Run(self.directory))])
+        self.assertFalse([one for one in words if "gnss_jump" in one])  # nobody knows when
+
+    def test_the_pictures_of_an_inertial_run_are_drawn(self):
+        truth = self.inertial()
+        result = self.report("--truth", truth)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        for name in ("errors", "biases", "path"):
+            with open(self.path(name + ".png"), "rb") as picture:
+                self.assertEqual(picture.read(8), b"\x89PNG\r\n\x1a\n")
+        self.assertIn("Biases of the IMU", text_of(self.path("report.html")))
+
+
+if __name__ == "__main__":
+    unittest.main()

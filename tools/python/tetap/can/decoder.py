@@ -1,0 +1,217 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Frames in words and units: `candump -L vcan0 | tools/can/decode_log`, `candump vcan0 | tools/can/decode_log`, `tools/can/decode_log LOG...`
+
+One line per frame: time, interface, id, message, signal=value unit. Enums by name, masks by the names of their bits. A CRC that is wrong
+is marked so. Frames of no known message are shown as they are. Malformed lines and frames of wrong length are reported on stderr with
+file and line; decoding goes on and the exit status is 1.
+"""
+import argparse
+import os
+import re
+import signal
+import sys
+
+from tetap.can import bus_database
+from tetap.can.bus_writer import DEFAULT_DBC
+
+# candump -L: (time) interface ID#DATA, ID#R[length] (remote), ID##FDATA (CAN FD), then R or T for the direction
+LOG = re.compile(rb"\s*\((\d+\.\d+)\)\s+(\S+)\s+([0-9A-Fa-f]{3}|[0-9A-Fa-f]{8})#(#[0-9A-Fa-f]|)([0-9A-Fa-f]*|R[0-9A-Fa-f]?)(?:\s+[RTB])?\s*$")
+# candump: [(time)] interface [RX - -] ID [length] bytes, then the bytes as text
+PLAIN = re.compile(rb"\s*(?:\((\d+[\d.:\- ]*)\)\s+)?(\S+)\s+(?:(?:RX|TX)\s+\S\s+\S\s+)?([0-9A-Fa-f]{3}|[0-9A-Fa-f]{8})\s+\[(\d+)\]"
+                   rb"((?:\s+[0-9A-Fa-f]{2})*)(?:\s+(remote request|ERRORFRAME))?(?:\s+'.*')?\s*$")
+
+AUTO = range(0x300, 0x580, bus_database.BLOCK)  # bases looked for without --base: above it CANopen's SDO begin
+
+
+class Malformed(Exception):
+    """A line that is no frame; the text says why."""
+
+
+def crc8_table():
+    """CRC-8 of the DBC's protected messages, polynomial 0x2F."""
+    table = []
+    for byte in range(256):
+        for _ in range(8):
+            byte = (byte << 1 ^ 0x2F) & 0xFF if byte & 0x80 else byte << 1
+        table.append(byte)
+    return table
+
+
+CRC8 = crc8_table()
+
+
+def crc8(data):
+    crc = 0xFF
+    for byte in data:
+        crc = CRC8[crc ^ byte]
+    return crc ^ 0xFF
+
+
+def formatter(field, tables):
+    """A function of the raw value, made once."""
+    if field.enum:
+        names = field.values
+        return lambda raw: names.get(raw) or "%d (no name)" % raw
+    if field.bit_names:
+        bits = sorted(tables[field.bit_names].items())
+        named = sum(1 << bit for bit, _ in bits)
+
+        def mask(raw):
+            words = [name for bit, name in bits if raw >> bit & 1]
+            if raw & ~named:
+                words.append("0x%X" % (raw & ~named))
+            return "|".join(words) or "none"
+        return mask
+    unit = " " + field.unit if field.unit not in ("", "1") else ""
+    if field.field.endswith("Crc") or (field.wraps and field.length == 32):
+        form = "0x%%0%dX" % ((field.length + 3) // 4)
+        return lambda raw: form % raw
+    if field.scale == 1:
+        show = lambda raw: "%d%s" % (raw, unit)  # noqa: E731
+    else:
+        per_unit, form = field.per_unit, "%%.%df%%s" % -field.scale.as_tuple().exponent
+        show = lambda raw: form % (raw / per_unit, unit)  # noqa: E731
+    if not field.gap:
+        return show
+    gap = field.gap_code
+    return lambda raw: "not available" if raw == gap else show(raw)
+
+
+class Decoder:
+    """Offset in the block -> words. Everything that depends on the DBC alone is worked out once."""
+
+    def __init__(self, database, bases):
+        self.bases = bases
+        self.messages = {}
+        for message in database.messages:
+            mux = message.mux
+            pages = {}
+            for page, name in zip(message.pages, message.page_names or [None]):
+                pages[page] = ("%s[%s]" % (message.name, name) if name else message.name,
+                               [(s.field + "=", s.start, (1 << s.length) - 1, 1 << (s.length - 1) if s.signed else 0,
+                                 formatter(s, database.tables)) for s in message.page_signals(page)])
+            self.messages[message.offset] = (message, (mux.start, (1 << mux.length) - 1) if mux else None, pages)
+
+    def words(self, frame_id, data):
+        """The frame in words, None when it is not ours, Malformed when it should be and cannot."""
+        base = frame_id & ~(bus_database.BLOCK - 1)
+        if self.bases:
+            base = next((b for b in self.bases if b <= frame_id < b + bus_database.BLOCK), None)
+        if base is None or (not self.bases and base not in AUTO):
+            return None
+        entry = self.messages.get(frame_id - base)
+        if entry is None:
+            return None
+        message, mux, pages = entry
+        at = "" if base == bus_database.BASE else "@%X" % base
+        if len(data) != message.size:
+            raise Malformed("%s%s has %d bytes, not %d" % (message.name, at, len(data), message.size))
+        word = int.from_bytes(data, "little")
+        page = word >> mux[0] & mux[1] if mux else None
+        if page not in pages:
+            return "%s%s page %d (unknown) %s" % (message.name, at, page, data.hex().upper())
+        name, fields = pages[page]
+        text = [name + at]
+        for label, start, mask, sign, show in fields:
+            raw = word >> start & mask
+            text.append(label + show((raw ^ sign) - sign))
+        if message.protected and crc8(bytes([message.offset]) + data[1:]) != data[0]:
+            text[1] += " (wrong)"
+        return " ".join(text)
+
+
+def parse(line):
+    """(time, interface, id text, data or None, what it is when it is no data frame)"""
+    found = LOG.match(line)
+    if found:
+        time, interface, frame_id, fd, payload = found.groups()
+        if payload[:1] == b"R":
+            return time, interface, frame_id, None, "remote request"
+        if len(payload) % 2:
+            raise Malformed("half a byte of data")
+        data = bytes.fromhex(payload.decode())
+        if fd:
+            return time, interface, frame_id, None, "CAN FD, %d bytes" % len(data)
+    else:
+        found = PLAIN.match(line)
+        if not found:
+            raise Malformed("no candump line: %s" % shown(line))
+        time, interface, frame_id, length, payload, special = found.groups()
+        data = bytes.fromhex(payload.decode())
+        if special == b"remote request":
+            return time, interface, frame_id, None, "remote request"
+        if len(data) != int(length):
+            raise Malformed("%d bytes announced, %d there" % (int(length), len(data)))
+        if int(length) > 8:
+            return time, interface, frame_id, None, "CAN FD, %d bytes" % len(data)
+    if len(data) > 8:
+        raise Malformed("%d bytes in a classic frame" % len(data))
+    return time, interface, frame_id, data, None
+
+
+def shown(line):
+    text = line.decode("ascii", "backslashreplace").strip()
+    return repr(text[:60] + ("..." if len(text) > 60 else ""))
+
+
+def decode(lines, name, decoder, out):
+    """Number of lines and frames that were wrong."""
+    wrong = 0
+    for number, line in enumerate(lines, 1):
+        if not line.strip():
+            continue
+        try:
+            time, interface, id_text, data, other = parse(line)
+            words = None
+            if data is not None and len(id_text) == 3:
+                words = decoder.words(int(id_text, 16), data)
+        except Malformed as reason:
+            out.flush()
+            print("tools/can/decode_log: %s:%d: %s" % (name, number, reason), file=sys.stderr, flush=True)
+            wrong += 1
+            continue
+        if words is None:
+            words = "? " + (other or " ".join("%02X" % byte for byte in data) or "no data")
+        out.write("%s%s %s %s\n" % ("(%s) " % time.decode() if time else "", interface.decode("ascii", "replace"), id_text.decode(), words))
+    return wrong
+
+
+def base_number(text):
+    try:
+        base = int(text, 0)
+    except ValueError:
+        raise argparse.ArgumentTypeError("'%s' is no number (0x300 is one)" % text)
+    if not 0 <= base <= 0x800 - bus_database.BLOCK:
+        raise argparse.ArgumentTypeError("0x%X is no id base: 0 to 0x%X" % (base, 0x800 - bus_database.BLOCK))
+    return base
+
+
+def main():
+    signal.signal(signal.SIGPIPE, signal.SIG_DFL)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("files", nargs="*", default=["-"], help="candump logs; - or none: stdin")
+    parser.add_argument("--base", action="append", type=base_number, metavar="ID",
+                        help="id base of a node, repeatable; without: 0x%X, 0x%X ... 0x%X" % (AUTO[0], AUTO[1], AUTO[-1]))
+    parser.add_argument("--dbc", default=DEFAULT_DBC)
+    options = parser.parse_args()
+    wrong = 0
+    try:
+        decoder = Decoder(bus_database.read(options.dbc), options.base)
+        for name in options.files:
+            try:
+                source = sys.stdin.buffer if name == "-" else open(name, "rb")
+                live = not os.path.isfile("/dev/stdin") if name == "-" else False
+                sys.stdout.reconfigure(line_buffering=live or sys.stdout.isatty())
+                wrong += decode(source, "stdin" if name == "-" else name, decoder, sys.stdout)
+            except OSError as error:
+                print("tools/can/decode_log: %s: %s" % (name, error.strerror), file=sys.stderr)
+                wrong += 1
+        sys.stdout.flush()
+    except bus_database.Refused as refusal:
+        sys.exit("tools/can/decode_log: %s" % refusal)
+    except KeyboardInterrupt:  # the usual way to stop watching
+        try:
+            sys.stdout.flush()
+        except KeyboardInterrupt:
+            pass
+    sys.exit(1 if wrong else 0)
