@@ -69,8 +69,8 @@ hashes: setup programs ## a hash of each estimate over simulated and recorded ru
 check: setup host ## format, tidy, layers, DBC fresh
 	@tools/proof/check_sources
 
-dbc: setup ## config/messages.hpp and config/messages.md from config/tetap.dbc
-	@tools/can/generate_messages config/tetap.dbc --header config/messages.hpp --table config/messages.md
+dbc: setup ## docs/reference/messages.md from config/tetap.dbc; the C++ messages are made in each build folder
+	@tools/can/generate_messages config/tetap.dbc --table docs/reference/messages.md
 
 setup:
 	@tools/run/install_packages

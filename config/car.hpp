@@ -3,15 +3,15 @@
 // mounting nor noise: the antenna is taken at the IMU, the noise from the first 20 s, at rest).
 #pragma once
 
-#include "app/estimators/inertial.hpp"
-#include "app/node.hpp"
-#include "app/numbers_check.hpp"
+#include "estimators/inertial/inertial.hpp"
+#include "node/node.hpp"
+#include "param/limits.hpp"
 
 namespace tetap::robot::car {
 
-using Estimators = app::Estimators<app::Inertial>;
+using Estimators = node::Estimators<estimators::Inertial>;
 
-inline constexpr app::Numbers numbers = app::checked({
+inline constexpr param::Parameters parameters = param::checked({
     .loop = {.period_us = 10'000, .window_us = 200'000, .ahead_us = 200'000},
     .gnss = {.sigma_floor_m = 1.0F, .gate_scale = 2, .align_distance_m = 15},
     .inertial =

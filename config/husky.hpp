@@ -3,16 +3,16 @@
 // Yaw rate from the gyroscope, because skidding wheels do not tell it.
 #pragma once
 
-#include "app/estimators/odometry.hpp"
-#include "app/estimators/pose_ekf.hpp"
-#include "app/node.hpp"
-#include "app/numbers_check.hpp"
+#include "estimators/odometry.hpp"
+#include "estimators/planar/pose_ekf.hpp"
+#include "node/node.hpp"
+#include "param/limits.hpp"
 
 namespace tetap::robot::husky {
 
-using Estimators = app::Estimators<app::Odometry, app::PoseEkf>;
+using Estimators = node::Estimators<estimators::Odometry, estimators::PoseEkf>;
 
-inline constexpr app::Numbers numbers = app::checked({
+inline constexpr param::Parameters parameters = param::checked({
     .loop = {.window_us = 200'000, .ahead_us = 200'000},
     .wheels =
         {.drive = {.left_radius_m = 0.165F, .right_radius_m = 0.165F, .track_m = 0.545F, .counts_per_turn = 78000.0F},

@@ -3,16 +3,16 @@
 // GNSS 2.5 Hz or the heading that the IMU (with its magnetometer) makes itself.
 #pragma once
 
-#include "app/estimators/inertial.hpp"
-#include "app/estimators/odometry.hpp"
+#include "estimators/inertial/inertial.hpp"
+#include "estimators/odometry.hpp"
 #include "config/husky.hpp"
 
 namespace tetap::robot::husky_inertial {
 
-using Estimators = app::Estimators<app::Odometry, app::Inertial>;
+using Estimators = node::Estimators<estimators::Odometry, estimators::Inertial>;
 
-inline constexpr app::Numbers numbers = app::checked([] {
-  app::Numbers n = husky::numbers;
+inline constexpr param::Parameters parameters = param::checked([] {
+  param::Parameters n = husky::parameters;
   // The sensor's z looks backwards, its x to the right: with it gravity, turns, accelerations and the IMU's own
   // orientation (level all the way) agree.
   n.inertial = {.mounting_bs = {0, 0, -1, -1, 0, 0, 0, 1, 0},

@@ -4,16 +4,16 @@
 // reference) for the samples of 5 ms that the log has, so that the two filters believe the same sensors as much.
 #pragma once
 
-#include "app/estimators/attitude.hpp"
-#include "app/estimators/inertial.hpp"
-#include "app/node.hpp"
-#include "app/numbers_check.hpp"
+#include "estimators/attitude.hpp"
+#include "estimators/inertial/inertial.hpp"
+#include "node/node.hpp"
+#include "param/limits.hpp"
 
 namespace tetap::robot::iris {
 
-using Estimators = app::Estimators<app::Attitude, app::Inertial>;
+using Estimators = node::Estimators<estimators::Attitude, estimators::Inertial>;
 
-inline constexpr app::Numbers numbers = app::checked({
+inline constexpr param::Parameters parameters = param::checked({
     .loop = {.period_us = 10'000, .window_us = 200'000, .ahead_us = 200'000},
     // EKF2_GPS_V_NOISE, EKF2_GPS_P_NOISE; the gates of five sigma EKF2_GPS_P_GATE and EKF2_GPS_V_GATE.
     .gnss = {.sigma_velocity_floor_mps = 0.3F, .sigma_floor_m = 0.5F, .gate_scale = 2},

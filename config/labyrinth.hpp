@@ -2,16 +2,16 @@
 // The robot of the TU Chemnitz labyrinth set: left and right wheel speeds, ultra-wideband ranges to four known anchors.
 #pragma once
 
-#include "app/estimators/odometry.hpp"
-#include "app/estimators/pose_ekf.hpp"
-#include "app/node.hpp"
-#include "app/numbers_check.hpp"
+#include "estimators/odometry.hpp"
+#include "estimators/planar/pose_ekf.hpp"
+#include "node/node.hpp"
+#include "param/limits.hpp"
 
 namespace tetap::robot::labyrinth {
 
-using Estimators = app::Estimators<app::Odometry, app::PoseEkf>;
+using Estimators = node::Estimators<estimators::Odometry, estimators::PoseEkf>;
 
-inline constexpr app::Numbers numbers = app::checked({
+inline constexpr param::Parameters parameters = param::checked({
     // The set states half the track, 0.0785 m (its odometry only meets the truth so), wheel speed variance 1e-4 (m/s)^2
     // at 7.8 Hz (times 0.128 s: a density), range variance 0.01 m^2.
     .wheels = {.drive = {.left_radius_m = 0.05F, .right_radius_m = 0.05F, .track_m = 0.157F},

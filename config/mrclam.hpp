@@ -7,21 +7,21 @@
 // log det S, NIS capped at 20), not by the distance to the truth; rounded to one digit.
 #pragma once
 
-#include "app/estimators/odometry.hpp"
-#include "app/estimators/pose_ekf.hpp"
-#include "app/node.hpp"
-#include "app/numbers_check.hpp"
+#include "estimators/odometry.hpp"
+#include "estimators/planar/pose_ekf.hpp"
+#include "node/node.hpp"
+#include "param/limits.hpp"
 
 namespace tetap::robot::mrclam {
 
-using Estimators = app::Estimators<app::Odometry, app::PoseEkf>;
+using Estimators = node::Estimators<estimators::Odometry, estimators::PoseEkf>;
 
-inline constexpr app::Numbers numbers = app::checked({
+inline constexpr param::Parameters parameters = param::checked({
     .loop = {.window_us = 200'000, .ahead_us = 400'000},
     .wheels =
         {.drive = {.left_radius_m = 0.033F, .right_radius_m = 0.033F, .track_m = 0.235F, .counts_per_turn = 508.8F},
          .noise = {.speed = 0.002F, .yaw_rate = 0.0005F, .yaw_rate_per_yaw_rate = 0.01F, .yaw_rate_per_speed = 0.0005F},
-         .hold = app::Hold::kForward,
+         .hold = param::Hold::kForward,
          .delay_us = 200'000,       // from command to motion: the likelihood is flat between 0.2 and 0.3 s
          .yaw_rate_scale = 0.95F,   // turns come out short; flat between 0.90 and 0.97
          .timeout_us = 5'000'000},  // a command holds until the next

@@ -4,21 +4,21 @@
 // says; the world's wheels are unequal and its track is wider.
 #pragma once
 
-#include "app/estimators/attitude.hpp"
-#include "app/estimators/inertial.hpp"
-#include "app/estimators/odometry.hpp"
-#include "app/estimators/only.hpp"
-#include "app/node.hpp"
-#include "app/numbers_check.hpp"
+#include "estimators/attitude.hpp"
+#include "estimators/inertial/inertial.hpp"
+#include "estimators/odometry.hpp"
+#include "estimators/with_sensors.hpp"
+#include "node/node.hpp"
+#include "param/limits.hpp"
 
 namespace tetap::robot::rover {
 
 // It has no magnetometer, barometer or second antenna, so nothing that fuses them is flashed.
-using Attitude = app::Only<app::Attitude, app::ImuSample>;
-using Inertial = app::Only<app::Inertial, app::ImuSample, app::WheelCounts, app::GnssPosition, app::GnssVelocity>;
-using Estimators = app::Estimators<app::Odometry, Attitude, Inertial>;
+using Attitude = estimators::WithSensors<estimators::Attitude, sensor::ImuSample>;
+using Inertial = estimators::WithSensors<estimators::Inertial, sensor::ImuSample, sensor::WheelCounts, sensor::GnssPosition, sensor::GnssVelocity>;
+using Estimators = node::Estimators<estimators::Odometry, Attitude, Inertial>;
 
-inline constexpr app::Numbers numbers = app::checked({
+inline constexpr param::Parameters parameters = param::checked({
     // GNSS fixes come 80 to 120 ms late: all inside the window.
     .loop = {.period_us = 10'000, .window_us = 200'000, .ahead_us = 200'000},
     // k: slip and unequal wheels make the error of a wheel grow by 4 cm per root metre; the drawing gives radius, track

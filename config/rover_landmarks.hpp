@@ -3,18 +3,18 @@
 // three states.
 #pragma once
 
-#include "app/estimators/odometry.hpp"
-#include "app/estimators/pose_ekf.hpp"
-#include "app/node.hpp"
-#include "app/numbers_check.hpp"
+#include "estimators/odometry.hpp"
+#include "estimators/planar/pose_ekf.hpp"
+#include "node/node.hpp"
+#include "param/limits.hpp"
 #include "config/rover.hpp"
 
 namespace tetap::robot::rover_landmarks {
 
-using Estimators = app::Estimators<app::Odometry, app::PoseEkf>;
+using Estimators = node::Estimators<estimators::Odometry, estimators::PoseEkf>;
 
-inline constexpr app::Numbers numbers = app::checked([] {
-  app::Numbers n = rover::numbers;
+inline constexpr param::Parameters parameters = param::checked([] {
+  param::Parameters n = rover::parameters;
   n.landmark = {.sigma_range_m = 0.12F, .sigma_range_per_m = 0.02F, .sigma_bearing_rad = 0.025F};
   // The receiver's error wanders over a minute: weight it down by what a fix repeats of the one before. The landmarks
   // say where the plane is.

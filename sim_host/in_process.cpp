@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sim_host/in_process.hpp"
 
-#include "app/firmware.hpp"
+#include "node/firmware.hpp"
 #include "sim_host/robots.hpp"
 #include "version.hpp"
 
@@ -12,11 +12,11 @@ namespace tetap::sim {
 int with_node_in_process(const std::string& robot, std::uint32_t can_base,
                          const std::function<int(InProcessLink&)>& play) {
   int status = 2;
-  for_robot(robot, [&]<class Estimators>(std::type_identity<Estimators>, app::Numbers numbers) {
-    numbers.can_base = can_base;
+  for_robot(robot, [&]<class Estimators>(std::type_identity<Estimators>, param::Parameters parameters) {
+    parameters.can_base = can_base;
     hal::MemoryBus bus;
     hal::MemoryBoard board(bus);
-    const auto firmware = std::make_unique<app::Firmware<hal::MemoryBoard, Estimators>>(board, numbers, kVersion);
+    const auto firmware = std::make_unique<node::Firmware<hal::MemoryBoard, Estimators>>(board, parameters, kVersion);
     InProcessLink link(bus, [&firmware] { firmware->poll(); });
     status = play(link);
   });

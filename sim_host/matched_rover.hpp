@@ -10,10 +10,10 @@
 namespace tetap::sim {
 
 /// For a world whose only errors are matched()'s. Everything that is not noise is the rover's.
-[[nodiscard]] inline app::Numbers matched_landmarks_rover(const World::Options& options = {.mismatched = false}) {
-  const Numbers world = options.mismatched ? options.numbers : matched(options.numbers);
+[[nodiscard]] inline param::Parameters matched_landmarks_rover(const World::Options& options = {.mismatched = false}) {
+  const Parameters world = options.mismatched ? options.parameters : matched(options.parameters);
   const auto single = [](double x) { return static_cast<float>(x); };
-  app::Numbers n = robot::rover_landmarks::numbers;
+  param::Parameters n = robot::rover_landmarks::parameters;
   // The world's own, whatever a calibration made of the robot's.
   n.imu = {};
   n.wheels.drive.left_radius_m = n.wheels.drive.right_radius_m = single(world.rover.wheel_radius_m);
@@ -37,23 +37,23 @@ namespace tetap::sim {
 }
 
 /// Likewise the rover with inertial navigation, for a world with matched_inertial()'s errors.
-[[nodiscard]] inline app::Numbers matched_rover() {
+[[nodiscard]] inline param::Parameters matched_rover() {
   const World::Options options{.mismatched = false, .inertial = true};
-  const Numbers world = matched_inertial(options.numbers);
+  const Parameters world = matched_inertial(options.parameters);
   const auto single = [](double x) { return static_cast<float>(x); };
   const double walk_rthz = sim::sqrt(2 / world.imu.walk_tau_s);
-  app::Numbers n = robot::rover::numbers;
-  const app::Numbers planar = matched_landmarks_rover();
+  param::Parameters n = robot::rover::parameters;
+  const param::Parameters planar = matched_landmarks_rover();
   n.imu = planar.imu;
   n.wheels = planar.wheels;
   n.gyro = planar.gyro;
   n.gnss = planar.gnss;
-  n.gnss.gate_scale = robot::rover::numbers.gnss.gate_scale;
+  n.gnss.gate_scale = robot::rover::parameters.gnss.gate_scale;
   n.gnss.antenna_x_b_m = single(world.gnss.antenna_b_m[0]);
   n.gnss.antenna_y_b_m = single(world.gnss.antenna_b_m[1]);
   n.gnss.antenna_z_b_m = single(world.gnss.antenna_b_m[2]);
   n.gnss.sigma_velocity_floor_mps = 0;
-  n.inertial.mounting_bs = app::InertialNumbers{}.mounting_bs;
+  n.inertial.mounting_bs = param::InertialParameters{}.mounting_bs;
   n.inertial.gyro_radps_rthz = single(world.imu.gyro_noise);
   n.inertial.gyro_scale = 0;
   n.inertial.accel_mps2_rthz = single(world.imu.accel_noise[2]);

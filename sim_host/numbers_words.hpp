@@ -3,14 +3,14 @@
 // say under which Q, R and gates it came about.
 #pragma once
 
-#include "app/numbers.hpp"
+#include "param/parameters.hpp"
 
 #include <cstdio>
 #include <string>
 
 namespace tetap::sim {
 
-[[nodiscard]] inline std::string numbers_words(const app::Numbers& n) {
+[[nodiscard]] inline std::string numbers_words(const param::Parameters& n) {
   std::string words;
   const auto add = [&words](const char* name, float value) {
     char text[64];

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // tetap-node: the firmware as a Linux program on SocketCAN. It stands in for the board.
-#include "app/firmware.hpp"
-#include "hal/port/linux/board.hpp"
-#include "hal/port/support/boot_line.hpp"
+#include "node/firmware.hpp"
+#include "hal/board/linux/board.hpp"
+#include "hal/chip/support/boot_line.hpp"
 #include "sim_host/play/arguments.hpp"
 #include "sim_host/robots.hpp"
 #include "version.hpp"
@@ -35,9 +35,9 @@ The firmware as a Linux program on SocketCAN. Ends on INT or TERM with status 0.
 }
 
 template <class Estimators>
-void run(tetap::hal::LinuxBoard& board, const tetap::app::Numbers& numbers) {
+void run(tetap::hal::LinuxBoard& board, const tetap::param::Parameters& parameters) {
   const auto firmware =
-      std::make_unique<tetap::app::Firmware<tetap::hal::LinuxBoard, Estimators>>(board, numbers, tetap::kVersion);
+      std::make_unique<tetap::node::Firmware<tetap::hal::LinuxBoard, Estimators>>(board, parameters, tetap::kVersion);
   while (stop_asked == 0) {
     firmware->poll();
     board.can.wait(tetap::base::Micros{500});
@@ -50,9 +50,9 @@ struct Console {
 };
 
 template <class Estimators>
-void print_boot_line(const std::string& robot, const tetap::app::Numbers& numbers) {
-  const auto node = std::make_unique<tetap::app::Node<Estimators>>(numbers, tetap::app::Version{});
-  const std::uint32_t bits = tetap::app::Exercise(*node, numbers.can_base, 1).run(tetap::hal::kBootEpochs);
+void print_boot_line(const std::string& robot, const tetap::param::Parameters& parameters) {
+  const auto node = std::make_unique<tetap::node::Node<Estimators>>(parameters, tetap::bus::Version{});
+  const std::uint32_t bits = tetap::node::BootSelfCheck(*node, parameters.can_base, 1).run(tetap::hal::kBootEpochs);
   tetap::hal::print_bits(Console{}, robot.c_str(), bits);
 }
 
@@ -70,13 +70,13 @@ int main(int argc, char** argv) try {
   if (list_robots) return std::printf("%s\n", tetap::sim::kRobotNames.c_str()), 0;
   std::signal(SIGINT, ask_to_stop);
   std::signal(SIGTERM, ask_to_stop);
-  tetap::sim::for_robot(robot, [&]<class Estimators>(std::type_identity<Estimators>, tetap::app::Numbers numbers) {
-    if (boot_line) return print_boot_line<Estimators>(robot, numbers);
-    numbers.can_base = base;
+  tetap::sim::for_robot(robot, [&]<class Estimators>(std::type_identity<Estimators>, tetap::param::Parameters parameters) {
+    if (boot_line) return print_boot_line<Estimators>(robot, parameters);
+    parameters.can_base = base;
     tetap::hal::LinuxBoard board(interface);
     std::fprintf(stderr, "tetap-node: robot %s on %s, ids %03X to %03X\n", robot.c_str(), interface.c_str(),
-                 numbers.can_base, numbers.can_base + 0x3F);
-    run<Estimators>(board, numbers);
+                 parameters.can_base, parameters.can_base + 0x3F);
+    run<Estimators>(board, parameters);
   });
   return 0;
 } catch (const std::exception& error) {

@@ -17,7 +17,7 @@ int main(int count, char** values) {
     sim::PlayOptions options = sim::play_options(arguments);
     if (!options.robot.empty())
       sim::for_robot(options.robot,
-                     [&options](auto, const app::Numbers& numbers) { options.numbers = sim::numbers_words(numbers); });
+                     [&options](auto, const param::Parameters& parameters) { options.parameters = sim::numbers_words(parameters); });
     // Before the bus, so that a log that cannot be read is said also where there is none.
     const sim::Log log = sim::load_for(options);
     if (options.memory)

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // tetap-record: writes down everything on a CAN interface (raw.log) and what one node says (estimates.log and CSV
 // files) until it is interrupted.
-#include "hal/port/linux/socket_can.hpp"
+#include "hal/board/linux/socket_can.hpp"
 #include "sim_host/play/arguments.hpp"
 #include "sim_host/play/session.hpp"
 

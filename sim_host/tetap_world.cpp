@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // tetap-world: the simulated world's sensors on a CAN bus, and what the node makes of them on record beside the truth.
-#include "sim_host/bias_left.hpp"
+#include "sim_host/residual_bias.hpp"
 #include "sim_host/in_process.hpp"
 #include "sim_host/play/arguments.hpp"
 #include "sim_host/play/lockstep.hpp"
 #include "sim_host/play/realtime.hpp"
 #include "sim_host/play/session.hpp"
 #include "sim_host/robots.hpp"
-#include "sim_host/sent.hpp"
+#include "sim_host/published_sensors.hpp"
 #include "sim_host/world_source.hpp"
 
 #include <algorithm>
@@ -70,9 +70,9 @@ std::string landmarks_json(const sim::World& world) {
 /// In lockstep each row is an epoch of the node, whatever became of the clock of the bus. Biases are those that the
 /// robot's own calibration leaves.
 void write_truth(const sim::SessionOptions& about, const sim::WorldSource& source, bool lockstep) {
-  app::Numbers numbers;
-  sim::for_robot(about.robot, [&](auto, const app::Numbers& n) { numbers = n; });
-  const double temperature_degC = source.world().numbers().imu.temperature_degC;
+  param::Parameters parameters;
+  sim::for_robot(about.robot, [&](auto, const param::Parameters& n) { parameters = n; });
+  const double temperature_degC = source.world().parameters().imu.temperature_degC;
   sim::OutFile file(about.folder + "/truth.csv");
   sim::Line line;
   file.write(
@@ -82,7 +82,7 @@ void write_truth(const sim::SessionOptions& about, const sim::WorldSource& sourc
   file.write(lockstep ? ",epoch\n" : "\n");
   std::int64_t epoch = 0;
   for (const sim::Truth& seen : source.truth()) {
-    const sim::Truth t = sim::bias_left(seen, numbers, temperature_degC);
+    const sim::Truth t = sim::bias_left(seen, parameters, temperature_degC);
     line.clear();
     line.fixed(t.time.us, 6).text(",").real(t.x_m, 6).text(",").real(t.y_m, 6).text(",").real(t.yaw_rad, 6);
     for (const double x : {t.z_m, t.roll_rad, t.pitch_rad}) line.text(",").real(x, 6);
@@ -155,11 +155,11 @@ void set_world(sim::Arguments& arguments, sim::World::Options& world) {
   const double east_m = arguments.real("--east", 0, -60'000, 60'000);  // what a pose on the bus can say
   for (sim::Waypoint& at : world.course.waypoints) at.x_m += east_m;
   for (sim::Landmark& mark : world.course.landmarks) mark.x_m += east_m;
-  if (arguments.flag("--no-wheels")) world.numbers.wheels.rate_hz = 0;
-  world.numbers.gnss.rate_hz = counted(arguments, "--gnss-hz", world.numbers.gnss.rate_hz, 100);
-  world.numbers.imu.rate_hz = counted(arguments, "--imu-hz", world.numbers.imu.rate_hz, 2000);
+  if (arguments.flag("--no-wheels")) world.parameters.wheels.rate_hz = 0;
+  world.parameters.gnss.rate_hz = counted(arguments, "--gnss-hz", world.parameters.gnss.rate_hz, 100);
+  world.parameters.imu.rate_hz = counted(arguments, "--imu-hz", world.parameters.imu.rate_hz, 2000);
   const double gnss_m = arguments.real("--gnss-m", 0, 0.001, 100);
-  if (gnss_m > 0) world.numbers.gnss = sim::with_error(world.numbers.gnss, gnss_m);
+  if (gnss_m > 0) world.parameters.gnss = sim::with_error(world.parameters.gnss, gnss_m);
 }
 
 }  // namespace

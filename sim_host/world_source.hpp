@@ -44,15 +44,15 @@ class WorldSource {
  private:
   void introduce() {
     for (const Landmark& mark : world_.map())
-      frames_.push_back(can::frame(
-          base_, can::InMapEntry{.id = mark.id, .x_raw = millimetres(mark.x_m), .y_raw = millimetres(mark.y_m)}));
+      frames_.push_back(bus::frame(
+          base_, bus::InMapEntry{.id = mark.id, .x_raw = millimetres(mark.x_m), .y_raw = millimetres(mark.y_m)}));
     if (!told_pose_) return;
     const StartPose start = world_.start_pose();
     frames_.push_back(
-        can::frame(base_, can::protect(can::CmdSetPos{
+        bus::frame(base_, bus::protect(bus::CmdSetPos{
                               .ctr = 1, .x_raw = millimetres(start.x_m) / 2, .y_raw = millimetres(start.y_m) / 2})));
     frames_.push_back(
-        can::frame(base_, can::protect(can::CmdSetYaw{.ctr = 1,
+        bus::frame(base_, bus::protect(bus::CmdSetYaw{.ctr = 1,
                                                       .yaw_rad = static_cast<float>(start.yaw_rad),
                                                       .std_pos_m = static_cast<float>(start.sigma_m),
                                                       .std_yaw_rad = static_cast<float>(start.sigma_yaw_rad)})));

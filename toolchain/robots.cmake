@@ -1,6 +1,5 @@
-# The robots: every header of config/ but messages.hpp, which tools/can/generate_messages makes. TETAP_ROBOTS holds their names, sorted; tools/run/list_robots prints them.
+# The robots: every header of config/. TETAP_ROBOTS holds their names, sorted; tools/run/list_robots prints them.
 file(GLOB robot_headers CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/config/[A-Za-z]*.hpp)
-list(REMOVE_ITEM robot_headers ${PROJECT_SOURCE_DIR}/config/messages.hpp)
 list(SORT robot_headers)
 set(TETAP_ROBOTS "")
 foreach(header ${robot_headers})

@@ -2,7 +2,7 @@
 // Two encoders, left and right, read together: counts and speeds in the form that estimators take.
 #pragma once
 
-#include "app/samples.hpp"
+#include "sensor/samples.hpp"
 #include "drivers/encoder/quadrature.hpp"
 
 namespace tetap::drivers {
@@ -20,12 +20,12 @@ class QuadraturePair {
   }
 
   /// The low 16 bits of the totals: only differences mean anything.
-  [[nodiscard]] constexpr app::WheelCounts counts() const {
+  [[nodiscard]] constexpr sensor::WheelCounts counts() const {
     return {static_cast<std::uint16_t>(left_.counts()), static_cast<std::uint16_t>(right_.counts())};
   }
 
   /// Metres of ground per count, each wheel its own.
-  [[nodiscard]] constexpr app::WheelSpeeds speeds(float left_m, float right_m) const {
+  [[nodiscard]] constexpr sensor::WheelSpeeds speeds(float left_m, float right_m) const {
     return {left_.counts_per_s() * left_m, right_.counts_per_s() * right_m};
   }
 

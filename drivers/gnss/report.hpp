@@ -3,7 +3,7 @@
 // samples that estimators take from it. What the receiver did not say is NaN or empty.
 #pragma once
 
-#include "app/samples.hpp"
+#include "sensor/samples.hpp"
 #include "base/float_bits.hpp"
 #include "base/math.hpp"
 
@@ -31,7 +31,7 @@ using Covariance = std::array<float, 6>;
 
 struct Report {
   Protocol protocol = Protocol::kUbx;
-  app::GnssFix fix = app::GnssFix::kNone;
+  sensor::GnssFix fix = sensor::GnssFix::kNone;
   std::uint8_t satellites = 0;
   bool has_position = false;             ///< the two angles below mean something
   std::optional<std::uint32_t> itow_ms;  ///< GPS time of week; UBX only
@@ -52,16 +52,16 @@ struct Report {
   std::optional<Covariance> velocity_cov_m2ps2;
 
   /// A place on Earth that the receiver itself calls valid.
-  [[nodiscard]] constexpr bool usable() const { return has_position && fix >= app::GnssFix::k2d; }
+  [[nodiscard]] constexpr bool usable() const { return has_position && fix >= sensor::GnssFix::k2d; }
 };
 
 /// What a filter may fuse; empty: this epoch has no position, or none the receiver vouches for. From the covariance,
 /// where it came, the accuracies are the axes' own; else the receiver's figure is passed on as it is.
-[[nodiscard]] constexpr std::optional<app::GnssPosition> position_of(const Report& report) {
+[[nodiscard]] constexpr std::optional<sensor::GnssPosition> position_of(const Report& report) {
   if (!report.usable()) return {};
-  app::GnssPosition p{.latitude_2ndeg = report.latitude_2ndeg,
+  sensor::GnssPosition p{.latitude_2ndeg = report.latitude_2ndeg,
                       .longitude_2ndeg = report.longitude_2ndeg,
-                      .height_m = report.fix == app::GnssFix::k2d ? base::kNan : report.height_m,
+                      .height_m = report.fix == sensor::GnssFix::k2d ? base::kNan : report.height_m,
                       .horizontal_acc_m = report.horizontal_acc_m,
                       .vertical_acc_m = report.vertical_acc_m,
                       .fix = report.fix,
@@ -74,9 +74,9 @@ struct Report {
 }
 
 /// Up may be NaN: NMEA has no vertical speed.
-[[nodiscard]] constexpr std::optional<app::GnssVelocity> velocity_of(const Report& report) {
-  if (report.fix < app::GnssFix::k2d || base::is_nan(report.v_n_mps[0]) || base::is_nan(report.v_n_mps[1])) return {};
-  app::GnssVelocity v{.v_n_mps = report.v_n_mps, .acc_mps = report.speed_acc_mps};
+[[nodiscard]] constexpr std::optional<sensor::GnssVelocity> velocity_of(const Report& report) {
+  if (report.fix < sensor::GnssFix::k2d || base::is_nan(report.v_n_mps[0]) || base::is_nan(report.v_n_mps[1])) return {};
+  sensor::GnssVelocity v{.v_n_mps = report.v_n_mps, .acc_mps = report.speed_acc_mps};
   if (const auto& c = report.velocity_cov_m2ps2) {
     v.acc_mps = base::sqrt(((*c)[0] + (*c)[3] + (*c)[5]) * (1.0F / 3.0F));
   }

@@ -7,7 +7,7 @@
 // plus gravity; the angle increment is the rotation vector from start to end. Between samples both are straight lines.
 #pragma once
 
-#include "app/samples.hpp"
+#include "sensor/samples.hpp"
 #include "base/math.hpp"
 #include "drivers/imu/reading.hpp"
 
@@ -18,7 +18,7 @@ namespace tetap::drivers {
 /// An increment and the time it ends at.
 struct StampedImu {
   base::Micros stamp{};
-  app::ImuSample sample{};
+  sensor::ImuSample sample{};
 };
 
 class ImuIntegrator {

@@ -4,8 +4,8 @@
 #pragma once
 
 #include "hal/can_bus.hpp"
-#include "hal/port/linux/memory_can.hpp"
-#include "hal/port/linux/socket_can.hpp"
+#include "hal/board/linux/memory_can.hpp"
+#include "hal/board/linux/socket_can.hpp"
 #include "sim_host/play/protocol.hpp"
 
 #include <concepts>

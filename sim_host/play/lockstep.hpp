@@ -4,7 +4,7 @@
 // speed.
 #pragma once
 
-#include "sim_host/play/conversation.hpp"
+#include "sim_host/play/node_link.hpp"
 #include "sim_host/play/script.hpp"
 
 namespace tetap::sim {
@@ -20,7 +20,7 @@ struct LockstepOptions {
 /// Throws RunError when the node stops answering; `counts` then holds what was so far.
 template <Link L, Source S, Sink K>
 void play_lockstep(L& link, S& source, K& sink, const LockstepOptions& options, Counts& counts) {
-  Conversation<L, K> node(link, sink, options.base, counts);
+  NodeLink<L, K> node(link, sink, options.base, counts);
   LockstepLedger ledger(counts);
 
   const auto send = [&](const Tick& tick) {
@@ -35,7 +35,7 @@ void play_lockstep(L& link, S& source, K& sink, const LockstepOptions& options, 
       link.flush();
       hal::sleep_for(options.burst_gap);
     }
-    node.sync(can::SyncKind::kStep, tick.time);
+    node.sync(bus::SyncKind::kStep, tick.time);
     ledger.asked(tick.inputs.size(), tick.time);
   };
   const auto receive = [&] {

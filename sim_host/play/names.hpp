@@ -3,7 +3,7 @@
 // config/tetap.dbc.
 #pragma once
 
-#include "config/messages.hpp"
+#include "bus/messages.hpp"
 
 #include <array>
 #include <cstddef>
@@ -14,34 +14,34 @@
 namespace tetap::sim {
 
 /// "?" for a code that has no name.
-[[nodiscard]] constexpr std::string_view name(can::Sensor value) {
+[[nodiscard]] constexpr std::string_view name(sensor::Sensor value) {
   constexpr std::array<std::string_view, 10> kNames{"Imu",          "WheelCounts",  "WheelSpeed",   "BodySpeed",
                                                     "RangeBearing", "GnssPosition", "GnssVelocity", "Magnetometer",
                                                     "Barometer",    "Heading"};
   const auto i = static_cast<std::size_t>(value);
-  return value == can::Sensor::kNotAvailable ? "NotAvailable" : i < kNames.size() ? kNames[i] : "?";
+  return value == sensor::Sensor::kNotAvailable ? "NotAvailable" : i < kNames.size() ? kNames[i] : "?";
 }
-[[nodiscard]] constexpr std::string_view name(can::Verdict value) {
+[[nodiscard]] constexpr std::string_view name(sensor::Verdict value) {
   constexpr std::array<std::string_view, 8> kNames{"Accepted",        "Rejected", "NotUsed",   "TooLate",
                                                    "UnknownLandmark", "Singular", "NotFinite", "Stale"};
   const auto i = static_cast<std::size_t>(value);
   return i < kNames.size() ? kNames[i] : "?";
 }
-[[nodiscard]] constexpr std::string_view name(can::Mode value) {
+[[nodiscard]] constexpr std::string_view name(sensor::Mode value) {
   constexpr std::array<std::string_view, 10> kNames{"Boot",          "WaitingForPose", "Aligning", "Nominal",
                                                     "DeadReckoning", "Degraded",       "Fault",    "WaitingForImu",
                                                     "Levelling",     "FindingHeading"};
   const auto i = static_cast<std::size_t>(value);
   return i < kNames.size() ? kNames[i] : "?";
 }
-[[nodiscard]] constexpr std::string_view name(can::ResetCause value) {
+[[nodiscard]] constexpr std::string_view name(sensor::ResetCause value) {
   constexpr std::array<std::string_view, 11> kNames{"PowerOn",   "Command",       "SetPose",      "TimeJump",
                                                     "NotFinite", "NotPositive",   "PositionJump", "HeadingWrong",
                                                     "Diverged",  "BarometerZero", "MagneticField"};
   const auto i = static_cast<std::size_t>(value);
   return i < kNames.size() ? kNames[i] : "?";
 }
-[[nodiscard]] constexpr std::string_view name(can::EstimatorKind value) {
+[[nodiscard]] constexpr std::string_view name(sensor::EstimatorKind value) {
   constexpr std::array<std::string_view, 8> kNames{"None", "Odometry", "Ekf",      "Kf",
                                                    "Ukf",  "Particle", "Inertial", "Attitude"};
   const auto i = static_cast<std::size_t>(value);
@@ -52,17 +52,17 @@ namespace tetap::sim {
 [[nodiscard]] inline std::string message_name(std::uint32_t offset) {
   constexpr std::array<std::string_view, 8> kCommon{"Est_Epoch",      "Est_StateCrc", "Est_Status",  "Est_Innov",
                                                     "Est_SensorStat", "Est_Diag",     "Est_Version", "Est_Origin"};
-  if (offset >= can::EstEpoch::kOffset && offset < can::EstEpoch::kOffset + kCommon.size())
-    return std::string(kCommon[offset - can::EstEpoch::kOffset]);
-  if (offset >= can::EstPos::kOffset && offset < can::EstPos::kOffset + can::EstPos::kStride * can::EstPos::kCount) {
-    const std::uint32_t within = (offset - can::EstPos::kOffset) % can::EstPos::kStride;
-    const std::string prefix = "Est" + std::to_string((offset - can::EstPos::kOffset) / can::EstPos::kStride) + "_";
+  if (offset >= bus::EstEpoch::kOffset && offset < bus::EstEpoch::kOffset + kCommon.size())
+    return std::string(kCommon[offset - bus::EstEpoch::kOffset]);
+  if (offset >= bus::EstPos::kOffset && offset < bus::EstPos::kOffset + bus::EstPos::kStride * bus::EstPos::kCount) {
+    const std::uint32_t within = (offset - bus::EstPos::kOffset) % bus::EstPos::kStride;
+    const std::string prefix = "Est" + std::to_string((offset - bus::EstPos::kOffset) / bus::EstPos::kStride) + "_";
     if (within == 0) return prefix + "Pos";
-    if (within == can::EstMotion::kOffset - can::EstPos::kOffset) return prefix + "Motion";
-    if (within == can::EstAtt::kOffset - can::EstPos::kOffset) return prefix + "Att";
-    if (within == can::EstVel::kOffset - can::EstPos::kOffset) return prefix + "Vel";
-    if (within == can::EstStateHeight::kOffset - can::EstPos::kOffset) return prefix + "State";
-    if (within == can::EstStdPose::kOffset - can::EstPos::kOffset) return prefix + "Std";
+    if (within == bus::EstMotion::kOffset - bus::EstPos::kOffset) return prefix + "Motion";
+    if (within == bus::EstAtt::kOffset - bus::EstPos::kOffset) return prefix + "Att";
+    if (within == bus::EstVel::kOffset - bus::EstPos::kOffset) return prefix + "Vel";
+    if (within == bus::EstStateHeight::kOffset - bus::EstPos::kOffset) return prefix + "State";
+    if (within == bus::EstStdPose::kOffset - bus::EstPos::kOffset) return prefix + "Std";
   }
   return "offset " + std::to_string(offset);
 }

@@ -29,7 +29,7 @@ struct PlayOptions {
   LockstepOptions lockstep;
   RealtimeOptions realtime;
   Perturbation perturbation;
-  std::string numbers;  ///< in words, for run.json
+  std::string parameters;  ///< in words, for run.json
   bool memory = false;  ///< the node is in this process
   bool raw = false;
   bool quiet = false;
@@ -60,12 +60,12 @@ int play(L& link, const PlayOptions& options, const Log& log, const std::string&
                        .robot = options.robot,
                        .log = options.log,
                        .quiet = options.quiet};
-  const auto note_log = [&log, &numbers = options.numbers](Session& session) {
+  const auto note_log = [&log, &parameters = options.parameters](Session& session) {
     session.note("malformed_lines", std::to_string(log.malformed));
     session.note("frames_not_data", std::to_string(log.not_data));
     session.note("frames_back_in_time", std::to_string(log.back_in_time));
     session.note("frames_of_wrong_length", std::to_string(log.wrong_length));
-    if (!numbers.empty()) session.note("numbers", sim::quoted(numbers));
+    if (!parameters.empty()) session.note("numbers", sim::quoted(parameters));
   };
 
   if (options.mode == PlayMode::kRealtime) {

@@ -5,8 +5,8 @@
 
 #include "base/can_frame.hpp"
 #include "base/time.hpp"
-#include "can/codec.hpp"
-#include "config/messages.hpp"
+#include "bus/codec.hpp"
+#include "bus/messages.hpp"
 
 #include <array>
 #include <cstddef>
@@ -22,31 +22,31 @@ inline constexpr std::uint64_t kTimeMask = 0xFFFFFFFFFFFF;
 
 /// Position within the node's block; nothing when the frame is not of this block.
 [[nodiscard]] constexpr std::optional<std::uint32_t> offset_in_block(const base::CanFrame& frame, std::uint32_t base) {
-  if (frame.extended || frame.id < base || frame.id >= base + can::kBlock) return std::nullopt;
+  if (frame.extended || frame.id < base || frame.id >= base + bus::kBlock) return std::nullopt;
   return frame.id - base;
 }
 /// A frame the node consumes and counts: of its inputs, sync frames excepted.
 [[nodiscard]] constexpr bool is_counted_input(const base::CanFrame& frame, std::uint32_t base) {
   const auto offset = offset_in_block(frame, base);
-  return offset && *offset < kInputOffsets && *offset != can::InSync::kOffset;
+  return offset && *offset < kInputOffsets && *offset != bus::InSync::kOffset;
 }
 /// What the loop and the controller saw of real time and the program's version differ between runs that are otherwise
-/// the same; everything else must not: of the diagnostics, counters that follow from the frames (app::Counters).
+/// the same; everything else must not: of the diagnostics, counters that follow from the frames (bus::Counters).
 [[nodiscard]] constexpr bool is_deterministic(const base::CanFrame& frame, std::uint32_t base) {
   const std::uint32_t offset = frame.id - base;
-  if (offset == can::EstDiagLoop::kOffset) {
-    const auto bytes = can::payload(frame);
-    return can::decode<can::EstDiagQueues>(bytes) || can::decode<can::EstDiagOrder>(bytes) ||
-           can::decode<can::EstDiagFrames>(bytes) || can::decode<can::EstDiagRefused>(bytes) ||
-           can::decode<can::EstDiagCapacity>(bytes);
+  if (offset == bus::EstDiagLoop::kOffset) {
+    const auto bytes = bus::payload(frame);
+    return bus::decode<bus::EstDiagQueues>(bytes) || bus::decode<bus::EstDiagOrder>(bytes) ||
+           bus::decode<bus::EstDiagFrames>(bytes) || bus::decode<bus::EstDiagRefused>(bytes) ||
+           bus::decode<bus::EstDiagCapacity>(bytes);
   }
-  return offset >= kInputOffsets && offset != can::EstVersion::kOffset;
+  return offset >= kInputOffsets && offset != bus::EstVersion::kOffset;
 }
 
-[[nodiscard]] constexpr base::CanFrame sync_frame(std::uint32_t base, can::SyncKind kind, base::Micros time,
+[[nodiscard]] constexpr base::CanFrame sync_frame(std::uint32_t base, bus::SyncKind kind, base::Micros time,
                                                   std::uint8_t counter) {
-  return can::frame(
-      base, can::InSync{.time_us = static_cast<std::uint64_t>(time.us) & kTimeMask, .ctr = counter, .kind = kind});
+  return bus::frame(
+      base, bus::InSync{.time_us = static_cast<std::uint64_t>(time.us) & kTimeMask, .ctr = counter, .kind = kind});
 }
 [[nodiscard]] constexpr bool same_bus_time(std::uint64_t bus_us, base::Micros time) {
   return bus_us == (static_cast<std::uint64_t>(time.us) & kTimeMask);
@@ -61,8 +61,8 @@ inline constexpr std::uint64_t kTimeMask = 0xFFFFFFFFFFFF;
 
 /// Everything a node sent for one tick, from Est_Epoch to Est_StateCrc.
 struct NodeEpoch {
-  std::optional<can::EstEpoch> head;  ///< missing: its frame was lost
-  can::EstStateCrc tail;
+  std::optional<bus::EstEpoch> head;  ///< missing: its frame was lost
+  bus::EstStateCrc tail;
   std::size_t received = 0;                ///< frames, tail included
   std::span<const base::CanFrame> frames;  ///< the first 256 of them, in order of arrival; valid until the next frame
 };
@@ -74,18 +74,18 @@ class EpochCollector {
   /// Between two epochs: the answer to a Begin frame comes only then.
   [[nodiscard]] bool idle() const { return received_ == 0; }
   [[nodiscard]] bool is_begin_answer(const base::CanFrame& frame) const {
-    return idle() && frame.id == base_ + can::EstVersion::kOffset && !frame.extended;
+    return idle() && frame.id == base_ + bus::EstVersion::kOffset && !frame.extended;
   }
 
   /// A frame from the bus; the finished epoch when this was its last one. Frames of others are ignored.
   std::optional<NodeEpoch> add(const base::CanFrame& frame) {
     const auto offset = offset_in_block(frame, base_);
     if (!offset || *offset < kInputOffsets || is_begin_answer(frame)) return std::nullopt;
-    if (*offset == can::EstEpoch::kOffset) begin(can::decode<can::EstEpoch>(can::payload(frame)));
+    if (*offset == bus::EstEpoch::kOffset) begin(bus::decode<bus::EstEpoch>(bus::payload(frame)));
     if (received_ < frames_.size()) frames_[received_] = frame;
     ++received_;
-    if (*offset != can::EstStateCrc::kOffset) return std::nullopt;
-    const auto tail = can::decode<can::EstStateCrc>(can::payload(frame));
+    if (*offset != bus::EstStateCrc::kOffset) return std::nullopt;
+    const auto tail = bus::decode<bus::EstStateCrc>(bus::payload(frame));
     if (!tail) return std::nullopt;
     const NodeEpoch done{.head = head_,
                          .tail = *tail,
@@ -99,18 +99,18 @@ class EpochCollector {
     head_.reset();
   }
   /// Of the epoch that is under way.
-  [[nodiscard]] const std::optional<can::EstEpoch>& head() const { return head_; }
+  [[nodiscard]] const std::optional<bus::EstEpoch>& head() const { return head_; }
   [[nodiscard]] std::size_t received() const { return received_; }
 
  private:
-  void begin(const std::optional<can::EstEpoch>& head) {
+  void begin(const std::optional<bus::EstEpoch>& head) {
     if (!head || (head_ && head_->time_us == head->time_us)) return;  // a duplicate counts as one frame too many
     reset();
     head_ = head;
   }
 
   std::uint32_t base_;
-  std::optional<can::EstEpoch> head_;
+  std::optional<bus::EstEpoch> head_;
   std::size_t received_ = 0;
   std::array<base::CanFrame, 256> frames_{};
 };

@@ -4,7 +4,7 @@
 // (as_recorded).
 #pragma once
 
-#include "sim_host/play/conversation.hpp"
+#include "sim_host/play/node_link.hpp"
 #include "sim_host/play/log.hpp"
 
 #include <algorithm>
@@ -27,7 +27,7 @@ template <Link L, Sink K>
 void play_realtime(L& link, std::span<const TimedFrame> frames, K& sink, const RealtimeOptions& options,
                    Counts& counts) {
   if (frames.empty()) return;
-  Conversation<L, K> node(link, sink, options.base, counts);
+  NodeLink<L, K> node(link, sink, options.base, counts);
   RealtimeLedger ledger(counts);
   const base::Micros period = options.period;
   base::Micros tick{std::max((frames.front().time.us + period.us - 1) / period.us, std::int64_t{1}) * period.us};
@@ -57,7 +57,7 @@ void play_realtime(L& link, std::span<const TimedFrame> frames, K& sink, const R
   const base::Micros first = std::min(frames.front().time, tick) - period;
   const auto log_time = [&] { return first + (hal::monotonic_clock() - began); };
   if (options.sync == Sync::kClock) {
-    node.sync(can::SyncKind::kClock, first);
+    node.sync(bus::SyncKind::kClock, first);
     ++counts.syncs;
     link.flush();
   }
@@ -73,7 +73,7 @@ void play_realtime(L& link, std::span<const TimedFrame> frames, K& sink, const R
         node.send(frames[next++].frame);
         ++counts.inputs;
       } else if (tick_due) {
-        node.sync(can::SyncKind::kTick, tick);
+        node.sync(bus::SyncKind::kTick, tick);
         ++counts.syncs;
         tick += period;
       }

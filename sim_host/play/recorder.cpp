@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sim_host/play/recorder.hpp"
 
-#include "hal/port/linux/clock.hpp"
+#include "hal/board/linux/clock.hpp"
 #include "sim_host/play/candump.hpp"
 #include "sim_host/play/names.hpp"
 
@@ -23,7 +23,7 @@ void put_name(Line& line, Code code) {
 }
 
 constexpr double millimetres(std::int32_t raw) {
-  return raw == can::EstPos::kXNotAvailable ? kNone : raw * can::EstPos::kXScale;
+  return raw == bus::EstPos::kXNotAvailable ? kNone : raw * bus::EstPos::kXScale;
 }
 
 }  // namespace
@@ -103,27 +103,27 @@ void Recorder::epoch(const NodeEpoch& epoch, base::Micros time) {
 
 void Recorder::frame(const base::CanFrame& f) {
   const std::uint32_t offset = f.id - options_.base;
-  const auto payload = can::payload(f);
-  if (offset == can::EstInnov::kOffset) {
-    if (const auto innovation = can::decode<can::EstInnov>(payload)) innovation_row(*innovation);
-  } else if (offset == can::EstSensorStat::kOffset) {
-    if (const auto statistics = can::decode<can::EstSensorStat>(payload)) sensor_row(*statistics);
-  } else if (offset == can::EstStatus::kOffset) {
-    if (const auto status = can::decode<can::EstStatus>(payload)) status_row(*status);
-  } else if (offset >= can::EstPos::kOffset) {
-    const std::size_t k = (offset - can::EstPos::kOffset) / can::EstPos::kStride;
+  const auto payload = bus::payload(f);
+  if (offset == bus::EstInnov::kOffset) {
+    if (const auto innovation = bus::decode<bus::EstInnov>(payload)) innovation_row(*innovation);
+  } else if (offset == bus::EstSensorStat::kOffset) {
+    if (const auto statistics = bus::decode<bus::EstSensorStat>(payload)) sensor_row(*statistics);
+  } else if (offset == bus::EstStatus::kOffset) {
+    if (const auto status = bus::decode<bus::EstStatus>(payload)) status_row(*status);
+  } else if (offset >= bus::EstPos::kOffset) {
+    const std::size_t k = (offset - bus::EstPos::kOffset) / bus::EstPos::kStride;
     if (k >= instances_.size()) return;
     Instance& instance = instances_[k];
-    if (offset == can::offset_of<can::EstPos>(k)) {
-      instance.position = can::decode<can::EstPos>(payload);
+    if (offset == bus::offset_of<bus::EstPos>(k)) {
+      instance.position = bus::decode<bus::EstPos>(payload);
       totals_.estimates += instance.position ? 1 : 0;
-    } else if (offset == can::offset_of<can::EstMotion>(k)) {
-      instance.motion = can::decode<can::EstMotion>(payload);
-    } else if (offset == can::offset_of<can::EstStdPose>(k)) {
-      if (const auto pose = can::decode<can::EstStdPose>(payload)) instance.deviation = pose;
-      if (const auto more = can::decode<can::EstStdMore>(payload)) instance.correlation = more;
+    } else if (offset == bus::offset_of<bus::EstMotion>(k)) {
+      instance.motion = bus::decode<bus::EstMotion>(payload);
+    } else if (offset == bus::offset_of<bus::EstStdPose>(k)) {
+      if (const auto pose = bus::decode<bus::EstStdPose>(payload)) instance.deviation = pose;
+      if (const auto more = bus::decode<bus::EstStdMore>(payload)) instance.correlation = more;
     } else {
-      state(states_now_[k], offset - static_cast<std::uint32_t>(k * can::EstPos::kStride), payload);
+      state(states_now_[k], offset - static_cast<std::uint32_t>(k * bus::EstPos::kStride), payload);
     }
   }
 }
@@ -135,18 +135,18 @@ void Recorder::state(State& state, std::uint32_t offset, std::span<const std::ui
     state.said = true;
   };
   const auto page = [&]<class Page>(std::size_t column, auto Page::*... fields) {
-    if (const auto found = can::decode<Page>(payload)) put(column, (*found).*fields...);
+    if (const auto found = bus::decode<Page>(payload)) put(column, (*found).*fields...);
   };
-  if (offset == can::EstAtt::kOffset)
-    page(0, &can::EstAtt::w, &can::EstAtt::x, &can::EstAtt::y, &can::EstAtt::z);
-  else if (offset == can::EstVel::kOffset)
-    page(4, &can::EstVel::east_mps, &can::EstVel::north_mps, &can::EstVel::up_mps);
-  if (offset != can::EstStateHeight::kOffset) return;
-  page(7, &can::EstStateHeight::height_m, &can::EstStateHeight::std_height_m);
-  page(34, &can::EstStateHeight::jump_z_m);
-  using can::EstStateAccBias, can::EstStateGyroBias, can::EstStateStdVel, can::EstStateStdTilt;
-  using can::EstStateDisagreement, can::EstStateImuHealth;
-  using can::EstStateStdAccBias, can::EstStateStdGyroBias, can::EstStateJump;
+  if (offset == bus::EstAtt::kOffset)
+    page(0, &bus::EstAtt::w, &bus::EstAtt::x, &bus::EstAtt::y, &bus::EstAtt::z);
+  else if (offset == bus::EstVel::kOffset)
+    page(4, &bus::EstVel::east_mps, &bus::EstVel::north_mps, &bus::EstVel::up_mps);
+  if (offset != bus::EstStateHeight::kOffset) return;
+  page(7, &bus::EstStateHeight::height_m, &bus::EstStateHeight::std_height_m);
+  page(34, &bus::EstStateHeight::jump_z_m);
+  using bus::EstStateAccBias, bus::EstStateGyroBias, bus::EstStateStdVel, bus::EstStateStdTilt;
+  using bus::EstStateDisagreement, bus::EstStateImuHealth;
+  using bus::EstStateStdAccBias, bus::EstStateStdGyroBias, bus::EstStateJump;
   page(9, &EstStateAccBias::acc_bias_x_mps2, &EstStateAccBias::acc_bias_y_mps2, &EstStateAccBias::acc_bias_z_mps2);
   page(12, &EstStateGyroBias::gyro_bias_x_radps, &EstStateGyroBias::gyro_bias_y_radps,
        &EstStateGyroBias::gyro_bias_z_radps);
@@ -159,8 +159,8 @@ void Recorder::state(State& state, std::uint32_t offset, std::span<const std::ui
   page(26, &EstStateJump::jump_x_m, &EstStateJump::jump_y_m, &EstStateJump::jump_yaw_rad);
   page(29, &EstStateDisagreement::disagree_tilt_rad, &EstStateDisagreement::disagree_yaw_rad);
   page(31, &EstStateImuHealth::vib_accel_mps2, &EstStateImuHealth::vib_gyro_radps, &EstStateImuHealth::clipped);
-  using can::EstStateCorrAccBias, can::EstStateCorrGyroBias;
-  using can::EstStateCorrPos, can::EstStateCorrVel, can::EstStateCorrTilt;
+  using bus::EstStateCorrAccBias, bus::EstStateCorrGyroBias;
+  using bus::EstStateCorrPos, bus::EstStateCorrVel, bus::EstStateCorrTilt;
   page(35, &EstStateCorrPos::corr_xz, &EstStateCorrPos::corr_yz);
   page(37, &EstStateCorrVel::corr_vel_en, &EstStateCorrVel::corr_vel_eu, &EstStateCorrVel::corr_vel_nu);
   page(40, &EstStateCorrTilt::corr_tilt_en, &EstStateCorrTilt::corr_tilt_e_yaw, &EstStateCorrTilt::corr_tilt_n_yaw);
@@ -176,7 +176,7 @@ void Recorder::state_row(std::size_t k, const State& state) {
   states_.write(line_.put('\n').view());
 }
 
-void Recorder::sensor_row(const can::EstSensorStat& s) {
+void Recorder::sensor_row(const bus::EstSensorStat& s) {
   row(time_).integer(s.estimator).put(',');
   put_name(line_, s.sensor);
   line_.put(',').integer(s.inst).put(',').integer(s.accepted).put(',').integer(s.rejected).put(',');
@@ -185,36 +185,36 @@ void Recorder::sensor_row(const can::EstSensorStat& s) {
 }
 
 void Recorder::estimate_row(std::size_t k, const Instance& e) {
-  const auto motion = [&](float can::EstMotion::*field) {
+  const auto motion = [&](float bus::EstMotion::*field) {
     return e.motion ? static_cast<double>((*e.motion).*field) : kNone;
   };
-  const auto deviation = [&](float can::EstStdPose::*field) {
+  const auto deviation = [&](float bus::EstStdPose::*field) {
     return e.deviation ? static_cast<double>((*e.deviation).*field) : kNone;
   };
-  const auto correlation = [&](float can::EstStdMore::*field) {
+  const auto correlation = [&](float bus::EstStdMore::*field) {
     return e.correlation ? static_cast<double>((*e.correlation).*field) : kNone;
   };
   row(time_).integer(static_cast<std::int64_t>(k)).put(',');
   put_name(line_, e.position->kind);
   line_.put(',').real(millimetres(e.position->x_raw), 3).put(',').real(millimetres(e.position->y_raw), 3);
-  line_.put(',').real(motion(&can::EstMotion::yaw_rad), 4).put(',').real(motion(&can::EstMotion::speed_mps), 3);
-  line_.put(',').real(motion(&can::EstMotion::yaw_rate_radps), 4);
+  line_.put(',').real(motion(&bus::EstMotion::yaw_rad), 4).put(',').real(motion(&bus::EstMotion::speed_mps), 3);
+  line_.put(',').real(motion(&bus::EstMotion::yaw_rate_radps), 4);
   for (const auto field :
-       {&can::EstStdPose::std_x_m, &can::EstStdPose::std_y_m, &can::EstStdPose::std_yaw_rad, &can::EstStdPose::corr_xy})
+       {&bus::EstStdPose::std_x_m, &bus::EstStdPose::std_y_m, &bus::EstStdPose::std_yaw_rad, &bus::EstStdPose::corr_xy})
     line_.put(',').real(deviation(field), 4);
-  for (const auto field : {&can::EstStdMore::corr_x_yaw, &can::EstStdMore::corr_y_yaw})
+  for (const auto field : {&bus::EstStdMore::corr_x_yaw, &bus::EstStdMore::corr_y_yaw})
     line_.put(',').real(correlation(field), 4);
   line_.put(',');
   if (e.motion)
     line_.put(e.motion->pos_valid ? '1' : '0').put(',').put(e.motion->hdg_valid ? '1' : '0');
   else
     line_.put(',');
-  for (const auto field : {&can::EstStdMore::std_speed_mps, &can::EstStdMore::std_yaw_rate_radps})
+  for (const auto field : {&bus::EstStdMore::std_speed_mps, &bus::EstStdMore::std_yaw_rate_radps})
     line_.put(',').real(correlation(field), 4);
   estimates_.write(line_.put('\n').view());
 }
 
-void Recorder::innovation_row(const can::EstInnov& i) {
+void Recorder::innovation_row(const bus::EstInnov& i) {
   row(time_).integer(i.estimator).put(',');
   put_name(line_, i.sensor);
   line_.put(',').integer(i.inst).put(',');
@@ -228,11 +228,11 @@ void Recorder::innovation_row(const can::EstInnov& i) {
       .put(',')
       .real(static_cast<double>(i.age_ms), 0)
       .put(',');
-  if (i.id != can::EstInnov::kIdNotAvailable) line_.integer(i.id);
+  if (i.id != bus::EstInnov::kIdNotAvailable) line_.integer(i.id);
   innovations_.write(line_.put('\n').view());
 }
 
-void Recorder::status_row(const can::EstStatus& s) {
+void Recorder::status_row(const bus::EstStatus& s) {
   row(time_);
   put_name(line_, s.mode);
   line_.put(',').integer(s.used).put(',').integer(s.faults).put(',').integer(s.reset_ctr).put(',');

@@ -60,10 +60,10 @@ class Recorder {
 
  private:
   struct Instance {
-    std::optional<can::EstPos> position;
-    std::optional<can::EstMotion> motion;
-    std::optional<can::EstStdPose> deviation;
-    std::optional<can::EstStdMore> correlation;
+    std::optional<bus::EstPos> position;
+    std::optional<bus::EstMotion> motion;
+    std::optional<bus::EstStdPose> deviation;
+    std::optional<bus::EstStdMore> correlation;
   };
   /// A row of states.csv: empty is what this epoch does not say.
   struct State {
@@ -75,9 +75,9 @@ class Recorder {
   void estimate_row(std::size_t k, const Instance& instance);
   void state(State& state, std::uint32_t offset, std::span<const std::uint8_t> payload);
   void state_row(std::size_t k, const State& state);
-  void sensor_row(const can::EstSensorStat& statistics);
-  void innovation_row(const can::EstInnov& innovation);
-  void status_row(const can::EstStatus& status);
+  void sensor_row(const bus::EstSensorStat& statistics);
+  void innovation_row(const bus::EstInnov& innovation);
+  void status_row(const bus::EstStatus& status);
   Line& row(base::Micros time);
   void raw_line(const base::CanFrame& frame, base::Micros time);
 
@@ -85,8 +85,8 @@ class Recorder {
   OutFile estimates_log_, estimates_, states_, innovations_, sensors_, status_;
   std::optional<OutFile> raw_;
   Line line_;
-  std::array<Instance, can::EstPos::kCount> instances_{};
-  std::array<State, can::EstPos::kCount> states_now_{};
+  std::array<Instance, bus::EstPos::kCount> instances_{};
+  std::array<State, bus::EstPos::kCount> states_now_{};
   std::uint64_t number_ = 0;  ///< of the epoch
   std::uint8_t last_epoch_ = 0;
   bool restarted_ = true;

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sim_host/play/recording.hpp"
 
-#include "app/inbox.hpp"
-#include "app/publisher.hpp"
-#include "sim_host/play/conversation.hpp"
+#include "bus/decoder.hpp"
+#include "bus/publisher.hpp"
+#include "sim_host/play/node_link.hpp"
 #include "sim_host/play/names.hpp"
 
 #include <algorithm>
@@ -16,7 +16,7 @@ namespace {
 /// What a node did between one start and the next.
 struct Segment {
   struct Entry {
-    can::EstStateCrc tail;
+    bus::EstStateCrc tail;
     std::uint16_t in_crc = 0;
     std::size_t inputs_before = 0;  ///< input frames in the log before this epoch's first frame
     RecordedEpoch epoch;
@@ -31,13 +31,13 @@ struct Segment {
 /// first disagreement.
 std::optional<std::size_t> disagreement(const Segment& segment, std::size_t start, std::uint32_t log_base,
                                         std::size_t limit) {
-  app::InputTally tally;
+  bus::InputCrc tally;
   std::size_t next = start;
   for (std::size_t e = 0; e < segment.entries.size() && e < limit; ++e) {
     while (static_cast<std::uint16_t>(tally.count()) != segment.entries[e].tail.in_count) {
       if (next == segment.inputs.size()) return e;
       const base::CanFrame& frame = segment.inputs[next++];
-      tally.add(app::frame_crc(static_cast<std::uint8_t>(frame.id - log_base), frame));
+      tally.add(bus::frame_crc(static_cast<std::uint8_t>(frame.id - log_base), frame));
     }
     tally.close_epoch();
     if (static_cast<std::uint16_t>(tally.running()) != segment.entries[e].in_crc) return e;
@@ -83,22 +83,22 @@ class Builder {
     const auto offset = offset_in_block(frame, options_.log_base);
     if (!offset) return;
     if (is_counted_input(frame, options_.log_base)) return segment_.inputs.push_back(frame);
-    if (*offset == can::InSync::kOffset) {
-      const auto sync = can::decode<can::InSync>(can::payload(frame));
-      if (sync && sync->kind == can::SyncKind::kBegin)
+    if (*offset == bus::InSync::kOffset) {
+      const auto sync = bus::decode<bus::InSync>(bus::payload(frame));
+      if (sync && sync->kind == bus::SyncKind::kBegin)
         begin_ = Begin{extend_bus_time(sync->time_us, entry.time), segment_.inputs.size()};
       return;
     }
     if (begin_ && collector_.is_begin_answer(frame)) start_segment();
-    if (*offset == can::EstEpoch::kOffset) {
+    if (*offset == bus::EstEpoch::kOffset) {
       if (!collector_.idle() && collector_.head() && !segment_.skipped)
         refuse("the epoch before " + in_seconds(entry.time) + " lacks its last frame");
       inputs_before_ = segment_.inputs.size();
     }
-    if (*offset == can::EstVersion::kOffset)
-      if (const auto version = can::decode<can::EstVersion>(can::payload(frame))) result_.config = version->config;
-    if (*offset == can::EstDiagBus::kOffset)
-      if (const auto bus = can::decode<can::EstDiagBus>(can::payload(frame))) result_.rx_overflow = bus->rx_overflow;
+    if (*offset == bus::EstVersion::kOffset)
+      if (const auto version = bus::decode<bus::EstVersion>(bus::payload(frame))) result_.config = version->config;
+    if (*offset == bus::EstDiagBus::kOffset)
+      if (const auto bus = bus::decode<bus::EstDiagBus>(bus::payload(frame))) result_.rx_overflow = bus->rx_overflow;
     if (const auto epoch = collector_.add(frame)) add_epoch(*epoch, entry.time);
   }
 
@@ -174,7 +174,7 @@ class Builder {
 
 bool is_recording(std::span<const TimedFrame> log, std::uint32_t log_base) {
   return std::any_of(log.begin(), log.end(), [&](const TimedFrame& e) {
-    return offset_in_block(e.frame, log_base) == can::EstStateCrc::kOffset;
+    return offset_in_block(e.frame, log_base) == bus::EstStateCrc::kOffset;
   });
 }
 
@@ -198,8 +198,8 @@ void Comparison::epoch(const NodeEpoch& epoch, base::Micros time) {
   const std::size_t number = ++next_;
   ++compared_;
   for (const base::CanFrame& frame : epoch.frames)
-    if (frame.id - base_ == can::EstVersion::kOffset)
-      if (const auto version = can::decode<can::EstVersion>(can::payload(frame))) config_ = version->config;
+    if (frame.id - base_ == bus::EstVersion::kOffset)
+      if (const auto version = bus::decode<bus::EstVersion>(bus::payload(frame))) config_ = version->config;
   std::size_t at = 0;
   const auto differs = [&](const base::CanFrame* recorded, const base::CanFrame* now) {
     ++different_;

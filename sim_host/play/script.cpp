@@ -11,12 +11,12 @@ namespace {
 
 constexpr base::Micros kLongestPause{60'000'000};
 
-std::optional<can::InSync> sync_of(const base::CanFrame& frame, std::uint32_t base) {
-  if (offset_in_block(frame, base) != can::InSync::kOffset) return std::nullopt;
-  return can::decode<can::InSync>(can::payload(frame));
+std::optional<bus::InSync> sync_of(const base::CanFrame& frame, std::uint32_t base) {
+  if (offset_in_block(frame, base) != bus::InSync::kOffset) return std::nullopt;
+  return bus::decode<bus::InSync>(bus::payload(frame));
 }
-bool is_tick(const std::optional<can::InSync>& sync) {
-  return sync && (sync->kind == can::SyncKind::kTick || sync->kind == can::SyncKind::kStep);
+bool is_tick(const std::optional<bus::InSync>& sync) {
+  return sync && (sync->kind == bus::SyncKind::kTick || sync->kind == bus::SyncKind::kStep);
 }
 
 base::CanFrame moved(base::CanFrame frame, const ScriptOptions& options) {
@@ -30,7 +30,7 @@ Script on_its_own_ticks(std::span<const TimedFrame> log, const ScriptOptions& op
   for (const TimedFrame& entry : log) {
     if (is_counted_input(entry.frame, options.log_base)) script.add_input(moved(entry.frame, options));
     const auto sync = sync_of(entry.frame, options.log_base);
-    if (sync && sync->kind == can::SyncKind::kBegin) last = base::Micros{static_cast<std::int64_t>(sync->time_us)};
+    if (sync && sync->kind == bus::SyncKind::kBegin) last = base::Micros{static_cast<std::int64_t>(sync->time_us)};
     if (!is_tick(sync)) continue;
     last = extend_bus_time(sync->time_us, last.value_or(entry.time));
     script.add_tick(*last, script.ticks() == 0 ? std::optional(*last - options.period) : std::nullopt);

@@ -3,8 +3,8 @@
 // run.json, in one line, and in the exit status how it went.
 #pragma once
 
-#include "hal/port/linux/clock.hpp"
-#include "sim_host/play/ledger.hpp"
+#include "hal/board/linux/clock.hpp"
+#include "sim_host/play/frame_accounting.hpp"
 #include "sim_host/play/link.hpp"
 #include "sim_host/play/recorder.hpp"
 #include "sim_host/play/recording.hpp"

@@ -3,7 +3,7 @@
 // is in it.
 #pragma once
 
-#include "app/samples.hpp"
+#include "sensor/samples.hpp"
 #include "base/time.hpp"
 
 #include <cstdint>
@@ -11,8 +11,8 @@
 
 namespace tetap::sim {
 
-using Value = std::variant<app::ImuSample, app::WheelCounts, app::WheelSpeeds, app::BodySpeed, app::GnssPosition,
-                           app::GnssVelocity, app::LandmarkSighting, app::MagneticFlux, app::AirPressure>;
+using Value = std::variant<sensor::ImuSample, sensor::WheelCounts, sensor::WheelSpeeds, sensor::BodySpeed, sensor::GnssPosition,
+                           sensor::GnssVelocity, sensor::LandmarkSighting, sensor::MagneticFlux, sensor::AirPressure>;
 
 struct Measurement {
   base::Micros stamp;
@@ -27,9 +27,9 @@ struct Measurement {
 /// In how many frames a value travels: gyro, accel, time; latitude, longitude, height, accuracy; east and north, up;
 /// one.
 [[nodiscard]] constexpr int parts(const Value& value) {
-  if (std::holds_alternative<app::ImuSample>(value)) return 3;
-  if (std::holds_alternative<app::GnssPosition>(value)) return 4;
-  if (std::holds_alternative<app::GnssVelocity>(value)) return 2;
+  if (std::holds_alternative<sensor::ImuSample>(value)) return 3;
+  if (std::holds_alternative<sensor::GnssPosition>(value)) return 4;
+  if (std::holds_alternative<sensor::GnssVelocity>(value)) return 2;
   return 1;
 }
 

@@ -43,7 +43,7 @@ struct RoverNumbers {
   double start_rad = 0.02;
 };
 
-struct ImuNumbers {
+struct ImuParameters {
   int rate_hz = 100;  ///< 0: no IMU; a divisor of 2000
   std::array<double, 3> accel_noise = {65e-6 * kG0, 65e-6 * kG0,
                                        70e-6 * kG0};  ///< m/s^2/sqrt(Hz) [ICM: 65 x, y; 70 z ug/sqrt(Hz)]
@@ -80,7 +80,7 @@ struct WheelSensorNumbers {
   base::Micros latency_min{300}, latency_max{900};
 };
 
-struct GnssNumbers {
+struct GnssParameters {
   int rate_hz = 5;               ///< 0: none
   double white_m = 0.30;         ///< per horizontal axis; with the next line 0.85 m = 1.0 m CEP [F9P]
   double correlated_m = 0.80;    ///< Gauss-Markov
@@ -142,11 +142,11 @@ struct CameraNumbers {
   base::Micros latency_min{20'000}, latency_max{60'000};
 };
 
-struct Numbers {
+struct Parameters {
   RoverNumbers rover;
-  ImuNumbers imu;
+  ImuParameters imu;
   WheelSensorNumbers wheels;
-  GnssNumbers gnss;
+  GnssParameters gnss;
   CameraNumbers camera;
   MagnetometerNumbers magnetometer;
   BarometerNumbers barometer;
@@ -154,7 +154,7 @@ struct Numbers {
 
 /// Only white noise of the stated sigma and encoder noise k |ds|: nothing a filter does not model. Accuracy figures are
 /// exact, and every sensor samples at an instant of the wheels', so that nothing is interpolated.
-[[nodiscard]] inline Numbers matched(Numbers n) {
+[[nodiscard]] inline Parameters matched(Parameters n) {
   n.rover.radius_difference = n.rover.track_error = n.rover.slip_per_mps2 = n.rover.slip_curve_per_mps2 =
       n.rover.slip_random = 0;
   n.rover.side_slip_s = n.rover.roll_rad_per_mps2 = n.rover.pitch_rad_per_mps2 = n.rover.ground_rad = 0;
@@ -183,8 +183,8 @@ struct Numbers {
 /// much slower than the run is that: its first draw is the turn-on bias, and it drives 2 sigma^2 / tau), wheels whose
 /// error is a share of their travel, and a body that trembles, at rest as well: sideways and up as much as a filter
 /// takes for the noise of the non-holonomic constraint, ahead as much as it takes for that of the wheels.
-[[nodiscard]] inline Numbers matched_inertial(Numbers n) {
-  const ImuNumbers imu = n.imu;
+[[nodiscard]] inline Parameters matched_inertial(Parameters n) {
+  const ImuParameters imu = n.imu;
   const double gnss_m = sim::sqrt(n.gnss.white_m * n.gnss.white_m + n.gnss.correlated_m * n.gnss.correlated_m);
   n = matched(n);
   n.gnss.white_m = gnss_m;
@@ -204,7 +204,7 @@ struct Numbers {
 }
 
 /// Errors of GNSS positions of so much in all, per horizontal axis, with the same share of white noise.
-[[nodiscard]] inline GnssNumbers with_error(GnssNumbers n, double sigma_m) {
+[[nodiscard]] inline GnssParameters with_error(GnssParameters n, double sigma_m) {
   const double by = sigma_m / sim::sqrt(n.white_m * n.white_m + n.correlated_m * n.correlated_m);
   n.white_m *= by;
   n.correlated_m *= by;
@@ -212,7 +212,7 @@ struct Numbers {
 }
 
 /// Everything arrives at the instant it was true.
-[[nodiscard]] inline Numbers without_latency(Numbers n) {
+[[nodiscard]] inline Parameters without_latency(Parameters n) {
   n.imu.latency_min = n.imu.latency_max = n.wheels.latency_min = n.wheels.latency_max = {};
   n.gnss.latency_min = n.gnss.latency_max = n.camera.latency_min = n.camera.latency_max = {};
   n.magnetometer.latency_min = n.magnetometer.latency_max = {};

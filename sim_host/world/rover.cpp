@@ -34,28 +34,28 @@ Vector3 to_body(const Vector3& attitude_rad, const Vector3& v) {
   return {a[0], r.cos * a[1] + r.sin * a[2], r.cos * a[2] - r.sin * a[1]};
 }
 
-Rover::Rover(const RoverNumbers& numbers, const Plan& plan, std::uint64_t seed, int substeps)
-    : numbers_{numbers},
+Rover::Rover(const RoverNumbers& parameters, const Plan& plan, std::uint64_t seed, int substeps)
+    : parameters_{parameters},
       plan_{&plan},
       substeps_{substeps},
-      track_m_{numbers.track_m * (1 + numbers.track_error)},
+      track_m_{parameters.track_m * (1 + parameters.track_error)},
       driver_chance_{seed, Stream::kDriver},
       ground_chance_{seed, Stream::kGround},
       slip_chance_{seed, Stream::kSlip},
       jitter_chance_{seed, Stream::kJitter},
-      wander_{numbers.driver_wander_m, numbers.driver_wander_tau_s, kDriver_s, driver_chance_},
-      ground_roll_{numbers.ground_rad, numbers.ground_tau_s, kDriver_s, ground_chance_},
-      ground_pitch_{numbers.ground_rad, numbers.ground_tau_s, kDriver_s, ground_chance_},
-      slip_left_{numbers.slip_random, numbers.slip_random_tau_s, kDriver_s, slip_chance_},
-      slip_right_{numbers.slip_random, numbers.slip_random_tau_s, kDriver_s, slip_chance_},
-      side_jitter_{numbers.jitter_mps, numbers.jitter_tau_s, kStep_s, jitter_chance_},
-      up_jitter_{numbers.jitter_mps, numbers.jitter_tau_s, kStep_s, jitter_chance_},
-      ahead_jitter_{numbers.jitter_ahead_mps, numbers.jitter_tau_s, kStep_s, jitter_chance_} {
+      wander_{parameters.driver_wander_m, parameters.driver_wander_tau_s, kDriver_s, driver_chance_},
+      ground_roll_{parameters.ground_rad, parameters.ground_tau_s, kDriver_s, ground_chance_},
+      ground_pitch_{parameters.ground_rad, parameters.ground_tau_s, kDriver_s, ground_chance_},
+      slip_left_{parameters.slip_random, parameters.slip_random_tau_s, kDriver_s, slip_chance_},
+      slip_right_{parameters.slip_random, parameters.slip_random_tau_s, kDriver_s, slip_chance_},
+      side_jitter_{parameters.jitter_mps, parameters.jitter_tau_s, kStep_s, jitter_chance_},
+      up_jitter_{parameters.jitter_mps, parameters.jitter_tau_s, kStep_s, jitter_chance_},
+      ahead_jitter_{parameters.jitter_ahead_mps, parameters.jitter_tau_s, kStep_s, jitter_chance_} {
   Chance start{seed, Stream::kStart};
   const PathPoint at = plan.path(0);
-  x_m_ = at.x_m + start.normal(numbers.start_m);
-  y_m_ = at.y_m + start.normal(numbers.start_m);
-  yaw_rad_ = at.yaw_rad + start.normal(numbers.start_rad);
+  x_m_ = at.x_m + start.normal(parameters.start_m);
+  y_m_ = at.y_m + start.normal(parameters.start_m);
+  yaw_rad_ = at.yaw_rad + start.normal(parameters.start_rad);
 }
 
 void Rover::place(const PathPoint& at) { x_m_ = at.x_m, y_m_ = at.y_m, yaw_rad_ = at.yaw_rad; }
@@ -90,7 +90,7 @@ void Rover::shake() {
 }
 
 void Rover::jitter() {
-  if (numbers_.jitter_mps <= 0) return;
+  if (parameters_.jitter_mps <= 0) return;
   const double side = side_jitter_.next(jitter_chance_);
   const double up = up_jitter_.next(jitter_chance_);
   const double ahead = ahead_jitter_.next(jitter_chance_);
@@ -147,7 +147,7 @@ void Rover::integrate(double h_s, Motion& motion) {
 
   // Pose: the velocity of the step's middle, turned by the yaw of the middle.
   const Direction d = direction(yaw_rad_ + 0.5 * h_s * rate);
-  const double drift = -numbers_.side_slip_s * speed * rate;
+  const double drift = -parameters_.side_slip_s * speed * rate;
   x_m_ += h_s * (speed * d.cos - drift * d.sin);
   y_m_ += h_s * (speed * d.sin + drift * d.cos);
   yaw_rad_ += h_s * rate;
@@ -156,8 +156,8 @@ void Rover::integrate(double h_s, Motion& motion) {
   // up.
   const double lateral = speed * rate;
   const double uneven = clamp(magnitude(speed) / 0.5, 0, 1);
-  const double roll_goal = numbers_.roll_rad_per_mps2 * lateral + uneven * ground_roll_.value();
-  const double pitch_goal = -numbers_.pitch_rad_per_mps2 * acceleration_mps2_ + uneven * ground_pitch_.value();
+  const double roll_goal = parameters_.roll_rad_per_mps2 * lateral + uneven * ground_roll_.value();
+  const double pitch_goal = -parameters_.pitch_rad_per_mps2 * acceleration_mps2_ + uneven * ground_pitch_.value();
   const auto spring = [h_s](double goal, double& angle, double& angle_rate) {
     const double before = angle_rate;
     angle_rate += h_s * kSuspension_radps * (kSuspension_radps * (goal - angle) - 2 * kDamping * angle_rate);
@@ -173,8 +173,8 @@ void Rover::integrate(double h_s, Motion& motion) {
 
   // Wheels: what the contact points travel, and slip on top, which grows with the load and is not there at standstill.
   const double load = clamp(0.3 + magnitude(acceleration_mps2_) + magnitude(lateral), 0, 2);
-  const double slip = numbers_.slip_per_mps2 * acceleration_mps2_ * (speed < 0 ? -1 : 1) +
-                      numbers_.slip_curve_per_mps2 * magnitude(lateral);
+  const double slip = parameters_.slip_per_mps2 * acceleration_mps2_ * (speed < 0 ? -1 : 1) +
+                      parameters_.slip_curve_per_mps2 * magnitude(lateral);
   motion.rim_left_m += h_s * (speed - 0.5 * track_m_ * rate) * (1 + slip + load * slip_left_.value());
   motion.rim_right_m += h_s * (speed + 0.5 * track_m_ * rate) * (1 + slip + load * slip_right_.value());
 }
@@ -182,7 +182,7 @@ void Rover::integrate(double h_s, Motion& motion) {
 Truth Rover::truth() const {
   const Direction d = direction(yaw_rad_);
   const double speed = speed_mps_ + ahead_mps_;
-  const double drift = side_mps_ - numbers_.side_slip_s * speed_mps_ * yaw_rate_radps_;
+  const double drift = side_mps_ - parameters_.side_slip_s * speed_mps_ * yaw_rate_radps_;
   return {.time = {},
           .x_m = x_m_,
           .y_m = y_m_,

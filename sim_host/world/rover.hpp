@@ -48,7 +48,7 @@ class Rover {
       500};  ///< random processes and sensors live on this grid, whatever the integration rate
 
   /// `substeps` integration steps per kStep.
-  Rover(const RoverNumbers& numbers, const Plan& plan, std::uint64_t seed, int substeps);
+  Rover(const RoverNumbers& parameters, const Plan& plan, std::uint64_t seed, int substeps);
 
   /// Advances by kStep; `since_start` is the time at its end.
   Motion step(base::Micros since_start);
@@ -65,7 +65,7 @@ class Rover {
   void integrate(double h_s, Motion& motion);
   void jitter();
 
-  RoverNumbers numbers_;
+  RoverNumbers parameters_;
   const Plan* plan_;
   int substeps_;
   base::Micros ahead_;

@@ -21,25 +21,25 @@ Vector3 three(Chance& chance, double sigma) {
 
 }  // namespace
 
-Imu::Imu(const ImuNumbers& numbers, double wheel_radius_m, const Wgs84& earth, std::uint64_t seed)
-    : numbers_{numbers},
-      period_s_{period_s(numbers.rate_hz)},
+Imu::Imu(const ImuParameters& parameters, double wheel_radius_m, const Wgs84& earth, std::uint64_t seed)
+    : parameters_{parameters},
+      period_s_{period_s(parameters.rate_hz)},
       wheel_radius_m_{wheel_radius_m},
       gravity_mps2_{earth.gravity_mps2()},
-      earth_rate_n_radps_{numbers.earth_rotation ? earth.earth_rate_n_radps() : Vector3{}},
+      earth_rate_n_radps_{parameters.earth_rotation ? earth.earth_rate_n_radps() : Vector3{}},
       noise_{seed, Stream::kImuNoise},
       vibration_{seed, Stream::kImuVibration},
-      gyro_walk_{walks(numbers.gyro_walk_radps)},
-      accel_walk_{walks(numbers.accel_walk_mps2)} {
+      gyro_walk_{walks(parameters.gyro_walk_radps)},
+      accel_walk_{walks(parameters.accel_walk_mps2)} {
   Chance turn_on{seed, Stream::kImuTurnOn};
-  gyro_bias_ = three(turn_on, numbers.gyro_turn_on_radps);
-  accel_bias_ = three(turn_on, numbers.accel_turn_on_mps2);
-  gyro_scale_ = three(turn_on, numbers.scale);
-  accel_scale_ = three(turn_on, numbers.scale);
+  gyro_bias_ = three(turn_on, parameters.gyro_turn_on_radps);
+  accel_bias_ = three(turn_on, parameters.accel_turn_on_mps2);
+  gyro_scale_ = three(turn_on, parameters.scale);
+  accel_scale_ = three(turn_on, parameters.scale);
 }
 
 Imu::Processes Imu::walks(double sigma) {
-  const auto one = [&] { return GaussMarkov{sigma, numbers_.walk_tau_s, period_s_, noise_}; };
+  const auto one = [&] { return GaussMarkov{sigma, parameters_.walk_tau_s, period_s_, noise_}; };
   return Processes{one(), one(), one()};
 }
 
@@ -51,13 +51,13 @@ void Imu::sense(const Motion& motion, double speed_mps, base::Micros now, const 
   for (std::size_t i = 0; i < 3; ++i) rate[i] += motion.rate_b_radps[i];
 
   // Tyre lugs: each axis hears them with another phase.
-  lug_phase_rad_ = wrap(lug_phase_rad_ + numbers_.lugs * speed_mps * kStep_s / wheel_radius_m_);
+  lug_phase_rad_ = wrap(lug_phase_rad_ + parameters_.lugs * speed_mps * kStep_s / wheel_radius_m_);
   const Direction lug = direction(lug_phase_rad_);
   const double share = magnitude(speed_mps) / kReferenceSpeed_mps;
   const Vector3 shape{0.5 * lug.cos, 0.5 * lug.sin, 0.7 * (lug.cos + lug.sin)};
   for (std::size_t i = 0; i < 3; ++i) {
-    force[i] = (force[i] + share * numbers_.vibration_mps2 * shape[i]) * (1 + accel_scale_[i]);
-    rate[i] = (rate[i] + share * numbers_.vibration_radps * shape[i]) * (1 + gyro_scale_[i]);
+    force[i] = (force[i] + share * parameters_.vibration_mps2 * shape[i]) * (1 + accel_scale_[i]);
+    rate[i] = (rate[i] + share * parameters_.vibration_radps * shape[i]) * (1 + gyro_scale_[i]);
   }
   const auto shake = [&](Fault fault, double by_mps2, double by_radps) {
     const auto on = faults.since(fault, now);
@@ -77,8 +77,8 @@ void Imu::sense(const Motion& motion, double speed_mps, base::Micros now, const 
   };
   Vector3 turn{}, push{};
   for (std::size_t i = 0; i < 3; ++i) {
-    turn[i] = within(rate[i], numbers_.gyro_range_radps, gyro_clips);
-    push[i] = within(force[i], numbers_.accel_range_mps2, accel_clips);
+    turn[i] = within(rate[i], parameters_.gyro_range_radps, gyro_clips);
+    push[i] = within(force[i], parameters_.accel_range_mps2, accel_clips);
   }
   // As a driver does that reads the sensor at 1 kHz: coning and sculling, so that both are told in the axes at the
   // begin of the sample (Savage 1998; to first order of the angle within it).
@@ -96,10 +96,10 @@ void Imu::sense(const Motion& motion, double speed_mps, base::Micros now, const 
   clipped_accel_ += accel_clips ? 1 : 0;
 }
 
-app::ImuSample Imu::sample(base::Micros now, const Faults& faults) {
+sensor::ImuSample Imu::sample(base::Micros now, const Faults& faults) {
   const double root = sim::sqrt(period_s_);
   const double share = magnitude(speed_mps_) / kReferenceSpeed_mps;
-  app::ImuSample s{.temperature_degC = single(numbers_.temperature_degC),
+  sensor::ImuSample s{.temperature_degC = single(parameters_.temperature_degC),
                    .interval_us = static_cast<std::uint16_t>(sim::floor(period_s_ * 1e6 + 0.5)),
                    .clipped_gyro = static_cast<std::uint8_t>(clipped_gyro_),
                    .clipped_accel = static_cast<std::uint8_t>(clipped_accel_)};
@@ -108,9 +108,9 @@ app::ImuSample Imu::sample(base::Micros now, const Faults& faults) {
     double gyro_bias = gyro_bias_[i] + gyro_walk_[i].next(noise_);
     if (stepped_ && i == 2) gyro_bias += FaultNumbers::kGyroStep_radps;
     const double accel_bias = accel_bias_[i] + accel_walk_[i].next(noise_);
-    const double angle_noise = noise_.normal(numbers_.gyro_noise * root);
+    const double angle_noise = noise_.normal(parameters_.gyro_noise * root);
     const double velocity_noise =
-        noise_.normal(numbers_.accel_noise[i] * root) + vibration_.normal(numbers_.vibration_noise * share * root);
+        noise_.normal(parameters_.accel_noise[i] * root) + vibration_.normal(parameters_.vibration_noise * share * root);
     s.dangle_b_rad[i] = single(angle_[i] + gyro_bias * period_s_ + angle_noise);
     s.dvelocity_b_mps[i] = single(velocity_[i] + accel_bias * period_s_ + velocity_noise);
   }
@@ -134,9 +134,9 @@ Vector3 Imu::accel_bias_mps2() const {
   return bias;
 }
 
-Wheels::Wheels(const WheelSensorNumbers& numbers, const RoverNumbers& rover, std::uint64_t seed)
-    : numbers_{numbers},
-      nominal_metres_per_count_{2 * kPi * rover.wheel_radius_m / numbers.counts_per_turn},
+Wheels::Wheels(const WheelSensorNumbers& parameters, const RoverNumbers& rover, std::uint64_t seed)
+    : parameters_{parameters},
+      nominal_metres_per_count_{2 * kPi * rover.wheel_radius_m / parameters.counts_per_turn},
       nominal_track_m_{rover.track_m},
       chance_{seed, Stream::kWheels} {
   left_.metres_per_count = nominal_metres_per_count_ * (1 + 0.5 * rover.radius_difference);
@@ -164,15 +164,15 @@ void Wheels::sense(const Motion& motion, base::Micros now, const Faults& faults)
 
 void Wheels::read() {
   for (Wheel* wheel : {&left_, &right_}) {
-    const double share_m = numbers_.noise_share * wheel->unread_m;
-    wheel->travel_m += chance_.normal() * sim::sqrt(numbers_.noise_m * magnitude(wheel->unread_m) + share_m * share_m);
+    const double share_m = parameters_.noise_share * wheel->unread_m;
+    wheel->travel_m += chance_.normal() * sim::sqrt(parameters_.noise_m * magnitude(wheel->unread_m) + share_m * share_m);
     wheel->unread_m = 0;
     wheel->read = wheel->count;
     wheel->count = static_cast<std::int64_t>(sim::floor(wheel->travel_m / wheel->metres_per_count));
   }
 }
 
-app::WheelCounts Wheels::counts() {
+sensor::WheelCounts Wheels::counts() {
   read();
   const auto wrapped = [](const Wheel& w) {
     return static_cast<std::uint16_t>(static_cast<std::uint64_t>(w.count) + w.offset);
@@ -180,50 +180,50 @@ app::WheelCounts Wheels::counts() {
   return {.left = wrapped(left_), .right = wrapped(right_)};
 }
 
-app::WheelSpeeds Wheels::wheel_speeds() {
+sensor::WheelSpeeds Wheels::wheel_speeds() {
   read();
   const auto speed = [this](const Wheel& w) {
-    return single(static_cast<double>(w.count - w.read) * nominal_metres_per_count_ * numbers_.rate_hz);
+    return single(static_cast<double>(w.count - w.read) * nominal_metres_per_count_ * parameters_.rate_hz);
   };
   return {.left_mps = speed(left_), .right_mps = speed(right_)};
 }
 
-app::BodySpeed Wheels::body_speed() {
+sensor::BodySpeed Wheels::body_speed() {
   read();
-  const double per_count = nominal_metres_per_count_ * numbers_.rate_hz;
+  const double per_count = nominal_metres_per_count_ * parameters_.rate_hz;
   const double left = static_cast<double>(left_.count - left_.read) * per_count;
   const double right = static_cast<double>(right_.count - right_.read) * per_count;
   return {.forward_mps = single(0.5 * (left + right)), .yaw_rate_radps = single((right - left) / nominal_track_m_)};
 }
 
-Gnss::Gnss(const GnssNumbers& numbers, const Wgs84& earth, std::uint64_t seed)
-    : numbers_{numbers},
+Gnss::Gnss(const GnssParameters& parameters, const Wgs84& earth, std::uint64_t seed)
+    : parameters_{parameters},
       earth_{&earth},
-      period_s_{period_s(numbers.rate_hz)},
+      period_s_{period_s(parameters.rate_hz)},
       noise_{seed, Stream::kGnssNoise},
       outage_chance_{seed, Stream::kGnssOutage},
       glitch_chance_{seed, Stream::kGnssGlitch},
       accuracy_chance_{seed, Stream::kGnssAccuracy},
       correlated_{
-          GaussMarkov{numbers.correlated_m, numbers.correlated_tau_s, period_s_, noise_},
-          GaussMarkov{numbers.correlated_m, numbers.correlated_tau_s, period_s_, noise_},
-          GaussMarkov{numbers.correlated_m * numbers.vertical_factor, numbers.correlated_tau_s, period_s_, noise_}},
-      accuracy_{numbers.accuracy_error, 20, period_s_, accuracy_chance_} {}
+          GaussMarkov{parameters.correlated_m, parameters.correlated_tau_s, period_s_, noise_},
+          GaussMarkov{parameters.correlated_m, parameters.correlated_tau_s, period_s_, noise_},
+          GaussMarkov{parameters.correlated_m * parameters.vertical_factor, parameters.correlated_tau_s, period_s_, noise_}},
+      accuracy_{parameters.accuracy_error, 20, period_s_, accuracy_chance_} {}
 
 void Gnss::advance_errors(base::Micros now) {
   for (auto& error : correlated_) error.next(noise_);
   accuracy_.next(accuracy_chance_);
 
-  const bool quiet = now < numbers_.quiet_start;
-  const bool begins = numbers_.outage_every_s > 0 && outage_chance_.happens(period_s_ / numbers_.outage_every_s);
-  const double lasts_s = outage_chance_.uniform(numbers_.outage_min_s, numbers_.outage_max_s);
+  const bool quiet = now < parameters_.quiet_start;
+  const bool begins = parameters_.outage_every_s > 0 && outage_chance_.happens(period_s_ / parameters_.outage_every_s);
+  const double lasts_s = outage_chance_.uniform(parameters_.outage_min_s, parameters_.outage_max_s);
   if (begins && !quiet && now >= outage_until_)
     outage_until_ = now + base::Micros{static_cast<std::int64_t>(lasts_s * 1e6)};
 
-  const bool strikes = glitch_chance_.happens(numbers_.glitch_probability);
-  const double size_m = glitch_chance_.uniform(numbers_.glitch_min_m, numbers_.glitch_max_m);
+  const bool strikes = glitch_chance_.happens(parameters_.glitch_probability);
+  const double size_m = glitch_chance_.uniform(parameters_.glitch_min_m, parameters_.glitch_max_m);
   const Direction towards = direction(glitch_chance_.uniform(-kPi, kPi));
-  const int fixes = 1 + static_cast<int>(numbers_.glitch_fixes_max * glitch_chance_.uniform());
+  const int fixes = 1 + static_cast<int>(parameters_.glitch_fixes_max * glitch_chance_.uniform());
   if (glitch_fixes_ > 0) --glitch_fixes_;
   if (strikes && !quiet && glitch_fixes_ == 0)
     glitch_fixes_ = fixes, glitch_m_ = {size_m * towards.cos, size_m * towards.sin};
@@ -231,11 +231,11 @@ void Gnss::advance_errors(base::Micros now) {
 
 Gnss::Reading Gnss::sample(const Truth& truth, const Vector3& rate_b, base::Micros now, const Faults& faults) {
   advance_errors(now);
-  const Vector3 white = three(noise_, numbers_.white_m);
-  Vector3 velocity_noise = three(noise_, numbers_.velocity_mps);
-  velocity_noise[2] *= numbers_.velocity_vertical_factor;
+  const Vector3 white = three(noise_, parameters_.white_m);
+  Vector3 velocity_noise = three(noise_, parameters_.velocity_mps);
+  velocity_noise[2] *= parameters_.velocity_vertical_factor;
 
-  const Vector3& l = numbers_.antenna_b_m;
+  const Vector3& l = parameters_.antenna_b_m;
   const Vector3 attitude{truth.roll_rad, truth.pitch_rad, truth.yaw_rad};
   const Vector3 lever_n = to_level(attitude, l);
   const Vector3 swing_n = to_level(attitude, {rate_b[1] * l[2] - rate_b[2] * l[1], rate_b[2] * l[0] - rate_b[0] * l[2],
@@ -243,7 +243,7 @@ Gnss::Reading Gnss::sample(const Truth& truth, const Vector3& rate_b, base::Micr
 
   Vector3 at_m{truth.x_m + lever_n[0] + correlated_[0].value() + white[0],
                truth.y_m + lever_n[1] + correlated_[1].value() + white[1],
-               truth.z_m + lever_n[2] + correlated_[2].value() + white[2] * numbers_.vertical_factor};
+               truth.z_m + lever_n[2] + correlated_[2].value() + white[2] * parameters_.vertical_factor};
   if (glitch_fixes_ > 0) at_m[0] += glitch_m_[0], at_m[1] += glitch_m_[1];
   if (faults.active(Fault::kGnssJump, now)) at_m[0] += FaultNumbers::kJump_m;
   if (const auto on = faults.since(Fault::kGnssRamp, now))
@@ -255,25 +255,25 @@ Gnss::Reading Gnss::sample(const Truth& truth, const Vector3& rate_b, base::Micr
 
   const double believed = clamp(1 + accuracy_.value(), 0.5, 2);
   const double sigma_m =
-      sim::sqrt(numbers_.white_m * numbers_.white_m + numbers_.correlated_m * numbers_.correlated_m) * believed;
+      sim::sqrt(parameters_.white_m * parameters_.white_m + parameters_.correlated_m * parameters_.correlated_m) * believed;
   const GeodeticPoint point = earth_->geodetic(at_m);
   Reading reading;
-  reading.position = app::GnssPosition{.latitude_2ndeg = point.latitude_2ndeg,
+  reading.position = sensor::GnssPosition{.latitude_2ndeg = point.latitude_2ndeg,
                                        .longitude_2ndeg = point.longitude_2ndeg,
                                        .height_m = single(point.height_m),
                                        .horizontal_acc_m = single(sigma_m),
-                                       .vertical_acc_m = single(sigma_m * numbers_.vertical_factor),
-                                       .fix = app::GnssFix::kDifferential,
+                                       .vertical_acc_m = single(sigma_m * parameters_.vertical_factor),
+                                       .fix = sensor::GnssFix::kDifferential,
                                        .satellites = 14};
   Vector3 v;
   for (std::size_t i = 0; i < 3; ++i) v[i] = truth.v_n_mps[i] + swing_n[i] + velocity_noise[i];
-  reading.velocity = app::GnssVelocity{.v_n_mps = {single(v[0]), single(v[1]), single(v[2])},
-                                       .acc_mps = single(numbers_.velocity_mps * believed)};
+  reading.velocity = sensor::GnssVelocity{.v_n_mps = {single(v[0]), single(v[1]), single(v[2])},
+                                       .acc_mps = single(parameters_.velocity_mps * believed)};
 
   if (now < outage_until_ && last_.position) {
     // A receiver that lost the sky goes on talking: its last position, and the word that it is none.
-    app::GnssPosition none = *last_.position;
-    none.fix = app::GnssFix::kNone;
+    sensor::GnssPosition none = *last_.position;
+    none.fix = sensor::GnssFix::kNone;
     none.satellites = 2;
     none.horizontal_acc_m = none.vertical_acc_m = kNone;
     reading = {.position = none, .velocity = std::nullopt};
@@ -286,52 +286,52 @@ Gnss::Reading Gnss::sample(const Truth& truth, const Vector3& rate_b, base::Micr
   return reading;
 }
 
-Magnetometer::Magnetometer(const MagnetometerNumbers& numbers, std::uint64_t seed)
-    : numbers_{numbers},
-      field_n_uT_{numbers.field_uT * sim::cos(numbers.dip_rad) * sim::sin(numbers.declination_rad),
-                  numbers.field_uT * sim::cos(numbers.dip_rad) * sim::cos(numbers.declination_rad),
-                  -numbers.field_uT * sim::sin(numbers.dip_rad)},
+Magnetometer::Magnetometer(const MagnetometerNumbers& parameters, std::uint64_t seed)
+    : parameters_{parameters},
+      field_n_uT_{parameters.field_uT * sim::cos(parameters.dip_rad) * sim::sin(parameters.declination_rad),
+                  parameters.field_uT * sim::cos(parameters.dip_rad) * sim::cos(parameters.declination_rad),
+                  -parameters.field_uT * sim::sin(parameters.dip_rad)},
       noise_{seed, Stream::kMagnetometer},
-      local_{GaussMarkov{numbers.local_uT, numbers.local_tau_s, period_s(numbers.rate_hz), noise_},
-             GaussMarkov{numbers.local_uT, numbers.local_tau_s, period_s(numbers.rate_hz), noise_},
-             GaussMarkov{numbers.local_uT, numbers.local_tau_s, period_s(numbers.rate_hz), noise_}} {
+      local_{GaussMarkov{parameters.local_uT, parameters.local_tau_s, period_s(parameters.rate_hz), noise_},
+             GaussMarkov{parameters.local_uT, parameters.local_tau_s, period_s(parameters.rate_hz), noise_},
+             GaussMarkov{parameters.local_uT, parameters.local_tau_s, period_s(parameters.rate_hz), noise_}} {
   Chance turn_on{seed, Stream::kMagnetometerTurnOn};
-  hard_iron_uT_ = three(turn_on, numbers.hard_iron_uT);
-  scale_ = three(turn_on, numbers.scale);
+  hard_iron_uT_ = three(turn_on, parameters.hard_iron_uT);
+  scale_ = three(turn_on, parameters.scale);
 }
 
-app::MagneticFlux Magnetometer::sample(const Truth& truth, base::Micros now, const Faults& faults) {
+sensor::MagneticFlux Magnetometer::sample(const Truth& truth, base::Micros now, const Faults& faults) {
   Vector3 field_n = field_n_uT_;
   // Iron in the ground passes by at the rover's speed; where it stands, nothing changes.
   for (std::size_t i = 0; i < 3; ++i)
     field_n[i] += magnitude(truth.speed_mps) > 0.05 ? local_[i].next(noise_) : local_[i].value();
   if (faults.active(Fault::kMagDisturbance, now)) field_n[0] += FaultNumbers::kIron_uT;
   const Vector3 field_b = to_body({truth.roll_rad, truth.pitch_rad, truth.yaw_rad}, field_n);
-  const Vector3 white = three(noise_, numbers_.noise_uT);
-  app::MagneticFlux flux;
+  const Vector3 white = three(noise_, parameters_.noise_uT);
+  sensor::MagneticFlux flux;
   for (std::size_t i = 0; i < 3; ++i)
     flux.flux_b_uT[i] = single(field_b[i] * (1 + scale_[i]) + hard_iron_uT_[i] + white[i]);
   return flux;
 }
 
-Barometer::Barometer(const BarometerNumbers& numbers, double origin_height_m, std::uint64_t seed)
-    : numbers_{numbers},
+Barometer::Barometer(const BarometerNumbers& parameters, double origin_height_m, std::uint64_t seed)
+    : parameters_{parameters},
       origin_height_m_{origin_height_m},
       noise_{seed, Stream::kBarometer},
-      offset_Pa_{noise_.normal(numbers.turn_on_Pa)},
-      drift_{numbers.drift_Pa, numbers.drift_tau_s, period_s(numbers.rate_hz), noise_} {}
+      offset_Pa_{noise_.normal(parameters.turn_on_Pa)},
+      drift_{parameters.drift_Pa, parameters.drift_tau_s, period_s(parameters.rate_hz), noise_} {}
 
-app::AirPressure Barometer::sample(const Truth& truth) {
+sensor::AirPressure Barometer::sample(const Truth& truth) {
   // Troposphere: 101325 Pa, 288.15 K, 6.5 K/km.
   const double share = 1 - 0.0065 / 288.15 * (origin_height_m_ + truth.z_m);
   const double standard_Pa = 101'325 * sim::exp(5.25588 * base::log(share));
-  const double noise_Pa = noise_.normal(numbers_.noise_Pa);
+  const double noise_Pa = noise_.normal(parameters_.noise_Pa);
   return {.pressure_Pa = single(standard_Pa + offset_Pa_ + drift_.next(noise_) + noise_Pa),
-          .temperature_degC = single(numbers_.temperature_degC)};
+          .temperature_degC = single(parameters_.temperature_degC)};
 }
 
-Camera::Camera(const CameraNumbers& numbers, std::vector<Landmark> landmarks, std::uint64_t seed)
-    : numbers_{numbers},
+Camera::Camera(const CameraNumbers& parameters, std::vector<Landmark> landmarks, std::uint64_t seed)
+    : parameters_{parameters},
       landmarks_{std::move(landmarks)},
       map_{landmarks_},
       noise_{seed, Stream::kCamera},
@@ -339,24 +339,24 @@ Camera::Camera(const CameraNumbers& numbers, std::vector<Landmark> landmarks, st
       outlier_{seed, Stream::kFaultOutlier} {
   Chance survey{seed, Stream::kSurvey};
   for (auto& landmark : map_) {
-    landmark.x_m += survey.normal(numbers.survey_m);
-    landmark.y_m += survey.normal(numbers.survey_m);
+    landmark.x_m += survey.normal(parameters.survey_m);
+    landmark.y_m += survey.normal(parameters.survey_m);
   }
 }
 
-std::vector<app::LandmarkSighting> Camera::sample(const Truth& truth, base::Micros now, const Faults& faults) {
-  std::vector<app::LandmarkSighting> sightings;
+std::vector<sensor::LandmarkSighting> Camera::sample(const Truth& truth, base::Micros now, const Faults& faults) {
+  std::vector<sensor::LandmarkSighting> sightings;
   for (std::size_t i = 0; i < landmarks_.size(); ++i) {
     const double dx = landmarks_[i].x_m - truth.x_m;
     const double dy = landmarks_[i].y_m - truth.y_m;
     const double range_m = sim::sqrt(dx * dx + dy * dy);
     const double bearing_rad = wrap(sim::atan2(dy, dx) - truth.yaw_rad);
-    if (range_m > numbers_.range_max_m || magnitude(bearing_rad) > 0.5 * numbers_.field_of_view_rad) continue;
+    if (range_m > parameters_.range_max_m || magnitude(bearing_rad) > 0.5 * parameters_.field_of_view_rad) continue;
 
-    const bool missed = noise_.happens(numbers_.miss_probability);
-    const double range_noise = noise_.normal(numbers_.sigma_range_m + numbers_.sigma_range_per_m * range_m);
-    const double bearing_noise = noise_.normal(numbers_.sigma_bearing_rad);
-    const bool mistaken = wrong_.happens(numbers_.wrong_id_probability);
+    const bool missed = noise_.happens(parameters_.miss_probability);
+    const double range_noise = noise_.normal(parameters_.sigma_range_m + parameters_.sigma_range_per_m * range_m);
+    const double bearing_noise = noise_.normal(parameters_.sigma_bearing_rad);
+    const bool mistaken = wrong_.happens(parameters_.wrong_id_probability);
     const auto other = static_cast<std::size_t>(static_cast<double>(landmarks_.size()) * wrong_.uniform());
     const bool outlier = outlier_.happens(FaultNumbers::kOutlierShare);
     const double outlier_range_m = outlier_.uniform(FaultNumbers::kOutlierRange_m[0], FaultNumbers::kOutlierRange_m[1]);
@@ -364,8 +364,8 @@ std::vector<app::LandmarkSighting> Camera::sample(const Truth& truth, base::Micr
         outlier_.uniform(-FaultNumbers::kOutlierBearing_rad, FaultNumbers::kOutlierBearing_rad);
     if (missed) continue;
 
-    double seen_m = range_m * (1 + numbers_.scale_error) + range_noise;
-    double seen_rad = bearing_rad - numbers_.mount_error_rad + bearing_noise;
+    double seen_m = range_m * (1 + parameters_.scale_error) + range_noise;
+    double seen_rad = bearing_rad - parameters_.mount_error_rad + bearing_noise;
     std::size_t named = mistaken ? other : i;
     if (faults.active(Fault::kLandmarkWrongId, now) && (named ^ 1U) < landmarks_.size()) named ^= 1U;
     if (outlier && faults.active(Fault::kLandmarkOutlier, now))

@@ -3,7 +3,7 @@
 // A fault never changes how many random numbers are drawn, so with and without it everything else is the same.
 #pragma once
 
-#include "app/samples.hpp"
+#include "sensor/samples.hpp"
 #include "sim_host/world/chance.hpp"
 #include "sim_host/world/faults.hpp"
 #include "sim_host/world/numbers.hpp"
@@ -19,9 +19,9 @@ namespace tetap::sim {
 /// Raw samples at 2 kHz, limited to full scale, summed to increments between two calls of sample().
 class Imu {
  public:
-  Imu(const ImuNumbers& numbers, double wheel_radius_m, const Wgs84& earth, std::uint64_t seed);
+  Imu(const ImuParameters& parameters, double wheel_radius_m, const Wgs84& earth, std::uint64_t seed);
   void sense(const Motion& motion, double speed_mps, base::Micros now, const Faults& faults);
-  [[nodiscard]] app::ImuSample sample(base::Micros now, const Faults& faults);
+  [[nodiscard]] sensor::ImuSample sample(base::Micros now, const Faults& faults);
   /// As of the last sample, as the truth has them.
   [[nodiscard]] Vector3 gyro_bias_radps() const;
   [[nodiscard]] Vector3 accel_bias_mps2() const;
@@ -30,7 +30,7 @@ class Imu {
   using Processes = std::array<GaussMarkov, 3>;
   [[nodiscard]] Processes walks(double sigma);
 
-  ImuNumbers numbers_;
+  ImuParameters parameters_;
   double period_s_;
   double wheel_radius_m_;
   double gravity_mps2_;
@@ -43,17 +43,17 @@ class Imu {
   double speed_mps_ = 0;
   int clipped_gyro_ = 0, clipped_accel_ = 0;
   bool stepped_ = false;
-  app::ImuSample last_;
+  sensor::ImuSample last_;
 };
 
 /// Quadrature counters of both wheels, or speeds made from their differences.
 class Wheels {
  public:
-  Wheels(const WheelSensorNumbers& numbers, const RoverNumbers& rover, std::uint64_t seed);
+  Wheels(const WheelSensorNumbers& parameters, const RoverNumbers& rover, std::uint64_t seed);
   void sense(const Motion& motion, base::Micros now, const Faults& faults);
-  [[nodiscard]] app::WheelCounts counts();
-  [[nodiscard]] app::WheelSpeeds wheel_speeds();
-  [[nodiscard]] app::BodySpeed body_speed();
+  [[nodiscard]] sensor::WheelCounts counts();
+  [[nodiscard]] sensor::WheelSpeeds wheel_speeds();
+  [[nodiscard]] sensor::BodySpeed body_speed();
 
  private:
   struct Wheel {
@@ -66,7 +66,7 @@ class Wheels {
   };
   void read();
 
-  WheelSensorNumbers numbers_;
+  WheelSensorNumbers parameters_;
   double nominal_metres_per_count_;
   double nominal_track_m_;
   Chance chance_;
@@ -76,16 +76,16 @@ class Wheels {
 class Gnss {
  public:
   struct Reading {
-    std::optional<app::GnssPosition> position;
-    std::optional<app::GnssVelocity> velocity;
+    std::optional<sensor::GnssPosition> position;
+    std::optional<sensor::GnssVelocity> velocity;
   };
-  Gnss(const GnssNumbers& numbers, const Wgs84& earth, std::uint64_t seed);
+  Gnss(const GnssParameters& parameters, const Wgs84& earth, std::uint64_t seed);
   [[nodiscard]] Reading sample(const Truth& truth, const Vector3& rate_b_radps, base::Micros now, const Faults& faults);
 
  private:
   void advance_errors(base::Micros now);
 
-  GnssNumbers numbers_;
+  GnssParameters parameters_;
   const Wgs84* earth_;
   double period_s_;
   Chance noise_, outage_chance_, glitch_chance_, accuracy_chance_;
@@ -101,11 +101,11 @@ class Gnss {
 /// The Earth's field as the body's axes see it, and the iron near by.
 class Magnetometer {
  public:
-  Magnetometer(const MagnetometerNumbers& numbers, std::uint64_t seed);
-  [[nodiscard]] app::MagneticFlux sample(const Truth& truth, base::Micros now, const Faults& faults);
+  Magnetometer(const MagnetometerNumbers& parameters, std::uint64_t seed);
+  [[nodiscard]] sensor::MagneticFlux sample(const Truth& truth, base::Micros now, const Faults& faults);
 
  private:
-  MagnetometerNumbers numbers_;
+  MagnetometerNumbers parameters_;
   Vector3 field_n_uT_;
   Chance noise_;
   Vector3 hard_iron_uT_{}, scale_{};
@@ -115,11 +115,11 @@ class Magnetometer {
 /// Static pressure: the standard atmosphere (ISO 2533) at the body's height, and how far weather and sensor are off it.
 class Barometer {
  public:
-  Barometer(const BarometerNumbers& numbers, double origin_height_m, std::uint64_t seed);
-  [[nodiscard]] app::AirPressure sample(const Truth& truth);
+  Barometer(const BarometerNumbers& parameters, double origin_height_m, std::uint64_t seed);
+  [[nodiscard]] sensor::AirPressure sample(const Truth& truth);
 
  private:
-  BarometerNumbers numbers_;
+  BarometerNumbers parameters_;
   double origin_height_m_;
   Chance noise_;
   double offset_Pa_;
@@ -129,13 +129,13 @@ class Barometer {
 /// Range and bearing to landmarks with known identity.
 class Camera {
  public:
-  Camera(const CameraNumbers& numbers, std::vector<Landmark> landmarks, std::uint64_t seed);
-  [[nodiscard]] std::vector<app::LandmarkSighting> sample(const Truth& truth, base::Micros now, const Faults& faults);
+  Camera(const CameraNumbers& parameters, std::vector<Landmark> landmarks, std::uint64_t seed);
+  [[nodiscard]] std::vector<sensor::LandmarkSighting> sample(const Truth& truth, base::Micros now, const Faults& faults);
   /// What a surveyor gives: positions with an error of a few centimetres.
   [[nodiscard]] const std::vector<Landmark>& map() const { return map_; }
 
  private:
-  CameraNumbers numbers_;
+  CameraNumbers parameters_;
   std::vector<Landmark> landmarks_;
   std::vector<Landmark> map_;
   Chance noise_, wrong_, outlier_;

@@ -27,8 +27,8 @@ bool later(base::Micros a_arrival, std::uint64_t a_order, base::Micros b_arrival
 
 }  // namespace
 
-Numbers World::effective(const Options& options) {
-  Numbers n = options.numbers;
+Parameters World::effective(const Options& options) {
+  Parameters n = options.parameters;
   if (!options.mismatched) n = options.inertial ? matched_inertial(n) : matched(n);
   if (!options.latency) n = without_latency(n);
   check_rate("IMU", n.imu.rate_hz);
@@ -42,18 +42,18 @@ Numbers World::effective(const Options& options) {
 }
 
 World::World(const Options& options, std::uint64_t seed)
-    : numbers_{effective(options)},
+    : parameters_{effective(options)},
       start_{options.start},
       faults_{options.faults},
       plan_{std::make_unique<const Plan>(options.course, options.limits)},
       earth_{std::make_unique<const Wgs84>(options.origin)},
-      rover_{numbers_.rover, *plan_, seed, options.substeps},
-      imu_{numbers_.imu, numbers_.rover.wheel_radius_m, *earth_, seed},
-      wheels_{numbers_.wheels, numbers_.rover, seed},
-      gnss_{numbers_.gnss, *earth_, seed},
-      camera_{numbers_.camera, options.course.landmarks, seed},
-      magnetometer_{numbers_.magnetometer, seed},
-      barometer_{numbers_.barometer, options.origin.height_m, seed},
+      rover_{parameters_.rover, *plan_, seed, options.substeps},
+      imu_{parameters_.imu, parameters_.rover.wheel_radius_m, *earth_, seed},
+      wheels_{parameters_.wheels, parameters_.rover, seed},
+      gnss_{parameters_.gnss, *earth_, seed},
+      camera_{parameters_.camera, options.course.landmarks, seed},
+      magnetometer_{parameters_.magnetometer, seed},
+      barometer_{parameters_.barometer, options.origin.height_m, seed},
       imu_latency_{seed, Stream::kImuLatency},
       wheel_latency_{seed, Stream::kWheelLatency},
       gnss_latency_{seed, Stream::kGnssLatency},
@@ -75,8 +75,8 @@ StartPose World::start_pose() const {
   return {.x_m = at.x_m,
           .y_m = at.y_m,
           .yaw_rad = wrap(at.yaw_rad),
-          .sigma_m = numbers_.rover.start_m,
-          .sigma_yaw_rad = numbers_.rover.start_rad};
+          .sigma_m = parameters_.rover.start_m,
+          .sigma_yaw_rad = parameters_.rover.start_rad};
 }
 
 base::Micros World::clock_offset_at(base::Micros since_start) const {
@@ -117,7 +117,7 @@ void World::step() {
   const Motion motion = rover_.step(now_);
   rate_b_radps_ = motion.rate_b_radps;
 
-  const auto& n = numbers_;
+  const auto& n = parameters_;
   if (n.imu.rate_hz > 0) {
     imu_.sense(motion, rover_.truth().speed_mps, now_, faults_);
     if (due(n.imu.rate_hz, n.imu.phase, now_))
@@ -166,7 +166,7 @@ void World::advance_to(base::Micros t, std::vector<Measurement>& arrived) {
 }
 
 bool can_act(Fault fault, const World::Options& options) {
-  const Numbers& n = options.numbers;
+  const Parameters& n = options.parameters;
   switch (info(fault).falls_on) {
     case FallsOn::kAny:
       return true;

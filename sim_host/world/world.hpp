@@ -30,7 +30,7 @@ class World {
     bool mismatched = true;  ///< false: only errors that filters model, see matched()
     bool inertial = false;   ///< and not mismatched: what an inertial filter models, see matched_inertial()
     bool latency = true;     ///< false: everything arrives at its stamp
-    Numbers numbers;
+    Parameters parameters;
     Course course = default_course();
     CourseLimits limits;
     GeodeticOrigin origin{.latitude_deg = 48.2627, .longitude_deg = 11.6683, .height_m = 520};
@@ -56,7 +56,7 @@ class World {
   [[nodiscard]] StartPose start_pose() const;
   [[nodiscard]] std::span<const Landmark> map() const { return camera_.map(); }
   [[nodiscard]] const GeodeticOrigin& origin() const { return earth_->origin(); }
-  [[nodiscard]] const Numbers& numbers() const { return numbers_; }
+  [[nodiscard]] const Parameters& parameters() const { return parameters_; }
   [[nodiscard]] const Faults& faults() const { return faults_; }
   [[nodiscard]] const Plan& plan() const { return *plan_; }
 
@@ -65,13 +65,13 @@ class World {
     Measurement measurement;
     std::uint64_t order;  ///< of making: what arrives at one instant keeps it
   };
-  static Numbers effective(const Options& options);
+  static Parameters effective(const Options& options);
   [[nodiscard]] base::Micros clock_offset_at(base::Micros since_start) const;
   void step();
   void kidnap();
   void emit(Value value, std::uint8_t sequence, base::Micros stamp_late, base::Micros latency);
 
-  Numbers numbers_;
+  Parameters parameters_;
   base::Micros start_;
   Faults faults_;
   // Behind pointers, because sensors and rover point at them and a World may move.

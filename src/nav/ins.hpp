@@ -8,7 +8,7 @@
 #include "filter/state.hpp"
 #include "nav/ins_covariance.hpp"
 #include "nav/strapdown.hpp"
-#include "nav/turned_scale.hpp"
+#include "nav/gyro_scale_consider.hpp"
 
 #include <algorithm>
 
@@ -163,7 +163,7 @@ class Ins {
     sink(pending_.dt_s);
     sink(pending_.shown_rad);
     sink(std::uint32_t{held_});
-    turned_.each_bit(sink);
+    turned_.hash_state(sink);
     for (int i = 0; i < 3; ++i) {
       sink(pending_.dv_n_mps(i));
       for (int k = 0; k < 3; ++k) sink(pending_.r_dt(i, k));
@@ -359,7 +359,7 @@ class Ins {
   }
 
   Pending pending_{};
-  TurnedScale turned_{};
+  GyroScaleConsider turned_{};
   InsFactor watch_{};
   /// So long yet what moves it counts in full, in 0.1 ms: wheels that slip for a while are heard again.
   static constexpr float kHeldPerS = 10'000.0F, kMostLeap_mps = 30;

@@ -81,7 +81,7 @@ struct InsState {
     return dx;
   }
   template <class Sink>
-  void each_bit(Sink&& sink) const {
+  void hash_state(Sink&& sink) const {
     for (const base::Anchored* coordinate : {&x, &y, &z}) {
       sink(coordinate->anchor_um);
       sink(coordinate->offset_m);

@@ -2,7 +2,7 @@
 // One program for every compiler and core: prints "bits: NAME HASH" for each function and filter, first of a short
 // form, then of the whole one. tools/proof/compare_bits compares the lines. An image takes no arguments; whoever has read enough ends
 // the emulator.
-#include "app/node.hpp"
+#include "node/node.hpp"
 #include "attitude.hpp"
 #include "base/selfcheck.hpp"
 #include "config/husky.hpp"
@@ -10,8 +10,8 @@
 #include "config/mrclam.hpp"
 #include "config/rover.hpp"
 #include "filters.hpp"
-#include "hal/port/support/boot_line.hpp"
-#include "hal/port/support/text.hpp"
+#include "hal/chip/support/boot_line.hpp"
+#include "hal/chip/support/text.hpp"
 #include "inertial.hpp"
 #include "recorded_world.hpp"
 
@@ -20,10 +20,10 @@
 #include <new>
 
 #if defined(TETAP_BOARD_ZYNQMP_R5)
-#include "hal/port/zynqmp_r5/board.hpp"
+#include "hal/board/zynqmp_r5/board.hpp"
 using Board = tetap::hal::zynqmp_r5::Board;
 #elif defined(TETAP_BOARD_MPS2)
-#include "hal/port/mps2/board.hpp"
+#include "hal/board/mps2/board.hpp"
 using Board = tetap::hal::mps2::Board;
 #else
 #include <cstdio>
@@ -50,7 +50,7 @@ std::uint32_t recorded(Node& node, std::uint32_t can_base) {
     for (std::uint32_t i = 0; i < tick.frames; ++i) node.on_frame((next++)->frame(can_base));
     node.tick({tick.time_us}, {}, [&](const base::CanFrame& frame) {
       const std::uint32_t offset = frame.id - can_base;
-      if (offset == can::EstVersion::kOffset || offset == can::EstDiagLoop::kOffset) return;
+      if (offset == bus::EstVersion::kOffset || offset == bus::EstDiagLoop::kOffset) return;
       hash(offset);
       for (std::size_t i = 0; i < frame.size; ++i) hash(std::uint32_t{frame.data[i]});
     });
@@ -81,22 +81,22 @@ class Program {
     line("attitude", "", bits::attitude(length.steps));
     line("ins", "", fresh<bits::InsRun>().run(length.steps));
     line("inertial", "", fresh<bits::InertialRun>().run(length.steps));
-    node<robot::rover::Estimators>("rover", robot::rover::numbers, length.steps);
-    node<robot::mrclam::Estimators>("mrclam", robot::mrclam::numbers, length.steps);
-    node<robot::husky::Estimators>("husky", robot::husky::numbers, length.steps);
-    node<robot::labyrinth::Estimators>("labyrinth", robot::labyrinth::numbers, length.steps);
-    auto& rover = fresh<app::Node<robot::rover::Estimators>>(robot::rover::numbers, app::Version{});
-    line("recorded_", "rover", recorded(rover, robot::rover::numbers.can_base));
+    node<robot::rover::Estimators>("rover", robot::rover::parameters, length.steps);
+    node<robot::mrclam::Estimators>("mrclam", robot::mrclam::parameters, length.steps);
+    node<robot::husky::Estimators>("husky", robot::husky::parameters, length.steps);
+    node<robot::labyrinth::Estimators>("labyrinth", robot::labyrinth::parameters, length.steps);
+    auto& rover = fresh<node::Node<robot::rover::Estimators>>(robot::rover::parameters, bus::Version{});
+    line("recorded_", "rover", recorded(rover, robot::rover::parameters.can_base));
     board_.print(hal::Text<>{}.add("bits: end ").add(length.name).add('\n').c_str());
   }
 
  private:
   /// boot_: what a flash image of this robot says of itself at boot.
   template <class Estimators>
-  void node(const char* robot, const app::Numbers& numbers, std::uint32_t steps) {
-    auto& node = fresh<app::Node<Estimators>>(numbers, app::Version{});
-    line("boot_", robot, app::Exercise(node, numbers.can_base, 1).run(hal::kBootEpochs));
-    line("node_", robot, app::Exercise(node, numbers.can_base, 2).run(steps));
+  void node(const char* robot, const param::Parameters& parameters, std::uint32_t steps) {
+    auto& node = fresh<node::Node<Estimators>>(parameters, bus::Version{});
+    line("boot_", robot, node::BootSelfCheck(node, parameters.can_base, 1).run(hal::kBootEpochs));
+    line("node_", robot, node::BootSelfCheck(node, parameters.can_base, 2).run(steps));
   }
   /// One after the other in the same memory: a core that has little holds all of them.
   template <class T, class... Arguments>

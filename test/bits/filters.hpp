@@ -3,8 +3,8 @@
 // every step.
 #pragma once
 
-#include "app/estimators/dead_reckoning.hpp"
-#include "app/exercise.hpp"
+#include "estimators/planar/dead_reckoning.hpp"
+#include "node/boot_self_check.hpp"
 #include "base/selfcheck.hpp"
 #include "config/rover.hpp"
 #include "filter/kalman.hpp"
@@ -24,7 +24,7 @@ namespace tetap::bits {
 /// like; in braces they stand in order.
 struct Chance {
   base::Random random;
-  app::Dice dice{2026};
+  node::Dice dice{2026};
 
   float normal() { return random.normal(); }
   float spread() { return 2.0F * random.uniform() - 1.0F; }
@@ -198,14 +198,14 @@ void hash_vector(base::WordHash& hash, const filter::Vector<float, N>& x) {
 [[nodiscard]] inline std::uint32_t dead_reckoning(std::uint32_t steps) {
   base::WordHash hash;
   Chance chance{.random = base::Random{1, 4}};
-  app::Numbers numbers = robot::rover::numbers;
-  app::DeadReckoning motion;
+  param::Parameters parameters = robot::rover::parameters;
+  estimators::DeadReckoning motion;
   std::int64_t now_us = 0;
-  app::WheelCounts counts;
+  sensor::WheelCounts counts;
   for (std::uint32_t k = 0; k < steps; ++k) {
     if (k % 1000 == 0 || chance.one_in(700)) {
-      numbers.gyro.use = static_cast<std::int32_t>(chance.dice.below(2));
-      numbers.wheels.hold = chance.one_in(2) ? app::Hold::kForward : app::Hold::kBackward;
+      parameters.gyro.use = static_cast<std::int32_t>(chance.dice.below(2));
+      parameters.wheels.hold = chance.one_in(2) ? param::Hold::kForward : param::Hold::kBackward;
       motion = {};
       motion.start({now_us}, model::PlanarPose{.yaw_rad = 3.0F * chance.spread()}, 0.1F, 0.05F);
     }
@@ -215,20 +215,20 @@ void hash_vector(base::WordHash& hash, const filter::Vector<float, N>& x) {
     counts.right = static_cast<std::uint16_t>(counts.right + 30 + chance.dice.below(25));
     switch (chance.dice.below(8)) {
       case 0:
-        motion.fuse(app::WheelSpeeds{.left_mps = chance.spread(), .right_mps = chance.spread()}, stamp, numbers);
+        motion.fuse(sensor::WheelSpeeds{.left_mps = chance.spread(), .right_mps = chance.spread()}, stamp, parameters);
         break;
       case 1:
-        motion.fuse(app::BodySpeed{.forward_mps = chance.spread(), .yaw_rate_radps = chance.spread()}, stamp, numbers);
+        motion.fuse(sensor::BodySpeed{.forward_mps = chance.spread(), .yaw_rate_radps = chance.spread()}, stamp, parameters);
         break;
       default:
-        motion.fuse(counts, stamp, numbers);
+        motion.fuse(counts, stamp, parameters);
         break;
     }
-    motion.fuse(app::ImuSample{.dangle_b_rad = {0.0F, 0.0F, 0.01F * chance.normal()}, .interval_us = 10'000}, stamp,
-                numbers);
+    motion.fuse(sensor::ImuSample{.dangle_b_rad = {0.0F, 0.0F, 0.01F * chance.normal()}, .interval_us = 10'000}, stamp,
+                parameters);
     motion.advance({now_us});
-    motion.each_bit(hash);
-    const app::Estimate ahead = motion.estimate(numbers);
+    motion.hash_state(hash);
+    const estimators::Estimate ahead = motion.estimate(parameters);
     hash(ahead.pose.x.um());
     hash(ahead.pose.y.um());
     hash(ahead.pose.yaw_rad);

@@ -3,7 +3,7 @@
 // models, and the estimator with samples that come late; raw bits hashed at every step.
 #pragma once
 
-#include "app/history.hpp"
+#include "node/fusion_window.hpp"
 #include "base/selfcheck.hpp"
 #include "config/rover.hpp"
 #include "filters.hpp"
@@ -154,10 +154,10 @@ class InsRun {
 class InertialRun {
  public:
   [[nodiscard]] std::uint32_t run(std::uint32_t steps) {
-    const app::GnssNumbers& g = kNumbers.gnss;
-    site_ = {};
-    site_.frame = nav::LocalFrame(g.origin_latitude_2ndeg, g.origin_longitude_2ndeg, g.origin_height_m);
-    site_.origin = can::OriginSource::kConfigured;
+    const param::GnssParameters& g = kNumbers.gnss;
+    map_frame_ = {};
+    map_frame_.frame = nav::LocalFrame(g.origin_latitude_2ndeg, g.origin_longitude_2ndeg, g.origin_height_m);
+    map_frame_.origin = sensor::OriginSource::kConfigured;
     now_ = {1'000'000};
     history_.power_on(now_, context());
     for (std::uint32_t k = 0; k < steps; ++k) {
@@ -166,42 +166,42 @@ class InertialRun {
       if (k % 2000 == 0 || chance_.one_in(1500)) restart();
       feed();
       static_cast<void>(history_.consume(
-          now_, context(), [](const app::Sample&) {}, noting()));
+          now_, context(), [](const sensor::Sample&) {}, noting()));
       history_.advance(now_, context());
       history_.each_lane([&](const auto& lane) {
-        const app::Estimate e = lane.estimate(context());
+        const estimators::Estimate e = lane.estimate(context());
         hash_(e.pose.x.um());
         hash_(e.pose.y.um());
         hash_(e.pose.yaw_rad);
         for (const float v : e.p.packed()) hash_(v);
         if constexpr (requires { lane.inertial(context()); }) {
-          const app::InertialEstimate full = lane.inertial(context());
+          const estimators::InertialEstimate full = lane.inertial(context());
           hash_state(hash_, full.state);
           for (const float v : full.p.packed()) hash_(v);
           filter::unroll<0, nav::InsState::kErrors>([&](auto i) { hash_(full.template covariance<i>()); });
-          const app::MotionVariance motion = lane.motion_variance(context());
+          const estimators::MotionVariance motion = lane.motion_variance(context());
           hash_(motion.forward_m2ps2);
           hash_(motion.yaw_rate_rad2ps2);
         }
       });
-      history_.each_bit(hash_);
+      history_.hash_state(hash_);
       history_.retire_until(now_ - base::Micros{kNumbers.loop.window_us}, context(), noting());
     }
     return hash_.value();
   }
 
  private:
-  static constexpr app::Numbers kNumbers = [] {
-    app::Numbers n = robot::rover::numbers;
+  static constexpr param::Parameters kNumbers = [] {
+    param::Parameters n = robot::rover::parameters;
     n.gnss.antenna_x_b_m = 0.3F;
     n.gnss.antenna_z_b_m = 0.8F;
     return n;
   }();
 
-  [[nodiscard]] app::Context context() const { return {.numbers = kNumbers, .site = site_}; }
+  [[nodiscard]] estimators::Context context() const { return {.parameters = kNumbers, .map_frame = map_frame_}; }
   struct Noting {
     base::WordHash& hash;
-    void operator()(std::size_t, const app::Sample& sample, const app::Innovation& record) const {
+    void operator()(std::size_t, const sensor::Sample& sample, const estimators::Innovation& record) const {
       hash(static_cast<std::uint32_t>(sample.sensor) << 8 | static_cast<std::uint32_t>(record.verdict));
       hash(record.nis);
     }
@@ -212,30 +212,30 @@ class InertialRun {
     history_.close_window(now_, context(), noting());
     history_.restart(now_, context());
     if (chance_.one_in(3)) return;  // then it finds place and heading by itself
-    const app::SetPose pose{.pose = {.yaw_rad = chance_.spread()}, .sigma_position_m = 0.5F, .sigma_yaw_rad = 0.1F};
+    const estimators::SetPose pose{.pose = {.yaw_rad = chance_.spread()}, .sigma_position_m = 0.5F, .sigma_yaw_rad = 0.1F};
     history_.each_lane([&](auto& lane) { lane.set_pose(now_, pose, context()); });
   }
   /// Mostly since the last tick; now and then late, or too late.
-  [[nodiscard]] app::Sample fresh(can::Sensor sensor) {
+  [[nodiscard]] sensor::Sample fresh(sensor::Sensor sensor) {
     std::int64_t back_us = chance_.dice.below(10'000);
     if (chance_.one_in(10)) back_us += chance_.dice.below(150'000);
     if (chance_.one_in(300)) back_us += 300'000;
-    app::Sample sample;
+    sensor::Sample sample;
     sample.stamp = now_ - base::Micros{back_us};
     sample.sensor = sensor;
     sample.sequence = static_cast<std::uint8_t>(step_ & 15);
     sample.bits = chance_.dice.roll();
     return sample;
   }
-  void offer(const app::Sample& sample) {
+  void offer(const sensor::Sample& sample) {
     if (chance_.one_in(100) || sample.stamp <= history_.closed_until()) return;
     hash_(static_cast<std::uint32_t>(history_.insert(sample, context(), noting())));
   }
   void feed() {
-    using can::Sensor;
+    using sensor::Sensor;
     const nav::Vector3 angle = noises(chance_, 2e-4F), push = noises(chance_, 2e-3F);
     const float turn = (step_ / 500) % 2 == 0 ? 2e-3F : 0.0F;
-    app::Sample imu = fresh(Sensor::kImu);
+    sensor::Sample imu = fresh(Sensor::kImu);
     imu.stamp = now_ - base::Micros{chance_.one_in(20) ? 30'000 : 2'000};
     imu.payload.imu = {.dangle_b_rad = {angle(0), angle(1), turn + angle(2)},
                        .dvelocity_b_mps = {push(0), push(1) + 100.0F * turn * 0.01F, 0.0981F + push(2)},
@@ -246,12 +246,12 @@ class InertialRun {
       left_ = static_cast<std::uint16_t>(left_ + 30 + chance_.dice.below(5));
       right_ = static_cast<std::uint16_t>(right_ + 31 + chance_.dice.below(5));
     }
-    app::Sample wheels = fresh(Sensor::kWheelCounts);
+    sensor::Sample wheels = fresh(Sensor::kWheelCounts);
     wheels.payload.counts = {.left = left_, .right = right_};
     offer(wheels);
     if (step_ % 20 != 7) return;
     const nav::Vector3 off = noises(chance_, 1.0F);
-    app::Sample fix = fresh(Sensor::kGnssPosition);
+    sensor::Sample fix = fresh(Sensor::kGnssPosition);
     fix.payload.gnss_position = {
         .latitude_2ndeg = kNumbers.gnss.origin_latitude_2ndeg + static_cast<std::int32_t>(4'500.0F * off(0)),
         .longitude_2ndeg = kNumbers.gnss.origin_longitude_2ndeg + static_cast<std::int32_t>(6'700.0F * off(1)) +
@@ -259,17 +259,17 @@ class InertialRun {
         .height_m = chance_.one_in(10) ? base::kNan : 520.0F + off(2),
         .horizontal_acc_m = chance_.one_in(10) ? 0.02F : 1.0F,
         .vertical_acc_m = 2.0F,
-        .fix = chance_.one_in(30) ? app::GnssFix::kNone : app::GnssFix::k3d};
+        .fix = chance_.one_in(30) ? sensor::GnssFix::kNone : sensor::GnssFix::k3d};
     offer(fix);
-    app::Sample velocity = fresh(Sensor::kGnssVelocity);
+    sensor::Sample velocity = fresh(Sensor::kGnssVelocity);
     velocity.payload.gnss_velocity = {.v_n_mps = {1.0F + 0.1F * off(1), 0.1F * off(2), 0.1F * off(0)}, .acc_mps = 0.2F};
     offer(velocity);
   }
 
   base::WordHash hash_;
   Chance chance_{.random = base::Random{1, 8}};
-  app::History<app::Estimators<robot::rover::Inertial>, 96> history_;
-  app::Site site_;
+  node::FusionWindow<node::Estimators<robot::rover::Inertial>, 96> history_;
+  estimators::MapFrame map_frame_;
   base::Micros now_;
   std::uint32_t step_ = 0;
   std::uint16_t left_ = 0, right_ = 0;

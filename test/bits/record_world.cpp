@@ -14,7 +14,7 @@ using namespace tetap;
 void record(const char* name, int imu_hz, std::int64_t seconds) {
   constexpr std::uint32_t kBase = 0x300;
   sim::World::Options options;
-  options.numbers.imu.rate_hz = imu_hz;
+  options.parameters.imu.rate_hz = imu_hz;
   sim::WorldSource source(sim::World(options, 1), kBase, base::Micros{10'000}, base::Micros{seconds * 1'000'000});
   std::string frames, ticks;
   char text[80];

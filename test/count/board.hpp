@@ -3,9 +3,9 @@
 #pragma once
 
 #if defined(TETAP_BOARD_ZYNQMP_R5)
-#include "hal/port/zynqmp_r5/board.hpp"
+#include "hal/board/zynqmp_r5/board.hpp"
 using Board = tetap::hal::zynqmp_r5::Board;
 #else
-#include "hal/port/mps2/board.hpp"
+#include "hal/board/mps2/board.hpp"
 using Board = tetap::hal::mps2::Board;
 #endif

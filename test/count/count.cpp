@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The workloads whose instructions tools/proof/count_instructions counts and tools/budgets.json bounds. Inputs are arrays made beforehand;
 // what is between the markers are calls of headers that the firmware is made of.
-#include "app/node.hpp"
+#include "node/node.hpp"
 #include "base/random.hpp"
 #include "board.hpp"
 #include "config/rover.hpp"
@@ -111,19 +111,19 @@ void planar() {
 
 /// Odometry: counts and a gyroscope, as the rover has them.
 void dead_reckoning() {
-  static std::array<app::WheelCounts, kSteps> counts;
-  static std::array<app::ImuSample, kSteps> imu;
+  static std::array<sensor::WheelCounts, kSteps> counts;
+  static std::array<sensor::ImuSample, kSteps> imu;
   Noise noise;
-  app::WheelCounts now;
+  sensor::WheelCounts now;
   for (std::size_t k = 0; k < kSteps; ++k) {
     now.left = static_cast<std::uint16_t>(now.left + 32 + static_cast<std::int32_t>(4.0F * noise.uniform()));
     now.right = static_cast<std::uint16_t>(now.right + 33 + static_cast<std::int32_t>(4.0F * noise.uniform()));
     counts[k] = now;
     imu[k] = {.dangle_b_rad = {0.0F, 0.0F, 0.003F + 1e-4F * noise()}, .interval_us = 10'000};
   }
-  app::Numbers by_wheels = robot::rover::numbers;
+  param::Parameters by_wheels = robot::rover::parameters;
   by_wheels.gyro.use = 0;
-  app::DeadReckoning motion;
+  estimators::DeadReckoning motion;
   motion.start({1'000'000}, {}, 0.1F, 0.05F);
   for (std::size_t k = 0; k < kSteps; ++k) {
     const Region<struct dead_reckoning_counts> region;
@@ -134,9 +134,9 @@ void dead_reckoning() {
   motion.start({1'000'000}, {}, 0.1F, 0.05F);
   for (std::size_t k = 0; k < kSteps; ++k) {
     const base::Micros stamp{1'010'000 + 10'000 * static_cast<std::int64_t>(k)};
-    motion.fuse(counts[k], stamp, robot::rover::numbers);
+    motion.fuse(counts[k], stamp, robot::rover::parameters);
     const Region<struct dead_reckoning_gyro> region;
-    motion.fuse(imu[k], stamp + base::Micros{5'000}, robot::rover::numbers);
+    motion.fuse(imu[k], stamp + base::Micros{5'000}, robot::rover::parameters);
   }
   opaque(motion);
 }
@@ -269,8 +269,8 @@ void functions() {
 
 /// The rover's node on 20 s of the simulated world: the tick, one input frame, and both together.
 void whole_node() {
-  static app::Node<robot::rover::Estimators> node{robot::rover::numbers, {}};
-  const std::uint32_t can_base = robot::rover::numbers.can_base;
+  static node::Node<robot::rover::Estimators> node{robot::rover::parameters, {}};
+  const std::uint32_t can_base = robot::rover::parameters.can_base;
   node.power_on({bits::kRecordedBegin_us});
   base::CanFrame last;
   const bits::RecordedFrame* next = bits::kRecordedFrames;

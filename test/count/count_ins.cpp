@@ -14,8 +14,8 @@ using namespace tetap;
 using count::opaque;
 using count::Region;
 
-constexpr app::Numbers kNumbers = [] {
-  app::Numbers n = robot::rover::numbers;
+constexpr param::Parameters kNumbers = [] {
+  param::Parameters n = robot::rover::parameters;
   n.gnss.antenna_x_b_m = 0.3F;
   n.gnss.antenna_z_b_m = 0.8F;
   return n;
@@ -25,7 +25,7 @@ constexpr app::Numbers kNumbers = [] {
 
 int main() {
   static Board board;
-  static count::Navigator<app::Inertial> navigator{kNumbers};
+  static count::Navigator<estimators::Inertial> navigator{kNumbers};
   count::calibrate();
   navigator.begin({bits::kFastBegin_us});
   const bits::RecordedFrame* next = bits::kFastFrames;
@@ -35,7 +35,7 @@ int main() {
     navigator.tick({tick.time_us});
   }
   opaque(navigator);
-  using can::Sensor;
+  using sensor::Sensor;
   if (!navigator.valid() || navigator.accepted(Sensor::kImu) < 2'000 ||
       navigator.accepted(Sensor::kWheelCounts) < 800 || navigator.accepted(Sensor::kGnssPosition) < 40) {
     board.print("count: the recorded world was not navigated\n");

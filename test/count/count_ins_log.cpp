@@ -4,7 +4,7 @@
 #include "config/car.hpp"
 #include "config/iris.hpp"
 #include "config/rover.hpp"
-#include "hal/port/mps2/board.hpp"
+#include "hal/board/mps2/board.hpp"
 #include "markers.hpp"
 #include "navigator.hpp"
 
@@ -16,17 +16,17 @@ using namespace tetap;
 
 /// True when the whole log was read and navigated.
 template <class Workload>
-[[gnu::noinline]] bool count_ticks(hal::mps2::Board& board, const app::Numbers& numbers) {
-  static count::Navigator<app::Inertial> navigator{numbers};
-  const std::uint32_t sync_id = numbers.can_base + can::InSync::kOffset;
+[[gnu::noinline]] bool count_ticks(hal::mps2::Board& board, const param::Parameters& parameters) {
+  static count::Navigator<estimators::Inertial> navigator{parameters};
+  const std::uint32_t sync_id = parameters.can_base + bus::InSync::kOffset;
   while (const auto frame = board.can.receive()) {
-    const auto sync = frame->id == sync_id ? can::decode<can::InSync>(can::payload(*frame)) : std::nullopt;
+    const auto sync = frame->id == sync_id ? bus::decode<bus::InSync>(bus::payload(*frame)) : std::nullopt;
     if (!sync) {
       navigator.on_frame(*frame);
       continue;
     }
     const base::Micros time{static_cast<std::int64_t>(sync->time_us)};
-    if (sync->kind == can::SyncKind::kBegin) {
+    if (sync->kind == bus::SyncKind::kBegin) {
       navigator.begin(time);
     } else {
       const count::Region<Workload> region;
@@ -35,7 +35,7 @@ template <class Workload>
   }
   count::opaque(navigator);
   return board.can.faults().rx_overflow == 0 && navigator.valid() &&
-         navigator.accepted(can::Sensor::kGnssPosition) > 10;
+         navigator.accepted(sensor::Sensor::kGnssPosition) > 10;
 }
 
 }  // namespace
@@ -50,9 +50,9 @@ int main() {
   }
   count::calibrate();
   const std::string_view robot = words[1];
-  const bool navigated = robot == "rover" ? count_ticks<struct ins_tick_rover>(board, robot::rover::numbers)
-                         : robot == "car" ? count_ticks<struct ins_tick_car>(board, robot::car::numbers)
-                                          : count_ticks<struct ins_tick_iris>(board, robot::iris::numbers);
+  const bool navigated = robot == "rover" ? count_ticks<struct ins_tick_rover>(board, robot::rover::parameters)
+                         : robot == "car" ? count_ticks<struct ins_tick_car>(board, robot::car::parameters)
+                                          : count_ticks<struct ins_tick_iris>(board, robot::iris::parameters);
   if (!navigated) {
     board.print("count_ins_log: the log was not navigated\n");
     return 1;

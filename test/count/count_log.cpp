@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Instructions of every tick of a MRCLAM robot's node over a recorded log: IN.log, a candump log with sync frames, is
 // the argument.
-#include "app/node.hpp"
+#include "node/node.hpp"
 #include "config/mrclam.hpp"
-#include "hal/port/mps2/board.hpp"
+#include "hal/board/mps2/board.hpp"
 #include "markers.hpp"
 
 int main() {
@@ -15,19 +15,19 @@ int main() {
     board.print("count_log: cannot open the log\n");
     return 1;
   }
-  static app::Node<robot::mrclam::Estimators> node{robot::mrclam::numbers, {}};
-  const std::uint32_t sync_id = robot::mrclam::numbers.can_base + can::InSync::kOffset;
+  static node::Node<robot::mrclam::Estimators> node{robot::mrclam::parameters, {}};
+  const std::uint32_t sync_id = robot::mrclam::parameters.can_base + bus::InSync::kOffset;
   count::calibrate();
   base::CanFrame last;
   while (const auto frame = board.can.receive()) {
-    const auto sync = frame->id == sync_id ? can::decode<can::InSync>(can::payload(*frame)) : std::nullopt;
+    const auto sync = frame->id == sync_id ? bus::decode<bus::InSync>(bus::payload(*frame)) : std::nullopt;
     if (!sync) {
       const count::Region<struct mrclam_frame> region;
       node.on_frame(*frame);
       continue;
     }
     const base::Micros time{static_cast<std::int64_t>(sync->time_us)};
-    if (sync->kind == can::SyncKind::kBegin) {
+    if (sync->kind == bus::SyncKind::kBegin) {
       node.power_on(time);
     } else {
       const count::Region<struct mrclam_tick> region;

@@ -196,15 +196,15 @@ TEST(Attitude, does_not_care_about_the_unit_of_the_magnetometer) {
 
 TEST(Attitude, keeps_inclination_and_bias_free_of_whatever_the_magnetometer_says) {
   std::vector<Sample> samples = recorded(30.0);
-  Attitude with, without;
+  Attitude ctx, without;
   std::mt19937 engine(3);
   std::normal_distribution<float> normal;
   for (const Sample& s : samples) {
-    static_cast<void>(with.step(s.rate, s.force, kDt_s));
-    with.magnetometer({normal(engine), normal(engine), normal(engine)}, kDt_s);
+    static_cast<void>(ctx.step(s.rate, s.force, kDt_s));
+    ctx.magnetometer({normal(engine), normal(engine), normal(engine)}, kDt_s);
     static_cast<void>(without.step(s.rate, s.force, kDt_s));
-    ASSERT_EQ(base::bits(with.bias_b_radps()(0)), base::bits(without.bias_b_radps()(0)));
-    ASSERT_LT(inclination_deg(wide(with.q_nb()), wide(without.q_nb())), 1e-4);
+    ASSERT_EQ(base::bits(ctx.bias_b_radps()(0)), base::bits(without.bias_b_radps()(0)));
+    ASSERT_LT(inclination_deg(wide(ctx.q_nb()), wide(without.q_nb())), 1e-4);
   }
 }
 

@@ -2,7 +2,7 @@
 // libFuzzer: bytes become frames and ticks for the rover's node and, a second time, for the whole firmware on a made-up
 // board. It must not crash or do anything undefined; every frame sent decodes; the state stays finite; and a node that
 // is powered on again answers as a new one does, whatever it went through before.
-#include "app/firmware.hpp"
+#include "node/firmware.hpp"
 #include "config/rover.hpp"
 
 #include <array>
@@ -19,8 +19,8 @@ namespace tetap {
 namespace {
 
 using robot::rover::Estimators;
-using robot::rover::numbers;
-using Node = app::Node<Estimators>;
+using robot::rover::parameters;
+using Node = node::Node<Estimators>;
 
 [[noreturn]] void fail(const char* what, const base::CanFrame& frame) {
   std::fprintf(stderr, "fuzz_frames: %s: %03X#", what, static_cast<unsigned>(frame.id));
@@ -50,11 +50,11 @@ struct Record {
   }
   [[nodiscard]] base::CanFrame frame() const {
     const auto offset = static_cast<std::uint8_t>(kind() & 0x3F);
-    base::CanFrame f{.id = numbers.can_base + offset,
+    base::CanFrame f{.id = parameters.can_base + offset,
                      .extended = (bytes[1] & 0x40) != 0,
                      .size = static_cast<std::uint8_t>(bytes[1] & 0x0F)};
     std::memcpy(f.data.data(), bytes + 2, f.data.size());
-    if ((bytes[1] & 0x80) != 0) f.data[0] = can::e2e_crc(offset, f.data);
+    if ((bytes[1] & 0x80) != 0) f.data[0] = bus::e2e_crc(offset, f.data);
     return f;
   }
 };
@@ -70,50 +70,50 @@ std::vector<Record> records_of(std::span<const std::uint8_t> bytes) {
 
 template <class... Messages>
 bool one_of(std::span<const std::uint8_t> payload) {
-  return (can::decode<Messages>(payload).has_value() || ...);
+  return (bus::decode<Messages>(payload).has_value() || ...);
 }
 
 bool decodes(std::uint32_t offset, std::span<const std::uint8_t> p) {
-  constexpr std::uint32_t kFirst = can::EstPos::kOffset, kStride = can::EstPos::kStride;
-  if (offset >= kFirst && offset < kFirst + kStride * can::EstPos::kCount) {
+  constexpr std::uint32_t kFirst = bus::EstPos::kOffset, kStride = bus::EstPos::kStride;
+  if (offset >= kFirst && offset < kFirst + kStride * bus::EstPos::kCount) {
     switch ((offset - kFirst) % kStride + kFirst) {
-      case can::EstPos::kOffset:
-        return one_of<can::EstPos>(p);
-      case can::EstMotion::kOffset:
-        return one_of<can::EstMotion>(p);
-      case can::EstStdPose::kOffset:
-        return one_of<can::EstStdPose, can::EstStdMore>(p);
-      case can::EstAtt::kOffset:
-        return one_of<can::EstAtt>(p);
-      case can::EstVel::kOffset:
-        return one_of<can::EstVel>(p);
-      case can::EstStateHeight::kOffset:
-        return one_of<can::EstStateHeight, can::EstStateAccBias, can::EstStateGyroBias, can::EstStateStdVel,
-                      can::EstStateStdTilt, can::EstStateStdAccBias, can::EstStateStdGyroBias, can::EstStateJump,
-                      can::EstStateDisagreement, can::EstStateImuHealth, can::EstStateCorrPos, can::EstStateCorrVel,
-                      can::EstStateCorrTilt, can::EstStateCorrAccBias, can::EstStateCorrGyroBias>(p);
+      case bus::EstPos::kOffset:
+        return one_of<bus::EstPos>(p);
+      case bus::EstMotion::kOffset:
+        return one_of<bus::EstMotion>(p);
+      case bus::EstStdPose::kOffset:
+        return one_of<bus::EstStdPose, bus::EstStdMore>(p);
+      case bus::EstAtt::kOffset:
+        return one_of<bus::EstAtt>(p);
+      case bus::EstVel::kOffset:
+        return one_of<bus::EstVel>(p);
+      case bus::EstStateHeight::kOffset:
+        return one_of<bus::EstStateHeight, bus::EstStateAccBias, bus::EstStateGyroBias, bus::EstStateStdVel,
+                      bus::EstStateStdTilt, bus::EstStateStdAccBias, bus::EstStateStdGyroBias, bus::EstStateJump,
+                      bus::EstStateDisagreement, bus::EstStateImuHealth, bus::EstStateCorrPos, bus::EstStateCorrVel,
+                      bus::EstStateCorrTilt, bus::EstStateCorrAccBias, bus::EstStateCorrGyroBias>(p);
       default:
         return false;
     }
   }
   switch (offset) {
-    case can::EstEpoch::kOffset:
-      return one_of<can::EstEpoch>(p);
-    case can::EstStateCrc::kOffset:
-      return one_of<can::EstStateCrc>(p);
-    case can::EstStatus::kOffset:
-      return one_of<can::EstStatus>(p) && can::e2e_valid(can::EstStatus::kOffset, p);
-    case can::EstInnov::kOffset:
-      return one_of<can::EstInnov>(p);
-    case can::EstSensorStat::kOffset:
-      return one_of<can::EstSensorStat>(p);
-    case can::EstDiagLoop::kOffset:
-      return one_of<can::EstDiagLoop, can::EstDiagTicks, can::EstDiagQueues, can::EstDiagOrder, can::EstDiagFrames,
-                    can::EstDiagBus, can::EstDiagRefused, can::EstDiagCapacity>(p);
-    case can::EstVersion::kOffset:
-      return one_of<can::EstVersion>(p);
-    case can::EstOriginLat::kOffset:
-      return one_of<can::EstOriginLat, can::EstOriginLon, can::EstOriginHeight>(p);
+    case bus::EstEpoch::kOffset:
+      return one_of<bus::EstEpoch>(p);
+    case bus::EstStateCrc::kOffset:
+      return one_of<bus::EstStateCrc>(p);
+    case bus::EstStatus::kOffset:
+      return one_of<bus::EstStatus>(p) && bus::e2e_valid(bus::EstStatus::kOffset, p);
+    case bus::EstInnov::kOffset:
+      return one_of<bus::EstInnov>(p);
+    case bus::EstSensorStat::kOffset:
+      return one_of<bus::EstSensorStat>(p);
+    case bus::EstDiagLoop::kOffset:
+      return one_of<bus::EstDiagLoop, bus::EstDiagTicks, bus::EstDiagQueues, bus::EstDiagOrder, bus::EstDiagFrames,
+                    bus::EstDiagBus, bus::EstDiagRefused, bus::EstDiagCapacity>(p);
+    case bus::EstVersion::kOffset:
+      return one_of<bus::EstVersion>(p);
+    case bus::EstOriginLat::kOffset:
+      return one_of<bus::EstOriginLat, bus::EstOriginLon, bus::EstOriginHeight>(p);
     default:
       return false;
   }
@@ -123,17 +123,17 @@ bool decodes(std::uint32_t offset, std::span<const std::uint8_t> p) {
 class Listener {
  public:
   void operator()(const base::CanFrame& frame) {
-    const std::uint32_t offset = frame.id - numbers.can_base;
-    const auto payload = can::payload(frame);
+    const std::uint32_t offset = frame.id - parameters.can_base;
+    const auto payload = bus::payload(frame);
     if (frame.extended || frame.id < numbers.can_base || !decodes(offset, payload))
       fail("sent, but not decodable", frame);
     ++in_epoch_;
-    if (offset == can::EstEpoch::kOffset) in_epoch_ = 1;
-    if (offset == can::EstStatus::kOffset) {
-      const auto status = can::decode<can::EstStatus>(payload);
-      if (status->reset_cause == can::ResetCause::kNotFinite) fail("the state was not finite", frame);
+    if (offset == bus::EstEpoch::kOffset) in_epoch_ = 1;
+    if (offset == bus::EstStatus::kOffset) {
+      const auto status = bus::decode<bus::EstStatus>(payload);
+      if (status->reset_cause == sensor::ResetCause::kNotFinite) fail("the state was not finite", frame);
     }
-    if (offset == can::EstStateCrc::kOffset && can::decode<can::EstStateCrc>(payload)->frames != in_epoch_)
+    if (offset == bus::EstStateCrc::kOffset && bus::decode<bus::EstStateCrc>(payload)->frames != in_epoch_)
       fail("the epoch's frames are not as many as it says", frame);
     sent.push_back(frame);
   }
@@ -150,7 +150,7 @@ void run_node(Node& node, const std::vector<Record>& records, Listener& listener
     if (record.is_tick()) {
       now = record.time(now);
       node.tick(now, {}, [&listener](const base::CanFrame& frame) { listener(frame); });
-    } else if ((record.kind() & 0x3F) != can::InSync::kOffset && (record.kind() & 0x20) == 0) {
+    } else if ((record.kind() & 0x3F) != bus::InSync::kOffset && (record.kind() & 0x20) == 0) {
       node.on_frame(record.frame());  // what Firmware hands on
     }
   }
@@ -181,7 +181,7 @@ struct MadeUpBoard {
 
 void run_firmware(const std::vector<Record>& records) {
   MadeUpBoard board;
-  const auto firmware = std::make_unique<app::Firmware<MadeUpBoard, Estimators>>(board, numbers, app::Version{});
+  const auto firmware = std::make_unique<node::Firmware<MadeUpBoard, Estimators>>(board, parameters, bus::Version{});
   for (const Record& record : records) {
     if (!record.is_tick()) {
       base::CanFrame frame = record.frame();
@@ -204,7 +204,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   // One node in memory that was never cleared, so a member that is read before it is written shows as a difference.
   alignas(Node) static std::array<std::byte, sizeof(Node)> memory;
   memory.fill(std::byte{0xA5});
-  Node& node = *new (memory.data()) Node(numbers, app::Version{});
+  Node& node = *new (memory.data()) Node(parameters, bus::Version{});
   Listener fresh, again;
   run_node(node, records, fresh);
   run_node(node, records, again);

@@ -47,7 +47,7 @@ void record(const Report& r, Words& out) {
     fail("a place that is not on Earth");
   if (r.utc.date_valid && !is_date(r.utc.year, r.utc.month, r.utc.day)) fail("a date that does not exist");
   if (r.utc.time_valid && !is_time(r.utc.hour, r.utc.minute, r.utc.second)) fail("a time that does not exist");
-  if (const auto p = position_of(r); p && p->fix < app::GnssFix::k2d) fail("a position without a fix");
+  if (const auto p = position_of(r); p && p->fix < sensor::GnssFix::k2d) fail("a position without a fix");
   static_cast<void>(velocity_of(r));
 }
 

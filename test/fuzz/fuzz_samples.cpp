@@ -2,11 +2,11 @@
 // libFuzzer: bytes become samples of every sensor with fields of any value, late, early and out of order, for a node
 // with inertial navigation, the attitude filter and odometry; between them a robot that drives on. What is plausible
 // goes in; no estimator may leave the numbers for it, and the node answers the same a second time.
-#include "app/estimators/attitude.hpp"
-#include "app/estimators/inertial.hpp"
-#include "app/estimators/odometry.hpp"
-#include "app/outlet.hpp"
-#include "app/plausible.hpp"
+#include "estimators/attitude.hpp"
+#include "estimators/inertial/inertial.hpp"
+#include "estimators/odometry.hpp"
+#include "bus/frame_sink.hpp"
+#include "sensor/plausibility.hpp"
 #include "config/rover.hpp"
 
 #include <array>
@@ -19,11 +19,11 @@
 namespace tetap {
 namespace {
 
-using Node = app::Node<app::Estimators<app::Odometry, app::Attitude, app::Inertial>>;
-using can::Sensor;
+using Node = node::Node<node::Estimators<estimators::Odometry, estimators::Attitude, estimators::Inertial>>;
+using sensor::Sensor;
 
-constexpr app::Numbers kNumbers = [] {
-  app::Numbers n = robot::rover::numbers;
+constexpr param::Parameters kNumbers = [] {
+  param::Parameters n = robot::rover::parameters;
   n.magnetic.use = n.baro.use = 1;
   n.inertial.level_s = 0.1F;  // a short input has to get somewhere
   n.gnss.antenna_x_b_m = 0.3F;
@@ -76,7 +76,7 @@ class Run {
                         .sigma_yaw_rad = 2e-4F * base::abs(number(b, 3)),
                         .counter = b[1]});
       } else if (kind == 12) {
-        node_.reset(static_cast<can::ResetWhat>(b[1] % 3));
+        node_.reset(static_cast<bus::ResetWhat>(b[1] % 3));
       } else if (kind == 13) {
         now_ += base::Micros{1000 * std::int64_t{word(b, 2)}};
         tick();
@@ -97,7 +97,7 @@ class Run {
   }
 
   void sample(Sensor sensor, const std::uint8_t* b) {
-    app::Sample s;
+    sensor::Sample s;
     s.stamp = now_ + base::Micros{10 * std::int64_t{word(b, 2)}};
     s.sensor = sensor;
     s.instance = static_cast<std::uint8_t>(b[0] >> 6);
@@ -132,7 +132,7 @@ class Run {
                            .height_m = 520.0F + value(2, 0.1F),
                            .horizontal_acc_m = base::abs(value(3, 0.01F)),
                            .vertical_acc_m = base::abs(value(4, 0.01F)),
-                           .fix = app::GnssFix::k3d};
+                           .fix = sensor::GnssFix::k3d};
         break;
       case Sensor::kGnssVelocity:
         p.gnss_velocity = {.v_n_mps = {value(0, 1e-2F), value(1, 1e-2F), value(2, 1e-2F)},
@@ -153,18 +153,18 @@ class Run {
       case Sensor::kNotAvailable:
         return;
     }
-    if (app::plausible(s)) node_.sample(s);
+    if (sensor::plausible(s)) node_.sample(s);
   }
   /// Ten milliseconds of a good IMU and good wheels.
   void drive_on() {
     now_ += base::Micros{10'000};
-    app::Sample imu;
+    sensor::Sample imu;
     imu.stamp = now_ - base::Micros{1'000};
     imu.sensor = Sensor::kImu;
     imu.payload.imu = {.dangle_b_rad = {0, 0, 0.001F}, .dvelocity_b_mps = {0, 0.01F, 0.0981F}, .interval_us = 10'000};
     node_.sample(imu);
     counts_ = static_cast<std::uint16_t>(counts_ + 32);
-    app::Sample wheels;
+    sensor::Sample wheels;
     wheels.stamp = now_ - base::Micros{2'000};
     wheels.sensor = Sensor::kWheelCounts;
     wheels.payload.counts = {.left = counts_, .right = counts_};
@@ -175,16 +175,16 @@ class Run {
     ++ticks_;
     node_.tick(now_, {}, [this](const base::CanFrame& frame) {
       hash_(frame);
-      if (frame.id != kNumbers.can_base + can::EstStatus::kOffset) return;
-      const auto status = can::decode<can::EstStatus>(can::payload(frame));
+      if (frame.id != kNumbers.can_base + bus::EstStatus::kOffset) return;
+      const auto status = bus::decode<bus::EstStatus>(bus::payload(frame));
       if (!status) fail("a status that does not decode", record_);
-      if (status->reset_cause == can::ResetCause::kNotFinite) fail("the state was not finite", record_);
-      if (status->reset_cause == can::ResetCause::kNotPositive) fail("a covariance was none", record_);
+      if (status->reset_cause == sensor::ResetCause::kNotFinite) fail("the state was not finite", record_);
+      if (status->reset_cause == sensor::ResetCause::kNotPositive) fail("a covariance was none", record_);
     });
   }
 
   Node& node_;
-  app::FrameHash hash_{kNumbers.can_base};
+  bus::FrameHash hash_{kNumbers.can_base};
   base::Micros now_{1'000'000};
   std::uint16_t counts_ = 0;
   std::size_t record_ = 0;
@@ -196,7 +196,7 @@ class Run {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace tetap;
-  static Node node(kNumbers, app::Version{});
+  static Node node(kNumbers, bus::Version{});
   const std::uint32_t first = Run(node).over({data, size});
   const bool again = size % 4 == 0;
   if (again && Run(node).over({data, size}) != first) fail("another answer the second time", size / kRecord);

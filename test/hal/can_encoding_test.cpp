@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "hal/port/zynqmp_r5/can_encoding.hpp"
+#include "hal/chip/zynqmp/can_encoding.hpp"
 
 #include <gtest/gtest.h>
 #include <linux/can.h>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The integer sum of doubles against the host's own adder.
 
-#include "hal/port/support/double_sum.hpp"
+#include "hal/chip/support/double_sum.hpp"
 
 #include <gtest/gtest.h>
 

@@ -4,7 +4,7 @@
 // words into the receive FIFO.
 #pragma once
 
-#include "hal/port/zynqmp_r5/can_encoding.hpp"
+#include "hal/chip/zynqmp/can_encoding.hpp"
 
 #include <cstdint>
 #include <deque>

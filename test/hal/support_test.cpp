@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "hal/port/mps2/candump_line.hpp"
-#include "hal/port/support/text.hpp"
+#include "hal/board/mps2/candump_line.hpp"
+#include "hal/chip/support/text.hpp"
 
 #include <gtest/gtest.h>
 

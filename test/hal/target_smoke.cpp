@@ -3,10 +3,10 @@
 // identifier + 1, and on a frame with identifier 7F0 reports the clock, the stack and the counters. Run by
 // r5_echo_test.sh and mps2_smoke_test.sh.
 #if defined(TETAP_BOARD_ZYNQMP_R5)
-#include "hal/port/zynqmp_r5/board.hpp"
+#include "hal/board/zynqmp_r5/board.hpp"
 using tetap::hal::zynqmp_r5::Board;
 #else
-#include "hal/port/mps2/board.hpp"
+#include "hal/board/mps2/board.hpp"
 using tetap::hal::mps2::Board;
 #endif
 

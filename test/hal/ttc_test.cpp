@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "hal/port/zynqmp_r5/ttc.hpp"
+#include "hal/chip/zynqmp/ttc.hpp"
 
 #include <gtest/gtest.h>
 

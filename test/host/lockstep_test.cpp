@@ -55,7 +55,7 @@ Outcome run(Sabotage sabotage = {}, std::size_t window = 8, Script script = regu
 
 bool is_input(const base::CanFrame& f) { return f.id == 0x308; }
 bool is_step(const base::CanFrame& f) {
-  return f.id == 0x300 && f.data[7] == static_cast<std::uint8_t>(can::SyncKind::kStep);
+  return f.id == 0x300 && f.data[7] == static_cast<std::uint8_t>(bus::SyncKind::kStep);
 }
 
 class Window : public testing::TestWithParam<std::size_t> {};

@@ -11,7 +11,7 @@ namespace tetap::sim {
 namespace {
 
 TEST(NumbersWords, another_noise_is_another_line) {
-  app::Numbers n;
+  param::Parameters n;
   const std::string before = numbers_words(n);
   for (float* const noise :
        {&n.wheels.noise.speed, &n.wheels.noise.speed_per_speed, &n.wheels.noise.yaw_rate,

@@ -178,11 +178,11 @@ void expect_names(const std::map<int, std::string>& table) {
 
 TEST(Names, AreTheDbcs) {
   const Dbc dbc;
-  expect_names<can::Sensor>(dbc.tables.at("Sensor"));
-  expect_names<can::Verdict>(dbc.tables.at("Verdict"));
-  expect_names<can::Mode>(dbc.tables.at("Mode"));
-  expect_names<can::ResetCause>(dbc.tables.at("ResetCause"));
-  expect_names<can::EstimatorKind>(dbc.tables.at("EstimatorKind"));
+  expect_names<sensor::Sensor>(dbc.tables.at("Sensor"));
+  expect_names<sensor::Verdict>(dbc.tables.at("Verdict"));
+  expect_names<sensor::Mode>(dbc.tables.at("Mode"));
+  expect_names<sensor::ResetCause>(dbc.tables.at("ResetCause"));
+  expect_names<sensor::EstimatorKind>(dbc.tables.at("EstimatorKind"));
   std::size_t checked = 0;
   for (const auto& [id, text] : dbc.messages) {
     if (id < 0x320 || id >= 0x340) continue;

@@ -35,7 +35,7 @@ struct FreeRun {
     while (const auto f = our_end.receive()) note(*f);
   }
   void begin(std::int64_t time_us) {
-    const auto frame = sync_frame(0x300, can::SyncKind::kBegin, {time_us}, 0);
+    const auto frame = sync_frame(0x300, bus::SyncKind::kBegin, {time_us}, 0);
     note(frame);
     static_cast<void>(our_end.send(frame));
     node.poll();
@@ -294,8 +294,8 @@ TEST(Realtime, FramesAndTicksKeepTheOrderOfTheLogHoweverLateTheyAre) {
     if (f.id == 0x308) {
       EXPECT_EQ(f.data[0], sent++);
     }
-    const auto sync = f.id == 0x300 ? can::decode<can::InSync>(can::payload(f)) : std::nullopt;
-    if (!sync || sync->kind != can::SyncKind::kTick) continue;
+    const auto sync = f.id == 0x300 ? bus::decode<bus::InSync>(bus::payload(f)) : std::nullopt;
+    if (!sync || sync->kind != bus::SyncKind::kTick) continue;
     EXPECT_EQ(sent, std::min<std::size_t>((sync->time_us - 5'000'000) / 1'000 + 1, 200))
         << "before the tick at " << sync->time_us;
   }

@@ -61,20 +61,20 @@ TEST(Script, TimeThatJumpsByYearsDoesNotMakeMillionsOfTicks) {
 
 TEST(Script, TicksInTheLogAreTheTicks) {
   std::vector<TimedFrame> log{input(1'000, 1),
-                              {{2'000}, sync_frame(0x300, can::SyncKind::kTick, {7'000'000}, 0)},
+                              {{2'000}, sync_frame(0x300, bus::SyncKind::kTick, {7'000'000}, 0)},
                               input(2'500, 2),
-                              {{3'000}, sync_frame(0x300, can::SyncKind::kClock, {1}, 1)},
-                              {{4'000}, sync_frame(0x300, can::SyncKind::kStep, {7'012'345}, 2)}};
+                              {{3'000}, sync_frame(0x300, bus::SyncKind::kClock, {1}, 1)},
+                              {{4'000}, sync_frame(0x300, bus::SyncKind::kStep, {7'012'345}, 2)}};
   const std::vector<Played> expected{{7'000'000, {1}, true}, {7'012'345, {2}, false}};
   EXPECT_EQ(all(script_of(log, {})), expected);
 }
 
 TEST(Script, TicksCountFromTheBeginOfTheBusNotByTheClockOfTheLog) {
   constexpr std::int64_t kToday_us = 1'795'555'498'360'954;  // candump's stamps are the calendar's
-  const std::vector<TimedFrame> log{{{kToday_us}, sync_frame(0x300, can::SyncKind::kBegin, {1'000'000}, 0)},
+  const std::vector<TimedFrame> log{{{kToday_us}, sync_frame(0x300, bus::SyncKind::kBegin, {1'000'000}, 0)},
                                     input(kToday_us + 10, 1),
-                                    {{kToday_us + 20}, sync_frame(0x300, can::SyncKind::kStep, {1'010'000}, 1)},
-                                    {{kToday_us + 30}, sync_frame(0x300, can::SyncKind::kStep, {1'020'000}, 2)}};
+                                    {{kToday_us + 20}, sync_frame(0x300, bus::SyncKind::kStep, {1'010'000}, 1)},
+                                    {{kToday_us + 30}, sync_frame(0x300, bus::SyncKind::kStep, {1'020'000}, 2)}};
   const std::vector<Played> expected{{1'010'000, {1}, true}, {1'020'000, {}, false}};
   EXPECT_EQ(all(script_of(log, {})), expected);
 }

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // SocketCAN on a real vcan: run it under `tools/run/provide_vcan -i vcan0 -i vcan1`, as root (it takes interfaces down).
-#include "hal/port/linux/socket_can.hpp"
+#include "hal/board/linux/socket_can.hpp"
 
-#include "hal/port/linux/clock.hpp"
+#include "hal/board/linux/clock.hpp"
 #include "host/stand_in_node.hpp"
 #include "sim_host/play/lockstep.hpp"
 

@@ -3,8 +3,8 @@
 // instead of an estimate, and loses or doubles frames on demand.
 #pragma once
 
-#include "app/inbox.hpp"
-#include "app/publisher.hpp"
+#include "bus/decoder.hpp"
+#include "bus/publisher.hpp"
 #include "hal/can_bus.hpp"
 #include "sim_host/play/protocol.hpp"
 
@@ -34,27 +34,27 @@ class StandInNode {
     bus_.flush();
   }
   void tick(std::int64_t time_us) {
-    tally_.close_epoch();
+    input_crc_.close_epoch();
     ++epoch_;
     frames_ = 0;
-    send(can::EstEpoch{.time_us = static_cast<std::uint64_t>(time_us),
-                       .in_crc = static_cast<std::uint16_t>(tally_.running())});
-    send(can::EstPos{.x_raw = static_cast<std::int32_t>(tally_.count()),
+    send(bus::EstEpoch{.time_us = static_cast<std::uint64_t>(time_us),
+                       .in_crc = static_cast<std::uint16_t>(input_crc_.running())});
+    send(bus::EstPos{.x_raw = static_cast<std::int32_t>(input_crc_.count()),
                      .y_raw = -static_cast<std::int32_t>(epoch_),
                      .epoch = static_cast<std::uint8_t>(epoch_ & 0xF),
-                     .kind = can::EstimatorKind::kOdometry},
+                     .kind = sensor::EstimatorKind::kOdometry},
          0);
-    send(can::EstMotion{.yaw_rad = 0.5F, .speed_mps = -1.25F, .yaw_rate_radps = 0.0F, .epoch = 0, .pos_valid = true},
+    send(bus::EstMotion{.yaw_rad = 0.5F, .speed_mps = -1.25F, .yaw_rate_radps = 0.0F, .epoch = 0, .pos_valid = true},
          0);
     if (epoch_ % 5 == 0)
-      send(can::EstStdPose{.epoch = 0, .std_x_m = 0.25F, .std_y_m = 0.5F, .std_yaw_rad = 0.1F, .corr_xy = -0.5F}, 0);
-    if (epoch_ % 10 == 0) send(can::EstDiagLoop{.loop_max_us = loop_time_us, .loop_mean_us = 3});
-    send(can::EstStateCrc{.crc = tally_.running() ^ state_flaw,
-                          .in_count = static_cast<std::uint16_t>(tally_.count()),
+      send(bus::EstStdPose{.epoch = 0, .std_x_m = 0.25F, .std_y_m = 0.5F, .std_yaw_rad = 0.1F, .corr_xy = -0.5F}, 0);
+    if (epoch_ % 10 == 0) send(bus::EstDiagLoop{.loop_max_us = loop_time_us, .loop_mean_us = 3});
+    send(bus::EstStateCrc{.crc = input_crc_.running() ^ state_flaw,
+                          .in_count = static_cast<std::uint16_t>(input_crc_.count()),
                           .epoch = static_cast<std::uint8_t>(epoch_),
                           .frames = static_cast<std::uint8_t>(frames_ + 1)});
   }
-  [[nodiscard]] std::uint64_t consumed() const { return tally_.count(); }
+  [[nodiscard]] std::uint64_t consumed() const { return input_crc_.count(); }
 
   std::uint32_t loop_time_us = 7;
   std::uint32_t state_flaw = 0;  ///< a node that computes something else
@@ -63,15 +63,15 @@ class StandInNode {
  private:
   void on_frame(const base::CanFrame& frame) {
     if (sim::is_counted_input(frame, base_)) {
-      tally_.add(app::frame_crc(static_cast<std::uint8_t>(frame.id - base_), frame));
+      input_crc_.add(bus::frame_crc(static_cast<std::uint8_t>(frame.id - base_), frame));
     } else if (frame.id == base_) {
-      const auto sync = can::decode<can::InSync>(can::payload(frame));
+      const auto sync = bus::decode<bus::InSync>(bus::payload(frame));
       if (!sync || silent) return;
-      if (sync->kind == can::SyncKind::kBegin) {
-        tally_ = {};
+      if (sync->kind == bus::SyncKind::kBegin) {
+        input_crc_ = {};
         epoch_ = 0;
-        send(can::EstVersion{.git = 1, .config = 2});
-      } else if (sync->kind != can::SyncKind::kClock) {
+        send(bus::EstVersion{.git = 1, .config = 2});
+      } else if (sync->kind != bus::SyncKind::kClock) {
         tick(static_cast<std::int64_t>(sync->time_us));
       }
     }
@@ -79,7 +79,7 @@ class StandInNode {
   template <class M>
   void send(const M& message, std::size_t instance = 0) {
     ++frames_;
-    const base::CanFrame frame = can::frame(base_, message, instance);
+    const base::CanFrame frame = bus::frame(base_, message, instance);
     const int times = sabotage_.out_of ? sabotage_.out_of(frames_out_++, frame) : 1;
     for (int i = 0; i < times; ++i) static_cast<void>(bus_.send(frame));
   }
@@ -87,7 +87,7 @@ class StandInNode {
   Bus& bus_;
   std::uint32_t base_;
   Sabotage sabotage_;
-  app::InputTally tally_;
+  bus::InputCrc input_crc_;
   std::uint32_t epoch_ = 0;
   std::uint32_t frames_ = 0;
   std::uint64_t frames_in_ = 0;
@@ -98,7 +98,7 @@ class StandInNode {
 struct KeepAll {
   std::vector<base::CanFrame> sent_frames, received_frames;
   std::vector<base::Micros> times;
-  std::vector<can::EstStateCrc> tails;
+  std::vector<bus::EstStateCrc> tails;
   int restarts = 0;
 
   void restarted() { ++restarts; }

@@ -79,7 +79,7 @@ inline nav::ImuIncrement increment(const Vector3d& dtheta, const Vector3d& dv, s
 
 /// To the bit.
 inline bool same(const nav::InsState& a, const nav::InsState& b) {
-  const auto numbers = [](const nav::InsState& x) {
+  const auto parameters = [](const nav::InsState& x) {
     std::array<std::uint32_t, 16> bits{};
     std::size_t i = 0;
     for (const base::Anchored& c : {x.x, x.y, x.z}) bits[i++] = base::bits(c.offset_m);
@@ -89,7 +89,7 @@ inline bool same(const nav::InsState& a, const nav::InsState& b) {
     return bits;
   };
   return a.x.anchor_um == b.x.anchor_um && a.y.anchor_um == b.y.anchor_um && a.z.anchor_um == b.z.anchor_um &&
-         numbers(a) == numbers(b);
+         parameters(a) == parameters(b);
 }
 
 /// Repeatable normal numbers.

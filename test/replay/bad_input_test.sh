@@ -41,8 +41,8 @@ on_the_bus() { # inside a private vcan0
   refused "a player on a bus that is down" 'tetap-play: CAN interface vcan0 is down' "$programs/tetap-play" "$work/good.log" --out "$work/out"
   refused "a world on a bus that is down" 'tetap-world: CAN interface vcan0 is down' "$programs/tetap-world" --can vcan0 --duration 1 --out "$work/out"
   refused "a recorder on a bus that is down" 'tetap-record: CAN interface vcan0 is down' "$programs/tetap-record" --out "$work/out"
-  [ ! -e build/r5/hal/port/tetap-zynqmp_r5-rover.elf ] ||
-    refused "an image in QEMU on a bus that is down" 'emulate_r5: vcan0: .*down' tools/run/emulate_r5 build/r5/hal/port/tetap-zynqmp_r5-rover.elf --can vcan0
+  [ ! -e build/r5/hal/board/tetap-zynqmp_r5-rover.elf ] ||
+    refused "an image in QEMU on a bus that is down" 'emulate_r5: vcan0: .*down' tools/run/emulate_r5 build/r5/hal/board/tetap-zynqmp_r5-rover.elf --can vcan0
   ip link set vcan0 up
   # A node whose bus goes away and comes back keeps its service.
   "$programs/tetap-node" 2>"$work/node" & node=$!
@@ -196,8 +196,8 @@ cp -r tools CMakePresets.json "$work/tree" && cp config/*.hpp "$work/tree/config
 for tool in proof/check_{heap,layers,size,stack}; do
   for one in run/build_preset proof/check_{heap,layers,size,stack}; do printf '#!/bin/sh\n' >"$work/tree/tools/$one"; done
   printf '#!/bin/sh\ncase $* in *tetap-zynqmp_r5-husky.elf*) echo "$0: no" >&2; exit 1 ;; esac\n' >"$work/tree/tools/$tool"
-  mkdir -p "$work/tree/build/r5/hal/port"
-  touch "$work/tree/build/r5/hal/port/tetap-zynqmp_r5-husky".{elf,bin,hex,map}
+  mkdir -p "$work/tree/build/r5/hal/board"
+  touch "$work/tree/build/r5/hal/board/tetap-zynqmp_r5-husky".{elf,bin,hex,map}
   refused "firmware that fails its proof ($tool)" "tools/$tool: no" env BOARD=zynqmp_r5 ROBOT=husky "$work/tree/tools/run/build_firmware"
 done
 refused "a report on nothing" 'nowhere' tools/report/write_report "$work/nowhere"

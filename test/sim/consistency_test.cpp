@@ -11,7 +11,7 @@
 //
 // In the default matched world heading lasts for minutes (its gyroscope is as good as the data sheet's) and neither
 // gyroscope nor wheels could be noticed to be wrong. So there is a second one, in which every noise matters.
-#include "app/node.hpp"
+#include "node/node.hpp"
 #include "sim_host/matched_rover.hpp"
 #include "sim_host/world_source.hpp"
 
@@ -44,10 +44,10 @@ World::Options as_made() { return {.mismatched = false}; }
 /// A gyroscope 20 times as noisy (0.056 deg/s/sqrt(Hz)) and wheels that err by 1.4 cm per root metre: what landmarks
 /// told is forgotten within seconds, and the steps of the published 1-sigma are small beside it.
 World::Options noisy() {
-  Numbers numbers = matched({});
-  numbers.imu.gyro_noise *= 20;
-  numbers.wheels.noise_m = 2e-4;
-  return {.numbers = numbers};
+  Parameters parameters = matched({});
+  parameters.imu.gyro_noise *= 20;
+  parameters.wheels.noise_m = 2e-4;
+  return {.parameters = parameters};
 }
 
 /// What one seed's world sends, and where the rover was. Made once: what is judged changes, the world does not.
@@ -64,7 +64,7 @@ struct Recorded {
 std::vector<Recorded> record(const World::Options& options) {
   std::vector<Recorded> made;
   for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
-    WorldSource source(World(options, seed), app::Numbers{}.can_base, kPeriod, kLength);
+    WorldSource source(World(options, seed), param::Parameters{}.can_base, kPeriod, kLength);
     Recorded& one = made.emplace_back();
     Tick tick;
     while (source.next(tick)) {
@@ -93,11 +93,11 @@ Bounds bounds(double dof, double count, double z) { return {chi_square(dof, -z) 
 
 struct Nis {
   double sum = 0, dof = 0, count = 0, rejected = 0;
-  void add(const can::EstInnov& innovation) {
+  void add(const bus::EstInnov& innovation) {
     sum += static_cast<double>(innovation.nis);
     dof += innovation.dof;
     count += 1;
-    rejected += innovation.verdict == can::Verdict::kRejected ? 1 : 0;
+    rejected += innovation.verdict == sensor::Verdict::kRejected ? 1 : 0;
   }
   [[nodiscard]] double mean() const { return sum / count; }
   [[nodiscard]] bool consistent() const { return bounds(dof, count, kTwoSided99).hold(mean()); }
@@ -109,7 +109,7 @@ struct Judgement {
   double inside = 0;   ///< share of the times
   double above = 0;    ///< too sure
   std::size_t times = 0;
-  std::map<can::Sensor, Nis> nis;
+  std::map<sensor::Sensor, Nis> nis;
 
   [[nodiscard]] bool poses_consistent() const { return inside >= 0.90 && std::abs(anees - 3) <= scatter; }
   [[nodiscard]] bool consistent() const {
@@ -120,25 +120,25 @@ struct Judgement {
 
 /// One epoch's frames of one estimator, as anybody on the bus decodes them.
 struct Published {
-  std::optional<can::EstPos> position;
-  std::optional<can::EstMotion> motion;
-  std::optional<can::EstStdPose> deviation;
-  std::optional<can::EstStdMore> correlation;
+  std::optional<bus::EstPos> position;
+  std::optional<bus::EstMotion> motion;
+  std::optional<bus::EstStdPose> deviation;
+  std::optional<bus::EstStdMore> correlation;
 
   void take(std::uint32_t offset, std::span<const std::uint8_t> payload, std::size_t k) {
-    if (offset == can::offset_of<can::EstPos>(k)) position = can::decode<can::EstPos>(payload);
-    if (offset == can::offset_of<can::EstMotion>(k)) motion = can::decode<can::EstMotion>(payload);
-    if (offset != can::offset_of<can::EstStdPose>(k)) return;
-    if (const auto page = can::decode<can::EstStdPose>(payload)) deviation = page;
-    if (const auto page = can::decode<can::EstStdMore>(payload)) correlation = page;
+    if (offset == bus::offset_of<bus::EstPos>(k)) position = bus::decode<bus::EstPos>(payload);
+    if (offset == bus::offset_of<bus::EstMotion>(k)) motion = bus::decode<bus::EstMotion>(payload);
+    if (offset != bus::offset_of<bus::EstStdPose>(k)) return;
+    if (const auto page = bus::decode<bus::EstStdPose>(payload)) deviation = page;
+    if (const auto page = bus::decode<bus::EstStdMore>(payload)) correlation = page;
   }
   /// Normalised squared error; empty in an epoch without a covariance.
   [[nodiscard]] std::optional<double> nees(const Truth& truth) const {
     if (!position || !motion || !deviation || !correlation) return std::nullopt;
     const auto real = [](float x) { return static_cast<double>(x); };
     const Eigen::Vector3d std{real(deviation->std_x_m), real(deviation->std_y_m), real(deviation->std_yaw_rad)};
-    const Eigen::Vector3d error{can::EstPos::kXScale * position->x_raw - truth.x_m,
-                                can::EstPos::kYScale * position->y_raw - truth.y_m,
+    const Eigen::Vector3d error{bus::EstPos::kXScale * position->x_raw - truth.x_m,
+                                bus::EstPos::kYScale * position->y_raw - truth.y_m,
                                 wrap(real(motion->yaw_rad) - truth.yaw_rad)};
     Eigen::Matrix3d p = Eigen::Matrix3d::Identity();
     p(0, 1) = p(1, 0) = real(deviation->corr_xy);
@@ -151,13 +151,13 @@ struct Published {
 
 constexpr std::size_t kOdometry = 0, kFused = 1;
 
-Judgement judge(const std::vector<Recorded>& runs, const app::Numbers& numbers, std::size_t estimator = kFused) {
-  using Node = app::Node<robot::rover_landmarks::Estimators>;
+Judgement judge(const std::vector<Recorded>& runs, const param::Parameters& parameters, std::size_t estimator = kFused) {
+  using Node = node::Node<robot::rover_landmarks::Estimators>;
   Judgement result;
   std::vector<double> sums(runs.front().epochs.size());  // of the seeds, by epoch
   std::vector<double> means;                             // of the times, by seed
   for (const Recorded& run : runs) {
-    const auto node = std::make_unique<Node>(numbers, app::Version{});
+    const auto node = std::make_unique<Node>(parameters, bus::Version{});
     node->power_on(run.begin);
     double sum = 0;
     std::size_t times = 0;
@@ -166,10 +166,10 @@ Judgement judge(const std::vector<Recorded>& runs, const app::Numbers& numbers, 
       for (const base::CanFrame& frame : epoch.inputs) node->on_frame(frame);
       Published published;
       node->tick(epoch.time, {}, [&](const base::CanFrame& frame) {
-        const std::uint32_t offset = frame.id - numbers.can_base;
-        published.take(offset, can::payload(frame), estimator);
-        if (offset != can::EstInnov::kOffset) return;
-        const auto innovation = can::decode<can::EstInnov>(can::payload(frame));
+        const std::uint32_t offset = frame.id - parameters.can_base;
+        published.take(offset, bus::payload(frame), estimator);
+        if (offset != bus::EstInnov::kOffset) return;
+        const auto innovation = bus::decode<bus::EstInnov>(bus::payload(frame));
         if (!innovation || innovation->estimator != estimator || innovation->dof == 0) return;
         result.nis[innovation->sensor].add(*innovation);
       });
@@ -233,22 +233,22 @@ TEST(Consistency, and_so_they_are_where_every_noise_matters) {
 TEST(Consistency, a_noise_that_is_half_or_double_is_noticed) {
   struct Case {
     const char* name;
-    std::function<void(app::Numbers&, float)> scale;
+    std::function<void(param::Parameters&, float)> scale;
   };
   const std::array cases{
-      Case{"wheels", [](app::Numbers& n, float k) { n.wheels.drive.noise_left *= k, n.wheels.drive.noise_right *= k; }},
-      Case{"gyro", [](app::Numbers& n, float k) { n.gyro.noise *= k; }},
-      Case{"range", [](app::Numbers& n, float k) { n.landmark.sigma_range_m *= k; }},
-      Case{"bearing", [](app::Numbers& n, float k) { n.landmark.sigma_bearing_rad *= k; }},
-      Case{"gnss", [](app::Numbers& n, float k) { n.gnss.sigma_scale *= k; }},
+      Case{"wheels", [](param::Parameters& n, float k) { n.wheels.drive.noise_left *= k, n.wheels.drive.noise_right *= k; }},
+      Case{"gyro", [](param::Parameters& n, float k) { n.gyro.noise *= k; }},
+      Case{"range", [](param::Parameters& n, float k) { n.landmark.sigma_range_m *= k; }},
+      Case{"bearing", [](param::Parameters& n, float k) { n.landmark.sigma_bearing_rad *= k; }},
+      Case{"gnss", [](param::Parameters& n, float k) { n.gnss.sigma_scale *= k; }},
   };
   const auto runs = record(noisy());
   ASSERT_TRUE(judge(runs, matched_landmarks_rover(noisy())).consistent());
   for (const Case& one : cases)
     for (const float k : {0.5F, 2.0F}) {
-      app::Numbers numbers = matched_landmarks_rover(noisy());
-      one.scale(numbers, k);
-      const Judgement j = judge(runs, numbers);
+      param::Parameters parameters = matched_landmarks_rover(noisy());
+      one.scale(parameters, k);
+      const Judgement j = judge(runs, parameters);
       std::printf("%-8s x %.1f: %s\n", one.name, static_cast<double>(k), words(j).c_str());
       EXPECT_FALSE(j.consistent()) << one.name << " x " << k << ": " << words(j);
     }

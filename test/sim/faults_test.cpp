@@ -26,8 +26,8 @@ struct Recording {
   std::map<Key, Measurement> all;
   explicit Recording(std::vector<FaultSetting> faults, World::Options options = {}) {
     options.faults = std::move(faults);
-    options.numbers.magnetometer.rate_hz = 20;
-    options.numbers.barometer.rate_hz = 10;
+    options.parameters.magnetometer.rate_hz = 20;
+    options.parameters.barometer.rate_hz = 10;
     std::map<std::pair<std::size_t, std::int64_t>, int> nth;
     for (const auto& m : run(options, 21, kLength)) all.emplace(key(m, nth), m);
   }
@@ -61,7 +61,7 @@ std::vector<std::tuple<base::Micros, T, T>> pairs(const Recording& faulty) {
   return both;
 }
 
-std::array<double, 3> enu(const app::GnssPosition& p) {
+std::array<double, 3> enu(const sensor::GnssPosition& p) {
   return kEarth.enu_m({p.latitude_2ndeg, p.longitude_2ndeg, static_cast<double>(p.height_m)});
 }
 
@@ -138,8 +138,8 @@ TEST(Faults, several_are_separated_by_commas_and_what_is_not_understood_is_named
 
 TEST(Faults, gnss_jump_is_a_hundred_metres_to_the_east) {
   int n = 0;
-  for (const auto& [t, a, b] : pairs<app::GnssPosition>(Recording{only(Fault::kGnssJump)})) {
-    if (!inside(t) || a.fix == app::GnssFix::kNone) continue;
+  for (const auto& [t, a, b] : pairs<sensor::GnssPosition>(Recording{only(Fault::kGnssJump)})) {
+    if (!inside(t) || a.fix == sensor::GnssFix::kNone) continue;
     EXPECT_NEAR(enu(b)[0] - enu(a)[0], 100, 1e-3);
     EXPECT_NEAR(enu(b)[1] - enu(a)[1], 0, 1e-3);
     EXPECT_EQ(a.horizontal_acc_m, b.horizontal_acc_m);
@@ -149,14 +149,14 @@ TEST(Faults, gnss_jump_is_a_hundred_metres_to_the_east) {
 }
 
 TEST(Faults, gnss_ramp_walks_north_at_a_metre_a_second) {
-  for (const auto& [t, a, b] : pairs<app::GnssPosition>(Recording{only(Fault::kGnssRamp)}))
+  for (const auto& [t, a, b] : pairs<sensor::GnssPosition>(Recording{only(Fault::kGnssRamp)}))
     if (inside(t)) {
       EXPECT_NEAR(enu(b)[1] - enu(a)[1], static_cast<double>((t - kFrom).us) * 1e-6, 1e-3);
     }
 }
 
 TEST(Faults, gnss_wrong_height_is_the_geoid) {
-  for (const auto& [t, a, b] : pairs<app::GnssPosition>(Recording{only(Fault::kGnssWrongHeight)}))
+  for (const auto& [t, a, b] : pairs<sensor::GnssPosition>(Recording{only(Fault::kGnssWrongHeight)}))
     if (inside(t)) {
       EXPECT_NEAR(b.height_m - a.height_m, 47, 1e-3);
     }
@@ -167,7 +167,7 @@ TEST(Faults, gnss_outage_is_silence) {
   int silent = 0;
   for (const auto& [key, m] : plain().all) {
     const bool gnss =
-        std::holds_alternative<app::GnssPosition>(m.value) || std::holds_alternative<app::GnssVelocity>(m.value);
+        std::holds_alternative<sensor::GnssPosition>(m.value) || std::holds_alternative<sensor::GnssVelocity>(m.value);
     if (!inside(true_time(m))) continue;
     EXPECT_EQ(faulty.all.count(key), gnss ? 0U : 1U);
     silent += gnss ? 1 : 0;
@@ -176,9 +176,9 @@ TEST(Faults, gnss_outage_is_silence) {
 }
 
 TEST(Faults, gnss_frozen_repeats_the_last_fix_with_fresh_stamps) {
-  std::optional<app::GnssPosition> last;
+  std::optional<sensor::GnssPosition> last;
   int n = 0;
-  for (const auto& [t, a, b] : pairs<app::GnssPosition>(Recording{only(Fault::kGnssFrozen)})) {
+  for (const auto& [t, a, b] : pairs<sensor::GnssPosition>(Recording{only(Fault::kGnssFrozen)})) {
     if (t < kFrom) last = a;
     if (!inside(t)) continue;
     EXPECT_EQ(b.latitude_2ndeg, last->latitude_2ndeg);
@@ -193,7 +193,7 @@ TEST(Faults, a_spinning_wheel_counts_a_metre_a_second_too_much_and_only_it) {
   const double per_metre = 2000 / (2 * kPi * 0.1);
   for (const Fault fault : {Fault::kSlipLeft, Fault::kSlipRight}) {
     const bool left = fault == Fault::kSlipLeft;
-    for (const auto& [t, a, b] : pairs<app::WheelCounts>(Recording{only(fault)})) {
+    for (const auto& [t, a, b] : pairs<sensor::WheelCounts>(Recording{only(fault)})) {
       const double on_s = clamp(static_cast<double>((t - kFrom).us) * 1e-6, 0, 6);
       const double expected = on_s * per_metre / (left ? 1.0025 : 0.9975);
       const int more_left = static_cast<std::uint16_t>(b.left - a.left);
@@ -206,7 +206,7 @@ TEST(Faults, a_spinning_wheel_counts_a_metre_a_second_too_much_and_only_it) {
 
 TEST(Faults, a_wheel_on_ice_counts_two_metres_a_second_too_much_and_only_it) {
   const double per_metre = 2000 / (2 * kPi * 0.1) / 0.9975;
-  for (const auto& [t, a, b] : pairs<app::WheelCounts>(Recording{only(Fault::kWheelSpin)})) {
+  for (const auto& [t, a, b] : pairs<sensor::WheelCounts>(Recording{only(Fault::kWheelSpin)})) {
     const double on_s = clamp(static_cast<double>((t - kFrom).us) * 1e-6, 0, 6);
     ASSERT_NEAR(static_cast<std::uint16_t>(b.right - a.right), 2 * on_s * per_metre, 5);
     ASSERT_EQ(a.left, b.left);
@@ -216,17 +216,17 @@ TEST(Faults, a_wheel_on_ice_counts_two_metres_a_second_too_much_and_only_it) {
 TEST(Faults, gnss_far_is_silent_for_211_s_then_105_fixes_are_800_m_west_and_the_next_is_right) {
   World::Options options;
   options.course = default_course(2);
-  options.numbers.gnss.glitch_probability = options.numbers.gnss.outage_every_s = 0;
+  options.parameters.gnss.glitch_probability = options.parameters.gnss.outage_every_s = 0;
   const auto right = run(options, 3, seconds_us(320));
   options.faults = {{Fault::kGnssFar, kFrom, seconds_us(260)}};
   const auto wrong = run(options, 3, seconds_us(320));
-  std::map<std::int64_t, app::GnssPosition> fixes;
+  std::map<std::int64_t, sensor::GnssPosition> fixes;
   for (const auto& m : right)
-    if (const auto* fix = std::get_if<app::GnssPosition>(&m.value)) fixes[m.stamp.us] = *fix;
+    if (const auto* fix = std::get_if<sensor::GnssPosition>(&m.value)) fixes[m.stamp.us] = *fix;
   int far = 0;
   std::int64_t last_far = 0, next_right = 0;
   for (const auto& m : wrong) {
-    const auto* fix = std::get_if<app::GnssPosition>(&m.value);
+    const auto* fix = std::get_if<sensor::GnssPosition>(&m.value);
     if (fix == nullptr) continue;
     const base::Micros at = m.stamp - options.start;
     ASSERT_FALSE(at >= kFrom && at < kFrom + seconds_us(211));
@@ -246,7 +246,7 @@ TEST(Faults, gnss_far_is_silent_for_211_s_then_105_fixes_are_800_m_west_and_the_
 
 TEST(Faults, vibration_stays_within_the_ranges_and_is_felt) {
   int felt = 0;
-  for (const auto& [t, a, b] : pairs<app::ImuSample>(Recording{only(Fault::kVibration)})) {
+  for (const auto& [t, a, b] : pairs<sensor::ImuSample>(Recording{only(Fault::kVibration)})) {
     ASSERT_EQ(b.clipped_accel + b.clipped_gyro, 0);
     felt += !same(Measurement{.value = a}, Measurement{.value = b}) ? 1 : 0;
   }
@@ -254,7 +254,7 @@ TEST(Faults, vibration_stays_within_the_ranges_and_is_felt) {
 }
 
 TEST(Faults, a_magnetic_disturbance_adds_its_field_wherever_the_rover_looks) {
-  for (const auto& [t, a, b] : pairs<app::MagneticFlux>(Recording{only(Fault::kMagDisturbance)})) {
+  for (const auto& [t, a, b] : pairs<sensor::MagneticFlux>(Recording{only(Fault::kMagDisturbance)})) {
     double square = 0;
     for (std::size_t i = 0; i < 3; ++i) {
       const double more = static_cast<double>(b.flux_b_uT[i]) - static_cast<double>(a.flux_b_uT[i]);
@@ -273,7 +273,7 @@ TEST(Faults, a_start_in_motion_is_silence_of_every_sensor) {
 
 TEST(Faults, a_stuck_wheel_stands_still) {
   std::set<std::uint16_t> left, right;
-  for (const auto& [t, a, b] : pairs<app::WheelCounts>(Recording{only(Fault::kWheelStuck)})) {
+  for (const auto& [t, a, b] : pairs<sensor::WheelCounts>(Recording{only(Fault::kWheelStuck)})) {
     if (inside(t) && t > kFrom + base::Micros{1'000}) left.insert(b.left), right.insert(b.right);
     if (inside(t)) {
       EXPECT_EQ(a.right, b.right);
@@ -286,8 +286,8 @@ TEST(Faults, a_stuck_wheel_stands_still) {
 TEST(Faults, an_encoder_with_a_loose_contact_loses_half_its_counts_in_bursts) {
   double plain_counts = 0, faulty_counts = 0;
   int still = 0, n = 0;
-  std::optional<std::pair<app::WheelCounts, app::WheelCounts>> last;
-  for (const auto& [t, a, b] : pairs<app::WheelCounts>(Recording{only(Fault::kEncoderDropout)})) {
+  std::optional<std::pair<sensor::WheelCounts, sensor::WheelCounts>> last;
+  for (const auto& [t, a, b] : pairs<sensor::WheelCounts>(Recording{only(Fault::kEncoderDropout)})) {
     if (inside(t) && last) {
       plain_counts += difference(a.right, last->first.right);
       faulty_counts += difference(b.right, last->second.right);
@@ -302,8 +302,8 @@ TEST(Faults, an_encoder_with_a_loose_contact_loses_half_its_counts_in_bursts) {
 }
 
 TEST(Faults, a_stuck_imu_repeats_its_last_sample) {
-  std::optional<app::ImuSample> last;
-  for (const auto& [t, a, b] : pairs<app::ImuSample>(Recording{only(Fault::kImuStuck)})) {
+  std::optional<sensor::ImuSample> last;
+  for (const auto& [t, a, b] : pairs<sensor::ImuSample>(Recording{only(Fault::kImuStuck)})) {
     if (t < kFrom) last = a;
     if (inside(t)) {
       EXPECT_TRUE(same(Measurement{.value = *last}, Measurement{.value = b}));
@@ -314,7 +314,7 @@ TEST(Faults, a_stuck_imu_repeats_its_last_sample) {
 TEST(Faults, a_shaken_imu_clips_says_so_and_stays_within_full_scale) {
   int gyro = 0, accel = 0, n = 0;
   double up = 0, up_plain = 0;
-  for (const auto& [t, a, b] : pairs<app::ImuSample>(Recording{only(Fault::kImuClipping)})) {
+  for (const auto& [t, a, b] : pairs<sensor::ImuSample>(Recording{only(Fault::kImuClipping)})) {
     if (!inside(t)) {
       EXPECT_EQ(b.clipped_gyro, 0);
       continue;
@@ -331,7 +331,7 @@ TEST(Faults, a_shaken_imu_clips_says_so_and_stays_within_full_scale) {
 }
 
 TEST(Faults, gyro_bias_step_turns_the_vertical_axis_only) {
-  for (const auto& [t, a, b] : pairs<app::ImuSample>(Recording{only(Fault::kGyroBiasStep)})) {
+  for (const auto& [t, a, b] : pairs<sensor::ImuSample>(Recording{only(Fault::kGyroBiasStep)})) {
     const float step = inside(t) ? 0.02F * 0.01F : 0.0F;
     ASSERT_NEAR(b.dangle_b_rad[2] - a.dangle_b_rad[2], step, 2e-9F);
     ASSERT_EQ(b.dangle_b_rad[0], a.dangle_b_rad[0]);
@@ -340,7 +340,7 @@ TEST(Faults, gyro_bias_step_turns_the_vertical_axis_only) {
 
 TEST(Faults, landmark_wrong_id_swaps_neighbours) {
   int n = 0;
-  for (const auto& [t, a, b] : pairs<app::LandmarkSighting>(Recording{only(Fault::kLandmarkWrongId)})) {
+  for (const auto& [t, a, b] : pairs<sensor::LandmarkSighting>(Recording{only(Fault::kLandmarkWrongId)})) {
     const int swapped = ((a.landmark - 1) ^ 1) + 1;  // ids count from 1
     EXPECT_EQ(b.landmark, inside(t) ? swapped : a.landmark);
     EXPECT_EQ(a.range_m, b.range_m);
@@ -352,7 +352,7 @@ TEST(Faults, landmark_wrong_id_swaps_neighbours) {
 TEST(Faults, landmark_outliers_are_half_of_the_sightings_and_metres_off) {
   const Recording faulty{{{Fault::kLandmarkOutlier, {}, kLength}}};
   int off = 0, n = 0;
-  for (const auto& [t, a, b] : pairs<app::LandmarkSighting>(faulty)) {
+  for (const auto& [t, a, b] : pairs<sensor::LandmarkSighting>(faulty)) {
     ++n;
     EXPECT_EQ(a.landmark, b.landmark);
     const float more = b.range_m - a.range_m;
@@ -374,7 +374,7 @@ TEST(Faults, stamps_are_old_ahead_or_jump_as_said_and_arrivals_are_not) {
     for (const auto& [key, m] : plain().all) {
       // Wheels are stamped up to 0.1 ms after the instant that decides.
       const base::Micros t = true_time(m);
-      if (std::holds_alternative<app::WheelCounts>(m.value) && !(inside(t) == inside(t - base::Micros{100}))) continue;
+      if (std::holds_alternative<sensor::WheelCounts>(m.value) && !(inside(t) == inside(t - base::Micros{100}))) continue;
       ASSERT_EQ((faulty.all.at(key).stamp - m.stamp).us, inside(t) ? shift_us : 0);
     }
   }
@@ -422,9 +422,9 @@ TEST(Faults, a_kidnapped_rover_is_eight_metres_further_and_nobody_felt_it) {
   until(20.5);  // on a straight: wheels and IMU go on as if nothing had been
   ASSERT_EQ(a.size(), b.size());
   for (std::size_t i = 0; i < a.size(); ++i)
-    if (const auto* s = std::get_if<app::ImuSample>(&a[i].value)) {
+    if (const auto* s = std::get_if<sensor::ImuSample>(&a[i].value)) {
       for (std::size_t k = 0; k < 3; ++k)
-        EXPECT_NEAR(s->dvelocity_b_mps[k], std::get<app::ImuSample>(b[i].value).dvelocity_b_mps[k], 0.02F);
+        EXPECT_NEAR(s->dvelocity_b_mps[k], std::get<sensor::ImuSample>(b[i].value).dvelocity_b_mps[k], 0.02F);
     }
   until(213);
   EXPECT_LT(sim::sqrt(taken.truth().x_m * taken.truth().x_m + taken.truth().y_m * taken.truth().y_m), 1.0)

@@ -31,17 +31,17 @@ double allan(const std::vector<double>& rates, std::size_t m) {
 }
 
 /// Samples of an IMU at rest for that long: six series, rate and specific force.
-std::array<std::vector<double>, 6> imu_at_rest(const ImuNumbers& numbers, double seconds, std::uint64_t seed) {
-  Imu imu{numbers, 0.1, kEarth, seed};
-  const int steps = 2000 / numbers.rate_hz;
+std::array<std::vector<double>, 6> imu_at_rest(const ImuParameters& parameters, double seconds, std::uint64_t seed) {
+  Imu imu{parameters, 0.1, kEarth, seed};
+  const int steps = 2000 / parameters.rate_hz;
   std::array<std::vector<double>, 6> series;
   base::Micros now;
-  for (int i = 0; i < static_cast<int>(seconds * numbers.rate_hz); ++i) {
+  for (int i = 0; i < static_cast<int>(seconds * parameters.rate_hz); ++i) {
     for (int k = 0; k < steps; ++k) imu.sense({}, 0, now += Rover::kStep, kNoFaults);
-    const app::ImuSample s = imu.sample(now, kNoFaults);
+    const sensor::ImuSample s = imu.sample(now, kNoFaults);
     for (std::size_t a = 0; a < 3; ++a) {
-      series[a].push_back(static_cast<double>(s.dangle_b_rad[a]) * numbers.rate_hz);
-      series[3 + a].push_back(static_cast<double>(s.dvelocity_b_mps[a]) * numbers.rate_hz);
+      series[a].push_back(static_cast<double>(s.dangle_b_rad[a]) * parameters.rate_hz);
+      series[3 + a].push_back(static_cast<double>(s.dvelocity_b_mps[a]) * parameters.rate_hz);
     }
   }
   return series;
@@ -88,49 +88,49 @@ TEST(Chance, every_seed_and_every_stream_draws_its_own_numbers) {
 
 TEST(Imu, white_noise_is_the_data_sheets_at_every_rate) {
   for (const int rate_hz : {100, 200, 400}) {
-    ImuNumbers numbers = matched(Numbers{}).imu;
-    numbers.rate_hz = rate_hz;
-    const auto series = imu_at_rest(numbers, 300, 5);
+    ImuParameters parameters = matched(Parameters{}).imu;
+    parameters.rate_hz = rate_hz;
+    const auto series = imu_at_rest(parameters, 300, 5);
     for (std::size_t a = 0; a < 3; ++a) {
       // Allan deviation of white noise at one second is the density itself.
-      EXPECT_NEAR(allan(series[a], static_cast<std::size_t>(rate_hz)) / numbers.gyro_noise, 1, 0.2);
-      EXPECT_NEAR(allan(series[3 + a], static_cast<std::size_t>(rate_hz)) / numbers.accel_noise[a], 1, 0.2);
-      EXPECT_NEAR(statistics(series[a]).variance / (numbers.gyro_noise * numbers.gyro_noise * rate_hz), 1, 0.05);
+      EXPECT_NEAR(allan(series[a], static_cast<std::size_t>(rate_hz)) / parameters.gyro_noise, 1, 0.2);
+      EXPECT_NEAR(allan(series[3 + a], static_cast<std::size_t>(rate_hz)) / parameters.accel_noise[a], 1, 0.2);
+      EXPECT_NEAR(statistics(series[a]).variance / (parameters.gyro_noise * parameters.gyro_noise * rate_hz), 1, 0.05);
     }
   }
 }
 
 TEST(Imu, allan_deviation_falls_with_white_noise_and_rises_with_the_wandering_bias) {
-  ImuNumbers numbers;
-  numbers.gyro_walk_radps = 1e-4;
-  numbers.walk_tau_s = 60;
-  const auto series = imu_at_rest(numbers, 2400, 6);
-  EXPECT_NEAR(allan(series[2], 10) / (numbers.gyro_noise / sim::sqrt(0.1)), 1, 0.05);
+  ImuParameters parameters;
+  parameters.gyro_walk_radps = 1e-4;
+  parameters.walk_tau_s = 60;
+  const auto series = imu_at_rest(parameters, 2400, 6);
+  EXPECT_NEAR(allan(series[2], 10) / (parameters.gyro_noise / sim::sqrt(0.1)), 1, 0.05);
   EXPECT_NEAR(allan(series[2], 40) / allan(series[2], 10), 0.5, 0.05);
   // Markov noise (IEEE Std 952, annex C): AVAR(T) = 2 sigma^2 tau/T (1 - tau/2T (3 - 4 e^(-T/tau) + e^(-2T/tau))), 0.58
   // sigma at T = tau.
-  EXPECT_NEAR(allan(series[2], 6000) / numbers.gyro_walk_radps, 0.58, 0.2);
+  EXPECT_NEAR(allan(series[2], 6000) / parameters.gyro_walk_radps, 0.58, 0.2);
 }
 
 TEST(Imu, turn_on_biases_differ_between_seeds_by_as_much_as_stated) {
   std::vector<double> gyro, accel;
-  const ImuNumbers numbers;
+  const ImuParameters parameters;
   for (std::uint64_t seed = 1; seed <= 150; ++seed) {
-    const auto series = imu_at_rest(numbers, 2, seed);
+    const auto series = imu_at_rest(parameters, 2, seed);
     for (std::size_t a = 0; a < 2; ++a) {
       gyro.push_back(statistics(series[a]).mean);
       accel.push_back(statistics(series[3 + a]).mean);
     }
   }
-  EXPECT_NEAR(sim::sqrt(statistics(gyro).variance) / numbers.gyro_turn_on_radps, 1, 0.15);
-  EXPECT_NEAR(sim::sqrt(statistics(accel).variance) / numbers.accel_turn_on_mps2, 1, 0.15);
+  EXPECT_NEAR(sim::sqrt(statistics(gyro).variance) / parameters.gyro_turn_on_radps, 1, 0.15);
+  EXPECT_NEAR(sim::sqrt(statistics(accel).variance) / parameters.accel_turn_on_mps2, 1, 0.15);
 }
 
 TEST(Imu, at_rest_it_feels_gravity_upward_and_the_turning_earth) {
-  ImuNumbers numbers = matched(Numbers{}).imu;
-  numbers.earth_rotation = true;
-  numbers.gyro_noise = 0;
-  const auto series = imu_at_rest(numbers, 60, 7);
+  ImuParameters parameters = matched(Parameters{}).imu;
+  parameters.earth_rotation = true;
+  parameters.gyro_noise = 0;
+  const auto series = imu_at_rest(parameters, 60, 7);
   EXPECT_NEAR(statistics(series[5]).mean, kEarth.gravity_mps2(), 3e-4);
   EXPECT_NEAR(statistics(series[3]).mean, 0, 3e-4);
   EXPECT_NEAR(statistics(series[2]).mean, 7.292115e-5 * std::sin(48.2627 * kPi / 180), 1e-9);
@@ -138,12 +138,12 @@ TEST(Imu, at_rest_it_feels_gravity_upward_and_the_turning_earth) {
 }
 
 TEST(Imu, vibration_grows_with_speed_and_is_none_at_rest) {
-  ImuNumbers numbers = matched(Numbers{}).imu;
-  numbers.accel_noise = {};
-  numbers.vibration_mps2 = 1.5;
-  numbers.rate_hz = 400;
+  ImuParameters parameters = matched(Parameters{}).imu;
+  parameters.accel_noise = {};
+  parameters.vibration_mps2 = 1.5;
+  parameters.rate_hz = 400;
   const auto spread = [&](double speed) {
-    Imu imu{numbers, 0.1, kEarth, 1};
+    Imu imu{parameters, 0.1, kEarth, 1};
     std::vector<double> z;
     base::Micros now;
     for (int i = 0; i < 4000; ++i) {
@@ -167,13 +167,13 @@ Motion rolling(double left_m, double right_m) {
 }
 
 TEST(Wheels, counting_rounds_down_to_a_count_and_never_drifts) {
-  const WheelSensorNumbers numbers;
+  const WheelSensorNumbers parameters;
   const RoverNumbers rover{.radius_difference = 0};
-  const double metres = 2 * kPi * rover.wheel_radius_m / numbers.counts_per_turn;
-  Wheels wheels{numbers, rover, 3};
+  const double metres = 2 * kPi * rover.wheel_radius_m / parameters.counts_per_turn;
+  Wheels wheels{parameters, rover, 3};
   base::Micros now;
-  const app::WheelCounts first = wheels.counts();
-  app::WheelCounts last = first;
+  const sensor::WheelCounts first = wheels.counts();
+  sensor::WheelCounts last = first;
   std::vector<double> error;
   double truth_m = 0;
   std::int64_t left = 0;
@@ -181,7 +181,7 @@ TEST(Wheels, counting_rounds_down_to_a_count_and_never_drifts) {
     const double step_m = 1.234567e-3 * (1 + 0.5 * sim::sin(0.01 * i));
     truth_m += step_m;
     wheels.sense(rolling(step_m, -step_m), now += Rover::kStep, kNoFaults);
-    const app::WheelCounts counts = wheels.counts();
+    const sensor::WheelCounts counts = wheels.counts();
     left += static_cast<std::int16_t>(counts.left - last.left);
     last = counts;
     error.push_back(truth_m / metres - static_cast<double>(left));
@@ -199,15 +199,15 @@ TEST(Wheels, counters_start_anywhere_and_wrap_both_ways) {
 }
 
 TEST(Wheels, matched_noise_has_the_variance_k_per_metre) {
-  const Numbers n = matched(Numbers{});
+  const Parameters n = matched(Parameters{});
   Wheels wheels{n.wheels, n.rover, 3};
   const double metres = 2 * kPi * n.rover.wheel_radius_m / n.wheels.counts_per_turn;
   base::Micros now;
-  app::WheelCounts last = wheels.counts();
+  sensor::WheelCounts last = wheels.counts();
   std::vector<double> left, right;
   for (int i = 0; i < 30'000; ++i) {
     wheels.sense(rolling(0.02, 0.01), now += Rover::kStep, kNoFaults);
-    const app::WheelCounts counts = wheels.counts();
+    const sensor::WheelCounts counts = wheels.counts();
     left.push_back(static_cast<std::int16_t>(counts.left - last.left) * metres - 0.02);
     right.push_back(static_cast<std::int16_t>(counts.right - last.right) * metres - 0.01);
     last = counts;
@@ -220,40 +220,40 @@ TEST(Wheels, matched_noise_has_the_variance_k_per_metre) {
 }
 
 TEST(Wheels, speeds_are_the_counts_differences_over_the_interval) {
-  WheelSensorNumbers numbers;
-  numbers.rate_hz = 50;
-  numbers.counts_per_turn = 1e6;
+  WheelSensorNumbers parameters;
+  parameters.rate_hz = 50;
+  parameters.counts_per_turn = 1e6;
   const RoverNumbers rover{.radius_difference = 0};
-  Wheels a{numbers, rover, 3};
-  Wheels b{numbers, rover, 3};
+  Wheels a{parameters, rover, 3};
+  Wheels b{parameters, rover, 3};
   base::Micros now;
   for (int i = 0; i < 40; ++i) {
     a.sense(rolling(0.8 / 2000, 1.2 / 2000), now += Rover::kStep, kNoFaults);
     b.sense(rolling(0.8 / 2000, 1.2 / 2000), now, kNoFaults);
   }
-  const app::WheelSpeeds speeds = a.wheel_speeds();
+  const sensor::WheelSpeeds speeds = a.wheel_speeds();
   EXPECT_NEAR(speeds.left_mps, 0.8F, 1e-4F);
   EXPECT_NEAR(speeds.right_mps, 1.2F, 1e-4F);
-  const app::BodySpeed body = b.body_speed();
+  const sensor::BodySpeed body = b.body_speed();
   EXPECT_NEAR(body.forward_mps, 1.0F, 1e-4F);
   EXPECT_NEAR(body.yaw_rate_radps, 0.8F, 2e-4F);
 }
 
 TEST(Wheels, slip_is_there_in_curves_and_on_acceleration_and_small) {
   World::Options options{.latency = false};
-  options.numbers.rover.radius_difference = options.numbers.rover.track_error = 0;
+  options.parameters.rover.radius_difference = options.parameters.rover.track_error = 0;
   World world{options, 1};
   std::vector<Measurement> arrived;
   world.advance_to(world.start() + base::Micros{8'500}, arrived);
   double rim = 0, path = 0;
-  const app::WheelCounts* last = nullptr;
+  const sensor::WheelCounts* last = nullptr;
   std::vector<Measurement> all;
   for (base::Micros t = world.start(); t < world.start() + world.duration(); t += base::Micros{10'000}) {
     world.advance_to(t, all);
     path += world.truth().speed_mps * 0.01;
   }
   for (const auto& m : all)
-    if (const auto* c = std::get_if<app::WheelCounts>(&m.value)) {
+    if (const auto* c = std::get_if<sensor::WheelCounts>(&m.value)) {
       if (last)
         rim += 0.5 *
                (static_cast<std::int16_t>(c->left - last->left) + static_cast<std::int16_t>(c->right - last->right)) *
@@ -269,15 +269,15 @@ struct GnssSeries {
   int fixes = 0, outages = 0, lost = 0;
 };
 
-GnssSeries gnss_at_rest(const GnssNumbers& numbers, int samples, std::uint64_t seed) {
-  Gnss gnss{numbers, kEarth, seed};
+GnssSeries gnss_at_rest(const GnssParameters& parameters, int samples, std::uint64_t seed) {
+  Gnss gnss{parameters, kEarth, seed};
   GnssSeries series;
   base::Micros now;
   bool was_lost = false;
   for (int i = 0; i < samples; ++i) {
     const auto reading = gnss.sample({}, {}, now += base::Micros{200'000}, kNoFaults);
     const auto& p = *reading.position;
-    const bool is_lost = p.fix == app::GnssFix::kNone;
+    const bool is_lost = p.fix == sensor::GnssFix::kNone;
     if (is_lost) {
       ++series.lost;
       series.outages += was_lost ? 0 : 1;
@@ -296,10 +296,10 @@ GnssSeries gnss_at_rest(const GnssNumbers& numbers, int samples, std::uint64_t s
 }
 
 TEST(Gnss, error_is_correlated_over_the_stated_time_and_as_large_as_the_receiver_says) {
-  GnssNumbers numbers;
-  numbers.outage_every_s = numbers.glitch_probability = 0;
-  numbers.antenna_b_m = {};
-  const auto s = gnss_at_rest(numbers, 200'000, 2);
+  GnssParameters parameters;
+  parameters.outage_every_s = parameters.glitch_probability = 0;
+  parameters.antenna_b_m = {};
+  const auto s = gnss_at_rest(parameters, 200'000, 2);
   const double total = 0.8 * 0.8 + 0.3 * 0.3;
   EXPECT_NEAR(statistics(s.east).variance / total, 1, 0.15);
   EXPECT_NEAR(statistics(s.north).variance / total, 1, 0.15);
@@ -316,10 +316,10 @@ TEST(Gnss, error_is_correlated_over_the_stated_time_and_as_large_as_the_receiver
 }
 
 TEST(Gnss, outages_and_glitches_come_as_often_as_stated_and_never_at_the_start) {
-  GnssNumbers numbers;
-  numbers.correlated_m = 0;
-  numbers.white_m = 0.1;
-  const auto s = gnss_at_rest(numbers, 100'000, 3);  // 20 000 s
+  GnssParameters parameters;
+  parameters.correlated_m = 0;
+  parameters.white_m = 0.1;
+  const auto s = gnss_at_rest(parameters, 100'000, 3);  // 20 000 s
   EXPECT_NEAR(s.outages, 20'000 / 95.0, 45);
   EXPECT_NEAR(s.lost * 0.2 / s.outages, 5, 0.6);
   const auto glitched =
@@ -330,14 +330,14 @@ TEST(Gnss, outages_and_glitches_come_as_often_as_stated_and_never_at_the_start) 
       }));
   EXPECT_NEAR(glitched / s.fixes, 0.004 * 2.5, 0.003);
   for (std::uint64_t seed = 1; seed <= 50; ++seed) {
-    const auto start = gnss_at_rest(numbers, 99, seed);
+    const auto start = gnss_at_rest(parameters, 99, seed);
     EXPECT_EQ(start.lost, 0);
     for (const double e : start.east) EXPECT_LT(magnitude(e), 1);
   }
 }
 
 TEST(Gnss, in_the_matched_world_it_is_white_with_the_sigma_it_states) {
-  const auto s = gnss_at_rest(matched(Numbers{}).gnss, 40'000, 4);
+  const auto s = gnss_at_rest(matched(Parameters{}).gnss, 40'000, 4);
   EXPECT_EQ(s.fixes, 40'000);
   EXPECT_NEAR(statistics(s.east).variance / (0.85 * 0.85), 1, 0.03);
   EXPECT_NEAR(correlation(s.east, 1), 0, 0.02);
@@ -345,9 +345,9 @@ TEST(Gnss, in_the_matched_world_it_is_white_with_the_sigma_it_states) {
 }
 
 TEST(Gnss, the_antenna_swings_with_the_body) {
-  GnssNumbers numbers = perfect().gnss;
-  numbers.antenna_b_m = {0.3, 0, 0.4};
-  Gnss gnss{numbers, kEarth, 1};
+  GnssParameters parameters = perfect().gnss;
+  parameters.antenna_b_m = {0.3, 0, 0.4};
+  Gnss gnss{parameters, kEarth, 1};
   Truth truth{.roll_rad = 0.1, .yaw_rad = kPi / 2, .v_n_mps = {0, 1, 0}};
   const auto reading = gnss.sample(truth, {0, 0, 0.5}, {200'000}, kNoFaults);
   const auto& p = *reading.position;
@@ -379,7 +379,7 @@ TEST(Camera, sees_what_is_in_range_and_in_view_and_nothing_else) {
 
 TEST(Camera, noise_misses_and_wrong_names_come_as_often_as_stated) {
   for (const bool mismatched : {false, true}) {
-    const CameraNumbers n = mismatched ? CameraNumbers{} : matched(Numbers{}).camera;
+    const CameraNumbers n = mismatched ? CameraNumbers{} : matched(Parameters{}).camera;
     Camera camera{n, parked_course(1).landmarks, 1};
     std::vector<double> range, bearing;
     int wrong = 0;
@@ -403,16 +403,16 @@ TEST(Camera, noise_misses_and_wrong_names_come_as_often_as_stated) {
 }
 
 TEST(Imu, the_biases_of_the_truth_are_what_it_shows_too_much) {
-  ImuNumbers numbers;
-  numbers.gyro_noise = 0;
-  numbers.accel_noise = {};
-  numbers.earth_rotation = false;
-  Imu imu{numbers, 0.1, kEarth, 3};
+  ImuParameters parameters;
+  parameters.gyro_noise = 0;
+  parameters.accel_noise = {};
+  parameters.earth_rotation = false;
+  Imu imu{parameters, 0.1, kEarth, 3};
   base::Micros now;
   const Faults step{{{Fault::kGyroBiasStep, seconds_us(1), seconds_us(1)}}};
   for (int i = 0; i < 300; ++i) {
     for (int k = 0; k < 20; ++k) imu.sense({}, 0, now += Rover::kStep, step);
-    const app::ImuSample s = imu.sample(now, step);
+    const sensor::ImuSample s = imu.sample(now, step);
     const Vector3 gyro = imu.gyro_bias_radps();
     const Vector3 accel = imu.accel_bias_mps2();
     for (std::size_t a = 0; a < 3; ++a) {
@@ -424,11 +424,11 @@ TEST(Imu, the_biases_of_the_truth_are_what_it_shows_too_much) {
 }
 
 TEST(Wheels, an_error_that_is_a_share_of_each_readings_travel_has_that_size_and_no_memory) {
-  WheelSensorNumbers numbers;
-  numbers.counts_per_turn = 2e6;
-  numbers.noise_share = 0.03;
-  numbers.output = WheelOutput::kWheelSpeeds;
-  Wheels wheels{numbers, matched(Numbers{}).rover, 5};
+  WheelSensorNumbers parameters;
+  parameters.counts_per_turn = 2e6;
+  parameters.noise_share = 0.03;
+  parameters.output = WheelOutput::kWheelSpeeds;
+  Wheels wheels{parameters, matched(Parameters{}).rover, 5};
   std::vector<double> errors;
   Motion motion;
   motion.rim_left_m = motion.rim_right_m = 0.001;  // 2 m/s
@@ -450,35 +450,35 @@ MagnetometerNumbers perfect_magnetometer() {
 }
 
 TEST(Magnetometer, a_perfect_one_points_to_magnetic_north_whatever_the_attitude) {
-  const MagnetometerNumbers numbers = perfect_magnetometer();
-  Magnetometer magnetometer{numbers, 1};
+  const MagnetometerNumbers parameters = perfect_magnetometer();
+  Magnetometer magnetometer{parameters, 1};
   for (const Vector3& attitude : {Vector3{0, 0, 0}, {0, 0, 1.2}, {0.2, -0.1, -2.5}, {-0.3, 0.4, 3.0}}) {
     Truth truth;
     truth.roll_rad = attitude[0], truth.pitch_rad = attitude[1], truth.yaw_rad = attitude[2];
-    const app::MagneticFlux flux = magnetometer.sample(truth, {}, kNoFaults);
+    const sensor::MagneticFlux flux = magnetometer.sample(truth, {}, kNoFaults);
     const auto wide = [&flux](std::size_t i) { return static_cast<double>(flux.flux_b_uT[i]); };
     const Vector3 n = to_level(attitude, {wide(0), wide(1), wide(2)});
-    EXPECT_NEAR(sim::atan2(n[0], n[1]), numbers.declination_rad, 1e-6);  // from north towards east
-    EXPECT_NEAR(sim::atan2(-n[2], sim::sqrt(n[0] * n[0] + n[1] * n[1])), numbers.dip_rad, 1e-6);
-    EXPECT_NEAR(sim::sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]), numbers.field_uT, 1e-4);
+    EXPECT_NEAR(sim::atan2(n[0], n[1]), parameters.declination_rad, 1e-6);  // from north towards east
+    EXPECT_NEAR(sim::atan2(-n[2], sim::sqrt(n[0] * n[0] + n[1] * n[1])), parameters.dip_rad, 1e-6);
+    EXPECT_NEAR(sim::sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]), parameters.field_uT, 1e-4);
   }
 }
 
 TEST(Magnetometer, its_errors_are_as_large_as_stated) {
-  MagnetometerNumbers numbers = perfect_magnetometer();
-  numbers.noise_uT = 0.3;
-  Magnetometer noisy{numbers, 2};
+  MagnetometerNumbers parameters = perfect_magnetometer();
+  parameters.noise_uT = 0.3;
+  Magnetometer noisy{parameters, 2};
   Magnetometer clean{perfect_magnetometer(), 2};
   std::vector<double> noise;
   for (int i = 0; i < 20'000; ++i)
     noise.push_back(static_cast<double>(noisy.sample({}, {}, kNoFaults).flux_b_uT[0]) -
                     static_cast<double>(clean.sample({}, {}, kNoFaults).flux_b_uT[0]));
   EXPECT_NEAR(statistics(noise).variance / 0.09, 1, 0.05);
-  numbers.noise_uT = 0;
-  numbers.hard_iron_uT = 0.8;
+  parameters.noise_uT = 0;
+  parameters.hard_iron_uT = 0.8;
   std::vector<double> iron;
   for (std::uint64_t seed = 0; seed < 2'000; ++seed) {
-    Magnetometer one{numbers, seed};
+    Magnetometer one{parameters, seed};
     const float first = one.sample({}, {}, kNoFaults).flux_b_uT[1];
     ASSERT_EQ(one.sample({}, {}, kNoFaults).flux_b_uT[1], first) << "it stays";
     iron.push_back(static_cast<double>(first) - static_cast<double>(clean.sample({}, {}, kNoFaults).flux_b_uT[1]));
@@ -488,9 +488,9 @@ TEST(Magnetometer, its_errors_are_as_large_as_stated) {
 }
 
 TEST(Magnetometer, iron_in_the_ground_changes_while_the_rover_drives_and_not_while_it_stands) {
-  MagnetometerNumbers numbers = perfect_magnetometer();
-  numbers.local_uT = 1;
-  Magnetometer magnetometer{numbers, 4};
+  MagnetometerNumbers parameters = perfect_magnetometer();
+  parameters.local_uT = 1;
+  Magnetometer magnetometer{parameters, 4};
   Truth truth;
   const auto flux = [&] { return static_cast<double>(magnetometer.sample(truth, {}, kNoFaults).flux_b_uT[0]); };
   const double parked = flux();
@@ -502,26 +502,26 @@ TEST(Magnetometer, iron_in_the_ground_changes_while_the_rover_drives_and_not_whi
 }
 
 TEST(Barometer, a_perfect_one_is_the_standard_atmosphere) {
-  BarometerNumbers numbers;
-  numbers.rate_hz = 10;
-  numbers.noise_Pa = numbers.turn_on_Pa = numbers.drift_Pa = 0;
+  BarometerNumbers parameters;
+  parameters.rate_hz = 10;
+  parameters.noise_Pa = parameters.turn_on_Pa = parameters.drift_Pa = 0;
   // ISO 2533, table 5: 95 460.8 Pa at 500 m, 89 874.6 Pa at 1000 m (of geopotential height).
-  EXPECT_NEAR(static_cast<double>(Barometer(numbers, 500, 1).sample({}).pressure_Pa), 95'460.8, 2);
-  EXPECT_NEAR(static_cast<double>(Barometer(numbers, 1000, 1).sample({}).pressure_Pa), 89'874.6, 2);
+  EXPECT_NEAR(static_cast<double>(Barometer(parameters, 500, 1).sample({}).pressure_Pa), 95'460.8, 2);
+  EXPECT_NEAR(static_cast<double>(Barometer(parameters, 1000, 1).sample({}).pressure_Pa), 89'874.6, 2);
   Truth higher;
   higher.z_m = 10;
-  const double per_metre = (static_cast<double>(Barometer(numbers, 520, 1).sample(higher).pressure_Pa) -
-                            static_cast<double>(Barometer(numbers, 520, 1).sample({}).pressure_Pa)) /
+  const double per_metre = (static_cast<double>(Barometer(parameters, 520, 1).sample(higher).pressure_Pa) -
+                            static_cast<double>(Barometer(parameters, 520, 1).sample({}).pressure_Pa)) /
                            10;
   EXPECT_NEAR(per_metre, -11.43, 0.05);
 }
 
 TEST(Barometer, noise_offset_and_drift_are_as_large_as_stated) {
-  BarometerNumbers numbers;
-  numbers.rate_hz = 10;
+  BarometerNumbers parameters;
+  parameters.rate_hz = 10;
   std::vector<double> offsets, noise;
   for (std::uint64_t seed = 0; seed < 1'000; ++seed) {
-    Barometer barometer{numbers, 520, seed};
+    Barometer barometer{parameters, 520, seed};
     const auto pressure = [&] { return static_cast<double>(barometer.sample({}).pressure_Pa); };
     const double first = pressure();
     offsets.push_back(first);

@@ -32,31 +32,31 @@ class Hash {
   [[nodiscard]] std::uint64_t value() const { return hash_; }
 
  private:
-  void fields(const app::ImuSample& s) {
+  void fields(const sensor::ImuSample& s) {
     add(std::uint64_t{s.interval_us});
     for (const float x : s.dangle_b_rad) add(x);
     for (const float x : s.dvelocity_b_mps) add(x);
     add(s.temperature_degC);
     add(std::uint64_t{s.clipped_gyro} | std::uint64_t{s.clipped_accel} << 8);
   }
-  void fields(const app::WheelCounts& s) { add(std::uint64_t{s.left} | std::uint64_t{s.right} << 16); }
-  void fields(const app::WheelSpeeds& s) { add(s.left_mps), add(s.right_mps); }
-  void fields(const app::BodySpeed& s) { add(s.forward_mps), add(s.yaw_rate_radps); }
-  void fields(const app::GnssPosition& s) {
+  void fields(const sensor::WheelCounts& s) { add(std::uint64_t{s.left} | std::uint64_t{s.right} << 16); }
+  void fields(const sensor::WheelSpeeds& s) { add(s.left_mps), add(s.right_mps); }
+  void fields(const sensor::BodySpeed& s) { add(s.forward_mps), add(s.yaw_rate_radps); }
+  void fields(const sensor::GnssPosition& s) {
     add(static_cast<std::uint64_t>(s.latitude_2ndeg));
     add(static_cast<std::uint64_t>(s.longitude_2ndeg));
     for (const float x : {s.height_m, s.horizontal_acc_m, s.vertical_acc_m}) add(x);
     add(static_cast<std::uint64_t>(s.fix) | std::uint64_t{s.satellites} << 8);
   }
-  void fields(const app::GnssVelocity& s) {
+  void fields(const sensor::GnssVelocity& s) {
     for (const float x : s.v_n_mps) add(x);
     add(s.acc_mps);
   }
-  void fields(const app::MagneticFlux& s) {
+  void fields(const sensor::MagneticFlux& s) {
     for (const float x : s.flux_b_uT) add(x);
   }
-  void fields(const app::AirPressure& s) { add(s.pressure_Pa), add(s.temperature_degC); }
-  void fields(const app::LandmarkSighting& s) { add(std::uint64_t{s.landmark}), add(s.range_m), add(s.bearing_rad); }
+  void fields(const sensor::AirPressure& s) { add(s.pressure_Pa), add(s.temperature_degC); }
+  void fields(const sensor::LandmarkSighting& s) { add(std::uint64_t{s.landmark}), add(s.range_m), add(s.bearing_rad); }
 
   std::uint64_t hash_ = 0xCBF29CE484222325U;
 };
@@ -81,8 +81,8 @@ inline std::uint64_t hash(const std::vector<Measurement>& all) {
 inline bool same(const Measurement& a, const Measurement& b) { return hash({a}) == hash({b}); }
 
 /// No noise, no slip, no wander, a start as planned: what is left is geometry.
-inline Numbers perfect() {
-  Numbers n = matched(Numbers{});
+inline Parameters perfect() {
+  Parameters n = matched(Parameters{});
   n.rover.driver_wander_m = n.rover.start_m = n.rover.start_rad = 0;
   n.imu.gyro_noise = 0;
   n.imu.accel_noise = {};

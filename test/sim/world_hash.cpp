@@ -13,8 +13,8 @@ int main() {
   Hash h;
   for (const bool mismatched : {false, true}) {
     World::Options options{.mismatched = mismatched};
-    options.numbers.magnetometer.rate_hz = 20;
-    options.numbers.barometer.rate_hz = 10;
+    options.parameters.magnetometer.rate_hz = 20;
+    options.parameters.barometer.rate_hz = 10;
     for (const auto& row : fault_table())
       options.faults.push_back({row.fault, seconds_us(row.start_s), seconds_us(row.duration_s)});
     World world{options, 42};

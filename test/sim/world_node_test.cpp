@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The node with the simulated world's frames: samples of several frames, late fixes, faults. Order of arrival leaves no
 // trace; and the 1 sigma of the motion says how far it is off.
-#include "app/node.hpp"
+#include "node/node.hpp"
 #include "sim_host/matched_rover.hpp"
 #include "sim_host/world_source.hpp"
 
@@ -31,7 +31,7 @@ struct Epoch {
 };
 
 std::vector<Epoch> made(const World::Options& options, std::uint64_t seed, int seconds) {
-  WorldSource source(World(options, seed), app::Numbers{}.can_base, kPeriod, base::Micros{1'000'000LL * seconds});
+  WorldSource source(World(options, seed), param::Parameters{}.can_base, kPeriod, base::Micros{1'000'000LL * seconds});
   std::vector<Epoch> epochs;
   Tick tick;
   while (source.next(tick)) {
@@ -45,7 +45,7 @@ std::vector<Epoch> made(const World::Options& options, std::uint64_t seed, int s
 
 struct Robot {
   const char* name;
-  app::Numbers numbers;
+  param::Parameters parameters;
   bool inertial;
 };
 void PrintTo(const Robot& robot, std::ostream* out) { *out << robot.name; }
@@ -70,8 +70,8 @@ std::string first_difference(const std::vector<base::CanFrame>& a, const std::ve
 
 /// hear(k, frame) gets every frame of epoch k.
 template <class Estimators, class Hear>
-void run_as(const app::Numbers& numbers, const std::vector<Epoch>& epochs, Hear& hear) {
-  const auto node = std::make_unique<app::Node<Estimators>>(numbers, app::Version{});
+void run_as(const param::Parameters& parameters, const std::vector<Epoch>& epochs, Hear& hear) {
+  const auto node = std::make_unique<node::Node<Estimators>>(parameters, bus::Version{});
   for (std::size_t k = 0; k < epochs.size(); ++k) {
     if (epochs[k].tick.begin) node->power_on(*epochs[k].tick.begin);
     for (const base::CanFrame& frame : epochs[k].inputs) node->on_frame(frame);
@@ -80,8 +80,8 @@ void run_as(const app::Numbers& numbers, const std::vector<Epoch>& epochs, Hear&
 }
 template <class Hear>
 void run(const Robot& robot, const std::vector<Epoch>& epochs, Hear&& hear) {
-  if (robot.inertial) return run_as<robot::rover::Estimators>(robot.numbers, epochs, hear);
-  run_as<robot::rover_landmarks::Estimators>(robot.numbers, epochs, hear);
+  if (robot.inertial) return run_as<robot::rover::Estimators>(robot.parameters, epochs, hear);
+  run_as<robot::rover_landmarks::Estimators>(robot.parameters, epochs, hear);
 }
 
 std::vector<base::CanFrame> outputs(const Robot& robot, const std::vector<Epoch>& epochs) {
@@ -95,7 +95,7 @@ class Order : public ::testing::TestWithParam<Robot> {};
 // IMU samples of three frames, fixes of four and two that come late, lost frames, another clock for a while.
 TEST_P(Order, OfArrivalWithinAnEpochHasNoEffectOnAnyByte) {
   World::Options options;
-  options.numbers.imu.rate_hz = 200;
+  options.parameters.imu.rate_hz = 200;
   options.faults = {{Fault::kLostFrames, base::Micros{4'000'000}, base::Micros{6'000'000}},
                     {Fault::kGnssJump, base::Micros{12'000'000}, base::Micros{4'000'000}},
                     {Fault::kStaleStamps, base::Micros{18'000'000}, base::Micros{2'000'000}},
@@ -116,8 +116,8 @@ TEST_P(Order, OfArrivalWithinAnEpochHasNoEffectOnAnyByte) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Robots, Order,
-                         ::testing::Values(Robot{"rover", robot::rover::numbers, true},
-                                           Robot{"rover_landmarks", robot::rover_landmarks::numbers, false}),
+                         ::testing::Values(Robot{"rover", robot::rover::parameters, true},
+                                           Robot{"rover_landmarks", robot::rover_landmarks::parameters, false}),
                          [](const auto& which) { return std::string(which.param.name); });
 
 /// By epoch, the pages of Est_State; and whether attitude, velocity and Est_Std were in all of those epochs.
@@ -128,11 +128,11 @@ struct SaidPages {
 SaidPages pages_of(const std::vector<Epoch>& epochs) {
   SaidPages said;
   std::map<std::size_t, std::set<std::uint32_t>> offsets;
-  run({"rover", robot::rover::numbers, true}, epochs, [&](std::size_t k, const base::CanFrame& frame) {
-    const std::uint32_t offset = frame.id - robot::rover::numbers.can_base;
-    if (offset == can::offset_of<can::EstStateHeight>(2)) said.pages[k].insert(frame.data[0] & 0xFU);
-    if (offset == can::offset_of<can::EstStdPose>(2)) offsets[k].insert(offset + 100 * (frame.data[0] & 1U));
-    if (offset == can::offset_of<can::EstAtt>(2) || offset == can::offset_of<can::EstVel>(2)) offsets[k].insert(offset);
+  run({"rover", robot::rover::parameters, true}, epochs, [&](std::size_t k, const base::CanFrame& frame) {
+    const std::uint32_t offset = frame.id - robot::rover::parameters.can_base;
+    if (offset == bus::offset_of<bus::EstStateHeight>(2)) said.pages[k].insert(frame.data[0] & 0xFU);
+    if (offset == bus::offset_of<bus::EstStdPose>(2)) offsets[k].insert(offset + 100 * (frame.data[0] & 1U));
+    if (offset == bus::offset_of<bus::EstAtt>(2) || offset == bus::offset_of<bus::EstVel>(2)) offsets[k].insert(offset);
   });
   for (const auto& [k, pages] : said.pages) said.whole = said.whole && offsets[k].size() == 4;
   return said;
@@ -163,25 +163,25 @@ TEST(Covariance, ComesWithWhatItJudgesInTurnsThatTheEpochSays) {
 // An IMU at 200 Hz, a window of half a second: what the receiver said 480 ms ago is fused at its own time, so nothing
 // of the estimate tells when it came.
 template <std::size_t kPlaces>
-using RoverWith = app::EstimatorsWithPlaces<kPlaces, app::Odometry, robot::rover::Attitude, robot::rover::Inertial>;
+using RoverWith = node::EstimatorsWithPlaces<kPlaces, estimators::Odometry, robot::rover::Attitude, robot::rover::Inertial>;
 
 /// How often samples became final early for want of places, if that frame says so.
 int short_windows(const base::CanFrame& frame) {
-  if (frame.id != 0x300 + can::EstDiagCapacity::kOffset) return 0;
-  const auto full = can::decode<can::EstDiagCapacity>(can::payload(frame));
+  if (frame.id != 0x300 + bus::EstDiagCapacity::kOffset) return 0;
+  const auto full = bus::decode<bus::EstDiagCapacity>(bus::payload(frame));
   return full ? full->window_short + full->timeline_full : 0;
 }
 template <class Estimators>
 int short_windows(const std::vector<Epoch>& epochs) {
   int count = 0;
   const auto hear = [&count](std::size_t, const base::CanFrame& frame) { count += short_windows(frame); };
-  run_as<Estimators>(robot::rover::numbers, epochs, hear);
+  run_as<Estimators>(robot::rover::parameters, epochs, hear);
   return count;
 }
 
 TEST(Late, AnImuAt400HzHasPlaceWhereTheRobotSaysSo) {
   World::Options options;
-  options.numbers.imu.rate_hz = 400;
+  options.parameters.imu.rate_hz = 400;
   const std::vector<Epoch> epochs = made(options, 4, 20);
   EXPECT_EQ(short_windows<RoverWith<128>>(epochs), 0);
   EXPECT_GT(short_windows<robot::rover::Estimators>(epochs), 0) << "88 places hold 200 ms of 200 Hz";
@@ -189,15 +189,15 @@ TEST(Late, AnImuAt400HzHasPlaceWhereTheRobotSaysSo) {
 
 TEST(Late, AFixOfAlmostHalfASecondAgoLeavesTheBytesOfOneOnTime) {
   World::Options options;
-  options.numbers.imu.rate_hz = 200;
-  options.numbers = without_latency(options.numbers);
-  app::Numbers numbers = robot::rover::numbers;
-  numbers.loop.window_us = 500'000;
+  options.parameters.imu.rate_hz = 200;
+  options.parameters = without_latency(options.parameters);
+  param::Parameters parameters = robot::rover::parameters;
+  parameters.loop.window_us = 500'000;
   const std::vector<Epoch> on_time = made(options, 4, 40);
   std::vector<Epoch> late = on_time;
   const auto of_gnss = [](const base::CanFrame& frame) {
     const auto offset = frame.id - 0x300;
-    return offset >= can::offset_of<can::InGnssLat>(0) && offset <= can::offset_of<can::InGnssVelU>(0);
+    return offset >= bus::offset_of<bus::InGnssLat>(0) && offset <= bus::offset_of<bus::InGnssVelU>(0);
   };
   constexpr std::size_t kLate = 48;
   std::size_t moved = 0;
@@ -212,12 +212,12 @@ TEST(Late, AFixOfAlmostHalfASecondAgoLeavesTheBytesOfOneOnTime) {
     const auto hear = [&](std::size_t, const base::CanFrame& frame) {
       constexpr std::size_t kFused = 2;
       without_place += short_windows(frame);
-      if (frame.id == 0x300 + can::offset_of<can::EstPos>(kFused) ||
-          frame.id == 0x300 + can::offset_of<can::EstMotion>(kFused) ||
-          frame.id == 0x300 + can::offset_of<can::EstStdPose>(kFused))
+      if (frame.id == 0x300 + bus::offset_of<bus::EstPos>(kFused) ||
+          frame.id == 0x300 + bus::offset_of<bus::EstMotion>(kFused) ||
+          frame.id == 0x300 + bus::offset_of<bus::EstStdPose>(kFused))
         all.push_back(frame);
     };
-    run_as<RoverWith<176>>(numbers, epochs, hear);
+    run_as<RoverWith<176>>(parameters, epochs, hear);
     EXPECT_EQ(without_place, 0);
     return all;
   };
@@ -230,18 +230,18 @@ TEST(Late, AFixOfAlmostHalfASecondAgoLeavesTheBytesOfOneOnTime) {
 // would be the same trembling of the body a second time, and the velocity too sure by it.
 TEST(Constraint, WhatWheelsBringIsNotTakenTwice) {
   World::Options options{.mismatched = false, .inertial = true};
-  options.numbers.imu.rate_hz = 200;
+  options.parameters.imu.rate_hz = 200;
   const std::vector<Epoch> epochs = made(options, 1, 40);
   const auto sigma_up_mps = [&](std::int32_t constrain_every_us) {
-    app::Numbers numbers = matched_rover();
-    numbers.inertial.constrain_every_us = constrain_every_us;
+    param::Parameters parameters = matched_rover();
+    parameters.inertial.constrain_every_us = constrain_every_us;
     float last = 0;
     const auto hear = [&last](std::size_t, const base::CanFrame& frame) {
       constexpr std::size_t kFused = 2;
-      if (frame.id != 0x300 + can::offset_of<can::EstStateStdVel>(kFused)) return;
-      if (const auto page = can::decode<can::EstStateStdVel>(can::payload(frame))) last = page->std_vel_up_mps;
+      if (frame.id != 0x300 + bus::offset_of<bus::EstStateStdVel>(kFused)) return;
+      if (const auto page = bus::decode<bus::EstStateStdVel>(bus::payload(frame))) last = page->std_vel_up_mps;
     };
-    run_as<robot::rover::Estimators>(numbers, epochs, hear);
+    run_as<robot::rover::Estimators>(parameters, epochs, hear);
     return last;
   };
   const float alone = sigma_up_mps(0), both = sigma_up_mps(20'000);
@@ -259,14 +259,14 @@ TEST(Motion, TheOneSigmaOfSpeedAndTurnRateIsThatOfTheirErrors) {
     std::map<std::size_t, Sum> sums;
     for (std::uint64_t seed = 1; seed <= 4; ++seed) {
       const std::vector<Epoch> epochs = made({.mismatched = false, .inertial = robot.inertial}, seed, 60);
-      std::map<std::size_t, can::EstMotion> motion;
+      std::map<std::size_t, bus::EstMotion> motion;
       run(robot, epochs, [&](std::size_t k, const base::CanFrame& frame) {
         if (k < 500) return;  // it stands, then drives
         for (std::size_t i = 0; i < 4; ++i) {
-          if (frame.id == 0x300 + can::offset_of<can::EstMotion>(i))
-            if (const auto said = can::decode<can::EstMotion>(can::payload(frame))) motion[i] = *said;
-          if (frame.id != 0x300 + can::offset_of<can::EstStdMore>(i)) continue;
-          const auto std = can::decode<can::EstStdMore>(can::payload(frame));
+          if (frame.id == 0x300 + bus::offset_of<bus::EstMotion>(i))
+            if (const auto said = bus::decode<bus::EstMotion>(bus::payload(frame))) motion[i] = *said;
+          if (frame.id != 0x300 + bus::offset_of<bus::EstStdMore>(i)) continue;
+          const auto std = bus::decode<bus::EstStdMore>(bus::payload(frame));
           if (!std || !motion[i].vel_valid || std->std_speed_mps < 1e-3F) continue;  // Speed itself has steps of 1 mm/s
           const auto square = [](float said, double truth, float sigma) {
             const double z = (static_cast<double>(said) - truth) / static_cast<double>(sigma);
@@ -297,15 +297,15 @@ TEST(Motion, TheOneSigmaOfSpeedAndTurnRateGrowsWithTheirErrorsWhereTheImuIsStuck
     for (std::uint64_t seed = 1; seed <= 3; ++seed) {
       World::Options options;
       options.faults = {{Fault::kImuStuck, base::Micros{40'000'000}, base::Micros{10'000'000}}};
-      if (!wheels) options.numbers.wheels.rate_hz = 0;
+      if (!wheels) options.parameters.wheels.rate_hz = 0;
       const std::vector<Epoch> epochs = made(options, seed, 52);
-      std::optional<can::EstMotion> motion;
-      run(Robot{"rover", robot::rover::numbers, true}, epochs, [&](std::size_t k, const base::CanFrame& frame) {
+      std::optional<bus::EstMotion> motion;
+      run(Robot{"rover", robot::rover::parameters, true}, epochs, [&](std::size_t k, const base::CanFrame& frame) {
         constexpr std::size_t kFused = 2;
-        if (frame.id == 0x300 + can::offset_of<can::EstMotion>(kFused))
-          motion = can::decode<can::EstMotion>(can::payload(frame));
-        if (k < 4100 || k > 4990 || frame.id != 0x300 + can::offset_of<can::EstStdMore>(kFused)) return;
-        const auto std = can::decode<can::EstStdMore>(can::payload(frame));
+        if (frame.id == 0x300 + bus::offset_of<bus::EstMotion>(kFused))
+          motion = bus::decode<bus::EstMotion>(bus::payload(frame));
+        if (k < 4100 || k > 4990 || frame.id != 0x300 + bus::offset_of<bus::EstStdMore>(kFused)) return;
+        const auto std = bus::decode<bus::EstStdMore>(bus::payload(frame));
         if (!std || !motion) return;
         const auto square = [](double error, float sigma) {
           return error * error / static_cast<double>(sigma * sigma);
@@ -334,25 +334,25 @@ TEST(Motion, WheelsWhoseReadingsScatterDoNotSlowTheRobot) {
     double off_mps = 0, count = 0;
     for (std::uint64_t seed = 1; seed <= 8; ++seed) {
       World::Options options{.mismatched = false, .inertial = true};
-      options.numbers.gnss.rate_hz = 0;
+      options.parameters.gnss.rate_hz = 0;
       Robot robot{"matched", matched_rover(), true};
-      robot.numbers.start = {.known = 1};
+      robot.parameters.start = {.known = 1};
       if (!counts) {
         constexpr double kShare = 0.2;
-        options.numbers.wheels.output = WheelOutput::kWheelSpeeds;
-        options.numbers.wheels.noise_share = kShare;
-        robot.numbers.inertial.slip_share = static_cast<float>(kShare / 1.4142);  // two wheels
+        options.parameters.wheels.output = WheelOutput::kWheelSpeeds;
+        options.parameters.wheels.noise_share = kShare;
+        robot.parameters.inertial.slip_share = static_cast<float>(kShare / 1.4142);  // two wheels
       }
       const std::vector<Epoch> epochs = made(options, seed, 60);
       const auto hear = [&](std::size_t k, const base::CanFrame& frame) {
-        if (k < 1500 || frame.id != 0x300 + can::offset_of<can::EstMotion>(1) || epochs[k].truth.speed_mps < 0.5)
+        if (k < 1500 || frame.id != 0x300 + bus::offset_of<bus::EstMotion>(1) || epochs[k].truth.speed_mps < 0.5)
           return;
-        const auto said = can::decode<can::EstMotion>(can::payload(frame));
+        const auto said = bus::decode<bus::EstMotion>(bus::payload(frame));
         if (!said || !said->vel_valid) return;
         off_mps += static_cast<double>(said->speed_mps) - epochs[k].truth.speed_mps;
         count += 1;
       };
-      run_as<app::Estimators<app::Odometry, app::Inertial>>(robot.numbers, epochs, hear);
+      run_as<node::Estimators<estimators::Odometry, estimators::Inertial>>(robot.parameters, epochs, hear);
     }
     std::printf("%s: speed off by %.2f mm/s in the mean of %.0f\n", counts ? "counts" : "speeds", 1e3 * off_mps / count,
                 count);
@@ -364,16 +364,16 @@ TEST(Motion, WheelsWhoseReadingsScatterDoNotSlowTheRobot) {
 // With fixes of 1 cm, wheels that stand and a gyroscope: nothing of that tells a heading, nor takes it away; whether
 // the body is still or an engine shakes it.
 TEST(Standstill, NeitherTellsAHeadingNorCostsOne) {
-  for (const Robot& robot : {Robot{"rover", robot::rover::numbers, true}, Robot{"matched", matched_rover(), true},
-                             Robot{"trembling", robot::rover::numbers, true}}) {
+  for (const Robot& robot : {Robot{"rover", robot::rover::parameters, true}, Robot{"matched", matched_rover(), true},
+                             Robot{"trembling", robot::rover::parameters, true}}) {
     World::Options options{.mismatched = robot.name != std::string("matched"), .inertial = true};
     if (robot.name == std::string("trembling")) {
-      options.numbers.imu.accel_range_mps2 = 16 * kG0;
-      options.numbers.rover.jitter_mps = options.numbers.rover.jitter_ahead_mps = kTrembles_mps;
+      options.parameters.imu.accel_range_mps2 = 16 * kG0;
+      options.parameters.rover.jitter_mps = options.parameters.rover.jitter_ahead_mps = kTrembles_mps;
     }
     options.course.waypoints.front().stop_s = 1e6;
-    options.numbers.gnss = with_error(options.numbers.gnss, 0.01);
-    options.numbers.gnss.rate_hz = 10;
+    options.parameters.gnss = with_error(options.parameters.gnss, 0.01);
+    options.parameters.gnss.rate_hz = 10;
     const std::vector<Epoch> epochs = made(options, 2, 300);
     ASSERT_EQ(epochs.size(), 30'000U);
     EXPECT_LT(std::abs(epochs.back().truth.x_m - epochs.front().truth.x_m),
@@ -381,10 +381,10 @@ TEST(Standstill, NeitherTellsAHeadingNorCostsOne) {
     std::map<std::size_t, float> sigma_rad, yaw_rad;  // by epoch
     run(robot, epochs, [&](std::size_t k, const base::CanFrame& frame) {
       constexpr std::size_t kFused = 2;
-      if (frame.id == 0x300 + can::offset_of<can::EstStdPose>(kFused))
-        if (const auto std = can::decode<can::EstStdPose>(can::payload(frame))) sigma_rad[k] = std->std_yaw_rad;
-      if (frame.id == 0x300 + can::offset_of<can::EstMotion>(kFused))
-        if (const auto said = can::decode<can::EstMotion>(can::payload(frame))) yaw_rad[k] = said->yaw_rad;
+      if (frame.id == 0x300 + bus::offset_of<bus::EstStdPose>(kFused))
+        if (const auto std = bus::decode<bus::EstStdPose>(bus::payload(frame))) sigma_rad[k] = std->std_yaw_rad;
+      if (frame.id == 0x300 + bus::offset_of<bus::EstMotion>(kFused))
+        if (const auto said = bus::decode<bus::EstMotion>(bus::payload(frame))) yaw_rad[k] = said->yaw_rad;
     });
     const auto from_s = [](const std::map<std::size_t, float>& said, std::size_t s) {
       return said.lower_bound(100 * s)->second;

@@ -12,7 +12,7 @@
 namespace tetap::sim {
 namespace {
 
-World::Options quiet(Numbers numbers = perfect()) { return {.mismatched = true, .latency = false, .numbers = numbers}; }
+World::Options quiet(Parameters parameters = perfect()) { return {.mismatched = true, .latency = false, .parameters = parameters}; }
 
 double distance_m(const Truth& a, const Truth& b) {
   return sim::sqrt((a.x_m - b.x_m) * (a.x_m - b.x_m) + (a.y_m - b.y_m) * (a.y_m - b.y_m));
@@ -81,7 +81,7 @@ TEST(World, without_slip_the_wheels_travel_what_the_rover_travels) {
   std::vector<Measurement> arrived;
   world.advance_to(world.start() + base::Micros{8'500}, arrived);
   double left = 0, right = 0, path = 0, turned = 0;
-  std::optional<app::WheelCounts> last;
+  std::optional<sensor::WheelCounts> last;
   Truth before = world.truth();
   for (base::Micros t = world.start() + base::Micros{8'500}; t < world.start() + world.duration();
        t += base::Micros{10'000}) {
@@ -92,7 +92,7 @@ TEST(World, without_slip_the_wheels_travel_what_the_rover_travels) {
     turned += wrap(now.yaw_rad - before.yaw_rad);
     before = now;
     for (const auto& m : arrived)
-      if (const auto* counts = std::get_if<app::WheelCounts>(&m.value)) {
+      if (const auto* counts = std::get_if<sensor::WheelCounts>(&m.value)) {
         if (last) {
           left += static_cast<std::int16_t>(counts->left - last->left) * 2 * kPi * 0.1 / 20000;
           right += static_cast<std::int16_t>(counts->right - last->right) * 2 * kPi * 0.1 / 20000;
@@ -106,16 +106,16 @@ TEST(World, without_slip_the_wheels_travel_what_the_rover_travels) {
 }
 
 TEST(World, unequal_wheels_and_a_wrong_track_show_in_the_counts_as_large_as_stated) {
-  Numbers numbers = perfect();
-  numbers.rover.radius_difference = 0.005;
-  numbers.rover.track_error = 0.01;
-  World::Options options = quiet(numbers);
+  Parameters parameters = perfect();
+  parameters.rover.radius_difference = 0.005;
+  parameters.rover.track_error = 0.01;
+  World::Options options = quiet(parameters);
   options.course = {.waypoints = {{.x_m = 0, .stop_s = 1}, {.x_m = 100, .stop_s = 1}}, .landmarks = {}};
   const auto travel = [](const std::vector<Measurement>& all) {
     std::array<double, 2> sum{};
-    const app::WheelCounts* last = nullptr;
+    const sensor::WheelCounts* last = nullptr;
     for (const auto& m : all)
-      if (const auto* c = std::get_if<app::WheelCounts>(&m.value)) {
+      if (const auto* c = std::get_if<sensor::WheelCounts>(&m.value)) {
         if (last)
           sum[0] += static_cast<std::int16_t>(c->left - last->left),
               sum[1] += static_cast<std::int16_t>(c->right - last->right);
@@ -128,8 +128,8 @@ TEST(World, unequal_wheels_and_a_wrong_track_show_in_the_counts_as_large_as_stat
   EXPECT_NEAR(straight[0], 100 / 1.0025, 0.02);
   EXPECT_NEAR(straight[1], 100 / 0.9975, 0.02);
 
-  numbers.rover.radius_difference = 0;
-  options = quiet(numbers);
+  parameters.rover.radius_difference = 0;
+  options = quiet(parameters);
   options.course = circle_course(4, 4);
   World world{options, 1};
   std::vector<Measurement> all;
@@ -144,7 +144,7 @@ struct Strapdown {
   Vector3 v{}, p{};
   double gravity = 0;
 
-  void advance(const app::ImuSample& s, double t) {
+  void advance(const sensor::ImuSample& s, double t) {
     const Vector3 w{static_cast<double>(s.dangle_b_rad[0]), static_cast<double>(s.dangle_b_rad[1]),
                     static_cast<double>(s.dangle_b_rad[2])};
     const Vector3 f{static_cast<double>(s.dvelocity_b_mps[0]), static_cast<double>(s.dvelocity_b_mps[1]),
@@ -169,10 +169,10 @@ struct Strapdown {
 };
 
 TEST(World, a_perfect_imu_integrates_to_the_truth) {
-  Numbers numbers = perfect();
-  numbers.rover = RoverNumbers{};  // lean, side slip, uneven ground and all
-  numbers.imu.rate_hz = 200;
-  World::Options options = quiet(numbers);
+  Parameters parameters = perfect();
+  parameters.rover = RoverNumbers{};  // lean, side slip, uneven ground and all
+  parameters.imu.rate_hz = 200;
+  World::Options options = quiet(parameters);
   World world{options, 11};
   std::vector<Measurement> arrived;
   // The IMU's intervals end 3.5 ms after each full 5 ms: start between two of them, at rest.
@@ -187,7 +187,7 @@ TEST(World, a_perfect_imu_integrates_to_the_truth) {
     if (t == begin) continue;
     world.advance_to(t, arrived);
     for (const auto& m : arrived)
-      if (const auto* s = std::get_if<app::ImuSample>(&m.value)) strapdown.advance(*s, 0.005);
+      if (const auto* s = std::get_if<sensor::ImuSample>(&m.value)) strapdown.advance(*s, 0.005);
   }
   const Truth end = world.truth();
   EXPECT_NEAR(wrap(strapdown.attitude[2] - end.yaw_rad), 0, 1e-5);
@@ -201,10 +201,10 @@ TEST(World, a_perfect_imu_integrates_to_the_truth) {
 }
 
 TEST(World, perfect_gnss_and_camera_say_the_truth_of_their_stamp) {
-  Numbers numbers = perfect();
-  numbers.rover = RoverNumbers{};
-  numbers.gnss.antenna_b_m = {0.3, 0.1, 0.4};
-  World::Options options = quiet(numbers);
+  Parameters parameters = perfect();
+  parameters.rover = RoverNumbers{};
+  parameters.gnss.antenna_b_m = {0.3, 0.1, 0.4};
+  World::Options options = quiet(parameters);
   World world{options, 13};
   const Wgs84 earth{options.origin};
   std::vector<Measurement> arrived;
@@ -214,21 +214,21 @@ TEST(World, perfect_gnss_and_camera_say_the_truth_of_their_stamp) {
     arrived.clear();
     world.advance_to(t, arrived);
     const Truth truth = world.truth();
-    const Vector3 lever = to_level({truth.roll_rad, truth.pitch_rad, truth.yaw_rad}, numbers.gnss.antenna_b_m);
+    const Vector3 lever = to_level({truth.roll_rad, truth.pitch_rad, truth.yaw_rad}, parameters.gnss.antenna_b_m);
     const Vector3 now{truth.x_m + lever[0], truth.y_m + lever[1], truth.z_m + lever[2]};
     for (const auto& m : arrived) {
-      if (const auto* p = std::get_if<app::GnssPosition>(&m.value)) {
+      if (const auto* p = std::get_if<sensor::GnssPosition>(&m.value)) {
         const auto enu = earth.enu_m({p->latitude_2ndeg, p->longitude_2ndeg, static_cast<double>(p->height_m)});
         ASSERT_NEAR(enu[0], now[0], 2e-4);
         ASSERT_NEAR(enu[1], now[1], 2e-4);
         ASSERT_NEAR(enu[2], now[2], 2e-4);
         ++positions;
-      } else if (const auto* v = std::get_if<app::GnssVelocity>(&m.value)) {
+      } else if (const auto* v = std::get_if<sensor::GnssVelocity>(&m.value)) {
         for (std::size_t i = 0; i < 3; ++i) {
           ASSERT_NEAR(static_cast<double>(v->v_n_mps[i]), (now[i] - (*antenna)[i]) / 500e-6, 2e-3);
         }
         ++velocities;
-      } else if (const auto* l = std::get_if<app::LandmarkSighting>(&m.value)) {
+      } else if (const auto* l = std::get_if<sensor::LandmarkSighting>(&m.value)) {
         const auto& at = options.course.landmarks.at(l->landmark - 1U);
         const double away = truth.yaw_rad + static_cast<double>(l->bearing_rad);
         ASSERT_NEAR(truth.x_m + static_cast<double>(l->range_m) * sim::cos(away), at.x_m, 1e-4);
@@ -301,11 +301,11 @@ TEST(World, how_often_it_is_asked_changes_nothing) {
 TEST(World, switching_a_sensor_off_leaves_the_others_as_they_were) {
   World::Options options;
   const auto all = run(options, 7, seconds_us(30));
-  options.numbers.imu.rate_hz = 0;
-  options.numbers.camera.rate_hz = 0;
+  options.parameters.imu.rate_hz = 0;
+  options.parameters.camera.rate_hz = 0;
   std::vector<Measurement> rest;
   for (const auto& m : all)
-    if (!std::holds_alternative<app::ImuSample>(m.value) && !std::holds_alternative<app::LandmarkSighting>(m.value))
+    if (!std::holds_alternative<sensor::ImuSample>(m.value) && !std::holds_alternative<sensor::LandmarkSighting>(m.value))
       rest.push_back(m);
   EXPECT_EQ(hash(rest), hash(run(options, 7, seconds_us(30))));
 }
@@ -341,8 +341,8 @@ TEST(World, measurements_come_in_order_of_arrival_after_they_were_true_within_th
 TEST(World, each_sensor_comes_at_its_rate_with_a_running_sequence) {
   for (const int imu_hz : {100, 200, 400}) {
     World::Options options;
-    options.numbers.imu.rate_hz = imu_hz;
-    options.numbers.wheels.rate_hz = 50;
+    options.parameters.imu.rate_hz = imu_hz;
+    options.parameters.wheels.rate_hz = 50;
     std::array<int, 7> count{};
     std::array<int, 7> sequence{};
     sequence.fill(-1);
@@ -355,7 +355,7 @@ TEST(World, each_sensor_comes_at_its_rate_with_a_running_sequence) {
       if (kind == 0 && count[0] > 0) {
         EXPECT_EQ(m.stamp.us - stamp[0], 1'000'000 / imu_hz);
       }
-      if (const auto* s = std::get_if<app::ImuSample>(&m.value)) {
+      if (const auto* s = std::get_if<sensor::ImuSample>(&m.value)) {
         EXPECT_EQ(s->interval_us, 1'000'000 / imu_hz);
       }
       sequence[kind] = m.sequence;
@@ -383,23 +383,23 @@ TEST(World, moving_the_whole_course_changes_nothing_but_gnss_so_no_other_sensor_
     const Measurement& a = here[i];
     const Measurement& b = there[i];
     ASSERT_EQ(a.stamp, b.stamp);
-    if (const auto* p = std::get_if<app::ImuSample>(&a.value)) {
-      const auto& q = std::get<app::ImuSample>(b.value);
+    if (const auto* p = std::get_if<sensor::ImuSample>(&a.value)) {
+      const auto& q = std::get<sensor::ImuSample>(b.value);
       for (std::size_t k = 0; k < 3; ++k) {
         ASSERT_NEAR(p->dangle_b_rad[k], q.dangle_b_rad[k], 1e-7F);
         ASSERT_NEAR(p->dvelocity_b_mps[k], q.dvelocity_b_mps[k], 1e-6F);
       }
-    } else if (const auto* c = std::get_if<app::WheelCounts>(&a.value)) {
-      const auto& d = std::get<app::WheelCounts>(b.value);
+    } else if (const auto* c = std::get_if<sensor::WheelCounts>(&a.value)) {
+      const auto& d = std::get<sensor::WheelCounts>(b.value);
       ASSERT_LE(static_cast<std::int16_t>(c->left - d.left) * static_cast<std::int16_t>(c->left - d.left), 1);
       ASSERT_LE(static_cast<std::int16_t>(c->right - d.right) * static_cast<std::int16_t>(c->right - d.right), 1);
-    } else if (const auto* l = std::get_if<app::LandmarkSighting>(&a.value)) {
-      const auto& k = std::get<app::LandmarkSighting>(b.value);
+    } else if (const auto* l = std::get_if<sensor::LandmarkSighting>(&a.value)) {
+      const auto& k = std::get<sensor::LandmarkSighting>(b.value);
       ASSERT_EQ(l->landmark, k.landmark);
       ASSERT_NEAR(l->range_m, k.range_m, 1e-5F);
       ASSERT_NEAR(l->bearing_rad, k.bearing_rad, 1e-5F);
-    } else if (const auto* g = std::get_if<app::GnssPosition>(&a.value)) {
-      ASSERT_GT(std::get<app::GnssPosition>(b.value).longitude_2ndeg - g->longitude_2ndeg, 6'000'000);
+    } else if (const auto* g = std::get_if<sensor::GnssPosition>(&a.value)) {
+      ASSERT_GT(std::get<sensor::GnssPosition>(b.value).longitude_2ndeg - g->longitude_2ndeg, 6'000'000);
       ++gnss;
     }
   }
@@ -452,9 +452,9 @@ TEST(World, in_the_matched_world_the_map_is_exact_and_the_body_level) {
 
 TEST(World, a_rate_that_is_no_divisor_is_refused) {
   World::Options options;
-  options.numbers.imu.rate_hz = 300;
+  options.parameters.imu.rate_hz = 300;
   EXPECT_THROW((World{options, 1}), std::invalid_argument);
-  options.numbers.imu.rate_hz = -1;
+  options.parameters.imu.rate_hz = -1;
   EXPECT_THROW((World{options, 1}), std::invalid_argument);
 }
 
@@ -462,7 +462,7 @@ TEST(World, in_the_world_matched_to_an_inertial_filter_the_body_trembles_without
   World::Options options{.mismatched = false, .inertial = true};
   options.course.waypoints.front().stop_s = 45;
   World world{options, 9};
-  const double sigma = world.numbers().rover.jitter_mps, sigma_ahead = world.numbers().rover.jitter_ahead_mps;
+  const double sigma = world.parameters().rover.jitter_mps, sigma_ahead = world.parameters().rover.jitter_ahead_mps;
   std::vector<Measurement> ignored;
   std::vector<double> side, up, ahead;
   double x_m = 0;
@@ -493,15 +493,15 @@ TEST(World, in_the_world_matched_to_an_inertial_filter_the_body_trembles_without
 
 TEST(World, a_gnss_error_that_is_asked_for_is_the_whole_error_in_every_world) {
   World::Options options;
-  options.numbers.gnss = with_error(options.numbers.gnss, 1.5);
-  const GnssNumbers& n = options.numbers.gnss;
+  options.parameters.gnss = with_error(options.parameters.gnss, 1.5);
+  const GnssParameters& n = options.parameters.gnss;
   EXPECT_NEAR(n.white_m * n.white_m + n.correlated_m * n.correlated_m, 2.25, 1e-12);
-  EXPECT_NEAR(n.white_m / n.correlated_m, GnssNumbers{}.white_m / GnssNumbers{}.correlated_m, 1e-12);
+  EXPECT_NEAR(n.white_m / n.correlated_m, GnssParameters{}.white_m / GnssParameters{}.correlated_m, 1e-12);
   options.mismatched = false;
   options.inertial = true;
   const World world{options, 1};
-  EXPECT_NEAR(world.numbers().gnss.white_m, 1.5, 1e-12);
-  EXPECT_EQ(world.numbers().gnss.correlated_m, 0);
+  EXPECT_NEAR(world.parameters().gnss.white_m, 1.5, 1e-12);
+  EXPECT_EQ(world.parameters().gnss.correlated_m, 0);
 }
 
 }  // namespace

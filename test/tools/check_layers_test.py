@@ -21,9 +21,9 @@ Text -> no arrow.
     src/can       -> src/base
     src/filter    -> src/base, Eigen
     src/app       -> src/{base,can,filter}, hal (concepts), drivers, config/messages.hpp
-    hal           -> src/base                      hal/port/support -> hal, src/base
-    hal/port/<board> -> hal, hal/port/support, src/base
-    hal/port/<board>/main.cpp -> hal/port/<board>, src/app, config/<robot>.hpp
+    hal           -> src/base                      hal/chip/support -> hal, src/base
+    hal/board/<board> -> hal, hal/chip/support, src/base
+    hal/board/<board>/main.cpp -> hal/board/<board>, src/app, config/<robot>.hpp
     drivers       -> hal, src/base, src/app/samples.hpp
     config/messages.hpp -> src/can, src/base       config/<robot>.hpp -> src/app
     sim_host      -> everything
@@ -32,9 +32,9 @@ Text -> no arrow.
 
     src/base -> everything
 """
-FILES = ["src/base/math.hpp", "src/base/time.hpp", "src/can/signal.hpp", "src/filter/ekf.hpp", "src/app/firmware.hpp", "src/app/samples.hpp",
-         "hal/board.hpp", "hal/port/support/text.hpp", "hal/port/mps2/board.hpp", "hal/port/mps2/main.cpp", "hal/port/r5/board.hpp",
-         "hal/port/linux/board.hpp", "drivers/imu.hpp", "config/messages.hpp", "config/rover.hpp", "sim_host/world.hpp", "test/x.cpp"]
+FILES = ["src/base/math.hpp", "src/base/time.hpp", "src/bus/signal.hpp", "src/filter/ekf.hpp", "src/app/firmware.hpp", "src/app/samples.hpp",
+         "hal/board.hpp", "hal/chip/support/text.hpp", "hal/board/mps2/board.hpp", "hal/board/mps2/main.cpp", "hal/board/r5/board.hpp",
+         "hal/board/linux/board.hpp", "drivers/imu.hpp", "config/messages.hpp", "config/rover.hpp", "sim_host/world.hpp", "test/x.cpp"]
 
 
 class LayersTest(ImageTest):
@@ -64,25 +64,25 @@ class LayersTest(ImageTest):
         self.assertEqual(self.findings(), [])
 
     def test_includes_along_the_arrows_pass(self):
-        for name, include in (("src/can/signal.hpp", "base/math.hpp"), ("src/base/math.hpp", "base/time.hpp"), ("src/base/math.hpp", "time.hpp"),
+        for name, include in (("src/bus/signal.hpp", "base/math.hpp"), ("src/base/math.hpp", "base/time.hpp"), ("src/base/math.hpp", "time.hpp"),
                               ("src/app/firmware.hpp", "hal/board.hpp"), ("src/app/firmware.hpp", "config/messages.hpp"),
                               ("src/app/firmware.hpp", "drivers/imu.hpp"), ("drivers/imu.hpp", "app/samples.hpp"),
-                              ("hal/port/mps2/board.hpp", "hal/port/support/text.hpp"), ("hal/port/mps2/main.cpp", "hal/port/mps2/board.hpp"),
-                              ("hal/port/mps2/main.cpp", "config/rover.hpp"), ("config/rover.hpp", "app/firmware.hpp"),
-                              ("sim_host/world.hpp", "hal/port/linux/board.hpp"), ("hal/port/mps2/main.cpp", "robot.hpp")):
+                              ("hal/board/mps2/board.hpp", "hal/chip/support/text.hpp"), ("hal/board/mps2/main.cpp", "hal/board/mps2/board.hpp"),
+                              ("hal/board/mps2/main.cpp", "config/rover.hpp"), ("config/rover.hpp", "app/firmware.hpp"),
+                              ("sim_host/world.hpp", "hal/board/linux/board.hpp"), ("hal/board/mps2/main.cpp", "robot.hpp")):
             with self.subTest(f"{name} includes {include}"):
                 self.assertEqual(self.findings(name, f'#include "{include}"\n'), [])
         self.assertEqual(self.findings("src/filter/ekf.hpp", "#include <Eigen/Core>\n#include <array>\n"), [])
 
     def test_includes_against_the_arrows_fail_with_file_and_line(self):
-        for name, include in (("src/base/math.hpp", "can/signal.hpp"), ("src/can/signal.hpp", "filter/ekf.hpp"), ("src/filter/ekf.hpp", "app/firmware.hpp"),
-                              ("src/app/firmware.hpp", "hal/port/mps2/board.hpp"), ("src/app/firmware.hpp", "config/rover.hpp"),
+        for name, include in (("src/base/math.hpp", "can/signal.hpp"), ("src/bus/signal.hpp", "filter/ekf.hpp"), ("src/filter/ekf.hpp", "app/firmware.hpp"),
+                              ("src/app/firmware.hpp", "hal/board/mps2/board.hpp"), ("src/app/firmware.hpp", "config/rover.hpp"),
                               ("src/filter/ekf.hpp", "config/messages.hpp"), ("hal/board.hpp", "app/firmware.hpp"),
-                              ("hal/board.hpp", "hal/port/support/text.hpp"), ("drivers/imu.hpp", "app/firmware.hpp"),
-                              ("hal/port/mps2/board.hpp", "hal/port/r5/board.hpp"), ("hal/port/mps2/main.cpp", "hal/port/r5/board.hpp"),
-                              ("hal/port/mps2/board.hpp", "app/firmware.hpp"), ("config/messages.hpp", "app/firmware.hpp"),
+                              ("hal/board.hpp", "hal/chip/support/text.hpp"), ("drivers/imu.hpp", "app/firmware.hpp"),
+                              ("hal/board/mps2/board.hpp", "hal/board/r5/board.hpp"), ("hal/board/mps2/main.cpp", "hal/board/r5/board.hpp"),
+                              ("hal/board/mps2/board.hpp", "app/firmware.hpp"), ("config/messages.hpp", "app/firmware.hpp"),
                               ("src/base/math.hpp", "sim_host/world.hpp"), ("src/base/math.hpp", "../can/signal.hpp"),
-                              ("src/base/math.hpp", "can/not_yet_generated.hpp"), ("hal/port/linux/board.hpp", "app/firmware.hpp")):
+                              ("src/base/math.hpp", "can/not_yet_generated.hpp"), ("hal/board/linux/board.hpp", "app/firmware.hpp")):
             with self.subTest(f"{name} includes {include}"):
                 found = self.findings(name, f'#pragma once\n/* two\nlines */\n  # include "{include}"\n')
                 self.assertEqual(len(found), 1, found)
@@ -100,7 +100,7 @@ class LayersTest(ImageTest):
                        "map", "cstdio", "stdexcept", "unistd.h"):
             with self.subTest(header):
                 self.assertEqual(len(self.findings("src/filter/ekf.hpp", f"#include <{header}>\n")), 1)
-                self.assertEqual(self.findings("hal/port/linux/board.hpp", f"#include <{header}>\n"), [])
+                self.assertEqual(self.findings("hal/board/linux/board.hpp", f"#include <{header}>\n"), [])
 
     def test_each_forbidden_word_fails(self):
         for code in ("int* p = new int;", "auto p = new (place) T{};", "delete p;", "delete[] p;", "void* operator new(std::size_t);", "p = malloc(3);", "std::free(p);", "p = alloca(3);",
@@ -115,7 +115,7 @@ class LayersTest(ImageTest):
             with self.subTest(code):
                 found = self.findings("src/filter/ekf.hpp", f"#pragma once\n\n{code}\n")
                 self.assertTrue(found and all(f.startswith("src/filter/ekf.hpp:3: ") for f in found), found or code)
-        for place in ("drivers/imu.hpp", "config/rover.hpp", "hal/board.hpp", "hal/port/mps2/board.hpp", "src/base/math.hpp"):
+        for place in ("drivers/imu.hpp", "config/rover.hpp", "hal/board.hpp", "hal/board/mps2/board.hpp", "src/base/math.hpp"):
             self.assertEqual(len(self.findings(place, "virtual void f();\n")), 1)
 
     def test_look_alikes_pass(self):
@@ -134,10 +134,10 @@ static_assert(noexcept(f())); std::string_view s; std::optional<int> o; using Ve
         self.assertEqual(self.findings("src/filter/ekf.hpp", code), [])
         self.assertEqual(self.findings("src/base/math.hpp", "inline float sin(float x); inline float sqrt(float x) { return __builtin_sqrtf(x); }\n"), [])
         self.assertEqual(self.findings("src/app/firmware.hpp", "const auto t = board.now();\n"), [])
-        self.assertEqual(self.findings("hal/port/linux/board.hpp", "#include <vector>\nstd::vector<int> v; throw 1; clock_gettime(a, b);\n"), [])
+        self.assertEqual(self.findings("hal/board/linux/board.hpp", "#include <vector>\nstd::vector<int> v; throw 1; clock_gettime(a, b);\n"), [])
 
     def test_the_table_is_read_from_the_design_and_a_broken_one_is_refused(self):
-        self.put("src/can/signal.hpp", '#include "filter/ekf.hpp"\n')
+        self.put("src/bus/signal.hpp", '#include "filter/ekf.hpp"\n')
         self.assertEqual(len(self.findings()), 1)
         self.put("DESIGN.md", DESIGN.replace("src/can       -> src/base", "src/can       -> src/base, src/filter"))
         self.assertEqual(self.findings(), [])
@@ -162,13 +162,13 @@ static_assert(noexcept(f())); std::string_view s; std::optional<int> o; using Ve
     def test_the_build_of_one_program_or_image_rejects_it_before_anything_is_compiled(self):
         tree = self.path("tree")
         shutil.copytree(ROOT, tree, ignore=lambda folder, names: (".git", "build", "out") if folder == ROOT else ())
-        with open(os.path.join(tree, "src/can/signal.hpp"), "a", encoding="utf-8") as file:
+        with open(os.path.join(tree, "src/bus/signal.hpp"), "a", encoding="utf-8") as file:
             file.write('#include "filter/update.hpp"\n')
         for target in ("host:tetap-world", "r5:tetap-zynqmp_r5-rover"):
             with self.subTest(target):
                 done = subprocess.run([os.path.join(tree, "tools", "run", "build_preset"), target], capture_output=True, text=True)
                 self.assertEqual(done.returncode, 1, done.stderr)
-                self.assertRegex(done.stderr, r'src/can/signal.hpp:\d+: #include "filter/update.hpp": against the arrows: src/can -> src/base')
+                self.assertRegex(done.stderr, r'src/bus/signal.hpp:\d+: #include "filter/update.hpp": against the arrows: src/can -> src/base')
                 built = os.path.join(tree, "build", target.split(":")[0])
                 objects = [f for top, _, files in os.walk(built) for f in files if f.endswith((".o", ".obj")) and "CompilerId" not in top]
                 self.assertEqual(objects, [])

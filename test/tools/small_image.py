@@ -21,7 +21,7 @@ FLAGS = ["-std=c++20", "-O2", "-ffp-contract=off", "-fno-math-errno", "-ffunctio
          "-DEIGEN_DONT_VECTORIZE", "-DEIGEN_NO_MALLOC", "-DEIGEN_CACHEFRIENDLY_PRODUCT_THRESHOLD=64", "-DEIGEN_NO_DEBUG",
          "-isystem", "/usr/include/eigen3", "-I" + ROOT, "-I" + os.path.join(ROOT, "src"), "-fstack-usage", "-fcallgraph-info=su"]
 
-# libgcc's divisions refer to the unwinder, as in hal/port/support/runtime.cpp.
+# libgcc's divisions refer to the unwinder, as in hal/chip/support/runtime.cpp.
 START = {"m": """
 #include <cstdint>
 extern "C" void __aeabi_unwind_cpp_pr0();

@@ -66,8 +66,8 @@ class YourOwn(unittest.TestCase):
 
     def test_a_board_is_a_folder_and_a_preset(self):
         self.copy(f"config/{ROBOT}.hpp")
-        self.copy(f"hal/port/{BOARD}")
-        self.assertEqual("", self.run_here("grep", "-r", "zynqmp_r5", f"hal/port/{BOARD}", status=1))
+        self.copy(f"hal/board/{BOARD}")
+        self.assertEqual("", self.run_here("grep", "-r", "zynqmp_r5", f"hal/board/{BOARD}", status=1))
         preset = self.line(rf'\{{ "name": "{BOARD}".*\}}')
         presets = os.path.join(self.tree, "CMakePresets.json")
         with open(presets, encoding="utf-8") as file:
@@ -87,7 +87,7 @@ class YourOwn(unittest.TestCase):
             self.assertRegex(said, f"tetap-{BOARD}-{ROBOT}: bound [0-9]+ of ")
             self.run_here("tools/run/build_preset", "host:tetap-node")
             boot = self.run_here("build/host/sim_host/tetap-node", "--boot-line", "--robot", ROBOT).strip()
-            image = f"build/{BOARD}/hal/port/tetap-{BOARD}-{ROBOT}.elf"
+            image = f"build/{BOARD}/hal/board/tetap-{BOARD}-{ROBOT}.elf"
             self.assertIn(boot, self.run_here("tools/run/emulate_r5", image, "--then", "sleep", "3").splitlines())
 
     def test_a_list_of_presets_that_is_none_is_told(self):
@@ -98,7 +98,7 @@ class YourOwn(unittest.TestCase):
 
     def test_a_board_without_a_folder_is_told(self):
         said = self.run_here("cmake", "--preset", "r5", "-DTETAP_BOARD=arduino", status=1)
-        self.assertIn("TETAP_BOARD is 'arduino': there is no hal/port/arduino with a link.ld", " ".join(said.split()))
+        self.assertIn("TETAP_BOARD is 'arduino': there is no hal/board/arduino with a link.ld", " ".join(said.split()))
 
     def test_a_core_that_is_not_its_board_s_is_told(self):
         said = self.run_here("cmake", "--preset", "m7", "-DTETAP_CORE=m4f", status=1)

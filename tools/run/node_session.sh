@@ -42,7 +42,7 @@ node_start() {
   case $board in
     linux) "$programs/tetap-node" --can "$iface" --robot "$robot" --base "$base" >"$node_log" 2>&1 & ;;
     zynqmp_r5)
-      local image=${TETAP_IMAGE:-$root/build/r5/hal/port/tetap-zynqmp_r5-$robot.elf}
+      local image=${TETAP_IMAGE:-$root/build/r5/hal/board/tetap-zynqmp_r5-$robot.elf}
       "$root/tools/run/emulate_r5" "$image" --can "$iface" >"$node_log" 2>&1 & ;;
   esac
   node=$!

@@ -90,8 +90,8 @@ class Epoch {
   /// GGA field 6: 0 none, 2 differential, 4 RTK, 5 RTK float, 6 dead reckoning, 7 typed in, 8 simulator. The last three
   /// measure nothing; nor does a receiver that uses no satellite, nor what RMC marks with V, or with one of the letters
   /// of these.
-  [[nodiscard]] constexpr app::GnssFix fix() const {
-    using app::GnssFix;
+  [[nodiscard]] constexpr sensor::GnssFix fix() const {
+    using sensor::GnssFix;
     const Parts& p = parts_;
     const bool known = p.quality || p.rmc_status != '\0';
     if (!known || (p.rmc_status != '\0' && p.rmc_status != 'A')) return GnssFix::kNone;

@@ -77,8 +77,8 @@ inline constexpr float k1e5degPerRad = 5.7295780e6F;
 
 /// gpsFix and fixType are the same scale: 0 none, 1 dead reckoning only, 2 2D, 3 3D, 4 GNSS and dead reckoning, 5 time.
 /// Dead reckoning alone is no fix: its errors are those of sensors that the robot's own filter fuses better.
-[[nodiscard]] constexpr app::GnssFix fix_of(std::uint8_t type, bool ok, bool differential, std::uint8_t carrier) {
-  using app::GnssFix;
+[[nodiscard]] constexpr sensor::GnssFix fix_of(std::uint8_t type, bool ok, bool differential, std::uint8_t carrier) {
+  using sensor::GnssFix;
   if (type == 5) return GnssFix::kTimeOnly;
   if (!ok || type < 2 || type > 4) return GnssFix::kNone;
   if (carrier == 2) return GnssFix::kRtkFixed;

@@ -64,7 +64,7 @@ TEST(GnssConfiguration, AReceiverWithoutNavPvtIsHeardByItsOlderMessages) {
     EXPECT_TRUE(bench.receiver.enabled(id)) << int{id};
   bench.run(3);
   ASSERT_GT(bench.reports.size(), 10U);
-  EXPECT_EQ(bench.reports.back().fix, app::GnssFix::k3d);
+  EXPECT_EQ(bench.reports.back().fix, sensor::GnssFix::k3d);
 }
 
 TEST(GnssConfiguration, ARefusedOptionIsSaidAndTheRestIsConfigured) {

@@ -16,7 +16,7 @@
 namespace tetap::drivers::gnss {
 namespace {
 
-using app::GnssFix;
+using sensor::GnssFix;
 using Bytes = std::vector<std::uint8_t>;
 
 Bytes ubx_frame(std::uint8_t message_class, std::uint8_t id, const Bytes& payload) {
@@ -265,27 +265,27 @@ TEST(Ubx, FixTypesFollowFlagsAndCarrierSolution) {
 }
 
 TEST(Ubx, APlaceThatIsNotOnEarthAndATimeThatIsNoneAreRefused) {
-  const auto with = [](std::size_t at, std::int64_t value, std::size_t size) {
+  const auto ctx = [](std::size_t at, std::int64_t value, std::size_t size) {
     Bytes p = pvt();
     put(p, at, value, size);
     return hear(ubx_frame(0x01, 0x07, p));
   };
   for (const std::int64_t lat : {900'000'001LL, -900'000'001LL, -2'147'483'648LL}) {
-    const Heard heard = with(28, lat, 4);
+    const Heard heard = ctx(28, lat, 4);
     EXPECT_FALSE(heard.reports.at(0).usable());
     EXPECT_EQ(heard.health.of(Reason::kOutOfRange), 1U);
     EXPECT_FALSE(position_of(heard.reports[0]).has_value());
   }
-  EXPECT_FALSE(with(24, 1'800'000'001, 4).reports.at(0).usable());
-  EXPECT_TRUE(with(24, 1'800'000'000, 4).reports.at(0).usable());
-  EXPECT_FALSE(with(78, 1, 1).reports.at(0).usable()) << "flags3.invalidLlh";
-  const Heard fast = with(48, 2'000'000, 4);
+  EXPECT_FALSE(ctx(24, 1'800'000'001, 4).reports.at(0).usable());
+  EXPECT_TRUE(ctx(24, 1'800'000'000, 4).reports.at(0).usable());
+  EXPECT_FALSE(ctx(78, 1, 1).reports.at(0).usable()) << "flags3.invalidLlh";
+  const Heard fast = ctx(48, 2'000'000, 4);
   EXPECT_FALSE(velocity_of(fast.reports.at(0)).has_value());
   EXPECT_EQ(fast.health.of(Reason::kOutOfRange), 1U);
-  const Heard date = with(7, 31, 1);
+  const Heard date = ctx(7, 31, 1);
   EXPECT_FALSE(date.reports.at(0).utc.date_valid);
   EXPECT_EQ(date.health.of(Reason::kBadTime), 1U);
-  EXPECT_FALSE(with(11, 0, 1).reports.at(0).utc.time_valid);
+  EXPECT_FALSE(ctx(11, 0, 1).reports.at(0).utc.time_valid);
 }
 
 TEST(Ubx, MessagesOfAWrongLengthAreRefused) {

@@ -11,7 +11,7 @@
 namespace tetap::drivers::gnss {
 namespace {
 
-using app::GnssFix;
+using sensor::GnssFix;
 using fakes::ublox::Fix;
 using fakes::ublox::Instant;
 using fakes::ublox::Solution;

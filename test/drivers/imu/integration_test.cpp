@@ -119,10 +119,10 @@ Motion coning(double half_angle_rad, double Hz) {
 TEST(ImuIntegrator, ConingDriftIsRemoved) {
   const Motion still = [](double) { return Double3{}; };
   const Motion cone = coning(0.02, 10);
-  const Errors with = integrate(cone, still, 10.0, 1000, 20, true);
+  const Errors ctx = integrate(cone, still, 10.0, 1000, 20, true);
   const Errors without = integrate(cone, still, 10.0, 1000, 20, false);
   EXPECT_GT(without.attitude_rad, 0.01);
-  EXPECT_LT(with.attitude_rad, without.attitude_rad / 50);
+  EXPECT_LT(ctx.attitude_rad, without.attitude_rad / 50);
 }
 
 TEST(ImuIntegrator, ScullingDriftIsRemoved) {
@@ -130,10 +130,10 @@ TEST(ImuIntegrator, ScullingDriftIsRemoved) {
   const double w = 2 * 3.14159265358979 * 10;
   const Motion rate = [=](double t) { return Double3{0.02 * w * std::cos(w * t), 0, 0}; };
   const Motion force = [=](double t) { return Double3{0, 5 * std::sin(w * t), 0}; };
-  const Errors with = integrate(rate, force, 10.0, 1000, 20, true);
+  const Errors ctx = integrate(rate, force, 10.0, 1000, 20, true);
   const Errors without = integrate(rate, force, 10.0, 1000, 20, false);
   EXPECT_GT(without.velocity_mps, 0.03);
-  EXPECT_LT(with.velocity_mps, without.velocity_mps / 50);
+  EXPECT_LT(ctx.velocity_mps, without.velocity_mps / 50);
 }
 
 TEST(ImuIntegrator, ASteadyTurnUnderSteadyForceIsExactToSecondOrder) {

@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+// The firmware on an emulated Cortex-M, fed from a candump log through semihosting: arguments IN.log OUT.log (either
+// may be missing). For on-target proofs: same bytes as the host, stack high-water mark, instructions per tick.
+#include "node/firmware.hpp"
+#include "hal/board/mps2/board.hpp"
+#include "hal/chip/support/boot_line.hpp"
+#include "robot.hpp"
+#include "version.hpp"
+
+int main() {
+  using Board = tetap::hal::mps2::Board;
+  static Board board;
+  static tetap::hal::mps2::semihosting::CommandLine<512> arguments;
+  const auto words = arguments.template words<3>();
+  if (!board.can.open(words[1], words[2])) {
+    board.print("tetap: cannot open the files\n");
+    return 1;
+  }
+  static tetap::node::Firmware<Board, tetap::robot::chosen::Estimators> firmware{board, tetap::robot::chosen::parameters,
+                                                                                tetap::kVersion};
+  tetap::hal::print_boot_line(board, tetap::robot::kName, firmware);
+  while (!board.can.at_end()) firmware.poll();
+  tetap::hal::print_stack_line(board);
+  return board.can.close() ? 0 : 1;
+}

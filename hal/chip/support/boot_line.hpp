@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+// The lines an image prints about itself: at boot the robot and the hashes of the self-check (the same on every target;
+// anybody with a board can compare them with `make bits`), later the stack's high-water mark.
+#pragma once
+
+#include "hal/chip/support/text.hpp"
+
+#include <cstdint>
+
+namespace tetap::hal {
+
+/// Epochs of the self-check at boot: 5 s of a robot's life, some tens of milliseconds of a core's.
+inline constexpr std::uint32_t kBootEpochs = 500;
+
+/// Apart, so that its text is not on the stack while the firmware runs.
+template <class Board>
+[[gnu::noinline]] void print_bits(const Board& board, const char* robot, std::uint32_t bits) {
+  board.print(Text<>{}.add("tetap: robot ").add(robot).add(", bits ").hex(bits).add('\n').c_str());
+}
+
+template <class Board, class Firmware>
+void print_boot_line(const Board& board, const char* robot, Firmware& firmware) {
+  const std::uint32_t bits = firmware.self_check(kBootEpochs);
+  print_bits(board, robot, bits);
+}
+
+template <class Board>
+void print_stack_line(const Board& board) {
+  const auto stack = Board::stack();
+  board.print(Text<>{}.add("tetap: stack ").dec(stack.used).add(" of ").dec(stack.reserved).add('\n').c_str());
+}
+
+}  // namespace tetap::hal

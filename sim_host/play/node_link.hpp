@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: Apache-2.0
+// What lockstep and real-time playing share: sending without loss, sync frames with their counter, and starting a node
+// (Begin until it answers with its version).
+#pragma once
+
+#include "hal/board/linux/clock.hpp"
+#include "sim_host/play/frame_accounting.hpp"
+#include "sim_host/play/link.hpp"
+#include "sim_host/play/out_file.hpp"
+
+#include <optional>
+#include <string>
+
+namespace tetap::sim {
+
+/// "12.340 s", for messages.
+[[nodiscard]] inline std::string in_seconds(base::Micros t) {
+  Line text;
+  text.fixed(t.us / 1000, 3).text(" s");
+  return std::string(text.view());
+}
+
+struct Patience {
+  base::Micros epoch{2'000'000};   ///< for the answer to a tick
+  base::Micros begin{15'000'000};  ///< for the answer to Begin: a node may be booting
+  base::Micros repeat{200'000};    ///< Begin is sent again after so long
+};
+/// An emulated core boots in its own time.
+inline constexpr Patience kEmulatedPatience{.epoch = {20'000'000}, .begin = {120'000'000}, .repeat = {1'000'000}};
+
+template <Link L, Sink K>
+class NodeLink {
+ public:
+  NodeLink(L& link, K& sink, std::uint32_t base, Counts& counts)
+      : link_(link), sink_(sink), collector_(base), counts_(counts), base_(base) {}
+
+  void send(const base::CanFrame& frame) {
+    if (!link_.send(frame)) send_later(frame);
+    sink_.sent(frame);
+  }
+  void sync(bus::SyncKind kind, base::Micros time) { send(sync_frame(base_, kind, time, sync_counter_++)); }
+
+  /// Takes every frame that is there; on_epoch(epoch) for each epoch that is complete.
+  template <class OnEpoch>
+  void drain(OnEpoch&& on_epoch) {
+    while (const auto frame = link_.receive()) {
+      sink_.received(*frame);
+      if (const auto epoch = collector_.add(*frame)) on_epoch(*epoch);
+    }
+  }
+
+  /// Sends Begin until the node answers; throws RunError when it does not.
+  void begin(base::Micros time, const Patience& patience) {
+    const base::Micros began = hal::monotonic_clock();
+    for (base::Micros now = began; now - began < patience.begin; now = hal::monotonic_clock()) {
+      sync(bus::SyncKind::kBegin, time);
+      ++counts_.syncs;
+      while (hal::monotonic_clock() - now < patience.repeat) {
+        link_.wait({20'000});
+        if (answered()) {
+          collector_.reset();
+          return sink_.restarted();
+        }
+      }
+    }
+    Line id;
+    id.hex(base_, 3);
+    throw RunError("no node with id base 0x" + std::string(id.view()) + " answers on this bus: sent Begin for " +
+                   in_seconds(hal::monotonic_clock() - began));
+  }
+
+  [[nodiscard]] const EpochCollector& collector() const { return collector_; }
+
+ private:
+  void send_later(const base::CanFrame& frame) {
+    const base::Micros began = hal::monotonic_clock();
+    do {
+      if (hal::monotonic_clock() - began > base::Micros{2'000'000})
+        throw RunError("the bus takes no frames: is the interface up?");
+      link_.wait({1000});
+    } while (!link_.send(frame));
+  }
+  bool answered() {
+    bool is = false;
+    while (const auto frame = link_.receive()) {
+      sink_.received(*frame);
+      is = is || collector_.is_begin_answer(*frame);
+      static_cast<void>(collector_.add(*frame));
+    }
+    return is;
+  }
+
+  L& link_;
+  K& sink_;
+  EpochCollector collector_;
+  Counts& counts_;
+  std::uint32_t base_;
+  std::uint8_t sync_counter_ = 0;
+};
+
+}  // namespace tetap::sim

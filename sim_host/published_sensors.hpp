@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: Apache-2.0
+// Which sensors a robot is sent: those that one of its estimators takes and its numbers use. The world has them all; a
+// bus need not. A fault of a sensor that is not sent cannot act.
+#pragma once
+
+#include "node/node.hpp"
+#include "sim_host/robots.hpp"
+#include "sim_host/world/world.hpp"
+
+#include <concepts>
+#include <sstream>
+#include <string>
+
+namespace tetap::sim {
+
+template <class E, class Payload>
+concept Takes = requires(E& e, const Payload& payload, base::Micros stamp, const estimators::Context& ctx) {
+  e.fuse(payload, stamp, ctx);
+};
+
+struct Sent {
+  bool imu = false, landmarks = false, magnetometer = false, barometer = false;
+  bool inertial = false;  ///< an inertial filter is there: what is a matched world for it is another one
+  friend bool operator==(const Sent&, const Sent&) = default;
+};
+
+template <class... E>
+[[nodiscard]] constexpr Sent sent_to(node::Estimators<E...>, const param::Parameters& n) {
+  // Those that live on an IMU; to the others its gyroscope is one way to know the turn.
+  constexpr bool kNeedsImu =
+      ((E::kKind == sensor::EstimatorKind::kInertial || E::kKind == sensor::EstimatorKind::kAttitude) || ...);
+  return {.imu = kNeedsImu || (n.gyro.use != 0 && (Takes<E, sensor::ImuSample> || ...)),
+          .landmarks = (Takes<E, sensor::LandmarkSighting> || ...),
+          .magnetometer = n.magnetic.use != 0 && (Takes<E, sensor::MagneticFlux> || ...),
+          .barometer = n.baro.use != 0 && (Takes<E, sensor::AirPressure> || ...),
+          .inertial = ((E::kKind == sensor::EstimatorKind::kInertial) || ...)};
+}
+
+/// Throws std::runtime_error when there is no such robot.
+[[nodiscard]] inline Sent sent_to(const std::string& robot) {
+  Sent sent;
+  for_robot(robot, [&]<class Estimators>(std::type_identity<Estimators>, const param::Parameters& parameters) {
+    sent = sent_to(Estimators{}, parameters);
+  });
+  return sent;
+}
+
+/// The world as that robot meets it.
+inline void send_only(const Sent& sent, World::Options& world) {
+  if (!sent.imu) world.parameters.imu.rate_hz = 0;
+  if (!sent.landmarks) world.parameters.camera.rate_hz = 0, world.course.landmarks.clear();
+  world.parameters.magnetometer.rate_hz = sent.magnetometer ? 20 : 0;
+  world.parameters.barometer.rate_hz = sent.barometer ? 10 : 0;
+  world.inertial = sent.inertial;
+}
+
+/// Names of the faults that act in that world, with a space between each.
+[[nodiscard]] inline std::string faults_that_act(const World::Options& world) {
+  std::string names;
+  for (const FaultInfo& row : fault_table())
+    if (can_act(row.fault, world)) (names += names.empty() ? "" : " ") += row.name;
+  return names;
+}
+
+/// Names of the robots on which that fault acts in that world, with a space between each.
+[[nodiscard]] inline std::string robots_it_acts_on(Fault fault, const World::Options& world) {
+  std::string names;
+  std::istringstream all{kRobotNames};
+  for (std::string name; all >> name;) {
+    World::Options as_sent = world;
+    send_only(sent_to(name), as_sent);
+    if (can_act(fault, as_sent)) (names += names.empty() ? "" : " ") += name;
+  }
+  return names;
+}
+
+/// Why one of the faults of a world, from which nothing is taken yet, cannot act on that robot, what could, and on whom
+/// it would; empty where all can.
+[[nodiscard]] inline std::string cannot_act(const World::Options& world, const std::string& robot) {
+  World::Options as_sent = world;
+  send_only(sent_to(robot), as_sent);
+  for (const FaultSetting& setting : world.faults) {
+    if (can_act(setting.fault, as_sent)) continue;
+    const FaultInfo& row = info(setting.fault);
+    const char* const lacks = row.falls_on == FallsOn::kImu         ? "IMU"
+                              : row.falls_on == FallsOn::kWheels    ? "wheels"
+                              : row.falls_on == FallsOn::kGnss      ? "GNSS"
+                              : row.falls_on == FallsOn::kLandmarks ? "landmarks"
+                                                                    : "magnetometer";
+    const std::string robots = robots_it_acts_on(setting.fault, world);
+    return "fault '" + std::string{row.name} + "': robot " + robot + " has no " + lacks +
+           "; faults that act on it: " + faults_that_act(as_sent) +
+           (robots.empty() ? "; in this world it acts on none" : "; robots on which it acts: " + robots);
+  }
+  return "";
+}
+
+}  // namespace tetap::sim

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+// What is left of the IMU's biases once the firmware has taken the robot's own calibration out of a sample
+// (src/app/calibrate.hpp): the truth that a published bias is held against.
+#pragma once
+
+#include "param/parameters.hpp"
+#include "sim_host/world/numbers.hpp"
+#include "sim_host/world/rover.hpp"
+
+#include <array>
+#include <cstddef>
+
+namespace tetap::sim {
+
+namespace detail {
+/// Of a matrix as param::Numbers has it, row by row.
+[[nodiscard]] inline Vector3 times(const std::array<float, 9>& m, const Vector3& v) {
+  Vector3 product{};
+  for (std::size_t i = 0; i < 3; ++i)
+    for (std::size_t j = 0; j < 3; ++j) product[i] += static_cast<double>(m[3 * i + j]) * v[j];
+  return product;
+}
+}  // namespace detail
+
+/// The truth with biases [rad/s, m/s^2] as they are after `numbers` were taken out, in the robot's body. Level and at
+/// rest, as the truth has them: what the accelerometer's matrix makes of gravity is in.
+[[nodiscard]] inline Truth bias_left(Truth t, const param::Parameters& parameters, double temperature_degC) {
+  const param::ImuParameters& n = parameters.imu;
+  const double warmer = temperature_degC - static_cast<double>(n.gyro_bias_at_degC);
+  for (std::size_t i = 0; i < 3; ++i) {
+    t.gyro_bias_b_radps[i] -=
+        static_cast<double>(n.gyro_bias_radps[i]) + static_cast<double>(n.gyro_bias_slope_radps_per_degC[i]) * warmer;
+    t.accel_bias_b_mps2[i] -= static_cast<double>(n.accel_bias_mps2[i]);
+  }
+  t.accel_bias_b_mps2 = detail::times(n.accel_matrix, t.accel_bias_b_mps2);
+  for (std::size_t i = 0; i < 3; ++i)
+    t.accel_bias_b_mps2[i] += (static_cast<double>(n.accel_matrix[3 * i + 2]) - (i == 2 ? 1.0 : 0.0)) * kG0;
+  t.gyro_bias_b_radps = detail::times(parameters.inertial.mounting_bs, t.gyro_bias_b_radps);
+  t.accel_bias_b_mps2 = detail::times(parameters.inertial.mounting_bs, t.accel_bias_b_mps2);
+  return t;
+}
+
+}  // namespace tetap::sim

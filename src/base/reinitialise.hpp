@@ -1,0 +1,14 @@
+// SPDX-License-Identifier: Apache-2.0
+// An object as it was when it was made, made anew in its own place: no copy of it passes over the stack, and nothing is
+// allocated.
+#pragma once
+
+#include <new>
+#include <type_traits>
+
+namespace tetap::base {
+
+template <class T>
+requires(std::is_trivially_destructible_v<T>) void reinitialise(T& object) { ::new (static_cast<void*>(&object)) T(); }
+
+}  // namespace tetap::base

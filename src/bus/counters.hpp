@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the world did to us, counted once where it was noticed. Counters only grow (modulo 2^16) and go out in Est_Diag.
+#pragma once
+
+#include "bus/messages.hpp"
+#include "hal/can_bus.hpp"
+
+#include <cstdint>
+
+namespace tetap::bus {
+
+/// Counters that follow from the frames and ticks alone: equal in every replay.
+struct Counters {
+  std::uint16_t too_late = 0;   ///< sample older than the window
+  std::uint16_t too_early = 0;  ///< stamp further ahead than a sample may wait
+  std::uint16_t duplicate = 0;
+  std::uint16_t incomplete = 0;       ///< a sample of several frames of which one never came
+  std::uint16_t malformed = 0;        ///< wrong length, or an input id that means nothing
+  std::uint16_t out_of_range = 0;     ///< a value that must be there is marked not available
+  std::uint16_t not_used = 0;         ///< no estimator takes this kind of sample
+  std::uint16_t no_time = 0;          ///< came before the first tick
+  std::uint16_t command_refused = 0;  ///< CRC wrong or counter repeated
+  std::uint16_t map_full = 0;
+  std::uint16_t timeline_full = 0;
+  std::uint16_t window_short = 0;  ///< samples that left the window before their time: a newer one needed the room
+  std::uint16_t events_dropped = 0;
+  std::uint16_t events_high_water = 0;
+};
+
+/// What the loop saw of real time and the bus: differs from run to run, and is never fed back into an estimate.
+struct LoopHealth {
+  bus::SyncState sync = bus::SyncState::kOwnTimer;
+  std::uint32_t longest_us = 0;  ///< tick, since start
+  float mean_us = 0;             ///< running mean
+  std::uint16_t ticks_late = 0;  ///< took longer than their period, or could not begin in it
+  std::uint16_t sync_lost = 0;
+  std::uint16_t sync_back = 0;  ///< sync frames whose time was not after the last tick
+  std::uint16_t sync_jump = 0;  ///< sync frames too far ahead
+  std::uint16_t sync_gap = 0;   ///< sync frames that were sent, by their counter, and never came
+  std::uint16_t sync_bad = 0;   ///< sync frames of wrong length
+  hal::CanFaults bus;
+};
+
+}  // namespace tetap::bus

@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: Apache-2.0
+// Records of measurements that wait for their frame: at most one goes out in so many ticks. Within a tick they come in
+// the order of the samples; what is refused between ticks is put in that order here, so that no arrival leaves a trace.
+#pragma once
+
+#include "estimators/estimate.hpp"
+#include "bus/counters.hpp"
+#include "sensor/sample.hpp"
+#include "base/float_bits.hpp"
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+namespace tetap::bus {
+
+class EventQueue {
+ public:
+  void power_on() { size_ = first_ = 0; }
+  void tick_begins() { first_ = kNone; }
+  void tick_ends() { first_ = size_; }
+
+  /// When the queue is full an accepted one makes room for one that was not; else the last refused has none.
+  void add(const estimators::Innovation& innovation, const sensor::Sample& sample, std::size_t instance, base::Micros now,
+           Counters& counters);
+
+  [[nodiscard]] bool empty() const { return size_ == 0; }
+  /// The oldest; not empty.
+  [[nodiscard]] bus::EstInnov take() {
+    const bus::EstInnov first = queue_[0];
+    remove(0);
+    return first;
+  }
+
+ private:
+  static constexpr std::size_t kCapacity = 16, kNone = kCapacity + 1;
+  /// By the time at which they were true; the rest only makes it an order.
+  [[nodiscard]] static bool before(const bus::EstInnov& a, const bus::EstInnov& b) {
+    if (a.age_ms > b.age_ms || a.age_ms < b.age_ms) return a.age_ms > b.age_ms;
+    return a.sensor != b.sensor ? a.sensor < b.sensor : a.inst < b.inst;
+  }
+  void remove(std::size_t i) {
+    for (++i; i < size_; ++i) queue_[i - 1] = queue_[i];
+    --size_;
+  }
+
+  std::array<bus::EstInnov, kCapacity> queue_{};
+  std::size_t size_ = 0;
+  std::size_t first_ = 0;  ///< of those since the last tick, which are kept in order; within a tick there are none
+};
+
+inline void EventQueue::add(const estimators::Innovation& innovation, const sensor::Sample& sample, std::size_t instance, base::Micros now,
+                            Counters& counters) {
+  const bus::EstInnov message{.estimator = static_cast<std::uint8_t>(instance),
+                              .sensor = sample.sensor,
+                              .inst = sample.instance,
+                              .verdict = innovation.verdict,
+                              .dof = innovation.dof,
+                              .age_ms = static_cast<float>(base::seconds(now - sample.stamp) * 1000.0F),
+                              .nis = innovation.dof > 0 ? innovation.nis : base::kNan,
+                              .ratio = innovation.gate > 0.0F ? innovation.nis / innovation.gate : base::kNan,
+                              .id = innovation.landmark,
+                              .epoch = 0};
+  if (size_ == kCapacity) {
+    ++counters.events_dropped;
+    if (innovation.verdict == sensor::Verdict::kAccepted) return;
+    std::size_t victim = 0;
+    while (victim < size_ && queue_[victim].verdict != sensor::Verdict::kAccepted) ++victim;
+    if (victim < size_) {
+      if (victim < first_ && first_ != kNone) --first_;
+    } else if (first_ < size_ && before(message, queue_[size_ - 1])) {
+      victim = size_ - 1;
+    } else {
+      return;
+    }
+    remove(victim);
+  }
+  std::size_t at = size_++;
+  for (; at > first_ && before(message, queue_[at - 1]); --at) queue_[at] = queue_[at - 1];
+  queue_[at] = message;
+  if (size_ > counters.events_high_water) counters.events_high_water = static_cast<std::uint16_t>(size_);
+}
+
+}  // namespace tetap::bus

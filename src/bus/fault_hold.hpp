@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+// Fault bits, and those that stand for a second after a counter has moved.
+#pragma once
+
+#include "bus/counters.hpp"
+#include "bus/messages.hpp"
+
+#include <cstdint>
+
+namespace tetap::bus {
+
+/// A bit per sensor::Fault.
+struct FaultSet {
+  std::uint16_t bits = 0;
+  constexpr void raise(sensor::Fault fault, bool is = true) {
+    bits = static_cast<std::uint16_t>(bits | (is ? 1U << static_cast<unsigned>(fault) : 0U));
+  }
+};
+
+class FaultHold {
+ public:
+  void power_on() { *this = {}; }
+
+  /// Once an epoch; `second` is how many epochs one lasts.
+  void note(const Counters& now, std::uint32_t epoch, std::uint32_t second) {
+    const Counters& then = last_;
+    FaultSet raised;
+    raised.raise(sensor::Fault::kIncomplete, now.incomplete != then.incomplete);
+    raised.raise(sensor::Fault::kTooLate, now.too_late != then.too_late);
+    raised.raise(sensor::Fault::kMalformed, now.malformed != then.malformed || now.out_of_range != then.out_of_range ||
+                                             now.no_time != then.no_time || now.too_early != then.too_early);
+    raised.raise(sensor::Fault::kCapacity, now.map_full != then.map_full || now.timeline_full != then.timeline_full ||
+                                            now.window_short != then.window_short ||
+                                            now.events_dropped != then.events_dropped);
+    raised.raise(sensor::Fault::kCommandRefused, now.command_refused != then.command_refused);
+    if (raised.bits != 0) {
+      bits_ = epoch < until_ ? static_cast<std::uint16_t>(bits_ | raised.bits) : raised.bits;
+      until_ = epoch + second;
+    }
+    last_ = now;
+  }
+  [[nodiscard]] FaultSet faults(std::uint32_t epoch) const { return {epoch < until_ ? bits_ : std::uint16_t{0}}; }
+
+ private:
+  Counters last_;            ///< as they were an epoch ago
+  std::uint32_t until_ = 0;  ///< epoch
+  std::uint16_t bits_ = 0;   ///< raised since
+};
+
+}  // namespace tetap::bus

@@ -1,0 +1,326 @@
+// SPDX-License-Identifier: Apache-2.0
+// From estimates, records and counters to frames: what goes out in which epoch. The schedule is counted in epochs, so
+// it is the same in every replay.
+#pragma once
+
+#include "estimators/attitude_disagreement.hpp"
+#include "estimators/estimate.hpp"
+#include "bus/event_queue.hpp"
+#include "bus/counters.hpp"
+#include "estimators/sensor_statistics.hpp"
+#include "bus/multiplexed.hpp"
+#include "sensor/sample.hpp"
+#include "bus/input_crc.hpp"
+#include "bus/fault_hold.hpp"
+#include "base/bit_crc.hpp"
+#include "base/math.hpp"
+#include "bus/codec.hpp"
+#include "bus/e2e.hpp"
+
+#include <array>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+
+namespace tetap::bus {
+
+/// What ran: the first 32 bits of the commit.
+struct Version {
+  std::uint32_t git = 0;
+};
+
+/// What Est_Status says.
+struct Summary {
+  sensor::Mode mode = sensor::Mode::kBoot;
+  bool position_valid = false;
+  bool heading_valid = false;
+  bool velocity_valid = false;
+  bool origin_known = false;
+  std::uint16_t used = 0;  ///< a bit per sensor kind accepted within the last second
+  bool rejecting = false;
+  std::uint16_t faults = 0;  ///< bits of sensor::Fault that estimators see
+  std::uint8_t resets = 0;
+  sensor::ResetCause cause = sensor::ResetCause::kPowerOn;
+  bool restarted = false;  ///< within the last second, by ourselves
+};
+
+template <std::size_t EstimatorCount>
+class Publisher {
+  /// At start only, of more than a hundred numbers: small, not fast.
+  struct NumbersCrc {
+    base::BitCrc crc;
+    [[gnu::noinline]] void operator()(std::uint32_t word) { crc(word); }
+    void operator()(std::int32_t word) { (*this)(static_cast<std::uint32_t>(word)); }
+    void operator()(float number) { (*this)(std::bit_cast<std::uint32_t>(number)); }
+    void operator()(std::int64_t word) {
+      (*this)(static_cast<std::uint32_t>(static_cast<std::uint64_t>(word)));
+      (*this)(static_cast<std::uint32_t>(static_cast<std::uint64_t>(word) >> 32));
+    }
+  };
+
+ public:
+  Publisher(const param::Parameters& parameters, const Version& version) : parameters_(parameters), version_(version) {
+    NumbersCrc crc;
+    each_parameter(parameters, crc);
+    config_ = crc.crc.value();
+  }
+
+  void power_on() {
+    epoch_ = 0;
+    frames_ = status_counter_ = page_ = identity_ = statistic_ = 0;
+    events_.power_on();
+    troubles_.power_on();
+  }
+
+  /// What is noted until end() comes in the order of the samples, and not of their arrival.
+  void tick_begins() { events_.tick_begins(); }
+  /// First frame of the epoch.
+  template <class Send>
+  void begin(base::Micros now, const InputCrc& tally, Send& send) {
+    ++epoch_;
+    frames_ = 0;
+    now_ = now;
+    put(bus::EstEpoch{.time_us = static_cast<std::uint64_t>(now.us) & 0xFFFFFFFFFFFFU,
+                      .in_crc = static_cast<std::uint16_t>(tally.running())},
+        send);
+  }
+
+  /// Last frame of the epoch.
+  template <class Send>
+  void end(std::uint32_t state_crc, const InputCrc& tally, Send& send) {
+    put(bus::EstStateCrc{.crc = state_crc,
+                         .in_count = static_cast<std::uint16_t>(tally.count()),
+                         .epoch = static_cast<std::uint8_t>(epoch_),
+                         .frames = static_cast<std::uint8_t>(frames_ + 1)},
+        send);
+    events_.tick_ends();
+  }
+
+  /// This estimator's 1 sigma go out in this epoch: the motion's variance is needed then.
+  [[nodiscard]] bool says_sigma(std::size_t instance, bool primary) const {
+    const param::PublishParameters& p = parameters_.publish;
+    return primary ? every(p.std_every, kTogether) : every(p.side_every, side(instance));
+  }
+  template <class Send>
+  void estimate(std::size_t instance, sensor::EstimatorKind kind, bool primary, const estimators::Estimate& e,
+                const estimators::MotionVariance& motion, Send& send);
+  /// `inertial` gives the estimate when it is asked for.
+  template <class Inertial, class Send>
+  void inertial(std::size_t instance, Inertial&& inertial, Send& send);
+  template <class Send>
+  void attitude(std::size_t instance, const estimators::AttitudeEstimate& e, const estimators::Disagreement& from_primary, Send& send);
+  template <class Send>
+  void status(const Summary& summary, Send& send);
+  template <class Lanes, class Send>
+  void statistics(const Lanes& lanes, base::Micros now, Send& send);
+  template <class Send>
+  void diagnostics(const Counters& counters, const LoopHealth& loop, std::uint16_t timeline_high, Send& send);
+  template <class Send>
+  void identity(const estimators::MapFrame& map_frame, Send& send);
+  template <class Send>
+  void events(Send& send);
+  template <class Send>
+  void send_version(Send& send) {
+    put(bus::EstVersion{.git = version_.git, .config = config_}, send);
+  }
+
+  /// Queues the record of a measurement.
+  void event(const estimators::Innovation& innovation, const sensor::Sample& sample, std::size_t instance, base::Micros now,
+             Counters& counters) {
+    events_.add(innovation, sample, instance, now, counters);
+  }
+
+ private:
+  template <class Message, class Send>
+  void put(const Message& message, Send& send, std::size_t instance = 0) {
+    ++frames_;
+    send(bus::frame(parameters_.can_base, message, instance));
+  }
+  [[nodiscard]] bool every(std::int32_t ticks, std::int32_t phase = 0) const {
+    return ticks > 0 && (epoch_ + static_cast<std::uint32_t>(phase)) % static_cast<std::uint32_t>(ticks) == 0;
+  }
+  /// Phase of what is to be of one epoch: attitude, velocity, sigmas, pages of the primary estimator.
+  static constexpr std::int32_t kTogether = 2;
+  /// Spreads the estimators' slow frames over the epochs.
+  [[nodiscard]] static std::int32_t side(std::size_t instance) { return static_cast<std::int32_t>(3 * instance); }
+  [[nodiscard]] std::uint8_t tag() const { return static_cast<std::uint8_t>(epoch_ & 0x0F); }
+
+  const param::Parameters& parameters_;
+  Version version_;
+  std::uint32_t config_ = 0;
+  std::uint32_t epoch_ = 0;
+  std::uint32_t frames_ = 0;
+  base::Micros now_;
+  std::uint32_t status_counter_ = 0;
+  std::uint32_t page_ = 0;
+  std::uint32_t identity_ = 0;
+  std::uint32_t statistic_ = 0;
+  EventQueue events_;
+  FaultHold troubles_;
+};
+
+template <std::size_t N>
+template <class Send>
+void Publisher<N>::estimate(std::size_t instance, sensor::EstimatorKind kind, bool primary, const estimators::Estimate& e,
+                            const estimators::MotionVariance& motion, Send& send) {
+  const param::PublishParameters& p = parameters_.publish;
+  const auto millimetres = [](const base::Anchored& a) {
+    const std::int64_t um = a.um();
+    return static_cast<std::int32_t>((um + (um < 0 ? -500 : 500)) / 1000);
+  };
+  if (every(primary ? p.pose_every : p.side_every, side(instance))) {
+    put(bus::EstPos{.x_raw = millimetres(e.pose.x), .y_raw = millimetres(e.pose.y), .epoch = tag(), .kind = kind}, send,
+        instance);
+    put(bus::EstMotion{.yaw_rad = e.pose.yaw_rad,
+                       .speed_mps = e.forward_mps,
+                       .yaw_rate_radps = e.yaw_rate_radps,
+                       .epoch = tag(),
+                       .pos_valid = e.position_valid,
+                       .hdg_valid = e.heading_valid,
+                       .vel_valid = e.velocity_valid},
+        send, instance);
+  }
+  if (says_sigma(instance, primary)) {
+    const float x = base::sqrt(e.p(0, 0));
+    const float y = base::sqrt(e.p(1, 1));
+    const float yaw = base::sqrt(e.p(2, 2));
+    put(bus::EstStdPose{.epoch = tag(), .std_x_m = x, .std_y_m = y, .std_yaw_rad = yaw, .corr_xy = e.p(0, 1) / (x * y)},
+        send, instance);
+    put(bus::EstStdMore{.epoch = tag(),
+                        .corr_x_yaw = e.p(0, 2) / (x * yaw),
+                        .corr_y_yaw = e.p(1, 2) / (y * yaw),
+                        .std_speed_mps = base::sqrt(motion.forward_m2ps2),
+                        .std_yaw_rate_radps = base::sqrt(motion.yaw_rate_rad2ps2)},
+        send, instance);
+  }
+}
+
+/// Attitude and velocity; of the rest one page at a time, in an epoch that has these and Est_Std too (numbers_check):
+/// what turns and accelerates is to be judged by the covariance of its own time.
+template <std::size_t N>
+template <class Inertial, class Send>
+void Publisher<N>::inertial(std::size_t instance, Inertial&& inertial, Send& send) {
+  const bool motion = every(parameters_.publish.attitude_every, kTogether);
+  const bool page = every(parameters_.publish.state_every, kTogether);
+  if (!motion && !page) return;
+  const estimators::InertialEstimate e = inertial();
+  if (!e.valid) return;
+  const nav::InsState& x = e.state;
+  if (motion) {
+    put(bus::EstAtt{.w = x.q_nb.w, .x = x.q_nb.x, .y = x.q_nb.y, .z = x.q_nb.z, .epoch = tag()}, send, instance);
+    put(bus::EstVel{.east_mps = x.v_n_mps(0), .north_mps = x.v_n_mps(1), .up_mps = x.v_n_mps(2), .epoch = tag()}, send,
+        instance);
+  }
+  if (!page) return;
+  // By the epoch, not by how often there was something to say: the same in every run, whenever its filter began.
+  const std::uint32_t turn = (epoch_ + kTogether) / static_cast<std::uint32_t>(parameters_.publish.state_every);
+  put_state_page(turn, e, tag(), [&](const auto& message) { put(message, send, instance); });
+}
+
+/// Attitude, and how far it is from the primary estimator's.
+template <std::size_t N>
+template <class Send>
+void Publisher<N>::attitude(std::size_t instance, const estimators::AttitudeEstimate& e, const estimators::Disagreement& from_primary,
+                            Send& send) {
+  if (!e.valid) return;
+  const param::PublishParameters& p = parameters_.publish;
+  if (every(p.attitude_every, 7))
+    put(bus::EstAtt{.w = e.q_nb.w, .x = e.q_nb.x, .y = e.q_nb.y, .z = e.q_nb.z, .epoch = tag()}, send, instance);
+  if (every(p.side_every, 1))
+    put(
+        bus::EstStateDisagreement{
+            .epoch = tag(), .disagree_tilt_rad = from_primary.tilt_rad, .disagree_yaw_rad = from_primary.heading_rad},
+        send, instance);
+}
+
+template <std::size_t N>
+template <class Send>
+void Publisher<N>::status(const Summary& s, Send& send) {
+  if (!every(parameters_.publish.status_every, 1)) return;
+  FaultSet faults = troubles_.faults(epoch_);
+  faults.bits = static_cast<std::uint16_t>(faults.bits | s.faults);
+  faults.raise(sensor::Fault::kInputStale, !s.velocity_valid);
+  faults.raise(sensor::Fault::kRejecting, s.rejecting);
+  faults.raise(sensor::Fault::kRestarted, s.restarted);
+  put(bus::protect(bus::EstStatus{.ctr = static_cast<std::uint8_t>(status_counter_++ & 0x0F),
+                                  .mode = s.mode,
+                                  .pos_valid = s.position_valid,
+                                  .hdg_valid = s.heading_valid,
+                                  .vel_valid = s.velocity_valid,
+                                  .origin = s.origin_known,
+                                  .used = s.used,
+                                  .faults = faults.bits,
+                                  .reset_ctr = s.resets,
+                                  .reset_cause = s.cause}),
+      send);
+}
+
+/// One active sensor of one estimator at a time.
+template <std::size_t N>
+template <class Lanes, class Send>
+void Publisher<N>::statistics(const Lanes& lanes, base::Micros now, Send& send) {
+  if (!every(parameters_.publish.statistics_every, 5)) return;
+  for (std::size_t tried = 0; tried < estimators::kStatistics * N; ++tried) {
+    const std::size_t index = statistic_++ % (estimators::kStatistics * N);
+    const std::size_t estimator = index / estimators::kStatistics;
+    const estimators::SensorStatistics* stat = nullptr;
+    std::size_t lane_index = 0;
+    std::apply(
+        [&](const auto&... lane) {
+          ((lane_index++ == estimator ? void(stat = &lane.statistics()[index % estimators::kStatistics]) : void()), ...);
+        },
+        lanes);
+    if (stat == nullptr || (stat->accepted == 0 && stat->rejected == 0)) continue;
+    const float age_s = base::seconds(now - stat->last_accepted);
+    put(bus::EstSensorStat{.sensor = stat->sensor,
+                           .inst = stat->instance,
+                           .estimator = static_cast<std::uint8_t>(estimator),
+                           .accepted = stat->accepted,
+                           .rejected = static_cast<std::uint16_t>(stat->rejected & 0xFFFU),
+                           .nis_mean = stat->compared ? stat->nis_mean : base::kNan,
+                           .age_s = stat->accepted > 0 ? age_s : base::kNan,
+                           .epoch = tag()},
+        send);
+    return;
+  }
+}
+
+/// One page at a time; all eight within about a second.
+template <std::size_t N>
+template <class Send>
+void Publisher<N>::diagnostics(const Counters& c, const LoopHealth& l, std::uint16_t timeline_high, Send& send) {
+  troubles_.note(c, epoch_, static_cast<std::uint32_t>(1'000'000 / parameters_.loop.period_us));
+  if (!every(parameters_.publish.diagnostics_every, 3)) return;
+  put_diagnostics(page_++, c, l, timeline_high, [&](const auto& page) { put(page, send); });
+}
+
+template <std::size_t N>
+template <class Send>
+void Publisher<N>::identity(const estimators::MapFrame& map_frame, Send& send) {
+  if (!every(parameters_.publish.identity_every, 7)) return;
+  switch (identity_++ % 4) {
+    case 0:
+      send_version(send);
+      break;
+    case 1:
+      put(bus::EstOriginLat{.source = map_frame.origin, .lat_raw = map_frame.frame.latitude_2ndeg()}, send);
+      break;
+    case 2:
+      put(bus::EstOriginLon{.source = map_frame.origin, .lon_raw = map_frame.frame.longitude_2ndeg()}, send);
+      break;
+    default:
+      put(bus::EstOriginHeight{.source = map_frame.origin, .height_m = map_frame.frame.height_m()}, send);
+      break;
+  }
+}
+
+template <std::size_t N>
+template <class Send>
+void Publisher<N>::events(Send& send) {
+  if (events_.empty() || !every(parameters_.publish.event_every)) return;
+  bus::EstInnov event = events_.take();
+  event.epoch = tag();
+  put(event, send);
+}
+
+}  // namespace tetap::bus

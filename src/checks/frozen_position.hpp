@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+// A receiver that repeats its coordinates while the filter moves.
+#pragma once
+
+#include "sensor/samples.hpp"
+
+#include <bit>
+#include <cstdint>
+
+namespace tetap::checks {
+
+/// Notices fixes that stay where they are, to the last digit, while the filter moves on.
+class FrozenPosition {
+ public:
+  /// By how much the filter is off, as this fix says: of the same fix, it changes by what the filter moves.
+  bool hear(const sensor::GnssPosition& fix, float east_m, float north_m, float limit_m) {
+    const std::uint32_t coordinates = static_cast<std::uint32_t>(fix.latitude_2ndeg) +
+                                      2'654'435'761U * static_cast<std::uint32_t>(fix.longitude_2ndeg) +
+                                      40'503U * std::bit_cast<std::uint32_t>(fix.height_m);
+    if (coordinates != coordinates_) {
+      *this = {};
+      coordinates_ = coordinates;
+      east_m_ = east_m;
+      north_m_ = north_m;
+    }
+    const float d_east_m = east_m - east_m_, d_north_m = north_m - north_m_;
+    frozen_ = frozen_ || d_east_m * d_east_m + d_north_m * d_north_m > limit_m * limit_m;
+    return frozen_;
+  }
+  [[nodiscard]] bool frozen() const { return frozen_; }
+
+  template <class Sink>
+  void hash_state(Sink&& sink) const {
+    sink(coordinates_);
+    sink(east_m_);
+    sink(north_m_);
+    sink(static_cast<std::uint32_t>(frozen_));
+  }
+
+ private:
+  std::uint32_t coordinates_ = 0;
+  float east_m_ = 0, north_m_ = 0;
+  bool frozen_ = false;
+};
+
+}  // namespace tetap::checks

@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+// Fixes before the filter begins: they count when they follow each other plausibly.
+#pragma once
+
+#include "sensor/samples.hpp"
+#include "base/math.hpp"
+#include "base/time.hpp"
+
+#include <cstdint>
+
+namespace tetap::checks {
+
+/// Before there is a filter: fixes count when so many in a row follow each other no faster than anything drives. A
+/// first fix that is a glitch begins nothing.
+class StartupFixCheck {
+ public:
+  [[gnu::noinline]] bool hear(const sensor::GnssPosition& fix, base::Micros stamp, std::int32_t needed) {
+    const float sigma_m = base::is_finite(fix.horizontal_acc_m) ? fix.horizontal_acc_m : 10.0F;
+    const float far_m = 4.0F * sigma_m + kFastest_mps * base::seconds(stamp - last_);
+    const float north_m = metres(fix.latitude_2ndeg - latitude_2ndeg_);
+    const std::int64_t latitude_2udeg = fix.latitude_2ndeg / 1'000;
+    const float latitude_rad = static_cast<float>(latitude_2udeg) * (2e-6F * 0.0174532925F);
+    const float east_m = metres(fix.longitude_2ndeg - longitude_2ndeg_) * base::cos(latitude_rad);
+    const bool follows = fixes_ > 0 && stamp > last_ && east_m * east_m + north_m * north_m <= far_m * far_m;
+    fixes_ = follows ? (fixes_ < needed ? fixes_ + 1 : needed) : 1;
+    latitude_2ndeg_ = fix.latitude_2ndeg;
+    longitude_2ndeg_ = fix.longitude_2ndeg;
+    last_ = stamp;
+    return fixes_ >= needed;
+  }
+  void forget() { *this = {}; }
+
+  template <class Sink>
+  void hash_state(Sink&& sink) const {
+    sink(latitude_2ndeg_);
+    sink(longitude_2ndeg_);
+    sink(last_.us);
+    sink(fixes_);
+  }
+
+ private:
+  static constexpr float kFastest_mps = 60;
+  static float metres(std::int64_t d_2ndeg) { return static_cast<float>(d_2ndeg) * (2e-9F * 111'320.0F); }
+
+  std::int64_t latitude_2ndeg_ = 0, longitude_2ndeg_ = 0;
+  base::Micros last_;
+  std::int32_t fixes_ = 0;
+};
+
+}  // namespace tetap::checks

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+// Two attitudes of one body that were found in different ways: how far they are apart, and for how long.
+#pragma once
+
+#include "estimators/estimate.hpp"
+#include "param/parameters.hpp"
+#include "base/math.hpp"
+#include "base/time.hpp"
+
+#include <cstdint>
+
+namespace tetap::estimators {
+
+struct Disagreement {
+  float tilt_rad = base::kNan;     ///< between the two verticals, 0 to pi; NaN: one of the two is not valid
+  float heading_rad = base::kNan;  ///< about the vertical, -pi to pi; NaN: one of the two has no heading
+};
+
+/// From b to a in the axes of n: q_a q_b* is a turn about an axis that lies level, the tilt, after one about the
+/// vertical, the heading. At a tilt of half a turn the heading says nothing, and is 0.
+[[nodiscard]] [[gnu::noinline]] inline Disagreement disagreement(const AttitudeEstimate& a, const AttitudeEstimate& b) {
+  if (!a.valid || !b.valid) return {};
+  const filter::Quaternion d = a.q_nb * b.q_nb.conjugate();
+  const float level = base::sqrt(d.x * d.x + d.y * d.y);
+  const float upright = base::sqrt(d.w * d.w + d.z * d.z);
+  return {
+      .tilt_rad = 2.0F * base::atan2(level, upright),
+      .heading_rad = a.heading_valid && b.heading_valid ? base::wrap_angle(2.0F * base::atan2(d.z, d.w)) : base::kNan};
+}
+
+/// Says that two attitudes disagree once they have been too far apart, in tilt or in heading, for longer than a stated
+/// time, and that they agree again after as long within both limits. What is not known neither disagrees nor agrees.
+class AttitudeDisagreement {
+ public:
+  bool step(const Disagreement& d, base::Micros now, const param::DisagreementParameters& n) {
+    const bool known = base::is_finite(d.tilt_rad);
+    const float heading = d.heading_rad < 0.0F ? -d.heading_rad : d.heading_rad;
+    const bool apart = d.tilt_rad > n.tilt_rad || heading > n.heading_rad;
+    if (!known || apart == disagrees_) {
+      since_ = now;
+    } else if (now - since_ >= base::Micros{n.after_us}) {
+      disagrees_ = apart;
+      since_ = now;
+    }
+    return disagrees_;
+  }
+  /// Begins to agree at t.
+  void restart(base::Micros t) { since_ = t, disagrees_ = false; }
+  [[nodiscard]] bool disagrees() const { return disagrees_; }
+
+  template <class Sink>
+  void hash_state(Sink&& sink) const {
+    sink(since_.us);
+    sink(static_cast<std::uint32_t>(disagrees_));
+  }
+
+ private:
+  base::Micros since_;  ///< the last time at which it was as it is said to be
+  bool disagrees_ = false;
+};
+
+}  // namespace tetap::estimators

@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+// What every estimator is given with a sample, and the commands it can be sent.
+#pragma once
+
+#include "param/parameters.hpp"
+#include "estimators/map_frame.hpp"
+#include "base/time.hpp"
+#include "model/planar_pose.hpp"
+
+namespace tetap::estimators {
+
+struct Context {
+  const param::Parameters& parameters;
+  const MapFrame& map_frame;
+};
+
+/// A pose from outside. sigma_yaw_rad >= pi (or not available on the bus): the heading is not known.
+struct SetPose {
+  model::PlanarPose pose;
+  float sigma_position_m = 0;
+  float sigma_yaw_rad = 0;
+  std::uint8_t counter = 0;  ///< of the command it came with
+};
+
+}  // namespace tetap::estimators

@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: Apache-2.0
+// What estimators give: an estimate with its uncertainty, and a record of every measurement they were offered.
+#pragma once
+
+#include "base/math.hpp"
+#include "base/time.hpp"
+#include "checks/imu_health.hpp"
+#include "sensor/vocabulary.hpp"
+#include "filter/quaternion.hpp"
+#include "filter/update.hpp"
+#include "model/planar_pose.hpp"
+#include "nav/ins_covariance_entry.hpp"
+#include "nav/ins_state.hpp"
+
+#include <array>
+#include <cstdint>
+
+namespace tetap::estimators {
+
+struct Estimate {
+  base::Micros time;
+  model::PlanarPose pose;
+  filter::Symmetric<float, 3> p;  ///< of (x, y, yaw)
+  float forward_mps = 0;
+  float yaw_rate_radps = 0;
+  bool position_valid = false;
+  bool heading_valid = false;
+  bool velocity_valid = false;
+};
+
+/// 1 sigma of what could be anything: of a place, and of a heading (pi / sqrt(3): even over the circle).
+inline constexpr float kUnknown_m = 1000, kUnknown_rad = 1.8138F;
+
+/// How uncertain the motion is, when somebody asks.
+struct MotionVariance {
+  float forward_m2ps2 = base::kNan;     ///< of Estimate::forward_mps; NaN: not known
+  float yaw_rate_rad2ps2 = base::kNan;  ///< of Estimate::yaw_rate_radps
+};
+
+/// An estimator's own step that nothing measured: it found itself wrong, and went where its sensors had been for long.
+struct Jump {
+  float east_m = 0;
+  float north_m = 0;
+  float up_m = 0;
+  float yaw_rad = 0;
+  sensor::ResetCause cause = sensor::ResetCause::kPositionJump;
+  std::uint8_t count = 0;  ///< of such steps since the start
+};
+
+/// What an inertial estimator has beyond that: the state at the present, the covariance of the far end of its window
+/// and how to carry an entry of it to the present.
+struct InertialEstimate {
+  nav::InsState state;
+  const filter::Symmetric<float, nav::InsState::kErrors>& p;  ///< the estimator's own: as long as nothing changes it
+  nav::InsCovarianceStep<float> ahead;                        ///< from the time of p to the present
+  bool valid = false;
+  Jump jump;
+  checks::ImuHealthReport imu;
+
+  /// Of errors kI and kJ (nav::InsState), at the present.
+  template <int kI, int kJ = kI>
+  [[nodiscard]] float covariance() const {
+    return nav::predicted_covariance<kI, kJ>(p, ahead);
+  }
+  /// Three errors that belong together (position, velocity, ...): 1 sigma of each, and their correlations.
+  struct Block {
+    std::array<float, 3> sigma;
+    float corr_01, corr_02, corr_12;
+  };
+  /// Of errors first, first + 1 and first + 2, at the present.
+  [[nodiscard]] Block block(int first) const {
+    const filter::Symmetric<float, 3> c = nav::predicted_block(p, ahead, first);
+    const std::array<float, 3> s{base::sqrt(c(0, 0)), base::sqrt(c(1, 1)), base::sqrt(c(2, 2))};
+    return {.sigma = s,
+            .corr_01 = c(0, 1) / (s[0] * s[1]),
+            .corr_02 = c(0, 2) / (s[0] * s[2]),
+            .corr_12 = c(1, 2) / (s[1] * s[2])};
+  }
+};
+
+/// What an attitude estimator has: the present, and what of it is believed.
+struct AttitudeEstimate {
+  filter::Quaternion q_nb;
+  bool valid = false;            ///< tilt, at least
+  bool heading_valid = false;    ///< else the heading is free and drifts
+  bool field_disturbed = false;  ///< the magnetometer is not followed
+};
+
+[[nodiscard]] inline AttitudeEstimate attitude_of(const InertialEstimate& e) {
+  const nav::Quaternion& q = e.state.q_nb;
+  return {.q_nb = {q.w, q.x, q.y, q.z}, .valid = e.valid, .heading_valid = e.valid};
+}
+
+/// One measurement (or input) and what became of it. dof 0: an input that is integrated, not compared.
+struct Innovation {
+  sensor::Verdict verdict = sensor::Verdict::kNotUsed;
+  std::uint8_t dof = 0;
+  float nis = 0;
+  float gate = 0;
+  std::uint8_t landmark = 0xFF;
+};
+
+/// The filter's record in the bus's words.
+template <int M>
+[[nodiscard]] Innovation record(const filter::Innovation<float, M>& from, std::uint8_t landmark = 0xFF) {
+  constexpr sensor::Verdict kWord[] = {sensor::Verdict::kAccepted, sensor::Verdict::kRejected, sensor::Verdict::kSingular,
+                                    sensor::Verdict::kNotFinite};
+  return {.verdict = kWord[static_cast<std::size_t>(from.verdict)],
+          .dof = M,
+          .nis = from.nis,
+          .gate = from.gate,
+          .landmark = landmark};
+}
+
+}  // namespace tetap::estimators

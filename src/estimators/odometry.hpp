@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+// Odometry: dead reckoning alone, continuous and without jumps (REP-105 "odom").
+#pragma once
+
+#include "estimators/context.hpp"
+#include "estimators/planar/dead_reckoning.hpp"
+
+namespace tetap::estimators {
+
+class Odometry {
+ public:
+  static constexpr sensor::EstimatorKind kKind = sensor::EstimatorKind::kOdometry;
+
+  void restart(base::Micros t, const Context& ctx) {
+    *this = {};
+    const param::StartParameters& s = ctx.parameters.start;
+    const bool known = s.known != 0;
+    bound_ = known;
+    motion_.start(t,
+                  known ? model::PlanarPose{.x = base::Anchored{}.plus(s.x_m),
+                                            .y = base::Anchored{}.plus(s.y_m),
+                                            .yaw_rad = s.yaw_rad}
+                        : model::PlanarPose{},
+                  kStartSigma, kStartSigma);
+  }
+  void set_pose(base::Micros t, const SetPose& given, const Context& ctx) {
+    motion_.propagate(t, ctx.parameters);
+    motion_.start(t, given.pose, given.sigma_position_m, given.sigma_yaw_rad);
+    bound_ = true;
+  }
+
+  void advance(base::Micros t, const Context&) { motion_.advance(t); }
+
+  template <class Input>
+  requires requires(DeadReckoning& motion, const Input& input, const param::Parameters& n) {
+    motion.fuse(input, base::Micros{}, n);
+  }
+  Innovation fuse(const Input& input, base::Micros stamp, const Context& ctx) {
+    const bool used = motion_.fuse(input, stamp, ctx.parameters);
+    return {.verdict = used ? sensor::Verdict::kAccepted : sensor::Verdict::kNotUsed};
+  }
+
+  /// Counted from where it began; valid as a place on the map once that is known.
+  [[nodiscard]] Estimate estimate(const Context& ctx) const {
+    Estimate estimate = motion_.estimate(ctx.parameters);
+    estimate.position_valid = estimate.heading_valid = bound_;
+    return estimate;
+  }
+  [[nodiscard]] MotionVariance motion_variance(const Context& ctx) const {
+    return motion_.motion_variance(ctx.parameters);
+  }
+  [[nodiscard]] sensor::Mode mode(const Context&) const { return sensor::Mode::kDeadReckoning; }
+  template <class Sink>
+  void hash_state(Sink&& sink) const {
+    motion_.hash_state(sink);
+    sink(static_cast<std::uint32_t>(bound_));
+  }
+
+ private:
+  static constexpr float kStartSigma =
+      1e-3F;  // a millimetre and a milliradian: of the definition of the origin, not of the world
+  DeadReckoning motion_;
+  bool bound_ = false;
+};
+
+}  // namespace tetap::estimators

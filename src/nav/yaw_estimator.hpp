@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: Apache-2.0
+// Heading of a robot that starts in motion, from gyroscope, accelerometer and the velocity GNSS or wheels show; beside
+// a running filter an independent judge of its heading. With the heading written as a phasor z = exp(i yaw) in place of
+// an angle everything else becomes linear (large heading uncertainty: Scherzinger 1996, "Inertial navigator error
+// models for large heading uncertainty", PLANS; Rogers 1997, NAVIGATION 44(3)), so that one filter holds what a bank of
+// hypotheses (Sorenson & Alspach 1971, Automatica 7(4); EKF-GSF of PX4 and ArduPilot) only samples: on the circle
+// |z| = 1 its Gaussian is a von Mises density around arg z of concentration kappa = 2 |z| / P_zz (Mardia & Jupp 2000,
+// "Directional Statistics", sec. 3.5.4). A heading that nothing has shown is z = 0: it cannot look known.
+#pragma once
+
+#include "base/anchored.hpp"
+#include "nav/imu_increment.hpp"
+#include "nav/complex_kalman.hpp"
+
+namespace tetap::nav {
+
+/// What disturbs it, one sigma per axis.
+struct YawFinderNoise {
+  float accel_mps2_rthz = 0.03F;  ///< white, vibration included, m/s^2/sqrt(Hz)
+  float gyro_radps_rthz = 3e-4F;  ///< rad/s/sqrt(Hz)
+  float gyro_scale = 0.005F;      ///< share of every turn
+  float accel_bias_mps2 = 0.1F;   ///< turn-on, fixed in the body
+  float gyro_bias_radps = 0.01F;  ///< turn-on
+  float tilt_rad = 0.05F;         ///< of the level it begins with
+  float floor_rad = 0.02F;        ///< no heading is known better: mounting, what the model lacks
+  float ready_rad = 0.15F;        ///< ready once sigma is below
+};
+
+class YawEstimator {
+ public:
+  YawFinderNoise noise{};  ///< changed: restart
+
+  YawEstimator() { restart(); }
+
+  /// Nothing is known; the first increment says roughly where up is.
+  void restart() {
+    up_b_ = Vector3::Zero();
+    begin(kFirstTilt_rad);
+  }
+  /// The same with a level from outside, good to noise.tilt_rad; its yaw does not matter.
+  void restart(const Quaternion& q_level);
+
+  /// Every increment, as the sensor shows it: the biases are found here. What is not accepted changes nothing.
+  [[nodiscard]] ImuVerdict predict(const ImuIncrement& imu);
+  /// Increments are missing: it may have turned and sped up meanwhile.
+  void predict_without_imu(base::Micros gap);
+
+  /// GNSS velocity; `lever_b_m`: the antenna from the IMU, forward and left.
+  void fuse_velocity(float east_mps, float north_mps, float sigma_mps, Complex lever_b_m = {});
+  /// GNSS position, for receivers without a velocity: what counts is how it moves.
+  void fuse_position(const base::Anchored& east, const base::Anchored& north, float sigma_m, Complex lever_b_m = {});
+  /// Forward speed of the wheels, reversing is negative: it goes where it points (non-holonomic). `axle_b_m`: the axle
+  /// that does not steer, from the IMU. Taken at most ten times a second; what slips is refused without consequence.
+  void fuse_forward_speed(float mps, float sigma_mps, Complex axle_b_m = {});
+
+  [[nodiscard]] float yaw_rad() const;
+  /// Of the yaw; that of a heading that may be any is pi / sqrt(3).
+  [[nodiscard]] float sigma_rad() const;
+  /// Sigma below noise.ready_rad after five fixes; sigma is small only while phasor and model agree.
+  [[nodiscard]] bool ready() const { return fixes_ >= kFixes && sigma_rad() < noise.ready_rad; }
+  /// How far another heading is away; and in sigma of the difference, 0 while not ready.
+  [[nodiscard]] float apart_rad(float yaw_rad_other) const {
+    return base::abs(base::wrap_angle(yaw_rad() - yaw_rad_other));
+  }
+  [[nodiscard]] float against(float yaw_rad_other, float sigma_rad_other) const;
+  /// Of the gyroscope, about the vertical.
+  [[nodiscard]] float bias_radps() const { return bias_b_radps_.dot(up_b_); }
+  /// How often it gave up what it believed, because GNSS or the length of its phasor denied it.
+  [[nodiscard]] std::uint32_t restarts() const { return restarts_; }
+
+  template <class Sink>
+  void hash_state(Sink&& sink) const {
+    filter_.hash_state(sink);
+    for (const Complex& value : {pending_.v, pending_.p, pending_.turned, heading_}) sink(value.re), sink(value.im);
+    for (const float value : {pending_.dt_s, pending_.turn_rad, up_b_(0), up_b_(1), up_b_(2), bias_b_radps_(0),
+                              bias_b_radps_(1), bias_b_radps_(2), rate_radps_, wheels_s_})
+      sink(value);
+    sink(east_.um());
+    sink(north_.um());
+    sink(restarts_);
+    sink(static_cast<std::uint32_t>(refused_ + 16 * fixes_) | (placed_ ? 256U : 0U));
+  }
+
+  /// For the tests: the covariance.
+  [[nodiscard]] const auto& filter() const { return filter_; }
+
+ private:
+  /// All in n, east + i north: position from the last fix, velocity, the heading's phasor; the acceleration the level's
+  /// error feigns, what drives it (the gyroscope's level biases times gravity), the accelerometer's bias, both along
+  /// the body but turned by z; and z times the gyroscope's bias about the vertical.
+  enum : int { kP, kV, kZ, kW, kR, kA, kU, kStates };
+  using Filter = ComplexKalman<kStates>;
+
+  static constexpr float kGravity = 9.80665F;
+  static constexpr float kFast_mps = 15.0F;       ///< before anything has shown its speed
+  static constexpr float kFar_m2 = 1e4F;          ///< before the first fix
+  static constexpr float kStep_s = 0.1F;          ///< between predictions of the filter
+  static constexpr float kBlind_m2ps2 = 1e6F;     ///< of the velocity, after too long without anything
+  static constexpr float kLean_s = 5.0F;          ///< own level leans towards the specific force
+  static constexpr float kForget_s = 30.0F;       ///< one unit of 1 / P_zz is forgotten in
+  static constexpr float kGate = 13.8F;           ///< one in a thousand, two degrees of freedom
+  static constexpr float kFirstTilt_rad = 0.15F;  ///< of one increment in motion
+  static constexpr float kKeptTilt_rad = 0.1F;    ///< of the own level after giving up
+  static constexpr float kWheelShare = 0.05F;     ///< one sigma of a speed, beside what the caller says
+  static constexpr std::uint8_t kMostRefused = 5, kFixes = 5;
+  // What walks, per axis and root of a second: the level's error, the biases.
+  static constexpr float kWander_mps2_rts = 0.01F, kBiasWalk_radps_rts = 1e-5F, kAccelWalk_mps2_rts = 2e-4F;
+
+  /// Since the filter's last prediction, along the axes that the gyroscope's yaw turned from n by yaw - arg z.
+  struct Pending {
+    Complex v, p;    ///< specific force integrated once and twice
+    Complex turned;  ///< integral of the heading
+    float dt_s = 0, turn_rad = 0;
+  };
+
+  static constexpr float square(float a) { return a * a; }
+  [[nodiscard]] static float from(const base::Anchored& a, const base::Anchored& b);
+  [[nodiscard]] static bool fits(float a, float b, float sigma, Complex lever);
+  /// z = x_i + heading c_b z + noise, whose variance is 2 sigma^2 + more.
+  Filter::Verdict measure(int i, Complex c_b, Complex z, float sigma, float more = 0.0F);
+  void begin(float tilt_rad);
+  void flush();
+  void bound();
+  void give_up();
+  void judge(Filter::Verdict verdict, bool gnss);
+
+  Filter filter_{};
+  Pending pending_{};
+  Complex heading_{1.0F, 0.0F};  ///< exp(i yaw) by gyroscope alone
+  Vector3 up_b_ = Vector3::Zero();
+  Vector3 bias_b_radps_ = Vector3::Zero();  ///< taken off the gyroscope
+  float rate_radps_ = 0;
+  float wheels_s_ = 0;               ///< since wheels were taken
+  base::Anchored east_{}, north_{};  ///< the newest fix
+  std::uint32_t restarts_ = 0;
+  std::uint8_t refused_ = 0, fixes_ = 0;
+  bool placed_ = false;
+};
+
+}  // namespace tetap::nav
+
+#include "nav/yaw_estimator_steps.hpp"  // IWYU pragma: keep

@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: Apache-2.0
+// One estimator in the firmware, with its statistics, in one of two ways.
+// A plain one has its current state and its state at the far end of the window.
+// A late sample is fused at its own time by starting again from `past` and repeating what came since: the result is the
+// one that would have been had the sample been on time. Costs: twice the estimator's memory; a burst only when
+// something is late that this estimator takes.
+// A delayed one (kDelayed) has its state at the far end of the window only: samples reach it in their order when they
+// leave the window, each once, and the present is that state carried over what the window holds. Costs: that carrying
+// in every tick, never a burst (what is due it may also leave for the next tick); its records are late by the window.
+#pragma once
+
+#include "estimators/context.hpp"
+#include "estimators/estimate.hpp"
+#include "estimators/sensor_statistics.hpp"
+#include "sensor/sample.hpp"
+
+#include <array>
+#include <concepts>
+#include <cstdint>
+#include <type_traits>
+
+namespace tetap::node {
+
+template <class E>
+concept Estimator = requires(E& e, const E& view, base::Micros t, const estimators::Context& ctx, const estimators::SetPose& pose) {
+  { E::kKind } -> std::convertible_to<sensor::EstimatorKind>;
+  { e.restart(t, ctx) } -> std::same_as<void>;
+  { e.set_pose(t, pose, ctx) } -> std::same_as<void>;
+  { view.estimate(ctx) } -> std::same_as<estimators::Estimate>;
+  { view.mode(ctx) } -> std::same_as<sensor::Mode>;
+};
+
+template <class E>
+inline constexpr bool kIsDelayed = requires {
+  requires E::kDelayed;
+};
+
+template <Estimator E>
+class EstimatorSlot {
+ public:
+  using Type = E;
+  static constexpr bool kDelayed = kIsDelayed<E>;
+  template <class Payload>
+  static constexpr bool kTakes = requires(E& e, const Payload& payload, base::Micros stamp, const estimators::Context& ctx) {
+    e.fuse(payload, stamp, ctx);
+  };
+
+  void restart(base::Micros t, const estimators::Context& ctx) {
+    now_.restart(t, ctx);
+    close();
+  }
+  void set_pose(base::Micros t, const estimators::SetPose& pose, const estimators::Context& ctx) {
+    now_.set_pose(t, pose, ctx);
+    close();
+  }
+
+  /// Whether this kind of sample means anything to the estimator.
+  [[nodiscard]] static bool takes(const sensor::Sample& sample) {
+    bool taken = false;
+    visit(sample, [&]<class Payload>(const Payload&) { taken = kTakes<Payload>; });
+    return taken;
+  }
+  /// Fuses into the current state; the record is what the bus is told.
+  estimators::Innovation fuse(const sensor::Sample& sample, const estimators::Context& ctx) { return fuse_into(now_, sample, ctx); }
+  /// The sample leaves the window: the far end takes it.
+  void retire(const sensor::Sample& sample, const estimators::Context& ctx) requires(!kDelayed) {
+    static_cast<void>(fuse_into(past_, sample, ctx));
+  }
+  /// Back to the far end of the window.
+  void rewind() requires(!kDelayed) { now_ = past_; }
+  /// What is now can no longer be changed by late samples.
+  void close() {
+    if constexpr (!kDelayed) past_ = now_;
+  }
+
+  /// A sample is new in the window.
+  void arrived(const sensor::Sample& sample, const estimators::Context& ctx) requires kDelayed {
+    if constexpr (requires { now_.arrived(sample, ctx); }) now_.arrived(sample, ctx);
+  }
+  /// A delayed estimator has done enough in this tick: the sample, true long enough ago, waits for the next.
+  [[nodiscard]] bool rests(const sensor::Sample& sample, const estimators::Context& ctx) {
+    if constexpr (requires { now_.rests(sample, ctx); }) return takes(sample) && now_.rests(sample, ctx);
+    return false;
+  }
+
+  /// `window` is what the estimators have of the samples in the window, in order.
+  template <class Window>
+  void advance(base::Micros t, const estimators::Context& ctx, const Window& window) {
+    if constexpr (kDelayed) {
+      now_.advance(t, ctx, window);
+    } else {
+      now_.advance(t, ctx);
+    }
+  }
+  [[nodiscard]] estimators::Estimate estimate(const estimators::Context& ctx) const { return now_.estimate(ctx); }
+  [[nodiscard]] estimators::MotionVariance motion_variance(const estimators::Context& ctx) const {
+    if constexpr (requires { now_.motion_variance(ctx); }) return now_.motion_variance(ctx);
+    return {};
+  }
+  [[nodiscard]] estimators::InertialEstimate inertial(const estimators::Context& ctx) const requires requires(const E& e) { e.inertial(ctx); }
+  { return now_.inertial(ctx); }
+  [[nodiscard]] estimators::AttitudeEstimate attitude(const estimators::Context& ctx) const requires requires(const E& e) { e.attitude(ctx); }
+  { return now_.attitude(ctx); }
+  /// What the estimator itself did about its state, for the status.
+  [[nodiscard]] estimators::Jump jump() const {
+    if constexpr (requires { now_.jump(); }) return now_.jump();
+    return {};
+  }
+  /// Bits of sensor::Fault that the estimator sees.
+  [[nodiscard]] std::uint16_t faults() const {
+    if constexpr (requires { now_.faults(); }) return now_.faults();
+    return 0;
+  }
+  [[nodiscard]] sensor::Mode mode(const estimators::Context& ctx) const { return now_.mode(ctx); }
+
+  void account(const sensor::Sample& sample, const estimators::Innovation& innovation) {
+    estimators::SensorStatistics& s = statistics(sample.sensor, sample.instance);
+    if (innovation.verdict == sensor::Verdict::kAccepted) {
+      ++s.accepted;
+      s.refused_in_a_row = 0;
+      s.last_accepted = sample.stamp;
+    } else if (innovation.verdict == sensor::Verdict::kRejected) {
+      ++s.rejected;
+      if (s.refused_in_a_row < 255) ++s.refused_in_a_row;
+    }
+    if (innovation.dof > 0) {
+      const float nis = innovation.nis / static_cast<float>(innovation.dof);
+      s.nis_mean = s.compared ? s.nis_mean + (nis - s.nis_mean) * 0.02F : nis;
+      s.compared = true;
+    }
+  }
+  [[nodiscard]] estimators::SensorStatistics& statistics(sensor::Sensor sensor, std::uint8_t instance) {
+    std::size_t i = 0;
+    while (i + 1 < estimators::kStatistics && statistics_[i].sensor != sensor::Sensor::kNotAvailable &&
+           (statistics_[i].sensor != sensor || statistics_[i].instance != instance))
+      ++i;
+    statistics_[i].sensor = sensor;
+    statistics_[i].instance = instance;
+    return statistics_[i];
+  }
+  [[nodiscard]] const std::array<estimators::SensorStatistics, estimators::kStatistics>& statistics() const { return statistics_; }
+  void clear_statistics() {
+    for (estimators::SensorStatistics& s : statistics_) s = {};
+  }
+
+  template <class Sink>
+  void hash_state(Sink&& sink) const {
+    now_.hash_state(sink);
+  }
+
+ private:
+  static estimators::Innovation fuse_into(E& estimator, const sensor::Sample& sample, const estimators::Context& ctx) {
+    estimators::Innovation innovation;
+    if (sample.sensor == sensor::Sensor::kImu && sample.instance != ctx.parameters.inertial.imu) return innovation;
+    visit(sample, [&](const auto& payload) {
+      if constexpr (kTakes<std::remove_cvref_t<decltype(payload)>>)
+        innovation = estimator.fuse(payload, sample.stamp, ctx);
+    });
+    return innovation;
+  }
+
+  struct Nothing {};
+
+  E now_;  ///< of a delayed estimator: the far end
+  [[no_unique_address]] std::conditional_t<kDelayed, Nothing, E> past_;
+  std::array<estimators::SensorStatistics, estimators::kStatistics> statistics_{};
+};
+
+}  // namespace tetap::node

@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0
+// The landmark map and the entries that wait for their tick to go into it.
+#pragma once
+
+#include "bus/counters.hpp"
+#include "estimators/map_frame.hpp"
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+namespace tetap::node {
+
+class Landmarks {
+ public:
+  void power_on(estimators::MapFrame& map_frame) {
+    map_.clear();
+    size_ = 0;
+    map_frame.map = &map_;
+  }
+  /// Entries wait sorted by id, so that the order of arrival has no effect.
+  void add(const estimators::MapEntry& entry, bus::Counters& counters);
+  [[nodiscard]] bool waiting() const { return size_ != 0; }
+  void apply(bus::Counters& counters) {
+    for (std::size_t i = 0; i < size_; ++i)
+      if (!map_.put(waiting_[i])) ++counters.map_full;
+    size_ = 0;
+  }
+  void clear() { map_.clear(); }
+  template <class Sink>
+  void hash_state(Sink&& sink) const {
+    map_.hash_state(sink);
+  }
+
+ private:
+  estimators::LandmarkMap<estimators::kMapCapacity> map_;
+  std::array<estimators::MapEntry, estimators::kMapCapacity> waiting_{};
+  std::size_t size_ = 0;
+};
+
+/// For robots none of whose estimators takes landmarks: no memory, and entries are counted as not used.
+struct NoLandmarks {
+  static void power_on(estimators::MapFrame& map_frame) { map_frame.map = nullptr; }
+  static void add(const estimators::MapEntry&, bus::Counters& counters) { ++counters.not_used; }
+  [[nodiscard]] static bool waiting() { return false; }
+  static void apply(bus::Counters&) {}
+  static void clear() {}
+  template <class Sink>
+  static void hash_state(Sink&&) {}
+};
+
+inline void Landmarks::add(const estimators::MapEntry& entry, bus::Counters& counters) {
+  std::size_t at = size_;
+  while (at > 0 && waiting_[at - 1].id >= entry.id) --at;
+  if (at < size_ && waiting_[at].id == entry.id) {
+    estimators::MapEntry& there = waiting_[at];  // of two within an epoch the one further east (or north) stands
+    const bool beyond = entry.x_mm != there.x_mm ? entry.x_mm > there.x_mm : entry.y_mm > there.y_mm;
+    if (beyond) there = entry;
+    return;
+  }
+  if (size_ == estimators::kMapCapacity) {  // the highest ids are the ones refused, in whatever order they come
+    ++counters.map_full;
+    if (at == size_) return;
+    --size_;
+  }
+  for (std::size_t i = size_; i > at; --i) waiting_[i] = waiting_[i - 1];
+  waiting_[at] = entry;
+  ++size_;
+}
+
+}  // namespace tetap::node

@@ -1,0 +1,362 @@
+// SPDX-License-Identifier: Apache-2.0
+// The firmware without board and clock: frames and ticks in, frames out. The same sequence of on_frame() and tick()
+// calls gives the same bits on every machine; everything that follows from real time stays outside (Pacer, LoopHealth).
+#pragma once
+
+#include "sensor/calibration.hpp"
+#include "node/fusion_window.hpp"
+#include "bus/decoder.hpp"
+#include "node/landmarks.hpp"
+#include "sensor/plausibility.hpp"
+#include "bus/publisher.hpp"
+#include "bus/input_crc.hpp"
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <type_traits>
+#include <utility>
+
+namespace tetap::node {
+
+template <class Estimators, std::size_t TimelineCapacity = Estimators::kSamples>
+class Node {
+ public:
+  Node(const param::Parameters& parameters, const bus::Version& version) : parameters_(parameters), publisher_(parameters, version) {
+    power_on(base::Micros{});
+  }
+
+  /// As after power-on, with the given time: what a Begin frame asks for.
+  void power_on(base::Micros t);
+
+  /// An input frame of this node's block (sync frames excepted).
+  void on_frame(const base::CanFrame& frame);
+
+  /// Consumes what was true until t, brings every estimator there and sends the epoch's frames.
+  template <class Send>
+  void tick(base::Micros t, const bus::LoopHealth& loop, Send&& send);
+
+  template <class Send>
+  void send_version(Send&& send) {
+    publisher_.send_version(send);
+  }
+
+  /// Called by the inbox.
+  void sample(const sensor::Sample& sample);
+  void map_entry(const estimators::MapEntry& entry) { landmarks_.add(entry, counters_); }
+  /// Of two within an epoch the one with the later counter stands, whichever came first.
+  void set_pose(const estimators::SetPose& pose) {
+    if (!pending_pose_ || ((pose.counter - pending_pose_->counter) & 0x0F) < 8) pending_pose_ = pose;
+  }
+  void reset(bus::ResetWhat what) { pending_reset_[static_cast<std::size_t>(what)] = true; }
+
+ private:
+  using FusionWindow = node::FusionWindow<Estimators, TimelineCapacity>;
+  using Estimates = typename FusionWindow::Estimates;
+  static constexpr std::size_t kPrimary = FusionWindow::kPrimary;
+  static constexpr base::Micros kLongestStep{500'000};
+  using Landmarks = std::conditional_t<Estimators::template kTakes<sensor::LandmarkSighting>, node::Landmarks, node::NoLandmarks>;
+
+  [[nodiscard]] estimators::Context context() const { return {.parameters = parameters_, .map_frame = map_frame_}; }
+  void restart(base::Micros t, sensor::ResetCause cause);
+  void consume(base::Micros t);
+  void close_window(base::Micros t);
+  void apply_map(base::Micros before);
+  void apply_commands();
+  void find_origin(const sensor::Sample& sample);
+  void note(std::size_t instance, const sensor::Sample& sample, const estimators::Innovation& innovation);
+  /// note(), for whoever makes records.
+  [[nodiscard]] auto noting() {
+    return [this](std::size_t instance, const sensor::Sample& sample, const estimators::Innovation& innovation) {
+      note(instance, sample, innovation);
+    };
+  }
+  [[nodiscard]] bool healthy(const Estimates& estimates);
+  [[nodiscard]] [[gnu::noinline]] estimators::Disagreement judge();
+  void note_jump();
+  [[nodiscard]] std::uint32_t state_crc() const;
+  [[nodiscard]] bus::Summary summary(const estimators::Estimate& estimate) const;
+
+  const param::Parameters& parameters_;
+  FusionWindow history_;
+  estimators::MapFrame map_frame_;
+  bus::Decoder inbox_;
+  bus::Counters counters_;
+  bus::Publisher<Estimators::kCount> publisher_;
+  [[no_unique_address]] Landmarks landmarks_;
+  std::array<bool, 3> pending_reset_{};
+  std::optional<estimators::SetPose> pending_pose_;
+
+  base::Micros now_;
+  bool ticked_ = false;
+  bus::InputCrc input_crc_;  ///< of the input frames
+  std::uint8_t resets_ = 0;
+  sensor::ResetCause reset_cause_ = sensor::ResetCause::kPowerOn;
+  base::Micros restarted_at_;
+  std::uint8_t jumps_ = 0;  ///< of the primary estimator, so many are in resets_
+  estimators::AttitudeDisagreement disagreement_;
+};
+
+template <class Estimators, std::size_t Capacity>
+void Node<Estimators, Capacity>::power_on(base::Micros t) {
+  // Cleared in place: a fresh object assigned over the old one would pass over the stack.
+  landmarks_.power_on(map_frame_);
+  map_frame_.frame = {};
+  map_frame_.origin = sensor::OriginSource::kNone;
+  const param::GnssParameters& g = parameters_.gnss;
+  if (g.origin_configured != 0) {
+    map_frame_.frame = nav::LocalFrame(g.origin_latitude_2ndeg, g.origin_longitude_2ndeg, g.origin_height_m);
+    map_frame_.origin = sensor::OriginSource::kConfigured;
+  }
+  inbox_.power_on();
+  counters_ = {};
+  publisher_.power_on();
+  pending_reset_ = {};
+  pending_pose_.reset();
+  now_ = restarted_at_ = t;
+  ticked_ = false;
+  input_crc_ = {};
+  resets_ = 0;
+  reset_cause_ = sensor::ResetCause::kPowerOn;
+  history_.power_on(t, context());
+  disagreement_.restart(t);
+  jumps_ = 0;
+}
+
+template <class Estimators, std::size_t Capacity>
+void Node<Estimators, Capacity>::on_frame(const base::CanFrame& frame) {
+  const auto offset = static_cast<std::uint8_t>(frame.id - parameters_.can_base);
+  input_crc_.add(bus::frame_crc(offset, frame));
+  inbox_.on_frame(offset, frame, now_, counters_, *this);
+}
+
+template <class Estimators, std::size_t Capacity>
+void Node<Estimators, Capacity>::sample(const sensor::Sample& arrived) {
+  sensor::Sample sample = arrived;
+  if (!ticked_ && now_.us == 0) return void(++counters_.no_time);
+  if (!plausible(sample)) return void(++counters_.out_of_range);
+  calibrate(sample, parameters_);
+  if (sample.stamp <= history_.closed_until()) {
+    ++counters_.too_late;
+    publisher_.event({.verdict = sensor::Verdict::kTooLate}, sample, kPrimary, now_, counters_);
+    return;
+  }
+  if (sample.stamp > now_ + base::Micros{parameters_.loop.ahead_us}) return void(++counters_.too_early);
+  const Insert result = history_.insert(sample, context(), noting());
+  if (result == Insert::kDuplicate) ++counters_.duplicate;
+  if (result == Insert::kFull) ++counters_.timeline_full;
+  if (result == Insert::kMadeRoom) ++counters_.window_short;
+}
+
+template <class Estimators, std::size_t Capacity>
+template <class Send>
+void Node<Estimators, Capacity>::tick(base::Micros t, const bus::LoopHealth& loop, Send&& send) {
+  publisher_.tick_begins();
+  if (!ticked_) {
+    restart(t, sensor::ResetCause::kPowerOn);
+    ticked_ = true;
+  } else if (t <= now_ || t - now_ > kLongestStep) {
+    restart(t, sensor::ResetCause::kTimeJump);
+  }
+  const base::Micros before = now_;
+  now_ = t;
+  input_crc_.close_epoch();
+  inbox_.expire(now_, base::Micros{parameters_.loop.window_us}, counters_);
+  apply_map(before);
+  consume(now_);
+  apply_commands();
+  history_.advance(now_, context());
+  Estimates estimates;
+  history_.estimate(context(), estimates);
+  if (!healthy(estimates)) history_.estimate(context(), estimates);
+
+  const estimators::Disagreement apart = judge();
+  note_jump();
+
+  publisher_.begin(now_, input_crc_, send);
+  std::size_t instance = 0;
+  history_.each_lane([&](const auto& lane) {
+    using E = typename std::remove_cvref_t<decltype(lane)>::Type;
+    const bool primary = instance == kPrimary;
+    const estimators::MotionVariance motion =
+        publisher_.says_sigma(instance, primary) ? lane.motion_variance(context()) : estimators::MotionVariance{};
+    publisher_.estimate(instance, E::kKind, primary, estimates[instance], motion, send);
+    if constexpr (requires { lane.inertial(context()); })
+      publisher_.inertial(
+          instance, [&] { return lane.inertial(context()); }, send);
+    if constexpr (requires { lane.attitude(context()); })
+      publisher_.attitude(instance, lane.attitude(context()), apart, send);
+    ++instance;
+  });
+  publisher_.status(summary(estimates[kPrimary]), send);
+  publisher_.statistics(history_.lanes(), now_, send);
+  publisher_.diagnostics(counters_, loop, history_.high_water(), send);
+  publisher_.identity(map_frame_, send);
+  publisher_.events(send);
+  history_.retire_until(now_ - base::Micros{parameters_.loop.window_us}, context(), noting());
+  publisher_.end(state_crc(), input_crc_, send);
+}
+
+template <class Estimators, std::size_t Capacity>
+void Node<Estimators, Capacity>::restart(base::Micros t, sensor::ResetCause cause) {
+  if (cause != sensor::ResetCause::kPowerOn) {
+    ++resets_;
+    reset_cause_ = cause;
+    restarted_at_ = t;
+  }
+  history_.restart(t, context());
+  disagreement_.restart(t);
+  jumps_ = 0;
+  if (cause == sensor::ResetCause::kTimeJump) {
+    inbox_.forget(counters_);
+    history_.clear();
+    history_.open_from(t - base::Micros{parameters_.loop.period_us});
+  }
+  if (cause == sensor::ResetCause::kPowerOn) history_.open_from(t - base::Micros{parameters_.loop.window_us});
+}
+
+/// What was consumed becomes final, and so does the time up to t: nothing from before it is fused any more.
+template <class Estimators, std::size_t Capacity>
+void Node<Estimators, Capacity>::close_window(base::Micros t) {
+  history_.close_window(t, context(), noting());
+}
+
+/// The record goes out when it says something. What comes with every tick or so would drown the rest: of accepted
+/// wheels, magnetometers and barometers the statistics are enough.
+template <class Estimators, std::size_t Capacity>
+void Node<Estimators, Capacity>::note(std::size_t instance, const sensor::Sample& sample, const estimators::Innovation& innovation) {
+  const bool frequent = sample.sensor <= sensor::Sensor::kBodySpeed || sample.sensor == sensor::Sensor::kMagnetometer ||
+                        sample.sensor == sensor::Sensor::kBarometer;
+  const bool ordinary = innovation.verdict == sensor::Verdict::kAccepted && frequent;
+  if ((innovation.dof > 0 && !ordinary) || innovation.verdict > sensor::Verdict::kNotUsed)
+    publisher_.event(innovation, sample, instance, now_, counters_);
+}
+
+template <class Estimators, std::size_t Capacity>
+void Node<Estimators, Capacity>::apply_map(base::Micros before) {
+  if (!landmarks_.waiting()) return;
+  consume(before);  // what came late belongs to the map as it was
+  close_window(before);
+  landmarks_.apply(counters_);
+}
+
+template <class Estimators, std::size_t Capacity>
+void Node<Estimators, Capacity>::apply_commands() {
+  using What = bus::ResetWhat;
+  const auto asked = [this](What what) { return std::exchange(pending_reset_[static_cast<std::size_t>(what)], false); };
+  if (asked(What::kLandmarkMap)) landmarks_.clear();
+  if (asked(What::kCounters)) {
+    counters_ = {};
+    history_.each_lane([](auto& lane) { lane.clear_statistics(); });
+  }
+  if (asked(What::kEstimators)) {
+    close_window(now_);
+    restart(now_, sensor::ResetCause::kCommand);
+  }
+  if (pending_pose_) {
+    close_window(now_);
+    history_.each_lane([&](auto& lane) { lane.set_pose(now_, *pending_pose_, context()); });
+    pending_pose_.reset();
+    ++resets_;
+    reset_cause_ = sensor::ResetCause::kSetPose;
+  }
+}
+
+template <class Estimators, std::size_t Capacity>
+void Node<Estimators, Capacity>::consume(base::Micros t) {
+  const std::uint16_t not_used = history_.consume(
+      t, context(), [this](const sensor::Sample& sample) { find_origin(sample); }, noting());
+  counters_.not_used = static_cast<std::uint16_t>(counters_.not_used + not_used);
+}
+
+template <class Estimators, std::size_t Capacity>
+void Node<Estimators, Capacity>::find_origin(const sensor::Sample& sample) {
+  if (map_frame_.origin != sensor::OriginSource::kNone || sample.sensor != sensor::Sensor::kGnssPosition) return;
+  const sensor::GnssPosition& fix = sample.payload.gnss_position;
+  if (fix.fix < sensor::GnssFix::k2d) return;
+  map_frame_.frame =
+      nav::LocalFrame(fix.latitude_2ndeg, fix.longitude_2ndeg, base::is_finite(fix.height_m) ? fix.height_m : 0.0F);
+  map_frame_.origin = sensor::OriginSource::kFirstFix;
+}
+
+/// A broken invariant (NaN, a covariance that is none) restarts the estimators from their defined start, and says so.
+template <class Estimators, std::size_t Capacity>
+bool Node<Estimators, Capacity>::healthy(const Estimates& estimates) {
+  bool finite = true;
+  bool positive = true;
+  for (const estimators::Estimate& e : estimates) {
+    finite = finite && base::is_finite(e.pose.yaw_rad) && base::is_finite(e.pose.x.offset_m) &&
+             base::is_finite(e.pose.y.offset_m);
+    positive = positive && e.p.positive_definite();
+  }
+  if (finite && positive) return true;
+  close_window(now_);
+  restart(now_, finite ? sensor::ResetCause::kNotPositive : sensor::ResetCause::kNotFinite);
+  history_.advance(now_, context());
+  return false;
+}
+
+/// How far the attitude estimator is from the primary one; nothing where one of them has no attitude.
+template <class Estimators, std::size_t Capacity>
+estimators::Disagreement Node<Estimators, Capacity>::judge() {
+  estimators::Disagreement apart;
+  if constexpr (requires { history_.primary().inertial(context()); }) {
+    history_.each_lane([&](const auto& lane) {
+      if constexpr (requires { lane.attitude(context()); })
+        apart = disagreement(lane.attitude(context()), attitude_of(history_.primary().inertial(context())));
+    });
+    disagreement_.step(apart, now_, parameters_.disagreement);
+  }
+  return apart;
+}
+
+/// A step the primary estimator made of itself counts as a reset, with its cause.
+template <class Estimators, std::size_t Capacity>
+void Node<Estimators, Capacity>::note_jump() {
+  const estimators::Jump jump = history_.primary().jump();
+  if (jump.count == jumps_) return;
+  resets_ = static_cast<std::uint8_t>(resets_ + static_cast<std::uint8_t>(jump.count - jumps_));
+  jumps_ = jump.count;
+  reset_cause_ = jump.cause;
+  restarted_at_ = now_;
+}
+
+template <class Estimators, std::size_t Capacity>
+std::uint32_t Node<Estimators, Capacity>::state_crc() const {
+  base::BitCrc crc;
+  history_.hash_state(crc);
+  crc(static_cast<std::uint32_t>(map_frame_.origin));
+  disagreement_.hash_state(crc);
+  landmarks_.hash_state(crc);
+  return crc.value();
+}
+
+template <class Estimators, std::size_t Capacity>
+bus::Summary Node<Estimators, Capacity>::summary(const estimators::Estimate& estimate) const {
+  const auto& primary = history_.primary();
+  bus::Summary s{.mode = primary.mode(context()),
+            .position_valid = estimate.position_valid,
+            .heading_valid = estimate.heading_valid,
+            .velocity_valid = estimate.velocity_valid,
+            .origin_known = map_frame_.origin != sensor::OriginSource::kNone,
+            .resets = resets_,
+            .cause = reset_cause_,
+            .restarted = resets_ > 0 && now_ - restarted_at_ < base::Micros{1'000'000} &&
+                         reset_cause_ != sensor::ResetCause::kSetPose};
+  bus::FaultSet faults{primary.faults()};
+  faults.raise(sensor::Fault::kAttitudeDisagrees, disagreement_.disagrees());
+  history_.each_lane([&](const auto& lane) {
+    if constexpr (requires { lane.attitude(context()); })
+      faults.raise(sensor::Fault::kMagneticDisturbance, lane.attitude(context()).field_disturbed);
+  });
+  s.faults = faults.bits;
+  for (const estimators::SensorStatistics& stat : primary.statistics()) {
+    const bool used = stat.accepted > 0 && now_ - stat.last_accepted < base::Micros{1'000'000};
+    if (used) s.used = static_cast<std::uint16_t>(s.used | (1U << static_cast<unsigned>(stat.sensor)));
+    s.rejecting = s.rejecting || stat.refused_in_a_row >= 3;
+  }
+  return s;
+}
+
+}  // namespace tetap::node

@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: Apache-2.0
+// When to tick: on the board's own timer, on the bus's sync frames, or in lockstep with a player. The only part of the
+// firmware that knows real time, and it decides nothing but the sequence of ticks, which every epoch frame states.
+#pragma once
+
+#include "bus/counters.hpp"
+#include "base/time.hpp"
+#include "bus/messages.hpp"
+
+#include <cstdint>
+#include <optional>
+
+namespace tetap::node {
+
+/// Rules.
+///   Clock frame: sets the clock's offset; ticks stay the own timer's, at whole periods of the bus's time.
+///   Tick frame:  tick at its time. Missing for three periods: hold over on the own timer. Back after three in a row
+///   that are one
+///                period (+-10 %) apart and ahead of the last tick.
+///   Step frame:  tick at its time, whatever it is; no own timer until a Tick or Clock frame comes.
+///   A Tick whose time is not ahead of the last tick, or more than kFarthest periods ahead, is refused and counted,
+///   until three in a row agree.
+class Pacer {
+ public:
+  explicit constexpr Pacer(base::Micros period) : period_(period) {}
+
+  /// A sync frame that arrived at board time `now`; the time to tick at, if any.
+  [[nodiscard]] constexpr std::optional<base::Micros> on_sync(bus::SyncKind kind, base::Micros time, base::Micros now,
+                                                              bus::LoopHealth& health) {
+    switch (kind) {
+      case bus::SyncKind::kBegin:
+        state_ = bus::SyncState::kLockstep;
+        on_bus_time_ = true;
+        last_tick_ = time;
+        return std::nullopt;
+      case bus::SyncKind::kStep:
+        state_ = bus::SyncState::kLockstep;
+        on_bus_time_ = true;
+        last_tick_ = time;
+        return time;
+      case bus::SyncKind::kClock:
+        return set_clock(time, now), std::nullopt;
+      case bus::SyncKind::kTick:
+        return follow(time, now, health);
+    }
+    return std::nullopt;
+  }
+
+  /// Called at each poll with the board's time; the time to tick at, if one is due.
+  [[nodiscard]] constexpr std::optional<base::Micros> on_poll(base::Micros now, bus::LoopHealth& health) {
+    if (state_ == bus::SyncState::kLockstep) return std::nullopt;
+    if (state_ == bus::SyncState::kFollowing) {
+      if (now - last_sync_arrival_ <= times(3)) return std::nullopt;
+      ++health.sync_lost;
+      state_ = bus::SyncState::kHoldover;
+      in_a_row_ = 0;
+      next_tick_ = last_tick_ + period_;
+      waited_ = 3;
+    }
+    if (next_tick_.us == 0) next_tick_ = next_multiple(now + offset_);
+    const base::Micros bus_now = now + offset_;
+    if (bus_now < next_tick_) return std::nullopt;
+    const std::int64_t behind = (bus_now - next_tick_).us / period_.us;
+    // The periods that hold-over waited for a sync frame are not the loop's lateness.
+    health.ticks_late = static_cast<std::uint16_t>(health.ticks_late + (behind > waited_ ? behind - waited_ : 0));
+    waited_ = 0;
+    last_tick_ = next_tick_ + times(behind);
+    next_tick_ = last_tick_ + period_;
+    return last_tick_;
+  }
+
+  [[nodiscard]] constexpr bus::SyncState state() const { return state_; }
+
+ private:
+  static constexpr std::int64_t kFarthest = 50;
+  [[nodiscard]] constexpr base::Micros times(std::int64_t n) const { return {n * period_.us}; }
+  [[nodiscard]] constexpr base::Micros next_multiple(base::Micros t) const {
+    return {(t.us / period_.us + 1) * period_.us};
+  }
+
+  /// A small correction keeps the sequence of ticks; a large one, or the first, begins it anew at a whole period.
+  constexpr void set_clock(base::Micros time, base::Micros now) {
+    const base::Micros correction = time - (now + offset_);
+    const bool small = correction < times(kFarthest) && times(-kFarthest) < correction;
+    offset_ = time - now;
+    if (state_ == bus::SyncState::kOwnTimer && small && next_tick_.us != 0) return;
+    state_ = bus::SyncState::kOwnTimer;
+    next_tick_ = next_multiple(time);
+  }
+
+  constexpr std::optional<base::Micros> follow(base::Micros time, base::Micros now, bus::LoopHealth& health) {
+    const base::Micros step = time - last_sync_;
+    const bool regular = step.us * 10 >= period_.us * 9 && step.us * 10 <= period_.us * 11;
+    in_a_row_ = regular ? in_a_row_ + 1 : 0;
+    last_sync_ = time;
+    const bool first = !on_bus_time_;
+    const bool back = time <= last_tick_;
+    const bool far = time > last_tick_ + times(kFarthest);
+    if (!first && in_a_row_ < 2) {
+      if (back) return ++health.sync_back, std::nullopt;
+      if (far) return ++health.sync_jump, std::nullopt;
+      if (state_ != bus::SyncState::kFollowing) return std::nullopt;
+    }
+    on_bus_time_ = true;
+    if (state_ == bus::SyncState::kHoldover && back)
+      return std::nullopt;  // its own ticks are ahead: wait until the bus is
+    // Two frames a period apart that are taken at nearly one moment: the loop was not there when the first one came.
+    if (state_ == bus::SyncState::kFollowing && regular && (now - last_sync_arrival_).us * 2 < period_.us)
+      ++health.ticks_late;
+    state_ = bus::SyncState::kFollowing;
+    last_sync_arrival_ = now;
+    offset_ = time - now;
+    last_tick_ = time;
+    return time;
+  }
+
+  base::Micros period_;
+  bus::SyncState state_ = bus::SyncState::kOwnTimer;
+  base::Micros offset_;  ///< bus time minus board time
+  base::Micros last_tick_;
+  base::Micros next_tick_;
+  base::Micros last_sync_;          ///< time stated in the last Tick frame, believed or not
+  base::Micros last_sync_arrival_;  ///< board time of the last one believed
+  std::int32_t in_a_row_ = 0;       ///< Tick frames one period apart
+  std::int64_t waited_ = 0;         ///< periods that went by before hold-over began
+  bool on_bus_time_ = false;        ///< the time of ticks has been the bus's before
+};
+
+}  // namespace tetap::node

@@ -1,0 +1,280 @@
+// SPDX-License-Identifier: Apache-2.0
+// All numbers of a robot in one struct, passed by const reference. Types and sizes are template arguments; everything
+// that can be tuned is here, has a unit, and is part of the hash in the version frame, so a replay with other numbers
+// says so.
+#pragma once
+
+#include "base/crc.hpp"
+#include "base/time.hpp"
+#include "filter/attitude_options.hpp"
+#include "model/differential_drive.hpp"
+#include "model/landmark.hpp"
+#include "model/unicycle.hpp"
+
+#include <array>
+#include <bit>
+#include <cstdint>
+
+namespace tetap::param {
+
+struct LoopParameters {
+  std::int32_t period_us = 10'000;   ///< of the tick, in sample time
+  std::int32_t window_us = 200'000;  ///< how late a sample may come and still be fused at its own time
+  std::int32_t ahead_us = 200'000;   ///< how far ahead of the tick a stamp may be and still wait
+  float turn_radps2 = 0.5F;          ///< 1 sigma of what turns it faster or slower: a yaw rate is as old as its sample
+};
+
+/// How a speed sample relates to its stamp.
+enum class Hold : std::int32_t {
+  kForward,   ///< a command: holds from its stamp on
+  kBackward,  ///< a measurement: the mean since the sample before
+};
+
+struct WheelParameters {
+  model::DifferentialDrive drive;
+  model::UnicycleNoise noise;   ///< for BodySpeed samples
+  float wheel_speed_noise = 0;  ///< m^2/s per wheel: white noise of WheelSpeed samples, at standstill
+  Hold hold = Hold::kBackward;
+  std::int32_t delay_us = 0;  ///< from a BodySpeed sample's stamp to the motion it speaks of: a command's dead time
+  float speed_scale = 1;      ///< true speed over stated speed, of BodySpeed samples
+  float yaw_rate_scale = 1;
+  float left_speed_scale = 1;  ///< the same of WheelSpeeds samples
+  float right_speed_scale = 1;
+  std::int32_t timeout_us = 500'000;  ///< without a sample for longer: assume standstill, grow the covariance fast
+  float timeout_noise = 1.0F;         ///< m^2/s and rad^2/s then
+};
+
+/// The IMU's own errors as tools/calibrate/calibrate_robot finds them, in its own axes: specific force = accel_matrix (raw -
+/// accel_bias), turn rate = raw - gyro_bias - slope (temperature - at); without a temperature the slope is not used.
+/// What estimators publish as a bias is what is left.
+struct ImuParameters {
+  std::array<float, 3> accel_bias_mps2{0, 0, 0};
+  std::array<float, 9> accel_matrix{1, 0, 0, 0, 1, 0, 0, 0, 1};  ///< scale and misalignment, row by row
+  std::array<float, 3> gyro_bias_radps{0, 0, 0};
+  std::array<float, 3> gyro_bias_slope_radps_per_degC{0, 0, 0};
+  float gyro_bias_at_degC = 25;
+};
+
+struct GyroParameters {
+  std::int32_t use = 0;                ///< 0: yaw rate from the wheels, 1: from IMU instance 0
+  std::array<float, 3> up_s{0, 0, 1};  ///< the body's z axis as a unit vector in sensor axes: row 3 of R_bs
+  float noise = 0;                     ///< rad^2/s: angular random walk squared, plus vibration
+  float bias_time_s = 20;              ///< time constant of the bias average at standstill
+  float standstill_mps = 0.002F;       ///< wheels slower than this for one second mean standstill
+};
+
+struct LandmarkParameters {
+  model::PlanarMounting mounting;  ///< of the sensor
+  float sigma_range_m = 0.1F;
+  float sigma_range_per_m = 0;  ///< grows with range
+  float sigma_bearing_rad = 0.02F;
+  float sigma_range_only_m = 0.1F;  ///< when no bearing comes with it
+  float gate_scale = 1;             ///< times the 99 % chi-square quantile
+};
+
+struct GnssParameters {
+  float antenna_x_b_m = 0;
+  float antenna_y_b_m = 0;
+  float antenna_z_b_m = 0;
+  float sigma_velocity_floor_mps = 0.1F;
+  float sigma_floor_m = 0.5F;  ///< the receiver's own accuracy is not believed below this
+  float sigma_scale = 1;       ///< times the receiver's own accuracy
+  float correlation_s = 0;     ///< inertial: how long the receiver's errors last; 0: a new one with every fix
+  float gate_scale = 1;
+  float align_distance_m = 8;  ///< travel by GNSS before a heading is derived from it
+  /// Of a receiver with two antennas: from the first to the second. Its heading is that of this line.
+  std::array<float, 3> baseline_b_m{1, 0, 0};
+  std::int32_t heading_stuck_samples = 50;  ///< repeated so often to the last bit, a heading is a stuck one; 0: never
+  std::int32_t origin_configured = 0;       ///< 0: the first fix is the origin
+  std::int64_t origin_latitude_2ndeg = 0;
+  std::int64_t origin_longitude_2ndeg = 0;
+  float origin_height_m = 0;
+};
+
+/// Inertial navigation: the sensor's data sheet, and how well the robot keeps to its wheels.
+struct InertialParameters {
+  std::int32_t imu = 0;  ///< which instance
+  /// From the sensor's axes into the body's, row by row: x forward, y left, z up.
+  std::array<float, 9> mounting_bs{1, 0, 0, 0, 1, 0, 0, 0, 1};
+  float gyro_radps_rthz = 5e-5F;        ///< ICM-42688-P, DS-000347 table 1: 0.0028 deg/s/sqrt(Hz)
+  float accel_mps2_rthz = 7e-4F;        ///< table 2: 70 ug/sqrt(Hz)
+  float gyro_scale = 0.003F;            ///< 1 sigma of its scale; table 1: initial tolerance 0.5 %
+  float gyro_bias_radps2_rthz = 1e-5F;  ///< random walk of the bias
+  float accel_bias_mps3_rthz = 2e-4F;
+  float gyro_turn_on_radps = 0.01F;  ///< 1 sigma of the bias at start
+  float accel_turn_on_mps2 = 0.2F;
+  float start_tilt_rad = 0.05F;     ///< 1 sigma of levelling
+  std::int32_t starts_forward = 0;  ///< 1: it never starts in reverse, so its course is its heading
+  float level_s = 1;                ///< how long gravity is looked at
+  std::int32_t earth_rate = 0;      ///< 1: a gyroscope good enough to feel the Earth turn, 15 deg/h
+  float gap_mps2 = 3;               ///< what may have happened while samples were missing
+  float gap_radps = 1;
+  float gap_wheels_radps = 0.1F;    ///< the same for turning, while wheels show how it turns
+  std::int32_t stuck_samples = 10;  ///< repeated so often, a sample is one of a stuck sensor; 0: never
+  std::int32_t stale_us = 100'000;  ///< without a sample for longer: bridged
+  float vibration_mps2 = 4;         ///< RMS up to which the noise densities hold; beyond, they grow with it
+  float vibration_radps = 0.4F;     ///< likewise
+  float calm_mps2 = 0.1F;           ///< RMS below which it may be standing, where wheels do not tell
+  float calm_radps = 0.01F;
+  float still_radps = 0.03F;    ///< turning slower than this, wheels still: standing
+  float still_mps = 0.005F;     ///< 1 sigma of standing as wheels tell it,
+  float still_gnss_mps = 0.1F;  ///< and as IMU and GNSS velocity do
+  float wheel_mps = 0.02F;      ///< 1 sigma of the wheels' speed at standstill
+  float slip_share = 0.02F;     ///< and what grows with speed
+  float lateral_mps = 0.05F;    ///< how well it does not move sideways
+  float vertical_mps = 0.05F;
+  float axle_x_b_m = 0;                   ///< the axle that does not steer
+  std::int32_t wheels_every_us = 15'000;  ///< wheels are fused no more often: at 100 Hz every second sample
+  float wheel_gate_scale = 1;
+  float slip_mps = 0.15F;  ///< off by more of it and 4 sigma, for long enough, a wheel is spinning; 0: not watched
+  /// Without a wheel speed for so long, it does at least not move sideways or up, said this often; 0: it may.
+  std::int32_t constrain_every_us = 0;
+};
+
+/// The magnetometer: its calibration, and what of it is believed. Field of the body = mounting * soft iron * (flux -
+/// hard iron), the last two in the sensor's own axes.
+struct MagneticParameters {
+  std::int32_t use = 0;
+  float declination_rad = 0;  ///< of magnetic from true north, eastward positive
+  std::array<float, 3> hard_iron_uT{0, 0, 0};
+  std::array<float, 9> soft_iron{1, 0, 0, 0, 1, 0, 0, 0, 1};    ///< row by row
+  std::array<float, 9> mounting_bs{1, 0, 0, 0, 1, 0, 0, 0, 1};  ///< from the sensor's axes into the body's, row by row
+  float sigma_rad = 0.1F;  ///< of a heading, all its errors together: no better is ever believed
+  float gate_scale = 1;
+  float norm_uT = 0;        ///< of the field after calibration; 0: as found at the start
+  float norm_share = 0.1F;  ///< off by more of it, the field is disturbed
+  float dip_rad = 0.15F;    ///< the same for its angle below the horizon, from what was found at the start
+  /// In motion for so long in a field that stays the same, but is not the one known: that is the known one then.
+  float field_new_s = 20;
+  std::int32_t stuck_samples = 50;  ///< in motion, repeated so often to the last bit, a field is a stuck one; 0: never
+};
+
+/// The barometer: its zero is found, and followed, where the height is known better by other means.
+struct BaroParameters {
+  std::int32_t use = 0;
+  float sigma_m = 0.3F;       ///< of one height, white
+  float drift_m_rts = 0.1F;   ///< of its zero: weather, warming up; m per root second
+  float scale_share = 0.05F;  ///< of a change of height: air that is not the standard atmosphere
+  float gate_scale = 1;
+  /// Repeated so often to the last bit (0.5 Pa on the bus), a pressure is a stuck one, where its noise is more than
+  /// that; 0: never.
+  std::int32_t stuck_samples = 0;
+};
+
+/// When two attitudes differ enough, for long enough, one of them is wrong. A curve that lasts tilts what only knows an
+/// accelerometer: on the simulated road (5 m/s) by up to 0.1 rad.
+struct DisagreementParameters {
+  float tilt_rad = 0.15F;
+  float heading_rad = 0.35F;
+  std::int32_t after_us = 2'000'000;
+};
+
+/// The state at start; sigma_yaw_rad >= pi means the heading is not known.
+struct StartParameters {
+  std::int32_t known = 0;  ///< 0: wait for a set-pose command or, with GNSS, align
+  float x_m = 0;
+  float y_m = 0;
+  float yaw_rad = 0;
+  float sigma_position_m = 0.1F;
+  float sigma_yaw_rad = 0.05F;
+};
+
+/// A sensor that was refused this long comes back by inflating the position's and heading's variance, once per period.
+/// Not so GNSS position in the inertial filter: what it refuses becomes true only by persisting.
+struct RecoveryParameters {
+  std::int32_t after_us = 3'000'000;
+  std::int32_t at_least = 10;  ///< rejections in a row
+  float inflate_position_m = 1;
+  float inflate_yaw_rad = 0.2F;
+  std::int32_t persist_us = 60'000'000;  ///< refused fixes that agree for longer are a jump that is true,
+  std::int32_t persist_fixes = 120;      ///< and if there are so many of them
+  std::int32_t confirm_fixes = 5;        ///< that agree, before one decides where the filter is
+  float frozen_m = 0.5F;                 ///< way with the same coordinates: the receiver repeats itself
+};
+
+/// Ticks between frames; 0 = never.
+struct PublishParameters {
+  std::int32_t pose_every = 1;  ///< estimate 1: position and motion
+  std::int32_t std_every = 5;
+  std::int32_t side_every = 10;  ///< every other estimate, all of its frames
+  std::int32_t status_every = 10;
+  std::int32_t statistics_every = 13;   ///< one sensor at a time
+  std::int32_t diagnostics_every = 12;  ///< one page at a time
+  std::int32_t identity_every = 25;     ///< version and origin, one frame at a time
+  std::int32_t attitude_every = 5;      ///< attitude and velocity of an inertial estimate
+  std::int32_t state_every = 10;        ///< one page of the rest of it at a time; a multiple of both
+  std::int32_t event_every = 2;         ///< at most one innovation per so many ticks
+};
+
+struct Parameters {
+  std::uint32_t can_base = 0x300;
+  LoopParameters loop;
+  WheelParameters wheels;
+  ImuParameters imu;  ///< of the one that is used: inertial.imu
+  GyroParameters gyro;
+  LandmarkParameters landmark;
+  GnssParameters gnss;
+  InertialParameters inertial;
+  MagneticParameters magnetic;
+  BaroParameters baro;
+  filter::AttitudeOptions attitude;  ///< its declination is the magnetometer's
+  DisagreementParameters disagreement;
+  StartParameters start;
+  RecoveryParameters recovery;
+  PublishParameters publish;
+};
+
+/// Feeds every number to sink(value), in declaration order.
+template <class Sink>
+constexpr void each_parameter(const Parameters& n, Sink&& sink) {
+  const auto all = [&sink](const auto&... values) { (sink(values), ...); };
+  all(n.can_base, n.loop.period_us, n.loop.window_us, n.loop.ahead_us, n.loop.turn_radps2);
+  const auto& d = n.wheels.drive;
+  all(d.left_radius_m, d.right_radius_m, d.track_m, d.counts_per_turn, d.noise_left, d.noise_right);
+  const auto& u = n.wheels.noise;
+  all(u.speed, u.speed_per_speed, u.yaw_rate, u.yaw_rate_per_yaw_rate, u.yaw_rate_per_speed);
+  all(n.wheels.wheel_speed_noise, static_cast<std::int32_t>(n.wheels.hold), n.wheels.delay_us, n.wheels.speed_scale,
+      n.wheels.yaw_rate_scale, n.wheels.left_speed_scale, n.wheels.right_speed_scale, n.wheels.timeout_us,
+      n.wheels.timeout_noise);
+  for (const float v : n.imu.accel_bias_mps2) sink(v);
+  for (const float v : n.imu.accel_matrix) sink(v);
+  for (const float v : n.imu.gyro_bias_radps) sink(v);
+  for (const float v : n.imu.gyro_bias_slope_radps_per_degC) sink(v);
+  sink(n.imu.gyro_bias_at_degC);
+  all(n.gyro.use, n.gyro.up_s[0], n.gyro.up_s[1], n.gyro.up_s[2], n.gyro.noise, n.gyro.bias_time_s,
+      n.gyro.standstill_mps);
+  const auto& l = n.landmark;
+  all(l.mounting.x_b_m, l.mounting.y_b_m, l.mounting.yaw_rad, l.sigma_range_m, l.sigma_range_per_m, l.sigma_bearing_rad,
+      l.sigma_range_only_m, l.gate_scale);
+  const auto& g = n.gnss;
+  all(g.antenna_x_b_m, g.antenna_y_b_m, g.antenna_z_b_m, g.sigma_velocity_floor_mps, g.sigma_floor_m, g.sigma_scale,
+      g.correlation_s, g.gate_scale, g.align_distance_m, g.origin_configured, g.origin_latitude_2ndeg,
+      g.origin_longitude_2ndeg, g.origin_height_m, g.baseline_b_m[0], g.baseline_b_m[1], g.baseline_b_m[2],
+      g.heading_stuck_samples);
+  const auto& i = n.inertial;
+  for (const float m : i.mounting_bs) sink(m);
+  all(i.imu, i.gyro_radps_rthz, i.gyro_scale, i.accel_mps2_rthz, i.gyro_bias_radps2_rthz, i.accel_bias_mps3_rthz,
+      i.gyro_turn_on_radps, i.accel_turn_on_mps2, i.start_tilt_rad, i.level_s, i.starts_forward, i.gap_mps2,
+      i.gap_radps, i.still_radps, i.still_mps, i.wheel_mps, i.slip_share, i.lateral_mps, i.vertical_mps, i.axle_x_b_m,
+      i.wheel_gate_scale, i.wheels_every_us, i.constrain_every_us, i.gap_wheels_radps, i.stuck_samples, i.stale_us,
+      i.earth_rate, i.vibration_mps2, i.vibration_radps, i.calm_mps2, i.calm_radps, i.still_gnss_mps, i.slip_mps);
+  const auto& m = n.magnetic;
+  for (const float v : m.hard_iron_uT) sink(v);
+  for (const float v : m.soft_iron) sink(v);
+  for (const float v : m.mounting_bs) sink(v);
+  all(m.use, m.declination_rad, m.sigma_rad, m.gate_scale, m.norm_uT, m.norm_share, m.dip_rad, m.field_new_s,
+      m.stuck_samples);
+  all(n.baro.use, n.baro.sigma_m, n.baro.drift_m_rts, n.baro.scale_share, n.baro.gate_scale, n.baro.stuck_samples);
+  n.attitude.each(sink);
+  all(n.disagreement.tilt_rad, n.disagreement.heading_rad, n.disagreement.after_us);
+  const auto& s = n.start;
+  all(s.known, s.x_m, s.y_m, s.yaw_rad, s.sigma_position_m, s.sigma_yaw_rad);
+  const auto& r = n.recovery;
+  all(r.after_us, r.at_least, r.inflate_position_m, r.inflate_yaw_rad, r.persist_us, r.persist_fixes, r.confirm_fixes,
+      r.frozen_m);
+  const auto& p = n.publish;
+  all(p.pose_every, p.std_every, p.side_every, p.status_every, p.statistics_every, p.diagnostics_every,
+      p.identity_every, p.attitude_every, p.state_every, p.event_every);
+}
+
+}  // namespace tetap::param

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+// What is known of a sensor's own errors is taken out of its samples before any estimator sees them. A function of the
+// sample alone: a late one is corrected as it would have been in time.
+#pragma once
+
+#include "param/parameters.hpp"
+#include "sensor/row_major.hpp"
+#include "sensor/sample.hpp"
+
+namespace tetap::sensor {
+
+/// Increments without bias: f = T (raw - b), w = raw - b(temperature). tools/calibrate/calibrate_robot finds these numbers.
+inline void calibrate(ImuSample& s, const param::ImuParameters& n) {
+  const float dt_s = base::seconds(base::Micros{s.interval_us});
+  const float now = s.temperature_degC;
+  const float warmer = now > -300.0F && now < 300.0F ? now - n.gyro_bias_at_degC : 0.0F;  // NaN: not available
+  filter::Vector3 dv;
+  for (std::size_t i = 0; i < 3; ++i) {
+    s.dangle_b_rad[i] -= (n.gyro_bias_radps[i] + n.gyro_bias_slope_radps_per_degC[i] * warmer) * dt_s;
+    dv(static_cast<int>(i)) = s.dvelocity_b_mps[i] - n.accel_bias_mps2[i] * dt_s;
+  }
+  const filter::Vector3 f = times(n.accel_matrix, dv);
+  s.dvelocity_b_mps = {f(0), f(1), f(2)};
+}
+
+inline void calibrate(Sample& sample, const param::Parameters& n) {
+  if (is_imu(sample, n.inertial.imu)) {
+    calibrate(sample.payload.imu, n.imu);
+  } else if (sample.sensor == sensor::Sensor::kWheelSpeed) {
+    sample.payload.wheel_speeds.left_mps *= n.wheels.left_speed_scale;
+    sample.payload.wheel_speeds.right_mps *= n.wheels.right_speed_scale;
+  } else if (sample.sensor == sensor::Sensor::kBodySpeed) {
+    sample.payload.body_speed.forward_mps *= n.wheels.speed_scale;
+    sample.payload.body_speed.yaw_rate_radps *= n.wheels.yaw_rate_scale;  // NaN stays what it is
+    sample.stamp += base::Micros{n.wheels.delay_us};
+  }
+}
+
+}  // namespace tetap::sensor

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a sample must be before anything computes with it: numbers where there must be numbers, of a size that a sensor
+// on a robot can mean. The limits are far beyond every robot; inside them no filter leaves the floats.
+#pragma once
+
+#include "sensor/sample.hpp"
+#include "base/math.hpp"
+
+namespace tetap::sensor {
+
+namespace detail {
+[[nodiscard]] constexpr bool within(float limit, auto... values) {  // false for NaN
+  return ((values <= limit && values >= -limit) && ...);
+}
+/// A 1 sigma that may be not available.
+[[nodiscard]] constexpr bool sigma_or_none(float sigma, float limit) {
+  return base::is_nan(sigma) || (sigma >= 0.0F && sigma <= limit);
+}
+[[nodiscard]] constexpr bool number_or_none(float x, float limit) { return base::is_nan(x) || within(limit, x); }
+
+struct Plausible {
+  bool operator()(const ImuSample& s) const {
+    const auto& a = s.dangle_b_rad;
+    const auto& v = s.dvelocity_b_mps;
+    return within(20.0F, a[0], a[1], a[2]) && within(200.0F, v[0], v[1], v[2]);
+  }
+  bool operator()(const WheelCounts&) const { return true; }
+  bool operator()(const WheelSpeeds& s) const { return within(1e3F, s.left_mps, s.right_mps); }
+  bool operator()(const BodySpeed& s) const {
+    return within(1e3F, s.forward_mps) && number_or_none(s.yaw_rate_radps, 100.0F);
+  }
+  bool operator()(const GnssPosition& s) const {
+    constexpr std::int64_t kQuarterTurn = 45'000'000'000;
+    return s.latitude_2ndeg <= kQuarterTurn && s.latitude_2ndeg >= -kQuarterTurn &&
+           s.longitude_2ndeg <= 4 * kQuarterTurn && s.longitude_2ndeg >= -4 * kQuarterTurn &&
+           number_or_none(s.height_m, 1e5F) && sigma_or_none(s.horizontal_acc_m, 1e6F) &&
+           sigma_or_none(s.vertical_acc_m, 1e6F);
+  }
+  bool operator()(const GnssVelocity& s) const {
+    return within(500.0F, s.v_n_mps[0], s.v_n_mps[1]) && number_or_none(s.v_n_mps[2], 500.0F) &&
+           sigma_or_none(s.acc_mps, 1e4F);
+  }
+  bool operator()(const LandmarkSighting& s) const {
+    const bool any = !base::is_nan(s.range_m) || !base::is_nan(s.bearing_rad);
+    return any && sigma_or_none(s.range_m, 1e5F) && number_or_none(s.bearing_rad, 10.0F);
+  }
+  bool operator()(const MagneticFlux& s) const { return within(1e6F, s.flux_b_uT[0], s.flux_b_uT[1], s.flux_b_uT[2]); }
+  bool operator()(const AirPressure& s) const { return s.pressure_Pa > 0.0F && s.pressure_Pa < 1e6F; }
+  bool operator()(const OutsideHeading& s) const { return within(10.0F, s.yaw_rad) && sigma_or_none(s.acc_rad, 10.0F); }
+};
+}  // namespace detail
+
+/// False: the sample is to be refused and counted (Counters::out_of_range).
+[[nodiscard]] inline bool plausible(const Sample& sample) {
+  bool good = false;
+  visit(sample, [&good](const auto& payload) { good = detail::Plausible{}(payload); });
+  return good;
+}
+
+}  // namespace tetap::sensor

@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: Apache-2.0
+// Any sample with its stamp and identity: what the timeline holds and orders.
+#pragma once
+
+#include "sensor/samples.hpp"
+#include "sensor/vocabulary.hpp"
+
+#include <compare>
+#include <cstdint>
+
+namespace tetap::sensor {
+
+struct Sample {
+  base::Micros stamp;
+  sensor::Sensor sensor = sensor::Sensor::kNotAvailable;  ///< says which member of the payload is there
+  std::uint8_t instance = 0;
+  std::uint8_t sequence = 0;
+  std::uint8_t detail = 0;  ///< tells apart what one sensor saw at one moment: the landmark
+  std::uint32_t bits = 0;   ///< sum of the CRC-32 of the frames it came in: stands for the payload in hashes
+
+  union Payload {
+    constexpr Payload() : imu{} {}
+    ImuSample imu;
+    WheelCounts counts;
+    WheelSpeeds wheel_speeds;
+    BodySpeed body_speed;
+    GnssPosition gnss_position;
+    GnssVelocity gnss_velocity;
+    LandmarkSighting sighting;
+    MagneticFlux magnetic;
+    AirPressure pressure;
+    OutsideHeading heading;
+  } payload;
+
+  static_assert(sizeof(Payload) == 32, "a window of them is most of the memory");
+
+  /// The order in which samples are consumed, whatever the order of arrival.
+  [[nodiscard]] constexpr std::strong_ordering order(const Sample& other) const {
+    if (const auto by = stamp <=> other.stamp; by != 0) return by;
+    if (const auto by = sensor <=> other.sensor; by != 0) return by;
+    if (const auto by = instance <=> other.instance; by != 0) return by;
+    if (const auto by = sequence <=> other.sequence; by != 0) return by;
+    return detail <=> other.detail;
+  }
+};
+
+[[nodiscard]] constexpr bool is_imu(const Sample& sample, std::int32_t instance) {
+  return sample.sensor == sensor::Sensor::kImu && sample.instance == instance;
+}
+
+/// Calls f with the payload that is there; false when there is none.
+template <class F>
+constexpr bool visit(const Sample& sample, F&& f) {
+  switch (sample.sensor) {
+    case sensor::Sensor::kImu:
+      f(sample.payload.imu);
+      return true;
+    case sensor::Sensor::kWheelCounts:
+      f(sample.payload.counts);
+      return true;
+    case sensor::Sensor::kWheelSpeed:
+      f(sample.payload.wheel_speeds);
+      return true;
+    case sensor::Sensor::kBodySpeed:
+      f(sample.payload.body_speed);
+      return true;
+    case sensor::Sensor::kRangeBearing:
+      f(sample.payload.sighting);
+      return true;
+    case sensor::Sensor::kGnssPosition:
+      f(sample.payload.gnss_position);
+      return true;
+    case sensor::Sensor::kGnssVelocity:
+      f(sample.payload.gnss_velocity);
+      return true;
+    case sensor::Sensor::kMagnetometer:
+      f(sample.payload.magnetic);
+      return true;
+    case sensor::Sensor::kBarometer:
+      f(sample.payload.pressure);
+      return true;
+    case sensor::Sensor::kHeading:
+      f(sample.payload.heading);
+      return true;
+    case sensor::Sensor::kNotAvailable:
+      return false;
+  }
+  return false;
+}
+
+}  // namespace tetap::sensor

@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: Apache-2.0
+// What sensors say, in SI: the one form in which wired drivers, the bus and the simulated world hand data to
+// estimators. Small structs, passed by value. Frames: b = body (x forward, y left, z up).
+#pragma once
+
+#include "base/time.hpp"
+
+#include <array>
+#include <cstdint>
+
+namespace tetap::sensor {
+
+/// Increments over `interval`, so that a driver sampling faster can integrate coning and sculling.
+struct ImuSample {
+  std::array<float, 3> dangle_b_rad{};     ///< integrated angular rate
+  std::array<float, 3> dvelocity_b_mps{};  ///< integrated specific force
+  float temperature_degC = 0;              ///< NaN: not available
+  std::uint16_t interval_us = 0;           ///< the span the increments cover; it ends at the stamp
+  std::uint8_t clipped_gyro = 0;           ///< raw samples at full scale within the interval
+  std::uint8_t clipped_accel = 0;
+};
+
+/// Free-running quadrature counters; only differences mean anything, and they wrap.
+struct WheelCounts {
+  std::uint16_t left = 0;
+  std::uint16_t right = 0;
+};
+
+/// Ground speed of each wheel's contact point.
+struct WheelSpeeds {
+  float left_mps = 0;
+  float right_mps = 0;
+};
+
+struct BodySpeed {
+  float forward_mps = 0;
+  float yaw_rate_radps = 0;  ///< NaN: not available
+};
+
+enum class GnssFix : std::uint8_t {
+  kNone = 0,
+  kTimeOnly = 1,
+  k2d = 2,
+  k3d = 3,
+  kDifferential = 4,
+  kRtkFloat = 5,
+  kRtkFixed = 6
+};
+
+/// WGS84. Angles are integers of 2e-9 deg (0.2 mm), because a float would lose metres.
+struct GnssPosition {
+  std::int64_t latitude_2ndeg = 0;
+  std::int64_t longitude_2ndeg = 0;
+  float height_m = 0;          ///< above the ellipsoid; NaN: not available
+  float horizontal_acc_m = 0;  ///< 1 sigma per axis, the receiver's own; NaN: not available
+  float vertical_acc_m = 0;
+  GnssFix fix = GnssFix::kNone;
+  std::uint8_t satellites = 0;
+};
+
+/// In the local level frame n: east, north, up.
+struct GnssVelocity {
+  std::array<float, 3> v_n_mps{};
+  float acc_mps = 0;  ///< 1 sigma per axis; NaN: not available
+};
+
+/// A landmark seen from the body: range, bearing (0 = ahead, counter-clockwise) or both; NaN: not measured.
+/// Magnetic flux density along the body's axes.
+struct MagneticFlux {
+  std::array<float, 3> flux_b_uT{};
+};
+
+struct AirPressure {
+  float pressure_Pa = 0;
+  float temperature_degC = 0;  ///< NaN: not available
+};
+
+/// Heading of a baseline on the body, from a receiver with two antennas for instance.
+struct OutsideHeading {
+  float yaw_rad = 0;
+  float acc_rad = 0;  ///< 1 sigma; NaN: not available
+};
+
+struct LandmarkSighting {
+  std::uint8_t landmark = 0;
+  float range_m = 0;
+  float bearing_rad = 0;
+};
+
+}  // namespace tetap::sensor

@@ -1,0 +1,168 @@
+// SPDX-License-Identifier: Apache-2.0
+// Wheels that spin, one or both, and wheels that do not: what is taken for slip, when, and how it ends.
+#include "checks/wheel_slip.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <optional>
+#include <random>
+
+namespace tetap::checks {
+namespace {
+
+using Slip = WheelSlip::Slip;
+constexpr float kTrack_m = 0.5F;
+
+/// A robot of its own speed and turn; what the wheels show on top of it.
+class Drive {
+ public:
+  param::InertialParameters n;
+  WheelSlip watch;
+  float forward_mps = 2, turn_radps = 0, sigma_mps = 0.03F;
+  float left_slip_mps = 0, right_slip_mps = 0;
+  float noise_mps = 0.03F;  ///< what one count of 0.3 mm is in 10 ms
+  bool filter_follows = false;
+
+  /// Until the watch says this, or for that long; how long it took.
+  std::optional<double> until(Slip wanted, double longest_s) {
+    for (int i = 1; i <= std::lround(longest_s * 100); ++i)
+      if (step() == wanted) return i * 0.01;
+    return std::nullopt;
+  }
+  Slip step() {
+    us_ += 10'000;
+    const auto noise = [&] { return noise_mps * (unit_(engine_) - 0.5F); };
+    const float turn = 0.5F * kTrack_m * turn_radps;
+    const float left = forward_mps - turn + left_slip_mps, right = forward_mps + turn + right_slip_mps;
+    const float follow = filter_follows ? 0.5F * (left_slip_mps + right_slip_mps) : 0.0F;
+    return watch.hear({.left_mps = left + noise(), .right_mps = right + noise()},
+                      {.forward_mps = forward_mps + follow, .sigma_mps = sigma_mps, .turn_mps = kTrack_m * turn_radps},
+                      {us_}, n);
+  }
+  bool gnss(float sigma = 0.05F) {
+    return watch.ground(forward_mps, forward_mps + 0.5F * (left_slip_mps + right_slip_mps), sigma, {us_}, n);
+  }
+
+ private:
+  std::int64_t us_ = 1'000'000;
+  std::mt19937 engine_{7};
+  std::uniform_real_distribution<float> unit_{0.0F, 1.0F};
+};
+
+TEST(WheelSlip, FindsEitherWheelThatSpinsWithinATenthOfASecondAndNamesIt) {
+  for (const float speed : {0.0F, 0.5F, 2.0F, -1.0F}) {
+    for (const float turn : {-0.8F, 0.0F, 0.8F}) {
+      Drive left, right;
+      left.forward_mps = right.forward_mps = speed;
+      left.turn_radps = right.turn_radps = turn;
+      EXPECT_EQ(left.until(Slip::kLeft, 1), std::nullopt);
+      EXPECT_EQ(right.until(Slip::kRight, 1), std::nullopt);
+      left.left_slip_mps = 1;
+      right.right_slip_mps = 2;
+      EXPECT_LE(left.until(Slip::kLeft, 1).value_or(9), 0.1);
+      EXPECT_LE(right.until(Slip::kRight, 1).value_or(9), 0.1);
+    }
+  }
+}
+
+TEST(WheelSlip, FindsAWheelThatIsDragged) {
+  Drive d;
+  d.until(Slip::kBoth, 1);
+  d.right_slip_mps = -d.forward_mps;
+  EXPECT_LE(d.until(Slip::kRight, 1).value_or(9), 0.1);
+}
+
+TEST(WheelSlip, FindsBothWheelsThatSpinAlikeByTheFiltersVelocity) {
+  Drive d;
+  d.until(Slip::kBoth, 1);
+  d.left_slip_mps = d.right_slip_mps = 1;
+  EXPECT_LE(d.until(Slip::kBoth, 1).value_or(9), 0.1);
+}
+
+TEST(WheelSlip, FindsBothByGnssWhenTheFilterHasFollowedThem) {
+  Drive d;
+  d.filter_follows = true;
+  d.until(Slip::kBoth, 1);
+  d.left_slip_mps = d.right_slip_mps = 1;
+  EXPECT_EQ(d.until(Slip::kBoth, 2), std::nullopt) << "nothing contradicts them";
+  EXPECT_FALSE(d.gnss()) << "once may be an outlier";
+  EXPECT_EQ(d.until(Slip::kBoth, 0.2), std::nullopt);
+  EXPECT_TRUE(d.gnss());
+  EXPECT_EQ(d.step(), Slip::kBoth);
+  EXPECT_FALSE(d.gnss()) << "is said once";
+  d.left_slip_mps = d.right_slip_mps = 0;
+  for (int i = 0; i < 5; ++i) {
+    EXPECT_EQ(d.step(), Slip::kBoth);
+  }
+  d.gnss();
+  EXPECT_LE(d.until(Slip::kNone, 1).value_or(9), 0.5);
+}
+
+TEST(WheelSlip, GnssThatIsUncertainContradictsNothing) {
+  Drive d;
+  d.filter_follows = true;
+  d.left_slip_mps = d.right_slip_mps = 1;
+  for (int i = 0; i < 10; ++i) {
+    d.until(Slip::kBoth, 0.2);
+    EXPECT_FALSE(d.gnss(0.5F));
+  }
+  EXPECT_EQ(d.watch.slip(), Slip::kNone);
+}
+
+TEST(WheelSlip, IsOverOnlyAfterAWhileOfRolling) {
+  Drive d;
+  d.right_slip_mps = 1;
+  ASSERT_TRUE(d.until(Slip::kRight, 1));
+  d.until(Slip::kNone, 2);
+  d.right_slip_mps = 0;
+  const double over_s = d.until(Slip::kNone, 2).value_or(9);
+  EXPECT_GE(over_s, 0.3);
+  EXPECT_LE(over_s, 0.8);
+}
+
+TEST(WheelSlip, AWheelThatSpinsAndRollsByTurnsOfATenthOfASecondStaysSpinning) {
+  Drive d;
+  d.until(Slip::kBoth, 1);
+  d.right_slip_mps = 1;
+  ASSERT_TRUE(d.until(Slip::kRight, 1));
+  for (int i = 0; i < 300; ++i) {
+    d.right_slip_mps = (i / 10) % 2 == 0 ? 0.0F : 1.0F;
+    ASSERT_EQ(d.step(), Slip::kRight) << i;
+  }
+}
+
+TEST(WheelSlip, TheSlipThatWheelsAlwaysHaveIsNone) {
+  for (const float sign : {-1.0F, 1.0F}) {
+    Drive d;
+    d.turn_radps = 0.7F;
+    d.left_slip_mps = sign * d.n.slip_share * d.forward_mps;
+    d.right_slip_mps = -sign * d.n.slip_share * d.forward_mps;
+    for (int i = 0; i < 3000; ++i) {
+      ASSERT_EQ(d.step(), Slip::kNone);
+      if (i % 20 == 0) {
+        ASSERT_FALSE(d.gnss());
+      }
+    }
+  }
+}
+
+TEST(WheelSlip, AVelocityThatIsNotKnownJudgesOneWheelByTheOtherOnly) {
+  Drive d;
+  d.sigma_mps = 1;
+  d.left_slip_mps = d.right_slip_mps = 1;
+  EXPECT_EQ(d.until(Slip::kBoth, 2), std::nullopt);
+  d.left_slip_mps = 0;
+  EXPECT_LE(d.until(Slip::kRight, 1).value_or(9), 0.2);
+}
+
+TEST(WheelSlip, IsNotWhereItIsNotWanted) {
+  Drive d;
+  d.n.slip_mps = 0;
+  d.left_slip_mps = 5;
+  EXPECT_EQ(d.until(Slip::kLeft, 2), std::nullopt);
+  EXPECT_FALSE(d.gnss() || d.gnss());
+}
+
+}  // namespace
+}  // namespace tetap::checks

@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "bench.hpp"
+
+#include <gtest/gtest.h>
+#include <cmath>
+
+namespace tetap::test {
+namespace {
+
+using estimators::DeadReckoning;
+
+double x_of(const estimators::Estimate& e) { return static_cast<double>(e.pose.x.minus(base::Anchored{})); }
+double y_of(const estimators::Estimate& e) { return static_cast<double>(e.pose.y.minus(base::Anchored{})); }
+
+TEST(DeadReckoning, CountsDriveACircleHome) {
+  DeadReckoning motion;
+  motion.start({0}, {}, 0.001F, 0.001F);
+  // left 3000 and right 5000 counts a second: v = 1.2566 m/s, yaw rate = 1.2566 rad/s, radius 1 m: home after 5 s
+  for (int k = 0; k <= 500; ++k)
+    motion.fuse(
+        sensor::WheelCounts{.left = static_cast<std::uint16_t>(30 * k), .right = static_cast<std::uint16_t>(50 * k)},
+        {10'000 * k}, kNumbers);
+  motion.advance({5'000'000});
+  const auto e = motion.estimate(kNumbers);
+  EXPECT_NEAR(x_of(e), 0.0, 2e-3);
+  EXPECT_NEAR(y_of(e), 0.0, 2e-3);
+  EXPECT_NEAR(static_cast<double>(e.forward_mps), 0.2 * M_PI / 2000 * 4000, 1e-4);
+  EXPECT_TRUE(e.p.positive_definite());
+}
+
+TEST(DeadReckoning, AnUpdateBetweenCountsDoesNotCountTravelTwice) {
+  DeadReckoning plain, interrupted;
+  for (auto* motion : {&plain, &interrupted}) motion->start({0}, {}, 0.01F, 0.01F);
+  for (int k = 0; k <= 200; ++k) {
+    if (k > 0) interrupted.propagate({10'000 * k - 4'000}, kNumbers);  // where a measurement would be fused
+    const sensor::WheelCounts counts{.left = static_cast<std::uint16_t>(33 * k),
+                                  .right = static_cast<std::uint16_t>(31 * k + (k % 7))};
+    plain.fuse(counts, {10'000 * k}, kNumbers);
+    interrupted.fuse(counts, {10'000 * k}, kNumbers);
+  }
+  for (auto* motion : {&plain, &interrupted}) motion->advance({2'000'000});
+  const auto a = plain.estimate(kNumbers), b = interrupted.estimate(kNumbers);
+  EXPECT_NEAR(x_of(a), x_of(b), 1e-4);
+  EXPECT_NEAR(y_of(a), y_of(b), 1e-4);
+  EXPECT_NEAR(a.pose.yaw_rad, b.pose.yaw_rad, 1e-5F);
+}
+
+TEST(DeadReckoning, ExtrapolationToTheTickDoesNotChangeTheState) {
+  DeadReckoning a, b;
+  for (auto* motion : {&a, &b}) motion->start({0}, {}, 0.01F, 0.01F);
+  for (int k = 1; k < 100; ++k) {
+    for (auto* motion : {&a, &b})
+      motion->fuse(sensor::BodySpeed{.forward_mps = 1.0F, .yaw_rate_radps = 0.3F}, {15'000 * k}, kNumbers);
+    a.advance({15'000 * k + 5'000});
+    static_cast<void>(a.estimate(kNumbers));
+  }
+  for (auto* motion : {&a, &b}) motion->advance({1'500'000});
+  EXPECT_EQ(a.estimate(kNumbers).pose.x.offset_m, b.estimate(kNumbers).pose.x.offset_m);
+  EXPECT_EQ(a.estimate(kNumbers).p.packed(), b.estimate(kNumbers).p.packed());
+}
+
+TEST(DeadReckoning, CommandsHoldForwardMeasurementsBackward) {
+  for (const param::Hold hold : {param::Hold::kForward, param::Hold::kBackward}) {
+    param::Parameters n = kNumbers;
+    n.wheels.hold = hold;
+    DeadReckoning motion;
+    motion.start({0}, {}, 0.01F, 0.01F);
+    motion.fuse(sensor::BodySpeed{.forward_mps = 1.0F}, {0}, n);
+    motion.fuse(sensor::BodySpeed{.forward_mps = 3.0F}, {100'000}, n);
+    motion.advance({100'000});
+    EXPECT_NEAR(x_of(motion.estimate(n)), hold == param::Hold::kForward ? 0.1 : 0.3, 1e-6);
+  }
+}
+
+TEST(DeadReckoning, SilentWheelsStopTheEstimateAndGrowTheUncertainty) {
+  DeadReckoning motion;
+  motion.start({0}, {}, 0.01F, 0.01F);
+  motion.fuse(sensor::BodySpeed{.forward_mps = 1.0F}, {0}, kNumbers);
+  motion.advance({400'000});
+  const auto before = motion.estimate(kNumbers);
+  EXPECT_TRUE(before.velocity_valid);
+  motion.advance({2'000'000});
+  const auto after = motion.estimate(kNumbers);
+  EXPECT_FALSE(after.velocity_valid);
+  EXPECT_EQ(after.forward_mps, 0.0F);
+  EXPECT_GT(after.p(0, 0), 0.5F);
+}
+
+TEST(DeadReckoning, TheGyroscopeTurnsAndItsBiasIsLearntAtRest) {
+  param::Parameters n = kNumbers;
+  n.gyro.use = 1;
+  n.gyro.bias_time_s = 1;
+  n.gyro.noise = 1e-6F;
+  DeadReckoning motion;
+  motion.start({0}, {}, 0.01F, 0.01F);
+  const float bias = 0.02F;
+  std::int64_t t = 0;
+  const auto second = [&](float forward_mps, float rate_radps) {
+    for (int k = 0; k < 100; ++k) {
+      t += 10'000;
+      motion.fuse(sensor::ImuSample{.dangle_b_rad = {0, 0, (rate_radps + bias) * 0.01F}, .interval_us = 10'000}, {t}, n);
+      motion.fuse(sensor::BodySpeed{.forward_mps = forward_mps, .yaw_rate_radps = -5.0F}, {t},
+                  n);  // wheels that skid tell nothing
+    }
+  };
+  for (int k = 0; k < 9; ++k) second(0.0F, 0.0F);
+  motion.advance({t});
+  const float yaw_before = motion.estimate(n).pose.yaw_rad;
+  second(1.0F, 0.5F);
+  motion.advance({t});
+  EXPECT_NEAR(motion.estimate(n).pose.yaw_rad - yaw_before, 0.5F, 0.01F);
+}
+
+}  // namespace
+}  // namespace tetap::test
