@@ -3,9 +3,9 @@
 // GNSS 2.5 Hz or the heading that the IMU (with its magnetometer) makes itself.
 #pragma once
 
+#include "config/husky.hpp"
 #include "estimators/inertial/inertial.hpp"
 #include "estimators/odometry.hpp"
-#include "config/husky.hpp"
 
 namespace tetap::robot::husky_inertial {
 

@@ -15,7 +15,8 @@ namespace tetap::robot::rover {
 
 // It has no magnetometer, barometer or second antenna, so nothing that fuses them is flashed.
 using Attitude = estimators::WithSensors<estimators::Attitude, sensor::ImuSample>;
-using Inertial = estimators::WithSensors<estimators::Inertial, sensor::ImuSample, sensor::WheelCounts, sensor::GnssPosition, sensor::GnssVelocity>;
+using Inertial = estimators::WithSensors<estimators::Inertial, sensor::ImuSample, sensor::WheelCounts,
+                                         sensor::GnssPosition, sensor::GnssVelocity>;
 using Estimators = node::Estimators<estimators::Odometry, Attitude, Inertial>;
 
 inline constexpr param::Parameters parameters = param::checked({

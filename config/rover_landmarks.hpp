@@ -3,11 +3,11 @@
 // three states.
 #pragma once
 
+#include "config/rover.hpp"
 #include "estimators/odometry.hpp"
 #include "estimators/planar/pose_ekf.hpp"
 #include "node/node.hpp"
 #include "param/limits.hpp"
-#include "config/rover.hpp"
 
 namespace tetap::robot::rover_landmarks {
 

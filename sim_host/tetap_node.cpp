@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // tetap-node: the firmware as a Linux program on SocketCAN. It stands in for the board.
-#include "node/firmware.hpp"
 #include "hal/board/linux/board.hpp"
 #include "hal/chip/support/boot_line.hpp"
+#include "node/firmware.hpp"
 #include "sim_host/play/arguments.hpp"
 #include "sim_host/robots.hpp"
 #include "version.hpp"
@@ -70,14 +70,15 @@ int main(int argc, char** argv) try {
   if (list_robots) return std::printf("%s\n", tetap::sim::kRobotNames.c_str()), 0;
   std::signal(SIGINT, ask_to_stop);
   std::signal(SIGTERM, ask_to_stop);
-  tetap::sim::for_robot(robot, [&]<class Estimators>(std::type_identity<Estimators>, tetap::param::Parameters parameters) {
-    if (boot_line) return print_boot_line<Estimators>(robot, parameters);
-    parameters.can_base = base;
-    tetap::hal::LinuxBoard board(interface);
-    std::fprintf(stderr, "tetap-node: robot %s on %s, ids %03X to %03X\n", robot.c_str(), interface.c_str(),
-                 parameters.can_base, parameters.can_base + 0x3F);
-    run<Estimators>(board, parameters);
-  });
+  tetap::sim::for_robot(robot,
+                        [&]<class Estimators>(std::type_identity<Estimators>, tetap::param::Parameters parameters) {
+                          if (boot_line) return print_boot_line<Estimators>(robot, parameters);
+                          parameters.can_base = base;
+                          tetap::hal::LinuxBoard board(interface);
+                          std::fprintf(stderr, "tetap-node: robot %s on %s, ids %03X to %03X\n", robot.c_str(),
+                                       interface.c_str(), parameters.can_base, parameters.can_base + 0x3F);
+                          run<Estimators>(board, parameters);
+                        });
   return 0;
 } catch (const std::exception& error) {
   std::fprintf(stderr, "tetap-node: %s\n", error.what());

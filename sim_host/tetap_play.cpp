@@ -16,8 +16,9 @@ int main(int count, char** values) {
       return std::fputs(sim::play_help(sim::kRobotNames).c_str(), stdout), 0;
     sim::PlayOptions options = sim::play_options(arguments);
     if (!options.robot.empty())
-      sim::for_robot(options.robot,
-                     [&options](auto, const param::Parameters& parameters) { options.parameters = sim::numbers_words(parameters); });
+      sim::for_robot(options.robot, [&options](auto, const param::Parameters& parameters) {
+        options.parameters = sim::numbers_words(parameters);
+      });
     // Before the bus, so that a log that cannot be read is said also where there is none.
     const sim::Log log = sim::load_for(options);
     if (options.memory)

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // tetap-world: the simulated world's sensors on a CAN bus, and what the node makes of them on record beside the truth.
-#include "sim_host/residual_bias.hpp"
 #include "sim_host/in_process.hpp"
 #include "sim_host/play/arguments.hpp"
 #include "sim_host/play/lockstep.hpp"
 #include "sim_host/play/realtime.hpp"
 #include "sim_host/play/session.hpp"
-#include "sim_host/robots.hpp"
 #include "sim_host/published_sensors.hpp"
+#include "sim_host/residual_bias.hpp"
+#include "sim_host/robots.hpp"
 #include "sim_host/world_source.hpp"
 
 #include <algorithm>

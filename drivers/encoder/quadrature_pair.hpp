@@ -2,8 +2,8 @@
 // Two encoders, left and right, read together: counts and speeds in the form that estimators take.
 #pragma once
 
-#include "sensor/samples.hpp"
 #include "drivers/encoder/quadrature.hpp"
+#include "sensor/samples.hpp"
 
 namespace tetap::drivers {
 

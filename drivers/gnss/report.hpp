@@ -3,9 +3,9 @@
 // samples that estimators take from it. What the receiver did not say is NaN or empty.
 #pragma once
 
-#include "sensor/samples.hpp"
 #include "base/float_bits.hpp"
 #include "base/math.hpp"
+#include "sensor/samples.hpp"
 
 #include <array>
 #include <cstdint>
@@ -60,12 +60,12 @@ struct Report {
 [[nodiscard]] constexpr std::optional<sensor::GnssPosition> position_of(const Report& report) {
   if (!report.usable()) return {};
   sensor::GnssPosition p{.latitude_2ndeg = report.latitude_2ndeg,
-                      .longitude_2ndeg = report.longitude_2ndeg,
-                      .height_m = report.fix == sensor::GnssFix::k2d ? base::kNan : report.height_m,
-                      .horizontal_acc_m = report.horizontal_acc_m,
-                      .vertical_acc_m = report.vertical_acc_m,
-                      .fix = report.fix,
-                      .satellites = report.satellites};
+                         .longitude_2ndeg = report.longitude_2ndeg,
+                         .height_m = report.fix == sensor::GnssFix::k2d ? base::kNan : report.height_m,
+                         .horizontal_acc_m = report.horizontal_acc_m,
+                         .vertical_acc_m = report.vertical_acc_m,
+                         .fix = report.fix,
+                         .satellites = report.satellites};
   if (const auto& c = report.position_cov_m2) {
     p.horizontal_acc_m = base::sqrt(0.5F * ((*c)[0] + (*c)[3]));
     p.vertical_acc_m = base::sqrt((*c)[5]);
@@ -75,7 +75,8 @@ struct Report {
 
 /// Up may be NaN: NMEA has no vertical speed.
 [[nodiscard]] constexpr std::optional<sensor::GnssVelocity> velocity_of(const Report& report) {
-  if (report.fix < sensor::GnssFix::k2d || base::is_nan(report.v_n_mps[0]) || base::is_nan(report.v_n_mps[1])) return {};
+  if (report.fix < sensor::GnssFix::k2d || base::is_nan(report.v_n_mps[0]) || base::is_nan(report.v_n_mps[1]))
+    return {};
   sensor::GnssVelocity v{.v_n_mps = report.v_n_mps, .acc_mps = report.speed_acc_mps};
   if (const auto& c = report.velocity_cov_m2ps2) {
     v.acc_mps = base::sqrt(((*c)[0] + (*c)[3] + (*c)[5]) * (1.0F / 3.0F));

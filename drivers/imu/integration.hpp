@@ -7,9 +7,9 @@
 // plus gravity; the angle increment is the rotation vector from start to end. Between samples both are straight lines.
 #pragma once
 
-#include "sensor/samples.hpp"
 #include "base/math.hpp"
 #include "drivers/imu/reading.hpp"
+#include "sensor/samples.hpp"
 
 #include <optional>
 

@@ -3,9 +3,9 @@
 // letting the other side run.
 #pragma once
 
-#include "hal/can_bus.hpp"
 #include "hal/board/linux/memory_can.hpp"
 #include "hal/board/linux/socket_can.hpp"
+#include "hal/can_bus.hpp"
 #include "sim_host/play/protocol.hpp"
 
 #include <concepts>

@@ -30,7 +30,7 @@ struct PlayOptions {
   RealtimeOptions realtime;
   Perturbation perturbation;
   std::string parameters;  ///< in words, for run.json
-  bool memory = false;  ///< the node is in this process
+  bool memory = false;     ///< the node is in this process
   bool raw = false;
   bool quiet = false;
 };

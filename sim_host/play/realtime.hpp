@@ -4,8 +4,8 @@
 // (as_recorded).
 #pragma once
 
-#include "sim_host/play/node_link.hpp"
 #include "sim_host/play/log.hpp"
+#include "sim_host/play/node_link.hpp"
 
 #include <algorithm>
 #include <span>

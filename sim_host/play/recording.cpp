@@ -3,8 +3,8 @@
 
 #include "bus/decoder.hpp"
 #include "bus/publisher.hpp"
-#include "sim_host/play/node_link.hpp"
 #include "sim_host/play/names.hpp"
+#include "sim_host/play/node_link.hpp"
 
 #include <algorithm>
 #include <stdexcept>

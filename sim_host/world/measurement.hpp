@@ -3,16 +3,17 @@
 // is in it.
 #pragma once
 
-#include "sensor/samples.hpp"
 #include "base/time.hpp"
+#include "sensor/samples.hpp"
 
 #include <cstdint>
 #include <variant>
 
 namespace tetap::sim {
 
-using Value = std::variant<sensor::ImuSample, sensor::WheelCounts, sensor::WheelSpeeds, sensor::BodySpeed, sensor::GnssPosition,
-                           sensor::GnssVelocity, sensor::LandmarkSighting, sensor::MagneticFlux, sensor::AirPressure>;
+using Value =
+    std::variant<sensor::ImuSample, sensor::WheelCounts, sensor::WheelSpeeds, sensor::BodySpeed, sensor::GnssPosition,
+                 sensor::GnssVelocity, sensor::LandmarkSighting, sensor::MagneticFlux, sensor::AirPressure>;
 
 struct Measurement {
   base::Micros stamp;

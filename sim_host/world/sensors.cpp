@@ -100,17 +100,17 @@ sensor::ImuSample Imu::sample(base::Micros now, const Faults& faults) {
   const double root = sim::sqrt(period_s_);
   const double share = magnitude(speed_mps_) / kReferenceSpeed_mps;
   sensor::ImuSample s{.temperature_degC = single(parameters_.temperature_degC),
-                   .interval_us = static_cast<std::uint16_t>(sim::floor(period_s_ * 1e6 + 0.5)),
-                   .clipped_gyro = static_cast<std::uint8_t>(clipped_gyro_),
-                   .clipped_accel = static_cast<std::uint8_t>(clipped_accel_)};
+                      .interval_us = static_cast<std::uint16_t>(sim::floor(period_s_ * 1e6 + 0.5)),
+                      .clipped_gyro = static_cast<std::uint8_t>(clipped_gyro_),
+                      .clipped_accel = static_cast<std::uint8_t>(clipped_accel_)};
   stepped_ = faults.active(Fault::kGyroBiasStep, now);
   for (std::size_t i = 0; i < 3; ++i) {
     double gyro_bias = gyro_bias_[i] + gyro_walk_[i].next(noise_);
     if (stepped_ && i == 2) gyro_bias += FaultNumbers::kGyroStep_radps;
     const double accel_bias = accel_bias_[i] + accel_walk_[i].next(noise_);
     const double angle_noise = noise_.normal(parameters_.gyro_noise * root);
-    const double velocity_noise =
-        noise_.normal(parameters_.accel_noise[i] * root) + vibration_.normal(parameters_.vibration_noise * share * root);
+    const double velocity_noise = noise_.normal(parameters_.accel_noise[i] * root) +
+                                  vibration_.normal(parameters_.vibration_noise * share * root);
     s.dangle_b_rad[i] = single(angle_[i] + gyro_bias * period_s_ + angle_noise);
     s.dvelocity_b_mps[i] = single(velocity_[i] + accel_bias * period_s_ + velocity_noise);
   }
@@ -165,7 +165,8 @@ void Wheels::sense(const Motion& motion, base::Micros now, const Faults& faults)
 void Wheels::read() {
   for (Wheel* wheel : {&left_, &right_}) {
     const double share_m = parameters_.noise_share * wheel->unread_m;
-    wheel->travel_m += chance_.normal() * sim::sqrt(parameters_.noise_m * magnitude(wheel->unread_m) + share_m * share_m);
+    wheel->travel_m +=
+        chance_.normal() * sim::sqrt(parameters_.noise_m * magnitude(wheel->unread_m) + share_m * share_m);
     wheel->unread_m = 0;
     wheel->read = wheel->count;
     wheel->count = static_cast<std::int64_t>(sim::floor(wheel->travel_m / wheel->metres_per_count));
@@ -204,10 +205,10 @@ Gnss::Gnss(const GnssParameters& parameters, const Wgs84& earth, std::uint64_t s
       outage_chance_{seed, Stream::kGnssOutage},
       glitch_chance_{seed, Stream::kGnssGlitch},
       accuracy_chance_{seed, Stream::kGnssAccuracy},
-      correlated_{
-          GaussMarkov{parameters.correlated_m, parameters.correlated_tau_s, period_s_, noise_},
-          GaussMarkov{parameters.correlated_m, parameters.correlated_tau_s, period_s_, noise_},
-          GaussMarkov{parameters.correlated_m * parameters.vertical_factor, parameters.correlated_tau_s, period_s_, noise_}},
+      correlated_{GaussMarkov{parameters.correlated_m, parameters.correlated_tau_s, period_s_, noise_},
+                  GaussMarkov{parameters.correlated_m, parameters.correlated_tau_s, period_s_, noise_},
+                  GaussMarkov{parameters.correlated_m * parameters.vertical_factor, parameters.correlated_tau_s,
+                              period_s_, noise_}},
       accuracy_{parameters.accuracy_error, 20, period_s_, accuracy_chance_} {}
 
 void Gnss::advance_errors(base::Micros now) {
@@ -255,20 +256,21 @@ Gnss::Reading Gnss::sample(const Truth& truth, const Vector3& rate_b, base::Micr
 
   const double believed = clamp(1 + accuracy_.value(), 0.5, 2);
   const double sigma_m =
-      sim::sqrt(parameters_.white_m * parameters_.white_m + parameters_.correlated_m * parameters_.correlated_m) * believed;
+      sim::sqrt(parameters_.white_m * parameters_.white_m + parameters_.correlated_m * parameters_.correlated_m) *
+      believed;
   const GeodeticPoint point = earth_->geodetic(at_m);
   Reading reading;
   reading.position = sensor::GnssPosition{.latitude_2ndeg = point.latitude_2ndeg,
-                                       .longitude_2ndeg = point.longitude_2ndeg,
-                                       .height_m = single(point.height_m),
-                                       .horizontal_acc_m = single(sigma_m),
-                                       .vertical_acc_m = single(sigma_m * parameters_.vertical_factor),
-                                       .fix = sensor::GnssFix::kDifferential,
-                                       .satellites = 14};
+                                          .longitude_2ndeg = point.longitude_2ndeg,
+                                          .height_m = single(point.height_m),
+                                          .horizontal_acc_m = single(sigma_m),
+                                          .vertical_acc_m = single(sigma_m * parameters_.vertical_factor),
+                                          .fix = sensor::GnssFix::kDifferential,
+                                          .satellites = 14};
   Vector3 v;
   for (std::size_t i = 0; i < 3; ++i) v[i] = truth.v_n_mps[i] + swing_n[i] + velocity_noise[i];
   reading.velocity = sensor::GnssVelocity{.v_n_mps = {single(v[0]), single(v[1]), single(v[2])},
-                                       .acc_mps = single(parameters_.velocity_mps * believed)};
+                                          .acc_mps = single(parameters_.velocity_mps * believed)};
 
   if (now < outage_until_ && last_.position) {
     // A receiver that lost the sky goes on talking: its last position, and the word that it is none.

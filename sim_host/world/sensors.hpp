@@ -130,7 +130,8 @@ class Barometer {
 class Camera {
  public:
   Camera(const CameraNumbers& parameters, std::vector<Landmark> landmarks, std::uint64_t seed);
-  [[nodiscard]] std::vector<sensor::LandmarkSighting> sample(const Truth& truth, base::Micros now, const Faults& faults);
+  [[nodiscard]] std::vector<sensor::LandmarkSighting> sample(const Truth& truth, base::Micros now,
+                                                             const Faults& faults);
   /// What a surveyor gives: positions with an error of a few centimetres.
   [[nodiscard]] const std::vector<Landmark>& map() const { return map_; }
 

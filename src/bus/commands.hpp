@@ -2,12 +2,12 @@
 // Commands from the bus: protected by CRC and counter, each obeyed once; a set pose comes in two frames of one counter.
 #pragma once
 
-#include "estimators/context.hpp"
-#include "bus/counters.hpp"
 #include "base/math.hpp"
 #include "bus/codec.hpp"
+#include "bus/counters.hpp"
 #include "bus/e2e.hpp"
 #include "bus/messages.hpp"
+#include "estimators/context.hpp"
 
 #include <array>
 #include <cstdint>
@@ -97,11 +97,11 @@ void Commands::on_frame(std::uint8_t offset, const base::CanFrame& frame, base::
     return void(++counters.out_of_range);
   }
   out.set_pose(estimators::SetPose{.pose = {.x = base::Anchored::from_um(position.x_raw * kUmPerStep),
-                                .y = base::Anchored::from_um(position.y_raw * kUmPerStep),
-                                .yaw_rad = heading ? yaw.yaw_rad : 0.0F},
-                       .sigma_position_m = yaw.std_pos_m,
-                       .sigma_yaw_rad = heading ? yaw.std_yaw_rad : 4.0F,
-                       .counter = counter});
+                                            .y = base::Anchored::from_um(position.y_raw * kUmPerStep),
+                                            .yaw_rad = heading ? yaw.yaw_rad : 0.0F},
+                                   .sigma_position_m = yaw.std_pos_m,
+                                   .sigma_yaw_rad = heading ? yaw.std_yaw_rad : 4.0F,
+                                   .counter = counter});
 }
 
 }  // namespace tetap::bus

@@ -2,13 +2,13 @@
 // From frames to samples and commands: decodes, puts samples of several frames together, counts what does not fit.
 #pragma once
 
-#include "bus/reassembly.hpp"
-#include "bus/commands.hpp"
-#include "bus/counters.hpp"
-#include "sensor/sample.hpp"
 #include "base/crc.hpp"
 #include "bus/codec.hpp"
+#include "bus/commands.hpp"
+#include "bus/counters.hpp"
 #include "bus/messages.hpp"
+#include "bus/reassembly.hpp"
+#include "sensor/sample.hpp"
 
 #include <cstdint>
 #include <limits>
@@ -23,7 +23,8 @@ inline constexpr std::int64_t kNoAngle = std::numeric_limits<std::int64_t>::min(
 /// The receiver's word for the fix; one that has no name is no fix.
 [[nodiscard]] constexpr sensor::GnssFix fix_of(bus::GnssFix fix) {
   const auto code = static_cast<std::uint8_t>(fix);
-  return code <= static_cast<std::uint8_t>(sensor::GnssFix::kRtkFixed) ? static_cast<sensor::GnssFix>(code) : sensor::GnssFix::kNone;
+  return code <= static_cast<std::uint8_t>(sensor::GnssFix::kRtkFixed) ? static_cast<sensor::GnssFix>(code)
+                                                                       : sensor::GnssFix::kNone;
 }
 
 class Decoder {
@@ -67,7 +68,7 @@ class Decoder {
 /// A whole sample from one frame.
 template <class Message>
 [[nodiscard]] constexpr sensor::Sample stamped(const Message& message, sensor::Sensor sensor, std::uint32_t bits,
-                                       base::Micros reference) {
+                                               base::Micros reference) {
   sensor::Sample sample;
   sample.stamp = base::extend(message.stamp_us, 20, reference);
   sample.sensor = sensor;
@@ -88,7 +89,7 @@ template <class Message>
 
 template <class Out>
 void Decoder::imu(std::uint8_t offset, const base::CanFrame& frame, std::uint32_t bits, base::Micros reference,
-                Counters& counters, Out& out) {
+                  Counters& counters, Out& out) {
   const auto instance = static_cast<std::uint8_t>((offset - bus::ImuGyro::kOffset) / bus::ImuGyro::kStride);
   const auto part = static_cast<std::uint8_t>((offset - bus::ImuGyro::kOffset) % bus::ImuGyro::kStride);
   if (part == 0) {
@@ -124,7 +125,7 @@ void Decoder::imu(std::uint8_t offset, const base::CanFrame& frame, std::uint32_
 
 template <class Message, class Fill, class Out>
 void Decoder::gnss(const base::CanFrame& frame, sensor::Sensor sensor, std::uint8_t frames, std::uint8_t frame_bit,
-                 std::uint32_t bits, base::Micros reference, Counters& counters, Out& out, Fill&& fill) {
+                   std::uint32_t bits, base::Micros reference, Counters& counters, Out& out, Fill&& fill) {
   const auto message = bus::decode<Message>(bus::payload(frame));
   if (!message) return void(++counters.malformed);
   Reassembly::Partial& partial = assembly_.slot(sensor, message->inst, message->seq, frames, reference, counters);
@@ -153,7 +154,7 @@ void Decoder::gnss(const base::CanFrame& frame, sensor::Sensor sensor, std::uint
 
 template <class Out>
 void Decoder::on_frame(std::uint8_t offset, const base::CanFrame& frame, base::Micros reference, Counters& counters,
-                     Out&& out) {
+                       Out&& out) {
   const auto bytes = bus::payload(frame);
   const std::uint32_t bits = frame_crc(offset, frame);
   // One frame, one sample: decode, refuse what must be there and is not, stamp, fill.
@@ -182,41 +183,48 @@ void Decoder::on_frame(std::uint8_t offset, const base::CanFrame& frame, base::M
       return;
     }
     case bus::InWheelCounts::kOffset:
-      return single(std::type_identity<bus::InWheelCounts>{}, sensor::Sensor::kWheelCounts, [](const auto& m, sensor::Sample& s) {
-        s.payload.counts = {.left = m.left, .right = m.right};
-        return true;
-      });
+      return single(std::type_identity<bus::InWheelCounts>{}, sensor::Sensor::kWheelCounts,
+                    [](const auto& m, sensor::Sample& s) {
+                      s.payload.counts = {.left = m.left, .right = m.right};
+                      return true;
+                    });
     case bus::InWheelSpeed::kOffset:
-      return single(std::type_identity<bus::InWheelSpeed>{}, sensor::Sensor::kWheelSpeed, [](const auto& m, sensor::Sample& s) {
-        s.payload.wheel_speeds = {.left_mps = m.left_mps, .right_mps = m.right_mps};
-        return all_finite(m.left_mps, m.right_mps);
-      });
+      return single(std::type_identity<bus::InWheelSpeed>{}, sensor::Sensor::kWheelSpeed,
+                    [](const auto& m, sensor::Sample& s) {
+                      s.payload.wheel_speeds = {.left_mps = m.left_mps, .right_mps = m.right_mps};
+                      return all_finite(m.left_mps, m.right_mps);
+                    });
     case bus::InBodySpeed::kOffset:
-      return single(std::type_identity<bus::InBodySpeed>{}, sensor::Sensor::kBodySpeed, [](const auto& m, sensor::Sample& s) {
-        s.payload.body_speed = {.forward_mps = m.forward_mps, .yaw_rate_radps = m.yaw_rate_radps};
-        return base::is_finite(m.forward_mps);  // a speedometer has no yaw rate
-      });
+      return single(std::type_identity<bus::InBodySpeed>{}, sensor::Sensor::kBodySpeed,
+                    [](const auto& m, sensor::Sample& s) {
+                      s.payload.body_speed = {.forward_mps = m.forward_mps, .yaw_rate_radps = m.yaw_rate_radps};
+                      return base::is_finite(m.forward_mps);  // a speedometer has no yaw rate
+                    });
     case bus::InRangeBearing::kOffset:
-      return single(std::type_identity<bus::InRangeBearing>{}, sensor::Sensor::kRangeBearing, [](const auto& m, sensor::Sample& s) {
-        s.payload.sighting = {.landmark = m.id, .range_m = m.range_m, .bearing_rad = m.bearing_rad};
-        s.detail = m.id;
-        return base::is_finite(m.range_m) || base::is_finite(m.bearing_rad);
-      });
+      return single(std::type_identity<bus::InRangeBearing>{}, sensor::Sensor::kRangeBearing,
+                    [](const auto& m, sensor::Sample& s) {
+                      s.payload.sighting = {.landmark = m.id, .range_m = m.range_m, .bearing_rad = m.bearing_rad};
+                      s.detail = m.id;
+                      return base::is_finite(m.range_m) || base::is_finite(m.bearing_rad);
+                    });
     case bus::InMag::kOffset:
-      return single(std::type_identity<bus::InMag>{}, sensor::Sensor::kMagnetometer, [](const auto& m, sensor::Sample& s) {
-        s.payload.magnetic = {.flux_b_uT = {m.flux_x_uT, m.flux_y_uT, m.flux_z_uT}};
-        return all_finite(m.flux_x_uT, m.flux_y_uT, m.flux_z_uT);
-      });
+      return single(std::type_identity<bus::InMag>{}, sensor::Sensor::kMagnetometer,
+                    [](const auto& m, sensor::Sample& s) {
+                      s.payload.magnetic = {.flux_b_uT = {m.flux_x_uT, m.flux_y_uT, m.flux_z_uT}};
+                      return all_finite(m.flux_x_uT, m.flux_y_uT, m.flux_z_uT);
+                    });
     case bus::InBaro::kOffset:
-      return single(std::type_identity<bus::InBaro>{}, sensor::Sensor::kBarometer, [](const auto& m, sensor::Sample& s) {
-        s.payload.pressure = {.pressure_Pa = m.pressure_Pa, .temperature_degC = m.temp_degC};
-        return base::is_finite(m.pressure_Pa);
-      });
+      return single(std::type_identity<bus::InBaro>{}, sensor::Sensor::kBarometer,
+                    [](const auto& m, sensor::Sample& s) {
+                      s.payload.pressure = {.pressure_Pa = m.pressure_Pa, .temperature_degC = m.temp_degC};
+                      return base::is_finite(m.pressure_Pa);
+                    });
     case bus::InHeading::kOffset:
-      return single(std::type_identity<bus::InHeading>{}, sensor::Sensor::kHeading, [](const auto& m, sensor::Sample& s) {
-        s.payload.heading = {.yaw_rad = m.angle_rad, .acc_rad = m.acc_rad};
-        return base::is_finite(m.angle_rad);
-      });
+      return single(std::type_identity<bus::InHeading>{}, sensor::Sensor::kHeading,
+                    [](const auto& m, sensor::Sample& s) {
+                      s.payload.heading = {.yaw_rad = m.angle_rad, .acc_rad = m.acc_rad};
+                      return base::is_finite(m.angle_rad);
+                    });
     case bus::InGnssLat::kOffset:
       return gnss<bus::InGnssLat>(
           frame, sensor::Sensor::kGnssPosition, kPositionFrames, 0b0001, bits, reference, counters, out,
@@ -226,30 +234,30 @@ void Decoder::on_frame(std::uint8_t offset, const base::CanFrame& frame, base::M
           frame, sensor::Sensor::kGnssPosition, kPositionFrames, 0b0010, bits, reference, counters, out,
           [](const auto& m, auto& p) { return p.gnss_position.longitude_2ndeg = m.lon_raw, m.lon_raw != kNoAngle; });
     case bus::InGnssAlt::kOffset:
-      return gnss<bus::InGnssAlt>(frame, sensor::Sensor::kGnssPosition, kPositionFrames, 0b0100, bits, reference, counters, out,
-                                  [](const auto& m, auto& p) {
+      return gnss<bus::InGnssAlt>(frame, sensor::Sensor::kGnssPosition, kPositionFrames, 0b0100, bits, reference,
+                                  counters, out, [](const auto& m, auto& p) {
                                     p.gnss_position.height_m = m.height_m;
                                     p.gnss_position.fix = fix_of(m.fix);
                                     p.gnss_position.satellites = m.num_sv;
                                     return true;
                                   });
     case bus::InGnssAcc::kOffset:
-      return gnss<bus::InGnssAcc>(frame, sensor::Sensor::kGnssPosition, kPositionFrames, 0b1000, bits, reference, counters, out,
-                                  [](const auto& m, auto& p) {
+      return gnss<bus::InGnssAcc>(frame, sensor::Sensor::kGnssPosition, kPositionFrames, 0b1000, bits, reference,
+                                  counters, out, [](const auto& m, auto& p) {
                                     p.gnss_position.horizontal_acc_m = m.hor_m;
                                     p.gnss_position.vertical_acc_m = m.ver_m;
                                     return true;
                                   });
     case bus::InGnssVelEN::kOffset:
-      return gnss<bus::InGnssVelEN>(frame, sensor::Sensor::kGnssVelocity, kVelocityFrames, 0b01, bits, reference, counters, out,
-                                    [](const auto& m, auto& p) {
+      return gnss<bus::InGnssVelEN>(frame, sensor::Sensor::kGnssVelocity, kVelocityFrames, 0b01, bits, reference,
+                                    counters, out, [](const auto& m, auto& p) {
                                       p.gnss_velocity.v_n_mps[0] = m.east_mps;
                                       p.gnss_velocity.v_n_mps[1] = m.north_mps;
                                       return all_finite(m.east_mps, m.north_mps);
                                     });
     case bus::InGnssVelU::kOffset:
-      return gnss<bus::InGnssVelU>(frame, sensor::Sensor::kGnssVelocity, kVelocityFrames, 0b10, bits, reference, counters, out,
-                                   [](const auto& m, auto& p) {
+      return gnss<bus::InGnssVelU>(frame, sensor::Sensor::kGnssVelocity, kVelocityFrames, 0b10, bits, reference,
+                                   counters, out, [](const auto& m, auto& p) {
                                      p.gnss_velocity.v_n_mps[2] = m.up_mps;
                                      p.gnss_velocity.acc_mps = m.acc_mps;
                                      return true;

@@ -3,10 +3,10 @@
 // the order of the samples; what is refused between ticks is put in that order here, so that no arrival leaves a trace.
 #pragma once
 
-#include "estimators/estimate.hpp"
-#include "bus/counters.hpp"
-#include "sensor/sample.hpp"
 #include "base/float_bits.hpp"
+#include "bus/counters.hpp"
+#include "estimators/estimate.hpp"
+#include "sensor/sample.hpp"
 
 #include <array>
 #include <cstddef>
@@ -21,8 +21,8 @@ class EventQueue {
   void tick_ends() { first_ = size_; }
 
   /// When the queue is full an accepted one makes room for one that was not; else the last refused has none.
-  void add(const estimators::Innovation& innovation, const sensor::Sample& sample, std::size_t instance, base::Micros now,
-           Counters& counters);
+  void add(const estimators::Innovation& innovation, const sensor::Sample& sample, std::size_t instance,
+           base::Micros now, Counters& counters);
 
   [[nodiscard]] bool empty() const { return size_ == 0; }
   /// The oldest; not empty.
@@ -49,8 +49,8 @@ class EventQueue {
   std::size_t first_ = 0;  ///< of those since the last tick, which are kept in order; within a tick there are none
 };
 
-inline void EventQueue::add(const estimators::Innovation& innovation, const sensor::Sample& sample, std::size_t instance, base::Micros now,
-                            Counters& counters) {
+inline void EventQueue::add(const estimators::Innovation& innovation, const sensor::Sample& sample,
+                            std::size_t instance, base::Micros now, Counters& counters) {
   const bus::EstInnov message{.estimator = static_cast<std::uint8_t>(instance),
                               .sensor = sample.sensor,
                               .inst = sample.instance,

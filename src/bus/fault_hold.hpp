@@ -28,10 +28,10 @@ class FaultHold {
     raised.raise(sensor::Fault::kIncomplete, now.incomplete != then.incomplete);
     raised.raise(sensor::Fault::kTooLate, now.too_late != then.too_late);
     raised.raise(sensor::Fault::kMalformed, now.malformed != then.malformed || now.out_of_range != then.out_of_range ||
-                                             now.no_time != then.no_time || now.too_early != then.too_early);
+                                                now.no_time != then.no_time || now.too_early != then.too_early);
     raised.raise(sensor::Fault::kCapacity, now.map_full != then.map_full || now.timeline_full != then.timeline_full ||
-                                            now.window_short != then.window_short ||
-                                            now.events_dropped != then.events_dropped);
+                                               now.window_short != then.window_short ||
+                                               now.events_dropped != then.events_dropped);
     raised.raise(sensor::Fault::kCommandRefused, now.command_refused != then.command_refused);
     if (raised.bits != 0) {
       bits_ = epoch < until_ ? static_cast<std::uint16_t>(bits_ | raised.bits) : raised.bits;

@@ -2,10 +2,10 @@
 // Messages of several pages, one page at a time: counters, and what an inertial estimator has beyond pose and velocity.
 #pragma once
 
-#include "estimators/estimate.hpp"
-#include "bus/counters.hpp"
 #include "base/math.hpp"
+#include "bus/counters.hpp"
 #include "bus/messages.hpp"
+#include "estimators/estimate.hpp"
 
 #include <cstdint>
 
@@ -55,7 +55,8 @@ void put_diagnostics(std::uint32_t page, const Counters& c, const LoopHealth& l,
 }
 
 /// One page, and with what has a covariance its sigmas and correlations: whole, and of one epoch (with Est_Std, which
-/// has those of x, y and yaw). Two turns of nine stay free, for the bus has no more room (tools/can/generate_messages --load).
+/// has those of x, y and yaw). Two turns of nine stay free, for the bus has no more room (tools/can/generate_messages
+/// --load).
 template <class Put>
 void put_state_page(std::uint32_t page, const estimators::InertialEstimate& e, std::uint8_t tag, Put&& put) {
   const nav::InsState& x = e.state;

@@ -3,19 +3,19 @@
 // it is the same in every replay.
 #pragma once
 
-#include "estimators/attitude_disagreement.hpp"
-#include "estimators/estimate.hpp"
-#include "bus/event_queue.hpp"
-#include "bus/counters.hpp"
-#include "estimators/sensor_statistics.hpp"
-#include "bus/multiplexed.hpp"
-#include "sensor/sample.hpp"
-#include "bus/input_crc.hpp"
-#include "bus/fault_hold.hpp"
 #include "base/bit_crc.hpp"
 #include "base/math.hpp"
 #include "bus/codec.hpp"
+#include "bus/counters.hpp"
 #include "bus/e2e.hpp"
+#include "bus/event_queue.hpp"
+#include "bus/fault_hold.hpp"
+#include "bus/input_crc.hpp"
+#include "bus/multiplexed.hpp"
+#include "estimators/attitude_disagreement.hpp"
+#include "estimators/estimate.hpp"
+#include "estimators/sensor_statistics.hpp"
+#include "sensor/sample.hpp"
 
 #include <array>
 #include <bit>
@@ -108,7 +108,8 @@ class Publisher {
   template <class Inertial, class Send>
   void inertial(std::size_t instance, Inertial&& inertial, Send& send);
   template <class Send>
-  void attitude(std::size_t instance, const estimators::AttitudeEstimate& e, const estimators::Disagreement& from_primary, Send& send);
+  void attitude(std::size_t instance, const estimators::AttitudeEstimate& e,
+                const estimators::Disagreement& from_primary, Send& send);
   template <class Send>
   void status(const Summary& summary, Send& send);
   template <class Lanes, class Send>
@@ -125,8 +126,8 @@ class Publisher {
   }
 
   /// Queues the record of a measurement.
-  void event(const estimators::Innovation& innovation, const sensor::Sample& sample, std::size_t instance, base::Micros now,
-             Counters& counters) {
+  void event(const estimators::Innovation& innovation, const sensor::Sample& sample, std::size_t instance,
+             base::Micros now, Counters& counters) {
     events_.add(innovation, sample, instance, now, counters);
   }
 
@@ -161,8 +162,8 @@ class Publisher {
 
 template <std::size_t N>
 template <class Send>
-void Publisher<N>::estimate(std::size_t instance, sensor::EstimatorKind kind, bool primary, const estimators::Estimate& e,
-                            const estimators::MotionVariance& motion, Send& send) {
+void Publisher<N>::estimate(std::size_t instance, sensor::EstimatorKind kind, bool primary,
+                            const estimators::Estimate& e, const estimators::MotionVariance& motion, Send& send) {
   const param::PublishParameters& p = parameters_.publish;
   const auto millimetres = [](const base::Anchored& a) {
     const std::int64_t um = a.um();
@@ -220,8 +221,8 @@ void Publisher<N>::inertial(std::size_t instance, Inertial&& inertial, Send& sen
 /// Attitude, and how far it is from the primary estimator's.
 template <std::size_t N>
 template <class Send>
-void Publisher<N>::attitude(std::size_t instance, const estimators::AttitudeEstimate& e, const estimators::Disagreement& from_primary,
-                            Send& send) {
+void Publisher<N>::attitude(std::size_t instance, const estimators::AttitudeEstimate& e,
+                            const estimators::Disagreement& from_primary, Send& send) {
   if (!e.valid) return;
   const param::PublishParameters& p = parameters_.publish;
   if (every(p.attitude_every, 7))
@@ -267,7 +268,8 @@ void Publisher<N>::statistics(const Lanes& lanes, base::Micros now, Send& send) 
     std::size_t lane_index = 0;
     std::apply(
         [&](const auto&... lane) {
-          ((lane_index++ == estimator ? void(stat = &lane.statistics()[index % estimators::kStatistics]) : void()), ...);
+          ((lane_index++ == estimator ? void(stat = &lane.statistics()[index % estimators::kStatistics]) : void()),
+           ...);
         },
         lanes);
     if (stat == nullptr || (stat->accepted == 0 && stat->rejected == 0)) continue;

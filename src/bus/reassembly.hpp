@@ -51,7 +51,7 @@ class Reassembly {
 };
 
 inline Reassembly::Partial& Reassembly::slot(sensor::Sensor sensor, std::uint8_t instance, std::uint8_t sequence,
-                                         std::uint8_t frames, base::Micros reference, Counters& counters) {
+                                             std::uint8_t frames, base::Micros reference, Counters& counters) {
   Partial* chosen = &partials_[0];
   for (Partial& partial : partials_) {
     const sensor::Sample& s = partial.sample;

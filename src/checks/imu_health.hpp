@@ -5,9 +5,9 @@
 // noise of the thermometer).
 #pragma once
 
+#include "base/math.hpp"
 #include "param/parameters.hpp"
 #include "sensor/samples.hpp"
-#include "base/math.hpp"
 
 #include <array>
 #include <cstdint>

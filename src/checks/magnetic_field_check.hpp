@@ -4,9 +4,9 @@
 // the same through a stretch of motion, which no magnet on the way does. And whether the magnetometer is believed.
 #pragma once
 
-#include "sensor/magnetic_field.hpp"
 #include "base/math.hpp"
 #include "base/time.hpp"
+#include "sensor/magnetic_field.hpp"
 
 #include <cstdint>
 

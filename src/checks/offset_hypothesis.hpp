@@ -2,8 +2,8 @@
 // What refused fixes state: a common offset, since when, and how often.
 #pragma once
 
-#include "checks/chi_square.hpp"
 #include "base/time.hpp"
+#include "checks/chi_square.hpp"
 
 #include <cstdint>
 

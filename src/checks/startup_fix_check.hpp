@@ -2,9 +2,9 @@
 // Fixes before the filter begins: they count when they follow each other plausibly.
 #pragma once
 
-#include "sensor/samples.hpp"
 #include "base/math.hpp"
 #include "base/time.hpp"
+#include "sensor/samples.hpp"
 
 #include <cstdint>
 

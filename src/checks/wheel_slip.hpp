@@ -4,8 +4,8 @@
 // body: Ward and Iagnemma 2008, IEEE T-RO 24(4).
 #pragma once
 
-#include "param/parameters.hpp"
 #include "base/time.hpp"
+#include "param/parameters.hpp"
 
 #include <cstdint>
 
@@ -54,7 +54,8 @@ class WheelSlip {
 
   /// What GNSS says the speed is, and what wheels said last. True when from now on it contradicts them, so that what
   /// was taken from them is as doubtful as they are: that is, for the second time in a row.
-  bool ground(float forward_mps, float rolled_mps, float sigma_mps, base::Micros stamp, const param::InertialParameters& n) {
+  bool ground(float forward_mps, float rolled_mps, float sigma_mps, base::Micros stamp,
+              const param::InertialParameters& n) {
     if (!(n.slip_mps > 0) || stamp - heard_ > kGap) return false;
     const bool off = magnitude(rolled_mps - forward_mps) > allowed(forward_mps, n) + 3.0F * sigma_mps;
     if (!off || stamp - grounded_ > kGroundGap) ground_ = 0;

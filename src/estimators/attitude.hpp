@@ -6,9 +6,9 @@
 
 #include "estimators/context.hpp"
 #include "estimators/estimate.hpp"
+#include "filter/attitude.hpp"
 #include "sensor/magnetic_field.hpp"
 #include "sensor/sample.hpp"
-#include "filter/attitude.hpp"
 
 #include <cstdint>
 

@@ -2,10 +2,10 @@
 // What every estimator is given with a sample, and the commands it can be sent.
 #pragma once
 
-#include "param/parameters.hpp"
-#include "estimators/map_frame.hpp"
 #include "base/time.hpp"
+#include "estimators/map_frame.hpp"
 #include "model/planar_pose.hpp"
+#include "param/parameters.hpp"
 
 namespace tetap::estimators {
 

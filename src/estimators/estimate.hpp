@@ -5,12 +5,12 @@
 #include "base/math.hpp"
 #include "base/time.hpp"
 #include "checks/imu_health.hpp"
-#include "sensor/vocabulary.hpp"
 #include "filter/quaternion.hpp"
 #include "filter/update.hpp"
 #include "model/planar_pose.hpp"
 #include "nav/ins_covariance_entry.hpp"
 #include "nav/ins_state.hpp"
+#include "sensor/vocabulary.hpp"
 
 #include <array>
 #include <cstdint>
@@ -103,8 +103,8 @@ struct Innovation {
 /// The filter's record in the bus's words.
 template <int M>
 [[nodiscard]] Innovation record(const filter::Innovation<float, M>& from, std::uint8_t landmark = 0xFF) {
-  constexpr sensor::Verdict kWord[] = {sensor::Verdict::kAccepted, sensor::Verdict::kRejected, sensor::Verdict::kSingular,
-                                    sensor::Verdict::kNotFinite};
+  constexpr sensor::Verdict kWord[] = {sensor::Verdict::kAccepted, sensor::Verdict::kRejected,
+                                       sensor::Verdict::kSingular, sensor::Verdict::kNotFinite};
   return {.verdict = kWord[static_cast<std::size_t>(from.verdict)],
           .dof = M,
           .nis = from.nis,

@@ -3,9 +3,9 @@
 // map.
 #pragma once
 
-#include "sensor/vocabulary.hpp"
 #include "model/landmark.hpp"
 #include "nav/geodesy.hpp"
+#include "sensor/vocabulary.hpp"
 
 #include <array>
 #include <cstddef>

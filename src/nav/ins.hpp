@@ -6,9 +6,9 @@
 #include "base/trig.hpp"
 #include "filter/sparse_update.hpp"
 #include "filter/state.hpp"
+#include "nav/gyro_scale_consider.hpp"
 #include "nav/ins_covariance.hpp"
 #include "nav/strapdown.hpp"
-#include "nav/gyro_scale_consider.hpp"
 
 #include <algorithm>
 

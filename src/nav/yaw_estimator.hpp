@@ -9,8 +9,8 @@
 #pragma once
 
 #include "base/anchored.hpp"
-#include "nav/imu_increment.hpp"
 #include "nav/complex_kalman.hpp"
+#include "nav/imu_increment.hpp"
 
 namespace tetap::nav {
 

@@ -137,7 +137,9 @@ inline void YawEstimator::restart(const Quaternion& q) {
   bound();
 }
 
-[[gnu::noinline]] inline float YawEstimator::from(const base::Anchored& a, const base::Anchored& b) { return a.minus(b); }
+[[gnu::noinline]] inline float YawEstimator::from(const base::Anchored& a, const base::Anchored& b) {
+  return a.minus(b);
+}
 
 /// Numbers that a sensor can mean; false for NaN.
 [[gnu::noinline]] inline bool YawEstimator::fits(float a, float b, float sigma, Complex lever) {
@@ -158,7 +160,7 @@ inline void YawEstimator::fuse_velocity(float east_mps, float north_mps, float s
 }
 
 inline void YawEstimator::fuse_position(const base::Anchored& east, const base::Anchored& north, float sigma_m,
-                                     Complex lever_b_m) {
+                                        Complex lever_b_m) {
   // The place is counted from the newest fix.
   const Complex moved{from(east, east_), from(north, north_)};
   if (!fits(0.0F, 0.0F, sigma_m, lever_b_m) || !(moved.norm2() < base::kInfinity)) return;

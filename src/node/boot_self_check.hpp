@@ -5,8 +5,8 @@
 // prints a short form at boot.
 #pragma once
 
-#include "node/node.hpp"
 #include "bus/frame_sink.hpp"
+#include "node/node.hpp"
 
 #include <cstdint>
 

@@ -22,7 +22,8 @@
 namespace tetap::node {
 
 template <class E>
-concept Estimator = requires(E& e, const E& view, base::Micros t, const estimators::Context& ctx, const estimators::SetPose& pose) {
+concept Estimator = requires(E& e, const E& view, base::Micros t, const estimators::Context& ctx,
+                             const estimators::SetPose& pose) {
   { E::kKind } -> std::convertible_to<sensor::EstimatorKind>;
   { e.restart(t, ctx) } -> std::same_as<void>;
   { e.set_pose(t, pose, ctx) } -> std::same_as<void>;
@@ -41,7 +42,8 @@ class EstimatorSlot {
   using Type = E;
   static constexpr bool kDelayed = kIsDelayed<E>;
   template <class Payload>
-  static constexpr bool kTakes = requires(E& e, const Payload& payload, base::Micros stamp, const estimators::Context& ctx) {
+  static constexpr bool kTakes = requires(E& e, const Payload& payload, base::Micros stamp,
+                                          const estimators::Context& ctx) {
     e.fuse(payload, stamp, ctx);
   };
 
@@ -61,7 +63,9 @@ class EstimatorSlot {
     return taken;
   }
   /// Fuses into the current state; the record is what the bus is told.
-  estimators::Innovation fuse(const sensor::Sample& sample, const estimators::Context& ctx) { return fuse_into(now_, sample, ctx); }
+  estimators::Innovation fuse(const sensor::Sample& sample, const estimators::Context& ctx) {
+    return fuse_into(now_, sample, ctx);
+  }
   /// The sample leaves the window: the far end takes it.
   void retire(const sensor::Sample& sample, const estimators::Context& ctx) requires(!kDelayed) {
     static_cast<void>(fuse_into(past_, sample, ctx));
@@ -97,9 +101,15 @@ class EstimatorSlot {
     if constexpr (requires { now_.motion_variance(ctx); }) return now_.motion_variance(ctx);
     return {};
   }
-  [[nodiscard]] estimators::InertialEstimate inertial(const estimators::Context& ctx) const requires requires(const E& e) { e.inertial(ctx); }
+  [[nodiscard]] estimators::InertialEstimate inertial(const estimators::Context& ctx) const requires
+      requires(const E& e) {
+    e.inertial(ctx);
+  }
   { return now_.inertial(ctx); }
-  [[nodiscard]] estimators::AttitudeEstimate attitude(const estimators::Context& ctx) const requires requires(const E& e) { e.attitude(ctx); }
+  [[nodiscard]] estimators::AttitudeEstimate attitude(const estimators::Context& ctx) const requires
+      requires(const E& e) {
+    e.attitude(ctx);
+  }
   { return now_.attitude(ctx); }
   /// What the estimator itself did about its state, for the status.
   [[nodiscard]] estimators::Jump jump() const {
@@ -138,7 +148,9 @@ class EstimatorSlot {
     statistics_[i].instance = instance;
     return statistics_[i];
   }
-  [[nodiscard]] const std::array<estimators::SensorStatistics, estimators::kStatistics>& statistics() const { return statistics_; }
+  [[nodiscard]] const std::array<estimators::SensorStatistics, estimators::kStatistics>& statistics() const {
+    return statistics_;
+  }
   void clear_statistics() {
     for (estimators::SensorStatistics& s : statistics_) s = {};
   }

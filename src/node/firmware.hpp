@@ -2,11 +2,11 @@
 // The product: one object, one poll(). A port's main() is this object and a loop.
 #pragma once
 
+#include "bus/frame_sink.hpp"
+#include "hal/board.hpp"
 #include "node/boot_self_check.hpp"
 #include "node/node.hpp"
-#include "bus/frame_sink.hpp"
 #include "node/pacer.hpp"
-#include "hal/board.hpp"
 
 #include <cstdint>
 
@@ -16,7 +16,10 @@ template <hal::Board Board, class Estimators>
 class Firmware {
  public:
   Firmware(Board& board, const param::Parameters& parameters, const bus::Version& version)
-      : board_(board), parameters_(parameters), node_(parameters, version), pacer_(base::Micros{parameters.loop.period_us}) {}
+      : board_(board),
+        parameters_(parameters),
+        node_(parameters, version),
+        pacer_(base::Micros{parameters.loop.period_us}) {}
 
   /// Runs the exercise on this very node, then powers it on anew. For boot: the hash says whether this core computes as
   /// all others do.

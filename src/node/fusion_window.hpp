@@ -133,7 +133,8 @@ class FusionWindow {
 
 template <class Estimators, std::size_t Capacity>
 template <class Note>
-Insert FusionWindow<Estimators, Capacity>::insert(const sensor::Sample& sample, const estimators::Context& ctx, Note&& note) {
+Insert FusionWindow<Estimators, Capacity>::insert(const sensor::Sample& sample, const estimators::Context& ctx,
+                                                  Note&& note) {
   const Insert result = timeline_.insert(sample);
   // What is older than all of them came too late for so small a window.
   if (result != Insert::kFull || !timeline_.consumed(0) || sample.order(timeline_[0]) < 0) return result;
@@ -145,7 +146,8 @@ Insert FusionWindow<Estimators, Capacity>::insert(const sensor::Sample& sample, 
 
 template <class Estimators, std::size_t Capacity>
 template <class Note>
-void FusionWindow<Estimators, Capacity>::leave_until(base::Micros t, Past past, const estimators::Context& ctx, Note& note) {
+void FusionWindow<Estimators, Capacity>::leave_until(base::Micros t, Past past, const estimators::Context& ctx,
+                                                     Note& note) {
   std::size_t count = 0;
   while (count < timeline_.size() && timeline_.consumed(count) && timeline_[count].stamp <= t) {
     if (past == Past::kFollows && rests(timeline_[count], ctx)) break;
@@ -157,7 +159,8 @@ void FusionWindow<Estimators, Capacity>::leave_until(base::Micros t, Past past, 
 
 template <class Estimators, std::size_t Capacity>
 template <class Note>
-void FusionWindow<Estimators, Capacity>::leave(const sensor::Sample& sample, Past past, const estimators::Context& ctx, Note& note) {
+void FusionWindow<Estimators, Capacity>::leave(const sensor::Sample& sample, Past past, const estimators::Context& ctx,
+                                               Note& note) {
   std::size_t instance = 0;
   each_lane([&](auto& lane) {
     if constexpr (std::remove_cvref_t<decltype(lane)>::kDelayed) {
@@ -198,7 +201,8 @@ bool FusionWindow<Estimators, Capacity>::came_late(std::size_t due) const {
 
 template <class Estimators, std::size_t Capacity>
 template <class OnNew, class Note>
-std::uint16_t FusionWindow<Estimators, Capacity>::consume(base::Micros t, const estimators::Context& ctx, OnNew&& on_new, Note&& note) {
+std::uint16_t FusionWindow<Estimators, Capacity>::consume(base::Micros t, const estimators::Context& ctx,
+                                                          OnNew&& on_new, Note&& note) {
   const std::size_t due = timeline_.until(t);
   std::array<bool, kCount> again{};
   std::size_t instance = 0;

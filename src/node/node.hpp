@@ -3,13 +3,13 @@
 // calls gives the same bits on every machine; everything that follows from real time stays outside (Pacer, LoopHealth).
 #pragma once
 
-#include "sensor/calibration.hpp"
-#include "node/fusion_window.hpp"
 #include "bus/decoder.hpp"
-#include "node/landmarks.hpp"
-#include "sensor/plausibility.hpp"
-#include "bus/publisher.hpp"
 #include "bus/input_crc.hpp"
+#include "bus/publisher.hpp"
+#include "node/fusion_window.hpp"
+#include "node/landmarks.hpp"
+#include "sensor/calibration.hpp"
+#include "sensor/plausibility.hpp"
 
 #include <array>
 #include <cstddef>
@@ -23,7 +23,8 @@ namespace tetap::node {
 template <class Estimators, std::size_t TimelineCapacity = Estimators::kSamples>
 class Node {
  public:
-  Node(const param::Parameters& parameters, const bus::Version& version) : parameters_(parameters), publisher_(parameters, version) {
+  Node(const param::Parameters& parameters, const bus::Version& version)
+      : parameters_(parameters), publisher_(parameters, version) {
     power_on(base::Micros{});
   }
 
@@ -56,7 +57,8 @@ class Node {
   using Estimates = typename FusionWindow::Estimates;
   static constexpr std::size_t kPrimary = FusionWindow::kPrimary;
   static constexpr base::Micros kLongestStep{500'000};
-  using Landmarks = std::conditional_t<Estimators::template kTakes<sensor::LandmarkSighting>, node::Landmarks, node::NoLandmarks>;
+  using Landmarks =
+      std::conditional_t<Estimators::template kTakes<sensor::LandmarkSighting>, node::Landmarks, node::NoLandmarks>;
 
   [[nodiscard]] estimators::Context context() const { return {.parameters = parameters_, .map_frame = map_frame_}; }
   void restart(base::Micros t, sensor::ResetCause cause);
@@ -225,7 +227,8 @@ void Node<Estimators, Capacity>::close_window(base::Micros t) {
 /// The record goes out when it says something. What comes with every tick or so would drown the rest: of accepted
 /// wheels, magnetometers and barometers the statistics are enough.
 template <class Estimators, std::size_t Capacity>
-void Node<Estimators, Capacity>::note(std::size_t instance, const sensor::Sample& sample, const estimators::Innovation& innovation) {
+void Node<Estimators, Capacity>::note(std::size_t instance, const sensor::Sample& sample,
+                                      const estimators::Innovation& innovation) {
   const bool frequent = sample.sensor <= sensor::Sensor::kBodySpeed || sample.sensor == sensor::Sensor::kMagnetometer ||
                         sample.sensor == sensor::Sensor::kBarometer;
   const bool ordinary = innovation.verdict == sensor::Verdict::kAccepted && frequent;
@@ -336,14 +339,14 @@ template <class Estimators, std::size_t Capacity>
 bus::Summary Node<Estimators, Capacity>::summary(const estimators::Estimate& estimate) const {
   const auto& primary = history_.primary();
   bus::Summary s{.mode = primary.mode(context()),
-            .position_valid = estimate.position_valid,
-            .heading_valid = estimate.heading_valid,
-            .velocity_valid = estimate.velocity_valid,
-            .origin_known = map_frame_.origin != sensor::OriginSource::kNone,
-            .resets = resets_,
-            .cause = reset_cause_,
-            .restarted = resets_ > 0 && now_ - restarted_at_ < base::Micros{1'000'000} &&
-                         reset_cause_ != sensor::ResetCause::kSetPose};
+                 .position_valid = estimate.position_valid,
+                 .heading_valid = estimate.heading_valid,
+                 .velocity_valid = estimate.velocity_valid,
+                 .origin_known = map_frame_.origin != sensor::OriginSource::kNone,
+                 .resets = resets_,
+                 .cause = reset_cause_,
+                 .restarted = resets_ > 0 && now_ - restarted_at_ < base::Micros{1'000'000} &&
+                              reset_cause_ != sensor::ResetCause::kSetPose};
   bus::FaultSet faults{primary.faults()};
   faults.raise(sensor::Fault::kAttitudeDisagrees, disagreement_.disagrees());
   history_.each_lane([&](const auto& lane) {

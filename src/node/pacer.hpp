@@ -3,8 +3,8 @@
 // firmware that knows real time, and it decides nothing but the sequence of ticks, which every epoch frame states.
 #pragma once
 
-#include "bus/counters.hpp"
 #include "base/time.hpp"
+#include "bus/counters.hpp"
 #include "bus/messages.hpp"
 
 #include <cstdint>

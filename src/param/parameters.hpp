@@ -44,9 +44,9 @@ struct WheelParameters {
   float timeout_noise = 1.0F;         ///< m^2/s and rad^2/s then
 };
 
-/// The IMU's own errors as tools/calibrate/calibrate_robot finds them, in its own axes: specific force = accel_matrix (raw -
-/// accel_bias), turn rate = raw - gyro_bias - slope (temperature - at); without a temperature the slope is not used.
-/// What estimators publish as a bias is what is left.
+/// The IMU's own errors as tools/calibrate/calibrate_robot finds them, in its own axes: specific force = accel_matrix
+/// (raw - accel_bias), turn rate = raw - gyro_bias - slope (temperature - at); without a temperature the slope is not
+/// used. What estimators publish as a bias is what is left.
 struct ImuParameters {
   std::array<float, 3> accel_bias_mps2{0, 0, 0};
   std::array<float, 9> accel_matrix{1, 0, 0, 0, 1, 0, 0, 0, 1};  ///< scale and misalignment, row by row

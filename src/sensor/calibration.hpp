@@ -9,7 +9,8 @@
 
 namespace tetap::sensor {
 
-/// Increments without bias: f = T (raw - b), w = raw - b(temperature). tools/calibrate/calibrate_robot finds these numbers.
+/// Increments without bias: f = T (raw - b), w = raw - b(temperature). tools/calibrate/calibrate_robot finds these
+/// numbers.
 inline void calibrate(ImuSample& s, const param::ImuParameters& n) {
   const float dt_s = base::seconds(base::Micros{s.interval_us});
   const float now = s.temperature_degC;

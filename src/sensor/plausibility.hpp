@@ -3,8 +3,8 @@
 // on a robot can mean. The limits are far beyond every robot; inside them no filter leaves the floats.
 #pragma once
 
-#include "sensor/sample.hpp"
 #include "base/math.hpp"
+#include "sensor/sample.hpp"
 
 namespace tetap::sensor {
 

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // One program for every compiler and core: prints "bits: NAME HASH" for each function and filter, first of a short
-// form, then of the whole one. tools/proof/compare_bits compares the lines. An image takes no arguments; whoever has read enough ends
-// the emulator.
-#include "node/node.hpp"
+// form, then of the whole one. tools/proof/compare_bits compares the lines. An image takes no arguments; whoever has
+// read enough ends the emulator.
 #include "attitude.hpp"
 #include "base/selfcheck.hpp"
 #include "config/husky.hpp"
@@ -13,6 +12,7 @@
 #include "hal/chip/support/boot_line.hpp"
 #include "hal/chip/support/text.hpp"
 #include "inertial.hpp"
+#include "node/node.hpp"
 #include "recorded_world.hpp"
 
 #include <array>

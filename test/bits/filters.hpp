@@ -3,10 +3,9 @@
 // every step.
 #pragma once
 
-#include "estimators/planar/dead_reckoning.hpp"
-#include "node/boot_self_check.hpp"
 #include "base/selfcheck.hpp"
 #include "config/rover.hpp"
+#include "estimators/planar/dead_reckoning.hpp"
 #include "filter/kalman.hpp"
 #include "model/bearing.hpp"
 #include "model/constant_velocity.hpp"
@@ -14,6 +13,7 @@
 #include "model/range.hpp"
 #include "model/range_bearing.hpp"
 #include "nav/geodesy.hpp"
+#include "node/boot_self_check.hpp"
 
 #include <array>
 #include <cstdint>
@@ -218,7 +218,8 @@ void hash_vector(base::WordHash& hash, const filter::Vector<float, N>& x) {
         motion.fuse(sensor::WheelSpeeds{.left_mps = chance.spread(), .right_mps = chance.spread()}, stamp, parameters);
         break;
       case 1:
-        motion.fuse(sensor::BodySpeed{.forward_mps = chance.spread(), .yaw_rate_radps = chance.spread()}, stamp, parameters);
+        motion.fuse(sensor::BodySpeed{.forward_mps = chance.spread(), .yaw_rate_radps = chance.spread()}, stamp,
+                    parameters);
         break;
       default:
         motion.fuse(counts, stamp, parameters);

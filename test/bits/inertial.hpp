@@ -3,7 +3,6 @@
 // models, and the estimator with samples that come late; raw bits hashed at every step.
 #pragma once
 
-#include "node/fusion_window.hpp"
 #include "base/selfcheck.hpp"
 #include "config/rover.hpp"
 #include "filters.hpp"
@@ -18,6 +17,7 @@
 #include "model/zero_velocity.hpp"
 #include "nav/imu_gather.hpp"
 #include "nav/ins.hpp"
+#include "node/fusion_window.hpp"
 
 #include <array>
 #include <cstdint>
@@ -212,7 +212,8 @@ class InertialRun {
     history_.close_window(now_, context(), noting());
     history_.restart(now_, context());
     if (chance_.one_in(3)) return;  // then it finds place and heading by itself
-    const estimators::SetPose pose{.pose = {.yaw_rad = chance_.spread()}, .sigma_position_m = 0.5F, .sigma_yaw_rad = 0.1F};
+    const estimators::SetPose pose{
+        .pose = {.yaw_rad = chance_.spread()}, .sigma_position_m = 0.5F, .sigma_yaw_rad = 0.1F};
     history_.each_lane([&](auto& lane) { lane.set_pose(now_, pose, context()); });
   }
   /// Mostly since the last tick; now and then late, or too late.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "bench.hpp"
+#include "node/bench.hpp"
 
 #include <gtest/gtest.h>
 #include <cmath>

@@ -2,8 +2,8 @@
 // The rules of trust by themselves: when fixes say the same, when they repeat themselves, when the first ones count,
 // and how much a fix is worth that repeats the error of the one before.
 #include "checks/coloured_noise.hpp"
-#include "checks/offset_hypothesis.hpp"
 #include "checks/frozen_position.hpp"
+#include "checks/offset_hypothesis.hpp"
 #include "checks/position_drift.hpp"
 #include "checks/startup_fix_check.hpp"
 
@@ -263,7 +263,7 @@ double variance_of_mean(int n, double phi) {
   return sum / n / n;
 }
 
-TEST(bus::Repeated, ManyFixesTellAsMuchAsTheirErrorsLeave) {
+TEST(Repeated, ManyFixesTellAsMuchAsTheirErrorsLeave) {
   // One in full, then n - 1 that repeat: the filter's own sum of information against the true variance of their mean.
   for (const float tau_s : {1.0F, 10.0F, 60.0F})
     for (const double lasting : {10.0, 30.0, 100.0}) {
@@ -275,7 +275,7 @@ TEST(bus::Repeated, ManyFixesTellAsMuchAsTheirErrorsLeave) {
     }
 }
 
-TEST(bus::Repeated, WhatAFilterMakesOfThemIsNeverWorseThanItSays) {
+TEST(Repeated, WhatAFilterMakesOfThemIsNeverWorseThanItSays) {
   // The first fix has the weight 1, the others 1 / repeated(): the variance of that mean, from all covariances.
   const double phi = std::exp(-0.2 / 20), weight = 1 / static_cast<double>(repeated(0.2F, 20.0F));
   double sum = 0, squares = 0, with_last = 0, worst = 0;  // of the weights; of the mean; of the sum with the last
@@ -309,7 +309,7 @@ TEST(FirstOfMany, ThreeSigmaHoldsWhatItPromisesWithAFigureThatIsOff) {
   EXPECT_LT(share_within(0.98 * three_sigma), promised) << "and no more is added than is needed";
 }
 
-TEST(bus::Repeated, AFixAfterALongSilenceAndWhiteErrorsCountInFull) {
+TEST(Repeated, AFixAfterALongSilenceAndWhiteErrorsCountInFull) {
   EXPECT_EQ(repeated(0.2F, 0.0F), 1.0F);
   EXPECT_NEAR(repeated(300.0F, 60.0F), 1.0F, 0.02F);
   EXPECT_EQ(repeated(1e6F, 60.0F), 1.0F);

@@ -3,7 +3,7 @@
 // standing, in a small world of its own: each sample fused at its own time.
 #include "checks/imu_health.hpp"
 
-#include "compiled_inertial.hpp"
+#include "estimators/compiled_inertial.hpp"
 
 #include <gtest/gtest.h>
 
@@ -16,8 +16,8 @@ namespace {
 
 class Sensor {
  public:
-  explicit sensor::Sensor(int rate_hz = 100) : rate_hz_(rate_hz) {}
-  estimators::ImuHealth watch;
+  explicit Sensor(int rate_hz = 100) : rate_hz_(rate_hz) {}
+  ImuHealth watch;
   param::InertialParameters n;
   float force_mps2 = 0, rate_radps = 0;  ///< amplitudes of a vibration of 31 Hz
   std::uint8_t clipped_gyro = 0, clipped_accel = 0;
@@ -28,8 +28,8 @@ class Sensor {
     us += 1'000'000 / rate_hz_;
     const float wave = static_cast<float>(std::sin(6.283185307 * 31e-6 * static_cast<double>(us)));
     sensor::ImuSample s{.interval_us = static_cast<std::uint16_t>(1'000'000 / rate_hz_),
-                .clipped_gyro = clipped_gyro,
-                .clipped_accel = clipped_accel};
+                        .clipped_gyro = clipped_gyro,
+                        .clipped_accel = clipped_accel};
     for (std::size_t i = 0; i < 3; ++i) {
       s.dangle_b_rad[i] = 1e-6F * normal_(engine_);
       s.dvelocity_b_mps[i] = 1e-5F * normal_(engine_);
@@ -57,8 +57,8 @@ class Sensor {
   std::normal_distribution<float> normal_;
 };
 
-TEST(estimators::ImuHealth, ASampleRepeatedTenTimesIsOneOfAStuckSensorUntilItShowsAnother) {
-  sensor::Sensor s;
+TEST(ImuHealth, ASampleRepeatedTenTimesIsOneOfAStuckSensorUntilItShowsAnother) {
+  Sensor s;
   s.run(1);
   for (int i = 1; i < s.n.stuck_samples; ++i) EXPECT_TRUE(s.hear_again()) << i;
   EXPECT_FALSE(s.hear_again());
@@ -70,9 +70,9 @@ TEST(estimators::ImuHealth, ASampleRepeatedTenTimesIsOneOfAStuckSensorUntilItSho
   EXPECT_FALSE(s.watch.stuck_lately({s.us + 1'500'000}));
 }
 
-TEST(estimators::ImuHealth, HalfASensorThatIsStuckIsStuck) {
+TEST(ImuHealth, HalfASensorThatIsStuckIsStuck) {
   for (const bool gyro : {false, true}) {
-    sensor::Sensor s;
+    Sensor s;
     s.run(0.1);
     const sensor::ImuSample held = s.next();
     bool heard = true;
@@ -85,8 +85,8 @@ TEST(estimators::ImuHealth, HalfASensorThatIsStuckIsStuck) {
   }
 }
 
-TEST(estimators::ImuHealth, OneEqualAxisIsNoStuckSensor) {
-  sensor::Sensor s;
+TEST(ImuHealth, OneEqualAxisIsNoStuckSensor) {
+  Sensor s;
   for (int i = 0; i < 1000; ++i) {
     sensor::ImuSample sample = s.next();
     sample.dangle_b_rad[1] = sample.dvelocity_b_mps[1] = 0;
@@ -94,8 +94,8 @@ TEST(estimators::ImuHealth, OneEqualAxisIsNoStuckSensor) {
   }
 }
 
-TEST(estimators::ImuHealth, IsStaleWhenNothingHasBeenSaidForTheStatedTime) {
-  sensor::Sensor s;
+TEST(ImuHealth, IsStaleWhenNothingHasBeenSaidForTheStatedTime) {
+  Sensor s;
   EXPECT_FALSE(s.watch.stale({s.us}, s.n)) << "before it has begun";
   s.run(0.1);
   EXPECT_FALSE(s.watch.stale({s.us + s.n.stale_us}, s.n));
@@ -104,8 +104,8 @@ TEST(estimators::ImuHealth, IsStaleWhenNothingHasBeenSaidForTheStatedTime) {
   EXPECT_TRUE(s.watch.stale({s.us}, s.n)) << "repetitions say nothing";
 }
 
-TEST(estimators::ImuHealth, CountsSamplesWithAClippedAxisAndSaysSoForASecond) {
-  sensor::Sensor s;
+TEST(ImuHealth, CountsSamplesWithAClippedAxisAndSaysSoForASecond) {
+  Sensor s;
   s.run(0.5);
   EXPECT_FALSE(s.watch.clipped_lately({s.us}));
   s.clipped_accel = 3;
@@ -123,9 +123,9 @@ TEST(estimators::ImuHealth, CountsSamplesWithAClippedAxisAndSaysSoForASecond) {
   EXPECT_EQ(s.watch.health().clipped, 0xFFFF) << "stays at the end";
 }
 
-TEST(estimators::ImuHealth, VibrationIsTheRmsOfWhatIsFasterThanMotion) {
+TEST(ImuHealth, VibrationIsTheRmsOfWhatIsFasterThanMotion) {
   for (const int rate_hz : {100, 200, 400}) {
-    sensor::Sensor s(rate_hz);
+    Sensor s(rate_hz);
     s.force_mps2 = 6, s.rate_radps = 0.8F;
     s.run(3);
     EXPECT_NEAR(s.watch.health().vibration_mps2, 6 / std::sqrt(2.0), 0.5) << rate_hz;
@@ -133,8 +133,8 @@ TEST(estimators::ImuHealth, VibrationIsTheRmsOfWhatIsFasterThanMotion) {
   }
 }
 
-TEST(estimators::ImuHealth, ASteadyForceAndASteadyTurnAreNoVibration) {
-  sensor::Sensor s;
+TEST(ImuHealth, ASteadyForceAndASteadyTurnAreNoVibration) {
+  Sensor s;
   for (int i = 0; i < 300; ++i) {
     sensor::ImuSample sample = s.next();
     sample.dangle_b_rad[2] += 0.02F, sample.dvelocity_b_mps[0] += 0.03F;
@@ -145,8 +145,8 @@ TEST(estimators::ImuHealth, ASteadyForceAndASteadyTurnAreNoVibration) {
   EXPECT_TRUE(s.watch.calm(s.n)) << "which is why it alone does not tell standing still from constant velocity";
 }
 
-TEST(estimators::ImuHealth, NoiseGrowsInProportionToVibrationBeyondWhatTheNumbersHoldFor) {
-  sensor::Sensor s;
+TEST(ImuHealth, NoiseGrowsInProportionToVibrationBeyondWhatTheNumbersHoldFor) {
+  Sensor s;
   s.run(3);
   EXPECT_EQ(s.watch.noise_factor(s.n), 1.0F);
   EXPECT_FALSE(s.watch.shaken());
@@ -181,7 +181,7 @@ class Robot {
   }
   param::Parameters n;
   estimators::MapFrame map_frame;
-  CompiledInertial estimator;
+  estimators::CompiledInertial estimator;
   bool imu = true, stuck = false, wheels = true, gnss = true;
   double spin_mps = 0;
   std::uint8_t clipped_gyro = 0, clipped_accel = 0;
@@ -240,17 +240,17 @@ class Robot {
       const double latitude = 48.2627 + north / 111'200.0, per_east = 1 / (111'320.0 * std::cos(48.2627 / 57.29577951));
       const double vx = v_ * std::cos(yaw_) + 0.05 * z(), vy = v_ * std::sin(yaw_) + 0.05 * z();
       estimator.fuse(sensor::GnssPosition{.latitude_2ndeg = std::llround(latitude / 2e-9),
-                                  .longitude_2ndeg = std::llround((11.6683 + east * per_east) / 2e-9),
-                                  .height_m = 500,
-                                  .horizontal_acc_m = 0.5F,
-                                  .vertical_acc_m = 1,
-                                  .fix = sensor::GnssFix::k3d,
-                                  .satellites = 10},
+                                          .longitude_2ndeg = std::llround((11.6683 + east * per_east) / 2e-9),
+                                          .height_m = 500,
+                                          .horizontal_acc_m = 0.5F,
+                                          .vertical_acc_m = 1,
+                                          .fix = sensor::GnssFix::k3d,
+                                          .satellites = 10},
                      {us}, ctx());
-      estimator.fuse(
-          sensor::GnssVelocity{.v_n_mps = {static_cast<float>(vx), static_cast<float>(vy), static_cast<float>(0.05 * z())},
-                       .acc_mps = 0.05F},
-          {us}, ctx());
+      estimator.fuse(sensor::GnssVelocity{.v_n_mps = {static_cast<float>(vx), static_cast<float>(vy),
+                                                      static_cast<float>(0.05 * z())},
+                                          .acc_mps = 0.05F},
+                     {us}, ctx());
     }
     estimator.advance({us}, ctx());
     if (mode() == sensor::Mode::kNominal) ++nominal;
@@ -264,7 +264,7 @@ class Robot {
   std::normal_distribution<float> normal_;
 };
 
-TEST(ImuHealthReport, AStuckOrAbsentImuIsBridgedByWheelsAndGnssNeverNominalAndBackAfterwards) {
+TEST(ImuHealth, AStuckOrAbsentImuIsBridgedByWheelsAndGnssNeverNominalAndBackAfterwards) {
   for (const bool stuck : {true, false}) {
     Robot r(1.5, 0.4);
     r.run(20);
@@ -289,7 +289,7 @@ TEST(ImuHealthReport, AStuckOrAbsentImuIsBridgedByWheelsAndGnssNeverNominalAndBa
   }
 }
 
-TEST(ImuHealthReport, WithoutImuAndWheelsTheDoubtGrowsUntilNothingCarriesIt) {
+TEST(ImuHealth, WithoutImuAndWheelsTheDoubtGrowsUntilNothingCarriesIt) {
   Robot r(1.5, 0.4);
   r.run(20);
   r.imu = r.wheels = false;
@@ -306,7 +306,7 @@ TEST(ImuHealthReport, WithoutImuAndWheelsTheDoubtGrowsUntilNothingCarriesIt) {
 }
 
 // Two samples may come late; what has not come after that was not seen, at the end of the window as anywhere in it.
-TEST(ImuHealthReport, AHoleAtTheEndIsDoubtedBeforeItIsASilence) {
+TEST(ImuHealth, AHoleAtTheEndIsDoubtedBeforeItIsASilence) {
   Robot r(1.5, 0.4);
   r.run(20);
   r.wheels = r.gnss = r.imu = false;
@@ -325,7 +325,7 @@ TEST(ImuHealthReport, AHoleAtTheEndIsDoubtedBeforeItIsASilence) {
   EXPECT_LT(std::abs(r.yaw_off_rad()), 3 * r.sigma(8));
 }
 
-TEST(ImuHealthReport, AClippedGyroscopeIsReplacedByWheelsAndWithoutThemIsAsUncertainAsNone) {
+TEST(ImuHealth, AClippedGyroscopeIsReplacedByWheelsAndWithoutThemIsAsUncertainAsNone) {
   Robot a(1.5, 0.4), b(1.5, 0.4);
   b.wheels = false;
   for (Robot* r : {&a, &b}) {
@@ -344,7 +344,7 @@ TEST(ImuHealthReport, AClippedGyroscopeIsReplacedByWheelsAndWithoutThemIsAsUncer
 }
 
 // The turn it still shows, so only the velocity is in doubt: by a walk of the force that may have gone unseen.
-TEST(ImuHealthReport, AClippedAccelerometerMakesTheVelocityDoubtedAndNothingOfTheTurn) {
+TEST(ImuHealth, AClippedAccelerometerMakesTheVelocityDoubtedAndNothingOfTheTurn) {
   Robot good(1.5, 0.4), clipped(1.5, 0.4);
   for (Robot* r : {&good, &clipped}) {
     r->run(20);
@@ -368,7 +368,7 @@ TEST(ImuHealthReport, AClippedAccelerometerMakesTheVelocityDoubtedAndNothingOfTh
   EXPECT_LT(clipped.sigma(3), 0.1) << "and it is told again how fast it is";
 }
 
-TEST(ImuHealthReport, OneSpinningWheelIsSaidAtOnceAndCostsNearlyNothing) {
+TEST(ImuHealth, OneSpinningWheelIsSaidAtOnceAndCostsNearlyNothing) {
   Robot r(1.5, 0.4);
   r.run(20);
   const double before = r.off_m();

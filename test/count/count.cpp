@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The workloads whose instructions tools/proof/count_instructions counts and tools/budgets.json bounds. Inputs are arrays made beforehand;
-// what is between the markers are calls of headers that the firmware is made of.
-#include "node/node.hpp"
+// The workloads whose instructions tools/proof/count_instructions counts and tools/budgets.json bounds. Inputs are
+// arrays made beforehand; what is between the markers are calls of headers that the firmware is made of.
 #include "base/random.hpp"
 #include "board.hpp"
 #include "config/rover.hpp"
@@ -13,6 +12,7 @@
 #include "model/range_bearing.hpp"
 #include "model/wheel_speed.hpp"
 #include "nav/ins.hpp"
+#include "node/node.hpp"
 #include "recorded_world.hpp"
 
 #include <array>

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Instructions of every tick of a MRCLAM robot's node over a recorded log: IN.log, a candump log with sync frames, is
 // the argument.
-#include "node/node.hpp"
 #include "config/mrclam.hpp"
 #include "hal/board/mps2/board.hpp"
 #include "markers.hpp"
+#include "node/node.hpp"
 
 int main() {
   using namespace tetap;

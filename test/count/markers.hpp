@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Marks workloads in an image so that tools/proof/count_instructions can count their instructions in QEMU. Between begin and end only what
-// is counted: input arrays and calls of public headers that the firmware instantiates too. A workload is named where it
-// stands:
+// Marks workloads in an image so that tools/proof/count_instructions can count their instructions in QEMU. Between
+// begin and end only what is counted: input arrays and calls of public headers that the firmware instantiates too. A
+// workload is named where it stands:
 //
 //   tetap::count::calibrate();                                       // once, first: what the markers themselves cost
 //   for (const auto& z : kInput) {                                   // any number of times: worst and mean are

@@ -2,9 +2,9 @@
 // Inertial navigation between the inbox and the publisher, as a node has it: what ins_tick counts.
 #pragma once
 
+#include "bus/decoder.hpp"
 #include "estimators/inertial/inertial.hpp"
 #include "node/fusion_window.hpp"
-#include "bus/decoder.hpp"
 
 #include <array>
 #include <cstddef>
@@ -63,7 +63,9 @@ class Navigator {
     valid_ = inertial.valid;
     history_.retire_until(t - base::Micros{parameters_.loop.window_us}, context(), noting());
   }
-  [[nodiscard]] std::uint32_t accepted(sensor::Sensor sensor) const { return accepted_[static_cast<std::size_t>(sensor)]; }
+  [[nodiscard]] std::uint32_t accepted(sensor::Sensor sensor) const {
+    return accepted_[static_cast<std::size_t>(sensor)];
+  }
   [[nodiscard]] bool valid() const { return valid_; }
 
  private:

@@ -100,8 +100,8 @@ class Body {
     constexpr float kDt_s = 1e-6F * static_cast<float>(kImu_us);
     const Vector3 f = filter::Rows(truth.conjugate()) * Vector3{0.0F, 0.0F, 9.81F};
     sensor::ImuSample values{.dangle_b_rad = {w(0) * kDt_s, w(1) * kDt_s, w(2) * kDt_s},
-                     .dvelocity_b_mps = {f(0) * kDt_s, f(1) * kDt_s, f(2) * kDt_s},
-                     .interval_us = kImu_us};
+                             .dvelocity_b_mps = {f(0) * kDt_s, f(1) * kDt_s, f(2) * kDt_s},
+                             .interval_us = kImu_us};
     if (imu(values)) {
       sensor::Sample s{.stamp = {now_us}, .sensor = sensor::Sensor::kImu};
       s.payload.imu = values;
@@ -170,7 +170,7 @@ TEST(AttitudeEstimator, is_the_same_however_the_imu_is_mounted) {
   Body body(n);
   body.imu = [](sensor::ImuSample& s) {
     const auto sensor = [](const std::array<float, 3>& b) {
-      const Vector3 v = transposed_times(kMounting, {b[0], b[1], b[2]});
+      const Vector3 v = sensor::transposed_times(kMounting, {b[0], b[1], b[2]});
       return std::array<float, 3>{v(0), v(1), v(2)};
     };
     s.dangle_b_rad = sensor(s.dangle_b_rad);
@@ -237,7 +237,9 @@ TEST(AttitudeEstimator, bridges_lost_samples_with_the_turn_of_the_next) {
   body.rate_radps = [](double) { return Vector3{0.0F, 0.0F, 1.0F}; };
   body.run(5);
   int count = 0;
-  body.imu = [&count](sensor::ImuSample&) { return ++count % 25 != 0 && count % 25 != 1; };  // 4.6 degrees/s are not seen
+  body.imu = [&count](sensor::ImuSample&) {
+    return ++count % 25 != 0 && count % 25 != 1;
+  };  // 4.6 degrees/s are not seen
   body.run(1);
   EXPECT_LT(body.run(10), 1.5F);  // and at most two of them within the window
 }
@@ -345,7 +347,7 @@ TEST(AttitudeEstimator, takes_calibration_mounting_and_declination_off) {
   body.flux = [&](sensor::MagneticFlux& s) {
     const Vector3 m =
         filter::Rows(body.truth.conjugate()) * (filter::Rows(east_of_north) * Vector3{0.0F, 17.0F, -46.0F});
-    const Vector3 in_sensor = transposed_times(n.magnetic.mounting_bs, m);
+    const Vector3 in_sensor = sensor::transposed_times(n.magnetic.mounting_bs, m);
     Eigen::Matrix3f soft;
     for (int i = 0; i < 9; ++i) soft(i / 3, i % 3) = n.magnetic.soft_iron[static_cast<std::size_t>(i)];
     const Eigen::Vector3f raw = soft.inverse() * Eigen::Vector3f(in_sensor(0), in_sensor(1), in_sensor(2));

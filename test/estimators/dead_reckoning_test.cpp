@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "bench.hpp"
+#include "node/bench.hpp"
 
 #include <gtest/gtest.h>
 #include <cmath>
@@ -34,7 +34,7 @@ TEST(DeadReckoning, AnUpdateBetweenCountsDoesNotCountTravelTwice) {
   for (int k = 0; k <= 200; ++k) {
     if (k > 0) interrupted.propagate({10'000 * k - 4'000}, kNumbers);  // where a measurement would be fused
     const sensor::WheelCounts counts{.left = static_cast<std::uint16_t>(33 * k),
-                                  .right = static_cast<std::uint16_t>(31 * k + (k % 7))};
+                                     .right = static_cast<std::uint16_t>(31 * k + (k % 7))};
     plain.fuse(counts, {10'000 * k}, kNumbers);
     interrupted.fuse(counts, {10'000 * k}, kNumbers);
   }
@@ -98,7 +98,8 @@ TEST(DeadReckoning, TheGyroscopeTurnsAndItsBiasIsLearntAtRest) {
   const auto second = [&](float forward_mps, float rate_radps) {
     for (int k = 0; k < 100; ++k) {
       t += 10'000;
-      motion.fuse(sensor::ImuSample{.dangle_b_rad = {0, 0, (rate_radps + bias) * 0.01F}, .interval_us = 10'000}, {t}, n);
+      motion.fuse(sensor::ImuSample{.dangle_b_rad = {0, 0, (rate_radps + bias) * 0.01F}, .interval_us = 10'000}, {t},
+                  n);
       motion.fuse(sensor::BodySpeed{.forward_mps = forward_mps, .yaw_rate_radps = -5.0F}, {t},
                   n);  // wheels that skid tell nothing
     }

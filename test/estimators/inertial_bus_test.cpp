@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the default robot's node says on the bus of its inertial filter: modes, faults, jumps and how far the two
 // attitudes are apart. Samples in, frames out.
+#include "config/rover.hpp"
 #include "estimators/attitude.hpp"
 #include "estimators/inertial/inertial.hpp"
-#include "bench.hpp"
-#include "config/rover.hpp"
+#include "node/bench.hpp"
 
 #include <gtest/gtest.h>
 
@@ -15,8 +15,8 @@
 namespace tetap::test {
 namespace {
 
-using sensor::GnssPosition, sensor::GnssVelocity, sensor::ImuSample, sensor::MagneticFlux, sensor::WheelCounts;
 using sensor::Fault, sensor::Mode, sensor::ResetCause;
+using sensor::GnssPosition, sensor::GnssVelocity, sensor::ImuSample, sensor::MagneticFlux, sensor::WheelCounts;
 
 constexpr std::size_t kAttitude = 1, kInertial = 2;
 
@@ -31,7 +31,9 @@ param::Parameters rover() {
 /// Stands for two seconds, then drives east at 1 m/s and turns as it is told.
 class Rover {
  public:
-  explicit Rover(const param::Parameters& parameters = rover()) : n_(parameters), node_(n_, {}) { node_.power_on({now_us_}); }
+  explicit Rover(const param::Parameters& parameters = rover()) : n_(parameters), node_(n_, {}) {
+    node_.power_on({now_us_});
+  }
 
   double turn_radps = 0, vibration_mps2 = 0, field_uT = 50, off_east_m = 0;
   bool gnss = true, wheels = true;
@@ -54,12 +56,12 @@ class Rover {
 
  private:
   template <class Payload>
-  void offer(sensor::Sensor sensor, const bus::Payload& payload) {
+  void offer(sensor::Sensor sensor, const Payload& payload) {
     sensor::Sample sample;
     sample.stamp = {now_us_ - 5'000};
     sample.sensor = sensor;
     sensor::visit(sample, [&payload]<class T>(const T& there) {
-      if constexpr (std::is_same_v<T, bus::Payload>) const_cast<T&>(there) = payload;  // NOLINT: the sample is not const
+      if constexpr (std::is_same_v<T, Payload>) const_cast<T&>(there) = payload;  // NOLINT: the sample is not const
     });
     node_.sample(sample);
   }
@@ -75,25 +77,26 @@ class Rover {
     east_m += speed_mps_ * std::cos(yaw_rad) * dt;
     north_m += speed_mps_ * std::sin(yaw_rad) * dt;
     const double pushed = speed_mps_ - before_mps, shaken = (k_ % 2 == 0 ? 1 : -1) * vibration_mps2 * dt;
-    offer(sensor::Sensor::kImu,
-          sensor::ImuSample{.dangle_b_rad = {noise(2e-5), noise(2e-5), static_cast<float>(turn_radps * dt) + noise(2e-5)},
-                    .dvelocity_b_mps = {static_cast<float>(pushed + shaken) + noise(5e-4),
-                                        static_cast<float>(speed_mps_ * turn_radps * dt) + noise(5e-4),
-                                        0.098089F + noise(5e-4)},
-                    .interval_us = 10'000});
+    offer(
+        sensor::Sensor::kImu,
+        sensor::ImuSample{.dangle_b_rad = {noise(2e-5), noise(2e-5), static_cast<float>(turn_radps * dt) + noise(2e-5)},
+                          .dvelocity_b_mps = {static_cast<float>(pushed + shaken) + noise(5e-4),
+                                              static_cast<float>(speed_mps_ * turn_radps * dt) + noise(5e-4),
+                                              0.098089F + noise(5e-4)},
+                          .interval_us = 10'000});
     if (wheels) {
       const double per_m = 2'000 / (2 * 3.14159265358979 * 0.1);
       left_ += (speed_mps_ - 0.25 * turn_radps) * dt * per_m;
       right_ += (speed_mps_ + 0.25 * turn_radps) * dt * per_m;
       offer(sensor::Sensor::kWheelCounts, sensor::WheelCounts{static_cast<std::uint16_t>(std::llround(left_)),
-                                                   static_cast<std::uint16_t>(std::llround(right_))});
+                                                              static_cast<std::uint16_t>(std::llround(right_))});
     }
     if (n_.magnetic.use != 0) {
       const double north_uT = 0.4 * field_uT;
       offer(sensor::Sensor::kMagnetometer,
             sensor::MagneticFlux{.flux_b_uT = {static_cast<float>(north_uT * std::sin(yaw_rad)) + noise(0.1),
-                                       static_cast<float>(north_uT * std::cos(yaw_rad)) + noise(0.1),
-                                       static_cast<float>(-0.9 * field_uT) + noise(0.1)}});
+                                               static_cast<float>(north_uT * std::cos(yaw_rad)) + noise(0.1),
+                                               static_cast<float>(-0.9 * field_uT) + noise(0.1)}});
     }
     if (gnss && k_ % 20 == 0) {
       const param::GnssParameters& g = n_.gnss;
@@ -111,9 +114,10 @@ class Rover {
                 .vertical_acc_m = 0.5F,
                 .fix = sensor::GnssFix::k3d});
       offer(sensor::Sensor::kGnssVelocity,
-            sensor::GnssVelocity{.v_n_mps = {static_cast<float>(speed_mps_ * std::cos(yaw_rad)) + noise(0.05),
-                                     static_cast<float>(speed_mps_ * std::sin(yaw_rad)) + noise(0.05), noise(0.05)},
-                         .acc_mps = 0.05F});
+            sensor::GnssVelocity{
+                .v_n_mps = {static_cast<float>(speed_mps_ * std::cos(yaw_rad)) + noise(0.05),
+                            static_cast<float>(speed_mps_ * std::sin(yaw_rad)) + noise(0.05), noise(0.05)},
+                .acc_mps = 0.05F});
     }
     node_.tick({now_us_}, {}, [&out](const base::CanFrame& frame) { out.push_back(frame); });
   }
@@ -145,7 +149,8 @@ std::vector<sensor::Mode> modes(const Frames& frames) {
 TEST(InertialBus, ItSaysWhatItWaitsForAndThenThatItNavigates) {
   Rover rover;
   const Frames out = rover.drive();
-  EXPECT_EQ(modes(out), (std::vector{sensor::Mode::kWaitingForImu, sensor::Mode::kLevelling, sensor::Mode::kFindingHeading, sensor::Mode::kNominal}));
+  EXPECT_EQ(modes(out), (std::vector{sensor::Mode::kWaitingForImu, sensor::Mode::kLevelling,
+                                     sensor::Mode::kFindingHeading, sensor::Mode::kNominal}));
   EXPECT_FALSE(said(rover.run(5), sensor::Fault::kInputStale));
 }
 

@@ -34,12 +34,14 @@ class Drive {
       speed_mps += acceleration_mps2 * kStep_s;
       const float sideways = speed_mps * turn_radps + sideways_error_mps2;
       static_cast<void>(estimator.fuse(
-          sensor::ImuSample{.dangle_b_rad = {0, 0, turn_radps * kStep_s},
-                    .dvelocity_b_mps = {acceleration_mps2 * kStep_s, sideways * kStep_s, gravity_mps2_ * kStep_s},
-                    .interval_us = kStep_us},
+          sensor::ImuSample{
+              .dangle_b_rad = {0, 0, turn_radps * kStep_s},
+              .dvelocity_b_mps = {acceleration_mps2 * kStep_s, sideways * kStep_s, gravity_mps2_ * kStep_s},
+              .interval_us = kStep_us},
           {us}, ctx()));
       if (wheels_every_us > 0 && us % wheels_every_us == 0)
-        static_cast<void>(estimator.fuse(sensor::WheelSpeeds{.left_mps = speed_mps, .right_mps = speed_mps}, {us}, ctx()));
+        static_cast<void>(
+            estimator.fuse(sensor::WheelSpeeds{.left_mps = speed_mps, .right_mps = speed_mps}, {us}, ctx()));
     }
     estimator.advance({us}, ctx());
   }

@@ -230,8 +230,8 @@ TEST(InertialDivergence, AFilterThatRecoveredIsNotErasedByOneFix) {
     }
     for (int i = 0; i < 100; ++i) {
       d.estimator.fuse(sensor::GnssVelocity{.v_n_mps = {static_cast<float>(d.speed_mps * std::cos(d.yaw_rad)),
-                                                static_cast<float>(d.speed_mps * std::sin(d.yaw_rad)), 0},
-                                    .acc_mps = 0.05F},
+                                                        static_cast<float>(d.speed_mps * std::sin(d.yaw_rad)), 0},
+                                            .acc_mps = 0.05F},
                        {d.us}, d.ctx());
       d.run(0.2);
     }

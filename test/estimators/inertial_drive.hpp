@@ -43,7 +43,8 @@ inline param::Parameters rover_like() {
 
 class Drive {
  public:
-  explicit Drive(const param::Parameters& of = parameters(), unsigned seed = 1) : n(of), engine_(seed), engine_imu_(98 + seed) {
+  explicit Drive(const param::Parameters& of = parameters(), unsigned seed = 1)
+      : n(of), engine_(seed), engine_imu_(98 + seed) {
     map_frame.frame = nav::LocalFrame(24'131'350'000, 5'834'150'000, 500.0F);
     map_frame.origin = sensor::OriginSource::kConfigured;
     gravity_mps2_ = nav::Earth::at(map_frame.frame, false).gravity_mps2;
@@ -130,19 +131,20 @@ class Drive {
     const auto shake = [this](double sigma) { return static_cast<float>(sigma * normal_imu_(engine_imu_)); };
     const double pushed = time_s() < 0.015 ? 0 : speed_mps - last_mps_;
     last_mps_ = speed_mps;
-    estimator.fuse(sensor::ImuSample{.dangle_b_rad = {shake(2e-5), shake(2e-5),
-                                              static_cast<float>((turn_radps + gyro_bias_radps) * dt) + shake(2e-5)},
-                             .dvelocity_b_mps = {static_cast<float>(pushed) + shake(5e-4),
-                                                 static_cast<float>(speed_mps * turn_radps * dt) + shake(5e-4),
-                                                 gravity_mps2_ * static_cast<float>(dt) + shake(5e-4)},
-                             .interval_us = kStep_us},
-                   {us}, ctx());
+    estimator.fuse(
+        sensor::ImuSample{.dangle_b_rad = {shake(2e-5), shake(2e-5),
+                                           static_cast<float>((turn_radps + gyro_bias_radps) * dt) + shake(2e-5)},
+                          .dvelocity_b_mps = {static_cast<float>(pushed) + shake(5e-4),
+                                              static_cast<float>(speed_mps * turn_radps * dt) + shake(5e-4),
+                                              gravity_mps2_ * static_cast<float>(dt) + shake(5e-4)},
+                          .interval_us = kStep_us},
+        {us}, ctx());
     if (wheels) {
       const double per_m = 20'000 / (2 * 3.14159265358979 * 0.1);
       left_ += (speed_mps - 0.25 * turn_radps) * dt * per_m;
       right_ += (speed_mps + 0.25 * turn_radps) * dt * per_m;
       estimator.fuse(sensor::WheelCounts{static_cast<std::uint16_t>(std::llround(left_)),
-                                 static_cast<std::uint16_t>(std::llround(right_))},
+                                         static_cast<std::uint16_t>(std::llround(right_))},
                      {us}, ctx());
     }
     if (speedometer && (us - kBegin_us) % speedometer_every_us == 0)

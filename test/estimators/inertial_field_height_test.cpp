@@ -114,8 +114,8 @@ class Robot {
     climbed_mps_ = climb_mps;
     constexpr float kStep_s = static_cast<float>(kDt_s);
     const sensor::ImuSample imu{.dangle_b_rad = {turn(0) * kStep_s, turn(1) * kStep_s, turn(2) * kStep_s},
-                        .dvelocity_b_mps = {force(0) * kStep_s, force(1) * kStep_s, force(2) * kStep_s},
-                        .interval_us = kImu_us};
+                                .dvelocity_b_mps = {force(0) * kStep_s, force(1) * kStep_s, force(2) * kStep_s},
+                                .interval_us = kImu_us};
     static_cast<void>(estimator.fuse(imu, {us}, ctx()));
     if (magnetometer && us % 20'000 == 0) take_flux(q_nb);
     if (baro && us % 50'000 == 0) take_air();
@@ -128,8 +128,8 @@ class Robot {
     const nav::Vector3 m_n{narrow(h * std::sin(declination_rad)), narrow(h * std::cos(declination_rad)),
                            narrow(-kField_uT * std::sin(kDip_rad))};
     const nav::Vector3 m = disturb(seen.conjugate().rotate(m_n)) + field_noise_(field_noise_uT);
-    last_flux =
-        estimator.fuse(sensor::MagneticFlux{.flux_b_uT = {m(0), m(1), m(2)}}, {us + std::llround(flux_after_s * 1e6)}, ctx());
+    last_flux = estimator.fuse(sensor::MagneticFlux{.flux_b_uT = {m(0), m(1), m(2)}},
+                               {us + std::llround(flux_after_s * 1e6)}, ctx());
     ++fluxes;
     rejected += last_flux.verdict == sensor::Verdict::kRejected;
   }
@@ -154,11 +154,12 @@ class Robot {
         .fix = sensor::GnssFix::k3d};
     static_cast<void>(estimator.fuse(fix, {us}, ctx()));
     const nav::Vector3 v = noise_(0.1);
-    static_cast<void>(estimator.fuse(sensor::GnssVelocity{.v_n_mps = {narrow(speed_mps * std::cos(yaw_rad)) + v(0),
-                                                              narrow(speed_mps * std::sin(yaw_rad)) + v(1),
-                                                              gnss_climbs ? narrow(climb_mps) + v(2) : base::kNan},
-                                                  .acc_mps = 0.1F},
-                                     {us}, ctx()));
+    static_cast<void>(estimator.fuse(
+        sensor::GnssVelocity{
+            .v_n_mps = {narrow(speed_mps * std::cos(yaw_rad)) + v(0), narrow(speed_mps * std::sin(yaw_rad)) + v(1),
+                        gnss_climbs ? narrow(climb_mps) + v(2) : base::kNan},
+            .acc_mps = 0.1F},
+        {us}, ctx()));
   }
   [[nodiscard]] nav::Quaternion attitude() const {
     return nav::from_euler({.yaw_rad = narrow(yaw_rad), .pitch_rad = narrow(pitch_rad), .roll_rad = narrow(roll_rad)});

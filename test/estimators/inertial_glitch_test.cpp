@@ -458,7 +458,8 @@ TEST(Lasting, AStartWithoutAPlaceIsAsUncertainAsItsFirstFixes) {
     const double up = d.height_error_m() / d.height_sigma_m();
     nees += (d.nees + up * up) / kSeeds;
   }
-  // Three degrees of freedom, times 1.14 (the mean of the figure's inverse square), over kStartPositionInflation squared.
+  // Three degrees of freedom, times 1.14 (the mean of the figure's inverse square), over kStartPositionInflation
+  // squared.
   EXPECT_NEAR(nees, 2.27, 0.55) << "3 sigma of the mean; with the receiver's own figure it is 3.2";
 }
 
@@ -496,11 +497,11 @@ TEST(NeverNan, NoAccuracyAndNoCoordinateBreaksIt) {
     for (const float height : {500.0F, base::kNan, 3e38F, -3e38F})
       for (const std::int64_t latitude : {24'131'350'000LL, 0LL, 45'000'000'000LL, -60'000'000'000LL}) {
         sensor::GnssPosition fix{.latitude_2ndeg = latitude,
-                         .longitude_2ndeg = 5'834'150'000,
-                         .height_m = height,
-                         .horizontal_acc_m = acc,
-                         .vertical_acc_m = acc,
-                         .fix = sensor::GnssFix::k3d};
+                                 .longitude_2ndeg = 5'834'150'000,
+                                 .height_m = height,
+                                 .horizontal_acc_m = acc,
+                                 .vertical_acc_m = acc,
+                                 .fix = sensor::GnssFix::k3d};
         for (int i = 0; i < 7; ++i) static_cast<void>(d.estimator.fuse(fix, {d.us + i}, d.ctx()));
         const InertialEstimate now = d.estimator.inertial(d.ctx());
         ASSERT_TRUE(now.state.finite()) << acc << ' ' << height << ' ' << latitude;

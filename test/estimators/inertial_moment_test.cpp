@@ -67,8 +67,7 @@ class Body {
     return nav::difference(estimator.inertial(ctx()).state.z, base::Anchored::from_um(place(us_).up_um));
   }
   [[nodiscard]] double yaw_error_rad() const {
-    return std::remainder(static_cast<double>(estimator.estimate(ctx()).pose.yaw_rad) - yaw(us_),
-                          2 * 3.14159265358979);
+    return std::remainder(static_cast<double>(estimator.estimate(ctx()).pose.yaw_rad) - yaw(us_), 2 * 3.14159265358979);
   }
   [[nodiscard]] Context ctx() const { return {n_, map_frame_}; }
 
@@ -83,14 +82,15 @@ class Body {
     odd_ = !odd_;
     const double dt = 1e-6 * kStep_us, turn = still_ ? 0 : turn_;
     const float alive = odd_ ? 1e-5F : -1e-5F;
-    estimator.fuse(sensor::ImuSample{.dangle_b_rad = {alive, -alive, static_cast<float>(turn * dt) + alive},
-                             .dvelocity_b_mps = {static_cast<float>(still_ ? 0 : accel_ * dt) + alive,
-                                                 static_cast<float>(turn * speed(us_ - kStep_us / 2) * dt) - alive,
-                                                 (gravity_mps2_ + static_cast<float>(still_ ? 0 : climb_)) *
-                                                         static_cast<float>(dt) +
-                                                     alive},
-                             .interval_us = kStep_us},
-                   {us_}, ctx());
+    estimator.fuse(
+        sensor::ImuSample{
+            .dangle_b_rad = {alive, -alive, static_cast<float>(turn * dt) + alive},
+            .dvelocity_b_mps = {static_cast<float>(still_ ? 0 : accel_ * dt) + alive,
+                                static_cast<float>(turn * speed(us_ - kStep_us / 2) * dt) - alive,
+                                (gravity_mps2_ + static_cast<float>(still_ ? 0 : climb_)) * static_cast<float>(dt) +
+                                    alive},
+            .interval_us = kStep_us},
+        {us_}, ctx());
     estimator.advance({us_}, ctx());
   }
 
@@ -111,11 +111,11 @@ TEST(OwnMicrosecond, OfAFix) {
     const auto coordinates = body.ctx().map_frame.frame.to_geodetic(body.place(at.us));
     ASSERT_TRUE(coordinates);
     static_cast<void>(body.estimator.fuse(sensor::GnssPosition{.latitude_2ndeg = coordinates->latitude_2ndeg,
-                                                       .longitude_2ndeg = coordinates->longitude_2ndeg,
-                                                       .height_m = single(coordinates->height_m),
-                                                       .horizontal_acc_m = 0.02F,
-                                                       .vertical_acc_m = 0.02F,
-                                                       .fix = sensor::GnssFix::k3d},
+                                                               .longitude_2ndeg = coordinates->longitude_2ndeg,
+                                                               .height_m = single(coordinates->height_m),
+                                                               .horizontal_acc_m = 0.02F,
+                                                               .vertical_acc_m = 0.02F,
+                                                               .fix = sensor::GnssFix::k3d},
                                           at, body.ctx()));
   });
   const auto [east_m, north_m] = body.place_error_m();
@@ -140,7 +140,8 @@ TEST(OwnMicrosecond, OfAGnssVelocity) {
   Body body(2.0, 0.0);
   body.run(8, [&](base::Micros at) {
     const auto mps = single(body.speed(at.us));
-    static_cast<void>(body.estimator.fuse(sensor::GnssVelocity{.v_n_mps = {mps, 0, 0}, .acc_mps = 0.02F}, at, body.ctx()));
+    static_cast<void>(
+        body.estimator.fuse(sensor::GnssVelocity{.v_n_mps = {mps, 0, 0}, .acc_mps = 0.02F}, at, body.ctx()));
   });
   EXPECT_NEAR(body.speed_error_mps(), 0.0, 0.002);
   EXPECT_NEAR(body.estimator.inertial(body.ctx()).state.v_n_mps(2), 0.0F, 0.002F) << "it does not fall meanwhile";
@@ -159,8 +160,9 @@ TEST(OwnMicrosecond, OfAHeading) {
   Body body(0.0, 1.0);
   body.run(20, [&](base::Micros at) {
     static_cast<void>(body.estimator.fuse(
-        sensor::OutsideHeading{.yaw_rad = single(std::remainder(body.yaw(at.us), 2 * 3.14159265358979)), .acc_rad = 0.005F}, at,
-        body.ctx()));
+        sensor::OutsideHeading{.yaw_rad = single(std::remainder(body.yaw(at.us), 2 * 3.14159265358979)),
+                               .acc_rad = 0.005F},
+        at, body.ctx()));
   });
   EXPECT_NEAR(body.yaw_error_rad(), 0.0, 0.001);
 }

@@ -288,8 +288,8 @@ TEST(InertialMovingStart, PlacesDoNotHoldUpWhatElseIsRefused) {
   for (int tenths = 1; tenths <= 200; ++tenths) {
     d.run(0.1);
     const double shown_rad = std::remainder(d.yaw_rad + 1e-3 * std::sin(tenths), 2 * 3.14159265358979);
-    static_cast<void>(
-        d.estimator.fuse(sensor::OutsideHeading{.yaw_rad = static_cast<float>(shown_rad), .acc_rad = 0.02F}, {d.us}, d.ctx()));
+    static_cast<void>(d.estimator.fuse(
+        sensor::OutsideHeading{.yaw_rad = static_cast<float>(shown_rad), .acc_rad = 0.02F}, {d.us}, d.ctx()));
     if (tenths % 20 == 0) say_pose(d, 0, 4);
   }
   EXPECT_LT(d.yaw_error_rad(), 0.1) << "12.6 s without places";

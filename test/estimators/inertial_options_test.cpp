@@ -38,19 +38,19 @@ class Stand {
       const auto noise = [this](double sigma) { return static_cast<float>(sigma * normal_(engine_)); };
       estimator.fuse(
           sensor::ImuSample{.dangle_b_rad = {0.01F * shown_radps(0) + noise(1e-6), 0.01F * shown_radps(1) + noise(1e-6),
-                                     0.01F * shown_radps(2) + noise(1e-6)},
-                    .dvelocity_b_mps = {noise(1e-4), noise(1e-4), 0.01F * gravity_mps2_ + noise(1e-4)},
-                    .interval_us = 10'000},
+                                             0.01F * shown_radps(2) + noise(1e-6)},
+                            .dvelocity_b_mps = {noise(1e-4), noise(1e-4), 0.01F * gravity_mps2_ + noise(1e-4)},
+                            .interval_us = 10'000},
           {us}, ctx());
       if (wheels) estimator.fuse(sensor::WheelCounts{}, {us}, ctx());
       estimator.advance({us}, ctx());
     }
   }
   Innovation heading(double line_rad) {
-    return estimator.fuse(
-        sensor::OutsideHeading{.yaw_rad = static_cast<float>(std::remainder(line_rad + 1e-3 * normal_(engine_), 2 * kPi)),
-                       .acc_rad = 0.01F},
-        {us}, ctx());
+    return estimator.fuse(sensor::OutsideHeading{.yaw_rad = static_cast<float>(
+                                                     std::remainder(line_rad + 1e-3 * normal_(engine_), 2 * kPi)),
+                                                 .acc_rad = 0.01F},
+                          {us}, ctx());
   }
   [[nodiscard]] Context ctx() const { return {n, map_frame}; }
   [[nodiscard]] double yaw_off_rad() const {
@@ -196,16 +196,17 @@ TEST(InertialOptions, SensorsThatShowTheSameForEverAreStuckAndSaidToBe) {
   EXPECT_TRUE(stand.says_stuck());
   static_cast<void>(stand.estimator.fuse(sensor::MagneticFlux{.flux_b_uT = {0, -20.1F, -40}}, at(), stand.ctx()));
   EXPECT_FALSE(stand.says_stuck()) << "it moves again";
-  EXPECT_EQ(
-      until_stale([&] { return stand.estimator.fuse(sensor::AirPressure{.pressure_Pa = 95'000}, at(), stand.ctx()).verdict; }),
-      50);
+  EXPECT_EQ(until_stale([&] {
+              return stand.estimator.fuse(sensor::AirPressure{.pressure_Pa = 95'000}, at(), stand.ctx()).verdict;
+            }),
+            50);
   EXPECT_TRUE(stand.says_stuck());
   static_cast<void>(stand.estimator.fuse(sensor::AirPressure{.pressure_Pa = 95'001}, at(), stand.ctx()));
-  EXPECT_EQ(
-      until_stale([&] {
-        return stand.estimator.fuse(sensor::OutsideHeading{.yaw_rad = 0.01F, .acc_rad = 0.01F}, at(), stand.ctx()).verdict;
-      }),
-      50);
+  EXPECT_EQ(until_stale([&] {
+              return stand.estimator.fuse(sensor::OutsideHeading{.yaw_rad = 0.01F, .acc_rad = 0.01F}, at(), stand.ctx())
+                  .verdict;
+            }),
+            50);
   EXPECT_TRUE(stand.says_stuck());
 }
 

@@ -13,7 +13,8 @@ TEST(InertialSize, TheFilterWithoutTheDelayRingTakesNoMoreThanTwoAndAHalfKilobyt
   std::printf(
       "filter %zu bytes, carried ahead %zu, a sample of the window %zu; of the filter: state and covariance %zu, "
       "start %zu\n",
-      sizeof(Inertial) - sizeof(OutputPredictor), sizeof(OutputPredictor), sizeof(sensor::Sample), sizeof(nav::Ins), sizeof(Alignment));
+      sizeof(Inertial) - sizeof(OutputPredictor), sizeof(OutputPredictor), sizeof(sensor::Sample), sizeof(nav::Ins),
+      sizeof(Alignment));
   EXPECT_LE(sizeof(Inertial) - sizeof(OutputPredictor), 2'560U);
 }
 

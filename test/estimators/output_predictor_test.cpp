@@ -19,7 +19,7 @@ namespace {
 constexpr std::int64_t kImu_us = 5'000, kTick_us = 10'000, kWindow_us = 200'000;
 
 sensor::Sample imu_sample(std::int64_t us, const nav::Vector3& w_b_radps, const nav::Vector3& f_b_mps2,
-                  std::int64_t dt_us = kImu_us) {
+                          std::int64_t dt_us = kImu_us) {
   const auto shown = nav::ImuIncrement::constant(w_b_radps, f_b_mps2, {dt_us});
   sensor::Sample s;
   s.stamp = {us};
@@ -90,7 +90,8 @@ class Feed {
   void produce(std::int64_t us) {
     if (wild_ && one_in(60)) fast_ = !fast_;
     const nav::Vector3 w = (fast_ ? 8.0F : 0.5F) * nav::Vector3(normal(), normal(), normal());
-    sensor::Sample s = imu_sample(us + (wild_ ? static_cast<std::int64_t>(40 * normal()) : 0), w, {normal(), normal(), 9.8F});
+    sensor::Sample s =
+        imu_sample(us + (wild_ ? static_cast<std::int64_t>(40 * normal()) : 0), w, {normal(), normal(), 9.8F});
     if (wild_) {
       if (one_in(80)) return;  // lost
       if (one_in(90)) s.payload.imu.dangle_b_rad[1] = std::nanf("");
@@ -225,7 +226,7 @@ TEST(OutputPredictor, SaysWhenASampleComesThatItWentOnWithout) {
   const nav::Earth earth;
   OutputPredictor ahead;
   std::vector<sensor::Sample> window{imu_sample(105'000, {0, 0, 1}, {0, 0, 9.8F}),
-                             imu_sample(115'000, {0, 0, 1}, {0, 0, 9.8F})};
+                                     imu_sample(115'000, {0, 0, 1}, {0, 0, 9.8F})};
   for (const sensor::Sample& s : window) EXPECT_FALSE(ahead.arrived(s.stamp));
   ahead.carry_from({.reached = {100'000}, .last = {100'000}}, window, ctx(n, earth));
   EXPECT_FALSE(ahead.arrived({120'000}));

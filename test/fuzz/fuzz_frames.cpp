@@ -2,8 +2,8 @@
 // libFuzzer: bytes become frames and ticks for the rover's node and, a second time, for the whole firmware on a made-up
 // board. It must not crash or do anything undefined; every frame sent decodes; the state stays finite; and a node that
 // is powered on again answers as a new one does, whatever it went through before.
-#include "node/firmware.hpp"
 #include "config/rover.hpp"
+#include "node/firmware.hpp"
 
 #include <array>
 #include <cstdint>

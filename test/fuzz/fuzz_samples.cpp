@@ -2,12 +2,12 @@
 // libFuzzer: bytes become samples of every sensor with fields of any value, late, early and out of order, for a node
 // with inertial navigation, the attitude filter and odometry; between them a robot that drives on. What is plausible
 // goes in; no estimator may leave the numbers for it, and the node answers the same a second time.
+#include "bus/frame_sink.hpp"
+#include "config/rover.hpp"
 #include "estimators/attitude.hpp"
 #include "estimators/inertial/inertial.hpp"
 #include "estimators/odometry.hpp"
-#include "bus/frame_sink.hpp"
 #include "sensor/plausibility.hpp"
-#include "config/rover.hpp"
 
 #include <array>
 #include <cstdint>

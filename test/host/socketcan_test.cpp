@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// SocketCAN on a real vcan: run it under `tools/run/provide_vcan -i vcan0 -i vcan1`, as root (it takes interfaces down).
+// SocketCAN on a real vcan: run it under `tools/run/provide_vcan -i vcan0 -i vcan1`, as root (it takes interfaces
+// down).
 #include "hal/board/linux/socket_can.hpp"
 
 #include "hal/board/linux/clock.hpp"

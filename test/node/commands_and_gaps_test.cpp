@@ -21,7 +21,7 @@ base::CanFrame counts(std::int64_t t, int both, int seq) {
                                .right = static_cast<std::uint16_t>(both)});
 }
 
-TEST(bus::Commands, AMapEntryInTheEpochOfALateSampleLetsNothingCountTwice) {
+TEST(Commands, AMapEntryInTheEpochOfALateSampleLetsNothingCountTwice) {
   const auto way = [](bool late, bool map) {
     Bench bench;
     bench.epoch(set_pose(1, 0, 0, 0));
@@ -45,7 +45,7 @@ TEST(bus::Commands, AMapEntryInTheEpochOfALateSampleLetsNothingCountTwice) {
   EXPECT_EQ(way(true, true), expected);
 }
 
-TEST(bus::Commands, APoseWithoutHeadingWaitsForOneInsteadOfTakingZero) {
+TEST(Commands, APoseWithoutHeadingWaitsForOneInsteadOfTakingZero) {
   constexpr std::int64_t kLatitude = 24'131'000'000, kLongitude = 5'834'000'000;
   constexpr double kNorth_2ndeg_per_m = 1 / (111'200.0 * 2e-9);
   Bench bench;
@@ -79,7 +79,7 @@ TEST(bus::Commands, APoseWithoutHeadingWaitsForOneInsteadOfTakingZero) {
   EXPECT_NEAR(last<bus::EstMotion>(out, 1)->yaw_rad, 1.571, 0.1);
 }
 
-TEST(bus::Commands, CloseTheTimeBeforeThem) {
+TEST(Commands, CloseTheTimeBeforeThem) {
   Bench bench;
   bench.epoch({map_entry(7, 5000, 0)});
   bench.epoch(set_pose(1, 0, 0, 0));
@@ -91,7 +91,7 @@ TEST(bus::Commands, CloseTheTimeBeforeThem) {
   EXPECT_EQ(last<bus::EstDiagOrder>(out)->too_late, 1);
 }
 
-TEST(bus::Commands, AResetOfNothingThatExistsIsRefused) {
+TEST(Commands, AResetOfNothingThatExistsIsRefused) {
   for (int what = 3; what < 16; ++what) {
     Bench bench;
     bench.epoch(set_pose(1, 0, 0, 0));
@@ -104,7 +104,7 @@ TEST(bus::Commands, AResetOfNothingThatExistsIsRefused) {
   }
 }
 
-TEST(bus::Commands, TheOrderOfContradictionsHasNoEffect) {
+TEST(Commands, TheOrderOfContradictionsHasNoEffect) {
   const auto crc = [](const Frames& frames) {
     Bench bench;
     bench.idle(3);
@@ -123,7 +123,7 @@ TEST(bus::Commands, TheOrderOfContradictionsHasNoEffect) {
             crc({body_speed(t, 2, 0, 1), body_speed(t, 1, 0, 1)}));
 }
 
-TEST(bus::Commands, AYawBeyondHalfATurnIsPublishedWrapped) {
+TEST(Commands, AYawBeyondHalfATurnIsPublishedWrapped) {
   Bench bench;
   bench.epoch(set_pose(1, 0, 0, 3.25F));
   EXPECT_NEAR(last<bus::EstMotion>(bench.idle(2), 1)->yaw_rad, 3.25 - 6.2831853, 1e-3);
@@ -131,8 +131,8 @@ TEST(bus::Commands, AYawBeyondHalfATurnIsPublishedWrapped) {
 
 // More samples than there is room for: none is lost, the window is shorter, and that is said.
 TEST(Gaps, AWindowThatIsTooSmallForItsSamplesIsSaidToBeShort) {
-  const auto node =
-      std::make_unique<node::Node<node::Estimators<estimators::Odometry, estimators::PoseEkf>, 16>>(kNumbers, bus::Version{});
+  const auto node = std::make_unique<node::Node<node::Estimators<estimators::Odometry, estimators::PoseEkf>, 16>>(
+      kNumbers, bus::Version{});
   std::int64_t now_us = Bench::kStart_us;
   node->power_on({now_us});
   std::optional<bus::EstDiagCapacity> capacity;

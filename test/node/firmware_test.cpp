@@ -57,8 +57,8 @@ class Loop : public ::testing::Test {
 
   SlowBoard board;
   std::unique_ptr<node::Firmware<SlowBoard, node::Estimators<estimators::Odometry, estimators::PoseEkf>>> firmware =
-      std::make_unique<node::Firmware<SlowBoard, node::Estimators<estimators::Odometry, estimators::PoseEkf>>>(board, kNumbers,
-                                                                                               bus::Version{});
+      std::make_unique<node::Firmware<SlowBoard, node::Estimators<estimators::Odometry, estimators::PoseEkf>>>(
+          board, kNumbers, bus::Version{});
 };
 
 TEST_F(Loop, TicksThatKeepTheirPeriodAreNotLate) {

@@ -2,16 +2,16 @@
 // Every estimator behind everything that a sample or a frame can say: finite states, covariances that are positive
 // definite (judge: eigenvalues in double), and no restart because an invariant broke.
 #include "support/never_nan.hpp"
+#include "bench.hpp"
+#include "config/rover.hpp"
 #include "estimators/attitude.hpp"
+#include "estimators/compiled_inertial.hpp"
 #include "estimators/inertial/inertial.hpp"
 #include "estimators/odometry.hpp"
 #include "estimators/planar/pose_ekf.hpp"
 #include "node/boot_self_check.hpp"
 #include "node/node.hpp"
 #include "sensor/plausibility.hpp"
-#include "bench.hpp"
-#include "compiled_inertial.hpp"
-#include "config/rover.hpp"
 
 #include <gtest/gtest.h>
 #include <limits>
@@ -47,7 +47,8 @@ class Wired {
   }
 
  public:
-  using FusionWindow = node::FusionWindow<node::Estimators<estimators::Odometry, estimators::PoseEkf, estimators::Attitude, estimators::Inertial>, 96>;
+  using FusionWindow = node::FusionWindow<
+      node::Estimators<estimators::Odometry, estimators::PoseEkf, estimators::Attitude, estimators::Inertial>, 96>;
 
   Wired() {
     const param::GnssParameters& g = kNumbers.gnss;
@@ -115,13 +116,13 @@ class Wired {
 };
 
 template <class Payload>
-void put(sensor::Sample& sample, const bus::Payload& payload) {
+void put(sensor::Sample& sample, const Payload& payload) {
   sensor::visit(sample, [&payload]<class T>(const T& there) {
-    if constexpr (std::is_same_v<T, bus::Payload>) const_cast<T&>(there) = payload;  // NOLINT: the sample is not const
+    if constexpr (std::is_same_v<T, Payload>) const_cast<T&>(there) = payload;  // NOLINT: the sample is not const
   });
 }
 template <class Payload>
-sensor::Sample sample_of(sensor::Sensor sensor, base::Micros stamp, const bus::Payload& payload) {
+sensor::Sample sample_of(sensor::Sensor sensor, base::Micros stamp, const Payload& payload) {
   sensor::Sample sample;
   sample.stamp = stamp;
   sample.sensor = sensor;
@@ -136,8 +137,8 @@ std::vector<sensor::Sample> good(int k, base::Micros t) {
   std::vector<sensor::Sample> all{
       sample_of(sensor::Sensor::kImu, t,
                 sensor::ImuSample{.dangle_b_rad = {0, 0, 1e-6F * static_cast<float>(k % 7 - 3)},  // not stuck
-                               .dvelocity_b_mps = {0, 0, 0.0981F + 1e-5F * static_cast<float>(k % 5)},
-                               .interval_us = 10'000}),
+                                  .dvelocity_b_mps = {0, 0, 0.0981F + 1e-5F * static_cast<float>(k % 5)},
+                                  .interval_us = 10'000}),
       sample_of(sensor::Sensor::kWheelCounts, t, sensor::WheelCounts{.left = counts, .right = counts}),
       sample_of(sensor::Sensor::kMagnetometer, t,
                 sensor::MagneticFlux{.flux_b_uT = {0.02F * static_cast<float>(k % 7), 17, -46}})};
@@ -145,12 +146,13 @@ std::vector<sensor::Sample> good(int k, base::Micros t) {
     const param::GnssParameters& g = kNumbers.gnss;
     all.push_back(sample_of(sensor::Sensor::kGnssPosition, t,
                             sensor::GnssPosition{.latitude_2ndeg = g.origin_latitude_2ndeg,
-                                              .longitude_2ndeg = g.origin_longitude_2ndeg + 68 * k,
-                                              .height_m = 520,
-                                              .horizontal_acc_m = 1.5F,
-                                              .vertical_acc_m = 3,
-                                              .fix = sensor::GnssFix::k3d}));
-    all.push_back(sample_of(sensor::Sensor::kGnssVelocity, t, sensor::GnssVelocity{.v_n_mps = {1, 0, 0}, .acc_mps = 0.2F}));
+                                                 .longitude_2ndeg = g.origin_longitude_2ndeg + 68 * k,
+                                                 .height_m = 520,
+                                                 .horizontal_acc_m = 1.5F,
+                                                 .vertical_acc_m = 3,
+                                                 .fix = sensor::GnssFix::k3d}));
+    all.push_back(
+        sample_of(sensor::Sensor::kGnssVelocity, t, sensor::GnssVelocity{.v_n_mps = {1, 0, 0}, .acc_mps = 0.2F}));
     all.push_back(
         sample_of(sensor::Sensor::kBarometer, t,
                   sensor::AirPressure{.pressure_Pa = 95'000 + static_cast<float>(k % 3), .temperature_degC = 15}));
@@ -232,8 +234,9 @@ TEST(NeverNan, EverySensorIsUsedWhileItIsGood) {
   }
   constexpr std::size_t kEkf = 1, kAttitude = 2, kInertial = 3;
   for (const sensor::Sensor sensor :
-       {sensor::Sensor::kImu, sensor::Sensor::kWheelCounts, sensor::Sensor::kWheelSpeed, sensor::Sensor::kBodySpeed, sensor::Sensor::kGnssPosition,
-        sensor::Sensor::kGnssVelocity, sensor::Sensor::kMagnetometer, sensor::Sensor::kBarometer, sensor::Sensor::kHeading})
+       {sensor::Sensor::kImu, sensor::Sensor::kWheelCounts, sensor::Sensor::kWheelSpeed, sensor::Sensor::kBodySpeed,
+        sensor::Sensor::kGnssPosition, sensor::Sensor::kGnssVelocity, sensor::Sensor::kMagnetometer,
+        sensor::Sensor::kBarometer, sensor::Sensor::kHeading})
     EXPECT_TRUE(wired.took(kInertial, sensor)) << static_cast<int>(sensor);
   EXPECT_TRUE(wired.took(kAttitude, sensor::Sensor::kMagnetometer));
   EXPECT_TRUE(wired.took(kEkf, sensor::Sensor::kRangeBearing));
@@ -292,7 +295,8 @@ TEST(NeverNan, EveryFieldOfEverySampleWhileStartingAndWhileNavigating) {
 
 /// What is refused at the door is counted, and the count is on the bus.
 TEST(NeverNan, EveryFieldThatIsRefusedIsSaid) {
-  using Node = node::Node<node::Estimators<estimators::Odometry, estimators::PoseEkf, estimators::Attitude, estimators::Inertial>>;
+  using Node = node::Node<
+      node::Estimators<estimators::Odometry, estimators::PoseEkf, estimators::Attitude, estimators::Inertial>>;
   param::Parameters parameters = kNumbers;
   parameters.publish.diagnostics_every = 1;
   static Node node{parameters, {}};
@@ -352,7 +356,8 @@ TEST(NeverNan, EveryIntegerOfEverySampleWhileStartingAndWhileNavigating) {
       {"all clipped", sensor::Sensor::kImu,
        [](sensor::Sample& s) { s.payload.imu.clipped_gyro = s.payload.imu.clipped_accel = 255; }},
       {"no temperature", sensor::Sensor::kImu, [](sensor::Sample& s) { s.payload.imu.temperature_degC = base::kNan; }},
-      {"infinitely hot", sensor::Sensor::kImu, [](sensor::Sample& s) { s.payload.imu.temperature_degC = base::kInfinity; }},
+      {"infinitely hot", sensor::Sensor::kImu,
+       [](sensor::Sample& s) { s.payload.imu.temperature_degC = base::kInfinity; }},
       {"counts that stay", sensor::Sensor::kWheelCounts, [](sensor::Sample& s) { s.payload.counts = {}; }},
       {"counts that leap", sensor::Sensor::kWheelCounts,
        [](sensor::Sample& s) {
@@ -364,13 +369,16 @@ TEST(NeverNan, EveryIntegerOfEverySampleWhileStartingAndWhileNavigating) {
        [](sensor::Sample& s) { s.payload.gnss_position.latitude_2ndeg = kLeast; }},
       {"round the world", sensor::Sensor::kGnssPosition,
        [](sensor::Sample& s) { s.payload.gnss_position.longitude_2ndeg = kMost; }},
-      {"and back", sensor::Sensor::kGnssPosition, [](sensor::Sample& s) { s.payload.gnss_position.longitude_2ndeg = kLeast; }},
+      {"and back", sensor::Sensor::kGnssPosition,
+       [](sensor::Sample& s) { s.payload.gnss_position.longitude_2ndeg = kLeast; }},
       {"the pole", sensor::Sensor::kGnssPosition,
        [](sensor::Sample& s) { s.payload.gnss_position.latitude_2ndeg = 45'000'000'000; }},
       {"nowhere", sensor::Sensor::kGnssPosition,
        [](sensor::Sample& s) { s.payload.gnss_position.latitude_2ndeg = s.payload.gnss_position.longitude_2ndeg = 0; }},
-      {"no thermometer", sensor::Sensor::kBarometer, [](sensor::Sample& s) { s.payload.pressure.temperature_degC = base::kNan; }},
-      {"absolute zero", sensor::Sensor::kBarometer, [](sensor::Sample& s) { s.payload.pressure.temperature_degC = -274; }},
+      {"no thermometer", sensor::Sensor::kBarometer,
+       [](sensor::Sample& s) { s.payload.pressure.temperature_degC = base::kNan; }},
+      {"absolute zero", sensor::Sensor::kBarometer,
+       [](sensor::Sample& s) { s.payload.pressure.temperature_degC = -274; }},
       {"no such landmark", sensor::Sensor::kRangeBearing, [](sensor::Sample& s) { s.payload.sighting.landmark = 255; }},
   };
   for (const Spoilt& one : all)
@@ -393,7 +401,7 @@ TEST(NeverNan, StampsOfAnyAgeInTheInertialEstimatorItself) {
     for (const std::int64_t off_us : std::initializer_list<std::int64_t>{-1'000'000'000'000, -10'000'000, -200'001, -1,
                                                                          1, 200'001, 10'000'000, 1'000'000'000'000}) {
       SCOPED_TRACE(testing::Message() << "sensor " << static_cast<int>(kind.sensor) << ", " << off_us << " us");
-      app::CompiledInertial estimator;
+      estimators::CompiledInertial estimator;
       base::Micros now{2'000'000'000'000};
       estimator.restart(now, ctx);
       for (int k = 0; k < 600; ++k) {
@@ -437,7 +445,8 @@ TEST(NeverNan, StaleAndFutureStampsOfEverySensor) {
 
 /// Frames whose payload is random bits, among good ones; commands with a right CRC among them.
 TEST(NeverNan, RandomBitsInEveryInputFrame) {
-  using Node = node::Node<node::Estimators<estimators::Odometry, estimators::PoseEkf, estimators::Attitude, estimators::Inertial>>;
+  using Node = node::Node<
+      node::Estimators<estimators::Odometry, estimators::PoseEkf, estimators::Attitude, estimators::Inertial>>;
   for (std::uint32_t seed = 1; seed <= 4; ++seed) {
     static Node node{kNumbers, {}};
     node::Dice dice(seed * 7919);

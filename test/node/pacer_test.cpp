@@ -7,11 +7,11 @@
 namespace tetap {
 namespace {
 
-using bus::LoopHealth;
-using node::Pacer;
 using base::Micros;
+using bus::LoopHealth;
 using bus::SyncKind;
 using bus::SyncState;
+using node::Pacer;
 
 constexpr Micros kPeriod{10'000};
 

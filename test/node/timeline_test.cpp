@@ -9,8 +9,8 @@
 namespace tetap {
 namespace {
 
-sensor::Sample sample(std::int64_t us, sensor::Sensor sensor = sensor::Sensor::kBodySpeed, int instance = 0, int sequence = 0,
-                   int detail = 0) {
+sensor::Sample sample(std::int64_t us, sensor::Sensor sensor = sensor::Sensor::kBodySpeed, int instance = 0,
+                      int sequence = 0, int detail = 0) {
   sensor::Sample s;
   s.stamp = {us};
   s.sensor = sensor;

@@ -4,7 +4,7 @@
 #include "sensor/calibration.hpp"
 
 #include "checks/imu_health.hpp"
-#include "bench.hpp"
+#include "node/bench.hpp"
 
 #include <gtest/gtest.h>
 #include <Eigen/LU>
@@ -16,10 +16,10 @@ namespace tetap::sensor {
 namespace {
 
 constexpr param::ImuParameters kImu{.accel_bias_mps2 = {0.12F, -0.08F, 0.2F},
-                          .accel_matrix = {1.02F, 0.01F, -0.02F, 0, 0.97F, 0.015F, 0, 0, 1.01F},
-                          .gyro_bias_radps = {0.01F, -0.02F, 0.005F},
-                          .gyro_bias_slope_radps_per_degC = {1e-4F, -5e-5F, 2e-4F},
-                          .gyro_bias_at_degC = 30};
+                                    .accel_matrix = {1.02F, 0.01F, -0.02F, 0, 0.97F, 0.015F, 0, 0, 1.01F},
+                                    .gyro_bias_radps = {0.01F, -0.02F, 0.005F},
+                                    .gyro_bias_slope_radps_per_degC = {1e-4F, -5e-5F, 2e-4F},
+                                    .gyro_bias_at_degC = 30};
 
 TEST(Calibrate, TakesOutWhatWasPutIn) {
   std::mt19937 engine{1};

@@ -151,7 +151,8 @@ struct Published {
 
 constexpr std::size_t kOdometry = 0, kFused = 1;
 
-Judgement judge(const std::vector<Recorded>& runs, const param::Parameters& parameters, std::size_t estimator = kFused) {
+Judgement judge(const std::vector<Recorded>& runs, const param::Parameters& parameters,
+                std::size_t estimator = kFused) {
   using Node = node::Node<robot::rover_landmarks::Estimators>;
   Judgement result;
   std::vector<double> sums(runs.front().epochs.size());  // of the seeds, by epoch
@@ -236,7 +237,8 @@ TEST(Consistency, a_noise_that_is_half_or_double_is_noticed) {
     std::function<void(param::Parameters&, float)> scale;
   };
   const std::array cases{
-      Case{"wheels", [](param::Parameters& n, float k) { n.wheels.drive.noise_left *= k, n.wheels.drive.noise_right *= k; }},
+      Case{"wheels",
+           [](param::Parameters& n, float k) { n.wheels.drive.noise_left *= k, n.wheels.drive.noise_right *= k; }},
       Case{"gyro", [](param::Parameters& n, float k) { n.gyro.noise *= k; }},
       Case{"range", [](param::Parameters& n, float k) { n.landmark.sigma_range_m *= k; }},
       Case{"bearing", [](param::Parameters& n, float k) { n.landmark.sigma_bearing_rad *= k; }},

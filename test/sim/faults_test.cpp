@@ -374,7 +374,8 @@ TEST(Faults, stamps_are_old_ahead_or_jump_as_said_and_arrivals_are_not) {
     for (const auto& [key, m] : plain().all) {
       // Wheels are stamped up to 0.1 ms after the instant that decides.
       const base::Micros t = true_time(m);
-      if (std::holds_alternative<sensor::WheelCounts>(m.value) && !(inside(t) == inside(t - base::Micros{100}))) continue;
+      if (std::holds_alternative<sensor::WheelCounts>(m.value) && !(inside(t) == inside(t - base::Micros{100})))
+        continue;
       ASSERT_EQ((faulty.all.at(key).stamp - m.stamp).us, inside(t) ? shift_us : 0);
     }
   }

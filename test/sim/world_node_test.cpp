@@ -163,7 +163,8 @@ TEST(Covariance, ComesWithWhatItJudgesInTurnsThatTheEpochSays) {
 // An IMU at 200 Hz, a window of half a second: what the receiver said 480 ms ago is fused at its own time, so nothing
 // of the estimate tells when it came.
 template <std::size_t kPlaces>
-using RoverWith = node::EstimatorsWithPlaces<kPlaces, estimators::Odometry, robot::rover::Attitude, robot::rover::Inertial>;
+using RoverWith =
+    node::EstimatorsWithPlaces<kPlaces, estimators::Odometry, robot::rover::Attitude, robot::rover::Inertial>;
 
 /// How often samples became final early for want of places, if that frame says so.
 int short_windows(const base::CanFrame& frame) {

@@ -12,7 +12,9 @@
 namespace tetap::sim {
 namespace {
 
-World::Options quiet(Parameters parameters = perfect()) { return {.mismatched = true, .latency = false, .parameters = parameters}; }
+World::Options quiet(Parameters parameters = perfect()) {
+  return {.mismatched = true, .latency = false, .parameters = parameters};
+}
 
 double distance_m(const Truth& a, const Truth& b) {
   return sim::sqrt((a.x_m - b.x_m) * (a.x_m - b.x_m) + (a.y_m - b.y_m) * (a.y_m - b.y_m));
@@ -305,7 +307,8 @@ TEST(World, switching_a_sensor_off_leaves_the_others_as_they_were) {
   options.parameters.camera.rate_hz = 0;
   std::vector<Measurement> rest;
   for (const auto& m : all)
-    if (!std::holds_alternative<sensor::ImuSample>(m.value) && !std::holds_alternative<sensor::LandmarkSighting>(m.value))
+    if (!std::holds_alternative<sensor::ImuSample>(m.value) &&
+        !std::holds_alternative<sensor::LandmarkSighting>(m.value))
       rest.push_back(m);
   EXPECT_EQ(hash(rest), hash(run(options, 7, seconds_us(30))));
 }

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Preloaded into user-mode-linux 6.1 on processors with AMX (tools/run/provide_vcan does it). That keeps a process's vector
-// registers in 2696 bytes, enough up to AVX-512, and hands them back through ptrace, of which Linux takes all that the
-// host has or nothing: 11 kB with AMX, so the first process ended with "ptrace set fp regs failed, errno = 14". Here
-// they are handed back in a buffer of the host's size. What is beyond theirs is AMX's, which nothing in the guest uses.
+// Preloaded into user-mode-linux 6.1 on processors with AMX (tools/run/provide_vcan does it). That keeps a process's
+// vector registers in 2696 bytes, enough up to AVX-512, and hands them back through ptrace, of which Linux takes all
+// that the host has or nothing: 11 kB with AMX, so the first process ended with "ptrace set fp regs failed, errno =
+// 14". Here they are handed back in a buffer of the host's size. What is beyond theirs is AMX's, which nothing in the
+// guest uses.
 #include <dlfcn.h>
 #include <sys/ptrace.h>
 #include <sys/types.h>

@@ -5,8 +5,8 @@
 #pragma once
 
 #include "base/can_frame.hpp"
-#include "hal/can_bus.hpp"
 #include "hal/board/mps2/candump_line.hpp"
+#include "hal/can_bus.hpp"
 #include "hal/chip/arm/semihosting.hpp"
 
 #include <array>

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // The firmware on an emulated Cortex-M, fed from a candump log through semihosting: arguments IN.log OUT.log (either
 // may be missing). For on-target proofs: same bytes as the host, stack high-water mark, instructions per tick.
-#include "node/firmware.hpp"
 #include "hal/board/mps2/board.hpp"
 #include "hal/chip/support/boot_line.hpp"
+#include "node/firmware.hpp"
 #include "robot.hpp"
 #include "version.hpp"
 
@@ -16,8 +16,8 @@ int main() {
     board.print("tetap: cannot open the files\n");
     return 1;
   }
-  static tetap::node::Firmware<Board, tetap::robot::chosen::Estimators> firmware{board, tetap::robot::chosen::parameters,
-                                                                                tetap::kVersion};
+  static tetap::node::Firmware<Board, tetap::robot::chosen::Estimators> firmware{
+      board, tetap::robot::chosen::parameters, tetap::kVersion};
   tetap::hal::print_boot_line(board, tetap::robot::kName, firmware);
   while (!board.can.at_end()) firmware.poll();
   tetap::hal::print_stack_line(board);

@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 // The flash image of a robot whose estimator is a Cortex-R5F of a Zynq UltraScale+.
-#include "node/firmware.hpp"
-#include "hal/chip/support/boot_line.hpp"
 #include "hal/board/zynqmp_r5/board.hpp"
+#include "hal/chip/support/boot_line.hpp"
+#include "node/firmware.hpp"
 #include "robot.hpp"
 #include "version.hpp"
 
 int main() {
   using Board = tetap::hal::zynqmp_r5::Board;
   static Board board;
-  static tetap::node::Firmware<Board, tetap::robot::chosen::Estimators> firmware{board, tetap::robot::chosen::parameters,
-                                                                                tetap::kVersion};
+  static tetap::node::Firmware<Board, tetap::robot::chosen::Estimators> firmware{
+      board, tetap::robot::chosen::parameters, tetap::kVersion};
   tetap::hal::print_boot_line(board, tetap::robot::kName, firmware);
   tetap::hal::print_stack_line(board);
   for (std::uint32_t polls = 0;; ++polls) {

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Vectors, reset and exceptions of the Cortex-R5F. ARM DDI 0460 (Cortex-R5 TRM) chapters 2 and 4, ARM DDI 0406 section
 // B1.
+#include "hal/board/zynqmp_r5/board.hpp"
 #include "hal/chip/support/image.hpp"
 #include "hal/chip/support/text.hpp"
-#include "hal/board/zynqmp_r5/board.hpp"
 
 // ISO C++ does not let a program call main by that name.
 int image_main() asm("main");

@@ -6,16 +6,16 @@
 #pragma once
 
 #include "checks/coloured_noise.hpp"
-#include "checks/offset_hypothesis.hpp"
 #include "checks/frozen_position.hpp"
+#include "checks/offset_hypothesis.hpp"
 #include "checks/position_drift.hpp"
 #include "checks/startup_fix_check.hpp"
-#include "param/parameters.hpp"
 #include "model/gnss_course.hpp"
 #include "model/gnss_fix_3d.hpp"
 #include "model/planar_pose.hpp"
 #include "nav/ins.hpp"
 #include "nav/yaw_estimator.hpp"
+#include "param/parameters.hpp"
 
 namespace tetap::estimators {
 

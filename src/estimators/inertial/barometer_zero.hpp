@@ -4,9 +4,9 @@
 // from then on, and no cross covariance is kept that would say how.
 #pragma once
 
-#include "param/parameters.hpp"
 #include "base/math.hpp"
 #include "base/time.hpp"
+#include "param/parameters.hpp"
 
 #include <cstdint>
 

@@ -5,9 +5,9 @@
 #pragma once
 
 #include "checks/imu_health.hpp"
+#include "nav/imu_gather.hpp"
 #include "param/parameters.hpp"
 #include "sensor/sample.hpp"
-#include "nav/imu_gather.hpp"
 
 #include <array>
 #include <cstdint>

@@ -4,24 +4,24 @@
 // with the non-holonomic constraint, standstill, headings from outside, a magnetometer and a barometer.
 #pragma once
 
-#include "estimators/context.hpp"
-#include "estimators/estimate.hpp"
-#include "estimators/inertial/output_predictor.hpp"
-#include "estimators/inertial/barometer_zero.hpp"
-#include "checks/magnetic_field_check.hpp"
+#include "base/reinitialise.hpp"
 #include "checks/coloured_noise.hpp"
-#include "checks/offset_hypothesis.hpp"
 #include "checks/frozen_position.hpp"
+#include "checks/imu_health.hpp"
+#include "checks/magnetic_field_check.hpp"
+#include "checks/offset_hypothesis.hpp"
 #include "checks/position_drift.hpp"
 #include "checks/startup_fix_check.hpp"
-#include "checks/imu_health.hpp"
-#include "estimators/inertial/alignment.hpp"
 #include "checks/stuck_value.hpp"
 #include "checks/wheel_slip.hpp"
-#include "sensor/sample.hpp"
-#include "base/reinitialise.hpp"
+#include "estimators/context.hpp"
+#include "estimators/estimate.hpp"
+#include "estimators/inertial/alignment.hpp"
+#include "estimators/inertial/barometer_zero.hpp"
+#include "estimators/inertial/output_predictor.hpp"
 #include "model/gnss_fix_3d.hpp"
 #include "nav/ins.hpp"
+#include "sensor/sample.hpp"
 
 #include <array>
 #include <cstdint>
@@ -199,8 +199,8 @@ class Inertial {
   void constrain(base::Micros stamp, const Context& ctx);
   [[nodiscard]] bool believe(const nav::Vector3& nu, const nav::Vector3& r, bool agrees, base::Micros stamp,
                              const param::RecoveryParameters& rules);
-  [[nodiscard]] bool drifts(const nav::Vector3& nu, const nav::Vector3& r, const FixNis& of_fix, const param::GnssParameters& n,
-                            Innovation& record);
+  [[nodiscard]] bool drifts(const nav::Vector3& nu, const nav::Vector3& r, const FixNis& of_fix,
+                            const param::GnssParameters& n, Innovation& record);
   Innovation weigh(model::GnssFix3d& fix, base::Micros stamp, const Context& ctx);
   void refused_or_not(Source source, bool refused, base::Micros stamp);
   void step(int first, int count, const nav::Vector3& by_m, const nav::Vector3& variance_m2);
@@ -269,12 +269,12 @@ class Inertial {
   checks::StartupFixCheck first_fixes_;
   checks::FrozenPosition frozen_;
   checks::PositionDrift drift_;
-  float rolled_mps_ = 0;                 ///< as wheels or a speedometer said last,
-  base::Micros rolled_;                  ///< and when
-  checks::OffsetHypothesis place_, height_;                 ///< of fixes that are not taken
-  std::array<float, 2> led_m_{};         ///< by how much the last fixes moved the position
-  bool doubted_ = false, back_ = false;  ///< so is that; the last jump may be taken back
-  std::uint8_t recoveries_ = 0;          ///< of the velocity, since a fix was accepted
+  float rolled_mps_ = 0;                     ///< as wheels or a speedometer said last,
+  base::Micros rolled_;                      ///< and when
+  checks::OffsetHypothesis place_, height_;  ///< of fixes that are not taken
+  std::array<float, 2> led_m_{};             ///< by how much the last fixes moved the position
+  bool doubted_ = false, back_ = false;      ///< so is that; the last jump may be taken back
+  std::uint8_t recoveries_ = 0;              ///< of the velocity, since a fix was accepted
   Jump jump_;
   checks::MagneticFieldCheck field_;
   BarometerZero baro_;

@@ -76,7 +76,7 @@ inline Innovation Inertial::fuse(const sensor::GnssPosition& fix, base::Micros s
   if (fix.fix < sensor::GnssFix::k2d || ctx.map_frame.origin == sensor::OriginSource::kNone) return {};
   const bool has_height = base::is_finite(fix.height_m);
   const nav::Local local = ctx.map_frame.frame.to_local(fix.latitude_2ndeg, fix.longitude_2ndeg,
-                                                    has_height ? fix.height_m : ctx.map_frame.frame.height_m());
+                                                        has_height ? fix.height_m : ctx.map_frame.frame.height_m());
   if (!local.valid) return {.verdict = sensor::Verdict::kNotFinite};
   const auto sigma = [&n](float own, float otherwise) {
     const float scaled = base::is_finite(own) ? n.sigma_scale * own : otherwise;
@@ -125,8 +125,10 @@ inline constexpr float kDecides = 4.0F;
   if (!(nis.joint < 1e30F && r(0) < 1e12F && r(2) < 1e12F)) return {.verdict = sensor::Verdict::kNotFinite};
   bool whole = nis.joint <= n.gate_scale * filter::chi_square_99(3);
   bool level = whole || nis.level <= n.gate_scale * filter::chi_square_99(2);
-  Innovation record{
-      .verdict = sensor::Verdict::kAccepted, .dof = 3, .nis = nis.joint, .gate = n.gate_scale * filter::chi_square_99(3)};
+  Innovation record{.verdict = sensor::Verdict::kAccepted,
+                    .dof = 3,
+                    .nis = nis.joint,
+                    .gate = n.gate_scale * filter::chi_square_99(3)};
   if (level && drifts(nu, r, nis, n, record)) whole = level = false;
   refused_or_not(kPosition, !level, stamp);
 
@@ -151,7 +153,9 @@ inline constexpr float kDecides = 4.0F;
   if (height) height_.forget();
 
   const float more =
-      n.correlation_s > 0.0F ? checks::kColouredNoiseInflation * checks::repeated(base::seconds(stamp - last_position_), n.correlation_s) : 1.0F;
+      n.correlation_s > 0.0F
+          ? checks::kColouredNoiseInflation * checks::repeated(base::seconds(stamp - last_position_), n.correlation_s)
+          : 1.0F;
   fix.sigma_horizontal_m *= base::sqrt(more);
   fix.sigma_vertical_m *= base::sqrt(more);
   if (!height) {                    // the horizontal part alone

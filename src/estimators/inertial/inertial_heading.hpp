@@ -39,7 +39,8 @@ inline Innovation Inertial::fuse(const sensor::OutsideHeading& heading, base::Mi
 
 /// The errors of a magnetometer last, so its headings never make the filter's better than sigma_rad: each is given the
 /// variance that would end there. While the heading is better known already, they are compared and nothing more.
-[[gnu::noinline]] inline Innovation Inertial::fuse(const sensor::MagneticFlux& flux, base::Micros stamp, const Context& ctx) {
+[[gnu::noinline]] inline Innovation Inertial::fuse(const sensor::MagneticFlux& flux, base::Micros stamp,
+                                                   const Context& ctx) {
   const param::MagneticParameters& n = ctx.parameters.magnetic;
   if (n.use == 0 || phase_ == Phase::kWaiting) return {};
   // In the body's axes at the state's time, that of the last IMU sample.

@@ -7,7 +7,8 @@
 
 namespace tetap::estimators {
 
-[[gnu::noinline]] inline Innovation Inertial::fuse(const sensor::AirPressure& air, base::Micros stamp, const Context& ctx) {
+[[gnu::noinline]] inline Innovation Inertial::fuse(const sensor::AirPressure& air, base::Micros stamp,
+                                                   const Context& ctx) {
   const param::BaroParameters& n = ctx.parameters.baro;
   if (n.use == 0 || phase_ != Phase::kTracking) return {};
   constexpr float kLeast_Pa = 22'700;  // the model ends at 11 km
@@ -26,7 +27,8 @@ namespace tetap::estimators {
   const float p_b = baro_.variance(altitude_m, n);
   const float nu = altitude_m - baro_.zero_m() - height_m;
   const float gate = n.gate_scale * filter::chi_square_99(1);
-  Innovation result{.verdict = sensor::Verdict::kRejected, .dof = 1, .nis = nu * nu / (p_z + p_b + white), .gate = gate};
+  Innovation result{
+      .verdict = sensor::Verdict::kRejected, .dof = 1, .nis = nu * nu / (p_z + p_b + white), .gate = gate};
   if (!(result.nis < 1e30F)) return {.verdict = sensor::Verdict::kNotFinite};
   if (result.nis > gate) {
     // A door, a hatch, a gust: pressure that stays different is a new zero.

@@ -204,7 +204,8 @@ inline void Inertial::stand(base::Micros stamp, const Context& ctx) {
     grounds_ = 0;
   }
   const bool wheels = have_counts_ && stamp - counts_time_ < kStandEvery;
-  const bool quiet = wheels ? stamp - moved_ > kQuiet && slip_.slip() == checks::WheelSlip::Slip::kNone : resting(stamp, ctx);
+  const bool quiet =
+      wheels ? stamp - moved_ > kQuiet && slip_.slip() == checks::WheelSlip::Slip::kNone : resting(stamp, ctx);
   ins_.stands = quiet && turn.squaredNorm() <= n.still_radps * n.still_radps;
   if (!ins_.stands) {
     still_.s = waiting_.s = 0;

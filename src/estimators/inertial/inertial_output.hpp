@@ -17,7 +17,8 @@ inline float Inertial::unseen_s2(float unseen_s) const {
 }
 
 /// From the time of the covariance to the present. In place: a pose needs little of it.
-[[gnu::always_inline]] inline nav::InsCovarianceStep<float> Inertial::step_ahead(const param::InertialParameters& n) const {
+[[gnu::always_inline]] inline nav::InsCovarianceStep<float> Inertial::step_ahead(
+    const param::InertialParameters& n) const {
   nav::InsCovarianceStep<float> step = ins_.step_to(now_x(), ahead_s());
   const float unseen_m2ps2 = unseen_s2(ahead_.place().unseen_s) * n.gap_mps2 * n.gap_mps2;
   const float turn_radps = unseen_turn_radps(n), half_s = 0.5F * ahead_s();

@@ -2,9 +2,9 @@
 // Inertial navigation, part: wheels, with the non-holonomic constraint.
 #pragma once
 
+#include "base/math.hpp"
 #include "estimators/inertial/inertial.hpp"
 #include "estimators/inertial/inertial_measure.hpp"
-#include "base/math.hpp"
 #include "model/wheel_speed.hpp"
 
 namespace tetap::estimators {
@@ -29,7 +29,8 @@ inline Innovation Inertial::fuse(const sensor::WheelCounts& counts, base::Micros
   gained_mps_ = 0;
   if (!usable) return {.verdict = sensor::Verdict::kAccepted};
   const float per_s = 1.0F / base::seconds(interval);
-  const checks::WheelSlip::Wheels wheels{.left_mps = drive.left_m(left) * per_s, .right_mps = drive.right_m(right) * per_s};
+  const checks::WheelSlip::Wheels wheels{.left_mps = drive.left_m(left) * per_s,
+                                         .right_mps = drive.right_m(right) * per_s};
   // One count over the interval; and what slip and radii make of the way since, as odometry has it (noise in m^2 per
   // m). The way is the filter's: by the counts', those that err to the slow side would count for more.
   const float count_mps = 0.41F * drive.left_m(1) * per_s;
@@ -57,8 +58,8 @@ inline Innovation Inertial::fuse(const sensor::BodySpeed& speed, base::Micros st
 
 /// Two wheels, as far as they roll: their mean; of one that rolls while the other spins, what the gyroscope leaves of
 /// it at the middle of the axle; of two that spin nothing.
-inline Innovation Inertial::roll(const checks::WheelSlip::Wheels& wheels, float sigma_mps, float later_mps, base::Micros stamp,
-                                 const Context& ctx) {
+inline Innovation Inertial::roll(const checks::WheelSlip::Wheels& wheels, float sigma_mps, float later_mps,
+                                 base::Micros stamp, const Context& ctx) {
   const param::InertialParameters& n = ctx.parameters.inertial;
   const float track_m = ctx.parameters.wheels.drive.track_m;
   if (!base::is_finite(wheels.left_mps) || !base::is_finite(wheels.right_mps))
@@ -95,7 +96,8 @@ inline Innovation Inertial::roll(const checks::WheelSlip::Wheels& wheels, float 
     return {.verdict = sensor::Verdict::kRejected};
   }
   if (!gyro) return {.verdict = sensor::Verdict::kRejected};
-  const float one = slip == checks::WheelSlip::Slip::kLeft ? wheels.right_mps - 0.5F * turn : wheels.left_mps + 0.5F * turn;
+  const float one =
+      slip == checks::WheelSlip::Slip::kLeft ? wheels.right_mps - 0.5F * turn : wheels.left_mps + 0.5F * turn;
   constexpr float kOne = 1.42F;  // of one wheel, not the mean of two
   const float alone = kOne * n.slip_share * v_b(0);
   return forward({.mps = one + later_mps, .sigma_mps = base::sqrt(2.0F * sigma_mps * sigma_mps + alone * alone)}, stamp,

@@ -4,8 +4,8 @@
 #pragma once
 
 #include "estimators/inertial/imu_cells.hpp"
-#include "sensor/row_major.hpp"
 #include "nav/strapdown.hpp"
+#include "sensor/row_major.hpp"
 
 #include <cstdint>
 #include <limits>
@@ -13,8 +13,9 @@
 namespace tetap::estimators {
 
 inline nav::ImuIncrement mounted(const nav::ImuIncrement& s, const param::InertialParameters& n) {
-  return {
-      .dtheta_b_rad = sensor::times(n.mounting_bs, s.dtheta_b_rad), .dv_b_mps = sensor::times(n.mounting_bs, s.dv_b_mps), .dt = s.dt};
+  return {.dtheta_b_rad = sensor::times(n.mounting_bs, s.dtheta_b_rad),
+          .dv_b_mps = sensor::times(n.mounting_bs, s.dv_b_mps),
+          .dt = s.dt};
 }
 
 class OutputPredictor {

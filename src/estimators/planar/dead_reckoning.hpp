@@ -5,10 +5,10 @@
 #pragma once
 
 #include "estimators/estimate.hpp"
-#include "param/parameters.hpp"
-#include "sensor/samples.hpp"
 #include "filter/ekf.hpp"
 #include "model/planar_increment.hpp"
+#include "param/parameters.hpp"
+#include "sensor/samples.hpp"
 
 #include <cstdint>
 

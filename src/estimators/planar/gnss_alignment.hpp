@@ -3,8 +3,8 @@
 // robot travel far enough, the direction of that travel in both frames gives the turn between them.
 #pragma once
 
-#include "estimators/context.hpp"
 #include "base/math.hpp"
+#include "estimators/context.hpp"
 #include "model/gnss_position.hpp"
 
 #include <optional>

@@ -114,8 +114,8 @@ class PoseEkf {
 };
 
 template <class Model>
-Innovation PoseEkf::measure(const Model& model, Source source, float gate_scale, base::Micros stamp,
-                            const Context& ctx, std::uint8_t landmark) {
+Innovation PoseEkf::measure(const Model& model, Source source, float gate_scale, base::Micros stamp, const Context& ctx,
+                            std::uint8_t landmark) {
   const auto result = motion_.filter.update(model, gate_scale * filter::chi_square_99(Model::kDimension));
   Refused& refused = refused_[source];
   if (result.verdict == filter::Verdict::kAccepted) {

@@ -11,10 +11,10 @@
 namespace tetap::drivers::gnss {
 namespace {
 
-using sensor::GnssFix;
 using fakes::ublox::Fix;
 using fakes::ublox::Instant;
 using fakes::ublox::Solution;
+using sensor::GnssFix;
 
 enum class Speaks { kKeys, kM8, kM6, kNmea };
 constexpr Speaks kAll[] = {Speaks::kKeys, Speaks::kM8, Speaks::kM6, Speaks::kNmea};
