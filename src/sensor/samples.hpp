@@ -64,7 +64,6 @@ struct GnssVelocity {
   float acc_mps = 0;  ///< 1 sigma per axis; NaN: not available
 };
 
-/// A landmark seen from the body: range, bearing (0 = ahead, counter-clockwise) or both; NaN: not measured.
 /// Magnetic flux density along the body's axes.
 struct MagneticFlux {
   std::array<float, 3> flux_b_uT{};
@@ -81,6 +80,7 @@ struct OutsideHeading {
   float acc_rad = 0;  ///< 1 sigma; NaN: not available
 };
 
+/// A landmark seen from the body: range, bearing (0 = ahead, counter-clockwise) or both; NaN: not measured.
 struct LandmarkSighting {
   std::uint8_t landmark = 0;
   float range_m = 0;
