@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A receiver that repeats its coordinates while the filter moves.
+// Frozen position: fixes that keep their coordinates to the last digit while the filter moves on.
 #pragma once
 
 #include "sensor/samples.hpp"
@@ -9,11 +9,11 @@
 
 namespace tetap::checks {
 
-/// Notices fixes that stay where they are, to the last digit, while the filter moves on.
 class FrozenPosition {
  public:
-  /// By how much the filter is off, as this fix says: of the same fix, it changes by what the filter moves.
-  bool hear(const sensor::GnssPosition& fix, float east_m, float north_m, float limit_m) {
+  /// (east, north): offset of the filter by this fix. While a receiver repeats a fix the offset changes by the filter's
+  /// own way; beyond `limit_m` of it the position is frozen.
+  bool update(const sensor::GnssPosition& fix, float east_m, float north_m, float limit_m) {
     const std::uint32_t coordinates = static_cast<std::uint32_t>(fix.latitude_2ndeg) +
                                       2'654'435'761U * static_cast<std::uint32_t>(fix.longitude_2ndeg) +
                                       40'503U * std::bit_cast<std::uint32_t>(fix.height_m);
@@ -38,8 +38,8 @@ class FrozenPosition {
   }
 
  private:
-  std::uint32_t coordinates_ = 0;
-  float east_m_ = 0, north_m_ = 0;
+  std::uint32_t coordinates_ = 0;   ///< hash of latitude, longitude and height
+  float east_m_ = 0, north_m_ = 0;  ///< offset at the first fix with these coordinates
   bool frozen_ = false;
 };
 

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which magnetic field is the Earth's: the one found first, of the strength that is configured where one is. A sample
-// whose strength or dip is another's is disturbed, and left out; another field becomes the known one when it has stayed
-// the same through a stretch of motion, which no magnet on the way does. And whether the magnetometer is believed.
+// Magnetic field against the Earth's. The known field is the first one found, of the configured strength where there is
+// one. A sample of another strength or dip is disturbed, and left out. Another field becomes the known one after it
+// stayed the same through a stretch of motion: no magnet on the way does that.
 #pragma once
 
 #include "base/math.hpp"
-#include "base/time.hpp"
-#include "sensor/magnetic_field.hpp"
+#include "checks/persistence.hpp"
+#include "param/parameters.hpp"
 
 #include <cstdint>
 
@@ -20,73 +20,74 @@ class MagneticFieldCheck {
     float up_uT = 0;
   };
 
-  /// How far the sample is from the known field: squared, in units of what is allowed; above 1 (or NaN): disturbed.
-  [[gnu::noinline]] float step(const Field& f, bool moving, base::Micros stamp, const param::MagneticParameters& n) {
+  /// Squared distance of the sample from the known field, in units of the allowed one; above 1 (or NaN): disturbed.
+  [[gnu::noinline]] float update(const Field& f, bool moving, base::Micros stamp, const param::MagneticParameters& n) {
     const base::Micros since = stamp - last_;
     last_ = stamp;
     renewed_ = false;
     const float off = compare(f, moving && since <= kGap ? base::seconds(since) : 0.0F, n);
-    if (!(off <= 1.0F) || since > kGap) since_ = stamp;
+    if (!(off <= 1.0F) || since > kGap) unchanged_since_ = stamp;
     return off;
   }
-
-  /// Another field has been taken for the known one by the last step().
+  /// The last update() made another field the known one.
   [[nodiscard]] bool renewed() const { return renewed_; }
 
-  /// Whether its headings are used. They stop to be when they have contradicted for `after` what better sensors say,
-  /// and are again when they have agreed for as long.
-  [[nodiscard]] bool believed() const { return !refused_; }
-  /// It is heard, and may have led the heading astray.
-  [[nodiscard]] bool misleads(base::Micros at) const { return refused_ && at - last_ <= kGap; }
-  /// True: it has contradicted for that long, or agreed while it was not believed.
-  [[nodiscard]] bool lasts(bool agrees, base::Micros stamp, base::Micros after) {
-    if (agrees == believed()) since_ = stamp;
-    return stamp - since_ >= after;
+  /// Headings are trusted until they have contradicted better sensors for `after`, and again when they have agreed for
+  /// as long.
+  [[nodiscard]] bool trusted() const { return !distrusted_; }
+  /// Samples come, are not trusted, and may have led the heading astray.
+  [[nodiscard]] bool may_mislead(base::Micros at) const { return distrusted_ && !older(last_, at, kGap); }
+  /// True: the magnetometer contradicted for that long, or agreed for as long while it was not trusted.
+  [[nodiscard]] bool trust_changes(bool agrees, base::Micros stamp, base::Micros after) {
+    if (agrees == trusted()) unchanged_since_ = stamp;
+    return stamp - unchanged_since_ >= after;
   }
-  void believe(bool agrees, base::Micros stamp) { refused_ = !agrees, since_ = stamp; }
+  void set_trusted(bool trusted, base::Micros stamp) { distrusted_ = !trusted, unchanged_since_ = stamp; }
+  /// Stamp of the last sample; 0: none.
+  [[nodiscard]] base::Micros last() const { return last_; }
 
   template <class Sink>
   void hash_state(Sink&& sink) const {
-    for (const Field& f : {field_, other_}) {
+    for (const Field& f : {known_field_, other_field_}) {
       sink(f.horizontal_uT);
       sink(f.up_uT);
     }
     sink(other_s_);
     sink(last_.us);
-    sink(since_.us);
-    sink(static_cast<std::uint32_t>((known_ ? 1U : 0U) | (refused_ ? 2U : 0U)));
+    sink(unchanged_since_.us);
+    sink(static_cast<std::uint32_t>((known_ ? 1U : 0U) | (distrusted_ ? 2U : 0U)));
   }
 
  private:
-  static constexpr base::Micros kGap{1'000'000};
+  static constexpr base::Micros kGap{1'000'000};  ///< a longer silence ends every comparison
 
   float compare(const Field& f, float moved_s, const param::MagneticParameters& n) {
     if (!known_) {
       const float off = strength_apart(f, n);
-      if (off <= 1.0F) field_ = other_ = f, known_ = true;
+      if (off <= 1.0F) known_field_ = other_field_ = f, known_ = true;
       return off;
     }
-    const float off = apart(f, field_, n);
+    const float off = apart(f, known_field_, n);
     if (off <= 1.0F) {
       other_s_ = 0;
       return off;
     }
-    if (!(apart(f, other_, n) <= 1.0F && strength_apart(f, n) <= 1.0F)) {
-      other_ = f;
+    if (!(apart(f, other_field_, n) <= 1.0F && strength_apart(f, n) <= 1.0F)) {
+      other_field_ = f;
       other_s_ = 0;
       return off;
     }
     constexpr float kShare = 0.02F;
-    other_.horizontal_uT += kShare * (f.horizontal_uT - other_.horizontal_uT);
-    other_.up_uT += kShare * (f.up_uT - other_.up_uT);
+    other_field_.horizontal_uT += kShare * (f.horizontal_uT - other_field_.horizontal_uT);
+    other_field_.up_uT += kShare * (f.up_uT - other_field_.up_uT);
     other_s_ += moved_s;
     if (other_s_ < n.field_new_s) return off;
-    field_ = other_;
+    known_field_ = other_field_;
     other_s_ = 0;
     renewed_ = true;
-    return apart(f, field_, n);
+    return apart(f, known_field_, n);
   }
-  /// Squared as well.
+  /// Squared distance from the configured strength; 0 where none is configured.
   static float strength_apart(const Field& f, const param::MagneticParameters& n) {
     if (!(n.norm_uT > 0.0F)) return 0.0F;
     const float norm = base::sqrt(f.horizontal_uT * f.horizontal_uT + f.up_uT * f.up_uT);
@@ -103,10 +104,11 @@ class MagneticFieldCheck {
     return strength * strength + dip * dip;
   }
 
-  Field field_, other_;
-  float other_s_ = 0;
-  bool known_ = false, refused_ = false, renewed_ = false;
-  base::Micros last_, since_;
+  Field known_field_, other_field_;  ///< the second: a disturbed one that lasts
+  float other_s_ = 0;                ///< time in motion that the other field has lasted
+  bool known_ = false, distrusted_ = false, renewed_ = false;
+  base::Micros last_;             ///< stamp of the last sample; 0: none
+  base::Micros unchanged_since_;  ///< last stamp at which the trust was as it should be, or the field disturbed
 };
 
 }  // namespace tetap::checks

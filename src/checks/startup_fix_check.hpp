@@ -1,20 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
-// Fixes before the filter begins: they count when they follow each other plausibly.
+// First fixes, before there is a filter: they count when so many in a row follow each other no faster than anything
+// drives. A first fix that is a glitch starts nothing.
 #pragma once
 
 #include "base/math.hpp"
-#include "base/time.hpp"
+#include "base/trig.hpp"
 #include "sensor/samples.hpp"
 
 #include <cstdint>
 
 namespace tetap::checks {
 
-/// Before there is a filter: fixes count when so many in a row follow each other no faster than anything drives. A
-/// first fix that is a glitch begins nothing.
 class StartupFixCheck {
  public:
-  [[gnu::noinline]] bool hear(const sensor::GnssPosition& fix, base::Micros stamp, std::int32_t needed) {
+  /// True when this fix is at least the `needed`-th in a row.
+  [[gnu::noinline]] bool update(const sensor::GnssPosition& fix, base::Micros stamp, std::int32_t needed) {
     const float sigma_m = base::is_finite(fix.horizontal_acc_m) ? fix.horizontal_acc_m : 10.0F;
     const float far_m = 4.0F * sigma_m + kFastest_mps * base::seconds(stamp - last_);
     const float north_m = metres(fix.latitude_2ndeg - latitude_2ndeg_);
@@ -28,7 +28,6 @@ class StartupFixCheck {
     last_ = stamp;
     return fixes_ >= needed;
   }
-  void forget() { *this = {}; }
 
   template <class Sink>
   void hash_state(Sink&& sink) const {
@@ -42,9 +41,9 @@ class StartupFixCheck {
   static constexpr float kFastest_mps = 60;
   static float metres(std::int64_t d_2ndeg) { return static_cast<float>(d_2ndeg) * (2e-9F * 111'320.0F); }
 
-  std::int64_t latitude_2ndeg_ = 0, longitude_2ndeg_ = 0;
-  base::Micros last_;
-  std::int32_t fixes_ = 0;
+  std::int64_t latitude_2ndeg_ = 0, longitude_2ndeg_ = 0;  ///< of the last fix
+  base::Micros last_;                                      ///< stamp of the last fix; 0: none
+  std::int32_t fixes_ = 0;                                 ///< in a row
 };
 
 }  // namespace tetap::checks

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// A sensor that shows to the last bit what it showed before, again and again: stuck. One whose noise spans the steps of
-// the bus does that a few times by chance, and not fifty; one that is finer does it at rest.
+// Repeated readings: a sensor whose noise spans the steps of its interface repeats a value by chance a few times, not
+// ten or fifty; one that does is stuck.
 #pragma once
 
-#include "base/time.hpp"
+#include "checks/persistence.hpp"
 
 #include <array>
 #include <cstddef>
@@ -11,32 +11,64 @@
 
 namespace tetap::checks {
 
+/// Counts readings in a row that differ from the one before by no more than `step` on every axis.
 template <std::size_t kSize>
-class StuckValue {
+class RepeatCounter {
  public:
-  /// Finite readings. True when this one is the n-th repetition or beyond; n = 0: never.
-  bool hear(const std::array<float, kSize>& now, std::int32_t n, base::Micros stamp) {
-    bool same = true;
-    for (std::size_t i = 0; i < kSize; ++i) same = same && now[i] <= last_[i] && now[i] >= last_[i];
-    last_ = now;
-    heard_ = stamp;
-    times_ = same ? static_cast<std::uint8_t>(times_ < 255 ? times_ + 1 : 255) : std::uint8_t{0};
-    stuck_ = n > 0 && times_ >= n;
-    return stuck_;
+  using Reading = std::array<float, kSize>;
+
+  [[nodiscard]] static bool alike(const Reading& a, const Reading& b, float step) {
+    for (std::size_t i = 0; i < kSize; ++i)
+      if (a[i] - b[i] > step || b[i] - a[i] > step) return false;
+    return true;
   }
-  /// The last that was heard, of late, was so.
-  [[nodiscard]] bool stuck(base::Micros at) const { return stuck_ && at - heard_ < base::Micros{2'000'000}; }
+  /// Finite readings. True from the n-th repetition on; n = 0: never.
+  bool update(const Reading& now, float step, std::int32_t n) {
+    count_ = alike(last_, now, step) ? static_cast<std::uint8_t>(count_ < 255 ? count_ + 1 : 255) : std::uint8_t{0};
+    last_ = now;
+    return n > 0 && count_ >= n;
+  }
+  /// The last reading was `reading`, and repeated nothing.
+  void restart(const Reading& reading) {
+    last_ = reading;
+    count_ = 0;
+  }
   template <class Sink>
   void hash_state(Sink&& sink) const {
-    sink(heard_.us);
     for (const float v : last_) sink(v);
-    sink(static_cast<std::uint32_t>(times_ | (stuck_ ? 256U : 0U)));
+    sink(std::uint32_t{count_});
   }
 
  private:
-  base::Micros heard_;
-  std::array<float, kSize> last_{};
-  std::uint8_t times_ = 0;
+  Reading last_{};
+  std::uint8_t count_ = 0;
+};
+
+/// The same to the last bit, with the time of the last reading.
+template <std::size_t kSize>
+class StuckValue {
+ public:
+  /// Finite readings. True from the n-th repetition on; n = 0: never.
+  bool update(const std::array<float, kSize>& now, std::int32_t n, base::Micros stamp) {
+    last_ = stamp;
+    stuck_ = repeats_.update(now, 0.0F, n);
+    return stuck_;
+  }
+  /// The last reading is at most two seconds old and was a stuck one.
+  [[nodiscard]] bool stuck(base::Micros at) const { return stuck_ && recent(last_, at, kFresh); }
+  [[nodiscard]] base::Micros last() const { return last_; }
+  template <class Sink>
+  void hash_state(Sink&& sink) const {
+    sink(last_.us);
+    repeats_.hash_state(sink);
+    sink(static_cast<std::uint32_t>(stuck_));
+  }
+
+ private:
+  static constexpr base::Micros kFresh{2'000'000};
+
+  base::Micros last_;  ///< stamp of the last reading
+  RepeatCounter<kSize> repeats_;
   bool stuck_ = false;
 };
 

@@ -4,6 +4,7 @@
 // its state is large: the present is the far end of the window, turned on by what the gyroscope says in it.
 #pragma once
 
+#include "checks/imu_classifier.hpp"
 #include "estimators/context.hpp"
 #include "estimators/estimate.hpp"
 #include "filter/attitude.hpp"
@@ -56,7 +57,6 @@ class Attitude {
  private:
   static constexpr base::Micros kSilent{500'000};
   /// Between the stamps of samples that follow each other; drivers' clocks jitter.
-  static constexpr base::Micros kJitter{1'500};
   /// The filter's longest step: the gyroscope is taken to have shown the same throughout.
   static constexpr base::Micros kBridged{200'000};
   static constexpr float kFastest_radps = 100;  ///< beyond is no turn but nonsense, as in the filter
@@ -81,7 +81,7 @@ inline Innovation Attitude::fuse(const sensor::ImuSample& sample, base::Micros s
   const filter::Vector3 rate = per_s * body(sample.dangle_b_rad);
   // Samples that were lost: while there are few, the turn was most likely this one's.
   const base::Micros span = stamp - time_;
-  const bool gap = filter_.started() && span > interval + kJitter;
+  const bool gap = filter_.started() && checks::ImuClassifier::is_gap(span - interval);
   const bool lost = gap && span > kBridged;
   const auto verdict = filter_.step(rate, per_s * body(sample.dvelocity_b_mps),
                                     base::seconds(gap && !lost ? span : interval), sample.clipped_accel == 0);

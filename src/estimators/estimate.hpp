@@ -10,6 +10,7 @@
 #include "model/planar_pose.hpp"
 #include "nav/ins_covariance_entry.hpp"
 #include "nav/ins_state.hpp"
+#include "sensor/source_state.hpp"
 #include "sensor/vocabulary.hpp"
 
 #include <array>
@@ -37,7 +38,8 @@ struct MotionVariance {
   float yaw_rate_rad2ps2 = base::kNan;  ///< of Estimate::yaw_rate_radps
 };
 
-/// An estimator's own step that nothing measured: it found itself wrong, and went where its sensors had been for long.
+/// An estimator's own step that nothing measured: it found itself wrong, and went where its sensors had been for
+/// long.
 struct Jump {
   float east_m = 0;
   float north_m = 0;
@@ -98,6 +100,9 @@ struct Innovation {
   float nis = 0;
   float gate = 0;
   std::uint8_t landmark = 0xFF;
+  sensor::Check failed = sensor::Check::kNone;  ///< test that refused the measurement
+  float statistic = 0;                          ///< statistic of that test, where it is not the innovation gate
+  float limit = 0;                              ///< limit of that statistic
 };
 
 /// The filter's record in the bus's words.

@@ -95,10 +95,7 @@ class Ins {
   /// else that it knows stays.
   void place(const base::Anchored& east, const base::Anchored& north, float sigma_m) {
     x.x = east, x.y = north;
-    for (const int i : {InsState::kPosition, InsState::kPosition + 1}) {
-      for (int j = 0; j < kErrors; ++j) p(i, j) = 0.0F;
-      p(i, i) = sigma_m * sigma_m;
-    }
+    for (const int i : {InsState::kPosition, InsState::kPosition + 1}) reset(i, sigma_m * sigma_m);
     condition(p, watch_);
   }
 
@@ -153,8 +150,35 @@ class Ins {
     return start_with_p(at);
   }
 
-  /// After p was written to from outside.
+  /// One error may be larger than the covariance has it, by this variance.
+  void inflate(int error, float variance) { p(error, error) += variance; }
+  /// One error is no longer correlated with anything, and has this variance; recondition() after the last one.
+  void reset(int error, float variance) {
+    for (int j = 0; j < kErrors; ++j) p(error, j) = 0.0F;
+    p(error, error) = variance;
+  }
   void recondition() { condition(p, watch_); }
+
+  /// Update by the gyroscope's mean over a standstill whose noise is also in the heading: `shared` is the covariance of
+  /// the two per axis of the bias, `wander` the variance of each bias's walk since the mean (Bar-Shalom, Li,
+  /// Kirubarajan 2001, sec. 8.3). The covariance is up to date.
+  template <filter::MeasurementModel<InsState> Measurement>
+  [[nodiscard]] filter::Innovation<float, Measurement::kDimension> update_shared_noise(const Measurement& measurement,
+                                                                                       float gate,
+                                                                                       const Vector3& shared,
+                                                                                       const Vector3& wander) {
+    constexpr int kYaw = InsState::kAttitude + 2, kBias = InsState::kGyroBias;
+    for (int i = 0; i < 3; ++i) {
+      p(kBias + i, kBias + i) -= wander(i);
+      p(kYaw, kBias + i) -= shared(i);
+    }
+    const auto result = update(measurement, gate);
+    for (int i = 0; i < 3; ++i) {
+      p(kYaw, kBias + i) += shared(i);
+      p(kBias + i, kBias + i) += wander(i);
+    }
+    return result;
+  }
 
   /// The covariance, and what is to be added to it still.
   template <class Sink>

@@ -25,11 +25,11 @@ constexpr std::int32_t kPersist_us = 60'000'000, kPersistFixes = 120;
 class Speaker {
  public:
   template <class Off>
-  void speak(OffsetHypothesis& claim, int fixes, Off&& off, float sigma_m = 1, float filter_m2 = 0) {
+  void speak(OffsetHypothesis& hypothesis, int fixes, Off&& off, float sigma_m = 1, float filter_m2 = 0) {
     for (int i = 0; i < fixes; ++i, now += kPeriod) {
       const auto [east, north] = off(base::seconds(now));
-      claim.hear(now, east + sigma_m * normal_(engine_), north + sigma_m * normal_(engine_), sigma_m * sigma_m,
-                 filter_m2);
+      hypothesis.update(now, east + sigma_m * normal_(engine_), north + sigma_m * normal_(engine_), sigma_m * sigma_m,
+                        filter_m2);
     }
   }
   base::Micros now;
@@ -42,51 +42,51 @@ using Off = std::array<float, 2>;
 constexpr auto kFar = [](float) { return Off{100, -30}; };
 
 TEST(OffsetHypothesis, PersistsWhenItIsRepeatedForLongEnoughAndOftenEnough) {
-  OffsetHypothesis claim;
+  OffsetHypothesis hypothesis;
   Speaker speaker;
-  speaker.speak(claim, 300, kFar);
-  EXPECT_FALSE(claim.persisted(kPersist_us, kPersistFixes)) << "59.8 s";
-  speaker.speak(claim, 1, kFar);
-  EXPECT_TRUE(claim.persisted(kPersist_us, kPersistFixes));
-  EXPECT_NEAR(claim.east_m(), 100.0F, 0.3F) << "the mean of what they said";
-  EXPECT_NEAR(claim.north_m(), -30.0F, 0.3F);
-  EXPECT_FALSE(claim.persisted(kPersist_us, 302)) << "not often enough";
+  speaker.speak(hypothesis, 300, kFar);
+  EXPECT_FALSE(hypothesis.persisted(base::Micros{kPersist_us}, kPersistFixes)) << "59.8 s";
+  speaker.speak(hypothesis, 1, kFar);
+  EXPECT_TRUE(hypothesis.persisted(base::Micros{kPersist_us}, kPersistFixes));
+  EXPECT_NEAR(hypothesis.east_m(), 100.0F, 0.3F) << "the mean of what they said";
+  EXPECT_NEAR(hypothesis.north_m(), -30.0F, 0.3F);
+  EXPECT_FALSE(hypothesis.persisted(base::Micros{kPersist_us}, 302)) << "not often enough";
 }
 
 TEST(OffsetHypothesis, ARampNeverPersistsHoweverLongItLasts) {
   for (const float speed_mps : {0.2F, 1.0F, 10.0F}) {
-    OffsetHypothesis claim;
+    OffsetHypothesis hypothesis;
     Speaker speaker;
     for (int i = 0; i < 3000; ++i) {
-      speaker.speak(claim, 1, [&](float t) { return Off{0, speed_mps * t}; });
-      ASSERT_FALSE(claim.persisted(kPersist_us, kPersistFixes)) << speed_mps << " m/s after " << i;
+      speaker.speak(hypothesis, 1, [&](float t) { return Off{0, speed_mps * t}; });
+      ASSERT_FALSE(hypothesis.persisted(base::Micros{kPersist_us}, kPersistFixes)) << speed_mps << " m/s after " << i;
     }
   }
 }
 
 TEST(OffsetHypothesis, WhatHoldsAfterARampPersistsFromThenOn) {
-  OffsetHypothesis claim;
+  OffsetHypothesis hypothesis;
   Speaker speaker;
   const auto ramp = [](float t) { return Off{0, t < 40 ? t : 40}; };
-  speaker.speak(claim, 200, ramp);
-  speaker.speak(claim, 250, ramp);
-  EXPECT_FALSE(claim.persisted(kPersist_us, kPersistFixes)) << "90 s, but only 50 s the same";
-  speaker.speak(claim, 70, ramp);
-  EXPECT_TRUE(claim.persisted(kPersist_us, kPersistFixes));
-  EXPECT_NEAR(claim.north_m(), 40.0F, 1.0F);
+  speaker.speak(hypothesis, 200, ramp);
+  speaker.speak(hypothesis, 250, ramp);
+  EXPECT_FALSE(hypothesis.persisted(base::Micros{kPersist_us}, kPersistFixes)) << "90 s, but only 50 s the same";
+  speaker.speak(hypothesis, 70, ramp);
+  EXPECT_TRUE(hypothesis.persisted(base::Micros{kPersist_us}, kPersistFixes));
+  EXPECT_NEAR(hypothesis.north_m(), 40.0F, 1.0F);
 }
 
 TEST(OffsetHypothesis, AFewThatContradictItAreLeftOutManyBeginAnother) {
-  OffsetHypothesis claim;
+  OffsetHypothesis hypothesis;
   Speaker speaker;
-  speaker.speak(claim, 100, kFar);
-  speaker.speak(claim, 4, [](float) { return Off{-500, 0}; });
-  speaker.speak(claim, 200, kFar);
-  EXPECT_TRUE(claim.persisted(kPersist_us, kPersistFixes));
-  EXPECT_NEAR(claim.east_m(), 100.0F, 0.3F) << "what contradicts is not in the mean";
-  speaker.speak(claim, 5, [](float) { return Off{-500, 0}; });
-  EXPECT_FALSE(claim.confirmed(2));
-  EXPECT_NEAR(claim.east_m(), -500.0F, 5.0F);
+  speaker.speak(hypothesis, 100, kFar);
+  speaker.speak(hypothesis, 4, [](float) { return Off{-500, 0}; });
+  speaker.speak(hypothesis, 200, kFar);
+  EXPECT_TRUE(hypothesis.persisted(base::Micros{kPersist_us}, kPersistFixes));
+  EXPECT_NEAR(hypothesis.east_m(), 100.0F, 0.3F) << "what contradicts is not in the mean";
+  speaker.speak(hypothesis, 5, [](float) { return Off{-500, 0}; });
+  EXPECT_FALSE(hypothesis.confirmed(2));
+  EXPECT_NEAR(hypothesis.east_m(), -500.0F, 5.0F);
 }
 
 TEST(OffsetHypothesis, TheFilterMayDriftMeanwhileByItsOwnUncertaintyAndNoFurther) {
@@ -95,20 +95,20 @@ TEST(OffsetHypothesis, TheFilterMayDriftMeanwhileByItsOwnUncertaintyAndNoFurther
   Speaker speaker;
   for (int i = 0; i < 301; ++i, speaker.now += kPeriod) {
     const float t = base::seconds(speaker.now), off = drift(t)[0];
-    judged.hear(speaker.now, off, 0, 1.0F, 4.0F);
-    excused.hear(speaker.now, off, 0, 1.0F, 4.0F + 0.1F * t * t);
+    judged.update(speaker.now, off, 0, 1.0F, 4.0F);
+    excused.update(speaker.now, off, 0, 1.0F, 4.0F + 0.1F * t * t);
   }
-  EXPECT_FALSE(judged.persisted(kPersist_us, kPersistFixes));
-  EXPECT_TRUE(excused.persisted(kPersist_us, kPersistFixes));
+  EXPECT_FALSE(judged.persisted(base::Micros{kPersist_us}, kPersistFixes));
+  EXPECT_TRUE(excused.persisted(base::Micros{kPersist_us}, kPersistFixes));
 }
 
 TEST(OffsetHypothesis, SaysWhatAnotherSaidWithinTheirUncertainty) {
-  OffsetHypothesis claim;
+  OffsetHypothesis hypothesis;
   Speaker speaker;
-  speaker.speak(claim, 20, kFar);
-  EXPECT_TRUE(claim.says(101, -31, 2));
-  EXPECT_FALSE(claim.says(107, -30, 2));
-  EXPECT_FALSE(claim.says(-100, 30, 2));
+  speaker.speak(hypothesis, 20, kFar);
+  EXPECT_TRUE(hypothesis.agrees(101, -31, 2));
+  EXPECT_FALSE(hypothesis.agrees(107, -30, 2));
+  EXPECT_FALSE(hypothesis.agrees(-100, 30, 2));
 }
 
 sensor::GnssPosition fix_at(std::int64_t latitude_2ndeg, std::int64_t longitude_2ndeg, float height_m = 500) {
@@ -125,22 +125,22 @@ constexpr double kMetre_2ndeg = 1 / (2e-9 * 111'320);  ///< to the north
 TEST(FrozenPosition, TheSameCoordinatesAreFrozenOnceTheFilterHasMovedOn) {
   FrozenPosition frozen;
   const sensor::GnssPosition same = fix_at(kLatitude, kLongitude);
-  EXPECT_FALSE(frozen.hear(same, 0.3F, 0.0F, 0.5F));
-  EXPECT_FALSE(frozen.hear(same, -0.1F, 0.0F, 0.5F)) << "0.4 m";
-  EXPECT_TRUE(frozen.hear(same, -0.3F, 0.0F, 0.5F)) << "0.6 m";
-  EXPECT_TRUE(frozen.hear(same, 0.3F, 0.0F, 0.5F)) << "a robot that comes back thaws nothing";
-  EXPECT_FALSE(frozen.hear(fix_at(kLatitude, kLongitude + 1), -3.0F, 0.0F, 0.5F)) << "the last digit differs";
+  EXPECT_FALSE(frozen.update(same, 0.3F, 0.0F, 0.5F));
+  EXPECT_FALSE(frozen.update(same, -0.1F, 0.0F, 0.5F)) << "0.4 m";
+  EXPECT_TRUE(frozen.update(same, -0.3F, 0.0F, 0.5F)) << "0.6 m";
+  EXPECT_TRUE(frozen.update(same, 0.3F, 0.0F, 0.5F)) << "a robot that comes back thaws nothing";
+  EXPECT_FALSE(frozen.update(fix_at(kLatitude, kLongitude + 1), -3.0F, 0.0F, 0.5F)) << "the last digit differs";
   EXPECT_FALSE(frozen.frozen());
 }
 
 TEST(FrozenPosition, StandingStillIsNotFrozenAndEachCoordinateCounts) {
   FrozenPosition frozen;
-  for (int i = 0; i < 1000; ++i) EXPECT_FALSE(frozen.hear(fix_at(kLatitude, kLongitude), 1.0F, 2.0F, 0.5F));
+  for (int i = 0; i < 1000; ++i) EXPECT_FALSE(frozen.update(fix_at(kLatitude, kLongitude), 1.0F, 2.0F, 0.5F));
   for (int i = 1; i < 30; ++i) {
     const auto off = static_cast<float>(i);
-    EXPECT_FALSE(frozen.hear(fix_at(kLatitude + i, kLongitude), off, 0, 0.5F));
-    EXPECT_FALSE(frozen.hear(fix_at(kLatitude + i, kLongitude - i - 1), off + 0.9F, 0, 0.5F));
-    EXPECT_FALSE(frozen.hear(fix_at(kLatitude + i, kLongitude - i - 1, off), off, 0, 0.5F));
+    EXPECT_FALSE(frozen.update(fix_at(kLatitude + i, kLongitude), off, 0, 0.5F));
+    EXPECT_FALSE(frozen.update(fix_at(kLatitude + i, kLongitude - i - 1), off + 0.9F, 0, 0.5F));
+    EXPECT_FALSE(frozen.update(fix_at(kLatitude + i, kLongitude - i - 1, off), off, 0, 0.5F));
   }
 }
 
@@ -148,9 +148,9 @@ TEST(FrozenPosition, StandingStillIsNotFrozenAndEachCoordinateCounts) {
 class Drifting {
  public:
   explicit Drifting(float sigma_m) : sigma_m_(sigma_m) {}
-  float hear(float off_m, float filter_m2 = 0) {
-    fixes.hear(sigma_m_ * normal_(engine_), off_m + sigma_m_ * normal_(engine_));
-    return fixes.nis(sigma_m_ * sigma_m_, filter_m2, filter_m2);
+  float add(float off_m, float filter_m2 = 0) {
+    fixes.update(sigma_m_ * normal_(engine_), off_m + sigma_m_ * normal_(engine_));
+    return fixes.statistic(sigma_m_ * sigma_m_, filter_m2, filter_m2);
   }
   PositionDrift fixes;
 
@@ -162,12 +162,12 @@ class Drifting {
 
 TEST(PositionDrift, IsChiSquareWhereEveryErrorIsNew) {
   Drifting drifting(1.5F);
-  for (int i = 0; i < 200; ++i) drifting.hear(0);
+  for (int i = 0; i < 200; ++i) drifting.add(0);
   constexpr int kFixes = 200'000;
   double sum = 0;
   int above = 0;
   for (int i = 0; i < kFixes; ++i) {
-    const float nis = drifting.hear(0);
+    const float nis = drifting.add(0);
     sum += static_cast<double>(nis);
     above += nis > kChiSquare999Of2 ? 1 : 0;
   }
@@ -178,22 +178,22 @@ TEST(PositionDrift, IsChiSquareWhereEveryErrorIsNew) {
 
 TEST(PositionDrift, ARampIsNoticedBeforeOneFixLeavesItsGateAndWhatStaysPassesAway) {
   Drifting drifting(1.5F);
-  for (int i = 0; i < 200; ++i) drifting.hear(0);
+  for (int i = 0; i < 200; ++i) drifting.add(0);
   int noticed = 0;
-  while (noticed < 100 && drifting.hear(0.2F * static_cast<float>(noticed)) <= kChiSquare999Of2) ++noticed;
+  while (noticed < 100 && drifting.add(0.2F * static_cast<float>(noticed)) <= kChiSquare999Of2) ++noticed;
   EXPECT_GT(noticed, 3) << "at 5 Hz and 1 m/s";
   EXPECT_LT(noticed, 22) << "4.5 m: the gate of one, 99 %";
   const float there_m = 0.2F * static_cast<float>(noticed);
-  for (int i = 0; i < 100; ++i) drifting.hear(there_m);
-  EXPECT_LT(drifting.hear(there_m), kChiSquare999Of2) << "it has been there for 20 s";
+  for (int i = 0; i < 100; ++i) drifting.add(there_m);
+  EXPECT_LT(drifting.add(there_m), kChiSquare999Of2) << "it has been there for 20 s";
 }
 
 TEST(PositionDrift, WhatTheFilterDoesNotKnowMayBeTheReason) {
   Drifting sure(1.0F), unsure(1.0F);
   float of_sure = 0, of_unsure = 0;
   for (int i = 0; i < 20; ++i) {
-    of_sure = sure.hear(0.2F * static_cast<float>(i));
-    of_unsure = unsure.hear(0.2F * static_cast<float>(i), 4.0F);
+    of_sure = sure.add(0.2F * static_cast<float>(i));
+    of_unsure = unsure.add(0.2F * static_cast<float>(i), 4.0F);
   }
   EXPECT_GT(of_sure, kChiSquare999Of2);
   EXPECT_LT(of_unsure, 2.0F);
@@ -201,34 +201,34 @@ TEST(PositionDrift, WhatTheFilterDoesNotKnowMayBeTheReason) {
 
 TEST(PositionDrift, EachAxisIsJudgedByItsOwnVariance) {
   PositionDrift east, north;
-  for (int i = 0; i < 10; ++i) east.hear(3, 0), north.hear(0, 3);
-  EXPECT_GT(east.nis(1, 0.01F, 100), kChiSquare999Of2);
-  EXPECT_LT(east.nis(1, 100, 0.01F), 1.0F);
-  EXPECT_GT(north.nis(1, 100, 0.01F), kChiSquare999Of2);
-  EXPECT_LT(north.nis(1, 0.01F, 100), 1.0F);
+  for (int i = 0; i < 10; ++i) east.update(3, 0), north.update(0, 3);
+  EXPECT_GT(east.statistic(1, 0.01F, 100), kChiSquare999Of2);
+  EXPECT_LT(east.statistic(1, 100, 0.01F), 1.0F);
+  EXPECT_GT(north.statistic(1, 100, 0.01F), kChiSquare999Of2);
+  EXPECT_LT(north.statistic(1, 0.01F, 100), 1.0F);
 }
 
 TEST(PositionDrift, AVelocityVouchesForAFewFixes) {
   PositionDrift fixes;
-  EXPECT_FALSE(fixes.vouched_for()) << "none was heard";
+  EXPECT_FALSE(fixes.take_vouch()) << "none was heard";
   fixes.velocity(true);
-  for (int i = 0; i < 5; ++i) EXPECT_TRUE(fixes.vouched_for()) << "one a second, fixes five: " << i;
+  for (int i = 0; i < 5; ++i) EXPECT_TRUE(fixes.take_vouch()) << "one a second, fixes five: " << i;
   fixes.velocity(false);
-  EXPECT_FALSE(fixes.vouched_for());
+  EXPECT_FALSE(fixes.take_vouch());
   fixes.velocity(true);
   int vouched = 0;
-  while (vouched < 100 && fixes.vouched_for()) ++vouched;
+  while (vouched < 100 && fixes.take_vouch()) ++vouched;
   EXPECT_LT(vouched, 20) << "it has ended";
   fixes.velocity(true);
-  fixes.forget();
-  EXPECT_FALSE(fixes.vouched_for());
+  fixes.reset();
+  EXPECT_FALSE(fixes.take_vouch());
 }
 
 TEST(StartupFixCheck, CountWhenSoManyFollowEachOther) {
   StartupFixCheck first;
   base::Micros now{1'000'000};
   for (int i = 1; i <= 10; ++i, now += kPeriod)
-    EXPECT_EQ(first.hear(fix_at(kLatitude + i, kLongitude), now, 5), i >= 5) << i;
+    EXPECT_EQ(first.update(fix_at(kLatitude + i, kLongitude), now, 5), i >= 5) << i;
 }
 
 TEST(StartupFixCheck, AGlitchFirstOrInTheMiddleBeginsNothing) {
@@ -238,7 +238,7 @@ TEST(StartupFixCheck, AGlitchFirstOrInTheMiddleBeginsNothing) {
     for (int i = 1; i <= 20; ++i, now += kPeriod) {
       const auto off = static_cast<std::int64_t>(i == glitch ? 100 * kMetre_2ndeg : 0);
       const int after = i > glitch ? i - glitch : 0;
-      EXPECT_EQ(first.hear(fix_at(kLatitude, kLongitude + off), now, 5), after >= 5) << i;
+      EXPECT_EQ(first.update(fix_at(kLatitude, kLongitude + off), now, 5), after >= 5) << i;
     }
   }
 }
@@ -249,8 +249,8 @@ TEST(StartupFixCheck, MayComeFromACarAndFromSlowReceivers) {
     bool counts = false;
     for (int i = 0; i < 5; ++i) {
       const double way_m = 40e-6 * static_cast<double>(i * period_us);
-      counts = first.hear(fix_at(kLatitude + static_cast<std::int64_t>(way_m * kMetre_2ndeg), kLongitude),
-                          {1'000'000 + i * period_us}, 5);
+      counts = first.update(fix_at(kLatitude + static_cast<std::int64_t>(way_m * kMetre_2ndeg), kLongitude),
+                            {1'000'000 + i * period_us}, 5);
     }
     EXPECT_TRUE(counts);
   }

@@ -38,16 +38,16 @@ class Sensor {
     s.dvelocity_b_mps[2] += (9.81F + force_mps2 * wave) * dt_s;
     return last_ = s;
   }
-  bool hear() {
+  bool update() {
     const sensor::ImuSample sample = next();
-    return watch.hear(sample, {us}, n);
+    return watch.update(sample, {us}, n);
   }
-  bool hear_again() {
+  bool repeat() {
     us += 1'000'000 / rate_hz_;
-    return watch.hear(last_, {us}, n);
+    return watch.update(last_, {us}, n);
   }
   void run(double s) {
-    for (int i = 0; i < std::lround(s * rate_hz_); ++i) hear();
+    for (int i = 0; i < std::lround(s * rate_hz_); ++i) update();
   }
 
  private:
@@ -60,11 +60,11 @@ class Sensor {
 TEST(ImuHealth, ASampleRepeatedTenTimesIsOneOfAStuckSensorUntilItShowsAnother) {
   Sensor s;
   s.run(1);
-  for (int i = 1; i < s.n.stuck_samples; ++i) EXPECT_TRUE(s.hear_again()) << i;
-  EXPECT_FALSE(s.hear_again());
+  for (int i = 1; i < s.n.stuck_samples; ++i) EXPECT_TRUE(s.repeat()) << i;
+  EXPECT_FALSE(s.repeat());
   EXPECT_TRUE(s.watch.stuck());
-  for (int i = 0; i < 1000; ++i) ASSERT_FALSE(s.hear_again());
-  EXPECT_TRUE(s.hear());
+  for (int i = 0; i < 1000; ++i) ASSERT_FALSE(s.repeat());
+  EXPECT_TRUE(s.update());
   EXPECT_FALSE(s.watch.stuck());
   EXPECT_TRUE(s.watch.stuck_lately({s.us + 500'000}));
   EXPECT_FALSE(s.watch.stuck_lately({s.us + 1'500'000}));
@@ -79,7 +79,7 @@ TEST(ImuHealth, HalfASensorThatIsStuckIsStuck) {
     for (int i = 0; i <= s.n.stuck_samples; ++i) {
       sensor::ImuSample sample = s.next();
       (gyro ? sample.dangle_b_rad : sample.dvelocity_b_mps) = gyro ? held.dangle_b_rad : held.dvelocity_b_mps;
-      heard = s.watch.hear(sample, {s.us}, s.n);
+      heard = s.watch.update(sample, {s.us}, s.n);
     }
     EXPECT_FALSE(heard) << (gyro ? "gyroscope" : "accelerometer");
   }
@@ -90,7 +90,7 @@ TEST(ImuHealth, OneEqualAxisIsNoStuckSensor) {
   for (int i = 0; i < 1000; ++i) {
     sensor::ImuSample sample = s.next();
     sample.dangle_b_rad[1] = sample.dvelocity_b_mps[1] = 0;
-    ASSERT_TRUE(s.watch.hear(sample, {s.us}, s.n));
+    ASSERT_TRUE(s.watch.update(sample, {s.us}, s.n));
   }
 }
 
@@ -100,7 +100,7 @@ TEST(ImuHealth, IsStaleWhenNothingHasBeenSaidForTheStatedTime) {
   s.run(0.1);
   EXPECT_FALSE(s.watch.stale({s.us + s.n.stale_us}, s.n));
   EXPECT_TRUE(s.watch.stale({s.us + s.n.stale_us + 1}, s.n));
-  for (int i = 0; i < 40; ++i) s.hear_again();
+  for (int i = 0; i < 40; ++i) s.repeat();
   EXPECT_TRUE(s.watch.stale({s.us}, s.n)) << "repetitions say nothing";
 }
 
@@ -113,14 +113,14 @@ TEST(ImuHealth, CountsSamplesWithAClippedAxisAndSaysSoForASecond) {
   s.clipped_accel = 0, s.clipped_gyro = 1;
   s.run(0.05);
   s.clipped_gyro = 0;
-  EXPECT_EQ(s.watch.health().clipped, 10);
+  EXPECT_EQ(s.watch.report().clipped, 10);
   s.run(0.9);
   EXPECT_TRUE(s.watch.clipped_lately({s.us}));
   s.run(0.2);
   EXPECT_FALSE(s.watch.clipped_lately({s.us}));
   s.clipped_gyro = 1;
-  for (int i = 0; i < 70'000; ++i) s.hear();
-  EXPECT_EQ(s.watch.health().clipped, 0xFFFF) << "stays at the end";
+  for (int i = 0; i < 70'000; ++i) s.update();
+  EXPECT_EQ(s.watch.report().clipped, 0xFFFF) << "stays at the end";
 }
 
 TEST(ImuHealth, VibrationIsTheRmsOfWhatIsFasterThanMotion) {
@@ -128,8 +128,8 @@ TEST(ImuHealth, VibrationIsTheRmsOfWhatIsFasterThanMotion) {
     Sensor s(rate_hz);
     s.force_mps2 = 6, s.rate_radps = 0.8F;
     s.run(3);
-    EXPECT_NEAR(s.watch.health().vibration_mps2, 6 / std::sqrt(2.0), 0.5) << rate_hz;
-    EXPECT_NEAR(s.watch.health().vibration_radps, 0.8 / std::sqrt(2.0), 0.07) << rate_hz;
+    EXPECT_NEAR(s.watch.report().vibration_mps2, 6 / std::sqrt(2.0), 0.5) << rate_hz;
+    EXPECT_NEAR(s.watch.report().vibration_radps, 0.8 / std::sqrt(2.0), 0.07) << rate_hz;
   }
 }
 
@@ -138,10 +138,10 @@ TEST(ImuHealth, ASteadyForceAndASteadyTurnAreNoVibration) {
   for (int i = 0; i < 300; ++i) {
     sensor::ImuSample sample = s.next();
     sample.dangle_b_rad[2] += 0.02F, sample.dvelocity_b_mps[0] += 0.03F;
-    s.watch.hear(sample, {s.us}, s.n);
+    s.watch.update(sample, {s.us}, s.n);
   }
-  EXPECT_LT(s.watch.health().vibration_mps2, 0.05);
-  EXPECT_LT(s.watch.health().vibration_radps, 0.05);
+  EXPECT_LT(s.watch.report().vibration_mps2, 0.05);
+  EXPECT_LT(s.watch.report().vibration_radps, 0.05);
   EXPECT_TRUE(s.watch.calm(s.n)) << "which is why it alone does not tell standing still from constant velocity";
 }
 

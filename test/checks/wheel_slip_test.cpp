@@ -36,12 +36,12 @@ class Drive {
     const float turn = 0.5F * kTrack_m * turn_radps;
     const float left = forward_mps - turn + left_slip_mps, right = forward_mps + turn + right_slip_mps;
     const float follow = filter_follows ? 0.5F * (left_slip_mps + right_slip_mps) : 0.0F;
-    return watch.hear({.left_mps = left + noise(), .right_mps = right + noise()},
-                      {.forward_mps = forward_mps + follow, .sigma_mps = sigma_mps, .turn_mps = kTrack_m * turn_radps},
-                      {us_}, n);
+    return watch.update(
+        {.left_mps = left + noise(), .right_mps = right + noise()},
+        {.forward_mps = forward_mps + follow, .sigma_mps = sigma_mps, .turn_mps = kTrack_m * turn_radps}, {us_}, n);
   }
   bool gnss(float sigma = 0.05F) {
-    return watch.ground(forward_mps, forward_mps + 0.5F * (left_slip_mps + right_slip_mps), sigma, {us_}, n);
+    return watch.update_ground(forward_mps, forward_mps + 0.5F * (left_slip_mps + right_slip_mps), sigma, {us_}, n);
   }
 
  private:

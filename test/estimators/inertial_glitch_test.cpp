@@ -188,9 +188,9 @@ Ramp ramp(
     for (int i = 0; i < 200; ++i) {
       d.run(0.2);
       const bool refused = d.last_fix.verdict == sensor::Verdict::kRejected;
-      if (refused && d.last_fix.dof == 2) {
+      if (refused && d.last_fix.failed == sensor::Check::kDrift) {
         ++all.of_drift;
-        EXPECT_GT(d.last_fix.nis, d.last_fix.gate) << "by how much";
+        EXPECT_GT(d.last_fix.statistic, d.last_fix.limit) << "by how much";
       }
       if (refused && d.counted('R') >= 3) first_s = std::min(first_s, 0.2 * i);
     }

@@ -111,24 +111,31 @@ TEST(InertialOptions, AGyroscopeThatFeelsTheEarthHasNoBiasOfIt) {
   }
 }
 
+/// A filter that begins as aligned, without wheels.
+void begin(nav::Ins& ins, const Alignment& start, const HeadingMonitor& monitor, const param::Parameters& n) {
+  const Alignment::Start at = start.start(nullptr, monitor, n.inertial, base::kNan);
+  Recovery::restart(ins, at.x, at.variances);
+}
+
 // The receiver's last known place first, then the true one, 150 km away: a way to the east is a course, however long.
 TEST(InertialOptions, AFirstWayThatIsLongIsACourse) {
   param::Parameters n = parameters();
   n.inertial.starts_forward = 1;
   Alignment start;
+  HeadingMonitor monitor;
   model::GnssFix3d fix{.sigma_horizontal_m = 1, .sigma_vertical_m = 2};
-  start.fix(fix, {1'000'000}, n);
+  start.fix(fix, {1'000'000}, monitor, n);
   fix.x = base::Anchored::from_um(150'000'000'000);
-  start.fix(fix, {2'000'000'000}, n);
+  start.fix(fix, {2'000'000'000}, monitor, n);
   EXPECT_FALSE(start.ready()) << "one fix may be an outlier";
-  start.fix(fix, {2'000'200'000}, n);
+  start.fix(fix, {2'000'200'000}, monitor, n);
   ASSERT_TRUE(start.ready());
   nav::Ins ins;
-  start.begin(ins, n.inertial, false);
+  begin(ins, start, monitor, n);
   EXPECT_NEAR(nav::euler(ins.x.q_nb).yaw_rad, 0.0F, 1e-6F);
   EXPECT_NEAR(ins.x.x.minus({}), 150'000.0F, 0.1F);
-  start.heading(base::kNan, 0.1F);
-  start.begin(ins, n.inertial, false);
+  start.set_heading(base::kNan, 0.1F);
+  begin(ins, start, monitor, n);
   EXPECT_TRUE(ins.x.finite()) << "no heading is no reason to lose one";
 }
 
@@ -137,11 +144,12 @@ std::optional<nav::Ins> begun_by(const nav::Vector3& v_n_mps, float sigma_mps, b
   param::Parameters n = parameters();
   n.inertial.starts_forward = forwards ? 1 : 0;
   Alignment start;
-  start.fix({.sigma_horizontal_m = 1, .sigma_vertical_m = 2}, {1'000'000}, n);
-  start.velocity(v_n_mps, sigma_mps, true, n);
+  HeadingMonitor monitor;
+  start.fix({.sigma_horizontal_m = 1, .sigma_vertical_m = 2}, {1'000'000}, monitor, n);
+  start.velocity(v_n_mps, sigma_mps, true, monitor, n);
   if (!start.ready()) return std::nullopt;
   nav::Ins ins;
-  start.begin(ins, n.inertial, false);
+  begin(ins, start, monitor, n);
   return ins;
 }
 

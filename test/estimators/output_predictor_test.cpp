@@ -65,7 +65,7 @@ class Feed {
     while (gone < window.size() && window[gone].stamp.us <= now_us - kWindow_us) {
       if (window[gone].sensor == sensor::Sensor::kImu) {
         far.last = window[gone].stamp;
-        static_cast<void>(far.repeats.hear(window[gone].payload.imu, 10));
+        static_cast<void>(far.classifier.repeated(window[gone].payload.imu, 10));
       }
       ++gone;
     }
@@ -121,7 +121,7 @@ class Feed {
   std::vector<sensor::Sample> waiting_;
 };
 
-OutputPredictor::With ctx(const param::InertialParameters& n, const nav::Earth& earth, bool turn_known = true) {
+OutputPredictor::Inputs inputs(const param::InertialParameters& n, const nav::Earth& earth, bool turn_known = true) {
   return {.parameters = n, .earth = earth, .turn_known = turn_known, .wheel_turn_radps = 0.1F};
 }
 
@@ -135,16 +135,16 @@ TEST(OutputPredictor, ItsCellsAreNoMoreThanACache) {
     OutputPredictor grown;
     for (int i = 0; i < 400; ++i) {
       feed.tick();
-      for (const std::int64_t us : feed.arrived_us) static_cast<void>(grown.arrived({us}));
+      for (const std::int64_t us : feed.arrived_us) static_cast<void>(grown.note_arrival({us}));
       feed.arrived_us.clear();
       const bool turn_known = !feed.one_in(4);
       if (feed.one_in(3)) {
-        grown.carry_on(feed.window, ctx(n, earth, turn_known));
+        grown.extend(feed.window, inputs(n, earth, turn_known));
         continue;
       }
-      grown.carry_from(feed.far, feed.window, ctx(n, earth, turn_known));
+      grown.rebuild(feed.far, feed.window, inputs(n, earth, turn_known));
       OutputPredictor fresh;
-      fresh.carry_from(feed.far, feed.window, ctx(n, earth, turn_known));
+      fresh.rebuild(feed.far, feed.window, inputs(n, earth, turn_known));
       ASSERT_EQ(bits_of(grown.place().x), bits_of(fresh.place().x)) << seed << ' ' << i;
       ASSERT_EQ(grown.place().reached, fresh.place().reached);
       ASSERT_EQ(grown.place().last, fresh.place().last);
@@ -166,21 +166,21 @@ TEST(OutputPredictor, ItsCellsSayWhatTheirSamplesSay) {
       feed.tick();
       const bool turn_known = !feed.one_in(4);
       OutputPredictor cells, each;
-      cells.carry_from(feed.far, feed.window, ctx(n, earth, turn_known));
-      each.carry_from(feed.far, std::vector<sensor::Sample>{}, ctx(n, earth, turn_known));
-      each.carry_on(feed.window, ctx(n, earth, turn_known));
+      cells.rebuild(feed.far, feed.window, inputs(n, earth, turn_known));
+      each.rebuild(feed.far, std::vector<sensor::Sample>{}, inputs(n, earth, turn_known));
+      each.extend(feed.window, inputs(n, earth, turn_known));
       ASSERT_EQ(cells.place().reached, each.place().reached) << seed << ' ' << i;
       ASSERT_EQ(cells.place().last, each.place().last);
       ASSERT_EQ(cells.place().unseen_s, each.place().unseen_s) << "lost or clipped";
       ASSERT_EQ(cells.place().unseen_turn_s, each.place().unseen_turn_s);
-      ASSERT_EQ(cells.heard(), each.heard());
+      ASSERT_EQ(cells.last_seen(), each.last_seen());
       ASSERT_EQ(cells.place().rate_b_radps, each.place().rate_b_radps);
-      const auto bits = [](const checks::Repeats& r) {
+      const auto bits = [](const checks::ImuClassifier& r) {
         std::vector<std::uint32_t> all;
         r.hash_state([&](auto v) { all.push_back(std::bit_cast<std::uint32_t>(v)); });
         return all;
       };
-      ASSERT_EQ(bits(cells.place().repeats), bits(each.place().repeats));
+      ASSERT_EQ(bits(cells.place().classifier), bits(each.place().classifier));
       ASSERT_LT(cells.place().x.minus(each.place().x).norm(), 0.05F);
       if (cells.place().reached.us > feed.far.reached.us) ++told;
     }
@@ -195,26 +195,26 @@ TEST(OutputPredictor, LeadsWhereSampleBySampleStrapdownLeads) {
   Feed feed(3, false);
   for (int i = 0; i < 25; ++i) feed.tick();
   OutputPredictor anew, on;
-  on.carry_from(feed.far, feed.window, ctx(n, earth));
+  on.rebuild(feed.far, feed.window, inputs(n, earth));
   for (int i = 0; i < 10; ++i) {
     feed.tick();
-    on.carry_on(feed.window, ctx(n, earth));
+    on.extend(feed.window, inputs(n, earth));
   }
   // Both from where the window began.
   nav::InsState each;
   Feed again(3, false);
   for (int i = 0; i < 25; ++i) again.tick();
-  for (const sensor::Sample& s : again.window) nav::strapdown(each, shown_by(s.payload.imu), earth);
+  for (const sensor::Sample& s : again.window) nav::strapdown(each, checks::increment_of(s.payload.imu), earth);
   for (const sensor::Sample& s : feed.window)
-    if (s.stamp > again.window.back().stamp) nav::strapdown(each, shown_by(s.payload.imu), earth);
-  const auto off = on.at({feed.now_us}, ctx(n, earth)).minus(each);
+    if (s.stamp > again.window.back().stamp) nav::strapdown(each, checks::increment_of(s.payload.imu), earth);
+  const auto off = on.at({feed.now_us}, inputs(n, earth)).minus(each);
   EXPECT_LT(off.head<3>().norm(), 2e-3F);
   EXPECT_LT(off.segment<3>(3).norm(), 1e-3F);
   EXPECT_LT(off.segment<3>(6).norm(), 1e-4F);
 
-  anew.carry_from(feed.far, feed.window, ctx(n, earth));
+  anew.rebuild(feed.far, feed.window, inputs(n, earth));
   each = {};
-  for (const sensor::Sample& s : feed.window) nav::strapdown(each, shown_by(s.payload.imu), earth);
+  for (const sensor::Sample& s : feed.window) nav::strapdown(each, checks::increment_of(s.payload.imu), earth);
   const auto off_anew = anew.place().x.minus(each);
   EXPECT_LT(off_anew.head<3>().norm(), 2e-3F);
   EXPECT_LT(off_anew.segment<3>(3).norm(), 1e-3F);
@@ -227,10 +227,10 @@ TEST(OutputPredictor, SaysWhenASampleComesThatItWentOnWithout) {
   OutputPredictor ahead;
   std::vector<sensor::Sample> window{imu_sample(105'000, {0, 0, 1}, {0, 0, 9.8F}),
                                      imu_sample(115'000, {0, 0, 1}, {0, 0, 9.8F})};
-  for (const sensor::Sample& s : window) EXPECT_FALSE(ahead.arrived(s.stamp));
-  ahead.carry_from({.reached = {100'000}, .last = {100'000}}, window, ctx(n, earth));
-  EXPECT_FALSE(ahead.arrived({120'000}));
-  EXPECT_TRUE(ahead.arrived({110'000}));
+  for (const sensor::Sample& s : window) EXPECT_FALSE(ahead.note_arrival(s.stamp));
+  ahead.rebuild({.reached = {100'000}, .last = {100'000}}, window, inputs(n, earth));
+  EXPECT_FALSE(ahead.note_arrival({120'000}));
+  EXPECT_TRUE(ahead.note_arrival({110'000}));
 }
 
 /// What is missing at the end is gone on through: the turn is kept for a few samples, then the wheels' word taken.
@@ -241,8 +241,8 @@ TEST(OutputPredictor, GoesOnStraightThroughWhatIsMissing) {
   nav::InsState x;
   x.v_n_mps = {2, 0, 0};
   const std::vector<sensor::Sample> window{imu_sample(105'000, {0, 0, 1}, {0, 2, earth.gravity_mps2})};
-  ahead.carry_from({.x = x, .reached = {100'000}, .last = {100'000}}, window, ctx(n, earth));
-  const auto after = [&](std::int64_t us, bool known) { return ahead.at({105'000 + us}, ctx(n, earth, known)); };
+  ahead.rebuild({.x = x, .reached = {100'000}, .last = {100'000}}, window, inputs(n, earth));
+  const auto after = [&](std::int64_t us, bool known) { return ahead.at({105'000 + us}, inputs(n, earth, known)); };
   EXPECT_NEAR(nav::euler(after(50'000, false).q_nb).yaw_rad, 0.055F, 1e-4F);
   EXPECT_NEAR(after(50'000, false).v_n_mps.norm(), 2.0F, 1e-3F);
   EXPECT_NEAR(nav::euler(after(400'000, true).q_nb).yaw_rad, 0.005F + 0.04F, 1e-4F);

@@ -75,7 +75,7 @@ TEST(Calibrate, WithoutATemperatureTheBiasIsTheOneItHoldsAt) {
 // What is taken out differs from sample to sample, by the noise of the thermometer and the jitter of the interval.
 TEST(Calibrate, DoesNotMakeAStuckSensorLookAlive) {
   for (const bool gyro : {true, false}) {
-    checks::Repeats repeats;
+    checks::ImuClassifier repeats;
     std::mt19937 engine{3};
     std::normal_distribution<float> normal;
     bool stuck = false;
@@ -86,7 +86,7 @@ TEST(Calibrate, DoesNotMakeAStuckSensorLookAlive) {
                   .interval_us = static_cast<std::uint16_t>(5000 + k % 3)};
       (gyro ? s.dvelocity_b_mps : s.dangle_b_rad)[2] += 2e-5F * normal(engine);
       calibrate(s, kImu);
-      stuck = repeats.hear(s, 10);
+      stuck = repeats.repeated(s, 10);
     }
     EXPECT_TRUE(stuck) << (gyro ? "gyroscope" : "accelerometer");
   }
@@ -94,13 +94,13 @@ TEST(Calibrate, DoesNotMakeAStuckSensorLookAlive) {
 
 // One step of the bus is a difference.
 TEST(Calibrate, ASensorThatMovesByOneStepIsNotStuck) {
-  checks::Repeats repeats;
+  checks::ImuClassifier repeats;
   for (std::size_t k = 0; k < 50; ++k) {
     ImuSample s{.temperature_degC = 40, .interval_us = 5000};
     s.dangle_b_rad[k % 3] = k % 2 == 0 ? 1e-6F : 0.0F;
     s.dvelocity_b_mps[k % 3] = k % 2 == 0 ? 1e-5F : 0.0F;
     calibrate(s, kImu);
-    EXPECT_FALSE(repeats.hear(s, 2)) << k;
+    EXPECT_FALSE(repeats.repeated(s, 2)) << k;
   }
 }
 

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a barometer shows is a height above an unknown zero, which drifts. Whichever of the two, the zero or the robot's
-// height, is known worse is found from the other, and never becomes better known than that: their errors are shared
-// from then on, and no cross covariance is kept that would say how.
+// Zero of a barometer: pressure is a height above an unknown zero, which drifts. Of zero and robot's height the one
+// that is known worse is found from the other, and never becomes better known than that: their errors are shared from
+// then on, and no cross covariance is kept of them.
 #pragma once
 
 #include "base/math.hpp"
 #include "base/time.hpp"
+#include "checks/persistence.hpp"
 #include "param/parameters.hpp"
 
 #include <cstdint>
@@ -17,21 +18,21 @@ namespace tetap::estimators {
   return 44330.77F * (1.0F - base::exp(0.1902632F * base::log(pressure_Pa * (1.0F / 101325.0F))));
 }
 
-/// The variance a measurement must be given so that the estimate (variance p) ends at `floor`, when the measurement
-/// were repeated without end; p > floor.
+/// Variance of a measurement with which the estimate (variance p) ends at `floor`, were the measurement repeated
+/// without end; p > floor.
 [[nodiscard]] inline float variance_towards(float floor, float p) { return floor * p / (p - floor); }
 
 class BarometerZero {
  public:
-  /// Of the zero to a sample's time.
+  /// Carries the zero to a sample's time.
   void predict(base::Micros stamp, const param::BaroParameters& n) {
     const base::Micros since = stamp - last_;
     if (since.us > 0) p_ += n.drift_m_rts * n.drift_m_rts * base::seconds(since);
-    if (since > kGap) agreed_ = stamp;
+    if (checks::older(last_, stamp, kGap)) agreed_ = stamp;
     last_ = stamp;
   }
-  /// Of a height above the zero, at this one: air that is not the standard's is off by a share of what was climbed
-  /// since the zero was found.
+  /// Variance of a height above the zero: in air other than the standard's a share of the climb since the zero was
+  /// found is wrong.
   [[nodiscard]] float variance(float altitude_m, const param::BaroParameters& n) const {
     const float air_m = n.scale_share * (altitude_m - altitude_m_);
     return p_ + air_m * air_m;
@@ -43,7 +44,7 @@ class BarometerZero {
     last_ = agreed_ = stamp;
     known_ = true;
   }
-  /// From its variance p by a height of variance p_z < p that says the zero should be `nu` higher.
+  /// Corrects the zero (variance p) by a height of variance p_z < p; `nu`: how much higher the zero should be.
   void correct(float nu, float p, float p_z, float white, float altitude_m) {
     const float k = p / (p + variance_towards(p_z, p) + white);
     zero_m_ += k * nu;
@@ -54,6 +55,8 @@ class BarometerZero {
   [[nodiscard]] float zero_m() const { return zero_m_; }
   void agreed(base::Micros stamp) { agreed_ = stamp; }
   [[nodiscard]] base::Micros refused_for(base::Micros stamp) const { return stamp - agreed_; }
+  /// Stamp of the last height; 0: none.
+  [[nodiscard]] base::Micros last() const { return last_; }
 
   template <class Sink>
   void hash_state(Sink&& sink) const {
@@ -66,9 +69,9 @@ class BarometerZero {
   }
 
  private:
-  static constexpr base::Micros kGap{1'000'000};  ///< of silence does not count as refused
+  static constexpr base::Micros kGap{1'000'000};  ///< a longer silence does not count as refused
   float zero_m_ = 0, p_ = 0;
-  float altitude_m_ = 0;  ///< where the zero was found
+  float altitude_m_ = 0;  ///< altitude at which the zero was found
   bool known_ = false;
   base::Micros last_, agreed_;
 };

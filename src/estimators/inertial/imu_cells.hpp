@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the IMU samples of the window add up to, in cells on a grid of time, so that the present is reached over a
-// handful of cells and not over every sample anew in every tick. A pure cache: cells that grew sample by sample are,
-// bit for bit, those made at once of what the window holds.
+// Sums of the window's IMU samples in cells on a grid of time: the present is reached over a handful of cells, and not
+// over every sample anew in every tick. A pure cache: cells that grew sample by sample are, bit for bit, those made at
+// once of all samples in the window.
 #pragma once
 
-#include "checks/imu_health.hpp"
+#include "checks/imu_classifier.hpp"
 #include "nav/imu_gather.hpp"
 #include "param/parameters.hpp"
 #include "sensor/sample.hpp"
@@ -15,31 +15,26 @@
 
 namespace tetap::estimators {
 
-/// In the axes of the sensor.
-inline nav::ImuIncrement shown_by(const sensor::ImuSample& sample) {
-  const auto& a = sample.dangle_b_rad;
-  const auto& v = sample.dvelocity_b_mps;
-  return {.dtheta_b_rad = {a[0], a[1], a[2]}, .dv_b_mps = {v[0], v[1], v[2]}, .dt = base::Micros{sample.interval_us}};
-}
-constexpr bool is_of(const sensor::Sample& sample, const param::InertialParameters& n) { return is_imu(sample, n.imu); }
-/// From the end of a sample to the begin of the next, longer is a gap: drivers' clocks jitter.
-inline constexpr base::Micros kImuJitter{1'500};
-/// A sample that begins before the last has ended by more than half of itself tells again what was told.
-constexpr bool overlaps(base::Micros gap, base::Micros dt) { return 2 * gap.us < -dt.us; }
+using sensor::ImuSample;
+using sensor::Sample;
+
+/// A sample of the IMU that the filter uses.
+constexpr bool is_of(const Sample& sample, const param::InertialParameters& n) { return sensor::is_imu(sample, n.imu); }
 
 /// Samples of one place on the grid that follow each other.
 struct ImuCell {
-  base::Micros begin;        ///< of the first
-  std::int32_t span_us = 0;  ///< from there to the stamp of the last
-  /// By how much one begins later than those before reach, at most; and twice that and its interval, at least.
+  base::Micros begin;        ///< begin of the first sample
+  std::int32_t span_us = 0;  ///< from there to the stamp of the last sample
+  /// Largest pause before a sample of the cell; least sum of twice the pause and the sample's interval.
   std::int32_t late_us = 0, early_us = std::numeric_limits<std::int32_t>::max();
   nav::ImuGather gather;
 
   [[nodiscard]] base::Micros last() const { return {begin.us + span_us}; }
-  /// Where what is before it reaches until `reached`, none of its samples follows a gap, and none is refused.
+  /// After samples that end at `reached`, every sample of the cell is contiguous.
   [[nodiscard]] bool follows(base::Micros reached) const {
-    const std::int64_t gap_us = begin.us - reached.us;
-    return gap_us + late_us <= kImuJitter.us && 2 * gap_us + early_us >= 0;
+    const base::Micros pause = begin - reached;
+    return !checks::ImuClassifier::is_gap(pause + base::Micros{late_us}) &&
+           !checks::ImuClassifier::overlaps(pause, {early_us});
   }
   [[nodiscard]] bool plain() const { return late_us != kEach; }
   void add(const nav::ImuIncrement& next, base::Micros stamp) {
@@ -50,8 +45,8 @@ struct ImuCell {
     gather.add(next);
     span_us = static_cast<std::int32_t>((stamp - begin).us);
   }
-  /// One of its samples has to be looked at by itself, so all have.
-  void look_at_each(base::Micros stamp) {
+  /// One sample has to be classified by itself, so all samples of the cell have.
+  void classify_each(base::Micros stamp) {
     late_us = kEach;
     span_us = static_cast<std::int32_t>((stamp - begin).us);
   }
@@ -62,14 +57,14 @@ struct ImuCell {
 
 class ImuCells {
  public:
-  /// A sample has come that may belong before others.
+  /// A sample came that may belong before others.
   void arrived(base::Micros stamp) {
     while (size_ > 0 && (*this)[size_ - 1].last() >= stamp) --size_;
   }
   void clear() { size_ = 0; }
 
-  /// Adds what is new in the window and lets go what begins to leave it: the place on the grid where the window's first
-  /// sample is has no cell, and samples beyond the last have none where there was no room for more.
+  /// Adds new samples of the window and drops those that begin to leave it: the grid place of the window's first sample
+  /// has no cell, and neither have samples beyond the last cell where there was no room for more.
   template <class Window>
   void follow(const Window& window, const param::InertialParameters& n) {
     std::size_t first = 0;
@@ -94,7 +89,7 @@ class ImuCells {
       before = i;
     }
   }
-  /// The end of the place on the grid that has no cell.
+  /// End of the grid place without a cell.
   [[nodiscard]] base::Micros leaving_until() const { return leaving_until_; }
 
   [[nodiscard]] std::size_t size() const { return size_; }
@@ -106,12 +101,10 @@ class ImuCells {
 
   [[nodiscard]] static constexpr std::int64_t grid(base::Micros t) { return t.us >> kGrid; }
   /// False when there is no room.
-  bool add(const sensor::Sample& sample, const sensor::ImuSample& before) {
-    const sensor::ImuSample& imu = sample.payload.imu;
-    const nav::ImuIncrement increment = shown_by(imu);
-    constexpr auto kAccepted = nav::ImuVerdict::kAccepted;
-    const bool plain = imu.clipped_gyro == 0 && imu.clipped_accel == 0 && increment.check() == kAccepted &&
-                       !checks::Repeats::repeats(imu, before) && shown_by(before).check() == kAccepted;
+  bool add(const Sample& sample, const ImuSample& before) {
+    const ImuSample& imu = sample.payload.imu;
+    const nav::ImuIncrement increment = checks::increment_of(imu);
+    const bool plain = checks::ImuClassifier::plain(imu, before);
     const ImuCell* open = size_ > 0 ? &(*this)[size_ - 1] : nullptr;
     if (open == nullptr || grid(open->last()) != grid(sample.stamp) || (open->plain() && open->gather.full())) {
       if (size_ == kMost) return false;
@@ -122,7 +115,7 @@ class ImuCells {
     if (plain && cell.plain()) {
       cell.add(increment, sample.stamp);
     } else {
-      cell.look_at_each(sample.stamp);
+      cell.classify_each(sample.stamp);
     }
     return true;
   }

@@ -3,6 +3,7 @@
 // rule for getting back in when everything is refused.
 #pragma once
 
+#include "checks/persistence.hpp"
 #include "estimators/context.hpp"
 #include "estimators/planar/dead_reckoning.hpp"
 #include "estimators/planar/gnss_alignment.hpp"
@@ -68,8 +69,8 @@ class PoseEkf {
   [[nodiscard]] sensor::Mode mode(const Context&) const {
     if (phase_ == Phase::kWaiting) return sensor::Mode::kWaitingForPose;
     if (phase_ == Phase::kAligning) return sensor::Mode::kAligning;
-    for (const Refused& refused : refused_)
-      if (refused.in_a_row >= 3) return sensor::Mode::kDegraded;
+    for (const checks::Persistence& refused : refused_)
+      if (refused.count() >= 3) return sensor::Mode::kDegraded;
     return now_ - last_absolute_ > base::Micros{5'000'000} ? sensor::Mode::kDeadReckoning : sensor::Mode::kNominal;
   }
   template <class Sink>
@@ -77,21 +78,13 @@ class PoseEkf {
     motion_.hash_state(sink);
     sink(static_cast<std::uint32_t>(phase_));
     alignment_.hash_state(sink);
-    for (const Refused& refused : refused_) {
-      sink(refused.in_a_row);
-      sink(refused.since.us);
-    }
+    for (const checks::Persistence& refused : refused_) refused.hash_state(sink);
     sink(last_absolute_.us);
   }
 
  private:
   enum class Phase : std::uint8_t { kWaiting, kAligning, kTracking };
   enum Source : std::size_t { kLandmark, kGnss, kSources };
-  /// Rejections in a row of one kind of sensor.
-  struct Refused {
-    std::int32_t in_a_row = 0;
-    base::Micros since;
-  };
   static constexpr float kLost_rad = 1;
 
   /// A heading that could be anything is looked for afresh: a filter that linearises about it would never find it.
@@ -103,13 +96,13 @@ class PoseEkf {
   template <class Model>
   Innovation measure(const Model& model, Source source, float gate_scale, base::Micros stamp, const Context& ctx,
                      std::uint8_t landmark = 0xFF);
-  void recover(Refused& refused, base::Micros stamp, const param::RecoveryParameters& n);
+  void recover(checks::Persistence& refused, base::Micros stamp, const param::RecoveryParameters& n);
 
   DeadReckoning motion_;
   GnssAlignment alignment_;
   Phase phase_ = Phase::kWaiting;
-  std::array<Refused, kSources> refused_{};
-  base::Micros last_absolute_;  ///< stamp of the last accepted landmark or fix
+  std::array<checks::Persistence, kSources> refused_{};  ///< rejections in a row of one kind of sensor
+  base::Micros last_absolute_;                           ///< stamp of the last accepted landmark or fix
   base::Micros now_;
 };
 
@@ -117,24 +110,24 @@ template <class Model>
 Innovation PoseEkf::measure(const Model& model, Source source, float gate_scale, base::Micros stamp, const Context& ctx,
                             std::uint8_t landmark) {
   const auto result = motion_.filter.update(model, gate_scale * filter::chi_square_99(Model::kDimension));
-  Refused& refused = refused_[source];
+  checks::Persistence& refused = refused_[source];
   if (result.verdict == filter::Verdict::kAccepted) {
-    refused.in_a_row = 0;
+    refused.update(false, stamp);
     last_absolute_ = stamp;
   } else if (result.verdict == filter::Verdict::kRejected) {
-    if (refused.in_a_row++ == 0) refused.since = stamp;
+    refused.update(true, stamp);
     recover(refused, stamp, ctx.parameters.recovery);
   }
   return record(result, landmark);
 }
 
-inline void PoseEkf::recover(Refused& refused, base::Micros stamp, const param::RecoveryParameters& n) {
-  if (refused.in_a_row < n.at_least || stamp - refused.since < base::Micros{n.after_us}) return;
+inline void PoseEkf::recover(checks::Persistence& refused, base::Micros stamp, const param::RecoveryParameters& n) {
+  if (!refused.persists(stamp, base::Micros{n.after_us}, n.at_least)) return;
   auto& p = motion_.filter.p;
   p(0, 0) += n.inflate_position_m * n.inflate_position_m;
   p(1, 1) += n.inflate_position_m * n.inflate_position_m;
   p(2, 2) += n.inflate_yaw_rad * n.inflate_yaw_rad;
-  refused = {};
+  refused.reset();
 }
 
 inline Innovation PoseEkf::fuse(const sensor::LandmarkSighting& sighting, base::Micros stamp, const Context& ctx) {

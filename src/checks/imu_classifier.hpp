@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: Apache-2.0
+// The one rule of what an IMU sample is good for. The filter, the output predictor, its cells and the attitude filter
+// must agree on it, or the present would be carried over samples that the filter later refuses.
+#pragma once
+
+#include "checks/stuck_value.hpp"
+#include "nav/imu_increment.hpp"
+#include "sensor/samples.hpp"
+
+#include <cstdint>
+
+namespace tetap::checks {
+
+/// Increments of a sample, along the sensor's axes.
+[[nodiscard]] inline nav::ImuIncrement increment_of(const sensor::ImuSample& sample) {
+  const auto& a = sample.dangle_b_rad;
+  const auto& v = sample.dvelocity_b_mps;
+  return {.dtheta_b_rad = {a[0], a[1], a[2]}, .dv_b_mps = {v[0], v[1], v[2]}, .dt = base::Micros{sample.interval_us}};
+}
+
+enum class ImuClass : std::uint8_t {
+  kInvalid,      ///< not finite, too fast, or its interval is none
+  kStuck,        ///< gyroscope or accelerometer repeats itself
+  kSaturated,    ///< gyroscope at full scale while wheels show the turn: used as if it were missing
+  kOverlapping,  ///< begins before the last one ended by more than half of itself
+  kAfterGap,     ///< samples are missing before it
+  kContiguous,   ///< begins where the last one ended
+};
+
+class ImuClassifier {
+ public:
+  /// Jitter of drivers' clocks: a longer pause between two samples is a gap.
+  static constexpr base::Micros kJitter{1'500};
+  /// `pause`: from the end of the last sample to the begin of this one; negative where they overlap.
+  [[nodiscard]] static constexpr bool is_gap(base::Micros pause) { return pause > kJitter; }
+  [[nodiscard]] static constexpr bool overlaps(base::Micros pause, base::Micros dt) { return 2 * pause.us < -dt.us; }
+
+  /// `increment`: of the sample, in any axes. `stuck_samples`: repetitions that make a stuck sensor; 0: never.
+  /// Repetitions are counted of valid samples alone.
+  ImuClass classify(const sensor::ImuSample& sample, const nav::ImuIncrement& increment, base::Micros pause,
+                    bool turn_known, std::int32_t stuck_samples) {
+    if (increment.check() != nav::ImuVerdict::kAccepted) return ImuClass::kInvalid;
+    if (repeated(sample, stuck_samples)) return ImuClass::kStuck;
+    if (sample.clipped_gyro > 0 && turn_known) return ImuClass::kSaturated;
+    if (overlaps(pause, increment.dt)) return ImuClass::kOverlapping;
+    return is_gap(pause) ? ImuClass::kAfterGap : ImuClass::kContiguous;
+  }
+  /// Counts a valid sample. True when this one is the n-th repetition or beyond; 0: never.
+  bool repeated(const sensor::ImuSample& s, std::int32_t n) {
+    const bool gyro = gyro_.update(s.dangle_b_rad, kStep_rad, n);
+    return accel_.update(s.dvelocity_b_mps, kStep_mps, n) || gyro;
+  }
+  /// Nothing but the time can make such a sample anything but contiguous: valid, not clipped, no repetition of
+  /// `before`.
+  [[nodiscard]] static bool plain(const sensor::ImuSample& s, const sensor::ImuSample& before) {
+    return s.clipped_gyro == 0 && s.clipped_accel == 0 && valid(s) && !repeats(s, before) && valid(before);
+  }
+  /// The classifier's state after a sample that repeats nothing.
+  [[nodiscard]] static ImuClassifier after(const sensor::ImuSample& s) {
+    ImuClassifier classifier;
+    classifier.gyro_.restart(s.dangle_b_rad);
+    classifier.accel_.restart(s.dvelocity_b_mps);
+    return classifier;
+  }
+  /// The gyroscope or the accelerometer shows what it showed in the sample before.
+  [[nodiscard]] static bool repeats(const sensor::ImuSample& s, const sensor::ImuSample& before) {
+    return Repeats::alike(s.dangle_b_rad, before.dangle_b_rad, kStep_rad) ||
+           Repeats::alike(s.dvelocity_b_mps, before.dvelocity_b_mps, kStep_mps);
+  }
+
+  template <class Sink>
+  void hash_state(Sink&& sink) const {
+    gyro_.hash_state(sink);
+    accel_.hash_state(sink);
+  }
+
+ private:
+  using Repeats = RepeatCounter<3>;
+  static constexpr float kStep_rad = 4e-7F, kStep_mps = 4e-6F;  ///< below half a step of the bus: 1e-6 rad, 1e-5 m/s
+
+  [[nodiscard]] static bool valid(const sensor::ImuSample& s) {
+    return increment_of(s).check() == nav::ImuVerdict::kAccepted;
+  }
+
+  Repeats gyro_, accel_;
+};
+
+}  // namespace tetap::checks

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: Apache-2.0
+// All aiding sources of the inertial filter.
+#pragma once
+
+#include "estimators/inertial/sources/barometer.hpp"
+#include "estimators/inertial/sources/forward_speed.hpp"
+#include "estimators/inertial/sources/gnss_height.hpp"
+#include "estimators/inertial/sources/gnss_position.hpp"
+#include "estimators/inertial/sources/gnss_velocity.hpp"
+#include "estimators/inertial/sources/magnetometer.hpp"
+#include "estimators/inertial/sources/outside_heading.hpp"
+#include "estimators/inertial/sources/wheels.hpp"
+
+namespace tetap::estimators {
+
+class AidingSources {
+ public:
+  GnssPositionSource position;
+  GnssHeightSource height;
+  GnssVelocitySource velocity;
+  Wheels wheels;
+  ForwardSpeedSource forward;
+  OutsideHeadingSource heading;
+  Magnetometer magnetometer;
+  Barometer barometer;
+
+  /// Some source was refused at least so often in a row.
+  [[nodiscard]] bool any_refused(std::int32_t at_least) const {
+    const auto refused = [at_least](const auto& source) { return source.refused().count() >= at_least; };
+    return refused(position) || refused(height) || refused(velocity) || refused(forward) || refused(heading);
+  }
+  [[nodiscard]] bool any_stuck(base::Micros at) const {
+    return magnetometer.stuck(at) || barometer.stuck(at) || heading.stuck(at);
+  }
+  /// The filter begins, at a speed that was measured or given, or not.
+  void begin(bool speed_known) {
+    position.begin();
+    height.relocated();
+    velocity.begin();
+    wheels.encoders().forget_gain();
+    forward.begin(speed_known);
+    heading.begin();
+  }
+  template <class Sink>
+  void hash_state(Sink&& sink) const {
+    position.hash_state(sink);
+    height.hash_state(sink);
+    velocity.hash_state(sink);
+    wheels.hash_state(sink);
+    forward.hash_state(sink);
+    heading.hash_state(sink);
+    magnetometer.hash_state(sink);
+    barometer.hash_state(sink);
+  }
+};
+
+static_assert(AidingSource<GnssPositionSource> && AidingSource<GnssHeightSource> && AidingSource<GnssVelocitySource>);
+static_assert(AidingSource<Wheels> && AidingSource<ForwardSpeedSource> && AidingSource<OutsideHeadingSource>);
+static_assert(AidingSource<Magnetometer> && AidingSource<Barometer>);
+
+}  // namespace tetap::estimators

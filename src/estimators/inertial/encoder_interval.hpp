@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: Apache-2.0
+// Encoder counts over an interval: wheel speeds, their uncertainty, and when the wheels moved last.
+#pragma once
+
+#include "checks/persistence.hpp"
+#include "estimators/inertial/filter_view.hpp"
+#include "estimators/inertial/wheel_reading.hpp"
+#include "model/differential_drive.hpp"
+
+#include <optional>
+
+namespace tetap::estimators {
+
+/// Wheels that come so soon after the last ones: counts are left to the next difference, speeds are left out.
+[[nodiscard]] constexpr bool is_soon(base::Micros last, base::Micros at, const param::InertialParameters& n) {
+  return at > last && at - last < base::Micros{n.wheels_every_us};
+}
+
+class EncoderInterval {
+ public:
+  /// Counts are also skipped while a standstill update is pending: it is worth more than counts that do not change.
+  [[nodiscard]] bool skips(base::Micros at, bool standstill_pending, base::Micros longest,
+                           const param::InertialParameters& n) const {
+    return has_counts_ && (is_soon(counted_at_, at, n) || (standstill_pending && at - counted_at_ < longest));
+  }
+  /// Counts that are left out.
+  void skip(const sensor::WheelCounts& counts, base::Micros stamp) {
+    if (counts.left != counts_.left || counts.right != counts_.right) moved_at_ = stamp;
+  }
+  /// Speeds over the interval that ends here; none without a begin.
+  [[nodiscard]] std::optional<WheelReading> update(const sensor::WheelCounts& counts, const FilterView& filter);
+  /// Forward speed gained by the IMU within one sample.
+  void note_gain(float gained_mps) { gained_mps_ += gained_mps; }
+  /// The gain since the last counts is not known.
+  void forget_gain() { gained_mps_ = base::kNan; }
+
+  /// Counts came within 0.1 s.
+  [[nodiscard]] bool counts_recently(base::Micros at) const {
+    return has_counts_ && checks::recent(counted_at_, at, base::Micros{100'000});
+  }
+  /// Counts came within 1 s.
+  [[nodiscard]] bool counts_lately(base::Micros at) const {
+    return checks::recent(counted_at_, at, base::Micros{1'000'000});
+  }
+  /// Counts have not changed for 0.5 s.
+  [[nodiscard]] bool at_rest(base::Micros at) const { return checks::older(moved_at_, at, base::Micros{500'000}); }
+
+  template <class Sink>
+  void hash_state(Sink&& sink) const {
+    sink(static_cast<std::uint32_t>(counts_.left | counts_.right << 16U));
+    sink(counted_at_.us);
+    sink(moved_at_.us);
+    sink(gained_mps_);
+    sink(static_cast<std::uint32_t>(has_counts_));
+  }
+
+ private:
+  sensor::WheelCounts counts_;
+  base::Micros counted_at_;        ///< stamp of the last counts
+  base::Micros moved_at_;          ///< last stamp at which counts had changed
+  float gained_mps_ = base::kNan;  ///< forward, by the IMU, since the last counts; NaN: not known
+  bool has_counts_ = false;
+};
+
+/// Counts are the mean over the interval, the state is at its end: half of the speed gained in between is added. It is
+/// the IMU's gain: corrections of measurements meanwhile were no gain. The noise is one count over the interval, and
+/// the slip and radii of the way, as odometry has them (m^2 per m). The way is the filter's: by the counts' own, those
+/// that err to the slow side would count for more.
+inline std::optional<WheelReading> EncoderInterval::update(const sensor::WheelCounts& counts,
+                                                           const FilterView& filter) {
+  const model::DifferentialDrive& drive = filter.parameters().wheels.drive;
+  const base::Micros stamp = filter.stamp(), interval = stamp - counted_at_;
+  const bool usable = has_counts_ && interval.us > 0 && interval <= base::Micros{filter.parameters().wheels.timeout_us};
+  const std::int32_t left = model::count_difference(counts.left, counts_.left);
+  const std::int32_t right = model::count_difference(counts.right, counts_.right);
+  counts_ = counts;
+  counted_at_ = stamp;
+  has_counts_ = true;
+  if (!usable || left != 0 || right != 0) moved_at_ = stamp;
+  const float later_mps = base::is_finite(gained_mps_) ? 0.5F * gained_mps_ : 0.0F;
+  gained_mps_ = 0;
+  if (!usable) return std::nullopt;
+  const float per_s = 1.0F / base::seconds(interval);
+  WheelReading reading{.wheels = {.left_mps = drive.left_m(left) * per_s, .right_mps = drive.right_m(right) * per_s},
+                       .later_mps = later_mps};
+  const float count_mps = 0.41F * drive.left_m(1) * per_s;
+  const float mean_mps = filter.tracking() ? filter.forward_mps() : reading.mean_mps();
+  const float half_mps = filter.tracking() ? 0.5F * drive.track_m * filter.turn_b_radps()(2)
+                                           : 0.5F * (reading.wheels.right_mps - reading.wheels.left_mps);
+  const float way =
+      drive.noise_left * base::abs(mean_mps - half_mps) + drive.noise_right * base::abs(mean_mps + half_mps);
+  reading.sigma_mps = base::sqrt(count_mps * count_mps + 0.25F * way * per_s);
+  return reading;
+}
+
+}  // namespace tetap::estimators

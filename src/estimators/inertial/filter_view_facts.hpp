@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+// Facts that cross sources: one definition and one time-out each.
+#pragma once
+
+#include "estimators/inertial/aiding_sources.hpp"
+#include "estimators/inertial/filter_view.hpp"
+
+namespace tetap::estimators {
+
+inline nav::Vector3 FilterView::axle_mps(const nav::Vector3& v_n_mps) const {
+  const param::GnssParameters& n = parameters().gnss;
+  const nav::Vector3 antenna_b{n.antenna_x_b_m - parameters().inertial.axle_x_b_m, n.antenna_y_b_m, n.antenna_z_b_m};
+  return x().q_nb.conjugate().rotate(v_n_mps) - nav::cross(turn_b_radps(), antenna_b);
+}
+
+inline checks::WheelSlip::Slip FilterView::slip() const { return parts_.sources.wheels.slip(); }
+
+inline bool FilterView::wheels_silent() const { return parts_.sources.forward.timed_out(stamp()); }
+
+inline bool FilterView::wheels_agree() const {
+  const AidingSources& s = parts_.sources;
+  if (s.position.refused().persists(stamp(), base::Micros{parameters().recovery.persist_us})) return false;
+  return checks::recent(s.wheels.turned_at(), stamp(), base::Micros{1'000'000}) && !s.forward.refused().holds() &&
+         slip() == checks::WheelSlip::Slip::kNone;
+}
+
+inline bool FilterView::wheels_show_turn() const {
+  return checks::recent(parts_.sources.wheels.turned_at(), stamp(), base::Micros{200'000}) &&
+         slip() == checks::WheelSlip::Slip::kNone;
+}
+
+inline float FilterView::recent_forward_mps() const {
+  const ForwardSpeedSource& forward = parts_.sources.forward;
+  return checks::recent(forward.last(), stamp(), base::Micros{500'000}) ? forward.last_mps() : 0.0F;
+}
+
+inline bool FilterView::encoders_count() const { return parts_.sources.wheels.encoders().counts_recently(stamp()); }
+
+inline bool FilterView::encoders_rest() const {
+  return parts_.sources.wheels.encoders().at_rest(stamp()) && slip() == checks::WheelSlip::Slip::kNone;
+}
+
+inline bool FilterView::position_frozen() const { return parts_.sources.position.frozen(); }
+
+inline bool FilterView::position_refused(std::int32_t at_least) const {
+  return parts_.sources.position.refused().count() >= at_least;
+}
+
+inline bool FilterView::position_holds_heading() const {
+  return checks::recent(parts_.sources.position.last_fused(), stamp(), base::Micros{parameters().recovery.after_us});
+}
+
+inline bool FilterView::gnss_holds_velocity() const {
+  constexpr base::Micros kLately{1'000'000};
+  const GnssVelocitySource& velocity = parts_.sources.velocity;
+  return !checks::older(parts_.sources.position.last_fused(), stamp(), kLately) ||
+         (velocity.came_lately(stamp()) && !velocity.refused().holds());
+}
+
+inline bool FilterView::velocity_recent() const { return parts_.sources.velocity.recent(stamp()); }
+
+inline bool FilterView::magnetometer_may_mislead() const { return parts_.sources.magnetometer.may_mislead(stamp()); }
+
+}  // namespace tetap::estimators

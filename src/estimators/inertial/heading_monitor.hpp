@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: Apache-2.0
+// Heading monitor: an independent estimate of the heading from how the robot moves. Before the filter it finds the
+// heading. Beside a filter without wheels it judges the filter's heading, and the magnetometer's.
+#pragma once
+
+#include "checks/persistence.hpp"
+#include "estimators/inertial/filter_view.hpp"
+#include "model/gnss_fix_3d.hpp"
+#include "nav/yaw_estimator.hpp"
+
+namespace tetap::estimators {
+
+class HeadingMonitor {
+ public:
+  static constexpr float kSigmas = 5;  ///< a heading farther off contradicts
+
+  [[nodiscard]] nav::YawEstimator& finder() { return finder_; }
+  [[nodiscard]] bool has_velocity() const { return has_velocity_; }
+  void note_velocity() { has_velocity_ = true; }
+  /// The monitor runs beside the filter, or did before a restart.
+  [[nodiscard]] bool runs() const { return runs_; }
+  void stop() { runs_ = false; }
+
+  void predict(const nav::ImuIncrement& imu, const nav::Quaternion& q_nb) {
+    if (!runs_) finder_.restart(q_nb);
+    runs_ = true;
+    static_cast<void>(finder_.predict(imu));
+  }
+  void fuse(const model::GnssFix3d& fix) {
+    if (runs_ && !has_velocity_) fuse_position(fix);
+  }
+  void fuse_velocity(const nav::Vector3& v_n_mps, float sigma_mps, const param::GnssParameters& n) {
+    if (!runs_) return;
+    has_velocity_ = true;
+    find_by_velocity(v_n_mps, sigma_mps, n);
+  }
+  void fuse_position(const model::GnssFix3d& fix) {
+    finder_.fuse_position(fix.x, fix.y, fix.sigma_horizontal_m, {fix.antenna_b_m(0), fix.antenna_b_m(1)});
+  }
+  void find_by_velocity(const nav::Vector3& v_n_mps, float sigma_mps, const param::GnssParameters& n) {
+    finder_.fuse_velocity(v_n_mps(0), v_n_mps(1), sigma_mps, {n.antenna_x_b_m, n.antenna_y_b_m});
+  }
+
+  /// Sigmas by which a heading (the filter's or a magnetometer's) is another one than the motion's; 0: it is not.
+  /// Velocities pull round what is less than half a radian off.
+  [[nodiscard, gnu::noinline]] float contradicts(float yaw_rad, float sigma_rad, float apart_rad = 0.5F,
+                                                 float least = kSigmas) const {
+    if (!runs_) return 0.0F;
+    const float sigmas = finder_.against(yaw_rad, sigma_rad);
+    const bool is = sigmas > least && finder_.apart_rad(yaw_rad) > apart_rad;
+    return is ? sigmas : 0.0F;
+  }
+  /// The filter's heading was contradicted for so long that the filter has to begin anew. With wheels or a speedometer
+  /// by their direction of travel, else by the monitor's own heading.
+  [[nodiscard]] bool heading_wrong(const FilterView& filter) {
+    return persists(contradicted_by_motion(filter), filter);
+  }
+  /// The same for wheels: receiver and wheels agree on a speed, but not on its direction in the body.
+  [[nodiscard]] bool direction_wrong(const nav::Vector3& v_b_mps, float level_mps, float sigma_mps,
+                                     const FilterView& filter) {
+    return persists(sideways(v_b_mps, level_mps, sigma_mps, filter), filter);
+  }
+
+  /// The motion's heading survives a restart of the filter.
+  void take_over(const HeadingMonitor& from) {
+    if (!from.runs_) return;
+    finder_ = from.finder_;
+    has_velocity_ = from.has_velocity_;
+    runs_ = true;
+  }
+  template <class Sink>
+  void hash_state(Sink&& sink) const {
+    finder_.hash_state(sink);
+    contradicted_.hash_state(sink);
+    sink(static_cast<std::uint32_t>((has_velocity_ ? 1U : 0U) | (runs_ ? 2U : 0U)));
+  }
+
+ private:
+  [[nodiscard]] bool contradicted_by_motion(const FilterView& filter) const;
+  [[nodiscard]] static bool sideways(const nav::Vector3& v_b_mps, float level_mps, float sigma_mps,
+                                     const FilterView& filter);
+  [[nodiscard]] bool persists(bool contradicted, const FilterView& filter) {
+    constexpr base::Micros kMaxGap{2'500'000};
+    const param::RecoveryParameters& n = filter.parameters().recovery;
+    contradicted_.update(contradicted, filter.stamp(), kMaxGap);
+    return contradicted_.persists(filter.stamp(), base::Micros{n.after_us}, n.at_least);
+  }
+
+  nav::YawEstimator finder_;
+  checks::Persistence contradicted_;  ///< tests in a row that contradicted the filter's heading
+  bool has_velocity_ = false;         ///< the receiver gives a velocity: its positions are left out
+  bool runs_ = false;                 ///< the monitor runs beside the filter, or did before a restart
+};
+
+/// A magnetometer that is not trusted may have led the heading so surely that velocities alone do not pull it round:
+/// then a smaller difference counts.
+[[gnu::noinline]] inline bool HeadingMonitor::contradicted_by_motion(const FilterView& filter) const {
+  constexpr float kLed_rad = 0.1F, kLedSigmas = 3.0F;
+  const float yaw_rad = nav::euler(filter.x().q_nb).yaw_rad, sigma_rad = base::sqrt(filter.heading_rad2());
+  const float sigmas = filter.magnetometer_may_mislead() ? contradicts(yaw_rad, sigma_rad, kLed_rad, kLedSigmas)
+                                                         : contradicts(yaw_rad, sigma_rad);
+  return sigmas > 0.0F;
+}
+
+/// Nothing drives half a radian sideways: where receiver and wheels agree on the speed, the filter's heading is wrong.
+[[gnu::noinline]] inline bool HeadingMonitor::sideways(const nav::Vector3& v_b_mps, float level_mps, float sigma_mps,
+                                                       const FilterView& filter) {
+  constexpr float kCosine = 0.88F;
+  const float wheels = filter.recent_forward_mps();
+  const float forward = wheels < 0.0F ? -v_b_mps(0) : v_b_mps(0);
+  return level_mps > 4.0F * sigma_mps + 0.3F &&
+         base::abs(level_mps - base::abs(wheels)) < 3.0F * sigma_mps + 0.05F * level_mps &&
+         forward < kCosine * level_mps - sigma_mps;
+}
+
+}  // namespace tetap::estimators

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: Apache-2.0
+// The IMU as the filter at the horizon uses it: its health, its last turn rate, and where the filter went without it.
+#pragma once
+
+#include "checks/imu_health.hpp"
+#include "estimators/inertial/source.hpp"
+#include "sensor/row_major.hpp"
+
+namespace tetap::estimators {
+
+/// Increments along the body's axes.
+[[nodiscard]] inline nav::ImuIncrement mounted(const nav::ImuIncrement& s, const param::InertialParameters& n) {
+  return {.dtheta_b_rad = sensor::times(n.mounting_bs, s.dtheta_b_rad),
+          .dv_b_mps = sensor::times(n.mounting_bs, s.dv_b_mps),
+          .dt = s.dt};
+}
+
+class ImuInput {
+ public:
+  [[nodiscard]] checks::ImuHealth& health() { return health_; }
+  [[nodiscard]] const checks::ImuHealth& health() const { return health_; }
+  /// Turn rate as the gyroscope shows it, at the filter's time; its bias is in it.
+  [[nodiscard]] const nav::Vector3& rate_b_radps() const { return rate_b_radps_; }
+  void set_rate(const nav::Vector3& rate_b_radps) { rate_b_radps_ = rate_b_radps; }
+  /// The last sample was at full scale where wheels show the turn.
+  [[nodiscard]] bool saturated() const { return saturated_; }
+  void set_saturated(bool saturated) { saturated_ = saturated; }
+  /// Time to which the filter last went without IMU; 0: never.
+  [[nodiscard]] base::Micros bridged_until() const { return bridged_until_; }
+  void set_bridged(base::Micros until) { bridged_until_ = until; }
+
+  /// The last step of a filter at `time` was without IMU.
+  [[nodiscard]] bool missing(base::Micros time) const {
+    return health_.stuck() || saturated_ || (bridged_until_.us > 0 && bridged_until_ == time);
+  }
+  /// Within the last second the filter went without IMU, or the IMU was stuck.
+  [[nodiscard]] bool missing_lately(base::Micros time) const {
+    return health_.stuck_lately(time) || checks::recent(bridged_until_, time, base::Micros{1'000'000});
+  }
+  [[nodiscard]] SourceStatus status(base::Micros at, const param::InertialParameters& n) const {
+    if (health_.stuck()) return {SourceState::kDistrusted, Check::kStuck};
+    if (health_.last_valid().us == 0 || health_.stale(at, n)) return {SourceState::kStopped, Check::kNone};
+    return {saturated_ ? SourceState::kRejecting : SourceState::kFusing, saturated_ ? Check::kValue : Check::kNone};
+  }
+
+  template <class Sink>
+  void hash_state(Sink&& sink) const {
+    health_.hash_state(sink);
+    for (int i = 0; i < 3; ++i) sink(rate_b_radps_(i));
+    sink(bridged_until_.us);
+    sink(static_cast<std::uint32_t>(saturated_));
+  }
+
+ private:
+  checks::ImuHealth health_;
+  nav::Vector3 rate_b_radps_ = nav::Vector3::Zero();
+  base::Micros bridged_until_;
+  bool saturated_ = false;
+};
+
+}  // namespace tetap::estimators

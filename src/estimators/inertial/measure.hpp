@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+// Inertial navigation: one measurement through its innovation gate, and what follows from refusing it for long.
+#pragma once
+
+#include "estimators/inertial/inertial.hpp"
+
+namespace tetap::estimators {
+
+template <class Model, class Source>
+Innovation Inertial::measure(const Model& model, Source& source, float gate_scale, const FilterView& filter) {
+  const auto result = update(model, gate_scale * filter::chi_square_99(Model::kDimension));
+  if (result.verdict > filter::Verdict::kRejected) return record(result);
+  const bool rejected = result.verdict == filter::Verdict::kRejected;
+  Assessment a{.dof = Model::kDimension, .nis = result.nis, .gate = result.gate};
+  if (rejected) a.reject(Check::kGate);
+  source.conclude(a, result.nu, filter);
+  apply(a, filter);
+  // Neither velocity nor place nor wheels, however uncertain the filter became: it is wrong about more than that.
+  const param::RecoveryParameters& n = filter.parameters().recovery;
+  if (recovery_.exhausted() && filter.position_refused(n.at_least) && !filter.wheels_agree())
+    restart_filter(filter.stamp(), sensor::ResetCause::kDiverged, filter.context());
+  return record_of(a);
+}
+
+}  // namespace tetap::estimators

@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: Apache-2.0
+// Inertial navigation: what is published.
+#pragma once
+
+#include "estimators/inertial/inertial.hpp"
+
+namespace tetap::estimators {
+
+inline sensor::Mode Inertial::mode(const Context& ctx) const {
+  if (phase_ == Phase::kLevelling)
+    return alignment_.levelling() ? sensor::Mode::kLevelling : sensor::Mode::kWaitingForImu;
+  if (phase_ == Phase::kFindingHeading)
+    return alignment_.placed() ? sensor::Mode::kFindingHeading : sensor::Mode::kWaitingForPose;
+  const bool dead_reckoning = sources_.position.timed_out(time_);
+  if (predictor_.without_imu() || imu_.missing_lately(time_)) {
+    const bool carried = sources_.wheels.encoders().counts_lately(time_) || sources_.position.fused_lately(time_);
+    return carried ? sensor::Mode::kDegraded : sensor::Mode::kWaitingForImu;
+  }
+  if (view(time_, ctx).slip() != Wheels::Slip::kNone || sources_.any_refused(3)) return sensor::Mode::kDegraded;
+  return dead_reckoning ? sensor::Mode::kDeadReckoning : sensor::Mode::kNominal;
+}
+
+/// For the status of the present.
+inline std::uint16_t Inertial::faults() const {
+  std::uint16_t bits = 0;
+  const auto raise = [&bits](sensor::Fault fault, bool is) {
+    if (is) bits = static_cast<std::uint16_t>(bits | 1U << static_cast<unsigned>(fault));
+  };
+  const checks::ImuHealth& imu = imu_.health();
+  raise(sensor::Fault::kWheelSlip, sources_.wheels.slip() != Wheels::Slip::kNone);
+  raise(sensor::Fault::kImuClipped, imu.clipped_lately(time_));
+  raise(sensor::Fault::kVibration, imu.shaken());
+  raise(sensor::Fault::kSensorStuck, imu.stuck() || sources_.any_stuck(time_));
+  raise(sensor::Fault::kInputStale, predictor_.without_imu() && !imu.stuck() && !imu_.saturated());
+  return bits;
+}
+
+template <class Sink>
+void Inertial::for_each_source(const Context& ctx, Sink&& sink) const {
+  const auto row = [&](sensor::Sensor of, const SourceStatus& status) { sink(of, status.state, status.failed); };
+  row(sensor::Sensor::kImu, imu_.status(time_, ctx.parameters.inertial));
+  row(sensor::Sensor::kGnssPosition, sources_.position.status(time_));
+  row(sensor::Sensor::kGnssVelocity, sources_.velocity.status(time_));
+  row(sensor::Sensor::kWheelSpeed, sources_.wheels.status(time_));
+  row(sensor::Sensor::kBodySpeed, sources_.forward.status(time_));
+  row(sensor::Sensor::kHeading, sources_.heading.status(time_));
+  row(sensor::Sensor::kMagnetometer, sources_.magnetometer.status(time_));
+  row(sensor::Sensor::kBarometer, sources_.barometer.status(time_));
+}
+
+/// Span to the present without IMU, squared, as the filter will grow there: over all of it, or over what is missing, at
+/// its end, too. Variance of velocity per (m/s^2)^2, or of attitude per (rad/s)^2.
+inline float Inertial::unseen_s2(float unseen_s) const {
+  constexpr float kLasts_s = 0.1F;  // Ins::predict_without_imu
+  constexpr base::Micros kHole{25'000};
+  if (predictor_.without_imu()) return ahead_s() * ahead_s();
+  const base::Micros open = predictor_.time() - predictor_.place().reached;
+  return kLasts_s * (unseen_s + (open > kHole ? base::seconds(open) : 0.0F));
+}
+
+/// From the time of the covariance to the present. In place: a pose needs little of it.
+[[gnu::always_inline]] inline nav::InsCovarianceStep<float> Inertial::step_ahead(const Context& ctx) const {
+  const param::InertialParameters& n = ctx.parameters.inertial;
+  nav::InsCovarianceStep<float> step = ins_.step_to(present(), ahead_s());
+  const float unseen_m2ps2 = unseen_s2(predictor_.place().unseen_s) * n.gap_mps2 * n.gap_mps2;
+  const float turn_radps = unseen_turn_radps(ctx), half_s = 0.5F * ahead_s();
+  step.var_p += half_s * half_s * unseen_m2ps2;
+  step.var_v += unseen_m2ps2;
+  step.var_theta += unseen_s2(predictor_.place().unseen_turn_s) * turn_radps * turn_radps;
+  return step;
+}
+
+inline InertialEstimate Inertial::inertial(const Context& ctx) const {
+  return {.state = present(),
+          .p = ins_.p,
+          .ahead = step_ahead(ctx),
+          .valid = tracking(),
+          .jump = recovery_.jump(),
+          .imu = imu_.health().report()};
+}
+
+inline Estimate Inertial::estimate(const Context& ctx) const {
+  const nav::InsState& x = present();
+  const bool valid = tracking();
+  const nav::InsCovarianceStep<float> ahead = step_ahead(ctx);
+  const nav::Vector3 v_b = x.q_nb.conjugate().rotate(x.v_n_mps);
+  const nav::Vector3 rate_b = valid ? predictor_.place().rate_b_radps : imu_.rate_b_radps();
+  const nav::Vector3 w_n = x.q_nb.rotate(rate_b - x.b_g_radps);
+  constexpr int kX = nav::InsState::kPosition, kY = kX + 1, kYaw = nav::InsState::kAttitude + 2;
+  filter::Symmetric<float, 3> planar;
+  if (valid) {
+    planar(0, 0) = nav::predicted_covariance<kX, kX>(ins_.p, ahead);
+    planar(0, 1) = nav::predicted_covariance<kX, kY>(ins_.p, ahead);
+    planar(1, 1) = nav::predicted_covariance<kY, kY>(ins_.p, ahead);
+    planar(0, 2) = nav::predicted_covariance<kX, kYaw>(ins_.p, ahead);
+    planar(1, 2) = nav::predicted_covariance<kY, kYaw>(ins_.p, ahead);
+    planar(2, 2) = nav::predicted_covariance<kYaw, kYaw>(ins_.p, ahead);
+  } else {
+    constexpr float kPlace = kUnknown_m * kUnknown_m;
+    planar = filter::Symmetric<float, 3>::diagonal({kPlace, kPlace, kUnknown_rad * kUnknown_rad});
+  }
+  return {.time = predictor_.time(),
+          .pose = {.x = x.x, .y = x.y, .yaw_rad = nav::euler(x.q_nb).yaw_rad},
+          .p = planar,
+          .forward_mps = v_b(0),
+          .yaw_rate_radps = w_n(2),
+          .position_valid = valid,
+          .heading_valid = valid,
+          .velocity_valid = valid};
+}
+
+namespace detail {
+
+/// row P row^T of the errors from kFirst on.
+template <int kFirst, std::size_t kN>
+[[nodiscard]] inline float quadratic(const nav::Ins::Covariance& p, const std::array<float, kN>& row) {
+  float sum = 0;
+  for (std::size_t c = 0; c < kN; ++c)
+    for (std::size_t r = 0; r < kN; ++r)
+      sum += row[r] * row[c] * p(kFirst + static_cast<int>(r), kFirst + static_cast<int>(c));
+  return sum;
+}
+
+}  // namespace detail
+
+/// Of the speed ahead, x_b . R^T v at the present: by velocity, attitude (as far as the robot does not go where it
+/// points, and by what tilt made of acceleration since) and accelerometer bias; to second order by an uncertain
+/// heading. Of the turn: by gyroscope noise and bias, and by the age of its sample.
+[[gnu::noinline]] inline MotionVariance Inertial::motion_variance(const Context& ctx) const {
+  const InertialEstimate full = inertial(ctx);
+  if (!full.valid) return {};
+  const nav::Quaternion& q = full.state.q_nb;
+  const nav::Vector3& v = full.state.v_n_mps;
+  const nav::Vector3 ahead_n = q.rotated_x();
+  const nav::Vector3 by_turn = nav::cross(ahead_n, nav::Vector3(v - full.ahead.dv_n_mps));
+  const std::array<float, 7> speed{ahead_n(0), ahead_n(1), ahead_n(2),      by_turn(0),
+                                   by_turn(1), by_turn(2), -full.ahead.dt_s};
+  const float heading = full.covariance<nav::InsState::kAttitude + 2>(), yaw_rad2 = heading < 1.0F ? heading : 1.0F;
+  MotionVariance variance{.forward_m2ps2 = detail::quadratic<nav::InsState::kVelocity>(full.p, speed) +
+                                           full.ahead.var_v + 0.5F * v.squaredNorm() * yaw_rad2 * yaw_rad2,
+                          .yaw_rate_rad2ps2 = 0};
+  if (predictor_.without_imu()) {
+    const float turn_radps = unseen_turn_radps(ctx);
+    variance.yaw_rate_rad2ps2 = turn_radps * turn_radps;
+    return variance;
+  }
+  const nav::Vector3 up_b = q.z_seen();
+  const std::array<float, 3> turn{up_b(0), up_b(1), up_b(2)};
+  const float gyro = ins_.vibration * ctx.parameters.inertial.gyro_radps_rthz;
+  const float period_s = base::seconds(base::Micros{ctx.parameters.loop.period_us});
+  // A sample is a mean, true in its middle.
+  const float age_s = base::seconds(predictor_.time() - predictor_.place().last) + 0.5F * period_s;
+  const float aged = ctx.parameters.loop.turn_radps2 * age_s;
+  variance.yaw_rate_rad2ps2 =
+      detail::quadratic<nav::InsState::kGyroBias>(full.p, turn) + gyro * gyro / period_s + aged * aged;
+  return variance;
+}
+
+template <class Sink>
+void Inertial::hash_state(Sink&& sink) const {
+  ins_.x.hash_state(sink);
+  ins_.each_bit_of_p(sink);
+  predictor_.hash_state(sink);
+  if (recovery_.step_unknown()) predictor_.present().hash_state(sink);
+  budget_.hash_state(sink);
+  alignment_.hash_state(sink);
+  heading_monitor_.hash_state(sink);
+  sink(static_cast<std::uint32_t>(phase_));
+  sink(time_.us);
+  imu_.hash_state(sink);
+  standstill_.hash_state(sink);
+  sources_.hash_state(sink);
+  recovery_.hash_state(sink);
+}
+
+}  // namespace tetap::estimators

@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: Apache-2.0
+// Inertial navigation: IMU samples, spans without them, and standstill.
+#pragma once
+
+#include "estimators/inertial/inertial.hpp"
+
+namespace tetap::estimators {
+
+inline Innovation Inertial::fuse(const sensor::ImuSample& sample, base::Micros stamp, const Context& ctx) {
+  const param::InertialParameters& n = ctx.parameters.inertial;
+  budget_.spend(WorkBudget::kImuSample);
+  const nav::ImuIncrement increment = mounted(checks::increment_of(sample), n);
+  const base::Micros pause = stamp - increment.dt - time_;
+  const bool was_stuck = imu_.health().stuck();
+  const bool turn_known = sample.clipped_gyro > 0 && tracking() && view(stamp, ctx).wheels_show_turn();
+  const checks::ImuClass found = imu_.health().update(sample, increment, stamp, pause, turn_known, n);
+  if (found == checks::ImuClass::kInvalid) return {.verdict = sensor::Verdict::kNotFinite, .failed = Check::kValue};
+  // The predictor may have classified the sample otherwise.
+  if (sample.clipped_gyro > 0 || sample.clipped_accel > 0) predictor_.note_correction();
+  if (found == checks::ImuClass::kStuck) return imu_stuck(increment, was_stuck, ctx);
+  imu_.set_saturated(found == checks::ImuClass::kSaturated);
+  if (found == checks::ImuClass::kSaturated) return {.verdict = sensor::Verdict::kNotUsed, .failed = Check::kValue};
+  // All that was true at the last sample has been fused: wheels bring the constraint with them, and twice is too sure.
+  if (tracking()) fuse_constraint(time_, ctx);
+  imu_.set_rate(increment.dtheta_b_rad / base::seconds(increment.dt));
+  if (!tracking()) return align(increment, pause, stamp, ctx);
+  if (found == checks::ImuClass::kOverlapping) {
+    predictor_.note_correction();
+    return {.verdict = sensor::Verdict::kStale, .failed = Check::kTime};
+  }
+  if (found == checks::ImuClass::kAfterGap) bridge_lost_samples(pause, ctx);
+  return propagate(sample, increment, stamp, ctx);
+}
+
+/// Repetitions before this one were taken for motion.
+inline Innovation Inertial::imu_stuck(const nav::ImuIncrement& increment, bool was_stuck, const Context& ctx) {
+  const param::InertialParameters& n = ctx.parameters.inertial;
+  if (!was_stuck) predictor_.note_correction();
+  const float false_s = static_cast<float>(n.stuck_samples) * base::seconds(increment.dt);
+  if (!was_stuck && tracking()) Recovery::inflate_motion(ins_, n.gap_mps2 * false_s, n.gap_radps * false_s);
+  return {.verdict = sensor::Verdict::kStale, .failed = Check::kStuck};
+}
+
+/// Before the filter runs.
+inline Innovation Inertial::align(const nav::ImuIncrement& increment, base::Micros pause, base::Micros stamp,
+                                  const Context& ctx) {
+  if (checks::ImuClassifier::is_gap(pause)) alignment_.gap(pause, heading_monitor_);
+  time_ = stamp;
+  if (alignment_.level(increment, heading_monitor_, ctx.parameters.inertial)) phase_ = Phase::kFindingHeading;
+  if (phase_ == Phase::kFindingHeading && alignment_.ready()) begin(ctx);
+  return {.verdict = sensor::Verdict::kAccepted};
+}
+
+/// Lost samples are bridged; what was bridged already this sample does not show again.
+inline void Inertial::bridge_lost_samples(base::Micros gap, const Context& ctx) {
+  const nav::Vector3 shown = imu_.rate_b_radps();
+  const base::Micros before = imu_.bridged_until();
+  bridge(gap, ctx);
+  if (gap <= base::Micros{ctx.parameters.inertial.stale_us}) imu_.set_bridged(before);  // a few lost are no lost IMU
+  imu_.set_rate(shown);
+}
+
+inline Innovation Inertial::propagate(const sensor::ImuSample& sample, const nav::ImuIncrement& increment,
+                                      base::Micros stamp, const Context& ctx) {
+  const param::InertialParameters& n = ctx.parameters.inertial;
+  const float dt_s = base::seconds(increment.dt);
+  const nav::Quaternion& q = ins_.x.q_nb;
+  const float up_b = 2.0F * (q.x * q.z - q.w * q.y);  // share of gravity's reaction that points forward
+  sources_.wheels.encoders().note_gain(increment.dv_b_mps(0) -
+                                       (ins_.x.b_a_mps2(0) + up_b * ins_.earth.gravity_mps2) * dt_s);
+  const nav::ImuVerdict verdict = ins_.predict(increment);
+  if (verdict == nav::ImuVerdict::kDiverged)
+    restart_filter(stamp, sensor::ResetCause::kDiverged, ctx);  // faster than anything drives
+  if (verdict != nav::ImuVerdict::kAccepted) {
+    time_ = stamp;
+    return {.verdict = sensor::Verdict::kNotFinite, .failed = Check::kValue};
+  }
+  ins_.vibration = imu_.health().noise_factor(n);
+  if (ins_.pending_s() >= predictor_.schedule().covariance_every_s()) ins_.predict_covariance();
+  if (sample.clipped_accel > 0 || sample.clipped_gyro > 0) inflate_clipped(sample, dt_s, n);
+  time_ = stamp;
+  if (stamp > predictor_.last_seen()) predictor_.note_correction();  // it left the window before the present had it
+  standstill_.update_rate(imu_.rate_b_radps(), dt_s);
+  detect_standstill(stamp, ctx);
+  if (view(stamp, ctx).wheels_silent()) {
+    heading_monitor_.predict(increment, ins_.x.q_nb);
+  } else {
+    heading_monitor_.stop();
+  }
+  return {.verdict = sensor::Verdict::kAccepted};
+}
+
+/// Clipped increments are used, and are as uncertain as none.
+[[gnu::noinline]] inline void Inertial::inflate_clipped(const sensor::ImuSample& sample, float dt_s,
+                                                        const param::InertialParameters& n) {
+  const float growth = base::sqrt(dt_s * 0.1F);
+  if (sample.clipped_accel > 0) ins_.accel_n_mps2 = nav::Vector3::Zero();
+  Recovery::inflate_motion(ins_, n.gap_mps2 * growth, sample.clipped_gyro > 0 ? n.gap_radps * growth : 0.0F);
+}
+
+/// Goes on without IMU: the velocity stays what it is in the body, which turns as the wheels show, or not at all.
+[[gnu::noinline]] inline void Inertial::bridge(base::Micros gap, const Context& ctx) {
+  const param::InertialParameters& n = ctx.parameters.inertial;
+  const bool wheels = view(time_, ctx).wheels_show_turn();
+  const float dt_s = base::seconds(gap);
+  ins_.predict_without_imu(gap, n.gap_mps2, unseen_turn_radps(ctx));
+  nav::Vector3 w_b = nav::Vector3::Zero();
+  if (wheels) {
+    w_b(2) = sources_.wheels.turn_radps();
+    ins_.turn_without_imu(nav::exp_quaternion(ins_.x.q_nb.rotate(w_b) * dt_s));
+    // Both wheels slip by their share, each on its own, for about a second the same.
+    const float slip = n.slip_share * n.slip_share * 2.0F * ins_.x.v_n_mps.squaredNorm();
+    const float track_m = ctx.parameters.wheels.drive.track_m;
+    Recovery::inflate_heading(ins_, slip / (track_m * track_m) * dt_s);
+  }
+  predictor_.note_correction();
+  alignment_.gap(gap, heading_monitor_);
+  imu_.set_rate(ins_.x.b_g_radps + w_b);
+  time_ += gap;
+  imu_.set_bridged(time_);
+  sources_.wheels.encoders().forget_gain();
+  standstill_.interrupt();
+}
+
+inline void Inertial::detect_standstill(base::Micros stamp, const Context& ctx) {
+  const param::InertialParameters& n = ctx.parameters.inertial;
+  const FilterView filter = view(stamp, ctx);
+  ins_.stands = standstill_.detect(filter, imu_.health().calm(n));
+  if (!ins_.stands) return;
+  const float gate = filter::chi_square_99(3) * Standstill::kGateScale;
+  if (standstill_.velocity_due(filter, budget_))
+    static_cast<void>(update(model::ZeroVelocity{.sigma_mps = Standstill::sigma_mps(filter)}, gate));
+  if (standstill_.rate_due(filter, budget_)) fuse_zero_rate(n);
+}
+
+[[gnu::noinline]] inline void Inertial::fuse_zero_rate(const param::InertialParameters& n) {
+  if (ins_.pending_s() > 0.0F) ins_.predict_covariance();
+  const Standstill::ZeroRateUpdate due = standstill_.take_rate(ins_, n);
+  budget_.spend(WorkBudget::kMeasurement);
+  predictor_.note_correction();
+  const float gate = filter::chi_square_99(3) * Standstill::kGateScale;
+  static_cast<void>(ins_.update_shared_noise(due.model, gate, due.shared, due.wander));
+}
+
+}  // namespace tetap::estimators

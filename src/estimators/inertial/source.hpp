@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: Apache-2.0
+// One shape for every aiding source. A source assesses a measurement against a read-only view of the filter and changes
+// nothing but itself; the Assessment is what is to be done with the measurement, and with the filter. PX4 publishes
+// the like for every source (EstimatorAidSource).
+#pragma once
+
+#include "base/time.hpp"
+#include "nav/so3.hpp"
+#include "sensor/source_state.hpp"
+#include "sensor/vocabulary.hpp"
+
+#include <array>
+#include <concepts>
+#include <cstdint>
+
+namespace tetap::estimators {
+
+using sensor::Check;
+using sensor::SourceState;
+
+enum class Action : std::uint8_t {
+  kFuse,             ///< update the filter
+  kSkip,             ///< leave the measurement out: it is no news, or waits for others
+  kReject,           ///< leave the measurement out: a test failed
+  kInflateMotion,    ///< reject; the source was refused for too long: velocity and heading become less certain
+  kInflateVelocity,  ///< the same of a refused velocity: by its innovation, and tilt and bias as at the start
+  kInflateSpeed,     ///< reject; the filter went along with wheels that spin
+  kInflateHeading,   ///< the heading becomes as uncertain as the innovation
+  kResetZero,        ///< reject; the source took a new zero
+  kResetPosition,    ///< fuse, after the horizontal position was reset
+  kResetHeight,      ///< fuse, after the height was reset
+  kRestartFilter,    ///< reject; the filter begins anew
+};
+
+/// Operands of Recovery; zero where the action needs none.
+struct Remedy {
+  nav::Vector3 step_m = nav::Vector3::Zero();       ///< reset: how far
+  nav::Vector3 variance_m2 = nav::Vector3::Zero();  ///< variance of the position after a reset
+  std::array<float, 2> pulled_m{};                  ///< 1 sigma by which refused fixes may have led the position before
+  nav::Vector3 innovation_mps = nav::Vector3::Zero();  ///< kInflateVelocity
+  float sigma_mps = 0;                                 ///< 1 sigma of the velocity, beside
+  float sigma_rad = 0;                                 ///< 1 sigma of the heading, beside
+  bool position_refused = false;                       ///< kInflateVelocity: fixes are refused, too
+  bool undoes = false;                                 ///< kResetPosition: back to where the last reset came from
+};
+
+/// The uniform record of one test of one measurement: what is to be done, and why.
+struct Assessment {
+  Action action = Action::kFuse;
+  Check failed = Check::kNone;
+  sensor::Verdict verdict = sensor::Verdict::kAccepted;
+  sensor::ResetCause cause = sensor::ResetCause::kPositionJump;  ///< cause of a reset or a restart
+  std::uint8_t dof = 0;
+  float nis = 0;
+  float gate = 0;
+  float statistic = 0;  ///< statistic of the failed check, where that is not the innovation gate
+  float limit = 0;      ///< the statistic's limit
+  Remedy remedy;
+
+  void reject(Check check) {
+    action = Action::kReject;
+    failed = check;
+    verdict = sensor::Verdict::kRejected;
+  }
+  [[nodiscard]] bool fuses() const {
+    return action == Action::kFuse || action == Action::kResetPosition || action == Action::kResetHeight;
+  }
+};
+
+/// The word of a source and the test that failed last.
+struct SourceStatus {
+  SourceState state = SourceState::kStopped;
+  Check failed = Check::kNone;
+
+  void fused() { *this = {SourceState::kFusing, Check::kNone}; }
+  void confirming() { *this = {SourceState::kConfirming, Check::kUnconfirmed}; }
+  void rejecting(Check check) { *this = {SourceState::kRejecting, check}; }
+  void distrusted(Check check) { *this = {SourceState::kDistrusted, check}; }
+  template <class Sink>
+  void hash_state(Sink&& sink) const {
+    sink(static_cast<std::uint32_t>(static_cast<unsigned>(state) | static_cast<unsigned>(failed) << 8U));
+  }
+};
+
+class FilterView;
+
+template <class S>
+concept AidingSource = requires(S& s, const S& seen, const typename S::Measurement& z, const FilterView& filter,
+                                base::Micros at) {
+  { s.assess(z, filter) } -> std::same_as<Assessment>;
+  { seen.timed_out(at) } -> std::same_as<bool>;
+  { seen.status(at) } -> std::same_as<SourceStatus>;
+  s.hash_state([](auto) {});
+};
+
+}  // namespace tetap::estimators

@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: Apache-2.0
+// Barometer: of the height and the barometer's zero the one that is known worse is corrected by the other.
+#pragma once
+
+#include "checks/stuck_value.hpp"
+#include "estimators/inertial/barometer_zero.hpp"
+#include "estimators/inertial/filter_view.hpp"
+#include "model/height.hpp"
+
+namespace tetap::estimators {
+
+struct HeightMeasurement {
+  float altitude_m = 0;  ///< by the pressure
+  float height_m = 0;    ///< the filter's, at the sample's time
+};
+
+class Barometer {
+ public:
+  using Measurement = HeightMeasurement;
+
+  [[nodiscard]] static bool starting_conditions(const FilterView& filter) {
+    return filter.parameters().baro.use != 0 && filter.tracking();
+  }
+  /// Range, and whether the sensor is stuck.
+  [[nodiscard]] Assessment assess_pressure(const sensor::AirPressure& air, const FilterView& filter);
+  [[nodiscard]] static HeightMeasurement measurement(const sensor::AirPressure& air, const FilterView& filter) {
+    const float later_s = base::seconds(filter.stamp() - filter.time());
+    return {.altitude_m = pressure_altitude_m(air.pressure_Pa),
+            .height_m = nav::difference(filter.x().z, {}) + filter.x().v_n_mps(2) * later_s};
+  }
+  /// kFuse: the filter is to be updated with model(). kSkip, accepted: the zero took the correction, or needs none.
+  [[nodiscard]] Assessment assess(const HeightMeasurement& z, const FilterView& filter);
+  [[nodiscard]] model::Height model(const HeightMeasurement& z, const FilterView& filter) const {
+    const param::BaroParameters& n = filter.parameters().baro;
+    const float p_b = zero_.variance(z.altitude_m, n), white = n.sigma_m * n.sigma_m;
+    return {.z = filter.x().z.plus(innovation_m(z)),
+            .sigma_m = base::sqrt(white + variance_towards(p_b, filter.p()(2, 2)))};
+  }
+  /// Pressure that stays different (a door, a hatch, a gust) is a new zero.
+  [[nodiscard]] bool reset_allowed(const FilterView& filter) const {
+    return zero_.refused_for(filter.stamp()) >= base::Micros{filter.parameters().recovery.after_us};
+  }
+
+  [[nodiscard]] bool stuck(base::Micros at) const { return repeats_.stuck(at); }
+  [[nodiscard]] bool timed_out(base::Micros at) const {
+    return !checks::recent(repeats_.last(), at, base::Micros{2'000'000});
+  }
+  [[nodiscard]] SourceStatus status(base::Micros at) const { return timed_out(at) ? SourceStatus{} : status_; }
+  template <class Sink>
+  void hash_state(Sink&& sink) const {
+    zero_.hash_state(sink);
+    repeats_.hash_state(sink);
+    status_.hash_state(sink);
+  }
+
+ private:
+  static constexpr float kWorth = 1.05F;  ///< a variance has to be off by so much for an update to change anything
+
+  [[nodiscard]] float innovation_m(const HeightMeasurement& z) const {
+    return z.altitude_m - zero_.zero_m() - z.height_m;
+  }
+  void set_zero(const HeightMeasurement& z, const FilterView& filter) {
+    const float white = filter.parameters().baro.sigma_m * filter.parameters().baro.sigma_m;
+    zero_.set(z.altitude_m, z.altitude_m - z.height_m, filter.p()(2, 2) + white, filter.stamp());
+  }
+  void judge_refused(const HeightMeasurement& z, const FilterView& filter, Assessment& a);
+
+  BarometerZero zero_;
+  checks::StuckValue<1> repeats_;
+  SourceStatus status_;
+};
+
+inline Assessment Barometer::assess_pressure(const sensor::AirPressure& air, const FilterView& filter) {
+  constexpr float kLeast_Pa = 22'700;  // the model ends at 11 km
+  if (!(air.pressure_Pa >= kLeast_Pa && air.pressure_Pa < 2e5F)) {
+    status_.rejecting(Check::kValue);
+    return {.action = Action::kReject, .failed = Check::kValue, .verdict = sensor::Verdict::kNotFinite};
+  }
+  if (!repeats_.update({air.pressure_Pa}, filter.parameters().baro.stuck_samples, filter.stamp())) return {};
+  status_.distrusted(Check::kStuck);
+  return {.action = Action::kSkip, .failed = Check::kStuck, .verdict = sensor::Verdict::kStale};
+}
+
+[[gnu::noinline]] inline Assessment Barometer::assess(const HeightMeasurement& z, const FilterView& filter) {
+  const param::BaroParameters& n = filter.parameters().baro;
+  status_.fused();
+  if (!zero_.known()) {
+    set_zero(z, filter);
+    return {.action = Action::kSkip};
+  }
+  zero_.predict(filter.stamp(), n);
+  const float white = n.sigma_m * n.sigma_m, p_z = filter.p()(2, 2);
+  const float p_b = zero_.variance(z.altitude_m, n), nu = innovation_m(z);
+  Assessment a{.dof = 1, .nis = nu * nu / (p_z + p_b + white), .gate = n.gate_scale * filter::chi_square_99(1)};
+  if (!(a.nis < 1e30F))
+    return {.action = Action::kReject, .failed = Check::kValue, .verdict = sensor::Verdict::kNotFinite};
+  if (a.nis > a.gate) {
+    judge_refused(z, filter, a);
+    return a;
+  }
+  zero_.agreed(filter.stamp());
+  if (p_z > kWorth * p_b) return a;
+  if (p_b > kWorth * p_z) zero_.correct(nu, p_b, p_z, white, z.altitude_m);
+  a.action = Action::kSkip;
+  return a;
+}
+
+inline void Barometer::judge_refused(const HeightMeasurement& z, const FilterView& filter, Assessment& a) {
+  a.action = Action::kReject;
+  a.failed = Check::kGate;
+  a.verdict = sensor::Verdict::kRejected;
+  status_.rejecting(Check::kGate);
+  if (!reset_allowed(filter)) return;
+  set_zero(z, filter);
+  a.action = Action::kResetZero;
+  a.cause = sensor::ResetCause::kBarometerZero;
+}
+
+}  // namespace tetap::estimators

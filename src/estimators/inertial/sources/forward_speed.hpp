@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: Apache-2.0
+// Forward speed of wheels or of a speedometer, with the non-holonomic constraint; and the constraint alone, where no
+// speed comes.
+#pragma once
+
+#include "estimators/inertial/filter_view.hpp"
+#include "estimators/inertial/refusal.hpp"
+#include "estimators/inertial/wheel_reading.hpp"
+#include "model/wheel_speed.hpp"
+
+namespace tetap::estimators {
+
+class ForwardSpeedSource {
+ public:
+  using Measurement = ForwardReading;
+
+  /// A forward speed as wheels or a speedometer show it, fused or not.
+  void note(float mps, base::Micros stamp) {
+    last_mps_ = mps;
+    last_ = stamp;
+  }
+  /// The constraint without a speed. Of a start in motion: linearised about a speed and a heading that are both
+  /// uncertain, it leaves out the product of the two errors. While that is more than the mean of its noise over some
+  /// samples, the constraint would take it for a heading.
+  [[nodiscard]] bool starting_conditions(const FilterView& filter) {
+    constexpr float kMean_s = 0.04F;
+    const param::InertialParameters& n = filter.parameters().inertial;
+    const nav::Ins::Covariance& p = filter.p();
+    const float mean2 = n.lateral_mps * n.lateral_mps * base::seconds(base::Micros{n.constrain_every_us}) / kMean_s;
+    speed_known_ = speed_known_ || (p(3, 3) + p(4, 4)) * p(8, 8) < mean2;
+    return speed_known_;
+  }
+  /// The innovation gate follows in the update.
+  [[nodiscard]] Assessment assess(const ForwardReading&, const FilterView& filter) {
+    fused_at_ = filter.stamp();
+    return {};
+  }
+  [[nodiscard]] static model::WheelSpeed model(const ForwardReading& z, const FilterView& filter);
+  void conclude(Assessment& a, const nav::Vector3&, const FilterView& filter) {
+    count_refusal(refused_, status_, a, Action::kInflateMotion, filter);
+  }
+  /// Both wheels spin. Where GNSS holds the filter's velocity the wheels are wrong; without it the filter may as well
+  /// be.
+  [[nodiscard]] Assessment assess_spinning(float mean_mps, const FilterView& filter) {
+    Assessment a{.action = Action::kReject, .failed = Check::kSlip, .verdict = sensor::Verdict::kRejected};
+    refused_.update(true, filter.stamp());
+    status_.rejecting(Check::kSlip);
+    const base::Micros after{filter.parameters().recovery.after_us};
+    if (filter.gnss_holds_velocity() || !refused_.persists(filter.stamp(), after)) return a;
+    a.action = Action::kInflateSpeed;
+    a.remedy.sigma_mps = mean_mps - filter.x().q_nb.conjugate().rotate(filter.x().v_n_mps)(0);
+    refused_.reset();
+    return a;
+  }
+  /// `speed_known`: the filter begins at a speed that was measured or given.
+  void begin(bool speed_known) {
+    refused_.reset();
+    speed_known_ = speed_known;
+  }
+  /// The constraint without a speed is no judge of wheels that spin: refusals stay those of `before`.
+  void restore_refusals(const checks::Persistence& before) { refused_ = before; }
+
+  [[nodiscard]] const checks::Persistence& refused() const { return refused_; }
+  [[nodiscard]] float last_mps() const { return last_mps_; }
+  [[nodiscard]] base::Micros last() const { return last_; }
+  [[nodiscard]] base::Micros fused_at() const { return fused_at_; }
+  /// No speed came for 1.5 s; a speedometer may come once a second.
+  [[nodiscard]] bool timed_out(base::Micros at) const { return !checks::recent(last_, at, base::Micros{1'500'000}); }
+  [[nodiscard]] SourceStatus status(base::Micros at) const { return timed_out(at) ? SourceStatus{} : status_; }
+  template <class Sink>
+  void hash_state(Sink&& sink) const {
+    refused_.hash_state(sink);
+    sink(last_mps_);
+    sink(last_.us);
+    sink(fused_at_.us);
+    sink(static_cast<std::uint32_t>(speed_known_));
+    status_.hash_state(sink);
+  }
+
+ private:
+  checks::Persistence refused_;  ///< forward speeds in a row that were refused
+  base::Micros last_;            ///< stamp of the last forward speed of wheels or speedometer; 0: none
+  base::Micros fused_at_;        ///< last stamp at which a speed, or the constraint alone, was fused; 0: never
+  float last_mps_ = 0;           ///< last forward speed of wheels or speedometer
+  bool speed_known_ = false;     ///< the constraint alone may be fused
+  SourceStatus status_;
+};
+
+/// The noise grows with the filter's own speed: by the reading, readings that err to the slow side would count for
+/// more. The reading is true at its own time, the state at that of the last IMU sample.
+inline model::WheelSpeed ForwardSpeedSource::model(const ForwardReading& z, const FilterView& filter) {
+  const param::InertialParameters& n = filter.parameters().inertial;
+  const nav::Ins::Covariance& p = filter.p();
+  const float variance = p(3, 3) + p(4, 4) + p(5, 5);
+  const nav::Vector3 ahead_n = filter.x().q_nb.rotated_x();
+  const float own_mps = ahead_n.dot(filter.x().v_n_mps);
+  const float slip2 = n.slip_share * n.slip_share * (own_mps * own_mps + variance);
+  // Without a speed the filter itself has to be sure that it stands, or goes.
+  constexpr float kSure_mps = 0.1F;
+  const bool goes = z.sigma_mps < ForwardReading::kUnknown_mps
+                        ? base::abs(z.mps) > 2.0F * n.wheel_mps
+                        : variance > kSure_mps * kSure_mps || filter.x().v_n_mps.squaredNorm() > 9.0F * variance;
+  return {.forward_mps = z.mps - ahead_n.dot(filter.ins().accel_n_mps2) * filter.later_s(),
+          .sigma_forward_mps = base::sqrt(n.wheel_mps * n.wheel_mps + slip2 + z.sigma_mps * z.sigma_mps),
+          .sigma_lateral_mps = n.lateral_mps,
+          .sigma_vertical_mps = n.vertical_mps,
+          .axle_b_m = {n.axle_x_b_m, 0.0F, 0.0F},
+          .gyro_b_radps = filter.rate_b_radps(),
+          .moves = goes && !filter.ins().stands};
+}
+
+}  // namespace tetap::estimators

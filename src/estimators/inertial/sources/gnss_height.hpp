@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+// GNSS position, vertical: a height may be refused by itself, and becomes true by persisting.
+#pragma once
+
+#include "checks/offset_hypothesis.hpp"
+#include "estimators/inertial/filter_view.hpp"
+#include "estimators/inertial/fix_measurement.hpp"
+
+namespace tetap::estimators {
+
+class GnssHeightSource {
+ public:
+  using Measurement = FixMeasurement;
+
+  /// After the horizontal part was fused or reset. `fuses()`: the height is fused with it.
+  [[nodiscard]] Assessment assess(const FixMeasurement& z, const FilterView& filter) {
+    const param::Parameters& n = filter.parameters();
+    Assessment a{.dof = 3, .nis = z.statistics.joint_nis, .gate = fix_gate(n.gnss, 3)};
+    const bool agrees = a.nis <= a.gate && !z.drifts;
+    refused_.update(!agrees, filter.stamp());
+    const float p_z = filter.p()(2, 2);
+    if (!agrees || p_z > FixMeasurement::kDecides * z.r(2)) {
+      offset_.update(filter.stamp(), z.nu(2), 0.0F, z.r(2), p_z);
+      if (agrees) {
+        confirm(a, n.recovery);
+      } else {
+        judge_refused(z, a, n.recovery);
+      }
+    }
+    if (a.fuses()) offset_.reset();
+    return a;
+  }
+  void fused() { status_.fused(); }
+  /// Offsets so far were measured from elsewhere.
+  void reset() { offset_.reset(); }
+  void relocated() { refused_.reset(); }
+
+  [[nodiscard]] const checks::Persistence& refused() const { return refused_; }
+  /// A height comes with its fix, and times out with it.
+  [[nodiscard]] bool timed_out(base::Micros) const { return status_.state == SourceState::kStopped; }
+  [[nodiscard]] SourceStatus status(base::Micros) const { return status_; }
+  template <class Sink>
+  void hash_state(Sink&& sink) const {
+    offset_.hash_state(sink);
+    refused_.hash_state(sink);
+    status_.hash_state(sink);
+  }
+
+ private:
+  void confirm(Assessment& a, const param::RecoveryParameters& n) {
+    if (offset_.confirmed(n.confirm_fixes)) return;
+    a.action = Action::kSkip;
+    a.failed = Check::kUnconfirmed;
+    status_.confirming();
+  }
+  void judge_refused(const FixMeasurement& z, Assessment& a, const param::RecoveryParameters& n) {
+    a.failed = z.drifts ? Check::kDrift : Check::kGate;
+    status_.rejecting(a.failed);
+    if (!offset_.persisted(base::Micros{n.persist_us}, n.persist_fixes)) {
+      a.action = Action::kReject;
+      return;
+    }
+    a.action = Action::kResetHeight;
+    a.remedy.step_m = {0.0F, 0.0F, offset_.east_m()};
+    a.remedy.variance_m2 = z.r;
+  }
+
+  checks::OffsetHypothesis offset_;  ///< offset of heights that were not fused
+  checks::Persistence refused_;      ///< heights in a row that were refused
+  SourceStatus status_;
+};
+
+}  // namespace tetap::estimators

@@ -1,0 +1,250 @@
+// SPDX-License-Identifier: Apache-2.0
+// GNSS position, horizontal: when a fix is fused, and when fixes that were refused become true. A fix is judged by the
+// receiver's own accuracy. A fix that would decide where the filter is has to be confirmed by others; fixes that are
+// refused count only by persisting (checks/offset_hypothesis.hpp).
+#pragma once
+
+#include "checks/chi_square.hpp"
+#include "checks/coloured_noise.hpp"
+#include "checks/frozen_position.hpp"
+#include "checks/offset_hypothesis.hpp"
+#include "checks/position_drift.hpp"
+#include "checks/startup_fix_check.hpp"
+#include "estimators/inertial/filter_view.hpp"
+#include "estimators/inertial/fix_measurement.hpp"
+#include "estimators/inertial/recovery.hpp"
+#include "model/gnss_fix_3d.hpp"
+
+#include <array>
+#include <optional>
+
+namespace tetap::estimators {
+
+class GnssPositionSource {
+ public:
+  using Measurement = FixMeasurement;
+  /// In the robot's map; none while the receiver has no fix or the map no origin. The second: a fix outside of the map.
+  struct Converted {
+    std::optional<model::GnssFix3d> fix;
+    bool outside = false;
+  };
+  [[nodiscard]] static Converted convert(const sensor::GnssPosition& fix, const Context& ctx);
+
+  /// Before the filter runs: whether the fix may start it.
+  [[nodiscard]] bool starting_conditions(const sensor::GnssPosition& fix, base::Micros stamp,
+                                         const param::RecoveryParameters& n) {
+    const bool starts = startup_.update(fix, stamp, n.confirm_fixes);
+    status_.confirming();
+    if (starts) last_fused_ = stamp;
+    return starts;
+  }
+  /// The fix is news: the receiver does not repeat itself.
+  [[nodiscard]] bool continuing_conditions(const sensor::GnssPosition& fix, const model::GnssFix3d& at,
+                                           const FilterView& filter) {
+    const bool frozen = frozen_.update(fix, nav::difference(at.x, filter.x().x), nav::difference(at.y, filter.x().y),
+                                       filter.parameters().recovery.frozen_m);
+    if (frozen) status_.distrusted(Check::kFrozen);
+    return !frozen;
+  }
+  /// The joint gate; where it fails, that of the horizontal part alone; and the drift of many fixes.
+  [[nodiscard]] Assessment assess(const FixMeasurement& z, const FilterView& filter);
+  /// Factor of the variance of a fix whose error lasts since the fix before.
+  [[nodiscard]] float correlated_inflation(const FilterView& filter) const {
+    const float correlation_s = filter.parameters().gnss.correlation_s;
+    if (!(correlation_s > 0.0F)) return 1.0F;
+    return checks::kColouredNoiseInflation *
+           checks::repeated(base::seconds(filter.stamp() - last_fused_), correlation_s);
+  }
+  /// A fix was fused, and moved the filter by so much.
+  void fused(base::Micros stamp, float moved_east_m, float moved_north_m) {
+    last_fused_ = stamp;
+    pulled_m_ = {0.9F * pulled_m_[0] + moved_east_m, 0.9F * pulled_m_[1] + moved_north_m};
+    pull_inflated_ = false;
+    status_.fused();
+  }
+  /// The receiver's velocity was fused, or not.
+  void velocity(bool fused) { drift_.velocity(fused); }
+  /// The filter is elsewhere now: refusals so far were by where it was.
+  void relocated(base::Micros time) {
+    last_fused_ = time;
+    refused_.reset();
+  }
+  /// A pose from outside ends every offset hypothesis.
+  void reset() {
+    offset_.reset();
+    drift_.reset();
+  }
+  void begin() { refused_.reset(); }
+
+  [[nodiscard]] bool frozen() const { return frozen_.frozen(); }
+  [[nodiscard]] const checks::Persistence& refused() const { return refused_; }
+  [[nodiscard]] base::Micros last_fused() const { return last_fused_; }
+  /// No fix was fused for three seconds: dead reckoning.
+  [[nodiscard]] bool timed_out(base::Micros at) const {
+    return checks::older(last_fused_, at, base::Micros{3'000'000});
+  }
+  /// A fix was fused within three seconds.
+  [[nodiscard]] bool fused_lately(base::Micros at) const {
+    return checks::recent(last_fused_, at, base::Micros{3'000'000});
+  }
+  [[nodiscard]] SourceStatus status(base::Micros at) const {
+    return status_.state == SourceState::kFusing && timed_out(at) ? SourceStatus{} : status_;
+  }
+  template <class Sink>
+  void hash_state(Sink&& sink) const {
+    startup_.hash_state(sink);
+    frozen_.hash_state(sink);
+    drift_.hash_state(sink);
+    offset_.hash_state(sink);
+    refused_.hash_state(sink);
+    sink(last_fused_.us);
+    sink(pulled_m_[0]);
+    sink(pulled_m_[1]);
+    sink(static_cast<std::uint32_t>(pull_inflated_));
+    status_.hash_state(sink);
+  }
+
+ private:
+  [[nodiscard]] bool drifts(const FixMeasurement& z, const param::GnssParameters& n, Assessment& a);
+  void confirm(Assessment& a, const param::RecoveryParameters& n);
+  void judge_refused(const FixMeasurement& z, const FilterView& filter, Assessment& a);
+  [[nodiscard]] bool reset_allowed(const FixMeasurement& z, const FilterView& filter, Assessment& a) const;
+  [[nodiscard]] bool undoes_reset(const FixMeasurement& z, const FilterView& filter) const;
+  [[nodiscard]] bool lost(const FilterView& filter) const;
+
+  checks::StartupFixCheck startup_;
+  checks::FrozenPosition frozen_;
+  checks::PositionDrift drift_;
+  checks::OffsetHypothesis offset_;  ///< offset of fixes that were not fused
+  checks::Persistence refused_;      ///< fixes in a row that were refused
+  base::Micros last_fused_;          ///< stamp of the last fix that was fused, or of the last reset; 0: none
+  std::array<float, 2> pulled_m_{};  ///< by how much the last fixes moved the position
+  bool pull_inflated_ = false;       ///< the position is already less certain by that
+  SourceStatus status_;
+};
+
+inline GnssPositionSource::Converted GnssPositionSource::convert(const sensor::GnssPosition& fix, const Context& ctx) {
+  const param::GnssParameters& n = ctx.parameters.gnss;
+  if (fix.fix < sensor::GnssFix::k2d || ctx.map_frame.origin == sensor::OriginSource::kNone) return {};
+  const bool has_height = base::is_finite(fix.height_m);
+  const nav::Local local = ctx.map_frame.frame.to_local(fix.latitude_2ndeg, fix.longitude_2ndeg,
+                                                        has_height ? fix.height_m : ctx.map_frame.frame.height_m());
+  if (!local.valid) return {.outside = true};
+  const auto sigma = [&n](float own, float otherwise) {
+    const float scaled = base::is_finite(own) ? n.sigma_scale * own : otherwise;
+    return scaled > n.sigma_floor_m ? scaled : n.sigma_floor_m;
+  };
+  return {.fix = model::GnssFix3d{
+              .x = base::Anchored::from_um(local.east_um),
+              .y = base::Anchored::from_um(local.north_um),
+              .z = base::Anchored::from_um(local.up_um),
+              .sigma_horizontal_m = sigma(fix.horizontal_acc_m, 10.0F),
+              .sigma_vertical_m = has_height ? sigma(fix.vertical_acc_m, 20.0F) : FixMeasurement::kNoHeight_m,
+              .antenna_b_m = {n.antenna_x_b_m, n.antenna_y_b_m, n.antenna_z_b_m}}};
+}
+
+[[gnu::noinline]] inline Assessment GnssPositionSource::assess(const FixMeasurement& z, const FilterView& filter) {
+  const param::Parameters& n = filter.parameters();
+  Assessment a{.dof = 3, .nis = z.statistics.joint_nis, .gate = fix_gate(n.gnss, 3)};
+  const bool inside = a.nis <= a.gate || z.statistics.horizontal_nis <= fix_gate(n.gnss, 2);
+  const bool agrees = inside && !drifts(z, n.gnss, a);
+  if (!inside) a.failed = Check::kGate;
+  refused_.update(!agrees, filter.stamp());
+  const float p_level = filter.p()(0, 0) + filter.p()(1, 1);
+  if (!agrees) {
+    judge_refused(z, filter, a);
+  } else if (p_level > 2.0F * FixMeasurement::kDecides * z.r(0)) {
+    offset_.update(filter.stamp(), z.nu(0), z.nu(1), z.r(0), p_level);
+    confirm(a, n.recovery);
+  }
+  if (a.fuses()) offset_.reset();
+  return a;
+}
+
+/// Fixes whose errors are new with each drift away. Errors that last wander themselves.
+[[gnu::noinline]] inline bool GnssPositionSource::drifts(const FixMeasurement& z, const param::GnssParameters& n,
+                                                         Assessment& a) {
+  if (n.correlation_s > 0.0F) return false;
+  drift_.update(z.nu(0), z.nu(1));
+  const std::array<float, 2>& expected_m2 = z.statistics.expected_m2;
+  const float statistic = drift_.statistic(z.r(0), expected_m2[0], expected_m2[1]);
+  const float limit = n.gate_scale * checks::kChiSquare999Of2;
+  if (!drift_.take_vouch() || statistic <= limit) return false;
+  a.failed = Check::kDrift;
+  a.statistic = statistic;
+  a.limit = limit;
+  return true;
+}
+
+/// A fix that would decide where the filter is waits for others that agree.
+inline void GnssPositionSource::confirm(Assessment& a, const param::RecoveryParameters& n) {
+  if (offset_.confirmed(n.confirm_fixes)) {
+    drift_.reset();  // the filter is no longer where their drift was measured from
+    return;
+  }
+  a.action = Action::kSkip;
+  a.verdict = sensor::Verdict::kNotUsed;
+  a.failed = Check::kUnconfirmed;
+  status_.confirming();
+}
+
+/// A filter that refuses fixes may have moved otherwise than it thinks, by as much as it is uncertain in any direction
+/// (twice the least eigenvalue): one that is held to a line is wrong across it, however little it knows along it.
+[[gnu::noinline]] inline void GnssPositionSource::judge_refused(const FixMeasurement& z, const FilterView& filter,
+                                                                Assessment& a) {
+  const param::RecoveryParameters& n = filter.parameters().recovery;
+  const nav::Ins::Covariance& p = filter.p();
+  const float half = 0.5F * (p(0, 0) - p(1, 1)), both = p(0, 1);
+  const float longer = 2.0F * base::sqrt(half * half + both * both);
+  offset_.update(filter.stamp(), z.nu(0), z.nu(1), z.r(0), p(0, 0) + p(1, 1) - longer);
+  a.action = Action::kReject;
+  a.verdict = sensor::Verdict::kRejected;
+  status_.rejecting(a.failed);
+  const bool confirmed = offset_.confirmed(n.confirm_fixes);
+  if (confirmed && !pull_inflated_) {  // the fixes before may have begun to lead the filter away
+    a.remedy.pulled_m = pulled_m_;
+    pull_inflated_ = true;
+  }
+  if (!reset_allowed(z, filter, a)) return;
+  a.action = Action::kResetPosition;
+  a.verdict = sensor::Verdict::kAccepted;
+  a.cause = sensor::ResetCause::kPositionJump;
+  a.remedy.step_m = {offset_.east_m(), offset_.north_m(), 0.0F};
+  a.remedy.variance_m2 = z.r;
+  refused_.reset();
+  drift_.reset();
+}
+
+/// The refused fixes persist, or agree with where the last reset came from, or the filter is lost.
+inline bool GnssPositionSource::reset_allowed(const FixMeasurement& z, const FilterView& filter, Assessment& a) const {
+  const param::RecoveryParameters& n = filter.parameters().recovery;
+  const bool confirmed = offset_.confirmed(n.confirm_fixes);
+  a.remedy.undoes = confirmed && undoes_reset(z, filter);
+  const bool is_lost = confirmed && lost(filter);
+  if (is_lost && filter.wheels_silent() &&
+      !filter.velocity_recent()) {  // it moved otherwise than it thought, all along
+    const float way2_m2 = offset_.east_m() * offset_.east_m() + offset_.north_m() * offset_.north_m();
+    a.remedy.sigma_mps = base::sqrt(way2_m2) / base::seconds(refused_.held_for(filter.stamp()));
+  }
+  return a.remedy.undoes || is_lost || offset_.persisted(base::Micros{n.persist_us}, n.persist_fixes);
+}
+
+/// Back to where the last reset came from: dead reckoning before it and fixes after it agree.
+inline bool GnssPositionSource::undoes_reset(const FixMeasurement& z, const FilterView& filter) const {
+  const Recovery& recovery = filter.recovery();
+  const float p_level = filter.p()(0, 0) + filter.p()(1, 1);
+  return recovery.undoable() &&
+         offset_.agrees(-recovery.jump().east_m, -recovery.jump().north_m, 2.0F * z.r(0) + p_level);
+}
+
+/// Fixes that agree with nothing for very long: the filter is no judge of how it moves. Sooner where its IMU alone
+/// shows how, and the offset is not one that lasts.
+inline bool GnssPositionSource::lost(const FilterView& filter) const {
+  const param::RecoveryParameters& n = filter.parameters().recovery;
+  const base::Micros refused = refused_.held_for(filter.stamp());
+  const bool motion_known = !filter.wheels_silent() || filter.velocity_recent();
+  const base::Micros despair{4 * std::int64_t{motion_known ? n.persist_us : n.after_us}};
+  return refused >= despair && (motion_known || !offset_.persisted({refused.us / 2}, 0));
+}
+
+}  // namespace tetap::estimators

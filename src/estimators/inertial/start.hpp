@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: Apache-2.0
+// Inertial navigation: start, pose from outside, restart.
+#pragma once
+
+#include "estimators/inertial/inertial.hpp"
+#include "model/dual_heading.hpp"
+
+namespace tetap::estimators {
+
+inline void Inertial::restart(base::Micros t, const Context& ctx) {
+  base::reinitialise(*this);
+  time_ = t;
+  set_noise(ctx.parameters.inertial);
+  const param::StartParameters& s = ctx.parameters.start;
+  if (s.known != 0)
+    alignment_.place({.x = base::Anchored{}.plus(s.x_m), .y = base::Anchored{}.plus(s.y_m), .yaw_rad = s.yaw_rad},
+                     s.sigma_position_m, s.sigma_yaw_rad);
+}
+
+inline void Inertial::set_pose(base::Micros, const SetPose& given, const Context& ctx) {
+  if (tracking()) alignment_.keep(ins_.x, base::sqrt(ins_.p(8, 8)));
+  alignment_.place(given.pose, given.sigma_position_m, given.sigma_yaw_rad);
+  sources_.position.reset();
+  sources_.height.reset();
+  recovery_.forbid_undo();
+  if (!tracking()) return;
+  if (Alignment::is_heading(given.sigma_yaw_rad) && !take_heading(given)) return begin(ctx);
+  Recovery::place(ins_, given.pose, given.sigma_position_m);
+  relocated();
+}
+
+/// A given heading that does not contradict the filter's own is a measurement: all else that the filter knows stays.
+[[gnu::noinline]] inline bool Inertial::take_heading(const SetPose& given) {
+  constexpr float kSmall_rad = 0.3F;  // no linear step turns rightly beyond that
+  if (!(ins_.p(8, 8) < kSmall_rad * kSmall_rad)) return false;
+  const model::DirectionMeasurement ahead =
+      model::DualHeading({1.0F, 0.0F, 0.0F}, given.pose.yaw_rad, given.sigma_yaw_rad);
+  return update(ahead, filter::chi_square_99(1)).verdict == filter::Verdict::kAccepted;
+}
+
+/// The filter begins where the alignment found the robot.
+inline void Inertial::begin(const Context& ctx) {
+  const param::InertialParameters& n = ctx.parameters.inertial;
+  if (ctx.map_frame.origin != sensor::OriginSource::kNone)
+    ins_.earth = nav::Earth::at(ctx.map_frame.frame, n.earth_rate != 0);
+  const float forward_mps = view(time_, ctx).wheels_silent() ? base::kNan : sources_.forward.last_mps();
+  const Alignment::Start start = alignment_.start(tracking() ? &ins_.x : nullptr, heading_monitor_, n, forward_mps);
+  Recovery::restart(ins_, start.x, start.variances);
+  phase_ = Phase::kTracking;
+  standstill_.restart_means();
+  sources_.begin(!alignment_.has_fixes());
+  relocated();
+}
+
+/// The filter is elsewhere at once: the covariance is looked at from end to end, and the present has to follow.
+inline void Inertial::relocated() {
+  sources_.position.relocated(time_);
+  sources_.height.relocated();
+  budget_.exhaust();
+  predictor_.schedule().hurry();
+}
+
+/// As after power on, without a place. The size of the step is measured when the filter runs again, from the last
+/// estimate. Where the motion finds the heading once more, a magnetometer that led it astray, or did not keep it from
+/// that, has to agree first.
+[[gnu::noinline]] inline void Inertial::restart_filter(base::Micros t, sensor::ResetCause cause, const Context& ctx) {
+  const auto count = static_cast<std::uint8_t>(recovery_.jump().count + 1);
+  const nav::InsState last = predictor_.present();
+  const HeadingMonitor before = heading_monitor_;
+  const bool trusted = sources_.magnetometer.trusted();
+  base::reinitialise(*this);
+  heading_monitor_.take_over(before);
+  if (heading_monitor_.runs() && (!trusted || cause == sensor::ResetCause::kHeadingWrong))
+    sources_.magnetometer.distrust(t);
+  time_ = t;
+  set_noise(ctx.parameters.inertial);
+  predictor_.remember(last);
+  recovery_.report_restart(cause, count);
+}
+
+}  // namespace tetap::estimators

@@ -1,0 +1,196 @@
+// SPDX-License-Identifier: Apache-2.0
+// State and failed check of every source as a robot drives: one word a source, and a refusal names its test. And the
+// three verbs of Recovery on a covariance.
+#include "inertial_drive.hpp"
+
+#include <gtest/gtest.h>
+
+#include <map>
+#include <utility>
+
+namespace tetap::estimators {
+namespace {
+
+using Word = std::pair<SourceState, Check>;
+
+Word word(const Drive& d, sensor::Sensor of) {
+  std::map<sensor::Sensor, Word> all;
+  d.estimator.for_each_source(d.ctx(), [&](sensor::Sensor sensor, SourceState state, Check failed) {
+    all[sensor] = {state, failed};
+  });
+  EXPECT_EQ(all.size(), 8U) << "every source once";
+  return all.at(of);
+}
+constexpr Word kFusing{SourceState::kFusing, Check::kNone}, kStopped{SourceState::kStopped, Check::kNone};
+
+TEST(Sources, StopAndFuseAsTheirMeasurementsDo) {
+  Drive d;
+  for (const auto of : {sensor::Sensor::kImu, sensor::Sensor::kGnssPosition, sensor::Sensor::kGnssVelocity,
+                        sensor::Sensor::kWheelSpeed, sensor::Sensor::kHeading, sensor::Sensor::kMagnetometer})
+    EXPECT_EQ(word(d, of), kStopped) << "before the first measurement: " << static_cast<int>(of);
+  d.place();
+  d.run(30);
+  ASSERT_TRUE(d.tracking());
+  for (const auto of : {sensor::Sensor::kImu, sensor::Sensor::kGnssPosition, sensor::Sensor::kGnssVelocity,
+                        sensor::Sensor::kWheelSpeed, sensor::Sensor::kBodySpeed})
+    EXPECT_EQ(word(d, of), kFusing) << static_cast<int>(of);
+  EXPECT_EQ(word(d, sensor::Sensor::kBarometer), kStopped) << "there is none";
+  d.tamper = [](Drive::Fix&) { return false; };
+  d.wheels = false;
+  d.run(4);
+  EXPECT_EQ(word(d, sensor::Sensor::kGnssPosition), kStopped);
+  EXPECT_EQ(word(d, sensor::Sensor::kGnssVelocity), kStopped);
+  EXPECT_EQ(word(d, sensor::Sensor::kWheelSpeed), kStopped);
+  EXPECT_EQ(word(d, sensor::Sensor::kImu), kFusing);
+}
+
+TEST(Sources, FirstFixesConfirmEachOther) {
+  Drive d;
+  d.run(0.5);
+  EXPECT_EQ(word(d, sensor::Sensor::kGnssPosition), (Word{SourceState::kConfirming, Check::kUnconfirmed}));
+}
+
+TEST(Sources, AJumpIsRejectedByTheGateAndNamesIt) {
+  Drive d = settled();
+  d.tamper = [](Drive::Fix& fix) { return fix.east_m += 100, true; };
+  d.run(1);
+  EXPECT_EQ(word(d, sensor::Sensor::kGnssPosition), (Word{SourceState::kRejecting, Check::kGate}));
+  EXPECT_EQ(d.last_fix.failed, Check::kGate);
+  EXPECT_GT(d.last_fix.nis, d.last_fix.gate);
+  d.tamper = [](Drive::Fix&) { return true; };
+  d.run(0.5);
+  EXPECT_EQ(word(d, sensor::Sensor::kGnssPosition), kFusing);
+  EXPECT_EQ(d.last_fix.failed, Check::kNone);
+}
+
+TEST(Sources, AFrozenReceiverIsDistrusted) {
+  Drive d = settled();
+  d.tamper = [](Drive::Fix& fix) { return fix.repeated = true; };
+  d.run(3);
+  const Word frozen{SourceState::kDistrusted, Check::kFrozen};
+  EXPECT_EQ(word(d, sensor::Sensor::kGnssPosition), frozen);
+  EXPECT_EQ(d.last_velocity.failed, Check::kFrozen);
+  d.tamper = [](Drive::Fix&) { return true; };
+  d.run(0.5);
+  EXPECT_EQ(word(d, sensor::Sensor::kGnssPosition), kFusing);
+}
+
+TEST(Sources, AVelocityThatIsOffIsRejectedByItsGate) {
+  Drive d = settled();
+  d.tamper = [](Drive::Fix& fix) { return fix.east_off_mps = 5, true; };
+  d.run(1);
+  EXPECT_EQ(word(d, sensor::Sensor::kGnssVelocity), (Word{SourceState::kRejecting, Check::kGate}));
+  EXPECT_EQ(word(d, sensor::Sensor::kGnssPosition), kFusing) << "its positions are right";
+}
+
+/// A covariance with correlations everywhere.
+nav::Ins correlated() {
+  nav::Ins ins;
+  for (int r = 0; r < nav::Ins::kErrors; ++r)
+    for (int c = 0; c <= r; ++c) ins.p(r, c) = r == c ? 2.0F : 0.1F;
+  return ins;
+}
+/// Entries that differ from those of `before`.
+std::vector<std::pair<int, int>> changed(const nav::Ins& before, const nav::Ins& now) {
+  std::vector<std::pair<int, int>> all;
+  for (int r = 0; r < nav::Ins::kErrors; ++r)
+    for (int c = 0; c <= r; ++c)
+      if (before.p(r, c) < now.p(r, c) || before.p(r, c) > now.p(r, c)) all.emplace_back(r, c);
+  return all;
+}
+
+TEST(Recovery, InflatingABlockAddsToItsVariancesAndToNothingElse) {
+  const nav::Ins before = correlated();
+  nav::Ins ins = before;
+  Recovery::inflate_motion(ins, 3, 0);
+  EXPECT_EQ(changed(before, ins), (std::vector<std::pair<int, int>>{{3, 3}, {4, 4}, {5, 5}}));
+  EXPECT_FLOAT_EQ(ins.p(4, 4), 11.0F);
+  ins = before;
+  Recovery::inflate_heading(ins, 0.5F);
+  EXPECT_EQ(changed(before, ins), (std::vector<std::pair<int, int>>{{8, 8}}));
+}
+
+TEST(Recovery, ResettingThePositionMovesItAndLeavesItUncorrelated) {
+  nav::Ins ins = correlated();
+  Recovery recovery;
+  Assessment a{.action = Action::kResetPosition};
+  a.remedy.step_m = {100, -40, 7};
+  a.remedy.variance_m2 = {4, 4, 9};
+  EXPECT_TRUE(recovery.apply(a, ins, parameters()));
+  EXPECT_NEAR(ins.x.x.minus({}), 100, 1e-4);
+  EXPECT_NEAR(ins.x.y.minus({}), -40, 1e-4);
+  EXPECT_NEAR(ins.x.z.minus({}), 0, 1e-6) << "the height is another block";
+  for (int j = 0; j < nav::Ins::kErrors; ++j)
+    for (const int i : {0, 1}) EXPECT_NEAR(ins.p(i, j), i == j ? 4.0F : 0.0F, 1e-5F) << i << ' ' << j;
+  EXPECT_FLOAT_EQ(ins.p(2, 2), 2.0F);
+  EXPECT_TRUE(ins.p.positive_definite());
+  EXPECT_EQ(recovery.jump().count, 1);
+  EXPECT_EQ(recovery.jump().east_m, 100.0F);
+  EXPECT_TRUE(recovery.undoable());
+  a.remedy.undoes = true;
+  EXPECT_TRUE(recovery.apply(a, ins, parameters()));
+  EXPECT_FALSE(recovery.undoable()) << "a way back is no way to go";
+}
+
+TEST(Recovery, FusingSkippingAndRejectingChangeNothing) {
+  const nav::Ins before = correlated();
+  for (const Action action : {Action::kFuse, Action::kSkip, Action::kReject}) {
+    nav::Ins ins = before;
+    Recovery recovery;
+    EXPECT_FALSE(recovery.apply({.action = action}, ins, parameters()));
+    EXPECT_TRUE(changed(before, ins).empty());
+    EXPECT_EQ(recovery.jump().count, 0);
+  }
+}
+
+TEST(Recovery, AVelocityRefusedThreeTimesForLongWithFixesRefusedExhaustsIt) {
+  nav::Ins ins = correlated();
+  Recovery recovery;
+  Assessment a{.action = Action::kInflateVelocity};
+  a.remedy.position_refused = true;
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_FALSE(recovery.exhausted()) << i;
+    recovery.apply(a, ins, parameters());
+  }
+  EXPECT_TRUE(recovery.exhausted());
+  recovery.position_fused();
+  EXPECT_FALSE(recovery.exhausted());
+}
+
+TEST(WorkBudget, TakesOneMeasurementATickAndWhatWaitedForTwiceItsPeriod) {
+  WorkBudget budget;
+  for (int i = 0; i < 2; ++i) budget.note_arrival();
+  budget.begin_tick();
+  EXPECT_EQ(budget.left(), 2) << "keeps pace with the IMU";
+  EXPECT_FALSE(budget.allows_due({100'000}, {100'000}));
+  EXPECT_TRUE(budget.allows_due({200'000}, {100'000}));
+  budget.grant(WorkBudget::kMeasurement);
+  EXPECT_TRUE(budget.allows_due({100'000}, {100'000}));
+  budget.spend(WorkBudget::kMeasurement);
+  EXPECT_FALSE(budget.allows(WorkBudget::kMeasurement));
+  budget.begin_tick();
+  EXPECT_EQ(budget.left(), 0);
+}
+
+TEST(RebuildSchedule, RebuildsAfterACorrectionOnceNothingElseIsDueAndAfterThreeTicksWhateverIs) {
+  RebuildSchedule schedule;
+  base::Micros t{1'000'000};
+  const auto tick = [&](bool deferred) { return t += base::Micros{10'000}, schedule.begin_tick(t, deferred); };
+  EXPECT_TRUE(tick(false)) << "nothing was ever built";
+  EXPECT_FALSE(tick(false));
+  schedule.note_correction();
+  EXPECT_TRUE(tick(false));
+  schedule.note_correction();
+  EXPECT_FALSE(tick(true));
+  EXPECT_FALSE(tick(true));
+  EXPECT_FALSE(tick(true));
+  EXPECT_TRUE(tick(true));
+  schedule.hurry();
+  EXPECT_TRUE(tick(true)) << "the filter is elsewhere at once";
+  int ticks = 1;
+  while (!tick(false)) ++ticks;
+  EXPECT_EQ(ticks, 50) << "twice a second even uncorrected";
+}
+
+}  // namespace
+}  // namespace tetap::estimators
