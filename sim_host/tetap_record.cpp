@@ -17,7 +17,7 @@ using namespace tetap;
 constexpr const char* kHelp = R"(usage: tetap-record [--can IFACE] [OPTION]...
 
 Records a CAN interface until interrupted (^C, SIGTERM): everything as candump would (raw.log), and what a node says
-(estimates.log, estimates.csv, innovations.csv, status.csv, run.json).
+(estimates.log, estimates.csv, innovations.csv, status.csv, sources.csv, run.json).
 
   --can IFACE     (default vcan0)
   --base ID       first id of the node's block (default 0x300)

@@ -48,6 +48,18 @@ namespace tetap::sim {
   return i < kNames.size() ? kNames[i] : "?";
 }
 
+[[nodiscard]] constexpr std::string_view name(sensor::SourceState value) {
+  constexpr std::array<std::string_view, 5> kNames{"Stopped", "Confirming", "Fusing", "Rejecting", "Distrusted"};
+  const auto i = static_cast<std::size_t>(value);
+  return i < kNames.size() ? kNames[i] : "?";
+}
+[[nodiscard]] constexpr std::string_view name(sensor::Check value) {
+  constexpr std::array<std::string_view, 12> kNames{"None",  "Value",   "Gate", "Drift",       "Frozen", "Stuck",
+                                                    "Field", "Heading", "Slip", "Unconfirmed", "Trust",  "Time"};
+  const auto i = static_cast<std::size_t>(value);
+  return i < kNames.size() ? kNames[i] : "?";
+}
+
 /// Of a frame the node sends, by its place in the node's block.
 [[nodiscard]] inline std::string message_name(std::uint32_t offset) {
   constexpr std::array<std::string_view, 8> kCommon{"Est_Epoch",      "Est_StateCrc", "Est_Status",  "Est_Innov",

@@ -11,7 +11,7 @@ std::string play_help(std::string_view robots) {
 Plays a log to a node and records what it answers.
 
   LOG                 candump -L log; frames with ids base+0x01 .. base+0x1F are played
-  --out DIR           for estimates.log, estimates.csv, innovations.csv, status.csv, run.json (default out/play)
+  --out DIR           for estimates.log, estimates.csv, innovations.csv, status.csv, sources.csv, run.json (default out/play)
   --can IFACE         the bus (default vcan0)
   --base ID           first id of the node's block (default 0x300)
   --log-base ID       first id of the block in the log (default: as --base)

@@ -35,7 +35,8 @@ Recorder::Recorder(const RecorderOptions& options)
       states_(options.folder + "/states.csv"),
       innovations_(options.folder + "/innovations.csv"),
       sensors_(options.folder + "/sensors.csv"),
-      status_(options.folder + "/status.csv") {
+      status_(options.folder + "/status.csv"),
+      sources_(options.folder + "/sources.csv") {
   if (options.raw) raw_.emplace(options.folder + "/raw.log");
   estimates_.write(
       "epoch,time_s,estimator,kind,x_m,y_m,yaw_rad,speed_mps,yaw_rate_radps,std_x_m,std_y_m,std_yaw_rad,corr_xy,corr_x_"
@@ -49,9 +50,10 @@ Recorder::Recorder(const RecorderOptions& options)
       "jump_yaw_rad,disagree_tilt_rad,disagree_yaw_rad,vib_accel_mps2,vib_gyro_radps,clipped,jump_z_m,corr_xz,corr_yz,"
       "corr_v_en,corr_v_eu,corr_v_nu,corr_tilt_en,corr_tilt_e_yaw,corr_tilt_n_yaw,corr_acc_bias_xy,corr_acc_bias_xz,"
       "corr_acc_bias_yz,corr_gyro_bias_xy,corr_gyro_bias_xz,corr_gyro_bias_yz\n");
-  innovations_.write("epoch,time_s,estimator,sensor,inst,verdict,dof,nis,ratio,age_ms,landmark\n");
+  innovations_.write("epoch,time_s,estimator,sensor,inst,verdict,dof,nis,ratio,age_ms,landmark,failed\n");
   sensors_.write("epoch,time_s,estimator,sensor,inst,accepted,rejected,nis_mean,age_s\n");
   status_.write("epoch,time_s,mode,used,faults,reset_ctr,reset_cause\n");
+  sources_.write("epoch,time_s,estimator,source,state,failed\n");
 }
 
 void Recorder::raw_line(const base::CanFrame& frame, base::Micros time) {
@@ -123,6 +125,8 @@ void Recorder::frame(const base::CanFrame& f) {
       if (const auto pose = bus::decode<bus::EstStdPose>(payload)) instance.deviation = pose;
       if (const auto more = bus::decode<bus::EstStdMore>(payload)) instance.correlation = more;
     } else {
+      if (offset == bus::offset_of<bus::EstStateSources>(k))
+        if (const auto sources = bus::decode<bus::EstStateSources>(payload)) source_rows(k, *sources);
       state(states_now_[k], offset - static_cast<std::uint32_t>(k * bus::EstPos::kStride), payload);
     }
   }
@@ -226,9 +230,11 @@ void Recorder::innovation_row(const bus::EstInnov& i) {
       .put(',')
       .real(static_cast<double>(i.ratio), 2)
       .put(',')
-      .real(static_cast<double>(i.age_ms), 0)
+      .real(static_cast<double>(i.age_s) * 1e3, 0)
       .put(',');
   if (i.id != bus::EstInnov::kIdNotAvailable) line_.integer(i.id);
+  line_.put(',');
+  put_name(line_, i.check);
   innovations_.write(line_.put('\n').view());
 }
 
@@ -240,14 +246,33 @@ void Recorder::status_row(const bus::EstStatus& s) {
   status_.write(line_.put('\n').view());
 }
 
+void Recorder::source_rows(std::size_t k, const bus::EstStateSources& s) {
+  const auto source = [&](std::string_view of, sensor::SourceState state, sensor::Check failed) {
+    row(time_).integer(static_cast<std::int64_t>(k)).put(',').text(of).put(',');
+    put_name(line_, state);
+    line_.put(',');
+    put_name(line_, failed);
+    sources_.write(line_.put('\n').view());
+  };
+  source("Imu", s.imu_state, s.imu_check);
+  source("GnssPosition", s.position_state, s.position_check);
+  source("GnssVelocity", s.velocity_state, s.velocity_check);
+  source("Wheels", s.wheel_state, s.wheel_check);
+  source("ForwardSpeed", s.speed_state, s.speed_check);
+  source("Heading", s.heading_state, s.heading_check);
+  source("Magnetometer", s.mag_state, s.mag_check);
+  source("Barometer", s.baro_state, s.baro_check);
+}
+
 void Recorder::flush() {
-  for (OutFile* file : {&estimates_log_, &estimates_, &states_, &innovations_, &sensors_, &status_}) file->flush();
+  for (OutFile* file : {&estimates_log_, &estimates_, &states_, &innovations_, &sensors_, &status_, &sources_})
+    file->flush();
   if (raw_) raw_->flush();
 }
 
 const Recorder::Totals& Recorder::finish() {
   totals_.estimates_sha256 = estimates_log_.close();
-  for (OutFile* file : {&estimates_, &states_, &innovations_, &sensors_, &status_}) file->close();
+  for (OutFile* file : {&estimates_, &states_, &innovations_, &sensors_, &status_, &sources_}) file->close();
   if (raw_) raw_->close();
   return totals_;
 }

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Writes what a node said: estimates.log (candump format, stamped with the epoch's time, only frames that are the same
 // in every run of the same input), estimates.csv, states.csv (what an inertial or attitude estimator says beyond a
-// pose), innovations.csv, sensors.csv (statistics by sensor), status.csv, and on request raw.log (everything on the bus
-// as it came).
+// pose), innovations.csv, sensors.csv (statistics by sensor), status.csv, sources.csv (state and failed check of each
+// source), and on request raw.log (everything on the bus as it came).
 #pragma once
 
 #include "sim_host/play/out_file.hpp"
@@ -78,11 +78,12 @@ class Recorder {
   void sensor_row(const bus::EstSensorStat& statistics);
   void innovation_row(const bus::EstInnov& innovation);
   void status_row(const bus::EstStatus& status);
+  void source_rows(std::size_t k, const bus::EstStateSources& sources);
   Line& row(base::Micros time);
   void raw_line(const base::CanFrame& frame, base::Micros time);
 
   RecorderOptions options_;
-  OutFile estimates_log_, estimates_, states_, innovations_, sensors_, status_;
+  OutFile estimates_log_, estimates_, states_, innovations_, sensors_, status_, sources_;
   std::optional<OutFile> raw_;
   Line line_;
   std::array<Instance, bus::EstPos::kCount> instances_{};

@@ -36,7 +36,7 @@ class EventQueue {
   static constexpr std::size_t kCapacity = 16, kNone = kCapacity + 1;
   /// By the time at which they were true; the rest only makes it an order.
   [[nodiscard]] static bool before(const bus::EstInnov& a, const bus::EstInnov& b) {
-    if (a.age_ms > b.age_ms || a.age_ms < b.age_ms) return a.age_ms > b.age_ms;
+    if (a.age_s > b.age_s || a.age_s < b.age_s) return a.age_s > b.age_s;
     return a.sensor != b.sensor ? a.sensor < b.sensor : a.inst < b.inst;
   }
   void remove(std::size_t i) {
@@ -56,10 +56,11 @@ inline void EventQueue::add(const estimators::Innovation& innovation, const sens
                               .inst = sample.instance,
                               .verdict = innovation.verdict,
                               .dof = innovation.dof,
-                              .age_ms = static_cast<float>(base::seconds(now - sample.stamp) * 1000.0F),
+                              .age_s = base::seconds(now - sample.stamp),
                               .nis = innovation.dof > 0 ? innovation.nis : base::kNan,
                               .ratio = innovation.gate > 0.0F ? innovation.nis / innovation.gate : base::kNan,
                               .id = innovation.landmark,
+                              .check = innovation.failed,
                               .epoch = 0};
   if (size_ == kCapacity) {
     ++counters.events_dropped;

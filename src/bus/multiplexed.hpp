@@ -54,9 +54,35 @@ void put_diagnostics(std::uint32_t page, const Counters& c, const LoopHealth& l,
   }
 }
 
+/// State and last failed check of every source.
+template <class Put>
+void put_sources(const estimators::SourceStates& s, std::uint8_t tag, Put&& put) {
+  using sensor::Sensor;
+  put(bus::EstStateSources{.epoch = tag,
+                           .imu_state = s.of(Sensor::kImu).state,
+                           .imu_check = s.of(Sensor::kImu).failed,
+                           .position_state = s.of(Sensor::kGnssPosition).state,
+                           .position_check = s.of(Sensor::kGnssPosition).failed,
+                           .velocity_state = s.of(Sensor::kGnssVelocity).state,
+                           .velocity_check = s.of(Sensor::kGnssVelocity).failed,
+                           .wheel_state = s.of(Sensor::kWheelSpeed).state,
+                           .wheel_check = s.of(Sensor::kWheelSpeed).failed,
+                           .speed_state = s.of(Sensor::kBodySpeed).state,
+                           .speed_check = s.of(Sensor::kBodySpeed).failed,
+                           .heading_state = s.of(Sensor::kHeading).state,
+                           .heading_check = s.of(Sensor::kHeading).failed,
+                           .mag_state = s.of(Sensor::kMagnetometer).state,
+                           .mag_check = s.of(Sensor::kMagnetometer).failed,
+                           .baro_state = s.of(Sensor::kBarometer).state,
+                           .baro_check = s.of(Sensor::kBarometer).failed});
+}
+
+/// Whether this turn is that of the sources.
+[[nodiscard]] constexpr bool is_turn_of_sources(std::uint32_t page) { return page % 18 == 4; }
+
 /// One page, and with what has a covariance its sigmas and correlations: whole, and of one epoch (with Est_Std, which
-/// has those of x, y and yaw). Two turns of nine stay free, for the bus has no more room (tools/can/generate_messages
-/// --load).
+/// has those of x, y and yaw). Of nine turns one is that of the sources, every other time, and one stays free: the bus
+/// has no more room (tools/can/generate_messages --load).
 template <class Put>
 void put_state_page(std::uint32_t page, const estimators::InertialEstimate& e, std::uint8_t tag, Put&& put) {
   const nav::InsState& x = e.state;

@@ -204,7 +204,11 @@ void Publisher<N>::inertial(std::size_t instance, Inertial&& inertial, Send& sen
   const bool motion = every(parameters_.publish.attitude_every, kTogether);
   const bool page = every(parameters_.publish.state_every, kTogether);
   if (!motion && !page) return;
+  // By the epoch, not by how often there was something to say: the same in every run, whenever its filter began.
+  const std::uint32_t turn = (epoch_ + kTogether) / static_cast<std::uint32_t>(parameters_.publish.state_every);
   const estimators::InertialEstimate e = inertial();
+  const auto put_here = [&](const auto& message) { put(message, send, instance); };
+  if (page && is_turn_of_sources(turn)) put_sources(e.sources, tag(), put_here);  // also while there is no estimate
   if (!e.valid) return;
   const nav::InsState& x = e.state;
   if (motion) {
@@ -212,10 +216,7 @@ void Publisher<N>::inertial(std::size_t instance, Inertial&& inertial, Send& sen
     put(bus::EstVel{.east_mps = x.v_n_mps(0), .north_mps = x.v_n_mps(1), .up_mps = x.v_n_mps(2), .epoch = tag()}, send,
         instance);
   }
-  if (!page) return;
-  // By the epoch, not by how often there was something to say: the same in every run, whenever its filter began.
-  const std::uint32_t turn = (epoch_ + kTogether) / static_cast<std::uint32_t>(parameters_.publish.state_every);
-  put_state_page(turn, e, tag(), [&](const auto& message) { put(message, send, instance); });
+  if (page) put_state_page(turn, e, tag(), put_here);
 }
 
 /// Attitude, and how far it is from the primary estimator's.

@@ -49,6 +49,25 @@ struct Jump {
   std::uint8_t count = 0;  ///< of such steps since the start
 };
 
+/// State and last failed check of each source, by the kind of sensor.
+class SourceStates {
+ public:
+  struct Entry {
+    sensor::SourceState state = sensor::SourceState::kStopped;
+    sensor::Check failed = sensor::Check::kNone;
+  };
+  /// Without an effect for a kind of sensor that has no place.
+  void set(sensor::Sensor of, const Entry& entry) {
+    if (index(of) < kKinds) entries_[index(of)] = entry;
+  }
+  [[nodiscard]] Entry of(sensor::Sensor kind) const { return index(kind) < kKinds ? entries_[index(kind)] : Entry{}; }
+
+ private:
+  static constexpr std::size_t kKinds = 10;
+  static constexpr std::size_t index(sensor::Sensor kind) { return static_cast<std::size_t>(kind); }
+  std::array<Entry, kKinds> entries_{};
+};
+
 /// What an inertial estimator has beyond that: the state at the present, the covariance of the far end of its window
 /// and how to carry an entry of it to the present.
 struct InertialEstimate {
@@ -58,6 +77,7 @@ struct InertialEstimate {
   bool valid = false;
   Jump jump;
   checks::ImuHealthReport imu;
+  SourceStates sources;
 
   /// Of errors kI and kJ (nav::InsState), at the present.
   template <int kI, int kJ = kI>

@@ -71,12 +71,17 @@ inline float Inertial::unseen_s2(float unseen_s) const {
 }
 
 inline InertialEstimate Inertial::inertial(const Context& ctx) const {
+  SourceStates sources;
+  for_each_source(ctx, [&sources](sensor::Sensor of, SourceState state, Check failed) {
+    sources.set(of, {state, failed});
+  });
   return {.state = present(),
           .p = ins_.p,
           .ahead = step_ahead(ctx),
           .valid = tracking(),
           .jump = recovery_.jump(),
-          .imu = imu_.health().report()};
+          .imu = imu_.health().report(),
+          .sources = sources};
 }
 
 inline Estimate Inertial::estimate(const Context& ctx) const {
