@@ -3,6 +3,7 @@
 // never sent.
 #pragma once
 
+#include "bus/e2e.hpp"
 #include "sim_host/encode.hpp"
 #include "sim_host/play/script.hpp"
 #include "sim_host/world/world.hpp"

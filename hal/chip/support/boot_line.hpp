@@ -19,13 +19,13 @@ template <class Board>
 }
 
 template <class Board, class Firmware>
-void print_boot_line(const Board& board, const char* robot, Firmware& firmware) {
+[[gnu::noinline]] void print_boot_line(const Board& board, const char* robot, Firmware& firmware) {
   const std::uint32_t bits = firmware.self_check(kBootEpochs);
   print_bits(board, robot, bits);
 }
 
 template <class Board>
-void print_stack_line(const Board& board) {
+[[gnu::noinline]] void print_stack_line(const Board& board) {
   const auto stack = Board::stack();
   board.print(Text<>{}.add("tetap: stack ").dec(stack.used).add(" of ").dec(stack.reserved).add('\n').c_str());
 }

@@ -30,12 +30,17 @@ inline Innovation Inertial::fuse(const sensor::BodySpeed& speed, base::Micros st
   return fuse_forward({.mps = speed.forward_mps}, view(stamp, ctx));
 }
 
-inline Innovation Inertial::fuse_wheels(const WheelReading& reading, const FilterView& filter) {
+/// Its own frame, which is gone when the forward speed is fused: that path decides the stack.
+[[gnu::noinline]] inline Innovation Inertial::assess_wheels(const WheelReading& reading, const FilterView& filter,
+                                                            ForwardReading& forward) {
   if (!base::is_finite(reading.wheels.left_mps) || !base::is_finite(reading.wheels.right_mps))
     return {.verdict = sensor::Verdict::kNotFinite, .failed = Check::kValue};
   sources_.forward.note(reading.mean_mps(), filter.stamp());
   Assessment a = sources_.wheels.assess(reading, filter);
-  if (a.fuses()) return fuse_forward(sources_.wheels.forward(reading, filter), filter);
+  if (a.fuses()) {
+    forward = sources_.wheels.forward(reading, filter);
+    return {.verdict = sensor::Verdict::kAccepted};
+  }
   if (sources_.wheels.slip() == Wheels::Slip::kBoth) {
     a = sources_.forward.assess_spinning(reading.mean_mps(), filter);
     apply(a, filter);
@@ -44,7 +49,14 @@ inline Innovation Inertial::fuse_wheels(const WheelReading& reading, const Filte
   return record_of(a);
 }
 
-inline Innovation Inertial::fuse_forward(const ForwardReading& reading, const FilterView& filter) {
+inline Innovation Inertial::fuse_wheels(const WheelReading& reading, const FilterView& filter) {
+  ForwardReading forward;
+  const Innovation assessed = assess_wheels(reading, filter, forward);
+  if (assessed.verdict != sensor::Verdict::kAccepted) return assessed;
+  return fuse_forward(forward, filter);
+}
+
+[[gnu::noinline]] inline Innovation Inertial::fuse_forward(const ForwardReading& reading, const FilterView& filter) {
   const param::InertialParameters& n = filter.parameters().inertial;
   if (!tracking()) {
     alignment_.forward(reading.mps, n.wheel_mps + n.slip_share * base::abs(reading.mps), n.axle_x_b_m,

@@ -111,12 +111,15 @@ class Inertial {
   }
   template <class Model, class Source>
   Innovation measure(const Model& model, Source& source, float gate_scale, const FilterView& filter);
+  template <int M, class Source>
+  Innovation conclude(const filter::Innovation<float, M>& result, Source& source, const FilterView& filter);
   void apply(const Assessment& a, const FilterView& filter) {
     if (recovery_.apply(a, ins_, filter.parameters())) predictor_.note_correction();
   }
   Innovation fuse_fix(model::GnssFix3d& fix, const FilterView& filter);
   Innovation update_by_fix(model::GnssFix3d& fix, const FixMeasurement& z, bool with_height, const FilterView& filter);
   void compare_with_ground(const VelocityMeasurement& z, const FilterView& filter);
+  Innovation assess_wheels(const WheelReading& reading, const FilterView& filter, ForwardReading& forward);
   Innovation fuse_wheels(const WheelReading& reading, const FilterView& filter);
   Innovation fuse_forward(const ForwardReading& reading, const FilterView& filter);
   void fuse_constraint(base::Micros stamp, const Context& ctx);

@@ -10,8 +10,15 @@ template <class Model, class Source>
 Innovation Inertial::measure(const Model& model, Source& source, float gate_scale, const FilterView& filter) {
   const auto result = update(model, gate_scale * filter::chi_square_99(Model::kDimension));
   if (result.verdict > filter::Verdict::kRejected) return record(result);
+  return conclude(result, source, filter);
+}
+
+/// Its own frame, beside that of the update: the update decides the stack.
+template <int M, class Source>
+[[gnu::noinline]] Innovation Inertial::conclude(const filter::Innovation<float, M>& result, Source& source,
+                                                const FilterView& filter) {
   const bool rejected = result.verdict == filter::Verdict::kRejected;
-  Assessment a{.dof = Model::kDimension, .nis = result.nis, .gate = result.gate};
+  Assessment a{.dof = M, .nis = result.nis, .gate = result.gate};
   if (rejected) a.reject(Check::kGate);
   source.conclude(a, result.nu, filter);
   apply(a, filter);
