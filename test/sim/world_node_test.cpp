@@ -130,7 +130,9 @@ SaidPages pages_of(const std::vector<Epoch>& epochs) {
   std::map<std::size_t, std::set<std::uint32_t>> offsets;
   run({"rover", robot::rover::parameters, true}, epochs, [&](std::size_t k, const base::CanFrame& frame) {
     const std::uint32_t offset = frame.id - robot::rover::parameters.can_base;
-    if (offset == bus::offset_of<bus::EstStateHeight>(2)) said.pages[k].insert(frame.data[0] & 0xFU);
+    const unsigned page = frame.data[0] & 0xFU;
+    const bool sources = page == bus::EstStateSources::kPage;  // sent from the start on: no covariance judges it
+    if (offset == bus::offset_of<bus::EstStateHeight>(2) && !sources) said.pages[k].insert(page);
     if (offset == bus::offset_of<bus::EstStdPose>(2)) offsets[k].insert(offset + 100 * (frame.data[0] & 1U));
     if (offset == bus::offset_of<bus::EstAtt>(2) || offset == bus::offset_of<bus::EstVel>(2)) offsets[k].insert(offset);
   });
