@@ -11,17 +11,20 @@ FAULT ?=
 REALTIME ?=
 LOG   ?=
 TRUTH ?=
-export ROBOT BOARD BUS SEED FAULT REALTIME LOG TRUTH
+PARAMS ?=
+SET   ?=
+STEPS ?=
+export ROBOT BOARD BUS SEED FAULT REALTIME LOG TRUTH PARAMS SET
 
 # A misspelt name would be taken for the default without a word: FALUT=gnss_jump would run another world than its user thinks.
-settings := ROBOT BOARD BUS SEED FAULT REALTIME LOG TRUTH OUT WORLD PLAY REPORT TETAP_DATA
+settings := ROBOT BOARD BUS SEED FAULT REALTIME LOG TRUTH OUT WORLD PLAY REPORT PARAMS SET STEPS TETAP_DATA
 given := $(foreach name,$(.VARIABLES),$(if $(findstring command line,$(origin $(name))),$(name)))
 unknown := $(filter-out $(settings) TETAP_% WITH_VCAN_% CMAKE_% CTEST_% CCACHE_% TMPDIR,$(given))
 ifneq ($(unknown),)
 $(error no setting $(unknown); there are: $(settings))
 endif
 
-.PHONY: help sim test quick proof replay firmware size heap stack count bits hashes check dbc setup host programs arm
+.PHONY: help sim test quick proof replay firmware size heap stack count bits hashes constants check dbc setup host programs arm
 
 help: ## this list
 	@echo "tetap: state estimation on the robot's own microcontroller"; echo
@@ -33,14 +36,14 @@ help: ## this list
 sim: setup programs ## the simulated world over vcan0: table, report, pictures in out/sim (SEED= FAULT= REALTIME=1 BOARD=zynqmp_r5 BUS=memory OUT=DIR)
 	@tools/run/simulate_world
 
-test: setup ## every proof on short prefixes, with a table of where the time went
-	@tools/proof/run_checks short
+test: setup ## every check on prefixes and samples, what is unchanged left out (STEPS="unit_tests check", TETAP_FRESH=1)
+	@tools/proof/run_checks test $(STEPS)
 
 quick: setup host ## host unit tests only
 	@ctest --preset quick
 
-proof: setup ## the whole lengths: exhaustive functions, full logs, long runs
-	@tools/proof/run_checks whole
+proof: setup ## the same on whole lengths, every float, long runs; goes on where it was interrupted (STEPS=)
+	@tools/proof/run_checks proof $(STEPS)
 
 replay: setup programs ## a recorded log over vcan0: LOG=run.log [TRUTH=run.truth.csv] ROBOT=NAME [BOARD=] [BUS=memory]
 	@tools/run/replay_log
@@ -63,11 +66,14 @@ count: arm ## instructions per workload and per tick on the emulated cores, agai
 bits: setup ## the same bits from every compiler, option and core: 2^24 values, 100000 steps (some 8 minutes)
 	@tools/proof/compare_bits --whole
 
+constants: setup ## numbers in the code and parameters that the inertial estimator reaches, in out/constants.json
+	@tools/proof/count_constants
+
 hashes: setup programs ## a hash of each estimate over simulated and recorded runs, in out/hashes.json
 	@tools/proof/hash_estimates
 
-check: setup host ## format, tidy, layers, DBC fresh
-	@tools/proof/check_sources
+check: setup ## format, tidy, layers, DBC fresh
+	@tools/proof/run_checks test check
 
 dbc: setup ## docs/reference/messages.md from config/tetap.dbc; the C++ messages are made in each build folder
 	@tools/can/generate_messages config/tetap.dbc --table docs/reference/messages.md

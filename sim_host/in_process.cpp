@@ -16,7 +16,7 @@ int with_node_in_process(const std::string& robot, std::uint32_t can_base,
     parameters.can_base = can_base;
     hal::MemoryBus bus;
     hal::MemoryBoard board(bus);
-    const auto firmware = std::make_unique<node::Firmware<hal::MemoryBoard, Estimators>>(board, parameters, kVersion);
+    const auto firmware = std::make_unique<node::Firmware<hal::MemoryBoard, Estimators>>(board, parameters, version());
     InProcessLink link(bus, [&firmware] { firmware->poll(); });
     status = play(link);
   });

@@ -37,7 +37,7 @@ The firmware as a Linux program on SocketCAN. Ends on INT or TERM with status 0.
 template <class Estimators>
 void run(tetap::hal::LinuxBoard& board, const tetap::param::Parameters& parameters) {
   const auto firmware =
-      std::make_unique<tetap::node::Firmware<tetap::hal::LinuxBoard, Estimators>>(board, parameters, tetap::kVersion);
+      std::make_unique<tetap::node::Firmware<tetap::hal::LinuxBoard, Estimators>>(board, parameters, tetap::version());
   while (stop_asked == 0) {
     firmware->poll();
     board.can.wait(tetap::base::Micros{500});

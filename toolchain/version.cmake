@@ -1,15 +1,43 @@
-# Writes OUTPUT (a header) with the first 32 bits of the commit, only when they have changed: run at every build, rebuilds nothing by itself.
+# Writes OUTPUT/version.hpp and version.cpp with the first 32 bits of the commit, only when they have changed: run at every build, rebuilds nothing by itself.
 execute_process(COMMAND git -C ${SOURCE} rev-parse --short=8 HEAD OUTPUT_VARIABLE commit OUTPUT_STRIP_TRAILING_WHITESPACE ERROR_QUIET
                 RESULT_VARIABLE failed)
 if(failed)
   set(commit 00000000)
 endif()
 string(SUBSTRING "${commit}" 0 8 commit)
-set(text "// Generated. The first 32 bits of the commit this was built from; 0: not from a repository.\n#pragma once\n#include \"bus/publisher.hpp\"\nnamespace tetap {\ninline constexpr bus::Version kVersion{.git = 0x${commit}};\n}\n")
-set(old "")
-if(EXISTS ${OUTPUT})
-  file(READ ${OUTPUT} old)
-endif()
-if(NOT text STREQUAL old)
-  file(WRITE ${OUTPUT} "${text}")
-endif()
+
+function(write_if_other path text)
+  set(old "")
+  if(EXISTS ${path})
+    file(READ ${path} old)
+  endif()
+  if(NOT text STREQUAL old)
+    file(WRITE ${path} "${text}")
+  endif()
+endfunction()
+
+# The mark is for tools/python/tetap/proof/stamps.py: programs that differ in the number behind it alone compute the same.
+write_if_other(${OUTPUT}/version.hpp "// Generated.
+#pragma once
+#include \"bus/publisher.hpp\"
+#include <cstdint>
+namespace tetap {
+struct Commit {
+  char mark[12];
+  std::uint32_t number;  ///< first 32 bits of the commit this was built from; 0: not from a repository
+};
+extern const Commit kCommit;
+inline bus::Version version() { return {.git = kCommit.number}; }
+}
+")
+write_if_other(${OUTPUT}/version.cpp "// Generated.
+#include <cstdint>
+namespace tetap {
+struct Commit {
+  char mark[12];
+  std::uint32_t number;
+};
+extern const Commit kCommit;
+const Commit kCommit{.mark = \"tetap-git:\", .number = 0x${commit}};
+}
+")

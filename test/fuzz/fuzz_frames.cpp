@@ -68,55 +68,28 @@ std::vector<Record> records_of(std::span<const std::uint8_t> bytes) {
 // ---- what is held against every frame that is sent
 // --------------------------------------------------------------------
 
-template <class... Messages>
-bool one_of(std::span<const std::uint8_t> payload) {
-  return (bus::decode<Messages>(payload).has_value() || ...);
-}
-
-bool decodes(std::uint32_t offset, std::span<const std::uint8_t> p) {
-  constexpr std::uint32_t kFirst = bus::EstPos::kOffset, kStride = bus::EstPos::kStride;
-  if (offset >= kFirst && offset < kFirst + kStride * bus::EstPos::kCount) {
-    switch ((offset - kFirst) % kStride + kFirst) {
-      case bus::EstPos::kOffset:
-        return one_of<bus::EstPos>(p);
-      case bus::EstMotion::kOffset:
-        return one_of<bus::EstMotion>(p);
-      case bus::EstStdPose::kOffset:
-        return one_of<bus::EstStdPose, bus::EstStdMore>(p);
-      case bus::EstAtt::kOffset:
-        return one_of<bus::EstAtt>(p);
-      case bus::EstVel::kOffset:
-        return one_of<bus::EstVel>(p);
-      case bus::EstStateHeight::kOffset:
-        return one_of<bus::EstStateHeight, bus::EstStateAccBias, bus::EstStateGyroBias, bus::EstStateStdVel,
-                      bus::EstStateStdTilt, bus::EstStateStdAccBias, bus::EstStateStdGyroBias, bus::EstStateJump,
-                      bus::EstStateDisagreement, bus::EstStateImuHealth, bus::EstStateCorrPos, bus::EstStateCorrVel,
-                      bus::EstStateCorrTilt, bus::EstStateCorrAccBias, bus::EstStateCorrGyroBias>(p);
-      default:
-        return false;
+/// Whether a message of the DBC has this offset.
+template <class M>
+constexpr bool has_offset(std::uint32_t offset) {
+  if constexpr (requires { M::kStride; }) {
+    for (std::uint32_t i = 0; i < M::kCount; ++i) {
+      if (offset == M::kOffset + i * M::kStride) return true;
     }
   }
-  switch (offset) {
-    case bus::EstEpoch::kOffset:
-      return one_of<bus::EstEpoch>(p);
-    case bus::EstStateCrc::kOffset:
-      return one_of<bus::EstStateCrc>(p);
-    case bus::EstStatus::kOffset:
-      return one_of<bus::EstStatus>(p) && bus::e2e_valid(bus::EstStatus::kOffset, p);
-    case bus::EstInnov::kOffset:
-      return one_of<bus::EstInnov>(p);
-    case bus::EstSensorStat::kOffset:
-      return one_of<bus::EstSensorStat>(p);
-    case bus::EstDiagLoop::kOffset:
-      return one_of<bus::EstDiagLoop, bus::EstDiagTicks, bus::EstDiagQueues, bus::EstDiagOrder, bus::EstDiagFrames,
-                    bus::EstDiagBus, bus::EstDiagRefused, bus::EstDiagCapacity>(p);
-    case bus::EstVersion::kOffset:
-      return one_of<bus::EstVersion>(p);
-    case bus::EstOriginLat::kOffset:
-      return one_of<bus::EstOriginLat, bus::EstOriginLon, bus::EstOriginHeight>(p);
-    default:
-      return false;
+  return offset == M::kOffset;
+}
+
+template <class... Messages>
+struct Every {
+  static bool decodes(std::uint32_t offset, std::span<const std::uint8_t> p) {
+    return ((has_offset<Messages>(offset) && bus::decode<Messages>(p).has_value()) || ...);
   }
+};
+
+/// Whether a node may send this: every message and page that the DBC has from the estimates on.
+bool decodes(std::uint32_t offset, std::span<const std::uint8_t> p) {
+  if (offset == bus::EstStatus::kOffset && !bus::e2e_valid(bus::EstStatus::kOffset, p)) return false;
+  return offset >= bus::EstEpoch::kOffset && bus::AllMessages<Every>::decodes(offset, p);
 }
 
 /// Checks what a node sends and keeps it for comparison.

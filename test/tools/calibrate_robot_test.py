@@ -520,7 +520,7 @@ class Program(unittest.TestCase):
     def compiles(self, snippet, assertion):
         source = os.path.join(self.at, "robot.cpp")
         with open(source, "w", encoding="utf-8") as file:
-            file.write('#include "app/numbers_check.hpp"\nconstexpr tetap::app::Numbers numbers = tetap::app::checked({\n' + snippet + "\n});\n"
+            file.write('#include "param/limits.hpp"\nconstexpr tetap::param::Parameters numbers = tetap::param::checked({\n' + snippet + "\n});\n"
                        f"static_assert({assertion});\n")
         subprocess.run(["g++", "-std=c++20", "-fsyntax-only", "-Wall", "-Werror", "-I", os.path.join(ROOT, "src"), "-I", ROOT,
                         "-isystem", "/usr/include/eigen3", source], check=True)
@@ -557,7 +557,7 @@ class Program(unittest.TestCase):
         self.assertIn("track", robot_numbers.snippet([part], robot_numbers.Robot()), "nobody knows what that robot has")
 
     def test_what_a_header_does_not_say_is_what_the_firmware_has_by_itself(self):
-        with open(os.path.join(ROOT, "src/app/numbers.hpp"), encoding="utf-8") as file:
+        with open(os.path.join(ROOT, "src/param/parameters.hpp"), encoding="utf-8") as file:
             text = file.read()
         for member, value in robot_numbers.UNSET.items():
             given = re.findall(r" %s(?: = ([^;]*)|\{([^}]*)\});" % member, text)

@@ -18,14 +18,14 @@ DESIGN = """# Design
 Text -> no arrow.
 
     src/base      -> (nothing)
-    src/can       -> src/base
+    src/bus       -> src/base
     src/filter    -> src/base, Eigen
-    src/app       -> src/{base,can,filter}, hal (concepts), drivers, config/messages.hpp
+    src/app       -> src/{base,bus,filter}, hal (concepts), drivers, config/messages.hpp
     hal           -> src/base                      hal/chip/support -> hal, src/base
     hal/board/<board> -> hal, hal/chip/support, src/base
     hal/board/<board>/main.cpp -> hal/board/<board>, src/app, config/<robot>.hpp
     drivers       -> hal, src/base, src/app/samples.hpp
-    config/messages.hpp -> src/can, src/base       config/<robot>.hpp -> src/app
+    config/messages.hpp -> src/bus, src/base       config/<robot>.hpp -> src/app
     sim_host      -> everything
 
 ### 4.2 Other
@@ -75,14 +75,14 @@ class LayersTest(ImageTest):
         self.assertEqual(self.findings("src/filter/ekf.hpp", "#include <Eigen/Core>\n#include <array>\n"), [])
 
     def test_includes_against_the_arrows_fail_with_file_and_line(self):
-        for name, include in (("src/base/math.hpp", "can/signal.hpp"), ("src/bus/signal.hpp", "filter/ekf.hpp"), ("src/filter/ekf.hpp", "app/firmware.hpp"),
+        for name, include in (("src/base/math.hpp", "bus/signal.hpp"), ("src/bus/signal.hpp", "filter/ekf.hpp"), ("src/filter/ekf.hpp", "app/firmware.hpp"),
                               ("src/app/firmware.hpp", "hal/board/mps2/board.hpp"), ("src/app/firmware.hpp", "config/rover.hpp"),
                               ("src/filter/ekf.hpp", "config/messages.hpp"), ("hal/board.hpp", "app/firmware.hpp"),
                               ("hal/board.hpp", "hal/chip/support/text.hpp"), ("drivers/imu.hpp", "app/firmware.hpp"),
                               ("hal/board/mps2/board.hpp", "hal/board/r5/board.hpp"), ("hal/board/mps2/main.cpp", "hal/board/r5/board.hpp"),
                               ("hal/board/mps2/board.hpp", "app/firmware.hpp"), ("config/messages.hpp", "app/firmware.hpp"),
-                              ("src/base/math.hpp", "sim_host/world.hpp"), ("src/base/math.hpp", "../can/signal.hpp"),
-                              ("src/base/math.hpp", "can/not_yet_generated.hpp"), ("hal/board/linux/board.hpp", "app/firmware.hpp")):
+                              ("src/base/math.hpp", "sim_host/world.hpp"), ("src/base/math.hpp", "../bus/signal.hpp"),
+                              ("src/base/math.hpp", "bus/not_yet_generated.hpp"), ("hal/board/linux/board.hpp", "app/firmware.hpp")):
             with self.subTest(f"{name} includes {include}"):
                 found = self.findings(name, f'#pragma once\n/* two\nlines */\n  # include "{include}"\n')
                 self.assertEqual(len(found), 1, found)
@@ -139,9 +139,9 @@ static_assert(noexcept(f())); std::string_view s; std::optional<int> o; using Ve
     def test_the_table_is_read_from_the_design_and_a_broken_one_is_refused(self):
         self.put("src/bus/signal.hpp", '#include "filter/ekf.hpp"\n')
         self.assertEqual(len(self.findings()), 1)
-        self.put("DESIGN.md", DESIGN.replace("src/can       -> src/base", "src/can       -> src/base, src/filter"))
+        self.put("DESIGN.md", DESIGN.replace("src/bus       -> src/base", "src/bus       -> src/base, src/filter"))
         self.assertEqual(self.findings(), [])
-        for broken, message in (("# nothing here\n", "has no table of arrows"), (DESIGN.replace("src/can  ", "src/c+an  "), "DESIGN.md:7: 'src/c+an'")):
+        for broken, message in (("# nothing here\n", "has no table of arrows"), (DESIGN.replace("src/bus  ", "src/c+an  "), "DESIGN.md:7: 'src/c+an'")):
             self.put("DESIGN.md", broken)
             status, text = self.run_tool("check_layers", "--root", self.folder)
             self.assertEqual(status, 2)
@@ -162,13 +162,13 @@ static_assert(noexcept(f())); std::string_view s; std::optional<int> o; using Ve
     def test_the_build_of_one_program_or_image_rejects_it_before_anything_is_compiled(self):
         tree = self.path("tree")
         shutil.copytree(ROOT, tree, ignore=lambda folder, names: (".git", "build", "out") if folder == ROOT else ())
-        with open(os.path.join(tree, "src/bus/signal.hpp"), "a", encoding="utf-8") as file:
+        with open(os.path.join(tree, "src/base/math.hpp"), "a", encoding="utf-8") as file:
             file.write('#include "filter/update.hpp"\n')
         for target in ("host:tetap-world", "r5:tetap-zynqmp_r5-rover"):
             with self.subTest(target):
                 done = subprocess.run([os.path.join(tree, "tools", "run", "build_preset"), target], capture_output=True, text=True)
                 self.assertEqual(done.returncode, 1, done.stderr)
-                self.assertRegex(done.stderr, r'src/bus/signal.hpp:\d+: #include "filter/update.hpp": against the arrows: src/can -> src/base')
+                self.assertRegex(done.stderr, r'src/base/math.hpp:\d+: #include "filter/update.hpp": against the arrows: src/base -> \(nothing\)')
                 built = os.path.join(tree, "build", target.split(":")[0])
                 objects = [f for top, _, files in os.walk(built) for f in files if f.endswith((".o", ".obj")) and "CompilerId" not in top]
                 self.assertEqual(objects, [])

@@ -9,8 +9,8 @@ import unittest
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.realpath(__file__))))
 COMPILERS = ("g++", "clang++")
 ROBOT = """#pragma once
-#include "app/numbers_check.hpp"
-inline constexpr tetap::app::Numbers numbers = tetap::app::checked({
+#include "param/limits.hpp"
+inline constexpr tetap::param::Parameters parameters = tetap::param::checked({
     .gnss = {%s},
 });
 %s"""

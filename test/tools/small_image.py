@@ -95,7 +95,7 @@ class ImageTest(unittest.TestCase):
                 out.write(text)
             objects.append(source.replace(".cpp", ".obj"))
             self.build(["arm-none-eabi-g++"] + FLAGS + CORES[core] + list(flags) + ["-c", source, "-o", objects[-1]])
-        script = os.path.join(ROOT, "hal", "port", "zynqmp_r5" if core == "r5" else "mps2", "link.ld")
+        script = os.path.join(ROOT, "hal", "board", "zynqmp_r5" if core == "r5" else "mps2", "link.ld")
         elf = os.path.join(folder, name + ".elf")
         self.build(["arm-none-eabi-g++"] + CORES[core] + ["-nostdlib", "-nostartfiles", "-T", script, "-Wl,--gc-sections",
                         "-Wl,-Map=" + elf.replace(".elf", ".map"), "-Wl,--defsym=_stack_size=8192", "-o", elf] + objects + list(link) +

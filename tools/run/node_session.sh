@@ -51,6 +51,9 @@ node_start() {
 # player_options BOARD: how a player has to treat a node on that board. An emulated controller has 64 receive buffers and no time of its own.
 player_options() { [ "$1" = linux ] || echo "--window 1 --emulated"; }
 
+# set_options: the settings PATH=VALUE of $SET as the programs take them.
+set_options() { local one; for one in ${SET:-}; do printf -- '--set %s ' "$one"; done; }
+
 # node_said: what it printed, without the line that says what runs.
 node_said() { grep -vE '^(emulate_r5: running |tetap-node: robot [A-Za-z0-9_]+ on )' "$node_log"; }
 
@@ -81,9 +84,3 @@ node_stop() {
 
 # files_are_in DIR: the last line of a run.
 files_are_in() { echo "files: $1 (the next run to there overwrites them; OUT=DIR: another place)"; }
-
-# bytes_differ LOG: a proof of identity (r5_identity, free_run, host_identity, same_bytes, two_nodes, r5_echo) says in its log that bytes or
-# state CRCs are not what they have to be. That is what it is there to find, so it is never tried again.
-bytes_differ() {
-  sed 's/, different 0$//' "$1" | grep -qiE '\bdiffer(s|ent)?\b|EOF on |came back as|every state CRC|does not move|the same as the undisturbed'
-}

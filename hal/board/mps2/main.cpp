@@ -17,7 +17,7 @@ int main() {
     return 1;
   }
   static tetap::node::Firmware<Board, tetap::robot::chosen::Estimators> firmware{
-      board, tetap::robot::chosen::parameters, tetap::kVersion};
+      board, tetap::robot::chosen::parameters, tetap::version()};
   tetap::hal::print_boot_line(board, tetap::robot::kName, firmware);
   while (!board.can.at_end()) firmware.poll();
   tetap::hal::print_stack_line(board);

@@ -10,7 +10,7 @@ int main() {
   using Board = tetap::hal::zynqmp_r5::Board;
   static Board board;
   static tetap::node::Firmware<Board, tetap::robot::chosen::Estimators> firmware{
-      board, tetap::robot::chosen::parameters, tetap::kVersion};
+      board, tetap::robot::chosen::parameters, tetap::version()};
   tetap::hal::print_boot_line(board, tetap::robot::kName, firmware);
   tetap::hal::print_stack_line(board);
   for (std::uint32_t polls = 0;; ++polls) {

@@ -23,7 +23,7 @@ from tetap.calibrate.robot_numbers import Refusal
 from tetap.dataset.inertial import to_enu
 
 REST_BIAS = 1e-3          # rad/s: 1 sigma of the bias against the one at rest, where there was one
-BIAS_WALK = 1e-5          # rad/s/sqrt(s), as InertialNumbers::gyro_bias_radps2_rthz
+BIAS_WALK = 1e-5          # rad/s/sqrt(s), as InertialParameters::gyro_bias_radps2_rthz
 MOST_FIXES = 1000         # of one kind: more are averaged in groups
 JUMP_RADPS = 0.2          # 1 sigma of what the turn rate did meanwhile, against the mean of before and after
 BLOCKS = 10               # of the run: each is left out in turn

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the parts of a calibration hand back: numbers with 1 sigma and their place in app::Numbers, residuals, notes; or why there is none."""
+"""What the parts of a calibration hand back: numbers with 1 sigma and their place in param::Parameters, residuals, notes; or why there is none."""
 import dataclasses
 import os
 import re
@@ -10,7 +10,7 @@ import numpy as np
 from tetap.can.bus_writer import BadInput
 
 ROOT = os.path.abspath(os.path.join(os.path.dirname(os.path.realpath(__file__)), *[os.pardir] * 4))
-STRUCTS = ("src/app/numbers.hpp", "src/model/differential_drive.hpp")
+STRUCTS = ("src/param/parameters.hpp", "src/model/differential_drive.hpp")
 
 
 class Refusal(Exception):
@@ -23,7 +23,7 @@ class Refusal(Exception):
 
 @dataclasses.dataclass
 class Number:
-    """One number or a list of them. `field`: where it belongs in app::Numbers ("": nowhere); `scale`: shown = value * scale, in `unit`."""
+    """One number or a list of them. `field`: where it belongs in param::Parameters ("": nowhere); `scale`: shown = value * scale, in `unit`."""
 
     name: str
     value: np.ndarray
@@ -80,8 +80,8 @@ class Robot:
             except OSError as error:
                 known = subprocess.run([os.path.join(ROOT, "tools/run/list_robots")], check=True, capture_output=True, text=True).stdout.split()
                 raise BadInput(f"config/{name}.hpp: {error.strerror}; there are: {', '.join(known)}") from None
-            if "app::Numbers" not in self.text:
-                raise BadInput(f"{path}: no robot: no app::Numbers in it")
+            if "param::Parameters" not in self.text:
+                raise BadInput(f"{path}: no robot: no param::Parameters in it")
         self.given = {}
 
     def number(self, field, default=None):
@@ -91,7 +91,7 @@ class Robot:
         return float(found[1]) if found else default
 
     def now(self, field):
-        """The values of one of the fields a calibration finds, as the header has them or app::Numbers by itself; None without a robot."""
+        """The values of one of the fields a calibration finds, as the header has them or param::Parameters by itself; None without a robot."""
         if not self.name:
             return None
         member = field.split(".")[-1]
@@ -111,14 +111,14 @@ class Robot:
         return now is not None and len(now) == len(number.value) and bool((np.abs(number.value - now) <= 2 * number.sigma).all())
 
 
-# What app::Numbers has where a header says nothing (test/tools/calibrate_robot_test.py compares).
+# What param::Parameters has where a header says nothing (test/tools/calibrate_robot_test.py compares).
 UNSET = {"mounting_bs": np.eye(3).ravel(), "up_s": np.array([0.0, 0.0, 1.0]), "accel_bias_mps2": np.zeros(3), "gyro_bias_radps": np.zeros(3),
          "accel_matrix": np.eye(3).ravel(), "speed_scale": np.ones(1), "left_speed_scale": np.ones(1), "right_speed_scale": np.ones(1),
          "yaw_rate_scale": np.ones(1)}
 
 
 def structs():
-    """Of each struct that app::Numbers is made of: its members in order, name -> type."""
+    """Of each struct that param::Parameters is made of: its members in order, name -> type."""
     found = {}
     for path in STRUCTS:
         with open(os.path.join(ROOT, path), encoding="utf-8") as file:
@@ -135,7 +135,7 @@ def literal(value, digits):
 
 
 def snippet(parts, robot=None):
-    """The numbers as designated initialisers of app::Numbers, in its order; without those that the robot has already."""
+    """The numbers as designated initialisers of param::Parameters, in its order; without those that the robot has already."""
     known, values = structs(), {}
     for number in (number for part in parts for number in part.numbers if number.field):
         if robot is not None and robot.has(number):
@@ -153,7 +153,7 @@ def snippet(parts, robot=None):
                 result += [f"{indent}.{member} = {{"] + lines(kind, f"{field}.", indent + "    ") + [f"{indent}}},"]
         return result
 
-    text = "\n".join(lines("Numbers", "", "    "))
+    text = "\n".join(lines("Parameters", "", "    "))
     if values:
-        raise LookupError(f"app::Numbers has no {', '.join(values)}")
+        raise LookupError(f"param::Parameters has no {', '.join(values)}")
     return text
