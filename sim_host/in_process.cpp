@@ -9,10 +9,10 @@
 
 namespace tetap::sim {
 
-int with_node_in_process(const std::string& robot, std::uint32_t can_base,
+int with_node_in_process(const std::string& robot, const ParameterSettings& settings, std::uint32_t can_base,
                          const std::function<int(InProcessLink&)>& play) {
   int status = 2;
-  for_robot(robot, [&]<class Estimators>(std::type_identity<Estimators>, param::Parameters parameters) {
+  for_robot(robot, settings, [&]<class Estimators>(std::type_identity<Estimators>, param::Parameters parameters) {
     parameters.can_base = can_base;
     hal::MemoryBus bus;
     hal::MemoryBoard board(bus);

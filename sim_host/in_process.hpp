@@ -2,6 +2,7 @@
 // A node in the player's own process: the same frames, codec and firmware as on a bus, without the bus.
 #pragma once
 
+#include "sim_host/parameter_settings.hpp"
 #include "sim_host/play/link.hpp"
 
 #include <cstdint>
@@ -12,10 +13,10 @@ namespace tetap::sim {
 
 using InProcessLink = MemoryLink<std::function<void()>>;
 
-/// Calls play(link) with a link to a node of that robot in this process; its status. Throws std::runtime_error when
-/// there is no such robot. Every robot's firmware is compiled behind this one function, once for all programs: that is
-/// most of what a first build waits for.
-int with_node_in_process(const std::string& robot, std::uint32_t can_base,
+/// Calls play(link) with a link to a node of that robot, with these settings, in this process; its status. Throws
+/// std::runtime_error when there is no such robot. Every robot's firmware is compiled behind this one function, once
+/// for all programs: that is most of what a first build waits for.
+int with_node_in_process(const std::string& robot, const ParameterSettings& settings, std::uint32_t can_base,
                          const std::function<int(InProcessLink&)>& play);
 
 }  // namespace tetap::sim

@@ -25,7 +25,7 @@ namespace tetap::sim {
   n.landmark.sigma_range_m = single(world.camera.sigma_range_m);
   n.landmark.sigma_range_per_m = single(world.camera.sigma_range_per_m);
   n.landmark.sigma_bearing_rad = single(world.camera.sigma_bearing_rad);
-  n.gnss.sigma_floor_m = 0;  // the receiver's accuracy figure is exact
+  n.gnss.sigma_floor_m = 0.001F;  // the receiver's accuracy figure is exact
   n.gnss.sigma_scale = 1;
   // A first fix as origin would be a metre off the map, for the whole run.
   const GeodeticPoint origin = Wgs84{options.origin}.geodetic({});
@@ -52,7 +52,7 @@ namespace tetap::sim {
   n.gnss.antenna_x_b_m = single(world.gnss.antenna_b_m[0]);
   n.gnss.antenna_y_b_m = single(world.gnss.antenna_b_m[1]);
   n.gnss.antenna_z_b_m = single(world.gnss.antenna_b_m[2]);
-  n.gnss.sigma_velocity_floor_mps = 0;
+  n.gnss.sigma_velocity_floor_mps = 0.001F;
   n.inertial.mounting_bs = param::InertialParameters{}.mounting_bs;
   n.inertial.gyro_radps_rthz = single(world.imu.gyro_noise);
   n.inertial.gyro_scale = 0;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which sensors a robot is sent: those that one of its estimators takes and its numbers use. The world has them all; a
-// bus need not. A fault of a sensor that is not sent cannot act.
+// Which sensors a robot is sent: those that one of its estimators takes and its parameters use. The world has them all;
+// a bus need not. A fault of a sensor that is not sent cannot act.
 #pragma once
 
 #include "node/node.hpp"
@@ -37,11 +37,12 @@ template <class... E>
 }
 
 /// Throws std::runtime_error when there is no such robot.
-[[nodiscard]] inline Sent sent_to(const std::string& robot) {
+[[nodiscard]] inline Sent sent_to(const std::string& robot, const ParameterSettings& settings = {}) {
   Sent sent;
-  for_robot(robot, [&]<class Estimators>(std::type_identity<Estimators>, const param::Parameters& parameters) {
-    sent = sent_to(Estimators{}, parameters);
-  });
+  for_robot(robot, settings,
+            [&]<class Estimators>(std::type_identity<Estimators>, const param::Parameters& parameters) {
+              sent = sent_to(Estimators{}, parameters);
+            });
   return sent;
 }
 

@@ -4,6 +4,7 @@
 
 #include "configured_robots.hpp"  // made by CMake of what lies in config/
 #include "sim_host/matched_rover.hpp"
+#include "sim_host/parameter_settings.hpp"
 
 #include <stdexcept>
 #include <string>
@@ -14,7 +15,7 @@ namespace tetap::sim {
 
 inline const std::string kRobotNames = std::string(kConfiguredRobots) + " rover_landmarks_matched rover_matched";
 
-/// Calls f(std::type_identity<Estimators>, numbers) for the robot of that name; false when there is none.
+/// Calls f(std::type_identity<Estimators>, parameters) for the robot of that name; false when there is none.
 template <class F>
 [[nodiscard]] bool with_robot(std::string_view name, F&& f) {
   if (name == "rover_landmarks_matched")
@@ -27,6 +28,18 @@ template <class F>
 template <class F>
 void for_robot(const std::string& name, F&& f) {
   if (!with_robot(name, f)) throw std::runtime_error("no robot '" + name + "'; there are: " + std::string(kRobotNames));
+}
+/// The same with these settings over the robot's parameters.
+template <class F>
+void for_robot(const std::string& name, const ParameterSettings& settings, F&& f) {
+  for_robot(name,
+            [&](auto estimators, const param::Parameters& parameters) { f(estimators, settings.over(parameters)); });
+}
+
+[[nodiscard]] inline param::Parameters parameters_of(const std::string& robot, const ParameterSettings& settings = {}) {
+  param::Parameters found;
+  for_robot(robot, settings, [&found](auto, const param::Parameters& parameters) { found = parameters; });
+  return found;
 }
 
 }  // namespace tetap::sim

@@ -28,7 +28,9 @@ The firmware as a Linux program on SocketCAN. Ends on INT or TERM with status 0.
   --robot NAME   what it is (default rover):
                  )" +
          tetap::sim::kRobotNames + R"(
-  --base ID      first id of the node's block of 64 (default 0x300)
+  --base ID      first id of the node's block of 64 (default: can_base of the parameters)
+)" + std::string(tetap::sim::kParameterHelp) +
+         R"(
   --list-robots  print the names of the robots, nothing else
   --boot-line    print what a flash image of this robot says of its core at boot, nothing else
 )";
@@ -64,13 +66,14 @@ int main(int argc, char** argv) try {
   const bool list_robots = arguments.flag("--list-robots");
   const std::string interface = arguments.text("--can").value_or("vcan0");
   const std::string robot = arguments.text("--robot").value_or("rover");
-  const std::uint32_t base = arguments.base();
+  const tetap::sim::ParameterSettings settings(arguments);
+  const std::uint32_t base = arguments.base("--base", settings.can_base());
   const bool boot_line = arguments.flag("--boot-line");
   arguments.finish();
   if (list_robots) return std::printf("%s\n", tetap::sim::kRobotNames.c_str()), 0;
   std::signal(SIGINT, ask_to_stop);
   std::signal(SIGTERM, ask_to_stop);
-  tetap::sim::for_robot(robot,
+  tetap::sim::for_robot(robot, settings,
                         [&]<class Estimators>(std::type_identity<Estimators>, tetap::param::Parameters parameters) {
                           if (boot_line) return print_boot_line<Estimators>(robot, parameters);
                           parameters.can_base = base;

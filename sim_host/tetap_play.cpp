@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // tetap-play: plays a candump log to a node, on a CAN interface or in its own process, and records what it answers.
 #include "sim_host/in_process.hpp"
-#include "sim_host/numbers_words.hpp"
+#include "sim_host/parameter_settings.hpp"
+
 #include "sim_host/play/play.hpp"
 #include "sim_host/robots.hpp"
 
@@ -14,15 +15,15 @@ int main(int count, char** values) {
     sim::Arguments arguments(count, values);
     if (arguments.flag("--help") || arguments.flag("-h"))
       return std::fputs(sim::play_help(sim::kRobotNames).c_str(), stdout), 0;
-    sim::PlayOptions options = sim::play_options(arguments);
+    const sim::ParameterSettings settings(arguments);
+    sim::PlayOptions options = sim::play_options(arguments, settings.can_base());
+    if (options.robot.empty() && !settings.words().empty()) throw sim::UsageError("--params and --set need --robot");
     if (!options.robot.empty())
-      sim::for_robot(options.robot, [&options](auto, const param::Parameters& parameters) {
-        options.parameters = sim::numbers_words(parameters);
-      });
+      options.notes = sim::parameter_notes(sim::parameters_of(options.robot, settings), settings);
     // Before the bus, so that a log that cannot be read is said also where there is none.
     const sim::Log log = sim::load_for(options);
     if (options.memory)
-      return sim::with_node_in_process(options.robot, options.script.base, [&](auto& link) {
+      return sim::with_node_in_process(options.robot, settings, options.script.base, [&](auto& link) {
         return sim::play(link, options, log, "memory", "tetap-play");
       });
     hal::SocketCan can(options.interface);

@@ -50,7 +50,8 @@ std::string help() {
       "  --realtime         at the speed of the world, with Tick frames; else lockstep, as fast as the node can\n"
       "  --window N         lockstep: ticks in flight (default 8)\n"
       "  --emulated         the node runs on an emulated core: be patient\n"
-      "  --base ID          first id of the node's block (default 0x300)\n"
+      "  --base ID          first id of the node's block (default: can_base of the parameters)\n" +
+      std::string(sim::kParameterHelp) +
       "  --raw              also write raw.log\n"
       "  --quiet            no progress line\n";
 }
@@ -69,9 +70,8 @@ std::string landmarks_json(const sim::World& world) {
 
 /// In lockstep each row is an epoch of the node, whatever became of the clock of the bus. Biases are those that the
 /// robot's own calibration leaves.
-void write_truth(const sim::SessionOptions& about, const sim::WorldSource& source, bool lockstep) {
-  param::Parameters parameters;
-  sim::for_robot(about.robot, [&](auto, const param::Parameters& n) { parameters = n; });
+void write_truth(const sim::SessionOptions& about, const param::Parameters& parameters, const sim::WorldSource& source,
+                 bool lockstep) {
   const double temperature_degC = source.world().parameters().imu.temperature_degC;
   sim::OutFile file(about.folder + "/truth.csv");
   sim::Line line;
@@ -101,6 +101,7 @@ struct Run {
   bool realtime = false;
   bool told_pose = true;
   std::string faults;
+  sim::ParameterSettings settings;
   sim::SessionOptions session;
   sim::LockstepOptions lockstep;
 };
@@ -116,6 +117,8 @@ int drive(L& link, const Run& run) {
   session.note("fault", sim::quoted(run.faults));
   session.note("landmarks", landmarks_json(source.world()));
   session.note("matched", run.world.mismatched ? "false" : "true");
+  const param::Parameters parameters = sim::parameters_of(about.robot, run.settings);
+  for (const auto& [name, json] : sim::parameter_notes(parameters, run.settings)) session.note(name, json);
   const int status = session.run([&] {
     if (!run.realtime) return sim::play_lockstep(link, source, session, run.lockstep, session.counts());
     std::vector<sim::TimedFrame> frames;
@@ -125,7 +128,7 @@ int drive(L& link, const Run& run) {
     sim::RealtimeOptions options{.base = about.base};
     sim::play_realtime(link, frames, session, options, session.counts());
   });
-  write_truth(about, source, !run.realtime);
+  write_truth(about, parameters, source, !run.realtime);
   return status;
 }
 
@@ -171,7 +174,8 @@ int main(int argc, char** argv) try {
   const std::string interface = arguments.text("--can").value_or("vcan0");
   const bool memory = arguments.flag("--memory");
   const std::string robot = arguments.text("--robot").value_or("rover");
-  const std::uint32_t base = arguments.base();
+  run.settings = sim::ParameterSettings(arguments);
+  const std::uint32_t base = arguments.base("--base", run.settings.can_base());
   run.seed = arguments.integer("--seed", 1, 0, ~std::uint64_t{0});
   run.limit = {static_cast<std::int64_t>(arguments.real("--duration", 86'400, 0.01, 1e7) * 1e6)};
   run.world.mismatched = !arguments.flag("--matched");
@@ -184,7 +188,7 @@ int main(int argc, char** argv) try {
   }
   set_world(arguments, run.world);
   const std::string refused = sim::cannot_act(run.world, robot);
-  sim::send_only(sim::sent_to(robot), run.world);
+  sim::send_only(sim::sent_to(robot, run.settings), run.world);
   run.realtime = arguments.flag("--realtime");
   run.lockstep.window = arguments.window();
   if (arguments.flag("--emulated")) run.lockstep.patience = sim::kEmulatedPatience;
@@ -202,7 +206,7 @@ int main(int argc, char** argv) try {
   arguments.finish();
   if (!refused.empty()) throw std::runtime_error(refused);
   if (list) return std::printf("%s\n", sim::faults_that_act(run.world).c_str()), 0;
-  if (memory) return sim::with_node_in_process(robot, base, [&](auto& link) { return drive(link, run); });
+  if (memory) return sim::with_node_in_process(robot, run.settings, base, [&](auto& link) { return drive(link, run); });
   hal::SocketCan can(interface);
   return drive(can, run);
 } catch (const std::exception& error) {

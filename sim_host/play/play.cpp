@@ -13,7 +13,7 @@ Plays a log to a node and records what it answers.
   LOG                 candump -L log; frames with ids base+0x01 .. base+0x1F are played
   --out DIR           for estimates.log, estimates.csv, innovations.csv, status.csv, sources.csv, run.json (default out/play)
   --can IFACE         the bus (default vcan0)
-  --base ID           first id of the node's block (default 0x300)
+  --base ID           first id of the node's block (default: can_base of --set, else 0x300)
   --log-base ID       first id of the block in the log (default: as --base)
   --log-interface I   play only frames logged from this interface
   --keep-going        count malformed lines of the log instead of stopping at the first
@@ -21,6 +21,8 @@ Plays a log to a node and records what it answers.
   --robot NAME        with --memory: what the node is; else only written into run.json:
                       )" +
          std::string(robots) + R"(
+  --params FILE       with --robot: parameters over the robot's own, `path = value` lines (tetap-params writes one)
+  --set PATH=VALUE    one parameter over the robot's own and the file's; may be given more than once
   --raw               also write raw.log: everything on the bus as it came
   --quiet             no progress line
 
@@ -47,13 +49,13 @@ no bus. run.json has the numbers.
 )";
 }
 
-PlayOptions play_options(Arguments& arguments) {
+PlayOptions play_options(Arguments& arguments, std::uint32_t can_base) {
   PlayOptions o;
   o.interface = arguments.text("--can").value_or("vcan0");
   o.memory = arguments.flag("--memory");
   o.robot = arguments.text("--robot").value_or("");
   o.folder = arguments.text("--out").value_or("out/play");
-  o.script.base = arguments.base();
+  o.script.base = arguments.base("--base", can_base);
   o.script.log_base = arguments.base("--log-base", o.script.base);
   const auto milliseconds = [&arguments](std::string_view name, double otherwise, double low) {
     return base::Micros{std::llround(arguments.real(name, otherwise, low, 1000) * 1000)};

@@ -13,6 +13,8 @@
 #include <cstdio>
 #include <string>
 #include <string_view>
+#include <utility>
+#include <vector>
 
 namespace tetap::sim {
 
@@ -29,8 +31,8 @@ struct PlayOptions {
   LockstepOptions lockstep;
   RealtimeOptions realtime;
   Perturbation perturbation;
-  std::string parameters;  ///< in words, for run.json
-  bool memory = false;     ///< the node is in this process
+  std::vector<std::pair<std::string, std::string>> notes;  ///< further lines of run.json: name and JSON
+  bool memory = false;                                     ///< the node is in this process
   bool raw = false;
   bool quiet = false;
 };
@@ -39,7 +41,8 @@ struct PlayOptions {
 [[nodiscard]] std::string play_help(std::string_view robots);
 
 /// Takes the player's options out of the command line, LOG included, and refuses what is left; throws UsageError.
-[[nodiscard]] PlayOptions play_options(Arguments& arguments);
+/// `can_base` is what --base is without being given.
+[[nodiscard]] PlayOptions play_options(Arguments& arguments, std::uint32_t can_base = 0x300);
 
 /// Reads the log and settles the mode: a log with the node's own frames in it is a record to be repeated.
 [[nodiscard]] Log load_for(PlayOptions& options);
@@ -60,12 +63,12 @@ int play(L& link, const PlayOptions& options, const Log& log, const std::string&
                        .robot = options.robot,
                        .log = options.log,
                        .quiet = options.quiet};
-  const auto note_log = [&log, &parameters = options.parameters](Session& session) {
+  const auto note_log = [&log, &notes = options.notes](Session& session) {
     session.note("malformed_lines", std::to_string(log.malformed));
     session.note("frames_not_data", std::to_string(log.not_data));
     session.note("frames_back_in_time", std::to_string(log.back_in_time));
     session.note("frames_of_wrong_length", std::to_string(log.wrong_length));
-    if (!parameters.empty()) session.note("numbers", sim::quoted(parameters));
+    for (const auto& [name, json] : notes) session.note(name, json);
   };
 
   if (options.mode == PlayMode::kRealtime) {

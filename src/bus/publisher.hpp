@@ -3,7 +3,6 @@
 // it is the same in every replay.
 #pragma once
 
-#include "base/bit_crc.hpp"
 #include "base/math.hpp"
 #include "bus/codec.hpp"
 #include "bus/counters.hpp"
@@ -15,10 +14,11 @@
 #include "estimators/attitude_disagreement.hpp"
 #include "estimators/estimate.hpp"
 #include "estimators/sensor_statistics.hpp"
+#include "param/crc.hpp"
 #include "sensor/sample.hpp"
 
 #include <array>
-#include <bit>
+
 #include <cstddef>
 #include <cstdint>
 
@@ -46,24 +46,9 @@ struct Summary {
 
 template <std::size_t EstimatorCount>
 class Publisher {
-  /// At start only, of more than a hundred numbers: small, not fast.
-  struct NumbersCrc {
-    base::BitCrc crc;
-    [[gnu::noinline]] void operator()(std::uint32_t word) { crc(word); }
-    void operator()(std::int32_t word) { (*this)(static_cast<std::uint32_t>(word)); }
-    void operator()(float number) { (*this)(std::bit_cast<std::uint32_t>(number)); }
-    void operator()(std::int64_t word) {
-      (*this)(static_cast<std::uint32_t>(static_cast<std::uint64_t>(word)));
-      (*this)(static_cast<std::uint32_t>(static_cast<std::uint64_t>(word) >> 32));
-    }
-  };
-
  public:
-  Publisher(const param::Parameters& parameters, const Version& version) : parameters_(parameters), version_(version) {
-    NumbersCrc crc;
-    each_parameter(parameters, crc);
-    config_ = crc.crc.value();
-  }
+  Publisher(const param::Parameters& parameters, const Version& version)
+      : parameters_(parameters), version_(version), config_(param::crc(parameters)) {}
 
   void power_on() {
     epoch_ = 0;
@@ -196,8 +181,8 @@ void Publisher<N>::estimate(std::size_t instance, sensor::EstimatorKind kind, bo
   }
 }
 
-/// Attitude and velocity; of the rest one page at a time, in an epoch that has these and Est_Std too (numbers_check):
-/// what turns and accelerates is to be judged by the covariance of its own time.
+/// Attitude and velocity; of the rest one page at a time, in an epoch that has these and Est_Std too
+/// (param/limits.hpp): what turns and accelerates is to be judged by the covariance of its own time.
 template <std::size_t N>
 template <class Inertial, class Send>
 void Publisher<N>::inertial(std::size_t instance, Inertial&& inertial, Send& send) {

@@ -53,18 +53,6 @@ struct AttitudeOptions {
   float field_reject_s = 60.0F;       ///< a disturbance of longer is followed, at 1/field_reject_factor of the gain
   float field_provisional_s = 10.0F;  ///< the same against a reference that no motion has confirmed
   float field_reject_factor = 2.0F;
-
-  /// Feeds every option to sink(value), in declaration order.
-  template <class Sink>
-  constexpr void each(Sink&& sink) const {
-    const auto all = [&sink](const auto&... values) { (sink(values), ...); };
-    all(tau_inclination_s, accelerometer_limit_mps2, inclination_limit_radps, inclination_reject_rad,
-        inclination_hold_s, gyroscope_limit_radps, relevel_s, bias_start_sigma_radps, bias_walk_radps, bias_walk_s,
-        bias_limit_radps, bias_motion_sigma_radps, bias_rest_sigma_radps, bias_vertical_weight, rest_after_s,
-        tau_rest_s, rest_rate_radps, rest_acceleration_mps2, tau_heading_s, declination_rad, tau_field_s,
-        tau_reference_s, field_norm_share, field_dip_rad, field_undisturbed_s, field_first_s, field_new_s,
-        field_motion_radps, field_reject_s, field_provisional_s, field_reject_factor);
-  }
 };
 
 }  // namespace tetap::filter

@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// All numbers of a robot in one struct, passed by const reference. Types and sizes are template arguments; everything
-// that can be tuned is here, has a unit, and is part of the hash in the version frame, so a replay with other numbers
-// says so.
+// The parameters of a robot in one struct, passed by const reference. Types and sizes are template arguments;
+// everything that can be tuned is here. Each member has a row in param/table.hpp: index, unit, limits, text. The
+// table's CRC is in the version frame.
 #pragma once
 
-#include "base/crc.hpp"
 #include "base/time.hpp"
 #include "filter/attitude_options.hpp"
 #include "model/differential_drive.hpp"
@@ -12,7 +11,6 @@
 #include "model/unicycle.hpp"
 
 #include <array>
-#include <bit>
 #include <cstdint>
 
 namespace tetap::param {
@@ -223,58 +221,5 @@ struct Parameters {
   RecoveryParameters recovery;
   PublishParameters publish;
 };
-
-/// Feeds every number to sink(value), in declaration order.
-template <class Sink>
-constexpr void each_parameter(const Parameters& n, Sink&& sink) {
-  const auto all = [&sink](const auto&... values) { (sink(values), ...); };
-  all(n.can_base, n.loop.period_us, n.loop.window_us, n.loop.ahead_us, n.loop.turn_radps2);
-  const auto& d = n.wheels.drive;
-  all(d.left_radius_m, d.right_radius_m, d.track_m, d.counts_per_turn, d.noise_left, d.noise_right);
-  const auto& u = n.wheels.noise;
-  all(u.speed, u.speed_per_speed, u.yaw_rate, u.yaw_rate_per_yaw_rate, u.yaw_rate_per_speed);
-  all(n.wheels.wheel_speed_noise, static_cast<std::int32_t>(n.wheels.hold), n.wheels.delay_us, n.wheels.speed_scale,
-      n.wheels.yaw_rate_scale, n.wheels.left_speed_scale, n.wheels.right_speed_scale, n.wheels.timeout_us,
-      n.wheels.timeout_noise);
-  for (const float v : n.imu.accel_bias_mps2) sink(v);
-  for (const float v : n.imu.accel_matrix) sink(v);
-  for (const float v : n.imu.gyro_bias_radps) sink(v);
-  for (const float v : n.imu.gyro_bias_slope_radps_per_degC) sink(v);
-  sink(n.imu.gyro_bias_at_degC);
-  all(n.gyro.use, n.gyro.up_s[0], n.gyro.up_s[1], n.gyro.up_s[2], n.gyro.noise, n.gyro.bias_time_s,
-      n.gyro.standstill_mps);
-  const auto& l = n.landmark;
-  all(l.mounting.x_b_m, l.mounting.y_b_m, l.mounting.yaw_rad, l.sigma_range_m, l.sigma_range_per_m, l.sigma_bearing_rad,
-      l.sigma_range_only_m, l.gate_scale);
-  const auto& g = n.gnss;
-  all(g.antenna_x_b_m, g.antenna_y_b_m, g.antenna_z_b_m, g.sigma_velocity_floor_mps, g.sigma_floor_m, g.sigma_scale,
-      g.correlation_s, g.gate_scale, g.align_distance_m, g.origin_configured, g.origin_latitude_2ndeg,
-      g.origin_longitude_2ndeg, g.origin_height_m, g.baseline_b_m[0], g.baseline_b_m[1], g.baseline_b_m[2],
-      g.heading_stuck_samples);
-  const auto& i = n.inertial;
-  for (const float m : i.mounting_bs) sink(m);
-  all(i.imu, i.gyro_radps_rthz, i.gyro_scale, i.accel_mps2_rthz, i.gyro_bias_radps2_rthz, i.accel_bias_mps3_rthz,
-      i.gyro_turn_on_radps, i.accel_turn_on_mps2, i.start_tilt_rad, i.level_s, i.starts_forward, i.gap_mps2,
-      i.gap_radps, i.still_radps, i.still_mps, i.wheel_mps, i.slip_share, i.lateral_mps, i.vertical_mps, i.axle_x_b_m,
-      i.wheel_gate_scale, i.wheels_every_us, i.constrain_every_us, i.gap_wheels_radps, i.stuck_samples, i.stale_us,
-      i.earth_rate, i.vibration_mps2, i.vibration_radps, i.calm_mps2, i.calm_radps, i.still_gnss_mps, i.slip_mps);
-  const auto& m = n.magnetic;
-  for (const float v : m.hard_iron_uT) sink(v);
-  for (const float v : m.soft_iron) sink(v);
-  for (const float v : m.mounting_bs) sink(v);
-  all(m.use, m.declination_rad, m.sigma_rad, m.gate_scale, m.norm_uT, m.norm_share, m.dip_rad, m.field_new_s,
-      m.stuck_samples);
-  all(n.baro.use, n.baro.sigma_m, n.baro.drift_m_rts, n.baro.scale_share, n.baro.gate_scale, n.baro.stuck_samples);
-  n.attitude.each(sink);
-  all(n.disagreement.tilt_rad, n.disagreement.heading_rad, n.disagreement.after_us);
-  const auto& s = n.start;
-  all(s.known, s.x_m, s.y_m, s.yaw_rad, s.sigma_position_m, s.sigma_yaw_rad);
-  const auto& r = n.recovery;
-  all(r.after_us, r.at_least, r.inflate_position_m, r.inflate_yaw_rad, r.persist_us, r.persist_fixes, r.confirm_fixes,
-      r.frozen_m);
-  const auto& p = n.publish;
-  all(p.pose_every, p.std_every, p.side_every, p.status_every, p.statistics_every, p.diagnostics_every,
-      p.identity_every, p.attitude_every, p.state_every, p.event_every);
-}
 
 }  // namespace tetap::param

@@ -32,6 +32,7 @@ with contextlib.redirect_stdout(io.StringIO()):
     from tetap.calibrate import recording
     from tetap.calibrate import magnetometer
     from tetap.calibrate import mounting
+    from tetap.calibrate import parameter_table
     from tetap.calibrate import robot_numbers
     from tetap.calibrate import rest
     from tetap.calibrate import wheels
@@ -542,12 +543,12 @@ class Program(unittest.TestCase):
     def test_what_a_robot_has_within_two_sigma_is_not_advised(self):
         robot = robot_numbers.Robot("rover")
         part = robot_numbers.Part("mounting", "mounting")
-        track = robot.number("track_m")
+        track = robot.number("wheels.drive.track_m")
         part.add("up", [0.018, 0, 0.99984], [0.01, 0.01, 0.001], "1", "gyro.up_s", tuple("xyz"))
         part.add("track", track + 0.019, 0.01, "m", "wheels.drive.track_m")
         part.add("bias", [0, 0, 0.021], [0.01, 0.01, 0.01], "rad/s", "imu.gyro_bias_radps", tuple("xyz"))
         self.assertEqual([robot.has(number) for number in part.numbers], [True, True, False])
-        part.add("right", robot.number("right_radius_m") + 1e-4, 1e-4, "m", "wheels.drive.right_radius_m", off=True)
+        part.add("right", robot.number("wheels.drive.right_radius_m") + 1e-4, 1e-4, "m", "wheels.drive.right_radius_m", off=True)
         self.assertFalse(robot.has(part.number("right")), "alone it is, together with the left one it is not")
         text = robot_numbers.snippet([part], robot)
         self.assertIn("right_radius_m = 0.1001F", text)
@@ -556,14 +557,27 @@ class Program(unittest.TestCase):
         self.assertNotIn("track", text)
         self.assertIn("track", robot_numbers.snippet([part], robot_numbers.Robot()), "nobody knows what that robot has")
 
-    def test_what_a_header_does_not_say_is_what_the_firmware_has_by_itself(self):
-        with open(os.path.join(ROOT, "src/param/parameters.hpp"), encoding="utf-8") as file:
-            text = file.read()
-        for member, value in robot_numbers.UNSET.items():
-            given = re.findall(r" %s(?: = ([^;]*)|\{([^}]*)\});" % member, text)
-            self.assertTrue(given, member)
-            for one in given:
-                self.assertEqual([float(v) for v in "".join(one).rstrip("F").split(",")], value.tolist(), member)
+    def test_a_robot_has_what_its_header_takes_from_another_and_the_defaults(self):
+        robot = robot_numbers.Robot("husky_inertial")
+        self.assertEqual(robot.now("gyro.up_s").tolist(), [0, 1, 0])
+        self.assertEqual(robot.now("imu.accel_matrix").tolist(), np.eye(3).ravel().tolist())
+        self.assertEqual(robot.number("wheels.drive.counts_per_turn"), 78000)
+        self.assertIsNone(robot_numbers.Robot("labyrinth").number("wheels.drive.counts_per_turn"), "a default is no value of the robot's")
+        self.assertIsNone(robot_numbers.Robot().now("gyro.up_s"))
+
+    def test_the_settings_are_a_file_of_parameters(self):
+        part = robot_numbers.Part("wheels", "wheels")
+        part.add("bias", [0.1, -0.2, 0.3], [0.01] * 3, "m/s2", "imu.accel_bias_mps2", tuple("xyz"))
+        part.add("left", 0.0825, 1e-4, "m", "wheels.drive.left_radius_m")
+        part.add("right", 0.0826, 1e-4, "m", "wheels.drive.right_radius_m")
+        part.add("track", 0.42, 1e-3, "m", "wheels.drive.track_m")
+        path = os.path.join(self.at, "found.params")
+        with open(path, "w", encoding="utf-8") as file:
+            file.write(robot_numbers.settings([part]) + "\n")
+        done = subprocess.run([parameter_table.program(), "--robot", "rover", "--params", path, "--json"], check=True, capture_output=True, text=True)
+        values = {row["path"]: row["value"] for row in json.loads(done.stdout)["parameters"]}
+        self.assertEqual([values[f"wheels.drive.{name}"] for name in ("left_radius_m", "right_radius_m", "track_m")], [0.0825, 0.0826, 0.42])
+        self.assertEqual(values["imu.accel_bias_mps2"], [0.1, -0.2, 0.3])
 
     def test_a_number_that_the_firmware_does_not_have_is_an_error(self):
         part = robot_numbers.Part("gyro", "gyroscope")

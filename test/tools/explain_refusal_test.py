@@ -1,6 +1,6 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
-"""A number that makes no sense, or a field that is misspelt, is one line of what and where, whichever compiler refuses it."""
+"""An implausible parameter does not compile: it is one sentence with path, value and limits, whichever compiler refuses it. So is a field that is misspelt."""
 import os
 import subprocess
 import tempfile
@@ -10,37 +10,62 @@ ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.realpath(__file__
 COMPILERS = ("g++", "clang++")
 ROBOT = """#pragma once
 #include "param/limits.hpp"
-inline constexpr tetap::param::Parameters parameters = tetap::param::checked({
-    .gnss = {%s},
+inline constexpr tetap::param::Parameters %s = tetap::param::checked({
+    %s,
 });
 %s"""
+WHEELS = ".wheels = {.drive = {.left_radius_m = %s, .right_radius_m = 0.1F, .track_m = %s}}"
+ORIGIN = ".gnss = {.origin_configured = 1, .origin_latitude_2ndeg = %s, .origin_longitude_2ndeg = %s}"
+AT_SEA = "it has to be a place on land, stored in steps of 2e-9 degrees: this one lies in the sea at 0 N 0 E"
+REFUSED = (
+    (WHEELS % ("82.5F", "0.42F"), "wheels.drive.left_radius_m is 82.5 m; it has to be from 0 to 2"),
+    (WHEELS % ("0.0825F", "420.0F"), "wheels.drive.track_m is 420 m; it has to be from 0 to 10"),
+    (WHEELS % ("0.0825F", '__builtin_nanf("")'), "wheels.drive.track_m is nan m; it has to be from 0 to 10"),
+    (".loop = {.period_us = 10}", "loop.period_us is 10 us; it has to be from 1000 to 100000"),
+    (ORIGIN % ("48", "11"), f"gnss.origin_latitude_deg is 9.6e-08 deg; {AT_SEA}"),
+    (ORIGIN % ("482627000", "116683000"), f"gnss.origin_latitude_deg is 0.965254 deg; {AT_SEA}"),
+    (ORIGIN % ("48'262'700'000'000", "5'834'150'000"), "gnss.origin_latitude_deg is 96525.4 deg; it has to be from -90 to 90"),
+    (".gnss = {.sigma_floor_m = -0.3F}", "gnss.sigma_floor_m is -0.3 m; it has to be from 0.001 to 100"),
+    (".loop = {.window_us = 5'000}", "loop.window_us is 5000 us; it has to be at least loop.period_us"),
+    (".inertial = {.mounting_bs = {0, 1, 0, 0, 0, 1, 1, 0, 0.1F}}", "inertial.mounting_bs has to be a rotation"),
+)
 
 
-class RefusedNumbers(unittest.TestCase):
-    def said(self, compiler, gnss, beside=""):
+class RefusedParameters(unittest.TestCase):
+    def said(self, compiler, robots, beside=""):
+        """What is said of a file that includes a robot's header for each of these fields."""
         with tempfile.TemporaryDirectory() as folder:
             os.mkdir(os.path.join(folder, "config"))
-            with open(os.path.join(folder, "config/robot.hpp"), "w", encoding="utf-8") as file:
-                file.write(ROBOT % (gnss, beside))
+            for number, fields in enumerate(robots):
+                with open(os.path.join(folder, f"config/robot{number}.hpp"), "w", encoding="utf-8") as file:
+                    file.write(ROBOT % (f"robot{number}", fields, beside))
             log = os.path.join(folder, "log")
             with open(log, "w", encoding="utf-8") as file:
-                subprocess.run([compiler, "-std=c++20", "-fsyntax-only", f"-I{folder}", f"-I{ROOT}/src", "-isystem", "/usr/include/eigen3", "-x", "c++", "-"],
-                               input='#include "config/robot.hpp"\n', text=True, stderr=file, check=False)
+                compiled = subprocess.run([compiler, "-std=c++20", "-fsyntax-only", f"-I{folder}", f"-I{ROOT}/src", "-isystem", "/usr/include/eigen3", "-x", "c++", "-"],
+                                          input="".join(f'#include "config/robot{number}.hpp"\n' for number in range(len(robots))), text=True, stderr=file, check=False)
             found = subprocess.run([os.path.join(ROOT, "tools/run/explain_refusal"), log], capture_output=True, text=True, check=False)
             self.assertEqual(found.returncode == 0, found.stdout != "")
-            return found.stdout
+            return compiled.returncode, found.stdout.splitlines()
 
-    def test_a_number_that_makes_no_sense_is_named(self):
-        for compiler, wrong in (("g++", "-0.3F"), ("clang++", "0.0F"), ("g++", '__builtin_nanf("")')):
-            self.assertEqual(self.said(compiler, f".sigma_floor_m = {wrong}"), "config/robot.hpp: gnss.sigma_floor_m: above 0\n", (compiler, wrong))
+    def test_an_implausible_parameter_is_one_sentence(self):
+        sentences = [f"config/robot{number}.hpp: {sentence}" for number, (_, sentence) in enumerate(REFUSED)]
+        for compiler in COMPILERS:
+            self.assertEqual(self.said(compiler, [fields for fields, _ in REFUSED]), (1, sentences), compiler)
+
+    def test_plausible_parameters_compile(self):
+        for compiler in COMPILERS:
+            robots = [WHEELS % ("0.0825F", "0.42F"), ORIGIN % ("24'131'350'000", "5'834'150'000"), ".inertial = {.gyro_scale = 0.1F}"]
+            self.assertEqual(self.said(compiler, robots), (0, []), compiler)
 
     def test_a_misspelt_field_is_told_by_its_robot(self):
-        self.assertRegex(self.said("g++", ".sigma_flour_m = 0.3F"), r"^config/robot\.hpp:3: a field here is misspelt.*\n$")
-        self.assertRegex(self.said("clang++", ".sigma_flour_m = 0.3F"), r"^config/robot\.hpp:4: field designator 'sigma_flour_m' .*\n$")
+        for compiler, words in (("g++", r"^config/robot0\.hpp:3: a field here is misspelt"), ("clang++", r"^config/robot0\.hpp:4: field designator 'sigma_flour_m' ")):
+            status, lines = self.said(compiler, [".gnss = {.sigma_flour_m = 0.3F}"])
+            self.assertEqual((status, len(lines)), (1, 1), lines)
+            self.assertRegex(lines[0], words)
 
     def test_other_errors_are_left_to_the_compiler(self):
         for compiler in COMPILERS:
-            self.assertEqual(self.said(compiler, ".sigma_floor_m = 0.3F", "int f() { return no_such_name; }"), "", compiler)
+            self.assertEqual(self.said(compiler, [".gnss = {.sigma_floor_m = 0.3F}"], "int f() { return no_such_name; }"), (1, []), compiler)
 
 
 if __name__ == "__main__":

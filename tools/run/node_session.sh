@@ -4,6 +4,15 @@ root=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
 programs=${TETAP_PROGRAMS:-$root/build/host/sim_host}
 node='' player=''
 
+# What $PARAMS (a file) and $SET (path=value words) set over the robot's compiled parameters, as options of the host programs.
+settings=(${PARAMS:+--params "$PARAMS"})
+for setting in ${SET:-}; do settings+=(--set "$setting"); done
+# settings_known BOARD: an image has its parameters compiled in.
+settings_known() {
+  [ "$1" = linux ] || [ ${#settings[@]} = 0 ] ||
+    { echo "PARAMS= and SET= are for the host's programs; an image on $1 has the parameters of config/ROBOT.hpp" >&2; return 2; }
+}
+
 # board_known BOARD: so that a wrong name is said before anything boots.
 board_known() {
   case $1 in
@@ -36,11 +45,11 @@ node_ready() {
 
 # node_start BOARD ROBOT IFACE [BASE]: starts a node; its process id is in $node, what it prints in $node_log.
 node_start() {
-  local board=$1 robot=$2 iface=$3 base=${4:-0x300}
+  local board=$1 robot=$2 iface=$3 base=${4:-}
   board_known "$board" || return 2
   node_log=$(mktemp "${TMPDIR:-/tmp}/tetap-node.XXXXXX")
   case $board in
-    linux) "$programs/tetap-node" --can "$iface" --robot "$robot" --base "$base" >"$node_log" 2>&1 & ;;
+    linux) "$programs/tetap-node" --can "$iface" --robot "$robot" ${base:+--base "$base"} "${settings[@]}" >"$node_log" 2>&1 & ;;
     zynqmp_r5)
       local image=${TETAP_IMAGE:-$root/build/r5/hal/board/tetap-zynqmp_r5-$robot.elf}
       "$root/tools/run/emulate_r5" "$image" --can "$iface" >"$node_log" 2>&1 & ;;
@@ -51,8 +60,6 @@ node_start() {
 # player_options BOARD: how a player has to treat a node on that board. An emulated controller has 64 receive buffers and no time of its own.
 player_options() { [ "$1" = linux ] || echo "--window 1 --emulated"; }
 
-# set_options: the settings PATH=VALUE of $SET as the programs take them.
-set_options() { local one; for one in ${SET:-}; do printf -- '--set %s ' "$one"; done; }
 
 # node_said: what it printed, without the line that says what runs.
 node_said() { grep -vE '^(emulate_r5: running |tetap-node: robot [A-Za-z0-9_]+ on )' "$node_log"; }

@@ -68,8 +68,8 @@ class Run:
         self.kind = wheels.kind
         self.radius = self.track = self.step = None
         if wheels.kind == "counts":
-            per_turn, radius = robot.number("counts_per_turn"), robot.number("left_radius_m")
-            right = robot.number("right_radius_m", radius)
+            per_turn, radius = robot.number("wheels.drive.counts_per_turn"), robot.number("wheels.drive.left_radius_m")
+            right = robot.number("wheels.drive.right_radius_m", radius)
             self.nominal_known = None not in (per_turn, radius)
             self.radius = (radius or 0.1, right or 0.1)
             self.per_turn = per_turn
@@ -95,6 +95,6 @@ class Run:
                 self.has_turn = bool(np.isfinite(wheels.two).mean() > 0.9)
                 return one, two
             left, right = one, two
-        self.track = robot.number("track_m")
+        self.track = robot.number("wheels.drive.track_m")
         self.nominal_known &= self.track is not None
         return 0.5 * (left + right), right - left

@@ -66,7 +66,7 @@ class Fit:
         self.all = (self.fix_t, self.fix), (self.vel_t, self.vel)
         self.names = [name for name in PRIORS if run.has_turn or name not in ("difference", "track")]
         self.names += [f"jump{k}" for k in range(len(run.gaps))] + [f"bias{k}" for k in range(len(run.knots))]
-        self.arm = robot.number("antenna_x_b_m", 0.0) + 1j * robot.number("antenna_y_b_m", 0.0)
+        self.arm = robot.number("gnss.antenna_x_b_m", 0.0) + 1j * robot.number("gnss.antenna_y_b_m", 0.0)
         self.dropped = {"fix": 0, "velocity": 0}
         self._start()
 

@@ -1,16 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the parts of a calibration hand back: numbers with 1 sigma and their place in param::Parameters, residuals, notes; or why there is none."""
+"""What the parts of a calibration hand back: numbers with 1 sigma and their place in the parameter table, residuals, notes; or why there is none."""
 import dataclasses
 import os
-import re
-import subprocess
 
 import numpy as np
 
-from tetap.can.bus_writer import BadInput
-
-ROOT = os.path.abspath(os.path.join(os.path.dirname(os.path.realpath(__file__)), *[os.pardir] * 4))
-STRUCTS = ("src/param/parameters.hpp", "src/model/differential_drive.hpp")
+from tetap.calibrate import parameter_table
 
 
 class Refusal(Exception):
@@ -23,7 +18,7 @@ class Refusal(Exception):
 
 @dataclasses.dataclass
 class Number:
-    """One number or a list of them. `field`: where it belongs in param::Parameters ("": nowhere); `scale`: shown = value * scale, in `unit`."""
+    """One number or a list of them. `field`: its path in the parameter table ("": nowhere); `scale`: shown = value * scale, in `unit`."""
 
     name: str
     value: np.ndarray
@@ -68,65 +63,45 @@ class Part:
 
 
 class Robot:
-    """What a robot's header says now (designated initialisers), as far as a calibration compares with it or needs it."""
+    """The parameters of a robot (tetap-params), as far as a calibration compares with them or needs them."""
 
     def __init__(self, name=None):
-        self.name, self.text = name, ""
-        if name:
-            path = os.path.join(ROOT, "config", f"{name}.hpp")
-            try:
-                with open(path, encoding="utf-8") as file:
-                    self.text = re.sub(r"//.*", "", file.read())
-            except OSError as error:
-                known = subprocess.run([os.path.join(ROOT, "tools/run/list_robots")], check=True, capture_output=True, text=True).stdout.split()
-                raise BadInput(f"config/{name}.hpp: {error.strerror}; there are: {', '.join(known)}") from None
-            if "param::Parameters" not in self.text:
-                raise BadInput(f"{path}: no robot: no param::Parameters in it")
-        self.given = {}
+        self.name, self.given = name, {}
+        self.rows = parameter_table.rows(name)
 
-    def number(self, field, default=None):
-        if field in self.given:
-            return self.given[field]
-        found = re.search(r"\.%s\s*=\s*([-+\d.eE]+)F?\s*[,}]" % re.escape(field), self.text)
-        return float(found[1]) if found else default
+    def number(self, path, default=None):
+        """A single value that the robot sets or the command line gives, else the default of the caller."""
+        if path in self.given:
+            return self.given[path]
+        row = self.rows[path]
+        return row["value"] if self.name and row["value"] != row["default"] else default
 
-    def now(self, field):
-        """The values of one of the fields a calibration finds, as the header has them or param::Parameters by itself; None without a robot."""
-        if not self.name:
-            return None
-        member = field.split(".")[-1]
-        if member == "mounting_bs" and field.startswith("magnetic."):
-            return None
-        found = re.search(r"\.%s\s*=\s*\{([^{}]*)\}" % re.escape(member), self.text)
-        if found:
-            return np.array([float(one.strip().rstrip("F")) for one in found[1].split(",") if one.strip()])
-        one = self.number(member)
-        return np.array([one]) if one is not None else UNSET.get(member)
+    def now(self, path):
+        """The values of one of the fields a calibration finds; None without a robot."""
+        return np.atleast_1d(np.array(self.rows[path]["value"], float)) if self.name else None
 
     def has(self, number):
-        """What it says now is no further off than two of its sigmas, each: nothing to change."""
+        """The robot's values are no further off than two of its sigmas, each: nothing to change."""
         if number.off:
             return False
         now = self.now(number.field) if number.field else None
         return now is not None and len(now) == len(number.value) and bool((np.abs(number.value - now) <= 2 * number.sigma).all())
 
 
-# What param::Parameters has where a header says nothing (test/tools/calibrate_robot_test.py compares).
-UNSET = {"mounting_bs": np.eye(3).ravel(), "up_s": np.array([0.0, 0.0, 1.0]), "accel_bias_mps2": np.zeros(3), "gyro_bias_radps": np.zeros(3),
-         "accel_matrix": np.eye(3).ravel(), "speed_scale": np.ones(1), "left_speed_scale": np.ones(1), "right_speed_scale": np.ones(1),
-         "yaw_rate_scale": np.ones(1)}
+def offered(parts, robot=None):
+    """{path: number} of what has a place in the table, in its order; without what the robot has already."""
+    found = {number.field: number for part in parts for number in part.numbers if number.field and not (robot and robot.has(number))}
+    rows = parameter_table.rows()
+    unknown = [path for path in found if path not in rows]
+    if unknown:
+        raise LookupError(f"the parameter table has no {', '.join(unknown)}")
+    return {path: found[path] for path in rows if path in found}
 
 
-def structs():
-    """Of each struct that param::Parameters is made of: its members in order, name -> type."""
-    found = {}
-    for path in STRUCTS:
-        with open(os.path.join(ROOT, path), encoding="utf-8") as file:
-            text = re.sub(r"//.*", "", file.read())
-        for name, body in re.findall(r"^struct (\w+) \{\n(.*?)^\};", text, re.MULTILINE | re.DOTALL):
-            found[name] = {member: kind.split("::")[-1]
-                           for kind, member in re.findall(r"^  ([\w:]+(?:<[^>]*>)?) (\w+)(?: = [^;]*|\{[^;]*\})?;", body, re.MULTILINE)}
-    return found
+def settings(parts, robot=None):
+    """The numbers as `path = value` lines, which PARAMS= and --params read."""
+    return "\n".join(f"{path} = " + " ".join(f"{value:.{number.digits}g}" for value in number.offered)
+                     for path, number in offered(parts, robot).items())
 
 
 def literal(value, digits):
@@ -135,25 +110,14 @@ def literal(value, digits):
 
 
 def snippet(parts, robot=None):
-    """The numbers as designated initialisers of param::Parameters, in its order; without those that the robot has already."""
-    known, values = structs(), {}
-    for number in (number for part in parts for number in part.numbers if number.field):
-        if robot is not None and robot.has(number):
-            continue
+    """The same as designated initialisers of a robot's header: a level of braces for each struct of a path."""
+    lines, within = [], []
+    for path, number in offered(parts, robot).items():
+        *structs, member = path.split(".")
+        common = len(os.path.commonprefix([structs, within]))
+        lines += ["    " * level + "}," for level in range(len(within), common, -1)]
+        lines += ["    " * (level + 1) + f".{structs[level]} = {{" for level in range(common, len(structs))]
+        within = structs
         text = ", ".join(literal(value, number.digits) for value in number.offered)
-        values[number.field] = text if len(number.value) == 1 else "{" + text + "}"
-
-    def lines(struct, path, indent):
-        result = []
-        for member, kind in known[struct].items():
-            field = f"{path}{member}"
-            if field in values:
-                result.append(f"{indent}.{member} = {values.pop(field)},")
-            elif any(name.startswith(f"{field}.") for name in values):
-                result += [f"{indent}.{member} = {{"] + lines(kind, f"{field}.", indent + "    ") + [f"{indent}}},"]
-        return result
-
-    text = "\n".join(lines("Parameters", "", "    "))
-    if values:
-        raise LookupError(f"param::Parameters has no {', '.join(values)}")
-    return text
+        lines.append("    " * (len(within) + 1) + f".{member} = {text if len(number.offered) == 1 else '{' + text + '}'},")
+    return "\n".join(lines + ["    " * level + "}," for level in range(len(within), 0, -1)])
