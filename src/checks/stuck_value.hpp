@@ -26,22 +26,27 @@ class RepeatCounter {
   bool update(const Reading& now, float step, std::int32_t n) {
     count_ = alike(last_, now, step) ? static_cast<std::uint8_t>(count_ < 255 ? count_ + 1 : 255) : std::uint8_t{0};
     last_ = now;
-    return n > 0 && count_ >= n;
+    stuck_ = n > 0 && count_ >= n;
+    return stuck_;
   }
+  /// The last reading was at least the n-th repetition.
+  [[nodiscard]] bool stuck() const { return stuck_; }
   /// The last reading was `reading`, and repeated nothing.
   void restart(const Reading& reading) {
     last_ = reading;
     count_ = 0;
+    stuck_ = false;
   }
   template <class Sink>
   void hash_state(Sink&& sink) const {
     for (const float v : last_) sink(v);
-    sink(std::uint32_t{count_});
+    sink(static_cast<std::uint32_t>(count_ | (stuck_ ? 256U : 0U)));
   }
 
  private:
   Reading last_{};
   std::uint8_t count_ = 0;
+  bool stuck_ = false;
 };
 
 /// The same to the last bit, with the time of the last reading.
@@ -51,17 +56,15 @@ class StuckValue {
   /// Finite readings. True from the n-th repetition on; n = 0: never.
   bool update(const std::array<float, kSize>& now, std::int32_t n, base::Micros stamp) {
     last_ = stamp;
-    stuck_ = repeats_.update(now, 0.0F, n);
-    return stuck_;
+    return repeats_.update(now, 0.0F, n);
   }
   /// The last reading is at most two seconds old and was a stuck one.
-  [[nodiscard]] bool stuck(base::Micros at) const { return stuck_ && recent(last_, at, kFresh); }
+  [[nodiscard]] bool stuck(base::Micros at) const { return repeats_.stuck() && recent(last_, at, kFresh); }
   [[nodiscard]] base::Micros last() const { return last_; }
   template <class Sink>
   void hash_state(Sink&& sink) const {
     sink(last_.us);
     repeats_.hash_state(sink);
-    sink(static_cast<std::uint32_t>(stuck_));
   }
 
  private:
@@ -69,7 +72,6 @@ class StuckValue {
 
   base::Micros last_;  ///< stamp of the last reading
   RepeatCounter<kSize> repeats_;
-  bool stuck_ = false;
 };
 
 }  // namespace tetap::checks

@@ -26,9 +26,9 @@ class WheelSlip {
   };
 
   Slip update(const Wheels& w, const Motion& m, base::Micros stamp, const param::InertialParameters& n) {
-    if (!(n.slip_mps > 0)) return Slip::kNone;
     const base::Micros since = stamp - last_;
     last_ = stamp;
+    if (!(n.slip_mps > 0)) return Slip::kNone;
     const float dt_s = since.us > 0 && since < kGap ? base::seconds(since) : 0.0F;
     const float share = dt_s / (kSmooth_s + dt_s);
     off_left_mps_ += share * (w.left_mps - m.forward_mps + 0.5F * m.turn_mps - off_left_mps_);
@@ -62,6 +62,8 @@ class WheelSlip {
   }
 
   [[nodiscard]] Slip slip() const { return slip_; }
+  /// Stamp of the last wheels; 0: none.
+  [[nodiscard]] base::Micros last() const { return last_; }
   void reset() { *this = {}; }
 
   template <class Sink>

@@ -21,7 +21,7 @@ class EncoderInterval {
   /// Counts are also skipped while a standstill update is pending: it is worth more than counts that do not change.
   [[nodiscard]] bool skips(base::Micros at, bool standstill_pending, base::Micros longest,
                            const param::InertialParameters& n) const {
-    return has_counts_ && (is_soon(counted_at_, at, n) || (standstill_pending && at - counted_at_ < longest));
+    return has_counts() && (is_soon(counted_at_, at, n) || (standstill_pending && at - counted_at_ < longest));
   }
   /// Counts that are left out.
   void skip(const sensor::WheelCounts& counts, base::Micros stamp) {
@@ -36,7 +36,7 @@ class EncoderInterval {
 
   /// Counts came within 0.1 s.
   [[nodiscard]] bool counts_recently(base::Micros at) const {
-    return has_counts_ && checks::recent(counted_at_, at, base::Micros{100'000});
+    return checks::recent(counted_at_, at, base::Micros{100'000});
   }
   /// Counts came within 1 s.
   [[nodiscard]] bool counts_lately(base::Micros at) const {
@@ -51,15 +51,15 @@ class EncoderInterval {
     sink(counted_at_.us);
     sink(moved_at_.us);
     sink(gained_mps_);
-    sink(static_cast<std::uint32_t>(has_counts_));
   }
 
  private:
-  sensor::WheelCounts counts_;
-  base::Micros counted_at_;        ///< stamp of the last counts
-  base::Micros moved_at_;          ///< last stamp at which counts had changed
+  [[nodiscard]] bool has_counts() const { return counted_at_.us > 0; }
+
+  sensor::WheelCounts counts_;     ///< last counts
   float gained_mps_ = base::kNan;  ///< forward, by the IMU, since the last counts; NaN: not known
-  bool has_counts_ = false;
+  base::Micros counted_at_;        ///< stamp of the last counts; 0: none
+  base::Micros moved_at_;          ///< last stamp at which counts had changed; 0: never
 };
 
 /// Counts are the mean over the interval, the state is at its end: half of the speed gained in between is added. It is
@@ -70,12 +70,12 @@ inline std::optional<WheelReading> EncoderInterval::update(const sensor::WheelCo
                                                            const FilterView& filter) {
   const model::DifferentialDrive& drive = filter.parameters().wheels.drive;
   const base::Micros stamp = filter.stamp(), interval = stamp - counted_at_;
-  const bool usable = has_counts_ && interval.us > 0 && interval <= base::Micros{filter.parameters().wheels.timeout_us};
+  const bool usable =
+      has_counts() && interval.us > 0 && interval <= base::Micros{filter.parameters().wheels.timeout_us};
   const std::int32_t left = model::count_difference(counts.left, counts_.left);
   const std::int32_t right = model::count_difference(counts.right, counts_.right);
   counts_ = counts;
   counted_at_ = stamp;
-  has_counts_ = true;
   if (!usable || left != 0 || right != 0) moved_at_ = stamp;
   const float later_mps = base::is_finite(gained_mps_) ? 0.5F * gained_mps_ : 0.0F;
   gained_mps_ = 0;

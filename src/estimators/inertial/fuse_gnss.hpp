@@ -61,9 +61,7 @@ inline Innovation Inertial::fuse(const sensor::GnssPosition& fix, base::Micros s
   const float inflation = sources_.position.correlated_inflation(filter);
   fix.sigma_horizontal_m *= base::sqrt(inflation);
   fix.sigma_vertical_m *= base::sqrt(inflation);
-  if (with_height) {
-    sources_.height.fused();
-  } else {
+  if (!with_height) {
     nav::move(fix.z, -z.nu(2));  // where the filter expects it, and hardly any weight
     fix.sigma_vertical_m = FixMeasurement::kNoHeight_m;
     fused.dof = 2;

@@ -53,8 +53,8 @@ class ImuInput {
 
  private:
   checks::ImuHealth health_;
+  base::Micros bridged_until_;  ///< time to which the filter last went without IMU; 0: never
   nav::Vector3 rate_b_radps_ = nav::Vector3::Zero();
-  base::Micros bridged_until_;
   bool saturated_ = false;
 };
 

@@ -149,9 +149,9 @@ class Inertial {
   nav::Ins ins_;
   OutputPredictor predictor_;
   WorkBudget budget_;
+  Phase phase_ = Phase::kLevelling;
   Alignment alignment_;
   HeadingMonitor heading_monitor_;
-  Phase phase_ = Phase::kLevelling;
   base::Micros time_;  ///< time of the filter's state
   ImuInput imu_;
   Standstill standstill_;

@@ -28,8 +28,8 @@ class Standstill {
   /// GNSS velocity, averaged while the IMU is calm.
   void update_ground(const nav::Vector3& v_n_mps) {
     if (!calm_.holds()) return;
-    ++grounds_;
-    const auto share = 1.0F / static_cast<float>(grounds_ < 25 ? grounds_ : 25);
+    if (grounds_ < kMeanOf) ++grounds_;
+    const auto share = 1.0F / static_cast<float>(grounds_);
     ground_mps_ += (v_n_mps - ground_mps_) * share;
   }
   /// IMU samples are missing: means begin anew.
@@ -102,9 +102,8 @@ class Standstill {
     }
     calm_.hash_state(sink);
     for (int i = 0; i < 3; ++i) sink(ground_mps_(i));
-    sink(grounds_);
     sink(velocity_at_.us);
-    sink(static_cast<std::uint32_t>(pending_));
+    sink(static_cast<std::uint32_t>(grounds_ | (pending_ ? 256U : 0U)));
   }
 
  private:
@@ -121,12 +120,14 @@ class Standstill {
            ground_mps_.squaredNorm() < most * most;
   }
 
-  Mean mean_;                 ///< mean of the gyroscope since the last one
-  Mean waiting_;              ///< last mean, kept until it is known that the robot has not begun to move
-  checks::Persistence calm_;  ///< IMU samples in a row without motion
-  nav::Vector3 ground_mps_ = nav::Vector3::Zero();  ///< mean GNSS velocity while calm
-  std::int32_t grounds_ = 0;                        ///< velocities in that mean
+  static constexpr std::uint8_t kMeanOf = 25;  ///< velocities whose mean shows a standstill
+
+  Mean mean_;                                       ///< mean of the gyroscope since the last one
+  Mean waiting_;                                    ///< last mean, kept until it is known that the robot still stands
+  checks::Persistence calm_;                        ///< IMU samples in a row without motion
   base::Micros velocity_at_;                        ///< last zero-velocity update; while moving, such that it is due
+  nav::Vector3 ground_mps_ = nav::Vector3::Zero();  ///< mean GNSS velocity while calm
+  std::uint8_t grounds_ = 0;                        ///< velocities in that mean
   bool pending_ = false;                            ///< an update is due and waits for the next tick
 };
 

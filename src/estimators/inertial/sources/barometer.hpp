@@ -45,12 +45,17 @@ class Barometer {
   [[nodiscard]] bool timed_out(base::Micros at) const {
     return !checks::recent(repeats_.last(), at, base::Micros{2'000'000});
   }
-  [[nodiscard]] SourceStatus status(base::Micros at) const { return timed_out(at) ? SourceStatus{} : status_; }
+  [[nodiscard]] SourceStatus status(base::Micros at) const {
+    if (timed_out(at)) return {};
+    if (stuck(at)) return {SourceState::kDistrusted, Check::kStuck};
+    const bool agrees = zero_.refused_for(zero_.last()).us == 0;
+    return agrees ? SourceStatus{SourceState::kFusing, Check::kNone}
+                  : SourceStatus{SourceState::kRejecting, Check::kGate};
+  }
   template <class Sink>
   void hash_state(Sink&& sink) const {
     zero_.hash_state(sink);
     repeats_.hash_state(sink);
-    status_.hash_state(sink);
   }
 
  private:
@@ -67,23 +72,18 @@ class Barometer {
 
   BarometerZero zero_;
   checks::StuckValue<1> repeats_;
-  SourceStatus status_;
 };
 
 inline Assessment Barometer::assess_pressure(const sensor::AirPressure& air, const FilterView& filter) {
   constexpr float kLeast_Pa = 22'700;  // the model ends at 11 km
-  if (!(air.pressure_Pa >= kLeast_Pa && air.pressure_Pa < 2e5F)) {
-    status_.rejecting(Check::kValue);
+  if (!(air.pressure_Pa >= kLeast_Pa && air.pressure_Pa < 2e5F))
     return {.action = Action::kReject, .failed = Check::kValue, .verdict = sensor::Verdict::kNotFinite};
-  }
   if (!repeats_.update({air.pressure_Pa}, filter.parameters().baro.stuck_samples, filter.stamp())) return {};
-  status_.distrusted(Check::kStuck);
   return {.action = Action::kSkip, .failed = Check::kStuck, .verdict = sensor::Verdict::kStale};
 }
 
 [[gnu::noinline]] inline Assessment Barometer::assess(const HeightMeasurement& z, const FilterView& filter) {
   const param::BaroParameters& n = filter.parameters().baro;
-  status_.fused();
   if (!zero_.known()) {
     set_zero(z, filter);
     return {.action = Action::kSkip};
@@ -109,7 +109,6 @@ inline void Barometer::judge_refused(const HeightMeasurement& z, const FilterVie
   a.action = Action::kReject;
   a.failed = Check::kGate;
   a.verdict = sensor::Verdict::kRejected;
-  status_.rejecting(Check::kGate);
   if (!reset_allowed(filter)) return;
   set_zero(z, filter);
   a.action = Action::kResetZero;

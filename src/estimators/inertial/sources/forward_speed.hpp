@@ -37,7 +37,12 @@ class ForwardSpeedSource {
   }
   [[nodiscard]] static model::WheelSpeed model(const ForwardReading& z, const FilterView& filter);
   void conclude(Assessment& a, const nav::Vector3&, const FilterView& filter) {
-    count_refusal(refused_, status_, a, Action::kInflateMotion, filter);
+    if (a.fuses()) {
+      status_.fused();
+    } else {
+      status_.rejecting(a.failed);
+    }
+    count_refusal(refused_, a, Action::kInflateMotion, filter);
   }
   /// Both wheels spin. Where GNSS holds the filter's velocity the wheels are wrong; without it the filter may as well
   /// be.

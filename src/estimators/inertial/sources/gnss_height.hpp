@@ -5,6 +5,7 @@
 #include "checks/offset_hypothesis.hpp"
 #include "estimators/inertial/filter_view.hpp"
 #include "estimators/inertial/fix_measurement.hpp"
+#include "estimators/inertial/refusal.hpp"
 
 namespace tetap::estimators {
 
@@ -30,20 +31,21 @@ class GnssHeightSource {
     if (a.fuses()) offset_.reset();
     return a;
   }
-  void fused() { status_.fused(); }
   /// Offsets so far were measured from elsewhere.
   void reset() { offset_.reset(); }
   void relocated() { refused_.reset(); }
 
   [[nodiscard]] const checks::Persistence& refused() const { return refused_; }
   /// A height comes with its fix, and times out with it.
-  [[nodiscard]] bool timed_out(base::Micros) const { return status_.state == SourceState::kStopped; }
-  [[nodiscard]] SourceStatus status(base::Micros) const { return status_; }
+  [[nodiscard]] static bool timed_out(base::Micros) { return false; }
+  [[nodiscard]] SourceStatus status(base::Micros) const {
+    if (!refused_.holds() && offset_.holds()) return {SourceState::kConfirming, Check::kUnconfirmed};
+    return status_of(refused_);
+  }
   template <class Sink>
   void hash_state(Sink&& sink) const {
     offset_.hash_state(sink);
     refused_.hash_state(sink);
-    status_.hash_state(sink);
   }
 
  private:
@@ -51,11 +53,9 @@ class GnssHeightSource {
     if (offset_.confirmed(n.confirm_fixes)) return;
     a.action = Action::kSkip;
     a.failed = Check::kUnconfirmed;
-    status_.confirming();
   }
   void judge_refused(const FixMeasurement& z, Assessment& a, const param::RecoveryParameters& n) {
     a.failed = z.drifts ? Check::kDrift : Check::kGate;
-    status_.rejecting(a.failed);
     if (!offset_.persisted(base::Micros{n.persist_us}, n.persist_fixes)) {
       a.action = Action::kReject;
       return;
@@ -67,7 +67,6 @@ class GnssHeightSource {
 
   checks::OffsetHypothesis offset_;  ///< offset of heights that were not fused
   checks::Persistence refused_;      ///< heights in a row that were refused
-  SourceStatus status_;
 };
 
 }  // namespace tetap::estimators

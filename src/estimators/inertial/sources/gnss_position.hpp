@@ -113,11 +113,11 @@ class GnssPositionSource {
   [[nodiscard]] bool lost(const FilterView& filter) const;
 
   checks::StartupFixCheck startup_;
-  checks::FrozenPosition frozen_;
-  checks::PositionDrift drift_;
   checks::OffsetHypothesis offset_;  ///< offset of fixes that were not fused
   checks::Persistence refused_;      ///< fixes in a row that were refused
   base::Micros last_fused_;          ///< stamp of the last fix that was fused, or of the last reset; 0: none
+  checks::FrozenPosition frozen_;
+  checks::PositionDrift drift_;
   std::array<float, 2> pulled_m_{};  ///< by how much the last fixes moved the position
   bool pull_inflated_ = false;       ///< the position is already less certain by that
   SourceStatus status_;

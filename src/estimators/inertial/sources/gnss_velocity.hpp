@@ -32,10 +32,7 @@ class GnssVelocitySource {
             .has_climb = base::is_finite(v_n(2))};
   }
   /// The receiver does not repeat its positions; a frozen receiver's velocities are as old.
-  [[nodiscard]] bool continuing_conditions(const FilterView& filter) {
-    if (filter.position_frozen()) status_.distrusted(Check::kFrozen);
-    return !filter.position_frozen();
-  }
+  [[nodiscard]] static bool continuing_conditions(const FilterView& filter) { return !filter.position_frozen(); }
   /// Speed against wheels. The innovation gate follows in the update.
   [[nodiscard]] Assessment assess(const VelocityMeasurement& z, const FilterView& filter) {
     const float own = base::abs(filter.forward_mps());
@@ -58,7 +55,7 @@ class GnssVelocitySource {
   }
   /// The update's verdict; nu: the innovation.
   void conclude(Assessment& a, const nav::Vector3& nu, const FilterView& filter) {
-    count_refusal(refused_, status_, a, Action::kInflateVelocity, filter);
+    count_refusal(refused_, a, Action::kInflateVelocity, filter);
     if (a.action != Action::kInflateVelocity) return;
     a.remedy.innovation_mps = nu;
     a.remedy.position_refused = filter.position_refused(1);
@@ -70,12 +67,13 @@ class GnssVelocitySource {
   [[nodiscard]] bool recent(base::Micros at) const { return checks::recent(last_, at, kFresh); }
   [[nodiscard]] bool came_lately(base::Micros at) const { return !checks::older(last_, at, kFresh); }
   [[nodiscard]] bool timed_out(base::Micros at) const { return checks::older(last_, at, kFresh + kFresh); }
-  [[nodiscard]] SourceStatus status(base::Micros at) const { return timed_out(at) ? SourceStatus{} : status_; }
+  [[nodiscard]] SourceStatus status(base::Micros at) const {
+    return timed_out(at) ? SourceStatus{} : status_of(refused_);
+  }
   template <class Sink>
   void hash_state(Sink&& sink) const {
     refused_.hash_state(sink);
     sink(last_.us);
-    status_.hash_state(sink);
   }
 
  private:
@@ -84,7 +82,6 @@ class GnssVelocitySource {
 
   checks::Persistence refused_;  ///< velocities in a row that were refused
   base::Micros last_;            ///< stamp of the last velocity; 0: none
-  SourceStatus status_;
 };
 
 }  // namespace tetap::estimators

@@ -82,10 +82,8 @@ inline FieldMeasurement Magnetometer::measurement(const sensor::MagneticFlux& fl
 [[gnu::noinline]] inline Assessment Magnetometer::assess_field(const FieldMeasurement& z, const FilterView& filter) {
   const param::MagneticParameters& n = filter.parameters().magnetic;
   const float horizontal2 = z.level_uT(0) * z.level_uT(0) + z.level_uT(1) * z.level_uT(1);
-  if (!(horizontal2 > 0.0F && z.b_uT.squaredNorm() < 1e12F)) {
-    status_.rejecting(Check::kValue);
+  if (!(horizontal2 > 0.0F && z.b_uT.squaredNorm() < 1e12F))
     return {.action = Action::kReject, .failed = Check::kValue, .verdict = sensor::Verdict::kNotFinite};
-  }
   if (repeats_.update(z.flux_uT, z.moving ? n.stuck_samples : 0, filter.stamp())) {
     status_.distrusted(Check::kStuck);
     return {.action = Action::kSkip, .failed = Check::kStuck, .verdict = sensor::Verdict::kStale};

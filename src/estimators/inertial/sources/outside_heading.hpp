@@ -22,7 +22,6 @@ class OutsideHeadingSource {
     if (!base::is_finite(z.yaw_rad))
       return {.action = Action::kReject, .failed = Check::kValue, .verdict = sensor::Verdict::kNotFinite};
     if (!repeats_.update({z.yaw_rad}, filter.parameters().gnss.heading_stuck_samples, filter.stamp())) return {};
-    status_.distrusted(Check::kStuck);
     return {.action = Action::kSkip, .failed = Check::kStuck, .verdict = sensor::Verdict::kStale};
   }
   /// At the time of the last IMU sample, as the state is.
@@ -39,7 +38,7 @@ class OutsideHeadingSource {
     return base::wrap_angle(z.yaw_rad - base::atan2(line(1), line(0)) + nav::euler(level).yaw_rad);
   }
   void conclude(Assessment& a, const filter::Vector<float, 1>&, const FilterView& filter) {
-    count_refusal(refused_, status_, a, Action::kInflateMotion, filter);
+    count_refusal(refused_, a, Action::kInflateMotion, filter);
   }
   void begin() { refused_.reset(); }
 
@@ -48,18 +47,19 @@ class OutsideHeadingSource {
   [[nodiscard]] bool timed_out(base::Micros at) const {
     return !checks::recent(repeats_.last(), at, base::Micros{2'000'000});
   }
-  [[nodiscard]] SourceStatus status(base::Micros at) const { return timed_out(at) ? SourceStatus{} : status_; }
+  [[nodiscard]] SourceStatus status(base::Micros at) const {
+    if (timed_out(at)) return {};
+    return stuck(at) ? SourceStatus{SourceState::kDistrusted, Check::kStuck} : status_of(refused_);
+  }
   template <class Sink>
   void hash_state(Sink&& sink) const {
     repeats_.hash_state(sink);
     refused_.hash_state(sink);
-    status_.hash_state(sink);
   }
 
  private:
   checks::StuckValue<1> repeats_;
   checks::Persistence refused_;  ///< headings in a row that were refused
-  SourceStatus status_;
 };
 
 }  // namespace tetap::estimators

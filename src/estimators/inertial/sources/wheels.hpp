@@ -33,7 +33,9 @@ class Wheels {
   /// The filter gave way: differences so far were its own error.
   void reset_slip() { slip_.reset(); }
 
-  [[nodiscard]] bool timed_out(base::Micros at) const { return !checks::recent(last_, at, base::Micros{1'500'000}); }
+  [[nodiscard]] bool timed_out(base::Micros at) const {
+    return !checks::recent(slip_.last(), at, base::Micros{1'500'000});
+  }
   [[nodiscard]] SourceStatus status(base::Micros at) const { return timed_out(at) ? SourceStatus{} : status_; }
   template <class Sink>
   void hash_state(Sink&& sink) const {
@@ -41,7 +43,6 @@ class Wheels {
     slip_.hash_state(sink);
     sink(turned_at_.us);
     sink(turn_radps_);
-    sink(last_.us);
     status_.hash_state(sink);
   }
 
@@ -55,13 +56,11 @@ class Wheels {
   checks::WheelSlip slip_;
   base::Micros turned_at_;  ///< stamp of the last wheels that rolled; 0: none
   float turn_radps_ = 0;    ///< turn rate by the wheels, low-passed: a count is much within one interval
-  base::Micros last_;       ///< stamp of the last reading; 0: none
   SourceStatus status_;
 };
 
 [[gnu::noinline]] inline Assessment Wheels::assess(const WheelReading& z, const FilterView& filter) {
   const param::InertialParameters& n = filter.parameters().inertial;
-  last_ = filter.stamp();
   const float track_m = filter.parameters().wheels.drive.track_m;
   if (!filter.tracking() || !(track_m > 0)) return {};
   const nav::Vector3 v_b = filter.x().q_nb.conjugate().rotate(filter.x().v_n_mps);
