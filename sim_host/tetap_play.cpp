@@ -21,7 +21,7 @@ int main(int count, char** values) {
     if (!options.robot.empty())
       options.notes = sim::parameter_notes(sim::parameters_of(options.robot, settings), settings);
     // Before the bus, so that a log that cannot be read is said also where there is none.
-    const sim::Log log = sim::load_for(options);
+    sim::SurveyedLog log = sim::survey_for(options);
     if (options.memory)
       return sim::with_node_in_process(options.robot, settings, options.script.base, [&](auto& link) {
         return sim::play(link, options, log, "memory", "tetap-play");

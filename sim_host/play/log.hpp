@@ -1,11 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-// A candump log in memory: its data frames with their times, and how many lines were something else.
+// A candump log: its data frames with their times, and how many lines were something else. A log of hours is read
+// frame by frame and never held whole.
 #pragma once
 
 #include "base/can_frame.hpp"
 #include "base/time.hpp"
 
+#include <cstddef>
 #include <cstdint>
+#include <cstdio>
+#include <memory>
+#include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -23,12 +29,12 @@ struct LogOptions {
   std::uint32_t base = 0x300;  ///< of the node; its inputs have eight bytes
 };
 
-struct Log {
+struct LogReport {
   std::string name;
-  std::vector<TimedFrame> frames;  ///< classic data frames in the order of the file
-  std::uint64_t malformed = 0;     ///< lines, only with keep_going
-  std::string first_malformed;     ///< "file:line: reason: 'text'"
-  std::uint64_t not_data = 0;      ///< remote, error and CAN FD frames
+  std::uint64_t data = 0;       ///< classic data frames
+  std::uint64_t malformed = 0;  ///< lines, only with keep_going
+  std::string first_malformed;  ///< "file:line: reason: 'text'"
+  std::uint64_t not_data = 0;   ///< remote, error and CAN FD frames
   std::uint64_t other_interface = 0;
   std::uint64_t back_in_time = 0;  ///< frames earlier than the one before
   std::uint64_t wrong_length = 0;  ///< input frames that have not eight bytes: the node will count them as malformed
@@ -37,11 +43,88 @@ struct Log {
   std::string first_gap;           ///< "file:line"
 };
 
-/// Throws std::runtime_error("name:line: reason: 'text'") at the first malformed line unless told to keep going. Blank
-/// lines are skipped.
-[[nodiscard]] Log parse_log(std::string_view text, const std::string& name, const LogOptions& options = {});
+/// Classic data frames in the order of a log, as often as asked for.
+class Frames {
+ public:
+  Frames() = default;
+  Frames(const Frames&) = delete;
+  Frames& operator=(const Frames&) = delete;
+  Frames(Frames&&) = default;
+  Frames& operator=(Frames&&) = default;
+  virtual ~Frames() = default;
+  /// Fills in the next frame; false: no more.
+  virtual bool next(TimedFrame& frame) = 0;
+  /// The next frame is the first one again.
+  virtual void rewind() = 0;
+};
 
-/// Reads the file; throws when it cannot be read or has no data frame.
-[[nodiscard]] Log read_log(const std::string& path, const LogOptions& options = {});
+class FramesInMemory : public Frames {
+ public:
+  explicit FramesInMemory(std::span<const TimedFrame> frames) : frames_(frames) {}
+  bool next(TimedFrame& frame) override {
+    if (next_ == frames_.size()) return false;
+    frame = frames_[next_++];
+    return true;
+  }
+  void rewind() override { next_ = 0; }
+
+ private:
+  std::span<const TimedFrame> frames_;
+  std::size_t next_ = 0;
+};
+
+/// Makes frames of lines and counts what is none.
+class LogParser {
+ public:
+  LogParser(const std::string& name, const LogOptions& options) : options_(options) { report_.name = name; }
+
+  /// The line's frame; nothing for a blank line and for what is counted instead. Throws
+  /// std::runtime_error("name:line: reason: 'text'") for a malformed line unless told to keep going.
+  std::optional<TimedFrame> add(std::string_view line);
+  [[nodiscard]] const LogReport& report() const { return report_; }
+
+ private:
+  LogOptions options_;
+  LogReport report_;
+  base::Micros latest_;
+  std::uint64_t number_ = 0;  ///< of the line
+};
+
+/// A log file, read in blocks. What cannot be read twice (a pipe) is copied into a temporary file first.
+class LogFile : public Frames {
+ public:
+  /// Throws std::runtime_error when the file cannot be opened.
+  LogFile(const std::string& path, const LogOptions& options);
+
+  /// Throws as LogParser does, when the file cannot be read, and when a second reading does not give the frames of the
+  /// first.
+  bool next(TimedFrame& frame) override;
+  void rewind() override;
+  /// Of the lines read so far; after a second reading still of the first.
+  [[nodiscard]] const LogReport& report() const { return report_ ? *report_ : parser_.report(); }
+
+ private:
+  bool next_line(std::string_view& line);
+  bool read_block();
+  [[noreturn]] void refuse(const std::string& reason) const;
+
+  std::string path_;
+  LogOptions options_;
+  std::unique_ptr<std::FILE, int (*)(std::FILE*)> file_;
+  LogParser parser_;
+  std::optional<LogReport> report_;  ///< of a reading to the end
+  std::vector<char> block_;
+  std::size_t begin_ = 0, end_ = 0;  ///< of what is left in block_
+  std::uint64_t bytes_ = 0;          ///< of the file, read so far
+  std::uint64_t length_ = 0;         ///< of the first reading: a log that grows meanwhile ends there
+};
+
+/// A log in memory.
+struct Log : LogReport {
+  std::vector<TimedFrame> frames;
+};
+
+/// Throws as LogParser does.
+[[nodiscard]] Log parse_log(std::string_view text, const std::string& name, const LogOptions& options = {});
 
 }  // namespace tetap::sim

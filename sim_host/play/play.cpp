@@ -2,6 +2,7 @@
 #include "sim_host/play/play.hpp"
 
 #include <cmath>
+#include <stdexcept>
 
 namespace tetap::sim {
 
@@ -99,15 +100,75 @@ PlayOptions play_options(Arguments& arguments, std::uint32_t can_base) {
   return o;
 }
 
-Log load_for(PlayOptions& options) {
+namespace {
+
+/// Goes along with one reading of the log and gathers what each mode has to know before it plays.
+class Survey {
+ public:
+  explicit Survey(const PlayOptions& options)
+      : base_(options.script.log_base), grid_(options.script.period), record_(options.log, base_) {
+    surveys_record_ = options.mode == PlayMode::kAutomatic || options.mode == PlayMode::kAsRecorded;
+  }
+
+  void add(const TimedFrame& entry) {
+    if (is_counted_input(entry.frame, base_)) {
+      ++inputs_;
+      if (own_ticks_ == 0)
+        while (grid_.due_before(entry.time)) ++grid_ticks_;
+    } else if (is_tick(entry.frame, base_)) {
+      ++own_ticks_;
+    } else if (offset_in_block(entry.frame, base_) == bus::EstStateCrc::kOffset) {
+      node_speaks_ = true;
+    }
+    if (surveys_record_) repeatable([&] { record_.add(entry); });
+  }
+
+  void finish(PlayOptions& options, SurveyedLog& log) {
+    if (options.mode == PlayMode::kAutomatic) options.mode = node_speaks_ ? PlayMode::kAsRecorded : PlayMode::kLockstep;
+    log.has_ticks = own_ticks_ > 0;
+    log.inputs = inputs_;
+    log.ticks = log.has_ticks ? own_ticks_ : grid_ticks_ + (grid_.last() ? 1 : 0);
+    if (surveys_record_) repeatable([&] { log.recording = record_.finish(); });
+    log.refusal = refusal_;
+  }
+
+ private:
+  /// A refusal matters only when a whole reading finds no worse, and the mode is to repeat.
+  template <class Step>
+  void repeatable(Step&& step) {
+    try {
+      step();
+    } catch (const std::runtime_error& error) {
+      refusal_ = error.what();
+      surveys_record_ = false;
+    }
+  }
+
+  std::uint32_t base_;
+  TickGrid grid_;
+  RecordSurvey record_;
+  bool surveys_record_ = false, node_speaks_ = false;
+  std::uint64_t inputs_ = 0, own_ticks_ = 0, grid_ticks_ = 0;
+  std::string refusal_;
+};
+
+}  // namespace
+
+SurveyedLog survey_for(PlayOptions& options) {
   options.reading.base = options.script.log_base;
-  Log log = read_log(options.log, options.reading);
-  if (options.mode == PlayMode::kAutomatic)
-    options.mode = is_recording(log.frames, options.script.log_base) ? PlayMode::kAsRecorded : PlayMode::kLockstep;
+  SurveyedLog log{.file = LogFile(options.log, options.reading)};
+  Survey survey(options);
+  for (TimedFrame entry; log.file.next(entry);) survey.add(entry);
+  const LogReport& report = log.file.report();
+  if (report.data == 0)
+    throw std::runtime_error(
+        options.log + ": " +
+        (report.other_interface > 0 ? "no frame of interface " + options.reading.interface : std::string("no CAN data frame in it")));
+  survey.finish(options, log);
   return log;
 }
 
-void warn_about(const Log& log, const char* program) {
+void warn_about(const LogReport& log, const char* program) {
   const auto warn = [program](const std::string& text) {
     std::fprintf(stderr, "%s: warning: %s\n", program, text.c_str());
   };

@@ -11,6 +11,7 @@
 
 #include <cstdint>
 #include <cstdio>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -44,16 +45,27 @@ struct PlayOptions {
 /// `can_base` is what --base is without being given.
 [[nodiscard]] PlayOptions play_options(Arguments& arguments, std::uint32_t can_base = 0x300);
 
+/// A log that was read once, to its end, and is read again as it is played.
+struct SurveyedLog {
+  LogFile file;
+  bool has_ticks = false;    ///< Tick or Step frames
+  std::uint64_t inputs = 0;  ///< frames
+  std::uint64_t ticks = 0;   ///< to be played, when it is no recording
+  std::optional<Recording> recording;
+  std::string refusal;  ///< why it is a recording that cannot be repeated
+};
+
 /// Reads the log and settles the mode: a log with the node's own frames in it is a record to be repeated.
-[[nodiscard]] Log load_for(PlayOptions& options);
+[[nodiscard]] SurveyedLog survey_for(PlayOptions& options);
 
 /// Warnings about the log, one line each.
-void warn_about(const Log& log, const char* program);
+void warn_about(const LogReport& log, const char* program);
 
-/// Plays what `load_for` read; returns the exit status. Throws std::runtime_error for what cannot be begun.
+/// Plays what `survey_for` read; returns the exit status. Throws std::runtime_error for what cannot be begun.
 template <Link L>
-int play(L& link, const PlayOptions& options, const Log& log, const std::string& bus, const char* program) {
-  warn_about(log, program);
+int play(L& link, const PlayOptions& options, SurveyedLog& log, const std::string& bus, const char* program) {
+  const LogReport& report = log.file.report();
+  warn_about(report, program);
   SessionOptions about{.program = program,
                        .folder = options.folder,
                        .base = options.script.base,
@@ -63,18 +75,17 @@ int play(L& link, const PlayOptions& options, const Log& log, const std::string&
                        .robot = options.robot,
                        .log = options.log,
                        .quiet = options.quiet};
-  const auto note_log = [&log, &notes = options.notes](Session& session) {
-    session.note("malformed_lines", std::to_string(log.malformed));
-    session.note("frames_not_data", std::to_string(log.not_data));
-    session.note("frames_back_in_time", std::to_string(log.back_in_time));
-    session.note("frames_of_wrong_length", std::to_string(log.wrong_length));
+  const auto note_log = [&report, &notes = options.notes](Session& session) {
+    session.note("malformed_lines", std::to_string(report.malformed));
+    session.note("frames_not_data", std::to_string(report.not_data));
+    session.note("frames_back_in_time", std::to_string(report.back_in_time));
+    session.note("frames_of_wrong_length", std::to_string(report.wrong_length));
     for (const auto& [name, json] : notes) session.note(name, json);
   };
 
   if (options.mode == PlayMode::kRealtime) {
-    const auto inputs = inputs_of(log.frames, options.script);
-    if (inputs.empty()) throw std::runtime_error(options.log + ": no input frames of this id base");
-    const Perturbed sent = perturb(inputs, options.perturbation);
+    if (log.inputs == 0) throw std::runtime_error(options.log + ": no input frames of this id base");
+    const Perturbed sent = perturb(inputs_of(log.file, options.script), options.perturbation);
     about.mode = "realtime";
     Session session(about);
     note_log(session);
@@ -86,7 +97,8 @@ int play(L& link, const PlayOptions& options, const Log& log, const std::string&
   }
 
   if (options.mode == PlayMode::kAsRecorded) {
-    Recording recording = recording_of(log, options.script);
+    if (!log.recording) throw std::runtime_error(log.refusal);
+    const Recording& recording = *log.recording;
     if (recording.inputs_differ_at)
       std::fprintf(
           stderr, "%s: %s: from the epoch at %s on the node consumed other input frames than the log holds%s\n",
@@ -95,19 +107,21 @@ int play(L& link, const PlayOptions& options, const Log& log, const std::string&
               ? ""
               : (": its receiver had lost " + std::to_string(recording.rx_overflow) + " (RxOverflow)").c_str());
     about.mode = "as-recorded";
-    about.ticks = recording.script.ticks();
-    Session session(about, &recording);
+    about.ticks = recording.epochs;
+    RecordedTicks ticks(log.file, recording, options.script);
+    Comparison comparison(ticks, recording, options.script);
+    Session session(about, &comparison);
     note_log(session);
     session.note("epochs_before_start", std::to_string(recording.skipped_epochs));
-    return session.run([&] { play_lockstep(link, recording.script, session, options.lockstep, session.counts()); });
+    return session.run([&] { play_lockstep(link, ticks, session, options.lockstep, session.counts()); });
   }
 
-  Script script = script_of(log.frames, options.script);
-  if (script.ticks() == 0) throw std::runtime_error(options.log + ": no input frames of this id base");
-  about.ticks = script.ticks();
+  if (log.ticks == 0) throw std::runtime_error(options.log + ": no input frames of this id base");
+  LogTicks ticks(log.file, options.script, log.has_ticks);
+  about.ticks = log.ticks;
   Session session(about);
   note_log(session);
-  return session.run([&] { play_lockstep(link, script, session, options.lockstep, session.counts()); });
+  return session.run([&] { play_lockstep(link, ticks, session, options.lockstep, session.counts()); });
 }
 
 }  // namespace tetap::sim

@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 // A log that holds a node's own frames is the record of a run. From it follows what the node consumed before each tick
-// (DESIGN.md 4.2), so the run can be played again exactly, and what it answered can be compared byte for byte.
+// (DESIGN.md 4.2), so the run can be played again exactly, and what it answered can be compared byte for byte. The log
+// is read twice, by RecordSurvey and by RecordedTicks, and held in memory only as far as a node lags behind its inputs.
 #pragma once
 
+#include "bus/input_crc.hpp"
 #include "sim_host/play/protocol.hpp"
 #include "sim_host/play/script.hpp"
 
 #include <cstdint>
+#include <deque>
 #include <optional>
 #include <span>
 #include <string>
@@ -14,17 +17,16 @@
 
 namespace tetap::sim {
 
-struct RecordedEpoch {
-  base::Micros time;
-  std::size_t first = 0;  ///< of its frames in Recording::outputs
-  std::size_t count = 0;
-};
-
+/// What the survey finds.
 struct Recording {
-  Script script;
-  std::vector<base::CanFrame> outputs;  ///< the node's deterministic frames
-  std::vector<RecordedEpoch> epochs;
-  std::uint32_t base = 0;             ///< of the recorded node
+  /// What a node did between one start and the next; only of those whose epochs can be repeated.
+  struct Life {
+    std::optional<base::Micros> begin;
+    std::uint64_t first_input = 0;  ///< that it consumed, of all inputs in the log
+  };
+  std::string name;  ///< of the log
+  std::vector<Life> lives;
+  std::uint64_t epochs = 0;
   std::uint64_t skipped_epochs = 0;   ///< of a node that was running already and was restarted later in the log
   std::uint64_t missing_outputs = 0;  ///< frames the node said it sent and the log does not hold
   /// Where the inputs in the log first differ from what the node says it consumed (Est_Epoch.InCrc): a frame was lost
@@ -34,31 +36,171 @@ struct Recording {
   std::optional<std::uint32_t> config;  ///< hash of the numbers it ran with, as it said last
 };
 
-/// True if a node with this base speaks in the log.
-[[nodiscard]] bool is_recording(std::span<const TimedFrame> log, std::uint32_t log_base);
+/// The node's frames of a log as lives and epochs.
+class RecordReader {
+ public:
+  RecordReader(std::string name, std::uint32_t log_base)
+      : name_(std::move(name)), log_base_(log_base), collector_(log_base) {}
 
-/// Throws std::runtime_error when the run cannot be repeated: the node's start is not in the log, or epochs are
-/// missing.
-[[nodiscard]] Recording recording_of(const Log& log, const ScriptOptions& options);
+  struct Begin {
+    base::Micros time;
+    std::uint64_t inputs;  ///< in the log before it
+  };
+  struct Found {
+    bool input = false;              ///< this frame is one
+    std::optional<Begin> new_life;   ///< the node took up this Begin frame: what came before belongs to its life before
+    std::optional<NodeEpoch> epoch;  ///< to be repeated; valid until the next frame
+  };
+  /// Throws std::runtime_error when the run cannot be repeated.
+  Found add(const TimedFrame& entry);
+
+  [[nodiscard]] std::uint64_t inputs() const { return inputs_; }
+  /// In the log before the first frame of the last epoch.
+  [[nodiscard]] std::uint64_t inputs_before() const { return inputs_before_; }
+  /// The log begins in the middle of this life: what the node knew by then is unknown.
+  [[nodiscard]] bool skips() const { return skips_; }
+  [[nodiscard]] std::uint64_t skipped_epochs() const { return skipped_epochs_; }
+  /// A Begin frame that the node has not answered.
+  [[nodiscard]] const std::optional<Begin>& pending() const { return pending_; }
+
+  [[noreturn]] void refuse(const std::string& why) const;
+
+ private:
+  [[nodiscard]] bool to_be_repeated(const NodeEpoch& epoch, base::Micros logged);
+
+  std::string name_;
+  std::uint32_t log_base_;
+  EpochCollector collector_;
+  std::optional<Begin> pending_;
+  bool begun_ = false;  ///< this life, with a Begin frame in the log
+  bool skips_ = false;
+  std::uint64_t number_ = 0;  ///< of the last epoch in this life
+  std::uint64_t inputs_ = 0, inputs_before_ = 0, skipped_epochs_ = 0;
+};
+
+/// The first reading: where each life begins, whether all can be repeated, and what is worth a warning.
+class RecordSurvey {
+ public:
+  RecordSurvey(const std::string& name, std::uint32_t log_base) : reader_(name, log_base), log_base_(log_base) {
+    result_.name = name;
+  }
+
+  /// Both throw std::runtime_error when the run cannot be repeated: the node's start is not in the log, or epochs are
+  /// missing.
+  void add(const TimedFrame& entry);
+  [[nodiscard]] Recording finish();
+
+ private:
+  struct Entry {
+    base::Micros time;
+    std::uint16_t in_count = 0;
+    std::uint16_t in_crc = 0;
+  };
+
+  void note_version(const base::CanFrame& frame);
+  void drop_before(std::uint64_t input);
+  void start_life(const RecordReader::Begin& begin);
+  void start_at(std::uint64_t input);
+  void add_epoch(const NodeEpoch& epoch);
+  [[nodiscard]] bool agrees_from(std::size_t start, std::size_t end) const;
+  void find_start(std::uint64_t end, bool life_is_over);
+  void follow_until(std::uint64_t end, bool life_is_over);
+  void close_life(std::uint64_t end);
+
+  RecordReader reader_;
+  std::uint32_t log_base_;
+  Recording result_;
+
+  // Of this life. Inputs are counted from the begin of the log.
+  std::optional<base::Micros> begin_;
+  bool has_entries_ = false;
+  bool started_ = false;               ///< its first input is known
+  bool differs_ = false;               ///< its inputs, from those in the log
+  std::uint64_t life_inputs_ = 0;      ///< before it
+  std::optional<std::uint64_t> best_;  ///< the latest first input that its first epoch allows
+  std::deque<std::uint32_t> crcs_;     ///< of inputs that it has not consumed
+  std::uint64_t first_crc_ = 0;        ///< the input of crcs_[0]
+  std::deque<Entry> waiting_;          ///< epochs that have not consumed their inputs
+  bus::InputCrc tally_;
+};
+
+/// Reads the whole log. Throws as RecordSurvey does.
+[[nodiscard]] Recording recording_of(Frames& log, const std::string& name, const ScriptOptions& options);
+
+/// The second reading: every tick with what the node consumed before it, and what it answered.
+class RecordedTicks {
+ public:
+  RecordedTicks(Frames& log, const Recording& recording, const ScriptOptions& options)
+      : log_(log),
+        recording_(recording),
+        options_(options),
+        reader_(recording.name, options.log_base),
+        consumed_(recording.lives.front().first_input) {
+    log_.rewind();
+  }
+
+  bool next(Tick& tick);
+
+  struct Answer {
+    std::uint64_t number;                    ///< of the epoch in the recording, from 1
+    std::span<const base::CanFrame> frames;  ///< the deterministic ones; valid until the next answer
+  };
+  /// What the recorded node answered to the tick of this time, which next() has given; earlier answers are dropped.
+  [[nodiscard]] std::optional<Answer> answer(base::Micros time);
+
+ private:
+  struct Entry {
+    base::Micros time;
+    std::uint16_t in_count = 0;
+    std::size_t life = 0;
+    std::size_t outputs = 0;
+  };
+
+  void read(const TimedFrame& entry);
+  void start_life();
+
+  Frames& log_;
+  const Recording& recording_;
+  ScriptOptions options_;
+  RecordReader reader_;
+
+  std::size_t read_lives_ = 0;    ///< that have epochs
+  bool in_life_ = false;          ///< that has epochs
+  std::size_t played_lives_ = 0;  ///< begun
+  std::uint64_t consumed_ = 0;    ///< inputs of the log, or left behind
+  std::uint16_t in_count_ = 0;    ///< as the node counts
+  std::uint64_t given_ = 0;       ///< ticks
+  std::deque<base::CanFrame> inputs_;
+  std::deque<Entry> entries_;             ///< to be given as ticks
+  std::deque<Entry> answers_;             ///< of ticks that were given
+  std::deque<base::CanFrame> outputs_;    ///< of answers_, then of entries_
+  std::vector<base::CanFrame> tick_;      ///< inputs of the last tick
+  std::vector<base::CanFrame> answered_;  ///< the last answer
+  std::uint64_t number_ = 0;              ///< of the last answer
+};
+
+static_assert(Source<RecordedTicks>);
 
 /// A sink's part: holds each epoch against the recorded one.
 class Comparison {
  public:
-  Comparison(const Recording& recording, std::uint32_t base) : recording_(recording), base_(base) {}
+  Comparison(RecordedTicks& ticks, const Recording& recording, const ScriptOptions& options)
+      : ticks_(ticks), recording_(recording), base_(options.base), log_base_(options.log_base) {}
 
   void epoch(const NodeEpoch& epoch, base::Micros time);
 
   [[nodiscard]] std::uint64_t compared() const { return compared_; }
   [[nodiscard]] std::uint64_t different() const { return different_; }
-  [[nodiscard]] std::uint64_t missing() const { return recording_.epochs.size() - compared_; }
+  [[nodiscard]] std::uint64_t missing() const { return recording_.epochs - compared_; }
   [[nodiscard]] const std::string& first_difference() const { return first_difference_; }
   /// Whether this node says it runs with other numbers than the recorded one did.
   [[nodiscard]] bool other_numbers() const { return config_ && recording_.config && *config_ != *recording_.config; }
+  [[nodiscard]] const Recording& recording() const { return recording_; }
 
  private:
+  RecordedTicks& ticks_;
   const Recording& recording_;
-  std::uint32_t base_;
-  std::size_t next_ = 0;
+  std::uint32_t base_, log_base_;
   std::uint64_t compared_ = 0;
   std::uint64_t different_ = 0;
   std::string first_difference_;

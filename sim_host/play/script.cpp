@@ -24,55 +24,62 @@ base::CanFrame moved(base::CanFrame frame, const ScriptOptions& options) {
   return frame;
 }
 
-Script on_its_own_ticks(std::span<const TimedFrame> log, const ScriptOptions& options) {
-  Script script;
-  std::optional<base::Micros> last;  // as the bus has it: the log's own clock may be another one
-  for (const TimedFrame& entry : log) {
-    if (is_counted_input(entry.frame, options.log_base)) script.add_input(moved(entry.frame, options));
-    const auto sync = sync_of(entry.frame, options.log_base);
-    if (sync && sync->kind == bus::SyncKind::kBegin) last = base::Micros{static_cast<std::int64_t>(sync->time_us)};
-    if (!is_tick(sync)) continue;
-    last = extend_bus_time(sync->time_us, last.value_or(entry.time));
-    script.add_tick(*last, script.ticks() == 0 ? std::optional(*last - options.period) : std::nullopt);
-  }
-  return script;
-}
-
-Script on_a_grid(std::span<const TimedFrame> log, const ScriptOptions& options) {
-  Script script;
-  const auto at_or_after = [&](base::Micros t) {
-    return base::Micros{(t.us + options.period.us - 1) / options.period.us * options.period.us};
-  };
-  std::optional<base::Micros> tick;
-  const auto add_tick = [&] {
-    script.add_tick(*tick, script.ticks() == 0 ? std::optional(*tick - options.period) : std::nullopt);
-  };
-  for (const TimedFrame& entry : log) {
-    if (!is_counted_input(entry.frame, options.log_base)) continue;
-    if (!tick) tick = std::max(at_or_after(entry.time), options.period);
-    while (*tick < entry.time) {
-      add_tick();
-      tick = entry.time - *tick > kLongestPause ? at_or_after(entry.time) : *tick + options.period;
-    }
-    script.add_input(moved(entry.frame, options));
-  }
-  if (tick) add_tick();
-  return script;
-}
-
 }  // namespace
 
-std::vector<TimedFrame> inputs_of(std::span<const TimedFrame> log, const ScriptOptions& options) {
+std::vector<TimedFrame> inputs_of(Frames& log, const ScriptOptions& options) {
   std::vector<TimedFrame> inputs;
-  for (const TimedFrame& entry : log)
+  log.rewind();
+  for (TimedFrame entry; log.next(entry);)
     if (is_counted_input(entry.frame, options.log_base)) inputs.push_back({entry.time, moved(entry.frame, options)});
   return inputs;
 }
 
-Script script_of(std::span<const TimedFrame> log, const ScriptOptions& options) {
-  const bool has_ticks = std::any_of(log.begin(), log.end(),
-                                     [&](const TimedFrame& e) { return is_tick(sync_of(e.frame, options.log_base)); });
-  return has_ticks ? on_its_own_ticks(log, options) : on_a_grid(log, options);
+bool is_tick(const base::CanFrame& frame, std::uint32_t log_base) { return is_tick(sync_of(frame, log_base)); }
+
+std::optional<base::Micros> TickGrid::due_before(base::Micros time) {
+  if (!next_) next_ = std::max(at_or_after(time), period_);
+  const base::Micros tick = *next_;
+  if (time <= tick) return std::nullopt;
+  next_ = time - tick > kLongestPause ? at_or_after(time) : tick + period_;
+  return tick;
+}
+
+void LogTicks::add_input(base::CanFrame frame) {
+  inputs_.push_back(moved(frame, options_));
+  ++count_;
+}
+
+bool LogTicks::next(Tick& tick) {
+  inputs_.clear();
+  const auto time = has_ticks_ ? own_tick() : grid_tick();
+  if (!time) return false;
+  tick = {.time = *time, .inputs = inputs_, .begin = {}};
+  if (!begun_) tick.begin = *time - options_.period;
+  begun_ = true;
+  return true;
+}
+
+std::optional<base::Micros> LogTicks::own_tick() {
+  for (TimedFrame entry; log_.next(entry);) {
+    if (is_counted_input(entry.frame, options_.log_base)) add_input(entry.frame);
+    const auto sync = sync_of(entry.frame, options_.log_base);
+    if (sync && sync->kind == bus::SyncKind::kBegin) own_last_ = base::Micros{static_cast<std::int64_t>(sync->time_us)};
+    if (!is_tick(sync)) continue;
+    own_last_ = extend_bus_time(sync->time_us, own_last_.value_or(entry.time));
+    return own_last_;
+  }
+  return std::nullopt;
+}
+
+std::optional<base::Micros> LogTicks::grid_tick() {
+  for (;;) {
+    for (TimedFrame entry; !ahead_ && log_.next(entry);)
+      if (is_counted_input(entry.frame, options_.log_base)) ahead_ = entry;
+    if (!ahead_) return grid_.last();
+    if (const auto due = grid_.due_before(ahead_->time)) return due;
+    add_input(ahead_->frame);
+    ahead_.reset();
+  }
 }
 
 }  // namespace tetap::sim

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a player sends: for every tick its input frames, then the tick. Made from a log, from a simulated world, or from
+// What a player sends: for every tick its input frames, then the tick. Read from a log, from a simulated world, or from
 // the record of another run.
 #pragma once
 
@@ -12,6 +12,7 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 namespace tetap::sim {
@@ -72,11 +73,60 @@ struct ScriptOptions {
 };
 
 /// The log's input frames with the ids of the node, sync frames left out.
-[[nodiscard]] std::vector<TimedFrame> inputs_of(std::span<const TimedFrame> log, const ScriptOptions& options);
+[[nodiscard]] std::vector<TimedFrame> inputs_of(Frames& log, const ScriptOptions& options);
 
-/// When there are Tick or Step frames in the log, those are the ticks. Else a grid of whole periods from the first
-/// frame on, and a frame belongs to the first tick at or after its time; a frame earlier than its predecessor belongs
-/// to that one's tick. A pause of more than a minute is skipped, so the node sees time jump.
-[[nodiscard]] Script script_of(std::span<const TimedFrame> log, const ScriptOptions& options);
+/// A frame that says when the node ticks.
+[[nodiscard]] bool is_tick(const base::CanFrame& frame, std::uint32_t log_base);
+
+/// Whole periods from the first input frame on. A frame belongs to the first tick at or after its time; a frame earlier
+/// than its predecessor belongs to that one's tick. A pause of more than a minute is skipped, so the node sees time
+/// jump.
+class TickGrid {
+ public:
+  explicit TickGrid(base::Micros period) : period_(period) {}
+
+  /// The tick that is due before an input of this time; asked until there is none.
+  std::optional<base::Micros> due_before(base::Micros time);
+  /// The tick behind the last input, once.
+  std::optional<base::Micros> last() { return std::exchange(next_, std::nullopt); }
+
+ private:
+  [[nodiscard]] base::Micros at_or_after(base::Micros t) const {
+    return base::Micros{(t.us + period_.us - 1) / period_.us * period_.us};
+  }
+  base::Micros period_;
+  std::optional<base::Micros> next_;
+};
+
+/// Ticks of a log without a node, read as they are played. When there are Tick or Step frames in the log, those are the
+/// ticks; else it is TickGrid.
+class LogTicks {
+ public:
+  LogTicks(Frames& log, const ScriptOptions& options, bool has_ticks)
+      : log_(log), options_(options), has_ticks_(has_ticks), grid_(options.period) {
+    log_.rewind();
+  }
+
+  bool next(Tick& tick);
+  /// Read so far.
+  [[nodiscard]] std::size_t inputs() const { return count_; }
+
+ private:
+  [[nodiscard]] std::optional<base::Micros> own_tick();
+  [[nodiscard]] std::optional<base::Micros> grid_tick();
+  void add_input(base::CanFrame frame);
+
+  Frames& log_;
+  ScriptOptions options_;
+  bool has_ticks_;
+  TickGrid grid_;
+  std::vector<base::CanFrame> inputs_;    ///< of the tick that is under way
+  std::optional<TimedFrame> ahead_;       ///< an input of a later tick
+  std::optional<base::Micros> own_last_;  ///< as the bus has it: the log's own clock may be another one
+  bool begun_ = false;
+  std::size_t count_ = 0;
+};
+
+static_assert(Source<LogTicks>);
 
 }  // namespace tetap::sim

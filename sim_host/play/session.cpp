@@ -35,16 +35,14 @@ std::string quoted(std::string_view text) {
   return out + '"';
 }
 
-Session::Session(const SessionOptions& options, const Recording* recording)
+Session::Session(const SessionOptions& options, Comparison* comparison)
     : options_(options),
       recorder_({.folder = options.folder,
                  .base = options.base,
                  .raw = options.raw,
                  .interface = options.bus == "memory" ? "vcan0" : options.bus}),
-      recording_(recording),
-      terminal_(isatty(STDERR_FILENO) == 1) {
-  if (recording != nullptr) comparison_.emplace(*recording, options.base);
-}
+      comparison_(comparison),
+      terminal_(isatty(STDERR_FILENO) == 1) {}
 
 void Session::show_progress() {
   const base::Micros now = hal::monotonic_clock();
@@ -75,7 +73,7 @@ std::string Session::complaint() const {
   if (counts_.extra() > 0)
     return count(counts_.extra()) + " frames too many (" + count(counts_.extra_inputs) + " to the node, " +
            count(counts_.extra_outputs) + " from it): is there another sender on this bus?";
-  if (!comparison_) return {};
+  if (comparison_ == nullptr) return {};
   if (comparison_->different() > 0)
     return (comparison_->other_numbers()
                 ? "the recorded node was another robot or ran with other numbers (Est_Version.Config): "
@@ -84,8 +82,8 @@ std::string Session::complaint() const {
            " epochs differ from the recording; first " + comparison_->first_difference() +
            (comparison_->other_numbers() ? "; --lockstep plays its inputs alone (make replay PLAY=--lockstep)" : "");
   if (comparison_->missing() > 0) return count(comparison_->missing()) + " recorded epochs were not repeated";
-  if (recording_->missing_outputs > 0)
-    return "the recording itself lacks " + count(recording_->missing_outputs) + " frames of the node";
+  if (comparison_->recording().missing_outputs > 0)
+    return "the recording itself lacks " + count(comparison_->recording().missing_outputs) + " frames of the node";
   return {};
 }
 
@@ -129,7 +127,7 @@ void Session::write_json(double wall_s) {
       {"estimates_sha256", sim::quoted(t.estimates_sha256)},
       {"state_crc_last", sim::quoted(crc.view())},
   };
-  if (comparison_) {
+  if (comparison_ != nullptr) {
     fields.emplace_back("epochs_compared", count(comparison_->compared()));
     fields.emplace_back("epochs_different", count(comparison_->different()));
     fields.emplace_back("first_difference", sim::quoted(comparison_->first_difference()));

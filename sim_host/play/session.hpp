@@ -10,7 +10,6 @@
 #include "sim_host/play/recording.hpp"
 
 #include <cstdint>
-#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -33,15 +32,15 @@ struct SessionOptions {
 
 class Session {
  public:
-  /// `recording`: every epoch is held against it; it has to outlive the session.
-  explicit Session(const SessionOptions& options, const Recording* recording = nullptr);
+  /// `comparison`: every epoch goes there too; it has to outlive the session.
+  explicit Session(const SessionOptions& options, Comparison* comparison = nullptr);
 
   void restarted() { recorder_.restarted(); }
   void sent(const base::CanFrame& frame) { recorder_.sent(frame); }
   void received(const base::CanFrame& frame) { recorder_.received(frame); }
   void epoch(const NodeEpoch& epoch, base::Micros time) {
     recorder_.epoch(epoch, time);
-    if (comparison_) comparison_->epoch(epoch, time);
+    if (comparison_ != nullptr) comparison_->epoch(epoch, time);
     if (recorder_.totals().epochs % 64 == 0) show_progress();
   }
 
@@ -70,8 +69,7 @@ class Session {
 
   SessionOptions options_;
   Recorder recorder_;
-  std::optional<Comparison> comparison_;
-  const Recording* recording_;
+  Comparison* comparison_;
   Counts counts_;
   std::vector<std::pair<std::string, std::string>> notes_;
   std::string error_;

@@ -5,6 +5,7 @@
 #include "sim_host/play/log.hpp"
 #include "sim_host/play/recording.hpp"
 
+#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 #include <stdexcept>
@@ -56,12 +57,22 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
 
   // A pause of a minute is played in full: a long period keeps the number of its ticks small.
   const sim::ScriptOptions options{.period = base::Micros{1'000'000}};
-  const sim::Script script = sim::script_of(log.frames, options);
-  if (script.inputs() != sim::inputs_of(log.frames, options).size())
-    fail("inputs were lost on the way to the script", "");
-  if (!sim::is_recording(log.frames, options.log_base)) return 0;
+  sim::FramesInMemory frames(log.frames);
+  const std::size_t inputs = sim::inputs_of(frames, options).size();
+  const bool has_ticks = std::any_of(log.frames.begin(), log.frames.end(), [&](const sim::TimedFrame& entry) {
+    return sim::is_tick(entry.frame, options.log_base);
+  });
+  sim::LogTicks ticks(frames, options, has_ticks);
+  sim::Tick tick;
+  while (ticks.next(tick)) continue;
+  if (ticks.inputs() != inputs) fail("inputs were lost on the way to the ticks", "");
   try {
-    static_cast<void>(sim::recording_of(log, options));
+    const sim::Recording recording = sim::recording_of(frames, "fuzz.log", options);
+    sim::RecordedTicks repeated(frames, recording, options);
+    std::uint64_t given = 0;
+    for (; repeated.next(tick); ++given)
+      if (!repeated.answer(tick.time)) fail("a tick of the record without its answer", "");
+    if (given != recording.epochs) fail("other ticks than the survey saw", "");
   } catch (const std::runtime_error& error) {
     if (!std::string_view(error.what()).starts_with("fuzz.log: ")) fail("a message without the file", error.what());
   }

@@ -2,13 +2,21 @@
 #include "sim_host/play/candump.hpp"
 
 #include "sim_host/play/log.hpp"
+#include "sim_host/play/play.hpp"
 
 #include <gtest/gtest.h>
 
+#include <sys/stat.h>
+
+#include <filesystem>
+#include <fstream>
 #include <random>
 #include <stdexcept>
 #include <string>
+#include <thread>
+#include <utility>
 #include <variant>
+#include <vector>
 
 namespace tetap::sim {
 namespace {
@@ -133,15 +141,155 @@ TEST(Log, FramesThatAreNoneOfOursAreCountedNotPlayed) {
   EXPECT_EQ(log.not_data, 3U);
 }
 
-TEST(Log, AFileThatIsNotThereOrEmptyIsNamed) {
+/// A file that is gone with the test.
+class LogOnDisk : public testing::Test {
+ protected:
+  std::string path_ = testing::TempDir() + "tetap_" + testing::UnitTest::GetInstance()->current_test_info()->name();
+  void TearDown() override { std::filesystem::remove(path_); }
+  void write(std::string_view text) const { std::ofstream(path_) << text; }
+
+  static std::vector<TimedFrame> read(LogFile& file) {
+    std::vector<TimedFrame> frames;
+    for (TimedFrame frame; file.next(frame);) frames.push_back(frame);
+    return frames;
+  }
+  static void expect_same(const std::vector<TimedFrame>& a, const std::vector<TimedFrame>& b) {
+    ASSERT_EQ(a.size(), b.size());
+    for (std::size_t i = 0; i < a.size(); ++i) {
+      ASSERT_EQ(a[i].time, b[i].time) << i;
+      ASSERT_EQ(a[i].frame, b[i].frame) << i;
+    }
+  }
+  static std::string refusal(const std::string& path) {
+    try {
+      PlayOptions options{.log = path};
+      static_cast<void>(survey_for(options));
+    } catch (const std::runtime_error& error) {
+      return error.what();
+    }
+    return "";
+  }
+};
+
+/// Some megabytes with everything that may be in a log, and lines longer than any block a reader may choose.
+std::string long_log() {
+  std::mt19937_64 draw(11);
+  std::string text;
+  for (int i = 0; i < 60'000; ++i) {
+    Line line;
+    const base::CanFrame frame{.id = 0x2F0 + static_cast<std::uint32_t>(draw() % 0x50),
+                               .size = static_cast<std::uint8_t>(draw() % 20 == 0 ? draw() % 9 : 8),
+                               .data = {static_cast<std::uint8_t>(draw()), static_cast<std::uint8_t>(draw())}};
+    append_log_line(line, {i * 1'000 - (draw() % 500 == 0 ? 5'000 : 0)}, i % 7 == 0 ? "can1" : "can0", frame);
+    text += line.view();
+    if (draw() % 300 == 0) text += "\n\r\n  \t\n";
+    if (draw() % 400 == 0) text += "(1.0) can0 301#R\n";
+    if (draw() % 500 == 0) text += "no line\n";
+    if (i == 20'000 || i == 50'000) text.append(3'000'000, 'x').append("\n");
+  }
+  return text + "(100.0) can0 301#0011223344556677";  // without an end of line
+}
+
+TEST_F(LogOnDisk, ReadInBlocksIsWhatTheWholeTextSays) {
+  const std::string text = long_log();
+  write(text);
+  for (const char* interface : {"", "can1"}) {
+    const LogOptions options{.interface = interface, .keep_going = true};
+    const Log whole = parse_log(text, path_, options);
+    LogFile file(path_, options);
+    for (int reading = 0; reading < 2; ++reading) {
+      expect_same(read(file), whole.frames);
+      const LogReport& report = file.report();
+      EXPECT_EQ(report.data, whole.frames.size());
+      EXPECT_EQ(report.malformed, whole.malformed);
+      EXPECT_EQ(report.first_malformed, whole.first_malformed);
+      EXPECT_EQ(report.not_data, whole.not_data);
+      EXPECT_EQ(report.other_interface, whole.other_interface);
+      EXPECT_EQ(report.back_in_time, whole.back_in_time);
+      EXPECT_EQ(report.wrong_length, whole.wrong_length);
+      EXPECT_EQ(report.first_wrong_length, whole.first_wrong_length);
+      EXPECT_EQ(report.gaps, whole.gaps);
+      EXPECT_EQ(report.first_gap, whole.first_gap);
+      file.rewind();
+    }
+  }
+}
+
+TEST_F(LogOnDisk, AMalformedLineDeepInTheFileIsNamedWithItsNumber) {
+  std::string text;
+  for (int i = 0; i < 100'000; ++i) text += "(1.0) can0 301#0011223344556677\n";
+  write(text + "(1.1) can0 301#1\n");
+  EXPECT_EQ(refusal(path_), path_ + ":100001: an odd number of data digits: '(1.1) can0 301#1'");
+}
+
+TEST_F(LogOnDisk, ALogThatGrowsIsReadAgainAsFarAsBefore) {
+  std::string text;
+  for (int i = 0; i < 20'000; ++i) text += "(1.0) can0 301#0011223344556677\n";
+  write(text + "(2.0) can0 301#00");  // its writer is in the middle of a line
+  LogFile file(path_, {});
+  const auto first = read(file);
+  std::ofstream(path_, std::ios::app) << "11223344556677\n(3.0) can0 301#0011223344556677\n";
+  file.rewind();
+  expect_same(read(file), first);
+}
+
+TEST_F(LogOnDisk, ALogThatShrinksIsNamed) {
+  std::string text;
+  for (int i = 0; i < 20'000; ++i) text += "(1.0) can0 301#0011223344556677\n";
+  write(text);
+  LogFile file(path_, {});
+  static_cast<void>(read(file));
+  std::filesystem::resize_file(path_, text.size() / 2);
+  file.rewind();
   try {
-    static_cast<void>(read_log("/nowhere/at/all.log"));
+    static_cast<void>(read(file));
     FAIL() << "no error";
   } catch (const std::runtime_error& error) {
-    EXPECT_STREQ(error.what(), "/nowhere/at/all.log: cannot be read: No such file or directory");
+    EXPECT_EQ(error.what(), path_ + ": has changed while it was played");
   }
-  EXPECT_THROW(static_cast<void>(read_log("/dev/null")), std::runtime_error);
-  EXPECT_THROW(static_cast<void>(read_log("/")), std::runtime_error) << "a folder";
+}
+
+TEST_F(LogOnDisk, APipeIsReadTwiceToo) {
+  const std::string text = long_log();
+  ASSERT_EQ(mkfifo(path_.c_str(), 0600), 0);
+  std::thread writer([&] { write(text); });
+  LogFile file(path_, {.keep_going = true});
+  writer.join();
+  const auto frames = parse_log(text, path_, {.keep_going = true}).frames;
+  expect_same(read(file), frames);
+  file.rewind();
+  expect_same(read(file), frames);
+}
+
+TEST_F(LogOnDisk, AsManyTicksAreAnnouncedAsAreGiven) {
+  const std::string grid =
+      "(1.003) can0 301#0011223344556677\n(1.5) can0 301#0011223344556677\n"
+      "(900.0) can0 301#0011223344556677\n";
+  std::string own = grid;
+  for (int i = 0; i < 3; ++i) {
+    Line line;
+    append_log_line(line, {2'000'000}, "can0", sync_frame(0x300, bus::SyncKind::kStep, {2'000'000 + i * 10'000}, 0));
+    own += line.view();
+  }
+  for (const auto& [text, expected] : {std::pair{grid, 51U}, std::pair{own, 3U}}) {
+    write(text);
+    PlayOptions options{.log = path_};
+    SurveyedLog log = survey_for(options);
+    EXPECT_EQ(log.ticks, expected);
+    EXPECT_EQ(log.inputs, 3U);
+    LogTicks ticks(log.file, options.script, log.has_ticks);
+    Tick tick;
+    std::uint64_t given = 0;
+    while (ticks.next(tick)) ++given;
+    EXPECT_EQ(given, log.ticks);
+    EXPECT_EQ(ticks.inputs(), 3U);
+  }
+}
+
+TEST_F(LogOnDisk, AFileThatIsNotThereOrEmptyIsNamed) {
+  EXPECT_EQ(refusal("/nowhere/at/all.log"), "/nowhere/at/all.log: cannot be read: No such file or directory");
+  EXPECT_EQ(refusal("/dev/null"), "/dev/null: no CAN data frame in it");
+  EXPECT_EQ(refusal("/"), "/: cannot be read: Is a directory");
 }
 
 }  // namespace

@@ -108,8 +108,9 @@ TEST_F(Folder, EpochsAreNumberedOnWhenTheNodeIsRestarted) {
 
 TEST_F(Folder, TheRawLogIsARecordingOfTheRun) {
   EXPECT_EQ(play(script(100)), 0);
-  const Recording recording = recording_of(read_log(path_ + "/raw.log"), {});
-  EXPECT_EQ(recording.epochs.size(), 100U);
+  LogFile log(path_ + "/raw.log", {});
+  const Recording recording = recording_of(log, "raw.log", {});
+  EXPECT_EQ(recording.epochs, 100U);
   EXPECT_FALSE(recording.inputs_differ_at);
 }
 

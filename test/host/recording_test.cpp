@@ -3,12 +3,16 @@
 #include "sim_host/play/recording.hpp"
 
 #include "host/stand_in_node.hpp"
+#include "sim_host/play/candump.hpp"
 #include "sim_host/play/lockstep.hpp"
+#include "sim_host/play/play.hpp"
 #include "sim_host/play/realtime.hpp"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <filesystem>
+#include <fstream>
 #include <random>
 #include <stdexcept>
 #include <string>
@@ -67,22 +71,29 @@ struct Repeated {
   std::string first;
 };
 
-Repeated repeat(const Recording& recording, std::uint32_t base = 0x300, std::uint32_t flaw = 0) {
-  Recording copy = recording;
+Recording surveyed(const Log& log, const ScriptOptions& options = {}) {
+  FramesInMemory frames(log.frames);
+  return recording_of(frames, log.name, options);
+}
+
+Repeated repeat(const Log& log, const ScriptOptions& options = {}, std::uint32_t flaw = 0) {
+  FramesInMemory frames(log.frames);
+  const Recording recording = recording_of(frames, log.name, options);
+  RecordedTicks ticks(frames, recording, options);
   hal::MemoryBus bus;
   hal::MemoryCan end = bus.node_end();
-  StandInNode node(end, base);
+  StandInNode node(end, options.base);
   node.loop_time_us = 4711;  // differs from run to run, and must not matter
   node.state_flaw = flaw;
   MemoryLink link(bus, [&node] { node.poll(); });
-  Comparison comparison(copy, base);
+  Comparison comparison(ticks, recording, options);
   struct Both : KeepAll {
     Comparison* comparison = nullptr;
     void epoch(const NodeEpoch& e, base::Micros t) { comparison->epoch(e, t); }
   } sink;
   sink.comparison = &comparison;
   Repeated r{};
-  play_lockstep(link, copy.script, sink, {.base = base}, r.counts);
+  play_lockstep(link, ticks, sink, {.base = options.base}, r.counts);
   r.compared = comparison.compared();
   r.different = comparison.different();
   r.missing = comparison.missing();
@@ -92,7 +103,7 @@ Repeated repeat(const Recording& recording, std::uint32_t base = 0x300, std::uin
 
 std::string refusal(const Log& log) {
   try {
-    static_cast<void>(recording_of(log, {}));
+    static_cast<void>(surveyed(log));
   } catch (const std::runtime_error& error) {
     return error.what();
   }
@@ -103,10 +114,10 @@ TEST(Recording, AFreeRunIsRepeatedByteForByte) {
   FreeRun run;
   run.begin(500'000);
   run.ticks(2000, 1'000'000);
-  const Recording recording = recording_of(run.log, {});
-  EXPECT_EQ(recording.epochs.size(), 2000U);
+  const Recording recording = surveyed(run.log);
+  EXPECT_EQ(recording.epochs, 2000U);
   EXPECT_FALSE(recording.inputs_differ_at);
-  const Repeated r = repeat(recording);
+  const Repeated r = repeat(run.log);
   EXPECT_EQ(r.compared, 2000U);
   EXPECT_EQ(r.different, 0U) << r.first;
   EXPECT_EQ(r.counts.lost() + r.counts.extra() + r.missing, 0U);
@@ -116,7 +127,7 @@ TEST(Recording, ItIsRepeatedOnANodeWithOtherIds) {
   FreeRun run;
   run.begin(0);
   run.ticks(100, 1'000'000);
-  const Repeated r = repeat(recording_of(run.log, {.base = 0x500, .log_base = 0x300}), 0x500);
+  const Repeated r = repeat(run.log, {.base = 0x500, .log_base = 0x300});
   EXPECT_EQ(r.compared, 100U);
   EXPECT_EQ(r.different, 0U) << r.first;
 }
@@ -126,7 +137,7 @@ TEST(Recording, MoreInputsThanTheCounterHoldsAreNoTrouble) {
   run.begin(0);
   run.ticks(20'000, 1'000'000);
   ASSERT_GT(run.node.consumed(), 65'536U);
-  const Repeated r = repeat(recording_of(run.log, {}));
+  const Repeated r = repeat(run.log);
   EXPECT_EQ(r.compared, 20'000U);
   EXPECT_EQ(r.different, 0U) << r.first;
 }
@@ -137,9 +148,9 @@ TEST(Recording, ANodeSwitchedOnWhileFramesFlowIsFoundByItsOwnCrc) {
   while (run.node_end.receive()) continue;
   run.inputs(7);
   run.ticks(50, 10'000);
-  const Recording recording = recording_of(run.log, {});
+  const Recording recording = surveyed(run.log);
   EXPECT_FALSE(recording.inputs_differ_at);
-  const Repeated r = repeat(recording);
+  const Repeated r = repeat(run.log);
   EXPECT_EQ(r.compared, 50U);
   EXPECT_EQ(r.different, 0U) << r.first;
 }
@@ -153,14 +164,15 @@ TEST(Recording, ANodeThatWasRestartedIsRestartedAgain) {
   run.begin(77);
   run.begin(78);
   run.ticks(300, 5'000'000);
-  Recording recording = recording_of(run.log, {});
+  FramesInMemory frames(run.log.frames);
+  const Recording recording = recording_of(frames, run.log.name, {});
+  RecordedTicks ticks(frames, recording, {});
   std::vector<std::int64_t> begins;
   Tick tick;
-  while (recording.script.next(tick))
+  while (ticks.next(tick))
     if (tick.begin) begins.push_back(tick.begin->us);
   EXPECT_EQ(begins, (std::vector<std::int64_t>{0, 78}));
-  recording.script.rewind();
-  const Repeated r = repeat(recording);
+  const Repeated r = repeat(run.log);
   EXPECT_EQ(r.compared, 330U);
   EXPECT_EQ(r.different, 0U) << r.first;
 }
@@ -173,10 +185,10 @@ TEST(Recording, WhatTheNodeDidBeforeTheLogBeganIsLeftOutWhenItIsRestarted) {
     run.begin(5'000'000);
     run.ticks(40, 6'000'000);
     run.log.frames.erase(run.log.frames.begin(), run.log.frames.begin() + cut);
-    const Recording recording = recording_of(run.log, {});
-    EXPECT_EQ(recording.epochs.size(), 40U);
+    const Recording recording = surveyed(run.log);
+    EXPECT_EQ(recording.epochs, 40U);
     EXPECT_GT(recording.skipped_epochs, 10U);
-    const Repeated r = repeat(recording);
+    const Repeated r = repeat(run.log);
     EXPECT_EQ(r.compared, 40U);
     EXPECT_EQ(r.different, 0U) << r.first;
   }
@@ -186,7 +198,7 @@ TEST(Recording, ANodeThatComputesSomethingElseIsNoticedInItsFirstEpoch) {
   FreeRun run;
   run.begin(0);
   run.ticks(20, 1'000'000);
-  const Repeated r = repeat(recording_of(run.log, {}), 0x300, 1);
+  const Repeated r = repeat(run.log, {}, 1);
   EXPECT_EQ(r.different, 20U);
   EXPECT_EQ(r.first.find("epoch 1 at 1.000 s: recorded Est_StateCrc "), 0U) << r.first;
 }
@@ -200,9 +212,9 @@ TEST(Recording, OneInputBitChangedIsNoticed) {
       run.log.frames[i].frame.data[5] ^= 1;
       break;
     }
-  const Recording recording = recording_of(run.log, {});
+  const Recording recording = surveyed(run.log);
   EXPECT_TRUE(recording.inputs_differ_at);
-  const Repeated r = repeat(recording);
+  const Repeated r = repeat(run.log);
   EXPECT_GT(r.different, 50U);
   EXPECT_LT(r.different, 150U) << "before the change all is equal";
 }
@@ -218,9 +230,9 @@ TEST(Recording, AFrameOfTheNodeMissingInTheRecordIsCountedAndShown) {
       frames.erase(f);
       break;
     }
-  const Recording recording = recording_of(run.log, {});
+  const Recording recording = surveyed(run.log);
   EXPECT_EQ(recording.missing_outputs, 1U);
-  const Repeated r = repeat(recording);
+  const Repeated r = repeat(run.log);
   EXPECT_EQ(r.different, 1U);
   EXPECT_EQ(r.first.find("epoch 20 at 1.190 s: recorded Est0_Motion"), 0U) << r.first;
 }
@@ -258,14 +270,99 @@ TEST(Recording, WhatCannotBeRepeatedIsRefusedWithTheReason) {
   EXPECT_NE(refusal(hole).find("epochs are missing"), std::string::npos) << refusal(hole);
 }
 
+/// The log as a file of its own, and how the player would play it.
+PlayMode mode_of(const Log& log, std::uint32_t base) {
+  const std::string path = testing::TempDir() + "tetap_mode_of.log";
+  std::ofstream out(path);
+  for (const TimedFrame& entry : log.frames) {
+    Line line;
+    append_log_line(line, entry.time, "vcan0", entry.frame);
+    out << line.view();
+  }
+  out.close();
+  PlayOptions options{.log = path, .script = {.base = base, .log_base = base}};
+  static_cast<void>(survey_for(options));
+  std::filesystem::remove(path);
+  return options.mode;
+}
+
 TEST(Recording, ALogWithoutNodeIsNone) {
   FreeRun run;
   run.inputs(10);
-  EXPECT_FALSE(is_recording(run.log.frames, 0x300));
+  EXPECT_EQ(mode_of(run.log, 0x300), PlayMode::kLockstep);
   run.node.poll();
   run.ticks(1, 1);
-  EXPECT_TRUE(is_recording(run.log.frames, 0x300));
-  EXPECT_FALSE(is_recording(run.log.frames, 0x340));
+  EXPECT_EQ(mode_of(run.log, 0x300), PlayMode::kAsRecorded);
+  EXPECT_EQ(mode_of(run.log, 0x340), PlayMode::kLockstep);
+}
+
+/// Counts what is read.
+class Counted : public Frames {
+ public:
+  explicit Counted(std::span<const TimedFrame> frames) : frames_(frames) {}
+  bool next(TimedFrame& frame) override {
+    ++read;
+    return frames_.next(frame);
+  }
+  void rewind() override {
+    read = 0;
+    frames_.rewind();
+  }
+  std::size_t read = 0;
+
+ private:
+  FramesInMemory frames_;
+};
+
+TEST(Recording, ALongLogIsReadAsItIsPlayed) {
+  FreeRun run;
+  run.begin(0);
+  run.ticks(5'000, 1'000'000);
+  std::vector<std::size_t> ends;  // of epochs, in the log
+  for (std::size_t i = 0; i < run.log.frames.size(); ++i)
+    if (run.log.frames[i].frame.id == 0x300 + bus::EstStateCrc::kOffset) ends.push_back(i + 1);
+  run.inputs(1'000);  // the node is switched off
+  Counted frames(run.log.frames);
+  const Recording recording = recording_of(frames, run.log.name, {});
+  RecordedTicks ticks(frames, recording, {});
+  Tick tick;
+  for (const std::size_t end : ends) {
+    ASSERT_TRUE(ticks.next(tick));
+    EXPECT_EQ(frames.read, end);
+  }
+  EXPECT_FALSE(ticks.next(tick));
+  EXPECT_EQ(frames.read, ends.back()) << "what comes after the last epoch is not read again";
+}
+
+TEST(Recording, InputsBehindABeginFrameThatNobodyAnsweredAreTheNodesAsBefore) {
+  FreeRun run;
+  run.begin(0);
+  run.ticks(20, 1'000'000);
+  run.inputs(5);
+  run.note(sync_frame(0x300, bus::SyncKind::kBegin, {9'000'000}, 1));  // the node never sees it
+  run.ticks(20, 2'000'000);
+  const Repeated r = repeat(run.log);
+  EXPECT_EQ(r.compared, 40U);
+  EXPECT_EQ(r.different, 0U) << r.first;
+  EXPECT_EQ(r.counts.lost() + r.counts.extra() + r.missing, 0U);
+}
+
+TEST(Recording, AnInputThatTheLogShowsLateIsTakenFromThere) {
+  FreeRun run;
+  run.begin(0);
+  run.ticks(100, 1'000'000);
+  auto& frames = run.log.frames;
+  std::size_t moved = 0;
+  for (std::size_t i = 50; i + 1 < frames.size(); ++i) {  // candump may stamp the node's frames before an input
+    if (!is_counted_input(frames[i].frame, 0x300) || is_counted_input(frames[i + 1].frame, 0x300)) continue;
+    std::rotate(frames.begin() + static_cast<std::ptrdiff_t>(i), frames.begin() + static_cast<std::ptrdiff_t>(i) + 1,
+                frames.begin() + static_cast<std::ptrdiff_t>(std::min(i + 12, frames.size())));
+    ++moved;
+    i += 40;
+  }
+  ASSERT_GT(moved, 5U);
+  const Recording recording = surveyed(run.log);
+  EXPECT_EQ(recording.epochs, 100U);
 }
 
 TEST(Realtime, FramesAndTicksKeepTheOrderOfTheLogHoweverLateTheyAre) {

@@ -26,14 +26,19 @@ struct Played {
   friend bool operator==(const Played&, const Played&) = default;
 };
 
-std::vector<Played> all(Script script) {
+std::vector<Played> all(const std::vector<TimedFrame>& log) {
+  FramesInMemory frames(log);
+  const bool has_ticks =
+      std::any_of(log.begin(), log.end(), [](const TimedFrame& entry) { return is_tick(entry.frame, 0x300); });
+  LogTicks source(frames, {}, has_ticks);
   std::vector<Played> ticks;
   Tick tick;
-  while (script.next(tick)) {
+  while (source.next(tick)) {
     Played p{tick.time.us, {}, tick.begin.has_value()};
     for (const auto& f : tick.inputs) p.tags.push_back(f.data[0]);
     ticks.push_back(p);
   }
+  EXPECT_FALSE(source.next(tick)) << "after the last tick there is none";
   return ticks;
 }
 
@@ -44,19 +49,19 @@ TEST(Script, AFrameBelongsToTheFirstTickAtOrAfterIt) {
                                      {1'030'000, {}, false},
                                      {1'040'000, {}, false},
                                      {1'050'000, {4}, false}};
-  EXPECT_EQ(all(script_of(log, {})), expected);
+  EXPECT_EQ(all(log), expected);
 }
 
 TEST(Script, AFrameFromThePastStaysWithItsPredecessor) {
   const std::vector<TimedFrame> log{input(1'015'000, 1), input(990'000, 2), input(1'021'000, 3)};
   const std::vector<Played> expected{{1'020'000, {1, 2}, true}, {1'030'000, {3}, false}};
-  EXPECT_EQ(all(script_of(log, {})), expected);
+  EXPECT_EQ(all(log), expected);
 }
 
 TEST(Script, TimeThatJumpsByYearsDoesNotMakeMillionsOfTicks) {
   const std::vector<TimedFrame> log{input(0, 1), input(1'000'000'000'000'000, 2)};
   const std::vector<Played> expected{{10'000, {1}, true}, {1'000'000'000'000'000, {2}, false}};
-  EXPECT_EQ(all(script_of(log, {})), expected);
+  EXPECT_EQ(all(log), expected);
 }
 
 TEST(Script, TicksInTheLogAreTheTicks) {
@@ -66,7 +71,7 @@ TEST(Script, TicksInTheLogAreTheTicks) {
                               {{3'000}, sync_frame(0x300, bus::SyncKind::kClock, {1}, 1)},
                               {{4'000}, sync_frame(0x300, bus::SyncKind::kStep, {7'012'345}, 2)}};
   const std::vector<Played> expected{{7'000'000, {1}, true}, {7'012'345, {2}, false}};
-  EXPECT_EQ(all(script_of(log, {})), expected);
+  EXPECT_EQ(all(log), expected);
 }
 
 TEST(Script, TicksCountFromTheBeginOfTheBusNotByTheClockOfTheLog) {
@@ -76,14 +81,15 @@ TEST(Script, TicksCountFromTheBeginOfTheBusNotByTheClockOfTheLog) {
                                     {{kToday_us + 20}, sync_frame(0x300, bus::SyncKind::kStep, {1'010'000}, 1)},
                                     {{kToday_us + 30}, sync_frame(0x300, bus::SyncKind::kStep, {1'020'000}, 2)}};
   const std::vector<Played> expected{{1'010'000, {1}, true}, {1'020'000, {}, false}};
-  EXPECT_EQ(all(script_of(log, {})), expected);
+  EXPECT_EQ(all(log), expected);
 }
 
 TEST(Script, OnlyInputsOfTheNodesBlockArePlayedUnderItsIds) {
   const std::vector<TimedFrame> log{input(1, 1, 0x2FF), input(2, 2, 0x301),
                                     input(3, 3, 0x31F), input(4, 4, 0x320),
                                     input(5, 5, 0x340), {{6}, {.id = 0x308, .extended = true, .size = 1, .data = {6}}}};
-  Script script = script_of(log, {.base = 0x480, .log_base = 0x300});
+  FramesInMemory frames(log);
+  LogTicks script(frames, {.base = 0x480, .log_base = 0x300}, false);
   Tick tick;
   ASSERT_TRUE(script.next(tick));
   ASSERT_EQ(tick.inputs.size(), 2U);
