@@ -8,6 +8,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import tracemalloc
 import unittest
 
 import numpy as np
@@ -17,7 +18,8 @@ TOOLS = os.path.join(ROOT, "tools")
 sys.path.insert(0, os.path.join(TOOLS, "python"))
 sys.dont_write_bytecode = True
 
-from tetap.report import metrics  # noqa: E402
+from tetap.can import bus_writer  # noqa: E402
+from tetap.report import metrics, tables  # noqa: E402
 
 RUN = {"frames_in": 1234, "frames_lost": 0, "estimates_out": 777, "times_realtime": 12.5, "bus_load_percent": 9.25, "estimates_sha256": "ab" * 32,
        "state_crc_last": "0x12345678", "bus": "memory", "way": "one process", "robot": "rover", "mode": "lockstep", "duration_s": 10.0, "seed": 7,
@@ -489,6 +491,82 @@ class BadInput(Case):
         self.refused("t.truth.csv", "row 3: time goes back", truth=self.truth([1, 2, 1.5], [0] * 3, [0] * 3))
         self.refused("t.truth.csv", "row 2 has no x_m", truth=self.truth([1, 2, 3], [0, None, 0], [0] * 3))
         self.refused("t.truth.csv", "fewer than two rows", truth=self.truth([1], [0], [0]))
+
+
+class Tables(Case):
+    """Read in blocks and kept in few bytes, a table still says what its text says."""
+    columns = ["epoch", "time_s", "kind", "x_m", "y_m", "verdict"]
+
+    def setUp(self):
+        super().setUp()
+        block = tables.BLOCK
+        self.addCleanup(setattr, tables, "BLOCK", block)
+
+    def rows(self, count):
+        random = np.random.default_rng(4)
+        odd = ["-0.000", "0.1", "1e300", "-2.5e-7", "", "123456789.125", "-32.768", "2147483.648", "12", "nan", "0.30000000000000004"]
+        for n in range(count):
+            time_s = f"{1763900000 + 0.01 * n:.6f}" if n < count // 2 else f"{0.01 * n:.6f}"
+            y = odd[random.integers(len(odd))] if n > count // 3 else f"{random.normal(0, 20):.3f}"
+            yield [str(n), time_s, ["Odometry", "Ekf", "3", ""][n % 4], f"{random.normal(0, 1):.4f}" if n % 3 else "", y, ["Rejected", "Accepted", " Stale "][n % 3]]
+
+    def test_every_number_is_the_float_of_its_text_whatever_the_blocks(self):
+        codes = bus_writer.Dbc().tables
+        names = {"kind": codes["EstimatorKind"], "verdict": codes["Verdict"]}
+        rows = list(self.rows(700))
+        text = "# a comment\n" + ",".join(self.columns) + "\n" + "".join(",".join(row) + "\n" for row in rows)
+        expected = {name: [float(names.get(name, {}).get(row[i].strip(), row[i].strip()) if row[i] else "nan") for row in rows]
+                    for i, name in enumerate(self.columns)}
+        for ends, last in (("\n", True), ("\r\n", True), ("\n", False)):
+            with open(self.path("a.csv"), "w", encoding="utf-8", newline="") as file:
+                file.write(text.replace("\n", ends) if last else text[:-1])
+            for tables.BLOCK in (1, 37, 1000, 1 << 22):
+                table = tables.read_table(self.path("a.csv"), self.columns)
+                for name, values in expected.items():
+                    # Bits, not values: minus zero is another number than zero.
+                    np.testing.assert_array_equal(table[name].view(np.int64), np.array(values).view(np.int64), f"{name}, blocks of {tables.BLOCK}")
+
+    def test_a_part_of_a_table_is_its_rows_and_keeps_its_time(self):
+        self.write("a.csv", "time_s,x_m\n" + "".join(f"{n}.5,{n}\n" for n in range(10)))
+        later = tables.read_table(self.path("a.csv"), ["time_s", "x_m"]).since(2.0)
+        odd = later.where(later["x_m"] % 2 == 1)
+        some = odd.where(odd["x_m"] > 4)
+        np.testing.assert_array_equal(some["x_m"], [5, 7, 9])
+        np.testing.assert_array_equal(some["time_s"], [3.5, 5.5, 7.5])
+        self.assertIn("x_m", some)
+        self.assertNotIn("y_m", some)
+
+    def test_a_wrong_line_in_a_later_block_is_named_as_in_the_first(self):
+        good = "".join(f"{n},{n}.5\n" for n in range(100))
+        for wrong, words in (("7,later\n", "a.csv:102: .*later"), ("7\n", "a.csv:102: 1 columns, expected 2"), ("7,1,2\n", "a.csv:102: 3 columns, expected 2"),
+                             ("\n", "a.csv:102: 1 columns, expected 2"), ("Ekf,1\n", "a.csv:102: .*Ekf")):
+            for after in ("", "8,1\n"):
+                self.write("a.csv", "epoch,time_s\n" + good + wrong + after)
+                for tables.BLOCK in (10, 1 << 22):
+                    with self.subTest(wrong=wrong, after=after, block=tables.BLOCK), self.assertRaisesRegex(tables.BadInput, words):
+                        tables.read_table(self.path("a.csv"), ["epoch", "time_s"])
+
+    def test_lines_without_anything_are_no_rows(self):
+        for text in ("", "\n", " \n\n\n"):
+            self.write("a.csv", "epoch,time_s\n" + text)
+            for tables.BLOCK in (1, 1 << 22):
+                self.assertEqual(len(tables.read_table(self.path("a.csv"), ["epoch"])["epoch"]), 0)
+
+    def test_a_long_table_takes_a_third_of_its_floats_and_its_reading_not_much_more(self):
+        count = 30_000
+        random = np.random.default_rng(8)
+        self.write("a.csv", ",".join(metrics.ESTIMATES) + "\n" + "".join(
+            f"{n},{1 + 0.01 * n:.6f},2,Inertial,{x:.3f},{y:.3f},{yaw:.4f},{x / 9:.3f},{y / 9:.4f},,,,,,,1,1,,\n"
+            for n, (x, y, yaw) in enumerate(random.uniform(-3, 3, (count, 3)))))
+        tables.BLOCK = 1 << 16
+        tracemalloc.start()
+        self.addCleanup(tracemalloc.stop)
+        table = tables.read_table(self.path("a.csv"), metrics.ESTIMATES)
+        held, most = tracemalloc.get_traced_memory()
+        floats = count * len(metrics.ESTIMATES) * 8
+        self.assertLess(held, floats / 3)
+        self.assertLess(most, floats / 2)
+        self.assertEqual(len(table["x_m"]), count)
 
 
 class Inertial(Case):

@@ -8,13 +8,13 @@ the epochs that say the block's covariance whole.
 import copy
 import json
 import os
-import warnings
 
 import numpy as np
 from scipy.special import chdtri
 
 from tetap.can import bus_writer
 from tetap.can.bus_writer import BadInput
+from tetap.report.tables import empty_table, read_table
 
 TICK_S = 0.01  # of the simulated world
 MOST_NEES = 100.0  # above this mean, or with more than this share of a sensor rejected, the report warns: no tuning is so far off
@@ -49,8 +49,6 @@ STEPS = {"position": ("Est2_Std", "StdX"), "velocity": ("Est2_State", "StdVelEas
 VALUE_STEPS = {"position": [("Est2_Pos", "X", 1), ("Est2_Pos", "Y", 1), ("Est2_State", "Height", 1)], "velocity": [("Est2_Vel", "East", 1)],
                "attitude": [("Est2_Att", "X", 2)], "gyro bias": [("Est2_State", "GyroBiasX", 1)], "acc bias": [("Est2_State", "AccBiasX", 1)]}
 UNITS = {"position": "m", "velocity": "m/s", "attitude": "rad", "gyro bias": "rad/s", "acc bias": "m/s2"}
-
-ENUMERATIONS = {"failed": "Check", "state": "SourceState", "kind": "EstimatorKind", "sensor": "Sensor", "verdict": "Verdict", "mode": "Mode", "reset_cause": "ResetCause"}
 
 
 def chi_square(share, dof):
@@ -113,79 +111,17 @@ def start_s(run):
 def fault_spans(run):
     """(name, start, end) of the faults on the run's own clock. The world ticks once per epoch and epoch 1 is its first tick, so a fault is
     found by epoch: its own clock may be what jumps."""
+    timed = [one for one in faults(run) if one.start_s is not None]
+    if not timed:
+        return []
     order = np.argsort(run.estimates["epoch"], kind="stable")
     epoch, time_s = run.estimates["epoch"][order], run.estimates["time_s"][order]
     spans = []
-    for one in faults(run):
-        if one.start_s is not None:
-            ends = [one.start_s / TICK_S, (one.start_s + one.duration_s) / TICK_S]
-            start, end = np.interp(ends, epoch, time_s)
-            spans.append((one.name, float(start), float(end)))
+    for one in timed:
+        ends = [one.start_s / TICK_S, (one.start_s + one.duration_s) / TICK_S]
+        start, end = np.interp(ends, epoch, time_s)
+        spans.append((one.name, float(start), float(end)))
     return spans
-
-
-def read_table(path, columns, also=()):
-    """Columns of a CSV file as arrays of floats by name, and those of `also` that it has. Empty: NaN. Names of the bus's enumerations stand
-    for their numbers."""
-    try:
-        with open(path, "rb") as file:
-            data = file.read().replace(b"\r\n", b"\n")
-    except OSError as error:
-        raise BadInput(f"{path}: {error.strerror}") from None
-    skipped = 0
-    while data.startswith(b"#"):
-        data = data[data.find(b"\n") + 1:] if b"\n" in data else b""
-        skipped += 1
-    header, _, body = data.partition(b"\n")
-    names = [name.strip() for name in header.decode("utf-8", "replace").split(",")]
-    missing = [name for name in columns if name not in names]
-    if missing:
-        raise BadInput(f"{path}:{skipped + 1}: no column {missing[0]!r}")
-    if not body.endswith(b"\n"):
-        body += b"\n"
-    first_line = skipped + 2
-    values = _parse(body, len(names))
-    if values is None:
-        values = _parse_names(body, names, path, first_line)
-    return {name: values[:, names.index(name)] for name in [*columns, *also] if name in names}
-
-
-def _parse(body, width):
-    """All fields as numbers at once, or None when something is not a number or a line has another number of fields."""
-    if body.strip() == b"":
-        return np.empty((0, width))
-    octets = np.frombuffer(body, dtype=np.uint8)
-    ends = np.flatnonzero(octets == ord("\n"))
-    if np.any(np.diff(np.concatenate([[0], np.cumsum(octets == ord(","))[ends]])) != width - 1):
-        return None
-    flat = body[:-1].replace(b"\n", b",")
-    while b",," in flat:
-        flat = flat.replace(b",,", b",nan,")
-    if flat.endswith(b","):
-        flat += b"nan"
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        try:
-            values = np.fromstring(flat, sep=",")
-        except (DeprecationWarning, ValueError):
-            return None
-    return values.reshape(-1, width) if len(values) == len(ends) * width else None
-
-
-def _parse_names(body, names, path, first_line):
-    """The slow way, which knows names and says where a line is wrong."""
-    tables = bus_writer.Dbc().tables
-    codes = [tables.get(ENUMERATIONS.get(name), {}) for name in names]
-    rows = []
-    for number, line in enumerate(body.decode("utf-8", "replace").splitlines(), first_line):
-        fields = [field.strip() for field in line.split(",")]
-        if len(fields) != len(names):
-            raise BadInput(f"{path}:{number}: {len(fields)} columns, expected {len(names)}")
-        try:
-            rows.append([code[field] if field in code else float(field or "nan") for field, code in zip(fields, codes)])
-        except ValueError as error:
-            raise BadInput(f"{path}:{number}: {error}") from None
-    return np.array(rows, dtype=np.float64)
 
 
 class Run:
@@ -215,38 +151,42 @@ class Run:
         path = os.path.join(directory, name)
         if os.path.exists(path):
             return read_table(path, columns)
-        return {column: np.empty(0) for column in columns}
+        return empty_table(columns)
 
     def since(self, start):
         """The same, with times counted from `start` [s]."""
         later = copy.copy(self)
         for name in ("estimates", "innovations", "status", "states", "sensors"):
-            table = getattr(self, name)
-            setattr(later, name, {**table, "time_s": table["time_s"] - start})
+            setattr(later, name, getattr(self, name).since(start))
         return later
 
     def of(self, estimator):
         """Rows of one estimator."""
-        mask = self.estimates["estimator"] == estimator
-        return {name: column[mask] for name, column in self.estimates.items()}
+        return self.estimates.where(self.estimates["estimator"] == estimator)
 
     def states_of(self, estimator):
         """The estimator's attitudes, one row each, and beside them what was said last of everything else, where that is not too old; None
         where it publishes none."""
-        mask = self.states["estimator"] == estimator
-        rows = {name: column[mask] for name, column in self.states.items()}
-        at = np.flatnonzero(np.isfinite(rows["q_w"])) if mask.any() else np.empty(0, dtype=int)
-        if len(at) == 0:
-            return None
-        held = {name: rows[name][at] for name in ("epoch", "time_s", *Q)}
-        for name in STATES[3 + len(Q):]:
-            held[name] = held_at(rows["epoch"], rows[name], held["epoch"], HELD_S / TICK_S)
-            held[f"new {name}"] = np.isfinite(rows[name][at])
-        pose = self.of(estimator)
-        for name in ("x_m", "y_m", "std_x_m", "std_y_m", "std_yaw_rad", "corr_xy", "pos_valid", "hdg_valid"):
-            held[name] = held_at(pose["epoch"], pose[name], held["epoch"], HELD_S / TICK_S)
-            held[f"new {name}"] = np.isin(held["epoch"], pose["epoch"][np.isfinite(pose[name])])
-        return held
+        states = States(self.states.where(self.states["estimator"] == estimator), self.of(estimator))
+        return states if len(states["epoch"]) > 0 else None
+
+
+class States:
+    """Columns by name, a row for every attitude; "new NAME": whether that was said in this very epoch."""
+    POSE = ("x_m", "y_m", "std_x_m", "std_y_m", "std_yaw_rad", "corr_xy", "pos_valid", "hdg_valid")
+
+    def __init__(self, rows, pose):
+        self._rows, self._pose = rows, pose
+        self._at = np.flatnonzero(np.isfinite(rows["q_w"]))
+
+    def __getitem__(self, name):
+        if name in ("epoch", "time_s", *Q):
+            return self._rows[name][self._at]
+        source = self._pose if name.removeprefix("new ") in self.POSE else self._rows
+        if not name.startswith("new "):
+            return held_at(source["epoch"], source[name], self["epoch"], HELD_S / TICK_S)
+        known = np.isfinite(source[name.removeprefix("new ")])
+        return known[self._at] if source is self._rows else np.isin(self["epoch"], source["epoch"][known])
 
 
 def names_of(kinds):
@@ -291,18 +231,18 @@ class Truth:
 
     def __init__(self, path, max_gap_s=None):
         self.path = path
-        rows = read_table(path, TRUTH, ["epoch", *TRUTH_MORE])
-        self.more = {name: rows[name] for name in TRUTH_MORE} if all(name in rows for name in TRUTH_MORE) else None
-        self.epoch = rows.get("epoch")
-        if self.epoch is not None and not (np.diff(self.epoch) > 0).all():
-            raise BadInput(f"{path}: row {int(np.argmin(np.diff(self.epoch) > 0)) + 2}: epoch does not grow")
-        self.time_s, self.x_m, self.y_m, self.yaw_rad = (rows[name] for name in TRUTH)
-        if len(self.time_s) < 2:
+        self._rows = read_table(path, TRUTH, ["epoch", *TRUTH_MORE])
+        self.has_more = all(name in self._rows for name in ("epoch", *TRUTH_MORE))
+        epoch, time_s = self.epoch, self.time_s
+        if epoch is not None and not (np.diff(epoch) > 0).all():
+            raise BadInput(f"{path}: row {int(np.argmin(np.diff(epoch) > 0)) + 2}: epoch does not grow")
+        if len(time_s) < 2:
             raise BadInput(f"{path}: fewer than two rows")
-        for column, name in ((self.time_s, "time_s"), (self.x_m, "x_m"), (self.y_m, "y_m")):
-            if not np.isfinite(column).all():
-                raise BadInput(f"{path}: row {int(np.argmin(np.isfinite(column))) + 1} has no {name}")
-        steps = np.diff(self.time_s)
+        for name in ("time_s", "x_m", "y_m"):
+            known = np.isfinite(self._rows[name])
+            if not known.all():
+                raise BadInput(f"{path}: row {int(np.argmin(known)) + 1} has no {name}")
+        steps = np.diff(time_s)
         if (steps < 0).any():
             raise BadInput(f"{path}: row {int(np.argmax(steps < 0)) + 2}: time goes back")
         self.max_gap_s = max(LEAST_GAP_S, 2.5 * float(np.median(steps))) if max_gap_s is None else max_gap_s
@@ -314,39 +254,45 @@ class Truth:
     def since(self, start):
         """The same, with times counted from `start` [s]."""
         later = copy.copy(self)
-        later.time_s = self.time_s - start
+        later._rows = self._rows.since(start)
         return later
+
+    epoch = property(lambda self: self._rows["epoch"] if "epoch" in self._rows else None)
+    time_s = property(lambda self: self._rows["time_s"])
+    x_m = property(lambda self: self._rows["x_m"])
+    y_m = property(lambda self: self._rows["y_m"])
+    yaw_rad = property(lambda self: self._rows["yaw_rad"])
+
+    def _in_epochs(self, epochs, names):
+        """These columns by name, in these epochs; NaN where there is no row."""
+        epoch = self.epoch
+        found = np.clip(np.searchsorted(epoch, epochs), 0, len(epoch) - 1)
+        known = epoch[found] == epochs
+        return {name: np.where(known, self._rows[name][found], np.nan) for name in names}
 
     def of(self, rows):
         """x, y, yaw for rows of estimates."""
         if self.epoch is None:
             return self.at(rows["time_s"])
-        found = np.clip(np.searchsorted(self.epoch, rows["epoch"]), 0, len(self.epoch) - 1)
-        known = self.epoch[found] == rows["epoch"]
-        return tuple(np.where(known, column[found], np.nan) for column in (self.x_m, self.y_m, self.yaw_rad))
+        return tuple(self._in_epochs(rows["epoch"], TRUTH[1:]).values())
 
     def more_of(self, epochs):
         """All that a simulated world says, for these epochs; None where the truth says only a pose."""
-        if self.more is None or self.epoch is None:
-            return None
-        found = np.clip(np.searchsorted(self.epoch, epochs), 0, len(self.epoch) - 1)
-        known = self.epoch[found] == epochs
-        columns = {"x_m": self.x_m, "y_m": self.y_m, "yaw_rad": self.yaw_rad, **self.more}
-        return {name: np.where(known, column[found], np.nan) for name, column in columns.items()}
+        return self._in_epochs(epochs, [*TRUTH[1:], *TRUTH_MORE]) if self.has_more else None
 
     def at(self, time_s):
         """x, y, yaw at the times given, linear in between; NaN outside of the truth and in its gaps."""
-        after = np.clip(np.searchsorted(self.time_s, time_s), 1, len(self.time_s) - 1)
+        known = self.time_s
+        after = np.clip(np.searchsorted(known, time_s), 1, len(known) - 1)
         before = after - 1
-        span = self.time_s[after] - self.time_s[before]
+        span = known[after] - known[before]
         with np.errstate(invalid="ignore", divide="ignore"):
-            part = np.where(span > 0, (time_s - self.time_s[before]) / span, 0.0)
-        inside = (time_s >= self.time_s[0]) & (time_s <= self.time_s[-1]) & ((span <= self.max_gap_s + 1e-9) | (part == 1.0))
+            part = np.where(span > 0, (time_s - known[before]) / span, 0.0)
+        inside = (time_s >= known[0]) & (time_s <= known[-1]) & ((span <= self.max_gap_s + 1e-9) | (part == 1.0))
         part = np.where(inside, part, np.nan)
-        turn = wrapped(self.yaw_rad[after] - self.yaw_rad[before])
-        return (self.x_m[before] + part * (self.x_m[after] - self.x_m[before]),
-                self.y_m[before] + part * (self.y_m[after] - self.y_m[before]),
-                wrapped(self.yaw_rad[before] + part * turn))
+        x, y, yaw = self.x_m, self.y_m, self.yaw_rad
+        return (x[before] + part * (x[after] - x[before]), y[before] + part * (y[after] - y[before]),
+                wrapped(yaw[before] + part * wrapped(yaw[after] - yaw[before])))
 
 
 def errors(rows, truth):
@@ -486,16 +432,18 @@ def disagreement(run):
 
 def nees_by_row(rows, dx, dy, dyaw, dof):
     """Normalised squared error of each row; NaN without a published covariance or a known error. And how many covariances were of no use."""
-    std = np.stack([rows["std_x_m"], rows["std_y_m"], rows["std_yaw_rad"]], axis=1)[:, :dof]
-    error = np.stack([dx, dy, dyaw], axis=1)[:, :dof]
-    correlation = correlation_matrices(rows["corr_xy"], rows["corr_x_yaw"], rows["corr_y_yaw"])[:, :dof, :dof]
-    known = np.flatnonzero(np.isfinite(std).all(axis=1) & np.isfinite(error).all(axis=1) & np.isfinite(correlation).all(axis=(1, 2)))
-    positive = (std[known] > 0).all(axis=1)
+    sigmas, errors_, correlations = ["std_x_m", "std_y_m", "std_yaw_rad"][:dof], [dx, dy, dyaw][:dof], ["corr_xy", "corr_x_yaw", "corr_y_yaw"]
+    all_known = np.ones(len(dx), dtype=bool)
+    for column in [*(rows[name] for name in [*sigmas, *correlations[:2 * dof - 3]]), *errors_]:
+        all_known &= np.isfinite(column)
+    known = np.flatnonzero(all_known)
+    std, error = np.stack([rows[name][known] for name in sigmas], axis=1), np.stack([column[known] for column in errors_], axis=1)
+    correlation = correlation_matrices(*(rows[name][known] for name in correlations))[:, :dof, :dof]
+    positive = (std > 0).all(axis=1)
     if len(known):
-        positive &= np.linalg.eigvalsh(correlation[known])[:, 0] > 1e-6
-    use = known[positive]
-    values = np.full(len(error), np.nan)
-    values[use] = squares(error[use], std[use], correlation[use])
+        positive &= np.linalg.eigvalsh(correlation)[:, 0] > 1e-6
+    values = np.full(len(dx), np.nan)
+    values[known[positive]] = squares(error[positive], std[positive], correlation[positive])
     return values, int(np.count_nonzero(~positive))
 
 

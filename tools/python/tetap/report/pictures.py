@@ -114,18 +114,22 @@ def covariance_ellipses(rows, share, count):
     return np.stack([rows["x_m"][pick], rows["y_m"][pick]], axis=1), axes[:, 1], axes[:, 0], angle
 
 
+def extremes(tracks, truth):
+    """The least and the largest x, and y, of all that is drawn of a path; nothing where there is none."""
+    found = []
+    for rows in tracks:
+        valid = rows["pos_valid"] == 1
+        if valid.any():
+            found.append([[column.min(), column.max()] for column in (rows["x_m"][valid], rows["y_m"][valid])])
+    if truth is not None:
+        found.append([[column.min(), column.max()] for column in (truth.x_m, truth.y_m)])
+    return np.array(found).transpose(1, 0, 2).reshape(2, -1) if found else (np.empty(0), np.empty(0))
+
+
 def path(run, truth, landmarks, title):
     """Truth, odometry and fused estimate in the plane."""
     tracks = {k: run.of(k) for k in run.estimators if run.kinds[k] != "Attitude"}
-    xs, ys = [], []
-    for rows in tracks.values():
-        valid = rows["pos_valid"] == 1
-        xs.append(rows["x_m"][valid])
-        ys.append(rows["y_m"][valid])
-    if truth is not None:
-        xs.append(truth.x_m)
-        ys.append(truth.y_m)
-    x, y = np.concatenate(xs), np.concatenate(ys)
+    x, y = extremes(tracks.values(), truth)
     aspect = (np.ptp(y) + 1e-3) / (np.ptp(x) + 1e-3) if len(x) else 1.0
     fig, (axes,) = figure(8.6, float(np.clip(6.6 * aspect, 3.6, 7.4)), title)
     if landmarks:
