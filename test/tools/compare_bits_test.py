@@ -120,9 +120,9 @@ class PackagesTest(unittest.TestCase):
             os.chmod(setup, 0o755)
             fresh = load()
             fresh.TOOLS = folder
+            fresh.all_hashes = lambda *_: self.fail("it builds")
             with self.assertRaisesRegex(fresh.BitsError, "packages of aarch64 and riscv64 are missing"):
                 fresh.compare("whole", os.path.join(folder, "build"), folder)
-            self.assertFalse(os.path.exists(os.path.join(folder, "build")))
             with open(asked, encoding="utf-8") as file:
                 self.assertEqual(file.read().split(), list(fresh.FETCHED))
 
