@@ -18,7 +18,7 @@ template <class Scalar, int N>
   Symmetric<Scalar, N> u;  // the diagonal holds 1 / pivot
 #pragma GCC unroll 16
   for (int j = 0; j < N; ++j) {
-    Scalar pivot = p(j, j) * Scalar{1.0F - kLeastEigenvalue};
+    Scalar pivot = p(j, j) * Scalar(1.0F - kLeastEigenvalue);
 #pragma GCC unroll 16
     for (int i = 0; i < j; ++i) {
       Scalar sum = p(i, j);
@@ -37,10 +37,10 @@ template <class Scalar, int N>
 /// not enough, and in the end by all. Every entry has to be a number (Symmetric::bounded()).
 template <class Scalar, int N>
 [[gnu::noinline]] void restore(Symmetric<Scalar, N>& p) {
-  constexpr Scalar kLeast{1e-20F};  // below, products of variances leave the normal numbers
+  constexpr auto kLeast = Scalar(1e-20F);  // below, products of variances leave the normal numbers
   for (int i = 0; i < N; ++i)
     if (!(p(i, i) > kLeast)) p(i, i) = kLeast;
-  for (Scalar share{4e-6F}; !well_conditioned(p); share *= Scalar{10}) {
+  for (auto share = Scalar(4e-6F); !well_conditioned(p); share *= Scalar{10}) {
     const Scalar keep = share < Scalar{1} ? Scalar{1} - share : Scalar{0};
     for (int c = 0; c < N; ++c)
       for (int r = 0; r < c; ++r) p(r, c) *= keep;

@@ -20,7 +20,7 @@ class Ekf {
   Symmetric<Scalar, kErrors> p{};
 
   /// x = f(x), P = F P F^T + Q. False, and nothing has changed, when either would be no number, or P beyond all sizes.
-  template <MotionModel<State> Motion>
+  template <LinearisedMotion<State> Motion>
   bool predict(const Motion& motion) {
     if constexpr (requires { motion.step(x); }) {
       return adopt(motion.step(x));
@@ -30,7 +30,7 @@ class Ekf {
   }
 
   /// Joint gate, then sequential scalar updates; a measurement that is rejected changes nothing.
-  template <MeasurementModel<State> Measurement>
+  template <LinearisedModel<State> Measurement>
   [[nodiscard]] Innovation<Scalar, Measurement::kDimension> update(const Measurement& measurement, Scalar gate) {
     constexpr int kColumns = static_cast<int>(Measurement::kTouches.size());
     Linearised<Scalar, Measurement::kDimension, kColumns> at;

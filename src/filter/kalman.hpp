@@ -26,6 +26,7 @@ template <class Scalar, int N, int... States>
 struct DirectMeasurement {
   static constexpr int kDimension = sizeof...(States);
   static constexpr std::array<int, sizeof...(States)> kTouches{States...};
+  static constexpr bool kSelects = true;  ///< H picks states: see structure.hpp
   static_assert(((States >= 0 && States < N) && ...));
 
   Vector<Scalar, kDimension> z;

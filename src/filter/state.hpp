@@ -31,23 +31,34 @@ struct Linearised {
   Matrix<Scalar, M, K> h;
 };
 
-/// x+ = predict(x), with F = d predict / d error state and the process noise Q added over the step.
+/// x+ = predict(x), with the process noise Q added over the step.
 template <class M, class S>
 concept MotionModel = State<S> && requires(const M& model, const S& x) {
   { model.predict(x) } -> std::same_as<S>;
-  { model.jacobian(x) } -> std::same_as<Matrix<typename S::Scalar, S::kErrors, S::kErrors>>;
   { model.noise(x) } -> std::same_as<Symmetric<typename S::Scalar, S::kErrors>>;
 };
 
-/// A model holds one measurement z. kTouches names the error states its Jacobian has columns for, so that a sparse
-/// update costs what it must. residual() is z minus z_hat, wrapped where a component is an angle. noise() are variances
-/// of independent components.
+/// A motion model with F = d predict / d error state.
+template <class M, class S>
+concept LinearisedMotion = MotionModel<M, S> && requires(const M& model, const S& x) {
+  { model.jacobian(x) } -> std::same_as<Matrix<typename S::Scalar, S::kErrors, S::kErrors>>;
+};
+
+/// A model holds one measurement z. kTouches names the error states that enter it, so that a sparse update costs what
+/// it must. residual() is z minus z_hat, wrapped where a component is an angle; kAngles, where a model has it, names
+/// those components. noise() are variances of independent components.
 template <class M, class S>
 concept MeasurementModel = State<S> &&
     requires(const M& model, const S& x, const Vector<typename S::Scalar, M::kDimension>& z_hat) {
   { model.predict(x) } -> std::same_as<Vector<typename S::Scalar, M::kDimension>>;
   { model.residual(z_hat) } -> std::same_as<Vector<typename S::Scalar, M::kDimension>>;
   { model.noise() } -> std::same_as<Vector<typename S::Scalar, M::kDimension>>;
+  M::kTouches.size();
+};
+
+/// A measurement model with the Jacobian of its prediction: column k belongs to error state kTouches[k].
+template <class M, class S>
+concept LinearisedModel = MeasurementModel<M, S> && requires(const M& model, const S& x) {
   {
     model.jacobian(x)
     } -> std::same_as<Matrix<typename S::Scalar, M::kDimension, static_cast<int>(M::kTouches.size())>>;

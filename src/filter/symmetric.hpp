@@ -3,6 +3,7 @@
 #pragma once
 
 #include "base/math.hpp"
+#include "base/math_double.hpp"
 
 #include <Eigen/Core>
 #include <array>
@@ -57,7 +58,7 @@ class Symmetric {
     Scalar sum = 0;
 #pragma GCC unroll 16
     for (const Scalar v : packed_) sum += v;
-    return sum < Scalar{1e30F} && sum > Scalar{-1e30F};
+    return sum < Scalar(1e30F) && sum > Scalar(-1e30F);
   }
 
   [[nodiscard]] constexpr bool no_variance_below_zero() const {
@@ -82,7 +83,7 @@ class Symmetric {
       Scalar pivot = l(j, j);
 #pragma GCC unroll 16
       for (int k = 0; k < j; ++k) pivot -= l(k, j) * l(k, j);
-      if (!(pivot > Scalar{0}) || !(pivot < Scalar{1e30F})) return false;
+      if (!(pivot > Scalar{0}) || !(pivot < Scalar(1e30F))) return false;
       l(j, j) = base::sqrt(pivot);
     }
     return true;

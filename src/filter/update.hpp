@@ -81,7 +81,7 @@ template <class Scalar, int N, int M, std::size_t K>
     Scalar pivot = record.s(j, j);
 #pragma GCC unroll 16
     for (int k = 0; k < j; ++k) pivot -= l(k, j) * l(k, j);
-    if (!(pivot > Scalar{0}) || !(pivot < Scalar{1e30F})) {
+    if (!(pivot > Scalar{0}) || !(pivot < Scalar(1e30F))) {
       record.verdict = pivot <= Scalar{0} ? Verdict::kSingular : Verdict::kNotFinite;
       return result;
     }
@@ -92,7 +92,7 @@ template <class Scalar, int N, int M, std::size_t K>
     y(j) = sum / l(j, j);
   }
   record.nis = y.dot(y);
-  if (!(record.nis < Scalar{1e30F})) return result;  // NaN or beyond every gate: kNotFinite
+  if (!(record.nis < Scalar(1e30F))) return result;  // NaN or beyond every gate: kNotFinite
   if (!(record.nis <= gate)) {
     record.verdict = Verdict::kRejected;
     return result;
@@ -117,7 +117,7 @@ template <class Scalar, int N, int M, std::size_t K>
     // In float the difference can lose every digit when the measurement is 10^7 times better than the prediction; a
     // variance never falls below the rounding error of what it was, so P stays positive where the exact result would
     // be.
-    const Scalar floor = p(c, c) * Scalar{2.4e-7F};
+    const Scalar floor = p(c, c) * Scalar(2.4e-7F);
 #pragma GCC unroll 16
     for (int r = 0; r <= c; ++r) p(r, c) -= g.row(r).dot(g.row(c));
     if (!(p(c, c) > floor)) p(c, c) = floor;

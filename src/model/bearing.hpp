@@ -11,6 +11,7 @@ namespace tetap::model {
 struct Bearing {
   static constexpr int kDimension = 1;
   static constexpr std::array<int, 3> kTouches{0, 1, 2};
+  static constexpr std::array<int, 1> kAngles{0};
 
   float bearing_rad = 0;
   float sigma_bearing_rad = 0;

@@ -31,8 +31,8 @@ struct ConstantVelocity {
     const Scalar dt2 = dt_s * dt_s;
     filter::Symmetric<Scalar, 4> q;
     for (int axis = 0; axis < 4; axis += 2) {
-      q(axis, axis) = acceleration_variance * dt2 * dt2 * Scalar{0.25F};
-      q(axis, axis + 1) = acceleration_variance * dt2 * dt_s * Scalar{0.5F};
+      q(axis, axis) = acceleration_variance * dt2 * dt2 * Scalar(0.25F);
+      q(axis, axis + 1) = acceleration_variance * dt2 * dt_s * Scalar(0.5F);
       q(axis + 1, axis + 1) = acceleration_variance * dt2;
     }
     return q;

@@ -7,6 +7,7 @@
 #include "base/math.hpp"
 #include "model/planar_pose.hpp"
 
+#include <array>
 #include <cstdint>
 
 namespace tetap::model {
@@ -14,6 +15,8 @@ namespace tetap::model {
 enum class Arc : std::uint8_t { kMidpoint, kExact };
 
 struct PlanarIncrement {
+  static constexpr std::array<int, 1> kNonlinear{2};  ///< the position is only carried along
+
   float ds_m = 0;
   float dyaw_rad = 0;
   float var_ds = 0;       ///< m^2

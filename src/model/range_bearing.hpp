@@ -11,6 +11,7 @@ namespace tetap::model {
 struct RangeBearing {
   static constexpr int kDimension = 2;
   static constexpr std::array<int, 3> kTouches{0, 1, 2};
+  static constexpr std::array<int, 1> kAngles{1};
 
   float range_m = 0;
   float bearing_rad = 0;

@@ -54,7 +54,7 @@ void constant_velocity() {
   filter::Kalman<float, 4> kf;
   kf.p = filter::Symmetric<float, 4>::diagonal({10, 10, 10, 10});
   for (const auto& position : z) {
-    const Region<struct w1_kf> region;
+    const Region<struct w1_kf_conditioned> region;
     kf.predict(model::ConstantVelocity<float>{.dt_s = 0.1F, .acceleration_variance = 0.1F});
     static_cast<void>(kf.update(filter::DirectMeasurement<float, 4, 0, 2>{.z = position, .variance = {0.25F, 0.25F}},
                                 filter::chi_square_99(2)));
