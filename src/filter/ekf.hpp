@@ -19,7 +19,8 @@ class Ekf {
   State x{};
   Symmetric<Scalar, kErrors> p{};
 
-  /// x = f(x), P = F P F^T + Q. False, and nothing has changed, when either would be no number, or P beyond all sizes.
+  /// x = f(x), P = F P F^T + Q: docs/explanation/equations.md (1). False, and nothing has changed, when either would be
+  /// no number, or P beyond all sizes.
   template <LinearisedMotion<State> Motion>
   bool predict(const Motion& motion) {
     if constexpr (requires { motion.step(x); }) {

@@ -36,6 +36,7 @@ struct Update {
   Vector<Scalar, N> dx = Vector<Scalar, N>::Zero();  ///< error-state correction; zero unless accepted
 };
 
+/// Implements docs/explanation/equations.md (2) to (4).
 /// H is given over the K error states named in `touches` only: column k of `h` belongs to state touches[k].
 /// P is changed only when the verdict is kAccepted. `noise` are the variances of independent components.
 template <class Scalar, int N, int M, std::size_t K>

@@ -21,7 +21,8 @@ struct DifferentialDrive {
   [[nodiscard]] constexpr float left_m(std::int32_t counts) const { return travel_m(left_radius_m, counts); }
   [[nodiscard]] constexpr float right_m(std::int32_t counts) const { return travel_m(right_radius_m, counts); }
 
-  /// ds = (r + l)/2, dyaw = (r - l)/b, covariance M Q_enc M^T with M = [1/2 1/2; 1/b -1/b].
+  /// ds = (r + l)/2, dyaw = (r - l)/b, covariance M Q_enc M^T with M = [1/2 1/2; 1/b -1/b]:
+  /// docs/explanation/equations.md (12).
   [[nodiscard]] constexpr PlanarIncrement increment(float ds_left_m, float ds_right_m, Arc arc = Arc::kExact) const {
     const float var_left = noise_left * (ds_left_m < 0 ? -ds_left_m : ds_left_m);
     const float var_right = noise_right * (ds_right_m < 0 ? -ds_right_m : ds_right_m);

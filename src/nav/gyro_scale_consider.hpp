@@ -13,6 +13,7 @@ namespace tetap::nav {
 /// are free until it is used up.
 class GyroScaleConsider {
  public:
+  /// Implements docs/explanation/equations.md (13).
   /// A turn of so much, in rad, since the last call: what it adds to the heading's variance, rad^2. `scale` is 1 sigma
   /// of the scale's error, as a share. Less than a degree waits until there is more: noise and vibration are no turn.
   [[nodiscard]] float turn(float by_rad, float scale) {

@@ -286,7 +286,7 @@ class Ins {
   /// What is measured in the body shows no heading: turned as a whole, the robot's way looks the same. The filter sees
   /// it so as long as its errors of v move with v, by all of it: by the IMU, and by whatever measurements make of it
   /// (the error of an invariant filter: Barrau & Bonnabel 2017; the rule: Huang, Mourikis, Roumeliotis 2010). Not by a
-  /// leap: that is more than float can carry through P.
+  /// leap: that is more than float can carry through P. Implements docs/explanation/equations.md (14).
   void move_errors(const Vector3& dv_n_mps) {
     if (dv_n_mps.squaredNorm() < kMostLeap_mps * kMostLeap_mps) pending_.dv_n_mps += dv_n_mps;
   }
@@ -322,6 +322,7 @@ class Ins {
   /// of either), whatever the heading: when that is corrected, the errors of the tilt turn with it, and a correction of
   /// the tilt is that of before. Else the bias would be seen from two sides that are none, as if the robot had turned.
   /// True where rounding may have cost P its definiteness.
+  /// Implements docs/explanation/equations.md (16).
   [[nodiscard]] bool turn_tilt(InsState::Error& dx) {
     constexpr int kEast = InsState::kAttitude, kNorth = kEast + 1;
     const float up_rad = dx(kNorth + 1), size_rad = base::abs(up_rad), east = dx(kEast);
@@ -371,6 +372,7 @@ class Ins {
   /// filter forgets about as fast as it would learn it), while the bias's variance is below ten times that: unheard for
   /// long, it would walk on. Without it the bias's NEES, given the other two, is 1.7 of 1 at the first standstill. Up
   /// is the body's: where it leans far, the doubt is in the wrong axis.
+  /// Implements docs/explanation/equations.md (15).
   void doubt_bias_up(float dt_s) {
     constexpr float kMost_rad2 = 0.02F;  // beyond no tilt is small
     constexpr float kOff_mps2 = 6.934F;  // sqrt(g^2 / 2), per rad^2

@@ -46,6 +46,7 @@ template <int kTo, class Scalar, class Gain>
 
 }  // namespace detail
 
+/// P = F P F^T + Q: docs/explanation/equations.md (8) to (11).
 template <class Scalar>
 inline void predict_covariance(filter::Symmetric<Scalar, InsState::kErrors>& p, const InsCovarianceStep<Scalar>& step) {
   constexpr int kV = InsState::kVelocity, kT = InsState::kAttitude, kA = InsState::kAccelBias, kG = InsState::kGyroBias;

@@ -16,8 +16,8 @@ struct StrapdownStep {
   Matrix3 r_nb = Matrix3::Identity();  ///< at the begin
 };
 
-/// Moves x by the increment. Velocity and attitude are exact for what the increment says, the position is their
-/// trapezoid.
+/// Moves x by the increment: docs/explanation/equations.md (5) to (7). Velocity and attitude are exact for what the
+/// increment says, the position is their trapezoid.
 inline StrapdownStep strapdown(InsState& x, const ImuIncrement& imu, const Earth& earth) {
   StrapdownStep step{.dt_s = base::seconds(imu.dt), .r_nb = x.q_nb.matrix()};
   const float dt_s = step.dt_s;

@@ -123,7 +123,7 @@ Alone drive_alone(Drive& d, double off_rad, double speed_mps) {
 /// Nobody but how it moves can say that the heading is wrong. It is noticed while the robot speeds up, or at the latest
 /// while it stops or turns: GNSS shows where the acceleration went that the IMU felt.
 TEST(InertialDivergence, WithoutWheelsAWrongHeadingIsFoundByHowItMoves) {
-  for (const unsigned seed : {1U, 2U, 3U})  // of 480 runs of 20 seeds 12 are outside: DESIGN, 6
+  for (const unsigned seed : {1U, 2U, 3U})  // of 480 runs of 20 seeds 12 are outside: docs/validation/shortfalls.md
     for (const bool constrained : {false, true})
       for (const double speed_mps : {1.0, 2.0})
         for (const double off_rad : {0.0, 1.05, -1.57, 1.57, 2.62, 3.14}) {

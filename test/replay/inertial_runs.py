@@ -4,7 +4,7 @@
 
 Skog's car (whole, and with GNSS cut out at ten places for 60 s, in the whole form for 30 s too, with and without its speedometer), PX4's own
 log, and the Husky (in the whole form with GNSS cut out at six places too). Prints errors beside the filter's own sigma, writes them as JSON
-(inertial_tables.py makes the tables of README and DESIGN of that), and holds bounds: two-sided, because a result far better than a filter can
+(inertial_tables.py makes the tables of docs/validation/recorded.md of that), and holds bounds: two-sided, because a result far better than a filter can
 be is as suspicious as one that is worse. None of the sets has truth; each line says what it is compared with.
 
 An error in the plane is beyond 3 sigma where its square in the published covariance (NEES) is above 11.83: as rare, with two axes, as 3 sigma
@@ -355,7 +355,7 @@ def husky(programs, out, whole, checks):
         print("Husky, GNSS cut for 60 s, odometry and IMU: error at the end from the withheld fix")
         for row in rows:
             outage_line(row)
-        # No bound on their NEES: it is far from 2, and the README says so.
+        # No bound on their NEES: it is far from 2, and docs/validation/shortfalls.md says so.
         checks.bound("husky: median error after 60 s, odometry and IMU [m]", np.median([row["error_m"] for row in rows]), 1, 12)
     return {"end_m": list(map(float, end)), "end": at_end, "odometry_sensors": odometry,
             "gnss_rms_m": rms(error), "gnss_sensors": sensors, "outages": rows}

@@ -1,6 +1,6 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
-"""The tables of README and DESIGN on recorded inertial data, in Markdown: inertial_tables.py [FILE], of what inertial_runs.py --whole
+"""The tables of docs/validation/recorded.md on recorded inertial data, in Markdown: inertial_tables.py [FILE], of what inertial_runs.py --whole
 wrote (default out/inertial.json).
 
 3 sigma is how far the ellipse reaches in the error's own direction that holds as much of the plane (99.73 %) as 3 sigma of one axis.

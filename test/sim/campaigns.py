@@ -1,8 +1,8 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
-"""The simulated campaigns of README, held: campaigns.py OUT [--whole].
+"""The simulated campaigns of docs/validation, held: campaigns.py OUT [--whole].
 
-Runs tools/proof/run_campaign as README names it and prints each figure beside its bounds. The bounds are what is required of the filter (a share of the
+Runs tools/proof/run_campaign as docs/validation names it and prints each figure beside its bounds. The bounds are what is required of the filter (a share of the
 way, a time, its own 3 sigma) or what chance leaves of it with so many seeds, never the figure that came out last time; two-sided, because an
 error far below what its sensors allow, or a sigma far above its error, is as wrong as the opposite. Where a requirement is known not to be met
 the line begins with "known:" and its bound is that it does not get worse.
@@ -35,7 +35,7 @@ RAMP_SAID_S = 5.5        # a ramp of 1 m/s by its drift; a fix of a poor receive
 TOO_SURE_SHARE = 0.02  # of many seeds, for more than a second: the world is not the filter's model; of a few, none
 # A right filter's share, rounded up: three axes with some three independent errors each in 200 s, of which 1 in 370 is beyond 3 sigma.
 START_TOO_SURE_SHARE = 0.03
-# What README says is not met: the share of the seeds that is too sure for more than a second, and how far an error goes beyond 3 sigma at the worst.
+# What docs/validation/shortfalls.md says is not met: the share of the seeds that is too sure for more than a second, and how far an error goes beyond 3 sigma at the worst.
 # And what loses its place, is as far off afterwards as a receiver is, and says so.
 KNOWN_TOO_SURE = {"gyro_bias_step": (1, 5), "kidnapped": (1, 30), "stale_stamps": (0, 1.25), "future_stamps": (0, 1.25), "clock_jump": (0, 1.25)}
 KNOWN_SLIP_WORST_M = 0.6

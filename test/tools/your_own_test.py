@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
-"""A robot and a board of one's own, made with the lines of the README in a copy of the tree (under names that nobody's tree has): CMake takes them,
-and what is named wrongly is told in one sentence. In the whole form (form=whole) README's `make` lines run, too: the robot drives in the simulated
+"""A robot and a board of one's own, made with the lines of docs/tutorial/your_robot.md in a copy of the tree (under names that nobody's tree has): CMake takes them,
+and what is named wrongly is told in one sentence. In the whole form (form=whole) its `make` lines run, too: the robot drives in the simulated
 world, `make firmware` proves its image, and in the emulator that says at boot what the program says."""
 import os
 import re
@@ -21,8 +21,8 @@ class YourOwn(unittest.TestCase):
         self.addCleanup(self.folder.cleanup)
         self.tree = os.path.join(self.folder.name, "tetap")
         shutil.copytree(ROOT, self.tree, ignore=lambda folder, _: {"build", "out", ".git"} if folder == ROOT else ())
-        with open(os.path.join(ROOT, "README.md"), encoding="utf-8") as file:
-            section = re.search(r"\n## Make it yours\n(.*?)\n### ", file.read(), re.S)[1]
+        with open(os.path.join(ROOT, "docs/tutorial/your_robot.md"), encoding="utf-8") as file:
+            section = file.read()
         self.section = re.sub(r"\bmyboard\b", BOARD, re.sub(r"\bmine\b", ROBOT, section))
 
     def run_here(self, *command, status=0):
@@ -32,8 +32,8 @@ class YourOwn(unittest.TestCase):
         return done.stdout + done.stderr
 
     def line(self, pattern):
-        """The one line of README's section that is like this."""
-        lines = re.findall(rf"^ +({pattern}),?$", self.section, re.M)
+        """The one line of the page that is like this."""
+        lines = re.findall(rf"^({pattern}),?$", self.section, re.M)
         self.assertEqual(len(lines), 1, pattern)
         return lines[0]
 

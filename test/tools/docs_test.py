@@ -1,0 +1,254 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: Apache-2.0
+"""The documentation holds: links and anchors resolve, named targets and tools exist, README and DESIGN keep their lengths, generated pages are fresh, and every
+shell line of tutorial and howto runs (a block whose fence states `sh skip: REASON` does not; `sh whole: REASON` does in the whole form, by your_own_test.py)."""
+import glob
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import unittest
+
+sys.dont_write_bytecode = True
+ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.realpath(__file__))))
+sys.path.insert(0, os.path.join(ROOT, "tools", "python"))
+from tetap.docs import figures, words  # noqa: E402
+
+PROGRAMS = os.environ.get("TETAP_PROGRAMS", os.path.join(ROOT, "build/host/sim_host"))
+WORLD = os.path.join(PROGRAMS, "tetap-world")
+BUILT = os.access(WORLD, os.X_OK)
+MOST_WORDS, MOST_LINES, MOST_COLUMNS = 900, 200, 100
+
+
+def read(path):
+    with open(os.path.join(ROOT, path), encoding="utf-8") as file:
+        return file.read()
+
+
+def pages():
+    found = ["README.md", "DESIGN.md", "CHANGELOG.md", "tools/README.md"]
+    return found + sorted(os.path.relpath(one, ROOT) for one in glob.glob(os.path.join(ROOT, "docs/**/*.md"), recursive=True))
+
+
+def without_code(text):
+    return re.sub(r"```.*?```", "", text, flags=re.S)
+
+
+def anchors(text):
+    """GitHub's names of the headings: lower case, blanks to dashes, letters, digits, dashes and underscores alone."""
+    names = []
+    for heading in re.findall(r"^#+ (.*)$", without_code(text), re.M):
+        plain = re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", heading).replace("`", "").lower()
+        names.append(re.sub(r"[^\w\- ]", "", plain).replace(" ", "-"))
+    return names
+
+
+def broken_links(page, text):
+    broken = []
+    for link in re.findall(r"\]\(([^)\s]+)\)", without_code(text)):
+        if re.match(r"[a-z]+:", link):
+            continue
+        path, _, anchor = link.partition("#")
+        target = os.path.normpath(os.path.join(os.path.dirname(page), path)) if path else page
+        if not os.path.exists(os.path.join(ROOT, target)):
+            broken.append(f"{page}: {link}: no such file")
+        elif anchor and target.endswith(".md") and anchor not in anchors(read(target)):
+            broken.append(f"{page}: {link}: no such heading")
+    return broken
+
+
+def blocks(text):
+    """(what stands behind `sh`, lines) of each fenced block of shell."""
+    return re.findall(r"^```sh[ ]?([^\n]*)\n(.*?)^```", text, re.S | re.M)
+
+
+class Pages(unittest.TestCase):
+    def test_every_relative_link_and_anchor_resolves(self):
+        links = 0
+        for page in pages():
+            text = read(page)
+            links += len(re.findall(r"\]\(", text))
+            self.assertEqual(broken_links(page, text), [])
+        self.assertGreater(links, 100)
+
+    def test_a_broken_link_or_anchor_is_named(self):
+        self.assertEqual(broken_links("docs/README.md", "[a](nowhere.md) [b](validation/README.md#nothing) [c](../DESIGN.md#41-the-arrows)"),
+                         ["docs/README.md: nowhere.md: no such file", "docs/README.md: validation/README.md#nothing: no such heading"])
+
+    def test_every_page_is_reached_from_the_readme(self):
+        reached, todo = set(), ["README.md"]
+        while todo:
+            page = todo.pop()
+            if page in reached:
+                continue
+            reached.add(page)
+            for link in re.findall(r"\]\(([^)#:\s]+\.md)[^)\s]*\)", without_code(read(page))):
+                todo.append(os.path.normpath(os.path.join(os.path.dirname(page), link)))
+        self.assertEqual(sorted(set(pages()) - reached - {"tools/README.md"}), [])
+
+    def test_every_make_target_that_is_named_exists(self):
+        targets = set(re.findall(r"^([a-z_]+):", read("Makefile"), re.M)) | {"docs", "board"}
+        for page in pages():
+            if page == "CHANGELOG.md":
+                continue
+            for span in re.findall(r"`make ([^`\n]+)`|^ *make ([^\n#]+)", read(page), re.M):
+                named = [word for word in re.split(r"\s+", re.sub(r"""[A-Z_]+=("[^"]*"|'[^']*'|\S*)""", "", (span[0] or span[1]))) if re.fullmatch(r"[a-z_]+", word)]
+                self.assertLessEqual(set(named), targets, page)
+
+    def test_every_tool_source_and_test_that_is_named_exists(self):
+        for page in pages():
+            if page in ("CHANGELOG.md", "docs/howto/recorded_data.md"):  # names of before, names of others
+                continue
+            text = re.sub(r"^ .* -> .*$", "", read(page), flags=re.M)  # the table of arrows names folders that are to come
+            for path in re.findall(r"(?<![\w./-])((?:tools|src|hal|test|config|sim_host|toolchain|drivers)/[\w./-]*\w)", text):
+                if re.search(r"[A-Z]{4}|mine|myboard|generated", path):
+                    continue  # a name for the reader's own
+                self.assertTrue(glob.glob(os.path.join(ROOT, path) + "*"), f"{page}: {path}")
+
+    def test_readme_and_design_keep_their_lengths(self):
+        self.assertLessEqual(len(read("README.md").split()), MOST_WORDS)
+        self.assertNotIn("NEES", read("README.md"))
+        lines = read("DESIGN.md").splitlines()
+        self.assertLessEqual(len(lines), MOST_LINES)
+        # The table of arrows is for a program and has one rule a line.
+        self.assertEqual([line for line in lines if len(line) > MOST_COLUMNS and " -> " not in line], [])
+
+    def test_the_functions_cite_the_equations_and_the_equations_name_the_functions(self):
+        page = read("docs/explanation/equations.md")
+        rows = re.findall(r"^\| \((\d+)\) \|.*?\| `([^`]+)` in `([^`]+)` \|", page, re.M)
+        self.assertEqual([int(number) for number, _, _ in rows], list(range(1, len(rows) + 1)))
+        for number, function, path in rows:
+            source = read(path)
+            self.assertRegex(source, rf"\b{function.split('::')[-1]}\(", f"({number}): {path} has no {function}")
+            cited = set()
+            for first, last in re.findall(r"docs/explanation/equations\.md,? \((\d+)\)(?: to \((\d+)\))?", source):
+                cited |= set(range(int(first), int(last or first) + 1))
+            self.assertIn(int(number), cited, f"{path} does not cite equation ({number})")
+
+
+class Generated(unittest.TestCase):
+    def test_the_pages_of_the_reference_are_fresh(self):
+        done = subprocess.run([os.path.join(ROOT, "tools/report/write_docs"), "--check", "--programs", PROGRAMS], capture_output=True, text=True)
+        self.assertEqual(done.returncode, 0, done.stderr)
+
+    def test_a_word_without_advice_and_advice_without_a_word_are_errors(self):
+        with tempfile.TemporaryDirectory() as tree:
+            for path in (words.VOCABULARY, words.ADVICE):
+                os.makedirs(os.path.dirname(os.path.join(tree, path)), exist_ok=True)
+                shutil.copy(os.path.join(ROOT, path), os.path.join(tree, path))
+            self.assertIn("| Nominal | 3 |", words.modes_and_faults(tree))
+            vocabulary, advice = read(words.VOCABULARY), read(words.ADVICE)
+            for name, text, said in ((words.VOCABULARY, vocabulary.replace("kFindingHeading = 9,", "kFindingHeading = 9,\n  kLost = 10,"), "Mode::kLost has no line"),
+                                     (words.ADVICE, advice + "Fault\tHungry\tNo food.\tEat.\n", "Fault Hungry is no word"),
+                                     (words.ADVICE, advice + "Fault\tWheelSlip\n", "expected enum, word, meaning")):
+                with self.subTest(said=said):
+                    with open(os.path.join(tree, name), "w", encoding="utf-8") as file:
+                        file.write(text)
+                    with self.assertRaisesRegex(words.WordError, said):
+                        words.modes_and_faults(tree)
+                    shutil.copy(os.path.join(ROOT, name), os.path.join(tree, name))
+
+    def test_sources_states_and_checks_are_read_from_the_headers(self):
+        with tempfile.TemporaryDirectory() as tree:
+            os.makedirs(os.path.join(tree, "src/sensor"))
+            os.makedirs(os.path.join(tree, words.SOURCES))
+            self.assertIn("do not carry a state", words.sources(tree))
+            with open(os.path.join(tree, words.SOURCE_STATE), "w", encoding="utf-8") as file:
+                file.write("enum class SourceState : std::uint8_t {\n  kStopped,  ///< silent\n  kFusing,\n  kRejecting,  ///< refused\n};\n"
+                           "enum class Check : std::uint8_t {\n  kNone,\n  kGate,  ///< innovation gate\n};\n")
+            with open(os.path.join(tree, words.SOURCES, "radar_range.hpp"), "w", encoding="utf-8") as file:
+                file.write("status_.rejecting(Check::kGate);")
+            page = words.sources(tree)
+            self.assertIn("| Stopped | 0 | silent |", page)
+            self.assertIn("| Rejecting | 2 | refused |", page)
+            self.assertIn("| radar range | x |  | x | Gate |", page)
+
+    def test_figures_come_from_out_and_stay_where_a_file_is_missing(self):
+        with tempfile.TemporaryDirectory() as out:
+            with open(os.path.join(out, "count.json"), "w", encoding="utf-8") as file:
+                json.dump({"m7": {"w1_kf": 959, "node_tick": 58270}, "r5": {"w1_kf": 900}}, file)
+            first = figures.page(out, "")
+            self.assertIn("| node_tick | 58 270 | - |", first)
+            self.assertIn("`make count`", first)
+            os.remove(os.path.join(out, "count.json"))
+            self.assertEqual(figures.page(out, first), first)
+
+
+@unittest.skipUnless(BUILT, "tetap-world is not built")
+class Lines(unittest.TestCase):
+    """Every shell line of tutorial and howto, in a copy of the tree with the programs that are built."""
+
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.tree = os.path.join(folder.name, "tetap")
+        shutil.copytree(ROOT, self.tree, ignore=lambda where, _: {"build", "out", ".git"} if where == ROOT else ())
+        # The programs are there already: packages and builds are other steps' matter.
+        for tool in ("install_packages", "build_preset"):
+            with open(os.path.join(self.tree, "tools/run", tool), "w", encoding="utf-8") as file:
+                file.write("#!/bin/sh\n")
+
+    def run_here(self, line, **more):
+        environment = {name: value for name, value in os.environ.items() if name not in ("MAKEFLAGS", "MAKELEVEL", "OUT")}
+        environment |= {"TETAP_PROGRAMS": PROGRAMS, "BUS": "memory", "REPORT": "--no-pictures", **more}
+        done = subprocess.run(["bash", "-eu", "-o", "pipefail", "-c", line], cwd=self.tree, env=environment, capture_output=True, text=True)
+        self.assertEqual(done.returncode, 0, f"{line}\n{done.stdout[-2000:]}{done.stderr[-2000:]}")
+        return done.stdout
+
+    def test_every_line_of_tutorial_and_howto_runs(self):
+        ran = 0
+        for page in pages():
+            if not page.startswith(("docs/tutorial/", "docs/howto/")):
+                continue
+            text = read(page)
+            self.assertEqual(len(re.findall(r"^```(?:sh|bash|console|shell)", text, re.M)), len(blocks(text)), page)
+            for code in re.findall(r"Save this as `example.cpp`:\n\n```cpp\n(.*?)```", text, re.S):
+                with open(os.path.join(self.tree, "example.cpp"), "w", encoding="utf-8") as file:
+                    file.write(code)
+            for how, lines in blocks(text):
+                if how:
+                    self.assertRegex(how, r"\A(skip|whole): \S.{10,}", f"{page}: why does this block not run?")
+                    continue
+                for line in lines.splitlines():
+                    with self.subTest(page=page, line=line):
+                        # What its reader runs to the end is shortened, but for the drive that shows each word of the tutorial.
+                        self.run_here(line, **({} if line == "make sim" else {"WORLD": "--duration 20"}))
+                        ran += 1
+        self.assertGreater(ran, 12)
+
+    def test_the_example_compiles_with_both_compilers_and_prints_what_stands_below_it(self):
+        text = read("docs/tutorial/your_filter.md")
+        code, command, printed = re.search(r"```cpp\n(.*?)```.*?```sh\n(g\+\+ [^\n]*)\n.*?```text\n(.*?)```", text, re.S).groups()
+        self.assertLessEqual(len([line for line in code.splitlines() if line.strip()]), 22)
+        with open(os.path.join(self.tree, "example.cpp"), "w", encoding="utf-8") as file:
+            file.write(code)
+        for compiler in ("g++", "clang++"):
+            self.run_here(command.replace("g++", compiler, 1) + " -Wall -Wextra -Werror")
+            self.assertEqual(self.run_here("./example"), printed)
+
+    def test_the_table_of_the_readme_is_that_of_make_sim(self):
+        self.run_here("make sim")
+        with open(os.path.join(self.tree, "out/sim/summary.json"), encoding="utf-8") as file:
+            summary = json.load(file)
+        for what, key, unit in (("position error, RMS", "position_rmse_m", "m"), ("heading error, RMS", "heading_rmse_deg", "deg"),
+                                ("largest position error", "max_error_m", "m")):
+            cells = [f"{summary[name][key]:.2f} {unit}" for name in ("odometry", "fused")]
+            self.assertIn(f"| {what} | {cells[0]} | {cells[1]} |", read("README.md"))
+
+    def test_the_faults_that_are_counted_are_those_there_are(self):
+        def printed(*options):
+            return subprocess.run([WORLD, *options], check=True, capture_output=True, text=True).stdout
+
+        every = re.findall(r"^  ([a-z_]+) +@", printed("--help"), re.M)
+        self.assertEqual(int(re.search(r"\* (\d+) faults and their times", read("docs/tutorial/first_run.md"))[1]), len(every))
+        page = read("docs/validation/shortfalls.md")
+        others = re.search(r"in the other (\d+) faults that act on a rover", " ".join(page.lower().split()))[1]
+        named = {fault for bullet in re.findall(r"^\* (.*?)(?=^\* |^##|\Z)", page, re.M | re.S) for fault in every if f"`{fault}`" in bullet}
+        self.assertEqual(int(others), len(set(printed("--list-faults").split()) - named))
+
+
+if __name__ == "__main__":
+    unittest.main()
