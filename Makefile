@@ -85,7 +85,7 @@ host:
 	@tools/run/build_preset host
 
 programs: setup
-	@tools/run/build_preset host:tetap-node,tetap-play,tetap-world,tetap-record
+	@tools/run/build_preset host:tetap-node,tetap-params,tetap-play,tetap-world,tetap-record
 
 arm: setup
 	@tools/run/build_preset r5 m7 m4f
