@@ -24,7 +24,7 @@ ifneq ($(unknown),)
 $(error no setting $(unknown); there are: $(settings))
 endif
 
-.PHONY: help sim test quick proof replay firmware size heap stack count bits hashes constants check dbc setup host programs arm
+.PHONY: help sim test quick proof replay firmware size heap stack count bits hashes constants check docs dbc setup host programs arm
 
 help: ## this list
 	@echo "tetap: state estimation on the robot's own microcontroller"; echo
@@ -74,6 +74,9 @@ hashes: setup programs ## a hash of each estimate over simulated and recorded ru
 
 check: setup ## format, tidy, layers, DBC fresh
 	@tools/proof/run_checks test check
+
+docs: setup programs ## the generated pages of docs/
+	@tools/report/write_docs --figures
 
 dbc: setup ## docs/reference/messages.md from config/tetap.dbc; the C++ messages are made in each build folder
 	@tools/can/generate_messages config/tetap.dbc --table docs/reference/messages.md
