@@ -416,6 +416,34 @@ class Pictures(Case):
             self.assertIn(text, page)
             self.assertIn(text, result.stdout)
 
+    def test_the_page_begins_with_one_sentence_and_the_long_table_follows_the_pictures(self):
+        truth = self.run_with_everything()
+        self.assertEqual(self.report("--truth", truth).returncode, 0)
+        page = text_of(self.path("report.html"))
+        fused = json.loads(text_of(self.path("summary.json")))["fused"]
+        sentence = re.search(r'<p class="headline">(.*?)</p>', page)[1]
+        self.assertIn(f"was within {fused['position_rmse_m']:.2f} m", sentence)
+        self.assertIn(f"at worst {fused['max_error_m']:.2f} m", sentence)
+        self.assertLess(page.index('class="headline"'), page.index("<img"))
+        self.assertLess(page.rindex("<img"), page.index("position RMSE"))
+
+    def test_a_band_of_ten_times_the_error_is_explained_and_a_narrow_one_is_not(self):
+        from tetap.report import pictures
+        error, sigma = np.full(50, 0.1), np.full(50, 0.4)
+        words = pictures.wide_bands([("east", error, sigma), ("north", error, sigma / 4)])
+        self.assertIn("east (12 times)", words)
+        self.assertNotIn("north", words)
+        self.assertEqual(pictures.wide_bands([("north", error, sigma / 4)]), "")
+
+    def test_raw_fixes_lie_where_their_degrees_are(self):
+        from tetap.report import fixes
+        # A minute of arc of a meridian is a nautical mile, 1 852 m, at 45 deg north.
+        north, east = fixes.metres_per_degree(45.0)
+        self.assertAlmostEqual(north / 60, 1852.2, delta=0.2)
+        self.assertAlmostEqual(fixes.metres_per_degree(0.0)[1], 111319.49, delta=0.01)
+        self.assertLess(east, north)
+        self.assertIsNone(fixes.raw_fixes(self.directory))
+
     def test_without_pictures_only_the_summary_is_written(self):
         truth = self.run_with_everything()
         before = set(os.listdir(self.directory))

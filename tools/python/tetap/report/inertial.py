@@ -60,6 +60,13 @@ def errors(run, truth, estimator, title):
     return fig
 
 
+def bands(run, truth, estimator):
+    """(name, error, published 1 sigma) of position, velocity and attitude by axis."""
+    found = metrics.blocks(run, estimator, truth)
+    return [(label.split(" [")[0], found.error[name][:, column], found.sigma[name][:, column])
+            for name, labels, _ in PANELS for column, label in enumerate(labels)]
+
+
 def _above(fig, axes, title, handles, labels):
     """Title and legend over all columns: a line of the title's room is the legend's."""
     axes[0].set_title("", loc="left")

@@ -17,6 +17,7 @@ INK, GREY, FAINT = "#262626", "#6b6b6b", "#e3e3e3"
 TRUTH, ODOMETRY, FUSED = "#3c3c3c", "#e69f00", "#0072b2"
 LANDMARK, REJECTED = "#009e73", "#d55e00"
 FAULT_SHADE = "#f6d9c8"
+FIX = "#9a9a9a"
 ESTIMATORS = {"odometry": ODOMETRY, "fused": FUSED, "attitude": "#cc79a7"}
 OTHER = "#56b4e9"
 MODES = {"Boot": "#f2f2f2", "WaitingForPose": "#d9d9d9", "Aligning": "#f0e442", "Nominal": "#9fd3c0", "DeadReckoning": "#e69f00",
@@ -24,6 +25,7 @@ MODES = {"Boot": "#f2f2f2", "WaitingForPose": "#d9d9d9", "Aligning": "#f0e442", 
 DPI = 120
 MOST_BANDS = 4.0  # an error of more usual bands than this gets an axis with two scales
 LARGEST_ELLIPSE = 0.25  # of the picture
+WIDE_BAND = 10.0  # a band of so many times the RMS error is explained in words
 MOST_POINTS = 20_000  # per line; more than a picture has columns
 
 
@@ -126,7 +128,39 @@ def extremes(tracks, truth):
     return np.array(found).transpose(1, 0, 2).reshape(2, -1) if found else (np.empty(0), np.empty(0))
 
 
-def path(run, truth, landmarks, title):
+def way_in_faults(run, truth, estimator):
+    """(name, x, y) of the way driven during each fault of the world: the truth's, or else the estimate's."""
+    rows = run.of(estimator)
+    valid = rows["pos_valid"] == 1
+    time_s, x, y = (truth.time_s, truth.x_m, truth.y_m) if truth is not None else (rows["time_s"][valid], rows["x_m"][valid], rows["y_m"][valid])
+    found = []
+    for name, start, end in metrics.fault_spans(run):
+        inside = np.flatnonzero((time_s >= start) & (time_s <= end)) if end > start else np.flatnonzero(time_s >= start)[:1]
+        if len(inside):
+            found.append((name, x[inside], y[inside]))
+    return found
+
+
+def draw_fixes(axes, fixes):
+    """Raw fixes as dots inside of the axes as they are; how many lie outside stands in the corner."""
+    (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
+    axes.plot(fixes[0], fixes[1], linestyle="none", marker=".", markersize=3, color=FIX, markeredgewidth=0, alpha=0.7, label="GNSS fix", zorder=1.5)
+    axes.set_xlim(left, right)
+    axes.set_ylim(bottom, top)
+    outside = int(((fixes[0] < left) | (fixes[0] > right) | (fixes[1] < bottom) | (fixes[1] > top)).sum())
+    if outside:
+        axes.annotate(f"{outside} fixes outside of the picture", (1.0, 0.0), xycoords="axes fraction", xytext=(-4, 4), textcoords="offset points", ha="right", va="bottom",
+                      fontsize=9, color=GREY)
+
+
+def draw_faults(axes, ways):
+    """The way driven during each fault, with its name where it began."""
+    for number, (name, x, y) in enumerate(ways):
+        axes.plot(x, y, color=REJECTED, linewidth=5, alpha=0.45, solid_capstyle="round", label="fault" if number == 0 else None, zorder=2.5)
+        axes.annotate(name, (x[0], y[0]), xytext=(6, 7), textcoords="offset points", fontsize=8.5, color=REJECTED, zorder=9)
+
+
+def path(run, truth, landmarks, title, fixes=None):
     """Truth, odometry and fused estimate in the plane."""
     tracks = {k: run.of(k) for k in run.estimators if run.kinds[k] != "Attitude"}
     x, y = extremes(tracks.values(), truth)
@@ -156,6 +190,9 @@ def path(run, truth, landmarks, title):
     if len(centres):
         axes.add_collection(EllipseCollection(widths, heights, angles, units="xy", offsets=centres, offset_transform=axes.transData,
                                               facecolor="none", edgecolor=color_of(run, best), linewidth=0.9, zorder=4))
+    draw_faults(axes, way_in_faults(run, truth, best))
+    if fixes is not None:
+        draw_fixes(axes, fixes)
     handles, labels = axes.get_legend_handles_labels()
     if len(centres):
         handles.append(Line2D([], [], marker="o", markersize=8, linestyle="none", markerfacecolor="none", markeredgecolor=color_of(run, best)))
@@ -222,6 +259,28 @@ def errors(run, truth, estimator, title):
                    labelcolor=INK, ncol=3, loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.0, handlelength=1.6)
     axes[0].set_title(title, loc="left", fontsize=11.5, color=INK, pad=24)
     return fig
+
+
+def bands(run, truth, estimator):
+    """(name, error, published 1 sigma) of x, y and yaw."""
+    rows = run.of(estimator)
+    dx, dy, dyaw = metrics.errors(rows, truth)
+    parts = [("x", dx, rows["std_x_m"]), ("y", dy, rows["std_y_m"])]
+    return parts + ([("yaw", dyaw, rows["std_yaw_rad"])] if truth.has_yaw else [])
+
+
+def wide_bands(parts):
+    """A sentence on the bands that are ten times the error or more; nothing where there is none."""
+    wide = []
+    for name, error, sigma in parts:
+        known = np.isfinite(error + sigma)
+        rms = float(np.sqrt(np.mean(error[known] ** 2))) if known.any() else 0.0
+        if rms > 0 and 3 * float(np.median(sigma[known])) >= WIDE_BAND * rms:
+            wide.append(f"{name} ({3 * float(np.median(sigma[known])) / rms:.0f} times)")
+    if not wide:
+        return ""
+    return (f" The band is ten times the error or more for {', '.join(wide)}. The estimate is then better than it says: its parameters describe worse sensors, "
+            "or errors that last longer, than this run had.")
 
 
 def sensors_with_nis(run, estimator):
