@@ -372,14 +372,14 @@ class Axes(Case):
         zero = np.zeros(20)
         self.estimates(1 + 0.01 * np.arange(20), zero, zero, zero)
         smallest, largest = metrics.limits("Est_Innov", "Nis")
-        self.assertEqual(smallest, 0.01)
+        self.assertEqual(smallest, 0.1)
         for nis, marked in ((largest, 1), (largest - 1, 0)):
             self.write_rows("innovations.csv", metrics.INNOVATIONS,
                             [[n, 1 + n, 1, 4, 0, int(n == 3), 2, nis if n == 3 else 1.0, 0.1, 5, 7] for n in range(10)])
             axes = pictures.nis(metrics.Run(self.directory), 1, metrics.code_names(), "t").axes[0]
             points = {line.get_marker(): len(line.get_xdata()) for line in axes.lines if line.get_linestyle() == "None"}
             self.assertEqual((points["^"], points["x"]), (marked, 1 - marked))
-            self.assertEqual("655 or more" in [text.get_text() for text in axes.get_legend().get_texts()], bool(marked))
+            self.assertEqual("819 or more" in [text.get_text() for text in axes.get_legend().get_texts()], bool(marked))
 
 
 class Pictures(Case):
