@@ -80,7 +80,10 @@ class Triangular {
   }
 
  private:
-  static constexpr std::size_t index(int r, int c) { return static_cast<std::size_t>(c * (c + 1) / 2 + r); }
+  static constexpr std::size_t index(int r, int c) {
+    const auto column = static_cast<std::size_t>(c);
+    return column * (column + 1) / 2 + static_cast<std::size_t>(r);
+  }
   std::array<Scalar, static_cast<std::size_t>(N) * (N + 1) / 2> packed_{};
 };
 

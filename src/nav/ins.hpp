@@ -172,7 +172,7 @@ class Ins {
       p(kBias + i, kBias + i) -= wander(i);
       p(kYaw, kBias + i) -= shared(i);
     }
-    const auto result = update(measurement, gate);
+    auto result = update(measurement, gate);
     for (int i = 0; i < 3; ++i) {
       p(kYaw, kBias + i) += shared(i);
       p(kBias + i, kBias + i) += wander(i);

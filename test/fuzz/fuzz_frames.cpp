@@ -98,7 +98,7 @@ class Listener {
   void operator()(const base::CanFrame& frame) {
     const std::uint32_t offset = frame.id - parameters.can_base;
     const auto payload = bus::payload(frame);
-    if (frame.extended || frame.id < numbers.can_base || !decodes(offset, payload))
+    if (frame.extended || frame.id < parameters.can_base || !decodes(offset, payload))
       fail("sent, but not decodable", frame);
     ++in_epoch_;
     if (offset == bus::EstEpoch::kOffset) in_epoch_ = 1;

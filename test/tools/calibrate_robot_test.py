@@ -379,7 +379,7 @@ class Wheels(Judged):
     def fit(self, seed, **how):
         log = read(drive(seed, np.eye(3), **how))
         robot = Robot()
-        robot.given = {"counts_per_turn": 2000, "left_radius_m": 0.1, "track_m": 0.4}
+        robot.given = {"wheels.drive.counts_per_turn": 2000, "wheels.drive.left_radius_m": 0.1, "wheels.drive.track_m": 0.4}
         return wheels.wheels(log, np.array([0, 0, 1.0]), robot)
 
     def test_radius_difference_and_track_are_within_their_sigma_over_seeds(self):
@@ -417,7 +417,7 @@ class Wheels(Judged):
         log.imu.angle[shaken] += 0.004
         log.imu.clipped[shaken] = True
         robot = Robot()
-        robot.given = {"counts_per_turn": 2000}
+        robot.given = {"wheels.drive.counts_per_turn": 2000}
         part = wheels.wheels(log, np.array([0, 0, 1.0]), robot)
         for name, true in (("left wheel radius", 0.1003), ("right wheel radius", 0.0998), ("track width", 0.42)):
             number = part.number(name)
@@ -604,7 +604,7 @@ class Program(unittest.TestCase):
         self.one_line(["a.log:2:", "bytes"], self.file(lines[0] + b"\n" + lines[0][:-4] + b"\n"))
         self.one_line(["base 0x300", "--base", "7A1"], self.file(b"(1.000000) can0 7A1#0011\n"))
         self.one_line(["no sensor's samples"], self.file(b"(1.000000) can0 300#40420F0000000003\n"))
-        self.one_line(["config/nobody.hpp", "mrclam, rover, rover_landmarks"], self.file(good), "--robot", "nobody")
+        self.one_line(["no robot 'nobody'", "mrclam rover rover_landmarks"], self.file(good), "--robot", "nobody")
         self.one_line(["--span begins at 500"], self.file(good), "--span", "500,600")
         self.one_line(["cannot write"], self.file(good), "--out", os.path.join(self.at, "no", "c"))
         back = b"(1.000000) can0 300#40420F0000000000\n(1.010000) can0 300#C0E1E40000000000\n(1.020000) can0 300#40420F0000000000\n"
