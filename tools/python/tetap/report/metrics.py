@@ -297,10 +297,12 @@ class Truth:
 
 def errors(rows, truth):
     """Estimate minus truth of one estimator's rows: dx, dy, dyaw; NaN where there is no truth or the estimate is not valid."""
-    x, y, yaw = truth.of(rows)
-    dx, dy, dyaw = rows["x_m"] - x, rows["y_m"] - y, wrapped(rows["yaw_rad"] - yaw)
+    dx, dy, dyaw = truth.of(rows)
     position, heading = rows["pos_valid"] == 1, rows["hdg_valid"] == 1
-    return np.where(position, dx, np.nan), np.where(position, dy, np.nan), np.where(position & heading, dyaw, np.nan)
+    for name, error, known in (("x_m", dx, position), ("y_m", dy, position), ("yaw_rad", dyaw, position & heading)):
+        np.subtract(rows[name], error, out=error)
+        error[~known] = np.nan
+    return dx, dy, wrapped(dyaw)
 
 
 def product(p, q):
@@ -341,13 +343,16 @@ def squares(error, sigma, correlation):
     return (scaled * np.linalg.solve(correlation, scaled)).sum(axis=(1, 2))
 
 
+def three(source, names):
+    return np.stack([source[name] for name in names], axis=1)
+
+
 class Blocks:
     """Errors of an inertial estimate by block, and the sigmas it published: `error[name]` and `sigma[name]` with three columns and a row for
     every attitude; position east, north, up; attitude about east, north and up."""
 
     def __init__(self, states, true):
-        def three(source, names):
-            return np.stack([source[name] for name in names], axis=1)
+        self._states = states
         self.epoch, self.time_s = states["epoch"], states["time_s"]
         self.error = {"position": three(states, ["x_m", "y_m", "height_m"]) - three(true, ["x_m", "y_m", "z_m"])}
         self.sigma = {"position": three(states, ["std_x_m", "std_y_m", "std_height_m"])}
@@ -356,13 +361,9 @@ class Blocks:
         for name, columns in (("velocity", VELOCITY), ("gyro bias", GYRO_BIAS), ("acc bias", ACC_BIAS)):
             self.error[name] = three(states, columns) - three(true, columns)
             self.sigma[name] = three(states, [f"std_{one}" for one in columns])
-        # A sigma of 0 is one below half a step of the bus; the estimate itself is rounded, too, which only the NEES has to know.
-        self._judged = {}
+        # A sigma of 0 is one below half a step of the bus.
         for name, (message, signal) in STEPS.items():
             self.sigma[name] = np.maximum(self.sigma[name], 0.5 * limits(message, signal)[0])
-            rounded = np.array([times * limits(*value)[0] / np.sqrt(12.0) for *value, times in VALUE_STEPS[name]])
-            self._judged[name] = np.hypot(self.sigma[name], rounded)
-        self._correlation = {name: three(states, columns) for name, columns in CORRELATIONS.items()}
         # All of it was said in this very epoch: what turns and accelerates has another covariance a second later.
         self._whole = {name: np.all([states[f"new {column}"] for column in columns], axis=0) for name, columns in CORRELATIONS.items()}
         invalid = states["pos_valid"] != 1
@@ -372,16 +373,18 @@ class Blocks:
     def white(self, name):
         """Errors in their own sigmas and without correlations, by the factor L of the covariance L L^T: independent with variance 1 where the
         estimate is what it says. NaN in rows in whose epoch the whole covariance was not said, and where something of it is not known."""
-        use = np.flatnonzero(self._whole[name] & np.isfinite(self.error[name] + self._judged[name] + self._correlation[name]).all(axis=1))
-        # What the values were rounded by is independent: it is in the variances, and not in what two of them share.
-        a, b, c = (self.sigma[name][use] / self._judged[name][use]).T
-        matrix = correlation_matrices(*(self._correlation[name][use].T * [a * b, a * c, b * c]))
+        # The estimate itself is rounded, too. That is independent: it is in the variances, and not in what two of them share.
+        rounded = np.array([times * limits(*value)[0] / np.sqrt(12.0) for *value, times in VALUE_STEPS[name]])
+        judged, correlation = np.hypot(self.sigma[name], rounded), three(self._states, CORRELATIONS[name])
+        use = np.flatnonzero(self._whole[name] & np.isfinite(self.error[name] + judged + correlation).all(axis=1))
+        a, b, c = (self.sigma[name][use] / judged[use]).T
+        matrix = correlation_matrices(*(correlation[use].T * [a * b, a * c, b * c]))
         # Correlations are rounded, too: below their step nothing is told from none.
         least = limits(*(("Est2_Std", "CorrXY") if name == "position" else ("Est2_State", "CorrVelEN")))[0]
         short = np.maximum(0.0, least - np.linalg.eigvalsh(matrix)[:, 0]) if len(use) else np.empty(0)
         matrix += short[:, None, None] * np.eye(3)
         values = np.full((len(self.epoch), 3), np.nan)
-        values[use] = np.linalg.solve(np.linalg.cholesky(matrix), (self.error[name][use] / self._judged[name][use])[:, :, None])[:, :, 0]
+        values[use] = np.linalg.solve(np.linalg.cholesky(matrix), (self.error[name][use] / judged[use])[:, :, None])[:, :, 0]
         return values
 
     def nees(self, name):
@@ -542,11 +545,12 @@ def judge(run, estimator, truth, names):
         result["final_heading_error_deg"] = float(np.degrees(dyaw[np.isfinite(dyaw)][-1]))
     if truth.is_reference:  # the reference is fused itself and has errors of its own: consistency with it says nothing
         return result
+    dof = 3 if truth.has_yaw else 2
+    values, unusable = nees(rows, dx, dy, dyaw, dof)
+    del dx, dy, dyaw, distance, known, valid  # of millions of rows, and the blocks need as much
     found = blocks(run, estimator, truth)
     if found is not None:
         result["blocks"] = {name: block_figures(found, name) for name in BLOCKS}
-    dof = 3 if truth.has_yaw else 2
-    values, unusable = nees(rows, dx, dy, dyaw, dof)
     result.update(nees_dof=dof, nees_epochs=len(values), nees_covariances_not_usable=unusable)
     if len(values):
         low, high = chi_square(0.025, dof), chi_square(0.975, dof)
