@@ -217,7 +217,8 @@ class Particles {
       if (relative > kVanishes) {
         const base::detail::Scaled e = base::detail::exp_scaled(relative);
         const float scaled = base::from_bits(base::bits(e.value) + ((e.power + std::uint32_t{kBits}) << 23));
-        w = static_cast<std::uint32_t>(static_cast<std::int32_t>(scaled + 0.5F));
+        const float raised = scaled + 0.5F;  // not negative: cutting it off rounds
+        w = static_cast<std::uint32_t>(static_cast<std::int32_t>(raised));
       }
       weights_[i] = w;
       sum += w;

@@ -175,7 +175,7 @@ for program in replay_log simulate_world; do
   : >"$work/asked"
   refused "$tool of an image that cannot be built" 'build: preset r5 failed' \
     timeout 20 env PATH="$work/bin:$PATH" LOG="$work/good.log" ROBOT=husky BOARD=zynqmp_r5 OUT="$work/out" tools/run/$program
-  grep -q -- '^--build build/r5 --target tetap-zynqmp_r5-husky$' "$work/asked" || { echo "WRONG  $tool does not build the image it is to run"; failed=$((failed + 1)); }
+  grep -qE -- '^--build build/r5 (-j [0-9]+ )?--target tetap-zynqmp_r5-husky( -j [0-9]+)?$' "$work/asked" || { echo "WRONG  $tool does not build the image it is to run"; failed=$((failed + 1)); }
 done
 refused "replay on no such board" "no board 'arduino'" env LOG="$work/good.log" BOARD=arduino OUT="$work/out" tools/run/replay_log
 refused "sim on no such board" "no board 'arduino'" env BOARD=arduino OUT="$work/out" tools/run/simulate_world
@@ -215,7 +215,7 @@ log_with "(1.0) vcan0 3"; refused "decode of a malformed line" ':3: ' bash -c 't
 refused "no such preset" "no preset 'nothing'; there are: .*host" tools/run/build_preset nothing
 refused "no such image" 'nowhere.elf: no such file' tools/run/emulate_r5 "$work/nowhere.elf"
 refused "qemu on a bus that is not there" 'nocan0: no such interface' tools/run/emulate_r5 "$programs/tetap-node" --can nocan0
-refused "run which checks?" 'usage: run_checks' tools/proof/run_checks everything
+refused "run which checks?" "no form 'everything'; there are: test proof" tools/proof/run_checks everything
 
 tools/run/provide_vcan --private -q -t 120 $self --inside
 read -r bus_count bus_failed <"$work/inside" || { echo "WRONG  the part on the bus did not come to its end"; exit 1; }
