@@ -11,7 +11,7 @@
 
 namespace tetap::hal {
 
-/// What went wrong on the controller's side, counted since start, never reset.
+/// Errors on the controller's side, counted since start, never reset.
 struct CanFaults {
   std::uint32_t rx_overflow = 0;  ///< frames the controller or the socket had to drop
   std::uint32_t tx_full = 0;      ///< frames send() refused

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sim_host/in_process.hpp"
 
-#include "node/firmware.hpp"
+#include "sim_host/robot_firmware.hpp"
 #include "sim_host/robots.hpp"
 #include "version.hpp"
 
@@ -15,8 +15,10 @@ int with_node_in_process(const std::string& robot, const ParameterSettings& sett
   for_robot(robot, settings, [&]<class Estimators>(std::type_identity<Estimators>, param::Parameters parameters) {
     parameters.can_base = can_base;
     hal::MemoryBus bus;
-    hal::MemoryBoard board(bus);
-    const auto firmware = std::make_unique<node::Firmware<hal::MemoryBoard, Estimators>>(board, parameters, version());
+    hal::MemoryCan node_end = bus.node_end();
+    CanAdapter can(node_end);
+    HostBoard board(can);
+    const std::unique_ptr<RobotFirmware> firmware = make_firmware<Estimators>(board, parameters, version());
     InProcessLink link(bus, [&firmware] { firmware->poll(); });
     status = play(link);
   });

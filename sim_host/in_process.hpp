@@ -14,8 +14,7 @@ namespace tetap::sim {
 using InProcessLink = MemoryLink<std::function<void()>>;
 
 /// Calls play(link) with a link to a node of that robot, with these settings, in this process; its status. Throws
-/// std::runtime_error when there is no such robot. Every robot's firmware is compiled behind this one function, once
-/// for all programs: that is most of what a first build waits for.
+/// std::runtime_error when there is no such robot.
 int with_node_in_process(const std::string& robot, const ParameterSettings& settings, std::uint32_t can_base,
                          const std::function<int(InProcessLink&)>& play);
 

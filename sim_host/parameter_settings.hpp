@@ -21,8 +21,8 @@ class ParameterSettings {
   /// for a file that cannot be read, an unknown path, a value that is none or out of its limits.
   explicit ParameterSettings(Arguments& arguments);
 
-  /// Of the text of a file named `name`: `path = value` lines, `#` begins a comment, elements are parted by blanks or
-  /// commas. Throws UsageError.
+  /// Settings from the text of a file named `name`: `path = value` lines, `#` begins a comment, elements are parted by
+  /// blanks or commas. Throws UsageError.
   void read(std::string_view text, const std::string& name);
   /// `setting` is PATH=VALUE. Throws UsageError.
   void set(std::string_view setting, const std::string& where);
@@ -62,7 +62,7 @@ inline constexpr std::string_view kParameterHelp =
 /// An object of every path and its value.
 [[nodiscard]] std::string parameters_json(const param::Parameters& parameters);
 
-/// What run.json says of a run's parameters: (name, JSON) of all values, of those that are not at their default, and of
+/// Parameters in run.json: (name, JSON) of all values, of those that are not at their default, and of
 /// the settings.
 [[nodiscard]] std::vector<std::pair<std::string, std::string>> parameter_notes(const param::Parameters& parameters,
                                                                                const ParameterSettings& settings);

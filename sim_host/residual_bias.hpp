@@ -13,7 +13,7 @@
 namespace tetap::sim {
 
 namespace detail {
-/// Of a matrix as param::Numbers has it, row by row.
+/// Matrix as param::Numbers has it, row by row.
 [[nodiscard]] inline Vector3 times(const std::array<float, 9>& m, const Vector3& v) {
   Vector3 product{};
   for (std::size_t i = 0; i < 3; ++i)

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // tetap-node: the firmware as a Linux program on SocketCAN. It stands in for the board.
-#include "hal/board/linux/board.hpp"
+#include "hal/board/linux/memory_can.hpp"
+#include "hal/board/linux/socket_can.hpp"
 #include "hal/chip/support/boot_line.hpp"
-#include "node/firmware.hpp"
 #include "sim_host/play/arguments.hpp"
+#include "sim_host/robot_firmware.hpp"
 #include "sim_host/robots.hpp"
 #include "version.hpp"
 
@@ -37,12 +38,16 @@ The firmware as a Linux program on SocketCAN. Ends on INT or TERM with status 0.
 }
 
 template <class Estimators>
-void run(tetap::hal::LinuxBoard& board, const tetap::param::Parameters& parameters) {
-  const auto firmware =
-      std::make_unique<tetap::node::Firmware<tetap::hal::LinuxBoard, Estimators>>(board, parameters, tetap::version());
+void run(const std::string& robot, const std::string& interface, const tetap::param::Parameters& parameters) {
+  tetap::hal::SocketCan bus(interface);
+  std::fprintf(stderr, "tetap-node: robot %s on %s, ids %03X to %03X\n", robot.c_str(), interface.c_str(),
+               parameters.can_base, parameters.can_base + 0x3F);
+  tetap::sim::CanAdapter can(bus);
+  tetap::sim::HostBoard board(can);
+  const auto firmware = tetap::sim::make_firmware<Estimators>(board, parameters, tetap::version());
   while (stop_asked == 0) {
     firmware->poll();
-    board.can.wait(tetap::base::Micros{500});
+    bus.wait(tetap::base::Micros{500});
   }
 }
 
@@ -53,9 +58,12 @@ struct Console {
 
 template <class Estimators>
 void print_boot_line(const std::string& robot, const tetap::param::Parameters& parameters) {
-  const auto node = std::make_unique<tetap::node::Node<Estimators>>(parameters, tetap::bus::Version{});
-  const std::uint32_t bits = tetap::node::BootSelfCheck(*node, parameters.can_base, 1).run(tetap::hal::kBootEpochs);
-  tetap::hal::print_bits(Console{}, robot.c_str(), bits);
+  tetap::hal::MemoryBus bus;
+  tetap::hal::MemoryCan end = bus.node_end();
+  tetap::sim::CanAdapter can(end);
+  tetap::sim::HostBoard board(can);
+  const auto firmware = tetap::sim::make_firmware<Estimators>(board, parameters, tetap::bus::Version{});
+  tetap::hal::print_boot_line(Console{}, robot.c_str(), *firmware);
 }
 
 }  // namespace
@@ -77,10 +85,7 @@ int main(int argc, char** argv) try {
                         [&]<class Estimators>(std::type_identity<Estimators>, tetap::param::Parameters parameters) {
                           if (boot_line) return print_boot_line<Estimators>(robot, parameters);
                           parameters.can_base = base;
-                          tetap::hal::LinuxBoard board(interface);
-                          std::fprintf(stderr, "tetap-node: robot %s on %s, ids %03X to %03X\n", robot.c_str(),
-                                       interface.c_str(), parameters.can_base, parameters.can_base + 0x3F);
-                          run<Estimators>(board, parameters);
+                          run<Estimators>(robot, interface, parameters);
                         });
   return 0;
 } catch (const std::exception& error) {

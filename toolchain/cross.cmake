@@ -11,6 +11,9 @@ set(CMAKE_CXX_COMPILER clang++)
 
 if(TETAP_MACHINE STREQUAL "wasm32-wasi")
   set(CMAKE_SYSTEM_NAME WASI)
+  # GNU ar makes no index of WebAssembly's objects.
+  set(CMAKE_AR llvm-ar-14 CACHE FILEPATH "")
+  set(CMAKE_RANLIB llvm-ranlib-14 CACHE FILEPATH "")
   # Debian's libc++abi for WebAssembly has no exceptions.
   set(CMAKE_CXX_FLAGS_INIT "-fno-exceptions -fno-rtti")
 elseif(TETAP_MACHINE MATCHES "^(aarch64|riscv64)-linux-gnu$")

@@ -33,3 +33,13 @@ target_compile_options(tetap_flashed_flags INTERFACE
   -fno-jump-tables  # a table is a jump that tools/proof/check_stack would have to guess the bounds of
   -fno-exceptions -fno-rtti -fno-threadsafe-statics -fno-use-cxa-atexit -fno-unwind-tables -fno-asynchronous-unwind-tables)
 target_link_libraries(tetap_flashed_flags INTERFACE tetap_flags)
+
+# Of a library that images link: flags of what is flashed, and the call graphs (.su, .ci) beside its objects that
+# tools/proof/check_stack reads. A compiler cache keeps objects but not their call graphs.
+function(tetap_call_graphs target)
+  if(CMAKE_SYSTEM_NAME STREQUAL "Generic")
+    target_compile_options(${target} PRIVATE -fstack-usage -fcallgraph-info=su)
+    set_target_properties(${target} PROPERTIES CXX_COMPILER_LAUNCHER "")
+    target_link_libraries(${target} PRIVATE tetap_flashed_flags)
+  endif()
+endfunction()

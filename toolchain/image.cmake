@@ -12,6 +12,9 @@ if(NOT TETAP_BOARD OR NOT EXISTS ${PROJECT_SOURCE_DIR}/hal/board/${TETAP_PORT}/l
   message(FATAL_ERROR "TETAP_BOARD is '${TETAP_BOARD}': there is no hal/board/${TETAP_PORT} with a link.ld (a preset of CMakePresets.json names the board)")
 endif()
 
+# At the end of every link line, behind the libraries that call them.
+set(CMAKE_CXX_STANDARD_LIBRARIES "-Wl,--start-group -lc -lgcc -Wl,--end-group")
+
 function(tetap_image)
   cmake_parse_arguments(ARG "" "NAME;STACK;OUTPUT;DATA" "SOURCES;LIBRARIES" ${ARGN})
   foreach(needed NAME SOURCES)
@@ -49,7 +52,6 @@ function(tetap_image)
   target_link_options(${ARG_NAME} PRIVATE -nostdlib -nostartfiles -T ${script} -Wl,--gc-sections -Wl,--print-memory-usage
     -Wl,--fatal-warnings -Wl,-Map=${output}.map $<$<BOOL:${ARG_STACK}>:-Wl,--defsym=_stack_size=${ARG_STACK}>
     $<$<STREQUAL:${ARG_DATA},ddr>:-Wl,--defsym=_data_in_ddr=1>)
-  target_link_libraries(${ARG_NAME} PRIVATE -Wl,--start-group -lc -lgcc -Wl,--end-group)
   add_custom_command(TARGET ${ARG_NAME} POST_BUILD
     COMMAND ${CMAKE_OBJCOPY} -O binary ${output}.elf ${output}.bin
     COMMAND ${CMAKE_OBJCOPY} -O ihex ${output}.elf ${output}.hex

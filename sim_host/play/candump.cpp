@@ -23,7 +23,7 @@ constexpr std::array<std::int8_t, 256> kHexDigits = [] {
 constexpr int hex_digit(char c) { return kHexDigits[static_cast<unsigned char>(c)]; }
 constexpr bool blank(char c) { return c == ' ' || c == '\t'; }
 
-/// What is left of the line.
+/// Rest of the line.
 class Cursor {
  public:
   explicit Cursor(std::string_view text) : text_(text) {}

@@ -17,19 +17,19 @@ struct Counts {
   std::uint64_t inputs = 0;        ///< frames sent for the node to consume
   std::uint64_t syncs = 0;         ///< sync frames sent
   std::uint64_t outputs = 0;       ///< frames of the node that arrived in its epochs
-  std::uint64_t epochs = 0;        ///< that arrived to their last frame
+  std::uint64_t epochs = 0;        ///< epochs that arrived to their last frame
   std::uint64_t lost_inputs = 0;   ///< sent and never consumed, sync frames included
   std::uint64_t extra_inputs = 0;  ///< consumed and never sent (by us): a duplicate, or another sender
   std::uint64_t lost_outputs =
       0;  ///< sent by the node and never arrived; an epoch without its last frame counts as one
   std::uint64_t extra_outputs = 0;  ///< arrived more often than sent
-  std::uint64_t overflows = 0;      ///< of lost_outputs, those our own socket dropped, as far as known
+  std::uint64_t overflows = 0;      ///< lost_outputs that our own socket dropped, as far as known
 
   [[nodiscard]] std::uint64_t lost() const { return lost_inputs + lost_outputs; }
   [[nodiscard]] std::uint64_t extra() const { return extra_inputs + extra_outputs; }
 };
 
-/// What both ways of playing have in common: the frames within one epoch, and epochs missing in between.
+/// Common part of both ways of playing: the frames within one epoch, and epochs missing in between.
 inline void account_frames(const NodeEpoch& epoch, Counts& counts) {
   counts.outputs += epoch.received;
   ++counts.epochs;

@@ -41,13 +41,13 @@ class MemoryLink {
   Pump pump_;
 };
 
-/// Who looks on: recorder, comparison, progress.
+/// Observers: recorder, comparison, progress.
 template <class K>
 concept Sink = requires(K& sink, const base::CanFrame& frame, const NodeEpoch& epoch, base::Micros time) {
   { sink.restarted() } -> std::same_as<void>;         ///< the node begins at its power-on state
   { sink.sent(frame) } -> std::same_as<void>;         ///< by us
   { sink.received(frame) } -> std::same_as<void>;     ///< anything on the bus
-  { sink.epoch(epoch, time) } -> std::same_as<void>;  ///< of the node, at this time
+  { sink.epoch(epoch, time) } -> std::same_as<void>;  ///< epoch of the node, at this time
 };
 
 /// A run that cannot go on: what was waited for, and what came.

@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::size_t kBlock = 1 << 18;
 
-/// What may be shown on a terminal of a line that may be anything.
+/// Printable part of a line that may be anything.
 std::string excerpt(std::string_view text) {
   constexpr std::size_t kLongest = 60;
   std::string shown(text.substr(0, kLongest));

@@ -26,7 +26,7 @@ struct TimedFrame {
 struct LogOptions {
   std::string interface;       ///< only frames of this interface; empty: of all
   bool keep_going = false;     ///< count malformed lines instead of stopping at the first
-  std::uint32_t base = 0x300;  ///< of the node; its inputs have eight bytes
+  std::uint32_t base = 0x300;  ///< id base of the node; its inputs have eight bytes
 };
 
 struct LogReport {
@@ -39,7 +39,7 @@ struct LogReport {
   std::uint64_t back_in_time = 0;  ///< frames earlier than the one before
   std::uint64_t wrong_length = 0;  ///< input frames that have not eight bytes: the node will count them as malformed
   std::string first_wrong_length;  ///< "file:line"
-  std::uint64_t gaps = 0;          ///< of more than a minute between frames
+  std::uint64_t gaps = 0;          ///< pauses of more than a minute between frames
   std::string first_gap;           ///< "file:line"
 };
 
@@ -87,7 +87,7 @@ class LogParser {
   LogOptions options_;
   LogReport report_;
   base::Micros latest_;
-  std::uint64_t number_ = 0;  ///< of the line
+  std::uint64_t number_ = 0;  ///< number of the line
 };
 
 /// A log file, read in blocks. What cannot be read twice (a pipe) is copied into a temporary file first.
@@ -100,7 +100,7 @@ class LogFile : public Frames {
   /// first.
   bool next(TimedFrame& frame) override;
   void rewind() override;
-  /// Of the lines read so far; after a second reading still of the first.
+  /// Report of the lines read up to now; after a second reading still that of the first.
   [[nodiscard]] const LogReport& report() const { return report_ ? *report_ : parser_.report(); }
 
  private:
@@ -112,11 +112,11 @@ class LogFile : public Frames {
   LogOptions options_;
   std::unique_ptr<std::FILE, int (*)(std::FILE*)> file_;
   LogParser parser_;
-  std::optional<LogReport> report_;  ///< of a reading to the end
+  std::optional<LogReport> report_;  ///< report of a reading to the end
   std::vector<char> block_;
-  std::size_t begin_ = 0, end_ = 0;  ///< of what is left in block_
-  std::uint64_t bytes_ = 0;          ///< of the file, read so far
-  std::uint64_t length_ = 0;         ///< of the first reading: a log that grows meanwhile ends there
+  std::size_t begin_ = 0, end_ = 0;  ///< unread part of block_
+  std::uint64_t bytes_ = 0;          ///< bytes of the file, read up to now
+  std::uint64_t length_ = 0;         ///< length at the first reading: a log that grows meanwhile ends there
 };
 
 /// A log in memory.

@@ -60,7 +60,7 @@ namespace tetap::sim {
   return i < kNames.size() ? kNames[i] : "?";
 }
 
-/// Of a frame the node sends, by its place in the node's block.
+/// Name of a frame that the node sends, by its place in the node's block.
 [[nodiscard]] inline std::string message_name(std::uint32_t offset) {
   constexpr std::array<std::string_view, 8> kCommon{"Est_Epoch",      "Est_StateCrc", "Est_Status",  "Est_Innov",
                                                     "Est_SensorStat", "Est_Diag",     "Est_Version", "Est_Origin"};

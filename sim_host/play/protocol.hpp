@@ -30,7 +30,7 @@ inline constexpr std::uint64_t kTimeMask = 0xFFFFFFFFFFFF;
   const auto offset = offset_in_block(frame, base);
   return offset && *offset < kInputOffsets && *offset != bus::InSync::kOffset;
 }
-/// What the loop and the controller saw of real time and the program's version differ between runs that are otherwise
+/// Frames with real time of loop and controller, and the program's version, differ between runs that are otherwise
 /// the same; everything else must not: of the diagnostics, counters that follow from the frames (bus::Counters).
 [[nodiscard]] constexpr bool is_deterministic(const base::CanFrame& frame, std::uint32_t base) {
   const std::uint32_t offset = frame.id - base;
@@ -98,7 +98,7 @@ class EpochCollector {
     received_ = 0;
     head_.reset();
   }
-  /// Of the epoch that is under way.
+  /// State of the epoch that is under way.
   [[nodiscard]] const std::optional<bus::EstEpoch>& head() const { return head_; }
   [[nodiscard]] std::size_t received() const { return received_; }
 

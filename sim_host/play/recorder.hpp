@@ -88,7 +88,7 @@ class Recorder {
   Line line_;
   std::array<Instance, bus::EstPos::kCount> instances_{};
   std::array<State, bus::EstPos::kCount> states_now_{};
-  std::uint64_t number_ = 0;  ///< of the epoch
+  std::uint64_t number_ = 0;  ///< number of the epoch
   std::uint8_t last_epoch_ = 0;
   bool restarted_ = true;
   base::Micros time_;

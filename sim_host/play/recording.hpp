@@ -17,17 +17,17 @@
 
 namespace tetap::sim {
 
-/// What the survey finds.
+/// Result of the survey.
 struct Recording {
-  /// What a node did between one start and the next; only of those whose epochs can be repeated.
+  /// Actions of a node between one start and the next; only of those whose epochs can be repeated.
   struct Life {
     std::optional<base::Micros> begin;
-    std::uint64_t first_input = 0;  ///< that it consumed, of all inputs in the log
+    std::uint64_t first_input = 0;  ///< first input that it consumed, of all inputs in the log
   };
-  std::string name;  ///< of the log
+  std::string name;  ///< name of the log
   std::vector<Life> lives;
   std::uint64_t epochs = 0;
-  std::uint64_t skipped_epochs = 0;   ///< of a node that was running already and was restarted later in the log
+  std::uint64_t skipped_epochs = 0;   ///< epochs of a node that was running already and was restarted later in the log
   std::uint64_t missing_outputs = 0;  ///< frames the node said it sent and the log does not hold
   /// Where the inputs in the log first differ from what the node says it consumed (Est_Epoch.InCrc): a frame was lost
   /// between them.
@@ -74,7 +74,7 @@ class RecordReader {
   std::optional<Begin> pending_;
   bool begun_ = false;  ///< this life, with a Begin frame in the log
   bool skips_ = false;
-  std::uint64_t number_ = 0;  ///< of the last epoch in this life
+  std::uint64_t number_ = 0;  ///< number of the last epoch in this life
   std::uint64_t inputs_ = 0, inputs_before_ = 0, skipped_epochs_ = 0;
 };
 
@@ -111,14 +111,14 @@ class RecordSurvey {
   std::uint32_t log_base_;
   Recording result_;
 
-  // Of this life. Inputs are counted from the begin of the log.
+  // Counts of this life. Inputs are counted from the begin of the log.
   std::optional<base::Micros> begin_;
   bool has_entries_ = false;
   bool started_ = false;               ///< its first input is known
   bool differs_ = false;               ///< its inputs, from those in the log
   std::uint64_t life_inputs_ = 0;      ///< before it
   std::optional<std::uint64_t> best_;  ///< the latest first input that its first epoch allows
-  std::deque<std::uint32_t> crcs_;     ///< of inputs that it has not consumed
+  std::deque<std::uint32_t> crcs_;     ///< CRCs of inputs that it has not consumed
   std::uint64_t first_crc_ = 0;        ///< the input of crcs_[0]
   std::deque<Entry> waiting_;          ///< epochs that have not consumed their inputs
   bus::InputCrc tally_;
@@ -142,10 +142,10 @@ class RecordedTicks {
   bool next(Tick& tick);
 
   struct Answer {
-    std::uint64_t number;                    ///< of the epoch in the recording, from 1
+    std::uint64_t number;                    ///< number of the epoch in the recording, from 1
     std::span<const base::CanFrame> frames;  ///< the deterministic ones; valid until the next answer
   };
-  /// What the recorded node answered to the tick of this time, which next() has given; earlier answers are dropped.
+  /// Answer of the recorded node to the tick of this time, which next() has given; earlier answers are dropped.
   [[nodiscard]] std::optional<Answer> answer(base::Micros time);
 
  private:
@@ -164,19 +164,19 @@ class RecordedTicks {
   ScriptOptions options_;
   RecordReader reader_;
 
-  std::size_t read_lives_ = 0;    ///< that have epochs
-  bool in_life_ = false;          ///< that has epochs
+  std::size_t read_lives_ = 0;    ///< lives with epochs, so far
+  bool in_life_ = false;          ///< the life has epochs
   std::size_t played_lives_ = 0;  ///< begun
   std::uint64_t consumed_ = 0;    ///< inputs of the log, or left behind
   std::uint16_t in_count_ = 0;    ///< as the node counts
   std::uint64_t given_ = 0;       ///< ticks
   std::deque<base::CanFrame> inputs_;
   std::deque<Entry> entries_;             ///< to be given as ticks
-  std::deque<Entry> answers_;             ///< of ticks that were given
-  std::deque<base::CanFrame> outputs_;    ///< of answers_, then of entries_
+  std::deque<Entry> answers_;             ///< entries of ticks that were given
+  std::deque<base::CanFrame> outputs_;    ///< outputs of answers_, then of entries_
   std::vector<base::CanFrame> tick_;      ///< inputs of the last tick
   std::vector<base::CanFrame> answered_;  ///< the last answer
-  std::uint64_t number_ = 0;              ///< of the last answer
+  std::uint64_t number_ = 0;              ///< number of the last answer
 };
 
 static_assert(Source<RecordedTicks>);

@@ -57,7 +57,7 @@ class Script {
   struct Entry {
     base::Micros time;
     std::optional<base::Micros> begin;
-    std::size_t end;  ///< of its inputs
+    std::size_t end;  ///< end of its inputs
   };
   std::vector<base::CanFrame> inputs_;
   std::vector<Entry> ticks_;
@@ -67,8 +67,8 @@ class Script {
 static_assert(Source<Script>);
 
 struct ScriptOptions {
-  std::uint32_t base = 0x300;      ///< of the node that is played to
-  std::uint32_t log_base = 0x300;  ///< of the ids in the log
+  std::uint32_t base = 0x300;      ///< id base of the node that is played to
+  std::uint32_t log_base = 0x300;  ///< id base of the log
   base::Micros period{10'000};
 };
 
@@ -120,7 +120,7 @@ class LogTicks {
   ScriptOptions options_;
   bool has_ticks_;
   TickGrid grid_;
-  std::vector<base::CanFrame> inputs_;    ///< of the tick that is under way
+  std::vector<base::CanFrame> inputs_;    ///< inputs of the tick that is under way
   std::optional<TimedFrame> ahead_;       ///< an input of a later tick
   std::optional<base::Micros> own_last_;  ///< as the bus has it: the log's own clock may be another one
   bool begun_ = false;

@@ -16,6 +16,7 @@ using PhiloxKey = std::array<std::uint32_t, 2>;
 
 /// Ten rounds: the four words that belong to this counter under this key.
 [[nodiscard]] constexpr PhiloxCounter philox(PhiloxCounter counter, PhiloxKey key) {
+#pragma GCC unroll 10
   for (int round = 0; round < 10; ++round) {
     const std::uint64_t first = std::uint64_t{0xD2511F53U} * counter[0];
     const std::uint64_t second = std::uint64_t{0xCD9E8D57U} * counter[2];

@@ -11,4 +11,8 @@ namespace tetap::base {
 template <class T>
 requires(std::is_trivially_destructible_v<T>) void reinitialise(T& object) { ::new (static_cast<void*>(&object)) T(); }
 
+/// Begins the life of a union's member in its own place; its numbers are not set.
+template <class T>
+requires(std::is_trivially_destructible_v<T>) void begin_life(T& member) { ::new (static_cast<void*>(&member)) T; }
+
 }  // namespace tetap::base

@@ -51,7 +51,7 @@ class Commands {
   PoseHalves& halves_of(std::uint8_t counter, base::Micros reference, Counters& counters);
 
   std::array<PoseHalves, 4> halves_{};
-  std::array<std::uint8_t, 2> last_counter_{0xFF, 0xFF};  ///< of reset and of set pose
+  std::array<std::uint8_t, 2> last_counter_{0xFF, 0xFF};  ///< counters of the last reset and the last set pose
 };
 
 inline Commands::PoseHalves& Commands::halves_of(std::uint8_t counter, base::Micros reference, Counters& counters) {

@@ -46,7 +46,7 @@ class EventQueue {
 
   std::array<bus::EstInnov, kCapacity> queue_{};
   std::size_t size_ = 0;
-  std::size_t first_ = 0;  ///< of those since the last tick, which are kept in order; within a tick there are none
+  std::size_t first_ = 0;  ///< begin of the ordered events since the last tick; within a tick there are none
 };
 
 inline void EventQueue::add(const estimators::Innovation& innovation, const sensor::Sample& sample,

@@ -11,23 +11,19 @@
 #include "bus/fault_hold.hpp"
 #include "bus/input_crc.hpp"
 #include "bus/multiplexed.hpp"
+#include "bus/version.hpp"
 #include "estimators/attitude_disagreement.hpp"
 #include "estimators/estimate.hpp"
+#include "estimators/map_frame.hpp"
 #include "estimators/sensor_statistics.hpp"
 #include "param/crc.hpp"
 #include "sensor/sample.hpp"
 
 #include <array>
-
 #include <cstddef>
 #include <cstdint>
 
 namespace tetap::bus {
-
-/// What ran: the first 32 bits of the commit.
-struct Version {
-  std::uint32_t git = 0;
-};
 
 /// What Est_Status says.
 struct Summary {
@@ -89,9 +85,9 @@ class Publisher {
   template <class Send>
   void estimate(std::size_t instance, sensor::EstimatorKind kind, bool primary, const estimators::Estimate& e,
                 const estimators::MotionVariance& motion, Send& send);
-  /// `inertial` gives the estimate when it is asked for.
-  template <class Inertial, class Send>
-  void inertial(std::size_t instance, Inertial&& inertial, Send& send);
+  /// `inertial` gives the estimate and `sources` the states of its sources, when they are asked for.
+  template <class Inertial, class Sources, class Send>
+  void inertial(std::size_t instance, Inertial&& inertial, Sources&& sources, Send& send);
   template <class Send>
   void attitude(std::size_t instance, const estimators::AttitudeEstimate& e,
                 const estimators::Disagreement& from_primary, Send& send);
@@ -184,16 +180,16 @@ void Publisher<N>::estimate(std::size_t instance, sensor::EstimatorKind kind, bo
 /// Attitude and velocity; of the rest one page at a time, in an epoch that has these and Est_Std too
 /// (param/limits.hpp): what turns and accelerates is to be judged by the covariance of its own time.
 template <std::size_t N>
-template <class Inertial, class Send>
-void Publisher<N>::inertial(std::size_t instance, Inertial&& inertial, Send& send) {
+template <class Inertial, class Sources, class Send>
+void Publisher<N>::inertial(std::size_t instance, Inertial&& inertial, Sources&& sources, Send& send) {
   const bool motion = every(parameters_.publish.attitude_every, kTogether);
   const bool page = every(parameters_.publish.state_every, kTogether);
   if (!motion && !page) return;
   // By the epoch, not by how often there was something to say: the same in every run, whenever its filter began.
   const std::uint32_t turn = (epoch_ + kTogether) / static_cast<std::uint32_t>(parameters_.publish.state_every);
-  const estimators::InertialEstimate e = inertial();
   const auto put_here = [&](const auto& message) { put(message, send, instance); };
-  if (page && is_turn_of_sources(turn)) put_sources(e.sources, tag(), put_here);  // also while there is no estimate
+  if (page && is_turn_of_sources(turn)) put_sources(sources(), tag(), put_here);  // also while there is no estimate
+  const estimators::InertialEstimate e = inertial();
   if (!e.valid) return;
   const nav::InsState& x = e.state;
   if (motion) {

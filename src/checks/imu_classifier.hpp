@@ -3,8 +3,10 @@
 // must agree on it, or the present would be carried over samples that the filter later refuses.
 #pragma once
 
+#include "base/math.hpp"
 #include "checks/stuck_value.hpp"
 #include "nav/imu_increment.hpp"
+#include "param/parameters.hpp"
 #include "sensor/samples.hpp"
 
 #include <cstdint>
@@ -20,6 +22,7 @@ namespace tetap::checks {
 
 enum class ImuClass : std::uint8_t {
   kInvalid,      ///< not finite, too fast, or its interval is none
+  kBeyondRange,  ///< more than the sensor can show on an axis: a garbled transfer, used as if it were missing
   kStuck,        ///< gyroscope or accelerometer repeats itself
   kSaturated,    ///< gyroscope at full scale while wheels show the turn: used as if it were missing
   kOverlapping,  ///< begins before the last one ended by more than half of itself
@@ -35,12 +38,14 @@ class ImuClassifier {
   [[nodiscard]] static constexpr bool is_gap(base::Micros pause) { return pause > kJitter; }
   [[nodiscard]] static constexpr bool overlaps(base::Micros pause, base::Micros dt) { return 2 * pause.us < -dt.us; }
 
-  /// `increment`: of the sample, in any axes. `stuck_samples`: repetitions that make a stuck sensor; 0: never.
-  /// Repetitions are counted of valid samples alone.
+  /// `increment`: of the sample, in any axes. Repetitions are counted of valid samples alone.
   ImuClass classify(const sensor::ImuSample& sample, const nav::ImuIncrement& increment, base::Micros pause,
-                    bool turn_known, std::int32_t stuck_samples) {
-    if (increment.check() != nav::ImuVerdict::kAccepted) return ImuClass::kInvalid;
-    if (repeated(sample, stuck_samples)) return ImuClass::kStuck;
+                    bool turn_known, const param::InertialParameters& n) {
+    if (!within_range(increment, n)) {
+      const ImuClass found = judge_size(sample, increment, n);
+      if (found != ImuClass::kContiguous) return found;
+    }
+    if (repeated(sample, n.stuck_samples)) return ImuClass::kStuck;
     if (sample.clipped_gyro > 0 && turn_known) return ImuClass::kSaturated;
     if (overlaps(pause, increment.dt)) return ImuClass::kOverlapping;
     return is_gap(pause) ? ImuClass::kAfterGap : ImuClass::kContiguous;
@@ -52,8 +57,9 @@ class ImuClassifier {
   }
   /// Nothing but the time can make such a sample anything but contiguous: valid, not clipped, no repetition of
   /// `before`.
-  [[nodiscard]] static bool plain(const sensor::ImuSample& s, const sensor::ImuSample& before) {
-    return s.clipped_gyro == 0 && s.clipped_accel == 0 && valid(s) && !repeats(s, before) && valid(before);
+  [[nodiscard]] static bool plain(const sensor::ImuSample& s, const sensor::ImuSample& before,
+                                  const param::InertialParameters& n) {
+    return s.clipped_gyro == 0 && s.clipped_accel == 0 && valid(s, n) && !repeats(s, before) && valid(before, n);
   }
   /// The classifier's state after a sample that repeats nothing.
   [[nodiscard]] static ImuClassifier after(const sensor::ImuSample& s) {
@@ -78,8 +84,28 @@ class ImuClassifier {
   using Repeats = RepeatCounter<3>;
   static constexpr float kStep_rad = 4e-7F, kStep_mps = 4e-6F;  ///< below half a step of the bus: 1e-6 rad, 1e-5 m/s
 
-  [[nodiscard]] static bool valid(const sensor::ImuSample& s) {
-    return increment_of(s).check() == nav::ImuVerdict::kAccepted;
+  [[nodiscard]] static bool valid(const sensor::ImuSample& s, const param::InertialParameters& n) {
+    const nav::ImuIncrement increment = increment_of(s);
+    return within_range(increment, n) || judge_size(s, increment, n) == ImuClass::kContiguous;
+  }
+  /// A norm within the range of one axis: no axis is beyond it. False for NaN.
+  [[nodiscard]] static bool within_range(const nav::ImuIncrement& increment, const param::InertialParameters& n) {
+    const float dt_s = base::seconds(increment.dt);
+    const float angle = n.gyro_range_radps * dt_s, speed = n.accel_range_mps2 * dt_s;
+    return increment.dt.us > 0 && increment.dt <= nav::ImuIncrement::kLongest &&
+           increment.dtheta_b_rad.squaredNorm() < angle * angle && increment.dv_b_mps.squaredNorm() < speed * speed;
+  }
+  /// The same axis by axis, along the sensor's own. kContiguous: nothing is wrong with the sample's size.
+  [[nodiscard, gnu::noinline]] static ImuClass judge_size(const sensor::ImuSample& s,
+                                                          const nav::ImuIncrement& increment,
+                                                          const param::InertialParameters& n) {
+    if (increment.check() != nav::ImuVerdict::kAccepted) return ImuClass::kInvalid;
+    const float dt_s = base::seconds(increment.dt);
+    for (std::size_t i = 0; i < 3; ++i)
+      if (base::abs(s.dangle_b_rad[i]) > n.gyro_range_radps * dt_s ||
+          base::abs(s.dvelocity_b_mps[i]) > n.accel_range_mps2 * dt_s)
+        return ImuClass::kBeyondRange;
+    return ImuClass::kContiguous;
   }
 
   Repeats gyro_, accel_;

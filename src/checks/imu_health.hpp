@@ -24,9 +24,13 @@ class ImuHealth {
   /// Classifies a sample and takes note of it; arguments as of ImuClassifier::classify().
   ImuClass update(const sensor::ImuSample& s, const nav::ImuIncrement& increment, base::Micros stamp,
                   base::Micros pause, bool turn_known, const param::InertialParameters& n) {
-    const ImuClass found = classifier_.classify(s, increment, pause, turn_known, n.stuck_samples);
-    if (found != ImuClass::kInvalid) note(s, found == ImuClass::kStuck, stamp, n);
-    return found;
+    const ImuClass found = classifier_.classify(s, increment, pause, turn_known, n);
+    if (found < ImuClass::kStuck) {
+      if (found == ImuClass::kBeyondRange) note_clipped(stamp);
+      return found;
+    }
+    note(s, found == ImuClass::kStuck, stamp, n);
+    return stuck_ ? ImuClass::kStuck : found;
   }
   /// The same for a valid sample whose place in time does not matter. False: the sensor is stuck.
   bool update(const sensor::ImuSample& s, base::Micros stamp, const param::InertialParameters& n) {
@@ -34,6 +38,19 @@ class ImuHealth {
     return !stuck_;
   }
   [[nodiscard]] bool stuck() const { return stuck_; }
+  /// One axis alone is stuck. The output predictor does not test that.
+  [[nodiscard]] bool axis_stuck() const { return axis_stuck_; }
+  /// Samples that showed a false motion until an axis or the whole sensor was found stuck.
+  [[nodiscard]] std::int32_t stuck_after(const param::InertialParameters& n) const {
+    return axis_stuck_ ? 2 * StuckAxis::kReadings : n.stuck_samples;
+  }
+  /// Distance of the last sample from the ones before it, where that is more than motion and vibration make: a wild
+  /// sample, or an impact.
+  struct Leap {
+    float rate_radps = 0, force_mps2 = 0;
+  };
+  [[nodiscard]] bool leaps() const { return leaps_; }
+  [[nodiscard]] const Leap& leap() const { return leap_; }
   /// Stamp of the last sample that was neither invalid nor stuck; 0: none.
   [[nodiscard]] base::Micros last_valid() const { return valid_; }
   /// The last sample that was neither invalid nor stuck is older than the time-out.
@@ -62,6 +79,8 @@ class ImuHealth {
   template <class Sink>
   void hash_state(Sink&& sink) const {
     classifier_.hash_state(sink);
+    gyro_axis_.hash_state(sink);
+    accel_axis_.hash_state(sink);
     for (std::size_t i = 0; i < 3; ++i) {
       sink(slow_gyro_[i]);
       sink(slow_accel_[i]);
@@ -69,25 +88,36 @@ class ImuHealth {
     sink(gyro2_);
     sink(accel2_);
     for (const base::Micros at : {valid_, clipped_at_, stuck_at_}) sink(at.us);
-    sink(static_cast<std::uint32_t>(clipped_ | (stuck_ ? 0x10000U : 0U) | (shaken_ ? 0x20000U : 0U)));
+    sink(static_cast<std::uint32_t>(clipped_ | (stuck_ ? 0x10000U : 0U) | (shaken_ ? 0x20000U : 0U) |
+                                    (accel_turn_ ? 0x40000U : 0U)));
   }
 
  private:
   static constexpr base::Micros kLately{1'000'000};
+  static constexpr float kLeap_radps = 2.0F, kLeap_mps2 = 30.0F;
   static constexpr float kSlow_s = 0.05F, kMean_s = 0.5F;  // motion is below 3 Hz; averaging time of the RMS
 
   void note(const sensor::ImuSample& s, bool stuck, base::Micros stamp, const param::InertialParameters& n) {
-    stuck_ = stuck;
-    if (stuck) {
+    leaps_ = false;
+    axis_stuck_ = n.stuck_samples > 0 && any_axis_stuck(s);
+    stuck_ = stuck || axis_stuck_;
+    if (stuck_) {
       stuck_at_ = stamp;
       return;
     }
     valid_ = stamp;
-    if (s.clipped_gyro > 0 || s.clipped_accel > 0) {
-      clipped_at_ = stamp;
-      clipped_ = static_cast<std::uint16_t>(clipped_ < 0xFFFF ? clipped_ + 1 : 0xFFFF);
-    }
+    if (s.clipped_gyro > 0 || s.clipped_accel > 0) note_clipped(stamp);
     measure_vibration(s, n);
+  }
+  void note_clipped(base::Micros stamp) {
+    clipped_at_ = stamp;
+    clipped_ = static_cast<std::uint16_t>(clipped_ < 0xFFFF ? clipped_ + 1 : 0xFFFF);
+  }
+  /// Gyroscope and accelerometer take turns, for the sake of the tick's work.
+  bool any_axis_stuck(const sensor::ImuSample& s) {
+    accel_turn_ = !accel_turn_;
+    if (accel_turn_) return accel_axis_.update(s.dvelocity_b_mps) || gyro_axis_.stuck();
+    return gyro_axis_.update(s.dangle_b_rad) || accel_axis_.stuck();
   }
   [[nodiscard]] bool begun() const { return valid_.us != 0; }
   [[nodiscard]] float excess(const param::InertialParameters& n) const {
@@ -113,18 +143,37 @@ class ImuHealth {
       }
       return sum;
     };
-    gyro2_ += mean * (fast2(slow_gyro_, s.dangle_b_rad) - gyro2_);
-    accel2_ += mean * (fast2(slow_accel_, s.dvelocity_b_mps) - accel2_);
+    float gyro2 = fast2(slow_gyro_, s.dangle_b_rad), accel2 = fast2(slow_accel_, s.dvelocity_b_mps);
+    if (gyro2 > kLeap_radps * kLeap_radps || accel2 > kLeap_mps2 * kLeap_mps2) measure_leap(gyro2, accel2);
+    gyro2_ += mean * (gyro2 - gyro2_);
+    accel2_ += mean * (accel2 - accel2_);
     const float share = excess(n);
     shaken_ = share > (shaken_ ? 1.0F : 4.0F);
   }
 
+  /// Motion does less from one sample to the next, and vibration four times what was there before. A sample that leaps
+  /// counts as vibration up to there only.
+  [[gnu::noinline]] void measure_leap(float& gyro2, float& accel2) {
+    constexpr float kVibrations = 4.0F;
+    const auto excess_of = [](float& fast2, float most) {
+      if (fast2 <= most * most) return 0.0F;
+      const float leap = base::sqrt(fast2);
+      fast2 = most * most;
+      return leap;
+    };
+    leap_ = {.rate_radps = excess_of(gyro2, kLeap_radps + kVibrations * base::sqrt(gyro2_)),
+             .force_mps2 = excess_of(accel2, kLeap_mps2 + kVibrations * base::sqrt(accel2_))};
+    leaps_ = leap_.rate_radps > 0.0F || leap_.force_mps2 > 0.0F;
+  }
+
   ImuClassifier classifier_;
+  StuckAxis gyro_axis_, accel_axis_;
   std::array<float, 3> slow_gyro_{}, slow_accel_{};  ///< low-passed rate and specific force
   float gyro2_ = 0, accel2_ = 0;                     ///< mean squares of the rest
   base::Micros valid_, clipped_at_, stuck_at_;       ///< stamps of the last such sample; 0: none
   std::uint16_t clipped_ = 0;
-  bool stuck_ = false, shaken_ = false, filtered_ = false;
+  Leap leap_;  ///< of the last sample; holds while leaps_
+  bool stuck_ = false, shaken_ = false, filtered_ = false, axis_stuck_ = false, accel_turn_ = false, leaps_ = false;
 };
 
 }  // namespace tetap::checks

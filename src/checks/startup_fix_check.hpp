@@ -41,7 +41,7 @@ class StartupFixCheck {
   static constexpr float kFastest_mps = 60;
   static float metres(std::int64_t d_2ndeg) { return static_cast<float>(d_2ndeg) * (2e-9F * 111'320.0F); }
 
-  std::int64_t latitude_2ndeg_ = 0, longitude_2ndeg_ = 0;  ///< of the last fix
+  std::int64_t latitude_2ndeg_ = 0, longitude_2ndeg_ = 0;  ///< coordinates of the last fix
   base::Micros last_;                                      ///< stamp of the last fix; 0: none
   std::int32_t fixes_ = 0;                                 ///< in a row
 };

@@ -6,6 +6,7 @@
 #include "checks/persistence.hpp"
 
 #include <array>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 
@@ -47,6 +48,43 @@ class RepeatCounter {
   Reading last_{};
   std::uint8_t count_ = 0;
   bool stuck_ = false;
+};
+
+/// One axis of three that keeps its value to the last bit at reading after reading in which both others changed. Rest
+/// and a coarse resolution leave two axes or all alike, which counts for nothing.
+class StuckAxis {
+ public:
+  static constexpr std::uint8_t kReadings = 32;  ///< make a stuck axis
+
+  /// True while an axis is stuck.
+  bool update(const std::array<float, 3>& now) {
+    unsigned same = 0;
+    for (std::size_t i = 0; i < 3; ++i) {
+      const auto bits = std::bit_cast<std::uint32_t>(now[i]);
+      same |= bits == last_[i] ? 1U << i : 0U;
+      last_[i] = bits;
+    }
+    if ((same & (same - 1U)) == 0) follow(same);
+    return count_ >= kReadings;
+  }
+  [[nodiscard]] bool stuck() const { return count_ >= kReadings; }
+  template <class Sink>
+  void hash_state(Sink&& sink) const {
+    for (const std::uint32_t bits : last_) sink(bits);
+    sink(count_ | static_cast<std::uint32_t>(axis_) << 8U);
+  }
+
+ private:
+  /// At most one axis is as it was: a bit of `same`, or 0.
+  void follow(unsigned same) {
+    if (same == 0 || same != axis_) count_ = 0;
+    axis_ = static_cast<std::uint8_t>(same);
+    if (same != 0 && count_ < kReadings) ++count_;
+  }
+
+  std::array<std::uint32_t, 3> last_{};  ///< bits of the last reading
+  std::uint8_t axis_ = 0;                ///< bit of the axis that kept its value; 0: none
+  std::uint8_t count_ = 0;               ///< readings at which that one alone kept its value
 };
 
 /// The same to the last bit, with the time of the last reading.

@@ -77,7 +77,6 @@ struct InertialEstimate {
   bool valid = false;
   Jump jump;
   checks::ImuHealthReport imu;
-  SourceStates sources;
 
   /// Of errors kI and kJ (nav::InsState), at the present.
   template <int kI, int kJ = kI>
@@ -130,11 +129,15 @@ template <int M>
 [[nodiscard]] Innovation record(const filter::Innovation<float, M>& from, std::uint8_t landmark = 0xFF) {
   constexpr sensor::Verdict kWord[] = {sensor::Verdict::kAccepted, sensor::Verdict::kRejected,
                                        sensor::Verdict::kSingular, sensor::Verdict::kNotFinite};
-  return {.verdict = kWord[static_cast<std::size_t>(from.verdict)],
+  constexpr sensor::Check kFailed[] = {sensor::Check::kNone, sensor::Check::kGate, sensor::Check::kValue,
+                                       sensor::Check::kValue};
+  const auto verdict = static_cast<std::size_t>(from.verdict);
+  return {.verdict = kWord[verdict],
           .dof = M,
           .nis = from.nis,
           .gate = from.gate,
-          .landmark = landmark};
+          .landmark = landmark,
+          .failed = kFailed[verdict]};
 }
 
 }  // namespace tetap::estimators

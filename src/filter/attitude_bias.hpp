@@ -50,7 +50,7 @@ class GyroscopeBias {
   struct Levelling {
     float x_rad, y_rad;
     bool usable;          ///< neither limited nor held
-    float average_share;  ///< of a step in the mean that starts the low-pass; 0 when the low-pass runs
+    float average_share;  ///< share of a step in the mean that starts the low-pass; 0 when the low-pass runs
   };
 
   /// A fifth of the work per step, in turns, each as if for five steps: what is compared is low-passed over seconds.

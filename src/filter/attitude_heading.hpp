@@ -152,7 +152,7 @@ class MagneticHeading {
   float norm2_low_, norm2_high_;
   float tan_dip_;
   base::SinCos declination_;
-  base::SinCos half_{.sin = 0.0F, .cos = 1.0F};  ///< of half the heading of the level axes
+  base::SinCos half_{.sin = 0.0F, .cos = 1.0F};  ///< half the heading of the level axes
   LowPass<2> field_;
   Field reference_ = Field::Zero(), candidate_ = Field::Zero();
   float undisturbed_s_ = 0.0F, candidate_s_ = 0.0F, rejected_s_ = 0.0F, average_s_ = 0.0F, moved_s_ = 0.0F;

@@ -26,7 +26,7 @@ struct AttitudeOptions {
 
   // Gyroscope bias.
   float bias_start_sigma_radps = 0.5F * kDegree;
-  float bias_walk_radps = 0.1F * kDegree;  ///< what it drifts in bias_walk_s
+  float bias_walk_radps = 0.1F * kDegree;  ///< drift of the bias in bias_walk_s
   float bias_walk_s = 100.0F;
   float bias_limit_radps = 2.0F * kDegree;
   float bias_motion_sigma_radps = 0.1F * kDegree;  ///< reached in steady state by motion alone, by rest alone
@@ -42,10 +42,10 @@ struct AttitudeOptions {
 
   // Heading.
   float tau_heading_s = 9.0F;
-  float declination_rad = 0.0F;  ///< of magnetic from true north, eastward positive
+  float declination_rad = 0.0F;  ///< magnetic north from true north, eastward positive
   float tau_field_s = 0.05F;
   float tau_reference_s = 20.0F;
-  float field_norm_share = 0.1F;  ///< of the reference's strength, beyond which a field is disturbed
+  float field_norm_share = 0.1F;  ///< share of the reference's strength beyond which a field is disturbed
   float field_dip_rad = 10.0F * kDegree;
   float field_undisturbed_s = 0.5F;                 ///< for so long inside both, to be undisturbed again
   float field_first_s = 5.0F, field_new_s = 20.0F;  ///< in motion, until another field becomes the reference

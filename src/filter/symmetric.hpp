@@ -39,6 +39,10 @@ class Symmetric {
     return result;
   }
 
+  /// Adds independent variances.
+  constexpr void add_diagonal(const std::array<Scalar, N>& variances) {
+    for (int i = 0; i < N; ++i) (*this)(i, i) += variances[static_cast<std::size_t>(i)];
+  }
   [[nodiscard]] constexpr Scalar operator()(int r, int c) const { return packed_[index(r, c)]; }
   [[nodiscard]] constexpr Scalar& operator()(int r, int c) { return packed_[index(r, c)]; }
   [[nodiscard]] constexpr const auto& packed() const { return packed_; }

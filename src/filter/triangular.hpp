@@ -118,7 +118,7 @@ template <class Scalar, int N, int M>
 struct RootCorrection {
   Triangular<Scalar, M> s;     ///< S = s^T s
   Matrix<Scalar, M, N> gain;   ///< W
-  Triangular<Scalar, N> root;  ///< of P+
+  Triangular<Scalar, N> root;  ///< factor of P+
 
   [[gnu::always_inline]] RootCorrection(const Triangular<Scalar, N>& prior, const Triangular<Scalar, M>& e,
                                         const Matrix<Scalar, N, M>& slope)

@@ -49,7 +49,7 @@ template <std::size_t A, class Scalar, int N>
 template <class Scalar, int N>
 struct PairSum {
   Vector<Scalar, N> sum;
-  Symmetric<Scalar, N> spread;  ///< of d+ d+^T + d- d-^T, twice
+  Symmetric<Scalar, N> spread;  ///< sum of d+ d+^T + d- d-^T, twice
 
   /// Takes one pair; gives d+ - d-, the slope along the pair. The first pair begins the sums.
   template <bool kFirst>

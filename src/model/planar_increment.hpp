@@ -39,7 +39,7 @@ struct PlanarIncrement {
 
  private:
   struct Terms {
-    base::SinCos direction;  ///< of the chord: yaw + dyaw/2
+    base::SinCos direction;  ///< direction of the chord: yaw + dyaw/2
     float chord = 1;         ///< chord over arc length, sin(h)/h
     float chord_slope = 0;   ///< its derivative by h
   };

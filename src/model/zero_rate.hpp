@@ -15,7 +15,7 @@ struct ZeroRate {
   static constexpr std::array<int, 3> kTouches{12, 13, 14};
 
   nav::Vector3 gyro_b_radps = nav::Vector3::Zero();  ///< mean over the standstill
-  float sigma_radps = 0;                             ///< of that mean, per axis
+  float sigma_radps = 0;                             ///< 1 sigma of that mean, per axis
   nav::Vector3 doubt = nav::Vector3::Ones();         ///< times its variance, per axis
   nav::Vector3 earth_rate_n_radps = nav::Vector3::Zero();
 

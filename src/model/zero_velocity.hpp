@@ -14,7 +14,7 @@ struct ZeroVelocity {
   static constexpr bool kDirect = true;
   static constexpr std::array<int, 3> kTouches{3, 4, 5};
 
-  float sigma_mps = 0;  ///< what may go unnoticed at standstill, per axis
+  float sigma_mps = 0;  ///< 1 sigma of motion that is unnoticed at standstill, per axis
 
   [[nodiscard]] filter::Vector<float, 3> predict(const nav::InsState& at) const { return at.v_n_mps; }
   [[nodiscard]] filter::Vector<float, 3> residual(const filter::Vector<float, 3>& z_hat) const { return -z_hat; }

@@ -13,6 +13,8 @@ namespace tetap::nav {
 enum class ImuVerdict : std::uint8_t { kAccepted, kNotFinite, kBadInterval, kTooFast, kDiverged };
 
 struct ImuIncrement {
+  static constexpr base::Micros kLongest{200'000};
+
   Vector3 dtheta_b_rad = Vector3::Zero();  ///< rotation vector from the axes at the begin to those at the end
   Vector3 dv_b_mps = Vector3::Zero();      ///< specific force integrated in the axes at the *begin*
   base::Micros dt{};
@@ -36,7 +38,7 @@ struct ImuIncrement {
   /// What no robot does is refused, so that the state stays finite whatever comes: 100 rad/s, 1000 m/s^2 (norms), 0.2
   /// s.
   [[nodiscard]] ImuVerdict check() const {
-    if (dt.us <= 0 || dt.us > 200'000) return ImuVerdict::kBadInterval;
+    if (dt.us <= 0 || dt > kLongest) return ImuVerdict::kBadInterval;
     const float dt_s = base::seconds(dt);
     const float angle = 100.0F * dt_s, speed = 1000.0F * dt_s;
     // Of the norms, so that the axes in which they are told do not matter; false for NaN.

@@ -23,7 +23,7 @@ struct InsNoise {
   float gyro_bias_time_s = 0;
   float accel_bias_time_s = 0;
   float gyro_scale = 0;    ///< how wrong the gyroscope's scale may be, as a share of every turn
-  float motion_sigma = 3;  ///< what the accelerometer shows counts as motion beyond so many sigma of its noise
+  float motion_sigma = 3;  ///< sigmas of the accelerometer's noise beyond which its readings are motion
 };
 
 class Ins {
@@ -152,6 +152,11 @@ class Ins {
 
   /// One error may be larger than the covariance has it, by this variance.
   void inflate(int error, float variance) { p(error, error) += variance; }
+  /// One cause may have moved position, velocity and attitude by `by`, 1 sigma: P += by by^T over these nine.
+  void inflate_along(const std::array<float, 9>& by) {
+    for (int i = 0; i < 9; ++i)
+      for (int j = 0; j <= i; ++j) p(i, j) += by[static_cast<std::size_t>(i)] * by[static_cast<std::size_t>(j)];
+  }
   /// One error is no longer correlated with anything, and has this variance; recondition() after the last one.
   void reset(int error, float variance) {
     for (int j = 0; j < kErrors; ++j) p(error, j) = 0.0F;

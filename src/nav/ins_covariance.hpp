@@ -20,7 +20,7 @@ struct InsCovarianceStep {
   filter::Matrix<Scalar, 3, 3> r_dt = filter::Matrix<Scalar, 3, 3>::Zero();  ///< sum of R_nb dt
   Scalar var_p = 0, var_v = 0, var_theta = 0, var_b_a = 0, var_b_g = 0;      ///< added per axis over the step
   Scalar var_yaw = 0;                                                        ///< about the vertical, besides
-  Scalar keep_b_a = 1, keep_b_g = 1;  ///< what is left of a bias after it (Gauss-Markov); 1: random walk
+  Scalar keep_b_a = 1, keep_b_g = 1;  ///< rest of a bias after the step (Gauss-Markov); 1: random walk
 };
 
 namespace detail {

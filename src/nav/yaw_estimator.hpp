@@ -21,7 +21,7 @@ struct YawFinderNoise {
   float gyro_scale = 0.005F;      ///< share of every turn
   float accel_bias_mps2 = 0.1F;   ///< turn-on, fixed in the body
   float gyro_bias_radps = 0.01F;  ///< turn-on
-  float tilt_rad = 0.05F;         ///< of the level it begins with
+  float tilt_rad = 0.05F;         ///< 1 sigma of the level it begins with
   float floor_rad = 0.02F;        ///< no heading is known better: mounting, what the model lacks
   float ready_rad = 0.15F;        ///< ready once sigma is below
 };
@@ -95,13 +95,13 @@ class YawEstimator {
   static constexpr float kFast_mps = 15.0F;       ///< before anything has shown its speed
   static constexpr float kFar_m2 = 1e4F;          ///< before the first fix
   static constexpr float kStep_s = 0.1F;          ///< between predictions of the filter
-  static constexpr float kBlind_m2ps2 = 1e6F;     ///< of the velocity, after too long without anything
+  static constexpr float kBlind_m2ps2 = 1e6F;     ///< variance of the velocity after too long without anything
   static constexpr float kLean_s = 5.0F;          ///< own level leans towards the specific force
   static constexpr float kForget_s = 30.0F;       ///< one unit of 1 / P_zz is forgotten in
   static constexpr float kGate = 13.8F;           ///< one in a thousand, two degrees of freedom
-  static constexpr float kFirstTilt_rad = 0.15F;  ///< of one increment in motion
-  static constexpr float kKeptTilt_rad = 0.1F;    ///< of the own level after giving up
-  static constexpr float kWheelShare = 0.05F;     ///< one sigma of a speed, beside what the caller says
+  static constexpr float kFirstTilt_rad = 0.15F;  ///< tilt of one increment in motion
+  static constexpr float kKeptTilt_rad = 0.1F;    ///< tilt of the own level after giving up
+  static constexpr float kWheelShare = 0.05F;     ///< one sigma of a speed, beside the caller's
   static constexpr std::uint8_t kMostRefused = 5, kFixes = 5;
   // What walks, per axis and root of a second: the level's error, the biases.
   static constexpr float kWander_mps2_rts = 0.01F, kBiasWalk_radps_rts = 1e-5F, kAccelWalk_mps2_rts = 2e-4F;
@@ -130,7 +130,7 @@ class YawEstimator {
   Vector3 up_b_ = Vector3::Zero();
   Vector3 bias_b_radps_ = Vector3::Zero();  ///< taken off the gyroscope
   float rate_radps_ = 0;
-  float wheels_s_ = 0;               ///< since wheels were taken
+  float wheels_s_ = 0;               ///< time since wheels were taken
   base::Anchored east_{}, north_{};  ///< the newest fix
   std::uint32_t restarts_ = 0;
   std::uint8_t refused_ = 0, fixes_ = 0;

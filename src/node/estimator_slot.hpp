@@ -13,6 +13,7 @@
 #include "estimators/estimate.hpp"
 #include "estimators/sensor_statistics.hpp"
 #include "sensor/sample.hpp"
+#include "sensor/window.hpp"
 
 #include <array>
 #include <concepts>
@@ -88,8 +89,7 @@ class EstimatorSlot {
   }
 
   /// `window` is what the estimators have of the samples in the window, in order.
-  template <class Window>
-  void advance(base::Micros t, const estimators::Context& ctx, const Window& window) {
+  void advance(base::Micros t, const estimators::Context& ctx, const sensor::Window& window) {
     if constexpr (kDelayed) {
       now_.advance(t, ctx, window);
     } else {
@@ -106,6 +106,10 @@ class EstimatorSlot {
     e.inertial(ctx);
   }
   { return now_.inertial(ctx); }
+  [[nodiscard]] estimators::SourceStates sources(const estimators::Context& ctx) const {
+    if constexpr (requires { now_.sources(ctx); }) return now_.sources(ctx);
+    return {};
+  }
   [[nodiscard]] estimators::AttitudeEstimate attitude(const estimators::Context& ctx) const requires
       requires(const E& e) {
     e.attitude(ctx);
@@ -173,7 +177,7 @@ class EstimatorSlot {
 
   struct Nothing {};
 
-  E now_;  ///< of a delayed estimator: the far end
+  E now_;  ///< state now; the far end's where the estimator is delayed
   [[no_unique_address]] std::conditional_t<kDelayed, Nothing, E> past_;
   std::array<estimators::SensorStatistics, estimators::kStatistics> statistics_{};
 };

@@ -87,7 +87,7 @@ class FusionWindow {
 
   /// Brings every estimator to t.
   void advance(base::Micros t, const estimators::Context& ctx) {
-    const Window window(timeline_, timeline_.until(t));
+    const sensor::Window window = timeline_.window(timeline_.until(t));
     each_lane([&](auto& lane) { lane.advance(t, ctx, window); });
   }
 

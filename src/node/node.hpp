@@ -92,11 +92,11 @@ class Node {
 
   base::Micros now_;
   bool ticked_ = false;
-  bus::InputCrc input_crc_;  ///< of the input frames
+  bus::InputCrc input_crc_;  ///< running CRC of the input frames
   std::uint8_t resets_ = 0;
   sensor::ResetCause reset_cause_ = sensor::ResetCause::kPowerOn;
   base::Micros restarted_at_;
-  std::uint8_t jumps_ = 0;  ///< of the primary estimator, so many are in resets_
+  std::uint8_t jumps_ = 0;  ///< steps of the primary estimator that resets_ counts
   estimators::AttitudeDisagreement disagreement_;
 };
 
@@ -186,7 +186,7 @@ void Node<Estimators, Capacity>::tick(base::Micros t, const bus::LoopHealth& loo
     publisher_.estimate(instance, E::kKind, primary, estimates[instance], motion, send);
     if constexpr (requires { lane.inertial(context()); })
       publisher_.inertial(
-          instance, [&] { return lane.inertial(context()); }, send);
+          instance, [&] { return lane.inertial(context()); }, [&] { return lane.sources(context()); }, send);
     if constexpr (requires { lane.attitude(context()); })
       publisher_.attitude(instance, lane.attitude(context()), apart, send);
     ++instance;

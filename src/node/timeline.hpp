@@ -4,6 +4,7 @@
 #pragma once
 
 #include "sensor/sample.hpp"
+#include "sensor/window.hpp"
 
 #include <array>
 #include <cstddef>
@@ -75,6 +76,10 @@ class Timeline {
     return sum;
   }
 
+  /// Its first `size` samples.
+  [[nodiscard]] constexpr sensor::Window window(std::size_t size) const {
+    return {samples_.data(), Capacity, begin_, size};
+  }
   [[nodiscard]] constexpr const sensor::Sample& operator[](std::size_t i) const { return samples_[place(i)]; }
   /// The current estimate has it, and its record went out.
   [[nodiscard]] constexpr bool consumed(std::size_t i) const { return consumed_[place(i)]; }
@@ -100,22 +105,8 @@ class Timeline {
   std::array<sensor::Sample, Capacity> samples_{};
   std::array<bool, Capacity> consumed_{};
   std::size_t begin_ = 0, size_ = 0;
-  std::size_t known_ = 0, new_ = 0;  ///< of those consumed; and how many are not
+  std::size_t known_ = 0, new_ = 0;  ///< places of consumed samples, and of those that are not
   std::uint16_t high_water_ = 0;
-};
-
-/// The first `size` samples of a timeline: those that the estimators have.
-template <std::size_t Capacity>
-class Window {
- public:
-  constexpr Window(const Timeline<Capacity>& timeline, std::size_t size) : timeline_(timeline), size_(size) {}
-
-  [[nodiscard]] constexpr std::size_t size() const { return size_; }
-  [[nodiscard]] constexpr const sensor::Sample& operator[](std::size_t i) const { return timeline_[i]; }
-
- private:
-  const Timeline<Capacity>& timeline_;
-  std::size_t size_;
 };
 
 }  // namespace tetap::node

@@ -16,7 +16,7 @@
 namespace tetap::param {
 
 struct LoopParameters {
-  std::int32_t period_us = 10'000;   ///< of the tick, in sample time
+  std::int32_t period_us = 10'000;   ///< period of the tick, in sample time
   std::int32_t window_us = 200'000;  ///< how late a sample may come and still be fused at its own time
   std::int32_t ahead_us = 200'000;   ///< how far ahead of the tick a stamp may be and still wait
   float turn_radps2 = 0.5F;          ///< 1 sigma of what turns it faster or slower: a yaw rate is as old as its sample
@@ -62,7 +62,7 @@ struct GyroParameters {
 };
 
 struct LandmarkParameters {
-  model::PlanarMounting mounting;  ///< of the sensor
+  model::PlanarMounting mounting;  ///< mounting of the sensor
   float sigma_range_m = 0.1F;
   float sigma_range_per_m = 0;  ///< grows with range
   float sigma_bearing_rad = 0.02F;
@@ -80,7 +80,7 @@ struct GnssParameters {
   float correlation_s = 0;     ///< inertial: how long the receiver's errors last; 0: a new one with every fix
   float gate_scale = 1;
   float align_distance_m = 8;  ///< travel by GNSS before a heading is derived from it
-  /// Of a receiver with two antennas: from the first to the second. Its heading is that of this line.
+  /// Baseline of a receiver with two antennas: from the first to the second. Its heading is that of this line.
   std::array<float, 3> baseline_b_m{1, 0, 0};
   std::int32_t heading_stuck_samples = 50;  ///< repeated so often to the last bit, a heading is a stuck one; 0: never
   std::int32_t origin_configured = 0;       ///< 0: the first fix is the origin
@@ -91,7 +91,7 @@ struct GnssParameters {
 
 /// Inertial navigation: the sensor's data sheet, and how well the robot keeps to its wheels.
 struct InertialParameters {
-  std::int32_t imu = 0;  ///< which instance
+  std::int32_t imu = 0;  ///< instance of the IMU
   /// From the sensor's axes into the body's, row by row: x forward, y left, z up.
   std::array<float, 9> mounting_bs{1, 0, 0, 0, 1, 0, 0, 0, 1};
   float gyro_radps_rthz = 5e-5F;        ///< ICM-42688-P, DS-000347 table 1: 0.0028 deg/s/sqrt(Hz)
@@ -105,10 +105,12 @@ struct InertialParameters {
   std::int32_t starts_forward = 0;  ///< 1: it never starts in reverse, so its course is its heading
   float level_s = 1;                ///< how long gravity is looked at
   std::int32_t earth_rate = 0;      ///< 1: a gyroscope good enough to feel the Earth turn, 15 deg/h
-  float gap_mps2 = 3;               ///< what may have happened while samples were missing
+  float gap_mps2 = 3;               ///< acceleration while samples are missing
   float gap_radps = 1;
   float gap_wheels_radps = 0.1F;    ///< the same for turning, while wheels show how it turns
   std::int32_t stuck_samples = 10;  ///< repeated so often, a sample is one of a stuck sensor; 0: never
+  float gyro_range_radps = 35;      ///< DS-000347 table 1: 2000 deg/s, which is 34.9
+  float accel_range_mps2 = 160;     ///< table 2: 16 g, which is 156.9; the rest is for the calibration
   std::int32_t stale_us = 100'000;  ///< without a sample for longer: bridged
   float vibration_mps2 = 4;         ///< RMS up to which the noise densities hold; beyond, they grow with it
   float vibration_radps = 0.4F;     ///< likewise
@@ -116,9 +118,9 @@ struct InertialParameters {
   float calm_radps = 0.01F;
   float still_radps = 0.03F;    ///< turning slower than this, wheels still: standing
   float still_mps = 0.005F;     ///< 1 sigma of standing as wheels tell it,
-  float still_gnss_mps = 0.1F;  ///< and as IMU and GNSS velocity do
+  float still_gnss_mps = 0.1F;  ///< the same for IMU and GNSS velocity
   float wheel_mps = 0.02F;      ///< 1 sigma of the wheels' speed at standstill
-  float slip_share = 0.02F;     ///< and what grows with speed
+  float slip_share = 0.02F;     ///< growth of that with the speed
   float lateral_mps = 0.05F;    ///< how well it does not move sideways
   float vertical_mps = 0.05F;
   float axle_x_b_m = 0;                   ///< the axle that does not steer
@@ -133,13 +135,13 @@ struct InertialParameters {
 /// hard iron), the last two in the sensor's own axes.
 struct MagneticParameters {
   std::int32_t use = 0;
-  float declination_rad = 0;  ///< of magnetic from true north, eastward positive
+  float declination_rad = 0;  ///< magnetic north from true north, eastward positive
   std::array<float, 3> hard_iron_uT{0, 0, 0};
   std::array<float, 9> soft_iron{1, 0, 0, 0, 1, 0, 0, 0, 1};    ///< row by row
   std::array<float, 9> mounting_bs{1, 0, 0, 0, 1, 0, 0, 0, 1};  ///< from the sensor's axes into the body's, row by row
-  float sigma_rad = 0.1F;  ///< of a heading, all its errors together: no better is ever believed
+  float sigma_rad = 0.1F;  ///< 1 sigma of a heading, all its errors together; the filter's heading gets no better by it
   float gate_scale = 1;
-  float norm_uT = 0;        ///< of the field after calibration; 0: as found at the start
+  float norm_uT = 0;        ///< strength of the field after calibration; 0: as found at the start
   float norm_share = 0.1F;  ///< off by more of it, the field is disturbed
   float dip_rad = 0.15F;    ///< the same for its angle below the horizon, from what was found at the start
   /// In motion for so long in a field that stays the same, but is not the one known: that is the known one then.
@@ -150,9 +152,9 @@ struct MagneticParameters {
 /// The barometer: its zero is found, and followed, where the height is known better by other means.
 struct BaroParameters {
   std::int32_t use = 0;
-  float sigma_m = 0.3F;       ///< of one height, white
-  float drift_m_rts = 0.1F;   ///< of its zero: weather, warming up; m per root second
-  float scale_share = 0.05F;  ///< of a change of height: air that is not the standard atmosphere
+  float sigma_m = 0.3F;       ///< 1 sigma of one height, white
+  float drift_m_rts = 0.1F;   ///< drift of its zero by weather and warming up; m per root second
+  float scale_share = 0.05F;  ///< share of a change of height: air that is not the standard atmosphere
   float gate_scale = 1;
   /// Repeated so often to the last bit (0.5 Pa on the bus), a pressure is a stuck one, where its noise is more than
   /// that; 0: never.
@@ -184,9 +186,9 @@ struct RecoveryParameters {
   std::int32_t at_least = 10;  ///< rejections in a row
   float inflate_position_m = 1;
   float inflate_yaw_rad = 0.2F;
-  std::int32_t persist_us = 60'000'000;  ///< refused fixes that agree for longer are a jump that is true,
-  std::int32_t persist_fixes = 120;      ///< and if there are so many of them
-  std::int32_t confirm_fixes = 5;        ///< that agree, before one decides where the filter is
+  std::int32_t persist_us = 60'000'000;  ///< refused fixes that agree for longer are a true jump
+  std::int32_t persist_fixes = 120;      ///< number of such fixes, at least
+  std::int32_t confirm_fixes = 5;        ///< fixes that agree before one decides where the filter is
   float frozen_m = 0.5F;                 ///< way with the same coordinates: the receiver repeats itself
 };
 
@@ -208,7 +210,7 @@ struct Parameters {
   std::uint32_t can_base = 0x300;
   LoopParameters loop;
   WheelParameters wheels;
-  ImuParameters imu;  ///< of the one that is used: inertial.imu
+  ImuParameters imu;  ///< calibration of the IMU that is used: inertial.imu
   GyroParameters gyro;
   LandmarkParameters landmark;
   GnssParameters gnss;

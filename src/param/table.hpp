@@ -201,6 +201,10 @@ inline constexpr std::array kTable{
               "Speed error beyond which, with 4 sigma, a wheel spins; 0: not tested."),
     TETAP_ROW(0x1E1, inertial.constrain_every_us, "us", 0, 10'000'000, kLive,
               "Period of the non-holonomic constraint while wheel samples are missing; 0: none."),
+    TETAP_ROW(0x1E2, inertial.gyro_range_radps, "rad/s", 0.1, 100, kLive,
+              "Full scale of the gyroscope on each axis; more is a garbled sample."),
+    TETAP_ROW(0x1E3, inertial.accel_range_mps2, "m/s^2", 10, 1000, kLive,
+              "Full scale of the accelerometer on each axis; more is a garbled sample."),
 
     TETAP_ROW(0x200, magnetic.use, "", 0, 1, kRestart, "1: the magnetometer is fused."),
     TETAP_ROW(0x201, magnetic.declination_rad, "rad", -detail::kPi, detail::kPi, kRestart,

@@ -27,7 +27,7 @@ enum class Check : std::uint8_t {
   kSlip,         ///< a wheel turns otherwise than the robot moves
   kUnconfirmed,  ///< too few others agree yet
   kTrust,        ///< the source agrees again, but not yet for long enough
-  kTime,         ///< sample overlaps the one before
+  kTime,         ///< sample overlaps the one before, or its interval is none
 };
 
 }  // namespace tetap::sensor

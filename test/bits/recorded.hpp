@@ -30,7 +30,7 @@ struct RecordedFrame {
 
 struct RecordedTick {
   std::int32_t time_us;
-  std::uint32_t frames;  ///< that arrive before it
+  std::uint32_t frames;  ///< frames that arrive before it
 };
 
 }  // namespace tetap::bits

@@ -30,9 +30,9 @@ struct FieldRow {
   enum class Kind : std::uint8_t { kFloat, kInteger, kOther };
   Signal signal;
   Kind kind;
-  std::size_t at;                                                      ///< of the field in the struct, bytes
-  std::size_t size;                                                    ///< of the field, bytes
-  std::int64_t least, most;                                            ///< of an integer field's type
+  std::size_t at;                                                      ///< offset of the field in the struct, bytes
+  std::size_t size;                                                    ///< size of the field, bytes
+  std::int64_t least, most;                                            ///< range of an integer field's type
   std::int64_t (*wrong_steps)(std::int64_t first, std::int64_t last);  ///< steps that decoding and encoding change
 };
 

@@ -291,7 +291,7 @@ TEST(Repeated, WhatAFilterMakesOfThemIsNeverWorseThanItSays) {
   EXPECT_GT(worst, 0.98 * static_cast<double>(kColouredNoiseInflation)) << "and no more is added than is needed";
 }
 
-/// Of errors of 1 sigma, the share within `factor` times an accuracy figure that is off by a fifth, from half to twice.
+/// Errors of 1 sigma: the share within `factor` times an accuracy figure that is off by a fifth, from half to twice.
 double share_within(double factor) {
   constexpr int kSteps = 12'000;
   double share = 0, weights = 0;

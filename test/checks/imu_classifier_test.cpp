@@ -14,6 +14,7 @@ namespace {
 
 using sensor::ImuSample;
 constexpr std::int32_t kStuckAfter = 10;
+constexpr param::InertialParameters kSensor{.stuck_samples = kStuckAfter};
 constexpr base::Micros kInterval{5'000};
 
 /// Samples with the noise of a sensor; each test spoils what it is about.
@@ -35,7 +36,7 @@ class Imu {
 };
 
 ImuClass classify(ImuClassifier& classifier, const ImuSample& s, base::Micros pause = {}, bool turn_known = false) {
-  return classifier.classify(s, increment_of(s), pause, turn_known, kStuckAfter);
+  return classifier.classify(s, increment_of(s), pause, turn_known, kSensor);
 }
 
 TEST(ImuClassifier, ASampleThatBeginsWhereTheLastEndedIsContiguousWhateverItShows) {
@@ -70,6 +71,29 @@ TEST(ImuClassifier, NoNumberTooFastAndNoIntervalAreInvalidBeforeAllElse) {
   }
 }
 
+// A value that the sensor cannot show on an axis is no reading of it; the norm of three axes may be more than one's
+// range.
+TEST(ImuClassifier, MoreThanTheRangeOfTheSensorIsLeftOutAxisByAxis) {
+  Imu imu;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    for (const float share : {-1.01F, -0.99F, 0.99F, 1.01F}) {
+      const ImuClass expected = std::abs(share) > 1 ? ImuClass::kBeyondRange : ImuClass::kContiguous;
+      ImuSample fast = imu.next(), hard = imu.next();
+      fast.dangle_b_rad[axis] = share * 0.005F * kSensor.gyro_range_radps;
+      hard.dvelocity_b_mps[axis] = share * 0.005F * kSensor.accel_range_mps2;
+      ImuClassifier one, other;
+      EXPECT_EQ(classify(one, fast), expected) << axis << ' ' << share;
+      EXPECT_EQ(classify(other, hard), expected) << axis << ' ' << share;
+      EXPECT_EQ(ImuClassifier::plain(fast, imu.next(), kSensor), expected == ImuClass::kContiguous);
+      EXPECT_EQ(ImuClassifier::plain(imu.next(), hard, kSensor), expected == ImuClass::kContiguous);
+    }
+  }
+  ImuSample all = imu.next();
+  all.dangle_b_rad.fill(0.99F * 0.005F * kSensor.gyro_range_radps);
+  ImuClassifier classifier;
+  EXPECT_EQ(classify(classifier, all), ImuClass::kContiguous);
+}
+
 TEST(ImuClassifier, EitherHalfThatRepeatsItselfTenTimesIsStuckUntilItShowsAnother) {
   for (const bool gyro : {false, true}) {
     Imu imu;
@@ -100,7 +124,7 @@ TEST(ImuClassifier, RepetitionsMayBeSwitchedOff) {
   ImuClassifier classifier;
   const ImuSample s = Imu().next();
   for (int i = 0; i < 300; ++i)
-    ASSERT_EQ(classifier.classify(s, increment_of(s), {}, false, 0), ImuClass::kContiguous) << i;
+    ASSERT_EQ(classifier.classify(s, increment_of(s), {}, false, {.stuck_samples = 0}), ImuClass::kContiguous) << i;
 }
 
 TEST(ImuClassifier, AGyroscopeAtFullScaleIsLeftOutOnlyWhereTheTurnIsKnown) {
@@ -132,7 +156,7 @@ TEST(ImuClassifier, PlainSamplesAreContiguousAndLeaveNothingBehindButThemselves)
     if (one_in(15)) s.clipped_gyro = 1;
     if (one_in(15)) s.clipped_accel = 1;
     if (one_in(20)) s.dangle_b_rad[0] = std::nanf("");
-    const bool is_plain = ImuClassifier::plain(s, before);
+    const bool is_plain = ImuClassifier::plain(s, before, kSensor);
     const ImuClass found = classify(all, s, {}, true);
     if (is_plain) {
       ++plain;

@@ -35,7 +35,7 @@ TEST(Older, AndRecentNeverHoldTogetherAndLeaveOneMicrosecondBetweenThem) {
   }
 }
 
-/// What the class promises, from the list of all tests.
+/// Promises of the class, from the list of all tests.
 struct Tests {
   struct One {
     bool held;

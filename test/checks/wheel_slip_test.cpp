@@ -21,7 +21,7 @@ class Drive {
   WheelSlip watch;
   float forward_mps = 2, turn_radps = 0, sigma_mps = 0.03F;
   float left_slip_mps = 0, right_slip_mps = 0;
-  float noise_mps = 0.03F;  ///< what one count of 0.3 mm is in 10 ms
+  float noise_mps = 0.03F;  ///< one count of 0.3 mm in 10 ms
   bool filter_follows = false;
 
   /// Until the watch says this, or for that long; how long it took.

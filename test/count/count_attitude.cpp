@@ -20,7 +20,8 @@ struct Sample {
   filter::Vector3 rate, force, field;
 };
 
-/// What ideal sensors feel of a rotation whose axis wanders, less than a revolution per second, and of a jolting hand.
+/// Readings of ideal sensors in a rotation whose axis wanders, less than a revolution per second, and of a jolting
+/// hand.
 class Body {
  public:
   Sample next() {

@@ -128,7 +128,7 @@ TEST(Geodesy, AgreesWithGeographicLibBothWaysWithinAMillimetreOutToAHundredKilom
   std::printf("worst of %zu: to local %.4f mm, to geodetic %.4f mm\n", judged, worst_there_m * 1e3, worst_back_m * 1e3);
 }
 
-// What the bus rounds is all that is lost: half of 2e-9 deg each way, and half a float's last place of the height.
+// Rounding on the bus is the only loss: half of 2e-9 deg each way, and half a float's last place of the height.
 TEST(Geodesy, ThereAndBackIsTheSamePlaceToTheResolutionOfTheBus) {
   std::uint64_t seed = 0;
   for (const Triple& origin : origins()) {

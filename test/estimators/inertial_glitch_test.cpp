@@ -120,16 +120,13 @@ TEST(Glitch, APoseFromOutsideEndsWhatFixesClaimed) {
   EXPECT_EQ(d.estimator.jump().count, 1);
 }
 
-TEST(Glitch, WhereNothingAgreesForFourTimesAsLongItGoesToTheFixesAndSaysSo) {
+// Fixes that agree with nothing, not even with the velocity of their own receiver, are never followed.
+TEST(Glitch, FixesThatWanderWhileEverythingElseAgreesAreNeverFollowed) {
   Drive d = settled();
   d.tamper = between(d, 60, 1e9, [](Drive::Fix& fix, double t) { fix.east_m += 60 * (1 + std::floor(t / 7)); });
-  d.run(239);
+  d.run(400);
   EXPECT_EQ(d.estimator.jump().count, 0);
-  EXPECT_LT(d.error_m(), 2.0);
-  d.run(4);
-  EXPECT_EQ(d.estimator.jump().count, 1);
-  EXPECT_EQ(d.estimator.jump().cause, sensor::ResetCause::kPositionJump);
-  EXPECT_NEAR(d.estimator.jump().east_m, 60 * 35, 5);
+  EXPECT_LT(d.error_m(), 4.0);
 }
 
 TEST(Glitch, FixesThatComeRarelyHaveToBeManyToPersist) {
@@ -167,7 +164,7 @@ TEST(Glitch, ARampHasHardlyAnyEffectWhereErrorsLastAndLittleWhereTheyAreNew) {
     }
 }
 
-/// Of 20 drives with a receiver whose errors are new with each fix, which drift for half a minute.
+/// Share of 20 drives with a receiver whose errors are new with each fix, which drift for half a minute.
 struct Ramp {
   double first_refused_s = 0, nees = 0;  ///< means over the drives
   int of_drift = 0;                      ///< fixes refused for their drift, not for themselves

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Every measurement is true at its own microsecond: between two IMU samples, too. A body on a plane that speeds up and
 // turns, exact sensors but for what keeps an IMU from looking stuck; each measurement 9 ms after an IMU sample.
-#include "compiled_inertial.hpp"
+#include "estimators/inertial/inertial.hpp"
 
 #include <gtest/gtest.h>
 
@@ -32,7 +32,7 @@ class Body {
     still_ = false;
     begun_us_ = us_;
   }
-  CompiledInertial estimator;
+  Inertial estimator;
 
   /// measure(stamp) 9 ms after every tenth IMU sample.
   template <class Measure>
@@ -42,7 +42,7 @@ class Body {
       step();
       if (k % 10 == 0) measure(base::Micros{us_ + 9'000});
     }
-    estimator.advance({us_}, ctx());
+    estimator.advance({us_}, ctx(), {});
   }
   [[nodiscard]] double speed(std::int64_t at_us) const { return accel_ * driven_s(at_us); }
   [[nodiscard]] double yaw(std::int64_t at_us) const { return begin_yaw_rad_ + turn_ * driven_s(at_us); }
@@ -91,7 +91,7 @@ class Body {
                                     alive},
             .interval_us = kStep_us},
         {us_}, ctx());
-    estimator.advance({us_}, ctx());
+    estimator.advance({us_}, ctx(), {});
   }
 
   double accel_, turn_, begin_yaw_rad_, climb_;
@@ -124,7 +124,7 @@ TEST(OwnMicrosecond, OfAFix) {
   EXPECT_NEAR(body.height_error_m(), 0.0F, 0.01F);
 }
 
-// Of the U.S. Standard Atmosphere 1976.
+// Model: U.S. Standard Atmosphere 1976.
 TEST(OwnMicrosecond, OfAPressure) {
   Body body(0.0, 0.0, 0.0, 1.0);
   body.run(8, [&](base::Micros at) {

@@ -11,7 +11,7 @@ constexpr std::array<double, 3> kLater_s{5, 20, 40};
 
 struct Starts {
   int aligned = 0;
-  std::array<double, 3> nees{};  ///< of the heading, mean, so long after it was found
+  std::array<double, 3> nees{};  ///< mean NEES of the heading, so long after it was found
   int beyond = 0;                ///< five sigma at any time
 };
 struct Way {
@@ -75,7 +75,7 @@ Starts moving(const Way& way, int seeds, double end_s = 72) {
   return starts;
 }
 
-/// Of 40 a mean of 1.66 is exceeded by one in a hundred that are right; modest by half may be what finds a heading.
+/// A mean of 1.66 over 40 is exceeded by one in a hundred that are right; modest by half may be what finds a heading.
 void expect_honest(const Way& way, int beyond, double most = 1.66) {
   SCOPED_TRACE(testing::Message() << (way.wheels ? "wheels, " : "") << (way.forwards ? "forwards, " : "") << way.mps
                                   << " m/s, " << way.turn_radps << " rad/s, fixes of " << way.fixes_m << " m");
@@ -148,7 +148,7 @@ TEST(InertialMovingStart, CurvesTellNoHeading) {
     }
 }
 
-// What two fixes of a receiver are apart is no way.
+// The distance of two fixes is no way.
 TEST(InertialMovingStart, ARobotThatStandsFindsNone) {
   for (const double fixes_m : {1.0, 3.0})
     EXPECT_EQ(moving({.mps = 0, .turn_radps = 0, .fixes_m = fixes_m}, 10, 900).aligned, 0) << fixes_m;
@@ -161,7 +161,7 @@ TEST(InertialMovingStart, ASlowSpeedometerWillDo) {
     expect_honest({.wheels = false, .mps = mps, .speedometer_every_us = 1'000'000}, 0);
 }
 
-// What the gyroscope shows while the robot stands is no arc of its way. (Half of it went into the course: 14 deg.)
+// Output of the gyroscope while the robot stands is no arc of its way. (Half of it went into the course: 14 deg.)
 TEST(InertialMovingStart, AGyroscopesBiasBeforeItDrivesOffIsNoCurve) {
   for (const double bias_radps : {-0.0085, 0.0085}) {
     constexpr int kSeeds = 40;
@@ -267,7 +267,7 @@ TEST(InertialMovingStart, APoseThatAgreesLeavesAllElseKnown) {
     }
 }
 
-// And one that does not is believed all the same.
+// A pose that contradicts the filter starts it anew.
 TEST(InertialMovingStart, APoseThatContradictsBeginsAnew) {
   Drive d = settled();
   d.yaw_rad += 1.0;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What a robot may have that the rover has not: a pair of antennas that does not point ahead, a gyroscope that feels
 // the Earth turn; and sensors that show the same for ever.
-#include "compiled_inertial.hpp"
+#include "estimators/inertial/inertial.hpp"
 
 #include <gtest/gtest.h>
 
@@ -26,7 +26,7 @@ class Stand {
   }
   param::Parameters n;
   MapFrame map_frame;
-  CompiledInertial estimator;
+  Inertial estimator;
   double yaw_rad = 0;
   nav::Vector3 shown_radps = nav::Vector3::Zero();  ///< by a gyroscope without bias
   bool wheels = true;
@@ -43,7 +43,7 @@ class Stand {
                             .interval_us = 10'000},
           {us}, ctx());
       if (wheels) estimator.fuse(sensor::WheelCounts{}, {us}, ctx());
-      estimator.advance({us}, ctx());
+      estimator.advance({us}, ctx(), {});
     }
   }
   Innovation heading(double line_rad) {

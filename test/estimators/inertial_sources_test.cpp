@@ -5,7 +5,6 @@
 
 #include <gtest/gtest.h>
 
-#include <map>
 #include <utility>
 
 namespace tetap::estimators {
@@ -14,12 +13,8 @@ namespace {
 using Word = std::pair<SourceState, Check>;
 
 Word word(const Drive& d, sensor::Sensor of) {
-  std::map<sensor::Sensor, Word> all;
-  d.estimator.for_each_source(d.ctx(), [&](sensor::Sensor sensor, SourceState state, Check failed) {
-    all[sensor] = {state, failed};
-  });
-  EXPECT_EQ(all.size(), 8U) << "every source once";
-  return all.at(of);
+  const SourceStates::Entry entry = d.estimator.sources(d.ctx()).of(of);
+  return {entry.state, entry.failed};
 }
 constexpr Word kFusing{SourceState::kFusing, Check::kNone}, kStopped{SourceState::kStopped, Check::kNone};
 
@@ -116,7 +111,7 @@ TEST(Recovery, ResettingThePositionMovesItAndLeavesItUncorrelated) {
   Assessment a{.action = Action::kResetPosition};
   a.remedy.step_m = {100, -40, 7};
   a.remedy.variance_m2 = {4, 4, 9};
-  EXPECT_TRUE(recovery.apply(a, ins, parameters()));
+  EXPECT_TRUE(recovery.apply(a, ins, {5'000'000}, parameters()));
   EXPECT_NEAR(ins.x.x.minus({}), 100, 1e-4);
   EXPECT_NEAR(ins.x.y.minus({}), -40, 1e-4);
   EXPECT_NEAR(ins.x.z.minus({}), 0, 1e-6) << "the height is another block";
@@ -128,7 +123,7 @@ TEST(Recovery, ResettingThePositionMovesItAndLeavesItUncorrelated) {
   EXPECT_EQ(recovery.jump().east_m, 100.0F);
   EXPECT_TRUE(recovery.undoable());
   a.remedy.undoes = true;
-  EXPECT_TRUE(recovery.apply(a, ins, parameters()));
+  EXPECT_TRUE(recovery.apply(a, ins, {5'000'000}, parameters()));
   EXPECT_FALSE(recovery.undoable()) << "a way back is no way to go";
 }
 
@@ -137,24 +132,55 @@ TEST(Recovery, FusingSkippingAndRejectingChangeNothing) {
   for (const Action action : {Action::kFuse, Action::kSkip, Action::kReject}) {
     nav::Ins ins = before;
     Recovery recovery;
-    EXPECT_FALSE(recovery.apply({.action = action}, ins, parameters()));
+    EXPECT_FALSE(recovery.apply({.action = action}, ins, {5'000'000}, parameters()));
     EXPECT_TRUE(changed(before, ins).empty());
     EXPECT_EQ(recovery.jump().count, 0);
   }
 }
 
-TEST(Recovery, AVelocityRefusedThreeTimesForLongWithFixesRefusedExhaustsIt) {
+// S' = S + k nu nu^T, so the normalised square of the same innovation is below 1 / k, whatever its size and
+// direction.
+TEST(Recovery, AfterAWideningTheSameInnovationIsTaken) {
+  for (const float size : {0.5F, 2.0F, 30.0F}) {
+    for (const float course : {0.0F, 1.1F, 4.0F}) {
+      const nav::Vector3 nu{size * std::cos(course), size * std::sin(course), 0.0F};
+      for (const Action action : {Action::kWidenVelocity, Action::kWidenPosition}) {
+        nav::Ins ins = correlated();
+        const nav::Ins before = ins;
+        Recovery recovery;
+        Assessment a{.action = action};
+        a.remedy.innovation = nu;
+        a.remedy.since_s = 2.0F;
+        EXPECT_TRUE(recovery.apply(a, ins, {5'000'000}, parameters()));
+        const int first = action == Action::kWidenVelocity ? nav::InsState::kVelocity : nav::InsState::kPosition;
+        const float c = std::cos(course), s = std::sin(course);
+        const float along =
+            c * c * ins.p(first, first) + s * s * ins.p(first + 1, first + 1) + 2 * c * s * ins.p(first, first + 1);
+        EXPECT_LT(size * size / along, 0.51F) << size << ' ' << course;
+        for (int i = nav::InsState::kAccelBias; i < nav::InsState::kErrors; ++i)
+          EXPECT_LE(ins.p(i, i), before.p(i, i)) << i;
+        EXPECT_TRUE(recovery.widened_lately({14'000'000}));
+        EXPECT_FALSE(recovery.widened_lately({16'000'000}));
+      }
+    }
+  }
+}
+
+TEST(Recovery, ASecondWideningWithinTenSecondsDoubtsTheBias) {
   nav::Ins ins = correlated();
   Recovery recovery;
-  Assessment a{.action = Action::kInflateVelocity};
-  a.remedy.position_refused = true;
-  for (int i = 0; i < 3; ++i) {
-    EXPECT_FALSE(recovery.exhausted()) << i;
-    recovery.apply(a, ins, parameters());
-  }
-  EXPECT_TRUE(recovery.exhausted());
-  recovery.position_fused();
-  EXPECT_FALSE(recovery.exhausted());
+  Assessment a{.action = Action::kWidenVelocity};
+  a.remedy.innovation = {1.0F, 0.0F, 0.0F};
+  a.remedy.since_s = 1.0F;
+  const auto bias = [&] { return ins.p(nav::InsState::kAccelBias, nav::InsState::kAccelBias); };
+  const float before = bias();
+  recovery.apply(a, ins, {5'000'000}, parameters());
+  EXPECT_EQ(bias(), before);
+  recovery.apply(a, ins, {30'000'000}, parameters());
+  EXPECT_EQ(bias(), before) << "long after";
+  recovery.apply(a, ins, {35'000'000}, parameters());
+  const float most = parameters().inertial.accel_turn_on_mps2;
+  EXPECT_NEAR(bias(), before + most * most, 1e-6F);
 }
 
 TEST(WorkBudget, TakesOneMeasurementATickAndWhatWaitedForTwiceItsPeriod) {

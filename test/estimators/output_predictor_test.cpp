@@ -233,7 +233,7 @@ TEST(OutputPredictor, SaysWhenASampleComesThatItWentOnWithout) {
   EXPECT_TRUE(ahead.note_arrival({110'000}));
 }
 
-/// What is missing at the end is gone on through: the turn is kept for a few samples, then the wheels' word taken.
+/// Missing samples at the end are bridged: the turn is kept for a few samples, then the wheels' word taken.
 TEST(OutputPredictor, GoesOnStraightThroughWhatIsMissing) {
   param::InertialParameters n;
   nav::Earth earth;
@@ -248,7 +248,7 @@ TEST(OutputPredictor, GoesOnStraightThroughWhatIsMissing) {
   EXPECT_NEAR(nav::euler(after(400'000, true).q_nb).yaw_rad, 0.005F + 0.04F, 1e-4F);
   EXPECT_NEAR(nav::euler(after(400'000, false).q_nb).yaw_rad, 0.005F, 1e-4F);
   EXPECT_NEAR(after(400'000, false).v_n_mps.norm(), 2.0F, 1e-3F);
-  // What it drives turns with it.
+  // The driven way turns with it.
   for (const nav::InsState& at : {after(50'000, false), after(400'000, true), after(400'000, false)})
     EXPECT_NEAR(at.q_nb.conjugate().rotate(at.v_n_mps)(1), 0.0F, 5e-3F);
 }
@@ -272,7 +272,7 @@ class Ticks {
     for (us_ += 1'000; us_ <= end; us_ += 1'000) {
       const float t_s = 1e-6F * static_cast<float>(us_ - kBegin_us);
       if (imu && us_ % imu_us == 0) {
-        if (!stuck) last_ = imu_sample(us_, {shake(), shake(), shake()}, {shake(), shake(), 9.806F}, imu_us);
+        if (!stuck) last_ = imu_sample(us_, {shake(), shake(), shake()}, {shake(), shake(), 9.806F + shake()}, imu_us);
         insert(last_);
       }
       if (unused_us > 0 && us_ % unused_us == 0) {
@@ -317,7 +317,7 @@ class Ticks {
   [[nodiscard]] float sigma_mps() const {
     return base::sqrt(history_.primary().motion_variance(context()).forward_m2ps2);
   }
-  std::int64_t late_us = 0;  ///< of what left, behind the end of the window, at most
+  std::int64_t late_us = 0;  ///< delay of the last output behind the end of the window, at most
   std::map<sensor::Sensor, int> fused;
 
  private:

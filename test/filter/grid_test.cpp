@@ -159,7 +159,7 @@ TEST(Grid, NothingMakesACellThatIsNoNumber) {
 // --- MRCLAM: 6 m x 12 m, cells of 0.25 m and 10 degrees, nothing known of the start.
 
 struct Search {
-  double found_s = -1;  ///< since when the error stayed below half a metre for ten seconds
+  double found_s = -1;  ///< begin of the time in which the error stayed below half a metre for ten seconds
 };
 
 Search search(const test::Mrclam& run) {

@@ -155,7 +155,7 @@ TEST(NeverNan, EveryNumberOfALinearKalmanFilter) {
   }
 }
 
-/// What a gate cannot compare with is no gate.
+/// A number that is not comparable is no gate.
 TEST(NeverNan, AGateThatIsNoNumberLetsNothingThrough) {
   auto ekf = rolling();
   const auto p = ekf.p.packed();

@@ -132,7 +132,7 @@ class FakeCanChip {
   std::deque<CanWords> rx_;
 };
 
-/// What the driver holds in place of Mmio.
+/// Stand-in for Mmio in the driver.
 struct FakeRegisters {
   FakeCanChip* chip;
   [[nodiscard]] std::uint32_t read(std::uint32_t offset) const { return chip->read(offset); }

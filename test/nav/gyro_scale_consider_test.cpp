@@ -39,7 +39,7 @@ TEST(GyroScaleConsider, TenCirclesCostTenTimesOne) {
   EXPECT_NEAR(sigma_after(62.831853, 0.01, [](double) { return 1.0; }) / 6.2831853, 10.0, 0.01);
 }
 
-/// What the heading's variance is with the scale as a state that is never corrected: 2 x 2, written out, by the gain
+/// Variance of the heading with the scale as a state that is never corrected: 2 x 2, written out, by the gain
 /// that the filter takes (Joseph's form: it may be another than the best).
 struct Considered {
   double p = 0, c = 0;

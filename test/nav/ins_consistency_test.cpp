@@ -188,7 +188,7 @@ TEST(InsConsistency, WhatATiltHidesIsNotTakenForAVerticalBias) {
       bias[s] += r.nees<3>(9) / kRuns, velocity[s] += r.nees<3>(3) / kRuns, tilt[s] += r.nees<2>(6) / kRuns;
     }
   }
-  // Of 400 draws one in a thousand is off by more than 0.40 of 3, 0.33 of 2 and 0.23 of 1. By 0.15 more: the second
+  // One in a thousand of 400 draws is off by more than 0.40 of 3, 0.33 of 2 and 0.23 of 1. By 0.15 more: the second
   // order has no normal distribution.
   for (std::size_t s = 0; s < 3; ++s) {
     std::printf(
@@ -202,9 +202,9 @@ TEST(InsConsistency, WhatATiltHidesIsNotTakenForAVerticalBias) {
   }
 }
 
-// What stood before it was told its heading has tilt and bias as one error in its body: told, it has not turned, and
-// the other directions of the pair stay unseen until it does. (With errors of the tilt that stay where they were the
-// NEES of the tilt was 40 of 2, of the bias 41 of 3.)
+// A robot that stood before its heading was given has tilt and bias as one error in its body: told, it has not turned,
+// and the other directions of the pair stay unseen until it does. (With errors of the tilt that stay where they were
+// the NEES of the tilt was 40 of 2, of the bias 41 of 3.)
 TEST(InsConsistency, AHeadingThatIsToldPartsNoTiltFromABias) {
   constexpr int kRuns = 200;
   const std::array<float, 15> sigma{0.1F, 0.1F,  0.1F,  0.01F, 0.01F, 0.01F, 5e-3F, 5e-3F,

@@ -111,7 +111,7 @@ TEST(Ins, AHeadingThatIsToldDoesNotPayForTheWayBack) {
   EXPECT_NEAR(std::sqrt(ins.p(8, 8)), kCircle_rad, 0.1F * kCircle_rad);
 }
 
-/// What tells the bias tells the heading what the bias did to it, and nothing of what the scale did.
+/// A measurement of the bias corrects the heading by the effect of the bias, and not by that of the scale.
 TEST(Ins, ABiasThatIsToldLeavesTheScaleToTheHeading) {
   Ins ins;
   ins.noise.gyro_scale = 0.003F;
@@ -177,7 +177,7 @@ TEST(Ins, TiltAndBiasStayTogetherWhenTheHeadingIsTold) {
     p(6, 6) = p(7, 7) = 2.5e-5F, p(8, 8) = 1, p(9, 9) = p(10, 10) = 2.5e-3F, p(9, 9) *= 4;
     for (int i = 3; i < 6; ++i) p(i, i) = 1e-4F;
     ASSERT_TRUE(ins.start({}, p));
-    // Of the acceleration that tilt and bias make together, in the body: theta x g - b.
+    // Acceleration that tilt and bias make together, in the body: theta x g - b.
     const auto variance = [&ins] {
       const Eigen::Matrix3d r = ins.x.q_nb.matrix().cast<double>();
       Eigen::Matrix<double, 2, 15> h = Eigen::Matrix<double, 2, 15>::Zero();
@@ -219,7 +219,7 @@ TEST(Ins, WhatTremblesAtRestTellsNoTilt) {
   EXPECT_NEAR(ins.p(7, 7), as_the_bias, 0.1F * as_the_bias);
 }
 
-/// What is published of the covariance while the filter itself is behind: as if it had been carried sample by sample.
+/// Published covariance while the filter itself is behind: as if it had been carried sample by sample.
 TEST(Ins, TheStepToThePresentIsThatOfEverySampleOnTheWay) {
   Ins far;
   far.noise.motion_sigma = 0;  // between samples there is motion here

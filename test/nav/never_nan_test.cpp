@@ -135,7 +135,7 @@ TEST(NeverNan, ACourseOfAVelocityThatIsNoneIsRefused) {
     }
 }
 
-/// What a gate cannot compare with is no gate.
+/// A number that is not comparable is no gate.
 TEST(NeverNan, AGateThatIsNoNumberLetsNothingThrough) {
   nav::Ins ins = navigating();
   const auto p = ins.p.packed();

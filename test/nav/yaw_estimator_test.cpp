@@ -24,7 +24,7 @@ using Eigen::Vector3d;
 constexpr double kPi = std::numbers::pi, kGravity = 9.80665, kDt_s = 0.005;
 constexpr std::int64_t kDt_us = 5'000;
 
-/// What a drive does at a time: speed along the nose, turning.
+/// Motion of a drive at a time: speed along the nose, turning.
 struct Drive {
   const char* name;
   std::function<double(double)> speed_mps, rate_radps;
@@ -44,19 +44,19 @@ const Drive kRoverCrawl{"rover at 0.5 m/s straight on", [](double) { return 0.5;
 const Drive kConstant{"constant velocity", [](double) { return 5.0; }, [](double) { return 0.0; }};
 const Drive kStand{"standstill", [](double) { return 0.0; }, [](double) { return 0.0; }};
 
-/// What is wrong with the sensors; one sigma, drawn per seed.
+/// Errors of the sensors; one sigma, drawn per seed.
 struct World {
   double gyro_bias_radps = 0.0087;  ///< 0.5 deg/s
   double accel_bias_mps2 = 0.1;
-  double tilt_rad = 0.05;  ///< of the level it is given
+  double tilt_rad = 0.05;  ///< tilt of the level it is given
   double gyro_radps_rthz = 1e-4, accel_mps2_rthz = 0.01;
   double velocity_mps = 0.1;
   double position_m = 0;  ///< above zero: no velocity but this
   double wheels_mps = 0;  ///< above zero: wheels
   double shake_rad = 0.03;
   bool level = true;
-  double slow_mps = 0;      ///< of an error of the velocity that lasts 2 s
-  double receiver_mps = 0;  ///< what the receiver calls its accuracy; 0: the truth
+  double slow_mps = 0;      ///< size of a velocity error that lasts 2 s
+  double receiver_mps = 0;  ///< accuracy as the receiver states it; 0: the truth
   double gyro_scale = 0, wheel_scale = 0;
 };
 
@@ -126,7 +126,7 @@ class Trial {
   [[nodiscard]] double gyro_bias_z_radps() const { return b_g_(2); }
 
   Vector3d glitch = Vector3d::Zero(), lever_b_m = Vector3d::Zero();
-  bool told = true;  ///< of the lever
+  bool told = true;  ///< the filter is given the lever
 
  private:
   void move() {
@@ -603,7 +603,7 @@ TEST(YawEstimator, NumbersThatNoSensorMeansChangeNothing) {
   }
 }
 
-/// What is accepted may still be nonsense.
+/// Accepted input may still be nonsense.
 TEST(YawEstimator, StaysFiniteWhateverComes) {
   base::Random random(99);
   const auto wild = [&] { return random.normal() * base::exp(6 * random.normal()); };

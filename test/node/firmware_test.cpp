@@ -16,7 +16,7 @@ struct SlowBoard {
     Frames to_node, sent;
     std::size_t next = 0;
     base::Micros* clock = nullptr;
-    base::Micros cost;  ///< of the epoch's first frame: what the tick takes
+    base::Micros cost;  ///< duration of the tick, at the epoch's first frame
 
     bool send(const base::CanFrame& frame) {
       if (frame.id == 0x300 + bus::EstEpoch::kOffset) *clock += cost;

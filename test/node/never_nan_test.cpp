@@ -5,7 +5,6 @@
 #include "bench.hpp"
 #include "config/rover.hpp"
 #include "estimators/attitude.hpp"
-#include "estimators/compiled_inertial.hpp"
 #include "estimators/inertial/inertial.hpp"
 #include "estimators/odometry.hpp"
 #include "estimators/planar/pose_ekf.hpp"
@@ -130,7 +129,7 @@ sensor::Sample sample_of(sensor::Sensor sensor, base::Micros stamp, const Payloa
   return sample;
 }
 
-/// What good sensors say of a robot that drives east at 1 m/s: they agree, or the rest of them would be refused.
+/// Samples of good sensors on a robot that drives east at 1 m/s: they agree, or the rest of them would be refused.
 std::vector<sensor::Sample> good(int k, base::Micros t) {
   using sensor::Sensor;
   const auto counts = static_cast<std::uint16_t>(32 * k);
@@ -293,7 +292,7 @@ TEST(NeverNan, EveryFieldOfEverySampleWhileStartingAndWhileNavigating) {
           }
 }
 
-/// What is refused at the door is counted, and the count is on the bus.
+/// Refused input is counted, and the count is on the bus.
 TEST(NeverNan, EveryFieldThatIsRefusedIsSaid) {
   using Node = node::Node<
       node::Estimators<estimators::Odometry, estimators::PoseEkf, estimators::Attitude, estimators::Inertial>>;
@@ -340,7 +339,7 @@ TEST(NeverNan, EveryFieldThatIsRefusedIsSaid) {
   EXPECT_GT(refused, 200);
 }
 
-/// What is counted, and what a thermometer says.
+/// Counts, and the reading of a thermometer.
 TEST(NeverNan, EveryIntegerOfEverySampleWhileStartingAndWhileNavigating) {
   using sensor::Sensor;
   struct Spoilt {
@@ -401,7 +400,7 @@ TEST(NeverNan, StampsOfAnyAgeInTheInertialEstimatorItself) {
     for (const std::int64_t off_us : std::initializer_list<std::int64_t>{-1'000'000'000'000, -10'000'000, -200'001, -1,
                                                                          1, 200'001, 10'000'000, 1'000'000'000'000}) {
       SCOPED_TRACE(testing::Message() << "sensor " << static_cast<int>(kind.sensor) << ", " << off_us << " us");
-      estimators::CompiledInertial estimator;
+      estimators::Inertial estimator;
       base::Micros now{2'000'000'000'000};
       estimator.restart(now, ctx);
       for (int k = 0; k < 600; ++k) {
@@ -413,7 +412,7 @@ TEST(NeverNan, StampsOfAnyAgeInTheInertialEstimatorItself) {
               static_cast<void>(estimator.fuse(payload, odd ? now + base::Micros{off_us} : now, ctx));
           });
         }
-        estimator.advance(now, ctx);
+        estimator.advance(now, ctx, {});
         if (k % 20 != 0) continue;
         const estimators::InertialEstimate e = estimator.inertial(ctx);
         ASSERT_TRUE(e.state.finite()) << k;

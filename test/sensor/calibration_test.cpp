@@ -72,7 +72,7 @@ TEST(Calibrate, WithoutATemperatureTheBiasIsTheOneItHoldsAt) {
   }
 }
 
-// What is taken out differs from sample to sample, by the noise of the thermometer and the jitter of the interval.
+// The correction differs from sample to sample, by the noise of the thermometer and the jitter of the interval.
 TEST(Calibrate, DoesNotMakeAStuckSensorLookAlive) {
   for (const bool gyro : {true, false}) {
     checks::ImuClassifier repeats;

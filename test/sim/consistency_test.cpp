@@ -50,7 +50,7 @@ World::Options noisy() {
   return {.parameters = parameters};
 }
 
-/// What one seed's world sends, and where the rover was. Made once: what is judged changes, the world does not.
+/// Frames of one seed's world, and where the rover was. Made once: what is judged changes, the world does not.
 struct Recorded {
   struct Epoch {
     std::vector<base::CanFrame> inputs;
@@ -88,7 +88,7 @@ struct Bounds {
 constexpr double kTwoSided95 = 1.9600, kTwoSided99 = 2.5758;
 constexpr double kStudent99 = 2.7564;  // two-sided, 29 degrees of freedom
 
-/// Of the mean of `count` variables with `dof` degrees of freedom in all.
+/// Interval of the mean of `count` variables with `dof` degrees of freedom in all.
 Bounds bounds(double dof, double count, double z) { return {chi_square(dof, -z) / count, chi_square(dof, z) / count}; }
 
 struct Nis {

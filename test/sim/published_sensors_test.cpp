@@ -39,7 +39,7 @@ std::vector<std::string> words(std::string_view text) {
   return {std::istream_iterator<std::string>{in}, {}};
 }
 
-/// What the world sends that robot, tick by tick, as text: ids and bytes.
+/// Frames of the world to that robot, tick by tick, as text: ids and bytes.
 class Sending {
  public:
   Sending(const std::string& robot, std::vector<FaultSetting> faults)
@@ -110,7 +110,7 @@ TEST(Sent, every_fault_that_a_robot_accepts_changes_what_it_is_sent_and_no_other
     for (Sending sending{robot, {}}; sending.next(bytes);) without.push_back(bytes);
     const std::vector<std::string> act = words(faults_that_act(Sending::options(robot, {})));
     for (const FaultInfo& row : fault_table()) {
-      // It stands until 10 s; what is told at the start comes with the first tick.
+      // The robot stands until 10 s; its pose at the start comes with the first tick.
       const std::vector<FaultSetting> faults{{row.fault, base::Micros{14'000'000}, base::Micros{5'000'000}}};
       const std::string why = cannot_act(Sending::options(robot, faults), robot);
       EXPECT_EQ(why.empty(), changes_a_frame(without, Sending{robot, faults})) << robot << ": " << row.name << why;

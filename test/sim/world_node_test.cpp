@@ -140,8 +140,8 @@ SaidPages pages_of(const std::vector<Epoch>& epochs) {
   return said;
 }
 
-// What is averaged over runs, or compared between a robot and its replay, has to come in the same epochs of each; and
-// what turns and accelerates is judged by the covariance of its own time.
+// Data that is averaged over runs, or compared between a robot and its replay, has to come in the same epochs of each;
+// and what turns and accelerates is judged by the covariance of its own time.
 TEST(Covariance, ComesWithWhatItJudgesInTurnsThatTheEpochSays) {
   World::Options late;
   late.faults = {{Fault::kMovingStart, base::Micros{0}, base::Micros{3'270'000}}};
@@ -328,7 +328,7 @@ TEST(Motion, TheOneSigmaOfSpeedAndTurnRateGrowsWithTheirErrorsWhereTheImuIsStuck
   }
 }
 
-constexpr double kTrembles_mps = 0.005;  ///< of a body, as an engine makes it
+constexpr double kTrembles_mps = 0.005;  ///< trembling of a body, as an engine makes it
 
 // Wheels that scatter, and no GNSS that would hide what they do: those that err to the slow side count for no more than
 // the others. By what the reading itself says of its uncertainty, the robot would lose 0.7 mm/s, or 25.

@@ -7,8 +7,8 @@
 
 namespace tetap::test {
 
-/// Of diag(p)^-1/2 p diag(p)^-1/2: above zero means positive definite. Minus infinity when something is no number or a
-/// variance is not above zero.
+/// Least eigenvalue of diag(p)^-1/2 p diag(p)^-1/2: above zero means positive definite. Minus infinity when something
+/// is no number or a variance is not above zero.
 double least_eigenvalue(const Eigen::MatrixXd& p);
 
 template <int N>

@@ -14,10 +14,10 @@ namespace tetap::hal {
   return {std::int64_t{t.tv_sec} * 1'000'000 + t.tv_nsec / 1000};
 }
 
-/// Since some fixed moment; never goes back.
+/// Time since some fixed moment; never goes back.
 [[nodiscard]] inline base::Micros monotonic_clock() { return read_clock(CLOCK_MONOTONIC); }
 
-/// Since 1970, what candump writes.
+/// Time since 1970, as candump writes it.
 [[nodiscard]] inline base::Micros wall_clock() { return read_clock(CLOCK_REALTIME); }
 
 inline void sleep_for(base::Micros span) {

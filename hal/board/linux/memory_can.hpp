@@ -3,8 +3,7 @@
 // codec and firmware.
 #pragma once
 
-#include "hal/board.hpp"
-#include "hal/board/linux/clock.hpp"
+#include "hal/can_bus.hpp"
 
 #include <array>
 #include <cstddef>
@@ -64,17 +63,5 @@ struct MemoryBus {
   [[nodiscard]] MemoryCan node_end() { return {*from_node, *to_node}; }
   [[nodiscard]] MemoryCan player_end() { return {*to_node, *from_node}; }
 };
-
-/// The node's board in such a process.
-struct MemoryBoard {
-  explicit MemoryBoard(MemoryBus& bus) : can(bus.node_end()) {}
-
-  [[nodiscard]] base::Micros now() const { return monotonic_clock() - began; }
-
-  MemoryCan can;
-  base::Micros began = monotonic_clock();
-};
-
-static_assert(Board<MemoryBoard>);
 
 }  // namespace tetap::hal

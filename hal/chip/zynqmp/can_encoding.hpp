@@ -90,7 +90,7 @@ inline constexpr std::uint32_t kError = 1U << 29;
 inline constexpr unsigned kDlcShift = 28;  // bits 27:0 are reserved, or the time stamp of a received frame
 inline constexpr std::uint8_t kMaxSize = 8;
 
-/// What is written to TXFIFO_ID, _DLC, _DATA1, _DATA2. Unused data bytes are zero.
+/// Words for TXFIFO_ID, _DLC, _DATA1, _DATA2. Unused data bytes are zero.
 [[nodiscard]] constexpr CanWords to_words(Machine machine, const base::CanFrame& frame) {
   const std::uint8_t size = frame.size < kMaxSize ? frame.size : kMaxSize;
   CanWords words{.id = id_word(machine, {.id = frame.id, .extended = frame.extended}),
@@ -101,7 +101,7 @@ inline constexpr std::uint8_t kMaxSize = 8;
   return words;
 }
 
-/// What was read from the RXFIFO registers; empty for a remote frame, which carries no data.
+/// Frame from the RXFIFO registers; empty for a remote frame, which carries no data.
 [[nodiscard]] constexpr std::optional<base::CanFrame> to_frame(Machine machine, const CanWords& words) {
   const CanIdentifier from =
       machine == Machine::kSilicon ? silicon::identifier(words.id) : emulated::identifier(words.id);

@@ -7,6 +7,7 @@
 #include "estimators/context.hpp"
 #include "estimators/inertial/imu_input.hpp"
 #include "estimators/inertial/source.hpp"
+#include "estimators/inertial/vote.hpp"
 #include "nav/ins.hpp"
 
 #include <cstdint>
@@ -76,12 +77,21 @@ class FilterView {
   [[nodiscard]] bool encoders_rest() const;
   /// The receiver repeats a position.
   [[nodiscard]] bool position_frozen() const;
-  /// So many fixes in a row were refused.
-  [[nodiscard]] bool position_refused(std::int32_t at_least) const;
+  /// Fixes were refused for so long that the receiver alone is right.
+  [[nodiscard]] bool position_refused_for_long() const;
   /// A fix was fused within RecoveryParameters::after_us: the filter's heading is better than a magnetometer's.
   [[nodiscard]] bool position_holds_heading() const;
-  /// A fix was fused, or a velocity came and was not refused, within 1 s.
-  [[nodiscard]] bool gnss_holds_velocity() const;
+  /// Vote of the wheels, or the speedometer, on what is refused since then; of the receiver's velocity; and of its
+  /// fixes on a velocity that is off by nu. Wheels that fixes contradicted for long do not vouch any more.
+  [[nodiscard]] Vote wheels_vote(base::Micros since) const;
+  [[nodiscard]] Vote velocity_vote(base::Micros since) const;
+  [[nodiscard]] Vote fixes_vote(base::Micros since, const nav::Vector3& nu_mps) const;
+  /// The receiver goes ahead as fast as the wheels roll.
+  [[nodiscard]] bool speeds_agree() const;
+  /// A velocity contradicts the filter of late, and where two do, they agree with each other.
+  [[nodiscard]] bool speeds_contradict() const;
+  /// Stamp of the last IMU sample that was left out, or that leapt; 0: none.
+  [[nodiscard]] base::Micros imu_doubted_at() const { return parts_.imu.doubted_at(); }
   /// A receiver's velocity came within 1 s.
   [[nodiscard]] bool velocity_recent() const;
   /// A magnetometer that is not trusted may have led the heading.

@@ -19,7 +19,7 @@ inline bool FilterView::wheels_silent() const { return parts_.sources.forward.ti
 
 inline bool FilterView::wheels_agree() const {
   const AidingSources& s = parts_.sources;
-  if (s.position.refused().persists(stamp(), base::Micros{parameters().recovery.persist_us})) return false;
+  if (position_refused_for_long()) return false;
   return checks::recent(s.wheels.turned_at(), stamp(), base::Micros{1'000'000}) && !s.forward.refused().holds() &&
          slip() == checks::WheelSlip::Slip::kNone;
 }
@@ -42,19 +42,37 @@ inline bool FilterView::encoders_rest() const {
 
 inline bool FilterView::position_frozen() const { return parts_.sources.position.frozen(); }
 
-inline bool FilterView::position_refused(std::int32_t at_least) const {
-  return parts_.sources.position.refused().count() >= at_least;
+inline bool FilterView::position_refused_for_long() const {
+  return parts_.sources.position.refused().persists(stamp(), base::Micros{parameters().recovery.persist_us});
 }
 
 inline bool FilterView::position_holds_heading() const {
   return checks::recent(parts_.sources.position.last_fused(), stamp(), base::Micros{parameters().recovery.after_us});
 }
 
-inline bool FilterView::gnss_holds_velocity() const {
-  constexpr base::Micros kLately{1'000'000};
-  const GnssVelocitySource& velocity = parts_.sources.velocity;
-  return !checks::older(parts_.sources.position.last_fused(), stamp(), kLately) ||
-         (velocity.came_lately(stamp()) && !velocity.refused().holds());
+inline Vote FilterView::wheels_vote(base::Micros since) const {
+  const Vote vote = parts_.sources.forward.witness().of_velocity(since, stamp());
+  const bool unsure = slip() != checks::WheelSlip::Slip::kNone || position_refused_for_long();
+  return vote == Vote::kFor && unsure ? Vote::kAbstains : vote;
+}
+
+inline Vote FilterView::velocity_vote(base::Micros since) const {
+  return parts_.sources.velocity.witness().of_velocity(since, stamp());
+}
+
+inline Vote FilterView::fixes_vote(base::Micros since, const nav::Vector3& nu_mps) const {
+  return parts_.sources.position.vote(since, nu_mps, stamp());
+}
+
+inline bool FilterView::speeds_agree() const {
+  const float rolled_mps = parts_.sources.forward.last_mps();
+  return base::abs(parts_.sources.velocity.ahead_mps() - rolled_mps) < 0.5F + 0.1F * base::abs(rolled_mps);
+}
+
+inline bool FilterView::speeds_contradict() const {
+  const bool receiver = parts_.sources.velocity.witness().contradicts(stamp());
+  const bool wheels = parts_.sources.forward.witness().contradicts(stamp());
+  return (receiver || wheels) && !(receiver && wheels && !speeds_agree());
 }
 
 inline bool FilterView::velocity_recent() const { return parts_.sources.velocity.recent(stamp()); }

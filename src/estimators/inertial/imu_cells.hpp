@@ -8,6 +8,7 @@
 #include "nav/imu_gather.hpp"
 #include "param/parameters.hpp"
 #include "sensor/sample.hpp"
+#include "sensor/window.hpp"
 
 #include <array>
 #include <cstdint>
@@ -65,8 +66,7 @@ class ImuCells {
 
   /// Adds new samples of the window and drops those that begin to leave it: the grid place of the window's first sample
   /// has no cell, and neither have samples beyond the last cell where there was no room for more.
-  template <class Window>
-  void follow(const Window& window, const param::InertialParameters& n) {
+  void follow(const sensor::Window& window, const param::InertialParameters& n) {
     std::size_t first = 0;
     while (first < window.size() && !is_of(window[first], n)) ++first;
     if (first == window.size()) return clear();
@@ -85,7 +85,7 @@ class ImuCells {
     while (!is_of(window[before], n)) --before;
     for (; i < window.size(); ++i) {
       if (!is_of(window[i], n)) continue;
-      if (!add(window[i], window[before].payload.imu)) return;
+      if (!add(window[i], window[before].payload.imu, n)) return;
       before = i;
     }
   }
@@ -101,10 +101,10 @@ class ImuCells {
 
   [[nodiscard]] static constexpr std::int64_t grid(base::Micros t) { return t.us >> kGrid; }
   /// False when there is no room.
-  bool add(const Sample& sample, const ImuSample& before) {
+  bool add(const Sample& sample, const ImuSample& before, const param::InertialParameters& n) {
     const ImuSample& imu = sample.payload.imu;
     const nav::ImuIncrement increment = checks::increment_of(imu);
-    const bool plain = checks::ImuClassifier::plain(imu, before);
+    const bool plain = checks::ImuClassifier::plain(imu, before, n);
     const ImuCell* open = size_ > 0 ? &(*this)[size_ - 1] : nullptr;
     if (open == nullptr || grid(open->last()) != grid(sample.stamp) || (open->plain() && open->gather.full())) {
       if (size_ == kMost) return false;

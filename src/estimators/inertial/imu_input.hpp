@@ -22,16 +22,19 @@ class ImuInput {
   /// Turn rate as the gyroscope shows it, at the filter's time; its bias is in it.
   [[nodiscard]] const nav::Vector3& rate_b_radps() const { return rate_b_radps_; }
   void set_rate(const nav::Vector3& rate_b_radps) { rate_b_radps_ = rate_b_radps; }
-  /// The last sample was at full scale where wheels show the turn.
-  [[nodiscard]] bool saturated() const { return saturated_; }
-  void set_saturated(bool saturated) { saturated_ = saturated; }
+  /// The last sample was beyond the sensor's range, or at full scale where wheels show the turn.
+  [[nodiscard]] bool unusable() const { return unusable_; }
+  void set_unusable(bool unusable) { unusable_ = unusable; }
+  /// Stamp of the last sample that was left out, or that leapt; 0: none.
+  [[nodiscard]] base::Micros doubted_at() const { return doubted_at_; }
+  void doubt(base::Micros stamp) { doubted_at_ = stamp; }
   /// Time to which the filter last went without IMU; 0: never.
   [[nodiscard]] base::Micros bridged_until() const { return bridged_until_; }
   void set_bridged(base::Micros until) { bridged_until_ = until; }
 
   /// The last step of a filter at `time` was without IMU.
   [[nodiscard]] bool missing(base::Micros time) const {
-    return health_.stuck() || saturated_ || (bridged_until_.us > 0 && bridged_until_ == time);
+    return health_.stuck() || unusable_ || (bridged_until_.us > 0 && bridged_until_ == time);
   }
   /// Within the last second the filter went without IMU, or the IMU was stuck.
   [[nodiscard]] bool missing_lately(base::Micros time) const {
@@ -40,7 +43,7 @@ class ImuInput {
   [[nodiscard]] SourceStatus status(base::Micros at, const param::InertialParameters& n) const {
     if (health_.stuck()) return {SourceState::kDistrusted, Check::kStuck};
     if (health_.last_valid().us == 0 || health_.stale(at, n)) return {SourceState::kStopped, Check::kNone};
-    return {saturated_ ? SourceState::kRejecting : SourceState::kFusing, saturated_ ? Check::kValue : Check::kNone};
+    return {unusable_ ? SourceState::kRejecting : SourceState::kFusing, unusable_ ? Check::kValue : Check::kNone};
   }
 
   template <class Sink>
@@ -48,14 +51,16 @@ class ImuInput {
     health_.hash_state(sink);
     for (int i = 0; i < 3; ++i) sink(rate_b_radps_(i));
     sink(bridged_until_.us);
-    sink(static_cast<std::uint32_t>(saturated_));
+    sink(doubted_at_.us);
+    sink(static_cast<std::uint32_t>(unusable_));
   }
 
  private:
   checks::ImuHealth health_;
   base::Micros bridged_until_;  ///< time to which the filter last went without IMU; 0: never
   nav::Vector3 rate_b_radps_ = nav::Vector3::Zero();
-  bool saturated_ = false;
+  base::Micros doubted_at_;  ///< stamp of the last sample that was left out, or that leapt; 0: none
+  bool unusable_ = false;
 };
 
 }  // namespace tetap::estimators

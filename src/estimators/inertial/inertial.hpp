@@ -17,6 +17,7 @@
 #include "estimators/inertial/work_budget.hpp"
 #include "nav/ins.hpp"
 #include "sensor/sample.hpp"
+#include "sensor/window.hpp"
 
 #include <cstdint>
 
@@ -46,8 +47,7 @@ class Inertial {
     budget_.note_arrival();
   }
   /// Brings the estimate to t: the state at the horizon, carried over the samples of the window.
-  template <class Window>
-  void advance(base::Micros t, const Context& ctx, const Window& window);
+  void advance(base::Micros t, const Context& ctx, const sensor::Window& window);
   /// The sample asks for more work than this tick has left: it waits for the next one.
   [[nodiscard]] bool rests(const sensor::Sample& sample, const Context& ctx);
 
@@ -59,9 +59,8 @@ class Inertial {
   [[nodiscard]] MotionVariance motion_variance(const Context& ctx) const;
   [[nodiscard]] InertialEstimate inertial(const Context& ctx) const;
   [[nodiscard]] sensor::Mode mode(const Context& ctx) const;
-  /// Calls sink(sensor::Sensor, SourceState, Check) for every source: its state, and the test that failed last.
-  template <class Sink>
-  void for_each_source(const Context& ctx, Sink&& sink) const;
+  /// State of every source, and the test that failed last.
+  [[nodiscard]] SourceStates sources(const Context& ctx) const;
   template <class Sink>
   void hash_state(Sink&& sink) const;
 
@@ -114,7 +113,9 @@ class Inertial {
   template <int M, class Source>
   Innovation conclude(const filter::Innovation<float, M>& result, Source& source, const FilterView& filter);
   void apply(const Assessment& a, const FilterView& filter) {
-    if (recovery_.apply(a, ins_, filter.parameters())) predictor_.note_correction();
+    if (recovery_.apply(a, ins_, filter.stamp(), filter.parameters())) predictor_.note_correction();
+    if (a.action == Action::kWidenVelocity)
+      sources_.wheels.reset_slip();  // a slip is judged by the speed that was wrong
   }
   Innovation fuse_fix(model::GnssFix3d& fix, const FilterView& filter);
   Innovation update_by_fix(model::GnssFix3d& fix, const FixMeasurement& z, bool with_height, const FilterView& filter);
@@ -133,8 +134,7 @@ class Inertial {
   // Tick.
   [[nodiscard]] std::int32_t work_of(const sensor::Sample& sample, const Context& ctx) const;
   void bridge_to(base::Micros horizon, const Context& ctx);
-  template <class Window>
-  void predict_output(const OutputPredictor::Inputs& in, const Window& window);
+  void predict_output(const OutputPredictor::Inputs& in, const sensor::Window& window);
   // Output.
   [[nodiscard]] float unseen_turn_radps(const Context& ctx) const {
     const param::InertialParameters& n = ctx.parameters.inertial;
@@ -159,6 +159,23 @@ class Inertial {
   Recovery recovery_;
 };
 
+template <class Sink>
+void Inertial::hash_state(Sink&& sink) const {
+  ins_.x.hash_state(sink);
+  ins_.each_bit_of_p(sink);
+  predictor_.hash_state(sink);
+  if (recovery_.step_unknown()) predictor_.present().hash_state(sink);
+  budget_.hash_state(sink);
+  alignment_.hash_state(sink);
+  heading_monitor_.hash_state(sink);
+  sink(static_cast<std::uint32_t>(phase_));
+  sink(time_.us);
+  imu_.hash_state(sink);
+  standstill_.hash_state(sink);
+  sources_.hash_state(sink);
+  recovery_.hash_state(sink);
+}
+
 /// Record of an assessment; an accepted measurement failed no test.
 [[nodiscard]] inline Innovation record_of(const Assessment& a) {
   const bool accepted = a.verdict == sensor::Verdict::kAccepted;
@@ -172,11 +189,3 @@ class Inertial {
 }
 
 }  // namespace tetap::estimators
-
-#include "estimators/inertial/fuse_forward.hpp"  // IWYU pragma: keep
-#include "estimators/inertial/fuse_gnss.hpp"     // IWYU pragma: keep
-#include "estimators/inertial/fuse_heading.hpp"  // IWYU pragma: keep
-#include "estimators/inertial/output.hpp"        // IWYU pragma: keep
-#include "estimators/inertial/propagation.hpp"   // IWYU pragma: keep
-#include "estimators/inertial/start.hpp"         // IWYU pragma: keep
-#include "estimators/inertial/tick.hpp"          // IWYU pragma: keep

@@ -22,10 +22,6 @@ template <int M, class Source>
   if (rejected) a.reject(Check::kGate);
   source.conclude(a, result.nu, filter);
   apply(a, filter);
-  // Neither velocity nor place nor wheels, however uncertain the filter became: it is wrong about more than that.
-  const param::RecoveryParameters& n = filter.parameters().recovery;
-  if (recovery_.exhausted() && filter.position_refused(n.at_least) && !filter.wheels_agree())
-    restart_filter(filter.stamp(), sensor::ResetCause::kDiverged, filter.context());
   return record_of(a);
 }
 

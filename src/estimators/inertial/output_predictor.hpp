@@ -8,9 +8,9 @@
 #include "estimators/inertial/imu_input.hpp"
 #include "estimators/inertial/rebuild_schedule.hpp"
 #include "nav/strapdown.hpp"
+#include "sensor/window.hpp"
 
 #include <cstdint>
-#include <limits>
 
 namespace tetap::estimators {
 
@@ -22,6 +22,7 @@ class OutputPredictor {
     const nav::Earth& earth;
     bool turn_known;
     float wheel_turn_radps;
+    bool imu_distrusted = false;  ///< an axis is stuck: samples are left out
   };
   struct Place {
     nav::InsState x;
@@ -45,16 +46,11 @@ class OutputPredictor {
   [[nodiscard]] RebuildSchedule& schedule() { return schedule_; }
   [[nodiscard]] const RebuildSchedule& schedule() const { return schedule_; }
   /// Before the filter runs: keeps the cells of the window.
-  template <class Window>
-  void follow(const Window& window, const param::InertialParameters& n) {
-    cells_.follow(window, n);
-  }
+  void follow(const sensor::Window& window, const param::InertialParameters& n) { cells_.follow(window, n); }
   /// Rebuilds the present from the horizon. True: samples of some cell had to be classified one by one.
-  template <class Window>
-  bool rebuild(const Place& far, const Window& window, const Inputs& in);
+  bool rebuild(const Place& far, const sensor::Window& window, const Inputs& in);
   /// Adds the samples that came since.
-  template <class Window>
-  void extend(const Window& window, const Inputs& in);
+  void extend(const sensor::Window& window, const Inputs& in);
   /// State at a time after the last sample: the velocity stays what it is in the body, but for the turn.
   [[nodiscard]] nav::InsState at(base::Micros t, const Inputs& in) const {
     nav::InsState x = place_.x;
@@ -66,9 +62,9 @@ class OutputPredictor {
   [[nodiscard]] base::Micros time() const { return time_; }
   void begin_tick(base::Micros t) { time_ = t; }
   /// Makes the state at the estimate's time the present.
-  void publish(const Inputs& in, bool saturated) {
+  void publish(const Inputs& in, bool unusable) {
     present_ = at(time_, in);
-    without_imu_ = saturated || checks::older(place_.last, time_, base::Micros{in.parameters.stale_us});
+    without_imu_ = unusable || checks::older(place_.last, time_, base::Micros{in.parameters.stale_us});
   }
   /// The present is without IMU: no valid sample within the time-out.
   [[nodiscard]] bool without_imu() const { return without_imu_; }
@@ -111,109 +107,5 @@ class OutputPredictor {
   base::Micros time_;         ///< time of the estimate
   bool without_imu_ = false;  ///< the present is without IMU
 };
-
-/// Increments of an IMU that went on straight. A gap of a few samples does not end a turn.
-inline nav::ImuIncrement OutputPredictor::unseen(base::Micros gap, const Inputs& in) const {
-  const nav::InsState& x = place_.x;
-  nav::Vector3 w_b = nav::Vector3::Zero();
-  if (gap <= base::Micros{in.parameters.stale_us}) {
-    w_b = place_.rate_b_radps - x.b_g_radps;
-  } else if (in.turn_known) {
-    w_b(2) = in.wheel_turn_radps;
-  }
-  const nav::Quaternion n_b = x.q_nb.conjugate();
-  const nav::Vector3 f_b = n_b.rotate({0.0F, 0.0F, in.earth.gravity_mps2}) + nav::cross(w_b, n_b.rotate(x.v_n_mps));
-  const float dt_s = base::seconds(gap);
-  const nav::Vector3 dtheta = (x.b_g_radps + w_b) * dt_s;
-  const nav::Vector3 dv = (x.b_a_mps2 + f_b) * dt_s;
-  return {.dtheta_b_rad = dtheta, .dv_b_mps = dv + 0.5F * nav::cross(dtheta, dv), .dt = gap};
-}
-
-inline void OutputPredictor::add(const Sample& sample, const Inputs& in, const ImuSample*& newest) {
-  const param::InertialParameters& n = in.parameters;
-  const ImuSample& imu = sample.payload.imu;
-  last_seen_ = sample.stamp;
-  const nav::ImuIncrement increment = checks::increment_of(imu);
-  const base::Micros gap = sample.stamp - increment.dt - place_.reached;
-  const checks::ImuClass found = place_.classifier.classify(imu, increment, gap, in.turn_known, n.stuck_samples);
-  if (found < checks::ImuClass::kAfterGap) return;
-  if (found == checks::ImuClass::kAfterGap) {
-    fold(in);
-    if (newest != nullptr) place_.rate_b_radps = rate_of(*newest, n);
-    static_cast<void>(nav::strapdown(place_.x, unseen(gap, in), in.earth));
-    place_.reached += gap;
-    place_.unseen_s += base::seconds(gap);
-    place_.unseen_turn_s += base::seconds(gap);
-  }
-  if (imu.clipped_accel > 0 || imu.clipped_gyro > 0) place_.unseen_s += base::seconds(increment.dt);
-  if (imu.clipped_gyro > 0) place_.unseen_turn_s += base::seconds(increment.dt);
-  if (gather_.full()) fold(in);
-  gather_.add(increment);
-  place_.reached += increment.dt;
-  place_.last = sample.stamp;
-  newest = &imu;
-}
-
-template <class Window>
-void OutputPredictor::extend(const Window& window, const Inputs& in) {
-  std::size_t i = window.size();
-  while (i > 0 && window[i - 1].stamp > last_seen_) --i;
-  const ImuSample* newest = nullptr;
-  for (; i < window.size(); ++i)
-    if (is_of(window[i], in.parameters)) add(window[i], in, newest);
-  fold(in);
-  if (newest != nullptr) place_.rate_b_radps = rate_of(*newest, in.parameters);
-  cells_.follow(window, in.parameters);
-}
-
-template <class Window>
-bool OutputPredictor::rebuild(const Place& far, const Window& window, const Inputs& in) {
-  const param::InertialParameters& n = in.parameters;
-  place_ = far;
-  cells_.follow(window, n);
-  std::size_t i = 0;
-  const ImuSample* newest = nullptr;
-  const auto add_until = [&](base::Micros until) {
-    for (; i < window.size(); ++i) {
-      const Sample& sample = window[i];
-      if (sample.stamp > until) return;
-      if (is_of(sample, n)) add(sample, in, newest);
-    }
-  };
-  // First, sample by sample, the grid place that begins to leave; then cells, but for those with a sample that has to
-  // be classified by itself; then samples without a cell.
-  add_until(cells_.leaving_until());
-  bool skipped = false;
-  bool one_by_one = false;
-  const auto catch_up = [&]() {
-    if (!skipped) return;
-    skipped = false;
-    while (i < window.size() && window[i].stamp <= place_.last) ++i;
-    std::size_t at = i;
-    while (!is_of(window[at - 1], n)) --at;
-    newest = &window[at - 1].payload.imu;
-    place_.classifier = checks::ImuClassifier::after(*newest);
-  };
-  for (std::size_t c = 0; c < cells_.size(); ++c) {
-    const ImuCell& cell = cells_[c];
-    fold(in);
-    if (cell.plain() && cell.follows(place_.reached)) {
-      gather_ = cell.gather;
-      place_.reached += gather_.sum().dt;
-      place_.last = last_seen_ = cell.last();
-      skipped = true;
-    } else {
-      catch_up();
-      add_until(cell.last());
-      one_by_one = true;
-    }
-  }
-  fold(in);
-  catch_up();
-  add_until({std::numeric_limits<std::int64_t>::max()});
-  fold(in);
-  if (newest != nullptr) place_.rate_b_radps = rate_of(*newest, n);
-  return one_by_one;
-}
 
 }  // namespace tetap::estimators

@@ -3,6 +3,7 @@
 // inflate a block, reset a block, restart.
 #pragma once
 
+#include "checks/persistence.hpp"
 #include "estimators/estimate.hpp"
 #include "estimators/inertial/source.hpp"
 #include "nav/ins.hpp"
@@ -21,12 +22,13 @@ class Recovery {
   [[nodiscard]] const Jump& jump() const { return jump_; }
   /// Returning to where the last position reset came from is one more agreement: the reset was wrong.
   [[nodiscard]] bool undoable() const { return undoable_; }
-  /// The velocity was inflated so often while fixes were refused: the filter is wrong about more than its velocity.
-  [[nodiscard]] bool exhausted() const { return velocity_attempts_ >= kMostAttempts; }
-  void position_fused() { velocity_attempts_ = 0; }
+  /// The filter was found wrong by its sources within ten seconds: fixes decide where it is.
+  [[nodiscard]] bool widened_lately(base::Micros stamp) const {
+    return checks::recent(widened_at_, stamp, base::Micros{10'000'000});
+  }
 
-  /// What an assessment asks of the covariance. True: position or height was reset.
-  bool apply(const Assessment& a, nav::Ins& ins, const param::Parameters& parameters);
+  /// What an assessment asks of the covariance. True: the present has to follow at once.
+  bool apply(const Assessment& a, nav::Ins& ins, base::Micros stamp, const param::Parameters& parameters);
 
   /// Verb 1, of velocity and attitude: both may be off by this, too.
   static void inflate_motion(nav::Ins& ins, float sigma_mps, float sigma_rad) {
@@ -64,11 +66,10 @@ class Recovery {
     for (const float v : {jump_.east_m, jump_.north_m, jump_.up_m, jump_.yaw_rad}) sink(v);
     sink(static_cast<std::uint32_t>(jump_.cause));
     sink(static_cast<std::uint32_t>(jump_.count | (undoable_ ? 256U : 0U)));
-    sink(std::uint32_t{velocity_attempts_});
+    sink(widened_at_.us);
   }
 
  private:
-  static constexpr std::uint8_t kMostAttempts = 3;
   static constexpr float kRefused_m2ps2 = 0.25F;  ///< added to the velocity when a refused source is right
 
   /// Verb 1: three errors from `first` on.
@@ -79,11 +80,15 @@ class Recovery {
   void reset_position(nav::Ins& ins, int first, int count, const nav::Vector3& by_m, const nav::Vector3& variance_m2);
   /// A source refused for so long is right, and the filter wrong, or it will refuse the source again.
   void inflate_refused(nav::Ins& ins, const param::Parameters& parameters);
-  void inflate_by_velocity(const Assessment& a, nav::Ins& ins, const param::InertialParameters& n);
+  /// Verb 1 by a cause, whichever it was: each one that explains the innovation, so the next sample is taken.
+  void widen(const Assessment& a, nav::Ins& ins, base::Micros stamp, const param::InertialParameters& n);
+  static void widen_velocity(nav::Ins& ins, const nav::Vector3& nu, float since_s);
+  static void widen_position(nav::Ins& ins, const nav::Vector3& nu, float since_s);
+  [[nodiscard]] static std::array<float, 2> tilt_of(float east_mps2, float north_mps2, float gravity_mps2);
 
   Jump jump_;
-  std::uint8_t velocity_attempts_ = 0;  ///< inflations of the velocity since a fix was accepted
-  bool undoable_ = false;               ///< the last reset of the position may be taken back
+  base::Micros widened_at_;  ///< stamp at which a source was last right against the filter; 0: none
+  bool undoable_ = false;    ///< the last reset of the position may be taken back
 };
 
 /// The coordinates from `first` on are where fixes were for long, and as uncertain as a fix.
@@ -103,33 +108,70 @@ inline void Recovery::inflate_refused(nav::Ins& ins, const param::Parameters& pa
   inflate_heading(ins, parameters.recovery.inflate_yaw_rad * parameters.recovery.inflate_yaw_rad);
 }
 
-/// Gravity, taken for motion, keeps pulling the velocity away: the tilt is known no better than at the start.
-inline void Recovery::inflate_by_velocity(const Assessment& a, nav::Ins& ins, const param::InertialParameters& n) {
-  if (!a.remedy.position_refused) {
-    velocity_attempts_ = 0;
-  } else if (velocity_attempts_ < 255) {
-    ++velocity_attempts_;
-  }
-  const float tilt = n.start_tilt_rad, bias = n.accel_turn_on_mps2;
-  inflate(ins, nav::InsState::kVelocity, a.remedy.innovation_mps.cwiseAbs2());
-  inflate(ins, nav::InsState::kAccelBias, nav::Vector3::Constant(bias * bias));
-  inflate(ins, nav::InsState::kAttitude, {tilt * tilt, tilt * tilt, 0.0F});
+/// Tilt (about east, north) that makes an acceleration out of gravity, limited to what is still a small angle.
+inline std::array<float, 2> Recovery::tilt_of(float east_mps2, float north_mps2, float gravity_mps2) {
+  constexpr float kMost_rad = 0.5F;
+  const float tilt = base::sqrt(east_mps2 * east_mps2 + north_mps2 * north_mps2) / gravity_mps2;
+  const float share = (tilt > kMost_rad ? kMost_rad / tilt : 1.0F) / gravity_mps2;
+  return {-north_mps2 * share, east_mps2 * share};
 }
 
-[[gnu::noinline]] inline bool Recovery::apply(const Assessment& a, nav::Ins& ins, const param::Parameters& parameters) {
+/// The velocity is off by nu. It leapt; or a tilt made it so, since the last agreement; or the heading is wrong.
+[[gnu::noinline]] inline void Recovery::widen_velocity(nav::Ins& ins, const nav::Vector3& nu, float since_s) {
+  ins.predict_covariance();
+  const float t = since_s > 0.1F ? since_s : 0.1F;
+  ins.inflate_along({nu(0) * t, nu(1) * t, nu(2) * t, nu(0), nu(1), nu(2), 0, 0, 0});
+  const std::array<float, 2> tilt = tilt_of(nu(0) / t, nu(1) / t, ins.earth.gravity_mps2);
+  ins.inflate_along({0.5F * nu(0) * t, 0.5F * nu(1) * t, 0, nu(0), nu(1), 0, tilt[0], tilt[1], 0});
+  const float ve = ins.x.v_n_mps(0), vn = ins.x.v_n_mps(1), v2 = ve * ve + vn * vn;
+  if (v2 > 1.0F) {
+    constexpr float kMost_rad = 0.7F;
+    const float turn = (nu(1) * ve - nu(0) * vn) / v2;
+    const float yaw = turn > kMost_rad ? kMost_rad : turn < -kMost_rad ? -kMost_rad : turn;
+    ins.inflate_along({-yaw * vn * t, yaw * ve * t, 0, -yaw * vn, yaw * ve, 0, 0, 0, yaw});
+  }
+  ins.recondition();
+}
+
+/// The position is off by nu. It leapt; or the velocity was wrong since the last agreement; or a tilt.
+[[gnu::noinline]] inline void Recovery::widen_position(nav::Ins& ins, const nav::Vector3& nu, float since_s) {
+  ins.predict_covariance();
+  const float t = since_s > 0.2F ? since_s : 0.2F;
+  ins.inflate_along({nu(0), nu(1), nu(2), 0, 0, 0, 0, 0, 0});
+  ins.inflate_along({nu(0), nu(1), nu(2), nu(0) / t, nu(1) / t, nu(2) / t, 0, 0, 0});
+  const float e = 2.0F * nu(0) / t, n = 2.0F * nu(1) / t;
+  const std::array<float, 2> tilt = tilt_of(e / t, n / t, ins.earth.gravity_mps2);
+  ins.inflate_along({nu(0), nu(1), 0, e, n, 0, tilt[0], tilt[1], 0});
+  ins.recondition();
+}
+
+/// Once more within ten seconds, it is not one of these causes alone: tilt and bias are as at the start.
+inline void Recovery::widen(const Assessment& a, nav::Ins& ins, base::Micros stamp,
+                            const param::InertialParameters& n) {
+  if (a.action == Action::kWidenPosition) {
+    widen_position(ins, a.remedy.innovation, a.remedy.since_s);
+  } else {
+    widen_velocity(ins, a.remedy.innovation, a.remedy.since_s);
+    if (widened_lately(stamp)) {
+      const float tilt = n.start_tilt_rad, bias = n.accel_turn_on_mps2;
+      inflate(ins, nav::InsState::kAccelBias, nav::Vector3::Constant(bias * bias));
+      inflate(ins, nav::InsState::kAttitude, {tilt * tilt, tilt * tilt, 0.0F});
+    }
+  }
+  widened_at_ = stamp;
+}
+
+[[gnu::noinline]] inline bool Recovery::apply(const Assessment& a, nav::Ins& ins, base::Micros stamp,
+                                              const param::Parameters& parameters) {
   inflate(ins, nav::InsState::kPosition,
           {a.remedy.pulled_m[0] * a.remedy.pulled_m[0], a.remedy.pulled_m[1] * a.remedy.pulled_m[1], 0.0F});
   switch (a.action) {
-    case Action::kInflateVelocity:
-      inflate_by_velocity(a, ins, parameters.inertial);
-      inflate_refused(ins, parameters);
-      return false;
+    case Action::kWidenVelocity:
+    case Action::kWidenPosition:
+      widen(a, ins, stamp, parameters.inertial);
+      return true;
     case Action::kInflateMotion:
       inflate_refused(ins, parameters);
-      return false;
-    case Action::kInflateSpeed:
-      inflate_refused(ins, parameters);
-      inflate_motion(ins, a.remedy.sigma_mps, 0.0F);
       return false;
     case Action::kInflateHeading:
       inflate_heading(ins, a.remedy.sigma_rad * a.remedy.sigma_rad);

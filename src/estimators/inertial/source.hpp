@@ -19,17 +19,17 @@ using sensor::Check;
 using sensor::SourceState;
 
 enum class Action : std::uint8_t {
-  kFuse,             ///< update the filter
-  kSkip,             ///< leave the measurement out: it is no news, or waits for others
-  kReject,           ///< leave the measurement out: a test failed
-  kInflateMotion,    ///< reject; the source was refused for too long: velocity and heading become less certain
-  kInflateVelocity,  ///< the same of a refused velocity: by its innovation, and tilt and bias as at the start
-  kInflateSpeed,     ///< reject; the filter went along with wheels that spin
-  kInflateHeading,   ///< the heading becomes as uncertain as the innovation
-  kResetZero,        ///< reject; the source took a new zero
-  kResetPosition,    ///< fuse, after the horizontal position was reset
-  kResetHeight,      ///< fuse, after the height was reset
-  kRestartFilter,    ///< reject; the filter begins anew
+  kFuse,            ///< update the filter
+  kSkip,            ///< leave the measurement out: it is no news, or waits for others
+  kReject,          ///< leave the measurement out: a test failed
+  kInflateMotion,   ///< reject; the source was refused for too long: velocity and heading become less certain
+  kWidenVelocity,   ///< reject; a velocity is right: what can have made the filter wrong by the innovation
+  kWidenPosition,   ///< fuse, after the same of a fix
+  kInflateHeading,  ///< the heading becomes as uncertain as the innovation
+  kResetZero,       ///< reject; the source took a new zero
+  kResetPosition,   ///< fuse, after the horizontal position was reset
+  kResetHeight,     ///< fuse, after the height was reset
+  kRestartFilter,   ///< reject; the filter begins anew
 };
 
 /// Operands of Recovery; zero where the action needs none.
@@ -37,11 +37,11 @@ struct Remedy {
   nav::Vector3 step_m = nav::Vector3::Zero();       ///< reset: how far
   nav::Vector3 variance_m2 = nav::Vector3::Zero();  ///< variance of the position after a reset
   std::array<float, 2> pulled_m{};                  ///< 1 sigma by which refused fixes may have led the position before
-  nav::Vector3 innovation_mps = nav::Vector3::Zero();  ///< kInflateVelocity
-  float sigma_mps = 0;                                 ///< 1 sigma of the velocity, beside
-  float sigma_rad = 0;                                 ///< 1 sigma of the heading, beside
-  bool position_refused = false;                       ///< kInflateVelocity: fixes are refused, too
-  bool undoes = false;                                 ///< kResetPosition: back to where the last reset came from
+  nav::Vector3 innovation = nav::Vector3::Zero();   ///< kWidenVelocity (m/s), kWidenPosition (m): level axes
+  float since_s = 0;                                ///< time in which the innovation grew
+  float sigma_mps = 0;                              ///< 1 sigma of the velocity, beside
+  float sigma_rad = 0;                              ///< 1 sigma of the heading, beside
+  bool undoes = false;                              ///< kResetPosition: back to where the last reset came from
 };
 
 /// The uniform record of one test of one measurement: what is to be done, and why.
@@ -63,7 +63,8 @@ struct Assessment {
     verdict = sensor::Verdict::kRejected;
   }
   [[nodiscard]] bool fuses() const {
-    return action == Action::kFuse || action == Action::kResetPosition || action == Action::kResetHeight;
+    return action == Action::kFuse || action == Action::kResetPosition || action == Action::kResetHeight ||
+           action == Action::kWidenPosition;
   }
 };
 

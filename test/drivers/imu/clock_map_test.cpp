@@ -15,8 +15,8 @@ namespace {
 constexpr std::int64_t kNominal = (std::int64_t{1} << 32) * 32 / 30;
 
 struct Followed {
-  double worst_us = 0;       ///< of the line against the truth, once settled
-  double worst_step_us = 0;  ///< of the distance between two samples against the true one
+  double worst_us = 0;       ///< error of the line against the truth, once settled
+  double worst_step_us = 0;  ///< error of the distance between two samples against the true one
   std::int32_t ppm = 0;
 };
 

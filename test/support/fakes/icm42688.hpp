@@ -85,7 +85,7 @@ class Icm42688 {
   [[nodiscard]] int broken_rules() const;
   [[nodiscard]] std::string broken_rules_in_words() const;
   void forget_broken_rules() { rules_ = {}; }
-  /// What a debugger would see: no side effects, no faults.
+  /// View of a debugger: no side effects, no faults.
   [[nodiscard]] std::uint8_t peek(std::uint8_t bank, std::uint8_t address) const {
     return registers_.at(bank, address);
   }

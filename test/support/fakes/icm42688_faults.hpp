@@ -37,11 +37,11 @@ struct FaultDetail {
   int axis = 0;
   int ppm = 20'000;
   int every = 10;
-  int after_transfers = 0;  ///< bus faults begin after this many good transfers,
-  int transfers = -1;       ///< and last this many; -1: until cleared
+  int after_transfers = 0;  ///< bus faults begin after so many good transfers
+  int transfers = -1;       ///< transfers for which the fault lasts; -1: until cleared
 };
 
-/// What the sheet asks of the host. Broken rules are counted; what the chip then does is in the second half.
+/// Rules of the sheet for the host. Broken rules are counted; what the chip then does is in the second half.
 enum class Rule : std::uint8_t {
   kNoAccessDuringReset,   ///< 14.1: 1 ms after a soft reset; reads give 0xFF, writes are lost
   kNoWriteInQuietTime,    ///< 14.36: 200 us after a sensor leaves OFF; the write is lost

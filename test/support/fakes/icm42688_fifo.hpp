@@ -40,7 +40,7 @@ class Fifo {
   [[nodiscard]] bool full() const {
     return !packets_.empty() && bytes() + packets_.back().size() > capacity(packets_.back().size());
   }
-  /// What is left to read. The sheet does not say what a half-read packet counts as; here it is still a record.
+  /// Bytes left to read. The sheet does not say what a half-read packet counts as; here it is still a record.
   [[nodiscard]] std::size_t bytes() const {
     std::size_t sum = 0;
     for (const auto& packet : packets_) sum += packet.size();

@@ -25,7 +25,7 @@ inline constexpr Picos kAccelStartUp = 10 * kMillisecond;   // 3.2
 inline constexpr double kDegree = 3.14159265358979323846 / 180.0;
 inline constexpr double kStandardGravity_mps2 = 9.80665;
 
-/// What the die feels, in its own axes (10.1); flat on a table the z axis shows +1 g (4.7).
+/// Motion of the die, in its own axes (10.1); flat on a table the z axis shows +1 g (4.7).
 struct Motion {
   std::array<double, 3> rate_radps{};
   std::array<double, 3> specific_force_mps2{0.0, 0.0, kStandardGravity_mps2};

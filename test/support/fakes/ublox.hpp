@@ -44,7 +44,7 @@ class Ublox {
     base::Micros jitter{0};                ///< on top, another for each epoch
     bool mute = false;                     ///< never answers
     bool silent_to_unknown = false;        ///< no ACK-NAK for what it does not know
-    int swallow_acks = 0;                  ///< so many acknowledgements are lost on the line
+    int swallow_acks = 0;                  ///< acknowledgements that are lost on the line
     std::set<std::uint32_t> unknown_keys;  ///< firmware without these items
     bool deaf_after_baud_change = false;   ///< takes the new rate, then says nothing
     std::size_t write_at_most = 1000;      ///< bytes that the line takes at a time
@@ -138,7 +138,7 @@ class Ublox {
     Bytes frame;
     bool acknowledgement;
   };
-  /// What became of a request; kUnknown: the firmware has no such message.
+  /// Outcome of a request; kUnknown: the firmware has no such message.
   enum class Verdict : std::uint8_t { kAck, kNak, kUnknown };
 
   static constexpr std::uint8_t kAckClass = 0x05, kCfg = 0x06, kMon = 0x0A, kNmea = 0xF0;
@@ -469,7 +469,7 @@ class Ublox {
     const auto found = kItemOf.find(message);
     return found == kItemOf.end() ? 0 : found->second;
   }
-  /// What CFG-MSG can name. GRS, GSV, ZDA, GBS and DTM are known, too, but this fake never sends them.
+  /// Messages that CFG-MSG can name. GRS, GSV, ZDA, GBS and DTM are known, too, but this fake never sends them.
   [[nodiscard]] bool exists(Message message) const {
     static const std::set<Message> kWithoutItem{{ublox::kNav, ublox::kNavSol},
                                                 {ublox::kNav, ublox::kNavVelNed},

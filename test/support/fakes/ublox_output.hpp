@@ -24,7 +24,7 @@ enum class Fix : std::uint8_t { kNone, kLimits, k2d, k3d, kDifferential, kRtkFlo
 /// Upper triangle in the order EE, EN, EU, NN, NU, UU.
 using Covariance = std::array<double, 6>;
 
-/// What the receiver found out at one epoch, in SI and east, north, up.
+/// Solution of the receiver at one epoch, in SI and east, north, up.
 struct Solution {
   Fix fix = Fix::k3d;
   int satellites = 17;

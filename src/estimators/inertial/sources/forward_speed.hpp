@@ -36,36 +36,42 @@ class ForwardSpeedSource {
     return {};
   }
   [[nodiscard]] static model::WheelSpeed model(const ForwardReading& z, const FilterView& filter);
-  void conclude(Assessment& a, const nav::Vector3&, const FilterView& filter) {
-    if (a.fuses()) {
-      status_.fused();
-    } else {
+  void conclude(Assessment& a, const nav::Vector3& nu_b_mps, const FilterView& filter) {
+    const bool rejected = !a.fuses();
+    if (rejected) {
       status_.rejecting(a.failed);
+    } else {
+      status_.fused();
     }
-    count_refusal(refused_, a, Action::kInflateMotion, filter);
+    witness_.update(rejected, filter.stamp());
+    if (!rejected) return;
+    if (timed_out(filter.stamp())) return give_way_to_constraint(a, filter);
+    judge(a, filter.x().q_nb.rotate(nu_b_mps), filter);
   }
-  /// Both wheels spin. Where GNSS holds the filter's velocity the wheels are wrong; without it the filter may as well
-  /// be.
+  /// Both wheels spin, or the filter is wrong.
   [[nodiscard]] Assessment assess_spinning(float mean_mps, const FilterView& filter) {
     Assessment a{.action = Action::kReject, .failed = Check::kSlip, .verdict = sensor::Verdict::kRejected};
-    refused_.update(true, filter.stamp());
+    witness_.update(true, filter.stamp());
     status_.rejecting(Check::kSlip);
-    const base::Micros after{filter.parameters().recovery.after_us};
-    if (filter.gnss_holds_velocity() || !refused_.persists(filter.stamp(), after)) return a;
-    a.action = Action::kInflateSpeed;
-    a.remedy.sigma_mps = mean_mps - filter.x().q_nb.conjugate().rotate(filter.x().v_n_mps)(0);
-    refused_.reset();
+    judge(a, filter.x().q_nb.rotated_x() * (mean_mps - filter.forward_mps()), filter);
     return a;
   }
   /// `speed_known`: the filter begins at a speed that was measured or given.
   void begin(bool speed_known) {
-    refused_.reset();
+    witness_.begin();
     speed_known_ = speed_known;
   }
-  /// The constraint without a speed is no judge of wheels that spin: refusals stay those of `before`.
-  void restore_refusals(const checks::Persistence& before) { refused_ = before; }
+  /// The constraint without a speed was fused since `before`: it is no witness, and no judge of wheels that spin.
+  void restore(const Witness& before, bool spinning) {
+    if (spinning) {
+      witness_ = before;
+    } else {
+      witness_.keep_hearing(before);
+    }
+  }
 
-  [[nodiscard]] const checks::Persistence& refused() const { return refused_; }
+  [[nodiscard]] const Witness& witness() const { return witness_; }
+  [[nodiscard]] const checks::Persistence& refused() const { return witness_.refused(); }
   [[nodiscard]] float last_mps() const { return last_mps_; }
   [[nodiscard]] base::Micros last() const { return last_; }
   [[nodiscard]] base::Micros fused_at() const { return fused_at_; }
@@ -74,7 +80,7 @@ class ForwardSpeedSource {
   [[nodiscard]] SourceStatus status(base::Micros at) const { return timed_out(at) ? SourceStatus{} : status_; }
   template <class Sink>
   void hash_state(Sink&& sink) const {
-    refused_.hash_state(sink);
+    witness_.hash_state(sink);
     sink(last_mps_);
     sink(last_.us);
     sink(fused_at_.us);
@@ -83,11 +89,22 @@ class ForwardSpeedSource {
   }
 
  private:
-  checks::Persistence refused_;  ///< forward speeds in a row that were refused
-  base::Micros last_;            ///< stamp of the last forward speed of wheels or speedometer; 0: none
-  base::Micros fused_at_;        ///< last stamp at which a speed, or the constraint alone, was fused; 0: never
-  float last_mps_ = 0;           ///< last forward speed of wheels or speedometer
-  bool speed_known_ = false;     ///< the constraint alone may be fused
+  /// The constraint alone is no device: it shows no cause. Refused for long, it is right.
+  void give_way_to_constraint(Assessment& a, const FilterView& filter) {
+    const param::RecoveryParameters& n = filter.parameters().recovery;
+    if (!witness_.refused().persists(filter.stamp(), base::Micros{n.after_us}, n.at_least)) return;
+    a.action = Action::kInflateMotion;
+    witness_.forgive();
+  }
+  void judge(Assessment& a, const nav::Vector3& nu_n_mps, const FilterView& filter) {
+    judge_velocity(a, nu_n_mps, filter.velocity_vote(witness_.since(filter.stamp())), witness_, filter);
+  }
+
+  Witness witness_;
+  base::Micros last_;         ///< stamp of the last forward speed of wheels or speedometer; 0: none
+  base::Micros fused_at_;     ///< last stamp at which a speed, or the constraint alone, was fused; 0: never
+  float last_mps_ = 0;        ///< last forward speed of wheels or speedometer
+  bool speed_known_ = false;  ///< the constraint alone may be fused
   SourceStatus status_;
 };
 

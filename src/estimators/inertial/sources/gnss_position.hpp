@@ -13,6 +13,7 @@
 #include "estimators/inertial/filter_view.hpp"
 #include "estimators/inertial/fix_measurement.hpp"
 #include "estimators/inertial/recovery.hpp"
+#include "estimators/inertial/refusal.hpp"
 #include "model/gnss_fix_3d.hpp"
 
 #include <array>
@@ -67,17 +68,23 @@ class GnssPositionSource {
   /// The filter is elsewhere now: refusals so far were by where it was.
   void relocated(base::Micros time) {
     last_fused_ = time;
-    refused_.reset();
+    witness_.forgive();
   }
   /// A pose from outside ends every offset hypothesis.
   void reset() {
     offset_.reset();
     drift_.reset();
   }
-  void begin() { refused_.reset(); }
+  void begin() { witness_.begin(); }
+  /// Vote on a velocity that is off by nu since then.
+  [[nodiscard]] Vote vote(base::Micros since, const nav::Vector3& nu_mps, base::Micros stamp) const {
+    const Vote present = witness_.presence(since, stamp);
+    if (present != Vote::kAbstains) return present;
+    return vote_of_fix(innovation_, witness_.refused().holds(), nu_mps, base::seconds(witness_.heard_at() - since));
+  }
 
   [[nodiscard]] bool frozen() const { return frozen_.frozen(); }
-  [[nodiscard]] const checks::Persistence& refused() const { return refused_; }
+  [[nodiscard]] const checks::Persistence& refused() const { return witness_.refused(); }
   [[nodiscard]] base::Micros last_fused() const { return last_fused_; }
   /// No fix was fused for three seconds: dead reckoning.
   [[nodiscard]] bool timed_out(base::Micros at) const {
@@ -96,7 +103,8 @@ class GnssPositionSource {
     frozen_.hash_state(sink);
     drift_.hash_state(sink);
     offset_.hash_state(sink);
-    refused_.hash_state(sink);
+    witness_.hash_state(sink);
+    for (const float v : {innovation_.east_m, innovation_.north_m, innovation_.variance_m2}) sink(v);
     sink(last_fused_.us);
     sink(pulled_m_[0]);
     sink(pulled_m_[1]);
@@ -109,13 +117,15 @@ class GnssPositionSource {
   void confirm(Assessment& a, const param::RecoveryParameters& n);
   void judge_refused(const FixMeasurement& z, const FilterView& filter, Assessment& a);
   [[nodiscard]] bool reset_allowed(const FixMeasurement& z, const FilterView& filter, Assessment& a) const;
+  [[nodiscard]] bool filter_wrong(const FilterView& filter) const;
   [[nodiscard]] bool undoes_reset(const FixMeasurement& z, const FilterView& filter) const;
   [[nodiscard]] bool lost(const FilterView& filter) const;
 
   checks::StartupFixCheck startup_;
   checks::OffsetHypothesis offset_;  ///< offset of fixes that were not fused
-  checks::Persistence refused_;      ///< fixes in a row that were refused
-  base::Micros last_fused_;          ///< stamp of the last fix that was fused, or of the last reset; 0: none
+  Witness witness_;
+  LevelInnovation innovation_;  ///< innovation of the last fix
+  base::Micros last_fused_;     ///< stamp of the last fix that was fused, or of the last reset; 0: none
   checks::FrozenPosition frozen_;
   checks::PositionDrift drift_;
   std::array<float, 2> pulled_m_{};  ///< by how much the last fixes moved the position
@@ -149,16 +159,30 @@ inline GnssPositionSource::Converted GnssPositionSource::convert(const sensor::G
   const bool inside = a.nis <= a.gate || z.statistics.horizontal_nis <= fix_gate(n.gnss, 2);
   const bool agrees = inside && !drifts(z, n.gnss, a);
   if (!inside) a.failed = Check::kGate;
-  refused_.update(!agrees, filter.stamp());
+  witness_.update(!agrees, filter.stamp());
+  const std::array<float, 2>& expected_m2 = z.statistics.expected_m2;
+  innovation_ = {z.nu(0), z.nu(1), 0.5F * (expected_m2[0] + expected_m2[1]) + z.r(0)};
   const float p_level = filter.p()(0, 0) + filter.p()(1, 1);
-  if (!agrees) {
+  if (!agrees && filter_wrong(filter)) {
+    a.failed = Check::kNone;
+    give_way(a, Action::kWidenPosition, {z.nu(0), z.nu(1), 0.0F}, witness_, filter.stamp());
+  } else if (!agrees) {
     judge_refused(z, filter, a);
-  } else if (p_level > 2.0F * FixMeasurement::kDecides * z.r(0)) {
+  } else if (!filter.recovery().widened_lately(filter.stamp()) && p_level > 2.0F * FixMeasurement::kDecides * z.r(0)) {
     offset_.update(filter.stamp(), z.nu(0), z.nu(1), z.r(0), p_level);
     confirm(a, n.recovery);
   }
   if (a.fuses()) offset_.reset();
   return a;
+}
+
+/// The filter refuses a second fix while a velocity contradicts it, too, or did within five seconds, and none vouches.
+inline bool GnssPositionSource::filter_wrong(const FilterView& filter) const {
+  if (witness_.refused().count() < 2) return false;
+  if (filter.recovery().widened_lately(filter.stamp())) return true;
+  const base::Micros since = witness_.since(filter.stamp());
+  return filter.speeds_contradict() && filter.velocity_vote(since) != Vote::kFor &&
+         filter.wheels_vote(since) != Vote::kFor;
 }
 
 /// Fixes whose errors are new with each drift away. Errors that last wander themselves.
@@ -211,7 +235,7 @@ inline void GnssPositionSource::confirm(Assessment& a, const param::RecoveryPara
   a.cause = sensor::ResetCause::kPositionJump;
   a.remedy.step_m = {offset_.east_m(), offset_.north_m(), 0.0F};
   a.remedy.variance_m2 = z.r;
-  refused_.reset();
+  witness_.forgive();
   drift_.reset();
 }
 
@@ -224,7 +248,7 @@ inline bool GnssPositionSource::reset_allowed(const FixMeasurement& z, const Fil
   if (is_lost && filter.wheels_silent() &&
       !filter.velocity_recent()) {  // it moved otherwise than it thought, all along
     const float way2_m2 = offset_.east_m() * offset_.east_m() + offset_.north_m() * offset_.north_m();
-    a.remedy.sigma_mps = base::sqrt(way2_m2) / base::seconds(refused_.held_for(filter.stamp()));
+    a.remedy.sigma_mps = base::sqrt(way2_m2) / base::seconds(witness_.refused().held_for(filter.stamp()));
   }
   return a.remedy.undoes || is_lost || offset_.persisted(base::Micros{n.persist_us}, n.persist_fixes);
 }
@@ -237,14 +261,16 @@ inline bool GnssPositionSource::undoes_reset(const FixMeasurement& z, const Filt
          offset_.agrees(-recovery.jump().east_m, -recovery.jump().north_m, 2.0F * z.r(0) + p_level);
 }
 
-/// Fixes that agree with nothing for very long: the filter is no judge of how it moves. Sooner where its IMU alone
-/// shows how, and the offset is not one that lasts.
+/// Fixes that agree with nothing for very long: the filter is no judge of how it moves. Without another witness of the
+/// motion, and where the offset is not one that lasts, soon. Else when the receiver's velocity contradicts the filter,
+/// too, for as long as an offset has to last: the receiver alone is right then.
 inline bool GnssPositionSource::lost(const FilterView& filter) const {
   const param::RecoveryParameters& n = filter.parameters().recovery;
-  const base::Micros refused = refused_.held_for(filter.stamp());
-  const bool motion_known = !filter.wheels_silent() || filter.velocity_recent();
-  const base::Micros despair{4 * std::int64_t{motion_known ? n.persist_us : n.after_us}};
-  return refused >= despair && (motion_known || !offset_.persisted({refused.us / 2}, 0));
+  const base::Micros refused = witness_.refused().held_for(filter.stamp());
+  if (filter.wheels_silent() && !filter.velocity_recent())
+    return refused >= base::Micros{4 * std::int64_t{n.after_us}} && !offset_.persisted({refused.us / 2}, 0);
+  return filter.speeds_contradict() &&
+         witness_.refused().persists(filter.stamp(), base::Micros{n.persist_us}, n.persist_fixes);
 }
 
 }  // namespace tetap::estimators

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// GNSS velocity. A receiver and a filter that contradict each other in direction: either may be wrong, and the filter
-// gives way after a while. In speed, where wheels agree with the filter: the receiver is wrong.
+// GNSS velocity. A receiver and a filter that contradict each other: either may be wrong. Wheels and fixes vote
+// (vote.hpp).
 #pragma once
 
 #include "estimators/inertial/filter_view.hpp"
@@ -33,14 +33,25 @@ class GnssVelocitySource {
   }
   /// The receiver does not repeat its positions; a frozen receiver's velocities are as old.
   [[nodiscard]] static bool continuing_conditions(const FilterView& filter) { return !filter.position_frozen(); }
-  /// Speed against wheels. The innovation gate follows in the update.
-  [[nodiscard]] Assessment assess(const VelocityMeasurement& z, const FilterView& filter) {
-    const float own = base::abs(filter.forward_mps());
-    if (filter.wheels_agree() && base::abs(z.level_mps() - own) > 4.0F * z.sigma_mps + 0.2F * own + 0.5F)
-      refused_.postpone(filter.stamp());
-    return {};
+  /// The innovation gate follows in the update.
+  [[nodiscard]] Assessment assess(const VelocityMeasurement&, const FilterView&) { return {}; }
+  /// A velocity came. Between two of them the filter moves as the IMU feels: a leap of their difference is the
+  /// receiver's, until the difference is gone.
+  void note(const VelocityMeasurement& z, const FilterView& filter) {
+    const nav::Vector3 off = z.v_n_mps - filter.x().v_n_mps;
+    const float dt_s = base::seconds(filter.stamp() - last_);
+    const float unfelt = kUnfelt_mps + kUnfelt_mps2 * dt_s;
+    const float most2 = 9.0F * (2.0F * z.sigma_mps * z.sigma_mps + unfelt * unfelt);
+    const float off2 = off.squaredNorm();
+    const bool leaps = dt_s < 1.5F && off2 > most2 && nav::Vector3(off - off_mps_).squaredNorm() > most2;
+    leapt_ = (leapt_ || leaps) && off2 >= 0.5F * most2 && filter.wheels_agree();
+    off_mps_ = off;
+    ahead_mps_ = z.v_b_mps(0);
+    last_ = filter.stamp();
   }
-  void note(base::Micros stamp) { last_ = stamp; }
+  [[nodiscard]] bool leapt() const { return leapt_; }
+  /// Speed ahead by the last velocity.
+  [[nodiscard]] float ahead_mps() const { return ahead_mps_; }
   [[nodiscard]] static model::GnssVelocity3d model(const VelocityMeasurement& z, const FilterView& filter) {
     const param::GnssParameters& n = filter.parameters().gnss;
     return {.v_n_mps = z.v_n_mps,
@@ -55,33 +66,56 @@ class GnssVelocitySource {
   }
   /// The update's verdict; nu: the innovation.
   void conclude(Assessment& a, const nav::Vector3& nu, const FilterView& filter) {
-    count_refusal(refused_, a, Action::kInflateVelocity, filter);
-    if (a.action != Action::kInflateVelocity) return;
-    a.remedy.innovation_mps = nu;
-    a.remedy.position_refused = filter.position_refused(1);
+    const bool rejected = a.action == Action::kReject;
+    witness_.update(rejected, filter.stamp());
+    if (!rejected) return;
+    const base::Micros since = witness_.since(filter.stamp());
+    judge_velocity(a, nu, vote_of_wheels(nu, since, filter), witness_, filter);
   }
-  void begin() { refused_.reset(); }
+  void begin() { witness_.begin(); }
 
-  [[nodiscard]] const checks::Persistence& refused() const { return refused_; }
+  [[nodiscard]] const Witness& witness() const { return witness_; }
+  [[nodiscard]] const checks::Persistence& refused() const { return witness_.refused(); }
   /// A velocity came within one second.
   [[nodiscard]] bool recent(base::Micros at) const { return checks::recent(last_, at, kFresh); }
   [[nodiscard]] bool came_lately(base::Micros at) const { return !checks::older(last_, at, kFresh); }
   [[nodiscard]] bool timed_out(base::Micros at) const { return checks::older(last_, at, kFresh + kFresh); }
   [[nodiscard]] SourceStatus status(base::Micros at) const {
-    return timed_out(at) ? SourceStatus{} : status_of(refused_);
+    return timed_out(at) ? SourceStatus{} : status_of(witness_.refused());
   }
   template <class Sink>
   void hash_state(Sink&& sink) const {
-    refused_.hash_state(sink);
-    sink(last_.us);
+    witness_.hash_state(sink);
+    for (const base::Micros at : {last_, speed_off_at_}) sink(at.us);
+    for (int i = 0; i < 3; ++i) sink(off_mps_(i));
+    sink(ahead_mps_);
+    sink(static_cast<std::uint32_t>(leapt_));
   }
 
  private:
   static constexpr base::Micros kFresh{1'000'000};
   static constexpr float kNoClimb_mps = 1e3F;  ///< sigma of a climb rate that is not there (NMEA has none)
 
-  checks::Persistence refused_;  ///< velocities in a row that were refused
-  base::Micros last_;            ///< stamp of the last velocity; 0: none
+  static constexpr float kUnfelt_mps = 0.05F, kUnfelt_mps2 = 0.3F;  ///< the IMU's own error between two velocities
+
+  /// Wheels do not see where the robot goes. Where the speed is alike all along, they abstain: the heading may be
+  /// wrong.
+  [[nodiscard]] Vote vote_of_wheels(const nav::Vector3& nu, base::Micros since, const FilterView& filter) {
+    const Vote vote = filter.wheels_vote(since);
+    const nav::Vector3 claimed = filter.x().v_n_mps + nu;
+    const float level = base::sqrt(claimed(0) * claimed(0) + claimed(1) * claimed(1));
+    const float rolled = base::abs(filter.recent_forward_mps());
+    if (base::abs(level - rolled) >= 0.3F + 0.1F * rolled) speed_off_at_ = filter.stamp();
+    const bool receiver = leapt_ && filter.imu_doubted_at() <= witness_.agreed_at();
+    return vote == Vote::kFor && speed_off_at_ < since && !receiver ? Vote::kAbstains : vote;
+  }
+
+  Witness witness_;
+  nav::Vector3 off_mps_ = nav::Vector3::Zero();  ///< difference of the last velocity to the filter's
+  base::Micros last_;                            ///< stamp of the last velocity; 0: none
+  base::Micros speed_off_at_;                    ///< stamp of the last refused one of another speed than the wheels'
+  float ahead_mps_ = 0;
+  bool leapt_ = false;  ///< the receiver leapt, and is not back
 };
 
 }  // namespace tetap::estimators

@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // Inertial navigation: one tick. The present is predicted from the horizon, and the horizon's work is shared out.
-#pragma once
-
 #include "estimators/inertial/inertial.hpp"
 
 namespace tetap::estimators {
 
 /// In units of the work budget: samples that are switched off or only gathered cost nothing.
-inline std::int32_t Inertial::work_of(const sensor::Sample& sample, const Context& ctx) const {
+std::int32_t Inertial::work_of(const sensor::Sample& sample, const Context& ctx) const {
   const param::InertialParameters& n = ctx.parameters.inertial;
   bool free = false;
   switch (sample.sensor) {
@@ -34,23 +32,22 @@ inline std::int32_t Inertial::work_of(const sensor::Sample& sample, const Contex
   return free ? 0 : WorkBudget::kMeasurement;
 }
 
-inline bool Inertial::rests(const sensor::Sample& sample, const Context& ctx) {
+bool Inertial::rests(const sensor::Sample& sample, const Context& ctx) {
   if (!tracking() || budget_.allows(work_of(sample, ctx))) return false;
   budget_.defer();
   return true;
 }
 
 /// Up to where no sample comes any more that the filter could fuse, it goes without IMU.
-inline void Inertial::bridge_to(base::Micros horizon, const Context& ctx) {
+void Inertial::bridge_to(base::Micros horizon, const Context& ctx) {
   const bool missing =
-      imu_.health().stuck() || imu_.saturated() || imu_.health().stale(horizon, ctx.parameters.inertial);
+      imu_.health().stuck() || imu_.unusable() || imu_.health().stale(horizon, ctx.parameters.inertial);
   if (horizon <= time_ || !missing) return;
   bridge(horizon - time_, ctx);
   detect_standstill(time_, ctx);
 }
 
-template <class Window>
-void Inertial::predict_output(const OutputPredictor::Inputs& in, const Window& window) {
+void Inertial::predict_output(const OutputPredictor::Inputs& in, const sensor::Window& window) {
   const bool rebuild = predictor_.schedule().begin_tick(predictor_.time(), budget_.deferred());
   budget_.clear_deferred();
   if (!rebuild) {
@@ -68,8 +65,7 @@ void Inertial::predict_output(const OutputPredictor::Inputs& in, const Window& w
   if (one_by_one && budget_.left() > 1) budget_.spend(WorkBudget::kImuSample);
 }
 
-template <class Window>
-void Inertial::advance(base::Micros t, const Context& ctx, const Window& window) {
+void Inertial::advance(base::Micros t, const Context& ctx, const sensor::Window& window) {
   const param::InertialParameters& n = ctx.parameters.inertial;
   predictor_.begin_tick(t);
   const base::Micros due = t - base::Micros{ctx.parameters.loop.window_us};
@@ -85,7 +81,8 @@ void Inertial::advance(base::Micros t, const Context& ctx, const Window& window)
   const OutputPredictor::Inputs in{.parameters = n,
                                    .earth = ins_.earth,
                                    .turn_known = view(time_, ctx).wheels_show_turn(),
-                                   .wheel_turn_radps = sources_.wheels.turn_radps()};
+                                   .wheel_turn_radps = sources_.wheels.turn_radps(),
+                                   .imu_distrusted = imu_.health().axis_stuck()};
   predict_output(in, window);
   // The farther the horizon is behind, the more work a tick takes.
   constexpr base::Micros kBehind{60'000};
@@ -94,7 +91,7 @@ void Inertial::advance(base::Micros t, const Context& ctx, const Window& window)
     budget_.grant(WorkBudget::kMeasurement * static_cast<std::int32_t>(more < 20 ? more : 20));
   }
   if (recovery_.step_unknown()) recovery_.measure_step(predictor_.present(), predictor_.at(t, in));
-  predictor_.publish(in, imu_.saturated());
+  predictor_.publish(in, imu_.unusable());
 }
 
 }  // namespace tetap::estimators

@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // Inertial navigation: GNSS position and velocity.
-#pragma once
-
 #include "estimators/inertial/inertial.hpp"
 #include "estimators/inertial/measure.hpp"
 
 namespace tetap::estimators {
 
-inline Innovation Inertial::fuse(const sensor::GnssPosition& fix, base::Micros stamp, const Context& ctx) {
+Innovation Inertial::fuse(const sensor::GnssPosition& fix, base::Micros stamp, const Context& ctx) {
   budget_.spend(WorkBudget::kFixChecks);
   GnssPositionSource::Converted converted = GnssPositionSource::convert(fix, ctx);
   if (!converted.fix) return {.verdict = converted.outside ? sensor::Verdict::kNotFinite : sensor::Verdict::kNotUsed};
@@ -35,7 +33,7 @@ inline Innovation Inertial::fuse(const sensor::GnssPosition& fix, base::Micros s
 }
 
 /// Horizontal part, then the height: each may be fused, skipped, or reset by itself.
-[[gnu::noinline]] inline Innovation Inertial::fuse_fix(model::GnssFix3d& fix, const FilterView& filter) {
+[[gnu::noinline]] Innovation Inertial::fuse_fix(model::GnssFix3d& fix, const FilterView& filter) {
   ins_.predict_covariance();
   const auto at = fix.linearised(ins_.x);
   FixMeasurement z{.nu = -at.z_hat, .r = fix.noise()};
@@ -53,8 +51,8 @@ inline Innovation Inertial::fuse(const sensor::GnssPosition& fix, base::Micros s
 }
 
 /// One update by a fix, with its height or without.
-[[gnu::noinline]] inline Innovation Inertial::update_by_fix(model::GnssFix3d& fix, const FixMeasurement& z,
-                                                            bool with_height, const FilterView& filter) {
+[[gnu::noinline]] Innovation Inertial::update_by_fix(model::GnssFix3d& fix, const FixMeasurement& z, bool with_height,
+                                                     const FilterView& filter) {
   const param::GnssParameters& n = filter.parameters().gnss;
   Innovation fused{
       .verdict = sensor::Verdict::kAccepted, .dof = 3, .nis = z.statistics.joint_nis, .gate = fix_gate(n, 3)};
@@ -71,12 +69,11 @@ inline Innovation Inertial::fuse(const sensor::GnssPosition& fix, base::Micros s
   const std::array<base::Anchored, 2> was{ins_.x.x, ins_.x.y};
   const auto result = update(fix, base::kInfinity);
   if (result.verdict != filter::Verdict::kAccepted) return estimators::record(result);
-  recovery_.position_fused();
   sources_.position.fused(filter.stamp(), nav::difference(ins_.x.x, was[0]), nav::difference(ins_.x.y, was[1]));
   return fused;
 }
 
-inline Innovation Inertial::fuse(const sensor::GnssVelocity& velocity, base::Micros stamp, const Context& ctx) {
+Innovation Inertial::fuse(const sensor::GnssVelocity& velocity, base::Micros stamp, const Context& ctx) {
   const param::GnssParameters& n = ctx.parameters.gnss;
   VelocityMeasurement z = GnssVelocitySource::measurement(velocity, n);
   if (!tracking()) {
@@ -90,7 +87,6 @@ inline Innovation Inertial::fuse(const sensor::GnssVelocity& velocity, base::Mic
   if (!z.has_climb) z.v_n_mps(2) = ins_.x.v_n_mps(2);  // as expected, and hardly any weight
   z.v_b_mps = filter.axle_mps(z.v_n_mps);
   compare_with_ground(z, filter);
-  static_cast<void>(sources_.velocity.assess(z, filter));
   heading_monitor_.fuse_velocity(z.v_n_mps, z.sigma_mps, n);
   if (filter.wheels_silent() ? heading_monitor_.heading_wrong(filter)
                              : heading_monitor_.direction_wrong(z.v_b_mps, z.level_mps(), z.sigma_mps, filter)) {
@@ -104,15 +100,13 @@ inline Innovation Inertial::fuse(const sensor::GnssVelocity& velocity, base::Mic
   return record;
 }
 
-/// GNSS velocity judges wheels and standstill. Wheels that lose grip at once by more than kUnseen_mps are seen by the
-/// IMU; a difference that GNSS alone sees is the receiver's. An unknown heading turns forward speed into sideways
-/// speed: its variance counts here.
-[[gnu::noinline]] inline void Inertial::compare_with_ground(const VelocityMeasurement& z, const FilterView& filter) {
+/// GNSS velocity judges wheels and standstill. A leap that the IMU did not feel is the receiver's, and so is a motion
+/// while encoders and IMU stand. An unknown heading turns forward speed into sideways speed: its variance counts here.
+[[gnu::noinline]] void Inertial::compare_with_ground(const VelocityMeasurement& z, const FilterView& filter) {
   standstill_.update_ground(z.v_n_mps);
-  sources_.velocity.note(filter.stamp());
-  constexpr float kUnseen_mps = 3;
+  sources_.velocity.note(z, filter);
+  if (sources_.velocity.leapt() || (ins_.stands && filter.wheels_agree())) return;
   const float off2 = nav::Vector3(z.v_n_mps - ins_.x.v_n_mps).squaredNorm();
-  if (off2 > kUnseen_mps * kUnseen_mps && filter.wheels_agree()) return;
   const float v2 = z.v_n_mps(0) * z.v_n_mps(0) + z.v_n_mps(1) * z.v_n_mps(1);
   const float yaw2 = filter.heading_rad2();
   const float sigma = base::sqrt(z.sigma_mps * z.sigma_mps + v2 * yaw2 * yaw2);

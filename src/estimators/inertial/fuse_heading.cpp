@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // Inertial navigation: headings from outside, magnetometer, barometer.
-#pragma once
-
 #include "estimators/inertial/inertial.hpp"
 #include "estimators/inertial/measure.hpp"
 
 namespace tetap::estimators {
 
-inline Innovation Inertial::fuse(const sensor::OutsideHeading& heading, base::Micros stamp, const Context& ctx) {
+Innovation Inertial::fuse(const sensor::OutsideHeading& heading, base::Micros stamp, const Context& ctx) {
   const FilterView filter = view(stamp, ctx);
   const Assessment a = sources_.heading.assess(heading, filter);
   if (!a.fuses()) return record_of(a);
@@ -20,8 +18,7 @@ inline Innovation Inertial::fuse(const sensor::OutsideHeading& heading, base::Mi
                  filter);
 }
 
-[[gnu::noinline]] inline Innovation Inertial::fuse(const sensor::MagneticFlux& flux, base::Micros stamp,
-                                                   const Context& ctx) {
+[[gnu::noinline]] Innovation Inertial::fuse(const sensor::MagneticFlux& flux, base::Micros stamp, const Context& ctx) {
   if (ctx.parameters.magnetic.use == 0 || phase_ == Phase::kLevelling) return {};
   const FilterView filter = view(stamp, ctx);
   Magnetometer& magnetometer = sources_.magnetometer;
@@ -40,8 +37,7 @@ inline Innovation Inertial::fuse(const sensor::OutsideHeading& heading, base::Mi
   return record_of(a);
 }
 
-[[gnu::noinline]] inline Innovation Inertial::fuse(const sensor::AirPressure& air, base::Micros stamp,
-                                                   const Context& ctx) {
+[[gnu::noinline]] Innovation Inertial::fuse(const sensor::AirPressure& air, base::Micros stamp, const Context& ctx) {
   const FilterView filter = view(stamp, ctx);
   Barometer& barometer = sources_.barometer;
   if (!Barometer::starting_conditions(filter)) return {};

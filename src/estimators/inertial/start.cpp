@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // Inertial navigation: start, pose from outside, restart.
-#pragma once
-
 #include "estimators/inertial/inertial.hpp"
 #include "model/dual_heading.hpp"
 
 namespace tetap::estimators {
 
-inline void Inertial::restart(base::Micros t, const Context& ctx) {
+void Inertial::restart(base::Micros t, const Context& ctx) {
   base::reinitialise(*this);
   time_ = t;
   set_noise(ctx.parameters.inertial);
@@ -17,7 +15,7 @@ inline void Inertial::restart(base::Micros t, const Context& ctx) {
                      s.sigma_position_m, s.sigma_yaw_rad);
 }
 
-inline void Inertial::set_pose(base::Micros, const SetPose& given, const Context& ctx) {
+void Inertial::set_pose(base::Micros, const SetPose& given, const Context& ctx) {
   if (tracking()) alignment_.keep(ins_.x, base::sqrt(ins_.p(8, 8)));
   alignment_.place(given.pose, given.sigma_position_m, given.sigma_yaw_rad);
   sources_.position.reset();
@@ -30,7 +28,7 @@ inline void Inertial::set_pose(base::Micros, const SetPose& given, const Context
 }
 
 /// A given heading that does not contradict the filter's own is a measurement: all else that the filter knows stays.
-[[gnu::noinline]] inline bool Inertial::take_heading(const SetPose& given) {
+[[gnu::noinline]] bool Inertial::take_heading(const SetPose& given) {
   constexpr float kSmall_rad = 0.3F;  // no linear step turns rightly beyond that
   if (!(ins_.p(8, 8) < kSmall_rad * kSmall_rad)) return false;
   const model::DirectionMeasurement ahead =
@@ -39,7 +37,7 @@ inline void Inertial::set_pose(base::Micros, const SetPose& given, const Context
 }
 
 /// The filter begins where the alignment found the robot.
-inline void Inertial::begin(const Context& ctx) {
+void Inertial::begin(const Context& ctx) {
   const param::InertialParameters& n = ctx.parameters.inertial;
   if (ctx.map_frame.origin != sensor::OriginSource::kNone)
     ins_.earth = nav::Earth::at(ctx.map_frame.frame, n.earth_rate != 0);
@@ -53,7 +51,7 @@ inline void Inertial::begin(const Context& ctx) {
 }
 
 /// The filter is elsewhere at once: the covariance is looked at from end to end, and the present has to follow.
-inline void Inertial::relocated() {
+void Inertial::relocated() {
   sources_.position.relocated(time_);
   sources_.height.relocated();
   budget_.exhaust();
@@ -63,7 +61,7 @@ inline void Inertial::relocated() {
 /// As after power on, without a place. The size of the step is measured when the filter runs again, from the last
 /// estimate. Where the motion finds the heading once more, a magnetometer that led it astray, or did not keep it from
 /// that, has to agree first.
-[[gnu::noinline]] inline void Inertial::restart_filter(base::Micros t, sensor::ResetCause cause, const Context& ctx) {
+[[gnu::noinline]] void Inertial::restart_filter(base::Micros t, sensor::ResetCause cause, const Context& ctx) {
   const auto count = static_cast<std::uint8_t>(recovery_.jump().count + 1);
   const nav::InsState last = predictor_.present();
   const HeadingMonitor before = heading_monitor_;

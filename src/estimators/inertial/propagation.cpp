@@ -1,12 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Inertial navigation: IMU samples, spans without them, and standstill.
-#pragma once
-
 #include "estimators/inertial/inertial.hpp"
 
 namespace tetap::estimators {
 
-inline Innovation Inertial::fuse(const sensor::ImuSample& sample, base::Micros stamp, const Context& ctx) {
+Innovation Inertial::fuse(const sensor::ImuSample& sample, base::Micros stamp, const Context& ctx) {
   const param::InertialParameters& n = ctx.parameters.inertial;
   budget_.spend(WorkBudget::kImuSample);
   const nav::ImuIncrement increment = mounted(checks::increment_of(sample), n);
@@ -14,12 +12,17 @@ inline Innovation Inertial::fuse(const sensor::ImuSample& sample, base::Micros s
   const bool was_stuck = imu_.health().stuck();
   const bool turn_known = sample.clipped_gyro > 0 && tracking() && view(stamp, ctx).wheels_show_turn();
   const checks::ImuClass found = imu_.health().update(sample, increment, stamp, pause, turn_known, n);
-  if (found == checks::ImuClass::kInvalid) return {.verdict = sensor::Verdict::kNotFinite, .failed = Check::kValue};
+  if (found == checks::ImuClass::kInvalid)
+    return {.verdict = sensor::Verdict::kNotFinite,
+            .failed = increment.check() == nav::ImuVerdict::kBadInterval ? Check::kTime : Check::kValue};
   // The predictor may have classified the sample otherwise.
   if (sample.clipped_gyro > 0 || sample.clipped_accel > 0) predictor_.note_correction();
   if (found == checks::ImuClass::kStuck) return imu_stuck(increment, was_stuck, ctx);
-  imu_.set_saturated(found == checks::ImuClass::kSaturated);
-  if (found == checks::ImuClass::kSaturated) return {.verdict = sensor::Verdict::kNotUsed, .failed = Check::kValue};
+  imu_.set_unusable(found <= checks::ImuClass::kSaturated);
+  if (imu_.unusable()) {
+    imu_.doubt(stamp);
+    return {.verdict = sensor::Verdict::kNotUsed, .failed = Check::kValue};
+  }
   // All that was true at the last sample has been fused: wheels bring the constraint with them, and twice is too sure.
   if (tracking()) fuse_constraint(time_, ctx);
   imu_.set_rate(increment.dtheta_b_rad / base::seconds(increment.dt));
@@ -33,17 +36,17 @@ inline Innovation Inertial::fuse(const sensor::ImuSample& sample, base::Micros s
 }
 
 /// Repetitions before this one were taken for motion.
-inline Innovation Inertial::imu_stuck(const nav::ImuIncrement& increment, bool was_stuck, const Context& ctx) {
+Innovation Inertial::imu_stuck(const nav::ImuIncrement& increment, bool was_stuck, const Context& ctx) {
   const param::InertialParameters& n = ctx.parameters.inertial;
   if (!was_stuck) predictor_.note_correction();
-  const float false_s = static_cast<float>(n.stuck_samples) * base::seconds(increment.dt);
+  const float false_s = static_cast<float>(imu_.health().stuck_after(n)) * base::seconds(increment.dt);
   if (!was_stuck && tracking()) Recovery::inflate_motion(ins_, n.gap_mps2 * false_s, n.gap_radps * false_s);
   return {.verdict = sensor::Verdict::kStale, .failed = Check::kStuck};
 }
 
 /// Before the filter runs.
-inline Innovation Inertial::align(const nav::ImuIncrement& increment, base::Micros pause, base::Micros stamp,
-                                  const Context& ctx) {
+Innovation Inertial::align(const nav::ImuIncrement& increment, base::Micros pause, base::Micros stamp,
+                           const Context& ctx) {
   if (checks::ImuClassifier::is_gap(pause)) alignment_.gap(pause, heading_monitor_);
   time_ = stamp;
   if (alignment_.level(increment, heading_monitor_, ctx.parameters.inertial)) phase_ = Phase::kFindingHeading;
@@ -52,7 +55,7 @@ inline Innovation Inertial::align(const nav::ImuIncrement& increment, base::Micr
 }
 
 /// Lost samples are bridged; what was bridged already this sample does not show again.
-inline void Inertial::bridge_lost_samples(base::Micros gap, const Context& ctx) {
+void Inertial::bridge_lost_samples(base::Micros gap, const Context& ctx) {
   const nav::Vector3 shown = imu_.rate_b_radps();
   const base::Micros before = imu_.bridged_until();
   bridge(gap, ctx);
@@ -60,8 +63,8 @@ inline void Inertial::bridge_lost_samples(base::Micros gap, const Context& ctx) 
   imu_.set_rate(shown);
 }
 
-inline Innovation Inertial::propagate(const sensor::ImuSample& sample, const nav::ImuIncrement& increment,
-                                      base::Micros stamp, const Context& ctx) {
+Innovation Inertial::propagate(const sensor::ImuSample& sample, const nav::ImuIncrement& increment, base::Micros stamp,
+                               const Context& ctx) {
   const param::InertialParameters& n = ctx.parameters.inertial;
   const float dt_s = base::seconds(increment.dt);
   const nav::Quaternion& q = ins_.x.q_nb;
@@ -78,6 +81,11 @@ inline Innovation Inertial::propagate(const sensor::ImuSample& sample, const nav
   ins_.vibration = imu_.health().noise_factor(n);
   if (ins_.pending_s() >= predictor_.schedule().covariance_every_s()) ins_.predict_covariance();
   if (sample.clipped_accel > 0 || sample.clipped_gyro > 0) inflate_clipped(sample, dt_s, n);
+  if (imu_.health().leaps()) {
+    const checks::ImuHealth::Leap& leap = imu_.health().leap();
+    imu_.doubt(stamp);
+    Recovery::inflate_motion(ins_, leap.force_mps2 * dt_s, leap.rate_radps * dt_s);
+  }
   time_ = stamp;
   if (stamp > predictor_.last_seen()) predictor_.note_correction();  // it left the window before the present had it
   standstill_.update_rate(imu_.rate_b_radps(), dt_s);
@@ -91,15 +99,15 @@ inline Innovation Inertial::propagate(const sensor::ImuSample& sample, const nav
 }
 
 /// Clipped increments are used, and are as uncertain as none.
-[[gnu::noinline]] inline void Inertial::inflate_clipped(const sensor::ImuSample& sample, float dt_s,
-                                                        const param::InertialParameters& n) {
+[[gnu::noinline]] void Inertial::inflate_clipped(const sensor::ImuSample& sample, float dt_s,
+                                                 const param::InertialParameters& n) {
   const float growth = base::sqrt(dt_s * 0.1F);
   if (sample.clipped_accel > 0) ins_.accel_n_mps2 = nav::Vector3::Zero();
   Recovery::inflate_motion(ins_, n.gap_mps2 * growth, sample.clipped_gyro > 0 ? n.gap_radps * growth : 0.0F);
 }
 
 /// Goes on without IMU: the velocity stays what it is in the body, which turns as the wheels show, or not at all.
-[[gnu::noinline]] inline void Inertial::bridge(base::Micros gap, const Context& ctx) {
+[[gnu::noinline]] void Inertial::bridge(base::Micros gap, const Context& ctx) {
   const param::InertialParameters& n = ctx.parameters.inertial;
   const bool wheels = view(time_, ctx).wheels_show_turn();
   const float dt_s = base::seconds(gap);
@@ -122,7 +130,7 @@ inline Innovation Inertial::propagate(const sensor::ImuSample& sample, const nav
   standstill_.interrupt();
 }
 
-inline void Inertial::detect_standstill(base::Micros stamp, const Context& ctx) {
+void Inertial::detect_standstill(base::Micros stamp, const Context& ctx) {
   const param::InertialParameters& n = ctx.parameters.inertial;
   const FilterView filter = view(stamp, ctx);
   ins_.stands = standstill_.detect(filter, imu_.health().calm(n));
@@ -133,7 +141,7 @@ inline void Inertial::detect_standstill(base::Micros stamp, const Context& ctx) 
   if (standstill_.rate_due(filter, budget_)) fuse_zero_rate(n);
 }
 
-[[gnu::noinline]] inline void Inertial::fuse_zero_rate(const param::InertialParameters& n) {
+[[gnu::noinline]] void Inertial::fuse_zero_rate(const param::InertialParameters& n) {
   if (ins_.pending_s() > 0.0F) ins_.predict_covariance();
   const Standstill::ZeroRateUpdate due = standstill_.take_rate(ins_, n);
   budget_.spend(WorkBudget::kMeasurement);

@@ -1,12 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Inertial navigation: what is published.
-#pragma once
-
 #include "estimators/inertial/inertial.hpp"
 
 namespace tetap::estimators {
 
-inline sensor::Mode Inertial::mode(const Context& ctx) const {
+sensor::Mode Inertial::mode(const Context& ctx) const {
   if (phase_ == Phase::kLevelling)
     return alignment_.levelling() ? sensor::Mode::kLevelling : sensor::Mode::kWaitingForImu;
   if (phase_ == Phase::kFindingHeading)
@@ -21,7 +19,7 @@ inline sensor::Mode Inertial::mode(const Context& ctx) const {
 }
 
 /// For the status of the present.
-inline std::uint16_t Inertial::faults() const {
+std::uint16_t Inertial::faults() const {
   std::uint16_t bits = 0;
   const auto raise = [&bits](sensor::Fault fault, bool is) {
     if (is) bits = static_cast<std::uint16_t>(bits | 1U << static_cast<unsigned>(fault));
@@ -31,13 +29,15 @@ inline std::uint16_t Inertial::faults() const {
   raise(sensor::Fault::kImuClipped, imu.clipped_lately(time_));
   raise(sensor::Fault::kVibration, imu.shaken());
   raise(sensor::Fault::kSensorStuck, imu.stuck() || sources_.any_stuck(time_));
-  raise(sensor::Fault::kInputStale, predictor_.without_imu() && !imu.stuck() && !imu_.saturated());
+  raise(sensor::Fault::kInputStale, predictor_.without_imu() && !imu.stuck() && !imu_.unusable());
   return bits;
 }
 
-template <class Sink>
-void Inertial::for_each_source(const Context& ctx, Sink&& sink) const {
-  const auto row = [&](sensor::Sensor of, const SourceStatus& status) { sink(of, status.state, status.failed); };
+SourceStates Inertial::sources(const Context& ctx) const {
+  SourceStates states;
+  const auto row = [&](sensor::Sensor of, const SourceStatus& status) {
+    states.set(of, {status.state, status.failed});
+  };
   row(sensor::Sensor::kImu, imu_.status(time_, ctx.parameters.inertial));
   row(sensor::Sensor::kGnssPosition, sources_.position.status(time_));
   row(sensor::Sensor::kGnssVelocity, sources_.velocity.status(time_));
@@ -46,11 +46,12 @@ void Inertial::for_each_source(const Context& ctx, Sink&& sink) const {
   row(sensor::Sensor::kHeading, sources_.heading.status(time_));
   row(sensor::Sensor::kMagnetometer, sources_.magnetometer.status(time_));
   row(sensor::Sensor::kBarometer, sources_.barometer.status(time_));
+  return states;
 }
 
 /// Span to the present without IMU, squared, as the filter will grow there: over all of it, or over what is missing, at
 /// its end, too. Variance of velocity per (m/s^2)^2, or of attitude per (rad/s)^2.
-inline float Inertial::unseen_s2(float unseen_s) const {
+float Inertial::unseen_s2(float unseen_s) const {
   constexpr float kLasts_s = 0.1F;  // Ins::predict_without_imu
   constexpr base::Micros kHole{25'000};
   if (predictor_.without_imu()) return ahead_s() * ahead_s();
@@ -70,21 +71,16 @@ inline float Inertial::unseen_s2(float unseen_s) const {
   return step;
 }
 
-inline InertialEstimate Inertial::inertial(const Context& ctx) const {
-  SourceStates sources;
-  for_each_source(ctx, [&sources](sensor::Sensor of, SourceState state, Check failed) {
-    sources.set(of, {state, failed});
-  });
+InertialEstimate Inertial::inertial(const Context& ctx) const {
   return {.state = present(),
           .p = ins_.p,
           .ahead = step_ahead(ctx),
           .valid = tracking(),
           .jump = recovery_.jump(),
-          .imu = imu_.health().report(),
-          .sources = sources};
+          .imu = imu_.health().report()};
 }
 
-inline Estimate Inertial::estimate(const Context& ctx) const {
+Estimate Inertial::estimate(const Context& ctx) const {
   const nav::InsState& x = present();
   const bool valid = tracking();
   const nav::InsCovarianceStep<float> ahead = step_ahead(ctx);
@@ -131,7 +127,7 @@ template <int kFirst, std::size_t kN>
 /// Of the speed ahead, x_b . R^T v at the present: by velocity, attitude (as far as the robot does not go where it
 /// points, and by what tilt made of acceleration since) and accelerometer bias; to second order by an uncertain
 /// heading. Of the turn: by gyroscope noise and bias, and by the age of its sample.
-[[gnu::noinline]] inline MotionVariance Inertial::motion_variance(const Context& ctx) const {
+[[gnu::noinline]] MotionVariance Inertial::motion_variance(const Context& ctx) const {
   const InertialEstimate full = inertial(ctx);
   if (!full.valid) return {};
   const nav::Quaternion& q = full.state.q_nb;
@@ -159,23 +155,6 @@ template <int kFirst, std::size_t kN>
   variance.yaw_rate_rad2ps2 =
       detail::quadratic<nav::InsState::kGyroBias>(full.p, turn) + gyro * gyro / period_s + aged * aged;
   return variance;
-}
-
-template <class Sink>
-void Inertial::hash_state(Sink&& sink) const {
-  ins_.x.hash_state(sink);
-  ins_.each_bit_of_p(sink);
-  predictor_.hash_state(sink);
-  if (recovery_.step_unknown()) predictor_.present().hash_state(sink);
-  budget_.hash_state(sink);
-  alignment_.hash_state(sink);
-  heading_monitor_.hash_state(sink);
-  sink(static_cast<std::uint32_t>(phase_));
-  sink(time_.us);
-  imu_.hash_state(sink);
-  standstill_.hash_state(sink);
-  sources_.hash_state(sink);
-  recovery_.hash_state(sink);
 }
 
 }  // namespace tetap::estimators

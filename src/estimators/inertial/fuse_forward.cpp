@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // Inertial navigation: wheels, speedometer, and the non-holonomic constraint.
-#pragma once
-
 #include "estimators/inertial/inertial.hpp"
 #include "estimators/inertial/measure.hpp"
 
 namespace tetap::estimators {
 
-inline Innovation Inertial::fuse(const sensor::WheelCounts& counts, base::Micros stamp, const Context& ctx) {
+Innovation Inertial::fuse(const sensor::WheelCounts& counts, base::Micros stamp, const Context& ctx) {
   EncoderInterval& encoders = sources_.wheels.encoders();
   if (skips_counts(stamp, ctx.parameters.inertial)) {
     encoders.skip(counts, stamp);
@@ -18,21 +16,21 @@ inline Innovation Inertial::fuse(const sensor::WheelCounts& counts, base::Micros
   return reading ? fuse_wheels(*reading, filter) : Innovation{.verdict = sensor::Verdict::kAccepted};
 }
 
-inline Innovation Inertial::fuse(const sensor::WheelSpeeds& speeds, base::Micros stamp, const Context& ctx) {
+Innovation Inertial::fuse(const sensor::WheelSpeeds& speeds, base::Micros stamp, const Context& ctx) {
   if (skips_speed(stamp, ctx.parameters.inertial)) return {.verdict = sensor::Verdict::kAccepted};
   return fuse_wheels({.wheels = {.left_mps = speeds.left_mps, .right_mps = speeds.right_mps}}, view(stamp, ctx));
 }
 
 /// There are no wheels to compare: the innovation gate alone judges a speedometer.
-inline Innovation Inertial::fuse(const sensor::BodySpeed& speed, base::Micros stamp, const Context& ctx) {
+Innovation Inertial::fuse(const sensor::BodySpeed& speed, base::Micros stamp, const Context& ctx) {
   if (skips_speed(stamp, ctx.parameters.inertial)) return {.verdict = sensor::Verdict::kAccepted};
   sources_.forward.note(speed.forward_mps, stamp);
   return fuse_forward({.mps = speed.forward_mps}, view(stamp, ctx));
 }
 
 /// Its own frame, which is gone when the forward speed is fused: that path decides the stack.
-[[gnu::noinline]] inline Innovation Inertial::assess_wheels(const WheelReading& reading, const FilterView& filter,
-                                                            ForwardReading& forward) {
+[[gnu::noinline]] Innovation Inertial::assess_wheels(const WheelReading& reading, const FilterView& filter,
+                                                     ForwardReading& forward) {
   if (!base::is_finite(reading.wheels.left_mps) || !base::is_finite(reading.wheels.right_mps))
     return {.verdict = sensor::Verdict::kNotFinite, .failed = Check::kValue};
   sources_.forward.note(reading.mean_mps(), filter.stamp());
@@ -44,19 +42,18 @@ inline Innovation Inertial::fuse(const sensor::BodySpeed& speed, base::Micros st
   if (sources_.wheels.slip() == Wheels::Slip::kBoth) {
     a = sources_.forward.assess_spinning(reading.mean_mps(), filter);
     apply(a, filter);
-    if (a.action == Action::kInflateSpeed) sources_.wheels.reset_slip();
   }
   return record_of(a);
 }
 
-inline Innovation Inertial::fuse_wheels(const WheelReading& reading, const FilterView& filter) {
+Innovation Inertial::fuse_wheels(const WheelReading& reading, const FilterView& filter) {
   ForwardReading forward;
   const Innovation assessed = assess_wheels(reading, filter, forward);
   if (assessed.verdict != sensor::Verdict::kAccepted) return assessed;
   return fuse_forward(forward, filter);
 }
 
-[[gnu::noinline]] inline Innovation Inertial::fuse_forward(const ForwardReading& reading, const FilterView& filter) {
+[[gnu::noinline]] Innovation Inertial::fuse_forward(const ForwardReading& reading, const FilterView& filter) {
   const param::InertialParameters& n = filter.parameters().inertial;
   if (!tracking()) {
     alignment_.forward(reading.mps, n.wheel_mps + n.slip_share * base::abs(reading.mps), n.axle_x_b_m,
@@ -68,16 +65,16 @@ inline Innovation Inertial::fuse_wheels(const WheelReading& reading, const Filte
 }
 
 /// The constraint alone, where no speed came of late: it is what a speed of which nothing is known leaves.
-inline void Inertial::fuse_constraint(base::Micros stamp, const Context& ctx) {
+void Inertial::fuse_constraint(base::Micros stamp, const Context& ctx) {
   const base::Micros every{ctx.parameters.inertial.constrain_every_us}, last = sources_.forward.fused_at();
   if (every.us <= 0 || checks::recent(last, stamp, every) || standstill_.pending() ||
       !budget_.allows_due(stamp - last, every))
     return;
   const FilterView filter = view(stamp, ctx);
   if (!sources_.forward.starting_conditions(filter)) return;
-  const checks::Persistence before = sources_.forward.refused();
+  const Witness before = sources_.forward.witness();
   static_cast<void>(fuse_forward({.sigma_mps = ForwardReading::kUnknown_mps}, filter));
-  if (filter.slip() == Wheels::Slip::kBoth) sources_.forward.restore_refusals(before);
+  sources_.forward.restore(before, filter.slip() == Wheels::Slip::kBoth);
 }
 
 }  // namespace tetap::estimators

@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+// Definition of make_firmware(). Only the files that instantiate it for a robot include this.
+#pragma once
+
+#include "node/firmware.hpp"
+#include "sim_host/robot_firmware.hpp"
+
+#include <memory>
+
+namespace tetap::sim {
+
+template <class Estimators>
+std::unique_ptr<RobotFirmware> make_firmware(HostBoard& board, const param::Parameters& parameters,
+                                             const bus::Version& version) {
+  class Firmware final : public RobotFirmware {
+   public:
+    Firmware(HostBoard& board, const param::Parameters& parameters, const bus::Version& version)
+        : firmware_(board, parameters, version) {}
+    void poll() override { firmware_.poll(); }
+    std::uint32_t self_check(std::uint32_t epochs) override { return firmware_.self_check(epochs); }
+
+   private:
+    node::Firmware<HostBoard, Estimators> firmware_;
+  };
+  return std::make_unique<Firmware>(board, parameters, version);
+}
+
+}  // namespace tetap::sim

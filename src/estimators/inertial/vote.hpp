@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: Apache-2.0
+// Votes of devices on a refused measurement. Witnesses are devices: the receiver (position and velocity), the wheels or
+// a speedometer, the IMU. A device that is refused is right when another device contradicts the filter likewise, or
+// when none vouches for the filter for long. A vote for or against takes a likelihood ratio, not a gate: Wald 1945,
+// "Sequential tests of statistical hypotheses", Ann. Math. Stat. 16(2).
+#pragma once
+
+#include "checks/persistence.hpp"
+#include "nav/so3.hpp"
+#include "param/parameters.hpp"
+
+#include <cstdint>
+
+namespace tetap::estimators {
+
+enum class Vote : std::uint8_t {
+  kAbsent,    ///< the device is silent
+  kAbstains,  ///< nothing that it showed tells right from wrong
+  kWaits,     ///< the device was not heard yet
+  kFor,       ///< the filter is right
+  kAgainst,   ///< the filter is wrong
+};
+
+/// What a device showed of the filter so far: accepted or refused, and when.
+class Witness {
+ public:
+  void update(bool refused, base::Micros stamp) {
+    refused_.update(refused, stamp);
+    heard_at_ = stamp;
+    if (!refused) agreed_at_ = stamp;
+  }
+  [[nodiscard]] const checks::Persistence& refused() const { return refused_; }
+  /// First refusal of the present run.
+  [[nodiscard]] base::Micros since(base::Micros stamp) const { return stamp - refused_.held_for(stamp); }
+  [[nodiscard]] base::Micros heard_at() const { return heard_at_; }
+  [[nodiscard]] base::Micros agreed_at() const { return agreed_at_; }
+  /// Time from the last agreement to `stamp`, at most ten seconds: what the filter is off by has grown in it.
+  [[nodiscard]] float disagrees_s(base::Micros stamp) const {
+    constexpr base::Micros kMost{10'000'000};
+    const base::Micros for_ = agreed_at_.us > 0 ? stamp - agreed_at_ : refused_.held_for(stamp);
+    return base::seconds(for_ < kMost ? for_ : kMost);
+  }
+  /// Refused at least three times, the last one within 1.5 s.
+  [[nodiscard]] bool contradicts(base::Micros stamp) const {
+    return refused_.count() >= kRefusals && stamp - heard_at_ < base::Micros{1'500'000};
+  }
+  /// A device that is heard at all votes when it was heard after `since`.
+  [[nodiscard]] Vote presence(base::Micros since, base::Micros stamp) const {
+    constexpr base::Micros kPresent{3'000'000}, kPatience{2'500'000};
+    if (!checks::recent(heard_at_, stamp, kPresent)) return Vote::kAbsent;
+    if (heard_at_ > since) return Vote::kAbstains;
+    return stamp - since > kPatience ? Vote::kAbsent : Vote::kWaits;
+  }
+  /// Vote of a velocity: accepted or refused since.
+  [[nodiscard]] Vote of_velocity(base::Micros since, base::Micros stamp) const {
+    const Vote present = presence(since, stamp);
+    if (present != Vote::kAbstains) return present;
+    return refused_.holds() ? Vote::kAgainst : Vote::kFor;
+  }
+  /// The filter gave way: refusals so far were its own error.
+  void forgive() { refused_.reset(); }
+  /// The filter begins.
+  void begin() { *this = {}; }
+  /// Measurements of something else were counted since `before`: they say nothing of the device.
+  void keep_hearing(const Witness& before) {
+    heard_at_ = before.heard_at_;
+    agreed_at_ = before.agreed_at_;
+  }
+
+  static constexpr std::int32_t kRefusals = 3;
+
+  template <class Sink>
+  void hash_state(Sink&& sink) const {
+    refused_.hash_state(sink);
+    sink(heard_at_.us);
+    sink(agreed_at_.us);
+  }
+
+ private:
+  checks::Persistence refused_;  ///< refusals in a row
+  base::Micros heard_at_;        ///< stamp of the last measurement; 0: none
+  base::Micros agreed_at_;       ///< stamp of the last one that was accepted; 0: none
+};
+
+/// Innovation of a fix: a level offset, and the mean variance of one axis.
+struct LevelInnovation {
+  float east_m = 0, north_m = 0, variance_m2 = 1;
+};
+
+/// Vote of the last fix, which came t after the velocity was first refused by nu: the log likelihood ratio of "off by
+/// d = nu t" to "not off" is twice (2 d v - d^2) / S. Accepted alone shows nothing.
+[[nodiscard]] inline Vote vote_of_fix(const LevelInnovation& fix, bool refused, const nav::Vector3& nu_mps, float t_s) {
+  constexpr float kShare = 0.7F;  // a deviation grows from nothing
+  constexpr float kRatio = 9.0F;  // 3 sigma
+  const float east_m = kShare * t_s * nu_mps(0), north_m = kShare * t_s * nu_mps(1);
+  const float for_filter =
+      (east_m * (east_m - 2.0F * fix.east_m) + north_m * (north_m - 2.0F * fix.north_m)) / fix.variance_m2;
+  if (for_filter < -kRatio) return Vote::kAgainst;
+  return for_filter > kRatio && !refused ? Vote::kFor : Vote::kAbstains;
+}
+
+/// Votes on a refused velocity.
+struct Ballot {
+  Vote speed = Vote::kAbsent;  ///< the other velocity
+  Vote fixes = Vote::kAbsent;
+  bool speeds_agree = false;  ///< both velocities say the same, so that they contradict the filter likewise
+};
+
+/// The filter gives way to a velocity: soon where a second device contradicts it, after RecoveryParameters::after_us
+/// where none vouches for it.
+[[nodiscard]] inline bool gives_way(const checks::Persistence& refused, const Ballot& votes, base::Micros stamp,
+                                    const param::RecoveryParameters& n) {
+  const auto any = [&votes](Vote vote) { return votes.speed == vote || votes.fixes == vote; };
+  if (any(Vote::kFor) || any(Vote::kWaits)) return false;
+  const bool against = votes.fixes == Vote::kAgainst || (votes.speed == Vote::kAgainst && votes.speeds_agree);
+  if (against) return refused.persists(stamp, base::Micros{200'000}, Witness::kRefusals);
+  return votes.speed != Vote::kAgainst && refused.persists(stamp, base::Micros{n.after_us}, n.at_least);
+}
+
+}  // namespace tetap::estimators

@@ -1,0 +1,154 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "estimators/planar/dead_reckoning.hpp"
+
+namespace tetap::estimators {
+
+model::PlanarIncrement DeadReckoning::held_increment(float dt_s, const param::Parameters& n) const {
+  model::PlanarIncrement increment;
+  switch (held_.kind) {
+    case Held::Kind::kNone:
+      break;
+    case Held::Kind::kBody:
+      increment =
+          model::Unicycle{.forward_mps = held_.first_mps, .yaw_rate_radps = held_.second, .noise = n.wheels.noise}
+              .increment(dt_s);
+      break;
+    case Held::Kind::kWheels: {
+      increment = n.wheels.drive.increment(held_.first_mps * dt_s, held_.second * dt_s);
+      const float white = n.wheels.wheel_speed_noise * dt_s;
+      increment.var_ds += 0.5F * white;
+      increment.var_dyaw += 2.0F * white / (n.wheels.drive.track_m * n.wheels.drive.track_m);
+      break;
+    }
+  }
+  if (n.gyro.use != 0) turn(increment, gyro_rate_radps_ * dt_s, n.gyro.noise * dt_s);
+  return increment;
+}
+
+void DeadReckoning::propagate(base::Micros t, const param::Parameters& n) {
+  if (t <= time_) return;
+  if (held_.kind == Held::Kind::kNone) {  // nothing was ever heard of motion: standing where it was put
+    time_ = t;
+    return;
+  }
+  // What was held counts until the time-out, as it was published; after that anything may have happened.
+  const base::Micros silent = last_input_ + base::Micros{n.wheels.timeout_us};
+  const base::Micros held_until = t < silent ? t : silent;
+  if (time_ < held_until) {
+    const float dt_s = base::seconds(held_until - time_);
+    filter.predict(held_increment(dt_s, n));
+    if (held_.kind == Held::Kind::kWheels) {
+      applied_left_m_ += held_.first_mps * dt_s;
+      applied_right_m_ += held_.second * dt_s;
+    }
+    if (n.gyro.use != 0) applied_yaw_rad_ += gyro_rate_radps_ * dt_s;
+    time_ = held_until;
+  }
+  if (time_ < t) {
+    const float grown = n.wheels.timeout_noise * base::seconds(t - time_);
+    filter.predict(model::PlanarIncrement{.var_ds = grown, .var_dyaw = grown});
+    time_ = t;
+  }
+}
+
+bool DeadReckoning::fuse(const sensor::WheelCounts& now, base::Micros stamp, const param::Parameters& n) {
+  const auto& drive = n.wheels.drive;
+  if (n.gyro.use != 0) propagate(stamp, n);  // the turn up to here; what the counts add is length
+  const bool usable = have_counts_ && stamp > counts_time_ && stamp - counts_time_ <= base::Micros{n.wheels.timeout_us};
+  if (usable) {
+    const float left_m = drive.left_m(model::count_difference(now.left, counts_.left));
+    const float right_m = drive.right_m(model::count_difference(now.right, counts_.right));
+    model::PlanarIncrement increment = drive.increment(left_m - applied_left_m_, right_m - applied_right_m_);
+    if (n.gyro.use != 0) turn(increment, 0.0F, 0.0F);
+    filter.predict(increment);
+    const float per_s = 1.0F / base::seconds(stamp - counts_time_);
+    held_ = {.kind = Held::Kind::kWheels, .first_mps = left_m * per_s, .second = right_m * per_s};
+  } else {
+    if (have_counts_) propagate(stamp, n);  // the doubt of the gap stays; its way is not known
+    held_ = {.kind = Held::Kind::kWheels};
+  }
+  if (stamp > time_) time_ = stamp;
+  untravelled();
+  counts_ = now;
+  counts_time_ = last_input_ = stamp;
+  have_counts_ = true;
+  return true;
+}
+
+bool DeadReckoning::fuse_speed(const Held& held, base::Micros stamp, const param::Parameters& n) {
+  const bool first = held_.kind == Held::Kind::kNone;
+  const bool gap = stamp - last_input_ > base::Micros{n.wheels.timeout_us};
+  if (n.wheels.hold == param::Hold::kForward || first || gap) propagate(stamp, n);
+  held_ = held;
+  last_input_ = stamp;
+  if (n.wheels.hold == param::Hold::kBackward) propagate(stamp, n);
+  if (stamp > time_) time_ = stamp;
+  return true;
+}
+
+bool DeadReckoning::fuse(const sensor::ImuSample& sample, base::Micros stamp, const param::Parameters& n) {
+  const base::Micros interval{sample.interval_us};
+  if (n.gyro.use == 0 || interval.us == 0 || interval > base::Micros{n.wheels.timeout_us}) return false;
+  const float interval_s = base::seconds(interval);
+  const float raw_radps = (n.gyro.up_s[0] * sample.dangle_b_rad[0] + n.gyro.up_s[1] * sample.dangle_b_rad[1] +
+                           n.gyro.up_s[2] * sample.dangle_b_rad[2]) /
+                          interval_s;
+  const float forward = forward_mps();
+  const bool still =
+      held_.kind != Held::Kind::kNone && forward < n.gyro.standstill_mps && -forward < n.gyro.standstill_mps;
+  if (!still) {
+    moving_ = true;
+  } else if (moving_) {
+    moving_ = false;
+    still_since_ = stamp;
+  } else if (stamp - still_since_ > base::Micros{1'000'000}) {
+    gyro_bias_radps_ += (raw_radps - gyro_bias_radps_) * (interval_s / n.gyro.bias_time_s);
+  }
+  gyro_rate_radps_ = raw_radps - gyro_bias_radps_;
+  // What was extrapolated since the sample before is taken off; a gap between the samples is filled with this one's
+  // rate.
+  propagate(stamp, n);
+  const base::Micros span = stamp - gyro_time_;
+  const bool follows = gyro_time_.us != 0 && span.us > 0 && span <= base::Micros{n.wheels.timeout_us};
+  if (follows) {
+    model::PlanarIncrement correction;
+    turn(correction, gyro_rate_radps_ * base::seconds(span) - applied_yaw_rad_, 0.0F);
+    filter.predict(correction);
+  }
+  applied_yaw_rad_ = 0;
+  gyro_time_ = stamp;
+  return true;
+}
+
+Estimate DeadReckoning::estimate(const param::Parameters& n) const {
+  DeadReckoning ahead = *this;
+  ahead.propagate(out_time_, n);
+  const bool fresh = this->fresh(n);
+  return {.time = out_time_,
+          .pose = ahead.filter.x,
+          .p = ahead.filter.p,
+          .forward_mps = fresh ? forward_mps() : 0.0F,
+          .yaw_rate_radps = fresh ? yaw_rate_radps(n) : 0.0F,
+          .position_valid = true,
+          .heading_valid = true,
+          .velocity_valid = fresh};
+}
+
+[[gnu::noinline]] MotionVariance DeadReckoning::motion_variance(const param::Parameters& n) const {
+  if (!fresh(n)) return {};
+  // Of the motion over one period: what it adds to the pose, and the steps of the counters.
+  const float period_s = base::seconds(base::Micros{n.loop.period_us});
+  const model::PlanarIncrement one = held_increment(period_s, n);
+  const float step_m = have_counts_ ? 0.41F * n.wheels.drive.left_m(1) : 0.0F;
+  const float track_m = n.wheels.drive.track_m;
+  const bool gyro = n.gyro.use != 0;
+  const float step_rad = gyro || !have_counts_ ? 0.0F : step_m / track_m;
+  // Samples are means, too: true in their middle.
+  const float aged =
+      n.loop.turn_radps2 * (base::seconds(out_time_ - (gyro ? gyro_time_ : last_input_)) + 0.5F * period_s);
+  const float per_s2 = 1.0F / (period_s * period_s);
+  return {.forward_m2ps2 = (one.var_ds + 0.5F * step_m * step_m) * per_s2,
+          .yaw_rate_rad2ps2 = (one.var_dyaw + 2.0F * step_rad * step_rad) * per_s2 + aged * aged};
+}
+
+}  // namespace tetap::estimators

@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "estimators/planar/pose_ekf.hpp"
+
+namespace tetap::estimators {
+
+template <class Model>
+Innovation PoseEkf::measure(const Model& model, Source source, float gate_scale, base::Micros stamp, const Context& ctx,
+                            std::uint8_t landmark) {
+  const auto result = motion_.filter.update(model, gate_scale * filter::chi_square_99(Model::kDimension));
+  checks::Persistence& refused = refused_[source];
+  if (result.verdict == filter::Verdict::kAccepted) {
+    refused.update(false, stamp);
+    last_absolute_ = stamp;
+  } else if (result.verdict == filter::Verdict::kRejected) {
+    refused.update(true, stamp);
+    recover(refused, stamp, ctx.parameters.recovery);
+  }
+  return record(result, landmark);
+}
+
+void PoseEkf::recover(checks::Persistence& refused, base::Micros stamp, const param::RecoveryParameters& n) {
+  if (!refused.persists(stamp, base::Micros{n.after_us}, n.at_least)) return;
+  const float place_m2 = n.inflate_position_m * n.inflate_position_m;
+  motion_.filter.p.add_diagonal({place_m2, place_m2, n.inflate_yaw_rad * n.inflate_yaw_rad});
+  refused.reset();
+}
+
+Innovation PoseEkf::fuse(const sensor::LandmarkSighting& sighting, base::Micros stamp, const Context& ctx) {
+  const param::LandmarkParameters& n = ctx.parameters.landmark;
+  const std::optional<model::Landmark> landmark =
+      ctx.map_frame.map != nullptr ? ctx.map_frame.map->find(sighting.landmark) : std::nullopt;
+  if (!landmark) return {.verdict = sensor::Verdict::kUnknownLandmark, .landmark = sighting.landmark};
+  motion_.propagate(stamp, ctx.parameters);
+  give_up_when_lost();
+  if (phase_ != Phase::kTracking) return {.verdict = sensor::Verdict::kNotUsed, .landmark = sighting.landmark};
+  const bool has_range = base::is_finite(sighting.range_m);
+  const bool has_bearing = base::is_finite(sighting.bearing_rad);
+  if (has_range && has_bearing) {
+    const model::RangeBearing model{.range_m = sighting.range_m,
+                                    .bearing_rad = sighting.bearing_rad,
+                                    .sigma_range_m = n.sigma_range_m + n.sigma_range_per_m * sighting.range_m,
+                                    .sigma_bearing_rad = n.sigma_bearing_rad,
+                                    .landmark = *landmark,
+                                    .mounting = n.mounting};
+    return measure(model, kLandmark, n.gate_scale, stamp, ctx, sighting.landmark);
+  }
+  if (has_range) {
+    const model::Range model{.range_m = sighting.range_m,
+                             .sigma_range_m = n.sigma_range_only_m + n.sigma_range_per_m * sighting.range_m,
+                             .landmark = *landmark,
+                             .mounting = n.mounting};
+    return measure(model, kLandmark, n.gate_scale, stamp, ctx, sighting.landmark);
+  }
+  if (has_bearing) {
+    const model::Bearing model{.bearing_rad = sighting.bearing_rad,
+                               .sigma_bearing_rad = n.sigma_bearing_rad,
+                               .landmark = *landmark,
+                               .mounting = n.mounting};
+    return measure(model, kLandmark, n.gate_scale, stamp, ctx, sighting.landmark);
+  }
+  return {.verdict = sensor::Verdict::kNotFinite, .landmark = sighting.landmark, .failed = sensor::Check::kValue};
+}
+
+Innovation PoseEkf::fuse(const sensor::GnssPosition& fix, base::Micros stamp, const Context& ctx) {
+  const param::GnssParameters& n = ctx.parameters.gnss;
+  if (fix.fix < sensor::GnssFix::k2d || ctx.map_frame.origin == sensor::OriginSource::kNone) return {};
+  const nav::Local local = ctx.map_frame.frame.to_local(fix.latitude_2ndeg, fix.longitude_2ndeg, fix.height_m);
+  if (!local.valid) return {.verdict = sensor::Verdict::kNotFinite, .failed = sensor::Check::kValue};
+  const float own = base::is_finite(fix.horizontal_acc_m) ? n.sigma_scale * fix.horizontal_acc_m : 10.0F;
+  const float sigma_m = own > n.sigma_floor_m ? own : n.sigma_floor_m;
+  const model::GnssPosition model{.x = base::Anchored::from_um(local.east_um),
+                                  .y = base::Anchored::from_um(local.north_um),
+                                  .sigma_m = sigma_m,
+                                  .antenna_x_b_m = n.antenna_x_b_m,
+                                  .antenna_y_b_m = n.antenna_y_b_m};
+  motion_.propagate(stamp, ctx.parameters);
+  give_up_when_lost();
+  if (phase_ == Phase::kTracking) return measure(model, kGnss, n.gate_scale, stamp, ctx);
+
+  phase_ = Phase::kAligning;
+  const auto aligned = alignment_.add(model, motion_.filter.x, n.align_distance_m);
+  if (aligned) {
+    motion_.start(stamp, aligned->pose, aligned->sigma_position_m, aligned->sigma_yaw_rad);
+    phase_ = Phase::kTracking;
+    last_absolute_ = stamp;
+  }
+  return {.verdict = sensor::Verdict::kAccepted};
+}
+
+}  // namespace tetap::estimators

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+// The samples that the estimators have and that are not final yet, in the order of their stamps: a view into a ring.
+#pragma once
+
+#include "sensor/sample.hpp"
+
+#include <cstddef>
+
+namespace tetap::sensor {
+
+/// Does not own its samples.
+class Window {
+ public:
+  constexpr Window() = default;
+  /// `size` samples of a ring of `places`, from place `begin` on.
+  constexpr Window(const Sample* ring, std::size_t places, std::size_t begin, std::size_t size)
+      : ring_(ring), places_(places), begin_(begin), size_(size) {}
+  /// Samples one behind the other: a vector, an array, a span.
+  template <class Samples>
+  requires requires(const Samples& samples) { samples.data(), samples.size(); }
+  constexpr Window(const Samples& samples)  // NOLINT(google-explicit-constructor): a view, as std::span
+      : Window(samples.data(), samples.size(), 0, samples.size()) {}
+
+  [[nodiscard]] constexpr std::size_t size() const { return size_; }
+  [[nodiscard]] constexpr const Sample& operator[](std::size_t i) const {
+    const std::size_t at = begin_ + i;
+    return ring_[at < places_ ? at : at - places_];
+  }
+
+ private:
+  const Sample* ring_ = nullptr;
+  std::size_t places_ = 0, begin_ = 0, size_ = 0;
+};
+
+}  // namespace tetap::sensor
