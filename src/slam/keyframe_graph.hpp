@@ -1,0 +1,234 @@
+// SPDX-License-Identifier: Apache-2.0
+// A pose graph that never ends: odometry becomes keyframes, closures between any two steps are moved to the nearest
+// ones, and what does not fit any more is thinned out in three stages, each counted: a keyframe is not made, a keyframe
+// is composed away and closures of the same pair are merged, a closure is refused.
+#pragma once
+
+#include "slam/pose_graph.hpp"
+
+namespace tetap::slam {
+
+struct KeyframeOptions {
+  float distance_m = 0.0F;      ///< a keyframe is made after so much way,
+  float turn_rad = 0.0F;        ///< or so much turn; both 0: each step
+  float contradiction = 30.0F;  ///< a closure above, by odometry's covariance, is refused
+  int closures_a_job = 1;       ///< a job begins by itself when so many came
+  GraphOptions graph;
+};
+
+struct KeyframeCounters {
+  std::uint32_t skipped = 0;        ///< stage 1: steps that wanted a keyframe and got none
+  std::uint32_t composed_away = 0;  ///< stage 2
+  std::uint32_t refused = 0;        ///< stage 3: closures without room
+  std::uint32_t contradicted = 0;   ///< closures that odometry or later closures make false
+  std::uint32_t unknown = 0;        ///< closures that name steps long gone, or none
+  std::uint32_t invalid = 0;        ///< inputs that are no number or no covariance
+  std::uint32_t jobs = 0, jobs_without_room = 0, jobs_not_converged = 0, jobs_aborted = 0;
+};
+
+/// As PoseGraph, and kTrail steps of odometry that closures may name.
+template <class Scalar_, int kPoses, int kEdges, int kBlocks, int kTrail>
+class KeyframeGraph {
+ public:
+  using Scalar = Scalar_;
+  using Graph = PoseGraph<Scalar, kPoses, kEdges, kBlocks>;
+  using Pose = typename Graph::Pose;
+  using Motion = typename Graph::Motion;
+
+  explicit KeyframeGraph(const KeyframeOptions& options = {}) : options_(options), graph_(options.graph) {}
+
+  /// One step of odometry: step() + 1. False, and nothing has changed, when it is no number or no covariance.
+  bool odometry(const Motion& motion) {
+    std::array<Scalar, 6> whitening{};
+    if (!motion.mean.valid() || !whitening_of(motion.covariance, whitening)) return ++count_.invalid, false;
+    ++step_;
+    trail_[step_ % kTrail] = Step::of(motion.mean);
+    pending_ = step_ == id_[at(graph_.poses() - 1)] + 1 ? motion : compose(pending_, motion);
+    if (wants_keyframe()) make_keyframe();
+    return true;
+  }
+
+  /// Step j as seen from step i. False when it was not taken, and counted why.
+  bool closure(std::uint32_t i, std::uint32_t j, const Motion& z) {
+    std::array<Scalar, 6> whitening{};
+    if (!z.mean.valid() || !whitening_of(z.covariance, whitening)) return ++count_.invalid, false;
+    Link link;
+    if (!between_keyframes(i, j, z, link)) return ++count_.unknown, false;
+    if (link.a == link.b) return true;  // such a closure adds nothing to the graph
+    const Scalar contradiction = graph_.contradiction(link.a, link.b, link.z);
+    if (!(contradiction >= Scalar{0} && contradiction < static_cast<Scalar>(options_.contradiction)))
+      return ++count_.contradicted, false;
+    if (graph_.edges() >= kEdges - 1) {  // one is kept for odometry
+      if (!thin() || !between_keyframes(i, j, z, link)) return ++count_.refused, false;
+      if (link.a == link.b) return true;
+    }
+    if (!graph_.close(link.a, link.b, link.z)) return ++count_.refused, false;
+    ++waiting_;
+    return true;
+  }
+
+  /// A share of the job; begins one when closures came since the last.
+  void work(int units) {
+    if (!graph_.busy()) {
+      if (waiting_ < options_.closures_a_job || waiting_ == 0 || !graph_.begin()) return;
+      waiting_ = 0;
+    }
+    graph_.work(units);
+    if (!graph_.busy()) end_job();
+  }
+  [[nodiscard]] bool idle() const { return !graph_.busy() && waiting_ < options_.closures_a_job; }
+  /// The next work() begins a job, however few closures came.
+  void optimise() { waiting_ = options_.closures_a_job > waiting_ ? options_.closures_a_job : waiting_; }
+
+  /// Where the latest step is.
+  [[nodiscard]] Pose pose() const { return placed(local()); }
+  [[nodiscard]] Pose keyframe(int k) const { return placed(graph_.pose(k)); }
+  [[nodiscard]] std::uint32_t keyframe_step(int k) const { return id_[at(k)]; }
+  [[nodiscard]] std::uint32_t step() const { return step_; }
+  [[nodiscard]] const Graph& graph() const { return graph_; }
+  [[nodiscard]] const KeyframeCounters& counters() const { return count_; }
+
+  /// Moves the whole graph so that the latest step is there: poses keep where they are to each other.
+  void set_pose(const Pose& pose) {
+    const Displacement<Scalar> to_first = Pose{}.minus(local());
+    origin_ = pose.plus(to_first);
+  }
+  /// Forgets everything but the counters.
+  void reset() {
+    if (graph_.busy()) ++count_.jobs_aborted;
+    graph_.clear();
+    step_ = 0;
+    id_[0] = 0;
+    origin_ = {};
+    waiting_ = 0;
+  }
+
+ private:
+  /// A step of odometry in 2 mm and 2^-16 turns: closures are known to less.
+  struct Step {
+    static constexpr Scalar kUnit_m{0.002F};
+    std::int16_t x = 0, y = 0, yaw = 0;
+
+    static Step of(const Displacement<Scalar>& d) {
+      return {rounded(d.x_m / kUnit_m), rounded(d.y_m / kUnit_m),
+              static_cast<std::int16_t>(d.yaw.turn >> (8 * sizeof(d.yaw.turn) - 16))};
+    }
+    [[nodiscard]] Displacement<Scalar> displacement() const {
+      using Turn = typename Heading<Scalar>::Turn;
+      return {static_cast<Scalar>(x) * kUnit_m,
+              static_cast<Scalar>(y) * kUnit_m,
+              {static_cast<Turn>(static_cast<typename Heading<Scalar>::Unsigned>(yaw) << (8 * sizeof(Turn) - 16))}};
+    }
+    /// The lowest value: too far for the trail.
+    [[nodiscard]] bool known() const { return x != INT16_MIN && y != INT16_MIN; }
+
+   private:
+    static std::int16_t rounded(Scalar v) {
+      if (!(v < Scalar{32767} && v > Scalar{-32767})) return INT16_MIN;
+      return static_cast<std::int16_t>(v < Scalar{0} ? v - static_cast<Scalar>(0.5) : v + static_cast<Scalar>(0.5));
+    }
+  };
+  static constexpr std::size_t at(int i) { return static_cast<std::size_t>(i); }
+
+  [[nodiscard]] Pose local() const {
+    const int last = graph_.poses() - 1;
+    return step_ == id_[at(last)] ? graph_.pose(last) : graph_.pose(last).plus(pending_.mean);
+  }
+  [[nodiscard]] Pose placed(const Pose& in_graph) const { return origin_.plus(in_graph.minus({})); }
+
+  [[nodiscard]] bool wants_keyframe() const {
+    const Scalar x = pending_.mean.x_m, y = pending_.mean.y_m, turn = pending_.mean.yaw.radians();
+    const auto way = static_cast<Scalar>(options_.distance_m), angle = static_cast<Scalar>(options_.turn_rad);
+    return x * x + y * y >= way * way || turn >= angle || turn <= -angle;
+  }
+  void make_keyframe() {
+    if (!graph_.has_room_for_pose() && !thin()) {
+      ++count_.skipped;
+      return;
+    }
+    if (!graph_.append(pending_)) {
+      ++count_.skipped;
+      return;
+    }
+    id_[at(graph_.poses() - 1)] = step_;
+  }
+  /// Composes that keyframe away which leaves the shortest gap; one without closures counts as half as long.
+  bool thin() {
+    int best = -1;
+    std::uint32_t least = 0xffff'ffffU;
+    for (int k = 1; k + 1 < graph_.poses(); ++k) {
+      const std::uint32_t gap = (id_[at(k + 1)] - id_[at(k - 1)]) * (graph_.has_closure(k) ? 2U : 1U);
+      if (gap < least) least = gap, best = k;
+    }
+    if (best < 0 || !graph_.compose_away(best)) return false;
+    for (int k = best; k < graph_.poses(); ++k) id_[at(k)] = id_[at(k + 1)];
+    ++count_.composed_away;
+    return true;
+  }
+
+  /// The keyframe at or before a step, or -1.
+  [[nodiscard]] int keyframe_of(std::uint32_t step) const {
+    if (step > step_) return -1;
+    int k = graph_.poses() - 1;
+    while (k > 0 && id_[at(k)] > step) --k;
+    return k;
+  }
+  /// Odometry from a keyframe to a later step. Its covariance is a share of what the next keyframe's edge says.
+  [[nodiscard]] bool way(int k, std::uint32_t step, Motion& way) const {
+    const std::uint32_t first = id_[at(k)];
+    if (step == first) return true;
+    if (k == graph_.poses() - 1 && step == step_) return way = pending_, true;
+    if (step_ - first >= static_cast<std::uint32_t>(kTrail)) return false;
+    Pose end{};
+    for (std::uint32_t s = first + 1; s <= step; ++s) {
+      if (!trail_[s % kTrail].known()) return false;
+      end = end.plus(trail_[s % kTrail].displacement());
+    }
+    const bool last = k == graph_.poses() - 1;
+    const auto whole = static_cast<Scalar>(static_cast<std::int32_t>((last ? step_ : id_[at(k + 1)]) - first));
+    const Scalar share = static_cast<Scalar>(static_cast<std::int32_t>(step - first)) / whole;
+    way = {.mean = end.minus({}), .covariance = last ? pending_.covariance : graph_.odometry_covariance(k + 1)};
+    for (int c = 0; c < 3; ++c)
+      for (int r = 0; r <= c; ++r) way.covariance(r, c) *= share;
+    return true;
+  }
+  /// A closure between two steps, moved to the keyframes before them through odometry.
+  struct Link {
+    int a = 0, b = 0;
+    Motion z;
+  };
+  [[nodiscard]] bool between_keyframes(std::uint32_t i, std::uint32_t j, const Motion& z, Link& link) const {
+    const int a = keyframe_of(i), b = keyframe_of(j);
+    Motion to_i, to_j;
+    if (a < 0 || b < 0 || i == j || !way(a, i, to_i) || !way(b, j, to_j)) return false;
+    link = {.a = a, .b = b, .z = i == id_[at(a)] ? z : compose(to_i, z)};
+    if (j != id_[at(b)]) link.z = compose(link.z, inverse(to_j));
+    return true;
+  }
+  void end_job() {
+    ++count_.jobs;
+    if (graph_.status() == GraphStatus::kConverged) {
+      count_.contradicted += static_cast<std::uint32_t>(graph_.remove_closures(true, kEdges));
+    } else if (graph_.status() == GraphStatus::kNoRoom) {
+      ++count_.jobs_without_room;
+      const int closures = graph_.edges() - (graph_.poses() - 1);
+      const int removed = graph_.remove_closures(false, closures / 8 + 1);
+      count_.refused += static_cast<std::uint32_t>(removed);
+      if (removed > 0) optimise();
+    } else {
+      ++count_.jobs_not_converged;
+    }
+  }
+
+  KeyframeOptions options_;
+  Graph graph_;
+  Pose origin_{};
+  Motion pending_{};
+  KeyframeCounters count_;
+  std::uint32_t step_ = 0;
+  int waiting_ = 0;  ///< closures since the last job began
+  std::array<std::uint32_t, kPoses> id_{};
+  std::array<Step, kTrail> trail_{};
+};
+
+}  // namespace tetap::slam

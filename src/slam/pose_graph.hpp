@@ -1,0 +1,527 @@
+// SPDX-License-Identifier: Apache-2.0
+// A graph of planar poses in fixed memory: poses are appended as they come, closures wait for the next optimisation,
+// which is a job cut in units of work (Gauss-Newton on the square-root information; Dellaert & Kaess, IJRR 25(12),
+// 2006). False closures are held off by dynamic covariance scaling, then left out (see graph_edge.hpp).
+#pragma once
+
+#include "slam/graph_edge.hpp"
+
+namespace tetap::slam {
+
+enum class GraphStatus : std::uint8_t {
+  kNone,          ///< nothing was optimised yet
+  kConverged,     ///< the sum of squares falls no more
+  kNotConverged,  ///< iterations ran out, or the sum of squares rose at the end: the poses are left as they were
+  kSingular,      ///< some pose is held by nothing, or something is no number: likewise
+  kNoRoom,        ///< rows and fronts do not fit kBlocks: likewise
+};
+
+struct GraphOptions {
+  bool robust = true;                ///< closures may be false
+  float phi = 1.0F;                  ///< dynamic covariance scaling: squared error from which a closure loses weight
+  float outlier_chi2 = 11.345F;      ///< a closure above is left out at the end: 99 % of chi-square with 3 degrees
+  int iterations = 30;               ///< at most, of each of the two kinds
+  float tolerance = 2e-7F;           ///< converged: the share of the sum of squares that another step may take
+  float weighted_tolerance = 1e-3F;  ///< likewise while closures are weighted
+};
+
+/// Up to kPoses poses (the first is fixed), kEdges measurements, and kBlocks 3 x 3 blocks of memory for the job.
+template <class Scalar_, int kPoses, int kEdges, int kBlocks>
+class PoseGraph {
+  static_assert(kPoses >= 2 && kPoses <= 0x4000);
+
+ public:
+  using Scalar = Scalar_;
+  using Pose = GraphPose<Scalar>;
+  using Motion = UncertainDisplacement<Scalar>;
+  using Edge = GraphEdge<Scalar>;
+
+  explicit PoseGraph(const GraphOptions& options = {}) : options_(options) {}
+
+  /// Back to one pose, at the origin. A job is aborted.
+  void clear() {
+    cancel();
+    poses_ = 1;
+    edges_ = 0;
+    pose_[0] = {};
+    covariance_ = {};
+    status_ = GraphStatus::kNone;
+    chi2_ = 0;
+    left_out_ = 0;
+  }
+  [[nodiscard]] int poses() const { return poses_; }
+  [[nodiscard]] int edges() const { return edges_; }
+  [[nodiscard]] bool has_room_for_pose() const { return poses_ < kPoses && edges_ < kEdges; }
+  [[nodiscard]] const Pose& pose(int i) const { return pose_[at(i)]; }
+  [[nodiscard]] const Edge& edge(int e) const { return edge_[at(e)]; }
+  /// Last pose, relative to the first; as of the latest job, carried on by odometry since.
+  [[nodiscard]] const filter::Symmetric<Scalar, 3>& covariance_of_last() const { return covariance_; }
+
+  /// A new pose at the end of odometry from the last one. False, and nothing has changed, when there is no room or the
+  /// motion is no number or its covariance not positive definite.
+  [[nodiscard]] bool append(const Motion& odometry) {
+    if (poses_ == kPoses || !add_edge(poses_ - 1, poses_, odometry, false)) return false;
+    const Pose& last = pose_[at(poses_ - 1)];
+    const auto turn = last.yaw.direction();
+    const Scalar c = turn.cos, s = turn.sin;
+    const Scalar x = c * odometry.mean.x_m - s * odometry.mean.y_m, y = s * odometry.mean.x_m + c * odometry.mean.y_m;
+    const auto added = detail::turned(odometry.covariance, c, s, Scalar{0}, Scalar{0}, Scalar{1}, {});
+    covariance_ = detail::turned(covariance_, Scalar{1}, Scalar{0}, -y, x, Scalar{1}, added);
+    pose_[at(poses_)] = last.plus(odometry.mean);
+    ++poses_;
+    return true;
+  }
+  /// Pose j as seen from pose i. False, and nothing has changed, as for append(), or when a pose is not there.
+  [[nodiscard]] bool close(int i, int j, const Motion& z) {
+    if (i < 0 || j < 0 || i >= poses_ || j >= poses_ || i == j || !add_edge(i, j, z, true)) return false;
+    if (!busy()) join(edges_ - 1);
+    return true;
+  }
+
+  /// The squared error of closing i and j so, by the covariance of the closure and of the odometry between them: of
+  /// chi-square with 3 degrees if the closure is true. Negative when that is no number. Cost: a composition a pose.
+  [[nodiscard]] Scalar contradiction(int i, int j, const Motion& z) const {
+    const int first = i < j ? i : j, last = i < j ? j : i;
+    Motion between{};
+    for (int e = 0; e < edges_; ++e) {
+      const Edge& edge = edge_[at(e)];
+      if (edge.closure != 0 || static_cast<int>(edge.from) < first || static_cast<int>(edge.to) > last) continue;
+      between = compose(between, {.mean = edge.z, .covariance = edge.covariance()});
+    }
+    if (i > j) between = inverse(between);
+    Edge test{};
+    for (int c = 0; c < 3; ++c)
+      for (int r = 0; r <= c; ++r) between.covariance(r, c) += z.covariance(r, c);
+    test.z = z.mean;
+    if (!z.mean.valid() || !whitening_of(between.covariance, test.whitening)) return Scalar{-1};
+    return test.chi2(pose_[at(i)], pose_[at(j)]);
+  }
+
+  /// Takes a pose out: the odometry before and after becomes one measurement, its closures move to the pose before it
+  /// through odometry (Smith, Self & Cheeseman 1990), and closures that then join the same poses are merged. The first
+  /// and the last pose stay, and nothing changes while a job runs: false.
+  [[nodiscard]] bool compose_away(int k) {
+    if (busy() || k < 1 || k >= poses_ - 1) return false;
+    const int incoming = odometry_to(k), outgoing = odometry_to(k + 1);
+    const Motion before = motion(incoming);
+    if (!set(outgoing, k - 1, k + 1, compose(before, motion(outgoing)))) return false;
+    for (int e = edges_ - 1; e >= 0; --e) {
+      const Edge& edge = edge_[at(e)];
+      const int from = static_cast<int>(edge.from), to = static_cast<int>(edge.to);
+      if (edge.closure == 0 || (from != k && to != k)) continue;
+      const bool moved = from == k ? set(e, k - 1, to, compose(before, motion(e)))
+                                   : set(e, from, k - 1, compose(motion(e), inverse(before)));
+      if (!moved)
+        remove_edge(e), ++lost_;
+      else
+        join(e);
+    }
+    remove_edge(odometry_to(k));
+    for (int i = k; i + 1 < poses_; ++i) pose_[at(i)] = pose_[at(i + 1)];
+    --poses_;
+    for (int e = 0; e < edges_; ++e) {
+      if (static_cast<int>(edge_[at(e)].from) > k) edge_[at(e)].from = (edge_[at(e)].from - 1U) & 0x3fffU;
+      if (static_cast<int>(edge_[at(e)].to) > k) edge_[at(e)].to = (edge_[at(e)].to - 1U) & 0x3fffU;
+    }
+    return true;
+  }
+  /// Removes closures that the latest job left out, or the `most` newest ones; nothing while a job runs.
+  int remove_closures(bool only_left_out, int most) {
+    int removed = 0;
+    for (int e = busy() ? -1 : edges_ - 1; e >= 0 && removed < most; --e)
+      if (edge_[at(e)].closure != 0 && (edge_[at(e)].left_out != 0 || !only_left_out)) remove_edge(e), ++removed;
+    if (only_left_out) left_out_ -= removed;
+    return removed;
+  }
+  /// Covariance of the odometry that leads to a pose.
+  [[nodiscard]] filter::Symmetric<Scalar, 3> odometry_covariance(int pose) const {
+    return edge_[at(odometry_to(pose))].covariance();
+  }
+  [[nodiscard]] bool has_closure(int pose) const {
+    for (int e = 0; e < edges_; ++e) {
+      const Edge& edge = edge_[at(e)];
+      if (edge.closure != 0 && (static_cast<int>(edge.from) == pose || static_cast<int>(edge.to) == pose)) return true;
+    }
+    return false;
+  }
+  [[nodiscard]] std::uint32_t merged() const { return merged_; }  ///< closures that became one with another
+  [[nodiscard]] std::uint32_t lost() const { return lost_; }      ///< closures that another one contradicted
+  /// Begins an optimisation of what is there now; poses and closures that come later are carried along and wait for the
+  /// next. False when a job is running or there is nothing to do.
+  [[nodiscard]] bool begin() {
+    if (phase_ != Phase::kIdle || poses_ < 2) return false;
+    job_poses_ = poses_;
+    job_edges_ = edges_;
+    for (int i = 0; i < poses_; ++i) trial_[at(i)] = pose_[at(i)];
+    solver_.begin(poses_ - 1);
+    stage_ = options_.robust && edges_ >= poses_ ? Stage::kWeighted : Stage::kPlain;
+    attempt_ = 0;
+    least_cost_ = static_cast<Scalar>(1e30);
+    known_false_ = left_out_;
+    iteration_ = 0;
+    total_iterations_ = 0;
+    cursor_ = 0;
+    last_step_ = false;
+    for (int e = 0; e < edges_; ++e) edge_[at(e)].off = 0;
+    phase_ = Phase::kConnect;
+    return true;
+  }
+  [[nodiscard]] bool busy() const { return phase_ != Phase::kIdle; }
+  /// Up to so many units of the job, a unit being about ten floating-point operations; an operation that is begun is
+  /// ended, and what it took too much is taken from the next call. The result is the same however the units are dealt.
+  void work(int units) {
+    credit_ += units;
+    while (credit_ > 0 && busy()) credit_ -= step();
+    if (!busy()) credit_ = 0;
+  }
+  /// Forgets the job. Poses stay as they are.
+  void cancel() {
+    phase_ = Phase::kIdle;
+    credit_ = 0;
+  }
+  /// Status of the latest job that ended.
+  [[nodiscard]] GraphStatus status() const { return status_; }
+  [[nodiscard]] Scalar chi2() const { return chi2_; }       ///< sum over the measurements that were not left out
+  [[nodiscard]] int left_out() const { return left_out_; }  ///< closures taken for false
+  [[nodiscard]] int iterations() const { return total_iterations_; }  ///< steps in all stages and attempts
+  [[nodiscard]] std::uint32_t blocks_used() const { return solver_.blocks_used(); }
+
+  /// For SquareRoot: the rows of edge e at the trial poses, and the nodes they touch.
+  struct Nodes {
+    int first, second;
+  };
+  Nodes linearise(int e, BlockRow<Scalar>& row) const {
+    const Edge& edge = edge_[at(e)];
+    Scalar chi2 = edge.linearise(trial_[edge.from], trial_[edge.to], row);
+    if (stage_ == Stage::kWeighted && edge.closure != 0) {
+      const Scalar scale = dynamic_scale(chi2, static_cast<Scalar>(options_.phi));
+      chi2 *= scale * scale;
+      for (std::size_t r = 0; r < 3; ++r) {
+        for (std::size_t c = 0; c < 3; ++c) row.of_first[r][c] *= scale, row.of_second[r][c] *= scale;
+        row.rest[r] *= scale;
+      }
+    }
+    sum_ += chi2;
+    return {static_cast<int>(edge.from) - 1, static_cast<int>(edge.to) - 1};
+  }
+
+ private:
+  /// Closures that count: those that odometry allows, all by weight, those that are not far off, those that fit.
+  enum class Stage : std::uint8_t { kConsistent, kWeighted, kNear, kPlain };
+  enum class Phase : std::uint8_t {
+    kIdle,
+    kConnect,
+    kOrder,
+    kSpread,
+    kScreen,
+    kRows,
+    kEliminate,
+    kSolve,
+    kMove,
+    kJudge
+  };
+  static constexpr std::size_t at(int i) { return static_cast<std::size_t>(i); }
+
+  [[nodiscard]] Motion motion(int e) const { return {.mean = edge_[at(e)].z, .covariance = edge_[at(e)].covariance()}; }
+  [[nodiscard]] bool set(int e, int i, int j, const Motion& z) {
+    std::array<Scalar, 6> whitening{};
+    if (!whitening_of(z.covariance, whitening)) return false;
+    Edge& edge = edge_[at(e)];
+    edge.from = static_cast<std::uint32_t>(i) & 0x3fffU;
+    edge.to = static_cast<std::uint32_t>(j) & 0x3fffU;
+    edge.z = z.mean;
+    edge.whitening = whitening;
+    return true;
+  }
+  [[nodiscard]] int odometry_to(int pose) const {
+    int e = 0;
+    while (e < edges_ && (edge_[at(e)].closure != 0 || static_cast<int>(edge_[at(e)].to) != pose)) ++e;
+    return e;
+  }
+  void remove_edge(int e) {
+    for (int k = e; k + 1 < edges_; ++k) edge_[at(k)] = edge_[at(k + 1)];
+    --edges_;
+  }
+  /// Closure e, as one with another that joins the same poses; it goes where it joins a pose with itself.
+  void join(int e) {
+    if (edge_[at(e)].from == edge_[at(e)].to) {
+      remove_edge(e);
+      ++merged_;
+      return;
+    }
+    for (int other = 0; other < edges_; ++other) {
+      Edge& into = edge_[at(other)];
+      if (other == e || into.closure == 0) continue;
+      const bool same = into.from == edge_[at(e)].from && into.to == edge_[at(e)].to;
+      const bool opposite = into.from == edge_[at(e)].to && into.to == edge_[at(e)].from;
+      if (!same && !opposite) continue;
+      if (opposite && !set(e, static_cast<int>(into.from), static_cast<int>(into.to), inverse(motion(e)))) continue;
+      if (merge(into, edge_[at(e)], static_cast<Scalar>(options_.outlier_chi2)))
+        ++merged_;
+      else
+        ++lost_;
+      remove_edge(e);
+      return;
+    }
+  }
+
+  [[nodiscard]] bool add_edge(int i, int j, const Motion& z, bool closure) {
+    std::array<Scalar, 6> whitening{};
+    if (edges_ == kEdges || !z.mean.valid() || !whitening_of(z.covariance, whitening)) return false;
+    edge_[at(edges_)] = {.from = static_cast<std::uint32_t>(i) & 0x3fffU,
+                         .to = static_cast<std::uint32_t>(j) & 0x3fffU,
+                         .closure = closure ? 1U : 0U,
+                         .off = 0,
+                         .left_out = 0,
+                         .z = z.mean,
+                         .whitening = whitening};
+    ++edges_;
+    return true;
+  }
+
+  /// The next operation of the job; its cost.
+  int step() {
+    switch (phase_) {
+      case Phase::kIdle:
+        return 0;
+      case Phase::kConnect:
+        return connect();
+      case Phase::kOrder:
+        return order();
+      case Phase::kSpread:
+        return spread();
+      case Phase::kScreen:
+        return screen();
+      case Phase::kRows:
+        return add_row();
+      case Phase::kEliminate:
+        return eliminate();
+      case Phase::kSolve:
+        return solve();
+      case Phase::kMove:
+        return move();
+      case Phase::kJudge:
+        break;
+    }
+    return judge();
+  }
+
+  int connect() {
+    const Edge& edge = edge_[at(cursor_)];
+    solver_.connect(static_cast<int>(edge.from) - 1, static_cast<int>(edge.to) - 1);
+    if (++cursor_ < job_edges_) return 1;
+    solver_.sort();
+    phase_ = Phase::kOrder;
+    return job_poses_;
+  }
+  int order() {
+    if (!solver_.ordered()) return solver_.order_step();
+    if (!solver_.finish_order()) return end(GraphStatus::kNoRoom);
+    begin_iteration();
+    return solver_.cost_of_order();
+  }
+  /// The second attempt begins where odometry alone leads to, with the closures that it allows.
+  void begin_second_attempt() {
+    for (int e = 0; e < job_edges_; ++e) {
+      const Edge& edge = edge_[at(e)];
+      if (edge.closure == 0) trial_[edge.to] = trial_[edge.from].plus(edge.z);
+    }
+    attempt_ = 1;
+    iteration_ = 0;
+    cursor_ = 0;
+    stage_ = Stage::kConsistent;
+    solver_.begin_scratch();
+    phase_ = Phase::kSpread;
+  }
+  /// One edge's part of how uncertain each pose is by odometry alone: as a motion of the whole plane about the first
+  /// pose, where the parts of a way add up.
+  int spread() {
+    auto& spread = solver_.scratch();
+    if (cursor_ == 0) spread[0] = {};
+    const Edge& edge = edge_[at(cursor_)];
+    if (edge.closure == 0) spread[edge.to] = on_plane(edge.covariance(), trial_[edge.from], spread[edge.from]);
+    if (++cursor_ == job_edges_) cursor_ = 0, phase_ = Phase::kScreen;
+    return 10;
+  }
+  /// A closure that odometry contradicts is off for now.
+  int screen() {
+    const auto& spread = solver_.scratch();
+    Edge& edge = edge_[at(cursor_)];
+    if (edge.closure != 0) {
+      const Pose& from = trial_[edge.from];
+      const bool later = edge.from < edge.to;
+      const auto& more = spread[later ? edge.to : edge.from];
+      const auto& less = spread[later ? edge.from : edge.to];
+      filter::Symmetric<Scalar, 3> between;
+      for (int c = 0; c < 3; ++c)
+        for (int r = 0; r <= c; ++r) between(r, c) = more(r, c) - less(r, c);
+      edge.off = consistent(edge, from, between) ? 0U : 1U;
+    }
+    if (++cursor_ == job_edges_) begin_iteration();
+    return 20;
+  }
+  /// C of a displacement from `pose`, as a motion of the plane about the first pose; plus what was there.
+  static filter::Symmetric<Scalar, 3> on_plane(const filter::Symmetric<Scalar, 3>& c, const Pose& pose,
+                                               const filter::Symmetric<Scalar, 3>& sum) {
+    const auto turn = pose.yaw.direction();
+    return detail::turned(c, turn.cos, turn.sin, pose.y.metres(), -pose.x.metres(), Scalar{1}, sum);
+  }
+  [[nodiscard]] bool consistent(const Edge& edge, const Pose& from, const filter::Symmetric<Scalar, 3>& between) const {
+    const Pose& to = trial_[edge.to];
+    const Displacement<Scalar> d = to.minus(from);
+    // The motion of the plane about the first pose, as one of the displacement's end about `from`.
+    const auto turn = from.yaw.direction();
+    const Scalar x = to.x.metres(), y = to.y.metres();
+    const auto in_world = detail::turned(between, Scalar{1}, Scalar{0}, -y, x, Scalar{1}, {});
+    const auto s = detail::turned(in_world, turn.cos, -turn.sin, Scalar{0}, Scalar{0}, Scalar{1}, edge.covariance());
+    std::array<Scalar, 6> w{};
+    if (!whitening_of(s, w)) return true;
+    const Edge test{.from = 0, .to = 0, .closure = 1, .off = 0, .left_out = 0, .z = edge.z, .whitening = w};
+    const auto r = test.whiten(d.x_m - edge.z.x_m, d.y_m - edge.z.y_m, (d.yaw - edge.z.yaw).radians());
+    return r[0] * r[0] + r[1] * r[1] + r[2] * r[2] < Scalar{30};
+  }
+  void begin_iteration() {
+    solver_.begin_rows();
+    sum_ = 0;
+    cursor_ = 0;
+    phase_ = Phase::kRows;
+  }
+  int add_row() {
+    const Edge& edge = edge_[at(cursor_)];
+    if (edge.off == 0 || stage_ == Stage::kWeighted)
+      solver_.add_row(cursor_, static_cast<int>(edge.from) - 1, static_cast<int>(edge.to) - 1);
+    if (++cursor_ == job_edges_) phase_ = Phase::kEliminate;
+    return 1;
+  }
+  int eliminate() {
+    const int cost = solver_.row_step(*this);
+    if (!solver_.rows_done()) return cost;
+    if (solver_.singular() || !detail::is_number(sum_)) return end(GraphStatus::kSingular);
+    // Steps shrink by about the same share again and again, so what is left after this one can be foreseen.
+    const Scalar decrease = solver_.decrease();
+    const Scalar share = iteration_ == 0 || decrease > before_ ? Scalar{1} : decrease / before_;
+    const float tolerance = stage_ == Stage::kPlain ? options_.tolerance : options_.weighted_tolerance;
+    last_step_ = !(decrease * share > static_cast<Scalar>(tolerance) * sum_ + static_cast<Scalar>(1e-6));
+    before_ = decrease;
+    solver_.begin_solve();
+    phase_ = Phase::kSolve;
+    return cost;
+  }
+  int solve() {
+    const int cost = solver_.solve_step();
+    if (solver_.solved()) cursor_ = 1, phase_ = Phase::kMove;
+    return cost;
+  }
+  int move() {
+    const Scalar* const d = solver_.correction(cursor_ - 1);
+    Pose& pose = trial_[at(cursor_)];
+    if (!detail::is_number(d[0] + d[1] + d[2])) return end(GraphStatus::kSingular);
+    pose = {pose.x.plus(d[0]), pose.y.plus(d[1]), pose.yaw + Heading<Scalar>::from_radians(d[2])};
+    if (++cursor_ == job_poses_) {
+      ++iteration_;
+      ++total_iterations_;
+      cursor_ = 0;
+      judged_ = 0;
+      out_ = 0;
+      if (last_step_ || iteration_ == options_.iterations)
+        end_stage();
+      else
+        begin_iteration();
+    }
+    return 2;
+  }
+  void end_stage() {
+    if (stage_ == Stage::kConsistent) {
+      stage_ = Stage::kWeighted;
+      iteration_ = 0;
+      begin_iteration();
+    } else {
+      phase_ = Phase::kJudge;
+    }
+  }
+  /// After the last step of a stage: one edge's squared error, and what it means for the next stage.
+  int judge() {
+    constexpr Scalar kNear = static_cast<Scalar>(9);  // three times the sigmas of an outlier
+    Edge& edge = edge_[at(cursor_)];
+    const Scalar chi2 = edge.chi2(trial_[edge.from], trial_[edge.to]);
+    const auto limit = static_cast<Scalar>(options_.outlier_chi2) * (stage_ == Stage::kWeighted ? kNear : Scalar{1});
+    if (stage_ != Stage::kPlain && edge.closure != 0) edge.off = chi2 > limit ? 1U : 0U;
+    if (edge.off == 0)
+      judged_ += chi2;
+    else
+      ++out_;
+    if (++cursor_ < job_edges_) return 10;
+    if (stage_ == Stage::kPlain) return end_attempt();
+    stage_ = stage_ == Stage::kWeighted ? Stage::kNear : Stage::kPlain;
+    iteration_ = 0;
+    begin_iteration();
+    return 10;
+  }
+  /// The better attempt is kept. A second is made when this one left out more than was known to be false.
+  int end_attempt() {
+    const bool settled =
+        judged_ <= sum_ * (Scalar{1} + static_cast<Scalar>(options_.weighted_tolerance)) + static_cast<Scalar>(1e-6);
+    const bool converged = last_step_ && settled;
+    const Scalar cost = judged_ + static_cast<Scalar>(out_) * static_cast<Scalar>(options_.outlier_chi2);
+    if (converged && cost < least_cost_) {
+      least_cost_ = cost;
+      adopt();
+    }
+    if (attempt_ == 0 && options_.robust && (out_ > known_false_ || !converged)) {
+      begin_second_attempt();
+      return 2 * job_edges_;
+    }
+    return end(least_cost_ < static_cast<Scalar>(1e30) ? GraphStatus::kConverged : GraphStatus::kNotConverged);
+  }
+  void adopt() {
+    const Pose was = pose_[at(job_poses_ - 1)], is = trial_[at(job_poses_ - 1)];
+    for (int i = job_poses_; i < poses_; ++i) pose_[at(i)] = is.plus(pose_[at(i)].minus(was));
+    for (int i = 0; i < job_poses_; ++i) pose_[at(i)] = trial_[at(i)];
+    for (int e = 0; e < job_edges_; ++e) edge_[at(e)].left_out = edge_[at(e)].off;
+    covariance_ = solver_.covariance_of_last();
+    for (int i = job_poses_; i < poses_; ++i) carry_covariance(i);
+    chi2_ = judged_;
+    left_out_ = out_;
+  }
+  int end(GraphStatus status) {
+    status_ = least_cost_ < static_cast<Scalar>(1e30) ? GraphStatus::kConverged : status;
+    phase_ = Phase::kIdle;
+    return 1;
+  }
+  /// Pose i came while the job ran; the edge that made it holds its odometry.
+  void carry_covariance(int i) {
+    for (int e = job_edges_; e < edges_; ++e) {
+      const Edge& edge = edge_[at(e)];
+      if (edge.closure != 0 || static_cast<int>(edge.to) != i) continue;
+      const auto turn = pose_[at(i - 1)].yaw.direction();
+      const auto added = detail::turned(edge.covariance(), turn.cos, turn.sin, Scalar{0}, Scalar{0}, Scalar{1}, {});
+      const Scalar x = pose_[at(i)].x.minus(pose_[at(i - 1)].x), y = pose_[at(i)].y.minus(pose_[at(i - 1)].y);
+      covariance_ = detail::turned(covariance_, Scalar{1}, Scalar{0}, -y, x, Scalar{1}, added);
+    }
+  }
+
+  GraphOptions options_;
+  int poses_ = 1;
+  int edges_ = 0;
+  std::array<Pose, kPoses> pose_{};
+  std::array<Edge, kEdges> edge_{};
+  filter::Symmetric<Scalar, 3> covariance_{};
+  GraphStatus status_ = GraphStatus::kNone;
+  Scalar chi2_ = 0;
+  int left_out_ = 0;
+  std::uint32_t merged_ = 0, lost_ = 0;
+  int total_iterations_ = 0;
+
+  Phase phase_ = Phase::kIdle;
+  Stage stage_ = Stage::kPlain;
+  bool last_step_ = false;
+  int credit_ = 0, cursor_ = 0, iteration_ = 0, job_poses_ = 0, job_edges_ = 0, out_ = 0, attempt_ = 0,
+      known_false_ = 0;
+  Scalar least_cost_ = 0, before_ = 0;
+  mutable Scalar sum_ = 0;  ///< squares summed at the trial poses
+  Scalar judged_ = 0;       ///< likewise, after the last step
+  std::array<Pose, kPoses> trial_{};
+  SquareRoot<Scalar, kPoses - 1, kEdges, kBlocks> solver_{};
+};
+
+}  // namespace tetap::slam
