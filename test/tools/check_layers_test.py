@@ -20,7 +20,8 @@ Text -> no arrow.
     src/base      -> (nothing)
     src/bus       -> src/base
     src/filter    -> src/base, Eigen
-    src/app       -> src/{base,bus,filter}, hal (concepts), drivers, config/messages.hpp
+    src/app       -> src/{base,bus,filter}, hal (concepts),
+                     drivers, config/messages.hpp
     hal           -> src/base                      hal/chip/support -> hal, src/base
     hal/board/<board> -> hal, hal/chip/support, src/base
     hal/board/<board>/main.cpp -> hal/board/<board>, src/app, config/<robot>.hpp
@@ -34,7 +35,7 @@ Text -> no arrow.
 """
 FILES = ["src/base/math.hpp", "src/base/time.hpp", "src/bus/signal.hpp", "src/filter/ekf.hpp", "src/app/firmware.hpp", "src/app/samples.hpp",
          "hal/board.hpp", "hal/chip/support/text.hpp", "hal/board/mps2/board.hpp", "hal/board/mps2/main.cpp", "hal/board/r5/board.hpp",
-         "hal/board/linux/board.hpp", "drivers/imu.hpp", "config/messages.hpp", "config/rover.hpp", "sim_host/world.hpp", "test/x.cpp"]
+         "hal/board/linux/clock.hpp", "drivers/imu.hpp", "config/messages.hpp", "config/rover.hpp", "sim_host/world.hpp", "test/x.cpp"]
 
 
 class LayersTest(ImageTest):
@@ -69,7 +70,7 @@ class LayersTest(ImageTest):
                               ("src/app/firmware.hpp", "drivers/imu.hpp"), ("drivers/imu.hpp", "app/samples.hpp"),
                               ("hal/board/mps2/board.hpp", "hal/chip/support/text.hpp"), ("hal/board/mps2/main.cpp", "hal/board/mps2/board.hpp"),
                               ("hal/board/mps2/main.cpp", "config/rover.hpp"), ("config/rover.hpp", "app/firmware.hpp"),
-                              ("sim_host/world.hpp", "hal/board/linux/board.hpp"), ("hal/board/mps2/main.cpp", "robot.hpp")):
+                              ("sim_host/world.hpp", "hal/board/linux/clock.hpp"), ("hal/board/mps2/main.cpp", "robot.hpp")):
             with self.subTest(f"{name} includes {include}"):
                 self.assertEqual(self.findings(name, f'#include "{include}"\n'), [])
         self.assertEqual(self.findings("src/filter/ekf.hpp", "#include <Eigen/Core>\n#include <array>\n"), [])
@@ -82,7 +83,7 @@ class LayersTest(ImageTest):
                               ("hal/board/mps2/board.hpp", "hal/board/r5/board.hpp"), ("hal/board/mps2/main.cpp", "hal/board/r5/board.hpp"),
                               ("hal/board/mps2/board.hpp", "app/firmware.hpp"), ("config/messages.hpp", "app/firmware.hpp"),
                               ("src/base/math.hpp", "sim_host/world.hpp"), ("src/base/math.hpp", "../bus/signal.hpp"),
-                              ("src/base/math.hpp", "bus/not_yet_generated.hpp"), ("hal/board/linux/board.hpp", "app/firmware.hpp")):
+                              ("src/base/math.hpp", "bus/not_yet_generated.hpp"), ("hal/board/linux/clock.hpp", "app/firmware.hpp")):
             with self.subTest(f"{name} includes {include}"):
                 found = self.findings(name, f'#pragma once\n/* two\nlines */\n  # include "{include}"\n')
                 self.assertEqual(len(found), 1, found)
@@ -100,7 +101,7 @@ class LayersTest(ImageTest):
                        "map", "cstdio", "stdexcept", "unistd.h"):
             with self.subTest(header):
                 self.assertEqual(len(self.findings("src/filter/ekf.hpp", f"#include <{header}>\n")), 1)
-                self.assertEqual(self.findings("hal/board/linux/board.hpp", f"#include <{header}>\n"), [])
+                self.assertEqual(self.findings("hal/board/linux/clock.hpp", f"#include <{header}>\n"), [])
 
     def test_each_forbidden_word_fails(self):
         for code in ("int* p = new int;", "auto p = new (place) T{};", "delete p;", "delete[] p;", "void* operator new(std::size_t);", "p = malloc(3);", "std::free(p);", "p = alloca(3);",
@@ -134,7 +135,7 @@ static_assert(noexcept(f())); std::string_view s; std::optional<int> o; using Ve
         self.assertEqual(self.findings("src/filter/ekf.hpp", code), [])
         self.assertEqual(self.findings("src/base/math.hpp", "inline float sin(float x); inline float sqrt(float x) { return __builtin_sqrtf(x); }\n"), [])
         self.assertEqual(self.findings("src/app/firmware.hpp", "const auto t = board.now();\n"), [])
-        self.assertEqual(self.findings("hal/board/linux/board.hpp", "#include <vector>\nstd::vector<int> v; throw 1; clock_gettime(a, b);\n"), [])
+        self.assertEqual(self.findings("hal/board/linux/clock.hpp", "#include <vector>\nstd::vector<int> v; throw 1; clock_gettime(a, b);\n"), [])
 
     def test_the_table_is_read_from_the_design_and_a_broken_one_is_refused(self):
         self.put("src/bus/signal.hpp", '#include "filter/ekf.hpp"\n')

@@ -15,7 +15,7 @@ import unittest
 sys.dont_write_bytecode = True
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.realpath(__file__))))
 sys.path.insert(0, os.path.join(ROOT, "tools", "python"))
-from tetap.docs import figures, words  # noqa: E402
+from tetap.docs import figures, language, regions, words  # noqa: E402
 
 PROGRAMS = os.environ.get("TETAP_PROGRAMS", os.path.join(ROOT, "build/host/sim_host"))
 WORLD = os.path.join(PROGRAMS, "tetap-world")
@@ -113,8 +113,7 @@ class Pages(unittest.TestCase):
         self.assertNotIn("NEES", read("README.md"))
         lines = read("DESIGN.md").splitlines()
         self.assertLessEqual(len(lines), MOST_LINES)
-        # The table of arrows is for a program and has one rule a line.
-        self.assertEqual([line for line in lines if len(line) > MOST_COLUMNS and " -> " not in line], [])
+        self.assertEqual([line for line in lines if len(line) > MOST_COLUMNS], [])
 
     def test_the_functions_cite_the_equations_and_the_equations_name_the_functions(self):
         page = read("docs/explanation/equations.md")
@@ -127,6 +126,41 @@ class Pages(unittest.TestCase):
             for first, last in re.findall(r"docs/explanation/equations\.md,? \((\d+)\)(?: to \((\d+)\))?", source):
                 cited |= set(range(int(first), int(last or first) + 1))
             self.assertIn(int(number), cited, f"{path} does not cite equation ({number})")
+
+
+    def test_sentences_are_short_and_name_their_subjects(self):
+        spoken = [page for page in pages() if page != "CHANGELOG.md" and page not in ("docs/reference/commands.md", "docs/reference/messages.md", "docs/reference/parameters.md")]
+        self.assertGreater(sum(len(list(language.sentences(read(page)))) for page in spoken), 800)
+        self.assertEqual([one for page in spoken for one in language.findings(page, read(page))], [])
+
+    def test_a_long_sentence_a_beginning_without_subject_and_speech_are_named(self):
+        short = "The gate refuses `a b c d`. A [link of three](x.md) counts as three.\n\n| It | a cell | `code that tells` |\n\n```sh\nIt says\n```\n## What follows\n"
+        self.assertEqual(len(language.findings("p", short)), 1)  # the cell
+        self.assertEqual(language.findings("p", "one " * 25 + "end. The other is short."), ["p: 26 words: " + "one " * 25 + "end."])
+        self.assertEqual(len(language.findings("p", "The fix is far. It is refused.")), 1)
+        self.assertEqual(len(language.findings("p", "The bus says so, and the node believes it.")), 2)
+        self.assertEqual(language.findings("p", "That line holds. This table has two rows. The set is that of the start."), [])
+
+    def test_state_diagrams_have_the_states_of_their_sources(self):
+        """Diagrams of a page, in order, against the rows of the table that is made from the sources."""
+        names = [word for word, _, _ in words.enumerators(words.read(ROOT, words.SOURCE_STATE), "SourceState")]
+        lines = [line.strip("|").split("|") for line in words.sources(ROOT).split("## Sources\n")[1].splitlines() if line.startswith("| ")][1:]
+        rows = {line[0].strip(): {name for name, cell in zip(names, line[1:]) if cell.strip() == "x"} for line in lines}
+        shown = {"gnss_position": ["gnss position", "gnss height"], "gnss_velocity": ["gnss velocity"], "magnetometer": ["magnetometer"], "barometer": ["barometer"],
+                 "outside_heading": ["outside heading"], "wheels": ["wheels", "forward speed"]}
+        self.assertEqual(sorted(source for one in shown.values() for source in one), sorted(rows))
+        for page in sorted(glob.glob(os.path.join(ROOT, "docs/explanation/trust/*.md"))) + [os.path.join(ROOT, "docs/explanation/trust.md")]:
+            diagrams = [set(re.findall(r"\b[A-Z][a-z]+\b", re.sub(r":[^\n]*", "", one))) for one in re.findall(r"```mermaid\nstateDiagram-v2\n(.*?)```", read(page), re.S)]
+            expected = [rows[source] for source in shown.get(os.path.basename(page)[:-3], [])]
+            for states in diagrams:
+                self.assertLessEqual(states, set(names), page)
+            if expected:
+                self.assertEqual(diagrams, expected, page)
+
+    def test_the_memory_of_the_readme_is_that_of_the_cost_page(self):
+        flash, ram = re.search(r"^\| Cortex-R5F, rover \| ([\d ]+) \| ([\d ]+) \|", read("docs/validation/cost.md"), re.M).groups()
+        kilo = [int(one.replace(" ", "")) / 1000 for one in (flash, ram)]
+        self.assertIn(f"| {kilo[0]:.0f} kB and {kilo[1]:.1f} kB with the stack", read("README.md"))
 
 
 class Generated(unittest.TestCase):
@@ -176,6 +210,18 @@ class Generated(unittest.TestCase):
             os.remove(os.path.join(out, "count.json"))
             self.assertEqual(figures.page(out, first), first)
 
+    def test_a_marked_table_is_made_from_its_files_and_stays_where_one_is_missing(self):
+        page = "Before.\n<!-- figures: memory -->\nold\n<!-- end -->\nAfter.\n"
+        with tempfile.TemporaryDirectory() as out:
+            self.assertEqual(regions.fill(page, out, ""), page)
+            for name, content in (("size", {"flash": 225096, "ram": 16472}), ("stack", {"bound": 2672, "measured": 2224})):
+                with open(os.path.join(out, f"{name}.json"), "w", encoding="utf-8") as file:
+                    json.dump({"tetap-zynqmp_r5-rover": content}, file)
+            made = regions.fill(page, out, "")
+            self.assertIn("`make size stack`:\n\n", made)
+            self.assertIn("| Cortex-R5F, rover | 225 096 | 16 472 | 2 672 | 2 224 |", made)
+            self.assertTrue(made.startswith("Before.\n") and made.endswith("<!-- end -->\nAfter.\n"))
+
 
 @unittest.skipUnless(BUILT, "tetap-world is not built")
 class Lines(unittest.TestCase):
@@ -186,6 +232,8 @@ class Lines(unittest.TestCase):
         self.addCleanup(folder.cleanup)
         self.tree = os.path.join(folder.name, "tetap")
         shutil.copytree(ROOT, self.tree, ignore=lambda where, _: {"build", "out", ".git"} if where == ROOT else ())
+        os.makedirs(os.path.join(self.tree, "build/host"))
+        os.symlink(PROGRAMS, os.path.join(self.tree, "build/host/sim_host"))
         # The programs are there already: packages and builds are other steps' matter.
         for tool in ("install_packages", "build_preset"):
             with open(os.path.join(self.tree, "tools/run", tool), "w", encoding="utf-8") as file:

@@ -79,6 +79,13 @@ def cited_checks(text, order):
     return [word for word in order if word in named]
 
 
+def enters(text, word):
+    """A source's own text sets or returns that state; a source without a time-out never stops."""
+    if word == "Stopped":
+        return not re.search(r"bool timed_out\([^)]*\)(?: const)? \{ return false; \}", text)
+    return bool(re.search(rf"\bstatus_?\.{VERBS.get(word, word)}\(|SourceState::k{word}\b", text))
+
+
 def sources(root):
     """The table sources x states x checks; a note where the sources have no states yet."""
     head = HEAD.format(f"{SOURCE_STATE} and {SOURCES}") + "# Sources, states and checks\n\n"
@@ -89,15 +96,15 @@ def sources(root):
     states, checks = enumerators(words, "SourceState"), enumerators(words, "Check")
     parts = [head + "One page a source explains the rules: [trust](../explanation/trust.md).\n\n## States\n\n| state | number | meaning |\n|---|---|---|"]
     parts += [f"| {word} | {number} | {comment or word} |" for word, number, comment in states]
-    parts.append("\n## Checks\n\nEvery refusal names one.\n\n| check | number | meaning |\n|---|---|---|")
+    parts.append("\n## Checks\n\nEvery refusal of the inertial filter names one.\n\n| check | number | meaning |\n|---|---|---|")
     parts += [f"| {word} | {number} | {comment or word} |" for word, number, comment in checks]
-    parts.append("\n## Sources\n\nAn x marks a state that the source enters. Every source enters Stopped by its time-out.\n\n| source | "
+    parts.append("\n## Sources\n\nAn x marks a state that the source enters. A source with a time-out enters Stopped by it.\n\n| source | "
                  + " | ".join(word for word, _, _ in states) + " | checks |\n|---|" + "---|" * len(states) + "---|")
     for path in sorted(glob.glob(os.path.join(root, SOURCES, "*.hpp"))):
         text = read(root, os.path.relpath(path, root))
         if f'#include "{REFUSAL}"' in text:
-            text += read(root, f"src/{REFUSAL}") + "Check::kGate"
-        ticks = ["x" if word == "Stopped" or re.search(rf"\bstatus_?\.{VERBS.get(word, word)}\(", text) else "" for word, _, _ in states]
+            text += (read(root, f"src/{REFUSAL}") if "status_of(" in text else "") + "Check::kGate"
+        ticks = ["x" if enters(text, word) else "" for word, _, _ in states]
         name = os.path.splitext(os.path.basename(path))[0].replace("_", " ")
         parts.append(f"| {name} | " + " | ".join(ticks) + " | " + ", ".join(cited_checks(text, [word for word, _, _ in checks])) + " |")
     return "\n".join(parts) + "\n"

@@ -34,7 +34,7 @@ def _limits(axes, band, value):
 def errors(run, truth, estimator, title):
     """Errors of position, velocity and attitude, each inside three times the sigma published for it."""
     found = metrics.blocks(run, estimator, truth)
-    fig, axes = pictures.figure(12.6, 7.0, title, 3, 3, sharex=True)
+    fig, axes = pictures.figure(10.6, 6.8, title, 3, 3, sharex=True)
     color = pictures.color_of(run, estimator)
     shades = []
     for row, (name, labels, scale) in enumerate(PANELS):

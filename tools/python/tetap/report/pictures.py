@@ -9,6 +9,7 @@ from matplotlib.collections import EllipseCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from matplotlib.patheffects import withStroke
 from matplotlib.ticker import NullLocator
 
 from tetap.report import metrics
@@ -17,7 +18,7 @@ INK, GREY, FAINT = "#262626", "#6b6b6b", "#e3e3e3"
 TRUTH, ODOMETRY, FUSED = "#3c3c3c", "#e69f00", "#0072b2"
 LANDMARK, REJECTED = "#009e73", "#d55e00"
 FAULT_SHADE = "#f6d9c8"
-FIX = "#9a9a9a"
+FIX = "#7d7d7d"
 ESTIMATORS = {"odometry": ODOMETRY, "fused": FUSED, "attitude": "#cc79a7"}
 OTHER = "#56b4e9"
 MODES = {"Boot": "#f2f2f2", "WaitingForPose": "#d9d9d9", "Aligning": "#f0e442", "Nominal": "#9fd3c0", "DeadReckoning": "#e69f00",
@@ -144,7 +145,7 @@ def way_in_faults(run, truth, estimator):
 def draw_fixes(axes, fixes):
     """Raw fixes as dots inside of the axes as they are; how many lie outside stands in the corner."""
     (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
-    axes.plot(fixes[0], fixes[1], linestyle="none", marker=".", markersize=3, color=FIX, markeredgewidth=0, alpha=0.7, label="GNSS fix", zorder=1.5)
+    axes.plot(fixes[0], fixes[1], linestyle="none", marker=".", markersize=4.5, color=FIX, markeredgewidth=0, alpha=0.8, label="GNSS fix", zorder=1.5)
     axes.set_xlim(left, right)
     axes.set_ylim(bottom, top)
     outside = int(((fixes[0] < left) | (fixes[0] > right) | (fixes[1] < bottom) | (fixes[1] > top)).sum())
@@ -157,7 +158,8 @@ def draw_faults(axes, ways):
     """The way driven during each fault, with its name where it began."""
     for number, (name, x, y) in enumerate(ways):
         axes.plot(x, y, color=REJECTED, linewidth=5, alpha=0.45, solid_capstyle="round", label="fault" if number == 0 else None, zorder=2.5)
-        axes.annotate(name, (x[0], y[0]), xytext=(6, 7), textcoords="offset points", fontsize=8.5, color=REJECTED, zorder=9)
+        axes.annotate(name, (x[0], y[0]), xytext=(6, 7), textcoords="offset points", fontsize=9, color=REJECTED, zorder=9,
+                      path_effects=[withStroke(linewidth=3, foreground="white")])
 
 
 def path(run, truth, landmarks, title, fixes=None):
@@ -279,7 +281,7 @@ def wide_bands(parts):
             wide.append(f"{name} ({3 * float(np.median(sigma[known])) / rms:.0f} times)")
     if not wide:
         return ""
-    return (f" The band is ten times the error or more for {', '.join(wide)}. The estimate is then better than it says: its parameters describe worse sensors, "
+    return (f" The band is ten times the error or more for {', '.join(wide)}. The estimate is then better than its covariance: its parameters describe worse sensors, "
             "or errors that last longer, than this run had.")
 
 

@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Tables of figures inside of pages that are written by hand. A region stands between `<!-- figures: NAME -->` and `<!-- end -->`; it is made from the files
+that its command wrote, with that command and the commit before them. A region whose files are missing stays as it was."""
+import json
+import os
+import re
+
+from tetap.docs.figures import commit_before, spaced, table
+
+REGION = re.compile(r"<!-- figures: (\w+) -->\n.*?<!-- end -->\n", re.S)
+IMAGES = [("tetap-zynqmp_r5-rover", "Cortex-R5F, rover"), ("tetap-mps2_m7-rover", "Cortex-M7, rover"), ("tetap-mps2_m4f-rover", "Cortex-M4F, rover"),
+          ("tetap-zynqmp_r5-mrclam", "Cortex-R5F, mrclam")]
+WORKLOADS = ["sincos", "atan2", "exp", "log", "w1_kf", "w1_kf_conditioned", "w2_ekf", "fuse_range_bearing", "w4_ahrs6", "w4_ahrs9", "ahrs9", "ins_strapdown",
+             "ins_covariance", "w5_ins", "ins_tick", "ins_tick_rover", "ins_tick_car", "ins_tick_iris", "node_tick", "mrclam_tick"]
+
+
+def loaded(out, name):
+    with open(os.path.join(out, name), encoding="utf-8") as file:
+        return json.load(file)
+
+
+def memory(out):
+    size, stack = loaded(out, "size.json"), loaded(out, "stack.json")
+    rows = []
+    for image, name in IMAGES:
+        if image in size:
+            one, found = size[image], stack.get(image, {})
+            rows.append([name, spaced(one["flash"]), spaced(one["ram"]), spaced(found.get("bound", "-")), spaced(found.get("measured") or "-")])
+    return table(["image", "flash B", "RAM B, with the stack reserved", "stack bound B", "painted mark B"], rows)
+
+
+def instructions(out):
+    count = loaded(out, "count.json")
+    cores = [core for core in ("m7", "m4f", "r5") if core in count]
+    rows = []
+    for name in WORKLOADS:
+        cells = [f"{spaced(count[core][f'{name}_mean'])} / {spaced(count[core][name])}" if name in count[core] else "-" for core in cores]
+        rows.append([f"`{name}`", *cells])
+    return table(["workload, mean / worst", *[{"m7": "Cortex-M7", "m4f": "Cortex-M4F", "r5": "Cortex-R5F"}[core] for core in cores]], rows)
+
+
+def campaign(out):
+    rows = []
+    for case in loaded(out, "campaign.json")["cases"]:
+        one = case["fused"]
+        nees, position, heading, sensors = one["anees"], one["position_rmse_m"], one["heading_rmse_deg"], one["bus"]
+        nis = ", ".join(f"{name} {sensors[key]['nis_per_dof']:.3f}" for key, name in (("GnssPosition", "position"), ("GnssVelocity", "velocity"), ("WheelCounts", "wheels"))
+                        if key in sensors)
+        rows.append([case["setting"], f"{position['median']:.3f} / {position['worst']:.3f} m", f"{heading['median']:.2f} / {heading['worst']:.2f} deg",
+                     f"{nees['mean']:.2f} +- {nees['mean_plus_minus']:.2f}", f"{100 * nees['inside']:.1f} %", f"{100 * nees['above']:.1f} / {100 * nees['below']:.1f} %", nis])
+    return table(["world, fused", "position RMSE, median / worst", "heading RMSE", "NEES of the pose (3 expected)", "inside its 95 % interval",
+                  "above it (too sure) / below (too modest)", "NIS per degree of freedom (1 expected)"], rows)
+
+
+def outages(out):
+    found = loaded(out, "inertial.json")["car"]["outages"]
+    kinds = [(speedometer, seconds) for speedometer in (True, False) for seconds in sorted({one["seconds"] for one in found})]
+    rows = []
+    for start in dict.fromkeys(one["start_s"] for one in found):
+        here = {(one["speedometer"], one["seconds"]): one for one in found if one["start_s"] == start}
+        cells = []
+        for kind in kinds:
+            one = here.get(kind)
+            text = f"{one['error_m']:.1f} / {'>' if one['sigma_limited'] else ''}{one['three_sigma_m']:.1f} m, {one['nees']:.2f}" if one else "-"
+            cells.append(f"**{text}**" if one and one["beyond"] else text)
+        longest = max(here.values(), key=lambda one: one["seconds"])
+        marks = ("*" if longest["calibrated_on"] else "") + ("o" if any(one["imu_hole"] for one in here.values()) else "")
+        rows.append([f"{start:.0f} s {marks}".strip().replace("*", "\\*"), f"{longest['driven_m']:.0f} m", *cells])
+    return table(["cut from", "driven", *[f"{'speedometer' if kind[0] else 'constraint alone'}, {kind[1]:.0f} s" for kind in kinds]], rows)
+
+
+def mrclam(out):
+    rows = []
+    for robot in range(1, 6):
+        one = loaded(out, f"recorded/mrclam{robot}/summary.json")["fused"]
+        sightings = one["measurements"]["RangeBearing"]
+        rows.append([str(robot), f"{one['position_rmse_m']:.3f} m", f"{one['heading_rmse_deg']:.1f} deg", f"{one['nees_mean']:.1f}", f"{sightings['nis_mean']:.2f}",
+                     f"{sightings['accepted']} / {sightings['rejected']}"])
+    return table(["robot", "position RMSE", "heading RMSE", "NEES mean (3 expected)", "NIS mean (2 expected)", "sightings accepted / rejected"], rows)
+
+
+# region: (command, files that it writes, table)
+REGIONS = {"memory": ("make size stack", ["size.json", "stack.json"], memory), "instructions": ("make count", ["count.json"], instructions),
+           "campaign": ("tools/proof/run_campaign", ["campaign.json"], campaign),
+           "outages": ("test/replay/inertial_runs.py build/host/sim_host out/inertial_runs", ["inertial.json"], outages),
+           "mrclam": ("make test STEPS=recorded_runs", [f"recorded/mrclam{robot}/summary.json" for robot in range(1, 6)], mrclam)}
+
+
+def fill(text, out, root):
+    """The page with each region made anew, where its files lie in out/."""
+    def region(match):
+        command, files, make = REGIONS[match[1]]
+        paths = [os.path.join(out, one) for one in files]
+        if not all(os.path.exists(one) for one in paths):
+            return match[0]
+        return f"<!-- figures: {match[1]} -->\n`{command}`{commit_before(root, max(paths, key=os.path.getmtime))}:\n\n{make(out)}\n<!-- end -->\n"
+    return REGION.sub(region, text)
