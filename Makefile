@@ -24,7 +24,7 @@ ifneq ($(unknown),)
 $(error no setting $(unknown); there are: $(settings))
 endif
 
-.PHONY: help sim test quick proof replay firmware size heap stack count bits hashes constants check docs dbc setup host programs arm
+.PHONY: help sim test quick proof replay firmware size heap stack count bits hashes constants check docs dbc setup programs arm
 
 help: ## this list
 	@echo "tetap: state estimation on the robot's own microcontroller"; echo
@@ -39,7 +39,8 @@ sim: setup programs ## the simulated world over vcan0: table, report, pictures i
 test: setup ## every check on prefixes and samples, what is unchanged left out (STEPS="unit_tests check", TETAP_FRESH=1)
 	@tools/proof/run_checks test $(STEPS)
 
-quick: setup host ## host unit tests only
+quick: setup ## unit tests only
+	@tools/run/build_preset clang
 	@ctest --preset quick
 
 proof: setup ## the same on whole lengths, every float, long runs; goes on where it was interrupted (STEPS=)
@@ -57,7 +58,7 @@ size: arm ## flash and RAM per section of every image against the budgets
 heap: arm ## no allocator in any linked image
 	@tools/proof/check_images heap
 
-stack: arm host ## worst-case stack from the call graph, against the painted high-water mark
+stack: arm programs ## worst-case stack from the call graph, against the painted high-water mark
 	@tools/proof/check_images stack
 
 count: arm ## instructions per workload and per tick on the emulated cores, against the budgets
@@ -83,9 +84,6 @@ dbc: setup ## docs/reference/messages.md from config/tetap.dbc; the C++ messages
 
 setup:
 	@tools/run/install_packages
-
-host:
-	@tools/run/build_preset host
 
 programs: setup
 	@tools/run/build_preset host:tetap-node,tetap-params,tetap-play,tetap-world,tetap-record

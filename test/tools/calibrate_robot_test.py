@@ -40,6 +40,7 @@ with contextlib.redirect_stdout(io.StringIO()):
     from tetap.dataset.inertial import from_enu
 
 WORLD = os.path.join(os.environ.get("TETAP_PROGRAMS", os.path.join(ROOT, "build/host/sim_host")), "tetap-world")
+WHOLE = bool(os.environ.get("whole"))  # more seeds, in `make proof`
 G = 9.80665
 FACES = [np.array(v, float) for v in ((1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1))]
 PLACE = (48.2, 11.6, 500.0)
@@ -385,7 +386,7 @@ class Wheels(Judged):
     def test_radius_difference_and_track_are_within_their_sigma_over_seeds(self):
         truth = {"left wheel radius": 0.1003, "right wheel radius": 0.0998, "track width": 0.42}
         z = {name: [] for name in truth}
-        for seed in range(5):
+        for seed in range(5 if WHOLE else 2):
             part = self.fit(seed)
             for name, true in truth.items():
                 number = part.number(name)
@@ -448,7 +449,7 @@ class World(Judged):
     def test_unequal_wheels_and_the_wide_track_are_found_within_three_sigma(self):
         kept = 0
         with tempfile.TemporaryDirectory() as directory:
-            for seed in (1, 2, 3, 4):
+            for seed in (1, 2, 3, 4) if WHOLE else (1, 2):
                 out = os.path.join(directory, str(seed))
                 subprocess.run([WORLD, "--memory", "--raw", "--quiet", "--seed", str(seed), "--out", out], check=True, capture_output=True,
                                timeout=900)
@@ -475,7 +476,7 @@ class World(Judged):
                     self.assertLess(sigma, self.MOST_SIGMA[name], f"seed {seed}: {name}: 1 sigma says nothing")
                     self.assertGreater(sigma, 0.05 * self.MOST_SIGMA[name], f"seed {seed}: {name}: 1 sigma too good to be true")
                 self.assertTrue(os.path.getsize(os.path.join(out, "c.png")) > 20_000)
-        self.assertGreater(kept, 2, "the mean was right, and was moved")
+        self.assertGreater(kept, 2 if WHOLE else 0, "the mean was right, and was moved")
 
 
 class Program(unittest.TestCase):

@@ -314,6 +314,13 @@ class RealTime(Tree):
         self.assertRegex(said, r"meets +skipped: not judged: machine too slow \(others took \d\d % of the \d+ processors")
         self.assertIn("0 passed, 0 failed, 1 skipped", said)
 
+    def test_a_step_that_names_the_figure_of_a_slow_machine_is_tried_twice_and_not_judged(self):
+        good, tries, said = self.judged("echo 900 of 2000 ticks; exit 75", 0.0)
+        self.assertEqual((good, tries), (True, 2))
+        self.assertRegex(said, r"meets +skipped: not judged: machine too slow \(900 of 2000 ticks; ")
+        good, tries, _ = self.judged("echo every state CRC differs, 900 of 2000 ticks; exit 75", 0.0)
+        self.assertEqual((good, tries), (False, 1))
+
     def test_bytes_that_differ_are_a_failure_on_any_machine(self):
         good, tries, _ = self.judged("echo board DIFFERS; exit 1", 0.9)
         self.assertEqual((good, tries), (False, 1))

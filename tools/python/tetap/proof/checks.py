@@ -15,6 +15,7 @@ from tetap.proof import stamps
 from tetap.proof.steps import Table, TableError
 
 SKIPPED = 77
+TOO_SLOW = 75           # a step in real time: its last line has the figure by which the machine was too slow
 LIMIT_S = {"test": 1800, "proof": 6 * 3600}
 TAIL = 25               # lines of a failed step that are shown
 BESIDE = 10             # niceness of what only computes
@@ -173,6 +174,8 @@ class Runner:
         foreign = max(0.0, busy_s() - busy - job.cpu) / ((time.monotonic() - began) * self.processors)
         if status == 0 and stamp:
             self.keep(job, stamp)
+        if status == TOO_SLOW and not bytes_differ(self.text(job)):
+            return self.end(job, SKIPPED, f"not judged: machine too slow ({self.text(job).strip().splitlines()[-1].strip()}; {job.log})")
         if status not in (0, SKIPPED) and foreign > FOREIGN_SHARE and not bytes_differ(self.text(job)):
             return self.end(job, SKIPPED, f"not judged: machine too slow (others took {100 * foreign:.0f} % of the {self.processors} processors; {job.log})")
         return self.end(job, status, f"at the second try, alone; the first is in {job.log}.before" if status == 0 else "")
