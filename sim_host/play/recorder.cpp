@@ -127,6 +127,9 @@ void Recorder::frame(const base::CanFrame& f) {
     } else {
       if (offset == bus::offset_of<bus::EstStateSources>(k))
         if (const auto sources = bus::decode<bus::EstStateSources>(payload)) source_rows(k, *sources);
+      if (offset == bus::offset_of<bus::EstStateCorrPos>(k))
+        if (const auto height = bus::decode<bus::EstStateCorrPos>(payload))
+          source_row(k, "GnssHeight", height->height_state, height->height_check);
       state(states_now_[k], offset - static_cast<std::uint32_t>(k * bus::EstPos::kStride), payload);
     }
   }
@@ -246,22 +249,23 @@ void Recorder::status_row(const bus::EstStatus& s) {
   status_.write(line_.put('\n').view());
 }
 
+void Recorder::source_row(std::size_t k, std::string_view source, sensor::SourceState state, sensor::Check failed) {
+  row(time_).integer(static_cast<std::int64_t>(k)).put(',').text(source).put(',');
+  put_name(line_, state);
+  line_.put(',');
+  put_name(line_, failed);
+  sources_.write(line_.put('\n').view());
+}
+
 void Recorder::source_rows(std::size_t k, const bus::EstStateSources& s) {
-  const auto source = [&](std::string_view of, sensor::SourceState state, sensor::Check failed) {
-    row(time_).integer(static_cast<std::int64_t>(k)).put(',').text(of).put(',');
-    put_name(line_, state);
-    line_.put(',');
-    put_name(line_, failed);
-    sources_.write(line_.put('\n').view());
-  };
-  source("Imu", s.imu_state, s.imu_check);
-  source("GnssPosition", s.position_state, s.position_check);
-  source("GnssVelocity", s.velocity_state, s.velocity_check);
-  source("Wheels", s.wheel_state, s.wheel_check);
-  source("ForwardSpeed", s.speed_state, s.speed_check);
-  source("Heading", s.heading_state, s.heading_check);
-  source("Magnetometer", s.mag_state, s.mag_check);
-  source("Barometer", s.baro_state, s.baro_check);
+  source_row(k, "Imu", s.imu_state, s.imu_check);
+  source_row(k, "GnssPosition", s.position_state, s.position_check);
+  source_row(k, "GnssVelocity", s.velocity_state, s.velocity_check);
+  source_row(k, "Wheels", s.wheel_state, s.wheel_check);
+  source_row(k, "ForwardSpeed", s.speed_state, s.speed_check);
+  source_row(k, "Heading", s.heading_state, s.heading_check);
+  source_row(k, "Magnetometer", s.mag_state, s.mag_check);
+  source_row(k, "Barometer", s.baro_state, s.baro_check);
 }
 
 void Recorder::flush() {

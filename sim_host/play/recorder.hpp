@@ -78,6 +78,7 @@ class Recorder {
   void sensor_row(const bus::EstSensorStat& statistics);
   void innovation_row(const bus::EstInnov& innovation);
   void status_row(const bus::EstStatus& status);
+  void source_row(std::size_t k, std::string_view source, sensor::SourceState state, sensor::Check failed);
   void source_rows(std::size_t k, const bus::EstStateSources& sources);
   Line& row(base::Micros time);
   void raw_line(const base::CanFrame& frame, base::Micros time);

@@ -92,7 +92,11 @@ void put_state_page(std::uint32_t page, const estimators::InertialEstimate& e, s
       const Block b = e.block(nav::InsState::kPosition);
       put(bus::EstStateHeight{
           .epoch = tag, .height_m = base::metres(x.z.um()), .std_height_m = b.sigma[2], .jump_z_m = e.jump.up_m});
-      put(bus::EstStateCorrPos{.epoch = tag, .corr_xz = b.corr_02, .corr_yz = b.corr_12});
+      put(bus::EstStateCorrPos{.epoch = tag,
+                               .corr_xz = b.corr_02,
+                               .corr_yz = b.corr_12,
+                               .height_state = e.gnss_height.state,
+                               .height_check = e.gnss_height.failed});
       break;
     }
     case 1: {

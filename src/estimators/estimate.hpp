@@ -77,6 +77,7 @@ struct InertialEstimate {
   bool valid = false;
   Jump jump;
   checks::ImuHealthReport imu;
+  SourceStates::Entry gnss_height;  ///< beside SourceStates: a height comes with the kind of its fix
 
   /// Of errors kI and kJ (nav::InsState), at the present.
   template <int kI, int kJ = kI>

@@ -16,6 +16,10 @@ Word word(const Drive& d, sensor::Sensor of) {
   const SourceStates::Entry entry = d.estimator.sources(d.ctx()).of(of);
   return {entry.state, entry.failed};
 }
+Word height(const Drive& d) {
+  const SourceStates::Entry entry = d.estimator.inertial(d.ctx()).gnss_height;
+  return {entry.state, entry.failed};
+}
 constexpr Word kFusing{SourceState::kFusing, Check::kNone}, kStopped{SourceState::kStopped, Check::kNone};
 
 TEST(Sources, StopAndFuseAsTheirMeasurementsDo) {
@@ -56,6 +60,18 @@ TEST(Sources, AJumpIsRejectedByTheGateAndNamesIt) {
   d.run(0.5);
   EXPECT_EQ(word(d, sensor::Sensor::kGnssPosition), kFusing);
   EXPECT_EQ(d.last_fix.failed, Check::kNone);
+}
+
+TEST(Sources, AHeightHasAStateOfItsOwnAndStopsWithItsFixes) {
+  Drive d = settled();
+  EXPECT_EQ(height(d), kFusing);
+  d.tamper = [](Drive::Fix& fix) { return fix.up_m += 100, true; };
+  d.run(1);
+  EXPECT_EQ(height(d), (Word{SourceState::kRejecting, Check::kGate}));
+  EXPECT_EQ(word(d, sensor::Sensor::kGnssPosition), kFusing) << "its horizontal part is right";
+  d.tamper = [](Drive::Fix&) { return false; };
+  d.run(4);
+  EXPECT_EQ(height(d), kStopped);
 }
 
 TEST(Sources, AFrozenReceiverIsDistrusted) {

@@ -72,12 +72,15 @@ float Inertial::unseen_s2(float unseen_s) const {
 }
 
 InertialEstimate Inertial::inertial(const Context& ctx) const {
+  const bool fixes = sources_.position.status(time_).state != SourceState::kStopped;
+  const SourceStatus height = fixes ? sources_.height.status(time_) : SourceStatus{};
   return {.state = present(),
           .p = ins_.p,
           .ahead = step_ahead(ctx),
           .valid = tracking(),
           .jump = recovery_.jump(),
-          .imu = imu_.health().report()};
+          .imu = imu_.health().report(),
+          .gnss_height = {height.state, height.failed}};
 }
 
 Estimate Inertial::estimate(const Context& ctx) const {
