@@ -18,7 +18,7 @@ inline constexpr param::Parameters parameters = param::checked({
         {// Mounting, from the same log (no other is there). Up: the axis about which it turns in curves. Yaw of the
          // sensor, 7.2 degrees: where the filter's GNSS innovations over the first 145 s are smallest (mean NIS with a
          // third of the receiver's sigma: 1.72 at 5, 1.65 at 7, 1.67 at 10 degrees, so good to some 2 degrees; the
-         // part after, which had no say, has its least at 6). Cuts of GNSS that begin later are the check.
+         // part after took no part in the choice and has its least at 6). Cuts of GNSS that begin later are the check.
          .mounting_bs = {0.99021F, 0.12803F, 0.05563F, -0.12516F, 0.99075F, -0.05234F, -0.06182F, 0.04487F, 0.99708F},
          .gyro_radps_rthz = 1e-3F,
          .accel_mps2_rthz = 3e-2F,

@@ -17,7 +17,7 @@ inline constexpr param::Parameters parameters = param::checked([] {
   // orientation (level all the way) agree.
   n.inertial = {.mounting_bs = {0, 0, -1, -1, 0, 0, 0, 1, 0},
                 // Vibration: 0.45 m/s^2 and 0.025 rad/s from one sample to the next, 33 ms later (median over the bag;
-                // its covariances say 0.1 and 0.02).
+                // its covariances give 0.1 and 0.02).
                 .gyro_radps_rthz = 5e-3F,
                 .accel_mps2_rthz = 8e-2F,
                 .start_tilt_rad = 0.1F,  // it starts while it drives

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Iris, the quadrotor of PX4's simulator (PX4-ECL test/replay_data/iris_gps.csv): IMU, GNSS, magnetometer, barometer;
 // no wheels, and nothing that keeps it from moving sideways. Noise: the defaults of PX4's EKF2 (PX4 parameter
-// reference) for the samples of 5 ms that the log has, so that the two filters believe the same sensors as much.
+// reference) for the samples of 5 ms that the log has, so that both filters give each sensor the same weight.
 #pragma once
 
 #include "estimators/attitude.hpp"
@@ -24,8 +24,8 @@ inline constexpr param::Parameters parameters = param::checked({
                  .gyro_turn_on_radps = 0.1F,      // EKF2_GBIAS_INIT
                  .accel_turn_on_mps2 = 0.2F,      // EKF2_ABIAS_INIT
                  .start_tilt_rad = 0.1F},         // EKF2_ANGERR_INIT
-    // North as PX4's own estimate of the field has it at the end of the log (0.204 G north, 0.002 G east): the log says
-    // nothing of the declination that its simulator used, and at 47 N 9 E the Earth's is 0.05 rad.
+    // North as PX4's own estimate of the field has it at the end of the log (0.204 G north, 0.002 G east): the log has
+    // no figure of the declination that its simulator used, and at 47 N 9 E the Earth's is 0.05 rad.
     .magnetic = {.use = 1, .declination_rad = 0.01F},
     .baro = {.use = 1},
     // Many sensors, so many innovations: within 600 frames/s (test/replay/worlds.sh).

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The default robot: a differential-drive rover with encoders, an IMU and a GNSS receiver, as simulated by
-// sim_host/world. Inertial navigation, the attitude filter that judges it, and odometry. Geometry is what the drawing
-// says; the world's wheels are unequal and its track is wider.
+// sim_host/world. Inertial navigation, the attitude filter that judges it, and odometry. Geometry is that of
+// the drawing; the world's wheels are unequal and its track is wider.
 #pragma once
 
 #include "estimators/attitude.hpp"
@@ -13,7 +13,7 @@
 
 namespace tetap::robot::rover {
 
-// It has no magnetometer, barometer or second antenna, so nothing that fuses them is flashed.
+// Sensors of this robot: no magnetometer, barometer or second antenna, so no code that fuses these is flashed.
 using Attitude = estimators::WithSensors<estimators::Attitude, sensor::ImuSample>;
 using Inertial = estimators::WithSensors<estimators::Inertial, sensor::ImuSample, sensor::WheelCounts,
                                          sensor::GnssPosition, sensor::GnssVelocity>;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The rover with exactly the matched world's noise: what a filter must be told to be consistent there (Bar-Shalom, Li,
-// Kirubarajan 2001, sec. 5.4: the filter's model is the world's). For judging; there is no such robot, so no image.
+// The rover with exactly the matched world's noise: the numbers with which a filter is consistent there (Bar-Shalom,
+// Li, Kirubarajan 2001, sec. 5.4: the filter's model is the world's). For judging; there is no such robot, so no image.
 #pragma once
 
 #include "config/rover.hpp"

@@ -20,7 +20,7 @@ int main(int count, char** values) {
     if (options.robot.empty() && !settings.words().empty()) throw sim::UsageError("--params and --set need --robot");
     if (!options.robot.empty())
       options.notes = sim::parameter_notes(sim::parameters_of(options.robot, settings), settings);
-    // Before the bus, so that a log that cannot be read is said also where there is none.
+    // Before the bus, so that an unreadable log is reported also where there is no bus.
     sim::SurveyedLog log = sim::survey_for(options);
     if (options.memory)
       return sim::with_node_in_process(options.robot, settings, options.script.base, [&](auto& link) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tetap-record: writes down everything on a CAN interface (raw.log) and what one node says (estimates.log and CSV
+// tetap-record: writes down everything on a CAN interface (raw.log) and one node's output (estimates.log and CSV
 // files) until it is interrupted.
 #include "hal/board/linux/socket_can.hpp"
 #include "sim_host/play/arguments.hpp"

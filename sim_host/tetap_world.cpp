@@ -155,7 +155,7 @@ void set_world(sim::Arguments& arguments, sim::World::Options& world) {
   } else {
     throw std::runtime_error("--course " + course + ": it is yard, road or stand");
   }
-  const double east_m = arguments.real("--east", 0, -60'000, 60'000);  // what a pose on the bus can say
+  const double east_m = arguments.real("--east", 0, -60'000, 60'000);  // range of a pose on the bus
   for (sim::Waypoint& at : world.course.waypoints) at.x_m += east_m;
   for (sim::Landmark& mark : world.course.landmarks) mark.x_m += east_m;
   if (arguments.flag("--no-wheels")) world.parameters.wheels.rate_hz = 0;

@@ -16,7 +16,7 @@ namespace tetap::drivers {
 
 struct QuadratureSettings {
   float most_counts_per_s = 200'000;    ///< faster than the wheel can turn: a jump
-  base::Micros standstill{500'000};     ///< so long without an edge is speed zero
+  base::Micros standstill{500'000};     ///< time without an edge after which the speed is zero
   std::int32_t edge_timing_below = 32;  ///< counts between two updates; from there on the tick is the better clock
   bool inverted = false;                ///< counts down when the wheel rolls forward
 };
@@ -24,7 +24,7 @@ struct QuadratureSettings {
 enum class EncoderReason : std::uint8_t {
   kJump,       ///< more counts than can be: refused, the total stands
   kRebased,    ///< the count stayed where it had jumped to: counted on from there, the jump is lost
-  kAmbiguous,  ///< so long between updates that the counter may have turned around: counted on, the rest is lost
+  kAmbiguous,  ///< updates too far apart for the counter's width: whole turns of it may be missing from the total
   kBadEdge,    ///< an edge from the future or from before the last: its time was not used
   kCount
 };
@@ -54,7 +54,7 @@ class Quadrature {
 
   explicit constexpr Quadrature(const QuadratureSettings& settings = {}) : settings_(settings) {}
 
-  /// At `now` the counter said `reading`. Called at the pace of the loop, more often than half a turn of the counter.
+  /// `reading` was taken at `now`. Called at the pace of the loop, more often than half a turn of the counter.
   constexpr void update(const hal::EncoderReading<Counter>& reading, base::Micros now) {
     if (!started_) {
       started_ = true;
@@ -78,7 +78,7 @@ class Quadrature {
     taken_ = now;
   }
 
-  /// Since the first update.
+  /// Counts since the first update.
   [[nodiscard]] constexpr std::int64_t counts() const { return total_; }
   [[nodiscard]] constexpr float counts_per_s() const { return speed_; }
   [[nodiscard]] constexpr const EncoderHealth& health() const { return health_; }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A GNSS receiver on a serial line: reads what has come, configures a u-blox receiver, hands on each epoch with the
-// time it was measured at. Receivers of other makers are heard as they are: with `configure` off nothing is sent.
+// time it was measured at. Receivers of other makers are read as they are: with `configure` off nothing is sent.
 #pragma once
 
 #include "drivers/gnss/epoch_clock.hpp"

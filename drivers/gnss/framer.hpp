@@ -16,7 +16,7 @@ namespace tetap::drivers::gnss {
 
 inline constexpr std::uint8_t kUbxSync1 = 0xB5, kUbxSync2 = 0x62, kRtcmPreamble = 0xD3;
 inline constexpr std::size_t kUbxOverhead = 8, kRtcmOverhead = 6;
-inline constexpr std::size_t kLongestSentence = 160;  ///< the standard says 82; receivers do not keep to it
+inline constexpr std::size_t kLongestSentence = 160;  ///< the standard allows 82; receivers send more
 
 /// Fletcher's sum of 8 bits over class, id, length and payload.
 struct UbxChecksum {
@@ -203,7 +203,7 @@ class Framer {
 
   std::array<std::uint8_t, Capacity> buffer_{};
   std::size_t size_ = 0;
-  std::size_t length_ = 0;  ///< of the frame at the start, once known
+  std::size_t length_ = 0;  ///< length of the frame at the start, bytes; 0: not known yet
   std::size_t seen_ = 0;    ///< bytes of a sentence that were looked at
   std::size_t star_ = 0;
   std::size_t text_ = 0;  ///< characters between '$' and the end

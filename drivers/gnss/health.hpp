@@ -25,7 +25,7 @@ enum class Reason : std::uint8_t {
   kNoEpoch,           ///< data without a time, before any epoch began
   kOutOfRange,        ///< a position or velocity that cannot be
   kBadTime,           ///< a date or time that does not exist
-  kSecondProtocol,    ///< an NMEA epoch beside UBX epochs that say the same
+  kSecondProtocol,    ///< an NMEA epoch beside UBX epochs of the same content
   kCount
 };
 

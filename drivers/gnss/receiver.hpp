@@ -83,7 +83,7 @@ class GnssReceiver {
     }
     constexpr void nmea(nmea::Text text) { receiver.nmea_.on_sentence(text, receiver.health_, *this); }
 
-    /// Of a receiver that says the same in two protocols, the more exact one is heard.
+    /// Protocol filter: the more exact one where a receiver sends the same epoch in UBX and NMEA.
     constexpr void operator()(const Report& report) {
       constexpr std::uint8_t kEpochsOfNmeaToWait = 3;
       if (report.protocol == Protocol::kUbx) {

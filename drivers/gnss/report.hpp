@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // One epoch of a GNSS receiver, whichever protocol it spoke, in SI units and the frame n (east, north, up); and the
-// samples that estimators take from it. What the receiver did not say is NaN or empty.
+// samples that estimators take from it. A field that the receiver did not send is NaN or empty.
 #pragma once
 
 #include "base/float_bits.hpp"
@@ -15,7 +15,7 @@ namespace tetap::drivers::gnss {
 
 enum class Protocol : std::uint8_t { kUbx, kNmea };
 
-/// UTC as the receiver said it. The second may be 60.
+/// UTC as the receiver sent it. The second may be 60.
 struct Utc {
   std::uint16_t year = 0;
   std::uint8_t month = 0, day = 0, hour = 0, minute = 0, second = 0;
@@ -44,7 +44,7 @@ struct Report {
   float vertical_acc_m = base::kNan;
   std::array<float, 3> v_n_mps{base::kNan, base::kNan, base::kNan};
   float speed_mps = base::kNan;   ///< over ground
-  float course_rad = base::kNan;  ///< clockwise from north, as receivers say it
+  float course_rad = base::kNan;  ///< clockwise from north, as receivers send it
   float speed_acc_mps = base::kNan;
   float course_acc_rad = base::kNan;
   float pdop = base::kNan, hdop = base::kNan, vdop = base::kNan;
@@ -55,7 +55,7 @@ struct Report {
   [[nodiscard]] constexpr bool usable() const { return has_position && fix >= sensor::GnssFix::k2d; }
 };
 
-/// What a filter may fuse; empty: this epoch has no position, or none the receiver vouches for. From the covariance,
+/// Position that a filter may fuse; empty: this epoch has none, or none the receiver vouches for. From the covariance,
 /// where it came, the accuracies are the axes' own; else the receiver's figure is passed on as it is.
 [[nodiscard]] constexpr std::optional<sensor::GnssPosition> position_of(const Report& report) {
   if (!report.usable()) return {};

@@ -42,7 +42,7 @@ class ClockMap {
     return anchor_ticks_ + (us << 28) / ((rate_ + slew_) >> 4);
   }
 
-  /// The newest sample had `ticks` when the clock said `now`. False: too far in the future, not used.
+  /// The newest sample had `ticks` when the clock showed `now`. False: too far in the future, not used.
   constexpr bool observe(std::int64_t ticks, base::Micros now) {
     const std::int64_t late_us = (now - time(ticks)).us;
     if (late_us < -(rate_known_ ? kSettled_us : kUnsettled_us)) return false;
@@ -118,13 +118,13 @@ class ClockMap {
   std::int64_t rate_;
   std::int64_t slew_ = 0;  ///< on top of the rate, for one window: what the offset still has to move
   base::Micros anchor_{};
-  std::int64_t fraction_ = 0;  ///< of the anchor, 2^-32 us
+  std::int64_t fraction_ = 0;  ///< fraction of the anchor, 2^-32 us
   std::int64_t anchor_ticks_ = 0;
   std::int64_t window_ticks_ = 0;
   base::Micros window_start_{};
   std::int64_t window_us_ = kFirstWindow_us;
   std::int64_t least_us_ = kNone_us;  ///< the lowest pair of the window, above the line
-  std::int64_t pulled_us_ = 0;        ///< what the line was pulled down within the window
+  std::int64_t pulled_us_ = 0;        ///< sum by which the line was pulled down within the window
   std::int64_t doubted_us_ = 0;
   bool running_ = false;
   bool rate_known_ = false;  ///< once settled

@@ -23,7 +23,7 @@ struct StampedImu {
 
 class ImuIntegrator {
  public:
-  /// So many readings make one increment, or as many as fit into the 65 ms that a sample can say.
+  /// `readings` make one increment, or as many as fit into the 65 ms that a sample's interval can hold.
   explicit constexpr ImuIntegrator(std::uint8_t readings) : readings_(readings > 0 ? readings : std::uint8_t{1}) {}
 
   /// An increment, when this reading completes one. A gap ends the one begun, without what is missing: then the next

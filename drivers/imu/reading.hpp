@@ -10,7 +10,7 @@ namespace tetap::drivers {
 struct ImuReading {
   base::Micros stamp{};  ///< when the motion was, on the MCU's clock: not when it was read, nor when the chip's filter
                          ///< let it out
-  base::Micros interval{};  ///< since the sample before, by the chip's ticks
+  base::Micros interval{};  ///< time since the sample before, by the chip's ticks
   Vector3 rate_b_radps{};
   Vector3 force_b_mps2{};      ///< specific force: +g upwards at rest
   float temperature_degC = 0;  ///< NaN: not available

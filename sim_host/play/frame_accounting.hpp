@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Double-entry book-keeping of a run: what was sent against what the node says it consumed (Est_StateCrc.InCount), what
-// the node says it sent (Frames, Epoch) against what arrived. So every frame lost anywhere is a number, not a surprise.
+// Double-entry book-keeping of a run: frames sent against frames that the node counted as consumed
+// (Est_StateCrc.InCount), frames that the node counted as sent (Frames, Epoch) against frames that arrived.
 #pragma once
 
 #include "sim_host/play/protocol.hpp"

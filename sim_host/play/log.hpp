@@ -79,7 +79,7 @@ class LogParser {
   LogParser(const std::string& name, const LogOptions& options) : options_(options) { report_.name = name; }
 
   /// The line's frame; nothing for a blank line and for what is counted instead. Throws
-  /// std::runtime_error("name:line: reason: 'text'") for a malformed line unless told to keep going.
+  /// std::runtime_error("name:line: reason: 'text'") for a malformed line unless set to keep going.
   std::optional<TimedFrame> add(std::string_view line);
   [[nodiscard]] const LogReport& report() const { return report_; }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Writes what a node said: estimates.log (candump format, stamped with the epoch's time, only frames that are the same
-// in every run of the same input), estimates.csv, states.csv (what an inertial or attitude estimator says beyond a
+// Writes a node's output: estimates.log (candump format, stamped with the epoch's time, only frames that are the same
+// in every run of the same input), estimates.csv, states.csv (output of an inertial or attitude estimator beyond a
 // pose), innovations.csv, sensors.csv (statistics by sensor), status.csv, sources.csv (state and failed check of each
 // source), and on request raw.log (everything on the bus as it came).
 #pragma once
@@ -65,7 +65,7 @@ class Recorder {
     std::optional<bus::EstStdPose> deviation;
     std::optional<bus::EstStdMore> correlation;
   };
-  /// A row of states.csv: empty is what this epoch does not say.
+  /// A row of states.csv: cells that this epoch does not carry are empty.
   struct State {
     static constexpr std::size_t kColumns = 49;
     std::array<double, kColumns> values{};

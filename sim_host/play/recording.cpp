@@ -12,7 +12,7 @@ namespace tetap::sim {
 
 namespace {
 
-constexpr std::size_t kEnough = 32;  ///< epochs, with 16 bits of CRC each, tell where a node's consumption begins
+constexpr std::size_t kEnough = 32;  ///< epochs, with 16 bits of CRC each, that fix where a node's consumption begins
 
 }  // namespace
 
@@ -130,7 +130,7 @@ bool RecordSurvey::agrees_from(std::size_t start, std::size_t end) const {
 }
 
 /// Where in the log the node's consumption begins. With a Begin frame that is known; a node that was switched on while
-/// frames were flowing took some of those before its first epoch, and its own CRC of them tells which.
+/// frames were flowing took some of those before its first epoch, and its own CRC of them shows which.
 void RecordSurvey::find_start(std::uint64_t end, bool life_is_over) {
   if (!life_is_over) {
     if (waiting_.size() < kEnough) return;
@@ -145,7 +145,7 @@ void RecordSurvey::find_start(std::uint64_t end, bool life_is_over) {
   start_at(*best_);
 }
 
-/// Takes every input before `end` that a waiting epoch says it consumed.
+/// Takes every input before `end` that a waiting epoch counted as consumed.
 void RecordSurvey::follow_until(std::uint64_t end, bool life_is_over) {
   if (!started_) find_start(end, life_is_over);
   if (!started_) return;

@@ -28,12 +28,12 @@ struct Recording {
   std::vector<Life> lives;
   std::uint64_t epochs = 0;
   std::uint64_t skipped_epochs = 0;   ///< epochs of a node that was running already and was restarted later in the log
-  std::uint64_t missing_outputs = 0;  ///< frames the node said it sent and the log does not hold
-  /// Where the inputs in the log first differ from what the node says it consumed (Est_Epoch.InCrc): a frame was lost
+  std::uint64_t missing_outputs = 0;  ///< frames that the node counted as sent and the log does not hold
+  /// Where the inputs in the log first differ from those that the node consumed (Est_Epoch.InCrc): a frame was lost
   /// between them.
   std::optional<base::Micros> inputs_differ_at;
-  std::uint16_t rx_overflow = 0;        ///< frames that the recorded node's receiver lost, as it said last
-  std::optional<std::uint32_t> config;  ///< hash of the numbers it ran with, as it said last
+  std::uint16_t rx_overflow = 0;        ///< frames that the recorded node's receiver lost, by its last count
+  std::optional<std::uint32_t> config;  ///< hash of the node's numbers, as last published
 };
 
 /// The node's frames of a log as lives and epochs.
@@ -193,7 +193,7 @@ class Comparison {
   [[nodiscard]] std::uint64_t different() const { return different_; }
   [[nodiscard]] std::uint64_t missing() const { return recording_.epochs - compared_; }
   [[nodiscard]] const std::string& first_difference() const { return first_difference_; }
-  /// Whether this node says it runs with other numbers than the recorded one did.
+  /// Whether this node publishes another hash of its numbers than the recorded one did.
   [[nodiscard]] bool other_numbers() const { return config_ && recording_.config && *config_ != *recording_.config; }
   [[nodiscard]] const Recording& recording() const { return recording_; }
 

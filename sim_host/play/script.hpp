@@ -75,7 +75,7 @@ struct ScriptOptions {
 /// The log's input frames with the ids of the node, sync frames left out.
 [[nodiscard]] std::vector<TimedFrame> inputs_of(Frames& log, const ScriptOptions& options);
 
-/// A frame that says when the node ticks.
+/// A frame that sets when the node ticks.
 [[nodiscard]] bool is_tick(const base::CanFrame& frame, std::uint32_t log_base);
 
 /// Whole periods from the first input frame on. A frame belongs to the first tick at or after its time; a frame earlier

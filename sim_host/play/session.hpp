@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// One run of a node seen from the host: the sink that records, compares and shows progress, and at the end says in
-// run.json, in one line, and in the exit status how it went.
+// One run of a node seen from the host: the sink that records, compares and shows progress, and at the end puts the
+// result into run.json, one line and the exit status.
 #pragma once
 
 #include "hal/board/linux/clock.hpp"

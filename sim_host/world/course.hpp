@@ -20,7 +20,7 @@ struct Landmark {
 struct Waypoint {
   double x_m = 0;
   double y_m = 0;
-  double radius_m = 0;  ///< of the corner; 0 at the two ends and where the line goes straight on
+  double radius_m = 0;  ///< radius of the corner; 0 at the two ends and where the line goes straight on
   double stop_s = 0;    ///< standstill there; only where radius_m = 0
 };
 

@@ -47,7 +47,7 @@ struct FaultInfo {
   Fault fault;
   FallsOn falls_on;
   std::string_view name;
-  double start_s;     ///< unless the command line says otherwise
+  double start_s;     ///< unless the command line gives another time
   double duration_s;  ///< 0: an instant
   std::string_view what;
 };
@@ -57,7 +57,7 @@ struct FaultNumbers {
   static constexpr double kJump_m = 100;                ///< to the east
   static constexpr double kRamp_mps = 1;                ///< to the north
   static constexpr double kHeight_m = 47;               ///< the geoid left out or counted twice
-  static constexpr double kSpin_mps = 1;                ///< of the wheel's rim, on top of its rolling
+  static constexpr double kSpin_mps = 1;                ///< speed of the wheel's rim, on top of its rolling
   static constexpr std::int64_t kDropout_us = 100'000;  ///< contact lost for this long, then back for as long
   static constexpr double kClipVibration_mps2 = 60;
   static constexpr double kClipVibration_radps = 12;
@@ -73,7 +73,7 @@ struct FaultNumbers {
   static constexpr std::int64_t kFarSilent_us = 211'000'000;
   static constexpr int kFarFixes = 105;
   static constexpr double kFar_m = 800;        ///< to the west
-  static constexpr double kFreeWheel_mps = 2;  ///< of the rim, on top of its rolling
+  static constexpr double kFreeWheel_mps = 2;  ///< speed of the rim, on top of its rolling
   static constexpr double kShake_mps2 = 20;    ///< amplitude, within the ranges
   static constexpr double kShake_radps = 1;
   static constexpr double kIron_uT = 30;  ///< towards east: a steel door, a car

@@ -24,19 +24,19 @@ struct RoverNumbers {
   double radius_difference =
       0.005;  ///< (left - right) / mean: unequal wheels [BF: the larger of the two dominant errors]
   double track_error =
-      0.01;  ///< true over nominal, minus 1: contact points are not where the drawing says [BF: the other one]
+      0.01;  ///< true over nominal, minus 1: contact points are not those of the drawing [BF: the other one]
   double slip_per_mps2 = 0.010;        ///< longitudinal slip for an acceleration of 1 m/s^2 [own]
   double slip_curve_per_mps2 = 0.006;  ///< both wheels turn further than they roll, per lateral acceleration [own]
   double slip_random = 0.010;          ///< 1 sigma per wheel at full load, Gauss-Markov [own]
   double slip_random_tau_s = 1.0;
   double side_slip_s = 0.010;         ///< drift to the outside of a curve: v_y = -side_slip * v * yaw rate [own]
   double roll_rad_per_mps2 = 0.012;   ///< body leans to the outside: 0.7 deg at 1 m/s^2 [own]
-  double pitch_rad_per_mps2 = 0.010;  ///< and squats on acceleration [own]
+  double pitch_rad_per_mps2 = 0.010;  ///< body squats on acceleration [own]
   double ground_rad = 0.004;          ///< roll and pitch by uneven ground, 1 sigma while moving [own]
   double ground_tau_s = 0.4;
   double driver_wander_m = 0.08;  ///< lateral, Gauss-Markov: no two runs drive the same line [own]
   double driver_wander_tau_s = 6;
-  double jitter_mps = 0;  ///< of the body sideways and up, at rest too; white for sensors (see matched_inertial())
+  double jitter_mps = 0;  ///< trembling sideways and up, at rest too; white for sensors (see matched_inertial())
   double jitter_ahead_mps = 0;
   double jitter_tau_s = 0.002;
   double start_m = 0.05;  ///< 1 sigma per axis of where the rover really stands at the start [own]
@@ -133,8 +133,8 @@ struct CameraNumbers {
   double sigma_range_m = 0.10;
   double sigma_range_per_m = 0.01;  ///< grows with range
   double sigma_bearing_rad = 0.015;
-  double scale_error = 0.005;      ///< of range: focal length [own]
-  double mount_error_rad = 0.004;  ///< yaw of the mount against what the filter is told [own]
+  double scale_error = 0.005;      ///< share of the range, by the focal length [own]
+  double mount_error_rad = 0.004;  ///< yaw of the mount against the filter's number [own]
   double miss_probability = 0.15;
   double wrong_id_probability = 0.005;
   double survey_m = 0.015;  ///< 1 sigma per axis of the landmark map
@@ -179,10 +179,10 @@ struct Parameters {
   return n;
 }
 
-/// What an inertial filter models exactly: matched(), and on top biases that wander at random (a Gauss-Markov process
-/// much slower than the run is that: its first draw is the turn-on bias, and it drives 2 sigma^2 / tau), wheels whose
-/// error is a share of their travel, and a body that trembles, at rest as well: sideways and up as much as a filter
-/// takes for the noise of the non-holonomic constraint, ahead as much as it takes for that of the wheels.
+/// The world that an inertial filter models exactly: matched(), and on top biases that wander at random (a Gauss-Markov
+/// process much slower than the run is that: its first draw is the turn-on bias, and it drives 2 sigma^2 / tau), wheels
+/// whose error is a share of their travel, and a body that trembles, at rest as well: sideways and up as much as a
+/// filter takes for the noise of the non-holonomic constraint, ahead as much as it takes for that of the wheels.
 [[nodiscard]] inline Parameters matched_inertial(Parameters n) {
   const ImuParameters imu = n.imu;
   const double gnss_m = sim::sqrt(n.gnss.white_m * n.gnss.white_m + n.gnss.correlated_m * n.gnss.correlated_m);

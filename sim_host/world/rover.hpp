@@ -24,13 +24,13 @@ struct Truth {
   double speed_mps = 0;                             ///< forward
   double yaw_rate_radps = 0;
   Vector3 v_n_mps{};
-  Vector3 gyro_bias_b_radps{};  ///< what the IMU shows too much
+  Vector3 gyro_bias_b_radps{};  ///< error of the IMU's rates: shown minus true
   Vector3 accel_bias_b_mps2{};  ///< likewise, level and at rest: the share of gravity in it that its scale error makes
 };
 
 /// Between the start and the end of one step.
 struct Motion {
-  Vector3 rate_b_radps{};  ///< of b against n, in b
+  Vector3 rate_b_radps{};  ///< rate of b against n, in b
   Vector3 acceleration_n_mps2{};
   Vector3 attitude_rad{};  ///< roll, pitch, yaw in the middle
   double rim_left_m = 0;   ///< travel of the wheels' rims: what they turned times their true radius

@@ -50,7 +50,7 @@ void Imu::sense(const Motion& motion, double speed_mps, base::Micros now, const 
   Vector3 rate = to_body(motion.attitude_rad, earth_rate_n_radps_);
   for (std::size_t i = 0; i < 3; ++i) rate[i] += motion.rate_b_radps[i];
 
-  // Tyre lugs: each axis hears them with another phase.
+  // Tyre lugs: each axis vibrates with another phase.
   lug_phase_rad_ = wrap(lug_phase_rad_ + parameters_.lugs * speed_mps * kStep_s / wheel_radius_m_);
   const Direction lug = direction(lug_phase_rad_);
   const double share = magnitude(speed_mps) / kReferenceSpeed_mps;
@@ -80,7 +80,7 @@ void Imu::sense(const Motion& motion, double speed_mps, base::Micros now, const 
     turn[i] = within(rate[i], parameters_.gyro_range_radps, gyro_clips);
     push[i] = within(force[i], parameters_.accel_range_mps2, accel_clips);
   }
-  // As a driver does that reads the sensor at 1 kHz: coning and sculling, so that both are told in the axes at the
+  // As a driver does that reads the sensor at 1 kHz: coning and sculling, so that both are in the axes at the
   // begin of the sample (Savage 1998; to first order of the angle within it).
   const auto cross = [](const Vector3& u, const Vector3& v, std::size_t i) {
     const std::size_t j = (i + 1) % 3, k = (i + 2) % 3;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The sensors: each sees the truth, adds its own errors and the faults that concern it, and says an app:: sample.
+// The sensors: each sees the truth, adds its own errors and the faults that concern it, and gives a sensor:: sample.
 // A fault never changes how many random numbers are drawn, so with and without it everything else is the same.
 #pragma once
 
@@ -58,8 +58,8 @@ class Wheels {
  private:
   struct Wheel {
     double metres_per_count = 0;  ///< with the true radius
-    double travel_m = 0;          ///< of the rim, with the sensor's noise
-    double unread_m = 0;          ///< since the last reading
+    double travel_m = 0;          ///< travel of the rim, with the sensor's noise
+    double unread_m = 0;          ///< travel since the last reading
     std::int64_t count = 0;
     std::int64_t read = 0;
     std::uint16_t offset = 0;  ///< counters free-run: nobody zeroes them
@@ -93,7 +93,7 @@ class Gnss {
   GaussMarkov accuracy_;
   base::Micros outage_until_;
   int glitch_fixes_ = 0;
-  int far_fixes_ = 0;  ///< of the fault
+  int far_fixes_ = 0;  ///< fixes since the fault's silence ended
   std::array<double, 2> glitch_m_{};
   Reading last_;
 };
@@ -132,7 +132,7 @@ class Camera {
   Camera(const CameraNumbers& parameters, std::vector<Landmark> landmarks, std::uint64_t seed);
   [[nodiscard]] std::vector<sensor::LandmarkSighting> sample(const Truth& truth, base::Micros now,
                                                              const Faults& faults);
-  /// What a surveyor gives: positions with an error of a few centimetres.
+  /// The surveyor's map: positions with an error of a few centimetres.
   [[nodiscard]] const std::vector<Landmark>& map() const { return map_; }
 
  private:

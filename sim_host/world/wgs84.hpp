@@ -17,7 +17,7 @@ struct GeodeticOrigin {
   double height_m = 0;  ///< above the ellipsoid
 };
 
-/// What the bus carries: angles in 2e-9 deg.
+/// A place in the bus's units: angles in 2e-9 deg.
 struct GeodeticPoint {
   std::int64_t latitude_2ndeg = 0;
   std::int64_t longitude_2ndeg = 0;

@@ -18,7 +18,7 @@
 
 namespace tetap::sim {
 
-/// What a start command can know: where the rover was put, and how well.
+/// Content of a start command: where the rover was put, and 1 sigma of that.
 struct StartPose {
   double x_m = 0, y_m = 0, yaw_rad = 0;
   double sigma_m = 0, sigma_yaw_rad = 0;
@@ -28,7 +28,7 @@ class World {
  public:
   struct Options {
     bool mismatched = true;  ///< false: only errors that filters model, see matched()
-    bool inertial = false;   ///< and not mismatched: what an inertial filter models, see matched_inertial()
+    bool inertial = false;   ///< with mismatched false: errors that an inertial filter models, see matched_inertial()
     bool latency = true;     ///< false: everything arrives at its stamp
     Parameters parameters;
     Course course = default_course();
@@ -52,7 +52,7 @@ class World {
   /// By how much the clock of the bus is off now (fault clock_jump): what sync frames add to the world's time.
   [[nodiscard]] base::Micros clock_offset() const { return clock_offset_at(now_); }
 
-  /// What may be told to a filter.
+  /// Start pose that a filter may be given.
   [[nodiscard]] StartPose start_pose() const;
   [[nodiscard]] std::span<const Landmark> map() const { return camera_.map(); }
   [[nodiscard]] const GeodeticOrigin& origin() const { return earth_->origin(); }
@@ -63,7 +63,7 @@ class World {
  private:
   struct Pending {
     Measurement measurement;
-    std::uint64_t order;  ///< of making: what arrives at one instant keeps it
+    std::uint64_t order;  ///< number of the measurement as made: the order among arrivals of one instant
   };
   static Parameters effective(const Options& options);
   [[nodiscard]] base::Micros clock_offset_at(base::Micros since_start) const;
@@ -85,7 +85,7 @@ class World {
   Magnetometer magnetometer_;
   Barometer barometer_;
   Chance imu_latency_, wheel_latency_, gnss_latency_, camera_latency_, magnetometer_latency_, barometer_latency_, loss_;
-  base::Micros now_;  ///< since the start
+  base::Micros now_;  ///< time since the start
   Vector3 rate_b_radps_{};
   std::uint8_t imu_sequence_ = 0, wheel_sequence_ = 0, position_sequence_ = 0, velocity_sequence_ = 0,
                sighting_sequence_ = 0, magnetometer_sequence_ = 0, barometer_sequence_ = 0;

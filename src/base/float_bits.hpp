@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a float is made of, and the helpers whose answer for NaN, infinity and signed zero is the same on every target.
-// IEEE 754-2008 binary32. Tests look at the bits, so they hold whatever the compiler is told about NaN.
+// The parts of a float, and the helpers whose answer for NaN, infinity and signed zero is the same on every target.
+// IEEE 754-2008 binary32. Tests look at the bits, so they hold whatever the compiler assumes about NaN.
 #pragma once
 
 #include <bit>

@@ -179,7 +179,7 @@ namespace detail {
   const double bottom = diagonal ? low + high : high;
   const double q = top / bottom;
   const double z = q * q;
-  // What the roundings of sum and difference took (exact, as |high| >= |low|): alone they would cost more than a place.
+  // Rounding errors of sum and difference (exact, as |high| >= |low|): without them a whole place would be lost.
   const double lost = diagonal ? ((low - (top + high)) - q * (low - (bottom - high))) / (bottom + bottom * z) : 0.0;
   double p = 0;
   for (const double c :

@@ -16,7 +16,7 @@ inline constexpr double kFlattening = 1.0 / 298.257223563;
 inline constexpr double kEccentricity2 = kFlattening * (2.0 - kFlattening);
 inline constexpr double kRadPer2ndeg = 2e-9 * 3.14159265358979323846 / 180.0;
 
-/// What the bus carries: angles in 2e-9 deg, a tenth of a millimetre; the height is the ellipsoid's.
+/// A place in the bus's units: angles in 2e-9 deg, a tenth of a millimetre; the height is the ellipsoid's.
 struct Geodetic {
   std::int64_t latitude_2ndeg = 0;
   std::int64_t longitude_2ndeg = 0;

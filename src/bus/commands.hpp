@@ -16,7 +16,7 @@
 
 namespace tetap::bus {
 
-/// What the codec gives for "not available" where a field is an integer of steps.
+/// The codec's value for "not available" where a field is an integer of steps.
 inline constexpr std::int32_t kNoSteps = std::numeric_limits<std::int32_t>::min();
 
 class Commands {

@@ -27,7 +27,7 @@ struct Counters {
   std::uint16_t events_high_water = 0;
 };
 
-/// What the loop saw of real time and the bus: differs from run to run, and is never fed back into an estimate.
+/// Measurements of real time and the bus: different in each run, and never fed back into an estimate.
 struct LoopHealth {
   bus::SyncState sync = bus::SyncState::kOwnTimer;
   std::uint32_t longest_us = 0;  ///< tick, since start

@@ -25,7 +25,7 @@
 
 namespace tetap::bus {
 
-/// What Est_Status says.
+/// Content of Est_Status.
 struct Summary {
   sensor::Mode mode = sensor::Mode::kBoot;
   bool position_valid = false;
@@ -53,7 +53,7 @@ class Publisher {
     troubles_.power_on();
   }
 
-  /// What is noted until end() comes in the order of the samples, and not of their arrival.
+  /// Notes until end() come in the order of the samples' stamps, not of their arrival.
   void tick_begins() { events_.tick_begins(); }
   /// First frame of the epoch.
   template <class Send>
@@ -185,7 +185,7 @@ void Publisher<N>::inertial(std::size_t instance, Inertial&& inertial, Sources&&
   const bool motion = every(parameters_.publish.attitude_every, kTogether);
   const bool page = every(parameters_.publish.state_every, kTogether);
   if (!motion && !page) return;
-  // By the epoch, not by how often there was something to say: the same in every run, whenever its filter began.
+  // By the epoch, not by the number of pages sent: the same in every run, whenever its filter began.
   const std::uint32_t turn = (epoch_ + kTogether) / static_cast<std::uint32_t>(parameters_.publish.state_every);
   const auto put_here = [&](const auto& message) { put(message, send, instance); };
   if (page && is_turn_of_sources(turn)) put_sources(sources(), tag(), put_here);  // also while there is no estimate

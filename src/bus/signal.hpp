@@ -23,7 +23,7 @@ struct Signal {
   std::uint8_t length = 1;
   bool is_signed = false;
   bool wraps = false;          ///< counters, stamps, masks: the low bits are the meaning
-  bool has_gap = false;        ///< the code beyond the range says "not available"
+  bool has_gap = false;        ///< the code beyond the range means "not available"
   std::uint32_t per_unit = 1;  ///< steps per unit: 1 / the scale of the DBC
 
   [[nodiscard]] constexpr std::uint64_t mask() const { return ~std::uint64_t{0} >> (64U - length); }

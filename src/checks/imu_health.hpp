@@ -172,7 +172,7 @@ class ImuHealth {
   float gyro2_ = 0, accel2_ = 0;                     ///< mean squares of the rest
   base::Micros valid_, clipped_at_, stuck_at_;       ///< stamps of the last such sample; 0: none
   std::uint16_t clipped_ = 0;
-  Leap leap_;  ///< of the last sample; holds while leaps_
+  Leap leap_;  ///< leap of the last sample; valid while leaps_
   bool stuck_ = false, shaken_ = false, filtered_ = false, axis_stuck_ = false, accel_turn_ = false, leaps_ = false;
 };
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The attitude filter (filter/attitude.hpp) in the firmware: gyroscope, accelerometer and, where the robot has one,
-// magnetometer; nothing else, so that it can tell when an estimator that believes more has gone wrong. Delayed, because
-// its state is large: the present is the far end of the window, turned on by what the gyroscope says in it.
+// magnetometer; nothing else, so that its answer can judge an estimator with more inputs. Delayed, because its
+// state is large: the present is the far end of the window, turned on by the gyroscope's samples in it.
 #pragma once
 
 #include "checks/imu_classifier.hpp"
@@ -29,7 +29,7 @@ class Attitude {
     rate_b_radps_ = last_rate_b_radps_ = filter::Vector3::Zero();
     now_ = time_ = last_imu_ = field_time_ = t;
   }
-  /// A pose from outside is not taken: what this says stays independent of what the others were told.
+  /// A pose from outside is not taken: this attitude stays independent of the other estimators' inputs.
   void set_pose(base::Micros, const SetPose&, const Context&) {}
 
   Innovation fuse(const sensor::ImuSample& sample, base::Micros stamp, const Context& ctx);
@@ -43,7 +43,7 @@ class Attitude {
             .heading_valid = filter_.heading_known(),
             .field_disturbed = filter_.magnetometer_disturbed()};
   }
-  /// Of the heading alone: a place is not what this knows.
+  /// Heading and yaw rate: this filter has no place.
   [[nodiscard]] Estimate estimate(const Context& ctx) const;
   [[nodiscard]] sensor::Mode mode(const Context& ctx) const {
     if (!filter_.started() || now_ - last_imu_ >= kSilent) return sensor::Mode::kWaitingForImu;
@@ -68,8 +68,8 @@ class Attitude {
   filter::Vector3 rate_b_radps_ = filter::Vector3::Zero();       ///< at the far end, as the gyroscope shows it
   filter::Vector3 last_rate_b_radps_ = filter::Vector3::Zero();  ///< at the present
   base::Micros now_;
-  base::Micros time_;      ///< stamp of the last IMU sample in the filter,
-  base::Micros last_imu_;  ///< and of the last in the window
+  base::Micros time_;      ///< stamp of the last IMU sample in the filter
+  base::Micros last_imu_;  ///< stamp of the last IMU sample in the window
   base::Micros field_time_;
 };
 

@@ -17,7 +17,7 @@ struct Disagreement {
 };
 
 /// From b to a in the axes of n: q_a q_b* is a turn about an axis that lies level, the tilt, after one about the
-/// vertical, the heading. At a tilt of half a turn the heading says nothing, and is 0.
+/// vertical, the heading. At a tilt of half a turn no heading exists, and 0 stands for it.
 [[nodiscard]] [[gnu::noinline]] inline Disagreement disagreement(const AttitudeEstimate& a, const AttitudeEstimate& b) {
   if (!a.valid || !b.valid) return {};
   const filter::Quaternion d = a.q_nb * b.q_nb.conjugate();
@@ -28,8 +28,8 @@ struct Disagreement {
       .heading_rad = a.heading_valid && b.heading_valid ? base::wrap_angle(2.0F * base::atan2(d.z, d.w)) : base::kNan};
 }
 
-/// Says that two attitudes disagree once they have been too far apart, in tilt or in heading, for longer than a stated
-/// time, and that they agree again after as long within both limits. What is not known neither disagrees nor agrees.
+/// Two attitudes disagree once they have been too far apart, in tilt or in heading, for longer than a stated time. They
+/// agree again after as long within both limits. An attitude that is not known changes neither.
 class AttitudeDisagreement {
  public:
   bool step(const Disagreement& d, base::Micros now, const param::DisagreementParameters& n) {
@@ -55,7 +55,7 @@ class AttitudeDisagreement {
   }
 
  private:
-  base::Micros since_;  ///< the last time at which it was as it is said to be
+  base::Micros since_;  ///< last time at which the limits agreed with disagrees_
   bool disagrees_ = false;
 };
 

@@ -19,7 +19,7 @@ struct SetPose {
   model::PlanarPose pose;
   float sigma_position_m = 0;
   float sigma_yaw_rad = 0;
-  std::uint8_t counter = 0;  ///< of the command it came with
+  std::uint8_t counter = 0;  ///< counter of the command that carried the pose
 };
 
 }  // namespace tetap::estimators

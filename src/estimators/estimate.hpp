@@ -21,7 +21,7 @@ namespace tetap::estimators {
 struct Estimate {
   base::Micros time;
   model::PlanarPose pose;
-  filter::Symmetric<float, 3> p;  ///< of (x, y, yaw)
+  filter::Symmetric<float, 3> p;  ///< covariance of (x, y, yaw): m, m, rad
   float forward_mps = 0;
   float yaw_rate_radps = 0;
   bool position_valid = false;
@@ -34,8 +34,8 @@ inline constexpr float kUnknown_m = 1000, kUnknown_rad = 1.8138F;
 
 /// How uncertain the motion is, when somebody asks.
 struct MotionVariance {
-  float forward_m2ps2 = base::kNan;     ///< of Estimate::forward_mps; NaN: not known
-  float yaw_rate_rad2ps2 = base::kNan;  ///< of Estimate::yaw_rate_radps
+  float forward_m2ps2 = base::kNan;     ///< variance of Estimate::forward_mps; NaN: not known
+  float yaw_rate_rad2ps2 = base::kNan;  ///< variance of Estimate::yaw_rate_radps; NaN: not known
 };
 
 /// An estimator's own step that nothing measured: it found itself wrong, and went where its sensors had been for
@@ -46,7 +46,7 @@ struct Jump {
   float up_m = 0;
   float yaw_rad = 0;
   sensor::ResetCause cause = sensor::ResetCause::kPositionJump;
-  std::uint8_t count = 0;  ///< of such steps since the start
+  std::uint8_t count = 0;  ///< number of such steps since the start
 };
 
 /// State and last failed check of each source, by the kind of sensor.
@@ -68,8 +68,8 @@ class SourceStates {
   std::array<Entry, kKinds> entries_{};
 };
 
-/// What an inertial estimator has beyond that: the state at the present, the covariance of the far end of its window
-/// and how to carry an entry of it to the present.
+/// Output of an inertial estimator beyond the pose: the state at the present, the covariance of the far end of its
+/// window and how to carry an entry of it to the present.
 struct InertialEstimate {
   nav::InsState state;
   const filter::Symmetric<float, nav::InsState::kErrors>& p;  ///< the estimator's own: as long as nothing changes it
@@ -79,7 +79,7 @@ struct InertialEstimate {
   checks::ImuHealthReport imu;
   SourceStates::Entry gnss_height;  ///< beside SourceStates: a height comes with the kind of its fix
 
-  /// Of errors kI and kJ (nav::InsState), at the present.
+  /// Covariance of errors kI and kJ (nav::InsState), at the present.
   template <int kI, int kJ = kI>
   [[nodiscard]] float covariance() const {
     return nav::predicted_covariance<kI, kJ>(p, ahead);
@@ -89,7 +89,7 @@ struct InertialEstimate {
     std::array<float, 3> sigma;
     float corr_01, corr_02, corr_12;
   };
-  /// Of errors first, first + 1 and first + 2, at the present.
+  /// Block of errors first, first + 1 and first + 2, at the present.
   [[nodiscard]] Block block(int first) const {
     const filter::Symmetric<float, 3> c = nav::predicted_block(p, ahead, first);
     const std::array<float, 3> s{base::sqrt(c(0, 0)), base::sqrt(c(1, 1)), base::sqrt(c(2, 2))};
@@ -100,7 +100,7 @@ struct InertialEstimate {
   }
 };
 
-/// What an attitude estimator has: the present, and what of it is believed.
+/// Output of an attitude estimator: the attitude at the present, and which parts of it are valid.
 struct AttitudeEstimate {
   filter::Quaternion q_nb;
   bool valid = false;            ///< tilt, at least

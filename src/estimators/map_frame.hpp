@@ -61,7 +61,7 @@ inline constexpr std::size_t kMapCapacity = 64;
 struct MapFrame {
   sensor::OriginSource origin = sensor::OriginSource::kNone;
   nav::LocalFrame frame;
-  const LandmarkMap<kMapCapacity>* map = nullptr;  ///< of a robot with an estimator that takes landmarks
+  const LandmarkMap<kMapCapacity>* map = nullptr;  ///< map for estimators that take landmarks; null: none does
 };
 
 }  // namespace tetap::estimators

@@ -10,7 +10,7 @@
 
 namespace tetap::estimators {
 
-/// What became of one sensor's samples.
+/// Fates of one sensor's samples.
 struct SensorStatistics {
   sensor::Sensor sensor = sensor::Sensor::kNotAvailable;  ///< not available: the entry is free
   std::uint8_t instance = 0;

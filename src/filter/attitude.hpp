@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Attitude from gyroscope, accelerometer and, where there is one, magnetometer: a complementary filter whose slow part
-// is a low-pass of the accelerometer in axes that hardly turn, so that motion averages out before it is believed
+// is a low-pass of the accelerometer in axes that hardly turn, so that motion averages out before it counts
 // (Laidig & Seel 2023, Information Fusion 91; measured facts and equations, own design). The gyroscope turns q_lb; the
 // low-passed accelerometer, carried in the level axes l, turns it back to level; heading is a separate angle from l to
 // n (east, north, up); the bias is estimated beside. Time is an argument; every sample may have its own interval.
@@ -21,7 +21,7 @@ class Attitude {
   explicit Attitude(const AttitudeOptions& options) : o_(options), bias_(options), heading_(options) {}
 
   /// A sample of both that were constant over the last dt_s. kRefused: no numbers, or no time, and nothing has changed;
-  /// kAccelerometerRefused: clipped (`force_usable` false says so of a mean that hides it) or in free fall, the
+  /// kAccelerometerRefused: clipped (`force_usable` false stands for that in a mean that hides it) or in free fall, the
   /// gyroscope alone was used.
   [[nodiscard]] AttitudeVerdict step(const Vector3& w_b_radps, const Vector3& f_b_mps2, float dt_s,
                                      bool force_usable = true) {
@@ -111,7 +111,7 @@ class Attitude {
     } else if (!off_) {
       held_s_ = held_s_ > dt_s ? held_s_ - dt_s : 0.0F;
     }
-    // What is turned back at the start and after a disturbance is not the bias.
+    // Corrections at the start and after a disturbance are not the bias.
     calm_s_ = off_ || share > 0.0F ? 0.0F : calm_s_ < o_.tau_inclination_s ? calm_s_ + dt_s : calm_s_;
     bias_.step(o_, r, {.x_rad = x, .y_rad = y, .usable = calm_s_ >= o_.tau_inclination_s, .average_share = share},
                rest_, dt_s);

@@ -46,7 +46,7 @@ class GyroscopeBias {
         rest_(square(square(o.bias_rest_sigma_radps)) / walk_),
         limit_(o.bias_limit_radps) {}
 
-  /// What the levelling did in a step: how far it turned the attitude about the horizontal axes of n.
+  /// Levelling of one step: turn of the attitude about the horizontal axes of n.
   struct Levelling {
     float x_rad, y_rad;
     bool usable;          ///< neither limited nor held
@@ -75,7 +75,7 @@ class GyroscopeBias {
   }
 
   [[nodiscard]] const Vector3& value() const { return bias_; }
-  /// Of the axis known worst.
+  /// 1 sigma of the axis known worst.
   [[nodiscard]] float sigma_radps() const { return base::sqrt(base::max(p_(0, 0), base::max(p_(1, 1), p_(2, 2)))); }
 
  private:

@@ -18,16 +18,16 @@ class MagneticHeading {
         tan_dip_(base::sin(o.field_dip_rad) / base::cos(o.field_dip_rad)),
         declination_(base::sincos(o.declination_rad)) {}
 
-  /// m_l: the field in axes that are level, heading free. turning: the body moves enough to tell a field from a magnet.
+  /// m_l: the field in axes that are level, heading free. turning: the body moves enough to part a field from a magnet.
   void step(const AttitudeOptions& o, const Vector3& m_l, bool turning, float dt_s) {
     const float h2 = m_l(0) * m_l(0) + m_l(1) * m_l(1);
     const float horizontal = base::sqrt(h2);
     if (!(horizontal > 0.0F)) return;
-    // Strength and dip say nothing while the level is still being found.
+    // Strength and dip are not compared while the level is still being found.
     if (average_s_ >= kSettled_s || !started_) check_field(o, {horizontal, m_l(2)}, turning, dt_s);
     const float gain = weight(o, dt_s);
     if (!(gain > 0.0F)) return;
-    // Cosine and sine of the turn that brings the field to where the declination says, by the half-angle formula
+    // Cosine and sine of the turn that brings the field to the declination's direction, by the half-angle formula
     // t = tan(turn/2): a share of a turn is that share of t, exact for all of it and for small ones.
     const float c = half_.cos * half_.cos - half_.sin * half_.sin;
     const float s = 2.0F * half_.cos * half_.sin;
@@ -42,7 +42,7 @@ class MagneticHeading {
     turn(gain * half_tan);
   }
 
-  /// What the gyroscope carried is lost: a mean over the samples again, as if it had begun age_s ago.
+  /// The heading that the gyroscope carried is lost: a mean over the samples again, as if begun age_s ago.
   void average_anew(float age_s) {
     average_s_ = age_s;
     rejected_s_ = undisturbed_s_ = 0.0F;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The numbers of the attitude filter. Defaults are those published with VQF (Laidig & Seel 2023, Information Fusion 91,
 // "VQF: Highly accurate IMU orientation estimation with bias estimation and magnetic disturbance rejection", table 1)
-// where that filter has the same parameter; the rest says where it comes from.
+// where that filter has the same parameter; each of the rest names its source.
 #pragma once
 
 namespace tetap::filter {
@@ -13,10 +13,10 @@ struct AttitudeOptions {
   float tau_inclination_s = 3.0F;
   /// A reading at the end of the sensor's range is not a measurement: 16 g less 2 %.
   float accelerometer_limit_mps2 = 153.0F;
-  /// The low-passed vertical moves by motion that averages out and by gyroscope bias. What asks for faster turns than
-  /// this is neither and is followed no faster ...
+  /// Limit of the levelling's turn rate, for inclination_hold_s at most. Motion that averages out and gyroscope bias
+  /// turn the low-passed vertical more slowly.
   float inclination_limit_radps = 3.0F * kDegree;
-  /// ... and not at all when that has left it this far off, but for a time; then it is believed.
+  /// Tilt between the two verticals beyond which levelling stops altogether, for inclination_hold_s at most.
   float inclination_reject_rad = 3.0F * kDegree;
   float inclination_hold_s = 10.0F;
   /// A gyroscope at the end of its range (2000 degrees/s less 2 %) has lost the attitude: the mean over the slow
@@ -31,7 +31,7 @@ struct AttitudeOptions {
   float bias_limit_radps = 2.0F * kDegree;
   float bias_motion_sigma_radps = 0.1F * kDegree;  ///< reached in steady state by motion alone, by rest alone
   float bias_rest_sigma_radps = 0.03F * kDegree;
-  /// How much less a sensor in motion says about its bias about the vertical: a leak to what is observed.
+  /// Weight of a sensor in motion for its bias about the vertical: a leak to what is observed.
   float bias_vertical_weight = 1e-4F;
 
   // Rest.

@@ -7,11 +7,11 @@
 
 namespace tetap::filter {
 
-/// The least eigenvalue that the correlations may have: some thirty roundings. Less cannot be told from nothing.
+/// The least eigenvalue that the correlations may have: some thirty roundings. Less is no different from zero.
 inline constexpr float kLeastEigenvalue = 2e-6F;
 
 /// P less that share of its diagonal has a factor U^T D U. (That it has one is exact for a matrix next to P, by some
-/// roundings: Higham 2002, thm. 10.3. The size of a pivot alone would say little.) False for NaN and for a variance
+/// roundings: Higham 2002, thm. 10.3. The size of a pivot alone would prove little.) False for NaN and for a variance
 /// that is zero or below.
 template <class Scalar, int N>
 [[nodiscard]] constexpr bool well_conditioned(const Symmetric<Scalar, N>& p) {

@@ -29,7 +29,7 @@ struct GridKernel {
   }
 };
 
-/// What moves a pose on the grid; on a line or a plane without headings, along the first axis.
+/// Motion of a pose on the grid; on a line or a plane without headings, along the first axis.
 struct GridMotion {
   float forward_m = 0;
   float turn_rad = 0;

@@ -13,7 +13,7 @@ class Mahony {
   float kp = 0.74F, ki = 0.0012F;
 
   /// One step with gyroscope and accelerometer. Free fall leaves the gyroscope alone to turn. False, and nothing has
-  /// changed, for what no sensor says and for no time.
+  /// changed, for values that no sensor gives and for no time.
   bool step(const Vector3& w_b_radps, const Vector3& f_b, float dt_s) {
     const float f2 = dot(f_b, f_b);
     if (!sane(w_b_radps, f2, dt_s)) return false;

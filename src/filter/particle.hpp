@@ -127,7 +127,7 @@ class Particles {
     return numerator * numerator / denominator;
   }
 
-  /// `wanted` particles (1 to kMost) of equal weight, each in expectation as often as its weight says.
+  /// `wanted` particles (1 to kMost) of equal weight, each in expectation in proportion to its weight.
   constexpr void resample(Resampling scheme, std::size_t wanted) {
     ++epoch_;
     wanted = wanted < 1 ? 1 : wanted > kMost ? kMost : wanted;

@@ -14,7 +14,7 @@
 
 namespace tetap::filter {
 
-/// What a draw is for: the last word of the counter, so that no two purposes share a number.
+/// Purpose of a draw: the last word of the counter, so that no two purposes share a number.
 enum class DrawFor : std::uint32_t { kMotion, kStart, kInjection, kResampling };
 
 namespace detail {
@@ -119,7 +119,7 @@ template <int kNormals>
   return normals;
 }
 
-/// What a particle is made from: random words and normal numbers of its own, for a purpose other than motion.
+/// Random numbers of one particle: words and normal numbers of its own, for a purpose other than motion.
 struct Draw {
   base::PhiloxCounter words;
   std::uint32_t epoch = 0;

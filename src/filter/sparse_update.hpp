@@ -9,14 +9,14 @@
 
 namespace tetap::filter {
 
-/// A measurement model that says that the first kDimension columns of its Jacobian are the identity. If it has more,
-/// has_rest() tells whether they are other than zero this time.
+/// A measurement model that declares the first kDimension columns of its Jacobian to be the identity. If it has more,
+/// has_rest() is true where they are other than zero this time.
 template <class Measurement>
 concept Direct = requires {
   requires Measurement::kDirect;
 };
 
-/// What remains of a variance is at least noise over S of it; below this share P is left with few right digits.
+/// Share of a variance that an update leaves (at least noise over S): below it P has few right digits.
 inline constexpr float kSharp = 1e-3F;
 
 template <class Scalar, int N, int M>

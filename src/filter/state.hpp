@@ -17,7 +17,7 @@ concept State = requires(const S& x, const Vector<typename S::Scalar, S::kErrors
   { x.minus(x) } -> std::same_as<Vector<typename S::Scalar, S::kErrors>>;
 };
 
-/// What a motion model gives when asked for everything at once (step()), and a measurement model (linearised()): for
+/// Result of a motion model that is asked for everything at once (step()), as linearised() of a measurement model: for
 /// models whose parts share work, trigonometry mostly. The filter asks for the whole where a model has it.
 template <class S>
 struct Step {

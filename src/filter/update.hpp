@@ -20,7 +20,7 @@ namespace tetap::filter {
 
 enum class Verdict : std::uint8_t { kAccepted, kRejected, kSingular, kNotFinite };
 
-/// What a measurement said and what became of it.
+/// Innovation of a measurement and its verdict.
 template <class Scalar, int M>
 struct Innovation {
   Vector<Scalar, M> nu = Vector<Scalar, M>::Zero();  ///< measured minus predicted, units of the measurement

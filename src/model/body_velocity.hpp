@@ -14,7 +14,7 @@ struct BodyVelocity {
   filter::Matrix<float, 3, 9> h;
 
   /// `moves` false: the velocity is not known from none, so the attitude shows in nothing. Else an hour of standstill
-  /// would tell a heading: by Jacobians of the velocity's noise.
+  /// would show a heading: by Jacobians of the velocity's noise.
   BodyVelocity(const nav::InsState& at, const nav::Vector3& gyro_b_radps, const nav::Vector3& lever_b_m, bool moves) {
     const nav::Matrix3 r_bn = at.q_nb.matrix().transpose();
     v_b_mps = r_bn * at.v_n_mps + nav::cross(gyro_b_radps - at.b_g_radps, lever_b_m);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The field a magnetometer shows points to magnetic north: its horizontal direction only, so that neither strength nor
-// dip of the field need be known. A wrong tilt turns the dipping field, and H says so.
+// dip of the field need be known. A wrong tilt turns the dipping field, and H contains that.
 #pragma once
 
 #include "model/direction.hpp"

@@ -19,7 +19,7 @@ struct WheelSpeed {
   float sigma_vertical_mps = 0;
   nav::Vector3 axle_b_m = nav::Vector3::Zero();      ///< the middle of the axle that does not steer
   nav::Vector3 gyro_b_radps = nav::Vector3::Zero();  ///< as the sensor shows it
-  bool moves = true;                                 ///< beyond doubt: then its direction tells attitude
+  bool moves = true;                                 ///< certain motion: then its direction shows attitude
 
   [[nodiscard]] filter::Vector<float, 3> predict(const nav::InsState& at) const { return linearised(at).z_hat; }
   [[nodiscard]] filter::Vector<float, 3> residual(const filter::Vector<float, 3>& z_hat) const {
@@ -44,7 +44,7 @@ struct NonHolonomic {
   float sigma_vertical_mps = 0;
   nav::Vector3 axle_b_m = nav::Vector3::Zero();
   nav::Vector3 gyro_b_radps = nav::Vector3::Zero();  ///< as the sensor shows it
-  bool moves = true;                                 ///< beyond doubt: then its direction tells attitude
+  bool moves = true;                                 ///< certain motion: then its direction shows attitude
 
   [[nodiscard]] filter::Vector<float, 2> predict(const nav::InsState& at) const { return linearised(at).z_hat; }
   [[nodiscard]] filter::Vector<float, 2> residual(const filter::Vector<float, 2>& z_hat) const { return -z_hat; }

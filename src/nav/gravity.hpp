@@ -22,8 +22,8 @@ namespace tetap::nav {
          (1.0 - 2.0 * (1.0 + base::kFlattening + kCentrifugal - 2.0 * base::kFlattening * s2) * up + 3.0 * up * up);
 }
 
-/// What the Earth does to a body at rest on it, in the local plane. Over 100 km the plumb line turns by 16 mrad against
-/// the plane; transport rate and that turn are left to the tilt states.
+/// Gravity and turn of the Earth on a body at rest, in the local plane. Over 100 km the plumb line turns by 16 mrad
+/// against the plane; transport rate and that turn are left to the tilt states.
 struct Earth {
   float gravity_mps2 = 9.80665F;
   Vector3 rate_n_radps = Vector3::Zero();  ///< zero: not modelled

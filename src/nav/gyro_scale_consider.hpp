@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a gyroscope whose scale is not exact makes of turns about the vertical, where nothing levels it.
+// Heading error by a gyroscope's scale error in turns about the vertical, where nothing levels the gyroscope.
 #pragma once
 
 #include "base/math.hpp"
@@ -7,7 +7,7 @@
 namespace tetap::nav {
 
 /// The heading is wrong by the scale's error times the angle turned: back and forth that comes to nothing, round and
-/// round it adds up, and what a measurement told of the heading on the way is told. The scale is considered, not
+/// round it adds up, less what measurements of the heading took off on the way. The scale is considered, not
 /// estimated (Schmidt 1966; Simon 2006, sec. 10.3): kept is only its covariance with the heading. A way back makes the
 /// heading better known again; P is not made smaller for that (its other correlations would not fit): the next turns
 /// are free until it is used up.
@@ -25,7 +25,7 @@ class GyroScaleConsider {
     waits_rad_ = 0;
     return more_rad2 > 0.0F ? scale * scale * more_rad2 : 0.0F;
   }
-  /// The same for a turn that has not been told yet, with what waits.
+  /// The same for a turn that is not added yet, with the turn that waits.
   [[nodiscard]] float would_add(float by_rad, float scale) const {
     const float more_rad2 = net_rad2(waits_rad_ + by_rad);
     return more_rad2 > 0.0F ? scale * scale * more_rad2 : 0.0F;

@@ -21,10 +21,10 @@ class ImuGather {
     sum_.dt += next.dt;
   }
   [[nodiscard]] bool empty() const { return sum_.dt.us == 0; }
-  /// It has to be taken before the next one is added.
+  /// The sum has to be taken before the next increment is added.
   [[nodiscard]] bool full() const { return sum_.dtheta_b_rad.squaredNorm() > kMost_rad * kMost_rad; }
   [[nodiscard]] const ImuIncrement& sum() const { return sum_; }
-  /// What was gathered; empty afterwards.
+  /// Gives the sum and leaves none.
   [[nodiscard]] ImuIncrement take() {
     ImuIncrement all = sum_;
     sum_ = {};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What an inertial sensor says about a span of time: the rotation and the velocity gained in it, coning and sculling
+// Increment of an inertial sensor over a span of time: the rotation and the velocity gained in it, coning and sculling
 // included (Savage 1998, J. Guid. Control Dyn. 21(1) and 21(2)).
 #pragma once
 
@@ -35,13 +35,13 @@ struct ImuIncrement {
             .dv_b_mps = dv_b_mps + turned.rotate(next.dv_b_mps),
             .dt = dt + next.dt};
   }
-  /// What no robot does is refused, so that the state stays finite whatever comes: 100 rad/s, 1000 m/s^2 (norms), 0.2
-  /// s.
+  /// Limits beyond any robot, so that the state stays finite whatever comes: 100 rad/s, 1000 m/s^2 (norms) and an
+  /// interval of 0.2 s.
   [[nodiscard]] ImuVerdict check() const {
     if (dt.us <= 0 || dt > kLongest) return ImuVerdict::kBadInterval;
     const float dt_s = base::seconds(dt);
     const float angle = 100.0F * dt_s, speed = 1000.0F * dt_s;
-    // Of the norms, so that the axes in which they are told do not matter; false for NaN.
+    // Norms are compared, so that the choice of axes has no effect; false for NaN.
     if (dtheta_b_rad.squaredNorm() < angle * angle && dv_b_mps.squaredNorm() < speed * speed)
       return ImuVerdict::kAccepted;
     return is_finite(dtheta_b_rad) && is_finite(dv_b_mps) ? ImuVerdict::kTooFast : ImuVerdict::kNotFinite;

@@ -91,8 +91,8 @@ class Ins {
     return step;
   }
 
-  /// Somebody said where it is in the plane (1 sigma per axis, metres): that is no longer correlated with anything, all
-  /// else that it knows stays.
+  /// Sets the position in the plane (1 sigma per axis, metres), which is then correlated with nothing; all other
+  /// states stay.
   void place(const base::Anchored& east, const base::Anchored& north, float sigma_m) {
     x.x = east, x.y = north;
     for (const int i : {InsState::kPosition, InsState::kPosition + 1}) reset(i, sigma_m * sigma_m);
@@ -117,7 +117,7 @@ class Ins {
     accel_n_mps2 = Vector3::Zero();
     condition(p, watch_);
   }
-  /// What it turned by in such a gap, if something else shows it; in the navigation frame.
+  /// Turn of the body in such a gap, if something else shows it; in the navigation frame.
   void turn_without_imu(const Quaternion& turn) {
     x.q_nb = (turn * x.q_nb).renormalised();
     const Vector3 v_n_mps = turn.rotate(x.v_n_mps);
@@ -229,7 +229,7 @@ class Ins {
                                         result);
     }
     if (result.innovation.verdict != filter::Verdict::kAccepted) return result.innovation;
-    // What tells only of biases leaves what the scale has done to the heading; what is measured in the body shows none.
+    // Measurements of biases alone leave the scale's share in the heading; measurements in the body show no heading.
     constexpr bool kTellsHeading = std::any_of(Measurement::kTouches.begin(), Measurement::kTouches.end(),
                                                [](int touched) { return touched < InsState::kAccelBias; });
     constexpr bool kInBody = requires { measurement.moves; };
@@ -255,17 +255,18 @@ class Ins {
     return true;
   }
   static constexpr float kMostSpeed_mps = 1000.0F;
-  /// Of less the tilt does not turn, rounding is small, it is no angle.
+  /// Turns below kLeastTurn_rad leave the tilt; below kSmallTurn_rad rounding is small; above kMostTurn_rad is no
+  /// angle.
   static constexpr float kLeastTurn_rad = 5e-4F, kSmallTurn_rad = 0.05F, kMostTurn_rad = 10.0F;
   static constexpr std::int64_t kGapStep_us = 100'000, kMostGap_us = 60'000'000;
   static constexpr float kGapStep_s = 0.1F;
 
-  /// What the state was moved by since the covariance was.
+  /// Motion of the state since the covariance was last predicted.
   struct Pending {
     float dt_s = 0;
     Vector3 dv_n_mps = Vector3::Zero();
     Matrix3 r_dt = Matrix3::Zero();
-    float shown_rad = 0;  ///< about the vertical, by a gyroscope with its bias
+    float shown_rad = 0;  ///< turn about the vertical, by a gyroscope with its bias
   };
 
   [[nodiscard]] float pending_turn_rad() const { return pending_.shown_rad - pending_.r_dt.row(2).dot(x.b_g_radps); }
@@ -288,15 +289,15 @@ class Ins {
             .keep_b_g = keep(noise.gyro_bias_time_s)};
   }
 
-  /// What is measured in the body shows no heading: turned as a whole, the robot's way looks the same. The filter sees
-  /// it so as long as its errors of v move with v, by all of it: by the IMU, and by whatever measurements make of it
+  /// Measurements in the body show no heading: turned as a whole, the robot's way looks the same. The filter sees it
+  /// so as long as its errors of v move with v, by all of it: by the IMU, and by whatever measurements make of it
   /// (the error of an invariant filter: Barrau & Bonnabel 2017; the rule: Huang, Mourikis, Roumeliotis 2010). Not by a
   /// leap: that is more than float can carry through P. Implements docs/explanation/equations.md (14).
   void move_errors(const Vector3& dv_n_mps) {
     if (dv_n_mps.squaredNorm() < kMostLeap_mps * kMostLeap_mps) pending_.dv_n_mps += dv_n_mps;
   }
 
-  /// Sensor noise taken for acceleration would let the filter believe that it sees its heading at standstill: v gains
+  /// Sensor noise taken for acceleration would let the filter see its heading at standstill: v gains
   /// theta x (dv + noise), and every noisy sample looks like a known push whose direction was then observed. The
   /// horizontal part of dv in F shrinks by the share of its energy that noise explains (James & Stein 1961). Not where
   /// v is held in the body: there that noise is taken back, and of a gentle curve every sample alone passes for noise.
@@ -371,13 +372,12 @@ class Ins {
     p(kEast, kNorth) = (c2 - s2) * en + sc * (ee - nn);
   }
 
-  /// What F leaves out of a tilt that is off: what was levelled by an accelerometer leans by what that errs, and to
-  /// second order that is g/2 (theta_x^2 + theta_y^2) upward, for as long as it leans, and passes for bias. Its mean
-  /// square, g^2 / 2 (P_xx + P_yy)^2 where both axes are alike, comes in every 1.5 s (chosen on simulated seeds: the
-  /// filter forgets about as fast as it would learn it), while the bias's variance is below ten times that: unheard for
-  /// long, it would walk on. Without it the bias's NEES, given the other two, is 1.7 of 1 at the first standstill. Up
-  /// is the body's: where it leans far, the doubt is in the wrong axis.
-  /// Implements docs/explanation/equations.md (15).
+  /// Second-order effect of a tilt error, which F leaves out: a body levelled by an accelerometer leans by that
+  /// sensor's error, and specific force of g/2 (theta_x^2 + theta_y^2) upward passes for bias for as long as the lean
+  /// lasts. The mean square, g^2 / 2 (P_xx + P_yy)^2 where both axes are alike, is added every 1.5 s (chosen on
+  /// simulated seeds: the filter forgets about as fast as it would learn the lean). Above ten times that nothing is
+  /// added, so that a bias that is long unobserved does not walk on. Up is the body's: where the body leans far, the
+  /// variance is added in the wrong axis. Implements docs/explanation/equations.md (15).
   void doubt_bias_up(float dt_s) {
     constexpr float kMost_rad2 = 0.02F;  // beyond no tilt is small
     constexpr float kOff_mps2 = 6.934F;  // sqrt(g^2 / 2), per rad^2
@@ -392,7 +392,7 @@ class Ins {
   Pending pending_{};
   GyroScaleConsider turned_{};
   InsFactor watch_{};
-  /// So long yet what moves it counts in full, in 0.1 ms: wheels that slip for a while are heard again.
+  /// Time for which held_ stays after a measurement in the body while moving, in 0.1 ms: wheels may slip for a while.
   static constexpr float kHeldPerS = 10'000.0F, kMostLeap_mps = 30;
   static constexpr std::uint16_t kHeld = 50'000;
   std::uint16_t held_ = 0;

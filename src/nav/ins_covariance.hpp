@@ -89,7 +89,7 @@ inline void predict_covariance(filter::Symmetric<Scalar, InsState::kErrors>& p, 
 inline constexpr std::array<float, 5> kInsMostSigma{1e6F, 1e4F, 4.0F, 10.0F, 1.0F};
 
 /// The factor of P less a share of its diagonal, made element by element: it exists when no eigenvalue of the
-/// correlations is below that share, which is what float can tell from nothing; and no variance is above its limit. A
+/// correlations is below that share, the least that float separates from zero; and no variance is above its limit. A
 /// copy is factored in place, so that the work can be spread over many steps.
 class InsFactor {
  public:
@@ -115,7 +115,7 @@ class InsFactor {
         continue;
       }
       const float most = kInsMostSigma[static_cast<std::size_t>(row_ / 3)];
-      // What is at its limit grows by a digit until the next round.
+      // Variances at their limit grow by a digit until the next round.
       if (!(pivot_ > 1e-7F * l_(row_, row_)) || l_(row_, row_) > 1.001F * most * most) return Progress::kBad;
       l_(row_, row_) = 1.0F / base::sqrt(pivot_);
       column_ = 0;
@@ -149,8 +149,8 @@ inline bool condition(filter::Symmetric<float, InsState::kErrors>& p, InsFactor&
     for (int j = 0; j < kN; ++j) p(i, j) = scale > 0.0F ? p(i, j) * scale : 0.0F;
     p(i, i) = small ? kLeast : most * most;
   }
-  // Over the second that may pass until the watch has seen all of P, each group takes on the doubt of the one that
-  // feeds it; with much less of its own it would end with none that float can tell from rounding.
+  // Over the second that may pass until the watch has seen all of P, each group takes on variance of the one that
+  // feeds it; with much less of its own it would end with none that float separates from rounding.
   constexpr float kOwn = 1e-6F, kGravity2 = 100.0F;
   for (int i = 0; i < 3; ++i) {
     const auto at_least = [&p](int of, float variance) {

@@ -12,7 +12,7 @@ namespace tetap::nav {
 
 namespace detail {
 
-/// Which errors make up error i after the step: those of row i of F.
+/// Errors that make up error i after the step: those of row i of F.
 struct InsTerms {
   std::array<int, 6> of{};
   int count = 0;
@@ -25,7 +25,7 @@ constexpr InsTerms ins_terms(int i) {
   if (i < kA) return {.of = {i, kG, kG + 1, kG + 2}, .count = 4};
   return {.of = {i}, .count = 1};
 }
-/// And by how much the k-th of them.
+/// Factor of the k-th error in error i: an entry of F.
 [[gnu::always_inline]] inline float ins_gain(int i, int k, const InsCovarianceStep<float>& step) {
   const int axis = i % 3, next = (axis + 1) % 3, last = (axis + 2) % 3;
   if (k == 0) {

@@ -9,15 +9,15 @@
 
 namespace tetap::nav {
 
-/// What a step of the state leaves for the covariance.
+/// Quantities of a step of the state that the covariance needs.
 struct StrapdownStep {
   float dt_s = 0;
   Vector3 dv_n_mps = Vector3::Zero();  ///< R (dv - b_a dt): specific force, gravity not in it
   Matrix3 r_nb = Matrix3::Identity();  ///< at the begin
 };
 
-/// Moves x by the increment: docs/explanation/equations.md (5) to (7). Velocity and attitude are exact for what the
-/// increment says, the position is their trapezoid.
+/// Moves x by the increment: docs/explanation/equations.md (5) to (7). Velocity and attitude are exact for the
+/// increment, the position is their trapezoid.
 inline StrapdownStep strapdown(InsState& x, const ImuIncrement& imu, const Earth& earth) {
   StrapdownStep step{.dt_s = base::seconds(imu.dt), .r_nb = x.q_nb.matrix()};
   const float dt_s = step.dt_s;

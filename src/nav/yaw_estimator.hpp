@@ -14,7 +14,7 @@
 
 namespace tetap::nav {
 
-/// What disturbs it, one sigma per axis.
+/// Noise of the yaw estimator's inputs, one sigma per axis.
 struct YawFinderNoise {
   float accel_mps2_rthz = 0.03F;  ///< white, vibration included, m/s^2/sqrt(Hz)
   float gyro_radps_rthz = 3e-4F;  ///< rad/s/sqrt(Hz)
@@ -32,7 +32,7 @@ class YawEstimator {
 
   YawEstimator() { restart(); }
 
-  /// Nothing is known; the first increment says roughly where up is.
+  /// Nothing is known; the first increment shows roughly where up is.
   void restart() {
     up_b_ = Vector3::Zero();
     begin(kFirstTilt_rad);
@@ -54,7 +54,7 @@ class YawEstimator {
   void fuse_forward_speed(float mps, float sigma_mps, Complex axle_b_m = {});
 
   [[nodiscard]] float yaw_rad() const;
-  /// Of the yaw; that of a heading that may be any is pi / sqrt(3).
+  /// 1 sigma of the yaw; pi / sqrt(3) where any heading is possible.
   [[nodiscard]] float sigma_rad() const;
   /// Sigma below noise.ready_rad after five fixes; sigma is small only while phasor and model agree.
   [[nodiscard]] bool ready() const { return fixes_ >= kFixes && sigma_rad() < noise.ready_rad; }
@@ -63,9 +63,9 @@ class YawEstimator {
     return base::abs(base::wrap_angle(yaw_rad() - yaw_rad_other));
   }
   [[nodiscard]] float against(float yaw_rad_other, float sigma_rad_other) const;
-  /// Of the gyroscope, about the vertical.
+  /// Bias of the gyroscope about the vertical.
   [[nodiscard]] float bias_radps() const { return bias_b_radps_.dot(up_b_); }
-  /// How often it gave up what it believed, because GNSS or the length of its phasor denied it.
+  /// Number of restarts because GNSS or the length of the phasor contradicted the state.
   [[nodiscard]] std::uint32_t restarts() const { return restarts_; }
 
   template <class Sink>
@@ -103,10 +103,10 @@ class YawEstimator {
   static constexpr float kKeptTilt_rad = 0.1F;    ///< tilt of the own level after giving up
   static constexpr float kWheelShare = 0.05F;     ///< one sigma of a speed, beside the caller's
   static constexpr std::uint8_t kMostRefused = 5, kFixes = 5;
-  // What walks, per axis and root of a second: the level's error, the biases.
+  // Random walks, per axis and root of a second: the level's error, the biases.
   static constexpr float kWander_mps2_rts = 0.01F, kBiasWalk_radps_rts = 1e-5F, kAccelWalk_mps2_rts = 2e-4F;
 
-  /// Since the filter's last prediction, along the axes that the gyroscope's yaw turned from n by yaw - arg z.
+  /// Motion since the filter's last prediction, in axes that the gyroscope's yaw turned from n by yaw - arg z.
   struct Pending {
     Complex v, p;    ///< specific force integrated once and twice
     Complex turned;  ///< integral of the heading

@@ -91,7 +91,7 @@ inline void YawEstimator::restart(const Quaternion& q) {
   filter_.add(kV, pending_.turned, kA);
   filter_.add(kW, pending_.v * (1.0F / kLean_s), kZ);  // what the leaning level takes off the specific force
   filter_.add(kW, pending_.turned, kR);
-  // What belongs to the body turns with z: per unit of z, the best linear guess.
+  // States in the body's axes turn with z: per unit of z, the best linear guess.
   std::array<Complex, kStates> with_z{};
   const float inverse = 1.0F / (filter_.value(kZ).norm2() + filter_.variance(kZ));
   for (const int k : {kZ, kW, kR, kA, kU})
@@ -99,8 +99,8 @@ inline void YawEstimator::restart(const Quaternion& q) {
         (filter_.value(k) * filter_.value(kZ).conjugate() + filter_.covariance(k, kZ)) * inverse;
   for (const int k : {kR, kA}) filter_.add(k, with_z[static_cast<std::size_t>(k)] * Complex{0.0F, -t}, kU);
   filter_.add(kZ, {0.0F, -t}, kU);
-  // Sensor noise taken for motion is a regressor with errors: it would show the heading at standstill. As much as it
-  // seems to tell, noise_v / S a step, is taken back, and a little for what is not modelled: from the heading with all
+  // Sensor noise taken for motion is a regressor with errors: it would show the heading at standstill. Its apparent
+  // information, noise_v / S a step, is taken back, and a little for what is not modelled: from the heading with all
   // that hangs on it, for only their common phase is what nothing else shows.
   const float variance_z = filter_.variance(kZ);
   filter_.spread(with_z, square(variance_z) * (0.25F * noise_v / filter_.variance(kV) + t / kForget_s));
@@ -201,7 +201,7 @@ inline void YawEstimator::fuse_forward_speed(float mps, float sigma_mps, Complex
 [[gnu::noinline]] inline float YawEstimator::sigma_rad() const {
   constexpr float kAny2 = 3.2898681F;  // pi^2 / 3
   const float length = base::sqrt(filter_.value(kZ).norm2());
-  // What the length lacks of one beyond two sigma is an error that the covariance does not know of.
+  // A length below one by more than two sigma is an error that the covariance does not contain.
   const float lacks2 = square(1.0F - length), variance = filter_.variance(kZ);
   const float extra = lacks2 > 2.0F * variance ? 2.0F * (lacks2 - 2.0F * variance) : 0.0F;
   const float inverse = (variance + extra) / (2.0F * length + 1e-6F);  // 1 / kappa
@@ -221,7 +221,7 @@ inline void YawEstimator::fuse_forward_speed(float mps, float sigma_mps, Complex
   }
   const float length2 = filter_.value(kZ).norm2();
   const float lacks2 = square(1.0F - base::sqrt(length2)), variance = filter_.variance(kZ);
-  // Four sigma of the length, and a scale error beyond all reason: what it believes has been denied.
+  // Four sigma of the length, and a scale error beyond all reason, contradict the state.
   const bool denied = lacks2 > 8.0F * variance + 0.1F;
   if (verdict == Filter::Verdict::kSingular || denied) return give_up();
   if (gnss) {
@@ -229,7 +229,7 @@ inline void YawEstimator::fuse_forward_speed(float mps, float sigma_mps, Complex
     if (fixes_ < kFixes) ++fixes_;
   }
   if (!ready()) return;
-  // What is known is taken off at the source, so that what is left stays small.
+  // Known errors are taken off at the source, so that the rest stays small.
   const Complex inverse = filter_.value(kZ).conjugate() * (1.0F / length2);
   const Complex drift = filter_.value(kR) * inverse * (1.0F / kGravity);
   const float rest = (filter_.value(kU) * inverse).re;

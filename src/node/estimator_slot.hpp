@@ -63,7 +63,7 @@ class EstimatorSlot {
     visit(sample, [&]<class Payload>(const Payload&) { taken = kTakes<Payload>; });
     return taken;
   }
-  /// Fuses into the current state; the record is what the bus is told.
+  /// Fuses into the current state and gives the record for the bus.
   estimators::Innovation fuse(const sensor::Sample& sample, const estimators::Context& ctx) {
     return fuse_into(now_, sample, ctx);
   }
@@ -73,7 +73,7 @@ class EstimatorSlot {
   }
   /// Back to the far end of the window.
   void rewind() requires(!kDelayed) { now_ = past_; }
-  /// What is now can no longer be changed by late samples.
+  /// Makes the current state final: late samples no longer change it.
   void close() {
     if constexpr (!kDelayed) past_ = now_;
   }
@@ -115,7 +115,7 @@ class EstimatorSlot {
     e.attitude(ctx);
   }
   { return now_.attitude(ctx); }
-  /// What the estimator itself did about its state, for the status.
+  /// Last step that the estimator itself made in its state, for the status.
   [[nodiscard]] estimators::Jump jump() const {
     if constexpr (requires { now_.jump(); }) return now_.jump();
     return {};

@@ -21,8 +21,8 @@ class Firmware {
         node_(parameters, version),
         pacer_(base::Micros{parameters.loop.period_us}) {}
 
-  /// Runs the exercise on this very node, then powers it on anew. For boot: the hash says whether this core computes as
-  /// all others do.
+  /// Runs the exercise on this very node, then powers it on anew. For boot: the hash shows whether this core computes
+  /// as all others do.
   [[nodiscard]] std::uint32_t self_check(std::uint32_t epochs) {
     bus::FrameHash hash(parameters_.can_base);
     bus::FrameSink outlet(board_.can, hash);
@@ -63,7 +63,7 @@ class Firmware {
     if (const auto t = pacer_.on_sync(sync->kind, time, board_.now(), health_)) tick(*t);
   }
 
-  /// What the counter says never came, modulo 256. A repeated frame is no gap, nor is one that comes out of its order:
+  /// Counts sync frames that the counter skipped, modulo 256. A repeated frame is no gap, nor is one out of its order:
   /// its time is not later.
   void count_sync(const bus::InSync& sync) {
     const auto step = static_cast<std::uint8_t>(sync.ctr - sync_counter_);

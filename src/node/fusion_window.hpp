@@ -72,8 +72,8 @@ class FusionWindow {
   template <class OnNew, class Note>
   std::uint16_t consume(base::Micros t, const estimators::Context& ctx, OnNew&& on_new, Note&& note);
 
-  /// What was true until t leaves the window and becomes final; what a delayed estimator would rather have in the next
-  /// tick, and all that follows, then.
+  /// Samples until t leave the window and become final. A sample that a delayed estimator leaves to its next tick
+  /// stays, and all that follow it.
   template <class Note>
   void retire_until(base::Micros t, const estimators::Context& ctx, Note&& note) {
     leave_until(t, Past::kFollows, ctx, note);
@@ -136,7 +136,7 @@ template <class Note>
 Insert FusionWindow<Estimators, Capacity>::insert(const sensor::Sample& sample, const estimators::Context& ctx,
                                                   Note&& note) {
   const Insert result = timeline_.insert(sample);
-  // What is older than all of them came too late for so small a window.
+  // A sample older than all of them came too late for so small a window.
   if (result != Insert::kFull || !timeline_.consumed(0) || sample.order(timeline_[0]) < 0) return result;
   leave(timeline_[0], Past::kFollows, ctx, note);
   timeline_.drop_front(1);
@@ -214,7 +214,7 @@ std::uint16_t FusionWindow<Estimators, Capacity>::consume(base::Micros t, const 
     }
   });
   std::uint16_t not_used = 0;
-  // What is before that, everyone has.
+  // Every estimator has the samples before known().
   const bool anew = std::any_of(again.begin(), again.end(), [](bool a) { return a; });
   for (std::size_t i = anew ? 0 : timeline_.known(); i < due; ++i) {
     const bool is_new = !timeline_.consumed(i);

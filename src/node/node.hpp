@@ -46,7 +46,7 @@ class Node {
   /// Called by the inbox.
   void sample(const sensor::Sample& sample);
   void map_entry(const estimators::MapEntry& entry) { landmarks_.add(entry, counters_); }
-  /// Of two within an epoch the one with the later counter stands, whichever came first.
+  /// Start pose; of two within an epoch the one with the later counter stands, whichever came first.
   void set_pose(const estimators::SetPose& pose) {
     if (!pending_pose_ || ((pose.counter - pending_pose_->counter) & 0x0F) < 8) pending_pose_ = pose;
   }
@@ -218,13 +218,13 @@ void Node<Estimators, Capacity>::restart(base::Micros t, sensor::ResetCause caus
   if (cause == sensor::ResetCause::kPowerOn) history_.open_from(t - base::Micros{parameters_.loop.window_us});
 }
 
-/// What was consumed becomes final, and so does the time up to t: nothing from before it is fused any more.
+/// Makes consumed samples and the time up to t final: nothing from before t is fused any more.
 template <class Estimators, std::size_t Capacity>
 void Node<Estimators, Capacity>::close_window(base::Micros t) {
   history_.close_window(t, context(), noting());
 }
 
-/// The record goes out when it says something. What comes with every tick or so would drown the rest: of accepted
+/// Sends the record of a compared or refused sample. Records with every tick would crowd out the rest: of accepted
 /// wheels, magnetometers and barometers the statistics are enough.
 template <class Estimators, std::size_t Capacity>
 void Node<Estimators, Capacity>::note(std::size_t instance, const sensor::Sample& sample,
@@ -283,7 +283,7 @@ void Node<Estimators, Capacity>::find_origin(const sensor::Sample& sample) {
   map_frame_.origin = sensor::OriginSource::kFirstFix;
 }
 
-/// A broken invariant (NaN, a covariance that is none) restarts the estimators from their defined start, and says so.
+/// A broken invariant (NaN, a covariance that is none) restarts the estimators from their start, with a reset cause.
 template <class Estimators, std::size_t Capacity>
 bool Node<Estimators, Capacity>::healthy(const Estimates& estimates) {
   bool finite = true;

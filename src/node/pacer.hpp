@@ -119,8 +119,8 @@ class Pacer {
   base::Micros offset_;  ///< bus time minus board time
   base::Micros last_tick_;
   base::Micros next_tick_;
-  base::Micros last_sync_;          ///< time stated in the last Tick frame, believed or not
-  base::Micros last_sync_arrival_;  ///< board time of the last one believed
+  base::Micros last_sync_;          ///< time stated in the last Tick frame, accepted or not
+  base::Micros last_sync_arrival_;  ///< board time of the last accepted Tick frame
   std::int32_t in_a_row_ = 0;       ///< Tick frames one period apart
   std::int64_t waited_ = 0;         ///< periods that went by before hold-over began
   bool on_bus_time_ = false;        ///< the time of ticks has been the bus's before

@@ -61,8 +61,8 @@ class Timeline {
   constexpr void clear() { size_ = known_ = new_ = 0; }
   constexpr void power_on() { begin_ = size_ = known_ = new_ = 0, high_water_ = 0; }
 
-  /// Of the content, in order: a polynomial in an odd number modulo 2^32. A sample's payload is in its frames' CRC
-  /// already, so this has only to tell which samples there are.
+  /// Digest of the content, in order: a polynomial in an odd number modulo 2^32. A sample's payload is in its frames'
+  /// CRC already, so this one only has to identify the samples.
   [[nodiscard]] constexpr std::uint32_t digest() const {
     constexpr std::uint32_t kOdd = 0x01000193;
     std::uint32_t sum = static_cast<std::uint32_t>(size_);
@@ -90,13 +90,13 @@ class Timeline {
     if (i == known_) ++known_;
     if (new_ == 0) known_ = size_;
   }
-  /// So many at the front, at least, are consumed; all when all are.
+  /// Number of samples at the front that are certainly consumed; all when all are.
   [[nodiscard]] constexpr std::size_t known() const { return known_; }
   [[nodiscard]] constexpr std::size_t size() const { return size_; }
   [[nodiscard]] constexpr std::uint16_t high_water() const { return high_water_; }
 
  private:
-  /// Of the i-th, i <= Capacity.
+  /// Index in samples_ of the i-th sample, i <= Capacity.
   [[nodiscard]] constexpr std::size_t place(std::size_t i) const {
     const std::size_t at = begin_ + i;
     return at < Capacity ? at : at - Capacity;

@@ -13,7 +13,7 @@
 namespace tetap::param {
 
 namespace detail {
-/// What a flash image keeps of a row.
+/// Part of a row that a flash image keeps.
 struct Place {
   std::uint16_t offset;
   std::uint16_t size;

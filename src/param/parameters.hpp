@@ -75,7 +75,7 @@ struct GnssParameters {
   float antenna_y_b_m = 0;
   float antenna_z_b_m = 0;
   float sigma_velocity_floor_mps = 0.1F;
-  float sigma_floor_m = 0.5F;  ///< the receiver's own accuracy is not believed below this
+  float sigma_floor_m = 0.5F;  ///< lower limit of the receiver's own accuracy
   float sigma_scale = 1;       ///< times the receiver's own accuracy
   float correlation_s = 0;     ///< inertial: how long the receiver's errors last; 0: a new one with every fix
   float gate_scale = 1;
@@ -114,10 +114,10 @@ struct InertialParameters {
   std::int32_t stale_us = 100'000;  ///< without a sample for longer: bridged
   float vibration_mps2 = 4;         ///< RMS up to which the noise densities hold; beyond, they grow with it
   float vibration_radps = 0.4F;     ///< likewise
-  float calm_mps2 = 0.1F;           ///< RMS below which it may be standing, where wheels do not tell
+  float calm_mps2 = 0.1F;           ///< RMS below which the robot may stand, where no wheels show it
   float calm_radps = 0.01F;
   float still_radps = 0.03F;    ///< turning slower than this, wheels still: standing
-  float still_mps = 0.005F;     ///< 1 sigma of standing as wheels tell it,
+  float still_mps = 0.005F;     ///< 1 sigma of standing as wheels show it,
   float still_gnss_mps = 0.1F;  ///< the same for IMU and GNSS velocity
   float wheel_mps = 0.02F;      ///< 1 sigma of the wheels' speed at standstill
   float slip_share = 0.02F;     ///< growth of that with the speed
@@ -127,11 +127,11 @@ struct InertialParameters {
   std::int32_t wheels_every_us = 15'000;  ///< wheels are fused no more often: at 100 Hz every second sample
   float wheel_gate_scale = 1;
   float slip_mps = 0.15F;  ///< off by more of it and 4 sigma, for long enough, a wheel is spinning; 0: not watched
-  /// Without a wheel speed for so long, it does at least not move sideways or up, said this often; 0: it may.
+  /// Period of the constraint "no motion sideways or up" while no wheel speed comes; 0: no constraint.
   std::int32_t constrain_every_us = 0;
 };
 
-/// The magnetometer: its calibration, and what of it is believed. Field of the body = mounting * soft iron * (flux -
+/// The magnetometer: its calibration, and its limits of use. Field of the body = mounting * soft iron * (flux -
 /// hard iron), the last two in the sensor's own axes.
 struct MagneticParameters {
   std::int32_t use = 0;

@@ -12,10 +12,10 @@ namespace tetap::sensor {
 
 struct Sample {
   base::Micros stamp;
-  sensor::Sensor sensor = sensor::Sensor::kNotAvailable;  ///< says which member of the payload is there
+  sensor::Sensor sensor = sensor::Sensor::kNotAvailable;  ///< kind of sensor, and by it the member of the payload
   std::uint8_t instance = 0;
   std::uint8_t sequence = 0;
-  std::uint8_t detail = 0;  ///< tells apart what one sensor saw at one moment: the landmark
+  std::uint8_t detail = 0;  ///< separates sightings of one sensor at one moment: the landmark
   std::uint32_t bits = 0;   ///< sum of the CRC-32 of the frames it came in: stands for the payload in hashes
 
   union Payload {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What sensors say, in SI: the one form in which wired drivers, the bus and the simulated world hand data to
+// Measurements of sensors, in SI: the one form in which wired drivers, the bus and the simulated world hand data to
 // estimators. Small structs, passed by value. Frames: b = body (x forward, y left, z up).
 #pragma once
 

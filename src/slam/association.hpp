@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which sighting belongs to which landmark: nearest neighbour, and the assignment of least total cost (Kuhn 1955;
+// Data association of sightings and landmarks: nearest neighbour, and the assignment of least total cost (Kuhn 1955;
 // shortest augmenting paths: Jonker & Volgenant, Computing 38, 1987). Costs are integers, so that sums are exact and
-// equal costs are told apart by index alone: the same answer on every target.
+// equal costs are ordered by index alone: the same answer on every target.
 #pragma once
 
 #include <array>

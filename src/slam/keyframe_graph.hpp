@@ -173,7 +173,7 @@ class KeyframeGraph {
     while (k > 0 && id_[at(k)] > step) --k;
     return k;
   }
-  /// Odometry from a keyframe to a later step. Its covariance is a share of what the next keyframe's edge says.
+  /// Odometry from a keyframe to a later step. Its covariance is a share of that of the next keyframe's edge.
   [[nodiscard]] bool way(int k, std::uint32_t step, Motion& way) const {
     const std::uint32_t first = id_[at(k)];
     if (step == first) return true;

@@ -1,7 +1,8 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
 """The documentation holds: links and anchors resolve, named targets and tools exist, README and DESIGN keep their lengths, generated pages are fresh, and every
-shell line of tutorial and howto runs (a block whose fence states `sh skip: REASON` does not; `sh whole: REASON` does in the whole form, by your_own_test.py)."""
+shell line of tutorial and howto runs. What stands behind `sh` of a fence: `data: FOLDER` runs where $TETAP_DATA has it, which DIR stands for; `whole: REASON` runs in
+the whole form (form=whole; those of your_robot.md by your_own_test.py, with names of its own); `skip: REASON` is run by the test that the reason names, or by nothing."""
 import glob
 import json
 import os
@@ -20,6 +21,8 @@ from tetap.docs import figures, language, regions, words  # noqa: E402
 PROGRAMS = os.environ.get("TETAP_PROGRAMS", os.path.join(ROOT, "build/host/sim_host"))
 WORLD = os.path.join(PROGRAMS, "tetap-world")
 BUILT = os.access(WORLD, os.X_OK)
+WHOLE = os.environ.get("form") == "whole"
+DATA = os.environ.get("TETAP_DATA", os.path.join(ROOT, "..", "shared", "data"))
 MOST_WORDS, MOST_LINES, MOST_COLUMNS = 900, 200, 100
 
 
@@ -129,9 +132,26 @@ class Pages(unittest.TestCase):
 
 
     def test_sentences_are_short_and_name_their_subjects(self):
-        spoken = [page for page in pages() if page != "CHANGELOG.md" and page not in ("docs/reference/commands.md", "docs/reference/messages.md", "docs/reference/parameters.md")]
+        spoken = [page for page in pages() if page != "CHANGELOG.md" and page != "docs/reference/messages.md"]  # its words are those of config/tetap.dbc
         self.assertGreater(sum(len(list(language.sentences(read(page)))) for page in spoken), 800)
         self.assertEqual([one for page in spoken for one in language.findings(page, read(page))], [])
+
+    def test_what_was_before_stands_in_the_decisions_alone(self):
+        for page in pages():
+            if page != "CHANGELOG.md" and not page.startswith(("docs/decisions/", "docs/reference/")):
+                self.assertEqual(re.findall(r"\b(?:before the (?:vote|composition|rule)|used to|formerly|first version)\b", read(page)), [], page)
+
+    def test_the_readme_has_what_a_stranger_looks_for(self):
+        page = read("README.md")
+        self.assertEqual(re.findall(r"^!\[[^\]]+\]\((\S+)\)", page, re.M), ["sim_host/images/path.png", "docs/images/blocks.svg"])
+        parts = {part.split("\n", 1)[0]: part for part in page.split("\n## ")[1:]}
+        self.assertEqual(list(parts), ["What it needs", "Two commands", "I want to ...", "Status"])
+        for need in ("core", "flash and RAM", "sensors"):
+            self.assertIn(f"| {need} |", parts["What it needs"])
+        self.assertEqual([line.split("  ")[0] for _, lines in blocks(page) for line in lines.splitlines()], ["make sim", "make test"])
+        self.assertEqual(len(re.findall(r"^\* \[", parts["I want to ..."], re.M)), 5)
+        self.assertEqual(len(re.findall(r"^\d\. ", parts["Status"], re.M)), 5)
+        self.assertIn("](LICENSE)", page)
 
     def test_a_long_sentence_a_beginning_without_subject_and_speech_are_named(self):
         short = "The gate refuses `a b c d`. A [link of three](x.md) counts as three.\n\n| It | a cell | `code that tells` |\n\n```sh\nIt says\n```\n## What follows\n"
@@ -140,6 +160,12 @@ class Pages(unittest.TestCase):
         self.assertEqual(len(language.findings("p", "The fix is far. It is refused.")), 1)
         self.assertEqual(len(language.findings("p", "The bus says so, and the node believes it.")), 2)
         self.assertEqual(language.findings("p", "That line holds. This table has two rows. The set is that of the start."), [])
+
+    def test_every_check_leads_to_a_page(self):
+        """A refusal names its check; the page from symptom to cause has each of them, with a link."""
+        checks = {word for word, _, _ in words.enumerators(words.read(ROOT, words.SOURCE_STATE), "Check")} - {"None"}
+        rows = re.findall(r"^\| ((?:\w+(?:, )?)+) \| [^|]+ \| ([^|]*\]\([^|]*) \|$", read("docs/howto/symptoms.md").split("## Symptoms")[0], re.M)
+        self.assertEqual({word for names, _ in rows for word in names.split(", ")}, checks)
 
     def test_state_diagrams_have_the_states_of_their_sources(self):
         """Diagrams of a page, in order, against the rows of the table that is made from the sources."""
@@ -154,6 +180,8 @@ class Pages(unittest.TestCase):
             expected = [rows[source] for source in shown.get(os.path.basename(page)[:-3], [])]
             for states in diagrams:
                 self.assertLessEqual(states, set(names), page)
+            if page.endswith("/imu.md"):  # no source of its own: its input gives the states
+                expected = [set(re.findall(r"SourceState::k(\w+)", read("src/estimators/inertial/imu_input.hpp")))]
             if expected:
                 self.assertEqual(diagrams, expected, page)
 
@@ -167,6 +195,16 @@ class Generated(unittest.TestCase):
     def test_the_pages_of_the_reference_are_fresh(self):
         done = subprocess.run([os.path.join(ROOT, "tools/report/write_docs"), "--check", "--programs", PROGRAMS], capture_output=True, text=True)
         self.assertEqual(done.returncode, 0, done.stderr)
+
+    def test_the_bus_load_of_the_pages_is_that_of_the_database(self):
+        done = subprocess.run([os.path.join(ROOT, "tools/can/generate_messages"), "config/tetap.dbc", "--load"], cwd=ROOT, capture_output=True, text=True)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        load = {name: cells for name, *cells in re.findall(r"^(\w.*?\w)  +\d+ +(\d+) +([\d.]+) %", done.stdout, re.M)}
+        (frames, share), (most, full) = load["what the node sends by default"], load["every sensor on the bus, IMU at 100 Hz"]
+        page = " ".join(read("docs/validation/cost.md").split())
+        self.assertIn(f"{frames} frames/s by default, {share} % of 500 kbit/s", page)
+        self.assertIn(f"{most} frames/s, {full} % of an allowed 40 %", page)
+        self.assertIn(f"at most {frames} frames/s by default, {float(share):.0f} % of 500 kbit/s", " ".join(read("docs/tutorial/first_run.md").split()))
 
     def test_a_word_without_advice_and_advice_without_a_word_are_errors(self):
         with tempfile.TemporaryDirectory() as tree:
@@ -210,6 +248,22 @@ class Generated(unittest.TestCase):
             os.remove(os.path.join(out, "count.json"))
             self.assertEqual(figures.page(out, first), first)
 
+    def test_every_region_of_the_pages_is_known_and_named_with_its_command(self):
+        found = {}
+        for page in pages():
+            for name, body in re.findall(r"<!-- figures: (\w+) -->\n(.*?)<!-- end -->", read(page), re.S):
+                found[name] = page
+                self.assertIn(name, regions.REGIONS, page)
+                self.assertTrue(body.startswith(f"`{regions.REGIONS[name][0]}`"), f"{page}: {name}")
+        self.assertEqual(set(found), set(regions.REGIONS))
+
+    def test_a_table_of_all_cuts_stays_where_the_file_has_some(self):
+        page = "<!-- figures: nees -->\nold\n<!-- end -->\n"
+        with tempfile.TemporaryDirectory() as out:
+            with open(os.path.join(out, "inertial.json"), "w", encoding="utf-8") as file:
+                json.dump({"car": {"outages": []}, "px4": {}, "husky": {}}, file)
+            self.assertEqual(regions.fill(page, out, ""), page)
+
     def test_a_marked_table_is_made_from_its_files_and_stays_where_one_is_missing(self):
         page = "Before.\n<!-- figures: memory -->\nold\n<!-- end -->\nAfter.\n"
         with tempfile.TemporaryDirectory() as out:
@@ -235,7 +289,10 @@ class Lines(unittest.TestCase):
         os.makedirs(os.path.join(self.tree, "build/host"))
         os.symlink(PROGRAMS, os.path.join(self.tree, "build/host/sim_host"))
         # The programs are there already: packages and builds are other steps' matter.
-        for tool in ("install_packages", "build_preset"):
+        self.without("install_packages", "build_preset")
+
+    def without(self, *tools):
+        for tool in tools:
             with open(os.path.join(self.tree, "tools/run", tool), "w", encoding="utf-8") as file:
                 file.write("#!/bin/sh\n")
 
@@ -257,15 +314,42 @@ class Lines(unittest.TestCase):
                 with open(os.path.join(self.tree, "example.cpp"), "w", encoding="utf-8") as file:
                     file.write(code)
             for how, lines in blocks(text):
-                if how:
+                data = re.fullmatch(r"data: (\S+)", how)
+                if data and not os.path.isdir(os.path.join(DATA, data[1])):
+                    continue
+                if how and not data:
                     self.assertRegex(how, r"\A(skip|whole): \S.{10,}", f"{page}: why does this block not run?")
                     continue
+                if data:
+                    lines = re.sub(r"\bDIR\b", os.path.join(DATA, os.path.dirname(data[1])), lines)
                 for line in lines.splitlines():
                     with self.subTest(page=page, line=line):
                         # What its reader runs to the end is shortened, but for the drive that shows each word of the tutorial.
                         self.run_here(line, **({} if line == "make sim" else {"WORLD": "--duration 20"}))
                         ran += 1
         self.assertGreater(ran, 12)
+
+    def test_a_block_is_left_out_with_one_of_the_known_reasons_alone(self):
+        left = [(page, how) for page in pages() if page.startswith(("docs/tutorial/", "docs/howto/")) for how, _ in blocks(read(page)) if how.startswith("skip: ")]
+        self.assertEqual([page for page, _ in left], ["docs/tutorial/first_run.md"] * 2, left)
+        for _, how in left:
+            for test in re.findall(r"test/\S+", how):
+                self.assertTrue(os.path.exists(os.path.join(ROOT, test)), how)
+
+    @unittest.skipUnless(WHOLE, "builds: whole form alone")
+    def test_every_line_that_builds_runs_in_the_whole_form(self):
+        shutil.copy(os.path.join(ROOT, "tools/run/build_preset"), os.path.join(self.tree, "tools/run/build_preset"))
+        shutil.rmtree(os.path.join(self.tree, "build"))
+        ran = 0
+        for page in pages():
+            if not page.startswith(("docs/tutorial/", "docs/howto/")) or page == "docs/tutorial/your_robot.md":
+                continue
+            for how, lines in blocks(read(page)):
+                for line in lines.splitlines() if how.startswith("whole: ") else ():
+                    with self.subTest(page=page, line=line):
+                        self.run_here(line)
+                        ran += 1
+        self.assertGreater(ran, 0)
 
     def test_the_example_compiles_with_both_compilers_and_prints_what_stands_below_it(self):
         text = read("docs/tutorial/your_filter.md")

@@ -51,9 +51,23 @@ class Tables(unittest.TestCase):
         rows = [row(60, 60, True, [0, 5]), row(160, 60, True, [1, 0]), row(60, 60, False, [2, 0]), row(160, 60, False, [0, 1])]
         lines = list(inertial_tables.outage_table(rows))
         self.assertEqual(len({one.count("|") for one in lines}), 1)
-        self.assertIn("| 60 s * | 600 m | **5.0 / 3.4 m, 25.00** | 2.0 / 6.9 m, 1.00 |", lines)
+        self.assertIn("| 60 s \\* | 600 m | **5.0 / 3.4 m, 25.00** | 2.0 / 6.9 m, 1.00 |", lines)
         self.assertIn("| 160 s | 600 m | 1.0 / 6.9 m, 0.25 | 1.0 / 3.4 m, 1.00 |", lines)
         self.assertIn("| 3.0 m; 1 of 2 | 1.5 m; 0 of 2 |", lines[-1])
+
+    def test_drives_are_told_of_a_file_with_all_cuts_alone(self):
+        from tetap.docs import recorded
+        rows = [row(start, seconds, speedometer, [0, 5 if start == 60 else 1]) for start in (60, 160) for seconds in (30, 60) for speedometer in (True, False)]
+        px4 = {"iris_gps": {"attitude_rms_deg": 0.5, "velocity_rms_mps": 0.25, "position_rms_m": 1.5, "nees": {}}}
+        husky = {"end": rows[0], "gnss_rms_m": 2.0, "gnss_sensors": {"GnssPosition": {"nis_per_dof": 0.75}}, "outages": rows[:2]}
+        whole = {"car": {"outages": rows}, "px4": px4, "husky": husky}
+        self.assertTrue(recorded.is_whole(whole))
+        self.assertFalse(recorded.is_whole({**whole, "car": {"outages": [one for one in rows if one["seconds"] == 60]}}))
+        self.assertFalse(recorded.is_whole({**whole, "husky": {**husky, "outages": []}}))
+        lines = list(recorded.drive_table(whole))
+        self.assertEqual(len(lines), 2 + 4 + 1 + 3)
+        self.assertIn("median 3.0 m (1.0 m at the 1 places that gave no mounting); 1 beyond 3 sigma", lines[2])
+        self.assertIn("2.00 m; 0.75", lines[8])
 
     def test_places_with_the_hole_are_told_apart_from_the_others(self):
         rows = [row(60, 60, True, [0, 5], imu_hole=True), row(160, 60, True, [2, 0])]

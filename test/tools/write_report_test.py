@@ -427,6 +427,25 @@ class Pictures(Case):
         self.assertLess(page.index('class="headline"'), page.index("<img"))
         self.assertLess(page.rindex("<img"), page.index("position RMSE"))
 
+    def test_the_sentences_of_the_page_are_those_of_the_documents(self):
+        from tetap.docs import language
+        truth = self.run_with_everything()
+        self.write("run.json", json.dumps({**RUN, "fault": "kidnapped@0.1+0.1"}))
+        self.assertEqual(self.report("--truth", truth).returncode, 0)
+        page = text_of(self.path("report.html"))
+        prose = [re.sub(r"<[^>]+>", "", one) for one in re.findall(r"<p[^>]*>(.*?)</p>", page, re.S)]
+        self.assertGreater(len(prose), 5)
+        self.assertEqual([one for text in prose for one in language.findings("report", text)], [])
+
+    def test_a_fault_of_the_world_is_named_once_and_in_no_title(self):
+        truth = self.run_with_everything()
+        self.write("run.json", json.dumps({**RUN, "fault": "kidnapped@0.1+0.1"}))
+        self.assertEqual(self.report("--truth", truth).returncode, 0)
+        page = text_of(self.path("report.html"))
+        self.assertEqual(len(re.findall(r"<p>[^<]*kidnapped at 0.1 s for 0.1 s[^<]*</p>", page)), 1)
+        for title in re.findall(r"<(?:h1|h2|title)>(.*?)</", page):
+            self.assertNotIn("kidnapped", title)
+
     def test_a_band_of_ten_times_the_error_is_explained_and_a_narrow_one_is_not(self):
         from tetap.report import pictures
         error, sigma = np.full(50, 0.1), np.full(50, 0.4)

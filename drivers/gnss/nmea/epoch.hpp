@@ -71,7 +71,7 @@ class Epoch {
     utc_.time_valid = false;
   }
 
-  /// The date goes on over midnight until a sentence says it again.
+  /// The date goes on over midnight until a sentence carries the next date.
   constexpr void set_time(const Utc& t) {
     if (utc_.date_valid && t.hour < 12 && utc_.hour >= 12) to_next_day(utc_);
     utc_.hour = t.hour;
@@ -119,7 +119,7 @@ class Epoch {
     r.height_m = p.altitude_m + p.separation_m;
     r.horizontal_acc_m = p.horizontal_acc_m;
     r.vertical_acc_m = p.vertical_acc_m;
-    // RMC says what time it speaks of, VTG does not: it comes where it comes.
+    // RMC carries its time of validity and VTG none: VTG belongs to the epoch in which it arrives.
     const bool rmc_speed = !base::is_nan(p.speed_mps);
     r.speed_mps = rmc_speed ? p.speed_mps : p.vtg_speed_mps;
     r.course_rad = rmc_speed ? p.course_rad : p.vtg_course_rad;
@@ -137,7 +137,7 @@ class Epoch {
   }
 
   Parts parts_{};
-  Utc utc_{};  ///< of this epoch; its date goes on
+  Utc utc_{};  ///< time of this epoch; the date is kept for the next
   EpochEnd<kSentences> end_{};
   std::uint32_t seen_ = 0;
   bool open_ = false;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the NMEA sentences GGA, RMC, VTG, GSA, GST and ZDA say, field by field. NMEA 0183 v4.1, sec. 6.3; u-blox F9 HPG
-// 1.32 interface description (UBX-22008968), sec. 2.7.
+// Content of the NMEA sentences GGA, RMC, VTG, GSA, GST and ZDA, field by field. NMEA 0183 v4.1, sec. 6.3; u-blox F9
+// HPG 1.32 interface description (UBX-22008968), sec. 2.7.
 #pragma once
 
 #include "base/math.hpp"
@@ -28,7 +28,7 @@ inline constexpr std::array<std::array<std::uint8_t, 3>, kSentences> kFormatters
   return {};
 }
 
-/// What the sentences of an epoch said.
+/// Content of an epoch's sentences; NaN, empty or 0: not sent.
 struct Parts {
   std::optional<std::int64_t> gga_latitude, gga_longitude, rmc_latitude, rmc_longitude;
   std::optional<std::int32_t> quality, satellites, dimension;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a u-blox receiver is asked to do, step by step, in both languages of configuration (sources in message.hpp), and
-// what the driver says about how it went.
+// Configuration steps of a u-blox receiver, in both languages of configuration (sources in message.hpp), and the states
+// and reasons that the driver reports about them.
 #pragma once
 
 #include "base/time.hpp"
@@ -19,9 +19,9 @@ struct Settings {
   DynamicModel model = DynamicModel::kAutomotive;
   bool covariance = true;
   base::Micros reply_timeout{300'000};  ///< on top of the time that a long reply takes on the line
-  std::uint8_t tries = 3;               ///< of each message
+  std::uint8_t tries = 3;               ///< attempts with each message
   std::uint8_t rounds = 4;              ///< through all baud rates
-  base::Micros lost_after{3'000'000};   ///< so long without an epoch: start again
+  base::Micros lost_after{3'000'000};   ///< time without an epoch after which the search starts again
   base::Micros rest{10'000'000};        ///< after giving up, before the next attempt
 };
 
@@ -52,7 +52,7 @@ inline constexpr std::array<std::string_view, static_cast<std::size_t>(ConfigRea
   return reason < ConfigReason::kCount ? kConfigReasonNames[static_cast<std::size_t>(reason)] : std::string_view{"?"};
 }
 
-/// What is asked of the receiver, in this order; the last five only where there is no NAV-PVT.
+/// Requests to the receiver, in this order; the last five only where there is no NAV-PVT.
 enum class Step : std::uint8_t {
   kPorts,
   kBaud,

@@ -97,7 +97,7 @@ class Configurator {
   [[nodiscard]] constexpr std::uint16_t of(ConfigReason reason) const {
     return counts_[static_cast<std::size_t>(reason)];
   }
-  /// What the receiver did not take since it was found.
+  /// True: the receiver refused this step since it was found.
   [[nodiscard]] constexpr bool was_refused(Step step) const {
     return (refused_ >> static_cast<unsigned>(step) & 1) != 0;
   }
@@ -162,7 +162,7 @@ class Configurator {
       ++tries_;
       return send(message_, now);
     }
-    // A receiver that says nothing to what it does not know.
+    // Receivers of the older generation do not answer requests that they do not know.
     if (step_ == Step::kPorts && !legacy_) return fall_back(now);
     next_attempt(now);
   }
@@ -189,7 +189,7 @@ class Configurator {
     return true;
   }
 
-  /// The request was sent at the old rate and may be answered at either; only what is heard at the new one counts.
+  /// The request was sent at the old rate and may be answered at either; only an answer at the new one counts.
   constexpr void verify_baud(base::Micros now) {
     if (!changed_) {
       changed_ = true;

@@ -162,7 +162,7 @@ class Epoch {
     }
   }
 
-  /// From Earth-centred coordinates, where no message said it better.
+  /// Fills fields from Earth-centred coordinates, where no message carried them directly.
   constexpr void compose() {
     Report& r = report_;
     if (!position_m_.has_value()) return;
@@ -173,7 +173,7 @@ class Epoch {
       r.longitude_2ndeg = at->longitude_2ndeg;
       r.has_position = true;
       r.height_m = static_cast<float>(at->height_m);
-      // pAcc is of three dimensions; nothing says how it divides.
+      // pAcc covers three dimensions; its division between them is not known.
       r.horizontal_acc_m = r.vertical_acc_m = position_acc_m_;
     }
     if (!has(Nav::kVelNed) && velocity_mps_.has_value()) {

@@ -56,7 +56,7 @@ class Driver {
   }
   [[nodiscard]] constexpr const SelfTestResult& self_test_result() const { return self_test_.result(); }
 
-  /// What the chip's tick is longer than nominal, by the MCU's clock.
+  /// Excess of the chip's tick over its nominal length, by the MCU's clock, in parts per million.
   [[nodiscard]] constexpr std::int32_t clock_error_ppm() const { return stream_.clock_error_ppm(); }
 
  private:
@@ -132,7 +132,7 @@ class Driver {
 
   constexpr void flush() {
     stream_.interrupt();
-    static_cast<void>(ok(bus_.write(kSignalPathReset, kFifoFlush)));  // 14.33; if it fails, headers will say so again
+    static_cast<void>(ok(bus_.write(kSignalPathReset, kFifoFlush)));  // 14.33; if it fails, headers will show it again
   }
 
   /// Silence: first the bank is selected again, then everything.
@@ -149,7 +149,7 @@ class Driver {
     }
   }
 
-  /// In turn: the bank, every field but the first, which says "off", the identity.
+  /// In turn: the bank, every field but the first (which means "off"), the identity.
   constexpr void check(base::Micros now) {
     check_due_ = now + kCheckTime;
     const std::size_t nth = checked_;

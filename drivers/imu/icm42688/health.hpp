@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the ICM-42688-P's driver says about its chip: a state, a reason for everything that went wrong, a count of each.
+// Health of an ICM-42688-P as its driver reports it: a state, a reason for everything that went wrong, a count of each.
 #pragma once
 
 #include <array>
@@ -32,7 +32,7 @@ enum class Reason : std::uint8_t {
   kBadHeader,        ///< a packet of another kind than configured: FIFO flushed
   kFifoShort,        ///< fewer packets than counted
   kInvalidSample,    ///< the chip's marker for "no data"
-  kRateChanged,      ///< the header said so
+  kRateChanged,      ///< a packet header with another data rate
   kLostSamples,      ///< stamps with a gap, in samples
   kBadStamp,         ///< a stamp that did not go on: the sample was dropped
   kStale,            ///< no sample for too long

@@ -21,7 +21,7 @@ enum class PacketKind : std::uint8_t {
 
 struct Packet {
   PacketKind kind = PacketKind::kForeign;
-  bool rate_changed = false;  ///< the chip says its data rate is not that of the packet before
+  bool rate_changed = false;  ///< the header marks a data rate other than that of the packet before
   std::array<std::int32_t, 3> accel{};
   std::array<std::int32_t, 3> gyro{};
   std::int16_t temperature = 0;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // From power-up to running sensors, in steps that never wait: reset, identity, every field written, every field read
-// back, sensors on, what they say while they start thrown away. DS-000347 rev. 1.8; sections at the places.
+// back, sensors on, their samples discarded while they start. DS-000347 rev. 1.8; sections at the places.
 #pragma once
 
 #include "base/time.hpp"
@@ -75,7 +75,7 @@ class Startup {
   constexpr Progress reset(Bus& bus, base::Micros now, Health& health) {
     bus.forget_bank();
     if (!ok(bus.write(kDeviceConfig, kSoftReset), health)) return Progress::kFailed;
-    bus.forget_bank();  // the chip is in bank 0 now (14.59), but it may not have heard us
+    bus.forget_bank();  // the chip is in bank 0 now (14.59), but it may have missed the command
     reset_limit_ = now + kResetLimit;
     go(State::kReset, now + kResetTime + kGrain, health);
     return Progress::kBusy;

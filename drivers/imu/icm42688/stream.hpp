@@ -155,7 +155,7 @@ class Stream {
   }
 
   static constexpr base::Micros kLongGap{1'000'000};
-  static constexpr base::Micros kAhead{200};  ///< of a chip that is read while `now` grows old
+  static constexpr base::Micros kAhead{200};  ///< allowance for stamps after `now`, which ages during the read
   static constexpr std::uint8_t kRefusals = 8;
 
   Settings settings_;
@@ -167,9 +167,9 @@ class Stream {
   std::int64_t last_ticks_ = 0;
   Repeats accel_{}, gyro_{};
   std::uint8_t refused_ = 0;
-  bool stamped_ = false;         ///< ever
+  bool stamped_ = false;         ///< some sample got a stamp since power-on
   bool follows_ = false;         ///< a sample with a stamp came before
-  bool after_withheld_ = false;  ///< and was not delivered
+  bool after_withheld_ = false;  ///< the sample before had a stamp and was not delivered
   bool clock_off_ = false;
 };
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What every flashed image does before main() and can say about itself after: sections copied and zeroed, the stack
+// Start of every flashed image before main(), and its own measurements after: sections copied and zeroed, the stack
 // painted and measured. The symbols come from the port's link.ld; the paint is put there by the port's reset code,
 // which has no stack yet.
 #pragma once

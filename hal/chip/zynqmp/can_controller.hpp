@@ -131,7 +131,7 @@ class CanController {
 
   void note_faults(std::uint32_t interrupts) {
     if ((interrupts & kRxOverflow) != 0) {
-      ++faults_.rx_overflow;  // one event; how many frames it cost the controller does not say
+      ++faults_.rx_overflow;  // one event; the controller does not count the frames lost
       registers_.write(kInterruptClear, kRxOverflow);
     }
     if ((interrupts & kBusOff) != 0) {

@@ -133,7 +133,7 @@ struct AcceptanceWords {
   const CanIdentifier wanted{.id = filter.id, .extended = filter.extended};
   const std::uint32_t id_bits = id_word(machine, {.id = filter.mask, .extended = filter.extended}) ^
                                 id_word(machine, {.id = 0, .extended = filter.extended});
-  // Frame size and data-not-remote are always compared; the bits that say so are those the identifier word sets for
+  // Frame size and data-not-remote are always compared; the bits for that are those the identifier word sets for
   // them.
   const std::uint32_t kind_bits = machine == Machine::kEmulated
                                       ? emulated::kExtended | emulated::kRemote | emulated::kError

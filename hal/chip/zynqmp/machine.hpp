@@ -2,7 +2,7 @@
 // Silicon or emulator: the one named seam of this port. The data sheets (UG1085, UG1087) are what kSilicon means.
 // kEmulated is QEMU 7.2's xlnx-zcu102, which differs in identifier word and data words of the CAN controller
 // (can_encoding.hpp), in width and clock of the timer (ttc.hpp), and in what an idle poll costs (rest(), here). One
-// image runs on both; Ttc::probe() tells them apart at boot.
+// image runs on both; Ttc::probe() distinguishes them at boot.
 #pragma once
 
 namespace tetap::hal::zynqmp_r5 {

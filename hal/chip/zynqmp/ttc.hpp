@@ -16,7 +16,7 @@ class Ttc {
  public:
   constexpr explicit Ttc(Registers registers) : registers_{registers} {}
 
-  /// The interval register has 32 bits on silicon and 16 in the emulator: what comes back tells which machine this is.
+  /// The interval register has 32 bits on silicon and 16 in the emulator: the value read back identifies the machine.
   [[nodiscard]] Machine probe() const {
     registers_.write(kInterval1, ~0U);
     return registers_.read(kInterval1) == ~0U ? Machine::kSilicon : Machine::kEmulated;

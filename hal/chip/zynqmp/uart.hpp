@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The serial port as a place to say things: 115200 baud 8N1, polled. UG1085 chapter "UART Controller", UG1087 module
+// The serial port for boot lines and errors: 115200 baud 8N1, polled. UG1085 chapter "UART Controller", UG1087 module
 // "UART".
 #pragma once
 

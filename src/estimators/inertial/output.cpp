@@ -127,9 +127,9 @@ template <int kFirst, std::size_t kN>
 
 }  // namespace detail
 
-/// Of the speed ahead, x_b . R^T v at the present: by velocity, attitude (as far as the robot does not go where it
-/// points, and by what tilt made of acceleration since) and accelerometer bias; to second order by an uncertain
-/// heading. Of the turn: by gyroscope noise and bias, and by the age of its sample.
+/// Variance of the speed ahead, x_b . R^T v at the present: by velocity, attitude (as far as the robot does not go
+/// where it points, and by what tilt made of acceleration since) and accelerometer bias; to second order by an
+/// uncertain heading. Variance of the turn: by gyroscope noise and bias, and by the age of its sample.
 [[gnu::noinline]] MotionVariance Inertial::motion_variance(const Context& ctx) const {
   const InertialEstimate full = inertial(ctx);
   if (!full.valid) return {};

@@ -27,7 +27,7 @@ class Recovery {
     return checks::recent(widened_at_, stamp, base::Micros{10'000'000});
   }
 
-  /// What an assessment asks of the covariance. True: the present has to follow at once.
+  /// Changes the covariance as an assessment asks. True: the present has to follow at once.
   bool apply(const Assessment& a, nav::Ins& ins, base::Micros stamp, const param::Parameters& parameters);
 
   /// Verb 1, of velocity and attitude: both may be off by this, too.

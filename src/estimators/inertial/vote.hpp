@@ -15,13 +15,13 @@ namespace tetap::estimators {
 
 enum class Vote : std::uint8_t {
   kAbsent,    ///< the device is silent
-  kAbstains,  ///< nothing that it showed tells right from wrong
-  kWaits,     ///< the device was not heard yet
+  kAbstains,  ///< the device's measurements do not decide
+  kWaits,     ///< no measurement of the device since the question; one may still come
   kFor,       ///< the filter is right
   kAgainst,   ///< the filter is wrong
 };
 
-/// What a device showed of the filter so far: accepted or refused, and when.
+/// Record of a device's measurements so far: accepted or refused, and when.
 class Witness {
  public:
   void update(bool refused, base::Micros stamp) {
@@ -44,7 +44,7 @@ class Witness {
   [[nodiscard]] bool contradicts(base::Micros stamp) const {
     return refused_.count() >= kRefusals && stamp - heard_at_ < base::Micros{1'500'000};
   }
-  /// A device that is heard at all votes when it was heard after `since`.
+  /// kAbstains: a measurement came after `since`; kWaits: one may still come; kAbsent: the device is silent.
   [[nodiscard]] Vote presence(base::Micros since, base::Micros stamp) const {
     constexpr base::Micros kPresent{3'000'000}, kPatience{2'500'000};
     if (!checks::recent(heard_at_, stamp, kPresent)) return Vote::kAbsent;
@@ -61,7 +61,7 @@ class Witness {
   void forgive() { refused_.reset(); }
   /// The filter begins.
   void begin() { *this = {}; }
-  /// Measurements of something else were counted since `before`: they say nothing of the device.
+  /// Measurements since `before` were of something else: stamps go back to those of `before`.
   void keep_hearing(const Witness& before) {
     heard_at_ = before.heard_at_;
     agreed_at_ = before.agreed_at_;
@@ -103,7 +103,7 @@ struct LevelInnovation {
 struct Ballot {
   Vote speed = Vote::kAbsent;  ///< the other velocity
   Vote fixes = Vote::kAbsent;
-  bool speeds_agree = false;  ///< both velocities say the same, so that they contradict the filter likewise
+  bool speeds_agree = false;  ///< both velocities agree, so that they contradict the filter likewise
 };
 
 /// The filter gives way to a velocity: soon where a second device contradicts it, after RecoveryParameters::after_us

@@ -11,7 +11,7 @@ namespace tetap::estimators {
 
 class WayCourse {
  public:
-  /// What a fix makes of the way.
+  /// The way as measured up to a fix.
   struct Way {
     float east_m = 0, north_m = 0;  ///< the chord
     float turned_rad = 0;           ///< by the gyroscope, from begin to end

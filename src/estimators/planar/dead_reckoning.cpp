@@ -27,11 +27,11 @@ model::PlanarIncrement DeadReckoning::held_increment(float dt_s, const param::Pa
 
 void DeadReckoning::propagate(base::Micros t, const param::Parameters& n) {
   if (t <= time_) return;
-  if (held_.kind == Held::Kind::kNone) {  // nothing was ever heard of motion: standing where it was put
+  if (held_.kind == Held::Kind::kNone) {  // no motion was ever measured: the robot stands where it was put
     time_ = t;
     return;
   }
-  // What was held counts until the time-out, as it was published; after that anything may have happened.
+  // Held speeds count until the time-out, as they were published; after that anything may have happened.
   const base::Micros silent = last_input_ + base::Micros{n.wheels.timeout_us};
   const base::Micros held_until = t < silent ? t : silent;
   if (time_ < held_until) {
@@ -64,7 +64,7 @@ bool DeadReckoning::fuse(const sensor::WheelCounts& now, base::Micros stamp, con
     const float per_s = 1.0F / base::seconds(stamp - counts_time_);
     held_ = {.kind = Held::Kind::kWheels, .first_mps = left_m * per_s, .second = right_m * per_s};
   } else {
-    if (have_counts_) propagate(stamp, n);  // the doubt of the gap stays; its way is not known
+    if (have_counts_) propagate(stamp, n);  // variance of the gap stays; its way is not known
     held_ = {.kind = Held::Kind::kWheels};
   }
   if (stamp > time_) time_ = stamp;
@@ -105,7 +105,7 @@ bool DeadReckoning::fuse(const sensor::ImuSample& sample, base::Micros stamp, co
     gyro_bias_radps_ += (raw_radps - gyro_bias_radps_) * (interval_s / n.gyro.bias_time_s);
   }
   gyro_rate_radps_ = raw_radps - gyro_bias_radps_;
-  // What was extrapolated since the sample before is taken off; a gap between the samples is filled with this one's
+  // The extrapolation since the sample before is taken off; a gap between the samples is filled with this one's
   // rate.
   propagate(stamp, n);
   const base::Micros span = stamp - gyro_time_;
@@ -136,7 +136,7 @@ Estimate DeadReckoning::estimate(const param::Parameters& n) const {
 
 [[gnu::noinline]] MotionVariance DeadReckoning::motion_variance(const param::Parameters& n) const {
   if (!fresh(n)) return {};
-  // Of the motion over one period: what it adds to the pose, and the steps of the counters.
+  // Variance of the motion over one period: its share in that of the pose, and the steps of the counters.
   const float period_s = base::seconds(base::Micros{n.loop.period_us});
   const model::PlanarIncrement one = held_increment(period_s, n);
   const float step_m = have_counts_ ? 0.41F * n.wheels.drive.left_m(1) : 0.0F;

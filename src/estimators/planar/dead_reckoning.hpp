@@ -31,14 +31,14 @@ class DeadReckoning {
 
   void advance(base::Micros t) { out_time_ = t; }
 
-  /// False: the sample says nothing to this robot (a speed without a turn, an IMU that is not used).
+  /// False: this robot has no use for the sample (a speed without a turn, an IMU that is not used).
   bool fuse(const sensor::WheelCounts& now, base::Micros stamp, const param::Parameters& n);
   bool fuse(const sensor::WheelSpeeds& speeds, base::Micros stamp, const param::Parameters& n) {
     return fuse_speed({.kind = Held::Kind::kWheels, .first_mps = speeds.left_mps, .second = speeds.right_mps}, stamp,
                       n);
   }
   bool fuse(const sensor::BodySpeed& speed, base::Micros stamp, const param::Parameters& n) {
-    // A speedometer alone says nothing of the turn: that has to come from a gyroscope.
+    // A speedometer alone does not measure the turn: a gyroscope has to.
     const bool turns = base::is_finite(speed.yaw_rate_radps);
     if (!turns && n.gyro.use == 0) return false;
     return fuse_speed(
@@ -83,7 +83,7 @@ class DeadReckoning {
   /// A sigma of 0 on the bus means less than half a step of the signal; and the covariance has to stay positive.
   static constexpr float kFinest_m = 0.5e-3F, kFinest_rad = 0.1e-3F;
 
-  /// The last speeds heard of; what the robot is assumed to keep doing.
+  /// Last measured speeds; the robot is assumed to keep them.
   struct Held {
     enum class Kind : std::uint8_t { kNone, kBody, kWheels };
     Kind kind = Kind::kNone;
@@ -92,7 +92,7 @@ class DeadReckoning {
   };
 
   bool fuse_speed(const Held& held, base::Micros stamp, const param::Parameters& n);
-  /// What it holds is recent enough to be called the motion.
+  /// The held speeds are recent enough to be called the motion.
   [[nodiscard]] bool fresh(const param::Parameters& n) const {
     return held_.kind != Held::Kind::kNone && out_time_ - last_input_ <= base::Micros{n.wheels.timeout_us};
   }
@@ -111,8 +111,8 @@ class DeadReckoning {
   }
   void untravelled() { applied_left_m_ = applied_right_m_ = 0; }
 
-  base::Micros time_;        ///< of the state
-  base::Micros out_time_;    ///< of the estimate
+  base::Micros time_;        ///< time of the state
+  base::Micros out_time_;    ///< time of the estimate
   base::Micros last_input_;  ///< stamp of the last wheel sample
   base::Micros counts_time_;
   base::Micros still_since_;

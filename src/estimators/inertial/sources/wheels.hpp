@@ -20,7 +20,7 @@ class Wheels {
   [[nodiscard]] float turn_radps() const { return turn_radps_; }
   [[nodiscard]] base::Micros turned_at() const { return turned_at_; }
 
-  /// Which wheels roll. Without a gyroscope the wheels alone show a turn, and cannot be judged by it.
+  /// Decides which wheels roll. Without a gyroscope the wheels alone show a turn, and cannot be judged by it.
   [[nodiscard]] Assessment assess(const WheelReading& z, const FilterView& filter);
   /// Forward speed of an assessed reading: the mean of both wheels, or, of one that rolls while the other spins, what
   /// the gyroscope leaves of it at the middle of the axle.

@@ -5,6 +5,7 @@ import json
 import os
 import re
 
+from tetap.docs import recorded
 from tetap.docs.figures import commit_before, spaced, table
 
 REGION = re.compile(r"<!-- figures: (\w+) -->\n.*?<!-- end -->\n", re.S)
@@ -12,6 +13,11 @@ IMAGES = [("tetap-zynqmp_r5-rover", "Cortex-R5F, rover"), ("tetap-mps2_m7-rover"
           ("tetap-zynqmp_r5-mrclam", "Cortex-R5F, mrclam")]
 WORKLOADS = ["sincos", "atan2", "exp", "log", "w1_kf", "w1_kf_conditioned", "w2_ekf", "fuse_range_bearing", "w4_ahrs6", "w4_ahrs9", "ahrs9", "ins_strapdown",
              "ins_covariance", "w5_ins", "ins_tick", "ins_tick_rover", "ins_tick_car", "ins_tick_iris", "node_tick", "mrclam_tick"]
+ESTIMATORS = [("`Inertial`, a tick with an IMU of 200 Hz", "ins_tick_rover"), ("`PoseEkf`, a sighting of a landmark", "fuse_range_bearing"), ("`Attitude`, a step with magnetometer", "ahrs9"),
+              ("plain Mahony, a step with magnetometer", "w4_ahrs9"), ("`Odometry`, a sample of wheel counts", "dead_reckoning_counts"),
+              ("`Odometry`, a sample with gyroscope", "dead_reckoning_gyro"), ("`filter::Kalman`, an update of 2 in 4 states", "w1_kf_conditioned"),
+              ("`filter::StructuredKalman`, the same", "w1_kf"), ("the rover's whole node, a tick of 10 ms", "node_tick")]
+WHOLE = "test/replay/inertial_runs.py build/host/sim_host out/inertial_runs --whole"
 
 
 def loaded(out, name):
@@ -52,21 +58,19 @@ def campaign(out):
                   "above it (too sure) / below (too modest)", "NIS per degree of freedom (1 expected)"], rows)
 
 
-def outages(out):
-    found = loaded(out, "inertial.json")["car"]["outages"]
-    kinds = [(speedometer, seconds) for speedometer in (True, False) for seconds in sorted({one["seconds"] for one in found})]
-    rows = []
-    for start in dict.fromkeys(one["start_s"] for one in found):
-        here = {(one["speedometer"], one["seconds"]): one for one in found if one["start_s"] == start}
-        cells = []
-        for kind in kinds:
-            one = here.get(kind)
-            text = f"{one['error_m']:.1f} / {'>' if one['sigma_limited'] else ''}{one['three_sigma_m']:.1f} m, {one['nees']:.2f}" if one else "-"
-            cells.append(f"**{text}**" if one and one["beyond"] else text)
-        longest = max(here.values(), key=lambda one: one["seconds"])
-        marks = ("*" if longest["calibrated_on"] else "") + ("o" if any(one["imu_hole"] for one in here.values()) else "")
-        rows.append([f"{start:.0f} s {marks}".strip().replace("*", "\\*"), f"{longest['driven_m']:.0f} m", *cells])
-    return table(["cut from", "driven", *[f"{'speedometer' if kind[0] else 'constraint alone'}, {kind[1]:.0f} s" for kind in kinds]], rows)
+def of_whole_runs(make):
+    """A table of the file with all cuts; None, so that the region stays, where the file has those of 60 s alone."""
+    def table_of(out):
+        result = loaded(out, "inertial.json")
+        return "\n".join(make(result)) if recorded.is_whole(result) else None
+    return table_of
+
+
+def estimators(out):
+    """Cost of each estimator alone, on a Cortex-M7."""
+    count = loaded(out, "count.json")["m7"]
+    return table(["estimator", "workload", "instructions, mean", "worst"],
+                 [[name, f"`{workload}`", spaced(count[f"{workload}_mean"]), spaced(count[workload])] for name, workload in ESTIMATORS])
 
 
 def mrclam(out):
@@ -82,7 +86,10 @@ def mrclam(out):
 # region: (command, files that it writes, table)
 REGIONS = {"memory": ("make size stack", ["size.json", "stack.json"], memory), "instructions": ("make count", ["count.json"], instructions),
            "campaign": ("tools/proof/run_campaign", ["campaign.json"], campaign),
-           "outages": ("test/replay/inertial_runs.py build/host/sim_host out/inertial_runs", ["inertial.json"], outages),
+           "estimators": ("make count", ["count.json"], estimators),
+           "drives": (WHOLE, ["inertial.json"], of_whole_runs(recorded.drive_table)),
+           "outages": (WHOLE, ["inertial.json"], of_whole_runs(lambda result: recorded.outage_table(result["car"]["outages"]))),
+           "nees": (WHOLE, ["inertial.json"], of_whole_runs(recorded.nees_table)),
            "mrclam": ("make test STEPS=recorded_runs", [f"recorded/mrclam{robot}/summary.json" for robot in range(1, 6)], mrclam)}
 
 
@@ -93,5 +100,8 @@ def fill(text, out, root):
         paths = [os.path.join(out, one) for one in files]
         if not all(os.path.exists(one) for one in paths):
             return match[0]
-        return f"<!-- figures: {match[1]} -->\n`{command}`{commit_before(root, max(paths, key=os.path.getmtime))}:\n\n{make(out)}\n<!-- end -->\n"
+        made = make(out)
+        if made is None:
+            return match[0]
+        return f"<!-- figures: {match[1]} -->\n`{command}`{commit_before(root, max(paths, key=os.path.getmtime))}:\n\n{made}\n<!-- end -->\n"
     return REGION.sub(region, text)

@@ -56,7 +56,7 @@ def errors(run, truth, estimator, title):
             if row == len(PANELS) - 1:
                 one.set_xlabel("time [s]")
     handles = [Line2D([], [], color=color, linewidth=1.2), Patch(color=color, alpha=0.16), *shades]
-    _above(fig, axes, title, handles, [f"{run.names[estimator]}: error", "±3σ as published"] + ["fault"] * len(shades))
+    _above(fig, axes, title, handles, [f"{run.names[estimator]}: error", "±3σ as published"] + [pictures.FAULT] * len(shades))
     return fig
 
 
@@ -79,7 +79,7 @@ def _above(fig, axes, title, handles, labels):
 
 
 def biases(run, truth, estimator, title):
-    """What the filter takes for the biases, and what they are."""
+    """Estimated biases in their bands, and the true ones."""
     states = run.states_of(estimator)
     true = truth.more_of(states["epoch"]) if truth is not None else None
     fig, axes = pictures.figure(11.0, 6.4, title, 3, 2, sharex=True)
@@ -107,7 +107,7 @@ def biases(run, truth, estimator, title):
     if true is not None:
         handles.append(Line2D([], [], color=pictures.TRUTH, linewidth=1.6, alpha=0.7))
         labels.append("truth")
-    _above(fig, axes, title, handles + shades, labels + ["fault"] * len(shades))
+    _above(fig, axes, title, handles + shades, labels + [pictures.FAULT] * len(shades))
     return fig
 
 
@@ -131,5 +131,5 @@ def disagreement(run, title):
         one.set_ylabel(label)
     axes[-1].set_xlabel("time [s]")
     _above(fig, axes, title, [Line2D([], [], color=color, linewidth=1.2), *shades],
-           [f"between attitude filter and {run.names[run.best]}"] + ["fault"] * len(shades))
+           [f"between attitude filter and {run.names[run.best]}"] + [pictures.FAULT] * len(shades))
     return fig

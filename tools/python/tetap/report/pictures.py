@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The pictures of a report: one idea each, the same colours for the same things everywhere.
 
-Colours: Okabe and Ito, "Color Universal Design" (2008): told apart with every common kind of colour vision.
+Colours: Okabe and Ito, "Color Universal Design" (2008): distinct with every common kind of colour vision.
 """
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -18,6 +18,7 @@ INK, GREY, FAINT = "#262626", "#6b6b6b", "#e3e3e3"
 TRUTH, ODOMETRY, FUSED = "#3c3c3c", "#e69f00", "#0072b2"
 LANDMARK, REJECTED = "#009e73", "#d55e00"
 FAULT_SHADE = "#f6d9c8"
+FAULT = "fault of the world"  # what the world did, beside the faults that the node reports
 FIX = "#7d7d7d"
 ESTIMATORS = {"odometry": ODOMETRY, "fused": FUSED, "attitude": "#cc79a7"}
 OTHER = "#56b4e9"
@@ -75,8 +76,8 @@ def shade_faults(axes, run):
     if not spans:
         return []
     if all(end == start for _, start, end in spans):
-        return [Line2D([], [], color=REJECTED, linewidth=1.2, linestyle=(0, (4, 2)), label="fault")]
-    return [Patch(facecolor=FAULT_SHADE, label="fault")]
+        return [Line2D([], [], color=REJECTED, linewidth=1.2, linestyle=(0, (4, 2)), label=FAULT)]
+    return [Patch(facecolor=FAULT_SHADE, label=FAULT)]
 
 
 def two_scales(axes, usual, largest):
@@ -157,7 +158,7 @@ def draw_fixes(axes, fixes):
 def draw_faults(axes, ways):
     """The way driven during each fault, with its name where it began."""
     for number, (name, x, y) in enumerate(ways):
-        axes.plot(x, y, color=REJECTED, linewidth=5, alpha=0.45, solid_capstyle="round", label="fault" if number == 0 else None, zorder=2.5)
+        axes.plot(x, y, color=REJECTED, linewidth=5, alpha=0.45, solid_capstyle="round", label=FAULT if number == 0 else None, zorder=2.5)
         axes.annotate(name, (x[0], y[0]), xytext=(6, 7), textcoords="offset points", fontsize=9, color=REJECTED, zorder=9,
                       path_effects=[withStroke(linewidth=3, foreground="white")])
 
@@ -211,8 +212,8 @@ def path(run, truth, landmarks, title, fixes=None):
         valid = np.flatnonzero(tracks[best]["pos_valid"] == 1)
         first = (tracks[best]["x_m"][valid[0]], tracks[best]["y_m"][valid[0]]) if len(valid) else None
     if first:
-        axes.plot(*first, marker="o", markersize=8, color="white", markeredgecolor=INK, markeredgewidth=1.6, zorder=8)
-    handles += [Line2D([], [], marker="o", markersize=7, linestyle="none", color="white", markeredgecolor=INK, markeredgewidth=1.6),
+        axes.plot(*first, marker="o", markersize=13, markerfacecolor="none", markeredgecolor=INK, markeredgewidth=1.6, zorder=8)  # an end may lie inside
+    handles += [Line2D([], [], marker="o", markersize=9, linestyle="none", markerfacecolor="none", markeredgecolor=INK, markeredgewidth=1.6),
                 Line2D([], [], marker="s", markersize=7, linestyle="none", color=GREY)]
     labels += ["start", "end"]
     axes.set_aspect("equal", adjustable="datalim")
@@ -223,7 +224,7 @@ def path(run, truth, landmarks, title, fixes=None):
 
 
 def errors(run, truth, estimator, title):
-    """Errors of one estimator's x, y and yaw inside of what it says of itself."""
+    """Errors of one estimator's x, y and yaw inside of three times the sigma published for it."""
     rows = run.of(estimator)
     dx, dy, dyaw = metrics.errors(rows, truth)
     parts = [("x [m]", dx, rows["std_x_m"], 1.0), ("y [m]", dy, rows["std_y_m"], 1.0)]
@@ -257,7 +258,7 @@ def errors(run, truth, estimator, title):
     axes[-1].set_xlabel("time [s]")
     handles = [Line2D([], [], color=color, linewidth=1.2), Patch(color=color, alpha=0.16)]
     kind = "difference" if truth.is_reference else "error"
-    axes[0].legend(handles + shades, [f"{run.names[estimator]}: {kind}", "±3σ as published"] + ["fault"] * len(shades), frameon=False, fontsize=9,
+    axes[0].legend(handles + shades, [f"{run.names[estimator]}: {kind}", "±3σ as published"] + [FAULT] * len(shades), frameon=False, fontsize=9,
                    labelcolor=INK, ncol=3, loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.0, handlelength=1.6)
     axes[0].set_title(title, loc="left", fontsize=11.5, color=INK, pad=24)
     return fig
@@ -293,7 +294,7 @@ def sensors_with_nis(run, estimator):
 
 
 def counted_by_node(run, estimator, sensor, framed):
-    """(time, mean NIS per degree of freedom, accepted, rejected) as the node says them of a sensor that is too fast for a frame per measurement;
+    """(time, mean NIS per degree of freedom, accepted, rejected) as the node counts them of a sensor that is too fast for a frame per measurement;
     None of the others."""
     mine = (run.sensors["estimator"] == estimator) & (run.sensors["sensor"] == sensor) & np.isfinite(run.sensors["nis_mean"])
     if not mine.any():
@@ -358,7 +359,7 @@ def nis(run, estimator, names, title):
     if any_most:
         handles.append(Line2D([], [], color=REJECTED, marker="^", markersize=6, linestyle="none"))
         labels.append(f"{largest:.0f} or more")
-    legend(axes[0], handles=handles + shades, labels=labels + ["fault"] * len(shades), ncol=len(labels) + len(shades), loc="lower left",
+    legend(axes[0], handles=handles + shades, labels=labels + [FAULT] * len(shades), ncol=len(labels) + len(shades), loc="lower left",
            bbox_to_anchor=(0.0, 1.12), columnspacing=1.4)
     return fig
 
@@ -380,7 +381,7 @@ def rejections(run, names):
 
 
 def timeline(run, names, title):
-    """What the node said of itself: mode, sensors in use and what of them was refused, faults, restarts."""
+    """The node's own status: mode, sensors in use, refused measurements, reported faults, restarts."""
     rows = run.status
     time_s = rows["time_s"]
     period = float(np.median(np.diff(time_s))) if len(time_s) > 1 else 0.1
@@ -396,7 +397,7 @@ def timeline(run, names, title):
     refused = rejections(run, names)
     used += [(name, np.zeros(len(time_s), dtype=bool)) for name in refused if name not in [one for one, _ in used]]
     faults = list(bits("faults", "Fault"))
-    lines = [("mode", None, None)] + [(f"{name} used", on, FUSED) for name, on in used] + [(f"fault {name}", on, REJECTED) for name, on in faults]
+    lines = [("mode", None, None)] + [(f"{name} used", on, FUSED) for name, on in used] + [(f"reports {name}", on, REJECTED) for name, on in faults]
     fig, (axes,) = figure(9.0, 1.5 + 0.34 * len(lines), title)
     handles = []
     for code in np.unique(rows["mode"]):
