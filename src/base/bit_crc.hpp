@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// CRC-32 over the raw bits of numbers, least significant byte first: what proves that two machines hold the same state.
+// CRC-32 over the raw bits of numbers, least significant byte first: of inputs and parameters.
 #pragma once
 
 #include "base/crc.hpp"

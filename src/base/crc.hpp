@@ -22,7 +22,7 @@ class Crc32 {
   [[nodiscard]] constexpr std::uint32_t value() const { return ~state_; }
 
  private:
-  // 1 kB of flash: the state CRC passes over some 200 bytes in every tick.
+  // 1 kB of flash: every frame that is consumed passes through it.
   static constexpr std::array<std::uint32_t, 256> kTable = [] {
     std::array<std::uint32_t, 256> table{};
     for (std::uint32_t byte = 0; byte < 256; ++byte) {

@@ -2,6 +2,7 @@
 // The landmark map and the entries that wait for their tick to go into it.
 #pragma once
 
+#include "base/word_hash.hpp"
 #include "bus/counters.hpp"
 #include "estimators/map_frame.hpp"
 
@@ -14,9 +15,9 @@ namespace tetap::node {
 class Landmarks {
  public:
   void power_on(estimators::MapFrame& map_frame) {
-    map_.clear();
     size_ = 0;
     map_frame.map = &map_;
+    clear();
   }
   /// Entries wait sorted by id, so that the order of arrival has no effect.
   void add(const estimators::MapEntry& entry, bus::Counters& counters);
@@ -25,17 +26,28 @@ class Landmarks {
     for (std::size_t i = 0; i < size_; ++i)
       if (!map_.put(waiting_[i])) ++counters.map_full;
     size_ = 0;
+    digest();
   }
-  void clear() { map_.clear(); }
+  void clear() {
+    map_.clear();
+    digest();
+  }
   template <class Sink>
   void hash_state(Sink&& sink) const {
-    map_.hash_state(sink);
+    sink(digest_);
   }
 
  private:
+  void digest() {
+    base::WordHash hash;
+    map_.hash_state(hash);
+    digest_ = hash.value();
+  }
+
   estimators::LandmarkMap<estimators::kMapCapacity> map_;
   std::array<estimators::MapEntry, estimators::kMapCapacity> waiting_{};
   std::size_t size_ = 0;
+  std::uint32_t digest_ = 0;  ///< hash of map_, made when it changes: a map is as large as all other state together
 };
 
 /// For robots none of whose estimators takes landmarks: no memory, and entries are counted as not used.

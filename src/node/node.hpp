@@ -3,6 +3,7 @@
 // calls gives the same bits on every machine; everything that follows from real time stays outside (Pacer, LoopHealth).
 #pragma once
 
+#include "base/word_hash.hpp"
 #include "bus/decoder.hpp"
 #include "bus/input_crc.hpp"
 #include "bus/publisher.hpp"
@@ -327,12 +328,12 @@ void Node<Estimators, Capacity>::note_jump() {
 
 template <class Estimators, std::size_t Capacity>
 std::uint32_t Node<Estimators, Capacity>::state_crc() const {
-  base::BitCrc crc;
-  history_.hash_state(crc);
-  crc(static_cast<std::uint32_t>(map_frame_.origin));
-  disagreement_.hash_state(crc);
-  landmarks_.hash_state(crc);
-  return crc.value();
+  base::WordHash hash;
+  history_.hash_state(hash);
+  hash(static_cast<std::uint32_t>(map_frame_.origin));
+  disagreement_.hash_state(hash);
+  landmarks_.hash_state(hash);
+  return hash.value();
 }
 
 template <class Estimators, std::size_t Capacity>
