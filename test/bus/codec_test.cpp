@@ -99,7 +99,7 @@ MessageRow message_row() {
     } else if constexpr (std::is_integral_v<Field> && !std::is_same_v<Field, bool>) {
       one.kind = FieldRow::Kind::kInteger;
       one.least = std::numeric_limits<Field>::min();
-      one.most = std::numeric_limits<Field>::max();
+      one.most = static_cast<std::int64_t>(std::numeric_limits<Field>::max());
     }
     row.fields.push_back(one);
   });

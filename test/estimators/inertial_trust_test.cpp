@@ -56,7 +56,7 @@ TEST(Vote, TheFilterGivesWayToTwoDevicesSoonToOneLateAndNeverAgainstAVoucher) {
 /// A drive whose receiver lies about its velocity.
 Drive lied_to(float speed_mps, float lie_mps, double for_s, double begin_s) {
   Drive d(rover_like());
-  d.speed_mps = speed_mps;
+  d.speed_mps = static_cast<double>(speed_mps);
   if (!(speed_mps > 0)) d.turn_radps = 0;
   d.white_m = 0.3;
   d.place();
