@@ -4,6 +4,7 @@
 // al., IEEE Trans. Ind. Electron. IE-29(3), 1982). No edge: at most one count in the time since the last, towards zero.
 #pragma once
 
+#include "base/math.hpp"
 #include "base/time.hpp"
 #include "hal/encoder_counter.hpp"
 
@@ -22,7 +23,7 @@ struct QuadratureSettings {
 };
 
 enum class EncoderReason : std::uint8_t {
-  kJump,       ///< more counts than can be: refused, the total stands
+  kJump,       ///< more counts than can be, or a reading that follows such a jump: refused, the total stands
   kRebased,    ///< the count stayed where it had jumped to: counted on from there, the jump is lost
   kAmbiguous,  ///< updates too far apart for the counter's width: whole turns of it may be missing from the total
   kBadEdge,    ///< an edge from the future or from before the last: its time was not used
@@ -70,7 +71,7 @@ class Quadrature {
     // The difference modulo the counter's width is right for every wrap, as long as it is below half a turn.
     const auto raw = static_cast<Difference>(static_cast<Counter>(reading.count - count_));
     const std::int64_t moved = settings_.inverted ? -std::int64_t{raw} : std::int64_t{raw};
-    if (beyond(moved, most)) return refuse(reading, now);
+    if (suspects_ > 0 ? !returns(reading, moved, elapsed, now) : beyond(moved, most)) return refuse(reading, now);
     suspects_ = 0;
     measure(static_cast<std::int32_t>(moved), elapsed, reading.last_edge, now);
     total_ += moved;
@@ -101,12 +102,33 @@ class Quadrature {
     speed_ = 0;
   }
 
+  [[nodiscard]] constexpr std::int64_t since_suspect(Counter count) const {
+    const auto raw = static_cast<Difference>(static_cast<Counter>(count - suspect_));
+    return settings_.inverted ? -std::int64_t{raw} : std::int64_t{raw};
+  }
+
+  /// Counts that can be passed since the last update, which was refused.
+  [[nodiscard]] constexpr float most_since_suspect(base::Micros now) const {
+    return settings_.most_counts_per_s * base::seconds(now - suspected_) + 2.0F;
+  }
+
+  /// After a jump: whether this reading is where the wheel went on at its speed, and nearer there than to the jump. The
+  /// time since the last good reading alone would let every jump pass as motion some updates later.
+  [[nodiscard]] constexpr bool returns(const hal::EncoderReading<Counter>& reading, std::int64_t moved,
+                                       base::Micros elapsed, base::Micros now) const {
+    const float most = settings_.most_counts_per_s * base::seconds(elapsed) + 2.0F;
+    const float way = base::min(base::max(speed_ * base::seconds(elapsed), -most), most);
+    const std::int64_t off = moved - static_cast<std::int32_t>(way), step = since_suspect(reading.count);
+    const std::int64_t off_size = off < 0 ? -off : off, step_size = step < 0 ? -step : step;
+    return !beyond(moved, most) && !beyond(off, most_since_suspect(now)) && off_size < step_size;
+  }
+
   /// One wrong reading is forgotten; a counter that stays away and moves plausibly there was set to something else.
   constexpr void refuse(const hal::EncoderReading<Counter>& reading, base::Micros now) {
     health_.add(EncoderReason::kJump);
-    const auto step = static_cast<Difference>(static_cast<Counter>(reading.count - suspect_));
-    const float most = settings_.most_counts_per_s * base::seconds(now - suspected_) + 2.0F;
-    suspects_ = suspects_ > 0 && most < kHalfTurn && !beyond(step, most) ? suspects_ + 1 : 1;
+    const float most = most_since_suspect(now);
+    const bool follows = suspects_ > 0 && most < kHalfTurn && !beyond(since_suspect(reading.count), most);
+    suspects_ = follows ? suspects_ + 1 : 1;
     suspect_ = reading.count;
     suspected_ = now;
     if (suspects_ < kSuspects) return;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A GNSS receiver on a serial line: reads what has come, configures a u-blox receiver, hands on each epoch with the
-// time it was measured at. Receivers of other makers are read as they are: with `configure` off nothing is sent.
+// A GNSS receiver on a serial line: reads its bytes, configures a u-blox receiver, hands on each epoch with the time it
+// was measured at. Receivers of other makers are read as they are: with `configure` off nothing is sent.
 #pragma once
 
 #include "drivers/gnss/epoch_clock.hpp"
@@ -31,9 +31,12 @@ class GnssDriver {
         settings_(settings),
         receiver_(settings.receiver),
         configurator_(port, settings.ubx),
-        clock_(settings.latency) {}
+        ubx_clock_(settings.latency),
+        nmea_clock_(settings.latency),
+        baseline_clock_(settings.latency) {}
 
-  /// `handler(report, stamp)` for every epoch, also those without a fix. Reads a bounded number of bytes.
+  /// `handler(report, stamp)` for every epoch, also those without a fix; `handler(baseline, stamp)`, where it takes
+  /// one, for every line between two antennas, also those that are no heading. Reads a bounded number of bytes.
   template <class Handler>
   constexpr void poll(base::Micros now, Handler&& handler) {
     Events<Handler> events{*this, handler, now};
@@ -64,6 +67,13 @@ class GnssDriver {
       if (r.protocol == Protocol::kUbx) driver.configurator_.on_report(now);
       handler(r, driver.stamp(r, now));
     }
+    constexpr void operator()(const Baseline& b) {
+      driver.configurator_.on_report(now);
+      const base::Micros itow{std::int64_t{b.itow_ms} * 1000};
+      const auto known = driver.ubx_clock_.at(itow, now);
+      const base::Micros stamp = known ? *known : driver.baseline_clock_.stamp(itow, now);
+      if constexpr (requires { handler(b, stamp); }) handler(b, stamp);
+    }
     constexpr void operator()(const ubx::Acknowledge& ack) {
       if (driver.settings_.configure) driver.configurator_.on_acknowledge(ack, now);
     }
@@ -72,18 +82,21 @@ class GnssDriver {
     }
   };
 
+  /// A doubtful time of day is not used: then the arrival is all that is known of the time.
   constexpr base::Micros stamp(const Report& r, base::Micros now) {
-    if (r.itow_ms) return clock_.stamp({std::int64_t{*r.itow_ms} * 1000}, now);
-    if (!r.utc.time_valid) return now - settings_.latency;
+    if (r.itow_ms) return ubx_clock_.stamp({std::int64_t{*r.itow_ms} * 1000}, now);
+    if (!r.utc.time_valid || r.time_doubtful) return now - settings_.latency;
     const std::int64_t s = r.utc.hour * 3600 + r.utc.minute * 60 + r.utc.second;
-    return clock_.stamp({s * 1'000'000 + r.utc.nano / 1000}, now);
+    return nmea_clock_.stamp({s * 1'000'000 + r.utc.nano / 1000}, now);
   }
 
   Port* port_;
   DriverSettings settings_;
   GnssReceiver<Capacity> receiver_;
   ubx::Configurator<Port> configurator_;
-  EpochClock clock_;
+  EpochClock ubx_clock_;       ///< by time of week
+  EpochClock nmea_clock_;      ///< by time of day
+  EpochClock baseline_clock_;  ///< by time of week, of a receiver that sends baselines alone
   base::Micros last_byte_{};
 };
 

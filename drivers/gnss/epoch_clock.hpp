@@ -6,6 +6,7 @@
 #include "base/time.hpp"
 
 #include <cstdint>
+#include <optional>
 
 namespace tetap::drivers::gnss {
 
@@ -33,7 +34,17 @@ class EpochClock {
     return at;
   }
 
+  /// When an epoch was, by the delays of others, for a message that comes late by nature; it changes nothing. Empty: no
+  /// epoch was stamped yet, or the message is later than any can be (the end of a week, a receiver that began anew).
+  [[nodiscard]] constexpr std::optional<base::Micros> at(base::Micros receiver_time, base::Micros arrival) const {
+    if (!running_) return {};
+    const base::Micros offset = arrival - receiver_time, apart = offset - least();
+    if (apart.us < -kJump_us || apart.us > kLatest_us) return {};
+    return receiver_time + (offset < least() ? offset : least()) - latency_;
+  }
+
  private:
+  static constexpr std::int64_t kLatest_us = 5'000'000;  ///< ours: u-blox waits a second for the reference's data
   static constexpr std::int64_t kJump_us = 500'000;
   static constexpr int kWindow = 32;  ///< at 5 Hz and 50 ppm the clocks part by 0.3 ms in it
   [[nodiscard]] constexpr base::Micros least() const { return earlier_ < current_ ? earlier_ : current_; }

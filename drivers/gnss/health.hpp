@@ -26,14 +26,40 @@ enum class Reason : std::uint8_t {
   kOutOfRange,        ///< a position or velocity that cannot be
   kBadTime,           ///< a date or time that does not exist
   kSecondProtocol,    ///< an NMEA epoch beside UBX epochs of the same content
+  kUnread,            ///< a whole message or sentence of a kind that the driver does not read
+  kLate,              ///< a message of an epoch that was handed on already
+  kRepeated,          ///< a sentence or an NMEA epoch that came twice, equal to the last character
+  kDoubtfulTime,      ///< an NMEA epoch whose time of day another fix has, too: it is reported with that mark
+  kGsaMode,           ///< a GSA whose fix mode another GSA of its epoch betters
+  kNoFix,             ///< a place that is no fix: dead reckoning, typed in, simulated or marked as not valid
+  kBaseline,          ///< a baseline between two antennas that is no heading
   kCount
 };
 
 inline constexpr std::array<std::string_view, static_cast<std::size_t>(Reason::kCount)> kReasonNames = {
-    "noise",          "UBX checksum",   "NMEA checksum",      "NMEA without checksum", "NMEA bad character",
-    "NMEA cut short", "RTCM CRC",       "too long",           "gap in frame",          "UBX length",
-    "UBX version",    "NMEA bad field", "data without epoch", "out of range",          "bad time",
-    "second protocol"};
+    "noise",
+    "UBX checksum",
+    "NMEA checksum",
+    "NMEA without checksum",
+    "NMEA bad character",
+    "NMEA cut short",
+    "RTCM CRC",
+    "too long",
+    "gap in frame",
+    "UBX length",
+    "UBX version",
+    "NMEA bad field",
+    "data without epoch",
+    "out of range",
+    "bad time",
+    "second protocol",
+    "not read",
+    "after its epoch",
+    "repeated",
+    "doubtful time",
+    "GSA of lesser mode",
+    "place without fix",
+    "baseline without heading"};
 
 [[nodiscard]] constexpr std::string_view name(Reason reason) {
   return reason < Reason::kCount ? kReasonNames[static_cast<std::size_t>(reason)] : std::string_view{"?"};

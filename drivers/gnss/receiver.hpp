@@ -5,6 +5,7 @@
 
 #include "drivers/gnss/framer.hpp"
 #include "drivers/gnss/nmea/epoch.hpp"
+#include "drivers/gnss/ubx/baseline.hpp"
 #include "drivers/gnss/ubx/epoch.hpp"
 
 #include <cstddef>
@@ -28,9 +29,10 @@ struct Identified {};
 
 struct ReceiverSettings {
   bool nmea_checksum_required = true;  ///< false: for old receivers that send none
+  float baseline_m = 0;                ///< between the antennas of a receiver with two; 0: the length is not checked
 };
 
-/// A handler is called with a Report and, where it takes them, with ubx::Acknowledge and ubx::Identified.
+/// A handler is called with a Report and, where it takes them, with a Baseline, ubx::Acknowledge and ubx::Identified.
 template <std::size_t Capacity = 1029>
 class GnssReceiver {
  public:
@@ -59,7 +61,7 @@ class GnssReceiver {
     Router<Handler> router{*this, handler};
     if (framer_.within_frame()) framer_.on_gap(health_, settings_.nmea_checksum_required, router);
     ubx_.finish(router);
-    nmea_.finish(router);
+    nmea_.finish(health_, router);
   }
 
   [[nodiscard]] constexpr const Health& health() const { return health_; }
@@ -72,23 +74,32 @@ class GnssReceiver {
     Handler& handler;
 
     constexpr void ubx(std::uint8_t message_class, std::uint8_t id, std::span<const std::uint8_t> payload) {
-      if (message_class == ubx::kClassNav) {
+      constexpr auto kRelPosNed = ubx::kNavMessages[static_cast<std::size_t>(ubx::Nav::kRelPosNed)];
+      if (message_class == ubx::kClassNav && id == kRelPosNed.id) {
+        // On its own: it waits for the reference antenna's data, and the place need not wait with it.
+        const auto baseline = ubx::baseline(payload, receiver.settings_.baseline_m, receiver.health_);
+        if (baseline) tell(*baseline);
+      } else if (message_class == ubx::kClassNav) {
         receiver.ubx_.on_nav(id, payload, receiver.health_, *this);
       } else if (message_class == ubx::kClassAck && id <= 1) {
         if (payload.size() != 2) return receiver.health_.add(Reason::kUbxLength);
         tell(ubx::Acknowledge{payload[0], payload[1], id == 1});
       } else if (message_class == ubx::kClassMon && id == 0x04 && payload.size() >= 40) {
         tell(ubx::Identified{});
+      } else {
+        receiver.health_.add(Reason::kUnread);
       }
     }
     constexpr void nmea(nmea::Text text) { receiver.nmea_.on_sentence(text, receiver.health_, *this); }
 
-    /// Protocol filter: the more exact one where a receiver sends the same epoch in UBX and NMEA.
+    /// UBX is the more exact of two protocols. Only a UBX epoch with a usable place holds NMEA back: NAV-STATUS,
+    /// NAV-POSLLH or NAV-VELNED alone is no fix.
     constexpr void operator()(const Report& report) {
       constexpr std::uint8_t kEpochsOfNmeaToWait = 3;
-      if (report.protocol == Protocol::kUbx) {
+      if (report.has_position && report.fix < sensor::GnssFix::k2d) receiver.health_.add(Reason::kNoFix);
+      if (report.usable() && report.protocol == Protocol::kUbx) {
         receiver.nmea_held_back_ = kEpochsOfNmeaToWait;
-      } else if (receiver.nmea_held_back_ > 0) {
+      } else if (report.protocol == Protocol::kNmea && receiver.nmea_held_back_ > 0) {
         --receiver.nmea_held_back_;
         return receiver.health_.add(Reason::kSecondProtocol);
       }

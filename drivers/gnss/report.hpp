@@ -36,6 +36,7 @@ struct Report {
   bool has_position = false;             ///< the two angles below mean something
   std::optional<std::uint32_t> itow_ms;  ///< GPS time of week; UBX only
   Utc utc{};
+  bool time_doubtful = false;       ///< other fixes have the same time of day: a receiver that cuts fractions off
   std::int64_t latitude_2ndeg = 0;  ///< units of 2e-9 deg, WGS84
   std::int64_t longitude_2ndeg = 0;
   float height_m = base::kNan;      ///< above the ellipsoid
@@ -54,6 +55,25 @@ struct Report {
   /// A place on Earth that the receiver itself calls valid.
   [[nodiscard]] constexpr bool usable() const { return has_position && fix >= sensor::GnssFix::k2d; }
 };
+
+/// Line between two antennas of one robot, from the moving reference antenna to the rover's, at one time of week.
+struct Baseline {
+  std::uint32_t itow_ms = 0;  ///< GPS time of week
+  bool valid = false;         ///< course usable as a heading; the driver counts the others
+  std::array<float, 3> n_m{base::kNan, base::kNan, base::kNan};  ///< east, north, up; NaN: only its direction is known
+  float length_m = base::kNan;
+  float length_acc_m = base::kNan;
+  float course_rad = base::kNan;  ///< direction of the line, clockwise from true north
+  float course_acc_rad = base::kNan;
+};
+
+/// Heading of the line, counter-clockwise from east, in the level frame of the place; empty: not valid. The filter's
+/// `gnss.baseline_b_m` is the same line in the body: from the reference antenna to the rover's.
+[[nodiscard]] constexpr std::optional<sensor::OutsideHeading> heading_of(const Baseline& baseline) {
+  if (!baseline.valid) return {};
+  return sensor::OutsideHeading{.yaw_rad = base::wrap_angle(0.5F * base::kPi - baseline.course_rad),
+                                .acc_rad = baseline.course_acc_rad};
+}
 
 /// Position that a filter may fuse; empty: this epoch has none, or none the receiver vouches for. From the covariance,
 /// where it came, the accuracies are the axes' own; else the receiver's figure is passed on as it is.

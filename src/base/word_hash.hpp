@@ -32,7 +32,7 @@ class WordHash {
 
  private:
   static constexpr std::uint32_t kGoldenRatio = 0x9E3779B1U;  ///< 2^32 divided by the golden ratio, the next odd prime
-  std::uint32_t state_ = kGoldenRatio;  ///< not 0, so that leading zeros count
+  std::uint32_t state_ = kGoldenRatio;                        ///< not 0, so that leading zeros count
 };
 
 }  // namespace tetap::base

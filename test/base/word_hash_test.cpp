@@ -23,7 +23,9 @@ std::uint32_t hash_of(const std::vector<std::uint32_t>& words) {
 std::vector<std::uint32_t> state() {
   std::vector<std::uint32_t> words;
   for (std::uint32_t i = 0; i < 120; ++i)
-    words.push_back(i % 3 == 0 ? 0U : i % 3 == 1 ? i : std::bit_cast<std::uint32_t>(1.0F + 1e-6F * static_cast<float>(i)));
+    words.push_back(i % 3 == 0   ? 0U
+                    : i % 3 == 1 ? i
+                                 : std::bit_cast<std::uint32_t>(1.0F + 1e-6F * static_cast<float>(i)));
   return words;
 }
 
@@ -77,9 +79,7 @@ TEST(WordHash, NumbersAreTheirBitsLeastSignificantWordFirst) {
 }
 
 // A recording that was made by one version is compared with a replay by another: the value may not change unseen.
-TEST(WordHash, KeepsItsValue) {
-  EXPECT_EQ(hash_of({1, 2, 3}), 0x49764487U);
-}
+TEST(WordHash, KeepsItsValue) { EXPECT_EQ(hash_of({1, 2, 3}), 0x49764487U); }
 
 }  // namespace
 }  // namespace tetap::base

@@ -27,7 +27,7 @@ void record(const Report& r, Words& out) {
       put(r.itow_ms.has_value());
   put(r.utc.year), put(r.utc.month), put(r.utc.day), put(r.utc.hour), put(r.utc.minute), put(r.utc.second),
       put(r.utc.nano);
-  put(r.utc.date_valid), put(r.utc.time_valid), put(r.latitude_2ndeg), put(r.longitude_2ndeg);
+  put(r.utc.date_valid), put(r.utc.time_valid), put(r.time_doubtful), put(r.latitude_2ndeg), put(r.longitude_2ndeg);
   const auto number = [&](float x) {
     if (!base::is_nan(x) && !base::is_finite(x)) fail("an infinite number");
     put(std::bit_cast<std::uint32_t>(x));
@@ -51,11 +51,26 @@ void record(const Report& r, Words& out) {
   static_cast<void>(velocity_of(r));
 }
 
+void record(const Baseline& b, Words& out) {
+  out.push_back(b.itow_ms);
+  out.push_back(b.valid ? 1 : 0);
+  for (const float x : {b.n_m[0], b.n_m[1], b.n_m[2], b.length_m, b.length_acc_m, b.course_rad, b.course_acc_rad}) {
+    if (!base::is_nan(x) && !base::is_finite(x)) fail("an infinite number in a baseline");
+    out.push_back(std::bit_cast<std::uint32_t>(x));
+  }
+  const auto heading = heading_of(b);
+  if (heading.has_value() != b.valid) fail("a heading of a line that is none");
+  if (heading && !(base::abs(heading->yaw_rad) <= base::kPi)) fail("a heading beyond half a turn");
+  if (heading && heading->acc_rad < 0) fail("a negative accuracy");
+}
+
 template <std::size_t Capacity>
 Words reports_of(std::span<const std::uint8_t> bytes, std::size_t piece, bool checksum, Health& health) {
   Words out;
   GnssReceiver<Capacity> receiver({.nmea_checksum_required = checksum});
-  const auto handler = [&](const Report& r) { record(r, out); };
+  const auto handler = [&](const auto& event) {
+    if constexpr (requires { record(event, out); }) record(event, out);
+  };
   for (std::size_t at = 0; at < bytes.size(); at += piece)
     receiver.on_bytes(bytes.subspan(at, std::min(piece, bytes.size() - at)), handler);
   receiver.finish(handler);

@@ -70,6 +70,7 @@ class Fields {
 
   [[nodiscard]] constexpr std::size_t count() const { return count_; }
   [[nodiscard]] constexpr bool ok() const { return ok_; }
+  constexpr void refuse() { ok_ = false; }
   [[nodiscard]] constexpr Text operator[](std::size_t i) const { return i < count_ ? fields_[i] : Text{}; }
   /// The one character of a field; 0: empty.
   constexpr char letter(std::size_t i) {
@@ -88,6 +89,14 @@ class Fields {
       return {};
     }
     return static_cast<std::int32_t>(*value);
+  }
+
+  /// From 0 to `limit`.
+  constexpr std::optional<std::int32_t> natural(std::size_t i, std::int32_t limit) {
+    const auto value = integer(i, 0, limit);
+    if (!value || *value >= 0) return value;
+    refuse();
+    return {};
   }
 
   /// With three decimals, or five; NaN: empty.

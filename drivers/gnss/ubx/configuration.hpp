@@ -18,6 +18,8 @@ struct Settings {
   std::uint16_t period_ms = 200;
   DynamicModel model = DynamicModel::kAutomotive;
   bool covariance = true;
+  bool high_precision = false;          ///< NAV-HPPOSLLH: the place to 0.1 mm, of receivers with RTK
+  bool baseline = false;                ///< NAV-RELPOSNED: the heading of two antennas
   base::Micros reply_timeout{300'000};  ///< on top of the time that a long reply takes on the line
   std::uint8_t tries = 3;               ///< attempts with each message
   std::uint8_t rounds = 4;              ///< through all baud rates
@@ -59,6 +61,8 @@ enum class Step : std::uint8_t {
   kRate,
   kPvt,
   kCov,
+  kHpPosLlh,
+  kRelPosNed,
   kModel,
   kPosLlh,
   kVelNed,
@@ -69,8 +73,9 @@ enum class Step : std::uint8_t {
 };
 
 [[nodiscard]] constexpr bool valid(const Settings& s) {
-  // An epoch of NAV-PVT and NAV-COV, ten bits a byte, within half the period.
-  const std::uint32_t bits = s.covariance ? 1720 : 1000;
+  // An epoch of NAV-PVT and the messages that are wanted besides, ten bits a byte, within half the period.
+  const std::uint32_t bits =
+      1000U + (s.covariance ? 720U : 0U) + (s.high_precision ? 440U : 0U) + (s.baseline ? 720U : 0U);
   return s.baud >= 9600 && s.baud <= 921'600 && s.period_ms >= 25 && s.period_ms <= 10'000 && s.tries > 0 &&
          s.rounds > 0 && s.reply_timeout.us > 0 && bits * 2000 <= s.baud * s.period_ms &&
          s.lost_after.us > 2000 * std::int64_t{s.period_ms} && s.rest.us >= 0;
@@ -91,6 +96,10 @@ enum class Step : std::uint8_t {
       return legacy ? legacy_enable(Nav::kPvt) : ValSet().set(Key::kNavPvtUart1, 1).finish();
     case Step::kCov:
       return ValSet().set(Key::kNavCovUart1, 1).finish();
+    case Step::kHpPosLlh:
+      return legacy ? legacy_enable(Nav::kHpPosLlh) : ValSet().set(Key::kNavHpPosLlhUart1, 1).finish();
+    case Step::kRelPosNed:
+      return legacy ? legacy_enable(Nav::kRelPosNed) : ValSet().set(Key::kNavRelPosNedUart1, 1).finish();
     case Step::kModel:
       return legacy ? legacy_model(settings.model)
                     : ValSet().set(Key::kDynamicModel, static_cast<std::uint32_t>(settings.model)).finish();

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Brings a u-blox receiver to send NAV-PVT and NAV-COV at the wanted rate and baud rate, and NMEA no more: finds its
-// baud rate, tries CFG-VALSET (M9, F9, M10), then the older CFG messages (M6 to M8), each acknowledged, with time-outs
-// and bounded retries. Runs on while the receiver does: one that lost its power is configured again.
+// Brings a u-blox receiver to send NAV-PVT and the messages wanted besides at the wanted rate and baud rate, and NMEA
+// no more: finds its baud rate, tries CFG-VALSET (M9, F9, M10), then the older CFG messages (M6 to M8), each
+// acknowledged, with time-outs and bounded retries. Runs on while the receiver does: one that lost its power is
+// configured again.
 #pragma once
 
 #include "base/time.hpp"
@@ -215,8 +216,14 @@ class Configurator {
       case Step::kRate:
         return Step::kPvt;
       case Step::kPvt:
-        return settings_.covariance && !legacy_ ? Step::kCov : Step::kModel;
+        if (settings_.covariance && !legacy_) return Step::kCov;
+        [[fallthrough]];
       case Step::kCov:
+        if (settings_.high_precision) return Step::kHpPosLlh;
+        [[fallthrough]];
+      case Step::kHpPosLlh:
+        return settings_.baseline ? Step::kRelPosNed : Step::kModel;
+      case Step::kRelPosNed:
         return Step::kModel;
       case Step::kModel:
         return has_pvt_ ? Step::kDone : Step::kPosLlh;

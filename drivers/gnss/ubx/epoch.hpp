@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Puts the UBX navigation messages of one time of week together into one report: NAV-PVT and NAV-COV of a current
-// receiver, or what an old one sends instead (NAV-SOL, -POSLLH, -VELNED, -STATUS, -DOP, -TIMEUTC; sources in nav.hpp).
+// Puts the UBX navigation messages of one time of week together into one report: NAV-PVT, NAV-COV and NAV-HPPOSLLH of a
+// current receiver, or the messages of an old one (NAV-SOL, -POSLLH, -VELNED, -STATUS, -DOP, -TIMEUTC; sources in
+// nav.hpp).
 #pragma once
 
 #include "base/wgs84.hpp"
@@ -23,13 +24,15 @@ class Epoch {
   constexpr void on_nav(std::uint8_t id, std::span<const std::uint8_t> payload, Health& health, Sink& sink) {
     std::size_t kind = 0;
     while (kind < kNavKinds && kNavMessages[kind].id != id) ++kind;
-    if (kind == kNavKinds) return;
+    if (kind == kNavKinds) return health.add(Reason::kUnread);
     const auto nav = static_cast<Nav>(kind);
     if (payload.size() != kNavMessages[kind].length && !(nav == Nav::kPvt && payload.size() == kOldPvtLength)) {
       return health.add(Reason::kUbxLength);
     }
     const Fields f{payload};
-    if (!open_ || f.u4(0) != report_.itow_ms) begin(f.u4(0), sink);
+    const std::uint32_t itow_ms = f.u4(kNavMessages[kind].itow_at);
+    if (!open_ || itow_ms != report_.itow_ms) begin(itow_ms, sink);
+    if (done_ && nav != Nav::kEndOfEpoch) health.add(Reason::kLate);
     seen_ |= 1U << kind;
     take(nav, f, health);
     if (end_.arrived(kind) || nav == Nav::kEndOfEpoch) finish(sink);
@@ -40,8 +43,8 @@ class Epoch {
   constexpr void finish(Sink& sink) {
     if (!open_ || done_) return;
     done_ = true;
-    constexpr std::uint32_t kSolution =
-        bit(Nav::kPvt) | bit(Nav::kPosLlh) | bit(Nav::kSol) | bit(Nav::kPosEcef) | bit(Nav::kStatus);
+    constexpr std::uint32_t kSolution = bit(Nav::kPvt) | bit(Nav::kPosLlh) | bit(Nav::kHpPosLlh) | bit(Nav::kSol) |
+                                        bit(Nav::kPosEcef) | bit(Nav::kStatus);
     if ((seen_ & kSolution) == 0) return;
     if (!has(Nav::kPvt)) compose();
     sink(static_cast<const Report&>(report_));
@@ -62,6 +65,7 @@ class Epoch {
     position_m_.reset();
     velocity_mps_.reset();
     from_sol_ = false;
+    fine_ = false;
   }
 
   constexpr void take(Nav nav, const Fields& f, Health& health) {
@@ -72,6 +76,8 @@ class Epoch {
         return cov(f, health);
       case Nav::kSol:
         return sol(f);
+      case Nav::kHpPosLlh:
+        return hp_pos_llh(f, health);
       case Nav::kDop:
         report_.pdop = f.su2(6, kCenti);
         report_.vdop = f.su2(10, kCenti);
@@ -99,6 +105,17 @@ class Epoch {
     if (!set_utc(f, 4, (valid & 1) != 0, (valid & 2) != 0, f.i4(16), r.utc)) health.add(Reason::kBadTime);
     r.fix = fix_of(f.u1(20), (flags & 1) != 0, (flags & 2) != 0, flags >> 6);
     r.satellites = f.u1(23);
+    if (!fine_) pvt_position(f, health);
+    set_velocity(f.si4(48, kMilli), f.si4(52, kMilli), f.si4(56, kMilli), health);
+    r.speed_mps = f.si4(60, kMilli);
+    r.course_rad = f.si4(64, k1e5degPerRad);
+    r.speed_acc_mps = f.su4(68, kMilli);
+    r.course_acc_rad = f.su4(72, k1e5degPerRad);
+    r.pdop = f.su2(76, kCenti);
+  }
+
+  constexpr void pvt_position(const Fields& f, Health& health) {
+    Report& r = report_;
     // flags3, bit 0: latitude, longitude and heights are not valid.
     r.has_position = (f.u2(78) & 1) == 0 && f.u1(20) >= 1 && f.u1(20) <= 4;
     if (r.has_position && !set_angles(f.i4(28), f.i4(24), r)) refuse_position(health);
@@ -108,12 +125,27 @@ class Epoch {
     }
     r.horizontal_acc_m = f.su4(40, kMilli);
     r.vertical_acc_m = f.su4(44, kMilli);
-    set_velocity(f.si4(48, kMilli), f.si4(52, kMilli), f.si4(56, kMilli), health);
-    r.speed_mps = f.si4(60, kMilli);
-    r.course_rad = f.si4(64, k1e5degPerRad);
-    r.speed_acc_mps = f.su4(68, kMilli);
-    r.course_acc_rad = f.su4(72, k1e5degPerRad);
-    r.pdop = f.su2(76, kCenti);
+  }
+
+  /// The place to 0.1 mm; it takes precedence over the other messages of its epoch. One that is not valid (flags, bit
+  /// 0) leaves the place of the others.
+  constexpr void hp_pos_llh(const Fields& f, Health& health) {
+    if (f.u1(0) != 0) return health.add(Reason::kUbxVersion);
+    if ((f.u1(3) & 1) != 0) return health.add(Reason::kNoFix);
+    constexpr int kAngle = 99, kHeight = 9;
+    const bool parts = fine_part(f.i1(24), kAngle) && fine_part(f.i1(25), kAngle) && fine_part(f.i1(26), kHeight) &&
+                       fine_part(f.i1(27), kHeight);
+    Report& r = report_;
+    if (!parts || !set_angles_ndeg(std::int64_t{f.i4(12)} * 100 + f.i1(25), std::int64_t{f.i4(8)} * 100 + f.i1(24), r))
+      return health.add(Reason::kOutOfRange);
+    const auto height_m = [&](std::size_t at, std::size_t part) {
+      return static_cast<float>(static_cast<double>(std::int64_t{f.i4(at)} * 10 + f.i1(part)) / 10'000.0);
+    };
+    r.height_m = height_m(16, 26);
+    r.height_msl_m = height_m(20, 27);
+    r.horizontal_acc_m = f.su4(28, kTenthMilli);
+    r.vertical_acc_m = f.su4(32, kTenthMilli);
+    fine_ = true;
   }
 
   constexpr void cov(const Fields& f, Health& health) {
@@ -140,6 +172,7 @@ class Epoch {
   constexpr void old(Nav nav, const Fields& f, Health& health) {
     Report& r = report_;
     if (nav == Nav::kPosLlh) {
+      if (fine_) return;
       if (!set_angles(f.i4(8), f.i4(4), r)) return refuse_position(health);
       r.height_m = f.si4(12, kMilli);
       r.height_msl_m = f.si4(16, kMilli);
@@ -152,7 +185,9 @@ class Epoch {
       r.speed_acc_mps = f.su4(28, kCenti);
       r.course_acc_rad = f.su4(32, k1e5degPerRad);
     } else if (nav == Nav::kStatus && !from_sol_) {
-      r.fix = fix_of(f.u1(4), (f.u1(5) & 1) != 0, (f.u1(5) & 2) != 0, 0);
+      // fixStat, bit 1: flags2 has the carrier solution in bits 7 and 6; older receivers leave both 0.
+      const std::uint8_t carrier = (f.u1(6) & 2) != 0 ? f.u1(7) >> 6 : 0;
+      r.fix = fix_of(f.u1(4), (f.u1(5) & 1) != 0, (f.u1(5) & 2) != 0, carrier);
     } else if (nav == Nav::kPosEcef && !from_sol_) {
       position_m_ = centi3(f, 4);
       position_acc_m_ = f.su4(16, kCenti);
@@ -168,7 +203,7 @@ class Epoch {
     if (!position_m_.has_value()) return;
     const auto at = base::geodetic_of(*position_m_);
     if (!at.has_value()) return;
-    if (!has(Nav::kPosLlh)) {
+    if (!has(Nav::kPosLlh) && !fine_) {
       r.latitude_2ndeg = at->latitude_2ndeg;
       r.longitude_2ndeg = at->longitude_2ndeg;
       r.has_position = true;
@@ -210,6 +245,7 @@ class Epoch {
   bool open_ = false;
   bool done_ = false;
   bool from_sol_ = false;
+  bool fine_ = false;  ///< the place is that of NAV-HPPOSLLH
 };
 
 }  // namespace tetap::drivers::gnss::ubx

@@ -80,7 +80,9 @@ enum class Key : std::uint32_t {
   kRateNavigation = 0x3021'0002,
   kDynamicModel = 0x2011'0021,
   kNavPvtUart1 = 0x2091'0007,
-  kNavCovUart1 = 0x2091'0084
+  kNavHpPosLlhUart1 = 0x2091'0034,
+  kNavCovUart1 = 0x2091'0084,
+  kNavRelPosNedUart1 = 0x2091'008E
 };
 
 class ValSet {

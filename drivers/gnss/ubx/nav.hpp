@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Payloads of the UBX navigation messages, field by field. Sources: u-blox F9 HPG 1.32 interface description
-// (UBX-22008968), sec. 3.15: UBX-NAV-PVT, -COV, -POSLLH, -VELNED, -STATUS, -DOP, -TIMEUTC, -TIMEGPS, -POSECEF,
-// -VELECEF, -EOE; u-blox 8 / M8 protocol specification (UBX-13003221), sec. 32.17: UBX-NAV-SOL.
+// (UBX-22008968), sec. 3.15: UBX-NAV-PVT, -COV, -POSLLH, -HPPOSLLH, -RELPOSNED, -VELNED, -STATUS, -DOP, -TIMEUTC,
+// -TIMEGPS, -POSECEF, -VELECEF, -EOE; u-blox 8 / M8 protocol specification (UBX-13003221), sec. 32.17: UBX-NAV-SOL.
 #pragma once
 
 #include "drivers/gnss/calendar.hpp"
@@ -26,9 +26,11 @@ enum class Nav : std::uint8_t {
   kPvt,
   kVelEcef,
   kVelNed,
+  kHpPosLlh,
   kTimeGps,
   kTimeUtc,
   kCov,
+  kRelPosNed,
   kEndOfEpoch,
   kCount
 };
@@ -37,6 +39,7 @@ inline constexpr std::size_t kNavKinds = static_cast<std::size_t>(Nav::kCount);
 struct NavMessage {
   std::uint8_t id;
   std::uint8_t length;
+  std::uint8_t itow_at = 0;  ///< offset of the time of week
 };
 /// In the order of Nav. NAV-PVT was 84 bytes long before protocol 15 (M7).
 inline constexpr std::array<NavMessage, kNavKinds> kNavMessages{{{0x01, 20},
@@ -47,11 +50,14 @@ inline constexpr std::array<NavMessage, kNavKinds> kNavMessages{{{0x01, 20},
                                                                  {0x07, 92},
                                                                  {0x11, 20},
                                                                  {0x12, 36},
+                                                                 {0x14, 36, 4},
                                                                  {0x20, 16},
                                                                  {0x21, 20},
                                                                  {0x36, 64},
+                                                                 {0x3C, 64, 4},
                                                                  {0x61, 4}}};
 inline constexpr std::size_t kOldPvtLength = 84;
+inline constexpr std::size_t kOldRelPosNedLength = 40;  ///< version 0, of the M8P: no heading, no length
 
 /// Little-endian fields; the caller has checked the length.
 struct Fields {
@@ -63,6 +69,7 @@ struct Fields {
   [[nodiscard]] constexpr std::uint32_t u4(std::size_t at) const {
     return std::uint32_t{u2(at)} | std::uint32_t{u2(at + 2)} << 16;
   }
+  [[nodiscard]] constexpr std::int8_t i1(std::size_t at) const { return static_cast<std::int8_t>(bytes[at]); }
   [[nodiscard]] constexpr std::int16_t i2(std::size_t at) const { return static_cast<std::int16_t>(u2(at)); }
   [[nodiscard]] constexpr std::int32_t i4(std::size_t at) const { return static_cast<std::int32_t>(u4(at)); }
   [[nodiscard]] constexpr float r4(std::size_t at) const { return std::bit_cast<float>(u4(at)); }
@@ -72,7 +79,7 @@ struct Fields {
   [[nodiscard]] constexpr float su2(std::size_t at, float per) const { return static_cast<float>(u2(at)) / per; }
 };
 
-inline constexpr float kMilli = 1000, kCenti = 100;
+inline constexpr float kMilli = 1000, kCenti = 100, kTenthMilli = 10'000;
 inline constexpr float k1e5degPerRad = 5.7295780e6F;
 
 /// gpsFix and fixType are the same scale: 0 none, 1 dead reckoning only, 2 2D, 3 3D, 4 GNSS and dead reckoning, 5 time.
@@ -87,18 +94,24 @@ inline constexpr float k1e5degPerRad = 5.7295780e6F;
   return differential ? GnssFix::kDifferential : GnssFix::k3d;
 }
 
-/// False: not on Earth.
-[[nodiscard]] constexpr bool set_angles(std::int32_t latitude_1e7deg, std::int32_t longitude_1e7deg, Report& out) {
-  constexpr std::int32_t kPole = 900'000'000, kDateLine = 1'800'000'000;
-  if (latitude_1e7deg > kPole || latitude_1e7deg < -kPole || longitude_1e7deg > kDateLine ||
-      longitude_1e7deg < -kDateLine) {
+/// False: not on Earth. Rounded half away from zero to the units of the report.
+[[nodiscard]] constexpr bool set_angles_ndeg(std::int64_t latitude_ndeg, std::int64_t longitude_ndeg, Report& out) {
+  constexpr std::int64_t kPole = 90'000'000'000, kDateLine = 180'000'000'000;
+  if (latitude_ndeg > kPole || latitude_ndeg < -kPole || longitude_ndeg > kDateLine || longitude_ndeg < -kDateLine)
     return false;
-  }
-  out.latitude_2ndeg = std::int64_t{latitude_1e7deg} * 50;
-  out.longitude_2ndeg = std::int64_t{longitude_1e7deg} * 50;
+  const auto half = [](std::int64_t x) { return (x + (x < 0 ? -1 : 1)) / 2; };
+  out.latitude_2ndeg = half(latitude_ndeg);
+  out.longitude_2ndeg = half(longitude_ndeg);
   out.has_position = true;
   return true;
 }
+[[nodiscard]] constexpr bool set_angles(std::int32_t latitude_1e7deg, std::int32_t longitude_1e7deg, Report& out) {
+  return set_angles_ndeg(std::int64_t{latitude_1e7deg} * 100, std::int64_t{longitude_1e7deg} * 100, out);
+}
+
+/// The parts that NAV-HPPOSLLH and NAV-RELPOSNED add to a coarser field are within +-99 hundredths of its unit, heights
+/// of NAV-HPPOSLLH within +-9 tenths.
+[[nodiscard]] constexpr bool fine_part(std::int8_t part, int most) { return part >= -most && part <= most; }
 
 /// Year, month, day, hour, minute, second from offset `at` on. False: marked as valid, but no such date or time.
 [[nodiscard]] constexpr bool set_utc(const Fields& f, std::size_t at, bool date, bool time, std::int32_t nano,

@@ -38,6 +38,7 @@ enum class Reason : std::uint8_t {
   kStale,            ///< no sample for too long
   kStuckAccel,       ///< the same values for too long; withheld until they move
   kStuckGyro,
+  kRepeatedGyro,  ///< all three axes as before, amid a turn; delivered
   kClippedAccel,  ///< at the end of the range; delivered and marked
   kClippedGyro,
   kClockOff,  ///< the chip's clock is further off than it may be
@@ -65,6 +66,7 @@ inline constexpr auto kReasons = static_cast<std::size_t>(Reason::kCount);
                                                              "stale",
                                                              "accel stuck",
                                                              "gyro stuck",
+                                                             "gyro repeated",
                                                              "accel clipped",
                                                              "gyro clipped",
                                                              "clock off",

@@ -55,8 +55,10 @@ struct Settings {
   /// Besides the interface filter's (5.5): the anti-alias filter's, for which the sheet has no number (a second order
   /// of bandwidth f is sqrt(2) / (2 pi f) late, 0.9 ms at 258 Hz), and what a calibration found.
   std::int32_t more_delay_us = 0;
-  std::uint16_t stuck_accel_samples = 100;  ///< one axis with the same value so often in a row is a fault; 0: never
-  std::uint16_t stuck_gyro_samples = 2000;  ///< 0 when filtered below 25 Hz at 16 bits: less noise than a count
+  /// One axis with the same value so often in a row is a fault; 0: never. Filters that leave less noise raise the
+  /// number by themselves (noise.hpp).
+  std::uint16_t stuck_accel_samples = 100;
+  std::uint16_t stuck_gyro_samples = 2000;
 
   /// Bytes of one packet in the FIFO (6.4).
   [[nodiscard]] constexpr int packet_size() const { return resolution == Resolution::k20bit ? 20 : 16; }
@@ -169,7 +171,8 @@ inline constexpr std::size_t kFieldCount = 38;
       {kDriveConfig, kSlewRates, kSlewRatesSpi},
       {kIntConfig, kInt1Fields, kInt1PushPullActiveHigh},
       {kIntfConfig0, kIntfFields, kIntfMarkBytesBigSpi},
-      {kIntfConfig1, kRtcMode | kClockSelect, byte(kClockPll | (s.external() ? kRtcMode : 0))},
+      {kIntfConfig1, kRangeSwitch | kRtcMode | kClockSelect,
+       byte(kRangeSwitchOff | kClockPll | (s.external() ? kRtcMode : 0))},
       {kGyroConfig0, kRangeAndRate, byte(byte(s.gyro_range) << kRangeShift | byte(s.rate))},
       {kAccelConfig0, kRangeAndRate, byte(byte(s.accel_range) << kRangeShift | byte(s.rate))},
       {kGyroConfig1, kGyroFilterOrder, byte(order << kGyroFilterOrderShift)},

@@ -5,6 +5,7 @@
 
 #include "drivers/imu/clock_map.hpp"
 #include "drivers/imu/icm42688/health.hpp"
+#include "drivers/imu/icm42688/noise.hpp"
 #include "drivers/imu/icm42688/packet.hpp"
 #include "drivers/imu/reading.hpp"
 
@@ -16,7 +17,10 @@ class Stream {
       : settings_(settings),
         scales_(scales(settings)),
         clock_(settings.tick_q32()),
-        delay_{group_delay_us(settings) + settings.more_delay_us} {}
+        delay_{group_delay_us(settings) + settings.more_delay_us},
+        accel_limit_(stuck_samples(settings.stuck_accel_samples, noise_counts(settings).accel, settings)),
+        gyro_limit_(stuck_samples(settings.stuck_gyro_samples, noise_counts(settings).gyro, settings)),
+        turn_(static_cast<std::int32_t>(4.0F + kTurnSigmas * noise_counts(settings).gyro)) {}
 
   [[nodiscard]] constexpr std::int32_t clock_error_ppm() const { return clock_.rate_error_ppm(); }
 
@@ -30,6 +34,8 @@ class Stream {
   constexpr void interrupt() {
     follows_ = false;
     accel_ = gyro_ = {};
+    change_ = 0;
+    has_rate_ = false;
   }
 
   /// `packets`, oldest first, are the first of `waiting` that were in the FIFO at `now`. True: time went on.
@@ -123,8 +129,9 @@ class Stream {
     follows_ = stamped_ = true;
     after_withheld_ = true;
     if (packet.kind != PacketKind::kSample) return health.add(Reason::kInvalidSample), true;
-    const bool stuck_accel = stuck(packet.accel, accel_, settings_.stuck_accel_samples);
-    const bool stuck_gyro = stuck(packet.gyro, gyro_, settings_.stuck_gyro_samples);
+    if (repeats(packet.gyro)) health.add(Reason::kRepeatedGyro);
+    const bool stuck_accel = stuck(packet.accel, accel_, accel_limit_);
+    const bool stuck_gyro = stuck(packet.gyro, gyro_, gyro_limit_);
     if (stuck_accel) health.add(Reason::kStuckAccel);
     if (stuck_gyro) health.add(Reason::kStuckGyro);
     if (stuck_accel || stuck_gyro) return true;
@@ -154,6 +161,21 @@ class Stream {
     return any;
   }
 
+  /// The same triple although the rate was changing by more than noise does: at rest equal triples are common.
+  constexpr bool repeats(const std::array<std::int32_t, 3>& now) {
+    const bool first = !has_rate_;
+    has_rate_ = true;
+    if (!first && now == gyro_.value) return change_ > turn_;
+    change_ = 0;
+    for (std::size_t i = 0; i < 3 && !first; ++i) {
+      const std::int32_t step = now[i] - gyro_.value[i];
+      const std::int32_t size = step < 0 ? -step : step;
+      if (size > change_) change_ = size;
+    }
+    return false;
+  }
+
+  static constexpr float kTurnSigmas = 11.3F;  ///< 8 sigma of a difference of two samples
   static constexpr base::Micros kLongGap{1'000'000};
   static constexpr base::Micros kAhead{200};  ///< allowance for stamps after `now`, which ages during the read
   static constexpr std::uint8_t kRefusals = 8;
@@ -162,6 +184,10 @@ class Stream {
   Scales scales_;
   ClockMap clock_;
   base::Micros delay_;
+  std::uint16_t accel_limit_, gyro_limit_;  ///< equal samples in a row that are a fault; 0: never
+  std::int32_t turn_;                       ///< counts from sample to sample that are no noise
+  std::int32_t change_ = 0;                 ///< largest axis of the last change of the rate
+  bool has_rate_ = false;                   ///< a rate came since the last interruption
   base::Micros taken_{};
   base::Micros last_stamp_{};
   std::int64_t last_ticks_ = 0;

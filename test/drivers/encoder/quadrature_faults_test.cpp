@@ -131,6 +131,100 @@ TEST(QuadratureFault, ACounterThatIsResetIsFollowed) {
   EXPECT_NEAR(bench.driver.counts_per_s(), -2000, 30);
 }
 
+/// Counts that the driver adds when the counter is set to 0 once, at this pace; readings are plain numbers.
+template <class C>
+std::int64_t added_by_reset(C standing_at, double counts_per_s, std::int64_t every_us,
+                            const QuadratureSettings& settings, EncoderHealth* health = nullptr) {
+  Quadrature<C> driver(settings);
+  const double sense = settings.inverted ? -1 : 1;
+  std::int64_t t = 0;
+  const auto moved = [&](std::int64_t at) {
+    return std::llround(sense * counts_per_s * 1e-6 * static_cast<double>(at));
+  };
+  const auto reading = [&](std::int64_t base_count) { return static_cast<C>(base_count + moved(t)); };
+  driver.update({reading(standing_at), {}}, {t});
+  std::int64_t offset = standing_at;
+  for (int i = 0; i < 200; ++i) {
+    t += every_us;
+    if (i == 100) offset = -moved(t);  // the counter reads 0 here and goes on from there
+    driver.update({reading(offset), {}}, {t});
+  }
+  if (health != nullptr) *health = driver.health();
+  const std::int64_t truth = std::llround(counts_per_s * 1e-6 * static_cast<double>(t));
+  return driver.counts() - truth;
+}
+
+TEST(QuadratureFault, ARefusedResetIsNeverCountedAsMotionAtAnyPaceSpeedOrDistance) {
+  for (const std::int64_t every_us : {1'000, 5'000, 10'000, 20'000}) {
+    const double most_per_update = 200'000.0 * 1e-6 * static_cast<double>(every_us);
+    for (int standing_at = 250; standing_at <= 32'000; standing_at += 250) {
+      for (const double speed : {0.0, 3'000.0, -3'000.0}) {
+        for (const bool inverted : {false, true}) {
+          // A jump that one update can pass cannot be told from motion, and half a turn of the counter has no sign.
+          const double sense = inverted ? -1.0 : 1.0, way = 1e-6 * speed * static_cast<double>(every_us);
+          const double jump = standing_at + sense * way * 100;
+          if (jump < most_per_update + std::abs(way) + 10 || jump > 32'000) continue;
+          EncoderHealth health;
+          const auto added = added_by_reset<std::uint16_t>(static_cast<std::uint16_t>(standing_at), speed, every_us,
+                                                           {.inverted = inverted}, &health);
+          // The motion of the readings until the new count is confirmed is lost.
+          const double lost = std::abs(speed) * 1e-6 * 7 * static_cast<double>(every_us) + 2;
+          EXPECT_LE(std::abs(static_cast<double>(added)), lost)
+              << "at " << standing_at << ", " << speed << "/s, every " << every_us << (inverted ? " inverted" : "");
+          EXPECT_GE(health.of(EncoderReason::kJump), 1);
+          EXPECT_EQ(health.of(EncoderReason::kRebased), 1);
+        }
+      }
+    }
+  }
+}
+
+TEST(QuadratureFault, AWrongReadingCostsNothingWhetherTheWheelStandsOrTurns) {
+  for (const int bit : {12, 13, 14, 15}) {
+    for (const double speed : {0.0, 20'000.0, -20'000.0, 120'000.0, -120'000.0}) {
+      for (const int wrong : {1, 2}) {
+        Quadrature<std::uint16_t> driver;
+        std::int64_t t = 0;
+        const auto truth = [&] { return std::llround(speed * 1e-6 * static_cast<double>(t)); };
+        driver.update({0, {}}, {t});
+        for (int i = 0; i < 100; ++i) {
+          t += 5'000;
+          auto count = static_cast<std::uint16_t>(truth());
+          // Each wrong reading is wrong in another bit.
+          if (i >= 50 && i < 50 + wrong) count = static_cast<std::uint16_t>(count ^ 1U << (bit - (i - 50)));
+          driver.update({count, {}}, {t});
+        }
+        EXPECT_EQ(driver.counts(), truth()) << bit << ' ' << speed << ' ' << wrong;
+        EXPECT_EQ(driver.health().of(EncoderReason::kRebased), 0);
+      }
+    }
+  }
+}
+
+TEST(QuadratureFault, ARefusedResetStaysRefusedWhenTheNextUpdatesComeLater) {
+  for (const std::int64_t later_us : {11'000, 15'000, 25'000, 50'000}) {
+    Quadrature<std::uint16_t> driver;
+    std::int64_t t = 0;
+    driver.update({2'100, {}}, {t});
+    for (int i = 0; i < 20; ++i) driver.update({2'100, {}}, {t += 10'000});
+    driver.update({0, {}}, {t += 10'000});  // beyond what 10 ms allow, within what the next pause allows
+    for (int i = 0; i < 20; ++i) driver.update({0, {}}, {t += later_us});
+    EXPECT_EQ(driver.counts(), 0) << later_us;
+    EXPECT_GE(driver.health().of(EncoderReason::kJump), 1);
+  }
+}
+
+TEST(QuadratureFault, AWrongReadingBeforeALongPauseIsForgotten) {
+  Quadrature<std::uint16_t> driver;
+  std::int64_t t = 0;
+  driver.update({5'000, {}}, {t});
+  for (int i = 0; i < 20; ++i) driver.update({5'000, {}}, {t += 10'000});
+  driver.update({1'000, {}}, {t += 10'000});  // refused
+  for (int i = 0; i < 20; ++i) driver.update({5'000, {}}, {t += 60'000});
+  EXPECT_EQ(driver.counts(), 0);
+  EXPECT_EQ(driver.health().of(EncoderReason::kJump), 1);
+}
+
 TEST(QuadratureFault, WithoutCaptureSpeedComesFromTheTickAlone) {
   Bench<std::uint16_t> bench;
   bench.encoder.inject(EncoderFault::kNoCapture);

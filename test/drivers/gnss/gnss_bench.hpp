@@ -31,10 +31,15 @@ struct Bench {
   void step() {
     now += base::Micros{2'000};
     receiver.advance(now);
-    driver.poll(now, [&](const Report& r, base::Micros stamp) {
-      reports.push_back(r);
-      stamps.push_back(stamp);
-    });
+    driver.poll(now, *this);
+  }
+  void operator()(const Report& r, base::Micros stamp) {
+    reports.push_back(r);
+    stamps.push_back(stamp);
+  }
+  void operator()(const Baseline& b, base::Micros stamp) {
+    baselines.push_back(b);
+    baseline_stamps.push_back(stamp);
   }
   void run(double s) {
     for (const auto end = now + base::Micros{static_cast<std::int64_t>(s * 1e6)}; now < end;) step();
@@ -46,6 +51,8 @@ struct Bench {
   base::Micros now{};
   std::vector<Report> reports;
   std::vector<base::Micros> stamps;
+  std::vector<Baseline> baselines;
+  std::vector<base::Micros> baseline_stamps;
 };
 
 }  // namespace tetap::drivers::gnss

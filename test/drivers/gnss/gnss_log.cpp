@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// gnss_log FILE: the bytes of a receiver's log through the driver; every report as one line of JSON, then one line of
-// what was refused. For the comparison with other decoders in logs_test.py.
+// gnss_log FILE: the bytes of a receiver's log through the driver; every report and every baseline as one line of JSON,
+// then one line with the counts of refusals. For the comparison with other decoders in logs_test.py and cases_test.py.
 #include "drivers/gnss/receiver.hpp"
 
 #include <cinttypes>
@@ -23,6 +23,7 @@ void print(const Report& r) {
   const Utc& t = r.utc;
   if (t.date_valid) std::printf(",\"date\":\"%04d-%02d-%02d\"", t.year, t.month, t.day);
   if (t.time_valid) std::printf(",\"tod_s\":%.9f", t.hour * 3600 + t.minute * 60 + t.second + 1e-9 * t.nano);
+  if (r.time_doubtful) std::printf(",\"doubtful\":true");
   if (r.has_position) {
     std::printf(",\"lat\":%.9f,\"lon\":%.9f", static_cast<double>(r.latitude_2ndeg) * 2e-9,
                 static_cast<double>(r.longitude_2ndeg) * 2e-9);
@@ -43,6 +44,24 @@ void print(const Report& r) {
   std::printf("}\n");
 }
 
+void print(const Baseline& b) {
+  std::printf("{\"baseline\":%s,\"itow\":%" PRIu32, b.valid ? "true" : "false", b.itow_ms);
+  number("east", b.n_m[0]);
+  number("north", b.n_m[1]);
+  number("up", b.n_m[2]);
+  number("length", b.length_m);
+  number("length_acc", b.length_acc_m);
+  number("course", b.course_rad * 57.29577951F);
+  number("course_acc", b.course_acc_rad * 57.29577951F);
+  if (const auto heading = heading_of(b)) number("yaw", heading->yaw_rad * 57.29577951F);
+  std::printf("}\n");
+}
+
+struct Printer {
+  void operator()(const Report& r) const { print(r); }
+  void operator()(const Baseline& b) const { print(b); }
+};
+
 }  // namespace
 }  // namespace tetap::drivers::gnss
 
@@ -53,8 +72,9 @@ int main(int argc, char** argv) {
   if (!file) return std::fprintf(stderr, "%s: cannot read\n", argv[1]), 1;
   const std::vector<char> text{std::istreambuf_iterator<char>(file), {}};
   GnssReceiver<> receiver({.nmea_checksum_required = false});
-  for (const char c : text) receiver.on_byte(static_cast<std::uint8_t>(c), print);
-  receiver.finish(print);
+  const Printer printer;
+  for (const char c : text) receiver.on_byte(static_cast<std::uint8_t>(c), printer);
+  receiver.finish(printer);
   const Health& h = receiver.health();
   std::printf("{\"ubx_frames\":%" PRIu32 ",\"nmea_frames\":%" PRIu32 ",\"rtcm_frames\":%" PRIu32, h.ubx_frames,
               h.nmea_frames, h.rtcm_frames);

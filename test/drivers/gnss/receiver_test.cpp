@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Laws of the byte-fed receiver: whatever the division of the bytes, the damage and what stands between, whole frames
 // are understood and nothing else; then each message against its description, field by field.
-#include "drivers/gnss/receiver.hpp"
+#include "drivers/gnss/gnss_bytes.hpp"
 
 #include <gtest/gtest.h>
 
-#include <bit>
 #include <cctype>
 #include <cmath>
 #include <cstdio>
@@ -17,31 +16,6 @@ namespace tetap::drivers::gnss {
 namespace {
 
 using sensor::GnssFix;
-using Bytes = std::vector<std::uint8_t>;
-
-Bytes ubx_frame(std::uint8_t message_class, std::uint8_t id, const Bytes& payload) {
-  Bytes out{0xB5,
-            0x62,
-            message_class,
-            id,
-            static_cast<std::uint8_t>(payload.size() & 0xFF),
-            static_cast<std::uint8_t>(payload.size() >> 8)};
-  for (const std::uint8_t byte : payload) out.push_back(byte);
-  unsigned a = 0, b = 0;
-  for (std::size_t i = 2; i < out.size(); ++i) b += a += out[i];
-  out.push_back(static_cast<std::uint8_t>(a));
-  out.push_back(static_cast<std::uint8_t>(b));
-  return out;
-}
-
-Bytes sentence(const std::string& text) {
-  unsigned sum = 0;
-  for (const char c : text) sum ^= static_cast<unsigned char>(c);
-  char end[8];
-  std::snprintf(end, sizeof end, "*%02X\r\n", sum);
-  const std::string whole = "$" + text + end;
-  return {whole.begin(), whole.end()};
-}
 
 Bytes rtcm_frame(const Bytes& payload) {
   Bytes out{0xD3, static_cast<std::uint8_t>(payload.size() >> 8), static_cast<std::uint8_t>(payload.size() & 0xFF)};
@@ -51,66 +25,12 @@ Bytes rtcm_frame(const Bytes& payload) {
   return out;
 }
 
-void put(Bytes& p, std::size_t at, std::int64_t value, std::size_t size) {
-  for (std::size_t i = 0; i < size; ++i) p[at + i] = static_cast<std::uint8_t>(value >> (8 * i));
-}
-void put_float(Bytes& p, std::size_t at, float value) { put(p, at, std::bit_cast<std::uint32_t>(value), 4); }
-
-/// NAV-PVT with another value in every field.
-Bytes pvt(std::uint32_t itow = 100'000, std::size_t length = 92) {
-  Bytes p(length, 0);
-  put(p, 0, itow, 4);
-  put(p, 4, 2024, 2);
-  put(p, 6, 2, 1), put(p, 7, 29, 1), put(p, 8, 23, 1), put(p, 9, 59, 1), put(p, 10, 60, 1);
-  put(p, 11, 0x07, 1);
-  put(p, 16, -123'456, 4);
-  put(p, 20, 3, 1), put(p, 21, 0x01, 1), put(p, 23, 17, 1);
-  put(p, 24, -1'213'142'468, 4), put(p, 28, 440'690'105, 4);
-  put(p, 32, 1'125'900, 4), put(p, 36, 1'147'200, 4);
-  put(p, 40, 1'234, 4), put(p, 44, 2'345, 4);
-  put(p, 48, -1'500, 4), put(p, 52, 2'000, 4), put(p, 56, 250, 4);
-  put(p, 60, 2'500, 4), put(p, 64, 12'687'000, 4), put(p, 68, 321, 4), put(p, 72, 45'000, 4);
-  put(p, 76, 156, 2);
-  return p;
-}
 Bytes cov(std::uint32_t itow) {
   Bytes p(64, 0);
   put(p, 0, itow, 4);
   put(p, 5, 1, 1), put(p, 6, 1, 1);
   for (int i = 0; i < 12; ++i) put_float(p, static_cast<std::size_t>(16 + 4 * i), static_cast<float>(i + 1));
   return p;
-}
-
-Bytes operator+(Bytes a, const Bytes& b) {
-  a.insert(a.end(), b.begin(), b.end());
-  return a;
-}
-
-struct Heard {
-  std::vector<Report> reports;
-  std::vector<ubx::Acknowledge> acknowledgements;
-  int identified = 0;
-  Health health;
-};
-
-Heard hear(const Bytes& bytes, bool checksum_required = true) {
-  Heard heard;
-  GnssReceiver<> receiver({.nmea_checksum_required = checksum_required});
-  struct {
-    Heard& heard;
-    void operator()(const Report& r) { heard.reports.push_back(r); }
-    void operator()(const ubx::Acknowledge& a) { heard.acknowledgements.push_back(a); }
-    void operator()(const ubx::Identified&) { ++heard.identified; }
-  } handler{heard};
-  receiver.on_bytes(bytes, handler);
-  receiver.finish(handler);
-  heard.health = receiver.health();
-  return heard;
-}
-Report only(const Bytes& bytes) {
-  const Heard heard = hear(bytes);
-  EXPECT_EQ(heard.reports.size(), 1U);
-  return heard.reports.empty() ? Report{} : heard.reports[0];
 }
 
 const Bytes kPvt = ubx_frame(0x01, 0x07, pvt());

@@ -136,6 +136,7 @@ class Icm42688 {
   [[nodiscard]] int watermark() const;
   void schedule();
   [[nodiscard]] Motion filtered(double host_s, double delay_s) const;
+  [[nodiscard]] bool switches_range(Picos at, const std::array<double, 3>& rate_radps);
   void sample(Picos at, double host_s);
   void update_threshold(bool packet_written);
   void write_packet(Picos at, bool accel_new, bool gyro_new);
@@ -175,6 +176,8 @@ class Icm42688 {
   double temperature_degC_ = 25.0;
   bool temperature_sampled_ = false;
   std::array<std::optional<double>, 6> frozen_{};
+  std::array<double, 3> rate_before_{};
+  Picos switching_until_ = 0;  ///< end of the repetition after a change of range
   std::array<std::uint8_t, 3> gyro_codes_{140, 145, 150};
   std::array<std::uint8_t, 3> accel_codes_{110, 115, 120};
   std::array<icm42688::Settling, 3> gyro_test_{icm42688::Settling{40 * icm42688::kMillisecond},

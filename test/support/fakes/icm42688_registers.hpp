@@ -110,7 +110,7 @@ inline constexpr auto kRegisters = std::to_array<Register>({
     {0, 0x38, 0x00, 0x00, Access::kClearOnRead, "14.32"},  // INT_STATUS3
     {0, 0x4B, 0x00, 0x6E, Access::kCommand, "14.33"},      // SIGNAL_PATH_RESET
     {0, 0x4C, 0x30, 0xF3, detail::kRw, "14.34"},           // INTF_CONFIG0
-    {0, 0x4D, 0x91, 0x0F, detail::kRw, "14.35"},           // INTF_CONFIG1
+    {0, 0x4D, 0x91, 0xCF, detail::kRw, "14.35"},           // INTF_CONFIG1; 7:6 reserved but for ArduPilot 25332
     {0, 0x4E, 0x00, 0x3F, detail::kRw, "14.36"},           // PWR_MGMT0
     {0, 0x4F, 0x06, 0xEF, detail::kRw, "14.37"},           // GYRO_CONFIG0
     {0, 0x50, 0x06, 0xEF, detail::kRw, "14.38"},           // ACCEL_CONFIG0

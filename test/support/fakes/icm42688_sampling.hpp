@@ -5,6 +5,7 @@
 #include "support/fakes/icm42688.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 namespace tetap::fakes {
 
@@ -88,8 +89,11 @@ inline void Icm42688::sample(Picos at, double host_s) {
     ++counters_.gyro_samples;
     const double delay_s =
         group_delay_s(gyro0 & 0x0F, registers_[kGyroAccelConfig0] & 0x0F, registers_[kGyroConfig1] >> 2 & 0x03);
-    take_axes(gyro_, filtered(host_s, delay_s).rate_radps, offsets.rate_radps, gyro_test_, gyro_full_scale_radps(gyro0),
-              gyro_full_scale_radps(0), 0);
+    const std::array<double, 3> rate_radps = filtered(host_s, delay_s).rate_radps;
+    if (!switches_range(at, rate_radps)) {
+      take_axes(gyro_, rate_radps, offsets.rate_radps, gyro_test_, gyro_full_scale_radps(gyro0),
+                gyro_full_scale_radps(0), 0);
+    }
     *gyro_.next += odr_period(gyro0).value_or(kMillisecond);
   }
   if (accel_new) {
@@ -108,6 +112,20 @@ inline void Icm42688::sample(Picos at, double host_s) {
   registers_[kIntStatus] |= kDataReady;
   write_packet(at, accel_new, gyro_new);
   last_odr_ = at;
+}
+
+/// Not in the sheet (ArduPilot issues 25025 and 25332): unless bits 7:6 of INTF_CONFIG1 are 01, the gyroscope repeats
+/// its last values for up to 2 ms after an axis passed 100 deg/s.
+inline bool Icm42688::switches_range(Picos at, const std::array<double, 3>& rate_radps) {
+  using namespace icm42688;
+  constexpr double kLimit_radps = 100.0 * 3.14159265358979 / 180.0;
+  bool passed = false;
+  for (std::size_t i = 0; i < 3; ++i)
+    passed |= (std::abs(rate_radps[i]) > kLimit_radps) != (std::abs(rate_before_[i]) > kLimit_radps);
+  rate_before_ = rate_radps;
+  if ((registers_[kIntfConfig1] & 0xC0) == 0x40 || !gyro_.sampled) return false;
+  if (passed) switching_until_ = at + 2 * kMillisecond;
+  return at < switching_until_;
 }
 
 /// 12.7: the counter runs at 30/32 of a microsecond's rate, so "timestamp interval reported in FIFO requires scaling by

@@ -459,6 +459,8 @@ class Ublox {
         {{ublox::kNav, ublox::kNavDop}, ublox::key("CFG-MSGOUT-UBX_NAV_DOP_UART1")},
         {{ublox::kNav, ublox::kNavPvt}, ublox::key("CFG-MSGOUT-UBX_NAV_PVT_UART1")},
         {{ublox::kNav, ublox::kNavCov}, ublox::key("CFG-MSGOUT-UBX_NAV_COV_UART1")},
+        {{ublox::kNav, ublox::kNavHpPosLlh}, ublox::key("CFG-MSGOUT-UBX_NAV_HPPOSLLH_UART1")},
+        {{ublox::kNav, ublox::kNavRelPosNed}, ublox::key("CFG-MSGOUT-UBX_NAV_RELPOSNED_UART1")},
         {{kNmea, 0x00}, ublox::key("CFG-MSGOUT-NMEA_ID_GGA_UART1")},
         {{kNmea, 0x01}, ublox::key("CFG-MSGOUT-NMEA_ID_GLL_UART1")},
         {{kNmea, 0x02}, ublox::key("CFG-MSGOUT-NMEA_ID_GSA_UART1")},
@@ -480,7 +482,8 @@ class Ublox {
                                                 {kNmea, 0x09},
                                                 {kNmea, 0x0A}};
     if (message.first == ublox::kNav && generation_ == Generation::kM6 &&
-        (message.second == ublox::kNavPvt || message.second == ublox::kNavCov)) {
+        (message.second == ublox::kNavPvt || message.second == ublox::kNavCov ||
+         message.second == ublox::kNavHpPosLlh || message.second == ublox::kNavRelPosNed)) {
       return false;
     }
     return item_of(message) != 0 || kWithoutItem.contains(message);
@@ -529,13 +532,15 @@ class Ublox {
     }
     using Nav = Bytes (*)(const Instant&, const Solution&);
     constexpr Nav kTimeUtc = [](const Instant& i, const Solution&) { return ublox::nav_timeutc(i); };
-    constexpr std::array<std::pair<std::uint8_t, Nav>, 7> kNavs{{{ublox::kNavPosLlh, ublox::nav_posllh},
+    constexpr std::array<std::pair<std::uint8_t, Nav>, 9> kNavs{{{ublox::kNavPosLlh, ublox::nav_posllh},
                                                                  {ublox::kNavDop, ublox::nav_dop},
                                                                  {ublox::kNavSol, ublox::nav_sol},
                                                                  {ublox::kNavPvt, ublox::nav_pvt},
                                                                  {ublox::kNavVelNed, ublox::nav_velned},
+                                                                 {ublox::kNavHpPosLlh, ublox::nav_hpposllh},
                                                                  {ublox::kNavTimeUtc, kTimeUtc},
-                                                                 {ublox::kNavCov, ublox::nav_cov}}};
+                                                                 {ublox::kNavCov, ublox::nav_cov},
+                                                                 {ublox::kNavRelPosNed, ublox::nav_relposned}}};
     for (const auto& [id, payload] : kNavs) {
       if (due(ublox::kNav, id)) say_ubx(ublox::frame(ublox::kNav, id, payload(instant, s)));
     }

@@ -33,6 +33,8 @@ struct Solution {
   std::array<double, 3> v_mps{};
   double horizontal_acc_m = 1.234, vertical_acc_m = 2.345, speed_acc_mps = 0.321, course_acc_deg = 0.45;
   double pdop = 1.94, hdop = 1.18, vdop = 1.54;
+  std::array<double, 3> baseline_m{0.3, 0.9, 0.01};  ///< from the moving reference antenna to this one
+  double baseline_acc_m = 0.01;                      ///< 1 sigma of each component and of the length
   Covariance position_cov_m2{0.25, 0.05, -0.02, 2.25, 0.03, 1.21};
   Covariance velocity_cov_m2ps2{0.01, 0.002, -0.001, 0.0225, 0.003, 0.04};
 
@@ -86,7 +88,7 @@ struct Instant {
 
 inline constexpr std::uint8_t kNav = 0x01;
 inline constexpr std::uint8_t kNavPosLlh = 0x02, kNavDop = 0x04, kNavSol = 0x06, kNavPvt = 0x07, kNavVelNed = 0x12,
-                              kNavTimeUtc = 0x21, kNavCov = 0x36;
+                              kNavHpPosLlh = 0x14, kNavTimeUtc = 0x21, kNavCov = 0x36, kNavRelPosNed = 0x3C;
 
 /// Sec. 5.4: Fletcher's sum over class, id, length and payload.
 inline std::array<std::uint8_t, 2> checksum(const std::uint8_t* from, std::size_t n) {
@@ -128,6 +130,7 @@ class Payload {
   Payload& i4(double v, double per_unit) { return i4(std::int64_t{std::llround(v * per_unit)}); }
   Payload& u4(double v, double per_unit) { return u4(static_cast<std::uint32_t>(std::llround(v * per_unit))); }
   Payload& u2(double v, double per_unit) { return u2(static_cast<std::uint32_t>(std::llround(v * per_unit))); }
+  Payload& i1(std::int64_t v) { return put<std::int8_t>(static_cast<std::int8_t>(v)); }
   Payload& r4(double v) { return put<float>(static_cast<float>(v)); }
   Payload& zeros(std::size_t n) { return bytes_.insert(bytes_.end(), n, 0), *this; }
   Payload& chars(const char* text, std::size_t n) {
@@ -216,6 +219,44 @@ inline Bytes nav_posllh(const Instant& at, const Solution& s) {
   p.u4(at.itow_ms).i4(s.longitude_deg, 1e7).i4(s.latitude_deg, 1e7).i4(s.height_m, 1e3).i4(s.msl_m, 1e3);
   detail::accuracy(p, s, s.horizontal_acc_m, 1e3);
   return detail::accuracy(p, s, s.vertical_acc_m, 1e3).bytes();
+}
+
+namespace detail {
+/// A number in units of 1 / `per_unit`, of which the last two digits (`base` 100) or the last one (10) stand elsewhere.
+struct Split {
+  std::int64_t whole, part;
+  Split(double v, double per_unit, std::int64_t base)
+      : whole(std::llround(v * per_unit) / base), part(std::llround(v * per_unit) % base) {}
+};
+}  // namespace detail
+
+/// UBX-22008968 sec. 3.15, NAV-HPPOSLLH, 36 bytes: 1e-9 deg and 0.1 mm in two parts each.
+inline Bytes nav_hpposllh(const Instant& at, const Solution& s) {
+  const detail::Split lon(s.longitude_deg, 1e9, 100), lat(s.latitude_deg, 1e9, 100);
+  const detail::Split height(s.height_m, 1e4, 10), msl(s.msl_m, 1e4, 10);
+  Payload p;
+  p.zeros(3).u1(s.fix == Fix::kNone ? 1 : 0).u4(at.itow_ms);
+  p.i4(lon.whole).i4(lat.whole).i4(height.whole).i4(msl.whole);
+  p.i1(lon.part).i1(lat.part).i1(height.part).i1(msl.part);
+  detail::accuracy(p, s, s.horizontal_acc_m, 1e4);
+  return detail::accuracy(p, s, s.vertical_acc_m, 1e4).bytes();
+}
+
+/// UBX-22008968 sec. 3.15, NAV-RELPOSNED version 1, 64 bytes, of a receiver with moving base.
+inline Bytes nav_relposned(const Instant& at, const Solution& s) {
+  const auto [east, north, up] = s.baseline_m;
+  const double level = std::hypot(east, north), length = std::hypot(level, up);
+  const detail::Split n(north, 1e4, 100), e(east, 1e4, 100), d(-up, 1e4, 100), l(length, 1e4, 100);
+  const double heading_deg = std::atan2(east, north) * 180 / M_PI;
+  Payload p;
+  p.u1(1).zeros(3).u4(at.itow_ms).i4(n.whole).i4(e.whole).i4(d.whole).i4(l.whole);
+  p.i4(heading_deg < 0 ? heading_deg + 360 : heading_deg, 1e5).zeros(4);
+  p.i1(n.part).i1(e.part).i1(d.part).i1(l.part);
+  for (int i = 0; i < 4; ++i) p.u4(s.baseline_acc_m, 1e4);
+  p.u4(s.baseline_acc_m / level * 180 / M_PI, 1e5).zeros(4);
+  const std::uint32_t carrier = s.fix == Fix::kRtkFixed ? 0x10 : s.fix == Fix::kRtkFloat ? 0x08 : 0;
+  const bool valid = carrier != 0;
+  return p.u4((s.valid() ? 1U : 0U) | (s.corrected() ? 2U : 0U) | (valid ? 0x104U : 0U) | carrier | 0x20U).bytes();
 }
 
 /// UBX-13003221, NAV-SOL, 52 bytes: earth-centred, in cm and cm/s.
