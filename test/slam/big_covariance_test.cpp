@@ -2,6 +2,8 @@
 #include "filter/big_covariance.hpp"
 
 #include <gtest/gtest.h>
+#include <algorithm>
+#include <cmath>
 #include <random>
 #include <vector>
 
@@ -48,24 +50,78 @@ struct Both {
   }
 };
 
-TEST(BigCovariance, ARankTwoUpdateIsThatOfTheFullMatrix) {
-  Both both(9);
-  const std::array<Covariance::States, 2> g{both.states(), both.states()};
-  both.p.subtract(g);
-  for (int r = 0; r < 9; ++r)
-    for (int c = 0; c < 9; ++c)
-      for (std::size_t k = 0; k < 2; ++k)
-        both.full[at(r)][at(c)] -= static_cast<double>(g[k][at(r)]) * static_cast<double>(g[k][at(c)]);
-  both.expect_equal(1e-5);
+TEST(BigCovariance, GainsAndTransportInOnePass) {
+  for (const int n : {8, 9}) {  // an even and an odd number of columns
+    Both both(n);
+    Covariance::Rows<6> w{};
+    for (auto& row : w)
+      for (float& value : row) value = both.normal(both.random);
+    both.p.correct<4>(w);
+    for (int r = 0; r < n; ++r)
+      for (int c = 0; c < n; ++c) {
+        const auto row = [&](int i, std::size_t k) { return static_cast<double>(w[at(i)][k]); };
+        both.full[at(r)][at(c)] += row(r, 0) * row(c, 1) + row(r, 1) * row(c, 0);
+        for (std::size_t k = 2; k < 6; ++k) both.full[at(r)][at(c)] -= row(r, k) * row(c, k);
+      }
+    both.expect_equal(2e-5);
+  }
 }
 
-TEST(BigCovariance, ASparseRowTimesP) {
+TEST(BigCovariance, SparseRowsTimesP) {
+  for (const int tail : {3, 5, 7}) {
+    Both both(9);
+    const std::array<std::array<float, 5>, 2> h{{{1.5F, -2.0F, 0.25F, 0.5F, 3.0F}, {0.1F, 0.2F, -1.0F, 2.0F, -0.7F}}};
+    Covariance::Rows<4> product{};
+    both.p.times<2, 3, 2>(h, tail, product, 1);
+    for (int n = 0; n < 9; ++n)
+      for (std::size_t r = 0; r < 2; ++r) {
+        double expected = 0;
+        for (int k = 0; k < 5; ++k)
+          expected += static_cast<double>(h[r][at(k)]) * both.full[at(n)][at(k < 3 ? k : tail + k - 3)];
+        EXPECT_NEAR(static_cast<double>(product[at(n)][1 + r]), expected, 1e-4) << tail << ": " << n;
+      }
+  }
+}
+
+TEST(BigCovariance, PredictsTheHeadAlone) {
   Both both(9);
-  Covariance::States product{};
-  both.p.times(std::array{1.5F, -2.0F, 0.25F}, std::array{0, 4, 8}, product);
-  for (int n = 0; n < 9; ++n)
-    EXPECT_NEAR(static_cast<double>(product[at(n)]),
-                1.5 * both.full[at(n)][0] - 2.0 * both.full[at(n)][4] + 0.25 * both.full[at(n)][8], 1e-4);
+  const std::array<std::array<float, 3>, 3> f{{{1, 0, -0.5F}, {0, 1, 2}, {0, 0, 1}}};
+  const std::array<std::array<float, 3>, 3> q{{{0.1F, 0.02F, 0.03F}, {0, 0.2F, 0.01F}, {0, 0, 0.3F}}};
+  both.p.predict_head<3>({f[0][2], f[1][2]}, q);
+  Dense expected = both.full;
+  const auto whole = [&](int r, int c) {
+    return r < 3 && c < 3 ? static_cast<double>(f[at(r)][at(c)]) : r == c ? 1.0 : 0.0;
+  };
+  for (int r = 0; r < 9; ++r)
+    for (int c = 0; c < 9; ++c) {
+      expected[at(r)][at(c)] = r < 3 && c < 3 ? static_cast<double>(q[at(std::min(r, c))][at(std::max(r, c))]) : 0;
+      for (int i = 0; i < 9; ++i)
+        for (int j = 0; j < 9; ++j) expected[at(r)][at(c)] += whole(r, i) * both.full[at(i)][at(j)] * whole(c, j);
+    }
+  both.full = expected;
+  both.expect_equal(1e-4);
+}
+
+TEST(BigCovariance, TurnsPairs) {
+  Both both(9);
+  const float c = std::cos(0.7F), s = std::sin(0.7F);
+  both.p.turn_pairs(3, c, s);
+  Dense expected = both.full;
+  const auto whole = [&](int r, int k) -> double {
+    if (r < 3) return r == k ? 1 : 0;
+    const int pair = 3 + (r - 3) / 2 * 2;
+    if (k != pair && k != pair + 1) return 0;
+    if (r == k) return static_cast<double>(c);
+    return static_cast<double>(r == pair ? -s : s);
+  };
+  for (int r = 0; r < 9; ++r)
+    for (int k = 0; k < 9; ++k) {
+      expected[at(r)][at(k)] = 0;
+      for (int i = 0; i < 9; ++i)
+        for (int j = 0; j < 9; ++j) expected[at(r)][at(k)] += whole(r, i) * both.full[at(i)][at(j)] * whole(k, j);
+    }
+  both.full = expected;
+  both.expect_equal(1e-4);
 }
 
 TEST(BigCovariance, AShearIsTPT) {

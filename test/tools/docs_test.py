@@ -119,16 +119,17 @@ class Pages(unittest.TestCase):
         self.assertEqual([line for line in lines if len(line) > MOST_COLUMNS], [])
 
     def test_the_functions_cite_the_equations_and_the_equations_name_the_functions(self):
-        page = read("docs/explanation/equations.md")
-        rows = re.findall(r"^\| \((\d+)\) \|.*?\| `([^`]+)` in `([^`]+)` \|", page, re.M)
-        self.assertEqual([int(number) for number, _, _ in rows], list(range(1, len(rows) + 1)))
-        for number, function, path in rows:
-            source = read(path)
-            self.assertRegex(source, rf"\b{function.split('::')[-1]}\(", f"({number}): {path} has no {function}")
-            cited = set()
-            for first, last in re.findall(r"docs/explanation/equations\.md,? \((\d+)\)(?: to \((\d+)\))?", source):
-                cited |= set(range(int(first), int(last or first) + 1))
-            self.assertIn(int(number), cited, f"{path} does not cite equation ({number})")
+        for page in ("equations", "ekf_slam", "fast_slam"):
+            rows = re.findall(r"^\| \((\d+)\) \|.*?\| `([^`]+)` in `([^`]+)` \|", read(f"docs/explanation/{page}.md"), re.M)
+            self.assertGreater(len(rows), 7)
+            self.assertEqual([int(number) for number, _, _ in rows], list(range(1, len(rows) + 1)))
+            for number, function, path in rows:
+                source = read(path)
+                self.assertRegex(source, rf"\b{function.split('::')[-1]}\(", f"({number}): {path} has no {function}")
+                cited = set()
+                for first, last in re.findall(rf"docs/explanation/{page}\.md,? \((\d+)\)(?: to \((\d+)\))?", re.sub(r"\n\s*///?", "", source)):
+                    cited |= set(range(int(first), int(last or first) + 1))
+                self.assertIn(int(number), cited, f"{path} does not cite equation ({number}) of {page}.md")
 
 
     def test_sentences_are_short_and_name_their_subjects(self):
