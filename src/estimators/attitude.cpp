@@ -13,10 +13,17 @@ Innovation Attitude::fuse(const sensor::ImuSample& sample, base::Micros stamp, c
   const base::Micros span = stamp - time_;
   const bool gap = filter_.started() && checks::ImuClassifier::is_gap(span - interval);
   const bool lost = gap && span > kBridged;
-  const auto verdict = filter_.step(rate, per_s * body(sample.dvelocity_b_mps),
-                                    base::seconds(gap && !lost ? span : interval), sample.clipped_accel == 0);
+  const param::InertialParameters& n = ctx.parameters.inertial;
+  filter_.set_range({.gyroscope_radps = n.gyro_range_radps, .accelerometer_mps2 = n.accel_range_mps2});
+  const auto verdict =
+      filter_.step(rate, per_s * body(sample.dvelocity_b_mps), base::seconds(gap && !lost ? span : interval),
+                   {.gyroscope = sample.clipped_gyro > 0, .accelerometer = sample.clipped_accel > 0});
   if (verdict == filter::AttitudeVerdict::kRefused) return {.verdict = sensor::Verdict::kNotFinite};
-  if (lost || sample.clipped_gyro > 0) filter_.turn_lost();
+  // The turn in a gap is unknown by the rate before it and by the rate that the inertial filter assumes in gaps.
+  if (lost) {
+    const float unseen_radps = n.gap_radps + base::sqrt(filter::dot(rate_b_radps_, rate_b_radps_));
+    filter_.lose(base::min(unseen_radps * base::seconds(span), base::kPi));
+  }
   rate_b_radps_ = rate;
   time_ = stamp;
   return {.verdict = sensor::Verdict::kAccepted};

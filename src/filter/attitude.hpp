@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // Attitude from gyroscope, accelerometer and, where there is one, magnetometer: a complementary filter whose slow part
 // is a low-pass of the accelerometer in axes that hardly turn, so that motion averages out before it counts
-// (Laidig & Seel 2023, Information Fusion 91; measured facts and equations, own design). The gyroscope turns q_lb; the
-// low-passed accelerometer, carried in the level axes l, turns it back to level; heading is a separate angle from l to
-// n (east, north, up); the bias is estimated beside. Time is an argument; every sample may have its own interval.
+// (Laidig & Seel 2023, Information Fusion 91, sec. 3; equations, own design). The gyroscope turns q_lb; the low-passed
+// accelerometer, carried in the level axes l, turns it back to level; heading is a separate angle from l to n (east,
+// north, up); the bias is estimated beside. Time is an argument; every sample may have its own interval.
 #pragma once
 
 #include "filter/attitude_bias.hpp"
+#include "filter/attitude_clipping.hpp"
 #include "filter/attitude_heading.hpp"
 
 #include <cstdint>
@@ -15,31 +16,46 @@ namespace tetap::filter {
 
 enum class AttitudeVerdict : std::uint8_t { kAccepted, kAccelerometerRefused, kRefused };
 
+/// Clipping that a driver has seen within the interval of a sample, where the mean hides it.
+struct ClippedSensors {
+  bool gyroscope = false, accelerometer = false;
+};
+
 class Attitude {
  public:
   Attitude() : Attitude(AttitudeOptions{}) {}
-  explicit Attitude(const AttitudeOptions& options) : o_(options), bias_(options), heading_(options) {}
+  explicit Attitude(const AttitudeOptions& options, const SensorRange& range = {})
+      : o_(options),
+        strongest_mps2_(SensorRange::kRangeShare * range.accelerometer_mps2),
+        clipping_(range.gyroscope_radps),
+        bias_(options),
+        heading_(options) {}
+
+  /// Another full scale of the sensors, for the samples from now on.
+  void set_range(const SensorRange& range) {
+    strongest_mps2_ = SensorRange::kRangeShare * range.accelerometer_mps2;
+    clipping_.set_range(range.gyroscope_radps);
+  }
 
   /// A sample of both that were constant over the last dt_s. kRefused: no numbers, or no time, and nothing has changed;
-  /// kAccelerometerRefused: clipped (`force_usable` false stands for that in a mean that hides it) or in free fall, the
-  /// gyroscope alone was used.
+  /// kAccelerometerRefused: clipped or in free fall, and the gyroscope alone was used.
   [[nodiscard]] AttitudeVerdict step(const Vector3& w_b_radps, const Vector3& f_b_mps2, float dt_s,
-                                     bool force_usable = true) {
+                                     ClippedSensors clipped = {}) {
     const float w2 = dot(w_b_radps, w_b_radps);
     const float f2 = dot(f_b_mps2, f_b_mps2);
     if (!(dt_s >= kShortest_s && dt_s <= kLongest_s && w2 <= kFastest_radps * kFastest_radps && f2 < base::kInfinity))
       return AttitudeVerdict::kRefused;
-    const float most = o_.accelerometer_limit_mps2;
-    const bool usable = force_usable && f2 > kLeastForce_mps2 * kLeastForce_mps2 && f2 < most * most;
+    const bool usable =
+        !clipped.accelerometer && f2 > kLeastForce_mps2 * kLeastForce_mps2 && f2 < strongest_mps2_ * strongest_mps2_;
     if (!started_) {
       if (!usable) return AttitudeVerdict::kRefused;
       q_lb_ = levelled(f_b_mps2);
+      up_.start(Rows(q_lb_) * f_b_mps2);
       started_ = true;
     } else {
       q_lb_ = turned(q_lb_, (0.5F * dt_s) * (w_b_radps - bias_.value()));
-      const float clip = o_.gyroscope_limit_radps;
-      if (w2 > clip * clip && !inside(w_b_radps, clip)) turn_lost();
     }
+    if (ClippedTurn::Missed missed; clipping_.step(w_b_radps, w2, clipped.gyroscope, dt_s, missed)) bridge(missed);
     rest_.step(o_, w_b_radps, f_b_mps2, dt_s);
     if (!usable) return AttitudeVerdict::kAccelerometerRefused;
     level(f_b_mps2, dt_s);
@@ -51,15 +67,18 @@ class Attitude {
     const float m2 = dot(m_b, m_b);
     if (!started_ || !(m2 > 0.0F && m2 < kStrongest2) || !(dt_s > 0.0F)) return false;
     if (off_ && heading_.known()) return true;  // a heading would only be as good as the level
-    const bool turning = !within(rest_.rate_b_radps(), o_.field_motion_radps);
-    heading_.step(o_, Rows(q_lb_) * m_b, turning, dt_s < 1.0F ? dt_s : 1.0F);
+    const Vector3 rate = clipping_.rate_b_radps() - bias_.value();
+    const float unsettled = tau_s_ < o_.tau_inclination_s ? o_.tau_inclination_s / tau_s_ : 1.0F;
+    heading_.step(Rows(q_lb_) * m_b, base::sqrt(dot(rate, rate)), unsettled * unsettled, dt_s < 1.0F ? dt_s : 1.0F);
     return true;
   }
 
-  /// The turn of the last moments is lost: the slow sensors set the attitude again, by a mean that begins here.
-  void turn_lost() {
-    age_s_ = o_.relevel_s;
-    heading_.average_anew(o_.relevel_s);
+  /// The gyroscope missed a turn of up to this angle. The speed of a body is bounded, so a mean over T seconds of the
+  /// accelerometer is wrong by its change over g T: an error that is n times the settled one asks for 1/n of the time.
+  void lose(float turn_rad) {
+    const float sigmas = turn_rad / o_.inclination_sigma_rad;
+    tau_s_ /= 1.0F + sigmas;
+    heading_.lose(sigmas);
   }
 
   [[nodiscard]] bool started() const { return started_; }
@@ -77,22 +96,28 @@ class Attitude {
   static constexpr float kShortest_s = 1e-6F, kLongest_s = 0.2F, kFastest_radps = 100.0F, kLeastForce_mps2 = 0.1F;
   static constexpr float kStrongest2 = 1e30F;  ///< in any unit; the squares of what is made of it are numbers
 
-  [[nodiscard]] static bool inside(const Vector3& v, float limit) {
-    return base::abs(v(0)) < limit && base::abs(v(1)) < limit && base::abs(v(2)) < limit;
+  /// Growth of the time constant while the low-pass settles: an error at the start then falls with t^-2.
+  static constexpr float kSettling = 0.4F;
+
+  /// Adds a turn that the gyroscope has not shown; it is as uncertain as it is large.
+  [[gnu::noinline]] void bridge(const ClippedTurn::Missed& missed) {
+    const Vector3& turn = missed.turn_b_rad;
+    const float angle = base::sqrt(dot(turn, turn));
+    if (angle > 0.0F) {
+      const base::SinCos half = base::sincos(0.5F * angle);
+      const Vector3 axis = (half.sin / angle) * turn;
+      q_lb_ = (q_lb_ * Quaternion{half.cos, axis(0), axis(1), axis(2)}).normalised();
+    }
+    lose(missed.sigma_rad);
   }
 
   [[gnu::always_inline]] inline void level(const Vector3& f_b, float dt_s) {
     const Rows r(q_lb_);
     const Vector3 f_l = r * f_b;
-    float share = 0.0F;
-    if (age_s_ < o_.tau_inclination_s) {
-      // A mean over what there is, the last samples counting most: the first second is as good as its samples.
-      age_s_ += dt_s;
-      share = age_s_ > 2.0F * dt_s ? 2.0F * dt_s / age_s_ : 1.0F;
-      up_.value += share * (f_l - up_.value);
-    } else {
-      up_.step(f_l, LowPass<3>::factor(o_.tau_inclination_s, dt_s));
-    }
+    const bool settling = tau_s_ < o_.tau_inclination_s;
+    if (settling) tau_s_ += kSettling * dt_s;
+    const float tau_s = settling ? tau_s_ : o_.tau_inclination_s;
+    up_.step(f_l, LowPass<3>::factor(tau_s, dt_s));
     const float n2 = dot(up_.value, up_.value);
     if (!(n2 > kLeastForce_mps2 * kLeastForce_mps2)) return;
     // The turn about a horizontal axis that brings it upright: for small angles the cross product with the vertical.
@@ -100,7 +125,7 @@ class Attitude {
     float x = scale * up_.value(1);
     float y = -scale * up_.value(0);
     const float tilt2 = x * x + y * y;
-    const float most = share > 0.0F ? 1.0F : o_.inclination_limit_radps * dt_s;
+    const float most = settling ? 1.0F : o_.inclination_limit_radps * dt_s;
     off_ = tilt2 > most * most;
     if (off_ && held_s_ < o_.inclination_hold_s) {
       held_s_ += dt_s;
@@ -111,10 +136,9 @@ class Attitude {
     } else if (!off_) {
       held_s_ = held_s_ > dt_s ? held_s_ - dt_s : 0.0F;
     }
-    // Corrections at the start and after a disturbance are not the bias.
-    calm_s_ = off_ || share > 0.0F ? 0.0F : calm_s_ < o_.tau_inclination_s ? calm_s_ + dt_s : calm_s_;
-    bias_.step(o_, r, {.x_rad = x, .y_rad = y, .usable = calm_s_ >= o_.tau_inclination_s, .average_share = share},
-               rest_, dt_s);
+    // The turn back at the start and after a disturbance is not the bias.
+    calm_s_ = off_ || settling ? 0.0F : calm_s_ < o_.tau_inclination_s ? calm_s_ + dt_s : calm_s_;
+    bias_.step(r, {.x_rad = x, .y_rad = y, .tau_s = tau_s, .usable = calm_s_ >= o_.tau_inclination_s}, rest_, dt_s);
     turn_level(x, y);
   }
 
@@ -133,12 +157,15 @@ class Attitude {
   }
 
   AttitudeOptions o_;
+  float strongest_mps2_;
   Quaternion q_lb_{};
   LowPass<3> up_;
+  ClippedTurn clipping_;
   RestDetector rest_;
   GyroscopeBias bias_;
   MagneticHeading heading_;
-  float age_s_ = 0.0F, held_s_ = 0.0F, calm_s_ = 0.0F;
+  float tau_s_ = 0.0F;  ///< time constant of the low-pass while it settles
+  float held_s_ = 0.0F, calm_s_ = 0.0F;
   bool started_ = false, off_ = false;
 };
 

@@ -49,18 +49,18 @@ class GyroscopeBias {
   /// Levelling of one step: turn of the attitude about the horizontal axes of n.
   struct Levelling {
     float x_rad, y_rad;
-    bool usable;          ///< neither limited nor held
-    float average_share;  ///< share of a step in the mean that starts the low-pass; 0 when the low-pass runs
+    float tau_s;  ///< time constant of the accelerometer's low-pass
+    bool usable;  ///< settled, and neither limited nor held
   };
 
   /// A fifth of the work per step, in turns, each as if for five steps: what is compared is low-passed over seconds.
-  [[gnu::always_inline]] inline void step(const AttitudeOptions& o, const Rows& r, const Levelling& levelling,
-                                          const RestDetector& rest, float dt_s) {
+  [[gnu::always_inline]] inline void step(const Rows& r, const Levelling& levelling, const RestDetector& rest,
+                                          float dt_s) {
     phase_ = phase_ < 4 ? phase_ + 1 : 0;
     const float span_s = 5.0F * dt_s;
     if (phase_ == 0) bias_ = {limited(bias_(0)), limited(bias_(1)), limited(bias_(2))};
-    if (phase_ == 0) return x_.follow(o, r.x, bias_, levelling.average_share, span_s);
-    if (phase_ == 1) return y_.follow(o, r.y, bias_, levelling.average_share, span_s);
+    if (phase_ == 0) return x_.follow(r.x, bias_, levelling.tau_s, span_s);
+    if (phase_ == 1) return y_.follow(r.y, bias_, levelling.tau_s, span_s);
     if (phase_ == 2) grow(span_s);
     const int axis = phase_ - 2;
     if (rest.at_rest()) {
@@ -84,12 +84,8 @@ class GyroscopeBias {
   struct Lagged {
     LowPass<4> low_pass;
 
-    void follow(const AttitudeOptions& o, const Vector3& r, const Vector3& bias, float average_share, float span_s) {
-      const Vector<float, 4> now{r(0), r(1), r(2), dot(r, bias)};
-      if (average_share > 0.0F)
-        low_pass.value += (average_share < 0.2F ? 5.0F * average_share : 1.0F) * (now - low_pass.value);
-      else
-        low_pass.step(now, LowPass<4>::factor(o.tau_inclination_s, span_s));
+    void follow(const Vector3& r, const Vector3& bias, float tau_s, float span_s) {
+      low_pass.step({r(0), r(1), r(2), dot(r, bias)}, LowPass<4>::factor(tau_s, span_s));
     }
     [[nodiscard]] Vector3 row() const { return {low_pass.value(0), low_pass.value(1), low_pass.value(2)}; }
     [[nodiscard]] float along() const { return low_pass.value(3); }

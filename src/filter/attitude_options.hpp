@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The numbers of the attitude filter. Defaults are those published with VQF (Laidig & Seel 2023, Information Fusion 91,
 // "VQF: Highly accurate IMU orientation estimation with bias estimation and magnetic disturbance rejection", table 1)
-// where that filter has the same parameter; each of the rest names its source.
+// where that filter has the same parameter. tools/report/choose_attitude chose the others by leaving out one trial.
 #pragma once
 
 namespace tetap::filter {
@@ -11,18 +11,14 @@ struct AttitudeOptions {
 
   // Inclination.
   float tau_inclination_s = 3.0F;
-  /// A reading at the end of the sensor's range is not a measurement: 16 g less 2 %.
-  float accelerometer_limit_mps2 = 153.0F;
-  /// Limit of the levelling's turn rate, for inclination_hold_s at most. Motion that averages out and gyroscope bias
-  /// turn the low-passed vertical more slowly.
+  /// The low-passed vertical moves by motion that averages out and by gyroscope bias. A faster correction than this is
+  /// neither, and is limited to it.
   float inclination_limit_radps = 3.0F * kDegree;
-  /// Tilt between the two verticals beyond which levelling stops altogether, for inclination_hold_s at most.
+  /// An error beyond this is not corrected at all, for the hold time.
   float inclination_reject_rad = 3.0F * kDegree;
   float inclination_hold_s = 10.0F;
-  /// A gyroscope at the end of its range (2000 degrees/s less 2 %) has lost the attitude: the mean over the slow
-  /// sensors begins anew, as if it were this old.
-  float gyroscope_limit_radps = 34.2F;
-  float relevel_s = 0.2F;
+  /// 1 sigma of the settled vertical. A turn of this size that the gyroscope missed halves both time constants.
+  float inclination_sigma_rad = 3.0F * kDegree;
 
   // Gyroscope bias.
   float bias_start_sigma_radps = 0.5F * kDegree;
@@ -43,16 +39,16 @@ struct AttitudeOptions {
   // Heading.
   float tau_heading_s = 9.0F;
   float declination_rad = 0.0F;  ///< magnetic north from true north, eastward positive
-  float tau_field_s = 0.05F;
-  float tau_reference_s = 20.0F;
-  float field_norm_share = 0.1F;  ///< share of the reference's strength beyond which a field is disturbed
-  float field_dip_rad = 10.0F * kDegree;
-  float field_undisturbed_s = 0.5F;                 ///< for so long inside both, to be undisturbed again
-  float field_first_s = 5.0F, field_new_s = 20.0F;  ///< in motion, until another field becomes the reference
-  float field_motion_radps = 20.0F * kDegree;
-  float field_reject_s = 60.0F;       ///< a disturbance of longer is followed, at 1/field_reject_factor of the gain
-  float field_provisional_s = 10.0F;  ///< the same against a reference that no motion has confirmed
-  float field_reject_factor = 2.0F;
+  /// Deviation from the reference, as a share of the horizontal field, that quarters the weight of a sample.
+  float field_deviation_share = 0.15F;
+  float field_turn_rad = 2.0F;  ///< turn in which the reference forgets the older field
+};
+
+/// Full scale of the sensors on each axis. A reading above kRangeShare of it may be clipped.
+struct SensorRange {
+  static constexpr float kRangeShare = 0.98F;  ///< the rest is scale error and calibration
+  float gyroscope_radps = 34.9F;               ///< 2000 degrees/s
+  float accelerometer_mps2 = 156.9F;           ///< 16 g
 };
 
 }  // namespace tetap::filter

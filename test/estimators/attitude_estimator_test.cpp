@@ -275,7 +275,7 @@ TEST(AttitudeEstimator, does_not_follow_an_accelerometer_that_says_it_is_clipped
   EXPECT_GT(tilt_after(0), 0.5F);
 }
 
-TEST(AttitudeEstimator, sets_the_attitude_anew_when_the_gyroscope_says_it_is_clipped) {
+TEST(AttitudeEstimator, follows_the_slow_sensors_when_the_gyroscope_reports_clipping) {
   const auto tilt_after = [](std::uint8_t clipped) {
     Body body(with_magnetometer());
     body.run(10);
@@ -293,6 +293,43 @@ TEST(AttitudeEstimator, sets_the_attitude_anew_when_the_gyroscope_says_it_is_cli
   };
   EXPECT_LT(tilt_after(3), 4.0F);
   EXPECT_GT(tilt_after(0), 20.0F);
+}
+
+/// A smooth turn about x, up to 15 rad/s, of which the gyroscope shows 10 rad/s; the error right after it.
+float degrees_off_after_clipping(float range_radps) {
+  param::Parameters n = with_magnetometer();
+  n.inertial.gyro_range_radps = range_radps;
+  Body body(n);
+  body.run(30);
+  const auto begin = 1e-6 * static_cast<double>(body.now_us);
+  body.rate_radps = [begin](double t_s) {
+    const auto phase = static_cast<float>((t_s - begin) / 0.5);
+    const float pulse = phase > 0.0F && phase < 1.0F ? std::sin(3.14159265F * phase) : 0.0F;
+    return Vector3{15.0F * pulse * pulse, 0.0F, 0.0F};
+  };
+  body.imu = [](sensor::ImuSample& s) {
+    s.dangle_b_rad[0] = std::min(s.dangle_b_rad[0], 10.0F * 1e-6F * static_cast<float>(s.interval_us));
+    return true;
+  };
+  body.run(0.8);  // the window of 0.2 s is behind
+  return body.degrees_off();
+}
+TEST(AttitudeEstimator, takes_the_range_of_the_gyroscope_from_the_parameters) {
+  EXPECT_GT(degrees_off_after_clipping(35.0F), 25.0F);
+  EXPECT_LT(degrees_off_after_clipping(10.0F), 10.0F);
+}
+
+TEST(AttitudeEstimator, does_not_throw_the_heading_away_for_a_short_gap) {
+  Body body(with_magnetometer());
+  body.run(30);
+  body.imu = [](sensor::ImuSample&) { return false; };
+  body.flux = [](sensor::MagneticFlux&) { return false; };
+  body.run(0.25);
+  body.imu = [](sensor::ImuSample&) { return true; };
+  body.flux = [](sensor::MagneticFlux& s) { return s.flux_b_uT[0] += 15.0F, true; };  // a magnet passes right after
+  body.run(1);
+  body.flux = [](sensor::MagneticFlux&) { return true; };
+  EXPECT_LT(body.run(5), 1.0F);
 }
 
 TEST(AttitudeEstimator, refuses_nonsense_on_its_way_in_and_does_not_turn_ahead_by_it) {

@@ -2,7 +2,8 @@
 // Runs an attitude filter over a recorded IMU log, for tools/report/compare_attitude: attitude_log FILTER IN OUT
 // [option=value...] IN: rows of ten little-endian floats, interval since the row before (s), gyroscope (rad/s),
 // accelerometer (m/s^2), magnetometer. OUT: one row each of q_nb (w x y z), gyroscope bias (rad/s) and flags (1 rest, 2
-// accelerometer, 4 magnetometer disturbed). The option names are those of AttitudeOptions. Madgwick's filter (2010) is
+// accelerometer, 4 magnetometer disturbed). The option names are those of AttitudeOptions,
+// gyroscope_range_radps and accelerometer_range_mps2. Madgwick's filter (2010) is
 // here as it was published, to show that the errors are measured as the published ones were.
 #include "filter/attitude.hpp"
 #include "filter/mahony.hpp"
@@ -21,6 +22,7 @@ namespace {
 using namespace tetap;
 using filter::AttitudeOptions;
 using filter::Quaternion;
+using filter::SensorRange;
 using filter::Vector3;
 
 struct Row {
@@ -117,7 +119,7 @@ class Madgwick {
   }
 };
 
-bool set(AttitudeOptions& o, std::string_view argument) {
+bool set(AttitudeOptions& o, SensorRange& range, std::string_view argument) {
   const std::size_t equals = argument.find('=');
   if (equals == std::string_view::npos) return false;
   const std::string_view name = argument.substr(0, equals);
@@ -131,7 +133,6 @@ bool set(AttitudeOptions& o, std::string_view argument) {
 #define OPTION(member) \
   { #member, &AttitudeOptions::member }
   constexpr Option kOptions[] = {OPTION(tau_inclination_s),
-                                 OPTION(accelerometer_limit_mps2),
                                  OPTION(inclination_limit_radps),
                                  OPTION(inclination_reject_rad),
                                  OPTION(inclination_hold_s),
@@ -148,20 +149,12 @@ bool set(AttitudeOptions& o, std::string_view argument) {
                                  OPTION(rest_acceleration_mps2),
                                  OPTION(tau_heading_s),
                                  OPTION(declination_rad),
-                                 OPTION(tau_field_s),
-                                 OPTION(tau_reference_s),
-                                 OPTION(field_norm_share),
-                                 OPTION(field_dip_rad),
-                                 OPTION(field_undisturbed_s),
-                                 OPTION(field_first_s),
-                                 OPTION(field_new_s),
-                                 OPTION(field_motion_radps),
-                                 OPTION(field_reject_s),
-                                 OPTION(field_reject_factor),
-                                 OPTION(field_provisional_s),
-                                 OPTION(gyroscope_limit_radps),
-                                 OPTION(relevel_s)};
+                                 OPTION(inclination_sigma_rad),
+                                 OPTION(field_deviation_share),
+                                 OPTION(field_turn_rad)};
 #undef OPTION
+  if (name == "gyroscope_range_radps") return range.gyroscope_radps = value, true;
+  if (name == "accelerometer_range_mps2") return range.accelerometer_mps2 = value, true;
   for (const Option& option : kOptions)
     if (option.name == name) return o.*option.member = value, true;
   return false;
@@ -172,12 +165,13 @@ int fail(const std::string& what) {
   return 2;
 }
 
-std::vector<Answer> run(std::string_view which, const std::vector<Row>& rows, const AttitudeOptions& options) {
+std::vector<Answer> run(std::string_view which, const std::vector<Row>& rows, const AttitudeOptions& options,
+                        const SensorRange& range) {
   std::vector<Answer> answers;
   answers.reserve(rows.size());
   const bool nine = which.ends_with('9');
   if (which.starts_with("tetap")) {
-    filter::Attitude attitude(options);
+    filter::Attitude attitude(options, range);
     for (const Row& row : rows) {
       static_cast<void>(attitude.step(vector(row.gyro), vector(row.force), row.dt_s));
       if (nine) attitude.magnetometer(vector(row.field), row.dt_s);
@@ -221,8 +215,9 @@ int main(int argc, char** argv) {
       which != "madgwick9")
     return fail(which + ": no such filter");
   AttitudeOptions options;
+  SensorRange range;
   for (int i = 4; i < argc; ++i)
-    if (!set(options, argv[i])) return fail(std::string(argv[i]) + ": no such option, or no number");
+    if (!set(options, range, argv[i])) return fail(std::string(argv[i]) + ": no such option, or no number");
   std::vector<Row> rows;
   if (std::FILE* in = std::fopen(argv[2], "rb")) {
     Row row;
@@ -234,7 +229,7 @@ int main(int argc, char** argv) {
     return fail(std::string(argv[2]) + ": " + std::strerror(errno));
   }
   if (rows.empty()) return fail(std::string(argv[2]) + ": has no rows");
-  const std::vector<Answer> answers = run(which, rows, options);
+  const std::vector<Answer> answers = run(which, rows, options, range);
   std::FILE* out = std::fopen(argv[3], "wb");
   if (out == nullptr) return fail(std::string(argv[3]) + ": " + std::strerror(errno));
   const bool written = std::fwrite(answers.data(), sizeof(Answer), answers.size(), out) == answers.size();
