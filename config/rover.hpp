@@ -32,7 +32,7 @@ inline constexpr param::Parameters parameters = param::checked({
                          .noise_right = 0.002F}},
     // ICM-42688-P: 0.0028 deg/s/sqrt(Hz) is 2.4e-9 rad^2/s; vibration and a 0.3 % scale error ask for more.
     .gyro = {.use = 1, .up_s = {0, 0, 1}, .noise = 4e-6F, .bias_time_s = 3},
-    // Without landmarks the plane is only as well known as its origin: surveyed here, not the first fix.
+    // The origin is the simulated world's. Anywhere else the first confirmed fix takes its place.
     .gnss = {.antenna_z_b_m = 0.4F,
              .sigma_floor_m = 0.3F,
              // The receiver's error wanders over a minute: what a fix repeats of the one before weighs less.
@@ -40,7 +40,7 @@ inline constexpr param::Parameters parameters = param::checked({
              // Gates of 99.9 % and more: one of 99 % refuses every hundredth good measurement, and always the one that
              // would have corrected most (velocity's NEES 3.04 of 3 in the matched world, with these 2.98).
              .gate_scale = 1.6F,
-             .origin_configured = 1,
+             .origin_configured = 2,
              .origin_latitude_2ndeg = 24'131'350'000,
              .origin_longitude_2ndeg = 5'834'150'000,
              .origin_height_m = 520},

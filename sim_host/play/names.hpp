@@ -35,9 +35,9 @@ namespace tetap::sim {
   return i < kNames.size() ? kNames[i] : "?";
 }
 [[nodiscard]] constexpr std::string_view name(sensor::ResetCause value) {
-  constexpr std::array<std::string_view, 11> kNames{"PowerOn",   "Command",       "SetPose",      "TimeJump",
-                                                    "NotFinite", "NotPositive",   "PositionJump", "HeadingWrong",
-                                                    "Diverged",  "BarometerZero", "MagneticField"};
+  constexpr std::array<std::string_view, 12> kNames{"PowerOn",   "Command",       "SetPose",       "TimeJump",
+                                                    "NotFinite", "NotPositive",   "PositionJump",  "HeadingWrong",
+                                                    "Diverged",  "BarometerZero", "MagneticField", "NewOrigin"};
   const auto i = static_cast<std::size_t>(value);
   return i < kNames.size() ? kNames[i] : "?";
 }

@@ -22,6 +22,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 
 namespace tetap::bus {
 
@@ -146,8 +147,10 @@ template <class Send>
 void Publisher<N>::estimate(std::size_t instance, sensor::EstimatorKind kind, bool primary,
                             const estimators::Estimate& e, const estimators::MotionVariance& motion, Send& send) {
   const param::PublishParameters& p = parameters_.publish;
-  const auto millimetres = [](const base::Anchored& a) {
+  const auto millimetres = [](const base::Anchored& a) {  // not available rather than at the signal's end
+    constexpr std::int64_t kMost_um = 134'217'727'000;
     const std::int64_t um = a.um();
+    if (um > kMost_um || um < -kMost_um) return std::numeric_limits<std::int32_t>::min();
     return static_cast<std::int32_t>((um + (um < 0 ? -500 : 500)) / 1000);
   };
   if (every(primary ? p.pose_every : p.side_every, side(instance))) {

@@ -5,6 +5,7 @@
 
 #include "base/math.hpp"
 #include "base/trig.hpp"
+#include "nav/geodesy.hpp"
 #include "sensor/samples.hpp"
 
 #include <cstdint>
@@ -20,7 +21,8 @@ class StartupFixCheck {
     const float north_m = metres(fix.latitude_2ndeg - latitude_2ndeg_);
     const std::int64_t latitude_2udeg = fix.latitude_2ndeg / 1'000;
     const float latitude_rad = static_cast<float>(latitude_2udeg) * (2e-6F * 0.0174532925F);
-    const float east_m = metres(fix.longitude_2ndeg - longitude_2ndeg_) * base::cos(latitude_rad);
+    const float east_m =
+        metres(nav::longitude_difference_2ndeg(fix.longitude_2ndeg, longitude_2ndeg_)) * base::cos(latitude_rad);
     const bool follows = fixes_ > 0 && stamp > last_ && east_m * east_m + north_m * north_m <= far_m * far_m;
     fixes_ = follows ? (fixes_ < needed ? fixes_ + 1 : needed) : 1;
     latitude_2ndeg_ = fix.latitude_2ndeg;
@@ -28,6 +30,8 @@ class StartupFixCheck {
     last_ = stamp;
     return fixes_ >= needed;
   }
+  /// Fixes in a row, up to the number needed.
+  [[nodiscard]] std::int32_t fixes() const { return fixes_; }
 
   template <class Sink>
   void hash_state(Sink&& sink) const {

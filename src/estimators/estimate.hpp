@@ -10,6 +10,7 @@
 #include "model/planar_pose.hpp"
 #include "nav/ins_covariance_entry.hpp"
 #include "nav/ins_state.hpp"
+#include "nav/local_level.hpp"
 #include "sensor/source_state.hpp"
 #include "sensor/vocabulary.hpp"
 
@@ -111,6 +112,14 @@ struct AttitudeEstimate {
 [[nodiscard]] inline AttitudeEstimate attitude_of(const InertialEstimate& e) {
   const nav::Quaternion& q = e.state.q_nb;
   return {.q_nb = {q.w, q.x, q.y, q.z}, .valid = e.valid, .heading_valid = e.valid};
+}
+
+/// An attitude that knows the level plane of the place and its north, in the map.
+[[nodiscard]] inline AttitudeEstimate in_map(const AttitudeEstimate& e, const nav::LocalLevel& place) {
+  const filter::Quaternion q{place.q_nl.w, place.q_nl.x, place.q_nl.y, place.q_nl.z};
+  AttitudeEstimate turned = e;
+  turned.q_nb = (q * e.q_nb).renormalised();
+  return turned;
 }
 
 /// One measurement (or input) and what became of it. dof 0: an input that is integrated, not compared.

@@ -3,8 +3,10 @@
 // map.
 #pragma once
 
+#include "base/trig.hpp"
 #include "model/landmark.hpp"
 #include "nav/geodesy.hpp"
+#include "sensor/samples.hpp"
 #include "sensor/vocabulary.hpp"
 
 #include <array>
@@ -57,6 +59,33 @@ class LandmarkMap {
 };
 
 inline constexpr std::size_t kMapCapacity = 64;
+
+/// The map is promised to 100 km from its origin, along the ground. Beyond a little more no position is valid.
+inline constexpr float kRange_m = 105'000;
+
+/// Distance from the origin in the plane of the map; without a division, to half a metre.
+[[nodiscard]] constexpr bool within_range(const base::Anchored& x, const base::Anchored& y) {
+  const auto metres = [](const base::Anchored& a) {
+    return static_cast<float>(static_cast<std::int32_t>(a.anchor_um >> 20)) * 1.048576F + a.offset_m;
+  };
+  const float east_m = metres(x), north_m = metres(y);
+  return east_m * east_m + north_m * north_m <= kRange_m * kRange_m;
+}
+
+/// The same for a fix, by the haversine of the distance on a sphere (Sinnott 1984, Sky and Telescope 68(2)) of the
+/// least radius of curvature: the fix of a position within the range is within it.
+[[nodiscard]] inline bool within_range(const nav::LocalFrame& frame, const sensor::GnssPosition& fix) {
+  constexpr std::int64_t kNear_2ndeg = 150'000'000;  // 0.3 deg both ways: 50 km at most
+  constexpr float kRad = 2e-9F * 0.0174532925F, kRadius_m = 6'335'000;
+  const std::int64_t north = fix.latitude_2ndeg - frame.latitude_2ndeg();
+  const std::int64_t east = nav::longitude_difference_2ndeg(fix.longitude_2ndeg, frame.longitude_2ndeg());
+  if (north < kNear_2ndeg && north > -kNear_2ndeg && east < kNear_2ndeg && east > -kNear_2ndeg) return true;
+  const float by_north = base::sin(0.5F * kRad * static_cast<float>(north));
+  const float by_east = base::sin(0.5F * kRad * static_cast<float>(east));
+  const float cosine = frame.curvature().axis_north * base::cos(kRad * static_cast<float>(fix.latitude_2ndeg));
+  constexpr float kMost = kRange_m / (2 * kRadius_m);  // sine of half the angle; the chord, but for 1e-5
+  return by_north * by_north + cosine * by_east * by_east <= kMost * kMost;
+}
 
 struct MapFrame {
   sensor::OriginSource origin = sensor::OriginSource::kNone;

@@ -4,6 +4,7 @@
 
 #include "base/math.hpp"
 #include "base/wgs84.hpp"
+#include "nav/local_level.hpp"
 
 #include <cstdint>
 #include <optional>
@@ -27,11 +28,13 @@ class LocalFrame {
         longitude_2ndeg_(longitude_2ndeg),
         height_m_(height_m),
         level_(latitude_2ndeg, longitude_2ndeg),
-        origin_m_(base::ecef_m(level_, static_cast<double>(height_m))) {}
+        origin_m_(base::ecef_m(level_, static_cast<double>(height_m))),
+        curvature_(level_, static_cast<double>(height_m)) {}
 
   [[nodiscard]] constexpr std::int64_t latitude_2ndeg() const { return latitude_2ndeg_; }
   [[nodiscard]] constexpr std::int64_t longitude_2ndeg() const { return longitude_2ndeg_; }
   [[nodiscard]] constexpr float height_m() const { return height_m_; }
+  [[nodiscard]] constexpr const Curvature& curvature() const { return curvature_; }
 
   /// A height that is not available counts as the origin's.
   [[nodiscard]] constexpr Local to_local(std::int64_t latitude_2ndeg, std::int64_t longitude_2ndeg,
@@ -69,6 +72,14 @@ class LocalFrame {
   float height_m_ = 0;
   base::Level level_{};
   base::Ecef origin_m_{};
+  Curvature curvature_{};
 };
+
+/// East minus west, the short way round the Earth; both in [-180, 180] deg.
+[[nodiscard]] constexpr std::int64_t longitude_difference_2ndeg(std::int64_t east_2ndeg, std::int64_t west_2ndeg) {
+  constexpr std::int64_t kTurn = 180'000'000'000;
+  const std::int64_t d = east_2ndeg - west_2ndeg;
+  return d > kTurn / 2 ? d - kTurn : d < -kTurn / 2 ? d + kTurn : d;
+}
 
 }  // namespace tetap::nav

@@ -22,22 +22,35 @@ namespace tetap::nav {
          (1.0 - 2.0 * (1.0 + base::kFlattening + kCentrifugal - 2.0 * base::kFlattening * s2) * up + 3.0 * up * up);
 }
 
-/// Gravity and turn of the Earth on a body at rest, in the local plane. Over 100 km the plumb line turns by 16 mrad
-/// against the plane; transport rate and that turn are left to the tilt states.
+/// Effect of the Earth on a body at rest on it, along the map's axes. The map is fixed to the Earth, so its rotation is
+/// the same everywhere, and there is no transport rate. Gravity is that of the place.
 struct Earth {
-  float gravity_mps2 = 9.80665F;
+  float gravity_mps2 = 9.80665F;           ///< at the place
   Vector3 rate_n_radps = Vector3::Zero();  ///< zero: not modelled
+  Vector3 up_n{0.0F, 0.0F, 1.0F};          ///< plumb line of the place
+  float origin_gravity_mps2 = 9.80665F;
 
+  /// At the origin.
   [[nodiscard]] static Earth at(const LocalFrame& origin, bool with_rotation) {
     constexpr double kRate_radps = 7.292115e-5;
     const double latitude = static_cast<double>(origin.latitude_2ndeg()) * base::kRadPer2ndeg;
     Earth earth;
-    earth.gravity_mps2 = static_cast<float>(normal_gravity(latitude, static_cast<double>(origin.height_m())));
+    earth.gravity_mps2 = earth.origin_gravity_mps2 =
+        static_cast<float>(normal_gravity(latitude, static_cast<double>(origin.height_m())));
     if (with_rotation) {
       const base::SinCosDouble at = base::sincos(latitude);
       earth.rate_n_radps = {0.0F, static_cast<float>(kRate_radps * at.cos), static_cast<float>(kRate_radps * at.sin)};
     }
     return earth;
+  }
+  /// Moves to a place. Normal gravity is linearised in the squared sine of the latitude and the height: within 2e-5
+  /// m/s^2 over 105 km and 2 km of height.
+  void move_to(const LocalLevel& place, const Curvature& origin) {
+    constexpr float kLatitude_mps2 = 0.05186F, kFreeAir_per_s2 = 3.086e-6F;
+    up_n = place.up_n;
+    const float rise = origin.axis_north * up_n(1) + origin.axis_up * (up_n(2) - 1.0F);  // sine here minus there
+    gravity_mps2 =
+        origin_gravity_mps2 + kLatitude_mps2 * rise * (2.0F * origin.axis_up + rise) - kFreeAir_per_s2 * place.height_m;
   }
   [[nodiscard]] bool rotates() const { return rate_n_radps.squaredNorm() > 0.0F; }
 };

@@ -56,7 +56,7 @@ class Ins {
     pending_.r_dt += step.r_nb * step.dt_s;
     pending_.shown_rad += step.r_nb.row(2).dot(imu.dtheta_b_rad);
     accel_n_mps2 = step.dv_n_mps / step.dt_s;
-    accel_n_mps2(2) -= earth.gravity_mps2;
+    accel_n_mps2 -= earth.gravity_mps2 * earth.up_n;
     return verdict;
   }
 
@@ -86,7 +86,7 @@ class Ins {
     InsCovarianceStep<float> step = noise_over(
         pending_, pending_.dt_s + ahead_s, turned_.would_add(pending_turn_rad() + 2.0F * half_rad, noise.gyro_scale));
     step.dv_n_mps += present.v_n_mps - x.v_n_mps;
-    step.dv_n_mps(2) += earth.gravity_mps2 * ahead_s;
+    step.dv_n_mps += (earth.gravity_mps2 * ahead_s) * earth.up_n;
     step.r_dt += present.q_nb.matrix() * ahead_s;
     return step;
   }
@@ -152,6 +152,11 @@ class Ins {
 
   /// One error may be larger than the covariance has it, by this variance.
   void inflate(int error, float variance) { p(error, error) += variance; }
+  /// Three errors from `first` on: that along the plumb line (of the attitude, the heading) has so much more variance.
+  void inflate_up(int first, float variance) {
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j <= i; ++j) p(first + i, first + j) += variance * earth.up_n(i) * earth.up_n(j);
+  }
   /// One cause may have moved position, velocity and attitude by `by`, 1 sigma: P += by by^T over these nine.
   void inflate_along(const std::array<float, 9>& by) {
     for (int i = 0; i < 9; ++i)
@@ -303,12 +308,14 @@ class Ins {
   /// v is held in the body: there that noise is taken back, and of a gentle curve every sample alone passes for noise.
   void keep_motion(InsCovarianceStep<float>& step) const {
     if (held_ > 0 && !stands) return;
-    const float energy = step.dv_n_mps(0) * step.dv_n_mps(0) + step.dv_n_mps(1) * step.dv_n_mps(1);
+    const Vector3 rest = (earth.gravity_mps2 * step.dt_s) * earth.up_n;
+    const float east = step.dv_n_mps(0) - rest(0), north = step.dv_n_mps(1) - rest(1),
+                energy = east * east + north * north;
     const float explained = noise.motion_sigma * noise.motion_sigma * step.var_v;
     const float share = !stands && energy > explained ? 1.0F - explained / energy : 0.0F;
-    step.dv_n_mps(0) *= share;
-    step.dv_n_mps(1) *= share;
-    if (stands) step.dv_n_mps(2) = earth.gravity_mps2 * step.dt_s;
+    step.dv_n_mps(0) = rest(0) + share * east;
+    step.dv_n_mps(1) = rest(1) + share * north;
+    if (stands) step.dv_n_mps(2) = rest(2);
   }
 
   /// Looks after the condition of P a little at every step: a round takes 121 of them, so what goes wrong is found

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// One inertial increment carried into position, velocity and attitude (Groves 2013, sec. 5.4, in a local plane that
-// does not move: transport rate left out).
+// One inertial increment carried into position, velocity and attitude (Groves 2013, sec. 5.4, in a level plane that
+// is fixed to the Earth).
 #pragma once
 
 #include "nav/gravity.hpp"
@@ -27,7 +27,7 @@ inline StrapdownStep strapdown(InsState& x, const ImuIncrement& imu, const Earth
   step.dv_n_mps = step.r_nb * (imu.dv_b_mps - x.b_a_mps2 * dt_s - unturned);
   const Vector3 before = x.v_n_mps;
   x.v_n_mps += step.dv_n_mps;
-  x.v_n_mps(2) -= earth.gravity_mps2 * dt_s;
+  x.v_n_mps -= (earth.gravity_mps2 * dt_s) * earth.up_n;
   x.q_nb = x.q_nb * exp_quaternion(dtheta_b);
   if (earth.rotates()) {
     x.v_n_mps -= (2.0F * dt_s) * cross(earth.rate_n_radps, before);

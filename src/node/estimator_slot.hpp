@@ -115,6 +115,11 @@ class EstimatorSlot {
     e.attitude(ctx);
   }
   { return now_.attitude(ctx); }
+  /// The estimator's level plane of the place, in the map; null: it has none.
+  [[nodiscard]] const nav::LocalLevel* level() const {
+    if constexpr (requires { now_.level(); }) return &now_.level();
+    return nullptr;
+  }
   /// Last step that the estimator itself made in its state, for the status.
   [[nodiscard]] estimators::Jump jump() const {
     if constexpr (requires { now_.jump(); }) return now_.jump();

@@ -9,6 +9,7 @@
 #include "bus/publisher.hpp"
 #include "node/fusion_window.hpp"
 #include "node/landmarks.hpp"
+#include "node/map_origin.hpp"
 #include "sensor/calibration.hpp"
 #include "sensor/plausibility.hpp"
 
@@ -67,7 +68,18 @@ class Node {
   void close_window(base::Micros t);
   void apply_map(base::Micros before);
   void apply_commands();
-  void find_origin(const sensor::Sample& sample);
+  void restart_in_new_map();
+  [[nodiscard]] bool out_of_range(const estimators::Estimate& estimate) const {
+    return origin_.fixes_outside(now_) || !estimators::within_range(estimate.pose.x, estimate.pose.y);
+  }
+  static void invalidate_beyond_range(Estimates& estimates) {
+    for (estimators::Estimate& e : estimates)
+      e.position_valid = e.position_valid && estimators::within_range(e.pose.x, e.pose.y);
+  }
+  [[nodiscard]] estimators::AttitudeEstimate in_map(const estimators::AttitudeEstimate& attitude) const {
+    const nav::LocalLevel* const place = history_.primary().level();
+    return place != nullptr ? estimators::in_map(attitude, *place) : attitude;
+  }
   void note(std::size_t instance, const sensor::Sample& sample, const estimators::Innovation& innovation);
   /// note(), for whoever makes records.
   [[nodiscard]] auto noting() {
@@ -84,6 +96,7 @@ class Node {
   const param::Parameters& parameters_;
   FusionWindow history_;
   estimators::MapFrame map_frame_;
+  MapOrigin origin_;
   bus::Decoder inbox_;
   bus::Counters counters_;
   bus::Publisher<Estimators::kCount> publisher_;
@@ -105,13 +118,7 @@ template <class Estimators, std::size_t Capacity>
 void Node<Estimators, Capacity>::power_on(base::Micros t) {
   // Cleared in place: a fresh object assigned over the old one would pass over the stack.
   landmarks_.power_on(map_frame_);
-  map_frame_.frame = {};
-  map_frame_.origin = sensor::OriginSource::kNone;
-  const param::GnssParameters& g = parameters_.gnss;
-  if (g.origin_configured != 0) {
-    map_frame_.frame = nav::LocalFrame(g.origin_latitude_2ndeg, g.origin_longitude_2ndeg, g.origin_height_m);
-    map_frame_.origin = sensor::OriginSource::kConfigured;
-  }
+  origin_.power_on(map_frame_, parameters_.gnss);
   inbox_.power_on();
   counters_ = {};
   publisher_.power_on();
@@ -168,11 +175,13 @@ void Node<Estimators, Capacity>::tick(base::Micros t, const bus::LoopHealth& loo
   inbox_.expire(now_, base::Micros{parameters_.loop.window_us}, counters_);
   apply_map(before);
   consume(now_);
+  if (origin_.take_replaced()) restart_in_new_map();
   apply_commands();
   history_.advance(now_, context());
   Estimates estimates;
   history_.estimate(context(), estimates);
   if (!healthy(estimates)) history_.estimate(context(), estimates);
+  invalidate_beyond_range(estimates);
 
   const estimators::Disagreement apart = judge();
   note_jump();
@@ -189,7 +198,7 @@ void Node<Estimators, Capacity>::tick(base::Micros t, const bus::LoopHealth& loo
       publisher_.inertial(
           instance, [&] { return lane.inertial(context()); }, [&] { return lane.sources(context()); }, send);
     if constexpr (requires { lane.attitude(context()); })
-      publisher_.attitude(instance, lane.attitude(context()), apart, send);
+      publisher_.attitude(instance, in_map(lane.attitude(context())), apart, send);
     ++instance;
   });
   publisher_.status(summary(estimates[kPrimary]), send);
@@ -270,18 +279,27 @@ void Node<Estimators, Capacity>::apply_commands() {
 template <class Estimators, std::size_t Capacity>
 void Node<Estimators, Capacity>::consume(base::Micros t) {
   const std::uint16_t not_used = history_.consume(
-      t, context(), [this](const sensor::Sample& sample) { find_origin(sample); }, noting());
+      t, context(),
+      [this](const sensor::Sample& sample) {
+        if (sample.sensor == sensor::Sensor::kGnssPosition)
+          origin_.update(sample.payload.gnss_position, sample.stamp, map_frame_, parameters_);
+      },
+      noting());
   counters_.not_used = static_cast<std::uint16_t>(counters_.not_used + not_used);
 }
 
+/// Estimators that fixes place begin anew; odometry, whose frame is its own, goes on.
 template <class Estimators, std::size_t Capacity>
-void Node<Estimators, Capacity>::find_origin(const sensor::Sample& sample) {
-  if (map_frame_.origin != sensor::OriginSource::kNone || sample.sensor != sensor::Sensor::kGnssPosition) return;
-  const sensor::GnssPosition& fix = sample.payload.gnss_position;
-  if (fix.fix < sensor::GnssFix::k2d) return;
-  map_frame_.frame =
-      nav::LocalFrame(fix.latitude_2ndeg, fix.longitude_2ndeg, base::is_finite(fix.height_m) ? fix.height_m : 0.0F);
-  map_frame_.origin = sensor::OriginSource::kFirstFix;
+void Node<Estimators, Capacity>::restart_in_new_map() {
+  close_window(now_);
+  history_.each_lane([&](auto& lane) {
+    if constexpr (std::remove_cvref_t<decltype(lane)>::template kTakes<sensor::GnssPosition>)
+      lane.restart(now_, context());
+  });
+  jumps_ = 0;
+  ++resets_;
+  reset_cause_ = sensor::ResetCause::kNewOrigin;
+  restarted_at_ = now_;
 }
 
 /// A broken invariant (NaN, a covariance that is none) restarts the estimators from their start, with a reset cause.
@@ -308,7 +326,7 @@ estimators::Disagreement Node<Estimators, Capacity>::judge() {
   if constexpr (requires { history_.primary().inertial(context()); }) {
     history_.each_lane([&](const auto& lane) {
       if constexpr (requires { lane.attitude(context()); })
-        apart = disagreement(lane.attitude(context()), attitude_of(history_.primary().inertial(context())));
+        apart = disagreement(in_map(lane.attitude(context())), attitude_of(history_.primary().inertial(context())));
     });
     disagreement_.step(apart, now_, parameters_.disagreement);
   }
@@ -331,6 +349,7 @@ std::uint32_t Node<Estimators, Capacity>::state_crc() const {
   base::WordHash hash;
   history_.hash_state(hash);
   hash(static_cast<std::uint32_t>(map_frame_.origin));
+  origin_.hash_state(hash);
   disagreement_.hash_state(hash);
   landmarks_.hash_state(hash);
   return hash.value();
@@ -349,6 +368,10 @@ bus::Summary Node<Estimators, Capacity>::summary(const estimators::Estimate& est
                  .restarted = resets_ > 0 && now_ - restarted_at_ < base::Micros{1'000'000} &&
                               reset_cause_ != sensor::ResetCause::kSetPose};
   bus::FaultSet faults{primary.faults()};
+  const bool far = out_of_range(estimate);
+  faults.raise(sensor::Fault::kOriginOutOfRange, far);
+  if (far && (s.mode == sensor::Mode::kNominal || s.mode == sensor::Mode::kDeadReckoning))
+    s.mode = sensor::Mode::kDegraded;
   faults.raise(sensor::Fault::kAttitudeDisagrees, disagreement_.disagrees());
   history_.each_lane([&](const auto& lane) {
     if constexpr (requires { lane.attitude(context()); })

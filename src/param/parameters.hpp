@@ -83,7 +83,9 @@ struct GnssParameters {
   /// Baseline of a receiver with two antennas: from the first to the second. Its heading is that of this line.
   std::array<float, 3> baseline_b_m{1, 0, 0};
   std::int32_t heading_stuck_samples = 50;  ///< repeated so often to the last bit, a heading is a stuck one; 0: never
-  std::int32_t origin_configured = 0;       ///< 0: the first fix is the origin
+  /// 0: the first of fixes that confirm each other is the origin; 1: as given here; 2: as given, until fixes that
+  /// confirm each other lie beyond the map's range.
+  std::int32_t origin_configured = 0;
   std::int64_t origin_latitude_2ndeg = 0;
   std::int64_t origin_longitude_2ndeg = 0;
   float origin_height_m = 0;

@@ -130,8 +130,9 @@ inline constexpr std::array kTable{
               "Vector from the first to the second antenna of a receiver with two."),
     TETAP_ROW(0x18A, gnss.heading_stuck_samples, "", 0, 255, kLive,
               "Equal headings in a row that make a stuck receiver; 0: not tested."),
-    TETAP_ROW(0x18B, gnss.origin_configured, "", 0, 1, kRestart,
-              "0: the first fix is the map's origin; 1: the origin is the one given here."),
+    TETAP_ROW(
+        0x18B, gnss.origin_configured, "", 0, 2, kRestart,
+        "0: the map's origin is the first confirmed fix; 1: as given; 2: as given, unless fixes are out of range."),
     TETAP_SCALED_ROW(0x18C, "gnss.origin_latitude_deg", gnss.origin_latitude_2ndeg, 500'000'000, "deg", -90, 90,
                      kRestart, "Latitude of the map's origin; the member counts steps of 2e-9 degrees."),
     TETAP_SCALED_ROW(0x18D, "gnss.origin_longitude_deg", gnss.origin_longitude_2ndeg, 500'000'000, "deg", -180, 180,

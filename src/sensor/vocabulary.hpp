@@ -61,6 +61,7 @@ enum class ResetCause : std::uint8_t {
   kDiverged = 8,
   kBarometerZero = 9,
   kMagneticField = 10,
+  kNewOrigin = 11,
 };
 
 /// Source of the map's origin.
@@ -93,6 +94,7 @@ enum class Fault : std::uint8_t {
   kSensorStuck = 11,
   kMagneticDisturbance = 12,
   kAttitudeDisagrees = 13,
+  kOriginOutOfRange = 14,
 };
 
 }  // namespace tetap::sensor

@@ -113,7 +113,7 @@ TEST(InertialOptions, AGyroscopeThatFeelsTheEarthHasNoBiasOfIt) {
 
 /// A filter that begins as aligned, without wheels.
 void begin(nav::Ins& ins, const Alignment& start, const HeadingMonitor& monitor, const param::Parameters& n) {
-  const Alignment::Start at = start.start(nullptr, monitor, n.inertial, base::kNan);
+  const Alignment::Start at = start.start(nullptr, nav::LocalLevel{}, monitor, n.inertial, base::kNan);
   Recovery::restart(ins, at.x, at.variances);
 }
 

@@ -6,6 +6,7 @@
 #include "model/gnss_fix_3d.hpp"
 #include "model/gnss_velocity_3d.hpp"
 #include "model/height.hpp"
+#include "model/level_plane.hpp"
 #include "model/magnetic_heading.hpp"
 #include "model/wheel_speed.hpp"
 #include "model/zero_rate.hpp"
@@ -64,6 +65,14 @@ struct Example<model::GnssVelocity3d> {
     return m.v_n_mps = m.predict(x), m;
   }
 };
+template <class Of>
+struct Example<model::OnLevelPlane<Of>> {
+  static model::OnLevelPlane<Of> at(const InsState& x) {
+    nav::LocalLevel place;
+    place.up_n = Vector3{0.016F, -0.01F, 1.0F};
+    return {Example<Of>::at(x), place};
+  }
+};
 /// Its constraint holds only for a body that moves the way it looks.
 template <>
 struct Example<model::WheelSpeed> {
@@ -97,6 +106,7 @@ template <>
 struct Example<model::DualHeading> {
   static model::DualHeading at(const InsState& x) {
     model::DualHeading m({0.3F, 0.8F, 0.1F}, 0.0F, 0.02F);
+    m.q_nl = nav::exp_quaternion({0.016F, -0.01F, 0.6F});
     return m.angle_rad = m.predict(x)(0), m;
   }
 };
@@ -124,7 +134,8 @@ template <class Model>
 class InsMeasurementLaws : public testing::Test {};
 using Models =
     testing::Types<model::GnssFix3d, model::GnssVelocity3d, model::WheelSpeed, model::NonHolonomic, model::ZeroVelocity,
-                   model::ZeroRate, model::DualHeading, model::MagneticHeading, model::GnssCourse, model::Height>;
+                   model::ZeroRate, model::DualHeading, model::MagneticHeading, model::GnssCourse, model::Height,
+                   model::OnLevelPlane<model::GnssFix3d>, model::OnLevelPlane<model::GnssVelocity3d>>;
 TYPED_TEST_SUITE(InsMeasurementLaws, Models);
 
 TYPED_TEST(InsMeasurementLaws, JacobianEqualsCentralDifferences) {

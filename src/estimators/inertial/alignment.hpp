@@ -67,13 +67,15 @@ class Alignment {
   [[nodiscard]] const nav::Quaternion& attitude() const { return levelling_.attitude(); }
   [[nodiscard]] bool levelling() const { return levelling_.begun(); }
   [[nodiscard]] bool placed() const { return placed_; }
+  /// Place and height to begin at.
+  [[nodiscard]] const model::GnssFix3d& at() const { return at_; }
   /// Fixes came before the filter began: later ones will show how the robot moves.
   [[nodiscard]] bool has_fixes() const { return has_fixes_; }
   [[nodiscard]] bool ready() const { return placed_ && headed_; }
 
-  /// State and variances to start with. `before`: the filter's state where it ran, whose tilt and biases stay; else
-  /// null. forward_mps: of the wheels; NaN: none.
-  [[nodiscard]] Start start(const nav::InsState* before, const HeadingMonitor& monitor,
+  /// State and variances to start with, on the level plane of the place. `before`: the filter's state where it ran,
+  /// whose tilt and biases stay; else null. forward_mps: of the wheels; NaN: none.
+  [[nodiscard]] Start start(const nav::InsState* before, const nav::LocalLevel& place, const HeadingMonitor& monitor,
                             const param::InertialParameters& n, float forward_mps) const;
 
   template <class Sink>
@@ -191,16 +193,18 @@ inline void Alignment::velocity(const nav::Vector3& v_n_mps, float sigma_mps, bo
 /// Without a receiver's velocity the robot goes where it points: linearised about another direction, wheels would seem
 /// to show the heading. Sideways the speed is uncertain by three times what the heading makes of it: the two are not
 /// correlated here, and the constraint would take the rest for knowledge of the heading.
-inline Alignment::Start Alignment::start(const nav::InsState* before, const HeadingMonitor& monitor,
-                                         const param::InertialParameters& n, float forward_mps) const {
+inline Alignment::Start Alignment::start(const nav::InsState* before, const nav::LocalLevel& place,
+                                         const HeadingMonitor& monitor, const param::InertialParameters& n,
+                                         float forward_mps) const {
   const bool again = before != nullptr;
   const bool rolls = !again && !monitor.has_velocity() && base::abs(forward_mps) < kFastest_mps;
   nav::InsState x = again ? *before : nav::InsState{};
   x.x = at_.x, x.y = at_.y, x.z = at_.z;
-  const nav::Quaternion level = again ? before->q_nb : levelling_.attitude();
-  // A heading found before is carried to the present by the gyroscope.
-  const float turn = base::wrap_angle(yaw_rad_ - (again ? nav::euler(level).yaw_rad : level_yaw_rad_));
-  x.q_nb = (nav::exp_quaternion({0.0F, 0.0F, turn}) * level).renormalised();
+  // A heading found before is carried to the present by the gyroscope. Levelling knows the place's level axes only.
+  const float turn = again ? base::wrap_angle(yaw_rad_ - nav::euler(before->q_nb).yaw_rad)
+                           : base::wrap_angle(yaw_rad_ - place.convergence_rad() - level_yaw_rad_);
+  const nav::Quaternion level = again ? before->q_nb : place.q_nl * levelling_.attitude();
+  x.q_nb = (nav::exp_quaternion(turn * place.up_n) * level).renormalised();
   if (!again) x.v_n_mps = rolls ? x.q_nb.rotated_x() * forward_mps : v_n_mps_;
   const float h = at_.sigma_horizontal_m * at_.sigma_horizontal_m, v = at_.sigma_vertical_m * at_.sigma_vertical_m;
   const float sideways_mps = rolls ? 3.0F * sigma_yaw_rad_ * forward_mps : 0.0F;

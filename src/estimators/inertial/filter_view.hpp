@@ -26,6 +26,7 @@ class FilterView {
     const AidingSources& sources;
     const HeadingMonitor& heading_monitor;
     const Recovery& recovery;
+    const nav::LocalLevel& level;
     const Context& ctx;
     base::Micros time;   ///< time of the filter's state
     base::Micros stamp;  ///< time of the measurement
@@ -36,6 +37,13 @@ class FilterView {
   [[nodiscard]] const nav::InsState& x() const { return parts_.ins.x; }
   [[nodiscard]] const nav::Ins::Covariance& p() const { return parts_.ins.p; }
   [[nodiscard]] const nav::Ins& ins() const { return parts_.ins; }
+  /// Height above the level surface of the origin.
+  [[nodiscard]] float height_m() const {
+    const nav::InsState& at = x();
+    return nav::difference(at.z, {}) + nav::level_drop_m(context().map_frame.frame.curvature(), at.x, at.y, at.z);
+  }
+  /// Level plane of the place, in the map.
+  [[nodiscard]] const nav::LocalLevel& level() const { return parts_.level; }
   [[nodiscard]] const param::Parameters& parameters() const { return parts_.ctx.parameters; }
   [[nodiscard]] const Context& context() const { return parts_.ctx; }
   [[nodiscard]] base::Micros stamp() const { return parts_.stamp; }

@@ -2,17 +2,22 @@
 // Inertial navigation: GNSS position and velocity.
 #include "estimators/inertial/inertial.hpp"
 #include "estimators/inertial/measure.hpp"
+#include "model/level_plane.hpp"
 
 namespace tetap::estimators {
 
 Innovation Inertial::fuse(const sensor::GnssPosition& fix, base::Micros stamp, const Context& ctx) {
   budget_.spend(WorkBudget::kFixChecks);
-  GnssPositionSource::Converted converted = GnssPositionSource::convert(fix, ctx);
-  if (!converted.fix) return {.verdict = converted.outside ? sensor::Verdict::kNotFinite : sensor::Verdict::kNotUsed};
+  const bool starts = !tracking() && fix.fix >= sensor::GnssFix::k2d &&
+                      sources_.position.starting_conditions(fix, stamp, ctx.parameters.recovery);
+  GnssPositionSource::Converted converted = GnssPositionSource::convert(fix, level_.height_m, ctx);
+  if (!converted.fix)
+    return {.verdict = converted.outside ? sensor::Verdict::kNotFinite : sensor::Verdict::kNotUsed,
+            .failed = converted.outside ? Check::kValue : Check::kNone};
   model::GnssFix3d& model = *converted.fix;
   if (!tracking()) {
-    if (!sources_.position.starting_conditions(fix, stamp, ctx.parameters.recovery))
-      return {.failed = Check::kUnconfirmed};
+    set_level(model.x, model.y, model.z, ctx);  // velocities and headings come before the filter runs, too
+    if (!starts) return {.failed = Check::kUnconfirmed};
     alignment_.fix(model, stamp, heading_monitor_, ctx.parameters);
     return {.verdict = sensor::Verdict::kAccepted};
   }
@@ -60,7 +65,10 @@ Innovation Inertial::fuse(const sensor::GnssPosition& fix, base::Micros stamp, c
   fix.sigma_horizontal_m *= base::sqrt(inflation);
   fix.sigma_vertical_m *= base::sqrt(inflation);
   if (!with_height) {
-    nav::move(fix.z, -z.nu(2));  // where the filter expects it, and hardly any weight
+    const float up_m = filter.level().up_n.dot(z.nu);  // to where the filter expects it, and hardly any weight
+    nav::move(fix.x, -up_m * filter.level().up_n(0));
+    nav::move(fix.y, -up_m * filter.level().up_n(1));
+    nav::move(fix.z, -up_m * filter.level().up_n(2));
     fix.sigma_vertical_m = FixMeasurement::kNoHeight_m;
     fused.dof = 2;
     fused.nis = z.statistics.horizontal_nis;
@@ -75,7 +83,7 @@ Innovation Inertial::fuse(const sensor::GnssPosition& fix, base::Micros stamp, c
 
 Innovation Inertial::fuse(const sensor::GnssVelocity& velocity, base::Micros stamp, const Context& ctx) {
   const param::GnssParameters& n = ctx.parameters.gnss;
-  VelocityMeasurement z = GnssVelocitySource::measurement(velocity, n);
+  VelocityMeasurement z = GnssVelocitySource::measurement(velocity, level_, n);
   if (!tracking()) {
     alignment_.velocity(z.v_n_mps, z.sigma_mps, z.has_climb, heading_monitor_, ctx.parameters);
     return {.verdict = sensor::Verdict::kAccepted};
@@ -83,8 +91,9 @@ Innovation Inertial::fuse(const sensor::GnssVelocity& velocity, base::Micros sta
   const FilterView filter = view(stamp, ctx);
   if (!sources_.velocity.continuing_conditions(filter))
     return {.verdict = sensor::Verdict::kStale, .failed = Check::kFrozen};
-  z.v_n_mps -= ins_.accel_n_mps2 * filter.later_s();   // to the time of the last IMU sample, as the state is
-  if (!z.has_climb) z.v_n_mps(2) = ins_.x.v_n_mps(2);  // as expected, and hardly any weight
+  z.v_n_mps -= ins_.accel_n_mps2 * filter.later_s();  // to the time of the last IMU sample, as the state is
+  if (!z.has_climb)                                   // as expected, and hardly any weight
+    z.v_n_mps -= level_.up_n.dot(z.v_n_mps - ins_.x.v_n_mps) * level_.up_n;
   z.v_b_mps = filter.axle_mps(z.v_n_mps);
   compare_with_ground(z, filter);
   heading_monitor_.fuse_velocity(z.v_n_mps, z.sigma_mps, n);
@@ -93,8 +102,11 @@ Innovation Inertial::fuse(const sensor::GnssVelocity& velocity, base::Micros sta
     restart_filter(stamp, sensor::ResetCause::kHeadingWrong, ctx);
     return {.verdict = sensor::Verdict::kRejected, .failed = Check::kHeading};
   }
-  Innovation record =
-      measure(GnssVelocitySource::model(z, filter), sources_.velocity, GnssVelocitySource::gate_scale(z, n), filter);
+  const model::GnssVelocity3d model = GnssVelocitySource::model(z, filter);
+  const float gate_scale = GnssVelocitySource::gate_scale(z, n);
+  Innovation record = !z.has_climb && level_.leans()
+                          ? measure(model::OnLevelPlane(model, level_), sources_.velocity, gate_scale, filter)
+                          : measure(model, sources_.velocity, gate_scale, filter);
   if (!z.has_climb && record.dof == 3) record.dof = 2;
   sources_.position.velocity(record.verdict == sensor::Verdict::kAccepted);
   return record;

@@ -10,7 +10,8 @@ Innovation Inertial::fuse(const sensor::OutsideHeading& heading, base::Micros st
   const Assessment a = sources_.heading.assess(heading, filter);
   if (!a.fuses()) return record_of(a);
   if (!tracking()) {
-    alignment_.set_heading(OutsideHeadingSource::body_yaw_rad(heading, alignment_.attitude(), ctx.parameters.gnss),
+    const float yaw_rad = OutsideHeadingSource::body_yaw_rad(heading, alignment_.attitude(), ctx.parameters.gnss);
+    alignment_.set_heading(base::wrap_angle(yaw_rad + level_.convergence_rad()),
                            OutsideHeadingSource::sigma_rad(heading));
     return {.verdict = sensor::Verdict::kAccepted};
   }
@@ -28,7 +29,7 @@ Innovation Inertial::fuse(const sensor::OutsideHeading& heading, base::Micros st
   if (!field.fuses()) return record_of(field);
   if (!tracking()) {
     if (!magnetometer.trusted()) return {.failed = Check::kTrust};
-    alignment_.field(z.level_uT, z.direction.angle_rad, ctx.parameters.magnetic.sigma_rad);
+    alignment_.field(z.level_uT, z.direction.angle_rad + level_.convergence_rad(), ctx.parameters.magnetic.sigma_rad);
     return {.verdict = sensor::Verdict::kAccepted};
   }
   const Assessment a = magnetometer.assess(z, filter);

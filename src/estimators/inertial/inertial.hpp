@@ -58,6 +58,8 @@ class Inertial {
   [[nodiscard]] Estimate estimate(const Context& ctx) const;
   [[nodiscard]] MotionVariance motion_variance(const Context& ctx) const;
   [[nodiscard]] InertialEstimate inertial(const Context& ctx) const;
+  /// Level plane of the place, in the map.
+  [[nodiscard]] const nav::LocalLevel& level() const { return level_; }
   [[nodiscard]] sensor::Mode mode(const Context& ctx) const;
   /// State of every source, and the test that failed last.
   [[nodiscard]] SourceStates sources(const Context& ctx) const;
@@ -74,6 +76,7 @@ class Inertial {
                        .sources = sources_,
                        .heading_monitor = heading_monitor_,
                        .recovery = recovery_,
+                       .level = level_,
                        .ctx = ctx,
                        .time = time_,
                        .stamp = stamp,
@@ -98,6 +101,8 @@ class Inertial {
                        const Context& ctx);
   void bridge(base::Micros gap, const Context& ctx);
   void bridge_lost_samples(base::Micros gap, const Context& ctx);
+  void follow_level(const Context& ctx);
+  void set_level(const base::Anchored& x, const base::Anchored& y, const base::Anchored& z, const Context& ctx);
   void inflate_clipped(const sensor::ImuSample& sample, float dt_s, const param::InertialParameters& n);
   void detect_standstill(base::Micros stamp, const Context& ctx);
   void fuse_zero_rate(const param::InertialParameters& n);
@@ -152,7 +157,9 @@ class Inertial {
   Phase phase_ = Phase::kLevelling;
   Alignment alignment_;
   HeadingMonitor heading_monitor_;
-  base::Micros time_;  ///< time of the filter's state
+  base::Micros time_;         ///< time of the filter's state
+  base::Micros levelled_at_;  ///< time of the level plane
+  nav::LocalLevel level_;     ///< level plane of the place, in the map
   ImuInput imu_;
   Standstill standstill_;
   AidingSources sources_;
@@ -170,6 +177,7 @@ void Inertial::hash_state(Sink&& sink) const {
   heading_monitor_.hash_state(sink);
   sink(static_cast<std::uint32_t>(phase_));
   sink(time_.us);
+  sink(levelled_at_.us);
   imu_.hash_state(sink);
   standstill_.hash_state(sink);
   sources_.hash_state(sink);

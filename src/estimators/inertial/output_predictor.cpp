@@ -15,7 +15,7 @@ nav::ImuIncrement OutputPredictor::unseen(base::Micros gap, const Inputs& in) co
     w_b(2) = in.wheel_turn_radps;
   }
   const nav::Quaternion n_b = x.q_nb.conjugate();
-  const nav::Vector3 f_b = n_b.rotate({0.0F, 0.0F, in.earth.gravity_mps2}) + nav::cross(w_b, n_b.rotate(x.v_n_mps));
+  const nav::Vector3 f_b = n_b.rotate(in.earth.gravity_mps2 * in.earth.up_n) + nav::cross(w_b, n_b.rotate(x.v_n_mps));
   const float dt_s = base::seconds(gap);
   const nav::Vector3 dtheta = (x.b_g_radps + w_b) * dt_s;
   const nav::Vector3 dv = (x.b_a_mps2 + f_b) * dt_s;

@@ -67,8 +67,7 @@ Innovation Inertial::propagate(const sensor::ImuSample& sample, const nav::ImuIn
                                const Context& ctx) {
   const param::InertialParameters& n = ctx.parameters.inertial;
   const float dt_s = base::seconds(increment.dt);
-  const nav::Quaternion& q = ins_.x.q_nb;
-  const float up_b = 2.0F * (q.x * q.z - q.w * q.y);  // share of gravity's reaction that points forward
+  const float up_b = ins_.x.q_nb.rotated_x().dot(ins_.earth.up_n);  // share of gravity's reaction that points forward
   sources_.wheels.encoders().note_gain(increment.dv_b_mps(0) -
                                        (ins_.x.b_a_mps2(0) + up_b * ins_.earth.gravity_mps2) * dt_s);
   const nav::ImuVerdict verdict = ins_.predict(increment);
@@ -87,6 +86,7 @@ Innovation Inertial::propagate(const sensor::ImuSample& sample, const nav::ImuIn
     Recovery::inflate_motion(ins_, leap.force_mps2 * dt_s, leap.rate_radps * dt_s);
   }
   time_ = stamp;
+  follow_level(ctx);
   if (stamp > predictor_.last_seen()) predictor_.note_correction();  // it left the window before the present had it
   standstill_.update_rate(imu_.rate_b_radps(), dt_s);
   detect_standstill(stamp, ctx);
@@ -96,6 +96,24 @@ Innovation Inertial::propagate(const sensor::ImuSample& sample, const nav::ImuIn
     heading_monitor_.stop();
   }
   return {.verdict = sensor::Verdict::kAccepted};
+}
+
+/// The level plane follows the robot: every 0.2 s, in a tick that has work left, or soon after.
+void Inertial::follow_level(const Context& ctx) {
+  constexpr base::Micros kEvery{200'000}, kLatest{400'000};
+  const base::Micros since = time_ - levelled_at_;
+  if (since < kEvery || (since < kLatest && !budget_.allows(WorkBudget::kImuSample))) return;
+  budget_.spend(WorkBudget::kImuSample);
+  set_level(ins_.x.x, ins_.x.y, ins_.x.z, ctx);
+}
+
+/// Gravity is that of the place, and so are the axes of what a receiver or compass measures.
+[[gnu::noinline]] void Inertial::set_level(const base::Anchored& x, const base::Anchored& y, const base::Anchored& z,
+                                           const Context& ctx) {
+  levelled_at_ = time_;
+  if (ctx.map_frame.origin == sensor::OriginSource::kNone) return;
+  level_ = nav::LocalLevel(ctx.map_frame.frame.curvature(), x, y, z);
+  ins_.earth.move_to(level_, ctx.map_frame.frame.curvature());
 }
 
 /// Clipped increments are used, and are as uncertain as none.
@@ -125,6 +143,7 @@ Innovation Inertial::propagate(const sensor::ImuSample& sample, const nav::ImuIn
   alignment_.gap(gap, heading_monitor_);
   imu_.set_rate(ins_.x.b_g_radps + w_b);
   time_ += gap;
+  follow_level(ctx);
   imu_.set_bridged(time_);
   sources_.wheels.encoders().forget_gain();
   standstill_.interrupt();

@@ -36,12 +36,12 @@ class Recovery {
     inflate(ins, nav::InsState::kAttitude, nav::Vector3::Constant(sigma_rad * sigma_rad));
   }
   static void inflate_heading(nav::Ins& ins, float variance_rad2) {
-    ins.inflate(nav::InsState::kAttitude + 2, variance_rad2);
+    ins.inflate_up(nav::InsState::kAttitude, variance_rad2);
   }
   /// Verb 2 by command: horizontal position from outside, 1 sigma per axis; all else stays.
   static void place(nav::Ins& ins, const model::PlanarPose& pose, float sigma_m) { ins.place(pose.x, pose.y, sigma_m); }
-  /// Verb 3: state and independent errors anew.
-  static void restart(nav::Ins& ins, const nav::InsState& x, const Variances& variances) { ins.start(x, variances); }
+  /// Verb 3: state and independent errors anew; the third of position, velocity and attitude is along the plumb line.
+  static void restart(nav::Ins& ins, const nav::InsState& x, const Variances& variances);
 
   /// A source was taken anew, and nothing moves at once: the sizes stay those of the last step.
   void report(sensor::ResetCause cause) {
@@ -90,6 +90,23 @@ class Recovery {
   base::Micros widened_at_;  ///< stamp at which a source was last right against the filter; 0: none
   bool undoable_ = false;    ///< the last reset of the position may be taken back
 };
+
+[[gnu::noinline]] inline void Recovery::restart(nav::Ins& ins, const nav::InsState& x, const Variances& variances) {
+  constexpr std::array<int, 3> kBlocks{nav::InsState::kPosition, nav::InsState::kVelocity, nav::InsState::kAttitude};
+  const bool leans = ins.earth.up_n(2) < 1.0F;
+  Variances level = variances;
+  for (const int first : kBlocks) {
+    const auto i = static_cast<std::size_t>(first);
+    if (leans) level[i + 2] = variances[i];
+  }
+  ins.start(x, level);
+  if (!leans) return;
+  for (const int first : kBlocks) {
+    const auto i = static_cast<std::size_t>(first);
+    ins.inflate_up(first, variances[i + 2] - variances[i]);
+  }
+  ins.recondition();
+}
 
 /// The coordinates from `first` on are where fixes were for long, and as uncertain as a fix.
 [[gnu::noinline]] inline void Recovery::reset_position(nav::Ins& ins, int first, int count, const nav::Vector3& by_m,

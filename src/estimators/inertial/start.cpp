@@ -42,7 +42,9 @@ void Inertial::begin(const Context& ctx) {
   if (ctx.map_frame.origin != sensor::OriginSource::kNone)
     ins_.earth = nav::Earth::at(ctx.map_frame.frame, n.earth_rate != 0);
   const float forward_mps = view(time_, ctx).wheels_silent() ? base::kNan : sources_.forward.last_mps();
-  const Alignment::Start start = alignment_.start(tracking() ? &ins_.x : nullptr, heading_monitor_, n, forward_mps);
+  set_level(alignment_.at().x, alignment_.at().y, alignment_.at().z, ctx);
+  const Alignment::Start start =
+      alignment_.start(tracking() ? &ins_.x : nullptr, level_, heading_monitor_, n, forward_mps);
   Recovery::restart(ins_, start.x, start.variances);
   phase_ = Phase::kTracking;
   standstill_.restart_means();
@@ -66,7 +68,9 @@ void Inertial::relocated() {
   const nav::InsState last = predictor_.present();
   const HeadingMonitor before = heading_monitor_;
   const bool trusted = sources_.magnetometer.trusted();
+  const nav::LocalLevel level = level_;
   base::reinitialise(*this);
+  level_ = level;
   heading_monitor_.take_over(before);
   if (heading_monitor_.runs() && (!trusted || cause == sensor::ResetCause::kHeadingWrong))
     sources_.magnetometer.distrust(t);

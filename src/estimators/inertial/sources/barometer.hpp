@@ -11,7 +11,7 @@ namespace tetap::estimators {
 
 struct HeightMeasurement {
   float altitude_m = 0;  ///< by the pressure
-  float height_m = 0;    ///< the filter's, at the sample's time
+  float height_m = 0;    ///< the filter's above the origin's level surface, at the sample's time
 };
 
 class Barometer {
@@ -26,7 +26,7 @@ class Barometer {
   [[nodiscard]] static HeightMeasurement measurement(const sensor::AirPressure& air, const FilterView& filter) {
     const float later_s = base::seconds(filter.stamp() - filter.time());
     return {.altitude_m = pressure_altitude_m(air.pressure_Pa),
-            .height_m = nav::difference(filter.x().z, {}) + filter.x().v_n_mps(2) * later_s};
+            .height_m = filter.height_m() + filter.level().up_n.dot(filter.x().v_n_mps) * later_s};
   }
   /// kFuse: the filter is to be updated with model(). kSkip, accepted: the zero took the correction, or needs none.
   [[nodiscard]] Assessment assess(const HeightMeasurement& z, const FilterView& filter);

@@ -29,7 +29,8 @@ class GnssPositionSource {
     std::optional<model::GnssFix3d> fix;
     bool outside = false;
   };
-  [[nodiscard]] static Converted convert(const sensor::GnssPosition& fix, const Context& ctx);
+  /// height_m: what stands for a height that is not there, above the origin's level surface.
+  [[nodiscard]] static Converted convert(const sensor::GnssPosition& fix, float height_m, const Context& ctx);
 
   /// Before the filter runs: whether the fix may start it.
   [[nodiscard]] bool starting_conditions(const sensor::GnssPosition& fix, base::Micros stamp,
@@ -133,12 +134,13 @@ class GnssPositionSource {
   SourceStatus status_;
 };
 
-inline GnssPositionSource::Converted GnssPositionSource::convert(const sensor::GnssPosition& fix, const Context& ctx) {
+inline GnssPositionSource::Converted GnssPositionSource::convert(const sensor::GnssPosition& fix, float height_m,
+                                                                 const Context& ctx) {
   const param::GnssParameters& n = ctx.parameters.gnss;
   if (fix.fix < sensor::GnssFix::k2d || ctx.map_frame.origin == sensor::OriginSource::kNone) return {};
   const bool has_height = base::is_finite(fix.height_m);
-  const nav::Local local = ctx.map_frame.frame.to_local(fix.latitude_2ndeg, fix.longitude_2ndeg,
-                                                        has_height ? fix.height_m : ctx.map_frame.frame.height_m());
+  const nav::Local local = ctx.map_frame.frame.to_local(
+      fix.latitude_2ndeg, fix.longitude_2ndeg, has_height ? fix.height_m : ctx.map_frame.frame.height_m() + height_m);
   if (!local.valid) return {.outside = true};
   const auto sigma = [&n](float own, float otherwise) {
     const float scaled = base::is_finite(own) ? n.sigma_scale * own : otherwise;

@@ -22,14 +22,16 @@ class GnssVelocitySource {
  public:
   using Measurement = VelocityMeasurement;
 
-  /// A receiver's velocity as it came.
+  /// A receiver's velocity, along the level axes of the place as it came, along the map's. A climb
+  /// rate that is not there is 0.
   [[nodiscard]] static VelocityMeasurement measurement(const sensor::GnssVelocity& velocity,
-                                                       const param::GnssParameters& n) {
-    const nav::Vector3 v_n{velocity.v_n_mps[0], velocity.v_n_mps[1], velocity.v_n_mps[2]};
+                                                       const nav::LocalLevel& place, const param::GnssParameters& n) {
+    const bool has_climb = base::is_finite(velocity.v_n_mps[2]);
+    const nav::Vector3 v_l{velocity.v_n_mps[0], velocity.v_n_mps[1], has_climb ? velocity.v_n_mps[2] : 0.0F};
     const float own = base::is_finite(velocity.acc_mps) ? velocity.acc_mps : 0.5F;
-    return {.v_n_mps = v_n,
+    return {.v_n_mps = place.to_map(v_l),
             .sigma_mps = own > n.sigma_velocity_floor_mps ? own : n.sigma_velocity_floor_mps,
-            .has_climb = base::is_finite(v_n(2))};
+            .has_climb = has_climb};
   }
   /// The receiver does not repeat its positions; a frozen receiver's velocities are as old.
   [[nodiscard]] static bool continuing_conditions(const FilterView& filter) { return !filter.position_frozen(); }

@@ -15,7 +15,7 @@ namespace tetap::estimators {
 struct FieldMeasurement {
   std::array<float, 3> flux_uT{};                ///< along the sensor's axes, as it came
   nav::Vector3 b_uT = nav::Vector3::Zero();      ///< along the body's axes
-  nav::Vector3 level_uT = nav::Vector3::Zero();  ///< along level axes, by the filter's attitude or the levelled one
+  nav::Vector3 level_uT = nav::Vector3::Zero();  ///< along the place's level axes, by the filter or by levelling
   bool moving = false;                           ///< by the filter's velocity or turn rate
   model::DirectionMeasurement direction{};
 };
@@ -73,8 +73,9 @@ inline FieldMeasurement Magnetometer::measurement(const sensor::MagneticFlux& fl
   const nav::Vector3 shown = sensor::field_b_uT(flux, n);
   FieldMeasurement z{.flux_uT = flux.flux_b_uT};
   z.b_uT = shown + nav::cross(rate * base::seconds(filter.stamp() - filter.time()), shown);
-  z.level_uT = (filter.tracking() ? filter.x().q_nb : level).rotate(z.b_uT);
+  z.level_uT = filter.tracking() ? filter.level().from_map(filter.x().q_nb.rotate(z.b_uT)) : level.rotate(z.b_uT);
   z.direction = model::MagneticHeading(z.b_uT, n.declination_rad, n.sigma_rad);
+  z.direction.q_nl = filter.level().q_nl;
   z.moving = filter.tracking() && (filter.x().v_n_mps.squaredNorm() > 0.25F || rate.squaredNorm() > 0.04F);
   return z;
 }

@@ -27,11 +27,13 @@ class OutsideHeadingSource {
   /// At the time of the last IMU sample, as the state is.
   [[nodiscard]] static model::DirectionMeasurement model(const sensor::OutsideHeading& z, const FilterView& filter) {
     const std::array<float, 3>& b = filter.parameters().gnss.baseline_b_m;
-    const float turn_radps = filter.x().q_nb.rotate(filter.turn_b_radps())(2);
+    const float turn_radps = filter.level().up_n.dot(filter.x().q_nb.rotate(filter.turn_b_radps()));
     const float yaw_rad = base::wrap_angle(z.yaw_rad - turn_radps * filter.later_s());
-    return model::DualHeading({b[0], b[1], b[2]}, yaw_rad, sigma_rad(z));
+    model::DirectionMeasurement direction = model::DualHeading({b[0], b[1], b[2]}, yaw_rad, sigma_rad(z));
+    direction.q_nl = filter.level().q_nl;
+    return direction;
   }
-  /// The body's heading before the filter runs, by the levelled attitude.
+  /// The body's heading at its place before the filter runs, by the levelled attitude.
   [[nodiscard]] static float body_yaw_rad(const sensor::OutsideHeading& z, const nav::Quaternion& level,
                                           const param::GnssParameters& n) {
     const nav::Vector3 line = level.rotate({n.baseline_b_m[0], n.baseline_b_m[1], n.baseline_b_m[2]});
