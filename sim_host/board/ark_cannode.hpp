@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+// The wiring of an ARK CANnode: which pin goes where. Pins: ArduPilot hwdef/ARK_CANNODE and PX4 boards/ark/cannode,
+// which agree.
+#pragma once
+
+#include "sim_host/board/chip.hpp"
+#include "sim_host/board/icm42688.hpp"
+#include "sim_host/board/sensor_world.hpp"
+
+#include <functional>
+#include <string>
+
+namespace tetap::board {
+
+struct BoardOptions {
+  Oscillators oscillators;
+  Icm42688Options imu;
+  bool imu_there = true;
+};
+
+class ArkCannode {
+ public:
+  explicit ArkCannode(const BoardOptions& options = {}, SensorWorld world = {});
+  ArkCannode(const ArkCannode&) = delete;
+  ArkCannode& operator=(const ArkCannode&) = delete;
+
+  static constexpr Pin kImuSelect{'A', 4}, kImuReady{'B', 2}, kCanSilent{'C', 14}, kCanTerminator{'C', 15},
+      kLedRed{'A', 8}, kLedGreen{'A', 9}, kLedBlue{'A', 10};
+
+  Chip chip;
+  Icm42688 imu;
+  /// Text that USART2 sent (console, PA2).
+  std::string console;
+  /// Every byte that USART1 sent to the GNSS connector, world or not.
+  std::string to_gnss;
+  /// Faults of the wiring.
+  void unplug_encoders();
+  void unplug_gnss() { gnss_plugged_ = false; }
+
+ private:
+  void ask_gnss();
+  SensorWorld world_;
+  Alarm gnss_;
+  SensorWorld::GnssByte next_{};
+  bool gnss_plugged_ = true;
+};
+
+}  // namespace tetap::board

@@ -1,0 +1,24 @@
+#!/bin/bash
+# SPDX-License-Identifier: Apache-2.0
+# tetap_board_test.sh TETAP-BOARD PROGRAMS: the program's three exit statuses, its log, and the same run twice to the byte.
+set -eu
+board=$1 programs=$2
+[ -x "$board" ] || { echo "tetap_board_test: skipped: no $board (libunicorn-dev)" >&2; exit 77; }
+out=$(mktemp -d)
+trap 'rm -rf "$out"' EXIT
+fail() { echo "tetap_board_test: $*" >&2; exit 1; }
+
+[ "$("$board" --seconds 0.1 "$programs/hello.elf" 2>"$out/err")" = "hello from 96 MHz" ] || fail "no line on the console: $(cat "$out/err")"
+"$board" --seconds 0.5 --log "$out/a.log" "$programs/sensors.elf" >/dev/null 2>"$out/err" || fail "complaints: $(cat "$out/err")"
+"$board" --seconds 0.5 --log "$out/b.log" "$programs/sensors.elf" >/dev/null 2>&1
+[ -s "$out/a.log" ] || fail "the log is empty"
+cmp "$out/a.log" "$out/b.log" || fail "two runs differ"
+grep -qE '^\([0-9]+\.[0-9]{6}\) can0 [0-9A-F]{3}#[0-9A-F]*$' "$out/a.log" || fail "not a line of candump: $(head -1 "$out/a.log")"
+status=0; "$board" --seconds 0.3 --no-imu "$programs/sensors.elf" >/dev/null 2>"$out/err" || status=$?
+[ $status = 0 ] || fail "no IMU is no complaint of the models: $(cat "$out/err")"
+status=0; "$board" "$out/none.elf" >/dev/null 2>"$out/err" || status=$?
+[ $status = 2 ] && grep -q 'none.elf: cannot be opened' "$out/err" || fail "a missing image: status $status, $(cat "$out/err")"
+status=0; "$board" "$0" >/dev/null 2>"$out/err" || status=$?
+[ $status = 2 ] && grep -q 'not an ELF file' "$out/err" || fail "a script as image: status $status, $(cat "$out/err")"
+status=0; "$board" --cpi 9 "$programs/hello.elf" >/dev/null 2>"$out/err" || status=$?
+[ $status = 2 ] || fail "--cpi 9 is out of range: status $status"
