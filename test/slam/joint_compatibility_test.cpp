@@ -47,7 +47,7 @@ TEST(JointCompatibility, LeavesOutWhatFitsNothingBesideTheOthers) {
   EXPECT_EQ(result.pairs, 2);
   EXPECT_EQ(result.landmark[0], 0);
   EXPECT_EQ(result.landmark[1], 1);
-  EXPECT_EQ(result.landmark[2], JointCompatibility<4, 5>::kNone);
+  EXPECT_EQ(result.landmark[2], (JointCompatibility<4, 5>::kNone));
 }
 
 TEST(JointCompatibility, NisIsThatOfTheWholeCovariance) {
