@@ -1,4 +1,4 @@
-# tetap_image(NAME target SOURCES main.cpp ... [LIBRARIES tetap_node ...] [STACK bytes] [OUTPUT name] [DATA ddr])
+# tetap_image(NAME target SOURCES main.cpp ... [LIBRARIES tetap_node ...] [STACK bytes] [OUTPUT name] [DATA ddr|64k])
 # makes NAME.elf .bin .hex .map in the binary directory, or OUTPUT.elf ... when another file name is wanted. Beside every object of
 # the image lie its .su and .ci (stack use and call graph, GCC's VCG form): CMakeFiles/NAME.dir/.
 set(TETAP_PORT "${TETAP_BOARD}")
@@ -51,7 +51,7 @@ function(tetap_image)
   # malloc fails to link, and libm is not there at all.
   target_link_options(${ARG_NAME} PRIVATE -nostdlib -nostartfiles -T ${script} -Wl,--gc-sections -Wl,--print-memory-usage
     -Wl,--fatal-warnings -Wl,-Map=${output}.map $<$<BOOL:${ARG_STACK}>:-Wl,--defsym=_stack_size=${ARG_STACK}>
-    $<$<STREQUAL:${ARG_DATA},ddr>:-Wl,--defsym=_data_in_ddr=1>)
+    $<$<STREQUAL:${ARG_DATA},ddr>:-Wl,--defsym=_data_in_ddr=1> $<$<STREQUAL:${ARG_DATA},64k>:-Wl,--defsym=_data_64k=1>)
   add_custom_command(TARGET ${ARG_NAME} POST_BUILD
     COMMAND ${CMAKE_OBJCOPY} -O binary ${output}.elf ${output}.bin
     COMMAND ${CMAKE_OBJCOPY} -O ihex ${output}.elf ${output}.hex

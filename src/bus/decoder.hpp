@@ -207,6 +207,16 @@ void Decoder::on_frame(std::uint8_t offset, const base::CanFrame& frame, base::M
                       s.detail = m.id;
                       return base::is_finite(m.range_m) || base::is_finite(m.bearing_rad);
                     });
+    case bus::InRadar::kOffset:
+      return single(std::type_identity<bus::InRadar>{}, sensor::Sensor::kRangeBearing,
+                    [](const auto& m, sensor::Sample& s) {
+                      s.payload.sighting = {.landmark = 0xFF,
+                                            .range_m = m.range_m,
+                                            .bearing_rad = m.bearing_rad,
+                                            .range_rate_mps = m.range_rate_mps};
+                      s.detail = 0xFF;
+                      return all_finite(m.range_m, m.bearing_rad, m.range_rate_mps);
+                    });
     case bus::InMag::kOffset:
       return single(std::type_identity<bus::InMag>{}, sensor::Sensor::kMagnetometer,
                     [](const auto& m, sensor::Sample& s) {

@@ -96,6 +96,13 @@ constexpr void encode_sample(const sensor::GnssVelocity& v, const SampleHead& he
 
 template <class Put>
 constexpr void encode_sample(const sensor::LandmarkSighting& v, const SampleHead& head, Put&& put) {
+  if (base::is_finite(v.range_rate_mps))
+    return put(InRadar{.stamp_us = head.stamp_us,
+                       .seq = head.seq,
+                       .inst = head.inst,
+                       .range_m = v.range_m,
+                       .bearing_rad = v.bearing_rad,
+                       .range_rate_mps = v.range_rate_mps});
   put(InRangeBearing{.stamp_us = head.stamp_us,
                      .seq = head.seq,
                      .inst = head.inst,

@@ -35,11 +35,20 @@ class LandmarkMap {
     return true;
   }
   [[nodiscard]] constexpr std::optional<model::Landmark> find(std::uint8_t id) const {
+    const std::int32_t at = index(id);
+    if (at < 0) return std::nullopt;
+    return entry(static_cast<std::size_t>(at));
+  }
+  /// Place of the id among the entries; -1 where there is none.
+  [[nodiscard]] constexpr std::int32_t index(std::uint8_t id) const {
     for (std::size_t i = 0; i < size_; ++i)
-      if (entries_[i].id == id)
-        return model::Landmark{.x = base::Anchored::from_um(std::int64_t{entries_[i].x_mm} * 1000),
-                               .y = base::Anchored::from_um(std::int64_t{entries_[i].y_mm} * 1000)};
-    return std::nullopt;
+      if (entries_[i].id == id) return static_cast<std::int32_t>(i);
+    return -1;
+  }
+  /// The landmark at a place below size().
+  [[nodiscard]] constexpr model::Landmark entry(std::size_t i) const {
+    return {.x = base::Anchored::from_um(std::int64_t{entries_[i].x_mm} * 1000),
+            .y = base::Anchored::from_um(std::int64_t{entries_[i].y_mm} * 1000)};
   }
   constexpr void clear() { size_ = 0; }
   [[nodiscard]] constexpr std::size_t size() const { return size_; }

@@ -76,6 +76,12 @@ class Particles {
     make_equal();
   }
 
+  /// Replaces every state by f of it: a change of coordinates, without a draw.
+  template <class Function>
+  constexpr void transform(const Function& f) {
+    for (std::size_t i = 0; i < size_; ++i) states_[i] = f(states_[i]);
+  }
+
   /// Moves every particle by a draw from the motion. False, and nothing has changed, when the motion is not valid.
   template <ParticleMotion<S> Motion>
   constexpr bool predict(const Motion& motion) {

@@ -37,14 +37,27 @@ inline constexpr bool kIsDelayed = requires {
   requires E::kDelayed;
 };
 
+/// An estimator whose state is too large to hash in every tick: hash_state() feeds what is small, digest() stands for
+/// the rest (base::StateDigest).
+template <class E>
+concept DigestsState = requires(const E& e) {
+  { e.digest() } -> std::same_as<std::uint32_t>;
+};
+
 template <Estimator E>
 class EstimatorSlot {
  public:
   using Type = E;
   static constexpr bool kDelayed = kIsDelayed<E>;
+  /// An estimator that distinguishes sensors of one kind is given the instance, too.
   template <class Payload>
-  static constexpr bool kTakes = requires(E& e, const Payload& payload, base::Micros stamp,
-                                          const estimators::Context& ctx) {
+  static constexpr bool kTakesInstance = requires(E& e, const Payload& payload, base::Micros stamp,
+                                                  std::uint8_t instance, const estimators::Context& ctx) {
+    e.fuse(payload, stamp, instance, ctx);
+  };
+  template <class Payload>
+  static constexpr bool kTakes = kTakesInstance<Payload> || requires(E& e, const Payload& payload, base::Micros stamp,
+                                                                     const estimators::Context& ctx) {
     e.fuse(payload, stamp, ctx);
   };
 
@@ -167,6 +180,7 @@ class EstimatorSlot {
   template <class Sink>
   void hash_state(Sink&& sink) const {
     now_.hash_state(sink);
+    if constexpr (DigestsState<E>) sink(now_.digest());
   }
 
  private:
@@ -174,8 +188,12 @@ class EstimatorSlot {
     estimators::Innovation innovation;
     if (sample.sensor == sensor::Sensor::kImu && sample.instance != ctx.parameters.inertial.imu) return innovation;
     visit(sample, [&](const auto& payload) {
-      if constexpr (kTakes<std::remove_cvref_t<decltype(payload)>>)
+      using Payload = std::remove_cvref_t<decltype(payload)>;
+      if constexpr (kTakesInstance<Payload>) {
+        innovation = estimator.fuse(payload, sample.stamp, sample.instance, ctx);
+      } else if constexpr (kTakes<Payload>) {
         innovation = estimator.fuse(payload, sample.stamp, ctx);
+      }
     });
     return innovation;
   }

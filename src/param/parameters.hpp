@@ -70,6 +70,21 @@ struct LandmarkParameters {
   float gate_scale = 1;             ///< times the 99 % chi-square quantile
 };
 
+/// A moving target, as a sensor at rest sees it.
+struct TargetParameters {
+  float sigma_position_m = 0.15F;        ///< lidar, per axis
+  float sigma_range_m = 0.3F;            ///< radar
+  float sigma_bearing_rad = 0.03F;       ///< radar
+  float sigma_range_rate_mps = 0.3F;     ///< radar
+  float acceleration_mps2 = 3;           ///< 1 sigma, constant between two measurements
+  float yaw_acceleration_radps2 = 0.5F;  ///< the same of a target that turns
+  float sigma_speed_mps = 10;            ///< at the beginning of a track; per axis, or along the yaw
+  float sigma_yaw_rad = 1;
+  float sigma_yaw_rate_radps = 0.3F;
+  float gate_scale = 1;                 ///< times the 99 % chi-square quantile
+  std::int32_t timeout_us = 2'000'000;  ///< a track without a measurement for so long is over
+};
+
 struct GnssParameters {
   float antenna_x_b_m = 0;
   float antenna_y_b_m = 0;
@@ -215,6 +230,7 @@ struct Parameters {
   ImuParameters imu;  ///< calibration of the IMU that is used: inertial.imu
   GyroParameters gyro;
   LandmarkParameters landmark;
+  TargetParameters target;
   GnssParameters gnss;
   InertialParameters inertial;
   MagneticParameters magnetic;

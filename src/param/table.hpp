@@ -325,6 +325,23 @@ inline constexpr std::array kTable{
     TETAP_ROW(0x388, publish.state_every, "ticks", 0, 100'000, kLive,
               "Period of one page of the rest of it; 0: never."),
     TETAP_ROW(0x389, publish.event_every, "ticks", 0, 100'000, kLive, "Least time between two innovations; 0: never."),
+
+    TETAP_ROW(0x400, target.sigma_position_m, "m", 0.001, 100, kLive,
+              "1 sigma per axis of a target's position by lidar."),
+    TETAP_ROW(0x401, target.sigma_range_m, "m", 0.001, 100, kLive, "1 sigma of a target's range by radar."),
+    TETAP_ROW(0x402, target.sigma_bearing_rad, "rad", 1e-4, 1, kLive, "1 sigma of a target's bearing by radar."),
+    TETAP_ROW(0x403, target.sigma_range_rate_mps, "m/s", 0.001, 100, kLive,
+              "1 sigma of a target's range rate by radar."),
+    TETAP_ROW(0x404, target.acceleration_mps2, "m/s^2", 0.001, 100, kLive,
+              "1 sigma of a target's acceleration between two measurements."),
+    TETAP_ROW(0x405, target.yaw_acceleration_radps2, "rad/s^2", 1e-4, 100, kLive,
+              "1 sigma of the yaw acceleration of a target that turns."),
+    TETAP_ROW(0x406, target.sigma_speed_mps, "m/s", 0.01, 100, kLive, "1 sigma of the speed of a target that is new."),
+    TETAP_ROW(0x407, target.sigma_yaw_rad, "rad", 0.001, detail::kPi, kLive, "1 sigma of its yaw."),
+    TETAP_ROW(0x408, target.sigma_yaw_rate_radps, "rad/s", 0.001, 10, kLive, "1 sigma of its yaw rate."),
+    TETAP_ROW(0x409, target.gate_scale, "", 0.25, 25, kLive, "Factor on the 99 % gate of a target's measurements."),
+    TETAP_ROW(0x40A, target.timeout_us, "us", 10'000, 60'000'000, kLive,
+              "Time without a measurement after which a track is over."),
 };
 
 #undef TETAP_ROW

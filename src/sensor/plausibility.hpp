@@ -42,7 +42,8 @@ struct Plausible {
   }
   bool operator()(const LandmarkSighting& s) const {
     const bool any = !base::is_nan(s.range_m) || !base::is_nan(s.bearing_rad);
-    return any && sigma_or_none(s.range_m, 1e5F) && number_or_none(s.bearing_rad, 10.0F);
+    return any && sigma_or_none(s.range_m, 1e5F) && number_or_none(s.bearing_rad, 10.0F) &&
+           number_or_none(s.range_rate_mps, 1e4F);
   }
   bool operator()(const MagneticFlux& s) const { return within(1e6F, s.flux_b_uT[0], s.flux_b_uT[1], s.flux_b_uT[2]); }
   bool operator()(const AirPressure& s) const { return s.pressure_Pa > 0.0F && s.pressure_Pa < 1e6F; }

@@ -3,6 +3,7 @@
 // estimators. Small structs, passed by value. Frames: b = body (x forward, y left, z up).
 #pragma once
 
+#include "base/float_bits.hpp"
 #include "base/time.hpp"
 
 #include <array>
@@ -80,11 +81,12 @@ struct OutsideHeading {
   float acc_rad = 0;  ///< 1 sigma; NaN: not available
 };
 
-/// A landmark seen from the body: range, bearing (0 = ahead, counter-clockwise) or both; NaN: not measured.
+/// A landmark or a target seen from the body: range, bearing (0 = ahead, counter-clockwise) or both; NaN: not measured.
 struct LandmarkSighting {
-  std::uint8_t landmark = 0;
+  std::uint8_t landmark = 0;  ///< 0xFF: not identified
   float range_m = 0;
   float bearing_rad = 0;
+  float range_rate_mps = base::kNan;  ///< radar only; positive: the distance grows
 };
 
 }  // namespace tetap::sensor

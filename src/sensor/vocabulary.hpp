@@ -76,6 +76,12 @@ enum class EstimatorKind : std::uint8_t {
   kParticle = 5,
   kInertial = 6,
   kAttitude = 7,
+  kGrid = 8,
+  kEkfSlam = 9,
+  kFastSlam = 10,
+  kPoseGraph = 11,
+  kMsckf = 12,
+  kFusion = 13,
 };
 
 /// Bit numbers of the status' fault field.

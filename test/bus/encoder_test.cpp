@@ -106,6 +106,15 @@ TEST(Encoder, SightingsFieldPressureAndHeadingComeBack) {
   EXPECT_EQ(seen.payload.sighting.landmark, 7);
   EXPECT_NEAR(seen.payload.sighting.range_m, 4.2F, 2e-3F);
   EXPECT_NEAR(seen.payload.sighting.bearing_rad, -0.3F, 1e-3F);
+  EXPECT_TRUE(base::is_nan(seen.payload.sighting.range_rate_mps));
+  const auto target = decoded(
+      sensor::LandmarkSighting{.landmark = 0xFF, .range_m = 42, .bearing_rad = 0.5F, .range_rate_mps = -7.5F}, 1, 1);
+  EXPECT_EQ(target.sensor, sensor::Sensor::kRangeBearing);
+  EXPECT_EQ(target.instance, 1);
+  EXPECT_EQ(target.payload.sighting.landmark, 0xFF);
+  EXPECT_NEAR(target.payload.sighting.range_m, 42.0F, 5.1e-3F);
+  EXPECT_NEAR(target.payload.sighting.bearing_rad, 0.5F, 8.1e-4F);
+  EXPECT_NEAR(target.payload.sighting.range_rate_mps, -7.5F, 2.1e-2F);
   const auto flux = decoded(sensor::MagneticFlux{.flux_b_uT = {20.0F, -1.0F, -43.0F}}, 0, 1);
   EXPECT_NEAR(flux.payload.magnetic.flux_b_uT[2], -43.0F, 0.02F);
   const auto air = decoded(sensor::AirPressure{.pressure_Pa = 95'123.0F, .temperature_degC = 20.0F}, 0, 1);

@@ -140,6 +140,7 @@ class Run {
         break;
       case Sensor::kRangeBearing:
         p.sighting = {.landmark = 1, .range_m = base::abs(value(0, 0.1F)), .bearing_rad = value(1, 1e-4F)};
+        if ((b[0] & 0x20) != 0) p.sighting.range_rate_mps = value(2, 1e-3F);
         break;
       case Sensor::kMagnetometer:
         p.magnetic = {.flux_b_uT = {value(0, 0.01F), value(1, 0.01F), value(2, 0.01F)}};

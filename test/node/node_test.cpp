@@ -247,7 +247,7 @@ TEST(Node, MalformedFramesAreCountedAndServiceGoesOn) {
   auto truncated = body_speed(bench.now_us, 1.0F, 0.0F);
   truncated.size = 5;
   auto unknown = body_speed(bench.now_us, 1.0F, 0.0F);
-  unknown.id = 0x31F;
+  unknown.id = 0x301;
   const auto nothing = body_speed(bench.now_us, std::numeric_limits<float>::quiet_NaN(), 0.0F);
   bench.epoch({truncated, unknown, nothing});
   const Frames out = run(bench, drive(120));

@@ -206,7 +206,7 @@ class Refusals(Folder):
     def test_estimator_at_an_uneven_distance(self):
         text = read(DBC)
         broken = self.path("broken.dbc")
-        write(broken, text.replace(" 827 ", " 799 "))
+        write(broken, text.replace(" 827 ", " 769 "))
         result = run(TOOL, broken)
         self.assertEqual(result.returncode, 1)
         self.assertIn("Est3_Motion: id is not at an even distance from Est0_Motion", result.stderr)
@@ -511,7 +511,7 @@ class Decode(Folder):
                             ("(0.0) can0 32F#R\n", "(0.0) can0 32F ? remote request\n"),
                             ("(0.0) can0 0000032F#102718FC00805500\n", "(0.0) can0 0000032F ? 10 27 18 FC 00 80 55 00\n"),
                             ("(0.0) can0 32F##100\n", "(0.0) can0 32F ? CAN FD, 1 bytes\n"),
-                            ("(0.0) can0 31F#0000000000000000\n", "(0.0) can0 31F ? 00 00 00 00 00 00 00 00\n"),
+                            ("(0.0) can0 301#0000000000000000\n", "(0.0) can0 301 ? 00 00 00 00 00 00 00 00\n"),
                             ("(0.0) can0 123#\n", "(0.0) can0 123 ? no data\n")):
             self.assertEqual(self.said(line).stdout, words)
         self.assertIn("Est_Diag page 9 (unknown) 0900", self.said("(0.0) can0 325#0900000000000000\n").stdout)

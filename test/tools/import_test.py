@@ -405,6 +405,47 @@ class BadInput(unittest.TestCase):
         self.assertAlmostEqual(about["start_pose"]["yaw_rad"], 3.2 - 2 * np.pi)
         self.assertEqual(sorted(os.listdir(self.directory)), ["out.json", "out.log", "out.truth.csv", "set"])
 
+    def test_mrclam_without_identities_with_a_wrong_start_and_an_end(self):
+        self.mrclam()
+        result = run("import_mrclam", "--no-ids", "--start-error", "2", "-1", "1.5", "--until", "0.5", self.set, 1, self.out)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        about = json.loads(text_of(self.out + ".json"))
+        self.assertEqual(about["detections"], {"landmarks": 1, "other_robots": 0, "unknown": 0})
+        self.assertEqual((about["start_pose"]["x_m"], about["start_pose"]["y_m"]), (2, -1))
+        self.assertAlmostEqual(about["start_pose"]["yaw_rad"], 3.2 + 1.5 - 2 * np.pi)
+        frames = list(read_log(self.out + ".log"))
+        self.assertEqual([(t, i) for t, i, _ in frames[4:]], [(1_000_000, 0x308), (1_000_000, 0x309), (1_300_000, 0x308)])
+        seen = decode(judge(), *frames[5][1:])[1]
+        self.assertEqual((seen["Id"].raw_value, float(seen["Range"].phys_value)), (255, 1.5))
+        os.mkdir(self.directory + "/none")
+        self.assertEqual(run("import_mrclam", "--until", "0", self.set, 1, self.directory + "/none/out").returncode, 1)
+        self.assertEqual(os.listdir(self.directory + "/none"), [])
+
+    TRACK = "L 3.0 4.0 1000000 3.1 4.1 1 0\nR 5.0 0.9 -1.5 1050000 3.2 4.1 1 0\nR 0 0 0 1100000 3.3 4.1 1 0\n"
+
+    def test_a_track_of_lidar_and_radar_is_imported(self):
+        self.write("track.txt", self.TRACK)
+        result = run("import_udacity_track", os.path.join(self.set, "track.txt"), self.out)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        about = json.loads(text_of(self.out + ".json"))
+        self.assertEqual(about["dropped"], {"rows in which the sensor saw nothing": 1})
+        (t0, i0, lidar), (t1, i1, radar) = read_log(self.out + ".log")
+        self.assertEqual((t0, i0, t1, i1), (1_000_000, 0x309, 1_050_000, 0x31F))
+        lidar, radar = decode(judge(), i0, lidar)[1], decode(judge(), i1, radar)[1]
+        self.assertEqual((lidar["Id"].raw_value, lidar["Inst"].raw_value, radar["Inst"].raw_value), (255, 0, 1))
+        self.assertAlmostEqual(float(lidar["Range"].phys_value), 5.0, delta=0.001)
+        self.assertAlmostEqual(float(lidar["Bearing"].phys_value), np.arctan2(4, 3), delta=0.0002)
+        for key, value, step in (("Range", 5.0, 0.01), ("Bearing", 0.9, 0.0016), ("RangeRate", -1.5, 0.04)):
+            self.assertAlmostEqual(float(radar[key].phys_value), value, delta=0.51 * step)
+        self.assertEqual(text_of(self.out + ".truth.csv").splitlines()[2], "1.050000,3.200000,4.100000,0.000000")
+
+    def test_a_track_names_file_line_and_reason(self):
+        for text, words in (("X 1 2 3 4 5 6 7\n", (":1", "L or R")), ("L 1 2 3 4 5\n", (":1", "6 columns")), ("# nothing\n", ("no measurement",)),
+                            (self.TRACK + self.TRACK[:10] + "1000000 0 0 0 0\n", (":4", "time")), ("L 1 nan 5 0 0 0 0\n", (":1", "finite"))):
+            with self.subTest(text=text):
+                self.write("track.txt", text)
+                self.refused(run("import_udacity_track", os.path.join(self.set, "track.txt"), self.out), "track.txt", *words)
+
     def test_mrclam_names_file_line_and_reason(self):
         cases = [("Robot1_Odometry.dat", "100.0 0.1 0.0\n100.5 0.1\n", ("Robot1_Odometry.dat:2", "2 columns, expected 3")),
                  ("Robot1_Odometry.dat", "100.0 0.1 zero\n", ("Robot1_Odometry.dat:1", "column 3", "not a number", "zero")),

@@ -1,9 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "estimators/planar/dead_reckoning.hpp"
 
+#include "estimators/planar/summing_ekf.hpp"
+#include "filter/ukf.hpp"
+#include "filter/ukf_sqrt.hpp"
+
 namespace tetap::estimators {
 
-model::PlanarIncrement DeadReckoning::held_increment(float dt_s, const param::Parameters& n) const {
+template <class Filter>
+model::PlanarIncrement PlanarDeadReckoning<Filter>::held_increment(float dt_s, const param::Parameters& n) const {
   model::PlanarIncrement increment;
   switch (held_.kind) {
     case Held::Kind::kNone:
@@ -25,7 +30,8 @@ model::PlanarIncrement DeadReckoning::held_increment(float dt_s, const param::Pa
   return increment;
 }
 
-void DeadReckoning::propagate(base::Micros t, const param::Parameters& n) {
+template <class Filter>
+void PlanarDeadReckoning<Filter>::propagate(base::Micros t, const param::Parameters& n) {
   if (t <= time_) return;
   if (held_.kind == Held::Kind::kNone) {  // no motion was ever measured: the robot stands where it was put
     time_ = t;
@@ -51,7 +57,8 @@ void DeadReckoning::propagate(base::Micros t, const param::Parameters& n) {
   }
 }
 
-bool DeadReckoning::fuse(const sensor::WheelCounts& now, base::Micros stamp, const param::Parameters& n) {
+template <class Filter>
+bool PlanarDeadReckoning<Filter>::fuse(const sensor::WheelCounts& now, base::Micros stamp, const param::Parameters& n) {
   const auto& drive = n.wheels.drive;
   if (n.gyro.use != 0) propagate(stamp, n);  // the turn up to here; what the counts add is length
   const bool usable = have_counts_ && stamp > counts_time_ && stamp - counts_time_ <= base::Micros{n.wheels.timeout_us};
@@ -75,7 +82,8 @@ bool DeadReckoning::fuse(const sensor::WheelCounts& now, base::Micros stamp, con
   return true;
 }
 
-bool DeadReckoning::fuse_speed(const Held& held, base::Micros stamp, const param::Parameters& n) {
+template <class Filter>
+bool PlanarDeadReckoning<Filter>::fuse_speed(const Held& held, base::Micros stamp, const param::Parameters& n) {
   const bool first = held_.kind == Held::Kind::kNone;
   const bool gap = stamp - last_input_ > base::Micros{n.wheels.timeout_us};
   if (n.wheels.hold == param::Hold::kForward || first || gap) propagate(stamp, n);
@@ -86,7 +94,9 @@ bool DeadReckoning::fuse_speed(const Held& held, base::Micros stamp, const param
   return true;
 }
 
-bool DeadReckoning::fuse(const sensor::ImuSample& sample, base::Micros stamp, const param::Parameters& n) {
+template <class Filter>
+bool PlanarDeadReckoning<Filter>::fuse(const sensor::ImuSample& sample, base::Micros stamp,
+                                       const param::Parameters& n) {
   const base::Micros interval{sample.interval_us};
   if (n.gyro.use == 0 || interval.us == 0 || interval > base::Micros{n.wheels.timeout_us}) return false;
   const float interval_s = base::seconds(interval);
@@ -120,13 +130,14 @@ bool DeadReckoning::fuse(const sensor::ImuSample& sample, base::Micros stamp, co
   return true;
 }
 
-Estimate DeadReckoning::estimate(const param::Parameters& n) const {
-  DeadReckoning ahead = *this;
+template <class Filter>
+Estimate PlanarDeadReckoning<Filter>::estimate(const param::Parameters& n) const {
+  PlanarDeadReckoning ahead = *this;
   ahead.propagate(out_time_, n);
   const bool fresh = this->fresh(n);
   return {.time = out_time_,
           .pose = ahead.filter.x,
-          .p = ahead.filter.p,
+          .p = covariance_of(ahead.filter),
           .forward_mps = fresh ? forward_mps() : 0.0F,
           .yaw_rate_radps = fresh ? yaw_rate_radps(n) : 0.0F,
           .position_valid = true,
@@ -134,7 +145,8 @@ Estimate DeadReckoning::estimate(const param::Parameters& n) const {
           .velocity_valid = fresh};
 }
 
-[[gnu::noinline]] MotionVariance DeadReckoning::motion_variance(const param::Parameters& n) const {
+template <class Filter>
+[[gnu::noinline]] MotionVariance PlanarDeadReckoning<Filter>::motion_variance(const param::Parameters& n) const {
   if (!fresh(n)) return {};
   // Variance of the motion over one period: its share in that of the pose, and the steps of the counters.
   const float period_s = base::seconds(base::Micros{n.loop.period_us});
@@ -150,5 +162,10 @@ Estimate DeadReckoning::estimate(const param::Parameters& n) const {
   return {.forward_m2ps2 = (one.var_ds + 0.5F * step_m * step_m) * per_s2,
           .yaw_rate_rad2ps2 = (one.var_dyaw + 2.0F * step_rad * step_rad) * per_s2 + aged * aged};
 }
+
+template class PlanarDeadReckoning<filter::Ekf<model::PlanarPose>>;
+template class PlanarDeadReckoning<SummingEkf>;
+template class PlanarDeadReckoning<filter::Ukf<model::PlanarPose>>;
+template class PlanarDeadReckoning<filter::UkfSqrt<model::PlanarPose>>;
 
 }  // namespace tetap::estimators

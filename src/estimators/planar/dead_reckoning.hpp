@@ -5,6 +5,7 @@
 #pragma once
 
 #include "estimators/estimate.hpp"
+#include "filter/covariance_access.hpp"
 #include "filter/ekf.hpp"
 #include "model/planar_increment.hpp"
 #include "param/parameters.hpp"
@@ -14,9 +15,11 @@
 
 namespace tetap::estimators {
 
-class DeadReckoning {
+/// Filter: what carries pose and covariance along an increment (filter::Ekf, Ukf, UkfSqrt of model::PlanarPose).
+template <class Filter>
+class PlanarDeadReckoning {
  public:
-  filter::Ekf<model::PlanarPose> filter;
+  Filter filter;
 
   void start(base::Micros t, const model::PlanarPose& pose, float sigma_position_m, float sigma_yaw_rad) {
     const float position_m = sigma_position_m > kFinest_m ? sigma_position_m : kFinest_m;
@@ -24,12 +27,18 @@ class DeadReckoning {
     const float variance = position_m * position_m;
     filter.x = pose;
     filter.x.yaw_rad = base::wrap_angle(pose.yaw_rad);
-    filter.p = filter::Symmetric<float, 3>::diagonal({variance, variance, yaw_rad * yaw_rad});
+    set_covariance(filter, filter::Symmetric<float, 3>::diagonal({variance, variance, yaw_rad * yaw_rad}));
     if (t > time_) time_ = t;
     untravelled();
   }
 
   void advance(base::Micros t) { out_time_ = t; }
+
+  /// The heading of today becomes the x axis of a frame of its own: known there, and apart from the position.
+  void forget_heading() {
+    const auto& p = covariance_of(filter);
+    set_covariance(filter, filter::Symmetric<float, 3>::diagonal({p(0, 0), p(1, 1), kFinest_rad * kFinest_rad}));
+  }
 
   /// False: this robot has no use for the sample (a speed without a turn, an IMU that is not used).
   bool fuse(const sensor::WheelCounts& now, base::Micros stamp, const param::Parameters& n);
@@ -62,7 +71,7 @@ class DeadReckoning {
     sink(filter.x.y.anchor_um);
     sink(filter.x.y.offset_m);
     sink(filter.x.yaw_rad);
-    for (const float v : filter.p.packed()) sink(v);
+    hash_covariance(filter, sink);
     sink(held_.first_mps);
     sink(held_.second);
     sink(applied_left_m_);
@@ -127,5 +136,7 @@ class DeadReckoning {
   float gyro_rate_radps_ = 0;
   float gyro_bias_radps_ = 0;
 };
+
+using DeadReckoning = PlanarDeadReckoning<filter::Ekf<model::PlanarPose>>;
 
 }  // namespace tetap::estimators

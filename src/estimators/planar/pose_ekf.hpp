@@ -1,109 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// The planar pose by extended Kalman filter: dead reckoning corrected by known landmarks and GNSS, with a gate and a
-// rule for getting back in when everything is refused.
+// The planar pose by extended Kalman filter.
 #pragma once
 
-#include "checks/persistence.hpp"
-#include "estimators/context.hpp"
-#include "estimators/planar/dead_reckoning.hpp"
-#include "estimators/planar/gnss_alignment.hpp"
-#include "model/bearing.hpp"
-#include "model/gnss_position.hpp"
-#include "model/range.hpp"
-#include "model/range_bearing.hpp"
-
-#include <array>
-#include <optional>
+#include "estimators/planar/pose_filter.hpp"
 
 namespace tetap::estimators {
 
-class PoseEkf {
- public:
-  static constexpr sensor::EstimatorKind kKind = sensor::EstimatorKind::kEkf;
-
-  void restart(base::Micros t, const Context& ctx) {
-    *this = {};
-    const param::StartParameters& s = ctx.parameters.start;
-    const SetPose start{
-        .pose = {.x = base::Anchored{}.plus(s.x_m), .y = base::Anchored{}.plus(s.y_m), .yaw_rad = s.yaw_rad},
-        .sigma_position_m = s.sigma_position_m,
-        .sigma_yaw_rad = s.sigma_yaw_rad};
-    if (s.known != 0) {
-      set_pose(t, start, ctx);
-    } else {
-      motion_.start(t, model::PlanarPose{}, kUnknown_m, kUnknown_rad);
-    }
-  }
-  void set_pose(base::Micros t, const SetPose& given, const Context& ctx) {
-    motion_.propagate(t, ctx.parameters);
-    const bool heading = given.sigma_yaw_rad < 3.14F;  // false for NaN too
-    motion_.start(t, given.pose, given.sigma_position_m, heading ? given.sigma_yaw_rad : kUnknown_rad);
-    phase_ = heading ? Phase::kTracking : Phase::kWaiting;
-    alignment_ = {};
-    last_absolute_ = t;
-    refused_ = {};
-  }
-
-  void advance(base::Micros t, const Context&) { motion_.advance(t), now_ = t; }
-
-  template <class Input>
-  requires requires(DeadReckoning& motion, const Input& input, const param::Parameters& n) {
-    motion.fuse(input, base::Micros{}, n);
-  }
-  Innovation fuse(const Input& input, base::Micros stamp, const Context& ctx) {
-    const bool used = motion_.fuse(input, stamp, ctx.parameters);
-    return {.verdict = used ? sensor::Verdict::kAccepted : sensor::Verdict::kNotUsed};
-  }
-
-  Innovation fuse(const sensor::LandmarkSighting& sighting, base::Micros stamp, const Context& ctx);
-  Innovation fuse(const sensor::GnssPosition& fix, base::Micros stamp, const Context& ctx);
-
-  [[nodiscard]] Estimate estimate(const Context& ctx) const {
-    Estimate estimate = motion_.estimate(ctx.parameters);
-    estimate.position_valid = estimate.heading_valid = phase_ == Phase::kTracking;
-    return estimate;
-  }
-  [[nodiscard]] MotionVariance motion_variance(const Context& ctx) const {
-    return motion_.motion_variance(ctx.parameters);
-  }
-  [[nodiscard]] sensor::Mode mode(const Context&) const {
-    if (phase_ == Phase::kWaiting) return sensor::Mode::kWaitingForPose;
-    if (phase_ == Phase::kAligning) return sensor::Mode::kAligning;
-    for (const checks::Persistence& refused : refused_)
-      if (refused.count() >= 3) return sensor::Mode::kDegraded;
-    return now_ - last_absolute_ > base::Micros{5'000'000} ? sensor::Mode::kDeadReckoning : sensor::Mode::kNominal;
-  }
-  template <class Sink>
-  void hash_state(Sink&& sink) const {
-    motion_.hash_state(sink);
-    sink(static_cast<std::uint32_t>(phase_));
-    alignment_.hash_state(sink);
-    for (const checks::Persistence& refused : refused_) refused.hash_state(sink);
-    sink(last_absolute_.us);
-  }
-
- private:
-  enum class Phase : std::uint8_t { kWaiting, kAligning, kTracking };
-  enum Source : std::size_t { kLandmark, kGnss, kSources };
-  static constexpr float kLost_rad = 1;
-
-  /// A heading that could be anything is looked for afresh: a filter that linearises about it would never find it.
-  void give_up_when_lost() {
-    if (phase_ != Phase::kTracking || !(motion_.filter.p(2, 2) > kLost_rad * kLost_rad)) return;
-    phase_ = Phase::kWaiting;
-    alignment_ = {};
-  }
-  template <class Model>
-  Innovation measure(const Model& model, Source source, float gate_scale, base::Micros stamp, const Context& ctx,
-                     std::uint8_t landmark = 0xFF);
-  void recover(checks::Persistence& refused, base::Micros stamp, const param::RecoveryParameters& n);
-
-  DeadReckoning motion_;
-  GnssAlignment alignment_;
-  Phase phase_ = Phase::kWaiting;
-  std::array<checks::Persistence, kSources> refused_{};  ///< rejections in a row of one kind of sensor
-  base::Micros last_absolute_;                           ///< stamp of the last accepted landmark or fix
-  base::Micros now_;
-};
+using PoseEkf = PoseFilter<filter::Ekf<model::PlanarPose>>;
 
 }  // namespace tetap::estimators

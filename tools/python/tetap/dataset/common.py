@@ -265,9 +265,9 @@ def identifier_base(text):
     return base
 
 
-def arguments_parser(description):
+def arguments_parser(description, what="directory", metavar="DIR", text="directory of the data set"):
     parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("directory", metavar="DIR", help="directory of the data set")
+    parser.add_argument(what, metavar=metavar, help=text)
     parser.add_argument("--dbc", default=bus_writer.DEFAULT_DBC, help="message layout (default: the repository's)")
     parser.add_argument("--base", type=identifier_base, default=bus_writer.DBC_BASE, help="identifier base of the node (default 0x300)")
     return parser

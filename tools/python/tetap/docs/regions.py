@@ -83,6 +83,12 @@ def mrclam(out):
     return table(["robot", "position RMSE", "heading RMSE", "NEES mean (3 expected)", "NIS mean (2 expected)", "sightings accepted / rejected"], rows)
 
 
+def menu(out):
+    """Each figure of the menu's robots on logs, with the bounds that the test holds it between."""
+    rows = [[what, f"{one['value']:.4g}", f"{one['low']:.3g} to {one['high']:.3g}"] for what, one in loaded(out, "menu/menu.json").items()]
+    return table(["run and figure", "measured", "bounds"], rows)
+
+
 # region: (command, files that it writes, table)
 REGIONS = {"memory": ("make size stack", ["size.json", "stack.json"], memory), "instructions": ("make count", ["count.json"], instructions),
            "campaign": ("tools/proof/run_campaign", ["campaign.json"], campaign),
@@ -90,6 +96,7 @@ REGIONS = {"memory": ("make size stack", ["size.json", "stack.json"], memory), "
            "drives": (WHOLE, ["inertial.json"], of_whole_runs(recorded.drive_table)),
            "outages": (WHOLE, ["inertial.json"], of_whole_runs(lambda result: recorded.outage_table(result["car"]["outages"]))),
            "nees": (WHOLE, ["inertial.json"], of_whole_runs(recorded.nees_table)),
+           "menu": ("test/replay/menu_runs.py build/host/sim_host out/menu", ["menu/menu.json"], menu),
            "mrclam": ("make test STEPS=recorded_runs", [f"recorded/mrclam{robot}/summary.json" for robot in range(1, 6)], mrclam)}
 
 

@@ -524,7 +524,7 @@ def judge(run, estimator, truth, names):
         result["end"] = {"time_s": float(rows["time_s"][last]), "x_m": float(rows["x_m"][last]), "y_m": float(rows["y_m"][last]),
                          "yaw_rad": float(rows["yaw_rad"][last])}
     empty = dict.fromkeys(["position_rmse_m", "heading_rmse_deg", "final_error_m", "max_error_m", "nees_mean", "nees_inside_95",
-                           "nees_inside_two_sided_95"])
+                           "nees_inside_two_sided_95", "recovered_after_s"])
     result.update(empty, epochs_with_truth=0)
     if truth is None:
         return result
@@ -543,6 +543,7 @@ def judge(run, estimator, truth, names):
                   final_error_m=float(distance[known[-1]]), max_error_m=float(distance[known].max()))
     if np.isfinite(dyaw).any():
         result["final_heading_error_deg"] = float(np.degrees(dyaw[np.isfinite(dyaw)][-1]))
+    result["recovered_after_s"] = recovered_after_s(rows["time_s"], distance, valid)
     if truth.is_reference:  # the reference is fused itself and has errors of its own: consistency with it says nothing
         return result
     dof = 3 if truth.has_yaw else 2
@@ -557,6 +558,22 @@ def judge(run, estimator, truth, names):
         result.update(nees_mean=float(values.mean()), nees_inside_95=float((values <= chi_square(0.95, dof)).mean()),
                       nees_inside_two_sided_95=float(((values >= low) & (values <= high)).mean()))
     return result
+
+
+RECOVERED_M, RECOVERED_S = 0.5, 10.0  # a robot is found when its valid estimate stays so near to the truth for so long
+
+
+def recovered_after_s(time_s, distance_m, valid):
+    """Begin of the first span of RECOVERED_S in which every estimate is valid and right, from the begin of the truth; None without one."""
+    known = np.flatnonzero(np.isfinite(distance_m))
+    time_s, right = time_s[known], (distance_m[known] <= RECOVERED_M) & valid[known]
+    begins = np.flatnonzero(right & ~np.concatenate([[False], right[:-1]]))
+    for begin in begins:
+        wrong = np.flatnonzero(~right[begin:])
+        end = time_s[begin + wrong[0]] if len(wrong) else time_s[-1]
+        if end - time_s[begin] >= RECOVERED_S:
+            return float(time_s[begin] - time_s[0])
+    return None
 
 
 def block_figures(found, name):
@@ -680,5 +697,6 @@ def summary(run, truth):
     result.update({one["name"]: one for one in judged})
     result["warnings"] = warnings_of(run, judged)
     best = result[run.names[run.best]]
-    result["position_rmse_m"], result["heading_rmse_deg"] = best["position_rmse_m"], best["heading_rmse_deg"]
+    for name in ("position_rmse_m", "heading_rmse_deg", "recovered_after_s"):
+        result[name] = best[name]
     return result

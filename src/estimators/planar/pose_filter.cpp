@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "estimators/planar/pose_ekf.hpp"
+#include "estimators/planar/pose_ukf.hpp"
 
 namespace tetap::estimators {
 
+template <class Filter>
 template <class Model>
-Innovation PoseEkf::measure(const Model& model, Source source, float gate_scale, base::Micros stamp, const Context& ctx,
-                            std::uint8_t landmark) {
+Innovation PoseFilter<Filter>::measure(const Model& model, Source source, float gate_scale, base::Micros stamp,
+                                       const Context& ctx, std::uint8_t landmark) {
   const auto result = motion_.filter.update(model, gate_scale * filter::chi_square_99(Model::kDimension));
   checks::Persistence& refused = refused_[source];
   if (result.verdict == filter::Verdict::kAccepted) {
@@ -18,14 +20,16 @@ Innovation PoseEkf::measure(const Model& model, Source source, float gate_scale,
   return record(result, landmark);
 }
 
-void PoseEkf::recover(checks::Persistence& refused, base::Micros stamp, const param::RecoveryParameters& n) {
+template <class Filter>
+void PoseFilter<Filter>::recover(checks::Persistence& refused, base::Micros stamp, const param::RecoveryParameters& n) {
   if (!refused.persists(stamp, base::Micros{n.after_us}, n.at_least)) return;
   const float place_m2 = n.inflate_position_m * n.inflate_position_m;
-  motion_.filter.p.add_diagonal({place_m2, place_m2, n.inflate_yaw_rad * n.inflate_yaw_rad});
+  add_variance(motion_.filter, {place_m2, place_m2, n.inflate_yaw_rad * n.inflate_yaw_rad});
   refused.reset();
 }
 
-Innovation PoseEkf::fuse(const sensor::LandmarkSighting& sighting, base::Micros stamp, const Context& ctx) {
+template <class Filter>
+Innovation PoseFilter<Filter>::fuse(const sensor::LandmarkSighting& sighting, base::Micros stamp, const Context& ctx) {
   const param::LandmarkParameters& n = ctx.parameters.landmark;
   const std::optional<model::Landmark> landmark =
       ctx.map_frame.map != nullptr ? ctx.map_frame.map->find(sighting.landmark) : std::nullopt;
@@ -61,7 +65,8 @@ Innovation PoseEkf::fuse(const sensor::LandmarkSighting& sighting, base::Micros 
   return {.verdict = sensor::Verdict::kNotFinite, .landmark = sighting.landmark, .failed = sensor::Check::kValue};
 }
 
-Innovation PoseEkf::fuse(const sensor::GnssPosition& fix, base::Micros stamp, const Context& ctx) {
+template <class Filter>
+Innovation PoseFilter<Filter>::fuse(const sensor::GnssPosition& fix, base::Micros stamp, const Context& ctx) {
   const param::GnssParameters& n = ctx.parameters.gnss;
   if (fix.fix < sensor::GnssFix::k2d || ctx.map_frame.origin == sensor::OriginSource::kNone) return {};
   const nav::Local local = ctx.map_frame.frame.to_local(fix.latitude_2ndeg, fix.longitude_2ndeg, fix.height_m);
@@ -86,5 +91,9 @@ Innovation PoseEkf::fuse(const sensor::GnssPosition& fix, base::Micros stamp, co
   }
   return {.verdict = sensor::Verdict::kAccepted};
 }
+
+template class PoseFilter<filter::Ekf<model::PlanarPose>>;  // PoseEkf
+template class PoseFilter<filter::Ukf<model::PlanarPose>>;  // PoseUkf
+template class PoseFilter<filter::UkfSqrt<model::PlanarPose>>;
 
 }  // namespace tetap::estimators

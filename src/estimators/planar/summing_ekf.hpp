@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+// An extended Kalman filter of the planar pose that also sums up its increments: what moves along with it moves once
+// for many of them.
+#pragma once
+
+#include "filter/ekf.hpp"
+#include "model/planar_increment.hpp"
+
+namespace tetap::estimators {
+
+struct SummingEkf : filter::Ekf<model::PlanarPose> {
+  bool predict(const model::PlanarIncrement& increment) {
+    travel.ds_m += increment.ds_m;
+    travel.dyaw_rad += increment.dyaw_rad;
+    travel.var_ds += increment.var_ds;
+    travel.var_dyaw += increment.var_dyaw;
+    return filter::Ekf<model::PlanarPose>::predict(increment);
+  }
+  model::PlanarIncrement travel;  ///< sum since the owner set it back; the errors of length and turn are independent
+};
+
+}  // namespace tetap::estimators

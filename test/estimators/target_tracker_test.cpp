@@ -1,0 +1,184 @@
+// SPDX-License-Identifier: Apache-2.0
+// Laws of the trackers: they follow a target within their uncertainty, begin anew when it is another one, ticks change
+// no bit, and no measurement leaves them without numbers.
+#include "estimators/target/target_tracker.hpp"
+#include "base/bit_crc.hpp"
+#include "config/tracker.hpp"
+#include "config/tracker_ukf.hpp"
+#include "support/never_nan.hpp"
+
+#include <gtest/gtest.h>
+#include <cmath>
+#include <random>
+
+namespace tetap::estimators {
+namespace {
+
+constexpr std::int64_t kStep_us = 50'000;
+
+/// A target on a circle of 10 m about (12, 3) at 4 m/s, seen by lidar and radar in turn.
+template <class E>
+struct Scene {
+  explicit Scene(const param::Parameters& parameters) : numbers(parameters) { tracker.restart({}, ctx()); }
+  [[nodiscard]] Context ctx() const { return {.parameters = numbers, .map_frame = frame}; }
+  [[nodiscard]] double x() const { return 12 + 10 * std::cos(angle); }
+  [[nodiscard]] double y() const { return 3 + 10 * std::sin(angle); }
+  [[nodiscard]] double yaw() const { return std::remainder(angle + M_PI / 2, 2 * M_PI); }
+  [[nodiscard]] sensor::LandmarkSighting seen() {
+    const auto noise = [this](double sigma) { return std::normal_distribution<double>(0, sigma)(random); };
+    const double range = std::hypot(x(), y()), bearing = std::atan2(y(), x());
+    if (steps % 2 == 0) {
+      const double px = x() + noise(0.15), py = y() + noise(0.15);
+      return {.landmark = 0xFF,
+              .range_m = static_cast<float>(std::hypot(px, py)),
+              .bearing_rad = static_cast<float>(std::atan2(py, px))};
+    }
+    const double rate = 4 * (x() * std::cos(yaw()) + y() * std::sin(yaw())) / range;
+    return {.landmark = 0xFF,
+            .range_m = static_cast<float>(range + noise(0.3)),
+            .bearing_rad = static_cast<float>(bearing + noise(0.03)),
+            .range_rate_mps = static_cast<float>(rate + noise(0.3))};
+  }
+  void drive(int count) {
+    for (int k = 0; k < count; ++k) {
+      us += kStep_us;
+      angle += 4 * 0.05 / 10;
+      ++steps;
+      last = tracker.fuse(seen(), {us}, ctx());
+      rejected += last.verdict == sensor::Verdict::kRejected ? 1 : 0;
+    }
+  }
+  [[nodiscard]] Estimate estimate() {
+    tracker.advance({us}, ctx());
+    return tracker.estimate(ctx());
+  }
+  [[nodiscard]] double error_m() {
+    const Estimate e = estimate();
+    return std::hypot(static_cast<double>(e.pose.x.minus({})) - x(), static_cast<double>(e.pose.y.minus({})) - y());
+  }
+  [[nodiscard]] std::uint32_t hash() const {
+    base::BitCrc crc;
+    tracker.hash_state(crc);
+    return crc.value();
+  }
+
+  param::Parameters numbers;
+  MapFrame frame;
+  E tracker;
+  Innovation last;
+  std::mt19937 random{3};
+  double angle = 0;
+  std::int64_t us = 0;
+  int steps = 0, rejected = 0;
+};
+
+template <class E>
+Scene<E> scene() {
+  if constexpr (std::is_same_v<E, VelocityTracker>) {
+    return Scene<E>(robot::tracker::parameters);
+  } else {
+    return Scene<E>(robot::tracker_ukf::parameters);
+  }
+}
+
+template <class E>
+class Tracker : public testing::Test {};
+using Trackers = testing::Types<VelocityTracker, TurnTracker>;
+TYPED_TEST_SUITE(Tracker, Trackers);
+
+TYPED_TEST(Tracker, FollowsWithinItsUncertainty) {
+  auto s = scene<TypeParam>();
+  s.drive(100);
+  // A turn track begins with a heading of 0 and 1 rad: a target that crosses is refused until the track begins anew.
+  const int at_first = s.rejected;
+  EXPECT_LE(at_first, TypeParam::kKind == sensor::EstimatorKind::kUkf ? 15 : 0);
+  double square = 0, sigma2 = 0, speed2 = 0, turn2 = 0;
+  constexpr int kLooks = 200;
+  for (int k = 0; k < kLooks; ++k) {
+    s.drive(5);
+    const Estimate e = s.estimate();
+    square += s.error_m() * s.error_m();
+    sigma2 += static_cast<double>(e.p(0, 0) + e.p(1, 1));
+    speed2 += std::pow(static_cast<double>(e.forward_mps) - 4, 2) / kLooks;
+    turn2 += std::pow(std::remainder(static_cast<double>(e.pose.yaw_rad) - s.yaw(), 2 * M_PI), 2) / kLooks;
+    EXPECT_TRUE(e.position_valid && e.heading_valid && e.velocity_valid);
+  }
+  EXPECT_LT(square / sigma2, 1.5);
+  EXPECT_GT(square / sigma2, 0.3);
+  EXPECT_LT(std::sqrt(speed2), 0.6);
+  EXPECT_LT(std::sqrt(turn2), 0.2);
+  EXPECT_EQ(s.rejected, at_first);
+}
+
+TYPED_TEST(Tracker, TicksChangeNoBit) {
+  auto quiet = scene<TypeParam>(), ticked = scene<TypeParam>();
+  for (int k = 0; k < 100; ++k) {
+    quiet.drive(3), ticked.drive(3);
+    for (std::int64_t ahead_us = 0; ahead_us < kStep_us; ahead_us += 10'000) {
+      ticked.tracker.advance({ticked.us + ahead_us}, ticked.ctx());
+      static_cast<void>(ticked.tracker.estimate(ticked.ctx()));
+    }
+    ASSERT_EQ(quiet.hash(), ticked.hash()) << k;
+  }
+}
+
+TYPED_TEST(Tracker, APoseFromOutsideIsTakenAsItIs) {
+  auto s = scene<TypeParam>();
+  s.drive(20);
+  s.tracker.set_pose(
+      {s.us}, {.pose = {.x = base::Anchored{}.plus(-4), .y = base::Anchored{}.plus(9)}, .sigma_position_m = 0.5F},
+      s.ctx());
+  const Estimate e = s.estimate();
+  EXPECT_EQ(e.pose.x.minus({}), -4);
+  EXPECT_EQ(e.pose.y.minus({}), 9);
+  EXPECT_NEAR(e.p(0, 0), 0.25F, 1e-6F);
+  EXPECT_FALSE(e.heading_valid);
+}
+
+TYPED_TEST(Tracker, ATargetThatIsElsewhereIsATrackOfItsOwnAfterFiveRefusals) {
+  auto s = scene<TypeParam>();
+  s.drive(100);
+  s.rejected = 0;
+  s.angle += 2;
+  s.drive(5);
+  EXPECT_EQ(s.rejected, 5);
+  EXPECT_GT(s.error_m(), 3);
+  EXPECT_EQ(s.tracker.mode(s.ctx()), sensor::Mode::kDegraded);
+  s.drive(100);
+  EXPECT_LT(s.error_m(), 0.6);
+}
+
+TYPED_TEST(Tracker, WithoutMeasurementsTheTrackEnds) {
+  auto s = scene<TypeParam>();
+  s.drive(100);
+  const Estimate before = s.estimate();
+  s.us += 1'900'000;
+  const Estimate later = s.estimate();
+  EXPECT_TRUE(later.position_valid);
+  EXPECT_GT(later.p(0, 0), 4 * before.p(0, 0));
+  s.us += 200'000;
+  EXPECT_FALSE(s.estimate().position_valid);
+  EXPECT_EQ(s.tracker.mode(s.ctx()), sensor::Mode::kWaitingForPose);
+}
+
+TYPED_TEST(Tracker, NoMeasurementLeavesItWithoutNumbers) {
+  for (const float value : test::kHostile)
+    for (int field = 0; field < 3; ++field) {
+      auto s = scene<TypeParam>();
+      s.drive(field == 0 ? 0 : 20);
+      for (int k = 0; k < 8; ++k) {
+        s.drive(1);
+        sensor::LandmarkSighting sighting{.landmark = 0xFF, .range_m = 15, .bearing_rad = 0.2F, .range_rate_mps = 1};
+        float* const fields[] = {&sighting.range_m, &sighting.bearing_rad, &sighting.range_rate_mps};
+        *fields[field] = value;
+        if (base::abs(value) > 1e5F) continue;  // never passes the plausibility test
+        static_cast<void>(s.tracker.fuse(sighting, {s.us}, s.ctx()));
+        const Estimate e = s.estimate();
+        EXPECT_TRUE(e.pose.finite()) << field << " = " << value;
+        EXPECT_GT(test::least_eigenvalue(e.p), 0) << field << " = " << value;
+      }
+    }
+}
+
+}  // namespace
+}  // namespace tetap::estimators
