@@ -16,8 +16,8 @@ namespace tetap::sim {
   param::Parameters n = robot::rover_landmarks::parameters;
   // The world's own, whatever a calibration made of the robot's.
   n.imu = {};
-  n.wheels.drive.left_radius_m = n.wheels.drive.right_radius_m = single(world.rover.wheel_radius_m);
-  n.wheels.drive.track_m = single(world.rover.track_m);
+  n.wheels.drive.left_radius_m = n.wheels.drive.right_radius_m = single(world.vehicle.wheel_radius_m);
+  n.wheels.drive.track_m = single(world.vehicle.track_m);
   n.wheels.drive.counts_per_turn = single(world.wheels.counts_per_turn);
   n.wheels.drive.noise_left = n.wheels.drive.noise_right = single(world.wheels.noise_m);
   n.gyro.noise = single(world.imu.gyro_noise * world.imu.gyro_noise);
@@ -28,7 +28,7 @@ namespace tetap::sim {
   n.gnss.sigma_floor_m = 0.001F;  // the receiver's accuracy figure is exact
   n.gnss.sigma_scale = 1;
   // A first fix as origin would be a metre off the map, for the whole run.
-  const GeodeticPoint origin = Wgs84{options.origin}.geodetic({});
+  const GeodeticPoint origin = Earth{options.origin}.geodetic({});
   n.gnss.origin_configured = 1;
   n.gnss.origin_latitude_2ndeg = origin.latitude_2ndeg;
   n.gnss.origin_longitude_2ndeg = origin.longitude_2ndeg;
@@ -61,9 +61,9 @@ namespace tetap::sim {
   n.inertial.accel_bias_mps3_rthz = single(world.imu.accel_walk_mps2 * walk_rthz);
   n.inertial.gyro_turn_on_radps = single(world.imu.gyro_walk_radps);
   n.inertial.accel_turn_on_mps2 = single(world.imu.accel_walk_mps2);
-  n.inertial.wheel_mps = single(world.rover.jitter_ahead_mps);
+  n.inertial.wheel_mps = single(world.vehicle.jitter_ahead_mps);
   n.inertial.slip_share = 0;  // the wheels' noise is that of odometry: k metres squared per metre
-  n.inertial.lateral_mps = n.inertial.vertical_mps = single(world.rover.jitter_mps);
+  n.inertial.lateral_mps = n.inertial.vertical_mps = single(world.vehicle.jitter_mps);
   // Bus or not, a judge wants sigmas beside their errors.
   n.publish.std_every = n.publish.attitude_every = n.publish.state_every = 5;
   return n;

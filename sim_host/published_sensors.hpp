@@ -5,6 +5,7 @@
 
 #include "node/node.hpp"
 #include "sim_host/robots.hpp"
+#include "sim_host/simulated_robot.hpp"
 #include "sim_host/world/world.hpp"
 
 #include <concepts>
@@ -21,6 +22,7 @@ concept Takes = requires(E& e, const Payload& payload, base::Micros stamp, const
 struct Sent {
   bool imu = false, landmarks = false, magnetometer = false, barometer = false;
   bool inertial = false;  ///< an inertial filter is there: what is a matched world for it is another one
+  VehicleKind kind = VehicleKind::kDifferentialDrive;
   friend bool operator==(const Sent&, const Sent&) = default;
 };
 
@@ -29,11 +31,13 @@ template <class... E>
   // Those that live on an IMU; to the others its gyroscope is one way to know the turn.
   constexpr bool kNeedsImu =
       ((E::kKind == sensor::EstimatorKind::kInertial || E::kKind == sensor::EstimatorKind::kAttitude) || ...);
+  constexpr bool kInertial = ((E::kKind == sensor::EstimatorKind::kInertial) || ...);
   return {.imu = kNeedsImu || (n.gyro.use != 0 && (Takes<E, sensor::ImuSample> || ...)),
           .landmarks = (Takes<E, sensor::LandmarkSighting> || ...),
           .magnetometer = n.magnetic.use != 0 && (Takes<E, sensor::MagneticFlux> || ...),
           .barometer = n.baro.use != 0 && (Takes<E, sensor::AirPressure> || ...),
-          .inertial = ((E::kKind == sensor::EstimatorKind::kInertial) || ...)};
+          .inertial = kInertial,
+          .kind = vehicle_kind(n, kInertial)};
 }
 
 /// Throws std::runtime_error when there is no such robot.
@@ -52,7 +56,17 @@ inline void send_only(const Sent& sent, World::Options& world) {
   if (!sent.landmarks) world.parameters.camera.rate_hz = 0, world.course.landmarks.clear();
   world.parameters.magnetometer.rate_hz = sent.magnetometer ? 20 : 0;
   world.parameters.barometer.rate_hz = sent.barometer ? 10 : 0;
+  if (sent.kind == VehicleKind::kMulticopter) world.parameters.wheels.rate_hz = 0;
   world.inertial = sent.inertial;
+}
+
+/// The world with that robot's body, sensors and noise, as its header states them; `parameters` are those.
+inline void simulate(const std::string& robot, const Sent& sent, const param::Parameters& parameters,
+                     World::Options& world) {
+  const bool made_from_world = robot.ends_with("_matched");  // sim_host/matched_rover.hpp
+  simulate(parameters,
+           {.kind = sent.kind, .inertial = sent.inertial, .landmarks = sent.landmarks, .own_noise = !made_from_world},
+           world);
 }
 
 /// Names of the faults that act in that world, with a space between each.

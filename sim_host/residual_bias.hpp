@@ -4,8 +4,8 @@
 #pragma once
 
 #include "param/parameters.hpp"
+#include "sim_host/world/motion.hpp"
 #include "sim_host/world/numbers.hpp"
-#include "sim_host/world/rover.hpp"
 
 #include <array>
 #include <cstddef>
@@ -33,8 +33,12 @@ namespace detail {
     t.accel_bias_b_mps2[i] -= static_cast<double>(n.accel_bias_mps2[i]);
   }
   t.accel_bias_b_mps2 = detail::times(n.accel_matrix, t.accel_bias_b_mps2);
-  for (std::size_t i = 0; i < 3; ++i)
-    t.accel_bias_b_mps2[i] += (static_cast<double>(n.accel_matrix[3 * i + 2]) - (i == 2 ? 1.0 : 0.0)) * kG0;
+  const auto& mounting = parameters.inertial.mounting_bs;
+  const Vector3 level{kG0 * static_cast<double>(mounting[6]), kG0 * static_cast<double>(mounting[7]),
+                      kG0 * static_cast<double>(mounting[8])};
+  std::array<float, 9> off = n.accel_matrix;
+  for (std::size_t i = 0; i < 3; ++i) off[4 * i] -= 1;
+  t.accel_bias_b_mps2 = t.accel_bias_b_mps2 + detail::times(off, level);
   t.gyro_bias_b_radps = detail::times(parameters.inertial.mounting_bs, t.gyro_bias_b_radps);
   t.accel_bias_b_mps2 = detail::times(parameters.inertial.mounting_bs, t.accel_bias_b_mps2);
   return t;

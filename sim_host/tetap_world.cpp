@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // tetap-world: the simulated world's sensors on a CAN bus, and what the node makes of them on record beside the truth.
 #include "sim_host/in_process.hpp"
+#include "sim_host/node_origin.hpp"
 #include "sim_host/play/arguments.hpp"
 #include "sim_host/play/lockstep.hpp"
 #include "sim_host/play/realtime.hpp"
@@ -11,6 +12,9 @@
 #include "sim_host/world_source.hpp"
 
 #include <algorithm>
+#include <array>
+#include <charconv>
+#include <cstddef>
 #include <cstdint>
 #include <cstdio>
 #include <exception>
@@ -25,7 +29,8 @@ std::string help() {
   return
 
       std::string(
-          "usage: tetap-world [OPTION]...\n\nDrives a simulated rover over its course, sends what its sensors say, and "
+          "usage: tetap-world [OPTION]...\n\nDrives or flies a simulated robot over its course, sends what its sensors "
+          "say, and "
           "records the node's answers.\n\n"
           "  --can IFACE        the interface the node is on (default vcan0)\n"
           "  --memory           run a node in this process instead, without a bus\n"
@@ -35,13 +40,22 @@ std::string help() {
           "  --out DIR          for the record and truth.csv (default out/sim)\n"
           "  --seed N           every draw follows from it (default 1)\n"
           "  --duration S       at most so long (default: the whole course)\n"
-          "  --matched          only errors that the filters model; for robots rover_matched, rover_landmarks_matched\n"
-          "  --course NAME      yard (default), road: 1.1 km at 5 m/s, or stand: it stays where it is\n"
-          "  --east M           the course so far east of the origin\n"
+          "  --matched          only errors that the filters model, as large as the robot's parameters say\n"
+          "  --course NAME      yard (on wheels), road: 1.1 km at 5 m/s, street (of a car), flight (of what flies), "
+          "or\n"
+          "                     stand: it stays where it is; default: that of the robot's class\n"
+          "  --start LAT,LON,H  where it starts [deg, deg, m above the ellipsoid] (default: the robot's origin, else\n"
+          "                     48.2627,11.6683,520)\n"
+          "  --origin-distance EAST,NORTH   the start so many metres from the origin, by the origin's axes; with "
+          "--start\n"
+          "                     the node in memory is given the origin that follows\n"
+          "  --east M           the same for M,0\n"
+          "  --built            the robot is built as --params and --set say; else they are what the node is told of "
+          "it\n"
           "  --laps N           the course so many times (default 1; 2 for gnss_far)\n"
           "  --imu-hz N         IMU samples a second (default 100)\n"
-          "  --gnss-m S         1 sigma of GNSS positions per horizontal axis (default 0.85)\n"
-          "  --gnss-hz N        fixes a second (default 5)\n"
+          "  --gnss-m S         1 sigma of GNSS positions per horizontal axis (default 0.85 or the robot's floor)\n"
+          "  --gnss-hz N        fixes a second (default 5; 1 where the robot expects them seldom)\n"
           "  --no-wheels        no wheel says anything\n"
           "  --no-pose          the node is not told where it starts\n"
           "  --fault NAME[@START[+DURATION]]   seconds; several with commas:\n") +
@@ -69,9 +83,10 @@ std::string landmarks_json(const sim::World& world) {
 }
 
 /// In lockstep each row is an epoch of the node, whatever became of the clock of the bus. Biases are those that the
-/// robot's own calibration leaves.
+/// robot's own calibration leaves. `origin` is that of the node's map.
 void write_truth(const sim::SessionOptions& about, const param::Parameters& parameters, const sim::WorldSource& source,
-                 bool lockstep) {
+                 const sim::GeodeticOrigin& origin, bool lockstep) {
+  const sim::FrameChange change(sim::Earth(source.world().origin()), sim::Earth(origin));
   const double temperature_degC = source.world().parameters().imu.temperature_degC;
   sim::OutFile file(about.folder + "/truth.csv");
   sim::Line line;
@@ -82,7 +97,7 @@ void write_truth(const sim::SessionOptions& about, const param::Parameters& para
   file.write(lockstep ? ",epoch\n" : "\n");
   std::int64_t epoch = 0;
   for (const sim::Truth& seen : source.truth()) {
-    const sim::Truth t = sim::bias_left(seen, parameters, temperature_degC);
+    const sim::Truth t = sim::in_frame(sim::bias_left(seen, parameters, temperature_degC), change);
     line.clear();
     line.fixed(t.time.us, 6).text(",").real(t.x_m, 6).text(",").real(t.y_m, 6).text(",").real(t.yaw_rad, 6);
     for (const double x : {t.z_m, t.roll_rad, t.pitch_rad}) line.text(",").real(x, 6);
@@ -119,16 +134,22 @@ int drive(L& link, const Run& run) {
   session.note("matched", run.world.mismatched ? "false" : "true");
   const param::Parameters parameters = sim::parameters_of(about.robot, run.settings);
   for (const auto& [name, json] : sim::parameter_notes(parameters, run.settings)) session.note(name, json);
+  sim::NodeOrigin node_origin(about.base);
+  sim::OriginWatch watch(session, node_origin);
   const int status = session.run([&] {
-    if (!run.realtime) return sim::play_lockstep(link, source, session, run.lockstep, session.counts());
+    if (!run.realtime) return sim::play_lockstep(link, source, watch, run.lockstep, session.counts());
     std::vector<sim::TimedFrame> frames;
     sim::Tick tick;
     while (source.next(tick))
       for (const auto& frame : tick.inputs) frames.push_back({.time = tick.time, .frame = frame});
     sim::RealtimeOptions options{.base = about.base};
-    sim::play_realtime(link, frames, session, options, session.counts());
+    sim::play_realtime(link, frames, watch, options, session.counts());
   });
-  write_truth(about, parameters, source, !run.realtime);
+  // A robot with a map of landmarks keeps to that, wherever its first fix fell.
+  const auto& world = source.world();
+  const sim::GeodeticOrigin origin =
+      run.world.surveyed ? world.origin() : node_origin.from_fix().value_or(world.origin());
+  write_truth(about, parameters, source, origin, !run.realtime);
   return status;
 }
 
@@ -138,31 +159,115 @@ int counted(sim::Arguments& arguments, std::string_view name, int otherwise, int
       arguments.integer(name, static_cast<std::uint64_t>(otherwise), 1, static_cast<std::uint64_t>(most)));
 }
 
-void set_world(sim::Arguments& arguments, sim::World::Options& world) {
-  const std::string course = arguments.text("--course").value_or("yard");
+/// Numbers parted by commas, each within its limits.
+template <std::size_t N>
+std::array<double, N> numbers(const std::string& text, const char* option, const std::array<double, N>& most) {
+  std::array<double, N> all{};
+  std::string_view left = text;
+  bool right = true;
+  for (std::size_t i = 0; i < N; ++i) {
+    const std::string_view one = left.substr(0, left.find(','));
+    const auto [after, error] = std::from_chars(one.data(), one.data() + one.size(), all[i]);
+    right =
+        right && error == std::errc{} && after == one.data() + one.size() && all[i] >= -most[i] && all[i] <= most[i];
+    right = right && (one.size() == left.size()) == (i + 1 == N);
+    left.remove_prefix(std::min(left.size(), one.size() + 1));
+  }
+  if (right) return all;
+  std::string limits;
+  for (const double x : most) limits += (limits.empty() ? "+-" : ",+-") + std::to_string(static_cast<long>(x));
+  throw sim::UsageError(std::string(option) + " needs " + std::to_string(N) + " numbers with commas between, within " +
+                        limits + ", not '" + text + "'");
+}
+
+constexpr double kFarthest_m = 120'000;
+
+/// Course, place and origin; the node's part of the origin goes to its settings.
+void set_place(sim::Arguments& arguments, const param::GnssParameters& node, bool memory, Run& run) {
+  sim::World::Options& world = run.world;
+  if (node.origin_configured != 0)
+    world.origin = {static_cast<double>(node.origin_latitude_2ndeg) * 2e-9,
+                    static_cast<double>(node.origin_longitude_2ndeg) * 2e-9, static_cast<double>(node.origin_height_m)};
+  std::array<double, 2> distance_m{arguments.real("--east", 0, -60'000, 60'000), 0};
+  const auto distance = arguments.text("--origin-distance");
+  if (distance) distance_m = numbers<2>(*distance, "--origin-distance", {kFarthest_m, kFarthest_m});
+  const bool distant = distance || sim::magnitude(distance_m[0]) > 0;
+  const auto given = arguments.text("--start");
+  if (!given) {
+    if (distant) world.place = sim::place_at(world.origin, distance_m[0], distance_m[1]);
+    if (distant && node.origin_configured == 0)
+      throw sim::UsageError(
+          "--origin-distance: robot " + run.session.robot +
+          " takes its origin from the first fix; give it one with --start, or with --set gnss.origin_*");
+    return;
+  }
+  const auto [latitude_deg, longitude_deg, height_m] = numbers<3>(*given, "--start", {90, 180, 10'000});
+  world.place = sim::GeodeticOrigin{latitude_deg, longitude_deg, height_m};
+  if (!distant) {
+    if (node.origin_configured == 0) world.origin = *world.place;
+    return;
+  }
+  if (!memory) throw sim::UsageError("--origin-distance with --start gives a node its origin: that needs --memory");
+  world.origin = sim::origin_with(*world.place, distance_m[0], distance_m[1]);
+  world.surveyed = true;
+  // In the node's own steps, so that both mean the same place.
+  const sim::GeodeticPoint origin = sim::Earth{world.origin}.geodetic({});
+  world.origin = {static_cast<double>(origin.latitude_2ndeg) * 2e-9, static_cast<double>(origin.longitude_2ndeg) * 2e-9,
+                  static_cast<double>(static_cast<float>(world.origin.height_m))};
+  const auto set = [&run](const char* path, double value) {
+    std::array<char, 64> text{};
+    std::snprintf(text.data(), text.size(), "%s=%.9f", path, value);
+    run.settings.set(text.data(), "--origin-distance");
+  };
+  set("gnss.origin_configured", 1);
+  set("gnss.origin_latitude_deg", world.origin.latitude_deg);
+  set("gnss.origin_longitude_deg", world.origin.longitude_deg);
+  set("gnss.origin_height_m", world.origin.height_m);
+}
+
+void set_course(sim::Arguments& arguments, sim::VehicleKind kind, sim::World::Options& world) {
+  const bool car = kind == sim::VehicleKind::kCar, flies = kind == sim::VehicleKind::kMulticopter;
+  const std::string course = arguments.text("--course").value_or(flies ? "flight" : car ? "street" : "yard");
   // Four minutes of one fault, and what comes after it, take two laps.
   const bool far = std::any_of(world.faults.begin(), world.faults.end(),
                                [](const sim::FaultSetting& s) { return s.fault == sim::Fault::kGnssFar; });
   const int laps = counted(arguments, "--laps", far ? 2 : 1, 1000);
-  if (course == "road") {
-    world.course = sim::road_course(laps);
-    world.limits.speed_mps = 5;
-  } else if (course == "stand") {
+  if (course == "stand") {
     world.course = {.waypoints = {{.x_m = 0, .y_m = 0, .stop_s = 86'400}, {.x_m = 1, .y_m = 0, .stop_s = 1}},
                     .landmarks = {}};
-  } else if (course == "yard") {
+  } else if (course == "road" && !flies) {
+    world.course = sim::road_course(laps);
+    world.limits.speed_mps = 5;
+  } else if (course == "street" && car) {
+    world.course = sim::street_course(laps);
+  } else if (course == "flight" && flies) {
+    world.course = sim::flight_course(laps);
+  } else if (course == "yard" && !car && !flies) {
     world.course = sim::default_course(laps);
   } else {
-    throw std::runtime_error("--course " + course + ": it is yard, road or stand");
+    throw std::runtime_error("--course " + course + ": for this robot it is " +
+                             (flies ? "flight"
+                              : car ? "street, road"
+                                    : "yard, road") +
+                             " or stand");
   }
-  const double east_m = arguments.real("--east", 0, -60'000, 60'000);  // range of a pose on the bus
-  for (sim::Waypoint& at : world.course.waypoints) at.x_m += east_m;
-  for (sim::Landmark& mark : world.course.landmarks) mark.x_m += east_m;
+}
+
+void set_world(sim::Arguments& arguments, sim::VehicleKind kind, sim::World::Options& world) {
+  set_course(arguments, kind, world);
   if (arguments.flag("--no-wheels")) world.parameters.wheels.rate_hz = 0;
   world.parameters.gnss.rate_hz = counted(arguments, "--gnss-hz", world.parameters.gnss.rate_hz, 100);
   world.parameters.imu.rate_hz = counted(arguments, "--imu-hz", world.parameters.imu.rate_hz, 2000);
   const double gnss_m = arguments.real("--gnss-m", 0, 0.001, 100);
   if (gnss_m > 0) world.parameters.gnss = sim::with_error(world.parameters.gnss, gnss_m);
+}
+
+/// The robot's body is that of its header; parameters of the command line are the node's.
+void set_robot(sim::Arguments& arguments, const sim::Sent& sent, Run& run) {
+  const std::string& robot = run.session.robot;
+  const param::Parameters built =
+      sim::parameters_of(robot, arguments.flag("--built") ? run.settings : sim::ParameterSettings{});
+  sim::simulate(robot, sent, built, run.world);
 }
 
 }  // namespace
@@ -186,9 +291,13 @@ int main(int argc, char** argv) try {
     run.world.faults.insert(run.world.faults.end(), parsed.settings.begin(), parsed.settings.end());
     run.faults += (run.faults.empty() ? "" : ",") + given;
   }
-  set_world(arguments, run.world);
+  run.session.robot = robot;
+  const sim::Sent sent = sim::sent_to(robot, run.settings);
+  set_robot(arguments, sent, run);
+  set_place(arguments, sim::parameters_of(robot, run.settings).gnss, memory, run);
+  set_world(arguments, sent.kind, run.world);
   const std::string refused = sim::cannot_act(run.world, robot);
-  sim::send_only(sim::sent_to(robot, run.settings), run.world);
+  sim::send_only(sent, run.world);
   run.realtime = arguments.flag("--realtime");
   run.lockstep.window = arguments.window();
   if (arguments.flag("--emulated")) run.lockstep.patience = sim::kEmulatedPatience;

@@ -47,8 +47,10 @@ class WorldSource {
     for (const Landmark& mark : world_.map())
       frames_.push_back(bus::frame(
           base_, bus::InMapEntry{.id = mark.id, .x_raw = millimetres(mark.x_m), .y_raw = millimetres(mark.y_m)}));
-    if (!told_pose_) return;
     const StartPose start = world_.start_pose();
+    // Further from the origin than the bus can carry, the robot has to find its place by itself.
+    constexpr double kFarthest_m = 67'000;
+    if (!told_pose_ || magnitude(start.x_m) > kFarthest_m || magnitude(start.y_m) > kFarthest_m) return;
     frames_.push_back(
         bus::frame(base_, bus::protect(bus::CmdSetPos{
                               .ctr = 1, .x_raw = millimetres(start.x_m) / 2, .y_raw = millimetres(start.y_m) / 2})));

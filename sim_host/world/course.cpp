@@ -86,6 +86,45 @@ Course road_course(int laps) {
   return course;
 }
 
+Course street_course(int laps) {
+  Course course{.waypoints = {{.x_m = 0, .y_m = 0, .stop_s = 10}}, .landmarks = {}};
+  for (int k = 0; k < laps; ++k)
+    for (const Waypoint& at : {Waypoint{.x_m = 150, .y_m = 0, .radius_m = 12},
+                               {.x_m = 150, .y_m = 80, .radius_m = 12},
+                               {.x_m = 60, .y_m = 80, .radius_m = 12},
+                               {.x_m = 60, .y_m = 160, .radius_m = 12},
+                               {.x_m = 160, .y_m = 160, .radius_m = 15},
+                               {.x_m = 160, .y_m = 240, .radius_m = 10},
+                               {.x_m = 80, .y_m = 240, .stop_s = 10},
+                               {.x_m = -40, .y_m = 240, .radius_m = 15},
+                               {.x_m = -40, .y_m = 150, .radius_m = 15},
+                               {.x_m = -20, .y_m = 110, .radius_m = 15},
+                               {.x_m = -40, .y_m = 70, .radius_m = 15},
+                               {.x_m = -40, .y_m = 0, .radius_m = 12},
+                               {.x_m = -10, .y_m = 0, .stop_s = 8}})
+      course.waypoints.push_back(at);
+  return course;
+}
+
+Course flight_course(int laps) {
+  Course course{.waypoints = {{.x_m = 0, .y_m = 0, .stop_s = 24}}, .landmarks = {}};
+  for (int k = 0; k < laps; ++k)
+    for (const Waypoint& at : {Waypoint{.x_m = 60, .y_m = 0, .radius_m = 5},
+                               {.x_m = 60, .y_m = 40, .radius_m = 8},
+                               {.x_m = 20, .y_m = 40, .radius_m = 5},
+                               {.x_m = 20, .y_m = 90, .radius_m = 5},
+                               {.x_m = 70, .y_m = 90, .radius_m = 5},
+                               {.x_m = 70, .y_m = 130, .radius_m = 5},
+                               {.x_m = 30, .y_m = 130, .stop_s = 8},
+                               {.x_m = -30, .y_m = 130, .radius_m = 10},
+                               {.x_m = -30, .y_m = 70, .radius_m = 5},
+                               {.x_m = -60, .y_m = 70, .radius_m = 5},
+                               {.x_m = -60, .y_m = 0, .radius_m = 8},
+                               {.x_m = -8, .y_m = 0, .stop_s = k + 1 == laps ? 24.0 : 5.0}})
+      course.waypoints.push_back(at);
+  return course;
+}
+
 Course circle_course(double radius_m, int turns) {
   const double r = radius_m;
   Course course{.waypoints = {{.x_m = -5, .y_m = 0, .stop_s = 2}}, .landmarks = {{1, 0, r}}};
@@ -172,6 +211,7 @@ void Plan::add_speeds(const CourseLimits& limits) {
   for (std::size_t i = 0; i < at_m.size(); ++i) {
     if (i > 0) time_s += 2 * (at_m[i] - at_m[i - 1]) / (speed[i] + speed[i - 1]);
     nodes_.push_back({at_m[i], speed[i], time_s});
+    arrival_s_ = time_s;
     if (const double wait_s = stop_at(at_m[i]); wait_s > 0) nodes_.push_back({at_m[i], 0, time_s += wait_s});
   }
   duration_ = {static_cast<std::int64_t>(sim::floor(time_s * 100)) * 10'000 + 10'000};

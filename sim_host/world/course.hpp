@@ -20,7 +20,7 @@ struct Landmark {
 struct Waypoint {
   double x_m = 0;
   double y_m = 0;
-  double radius_m = 0;  ///< radius of the corner; 0 at the two ends and where the line goes straight on
+  double radius_m = 0;  ///< corner's arc; 0 at the two ends and where the line goes straight on
   double stop_s = 0;    ///< standstill there; only where radius_m = 0
 };
 
@@ -44,6 +44,10 @@ struct Course {
 /// A road of 1.1 km for 5 m/s and more, driven so many times: long curves both ways, standstill at the start and once a
 /// lap.
 [[nodiscard]] Course road_course(int laps);
+/// Streets for a car at up to 12 m/s, driven so many times: corners of 10 to 15 m both ways, a light, a bend in S.
+[[nodiscard]] Course street_course(int laps);
+/// Legs for a multicopter at up to 5 m/s, flown so many times, with a hover half way and once a lap.
+[[nodiscard]] Course flight_course(int laps);
 /// A straight lead-in and full circles to the left, for laws that have closed forms.
 [[nodiscard]] Course circle_course(double radius_m, int turns);
 
@@ -75,6 +79,9 @@ class Plan {
   [[nodiscard]] base::Micros time_at(double s_m) const;
   [[nodiscard]] double length_m() const { return length_m_; }
   [[nodiscard]] base::Micros duration() const { return duration_; }
+  /// When it first leaves, and when it last arrives.
+  [[nodiscard]] double departure_s() const { return stops_m_.empty() || stops_m_.front() > 0 ? 0 : stops_s_.front(); }
+  [[nodiscard]] double arrival_s() const { return arrival_s_; }
 
  private:
   struct Piece {
@@ -92,6 +99,7 @@ class Plan {
   std::vector<double> stops_s_;
   std::vector<Node> nodes_;
   double length_m_ = 0;
+  double arrival_s_ = 0;
   base::Micros duration_;
 };
 

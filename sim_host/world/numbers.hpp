@@ -9,7 +9,7 @@
 #pragma once
 
 #include "base/time.hpp"
-#include "sim_host/world/math.hpp"
+#include "sim_host/world/rotation.hpp"
 
 #include <array>
 #include <cstdint>
@@ -18,9 +18,22 @@ namespace tetap::sim {
 
 inline constexpr double kG0 = 9.80665;  ///< standard gravity [m/s^2], the "g" of data sheets
 
-struct RoverNumbers {
-  double wheel_radius_m = 0.10;  ///< as in the robot's papers; what a filter is given
-  double track_m = 0.50;         ///< likewise
+enum class VehicleKind : std::uint8_t { kDifferentialDrive, kCar, kMulticopter };
+
+struct VehicleParameters {
+  VehicleKind kind = VehicleKind::kDifferentialDrive;
+  double wheel_radius_m = 0.10;      ///< mean of both, as in the robot's papers; what a filter is given
+  double track_m = 0.50;             ///< likewise
+  double drawn_difference = 0;       ///< (left - right) / mean of the radii, likewise
+  double axle_x_b_m = 0;             ///< the axle that does not steer, ahead of the IMU
+  double turning_radius_m = 0;       ///< smallest of a car; 0: turns on the spot
+  double acceleration_lag_s = 0.10;  ///< motor current and load [own]
+  double yaw_lag_s = 0.12;
+  double steer_beside_per_m2 = 1.5;  ///< curvature per metre beside the line [own]
+  double steer_heading_per_m = 2.5;  ///< curvature per radian off its direction
+  double steer_most_m = 0.5;         ///< further beside the line it steers no harder
+  double slip_yaw = 0;   ///< 1 sigma of the share by which a skidding vehicle's wheels turn further than the body
+  double rotor_mps = 2;  ///< rotors of a multicopter, as a speed of the vibration figures
   double radius_difference =
       0.005;  ///< (left - right) / mean: unequal wheels [BF: the larger of the two dominant errors]
   double track_error =
@@ -31,12 +44,13 @@ struct RoverNumbers {
   double slip_random_tau_s = 1.0;
   double side_slip_s = 0.010;         ///< drift to the outside of a curve: v_y = -side_slip * v * yaw rate [own]
   double roll_rad_per_mps2 = 0.012;   ///< body leans to the outside: 0.7 deg at 1 m/s^2 [own]
-  double pitch_rad_per_mps2 = 0.010;  ///< body squats on acceleration [own]
+  double pitch_rad_per_mps2 = 0.010;  ///< squat on acceleration [own]
   double ground_rad = 0.004;          ///< roll and pitch by uneven ground, 1 sigma while moving [own]
   double ground_tau_s = 0.4;
   double driver_wander_m = 0.08;  ///< lateral, Gauss-Markov: no two runs drive the same line [own]
   double driver_wander_tau_s = 6;
-  double jitter_mps = 0;  ///< trembling sideways and up, at rest too; white for sensors (see matched_inertial())
+  double jitter_mps =
+      0;  ///< trembling of the body sideways and up, at rest too; white for sensors (see matched_inertial())
   double jitter_ahead_mps = 0;
   double jitter_tau_s = 0.002;
   double start_m = 0.05;  ///< 1 sigma per axis of where the rover really stands at the start [own]
@@ -54,15 +68,23 @@ struct ImuParameters {
   double gyro_walk_radps = radians(10.0 / 3600);  ///< in-run bias, Gauss-Markov 1 sigma [own: not in the data sheet]
   double accel_walk_mps2 = 0.001;
   double walk_tau_s = 300;
-  double scale = 0.003;         ///< 1 sigma per axis [ICM: +-0.5 % initial tolerance]
-  double vibration_mps2 = 1.5;  ///< amplitude at 2 m/s, proportional to speed, from tyre lugs [own]
+  double scale = 0.003;            ///< accelerometer: 1 sigma per axis [ICM: +-0.5 % initial tolerance]
+  double gyro_scale = 0.003;       ///< likewise
+  double vibration_speed_mps = 2;  ///< at which the next figures are stated; they grow with the speed
+  double vibration_mps2 = 1.5;     ///< amplitude from tyre lugs [own]
   double vibration_radps = 0.03;
   int lugs = 17;                           ///< per turn of the wheel: 54 Hz at 2 m/s
-  double vibration_noise = 0.02;           ///< m/s^2/sqrt(Hz) at 2 m/s, broadband [own]
+  double vibration_noise = 0.02;           ///< m/s^2/sqrt(Hz), broadband [own]
+  double vibration_gyro_noise = 0;         ///< rad/s/sqrt(Hz), likewise
   double gyro_range_radps = radians(500);  ///< full scale as configured
   double accel_range_mps2 = 4 * kG0;
   bool earth_rotation = true;
   double temperature_degC = 31;
+  Matrix3 mounting_bs;  ///< from the sensor's axes into the body's
+  /// Errors that a calibration of the robot has found, in the sensor's axes: it shows matrix^-1 y + bias for y.
+  Matrix3 accel_matrix;
+  Vector3 accel_bias_mps2{};
+  Vector3 gyro_bias_radps{};
   base::Micros phase{9'000};  ///< when within its period it samples: no two clocks tick together [own]
   base::Micros latency_min{300}, latency_max{700};
 };
@@ -72,10 +94,15 @@ enum class WheelOutput : std::uint8_t { kCounts, kWheelSpeeds, kBodySpeed };
 struct WheelSensorNumbers {
   int rate_hz = 100;  ///< 0: none; a divisor of 2000
   WheelOutput output = WheelOutput::kCounts;
-  double counts_per_turn = 2000;     ///< 500 lines, four edges: 0.31 mm of travel
-  double noise_m = 0;                ///< k: variance of the measured travel per metre; the filters' own error model
-  double noise_share = 0;            ///< 1 sigma of each reading's travel, as a share of it
-  base::Micros stamp_late_max{100};  ///< stamped by software up to this much after the counters were latched [own]
+  double counts_per_turn = 2000;  ///< 500 lines, four edges: 0.31 mm of travel
+  double noise_m = 0;             ///< k: variance of the measured travel per metre; the filters' own error model
+  double noise_share = 0;         ///< 1 sigma of each reading's travel, as a share of it
+  double speed_noise_mps = 0;     ///< white noise of a body speed, 1 sigma
+  double speed_scale = 0;         ///< likewise: 1 sigma of its scale, drawn once
+  bool yaw_rate = true;           ///< false: a speedometer, without a turn
+  std::array<double, 2> stated_scale{1,
+                                     1};  ///< stated over true speed: of the left and right wheel, or of speed and turn
+  base::Micros stamp_late_max{100};       ///< stamped by software up to this much after the counters were latched [own]
   base::Micros phase{8'500};
   base::Micros latency_min{300}, latency_max{900};
 };
@@ -89,6 +116,7 @@ struct GnssParameters {
   double velocity_mps = 0.05;    ///< white, per axis [F9P]
   double velocity_vertical_factor = 1;
   double accuracy_error = 0.2;  ///< 1 sigma of the receiver's own accuracy figure against the truth, slow [own]
+  double accuracy_scale = 1;    ///< accuracy figure over the true 1 sigma, in the mean
   std::array<double, 3> antenna_b_m{0, 0, 0.4};
   double outage_every_s = 90;  ///< mean time between outages; 0: none [own]
   double outage_min_s = 2, outage_max_s = 8;
@@ -100,7 +128,8 @@ struct GnssParameters {
   base::Micros latency_min{80'000}, latency_max{120'000};
 };
 
-/// The Earth's field is that of the default origin, rounded, as the IGRF has it (48.6 uT, 64.2 deg down, 4 deg east).
+/// The Earth's field is that of the default origin, rounded, as the IGRF has it (48.6 uT, 64.2 deg down, 4 deg east),
+/// in the axes of whatever place.
 struct MagnetometerNumbers {
   int rate_hz = 0;  ///< 0: none
   double field_uT = 48.6;
@@ -111,6 +140,9 @@ struct MagnetometerNumbers {
   double scale = 0.01;        ///< 1 sigma per axis: soft iron left over [own]
   double local_uT = 1.0;      ///< 1 sigma per axis: iron in the ground, passed at walking speed [own]
   double local_tau_s = 5;
+  Matrix3 mounting_bs;  ///< from the sensor's axes into the body's
+  Matrix3 soft_iron;    ///< as a calibration of the robot has found it: it shows soft iron^-1 y + hard iron for y
+  Vector3 found_hard_iron_uT{};
   base::Micros phase{11'500};
   base::Micros latency_min{500}, latency_max{2'000};
 };
@@ -133,17 +165,18 @@ struct CameraNumbers {
   double sigma_range_m = 0.10;
   double sigma_range_per_m = 0.01;  ///< grows with range
   double sigma_bearing_rad = 0.015;
-  double scale_error = 0.005;      ///< share of the range, by the focal length [own]
-  double mount_error_rad = 0.004;  ///< yaw of the mount against the filter's number [own]
+  double scale_error = 0.005;      ///< range error by focal length [own]
+  double mount_error_rad = 0.004;  ///< yaw of the mount against the filter's parameter [own]
   double miss_probability = 0.15;
   double wrong_id_probability = 0.005;
-  double survey_m = 0.015;  ///< 1 sigma per axis of the landmark map
+  double survey_m = 0.015;                   ///< 1 sigma per axis of the landmark map
+  double x_b_m = 0, y_b_m = 0, yaw_rad = 0;  ///< where it is mounted
   base::Micros phase{33'500};
   base::Micros latency_min{20'000}, latency_max{60'000};
 };
 
 struct Parameters {
-  RoverNumbers rover;
+  VehicleParameters vehicle;
   ImuParameters imu;
   WheelSensorNumbers wheels;
   GnssParameters gnss;
@@ -155,11 +188,12 @@ struct Parameters {
 /// Only white noise of the stated sigma and encoder noise k |ds|: nothing a filter does not model. Accuracy figures are
 /// exact, and every sensor samples at an instant of the wheels', so that nothing is interpolated.
 [[nodiscard]] inline Parameters matched(Parameters n) {
-  n.rover.radius_difference = n.rover.track_error = n.rover.slip_per_mps2 = n.rover.slip_curve_per_mps2 =
-      n.rover.slip_random = 0;
-  n.rover.side_slip_s = n.rover.roll_rad_per_mps2 = n.rover.pitch_rad_per_mps2 = n.rover.ground_rad = 0;
-  n.imu.gyro_turn_on_radps = n.imu.accel_turn_on_mps2 = n.imu.gyro_walk_radps = n.imu.accel_walk_mps2 = n.imu.scale = 0;
-  n.imu.vibration_mps2 = n.imu.vibration_radps = n.imu.vibration_noise = 0;
+  n.vehicle.radius_difference = n.vehicle.track_error = n.vehicle.slip_per_mps2 = n.vehicle.slip_curve_per_mps2 =
+      n.vehicle.slip_random = 0;
+  n.vehicle.side_slip_s = n.vehicle.roll_rad_per_mps2 = n.vehicle.pitch_rad_per_mps2 = n.vehicle.ground_rad = 0;
+  n.imu.gyro_turn_on_radps = n.imu.accel_turn_on_mps2 = n.imu.gyro_walk_radps = n.imu.accel_walk_mps2 = n.imu.scale =
+      n.imu.gyro_scale = 0;
+  n.imu.vibration_mps2 = n.imu.vibration_radps = n.imu.vibration_noise = n.imu.vibration_gyro_noise = 0;
   n.imu.earth_rotation = false;
   n.wheels.counts_per_turn = 20000;  // so that quantisation (31 um) stays far below the noise of one sample
   n.wheels.noise_m = 2e-5;
@@ -193,8 +227,8 @@ struct Parameters {
   n.imu.walk_tau_s = 1e5;
   n.imu.accel_range_mps2 = 16 * kG0;  // the jitter is steep
   n.imu.accel_noise = {imu.accel_noise[2], imu.accel_noise[2], imu.accel_noise[2]};
-  n.rover.jitter_mps = 0.005;
-  n.rover.jitter_ahead_mps = 0.001;
+  n.vehicle.jitter_mps = 0.005;
+  n.vehicle.jitter_ahead_mps = 0.001;
   n.gnss.velocity_vertical_factor = 1.5;
   // On the node's ticks and at once: what the body does between a sample and the tick is in no filter's covariance.
   n.imu.phase = n.wheels.phase = {};

@@ -7,7 +7,7 @@ namespace tetap::sim {
 namespace {
 
 constexpr double kStep_s = 500e-6;
-constexpr double kReferenceSpeed_mps = 2.0;  // at which the vibration figures are stated
+constexpr int kGravitySteps = 200;
 constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
 
 double period_s(int rate_hz) { return rate_hz > 0 ? 1.0 / rate_hz : 1.0; }
@@ -21,12 +21,15 @@ Vector3 three(Chance& chance, double sigma) {
 
 }  // namespace
 
-Imu::Imu(const ImuParameters& parameters, double wheel_radius_m, const Wgs84& earth, std::uint64_t seed)
+Imu::Imu(const ImuParameters& parameters, double wheel_radius_m, const Earth& earth, std::uint64_t seed)
     : parameters_{parameters},
       period_s_{period_s(parameters.rate_hz)},
       wheel_radius_m_{wheel_radius_m},
-      gravity_mps2_{earth.gravity_mps2()},
+      earth_{&earth},
       earth_rate_n_radps_{parameters.earth_rotation ? earth.earth_rate_n_radps() : Vector3{}},
+      gravity_n_mps2_{earth.gravity_n_mps2({})},
+      body_to_sensor_{parameters.mounting_bs.transposed()},
+      uncalibrated_{parameters.accel_matrix.inverse()},
       noise_{seed, Stream::kImuNoise},
       vibration_{seed, Stream::kImuVibration},
       gyro_walk_{walks(parameters.gyro_walk_radps)},
@@ -34,7 +37,7 @@ Imu::Imu(const ImuParameters& parameters, double wheel_radius_m, const Wgs84& ea
   Chance turn_on{seed, Stream::kImuTurnOn};
   gyro_bias_ = three(turn_on, parameters.gyro_turn_on_radps);
   accel_bias_ = three(turn_on, parameters.accel_turn_on_mps2);
-  gyro_scale_ = three(turn_on, parameters.scale);
+  gyro_scale_ = three(turn_on, parameters.gyro_scale);
   accel_scale_ = three(turn_on, parameters.scale);
 }
 
@@ -45,15 +48,19 @@ Imu::Processes Imu::walks(double sigma) {
 
 void Imu::sense(const Motion& motion, double speed_mps, base::Micros now, const Faults& faults) {
   speed_mps_ = speed_mps;
-  const Vector3& a = motion.acceleration_n_mps2;
-  Vector3 force = to_body(motion.attitude_rad, {a[0], a[1], a[2] + gravity_mps2_});
-  Vector3 rate = to_body(motion.attitude_rad, earth_rate_n_radps_);
-  for (std::size_t i = 0; i < 3; ++i) rate[i] += motion.rate_b_radps[i];
+  if (until_gravity_-- == 0) {
+    gravity_n_mps2_ = earth_->gravity_n_mps2(motion.position_n_m);
+    until_gravity_ = kGravitySteps - 1;
+  }
+  const Matrix3 to_b = rotation(motion.attitude_rad).transposed();
+  const Vector3 coriolis = 2 * cross(earth_rate_n_radps_, motion.velocity_n_mps);
+  Vector3 force = body_to_sensor_ * (to_b * (motion.acceleration_n_mps2 + coriolis - gravity_n_mps2_));
+  Vector3 rate = body_to_sensor_ * (to_b * earth_rate_n_radps_ + motion.rate_b_radps);
 
   // Tyre lugs: each axis vibrates with another phase.
   lug_phase_rad_ = wrap(lug_phase_rad_ + parameters_.lugs * speed_mps * kStep_s / wheel_radius_m_);
   const Direction lug = direction(lug_phase_rad_);
-  const double share = magnitude(speed_mps) / kReferenceSpeed_mps;
+  const double share = magnitude(speed_mps) / parameters_.vibration_speed_mps;
   const Vector3 shape{0.5 * lug.cos, 0.5 * lug.sin, 0.7 * (lug.cos + lug.sin)};
   for (std::size_t i = 0; i < 3; ++i) {
     force[i] = (force[i] + share * parameters_.vibration_mps2 * shape[i]) * (1 + accel_scale_[i]);
@@ -82,23 +89,15 @@ void Imu::sense(const Motion& motion, double speed_mps, base::Micros now, const 
   }
   // As a driver does that reads the sensor at 1 kHz: coning and sculling, so that both are in the axes at the
   // begin of the sample (Savage 1998; to first order of the angle within it).
-  const auto cross = [](const Vector3& u, const Vector3& v, std::size_t i) {
-    const std::size_t j = (i + 1) % 3, k = (i + 2) % 3;
-    return u[j] * v[k] - u[k] * v[j];
-  };
-  Vector3 turned = angle_;
-  for (std::size_t i = 0; i < 3; ++i) turned[i] += 0.5 * turn[i];
-  for (std::size_t i = 0; i < 3; ++i) velocity_[i] += push[i] + cross(turned, push, i);
-  Vector3 next{};
-  for (std::size_t i = 0; i < 3; ++i) next[i] = angle_[i] + turn[i] + 0.5 * cross(angle_, turn, i);
-  angle_ = next;
+  velocity_ = velocity_ + push + cross(angle_ + 0.5 * turn, push);
+  angle_ = angle_ + turn + 0.5 * cross(angle_, turn);
   clipped_gyro_ += gyro_clips ? 1 : 0;
   clipped_accel_ += accel_clips ? 1 : 0;
 }
 
 sensor::ImuSample Imu::sample(base::Micros now, const Faults& faults) {
   const double root = sim::sqrt(period_s_);
-  const double share = magnitude(speed_mps_) / kReferenceSpeed_mps;
+  const double share = magnitude(speed_mps_) / parameters_.vibration_speed_mps;
   sensor::ImuSample s{.temperature_degC = single(parameters_.temperature_degC),
                       .interval_us = static_cast<std::uint16_t>(sim::floor(period_s_ * 1e6 + 0.5)),
                       .clipped_gyro = static_cast<std::uint8_t>(clipped_gyro_),
@@ -108,12 +107,15 @@ sensor::ImuSample Imu::sample(base::Micros now, const Faults& faults) {
     double gyro_bias = gyro_bias_[i] + gyro_walk_[i].next(noise_);
     if (stepped_ && i == 2) gyro_bias += FaultNumbers::kGyroStep_radps;
     const double accel_bias = accel_bias_[i] + accel_walk_[i].next(noise_);
-    const double angle_noise = noise_.normal(parameters_.gyro_noise * root);
+    const double angle_noise = noise_.normal(parameters_.gyro_noise * root) +
+                               vibration_.normal(parameters_.vibration_gyro_noise * share * root);
     const double velocity_noise = noise_.normal(parameters_.accel_noise[i] * root) +
                                   vibration_.normal(parameters_.vibration_noise * share * root);
-    s.dangle_b_rad[i] = single(angle_[i] + gyro_bias * period_s_ + angle_noise);
-    s.dvelocity_b_mps[i] = single(velocity_[i] + accel_bias * period_s_ + velocity_noise);
+    s.dangle_b_rad[i] = single(angle_[i] + (gyro_bias + parameters_.gyro_bias_radps[i]) * period_s_ + angle_noise);
+    velocity_[i] += accel_bias * period_s_ + velocity_noise;
   }
+  const Vector3 shown = uncalibrated_ * velocity_ + period_s_ * parameters_.accel_bias_mps2;
+  for (std::size_t i = 0; i < 3; ++i) s.dvelocity_b_mps[i] = single(shown[i]);
   angle_ = velocity_ = {};
   clipped_gyro_ = clipped_accel_ = 0;
   if (!faults.active(Fault::kImuStuck, now)) last_ = s;
@@ -122,29 +124,31 @@ sensor::ImuSample Imu::sample(base::Micros now, const Faults& faults) {
 
 Vector3 Imu::gyro_bias_radps() const {
   Vector3 bias;
-  for (std::size_t i = 0; i < 3; ++i) bias[i] = gyro_bias_[i] + gyro_walk_[i].value();
+  for (std::size_t i = 0; i < 3; ++i) bias[i] = gyro_bias_[i] + gyro_walk_[i].value() + parameters_.gyro_bias_radps[i];
   if (stepped_) bias[2] += FaultNumbers::kGyroStep_radps;
   return bias;
 }
 
 Vector3 Imu::accel_bias_mps2() const {
-  Vector3 bias;
-  for (std::size_t i = 0; i < 3; ++i) bias[i] = accel_bias_[i] + accel_walk_[i].value();
-  bias[2] += accel_scale_[2] * gravity_mps2_;
-  return bias;
+  const Vector3 level = body_to_sensor_ * Vector3{0, 0, earth_->gravity_mps2()};
+  Vector3 felt;
+  for (std::size_t i = 0; i < 3; ++i)
+    felt[i] = level[i] * (1 + accel_scale_[i]) + accel_bias_[i] + accel_walk_[i].value();
+  return uncalibrated_ * felt + parameters_.accel_bias_mps2 - level;
 }
 
-Wheels::Wheels(const WheelSensorNumbers& parameters, const RoverNumbers& rover, std::uint64_t seed)
-    : parameters_{parameters},
-      nominal_metres_per_count_{2 * kPi * rover.wheel_radius_m / parameters.counts_per_turn},
-      nominal_track_m_{rover.track_m},
-      chance_{seed, Stream::kWheels} {
-  left_.metres_per_count = nominal_metres_per_count_ * (1 + 0.5 * rover.radius_difference);
-  right_.metres_per_count = nominal_metres_per_count_ * (1 - 0.5 * rover.radius_difference);
+Wheels::Wheels(const WheelSensorNumbers& parameters, const VehicleParameters& vehicle, std::uint64_t seed)
+    : parameters_{parameters}, nominal_track_m_{vehicle.track_m}, chance_{seed, Stream::kWheels} {
+  const double per_count_m = 2 * kPi * vehicle.wheel_radius_m / parameters.counts_per_turn;
+  left_.drawn_per_count = per_count_m * (1 + 0.5 * vehicle.drawn_difference);
+  right_.drawn_per_count = per_count_m * (1 - 0.5 * vehicle.drawn_difference);
+  left_.metres_per_count = left_.drawn_per_count * (1 + 0.5 * vehicle.radius_difference);
+  right_.metres_per_count = right_.drawn_per_count * (1 - 0.5 * vehicle.radius_difference);
   for (Wheel* wheel : {&left_, &right_}) {
     wheel->offset = static_cast<std::uint16_t>(65536 * chance_.uniform());
     wheel->travel_m = wheel->metres_per_count * chance_.uniform();  // nobody parks on an edge of the encoder
   }
+  if (parameters.speed_scale > 0) speed_scale_ += chance_.normal(parameters.speed_scale);
 }
 
 void Wheels::sense(const Motion& motion, base::Micros now, const Faults& faults) {
@@ -183,21 +187,28 @@ sensor::WheelCounts Wheels::counts() {
 
 sensor::WheelSpeeds Wheels::wheel_speeds() {
   read();
-  const auto speed = [this](const Wheel& w) {
-    return single(static_cast<double>(w.count - w.read) * nominal_metres_per_count_ * parameters_.rate_hz);
+  const auto speed = [this](const Wheel& w, double scale) {
+    return single(static_cast<double>(w.count - w.read) * w.drawn_per_count * parameters_.rate_hz * scale);
   };
-  return {.left_mps = speed(left_), .right_mps = speed(right_)};
+  return {.left_mps = speed(left_, parameters_.stated_scale[0]),
+          .right_mps = speed(right_, parameters_.stated_scale[1])};
 }
 
 sensor::BodySpeed Wheels::body_speed() {
   read();
-  const double per_count = nominal_metres_per_count_ * parameters_.rate_hz;
-  const double left = static_cast<double>(left_.count - left_.read) * per_count;
-  const double right = static_cast<double>(right_.count - right_.read) * per_count;
-  return {.forward_mps = single(0.5 * (left + right)), .yaw_rate_radps = single((right - left) / nominal_track_m_)};
+  const auto speed = [this](const Wheel& w) {
+    return static_cast<double>(w.count - w.read) * w.drawn_per_count * parameters_.rate_hz;
+  };
+  const double left = speed(left_), right = speed(right_);
+  double forward = 0.5 * (left + right) * speed_scale_;
+  const double noise_mps = chance_.normal(parameters_.speed_noise_mps);
+  if (magnitude(forward) > 0) forward += noise_mps;  // a speedometer at rest shows 0
+  const double turn = (right - left) / nominal_track_m_ * parameters_.stated_scale[1];
+  return {.forward_mps = single(forward * parameters_.stated_scale[0]),
+          .yaw_rate_radps = parameters_.yaw_rate ? single(turn) : kNone};
 }
 
-Gnss::Gnss(const GnssParameters& parameters, const Wgs84& earth, std::uint64_t seed)
+Gnss::Gnss(const GnssParameters& parameters, const Earth& earth, std::uint64_t seed)
     : parameters_{parameters},
       earth_{&earth},
       period_s_{period_s(parameters.rate_hz)},
@@ -230,35 +241,35 @@ void Gnss::advance_errors(base::Micros now) {
     glitch_fixes_ = fixes, glitch_m_ = {size_m * towards.cos, size_m * towards.sin};
 }
 
-Gnss::Reading Gnss::sample(const Truth& truth, const Vector3& rate_b, base::Micros now, const Faults& faults) {
+Gnss::Reading Gnss::sample(const Truth& truth, base::Micros now, const Faults& faults) {
   advance_errors(now);
   const Vector3 white = three(noise_, parameters_.white_m);
   Vector3 velocity_noise = three(noise_, parameters_.velocity_mps);
   velocity_noise[2] *= parameters_.velocity_vertical_factor;
 
   const Vector3& l = parameters_.antenna_b_m;
-  const Vector3 attitude{truth.roll_rad, truth.pitch_rad, truth.yaw_rad};
-  const Vector3 lever_n = to_level(attitude, l);
-  const Vector3 swing_n = to_level(attitude, {rate_b[1] * l[2] - rate_b[2] * l[1], rate_b[2] * l[0] - rate_b[0] * l[2],
-                                              rate_b[0] * l[1] - rate_b[1] * l[0]});
+  const Matrix3 to_n = rotation({truth.roll_rad, truth.pitch_rad, truth.yaw_rad});
+  const Vector3 antenna_n_m = Vector3{truth.x_m, truth.y_m, truth.z_m} + to_n * l;
+  const Vector3 swing_n = to_n * cross(truth.rate_b_radps, l);
 
-  Vector3 at_m{truth.x_m + lever_n[0] + correlated_[0].value() + white[0],
-               truth.y_m + lever_n[1] + correlated_[1].value() + white[1],
-               truth.z_m + lever_n[2] + correlated_[2].value() + white[2] * parameters_.vertical_factor};
-  if (glitch_fixes_ > 0) at_m[0] += glitch_m_[0], at_m[1] += glitch_m_[1];
-  if (faults.active(Fault::kGnssJump, now)) at_m[0] += FaultNumbers::kJump_m;
+  // Errors, by chance and by fault, are to the east, north and up of the antenna's place.
+  const Matrix3 axes = earth_->axes(antenna_n_m);
+  Vector3 error_m{correlated_[0].value() + white[0], correlated_[1].value() + white[1],
+                  correlated_[2].value() + white[2] * parameters_.vertical_factor};
+  if (glitch_fixes_ > 0) error_m[0] += glitch_m_[0], error_m[1] += glitch_m_[1];
+  if (faults.active(Fault::kGnssJump, now)) error_m[0] += FaultNumbers::kJump_m;
   if (const auto on = faults.since(Fault::kGnssRamp, now))
-    at_m[1] += FaultNumbers::kRamp_mps * static_cast<double>(on->us) * 1e-6;
+    error_m[1] += FaultNumbers::kRamp_mps * static_cast<double>(on->us) * 1e-6;
   const auto lost = faults.since(Fault::kGnssFar, now);
   const bool silent = lost && lost->us < FaultNumbers::kFarSilent_us;
-  if (lost && !silent && far_fixes_++ < FaultNumbers::kFarFixes) at_m[0] -= FaultNumbers::kFar_m;
-  if (faults.active(Fault::kGnssWrongHeight, now)) at_m[2] += FaultNumbers::kHeight_m;
+  if (lost && !silent && far_fixes_++ < FaultNumbers::kFarFixes) error_m[0] -= FaultNumbers::kFar_m;
+  if (faults.active(Fault::kGnssWrongHeight, now)) error_m[2] += FaultNumbers::kHeight_m;
 
   const double believed = clamp(1 + accuracy_.value(), 0.5, 2);
   const double sigma_m =
       sim::sqrt(parameters_.white_m * parameters_.white_m + parameters_.correlated_m * parameters_.correlated_m) *
-      believed;
-  const GeodeticPoint point = earth_->geodetic(at_m);
+      believed * parameters_.accuracy_scale;
+  const GeodeticPoint point = earth_->geodetic(antenna_n_m + axes * error_m);
   Reading reading;
   reading.position = sensor::GnssPosition{.latitude_2ndeg = point.latitude_2ndeg,
                                           .longitude_2ndeg = point.longitude_2ndeg,
@@ -267,8 +278,7 @@ Gnss::Reading Gnss::sample(const Truth& truth, const Vector3& rate_b, base::Micr
                                           .vertical_acc_m = single(sigma_m * parameters_.vertical_factor),
                                           .fix = sensor::GnssFix::kDifferential,
                                           .satellites = 14};
-  Vector3 v;
-  for (std::size_t i = 0; i < 3; ++i) v[i] = truth.v_n_mps[i] + swing_n[i] + velocity_noise[i];
+  const Vector3 v = axes.transposed() * (truth.v_n_mps + swing_n) + velocity_noise;
   reading.velocity = sensor::GnssVelocity{.v_n_mps = {single(v[0]), single(v[1]), single(v[2])},
                                           .acc_mps = single(parameters_.velocity_mps * believed)};
 
@@ -288,11 +298,14 @@ Gnss::Reading Gnss::sample(const Truth& truth, const Vector3& rate_b, base::Micr
   return reading;
 }
 
-Magnetometer::Magnetometer(const MagnetometerNumbers& parameters, std::uint64_t seed)
+Magnetometer::Magnetometer(const MagnetometerNumbers& parameters, const Earth& earth, std::uint64_t seed)
     : parameters_{parameters},
-      field_n_uT_{parameters.field_uT * sim::cos(parameters.dip_rad) * sim::sin(parameters.declination_rad),
-                  parameters.field_uT * sim::cos(parameters.dip_rad) * sim::cos(parameters.declination_rad),
-                  -parameters.field_uT * sim::sin(parameters.dip_rad)},
+      earth_{&earth},
+      field_uT_{parameters.field_uT * sim::cos(parameters.dip_rad) * sim::sin(parameters.declination_rad),
+                parameters.field_uT * sim::cos(parameters.dip_rad) * sim::cos(parameters.declination_rad),
+                -parameters.field_uT * sim::sin(parameters.dip_rad)},
+      body_to_sensor_{parameters.mounting_bs.transposed()},
+      uncalibrated_{parameters.soft_iron.inverse()},
       noise_{seed, Stream::kMagnetometer},
       local_{GaussMarkov{parameters.local_uT, parameters.local_tau_s, period_s(parameters.rate_hz), noise_},
              GaussMarkov{parameters.local_uT, parameters.local_tau_s, period_s(parameters.rate_hz), noise_},
@@ -303,29 +316,30 @@ Magnetometer::Magnetometer(const MagnetometerNumbers& parameters, std::uint64_t 
 }
 
 sensor::MagneticFlux Magnetometer::sample(const Truth& truth, base::Micros now, const Faults& faults) {
-  Vector3 field_n = field_n_uT_;
-  // Iron in the ground passes by at the rover's speed; where it stands, nothing changes.
+  Vector3 field = field_uT_;
+  // Iron in the ground passes by at the vehicle's speed; where it stands, nothing changes.
   for (std::size_t i = 0; i < 3; ++i)
-    field_n[i] += magnitude(truth.speed_mps) > 0.05 ? local_[i].next(noise_) : local_[i].value();
-  if (faults.active(Fault::kMagDisturbance, now)) field_n[0] += FaultNumbers::kIron_uT;
-  const Vector3 field_b = to_body({truth.roll_rad, truth.pitch_rad, truth.yaw_rad}, field_n);
+    field[i] += magnitude(truth.speed_mps) > 0.05 ? local_[i].next(noise_) : local_[i].value();
+  if (faults.active(Fault::kMagDisturbance, now)) field[0] += FaultNumbers::kIron_uT;
+  const Vector3 field_n = earth_->axes({truth.x_m, truth.y_m, truth.z_m}) * field;
+  const Vector3 field_s = body_to_sensor_ * to_body({truth.roll_rad, truth.pitch_rad, truth.yaw_rad}, field_n);
   const Vector3 white = three(noise_, parameters_.noise_uT);
-  sensor::MagneticFlux flux;
-  for (std::size_t i = 0; i < 3; ++i)
-    flux.flux_b_uT[i] = single(field_b[i] * (1 + scale_[i]) + hard_iron_uT_[i] + white[i]);
-  return flux;
+  Vector3 felt;
+  for (std::size_t i = 0; i < 3; ++i) felt[i] = field_s[i] * (1 + scale_[i]) + hard_iron_uT_[i] + white[i];
+  const Vector3 shown = uncalibrated_ * felt + parameters_.found_hard_iron_uT;
+  return {.flux_b_uT = {single(shown[0]), single(shown[1]), single(shown[2])}};
 }
 
-Barometer::Barometer(const BarometerNumbers& parameters, double origin_height_m, std::uint64_t seed)
+Barometer::Barometer(const BarometerNumbers& parameters, const Earth& earth, std::uint64_t seed)
     : parameters_{parameters},
-      origin_height_m_{origin_height_m},
+      earth_{&earth},
       noise_{seed, Stream::kBarometer},
       offset_Pa_{noise_.normal(parameters.turn_on_Pa)},
       drift_{parameters.drift_Pa, parameters.drift_tau_s, period_s(parameters.rate_hz), noise_} {}
 
 sensor::AirPressure Barometer::sample(const Truth& truth) {
   // Troposphere: 101325 Pa, 288.15 K, 6.5 K/km.
-  const double share = 1 - 0.0065 / 288.15 * (origin_height_m_ + truth.z_m);
+  const double share = 1 - 0.0065 / 288.15 * earth_->place({truth.x_m, truth.y_m, truth.z_m}).height_m;
   const double standard_Pa = 101'325 * sim::exp(5.25588 * base::log(share));
   const double noise_Pa = noise_.normal(parameters_.noise_Pa);
   return {.pressure_Pa = single(standard_Pa + offset_Pa_ + drift_.next(noise_) + noise_Pa),
@@ -348,11 +362,14 @@ Camera::Camera(const CameraNumbers& parameters, std::vector<Landmark> landmarks,
 
 std::vector<sensor::LandmarkSighting> Camera::sample(const Truth& truth, base::Micros now, const Faults& faults) {
   std::vector<sensor::LandmarkSighting> sightings;
+  const Direction d = direction(truth.yaw_rad);
+  const double x_m = truth.x_m + d.cos * parameters_.x_b_m - d.sin * parameters_.y_b_m;
+  const double y_m = truth.y_m + d.sin * parameters_.x_b_m + d.cos * parameters_.y_b_m;
   for (std::size_t i = 0; i < landmarks_.size(); ++i) {
-    const double dx = landmarks_[i].x_m - truth.x_m;
-    const double dy = landmarks_[i].y_m - truth.y_m;
+    const double dx = landmarks_[i].x_m - x_m;
+    const double dy = landmarks_[i].y_m - y_m;
     const double range_m = sim::sqrt(dx * dx + dy * dy);
-    const double bearing_rad = wrap(sim::atan2(dy, dx) - truth.yaw_rad);
+    const double bearing_rad = wrap(sim::atan2(dy, dx) - truth.yaw_rad - parameters_.yaw_rad);
     if (range_m > parameters_.range_max_m || magnitude(bearing_rad) > 0.5 * parameters_.field_of_view_rad) continue;
 
     const bool missed = noise_.happens(parameters_.miss_probability);

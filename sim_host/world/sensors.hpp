@@ -5,10 +5,11 @@
 
 #include "sensor/samples.hpp"
 #include "sim_host/world/chance.hpp"
+#include "sim_host/world/course.hpp"
+#include "sim_host/world/earth.hpp"
 #include "sim_host/world/faults.hpp"
+#include "sim_host/world/motion.hpp"
 #include "sim_host/world/numbers.hpp"
-#include "sim_host/world/rover.hpp"
-#include "sim_host/world/wgs84.hpp"
 
 #include <array>
 #include <optional>
@@ -16,10 +17,12 @@
 
 namespace tetap::sim {
 
-/// Raw samples at 2 kHz, limited to full scale, summed to increments between two calls of sample().
+/// An ideal one would integrate the path's closed forms: specific force f = a + 2 w x v - g, with the
+/// Earth's rotation w and the gravity g of the place. Raw samples at 2 kHz, limited to full scale, summed to increments
+/// between two calls of sample().
 class Imu {
  public:
-  Imu(const ImuParameters& parameters, double wheel_radius_m, const Wgs84& earth, std::uint64_t seed);
+  Imu(const ImuParameters& parameters, double wheel_radius_m, const Earth& earth, std::uint64_t seed);
   void sense(const Motion& motion, double speed_mps, base::Micros now, const Faults& faults);
   [[nodiscard]] sensor::ImuSample sample(base::Micros now, const Faults& faults);
   /// As of the last sample, as the truth has them.
@@ -33,8 +36,11 @@ class Imu {
   ImuParameters parameters_;
   double period_s_;
   double wheel_radius_m_;
-  double gravity_mps2_;
+  const Earth* earth_;
   Vector3 earth_rate_n_radps_;
+  Vector3 gravity_n_mps2_;  ///< gravity of the place, looked up every 0.1 s
+  int until_gravity_ = 0;
+  Matrix3 body_to_sensor_, uncalibrated_;
   Chance noise_, vibration_;
   Vector3 gyro_bias_{}, accel_bias_{}, gyro_scale_{}, accel_scale_{};
   Processes gyro_walk_, accel_walk_;
@@ -49,7 +55,7 @@ class Imu {
 /// Quadrature counters of both wheels, or speeds made from their differences.
 class Wheels {
  public:
-  Wheels(const WheelSensorNumbers& parameters, const RoverNumbers& rover, std::uint64_t seed);
+  Wheels(const WheelSensorNumbers& parameters, const VehicleParameters& vehicle, std::uint64_t seed);
   void sense(const Motion& motion, base::Micros now, const Faults& faults);
   [[nodiscard]] sensor::WheelCounts counts();
   [[nodiscard]] sensor::WheelSpeeds wheel_speeds();
@@ -58,8 +64,9 @@ class Wheels {
  private:
   struct Wheel {
     double metres_per_count = 0;  ///< with the true radius
-    double travel_m = 0;          ///< travel of the rim, with the sensor's noise
-    double unread_m = 0;          ///< travel since the last reading
+    double drawn_per_count = 0;   ///< with the drawing's
+    double travel_m = 0;          ///< way of the rim, with the sensor's noise
+    double unread_m = 0;          ///< way after the last reading
     std::int64_t count = 0;
     std::int64_t read = 0;
     std::uint16_t offset = 0;  ///< counters free-run: nobody zeroes them
@@ -67,10 +74,10 @@ class Wheels {
   void read();
 
   WheelSensorNumbers parameters_;
-  double nominal_metres_per_count_;
   double nominal_track_m_;
   Chance chance_;
   Wheel left_, right_;
+  double speed_scale_ = 1;
 };
 
 class Gnss {
@@ -79,14 +86,14 @@ class Gnss {
     std::optional<sensor::GnssPosition> position;
     std::optional<sensor::GnssVelocity> velocity;
   };
-  Gnss(const GnssParameters& parameters, const Wgs84& earth, std::uint64_t seed);
-  [[nodiscard]] Reading sample(const Truth& truth, const Vector3& rate_b_radps, base::Micros now, const Faults& faults);
+  Gnss(const GnssParameters& parameters, const Earth& earth, std::uint64_t seed);
+  [[nodiscard]] Reading sample(const Truth& truth, base::Micros now, const Faults& faults);
 
  private:
   void advance_errors(base::Micros now);
 
   GnssParameters parameters_;
-  const Wgs84* earth_;
+  const Earth* earth_;
   double period_s_;
   Chance noise_, outage_chance_, glitch_chance_, accuracy_chance_;
   std::array<GaussMarkov, 3> correlated_;
@@ -101,12 +108,14 @@ class Gnss {
 /// The Earth's field as the body's axes see it, and the iron near by.
 class Magnetometer {
  public:
-  Magnetometer(const MagnetometerNumbers& parameters, std::uint64_t seed);
+  Magnetometer(const MagnetometerNumbers& parameters, const Earth& earth, std::uint64_t seed);
   [[nodiscard]] sensor::MagneticFlux sample(const Truth& truth, base::Micros now, const Faults& faults);
 
  private:
   MagnetometerNumbers parameters_;
-  Vector3 field_n_uT_;
+  const Earth* earth_;
+  Vector3 field_uT_;  ///< east, north, up of the place
+  Matrix3 body_to_sensor_, uncalibrated_;
   Chance noise_;
   Vector3 hard_iron_uT_{}, scale_{};
   std::array<GaussMarkov, 3> local_;
@@ -115,12 +124,12 @@ class Magnetometer {
 /// Static pressure: the standard atmosphere (ISO 2533) at the body's height, and how far weather and sensor are off it.
 class Barometer {
  public:
-  Barometer(const BarometerNumbers& parameters, double origin_height_m, std::uint64_t seed);
+  Barometer(const BarometerNumbers& parameters, const Earth& earth, std::uint64_t seed);
   [[nodiscard]] sensor::AirPressure sample(const Truth& truth);
 
  private:
   BarometerNumbers parameters_;
-  double origin_height_m_;
+  const Earth* earth_;
   Chance noise_;
   double offset_Pa_;
   GaussMarkov drift_;

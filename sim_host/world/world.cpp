@@ -29,7 +29,7 @@ bool later(base::Micros a_arrival, std::uint64_t a_order, base::Micros b_arrival
 
 Parameters World::effective(const Options& options) {
   Parameters n = options.parameters;
-  if (!options.mismatched) n = options.inertial ? matched_inertial(n) : matched(n);
+  if (!options.mismatched && !options.as_given) n = options.inertial ? matched_inertial(n) : matched(n);
   if (!options.latency) n = without_latency(n);
   check_rate("IMU", n.imu.rate_hz);
   check_rate("wheel", n.wheels.rate_hz);
@@ -45,25 +45,44 @@ World::World(const Options& options, std::uint64_t seed)
     : parameters_{effective(options)},
       start_{options.start},
       faults_{options.faults},
+      origin_{options.origin},
+      surveyed_{options.surveyed},
       plan_{std::make_unique<const Plan>(options.course, options.limits)},
-      earth_{std::make_unique<const Wgs84>(options.origin)},
-      rover_{parameters_.rover, *plan_, seed, options.substeps},
-      imu_{parameters_.imu, parameters_.rover.wheel_radius_m, *earth_, seed},
-      wheels_{parameters_.wheels, parameters_.rover, seed},
+      earth_{std::make_unique<const Earth>(options.place.value_or(options.origin))},
+      to_map_{*earth_, Earth{options.origin}},
+      vehicle_{parameters_.vehicle, *plan_, seed, options.substeps},
+      imu_{parameters_.imu, parameters_.vehicle.wheel_radius_m, *earth_, seed},
+      wheels_{parameters_.wheels, parameters_.vehicle, seed},
       gnss_{parameters_.gnss, *earth_, seed},
       camera_{parameters_.camera, options.course.landmarks, seed},
-      magnetometer_{parameters_.magnetometer, seed},
-      barometer_{parameters_.barometer, options.origin.height_m, seed},
+      magnetometer_{parameters_.magnetometer, *earth_, seed},
+      barometer_{parameters_.barometer, *earth_, seed},
       imu_latency_{seed, Stream::kImuLatency},
       wheel_latency_{seed, Stream::kWheelLatency},
       gnss_latency_{seed, Stream::kGnssLatency},
       camera_latency_{seed, Stream::kCameraLatency},
       magnetometer_latency_{seed, Stream::kMagnetometerLatency},
       barometer_latency_{seed, Stream::kBarometerLatency},
-      loss_{seed, Stream::kFaultLoss} {}
+      loss_{seed, Stream::kFaultLoss} {
+  for (const Landmark& mark : camera_.map()) {
+    const Vector3 at = to_map_.point({mark.x_m, mark.y_m, 0});
+    map_.push_back({.id = mark.id, .x_m = at[0], .y_m = at[1]});
+  }
+}
 
-Truth World::truth() const {
-  Truth t = rover_.truth();
+Truth in_frame(Truth truth, const FrameChange& change) {
+  const Vector3 p = change.point({truth.x_m, truth.y_m, truth.z_m});
+  const Vector3 a = change.attitude({truth.roll_rad, truth.pitch_rad, truth.yaw_rad});
+  truth.x_m = p[0], truth.y_m = p[1], truth.z_m = p[2];
+  truth.roll_rad = a[0], truth.pitch_rad = a[1], truth.yaw_rad = wrap(a[2]);
+  truth.v_n_mps = change.vector(truth.v_n_mps);
+  return truth;
+}
+
+Truth World::truth() const { return in_frame(truth_here(), to_map_); }
+
+Truth World::truth_here() const {
+  Truth t = vehicle_.truth();
   t.time = start_ + now_;
   t.gyro_bias_b_radps = imu_.gyro_bias_radps();
   t.accel_bias_b_mps2 = imu_.accel_bias_mps2();
@@ -72,11 +91,20 @@ Truth World::truth() const {
 
 StartPose World::start_pose() const {
   const PathPoint at = plan_->path(0);
-  return {.x_m = at.x_m,
-          .y_m = at.y_m,
-          .yaw_rad = wrap(at.yaw_rad),
-          .sigma_m = parameters_.rover.start_m,
-          .sigma_yaw_rad = parameters_.rover.start_rad};
+  const double yaw_rad = wrap(to_map_.attitude({0, 0, at.yaw_rad})[2]);
+  const VehicleParameters& n = parameters_.vehicle;
+  if (surveyed_) {
+    const Vector3 place = to_map_.point({at.x_m, at.y_m, 0});
+    return {.x_m = place[0], .y_m = place[1], .yaw_rad = yaw_rad, .sigma_m = n.start_m, .sigma_yaw_rad = n.start_rad};
+  }
+  // The antenna stands at the origin, to the resolution of a fix.
+  const GnssParameters& g = parameters_.gnss;
+  const Vector3 lever = to_level({0, 0, yaw_rad}, g.antenna_b_m);
+  return {.x_m = -lever[0],
+          .y_m = -lever[1],
+          .yaw_rad = yaw_rad,
+          .sigma_m = sim::sqrt(g.white_m * g.white_m + g.correlated_m * g.correlated_m),
+          .sigma_yaw_rad = n.start_rad};
 }
 
 base::Micros World::clock_offset_at(base::Micros since_start) const {
@@ -84,10 +112,10 @@ base::Micros World::clock_offset_at(base::Micros since_start) const {
 }
 
 void World::kidnap() {
-  const double s_m = plan_->at(now_ + rover_.ahead()).s_m;
+  const double s_m = plan_->at(now_ + vehicle_.ahead()).s_m;
   const base::Micros there = plan_->time_at(std::min(s_m + FaultNumbers::kKidnapped_m, plan_->length_m()));
-  rover_.set_ahead(there - now_);
-  rover_.place(plan_->path(plan_->at(there).s_m));
+  vehicle_.set_ahead(there - now_);
+  vehicle_.place(plan_->path(plan_->at(there).s_m));
 }
 
 void World::emit(Value value, std::uint8_t sequence, base::Micros stamp_late, base::Micros latency) {
@@ -112,14 +140,13 @@ void World::emit(Value value, std::uint8_t sequence, base::Micros stamp_late, ba
 
 void World::step() {
   const base::Micros before = now_;
-  now_ += Rover::kStep;
+  now_ += Vehicle::kStep;
   if (faults_.starts(Fault::kKidnapped, before, now_)) kidnap();
-  const Motion motion = rover_.step(now_);
-  rate_b_radps_ = motion.rate_b_radps;
+  const Motion motion = vehicle_.step();
 
   const auto& n = parameters_;
   if (n.imu.rate_hz > 0) {
-    imu_.sense(motion, rover_.truth().speed_mps, now_, faults_);
+    imu_.sense(motion, motion.shaking_mps, now_, faults_);
     if (due(n.imu.rate_hz, n.imu.phase, now_))
       emit(imu_.sample(now_, faults_), imu_sequence_++, {}, imu_latency_.between(n.imu.latency_min, n.imu.latency_max));
   }
@@ -135,26 +162,26 @@ void World::step() {
     }
   }
   if (due(n.gnss.rate_hz, n.gnss.phase, now_)) {
-    const Gnss::Reading reading = gnss_.sample(truth(), rate_b_radps_, now_, faults_);
+    const Gnss::Reading reading = gnss_.sample(truth_here(), now_, faults_);
     const base::Micros latency = gnss_latency_.between(n.gnss.latency_min, n.gnss.latency_max);
     if (reading.position) emit(*reading.position, position_sequence_++, {}, latency);
     if (reading.velocity) emit(*reading.velocity, velocity_sequence_++, {}, latency);
   }
   if (due(n.camera.rate_hz, n.camera.phase, now_)) {
     const base::Micros latency = camera_latency_.between(n.camera.latency_min, n.camera.latency_max);
-    for (const auto& sighting : camera_.sample(truth(), now_, faults_))
+    for (const auto& sighting : camera_.sample(truth_here(), now_, faults_))
       emit(sighting, sighting_sequence_++, {}, latency);
   }
   if (due(n.magnetometer.rate_hz, n.magnetometer.phase, now_))
-    emit(magnetometer_.sample(truth(), now_, faults_), magnetometer_sequence_++, {},
+    emit(magnetometer_.sample(truth_here(), now_, faults_), magnetometer_sequence_++, {},
          magnetometer_latency_.between(n.magnetometer.latency_min, n.magnetometer.latency_max));
   if (due(n.barometer.rate_hz, n.barometer.phase, now_))
-    emit(barometer_.sample(truth()), barometer_sequence_++, {},
+    emit(barometer_.sample(truth_here()), barometer_sequence_++, {},
          barometer_latency_.between(n.barometer.latency_min, n.barometer.latency_max));
 }
 
 void World::advance_to(base::Micros t, std::vector<Measurement>& arrived) {
-  while (start_ + now_ + Rover::kStep <= t) step();
+  while (start_ + now_ + Vehicle::kStep <= t) step();
   const auto by_arrival = [](const Pending& a, const Pending& b) {
     return later(a.measurement.arrival, a.order, b.measurement.arrival, b.order);
   };

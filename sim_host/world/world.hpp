@@ -1,39 +1,47 @@
 // SPDX-License-Identifier: Apache-2.0
-// The simulated world: a rover on a course, seen by its sensors. The same options and seed give the same measurements,
-// bit for bit, on every host; the truth leaves only by truth(), for judges.
+// The simulated world: a vehicle on a course, seen by its sensors. The same options and seed give the same
+// measurements, bit for bit, on every host; the truth leaves only by truth(), for judges.
 #pragma once
 
 #include "base/time.hpp"
 #include "sim_host/world/course.hpp"
+#include "sim_host/world/earth.hpp"
 #include "sim_host/world/faults.hpp"
 #include "sim_host/world/measurement.hpp"
 #include "sim_host/world/numbers.hpp"
-#include "sim_host/world/rover.hpp"
 #include "sim_host/world/sensors.hpp"
-#include "sim_host/world/wgs84.hpp"
+#include "sim_host/world/vehicle.hpp"
 
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
 namespace tetap::sim {
 
-/// Content of a start command: where the rover was put, and 1 sigma of that.
+/// A start command's knowledge: where the vehicle was put, and how well.
 struct StartPose {
   double x_m = 0, y_m = 0, yaw_rad = 0;
   double sigma_m = 0, sigma_yaw_rad = 0;
 };
 
+/// Position, velocity and attitude in the axes of another local frame.
+[[nodiscard]] Truth in_frame(Truth truth, const FrameChange& change);
+
 class World {
  public:
   struct Options {
     bool mismatched = true;  ///< false: only errors that filters model, see matched()
-    bool inertial = false;   ///< with mismatched false: errors that an inertial filter models, see matched_inertial()
+    bool inertial = false;   ///< not mismatched, too: what an inertial filter models, see matched_inertial()
+    bool as_given = false;   ///< `parameters` hold as they are, whatever the two above are
     bool latency = true;     ///< false: everything arrives at its stamp
     Parameters parameters;
     Course course = default_course();
     CourseLimits limits;
+    /// The map's origin: truth, start pose and landmarks are in its frame.
     GeodeticOrigin origin{.latitude_deg = 48.2627, .longitude_deg = 11.6683, .height_m = 520};
+    std::optional<GeodeticOrigin> place;  ///< origin of the course, level there; none: the map's
+    bool surveyed = true;  ///< false: the map begins at the first fix, so a start is known as well as that
     std::vector<FaultSetting> faults;
     base::Micros start{1'000'000};  ///< time of the bus when the run starts
     int substeps = 1;               ///< integration steps per 0.5 ms
@@ -45,7 +53,8 @@ class World {
   /// Lets the world run until `t`; appends what has arrived by then, in the order of arrival. Never runs backwards.
   void advance_to(base::Micros t, std::vector<Measurement>& arrived);
 
-  /// Times of the world: start() until start() + duration(). Truth is as of the last advance_to, on the grid of 0.5 ms.
+  /// Times of the world: start() until start() + duration(). Truth is as of the last advance_to, on the grid of 0.5 ms,
+  /// in the frame of the map.
   [[nodiscard]] Truth truth() const;
   [[nodiscard]] base::Micros start() const { return start_; }
   [[nodiscard]] base::Micros duration() const { return plan_->duration(); }
@@ -54,8 +63,8 @@ class World {
 
   /// Start pose that a filter may be given.
   [[nodiscard]] StartPose start_pose() const;
-  [[nodiscard]] std::span<const Landmark> map() const { return camera_.map(); }
-  [[nodiscard]] const GeodeticOrigin& origin() const { return earth_->origin(); }
+  [[nodiscard]] std::span<const Landmark> map() const { return map_; }
+  [[nodiscard]] const GeodeticOrigin& origin() const { return origin_; }
   [[nodiscard]] const Parameters& parameters() const { return parameters_; }
   [[nodiscard]] const Faults& faults() const { return faults_; }
   [[nodiscard]] const Plan& plan() const { return *plan_; }
@@ -67,6 +76,8 @@ class World {
   };
   static Parameters effective(const Options& options);
   [[nodiscard]] base::Micros clock_offset_at(base::Micros since_start) const;
+  /// In the frame of the course, which sensors see.
+  [[nodiscard]] Truth truth_here() const;
   void step();
   void kidnap();
   void emit(Value value, std::uint8_t sequence, base::Micros stamp_late, base::Micros latency);
@@ -74,19 +85,22 @@ class World {
   Parameters parameters_;
   base::Micros start_;
   Faults faults_;
-  // Behind pointers, because sensors and rover point at them and a World may move.
+  GeodeticOrigin origin_;
+  bool surveyed_;
+  // Behind pointers, because sensors and vehicle point at them and a World may move.
   std::unique_ptr<const Plan> plan_;
-  std::unique_ptr<const Wgs84> earth_;
-  Rover rover_;
+  std::unique_ptr<const Earth> earth_;  ///< local frame of the course
+  FrameChange to_map_;
+  Vehicle vehicle_;
   Imu imu_;
   Wheels wheels_;
   Gnss gnss_;
   Camera camera_;
+  std::vector<Landmark> map_;
   Magnetometer magnetometer_;
   Barometer barometer_;
   Chance imu_latency_, wheel_latency_, gnss_latency_, camera_latency_, magnetometer_latency_, barometer_latency_, loss_;
-  base::Micros now_;  ///< time since the start
-  Vector3 rate_b_radps_{};
+  base::Micros now_;  ///< time after the start
   std::uint8_t imu_sequence_ = 0, wheel_sequence_ = 0, position_sequence_ = 0, velocity_sequence_ = 0,
                sighting_sequence_ = 0, magnetometer_sequence_ = 0, barometer_sequence_ = 0;
   std::uint64_t made_ = 0;

@@ -155,5 +155,32 @@ TEST(Course, the_road_is_driven_at_five_metres_a_second_for_a_minute_and_more) {
     ASSERT_GT(plan.at(t).speed_mps, 4.9) << t.us;
 }
 
+TEST(Course, streets_are_for_a_car_at_its_speed_with_turns_both_ways) {
+  const Plan plan{street_course(1), {.speed_mps = 12, .acceleration_mps2 = 1.5, .lateral_mps2 = 2}};
+  double top = 0, left = 0, right = 0;
+  for (base::Micros t; t < plan.duration(); t += base::Micros{100'000}) {
+    const PlanPoint p = plan.at(t);
+    const double bend = plan.path(p.s_m).curvature_per_m;
+    top = std::max(top, p.speed_mps);
+    left = std::max(left, bend), right = std::max(right, -bend);
+  }
+  EXPECT_NEAR(top, 12, 0.1);
+  EXPECT_NEAR(1 / left, 10, 1e-9);  // well above a car's 5.5 m
+  EXPECT_NEAR(1 / right, 12, 1e-9);
+  EXPECT_GE(plan.duration().us, 120'000'000);
+  EXPECT_NEAR(plan.departure_s(), 10, 1e-9);
+  EXPECT_NEAR(plan.arrival_s(), static_cast<double>(plan.duration().us) * 1e-6 - 8, 0.02);
+  EXPECT_GT(Plan({street_course(3)}, {.speed_mps = 12}).length_m(), 2.9 * plan.length_m());
+}
+
+TEST(Course, a_flight_leaves_time_to_climb_and_to_land) {
+  for (const int laps : {1, 2}) {
+    const Plan plan{flight_course(laps), {.speed_mps = 5, .acceleration_mps2 = 1.5, .lateral_mps2 = 2}};
+    EXPECT_NEAR(plan.departure_s(), 24, 1e-9);
+    EXPECT_NEAR(plan.arrival_s(), static_cast<double>(plan.duration().us) * 1e-6 - 24, 0.02);
+    EXPECT_GE(plan.duration().us, 120'000'000 * laps);
+  }
+}
+
 }  // namespace
 }  // namespace tetap::sim

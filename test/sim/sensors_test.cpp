@@ -14,7 +14,7 @@
 namespace tetap::sim {
 namespace {
 
-const Wgs84 kEarth{{48.2627, 11.6683, 520}};
+const Earth kEarth{{48.2627, 11.6683, 520}};
 const Faults kNoFaults;
 
 /// Allan deviation of rates at averaging time m samples (IEEE Std 952, annex C, non-overlapping).
@@ -37,7 +37,7 @@ std::array<std::vector<double>, 6> imu_at_rest(const ImuParameters& parameters, 
   std::array<std::vector<double>, 6> series;
   base::Micros now;
   for (int i = 0; i < static_cast<int>(seconds * parameters.rate_hz); ++i) {
-    for (int k = 0; k < steps; ++k) imu.sense({}, 0, now += Rover::kStep, kNoFaults);
+    for (int k = 0; k < steps; ++k) imu.sense({}, 0, now += Vehicle::kStep, kNoFaults);
     const sensor::ImuSample s = imu.sample(now, kNoFaults);
     for (std::size_t a = 0; a < 3; ++a) {
       series[a].push_back(static_cast<double>(s.dangle_b_rad[a]) * parameters.rate_hz);
@@ -147,7 +147,7 @@ TEST(Imu, vibration_grows_with_speed_and_is_none_at_rest) {
     std::vector<double> z;
     base::Micros now;
     for (int i = 0; i < 4000; ++i) {
-      for (int k = 0; k < 5; ++k) imu.sense({}, speed, now += Rover::kStep, kNoFaults);
+      for (int k = 0; k < 5; ++k) imu.sense({}, speed, now += Vehicle::kStep, kNoFaults);
       z.push_back(static_cast<double>(imu.sample(now, kNoFaults).dvelocity_b_mps[2]) * 400);
     }
     return sim::sqrt(statistics(z).variance);
@@ -168,7 +168,7 @@ Motion rolling(double left_m, double right_m) {
 
 TEST(Wheels, counting_rounds_down_to_a_count_and_never_drifts) {
   const WheelSensorNumbers parameters;
-  const RoverNumbers rover{.radius_difference = 0};
+  const VehicleParameters rover{.radius_difference = 0};
   const double metres = 2 * kPi * rover.wheel_radius_m / parameters.counts_per_turn;
   Wheels wheels{parameters, rover, 3};
   base::Micros now;
@@ -180,7 +180,7 @@ TEST(Wheels, counting_rounds_down_to_a_count_and_never_drifts) {
   for (int i = 0; i < 20'000; ++i) {
     const double step_m = 1.234567e-3 * (1 + 0.5 * sim::sin(0.01 * i));
     truth_m += step_m;
-    wheels.sense(rolling(step_m, -step_m), now += Rover::kStep, kNoFaults);
+    wheels.sense(rolling(step_m, -step_m), now += Vehicle::kStep, kNoFaults);
     const sensor::WheelCounts counts = wheels.counts();
     left += static_cast<std::int16_t>(counts.left - last.left);
     last = counts;
@@ -200,13 +200,13 @@ TEST(Wheels, counters_start_anywhere_and_wrap_both_ways) {
 
 TEST(Wheels, matched_noise_has_the_variance_k_per_metre) {
   const Parameters n = matched(Parameters{});
-  Wheels wheels{n.wheels, n.rover, 3};
-  const double metres = 2 * kPi * n.rover.wheel_radius_m / n.wheels.counts_per_turn;
+  Wheels wheels{n.wheels, n.vehicle, 3};
+  const double metres = 2 * kPi * n.vehicle.wheel_radius_m / n.wheels.counts_per_turn;
   base::Micros now;
   sensor::WheelCounts last = wheels.counts();
   std::vector<double> left, right;
   for (int i = 0; i < 30'000; ++i) {
-    wheels.sense(rolling(0.02, 0.01), now += Rover::kStep, kNoFaults);
+    wheels.sense(rolling(0.02, 0.01), now += Vehicle::kStep, kNoFaults);
     const sensor::WheelCounts counts = wheels.counts();
     left.push_back(static_cast<std::int16_t>(counts.left - last.left) * metres - 0.02);
     right.push_back(static_cast<std::int16_t>(counts.right - last.right) * metres - 0.01);
@@ -223,12 +223,12 @@ TEST(Wheels, speeds_are_the_counts_differences_over_the_interval) {
   WheelSensorNumbers parameters;
   parameters.rate_hz = 50;
   parameters.counts_per_turn = 1e6;
-  const RoverNumbers rover{.radius_difference = 0};
+  const VehicleParameters rover{.radius_difference = 0};
   Wheels a{parameters, rover, 3};
   Wheels b{parameters, rover, 3};
   base::Micros now;
   for (int i = 0; i < 40; ++i) {
-    a.sense(rolling(0.8 / 2000, 1.2 / 2000), now += Rover::kStep, kNoFaults);
+    a.sense(rolling(0.8 / 2000, 1.2 / 2000), now += Vehicle::kStep, kNoFaults);
     b.sense(rolling(0.8 / 2000, 1.2 / 2000), now, kNoFaults);
   }
   const sensor::WheelSpeeds speeds = a.wheel_speeds();
@@ -241,7 +241,7 @@ TEST(Wheels, speeds_are_the_counts_differences_over_the_interval) {
 
 TEST(Wheels, slip_is_there_in_curves_and_on_acceleration_and_small) {
   World::Options options{.latency = false};
-  options.parameters.rover.radius_difference = options.parameters.rover.track_error = 0;
+  options.parameters.vehicle.radius_difference = options.parameters.vehicle.track_error = 0;
   World world{options, 1};
   std::vector<Measurement> arrived;
   world.advance_to(world.start() + base::Micros{8'500}, arrived);
@@ -275,7 +275,7 @@ GnssSeries gnss_at_rest(const GnssParameters& parameters, int samples, std::uint
   base::Micros now;
   bool was_lost = false;
   for (int i = 0; i < samples; ++i) {
-    const auto reading = gnss.sample({}, {}, now += base::Micros{200'000}, kNoFaults);
+    const auto reading = gnss.sample({}, now += base::Micros{200'000}, kNoFaults);
     const auto& p = *reading.position;
     const bool is_lost = p.fix == sensor::GnssFix::kNone;
     if (is_lost) {
@@ -348,8 +348,8 @@ TEST(Gnss, the_antenna_swings_with_the_body) {
   GnssParameters parameters = perfect().gnss;
   parameters.antenna_b_m = {0.3, 0, 0.4};
   Gnss gnss{parameters, kEarth, 1};
-  Truth truth{.roll_rad = 0.1, .yaw_rad = kPi / 2, .v_n_mps = {0, 1, 0}};
-  const auto reading = gnss.sample(truth, {0, 0, 0.5}, {200'000}, kNoFaults);
+  Truth truth{.roll_rad = 0.1, .yaw_rad = kPi / 2, .rate_b_radps = {0, 0, 0.5}, .v_n_mps = {0, 1, 0}};
+  const auto reading = gnss.sample(truth, {200'000}, kNoFaults);
   const auto& p = *reading.position;
   const auto enu = kEarth.enu_m({p.latitude_2ndeg, p.longitude_2ndeg, static_cast<double>(p.height_m)});
   EXPECT_NEAR(enu[0], 0.4 * std::sin(0.1), 2e-4);  // heading north, leaning to the right: the mast leans east
@@ -411,7 +411,7 @@ TEST(Imu, the_biases_of_the_truth_are_what_it_shows_too_much) {
   base::Micros now;
   const Faults step{{{Fault::kGyroBiasStep, seconds_us(1), seconds_us(1)}}};
   for (int i = 0; i < 300; ++i) {
-    for (int k = 0; k < 20; ++k) imu.sense({}, 0, now += Rover::kStep, step);
+    for (int k = 0; k < 20; ++k) imu.sense({}, 0, now += Vehicle::kStep, step);
     const sensor::ImuSample s = imu.sample(now, step);
     const Vector3 gyro = imu.gyro_bias_radps();
     const Vector3 accel = imu.accel_bias_mps2();
@@ -428,13 +428,13 @@ TEST(Wheels, an_error_that_is_a_share_of_each_readings_travel_has_that_size_and_
   parameters.counts_per_turn = 2e6;
   parameters.noise_share = 0.03;
   parameters.output = WheelOutput::kWheelSpeeds;
-  Wheels wheels{parameters, matched(Parameters{}).rover, 5};
+  Wheels wheels{parameters, matched(Parameters{}).vehicle, 5};
   std::vector<double> errors;
   Motion motion;
   motion.rim_left_m = motion.rim_right_m = 0.001;  // 2 m/s
   base::Micros now;
   for (int i = 0; i < 40'000; ++i) {
-    for (int k = 0; k < 20; ++k) wheels.sense(motion, now += Rover::kStep, kNoFaults);
+    for (int k = 0; k < 20; ++k) wheels.sense(motion, now += Vehicle::kStep, kNoFaults);
     errors.push_back(static_cast<double>(wheels.wheel_speeds().left_mps) - 2);
   }
   EXPECT_NEAR(statistics(errors).mean, 0, 0.001);
@@ -451,7 +451,7 @@ MagnetometerNumbers perfect_magnetometer() {
 
 TEST(Magnetometer, a_perfect_one_points_to_magnetic_north_whatever_the_attitude) {
   const MagnetometerNumbers parameters = perfect_magnetometer();
-  Magnetometer magnetometer{parameters, 1};
+  Magnetometer magnetometer{parameters, kEarth, 1};
   for (const Vector3& attitude : {Vector3{0, 0, 0}, {0, 0, 1.2}, {0.2, -0.1, -2.5}, {-0.3, 0.4, 3.0}}) {
     Truth truth;
     truth.roll_rad = attitude[0], truth.pitch_rad = attitude[1], truth.yaw_rad = attitude[2];
@@ -467,8 +467,8 @@ TEST(Magnetometer, a_perfect_one_points_to_magnetic_north_whatever_the_attitude)
 TEST(Magnetometer, its_errors_are_as_large_as_stated) {
   MagnetometerNumbers parameters = perfect_magnetometer();
   parameters.noise_uT = 0.3;
-  Magnetometer noisy{parameters, 2};
-  Magnetometer clean{perfect_magnetometer(), 2};
+  Magnetometer noisy{parameters, kEarth, 2};
+  Magnetometer clean{perfect_magnetometer(), kEarth, 2};
   std::vector<double> noise;
   for (int i = 0; i < 20'000; ++i)
     noise.push_back(static_cast<double>(noisy.sample({}, {}, kNoFaults).flux_b_uT[0]) -
@@ -478,7 +478,7 @@ TEST(Magnetometer, its_errors_are_as_large_as_stated) {
   parameters.hard_iron_uT = 0.8;
   std::vector<double> iron;
   for (std::uint64_t seed = 0; seed < 2'000; ++seed) {
-    Magnetometer one{parameters, seed};
+    Magnetometer one{parameters, kEarth, seed};
     const float first = one.sample({}, {}, kNoFaults).flux_b_uT[1];
     ASSERT_EQ(one.sample({}, {}, kNoFaults).flux_b_uT[1], first) << "it stays";
     iron.push_back(static_cast<double>(first) - static_cast<double>(clean.sample({}, {}, kNoFaults).flux_b_uT[1]));
@@ -490,7 +490,7 @@ TEST(Magnetometer, its_errors_are_as_large_as_stated) {
 TEST(Magnetometer, iron_in_the_ground_changes_while_the_rover_drives_and_not_while_it_stands) {
   MagnetometerNumbers parameters = perfect_magnetometer();
   parameters.local_uT = 1;
-  Magnetometer magnetometer{parameters, 4};
+  Magnetometer magnetometer{parameters, kEarth, 4};
   Truth truth;
   const auto flux = [&] { return static_cast<double>(magnetometer.sample(truth, {}, kNoFaults).flux_b_uT[0]); };
   const double parked = flux();
@@ -505,13 +505,15 @@ TEST(Barometer, a_perfect_one_is_the_standard_atmosphere) {
   BarometerNumbers parameters;
   parameters.rate_hz = 10;
   parameters.noise_Pa = parameters.turn_on_Pa = parameters.drift_Pa = 0;
+  const auto at_height = [](double height_m) { return Earth{{48, 11, height_m}}; };
+  const Earth low = at_height(500), high = at_height(1000);
   // ISO 2533, table 5: 95 460.8 Pa at 500 m, 89 874.6 Pa at 1000 m (of geopotential height).
-  EXPECT_NEAR(static_cast<double>(Barometer(parameters, 500, 1).sample({}).pressure_Pa), 95'460.8, 2);
-  EXPECT_NEAR(static_cast<double>(Barometer(parameters, 1000, 1).sample({}).pressure_Pa), 89'874.6, 2);
+  EXPECT_NEAR(static_cast<double>(Barometer(parameters, low, 1).sample({}).pressure_Pa), 95'460.8, 2);
+  EXPECT_NEAR(static_cast<double>(Barometer(parameters, high, 1).sample({}).pressure_Pa), 89'874.6, 2);
   Truth higher;
   higher.z_m = 10;
-  const double per_metre = (static_cast<double>(Barometer(parameters, 520, 1).sample(higher).pressure_Pa) -
-                            static_cast<double>(Barometer(parameters, 520, 1).sample({}).pressure_Pa)) /
+  const double per_metre = (static_cast<double>(Barometer(parameters, kEarth, 1).sample(higher).pressure_Pa) -
+                            static_cast<double>(Barometer(parameters, kEarth, 1).sample({}).pressure_Pa)) /
                            10;
   EXPECT_NEAR(per_metre, -11.43, 0.05);
 }
@@ -521,7 +523,7 @@ TEST(Barometer, noise_offset_and_drift_are_as_large_as_stated) {
   parameters.rate_hz = 10;
   std::vector<double> offsets, noise;
   for (std::uint64_t seed = 0; seed < 1'000; ++seed) {
-    Barometer barometer{parameters, 520, seed};
+    Barometer barometer{parameters, kEarth, seed};
     const auto pressure = [&] { return static_cast<double>(barometer.sample({}).pressure_Pa); };
     const double first = pressure();
     offsets.push_back(first);

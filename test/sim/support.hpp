@@ -83,7 +83,7 @@ inline bool same(const Measurement& a, const Measurement& b) { return hash({a}) 
 /// No noise, no slip, no wander, a start as planned: what is left is geometry.
 inline Parameters perfect() {
   Parameters n = matched(Parameters{});
-  n.rover.driver_wander_m = n.rover.start_m = n.rover.start_rad = 0;
+  n.vehicle.driver_wander_m = n.vehicle.start_m = n.vehicle.start_rad = 0;
   n.imu.gyro_noise = 0;
   n.imu.accel_noise = {};
   n.wheels.noise_m = 0;

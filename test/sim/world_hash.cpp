@@ -11,8 +11,20 @@ using namespace tetap::sim;
 
 int main() {
   Hash h;
-  for (const bool mismatched : {false, true}) {
-    World::Options options{.mismatched = mismatched};
+  for (const int which : {0, 1, 2, 3}) {
+    World::Options options{.mismatched = which > 0};
+    if (which == 2) {
+      options.parameters.vehicle.kind = VehicleKind::kMulticopter;
+      options.course = flight_course(1);
+      options.place = GeodeticOrigin{.latitude_deg = 80, .longitude_deg = 179.95, .height_m = 20};
+      options.origin = origin_with(*options.place, 60'000, -30'000);
+    }
+    if (which == 3) {
+      options.parameters.vehicle.kind = VehicleKind::kCar;
+      options.parameters.vehicle.turning_radius_m = 5.5;
+      options.parameters.wheels.output = WheelOutput::kBodySpeed;
+      options.parameters.imu.mounting_bs = {{0, 0, -1, -1, 0, 0, 0, 1, 0}};
+    }
     options.parameters.magnetometer.rate_hz = 20;
     options.parameters.barometer.rate_hz = 10;
     for (const auto& row : fault_table())

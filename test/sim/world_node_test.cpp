@@ -372,7 +372,7 @@ TEST(Standstill, NeitherTellsAHeadingNorCostsOne) {
     World::Options options{.mismatched = robot.name != std::string("matched"), .inertial = true};
     if (robot.name == std::string("trembling")) {
       options.parameters.imu.accel_range_mps2 = 16 * kG0;
-      options.parameters.rover.jitter_mps = options.parameters.rover.jitter_ahead_mps = kTrembles_mps;
+      options.parameters.vehicle.jitter_mps = options.parameters.vehicle.jitter_ahead_mps = kTrembles_mps;
     }
     options.course.waypoints.front().stop_s = 1e6;
     options.parameters.gnss = with_error(options.parameters.gnss, 0.01);

@@ -109,8 +109,8 @@ TEST(World, without_slip_the_wheels_travel_what_the_rover_travels) {
 
 TEST(World, unequal_wheels_and_a_wrong_track_show_in_the_counts_as_large_as_stated) {
   Parameters parameters = perfect();
-  parameters.rover.radius_difference = 0.005;
-  parameters.rover.track_error = 0.01;
+  parameters.vehicle.radius_difference = 0.005;
+  parameters.vehicle.track_error = 0.01;
   World::Options options = quiet(parameters);
   options.course = {.waypoints = {{.x_m = 0, .stop_s = 1}, {.x_m = 100, .stop_s = 1}}, .landmarks = {}};
   const auto travel = [](const std::vector<Measurement>& all) {
@@ -130,7 +130,7 @@ TEST(World, unequal_wheels_and_a_wrong_track_show_in_the_counts_as_large_as_stat
   EXPECT_NEAR(straight[0], 100 / 1.0025, 0.02);
   EXPECT_NEAR(straight[1], 100 / 0.9975, 0.02);
 
-  parameters.rover.radius_difference = 0;
+  parameters.vehicle.radius_difference = 0;
   options = quiet(parameters);
   options.course = circle_course(4, 4);
   World world{options, 1};
@@ -144,7 +144,7 @@ TEST(World, unequal_wheels_and_a_wrong_track_show_in_the_counts_as_large_as_stat
 struct Strapdown {
   Vector3 attitude{};  // roll, pitch, yaw
   Vector3 v{}, p{};
-  double gravity = 0;
+  Earth earth;  ///< GeographicLib's gravity of the place
 
   void advance(const sensor::ImuSample& s, double t) {
     const Vector3 w{static_cast<double>(s.dangle_b_rad[0]), static_cast<double>(s.dangle_b_rad[1]),
@@ -162,8 +162,9 @@ struct Strapdown {
     for (std::size_t i = 0; i < 3; ++i) middle[i] = attitude[i] + 0.5 * half[i];
     const Vector3 full = rates(middle);
     for (std::size_t i = 0; i < 3; ++i) attitude[i] += full[i];
+    const Vector3 gravity = earth.gravity_n_mps2(p);
     for (std::size_t i = 0; i < 3; ++i) {
-      const double change = dv[i] - (i == 2 ? gravity * t : 0);
+      const double change = dv[i] + gravity[i] * t;
       p[i] += (v[i] + 0.5 * change) * t;
       v[i] += change;
     }
@@ -172,7 +173,7 @@ struct Strapdown {
 
 TEST(World, a_perfect_imu_integrates_to_the_truth) {
   Parameters parameters = perfect();
-  parameters.rover = RoverNumbers{};  // lean, side slip, uneven ground and all
+  parameters.vehicle = VehicleParameters{};  // lean, side slip, uneven ground and all
   parameters.imu.rate_hz = 200;
   World::Options options = quiet(parameters);
   World world{options, 11};
@@ -183,7 +184,7 @@ TEST(World, a_perfect_imu_integrates_to_the_truth) {
   const Truth at = world.truth();
   Strapdown strapdown{.attitude = {at.roll_rad, at.pitch_rad, at.yaw_rad},
                       .p = {at.x_m, at.y_m, at.z_m},
-                      .gravity = Wgs84{options.origin}.gravity_mps2()};
+                      .earth = Earth{options.origin}};
   for (base::Micros t = begin; t <= begin + seconds_us(75); t += base::Micros{5'000}) {
     arrived.clear();
     if (t == begin) continue;
@@ -204,11 +205,11 @@ TEST(World, a_perfect_imu_integrates_to_the_truth) {
 
 TEST(World, perfect_gnss_and_camera_say_the_truth_of_their_stamp) {
   Parameters parameters = perfect();
-  parameters.rover = RoverNumbers{};
+  parameters.vehicle = VehicleParameters{};
   parameters.gnss.antenna_b_m = {0.3, 0.1, 0.4};
   World::Options options = quiet(parameters);
   World world{options, 13};
-  const Wgs84 earth{options.origin};
+  const Earth earth{options.origin};
   std::vector<Measurement> arrived;
   int positions = 0, velocities = 0, sightings = 0;
   std::optional<Vector3> antenna;
@@ -372,13 +373,11 @@ TEST(World, each_sensor_comes_at_its_rate_with_a_running_sequence) {
   }
 }
 
-// A filter that knows the world's place only by GNSS and map cannot be told apart by the rest: nothing else depends on
-// where it is.
+// A kilometre away gravity and the turn of the Earth are the same to a part in a million, so only GNSS and map show it.
 TEST(World, moving_the_whole_course_changes_nothing_but_gnss_so_no_other_sensor_knows_the_place) {
   World::Options options;
   const auto here = run(options, 9, seconds_us(60));
-  for (auto& w : options.course.waypoints) w.x_m += 1024, w.y_m -= 512;
-  for (auto& l : options.course.landmarks) l.x_m += 1024, l.y_m -= 512;
+  options.place = place_at(options.origin, 1024, -512);
   const auto there = run(options, 9, seconds_us(60));
   ASSERT_EQ(here.size(), there.size());
   int gnss = 0;
@@ -465,7 +464,7 @@ TEST(World, in_the_world_matched_to_an_inertial_filter_the_body_trembles_without
   World::Options options{.mismatched = false, .inertial = true};
   options.course.waypoints.front().stop_s = 45;
   World world{options, 9};
-  const double sigma = world.parameters().rover.jitter_mps, sigma_ahead = world.parameters().rover.jitter_ahead_mps;
+  const double sigma = world.parameters().vehicle.jitter_mps, sigma_ahead = world.parameters().vehicle.jitter_ahead_mps;
   std::vector<Measurement> ignored;
   std::vector<double> side, up, ahead;
   double x_m = 0;
