@@ -22,8 +22,8 @@ class GnssVelocitySource {
  public:
   using Measurement = VelocityMeasurement;
 
-  /// A receiver's velocity, along the level axes of the place as it came, along the map's. A climb
-  /// rate that is not there is 0.
+  /// A receiver's velocity, which came along the level axes of the place, along the map's. A climb rate that is not
+  /// there is 0.
   [[nodiscard]] static VelocityMeasurement measurement(const sensor::GnssVelocity& velocity,
                                                        const nav::LocalLevel& place, const param::GnssParameters& n) {
     const bool has_climb = base::is_finite(velocity.v_n_mps[2]);
