@@ -24,7 +24,7 @@ struct ClippedSensors {
 class Attitude {
  public:
   Attitude() : Attitude(AttitudeOptions{}) {}
-  explicit Attitude(const AttitudeOptions& options, const SensorRange& range = {})
+  [[gnu::cold]] explicit Attitude(const AttitudeOptions& options, const SensorRange& range = {})
       : o_(options),
         strongest_mps2_(SensorRange::kRangeShare * range.accelerometer_mps2),
         clipping_(range.gyroscope_radps),

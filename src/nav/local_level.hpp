@@ -78,11 +78,6 @@ struct LocalLevel {
 
   [[nodiscard]] Vector3 to_map(const Vector3& v_l) const { return q_nl.rotate(v_l); }
   [[nodiscard]] Vector3 from_map(const Vector3& v_n) const { return q_nl.conjugate().rotate(v_n); }
-  /// Beyond some 3 km from the origin; nearer, no measurement resolves the angle between the planes.
-  [[nodiscard]] bool leans() const {
-    constexpr float kLeast = 5e-4F;
-    return up_n(0) * up_n(0) + up_n(1) * up_n(1) > kLeast * kLeast;
-  }
   /// Turn of the place's east against the map's: a heading at the place plus this is the heading in the map.
   [[nodiscard]] float convergence_rad() const {
     const Vector3 east_n = q_nl.rotated_x();

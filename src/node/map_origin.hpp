@@ -26,8 +26,8 @@ class MapOrigin {
     map_frame.origin = sensor::OriginSource::kConfigured;
   }
   /// A fix before anybody uses it. Another origin may become the map's, or a first one where it had none.
-  void update(const sensor::GnssPosition& fix, base::Micros stamp, estimators::MapFrame& map_frame,
-              const param::Parameters& n) {
+  [[gnu::cold]] void update(const sensor::GnssPosition& fix, base::Micros stamp, estimators::MapFrame& map_frame,
+                            const param::Parameters& n) {
     if (fix.fix < sensor::GnssFix::k2d) return;
     run_.update(fix, stamp, kMostFixes);
     const bool known = map_frame.origin != sensor::OriginSource::kNone;

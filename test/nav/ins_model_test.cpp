@@ -6,7 +6,6 @@
 #include "model/gnss_fix_3d.hpp"
 #include "model/gnss_velocity_3d.hpp"
 #include "model/height.hpp"
-#include "model/level_plane.hpp"
 #include "model/magnetic_heading.hpp"
 #include "model/wheel_speed.hpp"
 #include "model/zero_rate.hpp"
@@ -63,14 +62,6 @@ struct Example<model::GnssVelocity3d> {
     model::GnssVelocity3d m{
         .sigma_horizontal_mps = 0.1F, .sigma_vertical_mps = 0.2F, .antenna_b_m = kLever, .gyro_b_radps = kGyro};
     return m.v_n_mps = m.predict(x), m;
-  }
-};
-template <class Of>
-struct Example<model::OnLevelPlane<Of>> {
-  static model::OnLevelPlane<Of> at(const InsState& x) {
-    nav::LocalLevel place;
-    place.up_n = Vector3{0.016F, -0.01F, 1.0F};
-    return {Example<Of>::at(x), place};
   }
 };
 /// Its constraint holds only for a body that moves the way it looks.
@@ -134,8 +125,7 @@ template <class Model>
 class InsMeasurementLaws : public testing::Test {};
 using Models =
     testing::Types<model::GnssFix3d, model::GnssVelocity3d, model::WheelSpeed, model::NonHolonomic, model::ZeroVelocity,
-                   model::ZeroRate, model::DualHeading, model::MagneticHeading, model::GnssCourse, model::Height,
-                   model::OnLevelPlane<model::GnssFix3d>, model::OnLevelPlane<model::GnssVelocity3d>>;
+                   model::ZeroRate, model::DualHeading, model::MagneticHeading, model::GnssCourse, model::Height>;
 TYPED_TEST_SUITE(InsMeasurementLaws, Models);
 
 TYPED_TEST(InsMeasurementLaws, JacobianEqualsCentralDifferences) {

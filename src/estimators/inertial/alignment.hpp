@@ -75,8 +75,9 @@ class Alignment {
 
   /// State and variances to start with, on the level plane of the place. `before`: the filter's state where it ran,
   /// whose tilt and biases stay; else null. forward_mps: of the wheels; NaN: none.
-  [[nodiscard]] Start start(const nav::InsState* before, const nav::LocalLevel& place, const HeadingMonitor& monitor,
-                            const param::InertialParameters& n, float forward_mps) const;
+  [[nodiscard, gnu::cold]] Start start(const nav::InsState* before, const nav::LocalLevel& place,
+                                       const HeadingMonitor& monitor, const param::InertialParameters& n,
+                                       float forward_mps) const;
 
   template <class Sink>
   void hash_state(Sink&& sink) const {

@@ -2,7 +2,6 @@
 // Inertial navigation: GNSS position and velocity.
 #include "estimators/inertial/inertial.hpp"
 #include "estimators/inertial/measure.hpp"
-#include "model/level_plane.hpp"
 
 namespace tetap::estimators {
 
@@ -104,9 +103,7 @@ Innovation Inertial::fuse(const sensor::GnssVelocity& velocity, base::Micros sta
   }
   const model::GnssVelocity3d model = GnssVelocitySource::model(z, filter);
   const float gate_scale = GnssVelocitySource::gate_scale(z, n);
-  Innovation record = !z.has_climb && level_.leans()
-                          ? measure(model::OnLevelPlane(model, level_), sources_.velocity, gate_scale, filter)
-                          : measure(model, sources_.velocity, gate_scale, filter);
+  Innovation record = measure(model, sources_.velocity, gate_scale, filter);
   if (!z.has_climb && record.dof == 3) record.dof = 2;
   sources_.position.velocity(record.verdict == sensor::Verdict::kAccepted);
   return record;

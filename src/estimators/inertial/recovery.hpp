@@ -41,7 +41,7 @@ class Recovery {
   /// Verb 2 by command: horizontal position from outside, 1 sigma per axis; all else stays.
   static void place(nav::Ins& ins, const model::PlanarPose& pose, float sigma_m) { ins.place(pose.x, pose.y, sigma_m); }
   /// Verb 3: state and independent errors anew; the third of position, velocity and attitude is along the plumb line.
-  static void restart(nav::Ins& ins, const nav::InsState& x, const Variances& variances);
+  [[gnu::cold]] static void restart(nav::Ins& ins, const nav::InsState& x, const Variances& variances);
 
   /// A source was taken anew, and nothing moves at once: the sizes stay those of the last step.
   void report(sensor::ResetCause cause) {
