@@ -14,7 +14,7 @@ namespace tetap::checks {
 
 class StartupFixCheck {
  public:
-  /// True when this fix is at least the `needed`-th in a row.
+  /// True when this fix is at least the `needed`-th in a row. Two receivers may have fixes of one stamp.
   [[gnu::noinline]] bool update(const sensor::GnssPosition& fix, base::Micros stamp, std::int32_t needed) {
     const float sigma_m = base::is_finite(fix.horizontal_acc_m) ? fix.horizontal_acc_m : 10.0F;
     const float far_m = 4.0F * sigma_m + kFastest_mps * base::seconds(stamp - last_);
@@ -23,7 +23,7 @@ class StartupFixCheck {
     const float latitude_rad = static_cast<float>(latitude_2udeg) * (2e-6F * 0.0174532925F);
     const float east_m =
         metres(nav::longitude_difference_2ndeg(fix.longitude_2ndeg, longitude_2ndeg_)) * base::cos(latitude_rad);
-    const bool follows = fixes_ > 0 && stamp > last_ && east_m * east_m + north_m * north_m <= far_m * far_m;
+    const bool follows = fixes_ > 0 && stamp >= last_ && east_m * east_m + north_m * north_m <= far_m * far_m;
     fixes_ = follows ? (fixes_ < needed ? fixes_ + 1 : needed) : 1;
     latitude_2ndeg_ = fix.latitude_2ndeg;
     longitude_2ndeg_ = fix.longitude_2ndeg;

@@ -56,7 +56,7 @@ struct PairSum {
   [[gnu::always_inline]] Vector<Scalar, N> add(std::bool_constant<kFirst>, const Vector<Scalar, N>& up,
                                                const Vector<Scalar, N>& down) {
     const Vector<Scalar, N> s = up + down;
-    const Vector<Scalar, N> t = up - down;
+    Vector<Scalar, N> t = up - down;
     sum = kFirst ? s : Vector<Scalar, N>(sum + s);
     unroll<0, N>([&](auto c) __attribute__((always_inline)) {
       unroll<0, c + 1>([&](auto r) __attribute__((always_inline)) {

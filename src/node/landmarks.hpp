@@ -2,7 +2,7 @@
 // The landmark map and the entries that wait for their tick to go into it.
 #pragma once
 
-#include "base/word_hash.hpp"
+#include "base/state_hash.hpp"
 #include "bus/counters.hpp"
 #include "estimators/map_frame.hpp"
 
@@ -39,7 +39,7 @@ class Landmarks {
 
  private:
   void digest() {
-    base::WordHash hash;
+    base::StateHash hash;
     map_.hash_state(hash);
     digest_ = hash.value();
   }

@@ -3,7 +3,7 @@
 // calls gives the same bits on every machine; everything that follows from real time stays outside (Pacer, LoopHealth).
 #pragma once
 
-#include "base/word_hash.hpp"
+#include "base/state_hash.hpp"
 #include "bus/decoder.hpp"
 #include "bus/input_crc.hpp"
 #include "bus/publisher.hpp"
@@ -346,7 +346,7 @@ void Node<Estimators, Capacity>::note_jump() {
 
 template <class Estimators, std::size_t Capacity>
 std::uint32_t Node<Estimators, Capacity>::state_crc() const {
-  base::WordHash hash;
+  base::StateHash hash;
   history_.hash_state(hash);
   hash(static_cast<std::uint32_t>(map_frame_.origin));
   origin_.hash_state(hash);

@@ -605,7 +605,7 @@ class Program(unittest.TestCase):
         self.one_line(["a.log:2:", "bytes"], self.file(lines[0] + b"\n" + lines[0][:-4] + b"\n"))
         self.one_line(["base 0x300", "--base", "7A1"], self.file(b"(1.000000) can0 7A1#0011\n"))
         self.one_line(["no sensor's samples"], self.file(b"(1.000000) can0 300#40420F0000000003\n"))
-        self.one_line(["no robot 'nobody'", "mrclam rover rover_landmarks"], self.file(good), "--robot", "nobody")
+        self.one_line(["no robot 'nobody'", "rover rover_landmarks"], self.file(good), "--robot", "nobody")
         self.one_line(["--span begins at 500"], self.file(good), "--span", "500,600")
         self.one_line(["cannot write"], self.file(good), "--out", os.path.join(self.at, "no", "c"))
         back = b"(1.000000) can0 300#40420F0000000000\n(1.010000) can0 300#C0E1E40000000000\n(1.020000) can0 300#40420F0000000000\n"

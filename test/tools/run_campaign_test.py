@@ -262,7 +262,7 @@ class WithFiles(unittest.TestCase):
     def test_all_faults_are_those_of_sensors_that_the_robot_has(self):
         known = set(campaign.fault_table())
         self.assertEqual(known - set(campaign.faults_of("rover")), {"landmark_wrong_id", "landmark_outlier", "mag_disturbance"})
-        self.assertEqual(known - set(campaign.faults_of("iris")), {"landmark_wrong_id", "landmark_outlier"})
+        self.assertEqual(known - set(campaign.faults_of("iris")), {"landmark_wrong_id", "landmark_outlier", "wheel_spin", "wheel_stuck", "slip_left", "slip_right", "encoder_dropout"})
 
     @unittest.skipUnless(os.access(os.path.join(PROGRAMS, "tetap-world"), os.X_OK), "tetap-world is not built")
     def test_bad_input_is_one_line_and_a_status(self):

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the hash of a state has to notice: one bit, an exchange, a word more; and that its value is the same everywhere.
-#include "base/word_hash.hpp"
+#include "base/state_hash.hpp"
 
 #include <array>
 #include <bit>
@@ -15,7 +15,7 @@ namespace tetap::base {
 namespace {
 
 std::uint32_t hash_of(const std::vector<std::uint32_t>& words) {
-  WordHash hash;
+  StateHash hash;
   for (const std::uint32_t word : words) hash(word);
   return hash.value();
 }
@@ -29,7 +29,7 @@ std::vector<std::uint32_t> state() {
   return words;
 }
 
-TEST(WordHash, EveryFlippedBitChangesTheValueAndNoTwoFlipsAreAlike) {
+TEST(StateHash, EveryFlippedBitChangesTheValueAndNoTwoFlipsAreAlike) {
   const std::vector<std::uint32_t> given = state();
   std::set<std::uint32_t> seen{hash_of(given)};
   for (std::size_t at = 0; at < given.size(); ++at)
@@ -40,7 +40,7 @@ TEST(WordHash, EveryFlippedBitChangesTheValueAndNoTwoFlipsAreAlike) {
     }
 }
 
-TEST(WordHash, AFlippedBitChangesHalfOfTheValueInTheMean) {
+TEST(StateHash, AFlippedBitChangesHalfOfTheValueInTheMean) {
   const std::vector<std::uint32_t> given = state();
   const std::uint32_t before = hash_of(given);
   double changed = 0;
@@ -54,7 +54,7 @@ TEST(WordHash, AFlippedBitChangesHalfOfTheValueInTheMean) {
   EXPECT_NEAR(changed / flips, 16.0, 0.5);
 }
 
-TEST(WordHash, ExchangedWordsAndLeadingOrTrailingZerosCount) {
+TEST(StateHash, ExchangedWordsAndLeadingOrTrailingZerosCount) {
   const std::vector<std::uint32_t> given = state();
   std::set<std::uint32_t> seen{hash_of(given)};
   for (std::size_t at = 0; at + 1 < given.size(); ++at) {
@@ -69,8 +69,8 @@ TEST(WordHash, ExchangedWordsAndLeadingOrTrailingZerosCount) {
   }
 }
 
-TEST(WordHash, NumbersAreTheirBitsLeastSignificantWordFirst) {
-  WordHash numbers, words;
+TEST(StateHash, NumbersAreTheirBitsLeastSignificantWordFirst) {
+  StateHash numbers, words;
   numbers(-0.0F);
   numbers(std::int32_t{-2});
   numbers(std::int64_t{0x0123'4567'89AB'CDEF});
@@ -79,7 +79,7 @@ TEST(WordHash, NumbersAreTheirBitsLeastSignificantWordFirst) {
 }
 
 // A recording that was made by one version is compared with a replay by another: the value may not change unseen.
-TEST(WordHash, KeepsItsValue) { EXPECT_EQ(hash_of({1, 2, 3}), 0x49764487U); }
+TEST(StateHash, KeepsItsValue) { EXPECT_EQ(hash_of({1, 2, 3}), 0x49764487U); }
 
 }  // namespace
 }  // namespace tetap::base

@@ -10,7 +10,7 @@
 
 namespace tetap::base {
 
-class WordHash {
+class StateHash {
  public:
   constexpr void operator()(std::uint32_t word) {
     const std::uint32_t mixed = (state_ ^ word) * kGoldenRatio;
