@@ -38,7 +38,7 @@ struct Chance {
 };
 
 template <class Filter>
-void hash_covariance(base::WordHash& hash, const Filter& filter) {
+void hash_packed(base::WordHash& hash, const Filter& filter) {
   for (const float v : filter.p.packed()) hash(v);
 }
 template <int M>
@@ -75,7 +75,7 @@ void hash_vector(base::WordHash& hash, const filter::Vector<float, N>& x) {
                   filter::chi_square_99(2));
     hash_innovation(hash, innovation);
     hash_vector<4>(hash, kf.x.value);
-    hash_covariance(hash, kf);
+    hash_packed(hash, kf);
   }
   return hash.value();
 }
@@ -103,7 +103,7 @@ void hash_vector(base::WordHash& hash, const filter::Vector<float, N>& x) {
         filter::chi_square_99(4));
     hash_innovation(hash, innovation);
     hash_vector<8>(hash, kf.x.value);
-    hash_covariance(hash, kf);
+    hash_packed(hash, kf);
   }
   return hash.value();
 }
@@ -189,7 +189,7 @@ void hash_vector(base::WordHash& hash, const filter::Vector<float, N>& x) {
     hash(ekf.x.y.anchor_um);
     hash(ekf.x.y.offset_m);
     hash(ekf.x.yaw_rad);
-    hash_covariance(hash, ekf);
+    hash_packed(hash, ekf);
   }
   return hash.value();
 }
@@ -233,7 +233,7 @@ void hash_vector(base::WordHash& hash, const filter::Vector<float, N>& x) {
     hash(ahead.pose.x.um());
     hash(ahead.pose.y.um());
     hash(ahead.pose.yaw_rad);
-    hash_covariance(hash, ahead);
+    hash_packed(hash, ahead);
   }
   return hash.value();
 }

@@ -46,7 +46,7 @@ class InsRun {
       drive();
       if (k % 4 == 0) measure();
       hash_state(hash_, ins_.x);
-      hash_covariance(hash_, ins_);
+      hash_packed(hash_, ins_);
       if (k % 50 == 49) {
         hash_state(hash_, gathered_);
         gathered_ = ins_.x;
