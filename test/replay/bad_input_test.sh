@@ -97,7 +97,7 @@ refused "a folder for a log" 'cannot be read: Is a directory' "$programs/tetap-p
 refused "an output folder that cannot be" "$work/good.log/x" "$programs/tetap-play" "$work/good.log" --memory --robot mrclam --out "$work/good.log/x" --quiet
 
 # Command lines
-robots='there are: car .*mrclam rover .*rover_matched'
+robots='there are: car .*mrclam .*rover .*rover_matched'
 refused "a robot that does not exist (player)" "no robot 'tank'; $robots" "$programs/tetap-play" "$work/good.log" --memory --robot tank
 refused "a robot that does not exist (node)" "no robot 'tank'; $robots" "$programs/tetap-node" --robot tank
 refused "a robot that does not exist (player, over a bus)" "no robot 'tank'; $robots" "$programs/tetap-play" "$work/good.log" --robot tank
@@ -184,7 +184,7 @@ refused "sim with a fault whose start is no number" "fault 'gnss_jump@soon': STA
 refused "sim with an unknown fault over a bus" "fault 'meteor'" timeout 20 env FAULT=meteor OUT="$work/out" tools/run/simulate_world
 refused "sim with a fault of a sensor it has not" "fault 'mag_disturbance': robot rover has no magnetometer; faults that act on it: gnss_jump .*; robots on which it acts: iris" \
   timeout 20 env FAULT=gnss_jump,mag_disturbance OUT="$work/out" tools/run/simulate_world
-refused "sim with a fault of landmarks it has not" "fault 'landmark_outlier': robot iris has no landmarks; .* mag_disturbance.*; robots on which it acts: .* rover_landmarks" \
+refused "sim with a fault of landmarks it has not" "fault 'landmark_outlier': robot iris has no landmarks; .* mag_disturbance.*; in this world it acts on none" \
   timeout 20 env ROBOT=iris FAULT=landmark_outlier@20+5 OUT="$work/out" tools/run/simulate_world
 refused "a world with a fault of wheels it has not" "fault 'wheel_spin': robot rover has no wheels" \
   "$programs/tetap-world" --memory --no-wheels --fault wheel_spin --out "$work/out"
