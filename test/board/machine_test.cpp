@@ -4,6 +4,7 @@
 #include "hal/chip/arm/cortex_m4.hpp"
 #include "hal/chip/stm32/registers_stm32f412.hpp"
 #include "test/board/emulated.hpp"
+#include "test/board/programs/choices.hpp"
 
 #include <bit>
 
@@ -12,27 +13,6 @@ namespace {
 
 namespace m4 = hal::cortex_m4;
 namespace reg = hal::stm32f412;
-
-enum Choice : std::uint32_t {
-  kFloatInHandler = 1,
-  kMasks,
-  kPriorities,
-  kSleep,
-  kUndefined,
-  kUnmapped,
-  kFloatingPointOff,
-  kUnalignedDouble,
-  kArmState,
-  kStackGuard,
-  kFlashWrite,
-  kReset,
-  kInterruptNotCleared,
-  kCycles,
-  kLockup,
-  kUnalignedWord,
-  kSupervisor,
-  kUnalignedFloat
-};
 
 TEST(Machine, FloatingPointInHandlersLeavesThreadModeItsRegisters) {
   Emulated run("core", kFloatInHandler);

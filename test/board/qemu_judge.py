@@ -11,7 +11,7 @@ SHARED, WORDS = 0x20020000, 64
 FORCED = 1 << 30
 UNDEFINED, INVALID_STATE, NO_COPROCESSOR, UNALIGNED = 1 << 16, 1 << 17, 1 << 19, 1 << 24
 
-# choice: expected words by index; the numbers of the choices are those of the enumeration in core.cpp.
+# choice: expected words by index; the numbers of the choices are those of the enumeration in choices.hpp.
 EXPECTED = {
     2: {0: 6, 1: 100, 2: 5, 3: 101, 4: 102, 5: 5, 6: 103, 60: 0x600D},
     3: {0: 5, 1: 12, 2: 10, 3: 1000, 4: 11, 5: 200, 60: 0x600D},

@@ -2,25 +2,13 @@
 // A node in small on the emulated board (programs/sensors.cpp): all blocks at once, and one mistake after the other.
 #include "hal/chip/stm32/registers_stm32f412.hpp"
 #include "test/board/emulated.hpp"
+#include "test/board/programs/choices.hpp"
 
 #include <map>
 #include <vector>
 
 namespace tetap::board {
 namespace {
-
-enum Mistake : std::uint32_t {
-  kNone,
-  kPriorityById,
-  kRequestNotCleared,
-  kWatchdogBeforeExercise,
-  kReloadTooSmall,
-  kDataBeforeEmpty,
-  kFifoNotReleased,
-  kSelectEarly,
-  kLoopStalled,
-  kWrongStream
-};
 
 /// 2 edges a millisecond forwards, backwards on the right; a byte each millisecond from the receiver.
 SensorWorld moving() {

@@ -1,31 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // Exceptions, masks, sleep, floating point and faults of the core, one choice each.
+#include "choices.hpp"
 #include "program.hpp"
 
 using namespace program;
+using namespace tetap::board;
 
 namespace {
-
-enum Choice : std::uint32_t {
-  kFloatInHandler = 1,
-  kMasks,
-  kPriorities,
-  kSleep,
-  kUndefined,
-  kUnmapped,
-  kFloatingPointOff,
-  kUnalignedDouble,
-  kArmState,
-  kStackGuard,
-  kFlashWrite,
-  kReset,
-  kInterruptNotCleared,
-  kCycles,
-  kLockup,
-  kUnalignedWord,
-  kSupervisor,
-  kUnalignedFloat,
-};
 
 void enable_fpu() {
   kScs.write(m4::scb::kCpacr, m4::scb::kCp10(3) | m4::scb::kCp11(3));

@@ -1,24 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // A node in small: 96 MHz, SysTick, IMU identity over SPI1, encoders, a serial ring by DMA, CAN frames by interrupt,
 // and a watchdog. Each choice but 0 makes one mistake.
+#include "choices.hpp"
 #include "program.hpp"
 
 using namespace program;
+using namespace tetap::board;
 
 namespace {
 
-enum Mistake : std::uint32_t {
-  kNone,
-  kPriorityById,
-  kRequestNotCleared,
-  kWatchdogBeforeExercise,
-  kReloadTooSmall,
-  kDataBeforeEmpty,
-  kFifoNotReleased,
-  kSelectEarly,
-  kLoopStalled,
-  kWrongStream,
-};
 bool is(Mistake mistake) { return shared().choice == mistake; }
 
 constexpr Mmio kSpi{reg::spi::kSpi1}, kCan{reg::can::kCan1}, kDma{reg::dma::kDma2}, kUsart1{reg::usart::kUsart1},
