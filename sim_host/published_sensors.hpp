@@ -63,14 +63,14 @@ inline void send_only(const Sent& sent, World::Options& world) {
 /// The world with that robot's body, sensors and noise, as its header states them; `parameters` are those.
 inline void simulate(const std::string& robot, const Sent& sent, const param::Parameters& parameters,
                      World::Options& world) {
-  const bool made_from_world = robot.ends_with("_matched");  // sim_host/matched_rover.hpp
+  const bool from_world = robot.ends_with("_matched");  // sim_host/matched_rover.hpp
   simulate(parameters,
-           {.kind = sent.kind, .inertial = sent.inertial, .landmarks = sent.landmarks, .own_noise = !made_from_world},
+           {.kind = sent.kind, .inertial = sent.inertial, .landmarks = sent.landmarks, .own_noise = !from_world},
            world);
 }
 
 /// Names of the faults that act in that world, with a space between each.
-[[nodiscard]] inline std::string faults_that_act(const World::Options& world) {
+[[nodiscard]] inline std::string applicable_faults(const World::Options& world) {
   std::string names;
   for (const FaultInfo& row : fault_table())
     if (can_act(row.fault, world)) (names += names.empty() ? "" : " ") += row.name;
@@ -78,7 +78,7 @@ inline void simulate(const std::string& robot, const Sent& sent, const param::Pa
 }
 
 /// Names of the robots on which that fault acts in that world, with a space between each.
-[[nodiscard]] inline std::string robots_it_acts_on(Fault fault, const World::Options& world) {
+[[nodiscard]] inline std::string applicable_robots(Fault fault, const World::Options& world) {
   std::string names;
   std::istringstream all{kRobotNames};
   for (std::string name; all >> name;) {
@@ -102,9 +102,9 @@ inline void simulate(const std::string& robot, const Sent& sent, const param::Pa
                               : row.falls_on == FallsOn::kGnss      ? "GNSS"
                               : row.falls_on == FallsOn::kLandmarks ? "landmarks"
                                                                     : "magnetometer";
-    const std::string robots = robots_it_acts_on(setting.fault, world);
+    const std::string robots = applicable_robots(setting.fault, world);
     return "fault '" + std::string{row.name} + "': robot " + robot + " has no " + lacks +
-           "; faults that act on it: " + faults_that_act(as_sent) +
+           "; faults that act on it: " + applicable_faults(as_sent) +
            (robots.empty() ? "; in this world it acts on none" : "; robots on which it acts: " + robots);
   }
   return "";

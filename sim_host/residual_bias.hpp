@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What is left of the IMU's biases once the firmware has taken the robot's own calibration out of a sample
-// (src/app/calibrate.hpp): the truth that a published bias is held against.
+// (src/sensor/calibration.hpp): the truth that a published bias is held against.
 #pragma once
 
 #include "param/parameters.hpp"
@@ -13,7 +13,7 @@
 namespace tetap::sim {
 
 namespace detail {
-/// Matrix as param::Numbers has it, row by row.
+/// Matrix as param::Parameters has it, row by row.
 [[nodiscard]] inline Vector3 times(const std::array<float, 9>& m, const Vector3& v) {
   Vector3 product{};
   for (std::size_t i = 0; i < 3; ++i)
@@ -22,9 +22,9 @@ namespace detail {
 }
 }  // namespace detail
 
-/// The truth with biases [rad/s, m/s^2] as they are after `numbers` were taken out, in the robot's body. Level and at
+/// The truth with biases [rad/s, m/s^2] as they are after `parameters` were taken out, in the robot's body. Level and at
 /// rest, as the truth has them: what the accelerometer's matrix makes of gravity is in.
-[[nodiscard]] inline Truth bias_left(Truth t, const param::Parameters& parameters, double temperature_degC) {
+[[nodiscard]] inline Truth residual_bias(Truth t, const param::Parameters& parameters, double temperature_degC) {
   const param::ImuParameters& n = parameters.imu;
   const double warmer = temperature_degC - static_cast<double>(n.gyro_bias_at_degC);
   for (std::size_t i = 0; i < 3; ++i) {

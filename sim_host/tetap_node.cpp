@@ -17,8 +17,8 @@
 
 namespace {
 
-volatile std::sig_atomic_t stop_asked = 0;
-void ask_to_stop(int) { stop_asked = 1; }
+volatile std::sig_atomic_t stop_requested = 0;
+void request_stop(int) { stop_requested = 1; }
 
 std::string help() {
   return R"(usage: tetap-node [OPTION]...
@@ -45,7 +45,7 @@ void run(const std::string& robot, const std::string& interface, const tetap::pa
   tetap::sim::CanAdapter can(bus);
   tetap::sim::HostBoard board(can);
   const auto firmware = tetap::sim::make_firmware<Estimators>(board, parameters, tetap::version());
-  while (stop_asked == 0) {
+  while (stop_requested == 0) {
     firmware->poll();
     bus.wait(tetap::base::Micros{500});
   }
@@ -79,8 +79,8 @@ int main(int argc, char** argv) try {
   const bool boot_line = arguments.flag("--boot-line");
   arguments.finish();
   if (list_robots) return std::printf("%s\n", tetap::sim::kRobotNames.c_str()), 0;
-  std::signal(SIGINT, ask_to_stop);
-  std::signal(SIGTERM, ask_to_stop);
+  std::signal(SIGINT, request_stop);
+  std::signal(SIGTERM, request_stop);
   tetap::sim::for_robot(robot, settings,
                         [&]<class Estimators>(std::type_identity<Estimators>, tetap::param::Parameters parameters) {
                           if (boot_line) return print_boot_line<Estimators>(robot, parameters);

@@ -46,19 +46,19 @@ int record(sim::Arguments& arguments) {
   hal::SocketCan can(interface, {.arrival_times = true});
   sim::Session session(about);
   sim::EpochCollector collector(about.base);
-  sim::RealtimeLedger ledger(session.counts());
+  sim::RealtimeFrameAccounting accounting(session.counts());
   const base::Micros began = hal::monotonic_clock();
   base::Micros written = began;
   while (stop == 0 && (duration.us == 0 || hal::monotonic_clock() - began < duration)) {
     can.wait({100'000});
     while (const auto frame = can.receive()) {
       session.recorder().received(*frame, can.last_arrival());
-      if (collector.is_begin_answer(*frame)) {  // the node starts anew
-        ledger.begin(true);
+      if (collector.is_begin_response(*frame)) {  // the node starts anew
+        accounting.begin(true);
         session.restarted();
       }
       if (const auto epoch = collector.add(*frame)) {
-        ledger.answered(*epoch);
+        accounting.answered(*epoch);
         session.epoch(*epoch, {epoch->head ? static_cast<std::int64_t>(epoch->head->time_us)
                                            : session.recorder().totals().last.us});
       }

@@ -97,7 +97,7 @@ void write_truth(const sim::SessionOptions& about, const param::Parameters& para
   file.write(lockstep ? ",epoch\n" : "\n");
   std::int64_t epoch = 0;
   for (const sim::Truth& seen : source.truth()) {
-    const sim::Truth t = sim::in_frame(sim::bias_left(seen, parameters, temperature_degC), change);
+    const sim::Truth t = sim::in_frame(sim::residual_bias(seen, parameters, temperature_degC), change);
     line.clear();
     line.fixed(t.time.us, 6).text(",").real(t.x_m, 6).text(",").real(t.y_m, 6).text(",").real(t.yaw_rad, 6);
     for (const double x : {t.z_m, t.roll_rad, t.pitch_rad}) line.text(",").real(x, 6);
@@ -114,7 +114,7 @@ struct Run {
   std::uint64_t seed = 1;
   base::Micros limit;
   bool realtime = false;
-  bool told_pose = true;
+  bool initial_pose_estimate = true;
   std::string faults;
   sim::ParameterSettings settings;
   sim::SessionOptions session;
@@ -124,7 +124,7 @@ struct Run {
 template <sim::Link L>
 int drive(L& link, const Run& run) {
   sim::WorldSource source(sim::World(run.world, run.seed), run.session.base, base::Micros{10'000}, run.limit,
-                          run.told_pose);
+                          run.initial_pose_estimate);
   auto about = run.session;
   about.ticks = static_cast<std::uint64_t>(std::min(run.limit, source.world().duration()).us / 10'000);
   sim::Session session(about);
@@ -284,7 +284,7 @@ int main(int argc, char** argv) try {
   run.seed = arguments.integer("--seed", 1, 0, ~std::uint64_t{0});
   run.limit = {static_cast<std::int64_t>(arguments.real("--duration", 86'400, 0.01, 1e7) * 1e6)};
   run.world.mismatched = !arguments.flag("--matched");
-  run.told_pose = !arguments.flag("--no-pose");
+  run.initial_pose_estimate = !arguments.flag("--no-pose");
   for (const std::string& given : arguments.texts("--fault")) {
     const sim::FaultsParsed parsed = sim::parse_faults(given);
     if (!parsed.error.empty()) throw std::runtime_error(parsed.error);
@@ -314,7 +314,7 @@ int main(int argc, char** argv) try {
   const bool list = arguments.flag("--list-faults");
   arguments.finish();
   if (!refused.empty()) throw std::runtime_error(refused);
-  if (list) return std::printf("%s\n", sim::faults_that_act(run.world).c_str()), 0;
+  if (list) return std::printf("%s\n", sim::applicable_faults(run.world).c_str()), 0;
   if (memory) return sim::with_node_in_process(robot, run.settings, base, [&](auto& link) { return drive(link, run); });
   hal::SocketCan can(interface);
   return drive(can, run);

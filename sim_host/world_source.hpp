@@ -16,9 +16,10 @@ namespace tetap::sim {
 
 class WorldSource {
  public:
-  WorldSource(World world, std::uint32_t base, base::Micros period, base::Micros limit, bool told_pose = true)
+  WorldSource(World world, std::uint32_t base, base::Micros period, base::Micros limit,
+              bool initial_pose_estimate = true)
       : world_(std::move(world)),
-        told_pose_(told_pose && !world_.faults().active(Fault::kMovingStart, {})),
+        initial_pose_estimate_(initial_pose_estimate && !world_.faults().active(Fault::kMovingStart, {})),
         base_(base),
         period_(period),
         next_(world_.start() + period),
@@ -50,7 +51,7 @@ class WorldSource {
     const StartPose start = world_.start_pose();
     // Further from the origin than the bus can carry, the robot has to find its place by itself.
     constexpr double kFarthest_m = 67'000;
-    if (!told_pose_ || magnitude(start.x_m) > kFarthest_m || magnitude(start.y_m) > kFarthest_m) return;
+    if (!initial_pose_estimate_ || magnitude(start.x_m) > kFarthest_m || magnitude(start.y_m) > kFarthest_m) return;
     frames_.push_back(
         bus::frame(base_, bus::protect(bus::CmdSetPos{
                               .ctr = 1, .x_raw = millimetres(start.x_m) / 2, .y_raw = millimetres(start.y_m) / 2})));
@@ -63,7 +64,7 @@ class WorldSource {
   static std::int32_t millimetres(double m) { return static_cast<std::int32_t>(std::lround(m * 1000.0)); }
 
   World world_;
-  bool told_pose_;
+  bool initial_pose_estimate_;
   std::uint32_t base_;
   base::Micros period_;
   base::Micros next_;

@@ -85,7 +85,7 @@ class GnssDriver {
   /// A doubtful time of day is not used: then the arrival is all that is known of the time.
   constexpr base::Micros stamp(const Report& r, base::Micros now) {
     if (r.itow_ms) return ubx_clock_.stamp({std::int64_t{*r.itow_ms} * 1000}, now);
-    if (!r.utc.time_valid || r.time_doubtful) return now - settings_.latency;
+    if (!r.utc.time_valid || r.time_uncertain) return now - settings_.latency;
     const std::int64_t s = r.utc.hour * 3600 + r.utc.minute * 60 + r.utc.second;
     return nmea_clock_.stamp({s * 1'000'000 + r.utc.nano / 1000}, now);
   }

@@ -29,7 +29,7 @@ enum class Reason : std::uint8_t {
   kUnread,            ///< a whole message or sentence of a kind that the driver does not read
   kLate,              ///< a message of an epoch that was handed on already
   kRepeated,          ///< a sentence or an NMEA epoch that came twice, equal to the last character
-  kDoubtfulTime,      ///< an NMEA epoch whose time of day another fix has, too: it is reported with that mark
+  kUncertainTime,     ///< an NMEA epoch whose time of day another fix has, too: it is reported with that mark
   kGsaMode,           ///< a GSA whose fix mode another GSA of its epoch betters
   kNoFix,             ///< a place that is no fix: dead reckoning, typed in, simulated or marked as not valid
   kBaseline,          ///< a baseline between two antennas that is no heading

@@ -78,14 +78,14 @@ class GnssReceiver {
       if (message_class == ubx::kClassNav && id == kRelPosNed.id) {
         // On its own: it waits for the reference antenna's data, and the place need not wait with it.
         const auto baseline = ubx::baseline(payload, receiver.settings_.baseline_m, receiver.health_);
-        if (baseline) tell(*baseline);
+        if (baseline) publish(*baseline);
       } else if (message_class == ubx::kClassNav) {
         receiver.ubx_.on_nav(id, payload, receiver.health_, *this);
       } else if (message_class == ubx::kClassAck && id <= 1) {
         if (payload.size() != 2) return receiver.health_.add(Reason::kUbxLength);
-        tell(ubx::Acknowledge{payload[0], payload[1], id == 1});
+        publish(ubx::Acknowledge{payload[0], payload[1], id == 1});
       } else if (message_class == ubx::kClassMon && id == 0x04 && payload.size() >= 40) {
-        tell(ubx::Identified{});
+        publish(ubx::Identified{});
       } else {
         receiver.health_.add(Reason::kUnread);
       }
@@ -107,7 +107,7 @@ class GnssReceiver {
     }
 
     template <class Event>
-    constexpr void tell(const Event& event) {
+    constexpr void publish(const Event& event) {
       if constexpr (requires { handler(event); }) handler(event);
     }
   };

@@ -36,7 +36,7 @@ struct Report {
   bool has_position = false;             ///< the two angles below mean something
   std::optional<std::uint32_t> itow_ms;  ///< GPS time of week; UBX only
   Utc utc{};
-  bool time_doubtful = false;       ///< other fixes have the same time of day: a receiver that cuts fractions off
+  bool time_uncertain = false;      ///< other fixes have the same time of day: a receiver that cuts fractions off
   std::int64_t latitude_2ndeg = 0;  ///< units of 2e-9 deg, WGS84
   std::int64_t longitude_2ndeg = 0;
   float height_m = base::kNan;      ///< above the ellipsoid

@@ -46,10 +46,10 @@ class ClockMap {
   constexpr bool observe(std::int64_t ticks, base::Micros now) {
     const std::int64_t late_us = (now - time(ticks)).us;
     if (late_us < -(rate_known_ ? kSettled_us : kUnsettled_us)) return false;
-    const std::int64_t doubted_us = doubted_us_;
-    doubted_us_ = late_us < -kDoubt_us ? late_us : 0;
-    if (late_us < -kDoubt_us && doubted_us >= -kDoubt_us) return true;  // one stamp alone moves nothing by so much
-    if (late_us < 0) {                                                  // it would have been read before it existed
+    const std::int64_t suspect_us = suspect_us_;
+    suspect_us_ = late_us < -kSuspect_us ? late_us : 0;
+    if (late_us < -kSuspect_us && suspect_us >= -kSuspect_us) return true;  // one stamp alone moves nothing by so much
+    if (late_us < 0) {                                                      // it would have been read before it existed
       anchor_ += base::Micros{late_us};
       pulled_us_ += late_us;
       least_us_ = 0;
@@ -75,7 +75,7 @@ class ClockMap {
   static constexpr std::int64_t kLimitParts = 16;  // 6 %
   static constexpr std::int64_t kUnsettled_us = 20'000;
   static constexpr std::int64_t kSettled_us = 1'000;
-  static constexpr std::int64_t kDoubt_us = 5'000;
+  static constexpr std::int64_t kSuspect_us = 5'000;
   static constexpr std::int64_t kLost_us = 3'000;  ///< no reading of a window closer than that: learn anew
   static constexpr std::int64_t kNone_us = 1'000'000;
 
@@ -125,7 +125,7 @@ class ClockMap {
   std::int64_t window_us_ = kFirstWindow_us;
   std::int64_t least_us_ = kNone_us;  ///< the lowest pair of the window, above the line
   std::int64_t pulled_us_ = 0;        ///< sum by which the line was pulled down within the window
-  std::int64_t doubted_us_ = 0;
+  std::int64_t suspect_us_ = 0;
   bool running_ = false;
   bool rate_known_ = false;  ///< once settled
 };

@@ -10,9 +10,9 @@ ArkCannode::ArkCannode(const BoardOptions& options, SensorWorld world)
     : chip(options.oscillators),
       imu(chip.scheduler, chip.complaints, options.imu),
       world_(std::move(world)),
-      gnss_(chip.scheduler, [this] { ask_gnss(); }) {
+      gnss_(chip.scheduler, [this] { poll_gnss(); }) {
   imu.world = world_.imu;
-  if (options.imu_there) {
+  if (options.imu_present) {
     imu.on_int1 = [this](bool level) { chip.pins.drive(kImuReady, level); };
     chip.spi1.connect(imu, kImuSelect, chip.pins);
   }
@@ -30,7 +30,7 @@ ArkCannode::ArkCannode(const BoardOptions& options, SensorWorld world)
 void ArkCannode::unplug_encoders() { chip.tim2.position = chip.tim3.position = nullptr; }
 
 // Either a byte begins now, or the receiver is asked for the next one.
-void ArkCannode::ask_gnss() {
+void ArkCannode::poll_gnss() {
   const Picoseconds now = chip.scheduler.now();
   if (next_.begin == now) {
     if (gnss_plugged_) chip.usart1.arrive(next_.byte, next_.baud);

@@ -15,7 +15,7 @@ namespace tetap::board {
 struct BoardOptions {
   Oscillators oscillators;
   Icm42688Options imu;
-  bool imu_there = true;
+  bool imu_present = true;
 };
 
 class ArkCannode {
@@ -38,7 +38,7 @@ class ArkCannode {
   void unplug_gnss() { gnss_plugged_ = false; }
 
  private:
-  void ask_gnss();
+  void poll_gnss();
   SensorWorld world_;
   Alarm gnss_;
   SensorWorld::GnssByte next_{};

@@ -209,8 +209,8 @@ void Can::write_mcr(std::uint32_t value) {
 }
 
 void Can::change_mode() {
-  const bool wants_initialisation = reg::mcr::kInrq.of(mcr_) != 0, wants_sleep = reg::mcr::kSleep.of(mcr_) != 0;
-  if (!wants_initialisation && !wants_sleep && mode_ != Mode::kNormal) {
+  const bool init_requested = reg::mcr::kInrq.of(mcr_) != 0, sleep_requested = reg::mcr::kSleep.of(mcr_) != 0;
+  if (!init_requested && !sleep_requested && mode_ != Mode::kNormal) {
     if (!pins_.carries(kRx, Signal::kCan1Rx)) {
       mode_change_.clear();
       return complain("CAN1_RX never sees eleven recessive bits: " + pins_.describe(kRx));

@@ -46,7 +46,7 @@ Options parse(sim::Arguments& arguments) {
   options.board.oscillators.lsi_hz = static_cast<std::int64_t>(arguments.integer("--lsi", 32'000, 17'000, 47'000));
   options.board.imu.clock_error = 1e-6 * arguments.real("--imu-clock-ppm", 0, -50'000, 50'000);
   options.board.oscillators.crystal = !arguments.flag("--no-crystal");
-  options.board.imu_there = !arguments.flag("--no-imu");
+  options.board.imu_present = !arguments.flag("--no-imu");
   options.partner = !arguments.flag("--no-partner");
   options.machine.check_alignment = arguments.flag("--check-alignment");
   const auto image = arguments.positional();

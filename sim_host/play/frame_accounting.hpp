@@ -38,9 +38,9 @@ inline void account_frames(const NodeEpoch& epoch, Counts& counts) {
 }
 
 /// For lockstep: every tick that was asked for is waited for.
-class LockstepLedger {
+class LockstepFrameAccounting {
  public:
-  explicit LockstepLedger(Counts& counts) : counts_(counts) {}
+  explicit LockstepFrameAccounting(Counts& counts) : counts_(counts) {}
 
   /// The node starts anew: its counters begin at 0.
   void begin() {
@@ -112,9 +112,9 @@ class LockstepLedger {
 };
 
 /// For a node that ticks on its own: totals are compared at the end.
-class RealtimeLedger {
+class RealtimeFrameAccounting {
  public:
-  explicit RealtimeLedger(Counts& counts) : counts_(counts) {}
+  explicit RealtimeFrameAccounting(Counts& counts) : counts_(counts) {}
 
   /// `started`: the node began at 0 with a Begin frame; else the first epoch is where counting starts.
   void begin(bool started) {

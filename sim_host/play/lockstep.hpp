@@ -21,12 +21,12 @@ struct LockstepOptions {
 template <Link L, Source S, Sink K>
 void play_lockstep(L& link, S& source, K& sink, const LockstepOptions& options, Counts& counts) {
   NodeLink<L, K> node(link, sink, options.base, counts);
-  LockstepLedger ledger(counts);
+  LockstepFrameAccounting accounting(counts);
 
   const auto send = [&](const Tick& tick) {
     if (tick.begin) {
       node.begin(*tick.begin, options.patience);
-      ledger.begin();
+      accounting.begin();
     }
     std::size_t sent = 0;
     for (const base::CanFrame& frame : tick.inputs) {
@@ -36,11 +36,11 @@ void play_lockstep(L& link, S& source, K& sink, const LockstepOptions& options, 
       hal::sleep_for(options.burst_gap);
     }
     node.sync(bus::SyncKind::kStep, tick.time);
-    ledger.asked(tick.inputs.size(), tick.time);
+    accounting.asked(tick.inputs.size(), tick.time);
   };
   const auto receive = [&] {
     node.drain([&](const NodeEpoch& epoch) {
-      if (const auto time = ledger.answered(epoch)) sink.epoch(epoch, *time);
+      if (const auto time = accounting.answered(epoch)) sink.epoch(epoch, *time);
     });
   };
 
@@ -48,9 +48,9 @@ void play_lockstep(L& link, S& source, K& sink, const LockstepOptions& options, 
   bool more = source.next(tick);
   constexpr base::Micros kNever{-1};
   base::Micros quiet_since = kNever;
-  while (more || ledger.in_flight() > 0) {
-    if (ledger.in_flight() <= options.window / 2) {  // refill in groups: fewer wake-ups on both sides
-      while (more && ledger.in_flight() < options.window && (!tick.begin || ledger.in_flight() == 0)) {
+  while (more || accounting.in_flight() > 0) {
+    if (accounting.in_flight() <= options.window / 2) {  // refill in groups: fewer wake-ups on both sides
+      while (more && accounting.in_flight() < options.window && (!tick.begin || accounting.in_flight() == 0)) {
         send(tick);
         more = source.next(tick);
       }
@@ -70,7 +70,7 @@ void play_lockstep(L& link, S& source, K& sink, const LockstepOptions& options, 
     if (quiet_since == kNever) quiet_since = now;
     if (now - quiet_since < options.patience.epoch) continue;
     const bool begun = node.collector().head().has_value() || !node.collector().idle();
-    throw RunError("no answer to the tick at " + in_seconds(ledger.oldest()) + " within " +
+    throw RunError("no answer to the tick at " + in_seconds(accounting.oldest()) + " within " +
                    in_seconds(options.patience.epoch) + ": " +
                    (begun ? "the epoch's last frame (Est_StateCrc) is missing, " +
                                 std::to_string(node.collector().received()) + " of its frames came"

@@ -84,7 +84,7 @@ class NodeLink {
     bool is = false;
     while (const auto frame = link_.receive()) {
       sink_.received(*frame);
-      is = is || collector_.is_begin_answer(*frame);
+      is = is || collector_.is_begin_response(*frame);
       static_cast<void>(collector_.add(*frame));
     }
     return is;

@@ -118,13 +118,14 @@ class Survey {
     } else if (is_tick(entry.frame, base_)) {
       ++own_ticks_;
     } else if (offset_in_block(entry.frame, base_) == bus::EstStateCrc::kOffset) {
-      node_speaks_ = true;
+      has_node_frames_ = true;
     }
     if (surveys_record_) repeatable([&] { record_.add(entry); });
   }
 
   void finish(PlayOptions& options, SurveyedLog& log) {
-    if (options.mode == PlayMode::kAutomatic) options.mode = node_speaks_ ? PlayMode::kAsRecorded : PlayMode::kLockstep;
+    if (options.mode == PlayMode::kAutomatic)
+      options.mode = has_node_frames_ ? PlayMode::kAsRecorded : PlayMode::kLockstep;
     log.has_ticks = own_ticks_ > 0;
     log.inputs = inputs_;
     log.ticks = log.has_ticks ? own_ticks_ : grid_ticks_ + (grid_.last() ? 1 : 0);
@@ -147,7 +148,7 @@ class Survey {
   std::uint32_t base_;
   TickGrid grid_;
   RecordSurvey record_;
-  bool surveys_record_ = false, node_speaks_ = false;
+  bool surveys_record_ = false, has_node_frames_ = false;
   std::uint64_t inputs_ = 0, own_ticks_ = 0, grid_ticks_ = 0;
   std::string refusal_;
 };

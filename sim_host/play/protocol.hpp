@@ -73,14 +73,14 @@ class EpochCollector {
 
   /// Between two epochs: the answer to a Begin frame comes only then.
   [[nodiscard]] bool idle() const { return received_ == 0; }
-  [[nodiscard]] bool is_begin_answer(const base::CanFrame& frame) const {
+  [[nodiscard]] bool is_begin_response(const base::CanFrame& frame) const {
     return idle() && frame.id == base_ + bus::EstVersion::kOffset && !frame.extended;
   }
 
   /// A frame from the bus; the finished epoch when this was its last one. Frames of others are ignored.
   std::optional<NodeEpoch> add(const base::CanFrame& frame) {
     const auto offset = offset_in_block(frame, base_);
-    if (!offset || *offset < kInputOffsets || is_begin_answer(frame)) return std::nullopt;
+    if (!offset || *offset < kInputOffsets || is_begin_response(frame)) return std::nullopt;
     if (*offset == bus::EstEpoch::kOffset) begin(bus::decode<bus::EstEpoch>(bus::payload(frame)));
     if (received_ < frames_.size()) frames_[received_] = frame;
     ++received_;

@@ -28,24 +28,24 @@ void play_realtime(L& link, std::span<const TimedFrame> frames, K& sink, const R
                    Counts& counts) {
   if (frames.empty()) return;
   NodeLink<L, K> node(link, sink, options.base, counts);
-  RealtimeLedger ledger(counts);
+  RealtimeFrameAccounting accounting(counts);
   const base::Micros period = options.period;
   base::Micros tick{std::max((frames.front().time.us + period.us - 1) / period.us, std::int64_t{1}) * period.us};
   const base::Micros end = std::max(frames.back().time + period, tick);
   base::Micros last_answer = hal::monotonic_clock();
   const auto receive = [&](base::Micros reference) {
     node.drain([&](const NodeEpoch& epoch) {
-      ledger.answered(epoch);
+      accounting.answered(epoch);
       last_answer = hal::monotonic_clock();
       sink.epoch(epoch, epoch.head ? extend_bus_time(epoch.head->time_us, reference) : reference);
     });
   };
 
-  ledger.begin(options.begin);
+  accounting.begin(options.begin);
   if (options.begin) {
     node.begin(tick - period, options.patience);
   } else {
-    while (!ledger.known()) {
+    while (!accounting.known()) {
       if (hal::monotonic_clock() - last_answer > options.patience.begin)
         throw RunError("no node is ticking on this bus");
       link.wait({20'000});
@@ -81,7 +81,7 @@ void play_realtime(L& link, std::span<const TimedFrame> frames, K& sink, const R
     link.flush();
     receive(now);
     const bool all_sent = next == frames.size() && (options.sync == Sync::kClock || tick > end);
-    if (all_sent && now > end + period && ledger.consumed() == counts.inputs) break;
+    if (all_sent && now > end + period && accounting.consumed() == counts.inputs) break;
     if (hal::monotonic_clock() - last_answer > options.patience.epoch + period)
       throw RunError("the node has not ticked for " + in_seconds(options.patience.epoch) + ", at " + in_seconds(now) +
                      " of the log");
@@ -91,7 +91,7 @@ void play_realtime(L& link, std::span<const TimedFrame> frames, K& sink, const R
     if (until.us > 0) link.wait(until);
     receive(now);
   }
-  ledger.close();
+  accounting.close();
   counts.overflows = link.faults().rx_overflow;
 }
 

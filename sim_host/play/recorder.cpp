@@ -100,7 +100,7 @@ void Recorder::epoch(const NodeEpoch& epoch, base::Micros time) {
   for (std::size_t k = 0; k < instances_.size(); ++k)
     if (instances_[k].position) estimate_row(k, instances_[k]);
   for (std::size_t k = 0; k < states_now_.size(); ++k)
-    if (states_now_[k].said) state_row(k, states_now_[k]);
+    if (states_now_[k].reported) state_row(k, states_now_[k]);
 }
 
 void Recorder::frame(const base::CanFrame& f) {
@@ -136,10 +136,10 @@ void Recorder::frame(const base::CanFrame& f) {
 }
 
 void Recorder::state(State& state, std::uint32_t offset, std::span<const std::uint8_t> payload) {
-  if (!state.said) state.values.fill(kNone);
+  if (!state.reported) state.values.fill(kNone);
   const auto put = [&state](std::size_t column, auto... values) {
     for (const double value : {static_cast<double>(values)...}) state.values[column++] = value;
-    state.said = true;
+    state.reported = true;
   };
   const auto page = [&]<class Page>(std::size_t column, auto Page::*... fields) {
     if (const auto found = bus::decode<Page>(payload)) put(column, (*found).*fields...);

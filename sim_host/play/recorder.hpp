@@ -69,7 +69,7 @@ class Recorder {
   struct State {
     static constexpr std::size_t kColumns = 49;
     std::array<double, kColumns> values{};
-    bool said = false;
+    bool reported = false;
   };
   void frame(const base::CanFrame& frame);
   void estimate_row(std::size_t k, const Instance& instance);

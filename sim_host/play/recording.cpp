@@ -36,7 +36,7 @@ RecordReader::Found RecordReader::add(const TimedFrame& entry) {
       pending_ = Begin{extend_bus_time(sync->time_us, entry.time), inputs_};
     return found;
   }
-  if (pending_ && collector_.is_begin_answer(frame)) {
+  if (pending_ && collector_.is_begin_response(frame)) {
     found.new_life = std::exchange(pending_, std::nullopt);
     begun_ = true;
     skips_ = false;
@@ -116,7 +116,7 @@ void RecordSurvey::start_at(std::uint64_t input) {
 }
 
 /// Whether the node's tally of its first epochs is that of the inputs from `start` on, none of them behind `end`.
-bool RecordSurvey::agrees_from(std::size_t start, std::size_t end) const {
+bool RecordSurvey::match_begin(std::size_t start, std::size_t end) const {
   bus::InputCrc tally;
   for (std::size_t e = 0; e < waiting_.size() && e < kEnough; ++e) {
     while (static_cast<std::uint16_t>(tally.count()) != waiting_[e].in_count) {
@@ -131,8 +131,8 @@ bool RecordSurvey::agrees_from(std::size_t start, std::size_t end) const {
 
 /// Where in the log the node's consumption begins. With a Begin frame that is known; a node that was switched on while
 /// frames were flowing took some of those before its first epoch, and its own CRC of them shows which.
-void RecordSurvey::find_start(std::uint64_t end, bool life_is_over) {
-  if (!life_is_over) {
+void RecordSurvey::find_start(std::uint64_t end, bool power_cycle_ended) {
+  if (!power_cycle_ended) {
     if (waiting_.size() < kEnough) return;
     std::uint64_t needed = *best_;
     std::uint16_t count = 0;
@@ -141,13 +141,13 @@ void RecordSurvey::find_start(std::uint64_t end, bool life_is_over) {
     if (needed > end) return;
   }
   for (std::size_t start = *best_ + 1; start-- > 0;)
-    if (agrees_from(start, end)) return start_at(start);
+    if (match_begin(start, end)) return start_at(start);
   start_at(*best_);
 }
 
 /// Takes every input before `end` that a waiting epoch counted as consumed.
-void RecordSurvey::follow_until(std::uint64_t end, bool life_is_over) {
-  if (!started_) find_start(end, life_is_over);
+void RecordSurvey::follow_until(std::uint64_t end, bool power_cycle_ended) {
+  if (!started_) find_start(end, power_cycle_ended);
   if (!started_) return;
   for (; !waiting_.empty(); waiting_.pop_front()) {
     const Entry& entry = waiting_.front();

@@ -102,9 +102,9 @@ class RecordSurvey {
   void start_life(const RecordReader::Begin& begin);
   void start_at(std::uint64_t input);
   void add_epoch(const NodeEpoch& epoch);
-  [[nodiscard]] bool agrees_from(std::size_t start, std::size_t end) const;
-  void find_start(std::uint64_t end, bool life_is_over);
-  void follow_until(std::uint64_t end, bool life_is_over);
+  [[nodiscard]] bool match_begin(std::size_t start, std::size_t end) const;
+  void find_start(std::uint64_t end, bool power_cycle_ended);
+  void follow_until(std::uint64_t end, bool power_cycle_ended);
   void close_life(std::uint64_t end);
 
   RecordReader reader_;

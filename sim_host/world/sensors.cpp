@@ -265,10 +265,10 @@ Gnss::Reading Gnss::sample(const Truth& truth, base::Micros now, const Faults& f
   if (lost && !silent && far_fixes_++ < FaultNumbers::kFarFixes) error_m[0] -= FaultNumbers::kFar_m;
   if (faults.active(Fault::kGnssWrongHeight, now)) error_m[2] += FaultNumbers::kHeight_m;
 
-  const double believed = clamp(1 + accuracy_.value(), 0.5, 2);
+  const double assumed = clamp(1 + accuracy_.value(), 0.5, 2);
   const double sigma_m =
       sim::sqrt(parameters_.white_m * parameters_.white_m + parameters_.correlated_m * parameters_.correlated_m) *
-      believed * parameters_.accuracy_scale;
+      assumed * parameters_.accuracy_scale;
   const GeodeticPoint point = earth_->geodetic(antenna_n_m + axes * error_m);
   Reading reading;
   reading.position = sensor::GnssPosition{.latitude_2ndeg = point.latitude_2ndeg,
@@ -280,7 +280,7 @@ Gnss::Reading Gnss::sample(const Truth& truth, base::Micros now, const Faults& f
                                           .satellites = 14};
   const Vector3 v = axes.transposed() * (truth.v_n_mps + swing_n) + velocity_noise;
   reading.velocity = sensor::GnssVelocity{.v_n_mps = {single(v[0]), single(v[1]), single(v[2])},
-                                          .acc_mps = single(parameters_.velocity_mps * believed)};
+                                          .acc_mps = single(parameters_.velocity_mps * assumed)};
 
   if (now < outage_until_ && last_.position) {
     // A receiver that lost the sky goes on talking: its last position, and the word that it is none.

@@ -37,7 +37,7 @@ class Commands {
         ++counters.command_refused;
       }
   }
-  void forget() { halves_ = {}; }
+  void discard() { halves_ = {}; }
 
  private:
   /// A set-pose command of which one frame is there.

@@ -46,9 +46,9 @@ class Decoder {
     commands_.expire(now, patience, counters);
   }
   /// Time has jumped: whatever is half belongs to another time.
-  void forget(Counters& counters) {
-    assembly_.forget(counters);
-    commands_.forget();
+  void discard(Counters& counters) {
+    assembly_.discard(counters);
+    commands_.discard();
   }
 
  private:

@@ -49,6 +49,12 @@ class EventQueue {
   std::size_t first_ = 0;  ///< begin of the ordered events since the last tick; within a tick there are none
 };
 
+/// Statistic of the test that decided, over its limit: of the failed check, else of the innovation gate.
+[[nodiscard]] constexpr float ratio_of(const estimators::Innovation& innovation) {
+  if (innovation.limit > 0.0F) return innovation.statistic / innovation.limit;
+  return innovation.gate > 0.0F ? innovation.nis / innovation.gate : base::kNan;
+}
+
 inline void EventQueue::add(const estimators::Innovation& innovation, const sensor::Sample& sample,
                             std::size_t instance, base::Micros now, Counters& counters) {
   const bus::EstInnov message{.estimator = static_cast<std::uint8_t>(instance),
@@ -58,7 +64,7 @@ inline void EventQueue::add(const estimators::Innovation& innovation, const sens
                               .dof = innovation.dof,
                               .age_s = base::seconds(now - sample.stamp),
                               .nis = innovation.dof > 0 ? innovation.nis : base::kNan,
-                              .ratio = innovation.gate > 0.0F ? innovation.nis / innovation.gate : base::kNan,
+                              .ratio = ratio_of(innovation),
                               .id = innovation.landmark,
                               .check = innovation.failed,
                               .epoch = 0};

@@ -79,7 +79,7 @@ class Publisher {
   }
 
   /// This estimator's 1 sigma go out in this epoch: the motion's variance is needed then.
-  [[nodiscard]] bool says_sigma(std::size_t instance, bool primary) const {
+  [[nodiscard]] bool publishes_sigma(std::size_t instance, bool primary) const {
     const param::PublishParameters& p = parameters_.publish;
     return primary ? every(p.std_every, kTogether) : every(p.side_every, side(instance));
   }
@@ -165,7 +165,7 @@ void Publisher<N>::estimate(std::size_t instance, sensor::EstimatorKind kind, bo
                        .vel_valid = e.velocity_valid},
         send, instance);
   }
-  if (says_sigma(instance, primary)) {
+  if (publishes_sigma(instance, primary)) {
     const float x = base::sqrt(e.p(0, 0));
     const float y = base::sqrt(e.p(1, 1));
     const float yaw = base::sqrt(e.p(2, 2));

@@ -28,7 +28,7 @@ class Reassembly {
       if (partial.missing != 0 && (now - partial.since > patience || partial.since > now)) give_up(partial, counters);
   }
   /// Time has jumped: whatever is half belongs to another time.
-  void forget(Counters& counters) {
+  void discard(Counters& counters) {
     for (Partial& partial : partials_)
       if (partial.missing != 0) give_up(partial, counters);
   }

@@ -36,7 +36,7 @@ class MagneticFieldCheck {
   /// as long.
   [[nodiscard]] bool trusted() const { return !distrusted_; }
   /// Samples come, are not trusted, and may have led the heading astray.
-  [[nodiscard]] bool may_mislead(base::Micros at) const { return distrusted_ && !older(last_, at, kGap); }
+  [[nodiscard]] bool is_suspect(base::Micros at) const { return distrusted_ && !older(last_, at, kGap); }
   /// True: the magnetometer contradicted for that long, or agreed for as long while it was not trusted.
   [[nodiscard]] bool trust_changes(bool agrees, base::Micros stamp, base::Micros after) {
     if (agrees == trusted()) unchanged_since_ = stamp;

@@ -37,11 +37,6 @@ class Persistence {
     if (count_ < kMost) ++count_;
   }
   constexpr void reset() { *this = {}; }
-  /// The time that counts begins at `stamp`; the number of tests stays.
-  constexpr void postpone(base::Micros stamp) {
-    since_ = stamp;
-    span_us_ = 0;
-  }
 
   /// Tests in a row that held.
   [[nodiscard]] constexpr std::int32_t count() const { return count_; }

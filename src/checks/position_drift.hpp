@@ -25,12 +25,12 @@ class PositionDrift {
   }
   /// The receiver's velocity agreed with the filter: it vouches for the filter at the next few fixes, for fixes may
   /// come more often than velocities. Each call takes one of them.
-  [[nodiscard]] bool take_vouch() {
-    if (vouches_ == 0) return false;
-    --vouches_;
+  [[nodiscard]] bool consume_velocity_agreement() {
+    if (agreements_left_ == 0) return false;
+    --agreements_left_;
     return true;
   }
-  void velocity(bool agrees) { vouches_ = agrees ? kFixesOfAVelocity : std::uint8_t{0}; }
+  void velocity(bool agrees) { agreements_left_ = agrees ? kFixesOfAVelocity : std::uint8_t{0}; }
   void reset() { *this = {}; }
 
   template <class Sink>
@@ -39,7 +39,7 @@ class PositionDrift {
       sink(mean[0]);
       sink(mean[1]);
     }
-    sink(static_cast<std::uint32_t>(vouches_));
+    sink(static_cast<std::uint32_t>(agreements_left_));
   }
 
  private:
@@ -55,7 +55,7 @@ class PositionDrift {
   }
 
   Mean fast_m_{}, slow_m_{};
-  std::uint8_t vouches_ = 0;  ///< fixes for which a velocity still vouches
+  std::uint8_t agreements_left_ = 0;  ///< fixes for which a velocity still vouches
 };
 
 }  // namespace tetap::checks

@@ -18,7 +18,8 @@ Innovation Attitude::fuse(const sensor::ImuSample& sample, base::Micros stamp, c
   const auto verdict =
       filter_.step(rate, per_s * body(sample.dvelocity_b_mps), base::seconds(gap && !lost ? span : interval),
                    {.gyroscope = sample.clipped_gyro > 0, .accelerometer = sample.clipped_accel > 0});
-  if (verdict == filter::AttitudeVerdict::kRefused) return {.verdict = sensor::Verdict::kNotFinite};
+  if (verdict == filter::AttitudeVerdict::kRefused)
+    return {.verdict = sensor::Verdict::kNotFinite, .failed = sensor::Check::kValue};
   // The turn in a gap is unknown by the rate before it and by the rate that the inertial filter assumes in gaps.
   if (lost) {
     const float unseen_radps = n.gap_radps + base::sqrt(filter::dot(rate_b_radps_, rate_b_radps_));
@@ -38,9 +39,11 @@ Innovation Attitude::fuse(const sensor::MagneticFlux& sample, base::Micros stamp
   const filter::Vector3 then = field + filter::cross(later_s * (rate_b_radps_ - filter_.bias_b_radps()), field);
   constexpr base::Micros kFirst{10'000};
   const base::Micros since = filter_.heading_known() ? stamp - field_time_ : kFirst;
-  if (!filter_.magnetometer(then, base::seconds(since))) return {.verdict = sensor::Verdict::kNotFinite};
+  if (!filter_.magnetometer(then, base::seconds(since)))
+    return {.verdict = sensor::Verdict::kNotFinite, .failed = sensor::Check::kValue};
   field_time_ = stamp;
-  return {.verdict = filter_.magnetometer_disturbed() ? sensor::Verdict::kRejected : sensor::Verdict::kAccepted};
+  if (filter_.magnetometer_disturbed()) return {.verdict = sensor::Verdict::kRejected, .failed = sensor::Check::kField};
+  return {.verdict = sensor::Verdict::kAccepted};
 }
 
 /// The turns of the window in the sensor's axes, one after the other, and into the body's at the end. (1 - h^2/3, h)

@@ -9,7 +9,7 @@
 
 namespace tetap::estimators {
 
-/// Only<Inertial, ImuSample, GnssPosition>: of E's fuse() those for the payloads named.
+/// WithSensors<Inertial, ImuSample, GnssPosition>: of E's fuse() those for the payloads named.
 template <class E, class... Payloads>
 class WithSensors : public E {
  public:

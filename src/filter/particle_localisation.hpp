@@ -43,7 +43,7 @@ struct LocalisationOptions {
   float bandwidth = 0.3F;       ///< kernel after resampling, in standard deviations
   float lost_below = 0.3F;      ///< mean likelihood of a sighting, its largest being 1: the search begins
   float found_above = 0.5F;     ///< the search ends
-  float doubt_gain = 0.1F;      ///< low-pass on the mean likelihood, per batch, while there is a track
+  float injection_gain = 0.1F;  ///< low-pass on the mean likelihood, per batch, while there is a track
   float search_gain = 0.2F;     ///< the same while there is none
   float inject_share = 0.2F;    ///< particles replaced at each batch while lost
   float kld_error = 0.05F;      ///< Kullback-Leibler distance
@@ -92,7 +92,7 @@ class ParticleLocalisation {
     float evidence = 0.0F;
     for (const LandmarkSeen& one : seen) evidence += weigh(one, map);
     const float mean = base::exp(evidence / static_cast<float>(static_cast<std::int32_t>(seen.size())));
-    likelihood_ += (lost_ ? options.search_gain : options.doubt_gain) * (mean - likelihood_);
+    likelihood_ += (lost_ ? options.search_gain : options.injection_gain) * (mean - likelihood_);
     lost_ = likelihood_ < (lost_ ? options.found_above : options.lost_below);
     if (lost_) {
       resample(kMost);

@@ -30,10 +30,10 @@ struct OdometryErrorSources {
     const float d = size_of(distance_m);
     const float per_track2 = 1.0F / (track_m * track_m);
     filter::Symmetric<float, 3> p;
-    const auto heading_that_stays = sigma_heading_rad * sigma_heading_rad;  // beside = d * heading
-    p(1, 1) += heading_that_stays * d * d;
-    p(1, 2) += heading_that_stays * d;
-    p(2, 2) += heading_that_stays;
+    const auto persistent_heading_variance = sigma_heading_rad * sigma_heading_rad;  // beside = d * heading
+    p(1, 1) += persistent_heading_variance * d * d;
+    p(1, 2) += persistent_heading_variance * d;
+    p(2, 2) += persistent_heading_variance;
     const float curvature = wheel_difference * wheel_difference * per_track2;  // beside = curvature d^2 / 2
     p(1, 1) += curvature * d * d * d * d * 0.25F;
     p(1, 2) += curvature * d * d * d * 0.5F;

@@ -31,7 +31,7 @@ class GyroScaleConsider {
     return more_rad2 > 0.0F ? scale * scale * more_rad2 : 0.0F;
   }
   /// A measurement has left so much of the heading's variance.
-  void told(float left) {
+  void heading_measured(float left) {
     if (!(left >= 0.0F && left < 1.0F)) return;
     with_heading_rad_ *= left;
     credit_rad2_ *= left * left;

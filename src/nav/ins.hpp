@@ -68,10 +68,10 @@ class Ins {
         noise_over(pending_, pending_.dt_s, turned_.turn(pending_turn_rad(), noise.gyro_scale));
     if (step.keep_b_a < 1.0F) x.b_a_mps2 *= step.keep_b_a;
     if (step.keep_b_g < 1.0F) x.b_g_radps *= step.keep_b_g;
-    if (noise.motion_sigma > 0.0F) keep_motion(step);
+    if (noise.motion_sigma > 0.0F) shrink_motion(step);
     const auto passed = static_cast<std::uint16_t>(pending_.dt_s < 1.0F ? pending_.dt_s * kHeldPerS : kHeld);
     held_ = held_ > passed ? static_cast<std::uint16_t>(held_ - passed) : std::uint16_t{0};
-    doubt_bias_up(step.dt_s);
+    inflate_vertical_bias(step.dt_s);
     nav::predict_covariance(p, step);
     pending_ = {};
     maintain();
@@ -96,7 +96,7 @@ class Ins {
   void place(const base::Anchored& east, const base::Anchored& north, float sigma_m) {
     x.x = east, x.y = north;
     for (const int i : {InsState::kPosition, InsState::kPosition + 1}) reset(i, sigma_m * sigma_m);
-    condition(p, watch_);
+    condition(p, condition_monitor_);
   }
 
   /// A gap in the increments: the velocity is kept, and the noise is that of a robot that may have done anything of
@@ -115,7 +115,7 @@ class Ins {
       pending_.dv_n_mps = Vector3::Zero();
     }
     accel_n_mps2 = Vector3::Zero();
-    condition(p, watch_);
+    condition(p, condition_monitor_);
   }
   /// Turn of the body in such a gap, if something else shows it; in the navigation frame.
   void turn_without_imu(const Quaternion& turn) {
@@ -167,7 +167,7 @@ class Ins {
     for (int j = 0; j < kErrors; ++j) p(error, j) = 0.0F;
     p(error, error) = variance;
   }
-  void recondition() { condition(p, watch_); }
+  void recondition() { condition(p, condition_monitor_); }
 
   /// Update by the gyroscope's mean over a standstill whose noise is also in the heading: `shared` is the covariance of
   /// the two per axis of the bias, `wander` the variance of each bias's walk since the mean (Bar-Shalom, Li,
@@ -235,23 +235,23 @@ class Ins {
     }
     if (result.innovation.verdict != filter::Verdict::kAccepted) return result.innovation;
     // Measurements of biases alone leave the scale's share in the heading; measurements in the body show no heading.
-    constexpr bool kTellsHeading = std::any_of(Measurement::kTouches.begin(), Measurement::kTouches.end(),
-                                               [](int touched) { return touched < InsState::kAccelBias; });
+    constexpr bool kObservesHeading = std::any_of(Measurement::kTouches.begin(), Measurement::kTouches.end(),
+                                                  [](int touched) { return touched < InsState::kAccelBias; });
     constexpr bool kInBody = requires { measurement.moves; };
-    if constexpr (kTellsHeading) turned_.told(p(kYaw, kYaw) / yaw_rad2);
+    if constexpr (kObservesHeading) turned_.heading_measured(p(kYaw, kYaw) / yaw_rad2);
     bool turned = false;
-    if constexpr (kTellsHeading && !kInBody) turned = turn_tilt(result.dx);
+    if constexpr (kObservesHeading && !kInBody) turned = turn_tilt(result.dx);
     x.correct(result.dx);
     if constexpr (kInBody)
       if (measurement.moves) held_ = kHeld;
     if (held_ > 0) move_errors(result.dx.template segment<3>(InsState::kVelocity));
-    if ((result.sharp || turned) && !condition(p, watch_)) note_conditioned();
+    if ((result.sharp || turned) && !condition(p, condition_monitor_)) note_conditioned();
     return result.innovation;
   }
 
   bool start_with_p(const InsState& at) {
     x = at;
-    condition(p, watch_);
+    condition(p, condition_monitor_);
     pending_ = {};
     turned_ = {};
     stands = false;
@@ -306,7 +306,7 @@ class Ins {
   /// theta x (dv + noise), and every noisy sample looks like a known push whose direction was then observed. The
   /// horizontal part of dv in F shrinks by the share of its energy that noise explains (James & Stein 1961). Not where
   /// v is held in the body: there that noise is taken back, and of a gentle curve every sample alone passes for noise.
-  void keep_motion(InsCovarianceStep<float>& step) const {
+  void shrink_motion(InsCovarianceStep<float>& step) const {
     if (held_ > 0 && !stands) return;
     const Vector3 rest = (earth.gravity_mps2 * step.dt_s) * earth.up_n;
     const float east = step.dv_n_mps(0) - rest(0), north = step.dv_n_mps(1) - rest(1),
@@ -321,9 +321,9 @@ class Ins {
   /// Looks after the condition of P a little at every step: a round takes 121 of them, so what goes wrong is found
   /// within 242. Only when it fails the whole is done at once.
   void maintain() {
-    if (watch_.idle()) return watch_.begin(p);
-    if (watch_.advance(3) != InsFactor::Progress::kBad) return;
-    condition(p, watch_);
+    if (condition_monitor_.idle()) return condition_monitor_.begin(p);
+    if (condition_monitor_.advance(3) != InsFactor::Progress::kBad) return;
+    condition(p, condition_monitor_);
     note_conditioned();
   }
 
@@ -385,7 +385,7 @@ class Ins {
   /// simulated seeds: the filter forgets about as fast as it would learn the lean). Above ten times that nothing is
   /// added, so that a bias that is long unobserved does not walk on. Up is the body's: where the body leans far, the
   /// variance is added in the wrong axis. Implements docs/explanation/equations.md (15).
-  void doubt_bias_up(float dt_s) {
+  void inflate_vertical_bias(float dt_s) {
     constexpr float kMost_rad2 = 0.02F;  // beyond no tilt is small
     constexpr float kOff_mps2 = 6.934F;  // sqrt(g^2 / 2), per rad^2
     constexpr float kBelow = 10, kOver_s = 1.5F;
@@ -398,7 +398,7 @@ class Ins {
 
   Pending pending_{};
   GyroScaleConsider turned_{};
-  InsFactor watch_{};
+  InsFactor condition_monitor_{};
   /// Time for which held_ stays after a measurement in the body while moving, in 0.1 ms: wheels may slip for a while.
   static constexpr float kHeldPerS = 10'000.0F, kMostLeap_mps = 30;
   static constexpr std::uint16_t kHeld = 50'000;

@@ -26,6 +26,13 @@ struct YawFinderNoise {
   float ready_rad = 0.15F;        ///< ready once sigma is below
 };
 
+/// Motion since the yaw filter's last prediction, in axes that the gyroscope's yaw turned from n by yaw - arg z.
+struct PendingMotion {
+  Complex v, p;    ///< specific force integrated once and twice
+  Complex turned;  ///< integral of the heading
+  float dt_s = 0, turn_rad = 0;
+};
+
 class YawEstimator {
  public:
   YawFinderNoise noise{};  ///< changed: restart
@@ -97,7 +104,7 @@ class YawEstimator {
   static constexpr float kStep_s = 0.1F;          ///< between predictions of the filter
   static constexpr float kBlind_m2ps2 = 1e6F;     ///< variance of the velocity after too long without anything
   static constexpr float kLean_s = 5.0F;          ///< own level leans towards the specific force
-  static constexpr float kForget_s = 30.0F;       ///< one unit of 1 / P_zz is forgotten in
+  static constexpr float kMemory_s = 30.0F;       ///< one unit of 1 / P_zz is forgotten in
   static constexpr float kGate = 13.8F;           ///< one in a thousand, two degrees of freedom
   static constexpr float kFirstTilt_rad = 0.15F;  ///< tilt of one increment in motion
   static constexpr float kKeptTilt_rad = 0.1F;    ///< tilt of the own level after giving up
@@ -105,13 +112,6 @@ class YawEstimator {
   static constexpr std::uint8_t kMostRefused = 5, kFixes = 5;
   // Random walks, per axis and root of a second: the level's error, the biases.
   static constexpr float kWander_mps2_rts = 0.01F, kBiasWalk_radps_rts = 1e-5F, kAccelWalk_mps2_rts = 2e-4F;
-
-  /// Motion since the filter's last prediction, in axes that the gyroscope's yaw turned from n by yaw - arg z.
-  struct Pending {
-    Complex v, p;    ///< specific force integrated once and twice
-    Complex turned;  ///< integral of the heading
-    float dt_s = 0, turn_rad = 0;
-  };
 
   static constexpr float square(float a) { return a * a; }
   [[nodiscard]] static float from(const base::Anchored& a, const base::Anchored& b);
@@ -125,7 +125,7 @@ class YawEstimator {
   void judge(Filter::Verdict verdict, bool gnss);
 
   Filter filter_{};
-  Pending pending_{};
+  PendingMotion pending_{};
   Complex heading_{1.0F, 0.0F};  ///< exp(i yaw) by gyroscope alone
   Vector3 up_b_ = Vector3::Zero();
   Vector3 bias_b_radps_ = Vector3::Zero();  ///< taken off the gyroscope

@@ -103,7 +103,7 @@ inline void YawEstimator::restart(const Quaternion& q) {
   // information, noise_v / S a step, is taken back, and a little for what is not modelled: from the heading with all
   // that hangs on it, for only their common phase is what nothing else shows.
   const float variance_z = filter_.variance(kZ);
-  filter_.spread(with_z, square(variance_z) * (0.25F * noise_v / filter_.variance(kV) + t / kForget_s));
+  filter_.spread(with_z, square(variance_z) * (0.25F * noise_v / filter_.variance(kV) + t / kMemory_s));
   // The gyroscope's noise turns the body, not the level's error. A scale error is the same all the way round: per turn
   // as much as it makes in a whole one.
   const float turn = pending_.turn_rad < 0.0F ? -pending_.turn_rad : pending_.turn_rad;

@@ -25,8 +25,8 @@ class Firmware {
   /// as all others do.
   [[nodiscard]] std::uint32_t self_check(std::uint32_t epochs) {
     bus::FrameHash hash(parameters_.can_base);
-    bus::FrameSink outlet(board_.can, hash);
-    BootSelfCheck(node_, parameters_.can_base, 1).run(epochs, outlet);
+    bus::FrameSink frame_sink(board_.can, hash);
+    BootSelfCheck(node_, parameters_.can_base, 1).run(epochs, frame_sink);
     node_.power_on({});
     return hash.value();
   }
@@ -57,8 +57,8 @@ class Firmware {
     const base::Micros time{static_cast<std::int64_t>(sync->time_us)};
     if (sync->kind == bus::SyncKind::kBegin) {
       node_.power_on(time);
-      bus::FrameSink outlet(board_.can);
-      node_.send_version(outlet);
+      bus::FrameSink frame_sink(board_.can);
+      node_.send_version(frame_sink);
     }
     if (const auto t = pacer_.on_sync(sync->kind, time, board_.now(), health_)) tick(*t);
   }
@@ -79,8 +79,8 @@ class Firmware {
     const base::Micros began = board_.now();
     health_.sync = pacer_.state();
     health_.bus = board_.can.faults();
-    bus::FrameSink outlet(board_.can);
-    node_.tick(t, health_, outlet);
+    bus::FrameSink frame_sink(board_.can);
+    node_.tick(t, health_, frame_sink);
     const std::int64_t took_us = (board_.now() - began).us;
     const auto us = static_cast<std::uint32_t>(took_us < 0 ? 0 : took_us > 1'000'000 ? 1'000'000 : took_us);
     if (us > health_.longest_us) health_.longest_us = us;

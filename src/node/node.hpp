@@ -192,7 +192,7 @@ void Node<Estimators, Capacity>::tick(base::Micros t, const bus::LoopHealth& loo
     using E = typename std::remove_cvref_t<decltype(lane)>::Type;
     const bool primary = instance == kPrimary;
     const estimators::MotionVariance motion =
-        publisher_.says_sigma(instance, primary) ? lane.motion_variance(context()) : estimators::MotionVariance{};
+        publisher_.publishes_sigma(instance, primary) ? lane.motion_variance(context()) : estimators::MotionVariance{};
     publisher_.estimate(instance, E::kKind, primary, estimates[instance], motion, send);
     if constexpr (requires { lane.inertial(context()); })
       publisher_.inertial(
@@ -221,7 +221,7 @@ void Node<Estimators, Capacity>::restart(base::Micros t, sensor::ResetCause caus
   disagreement_.restart(t);
   jumps_ = 0;
   if (cause == sensor::ResetCause::kTimeJump) {
-    inbox_.forget(counters_);
+    inbox_.discard(counters_);
     history_.clear();
     history_.open_from(t - base::Micros{parameters_.loop.period_us});
   }
@@ -257,13 +257,15 @@ void Node<Estimators, Capacity>::apply_map(base::Micros before) {
 template <class Estimators, std::size_t Capacity>
 void Node<Estimators, Capacity>::apply_commands() {
   using What = bus::ResetWhat;
-  const auto asked = [this](What what) { return std::exchange(pending_reset_[static_cast<std::size_t>(what)], false); };
-  if (asked(What::kLandmarkMap)) landmarks_.clear();
-  if (asked(What::kCounters)) {
+  const auto requested = [this](What what) {
+    return std::exchange(pending_reset_[static_cast<std::size_t>(what)], false);
+  };
+  if (requested(What::kLandmarkMap)) landmarks_.clear();
+  if (requested(What::kCounters)) {
     counters_ = {};
     history_.each_lane([](auto& lane) { lane.clear_statistics(); });
   }
-  if (asked(What::kEstimators)) {
+  if (requested(What::kEstimators)) {
     close_window(now_);
     restart(now_, sensor::ResetCause::kCommand);
   }

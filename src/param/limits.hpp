@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What is plausible: each value within its row's limits, and rules between fields. A robot's parameters are refused
 // where they are written: `constexpr Parameters parameters = checked({...})` does not compile when one is implausible,
-// and the compiler's message has path, value and limits (tools/build makes one sentence of it).
+// and the compiler's message has path, value and limits (tools/run/explain_refusal makes one sentence of it).
 #pragma once
 
 #include "param/table.hpp"

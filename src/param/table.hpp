@@ -286,8 +286,8 @@ inline constexpr std::array kTable{
 
     TETAP_ROW(0x300, start.known, "", 0, 1, kRestart,
               "0: the node waits for a pose or aligns by GNSS; 1: the pose at the start is given here."),
-    TETAP_ROW(0x301, start.x_m, "m", -60'000, 60'000, kRestart, "Place at the start, east of the origin."),
-    TETAP_ROW(0x302, start.y_m, "m", -60'000, 60'000, kRestart, "Place at the start, north of the origin."),
+    TETAP_ROW(0x301, start.x_m, "m", -100'000, 100'000, kRestart, "Place at the start, east of the origin."),
+    TETAP_ROW(0x302, start.y_m, "m", -100'000, 100'000, kRestart, "Place at the start, north of the origin."),
     TETAP_ROW(0x303, start.yaw_rad, "rad", -detail::kPi, detail::kPi, kRestart,
               "Heading at the start, counter-clockwise from east."),
     TETAP_ROW(0x304, start.sigma_position_m, "m", 1e-4, 1e5, kRestart, "1 sigma of the place at the start, per axis."),

@@ -24,7 +24,7 @@ struct EkfMapperOptions {
   float new_gate = 13.816F;   ///< NIS beside every landmark of a new one; between the two gates: ambiguous
   float margin = 3.0F;        ///< a second landmark whose NIS is no more than this larger makes a pair ambiguous
   float separation_m = 0.8F;  ///< no new landmark nearer than this to another one
-  std::int64_t forget_us = 30'000'000;  ///< an unconfirmed landmark without identity unseen for this long is removed
+  std::int64_t expiry_us = 30'000'000;  ///< an unconfirmed landmark without identity unseen for this long is removed
 };
 
 template <int kLandmarks_, int kSightings_ = 16, int kBatch_ = 5>
@@ -69,7 +69,7 @@ class EkfMapper {
     if (seen.size() > kMost) counts_.surplus += static_cast<std::uint32_t>(seen.size() - kMost);
     const std::span<const Sighting> all = seen.first(seen.size() < kMost ? seen.size() : kMost);
     put_in_order(all);
-    forget(stamp_us);
+    drop_expired(stamp_us);
     find_landmarks(all);
     std::array<typename Core::Pair, kMost> pairs;
     std::size_t count = 0;
@@ -104,11 +104,11 @@ class EkfMapper {
     }
   }
   /// Removes landmarks that were seen too seldom and too long ago. Those with an identity stay.
-  void forget(std::int64_t stamp_us) {
+  void drop_expired(std::int64_t stamp_us) {
     for (int k = core.map().size() - 1; k >= 0; --k) {
       const MapLandmark& landmark = core.map()[k];
       if (landmark.hits >= core.options.confirming_hits || named(landmark.id) ||
-          stamp_us - landmark.seen_us < options.forget_us)
+          stamp_us - landmark.seen_us < options.expiry_us)
         continue;
       core.remove(k);
       ++counts_.forgotten;

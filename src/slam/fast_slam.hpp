@@ -140,13 +140,13 @@ class FastSlam {
   /// One particle over all sightings of a stamp. Implements docs/explanation/fast_slam.md (5).
   void move_and_weigh(std::size_t i, std::span<const Use> uses) {
     Particle& particle = particles_[i];
-    PoseBelief belief = motion_.from(particle.pose);
+    PosePosterior posterior = motion_.from(particle.pose);
     float log_weight = 0.0F;
     if constexpr (kVersion == 2)
       for (const Use& use : uses)
         if (use.known)
-          log_weight += belief.refine(use.seen, particle.landmarks[at(use.landmark)], use.noise, options.gate);
-    particle.pose = belief.sample(filter::normals_of<3>(key_, epoch_, static_cast<std::uint32_t>(i)));
+          log_weight += posterior.refine(use.seen, particle.landmarks[at(use.landmark)], use.noise, options.gate);
+    particle.pose = posterior.sample(filter::normals_of<3>(key_, epoch_, static_cast<std::uint32_t>(i)));
     for (const Use& use : uses) {
       FastSlamLandmark& landmark = particle.landmarks[at(use.landmark)];
       if (use.is_new) {
@@ -232,13 +232,13 @@ FastSlam<kParticles_, kLandmarks_, kVersion_>::estimate() const {
                    .y_m = from.y_m + y / sum,
                    .yaw_rad = base::wrap_angle(from.yaw_rad + base::atan2(s, c))};
   for (std::size_t i = 0; i < kCount; ++i) {
-    const PoseBelief belief = motion_.from(particles_[i].pose);
+    const PosePosterior posterior = motion_.from(particles_[i].pose);
     const float w = base::exp(log_weights_[i]) / sum;
-    const std::array<float, 3> e{belief.mean.x_m - estimate.pose.x_m, belief.mean.y_m - estimate.pose.y_m,
-                                 base::wrap_angle(belief.mean.yaw_rad - estimate.pose.yaw_rad)};
+    const std::array<float, 3> e{posterior.mean.x_m - estimate.pose.x_m, posterior.mean.y_m - estimate.pose.y_m,
+                                 base::wrap_angle(posterior.mean.yaw_rad - estimate.pose.yaw_rad)};
     for (int column = 0; column < 3; ++column)
       for (int row = 0; row <= column; ++row)
-        estimate.p(row, column) += w * (e[at(row)] * e[at(column)] + belief.p(row, column));
+        estimate.p(row, column) += w * (e[at(row)] * e[at(column)] + posterior.p(row, column));
   }
   return estimate;
 }

@@ -92,7 +92,7 @@ struct FastSlamLandmark {
 };
 
 /// A normal distribution of a pose.
-struct PoseBelief {
+struct PosePosterior {
   PlanarOffset mean;
   filter::Symmetric<float, 3> p;
 
@@ -161,7 +161,7 @@ class SharedMotion {
     return true;
   }
   /// The distribution of a particle's pose after the motion.
-  [[nodiscard]] PoseBelief from(const PlanarOffset& pose) const {
+  [[nodiscard]] PosePosterior from(const PlanarOffset& pose) const {
     const base::SinCos turn = base::sincos(pose.yaw_rad);
     const float x = pose_.x.minus({}), y = pose_.y.minus({});
     filter::Matrix<float, 3, 3> rotation;

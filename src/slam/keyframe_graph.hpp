@@ -44,7 +44,7 @@ class KeyframeGraph {
     ++step_;
     trail_[step_ % kTrail] = Step::of(motion.mean);
     pending_ = step_ == id_[at(graph_.poses() - 1)] + 1 ? motion : compose(pending_, motion);
-    if (wants_keyframe()) make_keyframe();
+    if (keyframe_due()) make_keyframe();
     return true;
   }
 
@@ -136,7 +136,7 @@ class KeyframeGraph {
   }
   [[nodiscard]] Pose placed(const Pose& in_graph) const { return origin_.plus(in_graph.minus({})); }
 
-  [[nodiscard]] bool wants_keyframe() const {
+  [[nodiscard]] bool keyframe_due() const {
     const Scalar x = pending_.mean.x_m, y = pending_.mean.y_m, turn = pending_.mean.yaw.radians();
     const auto way = static_cast<Scalar>(options_.distance_m), angle = static_cast<Scalar>(options_.turn_rad);
     return x * x + y * y >= way * way || turn >= angle || turn <= -angle;

@@ -48,8 +48,8 @@ inline void hash_quaternion(base::WordHash& hash, const filter::Quaternion& q) {
     hash(static_cast<std::uint32_t>(complementary.step(w, f, dt_s)));
     hash(static_cast<std::uint32_t>(complementary.magnetometer(m, dt_s)));
     mahony.step(w, f, m, dt_s);
-    const bool heard = heading.step(w(2), base::atan2(m(0), m(1)), dt_s);
-    hash(static_cast<std::uint32_t>(heard));
+    const bool accepted = heading.step(w(2), base::atan2(m(0), m(1)), dt_s);
+    hash(static_cast<std::uint32_t>(accepted));
     hash_quaternion(hash, complementary.q_nb());
     hash_vector<3>(hash, complementary.bias_b_radps());
     hash(complementary.bias_sigma_radps());

@@ -282,7 +282,7 @@ TEST(Spi, StuckLinesAndAbsentChips) {
   EXPECT_EQ(stuck.read(0x75), 0x00);
   stuck.chip.spi1.stuck_miso = true;
   EXPECT_EQ(stuck.read(0x75), 0xFF);
-  Imu absent({.imu_there = false});
+  Imu absent({.imu_present = false});
   EXPECT_EQ(absent.read(0x75), 0xFF);
   Imu other({.imu = {.who_am_i = 0x44}});
   other.chip.advance_us(2'000);

@@ -143,7 +143,7 @@ TEST(Sensors, ReceivedFramesInterrupt) {
 }
 
 TEST(Sensors, MissingImuReadsAsAllOnes) {
-  Node node(kNone, {.imu_there = false});
+  Node node(kNone, {.imu_present = false});
   node.run_ms(200);
   EXPECT_EQ(node.result(0), 0xFFU);
   EXPECT_TRUE(node.complaints().empty()) << node.complaints().text();

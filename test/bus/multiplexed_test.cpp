@@ -65,10 +65,10 @@ Eigen::Matrix3d rebuilt(std::array<float, 3> sigma, std::array<float, 3> corr_01
 }
 
 /// Entry by entry, in shares of the two sigmas.
-void expect_near(const Eigen::Matrix3d& said, const Eigen::Matrix3d& p, double share, const char* of) {
+void expect_near(const Eigen::Matrix3d& published, const Eigen::Matrix3d& p, double share, const char* of) {
   for (int r = 0; r < 3; ++r)
     for (int c = 0; c < 3; ++c)
-      EXPECT_NEAR(said(r, c), p(r, c), share * std::sqrt(p(r, r) * p(c, c))) << of << ' ' << r << ' ' << c;
+      EXPECT_NEAR(published(r, c), p(r, c), share * std::sqrt(p(r, r) * p(c, c))) << of << ' ' << r << ' ' << c;
 }
 
 TEST(StatePages, SayTheCovarianceOfThePresentWholeBlockByBlock) {
@@ -88,31 +88,31 @@ TEST(StatePages, SayTheCovarianceOfThePresentWholeBlockByBlock) {
         for (int c = 0; c < 3; ++c) of(r, c) = static_cast<double>(present(first + r, first + c));
       return of;
     };
-    const Pages said = pages(e, 0, 9);
-    const auto v = said.only<bus::EstStateStdVel>();
-    const auto cv = said.only<bus::EstStateCorrVel>();
+    const Pages published = pages(e, 0, 9);
+    const auto v = published.only<bus::EstStateStdVel>();
+    const auto cv = published.only<bus::EstStateCorrVel>();
     expect_near(rebuilt({v.std_vel_east_mps, v.std_vel_north_mps, v.std_vel_up_mps},
                         {cv.corr_vel_en, cv.corr_vel_eu, cv.corr_vel_nu}),
                 block(3), 5e-3, "velocity");
     // 1 sigma of heading, and of east and north, are on Est_Std.
     const auto root = [&](int i) { return base::sqrt(present(i, i)); };
-    const auto t = said.only<bus::EstStateStdTilt>();
-    const auto ct = said.only<bus::EstStateCorrTilt>();
+    const auto t = published.only<bus::EstStateStdTilt>();
+    const auto ct = published.only<bus::EstStateCorrTilt>();
     expect_near(rebuilt({t.std_tilt_east_rad, t.std_tilt_north_rad, root(8)},
                         {ct.corr_tilt_en, ct.corr_tilt_e_yaw, ct.corr_tilt_n_yaw}),
                 block(6), 2e-3, "attitude");
-    const auto h = said.only<bus::EstStateHeight>();
-    const auto ch = said.only<bus::EstStateCorrPos>();
+    const auto h = published.only<bus::EstStateHeight>();
+    const auto ch = published.only<bus::EstStateCorrPos>();
     expect_near(
         rebuilt({root(0), root(1), h.std_height_m}, {present(0, 1) / (root(0) * root(1)), ch.corr_xz, ch.corr_yz}),
         block(0), 2e-3, "position");
-    const auto a = said.only<bus::EstStateStdAccBias>();
-    const auto ca = said.only<bus::EstStateCorrAccBias>();
+    const auto a = published.only<bus::EstStateStdAccBias>();
+    const auto ca = published.only<bus::EstStateCorrAccBias>();
     expect_near(rebuilt({a.std_acc_bias_x_mps2, a.std_acc_bias_y_mps2, a.std_acc_bias_z_mps2},
                         {ca.corr_acc_bias_xy, ca.corr_acc_bias_xz, ca.corr_acc_bias_yz}),
                 block(9), 2e-3, "accelerometer bias");
-    const auto g = said.only<bus::EstStateStdGyroBias>();
-    const auto cg = said.only<bus::EstStateCorrGyroBias>();
+    const auto g = published.only<bus::EstStateStdGyroBias>();
+    const auto cg = published.only<bus::EstStateCorrGyroBias>();
     expect_near(rebuilt({g.std_gyro_bias_x_radps, g.std_gyro_bias_y_radps, g.std_gyro_bias_z_radps},
                         {cg.corr_gyro_bias_xy, cg.corr_gyro_bias_xz, cg.corr_gyro_bias_yz}),
                 block(12), 2e-3, "gyroscope bias");

@@ -210,18 +210,18 @@ TEST(PositionDrift, EachAxisIsJudgedByItsOwnVariance) {
 
 TEST(PositionDrift, AVelocityVouchesForAFewFixes) {
   PositionDrift fixes;
-  EXPECT_FALSE(fixes.take_vouch()) << "none was heard";
+  EXPECT_FALSE(fixes.consume_velocity_agreement()) << "none was heard";
   fixes.velocity(true);
-  for (int i = 0; i < 5; ++i) EXPECT_TRUE(fixes.take_vouch()) << "one a second, fixes five: " << i;
+  for (int i = 0; i < 5; ++i) EXPECT_TRUE(fixes.consume_velocity_agreement()) << "one a second, fixes five: " << i;
   fixes.velocity(false);
-  EXPECT_FALSE(fixes.take_vouch());
+  EXPECT_FALSE(fixes.consume_velocity_agreement());
   fixes.velocity(true);
   int vouched = 0;
-  while (vouched < 100 && fixes.take_vouch()) ++vouched;
+  while (vouched < 100 && fixes.consume_velocity_agreement()) ++vouched;
   EXPECT_LT(vouched, 20) << "it has ended";
   fixes.velocity(true);
   fixes.reset();
-  EXPECT_FALSE(fixes.take_vouch());
+  EXPECT_FALSE(fixes.consume_velocity_agreement());
 }
 
 TEST(StartupFixCheck, CountWhenSoManyFollowEachOther) {

@@ -75,13 +75,13 @@ TEST(ImuHealth, HalfASensorThatIsStuckIsStuck) {
     Sensor s;
     s.run(0.1);
     const sensor::ImuSample held = s.next();
-    bool heard = true;
+    bool accepted = true;
     for (int i = 0; i <= s.n.stuck_samples; ++i) {
       sensor::ImuSample sample = s.next();
       (gyro ? sample.dangle_b_rad : sample.dvelocity_b_mps) = gyro ? held.dangle_b_rad : held.dvelocity_b_mps;
-      heard = s.watch.update(sample, {s.us}, s.n);
+      accepted = s.watch.update(sample, {s.us}, s.n);
     }
-    EXPECT_FALSE(heard) << (gyro ? "gyroscope" : "accelerometer");
+    EXPECT_FALSE(accepted) << (gyro ? "gyroscope" : "accelerometer");
   }
 }
 
@@ -153,7 +153,7 @@ TEST(ImuHealth, ASampleThatLeapsIsDoubtedInProportion) {
     sample.dangle_b_rad[1] += 0.01F * rate_radps;
     sample.dvelocity_b_mps[1] += 0.01F * force_mps2;
     s.watch.update(sample, {s.us}, s.n);
-    return s.watch.leaps() ? s.watch.leap() : ImuHealth::Leap{};
+    return s.watch.vibration().leaps() ? s.watch.vibration().leap() : Vibration::Leap{};
   };
   EXPECT_EQ(leap_of(2, 0, 0).rate_radps, 0.0F);
   EXPECT_EQ(leap_of(0, 30, 0).force_mps2, 0.0F);
@@ -173,7 +173,7 @@ TEST(ImuHealth, ASampleThatLeapsIsDoubtedInProportion) {
     sample.dangle_b_rad[2] += 0.01F * 0.1F * static_cast<float>(i);
     sample.dvelocity_b_mps[0] -= 0.01F * 9.0F;
     s.watch.update(sample, {s.us}, s.n);
-    ASSERT_FALSE(s.watch.leaps()) << i;
+    ASSERT_FALSE(s.watch.vibration().leaps()) << i;
   }
 }
 
@@ -231,21 +231,21 @@ TEST(ImuHealth, ASteadyForceAndASteadyTurnAreNoVibration) {
 TEST(ImuHealth, NoiseGrowsInProportionToVibrationBeyondWhatTheNumbersHoldFor) {
   Sensor s;
   s.run(3);
-  EXPECT_EQ(s.watch.noise_factor(s.n), 1.0F);
-  EXPECT_FALSE(s.watch.shaken());
+  EXPECT_EQ(s.watch.vibration().noise_factor(s.n), 1.0F);
+  EXPECT_FALSE(s.watch.vibration().shaken());
   s.force_mps2 = 5 * s.n.vibration_mps2 * std::sqrt(2.0F);
   s.run(5);
-  EXPECT_NEAR(s.watch.noise_factor(s.n), 5, 0.5);
-  EXPECT_TRUE(s.watch.shaken());
+  EXPECT_NEAR(s.watch.vibration().noise_factor(s.n), 5, 0.5);
+  EXPECT_TRUE(s.watch.vibration().shaken());
   s.force_mps2 = 0, s.rate_radps = 3 * s.n.vibration_radps * std::sqrt(2.0F);
   s.run(5);
-  EXPECT_NEAR(s.watch.noise_factor(s.n), 3, 0.4) << "whichever sensor is shaken more";
+  EXPECT_NEAR(s.watch.vibration().noise_factor(s.n), 3, 0.4) << "whichever sensor is shaken more";
   s.rate_radps = 1.5F * s.n.vibration_radps * std::sqrt(2.0F);
   s.run(5);
-  EXPECT_TRUE(s.watch.shaken()) << "said from twice, until it is once";
+  EXPECT_TRUE(s.watch.vibration().shaken()) << "said from twice, until it is once";
   s.rate_radps = 0;
   s.run(5);
-  EXPECT_FALSE(s.watch.shaken());
+  EXPECT_FALSE(s.watch.vibration().shaken());
 }
 
 /// On a circle or straight on at a constant speed, or standing; GNSS at 5 Hz, IMU and wheels at 100.

@@ -104,14 +104,6 @@ TEST(Persistence, TimeWithoutATestCountsOnlyWhereTheCallerLooksLater) {
   EXPECT_TRUE(p.persisted(ms(0)));
 }
 
-TEST(Persistence, PostponingBeginsTheTimeAnewAndKeepsTheCount) {
-  Persistence p;
-  for (int i = 0; i < 10; ++i) p.update(true, ms(100 * (i + 1)));
-  p.postpone(ms(1000));
-  EXPECT_FALSE(p.persists(ms(1000), ms(1), 10));
-  EXPECT_TRUE(p.persists(ms(1001), ms(1), 10));
-}
-
 TEST(Persistence, NothingPersistsBeforeTheFirstTestOrAfterAReset) {
   Persistence p;
   EXPECT_FALSE(p.persists(ms(1'000'000), ms(0), 0));

@@ -130,13 +130,13 @@ class Rover {
   std::normal_distribution<double> normal_;
 };
 
-bool says(const bus::EstStatus& status, sensor::Fault fault) {
+bool reports(const bus::EstStatus& status, sensor::Fault fault) {
   return (status.faults >> static_cast<unsigned>(fault) & 1) != 0;
 }
 /// Whether any status of these frames has this fault.
-bool said(const Frames& frames, sensor::Fault fault) {
+bool reported(const Frames& frames, sensor::Fault fault) {
   const auto all_of_them = all<bus::EstStatus>(frames);
-  return std::any_of(all_of_them.begin(), all_of_them.end(), [&](const auto& one) { return says(one, fault); });
+  return std::any_of(all_of_them.begin(), all_of_them.end(), [&](const auto& one) { return reports(one, fault); });
 }
 /// Modes in the order in which they are said.
 std::vector<sensor::Mode> modes(const Frames& frames) {
@@ -151,7 +151,7 @@ TEST(InertialBus, ItSaysWhatItWaitsForAndThenThatItNavigates) {
   const Frames out = rover.drive();
   EXPECT_EQ(modes(out), (std::vector{sensor::Mode::kWaitingForImu, sensor::Mode::kLevelling,
                                      sensor::Mode::kFindingHeading, sensor::Mode::kNominal}));
-  EXPECT_FALSE(said(rover.run(5), sensor::Fault::kInputStale));
+  EXPECT_FALSE(reported(rover.run(5), sensor::Fault::kInputStale));
 }
 
 TEST(InertialBus, WhatItDoesNotKnowYetIsNeitherValidNorConfident) {
@@ -180,14 +180,14 @@ TEST(InertialBus, AJumpThatPersistsIsRefusedAndThenTakenWithItsSize) {
   const auto before = last<bus::EstStatus>(rover.drive());
   rover.off_east_m = 30;
   const Frames refused = rover.run(4);
-  EXPECT_TRUE(says(*last<bus::EstStatus>(refused), sensor::Fault::kRejecting));
+  EXPECT_TRUE(reports(*last<bus::EstStatus>(refused), sensor::Fault::kRejecting));
   EXPECT_EQ(last<bus::EstStatus>(refused)->mode, sensor::Mode::kDegraded);
   EXPECT_EQ(last<bus::EstStatus>(refused)->reset_ctr, before->reset_ctr);
   const Frames taken = rover.run(6);
   const auto status = last<bus::EstStatus>(taken);
   EXPECT_EQ(status->reset_ctr, before->reset_ctr + 1);
   EXPECT_EQ(status->reset_cause, sensor::ResetCause::kPositionJump);
-  EXPECT_TRUE(said(taken, sensor::Fault::kRestarted));
+  EXPECT_TRUE(reported(taken, sensor::Fault::kRestarted));
   EXPECT_EQ(status->mode, sensor::Mode::kNominal);
   const auto jump = last<bus::EstStateJump>(taken, kInertial);
   ASSERT_TRUE(jump.has_value());
@@ -195,15 +195,15 @@ TEST(InertialBus, AJumpThatPersistsIsRefusedAndThenTakenWithItsSize) {
   EXPECT_NEAR(jump->jump_y_m, 0, 1);
   EXPECT_NEAR(jump->jump_yaw_rad, 0, 0.01);
   EXPECT_NEAR(last<bus::EstPos>(taken, kInertial)->x_raw, 1000 * (rover.east_m + 30), 1000);
-  EXPECT_FALSE(said(rover.run(3), sensor::Fault::kRestarted)) << "of the last second only";
+  EXPECT_FALSE(reported(rover.run(3), sensor::Fault::kRestarted)) << "of the last second only";
 }
 
 TEST(InertialBus, VibrationIsAFaultAndHasItsSize) {
   Rover rover;
-  EXPECT_FALSE(said(rover.drive(), sensor::Fault::kVibration));
+  EXPECT_FALSE(reported(rover.drive(), sensor::Fault::kVibration));
   rover.vibration_mps2 = 15;
   const Frames out = rover.run(5);
-  EXPECT_TRUE(says(*last<bus::EstStatus>(out), sensor::Fault::kVibration));
+  EXPECT_TRUE(reports(*last<bus::EstStatus>(out), sensor::Fault::kVibration));
   EXPECT_NEAR(last<bus::EstStateImuHealth>(out, kInertial)->vib_accel_mps2, 15, 3);
 }
 
@@ -212,12 +212,12 @@ TEST(InertialBus, TwoAttitudesThatAreApartAreSaidWithTheirAngle) {
   n.disagreement = {.tilt_rad = 0.02F, .heading_rad = 3, .after_us = 1'000'000};
   Rover rover(n);
   const Frames straight = rover.drive();
-  EXPECT_FALSE(says(*last<bus::EstStatus>(straight), sensor::Fault::kAttitudeDisagrees));
+  EXPECT_FALSE(reports(*last<bus::EstStatus>(straight), sensor::Fault::kAttitudeDisagrees));
   EXPECT_NEAR(last<bus::EstStateDisagreement>(straight, kAttitude)->disagree_tilt_rad, 0, 0.02);
   rover.wish_mps = 4;
   rover.turn_radps = 0.5;  // 2 m/s^2 to the side, for long: what knows an accelerometer alone tilts
   const Frames curve = rover.run(20);
-  EXPECT_TRUE(said(curve, sensor::Fault::kAttitudeDisagrees));
+  EXPECT_TRUE(reported(curve, sensor::Fault::kAttitudeDisagrees));
   EXPECT_GT(last<bus::EstStateDisagreement>(curve, kAttitude)->disagree_tilt_rad, 0.02F);
 }
 
@@ -225,11 +225,11 @@ TEST(InertialBus, AFieldThatIsNotTheEarthsIsAFaultAsLongAsItIsThere) {
   param::Parameters n = rover();
   n.magnetic.use = 1;
   Rover rover(n);
-  EXPECT_FALSE(says(*last<bus::EstStatus>(rover.drive()), sensor::Fault::kMagneticDisturbance));
+  EXPECT_FALSE(reports(*last<bus::EstStatus>(rover.drive()), sensor::Fault::kMagneticDisturbance));
   rover.field_uT = 80;
-  EXPECT_TRUE(says(*last<bus::EstStatus>(rover.run(3)), sensor::Fault::kMagneticDisturbance));
+  EXPECT_TRUE(reports(*last<bus::EstStatus>(rover.run(3)), sensor::Fault::kMagneticDisturbance));
   rover.field_uT = 50;
-  EXPECT_FALSE(says(*last<bus::EstStatus>(rover.run(10)), sensor::Fault::kMagneticDisturbance));
+  EXPECT_FALSE(reports(*last<bus::EstStatus>(rover.run(10)), sensor::Fault::kMagneticDisturbance));
 }
 
 }  // namespace

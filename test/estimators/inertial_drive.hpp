@@ -68,7 +68,7 @@ class Drive {
   double east_m = 0, north_m = 0, up_m = 0, yaw_rad = 0.3, speed_mps = 1, turn_radps = 0.05;
   double unseen_east_m = 0;  ///< it is carried, and no sensor of motion shows it
   double white_m = 1, lasting_m = 0, lasting_s = 60;
-  double believed = 1;         ///< the receiver's own accuracy figure, in what it is
+  double stated_ratio = 1;     ///< the receiver's own accuracy figure, in what it is
   double gyro_bias_radps = 0;  ///< about the vertical
   std::int64_t gnss_every_us = 200'000, speedometer_every_us = 10'000;
   bool wheels = true, speedometer = false, gnss_velocity = true;
@@ -186,19 +186,19 @@ class Drive {
     if (!tamper(fix)) return;
     velocity.v_n_mps[0] += fix.east_off_mps;
     const double cosine = std::cos(24'131'350'000 * 2e-9 * 3.14159265358979 / 180);
-    const auto sigma = static_cast<float>(believed * std::hypot(white_m, lasting_m));
+    const auto sigma = static_cast<float>(stated_ratio * std::hypot(white_m, lasting_m));
     if (!fix.repeated) {
-      said_ = {.latitude_2ndeg = 24'131'350'000 + std::llround(fix.north_m * kMetre_2ndeg),
-               .longitude_2ndeg = 5'834'150'000 + std::llround(fix.east_m * kMetre_2ndeg / cosine),
-               .height_m = static_cast<float>(500 + fix.up_m),
-               .horizontal_acc_m = sigma,
-               .vertical_acc_m = 1.5F * sigma,
-               .fix = sensor::GnssFix::k3d};
-      said_velocity_ = velocity;
+      report_ = {.latitude_2ndeg = 24'131'350'000 + std::llround(fix.north_m * kMetre_2ndeg),
+                 .longitude_2ndeg = 5'834'150'000 + std::llround(fix.east_m * kMetre_2ndeg / cosine),
+                 .height_m = static_cast<float>(500 + fix.up_m),
+                 .horizontal_acc_m = sigma,
+                 .vertical_acc_m = 1.5F * sigma,
+                 .fix = sensor::GnssFix::k3d};
+      velocity_report_ = velocity;
     }
-    last_fix = estimator.fuse(said_, {us}, ctx());
+    last_fix = estimator.fuse(report_, {us}, ctx());
     verdicts += "aRnTUSFs"[static_cast<std::size_t>(last_fix.verdict)];
-    if (gnss_velocity) last_velocity = estimator.fuse(said_velocity_, {us}, ctx());
+    if (gnss_velocity) last_velocity = estimator.fuse(velocity_report_, {us}, ctx());
   }
 
   std::mt19937 engine_;
@@ -209,8 +209,8 @@ class Drive {
   double left_ = 0, right_ = 0, last_mps_ = 1;
   std::array<double, 3> lasting_{};
   bool begun_ = false;
-  sensor::GnssPosition said_;
-  sensor::GnssVelocity said_velocity_;
+  sensor::GnssPosition report_;
+  sensor::GnssVelocity velocity_report_;
   struct {
     nav::InsState state;
     nav::Ins::Covariance p;

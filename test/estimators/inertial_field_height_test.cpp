@@ -320,8 +320,9 @@ TEST(InertialMagnetometer, is_not_turned_by_a_magnet_and_says_what_it_rejects) {
         }
       }
       EXPECT_GE(robot.rejected - before, 499);
-      EXPECT_EQ(robot.last_flux.dof, 2);  // strength and dip
-      EXPECT_GT(robot.last_flux.nis, robot.last_flux.gate);
+      EXPECT_EQ(robot.last_flux.failed, sensor::Check::kField);
+      EXPECT_EQ(robot.last_flux.dof, 0) << "no innovation was compared";
+      EXPECT_GT(robot.last_flux.statistic, robot.last_flux.limit);
       EXPECT_EQ(base::bits(robot.now().state.q_nb.z), base::bits(without.now().state.q_nb.z));
       EXPECT_EQ(base::bits(robot.now().p(8, 8)), base::bits(without.now().p(8, 8)));
       robot.disturb = turned_by(0);

@@ -221,7 +221,7 @@ TEST(Glitch, AnOffsetThatStaysInsideItsGateIsFollowedAfterAWhile) {
 /// After minutes without fixes the first that is believed moves the filter by many of a fix's sigmas; those it was off
 /// before are no drift. The same where somebody says where it is.
 TEST(Glitch, WhatMovedTheFilterIsNoDrift) {
-  for (const bool said : {false, true})
+  for (const bool published : {false, true})
     for (unsigned seed = 1; seed <= 5; ++seed) {
       param::Parameters n = parameters();
       n.inertial.slip_share = 0.5F;
@@ -229,7 +229,7 @@ TEST(Glitch, WhatMovedTheFilterIsNoDrift) {
       d.white_m = 0.1;
       d.place();
       d.run(60);
-      if (said) {
+      if (published) {
         d.place(10, 10);
       } else {
         d.tamper = [](Drive::Fix&) { return false; };
@@ -240,7 +240,7 @@ TEST(Glitch, WhatMovedTheFilterIsNoDrift) {
       d.clear();
       d.run(20);
       EXPECT_GE(d.counted('n'), 2) << "more than one fix before it moves: " << d.verdicts;
-      EXPECT_LE(d.counted('R'), 4) << said << seed << ": " << d.verdicts;
+      EXPECT_LE(d.counted('R'), 4) << published << seed << ": " << d.verdicts;
     }
 }
 
@@ -404,12 +404,12 @@ TEST(Glitch, AFirstFixThatIsOneDoesNotBecomeTheStart) {
 }
 
 /// NEES of the horizontal position over 30 drives of 200 s, with errors that last.
-double mean_nees(float told_s, double* rmse_m = nullptr) {
+double mean_nees(float modelled_s, double* rmse_m = nullptr) {
   double nees = 0, squares = 0;
   constexpr unsigned kSeeds = 30;
   for (unsigned seed = 1; seed <= kSeeds; ++seed) {
     param::Parameters n = parameters();
-    n.gnss.correlation_s = told_s;
+    n.gnss.correlation_s = modelled_s;
     Drive d(n, seed);
     d.white_m = 0.3;
     d.lasting_m = 0.8;
@@ -427,12 +427,12 @@ double mean_nees(float told_s, double* rmse_m = nullptr) {
 }
 
 TEST(Lasting, ErrorsThatLastLeaveAnHonestCovarianceWhenTheyAreKnownToLast) {
-  double told_m = 0, not_told_m = 0;
-  const double told = mean_nees(60, &told_m), not_told = mean_nees(0, &not_told_m);
-  EXPECT_GT(told, 1.0);
-  EXPECT_LT(told, 3.0) << "two degrees of freedom, 30 seeds of some three independent errors each";
-  EXPECT_GT(not_told, 10 * told);
-  EXPECT_LE(told_m, not_told_m);
+  double modelled_m = 0, unmodelled_m = 0;
+  const double modelled = mean_nees(60, &modelled_m), unmodelled = mean_nees(0, &unmodelled_m);
+  EXPECT_GT(modelled, 1.0);
+  EXPECT_LT(modelled, 3.0) << "two degrees of freedom, 30 seeds of some three independent errors each";
+  EXPECT_GT(unmodelled, 10 * modelled);
+  EXPECT_LE(modelled_m, unmodelled_m);
 }
 
 TEST(Lasting, AStartWithoutAPlaceIsAsUncertainAsItsFirstFixes) {
@@ -447,7 +447,7 @@ TEST(Lasting, AStartWithoutAPlaceIsAsUncertainAsItsFirstFixes) {
     d.white_m = 0.3;
     d.lasting_m = 0.8;
     std::mt19937 figure(1000 + seed);
-    d.believed = std::clamp(std::normal_distribution{1.0, 0.2}(figure), 0.5, 2.0);
+    d.stated_ratio = std::clamp(std::normal_distribution{1.0, 0.2}(figure), 0.5, 2.0);
     d.run(20);
     ASSERT_TRUE(d.tracking()) << seed;
     d.clear();
@@ -472,9 +472,9 @@ TEST(Lasting, WhereItBeginsCountsAsTheFigureThatMayBeOffAndOtherwiseAsTheReceive
       }
       while (!d.tracking() && d.time_s() < 30) d.run(Drive::kStep_us * 1e-6);
       ASSERT_TRUE(d.tracking());
-      const double told = lasts_s > 0 ? static_cast<double>(checks::kStartPositionInflation) : 1;
-      EXPECT_NEAR(d.height_sigma_m(), 1.5 * told, 0.03) << lasts_s << ' ' << given;
-      EXPECT_NEAR(d.sigma_m(), given ? 0.1 : told, 0.1) << lasts_s << ' ' << given;
+      const double modelled = lasts_s > 0 ? static_cast<double>(checks::kStartPositionInflation) : 1;
+      EXPECT_NEAR(d.height_sigma_m(), 1.5 * modelled, 0.03) << lasts_s << ' ' << given;
+      EXPECT_NEAR(d.sigma_m(), given ? 0.1 : modelled, 0.1) << lasts_s << ' ' << given;
     }
 }
 

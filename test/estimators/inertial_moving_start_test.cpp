@@ -20,7 +20,7 @@ struct Way {
   std::int64_t speedometer_every_us = 0;                                ///< 0: there is none
 };
 
-void say_pose(Drive& d, double wrong_rad, double sigma_rad, float sigma_m = 0.5F) {
+void publish_pose(Drive& d, double wrong_rad, double sigma_rad, float sigma_m = 0.5F) {
   d.estimator.set_pose({d.us},
                        {.pose = {.x = base::Anchored{}.plus(static_cast<float>(d.east_m)),
                                  .y = base::Anchored{}.plus(static_cast<float>(d.north_m)),
@@ -56,7 +56,7 @@ Starts moving(const Way& way, int seeds, double end_s = 72) {
       d.run(0.01);
       if (!given && d.time_s() > 0.95) {  // levelled, and the first fixes were heard
         given = true;
-        say_pose(d, drawn(seed, way.given_sigma_rad), way.given_sigma_rad);
+        publish_pose(d, drawn(seed, way.given_sigma_rad), way.given_sigma_rad);
       }
       if (!d.tracking()) continue;
       found_s = std::min(found_s, d.time_s());
@@ -131,7 +131,7 @@ TEST(InertialMovingStart, CurvesTellNoHeading) {
         d.turn_radps = turn_radps;
         d.gnss_velocity = false;
         d.tamper = [fixes](Drive::Fix&) { return fixes; };
-        say_pose(d, drawn(seed, 0.2), 0.2, 0.1F);
+        publish_pose(d, drawn(seed, 0.2), 0.2, 0.1F);
         for (int i = 0; i < 9; ++i) {
           d.run(10);
           d.turn_radps = -d.turn_radps;
@@ -204,7 +204,7 @@ TEST(InertialMovingStart, ASlowRobotHasItsConstraintToo) {
     d.wheels = d.gnss_velocity = false;
     d.speed_mps = 0.5;
     d.white_m = 1;
-    say_pose(d, 0, 0.02);
+    publish_pose(d, 0, 0.02);
     d.run(120);
     d.tamper = [](Drive::Fix&) { return false; };
     d.run(30);
@@ -216,7 +216,7 @@ TEST(InertialMovingStart, ASlowRobotHasItsConstraintToo) {
 
 // Without GNSS somebody says where it is: how it moves it knows better than at the start.
 TEST(InertialMovingStart, APlaceThatIsSaidLeavesTheSpeedKnown) {
-  for (const bool said : {false, true}) {
+  for (const bool published : {false, true}) {
     double squares_m2 = 0;
     constexpr int kSeeds = 10;
     for (unsigned seed = 1; seed <= kSeeds; ++seed) {
@@ -226,11 +226,11 @@ TEST(InertialMovingStart, APlaceThatIsSaidLeavesTheSpeedKnown) {
       d.wheels = d.gnss_velocity = false;
       d.speed_mps = 2;
       d.run(0.95);
-      say_pose(d, 0, 0.02);
+      publish_pose(d, 0, 0.02);
       d.run(90);
       d.tamper = [](Drive::Fix&) { return false; };
       d.run(1);
-      if (said) say_pose(d, 0, 4, 3);
+      if (published) publish_pose(d, 0, 4, 3);
       d.run(60);
       squares_m2 += d.error_m() * d.error_m() / kSeeds;
       EXPECT_LT(d.sigma_m(), 20.0);
@@ -253,11 +253,11 @@ TEST(InertialMovingStart, APoseThatAgreesLeavesAllElseKnown) {
       d.speed_mps = 2;
       d.turn_radps = 0.05;
       d.run(0.95);
-      say_pose(d, 0, 0.02);
+      publish_pose(d, 0, 0.02);
       d.run(60);
       d.tamper = [](Drive::Fix&) { return false; };
       d.run(30);
-      say_pose(d, drawn(seed, 0.02), 0.02);
+      publish_pose(d, drawn(seed, 0.02), 0.02);
       d.run(0.05);
       EXPECT_LT(d.error_m(), 1.0);
       EXPECT_LT(d.sigma_yaw_rad(), 0.021);
@@ -271,7 +271,7 @@ TEST(InertialMovingStart, APoseThatAgreesLeavesAllElseKnown) {
 TEST(InertialMovingStart, APoseThatContradictsBeginsAnew) {
   Drive d = settled();
   d.yaw_rad += 1.0;
-  say_pose(d, 0, 0.02);
+  publish_pose(d, 0, 0.02);
   d.run(0.05);
   EXPECT_LT(d.yaw_error_rad(), 0.06);
 }
@@ -290,7 +290,7 @@ TEST(InertialMovingStart, PlacesDoNotHoldUpWhatElseIsRefused) {
     const double shown_rad = std::remainder(d.yaw_rad + 1e-3 * std::sin(tenths), 2 * 3.14159265358979);
     static_cast<void>(d.estimator.fuse(
         sensor::OutsideHeading{.yaw_rad = static_cast<float>(shown_rad), .acc_rad = 0.02F}, {d.us}, d.ctx()));
-    if (tenths % 20 == 0) say_pose(d, 0, 4);
+    if (tenths % 20 == 0) publish_pose(d, 0, 4);
   }
   EXPECT_LT(d.yaw_error_rad(), 0.1) << "12.6 s without places";
 }
@@ -302,11 +302,11 @@ TEST(InertialMovingStart, APlaceWithoutAHeadingMakesNoneSurer) {
   d.speed_mps = d.turn_radps = 0;
   d.white_m = 3;
   d.run(3);
-  say_pose(d, 0, 0.8);
+  publish_pose(d, 0, 0.8);
   d.run(300);
   const double before_rad = d.sigma_yaw_rad();
   ASSERT_GT(before_rad, 1.2);
-  say_pose(d, 0, 4);
+  publish_pose(d, 0, 4);
   d.run(0.05);
   EXPECT_NEAR(d.sigma_yaw_rad(), before_rad, 0.02);
 }
@@ -320,7 +320,7 @@ TEST(InertialMovingStart, APlaceWithoutAHeadingLeavesItTheOneItHas) {
   d.turn_radps = 0.1;
   d.run(30);
   const double height_m = d.height_error_m();
-  say_pose(d, -d.yaw_rad, 4, 3);
+  publish_pose(d, -d.yaw_rad, 4, 3);
   d.clear();
   d.run(0.05);
   EXPECT_LT(d.yaw_error_rad(), 0.05);

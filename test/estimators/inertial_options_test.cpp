@@ -94,9 +94,9 @@ TEST(InertialOptions, ABaselineAcrossTheBodyIsNoHeadingOfTheBody) {
 TEST(InertialOptions, AGyroscopeThatFeelsTheEarthHasNoBiasOfIt) {
   constexpr float kRate = 7.292115e-5F;
   const auto cosine = static_cast<float>(std::cos(48 * kPi / 180)), sine = static_cast<float>(std::sin(48 * kPi / 180));
-  for (const bool told : {true, false}) {
+  for (const bool modelled : {true, false}) {
     param::Parameters n = parameters();
-    n.inertial.earth_rate = told ? 1 : 0;
+    n.inertial.earth_rate = modelled ? 1 : 0;
     n.inertial.gyro_radps_rthz = 2e-6F;
     n.inertial.gyro_bias_radps2_rthz = 1e-8F;
     Stand stand(n);  // looks east, so north is to its left
@@ -106,8 +106,8 @@ TEST(InertialOptions, AGyroscopeThatFeelsTheEarthHasNoBiasOfIt) {
       stand.heading(0);
     }
     const nav::Vector3 bias = stand.estimator.inertial(stand.ctx()).state.b_g_radps;
-    EXPECT_NEAR(bias(1), told ? 0.0F : kRate * cosine, 5e-6F) << told;
-    EXPECT_NEAR(bias(2), told ? 0.0F : kRate * sine, 5e-6F) << told;
+    EXPECT_NEAR(bias(1), modelled ? 0.0F : kRate * cosine, 5e-6F) << modelled;
+    EXPECT_NEAR(bias(2), modelled ? 0.0F : kRate * sine, 5e-6F) << modelled;
   }
 }
 

@@ -227,7 +227,7 @@ TEST(RebuildSchedule, RebuildsAfterACorrectionOnceNothingElseIsDueAndAfterThreeT
   EXPECT_FALSE(tick(true));
   EXPECT_FALSE(tick(true));
   EXPECT_TRUE(tick(true));
-  schedule.hurry();
+  schedule.force_rebuild();
   EXPECT_TRUE(tick(true)) << "the filter is elsewhere at once";
   int ticks = 1;
   while (!tick(false)) ++ticks;

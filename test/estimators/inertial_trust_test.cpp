@@ -21,7 +21,7 @@ TEST(Vote, AFixVotesOnlyWhereItTellsBothApart) {
 }
 
 TEST(Vote, ADeviceVotesByWhatItShowedSince) {
-  Witness w;
+  DeviceRecord w;
   EXPECT_EQ(w.of_velocity({5'000'000}, {5'500'000}), Vote::kAbsent);
   w.update(false, {4'900'000});
   EXPECT_EQ(w.of_velocity({5'000'000}, {5'500'000}), Vote::kWaits);
@@ -34,22 +34,22 @@ TEST(Vote, ADeviceVotesByWhatItShowedSince) {
 
 TEST(Vote, TheFilterGivesWayToTwoDevicesSoonToOneLateAndNeverAgainstAVoucher) {
   const param::RecoveryParameters n;
-  const auto gives_way_after = [&n](const Ballot& votes) {
+  const auto filter_yields_after = [&n](const Votes& votes) {
     checks::Persistence refused;
     for (std::int64_t us = 1'000'000; us < 20'000'000; us += 100'000) {
       refused.update(true, {us});
-      if (gives_way(refused, votes, {us}, n)) return us - 1'000'000;
+      if (filter_yields(refused, votes, {us}, n)) return us - 1'000'000;
     }
     return std::int64_t{-1};
   };
-  EXPECT_EQ(gives_way_after({.speed = Vote::kAgainst, .speeds_agree = true}), 200'000);
-  EXPECT_EQ(gives_way_after({.fixes = Vote::kAgainst}), 200'000);
-  EXPECT_EQ(gives_way_after({}), n.after_us);
-  EXPECT_EQ(gives_way_after({.speed = Vote::kAbstains, .fixes = Vote::kAbstains}), n.after_us);
-  EXPECT_EQ(gives_way_after({.speed = Vote::kAgainst}), -1) << "three that say three things";
+  EXPECT_EQ(filter_yields_after({.speed = Vote::kAgainst, .speeds_agree = true}), 200'000);
+  EXPECT_EQ(filter_yields_after({.fixes = Vote::kAgainst}), 200'000);
+  EXPECT_EQ(filter_yields_after({}), n.after_us);
+  EXPECT_EQ(filter_yields_after({.speed = Vote::kAbstains, .fixes = Vote::kAbstains}), n.after_us);
+  EXPECT_EQ(filter_yields_after({.speed = Vote::kAgainst}), -1) << "three that say three things";
   for (const Vote vote : {Vote::kFor, Vote::kWaits}) {
-    EXPECT_EQ(gives_way_after({.speed = vote, .fixes = Vote::kAgainst}), -1);
-    EXPECT_EQ(gives_way_after({.speed = Vote::kAgainst, .fixes = vote, .speeds_agree = true}), -1);
+    EXPECT_EQ(filter_yields_after({.speed = vote, .fixes = Vote::kAgainst}), -1);
+    EXPECT_EQ(filter_yields_after({.speed = Vote::kAgainst, .fixes = vote, .speeds_agree = true}), -1);
   }
 }
 

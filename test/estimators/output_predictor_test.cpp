@@ -159,7 +159,7 @@ TEST(OutputPredictor, ItsCellsAreNoMoreThanACache) {
 TEST(OutputPredictor, ItsCellsSayWhatTheirSamplesSay) {
   const param::InertialParameters n;
   const nav::Earth earth;
-  int told = 0;
+  int updates = 0;
   for (unsigned seed = 1; seed <= 20; ++seed) {
     Feed feed(seed, true);
     for (int i = 0; i < 200; ++i) {
@@ -182,10 +182,10 @@ TEST(OutputPredictor, ItsCellsSayWhatTheirSamplesSay) {
       };
       ASSERT_EQ(bits(cells.place().classifier), bits(each.place().classifier));
       ASSERT_LT(cells.place().x.minus(each.place().x).norm(), 0.05F);
-      if (cells.place().reached.us > feed.far.reached.us) ++told;
+      if (cells.place().reached.us > feed.far.reached.us) ++updates;
     }
   }
-  EXPECT_GT(told, 3000);
+  EXPECT_GT(updates, 3000);
 }
 
 /// Over cells, or on from tick to tick: where every sample by itself leads.

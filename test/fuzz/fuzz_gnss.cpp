@@ -27,7 +27,7 @@ void record(const Report& r, Words& out) {
       put(r.itow_ms.has_value());
   put(r.utc.year), put(r.utc.month), put(r.utc.day), put(r.utc.hour), put(r.utc.minute), put(r.utc.second),
       put(r.utc.nano);
-  put(r.utc.date_valid), put(r.utc.time_valid), put(r.time_doubtful), put(r.latitude_2ndeg), put(r.longitude_2ndeg);
+  put(r.utc.date_valid), put(r.utc.time_valid), put(r.time_uncertain), put(r.latitude_2ndeg), put(r.longitude_2ndeg);
   const auto number = [&](float x) {
     if (!base::is_nan(x) && !base::is_finite(x)) fail("an infinite number");
     put(std::bit_cast<std::uint32_t>(x));

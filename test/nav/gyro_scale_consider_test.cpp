@@ -58,7 +58,7 @@ TEST(GyroScaleConsider, TurnsAndWhatIsToldOfTheHeadingAreThoseOfAConsideredScale
   constexpr double kS = static_cast<double>(kScale);
   struct Leg {
     double turn_rad;
-    double told_rad2;  ///< variance of a heading told after it; 0: none is
+    double heading_rad2;  ///< variance of a heading told after it; 0: none is
   };
   const std::vector<std::vector<Leg>> drives{
       {{6.28, 1e-8}, {-6.28, 0}},
@@ -75,10 +75,10 @@ TEST(GyroScaleConsider, TurnsAndWhatIsToldOfTheHeadingAreThoseOfAConsideredScale
         law.turn(leg.turn_rad / 100, kS);
         variance += static_cast<double>(scale.turn(static_cast<float>(leg.turn_rad / 100), kScale));
       }
-      if (leg.told_rad2 > 0) {
-        const double left = leg.told_rad2 / (variance + leg.told_rad2);
-        law.measured(leg.told_rad2, left);
-        scale.told(static_cast<float>(left));
+      if (leg.heading_rad2 > 0) {
+        const double left = leg.heading_rad2 / (variance + leg.heading_rad2);
+        law.measured(leg.heading_rad2, left);
+        scale.heading_measured(static_cast<float>(left));
         variance *= left;
       }
       // On a way back P keeps what it had; it is never too sure, and after all of it as large again as it has to be.

@@ -94,7 +94,8 @@ class Trial {
           as_float((1 + world_.wheel_scale) * drive_.speed_mps(t_) + world_.wheels_mps * normal_()),
           as_float(world_.wheels_mps));
     if (steps_ % 40 != 0) return;
-    const nav::Complex lever = told ? nav::Complex{as_float(lever_b_m(0)), as_float(lever_b_m(1))} : nav::Complex{};
+    const nav::Complex lever =
+        lever_known ? nav::Complex{as_float(lever_b_m(0)), as_float(lever_b_m(1))} : nav::Complex{};
     const Vector3d arm = q_ * lever_b_m;
     if (world_.position_m > 0) {
       const Vector3d at = p_ + arm + Vector3d(30'000, -20'000, 0) + world_.position_m * normal_.vector();
@@ -104,8 +105,8 @@ class Trial {
       if (world_.slow_mps > 0) slow_ = keep * slow_ + world_.slow_mps * std::sqrt(1 - keep * keep) * normal_.vector();
       const Vector3d swing = (arm - q_before * lever_b_m) / kDt_s;
       const Vector3d v = v_ + swing + slow_ + world_.velocity_mps * normal_.vector() + glitch;
-      const double said = world_.receiver_mps > 0 ? world_.receiver_mps : world_.velocity_mps;
-      finder.fuse_velocity(as_float(v(0)), as_float(v(1)), as_float(said), lever);
+      const double stated_mps = world_.receiver_mps > 0 ? world_.receiver_mps : world_.velocity_mps;
+      finder.fuse_velocity(as_float(v(0)), as_float(v(1)), as_float(stated_mps), lever);
     }
   }
   void run(double seconds) {
@@ -126,7 +127,7 @@ class Trial {
   [[nodiscard]] double gyro_bias_z_radps() const { return b_g_(2); }
 
   Vector3d glitch = Vector3d::Zero(), lever_b_m = Vector3d::Zero();
-  bool told = true;  ///< the filter is given the lever
+  bool lever_known = true;  ///< the filter is given the lever
 
  private:
   void move() {
@@ -519,12 +520,12 @@ TEST(YawEstimator, JudgesAnotherHeading) {
 
 TEST(YawEstimator, AnAntennaBesideTheImuIsTakenAlong) {
   for (const bool velocity : {true, false}) {
-    for (const bool told : {true, false}) {
+    for (const bool lever_known : {true, false}) {
       Trial r(kRoverEight, {.position_m = velocity ? 0.0 : 0.05}, 1.0, 21);
       r.lever_b_m = {-1.5, 1.0, 0};
-      r.told = told;
+      r.lever_known = lever_known;
       r.run(40);
-      EXPECT_EQ(told, r.finder.ready() && std::abs(r.error_rad()) < 0.06) << velocity;
+      EXPECT_EQ(lever_known, r.finder.ready() && std::abs(r.error_rad()) < 0.06) << velocity;
     }
   }
 }

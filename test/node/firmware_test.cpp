@@ -48,7 +48,7 @@ class Loop : public ::testing::Test {
     firmware->poll();
   }
   template <class Page>
-  Page said() const {
+  Page published() const {
     const auto page = last<Page>(board.can.sent);
     EXPECT_TRUE(page.has_value());
     return page.value_or(Page{});
@@ -65,9 +65,9 @@ TEST_F(Loop, TicksThatKeepTheirPeriodAreNotLate) {
   board.can.cost = {6'000};
   poll_for(2'000'000);
   EXPECT_GE(ticks(), 195);
-  EXPECT_EQ(said<bus::EstDiagTicks>().ticks_late, 0);
-  EXPECT_EQ(said<bus::EstDiagLoop>().loop_max_us, 6'000U);
-  EXPECT_EQ(said<bus::EstDiagLoop>().tx_high, 7U);
+  EXPECT_EQ(published<bus::EstDiagTicks>().ticks_late, 0);
+  EXPECT_EQ(published<bus::EstDiagLoop>().loop_max_us, 6'000U);
+  EXPECT_EQ(published<bus::EstDiagLoop>().tx_high, 7U);
 }
 
 TEST_F(Loop, ATickThatOverrunsItsPeriodIsCountedOnItsOwnTimer) {
@@ -80,8 +80,8 @@ TEST_F(Loop, ATickThatOverrunsItsPeriodIsCountedOnItsOwnTimer) {
   }
   board.can.cost = {1'000};
   poll_for(2'000'000);
-  EXPECT_GE(said<bus::EstDiagTicks>().ticks_late, slow);
-  EXPECT_LE(said<bus::EstDiagTicks>().ticks_late, slow + slow / 2) << "and the periods it swallowed, if any";
+  EXPECT_GE(published<bus::EstDiagTicks>().ticks_late, slow);
+  EXPECT_LE(published<bus::EstDiagTicks>().ticks_late, slow + slow / 2) << "and the periods it swallowed, if any";
 }
 
 TEST_F(Loop, ATickThatOverrunsItsPeriodIsCountedWhenItFollows) {
@@ -91,8 +91,8 @@ TEST_F(Loop, ATickThatOverrunsItsPeriodIsCountedWhenItFollows) {
     sync(bus::SyncKind::kTick, time_us += 10'000, k);
     poll_for(9'000);
   }
-  EXPECT_EQ(said<bus::EstDiagLoop>().sync, bus::SyncState::kFollowing);
-  EXPECT_GE(said<bus::EstDiagTicks>().ticks_late, 50);
+  EXPECT_EQ(published<bus::EstDiagLoop>().sync, bus::SyncState::kFollowing);
+  EXPECT_GE(published<bus::EstDiagTicks>().ticks_late, 50);
 }
 
 TEST_F(Loop, SyncFramesThatNeverCameAreCountedByTheirCounter) {
@@ -102,14 +102,14 @@ TEST_F(Loop, SyncFramesThatNeverCameAreCountedByTheirCounter) {
   sync(bus::SyncKind::kBegin, time_us, counter);
   const auto step = [&](int by) { sync(bus::SyncKind::kStep, time_us += 10'000, counter += by); };
   for (int k = 0; k < 300; ++k) step(1);
-  EXPECT_EQ(said<bus::EstDiagSync>().sync_gap, 0) << "the counter wraps, nothing is missing";
+  EXPECT_EQ(published<bus::EstDiagSync>().sync_gap, 0) << "the counter wraps, nothing is missing";
   step(3);
   sync(bus::SyncKind::kStep, time_us, counter);      // again
   sync(bus::SyncKind::kStep, time_us, counter - 2);  // one that comes late
   step(1);
   step(2);
   for (int k = 0; k < 120; ++k) step(1);
-  EXPECT_EQ(said<bus::EstDiagSync>().sync_gap, 3);
+  EXPECT_EQ(published<bus::EstDiagSync>().sync_gap, 3);
 }
 
 TEST_F(Loop, ALongLossOfSyncIsCountedAndSoIsAShortOneAfterIt) {
@@ -120,10 +120,10 @@ TEST_F(Loop, ALongLossOfSyncIsCountedAndSoIsAShortOneAfterIt) {
   for (int k = 0; k < 20; ++k) after(1);
   after(201);
   for (int k = 0; k < 120; ++k) after(1);
-  EXPECT_EQ(said<bus::EstDiagSync>().sync_gap, 200);
+  EXPECT_EQ(published<bus::EstDiagSync>().sync_gap, 200);
   after(6);
   for (int k = 0; k < 120; ++k) after(1);
-  EXPECT_EQ(said<bus::EstDiagSync>().sync_gap, 205);
+  EXPECT_EQ(published<bus::EstDiagSync>().sync_gap, 205);
 }
 
 TEST_F(Loop, SyncFramesOfWrongLengthAreCountedAndChangeNothing) {
@@ -138,8 +138,8 @@ TEST_F(Loop, SyncFramesOfWrongLengthAreCountedAndChangeNothing) {
     firmware->poll();
   }
   EXPECT_EQ(ticks(), 120);
-  EXPECT_EQ(said<bus::EstDiagSync>().sync_bad, 50);
-  EXPECT_EQ(said<bus::EstDiagSync>().sync_gap, 0);
+  EXPECT_EQ(published<bus::EstDiagSync>().sync_bad, 50);
+  EXPECT_EQ(published<bus::EstDiagSync>().sync_gap, 0);
 }
 
 }  // namespace

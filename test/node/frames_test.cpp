@@ -44,30 +44,31 @@ MapFrame map_at(const GeoPlace& origin) {
 double metres(const base::Anchored& a) { return 1e-6 * static_cast<double>(a.um()); }
 
 /// An estimate in the tangent frame of the start, so that runs of different maps can be compared.
-struct Said {
+struct Published {
   bool valid = false;
   Three enu_m{};
   double yaw_rad = 0, pitch_rad = 0, roll_rad = 0, sigma_m = 0, sigma_yaw_rad = 0;
 };
 
-Said in_start_frame(const Inertial& estimator, const Context& ctx, const TangentFrame& map, const GeoPlace& start) {
+Published in_start_frame(const Inertial& estimator, const Context& ctx, const TangentFrame& map,
+                         const GeoPlace& start) {
   const estimators::InertialEstimate e = estimator.inertial(ctx);
-  Said said{.valid = e.valid};
-  if (!e.valid) return said;
+  Published published{.valid = e.valid};
+  if (!e.valid) return published;
   const TangentFrame frame(start);
-  said.enu_m = frame.enu_m(map.geodetic({metres(e.state.x), metres(e.state.y), metres(e.state.z)}));
+  published.enu_m = frame.enu_m(map.geodetic({metres(e.state.x), metres(e.state.y), metres(e.state.z)}));
   const nav::Matrix3 r = e.state.q_nb.matrix();
   const auto axis = [&](int c) {
     return map.to_level(start,
                         {static_cast<double>(r(0, c)), static_cast<double>(r(1, c)), static_cast<double>(r(2, c))});
   };
   const Three x = axis(0), y = axis(1), z = axis(2);
-  said.yaw_rad = std::atan2(x[1], x[0]);
-  said.pitch_rad = -std::asin(x[2]);
-  said.roll_rad = std::atan2(y[2], z[2]);
-  said.sigma_m = std::sqrt(0.5 * static_cast<double>(e.covariance<0>() + e.covariance<1>()));
-  said.sigma_yaw_rad = std::sqrt(static_cast<double>(e.covariance<8>()));
-  return said;
+  published.yaw_rad = std::atan2(x[1], x[0]);
+  published.pitch_rad = -std::asin(x[2]);
+  published.roll_rad = std::atan2(y[2], z[2]);
+  published.sigma_m = std::sqrt(0.5 * static_cast<double>(e.covariance<0>() + e.covariance<1>()));
+  published.sigma_yaw_rad = std::sqrt(static_cast<double>(e.covariance<8>()));
+  return published;
 }
 
 /// Runs an estimator through a drive in the map of an origin; judge(drive, said) after every step.
@@ -114,13 +115,14 @@ TEST(Frames, error_is_within_three_sigma_up_to_100_km_as_at_the_origin) {
         int judged = 0, outside = 0, outside_yaw = 0;
         double worst_m = 0;
         run({.start = start, .fastest_mps = 15, .noise = 1}, origin_of(start, distance_m, azimuth_deg), 60,
-            [&](const EarthDrive& drive, const Said& said) {
-              if (!said.valid || drive.us < 15'000'000) return;
+            [&](const EarthDrive& drive, const Published& published) {
+              if (!published.valid || drive.us < 15'000'000) return;
               ++judged;
-              const double off_m = std::hypot(said.enu_m[0] - drive.place_m[0], said.enu_m[1] - drive.place_m[1]);
+              const double off_m =
+                  std::hypot(published.enu_m[0] - drive.place_m[0], published.enu_m[1] - drive.place_m[1]);
               worst_m = std::max(worst_m, off_m);
-              outside += off_m > 3 * std::sqrt(2) * said.sigma_m ? 1 : 0;
-              outside_yaw += apart_rad(said.yaw_rad, drive.yaw_rad) > 3 * said.sigma_yaw_rad ? 1 : 0;
+              outside += off_m > 3 * std::sqrt(2) * published.sigma_m ? 1 : 0;
+              outside_yaw += apart_rad(published.yaw_rad, drive.yaw_rad) > 3 * published.sigma_yaw_rad ? 1 : 0;
             });
         EXPECT_GT(judged, 4'000);
         EXPECT_LE(outside, judged / 100);
@@ -140,25 +142,25 @@ struct Apart {
 /// Law: where the map's origin is, when the run is, and which way it heads changes nothing of what is said of the
 /// robot.
 Apart apart(const EarthDrive::Options& o, const GeoPlace& origin, const EarthDrive::Options& other) {
-  std::vector<Said> here;
-  run(o, o.start, 60, [&](const EarthDrive&, const Said& said) { here.push_back(said); });
+  std::vector<Published> here;
+  run(o, o.start, 60, [&](const EarthDrive&, const Published& published) { here.push_back(published); });
   std::size_t k = 0, compared = 0;
   Apart worst;
   const double turn = other.course_rad - o.course_rad, c = std::cos(turn), s = std::sin(turn);
-  run(other, origin, 60, [&](const EarthDrive& drive, const Said& said) {
-    const Said& row = here[k++];
-    ASSERT_EQ(said.valid, row.valid);
-    if (!said.valid) return;
+  run(other, origin, 60, [&](const EarthDrive& drive, const Published& published) {
+    const Published& row = here[k++];
+    ASSERT_EQ(published.valid, row.valid);
+    if (!published.valid) return;
     ++compared;
     const Three& p = row.enu_m;
-    const double m = std::hypot(said.enu_m[0] - (c * p[0] - s * p[1]), said.enu_m[1] - (s * p[0] + c * p[1]));
-    const double rad = apart_rad(said.yaw_rad, row.yaw_rad + turn);
+    const double m = std::hypot(published.enu_m[0] - (c * p[0] - s * p[1]), published.enu_m[1] - (s * p[0] + c * p[1]));
+    const double rad = apart_rad(published.yaw_rad, row.yaw_rad + turn);
     worst.sigmas = std::max({worst.sigmas, m / row.sigma_m, rad / row.sigma_yaw_rad});
     if (drive.us < other.begin_us + 25'000'000) return;
     worst.m = std::max(worst.m, m);
     worst.rad = std::max(worst.rad, rad);
-    worst.tilt_rad =
-        std::max({worst.tilt_rad, apart_rad(said.pitch_rad, row.pitch_rad), apart_rad(said.roll_rad, row.roll_rad)});
+    worst.tilt_rad = std::max(
+        {worst.tilt_rad, apart_rad(published.pitch_rad, row.pitch_rad), apart_rad(published.roll_rad, row.roll_rad)});
   });
   EXPECT_GT(compared, 4'000U);
   std::printf("  %.3f mm, %.2f urad, tilt %.2f urad, %.4f sigma\n", worst.m * 1e3, worst.rad * 1e6,

@@ -18,7 +18,7 @@ namespace {
 constexpr GeoPlace kHere{59.3, 18.07, 30}, kDateLine{-16.8, 179.99999, 10};
 
 /// Last words of the bus.
-struct Heard {
+struct Received {
   bool pos_valid = false, ever_valid = false;
   std::uint16_t faults = 0;
   sensor::Mode mode = sensor::Mode::kBoot;
@@ -49,10 +49,10 @@ class Robot {
         if constexpr (std::is_same_v<Payload, sensor::GnssPosition>) tamper(given);
         feed(given, us);
       });
-      node_->tick({drive.us}, {}, [this](const base::CanFrame& frame) { hear(frame); });
+      node_->tick({drive.us}, {}, [this](const base::CanFrame& frame) { receive(frame); });
     }
   }
-  Heard heard;
+  Received received;
 
  private:
   using Node = node::Node<node::Estimators<estimators::Inertial>>;
@@ -83,29 +83,29 @@ class Robot {
     put(sample, payload);
     node_->sample(sample);
   }
-  void hear(const base::CanFrame& frame) {
+  void receive(const base::CanFrame& frame) {
     const auto is = [&]<class M>(std::type_identity<M>) -> std::optional<M> {
       if (frame.id != 0x300 + bus::offset_of<M>(0)) return {};
       return bus::decode<M>(bus::payload(frame));
     };
     if (const auto m = is(std::type_identity<bus::EstStatus>{})) {
-      heard.pos_valid = m->pos_valid;
-      heard.faults = m->faults;
-      heard.mode = m->mode;
-      heard.resets = m->reset_ctr;
-      heard.cause = m->reset_cause;
+      received.pos_valid = m->pos_valid;
+      received.faults = m->faults;
+      received.mode = m->mode;
+      received.resets = m->reset_ctr;
+      received.cause = m->reset_cause;
     }
     if (const auto m = is(std::type_identity<bus::EstMotion>{}); m && m->pos_valid) {
-      if (!heard.ever_valid) heard.valid_after_s = 1e-6 * static_cast<double>(drive.us - begin_us_);
-      heard.ever_valid = true;
+      if (!received.ever_valid) received.valid_after_s = 1e-6 * static_cast<double>(drive.us - begin_us_);
+      received.ever_valid = true;
     }
-    if (const auto m = is(std::type_identity<bus::EstPos>{})) heard.x_mm = m->x_raw, heard.y_mm = m->y_raw;
+    if (const auto m = is(std::type_identity<bus::EstPos>{})) received.x_mm = m->x_raw, received.y_mm = m->y_raw;
     if (const auto m = is(std::type_identity<bus::EstOriginLat>{}))
-      heard.origin = m->source, heard.origin_latitude_deg = static_cast<double>(m->lat_raw) * 2e-9;
+      received.origin = m->source, received.origin_latitude_deg = static_cast<double>(m->lat_raw) * 2e-9;
     if (const auto m = is(std::type_identity<bus::EstOriginLon>{}))
-      heard.origin_longitude_deg = static_cast<double>(m->lon_raw) * 2e-9;
+      received.origin_longitude_deg = static_cast<double>(m->lon_raw) * 2e-9;
     if (const auto m = is(std::type_identity<bus::EstOriginHeight>{}))
-      heard.origin_height_m = static_cast<double>(m->height_m);
+      received.origin_height_m = static_cast<double>(m->height_m);
   }
 
   param::Parameters parameters_;
@@ -143,16 +143,16 @@ GeoPlace east_of(const GeoPlace& place, double distance_m) {
 }
 
 void expect_right_at(const Robot& r, const GeoPlace& start, double off_m) {
-  EXPECT_TRUE(r.heard.pos_valid);
-  EXPECT_EQ(r.heard.mode, sensor::Mode::kNominal);
-  EXPECT_EQ(r.heard.origin, sensor::OriginSource::kFirstFix);
-  const GeoPlace origin{r.heard.origin_latitude_deg, r.heard.origin_longitude_deg, r.heard.origin_height_m};
+  EXPECT_TRUE(r.received.pos_valid);
+  EXPECT_EQ(r.received.mode, sensor::Mode::kNominal);
+  EXPECT_EQ(r.received.origin, sensor::OriginSource::kFirstFix);
+  const GeoPlace origin{r.received.origin_latitude_deg, r.received.origin_longitude_deg, r.received.origin_height_m};
   const Three apart = TangentFrame(start).enu_m(origin);
   EXPECT_LT(std::hypot(apart[0], apart[1]), off_m);
   const Three truth = r.drive.in(TangentFrame(origin)).enu_m;
-  EXPECT_NEAR(r.heard.x_mm * 1e-3, truth[0], 0.5);
-  EXPECT_NEAR(r.heard.y_mm * 1e-3, truth[1], 0.5);
-  EXPECT_FALSE(r.heard.fault(sensor::Fault::kOriginOutOfRange));
+  EXPECT_NEAR(r.received.x_mm * 1e-3, truth[0], 0.5);
+  EXPECT_NEAR(r.received.y_mm * 1e-3, truth[1], 0.5);
+  EXPECT_FALSE(r.received.fault(sensor::Fault::kOriginOutOfRange));
 }
 
 TEST(MapOrigin, is_the_first_of_fixes_that_confirm_each_other) {
@@ -160,9 +160,9 @@ TEST(MapOrigin, is_the_first_of_fixes_that_confirm_each_other) {
   std::optional<sensor::GnssPosition> first;
   r.run(40, [&](sensor::GnssPosition& fix) { first = first ? first : fix; });
   expect_right_at(r, kHere, 1);
-  EXPECT_NEAR(r.heard.origin_latitude_deg, static_cast<double>(first->latitude_2ndeg) * 2e-9, 1e-9);
-  EXPECT_NEAR(r.heard.origin_longitude_deg, static_cast<double>(first->longitude_2ndeg) * 2e-9, 1e-9);
-  EXPECT_EQ(r.heard.resets, 0);
+  EXPECT_NEAR(r.received.origin_latitude_deg, static_cast<double>(first->latitude_2ndeg) * 2e-9, 1e-9);
+  EXPECT_NEAR(r.received.origin_longitude_deg, static_cast<double>(first->longitude_2ndeg) * 2e-9, 1e-9);
+  EXPECT_EQ(r.received.resets, 0);
 }
 
 TEST(MapOrigin, a_wrong_first_fix_is_none) {
@@ -172,7 +172,7 @@ TEST(MapOrigin, a_wrong_first_fix_is_none) {
     if (k++ == 0) fix.latitude_2ndeg = fix.longitude_2ndeg = 0;
   });
   expect_right_at(r, kHere, 1);
-  EXPECT_EQ(r.heard.resets, 0);
+  EXPECT_EQ(r.received.resets, 0);
 }
 
 TEST(MapOrigin, fixes_of_another_place_that_confirm_each_other_are_found_out) {
@@ -184,11 +184,11 @@ TEST(MapOrigin, fixes_of_another_place_that_confirm_each_other_are_found_out) {
       if (k++ < wrong) fix.latitude_2ndeg = fix.longitude_2ndeg = 0;
     };
     r.run(wrong * 0.2, tamper);
-    EXPECT_EQ(r.heard.origin_latitude_deg, 0);
+    EXPECT_EQ(r.received.origin_latitude_deg, 0);
     r.run(wrong < 30 ? 30 : 100, tamper);
     expect_right_at(r, kHere, 600);
-    EXPECT_EQ(r.heard.cause, sensor::ResetCause::kNewOrigin);
-    EXPECT_EQ(r.heard.resets, 1);
+    EXPECT_EQ(r.received.cause, sensor::ResetCause::kNewOrigin);
+    EXPECT_EQ(r.received.resets, 1);
   }
 }
 
@@ -196,15 +196,15 @@ TEST(MapOrigin, an_established_one_is_not_given_up_for_a_few_wrong_fixes) {
   for (const int wrong : {1, 5, 50}) {
     Robot r(robot(), at(kHere));
     r.run(40);
-    const double latitude_deg = r.heard.origin_latitude_deg;
+    const double latitude_deg = r.received.origin_latitude_deg;
     r.run(wrong * 0.2, [](sensor::GnssPosition& fix) { fix.latitude_2ndeg = fix.longitude_2ndeg = 0; });
     if (wrong != 5) {
-      EXPECT_EQ(r.heard.fault(sensor::Fault::kOriginOutOfRange), wrong > 5);
+      EXPECT_EQ(r.received.fault(sensor::Fault::kOriginOutOfRange), wrong > 5);
     }
     r.run(20);
     expect_right_at(r, kHere, 1);
-    EXPECT_EQ(r.heard.origin_latitude_deg, latitude_deg);
-    EXPECT_EQ(r.heard.resets, 0);
+    EXPECT_EQ(r.received.origin_latitude_deg, latitude_deg);
+    EXPECT_EQ(r.received.resets, 0);
   }
 }
 
@@ -213,12 +213,13 @@ TEST(MapOrigin, configured_and_out_of_range_has_a_word) {
     SCOPED_TRACE(distance_m);
     Robot r(configured(east_of(kHere, distance_m), 1), at(kHere));
     r.run(30);
-    EXPECT_TRUE(r.heard.fault(sensor::Fault::kOriginOutOfRange));
-    EXPECT_FALSE(r.heard.ever_valid);
-    EXPECT_NE(r.heard.mode, sensor::Mode::kNominal);
-    EXPECT_EQ(r.heard.origin, sensor::OriginSource::kConfigured);
+    EXPECT_TRUE(r.received.fault(sensor::Fault::kOriginOutOfRange));
+    EXPECT_FALSE(r.received.ever_valid);
+    EXPECT_NE(r.received.mode, sensor::Mode::kNominal);
+    EXPECT_EQ(r.received.origin, sensor::OriginSource::kConfigured);
     if (distance_m > 135e3) {
-      EXPECT_TRUE(r.heard.x_mm == 0 || r.heard.x_mm == std::numeric_limits<std::int32_t>::min()) << r.heard.x_mm;
+      EXPECT_TRUE(r.received.x_mm == 0 || r.received.x_mm == std::numeric_limits<std::int32_t>::min())
+          << r.received.x_mm;
     }
   }
 }
@@ -230,12 +231,12 @@ TEST(MapOrigin, configured_and_in_range_is_kept) {
       const GeoPlace origin = east_of(kHere, distance_m);
       Robot r(configured(origin, how), at(kHere));
       r.run(40);
-      EXPECT_TRUE(r.heard.pos_valid);
-      EXPECT_EQ(r.heard.origin, sensor::OriginSource::kConfigured);
-      EXPECT_EQ(r.heard.faults, 0);
+      EXPECT_TRUE(r.received.pos_valid);
+      EXPECT_EQ(r.received.origin, sensor::OriginSource::kConfigured);
+      EXPECT_EQ(r.received.faults, 0);
       const Three truth = r.drive.in(TangentFrame(origin)).enu_m;
-      EXPECT_NEAR(r.heard.x_mm * 1e-3, truth[0], 0.5);
-      EXPECT_NEAR(r.heard.y_mm * 1e-3, truth[1], 0.5);
+      EXPECT_NEAR(r.received.x_mm * 1e-3, truth[0], 0.5);
+      EXPECT_NEAR(r.received.y_mm * 1e-3, truth[1], 0.5);
     }
 }
 
@@ -257,16 +258,16 @@ TEST(MapOrigin, who_drives_out_of_range_is_told_and_comes_back_without_a_reset) 
     o.turns_back_s = 40;
     Robot r(configured(origin, how), o);
     r.run(12);
-    EXPECT_TRUE(r.heard.pos_valid);
-    EXPECT_EQ(r.heard.faults, 0);
+    EXPECT_TRUE(r.received.pos_valid);
+    EXPECT_EQ(r.received.faults, 0);
     r.run(25);
-    EXPECT_FALSE(r.heard.pos_valid);
-    EXPECT_TRUE(r.heard.fault(sensor::Fault::kOriginOutOfRange));
+    EXPECT_FALSE(r.received.pos_valid);
+    EXPECT_TRUE(r.received.fault(sensor::Fault::kOriginOutOfRange));
     r.run(50);
-    EXPECT_TRUE(r.heard.pos_valid);
-    EXPECT_EQ(r.heard.faults, 0);
-    EXPECT_EQ(r.heard.resets, 0);
-    EXPECT_EQ(r.heard.origin, sensor::OriginSource::kConfigured);
+    EXPECT_TRUE(r.received.pos_valid);
+    EXPECT_EQ(r.received.faults, 0);
+    EXPECT_EQ(r.received.resets, 0);
+    EXPECT_EQ(r.received.origin, sensor::OriginSource::kConfigured);
   }
 }
 
@@ -275,7 +276,7 @@ TEST(MapOrigin, a_start_on_the_date_line_takes_no_longer_than_elsewhere) {
   here.run(40);
   there.run(40);
   expect_right_at(there, kDateLine, 1);
-  EXPECT_NEAR(there.heard.valid_after_s, here.heard.valid_after_s, 0.2);
+  EXPECT_NEAR(there.received.valid_after_s, here.received.valid_after_s, 0.2);
 }
 
 }  // namespace

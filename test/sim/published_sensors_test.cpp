@@ -108,7 +108,7 @@ TEST(Sent, every_fault_that_a_robot_accepts_changes_what_it_is_sent_and_no_other
     std::vector<std::string> without;
     std::string bytes;
     for (Sending sending{robot, {}}; sending.next(bytes);) without.push_back(bytes);
-    const std::vector<std::string> act = words(faults_that_act(Sending::options(robot, {})));
+    const std::vector<std::string> act = words(applicable_faults(Sending::options(robot, {})));
     for (const FaultInfo& row : fault_table()) {
       // The robot stands until 10 s; its pose at the start comes with the first tick.
       const std::vector<FaultSetting> faults{{row.fault, base::Micros{14'000'000}, base::Micros{5'000'000}}};

@@ -21,7 +21,7 @@ sim::Truth truth() {
 }
 
 TEST(BiasLeft, WithoutACalibrationIsTheWholeOfIt) {
-  const sim::Truth left = sim::bias_left(truth(), param::Parameters{}, kWarm_degC);
+  const sim::Truth left = sim::residual_bias(truth(), param::Parameters{}, kWarm_degC);
   EXPECT_EQ(left.gyro_bias_b_radps, kGyro_radps);
   EXPECT_EQ(left.accel_bias_b_mps2, kAccel_mps2);
 }
@@ -42,7 +42,7 @@ TEST(BiasLeft, IsWhatTheFirmwareLeavesInASampleAtRest) {
     s.dvelocity_b_mps[i] = static_cast<float>(kInterval_s * (kAccel_mps2[i] + (i == 2 ? sim::kG0 : 0.0)));
   }
   sensor::calibrate(s, n.imu);
-  const sim::Truth left = sim::bias_left(truth(), n, kWarm_degC);
+  const sim::Truth left = sim::residual_bias(truth(), n, kWarm_degC);
   const auto in_body = [&n](const auto& v) {
     return sensor::times(n.inertial.mounting_bs, filter::Vector3{v[0], v[1], v[2]});
   };

@@ -98,14 +98,14 @@ World::Options world_of(const std::string& robot, const param::Parameters& param
   return options;
 }
 
-Judged run(const Case& one, const World::Options& options, const ParameterSettings& told, std::uint64_t seed,
+Judged run(const Case& one, const World::Options& options, const ParameterSettings& stated, std::uint64_t seed,
            double seconds) {
   Listener listener(one.estimator);
   NodeOrigin origin(kBase);
   OriginWatch watch(listener, origin);
   WorldSource source(World(options, seed), kBase, base::Micros{10'000}, seconds_us(seconds));
   Counts counts;
-  with_node_in_process(one.robot, told, kBase, [&](InProcessLink& link) {
+  with_node_in_process(one.robot, stated, kBase, [&](InProcessLink& link) {
     play_lockstep(link, source, watch, {.base = kBase}, counts);
     return 0;
   });
@@ -146,10 +146,10 @@ Judged run(const Case& one, const World::Options& options, const ParameterSettin
 constexpr int kSeeds = 3;
 constexpr double kLength_s = 75;
 
-Judged mean_of(const Case& one, const World::Options& options, const ParameterSettings& told = {}) {
+Judged mean_of(const Case& one, const World::Options& options, const ParameterSettings& stated = {}) {
   Judged mean;
   for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
-    const Judged j = run(one, options, told, seed, kLength_s);
+    const Judged j = run(one, options, stated, seed, kLength_s);
     std::printf("%s, seed %d: NEES %.2f (3), error %.2f of 3 sigma, RMSE %.2f m, %.0f m, %.0f m high\n", one.robot,
                 static_cast<int>(seed), j.nees, j.beyond, j.rmse_m, j.way_m, j.highest_m);
     mean.nees += j.nees / kSeeds;
@@ -185,9 +185,9 @@ INSTANTIATE_TEST_SUITE_P(All, Robots,
 /// The rover's node told of another body; the world has it, or not.
 struct Copy {
   param::Parameters parameters = parameters_of("rover");
-  ParameterSettings told;
-  void set(const char* setting) { told.set(setting, "test"); }
-  void apply() { parameters = told.over(parameters); }
+  ParameterSettings stated;
+  void set(const char* setting) { stated.set(setting, "test"); }
+  void apply() { parameters = stated.over(parameters); }
 };
 
 TEST(Copies, with_another_body_are_simulated_with_that) {
@@ -198,14 +198,14 @@ TEST(Copies, with_another_body_are_simulated_with_that) {
     copy.set(one);
   copy.apply();
   const Case rover{"rover", 2, 80, VehicleKind::kDifferentialDrive};
-  const Judged right = mean_of(rover, world_of("rover", copy.parameters), copy.told);
+  const Judged right = mean_of(rover, world_of("rover", copy.parameters), copy.stated);
   EXPECT_LT(right.nees, 4.5);
   EXPECT_GT(right.nees, 0.3);
   EXPECT_LT(right.beyond, 1.3);
   // The same node in the world of the rover as it was drawn: wheels that are half as large again.
   Copy wheels;
   for (const char* one : {"wheels.drive.left_radius_m=0.15", "wheels.drive.right_radius_m=0.15"}) wheels.set(one);
-  const Judged wrong = run(rover, world_of("rover", parameters_of("rover")), wheels.told, 1, kLength_s);
+  const Judged wrong = run(rover, world_of("rover", parameters_of("rover")), wheels.stated, 1, kLength_s);
   EXPECT_GT(wrong.rmse_m, 3 * right.rmse_m);
 }
 

@@ -69,19 +69,19 @@ std::string first_difference(const std::vector<base::CanFrame>& a, const std::ve
 }
 
 /// hear(k, frame) gets every frame of epoch k.
-template <class Estimators, class Hear>
-void run_as(const param::Parameters& parameters, const std::vector<Epoch>& epochs, Hear& hear) {
+template <class Estimators, class Receive>
+void run_as(const param::Parameters& parameters, const std::vector<Epoch>& epochs, Receive& receive) {
   const auto node = std::make_unique<node::Node<Estimators>>(parameters, bus::Version{});
   for (std::size_t k = 0; k < epochs.size(); ++k) {
     if (epochs[k].tick.begin) node->power_on(*epochs[k].tick.begin);
     for (const base::CanFrame& frame : epochs[k].inputs) node->on_frame(frame);
-    node->tick(epochs[k].tick.time, {}, [&](const base::CanFrame& frame) { hear(k, frame); });
+    node->tick(epochs[k].tick.time, {}, [&](const base::CanFrame& frame) { receive(k, frame); });
   }
 }
-template <class Hear>
-void run(const Robot& robot, const std::vector<Epoch>& epochs, Hear&& hear) {
-  if (robot.inertial) return run_as<robot::rover::Estimators>(robot.parameters, epochs, hear);
-  run_as<robot::rover_landmarks::Estimators>(robot.parameters, epochs, hear);
+template <class Receive>
+void run(const Robot& robot, const std::vector<Epoch>& epochs, Receive&& receive) {
+  if (robot.inertial) return run_as<robot::rover::Estimators>(robot.parameters, epochs, receive);
+  run_as<robot::rover_landmarks::Estimators>(robot.parameters, epochs, receive);
 }
 
 std::vector<base::CanFrame> outputs(const Robot& robot, const std::vector<Epoch>& epochs) {
@@ -177,8 +177,8 @@ int short_windows(const base::CanFrame& frame) {
 template <class Estimators>
 int short_windows(const std::vector<Epoch>& epochs) {
   int count = 0;
-  const auto hear = [&count](std::size_t, const base::CanFrame& frame) { count += short_windows(frame); };
-  run_as<Estimators>(robot::rover::parameters, epochs, hear);
+  const auto receive = [&count](std::size_t, const base::CanFrame& frame) { count += short_windows(frame); };
+  run_as<Estimators>(robot::rover::parameters, epochs, receive);
   return count;
 }
 
@@ -212,7 +212,7 @@ TEST(Late, AFixOfAlmostHalfASecondAgoLeavesTheBytesOfOneOnTime) {
   const auto said = [&](const std::vector<Epoch>& epochs) {
     std::vector<base::CanFrame> all;
     int without_place = 0;
-    const auto hear = [&](std::size_t, const base::CanFrame& frame) {
+    const auto receive = [&](std::size_t, const base::CanFrame& frame) {
       constexpr std::size_t kFused = 2;
       without_place += short_windows(frame);
       if (frame.id == 0x300 + bus::offset_of<bus::EstPos>(kFused) ||
@@ -220,7 +220,7 @@ TEST(Late, AFixOfAlmostHalfASecondAgoLeavesTheBytesOfOneOnTime) {
           frame.id == 0x300 + bus::offset_of<bus::EstStdPose>(kFused))
         all.push_back(frame);
     };
-    run_as<RoverWith<176>>(parameters, epochs, hear);
+    run_as<RoverWith<176>>(parameters, epochs, receive);
     EXPECT_EQ(without_place, 0);
     return all;
   };
@@ -239,12 +239,12 @@ TEST(Constraint, WhatWheelsBringIsNotTakenTwice) {
     param::Parameters parameters = matched_rover();
     parameters.inertial.constrain_every_us = constrain_every_us;
     float last = 0;
-    const auto hear = [&last](std::size_t, const base::CanFrame& frame) {
+    const auto receive = [&last](std::size_t, const base::CanFrame& frame) {
       constexpr std::size_t kFused = 2;
       if (frame.id != 0x300 + bus::offset_of<bus::EstStateStdVel>(kFused)) return;
       if (const auto page = bus::decode<bus::EstStateStdVel>(bus::payload(frame))) last = page->std_vel_up_mps;
     };
-    run_as<robot::rover::Estimators>(parameters, epochs, hear);
+    run_as<robot::rover::Estimators>(parameters, epochs, receive);
     return last;
   };
   const float alone = sigma_up_mps(0), both = sigma_up_mps(20'000);
@@ -347,7 +347,7 @@ TEST(Motion, WheelsWhoseReadingsScatterDoNotSlowTheRobot) {
         robot.parameters.inertial.slip_share = static_cast<float>(kShare / 1.4142);  // two wheels
       }
       const std::vector<Epoch> epochs = made(options, seed, 60);
-      const auto hear = [&](std::size_t k, const base::CanFrame& frame) {
+      const auto receive = [&](std::size_t k, const base::CanFrame& frame) {
         if (k < 1500 || frame.id != 0x300 + bus::offset_of<bus::EstMotion>(1) || epochs[k].truth.speed_mps < 0.5)
           return;
         const auto said = bus::decode<bus::EstMotion>(bus::payload(frame));
@@ -355,7 +355,7 @@ TEST(Motion, WheelsWhoseReadingsScatterDoNotSlowTheRobot) {
         off_mps += static_cast<double>(said->speed_mps) - epochs[k].truth.speed_mps;
         count += 1;
       };
-      run_as<node::Estimators<estimators::Odometry, estimators::Inertial>>(robot.parameters, epochs, hear);
+      run_as<node::Estimators<estimators::Odometry, estimators::Inertial>>(robot.parameters, epochs, receive);
     }
     std::printf("%s: speed off by %.2f mm/s in the mean of %.0f\n", counts ? "counts" : "speeds", 1e3 * off_mps / count,
                 count);

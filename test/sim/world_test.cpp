@@ -410,10 +410,10 @@ TEST(World, moving_the_whole_course_changes_nothing_but_gnss_so_no_other_sensor_
 
 TEST(World, what_a_filter_is_told_is_not_the_truth) {
   World world{{}, 12};
-  const StartPose told = world.start_pose();
+  const StartPose stated = world.start_pose();
   const Truth truth = world.truth();
-  EXPECT_NE(told.x_m, truth.x_m);
-  EXPECT_NE(told.yaw_rad, truth.yaw_rad);
+  EXPECT_NE(stated.x_m, truth.x_m);
+  EXPECT_NE(stated.yaw_rad, truth.yaw_rad);
   const Course course = default_course();
   std::vector<double> survey;
   for (std::uint64_t seed = 1; seed <= 40; ++seed) {

@@ -269,9 +269,9 @@ TEST(EkfMapper, ForgetsWhatWasSeenOnce) {
   once.range_m = 3, once.bearing_rad = 1;
   EXPECT_EQ(mapper.update({&once, 1}, 0)[0].verdict, SightingVerdict::kNewLandmark);
   EXPECT_EQ(mapper.core.map().size(), 1);
-  mapper.update({}, mapper.options.forget_us - 1);
+  mapper.update({}, mapper.options.expiry_us - 1);
   EXPECT_EQ(mapper.core.map().size(), 1);
-  mapper.update({}, mapper.options.forget_us);
+  mapper.update({}, mapper.options.expiry_us);
   EXPECT_EQ(mapper.core.map().size(), 0);
   EXPECT_EQ(mapper.counts().forgotten, 1U);
 }

@@ -28,12 +28,12 @@ TEST(FastSlam, SharedMotionIsTheMotionOfEachParticle) {
       p = filter::propagate(p, own.f, own.q);
       pose = own.x;
     }
-    const PoseBelief belief = shared.from(start);
-    EXPECT_NEAR(belief.mean.x_m, pose.x.minus({}), 1e-5);
-    EXPECT_NEAR(belief.mean.y_m, pose.y.minus({}), 1e-5);
-    EXPECT_NEAR(base::wrap_angle(belief.mean.yaw_rad - pose.yaw_rad), 0, 1e-5);
+    const PosePosterior posterior = shared.from(start);
+    EXPECT_NEAR(posterior.mean.x_m, pose.x.minus({}), 1e-5);
+    EXPECT_NEAR(posterior.mean.y_m, pose.y.minus({}), 1e-5);
+    EXPECT_NEAR(base::wrap_angle(posterior.mean.yaw_rad - pose.yaw_rad), 0, 1e-5);
     for (int c = 0; c < 3; ++c)
-      for (int r = 0; r <= c; ++r) EXPECT_NEAR(belief.p(r, c), p(r, c), 1e-4F) << r << c;
+      for (int r = 0; r <= c; ++r) EXPECT_NEAR(posterior.p(r, c), p(r, c), 1e-4F) << r << c;
   }
 }
 
@@ -61,14 +61,14 @@ TEST(FastSlam, ALandmarksUpdateIsTheAverageOfEqualSightings) {
 }
 
 TEST(FastSlam, DrawsHaveTheProposalsMoments) {
-  PoseBelief belief{.mean = {.x_m = 1, .y_m = -2, .yaw_rad = 3}, .p = {}};
-  belief.p(0, 0) = 0.09F, belief.p(1, 1) = 0.04F, belief.p(2, 2) = 0.01F;
-  belief.p(0, 1) = 0.03F, belief.p(0, 2) = -0.012F, belief.p(1, 2) = 0.002F;
+  PosePosterior posterior{.mean = {.x_m = 1, .y_m = -2, .yaw_rad = 3}, .p = {}};
+  posterior.p(0, 0) = 0.09F, posterior.p(1, 1) = 0.04F, posterior.p(2, 2) = 0.01F;
+  posterior.p(0, 1) = 0.03F, posterior.p(0, 2) = -0.012F, posterior.p(1, 2) = 0.002F;
   constexpr int kDraws = 20'000;
   std::array<std::array<double, 3>, 3> second{};
   std::array<double, 3> first{};
   for (int k = 0; k < kDraws; ++k) {
-    const PlanarOffset drawn = belief.sample(filter::normals_of<3>({1, 2}, 3, static_cast<std::uint32_t>(k)));
+    const PlanarOffset drawn = posterior.sample(filter::normals_of<3>({1, 2}, 3, static_cast<std::uint32_t>(k)));
     const std::array<double, 3> e{d(drawn.x_m) - 1, d(drawn.y_m) + 2, std::remainder(d(drawn.yaw_rad) - 3, 2 * M_PI)};
     for (std::size_t r = 0; r < 3; ++r) {
       first[r] += e[r] / kDraws;
@@ -79,7 +79,7 @@ TEST(FastSlam, DrawsHaveTheProposalsMoments) {
     EXPECT_NEAR(first[r], 0, 0.01);
     for (std::size_t c = 0; c < 3; ++c) {
       const int i = static_cast<int>(r), j = static_cast<int>(c);
-      EXPECT_NEAR(second[r][c], d(belief.p(i, j)), 0.05 * std::sqrt(d(belief.p(i, i)) * d(belief.p(j, j))));
+      EXPECT_NEAR(second[r][c], d(posterior.p(i, j)), 0.05 * std::sqrt(d(posterior.p(i, i)) * d(posterior.p(j, j))));
     }
   }
 }

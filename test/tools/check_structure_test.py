@@ -24,7 +24,7 @@ class Structure(unittest.TestCase):
     def run_tool(self, files, *words):
         with tempfile.TemporaryDirectory() as folder:
             for name, text in files.items():
-                path = os.path.join(folder, "estimators", "inertial", name)
+                path = os.path.normpath(os.path.join(folder, "estimators", "inertial", name))
                 os.makedirs(os.path.dirname(path), exist_ok=True)
                 with open(path, "w", encoding="utf-8") as file:
                     file.write("// SPDX\nnamespace tetap::estimators {\n" + text + "}  // namespace\n")
@@ -54,6 +54,12 @@ class Structure(unittest.TestCase):
         self.green({"a.hpp": struct("A", many(15) + nested)})
         self.red({"a.hpp": struct("A", many(3) + "  struct Part {\n" + many(16) + "  };\n")}, "A::Part has 16")
 
+    def test_parts_of_the_composition(self):
+        ok = {"a.hpp": struct("A", many(1))}
+        self.green(ok | {"../../checks/b.hpp": struct("B", many(15)), "../../filter/c.hpp": struct("C", many(30))})
+        for part in ("checks", "nav"):
+            self.red(ok | {f"../../{part}/b.hpp": struct("B", many(16))}, "B has 16 data members", f"{part}/b.hpp:3:")
+
     def test_what_is_no_member(self):
         self.green({"a.hpp": struct("A", many(15) + "  static constexpr float kLimit = 4.0F, kOther = 2;\n  using Mean = std::array<float, 2>;\n  enum class E { kA, kB };\n"
                                     "  [[nodiscard]] bool holds(int n = 3) const;\n  template <class T>\n  void f(T&& t);\n  // int commented_ = 0;\n")})
@@ -65,9 +71,9 @@ class Structure(unittest.TestCase):
         self.red({"a.hpp": "int A::f(int& a) const {\n  if (a) {\n" + body + "  }\n  return a;\n}\n"}, "A::f() has 63 lines")
 
     def test_only_recovery_changes_the_covariance(self):
-        for write in ("ins_.p(8, 8) += x", "ins.p(3 + i, kYaw) = 0", "p(i, f(j)) *= 2"):
+        for write in ("ins_.p(8, 8) += x", "ins_.p = x", "ins.p += x", "ins.p(3 + i, kYaw) = 0", "p(i, f(j)) *= 2"):
             self.red({"a.hpp": f"inline void f() {{ {write}; }}\n"}, "writes p(r, c)")
-        for verb in ("inflate(8, x)", "reset(0, x)", "start(x, p)", "place(x, y, s)"):
+        for verb in ("inflate(8, x)", "inflate_up(x)", "inflate_along(d, x)", "reset(0, x)", "start(x, p)", "place(x, y, s)"):
             self.red({"sources/a.hpp": f"inline void f() {{ ins_.{verb}; }}\n"}, "only recovery.hpp")
             self.green({"recovery.hpp": f"inline void f() {{ ins.{verb}; }}\n"})
         self.green({"a.hpp": "inline bool f() { const float x = p(8, 8) + p(0, 1); return x == p(1, 1) && x <= p(2, 2); }  // p(8, 8) = 0\n"})

@@ -228,13 +228,15 @@ class Generated(unittest.TestCase):
         with tempfile.TemporaryDirectory() as tree:
             os.makedirs(os.path.join(tree, "src/sensor"))
             os.makedirs(os.path.join(tree, words.SOURCES))
-            self.assertIn("do not carry a state", words.sources(tree))
             with open(os.path.join(tree, words.SOURCE_STATE), "w", encoding="utf-8") as file:
                 file.write("enum class SourceState : std::uint8_t {\n  kStopped,  ///< silent\n  kFusing,\n  kRejecting,  ///< refused\n};\n"
                            "enum class Check : std::uint8_t {\n  kNone,\n  kGate,  ///< innovation gate\n};\n")
             with open(os.path.join(tree, words.SOURCES, "radar_range.hpp"), "w", encoding="utf-8") as file:
                 file.write("status_.rejecting(Check::kGate);")
+            with open(os.path.join(tree, os.path.dirname(words.SOURCES), "fuse.cpp"), "w", encoding="utf-8") as file:
+                file.write("void Inertial::other(int a) {\n  Check::kOther;\n}\nInnovation Inertial::fuse(const sensor::ImuSample& s) {\n  Check::kGate;\n}\n")
             page = words.sources(tree)
+            self.assertIn("Its samples are tested for Gate.", page)
             self.assertIn("| Stopped | 0 | silent |", page)
             self.assertIn("| Rejecting | 2 | refused |", page)
             self.assertIn("| radar range | x |  | x | Gate |", page)

@@ -341,6 +341,7 @@ class TheTable(Tree):
 
     def test_what_is_wrong_in_a_table_is_one_line(self):
         for text, why in (('[[step]]\nname = "a"\ncommand = "true"\ninputs = ["nowhere/*"]', "a: no file is like nowhere"),
+                          ('[[step]]\nname = "a"\ncommand = "true"\ninputs = ["{table.toml,nowhere}"]', "a: no file is like nowhere"),
                           ('[[step]]\nname = "a"\ncommand = "true"\nafter = ["b"]', "a comes after b, which is no step"),
                           ('[[step]]\nname = "a"', "a: command is missing"), ('[[step]]\nname = "a"\ncommand = "true"\nimputs = []', "a: imputs = "),
                           ('[[step]]\nname = "a"\ncommand = "true"\ninputs = ["@b"]', "a: there is no group @b"), ("[[step", "table.toml: ")):

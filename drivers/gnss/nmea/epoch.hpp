@@ -58,14 +58,14 @@ class Epoch {
     if (!has(Sentence::kGga) && !has(Sentence::kGns) && !has(Sentence::kRmc)) return;
     if (parts_.gsa_unused > 0) health.add(Reason::kGsaMode, parts_.gsa_unused);
     if (same_time_ && repeats()) return health.add(Reason::kRepeated);
-    if (same_time_) doubtful_ = kEpochsInDoubt;
-    if (doubtful_ > 0) health.add(Reason::kDoubtfulTime);
+    if (same_time_) uncertain_ = kUncertainEpochs;
+    if (uncertain_ > 0) health.add(Reason::kUncertainTime);
     sink(report());
   }
 
  private:
   using Sums = std::array<std::uint32_t, kSentences>;
-  static constexpr std::uint8_t kEpochsInDoubt = 16;  ///< ours: with new times, until the times are trusted again
+  static constexpr std::uint8_t kUncertainEpochs = 16;  ///< ours: with new times, until the times are trusted again
 
   static constexpr std::size_t index(Sentence s) { return static_cast<std::size_t>(s); }
   static constexpr std::uint32_t bit(Sentence s) { return 1U << static_cast<unsigned>(s); }
@@ -115,8 +115,8 @@ class Epoch {
 
   template <class Sink>
   constexpr void begin(bool same_time, bool differs, Health& health, Sink& sink) {
-    if (same_time && differs) doubtful_ = kEpochsInDoubt;
-    if (!same_time && doubtful_ > 0) --doubtful_;
+    if (same_time && differs) uncertain_ = kUncertainEpochs;
+    if (!same_time && uncertain_ > 0) --uncertain_;
     finish(health, sink);
     end_.begin();
     same_time_ = same_time;
@@ -179,7 +179,7 @@ class Epoch {
   [[nodiscard]] constexpr Report report() const {
     const Parts& p = parts_;
     Report r{.protocol = Protocol::kNmea, .fix = fix(), .utc = utc_};
-    r.time_doubtful = doubtful_ > 0;
+    r.time_uncertain = uncertain_ > 0;
     place(r);
     r.horizontal_acc_m = p.horizontal_acc_m;
     r.vertical_acc_m = p.vertical_acc_m;
@@ -225,8 +225,8 @@ class Epoch {
   std::array<std::array<std::uint8_t, 2>, kSentences> talkers_{};  ///< talker of the first sentence of each kind
   std::uint32_t previous_sum_ = 0;                                 ///< CRC-32 of the last sentence with a time
   std::uint32_t seen_ = 0;
-  std::uint8_t doubtful_ = 0;  ///< epochs whose time is still doubtful; 0: times are trusted
-  bool same_time_ = false;     ///< this epoch has the time of the one before
+  std::uint8_t uncertain_ = 0;  ///< epochs whose time is still doubtful; 0: times are trusted
+  bool same_time_ = false;      ///< this epoch has the time of the one before
   bool open_ = false;
   bool done_ = false;
 };

@@ -16,7 +16,7 @@ namespace tetap::drivers::gnss::ubx {
 /// Flags of a line that is a heading: fix, relative position valid, ambiguities fixed (carrSoln 2), the reference
 /// antenna moves with the robot, nothing extrapolated. Without a moving reference the line ends at a station on the
 /// ground. ArduPilot's driver (AP_GPS_UBLOX, RELPOSNED) asks for the same bits.
-inline constexpr std::uint32_t kRelPosAsked = 0x00FD, kRelPosWanted = 0x0035;
+inline constexpr std::uint32_t kRelPosRequested = 0x00FD, kRelPosRequired = 0x0035;
 inline constexpr std::uint32_t kRelPosHeadingValid = 0x0100, kRelPosNormalised = 0x0200;
 
 /// North, east, down or length: centimetres, and hundredths of them in a byte.
@@ -76,7 +76,7 @@ constexpr void course_of_ends(float east_acc_m, float north_acc_m, Baseline& b) 
     // An accuracy of 0 is none.
     if (f.u4(52) != 0) b.course_acc_rad = f.su4(52, k1e5degPerRad);
   }
-  const bool heading = (flags & kRelPosAsked) == kRelPosWanted && (old || (flags & kRelPosHeadingValid) != 0);
+  const bool heading = (flags & kRelPosRequested) == kRelPosRequired && (old || (flags & kRelPosHeadingValid) != 0);
   b.valid = heading && !base::is_nan(b.course_rad) && has_length(b, mounted_m);
   if (!b.valid) health.add(Reason::kBaseline);
   return b;

@@ -36,14 +36,14 @@ inline constexpr std::array<std::string_view, 6> kConfigStateNames = {"searching
 }
 
 enum class ConfigReason : std::uint8_t {
-  kNoAnswer,    ///< a round through all baud rates without a receiver
-  kTimeout,     ///< a message without acknowledgement in time
-  kRefused,     ///< a message that the receiver did not take
-  kLegacy,      ///< no CFG-VALSET: the older messages
-  kNoPvt,       ///< no NAV-PVT: the older messages instead
-  kBaudKept,    ///< silent after the change of baud rate: the one found stays
-  kLost,        ///< silent while running: configured again
-  kLateAnswer,  ///< an acknowledgement that nothing waited for
+  kNoResponse,    ///< a round through all baud rates without a receiver
+  kTimeout,       ///< a message without acknowledgement in time
+  kRefused,       ///< a message that the receiver did not take
+  kLegacy,        ///< no CFG-VALSET: the older messages
+  kNoPvt,         ///< no NAV-PVT: the older messages instead
+  kBaudKept,      ///< silent after the change of baud rate: the one found stays
+  kLost,          ///< silent while running: configured again
+  kLateResponse,  ///< an acknowledgement that nothing waited for
   kCount
 };
 

@@ -74,7 +74,7 @@ class Configurator {
     const bool ours = state_ == ConfigState::kApply && !settling_ && ack.message_class == message_.message_class() &&
                       ack.message_id == message_.id();
     if (!ours) {
-      if (ack.message_class == kClassCfg && state_ != ConfigState::kChangeBaud) add(ConfigReason::kLateAnswer);
+      if (ack.message_class == kClassCfg && state_ != ConfigState::kChangeBaud) add(ConfigReason::kLateResponse);
       return;
     }
     if (ack.accepted) {
@@ -126,7 +126,7 @@ class Configurator {
   /// First the wanted one, then the list.
   constexpr void next_baud(base::Micros now) {
     if (candidate_ < kBauds.size() && kHasBaud) return listen(kBauds[candidate_++], now);
-    add(ConfigReason::kNoAnswer);
+    add(ConfigReason::kNoResponse);
     end_round(now);
   }
 

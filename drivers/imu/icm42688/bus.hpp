@@ -54,7 +54,7 @@ class Bus {
   }
 
   /// After a reset, or when what is read makes no sense.
-  constexpr void forget_bank() { bank_ = kUnknown; }
+  constexpr void invalidate_bank() { bank_ = kUnknown; }
 
  private:
   static constexpr std::uint8_t kUnknown = 0xFF;

@@ -39,8 +39,8 @@ class Driver {
     health_.state = State::kRunning;
     stream_.interrupt();
     check_due_ = now + kCheckTime;
-    heard_ = now;
-    asked_again_ = false;
+    responded_ = now;
+    retried_ = false;
     checked_ = 0;
   }
 
@@ -82,13 +82,13 @@ class Driver {
       const int bytes = big_endian(head[1], head[2]);
       if (bytes > kFifoBytes) {
         health_.add(Reason::kBadCount);
-        bus_.forget_bank();
+        bus_.invalidate_bank();
       } else {
         if ((head[0] & kFifoFull) != 0) health_.add(Reason::kFifoOverflow);
         if (bytes % settings_.packet_size() != 0) health_.add(Reason::kBadCount);
         if (drain(bytes / settings_.packet_size(), now, sink)) {
-          heard_ = now;
-          asked_again_ = false;
+          responded_ = now;
+          retried_ = false;
         }
       }
     }
@@ -122,7 +122,7 @@ class Driver {
       if (good == count) continue;
       health_.add(kind == PacketKind::kEmpty ? Reason::kFifoShort : Reason::kBadHeader);
       if (kind == PacketKind::kForeign) {
-        bus_.forget_bank();
+        bus_.invalidate_bank();
         flush();
       }
       return went_on;
@@ -138,12 +138,12 @@ class Driver {
   /// Silence: first the bank is selected again, then everything.
   constexpr void watch(base::Micros now) {
     const base::Micros silence{settings_.period_ns() / 50 + 20'000};  // 20 periods and 20 ms
-    const base::Micros since = now - heard_;
+    const base::Micros since = now - responded_;
     if (since < silence) return;
-    if (!asked_again_) {
-      asked_again_ = true;
+    if (!retried_) {
+      retried_ = true;
       health_.add(Reason::kStale);
-      bus_.forget_bank();
+      bus_.invalidate_bank();
     } else if (since >= silence + silence) {
       restart(now, base::Micros{0});
     }
@@ -179,10 +179,10 @@ class Driver {
   Stream stream_;
   SelfTest self_test_{};
   Health health_{};
-  base::Micros check_due_{}, heard_{};
+  base::Micros check_due_{}, responded_{};
   std::size_t checked_ = 0;
   bool polled_ = false;
-  bool asked_again_ = false;
+  bool retried_ = false;
 };
 
 }  // namespace tetap::drivers::icm42688

@@ -10,7 +10,7 @@
 
 namespace tetap::drivers::icm42688 {
 
-enum class Compared : std::uint8_t { kEqual, kDifferent, kNoAnswer };
+enum class Compared : std::uint8_t { kEqual, kDifferent, kNoResponse };
 
 class Startup {
  public:
@@ -47,7 +47,7 @@ class Startup {
   template <class Bus>
   static constexpr Compared compare(Bus& bus, const Field& field, Health& health) {
     std::uint8_t value = 0;
-    if (!ok(bus.read(field.where, value), health)) return Compared::kNoAnswer;
+    if (!ok(bus.read(field.where, value), health)) return Compared::kNoResponse;
     return (value & field.mask) == field.value ? Compared::kEqual : Compared::kDifferent;
   }
 
@@ -73,9 +73,9 @@ class Startup {
 
   template <class Bus>
   constexpr Progress reset(Bus& bus, base::Micros now, Health& health) {
-    bus.forget_bank();
+    bus.invalidate_bank();
     if (!ok(bus.write(kDeviceConfig, kSoftReset), health)) return Progress::kFailed;
-    bus.forget_bank();  // the chip is in bank 0 now (14.59), but it may have missed the command
+    bus.invalidate_bank();  // the chip is in bank 0 now (14.59), but it may have missed the command
     reset_limit_ = now + kResetLimit;
     go(State::kReset, now + kResetTime + kGrain, health);
     return Progress::kBusy;
@@ -102,7 +102,7 @@ class Startup {
       case Compared::kDifferent:
         health.add(Reason::kWrongIdentity);
         return Progress::kFailed;
-      case Compared::kNoAnswer:
+      case Compared::kNoResponse:
         break;
     }
     return Progress::kFailed;

@@ -34,7 +34,7 @@ union Control {
   std::array<char, CMSG_SPACE(sizeof(std::uint32_t)) + CMSG_SPACE(sizeof(timeval))> bytes;
 };
 
-std::string how_to_make(const std::string& interface) {
+std::string setup_hint(const std::string& interface) {
   if (interface.rfind("vcan", 0) == 0)
     return "ip link add dev " + interface + " type vcan && ip link set up " + interface;
   return "ip link set " + interface + " up type can bitrate 500000";
@@ -110,10 +110,10 @@ bool SocketCan::open_socket(std::string& why) {
     return refuse("'" + interface_ + "' is not a name for an interface: 1 to 15 characters");
   interface_.copy(request.ifr_name, sizeof request.ifr_name - 1);
   if (ioctl(socket_, SIOCGIFINDEX, &request) < 0)
-    return refuse("CAN interface " + interface_ + " does not exist; make it with: " + how_to_make(interface_));
+    return refuse("CAN interface " + interface_ + " does not exist; make it with: " + setup_hint(interface_));
   const int index = request.ifr_ifindex;
   if (ioctl(socket_, SIOCGIFHWADDR, &request) == 0 && request.ifr_hwaddr.sa_family != ARPHRD_CAN)
-    return refuse("interface " + interface_ + " is not a CAN interface; make one with: " + how_to_make("vcan0"));
+    return refuse("interface " + interface_ + " is not a CAN interface; make one with: " + setup_hint("vcan0"));
   if (ioctl(socket_, SIOCGIFFLAGS, &request) < 0 || (request.ifr_flags & IFF_UP) == 0)
     return refuse("CAN interface " + interface_ + " is down; start it with: ip link set up " + interface_);
 
@@ -153,7 +153,7 @@ void SocketCan::flush() {
     const int sent = sendmmsg(socket_, &batches_->out[done], static_cast<unsigned>(to_send_ - done), MSG_DONTWAIT);
     if (sent > 0) {
       done += static_cast<std::size_t>(sent);
-      came_back();
+      recovered();
       continue;
     }
     const int reason = errno;
@@ -183,7 +183,7 @@ void SocketCan::went_down() {
   down_ = true;
 }
 
-void SocketCan::came_back() { down_ = false; }
+void SocketCan::recovered() { down_ = false; }
 
 void SocketCan::fill() {
   if (lost_) return;
@@ -192,7 +192,7 @@ void SocketCan::fill() {
   received_ = {};
   if (count > 0) {
     received_.size = static_cast<std::size_t>(count);
-    came_back();
+    recovered();
     return;
   }
   if (count < 0 && errno == ENETDOWN) went_down();
@@ -245,7 +245,7 @@ void SocketCan::wait(base::Micros timeout) {
       lost_ = !open_socket(why);
     }
     if (lost_) return sleep_for(std::min(timeout, kRetryOpen));
-    came_back();
+    recovered();
   }
   const timespec limit{.tv_sec = static_cast<time_t>(timeout.us / 1'000'000),
                        .tv_nsec = static_cast<long>(timeout.us % 1'000'000) * 1000};

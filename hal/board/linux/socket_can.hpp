@@ -59,7 +59,7 @@ class SocketCan {
   void close_socket();
   void fill();
   void went_down();
-  void came_back();
+  void recovered();
 
   std::string interface_;
   SocketCanOptions options_;

@@ -37,7 +37,7 @@ class AidingSources {
     position.begin();
     height.relocated();
     velocity.begin();
-    wheels.encoders().forget_gain();
+    wheels.encoders().invalidate_gain();
     forward.begin(speed_known);
     heading.begin();
   }

@@ -157,7 +157,7 @@ inline void Alignment::fix(const model::GnssFix3d& fix, base::Micros stamp, Head
   }
   // A fix as far away as that is a course at the next one, or an outlier.
   if (!headed_ && !monitor.has_velocity() && !way.far) monitor.fuse_position(fix);
-  way_.go_on(way, fix, yaw_rad, !fixed_);
+  way_.extend_or_restart(way, fix, yaw_rad, !fixed_);
   fixed_ = has_fixes_ = true;
   take_place(fix, n.gnss);
 }

@@ -12,7 +12,8 @@
 namespace tetap::estimators {
 
 /// Wheels that come so soon after the last ones: counts are left to the next difference, speeds are left out.
-[[nodiscard]] constexpr bool is_soon(base::Micros last, base::Micros at, const param::InertialParameters& n) {
+[[nodiscard]] constexpr bool below_min_interval(base::Micros last, base::Micros at,
+                                                const param::InertialParameters& n) {
   return at > last && at - last < base::Micros{n.wheels_every_us};
 }
 
@@ -21,7 +22,8 @@ class EncoderInterval {
   /// Counts are also skipped while a standstill update is pending: it is worth more than counts that do not change.
   [[nodiscard]] bool skips(base::Micros at, bool standstill_pending, base::Micros longest,
                            const param::InertialParameters& n) const {
-    return has_counts() && (is_soon(counted_at_, at, n) || (standstill_pending && at - counted_at_ < longest));
+    return has_counts() &&
+           (below_min_interval(counted_at_, at, n) || (standstill_pending && at - counted_at_ < longest));
   }
   /// Counts that are left out.
   void skip(const sensor::WheelCounts& counts, base::Micros stamp) {
@@ -32,7 +34,7 @@ class EncoderInterval {
   /// Forward speed gained by the IMU within one sample.
   void note_gain(float gained_mps) { gained_mps_ += gained_mps; }
   /// The gain since the last counts is not known.
-  void forget_gain() { gained_mps_ = base::kNan; }
+  void invalidate_gain() { gained_mps_ = base::kNan; }
 
   /// Counts came within 0.1 s.
   [[nodiscard]] bool counts_recently(base::Micros at) const {

@@ -70,7 +70,7 @@ class FilterView {
   /// The filter's last step was without IMU.
   [[nodiscard]] bool imu_missing() const { return parts_.imu.missing(parts_.time); }
   /// No wheels and no speedometer for 1.5 s (a speedometer may come once a second): the IMU alone carries the filter.
-  [[nodiscard]] bool wheels_silent() const;
+  [[nodiscard]] bool wheels_timed_out() const;
   /// Wheels came within 1 s, do not spin, and the filter goes as fast as they do. Not for ever: the filter may be
   /// pinned to them on a ferry, and fixes that were refused for long are right.
   [[nodiscard]] bool wheels_agree() const;
@@ -99,11 +99,11 @@ class FilterView {
   /// A velocity contradicts the filter of late, and where two do, they agree with each other.
   [[nodiscard]] bool speeds_contradict() const;
   /// Stamp of the last IMU sample that was left out, or that leapt; 0: none.
-  [[nodiscard]] base::Micros imu_doubted_at() const { return parts_.imu.doubted_at(); }
+  [[nodiscard]] base::Micros imu_last_suspect() const { return parts_.imu.last_suspect(); }
   /// A receiver's velocity came within 1 s.
   [[nodiscard]] bool velocity_recent() const;
   /// A magnetometer that is not trusted may have led the heading.
-  [[nodiscard]] bool magnetometer_may_mislead() const;
+  [[nodiscard]] bool magnetometer_is_suspect() const;
   [[nodiscard]] const HeadingMonitor& heading_monitor() const { return parts_.heading_monitor; }
   [[nodiscard]] const Recovery& recovery() const { return parts_.recovery; }
 

@@ -15,7 +15,7 @@ inline nav::Vector3 FilterView::axle_mps(const nav::Vector3& v_n_mps) const {
 
 inline checks::WheelSlip::Slip FilterView::slip() const { return parts_.sources.wheels.slip(); }
 
-inline bool FilterView::wheels_silent() const { return parts_.sources.forward.timed_out(stamp()); }
+inline bool FilterView::wheels_timed_out() const { return parts_.sources.forward.timed_out(stamp()); }
 
 inline bool FilterView::wheels_agree() const {
   const AidingSources& s = parts_.sources;
@@ -77,6 +77,6 @@ inline bool FilterView::speeds_contradict() const {
 
 inline bool FilterView::velocity_recent() const { return parts_.sources.velocity.recent(stamp()); }
 
-inline bool FilterView::magnetometer_may_mislead() const { return parts_.sources.magnetometer.may_mislead(stamp()); }
+inline bool FilterView::magnetometer_is_suspect() const { return parts_.sources.magnetometer.is_suspect(stamp()); }
 
 }  // namespace tetap::estimators

@@ -72,7 +72,7 @@ void Inertial::fuse_constraint(base::Micros stamp, const Context& ctx) {
     return;
   const FilterView filter = view(stamp, ctx);
   if (!sources_.forward.starting_conditions(filter)) return;
-  const Witness before = sources_.forward.witness();
+  const DeviceRecord before = sources_.forward.witness();
   static_cast<void>(fuse_forward({.sigma_mps = ForwardReading::kUnknown_mps}, filter));
   sources_.forward.restore(before, filter.slip() == Wheels::Slip::kBoth);
 }

@@ -29,7 +29,7 @@ Innovation Inertial::fuse(const sensor::GnssPosition& fix, base::Micros stamp, c
   if (!sources_.position.continuing_conditions(fix, model, filter))
     return {.verdict = sensor::Verdict::kStale, .failed = Check::kFrozen};
   heading_monitor_.fuse(model);
-  if (filter.wheels_silent() && heading_monitor_.heading_wrong(filter)) {
+  if (filter.wheels_timed_out() && heading_monitor_.heading_wrong(filter)) {
     restart_filter(stamp, sensor::ResetCause::kHeadingWrong, ctx);
     return {.verdict = sensor::Verdict::kRejected, .failed = Check::kHeading};
   }
@@ -96,8 +96,8 @@ Innovation Inertial::fuse(const sensor::GnssVelocity& velocity, base::Micros sta
   z.v_b_mps = filter.axle_mps(z.v_n_mps);
   compare_with_ground(z, filter);
   heading_monitor_.fuse_velocity(z.v_n_mps, z.sigma_mps, n);
-  if (filter.wheels_silent() ? heading_monitor_.heading_wrong(filter)
-                             : heading_monitor_.direction_wrong(z.v_b_mps, z.level_mps(), z.sigma_mps, filter)) {
+  if (filter.wheels_timed_out() ? heading_monitor_.heading_wrong(filter)
+                                : heading_monitor_.direction_wrong(z.v_b_mps, z.level_mps(), z.sigma_mps, filter)) {
     restart_filter(stamp, sensor::ResetCause::kHeadingWrong, ctx);
     return {.verdict = sensor::Verdict::kRejected, .failed = Check::kHeading};
   }
@@ -114,7 +114,7 @@ Innovation Inertial::fuse(const sensor::GnssVelocity& velocity, base::Micros sta
 [[gnu::noinline]] void Inertial::compare_with_ground(const VelocityMeasurement& z, const FilterView& filter) {
   standstill_.update_ground(z.v_n_mps);
   sources_.velocity.note(z, filter);
-  if (sources_.velocity.leapt() || (ins_.stands && filter.wheels_agree())) return;
+  if (sources_.velocity.step_detected() || (ins_.stands && filter.wheels_agree())) return;
   const float off2 = nav::Vector3(z.v_n_mps - ins_.x.v_n_mps).squaredNorm();
   const float v2 = z.v_n_mps(0) * z.v_n_mps(0) + z.v_n_mps(1) * z.v_n_mps(1);
   const float yaw2 = filter.heading_rad2();

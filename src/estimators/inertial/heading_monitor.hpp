@@ -62,7 +62,7 @@ class HeadingMonitor {
   }
 
   /// The motion's heading survives a restart of the filter.
-  void take_over(const HeadingMonitor& from) {
+  void copy_from(const HeadingMonitor& from) {
     if (!from.runs_) return;
     finder_ = from.finder_;
     has_velocity_ = from.has_velocity_;
@@ -95,10 +95,11 @@ class HeadingMonitor {
 /// A magnetometer that is not trusted may have led the heading so surely that velocities alone do not pull it round:
 /// then a smaller difference counts.
 [[gnu::noinline]] inline bool HeadingMonitor::contradicted_by_motion(const FilterView& filter) const {
-  constexpr float kLed_rad = 0.1F, kLedSigmas = 3.0F;
+  constexpr float kSuspectMagnetometer_rad = 0.1F, kSuspectMagnetometerSigmas = 3.0F;
   const float yaw_rad = nav::euler(filter.x().q_nb).yaw_rad, sigma_rad = base::sqrt(filter.heading_rad2());
-  const float sigmas = filter.magnetometer_may_mislead() ? contradicts(yaw_rad, sigma_rad, kLed_rad, kLedSigmas)
-                                                         : contradicts(yaw_rad, sigma_rad);
+  const float sigmas = filter.magnetometer_is_suspect()
+                           ? contradicts(yaw_rad, sigma_rad, kSuspectMagnetometer_rad, kSuspectMagnetometerSigmas)
+                           : contradicts(yaw_rad, sigma_rad);
   return sigmas > 0.0F;
 }
 

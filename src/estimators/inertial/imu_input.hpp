@@ -26,8 +26,8 @@ class ImuInput {
   [[nodiscard]] bool unusable() const { return unusable_; }
   void set_unusable(bool unusable) { unusable_ = unusable; }
   /// Stamp of the last sample that was left out, or that leapt; 0: none.
-  [[nodiscard]] base::Micros doubted_at() const { return doubted_at_; }
-  void doubt(base::Micros stamp) { doubted_at_ = stamp; }
+  [[nodiscard]] base::Micros last_suspect() const { return last_suspect_; }
+  void note_suspect(base::Micros stamp) { last_suspect_ = stamp; }
   /// Time to which the filter last went without IMU; 0: never.
   [[nodiscard]] base::Micros bridged_until() const { return bridged_until_; }
   void set_bridged(base::Micros until) { bridged_until_ = until; }
@@ -51,7 +51,7 @@ class ImuInput {
     health_.hash_state(sink);
     for (int i = 0; i < 3; ++i) sink(rate_b_radps_(i));
     sink(bridged_until_.us);
-    sink(doubted_at_.us);
+    sink(last_suspect_.us);
     sink(static_cast<std::uint32_t>(unusable_));
   }
 
@@ -59,7 +59,7 @@ class ImuInput {
   checks::ImuHealth health_;
   base::Micros bridged_until_;  ///< time to which the filter last went without IMU; 0: never
   nav::Vector3 rate_b_radps_ = nav::Vector3::Zero();
-  base::Micros doubted_at_;  ///< stamp of the last sample that was left out, or that leapt; 0: none
+  base::Micros last_suspect_;  ///< stamp of the last sample that was left out, or that leapt; 0: none
   bool unusable_ = false;
 };
 

@@ -134,7 +134,7 @@ class Inertial {
     return sources_.wheels.encoders().skips(at, standstill_.pending(), kLongest, n);
   }
   [[nodiscard]] bool skips_speed(base::Micros at, const param::InertialParameters& n) const {
-    return is_soon(sources_.forward.fused_at(), at, n);
+    return below_min_interval(sources_.forward.fused_at(), at, n);
   }
   // Tick.
   [[nodiscard]] std::int32_t work_of(const sensor::Sample& sample, const Context& ctx) const;

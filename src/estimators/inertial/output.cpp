@@ -27,7 +27,7 @@ std::uint16_t Inertial::faults() const {
   const checks::ImuHealth& imu = imu_.health();
   raise(sensor::Fault::kWheelSlip, sources_.wheels.slip() != Wheels::Slip::kNone);
   raise(sensor::Fault::kImuClipped, imu.clipped_lately(time_));
-  raise(sensor::Fault::kVibration, imu.shaken());
+  raise(sensor::Fault::kVibration, imu.vibration().shaken());
   raise(sensor::Fault::kSensorStuck, imu.stuck() || sources_.any_stuck(time_));
   raise(sensor::Fault::kInputStale, predictor_.without_imu() && !imu.stuck() && !imu_.unusable());
   return bits;

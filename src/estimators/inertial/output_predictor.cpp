@@ -76,7 +76,7 @@ bool OutputPredictor::rebuild(const Place& far, const sensor::Window& window, co
   // be classified by itself; then samples without a cell.
   add_until(cells_.leaving_until());
   bool skipped = false;
-  bool one_by_one = false;
+  bool samplewise = false;
   const auto catch_up = [&]() {
     if (!skipped) return;
     skipped = false;
@@ -97,7 +97,7 @@ bool OutputPredictor::rebuild(const Place& far, const sensor::Window& window, co
     } else {
       catch_up();
       add_until(cell.last());
-      one_by_one = true;
+      samplewise = true;
     }
   }
   fold(in);
@@ -105,7 +105,7 @@ bool OutputPredictor::rebuild(const Place& far, const sensor::Window& window, co
   add_until({std::numeric_limits<std::int64_t>::max()});
   fold(in);
   if (newest != nullptr) place_.rate_b_radps = rate_of(*newest, n);
-  return one_by_one;
+  return samplewise;
 }
 
 }  // namespace tetap::estimators

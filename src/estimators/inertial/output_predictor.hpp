@@ -69,7 +69,7 @@ class OutputPredictor {
   /// The present is without IMU: no valid sample within the time-out.
   [[nodiscard]] bool without_imu() const { return without_imu_; }
   [[nodiscard]] const nav::InsState& present() const { return present_; }
-  void remember(const nav::InsState& last) { present_ = last; }
+  void set_present(const nav::InsState& last) { present_ = last; }
   [[nodiscard]] const Place& place() const { return place_; }
   /// Stamp of the last sample in the prediction, of whatever class.
   [[nodiscard]] base::Micros last_seen() const { return last_seen_; }

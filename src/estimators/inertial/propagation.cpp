@@ -20,7 +20,7 @@ Innovation Inertial::fuse(const sensor::ImuSample& sample, base::Micros stamp, c
   if (found == checks::ImuClass::kStuck) return imu_stuck(increment, was_stuck, ctx);
   imu_.set_unusable(found <= checks::ImuClass::kSaturated);
   if (imu_.unusable()) {
-    imu_.doubt(stamp);
+    imu_.note_suspect(stamp);
     return {.verdict = sensor::Verdict::kNotUsed, .failed = Check::kValue};
   }
   // All that was true at the last sample has been fused: wheels bring the constraint with them, and twice is too sure.
@@ -77,12 +77,12 @@ Innovation Inertial::propagate(const sensor::ImuSample& sample, const nav::ImuIn
     time_ = stamp;
     return {.verdict = sensor::Verdict::kNotFinite, .failed = Check::kValue};
   }
-  ins_.vibration = imu_.health().noise_factor(n);
+  ins_.vibration = imu_.health().vibration().noise_factor(n);
   if (ins_.pending_s() >= predictor_.schedule().covariance_every_s()) ins_.predict_covariance();
   if (sample.clipped_accel > 0 || sample.clipped_gyro > 0) inflate_clipped(sample, dt_s, n);
-  if (imu_.health().leaps()) {
-    const checks::ImuHealth::Leap& leap = imu_.health().leap();
-    imu_.doubt(stamp);
+  if (imu_.health().vibration().leaps()) {
+    const checks::Vibration::Leap& leap = imu_.health().vibration().leap();
+    imu_.note_suspect(stamp);
     Recovery::inflate_motion(ins_, leap.force_mps2 * dt_s, leap.rate_radps * dt_s);
   }
   time_ = stamp;
@@ -90,7 +90,7 @@ Innovation Inertial::propagate(const sensor::ImuSample& sample, const nav::ImuIn
   if (stamp > predictor_.last_seen()) predictor_.note_correction();  // it left the window before the present had it
   standstill_.update_rate(imu_.rate_b_radps(), dt_s);
   detect_standstill(stamp, ctx);
-  if (view(stamp, ctx).wheels_silent()) {
+  if (view(stamp, ctx).wheels_timed_out()) {
     heading_monitor_.predict(increment, ins_.x.q_nb);
   } else {
     heading_monitor_.stop();
@@ -145,7 +145,7 @@ void Inertial::follow_level(const Context& ctx) {
   time_ += gap;
   follow_level(ctx);
   imu_.set_bridged(time_);
-  sources_.wheels.encoders().forget_gain();
+  sources_.wheels.encoders().invalidate_gain();
   standstill_.interrupt();
 }
 

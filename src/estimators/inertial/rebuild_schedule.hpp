@@ -15,7 +15,7 @@ class RebuildSchedule {
     if (ticks_ == 0) ticks_ = 1;
   }
   /// The present has to follow a correction in the next tick, whatever else is due.
-  void hurry() { ticks_ = 0xFF; }
+  void force_rebuild() { ticks_ = 0xFF; }
   /// Begins a tick at t. True: rebuild now. `deferred`: other work waits for this tick. Intervals need not add up to
   /// the stamps, so even an uncorrected prediction is rebuilt twice a second.
   bool begin_tick(base::Micros t, bool deferred) {
@@ -33,7 +33,7 @@ class RebuildSchedule {
     return rebuilt_;
   }
   /// The rebuild had to classify samples one by one.
-  void note_one_by_one(bool is) { one_by_one_ = is; }
+  void note_samplewise(bool is) { one_by_one_ = is; }
   /// Span over which the covariance may wait for its prediction in this tick: a measurement brings it up to date, and
   /// where this tick may take one, it is left to that.
   [[nodiscard]] float covariance_every_s() const { return !rebuilt_ ? 20e-3F : one_by_one_ ? 30e-3F : 7.5e-3F; }

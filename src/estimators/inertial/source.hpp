@@ -29,7 +29,6 @@ enum class Action : std::uint8_t {
   kResetZero,       ///< reject; the source took a new zero
   kResetPosition,   ///< fuse, after the horizontal position was reset
   kResetHeight,     ///< fuse, after the height was reset
-  kRestartFilter,   ///< reject; the filter begins anew
 };
 
 /// Operands of Recovery; zero where the action needs none.

@@ -154,7 +154,7 @@ class Standstill {
   }
   // A robot that stands turns with the Earth.
   const nav::Vector3 still_b = waiting_.rate_radps - ins.x.q_nb.conjugate().rotate(ins.earth.rate_n_radps);
-  due.model = {.gyro_b_radps = still_b, .sigma_radps = base::sqrt(density / waiting_.s), .doubt = growth};
+  due.model = {.gyro_b_radps = still_b, .sigma_radps = base::sqrt(density / waiting_.s), .variance_factor = growth};
   waiting_.s = 0;
   return due;
 }

@@ -41,7 +41,7 @@ void Inertial::begin(const Context& ctx) {
   const param::InertialParameters& n = ctx.parameters.inertial;
   if (ctx.map_frame.origin != sensor::OriginSource::kNone)
     ins_.earth = nav::Earth::at(ctx.map_frame.frame, n.earth_rate != 0);
-  const float forward_mps = view(time_, ctx).wheels_silent() ? base::kNan : sources_.forward.last_mps();
+  const float forward_mps = view(time_, ctx).wheels_timed_out() ? base::kNan : sources_.forward.last_mps();
   set_level(alignment_.at().x, alignment_.at().y, alignment_.at().z, ctx);
   const Alignment::Start start =
       alignment_.start(tracking() ? &ins_.x : nullptr, level_, heading_monitor_, n, forward_mps);
@@ -57,7 +57,7 @@ void Inertial::relocated() {
   sources_.position.relocated(time_);
   sources_.height.relocated();
   budget_.exhaust();
-  predictor_.schedule().hurry();
+  predictor_.schedule().force_rebuild();
 }
 
 /// As after power on, without a place. The size of the step is measured when the filter runs again, from the last
@@ -71,12 +71,12 @@ void Inertial::relocated() {
   const nav::LocalLevel level = level_;
   base::reinitialise(*this);
   level_ = level;
-  heading_monitor_.take_over(before);
+  heading_monitor_.copy_from(before);
   if (heading_monitor_.runs() && (!trusted || cause == sensor::ResetCause::kHeadingWrong))
     sources_.magnetometer.distrust(t);
   time_ = t;
   set_noise(ctx.parameters.inertial);
-  predictor_.remember(last);
+  predictor_.set_present(last);
   recovery_.report_restart(cause, count);
 }
 

@@ -54,15 +54,15 @@ void Inertial::predict_output(const OutputPredictor::Inputs& in, const sensor::W
     budget_.grant(WorkBudget::kMeasurement + WorkBudget::kImuSample);
     return predictor_.extend(window, in);
   }
-  const bool one_by_one = predictor_.rebuild({.x = ins_.x,
+  const bool samplewise = predictor_.rebuild({.x = ins_.x,
                                               .reached = time_,
                                               .last = imu_.health().last_valid(),
                                               .classifier = imu_.health().classifier(),
                                               .rate_b_radps = imu_.rate_b_radps()},
                                              window, in);
-  predictor_.schedule().note_one_by_one(one_by_one);
+  predictor_.schedule().note_samplewise(samplewise);
   // Then the horizon leaves one of its own samples for later.
-  if (one_by_one && budget_.left() > 1) budget_.spend(WorkBudget::kImuSample);
+  if (samplewise && budget_.left() > 1) budget_.spend(WorkBudget::kImuSample);
 }
 
 void Inertial::advance(base::Micros t, const Context& ctx, const sensor::Window& window) {

@@ -22,33 +22,33 @@ enum class Vote : std::uint8_t {
 };
 
 /// Record of a device's measurements so far: accepted or refused, and when.
-class Witness {
+class DeviceRecord {
  public:
   void update(bool refused, base::Micros stamp) {
     refused_.update(refused, stamp);
-    heard_at_ = stamp;
-    if (!refused) agreed_at_ = stamp;
+    last_measurement_ = stamp;
+    if (!refused) last_accepted_ = stamp;
   }
   [[nodiscard]] const checks::Persistence& refused() const { return refused_; }
   /// First refusal of the present run.
   [[nodiscard]] base::Micros since(base::Micros stamp) const { return stamp - refused_.held_for(stamp); }
-  [[nodiscard]] base::Micros heard_at() const { return heard_at_; }
-  [[nodiscard]] base::Micros agreed_at() const { return agreed_at_; }
+  [[nodiscard]] base::Micros last_measurement() const { return last_measurement_; }
+  [[nodiscard]] base::Micros last_accepted() const { return last_accepted_; }
   /// Time from the last agreement to `stamp`, at most ten seconds: what the filter is off by has grown in it.
-  [[nodiscard]] float disagrees_s(base::Micros stamp) const {
+  [[nodiscard]] float disagreement_s(base::Micros stamp) const {
     constexpr base::Micros kMost{10'000'000};
-    const base::Micros for_ = agreed_at_.us > 0 ? stamp - agreed_at_ : refused_.held_for(stamp);
+    const base::Micros for_ = last_accepted_.us > 0 ? stamp - last_accepted_ : refused_.held_for(stamp);
     return base::seconds(for_ < kMost ? for_ : kMost);
   }
   /// Refused at least three times, the last one within 1.5 s.
   [[nodiscard]] bool contradicts(base::Micros stamp) const {
-    return refused_.count() >= kRefusals && stamp - heard_at_ < base::Micros{1'500'000};
+    return refused_.count() >= kRefusals && checks::recent(last_measurement_, stamp, base::Micros{1'500'000});
   }
   /// kAbstains: a measurement came after `since`; kWaits: one may still come; kAbsent: the device is silent.
   [[nodiscard]] Vote presence(base::Micros since, base::Micros stamp) const {
     constexpr base::Micros kPresent{3'000'000}, kPatience{2'500'000};
-    if (!checks::recent(heard_at_, stamp, kPresent)) return Vote::kAbsent;
-    if (heard_at_ > since) return Vote::kAbstains;
+    if (!checks::recent(last_measurement_, stamp, kPresent)) return Vote::kAbsent;
+    if (last_measurement_ > since) return Vote::kAbstains;
     return stamp - since > kPatience ? Vote::kAbsent : Vote::kWaits;
   }
   /// Vote of a velocity: accepted or refused since.
@@ -58,13 +58,13 @@ class Witness {
     return refused_.holds() ? Vote::kAgainst : Vote::kFor;
   }
   /// The filter gave way: refusals so far were its own error.
-  void forgive() { refused_.reset(); }
+  void reset_refusals() { refused_.reset(); }
   /// The filter begins.
   void begin() { *this = {}; }
   /// Measurements since `before` were of something else: stamps go back to those of `before`.
-  void keep_hearing(const Witness& before) {
-    heard_at_ = before.heard_at_;
-    agreed_at_ = before.agreed_at_;
+  void restore_stamps(const DeviceRecord& before) {
+    last_measurement_ = before.last_measurement_;
+    last_accepted_ = before.last_accepted_;
   }
 
   static constexpr std::int32_t kRefusals = 3;
@@ -72,14 +72,14 @@ class Witness {
   template <class Sink>
   void hash_state(Sink&& sink) const {
     refused_.hash_state(sink);
-    sink(heard_at_.us);
-    sink(agreed_at_.us);
+    sink(last_measurement_.us);
+    sink(last_accepted_.us);
   }
 
  private:
-  checks::Persistence refused_;  ///< refusals in a row
-  base::Micros heard_at_;        ///< stamp of the last measurement; 0: none
-  base::Micros agreed_at_;       ///< stamp of the last one that was accepted; 0: none
+  checks::Persistence refused_;    ///< refusals in a row
+  base::Micros last_measurement_;  ///< stamp of the last measurement; 0: none
+  base::Micros last_accepted_;     ///< stamp of the last one that was accepted; 0: none
 };
 
 /// Innovation of a fix: a level offset, and the mean variance of one axis.
@@ -100,7 +100,7 @@ struct LevelInnovation {
 }
 
 /// Votes on a refused velocity.
-struct Ballot {
+struct Votes {
   Vote speed = Vote::kAbsent;  ///< the other velocity
   Vote fixes = Vote::kAbsent;
   bool speeds_agree = false;  ///< both velocities agree, so that they contradict the filter likewise
@@ -108,12 +108,12 @@ struct Ballot {
 
 /// The filter gives way to a velocity: soon where a second device contradicts it, after RecoveryParameters::after_us
 /// where none vouches for it.
-[[nodiscard]] inline bool gives_way(const checks::Persistence& refused, const Ballot& votes, base::Micros stamp,
-                                    const param::RecoveryParameters& n) {
+[[nodiscard]] inline bool filter_yields(const checks::Persistence& refused, const Votes& votes, base::Micros stamp,
+                                        const param::RecoveryParameters& n) {
   const auto any = [&votes](Vote vote) { return votes.speed == vote || votes.fixes == vote; };
   if (any(Vote::kFor) || any(Vote::kWaits)) return false;
   const bool against = votes.fixes == Vote::kAgainst || (votes.speed == Vote::kAgainst && votes.speeds_agree);
-  if (against) return refused.persists(stamp, base::Micros{200'000}, Witness::kRefusals);
+  if (against) return refused.persists(stamp, base::Micros{200'000}, DeviceRecord::kRefusals);
   return votes.speed != Vote::kAgainst && refused.persists(stamp, base::Micros{n.after_us}, n.at_least);
 }
 

@@ -43,7 +43,7 @@ class WayCourse {
   }
   /// Goes on from a fix, or begins anew there. Turning before the robot has gone anywhere is the gyroscope's bias or a
   /// turn on the spot, and no arc.
-  void go_on(const Way& way, const model::GnssFix3d& fix, float yaw_rad, bool first) {
+  void extend_or_restart(const Way& way, const model::GnssFix3d& fix, float yaw_rad, bool first) {
     const bool anew = first || (way.arc_ends && way.far == far_);
     if (anew) first_x_ = fix.x, first_y_ = fix.y;
     if (anew || way.near) first_yaw_rad_ = yaw_rad, way_s_ = 0;

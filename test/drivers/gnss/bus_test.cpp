@@ -71,9 +71,9 @@ TEST(GnssOverTheBus, TheHeadingOfTwoAntennasIsThatOfTheBodyWhereverTheyAreMounte
           std::cos(yaw) * static_cast<double>(baseline_b_m[0]) - std::sin(yaw) * static_cast<double>(baseline_b_m[1]);
       const double north =
           std::sin(yaw) * static_cast<double>(baseline_b_m[0]) + std::cos(yaw) * static_cast<double>(baseline_b_m[1]);
-      const Heard heard = hear(ubx_frame(1, 0x3C, line(east, north)));
-      ASSERT_EQ(heard.baselines.size(), 1U);
-      const auto heading = heading_of(heard.baselines[0]);
+      const Received received = receive(ubx_frame(1, 0x3C, line(east, north)));
+      ASSERT_EQ(received.baselines.size(), 1U);
+      const auto heading = heading_of(received.baselines[0]);
       ASSERT_TRUE(heading.has_value());
       const sensor::OutsideHeading got = over_the_bus(*heading).payload.heading;
       EXPECT_NEAR(static_cast<double>(got.acc_rad), 0.01, 3e-4);

@@ -44,7 +44,7 @@ TEST(GnssConfiguration, AReceiverWithKeysIsConfiguredFromEveryBaudRate) {
 TEST(GnssConfiguration, AReceiverWithoutKeysIsConfiguredByTheOlderMessages) {
   for (const bool silent : {false, true}) {
     Bench bench(Generation::kM8);
-    bench.receiver.faults.silent_to_unknown = silent;
+    bench.receiver.faults.ignores_unknown = silent;
     ASSERT_TRUE(bench.until(ConfigState::kRunning, 30));
     expect_configured(bench);
     EXPECT_TRUE(bench.driver.configurator().legacy());
@@ -102,7 +102,7 @@ TEST(GnssConfiguration, AnAnswerToAnEarlierTryIsNotTakenForTheNextStep) {
   ASSERT_TRUE(bench.until(ConfigState::kRunning, 60));
   expect_configured(bench);
   EXPECT_GT(bench.count(ConfigReason::kTimeout), 0);
-  EXPECT_GT(bench.count(ConfigReason::kLateAnswer), 0);
+  EXPECT_GT(bench.count(ConfigReason::kLateResponse), 0);
   EXPECT_TRUE(bench.driver.configurator().was_refused(Step::kCov));
   EXPECT_FALSE(bench.driver.configurator().was_refused(Step::kModel));
   EXPECT_FALSE(bench.driver.configurator().was_refused(Step::kPvt));
@@ -129,7 +129,7 @@ TEST(GnssConfiguration, ASilentReceiverIsGivenUpWithBoundedRequestsAndTriedAgain
   Bench bench(Generation::kKeys);
   bench.receiver.faults.mute = true;
   ASSERT_TRUE(bench.until(ConfigState::kGaveUp, 120));
-  EXPECT_EQ(bench.count(ConfigReason::kNoAnswer), ubx::Settings{}.rounds);
+  EXPECT_EQ(bench.count(ConfigReason::kNoResponse), ubx::Settings{}.rounds);
   const int requests = bench.receiver.requests();
   EXPECT_LT(requests, 20);
   bench.run(5);
@@ -170,7 +170,7 @@ TEST(GnssConfiguration, ALineThatTakesThreeBytesAtATimeIsEnoughAndOneThatTakesNo
   Bench stuck(Generation::kKeys);
   stuck.receiver.faults.write_at_most = 0;
   EXPECT_TRUE(stuck.until(ConfigState::kGaveUp, 120));
-  EXPECT_GT(stuck.count(ConfigReason::kNoAnswer), 0);
+  EXPECT_GT(stuck.count(ConfigReason::kNoResponse), 0);
 }
 
 TEST(GnssConfiguration, SettingsThatTheLineCannotCarrySendNothing) {
@@ -197,7 +197,7 @@ TEST(GnssConfiguration, StatesAndReasonsHaveNames) {
   for (std::size_t i = 0; i < static_cast<std::size_t>(ConfigReason::kCount); ++i)
     EXPECT_GT(name(static_cast<ConfigReason>(i)).size(), 3U);
   EXPECT_EQ(name(ConfigState::kGaveUp), "gave up");
-  EXPECT_EQ(name(ConfigReason::kLateAnswer), "late answer");
+  EXPECT_EQ(name(ConfigReason::kLateResponse), "late answer");
 }
 
 TEST(GnssEpochClock, StampsAreAsRegularAsTheReceiverAndNeverLate) {

@@ -70,7 +70,7 @@ inline Bytes operator+(Bytes a, const Bytes& b) {
   return a;
 }
 
-struct Heard {
+struct Received {
   std::vector<Report> reports;
   std::vector<Baseline> baselines;
   std::vector<ubx::Acknowledge> acknowledgements;
@@ -78,28 +78,28 @@ struct Heard {
   Health health;
 };
 
-inline Heard hear(const Bytes& bytes, const ReceiverSettings& settings) {
-  Heard heard;
+inline Received receive(const Bytes& bytes, const ReceiverSettings& settings) {
+  Received received;
   GnssReceiver<> receiver(settings);
   struct {
-    Heard& heard;
-    void operator()(const Report& r) { heard.reports.push_back(r); }
-    void operator()(const Baseline& b) { heard.baselines.push_back(b); }
-    void operator()(const ubx::Acknowledge& a) { heard.acknowledgements.push_back(a); }
-    void operator()(const ubx::Identified&) { ++heard.identified; }
-  } handler{heard};
+    Received& received;
+    void operator()(const Report& r) { received.reports.push_back(r); }
+    void operator()(const Baseline& b) { received.baselines.push_back(b); }
+    void operator()(const ubx::Acknowledge& a) { received.acknowledgements.push_back(a); }
+    void operator()(const ubx::Identified&) { ++received.identified; }
+  } handler{received};
   receiver.on_bytes(bytes, handler);
   receiver.finish(handler);
-  heard.health = receiver.health();
-  return heard;
+  received.health = receiver.health();
+  return received;
 }
-inline Heard hear(const Bytes& bytes, bool checksum_required = true) {
-  return hear(bytes, ReceiverSettings{.nmea_checksum_required = checksum_required});
+inline Received receive(const Bytes& bytes, bool checksum_required = true) {
+  return receive(bytes, ReceiverSettings{.nmea_checksum_required = checksum_required});
 }
 inline Report only(const Bytes& bytes) {
-  const Heard heard = hear(bytes);
-  EXPECT_EQ(heard.reports.size(), 1U);
-  return heard.reports.empty() ? Report{} : heard.reports[0];
+  const Received received = receive(bytes);
+  EXPECT_EQ(received.reports.size(), 1U);
+  return received.reports.empty() ? Report{} : received.reports[0];
 }
 
 /// A line on which prepared bytes come at their times.

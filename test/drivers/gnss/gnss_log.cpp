@@ -23,7 +23,7 @@ void print(const Report& r) {
   const Utc& t = r.utc;
   if (t.date_valid) std::printf(",\"date\":\"%04d-%02d-%02d\"", t.year, t.month, t.day);
   if (t.time_valid) std::printf(",\"tod_s\":%.9f", t.hour * 3600 + t.minute * 60 + t.second + 1e-9 * t.nano);
-  if (r.time_doubtful) std::printf(",\"doubtful\":true");
+  if (r.time_uncertain) std::printf(",\"doubtful\":true");
   if (r.has_position) {
     std::printf(",\"lat\":%.9f,\"lon\":%.9f", static_cast<double>(r.latitude_2ndeg) * 2e-9,
                 static_cast<double>(r.longitude_2ndeg) * 2e-9);

@@ -82,7 +82,7 @@ TEST(UbxHighPrecision, WhatIsNotValidLeavesThePlaceOfPvtAndIsCounted) {
   const auto with = [](std::size_t at, std::int64_t value, std::size_t size) {
     Bytes p = hp();
     put(p, at, value, size);
-    return hear(kPvt + hp_frame(p));
+    return receive(kPvt + hp_frame(p));
   };
   const struct {
     std::size_t at;
@@ -98,15 +98,15 @@ TEST(UbxHighPrecision, WhatIsNotValidLeavesThePlaceOfPvtAndIsCounted) {
              {12, 900'000'001, 4, Reason::kOutOfRange},
              {8, -1'800'000'000, 4, Reason::kOutOfRange}};
   for (const auto& b : bad) {
-    const Heard heard = with(b.at, b.value, b.size);
-    ASSERT_EQ(heard.reports.size(), 1U);
-    EXPECT_EQ(heard.health.of(b.reason), 1U) << b.at;
-    EXPECT_EQ(heard.reports[0].latitude_2ndeg, 440'690'105LL * 50) << b.at;
-    EXPECT_EQ(heard.reports[0].longitude_2ndeg, -1'213'142'468LL * 50) << b.at;
-    EXPECT_TRUE(heard.reports[0].usable());
+    const Received received = with(b.at, b.value, b.size);
+    ASSERT_EQ(received.reports.size(), 1U);
+    EXPECT_EQ(received.health.of(b.reason), 1U) << b.at;
+    EXPECT_EQ(received.reports[0].latitude_2ndeg, 440'690'105LL * 50) << b.at;
+    EXPECT_EQ(received.reports[0].longitude_2ndeg, -1'213'142'468LL * 50) << b.at;
+    EXPECT_TRUE(received.reports[0].usable());
   }
-  EXPECT_EQ(hear(kPvt + hp_frame(Bytes(28, 0))).health.of(Reason::kUbxLength), 1U);
-  const Report other = hear(kPvt + hp_frame(hp(100'200))).reports.at(0);
+  EXPECT_EQ(receive(kPvt + hp_frame(Bytes(28, 0))).health.of(Reason::kUbxLength), 1U);
+  const Report other = receive(kPvt + hp_frame(hp(100'200))).reports.at(0);
   EXPECT_EQ(other.latitude_2ndeg, 440'690'105LL * 50) << "of another epoch";
 }
 
@@ -123,15 +123,15 @@ Bytes rel(std::uint32_t flags = 0x137) {
   return p;
 }
 Bytes rel_frame(const Bytes& payload) { return ubx_frame(0x01, 0x3C, payload); }
-Heard rel_heard(const Bytes& payload, float mounted_m = 0) {
-  return hear(rel_frame(payload), ReceiverSettings{.baseline_m = mounted_m});
+Received received_baseline(const Bytes& payload, float mounted_m = 0) {
+  return receive(rel_frame(payload), ReceiverSettings{.baseline_m = mounted_m});
 }
 
 TEST(UbxBaseline, ItsHeadingIsFromEastCounterClockwiseWithItsAccuracy) {
-  const Heard heard = rel_heard(rel());
-  ASSERT_EQ(heard.baselines.size(), 1U);
-  EXPECT_TRUE(heard.reports.empty());
-  const Baseline& b = heard.baselines[0];
+  const Received received = received_baseline(rel());
+  ASSERT_EQ(received.baselines.size(), 1U);
+  EXPECT_TRUE(received.reports.empty());
+  const Baseline& b = received.baselines[0];
   EXPECT_EQ(b.itow_ms, 100'000U);
   EXPECT_NEAR(b.n_m[0], -0.8734F, 1e-6F);
   EXPECT_NEAR(b.n_m[1], 0.5012F, 1e-6F);
@@ -149,7 +149,7 @@ TEST(UbxBaseline, EveryQuadrantKeepsItsSense) {
   for (int deg = 0; deg <= 360; deg += 15) {
     Bytes p = rel();
     put(p, 24, deg * 100'000, 4);
-    const auto heading = heading_of(rel_heard(p).baselines.at(0));
+    const auto heading = heading_of(received_baseline(p).baselines.at(0));
     ASSERT_TRUE(heading.has_value());
     const double course = deg * M_PI / 180, yaw = static_cast<double>(heading->yaw_rad);
     EXPECT_NEAR(std::cos(yaw), std::sin(course), 1e-6) << deg;  // east
@@ -161,27 +161,27 @@ TEST(UbxBaseline, EveryQuadrantKeepsItsSense) {
 TEST(UbxBaseline, EachFlagThatDeniesAHeadingIsEnoughAndCounted) {
   // Fix, relative position, ambiguities fixed, moving reference, heading: each missing. Float, and both extrapolations.
   for (const std::uint32_t flags : {0x136U, 0x133U, 0x127U, 0x117U, 0x037U, 0x12FU, 0x13FU, 0x177U, 0x1B7U}) {
-    const Heard heard = rel_heard(rel(flags));
-    ASSERT_EQ(heard.baselines.size(), 1U);
-    EXPECT_FALSE(heading_of(heard.baselines[0]).has_value()) << std::hex << flags;
-    EXPECT_EQ(heard.health.of(Reason::kBaseline), 1U) << std::hex << flags;
+    const Received received = received_baseline(rel(flags));
+    ASSERT_EQ(received.baselines.size(), 1U);
+    EXPECT_FALSE(heading_of(received.baselines[0]).has_value()) << std::hex << flags;
+    EXPECT_EQ(received.health.of(Reason::kBaseline), 1U) << std::hex << flags;
   }
   for (const std::uint32_t flags : {0x137U, 0x135U}) {
-    EXPECT_TRUE(heading_of(rel_heard(rel(flags)).baselines.at(0)).has_value()) << std::hex << flags;
-    EXPECT_EQ(rel_heard(rel(flags)).health.of(Reason::kBaseline), 0U);
+    EXPECT_TRUE(heading_of(received_baseline(rel(flags)).baselines.at(0)).has_value()) << std::hex << flags;
+    EXPECT_EQ(received_baseline(rel(flags)).health.of(Reason::kBaseline), 0U);
   }
 }
 
 TEST(UbxBaseline, ALengthThatIsNotThatOfTheAntennasIsNoHeading) {
   for (const float mounted_m : {0.0F, 1.0F, 1.09F, 0.92F})
-    EXPECT_TRUE(rel_heard(rel(), mounted_m).baselines.at(0).valid);
+    EXPECT_TRUE(received_baseline(rel(), mounted_m).baselines.at(0).valid);
   for (const float mounted_m : {0.5F, 0.9F, 1.1F, 1.19F, 5.0F}) {
-    const Heard heard = rel_heard(rel(), mounted_m);
-    EXPECT_FALSE(heard.baselines.at(0).valid) << mounted_m;
-    EXPECT_EQ(heard.health.of(Reason::kBaseline), 1U);
+    const Received received = received_baseline(rel(), mounted_m);
+    EXPECT_FALSE(received.baselines.at(0).valid) << mounted_m;
+    EXPECT_EQ(received.health.of(Reason::kBaseline), 1U);
   }
   // Normalised: the components are those of a unit vector, so there is no length to compare.
-  const Baseline b = rel_heard(rel(0x337), 5.0F).baselines.at(0);
+  const Baseline b = received_baseline(rel(0x337), 5.0F).baselines.at(0);
   EXPECT_TRUE(b.valid);
   EXPECT_TRUE(std::isnan(b.length_m) && std::isnan(b.n_m[0]));
 }
@@ -189,7 +189,7 @@ TEST(UbxBaseline, ALengthThatIsNotThatOfTheAntennasIsNoHeading) {
 TEST(UbxBaseline, AnAccuracyOfZeroIsNone) {
   Bytes p = rel();
   put(p, 52, 0, 4);
-  const auto heading = heading_of(rel_heard(p).baselines.at(0));
+  const auto heading = heading_of(received_baseline(p).baselines.at(0));
   ASSERT_TRUE(heading.has_value());
   EXPECT_TRUE(std::isnan(heading->acc_rad));
 }
@@ -198,9 +198,9 @@ TEST(UbxBaseline, OtherVersionsLengthsAndPartsAreRefused) {
   const auto refused = [](std::size_t at, std::int64_t value, std::size_t size, Reason reason) {
     Bytes p = rel();
     put(p, at, value, size);
-    const Heard heard = rel_heard(p);
-    EXPECT_TRUE(heard.baselines.empty()) << at;
-    EXPECT_EQ(heard.health.of(reason), 1U) << at;
+    const Received received = received_baseline(p);
+    EXPECT_TRUE(received.baselines.empty()) << at;
+    EXPECT_EQ(received.health.of(reason), 1U) << at;
   };
   refused(0, 0, 1, Reason::kUbxVersion);
   refused(0, 2, 1, Reason::kUbxVersion);
@@ -211,9 +211,9 @@ TEST(UbxBaseline, OtherVersionsLengthsAndPartsAreRefused) {
   refused(24, 36'000'001, 4, Reason::kOutOfRange);
   refused(24, -36'000'001, 4, Reason::kOutOfRange);
   for (const std::size_t length : {0U, 39U, 41U, 63U, 65U}) {
-    const Heard heard = rel_heard(Bytes(length, 0));
-    EXPECT_TRUE(heard.baselines.empty());
-    EXPECT_EQ(heard.health.of(Reason::kUbxLength), 1U) << length;
+    const Received received = received_baseline(Bytes(length, 0));
+    EXPECT_TRUE(received.baselines.empty());
+    EXPECT_EQ(received.health.of(Reason::kUbxLength), 1U) << length;
   }
 }
 
@@ -222,9 +222,9 @@ TEST(UbxBaseline, TheHeadingOfVersionZeroFollowsFromTheEndsOfTheLine) {
   put(p, 4, 100'000, 4), put(p, 8, -120, 4), put(p, 12, 90, 4), put(p, 16, 0, 4);
   put(p, 20, -50, 1), put(p, 21, 25, 1);
   put(p, 24, 200, 4), put(p, 28, 50, 4), put(p, 32, 300, 4), put(p, 36, 0x037, 4);
-  const Heard heard = rel_heard(p);
-  ASSERT_EQ(heard.baselines.size(), 1U);
-  const auto heading = heading_of(heard.baselines[0]);
+  const Received received = received_baseline(p);
+  ASSERT_EQ(received.baselines.size(), 1U);
+  const auto heading = heading_of(received.baselines[0]);
   ASSERT_TRUE(heading.has_value());
   const double north = -1.205, east = 0.9025;
   EXPECT_NEAR(static_cast<double>(heading->yaw_rad), std::atan2(north, east), 1e-6);
@@ -232,10 +232,10 @@ TEST(UbxBaseline, TheHeadingOfVersionZeroFollowsFromTheEndsOfTheLine) {
   const double by_n = (std::atan2(north + 1e-6, east) - std::atan2(north - 1e-6, east)) / 2e-6;
   const double by_e = (std::atan2(north, east + 1e-6) - std::atan2(north, east - 1e-6)) / 2e-6;
   EXPECT_NEAR(static_cast<double>(heading->acc_rad), std::hypot(by_n * 0.02, by_e * 0.005), 1e-6);
-  EXPECT_NEAR(static_cast<double>(heard.baselines[0].length_m), std::hypot(north, east), 1e-6);
+  EXPECT_NEAR(static_cast<double>(received.baselines[0].length_m), std::hypot(north, east), 1e-6);
   put(p, 36, 0x017, 4);
-  EXPECT_FALSE(rel_heard(p).baselines.at(0).valid) << "a base that stands on the ground";
-  EXPECT_EQ(rel_heard(p).health.of(Reason::kUbxVersion), 0U);
+  EXPECT_FALSE(received_baseline(p).baselines.at(0).valid) << "a base that stands on the ground";
+  EXPECT_EQ(received_baseline(p).health.of(Reason::kUbxVersion), 0U);
 }
 
 TEST(UbxBaseline, ALateOneDoesNotTearTheEpochsOfThePlace) {
@@ -245,10 +245,10 @@ TEST(UbxBaseline, ALateOneDoesNotTearTheEpochsOfThePlace) {
     put(late, 4, 100'000 + 200 * (k - 1), 4);
     stream = stream + ubx_frame(1, 7, pvt(100'000 + 200 * k)) + rel_frame(late) + hp_frame(hp(100'000 + 200 * k));
   }
-  const Heard heard = hear(stream);
-  EXPECT_EQ(heard.reports.size(), 5U);
-  EXPECT_EQ(heard.baselines.size(), 5U);
-  for (const Report& r : heard.reports) expect_fine(r);
+  const Received received = receive(stream);
+  EXPECT_EQ(received.reports.size(), 5U);
+  EXPECT_EQ(received.baselines.size(), 5U);
+  for (const Report& r : received.reports) expect_fine(r);
 }
 
 /// Stamps of the driver on a line, by time of week.
@@ -389,11 +389,11 @@ TEST(UbxBesideNmea, MessagesWithoutAUsablePlaceSilenceNobody) {
       put(payload, kind.itow_at, 10'000 + 1'000 * i, 4);
       stream = stream + ubx_frame(0x01, kind.id, payload) + sentence(gga(i));
     }
-    const Heard heard = hear(stream);
+    const Received received = receive(stream);
     int fixes = 0;
-    for (const Report& r : heard.reports) fixes += r.protocol == Protocol::kNmea && r.usable() ? 1 : 0;
+    for (const Report& r : received.reports) fixes += r.protocol == Protocol::kNmea && r.usable() ? 1 : 0;
     EXPECT_EQ(fixes, 20) << kind.name;
-    EXPECT_EQ(heard.health.of(Reason::kSecondProtocol), 0U) << kind.name;
+    EXPECT_EQ(received.health.of(Reason::kSecondProtocol), 0U) << kind.name;
   }
 }
 
@@ -405,19 +405,19 @@ TEST(UbxBesideNmea, StatusWithAPlaceStillHoldsNmeaBack) {
     put(status, 0, 10'000 + 1'000 * i, 4), put(llh, 0, 10'000 + 1'000 * i, 4);
     stream = stream + ubx_frame(1, 2, llh) + ubx_frame(1, 3, status) + sentence(gga(i));
   }
-  const Heard heard = hear(stream);
+  const Received received = receive(stream);
   int nmea = 0, ubx = 0;
-  for (const Report& r : heard.reports) (r.protocol == Protocol::kNmea ? nmea : ubx) += 1;
+  for (const Report& r : received.reports) (r.protocol == Protocol::kNmea ? nmea : ubx) += 1;
   EXPECT_EQ(ubx, 20);
   EXPECT_LE(nmea, 1) << "the one before the first place";
-  EXPECT_GE(heard.health.of(Reason::kSecondProtocol), 19U);
+  EXPECT_GE(received.health.of(Reason::kSecondProtocol), 19U);
 }
 
 TEST(UbxBesideNmea, MessagesAndSentencesThatAreNotReadAreCounted) {
-  const Heard heard = hear(ubx_frame(0x01, 0x35, Bytes(8, 0)) + ubx_frame(0x0D, 0x01, Bytes(16, 0)) +
-                           sentence("GPGSV,1,1,00") + sentence("GPGLL,4807.0380,N,01131.0000,E,101010,A"));
-  EXPECT_EQ(heard.health.of(Reason::kUnread), 4U);
-  EXPECT_EQ(hear(kPvt + sentence(gga(1))).health.of(Reason::kUnread), 0U);
+  const Received received = receive(ubx_frame(0x01, 0x35, Bytes(8, 0)) + ubx_frame(0x0D, 0x01, Bytes(16, 0)) +
+                                    sentence("GPGSV,1,1,00") + sentence("GPGLL,4807.0380,N,01131.0000,E,101010,A"));
+  EXPECT_EQ(received.health.of(Reason::kUnread), 4U);
+  EXPECT_EQ(receive(kPvt + sentence(gga(1))).health.of(Reason::kUnread), 0U);
 }
 
 }  // namespace

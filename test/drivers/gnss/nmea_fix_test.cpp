@@ -38,21 +38,21 @@ TEST(NmeaGsa, TheBestModeOfAnEpochIsItsFixInEveryOrderAndTheOthersAreCounted) {
       stream = stream + sentence(rmc(time)) + sentence(gga(time));
       for (const int mode : modes) stream = stream + sentence(gsa(mode, mode == 3 ? "1.5,1.1,1.0" : "99.9,99.9,99.9"));
     }
-    const Heard heard = hear(stream);
-    ASSERT_EQ(heard.reports.size(), 3U);
-    for (const Report& r : heard.reports) {
+    const Received received = receive(stream);
+    ASSERT_EQ(received.reports.size(), 3U);
+    for (const Report& r : received.reports) {
       EXPECT_EQ(r.fix, GnssFix::k3d);
       EXPECT_FLOAT_EQ(r.pdop, 1.5F) << "of the constellation that is used";
       EXPECT_FLOAT_EQ(r.vdop, 1.0F);
     }
-    EXPECT_EQ(heard.health.of(Reason::kGsaMode), 9U) << "three of each epoch";
+    EXPECT_EQ(received.health.of(Reason::kGsaMode), 9U) << "three of each epoch";
   } while (std::next_permutation(modes.begin(), modes.end()));
 }
 
 TEST(NmeaGsa, ModeTwoAtBestIsATwoDimensionalFixAndModeOneThroughoutNone) {
   EXPECT_EQ(only(sentence(gga("101010.00")) + sentence(gsa(1)) + sentence(gsa(2)) + sentence(gsa(1))).fix,
             GnssFix::k2d);
-  const Heard none = hear(sentence(gga("101010.00")) + sentence(gsa(1)) + sentence(gsa(1)));
+  const Received none = receive(sentence(gga("101010.00")) + sentence(gsa(1)) + sentence(gsa(1)));
   ASSERT_EQ(none.reports.size(), 1U);
   EXPECT_EQ(none.reports[0].fix, GnssFix::kNone);
   EXPECT_EQ(none.health.of(Reason::kNoFix), 1U) << "a place that is no fix is counted";
@@ -64,17 +64,17 @@ TEST(NmeaGsa, AConstellationMoreThanInTheEpochBeforeIsWaitedForWhileTheOthersDen
   for (const char* time : {"101010.00", "101011.00"}) stream = stream + sentence(gga(time)) + sentence(gsa(3));
   for (const char* time : {"101012.00", "101013.00"})
     stream = stream + sentence(gga(time)) + sentence(gsa(1)) + sentence(gsa(3));
-  const Heard heard = hear(stream);
-  ASSERT_EQ(heard.reports.size(), 4U);
-  for (const Report& r : heard.reports) EXPECT_EQ(r.fix, GnssFix::k3d);
+  const Received received = receive(stream);
+  ASSERT_EQ(received.reports.size(), 4U);
+  for (const Report& r : received.reports) EXPECT_EQ(r.fix, GnssFix::k3d);
 }
 
 TEST(NmeaGsa, AModeThatDoesNotExistRefusesTheSentence) {
   for (const char* mode : {"0", "4", "-1", "x"}) {
-    const Heard heard =
-        hear(sentence(gga("101010.00")) + sentence("GNGSA,A," + std::string(mode) + ",,,,,,,,,,,,,1,1,1"));
-    EXPECT_EQ(heard.health.of(Reason::kNmeaField), 1U) << mode;
-    EXPECT_EQ(heard.reports.at(0).fix, GnssFix::k3d) << mode;
+    const Received received =
+        receive(sentence(gga("101010.00")) + sentence("GNGSA,A," + std::string(mode) + ",,,,,,,,,,,,,1,1,1"));
+    EXPECT_EQ(received.health.of(Reason::kNmeaField), 1U) << mode;
+    EXPECT_EQ(received.reports.at(0).fix, GnssFix::k3d) << mode;
   }
 }
 
@@ -83,11 +83,11 @@ TEST(NmeaGsa, ASentenceAfterItsEpochIsCountedAndMovesTheEndOfTheNext) {
   for (const char* time : {"101010.00", "101011.00"}) stream = stream + sentence(rmc(time)) + sentence(gga(time));
   for (const char* time : {"101012.00", "101013.00"})
     stream = stream + sentence(rmc(time)) + sentence(gga(time)) + sentence(gsa(2));
-  const Heard heard = hear(stream);
-  ASSERT_EQ(heard.reports.size(), 4U);
-  EXPECT_EQ(heard.health.of(Reason::kLate), 1U);
-  EXPECT_EQ(heard.reports[2].fix, GnssFix::k3d);
-  EXPECT_EQ(heard.reports[3].fix, GnssFix::k2d);
+  const Received received = receive(stream);
+  ASSERT_EQ(received.reports.size(), 4U);
+  EXPECT_EQ(received.health.of(Reason::kLate), 1U);
+  EXPECT_EQ(received.reports[2].fix, GnssFix::k3d);
+  EXPECT_EQ(received.reports[3].fix, GnssFix::k2d);
 }
 
 // ---- quality
@@ -100,17 +100,17 @@ TEST(NmeaQuality, EveryFigureIsDecidedAndWhatIsNoFixIsCounted) {
                {"4", GnssFix::kRtkFixed}, {"5", GnssFix::kRtkFloat},     {"6", GnssFix::kNone},
                {"7", GnssFix::kNone},     {"8", GnssFix::kNone},         {"9", GnssFix::kDifferential}};
   for (const auto& row : table) {
-    const Heard heard = hear(sentence(gga("101010.00", row.quality)));
-    ASSERT_EQ(heard.reports.size(), 1U) << row.quality;
-    EXPECT_EQ(heard.reports[0].fix, row.fix) << row.quality;
-    EXPECT_EQ(position_of(heard.reports[0]).has_value(), row.fix != GnssFix::kNone) << row.quality;
-    EXPECT_EQ(heard.health.of(Reason::kNoFix), row.fix == GnssFix::kNone ? 1U : 0U) << row.quality;
+    const Received received = receive(sentence(gga("101010.00", row.quality)));
+    ASSERT_EQ(received.reports.size(), 1U) << row.quality;
+    EXPECT_EQ(received.reports[0].fix, row.fix) << row.quality;
+    EXPECT_EQ(position_of(received.reports[0]).has_value(), row.fix != GnssFix::kNone) << row.quality;
+    EXPECT_EQ(received.health.of(Reason::kNoFix), row.fix == GnssFix::kNone ? 1U : 0U) << row.quality;
   }
-  const Heard without = hear(sentence(gga("101010.00", "0")));
+  const Received without = receive(sentence(gga("101010.00", "0")));
   EXPECT_EQ(without.reports.at(0).fix, GnssFix::kNone);
   EXPECT_EQ(without.health.of(Reason::kNoFix), 0U) << "no place, nothing refused";
   for (const char* unknown : {"10", "-1", "A"}) {
-    const Heard refused = hear(sentence(gga("101010.00", unknown)));
+    const Received refused = receive(sentence(gga("101010.00", unknown)));
     EXPECT_TRUE(refused.reports.empty()) << unknown;
     EXPECT_EQ(refused.health.of(Reason::kNmeaField), 1U) << unknown;
   }
@@ -156,7 +156,7 @@ TEST(NmeaGns, TheBestLetterOfAllConstellationsIsTheFix) {
       {"NNFN", GnssFix::kRtkFloat}, {"FR", GnssFix::kRtkFixed}, {"P", GnssFix::k3d},   {"NN", GnssFix::kNone},
       {"E", GnssFix::kNone},        {"MN", GnssFix::kNone},     {"S", GnssFix::kNone}, {"EANN", GnssFix::k3d}};
   for (const auto& row : table) EXPECT_EQ(only(sentence(gns("014035.00", row.modes))).fix, row.fix) << row.modes;
-  const Heard unknown = hear(sentence(gns("014035.00", "AX")));
+  const Received unknown = receive(sentence(gns("014035.00", "AX")));
   EXPECT_TRUE(unknown.reports.empty());
   EXPECT_EQ(unknown.health.of(Reason::kNmeaField), 1U);
 }
@@ -203,17 +203,17 @@ Bytes whole_seconds(int fixes) {
 }
 
 TEST(NmeaTime, EveryFixOfASecondIsReportedAndItsTimeIsMarkedAsDoubtful) {
-  const Heard heard = hear(whole_seconds(50));
-  ASSERT_EQ(heard.reports.size(), 50U);
+  const Received received = receive(whole_seconds(50));
+  ASSERT_EQ(received.reports.size(), 50U);
   for (std::size_t i = 0; i < 50; ++i) {
-    EXPECT_TRUE(heard.reports[i].time_doubtful) << i;
-    EXPECT_EQ(heard.reports[i].utc.second, 10 + i / 5);
-    EXPECT_FALSE(std::isnan(heard.reports[i].speed_mps)) << "the speed of its own RMC";
+    EXPECT_TRUE(received.reports[i].time_uncertain) << i;
+    EXPECT_EQ(received.reports[i].utc.second, 10 + i / 5);
+    EXPECT_FALSE(std::isnan(received.reports[i].speed_mps)) << "the speed of its own RMC";
     if (i > 0) {
-      EXPECT_GT(heard.reports[i].longitude_2ndeg, heard.reports[i - 1].longitude_2ndeg);
+      EXPECT_GT(received.reports[i].longitude_2ndeg, received.reports[i - 1].longitude_2ndeg);
     }
   }
-  EXPECT_EQ(heard.health.of(Reason::kDoubtfulTime), 50U);
+  EXPECT_EQ(received.health.of(Reason::kUncertainTime), 50U);
 }
 
 TEST(NmeaTime, TimesThatGoOnAreTrustedAgain) {
@@ -223,32 +223,32 @@ TEST(NmeaTime, TimesThatGoOnAreTrustedAgain) {
     std::snprintf(time, sizeof time, "1011%02d.00", i);
     stream = stream + sentence(gga(time, "1", minute(100 + i)));
   }
-  const Heard heard = hear(stream);
-  ASSERT_EQ(heard.reports.size(), 40U);
-  EXPECT_TRUE(heard.reports[12].time_doubtful);
-  EXPECT_FALSE(heard.reports[39].time_doubtful);
+  const Received received = receive(stream);
+  ASSERT_EQ(received.reports.size(), 40U);
+  EXPECT_TRUE(received.reports[12].time_uncertain);
+  EXPECT_FALSE(received.reports[39].time_uncertain);
 }
 
 TEST(NmeaTime, TwoTalkersOfOneTimeAreOneFix) {
   Bytes stream;
   for (const char* time : {"101010.00", "101011.00", "101012.00"})
     stream = stream + sentence(gga(time)) + sentence("GP" + gga(time, "1", minute(1)).substr(2)) + sentence(rmc(time));
-  const Heard heard = hear(stream);
-  EXPECT_EQ(heard.reports.size(), 3U);
-  EXPECT_EQ(heard.health.of(Reason::kDoubtfulTime), 0U);
+  const Received received = receive(stream);
+  EXPECT_EQ(received.reports.size(), 3U);
+  EXPECT_EQ(received.health.of(Reason::kUncertainTime), 0U);
 }
 
 TEST(NmeaTime, ASentenceOrAnEpochThatComesTwiceIsOneFixAndCounted) {
   const Bytes a = sentence(rmc("101010.00")) + sentence(gga("101010.00"));
   const Bytes b = sentence(rmc("101011.00")) + sentence(gga("101011.00"));
-  const Heard epochs = hear(a + a + b + b);
+  const Received epochs = receive(a + a + b + b);
   EXPECT_EQ(epochs.reports.size(), 2U);
   EXPECT_EQ(epochs.health.of(Reason::kRepeated), 2U);
-  EXPECT_EQ(epochs.health.of(Reason::kDoubtfulTime), 0U);
+  EXPECT_EQ(epochs.health.of(Reason::kUncertainTime), 0U);
   Bytes sentences;
   for (const char* time : {"101010.00", "101011.00"})
     for (const std::string& text : {rmc(time), gga(time)}) sentences = sentences + sentence(text) + sentence(text);
-  const Heard doubled = hear(sentences);
+  const Received doubled = receive(sentences);
   EXPECT_EQ(doubled.reports.size(), 2U);
   EXPECT_EQ(doubled.health.of(Reason::kRepeated), 4U);
   EXPECT_EQ(doubled.reports[0].fix, GnssFix::k3d);
@@ -265,7 +265,7 @@ TEST(NmeaTime, ADoubtfulTimeIsStampedByItsArrival) {
   std::vector<base::Micros> stamps;
   for (; line.now_us < 9'500'000; line.now_us += 1'000)
     driver.poll({line.now_us}, [&](const Report& r, base::Micros stamp) {
-      EXPECT_TRUE(r.time_doubtful);
+      EXPECT_TRUE(r.time_uncertain);
       stamps.push_back(stamp);
     });
   ASSERT_GE(stamps.size(), 39U);

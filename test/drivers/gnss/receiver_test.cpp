@@ -50,10 +50,10 @@ TEST(GnssFraming, ADamagedByteCostsItsOwnFrameAndNoOther) {
       // A length that grew by kilobytes is refused at once, one that grew by less is waited for.
       Bytes stream = kPvt + damaged + last;
       for (int i = 0; i < 10; ++i) stream = stream + more;
-      const Heard heard = hear(stream);
-      ASSERT_EQ(heard.reports.size(), 3U) << at << " bit " << bit;
-      EXPECT_EQ(heard.reports[1].itow_ms, 300'000U);
-      EXPECT_GE(heard.health.of(Reason::kNoise), 1U);
+      const Received received = receive(stream);
+      ASSERT_EQ(received.reports.size(), 3U) << at << " bit " << bit;
+      EXPECT_EQ(received.reports[1].itow_ms, 300'000U);
+      EXPECT_GE(received.health.of(Reason::kNoise), 1U);
     }
   }
 }
@@ -61,32 +61,32 @@ TEST(GnssFraming, ADamagedByteCostsItsOwnFrameAndNoOther) {
 TEST(GnssFraming, EveryCutOfTheStreamLosesAtMostWhatItCutsThrough) {
   const Bytes stream = kPvt + sentence("GPTXT,hello") + ubx_frame(0x01, 0x07, pvt(200'000));
   for (std::size_t cut = 0; cut <= stream.size(); ++cut) {
-    const Heard heard = hear(Bytes(stream.begin() + static_cast<std::ptrdiff_t>(cut), stream.end()));
-    EXPECT_EQ(heard.reports.size(), cut == 0 ? 2U : cut <= stream.size() - 100 ? 1U : 0U) << cut;
+    const Received received = receive(Bytes(stream.begin() + static_cast<std::ptrdiff_t>(cut), stream.end()));
+    EXPECT_EQ(received.reports.size(), cut == 0 ? 2U : cut <= stream.size() - 100 ? 1U : 0U) << cut;
   }
 }
 
 TEST(GnssFraming, WhatIsInsideAFrameOfAnotherProtocolIsNotHeard) {
-  const Heard heard = hear(rtcm_frame(kPvt + sentence(kGga)) + ubx_frame(0x02, 0x15, sentence(kGga)));
-  EXPECT_TRUE(heard.reports.empty());
-  EXPECT_EQ(heard.health.rtcm_frames, 1U);
-  EXPECT_EQ(heard.health.ubx_frames, 1U);
-  EXPECT_EQ(heard.health.nmea_frames, 0U);
+  const Received received = receive(rtcm_frame(kPvt + sentence(kGga)) + ubx_frame(0x02, 0x15, sentence(kGga)));
+  EXPECT_TRUE(received.reports.empty());
+  EXPECT_EQ(received.health.rtcm_frames, 1U);
+  EXPECT_EQ(received.health.ubx_frames, 1U);
+  EXPECT_EQ(received.health.nmea_frames, 0U);
 }
 
 TEST(GnssFraming, AnRtcmFrameOfTheGreatestLengthIsSkippedAndALongerUbxFrameRefused) {
-  const Heard heard = hear(rtcm_frame(Bytes(1023, 0x42)) + ubx_frame(0x02, 0x15, Bytes(1022, 0x42)) + kPvt);
-  EXPECT_EQ(heard.health.rtcm_frames, 1U);
-  EXPECT_EQ(heard.health.of(Reason::kTooLong), 1U);
-  EXPECT_EQ(heard.reports.size(), 1U);
+  const Received received = receive(rtcm_frame(Bytes(1023, 0x42)) + ubx_frame(0x02, 0x15, Bytes(1022, 0x42)) + kPvt);
+  EXPECT_EQ(received.health.rtcm_frames, 1U);
+  EXPECT_EQ(received.health.of(Reason::kTooLong), 1U);
+  EXPECT_EQ(received.reports.size(), 1U);
 }
 
 TEST(GnssFraming, ADamagedRtcmFrameGivesBackWhatWasBehindItsStart) {
   Bytes rtcm = rtcm_frame(Bytes(30, 0x42));
   rtcm[2] = 200;  // its length
-  const Heard heard = hear(rtcm + kPvt + kPvt + kPvt);
-  EXPECT_EQ(heard.health.of(Reason::kRtcmCrc), 1U);
-  EXPECT_EQ(heard.health.ubx_frames, 3U);
+  const Received received = receive(rtcm + kPvt + kPvt + kPvt);
+  EXPECT_EQ(received.health.of(Reason::kRtcmCrc), 1U);
+  EXPECT_EQ(received.health.ubx_frames, 3U);
 }
 
 TEST(GnssFraming, Crc24qHasItsPublishedCheckValue) {
@@ -97,26 +97,26 @@ TEST(GnssFraming, Crc24qHasItsPublishedCheckValue) {
 TEST(GnssFraming, ChecksumsOfSentencesAreRequiredUnlessSaidOtherwise) {
   const std::string bare = "$" + kGga + "\r\n";
   const Bytes without(bare.begin(), bare.end());
-  EXPECT_EQ(hear(without).health.of(Reason::kNmeaNoChecksum), 1U);
-  EXPECT_TRUE(hear(without).reports.empty());
-  EXPECT_EQ(hear(without, false).reports.size(), 1U);
+  EXPECT_EQ(receive(without).health.of(Reason::kNmeaNoChecksum), 1U);
+  EXPECT_TRUE(receive(without).reports.empty());
+  EXPECT_EQ(receive(without, false).reports.size(), 1U);
   for (std::size_t at = 1; at + 5 < sentence(kGga).size(); ++at) {
     Bytes wrong = sentence(kGga);
     wrong[at] = wrong[at] == '5' ? '6' : '5';
-    EXPECT_TRUE(hear(wrong, false).reports.empty()) << at;
+    EXPECT_TRUE(receive(wrong, false).reports.empty()) << at;
   }
   Bytes small = sentence(kGga);
   for (std::size_t i = small.size() - 4; i < small.size(); ++i)
     small[i] = static_cast<std::uint8_t>(std::tolower(small[i]));
-  EXPECT_EQ(hear(small).reports.size(), 1U);
+  EXPECT_EQ(receive(small).reports.size(), 1U);
 }
 
 TEST(GnssFraming, SentencesThatAreCutShortTooLongOrNoTextAreNamed) {
   const Bytes whole = sentence(kGga);
-  EXPECT_EQ(hear(Bytes(whole.begin(), whole.begin() + 20) + whole).health.of(Reason::kNmeaCutShort), 1U);
-  EXPECT_EQ(hear(sentence("GPGGA," + std::string(200, '1'))).health.of(Reason::kTooLong), 1U);
-  EXPECT_EQ(hear(sentence("GPGGA,\x01")).health.of(Reason::kNmeaBadCharacter), 1U);
-  EXPECT_EQ(hear(Bytes(whole.begin(), whole.begin() + 20)).health.of(Reason::kGap), 1U);
+  EXPECT_EQ(receive(Bytes(whole.begin(), whole.begin() + 20) + whole).health.of(Reason::kNmeaCutShort), 1U);
+  EXPECT_EQ(receive(sentence("GPGGA," + std::string(200, '1'))).health.of(Reason::kTooLong), 1U);
+  EXPECT_EQ(receive(sentence("GPGGA,\x01")).health.of(Reason::kNmeaBadCharacter), 1U);
+  EXPECT_EQ(receive(Bytes(whole.begin(), whole.begin() + 20)).health.of(Reason::kGap), 1U);
 }
 
 TEST(GnssFraming, AGapGivesUpTheFrameAndFindsTheOneWithinIt) {
@@ -131,14 +131,14 @@ TEST(GnssFraming, AGapGivesUpTheFrameAndFindsTheOneWithinIt) {
 }
 
 TEST(GnssFraming, AnswersToConfigurationAreHandedOn) {
-  const Heard heard = hear(ubx_frame(0x05, 1, {0x06, 0x8A}) + ubx_frame(0x05, 0, {0x06, 0x01}) +
-                           ubx_frame(0x0A, 0x04, Bytes(100, 0)) + ubx_frame(0x05, 1, {0x06}));
-  ASSERT_EQ(heard.acknowledgements.size(), 2U);
-  EXPECT_TRUE(heard.acknowledgements[0].accepted);
-  EXPECT_EQ(heard.acknowledgements[0].message_id, 0x8A);
-  EXPECT_FALSE(heard.acknowledgements[1].accepted);
-  EXPECT_EQ(heard.identified, 1);
-  EXPECT_EQ(heard.health.of(Reason::kUbxLength), 1U);
+  const Received received = receive(ubx_frame(0x05, 1, {0x06, 0x8A}) + ubx_frame(0x05, 0, {0x06, 0x01}) +
+                                    ubx_frame(0x0A, 0x04, Bytes(100, 0)) + ubx_frame(0x05, 1, {0x06}));
+  ASSERT_EQ(received.acknowledgements.size(), 2U);
+  EXPECT_TRUE(received.acknowledgements[0].accepted);
+  EXPECT_EQ(received.acknowledgements[0].message_id, 0x8A);
+  EXPECT_FALSE(received.acknowledgements[1].accepted);
+  EXPECT_EQ(received.identified, 1);
+  EXPECT_EQ(received.health.of(Reason::kUbxLength), 1U);
 }
 
 // ---- UBX
@@ -188,21 +188,21 @@ TEST(Ubx, APlaceThatIsNotOnEarthAndATimeThatIsNoneAreRefused) {
   const auto ctx = [](std::size_t at, std::int64_t value, std::size_t size) {
     Bytes p = pvt();
     put(p, at, value, size);
-    return hear(ubx_frame(0x01, 0x07, p));
+    return receive(ubx_frame(0x01, 0x07, p));
   };
   for (const std::int64_t lat : {900'000'001LL, -900'000'001LL, -2'147'483'648LL}) {
-    const Heard heard = ctx(28, lat, 4);
-    EXPECT_FALSE(heard.reports.at(0).usable());
-    EXPECT_EQ(heard.health.of(Reason::kOutOfRange), 1U);
-    EXPECT_FALSE(position_of(heard.reports[0]).has_value());
+    const Received received = ctx(28, lat, 4);
+    EXPECT_FALSE(received.reports.at(0).usable());
+    EXPECT_EQ(received.health.of(Reason::kOutOfRange), 1U);
+    EXPECT_FALSE(position_of(received.reports[0]).has_value());
   }
   EXPECT_FALSE(ctx(24, 1'800'000'001, 4).reports.at(0).usable());
   EXPECT_TRUE(ctx(24, 1'800'000'000, 4).reports.at(0).usable());
   EXPECT_FALSE(ctx(78, 1, 1).reports.at(0).usable()) << "flags3.invalidLlh";
-  const Heard fast = ctx(48, 2'000'000, 4);
+  const Received fast = ctx(48, 2'000'000, 4);
   EXPECT_FALSE(velocity_of(fast.reports.at(0)).has_value());
   EXPECT_EQ(fast.health.of(Reason::kOutOfRange), 1U);
-  const Heard date = ctx(7, 31, 1);
+  const Received date = ctx(7, 31, 1);
   EXPECT_FALSE(date.reports.at(0).utc.date_valid);
   EXPECT_EQ(date.health.of(Reason::kBadTime), 1U);
   EXPECT_FALSE(ctx(11, 0, 1).reports.at(0).utc.time_valid);
@@ -210,9 +210,9 @@ TEST(Ubx, APlaceThatIsNotOnEarthAndATimeThatIsNoneAreRefused) {
 
 TEST(Ubx, MessagesOfAWrongLengthAreRefused) {
   for (const std::size_t length : {0U, 4U, 83U, 85U, 91U, 93U, 100U}) {
-    const Heard heard = hear(ubx_frame(0x01, 0x07, Bytes(length, 0)));
-    EXPECT_TRUE(heard.reports.empty());
-    EXPECT_EQ(heard.health.of(Reason::kUbxLength), 1U) << length;
+    const Received received = receive(ubx_frame(0x01, 0x07, Bytes(length, 0)));
+    EXPECT_TRUE(received.reports.empty());
+    EXPECT_EQ(received.health.of(Reason::kUbxLength), 1U) << length;
   }
 }
 
@@ -228,12 +228,12 @@ TEST(Ubx, NavCovOfTheSameEpochBecomesEastNorthUp) {
 }
 
 TEST(Ubx, NavCovOfAnotherEpochOrVersionOrWithoutSenseIsNotUsed) {
-  const Heard other = hear(kPvt + ubx_frame(0x01, 0x36, cov(100'200)));
+  const Received other = receive(kPvt + ubx_frame(0x01, 0x36, cov(100'200)));
   ASSERT_EQ(other.reports.size(), 1U);
   EXPECT_FALSE(other.reports[0].position_cov_m2.has_value());
   Bytes version = cov(100'000);
   version[4] = 1;
-  const Heard refused = hear(kPvt + ubx_frame(0x01, 0x36, version));
+  const Received refused = receive(kPvt + ubx_frame(0x01, 0x36, version));
   EXPECT_FALSE(refused.reports.at(0).position_cov_m2.has_value());
   EXPECT_EQ(refused.health.of(Reason::kUbxVersion), 1U);
   for (const float bad :
@@ -335,7 +335,7 @@ TEST(Nmea, GgaAndRmcOfAnyTalkerMakeOneReport) {
     EXPECT_TRUE(std::isnan(r.horizontal_acc_m));
     EXPECT_EQ(r.utc, (Utc{2024, 2, 28, 23, 59, 59, 200'000'000, true, true}));
   }
-  EXPECT_TRUE(hear(sentence("PUBX" + kGga.substr(4))).reports.empty());
+  EXPECT_TRUE(receive(sentence("PUBX" + kGga.substr(4))).reports.empty());
 }
 
 TEST(Nmea, DilutionAndAccuracyComeFromGsaAndGst) {
@@ -387,17 +387,17 @@ TEST(Nmea, AFixWithoutSatellitesIsNone) {
 }
 
 TEST(Nmea, EmptyFieldsAreNoErrorAndNoFix) {
-  const Heard heard =
-      hear(sentence("GNRMC,,V,,,,,,,,,,N") + sentence("GNVTG,,,,,,,,,N") + sentence("GNGGA,,,,,,0,00,99.99,,,,,,") +
-           sentence("GNGSA,A,1,,,,,,,,,,,,,99.99,99.99,99.99") + sentence("GNRMC,,V,,,,,,,,,,N"));
-  EXPECT_EQ(heard.reports.size(), 2U) << "the same sentence again is the next epoch";
-  for (const Report& r : heard.reports) {
+  const Received received =
+      receive(sentence("GNRMC,,V,,,,,,,,,,N") + sentence("GNVTG,,,,,,,,,N") + sentence("GNGGA,,,,,,0,00,99.99,,,,,,") +
+              sentence("GNGSA,A,1,,,,,,,,,,,,,99.99,99.99,99.99") + sentence("GNRMC,,V,,,,,,,,,,N"));
+  EXPECT_EQ(received.reports.size(), 2U) << "the same sentence again is the next epoch";
+  for (const Report& r : received.reports) {
     EXPECT_EQ(r.fix, GnssFix::kNone);
     EXPECT_FALSE(r.has_position);
     EXPECT_FALSE(r.utc.time_valid);
     EXPECT_TRUE(std::isnan(r.speed_mps));
   }
-  EXPECT_EQ(heard.health.of(Reason::kNmeaField), 0U);
+  EXPECT_EQ(received.health.of(Reason::kNmeaField), 0U);
   const Report part = only(sentence("GPGGA,235959.20,,,,,1,08,,,M,,M,,"));
   EXPECT_FALSE(part.usable());
 }
@@ -417,25 +417,26 @@ TEST(Nmea, OneWrongFieldRefusesTheSentence) {
                           "GPGGA,235961.00,4404.1,N,12118.8,W,1,12,0.9,1.0,M,1.0,M,,",
                           "GPRMC,235959.00,A,4404.1,N,12118.8,W,1.5,90.0,300224,,,A",
                           "GPRMC,235959.00,A,4404.1,N,12118.8,W,x,90.0,280224,,,A"}) {
-    const Heard heard = hear(sentence(bad));
-    EXPECT_TRUE(heard.reports.empty()) << bad;
-    EXPECT_EQ(heard.health.of(Reason::kNmeaField), 1U) << bad;
+    const Received received = receive(sentence(bad));
+    EXPECT_TRUE(received.reports.empty()) << bad;
+    EXPECT_EQ(received.health.of(Reason::kNmeaField), 1U) << bad;
   }
 }
 
 TEST(Nmea, TheDateGoesOnOverMidnightALeapDayAndALeapSecond) {
   const auto gga = [](const std::string& time) { return sentence("GPGGA," + time + kGga.substr(kGga.find(",4404"))); };
-  const Heard heard = hear(sentence(kRmc) + gga("235959.20") + gga("235960.00") + gga("000000.00") + gga("000001.00"));
-  ASSERT_EQ(heard.reports.size(), 4U);
-  EXPECT_EQ(heard.reports[1].utc.second, 60);
-  EXPECT_EQ(heard.reports[1].utc.day, 28);
-  EXPECT_EQ(heard.reports[2].utc.day, 29) << "2024 has one";
-  EXPECT_EQ(heard.reports[3].utc.day, 29);
-  EXPECT_EQ(heard.reports[3].utc.month, 2);
+  const Received received =
+      receive(sentence(kRmc) + gga("235959.20") + gga("235960.00") + gga("000000.00") + gga("000001.00"));
+  ASSERT_EQ(received.reports.size(), 4U);
+  EXPECT_EQ(received.reports[1].utc.second, 60);
+  EXPECT_EQ(received.reports[1].utc.day, 28);
+  EXPECT_EQ(received.reports[2].utc.day, 29) << "2024 has one";
+  EXPECT_EQ(received.reports[3].utc.day, 29);
+  EXPECT_EQ(received.reports[3].utc.month, 2);
 }
 
 TEST(Nmea, SentencesBeforeTheFirstEpochAreCounted) {
-  EXPECT_EQ(hear(sentence("GPVTG,1.0,T,,M,1.0,N,1.0,K,A")).health.of(Reason::kNoEpoch), 1U);
+  EXPECT_EQ(receive(sentence("GPVTG,1.0,T,,M,1.0,N,1.0,K,A")).health.of(Reason::kNoEpoch), 1U);
 }
 
 TEST(Nmea, BesideUbxItIsHeldBackAndComesBackWhenUbxStops) {
@@ -448,14 +449,14 @@ TEST(Nmea, BesideUbxItIsHeldBackAndComesBackWhenUbxStops) {
   for (int i = 0; i < 5; ++i)
     stream = stream + ubx_frame(0x01, 0x07, pvt(static_cast<std::uint32_t>(i) * 1000)) + gga(i);
   for (int i = 5; i < 15; ++i) stream = stream + gga(i);
-  const Heard heard = hear(stream);
+  const Received received = receive(stream);
   int nmea = 0;
-  for (const Report& r : heard.reports) nmea += r.protocol == Protocol::kNmea ? 1 : 0;
-  EXPECT_EQ(heard.reports.size() - static_cast<std::size_t>(nmea), 5U);
+  for (const Report& r : received.reports) nmea += r.protocol == Protocol::kNmea ? 1 : 0;
+  EXPECT_EQ(received.reports.size() - static_cast<std::size_t>(nmea), 5U);
   EXPECT_GE(nmea, 6);
   EXPECT_LE(nmea, 8);
-  EXPECT_EQ(heard.reports.back().protocol, Protocol::kNmea);
-  EXPECT_EQ(heard.health.of(Reason::kSecondProtocol), static_cast<unsigned>(15 - nmea));
+  EXPECT_EQ(received.reports.back().protocol, Protocol::kNmea);
+  EXPECT_EQ(received.health.of(Reason::kSecondProtocol), static_cast<unsigned>(15 - nmea));
 }
 
 TEST(GnssHealth, EveryReasonHasAName) {

@@ -16,25 +16,25 @@ using fakes::ublox::Instant;
 using fakes::ublox::Solution;
 using sensor::GnssFix;
 
-enum class Speaks { kKeys, kM8, kM6, kNmea };
-constexpr Speaks kAll[] = {Speaks::kKeys, Speaks::kM8, Speaks::kM6, Speaks::kNmea};
+enum class Protocol { kKeys, kM8, kM6, kNmea };
+constexpr Protocol kAll[] = {Protocol::kKeys, Protocol::kM8, Protocol::kM6, Protocol::kNmea};
 
 /// A receiver that runs and a driver that hears it; NMEA is what it says of itself, with nothing configured.
-Bench speaking(Speaks how) {
+Bench speaking(Protocol how) {
   DriverSettings settings;
-  settings.configure = how != Speaks::kNmea;
-  const Generation generation = how == Speaks::kM8   ? Generation::kM8
-                                : how == Speaks::kM6 ? Generation::kM6
-                                                     : Generation::kKeys;
+  settings.configure = how != Protocol::kNmea;
+  const Generation generation = how == Protocol::kM8   ? Generation::kM8
+                                : how == Protocol::kM6 ? Generation::kM6
+                                                       : Generation::kKeys;
   return Bench(generation, 38'400, settings);
 }
 /// The report of the solution, once the driver knows which message ends an epoch.
-Report heard(Speaks how, const Solution& solution, const Instant& instant = {.itow_ms = 100'000'000}) {
+Report received(Protocol how, const Solution& solution, const Instant& instant = {.itow_ms = 100'000'000}) {
   Bench bench = speaking(how);
   bench.receiver.set(key("CFG-MSGOUT-NMEA_ID_GST_UART1"), 1);
   bench.receiver.set_instant(instant);
   bench.receiver.set_solution(solution);
-  if (how == Speaks::kNmea) {
+  if (how == Protocol::kNmea) {
     bench.driver.poll(bench.now, [](const Report&, base::Micros) {});
   } else {
     EXPECT_TRUE(bench.until(ConfigState::kRunning, 30));
@@ -68,18 +68,18 @@ void expect_angle(std::int64_t units, double deg, double within_deg) {
 }
 
 TEST(GnssSolution, PlaceHeightAndVelocityArriveInAllQuadrantsWhateverIsSpoken) {
-  for (const Speaks how : kAll) {
+  for (const Protocol how : kAll) {
     for (const Solution& s : solutions()) {
       SCOPED_TRACE(testing::Message() << static_cast<int>(how) << ": " << s.latitude_deg << ' ' << s.longitude_deg);
-      const Report r = heard(how, s);
+      const Report r = received(how, s);
       ASSERT_TRUE(r.usable());
-      const bool nmea = how == Speaks::kNmea;
+      const bool nmea = how == Protocol::kNmea;
       const double angle = nmea ? 0.6e-5 / 60 : 0.6e-7;
       expect_angle(r.latitude_2ndeg, s.latitude_deg, angle);
       expect_angle(r.longitude_2ndeg, s.longitude_deg, angle);
       EXPECT_NEAR(r.height_m, s.height_m, nmea ? 0.11 : 0.001);
       EXPECT_NEAR(r.height_msl_m, s.msl_m, nmea ? 0.051 : 0.001);
-      const double fine = how == Speaks::kKeys || how == Speaks::kM8 ? 0.00051 : 0.0051;
+      const double fine = how == Protocol::kKeys || how == Protocol::kM8 ? 0.00051 : 0.0051;
       EXPECT_NEAR(r.v_n_mps[0], s.v_mps[0], fine);
       EXPECT_NEAR(r.v_n_mps[1], s.v_mps[1], fine);
       if (nmea) {
@@ -95,16 +95,16 @@ TEST(GnssSolution, PlaceHeightAndVelocityArriveInAllQuadrantsWhateverIsSpoken) {
 
 TEST(GnssSolution, AccuraciesCovariancesAndDilutionArrive) {
   const Solution s = solutions()[2];
-  for (const Speaks how : kAll) {
+  for (const Protocol how : kAll) {
     SCOPED_TRACE(static_cast<int>(how));
-    const Report r = heard(how, s);
+    const Report r = received(how, s);
     EXPECT_NEAR(r.pdop, s.pdop, 0.0051);
-    EXPECT_EQ(r.satellites, how == Speaks::kNmea ? 12 : s.satellites) << "GGA counts no further";
-    if (how == Speaks::kM6 || how == Speaks::kNmea) {
+    EXPECT_EQ(r.satellites, how == Protocol::kNmea ? 12 : s.satellites) << "GGA counts no further";
+    if (how == Protocol::kM6 || how == Protocol::kNmea) {
       EXPECT_NEAR(r.hdop, s.hdop, 0.0051);
       EXPECT_NEAR(r.vdop, s.vdop, 0.0051);
     }
-    if (how == Speaks::kNmea) {
+    if (how == Protocol::kNmea) {
       const auto& c = s.position_cov_m2;
       EXPECT_NEAR(r.horizontal_acc_m, std::sqrt((c[0] + c[3]) / 2), 0.051);
       EXPECT_NEAR(r.vertical_acc_m, std::sqrt(c[5]), 0.051);
@@ -112,10 +112,10 @@ TEST(GnssSolution, AccuraciesCovariancesAndDilutionArrive) {
     }
     EXPECT_NEAR(r.horizontal_acc_m, s.horizontal_acc_m, 0.00051);
     EXPECT_NEAR(r.vertical_acc_m, s.vertical_acc_m, 0.00051);
-    EXPECT_NEAR(r.speed_acc_mps, s.speed_acc_mps, how == Speaks::kM6 ? 0.0051 : 0.00051);
+    EXPECT_NEAR(r.speed_acc_mps, s.speed_acc_mps, how == Protocol::kM6 ? 0.0051 : 0.00051);
     EXPECT_NEAR(r.course_acc_rad, s.course_acc_deg * M_PI / 180, 1e-6);
-    ASSERT_EQ(r.position_cov_m2.has_value(), how == Speaks::kKeys);
-    if (how != Speaks::kKeys) continue;
+    ASSERT_EQ(r.position_cov_m2.has_value(), how == Protocol::kKeys);
+    if (how != Protocol::kKeys) continue;
     for (std::size_t i = 0; i < 6; ++i) {
       EXPECT_FLOAT_EQ((*r.position_cov_m2)[i], static_cast<float>(s.position_cov_m2[i])) << i;
       EXPECT_FLOAT_EQ((*r.velocity_cov_m2ps2)[i], static_cast<float>(s.velocity_cov_m2ps2[i])) << i;
@@ -134,13 +134,13 @@ TEST(GnssSolution, EveryKindOfFixIsThatKindAndNoFixIsNone) {
                {Fix::kDifferential, GnssFix::kDifferential, GnssFix::kDifferential},
                {Fix::kRtkFloat, GnssFix::kRtkFloat, GnssFix::kDifferential},
                {Fix::kRtkFixed, GnssFix::kRtkFixed, GnssFix::kDifferential}};
-  for (const Speaks how : kAll) {
+  for (const Protocol how : kAll) {
     for (const auto& kind : kinds) {
       Solution s = solutions()[1];
       s.fix = kind.fix;
       SCOPED_TRACE(testing::Message() << static_cast<int>(how) << ": " << static_cast<int>(kind.fix));
-      const Report r = heard(how, s);
-      EXPECT_EQ(r.fix, how == Speaks::kM6 ? kind.of_old : kind.expected);
+      const Report r = received(how, s);
+      EXPECT_EQ(r.fix, how == Protocol::kM6 ? kind.of_old : kind.expected);
       EXPECT_EQ(position_of(r).has_value(), kind.expected != GnssFix::kNone);
       EXPECT_EQ(velocity_of(r).has_value(), kind.expected != GnssFix::kNone);
     }
@@ -148,8 +148,8 @@ TEST(GnssSolution, EveryKindOfFixIsThatKindAndNoFixIsNone) {
 }
 
 TEST(GnssSolution, StandstillIsAVelocityOfZero) {
-  for (const Speaks how : kAll) {
-    const auto v = velocity_of(heard(how, Solution{}));
+  for (const Protocol how : kAll) {
+    const auto v = velocity_of(received(how, Solution{}));
     ASSERT_TRUE(v.has_value()) << static_cast<int>(how);
     EXPECT_EQ(v->v_n_mps[0], 0.0F);
     EXPECT_EQ(v->v_n_mps[1], 0.0F);
@@ -160,7 +160,7 @@ TEST(GnssSolution, StandstillIsAVelocityOfZero) {
 // of a week, of a leap February.
 TEST(GnssSolution, DateAndTimeAreThoseOfTheEpoch) {
   constexpr std::uint32_t kWeek_ms = 604'800'000;
-  for (const Speaks how : kAll) {
+  for (const Protocol how : kAll) {
     for (const std::int32_t beside_ns : {0, 123'456, -123'456, -3'900'000}) {
       for (const Instant& start :
            {Instant{.week = 2306, .itow_ms = 1'000}, Instant{.week = 2306, .itow_ms = kWeek_ms - 2'000},
@@ -178,10 +178,10 @@ TEST(GnssSolution, DateAndTimeAreThoseOfTheEpoch) {
           const auto& epochs = bench.receiver.epochs();
           const Instant& truth = epochs[epochs.size() - back].instant;
           auto utc = truth.utc();
-          if (how != Speaks::kNmea) {
+          if (how != Protocol::kNmea) {
             ASSERT_EQ(r.itow_ms, truth.itow_ms);
           }
-          if (how == Speaks::kNmea) {
+          if (how == Protocol::kNmea) {
             EXPECT_TRUE(r.utc.date_valid && r.utc.time_valid);
             EXPECT_EQ(r.utc.nano % 10'000'000, 0);
             utc.nano = (utc.nano + 5'000'000) / 10'000'000 * 10'000'000;
@@ -197,7 +197,7 @@ TEST(GnssSolution, DateAndTimeAreThoseOfTheEpoch) {
 }
 
 TEST(GnssSolution, TheStampIsWhenItWasMeasuredHoweverLateItIsSaid) {
-  for (const Speaks how : kAll) {
+  for (const Protocol how : kAll) {
     Bench bench = speaking(how);
     bench.receiver.faults.compute = base::Micros{60'000};  // the driver's setting
     bench.receiver.faults.jitter = base::Micros{40'000};
@@ -210,7 +210,7 @@ TEST(GnssSolution, TheStampIsWhenItWasMeasuredHoweverLateItIsSaid) {
         nearest = std::min(nearest, std::abs(static_cast<double>((bench.stamps[i] - epoch.at).us)));
       EXPECT_LT(nearest, 4'500) << static_cast<int>(how);
       const double apart_us = static_cast<double>((bench.stamps[i] - bench.stamps[i - 1]).us);
-      EXPECT_NEAR(apart_us, how == Speaks::kNmea ? 1'000'000 : 200'000, 2'500);
+      EXPECT_NEAR(apart_us, how == Protocol::kNmea ? 1'000'000 : 200'000, 2'500);
     }
   }
 }

@@ -43,7 +43,7 @@ class Ublox {
     base::Micros compute{0};               ///< from the epoch to its first byte
     base::Micros jitter{0};                ///< on top, another for each epoch
     bool mute = false;                     ///< never answers
-    bool silent_to_unknown = false;        ///< no ACK-NAK for what it does not know
+    bool ignores_unknown = false;          ///< no ACK-NAK for what it does not know
     int swallow_acks = 0;                  ///< acknowledgements that are lost on the line
     std::set<std::uint32_t> unknown_keys;  ///< firmware without these items
     bool deaf_after_baud_change = false;   ///< takes the new rate, then says nothing
@@ -72,7 +72,7 @@ class Ublox {
     const std::size_t n = std::min(out.size(), faults.write_at_most);
     for (const std::uint8_t byte : out.first(n)) {
       // Each byte for itself: a request may change the rate under those that follow it.
-      heard_.push_back({in_step() ? byte : garbled(byte), in_step()});
+      received_.push_back({in_step() ? byte : garbled(byte), in_step()});
       understand();
     }
     return n;
@@ -130,7 +130,7 @@ class Ublox {
 
  private:
   using Message = std::pair<std::uint8_t, std::uint8_t>;  // class, id
-  struct Heard {
+  struct Received {
     std::uint8_t byte;
     bool clear;  // both ends had the same rate
   };
@@ -156,7 +156,7 @@ class Ublox {
     if (gone_quiet_) return;
     for (const std::uint8_t byte : bytes) to_host_.push_back(in_step() ? byte : garbled(byte));
   }
-  void say_ubx(const Bytes& frame) {
+  void send_ubx(const Bytes& frame) {
     // CFG-UART1OUTPROT: what is not let out is not sent; open for acknowledgements, so they are not either.
     if (ram(ublox::key("CFG-UART1OUTPROT-UBX")) != 0) say(frame);
   }
@@ -171,7 +171,7 @@ class Ublox {
       --faults.swallow_acks;
       return;
     }
-    say_ubx(answer.frame);
+    send_ubx(answer.frame);
   }
   void answer(Message message, const Bytes& payload) {
     if (faults.mute) return;
@@ -184,19 +184,19 @@ class Ublox {
   /// Takes frames out of what was heard. One that is damaged costs its first byte only, so that a frame hidden in it
   /// is found.
   void understand() {
-    while (!heard_.empty()) {
-      const auto at = [this](std::size_t i) { return heard_[i].byte; };
-      if (at(0) != 0xB5 || (heard_.size() > 1 && at(1) != 0x62)) {
-        heard_.pop_front();
+    while (!received_.empty()) {
+      const auto at = [this](std::size_t i) { return received_[i].byte; };
+      if (at(0) != 0xB5 || (received_.size() > 1 && at(1) != 0x62)) {
+        received_.pop_front();
         continue;
       }
-      if (heard_.size() < 6) return;
+      if (received_.size() < 6) return;
       const auto length = static_cast<std::size_t>(at(4) | at(5) << 8);
       if (length > kLongest) {
-        heard_.pop_front();
+        received_.pop_front();
         continue;
       }
-      if (heard_.size() < length + 8) return;
+      if (received_.size() < length + 8) return;
       take(length);
     }
   }
@@ -204,16 +204,16 @@ class Ublox {
     Bytes whole;
     bool clear = true;
     for (std::size_t i = 0; i < length + 8; ++i) {
-      whole.push_back(heard_[i].byte);
-      clear = clear && heard_[i].clear;
+      whole.push_back(received_[i].byte);
+      clear = clear && received_[i].clear;
     }
     const auto sum = ublox::checksum(whole.data() + 2, length + 4);
     if (whole[length + 6] != sum[0] || whole[length + 7] != sum[1]) {
       if (clear) ++damaged_;  // the line's doing is not the host's
-      heard_.pop_front();
+      received_.pop_front();
       return;
     }
-    heard_.erase(heard_.begin(), heard_.begin() + static_cast<std::ptrdiff_t>(whole.size()));
+    received_.erase(received_.begin(), received_.begin() + static_cast<std::ptrdiff_t>(whole.size()));
     // CFG-UART1INPROT: a protocol that is off is not read; there is no way back on this port but the power.
     if (ram(ublox::key("CFG-UART1INPROT-UBX")) == 0) return;
     ++requests_;
@@ -228,7 +228,7 @@ class Ublox {
     // Sec. 5.8: acknowledged is what is of class CFG; others get no answer at all.
     if (message.first != kCfg) return;
     const Verdict verdict = generation_ == Generation::kKeys ? by_keys(message, payload) : by_fields(message, payload);
-    if (verdict == Verdict::kUnknown && faults.silent_to_unknown) return;
+    if (verdict == Verdict::kUnknown && faults.ignores_unknown) return;
     const std::uint8_t ack = verdict == Verdict::kAck ? 1 : 0;
     answer({kAckClass, ack}, {message.first, message.second});
     if (baud() != before && faults.deaf_after_baud_change) gone_quiet_ = true;
@@ -542,7 +542,7 @@ class Ublox {
                                                                  {ublox::kNavCov, ublox::nav_cov},
                                                                  {ublox::kNavRelPosNed, ublox::nav_relposned}}};
     for (const auto& [id, payload] : kNavs) {
-      if (due(ublox::kNav, id)) say_ubx(ublox::frame(ublox::kNav, id, payload(instant, s)));
+      if (due(ublox::kNav, id)) send_ubx(ublox::frame(ublox::kNav, id, payload(instant, s)));
     }
     epochs_.push_back({at, instant, s});
   }
@@ -557,7 +557,7 @@ class Ublox {
     factory_baud_ = baud;
     for (const ublox::Item& item : ublox::kItems) ram_[item.id] = standard(item);
     plain_rates_.clear();
-    heard_.clear();
+    received_.clear();
     answers_.clear();
     gone_quiet_ = false;
   }
@@ -569,7 +569,7 @@ class Ublox {
   std::uint32_t factory_baud_ = 0;
   std::map<std::uint32_t, std::uint32_t> ram_, bbr_;
   std::map<Message, std::uint32_t> plain_rates_;  // messages without an item
-  std::deque<Heard> heard_;
+  std::deque<Received> received_;
   std::deque<std::uint8_t> to_host_;
   std::multimap<base::Micros, Answer> answers_;
   bool gone_quiet_ = false;

@@ -355,7 +355,7 @@ TEST_F(UbloxTest, FaultsDoWhatTheySay) {
   EXPECT_EQ(send(valset(kRam, {})), kNothing);
   u.faults.mute = false;
   EXPECT_EQ(send(ublox::frame(0x06, 0x08, {})), kRefused);  // an older message
-  u.faults.silent_to_unknown = true;
+  u.faults.ignores_unknown = true;
   EXPECT_EQ(send(ublox::frame(0x06, 0x08, {})), kNothing);
   u.faults.write_at_most = 3;
   EXPECT_EQ(u.write(Bytes(10)), 3U);

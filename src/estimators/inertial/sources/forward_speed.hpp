@@ -43,35 +43,35 @@ class ForwardSpeedSource {
     } else {
       status_.fused();
     }
-    witness_.update(rejected, filter.stamp());
+    record_.update(rejected, filter.stamp());
     if (!rejected) return;
-    if (timed_out(filter.stamp())) return give_way_to_constraint(a, filter);
+    if (timed_out(filter.stamp())) return yield_to_constraint(a, filter);
     judge(a, filter.x().q_nb.rotate(nu_b_mps), filter);
   }
   /// Both wheels spin, or the filter is wrong.
   [[nodiscard]] Assessment assess_spinning(float mean_mps, const FilterView& filter) {
     Assessment a{.action = Action::kReject, .failed = Check::kSlip, .verdict = sensor::Verdict::kRejected};
-    witness_.update(true, filter.stamp());
+    record_.update(true, filter.stamp());
     status_.rejecting(Check::kSlip);
     judge(a, filter.x().q_nb.rotated_x() * (mean_mps - filter.forward_mps()), filter);
     return a;
   }
   /// `speed_known`: the filter begins at a speed that was measured or given.
   void begin(bool speed_known) {
-    witness_.begin();
+    record_.begin();
     speed_known_ = speed_known;
   }
   /// The constraint without a speed was fused since `before`: it is no witness, and no judge of wheels that spin.
-  void restore(const Witness& before, bool spinning) {
+  void restore(const DeviceRecord& before, bool spinning) {
     if (spinning) {
-      witness_ = before;
+      record_ = before;
     } else {
-      witness_.keep_hearing(before);
+      record_.restore_stamps(before);
     }
   }
 
-  [[nodiscard]] const Witness& witness() const { return witness_; }
-  [[nodiscard]] const checks::Persistence& refused() const { return witness_.refused(); }
+  [[nodiscard]] const DeviceRecord& witness() const { return record_; }
+  [[nodiscard]] const checks::Persistence& refused() const { return record_.refused(); }
   [[nodiscard]] float last_mps() const { return last_mps_; }
   [[nodiscard]] base::Micros last() const { return last_; }
   [[nodiscard]] base::Micros fused_at() const { return fused_at_; }
@@ -80,7 +80,7 @@ class ForwardSpeedSource {
   [[nodiscard]] SourceStatus status(base::Micros at) const { return timed_out(at) ? SourceStatus{} : status_; }
   template <class Sink>
   void hash_state(Sink&& sink) const {
-    witness_.hash_state(sink);
+    record_.hash_state(sink);
     sink(last_mps_);
     sink(last_.us);
     sink(fused_at_.us);
@@ -90,17 +90,17 @@ class ForwardSpeedSource {
 
  private:
   /// The constraint alone is no device: it shows no cause. Refused for long, it is right.
-  void give_way_to_constraint(Assessment& a, const FilterView& filter) {
+  void yield_to_constraint(Assessment& a, const FilterView& filter) {
     const param::RecoveryParameters& n = filter.parameters().recovery;
-    if (!witness_.refused().persists(filter.stamp(), base::Micros{n.after_us}, n.at_least)) return;
+    if (!record_.refused().persists(filter.stamp(), base::Micros{n.after_us}, n.at_least)) return;
     a.action = Action::kInflateMotion;
-    witness_.forgive();
+    record_.reset_refusals();
   }
   void judge(Assessment& a, const nav::Vector3& nu_n_mps, const FilterView& filter) {
-    judge_velocity(a, nu_n_mps, filter.velocity_vote(witness_.since(filter.stamp())), witness_, filter);
+    judge_velocity(a, nu_n_mps, filter.velocity_vote(record_.since(filter.stamp())), record_, filter);
   }
 
-  Witness witness_;
+  DeviceRecord record_;
   base::Micros last_;         ///< stamp of the last forward speed of wheels or speedometer; 0: none
   base::Micros fused_at_;     ///< last stamp at which a speed, or the constraint alone, was fused; 0: never
   float last_mps_ = 0;        ///< last forward speed of wheels or speedometer

@@ -69,23 +69,24 @@ class GnssPositionSource {
   /// The filter is elsewhere now: refusals so far were by where it was.
   void relocated(base::Micros time) {
     last_fused_ = time;
-    witness_.forgive();
+    record_.reset_refusals();
   }
   /// A pose from outside ends every offset hypothesis.
   void reset() {
     offset_.reset();
     drift_.reset();
   }
-  void begin() { witness_.begin(); }
+  void begin() { record_.begin(); }
   /// Vote on a velocity that is off by nu since then.
   [[nodiscard]] Vote vote(base::Micros since, const nav::Vector3& nu_mps, base::Micros stamp) const {
-    const Vote present = witness_.presence(since, stamp);
+    const Vote present = record_.presence(since, stamp);
     if (present != Vote::kAbstains) return present;
-    return vote_of_fix(innovation_, witness_.refused().holds(), nu_mps, base::seconds(witness_.heard_at() - since));
+    return vote_of_fix(innovation_, record_.refused().holds(), nu_mps,
+                       base::seconds(record_.last_measurement() - since));
   }
 
   [[nodiscard]] bool frozen() const { return frozen_.frozen(); }
-  [[nodiscard]] const checks::Persistence& refused() const { return witness_.refused(); }
+  [[nodiscard]] const checks::Persistence& refused() const { return record_.refused(); }
   [[nodiscard]] base::Micros last_fused() const { return last_fused_; }
   /// No fix was fused for three seconds: dead reckoning.
   [[nodiscard]] bool timed_out(base::Micros at) const {
@@ -104,7 +105,7 @@ class GnssPositionSource {
     frozen_.hash_state(sink);
     drift_.hash_state(sink);
     offset_.hash_state(sink);
-    witness_.hash_state(sink);
+    record_.hash_state(sink);
     for (const float v : {innovation_.east_m, innovation_.north_m, innovation_.variance_m2}) sink(v);
     sink(last_fused_.us);
     sink(pulled_m_[0]);
@@ -124,7 +125,7 @@ class GnssPositionSource {
 
   checks::StartupFixCheck startup_;
   checks::OffsetHypothesis offset_;  ///< offset of fixes that were not fused
-  Witness witness_;
+  DeviceRecord record_;
   LevelInnovation innovation_;  ///< innovation of the last fix
   base::Micros last_fused_;     ///< stamp of the last fix that was fused, or of the last reset; 0: none
   checks::FrozenPosition frozen_;
@@ -161,13 +162,13 @@ inline GnssPositionSource::Converted GnssPositionSource::convert(const sensor::G
   const bool inside = a.nis <= a.gate || z.statistics.horizontal_nis <= fix_gate(n.gnss, 2);
   const bool agrees = inside && !drifts(z, n.gnss, a);
   if (!inside) a.failed = Check::kGate;
-  witness_.update(!agrees, filter.stamp());
+  record_.update(!agrees, filter.stamp());
   const std::array<float, 2>& expected_m2 = z.statistics.expected_m2;
   innovation_ = {z.nu(0), z.nu(1), 0.5F * (expected_m2[0] + expected_m2[1]) + z.r(0)};
   const float p_level = filter.p()(0, 0) + filter.p()(1, 1);
   if (!agrees && filter_wrong(filter)) {
     a.failed = Check::kNone;
-    give_way(a, Action::kWidenPosition, {z.nu(0), z.nu(1), 0.0F}, witness_, filter.stamp());
+    widen_by_innovation(a, Action::kWidenPosition, {z.nu(0), z.nu(1), 0.0F}, record_, filter.stamp());
   } else if (!agrees) {
     judge_refused(z, filter, a);
   } else if (!filter.recovery().widened_lately(filter.stamp()) && p_level > 2.0F * FixMeasurement::kDecides * z.r(0)) {
@@ -180,9 +181,9 @@ inline GnssPositionSource::Converted GnssPositionSource::convert(const sensor::G
 
 /// The filter refuses a second fix while a velocity contradicts it, too, or did within five seconds, and none vouches.
 inline bool GnssPositionSource::filter_wrong(const FilterView& filter) const {
-  if (witness_.refused().count() < 2) return false;
+  if (record_.refused().count() < 2) return false;
   if (filter.recovery().widened_lately(filter.stamp())) return true;
-  const base::Micros since = witness_.since(filter.stamp());
+  const base::Micros since = record_.since(filter.stamp());
   return filter.speeds_contradict() && filter.velocity_vote(since) != Vote::kFor &&
          filter.wheels_vote(since) != Vote::kFor;
 }
@@ -195,7 +196,7 @@ inline bool GnssPositionSource::filter_wrong(const FilterView& filter) const {
   const std::array<float, 2>& expected_m2 = z.statistics.expected_m2;
   const float statistic = drift_.statistic(z.r(0), expected_m2[0], expected_m2[1]);
   const float limit = n.gate_scale * checks::kChiSquare999Of2;
-  if (!drift_.take_vouch() || statistic <= limit) return false;
+  if (!drift_.consume_velocity_agreement() || statistic <= limit) return false;
   a.failed = Check::kDrift;
   a.statistic = statistic;
   a.limit = limit;
@@ -237,7 +238,7 @@ inline void GnssPositionSource::confirm(Assessment& a, const param::RecoveryPara
   a.cause = sensor::ResetCause::kPositionJump;
   a.remedy.step_m = {offset_.east_m(), offset_.north_m(), 0.0F};
   a.remedy.variance_m2 = z.r;
-  witness_.forgive();
+  record_.reset_refusals();
   drift_.reset();
 }
 
@@ -247,10 +248,10 @@ inline bool GnssPositionSource::reset_allowed(const FixMeasurement& z, const Fil
   const bool confirmed = offset_.confirmed(n.confirm_fixes);
   a.remedy.undoes = confirmed && undoes_reset(z, filter);
   const bool is_lost = confirmed && lost(filter);
-  if (is_lost && filter.wheels_silent() &&
+  if (is_lost && filter.wheels_timed_out() &&
       !filter.velocity_recent()) {  // it moved otherwise than it thought, all along
     const float way2_m2 = offset_.east_m() * offset_.east_m() + offset_.north_m() * offset_.north_m();
-    a.remedy.sigma_mps = base::sqrt(way2_m2) / base::seconds(witness_.refused().held_for(filter.stamp()));
+    a.remedy.sigma_mps = base::sqrt(way2_m2) / base::seconds(record_.refused().held_for(filter.stamp()));
   }
   return a.remedy.undoes || is_lost || offset_.persisted(base::Micros{n.persist_us}, n.persist_fixes);
 }
@@ -268,11 +269,11 @@ inline bool GnssPositionSource::undoes_reset(const FixMeasurement& z, const Filt
 /// too, for as long as an offset has to last: the receiver alone is right then.
 inline bool GnssPositionSource::lost(const FilterView& filter) const {
   const param::RecoveryParameters& n = filter.parameters().recovery;
-  const base::Micros refused = witness_.refused().held_for(filter.stamp());
-  if (filter.wheels_silent() && !filter.velocity_recent())
+  const base::Micros refused = record_.refused().held_for(filter.stamp());
+  if (filter.wheels_timed_out() && !filter.velocity_recent())
     return refused >= base::Micros{4 * std::int64_t{n.after_us}} && !offset_.persisted({refused.us / 2}, 0);
   return filter.speeds_contradict() &&
-         witness_.refused().persists(filter.stamp(), base::Micros{n.persist_us}, n.persist_fixes);
+         record_.refused().persists(filter.stamp(), base::Micros{n.persist_us}, n.persist_fixes);
 }
 
 }  // namespace tetap::estimators

@@ -42,16 +42,16 @@ class GnssVelocitySource {
   void note(const VelocityMeasurement& z, const FilterView& filter) {
     const nav::Vector3 off = z.v_n_mps - filter.x().v_n_mps;
     const float dt_s = base::seconds(filter.stamp() - last_);
-    const float unfelt = kUnfelt_mps + kUnfelt_mps2 * dt_s;
-    const float most2 = 9.0F * (2.0F * z.sigma_mps * z.sigma_mps + unfelt * unfelt);
+    const float unmodelled = kUnmodelled_mps + kUnmodelled_mps2 * dt_s;
+    const float most2 = 9.0F * (2.0F * z.sigma_mps * z.sigma_mps + unmodelled * unmodelled);
     const float off2 = off.squaredNorm();
-    const bool leaps = dt_s < 1.5F && off2 > most2 && nav::Vector3(off - off_mps_).squaredNorm() > most2;
-    leapt_ = (leapt_ || leaps) && off2 >= 0.5F * most2 && filter.wheels_agree();
-    off_mps_ = off;
+    const bool leaps = dt_s < 1.5F && off2 > most2 && nav::Vector3(off - difference_mps_).squaredNorm() > most2;
+    step_detected_ = (step_detected_ || leaps) && off2 >= 0.5F * most2 && filter.wheels_agree();
+    difference_mps_ = off;
     ahead_mps_ = z.v_b_mps(0);
     last_ = filter.stamp();
   }
-  [[nodiscard]] bool leapt() const { return leapt_; }
+  [[nodiscard]] bool step_detected() const { return step_detected_; }
   /// Speed ahead by the last velocity.
   [[nodiscard]] float ahead_mps() const { return ahead_mps_; }
   [[nodiscard]] static model::GnssVelocity3d model(const VelocityMeasurement& z, const FilterView& filter) {
@@ -72,36 +72,36 @@ class GnssVelocitySource {
   /// The update's verdict; nu: the innovation.
   void conclude(Assessment& a, const nav::Vector3& nu, const FilterView& filter) {
     const bool rejected = a.action == Action::kReject;
-    witness_.update(rejected, filter.stamp());
+    record_.update(rejected, filter.stamp());
     if (!rejected) return;
-    const base::Micros since = witness_.since(filter.stamp());
-    judge_velocity(a, nu, vote_of_wheels(nu, since, filter), witness_, filter);
+    const base::Micros since = record_.since(filter.stamp());
+    judge_velocity(a, nu, vote_of_wheels(nu, since, filter), record_, filter);
   }
-  void begin() { witness_.begin(); }
+  void begin() { record_.begin(); }
 
-  [[nodiscard]] const Witness& witness() const { return witness_; }
-  [[nodiscard]] const checks::Persistence& refused() const { return witness_.refused(); }
+  [[nodiscard]] const DeviceRecord& witness() const { return record_; }
+  [[nodiscard]] const checks::Persistence& refused() const { return record_.refused(); }
   /// A velocity came within one second.
   [[nodiscard]] bool recent(base::Micros at) const { return checks::recent(last_, at, kFresh); }
-  [[nodiscard]] bool came_lately(base::Micros at) const { return !checks::older(last_, at, kFresh); }
   [[nodiscard]] bool timed_out(base::Micros at) const { return checks::older(last_, at, kFresh + kFresh); }
   [[nodiscard]] SourceStatus status(base::Micros at) const {
-    return timed_out(at) ? SourceStatus{} : status_of(witness_.refused());
+    return timed_out(at) ? SourceStatus{} : status_of(record_.refused());
   }
   template <class Sink>
   void hash_state(Sink&& sink) const {
-    witness_.hash_state(sink);
+    record_.hash_state(sink);
     for (const base::Micros at : {last_, speed_off_at_}) sink(at.us);
-    for (int i = 0; i < 3; ++i) sink(off_mps_(i));
+    for (int i = 0; i < 3; ++i) sink(difference_mps_(i));
     sink(ahead_mps_);
-    sink(static_cast<std::uint32_t>(leapt_));
+    sink(static_cast<std::uint32_t>(step_detected_));
   }
 
  private:
   static constexpr base::Micros kFresh{1'000'000};
   static constexpr float kNoClimb_mps = 1e3F;  ///< sigma of a climb rate that is not there (NMEA has none)
 
-  static constexpr float kUnfelt_mps = 0.05F, kUnfelt_mps2 = 0.3F;  ///< the IMU's own error between two velocities
+  static constexpr float kUnmodelled_mps = 0.05F,
+                         kUnmodelled_mps2 = 0.3F;  ///< the IMU's own error between two velocities
 
   /// Wheels do not see where the robot goes. Where the speed is alike all along, they abstain: the heading may be
   /// wrong.
@@ -111,16 +111,16 @@ class GnssVelocitySource {
     const float level = base::sqrt(claimed(0) * claimed(0) + claimed(1) * claimed(1));
     const float rolled = base::abs(filter.recent_forward_mps());
     if (base::abs(level - rolled) >= 0.3F + 0.1F * rolled) speed_off_at_ = filter.stamp();
-    const bool receiver = leapt_ && filter.imu_doubted_at() <= witness_.agreed_at();
+    const bool receiver = step_detected_ && filter.imu_last_suspect() <= record_.last_accepted();
     return vote == Vote::kFor && speed_off_at_ < since && !receiver ? Vote::kAbstains : vote;
   }
 
-  Witness witness_;
-  nav::Vector3 off_mps_ = nav::Vector3::Zero();  ///< difference of the last velocity to the filter's
-  base::Micros last_;                            ///< stamp of the last velocity; 0: none
-  base::Micros speed_off_at_;                    ///< stamp of the last refused one of another speed than the wheels'
+  DeviceRecord record_;
+  nav::Vector3 difference_mps_ = nav::Vector3::Zero();  ///< difference of the last velocity to the filter's
+  base::Micros last_;                                   ///< stamp of the last velocity; 0: none
+  base::Micros speed_off_at_;  ///< stamp of the last refused one of another speed than the wheels'
   float ahead_mps_ = 0;
-  bool leapt_ = false;  ///< the receiver leapt, and is not back
+  bool step_detected_ = false;  ///< the receiver leapt, and is not back
 };
 
 }  // namespace tetap::estimators

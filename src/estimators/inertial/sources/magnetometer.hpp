@@ -40,7 +40,7 @@ class Magnetometer {
   [[nodiscard]] bool field_renewed() const { return field_.renewed(); }
   [[nodiscard]] bool trusted() const { return field_.trusted(); }
   void distrust(base::Micros at) { field_.set_trusted(false, at); }
-  [[nodiscard]] bool may_mislead(base::Micros at) const { return field_.may_mislead(at); }
+  [[nodiscard]] bool is_suspect(base::Micros at) const { return field_.is_suspect(at); }
   [[nodiscard]] bool stuck(base::Micros at) const { return repeats_.stuck(at); }
   [[nodiscard]] bool timed_out(base::Micros at) const {
     return !checks::recent(repeats_.last(), at, base::Micros{2'000'000});
@@ -96,9 +96,6 @@ inline FieldMeasurement Magnetometer::measurement(const sensor::MagneticFlux& fl
   return {.action = Action::kReject,
           .failed = Check::kField,
           .verdict = sensor::Verdict::kRejected,
-          .dof = 2,
-          .nis = off,
-          .gate = 1.0F,
           .statistic = off,
           .limit = 1.0F};
 }
@@ -124,13 +121,13 @@ inline Magnetometer::Expected Magnetometer::expected(const model::DirectionMeasu
   Assessment a{.dof = 1, .nis = nu * nu / variance, .gate = n.gate_scale * filter::chi_square_99(1)};
   if (!(a.nis < 1e30F))  // a field straight down
     return {.action = Action::kReject, .failed = Check::kValue, .verdict = sensor::Verdict::kNotFinite};
-  const bool judged = filter.wheels_silent() && filter.position_holds_heading();
+  const bool judged = filter.wheels_timed_out() && filter.position_holds_heading();
   const float yaw_rad = nav::euler(filter.x().q_nb).yaw_rad;
   const float sigmas = judged ? filter.heading_monitor().contradicts(yaw_rad + nu, n.sigma_rad) : 0.0F;
   if (sigmas > 0.0F) {
     a.failed = Check::kHeading;
-    a.nis = a.statistic = sigmas * sigmas;
-    a.gate = a.limit = HeadingMonitor::kSigmas * HeadingMonitor::kSigmas;
+    a.statistic = sigmas * sigmas;
+    a.limit = HeadingMonitor::kSigmas * HeadingMonitor::kSigmas;
   } else if (!(a.nis <= a.gate)) {
     a.failed = Check::kGate;
   }
@@ -176,8 +173,8 @@ inline bool Magnetometer::weigh(FieldMeasurement& z, const FilterView& filter) {
   const float p_yaw = filter.p()(8, 8);
   if (!(p_yaw > kWorth * floor)) return false;
   const Expected e = expected(z.direction, filter);
-  const float ends_there = e.with_heading * e.with_heading / (p_yaw - floor) - e.variance;
-  z.direction.sigma_rad = base::sqrt(ends_there > floor ? ends_there : floor);
+  const float target_variance = e.with_heading * e.with_heading / (p_yaw - floor) - e.variance;
+  z.direction.sigma_rad = base::sqrt(target_variance > floor ? target_variance : floor);
   return true;
 }
 

@@ -7,6 +7,9 @@ import re
 VOCABULARY = "src/sensor/vocabulary.hpp"
 SOURCE_STATE = "src/sensor/source_state.hpp"
 SOURCES = "src/estimators/inertial/sources"
+INPUTS = {"sensor::ImuSample": "imu", "nav::ImuIncrement": "imu", "sensor::GnssPosition": "gnss_position", "model::GnssFix3d": "gnss_position",
+          "sensor::GnssVelocity": "gnss_velocity", "WheelReading": "wheels", "ForwardReading": "forward_speed", "sensor::BodySpeed": "forward_speed",
+          "sensor::OutsideHeading": "outside_heading", "sensor::MagneticFlux": "magnetometer", "sensor::AirPressure": "barometer"}  # of Inertial's functions
 ADVICE = "docs/reference/advice.tsv"
 ENUMS = [("Mode", "Modes", "`Est_Status.Mode`: state of an estimator as a whole."),
          ("Fault", "Faults", "`Est_Status.Faults`: one bit each."),
@@ -79,6 +82,19 @@ def cited_checks(text, order):
     return [word for word in order if word in named]
 
 
+def tests_before_a_source(root):
+    """{source: text of the functions of Inertial that take its measurement}: conversion and timing are tested there."""
+    found = {}
+    for path in sorted(glob.glob(os.path.join(root, os.path.dirname(SOURCES), "*.cpp"))):
+        text = read(root, os.path.relpath(path, root))
+        heads = list(re.finditer(r"^[^\s/].*\bInertial::\w+\(const ([\w:]+)& |^[^\s/].*\bInertial::\w+\(([\w:]+)& |^[^\s/].*\bInertial::\w+\(", text, re.M))
+        for head, after in zip(heads, [*heads[1:], None]):
+            source = INPUTS.get(head[1] or head[2])
+            if source:
+                found[source] = found.get(source, "") + text[head.start():after.start() if after else len(text)]
+    return found
+
+
 def enters(text, word):
     """A source's own text sets or returns that state; a source without a time-out never stops."""
     if word == "Stopped":
@@ -87,24 +103,25 @@ def enters(text, word):
 
 
 def sources(root):
-    """The table sources x states x checks; a note where the sources have no states yet."""
+    """The table sources x states x checks."""
     head = HEAD.format(f"{SOURCE_STATE} and {SOURCES}") + "# Sources, states and checks\n\n"
-    if not os.path.exists(os.path.join(root, SOURCE_STATE)):
-        return head + ("The sources of the inertial filter do not carry a state in this version. Their rules stand one page a source in "
-                       "[trust](../explanation/trust.md).\n")
     words = read(root, SOURCE_STATE)
     states, checks = enumerators(words, "SourceState"), enumerators(words, "Check")
     parts = [head + "One page a source explains the rules: [trust](../explanation/trust.md).\n\n## States\n\n| state | number | meaning |\n|---|---|---|"]
     parts += [f"| {word} | {number} | {comment or word} |" for word, number, comment in states]
     parts.append("\n## Checks\n\nEvery refusal of the inertial filter names one.\n\n| check | number | meaning |\n|---|---|---|")
     parts += [f"| {word} | {number} | {comment or word} |" for word, number, comment in checks]
-    parts.append("\n## Sources\n\nAn x marks a state that the source enters. A source with a time-out enters Stopped by it.\n\n| source | "
+    parts.append("\n## Sources\n\nAn x marks a state that the source enters. A source with a time-out enters Stopped by it. A height stops with its fix.\n\n| source | "
                  + " | ".join(word for word, _, _ in states) + " | checks |\n|---|" + "---|" * len(states) + "---|")
+    before = tests_before_a_source(root)
     for path in sorted(glob.glob(os.path.join(root, SOURCES, "*.hpp"))):
         text = read(root, os.path.relpath(path, root))
+        stem = os.path.splitext(os.path.basename(path))[0]
         if f'#include "{REFUSAL}"' in text:
             text += (read(root, f"src/{REFUSAL}") if "status_of(" in text else "") + "Check::kGate"
         ticks = ["x" if enters(text, word) else "" for word, _, _ in states]
-        name = os.path.splitext(os.path.basename(path))[0].replace("_", " ")
-        parts.append(f"| {name} | " + " | ".join(ticks) + " | " + ", ".join(cited_checks(text, [word for word, _, _ in checks])) + " |")
+        parts.append(f"| {stem.replace('_', ' ')} | " + " | ".join(ticks) + " | "
+                     + ", ".join(cited_checks(text + "\n" + before.get(stem, ""), [word for word, _, _ in checks])) + " |")
+    if "imu" in before:
+        parts.append("\nThe IMU is no source of updates. Its samples are tested for " + ", ".join(cited_checks(before["imu"], [word for word, _, _ in checks])) + ".")
     return "\n".join(parts) + "\n"

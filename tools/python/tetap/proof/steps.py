@@ -56,7 +56,7 @@ class Table:
             for other in step.after:
                 if other not in names:
                     raise TableError(f"{path}: {step.name} comes after {other}, which is no step")
-            for pattern in step.inputs + step.each:
+            for pattern in [one for whole in step.inputs + step.each + step.without for one in stamps.braces(whole)]:
                 if not pattern.startswith(MADE) and "$item" not in pattern and not stamps.matches(root, pattern):
                     raise TableError(f"{path}: {step.name}: no file is like {pattern}")
 
