@@ -22,8 +22,8 @@ namespace detail {
 }
 }  // namespace detail
 
-/// The truth with biases [rad/s, m/s^2] as they are after `parameters` were taken out, in the robot's body. Level and at
-/// rest, as the truth has them: what the accelerometer's matrix makes of gravity is in.
+/// The truth with biases [rad/s, m/s^2] as they are after `parameters` were taken out, in the robot's body. Level and
+/// at rest, as the truth has them: what the accelerometer's matrix makes of gravity is in.
 [[nodiscard]] inline Truth residual_bias(Truth t, const param::Parameters& parameters, double temperature_degC) {
   const param::ImuParameters& n = parameters.imu;
   const double warmer = temperature_degC - static_cast<double>(n.gyro_bias_at_degC);
