@@ -5,6 +5,7 @@
 
 #include "filter/condition.hpp"
 #include "filter/state.hpp"
+#include "filter/structure.hpp"
 #include "filter/update.hpp"
 
 namespace tetap::filter {
@@ -23,10 +24,17 @@ class Ekf {
   /// no number, or P beyond all sizes.
   template <LinearisedMotion<State> Motion>
   bool predict(const Motion& motion) {
-    if constexpr (requires { motion.step(x); }) {
-      return adopt(motion.step(x));
+    if constexpr (requires { motion.sparse_step(x); }) {
+      const auto step = motion.sparse_step(x);
+      Symmetric<Scalar, kErrors> covariance = turned(p, step.f);
+      add_noise(covariance, step.q);
+      return adopt(step.x, covariance, step.q);
+    } else if constexpr (requires { motion.step(x); }) {
+      const Step<State> step = motion.step(x);
+      return adopt(step.x, propagate(p, step.f, step.q), step.q);
     } else {
-      return adopt({.x = motion.predict(x), .f = motion.jacobian(x), .q = motion.noise(x)});
+      const Symmetric<Scalar, kErrors> q = motion.noise(x);
+      return adopt(motion.predict(x), propagate(p, motion.jacobian(x), q), q);
     }
   }
 
@@ -49,11 +57,10 @@ class Ekf {
   }
 
  private:
-  bool adopt(const Step<State>& next) {
-    const Symmetric<Scalar, kErrors> covariance = propagate(p, next.f, next.q);
-    if (!next.q.no_variance_below_zero() || !covariance.bounded() || !next.x.finite()) return false;
+  bool adopt(const State& next, const Symmetric<Scalar, kErrors>& covariance, const Symmetric<Scalar, kErrors>& q) {
+    if (!q.no_variance_below_zero() || !covariance.bounded() || !next.finite()) return false;
     p = covariance;
-    x = next.x;
+    x = next;
     if (!well_conditioned(p)) restore(p);
     return true;
   }

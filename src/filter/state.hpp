@@ -25,6 +25,13 @@ struct Step {
   Matrix<typename S::Scalar, S::kErrors, S::kErrors> f;
   Symmetric<typename S::Scalar, S::kErrors> q;
 };
+/// The same with a type for F that holds its zeros and ones (structure.hpp): result of sparse_step().
+template <class S, class F>
+struct SparseStep {
+  S x;
+  F f;
+  Symmetric<typename S::Scalar, S::kErrors> q;
+};
 template <class Scalar, int M, int K>
 struct Linearised {
   Vector<Scalar, M> z_hat;

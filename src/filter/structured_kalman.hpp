@@ -15,7 +15,7 @@ namespace tetap::filter {
 enum class Guard : std::uint8_t {
   kNone,         ///< inputs are numbers, and P stays in the range of float by the design of the application
   kVariances,    ///< variances above zero and bounded after a prediction, pivots of S above zero, a floor below P
-  kConditioned,  ///< the same, and P conditioned as in Ekf
+  kConditioned,  ///< the same, and P conditioned: after every prediction, and after an update by a sharp measurement
 };
 
 template <State State_, Guard kGuard = Guard::kVariances>
@@ -32,7 +32,10 @@ class StructuredKalman {
   /// when a guard refuses the result; always true without guards.
   template <class Motion>
   [[gnu::always_inline]] bool predict(const Motion& motion) {
-    if constexpr (requires { motion.step(x); }) {
+    if constexpr (requires { motion.sparse_step(x); }) {
+      const auto step = motion.sparse_step(x);
+      return adopt(step.x, step.f, step.q);
+    } else if constexpr (requires { motion.step(x); }) {
       const auto step = motion.step(x);
       return adopt(step.x, step.f, step.q);
     } else {
@@ -47,7 +50,7 @@ class StructuredKalman {
     constexpr int M = Measurement::kDimension;
     Innovation<Scalar, M> record;
     Matrix<Scalar, kErrors, M> cross;  // P H^T
-    linearise(z, record, cross);
+    const bool sharp = linearise(z, record, cross);
     const Decorrelated<Scalar, kErrors, M> by = decorrelate(cross, record.s, record.nu);
     if (kGuard != Guard::kNone && !by.positive) {
       record.verdict = record.s.bounded() ? Verdict::kSingular : Verdict::kNotFinite;
@@ -68,7 +71,7 @@ class StructuredKalman {
     x = x.plus(state_correction(by));
     subtract_gain<kGuard != Guard::kNone>(p, by);
     if constexpr (kGuard == Guard::kConditioned)
-      if (!well_conditioned(p)) restore(p);
+      if (sharp && !well_conditioned(p)) restore(p);
     return record;
   }
 
@@ -84,7 +87,8 @@ class StructuredKalman {
         sum += next(i, i);
         least = next(i, i) < least ? next(i, i) : least;
       });
-      if (!(least > Scalar{0}) || !(sum < Scalar(1e30F)) || !moved.finite()) return false;
+      const bool positive = kGuard == Guard::kConditioned ? least >= Scalar{0} : least > Scalar{0};  // 0: restore()
+      if (!positive || !(sum < Scalar(1e30F)) || !moved.finite()) return false;
     }
     if constexpr (kGuard == Guard::kConditioned)
       if (!next.bounded()) return false;
@@ -95,9 +99,12 @@ class StructuredKalman {
     return true;
   }
 
-  /// nu, S = H P H^T + R and P H^T.
+  /// Below this share of S the noise of a component takes away more digits of P than float can spare.
+  static constexpr Scalar kSharp = Scalar(1e-3F);
+
+  /// nu, S = H P H^T + R and P H^T. True: some component is sharp.
   template <class Measurement, int M>
-  [[gnu::always_inline]] void linearise(const Measurement& z, Innovation<Scalar, M>& record,
+  [[gnu::always_inline]] bool linearise(const Measurement& z, Innovation<Scalar, M>& record,
                                         Matrix<Scalar, kErrors, M>& cross) const {
     constexpr int K = static_cast<int>(Measurement::kTouches.size());
     constexpr auto kState = [](int k) { return Measurement::kTouches[static_cast<std::size_t>(k)]; };
@@ -126,6 +133,10 @@ class StructuredKalman {
         record.s(c, c) += noise(int{c});
       });
     }
+    bool sharp = false;
+    if constexpr (kGuard == Guard::kConditioned)
+      for (int m = 0; m < M; ++m) sharp = sharp || !(noise(m) > kSharp * record.s(m, m));
+    return sharp;
   }
   template <class Measurement>
   [[gnu::always_inline]] auto linearised(const Measurement& z) const {

@@ -5,6 +5,7 @@
 #pragma once
 
 #include "base/math.hpp"
+#include "filter/structure.hpp"
 #include "model/planar_pose.hpp"
 
 #include <array>
@@ -13,6 +14,9 @@
 namespace tetap::model {
 
 enum class Arc : std::uint8_t { kMidpoint, kExact };
+
+/// F of a planar motion: the error in yaw swings the chord.
+using YawSwing = filter::UnitPlus<float, 3, filter::Entry{0, 2}, filter::Entry{1, 2}>;
 
 struct PlanarIncrement {
   static constexpr std::array<int, 1> kNonlinear{2};  ///< the position is only carried along
@@ -25,16 +29,23 @@ struct PlanarIncrement {
   Arc arc = Arc::kExact;
 
   /// The pose after the increment.
-  [[nodiscard]] PlanarPose predict(const PlanarPose& from) const { return predict(from, terms(from.yaw_rad)); }
-  /// F: the error in yaw swings the chord.
-  [[nodiscard]] filter::Matrix<float, 3, 3> jacobian(const PlanarPose& from) const {
-    return jacobian(terms(from.yaw_rad));
-  }
-  /// Q = G cov(ds, dyaw) G^T with G = d pose / d (ds, dyaw).
-  [[nodiscard]] filter::Symmetric<float, 3> noise(const PlanarPose& from) const { return noise(terms(from.yaw_rad)); }
-  [[nodiscard]] filter::Step<PlanarPose> step(const PlanarPose& from) const {
+  [[nodiscard]] PlanarPose predict(const PlanarPose& from) const {
     const Terms t = terms(from.yaw_rad);
-    return {.x = predict(from, t), .f = jacobian(t), .q = noise(t)};
+    return predict(from, ds_m * (t.chord * t.direction.cos), ds_m * (t.chord * t.direction.sin));
+  }
+  /// F: the error in yaw swings the chord.
+  [[nodiscard]] filter::Matrix<float, 3, 3> jacobian(const PlanarPose& from) const { return step(from).f; }
+  /// Q = G cov(ds, dyaw) G^T with G = d pose / d (ds, dyaw).
+  [[nodiscard]] filter::Symmetric<float, 3> noise(const PlanarPose& from) const { return step(from).q; }
+  /// The same as step(), with the zeros and ones of F in its type.
+  [[nodiscard]] filter::SparseStep<PlanarPose, YawSwing> sparse_step(const PlanarPose& from) const {
+    const Terms t = terms(from.yaw_rad);
+    const float dx_m = ds_m * (t.chord * t.direction.cos), dy_m = ds_m * (t.chord * t.direction.sin);
+    return {.x = predict(from, dx_m, dy_m), .f = {{-dy_m, dx_m}}, .q = noise(t, dx_m, dy_m)};
+  }
+  [[nodiscard]] filter::Step<PlanarPose> step(const PlanarPose& from) const {
+    const auto sparse = sparse_step(from);
+    return {.x = sparse.x, .f = sparse.f.dense(), .q = sparse.q};
   }
 
  private:
@@ -58,34 +69,22 @@ struct PlanarIncrement {
     }
     return t;
   }
-  [[nodiscard]] PlanarPose predict(const PlanarPose& from, const Terms& t) const {
-    return {.x = from.x.plus(ds_m * t.chord * t.direction.cos),
-            .y = from.y.plus(ds_m * t.chord * t.direction.sin),
-            .yaw_rad = base::wrap_angle(from.yaw_rad + dyaw_rad)};
+  /// Moved by the chord.
+  [[nodiscard]] PlanarPose predict(const PlanarPose& from, float dx_m, float dy_m) const {
+    return {.x = from.x.plus(dx_m), .y = from.y.plus(dy_m), .yaw_rad = base::wrap_angle(from.yaw_rad + dyaw_rad)};
   }
-  [[nodiscard]] filter::Matrix<float, 3, 3> jacobian(const Terms& t) const {
-    filter::Matrix<float, 3, 3> f = filter::Matrix<float, 3, 3>::Identity();
-    f(0, 2) = -ds_m * t.chord * t.direction.sin;
-    f(1, 2) = ds_m * t.chord * t.direction.cos;
-    return f;
-  }
-  [[nodiscard]] filter::Symmetric<float, 3> noise(const Terms& t) const {
-    filter::Matrix<float, 3, 2> g;
-    g(0, 0) = t.chord * t.direction.cos;
-    g(1, 0) = t.chord * t.direction.sin;
-    g(2, 0) = 0.0F;
-    g(0, 1) = 0.5F * ds_m * (t.chord_slope * t.direction.cos - t.chord * t.direction.sin);
-    g(1, 1) = 0.5F * ds_m * (t.chord_slope * t.direction.sin + t.chord * t.direction.cos);
-    g(2, 1) = 1.0F;
-    filter::Matrix<float, 2, 3> cov_gt;  // cov(ds, dyaw) G^T
+  [[nodiscard]] filter::Symmetric<float, 3> noise(const Terms& t, float dx_m, float dy_m) const {
+    // G = (a, c; b, d; 0, 1)
+    const float a = t.chord * t.direction.cos, b = t.chord * t.direction.sin, bend_m = ds_m * t.chord_slope;
+    const float c = 0.5F * (bend_m * t.direction.cos - dy_m), d = 0.5F * (bend_m * t.direction.sin + dx_m);
     filter::Symmetric<float, 3> q;
-#pragma GCC unroll 16
-    for (int c = 0; c < 3; ++c) {
-      cov_gt(0, c) = var_ds * g(c, 0) + cov_ds_dyaw * g(c, 1);
-      cov_gt(1, c) = cov_ds_dyaw * g(c, 0) + var_dyaw * g(c, 1);
-#pragma GCC unroll 16
-      for (int r = 0; r <= c; ++r) q(r, c) = g(r, 0) * cov_gt(0, c) + g(r, 1) * cov_gt(1, c);
-    }
+    q(0, 2) = cov_ds_dyaw * a + var_dyaw * c;
+    q(1, 2) = cov_ds_dyaw * b + var_dyaw * d;
+    q(2, 2) = var_dyaw;
+    q(0, 0) = a * (var_ds * a + cov_ds_dyaw * c) + c * q(0, 2);
+    const float column = var_ds * b + cov_ds_dyaw * d;
+    q(0, 1) = a * column + c * q(1, 2);
+    q(1, 1) = b * column + d * q(1, 2);
     return q;
   }
 };

@@ -23,9 +23,7 @@ struct PlanarPose {
   [[nodiscard]] filter::Vector<float, 3> minus(const PlanarPose& other) const {
     return {x.minus(other.x), y.minus(other.y), base::wrap_angle(yaw_rad - other.yaw_rad)};
   }
-  [[nodiscard]] constexpr bool finite() const {
-    return base::is_finite(x.offset_m) && base::is_finite(y.offset_m) && base::is_finite(yaw_rad);
-  }
+  [[nodiscard]] constexpr bool finite() const { return base::is_finite(x.offset_m + y.offset_m + yaw_rad); }
 };
 
 }  // namespace tetap::model

@@ -31,9 +31,10 @@ struct RangeBearing {
   [[nodiscard]] filter::Linearised<float, 2, 3> linearised(const PlanarPose& pose) const {
     const Sight sight(pose, landmark, mounting);
     filter::Linearised<float, 2, 3> at;
-    at.z_hat = {sight.range_m(), sight.bearing_rad(pose, mounting)};
-    at.h.row(0) = sight.range_row();
-    at.h.row(1) = sight.bearing_row();
+    const float inverse = sight.inverse_range();
+    at.z_hat = {sight.range2_m2 * inverse, sight.bearing_rad(pose, mounting)};
+    at.h.row(0) = sight.range_row(inverse);
+    at.h.row(1) = sight.bearing_row(inverse);
     return at;
   }
 };

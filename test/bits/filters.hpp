@@ -112,7 +112,7 @@ void hash_vector(base::WordHash& hash, const filter::Vector<float, N>& x) {
 [[nodiscard]] inline std::uint32_t ekf_planar(std::uint32_t steps) {
   base::WordHash hash;
   Chance chance{.random = base::Random{1, 3}};
-  filter::Ekf<model::PlanarPose> ekf;
+  estimators::PlanarEkf ekf;
   const model::UnicycleNoise noise{
       .speed = 1e-3F, .speed_per_speed = 1e-2F, .yaw_rate = 1e-3F, .yaw_rate_per_yaw_rate = 1e-2F};
   const model::DifferentialDrive drive{.left_radius_m = 0.1F,

@@ -5,6 +5,7 @@
 #include "board.hpp"
 #include "config/rover.hpp"
 #include "filter/kalman.hpp"
+#include "filter/structured_kalman.hpp"
 #include "markers.hpp"
 #include "model/constant_velocity.hpp"
 #include "model/gnss_fix_3d.hpp"
@@ -88,7 +89,7 @@ void planar() {
                                .sigma_bearing_rad = 0.02F,
                                .landmark = landmark};
   };
-  filter::Ekf<model::PlanarPose> ekf;
+  filter::StructuredKalman<model::PlanarPose, filter::Guard::kConditioned> ekf;
   ekf.p = filter::Symmetric<float, 3>::diagonal({0.1F, 0.1F, 0.05F});
   for (const Input& input : inputs) {
     const Region<struct w2_ekf> region;

@@ -2,6 +2,7 @@
 // Whatever a sensor says, the Kalman filters stay finite, their covariance stays positive definite (judge: eigenvalues
 // in double), and the refusal is told.
 #include "support/never_nan.hpp"
+#include "estimators/planar/planar_ekf.hpp"
 #include "filter/kalman.hpp"
 #include "model/bearing.hpp"
 #include "model/constant_velocity.hpp"
@@ -57,14 +58,14 @@ class Normal {
   std::normal_distribution<double> normal_;
 };
 
-filter::Ekf<model::PlanarPose> rolling() {
-  filter::Ekf<model::PlanarPose> ekf;
+estimators::PlanarEkf rolling() {
+  estimators::PlanarEkf ekf;
   ekf.p = filter::Symmetric<float, 3>::diagonal({0.1F, 0.1F, 0.05F});
   EXPECT_TRUE(ekf.predict(model::PlanarIncrement{.ds_m = 1, .dyaw_rad = 0.1F, .var_ds = 1e-3F, .var_dyaw = 1e-3F}));
   return ekf;
 }
 template <class Model>
-void break_every_field(const filter::Ekf<model::PlanarPose>& well, const Model& good) {
+void break_every_field(const estimators::PlanarEkf& well, const Model& good) {
   test::break_every_field(
       well, good, [](Model& m) { return fields_of(m); }, [](const auto& a, const auto& b) { return same(a, b); });
 }
@@ -165,7 +166,7 @@ TEST(NeverNan, AGateThatIsNoNumberLetsNothingThrough) {
 }
 
 TEST(NeverNan, ASingularInnovationIsCalledThatAndChangesNothing) {
-  filter::Ekf<model::PlanarPose> ekf;  // knows everything
+  estimators::PlanarEkf ekf;  // knows everything
   EXPECT_EQ(ekf.update(model::GnssPosition{}, 1e9F).verdict, Verdict::kSingular);
   EXPECT_EQ(ekf.update(model::Bearing{.landmark = {.x = base::Anchored{}.plus(3)}}, 1e9F).verdict, Verdict::kSingular);
   EXPECT_EQ(ekf.p.packed(), (filter::Symmetric<float, 3>{}.packed()));
@@ -224,7 +225,7 @@ TEST(NeverNan, CovariancesOfEverySizeStayPositiveDefinite) {
   };
   int accepted = 0;
   for (int run = 0; run < 2000; ++run) {
-    filter::Ekf<model::PlanarPose> ekf;
+    estimators::PlanarEkf ekf;
     for (int k = 0; k < 3; ++k) ekf.p(k, k) = size(k == 2 ? 2 : 12);
     for (int i = 0; i < 100; ++i) {
       static_cast<void>(ekf.predict(model::PlanarIncrement{
@@ -260,7 +261,7 @@ TEST(NeverNan, CovariancesOfEverySizeStayPositiveDefinite) {
 }
 
 TEST(NeverNan, AMillionStepsOfThePlanarFilterWithoutAMeasurement) {
-  filter::Ekf<model::PlanarPose> ekf;
+  estimators::PlanarEkf ekf;
   ekf.p = filter::Symmetric<float, 3>::diagonal({1e-6F, 1e-6F, 1e-6F});
   const model::UnicycleNoise noise{.speed = 1e-3F, .yaw_rate = 1e-4F};
   for (int i = 0; i < 1'000'000; ++i) {

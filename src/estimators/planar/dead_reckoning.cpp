@@ -163,7 +163,7 @@ template <class Filter>
           .yaw_rate_rad2ps2 = (one.var_dyaw + 2.0F * step_rad * step_rad) * per_s2 + aged * aged};
 }
 
-template class PlanarDeadReckoning<filter::Ekf<model::PlanarPose>>;
+template class PlanarDeadReckoning<PlanarEkf>;
 template class PlanarDeadReckoning<SummingEkf>;
 template class PlanarDeadReckoning<filter::Ukf<model::PlanarPose>>;
 template class PlanarDeadReckoning<filter::UkfSqrt<model::PlanarPose>>;

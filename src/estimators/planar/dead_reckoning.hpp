@@ -6,7 +6,7 @@
 
 #include "estimators/estimate.hpp"
 #include "filter/covariance_access.hpp"
-#include "filter/ekf.hpp"
+#include "estimators/planar/planar_ekf.hpp"
 #include "model/planar_increment.hpp"
 #include "param/parameters.hpp"
 #include "sensor/samples.hpp"
@@ -137,6 +137,6 @@ class PlanarDeadReckoning {
   float gyro_bias_radps_ = 0;
 };
 
-using DeadReckoning = PlanarDeadReckoning<filter::Ekf<model::PlanarPose>>;
+using DeadReckoning = PlanarDeadReckoning<PlanarEkf>;
 
 }  // namespace tetap::estimators

@@ -6,6 +6,6 @@
 
 namespace tetap::estimators {
 
-using PoseEkf = PoseFilter<filter::Ekf<model::PlanarPose>>;
+using PoseEkf = PoseFilter<PlanarEkf>;
 
 }  // namespace tetap::estimators

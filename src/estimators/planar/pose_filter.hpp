@@ -25,7 +25,7 @@ class PoseFilter {
 
  public:
   /// The mean of an unscented filter depends on the spread of its points, that of an extended one does not.
-  static constexpr bool kUnscented = !std::same_as<Filter, filter::Ekf<model::PlanarPose>>;
+  static constexpr bool kUnscented = !std::same_as<Filter, PlanarEkf>;
   static constexpr sensor::EstimatorKind kKind = kUnscented ? sensor::EstimatorKind::kUkf : sensor::EstimatorKind::kEkf;
 
   void restart(base::Micros t, const Context& ctx) {

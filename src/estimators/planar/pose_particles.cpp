@@ -111,7 +111,7 @@ Innovation PoseParticles<kMost>::fuse(const sensor::LandmarkSighting& sighting, 
 template <std::size_t kMost>
 Innovation PoseParticles<kMost>::judge(const sensor::LandmarkSighting& sighting, const model::Landmark& landmark,
                                        const param::LandmarkParameters& n) const {
-  filter::Ekf<model::PlanarPose> estimate;
+  PlanarEkf estimate;
   estimate.x = motion_.filter.x;
   estimate.p = motion_.filter.p;
   const model::RangeBearing model{.range_m = sighting.range_m,

@@ -3,18 +3,18 @@
 // for many of them.
 #pragma once
 
-#include "filter/ekf.hpp"
+#include "estimators/planar/planar_ekf.hpp"
 #include "model/planar_increment.hpp"
 
 namespace tetap::estimators {
 
-struct SummingEkf : filter::Ekf<model::PlanarPose> {
+struct SummingEkf : PlanarEkf {
   bool predict(const model::PlanarIncrement& increment) {
     travel.ds_m += increment.ds_m;
     travel.dyaw_rad += increment.dyaw_rad;
     travel.var_ds += increment.var_ds;
     travel.var_dyaw += increment.var_dyaw;
-    return filter::Ekf<model::PlanarPose>::predict(increment);
+    return PlanarEkf::predict(increment);
   }
   model::PlanarIncrement travel;  ///< sum since the owner set it back; the errors of length and turn are independent
 };

@@ -1,0 +1,12 @@
+// SPDX-License-Identifier: Apache-2.0
+// The extended Kalman filter of the planar pose, whose motion and measurements declare their structure by type.
+#pragma once
+
+#include "filter/structured_kalman.hpp"
+#include "model/planar_pose.hpp"
+
+namespace tetap::estimators {
+
+using PlanarEkf = filter::StructuredKalman<model::PlanarPose, filter::Guard::kConditioned>;
+
+}  // namespace tetap::estimators
