@@ -29,7 +29,9 @@ inline constexpr param::Parameters parameters = param::checked({
                          .track_m = 0.50F,
                          .counts_per_turn = 2000,
                          .noise_left = 0.002F,
-                         .noise_right = 0.002F}},
+                         .noise_right = 0.002F},
+               // Twice the 5 m/s that it drives.
+               .most_mps = 10},
     // ICM-42688-P: 0.0028 deg/s/sqrt(Hz) is 2.4e-9 rad^2/s; vibration and a 0.3 % scale error ask for more.
     .gyro = {.use = 1, .up_s = {0, 0, 1}, .noise = 4e-6F, .bias_time_s = 3},
     // The origin is the simulated world's. Anywhere else the first confirmed fix takes its place.

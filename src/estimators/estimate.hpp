@@ -134,6 +134,12 @@ struct Innovation {
   float limit = 0;                              ///< limit of that statistic
 };
 
+/// Record of an input that is integrated. A refused one was beyond what the sensor can measure.
+[[nodiscard]] inline Innovation input_record(sensor::Verdict verdict) {
+  return {.verdict = verdict,
+          .failed = verdict == sensor::Verdict::kRejected ? sensor::Check::kValue : sensor::Check::kNone};
+}
+
 /// The filter's record in the bus's words.
 template <int M>
 [[nodiscard]] Innovation record(const filter::Innovation<float, M>& from, std::uint8_t landmark = 0xFF) {

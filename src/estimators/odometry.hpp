@@ -36,8 +36,7 @@ class Odometry {
     motion.fuse(input, base::Micros{}, n);
   }
   Innovation fuse(const Input& input, base::Micros stamp, const Context& ctx) {
-    const bool used = motion_.fuse(input, stamp, ctx.parameters);
-    return {.verdict = used ? sensor::Verdict::kAccepted : sensor::Verdict::kNotUsed};
+    return input_record(motion_.fuse(input, stamp, ctx.parameters));
   }
 
   /// Counted from where it began; valid as a place on the map once that is known.

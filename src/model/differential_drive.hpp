@@ -49,4 +49,9 @@ struct DifferentialDrive {
   return ahead < 0x8000 ? static_cast<std::int32_t>(ahead) : static_cast<std::int32_t>(ahead) - 0x10000;
 }
 
+/// False: a wheel went farther than `most_m`, or not a number.
+[[nodiscard]] constexpr bool possible_step(float left_m, float right_m, float most_m) {
+  return left_m <= most_m && -left_m <= most_m && right_m <= most_m && -right_m <= most_m;
+}
+
 }  // namespace tetap::model

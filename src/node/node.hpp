@@ -7,6 +7,7 @@
 #include "bus/decoder.hpp"
 #include "bus/input_crc.hpp"
 #include "bus/publisher.hpp"
+#include "bus/stamp_wraps.hpp"
 #include "node/fusion_window.hpp"
 #include "node/landmarks.hpp"
 #include "node/map_origin.hpp"
@@ -62,6 +63,12 @@ class Node {
   using Landmarks =
       std::conditional_t<Estimators::template kTakes<sensor::LandmarkSighting>, node::Landmarks, node::NoLandmarks>;
 
+  /// Sightings, and speeds that are commands.
+  [[nodiscard]] bool at_no_fixed_rate(const sensor::Sample& sample) const {
+    const bool commanded = parameters_.wheels.hold == param::Hold::kForward;
+    return (Estimators::template kTakes<sensor::LandmarkSighting> && sample.sensor == sensor::Sensor::kRangeBearing) ||
+           (Estimators::template kTakes<sensor::BodySpeed> && sample.sensor == sensor::Sensor::kBodySpeed && commanded);
+  }
   [[nodiscard]] estimators::Context context() const { return {.parameters = parameters_, .map_frame = map_frame_}; }
   void restart(base::Micros t, sensor::ResetCause cause);
   void consume(base::Micros t);
@@ -98,6 +105,7 @@ class Node {
   estimators::MapFrame map_frame_;
   MapOrigin origin_;
   bus::Decoder inbox_;
+  bus::StampWraps wraps_;
   bus::Counters counters_;
   bus::Publisher<Estimators::kCount> publisher_;
   [[no_unique_address]] Landmarks landmarks_;
@@ -120,6 +128,7 @@ void Node<Estimators, Capacity>::power_on(base::Micros t) {
   landmarks_.power_on(map_frame_);
   origin_.power_on(map_frame_, parameters_.gnss);
   inbox_.power_on();
+  wraps_.power_on();
   counters_ = {};
   publisher_.power_on();
   pending_reset_ = {};
@@ -145,11 +154,15 @@ template <class Estimators, std::size_t Capacity>
 void Node<Estimators, Capacity>::sample(const sensor::Sample& arrived) {
   sensor::Sample sample = arrived;
   if (!ticked_ && now_.us == 0) return void(++counters_.no_time);
-  if (!plausible(sample)) return void(++counters_.out_of_range);
+  if (!plausible(sample, parameters_.wheels.most_mps)) return void(++counters_.out_of_range);
+  sample.stamp = at_no_fixed_rate(sample) ? wraps_.place_beside(sample, now_) : wraps_.place(sample, now_);
   calibrate(sample, parameters_);
+  if constexpr (Estimators::template kTakes<sensor::LandmarkSighting>)
+    if (sample.sensor == sensor::Sensor::kRangeBearing) calibrate(sample.payload.sighting, parameters_.landmark);
   if (sample.stamp <= history_.closed_until()) {
     ++counters_.too_late;
-    publisher_.event({.verdict = sensor::Verdict::kTooLate}, sample, kPrimary, now_, counters_);
+    publisher_.event({.verdict = sensor::Verdict::kTooLate, .failed = sensor::Check::kTime}, sample, kPrimary, now_,
+                     counters_);
     return;
   }
   if (sample.stamp > now_ + base::Micros{parameters_.loop.ahead_us}) return void(++counters_.too_early);
@@ -222,6 +235,7 @@ void Node<Estimators, Capacity>::restart(base::Micros t, sensor::ResetCause caus
   jumps_ = 0;
   if (cause == sensor::ResetCause::kTimeJump) {
     inbox_.discard(counters_);
+    wraps_.power_on();
     history_.clear();
     history_.open_from(t - base::Micros{parameters_.loop.period_us});
   }
@@ -242,7 +256,9 @@ void Node<Estimators, Capacity>::note(std::size_t instance, const sensor::Sample
   const bool frequent = sample.sensor <= sensor::Sensor::kBodySpeed || sample.sensor == sensor::Sensor::kMagnetometer ||
                         sample.sensor == sensor::Sensor::kBarometer;
   const bool ordinary = innovation.verdict == sensor::Verdict::kAccepted && frequent;
-  if ((innovation.dof > 0 && !ordinary) || innovation.verdict > sensor::Verdict::kNotUsed)
+  const bool impossible =
+      innovation.verdict == sensor::Verdict::kRejected && innovation.failed == sensor::Check::kValue;
+  if ((innovation.dof > 0 && !ordinary) || innovation.verdict > sensor::Verdict::kNotUsed || impossible)
     publisher_.event(innovation, sample, instance, now_, counters_);
 }
 

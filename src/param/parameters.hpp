@@ -40,6 +40,7 @@ struct WheelParameters {
   float right_speed_scale = 1;
   std::int32_t timeout_us = 500'000;  ///< without a sample for longer: assume standstill, grow the covariance fast
   float timeout_noise = 1.0F;         ///< m^2/s and rad^2/s then
+  float most_mps = 50;                ///< fastest rim of a wheel; a faster step or speed is refused
 };
 
 /// The IMU's own errors as tools/calibrate/calibrate_robot finds them, in its own axes: specific force = accel_matrix
@@ -68,6 +69,9 @@ struct LandmarkParameters {
   float sigma_bearing_rad = 0.02F;
   float sigma_range_only_m = 0.1F;  ///< when no bearing comes with it
   float gate_scale = 1;             ///< times the 99 % chi-square quantile
+  std::int32_t depth = 0;           ///< 1: a stated range is the depth along the sensor's axis, range cos(bearing)
+  float range_offset_m = 0;         ///< stated less true range, at the sensor
+  float range_scale = 1;            ///< true over stated range, without the offset
 };
 
 /// A moving target, as a sensor at rest sees it.

@@ -75,6 +75,8 @@ inline constexpr std::array kTable{
               "Wheels without a sample for longer count as standing still, with a covariance that grows fast."),
     TETAP_ROW(0x093, wheels.timeout_noise, "m^2/s", 0.001, 100, kLive,
               "Noise density after the time-out; the same number in rad^2/s for the heading."),
+    TETAP_ROW(0x094, wheels.most_mps, "m/s", 0.1, 1000, kLive,
+              "Fastest speed of a wheel's rim; a faster step of counts, or a faster speed, is refused."),
 
     TETAP_ROW(0x0C0, imu.accel_bias_mps2, "m/s^2", -5, 5, kRestart,
               "Bias of the accelerometer in its own axes, which is subtracted from each sample."),
@@ -110,6 +112,11 @@ inline constexpr std::array kTable{
     TETAP_ROW(0x146, landmark.sigma_range_only_m, "m", 0.001, 10, kLive, "1 sigma of a range without a bearing."),
     TETAP_ROW(0x147, landmark.gate_scale, "", 0.25, 25, kLive,
               "Innovation gate of landmarks over the 99 % quantile of chi-square."),
+    TETAP_ROW(0x148, landmark.depth, "", 0, 1, kRestart,
+              "1: a range is the depth along the sensor's axis, as a camera finds it from a known size."),
+    TETAP_ROW(0x149, landmark.range_offset_m, "m", -10, 10, kRestart,
+              "Stated less true range at the sensor, which is subtracted from each range."),
+    TETAP_ROW(0x14A, landmark.range_scale, "", 0.5, 2, kRestart, "True over stated range, without the offset."),
 
     TETAP_ROW(0x180, gnss.antenna_x_b_m, "m", -50, 50, kRestart,
               "Place of the GNSS antenna ahead of the body's origin."),

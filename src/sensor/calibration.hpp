@@ -3,6 +3,7 @@
 // sample alone: a late one is corrected as it would have been in time.
 #pragma once
 
+#include "base/math.hpp"
 #include "param/parameters.hpp"
 #include "sensor/row_major.hpp"
 #include "sensor/sample.hpp"
@@ -22,6 +23,16 @@ inline void calibrate(ImuSample& s, const param::ImuParameters& n) {
   }
   const filter::Vector3 f = times(n.accel_matrix, dv);
   s.dvelocity_b_mps = {f(0), f(1), f(2)};
+}
+
+/// Range of a landmark: z = d / cos(bearing) for a depth d along the sensor's axis, without offset and scale. A bearing
+/// beyond 80 degrees has no depth to speak of.
+inline void calibrate(LandmarkSighting& s, const param::LandmarkParameters& n) {
+  s.range_m = (s.range_m - n.range_offset_m) * n.range_scale;
+  if (n.depth == 0 || !base::is_finite(s.bearing_rad)) return;
+  constexpr float kLeastCosine = 0.17F;
+  const float cosine = base::cos(s.bearing_rad);
+  if (cosine > kLeastCosine) s.range_m /= cosine;
 }
 
 inline void calibrate(Sample& sample, const param::Parameters& n) {

@@ -19,15 +19,17 @@ namespace detail {
 [[nodiscard]] constexpr bool number_or_none(float x, float limit) { return base::is_nan(x) || within(limit, x); }
 
 struct Plausible {
+  float most_mps;  ///< fastest wheel, and fastest body
+
   bool operator()(const ImuSample& s) const {
     const auto& a = s.dangle_b_rad;
     const auto& v = s.dvelocity_b_mps;
     return within(20.0F, a[0], a[1], a[2]) && within(200.0F, v[0], v[1], v[2]);
   }
   bool operator()(const WheelCounts&) const { return true; }
-  bool operator()(const WheelSpeeds& s) const { return within(1e3F, s.left_mps, s.right_mps); }
+  bool operator()(const WheelSpeeds& s) const { return within(most_mps, s.left_mps, s.right_mps); }
   bool operator()(const BodySpeed& s) const {
-    return within(1e3F, s.forward_mps) && number_or_none(s.yaw_rate_radps, 100.0F);
+    return within(most_mps, s.forward_mps) && number_or_none(s.yaw_rate_radps, 100.0F);
   }
   bool operator()(const GnssPosition& s) const {
     constexpr std::int64_t kQuarterTurn = 45'000'000'000;
@@ -51,10 +53,13 @@ struct Plausible {
 };
 }  // namespace detail
 
-/// False: the sample is to be refused and counted (Counters::out_of_range).
-[[nodiscard]] inline bool plausible(const Sample& sample) {
+/// Faster than every robot, in m/s.
+inline constexpr float kFastest_mps = 1e3F;
+
+/// False: the sample is to be refused and counted (Counters::out_of_range). `most_mps`: fastest wheel of the robot.
+[[nodiscard]] inline bool plausible(const Sample& sample, float most_mps = kFastest_mps) {
   bool good = false;
-  visit(sample, [&good](const auto& payload) { good = detail::Plausible{}(payload); });
+  visit(sample, [&](const auto& payload) { good = detail::Plausible{most_mps}(payload); });
   return good;
 }
 

@@ -112,5 +112,68 @@ TEST(DeadReckoning, TheGyroscopeTurnsAndItsBiasIsLearntAtRest) {
   EXPECT_NEAR(motion.estimate(n).pose.yaw_rad - yaw_before, 0.5F, 0.01F);
 }
 
+/// One metre a second straight ahead, by counters of which some begin at 0 again at `restart_s`.
+struct Restarted {
+  double error_m = 0;  ///< at the end, from a drive whose counters go on
+  int refused = 0;
+  float var_x = 0;
+};
+Restarted restarted(int first_count, bool left, bool right, bool gyro) {
+  param::Parameters n = kNumbers;
+  n.gyro.use = gyro ? 1 : 0;
+  n.wheels.most_mps = 10;
+  DeadReckoning motion;
+  motion.start({0}, {}, 0.001F, 0.001F);
+  constexpr int kRestart = 300, kEnd = 600;
+  constexpr double kPerStep = 0.01 * 2000 / (0.2 * M_PI);
+  Restarted result;
+  for (int k = 1; k <= kEnd; ++k) {
+    const base::Micros stamp{10'000 * k};
+    if (gyro)
+      motion.fuse(sensor::ImuSample{.dangle_b_rad = {0, 0, 0}, .interval_us = 10'000}, stamp - base::Micros{4'000}, n);
+    const auto count = [&](bool restarts) {
+      const int from = restarts && k >= kRestart ? kRestart : 0;
+      return static_cast<std::uint16_t>((from > 0 ? 0 : first_count) + std::lround(kPerStep * (k - from)));
+    };
+    const auto verdict = motion.fuse(sensor::WheelCounts{.left = count(left), .right = count(right)}, stamp, n);
+    if (verdict == sensor::Verdict::kRejected) ++result.refused;
+  }
+  motion.advance({10'000 * kEnd});
+  const auto e = motion.estimate(n);
+  result.error_m = std::hypot(x_of(e) - 0.01 * (kEnd - 1), y_of(e));
+  result.var_x = e.p(0, 0);
+  return result;
+}
+
+// Every count at which a step to 0 is faster than the wheel's 10 m/s: 318 counts in 10 ms.
+TEST(DeadReckoning, CountersThatRestartAreRefusedAndCostNoWay) {
+  for (const bool gyro : {false, true})
+    for (const auto& [left, right] : {std::pair{true, true}, {true, false}, {false, true}})
+      for (const int first : {0, 1'000, 9'000, 30'000, 43'310, 60'000, 63'000}) {
+        const Restarted r = restarted(first, left, right, gyro);
+        EXPECT_EQ(r.refused, 1) << first << left << right << gyro;
+        EXPECT_LT(r.error_m, 2e-3) << first << left << right << gyro;
+      }
+  EXPECT_EQ(restarted(9'000, false, false, true).refused, 0);
+}
+
+TEST(DeadReckoning, CountersThatOnlyLeapBecomeSilentWheels) {
+  param::Parameters n = kNumbers;
+  n.wheels.most_mps = 10;
+  DeadReckoning motion;
+  motion.start({0}, {}, 0.001F, 0.001F);
+  for (int k = 1; k <= 300; ++k) {
+    const int count = k < 100 ? 32 * k : 9'000 * (k % 3);
+    motion.fuse(
+        sensor::WheelCounts{.left = static_cast<std::uint16_t>(count), .right = static_cast<std::uint16_t>(count)},
+        {10'000 * k}, n);
+  }
+  motion.advance({3'000'000});
+  const auto e = motion.estimate(n);
+  EXPECT_FALSE(e.velocity_valid);
+  EXPECT_GT(e.p(0, 0), 0.5F);
+  EXPECT_NEAR(x_of(e), 1.0 + 0.5, 0.05);  // the last speed holds until the time-out
+}
+
 }  // namespace
 }  // namespace tetap::test

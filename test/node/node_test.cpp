@@ -321,6 +321,31 @@ TEST(Node, ABrokenInvariantRestartsTheEstimatorsSaysWhichAndNeverReachesTheBus) 
   }
 }
 
+TEST(Node, CountersThatBeginAnewAreRefusedAndSaid) {
+  Bench bench;
+  Frames out;
+  const auto counts = [&bench](int k, int left, int right) {
+    return in(bus::InWheelCounts{.stamp_us = stamp(bench.now_us + 5'000),
+                                 .seq = static_cast<std::uint8_t>(k & 15),
+                                 .left = static_cast<std::uint16_t>(left),
+                                 .right = static_cast<std::uint16_t>(right)});
+  };
+  for (int k = 0; k < 200; ++k) {
+    const int since = k < 100 ? 20'000 + 32 * k : 32 * (k - 100);
+    for (const auto& frame : bench.epoch({counts(k, since, since)})) out.push_back(frame);
+  }
+  int said = 0;
+  for (const auto& event : all<bus::EstInnov>(out)) {
+    if (event.sensor != sensor::Sensor::kWheelCounts) continue;
+    EXPECT_EQ(event.verdict, sensor::Verdict::kRejected);
+    EXPECT_EQ(event.check, sensor::Check::kValue);
+    ++said;
+  }
+  EXPECT_EQ(said, 2) << "once for odometry, once for the filter";
+  const double way_m = bus::EstPos::kXScale * last<bus::EstPos>(out, 0)->x_raw;
+  EXPECT_NEAR(way_m, 200 * 32 * 0.1 * 2 * M_PI / 2000, 0.03);
+}
+
 TEST(Node, StatusCarriesAValidCrcAndACounter) {
   Bench bench;
   int expected = 0;

@@ -160,5 +160,28 @@ TEST(Calibrate, AGyroscopesBiasDoesNotTurnTheNodesHeading) {
   EXPECT_NEAR(motion->yaw_rad, 0.0F, 1e-3F);
 }
 
+/// A camera's depth of a landmark, with offset and scale, becomes its range again.
+TEST(Calibrate, ADepthBecomesARange) {
+  const param::LandmarkParameters n{.depth = 1, .range_offset_m = 0.05F, .range_scale = 0.97F};
+  for (const double range_m : {0.4, 1.0, 5.0, 60.0})
+    for (double bearing_rad = -1.35; bearing_rad < 1.36; bearing_rad += 0.15) {
+      const double stated_m = range_m * std::cos(bearing_rad) / 0.97 + 0.05;
+      LandmarkSighting s{.range_m = static_cast<float>(stated_m), .bearing_rad = static_cast<float>(bearing_rad)};
+      calibrate(s, n);
+      EXPECT_NEAR(s.range_m, range_m, 2e-6 * range_m + 1e-6) << range_m << ' ' << bearing_rad;
+      EXPECT_EQ(s.bearing_rad, static_cast<float>(bearing_rad));
+    }
+}
+
+TEST(Calibrate, ARangeWithoutABearingHasNoDepth) {
+  LandmarkSighting s{.range_m = 3, .bearing_rad = base::kNan};
+  calibrate(s, param::LandmarkParameters{.depth = 1});
+  EXPECT_EQ(s.range_m, 3);
+  s = {.range_m = base::kNan, .bearing_rad = 0.3F};
+  calibrate(s, param::LandmarkParameters{.depth = 1});
+  EXPECT_TRUE(base::is_nan(s.range_m));
+  EXPECT_EQ(s.bearing_rad, 0.3F);
+}
+
 }  // namespace
 }  // namespace tetap::sensor

@@ -31,8 +31,8 @@ Innovation Inertial::fuse(const sensor::BodySpeed& speed, base::Micros stamp, co
 /// Its own frame, which is gone when the forward speed is fused: that path decides the stack.
 [[gnu::noinline]] Innovation Inertial::assess_wheels(const WheelReading& reading, const FilterView& filter,
                                                      ForwardReading& forward) {
-  if (!base::is_finite(reading.wheels.left_mps) || !base::is_finite(reading.wheels.right_mps))
-    return {.verdict = sensor::Verdict::kNotFinite, .failed = Check::kValue};
+  if (!model::possible_step(reading.wheels.left_mps, reading.wheels.right_mps, filter.parameters().wheels.most_mps))
+    return {.verdict = sensor::Verdict::kRejected, .failed = Check::kValue};
   sources_.forward.note(reading.mean_mps(), filter.stamp());
   Assessment a = sources_.wheels.assess(reading, filter);
   if (a.fuses()) {

@@ -58,18 +58,26 @@ void PlanarDeadReckoning<Filter>::propagate(base::Micros t, const param::Paramet
 }
 
 template <class Filter>
-bool PlanarDeadReckoning<Filter>::fuse(const sensor::WheelCounts& now, base::Micros stamp, const param::Parameters& n) {
+sensor::Verdict PlanarDeadReckoning<Filter>::fuse(const sensor::WheelCounts& now, base::Micros stamp,
+                                                  const param::Parameters& n) {
   const auto& drive = n.wheels.drive;
   if (n.gyro.use != 0) propagate(stamp, n);  // the turn up to here; what the counts add is length
   const bool usable = have_counts_ && stamp > counts_time_ && stamp - counts_time_ <= base::Micros{n.wheels.timeout_us};
+  sensor::Verdict verdict = sensor::Verdict::kAccepted;
   if (usable) {
     const float left_m = drive.left_m(model::count_difference(now.left, counts_.left));
     const float right_m = drive.right_m(model::count_difference(now.right, counts_.right));
-    model::PlanarIncrement increment = drive.increment(left_m - applied_left_m_, right_m - applied_right_m_);
-    if (n.gyro.use != 0) turn(increment, 0.0F, 0.0F);
-    filter.predict(increment);
-    const float per_s = 1.0F / base::seconds(stamp - counts_time_);
-    held_ = {.kind = Held::Kind::kWheels, .first_mps = left_m * per_s, .second = right_m * per_s};
+    const float dt_s = base::seconds(stamp - counts_time_);
+    if (model::possible_step(left_m, right_m, n.wheels.most_mps * dt_s)) {
+      model::PlanarIncrement increment = drive.increment(left_m - applied_left_m_, right_m - applied_right_m_);
+      if (n.gyro.use != 0) turn(increment, 0.0F, 0.0F);
+      filter.predict(increment);
+      const float per_s = 1.0F / dt_s;
+      held_ = {.kind = Held::Kind::kWheels, .first_mps = left_m * per_s, .second = right_m * per_s};
+    } else {
+      propagate(stamp, n);  // as far as the last speeds hold
+      verdict = sensor::Verdict::kRejected;
+    }
   } else {
     if (have_counts_) propagate(stamp, n);  // variance of the gap stays; its way is not known
     held_ = {.kind = Held::Kind::kWheels};
@@ -77,13 +85,15 @@ bool PlanarDeadReckoning<Filter>::fuse(const sensor::WheelCounts& now, base::Mic
   if (stamp > time_) time_ = stamp;
   untravelled();
   counts_ = now;
-  counts_time_ = last_input_ = stamp;
+  counts_time_ = stamp;
+  if (verdict == sensor::Verdict::kAccepted) last_input_ = stamp;
   have_counts_ = true;
-  return true;
+  return verdict;
 }
 
 template <class Filter>
-bool PlanarDeadReckoning<Filter>::fuse_speed(const Held& held, base::Micros stamp, const param::Parameters& n) {
+sensor::Verdict PlanarDeadReckoning<Filter>::fuse_speed(const Held& held, base::Micros stamp,
+                                                        const param::Parameters& n) {
   const bool first = held_.kind == Held::Kind::kNone;
   const bool gap = stamp - last_input_ > base::Micros{n.wheels.timeout_us};
   if (n.wheels.hold == param::Hold::kForward || first || gap) propagate(stamp, n);
@@ -91,14 +101,15 @@ bool PlanarDeadReckoning<Filter>::fuse_speed(const Held& held, base::Micros stam
   last_input_ = stamp;
   if (n.wheels.hold == param::Hold::kBackward) propagate(stamp, n);
   if (stamp > time_) time_ = stamp;
-  return true;
+  return sensor::Verdict::kAccepted;
 }
 
 template <class Filter>
-bool PlanarDeadReckoning<Filter>::fuse(const sensor::ImuSample& sample, base::Micros stamp,
-                                       const param::Parameters& n) {
+sensor::Verdict PlanarDeadReckoning<Filter>::fuse(const sensor::ImuSample& sample, base::Micros stamp,
+                                                  const param::Parameters& n) {
   const base::Micros interval{sample.interval_us};
-  if (n.gyro.use == 0 || interval.us == 0 || interval > base::Micros{n.wheels.timeout_us}) return false;
+  if (n.gyro.use == 0 || interval.us == 0 || interval > base::Micros{n.wheels.timeout_us})
+    return sensor::Verdict::kNotUsed;
   const float interval_s = base::seconds(interval);
   const float raw_radps = (n.gyro.up_s[0] * sample.dangle_b_rad[0] + n.gyro.up_s[1] * sample.dangle_b_rad[1] +
                            n.gyro.up_s[2] * sample.dangle_b_rad[2]) /
@@ -127,7 +138,7 @@ bool PlanarDeadReckoning<Filter>::fuse(const sensor::ImuSample& sample, base::Mi
   }
   applied_yaw_rad_ = 0;
   gyro_time_ = stamp;
-  return true;
+  return sensor::Verdict::kAccepted;
 }
 
 template <class Filter>

@@ -22,39 +22,50 @@ class PlanarDeadReckoning {
   Filter filter;
 
   void start(base::Micros t, const model::PlanarPose& pose, float sigma_position_m, float sigma_yaw_rad) {
-    const float position_m = sigma_position_m > kFinest_m ? sigma_position_m : kFinest_m;
-    const float yaw_rad = sigma_yaw_rad > kFinest_rad ? sigma_yaw_rad : kFinest_rad;
-    const float variance = position_m * position_m;
     filter.x = pose;
     filter.x.yaw_rad = base::wrap_angle(pose.yaw_rad);
-    set_covariance(filter, filter::Symmetric<float, 3>::diagonal({variance, variance, yaw_rad * yaw_rad}));
+    set_error(sigma_position_m, sigma_yaw_rad);
     if (t > time_) time_ = t;
     untravelled();
   }
 
   void advance(base::Micros t) { out_time_ = t; }
 
+  /// The pose of now becomes certain: the origin of a frame of its own.
+  void forget_error() { set_error(kFinest_m, kFinest_rad); }
+  /// The pose of now is another one; what the wheels did since their last sample stays in it.
+  void relocate(const model::PlanarPose& pose, float sigma_position_m, float sigma_yaw_rad) {
+    filter.x = pose;
+    set_error(sigma_position_m, sigma_yaw_rad);
+  }
   /// The heading of today becomes the x axis of a frame of its own: known there, and apart from the position.
   void forget_heading() {
     const auto& p = covariance_of(filter);
     set_covariance(filter, filter::Symmetric<float, 3>::diagonal({p(0, 0), p(1, 1), kFinest_rad * kFinest_rad}));
   }
 
-  /// False: this robot has no use for the sample (a speed without a turn, an IMU that is not used).
-  bool fuse(const sensor::WheelCounts& now, base::Micros stamp, const param::Parameters& n);
-  bool fuse(const sensor::WheelSpeeds& speeds, base::Micros stamp, const param::Parameters& n) {
+  /// kNotUsed: this robot has no use for the sample (a speed without a turn, an IMU that is not used). kRejected: a
+  /// step of counts that no wheel can do; the held speeds stand for it, and the counters begin anew.
+  sensor::Verdict fuse(const sensor::WheelCounts& now, base::Micros stamp, const param::Parameters& n);
+  sensor::Verdict fuse(const sensor::WheelSpeeds& speeds, base::Micros stamp, const param::Parameters& n) {
     return fuse_speed({.kind = Held::Kind::kWheels, .first_mps = speeds.left_mps, .second = speeds.right_mps}, stamp,
                       n);
   }
-  bool fuse(const sensor::BodySpeed& speed, base::Micros stamp, const param::Parameters& n) {
+  sensor::Verdict fuse(const sensor::BodySpeed& speed, base::Micros stamp, const param::Parameters& n) {
     // A speedometer alone does not measure the turn: a gyroscope has to.
     const bool turns = base::is_finite(speed.yaw_rate_radps);
-    if (!turns && n.gyro.use == 0) return false;
+    if (!turns && n.gyro.use == 0) return sensor::Verdict::kNotUsed;
     return fuse_speed(
         {.kind = Held::Kind::kBody, .first_mps = speed.forward_mps, .second = turns ? speed.yaw_rate_radps : 0.0F},
         stamp, n);
   }
-  bool fuse(const sensor::ImuSample& sample, base::Micros stamp, const param::Parameters& n);
+  sensor::Verdict fuse(const sensor::ImuSample& sample, base::Micros stamp, const param::Parameters& n);
+
+  /// Turn rates as the wheels and as the gyroscope showed them last.
+  [[nodiscard]] float wheels_turn_radps(const param::Parameters& n) const {
+    return held_.kind == Held::Kind::kWheels ? (held_.second - held_.first_mps) / n.wheels.drive.track_m : held_.second;
+  }
+  [[nodiscard]] float gyro_turn_radps() const { return gyro_rate_radps_; }
 
   /// Brings the state to t with what is held; called before a measurement is fused at its own time.
   void propagate(base::Micros t, const param::Parameters& n);
@@ -100,7 +111,13 @@ class PlanarDeadReckoning {
     float second = 0;     ///< yaw rate [rad/s], or the right wheel's speed
   };
 
-  bool fuse_speed(const Held& held, base::Micros stamp, const param::Parameters& n);
+  void set_error(float sigma_position_m, float sigma_yaw_rad) {
+    const float position_m = sigma_position_m > kFinest_m ? sigma_position_m : kFinest_m;
+    const float yaw_rad = sigma_yaw_rad > kFinest_rad ? sigma_yaw_rad : kFinest_rad;
+    const float variance = position_m * position_m;
+    set_covariance(filter, filter::Symmetric<float, 3>::diagonal({variance, variance, yaw_rad * yaw_rad}));
+  }
+  sensor::Verdict fuse_speed(const Held& held, base::Micros stamp, const param::Parameters& n);
   /// The held speeds are recent enough to be called the motion.
   [[nodiscard]] bool fresh(const param::Parameters& n) const {
     return held_.kind != Held::Kind::kNone && out_time_ - last_input_ <= base::Micros{n.wheels.timeout_us};
@@ -110,7 +127,7 @@ class PlanarDeadReckoning {
   }
   [[nodiscard]] float yaw_rate_radps(const param::Parameters& n) const {
     if (n.gyro.use != 0) return gyro_rate_radps_;
-    return held_.kind == Held::Kind::kWheels ? (held_.second - held_.first_mps) / n.wheels.drive.track_m : held_.second;
+    return wheels_turn_radps(n);
   }
   [[nodiscard]] model::PlanarIncrement held_increment(float dt_s, const param::Parameters& n) const;
   static void turn(model::PlanarIncrement& increment, float dyaw_rad, float variance) {

@@ -36,7 +36,6 @@ Innovation PoseFilter<Filter>::fuse(const sensor::LandmarkSighting& sighting, ba
   if (!landmark) return {.verdict = sensor::Verdict::kUnknownLandmark, .landmark = sighting.landmark};
   motion_.propagate(stamp, ctx.parameters);
   give_up_when_lost();
-  if (phase_ != Phase::kTracking) return {.verdict = sensor::Verdict::kNotUsed, .landmark = sighting.landmark};
   const bool has_range = base::is_finite(sighting.range_m);
   const bool has_bearing = base::is_finite(sighting.bearing_rad);
   if (has_range && has_bearing) {
@@ -46,8 +45,10 @@ Innovation PoseFilter<Filter>::fuse(const sensor::LandmarkSighting& sighting, ba
                                     .sigma_bearing_rad = n.sigma_bearing_rad,
                                     .landmark = *landmark,
                                     .mounting = n.mounting};
+    if (phase_ != Phase::kTracking) return align(model, stamp, ctx, sighting.landmark);
     return measure(model, kLandmark, n.gate_scale, stamp, ctx, sighting.landmark);
   }
+  if (phase_ != Phase::kTracking) return {.verdict = sensor::Verdict::kNotUsed, .landmark = sighting.landmark};
   if (has_range) {
     const model::Range model{.range_m = sighting.range_m,
                              .sigma_range_m = n.sigma_range_only_m + n.sigma_range_per_m * sighting.range_m,
@@ -63,6 +64,42 @@ Innovation PoseFilter<Filter>::fuse(const sensor::LandmarkSighting& sighting, ba
     return measure(model, kLandmark, n.gate_scale, stamp, ctx, sighting.landmark);
   }
   return {.verdict = sensor::Verdict::kNotFinite, .landmark = sighting.landmark, .failed = sensor::Check::kValue};
+}
+
+/// The candidate's own frame is the map; refused, it is one as good as any other.
+template <class Filter>
+Innovation PoseFilter<Filter>::align(const model::RangeBearing& seen, base::Micros stamp, const Context& ctx,
+                                     std::uint8_t landmark) {
+  const Innovation waits{
+      .verdict = sensor::Verdict::kNotUsed, .landmark = landmark, .failed = sensor::Check::kUnconfirmed};
+  Innovation third = waits;
+  if (landmarks_.has_candidate()) {
+    if (!landmarks_.is_third(landmark, stamp)) return waits;
+    const float gate = ctx.parameters.landmark.gate_scale * filter::chi_square_99(model::RangeBearing::kDimension);
+    third = record(motion_.filter.update(seen, gate), landmark);
+    if (third.verdict == sensor::Verdict::kAccepted) {
+      begin_tracking(stamp);
+      return third;
+    }
+    phase_ = Phase::kWaiting;
+  }
+  const LandmarkAlignment::Result found =
+      landmarks_.add(seen, landmark, stamp, motion_.filter.x, covariance_of(motion_.filter));
+  using Outcome = LandmarkAlignment::Outcome;
+  if (found.outcome == Outcome::kFirst || found.outcome == Outcome::kContradicts) motion_.forget_error();
+  if (found.outcome == Outcome::kContradicts)
+    return {.verdict = sensor::Verdict::kRejected,
+            .dof = 1,
+            .nis = found.nis,
+            .gate = found.gate,
+            .landmark = landmark,
+            .failed = sensor::Check::kGate};
+  if (found.outcome == Outcome::kCandidate) {
+    motion_.relocate(found.pose.pose, found.pose.sigma_position_m, found.pose.sigma_yaw_rad);
+    alignment_ = {};  // it knew the frame of before
+    phase_ = Phase::kAligning;
+  }
+  return third;
 }
 
 template <class Filter>
@@ -86,8 +123,7 @@ Innovation PoseFilter<Filter>::fuse(const sensor::GnssPosition& fix, base::Micro
   const auto aligned = alignment_.add(model, motion_.filter.x, n.align_distance_m);
   if (aligned) {
     motion_.start(stamp, aligned->pose, aligned->sigma_position_m, aligned->sigma_yaw_rad);
-    phase_ = Phase::kTracking;
-    last_absolute_ = stamp;
+    begin_tracking(stamp);
   }
   return {.verdict = sensor::Verdict::kAccepted};
 }

@@ -4,9 +4,11 @@
 #pragma once
 
 #include "checks/persistence.hpp"
+#include "checks/wheel_turn.hpp"
 #include "estimators/context.hpp"
 #include "estimators/planar/dead_reckoning.hpp"
 #include "estimators/planar/gnss_alignment.hpp"
+#include "estimators/planar/landmark_alignment.hpp"
 #include "model/bearing.hpp"
 #include "model/gnss_position.hpp"
 #include "model/range.hpp"
@@ -47,6 +49,7 @@ class PoseFilter {
     motion_.start(t, given.pose, given.sigma_position_m, heading ? given.sigma_yaw_rad : kFreeHeading_rad);
     phase_ = heading ? Phase::kTracking : Phase::kWaiting;
     alignment_ = {};
+    landmarks_.reset();
     last_absolute_ = t;
     refused_ = {};
   }
@@ -58,8 +61,11 @@ class PoseFilter {
     motion.fuse(input, base::Micros{}, n);
   }
   Innovation fuse(const Input& input, base::Micros stamp, const Context& ctx) {
-    const bool used = motion_.fuse(input, stamp, ctx.parameters);
-    return {.verdict = used ? sensor::Verdict::kAccepted : sensor::Verdict::kNotUsed};
+    const sensor::Verdict verdict = motion_.fuse(input, stamp, ctx.parameters);
+    const param::Parameters& n = ctx.parameters;
+    if (!std::same_as<Input, sensor::ImuSample> && n.gyro.use != 0 && verdict == sensor::Verdict::kAccepted)
+      wheel_turn_.update(motion_.wheels_turn_radps(n), motion_.gyro_turn_radps(), stamp, n.disagreement);
+    return input_record(verdict);
   }
 
   Innovation fuse(const sensor::LandmarkSighting& sighting, base::Micros stamp, const Context& ctx);
@@ -68,11 +74,19 @@ class PoseFilter {
   [[nodiscard]] Estimate estimate(const Context& ctx) const {
     Estimate estimate = motion_.estimate(ctx.parameters);
     estimate.position_valid = estimate.heading_valid = phase_ == Phase::kTracking;
-    if (kUnscented && phase_ != Phase::kTracking) estimate.p.add_diagonal({0, 0, kUnknown_rad * kUnknown_rad});
+    if (phase_ == Phase::kTracking) return estimate;
+    const bool own_frame = landmarks_.searches();
+    const float place_m2 = own_frame ? kUnknown_m * kUnknown_m : 0.0F;
+    const float yaw_rad2 = own_frame || kUnscented ? kUnknown_rad * kUnknown_rad : 0.0F;
+    estimate.p.add_diagonal({place_m2, place_m2, yaw_rad2});
     return estimate;
   }
   [[nodiscard]] MotionVariance motion_variance(const Context& ctx) const {
     return motion_.motion_variance(ctx.parameters);
+  }
+  /// Bits of sensor::Fault: wheels that turn otherwise than the gyroscope.
+  [[nodiscard]] std::uint16_t faults() const {
+    return wheel_turn_.refuted() ? 1U << static_cast<unsigned>(sensor::Fault::kWheelSlip) : 0U;
   }
   [[nodiscard]] sensor::Mode mode(const Context&) const {
     if (phase_ == Phase::kWaiting) return sensor::Mode::kWaitingForPose;
@@ -86,6 +100,8 @@ class PoseFilter {
     motion_.hash_state(sink);
     sink(static_cast<std::uint32_t>(phase_));
     alignment_.hash_state(sink);
+    landmarks_.hash_state(sink);
+    wheel_turn_.hash_state(sink);
     for (const checks::Persistence& refused : refused_) refused.hash_state(sink);
     sink(last_absolute_.us);
   }
@@ -103,15 +119,25 @@ class PoseFilter {
     if (phase_ != Phase::kTracking || !(covariance_of(motion_.filter)(2, 2) > kLost_rad * kLost_rad)) return;
     phase_ = Phase::kWaiting;
     alignment_ = {};
+    landmarks_.reset();
     if (kUnscented) motion_.forget_heading();
   }
   template <class Model>
   Innovation measure(const Model& model, Source source, float gate_scale, base::Micros stamp, const Context& ctx,
                      std::uint8_t landmark = 0xFF);
+  /// A sighting while the pose is unknown.
+  Innovation align(const model::RangeBearing& seen, base::Micros stamp, const Context& ctx, std::uint8_t landmark);
+  void begin_tracking(base::Micros stamp) {
+    phase_ = Phase::kTracking;
+    landmarks_.reset();
+    last_absolute_ = stamp;
+  }
   void recover(checks::Persistence& refused, base::Micros stamp, const param::RecoveryParameters& n);
 
   Motion motion_;
   GnssAlignment alignment_;
+  LandmarkAlignment landmarks_;
+  checks::WheelTurn wheel_turn_;
   Phase phase_ = Phase::kWaiting;
   std::array<checks::Persistence, kSources> refused_{};  ///< rejections in a row of one kind of sensor
   base::Micros last_absolute_;                           ///< stamp of the last accepted landmark or fix

@@ -43,9 +43,9 @@ class PoseParticles {
   }
   Innovation fuse(const Input& input, base::Micros stamp, const Context& ctx) {
     close_batch(stamp, ctx);
-    const bool used = motion_.fuse(input, stamp, ctx.parameters);
+    const sensor::Verdict verdict = motion_.fuse(input, stamp, ctx.parameters);
     if (stamp - moved_ >= kLongestArc) move_cloud(stamp);
-    return {.verdict = used ? sensor::Verdict::kAccepted : sensor::Verdict::kNotUsed};
+    return input_record(verdict);
   }
   /// Range and bearing together; the landmark 0xFF is one without an identity. A sighting whose distance from the
   /// estimate exceeds the cap of the likelihood counts as rejected: it weighs no more than the cap.

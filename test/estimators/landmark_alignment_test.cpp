@@ -1,0 +1,152 @@
+// SPDX-License-Identifier: Apache-2.0
+// Landmarks with known ids find the pose of a robot that has none, or has lost it: two of them make a candidate, a
+// later look makes it valid. Truth is the simulated drive's own; a misread barcode must not place the robot.
+#include "estimators/circling_robot.hpp"
+#include "estimators/planar/pose_ekf.hpp"
+#include "estimators/planar/pose_ukf.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <functional>
+
+namespace tetap::estimators {
+namespace {
+
+constexpr float kReach_m = 3;  ///< landmarks farther away are not seen
+
+/// Drives about a place of its own among seven landmarks; sees one at a time, in turn, and only near ones.
+template <class E>
+struct ShortSighted {
+  explicit ShortSighted(unsigned seed) : robot(test::held_backward()), random(seed) {
+    robot.numbers.landmark.gate_scale = 1.5F;
+    robot.map.clear();
+    for (std::uint8_t id = 1; id <= 7; ++id) {  // about the circle, some inside it
+      const double angle = 0.9 * id, radius = id % 2 == 0 ? 4.5 : 1.5;
+      static_cast<void>(robot.map.put({.x_mm = static_cast<std::int32_t>(1000 * radius * std::cos(angle)),
+                                       .y_mm = static_cast<std::int32_t>(3000 + 1000 * radius * std::sin(angle)),
+                                       .id = id}));
+    }
+    robot.random.seed(seed);
+  }
+  /// Half a second, and a sighting at its end: of the nearest landmark in every other, of the next nearest else.
+  void look(const std::function<std::uint8_t(std::uint8_t)>& read_as) {
+    robot.drive(10, false);
+    std::array<std::uint8_t, 7> ids{1, 2, 3, 4, 5, 6, 7};
+    std::sort(ids.begin(), ids.end(), [this](auto a, auto b) { return way(a) < way(b); });
+    const std::uint8_t id = ids[looks++ % 2];
+    if (way(id) > static_cast<double>(kReach_m)) return;
+    const model::Landmark at = *robot.map.find(id);
+    const double dx = static_cast<double>(at.x.minus({})) - robot.x, dy = static_cast<double>(at.y.minus({})) - robot.y;
+    const auto noise = [this](double sigma) { return std::normal_distribution<double>(0, sigma)(random); };
+    static_cast<void>(robot.estimator.fuse(
+        sensor::LandmarkSighting{
+            .landmark = read_as(id),
+            .range_m = static_cast<float>(std::hypot(dx, dy) + noise(0.1)),
+            .bearing_rad = static_cast<float>(std::remainder(std::atan2(dy, dx) - robot.yaw + noise(0.02), 2 * M_PI))},
+        {robot.us}, robot.ctx()));
+  }
+  [[nodiscard]] double way(std::uint8_t id) const {
+    const model::Landmark at = *robot.map.find(id);
+    return std::hypot(static_cast<double>(at.x.minus({})) - robot.x, static_cast<double>(at.y.minus({})) - robot.y);
+  }
+  /// Squared error of the pose over its covariance's diagonal, at its worst.
+  [[nodiscard]] double worst_sigmas() {
+    const Estimate e = robot.estimate();
+    const double yaw = std::abs(std::remainder(static_cast<double>(e.pose.yaw_rad) - robot.yaw, 2 * M_PI));
+    const auto sigma = [&e](int i) { return std::sqrt(static_cast<double>(e.p(i, i))); };
+    return std::max({std::abs(static_cast<double>(e.pose.x.minus({})) - robot.x) / sigma(0),
+                     std::abs(static_cast<double>(e.pose.y.minus({})) - robot.y) / sigma(1), yaw / sigma(2)});
+  }
+  test::CirclingRobot<E> robot;
+  std::mt19937 random;
+  std::size_t looks = 0;
+};
+
+const auto kRight = [](std::uint8_t id) { return id; };
+
+template <class E>
+class LandmarkAlignmentOf : public testing::Test {};
+using Filters = testing::Types<PoseEkf, PoseUkf, PoseUkfSqrt>;
+TYPED_TEST_SUITE(LandmarkAlignmentOf, Filters);
+
+TYPED_TEST(LandmarkAlignmentOf, ARobotThatWasNeverPlacedFindsItselfByOneLandmarkAtATime) {
+  double square = 0;
+  constexpr unsigned kSeeds = 20;
+  for (unsigned seed = 1; seed <= kSeeds; ++seed) {
+    ShortSighted<TypeParam> drive(seed);
+    int looks = 0;
+    for (; looks < 60 && !drive.robot.estimate().position_valid; ++looks) {
+      EXPECT_GT(drive.robot.estimate().p(0, 0), 1e5F) << "no pose, and none is claimed";
+      drive.look(kRight);
+    }
+    EXPECT_LT(looks, 20) << seed;
+    EXPECT_TRUE(drive.robot.estimate().heading_valid);
+    EXPECT_LT(drive.worst_sigmas(), 4.0) << seed;
+    square += drive.worst_sigmas() * drive.worst_sigmas() / kSeeds;
+    for (int k = 0; k < 30; ++k) drive.look(kRight);
+    EXPECT_LT(drive.robot.error_m(), 0.3) << seed;
+    EXPECT_EQ(drive.robot.estimator.mode(drive.robot.ctx()), sensor::Mode::kNominal);
+  }
+  EXPECT_GT(square, 0.3) << "its covariance is not too large";
+}
+
+TYPED_TEST(LandmarkAlignmentOf, OneLandmarkAloneNeverPlacesIt) {
+  ShortSighted<TypeParam> drive(3);
+  const model::Landmark at = *drive.robot.map.find(1);
+  for (int k = 0; k < 100; ++k) {
+    drive.robot.drive(10, false);
+    const double dx = static_cast<double>(at.x.minus({})) - drive.robot.x,
+                 dy = static_cast<double>(at.y.minus({})) - drive.robot.y;
+    const Innovation seen = drive.robot.estimator.fuse(
+        sensor::LandmarkSighting{
+            .landmark = 1,
+            .range_m = static_cast<float>(std::hypot(dx, dy)),
+            .bearing_rad = static_cast<float>(std::remainder(std::atan2(dy, dx) - drive.robot.yaw, 2 * M_PI))},
+        {drive.robot.us}, drive.robot.ctx());
+    EXPECT_EQ(seen.failed, sensor::Check::kUnconfirmed);
+    EXPECT_FALSE(drive.robot.estimate().position_valid);
+  }
+}
+
+// One barcode in four is read as another one. The robot may need longer, but is not valid at a wrong place.
+TYPED_TEST(LandmarkAlignmentOf, MisreadLandmarksDelayItAndDoNotMisplaceIt) {
+  int placed = 0, wrong = 0;
+  constexpr int kSeeds = 40;
+  for (unsigned seed = 1; seed <= kSeeds; ++seed) {
+    ShortSighted<TypeParam> drive(seed);
+    std::mt19937 chance(seed);
+    const auto misread = [&chance](std::uint8_t id) {
+      return chance() % 4 == 0 ? static_cast<std::uint8_t>(1 + (id + chance() % 6) % 7) : id;
+    };
+    for (int k = 0; k < 80 && !drive.robot.estimate().position_valid; ++k) drive.look(misread);
+    if (!drive.robot.estimate().position_valid) continue;
+    ++placed;
+    if (drive.robot.error_m() > 0.6 && drive.worst_sigmas() > 4) ++wrong;
+  }
+  EXPECT_GE(placed, kSeeds - 2);
+  EXPECT_LE(wrong, 2);
+}
+
+// Its wheels are silent for ten seconds while it is carried off: the heading is lost, then landmarks place it anew.
+TYPED_TEST(LandmarkAlignmentOf, ARobotThatIsLostComesBack) {
+  for (unsigned seed = 1; seed <= 10; ++seed) {
+    ShortSighted<TypeParam> drive(seed);
+    drive.robot.set(0, 0, 0, 0.05F, 0.02F);
+    for (int k = 0; k < 20; ++k) drive.look(kRight);
+    EXPECT_LT(drive.robot.error_m(), 0.4);
+    drive.robot.us += 10'000'000;
+    drive.robot.x += 1.5, drive.robot.y -= 1, drive.robot.yaw += 2.5;
+    drive.look(kRight);
+    EXPECT_FALSE(drive.robot.estimate().position_valid) << seed;
+    int looks = 0;
+    for (; looks < 60 && !drive.robot.estimate().position_valid; ++looks) drive.look(kRight);
+    EXPECT_LT(looks, 40) << seed;
+    EXPECT_LT(drive.worst_sigmas(), 4.0) << seed;
+    for (int k = 0; k < 30; ++k) drive.look(kRight);
+    EXPECT_LT(drive.robot.error_m(), 0.4) << seed;
+  }
+}
+
+}  // namespace
+}  // namespace tetap::estimators
