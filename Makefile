@@ -24,7 +24,7 @@ ifneq ($(unknown),)
 $(error no setting $(unknown); there are: $(settings))
 endif
 
-.PHONY: help sim test quick proof replay firmware size heap stack count bits hashes constants check docs dbc setup programs arm
+.PHONY: help sim test quick proof replay record firmware size heap stack count bits hashes constants check docs dbc setup programs arm
 
 help: ## this list
 	@echo "tetap: state estimation on the robot's own microcontroller"; echo
@@ -48,6 +48,9 @@ proof: setup ## the same on whole lengths, every float, long runs; goes on where
 
 replay: setup programs ## a recorded log over vcan0: LOG=run.log [TRUTH=run.truth.csv] ROBOT=NAME [BOARD=] [BUS=memory]
 	@tools/run/replay_log
+
+record: setup programs ## everything on vcan0 until ^C, in out/record: raw.log can be repeated, also of a node that runs already
+	@build/host/sim_host/tetap-record --snapshot
 
 firmware: setup ## the flash image: BOARD=zynqmp_r5 ROBOT=rover, with its size table, no heap and stack proved
 	@tools/run/build_firmware

@@ -53,6 +53,8 @@ inline constexpr param::Parameters parameters = param::checked({
         {.gyro_radps_rthz = 2e-3F, .accel_mps2_rthz = 5e-2F, .wheel_gate_scale = 1.6F, .constrain_every_us = 20'000},
     // Three estimators share the bus: 591 frames/s at most (tools/can/generate_messages --load).
     .publish = {.std_every = 10, .side_every = 20, .attitude_every = 10, .state_every = 10},
+    // On a board that has them: 1 kHz of the IMU in increments of 10 ms, as the bus carries them.
+    .wired = {.imu = 1, .encoders = 1, .gnss = 2},
 });
 
 }  // namespace tetap::robot::rover

@@ -20,6 +20,7 @@ int with_node_in_process(const std::string& robot, const ParameterSettings& sett
     HostBoard board(can);
     const std::unique_ptr<RobotFirmware> firmware = make_firmware<Estimators>(board, parameters, version());
     InProcessLink link(bus, [&firmware] { firmware->poll(); });
+    link.on_resume([&firmware](std::span<const std::byte> state) { return firmware->resume(state); });
     status = play(link);
   });
   return status;

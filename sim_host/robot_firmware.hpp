@@ -8,9 +8,11 @@
 #include "hal/board/linux/clock.hpp"
 #include "param/parameters.hpp"
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 
 namespace tetap::sim {
 
@@ -49,6 +51,7 @@ struct HostBoard {
 
   [[nodiscard]] base::Micros now() const { return hal::monotonic_clock() - began; }
 
+  static constexpr bool kSnapshots = true;
   AnyCan& can;
   base::Micros began = hal::monotonic_clock();
 };
@@ -64,6 +67,8 @@ class RobotFirmware {
   virtual void poll() = 0;
   /// Hash of the boot self-check over so many epochs.
   [[nodiscard]] virtual std::uint32_t self_check(std::uint32_t epochs) = 0;
+  /// Goes on from a snapshot's state; false: that is of another layout.
+  [[nodiscard]] virtual bool resume(std::span<const std::byte> state) = 0;
 };
 
 /// Firmware with these estimators; instantiated once for each robot, in a file that CMake makes. The board and the

@@ -18,6 +18,7 @@ std::unique_ptr<RobotFirmware> make_firmware(HostBoard& board, const param::Para
         : firmware_(board, parameters, version) {}
     void poll() override { firmware_.poll(); }
     std::uint32_t self_check(std::uint32_t epochs) override { return firmware_.self_check(epochs); }
+    bool resume(std::span<const std::byte> state) override { return firmware_.resume(state); }
 
    private:
     node::Firmware<HostBoard, Estimators> firmware_;

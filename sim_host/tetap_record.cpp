@@ -4,10 +4,12 @@
 #include "hal/board/linux/socket_can.hpp"
 #include "sim_host/play/arguments.hpp"
 #include "sim_host/play/session.hpp"
+#include "sim_host/play/snapshot_request.hpp"
 
 #include <csignal>
 #include <cstdio>
 #include <exception>
+#include <optional>
 #include <string>
 
 namespace {
@@ -23,6 +25,8 @@ Records a CAN interface until interrupted (^C, SIGTERM): everything as candump w
   --base ID       first id of the node's block (default 0x300)
   --out DIR       (default out/record)
   --duration S    stop by itself after so many seconds
+  --snapshot      ask a node that runs already for its state (one Cmd_Reset), so that the log can be repeated from there;
+                  without it nothing is sent
   --quiet         no progress line
 
 Exit status: 0; 1 frames were lost; 2 bad usage or no bus.
@@ -41,12 +45,15 @@ int record(sim::Arguments& arguments) {
                                   .mode = "record",
                                   .bus = interface,
                                   .quiet = arguments.flag("--quiet")};
+  const bool ask = arguments.flag("--snapshot");
   const base::Micros duration{static_cast<std::int64_t>(arguments.real("--duration", 0, 0, 1e7) * 1e6)};
   arguments.finish();
   hal::SocketCan can(interface, {.arrival_times = true});
   sim::Session session(about);
   sim::EpochCollector collector(about.base);
   sim::RealtimeFrameAccounting accounting(session.counts());
+  sim::SnapshotRequest snapshot(about.base);
+  const auto counter = static_cast<std::uint32_t>(hal::wall_clock().us / 1'000'000 & 0x0F);
   const base::Micros began = hal::monotonic_clock();
   base::Micros written = began;
   while (stop == 0 && (duration.us == 0 || hal::monotonic_clock() - began < duration)) {
@@ -57,13 +64,19 @@ int record(sim::Arguments& arguments) {
         accounting.begin(true);
         session.restarted();
       }
-      if (const auto epoch = collector.add(*frame)) {
+      const auto epoch = collector.add(*frame);
+      snapshot.note(*frame, epoch);
+      if (epoch) {
         accounting.answered(*epoch);
         session.epoch(*epoch, {epoch->head ? static_cast<std::int64_t>(epoch->head->time_us)
                                            : session.recorder().totals().last.us});
       }
     }
     const base::Micros now = hal::monotonic_clock();
+    if (const auto command = ask ? snapshot.due(now, counter) : std::nullopt; command && can.send(*command)) {
+      can.flush();
+      session.recorder().received(*command, hal::wall_clock());  // no socket shows its own frames
+    }
     if (now - written < base::Micros{1'000'000}) continue;
     session.recorder().flush();
     written = now;
@@ -71,6 +84,7 @@ int record(sim::Arguments& arguments) {
   session.counts().overflows = can.faults().rx_overflow;
   if (session.counts().lost_outputs < session.counts().overflows)
     session.counts().lost_outputs = session.counts().overflows;
+  if (ask) session.note("snapshot", sim::quoted(snapshot.outcome()));
   session.note("interface_down", std::to_string(can.faults().bus_off));
   return session.finish();
 }

@@ -42,12 +42,12 @@ class LockstepFrameAccounting {
  public:
   explicit LockstepFrameAccounting(Counts& counts) : counts_(counts) {}
 
-  /// The node starts anew: its counters begin at 0.
-  void begin() {
+  /// The node starts anew: its counters begin at 0, or where its state was taken.
+  void begin(std::uint64_t inputs = 0, std::uint32_t epoch = 0) {
     asked_.clear();
-    sent_ = 0;
+    sent_ = inputs;
     deficit_ = 0;
-    last_epoch_ = 0;
+    last_epoch_ = static_cast<std::uint8_t>(epoch);
     any_ = false;
   }
   void asked(std::size_t inputs, base::Micros time) {

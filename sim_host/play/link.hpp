@@ -9,6 +9,9 @@
 #include "sim_host/play/protocol.hpp"
 
 #include <concepts>
+#include <cstddef>
+#include <functional>
+#include <span>
 #include <stdexcept>
 #include <utility>
 
@@ -36,9 +39,15 @@ class MemoryLink {
   }  // a full queue is waited for
   void wait(base::Micros) { pump_(); }
 
+  /// How the node at the other end takes up a snapshot's state.
+  using Resume = std::function<bool(std::span<const std::byte>)>;
+  void on_resume(Resume resume) { resume_ = std::move(resume); }
+  bool resume(std::span<const std::byte> state) { return resume_ && resume_(state); }
+
  private:
   hal::MemoryCan can_;
   Pump pump_;
+  Resume resume_;
 };
 
 /// Observers: recorder, comparison, progress.

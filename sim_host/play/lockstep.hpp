@@ -26,7 +26,10 @@ void play_lockstep(L& link, S& source, K& sink, const LockstepOptions& options, 
   const auto send = [&](const Tick& tick) {
     if (tick.begin) {
       node.begin(*tick.begin, options.patience);
-      accounting.begin();
+      if (tick.snapshot != nullptr)
+        node.resume(*tick.snapshot), accounting.begin(tick.snapshot->header.in_count, tick.snapshot->header.epoch);
+      else
+        accounting.begin();
     }
     std::size_t sent = 0;
     for (const base::CanFrame& frame : tick.inputs) {

@@ -7,8 +7,11 @@
 #include "sim_host/play/frame_accounting.hpp"
 #include "sim_host/play/link.hpp"
 #include "sim_host/play/out_file.hpp"
+#include "sim_host/play/snapshot.hpp"
 
+#include <cstddef>
 #include <optional>
+#include <span>
 #include <string>
 
 namespace tetap::sim {
@@ -67,6 +70,16 @@ class NodeLink {
     id.hex(base_, 3);
     throw RunError("no node with id base 0x" + std::string(id.view()) + " answers on this bus: sent Begin for " +
                    in_seconds(hal::monotonic_clock() - began));
+  }
+
+  /// Hands the node a state to go on from; throws RunError when it cannot take it.
+  void resume(const Snapshot& snapshot) {
+    if constexpr (requires { link_.resume(std::span<const std::byte>(snapshot.state)); }) {
+      if (link_.resume(snapshot.state)) return;
+      throw RunError("the snapshot in the log is of another robot or of a program with another layout: " +
+                     std::to_string(snapshot.state.size()) + " bytes");
+    }
+    throw RunError("the log begins with a snapshot, which only a node in this process takes up: --memory --robot NAME");
   }
 
   [[nodiscard]] const EpochCollector& collector() const { return collector_; }

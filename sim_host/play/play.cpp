@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <stdexcept>
+#include <utility>
 
 namespace tetap::sim {
 
@@ -45,8 +46,10 @@ Plays a log to a node and records what it answers.
   --reorder P         realtime: let it change places with the next
   --seed N            of these four (default 1)
 
-Exit status: 0; 1: frames were lost, came twice or differ from the record, or the node does not answer; 2: bad usage, unreadable log,
-no bus. run.json has the numbers.
+A record is repeated up to the first hole in it (frames that are lost, samples that the bus did not take), from the node's start on
+or, with --memory, from a snapshot of its state (make record asks for one).
+Exit status: 0; 1: frames were lost, came twice or differ from the record, the record has a hole, or the node does not answer;
+2: bad usage, unreadable log, no bus. run.json has the numbers.
 )";
 }
 
@@ -105,9 +108,15 @@ namespace {
 /// Goes along with one reading of the log and gathers what each mode has to know before it plays.
 class Survey {
  public:
-  explicit Survey(const PlayOptions& options)
-      : base_(options.script.log_base), grid_(options.script.period), record_(options.log, base_) {
-    surveys_record_ = options.mode == PlayMode::kAutomatic || options.mode == PlayMode::kAsRecorded;
+  /// `facts`: of the log, where it may be a record.
+  Survey(const PlayOptions& options, LogFacts facts)
+      : base_(options.script.log_base),
+        grid_(options.script.period),
+        record_(options.log, base_, std::move(facts)),
+        surveys_record_(may_be_record(options)) {}
+
+  [[nodiscard]] static bool may_be_record(const PlayOptions& options) {
+    return options.mode == PlayMode::kAutomatic || options.mode == PlayMode::kAsRecorded;
   }
 
   void add(const TimedFrame& entry) {
@@ -148,7 +157,7 @@ class Survey {
   std::uint32_t base_;
   TickGrid grid_;
   RecordSurvey record_;
-  bool surveys_record_ = false, has_node_frames_ = false;
+  bool surveys_record_, has_node_frames_ = false;
   std::uint64_t inputs_ = 0, own_ticks_ = 0, grid_ticks_ = 0;
   std::string refusal_;
 };
@@ -158,7 +167,7 @@ class Survey {
 SurveyedLog survey_for(PlayOptions& options) {
   options.reading.base = options.script.log_base;
   SurveyedLog log{.file = LogFile(options.log, options.reading)};
-  Survey survey(options);
+  Survey survey(options, Survey::may_be_record(options) ? facts_of(log.file, options.script.log_base) : LogFacts{});
   for (TimedFrame entry; log.file.next(entry);) survey.add(entry);
   const LogReport& report = log.file.report();
   if (report.data == 0)

@@ -99,13 +99,6 @@ int play(L& link, const PlayOptions& options, SurveyedLog& log, const std::strin
   if (options.mode == PlayMode::kAsRecorded) {
     if (!log.recording) throw std::runtime_error(log.refusal);
     const Recording& recording = *log.recording;
-    if (recording.inputs_differ_at)
-      std::fprintf(
-          stderr, "%s: %s: from the epoch at %s on the node consumed other input frames than the log holds%s\n",
-          program, options.log.c_str(), in_seconds(*recording.inputs_differ_at).c_str(),
-          recording.rx_overflow == 0
-              ? ""
-              : (": its receiver had lost " + std::to_string(recording.rx_overflow) + " (RxOverflow)").c_str());
     about.mode = "as-recorded";
     about.ticks = recording.epochs;
     RecordedTicks ticks(log.file, recording, options.script);

@@ -43,6 +43,23 @@ inline constexpr std::uint64_t kTimeMask = 0xFFFFFFFFFFFF;
   return offset >= kInputOffsets && offset != bus::EstVersion::kOffset;
 }
 
+/// A piece of a snapshot: it comes between two epochs, and belongs to none.
+[[nodiscard]] constexpr bool is_snapshot_piece(const base::CanFrame& frame, std::uint32_t base) {
+  return !frame.extended && frame.id == base + bus::EstDiagSnapshot::kOffset &&
+         bus::decode<bus::EstDiagSnapshot>(bus::payload(frame)).has_value();
+}
+/// The frame without what a repetition cannot know: two bits of Est_Status are about the bus and not about the frames.
+[[nodiscard]] constexpr base::CanFrame repeatable(const base::CanFrame& frame, std::uint32_t base) {
+  if (frame.id != base + bus::EstStatus::kOffset) return frame;
+  auto status = bus::decode<bus::EstStatus>(bus::payload(frame));
+  if (!status) return frame;
+  status->crc = 0;
+  status->unlogged = false;
+  status->faults =
+      static_cast<std::uint16_t>(status->faults & ~(1U << static_cast<unsigned>(sensor::Fault::kIdConflict)));
+  return bus::frame(base, *status);
+}
+
 [[nodiscard]] constexpr base::CanFrame sync_frame(std::uint32_t base, bus::SyncKind kind, base::Micros time,
                                                   std::uint8_t counter) {
   return bus::frame(
@@ -80,7 +97,8 @@ class EpochCollector {
   /// A frame from the bus; the finished epoch when this was its last one. Frames of others are ignored.
   std::optional<NodeEpoch> add(const base::CanFrame& frame) {
     const auto offset = offset_in_block(frame, base_);
-    if (!offset || *offset < kInputOffsets || is_begin_response(frame)) return std::nullopt;
+    if (!offset || *offset < kInputOffsets || is_begin_response(frame) || is_snapshot_piece(frame, base_))
+      return std::nullopt;
     if (*offset == bus::EstEpoch::kOffset) begin(bus::decode<bus::EstEpoch>(bus::payload(frame)));
     if (received_ < frames_.size()) frames_[received_] = frame;
     ++received_;

@@ -6,6 +6,7 @@
 #include "base/can_frame.hpp"
 #include "base/time.hpp"
 #include "sim_host/play/log.hpp"
+#include "sim_host/play/snapshot.hpp"
 
 #include <concepts>
 #include <cstddef>
@@ -22,6 +23,7 @@ struct Tick {
   base::Micros time;
   std::span<const base::CanFrame> inputs;  ///< sent before the tick, ids of the node that is played to
   std::optional<base::Micros> begin;       ///< before all: the node starts as after power-on, at this time
+  const Snapshot* snapshot = nullptr;      ///< behind `begin`: the node takes up this state
 };
 
 template <class S>

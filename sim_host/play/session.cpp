@@ -82,6 +82,9 @@ std::string Session::complaint() const {
            " epochs differ from the recording; first " + comparison_->first_difference() +
            (comparison_->other_numbers() ? "; --lockstep plays its inputs alone (make replay PLAY=--lockstep)" : "");
   if (comparison_->missing() > 0) return count(comparison_->missing()) + " recorded epochs were not repeated";
+  if (const auto& hole = comparison_->recording().hole)
+    return hole->why + "; " + count(comparison_->compared()) + " epochs up to there are equal, " +
+           count(comparison_->recording().unlogged) + " behind it cannot be repeated";
   if (comparison_->recording().missing_outputs > 0)
     return "the recording itself lacks " + count(comparison_->recording().missing_outputs) + " frames of the node";
   return {};
@@ -130,6 +133,10 @@ void Session::write_json(double wall_s) {
   if (comparison_ != nullptr) {
     fields.emplace_back("epochs_compared", count(comparison_->compared()));
     fields.emplace_back("epochs_different", count(comparison_->different()));
+    fields.emplace_back("unlogged", count(comparison_->recording().unlogged));
+    const auto& hole = comparison_->recording().hole;
+    fields.emplace_back("hole_s", hole ? number(to_seconds(hole->time), 3) : "null");
+    fields.emplace_back("hole", sim::quoted(hole ? hole->why : ""));
     fields.emplace_back("first_difference", sim::quoted(comparison_->first_difference()));
   }
   fields.insert(fields.end(), notes_.begin(), notes_.end());

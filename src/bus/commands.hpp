@@ -78,7 +78,7 @@ void Commands::on_frame(std::uint8_t offset, const base::CanFrame& frame, base::
   if (offset == bus::CmdReset::kOffset) {
     const auto reset = bus::decode<bus::CmdReset>(bus::payload(frame));
     if (!reset) return void(++counters.malformed);
-    if (reset->what > bus::ResetWhat::kLandmarkMap) return void(++counters.out_of_range);
+    if (reset->what > bus::ResetWhat::kWiredOn) return void(++counters.out_of_range);
     last = counter;
     out.reset(reset->what);
     return;

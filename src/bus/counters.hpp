@@ -5,6 +5,7 @@
 #include "bus/messages.hpp"
 #include "hal/can_bus.hpp"
 
+#include <array>
 #include <cstdint>
 
 namespace tetap::bus {
@@ -39,6 +40,10 @@ struct LoopHealth {
   std::uint16_t sync_gap = 0;   ///< sync frames that were sent, by their counter, and never came
   std::uint16_t sync_bad = 0;   ///< sync frames of wrong length
   hal::CanFaults bus;
+  bool id_conflict = false;  ///< within the last second a frame came whose id is this node's own
+  bool unlogged = false;     ///< a wired sample was consumed that the bus did not take
+  /// Pages 9 to 11 of Est_Diag; null: nothing is wired, and these pages are empty.
+  const std::array<Payload, 3>* pages = nullptr;
 };
 
 }  // namespace tetap::bus

@@ -12,6 +12,9 @@ namespace tetap::bus {
 /// frames' own CRCs are summed, and the sum goes into the running CRC.
 class InputCrc {
  public:
+  constexpr InputCrc() = default;
+  /// As it was behind an epoch.
+  constexpr InputCrc(std::uint32_t running, std::uint32_t count) : running_(running), count_(count) {}
   constexpr void add(std::uint32_t frame_crc) {
     sum_ += frame_crc;
     ++in_epoch_;

@@ -11,12 +11,12 @@
 
 namespace tetap::bus {
 
-/// put(message) is called once.
+/// put(message) is called once; `page` is from 0 to 8.
 template <class Put>
 void put_diagnostics(std::uint32_t page, const Counters& c, const LoopHealth& l, std::uint16_t timeline_high,
                      Put&& put) {
   constexpr std::uint32_t kLongest = 0xFFFFFE;
-  switch (page % 9) {
+  switch (page) {
     case 0:
       put(bus::EstDiagLoop{.loop_max_us = l.longest_us < kLongest ? l.longest_us : kLongest,
                            .loop_mean_us = static_cast<std::uint16_t>(l.mean_us < 65534.0F ? l.mean_us : 65534.0F),

@@ -50,6 +50,7 @@ class Publisher {
   void power_on() {
     epoch_ = 0;
     frames_ = status_counter_ = page_ = identity_ = statistic_ = 0;
+    show_wired();
     events_.power_on();
     troubles_.power_on();
   }
@@ -93,7 +94,7 @@ class Publisher {
   void attitude(std::size_t instance, const estimators::AttitudeEstimate& e,
                 const estimators::Disagreement& from_primary, Send& send);
   template <class Send>
-  void status(const Summary& summary, Send& send);
+  void status(const Summary& summary, const LoopHealth& loop, Send& send);
   template <class Lanes, class Send>
   void statistics(const Lanes& lanes, base::Micros now, Send& send);
   template <class Send>
@@ -105,6 +106,24 @@ class Publisher {
   template <class Send>
   void send_version(Send& send) {
     put(bus::EstVersion{.git = version_.git, .config = config_}, send);
+  }
+
+  [[nodiscard]] std::uint32_t epoch() const { return epoch_; }
+  /// The next page of diagnostics is the one with the wired sensors.
+  void show_wired() {
+    if (parameters_.wired.any()) page_ = kWiredPage;
+  }
+  /// All but parameters and version, which stay its own.
+  void resume(const Publisher& other) {
+    epoch_ = other.epoch_;
+    frames_ = other.frames_;
+    now_ = other.now_;
+    status_counter_ = other.status_counter_;
+    page_ = other.page_;
+    identity_ = other.identity_;
+    statistic_ = other.statistic_;
+    events_ = other.events_;
+    troubles_ = other.troubles_;
   }
 
   /// Queues the record of a measurement.
@@ -119,6 +138,17 @@ class Publisher {
     ++frames_;
     send(bus::frame(parameters_.can_base, message, instance));
   }
+  /// A node that only repeats a recording has nothing wired, and sends the page without its content.
+  template <class Send>
+  [[gnu::cold, gnu::noinline]] void put_wired_page(std::uint32_t page, const LoopHealth& l, Send& send) {
+    ++frames_;
+    base::CanFrame frame{.id = parameters_.can_base + EstDiagLoop::kOffset, .size = EstDiagLoop::kSize};
+    frame.data[0] = static_cast<std::uint8_t>(page);
+    if (l.pages != nullptr) frame.data = (*l.pages)[page - kPages];
+    send(frame);
+  }
+  /// Pages of Est_Diag of every node, and of one with wired sensors; the page that names these.
+  static constexpr std::uint32_t kPages = 9, kAllPages = 12, kWiredPage = 10;
   [[nodiscard]] bool every(std::int32_t ticks, std::int32_t phase = 0) const {
     return ticks > 0 && (epoch_ + static_cast<std::uint32_t>(phase)) % static_cast<std::uint32_t>(ticks) == 0;
   }
@@ -221,13 +251,14 @@ void Publisher<N>::attitude(std::size_t instance, const estimators::AttitudeEsti
 
 template <std::size_t N>
 template <class Send>
-void Publisher<N>::status(const Summary& s, Send& send) {
+void Publisher<N>::status(const Summary& s, const LoopHealth& loop, Send& send) {
   if (!every(parameters_.publish.status_every, 1)) return;
   FaultSet faults = troubles_.faults(epoch_);
   faults.bits = static_cast<std::uint16_t>(faults.bits | s.faults);
   faults.raise(sensor::Fault::kInputStale, !s.velocity_valid);
   faults.raise(sensor::Fault::kRejecting, s.rejecting);
   faults.raise(sensor::Fault::kRestarted, s.restarted);
+  faults.raise(sensor::Fault::kIdConflict, loop.id_conflict);
   put(bus::protect(bus::EstStatus{.ctr = static_cast<std::uint8_t>(status_counter_++ & 0x0F),
                                   .mode = s.mode,
                                   .pos_valid = s.position_valid,
@@ -237,7 +268,8 @@ void Publisher<N>::status(const Summary& s, Send& send) {
                                   .used = s.used,
                                   .faults = faults.bits,
                                   .reset_ctr = s.resets,
-                                  .reset_cause = s.cause}),
+                                  .reset_cause = s.cause,
+                                  .unlogged = loop.unlogged}),
       send);
 }
 
@@ -272,13 +304,16 @@ void Publisher<N>::statistics(const Lanes& lanes, base::Micros now, Send& send) 
   }
 }
 
-/// One page at a time; all eight within about a second.
+/// One page at a time; all of them within about a second.
 template <std::size_t N>
 template <class Send>
 void Publisher<N>::diagnostics(const Counters& c, const LoopHealth& l, std::uint16_t timeline_high, Send& send) {
   troubles_.note(c, epoch_, static_cast<std::uint32_t>(1'000'000 / parameters_.loop.period_us));
   if (!every(parameters_.publish.diagnostics_every, 3)) return;
-  put_diagnostics(page_++, c, l, timeline_high, [&](const auto& page) { put(page, send); });
+  const std::uint32_t page = page_++ % (parameters_.wired.any() ? kAllPages : kPages);
+  if (page < kPages)
+    return put_diagnostics(page, c, l, timeline_high, [&](const auto& message) { put(message, send); });
+  put_wired_page(page, l, send);
 }
 
 template <std::size_t N>

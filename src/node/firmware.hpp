@@ -7,19 +7,27 @@
 #include "node/boot_self_check.hpp"
 #include "node/node.hpp"
 #include "node/pacer.hpp"
+#include "node/snapshot.hpp"
+#include "node/wired_inputs.hpp"
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
+#include <span>
+#include <type_traits>
 
 namespace tetap::node {
 
-template <hal::Board Board, class Estimators>
+/// `kParts`: the wired sensors that the image has drivers for, usually WiredParts::of(the robot's parameters).
+template <hal::Board Board, class Estimators, WiredParts kParts = WiredParts{}>
 class Firmware {
  public:
   Firmware(Board& board, const param::Parameters& parameters, const bus::Version& version)
       : board_(board),
         parameters_(parameters),
         node_(parameters, version),
-        pacer_(base::Micros{parameters.loop.period_us}) {}
+        pacer_(base::Micros{parameters.loop.period_us}),
+        extras_(board, parameters, version) {}
 
   /// Runs the exercise on this very node, then powers it on anew. For boot: the hash shows whether this core computes
   /// as all others do.
@@ -31,32 +39,51 @@ class Firmware {
     return hash.value();
   }
 
-  /// Takes what has arrived, ticks when it is time, hands on what is to be sent. Call it in a loop, as often as you
-  /// like.
+  /// Takes what has arrived and what wired sensors have measured, ticks when it is time, hands on what is to be sent.
+  /// Call it in a loop, as often as you like: after the self-check, because the first call starts sensors and watchdog.
   void poll() {
+    if constexpr (hal::SensorBoard<Board>) {
+      if (!polled_) board_.start_sensors();
+    }
     // As much as two full receivers: a bus that is never quiet must not keep the tick from its time.
     for (int i = 0; i < kMostPerPoll; ++i) {
       const auto frame = board_.can.receive();
       if (!frame) break;
       on_frame(*frame);
     }
+    if constexpr (kWired) poll_wired();
     if (const auto t = pacer_.on_poll(board_.now(), health_)) tick(*t);
     board_.can.flush();
+    end_poll();
+  }
+
+  /// Goes on from a snapshot's state; false: that is of another layout.
+  [[nodiscard]] bool resume(std::span<const std::byte> state) requires hal::SnapshotBoard<Board> {
+    const auto* const other = extras_.snapshot.load(state);
+    if (other != nullptr) node_.resume(*other);
+    return other != nullptr;
   }
 
  private:
   static constexpr int kMostPerPoll = 128;
   static constexpr std::uint32_t kInputs = 0x20;  ///< offsets below are inputs
+  static constexpr bool kWired = WiredInputs<Board, kParts>::kAny;
+  static constexpr bool kSnapshots = hal::SnapshotBoard<Board>;
+  using Node = node::Node<Estimators>;
 
   void on_frame(const base::CanFrame& frame) {
-    if (frame.extended || frame.id < parameters_.can_base || frame.id >= parameters_.can_base + kInputs) return;
-    if (frame.id != parameters_.can_base + bus::InSync::kOffset) return node_.on_frame(frame);
+    const std::uint32_t offset = frame.id - parameters_.can_base;
+    if (frame.extended || offset >= bus::kBlock) return;
+    // A frame that only this node sends, or may send now, comes from a second node of the same ids.
+    if (offset >= kInputs || is_own(offset)) return void(conflict_ticks_ = 1'000'000 / parameters_.loop.period_us);
+    if (offset != bus::InSync::kOffset) return node_.on_frame(frame);
     const auto sync = bus::decode<bus::InSync>(bus::payload(frame));
     if (!sync) return void(++health_.sync_bad);
     count_sync(*sync);
     const base::Micros time{static_cast<std::int64_t>(sync->time_us)};
     if (sync->kind == bus::SyncKind::kBegin) {
       node_.power_on(time);
+      health_.unlogged = false;
       bus::FrameSink frame_sink(board_.can);
       node_.send_version(frame_sink);
     }
@@ -79,8 +106,13 @@ class Firmware {
     const base::Micros began = board_.now();
     health_.sync = pacer_.state();
     health_.bus = board_.can.faults();
+    health_.id_conflict = conflict_ticks_ > 0;
+    if (conflict_ticks_ > 0) --conflict_ticks_;
+    if constexpr (kWired) renew_pages();
     bus::FrameSink frame_sink(board_.can);
     node_.tick(t, health_, frame_sink);
+    if constexpr (kWired) extras_.ticked = true;
+    if constexpr (kSnapshots) send_snapshot();
     const std::int64_t took_us = (board_.now() - began).us;
     const auto us = static_cast<std::uint32_t>(took_us < 0 ? 0 : took_us > 1'000'000 ? 1'000'000 : took_us);
     if (us > health_.longest_us) health_.longest_us = us;
@@ -88,14 +120,86 @@ class Firmware {
     health_.mean_us += (static_cast<float>(us) - health_.mean_us) * 0.01F;
   }
 
+  /// Samples of wired sensors count: the node's clock runs with the board's, and no command has switched them off.
+  [[nodiscard]] bool wired_on() const requires kWired {
+    return extras_.ticked && !node_.wired_off() && pacer_.state() != bus::SyncState::kLockstep;
+  }
+  [[nodiscard]] bool is_own(std::uint32_t offset) const {
+    if constexpr (kWired) return extras_.wired.owns(offset) && wired_on();
+    return false;
+  }
+  /// Consumed frames go onto the bus as well; once that takes no more, a log of it is no record any longer.
+  void poll_wired() requires kWired {
+    extras_.wired.poll(board_.now(), pacer_.offset(), wired_on(), [this](const base::CanFrame& frame) {
+      if (!board_.can.send(frame)) health_.unlogged = true;
+      node_.on_frame(frame);
+    });
+  }
+  void end_poll() {
+    if constexpr (hal::WatchdogBoard<Board>) polled_ ? board_.kick() : board_.start_watchdog();
+    polled_ = true;
+    if constexpr (hal::IdleBoard<Board>) board_.idle();
+  }
+  /// The page of wired sensors holds in every epoch; the others are up to 16 ticks old.
+  void renew_pages() requires kWired {
+    health_.pages = &extras_.pages;
+    extras_.pages[1] = bus::encode(extras_.wired.wired_page(wired_on()));
+    if ((extras_.turn++ & 0xF) != 0) return;
+    extras_.pages[0] = bus::encode(extras_.wired.imu_page());
+    extras_.pages[2] = bus::encode(boot_page());
+  }
+  [[nodiscard]] bus::EstDiagBoot boot_page() {
+    bus::EstDiagBoot page{.watchdog = hal::WatchdogBoard<Board> && polled_};
+    if constexpr (hal::ReportingBoard<Board>) {
+      const hal::BootReport& boot = board_.boot();
+      page.boot_cause = static_cast<bus::BootCause>(boot.cause);
+      page.fault = static_cast<bus::CpuFault>(boot.fault.fault);
+      page.fallback = boot.fallback_clock;
+      page.stack = board_.stack().used;
+      page.fault_pc = boot.fault.program_counter;
+    }
+    return page;
+  }
+  void send_snapshot() requires kSnapshots {
+    if (node_.take_snapshot_request()) {
+      extras_.snapshot.freeze(node_, extras_.version, param::crc(parameters_));
+      health_.unlogged = false;
+    }
+    extras_.snapshot.send([this](const base::CanFrame& frame) { return board_.can.send(frame); });
+  }
+
+  struct NoSnapshot {
+    NoSnapshot(std::uint32_t, base::Micros) {}
+  };
+  struct NotWired {
+    NotWired(Board&, const param::Parameters&) {}
+  };
+  /// Members that only some boards and robots have.
+  struct Extras {
+    Extras(Board& board, const param::Parameters& p, const bus::Version& v)
+        : wired(board, p), snapshot(p.can_base, base::Micros{p.loop.period_us}), version(v) {}
+    [[no_unique_address]] std::conditional_t<kWired, WiredInputs<Board, kParts>, NotWired> wired;
+    [[no_unique_address]] std::conditional_t<kSnapshots, SnapshotSender<Node>, NoSnapshot> snapshot;
+    bus::Version version;
+    std::array<bus::Payload, 3> pages{};  ///< 9 to 11 of Est_Diag
+    std::uint32_t turn = 0;               ///< ticks
+    bool ticked = false;                  ///< the node has a time
+  };
+  struct NoExtras {
+    NoExtras(Board&, const param::Parameters&, const bus::Version&) {}
+  };
+
   Board& board_;
   const param::Parameters& parameters_;
-  Node<Estimators> node_;
+  Node node_;
   Pacer pacer_;
   bus::LoopHealth health_;
+  [[no_unique_address]] std::conditional_t<kWired || kSnapshots, Extras, NoExtras> extras_;
+  std::int32_t conflict_ticks_ = 0;  ///< left until an id conflict is over
   std::uint64_t sync_time_us_ = 0;
   std::uint8_t sync_counter_ = 0;
   bool counts_sync_ = false;  ///< a sync frame has been there
+  bool polled_ = false;       ///< sensors and watchdog run
 };
 
 }  // namespace tetap::node

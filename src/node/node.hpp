@@ -53,9 +53,31 @@ class Node {
   void set_pose(const estimators::SetPose& pose) {
     if (!pending_pose_ || ((pose.counter - pending_pose_->counter) & 0x0F) < 8) pending_pose_ = pose;
   }
-  void reset(bus::ResetWhat what) { pending_reset_[static_cast<std::size_t>(what)] = true; }
+  void reset(bus::ResetWhat what) {
+    if (what >= bus::ResetWhat::kWiredOff) return switch_wired(what == bus::ResetWhat::kWiredOff);
+    pending_reset_[static_cast<std::size_t>(what)] = true;
+  }
+
+  /// A command has switched the wired sensors off.
+  [[nodiscard]] bool wired_off() const { return wired_off_; }
+  /// Once for a command that asks for a snapshot.
+  [[nodiscard]] bool take_snapshot_request() { return take(bus::ResetWhat::kSnapshot); }
+  [[nodiscard]] base::Micros now() const { return now_; }
+  /// Number of the last tick since power-on.
+  [[nodiscard]] std::uint32_t epoch() const { return publisher_.epoch(); }
+  /// Inputs consumed up to the last tick.
+  [[nodiscard]] const bus::InputCrc& consumed() const { return input_crc_; }
+  /// Goes on from the state of another node of this robot. References and pointers stay its own.
+  void resume(const Node& other);
 
  private:
+  [[gnu::cold, gnu::noinline]] void switch_wired(bool off) {
+    wired_off_ = off;
+    publisher_.show_wired();
+  }
+  [[nodiscard]] bool take(bus::ResetWhat what) {
+    return std::exchange(pending_reset_[static_cast<std::size_t>(what)], false);
+  }
   using FusionWindow = node::FusionWindow<Estimators, TimelineCapacity>;
   using Estimates = typename FusionWindow::Estimates;
   static constexpr std::size_t kPrimary = FusionWindow::kPrimary;
@@ -109,7 +131,8 @@ class Node {
   bus::Counters counters_;
   bus::Publisher<Estimators::kCount> publisher_;
   [[no_unique_address]] Landmarks landmarks_;
-  std::array<bool, 3> pending_reset_{};
+  std::array<bool, 4> pending_reset_{};
+  bool wired_off_ = false;  ///< by command; a Begin frame leaves it
   std::optional<estimators::SetPose> pending_pose_;
 
   base::Micros now_;
@@ -141,6 +164,30 @@ void Node<Estimators, Capacity>::power_on(base::Micros t) {
   history_.power_on(t, context());
   disagreement_.restart(t);
   jumps_ = 0;
+}
+
+template <class Estimators, std::size_t Capacity>
+void Node<Estimators, Capacity>::resume(const Node& other) {
+  const auto* const map = map_frame_.map;
+  history_ = other.history_;
+  map_frame_ = other.map_frame_;
+  map_frame_.map = map;
+  origin_ = other.origin_;
+  inbox_ = other.inbox_;
+  counters_ = other.counters_;
+  publisher_.resume(other.publisher_);
+  landmarks_ = other.landmarks_;
+  pending_reset_ = other.pending_reset_;
+  wired_off_ = other.wired_off_;
+  pending_pose_ = other.pending_pose_;
+  now_ = other.now_;
+  ticked_ = other.ticked_;
+  input_crc_ = other.input_crc_;
+  resets_ = other.resets_;
+  reset_cause_ = other.reset_cause_;
+  restarted_at_ = other.restarted_at_;
+  jumps_ = other.jumps_;
+  disagreement_ = other.disagreement_;
 }
 
 template <class Estimators, std::size_t Capacity>
@@ -214,7 +261,7 @@ void Node<Estimators, Capacity>::tick(base::Micros t, const bus::LoopHealth& loo
       publisher_.attitude(instance, in_map(lane.attitude(context())), apart, send);
     ++instance;
   });
-  publisher_.status(summary(estimates[kPrimary]), send);
+  publisher_.status(summary(estimates[kPrimary]), loop, send);
   publisher_.statistics(history_.lanes(), now_, send);
   publisher_.diagnostics(counters_, loop, history_.high_water(), send);
   publisher_.identity(map_frame_, send);
@@ -273,15 +320,12 @@ void Node<Estimators, Capacity>::apply_map(base::Micros before) {
 template <class Estimators, std::size_t Capacity>
 void Node<Estimators, Capacity>::apply_commands() {
   using What = bus::ResetWhat;
-  const auto requested = [this](What what) {
-    return std::exchange(pending_reset_[static_cast<std::size_t>(what)], false);
-  };
-  if (requested(What::kLandmarkMap)) landmarks_.clear();
-  if (requested(What::kCounters)) {
+  if (take(What::kLandmarkMap)) landmarks_.clear();
+  if (take(What::kCounters)) {
     counters_ = {};
     history_.each_lane([](auto& lane) { lane.clear_statistics(); });
   }
-  if (requested(What::kEstimators)) {
+  if (take(What::kEstimators)) {
     close_window(now_);
     restart(now_, sensor::ResetCause::kCommand);
   }

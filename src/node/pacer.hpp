@@ -70,6 +70,8 @@ class Pacer {
   }
 
   [[nodiscard]] constexpr bus::SyncState state() const { return state_; }
+  /// Bus time minus board time; without meaning in lockstep.
+  [[nodiscard]] constexpr base::Micros offset() const { return offset_; }
 
  private:
   static constexpr std::int64_t kFarthest = 50;

@@ -60,6 +60,23 @@ constexpr bool origin_on_land(const GnssParameters& g) {
   return g.origin_configured == 0 || !within(g.origin_latitude_2ndeg, kDegree * 18 / 10) ||
          !within(g.origin_longitude_2ndeg, kDegree * 36 / 10);
 }
+/// Three axes of a chip that are axes of a right-handed frame.
+constexpr bool axes(const WiredParameters& w) {
+  std::array<float, 9> rows{};
+  const auto row = [&rows](std::size_t i, ChipAxis axis) {
+    const auto number = static_cast<std::size_t>(axis);
+    rows[3 * i + number % 3] = number < 3 ? 1.0F : -1.0F;
+  };
+  row(0, w.imu_x);
+  row(1, w.imu_y);
+  row(2, w.imu_z);
+  return rotation(rows);
+}
+constexpr bool one_of(std::int32_t x, auto... values) { return ((x == values) || ...); }
+/// An epoch of a configured receiver, 1720 bits with its covariance, takes at most half of the period.
+constexpr bool line_suffices(const WiredParameters& w) {
+  return w.gnss != 2 || std::int64_t{1720} * 2000 <= std::int64_t{w.gnss_baud} * w.gnss_period_ms;
+}
 constexpr bool multiple(std::int32_t x, std::int32_t of) { return of <= 0 || x % of == 0; }
 
 }  // namespace detail
@@ -94,6 +111,18 @@ inline constexpr std::array kRules{
          "a multiple of publish.std_every"},
     Rule{"recovery.confirm_fixes", [](const P& p) { return p.recovery.confirm_fixes <= p.recovery.persist_fixes; },
          "at most recovery.persist_fixes"},
+    Rule{"wired.imu_x", [](const P& p) { return detail::axes(p.wired); },
+         "one of three different axes that with imu_y and imu_z make a right-handed frame"},
+    Rule{"wired.imu_rate_hz",
+         [](const P& p) {
+           return detail::one_of(p.wired.imu_rate_hz, 25, 50, 100, 200, 500, 1'000, 2'000, 4'000, 8'000);
+         },
+         "25, 50, 100, 200, 500, 1000, 2000, 4000 or 8000"},
+    Rule{"wired.imu_readings",
+         [](const P& p) { return std::int64_t{p.wired.imu_readings} * 1'000'000 <= p.wired.imu_rate_hz * 65'000; },
+         "as many as come in 65 ms at wired.imu_rate_hz"},
+    Rule{"wired.gnss_baud", [](const P& p) { return detail::line_suffices(p.wired); },
+         "fast enough for 3440 bits in each wired.gnss_period_ms"},
 };
 
 /// The first rule that does not hold; null when all do.

@@ -227,6 +227,31 @@ struct PublishParameters {
   std::int32_t event_every = 2;         ///< at most one innovation per so many ticks
 };
 
+/// Axis of a chip: x, y, z, then the same backwards.
+enum class ChipAxis : std::int32_t { kX, kY, kZ, kMinusX, kMinusY, kMinusZ };
+
+/// Sensors wired to the node's own board. A robot without any is fed by the bus alone, and this part is not in its CRC.
+struct WiredParameters {
+  std::int32_t imu = 0;  ///< 0: none, 1: ICM-42688-P; its samples are those of instance inertial.imu
+  /// Axes of the chip that point along the axes of the robot's IMU samples: quarter turns of its place on the board.
+  ChipAxis imu_x = ChipAxis::kX;
+  ChipAxis imu_y = ChipAxis::kY;
+  ChipAxis imu_z = ChipAxis::kZ;
+  std::int32_t imu_rate_hz = 1'000;         ///< rate of the chip's own samples
+  std::int32_t imu_readings = 10;           ///< chip's samples in one increment, coning and sculling included
+  std::int32_t encoders = 0;                ///< 0: none, 1: a quadrature pair, left and right
+  std::int32_t encoders_every_us = 10'000;  ///< period of a sample of both counts
+  std::int32_t left_inverted = 0;           ///< 1: the left counter counts down when the robot drives forward
+  std::int32_t right_inverted = 0;          ///< 1: the right one does
+  float encoder_most_per_s = 200'000;       ///< counts per second beyond which a change is a jump
+  std::int32_t gnss = 0;                    ///< 0: none, 1: a receiver read as it is, 2: a u-blox one, configured
+  std::int32_t gnss_baud = 115'200;         ///< baud rate that a configured receiver is set to
+  std::int32_t gnss_period_ms = 200;        ///< period of a configured receiver's fixes
+  std::int32_t gnss_latency_us = 60'000;    ///< time from a measurement to the last byte of its message
+
+  [[nodiscard]] constexpr bool any() const { return imu != 0 || encoders != 0 || gnss != 0; }
+};
+
 struct Parameters {
   std::uint32_t can_base = 0x300;
   LoopParameters loop;
@@ -244,6 +269,7 @@ struct Parameters {
   StartParameters start;
   RecoveryParameters recovery;
   PublishParameters publish;
+  WiredParameters wired;
 };
 
 }  // namespace tetap::param

@@ -101,6 +101,7 @@ enum class Fault : std::uint8_t {
   kMagneticDisturbance = 12,
   kAttitudeDisagrees = 13,
   kOriginOutOfRange = 14,
+  kIdConflict = 15,
 };
 
 }  // namespace tetap::sensor

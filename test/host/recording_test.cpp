@@ -213,10 +213,14 @@ TEST(Recording, OneInputBitChangedIsNoticed) {
       break;
     }
   const Recording recording = surveyed(run.log);
-  EXPECT_TRUE(recording.inputs_differ_at);
+  ASSERT_TRUE(recording.inputs_differ_at && recording.hole);
+  EXPECT_EQ(recording.hole->time, *recording.inputs_differ_at);
+  EXPECT_NE(recording.hole->why.find("consumed other input frames than the log holds"), std::string::npos);
   const Repeated r = repeat(run.log);
-  EXPECT_GT(r.different, 50U);
-  EXPECT_LT(r.different, 150U) << "before the change all is equal";
+  EXPECT_EQ(r.different, 0U) << "before the change all is equal";
+  EXPECT_GT(r.compared, 50U);
+  EXPECT_LT(r.compared, 150U);
+  EXPECT_EQ(r.compared + recording.unlogged, 200U);
 }
 
 TEST(Recording, AFrameOfTheNodeMissingInTheRecordIsCountedAndShown) {
@@ -237,37 +241,56 @@ TEST(Recording, AFrameOfTheNodeMissingInTheRecordIsCountedAndShown) {
   EXPECT_EQ(r.first.find("epoch 20 at 1.190 s: recorded Est0_Motion"), 0U) << r.first;
 }
 
-TEST(Recording, WhatCannotBeRepeatedIsRefusedWithTheReason) {
+TEST(Recording, ALogIsRepeatedUpToAHoleWithTheReason) {
   FreeRun run;
   run.begin(0);
   run.ticks(50, 1'000'000);
+  const auto expect_hole = [](const Log& log, std::uint64_t epochs, const char* why) {
+    const Recording recording = surveyed(log);
+    ASSERT_TRUE(recording.hole) << why;
+    EXPECT_NE(recording.hole->why.find(why), std::string::npos) << recording.hole->why;
+    EXPECT_NEAR(static_cast<double>(recording.hole->time.us), 1e6 + 1e4 * static_cast<double>(epochs), 2e4) << why;
+    const Repeated r = repeat(log);
+    EXPECT_EQ(r.compared, epochs) << why;
+    EXPECT_EQ(r.different + r.missing, 0U) << r.first;
+    EXPECT_GE(recording.epochs + recording.unlogged, 49U) << why;
+  };
   const auto without = [&run](std::uint32_t id, std::size_t which) {
     Log log = run.log;
     std::size_t seen = 0;
     std::erase_if(log.frames, [&](const TimedFrame& f) { return f.frame.id == id && ++seen == which; });
     return log;
   };
-  EXPECT_NE(refusal(without(0x320, 10)).find("lacks its first frame"), std::string::npos)
-      << refusal(without(0x320, 10));
-  EXPECT_NE(refusal(without(0x321, 10)).find("lacks its last frame"), std::string::npos) << refusal(without(0x321, 10));
-  Log late = run.log;
-  late.frames.erase(late.frames.begin(), late.frames.begin() + 120);
-  EXPECT_NE(refusal(late).find("begins after the node's start"), std::string::npos) << refusal(late);
-  Log inputs_gone = run.log;
-  std::erase_if(inputs_gone.frames, [](const TimedFrame& f) { return is_counted_input(f.frame, 0x300); });
-  EXPECT_NE(refusal(inputs_gone).find("no input frames in this log"), std::string::npos) << refusal(inputs_gone);
-  Log inputs_end = run.log;
-  std::size_t inputs = 0;
-  std::erase_if(inputs_end.frames,
-                [&](const TimedFrame& f) { return is_counted_input(f.frame, 0x300) && ++inputs > 10; });
-  EXPECT_NE(refusal(inputs_end).find("more input frames"), std::string::npos) << refusal(inputs_end);
+  expect_hole(without(0x320, 10), 9, "lacks its first frame");
+  expect_hole(without(0x321, 10), 9, "lacks its last frame");
   Log hole = run.log;
   std::size_t epoch = 0;
   std::erase_if(hole.frames, [&](const TimedFrame& f) {
     epoch += f.frame.id == 0x320 ? 1 : 0;
     return epoch == 20 && f.frame.id >= 0x320;
   });
-  EXPECT_NE(refusal(hole).find("epochs are missing"), std::string::npos) << refusal(hole);
+  expect_hole(hole, 19, "epochs are missing");
+  Log inputs_end = run.log;
+  std::size_t inputs = 0;
+  std::erase_if(inputs_end.frames,
+                [&](const TimedFrame& f) { return is_counted_input(f.frame, 0x300) && ++inputs > 100; });
+  const Recording recording = surveyed(inputs_end);
+  ASSERT_TRUE(recording.hole);
+  EXPECT_NE(recording.hole->why.find("more input frames"), std::string::npos) << recording.hole->why;
+  EXPECT_GT(recording.epochs, 20U);
+  EXPECT_EQ(repeat(inputs_end).different, 0U);
+}
+
+TEST(Recording, WhatCannotBeRepeatedAtAllIsRefusedWithTheReason) {
+  FreeRun run;
+  run.begin(0);
+  run.ticks(50, 1'000'000);
+  Log late = run.log;
+  late.frames.erase(late.frames.begin(), late.frames.begin() + 120);
+  EXPECT_NE(refusal(late).find("begins after the node's start"), std::string::npos) << refusal(late);
+  Log inputs_gone = run.log;
+  std::erase_if(inputs_gone.frames, [](const TimedFrame& f) { return is_counted_input(f.frame, 0x300); });
+  EXPECT_NE(refusal(inputs_gone).find("no input frames in this log"), std::string::npos) << refusal(inputs_gone);
 }
 
 /// The log as a file of its own, and how the player would play it.
@@ -355,14 +378,17 @@ TEST(Recording, AnInputThatTheLogShowsLateIsTakenFromThere) {
   std::size_t moved = 0;
   for (std::size_t i = 50; i + 1 < frames.size(); ++i) {  // candump may stamp the node's frames before an input
     if (!is_counted_input(frames[i].frame, 0x300) || is_counted_input(frames[i + 1].frame, 0x300)) continue;
+    std::size_t end = i + 1;  // inputs keep their own order
+    while (end < std::min(i + 12, frames.size()) && !is_counted_input(frames[end].frame, 0x300)) ++end;
     std::rotate(frames.begin() + static_cast<std::ptrdiff_t>(i), frames.begin() + static_cast<std::ptrdiff_t>(i) + 1,
-                frames.begin() + static_cast<std::ptrdiff_t>(std::min(i + 12, frames.size())));
+                frames.begin() + static_cast<std::ptrdiff_t>(end));
     ++moved;
     i += 40;
   }
   ASSERT_GT(moved, 5U);
   const Recording recording = surveyed(run.log);
   EXPECT_EQ(recording.epochs, 100U);
+  EXPECT_FALSE(recording.hole) << recording.hole->why;
 }
 
 TEST(Realtime, FramesAndTicksKeepTheOrderOfTheLogHoweverLateTheyAre) {

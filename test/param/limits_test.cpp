@@ -41,6 +41,11 @@ const std::vector<Break> kBreaks{
     {"attitude.declination_rad", [](Parameters& p) { p.attitude.declination_rad = 0.1F; }},
     {"publish.state_every", [](Parameters& p) { p.publish.attitude_every = 3; }},
     {"publish.state_every", [](Parameters& p) { p.publish.std_every = 20; }},
+    {"wired.imu_x", [](Parameters& p) { p.wired.imu_x = ChipAxis::kMinusX; }},
+    {"wired.imu_x", [](Parameters& p) { p.wired.imu_y = ChipAxis::kX; }},
+    {"wired.imu_rate_hz", [](Parameters& p) { p.wired.imu_rate_hz = 999; }},
+    {"wired.imu_readings", [](Parameters& p) { p.wired.imu_readings = 7, p.wired.imu_rate_hz = 100; }},
+    {"wired.gnss_baud", [](Parameters& p) { p.wired.gnss = 2, p.wired.gnss_baud = 9'600; }},
     {"recovery.confirm_fixes", [](Parameters& p) { p.recovery.confirm_fixes = p.recovery.persist_fixes + 1; }},
 };
 

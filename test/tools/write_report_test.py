@@ -288,7 +288,13 @@ class Warnings(Case):
         self.estimates(self.time_s, self.zero, self.zero, self.zero)
         self.assertNotIn("repeated", self.report("--no-pictures").stdout)
         self.write("run.json", json.dumps({**RUN, "epochs_compared": 21368, "epochs_different": 0}))
-        self.assertIn("\nrepeated: 21368 epochs compared with the log's own, byte for byte, 0 different\n", self.report("--no-pictures").stdout)
+        said = self.report("--no-pictures").stdout
+        self.assertIn("\nrepeated: 21368 epochs compared with the log's own, byte for byte, 0 different\n", said)
+        self.assertNotIn("hole:", said)
+        self.write("run.json", json.dumps({**RUN, "epochs_compared": 900, "epochs_different": 0, "unlogged": 12, "hole_s": 9.01, "hole": "Unlogged"}))
+        self.assertIn("\nhole: Unlogged; 12 epochs behind it are not repeated\n", self.report("--no-pictures").stdout)
+        summary = json.loads(text_of(self.path("summary.json")))
+        self.assertEqual([summary[key] for key in ("epochs_compared", "epochs_different", "unlogged")], [900, 0, 12])
 
 
 class Faults(Case):

@@ -4,6 +4,8 @@
 // which has no stack yet.
 #pragma once
 
+#include "hal/board_report.hpp"
+
 #include <cstdint>
 #include <cstring>
 
@@ -28,11 +30,6 @@ inline void load_sections() {
   std::memset(__bss_start, 0,
               reinterpret_cast<std::uintptr_t>(__bss_end) - reinterpret_cast<std::uintptr_t>(__bss_start));
 }
-
-struct StackUse {
-  std::uint32_t reserved;  ///< bytes between __stack_bottom and __stack_top
-  std::uint32_t used;      ///< high-water mark since reset, in bytes
-};
 
 [[nodiscard]] inline StackUse stack_use() {
   const auto reserved =

@@ -44,7 +44,7 @@ TEST(GnssConfiguration, AReceiverWithKeysIsConfiguredFromEveryBaudRate) {
 TEST(GnssConfiguration, AReceiverWithoutKeysIsConfiguredByTheOlderMessages) {
   for (const bool silent : {false, true}) {
     Bench bench(Generation::kM8);
-    bench.receiver.faults.ignores_unknown = silent;
+    bench.receiver.injected.ignores_unknown = silent;
     ASSERT_TRUE(bench.until(ConfigState::kRunning, 30));
     expect_configured(bench);
     EXPECT_TRUE(bench.driver.configurator().legacy());
@@ -69,7 +69,7 @@ TEST(GnssConfiguration, AReceiverWithoutNavPvtIsHeardByItsOlderMessages) {
 
 TEST(GnssConfiguration, ARefusedOptionIsSaidAndTheRestIsConfigured) {
   Bench bench(Generation::kKeys);
-  bench.receiver.faults.unknown_keys = {key("CFG-MSGOUT-UBX_NAV_COV_UART1"), key("CFG-NAVSPG-DYNMODEL")};
+  bench.receiver.injected.unknown_keys = {key("CFG-MSGOUT-UBX_NAV_COV_UART1"), key("CFG-NAVSPG-DYNMODEL")};
   ASSERT_TRUE(bench.until(ConfigState::kRunning, 20));
   EXPECT_TRUE(bench.receiver.enabled(0x07));
   EXPECT_EQ(bench.count(ConfigReason::kRefused), 2);
@@ -80,14 +80,14 @@ TEST(GnssConfiguration, ARefusedOptionIsSaidAndTheRestIsConfigured) {
 
 TEST(GnssConfiguration, AReceiverThatRefusesNavPvtIsGivenUpAfterBoundedRounds) {
   Bench bench(Generation::kKeys);
-  bench.receiver.faults.unknown_keys = {key("CFG-MSGOUT-UBX_NAV_PVT_UART1")};
+  bench.receiver.injected.unknown_keys = {key("CFG-MSGOUT-UBX_NAV_PVT_UART1")};
   ASSERT_TRUE(bench.until(ConfigState::kGaveUp, 120));
   EXPECT_EQ(bench.count(ConfigReason::kRefused), ubx::Settings{}.rounds);
 }
 
 TEST(GnssConfiguration, LostAcknowledgementsAreAskedForAgain) {
   Bench bench(Generation::kKeys, 115'200);
-  bench.receiver.faults.swallow_acks = 2;
+  bench.receiver.injected.swallow_acks = 2;
   ASSERT_TRUE(bench.until(ConfigState::kRunning, 20));
   EXPECT_EQ(bench.count(ConfigReason::kTimeout), 2);
   expect_configured(bench);
@@ -96,9 +96,9 @@ TEST(GnssConfiguration, LostAcknowledgementsAreAskedForAgain) {
 TEST(GnssConfiguration, AnAnswerToAnEarlierTryIsNotTakenForTheNextStep) {
   Bench bench(Generation::kKeys, 115'200);
   ASSERT_TRUE(bench.until(ConfigState::kApply, 5));
-  bench.receiver.faults.delay = base::Micros{500'000};  // the time-out is 387 ms
+  bench.receiver.injected.delay = base::Micros{500'000};  // the time-out is 387 ms
   // If taken for one step later, another step looks refused.
-  bench.receiver.faults.unknown_keys = {key("CFG-MSGOUT-UBX_NAV_COV_UART1")};
+  bench.receiver.injected.unknown_keys = {key("CFG-MSGOUT-UBX_NAV_COV_UART1")};
   ASSERT_TRUE(bench.until(ConfigState::kRunning, 60));
   expect_configured(bench);
   EXPECT_GT(bench.count(ConfigReason::kTimeout), 0);
@@ -127,14 +127,14 @@ TEST(GnssConfiguration, AnAcknowledgementOfAnotherMessageIsNotTaken) {
 
 TEST(GnssConfiguration, ASilentReceiverIsGivenUpWithBoundedRequestsAndTriedAgainLater) {
   Bench bench(Generation::kKeys);
-  bench.receiver.faults.mute = true;
+  bench.receiver.injected.mute = true;
   ASSERT_TRUE(bench.until(ConfigState::kGaveUp, 120));
   EXPECT_EQ(bench.count(ConfigReason::kNoResponse), ubx::Settings{}.rounds);
   const int requests = bench.receiver.requests();
   EXPECT_LT(requests, 20);
   bench.run(5);
   EXPECT_EQ(bench.receiver.requests(), requests) << "it rests";
-  bench.receiver.faults.mute = false;
+  bench.receiver.injected.mute = false;
   EXPECT_TRUE(bench.until(ConfigState::kRunning, 40));
 }
 
@@ -152,11 +152,11 @@ TEST(GnssConfiguration, AReceiverThatLostItsPowerIsConfiguredAgain) {
 
 TEST(GnssConfiguration, ABaudRateAtWhichNothingIsHeardIsNotKept) {
   Bench bench(Generation::kKeys, 9600);
-  bench.receiver.faults.deaf_after_baud_change = true;
+  bench.receiver.injected.deaf_after_baud_change = true;
   ASSERT_FALSE(bench.until(ConfigState::kRunning, 10));
   EXPECT_EQ(bench.count(ConfigReason::kBaudKept), 1);
   // Someone resets it.
-  bench.receiver.faults.deaf_after_baud_change = false;
+  bench.receiver.injected.deaf_after_baud_change = false;
   bench.receiver.power_cycle(9600);
   ASSERT_TRUE(bench.until(ConfigState::kRunning, 40));
   EXPECT_EQ(bench.receiver.baud(), 9600U) << "the rate it was found at stays";
@@ -165,10 +165,10 @@ TEST(GnssConfiguration, ABaudRateAtWhichNothingIsHeardIsNotKept) {
 
 TEST(GnssConfiguration, ALineThatTakesThreeBytesAtATimeIsEnoughAndOneThatTakesNoneIsSaid) {
   Bench bench(Generation::kKeys);
-  bench.receiver.faults.write_at_most = 3;
+  bench.receiver.injected.write_at_most = 3;
   EXPECT_TRUE(bench.until(ConfigState::kRunning, 20));
   Bench stuck(Generation::kKeys);
-  stuck.receiver.faults.write_at_most = 0;
+  stuck.receiver.injected.write_at_most = 0;
   EXPECT_TRUE(stuck.until(ConfigState::kGaveUp, 120));
   EXPECT_GT(stuck.count(ConfigReason::kNoResponse), 0);
 }

@@ -339,8 +339,8 @@ TEST(UbxHighPrecision, UnwantedMessagesAreNotAskedForAndRefusedOnesAreSaid) {
   DriverSettings settings;
   settings.ubx.high_precision = settings.ubx.baseline = true;
   Bench simple(Generation::kKeys, 38'400, settings);
-  simple.receiver.faults.unknown_keys = {key("CFG-MSGOUT-UBX_NAV_HPPOSLLH_UART1"),
-                                         key("CFG-MSGOUT-UBX_NAV_RELPOSNED_UART1")};
+  simple.receiver.injected.unknown_keys = {key("CFG-MSGOUT-UBX_NAV_HPPOSLLH_UART1"),
+                                           key("CFG-MSGOUT-UBX_NAV_RELPOSNED_UART1")};
   ASSERT_TRUE(simple.until(ConfigState::kRunning, 20));
   EXPECT_TRUE(simple.driver.configurator().was_refused(ubx::Step::kHpPosLlh));
   EXPECT_TRUE(simple.driver.configurator().was_refused(ubx::Step::kRelPosNed));

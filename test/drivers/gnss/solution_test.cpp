@@ -199,8 +199,8 @@ TEST(GnssSolution, DateAndTimeAreThoseOfTheEpoch) {
 TEST(GnssSolution, TheStampIsWhenItWasMeasuredHoweverLateItIsSaid) {
   for (const Protocol how : kAll) {
     Bench bench = speaking(how);
-    bench.receiver.faults.compute = base::Micros{60'000};  // the driver's setting
-    bench.receiver.faults.jitter = base::Micros{40'000};
+    bench.receiver.injected.compute = base::Micros{60'000};  // the driver's setting
+    bench.receiver.injected.jitter = base::Micros{40'000};
     bench.run(60);
     ASSERT_GT(bench.stamps.size(), 40U);
     const auto& epochs = bench.receiver.epochs();

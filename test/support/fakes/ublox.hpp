@@ -9,6 +9,7 @@
 #pragma once
 
 #include "base/time.hpp"
+#include "hal/byte_stream.hpp"
 #include "support/fakes/ublox_items.hpp"
 #include "support/fakes/ublox_output.hpp"
 
@@ -58,9 +59,12 @@ class Ublox {
 
   Ublox(Generation generation, std::uint32_t baud) : generation_(generation), host_baud_(baud) { factory_reset(baud); }
 
-  Faults faults;
+  Faults injected;
 
   // ---- the line
+  /// Bytes that the line lost; the test sets them, the model of the receiver loses none.
+  hal::SerialFaults line_faults{};
+  [[nodiscard]] hal::SerialFaults faults() const { return line_faults; }
   std::size_t read(std::span<std::uint8_t> in) {
     const std::size_t n = std::min(in.size(), to_host_.size());
     const auto end = to_host_.begin() + static_cast<std::ptrdiff_t>(n);
@@ -69,7 +73,7 @@ class Ublox {
     return n;
   }
   std::size_t write(std::span<const std::uint8_t> out) {
-    const std::size_t n = std::min(out.size(), faults.write_at_most);
+    const std::size_t n = std::min(out.size(), injected.write_at_most);
     for (const std::uint8_t byte : out.first(n)) {
       // Each byte for itself: a request may change the rate under those that follow it.
       received_.push_back({in_step() ? byte : garbled(byte), in_step()});
@@ -86,7 +90,7 @@ class Ublox {
   // ---- the test's side
   void advance(base::Micros now) {
     for (;;) {
-      const base::Micros epoch = next_epoch_ + faults.compute + wait();
+      const base::Micros epoch = next_epoch_ + injected.compute + wait();
       const bool answer_first = !answers_.empty() && answers_.begin()->first <= epoch;
       const base::Micros next = answer_first ? answers_.begin()->first : epoch;
       if (next > now) break;
@@ -167,16 +171,16 @@ class Ublox {
   /// Sec. 5.9.17.2: queued messages go out with the parameters that hold then, so the acknowledgement of a new rate
   /// may come at either; it is the new one here.
   void say_answer(const Answer& answer) {
-    if (answer.acknowledgement && faults.swallow_acks > 0) {
-      --faults.swallow_acks;
+    if (answer.acknowledgement && injected.swallow_acks > 0) {
+      --injected.swallow_acks;
       return;
     }
     send_ubx(answer.frame);
   }
   void answer(Message message, const Bytes& payload) {
-    if (faults.mute) return;
+    if (injected.mute) return;
     const bool ack = message.first == kAckClass;
-    answers_.emplace(now_ + faults.delay, Answer{ublox::frame(message.first, message.second, payload), ack});
+    answers_.emplace(now_ + injected.delay, Answer{ublox::frame(message.first, message.second, payload), ack});
   }
 
   // ---- frames (sec. 5.2)
@@ -228,10 +232,10 @@ class Ublox {
     // Sec. 5.8: acknowledged is what is of class CFG; others get no answer at all.
     if (message.first != kCfg) return;
     const Verdict verdict = generation_ == Generation::kKeys ? by_keys(message, payload) : by_fields(message, payload);
-    if (verdict == Verdict::kUnknown && faults.ignores_unknown) return;
+    if (verdict == Verdict::kUnknown && injected.ignores_unknown) return;
     const std::uint8_t ack = verdict == Verdict::kAck ? 1 : 0;
     answer({kAckClass, ack}, {message.first, message.second});
-    if (baud() != before && faults.deaf_after_baud_change) gone_quiet_ = true;
+    if (baud() != before && injected.deaf_after_baud_change) gone_quiet_ = true;
   }
 
   Verdict by_keys(Message message, std::span<const std::uint8_t> payload) {
@@ -250,7 +254,7 @@ class Ublox {
   }
 
   [[nodiscard]] const ublox::Item* known(std::uint32_t id) const {
-    return faults.unknown_keys.contains(id) ? nullptr : ublox::find(id);
+    return injected.unknown_keys.contains(id) ? nullptr : ublox::find(id);
   }
 
   /// Sec. 5.9.27: all or nothing.
@@ -499,7 +503,7 @@ class Ublox {
   /// The jitter of the epoch that is due: spread over the whole span, the same in every run.
   [[nodiscard]] base::Micros wait() const {
     const std::uint64_t mixed = (epochs_.size() + 1) * 0x9E3779B97F4A7C15ULL >> 33;
-    const auto span = static_cast<std::uint64_t>(std::max(faults.jitter.us, std::int64_t{0}));
+    const auto span = static_cast<std::uint64_t>(std::max(injected.jitter.us, std::int64_t{0}));
     return {static_cast<std::int64_t>(mixed % (span + 1))};
   }
 

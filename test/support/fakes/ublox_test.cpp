@@ -261,7 +261,7 @@ TEST_F(UbloxTest, RefusesTheWholeOfIt) {
   EXPECT_EQ(send(valset(kRam, {good}, 1, 1)), kRefused);
   Bytes cut{0, kRam, 0, 0, 0x01, 0x00, 0x21, 0x30, 0xC8};
   EXPECT_EQ(send(ublox::frame(0x06, 0x8A, cut)), kRefused);
-  u.faults.unknown_keys = {good.first};
+  u.injected.unknown_keys = {good.first};
   EXPECT_EQ(send(valset(kRam, {good})), kRefused);
   EXPECT_EQ(u.ram(good.first), 1000U);
   EXPECT_EQ(u.broken_rules(), 0);
@@ -347,20 +347,20 @@ TEST_F(UbloxTest, AcknowledgesANewRateAtTheNewRate) {
 }
 
 TEST_F(UbloxTest, FaultsDoWhatTheySay) {
-  u.faults.swallow_acks = 1;
+  u.injected.swallow_acks = 1;
   EXPECT_EQ(send(valset(kRam, {{key("CFG-RATE-NAV"), 2}})), kNothing);
   EXPECT_EQ(u.ram(key("CFG-RATE-NAV")), 2U);
   EXPECT_EQ(send(valset(kRam, {})), kAcked);
-  u.faults.mute = true;
+  u.injected.mute = true;
   EXPECT_EQ(send(valset(kRam, {})), kNothing);
-  u.faults.mute = false;
+  u.injected.mute = false;
   EXPECT_EQ(send(ublox::frame(0x06, 0x08, {})), kRefused);  // an older message
-  u.faults.ignores_unknown = true;
+  u.injected.ignores_unknown = true;
   EXPECT_EQ(send(ublox::frame(0x06, 0x08, {})), kNothing);
-  u.faults.write_at_most = 3;
+  u.injected.write_at_most = 3;
   EXPECT_EQ(u.write(Bytes(10)), 3U);
-  u.faults.write_at_most = 1000;
-  u.faults.deaf_after_baud_change = true;
+  u.injected.write_at_most = 1000;
+  u.injected.deaf_after_baud_change = true;
   u.write(valset(kRam, {{key("CFG-UART1-BAUDRATE"), 9600}}));
   u.set_baud(9600);
   step(3'000'000);
@@ -368,7 +368,7 @@ TEST_F(UbloxTest, FaultsDoWhatTheySay) {
 }
 
 TEST_F(UbloxTest, AnswersAfterTheDelay) {
-  u.faults.delay = Micros{900'000};
+  u.injected.delay = Micros{900'000};
   u.write(valset(kRam, {}));
   step(899'999);
   EXPECT_TRUE(read_all(u).empty());
@@ -415,8 +415,8 @@ TEST_F(UbloxTest, SendsEveryNthOfTheSolutionsAndCrossesTheWeek) {
 }
 
 TEST_F(UbloxTest, ComputesForAWhile) {
-  u.faults.compute = Micros{70'000};
-  u.faults.jitter = Micros{10'000};
+  u.injected.compute = Micros{70'000};
+  u.injected.jitter = Micros{10'000};
   step(1'069'999);
   EXPECT_TRUE(u.epochs().empty());
   step(10'001);
