@@ -22,8 +22,9 @@ namespace tetap::sim {
   return value == sensor::Sensor::kNotAvailable ? "NotAvailable" : i < kNames.size() ? kNames[i] : "?";
 }
 [[nodiscard]] constexpr std::string_view name(sensor::Verdict value) {
-  constexpr std::array<std::string_view, 8> kNames{"Accepted",        "Rejected", "NotUsed",   "TooLate",
-                                                   "UnknownLandmark", "Singular", "NotFinite", "Stale"};
+  constexpr std::array<std::string_view, 13> kNames{
+      "Accepted", "Rejected",    "NotUsed",   "TooLate", "UnknownLandmark", "Singular", "NotFinite",
+      "Stale",    "NewLandmark", "Ambiguous", "NoRoom",  "Pending",         "Outlier"};
   const auto i = static_cast<std::size_t>(value);
   return i < kNames.size() ? kNames[i] : "?";
 }
@@ -61,6 +62,12 @@ namespace tetap::sim {
   return i < kNames.size() ? kNames[i] : "?";
 }
 
+[[nodiscard]] constexpr std::string_view name(bus::LandmarkState value) {
+  constexpr std::array<std::string_view, 3> kNames{"Tentative", "Kept", "Frozen"};
+  const auto i = static_cast<std::size_t>(value);
+  return i < kNames.size() ? kNames[i] : "?";
+}
+
 /// Name of a frame that the node sends, by its place in the node's block.
 [[nodiscard]] inline std::string message_name(std::uint32_t offset) {
   constexpr std::array<std::string_view, 8> kCommon{"Est_Epoch",      "Est_StateCrc", "Est_Status",  "Est_Innov",
@@ -77,6 +84,9 @@ namespace tetap::sim {
     if (within == bus::EstStateHeight::kOffset - bus::EstPos::kOffset) return prefix + "State";
     if (within == bus::EstStdPose::kOffset - bus::EstPos::kOffset) return prefix + "Std";
   }
+  if (offset == bus::EstLandmark::kOffset) return "Est_Landmark";
+  if (offset == bus::EstLandmarkStd::kOffset) return "Est_LandmarkStd";
+  if (offset == bus::EstKeyframe::kOffset) return "Est_Keyframe";
   return "offset " + std::to_string(offset);
 }
 

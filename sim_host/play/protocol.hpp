@@ -8,6 +8,7 @@
 #include "bus/codec.hpp"
 #include "bus/messages.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -20,9 +21,10 @@ inline constexpr std::uint32_t kInputOffsets =
     0x20;  ///< offsets below are inputs, the others of the block are the node's
 inline constexpr std::uint64_t kTimeMask = 0xFFFFFFFFFFFF;
 
-/// Position within the node's block; nothing when the frame is not of this block.
+/// Position within the node's block and the map's behind it; nothing when the frame is of neither. Where no robot maps,
+/// another node may have the map's identifiers for inputs of its own.
 [[nodiscard]] constexpr std::optional<std::uint32_t> offset_in_block(const base::CanFrame& frame, std::uint32_t base) {
-  if (frame.extended || frame.id < base || frame.id >= base + bus::kBlock) return std::nullopt;
+  if (frame.extended || frame.id < base || frame.id >= base + bus::kBlock + bus::kMapBlock) return std::nullopt;
   return frame.id - base;
 }
 /// A frame the node consumes and counts: of its inputs, sync frames excepted.
@@ -38,7 +40,7 @@ inline constexpr std::uint64_t kTimeMask = 0xFFFFFFFFFFFF;
     const auto bytes = bus::payload(frame);
     return bus::decode<bus::EstDiagQueues>(bytes) || bus::decode<bus::EstDiagOrder>(bytes) ||
            bus::decode<bus::EstDiagFrames>(bytes) || bus::decode<bus::EstDiagRefused>(bytes) ||
-           bus::decode<bus::EstDiagCapacity>(bytes);
+           bus::decode<bus::EstDiagCapacity>(bytes) || bus::decode<bus::EstDiagMapper>(bytes);
   }
   return offset >= kInputOffsets && offset != bus::EstVersion::kOffset;
 }
@@ -99,21 +101,24 @@ class EpochCollector {
     const auto offset = offset_in_block(frame, base_);
     if (!offset || *offset < kInputOffsets || is_begin_response(frame) || is_snapshot_piece(frame, base_))
       return std::nullopt;
+    const bool of_map = *offset >= bus::kBlock;
+    if (of_map && idle()) return std::nullopt;
     if (*offset == bus::EstEpoch::kOffset) begin(bus::decode<bus::EstEpoch>(bus::payload(frame)));
-    if (received_ < frames_.size()) frames_[received_] = frame;
-    ++received_;
+    if (stored_ < frames_.size()) frames_[stored_++] = frame;
+    ++(of_map ? of_map_ : received_);
     if (*offset != bus::EstStateCrc::kOffset) return std::nullopt;
     const auto tail = bus::decode<bus::EstStateCrc>(bus::payload(frame));
     if (!tail) return std::nullopt;
+    decide_whose_map(*tail);
     const NodeEpoch done{.head = head_,
                          .tail = *tail,
-                         .received = received_,
-                         .frames = std::span(frames_).first(received_ < frames_.size() ? received_ : frames_.size())};
+                         .received = received_ + (maps_ ? of_map_ : 0),
+                         .frames = std::span(frames_).first(stored_)};
     reset();
     return done;
   }
   void reset() {
-    received_ = 0;
+    received_ = of_map_ = stored_ = 0;
     head_.reset();
   }
   /// State of the epoch that is under way.
@@ -127,9 +132,23 @@ class EpochCollector {
     head_ = head;
   }
 
+  /// Frames with the map's identifiers are the node's when its own count has them; else another node's inputs, and
+  /// dropped.
+  void decide_whose_map(const bus::EstStateCrc& tail) {
+    if (of_map_ == 0 || maps_) return;
+    maps_ = tail.frames == static_cast<std::uint8_t>(received_ + of_map_);
+    if (maps_) return;
+    const auto begin = frames_.begin(), end = begin + static_cast<std::ptrdiff_t>(stored_);
+    stored_ = static_cast<std::size_t>(
+        std::remove_if(begin, end, [&](const base::CanFrame& f) { return f.id - base_ >= bus::kBlock; }) - begin);
+  }
+
   std::uint32_t base_;
   std::optional<bus::EstEpoch> head_;
-  std::size_t received_ = 0;
+  std::size_t received_ = 0;  ///< frames of the node's block in this epoch
+  std::size_t of_map_ = 0;    ///< frames of the map's block
+  std::size_t stored_ = 0;
+  bool maps_ = false;  ///< the node sends a map
   std::array<base::CanFrame, 256> frames_{};
 };
 

@@ -36,7 +36,8 @@ Recorder::Recorder(const RecorderOptions& options)
       innovations_(options.folder + "/innovations.csv"),
       sensors_(options.folder + "/sensors.csv"),
       status_(options.folder + "/status.csv"),
-      sources_(options.folder + "/sources.csv") {
+      sources_(options.folder + "/sources.csv"),
+      map_(options.folder + "/map.csv") {
   if (options.raw) raw_.emplace(options.folder + "/raw.log");
   estimates_.write(
       "epoch,time_s,estimator,kind,x_m,y_m,yaw_rad,speed_mps,yaw_rate_radps,std_x_m,std_y_m,std_yaw_rad,corr_xy,corr_x_"
@@ -54,6 +55,7 @@ Recorder::Recorder(const RecorderOptions& options)
   sensors_.write("epoch,time_s,estimator,sensor,inst,accepted,rejected,nis_mean,age_s\n");
   status_.write("epoch,time_s,mode,used,faults,reset_ctr,reset_cause\n");
   sources_.write("epoch,time_s,estimator,source,state,failed\n");
+  map_.write("epoch,time_s,landmark,x_m,y_m,std_x_m,std_y_m,corr_xy,hits,age_s,landmark_state\n");
 }
 
 void Recorder::raw_line(const base::CanFrame& frame, base::Micros time) {
@@ -112,6 +114,10 @@ void Recorder::frame(const base::CanFrame& f) {
     if (const auto statistics = bus::decode<bus::EstSensorStat>(payload)) sensor_row(*statistics);
   } else if (offset == bus::EstStatus::kOffset) {
     if (const auto status = bus::decode<bus::EstStatus>(payload)) status_row(*status);
+  } else if (offset == bus::EstLandmark::kOffset) {
+    landmark_ = bus::decode<bus::EstLandmark>(payload);
+  } else if (offset == bus::EstLandmarkStd::kOffset) {
+    if (const auto deviation = bus::decode<bus::EstLandmarkStd>(payload)) landmark_row(*deviation);
   } else if (offset >= bus::EstPos::kOffset) {
     const std::size_t k = (offset - bus::EstPos::kOffset) / bus::EstPos::kStride;
     if (k >= instances_.size()) return;
@@ -181,6 +187,17 @@ void Recorder::state_row(std::size_t k, const State& state) {
   row(time_).integer(static_cast<std::int64_t>(k));
   for (const double value : state.values) line_.put(',').real(value, 7);
   states_.write(line_.put('\n').view());
+}
+
+void Recorder::landmark_row(const bus::EstLandmarkStd& s) {
+  if (!landmark_ || landmark_->id != s.id) return;
+  row(time_).integer(s.id);
+  line_.put(',').real(millimetres(landmark_->x_raw), 3).put(',').real(millimetres(landmark_->y_raw), 3);
+  for (const float value : {s.std_x_m, s.std_y_m}) line_.put(',').real(static_cast<double>(value), 3);
+  line_.put(',').real(static_cast<double>(s.corr_xy), 2).put(',').integer(s.hits).put(',').integer(s.age_s).put(',');
+  put_name(line_, s.state);
+  map_.write(line_.put('\n').view());
+  landmark_.reset();
 }
 
 void Recorder::sensor_row(const bus::EstSensorStat& s) {
@@ -269,14 +286,14 @@ void Recorder::source_rows(std::size_t k, const bus::EstStateSources& s) {
 }
 
 void Recorder::flush() {
-  for (OutFile* file : {&estimates_log_, &estimates_, &states_, &innovations_, &sensors_, &status_, &sources_})
+  for (OutFile* file : {&estimates_log_, &estimates_, &states_, &innovations_, &sensors_, &status_, &sources_, &map_})
     file->flush();
   if (raw_) raw_->flush();
 }
 
 const Recorder::Totals& Recorder::finish() {
   totals_.estimates_sha256 = estimates_log_.close();
-  for (OutFile* file : {&estimates_, &states_, &innovations_, &sensors_, &status_, &sources_}) file->close();
+  for (OutFile* file : {&estimates_, &states_, &innovations_, &sensors_, &status_, &sources_, &map_}) file->close();
   if (raw_) raw_->close();
   return totals_;
 }

@@ -2,7 +2,8 @@
 // Writes a node's output: estimates.log (candump format, stamped with the epoch's time, only frames that are the same
 // in every run of the same input), estimates.csv, states.csv (output of an inertial or attitude estimator beyond a
 // pose), innovations.csv, sensors.csv (statistics by sensor), status.csv, sources.csv (state and failed check of each
-// source), and on request raw.log (everything on the bus as it came).
+// source), map.csv (landmarks of the map that the node makes), and on request raw.log (everything on the bus as it
+// came).
 #pragma once
 
 #include "sim_host/play/out_file.hpp"
@@ -75,6 +76,7 @@ class Recorder {
   void estimate_row(std::size_t k, const Instance& instance);
   void state(State& state, std::uint32_t offset, std::span<const std::uint8_t> payload);
   void state_row(std::size_t k, const State& state);
+  void landmark_row(const bus::EstLandmarkStd& std);
   void sensor_row(const bus::EstSensorStat& statistics);
   void innovation_row(const bus::EstInnov& innovation);
   void status_row(const bus::EstStatus& status);
@@ -84,12 +86,13 @@ class Recorder {
   void raw_line(const base::CanFrame& frame, base::Micros time);
 
   RecorderOptions options_;
-  OutFile estimates_log_, estimates_, states_, innovations_, sensors_, status_, sources_;
+  OutFile estimates_log_, estimates_, states_, innovations_, sensors_, status_, sources_, map_;
   std::optional<OutFile> raw_;
   Line line_;
   std::array<Instance, bus::EstPos::kCount> instances_{};
   std::array<State, bus::EstPos::kCount> states_now_{};
-  std::uint64_t number_ = 0;  ///< number of the epoch
+  std::optional<bus::EstLandmark> landmark_;  ///< the last, until its sigmas come
+  std::uint64_t number_ = 0;                  ///< number of the epoch
   std::uint8_t last_epoch_ = 0;
   bool restarted_ = true;
   base::Micros time_;

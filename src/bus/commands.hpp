@@ -13,11 +13,18 @@
 #include <cstdint>
 #include <limits>
 #include <optional>
+#include <type_traits>
 
 namespace tetap::bus {
 
 /// The codec's value for "not available" where a field is an integer of steps.
 inline constexpr std::int32_t kNoSteps = std::numeric_limits<std::int32_t>::min();
+
+/// Whether a robot has a map of its own, which a command resets.
+template <class Out>
+inline constexpr bool kMakesMap = requires {
+  requires std::remove_cvref_t<Out>::kMakesMap;
+};
 
 class Commands {
  public:
@@ -78,7 +85,8 @@ void Commands::on_frame(std::uint8_t offset, const base::CanFrame& frame, base::
   if (offset == bus::CmdReset::kOffset) {
     const auto reset = bus::decode<bus::CmdReset>(bus::payload(frame));
     if (!reset) return void(++counters.malformed);
-    if (reset->what > bus::ResetWhat::kWiredOn) return void(++counters.out_of_range);
+    if (reset->what > (kMakesMap<Out> ? bus::ResetWhat::kOwnMap : bus::ResetWhat::kWiredOn))
+      return void(++counters.out_of_range);
     last = counter;
     out.reset(reset->what);
     return;

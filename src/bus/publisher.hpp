@@ -15,10 +15,12 @@
 #include "estimators/attitude_disagreement.hpp"
 #include "estimators/estimate.hpp"
 #include "estimators/map_frame.hpp"
+#include "estimators/own_map.hpp"
 #include "estimators/sensor_statistics.hpp"
 #include "param/crc.hpp"
 #include "sensor/sample.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -93,6 +95,9 @@ class Publisher {
   template <class Send>
   void attitude(std::size_t instance, const estimators::AttitudeEstimate& e,
                 const estimators::Disagreement& from_primary, Send& send);
+  /// One landmark of the estimator's own map, and in its turn the page about the map.
+  template <estimators::MakesMap Estimator, class Send>
+  void own_map(const Estimator& estimator, Send& send);
   template <class Send>
   void status(const Summary& summary, const LoopHealth& loop, Send& send);
   template <class Lanes, class Send>
@@ -154,6 +159,13 @@ class Publisher {
   }
   /// Phase of what is to be of one epoch: attitude, velocity, sigmas, pages of the primary estimator.
   static constexpr std::int32_t kTogether = 2;
+  /// A coordinate in steps of the bus; not available rather than at the signal's end.
+  [[nodiscard]] static std::int32_t millimetres(const base::Anchored& a) {
+    constexpr std::int64_t kMost_um = 134'217'727'000;
+    const std::int64_t um = a.um();
+    if (um > kMost_um || um < -kMost_um) return std::numeric_limits<std::int32_t>::min();
+    return static_cast<std::int32_t>((um + (um < 0 ? -500 : 500)) / 1000);
+  }
   /// Spreads the estimators' slow frames over the epochs.
   [[nodiscard]] static std::int32_t side(std::size_t instance) { return static_cast<std::int32_t>(3 * instance); }
   [[nodiscard]] std::uint8_t tag() const { return static_cast<std::uint8_t>(epoch_ & 0x0F); }
@@ -177,12 +189,6 @@ template <class Send>
 void Publisher<N>::estimate(std::size_t instance, sensor::EstimatorKind kind, bool primary,
                             const estimators::Estimate& e, const estimators::MotionVariance& motion, Send& send) {
   const param::PublishParameters& p = parameters_.publish;
-  const auto millimetres = [](const base::Anchored& a) {  // not available rather than at the signal's end
-    constexpr std::int64_t kMost_um = 134'217'727'000;
-    const std::int64_t um = a.um();
-    if (um > kMost_um || um < -kMost_um) return std::numeric_limits<std::int32_t>::min();
-    return static_cast<std::int32_t>((um + (um < 0 ? -500 : 500)) / 1000);
-  };
   if (every(primary ? p.pose_every : p.side_every, side(instance))) {
     put(bus::EstPos{.x_raw = millimetres(e.pose.x), .y_raw = millimetres(e.pose.y), .epoch = tag(), .kind = kind}, send,
         instance);
@@ -247,6 +253,36 @@ void Publisher<N>::attitude(std::size_t instance, const estimators::AttitudeEsti
         bus::EstStateDisagreement{
             .epoch = tag(), .disagree_tilt_rad = from_primary.tilt_rad, .disagree_yaw_rad = from_primary.heading_rad},
         send, instance);
+}
+
+template <std::size_t N>
+template <estimators::MakesMap Estimator, class Send>
+void Publisher<N>::own_map(const Estimator& estimator, Send& send) {
+  const bool page = every(8 * parameters_.publish.diagnostics_every, 9);
+  const bool landmark = every(parameters_.mapping.publish_every, 4);
+  if (!page && !landmark) return;
+  const estimators::MapReport map = estimator.own_map();
+  if (page)
+    put(bus::EstDiagMapper{.map_size = static_cast<std::uint16_t>(std::min<std::uint32_t>(map.size, 0xFFFF)),
+                           .map_refused = static_cast<std::uint16_t>(map.refused & 0x7FFU),
+                           .ambiguous = static_cast<std::uint16_t>(map.ambiguous & 0x7FFU),
+                           .work_left = static_cast<std::uint16_t>(std::min<std::uint32_t>(map.work_left, 0xFFFF)),
+                           .jobs_aborted = static_cast<std::uint8_t>(map.jobs_aborted)},
+        send);
+  if (!landmark || map.size == 0) return;
+  const auto turn = epoch_ / static_cast<std::uint32_t>(parameters_.mapping.publish_every);
+  const estimators::MappedLandmark m = estimator.own_landmark(turn % map.size);
+  put(bus::EstLandmark{.id = m.id, .x_raw = millimetres(m.place.x), .y_raw = millimetres(m.place.y)}, send);
+  const float x = base::sqrt(m.xx_m2), y = base::sqrt(m.yy_m2);
+  put(bus::EstLandmarkStd{.id = m.id,
+                          .std_x_m = x,
+                          .std_y_m = y,
+                          .corr_xy = m.xy_m2 / (x * y),
+                          .hits = static_cast<std::uint8_t>(m.hits < 255 ? m.hits : 255),
+                          .age_s = static_cast<std::uint8_t>(m.age.us < 255'000'000 ? m.age.us / 1'000'000 : 255),
+                          .state = m.confirmed ? bus::LandmarkState::kKept : bus::LandmarkState::kTentative,
+                          .epoch = tag()},
+      send);
 }
 
 template <std::size_t N>

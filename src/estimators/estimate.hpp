@@ -140,6 +140,14 @@ struct Innovation {
           .failed = verdict == sensor::Verdict::kRejected ? sensor::Check::kValue : sensor::Check::kNone};
 }
 
+/// Record of a sample that fuse() took with the verdict Pending: its fate, once that is known.
+struct LateRecord {
+  base::Micros stamp;
+  sensor::Sensor sensor = sensor::Sensor::kNotAvailable;
+  std::uint8_t instance = 0;
+  Innovation innovation;
+};
+
 /// The filter's record in the bus's words.
 template <int M>
 [[nodiscard]] Innovation record(const filter::Innovation<float, M>& from, std::uint8_t landmark = 0xFF) {

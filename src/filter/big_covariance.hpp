@@ -23,6 +23,9 @@ class BigCovariance {
 
   [[nodiscard]] int size() const { return size_; }
   [[nodiscard]] bool full() const { return size_ == kMost; }
+  /// Number of covariances in use, and one of them: the upper half by columns.
+  [[nodiscard]] std::size_t words() const { return index(0, size_); }
+  [[nodiscard]] Scalar word(std::size_t i) const { return packed_[i]; }
   [[nodiscard]] Scalar operator()(int r, int c) const { return packed_[index(r, c)]; }
   [[nodiscard]] Scalar& operator()(int r, int c) { return packed_[index(r, c)]; }
   void clear() { size_ = 0; }

@@ -11,6 +11,7 @@
 
 #include "estimators/context.hpp"
 #include "estimators/estimate.hpp"
+#include "estimators/own_map.hpp"
 #include "estimators/sensor_statistics.hpp"
 #include "sensor/sample.hpp"
 #include "sensor/window.hpp"
@@ -44,11 +45,26 @@ concept DigestsState = requires(const E& e) {
   { e.digest() } -> std::same_as<std::uint32_t>;
 };
 
+/// An estimator that judges samples together: fuse() gives the verdict Pending, and late_records(sink) hands out the
+/// records (estimators::LateRecord) when they are there.
+template <class E>
+concept RecordsLater = requires(E& e) {
+  e.late_records([](const estimators::LateRecord&) {});
+};
+
+/// An estimator with jobs longer than a tick: work() does so many units of the one under way, once a tick.
+template <class E>
+concept WorksInJobs = requires(E& e, std::uint32_t units, const estimators::Context& ctx) {
+  e.work(units, ctx);
+  e.abort_job();
+};
+
 template <Estimator E>
 class EstimatorSlot {
  public:
   using Type = E;
   static constexpr bool kDelayed = kIsDelayed<E>;
+  static_assert(!WorksInJobs<E> || kDelayed, "a plain estimator repeats its window, and would repeat its jobs");
   /// An estimator that distinguishes sensors of one kind is given the instance, too.
   template <class Payload>
   static constexpr bool kTakesInstance = requires(E& e, const Payload& payload, base::Micros stamp,
@@ -144,6 +160,25 @@ class EstimatorSlot {
     return 0;
   }
   [[nodiscard]] sensor::Mode mode(const estimators::Context& ctx) const { return now_.mode(ctx); }
+  /// Calls sink(sample, innovation) for records later than fuse(); of the sample stamp, sensor and instance are there.
+  template <class Sink>
+  void late_records(Sink&& sink) requires RecordsLater<E> {
+    now_.late_records([&](const estimators::LateRecord& record) {
+      sensor::Sample sample;
+      sample.stamp = record.stamp;
+      sample.sensor = record.sensor;
+      sample.instance = record.instance;
+      account(sample, record.innovation);
+      sink(sample, record.innovation);
+    });
+  }
+  void work(std::uint32_t units, const estimators::Context& ctx) requires WorksInJobs<E> { now_.work(units, ctx); }
+  /// The window is closed: a job under way is given up.
+  void abort_job() requires WorksInJobs<E> { now_.abort_job(); }
+  /// The window is closed: what waits for others of its stamp is judged now.
+  void close_batch(const estimators::Context& ctx) requires RecordsLater<E> { now_.close_batch(ctx); }
+  [[nodiscard]] const E& map_maker() const requires estimators::MakesMap<E> { return now_; }
+  void reset_own_map() requires estimators::MakesMap<E> { now_.reset_own_map(); }
 
   void account(const sensor::Sample& sample, const estimators::Innovation& innovation) {
     estimators::SensorStatistics& s = statistics(sample.sensor, sample.instance);

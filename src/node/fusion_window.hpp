@@ -25,6 +25,8 @@ struct Estimators {
   static constexpr std::size_t kCount = sizeof...(E);
   template <class Payload>
   static constexpr bool kTakes = (EstimatorSlot<E>::template kTakes<Payload> || ...);
+  static constexpr bool kUsesMap = (estimators::UsesMap<E> || ...);
+  static constexpr bool kMakesMap = (estimators::MakesMap<E> || ...);
   /// Places for the samples of the window: 200 ms of an IMU at 200 Hz with wheels at 100 Hz and GNSS need 64.
   static constexpr std::size_t kSamples = 88;
 };
@@ -82,13 +84,36 @@ class FusionWindow {
   template <class Note>
   void close_window(base::Micros t, const estimators::Context& ctx, Note&& note) {
     leave_until(t, Past::kIsNow, ctx, note);
-    each_lane([](auto& lane) { lane.close(); });
+    each_lane([&](auto& lane) {
+      if constexpr (requires { lane.close_batch(ctx); }) lane.close_batch(ctx);
+      if constexpr (requires { lane.abort_job(); }) lane.abort_job();
+      lane.close();
+    });
+    late_records(note);
   }
 
   /// Brings every estimator to t.
   void advance(base::Micros t, const estimators::Context& ctx) {
     const sensor::Window window = timeline_.window(timeline_.until(t));
     each_lane([&](auto& lane) { lane.advance(t, ctx, window); });
+  }
+  /// The tick's share of jobs that are longer.
+  void work(std::uint32_t units, const estimators::Context& ctx) {
+    each_lane([&](auto& lane) {
+      if constexpr (requires { lane.work(units, ctx); }) lane.work(units, ctx);
+    });
+  }
+  /// Notes the records that came later than fuse().
+  template <class Note>
+  void late_records(Note&& note) {
+    std::size_t instance = 0;
+    each_lane([&](auto& lane) {
+      if constexpr (RecordsLater<typename std::remove_cvref_t<decltype(lane)>::Type>)
+        lane.late_records([&](const sensor::Sample& sample, const estimators::Innovation& innovation) {
+          note(instance, sample, innovation);
+        });
+      ++instance;
+    });
   }
 
   using Estimates = std::array<estimators::Estimate, kCount>;
@@ -165,6 +190,9 @@ void FusionWindow<Estimators, Capacity>::leave(const sensor::Sample& sample, Pas
   each_lane([&](auto& lane) {
     if constexpr (std::remove_cvref_t<decltype(lane)>::kDelayed) {
       const estimators::Innovation innovation = lane.fuse(sample, ctx);
+      if constexpr (RecordsLater<typename std::remove_cvref_t<decltype(lane)>::Type>) {
+        if (innovation.verdict == sensor::Verdict::kPending) return void(++instance);
+      }
       lane.account(sample, innovation);
       note(instance, sample, innovation);
     } else if (past == Past::kFollows) {

@@ -46,6 +46,8 @@ class Node {
     publisher_.send_version(send);
   }
 
+  /// Whether an estimator makes a map of its own, which a command resets.
+  static constexpr bool kMakesMap = Estimators::kMakesMap;
   /// Called by the inbox.
   void sample(const sensor::Sample& sample);
   void map_entry(const estimators::MapEntry& entry) { landmarks_.add(entry, counters_); }
@@ -82,8 +84,7 @@ class Node {
   using Estimates = typename FusionWindow::Estimates;
   static constexpr std::size_t kPrimary = FusionWindow::kPrimary;
   static constexpr base::Micros kLongestStep{500'000};
-  using Landmarks =
-      std::conditional_t<Estimators::template kTakes<sensor::LandmarkSighting>, node::Landmarks, node::NoLandmarks>;
+  using Landmarks = std::conditional_t<Estimators::kUsesMap, node::Landmarks, node::NoLandmarks>;
 
   /// Sightings, and speeds that are commands.
   [[nodiscard]] bool at_no_fixed_rate(const sensor::Sample& sample) const {
@@ -131,7 +132,7 @@ class Node {
   bus::Counters counters_;
   bus::Publisher<Estimators::kCount> publisher_;
   [[no_unique_address]] Landmarks landmarks_;
-  std::array<bool, 4> pending_reset_{};
+  std::array<bool, 7> pending_reset_{};
   bool wired_off_ = false;  ///< by command; a Begin frame leaves it
   std::optional<estimators::SetPose> pending_pose_;
 
@@ -238,6 +239,8 @@ void Node<Estimators, Capacity>::tick(base::Micros t, const bus::LoopHealth& loo
   if (origin_.take_replaced()) restart_in_new_map();
   apply_commands();
   history_.advance(now_, context());
+  history_.late_records(noting());
+  history_.work(static_cast<std::uint32_t>(parameters_.loop.work_units), context());
   Estimates estimates;
   history_.estimate(context(), estimates);
   if (!healthy(estimates)) history_.estimate(context(), estimates);
@@ -259,6 +262,7 @@ void Node<Estimators, Capacity>::tick(base::Micros t, const bus::LoopHealth& loo
           instance, [&] { return lane.inertial(context()); }, [&] { return lane.sources(context()); }, send);
     if constexpr (requires { lane.attitude(context()); })
       publisher_.attitude(instance, in_map(lane.attitude(context())), apart, send);
+    if constexpr (estimators::MakesMap<E>) publisher_.own_map(lane.map_maker(), send);
     ++instance;
   });
   publisher_.status(summary(estimates[kPrimary]), loop, send);
@@ -321,6 +325,14 @@ template <class Estimators, std::size_t Capacity>
 void Node<Estimators, Capacity>::apply_commands() {
   using What = bus::ResetWhat;
   if (take(What::kLandmarkMap)) landmarks_.clear();
+  if constexpr (kMakesMap) {
+    if (take(What::kOwnMap)) {
+      close_window(now_);
+      history_.each_lane([](auto& lane) {
+        if constexpr (requires { lane.reset_own_map(); }) lane.reset_own_map();
+      });
+    }
+  }
   if (take(What::kCounters)) {
     counters_ = {};
     history_.each_lane([](auto& lane) { lane.clear_statistics(); });

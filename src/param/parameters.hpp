@@ -20,6 +20,7 @@ struct LoopParameters {
   std::int32_t window_us = 200'000;  ///< how late a sample may come and still be fused at its own time
   std::int32_t ahead_us = 200'000;   ///< how far ahead of the tick a stamp may be and still wait
   float turn_radps2 = 0.5F;          ///< 1 sigma of what turns it faster or slower: a yaw rate is as old as its sample
+  std::int32_t work_units = 1000;    ///< share of a job longer than a tick, in each tick
 };
 
 /// How a speed sample relates to its stamp.
@@ -213,6 +214,18 @@ struct RecoveryParameters {
   float frozen_m = 0.5F;                 ///< way with the same coordinates: the receiver repeats itself
 };
 
+/// Mappers: how the own map is made and sent.
+struct MappingParameters {
+  float correlation_m = 0;           ///< way over which errors of one landmark's sightings stay alike; 0: independent
+  float separation_m = 0.8F;         ///< without identities: no new landmark nearer than this to another one
+  std::int32_t association = 0;      ///< without identities: 0 nearest neighbour, 1 assignment, 2 joint compatibility
+  std::int32_t confirming_hits = 3;  ///< a landmark of fewer sightings gives way when there is no room
+  std::int32_t when_full = 0;        ///< 0: a new landmark is refused; 1: the landmark unseen for longest goes
+  float resample_share = 0.5F;       ///< share of effective particles below which they are drawn anew
+  std::int32_t seed = 1;             ///< key of the particles' noise
+  std::int32_t publish_every = 10;   ///< ticks between landmarks on the bus, one at a time; 0: never
+};
+
 /// Ticks between frames; 0 = never.
 struct PublishParameters {
   std::int32_t pose_every = 1;  ///< estimate 1: position and motion
@@ -270,6 +283,7 @@ struct Parameters {
   RecoveryParameters recovery;
   PublishParameters publish;
   WiredParameters wired;
+  MappingParameters mapping;
 };
 
 }  // namespace tetap::param

@@ -37,6 +37,7 @@ inline constexpr std::array kTable{
               "A sample whose stamp is further ahead of the tick is refused."),
     TETAP_ROW(0x043, loop.turn_radps2, "rad/s^2", 0, 100, kLive,
               "1 sigma of the angular acceleration between the last yaw rate and the tick."),
+    TETAP_ROW(0x044, loop.work_units, "", 1, 1'000'000, kLive, "Units of a mapper's job that are done in each tick."),
 
     TETAP_ROW(0x080, wheels.drive.left_radius_m, "m", 0, 2, kRestart,
               "Radius of the left wheel; 0 together with the right radius and the track: no wheel counts."),
@@ -372,6 +373,22 @@ inline constexpr std::array kTable{
     TETAP_ROW(0x48D, wired.gnss_period_ms, "ms", 25, 10'000, kRestart, "Period of a configured receiver's fixes."),
     TETAP_ROW(0x48E, wired.gnss_latency_us, "us", 0, 500'000, kRestart,
               "Time from a measurement of the receiver to the last byte of its message."),
+
+    TETAP_ROW(0x4A0, mapping.correlation_m, "m", 0, 100, kLive,
+              "Way over which errors of one landmark's sightings stay alike; 0: independent."),
+    TETAP_ROW(0x4A1, mapping.separation_m, "m", 0, 1'000, kLive,
+              "Least distance of a new landmark without identity from every other one."),
+    TETAP_ROW(0x4A2, mapping.association, "", 0, 2, kLive,
+              "Sightings without identity: 0 nearest neighbour, 1 assignment, 2 joint compatibility."),
+    TETAP_ROW(0x4A3, mapping.confirming_hits, "", 1, 1'000, kLive,
+              "Sightings from which a landmark no longer gives way when the map is full."),
+    TETAP_ROW(0x4A4, mapping.when_full, "", 0, 1, kLive,
+              "A full map: 0 refuses a new landmark, 1 removes the one unseen for longest."),
+    TETAP_ROW(0x4A5, mapping.resample_share, "", 0.01, 1, kLive,
+              "Share of effective particles below which they are drawn anew."),
+    TETAP_ROW(0x4A6, mapping.seed, "", 0, 1'000'000, kRestart, "Key of the particles' noise."),
+    TETAP_ROW(0x4A7, mapping.publish_every, "ticks", 0, 100'000, kLive,
+              "Period of one landmark of the own map on the bus; 0: never."),
 };
 
 #undef TETAP_ROW

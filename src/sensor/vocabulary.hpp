@@ -31,7 +31,12 @@ enum class Verdict : std::uint8_t {
   kUnknownLandmark = 4,  ///< the map has no landmark of this id
   kSingular = 5,         ///< the innovation covariance has no factor
   kNotFinite = 6,
-  kStale = 7,  ///< the sensor repeats itself
+  kStale = 7,        ///< the sensor repeats itself
+  kNewLandmark = 8,  ///< the sighting began a landmark of the own map
+  kAmbiguous = 9,    ///< more than one landmark, or neither a known nor surely a new one
+  kNoRoom = 10,      ///< a new landmark, and the own map is full
+  kPending = 11,     ///< kept until more measurements decide
+  kOutlier = 12,     ///< possible by itself, not beside the others of its stamp
 };
 
 /// State of an estimator as a whole.

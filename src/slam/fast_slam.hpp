@@ -64,15 +64,16 @@ class FastSlam {
     ++epoch_;
     reset_map();
     motion_ = {};
-    for (std::size_t i = 0; i < particles_.size(); ++i) {
-      const filter::Draw draw = filter::draw_of(key_, epoch_, static_cast<std::uint32_t>(i), filter::DrawFor::kStart);
-      particles_[i].pose = {.x_m = pose.x_m + sigma_position_m * draw.normal(0),
-                            .y_m = pose.y_m + sigma_position_m * draw.normal(1),
-                            .yaw_rad = base::wrap_angle(pose.yaw_rad + sigma_yaw_rad * draw.normal(2))};
-    }
+    for (std::size_t i = 0; i < particles_.size(); ++i)
+      particles_[i].pose = drawn(i, pose, sigma_position_m, sigma_yaw_rad);
     log_weights_.fill(0.0F);
   }
   void reset_map() { landmarks_ = 0; }
+  /// Key of the draws from here on.
+  void set_key(base::PhiloxKey key) { key_ = key; }
+  /// Robot and map move as one: each particle's landmarks keep their places beside its robot, which gets a pose drawn
+  /// from the one given.
+  void set_pose(const PlanarOffset& pose, float sigma_position_m, float sigma_yaw_rad);
 
   /// Adds to the motion that the particles have not made yet. False, and nothing has changed, when the increment is no
   /// number.
@@ -118,8 +119,30 @@ class FastSlam {
   }
 
   [[nodiscard]] Estimate estimate() const;
+  /// Landmark k over all particles: mean, and spread plus the particles' own covariance. Relative to the zero of poses.
+  [[nodiscard]] FastSlamLandmark landmark(int k) const;
+
+  /// Words of memory in use, and one of them: log-weight, pose and landmarks of each particle.
+  [[nodiscard]] std::size_t words() const { return kCount * words_of_particle(); }
+  [[nodiscard]] float word(std::size_t i) const {
+    const Particle& particle = particles_[i / words_of_particle()];
+    const std::size_t within = i % words_of_particle();
+    const PlanarOffset& s = particle.pose;
+    if (within < 4) return std::array{log_weights_[i / words_of_particle()], s.x_m, s.y_m, s.yaw_rad}[within];
+    const FastSlamLandmark& m = particle.landmarks[(within - 4) / 5];
+    return std::array{m.x_m, m.y_m, m.p.xx, m.p.xy, m.p.yy}[(within - 4) % 5];
+  }
 
  private:
+  [[nodiscard]] std::size_t words_of_particle() const { return 4 + 5 * static_cast<std::size_t>(landmarks_); }
+  /// A pose with independent errors, for particle i in this epoch.
+  [[nodiscard]] PlanarOffset drawn(std::size_t i, const PlanarOffset& pose, float sigma_position_m,
+                                   float sigma_yaw_rad) const {
+    const filter::Draw draw = filter::draw_of(key_, epoch_, static_cast<std::uint32_t>(i), filter::DrawFor::kStart);
+    return {.x_m = pose.x_m + sigma_position_m * draw.normal(0),
+            .y_m = pose.y_m + sigma_position_m * draw.normal(1),
+            .yaw_rad = base::wrap_angle(pose.yaw_rad + sigma_yaw_rad * draw.normal(2))};
+  }
   static constexpr std::size_t kMostSightings = 16;
   static constexpr auto kCount = static_cast<std::size_t>(kParticles);
   static constexpr std::size_t at(int i) { return static_cast<std::size_t>(i); }
@@ -241,6 +264,55 @@ FastSlam<kParticles_, kLandmarks_, kVersion_>::estimate() const {
         estimate.p(row, column) += w * (e[at(row)] * e[at(column)] + posterior.p(row, column));
   }
   return estimate;
+}
+
+template <int kParticles_, int kLandmarks_, int kVersion_>
+void FastSlam<kParticles_, kLandmarks_, kVersion_>::set_pose(const PlanarOffset& pose, float sigma_position_m,
+                                                             float sigma_yaw_rad) {
+  ++epoch_;
+  for (std::size_t i = 0; i < kCount; ++i) {
+    Particle& particle = particles_[i];
+    const PlanarOffset from =
+        motion_.from(particle.pose).sample(filter::normals_of<3>(key_, epoch_, static_cast<std::uint32_t>(i)));
+    const PlanarOffset to = drawn(i, pose, sigma_position_m, sigma_yaw_rad);
+    const base::SinCos turn = base::sincos(to.yaw_rad - from.yaw_rad);
+    const float c = turn.cos, s = turn.sin;
+    particle.pose = to;
+    for (int k = 0; k < landmarks_; ++k) {
+      FastSlamLandmark& m = particle.landmarks[at(k)];
+      const float dx = m.x_m - from.x_m, dy = m.y_m - from.y_m;
+      const Covariance2 p = m.p;
+      m = {.x_m = to.x_m + c * dx - s * dy,
+           .y_m = to.y_m + s * dx + c * dy,
+           .p = {.xx = c * c * p.xx - 2.0F * c * s * p.xy + s * s * p.yy,
+                 .xy = c * s * (p.xx - p.yy) + (c * c - s * s) * p.xy,
+                 .yy = s * s * p.xx + 2.0F * c * s * p.xy + c * c * p.yy}};
+    }
+  }
+  motion_ = {};
+}
+
+template <int kParticles_, int kLandmarks_, int kVersion_>
+FastSlamLandmark FastSlam<kParticles_, kLandmarks_, kVersion_>::landmark(int k) const {
+  const FastSlamLandmark& first = particles_[0].landmarks[at(k)];
+  float sum = 0.0F, x = 0.0F, y = 0.0F;
+  Covariance2 p;
+  for (std::size_t i = 0; i < kCount; ++i) {
+    const FastSlamLandmark& m = particles_[i].landmarks[at(k)];
+    const float w = base::exp(log_weights_[i]), dx = m.x_m - first.x_m, dy = m.y_m - first.y_m;
+    sum += w;
+    x += w * dx;
+    y += w * dy;
+    p.xx += w * (m.p.xx + dx * dx);
+    p.xy += w * (m.p.xy + dx * dy);
+    p.yy += w * (m.p.yy + dy * dy);
+  }
+  x /= sum;
+  y /= sum;
+  const auto variance = [&](float square, float mean2) { return base::max(square / sum - mean2, 0.0F); };
+  return {.x_m = first.x_m + x,
+          .y_m = first.y_m + y,
+          .p = {.xx = variance(p.xx, x * x), .xy = p.xy / sum - x * y, .yy = variance(p.yy, y * y)}};
 }
 
 }  // namespace tetap::slam

@@ -143,6 +143,22 @@ TEST_F(Folder, AnyBytesFromTheNodeAreWrittenWithoutHarm) {
   for (std::string row; std::getline(innovations, row);) EXPECT_EQ(std::count(row.begin(), row.end(), ','), 11) << row;
 }
 
+/// Frames with the identifiers of a map are the node's when its count has them, else another node's inputs.
+TEST(EpochCollector, AMapBelongsToTheNodeThatCountsIt) {
+  const auto epoch = [](EpochCollector& collector, std::uint8_t frames) {
+    static_cast<void>(collector.add(bus::frame(0x300, bus::EstEpoch{.time_us = 5})));
+    static_cast<void>(collector.add(bus::frame(0x300, bus::EstLandmark{.id = 7})));
+    return *collector.add(bus::frame(0x300, bus::EstStateCrc{.frames = frames}));
+  };
+  EpochCollector maps(0x300), other(0x300);
+  EXPECT_EQ(epoch(maps, 3).received, 3U);
+  EXPECT_EQ(epoch(maps, 4).received, 3U);  // one is lost, and the map is still the node's
+  const NodeEpoch without = epoch(other, 2);
+  EXPECT_EQ(without.received, 2U);
+  ASSERT_EQ(without.frames.size(), 2U);
+  EXPECT_EQ(without.frames[1].id, 0x321U);
+}
+
 TEST(WorstCaseBits, AreThoseOfTheLiterature) {
   EXPECT_EQ(worst_case_bits({.id = 1, .size = 8}), 135U);
   EXPECT_EQ(worst_case_bits({.id = 1, .size = 0}), 55U);

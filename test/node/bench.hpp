@@ -25,9 +25,10 @@ inline constexpr param::Parameters kNumbers{
     .landmark = {.sigma_range_m = 0.1F, .sigma_bearing_rad = 0.02F},
 };
 
-class Bench {
+template <class Estimators>
+class BenchOf {
  public:
-  explicit Bench(const param::Parameters& parameters = kNumbers) : node(parameters, {.git = 0x12345678}) {
+  explicit BenchOf(const param::Parameters& parameters = kNumbers) : node(parameters, {.git = 0x12345678}) {
     node.power_on({kStart_us});
   }
 
@@ -48,8 +49,9 @@ class Bench {
 
   static constexpr std::int64_t kStart_us = 5'000'000;
   std::int64_t now_us = kStart_us;
-  node::Node<node::Estimators<estimators::Odometry, estimators::PoseEkf>> node;
+  node::Node<Estimators> node;
 };
+using Bench = BenchOf<node::Estimators<estimators::Odometry, estimators::PoseEkf>>;
 
 template <class Message>
 base::CanFrame in(const Message& message, std::size_t instance = 0) {

@@ -191,10 +191,10 @@ class Refusals(Folder):
     def test_id_outside_the_block(self):
         text = read(DBC)
         broken = self.path("broken.dbc")
-        write(broken, text.replace(" 776 ", " 832 "))
+        write(broken, text.replace(" 776 ", " 848 "))
         result = run(TOOL, broken)
         self.assertEqual(result.returncode, 1)
-        self.assertIn("In_BodySpeed: id 0x340 is outside the block 0x300..0x33F", result.stderr)
+        self.assertIn("In_BodySpeed: id 0x350 is outside the block 0x300..0x34F", result.stderr)
 
     def test_estimators_of_different_layout(self):
         self.refused("SG_ Est2Motion_Epoch : 48|4@1+", "SG_ Est2Motion_Epoch : 56|4@1+", "Est2_Motion", "layout differs from Est0_Motion")
@@ -505,6 +505,15 @@ class Decode(Folder):
         self.assertIn("36F Est1_Motion@340 Yaw", self.said(other, "--base", "0x300", "--base", "0x340").stdout)
         self.assertIn("12F Est1_Motion@100 Yaw", self.said(self.MOTION.replace("32F", "12F"), "--base", "256").stdout)
         self.assertIn("is no number", self.said("", "--base", "x", code=2).stderr)
+
+    def test_tells_a_map_from_the_inputs_of_another_node(self):
+        frame = "(0.0) can0 340#0700000000000000\n"
+        landmark, sync = "340 Est_Landmark Id=7 ", "340 In_Sync@340 Time=7 us"
+        self.assertIn(sync, self.said(frame).stdout)  # nothing says otherwise
+        self.assertIn(landmark, self.said(self.MOTION + frame).stdout)
+        self.assertIn(sync, self.said(self.MOTION + self.MOTION.replace("32F", "36F") + frame).stdout)
+        self.assertIn(landmark, self.said(frame, "--base", "0x300").stdout)
+        self.assertIn(sync, self.said(frame, "--base", "0x300", "--base", "0x340").stdout)
 
     def test_shows_what_is_not_ours_as_it_is(self):
         for line, words in (("(0.0) can0 123#DEAD\n", "(0.0) can0 123 ? DE AD\n"),

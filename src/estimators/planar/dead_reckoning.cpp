@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "estimators/planar/dead_reckoning.hpp"
 
+#include "estimators/mapping/recording_ekf.hpp"
 #include "estimators/planar/summing_ekf.hpp"
 #include "filter/ukf.hpp"
 #include "filter/ukf_sqrt.hpp"
@@ -175,6 +176,7 @@ template <class Filter>
 }
 
 template class PlanarDeadReckoning<PlanarEkf>;
+template class PlanarDeadReckoning<RecordingEkf>;
 template class PlanarDeadReckoning<SummingEkf>;
 template class PlanarDeadReckoning<filter::Ukf<model::PlanarPose>>;
 template class PlanarDeadReckoning<filter::UkfSqrt<model::PlanarPose>>;

@@ -30,6 +30,8 @@ class PoseFilter {
   static constexpr bool kUnscented = !std::same_as<Filter, PlanarEkf>;
   static constexpr sensor::EstimatorKind kKind = kUnscented ? sensor::EstimatorKind::kUkf : sensor::EstimatorKind::kEkf;
 
+  static constexpr bool kUsesMap = true;
+
   void restart(base::Micros t, const Context& ctx) {
     *this = {};
     const param::StartParameters& s = ctx.parameters.start;

@@ -29,6 +29,7 @@ class PoseParticles {
  public:
   static constexpr sensor::EstimatorKind kKind = sensor::EstimatorKind::kParticle;
   static constexpr bool kDelayed = true;
+  static constexpr bool kUsesMap = true;
   static constexpr std::size_t kBatch = 16;
   /// Particles whose bits enter the digest in one tick.
   static constexpr std::size_t kScanned = 16;

@@ -8,6 +8,7 @@ import re
 
 BASE = 0x300          # the id base the DBC is written for
 BLOCK = 0x40          # ids of one node
+MAP_BLOCK = 0x10      # further ids of a node that maps, directly behind its block: its base is a multiple of 128
 NOT_AVAILABLE = "NotAvailable"
 NAME_LIMIT = 32
 SEND_TYPES = ("Cyclic", "Event", "NoMsgSendType")
@@ -220,8 +221,8 @@ def _check(database, text):
             at = text.signal_line.get((message.name, signal.name), line) if signal else line
             raise Refused("%s:%s: %s: %s" % (text.path, at, signal.where() if signal else message.name, reason))
 
-        if message.extended or not BASE <= message.id < BASE + BLOCK:
-            refuse("id 0x%X is outside the block 0x%X..0x%X" % (message.id, BASE, BASE + BLOCK - 1))
+        if message.extended or not BASE <= message.id < BASE + BLOCK + MAP_BLOCK:
+            refuse("id 0x%X is outside the block 0x%X..0x%X" % (message.id, BASE, BASE + BLOCK + MAP_BLOCK - 1))
         if message.size != 8:
             refuse("length %d, not 8" % message.size)
         if not message.comment:

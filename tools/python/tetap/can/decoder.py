@@ -20,6 +20,7 @@ LOG = re.compile(rb"\s*\((\d+\.\d+)\)\s+(\S+)\s+([0-9A-Fa-f]{3}|[0-9A-Fa-f]{8})#
 PLAIN = re.compile(rb"\s*(?:\((\d+[\d.:\- ]*)\)\s+)?(\S+)\s+(?:(?:RX|TX)\s+\S\s+\S\s+)?([0-9A-Fa-f]{3}|[0-9A-Fa-f]{8})\s+\[(\d+)\]"
                    rb"((?:\s+[0-9A-Fa-f]{2})*)(?:\s+(remote request|ERRORFRAME))?(?:\s+'.*')?\s*$")
 
+INPUTS = 0x20  # offsets below are inputs
 AUTO = range(0x300, 0x580, bus_database.BLOCK)  # bases looked for without --base: above it CANopen's SDO begin
 
 
@@ -82,6 +83,7 @@ class Decoder:
 
     def __init__(self, database, bases):
         self.bases = bases
+        self.nodes = set()  # bases of nodes that have sent
         self.messages = {}
         for message in database.messages:
             mux = message.mux
@@ -92,12 +94,21 @@ class Decoder:
                                  formatter(s, database.tables)) for s in message.page_signals(page)])
             self.messages[message.offset] = (message, (mux.start, (1 << mux.length) - 1) if mux else None, pages)
 
+    def _base(self, frame_id):
+        """Base of the node that the frame belongs to. The ids of a map are those of inputs of a node 64 further on, if there is one."""
+        own = frame_id & ~(bus_database.BLOCK - 1)
+        maps = own - bus_database.BLOCK if own % (2 * bus_database.BLOCK) and frame_id - own < bus_database.MAP_BLOCK else None
+        if self.bases:
+            return own if own in self.bases else maps if maps in self.bases else next((b for b in self.bases if b <= frame_id < b + bus_database.BLOCK), None)
+        if frame_id - own >= INPUTS:
+            self.nodes.add(own)
+        found = maps if maps in self.nodes and own not in self.nodes else own
+        return found if found in AUTO else None
+
     def words(self, frame_id, data):
         """The frame in words, None when it is not ours, Malformed when it should be and cannot."""
-        base = frame_id & ~(bus_database.BLOCK - 1)
-        if self.bases:
-            base = next((b for b in self.bases if b <= frame_id < b + bus_database.BLOCK), None)
-        if base is None or (not self.bases and base not in AUTO):
+        base = self._base(frame_id)
+        if base is None:
             return None
         entry = self.messages.get(frame_id - base)
         if entry is None:

@@ -163,6 +163,7 @@ class Recording:
         self.log = bus_writer.Log(bus_writer.Dbc(arguments.dbc), arguments.base)
         self.start_us = start_us
         self.truth = None
+        self._sightings = None
         self.about = {"dataset": dataset, "time_offset_s": (start_us - START_US) / 1e6, "dropped": {}, "notes": []}
         self._files = []
 
@@ -177,9 +178,15 @@ class Recording:
     def source(self, path, rows):
         self._files.append({"file": os.path.basename(path), "rows": int(rows), "sha256": _sha256(path)})
 
-    def map_entries(self, identifiers, x_m, y_m):
-        self.log.add("In_MapEntry", MAP_FIRST_US + MAP_STEP_US * np.arange(len(identifiers)), Id=identifiers, X=x_m, Y=y_m)
+    def map_entries(self, identifiers, x_m, y_m, sent=True):
+        """`sent` False: the places are truth to compare with, and not on the bus."""
+        if sent:
+            self.log.add("In_MapEntry", MAP_FIRST_US + MAP_STEP_US * np.arange(len(identifiers)), Id=identifiers, X=x_m, Y=y_m)
         self.about["landmarks"] = [{"id": int(i), "x_m": float(x), "y_m": float(y)} for i, x, y in zip(identifiers, x_m, y_m)]
+
+    def true_sightings(self, time_us, identifiers):
+        """The landmark that each sighting shows, where the log does not say it or a mapper's word for it is judged."""
+        self._sightings = (self.log_us(time_us), identifiers)
 
     def start_pose(self, x_m, y_m, yaw_rad, sigma_position_m, sigma_yaw_rad, how):
         self.log.add("Cmd_SetPos", POSE_US, Ctr=1, X=x_m, Y=y_m)
@@ -206,6 +213,9 @@ class Recording:
         self.about.update(messages=dict(sorted(self.log.counts.items())), frames=len(frame_times), limited=self.log.limited,
                           duration_s=float(frame_times[-1] - START_US) / 1e6, sources=self._files)
         truth = {} if self.truth is None else {f"{out}.truth.csv": self._truth_text().encode()}
+        if self._sightings is not None:
+            rows = zip(*self._sightings)
+            truth[f"{out}.sightings.csv"] = ("time_s,landmark\n" + "".join(f"{us / 1e6:.6f},{int(k)}\n" for us, k in rows)).encode()
         _replace_all({f"{out}.log": log, **truth, f"{out}.json": (json.dumps(self.about, indent=2) + "\n").encode()})
         counts = ", ".join(f"{name} {count}" for name, count in self.about["messages"].items())
         print(f"{out}.log: {len(frame_times)} frames, {self.about['duration_s']:.1f} s ({counts})")

@@ -85,10 +85,12 @@ def mrclam(out):
     return table(["robot", "position RMSE", "heading RMSE", "NEES mean (3 expected)", "NIS mean (2 expected)", "sightings accepted / rejected"], rows)
 
 
-def menu(out):
-    """Each figure of the menu's robots on logs, with the bounds that the test holds it between."""
-    rows = [[what, f"{one['value']:.4g}", f"{one['low']:.3g} to {one['high']:.3g}"] for what, one in loaded(out, "menu/menu.json").items()]
-    return table(["run and figure", "measured", "bounds"], rows)
+def bounded(file):
+    """Each figure of a file of runs on logs, with the bounds that the test holds it between."""
+    def made(out):
+        rows = [[what, f"{one['value']:.4g}", f"{one['low']:.3g} to {one['high']:.3g}"] for what, one in loaded(out, file).items()]
+        return table(["run and figure", "measured", "bounds"], rows)
+    return made
 
 
 # region: (command, files that it writes, table)
@@ -98,7 +100,8 @@ REGIONS = {"memory": ("make size stack", ["size.json", "stack.json"], memory), "
            "drives": (WHOLE, ["inertial.json"], of_whole_runs(recorded.drive_table)),
            "outages": (WHOLE, ["inertial.json"], of_whole_runs(lambda result: recorded.outage_table(result["car"]["outages"]))),
            "nees": (WHOLE, ["inertial.json"], of_whole_runs(recorded.nees_table)),
-           "menu": ("test/replay/menu_runs.py build/host/sim_host out/menu", ["menu/menu.json"], menu),
+           "menu": ("test/replay/menu_runs.py build/host/sim_host out/menu", ["menu/menu.json"], bounded("menu/menu.json")),
+           "mapping": ("test/replay/mapping_runs.py build/host/sim_host out/mapping --whole", ["mapping/mapping.json"], bounded("mapping/mapping.json")),
            "mrclam": ("make test STEPS=recorded_runs", [f"recorded/mrclam{robot}/summary.json" for robot in range(1, 6)], mrclam)}
 
 

@@ -14,6 +14,7 @@ from scipy.special import chdtri
 
 from tetap.can import bus_writer
 from tetap.can.bus_writer import BadInput
+from tetap.report import own_map
 from tetap.report.tables import empty_table, read_table
 
 TICK_S = 0.01  # of the simulated world
@@ -137,6 +138,7 @@ class Run:
         self.status = self._optional(directory, "status.csv", STATUS)
         self.states = self._optional(directory, "states.csv", STATES)
         self.sensors = self._optional(directory, "sensors.csv", SENSORS)
+        self.map = self._optional(directory, "map.csv", own_map.MAP)
         self.estimators = sorted(int(one) for one in np.unique(self.estimates["estimator"]))
         self.kinds = {k: self._kind(k) for k in self.estimators}
         self.names = names_of(self.kinds)
@@ -548,6 +550,7 @@ def judge(run, estimator, truth, names):
         return result
     dof = 3 if truth.has_yaw else 2
     values, unusable = nees(rows, dx, dy, dyaw, dof)
+    result.update(own_map.figures(run, estimator, truth, dx, dy))
     del dx, dy, dyaw, distance, known, valid  # of millions of rows, and the blocks need as much
     found = blocks(run, estimator, truth)
     if found is not None:
@@ -699,4 +702,8 @@ def summary(run, truth):
     best = result[run.names[run.best]]
     for name in ("position_rmse_m", "heading_rmse_deg", "recovered_after_s"):
         result[name] = best[name]
+    for name in ("trajectory_rmse_aligned_m", "map_rmse_m", "wrong_associations"):
+        if name in best:
+            result[name] = best[name]
+            result["pose_nees_mean"] = best["nees_mean"]
     return result

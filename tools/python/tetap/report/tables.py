@@ -9,7 +9,8 @@ import numpy as np
 from tetap.can import bus_writer
 from tetap.can.bus_writer import BadInput
 
-ENUMERATIONS = {"failed": "Check", "state": "SourceState", "kind": "EstimatorKind", "sensor": "Sensor", "verdict": "Verdict", "mode": "Mode", "reset_cause": "ResetCause"}
+ENUMERATIONS = {"failed": "Check", "state": "SourceState", "kind": "EstimatorKind", "sensor": "Sensor", "verdict": "Verdict", "mode": "Mode", "reset_cause": "ResetCause",
+                "landmark_state": "LandmarkState"}
 BLOCK = 1 << 22  # bytes of text at once
 MOST_DECIMALS = 9
 LONGEST_NAME = 40

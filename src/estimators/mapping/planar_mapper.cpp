@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "estimators/mapping/planar_mapper.hpp"
+
+#include "base/reinitialise.hpp"
+
+namespace tetap::estimators {
+
+template <class Engine>
+filter::Symmetric<float, 3> PlanarMapper<Engine>::covariance_of_pose(float sigma_position_m, float sigma_yaw_rad) {
+  const bool heading = sigma_yaw_rad < 3.14F;  // false for NaN too
+  const float place_m = sigma_position_m > kFinest_m ? sigma_position_m : kFinest_m;
+  const float yaw_rad = !heading ? kUnknown_rad : sigma_yaw_rad > kFinest_rad ? sigma_yaw_rad : kFinest_rad;
+  return filter::Symmetric<float, 3>::diagonal({place_m * place_m, place_m * place_m, yaw_rad * yaw_rad});
+}
+
+template <class Engine>
+void PlanarMapper<Engine>::restart(base::Micros t, const Context& ctx) {
+  base::reinitialise(*this);
+  last_absolute_ = now_ = t;
+  const param::StartParameters& s = ctx.parameters.start;
+  const bool known = s.known != 0;
+  const model::PlanarPose pose = known ? model::PlanarPose{.x = base::Anchored{}.plus(s.x_m),
+                                                           .y = base::Anchored{}.plus(s.y_m),
+                                                           .yaw_rad = s.yaw_rad}
+                                       : model::PlanarPose{};
+  const filter::Symmetric<float, 3> p =
+      known ? covariance_of_pose(s.sigma_position_m, s.sigma_yaw_rad) : covariance_of_pose(0.0F, 0.0F);
+  motion_.start(t, pose, 0.0F, 0.0F);
+  adopt_pose(pose, p);
+  engine_.configure(ctx.parameters);
+  engine_.start(pose, p);
+  present_ = motion_;
+}
+
+template <class Engine>
+void PlanarMapper<Engine>::set_pose(base::Micros t, const SetPose& given, const Context& ctx) {
+  close_batch(ctx);
+  motion_.propagate(t, ctx.parameters);
+  move_engine();
+  model::PlanarPose pose = given.pose;
+  if (!(given.sigma_yaw_rad < 3.14F)) pose.yaw_rad = motion_.filter.x.yaw_rad;
+  pose.yaw_rad = base::wrap_angle(pose.yaw_rad);
+  const filter::Symmetric<float, 3> p = covariance_of_pose(given.sigma_position_m, given.sigma_yaw_rad);
+  motion_.start(t, pose, 0.0F, 0.0F);
+  adopt_pose(pose, p);
+  engine_.set_pose(pose, p);
+  digest_.update(pose.x.um(), pose.y.um(), pose.yaw_rad, p(0, 0), p(2, 2));
+  last_absolute_ = t;
+  present_ = motion_;
+}
+
+template <class Engine>
+void PlanarMapper<Engine>::advance(base::Micros t, const Context& ctx, const sensor::Window& window) {
+  close_batch(ctx);  // what left the window together was seen together
+  now_ = t;
+  motion_.advance(t);
+  present_ = motion_;
+  for (std::size_t i = 0; i < window.size(); ++i) {
+    const sensor::Sample& sample = window[i];
+    if (sample.sensor == sensor::Sensor::kImu && !is_imu(sample, ctx.parameters.inertial.imu)) continue;
+    visit(sample, [&](const auto& payload) {
+      if constexpr (requires { present_.fuse(payload, sample.stamp, ctx.parameters); })
+        static_cast<void>(present_.fuse(payload, sample.stamp, ctx.parameters));
+    });
+  }
+  digest_.scan(engine_.words(), kScanned, [this](std::size_t i, auto& sink) { engine_.hash_word(i, sink); });
+}
+
+template <class Engine>
+Innovation PlanarMapper<Engine>::fuse(const sensor::LandmarkSighting& sighting, base::Micros stamp,
+                                      std::uint8_t instance, const Context& ctx) {
+  Innovation record{.landmark = sighting.landmark};
+  if (base::is_finite(sighting.range_rate_mps)) return record;  // a radar sees no landmark
+  if (stamp > batch_stamp_) close_batch(ctx);
+  if (batch_size_ == kBatch) return record;
+  motion_.propagate(stamp, ctx.parameters);
+  move_engine();
+  batch_stamp_ = stamp;
+  batch_instance_[batch_size_] = instance;
+  batch_[batch_size_++] = {
+      .id = sighting.landmark == kAnyLandmark ? slam::Sighting::kNoId : std::uint16_t{sighting.landmark},
+      .range_m = sighting.range_m,
+      .bearing_rad = sighting.bearing_rad};
+  record.verdict = sensor::Verdict::kPending;
+  return record;
+}
+
+template <class Engine>
+void PlanarMapper<Engine>::close_batch(const Context& ctx) {
+  if (batch_size_ == 0) return;
+  engine_.configure(ctx.parameters);
+  const auto found = engine_.update({batch_.data(), batch_size_}, batch_stamp_);
+  const float gate_scale = ctx.parameters.landmark.gate_scale;
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    const slam::SightingRecord& one = found[i];
+    const float gate = gate_scale * filter::chi_square_99(one.components == 2 ? 2 : 1);
+    record_[i] = {.stamp = batch_stamp_,
+                  .sensor = sensor::Sensor::kRangeBearing,
+                  .instance = batch_instance_[i],
+                  .innovation = record(one, gate)};
+    if (one.verdict == slam::SightingVerdict::kAccepted) last_absolute_ = batch_stamp_;
+    digest_.update(static_cast<std::uint32_t>(one.id) << 16 | static_cast<std::uint32_t>(one.verdict), one.nu[0],
+                   one.nu[1], one.s.xx, one.s.xy, one.s.yy, one.nis);
+  }
+  records_ = found.size();
+  const std::uint32_t refused = engine_.report().refused;
+  if (refused != refused_) last_refused_ = now_;
+  refused_ = refused;
+  batch_size_ = 0;
+  adopt_pose(engine_.pose(), engine_.covariance());
+  const model::PlanarPose& pose = motion_.filter.x;
+  digest_.update(pose.x.um(), pose.y.um(), pose.yaw_rad, motion_.filter.p(0, 0), motion_.filter.p(1, 1),
+                 motion_.filter.p(2, 2));
+}
+
+template class PlanarMapper<EkfSlamEngine<30>>;           // EkfSlam30
+template class PlanarMapper<FastSlamEngine<100, 15, 2>>;  // FastSlam100
+
+}  // namespace tetap::estimators

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+// An extended Kalman filter of the planar pose that also keeps its last increments, for a mapper that makes the same
+// motion.
+#pragma once
+
+#include "filter/ekf.hpp"
+#include "model/planar_increment.hpp"
+
+#include <array>
+#include <cstddef>
+#include <span>
+
+namespace tetap::estimators {
+
+struct RecordingEkf : filter::Ekf<model::PlanarPose> {
+  /// Increments that one sample of PlanarDeadReckoning makes at the most: held speeds, the gap after them, the sample.
+  static constexpr std::size_t kMost = 4;
+
+  bool predict(const model::PlanarIncrement& increment) {
+    if (count_ < kMost) steps_[count_++] = increment;
+    return filter::Ekf<model::PlanarPose>::predict(increment);
+  }
+  /// Increments since the last call.
+  [[nodiscard]] std::span<const model::PlanarIncrement> take_steps() {
+    const std::span<const model::PlanarIncrement> steps{steps_.data(), count_};
+    count_ = 0;
+    return steps;
+  }
+
+ private:
+  std::array<model::PlanarIncrement, kMost> steps_{};
+  std::size_t count_ = 0;
+};
+
+}  // namespace tetap::estimators

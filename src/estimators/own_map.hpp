@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+// Output of an estimator that makes a map of its own: landmarks one at a time, and how full the map is.
+#pragma once
+
+#include "base/time.hpp"
+#include "model/landmark.hpp"
+#include "sensor/vocabulary.hpp"
+
+#include <concepts>
+#include <cstddef>
+#include <cstdint>
+
+namespace tetap::estimators {
+
+/// A landmark of the own map; errors in axes of n.
+struct MappedLandmark {
+  std::uint8_t id = 0;
+  model::Landmark place;
+  float xx_m2 = 0;
+  float xy_m2 = 0;
+  float yy_m2 = 0;
+  std::uint16_t hits = 0;  ///< accepted sightings
+  base::Micros age;        ///< time since the last of them
+  bool confirmed = false;  ///< false: the landmark gives way when there is no room
+};
+
+/// State of the own map and of a job that lasts longer than a tick. Counters grow since the start of the estimator.
+struct MapReport {
+  std::uint32_t size = 0;
+  std::uint32_t refused = 0;    ///< new landmarks or edges without room
+  std::uint32_t ambiguous = 0;  ///< sightings of which the landmark was not clear
+  std::uint32_t work_left = 0;  ///< units of the job under way
+  std::uint32_t jobs_aborted = 0;
+};
+
+/// An estimator that makes a map: `own_map()` reports on it, `own_landmark(i)` is its landmark i below `size`.
+template <class E>
+concept MakesMap = requires(const E& e, std::size_t i) {
+  { e.own_map() } -> std::same_as<MapReport>;
+  { e.own_landmark(i) } -> std::same_as<MappedLandmark>;
+};
+
+/// An estimator that localises on the map it is given (MapFrame::map).
+template <class E>
+concept UsesMap = requires {
+  requires E::kUsesMap;
+};
+
+}  // namespace tetap::estimators
