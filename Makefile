@@ -24,7 +24,7 @@ ifneq ($(unknown),)
 $(error no setting $(unknown); there are: $(settings))
 endif
 
-.PHONY: help sim test quick proof replay record firmware size heap stack count bits hashes constants check docs dbc setup programs arm
+.PHONY: help sim test quick proof replay record doctor firmware size heap stack count bits hashes constants check docs dbc setup programs arm
 
 help: ## this list
 	@echo "tetap: state estimation on the robot's own microcontroller"; echo
@@ -51,6 +51,9 @@ replay: setup programs ## a recorded log over vcan0: LOG=run.log [TRUTH=run.trut
 
 record: setup programs ## everything on vcan0 until ^C, in out/record: raw.log can be repeated, also of a node that runs already
 	@build/host/sim_host/tetap-record --snapshot
+
+doctor: setup programs ## the likeliest mistake in a log, by its devices alone: LOG=run.log [ROBOT=NAME], in out/doctor.json
+	@tools/run/diagnose_log $(if $(filter file,$(origin ROBOT)),,$(ROBOT))
 
 firmware: setup ## the flash image: BOARD=zynqmp_r5 ROBOT=rover, with its size table, no heap and stack proved
 	@tools/run/build_firmware
@@ -89,7 +92,7 @@ setup:
 	@tools/run/install_packages
 
 programs: setup
-	@tools/run/build_preset host:tetap-node,tetap-params,tetap-play,tetap-world,tetap-record
+	@tools/run/build_preset host:tetap-doctor,tetap-node,tetap-params,tetap-play,tetap-world,tetap-record
 
 arm: setup
 	@tools/run/build_preset r5 m7 m4f

@@ -93,6 +93,17 @@ refused "a record of a node with other numbers" 'the recorded node was another r
 log_with; refused "a log that is no record" 'bad.log: cannot be repeated' play --as-recorded
 refused "no such log" 'nowhere.log: cannot be read: No such file' "$programs/tetap-play" "$work/nowhere.log" --memory --robot mrclam
 refused "no such log (over a bus that is none)" 'nowhere.log: cannot be read: No such file' "$programs/tetap-play" "$work/nowhere.log" --can nobus0
+doctor() { "$programs/tetap-doctor" "$work/bad.log" --robot rover "$@"; }
+log_with rubbish; refused "a broken log (doctor)" "tetap-doctor: .*bad.log:3: .*'rubbish'" doctor
+: >"$work/bad.log"; refused "an empty log (doctor)" 'tetap-doctor: .*bad.log: no CAN data frame' doctor
+echo "(1.000000) vcan0 123#00" >"$work/bad.log"; refused "a log without the node's inputs (doctor)" 'tetap-doctor: .*bad.log: no input frames' doctor
+log_with
+refused "no such log (doctor)" 'tetap-doctor: .*nowhere.log: cannot be read: No such file' "$programs/tetap-doctor" "$work/nowhere.log"
+refused "no log (doctor)" 'tetap-doctor: no LOG given' "$programs/tetap-doctor" --robot rover
+refused "a robot that does not exist (doctor)" "tetap-doctor: no robot 'tank'" "$programs/tetap-doctor" "$work/good.log" --robot tank
+refused "parameters of no robot (doctor)" 'tetap-doctor: --params and --set need --robot' "$programs/tetap-doctor" "$work/good.log" --set gnss.sigma_scale=2
+refused "no log (make doctor)" 'doctor: which log' env LOG= tools/run/diagnose_log
+refused "a log that is not there (make doctor)" 'doctor: nowhere.log: no such file' env LOG=nowhere.log tools/run/diagnose_log rover
 refused "a folder for a log" 'cannot be read: Is a directory' "$programs/tetap-play" "$work" --memory --robot mrclam
 refused "an output folder that cannot be" "$work/good.log/x" "$programs/tetap-play" "$work/good.log" --memory --robot mrclam --out "$work/good.log/x" --quiet
 
@@ -103,7 +114,7 @@ refused "a robot that does not exist (node)" "no robot 'tank'; $robots" "$progra
 refused "a robot that does not exist (player, over a bus)" "no robot 'tank'; $robots" "$programs/tetap-play" "$work/good.log" --robot tank
 refused "a robot that does not exist (world, over a bus)" "no robot 'tank'; $robots" "$programs/tetap-world" --robot tank --out "$work/out"
 refused "a robot that does not exist (world)" "no robot 'tank'; $robots" "$programs/tetap-world" --memory --robot tank --out "$work/out"
-for program in play node world record; do
+for program in play node world record doctor; do
   refused "an unknown option (tetap-$program)" "tetap-$program: .*--frobnicate" "$programs/tetap-$program" --frobnicate
 done
 refused "an option without its value" '--robot' "$programs/tetap-play" "$work/good.log" --memory --robot

@@ -89,5 +89,11 @@ node_stop() {
   node=
 }
 
+# likeliest_cause LOG DIR: a mistake that the log's own devices show, in a few lines and in DIR/doctor.json; nothing where they agree.
+likeliest_cause() {
+  [ -x "$programs/tetap-doctor" ] || return 0
+  "$programs/tetap-doctor" "$1" --robot "$ROBOT" "${settings[@]}" --keep-going --brief --json "$2/doctor.json" 2>/dev/null || true
+}
+
 # files_are_in DIR: the last line of a run.
 files_are_in() { echo "files: $1 (the next run to there overwrites them; OUT=DIR: another place)"; }

@@ -58,12 +58,12 @@ def tools(root):
 
 def programs(folder):
     """Help of the host programs; None where one is not built."""
-    names = ["tetap-world", "tetap-play", "tetap-record", "tetap-node", "tetap-params"]
+    names = ["tetap-world", "tetap-play", "tetap-record", "tetap-node", "tetap-params", "tetap-doctor"]
     parts = ["## Host programs\n\nThe programs lie in `build/host/sim_host`.\n"]
     for name in names:
         path = os.path.join(folder, name)
         if not os.access(path, os.X_OK):
-            if name == "tetap-params":
+            if name in ("tetap-params", "tetap-doctor"):
                 continue
             return None
         done = subprocess.run([path, "--help"], capture_output=True, text=True, check=True)

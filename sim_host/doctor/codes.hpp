@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: Apache-2.0
+// The mistakes that the doctor names: one row a code. docs/reference/diagnoses.md is made from this table.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <string_view>
+
+namespace tetap::doctor {
+
+enum class Code : std::uint8_t {
+  kMessageMissing,
+  kTwoSenders,
+  kStampsInMs,
+  kStampsInS,
+  kTwoClocks,
+  kNoInSync,
+  kRatesForIncrements,
+  kGForMps2,
+  kDegForRad,
+  kWheelsSwapped,
+  kWheelReversed,
+  kImuUpsideDown,
+  kImuAxes,
+  kLatLonSwapped,
+  kLatitudeSign,
+  kLongitudeSign,
+  kVelocityAxes,
+  kWheelScale,
+  kOriginFar,
+};
+
+/// Devices whose data a mistake spoils; a comparison with a spoilt device gives no second finding.
+enum Device : std::uint8_t {
+  kNoDevice = 0,
+  kGyroscope = 1,
+  kAccelerometer = 2,
+  kMounting = 4,
+  kWheels = 8,
+  kFixes = 16,
+  kGnssVelocity = 32,
+};
+using Devices = std::uint8_t;
+
+struct CodeRow {
+  Code code;
+  std::string_view name;      ///< as in doctor.json
+  std::string_view cause;     ///< in plain words
+  std::string_view evidence;  ///< the comparison that shows it
+  std::string_view change;    ///< remedy
+  Devices spoils;
+};
+
+/// In the order in which causes are ranked: an early one explains the traces that it leaves in later comparisons.
+inline constexpr std::array kCodes{
+    CodeRow{Code::kMessageMissing, "message_missing", "One message of a sample never comes, or its parts never match.",
+            "The log has messages of a sample, and next to no whole sample.",
+            "Send every message of the sample, with one Seq and, for GNSS, one Stamp.",
+            kGyroscope | kAccelerometer | kFixes | kGnssVelocity},
+    CodeRow{Code::kTwoSenders, "two_senders", "Two senders use one CAN identifier.",
+            "Two counters of Seq run through the frames of one identifier and instance.",
+            "Stop one sender, or give the second device another Inst.",
+            kGyroscope | kAccelerometer | kWheels | kFixes | kGnssVelocity},
+    CodeRow{Code::kStampsInMs, "stamps_in_ms", "Stamp or Interval counts milliseconds.",
+            "The difference of stamps against the time of arrival.", "Send Stamp and Interval in microseconds.", 0},
+    CodeRow{Code::kStampsInS, "stamps_in_s", "Stamp or Interval counts seconds, or stands still.",
+            "The difference of stamps against the time of arrival.", "Send Stamp and Interval in microseconds.", 0},
+    CodeRow{Code::kTwoClocks, "two_clocks", "The stamps of a device come from another clock.",
+            "The age of its samples on arrival, by offset and by drift.",
+            "Stamp by the clock that In_Sync distributes.", 0},
+    CodeRow{Code::kNoInSync, "no_in_sync", "No In_Sync ties the stamps to a time.",
+            "The age of all samples on arrival, in a log without In_Sync.",
+            "Send In_Sync from the clock that stamps the samples.", 0},
+    CodeRow{Code::kRatesForIncrements, "rates_for_increments", "The IMU's frames carry rates in place of increments.",
+            "The mean specific force against gravity.",
+            "Multiply turn rate and specific force by the interval before they are sent.",
+            kGyroscope | kAccelerometer | kMounting},
+    CodeRow{Code::kGForMps2, "g_for_mps2", "The specific force is in g.", "The mean specific force against gravity.",
+            "Multiply the accelerometer's values by 9.80665.", kAccelerometer},
+    CodeRow{Code::kDegForRad, "deg_for_rad", "The turn rate is in degrees.",
+            "The gyroscope against wheels, course or magnetic field.", "Multiply the gyroscope's values by pi/180.",
+            kGyroscope},
+    CodeRow{Code::kWheelsSwapped, "wheels_swapped", "Left and right wheel are swapped.",
+            "The turn by the wheels against the gyroscope.", "Swap Left and Right in the sender, or the two plugs.",
+            kWheels},
+    CodeRow{Code::kWheelReversed, "wheel_reversed", "A wheel counts backwards.",
+            "The turn by the gyroscope against the sum and the difference of the wheels.",
+            "Negate that wheel in the sender, or swap the encoder's channels A and B.", kWheels},
+    CodeRow{Code::kImuUpsideDown, "imu_upside_down", "The IMU is upside down.",
+            "The mean specific force in the robot's axes.",
+            "Turn the sensor, or set the rows of inertial.mounting_bs (planar robots: gyro.up_s).", kMounting},
+    CodeRow{Code::kImuAxes, "imu_axes", "The IMU's axes are not those that the robot states.",
+            "The direction of gravity, and forces against acceleration and curves.",
+            "Set inertial.mounting_bs (planar robots: gyro.up_s); tools/calibrate/calibrate_robot finds it.",
+            kMounting},
+    CodeRow{Code::kLatLonSwapped, "lat_lon_swapped", "Latitude and longitude are swapped.",
+            "The way by the fixes against GNSS velocity, wheels and the robot's origin.",
+            "Swap Lat of In_GnssLat and Lon of In_GnssLon in the sender.", kFixes},
+    CodeRow{Code::kLatitudeSign, "latitude_sign", "The latitude has the wrong sign.",
+            "The way by the fixes against GNSS velocity, wheels and the robot's origin.",
+            "Send north as positive in In_GnssLat.", kFixes},
+    CodeRow{Code::kLongitudeSign, "longitude_sign", "The longitude has the wrong sign.",
+            "The way by the fixes against GNSS velocity, wheels and the robot's origin.",
+            "Send east as positive in In_GnssLon.", kFixes},
+    CodeRow{Code::kVelocityAxes, "velocity_axes", "The axes of the GNSS velocity are swapped or reversed.",
+            "The integral of the velocity against the way by the fixes.",
+            "Send East and North of In_GnssVelEN and Up of In_GnssVelU in these axes.", kGnssVelocity},
+    CodeRow{Code::kWheelScale, "wheel_scale", "The wheels' radius or counts per turn is wrong.",
+            "The speed of the wheels against GNSS.",
+            "Correct wheels.drive radii or counts_per_turn (In_BodySpeed: wheels.speed_scale).", kWheels},
+    CodeRow{Code::kOriginFar, "origin_far", "The robot's configured origin is far away.",
+            "The distance of the fixes from gnss.origin.",
+            "Set the origin of the site, or gnss.origin_configured = 0: the first fixes are the origin.", 0},
+};
+
+[[nodiscard]] constexpr const CodeRow& row(Code code) { return kCodes[static_cast<std::size_t>(code)]; }
+
+static_assert([] {
+  for (std::size_t i = 0; i < kCodes.size(); ++i)
+    if (kCodes[i].code != static_cast<Code>(i)) return false;
+  return true;
+}());
+
+}  // namespace tetap::doctor

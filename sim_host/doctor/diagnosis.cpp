@@ -1,0 +1,168 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "sim_host/doctor/diagnosis.hpp"
+
+#include "bus/decoder.hpp"
+#include "sim_host/doctor/bus_time.hpp"
+#include "sim_host/doctor/fixes.hpp"
+#include "sim_host/doctor/force.hpp"
+#include "sim_host/doctor/forward.hpp"
+#include "sim_host/doctor/gyro_reference.hpp"
+#include "sim_host/doctor/halves.hpp"
+#include "sim_host/doctor/origin.hpp"
+#include "sim_host/doctor/path.hpp"
+#include "sim_host/doctor/sequence.hpp"
+#include "sim_host/doctor/stamps.hpp"
+#include "sim_host/doctor/turn.hpp"
+#include "sim_host/doctor/wheel_speed.hpp"
+#include "sim_host/play/protocol.hpp"
+
+#include <algorithm>
+#include <array>
+#include <stdexcept>
+#include <utility>
+
+namespace tetap::doctor {
+namespace {
+
+constexpr base::Micros kPatience{200'000};  ///< for the rest of a sample of several frames
+constexpr std::int64_t kMostPause_us = 60'000'000;
+
+/// The first reading: which clock the log has.
+struct Survey {
+  std::uint64_t inputs = 0, syncs = 0, steps = 0, epochs = 0;
+
+  void add(const base::CanFrame& frame, std::uint32_t base) {
+    const auto offset = sim::offset_in_block(frame, base);
+    if (!offset) return;
+    if (sim::is_counted_input(frame, base)) ++inputs;
+    if (*offset == bus::EstEpoch::kOffset) ++epochs;
+    if (*offset != bus::InSync::kOffset) return;
+    const auto sync = bus::decode<bus::InSync>(bus::payload(frame));
+    if (!sync) return;
+    ++syncs;
+    if (sync->kind == bus::SyncKind::kStep) ++steps;
+  }
+  [[nodiscard]] ClockSource clock() const {
+    return syncs > 0 ? ClockSource::kSync : epochs > 0 ? ClockSource::kEpochs : ClockSource::kLog;
+  }
+};
+
+/// All detectors, and what puts frames together for them.
+class Examination {
+ public:
+  Examination(const RobotFacts& robot, ClockSource clock)
+      : windows_(robot),
+        stamps_(clock, base::Micros{robot.parameters.loop.window_us}),
+        force_(robot),
+        turn_(robot),
+        forward_(robot),
+        course_(robot.imu),
+        field_(robot),
+        velocity_(course_),
+        path_(robot, windows_),
+        wheel_speed_(robot),
+        origin_(robot) {
+    decoder_.power_on();
+  }
+
+  void frame(const SeenFrame& seen) {
+    for (Detector* one : all_) one->frame(seen);
+    time_ = seen.time;
+    decoder_.expire(seen.time, kPatience, counters_);
+    decoder_.on_frame(static_cast<std::uint8_t>(seen.offset), seen.frame, seen.time, counters_, *this);
+  }
+  Findings finish() {
+    Findings findings;
+    for (Detector* one : all_) one->finish(findings);
+    return findings;
+  }
+
+  // The decoder hands these over.
+  void sample(const sensor::Sample& sample) {
+    if (const auto window = windows_.add(time_, sample))
+      for (Detector* one : all_) one->window(*window);
+    for (Detector* one : all_) one->sample(time_, sample);
+  }
+  void map_entry(const estimators::MapEntry&) {}
+  void set_pose(const auto&) {}
+  void reset(auto) {}
+
+ private:
+  bus::Decoder decoder_;
+  bus::Counters counters_;
+  base::Micros time_;
+  Windows windows_;
+  HalvesDetector halves_;
+  SequenceDetector sequence_;
+  StampDetector stamps_;
+  ForceDetector force_;
+  TurnDetector turn_;
+  ForwardDetector forward_;
+  CourseDetector course_;
+  FieldDetector field_;
+  VelocityDetector velocity_;
+  PathDetector path_;
+  WheelSpeedDetector wheel_speed_;
+  OriginDetector origin_;
+  std::array<Detector*, 12> all_{&halves_, &sequence_, &stamps_,   &force_, &turn_,        &forward_,
+                                 &course_, &field_,    &velocity_, &path_,  &wheel_speed_, &origin_};
+};
+
+/// Codes of one comparison of several devices, which may not show whose axes are wrong.
+bool is_gnss_axes(Code code) { return code >= Code::kLatLonSwapped && code <= Code::kVelocityAxes; }
+
+}  // namespace
+
+Findings ranked(Findings findings) {
+  std::stable_sort(findings.begin(), findings.end(), [](const Finding& a, const Finding& b) {
+    const bool one_comparison = is_gnss_axes(a.code) && is_gnss_axes(b.code);
+    if (a.code != b.code && !one_comparison) return a.code < b.code;
+    return a.certainty > b.certainty;
+  });
+  Findings kept;
+  Devices spoiled = 0, spoiled_axes = 0;
+  bool placed = false;  // by the robot's origin, which leaves no second reading of the axes
+  for (Finding& one : findings) {
+    const bool axes = is_gnss_axes(one.code);
+    if ((one.uses & spoiled) != 0 || (!axes && (one.uses & spoiled_axes) != 0) || (axes && placed)) continue;
+    const Devices spoils = one.spoils != 0 ? one.spoils : row(one.code).spoils;
+    const auto same = std::find_if(kept.begin(), kept.end(), [&](const Finding& k) { return k.code == one.code; });
+    if (same != kept.end()) {
+      if (same->evidence.size() + one.evidence.size() < 600) same->evidence += " " + one.evidence;
+      continue;
+    }
+    (axes ? spoiled_axes : spoiled) |= spoils;
+    placed |= axes && one.uses == kNoDevice;
+    if (one.change.empty()) one.change = row(one.code).change;
+    kept.push_back(std::move(one));
+  }
+  return kept;
+}
+
+Diagnosis diagnose(const std::string& path, const sim::LogOptions& reading, const RobotFacts& robot) {
+  sim::LogFile log(path, reading);
+  Survey survey;
+  for (sim::TimedFrame entry; log.next(entry);) survey.add(entry.frame, reading.base);
+  if (log.report().data == 0) throw std::runtime_error(path + ": no CAN data frame in it");
+  if (survey.inputs == 0) throw std::runtime_error(path + ": no input frames of this id base");
+  log.rewind();
+  BusTime clock(survey.clock(), reading.base, survey.steps > 0);
+  Examination examination(robot, survey.clock());
+  Diagnosis found{.findings = {}, .inputs = survey.inputs};
+  base::Micros last;
+  bool begun = false;
+  for (sim::TimedFrame entry; log.next(entry);) {
+    clock.add(entry.time, entry.frame);
+    if (!clock.known() || !sim::is_counted_input(entry.frame, reading.base)) continue;
+    const base::Micros now = clock.now();
+    if (begun && now > last && (now - last).us < kMostPause_us)
+      found.duration_s += static_cast<double>((now - last).us) * 1e-6;
+    begun = true;
+    last = now;
+    examination.frame({.time = now, .offset = entry.frame.id - reading.base, .frame = entry.frame});
+  }
+  found.findings = ranked(examination.finish());
+  return found;
+}
+
+}  // namespace tetap::doctor

@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "sim_host/doctor/forward.hpp"
+
+#include <cmath>
+
+namespace tetap::doctor {
+namespace {
+
+constexpr double kLeastWindows = 30;
+constexpr double kLeast_mps2 = 0.1;  ///< RMS of the motion's acceleration: less drowns in slopes and vibration
+constexpr double kSlow_mps = 1;      ///< below, the magnitude of a GNSS velocity is noise
+constexpr double kFits = 0.25;       ///< share of the force's variance, by the placing that fits best
+constexpr double kStatedFits = 0.4;  ///< share of the best, by the one stated: a mounting 45 degrees off has half
+
+struct Placing {
+  double forward_a, forward_q, left_a, left_q;
+  const char* words;
+};
+/// Force forward and left for acceleration a and q = v w. The first is the stated one.
+constexpr Placing kPlacings[] = {
+    {1, 0, 0, 1, "as stated"},
+    {-1, 0, 0, -1, "turned by 180 deg about up"},
+    {0, 1, -1, 0, "turned by 90 deg about up: x of the robot lies along its left"},
+    {0, -1, 1, 0, "turned by -90 deg about up: x of the robot lies along its right"},
+    {1, 0, 0, -1, "with left for right"},
+    {-1, 0, 0, 1, "with forward for backward"},
+    {0, 1, 1, 0, "with x and y exchanged"},
+    {0, -1, -1, 0, "with x and y exchanged and reversed"},
+};
+
+/// Share of the force's variance that a placing explains with one positive factor.
+double explained(const Moments<4>& m, const Placing& p) {
+  const double force2 = m.covariance(0, 0) + m.covariance(1, 1);
+  const double motion2 = m.covariance(2, 2) + m.covariance(3, 3);
+  const double both = p.forward_a * m.covariance(0, 2) + p.forward_q * m.covariance(0, 3) +
+                      p.left_a * m.covariance(1, 2) + p.left_q * m.covariance(1, 3);
+  return both > 0 && force2 > 0 && motion2 > 0 ? both * both / (force2 * motion2) : 0;
+}
+
+}  // namespace
+
+void ForwardDetector::add(Source& source, std::optional<double> speed_mps, const Window& w) {
+  if (source.speed_mps && speed_mps && before_ && before_->force_s_mps2 && w.force_s_mps2 && w.turn_s_radps &&
+      w.start_s - before_->start_s < 1.5) {
+    const Vector3 force = rotated(*robot_.mounting, scaled(0.5, sum(*before_->force_s_mps2, *w.force_s_mps2)));
+    const Vector3 turn = scaled(0.5, sum(*before_->turn_s_radps, *w.turn_s_radps));
+    const double speed = 0.5 * (*source.speed_mps + *speed_mps);
+    source.moments.add({force[0], force[1], (*speed_mps - *source.speed_mps) / (w.start_s - before_->start_s),
+                        speed * dot(turn, w.up_s)});
+  }
+  source.speed_mps = speed_mps;
+}
+
+void ForwardDetector::window(const Window& w) {
+  if (!robot_.mounting) return;
+  std::optional<double> wheels, gnss;
+  if (w.wheels) wheels = 0.5 * w.wheels->sum_mps;
+  if (w.velocity_n_mps) gnss = std::hypot((*w.velocity_n_mps)[0], (*w.velocity_n_mps)[1]);
+  if (gnss && *gnss < kSlow_mps) gnss.reset();
+  add(wheels_, wheels, w);
+  add(gnss_, gnss, w);
+  before_ = w;
+}
+
+void ForwardDetector::finish(Findings& findings) {
+  if (wheels_.moments.count() >= kLeastWindows)
+    judge(wheels_, "the wheels", kWheels, findings);
+  else if (gnss_.moments.count() >= kLeastWindows)
+    judge(gnss_, "GNSS", kGnssVelocity, findings);
+}
+
+void ForwardDetector::judge(const Source& source, const char* name, Devices device, Findings& findings) const {
+  const Moments<4>& m = source.moments;
+  if (m.covariance(2, 2) + m.covariance(3, 3) < kLeast_mps2 * kLeast_mps2) return;
+  const Placing* best = &kPlacings[0];
+  for (const Placing& one : kPlacings)
+    if (explained(m, one) > explained(m, *best)) best = &one;
+  const double fits = explained(m, *best), stated = explained(m, kPlacings[0]);
+  if (fits < kFits || stated > kStatedFits * fits) return;
+  findings.push_back(
+      {.code = Code::kImuAxes,
+       .uses = static_cast<Devices>(kGyroscope | kAccelerometer | kMounting | device),
+       .certainty = fits,
+       .evidence = text("The horizontal force follows acceleration and curves by %s as an IMU %s (%.0f %% "
+                        "of its variance over %.0f s; as stated: %.0f %%).",
+                        name, best->words, 100 * fits, m.count(), 100 * stated)});
+}
+
+}  // namespace tetap::doctor

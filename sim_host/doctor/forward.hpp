@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+// Horizontal forces against the motion of a vehicle on the ground: forward it feels its acceleration a, to the left
+// v w in a curve. The eight ways to place two axes on two others are tried; the one stated has to fit best.
+#pragma once
+
+#include "sim_host/doctor/detector.hpp"
+#include "sim_host/doctor/moments.hpp"
+#include "sim_host/doctor/robot_facts.hpp"
+
+#include <optional>
+
+namespace tetap::doctor {
+
+class ForwardDetector : public Detector {
+ public:
+  explicit ForwardDetector(const RobotFacts& robot) : robot_(robot) {}
+
+  void window(const Window& w) override;
+  void finish(Findings& findings) override;
+
+ private:
+  /// One source of the speed.
+  struct Source {
+    std::optional<double> speed_mps;  ///< in the window before
+    Moments<4> moments;               ///< force forward and left, acceleration, speed times turn rate
+  };
+  void add(Source& source, std::optional<double> speed_mps, const Window& w);
+  void judge(const Source& source, const char* name, Devices device, Findings& findings) const;
+
+  const RobotFacts& robot_;
+  std::optional<Window> before_;
+  Source wheels_, gnss_;
+};
+
+}  // namespace tetap::doctor

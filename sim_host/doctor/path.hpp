@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+// The path of wheels and gyroscope against the fixes, chord by chord: two chords one after the other have a ratio and
+// an angle that no unknown heading changes. A mirror reverses the angle; swapped angles of the Earth stretch it, too.
+#pragma once
+
+#include "sim_host/doctor/detector.hpp"
+#include "sim_host/doctor/fixes.hpp"
+#include "sim_host/doctor/robot_facts.hpp"
+
+#include <array>
+#include <complex>
+#include <cstddef>
+#include <optional>
+#include <vector>
+
+namespace tetap::doctor {
+
+class PathDetector : public Detector {
+ public:
+  PathDetector(const RobotFacts& robot, const Windows& windows)
+      : robot_(robot), scale_(wheel_scale(robot)), windows_(windows) {}
+
+  void sample(base::Micros time, const sensor::Sample& sample) override;
+  void finish(Findings& findings) override;
+
+ private:
+  using Complex = std::complex<double>;
+  static constexpr std::size_t kRatios = 2048;  ///< most that are kept; of a long log each second, fourth, ... chord
+
+  void turn_by(base::Micros time, const sensor::ImuSample& imu);
+  void roll(base::Micros time, const sensor::Sample& sample);
+  void end_chord(base::Micros time, const PlanePoint& here, double sigma_m);
+  void add_pair(Complex fixes_before, Complex path_before, Complex fixes, Complex path);
+  void judge_scale(Findings& findings) const;
+
+  const RobotFacts& robot_;
+  WheelScale scale_;
+  const Windows& windows_;
+  Plane plane_;
+  double yaw_rad_ = 0;
+  bool gyroscope_ = false;
+  Complex path_m_{};
+  std::optional<base::Micros> wheels_at_;
+  std::optional<sensor::WheelCounts> counts_;
+  std::optional<base::Micros> began_;
+  Complex from_{}, path_from_{};
+  std::optional<Complex> fixes_before_, path_before_;
+  std::array<double, 4> left_{};  ///< squared logarithm of the ratio left over: as sent, swapped, latitude, longitude
+  double pairs_ = 0;
+  std::vector<float> ratios_;  ///< chord by the fixes over chord by the path
+  std::size_t every_ = 1, seen_ = 0;
+};
+
+}  // namespace tetap::doctor

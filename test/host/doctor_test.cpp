@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: Apache-2.0
+// The parts of the doctor that a log cannot reach one by one: ranking, counters of two senders, the time of the bus.
+// Whole logs with mistakes: test/tools/doctor_test.py.
+#include "sim_host/doctor/bus_time.hpp"
+#include "sim_host/doctor/diagnosis.hpp"
+#include "sim_host/doctor/moments.hpp"
+#include "sim_host/doctor/sequence.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+namespace tetap::doctor {
+namespace {
+
+base::CanFrame wheels(std::uint8_t sequence, std::uint16_t left) {
+  return bus::frame(0x300, bus::InWheelCounts{.stamp_us = 0, .seq = sequence, .inst = 0, .left = left, .right = 0});
+}
+
+Findings of_sequence(const std::vector<base::CanFrame>& frames) {
+  SequenceDetector detector;
+  std::int64_t us = 0;
+  for (const base::CanFrame& frame : frames) detector.frame({base::Micros{us += 10'000}, frame.id - 0x300, frame});
+  Findings findings;
+  detector.finish(findings);
+  return findings;
+}
+
+std::vector<Code> codes(const Findings& findings) {
+  std::vector<Code> found;
+  for (const Finding& one : findings) found.push_back(one.code);
+  return found;
+}
+
+TEST(Sequence, OneSenderWithLossesAndRepeatsIsOne) {
+  std::vector<base::CanFrame> frames;
+  for (unsigned i = 0; i < 4000; ++i) {
+    if (i * 2654435761U % 100 < 20) continue;  // a fifth is lost
+    frames.push_back(wheels(i % 16, static_cast<std::uint16_t>(i)));
+    if (i % 3 == 0) frames.push_back(frames.back());
+  }
+  EXPECT_TRUE(of_sequence(frames).empty());
+}
+
+TEST(Sequence, TwoSendersAreFoundAtEveryOffsetOfTheirCounters) {
+  for (unsigned offset = 0; offset < 16; ++offset) {
+    std::vector<base::CanFrame> frames;
+    for (unsigned i = 0; i < 200; ++i) {
+      frames.push_back(wheels(i % 16, static_cast<std::uint16_t>(i)));
+      frames.push_back(wheels((i + offset) % 16, static_cast<std::uint16_t>(30'000 + i)));
+    }
+    EXPECT_EQ(codes(of_sequence(frames)), std::vector{Code::kTwoSenders}) << offset;
+  }
+}
+
+TEST(Sequence, ASecondSenderOfATenthOfTheRateIsFound) {
+  std::vector<base::CanFrame> frames;
+  for (unsigned i = 0; i < 2000; ++i) {
+    frames.push_back(wheels(i % 16, static_cast<std::uint16_t>(i)));
+    if (i % 10 == 0) frames.push_back(wheels(i / 10 % 16, static_cast<std::uint16_t>(30'000 + i)));
+  }
+  EXPECT_EQ(codes(of_sequence(frames)), std::vector{Code::kTwoSenders});
+}
+
+Finding finding(Code code, Devices uses, double certainty = 1) {
+  return {.code = code, .uses = uses, .certainty = certainty, .evidence = "e", .change = {}};
+}
+
+TEST(Ranking, WhatRestsOnASpoiltDeviceIsNoSecondCause) {
+  const Findings found = ranked({finding(Code::kWheelScale, kWheels | kGnssVelocity),
+                                 finding(Code::kWheelReversed, kWheels | kGyroscope), finding(Code::kOriginFar, 0)});
+  EXPECT_EQ(codes(found), (std::vector{Code::kWheelReversed, Code::kOriginFar}));
+}
+
+TEST(Ranking, AxesOfGnssThatOneComparisonCannotPartAreBothNamedAndTheOriginDecides) {
+  Findings mirrored{finding(Code::kLongitudeSign, kFixes, 0.7), finding(Code::kLatitudeSign, kFixes, 0.8),
+                    finding(Code::kWheelScale, kFixes)};
+  EXPECT_EQ(codes(ranked(mirrored)), (std::vector{Code::kLatitudeSign, Code::kLongitudeSign}));
+  mirrored.push_back(finding(Code::kLongitudeSign, kNoDevice));
+  EXPECT_EQ(codes(ranked(mirrored)), std::vector{Code::kLongitudeSign});
+}
+
+TEST(Ranking, OneFindingACodeWithTheEvidenceOfAllAndAChange) {
+  const Findings found = ranked({finding(Code::kTwoClocks, 0, 0.5), finding(Code::kTwoClocks, 0)});
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_EQ(found[0].evidence, "e e");
+  EXPECT_EQ(found[0].change, row(Code::kTwoClocks).change);
+}
+
+TEST(BusClock, GoesOnBetweenSyncFramesButInLockstepByATickAtMost) {
+  const base::CanFrame sync =
+      bus::frame(0x300, bus::InSync{.time_us = 5'000'000, .ctr = 0, .kind = bus::SyncKind::kTick});
+  const base::CanFrame other = wheels(0, 0);
+  for (const bool lockstep : {false, true}) {
+    BusTime time(ClockSource::kSync, 0x300, lockstep);
+    time.add(base::Micros{99}, other);
+    EXPECT_FALSE(time.known());
+    time.add(base::Micros{1'000'000}, sync);
+    time.add(base::Micros{1'250'000}, other);
+    EXPECT_TRUE(time.known());
+    EXPECT_EQ(time.now().us, lockstep ? 5'010'000 : 5'250'000);
+  }
+}
+
+TEST(Moments, OfALineAreItsSlopeAndACorrelationOfOne) {
+  Moments<2> moments;
+  for (const double x : {-3.0, 1.0, 2.0, 8.0}) moments.add({x, 5 - 2 * x});
+  EXPECT_DOUBLE_EQ(moments.mean(0), 2);
+  EXPECT_DOUBLE_EQ(moments.covariance(0, 1) / moments.covariance(0, 0), -2);
+  EXPECT_DOUBLE_EQ(correlation(moments.covariance(0, 1), moments.covariance(0, 0), moments.covariance(1, 1)), -1);
+}
+
+}  // namespace
+}  // namespace tetap::doctor

@@ -1,0 +1,427 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: Apache-2.0
+"""tetap-doctor names mistakes and finds none in good logs: the mistakes are made here, in the frames of good logs, by the signals of
+config/tetap.dbc. Good logs: the simulated world, and the recorded sets below $TETAP_DATA (each one is left out where it is missing).
+
+The short form has a sample of logs and mistakes; form=whole has each mistake in three logs or more, and every good log."""
+import json
+import os
+import re
+import subprocess
+import sys
+import tempfile
+import unittest
+
+import numpy as np
+
+sys.dont_write_bytecode = True
+ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.realpath(__file__))))
+sys.path.insert(0, os.path.join(ROOT, "tools", "python"))
+from tetap.can import bus_writer  # noqa: E402
+
+PROGRAMS = os.environ.get("TETAP_PROGRAMS", os.path.join(ROOT, "build/host/sim_host"))
+DATA = os.environ.get("TETAP_DATA") or os.path.join(ROOT, "..", "shared", "data")
+WHOLE = os.environ.get("form") == "whole" or "--whole" in sys.argv
+DBC = bus_writer.Dbc()
+MASK = (1 << 20) - 1
+GYRO, ACCEL, TIME = "In_Imu0Gyro", "In_Imu0Accel", "In_Imu0Time"
+ANGLES, VELOCITIES = ("AngX", "AngY", "AngZ"), ("VelX", "VelY", "VelZ")
+HUSKY_TRACK_M = 0.545
+NAMED_SHARE = 0.9  # of all mistakes, first or second
+
+
+# ---- frames
+class Frames:
+    """Input and sync frames of a candump log, in numpy: time [us], identifier, payload."""
+
+    def __init__(self, time_us, identifier, payload):
+        self.time_us, self.identifier, self.payload = time_us, identifier, payload
+
+    @classmethod
+    def read(cls, path):
+        with open(path, encoding="ascii") as file:
+            lines = [line for line in file.read().split("\n") if line]
+        identifier = np.array([int(line.split(" ", 3)[2][:3], 16) for line in lines])
+        keep = np.flatnonzero((identifier >= 0x300) & (identifier < 0x320))
+        time_us = np.array([int(line[1:11]) * 1_000_000 + int(line[12:18]) for line in lines], dtype=np.int64)
+        payload = np.array([int.from_bytes(bytes.fromhex(line.split("#", 1)[1]).ljust(8, b"\0"), "little") for line in lines], dtype=np.uint64)
+        return cls(time_us[keep], identifier[keep], payload[keep])
+
+    def copy(self):
+        return Frames(self.time_us.copy(), self.identifier.copy(), self.payload.copy())
+
+    def where(self, name):
+        return np.flatnonzero(self.identifier == DBC.messages[name].identifier)
+
+    def has(self, name):
+        return len(self.where(name)) > 0
+
+    def get(self, name, signal):
+        s = DBC.messages[name].signals[signal]
+        raw = ((self.payload[self.where(name)] >> np.uint64(s.start)) & np.uint64((1 << s.length) - 1)).astype(np.int64)
+        raw = np.where(raw >= 1 << (s.length - 1), raw - (1 << s.length), raw) if s.signed else raw
+        return np.where(raw == s.not_available, np.nan, raw * s.scale) if s.not_available is not None else raw * s.scale
+
+    def set(self, name, **values):
+        """Limited to what the signal can say, as a sender with saturation would."""
+        rows = self.where(name)
+        for signal, value in values.items():
+            s = DBC.messages[name].signals[signal]
+            bits, _ = s.pack(np.asarray(value, dtype=float), signal)
+            hole = np.uint64(((1 << s.length) - 1) << s.start)
+            self.payload[rows] = (self.payload[rows] & ~hole) | bits
+
+    def without(self, *names):
+        gone = np.isin(self.identifier, [DBC.messages[name].identifier for name in names])
+        return Frames(self.time_us[~gone], self.identifier[~gone], self.payload[~gone])
+
+    def bus_us(self):
+        """Time of the bus at each frame: the last In_Sync, or the log's own time."""
+        sync = self.identifier == DBC.messages["In_Sync"].identifier
+        if not sync.any():
+            return self.time_us.copy()
+        at = np.flatnonzero(sync)
+        times = (self.payload[at] & np.uint64((1 << 48) - 1)).astype(np.int64)
+        return times[np.maximum(np.searchsorted(at, np.arange(len(sync)), side="right") - 1, 0)]
+
+    def valid_us(self, name):
+        """Full times of the stamps of a message."""
+        reference = self.bus_us()[self.where(name)]
+        stamp = np.rint(self.get(name, "Stamp")).astype(np.int64)
+        return reference + ((stamp - reference + (1 << 19)) & MASK) - (1 << 19)
+
+    def stamped(self):
+        return [name for name, message in DBC.messages.items() if "Stamp" in message.signals and self.has(name)]
+
+    def write(self, path):
+        order = np.argsort(self.time_us, kind="stable")
+        with open(path, "w", encoding="ascii") as file:
+            for t, i, p in zip(self.time_us[order].tolist(), self.identifier[order].tolist(), self.payload[order].tolist()):
+                file.write(f"({t // 1_000_000:010d}.{t % 1_000_000:06d}) vcan0 {i:03X}#{p.to_bytes(8, 'little').hex().upper()}\n")
+
+
+# ---- mistakes, each a function of Frames
+def vectors(frames, name, signals):
+    return np.stack([frames.get(name, one) for one in signals], axis=1)
+
+
+def turn_imu(frames, matrix):
+    for name, signals in ((GYRO, ANGLES), (ACCEL, VELOCITIES)):
+        turned = vectors(frames, name, signals) @ np.asarray(matrix, dtype=float).T
+        frames.set(name, **dict(zip(signals, turned.T)))
+    return frames
+
+
+def scale_imu(frames, gyro, accel):
+    for name, signals, factor in ((GYRO, ANGLES, gyro), (ACCEL, VELOCITIES, accel)):
+        frames.set(name, **{one: frames.get(name, one) * factor for one in signals})
+    return frames
+
+
+def swap_wheels(frames):
+    if frames.has("In_WheelCounts"):
+        frames.set("In_WheelCounts", Left=frames.get("In_WheelCounts", "Right"), Right=frames.get("In_WheelCounts", "Left"))
+    if frames.has("In_BodySpeed"):
+        frames.set("In_BodySpeed", YawRate=-frames.get("In_BodySpeed", "YawRate"))
+    return frames
+
+
+def reverse_wheel(frames, side):
+    if frames.has("In_WheelCounts"):
+        frames.set("In_WheelCounts", **{side: np.mod(-frames.get("In_WheelCounts", side), 65536)})
+    if frames.has("In_BodySpeed"):
+        forward, yaw_rate = frames.get("In_BodySpeed", "Forward"), frames.get("In_BodySpeed", "YawRate")
+        left, right = forward - yaw_rate * HUSKY_TRACK_M / 2, forward + yaw_rate * HUSKY_TRACK_M / 2
+        left, right = (-left, right) if side == "Left" else (left, -right)
+        frames.set("In_BodySpeed", Forward=(left + right) / 2, YawRate=(right - left) / HUSKY_TRACK_M)
+    return frames
+
+
+def scale_wheels(frames, factor):
+    if frames.has("In_WheelCounts"):
+        for side in ("Left", "Right"):
+            counts = frames.get("In_WheelCounts", side)
+            steps = np.mod(np.diff(counts) + 32768, 65536) - 32768
+            frames.set("In_WheelCounts", **{side: np.mod(np.rint(counts[0] + factor * np.concatenate([[0], np.cumsum(steps)])), 65536)})
+    if frames.has("In_BodySpeed"):
+        frames.set("In_BodySpeed", Forward=frames.get("In_BodySpeed", "Forward") * factor, YawRate=frames.get("In_BodySpeed", "YawRate") * factor)
+    return frames
+
+
+def rates(frames):
+    interval_s = frames.get(TIME, "Interval") * 1e-6
+    count = min(len(frames.where(one)) for one in (GYRO, ACCEL, TIME))
+    for name, signals in ((GYRO, ANGLES), (ACCEL, VELOCITIES)):
+        span = np.resize(interval_s[:count], len(frames.where(name)))
+        frames.set(name, **{one: frames.get(name, one) / span for one in signals})
+    return frames
+
+
+def stamps(frames, per_us, names=None, interval=True):
+    for name in names or frames.stamped():
+        frames.set(name, Stamp=(frames.valid_us(name) // per_us) & MASK)
+        if interval and name == TIME:
+            frames.set(name, Interval=frames.get(name, "Interval") // per_us)
+    return frames
+
+
+def other_clock(frames, names, offset_s, ppm):
+    for name in names:
+        valid = frames.valid_us(name)
+        moved = valid + np.rint(offset_s * 1e6 + ppm * 1e-6 * (valid - valid[0])).astype(np.int64)
+        frames.set(name, Stamp=moved & MASK)
+    return frames
+
+
+def no_sync(frames, offset_s):
+    frames.time_us = frames.bus_us() + round(offset_s * 1e6)
+    return frames.without("In_Sync")
+
+
+def swap_angles(frames):
+    lat, lon = frames.get("In_GnssLat", "Lat"), frames.get("In_GnssLon", "Lon")
+    count = min(len(lat), len(lon))
+    lat[:count], lon[:count] = lon[:count].copy(), lat[:count].copy()
+    frames.set("In_GnssLat", Lat=lat)
+    frames.set("In_GnssLon", Lon=lon)
+    return frames
+
+
+def map_signal(name, signal, function):
+    def apply(frames):
+        frames.set(name, **{signal: function(frames.get(name, signal))})
+        return frames
+    return apply
+
+
+def swap_velocity(frames):
+    frames.set("In_GnssVelEN", East=frames.get("In_GnssVelEN", "North"), North=frames.get("In_GnssVelEN", "East"))
+    return frames
+
+
+def second_sender(frames, names, later_us, counter, **values):
+    """A second source of the same identifiers: a copy, later, with its own counter and values."""
+    rows = np.flatnonzero(np.isin(frames.identifier, [DBC.messages[name].identifier for name in names]))
+    other = Frames(frames.time_us[rows] + later_us, frames.identifier[rows].copy(), frames.payload[rows].copy())
+    for name in names:
+        other.set(name, Seq=np.mod(other.get(name, "Seq") + counter, 16))
+        here = {key: value for key, value in values.items() if key in DBC.messages[name].signals}
+        other.set(name, **here)
+    # In the frames' own order: a sync frame that was sent later in the log stays behind.
+    order = np.argsort(np.concatenate([np.arange(len(frames.time_us)), rows + 0.5]), kind="stable")
+    both = [np.concatenate([a, b])[order] for a, b in zip((frames.time_us, frames.identifier, frames.payload), (other.time_us, other.identifier, other.payload))]
+    both[0] = np.maximum.accumulate(both[0])
+    return Frames(*both)
+
+
+ABOUT_X, ABOUT_Z, Y_FOR_Z = np.diag([1, -1, -1]), [[0, -1, 0], [1, 0, 0], [0, 0, 1]], [[1, 0, 0], [0, 0, 1], [0, -1, 0]]
+FIX = ["In_GnssLat", "In_GnssLon", "In_GnssAlt", "In_GnssAcc"]
+DEGREE = 180 / np.pi
+IMU_FRAMES = [GYRO, ACCEL, TIME]
+
+# (code, log, mistake, further arguments): those with a star make the short form.
+MISTAKES = [
+    ("wheels_swapped", "*yard", swap_wheels), ("wheels_swapped", "road", swap_wheels), ("wheels_swapped", "*husky", swap_wheels),
+    ("wheels_swapped", "husky_sim", swap_wheels),
+    ("wheel_reversed", "*yard", lambda f: reverse_wheel(f, "Left")), ("wheel_reversed", "road", lambda f: reverse_wheel(f, "Right")),
+    ("wheel_reversed", "husky", lambda f: reverse_wheel(f, "Left")), ("wheel_reversed", "husky_sim", lambda f: reverse_wheel(f, "Right")),
+    ("imu_upside_down", "*yard", lambda f: turn_imu(f, ABOUT_X)), ("imu_upside_down", "skog", lambda f: turn_imu(f, ABOUT_X)),
+    ("imu_upside_down", "*iris_gps", lambda f: turn_imu(f, ABOUT_X)), ("imu_upside_down", "husky", lambda f: turn_imu(f, np.diag([-1, -1, 1]))),
+    ("imu_axes", "*yard", lambda f: turn_imu(f, ABOUT_Z)), ("imu_axes", "skog", lambda f: turn_imu(f, np.transpose(ABOUT_Z))),
+    ("imu_axes", "skog", lambda f: turn_imu(f, np.diag([-1, -1, 1]))), ("imu_axes", "*husky", lambda f: turn_imu(f, Y_FOR_Z)),
+    ("imu_axes", "iris", lambda f: turn_imu(f, Y_FOR_Z)), ("imu_axes", "car", lambda f: turn_imu(f, ABOUT_Z)),
+    ("imu_axes", "road", lambda f: turn_imu(f, np.diag([-1, -1, 1]))),
+    ("rates_for_increments", "yard", rates), ("rates_for_increments", "*skog", rates), ("rates_for_increments", "iris_gps", rates),
+    ("rates_for_increments", "husky", rates),
+    ("g_for_mps2", "yard", lambda f: scale_imu(f, 1, 1 / 9.80665)), ("g_for_mps2", "*skog", lambda f: scale_imu(f, 1, 1 / 9.80665)),
+    ("g_for_mps2", "iris_gps", lambda f: scale_imu(f, 1, 1 / 9.80665)), ("g_for_mps2", "husky", lambda f: scale_imu(f, 1, 1 / 9.80665)),
+    ("deg_for_rad", "*yard", lambda f: scale_imu(f, DEGREE, 1)), ("deg_for_rad", "car", lambda f: scale_imu(f, DEGREE, 1)),
+    ("deg_for_rad", "husky", lambda f: scale_imu(f, DEGREE, 1)), ("deg_for_rad", "iris", lambda f: scale_imu(f, DEGREE, 1)),
+    ("deg_for_rad", "road", lambda f: scale_imu(f, 1 / DEGREE, 1)),
+    ("deg_for_rad", "skog", lambda f: scale_imu(f, DEGREE, 1)),
+    ("stamps_in_ms", "*yard", lambda f: stamps(f, 1000)), ("stamps_in_ms", "*mrclam1", lambda f: stamps(f, 1000)),
+    ("stamps_in_ms", "skog", lambda f: stamps(f, 1000, FIX)), ("stamps_in_ms", "iris_gps", lambda f: stamps(f, 1000, [TIME], False)),
+    ("stamps_in_s", "road", lambda f: stamps(f, 1_000_000)), ("stamps_in_s", "*husky", lambda f: stamps(f, 1_000_000, FIX)),
+    ("stamps_in_s", "labyrinth", lambda f: stamps(f, 1_000_000)),
+    ("two_clocks", "*yard", lambda f: other_clock(f, [TIME], -0.45, 0)), ("two_clocks", "skog", lambda f: other_clock(f, ["In_BodySpeed"], 0.03, 300)),
+    ("two_clocks", "husky", lambda f: other_clock(f, FIX, 0.4, 0)), ("two_clocks", "mrclam2", lambda f: other_clock(f, ["In_RangeBearing"], -0.6, 20)),
+    ("two_clocks", "iris_gps", lambda f: other_clock(f, ["In_Mag"], 0, -400)),
+    ("no_in_sync", "*yard", lambda f: no_sync(f, 1.764e9 + 0.35)), ("no_in_sync", "skog", lambda f: no_sync(f, 86400.3)),
+    ("no_in_sync", "mrclam3", lambda f: no_sync(f, 1.7e9 + 0.55)), ("no_in_sync", "iris_gps", lambda f: no_sync(f, 12345.25)),
+    ("lat_lon_swapped", "*yard", swap_angles), ("lat_lon_swapped", "skog", swap_angles), ("lat_lon_swapped", "*iris", swap_angles),
+    ("lat_lon_swapped", "husky", swap_angles), ("lat_lon_swapped", "husky_sim", swap_angles),
+    ("latitude_sign", "*yard", map_signal("In_GnssLat", "Lat", np.negative)), ("latitude_sign", "skog", map_signal("In_GnssLat", "Lat", np.negative)),
+    ("latitude_sign", "iris", map_signal("In_GnssLat", "Lat", np.negative)), ("latitude_sign", "husky", map_signal("In_GnssLat", "Lat", np.negative)),
+    ("longitude_sign", "yard", map_signal("In_GnssLon", "Lon", np.negative)), ("longitude_sign", "*skog", map_signal("In_GnssLon", "Lon", np.negative)),
+    ("longitude_sign", "iris", map_signal("In_GnssLon", "Lon", np.negative)), ("longitude_sign", "husky", map_signal("In_GnssLon", "Lon", np.negative)),
+    ("velocity_axes", "*yard", swap_velocity), ("velocity_axes", "road", swap_velocity), ("velocity_axes", "iris", swap_velocity), ("velocity_axes", "road", map_signal("In_GnssVelEN", "North", np.negative)),
+    ("wheel_scale", "*yard", lambda f: scale_wheels(f, 1.3)), ("wheel_scale", "road", lambda f: scale_wheels(f, 0.5)),
+    ("wheel_scale", "husky", lambda f: scale_wheels(f, 2)), ("wheel_scale", "skog", lambda f: scale_wheels(f, 1 / 3.6)),
+    ("origin_far", "*yard", map_signal("In_GnssLat", "Lat", lambda lat: lat - 82.1)), ("origin_far", "road", map_signal("In_GnssLon", "Lon", lambda lon: lon + 30)),
+    ("wheel_scale", "husky_sim", lambda f: f, "--set", "wheels.speed_scale=1.4"),
+    ("imu_upside_down", "car", lambda f: f, "--set", "inertial.mounting_bs=1,0,0,0,-1,0,0,0,-1"),
+    ("imu_axes", "iris_gps", lambda f: f, "--set", "inertial.mounting_bs=0,0,1,1,0,0,0,1,0"),
+    ("wheel_scale", "yard", lambda f: f, "--set", "wheels.drive.counts_per_turn=500"),
+    ("origin_far", "iris_gps", lambda f: f, "--set", "gnss.origin_configured=1", "--set", "gnss.origin_latitude_deg=48.2627", "--set", "gnss.origin_longitude_deg=11.6683"),
+    ("message_missing", "*yard", lambda f: f.without("In_GnssLon")), ("message_missing", "skog", lambda f: f.without(TIME)),
+    ("message_missing", "iris_gps", lambda f: f.without("In_GnssVelU")), ("message_missing", "husky", lambda f: f.without("In_GnssAcc")),
+    ("two_senders", "*yard", lambda f: second_sender(f, ["In_WheelCounts"], 1, 7, Left=1000, Right=2000)),
+    ("two_senders", "skog", lambda f: second_sender(f, ["In_BodySpeed"], 100, 5, Forward=0)),
+    ("two_senders", "husky", lambda f: second_sender(f, IMU_FRAMES, 300, 3, AngZ=0.001)),
+    ("two_senders", "mrclam1", lambda f: second_sender(f, ["In_BodySpeed"], 50, 0, Forward=0.05)),
+]
+
+# name: robot, and how the log is made: arguments of tetap-world, or an importer with its arguments ({DATA} is the folder of the sets)
+WORLDS = {"yard": ("rover", []), "road": ("rover", ["--course", "road"]), "car": ("car", []), "iris": ("iris", []),
+          "husky_sim": ("husky_inertial", []),
+          "usual": ("rover", ["--seed", "2", "--fault", "wheel_spin@45+3,gnss_outage@80+30,gnss_jump@150+2"])}
+SETS = {"skog": ("car", "import_skog", "skog_gnss_ins"), "husky": ("husky_inertial", "import_husky", "husky"),
+        "iris_gps": ("iris", "import_px4", "px4_ecl", "iris_gps"),
+        "labyrinth": ("labyrinth", "import_labyrinth", "tuc_labyrinth/Indoor_UWB"),
+        **{f"mrclam{i}": ("mrclam", "import_mrclam", "mrclam/MRCLAM_Dataset7", str(i)) for i in range(1, 6)}}
+SHORT_GOOD = ("yard", "skog", "husky", "iris_gps", "mrclam1", "labyrinth")
+SHORT_S = "90"
+
+
+class Logs:
+    """The good logs, made when they are asked for."""
+
+    def __init__(self, folder):
+        self.folder, self.made = folder, {}
+
+    def available(self, name):
+        return name in WORLDS or os.path.exists(os.path.join(DATA, SETS[name][2]))
+
+    @staticmethod
+    def robot(name):
+        return (WORLDS.get(name) or SETS[name])[0]
+
+    def frames(self, name):
+        if name not in self.made:
+            self.made[name] = self._simulated(name) if name in WORLDS else self._recorded(name)
+        return self.made[name].copy()
+
+    def _simulated(self, name):
+        robot, arguments = WORLDS[name]
+        out = os.path.join(self.folder, name)
+        run(os.path.join(PROGRAMS, "tetap-world"), "--memory", "--raw", "--quiet", "--robot", robot, "--out", out, *arguments, *([] if WHOLE else ["--duration", SHORT_S]))
+        return Frames.read(os.path.join(out, "raw.log"))
+
+    def _recorded(self, name):
+        _, importer, data, *arguments = SETS[name]
+        out = os.path.join(self.folder, name)
+        run(os.path.join(ROOT, "tools/dataset", importer), os.path.join(DATA, data), *arguments, out)
+        return Frames.read(out + ".log")
+
+
+def run(*words):
+    done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True)
+    if done.returncode != 0:
+        raise AssertionError(f"{' '.join(words)}: {done.stdout}{done.stderr}")
+    return done.stdout
+
+
+class Doctor(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.directory = tempfile.TemporaryDirectory()
+        cls.logs = Logs(cls.directory.name)
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.directory.cleanup()
+
+    def examine(self, frames, robot, *arguments):
+        log, answer = (os.path.join(self.directory.name, one) for one in ("made.log", "doctor.json"))
+        frames.write(log)
+        said = run(os.path.join(PROGRAMS, "tetap-doctor"), log, *(["--robot", robot] if robot else []), "--json", answer, *arguments)
+        with open(answer, encoding="utf-8") as file:
+            found = json.load(file)["findings"]
+        for rank, one in enumerate(found, 1):
+            self.assertEqual(one["rank"], rank)
+            self.assertIn(one["evidence"], said)
+            self.assertIn(one["change"], said)
+        return found
+
+    def test_each_mistake_is_named_first_or_second(self):
+        missed, first, tried = [], 0, 0
+        for number, (code, where, mistake, *arguments) in enumerate(MISTAKES):
+            short, name = where.startswith("*"), where.lstrip("*")
+            if not (short or WHOLE) or not self.logs.available(name):
+                continue
+            found = [one["code"] for one in self.examine(mistake(self.logs.frames(name)), self.logs.robot(name), *arguments)]
+            tried += 1
+            first += found[:1] == [code]
+            if code not in found[:2]:
+                missed.append(f"{code} in {name} (row {number}): {found or 'nothing'}")
+        print(f"{tried} mistakes: {first} named first, {tried - len(missed)} first or second" + "".join(f"\n  missed: {one}" for one in missed))
+        self.assertGreater(tried, 15)
+        self.assertGreaterEqual(tried - len(missed), NAMED_SHARE * tried, missed)
+
+    def test_the_table_of_codes_is_that_of_the_mistakes(self):
+        """Each code of the program is made up here, in three logs or more, and stands on the page."""
+        page = run(os.path.join(PROGRAMS, "tetap-doctor"), "--markdown")
+        codes = re.findall(r"^\| `(\w+)` \|", page, re.M)
+        made = [code for code, *_ in MISTAKES]
+        self.assertEqual(sorted(codes), sorted(set(made)))
+        self.assertGreaterEqual(min(len({where.lstrip("*") for one, where, *_ in MISTAKES if one == code}) for code in codes), 3)
+        with open(os.path.join(ROOT, "docs/reference/diagnoses.md"), encoding="utf-8") as file:
+            self.assertEqual(file.read(), page)
+
+    def test_memory_does_not_grow_with_the_log(self):
+        frames = self.logs.frames("yard")
+        frames.time_us = frames.bus_us()
+        frames = frames.without("In_Sync")
+        least = []  # address space [kB] in which the program runs, in steps of 512
+        for times in (1, 8):
+            span = int(frames.time_us[-1] - frames.time_us[0]) // (1 << 20) * (1 << 20) + 2 * (1 << 20)  # stamps fit again after a wrap
+            many = Frames(np.concatenate([frames.time_us + k * span for k in range(times)]), np.tile(frames.identifier, times), np.tile(frames.payload, times))
+            path = os.path.join(self.directory.name, "long.log")
+            many.write(path)
+            command = ["bash", "-c", 'ulimit -v "$1"; exec "$2" "$3" --robot rover --brief', "bash"]
+            least.append(next(limit for limit in range(4096, 65536, 512)
+                              if subprocess.run([*command, str(limit), os.path.join(PROGRAMS, "tetap-doctor"), path], capture_output=True).returncode == 0))
+        self.assertLessEqual(least[1] - least[0], 512)
+
+    def test_the_findings_of_make_doctor_stand_in_its_folder(self):
+        log = os.path.join(self.directory.name, "swapped.log")
+        swap_wheels(self.logs.frames("yard")).write(log)
+        out = os.path.join(self.directory.name, "made", "here")
+        done = subprocess.run([os.path.join(ROOT, "tools/run/diagnose_log"), "rover"], capture_output=True, text=True, env={**os.environ, "LOG": log, "OUT": out, "PARAMS": "", "SET": ""})
+        self.assertEqual((done.returncode, done.stderr), (0, ""))
+        with open(os.path.join(out, "doctor.json"), encoding="utf-8") as file:
+            answer = json.load(file)
+        self.assertEqual([one["code"] for one in answer["findings"]], ["wheels_swapped"])
+        self.assertEqual(sorted(answer["findings"][0]), ["change", "code", "evidence", "rank"])
+        factor = re.search(r"by (-?\d+\.\d+) times the gyroscope's yaw rate over (\d+) s", answer["findings"][0]["evidence"])
+        self.assertAlmostEqual(float(factor[1]), -1, delta=0.25)
+        self.assertGreater(int(factor[2]), 60)
+
+    @unittest.skipUnless(WHOLE, "plays a whole log: whole form alone")
+    def test_a_replay_ends_with_the_likeliest_cause(self):
+        log, out = (os.path.join(self.directory.name, one) for one in ("played.log", "played"))
+        settings = {**os.environ, "LOG": log, "OUT": out, "ROBOT": "rover", "BOARD": "linux", "BUS": "memory", "REPORT": "--no-pictures", "PLAY": "--quiet --lockstep",
+                    "PARAMS": "", "SET": "", "TRUTH": ""}
+        for mistake, words in ((swap_wheels, "likeliest cause: Left and right wheel are swapped. (wheels_swapped)"), (lambda f: f, None)):
+            mistake(self.logs.frames("yard")).write(log)
+            done = subprocess.run([os.path.join(ROOT, "tools/run/replay_log")], capture_output=True, text=True, env=settings)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            last = done.stdout.splitlines()[-4:]
+            self.assertEqual(words in last if words else "likeliest" not in done.stdout, True, done.stdout)
+            self.assertTrue(os.path.exists(os.path.join(out, "doctor.json")))
+
+    def test_nothing_is_found_in_good_logs(self):
+        names = [name for name in (list(WORLDS) + list(SETS) if WHOLE else SHORT_GOOD) if self.logs.available(name)]
+        found = {}
+        for name in names:
+            for robot in [self.logs.robot(name)] + (["husky"] if name == "husky" else []) + [""]:
+                codes = self.examine(self.logs.frames(name), robot)
+                if codes:
+                    found[f"{name} as {robot or 'no robot'}"] = codes
+        self.assertEqual(found, {})
+        print(f"{len(names)} good logs, each with its robot and without: nothing found")
+
+
+if __name__ == "__main__":
+    sys.argv = [one for one in sys.argv if one != "--whole"]
+    unittest.main()
