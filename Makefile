@@ -14,17 +14,18 @@ TRUTH ?=
 PARAMS ?=
 SET   ?=
 STEPS ?=
+CELLS ?=
 export ROBOT BOARD BUS SEED FAULT REALTIME LOG TRUTH PARAMS SET
 
 # A misspelt name would be taken for the default without a word: FALUT=gnss_jump would run another world than its user thinks.
-settings := ROBOT BOARD BUS SEED FAULT REALTIME LOG TRUTH OUT WORLD PLAY REPORT PARAMS SET STEPS TETAP_DATA
+settings := ROBOT BOARD BUS SEED FAULT REALTIME LOG TRUTH OUT WORLD PLAY REPORT PARAMS SET STEPS CELLS TETAP_DATA
 given := $(foreach name,$(.VARIABLES),$(if $(findstring command line,$(origin $(name))),$(name)))
 unknown := $(filter-out $(settings) TETAP_% WITH_VCAN_% CMAKE_% CTEST_% CCACHE_% TMPDIR,$(given))
 ifneq ($(unknown),)
 $(error no setting $(unknown); there are: $(settings))
 endif
 
-.PHONY: help sim test quick proof replay record doctor firmware size heap stack count bits hashes constants check docs dbc setup programs arm
+.PHONY: help sim test quick proof replay record doctor firmware size heap stack count bits hashes matrix constants check docs dbc setup programs arm
 
 help: ## this list
 	@echo "tetap: state estimation on the robot's own microcontroller"; echo
@@ -79,6 +80,10 @@ constants: setup ## numbers in the code and parameters that the inertial estimat
 hashes: setup programs ## a hash of each estimate over simulated and recorded runs, in out/hashes.json
 	@tools/proof/hash_estimates
 
+matrix: setup ## faults of every sensor in every situation against what the node promises, in out/matrix.json (CELLS=1000); goes on where it was
+	@tools/run/build_preset host:tetap-matrix
+	@tools/proof/run_matrix $(if $(CELLS),--cells $(CELLS))
+
 check: setup ## format, tidy, layers, DBC fresh
 	@tools/proof/run_checks test check
 
@@ -92,7 +97,7 @@ setup:
 	@tools/run/install_packages
 
 programs: setup
-	@tools/run/build_preset host:tetap-doctor,tetap-node,tetap-params,tetap-play,tetap-world,tetap-record
+	@tools/run/build_preset host:tetap-doctor,tetap-node,tetap-params,tetap-play,tetap-world,tetap-record,tetap-matrix,tetap-inject
 
 arm: setup
 	@tools/run/build_preset r5 m7 m4f

@@ -58,7 +58,7 @@ def tools(root):
 
 def programs(folder):
     """Help of the host programs; None where one is not built."""
-    names = ["tetap-world", "tetap-play", "tetap-record", "tetap-node", "tetap-params", "tetap-doctor"]
+    names = ["tetap-world", "tetap-play", "tetap-record", "tetap-node", "tetap-params", "tetap-doctor", "tetap-matrix", "tetap-inject"]
     parts = ["## Host programs\n\nThe programs lie in `build/host/sim_host`.\n"]
     for name in names:
         path = os.path.join(folder, name)

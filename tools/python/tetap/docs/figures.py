@@ -56,10 +56,16 @@ def of_times(text):
     return table(["step", *(["wall s", "CPU s"] + [""] * width)[:width - 1]], [row + [""] * (width - len(row)) for row in rows])
 
 
+def of_matrix(rows):
+    """Shares by robot; the page of kinds is docs/validation/matrix.md."""
+    from tetap.proof import matrix_tables  # needs matplotlib, which the other sections do not
+    return table(["robot", *matrix_tables.WHOLE[1:]], matrix_tables.of_whole(rows, lambda row: row["robot"]))
+
+
 SECTIONS = [("make sim", "sim/summary.json", "the simulated rover", of_run), ("make count", "count.json", "instructions", of_count),
             ("make size", "size.json", "flash and RAM", of_flat), ("make stack", "stack.json", "stack", of_flat),
             ("make hashes", "hashes.json", "hashes of the estimates", of_hashes), ("make costs", "costs.json", "costs of the filters", of_flat),
-            ("make bench", "bench.json", "time", of_flat), ("make matrix", "matrix.json", "promises", of_flat), ("make mutants", "mutants.json", "seeded faults in the code", of_flat),
+            ("make bench", "bench.json", "time", of_flat), ("make matrix", "matrix.json", "promises", of_matrix), ("make mutants", "mutants.json", "seeded faults in the code", of_flat),
             ("make soak", "soak.json", "long runs", of_flat), ("make fuzz", "fuzz.json", "fuzzing", of_flat), ("make test", "prove/times.tsv", "time of each step", of_times)]
 
 
