@@ -50,9 +50,9 @@ class PlanarMapper {
   }
   Innovation fuse(const Input& input, base::Micros stamp, const Context& ctx) {
     if (stamp > batch_stamp_) close_batch(ctx);
-    const bool used = motion_.fuse(input, stamp, ctx.parameters);
+    const sensor::Verdict verdict = motion_.fuse(input, stamp, ctx.parameters);
     move_engine();
-    return {.verdict = used ? sensor::Verdict::kAccepted : sensor::Verdict::kNotUsed};
+    return input_record(verdict);
   }
   /// Pending until all sightings of the stamp are there.
   Innovation fuse(const sensor::LandmarkSighting& sighting, base::Micros stamp, std::uint8_t instance,
