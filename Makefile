@@ -10,22 +10,24 @@ SEED  ?= 1
 FAULT ?=
 REALTIME ?=
 LOG   ?=
+PROBE ?=
+DRY_RUN ?=
 TRUTH ?=
 PARAMS ?=
 SET   ?=
 STEPS ?=
 CELLS ?=
-export ROBOT BOARD BUS SEED FAULT REALTIME LOG TRUTH PARAMS SET
+export ROBOT BOARD PROBE DRY_RUN BUS SEED FAULT REALTIME LOG TRUTH PARAMS SET
 
 # A misspelt name would be taken for the default without a word: FALUT=gnss_jump would run another world than its user thinks.
-settings := ROBOT BOARD BUS SEED FAULT REALTIME LOG TRUTH OUT WORLD PLAY REPORT PARAMS SET STEPS CELLS TETAP_DATA
+settings := ROBOT BOARD PROBE DRY_RUN BUS SEED FAULT REALTIME LOG TRUTH OUT WORLD PLAY REPORT PARAMS SET STEPS CELLS TETAP_DATA
 given := $(foreach name,$(.VARIABLES),$(if $(findstring command line,$(origin $(name))),$(name)))
 unknown := $(filter-out $(settings) TETAP_% WITH_VCAN_% CMAKE_% CTEST_% CCACHE_% TMPDIR,$(given))
 ifneq ($(unknown),)
 $(error no setting $(unknown); there are: $(settings))
 endif
 
-.PHONY: help sim test quick proof replay record doctor firmware size heap stack count bits hashes matrix constants check docs dbc setup programs arm
+.PHONY: help sim test quick proof replay record doctor firmware flash size heap stack count bits hashes matrix constants check docs dbc setup programs arm
 
 help: ## this list
 	@echo "tetap: state estimation on the robot's own microcontroller"; echo
@@ -58,6 +60,9 @@ doctor: setup programs ## the likeliest mistake in a log, by its devices alone: 
 
 firmware: setup ## the flash image: BOARD=zynqmp_r5 ROBOT=rover, with its size table, no heap and stack proved
 	@tools/run/build_firmware
+
+flash: setup ## writes the image onto a board: BOARD=ark_cannode ROBOT=rover PROBE=stlink, openocd or dfu (DRY_RUN=1 only prints)
+	@tools/run/flash_board
 
 size: arm ## flash and RAM per section of every image against the budgets
 	@tools/proof/check_images size

@@ -1,4 +1,5 @@
-# tetap_image(NAME target SOURCES main.cpp ... [LIBRARIES tetap_node ...] [STACK bytes] [OUTPUT name] [DATA ddr|64k])
+# tetap_image(NAME target SOURCES main.cpp ... [LIBRARIES tetap_node ...] [STACK bytes] [OUTPUT name] [DATA ddr|64k] [OFFSET bytes])
+# OFFSET: bytes at the begin of the flash that stay a boot loader's, where the board's link.ld has _flash_offset.
 # makes NAME.elf .bin .hex .map in the binary directory, or OUTPUT.elf ... when another file name is wanted. Beside every object of
 # the image lie its .su and .ci (stack use and call graph, GCC's VCG form): CMakeFiles/NAME.dir/.
 set(TETAP_PORT "${TETAP_BOARD}")
@@ -16,7 +17,7 @@ endif()
 set(CMAKE_CXX_STANDARD_LIBRARIES "-Wl,--start-group -lc -lgcc -Wl,--end-group")
 
 function(tetap_image)
-  cmake_parse_arguments(ARG "" "NAME;STACK;OUTPUT;DATA" "SOURCES;LIBRARIES" ${ARGN})
+  cmake_parse_arguments(ARG "" "NAME;STACK;OUTPUT;DATA;OFFSET" "SOURCES;LIBRARIES" ${ARGN})
   foreach(needed NAME SOURCES)
     if(NOT ARG_${needed})
       message(FATAL_ERROR "tetap_image: ${needed} is missing")
@@ -51,7 +52,8 @@ function(tetap_image)
   # malloc fails to link, and libm is not there at all.
   target_link_options(${ARG_NAME} PRIVATE -nostdlib -nostartfiles -T ${script} -Wl,--gc-sections -Wl,--print-memory-usage
     -Wl,--fatal-warnings -Wl,-Map=${output}.map $<$<BOOL:${ARG_STACK}>:-Wl,--defsym=_stack_size=${ARG_STACK}>
-    $<$<STREQUAL:${ARG_DATA},ddr>:-Wl,--defsym=_data_in_ddr=1> $<$<STREQUAL:${ARG_DATA},64k>:-Wl,--defsym=_data_64k=1>)
+    $<$<STREQUAL:${ARG_DATA},ddr>:-Wl,--defsym=_data_in_ddr=1> $<$<STREQUAL:${ARG_DATA},64k>:-Wl,--defsym=_data_64k=1>
+    $<$<BOOL:${ARG_OFFSET}>:-Wl,--defsym=_flash_offset=${ARG_OFFSET}>)
   add_custom_command(TARGET ${ARG_NAME} POST_BUILD
     COMMAND ${CMAKE_OBJCOPY} -O binary ${output}.elf ${output}.bin
     COMMAND ${CMAKE_OBJCOPY} -O ihex ${output}.elf ${output}.hex

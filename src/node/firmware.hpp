@@ -129,11 +129,17 @@ class Firmware {
     return false;
   }
   /// Consumed frames go onto the bus as well; once that takes no more, a log of it is no record any longer.
+  /// The drivers fill a queue, so that the node's work does not stand on their stack. Frames beyond it are neither sent
+  /// nor consumed: the node counts an incomplete sample.
   void poll_wired() requires kWired {
-    extras_.wired.poll(board_.now(), pacer_.offset(), wired_on(), [this](const base::CanFrame& frame) {
-      if (!board_.can.send(frame)) health_.unlogged = true;
-      node_.on_frame(frame);
+    std::size_t count = 0;
+    extras_.wired.poll(board_.now(), pacer_.offset(), wired_on(), [this, &count](const base::CanFrame& frame) {
+      if (count < extras_.queue.size()) extras_.queue[count++] = frame;
     });
+    for (std::size_t i = 0; i < count; ++i) {
+      if (!board_.can.send(extras_.queue[i])) health_.unlogged = true;
+      node_.on_frame(extras_.queue[i]);
+    }
   }
   void end_poll() {
     if constexpr (hal::WatchdogBoard<Board>) polled_ ? board_.kick() : board_.start_watchdog();
@@ -182,8 +188,10 @@ class Firmware {
     [[no_unique_address]] std::conditional_t<kSnapshots, SnapshotSender<Node>, NoSnapshot> snapshot;
     bus::Version version;
     std::array<bus::Payload, 3> pages{};  ///< 9 to 11 of Est_Diag
-    std::uint32_t turn = 0;               ///< ticks
-    bool ticked = false;                  ///< the node has a time
+    /// Frames of one poll: at most 32 samples of an IMU, a count, ten epochs of a receiver.
+    std::array<base::CanFrame, 160> queue{};
+    std::uint32_t turn = 0;  ///< ticks
+    bool ticked = false;     ///< the node has a time
   };
   struct NoExtras {
     NoExtras(Board&, const param::Parameters&, const bus::Version&) {}

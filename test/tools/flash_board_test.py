@@ -1,0 +1,129 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: Apache-2.0
+"""tools/run/flash_board with tools that only write down what they were called with: what it prints is what it runs, what is missing is one sentence with
+the way to get it, and nothing touches a board before tool, probe and image are there."""
+import hashlib
+import os
+import shutil
+import struct
+import subprocess
+import tempfile
+import unittest
+
+ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.realpath(__file__))))
+TOOL = os.path.join(ROOT, "tools", "run", "flash_board")
+CODE = bytes(range(64))
+
+
+def elf(address):
+    """An ELF file for ARM with one section of code at `address` and one symbol."""
+    names, strings = b"\0.text\0.shstrtab\0.symtab\0.strtab\0", b"\0start\0"
+    symbols = bytes(16) + struct.pack("<IIIBBH", 1, address, 4, 0x12, 0, 1)
+    parts, offset = [], 52
+    for content in (CODE, names, symbols, strings):
+        parts.append((offset, len(content)))
+        offset += len(content)
+    sections = [(0,) * 10, (1, 1, 6, address, *parts[0], 0, 0, 4, 0), (7, 3, 0, 0, *parts[1], 0, 0, 1, 0), (17, 2, 0, 0, *parts[2], 4, 1, 4, 16),
+                (25, 3, 0, 0, *parts[3], 0, 0, 1, 0)]
+    start = b"\x7fELF\x01\x01\x01" + bytes(9) + struct.pack("<HHIIIIIHHHHHH", 2, 40, 1, address, 0, offset, 0x05000000, 52, 32, 0, 40, len(sections), 2)
+    return start + CODE + names + symbols + strings + b"".join(struct.pack("<10I", *section) for section in sections)
+
+
+class FlashBoard(unittest.TestCase):
+    def setUp(self):
+        self.folder = tempfile.TemporaryDirectory()
+        self.addCleanup(self.folder.cleanup)
+        self.bin = os.path.join(self.folder.name, "bin")
+        os.makedirs(self.bin)
+        for needed in ("python3", "bash", "arm-none-eabi-objdump", "arm-none-eabi-c++filt"):
+            if found := shutil.which(needed):
+                os.symlink(found, os.path.join(self.bin, needed))
+        self.calls = os.path.join(self.folder.name, "calls")
+        self.image = os.path.join(self.folder.name, "robot.elf")
+        self.store(0x08000000)
+
+    def store(self, address):
+        with open(self.image, "wb") as file:
+            file.write(elf(address))
+        with open(self.image.replace(".elf", ".bin"), "wb") as file:
+            file.write(CODE)
+
+    def install(self, tool, prints="", status=0):
+        path = os.path.join(self.bin, tool)
+        with open(path, "w", encoding="utf-8") as file:
+            file.write(f"#!{shutil.which('bash')}\necho {tool} \"$@\" >>{self.calls}\necho '{prints}'\nexit {status}\n")
+        os.chmod(path, 0o755)
+
+    def flash(self, *options, status=0, board="ark_cannode", **environment):
+        done = subprocess.run([TOOL, "--board", board, "--image", self.image, *options], capture_output=True, text=True, check=False,
+                              env={"PATH": self.bin, **environment})
+        self.assertEqual(done.returncode, status, done.stdout + done.stderr)
+        return done.stdout + done.stderr
+
+    def called(self):
+        if not os.path.exists(self.calls):
+            return []
+        with open(self.calls, encoding="utf-8") as file:
+            return file.read().splitlines()
+
+    def test_what_it_prints_is_what_it_runs(self):
+        self.install("st-flash")
+        self.install("st-info", "Found 1 stlink programmers\n  serial:     0669FF")
+        printed = self.flash("--probe", "stlink")
+        flashing = f"st-flash --reset write {self.image.replace('.elf', '.bin')} 0x08000000"
+        self.assertIn(f"flash: {flashing}\n", printed)
+        self.assertIn(f"64 bytes at 0x08000000, sha256 of the .bin {hashlib.sha256(CODE).hexdigest()}", printed)
+        self.assertIn("SWDIO is PA13", printed)
+        self.assertEqual(self.called(), ["st-info --probe", flashing])
+
+    def test_an_image_behind_a_boot_loader_goes_where_it_was_linked(self):
+        self.store(0x08010000)
+        self.install("dfu-util", "Found DFU: [0483:df11] ver=2200")
+        printed = self.flash("--probe", "dfu")
+        self.assertIn("expect no USB device", printed)
+        self.assertIn("-s 0x08010000:leave", self.called()[-1])
+
+    def test_openocd_verifies_and_takes_another_probe(self):
+        self.install("openocd")
+        self.flash("--probe", "openocd", TETAP_OPENOCD_INTERFACE="interface/cmsis-dap.cfg")
+        self.assertEqual(self.called()[0], "openocd -f interface/cmsis-dap.cfg -f target/stm32f4x.cfg -c init; exit")
+        self.assertIn(f"program {{{self.image}}} verify reset exit", self.called()[1])
+
+    def test_what_is_missing_is_named_before_anything_is_written(self):
+        self.assertIn("st-flash is not installed: apt-get install stlink-tools", self.flash("--probe", "stlink", status=2))
+        self.install("st-flash")
+        self.install("st-info", "Found 0 stlink programmers")
+        said = self.flash("--probe", "stlink", status=2)
+        self.assertIn("no stlink probe with a board on it: st-info --probe: Found 0 stlink programmers; plug the probe", said)
+        self.install("openocd", "Error: open failed", 1)
+        self.assertIn("Error: open failed", self.flash("--probe", "openocd", status=2))
+        self.install("dfu-util", "dfu-util 0.11")
+        self.assertIn("no dfu probe", self.flash("--probe", "dfu", status=2))
+        self.assertEqual([call for call in self.called() if " write " in call or "program" in call or "-D" in call], [])
+
+    def test_wrong_names_are_one_line(self):
+        for options, what in ((("--probe", "jlink"), "no probe 'jlink'; there are: stlink openocd dfu"),
+                              (("--probe", "stlink", "--image", "/nowhere.elf", "--dry-run"), "is not there: make firmware BOARD=ark_cannode ROBOT=rover")):
+            said = self.flash(*options, status=2)
+            self.assertIn(what, said)
+            self.assertEqual(said.count("\n"), 1, said)
+        self.assertIn("no board 'zynqmp_r5' that can be flashed; there are: ", self.flash(status=2, board="zynqmp_r5"))
+
+    def test_a_failed_tool_is_a_failure(self):
+        self.install("st-info", "serial: 1")
+        self.install("st-flash", "Unknown chip", 1)
+        self.assertIn("Unknown chip", self.flash("--probe", "stlink", status=1))
+
+    def test_a_dry_run_needs_no_tool_and_touches_nothing(self):
+        for probe in ("stlink", "openocd", "dfu"):
+            said = self.flash("--probe", probe, "--dry-run")
+            self.assertIn("dry run, nothing was written", said)
+            self.assertIn("is not installed: apt-get install", said)
+        self.install("st-flash")
+        self.install("st-info", "serial: 1")
+        self.assertIn("st-flash --reset write", self.flash("--probe", "stlink", "--dry-run"))
+        self.assertEqual(self.called(), [])
+
+
+if __name__ == "__main__":
+    unittest.main()
