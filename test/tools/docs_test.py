@@ -16,7 +16,7 @@ import unittest
 sys.dont_write_bytecode = True
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.realpath(__file__))))
 sys.path.insert(0, os.path.join(ROOT, "tools", "python"))
-from tetap.docs import figures, language, regions, words  # noqa: E402
+from tetap.docs import campaigns, figures, language, regions, robots, words  # noqa: E402
 
 PROGRAMS = os.environ.get("TETAP_PROGRAMS", os.path.join(ROOT, "build/host/sim_host"))
 WORLD = os.path.join(PROGRAMS, "tetap-world")
@@ -191,6 +191,11 @@ class Pages(unittest.TestCase):
         kilo = [int(one.replace(" ", "")) / 1000 for one in (flash, ram)]
         self.assertIn(f"| {kilo[0]:.0f} kB and {kilo[1]:.1f} kB with the stack", read("README.md"))
 
+    def test_the_instructions_of_the_readme_are_those_of_the_cost_page(self):
+        cells = re.search(r"^\| `node_tick` \| ([\d ]+) / ([\d ]+) \| ([\d ]+) / ([\d ]+) \|", read("docs/validation/cost.md"), re.M).groups()
+        m7, _, m4f, worst = [round(int(one.replace(" ", "")) / 1000) for one in cells]
+        self.assertIn(f"| {m7} 000 instructions a tick of 10 ms on M7, {m4f} 000 on M4F, at worst {worst} 000;", read("README.md"))
+
 
 class Generated(unittest.TestCase):
     def test_the_pages_of_the_reference_are_fresh(self):
@@ -223,6 +228,28 @@ class Generated(unittest.TestCase):
                     with self.assertRaisesRegex(words.WordError, said):
                         words.modes_and_faults(tree)
                     shutil.copy(os.path.join(ROOT, name), os.path.join(tree, name))
+
+    def test_every_robot_that_is_shipped_is_on_the_page_of_robots(self):
+        done = subprocess.run(["git", "-C", ROOT, "ls-files", "config/*.hpp"], capture_output=True, text=True)
+        shipped = [os.path.basename(path)[:-len(".hpp")] for path in done.stdout.split()]
+        page = robots.robots(ROOT)
+        rows = {robot: names for robot, names in re.findall(r"^\| `(\w+)` \| [^|]+ \| [^|]+ \| ([^|]+) \| [^|]+ \|$", page, re.M)}
+        self.assertEqual(sorted(rows), sorted(shipped) if done.returncode == 0 else sorted(rows))
+        self.assertEqual(rows["rover"], "`Odometry`, `Attitude`, `Inertial`")
+        self.assertEqual(rows["husky"], "`Odometry`, `PoseEkf`")
+        self.assertEqual(rows["mrclam_pf"], "`Odometry`, `PoseParticles<1000>`")
+        self.assertEqual(rows["fusion2"], "`PositionFusion<InverseVariance>`, `PositionFusion<Intersection>`")
+
+    def test_a_robot_that_is_listed_and_not_there_is_an_error(self):
+        with tempfile.TemporaryDirectory() as tree:
+            os.makedirs(os.path.join(tree, "docs/reference"))
+            shutil.copytree(os.path.join(ROOT, "config"), os.path.join(tree, "config"))
+            os.remove(os.path.join(tree, "config/car.hpp"))
+            for text, reason in ((read(robots.LIST), "car is no robot"), ("husky\ta\tb\tc\nhusky\ta\tb\tc\n", "2: husky stands twice"), ("husky\ta\tb\n", "expected robot, what")):
+                with open(os.path.join(tree, robots.LIST), "w", encoding="utf-8") as file:
+                    file.write(text)
+                with self.assertRaisesRegex(words.WordError, reason):
+                    robots.robots(tree)
 
     def test_sources_states_and_checks_are_read_from_the_headers(self):
         with tempfile.TemporaryDirectory() as tree:
@@ -266,6 +293,31 @@ class Generated(unittest.TestCase):
             with open(os.path.join(out, "inertial.json"), "w", encoding="utf-8") as file:
                 json.dump({"car": {"outages": []}, "px4": {}, "husky": {}}, file)
             self.assertEqual(regions.fill(page, out, ""), page)
+
+    def test_a_table_of_a_campaign_is_made_of_its_very_command_alone(self):
+        spread = {"median": 0.104, "worst": 0.226}
+        case = {"label": "matched, wheel_spin", "seeds": 100, "said_after_s": {"median": 0.34, "worst": 0.4},
+                "fused": {"largest_error_m": spread, "position_rmse_after_m": None, "error_over_3_sigma": {"median": 0.4, "worst": 1.256}, "too_sure_seeds": 7}}
+        page = "<!-- figures: slip -->\nold\n<!-- end -->\n"
+        with tempfile.TemporaryDirectory() as out:
+            os.makedirs(os.path.join(out, "campaigns/slip"))
+            for words_of, made in (("--scenario slip --seeds 3 --out out/campaigns/slip", False), ("--scenario slip --seeds 100", False),
+                                   ("--scenario slip --seeds 100 --out out/campaigns/slip --jobs 1", True)):
+                with open(os.path.join(out, "campaigns/slip/campaign.json"), "w", encoding="utf-8") as file:
+                    json.dump({"command": f"tools/proof/run_campaign {words_of}", "cases": [case]}, file)
+                filled = regions.fill(page, out, "")
+                if made:
+                    self.assertIn("| matched, wheel_spin | 0.3 s | 0.10 / 0.23 m | - | 1.26 | 7 of 100 |", filled)
+                else:
+                    self.assertEqual(filled, page)
+
+    def test_every_campaign_of_a_page_is_one_that_the_program_takes(self):
+        """Its words are parsed by run_campaign itself, up to where it would build."""
+        for one in campaigns.REGIONS.values():
+            for shown in one[0].split(" && "):
+                self.assertTrue(shown.startswith(campaigns.PROGRAM + " --"), shown)
+                done = subprocess.run([os.path.join(ROOT, campaigns.PROGRAM), *shown.split()[1:], "--jobs", "0"], capture_output=True, text=True)
+                self.assertIn("must be 1 or more", done.stderr, shown)
 
     def test_a_marked_table_is_made_from_its_files_and_stays_where_one_is_missing(self):
         page = "Before.\n<!-- figures: memory -->\nold\n<!-- end -->\nAfter.\n"
@@ -364,6 +416,35 @@ class Lines(unittest.TestCase):
             self.run_here(command.replace("g++", compiler, 1) + " -Wall -Wextra -Werror")
             self.assertEqual(self.run_here("./example"), printed)
 
+    def quoted_lines_are_those_of_the_run(self, summary):
+        """Figures and lines of first_run.md against the run that it describes: every word of a quoted line is in the first line that its grep finds."""
+        page = read("docs/tutorial/first_run.md")
+        fused = summary["fused"]
+        self.assertIn(f"({fused['blocks']['position']['rmse'][2]:.3f} m RMS here)", page)
+        self.assertIn(f" {fused['nees_mean']:.2f} means a covariance that is too large", page)
+        wheels = fused["measurements"]["WheelCounts"]["bus_nis_per_dof"]
+        self.assertIn(f"The NIS of the wheels is about {wheels:.2f},", page)
+        self.run_here("tools/can/decode_log out/sim/raw.log > out/sim/raw.txt")
+        commands = re.findall(r"^(grep -m 1 .*)$", page, re.M)
+        quoted = re.search(r"The three lines read like this.*?```text\n(.*?)```", page, re.S)[1].splitlines()
+        self.assertEqual((len(commands), len(quoted)), (3, 3))
+        for command, line in zip(commands, quoted):
+            found = self.run_here(command).split()
+            self.assertEqual([word for word in line.split() if word not in found], [], f"{command}: {' '.join(found)}")
+
+    def test_the_robot_of_the_tutorial_compiles_with_both_compilers_and_has_noise_of_its_wheels(self):
+        code = re.search(r"Save this as `config/mine.hpp`:\n\n```cpp\n(.*?)```", read("docs/tutorial/your_robot.md"), re.S)[1]
+        with open(os.path.join(self.tree, "config/mine.hpp"), "w", encoding="utf-8") as file:
+            file.write(code)
+        with open(os.path.join(self.tree, "robot.cpp"), "w", encoding="utf-8") as file:
+            file.write('#include "config/mine.hpp"\n#include <memory>\nnamespace r = tetap::robot::mine;\nusing Node = tetap::node::Node<r::Estimators>;\n'
+                       "std::unique_ptr<Node> f(const tetap::bus::Version& v) { return std::make_unique<Node>(r::parameters, v); }\n"
+                       "static_assert(r::parameters.wheels.drive.noise_left > 0 && r::parameters.wheels.drive.noise_right > 0);\n")
+        os.makedirs(os.path.join(self.tree, "made/bus"))
+        self.run_here("tools/can/generate_messages --header made/bus/messages.hpp")
+        for compiler in ("g++", "clang++"):
+            self.run_here(f"{compiler} -std=c++20 -fsyntax-only -Wall -Wextra -Werror -I. -Isrc -Imade -isystem /usr/include/eigen3 robot.cpp")
+
     def test_the_table_of_the_readme_is_that_of_make_sim(self):
         self.run_here("make sim")
         with open(os.path.join(self.tree, "out/sim/summary.json"), encoding="utf-8") as file:
@@ -372,6 +453,7 @@ class Lines(unittest.TestCase):
                                 ("largest position error", "max_error_m", "m")):
             cells = [f"{summary[name][key]:.2f} {unit}" for name in ("odometry", "fused")]
             self.assertIn(f"| {what} | {cells[0]} | {cells[1]} |", read("README.md"))
+        self.quoted_lines_are_those_of_the_run(summary)
 
     def test_the_faults_that_are_counted_are_those_there_are(self):
         def printed(*options):

@@ -108,6 +108,33 @@ class Encode(unittest.TestCase):
         self.assertRegex(line, r"^\(2\.500000\) vcan0 308#[0-9A-F]{16}\n$")
         self.assertEqual(int.from_bytes(bytes.fromhex(line.strip().split("#")[1]), "little") & 0xFFFFF, 2500000 % (1 << 20))
 
+    def test_a_batch_is_the_frames_of_its_lines(self):
+        chance, lines, alone = random.Random(3), [], []
+        for number in range(40):
+            seq, left, time = number % 16, chance.randrange(1 << 16), "%d.%02d" % divmod(95 + number, 100)
+            words = ["In_WheelCounts", "Inst=0", "Seq=%d" % seq, "Left=%d" % left, "Right=7", "--time", time, *(["--stamp", "0.5"] if number % 3 == 0 else [])]
+            lines.append(" ".join(words))
+            stamp = 500000 if number % 3 == 0 else (950 + 10 * number) * 1000
+            word = stamp % (1 << 20) | seq << 20 | left << 26 | 7 << 42
+            alone.append("(%d.%02d0000) vcan0 306#%s\n" % (*divmod(95 + number, 100), word.to_bytes(8, "little").hex().upper()))
+        text = "# a comment\n\n" + "\n".join(lines) + "\n"
+        done = subprocess.run([TOOL, "-"], input=text, capture_output=True, text=True, timeout=60)
+        self.assertEqual((done.returncode, done.stderr), (0, ""))
+        self.assertEqual(done.stdout, "".join(alone))
+        self.assertEqual(run(*lines[0].split()).stdout, alone[0])
+        based = subprocess.run([TOOL, "-", "--base", "0x340", "--interface", "can1"], input=lines[1] + "\n", capture_output=True, text=True, timeout=60).stdout
+        self.assertEqual(based, alone[1].replace("vcan0 306", "can1 346"))
+
+    def test_a_line_of_a_batch_that_is_wrong_is_named_and_nothing_is_printed(self):
+        good = "In_MapEntry Id=7 X=1 Y=2 --time 0.5"
+        for bad, reason in (("In_Nothing", "no message 'In_Nothing'"), ("In_MapEntry Id=300", "out of range"), ("In_MapEntry Id=1 X=1 Y=2 --time x", "no time in seconds"),
+                            ("In_MapEntry Id=1 X=1 Y=2 --tme 1", "unrecognized arguments: --tme"), ("In_MapEntry Id='1", "No closing quotation")):
+            done = subprocess.run([TOOL, "-"], input=f"{good}\n{good}\n{bad}\n", capture_output=True, text=True, timeout=60)
+            self.assertEqual((done.returncode, done.stdout, done.stderr.count("\n")), (1, "", 1), done)
+            self.assertIn("line 3: ", done.stderr)
+            self.assertIn(reason, done.stderr)
+        self.assertIn("beside -", run("-", "Id=7").stderr)
+
     def test_bad_words_are_refused_in_one_line_that_says_why(self):
         for words, reason in ((["In_Nothing"], "no message 'In_Nothing'"), (["In_MapEntry", "Id=7", "Z=1"], "no 'Z'; there are: Id X Y"),
                               (["In_MapEntry", "Id=300"], "300 is out of range: 0 to 254"), (["In_MapEntry", "Id=1.5"], "no whole number"),

@@ -280,6 +280,45 @@ class Warnings(Case):
         self.estimates(self.time_s, self.zero, self.zero, self.zero, valid=[0] * 40)
         self.assertIn("warning: fused never had a valid position (is rover the robot of this log?)\n", self.report("--no-pictures").stdout)
 
+    def test_a_robot_without_a_position_is_named_with_the_mode_in_which_it_stayed(self):
+        self.estimates(self.time_s, self.zero, self.zero, self.zero, valid=[0] * 40)
+        mode = {word: number for number, word in metrics.code_names()["Mode"].items()}
+        self.write_rows("status.csv", metrics.STATUS, [[n, self.time_s[n], mode["Boot" if n < 10 else "Aligning"], 0, 0, 0, 0] for n in range(40)])
+        self.assertIn(f"fused never had a valid position: its mode was Aligning for the last {self.time_s[-1] - self.time_s[10]:.0f} s (is rover the robot of this log?)",
+                      self.report("--no-pictures").stdout)
+
+    def counted(self, accepted, estimator=1, sensor="WheelCounts"):
+        code = {word: number for number, word in metrics.code_names()["Sensor"].items()}[sensor]
+        self.write_rows("sensors.csv", metrics.SENSORS, [[n, self.time_s[n], estimator, code, 0, accepted * (n + 1) // 40, 0, None, 0] for n in range(40)])
+        return code
+
+    def test_measurements_that_are_only_counted_are_not_reported_as_none(self):
+        """Accepted wheel counts have no frame each; one that was too late has."""
+        self.estimates(self.time_s, self.zero, self.zero, self.zero)
+        self.write_rows("innovations.csv", metrics.INNOVATIONS, [[0, 1.0, 1, self.counted(1197), 0, 3, 0, None, None, 0, None]])
+        said = self.report("--no-pictures").stdout
+        self.assertRegex(said, r"WheelCounts accepted / rejected +1197 / 0\n")
+        self.assertRegex(said, r"WheelCounts too late +1\n")
+        self.assertNotIn("WheelCounts NIS", said)
+
+    def test_wheels_that_are_used_without_noise_are_named_in_one_sentence(self):
+        self.estimates(self.time_s, self.zero, self.zero, self.zero)
+        parameters = {"wheels.drive.noise_left": 0, "wheels.drive.noise_right": 0, "wheels.wheel_speed_noise": 0, "wheels.noise.speed": 0, "wheels.noise.speed_per_speed": 0.002}
+
+        def warned(accepted, sensor, **changed):
+            self.counted(accepted, sensor=sensor)
+            self.write("run.json", json.dumps({**RUN, "parameters": {**parameters, **changed}}))
+            return [line for line in self.report("--no-pictures").stdout.splitlines() if line.startswith("warning")]
+        self.assertEqual(warned(100, "WheelCounts"), ["warning: WheelCounts are used, but wheels.drive.noise_left and wheels.drive.noise_right are 0: the covariance does not "
+                                                      "grow with the way (docs/tutorial/your_robot.md has usual values)"])
+        self.assertIn("but wheels.drive.noise_right is 0", warned(100, "WheelCounts", **{"wheels.drive.noise_left": 0.002})[0])
+        self.assertEqual(warned(100, "WheelCounts", **{"wheels.drive.noise_left": 0.002, "wheels.drive.noise_right": 0.002}), [])
+        self.assertEqual(warned(0, "WheelCounts"), [])
+        self.assertEqual(warned(100, "BodySpeed"), [])
+        self.assertEqual(len(warned(100, "BodySpeed", **{"wheels.noise.speed_per_speed": 0})), 1)
+        self.assertEqual(len(warned(100, "WheelSpeed")), 1)
+        self.assertEqual(warned(100, "WheelSpeed", **{"wheels.wheel_speed_noise": 1e-5}), [])
+
     def test_a_fault_after_the_end_did_not_happen(self):
         lines = self.run_with(0, about={**RUN, "fault": "kidnapped@20+0,imu_stuck@0.1+3"})
         self.assertEqual(lines, ["warning: fault kidnapped at 20 s, after the end of the run (0 s): it did not happen"])
@@ -469,6 +508,44 @@ class Pictures(Case):
         self.assertLess(east, north)
         self.assertIsNone(fixes.raw_fixes(self.directory))
 
+    def encoded(self, *lines):
+        return subprocess.run([os.path.join(TOOLS, "can", "encode_frame"), "-"], input="\n".join(lines) + "\n", capture_output=True, text=True, check=True).stdout
+
+    def test_fixes_lie_about_the_origin_that_the_node_published_also_of_two_receivers(self):
+        """A thousandth of a degree north at 45 deg north is 111.13 m (WGS84: 111 131.7 m a degree of latitude there)."""
+        from tetap.report import fixes
+        own = self.encoded("In_GnssLat Inst=0 Seq=1 Lat=45.001 --time 1.0", "In_GnssLat Inst=1 Seq=1 Lat=45.002 --time 1.0", "In_GnssLon Inst=0 Seq=1 Lon=11 --time 1.0",
+                           "In_GnssLon Inst=1 Seq=1 Lon=11.001 --time 1.0", "In_GnssLon Inst=0 Seq=2 Lon=11 --time 1.1")
+        self.write("raw.log", own)
+        self.assertIsNone(fixes.raw_fixes(self.directory))
+        self.write("raw.log", own + self.encoded("Est_Origin Sel=Lat Source=Configured Lat=45 --time 1.0", "Est_Origin Sel=Lon Source=Configured Lon=11 --time 1.1"))
+        east, north = fixes.raw_fixes(self.directory)
+        np.testing.assert_allclose(north, [111.1317, 222.2634], atol=0.01)
+        np.testing.assert_allclose(east, [0.0, 78.8468], atol=0.01)
+
+    def test_a_truth_of_another_origin_is_turned_into_the_map_of_the_node(self):
+        """Places by latitude and longitude, put into the plane of each origin through degrees alone (from_enu, whose inverse is another function)."""
+        from tetap.dataset import inertial
+        time_s = 1 + 0.1 * np.arange(60)
+        of, to = (48.0, 11.0, 500.0), (48.05, 11.1, 512.0)  # 9 km apart
+        x, y = 40.0 * np.cos(time_s), 30.0 * np.sin(time_s)
+        lat, lon, height = inertial.from_enu(np.stack([x, y, np.zeros(60)]), of)
+        east, north, _ = inertial.to_enu(*(np.concatenate([[first], rest]) for first, rest in zip(to, (lat, lon, height))))[:, 1:]
+        # Meridians converge northwards: the north of an origin 0.1 deg further west leans to the east.
+        convergence = np.radians(0.1) * np.sin(np.radians(48.025))
+        truth = self.truth(time_s, x, y, np.full(60, 0.3), {"truth_origin": dict(zip(("lat_deg", "lon_deg", "height_m"), of))})
+        self.estimates(time_s, east, north, np.full(60, 0.3 - convergence))
+        self.assertIn("does not have", self.report("--truth", truth).stderr)
+        self.write("raw.log", self.encoded(*(f"Est_Origin Sel={page} Source=FirstFix {page}={value} --time 1.0" for page, value in zip(("Lat", "Lon", "Height"), to))))
+        fused = self.summary("--truth", truth)["fused"]
+        self.assertLess(fused["max_error_m"], 0.002)
+        self.assertLess(fused["heading_rmse_deg"], 0.01)
+        self.assertIn("the truth was turned into the map of Est_Origin, 930", self.report("--truth", truth, "--no-pictures").stdout)
+        self.write("t.json", json.dumps({"truth_origin": {"lat_deg": 48}}))
+        self.assertIn("truth_origin is not {lat_deg, lon_deg, height_m} in numbers", self.report("--truth", truth).stderr)
+        self.write("t.json", "{}")  # without the word the truth stays where it is
+        self.assertGreater(self.summary("--truth", truth)["fused"]["max_error_m"], 9000)
+
     def test_without_pictures_only_the_summary_is_written(self):
         truth = self.run_with_everything()
         before = set(os.listdir(self.directory))
@@ -628,6 +705,21 @@ class Inertial(Case):
     std = {"position": 0.3, "velocity": 0.05, "attitude": 0.01, "gyro bias": 2e-4, "acc bias": 0.02}
     # Of first and second, first and third, second and third.
     corr = {"position": (0.9, 0.3, 0.2), "velocity": (-0.95, 0.3, -0.2), "attitude": (0.2, -0.6, 0.5), "gyro bias": (0.7, 0.1, 0.6), "acc bias": (0, 0, 0.98)}
+
+    def test_two_attitudes_that_come_in_different_epochs_are_compared_at_the_same_time(self):
+        """A turn of 1 rad/s: 50 ms apart the same attitude is 2.9 deg apart, unless one is brought to the other's time."""
+        def yawed(epoch):
+            half = 0.5 * metrics.TICK_S * np.asarray(epoch, dtype=float)  # 1 rad/s
+            return np.stack([np.cos(half), 0 * half, 0 * half, np.sin(half)], axis=1)
+        one, other = 10.0 * np.arange(80) + 3, 10.0 * np.arange(80) + 8
+        tilt, heading = metrics.apart(yawed(other), metrics.attitudes_at(one, yawed(one), other, 20))
+        self.assertEqual(int(np.isfinite(heading).sum()), 79)  # none behind the last
+        self.assertLess(np.degrees(np.nanmax(np.abs(heading))), 0.01)
+        self.assertLess(np.degrees(np.nanmax(tilt)), 0.01)
+        gap = np.delete(one, slice(40, 44))
+        self.assertEqual(int(np.isfinite(metrics.attitudes_at(gap, yawed(gap), other, 20)[:, 0]).sum()), 79 - 5)
+        negated = yawed(one) * np.where(np.arange(80) % 2, -1.0, 1.0)[:, None]  # q and -q are one attitude
+        self.assertLess(np.degrees(np.nanmax(np.abs(metrics.apart(yawed(other), metrics.attitudes_at(one, negated, other, 20))[1]))), 0.01)
 
     def inertial(self, scale=1.0, turn=0.0, between=1.0):
         """A robot at rest at the origin whose estimate errs as it says, times `scale`; `turn`: by how much it is off about the vertical too;

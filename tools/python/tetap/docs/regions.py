@@ -5,7 +5,7 @@ import json
 import os
 import re
 
-from tetap.docs import recorded
+from tetap.docs import campaigns, recorded
 from tetap.docs.figures import commit_before, spaced, table
 
 REGION = re.compile(r"<!-- figures: (\w+) -->\n.*?<!-- end -->\n", re.S)
@@ -48,8 +48,10 @@ def instructions(out):
 
 
 def campaign(out):
-    rows = []
-    for case in loaded(out, "campaign.json")["cases"]:
+    rows, found = [], loaded(out, "campaign.json")
+    if campaigns.plain(found.get("command", campaigns.PROGRAM)) != campaigns.PROGRAM:
+        return None  # of other seeds or another scenario
+    for case in found["cases"]:
         one = case["fused"]
         nees, position, heading, sensors = one["anees"], one["position_rmse_m"], one["heading_rmse_deg"], one["bus"]
         nis = ", ".join(f"{name} {sensors[key]['nis_per_dof']:.3f}" for key, name in (("GnssPosition", "position"), ("GnssVelocity", "velocity"), ("WheelCounts", "wheels"))
@@ -102,7 +104,7 @@ REGIONS = {"memory": ("make size stack", ["size.json", "stack.json"], memory), "
            "nees": (WHOLE, ["inertial.json"], of_whole_runs(recorded.nees_table)),
            "menu": ("test/replay/menu_runs.py build/host/sim_host out/menu", ["menu/menu.json"], bounded("menu/menu.json")),
            "mapping": ("test/replay/mapping_runs.py build/host/sim_host out/mapping --whole", ["mapping/mapping.json"], bounded("mapping/mapping.json")),
-           "mrclam": ("make test STEPS=recorded_runs", [f"recorded/mrclam{robot}/summary.json" for robot in range(1, 6)], mrclam)}
+           "mrclam": ("make test STEPS=recorded_runs", [f"recorded/mrclam{robot}/summary.json" for robot in range(1, 6)], mrclam), **campaigns.REGIONS}
 
 
 def fill(text, out, root):

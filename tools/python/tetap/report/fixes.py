@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Raw GNSS fixes of a run's raw.log, in the plane of its map."""
+"""Raw GNSS fixes of a run, in the plane of its map."""
 import os
 
 import numpy as np
@@ -22,35 +22,52 @@ def metres_per_degree(latitude_deg):
     return np.radians(EQUATOR_M * (1 - SQUARED_ECCENTRICITY) / w ** 1.5), np.radians(EQUATOR_M / np.sqrt(w) * np.cos(np.radians(latitude_deg)))
 
 
+def _frames(path, wanted):
+    """(message, payload) of each frame of these messages, by the end of their identifiers."""
+    ends = {f" {one.identifier:03X}#": one for one in wanted}
+    with open(path, encoding="ascii", errors="replace") as file:
+        for line in file:
+            at = line.find("#")
+            message = ends.get(line[at - 4:at + 1])
+            if message is not None and len(line.rstrip()) >= at + 17:
+                try:
+                    yield message, bytes.fromhex(line[at + 1:at + 17])
+                except ValueError:
+                    continue
+
+
+def published_origin(path):
+    """(latitude, longitude, height) of the map's origin, as published last in that log; None without one. A height that is not available is 0."""
+    message, where = bus_writer.Dbc().messages["Est_Origin"], {}
+    for _, payload in _frames(path, [message]):
+        page = int(_value(payload, message.signals["Sel"]))
+        if page in (0, 1, 2) and _value(payload, message.signals["Source"]) > 0:
+            where[page] = _value(payload, message.signals[("Lat", "Lon", "Height")[page]])
+    if 0 not in where or 1 not in where:
+        return None
+    height_m = where.get(2, 0.0)
+    return where[0], where[1], height_m if abs(height_m) < 16777.2 else 0.0
+
+
 def raw_fixes(directory):
-    """(x, y) in metres east and north of the map's origin; None without raw.log, fixes or origin."""
+    """(x, y) in metres east and north of the map's origin, as the node published it last; None without raw.log, fixes or origin."""
     path = os.path.join(directory, "raw.log")
     if not os.path.exists(path):
         return None
     messages = bus_writer.Dbc().messages
-    latitude, longitude, origin = (messages[name] for name in ("In_GnssLat", "In_GnssLon", "Est_Origin"))
-    wanted = {f" {one.identifier:03X}#": one for one in (latitude, longitude, origin)}
-    where, pairs, waits = {}, [], {}
-    with open(path, encoding="ascii", errors="replace") as file:
-        for line in file:
-            at = line.find("#")
-            message = wanted.get(line[at - 4:at + 1])
-            if message is None or len(line.rstrip()) != at + 17:
-                continue
-            payload = bytes.fromhex(line[at + 1:at + 17])
-            of = {name: signal for name, signal in message.signals.items()}
-            if message is origin:
-                page = int(_value(payload, of["Sel"]))
-                if page in (0, 1) and _value(payload, of["Source"]) > 0:
-                    where[page] = _value(payload, of["Lat" if page == 0 else "Lon"])
-            elif message is latitude:
-                waits[int(_value(payload, of["Seq"]))] = _value(payload, of["Lat"])
-            else:
-                north = waits.pop(int(_value(payload, of["Seq"])), None)
-                if north is not None:
-                    pairs.append((north, _value(payload, of["Lon"])))
-    if len(where) < 2 or not pairs:
+    latitude, longitude = messages["In_GnssLat"], messages["In_GnssLon"]
+    origin = published_origin(path)
+    if origin is None:
         return None
-    fixes = np.array(pairs) - [where[0], where[1]]
-    north_m, east_m = metres_per_degree(where[0])
+    pairs, waits = [], {}
+    for message, payload in _frames(path, [latitude, longitude]):
+        key = int(_value(payload, message.signals["Inst"])), int(_value(payload, message.signals["Seq"]))
+        if message is latitude:
+            waits[key] = _value(payload, message.signals["Lat"])
+        elif key in waits:
+            pairs.append((waits.pop(key), _value(payload, message.signals["Lon"])))
+    if not pairs:
+        return None
+    fixes = np.array(pairs) - np.array(origin[:2])
+    north_m, east_m = metres_per_degree(origin[0])
     return fixes[:, 1] * east_m, fixes[:, 0] * north_m

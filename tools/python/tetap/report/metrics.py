@@ -259,6 +259,12 @@ class Truth:
         later._rows = self._rows.since(start)
         return later
 
+    def with_poses(self, x_m, y_m, yaw_rad):
+        """The same with other poses in its rows."""
+        other = copy.copy(self)
+        other._rows = self._rows.with_columns(x_m=x_m, y_m=y_m, yaw_rad=yaw_rad)
+        return other
+
     epoch = property(lambda self: self._rows["epoch"] if "epoch" in self._rows else None)
     time_s = property(lambda self: self._rows["time_s"])
     x_m = property(lambda self: self._rows["x_m"])
@@ -430,10 +436,24 @@ def disagreement(run):
     a, b = (None, None) if other is None else (run.states_of(other), run.states_of(run.best))
     if a is None or b is None:
         return None
-    # Each is held until its next: they need not come in the same epoch, only within a tenth of a second.
-    columns = [held_at(a["epoch"], a[name], b["epoch"], 0.1 / TICK_S) for name in Q]
-    tilt, heading = apart(np.stack([b[name] for name in Q], axis=1), np.stack(columns, axis=1))
+    # They come in different epochs, and a robot that turns with 1 rad/s turns by 3 deg in the 50 ms between: the one is brought to the other's time.
+    tilt, heading = apart(np.stack([b[name] for name in Q], axis=1), attitudes_at(a["epoch"], three(a, Q), b["epoch"], 0.2 / TICK_S))
     return b["time_s"], tilt, wrapped(-heading)
+
+
+def attitudes_at(epoch, q, at, longest):
+    """Quaternions between those before and after each of `at`, along the chord; NaN outside of them and where they are more than `longest` apart."""
+    if len(epoch) < 2:
+        return np.full((len(at), 4), np.nan)
+    after = np.clip(np.searchsorted(epoch, at), 1, len(epoch) - 1)
+    before = after - 1
+    span = epoch[after] - epoch[before]
+    part = ((at - epoch[before]) / span)[:, None]
+    first, last = q[before], q[after]
+    last = last * np.where((first * last).sum(axis=1, keepdims=True) < 0, -1.0, 1.0)
+    between = (1 - part) * first + part * last
+    inside = (at >= epoch[0]) & (at <= epoch[-1]) & (span <= longest)
+    return np.where(inside[:, None], between / np.linalg.norm(between, axis=1, keepdims=True), np.nan)
 
 def nees_by_row(rows, dx, dy, dyaw, dof):
     """Normalised squared error of each row; NaN without a published covariance or a known error. And how many covariances were of no use."""
@@ -516,9 +536,10 @@ def judge(run, estimator, truth, names):
               "epochs": int(len(valid)), "epochs_not_valid": int((~valid).sum()),
               "measurements": measurements(run.innovations, estimator, names)}
     for sensor, counts in bus_nis(run, estimator, names).items():
-        if counts["nis_per_dof"] is not None:
+        if counts["nis_per_dof"] is not None or sensor in result["measurements"]:
             one = result["measurements"].setdefault(sensor, {"accepted": 0, "rejected": 0, "other": 0, "verdicts": {}})
-            one["bus_nis_per_dof"] = counts["nis_per_dof"]
+            if counts["nis_per_dof"] is not None:
+                one["bus_nis_per_dof"] = counts["nis_per_dof"]
             if counts["accepted"] + counts["rejected"] > MOST_FRAMED * (one["accepted"] + one["rejected"]):
                 one.update(accepted=counts["accepted"], rejected=counts["rejected"], counted="by the node: too fast for a frame each")
     if valid.any():
@@ -683,10 +704,45 @@ def warnings_of(run, judged):
         if one["nees_mean"] is not None and one["nees_mean"] > MOST_NEES:
             found.append(f"NEES mean of {one['name']} is {one['nees_mean']:.0f}, not {one['nees_dof']}")
         if one["kind"] != "Attitude" and one["epochs"] == one["epochs_not_valid"]:
-            found.append(f"{one['name']} never had a valid position")
+            found.append(f"{one['name']} never had a valid position" + (last_mode(run) if one["name"] == run.names[run.best] else ""))
     length_s = float(run.estimates["time_s"][-1] - run.estimates["time_s"][0])
     late = [f"{one.words}, after the end of the run ({length_s:.0f} s)" for one in faults(run) if one.start_s is not None and one.start_s > length_s]
-    return log + ([f"{'; '.join(found)} ({cause})"] if found else []) + [f"fault {one}: it did not happen" for one in late]
+    return (log + ([f"{'; '.join(found)} ({cause})"] if found else []) + [f"fault {one}: it did not happen" for one in late]
+            + wheels_without_noise(run))
+
+
+def last_mode(run):
+    """The mode in which the node stayed, and for how long; nothing without a status."""
+    mode, time_s = run.status["mode"], run.status["time_s"]
+    if not len(mode):
+        return ""
+    since = int(np.flatnonzero(mode != mode[-1])[-1]) + 1 if (mode != mode[-1]).any() else 0
+    word = code_names()["Mode"].get(int(mode[-1]), int(mode[-1]))
+    return f": its mode was {word} for the last {time_s[-1] - time_s[since]:.0f} s"
+
+
+# Sensor: parameters that make its noise, one of each group above 0.
+WHEEL_NOISE = {"WheelCounts": [["wheels.drive.noise_left"], ["wheels.drive.noise_right"]],
+               "WheelSpeed": [["wheels.wheel_speed_noise", "wheels.drive.noise_left"], ["wheels.wheel_speed_noise", "wheels.drive.noise_right"]],
+               "BodySpeed": [["wheels.noise.speed", "wheels.noise.speed_per_speed"]]}
+
+
+def wheels_without_noise(run):
+    """A sentence for each wheel sensor that is used while its noise is 0: the covariance of dead reckoning then does not grow with the way."""
+    parameters, names = run.about.get("parameters"), code_names()["Sensor"]
+    if not isinstance(parameters, dict):
+        return []
+    used = set()
+    for estimator, sensor in {(int(k), int(s)) for k, s in zip(*(run.sensors[name][run.sensors["accepted"] > 0] for name in ("estimator", "sensor")))}:
+        if run.kinds.get(estimator) != "Inertial" or names.get(sensor) == "WheelCounts":  # inertial navigation has parameters of its own for speeds
+            used.add(names.get(sensor))
+    found = []
+    for sensor in sorted(used & set(WHEEL_NOISE)):
+        zero = sorted({path for group in WHEEL_NOISE[sensor] if not any(parameters.get(path, 1) > 0 for path in group) for path in group})
+        if zero:
+            found.append(f"{sensor} are used, but {' and '.join(zero)} {'is' if len(zero) == 1 else 'are'} 0: the covariance does not grow with the way "
+                         "(docs/tutorial/your_robot.md has usual values)")
+    return found
 
 
 def summary(run, truth):

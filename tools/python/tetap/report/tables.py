@@ -77,6 +77,16 @@ class Table:
         values = values if self._index is None else values[self._index]
         return values if self._start is None or name != "time_s" else values - self._start
 
+    def with_columns(self, **columns):
+        """The same, whole, with other values in these columns."""
+        if self._index is not None:
+            raise ValueError("of a whole table alone")
+        changed = dict(self._columns)
+        for name, values in columns.items():
+            changed[name] = Column()
+            changed[name].add(values)
+        return Table(changed, None, self._start)
+
     def where(self, mask):
         """The rows for which `mask` holds."""
         index = np.flatnonzero(mask)
