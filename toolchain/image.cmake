@@ -1,4 +1,4 @@
-# tetap_image(NAME target SOURCES main.cpp ... [LIBRARIES tetap_node ...] [STACK bytes] [OUTPUT name] [DATA ddr|64k] [OFFSET bytes])
+# tetap_image(NAME target SOURCES main.cpp ... [LIBRARIES tetap_node ...] [STACK bytes] [OUTPUT name] [DATA ddr|bytes] [OFFSET bytes])
 # OFFSET: bytes at the begin of the flash that stay a boot loader's, where the board's link.ld has _flash_offset.
 # makes NAME.elf .bin .hex .map in the binary directory, or OUTPUT.elf ... when another file name is wanted. Beside every object of
 # the image lie its .su and .ci (stack use and call graph, GCC's VCG form): CMakeFiles/NAME.dir/.
@@ -52,7 +52,7 @@ function(tetap_image)
   # malloc fails to link, and libm is not there at all.
   target_link_options(${ARG_NAME} PRIVATE -nostdlib -nostartfiles -T ${script} -Wl,--gc-sections -Wl,--print-memory-usage
     -Wl,--fatal-warnings -Wl,-Map=${output}.map $<$<BOOL:${ARG_STACK}>:-Wl,--defsym=_stack_size=${ARG_STACK}>
-    $<$<STREQUAL:${ARG_DATA},ddr>:-Wl,--defsym=_data_in_ddr=1> $<$<STREQUAL:${ARG_DATA},64k>:-Wl,--defsym=_data_64k=1>
+    $<$<STREQUAL:${ARG_DATA},ddr>:-Wl,--defsym=_data_in_ddr=1> $<$<NOT:$<OR:$<STREQUAL:${ARG_DATA},>,$<STREQUAL:${ARG_DATA},ddr>>>:-Wl,--defsym=_data_size=${ARG_DATA}>
     $<$<BOOL:${ARG_OFFSET}>:-Wl,--defsym=_flash_offset=${ARG_OFFSET}>)
   add_custom_command(TARGET ${ARG_NAME} POST_BUILD
     COMMAND ${CMAKE_OBJCOPY} -O binary ${output}.elf ${output}.bin

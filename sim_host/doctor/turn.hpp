@@ -13,7 +13,7 @@ namespace tetap::doctor {
 
 class TurnDetector : public Detector {
  public:
-  explicit TurnDetector(const RobotFacts& robot) : robot_(robot), scale_(wheel_scale(robot)) {}
+  explicit TurnDetector(const RobotFacts& robot) : scale_(wheel_scale(robot)) {}
 
   void sample(base::Micros time, const sensor::Sample& sample) override;
   void window(const Window& w) override;
@@ -31,7 +31,6 @@ class TurnDetector : public Detector {
   void judge_wheels(double gyro2, double by_difference, double by_sum, Findings& findings) const;
   void judge_gyroscope(double ratio, Findings& findings) const;
 
-  const RobotFacts& robot_;
   WheelScale scale_;
   std::string message_;
   Moments<5> moments_;  ///< gyroscope x y z [rad/s], difference and sum of the wheels [m/s]

@@ -20,14 +20,16 @@ constexpr double sample_point(std::uint32_t btr) {
   return (1 + segment1) / (1 + segment1 + segment2);
 }
 
-template <std::uint32_t Rate, std::uint32_t Clock>
-constexpr bool samples_at_875() {
-  constexpr std::uint32_t kBtr = can_bit_timing(Clock, Rate).btr();
-  return bit_rate(kBtr, Clock) == Rate && Clock % Rate == 0 && sample_point(kBtr) == 0.875 && kBtr >> 30 == 0;
+constexpr bool samples_at_875(CanBitTiming timing, std::uint32_t clock_hz, std::uint32_t rate) {
+  const std::uint32_t btr = timing.btr();
+  return bit_rate(btr, clock_hz) == rate && clock_hz % rate == 0 && sample_point(btr) == 0.875 && btr >> 30 == 0;
 }
-static_assert(samples_at_875<125'000, 48'000'000>() && samples_at_875<250'000, 48'000'000>());
-static_assert(samples_at_875<500'000, 48'000'000>() && samples_at_875<1'000'000, 48'000'000>());
-static_assert(samples_at_875<500'000, 16'000'000>());
+constexpr std::uint32_t kApb_hz = 48'000'000, kInternal_hz = 16'000'000;
+static_assert(samples_at_875(can_bit_timing(kApb_hz, 125'000), kApb_hz, 125'000));
+static_assert(samples_at_875(can_bit_timing(kApb_hz, 250'000), kApb_hz, 250'000));
+static_assert(samples_at_875(can_bit_timing(kApb_hz, 500'000), kApb_hz, 500'000));
+static_assert(samples_at_875(can_bit_timing(kApb_hz, 1'000'000), kApb_hz, 1'000'000));
+static_assert(samples_at_875(can_bit_timing(kInternal_hz, 500'000), kInternal_hz, 500'000));
 
 TEST(BxcanTiming, ResynchronisesByTheWholeSecondSegment) {
   constexpr CanBitTiming kTiming = can_bit_timing(48'000'000, 500'000);

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "drivers/gnss/receiver.hpp"
+#include "hal/byte_stream.hpp"
 
 #include <gtest/gtest.h>
 
@@ -112,6 +113,7 @@ struct Line {
     for (const std::uint8_t byte : some) bytes.emplace_back(at_us, byte);
     std::stable_sort(bytes.begin(), bytes.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
   }
+  [[nodiscard]] hal::SerialFaults faults() const { return {}; }
   std::size_t read(std::span<std::uint8_t> in) {
     std::size_t n = 0;
     for (; n < in.size() && at < bytes.size() && bytes[at].first <= now_us; ++at) in[n++] = bytes[at].second;
