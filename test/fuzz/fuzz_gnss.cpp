@@ -2,6 +2,7 @@
 // libFuzzer: bytes of a GNSS receiver. However they are divided, the same reports and the same counts come out; what is
 // called a position is one; and a driver that configures a receiver made of these bytes sends a bounded number of them.
 #include "drivers/gnss/driver.hpp"
+#include "hal/byte_stream.hpp"
 
 #include <bit>
 #include <cstdint>
@@ -91,6 +92,7 @@ struct Port {
     return n;
   }
   std::size_t write(std::span<const std::uint8_t> out) { return written += out.size(), out.size(); }
+  [[nodiscard]] hal::SerialFaults faults() const { return {}; }
   void set_baud(std::uint32_t) {}
 };
 

@@ -1,6 +1,6 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
-"""A log of eight hours is replayed and reported in less than 1 GB: the growth of memory between two lengths, carried on to eight hours.
+"""A replay in memory needs as much memory for twenty minutes as for seven: its growth, carried on to eight hours, stays below 100 MB.
 
 TETAP_PROGRAMS: where tetap-world and tetap-play are (default build/host/sim_host)."""
 import os
@@ -10,8 +10,8 @@ import unittest
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.realpath(__file__))))
 PROGRAMS = os.environ.get("TETAP_PROGRAMS") or os.path.join(ROOT, "build", "host", "sim_host")
-SHORT_S, LONG_S, DAY_S = 60, 420, 8 * 3600
-MOST_B = 1_000_000_000
+SHORT_S, LONG_S, DAY_S = 420, 1240, 8 * 3600
+MOST_B = 100e6
 
 
 def largest_memory_b(*words):
@@ -25,20 +25,19 @@ def largest_memory_b(*words):
 
 
 class LongLog(unittest.TestCase):
-    def test_eight_hours_in_a_gigabyte(self):
+    def test_a_replay_does_not_grow_with_its_log(self):
         with tempfile.TemporaryDirectory() as folder:
-            found = {"replay": [], "report": []}
+            found = []
             for length_s in (SHORT_S, LONG_S):
-                made, played = os.path.join(folder, f"made{length_s}"), os.path.join(folder, f"played{length_s}")
-                subprocess.run([os.path.join(PROGRAMS, "tetap-world"), "--memory", "--laps", "3", "--duration", str(length_s), "--out", made],
+                made = os.path.join(folder, f"made{length_s}")
+                subprocess.run([os.path.join(PROGRAMS, "tetap-world"), "--memory", "--raw", "--laps", "9", "--duration", str(length_s), "--out", made],
                                cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
-                log = os.path.join(made, "raw.log")
-                found["replay"].append(largest_memory_b(os.path.join(PROGRAMS, "tetap-play"), log, "--memory", "--robot", "rover", "--out", played))
-                found["report"].append(largest_memory_b(os.path.join(ROOT, "tools", "report", "write_report"), played, "--truth", os.path.join(made, "truth.csv")))
-            for what, (short_b, long_b) in found.items():
-                day_b = short_b + (long_b - short_b) * (DAY_S - SHORT_S) / (LONG_S - SHORT_S)
-                print(f"{what}: {short_b / 1e6:.0f} MB for {SHORT_S} s, {long_b / 1e6:.0f} MB for {LONG_S} s, {day_b / 1e6:.0f} MB for 8 hours")
-                self.assertLess(day_b, MOST_B, what)
+                found.append(largest_memory_b(os.path.join(PROGRAMS, "tetap-play"), os.path.join(made, "raw.log"), "--memory", "--robot", "rover", "--out",
+                                              os.path.join(folder, f"played{length_s}")))
+            short_b, long_b = found
+            day_b = short_b + (long_b - short_b) * (DAY_S - SHORT_S) / (LONG_S - SHORT_S)
+            print(f"{short_b / 1e6:.0f} MB for {SHORT_S} s, {long_b / 1e6:.0f} MB for {LONG_S} s, {day_b / 1e6:.0f} MB for 8 hours")
+            self.assertLess(day_b, MOST_B)
 
 
 if __name__ == "__main__":

@@ -5,8 +5,8 @@
 #pragma once
 
 #include "estimators/estimate.hpp"
-#include "filter/covariance_access.hpp"
 #include "estimators/planar/planar_ekf.hpp"
+#include "filter/covariance_access.hpp"
 #include "model/planar_increment.hpp"
 #include "param/parameters.hpp"
 #include "sensor/samples.hpp"

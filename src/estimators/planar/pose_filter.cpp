@@ -128,7 +128,7 @@ Innovation PoseFilter<Filter>::fuse(const sensor::GnssPosition& fix, base::Micro
   return {.verdict = sensor::Verdict::kAccepted};
 }
 
-template class PoseFilter<PlanarEkf>;  // PoseEkf
+template class PoseFilter<PlanarEkf>;                       // PoseEkf
 template class PoseFilter<filter::Ukf<model::PlanarPose>>;  // PoseUkf
 template class PoseFilter<filter::UkfSqrt<model::PlanarPose>>;
 

@@ -430,6 +430,9 @@ def apart(q, reference):
     return tilt, wrapped(2 * np.arctan2(d[:, 3], d[:, 0]))
 
 
+PART = 1 << 14  # epochs that are worked on at once
+
+
 def disagreement(run):
     """(time, tilt, heading) between the attitude filter and the best estimate, where both publish an attitude at the same epoch; None else."""
     other = next((k for k in run.estimators if run.kinds[k] == "Attitude"), None)
@@ -437,7 +440,11 @@ def disagreement(run):
     if a is None or b is None:
         return None
     # They come in different epochs, and a robot that turns with 1 rad/s turns by 3 deg in the 50 ms between: the one is brought to the other's time.
-    tilt, heading = apart(np.stack([b[name] for name in Q], axis=1), attitudes_at(a["epoch"], three(a, Q), b["epoch"], 0.2 / TICK_S))
+    q, epochs, own = three(a, Q), b["epoch"], [b[name] for name in Q]
+    tilt, heading = np.empty(len(epochs)), np.empty(len(epochs))
+    for first in range(0, len(epochs), PART):  # in parts: a log of hours does not fit several times
+        part = slice(first, first + PART)
+        tilt[part], heading[part] = apart(np.stack([one[part] for one in own], axis=1), attitudes_at(a["epoch"], q, epochs[part], 0.2 / TICK_S))
     return b["time_s"], tilt, wrapped(-heading)
 
 
