@@ -22,7 +22,8 @@ namespace tetap::base {
   constexpr std::int32_t kPerMetre = 1'000'000;
   const auto near = static_cast<std::int32_t>(um);
   if (near != um) return far_metres(um);
-  return static_cast<float>(near / kPerMetre) + static_cast<float>(near % kPerMetre) * 1e-6F;
+  const std::int32_t whole = near / kPerMetre;
+  return static_cast<float>(whole) + static_cast<float>(near % kPerMetre) * 1e-6F;
 }
 
 /// Metres as micrometres, rounded to nearest; saturates at +-2000 m (callers hold offsets below 256 m). NaN gives 0.

@@ -56,7 +56,8 @@ class Node {
     if (!pending_pose_ || ((pose.counter - pending_pose_->counter) & 0x0F) < 8) pending_pose_ = pose;
   }
   void reset(bus::ResetWhat what) {
-    if (what >= bus::ResetWhat::kWiredOff) return switch_wired(what == bus::ResetWhat::kWiredOff);
+    if (what == bus::ResetWhat::kWiredOff || what == bus::ResetWhat::kWiredOn)
+      return switch_wired(what == bus::ResetWhat::kWiredOff);
     pending_reset_[static_cast<std::size_t>(what)] = true;
   }
 

@@ -99,5 +99,5 @@ struct Print {
 
 int main(int argc, char** argv) {
   const int rounds = argc > 1 ? std::atoi(argv[1]) : 20;
-  for (int i = 0; i < rounds; ++i) bus::AllMessages<Print>::all(i % 2 == 0 ? 0x300 : 0x340);
+  for (int i = 0; i < rounds; ++i) bus::AllMessages<Print>::all(i % 2 == 0 ? 0x300 : 0x380);
 }

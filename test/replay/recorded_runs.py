@@ -54,7 +54,7 @@ def main():
         summary = replay(programs, out, name, "mrclam")
         # The plain EKF took the camera's depth for a range, which is most of its error.
         bound(f"{name} position RMSE [m]", summary["position_rmse_m"], position / 3, 0.8 * position)
-        bound(f"{name} NEES (3 expected)", summary["nees_mean"], 1, 4.5)
+        bound(f"{name} NEES (3 expected)", summary["fused"]["nees_mean"], 1, 4.5)
         bound(f"{name} heading RMSE [deg]", summary["heading_rmse_deg"], heading / 2, heading)
         bound(f"{name} frames lost", summary["frames_lost"], 0, 0)
         print(f"  {name} times real time {summary['times_realtime']:.0f} (a benchmark, not a test)")

