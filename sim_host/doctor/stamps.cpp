@@ -179,6 +179,7 @@ void StampDetector::judge_ages(const std::vector<Age>& ages, Findings& findings)
 
 void StampDetector::judge_drifts(const std::vector<Age>& ages, Findings& findings) const {
   std::vector<double> slopes;
+  slopes.reserve(ages.size());
   for (const Age& age : ages) slopes.push_back(age.drift_ppm);
   std::nth_element(slopes.begin(), slopes.begin() + static_cast<std::ptrdiff_t>(slopes.size() / 2), slopes.end());
   // Without In_Sync the log's own clock may run otherwise than the bus's: what most devices share is that.

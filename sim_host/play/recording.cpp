@@ -285,8 +285,8 @@ void RecordSurvey::close_life(std::uint64_t end) {
 }
 
 std::string RecordSurvey::reason_of_difference() const {
-  const std::string other = "from the epoch at " + in_seconds(*result_.inputs_differ_at) +
-                            " on the node consumed other input frames than the log holds";
+  std::string other = "from the epoch at " + in_seconds(*result_.inputs_differ_at) +
+                      " on the node consumed other input frames than the log holds";
   if (unlogged_seen_) return other + ": its bus did not take all of its wired samples (Unlogged)";
   if (conflict_seen_) return other + ": another node sends the same ids (IdConflict)";
   if (result_.rx_overflow > 0)
