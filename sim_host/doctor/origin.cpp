@@ -2,6 +2,7 @@
 #include "sim_host/doctor/origin.hpp"
 
 #include "base/wgs84.hpp"
+#include "sim_host/doctor/plane.hpp"
 
 #include <array>
 #include <cmath>
@@ -10,7 +11,6 @@
 namespace tetap::doctor {
 namespace {
 
-constexpr double kEarth_m = 6371008.8;
 constexpr double kMapRange_m = 105'000;  ///< beyond, the node itself sets OriginOutOfRange
 constexpr int kLeastFixes = 3;
 

@@ -7,11 +7,6 @@
 #include <numbers>
 
 namespace tetap::doctor {
-namespace {
-
-constexpr double kEarth_m = 6371008.8;  ///< mean radius
-
-}  // namespace
 
 PlanePoint Plane::at(const sensor::GnssPosition& fix) {
   const double latitude = static_cast<double>(fix.latitude_2ndeg) * base::kRadPer2ndeg;

@@ -6,6 +6,9 @@
 
 namespace tetap::doctor {
 
+inline constexpr double kEarth_m =
+    6371008.8;  ///< mean radius (Moritz 2000, J. Geodesy 74, "Geodetic Reference System 1980")
+
 /// A fix on the plane of the first one.
 struct PlanePoint {
   double east_m = 0, north_m = 0, up_m = 0;

@@ -2,6 +2,7 @@
 #include "estimators/mapping/planar_mapper.hpp"
 
 #include "base/reinitialise.hpp"
+#include "estimators/planar/window_motion.hpp"
 
 namespace tetap::estimators {
 
@@ -55,14 +56,7 @@ void PlanarMapper<Engine>::advance(base::Micros t, const Context& ctx, const sen
   now_ = t;
   motion_.advance(t);
   present_ = motion_;
-  for (std::size_t i = 0; i < window.size(); ++i) {
-    const sensor::Sample& sample = window[i];
-    if (sample.sensor == sensor::Sensor::kImu && !is_imu(sample, ctx.parameters.inertial.imu)) continue;
-    visit(sample, [&](const auto& payload) {
-      if constexpr (requires { present_.fuse(payload, sample.stamp, ctx.parameters); })
-        static_cast<void>(present_.fuse(payload, sample.stamp, ctx.parameters));
-    });
-  }
+  move_through(window, present_, ctx.parameters);
   digest_.scan(engine_.words(), kScanned, [this](std::size_t i, auto& sink) { engine_.hash_word(i, sink); });
 }
 

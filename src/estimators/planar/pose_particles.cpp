@@ -2,6 +2,7 @@
 #include "estimators/planar/pose_particles.hpp"
 
 #include "base/reinitialise.hpp"
+#include "estimators/planar/window_motion.hpp"
 #include "model/range_bearing.hpp"
 
 namespace tetap::estimators {
@@ -66,14 +67,7 @@ void PoseParticles<kMost>::advance(base::Micros t, const Context& ctx, const sen
   now_ = t;
   motion_.advance(t);
   present_ = motion_;
-  for (std::size_t i = 0; i < window.size(); ++i) {
-    const sensor::Sample& sample = window[i];
-    if (sample.sensor == sensor::Sensor::kImu && !is_imu(sample, ctx.parameters.inertial.imu)) continue;
-    visit(sample, [&](const auto& payload) {
-      if constexpr (requires { present_.fuse(payload, sample.stamp, ctx.parameters); })
-        static_cast<void>(present_.fuse(payload, sample.stamp, ctx.parameters));
-    });
-  }
+  move_through(window, present_, ctx.parameters);
   digest_.scan(cloud_.cloud.size(), kScanned, [this](std::size_t i, auto& sink) { this->hash_particle(i, sink); });
 }
 
