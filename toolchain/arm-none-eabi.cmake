@@ -16,7 +16,7 @@ list(APPEND CMAKE_TRY_COMPILE_PLATFORM_VARIABLES TETAP_CORE)
 
 if(TETAP_CORE STREQUAL "r5")
   # VFPv3-D16: no fused multiply-add.
-  set(TETAP_CORE_FLAGS "-mcpu=cortex-r5 -mfpu=vfpv3-d16 -mfloat-abi=hard -marm")
+  set(TETAP_CORE_FLAGS "-mcpu=cortex-r5 -mfpu=vfpv3-d16 -mfloat-abi=hard -mthumb")
 elseif(TETAP_CORE STREQUAL "m7")
   set(TETAP_CORE_FLAGS "-mcpu=cortex-m7 -mfpu=fpv5-d16 -mfloat-abi=hard -mthumb")
 elseif(TETAP_CORE STREQUAL "m4f")

@@ -13,7 +13,7 @@ extern "C" {
 [[noreturn]] void tetap_start();
 [[noreturn]] void tetap_exception(std::uint32_t kind, std::uint32_t address);
 
-[[gnu::naked, gnu::used, gnu::section(".vectors")]] void _start() {
+[[gnu::naked, gnu::used, gnu::target("arm"), gnu::section(".vectors")]] void _start() {
   asm volatile(
       "b tetap_reset\n"
       "b tetap_undefined\n"
@@ -25,7 +25,7 @@ extern "C" {
       "b tetap_fiq\n");
 }
 
-[[gnu::naked, gnu::used]] void tetap_reset() {
+[[gnu::naked, gnu::used, gnu::target("arm")]] void tetap_reset() {
   asm volatile(
       "cpsid if\n"
       "cps #0x1F\n"  // system mode for good: there are no interrupts and no privileges to lose
@@ -54,7 +54,7 @@ extern "C" {
 
 // Each mode has its own stack pointer; one small stack is enough, because nothing returns from here.
 #define TETAP_EXCEPTION(name, kind, offset) \
-  [[gnu::naked, gnu::used]] void name() {   \
+  [[gnu::naked, gnu::used, gnu::target("arm")]] void name() {   \
     asm volatile(                           \
         "ldr sp, =__exception_stack_top\n"  \
         "mov r0, #" #kind                   \
