@@ -22,7 +22,7 @@ struct CanFaults {
 template <class B>
 concept CanBus = requires(B& bus, const B& view, const base::CanFrame& frame) {
   /// Takes the frame for transmission; false: no room, the frame is not taken. Frames leave in the order of these
-  /// calls, whatever their identifiers: a log then shows an input of the node's own before the epoch that consumed it.
+  /// calls, whatever their identifiers. A log then shows an input of the node's own before the epoch that consumed it.
   { bus.send(frame) } -> std::same_as<bool>;
   /// The next received frame, in order of arrival; empty: none now. Never waits.
   { bus.receive() } -> std::same_as<std::optional<base::CanFrame>>;

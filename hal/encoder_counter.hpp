@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a driver asks of a timer in quadrature mode: its free-running count and, where the timer can capture it, the
-// time of the last edge that was counted.
+// A timer in quadrature mode as a driver needs it: its free-running count and, where the timer can capture it, the time
+// of the last counted edge.
 #pragma once
 
 #include "base/time.hpp"

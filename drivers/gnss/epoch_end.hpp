@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Learns which message is the last of an epoch, so that an epoch can be handed on with it and not only when the next
-// one begins: the last message of the epoch before is expected to be the last of this one.
+// Learns which message is the last of an epoch, so that an epoch is handed on with it and not with the next one. The
+// last message of the epoch before is expected to be the last of this one.
 #pragma once
 
 #include <array>

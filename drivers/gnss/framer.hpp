@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Finds UBX, NMEA 0183 and RTCM 3 frames in one stream of bytes. A frame counts only when its checksum fits; otherwise
-// the search goes on one byte after its start, within what is already buffered, so damage costs only the damaged frame.
+// Finds UBX, NMEA 0183 and RTCM 3 frames in one stream of bytes. A frame counts only when its checksum fits. Otherwise
+// the search goes on one byte after its start, within the buffered bytes, so damage costs only the damaged frame.
 // Frames: u-blox F9 HPG 1.32 interface description, sec. 3.2 to 3.4; NMEA 0183 v4.1 sec. 5.3; RTCM 10403.3, sec. 4.
 #pragma once
 

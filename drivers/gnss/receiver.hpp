@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A GNSS receiver that speaks UBX, NMEA or both, fed byte by byte: reports of whole epochs come out, the same ones
-// however the bytes are divided. What was refused is counted with its reason.
+// A GNSS receiver that speaks UBX, NMEA or both, fed byte by byte. Reports of whole epochs come out, the same ones
+// however the bytes are divided. Refused bytes and messages are counted with their reason.
 #pragma once
 
 #include "drivers/gnss/framer.hpp"

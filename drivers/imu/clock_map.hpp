@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A sensor's own clock as seen by the MCU's. A sample cannot be read before it exists, and the luckiest reading comes
-// at once: the line under all pairs (ticks, time of reading) is the sensor's clock. Its offset follows the lowest pair
-// of each window, its rate what the offset did from window to window (a loop of second order; poles at 0.71).
+// at once. The line under all pairs (ticks, time of reading) is the sensor's clock. Its offset follows the lowest pair
+// of each window, its rate the change of the offset between windows (a loop of second order; poles at 0.71).
 #pragma once
 
 #include "base/time.hpp"

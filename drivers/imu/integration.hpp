@@ -26,8 +26,8 @@ class ImuIntegrator {
   /// `readings` make one increment, or as many as fit into the 65 ms that a sample's interval can hold.
   explicit constexpr ImuIntegrator(std::uint8_t readings) : readings_(readings > 0 ? readings : std::uint8_t{1}) {}
 
-  /// An increment, when this reading completes one. A gap ends the one begun, without what is missing: then the next
-  /// does not begin where the last one ended, and whoever integrates further sees it.
+  /// An increment, when this reading completes one. A gap ends the one begun, without the missing part. The next then
+  /// does not begin where the last one ended, which shows to every later integrator.
   constexpr std::optional<StampedImu> add(const ImuReading& reading) {
     std::optional<StampedImu> out{};
     if (reading.after_gap) {

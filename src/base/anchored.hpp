@@ -57,7 +57,7 @@ struct Anchored {
   [[nodiscard]] constexpr std::int64_t um() const { return anchor_um + micrometres(offset_m); }
 
  private:
-  /// Moves the anchor so that the offset is small again. The step 256 m is exact in float and in micrometres, and x -
+  /// Moves the anchor so that the offset is small again. The step of 256 m is exact in float and in micrometres. x -
   /// 256 is exact for x in [128, 512] (Sterbenz), so no bit of the position is lost. A jump beyond is re-anchored
   /// whole.
   [[gnu::noinline]] constexpr void settle() {

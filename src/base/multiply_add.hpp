@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Sums of products, rounded after the product and after the sum, as every target does without contraction. The
-// compiler writes two instructions for them where both roundings are kept; the Cortex-M7 has one that rounds
-// twice (ARMv7-M Architecture Reference Manual, VMLA, VMLS), so that the bits are the same.
+// Sums of products, rounded after the product and after the sum, as every target does without contraction. The compiler
+// writes two instructions where both roundings are kept. The Cortex-M7 has one that rounds twice (ARMv7-M Architecture
+// Reference Manual, VMLA, VMLS), with the same bits.
 #pragma once
 
 namespace tetap::base {

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// An object as it was when it was made, made anew in its own place: no copy of it passes over the stack, and nothing is
-// allocated.
+// Construction of an object anew in its own place. No copy of it passes over the stack, and nothing is allocated.
 #pragma once
 
 #include <new>

@@ -13,8 +13,8 @@
 namespace tetap::base {
 
 /// The mixing steps of MurmurHash3 (A. Appleby, 2011, public domain) over 32-bit words. Each step is a bijection of the
-/// state, so one word that differs is always seen; cheaper than a CRC, which matters on 2^24 values of an emulated
-/// core.
+/// state, so one word that differs always changes the hash. It is cheaper than a CRC, which matters for 2^24 values on
+/// an emulated core.
 class WordHash {
  public:
   constexpr void operator()(std::uint32_t word) {
@@ -35,8 +35,8 @@ class WordHash {
   std::uint32_t state_ = 0;
 };
 
-/// f(hash, x) for n floats. Multiples of an odd number modulo 2^32 (here 2^32 over the golden ratio) are all different
-/// and lie evenly over the encodings: subnormals, infinities' neighbours and NaNs of both kinds have their share.
+/// f(hash, x) for n floats. Multiples of an odd number modulo 2^32 (here 2^32 over the golden ratio) are all different.
+/// They lie evenly over the encodings: subnormals, infinities' neighbours and NaNs of both kinds have their share.
 template <class F>
 [[nodiscard]] constexpr std::uint32_t hash_of_floats(std::uint32_t n, F&& f) {
   WordHash hash;
@@ -65,8 +65,8 @@ template <class F>
   return hash.value();
 }
 
-/// report(name, hash) for every function of base/math.hpp on n inputs, for n draws of the random generator, and for
-/// every function in double, which a core may do in software, on n/64.
+/// report(name, hash) for every function of base/math.hpp on n inputs, and for n draws of the random generator.
+/// Functions in double, which a core may compute in software, get n/64 inputs.
 template <class Report>
 void check_functions(std::uint32_t n, Report&& report) {
   report("sin", hash_of_floats(n, [](WordHash& h, float x) { h(sin(x)); }));

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Digest of a state too large to hash in every tick: what goes into each update and comes out of it is hashed at once,
-// the memory itself a part at a time, round-robin. A bit that differs shows with the update that uses it, and at the
-// latest when the round has come to it.
+// Digest of a state too large to hash in every tick. Inputs and results of each update are hashed at once, the memory
+// itself in parts, round-robin. A bit that differs shows with the update that uses it, at the latest after one round.
 #pragma once
 
 #include "base/bit_crc.hpp"

@@ -17,8 +17,8 @@ struct Micros {
   constexpr Micros& operator+=(Micros b) { return us += b.us, *this; }
 };
 
-/// The span in seconds, for |span| <= 2147 s; longer ones saturate there, so the conversion from integer stays the
-/// hardware's single correctly rounded instruction on every target.
+/// The span in seconds, for |span| <= 2147 s; longer spans saturate. The conversion from integer stays the hardware's
+/// single correctly rounded instruction on every target.
 [[nodiscard]] constexpr float seconds(Micros span) {
   constexpr std::int64_t kLimit_us = 2'147'000'000;
   const std::int64_t us = span.us > kLimit_us ? kLimit_us : span.us < -kLimit_us ? -kLimit_us : span.us;

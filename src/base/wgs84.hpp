@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The WGS84 ellipsoid (NIMA TR8350.2, table 3.1): latitude, longitude, height to Earth-centred, Earth-fixed coordinates
-// (Torge & Mueller 2012, sec. 4.1.3) and back, and directions between ECEF and east, north, up. In bit-identical
-// double, as gravity by latitude is: a float holds 0.5 m of the Earth's radius.
+// The WGS84 ellipsoid (NIMA TR8350.2, table 3.1). Latitude, longitude, height to Earth-centred, Earth-fixed coordinates
+// and back (Torge & Mueller 2012, sec. 4.1.3), and directions between ECEF and east, north, up. Bit-identical double,
+// as for gravity by latitude: a float holds 0.5 m of the Earth's radius.
 #pragma once
 
 #include "base/math_double.hpp"
@@ -64,8 +64,8 @@ struct Level {
           .z = (n * (1.0 - kEccentricity2) + height_m) * at.latitude.sin};
 }
 
-/// Bowring's formula (Survey Review 23(181), 1976), applied twice: from 6000 km to 60 000 km off the Earth's centre its
-/// own error is below 1e-9 m, and what is left is the rounding of the result. Empty: further in or out, or not a place.
+/// Bowring's formula (Survey Review 23(181), 1976), applied twice. From 6000 km to 60 000 km off the Earth's centre its
+/// own error is below 1e-9 m; the rest is the rounding of the result. Empty: further in or out, or not a place.
 [[nodiscard]] constexpr std::optional<Geodetic> geodetic_of(const Ecef& p_m) {
   constexpr double kSecondEccentricity2 = kEccentricity2 / (1.0 - kEccentricity2);
   constexpr double kUnitsPerRad = 180.0 / 3.14159265358979323846 / 2e-9;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The velocity of a point of the body in the body's own axes, and how the errors of inertial navigation show in it:
-// what wheels and the non-holonomic constraint measure (Dissanayake et al. 2001, IEEE T-RA 17(5)).
+// Velocity of a point of the body in the body's own axes, and how the errors of inertial navigation show in it. Wheels
+// and the non-holonomic constraint measure it (Dissanayake et al. 2001, IEEE T-RA 17(5)).
 #pragma once
 
 #include "filter/state.hpp"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Constant acceleration in the plane, state (x, vx, ax, y, vy, ay), driven by white increments of the acceleration
+// Constant acceleration in the plane, state (x, vx, ax, y, vy, ay). White increments of the acceleration drive it
 // (Bar-Shalom, Li, Kirubarajan 2001, sec. 6.3.3: discrete Wiener process acceleration model).
 #pragma once
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Constant velocity in the plane, state (x, vx, y, vy), driven by white acceleration
-// (Bar-Shalom, Li, Kirubarajan 2001, eq. 6.2.2-12: discretised continuous noise is q dt^3/3 ...; this is the
-// piecewise-constant acceleration form, eq. 6.3.2-4, q in (m/s^2)^2).
+// Constant velocity in the plane, state (x, vx, y, vy), driven by white acceleration. This is the piecewise-constant
+// form, q in (m/s^2)^2 (Bar-Shalom, Li, Kirubarajan 2001, eq. 6.3.2-4); eq. 6.2.2-12 is the discretised continuous one,
+// q dt^3/3.
 #pragma once
 
 #include "filter/kalman.hpp"

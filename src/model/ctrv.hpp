@@ -30,8 +30,8 @@ struct CtrvState {
   [[nodiscard]] bool finite() const { return filter::VectorState<Scalar, 5>{value}.finite(); }
 };
 
-/// Accelerations along the path and of the yaw, constant within a step, enter as noise w = (m/s^2, rad/s^2): predict(x,
-/// w) for augmented filters; jacobian() and the Q it makes of them for the others.
+/// Accelerations along the path and of the yaw, constant within a step, enter as noise w = (m/s^2, rad/s^2). predict(x,
+/// w) is for augmented filters; jacobian() and the Q that it forms are for the others.
 template <class Scalar>
 struct Ctrv {
   using State = CtrvState<Scalar>;

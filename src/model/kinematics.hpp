@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Position and velocity of a tracked target, from any of the states that motion models give it, and the line of sight
-// of a sensor that watches it.
+// Position and velocity of a tracked target, from any state of the motion models, and the line of sight of a sensor
+// that watches it.
 #pragma once
 
 #include "model/ctrv.hpp"

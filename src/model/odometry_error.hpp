@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the error sources of a differential drive make of a straight drive: slip, unlike wheels, encoder steps and the
-// initial heading (Borenstein & Feng, IEEE Trans. Robotics and Automation 12(6), 1996; Siegwart, Nourbakhsh, Scaramuzza
-// 2011, sec. 5.2.4).
+// Error sources of a differential drive on a straight way: slip, unlike wheels, encoder steps and the initial heading.
+// Borenstein & Feng, IEEE Trans. Robotics and Automation 12(6), 1996; Siegwart, Nourbakhsh, Scaramuzza 2011, sec.
+// 5.2.4.
 #pragma once
 
 #include "filter/symmetric.hpp"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Unicycle: forward speed and yaw rate held over a step, each with white noise of a stated density
-// (Thrun, Burgard, Fox 2005, sec. 5.3 and 7.4: noise in control space, growing with the motion).
+// Unicycle: forward speed and yaw rate held over a step, each with white noise of a stated density. Thrun, Burgard, Fox
+// 2005, sec. 5.3 and 7.4: noise in control space, which grows with the motion.
 #pragma once
 
 #include "model/planar_increment.hpp"

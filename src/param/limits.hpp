@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is plausible: each value within its row's limits, and rules between fields. A robot's parameters are refused
-// where they are written: `constexpr Parameters parameters = checked({...})` does not compile when one is implausible,
-// and the compiler's message has path, value and limits (tools/run/explain_refusal makes one sentence of it).
+// Plausibility of parameters: each value within its row's limits, and rules between fields. A robot's parameters are
+// refused where they are written: `constexpr Parameters parameters = checked({...})` does not compile with an
+// implausible one. The compiler's message has path, value and limits; tools/run/explain_refusal forms one sentence of
+// it.
 #pragma once
 
 #include "param/table.hpp"
@@ -52,8 +53,8 @@ constexpr bool wheels_complete(const model::DifferentialDrive& d) {
   const bool none = d.left_radius_m <= 0 && d.right_radius_m <= 0 && d.track_m <= 0;
   return none || (d.left_radius_m >= 0.005F && d.right_radius_m >= 0.005F && d.track_m >= 0.01F);
 }
-/// Degrees, u-blox' 1e-7 degrees or radians taken for steps of 2e-9 degrees lie in the open sea off Ghana: within 1.8
-/// degrees of the equator and 3.6 degrees of Greenwich there is no land.
+/// Degrees, u-blox' 1e-7 degrees or radians taken for steps of 2e-9 degrees lie in the open sea off Ghana. There is no
+/// land within 1.8 degrees of the equator and 3.6 degrees of Greenwich.
 constexpr bool origin_on_land(const GnssParameters& g) {
   constexpr std::int64_t kDegree = 500'000'000;
   const auto within = [](std::int64_t x, std::int64_t limit) { return x >= -limit && x <= limit; };

@@ -44,9 +44,9 @@ struct WheelParameters {
   float most_mps = 50;                ///< fastest rim of a wheel; a faster step or speed is refused
 };
 
-/// The IMU's own errors as tools/calibrate/calibrate_robot finds them, in its own axes: specific force = accel_matrix
-/// (raw - accel_bias), turn rate = raw - gyro_bias - slope (temperature - at); without a temperature the slope is not
-/// used. What estimators publish as a bias is what is left.
+/// The IMU's own errors as tools/calibrate/calibrate_robot finds them, in its own axes. Specific force = accel_matrix
+/// (raw - accel_bias). Turn rate = raw - gyro_bias - slope (temperature - at); without a temperature the slope is not
+/// used. Estimators publish the rest as a bias.
 struct ImuParameters {
   std::array<float, 3> accel_bias_mps2{0, 0, 0};
   std::array<float, 9> accel_matrix{1, 0, 0, 0, 1, 0, 0, 0, 1};  ///< scale and misalignment, row by row

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Puts the NMEA sentences of one time of day together into one report: GGA, GNS, RMC, VTG, GSA, GST and ZDA of any
-// talker. A sentence with another time begins the next epoch, and so does a second one of the same talker and kind:
-// some receivers cut the fraction of the second off. VTG and GSA have no time and belong to the epoch they come in.
-// NMEA 0183 v4.1, sec. 6.3; u-blox F9 HPG 1.32 interface description, sec. 2.7.
+// Joins the NMEA sentences of one time of day in one report: GGA, GNS, RMC, VTG, GSA, GST and ZDA of any talker. A
+// sentence with another time begins the next epoch. A second one of the same talker and kind does too: some receivers
+// cut the fraction of the second off. VTG and GSA have no time and belong to the epoch they come in. NMEA 0183 v4.1,
+// sec. 6.3; u-blox F9 HPG 1.32 interface description, sec. 2.7.
 #pragma once
 
 #include "base/crc.hpp"

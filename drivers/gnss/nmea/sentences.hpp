@@ -42,8 +42,8 @@ enum class Solution : std::uint8_t {
   kRtkFloat,
   kRtkFixed
 };
-/// GGA field 6, by NMEA 0183 v4.1 sec. 6.3 for 0 to 8 and NovAtel OEM7 (log GPGGA) for 9; 3 is the precise service
-/// (PPS). docs/reference/receivers.md has the manuals figure by figure.
+/// GGA field 6: NMEA 0183 v4.1 sec. 6.3 for 0 to 8, NovAtel OEM7 (log GPGGA) for 9. 3 is the precise service (PPS).
+/// docs/reference/receivers.md has the manuals figure by figure.
 inline constexpr std::array<Solution, 10> kQualities{
     Solution::kNone,        Solution::kAutonomous,  Solution::kDifferential, Solution::kAutonomous,
     Solution::kRtkFixed,    Solution::kRtkFloat,    Solution::kNotMeasured,  Solution::kNotMeasured,

@@ -35,7 +35,7 @@ constexpr void course_of_ends(float east_acc_m, float north_acc_m, Baseline& b) 
   b.course_acc_rad = base::sqrt(across_east * across_east + across_north * across_north) / square;
 }
 
-/// Whether the length is that of the antennas on the robot; a wrong integer ambiguity changes it by a part of 19 cm,
+/// Whether the length is that of the antennas on the robot. A wrong integer ambiguity changes it by a part of 19 cm,
 /// the wavelength of L1. The 5 cm are for the tape; `mounted_m` 0: not checked.
 [[nodiscard]] constexpr bool has_length(const Baseline& b, float mounted_m) {
   constexpr float kTape_m = 0.05F;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Brings a u-blox receiver to send NAV-PVT and the messages wanted besides at the wanted rate and baud rate, and NMEA
-// no more: finds its baud rate, tries CFG-VALSET (M9, F9, M10), then the older CFG messages (M6 to M8), each
-// acknowledged, with time-outs and bounded retries. Runs on while the receiver does: one that lost its power is
-// configured again.
+// Configures a u-blox receiver to send NAV-PVT and the other wanted messages at the wanted rate and baud rate, without
+// NMEA. It finds the baud rate and tries CFG-VALSET (M9, F9, M10), then the older CFG messages (M6 to M8). Each is
+// acknowledged, with time-outs and bounded retries. It runs on with the receiver: one that lost its power is configured
+// again.
 #pragma once
 
 #include "base/time.hpp"
@@ -68,8 +68,8 @@ class Configurator {
     }
   }
 
-  /// Acknowledgements name a message, not which one of its kind: after a retry an old one may still be on its way, and
-  /// the step waits for silence before the next goes out.
+  /// Acknowledgements name a message, not one of its kind. After a retry an old one may still be on its way, so the
+  /// step waits for silence before the next goes out.
   constexpr void on_acknowledge(const Acknowledge& ack, base::Micros now) {
     const bool ours = state_ == ConfigState::kApply && !settling_ && ack.message_class == message_.message_class() &&
                       ack.message_id == message_.id();

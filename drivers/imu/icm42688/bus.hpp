@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Registers of the ICM-42688-P over SPI (DS-000347, 9.6): the bank of each is part of its name, selected when it is
-// another than the last, and read back, because a lost selection would write a right value to a wrong place.
+// Registers of the ICM-42688-P over SPI (DS-000347, 9.6). The bank of each is part of its name and is selected when it
+// is another than the last. The selection is read back, because a lost one would write a right value to a wrong place.
 #pragma once
 
 #include "drivers/imu/icm42688/registers.hpp"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The ICM-42688-P over SPI, as a machine that is polled and never waits: the start, then the FIFO with time stamps,
-// every register checked in turn while it runs, a restart for whatever does not heal. DS-000347 rev. 1.8; sections at
-// the places. Poll it at INT1 or at any pace that empties 2 kB in time.
+// The ICM-42688-P over SPI, as a machine that is polled and never waits. The start comes first, then the FIFO with time
+// stamps. Every register is checked in turn while it runs; a lasting fault restarts the chip. DS-000347 rev. 1.8;
+// sections at the places. Poll it at INT1 or at any pace that empties 2 kB in time.
 #pragma once
 
 #include "drivers/imu/icm42688/self_test.hpp"

@@ -52,8 +52,8 @@ struct Settings {
   std::uint8_t watermark_packets = 1;   ///< INT1 pulses when so many wait
   std::uint32_t external_clock_Hz = 0;  ///< on pin 9, 31 to 50 kHz; 0: the chip's own, 3 % (table 4)
   Mounting mounting{};
-  /// Besides the interface filter's (5.5): the anti-alias filter's, for which the sheet has no number (a second order
-  /// of bandwidth f is sqrt(2) / (2 pi f) late, 0.9 ms at 258 Hz), and what a calibration found.
+  /// Delays besides the interface filter's (5.5): the anti-alias filter's, and one that a calibration found. The sheet
+  /// has no number for the former: a second order of bandwidth f is sqrt(2) / (2 pi f) late, 0.9 ms at 258 Hz.
   std::int32_t more_delay_us = 0;
   /// One axis with the same value so often in a row is a fault; 0: never. Filters that leave less noise raise the
   /// number by themselves (noise.hpp).

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// From power-up to running sensors, in steps that never wait: reset, identity, every field written, every field read
+// From power-up to running sensors, in steps that never wait. Reset, identity, every field written, every field read
 // back, sensors on, their samples discarded while they start. DS-000347 rev. 1.8; sections at the places.
 #pragma once
 

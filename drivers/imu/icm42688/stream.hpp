@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// From the packets of one reading to samples: stamps unwrapped and put on the MCU's clock, gaps, markers, values that
-// do not move, the ends of the range, the body's axes. DS-000347: 12.7 (ticks), 5.5 (delay of the filter).
+// From the packets of one reading to samples. Stamps are unwrapped and put on the MCU's clock; gaps, markers, stuck
+// values and the ends of the range are found; axes become the body's. DS-000347: 12.7 (ticks), 5.5 (delay of the
+// filter).
 #pragma once
 
 #include "drivers/imu/clock_map.hpp"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A CAN bus made of two files in candump's log form, "(seconds) interface 123#DEADBEEF": what the node receives comes
-// from one, what it sends goes to the other. For runs of the whole firmware on an emulated core that has no CAN
-// controller. A line that is not a data frame is counted as a lost frame (rx_overflow) and passed over.
+// A CAN bus formed of two files in candump's log form, "(seconds) interface 123#DEADBEEF": one for reception, one for
+// transmission. It serves runs of the whole firmware on an emulated core that has no CAN controller. A line that is not
+// a data frame is counted as a lost frame (rx_overflow) and passed over.
 #pragma once
 
 #include "base/can_frame.hpp"

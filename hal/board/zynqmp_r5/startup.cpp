@@ -53,16 +53,16 @@ extern "C" {
 }
 
 // Each mode has its own stack pointer; one small stack is enough, because nothing returns from here.
-#define TETAP_EXCEPTION(name, kind, offset) \
-  [[gnu::naked, gnu::used, gnu::target("arm")]] void name() {   \
-    asm volatile(                           \
-        "ldr sp, =__exception_stack_top\n"  \
-        "mov r0, #" #kind                   \
-        "\n"                                \
-        "sub r1, lr, #" #offset             \
-        "\n"                                \
-        "b tetap_exception\n"               \
-        ".ltorg\n");                        \
+#define TETAP_EXCEPTION(name, kind, offset)                   \
+  [[gnu::naked, gnu::used, gnu::target("arm")]] void name() { \
+    asm volatile(                                             \
+        "ldr sp, =__exception_stack_top\n"                    \
+        "mov r0, #" #kind                                     \
+        "\n"                                                  \
+        "sub r1, lr, #" #offset                               \
+        "\n"                                                  \
+        "b tetap_exception\n"                                 \
+        ".ltorg\n");                                          \
   }
 TETAP_EXCEPTION(tetap_undefined, 1, 4)
 TETAP_EXCEPTION(tetap_svc, 2, 4)

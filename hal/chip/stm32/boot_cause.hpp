@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Cause of the last reset. RM0402 chapter "Reset and clock control (RCC)", register RCC_CSR: flags add up until RMVF
-// clears them; every reset also sets PINRST, because the chip drives its own reset pin.
+// clears them. Every reset also sets PINRST, because the chip drives its own reset pin.
 #pragma once
 
 #include "hal/board_report.hpp"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The lines an image prints about itself: at boot the robot and the hashes of the self-check (the same on every target;
-// anybody with a board can compare them with `make bits`), later the stack's high-water mark.
+// The lines that an image prints about itself. At boot: the robot and the hashes of the self-check, the same on every
+// target; anybody with a board can compare them with `make bits`. Later: the stack's high-water mark.
 #pragma once
 
 #include "hal/chip/support/text.hpp"

@@ -26,8 +26,8 @@ namespace detail {
 inline void no_exact_bit_timing_for_this_clock() {}
 }  // namespace detail
 
-/// The exact timing with the sample point nearest to, and not above, 87.5 % (CiA 301), at least two quanta after it and
-/// as many quanta as possible; no exact timing is a compile error.
+/// The exact timing with the sample point nearest to, and not above, 87.5 % (CiA 301). It has at least two quanta after
+/// that point and as many quanta as possible. No exact timing is a compile error.
 [[nodiscard]] consteval CanBitTiming can_bit_timing(std::uint32_t reference_hz, std::uint32_t bit_rate) {
   constexpr std::uint32_t kMaxSegment1 = 16, kMaxSegment2 = 8, kMaxJump = 4, kMaxPrescaler = 256, kMinQuanta = 8;
   for (std::uint32_t quanta = 1 + kMaxSegment1 + kMaxSegment2; quanta >= kMinQuanta; --quanta) {

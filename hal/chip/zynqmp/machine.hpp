@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Silicon or emulator: the one named seam of this port. The data sheets (UG1085, UG1087) are what kSilicon means.
-// kEmulated is QEMU 7.2's xlnx-zcu102, which differs in identifier word and data words of the CAN controller
-// (can_encoding.hpp), in width and clock of the timer (ttc.hpp), and in what an idle poll costs (rest(), here). One
-// image runs on both; Ttc::probe() distinguishes them at boot.
+// Silicon or emulator: the one named seam of this port. The data sheets (UG1085, UG1087) define kSilicon. kEmulated is
+// QEMU 7.2's xlnx-zcu102. It differs in identifier word and data words of the CAN controller (can_encoding.hpp), in
+// width and clock of the timer (ttc.hpp), and in the cost of an idle poll (rest(), here). One image runs on both;
+// Ttc::probe() distinguishes them at boot.
 #pragma once
 
 namespace tetap::hal::zynqmp_r5 {
@@ -14,7 +14,7 @@ enum class Machine : unsigned char { kSilicon, kEmulated };
 }
 
 /// Called when a poll found nothing to do. In the emulator every register access takes the lock under which its event
-/// loop delivers frames, and every look at the timer is a system call of the host: polling without a break halves its
+/// loop delivers frames. Every look at the timer is a system call of the host. Polling without a break halves its
 /// frames per second or worse.
 inline void rest(Machine machine) {
   constexpr int kEmulatedRest = 10'000;  // about 50 us there; nothing on silicon
