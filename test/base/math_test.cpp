@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The functions of base/math.hpp against the C library in double, on a dense sample of all encodings and on the places
-// where a method changes. math_exhaustive does the same for every float; limits and measure (support/ulp.hpp) are the
-// same.
+// The functions of base/math.hpp against the C library in double, on a dense sample of all encodings and where a method
+// changes. math_exhaustive does the same for every float; limits and measure (support/ulp.hpp) are the same.
 #include "base/math.hpp"
 
 #include "support/samples.hpp"
@@ -19,8 +18,8 @@ namespace {
 
 using test::ulp_error;
 
-// The promise is 1.5 ulp, for atan2 1.6. Held here is what math_exhaustive found, rounded up, so that accuracy is not
-// lost unnoticed: sin 0.9163, cos 0.9118, exp 0.9886, log 0.8399, wrap_angle 0.7517 over every float, atan2 1.3663 on
+// The promise is 1.5 ulp, for atan2 1.6. The bounds are math_exhaustive's errors over every float, rounded up, so that
+// accuracy is not lost unnoticed. sin 0.9163, cos 0.9118, exp 0.9886, log 0.8399, wrap_angle 0.7517; atan2 1.3663 on
 // 10^9 pairs.
 constexpr double kSinLimit_ulp = 0.92, kExpLimit_ulp = 0.99, kLogLimit_ulp = 0.84, kWrapLimit_ulp = 0.76,
                  kAtan2Limit_ulp = 1.40;
@@ -82,8 +81,8 @@ TEST(SinCos, AreWithinOneAndAHalfUlpBesideEveryMultipleOfAnEighthTurn) {
       worst.add(ulp_error(cos(x), std::cos(wide(x))), x);
     });
   }
-  // The floats nearest to a multiple of pi/2 of all, by a search over every fraction under every exponent: 1.0e-9 to
-  // 5e-9 of a quarter turn.
+  // The floats nearest to a multiple of pi/2: 1.0e-9 to 5e-9 of a quarter turn. A search over every fraction under
+  // every exponent found them.
   for (const float x : {0x1.f37c8ap+95F, 0x1.47d0fep+34F, 0x1.f37c8ap+96F, 0x1.47d0fep+35F, 0x1.f9cbe2p+7F,
                         0x1.f37c8ap+97F, 0x1.32ede2p+85F, 0x1.628d4cp+40F, 0x1.130930p+76F, 0x1.47d0fep+36F}) {
     worst.add(ulp_error(sin(x), std::sin(wide(x))), x);

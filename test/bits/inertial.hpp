@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Inertial navigation on made-up driving with outliers, gaps, broken samples and restarts: the filter with its
-// models, and the estimator with samples that come late; raw bits hashed at every step.
+// Inertial navigation on made-up driving with outliers, gaps, broken samples and restarts. The filter with its models,
+// and the estimator with samples that come late; raw bits are hashed at every step.
 #pragma once
 
 #include "base/selfcheck.hpp"
@@ -150,7 +150,7 @@ class InsRun {
 };
 
 /// The default robot's inertial estimator between timeline and publisher, with lever arm and without the other
-/// estimators: its state and covariance at the far end of the window and at the present hashed at every tick.
+/// estimators. Its state and covariance at the far end of the window and at the present are hashed at every tick.
 class InertialRun {
  public:
   [[nodiscard]] std::uint32_t run(std::uint32_t steps) {

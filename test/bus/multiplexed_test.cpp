@@ -120,8 +120,8 @@ TEST(StatePages, SayTheCovarianceOfThePresentWholeBlockByBlock) {
   }
 }
 
-/// Half a covariance cannot be judged, nor a bias by the sigma of another time: what belongs together comes together,
-/// and after nine turns all has come.
+/// Half a covariance cannot be judged, nor a bias by the sigma of another time. One turn therefore holds what belongs
+/// together, and after nine turns everything was sent.
 TEST(StatePages, ValuesSigmasAndTheirCorrelationsComeTogether) {
   const filter::Symmetric<float, 15> p =
       filter::Symmetric<float, 15>::diagonal({1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1});

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// No delay is taken for another one: a sample that was held for longer than half a wrap of its stamp is placed where it
-// was true, or at least not where it would be fused. A model of a gateway holds it; the true stamp is the model's.
+// No delay is taken for another one. A sample that was held for longer than half a wrap of its stamp is placed at its
+// true time, or at least not where it would be fused. A model of a gateway holds it; the true stamp is the model's.
 #include "bus/stamp_wraps.hpp"
 
 #include <gtest/gtest.h>

@@ -71,8 +71,8 @@ TEST(ImuClassifier, NoNumberTooFastAndNoIntervalAreInvalidBeforeAllElse) {
   }
 }
 
-// A value that the sensor cannot show on an axis is no reading of it; the norm of three axes may be more than one's
-// range.
+// A value that the sensor cannot have on an axis is no reading of it. The norm of three axes may exceed the range of
+// one.
 TEST(ImuClassifier, MoreThanTheRangeOfTheSensorIsLeftOutAxisByAxis) {
   Imu imu;
   for (std::size_t axis = 0; axis < 3; ++axis) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// How an IMU fares, sample by sample; then what the inertial estimator does about it, and when it takes itself to be
-// standing, in a small world of its own: each sample fused at its own time.
+// Health of an IMU, sample by sample. Then what the inertial estimator does about it, and when it takes itself to be
+// standing, in a small world of its own. Each sample is fused at its own time.
 #include "checks/imu_health.hpp"
 
 #include "estimators/inertial/inertial.hpp"

@@ -143,7 +143,7 @@ void dead_reckoning() {
 }
 
 /// Inertial navigation at 100 Hz: strapdown, covariance, three velocities and three positions every step, each three
-/// with its joint gate; a rover that speeds up, brakes and turns. Then the parts one by one, with a lever arm.
+/// with its joint gate. The rover speeds up, brakes and turns. The parts one by one follow, with a lever arm.
 void inertial() {
   struct Input {
     nav::ImuIncrement imu;

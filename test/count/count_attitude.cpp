@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The attitude filters' workloads: a body that tumbles at 100 Hz, so that nothing is at rest and every branch of the
-// steady filter is taken; the start of a filter is over before the counting begins.
+// The attitude filters' workloads. A body tumbles at 100 Hz, so nothing is at rest and every branch of the steady
+// filter is taken. A filter's start is over before the counting begins.
 #include "board.hpp"
 #include "filter/attitude.hpp"
 #include "filter/complementary.hpp"

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a tick costs for inertial navigation alone, over 12 s of the simulated world with 200 IMU samples a second: the
-// samples that leave the window fused (two of the IMU, wheels, and now and then a fix with lever arm, gate and record),
-// and the state carried over the forty that are in it. Decoding frames before and sending them after are node_tick's.
+// Cost of a tick for inertial navigation alone, over 12 s of the simulated world with 200 IMU samples a second. The
+// samples that leave the window are fused: two of the IMU, wheels, now and then a fix with lever arm, gate and record.
+// The state is carried over the forty samples in the window. Decoding frames before and sending them after are
+// node_tick's.
 #include "board.hpp"
 #include "config/rover.hpp"
 #include "markers.hpp"

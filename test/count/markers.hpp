@@ -1,26 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
 // Marks workloads in an image so that tools/proof/count_instructions can count their instructions in QEMU. Between
-// begin and end only what is counted: input arrays and calls of public headers that the firmware instantiates too. A
-// workload is named where it stands:
+// begin and end stands only what is counted: input arrays and calls of public headers that the firmware instantiates
+// too. A workload is named where it stands. One that is used in two places is declared above both.
 //
-//   tetap::count::calibrate();                                       // once, first: what the markers themselves cost
-//   for (const auto& z : kInput) {                                   // any number of times: worst and mean are
-//   reported
-//     const tetap::count::Region<struct ekf_update> region;          // name in the table: ekf_update
+//   tetap::count::calibrate();                                // once, first: the cost of the markers themselves
+//   for (const auto& z : kInput) {                            // any number of times: worst and mean are reported
+//     const tetap::count::Region<struct ekf_update> region;   // name in the table: ekf_update
 //     filter.fuse(z);
 //   }
-//                                                                    // (used in two places: declare `struct
-//                                                                    ekf_update;` above both)
-//   tetap::count::opaque(filter);                                    // the result is used, so nothing is optimised
-//   away tetap::count::finish();                                          // ends the emulator; without it the run
-//   counts as crashed
+//   tetap::count::opaque(filter);                             // the result is used, so nothing is optimised away
+//   tetap::count::finish();                                   // ends the emulator; a run without it counts as crashed
 #pragma once
 
 namespace tetap::count {
 
 /// The plugin recognises these functions by their addresses; the name is read from the symbol. noipa: the compiler may
-/// neither inline nor merge them nor know what they do to memory, so no work on objects in memory moves across a
-/// marker.
+/// neither inline nor merge them. It does not know what they do to memory, so no work on objects in memory moves across
+/// a marker.
 template <class Name>
 [[gnu::noipa]] void begin() {
   asm volatile("" : : : "memory");

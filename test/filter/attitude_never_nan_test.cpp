@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Whatever gyroscope, accelerometer and magnetometer say, the attitude filters stay finite, tell what they refuse, and
-// find the attitude again: nothing inside keeps a number that is none.
+// The attitude filters stay finite with every gyroscope, accelerometer and magnetometer sample, report what they
+// refuse, and find the attitude again. No part keeps a value that is not a number.
 #include "filter/attitude.hpp"
 #include "filter/complementary.hpp"
 #include "filter/mahony.hpp"
@@ -80,8 +80,8 @@ void expect_sane(const Filter& filter) {
   EXPECT_TRUE(filter.bias_b_radps().allFinite());
 }
 
-/// Each field of a sample broken with each hostile value, `times` samples long, after `before` good ones; and then good
-/// ones for `after`: the attitude has to be found again.
+/// Each field of a sample broken with each hostile value, `times` samples long, after `before` good ones. Good ones for
+/// `after` follow, in which the attitude has to be found again.
 template <class Filter>
 void break_every_field(int before, int times, int after, float most_off_rad) {
   for (std::size_t field = 0; field < kFields; ++field)

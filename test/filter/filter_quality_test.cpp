@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Every filter in a world that is its model: unbiased, consistent, white and efficient over 100 seeds; and with Q or R
+// Every filter in a world that is its model: unbiased, consistent, white and efficient over 100 seeds. With Q or R
 // wrong by three it is not. Laws that estimators have by name stand below.
 #include "support/quality.hpp"
 
@@ -281,8 +281,8 @@ TYPED_TEST(LinearQuality, ASharpMeasurementWinsAndASharpPredictionWins) {
   EXPECT_NEAR(covariance(sure)(0, 0), 1e-8F, 1e-14F);
 }
 
-// Bearings alone, from an observer that turns back every 30 s, to a target at 1000 m that is thought to be at 300 m
-// with a sigma of 1000 m (the classic case: Aidala 1979). Lost is beyond 200 m after 100 s.
+// Bearings alone, from an observer that turns back every 30 s, to a target at 1000 m. The start has it at 300 m with a
+// sigma of 1000 m (the classic case: Aidala 1979). Lost is beyond 200 m after 100 s.
 template <class Filter>
 int lost_targets() {
   int lost = 0;

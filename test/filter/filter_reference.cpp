@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Runs one filter over the inputs on stdin and prints its state and covariance after each step, for reference_test.py.
-// filter_reference SCENARIO FILTER SCALAR; a line of input is a step, numbers as the scenario's `step` takes them.
+// Usage: filter_reference SCENARIO FILTER SCALAR. A line of input is a step, numbers as the scenario's `step` takes
+// them.
 #include "filter/iterated_ekf.hpp"
 #include "filter/joseph.hpp"
 #include "filter/kalman.hpp"

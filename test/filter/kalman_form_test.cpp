@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Every form of the Kalman filter inherits the same laws: name it in a list, and it is held to the worked example, to a
-// dense reference over matrices that change at every step, and to what a refusal has to leave alone.
+// Laws of every form of the Kalman filter, each named in a list. The judges are the worked example and a dense
+// reference over matrices that change at every step. A refusal leaves state and covariance alone.
 #include "filter/iterated_ekf.hpp"
 #include "filter/joseph.hpp"
 #include "filter/kalman.hpp"
@@ -312,8 +312,8 @@ TEST(Ud, FactorIsUnitUpperTriangularAndGivesPBack) {
   }
 }
 
-// A range of 1 cm to a target whose place is known to 2 m: one linearisation falls short of the circle by what the
-// error across squared and halved over the range leaves. The reference is the posterior's maximum on a fine grid.
+// A range of 1 cm to a target whose place is known to 2 m. One linearisation falls short of the circle by the squared
+// error across over twice the range. The reference is the posterior's maximum on a fine grid.
 TEST(IteratedEkf, ReachesThePosteriorsMaximumWhereOneLinearisationDoesNot) {
   using State = VectorState<double, 4>;
   const model::TargetRange<State> z{.range_m = 5.0, .sigma_range_m = 0.01};

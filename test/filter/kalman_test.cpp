@@ -36,9 +36,8 @@ TEST(Kalman, WorkedExampleStepByStep) {
 }
 
 TEST(Kalman, ConvergesToTheRiccatiSolutionOfTheAlphaBetaFilter) {
-  // Steady state of the piecewise-constant acceleration model (Kalata 1984): tracking index L = sigma_w T^2 / sigma_v
-  // gives beta = (L^2 + 4 L - L sqrt(L^2 + 8 L)) / 4 ... with r = (4 + L - sqrt(8 L + L^2)) / 4: alpha = 1 - r^2, beta
-  // = 2 (2 - alpha) - 4 sqrt(1 - alpha).
+  // Steady state of the piecewise-constant acceleration model (Kalata 1984). Tracking index L = sigma_w T^2 / sigma_v
+  // and r = (4 + L - sqrt(8 L + L^2)) / 4 give alpha = 1 - r^2 and beta = 2 (2 - alpha) - 4 sqrt(1 - alpha).
   constexpr float kDt = 0.1F, kAcceleration = 4.0F, kVariance = 0.25F;
   filter::Ekf<model::ConstantVelocity<float>::State> kf;
   kf.p = filter::Symmetric<float, 4>::diagonal({10, 10, 10, 10});

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Every model inherits the same laws: name it in a list with a few examples, and its Jacobian, its noise and "a perfect
-// measurement changes nothing" are tested.
+// Laws of every model, each named in a list with a few examples. Its Jacobian, its noise and "a perfect measurement
+// changes nothing" are tested.
 #include "filter/ekf.hpp"
 #include "model/bearing.hpp"
 #include "model/constant_velocity.hpp"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Fusion without motion: what each form claims against the covariance that its own weights give the truth, for errors
-// whose correlation is known to the judge and not to the fusion.
+// Fusion without motion. Each form's claim stands against the covariance that its own weights give the truth. The judge
+// knows the correlation of the errors, the fusion does not.
 #include "filter/static_fusion.hpp"
 
 #include <gtest/gtest.h>

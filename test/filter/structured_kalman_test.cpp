@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The filter that skips declared zeros and ones, beside Joseph's form in double with dense models (held to SciPy by
-// reference_test.py), whatever is asked of it; and each structure beside the dense matrix it stands for.
+// reference_test.py). Each structure stands beside its dense matrix, with every option.
 #include "filter/structured_kalman.hpp"
 
 #include "filter/joseph.hpp"

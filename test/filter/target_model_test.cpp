@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Models of a tracked target: every Jacobian against central differences in double, motion against fine integration of
-// its differential equation, noise against what the noise inputs make.
+// Models of a tracked target. Every Jacobian stands against central differences in double, motion against fine
+// integration of its differential equation, noise against the effect of the noise inputs.
 #include "filter/ekf.hpp"
 #include "model/constant_acceleration.hpp"
 #include "model/constant_velocity.hpp"

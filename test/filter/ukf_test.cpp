@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Laws of both unscented filters: moments that are known in closed form, angles, noise that is augmented, the choice of
-// weights, and the sharp sensor at which the plain form breaks.
+// Laws of both unscented filters: moments in closed form, angles, augmented noise, the choice of weights. The plain
+// form breaks with a sharp sensor; the square-root form does not.
 #include "filter/ukf.hpp"
 #include "filter/ekf.hpp"
 #include "filter/ukf_sqrt.hpp"
@@ -162,8 +162,8 @@ TYPED_TEST(Unscented, AugmentedNoiseEntersAsItsSquare) {
   ASSERT_TRUE(ukf.predict(SquaredNoise{.variance = {0.2, 0.4}}));
   EXPECT_NEAR(ukf.x.value(0), 1.2, 1e-14);
   EXPECT_NEAR(ukf.x.value(1), -2.0, 1e-14);
-  // Four dimensions put the points at 2 sigma, so the fourth moment counts as 4 where a Gaussian's is 3: variance of
-  // the square is (4 - 1) q^2 plus (beta - alpha^2) q^2.
+  // Four dimensions put the points at 2 sigma, so the fourth moment counts as 4 where a Gaussian's is 3. The variance
+  // of the square is (4 - 1) q^2 plus (beta - alpha^2) q^2.
   EXPECT_NEAR(covariance(ukf)(0, 0), 0.5 + 4 * 0.04 + 0.04, 1e-13);
   EXPECT_NEAR(covariance(ukf)(1, 1), 0.3 + 0.4, 1e-14);
   const double before = covariance(ukf)(0, 0);
@@ -300,8 +300,8 @@ TEST(Scaling, ThePlainFormRefusesASmallAlphaAndKeepsWhatItHas) {
   EXPECT_EQ(root.set_scaling({.kAlpha = 0.05F}), ScalingVerdict::kUsable);
 }
 
-/// The textbook's plain form in float, weights as printed (Thrun, Burgard, Fox 2005, table 3.4), on the same drive:
-/// steps until P has no Cholesky factor; -1 when it keeps one.
+/// The textbook's plain form in float, weights as printed (Thrun, Burgard, Fox 2005, table 3.4), on the same drive. The
+/// result is the steps until P has no Cholesky factor; -1 when it keeps one.
 int textbook_breaks_after(double alpha, double sigma_range_m, double sigma_bearing_rad, int steps) {
   using Eigen::Matrix3f, Eigen::Vector3f, Eigen::Vector2f;
   std::mt19937 random(32);

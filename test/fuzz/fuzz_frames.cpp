@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // libFuzzer: bytes become frames and ticks for the rover's node and, a second time, for the whole firmware on a made-up
-// board. It must not crash or do anything undefined; every frame sent decodes; the state stays finite; and a node that
+// board. It must not crash or do anything undefined. Every frame sent decodes, and the state stays finite. A node that
 // is powered on again answers as a new one does, whatever it went through before.
 #include "config/rover.hpp"
 #include "node/firmware.hpp"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// libFuzzer: bytes of a GNSS receiver. However they are divided, the same reports and the same counts come out; what is
-// called a position is one; and a driver that configures a receiver made of these bytes sends a bounded number of them.
+// libFuzzer: bytes of a GNSS receiver. The same reports and the same counts come out, however they are divided, and a
+// reported position is one. A driver that configures a receiver made of these bytes sends a bounded number of them.
 #include "drivers/gnss/driver.hpp"
 #include "hal/byte_stream.hpp"
 

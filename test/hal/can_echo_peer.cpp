@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The other end of the echo test: can_echo_peer IFACE ROUNDS BURST. Each round sends BURST frames, standard and
-// extended in turn, sizes 1 to 8, pseudo-random data, and waits for every one to come back under identifier + 1 with
-// the same bytes in the same order. Prints the rounds per second; exit status 1 when a frame is lost, changed or out of
+// extended in turn, sizes 1 to 8, with pseudo-random data. Each must come back under identifier + 1 with the same bytes
+// in the same order. The program prints the rounds per second; exit status 1: a frame was lost, changed or out of
 // order.
 #include <linux/can.h>
 #include <linux/can/raw.h>

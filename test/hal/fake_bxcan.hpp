@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A model of bxCAN for the driver's test, from RM0402 chapter "Controller area network (bxCAN)": modes, three mailboxes
-// in the order of TXFP, FIFO 0 of three, filter bank 0, bus-off. Offsets and bits are written down here once more.
+// A model of bxCAN for the driver's test, from RM0402 chapter "Controller area network (bxCAN)". It has modes, three
+// mailboxes in the order of TXFP, FIFO 0 of three, filter bank 0, bus-off. Offsets and bits are written down here once
+// more.
 #pragma once
 
 #include <array>

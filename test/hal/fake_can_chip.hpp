@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A model of the ZynqMP CAN controller as UG1085 and UG1087 describe it, and of QEMU's where that differs: register by
-// register, with faults that have names. What leaves the transmit FIFO for the bus is kept in `wire`; `arrive` puts
+// A model of the ZynqMP CAN controller as UG1085 and UG1087 describe it, and of QEMU's where that differs, register by
+// register. Its faults have names. Words that leave the transmit FIFO for the bus are kept in `wire`; `arrive` puts
 // words into the receive FIFO.
 #pragma once
 

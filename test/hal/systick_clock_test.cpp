@@ -8,7 +8,7 @@
 namespace tetap::hal {
 namespace {
 
-// SysTick as ARM DDI 0403E.e B3.3 has it: time in cycles of the core passes with every access, and the exception is
+// SysTick as ARM DDI 0403E.e B3.3 has it. Time in cycles of the core passes with every access, and the exception is
 // taken when the program lets it be. Offsets are those of the manual, not those of the driver's header.
 class FakeSysTick {
  public:

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The smallest image that uses all of a board: says it is up, answers every CAN frame with the same data under
-// identifier + 1, and on a frame with identifier 7F0 reports the clock, the stack and the counters. Run by
+// The smallest image that uses all of a board. It prints that it is up and answers every CAN frame with the same data
+// under identifier + 1. On a frame with identifier 7F0 it reports the clock, the stack and the counters. Run by
 // r5_echo_test.sh and mps2_smoke_test.sh.
 #if defined(TETAP_BOARD_ZYNQMP_R5)
 #include "hal/board/zynqmp_r5/board.hpp"

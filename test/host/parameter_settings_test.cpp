@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A file of parameters and single settings: what is set counts, what is wrong is one error with file and line, and what
-// is printed reads back as the same bits.
+// A file of parameters and single settings. A valid one counts, a wrong one is one error with file and line, and
+// printed numbers read back as the same bits.
 #include "sim_host/parameter_settings.hpp"
 
 #include "param/crc.hpp"

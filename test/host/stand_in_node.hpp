@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A node for tests of the player: answers Begin and each Step or Tick as the firmware does, from a CRC over its inputs
-// instead of an estimate, and loses or doubles frames on demand.
+// A node for tests of the player. It answers Begin and each Step or Tick as the firmware does, from a CRC over its
+// inputs instead of an estimate. It loses or doubles frames on demand.
 #pragma once
 
 #include "bus/decoder.hpp"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A rover whose sensors are wired to its board, on a bus that others use too: one queue of the board's own frames, one
-// of the others', one wire, a log of what was on it.
+// A rover whose sensors are wired to its board, on a bus that others use too. One queue of the board's own frames, one
+// of the others', one wire, a log of its frames.
 #pragma once
 
 #include "config/rover.hpp"

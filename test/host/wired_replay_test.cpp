@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A whole node behind fakes of its sensors: what it did is repeated at the desk from the log of its bus alone, bit by
-// bit, whatever else is on that bus.
+// A whole node behind fakes of its sensors. Its run is repeated at the desk from the log of its bus alone, bit by bit,
+// whatever else is on that bus.
 #include "host/wired_bench.hpp"
 
 #include <gtest/gtest.h>

@@ -39,8 +39,8 @@ TEST(GyroScaleConsider, TenCirclesCostTenTimesOne) {
   EXPECT_NEAR(sigma_after(62.831853, 0.01, [](double) { return 1.0; }) / 6.2831853, 10.0, 0.01);
 }
 
-/// Variance of the heading with the scale as a state that is never corrected: 2 x 2, written out, by the gain
-/// that the filter takes (Joseph's form: it may be another than the best).
+/// Variance of the heading with the scale as a state that is never corrected. Two states, written out, with the gain of
+/// the filter. Joseph's form, because the gain may be another than the best.
 struct Considered {
   double p = 0, c = 0;
   void turn(double by, double scale) {
@@ -81,7 +81,8 @@ TEST(GyroScaleConsider, TurnsAndWhatIsToldOfTheHeadingAreThoseOfAConsideredScale
         scale.heading_measured(static_cast<float>(left));
         variance *= left;
       }
-      // On a way back P keeps what it had; it is never too sure, and after all of it as large again as it has to be.
+      // P stays as it was on the way back. It is never too small, and at the end at most twice as large as it has to
+      // be.
       EXPECT_GE(variance, 0.97 * law.p) << leg.turn_rad;
     }
     EXPECT_NEAR(variance, law.p, 0.05 * law.p);

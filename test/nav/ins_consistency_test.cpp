@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Is the filter as wrong as it says? NEES with two-sided chi-square bounds (Bar-Shalom, Li, Kirubarajan 2001, sec. 5.4)
-// in a world that is just as the filter believes, and an hour of standstill with centimetres.
+// Consistency of inertial navigation: NEES with two-sided chi-square bounds (Bar-Shalom, Li, Kirubarajan 2001, sec.
+// 5.4). The world is the filter's model. An hour of standstill with centimetres stands beside it.
 #include "model/dual_heading.hpp"
 #include "model/gnss_fix_3d.hpp"
 #include "model/gnss_velocity_3d.hpp"
@@ -202,9 +202,9 @@ TEST(InsConsistency, WhatATiltHidesIsNotTakenForAVerticalBias) {
   }
 }
 
-// A robot that stood before its heading was given has tilt and bias as one error in its body: told, it has not turned,
-// and the other directions of the pair stay unseen until it does. (With errors of the tilt that stay where they were
-// the NEES of the tilt was 40 of 2, of the bias 41 of 3.)
+// A robot that stood before its heading was set has tilt and bias as one error in its body. The heading does not turn
+// this pair, and its other directions stay unseen until the robot turns. With errors of the tilt that stay where they
+// were, the NEES of the tilt was 40 of 2, of the bias 41 of 3.
 TEST(InsConsistency, AHeadingThatIsToldPartsNoTiltFromABias) {
   constexpr int kRuns = 200;
   const std::array<float, 15> sigma{0.1F, 0.1F,  0.1F,  0.01F, 0.01F, 0.01F, 5e-3F, 5e-3F,
@@ -253,9 +253,9 @@ bool positive_definite_in_double(const Covariance& p) {
   return factor.info() == Eigen::Success;
 }
 
-/// The case that broke flight stacks: an hour of standstill, 1 cm GNSS at 10 Hz, 200 Hz IMU. Where the antenna stands
-/// beside the body's origin, the heading has to be known to some degrees: what an extended filter leaves out of the
-/// swing of a lever, l sigma^2 / 2, must stay below what 36 000 fixes average to.
+/// The case that broke flight stacks: an hour of standstill, 1 cm GNSS at 10 Hz, 200 Hz IMU. The antenna stands beside
+/// the body's origin, so the heading has to be known to some degrees. An extended filter leaves l sigma^2 / 2 out of
+/// the swing of a lever l; it must stay below the mean of 36 000 fixes.
 void an_hour_of_standstill(double x_m, double y_m, const Vector3d& lever, float sigma_heading_rad) {
   const std::array<float, 15> sigma{0.01F, 0.01F, 0.02F, 0.01F, 0.01F, 0.01F, 5e-3F, 5e-3F, sigma_heading_rad,
                                     0.05F, 0.05F, 0.05F, 2e-4F, 2e-4F, 2e-4F};

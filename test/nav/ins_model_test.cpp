@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Every measurement model of inertial navigation inherits the same laws: its Jacobian against central differences, a
-// perfect measurement moves nothing, 50 km from the origin it sees the same.
+// Laws of every measurement model of inertial navigation. The Jacobian equals central differences, a perfect
+// measurement moves nothing, and 50 km from the origin both hold.
 #include "model/dual_heading.hpp"
 #include "model/gnss_course.hpp"
 #include "model/gnss_fix_3d.hpp"
@@ -175,8 +175,8 @@ nav::Ins::Covariance correlated(test::Normal& normal) {
   return nav::Ins::Covariance::upper_of(full.cast<float>());
 }
 
-/// The state moved by dx, the covariance as it was updated; a heading told from outside the body turns the errors of
-/// the tilt with it, its own correction by half.
+/// The state moved by dx, the covariance as it was updated. A heading from outside the body turns the errors of the
+/// tilt with it, its own correction by half.
 void expect_moved(const nav::Ins& ins, const InsState& from, const Vector15& dx, const nav::Ins::Covariance& updated,
                   bool from_outside, float scale) {
   Matrix15 turn = Matrix15::Identity(), half = turn;

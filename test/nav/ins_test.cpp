@@ -87,8 +87,8 @@ TEST(Ins, AMillionStepsWithoutAMeasurementStayFiniteAndPositiveDefinite) {
   }
 }
 
-/// A circle to the left, a compass, a circle to the right: what the compass said of the way there it did not say of the
-/// way back.
+/// A circle to the left, a compass, a circle to the right. A compass in between is no measurement of the heading on the
+/// way there.
 TEST(Ins, AHeadingThatIsToldDoesNotPayForTheWayBack) {
   Ins ins;
   ins.noise.gyro_scale = 0.003F;
@@ -134,8 +134,8 @@ TEST(Ins, ABiasThatIsToldLeavesTheScaleToTheHeading) {
   EXPECT_NEAR(std::sqrt(ins.p(8, 8)), 2.0F * kCircle_rad, 0.1F * kCircle_rad);
 }
 
-/// Turned as a whole a way looks the same to wheels and IMU: they tell no heading, straight on or in curves, however
-/// gentle, of a sensor however noisy.
+/// A way that is turned as a whole is the same to wheels and IMU. They measure no heading, straight on or in curves,
+/// however gentle, with a sensor however noisy.
 TEST(Ins, WhatIsMeasuredInTheBodyTellsNoHeading) {
   for (const float accel_mps2_rthz : {2e-3F, 2e-2F, 1e-1F})
     for (const float turn_radps : {0.0F, 0.02F, 0.1F, 0.3F, 1.0F}) {

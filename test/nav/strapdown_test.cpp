@@ -75,8 +75,8 @@ TEST(Strapdown, ACircleComesHomeAndTheErrorFallsWithTheSquareOfTheStep) {
 }
 
 /// Coning: the axis of a rotation by `a` runs round a cone. Truth: q(t) = (cos(a/2), sin(a/2) cos wt, sin(a/2) sin wt,
-/// 0); the body drifts about z by w (1 - cos a) per second against what the sum of angles says. Increments whose coning
-/// is counted do not drift.
+/// 0). Against the sum of angles the body drifts about z by w (1 - cos a) per second. Increments whose coning is
+/// counted do not drift.
 TEST(Strapdown, ConingDoesNotDriftWhenSamplesAreJoinedAndDoesWhenTheyAreSummed) {
   const double a = 0.05, w = 2 * M_PI * 20;
   const auto truth = [&](double t) {

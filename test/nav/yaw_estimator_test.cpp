@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The heading finder against the bank of hypotheses that it stands for, and in a world of its own: drives of a car and
+// The heading finder against the bank of hypotheses that it stands for, and in a world of its own. Drives of a car and
 // a rover in double, an IMU with biases and a wrong level, GNSS velocity or position, wheels.
 #include "nav/yaw_estimator.hpp"
 
@@ -296,8 +296,8 @@ TEST(ComplexKalman, AGateRefusesWithoutATrace) {
   EXPECT_EQ(base::bits(f.variance(0)), base::bits(1.0F));
 }
 
-/// One filter of phasors says what a bank of 360 hypotheses says: each a Kalman filter (in double) of velocity and
-/// accelerometer bias that knows its yaw, weighted by its likelihoods. The weights are the von Mises density.
+/// One filter of phasors equals a bank of 360 hypotheses. Each of them is a Kalman filter (in double) of velocity and
+/// accelerometer bias with a known yaw, weighted by its likelihoods. The weights are the von Mises density.
 TEST(YawEstimator, OneFilterOfPhasorsIsABankOf360Hypotheses) {
   constexpr int kBank = 360;
   base::Random random(11);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Laws of the parameter table: paths and indices are unique and stable, every member has a row, defaults lie inside the
-// limits, access by a row touches its member alone, and the CRC of the version frame sees every element.
+// Laws of the parameter table. Paths and indices are unique and stable, every member has a row, and defaults lie inside
+// the limits. Access by a row touches its member alone, and the CRC of the version frame covers every element.
 #include "param/table.hpp"
 
 #include "param/crc.hpp"
@@ -84,8 +84,8 @@ TEST(ParameterTable, an_index_is_never_changed_and_never_used_again) {
     EXPECT_EQ(retired.count(path), 1U) << path << " has no row any more: its line needs the word retired";
 }
 
-/// Without a row are the declination of the attitude filter, which a rule keeps at 0, and what aligns the 64-bit
-/// origin: less than 8 bytes before the origin's struct, before the origin, and behind it.
+/// Two members have no row: the declination of the attitude filter, which a rule keeps at 0, and the padding of the
+/// 64-bit origin. The padding is less than 8 bytes before the origin's struct, before the origin, and behind it.
 TEST(ParameterTable, every_member_has_one_row) {
   std::array<int, sizeof(Parameters) + 1> rows{};
   rows.back() = 1;

@@ -49,7 +49,7 @@ Quaternion first_attitude(const Row& row) {
 }
 
 /// Gradient descent (Madgwick 2010, "An efficient orientation filter for inertial and inertial/magnetic sensor arrays",
-/// eq. 25 to 34 and 45), with north the first axis as there: the radial part of the gradient depends on it.
+/// eq. 25 to 34 and 45). North is the first axis as there, because the radial part of the gradient depends on it.
 class Madgwick {
  public:
   double beta = 0.12;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A sensor's known errors are taken out of its samples: against raw samples made with Eigen in double from the truth,
-// and through a whole node.
+// A sensor's known errors are taken out of its samples. The judge is Eigen in double, which makes the raw samples from
+// the truth; the second test goes through a whole node.
 #include "sensor/calibration.hpp"
 
 #include "checks/imu_health.hpp"

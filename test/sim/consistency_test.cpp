@@ -41,8 +41,8 @@ constexpr base::Micros kLength{120'000'000};
 constexpr base::Micros kPeriod{10'000};
 
 World::Options as_made() { return {.mismatched = false}; }
-/// A gyroscope 20 times as noisy (0.056 deg/s/sqrt(Hz)) and wheels that err by 1.4 cm per root metre: what landmarks
-/// told is forgotten within seconds, and the steps of the published 1-sigma are small beside it.
+/// A gyroscope 20 times as noisy (0.056 deg/s/sqrt(Hz)) and wheels that err by 1.4 cm per root metre. Information of
+/// landmarks is lost within seconds, and the steps of the published 1-sigma are small beside it.
 World::Options noisy() {
   Parameters parameters = matched({});
   parameters.imu.gyro_noise *= 20;

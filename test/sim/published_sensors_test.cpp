@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A robot is sent what it takes, and nothing else: its bus is loaded by nothing that nobody reads, and a fault of what
-// it is not sent is refused.
+// A robot gets the messages that it takes, and nothing else. Nothing that nobody reads loads its bus, and a fault of a
+// message that it does not get is refused.
 #include "sim_host/published_sensors.hpp"
 
 #include "sim_host/world_source.hpp"

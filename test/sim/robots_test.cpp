@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Every robot in the world that its parameters describe: without any fault its estimate is as uncertain as it says; and
-// a copy with another body is simulated with that.
+// Every robot in the world that its parameters describe. Without any fault its error fits its uncertainty. A copy with
+// another body is simulated with that body.
 #include "sim_host/in_process.hpp"
 #include "sim_host/node_origin.hpp"
 #include "sim_host/play/lockstep.hpp"

@@ -140,8 +140,8 @@ SaidPages pages_of(const std::vector<Epoch>& epochs) {
   return said;
 }
 
-// Data that is averaged over runs, or compared between a robot and its replay, has to come in the same epochs of each;
-// and what turns and accelerates is judged by the covariance of its own time.
+// Values that are averaged over runs, or compared between a robot and its replay, come in the same epochs of each. Turn
+// and acceleration are judged by the covariance of their own time.
 TEST(Covariance, ComesWithWhatItJudgesInTurnsThatTheEpochSays) {
   World::Options late;
   late.faults = {{Fault::kMovingStart, base::Micros{0}, base::Micros{3'270'000}}};
@@ -162,8 +162,8 @@ TEST(Covariance, ComesWithWhatItJudgesInTurnsThatTheEpochSays) {
   EXPECT_GT(missing, 3U) << "or both began at once";
 }
 
-// An IMU at 200 Hz, a window of half a second: what the receiver said 480 ms ago is fused at its own time, so nothing
-// of the estimate tells when it came.
+// An IMU at 200 Hz, a window of half a second. A receiver's sample of 480 ms ago is fused at its own time, so the
+// estimate does not depend on when it came.
 template <std::size_t kPlaces>
 using RoverWith =
     node::EstimatorsWithPlaces<kPlaces, estimators::Odometry, robot::rover::Attitude, robot::rover::Inertial>;
@@ -229,8 +229,8 @@ TEST(Late, AFixOfAlmostHalfASecondAgoLeavesTheBytesOfOneOnTime) {
   EXPECT_EQ(first_difference(said(late), straight), "");
 }
 
-// The non-holonomic constraint comes with the wheels, every 20 ms; what is told for want of them at the same instants
-// would be the same trembling of the body a second time, and the velocity too sure by it.
+// The non-holonomic constraint comes with the wheels, every 20 ms. A second constraint at the same instants would count
+// the same trembling of the body twice, and the velocity would be too sure.
 TEST(Constraint, WhatWheelsBringIsNotTakenTwice) {
   World::Options options{.mismatched = false, .inertial = true};
   options.parameters.imu.rate_hz = 200;
@@ -330,8 +330,8 @@ TEST(Motion, TheOneSigmaOfSpeedAndTurnRateGrowsWithTheirErrorsWhereTheImuIsStuck
 
 constexpr double kTrembles_mps = 0.005;  ///< trembling of a body, as an engine makes it
 
-// Wheels that scatter, and no GNSS that would hide what they do: those that err to the slow side count for no more than
-// the others. By what the reading itself says of its uncertainty, the robot would lose 0.7 mm/s, or 25.
+// Wheels that scatter, and no GNSS that would hide it. Readings on the slow side count for no more than the others.
+// With each reading's own uncertainty the robot would lose 0.7 mm/s, or 25.
 TEST(Motion, WheelsWhoseReadingsScatterDoNotSlowTheRobot) {
   for (const bool counts : {true, false}) {
     double off_mps = 0, count = 0;
@@ -364,8 +364,8 @@ TEST(Motion, WheelsWhoseReadingsScatterDoNotSlowTheRobot) {
   }
 }
 
-// With fixes of 1 cm, wheels that stand and a gyroscope: nothing of that tells a heading, nor takes it away; whether
-// the body is still or an engine shakes it.
+// With fixes of 1 cm, wheels that stand and a gyroscope nothing measures a heading, nor takes it away. The body may be
+// still or shaken by an engine.
 TEST(Standstill, NeitherTellsAHeadingNorCostsOne) {
   for (const Robot& robot : {Robot{"rover", robot::rover::parameters, true}, Robot{"matched", matched_rover(), true},
                              Robot{"trembling", robot::rover::parameters, true}}) {

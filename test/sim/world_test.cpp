@@ -373,7 +373,7 @@ TEST(World, each_sensor_comes_at_its_rate_with_a_running_sequence) {
   }
 }
 
-// A kilometre away gravity and the turn of the Earth are the same to a part in a million, so only GNSS and map show it.
+// A kilometre away gravity and the turn of the Earth are the same to a part in a million, so only GNSS and map differ.
 TEST(World, moving_the_whole_course_changes_nothing_but_gnss_so_no_other_sensor_knows_the_place) {
   World::Options options;
   const auto here = run(options, 9, seconds_us(60));

@@ -6,8 +6,8 @@
 
 namespace tetap::test {
 
-/// The 95 % interval of the mean of `samples` independent chi-square variables of `degrees` freedom, by the
-/// Wilson-Hilferty cube (exact to 0.1 % for the hundreds of degrees that come together here).
+/// The 95 % interval of the mean of `samples` independent chi-square variables of `degrees` freedom. The
+/// Wilson-Hilferty cube is exact to 0.1 % for hundreds of degrees.
 struct Interval {
   double low;
   double high;

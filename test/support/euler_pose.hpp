@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A vehicle in the plane as textbooks write it (Thrun, Burgard, Fox 2005, sec. 3.3): state (x, y, yaw) as three
+// A vehicle in the plane as textbooks write it (Thrun, Burgard, Fox 2005, sec. 3.3). State (x, y, yaw) as three
 // numbers, one Euler step of a unicycle, additive noise, range and bearing to one landmark. Filters are compared on it,
 // and tools/count counts it.
 #pragma once

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Quality of an estimator as numbers with intervals, over independent runs in a world that is its model: bias, NEES,
-// NIS, whiteness of the innovations, efficiency (Bar-Shalom, Li, Kirubarajan 2001, sec. 5.4 and 2.7).
-//
-// Each check is a set of tests at once; its interval is that of 99 % for the whole set (Bonferroni).
+// Quality of an estimator as numbers with intervals, over independent runs in a world that is its model. Bias, NEES,
+// NIS, whiteness of the innovations, efficiency (Bar-Shalom, Li, Kirubarajan 2001, sec. 5.4 and 2.7). Each check is a
+// set of tests at once; its interval is that of 99 % for the whole set (Bonferroni).
 #pragma once
 
 #include "support/consistency.hpp"

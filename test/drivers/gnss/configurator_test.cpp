@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The driver on a line with a fake u-blox receiver: whatever generation, baud rate and fault, it ends up running or
-// says why not, after a bounded number of requests.
+// The driver on a line with a fake u-blox receiver. With every generation, baud rate and fault it runs in the end or
+// reports why not, after a bounded number of requests.
 #include "drivers/gnss/gnss_bench.hpp"
 
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The fix of an NMEA epoch, where its sentences differ: one GSA for each constellation, every figure of GGA's quality,
+// The fix of an NMEA epoch, where its sentences differ. One GSA for each constellation, every figure of GGA's quality,
 // GNS in place of GGA, times without a fraction. Sentences follow NMEA 0183 v4.1, sec. 6.3, and the manuals of
 // docs/reference/receivers.md.
 #include "drivers/gnss/gnss_bench.hpp"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Laws of the byte-fed receiver: whatever the division of the bytes, the damage and what stands between, whole frames
-// are understood and nothing else; then each message against its description, field by field.
+// Laws of the byte-fed receiver: whatever the division of the bytes, the damage and the bytes in between, whole frames
+// are decoded and nothing else. Then each message against its description, field by field.
 #include "drivers/gnss/gnss_bytes.hpp"
 
 #include <gtest/gtest.h>

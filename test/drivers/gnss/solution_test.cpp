@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the receiver found out arrives: places in all quadrants, speeds in all directions, every kind of fix, dates and
-// times, through UBX of each generation and through NMEA, each field within what its protocol resolves.
+// The receiver's solution arrives: places in all quadrants, speeds in all directions, every kind of fix, dates and
+// times. It comes through UBX of each generation and through NMEA, each field within its protocol's resolution.
 #include "drivers/gnss/gnss_bench.hpp"
 
 #include <gtest/gtest.h>
@@ -156,8 +156,8 @@ TEST(GnssSolution, StandstillIsAVelocityOfZero) {
   }
 }
 
-// The epochs lie a few nanoseconds to milliseconds beside whole ones; the date goes over midnight, the end of a year,
-// of a week, of a leap February.
+// The epochs lie a few nanoseconds to milliseconds beside whole ones. The date passes midnight, the end of a year, of a
+// week, of a leap February.
 TEST(GnssSolution, DateAndTimeAreThoseOfTheEpoch) {
   constexpr std::uint32_t kWeek_ms = 604'800'000;
   for (const Protocol how : kAll) {

@@ -48,7 +48,7 @@ TEST(Icm42688Repeats, TheGyroscopeRepeatsNothingAt100DegreesPerSecondAndIfItDoes
 }
 
 /// White noise of the sheet's densities (tables 1 and 2) behind a second order of this bandwidth, at rest and in the
-/// middle of a count: by bilinear transform, as textbooks have it (Oppenheim and Schafer, sec. 7.1).
+/// middle of a count. The filter is discretised by the bilinear transform (Oppenheim and Schafer, sec. 7.1).
 class Rest {
  public:
   Rest(double bandwidth_Hz, double rate_Hz, double quieter, unsigned seed) : random_(seed) {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// A fake quadrature encoder on a timer's counter: two square waves a quarter period apart, counted on every edge of
-// both, up or down by the level of the other (STMicroelectronics RM0365, general-purpose timers, Encoder interface
-// mode, table 118 "Counting direction versus encoder signals"), with the time of the last counted edge captured. Fails
-// in named ways at the wires, so what the counter then does is what the counting table makes of it.
+// A fake quadrature encoder on a timer's counter: two square waves a quarter period apart. Every edge of both is
+// counted, up or down by the level of the other, with the time of the last counted edge captured (STMicroelectronics
+// RM0365, general-purpose timers, Encoder interface mode, table 118 "Counting direction versus encoder signals"). Its
+// named faults are at the wires, so the counter does what the counting table makes of them.
 //
 //   Encoder<std::uint16_t> encoder;                                  // satisfies hal::EncoderCounter
 //   encoder.set_motion([](double s) { return 4000.0 * s; });         // position in edges, by host time
@@ -76,8 +76,8 @@ class Encoder {
       host_ += step;
     }
   }
-  /// Position in edges (four to a line of the disc) by host time in seconds; where it is at the call stays the wires'
-  /// present state, so a motion may be replaced while it runs if it continues from position().
+  /// Position in edges (four to a line of the disc) by host time in seconds. The wires keep their present state, so a
+  /// motion may be replaced while it runs if it continues from position().
   template <std::invocable<double> F>
   void set_motion(F position_edges) {
     motion_ = std::move(position_edges);

@@ -14,9 +14,9 @@ namespace tetap::fakes::icm42688 {
 
 class Fifo {
  public:
-  /// 6.3: "the physical FIFO size is 2048 bytes"; one packet is reserved against reading while writing, and a read
-  /// cache of two packets "may become available for storing", which the sheet calls non-deterministic. The default is
-  /// the worst case for the host: 129 packets of 16 bytes, 2064 bytes.
+  /// 6.3: "the physical FIFO size is 2048 bytes"; one packet is reserved against reading while writing. A read cache of
+  /// two packets "may become available for storing", which the sheet calls non-deterministic. The default is the worst
+  /// case for the host: 129 packets of 16 bytes, 2064 bytes.
   int read_cache_packets = 2;
 
   [[nodiscard]] std::size_t capacity(std::size_t packet_bytes) const {

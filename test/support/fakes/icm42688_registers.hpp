@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The register map of the ICM-42688-P as its data sheet gives it (TDK DS-000347 revision 1.8, sections 13 to 18): reset
-// values, which bits a user may set, and what a read or a write does. Knows no driver: the fake is judged against it.
+// The register map of the ICM-42688-P as its data sheet gives it (TDK DS-000347 revision 1.8, sections 13 to 18). It
+// holds reset values, the bits that a user may set, and the effect of a read or a write. It uses no driver: the fake is
+// judged against it.
 #pragma once
 
 #include <algorithm>

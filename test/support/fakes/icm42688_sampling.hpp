@@ -114,7 +114,7 @@ inline void Icm42688::sample(Picos at, double host_s) {
   last_odr_ = at;
 }
 
-/// Not in the sheet (ArduPilot issues 25025 and 25332): unless bits 7:6 of INTF_CONFIG1 are 01, the gyroscope repeats
+/// Not in the sheet (ArduPilot issues 25025 and 25332). Unless bits 7:6 of INTF_CONFIG1 are 01, the gyroscope repeats
 /// its last values for up to 2 ms after an axis passed 100 deg/s.
 inline bool Icm42688::switches_range(Picos at, const std::array<double, 3>& rate_radps) {
   using namespace icm42688;
@@ -147,9 +147,9 @@ inline void Icm42688::put(std::vector<std::uint8_t>& packet, int value) const { 
 }
 
 /// 6.1, 6.2, 6.4. A sensor that is in the packet but has no new sample is marked invalid, or repeats its last valid one
-/// (12.8): "when accel and gyro are enabled with different ODRs", when one is off, while one still starts up.
-/// The header's stamp bits are 11 only for the packet after an FSYNC edge, as 6.2 says; the table of 6.4 prints 11 for
-/// all packets once FIFO_TMST_FSYNC_EN is set.
+/// (12.8). Cases: "when accel and gyro are enabled with different ODRs", one is off, one still starts up. The header's
+/// stamp bits are 11 only for the packet after an FSYNC edge, as 6.2 says. The table of 6.4 prints 11 for all packets
+/// once FIFO_TMST_FSYNC_EN is set.
 inline void Icm42688::write_packet(Picos at, bool accel_new, bool gyro_new) {
   using namespace icm42688;
   const std::uint8_t content = registers_[kFifoConfig1];

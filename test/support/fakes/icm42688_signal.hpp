@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // From motion to the numbers of the ICM-42688-P: output data rates, full scales, saturation, the code for "no sample",
-// temperature, self test (TDK DS-000347 revision 1.8, sections 3.1, 3.2, 4.9, 4.13, 5.5, 5.6, 6.1, 12.8 and 14.34).
+// temperature, self test. Source: TDK DS-000347 revision 1.8, sections 3.1, 3.2, 4.9, 4.13, 5.5, 5.6, 6.1, 12.8 and
+// 14.34.
 #pragma once
 
 #include <algorithm>
@@ -98,8 +99,8 @@ inline constexpr int kInvalid8 = -128;  // of FIFO_TEMP_DATA; from TDK's own dri
 }
 
 /// The response that the factory code stands for, as a share of full scale 3 (250 dps, 2 g): 2620 * 1.01^(code - 1)
-/// counts, and half of it for every step of full scale. The formula is TDK's own driver's (Icm426xxSelfTest.c; the
-/// sheet gives the codes, 15.11 and 16.4, but no formula); the mechanics do not depend on the full scale chosen.
+/// counts. Every step of full scale halves it. The formula is TDK's own driver's (Icm426xxSelfTest.c); the sheet gives
+/// the codes, 15.11 and 16.4, but no formula. The mechanics do not depend on the full scale chosen.
 [[nodiscard]] inline double self_test_counts_at_3(std::uint8_t code) {
   return code == 0 ? 10'000.0 : 2620.0 * std::pow(1.01, code - 1);
 }
@@ -132,8 +133,8 @@ class Settling {
   double target_ = 0.0;
 };
 
-/// 5.4: signed 12 bits, 1/32 dps a step for the gyroscope, 0.5 mg for the accelerometer (the sheet prints "0.5 g"
-/// beside "max +-1 g" for 12 bits), laid out over nine bytes.
+/// 5.4: signed 12 bits, 1/32 dps a step for the gyroscope, 0.5 mg for the accelerometer, laid out over nine bytes. The
+/// sheet prints "0.5 g" beside "max +-1 g" for 12 bits.
 struct UserOffsets {
   std::array<double, 3> rate_radps{};
   std::array<double, 3> specific_force_mps2{};

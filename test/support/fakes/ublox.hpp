@@ -168,8 +168,8 @@ class Ublox {
     if (ram(ublox::key("CFG-UART1OUTPROT-NMEA")) == 0) return;
     say(Bytes(text.begin(), text.end()));
   }
-  /// Sec. 5.9.17.2: queued messages go out with the parameters that hold then, so the acknowledgement of a new rate
-  /// may come at either; it is the new one here.
+  /// Sec. 5.9.17.2: queued messages go out with the parameters of their time. The acknowledgement of a new rate may
+  /// come at either; it is the new one here.
   void say_answer(const Answer& answer) {
     if (answer.acknowledgement && injected.swallow_acks > 0) {
       --injected.swallow_acks;

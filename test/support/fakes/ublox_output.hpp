@@ -61,8 +61,8 @@ struct Instant {
     std::int64_t nano;
   };
 
-  /// UBX-18010802, UTC representation: date and time come from rounding to 10 ms, the same in UBX and NMEA; nano is
-  /// what brings them back to the truth: -5 000 000 to 994 999 999.
+  /// UBX-18010802, UTC representation: date and time come from rounding to 10 ms, the same in UBX and NMEA. nano brings
+  /// them back to the truth: -5 000 000 to 994 999 999.
   [[nodiscard]] Utc utc() const {
     using namespace std::chrono;
     // IS-GPS-200 sec. 3.3.4: week 0 began at midnight before 6 January 1980; GPS time has no leap seconds.
