@@ -27,7 +27,7 @@ ifneq ($(unknown),)
 $(error no setting $(unknown); there are: $(settings))
 endif
 
-.PHONY: help sim test quick proof replay record doctor firmware flash size heap stack count bits hashes matrix constants check docs dbc setup programs arm
+.PHONY: help sim test quick proof replay record doctor firmware flash size heap stack count bits hashes matrix laws constants check docs dbc setup programs arm
 
 help: ## this list
 	@echo "tetap: state estimation on the robot's own microcontroller"; echo
@@ -88,6 +88,10 @@ hashes: setup programs ## a hash of each estimate over simulated and recorded ru
 matrix: setup ## faults of every sensor in every situation against what the node promises, in out/matrix.json (CELLS=1000); goes on where it was
 	@tools/run/build_preset host:tetap-matrix
 	@tools/proof/run_matrix $(if $(CELLS),--cells $(CELLS))
+
+laws: setup programs ## laws that need no truth (other stamps, order, time, place, mirror image) on LOG= of ROBOT=; figures in out/laws
+	@test -n "$(LOG)" || { echo "make laws: name a log: LOG=file ROBOT=$(ROBOT)" >&2; exit 2; }
+	@tools/proof/check_laws $(LOG) --robot $(ROBOT)
 
 check: setup ## format, tidy, layers, DBC fresh
 	@tools/proof/run_checks test check
