@@ -27,7 +27,7 @@ ifneq ($(unknown),)
 $(error no setting $(unknown); there are: $(settings))
 endif
 
-.PHONY: help sim test quick proof replay record doctor firmware flash size heap stack count bits hashes matrix laws constants check docs dbc setup programs arm
+.PHONY: help sim test quick proof replay record doctor firmware flash size heap stack count bits hashes soak matrix laws constants check docs dbc setup programs arm
 
 help: ## this list
 	@echo "tetap: state estimation on the robot's own microcontroller"; echo
@@ -78,6 +78,10 @@ count: arm ## instructions per workload and per tick on the emulated cores, agai
 
 bits: setup ## the same bits from every compiler, option and core: 2^24 values, 100000 steps (some 8 minutes)
 	@tools/proof/compare_bits --whole
+
+soak: setup ## the node on a hostile bus: 10^8 frames, 24 h of robot time, in out/soak.json; goes on where it was interrupted
+	@tools/run/build_preset host:soak
+	@tools/proof/run_soak
 
 constants: setup ## numbers in the code and parameters that the inertial estimator reaches, in out/constants.json
 	@tools/proof/count_constants

@@ -19,6 +19,16 @@ struct CanFaults {
   std::uint32_t tx_high = 0;      ///< most frames that waited to be sent at once
 };
 
+/// Standard data frames whose identifier equals `id` in every bit of `mask`: all that a node asks a port to receive.
+struct Acceptance {
+  std::uint32_t id = 0;
+  std::uint32_t mask = 0;
+
+  [[nodiscard]] constexpr bool takes(const base::CanFrame& frame) const {
+    return !frame.extended && (frame.id & mask) == (id & mask);
+  }
+};
+
 template <class B>
 concept CanBus = requires(B& bus, const B& view, const base::CanFrame& frame) {
   /// Takes the frame for transmission; false: no room, the frame is not taken. Frames leave in the order of these

@@ -14,10 +14,13 @@ int with_node_in_process(const std::string& robot, const ParameterSettings& sett
   int status = 2;
   for_robot(robot, settings, [&]<class Estimators>(std::type_identity<Estimators>, param::Parameters parameters) {
     parameters.can_base = can_base;
+    // A node in the player's own process is the player's.
+    if (parameters.loop.lockstep == param::Lockstep::kAuthenticated) parameters.loop.lockstep = param::Lockstep::kPlain;
     hal::MemoryBus bus;
     hal::MemoryCan node_end = bus.node_end();
     CanAdapter can(node_end);
-    HostBoard board(can);
+    constexpr base::Micros kLongestPause{200'000};  // well below the time after which lockstep ends
+    HostBoard board(can, kLongestPause);
     const std::unique_ptr<RobotFirmware> firmware = make_firmware<Estimators>(board, parameters, version());
     InProcessLink link(bus, [&firmware] { firmware->poll(); });
     link.on_resume([&firmware](std::span<const std::byte> state) { return firmware->resume(state); });

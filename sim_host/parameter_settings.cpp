@@ -136,7 +136,8 @@ std::string ParameterSettings::words() const {
   std::string words;
   for (const Setting& one : settings_) {
     words += (words.empty() ? "" : " ") + std::string(one.row->path) + "=";
-    for (std::size_t i = 0; i < one.values.size(); ++i)
+    if (param::is_secret(*one.row)) words += "secret";
+    for (std::size_t i = 0; i < one.values.size() && !param::is_secret(*one.row); ++i)
       words += (i == 0 ? "" : ",") + element_text(*one.row, one.values[i]);
   }
   return words;
@@ -145,7 +146,7 @@ std::string ParameterSettings::words() const {
 std::string value_text(const param::Row& row, const param::Parameters& parameters) {
   std::string text;
   for (std::size_t i = 0; i < row.elements; ++i)
-    text += (i == 0 ? "" : " ") + element_text(row, row.get(parameters, i));
+    text += (i == 0 ? "" : " ") + element_text(row, param::is_secret(row) ? 0 : row.get(parameters, i));
   return text;
 }
 

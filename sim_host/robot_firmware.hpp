@@ -47,13 +47,25 @@ class CanAdapter final : public AnyCan {
 
 /// The host as a board: any bus, and the machine's monotonic clock from the board's beginning.
 struct HostBoard {
-  explicit HostBoard(AnyCan& bus) : can(bus) {}
+  /// `longest_pause`: a longer time between two looks at the clock counts as so long; 0: all time counts. For a node
+  /// that stands still together with its player, as in a stopped process.
+  explicit HostBoard(AnyCan& bus, base::Micros longest_pause = {}) : can(bus), longest_pause_(longest_pause) {}
 
-  [[nodiscard]] base::Micros now() const { return hal::monotonic_clock() - began; }
+  [[nodiscard]] base::Micros now() {
+    const base::Micros time = hal::monotonic_clock();
+    const base::Micros pause = time - looked_;
+    if (longest_pause_.us > 0 && pause > longest_pause_) began_ += pause - longest_pause_;
+    looked_ = time;
+    return time - began_;
+  }
 
   static constexpr bool kSnapshots = true;
   AnyCan& can;
-  base::Micros began = hal::monotonic_clock();
+
+ private:
+  base::Micros longest_pause_;
+  base::Micros began_ = hal::monotonic_clock();
+  base::Micros looked_ = began_;
 };
 
 /// node::Firmware of some robot.
@@ -71,8 +83,8 @@ class RobotFirmware {
   [[nodiscard]] virtual bool resume(std::span<const std::byte> state) = 0;
 };
 
-/// Firmware with these estimators; instantiated once for each robot, in a file that CMake makes. The board and the
-/// parameters outlive it.
+/// Firmware with these estimators, tags and guards included: a host has room for what parameters may ask for;
+/// instantiated once for each robot, in a file that CMake makes. The board and the parameters outlive it.
 template <class Estimators>
 [[nodiscard]] std::unique_ptr<RobotFirmware> make_firmware(HostBoard& board, const param::Parameters& parameters,
                                                            const bus::Version& version);

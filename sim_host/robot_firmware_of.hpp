@@ -2,6 +2,7 @@
 // Definition of make_firmware(). Only the files that instantiate it for a robot include this.
 #pragma once
 
+#include "node/bus_protection.hpp"
 #include "node/firmware.hpp"
 #include "sim_host/robot_firmware.hpp"
 
@@ -21,7 +22,7 @@ std::unique_ptr<RobotFirmware> make_firmware(HostBoard& board, const param::Para
     bool resume(std::span<const std::byte> state) override { return firmware_.resume(state); }
 
    private:
-    node::Firmware<HostBoard, Estimators> firmware_;
+    node::Firmware<HostBoard, node::WithBusProtection<Estimators>> firmware_;
   };
   return std::make_unique<Firmware>(board, parameters, version);
 }

@@ -3,6 +3,7 @@
 #include "hal/board/linux/memory_can.hpp"
 #include "hal/board/linux/socket_can.hpp"
 #include "hal/chip/support/boot_line.hpp"
+#include "node/accepted_frames.hpp"
 #include "sim_host/play/arguments.hpp"
 #include "sim_host/robot_firmware.hpp"
 #include "sim_host/robots.hpp"
@@ -39,9 +40,9 @@ The firmware as a Linux program on SocketCAN. Ends on INT or TERM with status 0.
 
 template <class Estimators>
 void run(const std::string& robot, const std::string& interface, const tetap::param::Parameters& parameters) {
-  tetap::hal::SocketCan bus(interface);
-  std::fprintf(stderr, "tetap-node: robot %s on %s, ids %03X to %03X\n", robot.c_str(), interface.c_str(),
-               parameters.can_base, parameters.can_base + 0x3F);
+  tetap::hal::SocketCan bus(interface, {.accept = tetap::node::accepted_by<Estimators>(parameters)});
+  std::fprintf(stderr, "tetap-node: robot %s on %s, ids %03X to %03X, version %s\n", robot.c_str(), interface.c_str(),
+               parameters.can_base, parameters.can_base + 0x3F, tetap::hal::version_text(tetap::version()).c_str());
   tetap::sim::CanAdapter can(bus);
   tetap::sim::HostBoard board(can);
   const auto firmware = tetap::sim::make_firmware<Estimators>(board, parameters, tetap::version());

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // tetap-play: plays a candump log to a node, on a CAN interface or in its own process, and records what it answers.
+#include "hal/chip/support/boot_line.hpp"
 #include "sim_host/in_process.hpp"
 #include "sim_host/parameter_settings.hpp"
 
 #include "sim_host/play/play.hpp"
 #include "sim_host/robots.hpp"
+#include "version.hpp"
 
 #include <cstdio>
 #include <exception>
@@ -17,9 +19,11 @@ int main(int count, char** values) {
       return std::fputs(sim::play_help(sim::kRobotNames).c_str(), stdout), 0;
     const sim::ParameterSettings settings(arguments);
     sim::PlayOptions options = sim::play_options(arguments, settings.can_base());
+    options.version = hal::version_text(version()).c_str();
     if (options.robot.empty() && !settings.words().empty()) throw sim::UsageError("--params and --set need --robot");
     if (!options.robot.empty())
       options.notes = sim::parameter_notes(sim::parameters_of(options.robot, settings), settings);
+    sim::Interruption::expect();
     // Before the bus, so that an unreadable log is reported also where there is no bus.
     sim::SurveyedLog log = sim::survey_for(options);
     if (options.memory)

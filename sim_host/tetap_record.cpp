@@ -2,11 +2,13 @@
 // tetap-record: writes down everything on a CAN interface (raw.log) and one node's output (estimates.log and CSV
 // files) until it is interrupted.
 #include "hal/board/linux/socket_can.hpp"
+#include "hal/chip/support/boot_line.hpp"
 #include "sim_host/play/arguments.hpp"
+#include "sim_host/play/interruption.hpp"
 #include "sim_host/play/session.hpp"
 #include "sim_host/play/snapshot_request.hpp"
+#include "version.hpp"
 
-#include <csignal>
 #include <cstdio>
 #include <exception>
 #include <optional>
@@ -19,7 +21,7 @@ using namespace tetap;
 constexpr const char* kHelp = R"(usage: tetap-record [--can IFACE] [OPTION]...
 
 Records a CAN interface until interrupted (^C, SIGTERM): everything as candump would (raw.log), and what a node says
-(estimates.log, estimates.csv, innovations.csv, status.csv, sources.csv, run.json).
+(estimates.log, estimates.csv, innovations.csv, status.csv, sources.csv, run.json). Until then their names end in .part.
 
   --can IFACE     (default vcan0)
   --base ID       first id of the node's block (default 0x300)
@@ -32,13 +34,10 @@ Records a CAN interface until interrupted (^C, SIGTERM): everything as candump w
 Exit status: 0; 1 frames were lost; 2 bad usage or no bus.
 )";
 
-volatile std::sig_atomic_t stop = 0;
-
-void on_signal(int) { stop = 1; }
-
 int record(sim::Arguments& arguments) {
   const std::string interface = arguments.text("--can").value_or("vcan0");
   const sim::SessionOptions about{.program = "tetap-record",
+                                  .version = hal::version_text(version()).c_str(),
                                   .folder = arguments.text("--out").value_or("out/record"),
                                   .base = arguments.base(),
                                   .raw = true,
@@ -56,7 +55,7 @@ int record(sim::Arguments& arguments) {
   const auto counter = static_cast<std::uint32_t>(hal::wall_clock().us / 1'000'000 & 0x0F);
   const base::Micros began = hal::monotonic_clock();
   base::Micros written = began;
-  while (stop == 0 && (duration.us == 0 || hal::monotonic_clock() - began < duration)) {
+  while (sim::Interruption::signal() == 0 && (duration.us == 0 || hal::monotonic_clock() - began < duration)) {
     can.wait({100'000});
     while (const auto frame = can.receive()) {
       session.recorder().received(*frame, can.last_arrival());
@@ -92,8 +91,7 @@ int record(sim::Arguments& arguments) {
 }  // namespace
 
 int main(int count, char** values) {
-  std::signal(SIGINT, on_signal);
-  std::signal(SIGTERM, on_signal);
+  sim::Interruption::expect();
   try {
     sim::Arguments arguments(count, values);
     if (arguments.flag("--help") || arguments.flag("-h")) return std::fputs(kHelp, stdout), 0;

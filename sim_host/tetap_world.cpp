@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // tetap-world: the simulated world's sensors on a CAN bus, and what the node makes of them on record beside the truth.
+#include "hal/chip/support/boot_line.hpp"
 #include "sim_host/in_process.hpp"
 #include "sim_host/node_origin.hpp"
 #include "sim_host/play/arguments.hpp"
+#include "sim_host/play/interruption.hpp"
 #include "sim_host/play/lockstep.hpp"
 #include "sim_host/play/realtime.hpp"
 #include "sim_host/play/session.hpp"
@@ -10,6 +12,7 @@
 #include "sim_host/residual_bias.hpp"
 #include "sim_host/robots.hpp"
 #include "sim_host/world_source.hpp"
+#include "version.hpp"
 
 #include <algorithm>
 #include <array>
@@ -82,10 +85,10 @@ std::string landmarks_json(const sim::World& world) {
   return "[" + text + "]";
 }
 
-/// In lockstep each row is an epoch of the node, whatever became of the clock of the bus. Biases are those that the
-/// robot's own calibration leaves. `origin` is that of the node's map.
-void write_truth(const sim::SessionOptions& about, const param::Parameters& parameters, const sim::WorldSource& source,
-                 const sim::GeodeticOrigin& origin, bool lockstep) {
+/// The ended file. In lockstep each row is an epoch of the node, whatever became of the clock of the bus. Biases are
+/// those that the robot's own calibration leaves. `origin` is that of the node's map.
+sim::OutFile write_truth(const sim::SessionOptions& about, const param::Parameters& parameters,
+                         const sim::WorldSource& source, const sim::GeodeticOrigin& origin, bool lockstep) {
   const sim::FrameChange change(sim::Earth(source.world().origin()), sim::Earth(origin));
   const double temperature_degC = source.world().parameters().imu.temperature_degC;
   sim::OutFile file(about.folder + "/truth.csv");
@@ -106,7 +109,8 @@ void write_truth(const sim::SessionOptions& about, const param::Parameters& para
     if (lockstep) line.text(",").integer(++epoch);
     file.write(line.text("\n").view());
   }
-  file.close();
+  file.end();
+  return file;
 }
 
 struct Run {
@@ -133,10 +137,11 @@ int drive(L& link, const Run& run) {
   session.note("landmarks", landmarks_json(source.world()));
   session.note("matched", run.world.mismatched ? "false" : "true");
   const param::Parameters parameters = sim::parameters_of(about.robot, run.settings);
+  if (parameters.bus.guard != 0) source.send_guards();
   for (const auto& [name, json] : sim::parameter_notes(parameters, run.settings)) session.note(name, json);
   sim::NodeOrigin node_origin(about.base);
   sim::OriginWatch watch(session, node_origin);
-  const int status = session.run([&] {
+  const auto play = [&] {
     if (!run.realtime) return sim::play_lockstep(link, source, watch, run.lockstep, session.counts());
     std::vector<sim::TimedFrame> frames;
     sim::Tick tick;
@@ -144,13 +149,14 @@ int drive(L& link, const Run& run) {
       for (const auto& frame : tick.inputs) frames.push_back({.time = tick.time, .frame = frame});
     sim::RealtimeOptions options{.base = about.base};
     sim::play_realtime(link, frames, watch, options, session.counts());
+  };
+  return session.run(play, [&] {
+    // A robot with a map of landmarks keeps to that, wherever its first fix fell.
+    const auto& world = source.world();
+    const sim::GeodeticOrigin origin =
+        run.world.surveyed ? world.origin() : node_origin.from_fix().value_or(world.origin());
+    session.add(write_truth(about, parameters, source, origin, !run.realtime));
   });
-  // A robot with a map of landmarks keeps to that, wherever its first fix fell.
-  const auto& world = source.world();
-  const sim::GeodeticOrigin origin =
-      run.world.surveyed ? world.origin() : node_origin.from_fix().value_or(world.origin());
-  write_truth(about, parameters, source, origin, !run.realtime);
-  return status;
 }
 
 /// From 1 to `most`.
@@ -302,7 +308,9 @@ int main(int argc, char** argv) try {
   run.lockstep.window = arguments.window();
   if (arguments.flag("--emulated")) run.lockstep.patience = sim::kEmulatedPatience;
   run.lockstep.base = base;
+  sim::Interruption::expect();
   run.session = {.program = "tetap-world",
+                 .version = hal::version_text(version()).c_str(),
                  .folder = arguments.text("--out").value_or("out/sim"),
                  .base = base,
                  .raw = arguments.flag("--raw"),

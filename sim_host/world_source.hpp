@@ -4,12 +4,14 @@
 #pragma once
 
 #include "bus/e2e.hpp"
+#include "bus/guard_sender.hpp"
 #include "sim_host/encode.hpp"
 #include "sim_host/play/script.hpp"
 #include "sim_host/world/world.hpp"
 
 #include <cmath>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 namespace tetap::sim {
@@ -25,6 +27,9 @@ class WorldSource {
         next_(world_.start() + period),
         end_(world_.start() + (limit < world_.duration() ? limit : world_.duration())) {}
 
+  /// From now on guards are sent with samples and map entries (param::BusParameters::guard).
+  void send_guards() { guards_.emplace(); }
+
   /// The first tick brings the landmark map and the start pose.
   bool next(Tick& tick) {
     if (next_ > end_) return false;
@@ -33,6 +38,7 @@ class WorldSource {
     world_.advance_to(next_, measurements_);
     if (truth_.empty()) introduce();
     for (const Measurement& m : measurements_) encode(base_, m, frames_);
+    if (guards_) guard();
     truth_.push_back(world_.truth());
     tick = {.time = next_ + world_.clock_offset(), .inputs = frames_, .begin = {}};
     if (truth_.size() == 1) tick.begin = next_ - period_;
@@ -44,6 +50,21 @@ class WorldSource {
   [[nodiscard]] const World& world() const { return world_; }
 
  private:
+  /// Each guard behind the last frame of its sample, or before its map entry.
+  void guard() {
+    guarded_.clear();
+    for (const base::CanFrame& frame : frames_) {
+      const auto offset = static_cast<std::uint8_t>(frame.id - base_);
+      if (offset == bus::InMapEntry::kOffset) {
+        bus::InGuardEntry entry{.entry_id = frame.data[0], .entry_ctr = entries_++};
+        entry.entry_crc = bus::entry_guard_crc(entry, frame);
+        guarded_.push_back(bus::frame(base_, entry));
+      }
+      guarded_.push_back(frame);
+      if (const auto sample = guards_->after(offset, frame)) guarded_.push_back(bus::frame(base_, *sample));
+    }
+    frames_.swap(guarded_);
+  }
   void introduce() {
     for (const Landmark& mark : world_.map())
       frames_.push_back(bus::frame(
@@ -70,7 +91,9 @@ class WorldSource {
   base::Micros next_;
   base::Micros end_;
   std::vector<Measurement> measurements_;
-  std::vector<base::CanFrame> frames_;
+  std::vector<base::CanFrame> frames_, guarded_;
+  std::optional<bus::GuardSender> guards_;
+  std::uint8_t entries_ = 0;  ///< map entries guarded
   std::vector<Truth> truth_;
 };
 

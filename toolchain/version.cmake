@@ -1,10 +1,16 @@
-# Writes OUTPUT/version.hpp and version.cpp with the first 32 bits of the commit, only when they have changed: run at every build, rebuilds nothing by itself.
+# Writes OUTPUT/version.hpp and version.cpp with the first 28 bits of the commit and a mark of a changed tree, only when they have changed: run at every build,
+# rebuilds nothing by itself.
 execute_process(COMMAND git -C ${SOURCE} rev-parse --short=8 HEAD OUTPUT_VARIABLE commit OUTPUT_STRIP_TRAILING_WHITESPACE ERROR_QUIET
                 RESULT_VARIABLE failed)
 if(failed)
   set(commit 00000000)
 endif()
-string(SUBSTRING "${commit}" 0 8 commit)
+string(SUBSTRING "${commit}" 0 7 commit)
+execute_process(COMMAND git -C ${SOURCE} status --porcelain OUTPUT_VARIABLE changes ERROR_QUIET)
+set(dirty 0)
+if(changes)
+  set(dirty 1)
+endif()
 
 function(write_if_other path text)
   set(old "")
@@ -24,10 +30,10 @@ write_if_other(${OUTPUT}/version.hpp "// Generated.
 namespace tetap {
 struct Commit {
   char mark[12];
-  std::uint32_t number;  ///< first 32 bits of the commit this was built from; 0: not from a repository
+  std::uint32_t number;  ///< first 28 bits of the commit this was built from, 0 outside of a repository; then 4 bits, 1: changed since
 };
 extern const Commit kCommit;
-inline bus::Version version() { return {.git = kCommit.number}; }
+inline bus::Version version() { return {.git = kCommit.number >> 4, .dirty = (kCommit.number & 15U) != 0}; }
 }
 ")
 write_if_other(${OUTPUT}/version.cpp "// Generated.
@@ -38,6 +44,6 @@ struct Commit {
   std::uint32_t number;
 };
 extern const Commit kCommit;
-const Commit kCommit{.mark = \"tetap-git:\", .number = 0x${commit}};
+const Commit kCommit{.mark = \"tetap-git:\", .number = 0x${commit}${dirty}};
 }
 ")

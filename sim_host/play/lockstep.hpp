@@ -52,6 +52,7 @@ void play_lockstep(L& link, S& source, K& sink, const LockstepOptions& options, 
   constexpr base::Micros kNever{-1};
   base::Micros quiet_since = kNever;
   while (more || accounting.in_flight() > 0) {
+    end_if_interrupted(counts);
     if (accounting.in_flight() <= options.window / 2) {  // refill in groups: fewer wake-ups on both sides
       while (more && accounting.in_flight() < options.window && (!tick.begin || accounting.in_flight() == 0)) {
         send(tick);

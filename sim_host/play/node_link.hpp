@@ -5,6 +5,7 @@
 
 #include "hal/board/linux/clock.hpp"
 #include "sim_host/play/frame_accounting.hpp"
+#include "sim_host/play/interruption.hpp"
 #include "sim_host/play/link.hpp"
 #include "sim_host/play/out_file.hpp"
 #include "sim_host/play/snapshot.hpp"
@@ -21,6 +22,12 @@ namespace tetap::sim {
   Line text;
   text.fixed(t.us / 1000, 3).text(" s");
   return std::string(text.view());
+}
+
+/// Throws RunError when a signal has asked for the end.
+inline void end_if_interrupted(const Counts& counts) {
+  if (Interruption::signal() != 0)
+    throw RunError(Interruption::text() + " after " + std::to_string(counts.epochs) + " epochs");
 }
 
 struct Patience {
@@ -41,7 +48,13 @@ class NodeLink {
     if (!link_.send(frame)) send_later(frame);
     sink_.sent(frame);
   }
-  void sync(bus::SyncKind kind, base::Micros time) { send(sync_frame(base_, kind, time, sync_counter_++)); }
+  void sync(bus::SyncKind kind, base::Micros time) {
+    const bus::InSync message = sync_message(kind, time, sync_counter_++);
+    // A node takes its power-on state, and leaps in time, only at the request of a guarded frame.
+    if (kind == bus::SyncKind::kBegin || kind == bus::SyncKind::kClock)
+      send(bus::frame(base_, bus::guard_of_sync(message)));
+    send(bus::frame(base_, message));
+  }
 
   /// Takes every frame that is there; on_epoch(epoch) for each epoch that is complete.
   template <class OnEpoch>
@@ -59,6 +72,7 @@ class NodeLink {
       sync(bus::SyncKind::kBegin, time);
       ++counts_.syncs;
       while (hal::monotonic_clock() - now < patience.repeat) {
+        end_if_interrupted(counts_);
         link_.wait({20'000});
         if (answered()) {
           collector_.reset();
@@ -88,6 +102,7 @@ class NodeLink {
   void send_later(const base::CanFrame& frame) {
     const base::Micros began = hal::monotonic_clock();
     do {
+      end_if_interrupted(counts_);
       if (hal::monotonic_clock() - began > base::Micros{2'000'000})
         throw RunError("the bus takes no frames: is the interface up?");
       link_.wait({1000});

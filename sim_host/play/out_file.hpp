@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Text output that keeps up with runs at hundreds of times real time: lines are made by hand in a small buffer, files
-// are written in blocks. A write that fails (disk full) is an error, not a short file.
+// are written in blocks. A write that fails (disk full) is an error, not a short file. A file has its name once it is
+// whole, and one program at a time writes into a folder.
 #pragma once
 
 #include "sim_host/play/sha256.hpp"
@@ -41,6 +42,7 @@ class Line {
   std::size_t size_ = 0;
 };
 
+/// Written as PATH.part, which publish() renames. A device or pipe is written as it is.
 class OutFile {
  public:
   enum class Hash : bool { kNo, kSha256 };
@@ -53,6 +55,10 @@ class OutFile {
     buffer_.append(text);
   }
   /// Writes what is left; throws when anything could not be written. Returns the SHA-256 of all, if asked for.
+  std::string end();
+  /// Gives the file, which has ended, its name; throws when that is not possible.
+  void publish();
+  /// end() and publish().
   std::string close();
   void flush();
 
@@ -64,6 +70,7 @@ class OutFile {
   void spill();
 
   std::string path_;
+  std::string written_;  ///< path until publish()
   std::unique_ptr<std::FILE, Closer> file_;
   std::string buffer_;
   std::optional<Sha256> hash_;
@@ -71,5 +78,19 @@ class OutFile {
 
 /// Creates the folder and its parents; throws with the path and the reason.
 void make_folder(const std::string& path);
+
+/// Keeps other programs of this kind out of a folder, which it makes. The system takes the lock off when the program
+/// ends, however it ends.
+class FolderLock {
+ public:
+  /// Throws std::runtime_error when another program has the folder.
+  explicit FolderLock(const std::string& path);
+  FolderLock(const FolderLock&) = delete;
+  FolderLock& operator=(const FolderLock&) = delete;
+  ~FolderLock();
+
+ private:
+  int folder_ = -1;
+};
 
 }  // namespace tetap::sim

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// Input frames of a log that its node sent itself: samples of the sensors wired to it, as Est_Diag page 10 names them.
+// Input frames of a log that its node sent itself: samples of the sensors wired to it, as Est_Diag page 10 names them,
+// and their guards.
 #pragma once
 
 #include "bus/e2e.hpp"
+#include "bus/guard.hpp"
 #include "sim_host/play/protocol.hpp"
 
 #include <cstdint>
@@ -29,7 +31,11 @@ class OwnInputs {
         if (const auto page = bus::decode<bus::EstDiagWired>(bytes)) apply(*page);
         return false;
       case bus::InSync::kOffset:
-        if (const auto sync = bus::decode<bus::InSync>(bytes)) on_sync(sync->kind);
+        if (const auto sync = bus::decode<bus::InSync>(bytes)) on_sync(sync->kind, guard_.covers(frame));
+        return false;
+      case bus::InGuardSample::kOffset:
+        if (bus::is_sync_guard(*offset, frame)) guard_.announce(frame);
+        if (const auto guard = bus::decode<bus::InGuardSample>(bytes)) return on_ && owns(*guard);
         return false;
       case bus::CmdReset::kOffset:
         if (const auto reset = bus::decode<bus::CmdReset>(bytes);
@@ -54,12 +60,26 @@ class OwnInputs {
            (wired_.wired_encoders && offset == bus::InWheelCounts::kOffset) ||
            (wired_.wired_gnss && offset >= bus::InGnssLat::kOffset && offset <= bus::InGnssVelU::kOffset);
   }
+  [[nodiscard]] bool owns(const bus::InGuardSample& guard) const {
+    switch (guard.sensor) {
+      case sensor::Sensor::kImu:
+        return wired_.wired_imu && guard.sample_inst == wired_.wired_inst;
+      case sensor::Sensor::kWheelCounts:
+        return wired_.wired_encoders;
+      case sensor::Sensor::kGnssPosition:
+      case sensor::Sensor::kGnssVelocity:
+        return wired_.wired_gnss;
+      default:
+        return false;
+    }
+  }
   void apply(const bus::EstDiagWired& page) {
     wired_ = page;
     on_ = !page.wired_off;
   }
-  void on_sync(bus::SyncKind kind) {
-    if (kind == bus::SyncKind::kStep) return begin();
+  void on_sync(bus::SyncKind kind, bool guarded) {
+    // A node refuses a Step out of lockstep that nobody vouches for.
+    if (kind == bus::SyncKind::kStep) return lockstep_ || guarded ? begin() : void();
     if (kind == bus::SyncKind::kBegin) return;  // until the node answers
     if (lockstep_ && !commanded_off_) on_ = true;
     lockstep_ = false;
@@ -72,6 +92,7 @@ class OwnInputs {
   }
 
   std::uint32_t base_;
+  bus::SyncGuard guard_;
   bus::EstDiagWired wired_;  ///< wired sensors, by the last page
   bool on_ = false;
   bool commanded_off_ = false;

@@ -26,6 +26,7 @@ struct PlayOptions {
   std::string interface;
   std::string folder;
   std::string robot;
+  std::string version;  ///< version of the program
   PlayMode mode = PlayMode::kAutomatic;
   ScriptOptions script;
   LogOptions reading;
@@ -67,6 +68,7 @@ int play(L& link, const PlayOptions& options, SurveyedLog& log, const std::strin
   const LogReport& report = log.file.report();
   warn_about(report, program);
   SessionOptions about{.program = program,
+                       .version = options.version,
                        .folder = options.folder,
                        .base = options.script.base,
                        .raw = options.raw,

@@ -6,6 +6,7 @@
 #include "base/can_frame.hpp"
 #include "base/time.hpp"
 #include "bus/codec.hpp"
+#include "bus/guard.hpp"
 #include "bus/messages.hpp"
 
 #include <algorithm>
@@ -27,10 +28,10 @@ inline constexpr std::uint64_t kTimeMask = 0xFFFFFFFFFFFF;
   if (frame.extended || frame.id < base || frame.id >= base + bus::kBlock + bus::kMapBlock) return std::nullopt;
   return frame.id - base;
 }
-/// A frame the node consumes and counts: of its inputs, sync frames excepted.
+/// A frame the node consumes and counts: of its inputs, sync frames and their guards excepted.
 [[nodiscard]] constexpr bool is_counted_input(const base::CanFrame& frame, std::uint32_t base) {
   const auto offset = offset_in_block(frame, base);
-  return offset && *offset < kInputOffsets && *offset != bus::InSync::kOffset;
+  return offset && *offset < kInputOffsets && *offset != bus::InSync::kOffset && !bus::is_sync_guard(*offset, frame);
 }
 /// Frames with real time of loop and controller, and the program's version, differ between runs that are otherwise
 /// the same; everything else must not: of the diagnostics, counters that follow from the frames (bus::Counters).
@@ -62,10 +63,12 @@ inline constexpr std::uint64_t kTimeMask = 0xFFFFFFFFFFFF;
   return bus::frame(base, *status);
 }
 
+[[nodiscard]] constexpr bus::InSync sync_message(bus::SyncKind kind, base::Micros time, std::uint8_t counter) {
+  return {.time_us = static_cast<std::uint64_t>(time.us) & kTimeMask, .ctr = counter, .kind = kind};
+}
 [[nodiscard]] constexpr base::CanFrame sync_frame(std::uint32_t base, bus::SyncKind kind, base::Micros time,
                                                   std::uint8_t counter) {
-  return bus::frame(
-      base, bus::InSync{.time_us = static_cast<std::uint64_t>(time.us) & kTimeMask, .ctr = counter, .kind = kind});
+  return bus::frame(base, sync_message(kind, time, counter));
 }
 [[nodiscard]] constexpr bool same_bus_time(std::uint64_t bus_us, base::Micros time) {
   return bus_us == (static_cast<std::uint64_t>(time.us) & kTimeMask);

@@ -46,6 +46,7 @@ void play_realtime(L& link, std::span<const TimedFrame> frames, K& sink, const R
     node.begin(tick - period, options.patience);
   } else {
     while (!accounting.known()) {
+      end_if_interrupted(counts);
       if (hal::monotonic_clock() - last_answer > options.patience.begin)
         throw RunError("no node is ticking on this bus");
       link.wait({20'000});
@@ -65,6 +66,7 @@ void play_realtime(L& link, std::span<const TimedFrame> frames, K& sink, const R
   std::size_t next = 0;
   base::Micros quiet_end = end + base::Micros{std::max<std::int64_t>(period.us * 5, 1'000'000)};
   for (base::Micros now = log_time(); now < quiet_end; now = log_time()) {
+    end_if_interrupted(counts);
     for (bool due = true; due;) {
       const bool frame_due = next < frames.size() && frames[next].time <= now;
       const bool tick_due = options.sync == Sync::kTick && tick <= end && tick <= now;

@@ -291,10 +291,22 @@ void Recorder::flush() {
   if (raw_) raw_->flush();
 }
 
+const Recorder::Totals& Recorder::end() {
+  totals_.estimates_sha256 = estimates_log_.end();
+  for (OutFile* file : {&estimates_, &states_, &innovations_, &sensors_, &status_, &sources_, &map_}) file->end();
+  if (raw_) raw_->end();
+  return totals_;
+}
+
+void Recorder::publish() {
+  for (OutFile* file : {&estimates_log_, &estimates_, &states_, &innovations_, &sensors_, &status_, &sources_, &map_})
+    file->publish();
+  if (raw_) raw_->publish();
+}
+
 const Recorder::Totals& Recorder::finish() {
-  totals_.estimates_sha256 = estimates_log_.close();
-  for (OutFile* file : {&estimates_, &states_, &innovations_, &sensors_, &status_, &sources_, &map_}) file->close();
-  if (raw_) raw_->close();
+  end();
+  publish();
   return totals_;
 }
 

@@ -56,6 +56,10 @@ class Recorder {
   /// Writes out what is buffered, so that a long recording can be looked at.
   void flush();
   /// Ends all files; throws when one could not be written whole.
+  const Totals& end();
+  /// Gives the files, which have ended, their names.
+  void publish();
+  /// end() and publish().
   const Totals& finish();
   [[nodiscard]] const Totals& totals() const { return totals_; }
 

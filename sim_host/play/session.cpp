@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sim_host/play/session.hpp"
 
+#include "sim_host/play/interruption.hpp"
+
 #include <unistd.h>
 
 #include <cstdio>
+#include <filesystem>
 
 namespace tetap::sim {
 
@@ -37,6 +40,7 @@ std::string quoted(std::string_view text) {
 
 Session::Session(const SessionOptions& options, Comparison* comparison)
     : options_(options),
+      lock_(options.folder),
       recorder_({.folder = options.folder,
                  .base = options.base,
                  .raw = options.raw,
@@ -92,15 +96,29 @@ std::string Session::complaint() const {
 
 int Session::finish() {
   const double wall_s = to_seconds(hal::monotonic_clock() - began_);
-  recorder_.finish();
+  recorder_.end();
+  OutFile json(options_.folder + "/run.json");
+  write_json(json, wall_s);
+  publish(json);
   if (terminal_ && !options_.quiet) std::fputs("\r\033[K", stderr);
-  write_json(wall_s);
   const std::string wrong = complaint();
-  if (!wrong.empty()) std::fprintf(stderr, "%s: %s\n", options_.program.c_str(), wrong.c_str());
+  const int signal = error_.empty() ? 0 : Interruption::signal();
+  // Whoever sends TERM has a reason to print.
+  if (!wrong.empty() && signal != SIGTERM) std::fprintf(stderr, "%s: %s\n", options_.program.c_str(), wrong.c_str());
+  if (signal != 0) return 128 + signal;
   return wrong.empty() ? 0 : 1;
 }
 
-void Session::write_json(double wall_s) {
+void Session::publish(OutFile& json) {
+  // Whatever ends this program in between, there is no summary beside data of another run.
+  for (const char* name : {"summary.json", "report.html", "doctor.json", "run.json"})
+    std::filesystem::remove(options_.folder + "/" + name);
+  recorder_.publish();
+  for (OutFile& file : files_) file.publish();
+  json.publish();
+}
+
+void Session::write_json(OutFile& file, double wall_s) {
   const Recorder::Totals& t = recorder_.totals();
   const double duration_s = t.epochs > 0 ? to_seconds(t.last - t.first) : 0;
   const auto load = [&](std::uint64_t bits) {
@@ -110,6 +128,7 @@ void Session::write_json(double wall_s) {
   Line crc;
   crc.hex(t.state_crc, 8);
   std::vector<std::pair<std::string, std::string>> fields{
+      {"version", sim::quoted(options_.version)},
       {"mode", sim::quoted(options_.mode)},
       {"bus", sim::quoted(options_.bus)},
       {"robot", sim::quoted(options_.robot)},
@@ -141,12 +160,11 @@ void Session::write_json(double wall_s) {
   }
   fields.insert(fields.end(), notes_.begin(), notes_.end());
   if (!error_.empty()) fields.emplace_back("error", sim::quoted(error_));
-  OutFile file(options_.folder + "/run.json");
   file.write("{\n");
   for (std::size_t i = 0; i < fields.size(); ++i)
     file.write("  " + sim::quoted(fields[i].first) + ": " + fields[i].second + (i + 1 < fields.size() ? ",\n" : "\n"));
   file.write("}\n");
-  file.close();
+  file.end();
 }
 
 }  // namespace tetap::sim

@@ -6,6 +6,7 @@
 #include "hal/board/linux/clock.hpp"
 #include "sim_host/play/frame_accounting.hpp"
 #include "sim_host/play/link.hpp"
+#include "sim_host/play/out_file.hpp"
 #include "sim_host/play/recorder.hpp"
 #include "sim_host/play/recording.hpp"
 
@@ -18,6 +19,7 @@ namespace tetap::sim {
 
 struct SessionOptions {
   std::string program;  ///< for messages
+  std::string version;  ///< version of the program
   std::string folder;
   std::uint32_t base = 0x300;
   bool raw = false;
@@ -30,9 +32,11 @@ struct SessionOptions {
   bool quiet = false;
 };
 
+/// The folder is this session's alone. Its files have their names once all of them are whole, run.json last; what was
+/// made of the files before them (summary, report) is removed then.
 class Session {
  public:
-  /// `comparison`: every epoch goes there too; it has to outlive the session.
+  /// `comparison`: every epoch goes there too; it has to outlive the session. Throws when another run has the folder.
   explicit Session(const SessionOptions& options, Comparison* comparison = nullptr);
 
   void restarted() { recorder_.restarted(); }
@@ -49,29 +53,41 @@ class Session {
   /// Another line for run.json: `value` is JSON (a number, or a quoted string).
   void note(std::string key, std::string value) { notes_.emplace_back(std::move(key), std::move(value)); }
 
-  /// Plays with `play()` and turns a RunError into a message. Returns the exit status: 0, or 1 when frames were lost,
-  /// came twice, or differ from the recording.
-  template <class Play>
-  int run(Play&& play) {
+  /// Another file of this run, which has ended: it gets its name with the others.
+  void add(OutFile file) { files_.push_back(std::move(file)); }
+
+  /// Plays with `play()` and turns a RunError into a message; then `complete()` may add files. Returns the exit status:
+  /// 0; 1 when frames were lost, came twice, or differ from the recording; 128 and the signal's number when one ended
+  /// the run.
+  template <class Play, class Complete>
+  int run(Play&& play, Complete&& complete) {
     try {
       play();
     } catch (const RunError& error) {
       error_ = error.what();
     }
+    complete();
     return finish();
+  }
+  template <class Play>
+  int run(Play&& play) {
+    return run(std::forward<Play>(play), [] {});
   }
   int finish();
 
  private:
   void show_progress();
   [[nodiscard]] std::string complaint() const;
-  void write_json(double wall_s);
+  void write_json(OutFile& file, double wall_s);
+  void publish(OutFile& json);
 
   SessionOptions options_;
+  FolderLock lock_;
   Recorder recorder_;
   Comparison* comparison_;
   Counts counts_;
   std::vector<std::pair<std::string, std::string>> notes_;
+  std::vector<OutFile> files_;
   std::string error_;
   base::Micros began_ = hal::monotonic_clock();
   base::Micros shown_ = began_;

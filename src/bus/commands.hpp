@@ -4,6 +4,7 @@
 
 #include "base/math.hpp"
 #include "bus/codec.hpp"
+#include "bus/command_policy.hpp"
 #include "bus/counters.hpp"
 #include "bus/e2e.hpp"
 #include "bus/messages.hpp"
@@ -34,7 +35,7 @@ class Commands {
 
   void power_on() {
     halves_ = {};
-    last_counter_.fill(0xFF);
+    policy_.power_on();
   }
   /// Half commands older than `patience`, or from a time still to come, are given up and counted.
   void expire(base::Micros now, base::Micros patience, Counters& counters) {
@@ -58,7 +59,7 @@ class Commands {
   PoseHalves& halves_of(std::uint8_t counter, base::Micros reference, Counters& counters);
 
   std::array<PoseHalves, 4> halves_{};
-  std::array<std::uint8_t, 2> last_counter_{0xFF, 0xFF};  ///< counters of the last reset and the last set pose
+  CommandPolicy policy_;
 };
 
 inline Commands::PoseHalves& Commands::halves_of(std::uint8_t counter, base::Micros reference, Counters& counters) {
@@ -77,18 +78,18 @@ inline Commands::PoseHalves& Commands::halves_of(std::uint8_t counter, base::Mic
 }
 
 template <class Out>
-void Commands::on_frame(std::uint8_t offset, const base::CanFrame& frame, base::Micros reference, Counters& counters,
-                        Out& out) {
+[[gnu::cold]] void Commands::on_frame(std::uint8_t offset, const base::CanFrame& frame, base::Micros reference,
+                                      Counters& counters, Out& out) {
   const auto counter = static_cast<std::uint8_t>(frame.data[1] & 0x0F);
-  std::uint8_t& last = last_counter_[offset == bus::CmdReset::kOffset ? 0 : 1];
-  if (!bus::e2e_valid(offset, bus::payload(frame)) || counter == last) return void(++counters.command_refused);
+  const CommandKind kind = offset == bus::CmdReset::kOffset ? CommandKind::kReset : CommandKind::kSetPose;
+  if (!bus::e2e_valid(offset, bus::payload(frame)) || policy_.repeats(kind, counter))
+    return void(++counters.command_refused);
   if (offset == bus::CmdReset::kOffset) {
     const auto reset = bus::decode<bus::CmdReset>(bus::payload(frame));
     if (!reset) return void(++counters.malformed);
     if (reset->what > (kMakesMap<Out> ? bus::ResetWhat::kOwnMap : bus::ResetWhat::kWiredOn))
       return void(++counters.out_of_range);
-    last = counter;
-    out.reset(reset->what);
+    if (policy_.admits(kind, counter, reference, counters)) out.reset(reset->what);
     return;
   }
   PoseHalves& halves = halves_of(counter, reference, counters);
@@ -98,7 +99,7 @@ void Commands::on_frame(std::uint8_t offset, const base::CanFrame& frame, base::
   const bus::CmdSetPos position = *halves.position;
   const bus::CmdSetYaw yaw = *halves.yaw;
   halves = {};
-  last = counter;
+  if (!policy_.admits(kind, counter, reference, counters)) return;
   constexpr std::int64_t kUmPerStep = 2000;
   const bool heading = base::is_finite(yaw.std_yaw_rad) && base::is_finite(yaw.yaw_rad);
   if (position.x_raw == kNoSteps || position.y_raw == kNoSteps || !base::is_finite(yaw.std_pos_m)) {

@@ -26,6 +26,11 @@ struct Counters {
   std::uint16_t window_short = 0;  ///< samples that left the window before their time: a newer one needed the room
   std::uint16_t events_dropped = 0;
   std::uint16_t events_high_water = 0;
+  std::uint16_t guard_bad = 0;     ///< samples and map entries whose guard was missing, did not fit or came twice
+  std::uint16_t auth_bad = 0;      ///< commands and sync frames without a tag, or with a wrong one
+  std::uint16_t replayed = 0;      ///< tags whose counter had been used
+  std::uint16_t command_rate = 0;  ///< commands that came too fast
+  std::uint16_t overload = 0;      ///< samples beyond those that a tick may work on
 };
 
 /// Measurements of real time and the bus: different in each run, and never fed back into an estimate.
@@ -35,10 +40,11 @@ struct LoopHealth {
   float mean_us = 0;             ///< running mean
   std::uint16_t ticks_late = 0;  ///< took longer than their period, or could not begin in it
   std::uint16_t sync_lost = 0;
-  std::uint16_t sync_back = 0;  ///< sync frames whose time was not after the last tick
-  std::uint16_t sync_jump = 0;  ///< sync frames too far ahead
-  std::uint16_t sync_gap = 0;   ///< sync frames that were sent, by their counter, and never came
-  std::uint16_t sync_bad = 0;   ///< sync frames of wrong length
+  std::uint16_t sync_back = 0;     ///< sync frames whose time was not after the last tick
+  std::uint16_t sync_jump = 0;     ///< sync frames too far ahead
+  std::uint16_t sync_gap = 0;      ///< sync frames that were sent, by their counter, and never came
+  std::uint16_t sync_bad = 0;      ///< sync frames of wrong length
+  std::uint16_t lock_refused = 0;  ///< Begin and Step frames that were refused
   hal::CanFaults bus;
   bool id_conflict = false;  ///< within the last second a frame came whose id is this node's own
   bool unlogged = false;     ///< a wired sample was consumed that the bus did not take

@@ -28,11 +28,15 @@ class FaultHold {
     raised.raise(sensor::Fault::kIncomplete, now.incomplete != then.incomplete);
     raised.raise(sensor::Fault::kTooLate, now.too_late != then.too_late);
     raised.raise(sensor::Fault::kMalformed, now.malformed != then.malformed || now.out_of_range != then.out_of_range ||
-                                                now.no_time != then.no_time || now.too_early != then.too_early);
+                                                now.no_time != then.no_time || now.too_early != then.too_early ||
+                                                now.guard_bad != then.guard_bad);
     raised.raise(sensor::Fault::kCapacity, now.map_full != then.map_full || now.timeline_full != then.timeline_full ||
                                                now.window_short != then.window_short ||
-                                               now.events_dropped != then.events_dropped);
-    raised.raise(sensor::Fault::kCommandRefused, now.command_refused != then.command_refused);
+                                               now.events_dropped != then.events_dropped ||
+                                               now.overload != then.overload);
+    raised.raise(sensor::Fault::kCommandRefused, now.command_refused != then.command_refused ||
+                                                     now.command_rate != then.command_rate ||
+                                                     now.auth_bad != then.auth_bad || now.replayed != then.replayed);
     if (raised.bits != 0) {
       bits_ = epoch < until_ ? static_cast<std::uint16_t>(bits_ | raised.bits) : raised.bits;
       until_ = epoch + second;

@@ -54,6 +54,14 @@ void put_diagnostics(std::uint32_t page, const Counters& c, const LoopHealth& l,
   }
 }
 
+/// Pages that are not in this cycle: limits that were reached, and what guards and tags refused.
+[[nodiscard]] constexpr EstDiagLimits limits_page(const Counters& c, const LoopHealth& l) {
+  return {.overload = c.overload, .cmd_rate = c.command_rate, .lock_refused = l.lock_refused};
+}
+[[nodiscard]] constexpr EstDiagGuard guard_page(const Counters& c, std::uint32_t nonce) {
+  return {.guard_bad = c.guard_bad, .auth_bad = c.auth_bad, .replayed = c.replayed, .nonce = nonce};
+}
+
 /// State and last failed check of every source.
 template <class Put>
 void put_sources(const estimators::SourceStates& s, std::uint8_t tag, Put&& put) {

@@ -104,13 +104,16 @@ class Publisher {
   void statistics(const Lanes& lanes, base::Micros now, Send& send);
   template <class Send>
   void diagnostics(const Counters& counters, const LoopHealth& loop, std::uint16_t timeline_high, Send& send);
+  /// Counts of refusals; `guard_page()` gives that of guards and tags, where the node has them.
+  template <class Send, class GuardPage>
+  void refusals(const Counters& counters, const LoopHealth& loop, GuardPage&& guard_page, Send& send);
   template <class Send>
   void identity(const estimators::MapFrame& map_frame, Send& send);
   template <class Send>
   void events(Send& send);
   template <class Send>
   void send_version(Send& send) {
-    put(bus::EstVersion{.git = version_.git, .config = config_}, send);
+    put(bus::EstVersion{.dirty = version_.dirty, .git = version_.git, .config = config_}, send);
   }
 
   [[nodiscard]] std::uint32_t epoch() const { return epoch_; }
@@ -352,9 +355,19 @@ void Publisher<N>::diagnostics(const Counters& c, const LoopHealth& l, std::uint
   put_wired_page(page, l, send);
 }
 
+/// Apart from the other pages, whose cycle a refusal does not lengthen: each about once a second.
+template <std::size_t N>
+template <class Send, class GuardPage>
+void Publisher<N>::refusals(const Counters& c, const LoopHealth& l, GuardPage&& guard_page, Send& send) {
+  const std::int32_t period = 8 * parameters_.publish.diagnostics_every;
+  if (every(period, 6)) put(limits_page(c, l), send);
+  if constexpr (requires { guard_page(); })
+    if (every(period, 54)) put(guard_page(), send);
+}
+
 template <std::size_t N>
 template <class Send>
-void Publisher<N>::identity(const estimators::MapFrame& map_frame, Send& send) {
+[[gnu::cold]] void Publisher<N>::identity(const estimators::MapFrame& map_frame, Send& send) {
   if (!every(parameters_.publish.identity_every, 7)) return;
   switch (identity_++ % 4) {
     case 0:

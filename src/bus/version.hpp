@@ -6,9 +6,9 @@
 
 namespace tetap::bus {
 
-/// First 32 bits of the commit; 0: not built from a repository.
 struct Version {
-  std::uint32_t git = 0;
+  std::uint32_t git = 0;  ///< first 28 bits of the commit; 0: not built from a repository
+  bool dirty = false;     ///< the tree differed from that commit
 };
 
 }  // namespace tetap::bus

@@ -3,8 +3,12 @@
 #pragma once
 
 #include "bus/frame_sink.hpp"
+#include "bus/guard.hpp"
+#include "bus/guard_sender.hpp"
 #include "hal/board.hpp"
 #include "node/boot_self_check.hpp"
+#include "node/bus_protection.hpp"
+#include "node/lockstep_policy.hpp"
 #include "node/node.hpp"
 #include "node/pacer.hpp"
 #include "node/snapshot.hpp"
@@ -41,6 +45,7 @@ class Firmware {
 
   /// Takes what has arrived and what wired sensors have measured, ticks when it is time, hands on what is to be sent.
   /// Call it in a loop, as often as you like: after the self-check, because the first call starts sensors and watchdog.
+  /// A call ticks or begins once for a sync frame at most; frames behind that one wait for the next call.
   void poll() {
     if constexpr (hal::SensorBoard<Board>) {
       if (!polled_) board_.start_sensors();
@@ -48,8 +53,7 @@ class Firmware {
     // As much as two full receivers: a bus that is never quiet must not keep the tick from its time.
     for (int i = 0; i < kMostPerPoll; ++i) {
       const auto frame = board_.can.receive();
-      if (!frame) break;
-      on_frame(*frame);
+      if (!frame || on_frame(*frame)) break;
     }
     if constexpr (kWired) poll_wired();
     if (const auto t = pacer_.on_poll(board_.now(), health_)) tick(*t);
@@ -71,23 +75,37 @@ class Firmware {
   static constexpr bool kSnapshots = hal::SnapshotBoard<Board>;
   using Node = node::Node<Estimators>;
 
-  void on_frame(const base::CanFrame& frame) {
+  /// True: the node ticked or began.
+  bool on_frame(const base::CanFrame& frame) {
     const std::uint32_t offset = frame.id - parameters_.can_base;
-    if (frame.extended || offset >= bus::kBlock) return;
+    if (frame.extended || offset >= bus::kBlock) return false;
     // A frame that only this node sends, or may send now, comes from a second node of the same ids.
-    if (offset >= kInputs || is_own(offset)) return void(conflict_ticks_ = 1'000'000 / parameters_.loop.period_us);
-    if (offset != bus::InSync::kOffset) return node_.on_frame(frame);
+    if (offset >= kInputs || is_own(offset)) return conflict_ticks_ = 1'000'000 / parameters_.loop.period_us, false;
+    if (offset == bus::InSync::kOffset) return on_sync(frame);
+    if (bus::is_sync_guard(offset, frame)) return sync_guard_.announce(frame), false;
+    return node_.on_frame(frame), false;
+  }
+
+  [[gnu::cold]] bool on_sync(const base::CanFrame& frame) {
     const auto sync = bus::decode<bus::InSync>(bus::payload(frame));
-    if (!sync) return void(++health_.sync_bad);
-    count_sync(*sync);
+    if (!sync) return ++health_.sync_bad, false;
     const base::Micros time{static_cast<std::int64_t>(sync->time_us)};
-    if (sync->kind == bus::SyncKind::kBegin) {
+    const bool begins = sync->kind == bus::SyncKind::kBegin;
+    const SyncProof proof{.guarded = sync_guard_.covers(frame), .authenticated = node_.admits_sync(frame)};
+    if (begins || sync->kind == bus::SyncKind::kStep) {
+      if (!lockstep_.admits(sync->kind, proof, parameters_.loop.lockstep, pacer_.state(), board_.now()))
+        return ++health_.lock_refused, false;
+    }
+    count_sync(*sync);
+    if (begins) {
       node_.power_on(time);
       health_.unlogged = false;
       bus::FrameSink frame_sink(board_.can);
       node_.send_version(frame_sink);
     }
-    if (const auto t = pacer_.on_sync(sync->kind, time, board_.now(), health_)) tick(*t);
+    const auto t = pacer_.on_sync(sync->kind, time, board_.now(), health_, proof.guarded || proof.authenticated);
+    if (t) tick(*t);
+    return begins || t.has_value();
   }
 
   /// Counts sync frames that the counter skipped, modulo 256. A repeated frame is no gap, nor is one out of its order:
@@ -102,7 +120,7 @@ class Firmware {
     counts_sync_ = true;
   }
 
-  void tick(base::Micros t) {
+  [[gnu::noinline]] void tick(base::Micros t) {
     const base::Micros began = board_.now();
     health_.sync = pacer_.state();
     health_.bus = board_.can.faults();
@@ -137,9 +155,19 @@ class Firmware {
       if (count < extras_.queue.size()) extras_.queue[count++] = frame;
     });
     for (std::size_t i = 0; i < count; ++i) {
-      if (!board_.can.send(extras_.queue[i])) health_.unlogged = true;
-      node_.on_frame(extras_.queue[i]);
+      const base::CanFrame& frame = extras_.queue[i];
+      consume_wired(frame);
+      if constexpr (kHasBusProtection<Estimators>) {
+        if (parameters_.bus.guard == 0) continue;
+        const auto offset = static_cast<std::uint8_t>(frame.id - parameters_.can_base);
+        if (const auto guard = extras_.guards.after(offset, frame))
+          consume_wired(bus::frame(parameters_.can_base, *guard));
+      }
     }
+  }
+  void consume_wired(const base::CanFrame& frame) requires kWired {
+    if (!board_.can.send(frame)) health_.unlogged = true;
+    node_.on_frame(frame);
   }
   void end_poll() {
     if constexpr (hal::WatchdogBoard<Board>) polled_ ? board_.kick() : board_.start_watchdog();
@@ -177,6 +205,7 @@ class Firmware {
   struct NoSnapshot {
     NoSnapshot(std::uint32_t, base::Micros) {}
   };
+  struct NoGuards {};
   struct NotWired {
     NotWired(Board&, const param::Parameters&) {}
   };
@@ -186,6 +215,8 @@ class Firmware {
         : wired(board, p), snapshot(p.can_base, base::Micros{p.loop.period_us}), version(v) {}
     [[no_unique_address]] std::conditional_t<kWired, WiredInputs<Board, kParts>, NotWired> wired;
     [[no_unique_address]] std::conditional_t<kSnapshots, SnapshotSender<Node>, NoSnapshot> snapshot;
+    /// Guards go out with wired samples as with others, so that a replay has them.
+    [[no_unique_address]] std::conditional_t<kHasBusProtection<Estimators>, bus::GuardSender, NoGuards> guards;
     bus::Version version;
     std::array<bus::Payload, 3> pages{};  ///< 9 to 11 of Est_Diag
     /// Frames of one poll: at most 32 samples of an IMU, a count, ten epochs of a receiver.
@@ -201,6 +232,8 @@ class Firmware {
   const param::Parameters& parameters_;
   Node node_;
   Pacer pacer_;
+  LockstepPolicy lockstep_;
+  bus::SyncGuard sync_guard_;
   bus::LoopHealth health_;
   [[no_unique_address]] std::conditional_t<kWired || kSnapshots, Extras, NoExtras> extras_;
   std::int32_t conflict_ticks_ = 0;  ///< left until an id conflict is over

@@ -6,6 +6,7 @@
 #include "bus/counters.hpp"
 #include "node/estimator_slot.hpp"
 #include "node/timeline.hpp"
+#include "node/work_limit.hpp"
 
 #include <algorithm>
 #include <array>
@@ -49,6 +50,10 @@ class FusionWindow {
 
   void power_on(base::Micros t, const estimators::Context& ctx) {
     timeline_.power_on();
+    limit_.power_on();
+    owed_ = {};
+    consumed_until_ = t;
+    turn_ = 0;
     closed_until_ = t;
     each_lane([&](auto& lane) {
       lane.restart(t, ctx);
@@ -61,6 +66,9 @@ class FusionWindow {
   void clear() { timeline_.clear(); }
   /// The window begins after t.
   void open_from(base::Micros t) { closed_until_ = t; }
+
+  /// Whether one more sample is looked at before the next tick.
+  [[nodiscard]] bool admits_sample() { return limit_.admits_sample(); }
 
   /// Samples up to here can no longer be fused.
   [[nodiscard]] base::Micros closed_until() const { return closed_until_; }
@@ -149,20 +157,28 @@ class FusionWindow {
   void leave(const sensor::Sample& sample, Past past, const estimators::Context& ctx, Note& note);
   [[nodiscard]] bool rests(const sensor::Sample& sample, const estimators::Context& ctx);
   template <class EstimatorSlot>
-  [[nodiscard]] bool came_late(std::size_t due) const;
+  [[nodiscard]] [[gnu::noinline]] bool came_late(std::size_t due) const;
 
   typename Estimators::Lanes lanes_;
   Timeline<Capacity> timeline_;
+  WorkLimit<Capacity> limit_;
+  std::array<bool, kCount> owed_{};  ///< a late sample waits until this lane works through the window again
+  std::size_t turn_ = 0;             ///< the lane whose turn that is, where limits are tight
   base::Micros closed_until_;
+  base::Micros consumed_until_;  ///< time of the last tick
 };
 
 template <class Estimators, std::size_t Capacity>
 template <class Note>
 Insert FusionWindow<Estimators, Capacity>::insert(const sensor::Sample& sample, const estimators::Context& ctx,
                                                   Note&& note) {
-  const Insert result = timeline_.insert(sample);
+  std::size_t moves = limit_.moves();
+  const Insert result = timeline_.insert(sample, moves);
+  if (result == Insert::kTooMuch) limit_.refuse();
+  if (result == Insert::kTaken) limit_.spend_moves(moves, sample.stamp <= consumed_until_);
   // A sample older than all of them came too late for so small a window.
   if (result != Insert::kFull || !timeline_.consumed(0) || sample.order(timeline_[0]) < 0) return result;
+  if (!limit_.admits_room()) return Insert::kTooMuch;
   leave(timeline_[0], Past::kFollows, ctx, note);
   timeline_.drop_front(1);
   const Insert again = timeline_.insert(sample);
@@ -235,12 +251,24 @@ std::uint16_t FusionWindow<Estimators, Capacity>::consume(base::Micros t, const 
   std::array<bool, kCount> again{};
   std::size_t instance = 0;
   each_lane([&](auto& lane) {
-    bool& repeat = again[instance++];
-    repeat = came_late<std::remove_cvref_t<decltype(lane)>>(due);
-    if constexpr (!std::remove_cvref_t<decltype(lane)>::kDelayed) {
-      if (repeat) lane.rewind();
+    using EstimatorSlot = std::remove_cvref_t<decltype(lane)>;
+    if constexpr (!EstimatorSlot::kDelayed) {
+      owed_[instance] = owed_[instance] || came_late<EstimatorSlot>(due);
+      again[instance] = owed_[instance] && limit_.admits_rework(due, instance == turn_);
+      if (again[instance]) {
+        owed_[instance] = false;
+        lane.rewind();
+      }
     }
+    ++instance;
   });
+  turn_ = (turn_ + 1) % kCount;
+  consumed_until_ = t;
+  const param::LoopParameters& loop = ctx.parameters.loop;
+  limit_.begin_tick(static_cast<std::uint32_t>(loop.window_us / loop.period_us));
+  // A lane that waits for its turn takes what follows all that it has, and leaves the rest to that turn.
+  std::size_t in_order = due;
+  while (in_order > 0 && !timeline_.consumed(in_order - 1)) --in_order;
   std::uint16_t not_used = 0;
   // Every estimator has the samples before known().
   const bool anew = std::any_of(again.begin(), again.end(), [](bool a) { return a; });
@@ -256,6 +284,8 @@ std::uint16_t FusionWindow<Estimators, Capacity>::consume(base::Micros t, const 
       if constexpr (EstimatorSlot::kDelayed) {
         taken = taken || EstimatorSlot::takes(sample);
         if (is_new) lane.arrived(sample, ctx);
+      } else if (owed_[instance] && i < in_order) {
+        taken = true;
       } else if (is_new || again[instance]) {
         const estimators::Innovation innovation = lane.fuse(sample, ctx);
         if (is_new) {

@@ -8,6 +8,7 @@
 #include "bus/input_crc.hpp"
 #include "bus/publisher.hpp"
 #include "bus/stamp_wraps.hpp"
+#include "node/bus_protection.hpp"
 #include "node/fusion_window.hpp"
 #include "node/landmarks.hpp"
 #include "node/map_origin.hpp"
@@ -27,7 +28,7 @@ template <class Estimators, std::size_t TimelineCapacity = Estimators::kSamples>
 class Node {
  public:
   Node(const param::Parameters& parameters, const bus::Version& version)
-      : parameters_(parameters), publisher_(parameters, version) {
+      : parameters_(parameters), protection_(parameters), publisher_(parameters, version) {
     power_on(base::Micros{});
   }
 
@@ -46,10 +47,15 @@ class Node {
     publisher_.send_version(send);
   }
 
+  /// Whether a tag vouches for this sync frame.
+  [[nodiscard]] bool admits_sync(const base::CanFrame& frame) { return protection_.admits_sync(frame, counters_); }
+
   /// Whether an estimator makes a map of its own, which a command resets.
   static constexpr bool kMakesMap = Estimators::kMakesMap;
   /// Called by the inbox.
-  void sample(const sensor::Sample& sample);
+  void sample(const sensor::Sample& sample) {
+    protection_.sample(sample, now_, counters_, [this](const sensor::Sample& vouched) { take(vouched); });
+  }
   void map_entry(const estimators::MapEntry& entry) { landmarks_.add(entry, counters_); }
   /// Start pose; of two within an epoch the one with the later counter stands, whichever came first.
   void set_pose(const estimators::SetPose& pose) {
@@ -72,6 +78,8 @@ class Node {
   [[nodiscard]] const bus::InputCrc& consumed() const { return input_crc_; }
   /// Goes on from the state of another node of this robot. References and pointers stay its own.
   void resume(const Node& other);
+  /// For a copy that others get: nothing is left from which the key of commands could be computed. Between ticks only.
+  void hide_secrets() { protection_.hide_secrets(); }
 
  private:
   [[gnu::cold, gnu::noinline]] void switch_wired(bool off) {
@@ -81,6 +89,8 @@ class Node {
   [[nodiscard]] bool take(bus::ResetWhat what) {
     return std::exchange(pending_reset_[static_cast<std::size_t>(what)], false);
   }
+  void take(const sensor::Sample& sample);
+
   using FusionWindow = node::FusionWindow<Estimators, TimelineCapacity>;
   using Estimates = typename FusionWindow::Estimates;
   static constexpr std::size_t kPrimary = FusionWindow::kPrimary;
@@ -128,6 +138,7 @@ class Node {
   FusionWindow history_;
   estimators::MapFrame map_frame_;
   MapOrigin origin_;
+  BusProtection<Estimators> protection_;
   bus::Decoder inbox_;
   bus::StampWraps wraps_;
   bus::Counters counters_;
@@ -152,6 +163,7 @@ void Node<Estimators, Capacity>::power_on(base::Micros t) {
   // Cleared in place: a fresh object assigned over the old one would pass over the stack.
   landmarks_.power_on(map_frame_);
   origin_.power_on(map_frame_, parameters_.gnss);
+  protection_.power_on();
   inbox_.power_on();
   wraps_.power_on();
   counters_ = {};
@@ -175,7 +187,9 @@ void Node<Estimators, Capacity>::resume(const Node& other) {
   map_frame_ = other.map_frame_;
   map_frame_.map = map;
   origin_ = other.origin_;
+  protection_.resume(other.protection_);
   inbox_ = other.inbox_;
+  wraps_ = other.wraps_;
   counters_ = other.counters_;
   publisher_.resume(other.publisher_);
   landmarks_ = other.landmarks_;
@@ -196,13 +210,16 @@ template <class Estimators, std::size_t Capacity>
 void Node<Estimators, Capacity>::on_frame(const base::CanFrame& frame) {
   const auto offset = static_cast<std::uint8_t>(frame.id - parameters_.can_base);
   input_crc_.add(bus::frame_crc(offset, frame));
-  inbox_.on_frame(offset, frame, now_, counters_, *this);
+  const bool admitted =
+      protection_.admits(offset, frame, now_, counters_, [this](const sensor::Sample& vouched) { take(vouched); });
+  if (admitted) inbox_.on_frame(offset, frame, now_, counters_, *this);
 }
 
 template <class Estimators, std::size_t Capacity>
-void Node<Estimators, Capacity>::sample(const sensor::Sample& arrived) {
+void Node<Estimators, Capacity>::take(const sensor::Sample& arrived) {
   sensor::Sample sample = arrived;
   if (!ticked_ && now_.us == 0) return void(++counters_.no_time);
+  if (!history_.admits_sample()) return void(++counters_.overload);
   if (!plausible(sample, parameters_.wheels.most_mps)) return void(++counters_.out_of_range);
   sample.stamp = at_no_fixed_rate(sample) ? wraps_.place_beside(sample, now_) : wraps_.place(sample, now_);
   calibrate(sample, parameters_);
@@ -219,6 +236,7 @@ void Node<Estimators, Capacity>::sample(const sensor::Sample& arrived) {
   if (result == Insert::kDuplicate) ++counters_.duplicate;
   if (result == Insert::kFull) ++counters_.timeline_full;
   if (result == Insert::kMadeRoom) ++counters_.window_short;
+  if (result == Insert::kTooMuch) ++counters_.overload;
 }
 
 template <class Estimators, std::size_t Capacity>
@@ -234,6 +252,7 @@ void Node<Estimators, Capacity>::tick(base::Micros t, const bus::LoopHealth& loo
   const base::Micros before = now_;
   now_ = t;
   input_crc_.close_epoch();
+  protection_.tick(now_, counters_);
   inbox_.expire(now_, base::Micros{parameters_.loop.window_us}, counters_);
   apply_map(before);
   consume(now_);
@@ -269,6 +288,11 @@ void Node<Estimators, Capacity>::tick(base::Micros t, const bus::LoopHealth& loo
   publisher_.status(summary(estimates[kPrimary]), loop, send);
   publisher_.statistics(history_.lanes(), now_, send);
   publisher_.diagnostics(counters_, loop, history_.high_water(), send);
+  if constexpr (kHasBusProtection<Estimators>)
+    publisher_.refusals(
+        counters_, loop, [this] { return bus::guard_page(counters_, protection_.nonce()); }, send);
+  else
+    publisher_.refusals(counters_, loop, nullptr, send);
   publisher_.identity(map_frame_, send);
   publisher_.events(send);
   history_.retire_until(now_ - base::Micros{parameters_.loop.window_us}, context(), noting());

@@ -53,6 +53,7 @@ class SnapshotSender {
   void freeze(const Node& node, const bus::Version& version, std::uint32_t config) {
     static_assert(std::is_trivially_destructible_v<Node>, "its bytes are all of it");
     std::memcpy(state_.data(), static_cast<const void*>(&node), state_.size());
+    reinterpret_cast<Node*>(state_.data())->hide_secrets();
     header_ = {.length = sizeof(Node),
                .crc = snapshot_crc(state_),
                .time_us = node.now().us,

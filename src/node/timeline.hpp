@@ -12,17 +12,20 @@
 
 namespace tetap::node {
 
-/// kMadeRoom: taken, and for it the oldest left before its time.
-enum class Insert : std::uint8_t { kTaken, kDuplicate, kFull, kMadeRoom };
+/// kMadeRoom: taken, and for it the oldest left before its time. kTooMuch: beyond what a tick may work on.
+enum class Insert : std::uint8_t { kTaken, kDuplicate, kFull, kMadeRoom, kTooMuch };
 
 /// When full, insert() refuses; the caller then retires the oldest consumed sample and tries again, or counts the loss.
 template <std::size_t Capacity>
 class Timeline {
  public:
   /// Keeps the order; a sample equal in stamp, kind, instance, sequence and detail is a duplicate.
-  [[nodiscard]] constexpr Insert insert(const sensor::Sample& sample) {
+  /// It may move as many samples as `moves`; then this is how many it moved.
+  [[nodiscard]] constexpr Insert insert(const sensor::Sample& sample, std::size_t& moves) {
     std::size_t at = size_;
-    while (at > 0 && (*this)[at - 1].order(sample) > 0) --at;
+    for (; at > 0 && (*this)[at - 1].order(sample) > 0; --at)
+      if (size_ - at == moves) return Insert::kTooMuch;
+    moves = size_ - at;
     if (at > 0 && (*this)[at - 1].order(sample) == 0) {
       // Two that claim to be one sample and differ: the one whose frames have the smaller sum, whichever came first.
       if (!consumed(at - 1) && sample.bits < (*this)[at - 1].bits) samples_[place(at - 1)] = sample;
@@ -43,6 +46,12 @@ class Timeline {
     if (at < known_) known_ = at;
     if (size_ > high_water_) high_water_ = static_cast<std::uint16_t>(size_);
     return Insert::kTaken;
+  }
+
+  /// The same without a limit.
+  [[nodiscard]] constexpr Insert insert(const sensor::Sample& sample) {
+    std::size_t moves = Capacity;
+    return insert(sample, moves);
   }
 
   /// How many samples have a stamp <= t.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The CRC of the version frame: the stored bits of every row, in the order of the table. The group `wired` counts only
-// where a robot has a wired sensor.
+// The CRC of the version frame: the stored bits of the rows, in the order of the table, without those on which no bit
+// of an estimate depends. The group `wired` counts only where a robot has a wired sensor.
 #pragma once
 
 #include "base/bit_crc.hpp"
@@ -19,26 +19,25 @@ struct Run {
   std::uint16_t offset;
   std::uint16_t size;
 };
-/// Row of the first wired parameter. Its group is the last, and the CRC of a robot without wired sensors ends before
-/// it.
-inline constexpr std::size_t kFirstWiredRow = [] {
-  std::size_t row = 0;
-  while (kTable[row].offset < offsetof(Parameters, wired)) ++row;
-  return row;
-}();
+constexpr bool is_wired(std::size_t offset) {
+  return offset >= offsetof(Parameters, wired) && offset < offsetof(Parameters, wired) + sizeof(WiredParameters);
+}
 constexpr bool begins_run(std::size_t row) {
-  return row == 0 || row == kFirstWiredRow || kTable[row].offset != kTable[row - 1].offset + kTable[row - 1].size;
+  if (row == 0) return true;
+  const Row &now = kTable[row], &before = kTable[row - 1];
+  return is_outside_crc(before) || now.offset != before.offset + before.size ||
+         is_wired(now.offset) != is_wired(before.offset);
 }
 constexpr std::size_t runs_before(std::size_t row) {
   std::size_t runs = 0;
-  for (std::size_t i = 0; i < row; ++i) runs += begins_run(i) ? 1 : 0;
+  for (std::size_t i = 0; i < row; ++i) runs += !is_outside_crc(kTable[i]) && begins_run(i) ? 1 : 0;
   return runs;
 }
-inline constexpr std::size_t kUnwiredRuns = runs_before(kFirstWiredRow);
 inline constexpr auto kRuns = [] {
   std::array<Run, runs_before(kTable.size())> runs{};
   std::size_t at = 0;
   for (std::size_t row = 0; row < kTable.size(); ++row) {
+    if (is_outside_crc(kTable[row])) continue;
     if (begins_run(row)) runs[at++] = {static_cast<std::uint16_t>(kTable[row].offset), 0};
     runs[at - 1].size = static_cast<std::uint16_t>(runs[at - 1].size + kTable[row].size);
   }
@@ -50,13 +49,14 @@ inline constexpr auto kRuns = [] {
 [[nodiscard]] inline std::uint32_t crc(const Parameters& parameters) {
   const auto* bytes = reinterpret_cast<const unsigned char*>(&parameters);
   base::BitCrc sum;
-  const std::size_t runs = parameters.wired.any() ? detail::kRuns.size() : detail::kUnwiredRuns;
-  for (std::size_t run = 0; run < runs; ++run)
-    for (std::size_t i = 0; i < detail::kRuns[run].size; i += 4) {
+  for (const detail::Run& run : detail::kRuns) {
+    if (detail::is_wired(run.offset) && !parameters.wired.any()) continue;
+    for (std::size_t i = 0; i < run.size; i += 4) {
       std::uint32_t word = 0;
-      std::memcpy(&word, bytes + detail::kRuns[run].offset + i, sizeof word);
+      std::memcpy(&word, bytes + run.offset + i, sizeof word);
       sum(word);
     }
+  }
   return sum.value();
 }
 

@@ -110,6 +110,18 @@ inline constexpr std::array kRules{
          "a multiple of publish.attitude_every"},
     Rule{"publish.state_every", [](const P& p) { return detail::multiple(p.publish.state_every, p.publish.std_every); },
          "a multiple of publish.std_every"},
+    // A Begin sets the numbers back that make tags fresh.
+    Rule{"loop.lockstep",
+         [](const P& p) {
+           return p.bus.commands != CommandAccess::kAuthenticated || p.loop.lockstep != Lockstep::kGuarded;
+         },
+         "0, or 2 on a desk, where bus.commands is 1"},
+    Rule{"bus.key",
+         [](const P& p) {
+           return p.bus.commands != CommandAccess::kAuthenticated ||
+                  (p.bus.key[0] | p.bus.key[1] | p.bus.key[2] | p.bus.key[3]) != 0;
+         },
+         "set where bus.commands is 1"},
     Rule{"recovery.confirm_fixes", [](const P& p) { return p.recovery.confirm_fixes <= p.recovery.persist_fixes; },
          "at most recovery.persist_fixes"},
     Rule{"wired.imu_x", [](const P& p) { return detail::axes(p.wired); },

@@ -15,12 +15,20 @@
 
 namespace tetap::param {
 
+/// Proof that a Begin or Step frame needs for the node to follow it instead of its own timer.
+enum class Lockstep : std::int32_t {
+  kAuthenticated,  ///< a tag (bus/authentication.hpp)
+  kGuarded,        ///< a tag, or the checksum of an In_Guard frame before it
+  kPlain,          ///< nothing
+};
+
 struct LoopParameters {
   std::int32_t period_us = 10'000;   ///< period of the tick, in sample time
   std::int32_t window_us = 200'000;  ///< how late a sample may come and still be fused at its own time
   std::int32_t ahead_us = 200'000;   ///< how far ahead of the tick a stamp may be and still wait
   float turn_radps2 = 0.5F;          ///< 1 sigma of what turns it faster or slower: a yaw rate is as old as its sample
   std::int32_t work_units = 1000;    ///< share of a job longer than a tick, in each tick
+  Lockstep lockstep = Lockstep::kGuarded;
 };
 
 /// How a speed sample relates to its stamp.
@@ -240,6 +248,17 @@ struct PublishParameters {
   std::int32_t event_every = 2;         ///< at most one innovation per so many ticks
 };
 
+/// Access to the commands: reset, set pose, map entries.
+enum class CommandAccess : std::int32_t { kOpen, kAuthenticated, kNone };
+
+/// Defence against other senders on the bus; guard and kAuthenticated need a robot that names them
+/// (node/bus_protection.hpp).
+struct BusParameters {
+  CommandAccess commands = CommandAccess::kOpen;
+  std::int32_t guard = 0;                        ///< 1: samples and map entries are used with their guard frame only
+  std::array<std::uint32_t, 4> key{0, 0, 0, 0};  ///< key of the tags; all zero: none. Not in the parameters' CRC
+};
+
 /// Axis of a chip: x, y, z, then the same backwards.
 enum class ChipAxis : std::int32_t { kX, kY, kZ, kMinusX, kMinusY, kMinusZ };
 
@@ -282,6 +301,7 @@ struct Parameters {
   StartParameters start;
   RecoveryParameters recovery;
   PublishParameters publish;
+  BusParameters bus;
   WiredParameters wired;
   MappingParameters mapping;
 };

@@ -38,6 +38,8 @@ inline constexpr std::array kTable{
     TETAP_ROW(0x043, loop.turn_radps2, "rad/s^2", 0, 100, kLive,
               "1 sigma of the angular acceleration between the last yaw rate and the tick."),
     TETAP_ROW(0x044, loop.work_units, "", 1, 1'000'000, kLive, "Units of a mapper's job that are done in each tick."),
+    TETAP_ROW(0x045, loop.lockstep, "", 0, 2, kRestart,
+              "Lockstep by Begin and Step: 0: with a tag; 1: with a tag or a guard frame; 2: with nothing."),
 
     TETAP_ROW(0x080, wheels.drive.left_radius_m, "m", 0, 2, kRestart,
               "Radius of the left wheel; 0 together with the right radius and the track: no wheel counts."),
@@ -351,6 +353,13 @@ inline constexpr std::array kTable{
     TETAP_ROW(0x40A, target.timeout_us, "us", 10'000, 60'000'000, kLive,
               "Time without a measurement after which a track is over."),
 
+    TETAP_ROW(0x440, bus.commands, "", 0, 2, kRestart,
+              "Reset, set pose and map entries from the bus: 0: obeyed; 1: obeyed with a tag; 2: refused."),
+    TETAP_ROW(0x441, bus.guard, "", 0, 1, kRestart,
+              "1: IMU, wheel and GNSS samples and map entries are used with their guard frame only."),
+    TETAP_ROW(0x442, bus.key, "", 0, 4294967295.0, kRestart,
+              "Key of the tags, 128 bits, never published, nor part of the parameters' CRC; all zero: none."),
+
     TETAP_ROW(0x480, wired.imu, "", 0, 1, kRestart, "IMU on the board: 0 none, 1 an ICM-42688-P on SPI."),
     TETAP_ROW(0x481, wired.imu_x, "", 0, 5, kRestart,
               "Axis of the chip along x of the IMU's samples: 0 x, 1 y, 2 z, 3 to 5 the same backwards."),
@@ -393,6 +402,13 @@ inline constexpr std::array kTable{
 
 #undef TETAP_ROW
 #undef TETAP_SCALED_ROW
+
+/// A value that no program prints.
+[[nodiscard]] constexpr bool is_secret(const Row& row) { return std::string_view(row.path) == "bus.key"; }
+/// No bit of an estimate depends on it: a desk may have another one than the robot.
+[[nodiscard]] constexpr bool is_outside_crc(const Row& row) {
+  return is_secret(row) || std::string_view(row.path) == "loop.lockstep";
+}
 
 /// Null without such a path.
 [[nodiscard]] constexpr const Row* row_of(std::string_view path) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Check values over "123456789": CRC-32/ISO-HDLC and AUTOSAR CP SWS_CRCLibrary (CRC-8 H2F).
+// Check values over "123456789": CRC-32/ISO-HDLC and AUTOSAR CP SWS_CRCLibrary (CRC-16, CRC-8 H2F).
 #include "base/crc.hpp"
 
 #include <array>
@@ -21,6 +21,7 @@ constexpr auto crc_of(std::span<const std::uint8_t> bytes) {
 }
 
 static_assert(crc_of<Crc32>(kDigits) == 0xCBF43926U);
+static_assert(crc_of<Crc16>(kDigits) == 0x29B1);
 static_assert(crc_of<Crc8H2f>(kDigits) == 0xDF);
 
 /// Bit by bit, most significant first, on mirrored data: another way to the same numbers than the nibble tables.

@@ -2,9 +2,13 @@
 #include "sim_host/play/out_file.hpp"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <limits>
 #include <random>
 #include <stdexcept>
@@ -67,6 +71,80 @@ TEST(Line, WhatDoesNotFitIsCut) {
   Line line;
   line.text(std::string(1000, 'a'));
   EXPECT_EQ(line.view().size(), 512U);
+}
+
+/// A folder of its own for each test.
+class OutFileInAFolder : public testing::Test {
+ protected:
+  OutFileInAFolder() {
+    std::filesystem::remove_all(folder_);
+    std::filesystem::create_directories(folder_);
+  }
+  ~OutFileInAFolder() override { std::filesystem::remove_all(folder_); }
+
+  [[nodiscard]] std::string path(const std::string& name) const { return (folder_ / name).string(); }
+  void put(const std::string& name, const std::string& text) const { std::ofstream(path(name)) << text; }
+  [[nodiscard]] std::string text_of(const std::string& name) const {
+    std::ifstream file(path(name));
+    return {std::istreambuf_iterator<char>(file), {}};
+  }
+  [[nodiscard]] std::size_t files() const {
+    return static_cast<std::size_t>(std::distance(std::filesystem::directory_iterator(folder_), {}));
+  }
+
+  std::filesystem::path folder_ =
+      std::filesystem::temp_directory_path() /
+      ("tetap-" + std::to_string(getpid()) + "-" + testing::UnitTest::GetInstance()->current_test_info()->name());
+};
+
+TEST_F(OutFileInAFolder, HasItsNameOnceItIsWhole) {
+  put("a.csv", "old");
+  OutFile file(path("a.csv"));
+  file.write("new");
+  file.flush();
+  EXPECT_EQ(text_of("a.csv"), "old");
+  file.end();
+  EXPECT_EQ(text_of("a.csv"), "old") << "others of the run may not be whole";
+  file.publish();
+  EXPECT_EQ(text_of("a.csv"), "new");
+  EXPECT_EQ(files(), 1U) << "nothing is left aside";
+}
+
+TEST_F(OutFileInAFolder, ThatIsGivenUpLeavesTheOldOne) {
+  put("a.csv", "old");
+  { OutFile(path("a.csv")).write("half"); }
+  EXPECT_EQ(text_of("a.csv"), "old");
+}
+
+TEST_F(OutFileInAFolder, BehindALinkIsReplacedAndTheLinkStays) {
+  put("real.csv", "old");
+  std::filesystem::create_symlink(path("real.csv"), path("link.csv"));
+  OutFile file(path("link.csv"));
+  file.write("new");
+  file.close();
+  EXPECT_TRUE(std::filesystem::is_symlink(path("link.csv")));
+  EXPECT_EQ(text_of("real.csv"), "new");
+}
+
+TEST_F(OutFileInAFolder, HasAWriterAtATime) {
+  {
+    const FolderLock one(path("run"));
+    try {
+      const FolderLock other(path("run"));
+      FAIL() << "two runs write into one folder";
+    } catch (const std::runtime_error& error) {
+      EXPECT_EQ(error.what(), path("run") + ": another run writes here; give this one another folder");
+    }
+    EXPECT_NO_THROW(FolderLock{path("run2")});
+  }
+  EXPECT_NO_THROW(FolderLock{path("run")});
+}
+
+TEST(OutFile, ThatIsADeviceIsWrittenAsItIs) {
+  OutFile file("/dev/null");
+  file.write("text");
+  file.close();
+  EXPECT_TRUE(std::filesystem::is_character_file("/dev/null"));
 }
 
 TEST(OutFile, AFullDiskIsAnError) {

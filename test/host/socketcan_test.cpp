@@ -50,6 +50,17 @@ std::optional<base::CanFrame> next(SocketCan& can) {
   return std::nullopt;
 }
 
+TEST(SocketCan, AnAcceptanceFilterLetsThroughTheInputsOfANodeAlone) {
+  SocketCan a("vcan0"), b("vcan0", {.accept = Acceptance{.id = 0x340, .mask = 0x7E0}});
+  for (const base::CanFrame& frame :
+       {base::CanFrame{.id = 0x33F}, base::CanFrame{.id = 0x340}, base::CanFrame{.id = 0x340, .extended = true},
+        base::CanFrame{.id = 0x35F}, base::CanFrame{.id = 0x360}, base::CanFrame{.id = 0x341}})
+    ASSERT_TRUE(a.send(frame));
+  a.flush();
+  for (const std::uint32_t expected : {0x340U, 0x35FU, 0x341U}) EXPECT_EQ(next(b)->id, expected);
+  EXPECT_EQ(b.receive(), std::nullopt);
+}
+
 TEST(SocketCan, FramesGoBothWaysAndNobodyHearsHimself) {
   SocketCan a("vcan0"), b("vcan0");
   for (std::uint8_t size = 0; size <= 8; ++size) {

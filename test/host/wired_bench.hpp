@@ -4,6 +4,7 @@
 #pragma once
 
 #include "config/rover.hpp"
+#include "node/bus_protection.hpp"
 #include "node/firmware.hpp"
 #include "sim_host/play/lockstep.hpp"
 #include "sim_host/play/recording.hpp"
@@ -89,11 +90,14 @@ inline param::Parameters wired_rover() {
   return p;
 }
 
+/// With the code of tags and guards, which the parameters ask for or not.
+using ProtectedRover = node::WithBusProtection<robot::rover::Estimators>;
+
 /// Drives north: at rest for 4 s, then at 1 m/s.
 class WiredRover {
  public:
   static constexpr node::WiredParts kParts{.imu = true, .encoders = true, .gnss = true};
-  using Firmware = node::Firmware<RoverBoard, robot::rover::Estimators, kParts>;
+  using Firmware = node::Firmware<RoverBoard, ProtectedRover, kParts>;
 
   WiredRover() {
     board.imu.set_motion([](double t) {
@@ -125,7 +129,10 @@ class WiredRover {
     wire.foreign(bus::frame(0x300, bus::protect(bus::CmdReset{.ctr = ++command_counter, .what = what})));
   }
   void sync(bus::SyncKind kind, std::int64_t time_us) {
-    wire.foreign(sim::sync_frame(0x300, kind, {time_us}, ++syncs));
+    const bus::InSync message = sim::sync_message(kind, {time_us}, ++syncs);
+    if (kind == bus::SyncKind::kBegin || kind == bus::SyncKind::kClock)
+      wire.foreign(bus::frame(0x300, bus::guard_of_sync(message)));
+    wire.foreign(bus::frame(0x300, message));
   }
 
   template <class Message>
@@ -191,15 +198,15 @@ struct Repetition {
   std::string first;
 };
 
-inline Repetition repeat_at_the_desk(const std::vector<sim::TimedFrame>& log) {
+inline Repetition repeat_at_the_desk(const std::vector<sim::TimedFrame>& log,
+                                     const param::Parameters& parameters = wired_rover()) {
   Repetition r;
   sim::FramesInMemory frames(log);
   r.recording = sim::recording_of(frames, "wired.log", {});
   sim::RecordedTicks ticks(frames, r.recording, {});
   hal::MemoryBus bus;
   DeskBoard board{bus.node_end()};
-  const param::Parameters parameters = wired_rover();
-  using Firmware = node::Firmware<DeskBoard, robot::rover::Estimators>;
+  using Firmware = node::Firmware<DeskBoard, ProtectedRover>;
   const auto firmware = std::make_unique<Firmware>(board, parameters, bus::Version{.git = 7});
   sim::MemoryLink link(bus, [&firmware] { firmware->poll(); });
   link.on_resume([&firmware](std::span<const std::byte> state) { return firmware->resume(state); });

@@ -39,6 +39,33 @@ TEST(WiredNode, frames_of_others_between_its_own_leave_no_trace) {
   expect_equal(r, rover.epochs());
 }
 
+TEST(WiredNode, sends_guards_of_its_samples_where_samples_need_them) {
+  WiredRover rover;
+  rover.parameters.bus.guard = 1;
+  rover.boot();
+  rover.run(20);
+  const auto status = rover.said<bus::EstStatus>();
+  EXPECT_EQ(status.back().mode, sensor::Mode::kNominal);
+  EXPECT_TRUE(status.back().pos_valid && status.back().hdg_valid);
+  const std::size_t samples = rover.said<bus::InWheelCounts>().size() + rover.said<bus::ImuTime>().size() +
+                              rover.said<bus::InGnssAcc>().size() + rover.said<bus::InGnssVelU>().size();
+  EXPECT_GT(samples, 3'000U);
+  EXPECT_NEAR(static_cast<double>(rover.said<bus::InGuardSample>().size()), static_cast<double>(samples), 2);
+  EXPECT_EQ(rover.said<bus::EstDiagGuard>().back().guard_bad, 0);
+  const Repetition r = repeat_at_the_desk(rover.wire.log, rover.parameters);
+  EXPECT_FALSE(r.recording.hole) << r.recording.hole->why;
+  expect_equal(r, rover.epochs());
+  // Others on the bus, whose samples have none, are refused. A Step that nobody vouches for leaves the record whole.
+  rover.foreign_per_s = 100;
+  rover.wire.foreign(sim::sync_frame(0x300, bus::SyncKind::kStep, {5'000'000}, 77));
+  rover.run(5);
+  EXPECT_GT(rover.said<bus::EstDiagGuard>().back().guard_bad, 100);
+  EXPECT_EQ(rover.said<bus::EstDiagLimits>().back().lock_refused, 1);
+  const Repetition both = repeat_at_the_desk(rover.wire.log, rover.parameters);
+  EXPECT_FALSE(both.recording.hole) << both.recording.hole->why;
+  expect_equal(both, rover.epochs());
+}
+
 TEST(WiredNode, samples_reach_estimates_in_the_bodys_axes_and_signs) {
   WiredRover rover;
   rover.run(15);

@@ -43,8 +43,10 @@ class Loop : public ::testing::Test {
       firmware->poll();
   }
   void sync(bus::SyncKind kind, std::int64_t time_us, int counter) {
-    board.can.to_node.push_back(in(bus::InSync{
-        .time_us = static_cast<std::uint64_t>(time_us), .ctr = static_cast<std::uint8_t>(counter), .kind = kind}));
+    const bus::InSync message{
+        .time_us = static_cast<std::uint64_t>(time_us), .ctr = static_cast<std::uint8_t>(counter), .kind = kind};
+    if (kind == bus::SyncKind::kBegin) board.can.to_node.push_back(in(bus::guard_of_sync(message)));
+    board.can.to_node.push_back(in(message));
     firmware->poll();
   }
   template <class Page>

@@ -248,6 +248,7 @@ TEST(Node, MalformedFramesAreCountedAndServiceGoesOn) {
   truncated.size = 5;
   auto unknown = body_speed(bench.now_us, 1.0F, 0.0F);
   unknown.id = 0x301;
+  unknown.data[0] = 2;  // a page that is none
   const auto nothing = body_speed(bench.now_us, std::numeric_limits<float>::quiet_NaN(), 0.0F);
   bench.epoch({truncated, unknown, nothing});
   const Frames out = run(bench, drive(120));

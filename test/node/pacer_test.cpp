@@ -39,10 +39,77 @@ TEST(Pacer, InLockstepOnlyStepsTick) {
   Pacer pacer(kPeriod);
   bus::LoopHealth health;
   EXPECT_EQ(pacer.on_sync(bus::SyncKind::kBegin, {1'000'000}, {0}, health), std::nullopt);
-  EXPECT_EQ(pacer.on_poll({60'000'000}, health), std::nullopt);
-  EXPECT_EQ(pacer.on_sync(bus::SyncKind::kStep, {1'010'000}, {60'000'000}, health)->us, 1'010'000);
-  EXPECT_EQ(pacer.on_sync(bus::SyncKind::kStep, {1'007'000}, {60'000'001}, health)->us, 1'007'000)
+  EXPECT_EQ(pacer.on_poll({2'000'000}, health), std::nullopt);
+  EXPECT_EQ(pacer.on_sync(bus::SyncKind::kStep, {1'010'000}, {2'000'000}, health)->us, 1'010'000);
+  EXPECT_EQ(pacer.on_sync(bus::SyncKind::kStep, {1'007'000}, {2'000'001}, health)->us, 1'007'000)
       << "whatever the time: the node judges";
+}
+
+TEST(Pacer, TwoSecondsAfterTheLastStepItTicksByItself) {
+  Pacer pacer(kPeriod);
+  bus::LoopHealth health;
+  EXPECT_EQ(pacer.on_sync(bus::SyncKind::kStep, {700'003}, {5'000'000}, health)->us, 700'003);
+  for (std::int64_t now = 5'000'000; now <= 7'000'000; now += 500)
+    ASSERT_EQ(pacer.on_poll({now}, health), std::nullopt) << now;
+  std::vector<std::int64_t> ticks;
+  for (std::int64_t now = 7'000'500; now < 7'030'000; now += 500)
+    if (const auto t = pacer.on_poll({now}, health)) ticks.push_back(t->us);
+  EXPECT_EQ(ticks, (std::vector<std::int64_t>{2'710'000, 2'720'000})) << "the bus's time went on as the board's did";
+  EXPECT_EQ(pacer.state(), SyncState::kOwnTimer);
+  EXPECT_EQ(health.sync_lost, 1);
+}
+
+TEST(Pacer, AStormOfTicksDoesNotLetTimeRunAway) {
+  for (const std::int64_t apart_us : {1, 4'999, 5'000, 10'000, 400'000}) {
+    Pacer pacer(kPeriod);
+    bus::LoopHealth health;
+    std::int64_t now = 0, time = 1'000'000;
+    for (int k = 0; k < 100; ++k, now += 10'000, time += 10'000)
+      ASSERT_TRUE(pacer.on_sync(SyncKind::kTick, {time}, {now}, health));
+    int ticks = 0;
+    for (int k = 0; k < 10'000; ++k, now += 100) {  // a second of ten frames a millisecond
+      time += apart_us;
+      ticks += pacer.on_sync(SyncKind::kTick, {time}, {now}, health) ? 1 : 0;
+    }
+    EXPECT_LE(ticks, 50 + 125) << apart_us
+                               << ": what a loop that stood still may make up for, and the time that went by";
+    EXPECT_EQ(health.sync_back + health.sync_jump + ticks, 10'000) << apart_us;
+  }
+}
+
+TEST(Pacer, ATickOnANodeThatTicksByItselfIsRefusedUntilThreeAgree) {
+  Pacer pacer(kPeriod);
+  bus::LoopHealth health;
+  std::int64_t now = 0;
+  for (; now < 1'000'000; now += 500) static_cast<void>(pacer.on_poll({now}, health));
+  EXPECT_FALSE(pacer.on_sync(SyncKind::kTick, {900'000'000}, {now}, health));
+  EXPECT_EQ(health.sync_jump, 1);
+  EXPECT_FALSE(pacer.on_sync(SyncKind::kTick, {900'010'000}, {now + 10'000}, health));
+  EXPECT_TRUE(pacer.on_sync(SyncKind::kTick, {900'020'000}, {now + 20'000}, health));
+}
+
+TEST(Pacer, AClockThatLeapsIsRefusedUntilThreeAgree) {
+  Pacer pacer(kPeriod);
+  bus::LoopHealth health;
+  std::int64_t now = 0, last = 0;
+  const auto poll_for = [&](std::int64_t us) {
+    for (const std::int64_t end = now + us; now < end; now += 500)
+      if (const auto t = pacer.on_poll({now}, health)) last = t->us;
+  };
+  static_cast<void>(pacer.on_sync(SyncKind::kClock, {50'000'000}, {now}, health));
+  poll_for(1'000'000);
+  EXPECT_NEAR(static_cast<double>(last), 51e6, 2e4);
+  static_cast<void>(pacer.on_sync(SyncKind::kClock, {77'000'000}, {now}, health));
+  static_cast<void>(pacer.on_sync(SyncKind::kClock, {3'000'000}, {now}, health));
+  poll_for(1'000'000);
+  EXPECT_NEAR(static_cast<double>(last), 52e6, 2e4) << "two that agree with nothing";
+  EXPECT_EQ(health.sync_jump, 1);
+  EXPECT_EQ(health.sync_back, 1);
+  for (int k = 0; k < 3; ++k) {
+    static_cast<void>(pacer.on_sync(SyncKind::kClock, {99'000'000 + k * 1'000'000}, {now}, health));
+    poll_for(1'000'000);
+  }
+  EXPECT_NEAR(static_cast<double>(last), 102e6, 2e4);
 }
 
 TEST(Pacer, FollowsHoldsOverAfterThreePeriodsAndComesBack) {

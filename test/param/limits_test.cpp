@@ -41,6 +41,15 @@ const std::vector<Break> kBreaks{
     {"attitude.declination_rad", [](Parameters& p) { p.attitude.declination_rad = 0.1F; }},
     {"publish.state_every", [](Parameters& p) { p.publish.attitude_every = 3; }},
     {"publish.state_every", [](Parameters& p) { p.publish.std_every = 20; }},
+    {"loop.lockstep",
+     [](Parameters& p) {
+       p.bus = {.commands = CommandAccess::kAuthenticated, .key = {1, 2, 3, 4}};
+     }},
+    {"bus.key",
+     [](Parameters& p) {
+       p.bus.commands = CommandAccess::kAuthenticated;
+       p.loop.lockstep = Lockstep::kAuthenticated;
+     }},
     {"wired.imu_x", [](Parameters& p) { p.wired.imu_x = ChipAxis::kMinusX; }},
     {"wired.imu_x", [](Parameters& p) { p.wired.imu_y = ChipAxis::kX; }},
     {"wired.imu_rate_hz", [](Parameters& p) { p.wired.imu_rate_hz = 999; }},

@@ -143,7 +143,7 @@ class Encode(unittest.TestCase):
                               (["Cmd_SetPos", "X=1", "X=2"], "twice"), (["Cmd_SetPos", "Crc=1"], "worked out"),
                               (["Cmd_Reset", "What=Everything"], "there are: Estimators Counters LandmarkMap"),
                               (["Cmd_Reset"], "missing, and there is no code for not available: What"),
-                              (["Est_Diag"], "Page= is missing; there are: "), (["Est_Diag", "Page=14"], "no page 14")):
+                              (["Est_Diag"], "Page= is missing; there are: "), (["In_Guard", "Page=14"], "no page 14")):
             result = run(*words)
             self.assertEqual((result.returncode, result.stdout, result.stderr.count("\n")), (1, "", 1), result)
             self.assertIn(reason, result.stderr)

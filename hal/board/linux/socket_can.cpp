@@ -123,6 +123,11 @@ bool SocketCan::open_socket(std::string& why) {
     setsockopt(socket_, SOL_SOCKET, SO_RCVBUF, &size, sizeof size);
   setsockopt(socket_, SOL_SOCKET, SO_RXQ_OVFL, &yes, sizeof yes);
   if (options_.arrival_times) setsockopt(socket_, SOL_SOCKET, SO_TIMESTAMP, &yes, sizeof yes);
+  if (options_.accept) {
+    const can_filter wanted{.can_id = options_.accept->id,
+                            .can_mask = options_.accept->mask | CAN_EFF_FLAG | CAN_RTR_FLAG};
+    setsockopt(socket_, SOL_CAN_RAW, CAN_RAW_FILTER, &wanted, sizeof wanted);
+  }
   const can_err_mask_t errors = CAN_ERR_BUSOFF | CAN_ERR_CRTL | CAN_ERR_RESTARTED;
   setsockopt(socket_, SOL_CAN_RAW, CAN_RAW_ERR_FILTER, &errors, sizeof errors);
   socket_drops_ = 0;

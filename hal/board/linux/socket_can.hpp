@@ -18,6 +18,7 @@ namespace tetap::hal {
 
 struct SocketCanOptions {
   int receive_buffer_bytes = 16 << 20;  ///< forced past net.core.rmem_max where allowed
+  std::optional<Acceptance> accept{};   ///< frames that the kernel hands on; empty: all
   bool arrival_times = false;           ///< ask the kernel when each frame came
 };
 

@@ -33,6 +33,9 @@ class FileCan {
     return good_;
   }
 
+  /// From now on only these frames are received.
+  void accept(Acceptance wanted) { wanted_ = wanted; }
+
   [[nodiscard]] bool at_end() const { return end_; }
   [[nodiscard]] std::uint32_t sent() const { return sent_; }
   [[nodiscard]] std::uint32_t hash() const {
@@ -47,8 +50,9 @@ class FileCan {
         if (size < line.size()) line[size++] = static_cast<char>(c);
       }
       if (size == 0) continue;
-      if (const auto frame = parse_candump(line.data(), size)) return frame;
-      ++faults_.rx_overflow;
+      const auto frame = parse_candump(line.data(), size);
+      if (frame && (wanted_.mask == 0 || wanted_.takes(*frame))) return frame;
+      if (!frame) ++faults_.rx_overflow;
     }
     return std::nullopt;
   }
@@ -103,6 +107,7 @@ class FileCan {
 
   std::uint32_t in_ = semihosting::kNoFile;
   std::uint32_t out_ = semihosting::kNoFile;
+  Acceptance wanted_;  ///< a mask of 0: every frame
   bool end_ = false;
   bool good_ = true;
   std::size_t in_at_ = 0;

@@ -24,6 +24,13 @@ inline constexpr CanConfig kCanDefault{.timing = can_bit_timing(kCanReference_hz
 static_assert(kCanReference_hz == kCanBitRate * kCanDefault.timing.prescaler * kCanDefault.timing.quanta());
 static_assert(kCanDefault.timing.quanta() >= 16, "few quanta leave little to resynchronise with");
 
+/// The same with a filter in the controller.
+[[nodiscard]] constexpr CanConfig receiving(CanConfig config, Acceptance wanted) {
+  config.filters[0] = {.id = wanted.id, .mask = wanted.mask};
+  config.filter_count = 1;
+  return config;
+}
+
 struct Board {
   explicit Board(const CanConfig& config = kCanDefault) {
     const Machine machine = timer_.probe();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The lines that an image prints about itself. At boot: the robot and the hashes of the self-check, the same on every
-// target; anybody with a board can compare them with `make bits`. Later: the stack's high-water mark.
+// The lines that an image prints about itself. At boot: its version, the robot and the hashes of the self-check, the
+// same on every target; anybody with a board can compare them with `make bits`. Later: the stack's high-water mark.
 #pragma once
 
 #include "hal/chip/support/text.hpp"
@@ -16,6 +16,19 @@ inline constexpr std::uint32_t kBootEpochs = 500;
 template <class Board>
 [[gnu::noinline]] void print_bits(const Board& board, const char* robot, std::uint32_t bits) {
   board.print(Text<>{}.add("tetap: robot ").add(robot).add(", bits ").hex(bits).add('\n').c_str());
+}
+
+/// "8a2d5ae", or "8a2d5ae-dirty" of a changed tree, as git describe writes it.
+template <class Version>
+[[nodiscard]] Text<16> version_text(const Version& version) {
+  Text<16> text;
+  text.hex(version.git, 7);
+  return version.dirty ? text.add("-dirty") : text;
+}
+
+template <class Board, class Version>
+[[gnu::noinline]] void print_version_line(const Board& board, const Version& version) {
+  board.print(Text<>{}.add("tetap: version ").add(version_text(version).c_str()).add('\n').c_str());
 }
 
 template <class Board, class Firmware>

@@ -20,9 +20,9 @@ class Text {
     if (size_ < Capacity) text_[size_++] = c;
     return *this;
   }
-  /// Always eight digits, lower case, no prefix.
-  constexpr Text& hex(std::uint32_t value) {
-    for (int shift = 28; shift >= 0; shift -= 4) add("0123456789abcdef"[(value >> shift) & 15U]);
+  /// The last `digits` digits, lower case, no prefix.
+  constexpr Text& hex(std::uint32_t value, int digits = 8) {
+    for (int shift = 4 * (digits - 1); shift >= 0; shift -= 4) add("0123456789abcdef"[(value >> shift) & 15U]);
     return *this;
   }
   constexpr Text& dec(std::uint32_t value) {

@@ -17,7 +17,7 @@ from tetap.can.bus_writer import DEFAULT_DBC
 # candump -L: (time) interface ID#DATA, ID#R[length] (remote), ID##FDATA (CAN FD), then R or T for the direction
 LOG = re.compile(rb"\s*\((\d+\.\d+)\)\s+(\S+)\s+([0-9A-Fa-f]{3}|[0-9A-Fa-f]{8})#(#[0-9A-Fa-f]|)([0-9A-Fa-f]*|R[0-9A-Fa-f]?)(?:\s+[RTB])?\s*$")
 # candump: [(time)] interface [RX - -] ID [length] bytes, then the bytes as text
-PLAIN = re.compile(rb"\s*(?:\((\d+[\d.:\- ]*)\)\s+)?(\S+)\s+(?:(?:RX|TX)\s+\S\s+\S\s+)?([0-9A-Fa-f]{3}|[0-9A-Fa-f]{8})\s+\[(\d+)\]"
+PLAIN = re.compile(rb"\s*(?:\((\d[\d.:\- ]*)\)\s+)?(\S+)\s+(?:(?:RX|TX)\s+\S\s+\S\s+)?([0-9A-Fa-f]{3}|[0-9A-Fa-f]{8})\s+\[(\d+)\]"
                    rb"((?:\s+[0-9A-Fa-f]{2})*)(?:\s+(remote request|ERRORFRAME))?(?:\s+'.*')?\s*$")
 
 INPUTS = 0x20  # offsets below are inputs

@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: Apache-2.0
+// Commands with a tag: 32 bits of SipHash-2-4 under a key that node and host share, over the command, a counter and a
+// number that the node publishes (Diag_Nonce). SECURITY.md has what it promises.
+#pragma once
+
+#include "base/can_frame.hpp"
+#include "base/siphash.hpp"
+#include "base/time.hpp"
+#include "bus/codec.hpp"
+#include "bus/counters.hpp"
+#include "bus/messages.hpp"
+#include "param/parameters.hpp"
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+namespace tetap::bus {
+
+/// Content of a tag beside the frame's data.
+struct TagContext {
+  std::uint32_t nonce = 0;
+  std::uint32_t turn = 0;  ///< turn of the nonce
+  std::uint32_t id = 0;    ///< identifier of the command's frame
+  std::uint32_t counter = 0;
+};
+
+[[nodiscard]] constexpr std::uint32_t tag_of(const base::SipKey& key, const TagContext& of,
+                                             std::span<const std::uint8_t> data) {
+  base::SipHash hash(key);
+  for (const std::uint32_t value : {of.nonce, of.turn, of.id, of.counter}) hash.add_word(value);
+  hash.add(data);
+  return static_cast<std::uint32_t>(hash.finish());
+}
+
+/// A nonce is a keyed hash of every input frame since power-on, chained tick by tick: it differs from start to start as
+/// the sensors' noise does, and nobody without the key can make it repeat. It holds for a turn of 2^21 us and the turn
+/// after; within it counters only rise.
+class Authentication {
+ public:
+  explicit Authentication(const param::Parameters& parameters) : parameters_(parameters), inputs_(parameters.bus.key) {}
+
+  void power_on() {
+    chain_ = 0;
+    begin_link();
+    heard_ = 0;
+    nonces_ = {};
+    tags_ = {};
+    attempts_ = kAttempts;
+    turn_ = 0;
+  }
+  /// The key could be computed from a hash that is under way. Only right behind tick().
+  void hide_secrets() { inputs_ = base::SipHash({}); }
+  /// All but the parameters, from a state whose secrets may be hidden.
+  void resume(const Authentication& other) {
+    chain_ = other.chain_;
+    begin_link();
+    heard_ = other.heard_;
+    nonces_ = other.nonces_;
+    tags_ = other.tags_;
+    attempts_ = other.attempts_;
+    more_at_ = other.more_at_;
+    turn_ = other.turn_;
+  }
+
+  /// Every input frame, in the order of arrival.
+  void input(const base::CanFrame& frame) {
+    inputs_.add(frame.data);
+    if (heard_ < kEnough) ++heard_;
+  }
+
+  /// A tag waits for the frame of its id; a later one takes its place.
+  void announce(const InGuardTag& tag) {
+    if (tag.tag_id < tags_.size()) tags_[tag.tag_id] = {.counter = tag.tag_ctr, .tag = tag.tag_crc, .waits = true};
+  }
+  [[nodiscard]] bool waits_for(std::uint8_t offset) const { return tags_[offset].waits; }
+  /// Whether the tag that waits for this frame is right and new; it is used up.
+  [[nodiscard]] bool admits(std::uint8_t offset, const base::CanFrame& frame, Counters& counters);
+
+  /// At the begin of a tick: a new nonce in a new turn, and patience with wrong tags.
+  void tick(base::Micros now);
+  [[nodiscard]] std::uint32_t nonce() const { return nonces_[0].number; }
+
+ private:
+  static constexpr int kTurnBits = 21;
+  static constexpr std::uint32_t kEnough = 256;  ///< frames without which there is no nonce
+  static constexpr std::uint8_t kAttempts = 8;   ///< wrong tags at once; then ten in a turn
+
+  struct Nonce {
+    std::uint32_t number = 0;
+    std::uint32_t turn = 0;
+    std::uint32_t last = 0;  ///< the greatest counter that was accepted with it
+  };
+  struct Tag {
+    std::uint32_t counter = 0;
+    std::uint32_t tag = 0;
+    bool waits = false;
+  };
+
+  void begin_link() {
+    inputs_ = base::SipHash(parameters_.bus.key);
+    inputs_.add_word(static_cast<std::uint32_t>(chain_));
+    inputs_.add_word(static_cast<std::uint32_t>(chain_ >> 32));
+  }
+
+  const param::Parameters& parameters_;
+  base::SipHash inputs_;     ///< hash of chain_ and the frames since the last tick
+  std::uint64_t chain_ = 0;  ///< hash of all frames up to the last tick; without the key, nothing follows from it
+  std::uint32_t heard_ = 0;
+  std::array<Nonce, 2> nonces_{};  ///< nonces of this turn and of the one before
+  std::array<Tag, 6> tags_{};      ///< by id offset
+  std::uint8_t attempts_ = kAttempts;
+  base::Micros more_at_;  ///< when another wrong tag is bearable
+  std::uint32_t turn_ = 0;
+};
+
+[[gnu::cold]] inline bool Authentication::admits(std::uint8_t offset, const base::CanFrame& frame, Counters& counters) {
+  Tag& tag = tags_[offset];
+  if (!tag.waits || attempts_ == 0) return ++counters.auth_bad, false;
+  for (Nonce& nonce : nonces_) {
+    if (nonce.number == 0) continue;
+    const TagContext context{
+        .nonce = nonce.number, .turn = nonce.turn, .id = parameters_.can_base + offset, .counter = tag.counter};
+    if (tag_of(parameters_.bus.key, context, payload(frame)) != tag.tag) continue;
+    tag.waits = false;
+    if (tag.counter <= nonce.last) return ++counters.replayed, false;
+    nonce.last = tag.counter;
+    return true;
+  }
+  --attempts_;
+  return ++counters.auth_bad, false;
+}
+
+inline void Authentication::tick(base::Micros now) {
+  chain_ = inputs_.finish();
+  begin_link();
+  if (now >= more_at_ || more_at_.us - now.us > 1'000'000) {
+    more_at_ = now + base::Micros{(1 << kTurnBits) / 10};
+    if (attempts_ < kAttempts) ++attempts_;
+  }
+  const auto turn = static_cast<std::uint32_t>(static_cast<std::uint64_t>(now.us) >> kTurnBits);
+  if (turn == turn_ || heard_ < kEnough) return;
+  // A turn that was left out: the nonce before the last one is of no use any more.
+  nonces_[1] = turn == nonces_[0].turn + 1 ? nonces_[0] : Nonce{};
+  base::SipHash hash = inputs_;
+  hash.add_word(turn);
+  const auto number = static_cast<std::uint32_t>(hash.finish());
+  nonces_[0] = {.number = number != 0 ? number : 1, .turn = turn};
+  turn_ = turn;
+}
+
+}  // namespace tetap::bus

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+// How much work a bus may give a tick: places that samples out of their order move others by, samples that push others
+// out of a full window, and samples at all. An honest bus stays below, with room for what a gateway held back; when one
+// limit is reached, or many samples of one tick are late, the limits are tight for a second, and estimators that would
+// work through their window again wait for a short one. Counted per tick, so a replay refuses alike.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+namespace tetap::node {
+
+/// `Capacity` is that of the timeline: the limits follow from it, as the window does.
+template <std::size_t Capacity>
+class WorkLimit {
+ public:
+  void power_on() { *this = {}; }
+  /// `periods`: ticks in the length of the window.
+  void begin_tick(std::uint32_t periods) {
+    if (tight_ > 0) --tight_;
+    const std::uint32_t share = tight_ > 0 ? 4 * periods : periods;
+    add(moves_, 3 * kMoves / share, kMoves);
+    add(samples_, kSamples / share, kSamples);
+    rooms_ = tight_ > 0 ? kRooms / 6 : kRooms;
+    late_ = 0;
+  }
+
+  /// One more sample.
+  [[nodiscard]] bool admits_sample() { return samples_ > 0 ? (--samples_, true) : refuse(); }
+  /// Places by which a sample may move those behind it.
+  [[nodiscard]] std::size_t moves() const { return moves_; }
+  /// `late`: the sample is older than the last tick.
+  void spend_moves(std::size_t moves, bool late) {
+    moves_ = static_cast<std::uint16_t>(moves_ - moves);
+    if (moves > 0 && late && ++late_ > kLate) tight_ = kTightTicks;
+  }
+  /// One more sample leaves a full window early.
+  [[nodiscard]] bool admits_room() { return rooms_ > 0 ? (--rooms_, true) : refuse(); }
+  bool refuse() { return tight_ = kTightTicks, false; }
+
+  /// Whether an estimator works through `samples` again in this tick; `turn`: none does before it.
+  [[nodiscard]] bool admits_rework(std::size_t samples, bool turn) const {
+    return tight_ == 0 || (turn && samples <= kRework);
+  }
+
+ private:
+  static constexpr std::uint16_t kMoves = 3 * Capacity, kSamples = 4 * Capacity, kRooms = 24, kTightTicks = 100;
+  static constexpr std::uint16_t kLate = 8, kRework = Capacity / 2;
+  static void add(std::uint16_t& left, std::uint32_t more, std::uint16_t most) {
+    left = static_cast<std::uint16_t>(left + more < most ? left + more : most);
+  }
+
+  std::uint16_t moves_ = kMoves, samples_ = kSamples, rooms_ = kRooms;  ///< left
+  std::uint16_t late_ = 0;                                              ///< late samples since the last tick
+  std::uint16_t tight_ = 0;                                             ///< ticks
+};
+
+}  // namespace tetap::node
