@@ -19,7 +19,7 @@ class WorkLimit {
   void begin_tick(std::uint32_t periods) {
     if (tight_ > 0) --tight_;
     const std::uint32_t share = tight_ > 0 ? 4 * periods : periods;
-    add(moves_, 3 * kMoves / share, kMoves);
+    add(moves_, tight_ > 0 ? Capacity : 4 * Capacity, kMoves);
     add(samples_, kSamples / share, kSamples);
     rooms_ = tight_ > 0 ? kRooms / 6 : kRooms;
     late_ = 0;
@@ -44,7 +44,7 @@ class WorkLimit {
   }
 
  private:
-  static constexpr std::uint16_t kMoves = 3 * Capacity, kSamples = 4 * Capacity, kRooms = 24, kTightTicks = 100;
+  static constexpr std::uint16_t kMoves = 6 * Capacity, kSamples = 4 * Capacity, kRooms = 24, kTightTicks = 100;
   static constexpr std::uint16_t kLate = 8, kRework = Capacity / 2;
   static void add(std::uint16_t& left, std::uint32_t more, std::uint16_t most) {
     left = static_cast<std::uint16_t>(left + more < most ? left + more : most);
