@@ -109,9 +109,9 @@ struct AttitudeEstimate {
   bool field_disturbed = false;  ///< the magnetometer is not followed
 };
 
-[[nodiscard]] inline AttitudeEstimate attitude_of(const InertialEstimate& e) {
-  const nav::Quaternion& q = e.state.q_nb;
-  return {.q_nb = {q.w, q.x, q.y, q.z}, .valid = e.valid, .heading_valid = e.valid};
+[[nodiscard]] inline AttitudeEstimate attitude_of(const nav::InsState& x, bool valid) {
+  const nav::Quaternion& q = x.q_nb;
+  return {.q_nb = {q.w, q.x, q.y, q.z}, .valid = valid, .heading_valid = valid};
 }
 
 /// An attitude that knows the level plane of the place and its north, in the map.

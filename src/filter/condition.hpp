@@ -3,6 +3,7 @@
 // or noise of one direction that is far above what was there, would take the smallest eigenvalue below zero.
 #pragma once
 
+#include "base/multiply_add.hpp"
 #include "filter/symmetric.hpp"
 
 namespace tetap::filter {
@@ -31,6 +32,23 @@ template <class Scalar, int N>
     u(j, j) = Scalar{1} / pivot;
   }
   return true;
+}
+
+/// The same by a test that costs less and may refuse a P that is well conditioned: of three correlations with the
+/// determinant d, whose trace is 3, the least eigenvalue is above d / 2.25 (the product of the others is at most that).
+template <class Scalar, int N>
+[[nodiscard, gnu::always_inline]] inline bool surely_well_conditioned(const Symmetric<Scalar, N>& p) {
+  if constexpr (N != 3) {
+    return well_conditioned(p);
+  } else {
+    constexpr auto kLeast = Scalar(16 * kLeastEigenvalue);
+    const Scalar xx = p(0, 0), xy = p(0, 1), yy = p(1, 1), xz = p(0, 2), yz = p(1, 2), zz = p(2, 2);
+    using base::add_product, base::subtract_product;
+    const Scalar minor = subtract_product(xx * yy, xy, xy);
+    const Scalar by_xz = subtract_product(xy * yz, yy, xz), by_yz = subtract_product(xx * yz, xy, xz);
+    const Scalar determinant = subtract_product(add_product(zz * minor, xz, by_xz), yz, by_yz);
+    return xx > Scalar{0} && minor > Scalar{0} && determinant > kLeast * (xx * yy * zz);
+  }
 }
 
 /// Makes all correlations smaller by a little, which adds that share to every conditional variance; by more if that is

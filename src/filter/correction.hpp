@@ -7,6 +7,7 @@
 // Golub & Van Loan 2013, sec. 4.1.2 (the factor); Bierman 1977, ch. V (one component after another).
 #pragma once
 
+#include "base/multiply_add.hpp"
 #include "filter/unroll.hpp"
 #include "filter/update.hpp"
 
@@ -39,9 +40,11 @@ template <class Scalar, int N, int M>
       Scalar sum = s(k, j);
       unroll<0, k>([&](auto i) __attribute__((always_inline)) { sum -= u(i, k) * out.inverse(int{i}) * u(i, j); });
       const Scalar l = sum * out.inverse(int{k});
-      d -= l * sum;
-      y -= l * out.y(int{k});
-      unroll<0, N>([&](auto n) __attribute__((always_inline)) { out.g(int{n}, int{j}) -= l * out.g(int{n}, int{k}); });
+      d = base::subtract_product(d, l, sum);
+      y = base::subtract_product(y, l, Scalar{out.y(int{k})});
+      unroll<0, N>([&](auto n) __attribute__((always_inline)) {
+        out.g(int{n}, int{j}) = base::subtract_product(Scalar{out.g(int{n}, int{j})}, l, Scalar{out.g(int{n}, int{k})});
+      });
       u(k, j) = sum;
     });
     out.positive = out.positive && d > Scalar{0} && d < Scalar(1e30F);
@@ -61,7 +64,9 @@ template <bool kFloor = true, class Scalar, int N, int M>
     const Scalar floor = p(c, c) * Scalar(2.4e-7F);
     unroll<0, c + 1>([&](auto r) __attribute__((always_inline)) {
       Scalar rest = p(r, c);
-      unroll<0, M>([&](auto j) __attribute__((always_inline)) { rest -= by.g(int{r}, int{j}) * k(int{j}); });
+      unroll<0, M>([&](auto j) __attribute__((always_inline)) {
+        rest = base::subtract_product(rest, Scalar{by.g(int{r}, int{j})}, Scalar{k(int{j})});
+      });
       if (kFloor && r == c && !(rest > floor)) rest = floor;
       p(r, c) = rest;
     });
@@ -75,7 +80,7 @@ template <class Scalar, int N, int M>
   unroll<0, N>([&](auto n) __attribute__((always_inline)) {
     Scalar sum = by.g(int{n}, 0) * (by.y(0) * by.inverse(0));
     unroll<1, M>([&](auto j) __attribute__((always_inline)) {
-      sum += by.g(int{n}, int{j}) * (by.y(int{j}) * by.inverse(int{j}));
+      sum = base::add_product(sum, Scalar{by.g(int{n}, int{j})}, Scalar{by.y(int{j}) * by.inverse(int{j})});
     });
     dx(int{n}) = sum;
   });

@@ -4,6 +4,7 @@
 // identity) the group's columns of P are taken without a product.
 #pragma once
 
+#include "base/multiply_add.hpp"
 #include "filter/unroll.hpp"
 #include "filter/update.hpp"
 
@@ -60,8 +61,8 @@ template <class Scalar, int N, int M>
       unroll<kFrom, kEnd>([&](auto c) __attribute__((always_inline)) {
         Scalar rest = p(r, c);
         unroll<0, M>([&](auto m) __attribute__((always_inline)) {
-          rest -= row[static_cast<std::size_t>(m)] *
-                  column[static_cast<std::size_t>(c - kBegin) * M + static_cast<std::size_t>(m)];
+          rest = base::subtract_product(rest, row[static_cast<std::size_t>(m)],
+                                        column[static_cast<std::size_t>(c - kBegin) * M + static_cast<std::size_t>(m)]);
         });
         sum[static_cast<std::size_t>(c - kBegin)] = rest;
       });
@@ -84,12 +85,12 @@ template <int kGroup, class Scalar, int N, int M>
     for (int i = 0; i < j; ++i) {
       Scalar sum = record.s(i, j);
 #pragma GCC unroll 16
-      for (int k = 0; k < i; ++k) sum -= l(k, i) * l(k, j);
+      for (int k = 0; k < i; ++k) sum = base::subtract_product(sum, l(k, i), l(k, j));
       l(i, j) = sum * l(i, i);
     }
     Scalar pivot = record.s(j, j);
 #pragma GCC unroll 16
-    for (int k = 0; k < j; ++k) pivot -= l(k, j) * l(k, j);
+    for (int k = 0; k < j; ++k) pivot = base::subtract_product(pivot, l(k, j), l(k, j));
     if (!(pivot > Scalar{0}) || !(pivot < Scalar{1e30F})) {
       record.verdict = pivot <= Scalar{0} ? Verdict::kSingular : Verdict::kNotFinite;
       return;
@@ -97,7 +98,7 @@ template <int kGroup, class Scalar, int N, int M>
     l(j, j) = Scalar{1} / base::sqrt(pivot);
     Scalar sum = record.nu(j);
 #pragma GCC unroll 16
-    for (int k = 0; k < j; ++k) sum -= l(k, j) * y(k);
+    for (int k = 0; k < j; ++k) sum = base::subtract_product(sum, l(k, j), Scalar{y(k)});
     y(j) = sum * l(j, j);
   }
   record.nis = y.dot(y);
@@ -112,10 +113,11 @@ template <int kGroup, class Scalar, int N, int M>
     Scalar dx;
     unroll<0, M>([&](auto j) __attribute__((always_inline)) {
       Scalar gain = kGroup < 0 ? g(n, j) : p(n, kGroup < 0 ? 0 : kGroup + j);
-      unroll<0, j>([&](auto k) __attribute__((always_inline)) { gain -= g(n, k) * l(k, j); });
+      unroll<0, j>([&](auto k)
+                       __attribute__((always_inline)) { gain = base::subtract_product(gain, g(n, k), l(k, j)); });
       gain *= l(j, j);
       g(n, j) = gain;
-      dx = j == 0 ? gain * y(0) : dx + gain * y(int{j});
+      dx = j == 0 ? gain * y(0) : base::add_product(dx, gain, Scalar{y(int{j})});
     });
     result.dx(int{n}) = dx;
   });
@@ -170,8 +172,9 @@ inline void sparse_update(
   unroll<0, N>([&](auto n) __attribute__((always_inline)) {
     unroll<0, kM>([&](auto m) __attribute__((always_inline)) {
       Scalar sum = kFirst > 0 ? p(n, touch(m)) : at(m, 0) * p(n, touch(0));
-      unroll<(kFirst > 0 ? kFirst : 1), kK>([&](auto k)
-                                                __attribute__((always_inline)) { sum += at(m, k) * p(n, touch(k)); });
+      unroll<(kFirst > 0 ? kFirst : 1), kK>([&](auto k) __attribute__((always_inline)) {
+        sum = base::add_product(sum, Scalar{at(m, k)}, p(n, touch(k)));
+      });
       g(n, m) = sum;
     });
   });
@@ -179,7 +182,9 @@ inline void sparse_update(
     unroll<0, c + 1>([&](auto r) __attribute__((always_inline)) {
       Scalar sum = r == c ? noise(int{c}) : Scalar{0};
       if constexpr (kFirst > 0) sum += g(touch(r), c);
-      unroll<kFirst, kK>([&](auto k) __attribute__((always_inline)) { sum += at(r, k) * g(touch(k), c); });
+      unroll<kFirst, kK>([&](auto k) __attribute__((always_inline)) {
+        sum = base::add_product(sum, Scalar{at(r, k)}, g(touch(k), c));
+      });
       record.s(r, c) = sum;
     });
   });

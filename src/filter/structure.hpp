@@ -3,6 +3,7 @@
 // matrix and a few entries, Q with a few entries, H that picks states or has constants.
 #pragma once
 
+#include "base/multiply_add.hpp"
 #include "filter/symmetric.hpp"
 #include "filter/unroll.hpp"
 
@@ -55,7 +56,7 @@ template <class F, int R, int C, std::size_t K, class P>
   if constexpr (K == F::kAt.size()) {
     return p(R, C);
   } else if constexpr (F::kAt[K].row == R) {
-    return left_product<F, R, C, K + 1>(p, f) + f.value[K] * p(F::kAt[K].column, C);
+    return base::add_product(left_product<F, R, C, K + 1>(p, f), f.value[K], p(F::kAt[K].column, C));
   } else {
     return left_product<F, R, C, K + 1>(p, f);
   }
@@ -66,7 +67,8 @@ template <class F, int R, int C, std::size_t K, class P>
   if constexpr (K == F::kAt.size()) {
     return left_product<F, R, C, 0>(p, f);
   } else if constexpr (F::kAt[K].row == C) {
-    return both_products<F, R, C, K + 1>(p, f) + f.value[K] * left_product<F, R, F::kAt[K].column, 0>(p, f);
+    return base::add_product(both_products<F, R, C, K + 1>(p, f), f.value[K],
+                             left_product<F, R, F::kAt[K].column, 0>(p, f));
   } else {
     return both_products<F, R, C, K + 1>(p, f);
   }

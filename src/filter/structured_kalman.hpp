@@ -80,22 +80,32 @@ class StructuredKalman {
   [[gnu::always_inline]] bool adopt(const State& moved, const F& f, const Q& q) {
     Symmetric<Scalar, kErrors> next = turned(p, f);
     add_noise(next, q);
-    if constexpr (kGuard != Guard::kNone) {
+    if constexpr (kGuard == Guard::kConditioned) {
+      // Positive pivots and variances with a bounded sum bound every entry: nothing else can be wrong with P.
+      Scalar sum = next(0, 0);
+      unroll<1, kErrors>([&](auto i) __attribute__((always_inline)) { sum += next(i, i); });
+      if (!surely_well_conditioned(next) || !(sum < Scalar(1e30F)) || !moved.finite())
+        return adopt_restored(moved, next);
+    } else if constexpr (kGuard != Guard::kNone) {
       // With |p(i, j)| <= (p(i, i) + p(j, j)) / 2 the variances bound all entries; NaN is neither above nor below.
       Scalar sum = next(0, 0), least = next(0, 0);
       unroll<1, kErrors>([&](auto i) __attribute__((always_inline)) {
         sum += next(i, i);
         least = next(i, i) < least ? next(i, i) : least;
       });
-      const bool positive = kGuard == Guard::kConditioned ? least >= Scalar{0} : least > Scalar{0};  // 0: restore()
-      if (!positive || !(sum < Scalar(1e30F)) || !moved.finite()) return false;
+      if (!(least > Scalar{0}) || !(sum < Scalar(1e30F)) || !moved.finite()) return false;
     }
-    if constexpr (kGuard == Guard::kConditioned)
-      if (!next.bounded()) return false;
     p = next;
     x = moved;
-    if constexpr (kGuard == Guard::kConditioned)
-      if (!well_conditioned(p)) restore(p);
+    return true;
+  }
+  /// The same where P has to be looked at closely: it is restored, or refused when a variance is negative or an entry
+  /// is no number.
+  [[gnu::cold, gnu::noinline]] bool adopt_restored(const State& moved, const Symmetric<Scalar, kErrors>& next) {
+    if (!next.no_variance_below_zero() || !next.bounded() || !moved.finite()) return false;
+    p = next;
+    x = moved;
+    if (!well_conditioned(p)) restore(p);
     return true;
   }
 
@@ -174,7 +184,7 @@ class StructuredKalman {
                                                     : Scalar{0};
     unroll<kFirst + 1, K>([&](auto k) __attribute__((always_inline)) {
       constexpr Coefficient kKind = coefficient<Measurement>(m, k);
-      if constexpr (kKind == Coefficient::kValue) sum += h(m, int{k}) * column(k);
+      if constexpr (kKind == Coefficient::kValue) sum = base::add_product(sum, Scalar{h(m, int{k})}, Scalar{column(k)});
       if constexpr (kKind == Coefficient::kOne) sum += column(k);
       if constexpr (kKind == Coefficient::kMinusOne) sum -= column(k);
     });

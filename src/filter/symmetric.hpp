@@ -47,6 +47,24 @@ class Symmetric {
   [[nodiscard]] constexpr Scalar& operator()(int r, int c) { return packed_[index(r, c)]; }
   [[nodiscard]] constexpr const auto& packed() const { return packed_; }
 
+  /// Assignment for large ones: words are copied in groups, with neither a call nor a loop over single words.
+  [[gnu::always_inline]] void copy_from(const Symmetric& other) {
+    constexpr std::size_t kGroup = 10, kWords = static_cast<std::size_t>(N) * (N + 1) / 2;
+    const Scalar* from = other.packed_.data();
+    Scalar* to = packed_.data();
+    const Scalar* const end = from + kWords / kGroup * kGroup;
+    while (from != end) {
+      std::array<Scalar, kGroup> group;
+#pragma GCC unroll 16
+      for (std::size_t i = 0; i < kGroup; ++i) group[i] = from[i];
+#pragma GCC unroll 16
+      for (std::size_t i = 0; i < kGroup; ++i) to[i] = group[i];
+      from += kGroup;
+      to += kGroup;
+    }
+    for (std::size_t i = 0; i < kWords % kGroup; ++i) to[i] = from[i];
+  }
+
   [[nodiscard]] Matrix<Scalar, N, N> dense() const {
     Matrix<Scalar, N, N> full;
 #pragma GCC unroll 16

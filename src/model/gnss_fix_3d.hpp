@@ -21,7 +21,11 @@ struct GnssFix3d {
   nav::Vector3 antenna_b_m = nav::Vector3::Zero();
 
   /// The antenna's place minus the fix: anchored numbers are differenced, so no digit is lost far from the origin.
-  [[nodiscard]] filter::Vector<float, 3> predict(const nav::InsState& at) const { return linearised(at).z_hat; }
+  [[nodiscard]] filter::Vector<float, 3> predict(const nav::InsState& at) const {
+    const nav::Vector3 apart_m{nav::difference(at.x, x), nav::difference(at.y, y), nav::difference(at.z, z)};
+    if (!has_rest()) return apart_m;
+    return at.q_nb.rotate(antenna_b_m) + apart_m;
+  }
   [[nodiscard]] filter::Vector<float, 3> residual(const filter::Vector<float, 3>& z_hat) const { return -z_hat; }
   /// Whether there is a lever arm.
   [[nodiscard]] bool has_rest() const { return !(antenna_b_m.squaredNorm() <= 0.0F); }

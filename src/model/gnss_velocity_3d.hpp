@@ -21,7 +21,10 @@ struct GnssVelocity3d {
   nav::Vector3 antenna_b_m = nav::Vector3::Zero();
   nav::Vector3 gyro_b_radps = nav::Vector3::Zero();  ///< as the sensor shows it: the filter takes its bias off
 
-  [[nodiscard]] filter::Vector<float, 3> predict(const nav::InsState& at) const { return linearised(at).z_hat; }
+  [[nodiscard]] filter::Vector<float, 3> predict(const nav::InsState& at) const {
+    if (!has_rest()) return at.v_n_mps;
+    return linearised(at).z_hat;
+  }
   [[nodiscard]] filter::Vector<float, 3> residual(const filter::Vector<float, 3>& z_hat) const {
     return v_n_mps - z_hat;
   }

@@ -5,6 +5,7 @@
 #pragma once
 
 #include "base/math.hpp"
+#include "base/multiply_add.hpp"
 #include "filter/structure.hpp"
 #include "model/planar_pose.hpp"
 
@@ -78,13 +79,15 @@ struct PlanarIncrement {
     const float a = t.chord * t.direction.cos, b = t.chord * t.direction.sin, bend_m = ds_m * t.chord_slope;
     const float c = 0.5F * (bend_m * t.direction.cos - dy_m), d = 0.5F * (bend_m * t.direction.sin + dx_m);
     filter::Symmetric<float, 3> q;
-    q(0, 2) = cov_ds_dyaw * a + var_dyaw * c;
-    q(1, 2) = cov_ds_dyaw * b + var_dyaw * d;
+    using base::add_product;
+    const float q02 = add_product(cov_ds_dyaw * a, var_dyaw, c), q12 = add_product(cov_ds_dyaw * b, var_dyaw, d);
+    const float column = add_product(var_ds * b, cov_ds_dyaw, d);
+    q(0, 2) = q02;
+    q(1, 2) = q12;
     q(2, 2) = var_dyaw;
-    q(0, 0) = a * (var_ds * a + cov_ds_dyaw * c) + c * q(0, 2);
-    const float column = var_ds * b + cov_ds_dyaw * d;
-    q(0, 1) = a * column + c * q(1, 2);
-    q(1, 1) = b * column + d * q(1, 2);
+    q(0, 0) = add_product(a * add_product(var_ds * a, cov_ds_dyaw, c), c, q02);
+    q(0, 1) = add_product(a * column, c, q12);
+    q(1, 1) = add_product(b * column, d, q12);
     return q;
   }
 };

@@ -115,7 +115,8 @@ class Ins {
       pending_.dv_n_mps = Vector3::Zero();
     }
     accel_n_mps2 = Vector3::Zero();
-    condition(p, condition_monitor_);
+    // A few lost samples of a fast IMU add little: the watch over P, which goes on at every step, is enough.
+    if (gap.us > kShortGap_us) condition(p, condition_monitor_);
   }
   /// Turn of the body in such a gap, if something else shows it; in the navigation frame.
   void turn_without_imu(const Quaternion& turn) {
@@ -193,6 +194,7 @@ class Ins {
   /// The covariance, and what is to be added to it still.
   template <class Sink>
   void each_bit_of_p(Sink&& sink) const {
+#pragma GCC unroll 8
     for (const float v : p.packed()) sink(v);
     sink(pending_.dt_s);
     sink(pending_.shown_rad);
@@ -265,6 +267,7 @@ class Ins {
   static constexpr float kLeastTurn_rad = 5e-4F, kSmallTurn_rad = 0.05F, kMostTurn_rad = 10.0F;
   static constexpr std::int64_t kGapStep_us = 100'000, kMostGap_us = 60'000'000;
   static constexpr float kGapStep_s = 0.1F;
+  static constexpr std::int64_t kShortGap_us = 9'000;
 
   /// Motion of the state since the covariance was last predicted.
   struct Pending {

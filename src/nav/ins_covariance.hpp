@@ -5,6 +5,7 @@
 // Terms in dt^2 are left out: over T they are dt/T of what the same errors do through the velocity.
 #pragma once
 
+#include "base/multiply_add.hpp"
 #include "filter/unroll.hpp"
 #include "nav/ins_state.hpp"
 
@@ -28,19 +29,20 @@ namespace detail {
 template <class Scalar>
 using InsP = filter::Symmetric<Scalar, InsState::kErrors>;
 
-/// The group at kTo gains gain(r, j): row r of the multiple, against error j. gain reads only rows of other groups.
+/// The group at kTo gains a multiple of others: gain(to, r, j) adds its row r against error j. gain reads only rows of
+/// other groups.
 template <int kTo, class Scalar, class Gain>
 [[gnu::always_inline]] inline void shear(InsP<Scalar>& p, const Gain& gain) {
   using filter::unroll;
   unroll<0, 3>([&](auto c) __attribute__((always_inline)) {
-    unroll<0, c + 1>([&](auto r) __attribute__((always_inline)) { p(kTo + r, kTo + c) += gain(r, kTo + c); });
+    unroll<0, c + 1>([&](auto r) __attribute__((always_inline)) { gain(p(kTo + r, kTo + c), r, kTo + c); });
   });
   unroll<0, InsState::kErrors>([&](auto j) __attribute__((always_inline)) {
     if constexpr (j < kTo || j >= kTo + 3)
-      unroll<0, 3>([&](auto r) __attribute__((always_inline)) { p(kTo + r, j) += gain(r, j); });
+      unroll<0, 3>([&](auto r) __attribute__((always_inline)) { gain(p(kTo + r, j), r, j); });
   });
   unroll<0, 3>([&](auto c) __attribute__((always_inline)) {
-    unroll<0, c + 1>([&](auto r) __attribute__((always_inline)) { p(kTo + r, kTo + c) += gain(c, kTo + r); });
+    unroll<0, c + 1>([&](auto r) __attribute__((always_inline)) { gain(p(kTo + r, kTo + c), c, kTo + r); });
   });
 }
 
@@ -54,17 +56,19 @@ inline void predict_covariance(filter::Symmetric<Scalar, InsState::kErrors>& p, 
   const filter::Vector<Scalar, 3> dv = step.dv_n_mps;
   const Scalar dt_s = step.dt_s;
   const auto turned = [&](int r, int from, int j) __attribute__((always_inline)) {  // row r of R dt times a group
-    return r_dt(r, 0) * p(from, j) + r_dt(r, 1) * p(from + 1, j) + r_dt(r, 2) * p(from + 2, j);
+    const Scalar two = base::add_product(Scalar{r_dt(r, 0) * p(from, j)}, Scalar{r_dt(r, 1)}, p(from + 1, j));
+    return base::add_product(two, Scalar{r_dt(r, 2)}, p(from + 2, j));
   };
   detail::shear<InsState::kPosition>(
-      p, [&](int r, int j) __attribute__((always_inline)) { return dt_s * p(kV + r, j); });
+      p, [&](Scalar & to, int r, int j)
+             __attribute__((always_inline)) { to = base::add_product(to, dt_s, p(kV + r, j)); });
   detail::shear<kV>(
-      p, [&](int r, int j) __attribute__((always_inline)) {
+      p, [&](Scalar & to, int r, int j) __attribute__((always_inline)) {
         const int a = r == 2 ? 0 : r + 1, b = r == 0 ? 2 : r - 1;  // theta x dv
-        return (p(kT + a, j) * dv(b) - p(kT + b, j) * dv(a)) - turned(r, kA, j);
+        to += base::subtract_product(Scalar{p(kT + a, j) * dv(b)}, p(kT + b, j), Scalar{dv(a)}) - turned(r, kA, j);
       });
   detail::shear<kT>(
-      p, [&](int r, int j) __attribute__((always_inline)) { return -turned(r, kG, j); });
+      p, [&](Scalar & to, int r, int j) __attribute__((always_inline)) { to -= turned(r, kG, j); });
   if (step.keep_b_a < Scalar{1} || step.keep_b_g < Scalar{1}) {
     for (int i = 0; i < 6; ++i) {
       const Scalar keep = i < 3 ? step.keep_b_a : step.keep_b_g;
@@ -97,7 +101,7 @@ class InsFactor {
   enum class Progress : std::uint8_t { kBusy, kGood, kBad };
 
   void begin(const filter::Symmetric<float, InsState::kErrors>& p) {
-    l_ = p;
+    l_.copy_from(p);
     row_ = column_ = 0;
     pivot_ = p(0, 0) * (1.0F - kShare);
   }
@@ -107,7 +111,7 @@ class InsFactor {
       terms -= column_ + 3;
       if (column_ < row_) {
         float sum = l_(column_, row_);
-        for (int k = 0; k < column_; ++k) sum -= l_(k, column_) * l_(k, row_);
+        for (int k = 0; k < column_; ++k) sum = base::subtract_product(sum, l_(k, column_), l_(k, row_));
         sum *= l_(column_, column_);
         l_(column_, row_) = sum;
         pivot_ -= sum * sum;

@@ -56,33 +56,68 @@ template <int kI, int kJ>
     const float by_i = detail::ins_gain(kI, i, step);
     float row = 0;
     filter::unroll<kFrom, kOfJ.count>([&](auto j) __attribute__((always_inline)) {
-      row += detail::ins_gain(kJ, j, step) * p(kOfI.of[i], kOfJ.of[j]);
+      row = base::add_product(row, detail::ins_gain(kJ, j, step), p(kOfI.of[i], kOfJ.of[j]));
     });
     if constexpr (kI == kJ) row = by_i * p(kOfI.of[i], kOfI.of[i]) + 2.0F * row;
-    sum += by_i * row;
+    sum = base::add_product(sum, by_i, row);
   });
   if constexpr (kI == kJ) sum += detail::ins_noise(kI, step);
   return sum;
 }
 
-/// The same of errors first, first + 1 and first + 2, in one piece of code for all of them: small, and not fast.
-[[nodiscard, gnu::noinline]] inline filter::Symmetric<float, 3> predicted_block(
-    const filter::Symmetric<float, InsState::kErrors>& p, const InsCovarianceStep<float>& step, int first) {
-  filter::Symmetric<float, 3> block;
-  for (int c = 0; c < 3; ++c) {
-    const detail::InsTerms of_c = detail::ins_terms(first + c);
-    for (int r = 0; r <= c; ++r) {
-      const detail::InsTerms of_r = detail::ins_terms(first + r);
-      float sum = r == c ? detail::ins_noise(first + c, step) : 0.0F;
-      for (int i = 0; i < of_r.count; ++i) {
-        float row = 0;
-        for (int j = 0; j < of_c.count; ++j)
-          row += detail::ins_gain(first + c, j, step) *
-                 p(of_r.of[static_cast<std::size_t>(i)], of_c.of[static_cast<std::size_t>(j)]);
-        sum += detail::ins_gain(first + r, i, step) * row;
-      }
+namespace detail {
+
+/// Sum of what error kFrom has with the terms of error kOf: an entry of P F^T.
+template <int kFrom, int kOf>
+[[nodiscard, gnu::always_inline]] inline float predicted_row(const filter::Symmetric<float, InsState::kErrors>& p,
+                                                             const InsCovarianceStep<float>& step) {
+  constexpr InsTerms kTerms = ins_terms(kOf);
+  float row = kOf < InsState::kAccelBias ? p(kFrom, kOf) : ins_gain(kOf, 0, step) * p(kFrom, kOf);
+  filter::unroll<1, kTerms.count>([&](auto j) __attribute__((always_inline)) {
+    row = base::add_product(row, ins_gain(kOf, j, step), p(kFrom, kTerms.of[static_cast<std::size_t>(int{j})]));
+  });
+  return row;
+}
+
+template <int kFirst>
+[[gnu::noinline]] void predict_block(const filter::Symmetric<float, InsState::kErrors>& p,
+                                     const InsCovarianceStep<float>& step, filter::Symmetric<float, 3>& block) {
+  filter::unroll<0, 3>([&](auto c) __attribute__((always_inline)) {
+    filter::unroll<0, c + 1>([&](auto r) __attribute__((always_inline)) {
+      constexpr InsTerms kTerms = ins_terms(kFirst + r);
+      float sum = r == c ? ins_noise(kFirst + c, step) : 0.0F;
+      filter::unroll<0, kTerms.count>([&](auto i) __attribute__((always_inline)) {
+        constexpr int kFrom = kTerms.of[static_cast<std::size_t>(int{i})];
+        const float row = predicted_row<kFrom, kFirst + c>(p, step);
+        sum = i == 0 && kFirst < InsState::kAccelBias ? sum + row
+                                                      : base::add_product(sum, ins_gain(kFirst + r, i, step), row);
+      });
       block(r, c) = sum;
-    }
+    });
+  });
+}
+
+}  // namespace detail
+
+/// The same of errors first, first + 1 and first + 2: position, velocity, attitude or one of the biases.
+[[nodiscard]] inline filter::Symmetric<float, 3> predicted_block(const filter::Symmetric<float, InsState::kErrors>& p,
+                                                                 const InsCovarianceStep<float>& step, int first) {
+  filter::Symmetric<float, 3> block;
+  switch (first) {
+    case InsState::kPosition:
+      detail::predict_block<InsState::kPosition>(p, step, block);
+      break;
+    case InsState::kVelocity:
+      detail::predict_block<InsState::kVelocity>(p, step, block);
+      break;
+    case InsState::kAttitude:
+      detail::predict_block<InsState::kAttitude>(p, step, block);
+      break;
+    case InsState::kAccelBias:
+      detail::predict_block<InsState::kAccelBias>(p, step, block);
+      break;
+    default:
+      detail::predict_block<InsState::kGyroBias>(p, step, block);
   }
   return block;
 }

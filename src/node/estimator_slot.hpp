@@ -3,7 +3,8 @@
 // A plain one has its current state and its state at the far end of the window.
 // A late sample is fused at its own time by starting again from `past` and repeating what came since: the result is the
 // one that would have been had the sample been on time. Costs: twice the estimator's memory; a burst only when
-// something is late that this estimator takes.
+// something is late that this estimator takes. What is too long to repeat in one tick is caught up over several: the
+// far end moves towards the present by a tick's share at a time, takes the late sample on its way, and stays there.
 // A delayed one (kDelayed) has its state at the far end of the window only: samples reach it in their order when they
 // leave the window, each once, and the present is that state carried over what the window holds. Costs: that carrying
 // in every tick, never a burst (what is due it may also leave for the next tick); its records are late by the window.
@@ -19,6 +20,7 @@
 #include <array>
 #include <concepts>
 #include <cstdint>
+#include <limits>
 #include <type_traits>
 
 namespace tetap::node {
@@ -80,6 +82,7 @@ class EstimatorSlot {
   void restart(base::Micros t, const estimators::Context& ctx) {
     now_.restart(t, ctx);
     close();
+    if constexpr (!kDelayed) replay_.until = {std::numeric_limits<std::int64_t>::min()};
   }
   void set_pose(base::Micros t, const estimators::SetPose& pose, const estimators::Context& ctx) {
     now_.set_pose(t, pose, ctx);
@@ -88,23 +91,42 @@ class EstimatorSlot {
 
   /// Whether this kind of sample means anything to the estimator.
   [[nodiscard]] static bool takes(const sensor::Sample& sample) {
-    bool taken = false;
-    visit(sample, [&]<class Payload>(const Payload&) { taken = kTakes<Payload>; });
-    return taken;
+    return (kTaken >> static_cast<unsigned>(sample.sensor) & 1U) != 0;
   }
   /// Fuses into the current state and gives the record for the bus.
   estimators::Innovation fuse(const sensor::Sample& sample, const estimators::Context& ctx) {
     return fuse_into(now_, sample, ctx);
   }
-  /// The sample leaves the window: the far end takes it.
-  void retire(const sensor::Sample& sample, const estimators::Context& ctx) requires(!kDelayed) {
-    static_cast<void>(fuse_into(past_, sample, ctx));
+  /// The far end takes the sample, which leaves the window or is caught up with.
+  estimators::Innovation retire(const sensor::Sample& sample, const estimators::Context& ctx) requires(!kDelayed) {
+    return fuse_into(past_, sample, ctx);
   }
   /// Back to the far end of the window.
-  void rewind() requires(!kDelayed) { now_ = past_; }
+  void rewind() requires(!kDelayed) {
+    now_ = past_;
+    replay_.due = false;
+  }
   /// Makes the current state final: late samples no longer change it.
   void close() {
-    if constexpr (!kDelayed) past_ = now_;
+    if constexpr (!kDelayed) {
+      past_ = now_;
+      replay_.due = false;
+    }
+  }
+  /// The far end has this sample of the window, or is beyond it.
+  [[nodiscard]] bool past_has(const sensor::Sample& sample) const requires(!kDelayed) {
+    return sample.stamp <= replay_.until;
+  }
+  /// The far end has caught up to this stamp.
+  void catch_up_to(base::Micros stamp) requires(!kDelayed) { replay_.until = stamp; }
+  /// Something is late in the window, and the present does not have it yet.
+  void note_late() requires(!kDelayed) { replay_.due = true; }
+  [[nodiscard]] bool replay_due() const {
+    if constexpr (kDelayed) {
+      return false;
+    } else {
+      return replay_.due;
+    }
   }
 
   /// A sample is new in the window.
@@ -135,6 +157,10 @@ class EstimatorSlot {
     e.inertial(ctx);
   }
   { return now_.inertial(ctx); }
+  [[nodiscard]] estimators::AttitudeEstimate inertial_attitude() const requires requires(const E& e) {
+    e.inertial_attitude();
+  }
+  { return now_.inertial_attitude(); }
   [[nodiscard]] estimators::SourceStates sources(const estimators::Context& ctx) const {
     if constexpr (requires { now_.sources(ctx); }) return now_.sources(ctx);
     return {};
@@ -215,6 +241,7 @@ class EstimatorSlot {
   template <class Sink>
   void hash_state(Sink&& sink) const {
     now_.hash_state(sink);
+    if constexpr (!kDelayed) sink(static_cast<std::uint32_t>(replay_.until.us) ^ (replay_.due ? 1U : 0U));
     if constexpr (DigestsState<E>) sink(now_.digest());
   }
 
@@ -233,10 +260,30 @@ class EstimatorSlot {
     return innovation;
   }
 
+  template <class Payload>
+  static constexpr std::uint32_t bit_of(sensor::Sensor sensor) {
+    return kTakes<Payload> ? 1U << static_cast<unsigned>(sensor) : 0U;
+  }
+  /// A bit for each kind of sample that the estimator takes, as sensor::visit() names them.
+  static constexpr std::uint32_t kTaken =
+      bit_of<sensor::ImuSample>(sensor::Sensor::kImu) | bit_of<sensor::WheelCounts>(sensor::Sensor::kWheelCounts) |
+      bit_of<sensor::WheelSpeeds>(sensor::Sensor::kWheelSpeed) | bit_of<sensor::BodySpeed>(sensor::Sensor::kBodySpeed) |
+      bit_of<sensor::LandmarkSighting>(sensor::Sensor::kRangeBearing) |
+      bit_of<sensor::GnssPosition>(sensor::Sensor::kGnssPosition) |
+      bit_of<sensor::GnssVelocity>(sensor::Sensor::kGnssVelocity) |
+      bit_of<sensor::MagneticFlux>(sensor::Sensor::kMagnetometer) |
+      bit_of<sensor::AirPressure>(sensor::Sensor::kBarometer) |
+      bit_of<sensor::OutsideHeading>(sensor::Sensor::kHeading);
+
   struct Nothing {};
+  struct Replay {
+    base::Micros until{std::numeric_limits<std::int64_t>::min()};  ///< stamp to which past_ has caught up
+    bool due = false;                                              ///< a late sample is not in now_ yet
+  };
 
   E now_;  ///< state now; the far end's where the estimator is delayed
   [[no_unique_address]] std::conditional_t<kDelayed, Nothing, E> past_;
+  [[no_unique_address]] std::conditional_t<kDelayed, std::array<Nothing, 0>, Replay> replay_;
   std::array<estimators::SensorStatistics, estimators::kStatistics> statistics_{};
 };
 

@@ -30,6 +30,11 @@ struct Estimators {
   static constexpr bool kMakesMap = (estimators::MakesMap<E> || ...);
   /// Places for the samples of the window: 200 ms of an IMU at 200 Hz with wheels at 100 Hz and GNSS need 64.
   static constexpr std::size_t kSamples = 88;
+  /// Samples that plain estimators repeat in a tick when one came late; what is more is spread over several ticks. A
+  /// delayed estimator beside them needs much of the tick for itself.
+  static constexpr std::size_t kReplayed = (EstimatorSlot<E>::kDelayed || ...) ? 40 : 56;
+  /// Fewer by so many for each IMU sample of the tick beyond the first: every estimator pays for those.
+  static constexpr std::size_t kReplayedLess = 12, kLeastReplayed = 8;
 };
 
 /// The same with another number of places, for a faster IMU or a longer window (DESIGN.md, 4.3).
@@ -51,9 +56,7 @@ class FusionWindow {
   void power_on(base::Micros t, const estimators::Context& ctx) {
     timeline_.power_on();
     limit_.power_on();
-    owed_ = {};
     consumed_until_ = t;
-    turn_ = 0;
     closed_until_ = t;
     each_lane([&](auto& lane) {
       lane.restart(t, ctx);
@@ -91,6 +94,7 @@ class FusionWindow {
   /// The same at once: nothing from before t is fused any more, and plain estimators' past is their present.
   template <class Note>
   void close_window(base::Micros t, const estimators::Context& ctx, Note&& note) {
+    finish_replays(ctx, note);
     leave_until(t, Past::kIsNow, ctx, note);
     each_lane([&](auto& lane) {
       if constexpr (requires { lane.close_batch(ctx); }) lane.close_batch(ctx);
@@ -154,16 +158,30 @@ class FusionWindow {
   template <class Note>
   void leave_until(base::Micros t, Past past, const estimators::Context& ctx, Note& note);
   template <class Note>
-  void leave(const sensor::Sample& sample, Past past, const estimators::Context& ctx, Note& note);
+  void leave(std::size_t i, Past past, const estimators::Context& ctx, Note& note);
   [[nodiscard]] bool rests(const sensor::Sample& sample, const estimators::Context& ctx);
   template <class EstimatorSlot>
-  [[nodiscard]] [[gnu::noinline]] bool came_late(std::size_t due) const;
+  [[nodiscard]] std::size_t late_before(const EstimatorSlot& lane, std::size_t due) const;
+  [[nodiscard]] std::size_t replay_share(std::size_t due) const;
+  template <class EstimatorSlot>
+  [[nodiscard]] std::size_t replay_size(const EstimatorSlot& lane, std::size_t due, std::size_t most) const;
+  template <class EstimatorSlot, class Note>
+  void catch_up(EstimatorSlot& lane, std::size_t instance, std::size_t due, std::size_t share,
+                const estimators::Context& ctx, Note& note);
+  template <class Note>
+  void finish_replays(const estimators::Context& ctx, Note& note);
+  /// Accounts for and notes the innovation of a sample that came late.
+  template <class EstimatorSlot, class Note>
+  void record_awaited(EstimatorSlot& lane, std::size_t instance, std::size_t i,
+                      const estimators::Innovation& innovation, Note& note) {
+    if (!timeline_.take_awaited(i, instance)) return;
+    lane.account(timeline_[i], innovation);
+    note(instance, timeline_[i], innovation);
+  }
 
   typename Estimators::Lanes lanes_;
   Timeline<Capacity> timeline_;
   WorkLimit<Capacity> limit_;
-  std::array<bool, kCount> owed_{};  ///< a late sample waits until this lane works through the window again
-  std::size_t turn_ = 0;             ///< the lane whose turn that is, where limits are tight
   base::Micros closed_until_;
   base::Micros consumed_until_;  ///< time of the last tick
 };
@@ -179,7 +197,7 @@ Insert FusionWindow<Estimators, Capacity>::insert(const sensor::Sample& sample, 
   // A sample older than all of them came too late for so small a window.
   if (result != Insert::kFull || !timeline_.consumed(0) || sample.order(timeline_[0]) < 0) return result;
   if (!limit_.admits_room()) return Insert::kTooMuch;
-  leave(timeline_[0], Past::kFollows, ctx, note);
+  leave(0, Past::kFollows, ctx, note);
   timeline_.drop_front(1);
   const Insert again = timeline_.insert(sample);
   return again == Insert::kTaken ? Insert::kMadeRoom : again;
@@ -192,7 +210,7 @@ void FusionWindow<Estimators, Capacity>::leave_until(base::Micros t, Past past, 
   std::size_t count = 0;
   while (count < timeline_.size() && timeline_.consumed(count) && timeline_[count].stamp <= t) {
     if (past == Past::kFollows && rests(timeline_[count], ctx)) break;
-    leave(timeline_[count++], past, ctx, note);
+    leave(count++, past, ctx, note);
   }
   timeline_.drop_front(count);
   if (t > closed_until_) closed_until_ = t;
@@ -200,8 +218,8 @@ void FusionWindow<Estimators, Capacity>::leave_until(base::Micros t, Past past, 
 
 template <class Estimators, std::size_t Capacity>
 template <class Note>
-void FusionWindow<Estimators, Capacity>::leave(const sensor::Sample& sample, Past past, const estimators::Context& ctx,
-                                               Note& note) {
+void FusionWindow<Estimators, Capacity>::leave(std::size_t i, Past past, const estimators::Context& ctx, Note& note) {
+  const sensor::Sample& sample = timeline_[i];
   std::size_t instance = 0;
   each_lane([&](auto& lane) {
     if constexpr (std::remove_cvref_t<decltype(lane)>::kDelayed) {
@@ -211,8 +229,8 @@ void FusionWindow<Estimators, Capacity>::leave(const sensor::Sample& sample, Pas
       }
       lane.account(sample, innovation);
       note(instance, sample, innovation);
-    } else if (past == Past::kFollows) {
-      lane.retire(sample, ctx);
+    } else if (past == Past::kFollows && !lane.past_has(sample)) {
+      record_awaited(lane, instance, i, lane.retire(sample, ctx), note);
     }
     ++instance;
   });
@@ -226,21 +244,79 @@ bool FusionWindow<Estimators, Capacity>::rests(const sensor::Sample& sample, con
   return rests;
 }
 
-/// Whether something new belongs before something that the lane has fused already.
+/// Index of the last sample that the lane has fused already, when something new belongs before it; otherwise 0.
 template <class Estimators, std::size_t Capacity>
 template <class EstimatorSlot>
-bool FusionWindow<Estimators, Capacity>::came_late(std::size_t due) const {
-  if (EstimatorSlot::kDelayed) return false;
-  bool is_new = false;
-  for (std::size_t i = timeline_.known(); i < due; ++i) {
-    if (!EstimatorSlot::takes(timeline_[i])) continue;
-    if (!timeline_.consumed(i)) {
-      is_new = true;
-    } else if (is_new) {
-      return true;
+std::size_t FusionWindow<Estimators, Capacity>::late_before(const EstimatorSlot& lane, std::size_t due) const {
+  if (!lane.replay_due() && !timeline_.any_late()) return 0;
+  std::size_t last = due;
+  do {
+    if (last == 0) return 0;
+    --last;
+  } while (!timeline_.consumed(last) || !EstimatorSlot::takes(timeline_[last]));
+  if (lane.replay_due()) return last;
+  for (std::size_t i = timeline_.known(); i < last; ++i)
+    if (!timeline_.consumed(i) && EstimatorSlot::takes(timeline_[i]) && !lane.past_has(timeline_[i])) return last;
+  return 0;
+}
+
+/// Samples that this tick may repeat.
+template <class Estimators, std::size_t Capacity>
+std::size_t FusionWindow<Estimators, Capacity>::replay_share(std::size_t due) const {
+  std::size_t imu = 0;
+  for (std::size_t i = timeline_.known(); i < due; ++i)
+    if (timeline_[i].sensor == sensor::Sensor::kImu && !timeline_.consumed(i)) ++imu;
+  imu = std::max(imu, due / 64);  // a tick of a full window whose samples are all late has none
+  const std::size_t less = imu > 1 ? (imu - 1) * Estimators::kReplayedLess : 0;
+  constexpr std::size_t kMost = Estimators::kReplayed, kLeast = Estimators::kLeastReplayed;
+  return less + kLeast < kMost ? kMost - less : kLeast;
+}
+
+/// Samples between the far end of the lane and the present; `most` + 1 when there are more.
+template <class Estimators, std::size_t Capacity>
+template <class EstimatorSlot>
+std::size_t FusionWindow<Estimators, Capacity>::replay_size(const EstimatorSlot& lane, std::size_t due,
+                                                            std::size_t most) const {
+  std::size_t size = 0;
+  for (std::size_t i = due; i > 0 && size <= most && !lane.past_has(timeline_[i - 1]); --i)
+    if (EstimatorSlot::takes(timeline_[i - 1])) ++size;
+  return size;
+}
+
+/// Moves the lane's far end by `share` samples, and on to the end of the last one's stamp.
+template <class Estimators, std::size_t Capacity>
+template <class EstimatorSlot, class Note>
+void FusionWindow<Estimators, Capacity>::catch_up(EstimatorSlot& lane, std::size_t instance, std::size_t due,
+                                                  std::size_t share, const estimators::Context& ctx, Note& note) {
+  std::size_t i = 0;
+  while (i < due && lane.past_has(timeline_[i])) ++i;
+  for (std::size_t done = 0; i < due; ++i) {
+    const sensor::Sample& sample = timeline_[i];
+    if (done >= share && sample.stamp != timeline_[i - 1].stamp) break;
+    if (EstimatorSlot::takes(sample)) {
+      record_awaited(lane, instance, i, lane.retire(sample, ctx), note);
+      ++done;
     }
+    if (i + 1 == due || timeline_[i + 1].stamp != sample.stamp) lane.catch_up_to(sample.stamp);
   }
-  return false;
+}
+
+/// Replays under way are completed at once.
+template <class Estimators, std::size_t Capacity>
+template <class Note>
+void FusionWindow<Estimators, Capacity>::finish_replays(const estimators::Context& ctx, Note& note) {
+  std::size_t instance = 0;
+  each_lane([&](auto& lane) {
+    if constexpr (!std::remove_cvref_t<decltype(lane)>::kDelayed) {
+      if (lane.replay_due()) {
+        lane.rewind();
+        for (std::size_t i = 0; i < timeline_.size(); ++i)
+          if (timeline_.consumed(i) && !lane.past_has(timeline_[i]))
+            record_awaited(lane, instance, i, lane.fuse(timeline_[i], ctx), note);
+      }
+    }
+    ++instance;
+  });
 }
 
 template <class Estimators, std::size_t Capacity>
@@ -248,30 +324,30 @@ template <class OnNew, class Note>
 std::uint16_t FusionWindow<Estimators, Capacity>::consume(base::Micros t, const estimators::Context& ctx,
                                                           OnNew&& on_new, Note&& note) {
   const std::size_t due = timeline_.until(t);
+  std::size_t left = replay_share(due);
   std::array<bool, kCount> again{};
+  std::array<std::size_t, kCount> last{};  // samples before it are late
+  bool anew = false;
   std::size_t instance = 0;
   each_lane([&](auto& lane) {
     using EstimatorSlot = std::remove_cvref_t<decltype(lane)>;
     if constexpr (!EstimatorSlot::kDelayed) {
-      owed_[instance] = owed_[instance] || came_late<EstimatorSlot>(due);
-      again[instance] = owed_[instance] && limit_.admits_rework(due, instance == turn_);
-      if (again[instance]) {
-        owed_[instance] = false;
+      last[instance] = late_before(lane, due);
+      if (last[instance] > 0) lane.note_late();
+      const std::size_t size = lane.replay_due() ? replay_size(lane, due, left) : 0;
+      if (size > 0 && size <= left) {
+        left -= size;
+        again[instance] = anew = true;
         lane.rewind();
       }
     }
     ++instance;
   });
-  turn_ = (turn_ + 1) % kCount;
   consumed_until_ = t;
   const param::LoopParameters& loop = ctx.parameters.loop;
   limit_.begin_tick(static_cast<std::uint32_t>(loop.window_us / loop.period_us));
-  // A lane that waits for its turn takes what follows all that it has, and leaves the rest to that turn.
-  std::size_t in_order = due;
-  while (in_order > 0 && !timeline_.consumed(in_order - 1)) --in_order;
   std::uint16_t not_used = 0;
   // Every estimator has the samples before known().
-  const bool anew = std::any_of(again.begin(), again.end(), [](bool a) { return a; });
   for (std::size_t i = anew ? 0 : timeline_.known(); i < due; ++i) {
     const bool is_new = !timeline_.consumed(i);
     if (!is_new && !anew) continue;
@@ -284,14 +360,22 @@ std::uint16_t FusionWindow<Estimators, Capacity>::consume(base::Micros t, const 
       if constexpr (EstimatorSlot::kDelayed) {
         taken = taken || EstimatorSlot::takes(sample);
         if (is_new) lane.arrived(sample, ctx);
-      } else if (owed_[instance] && i < in_order) {
-        taken = true;
+      } else if (lane.past_has(sample)) {
+        if (is_new && EstimatorSlot::takes(sample)) {
+          taken = true;
+          note(instance, sample, {.verdict = sensor::Verdict::kTooLate, .failed = sensor::Check::kTime});
+        }
+      } else if (is_new && !again[instance] && i < last[instance]) {
+        taken = taken || EstimatorSlot::takes(sample);
+        if (EstimatorSlot::takes(sample)) timeline_.await(i, instance);
       } else if (is_new || again[instance]) {
         const estimators::Innovation innovation = lane.fuse(sample, ctx);
         if (is_new) {
           taken = taken || innovation.verdict != sensor::Verdict::kNotUsed;
           lane.account(sample, innovation);
           note(instance, sample, innovation);
+        } else {
+          record_awaited(lane, instance, i, innovation, note);
         }
       }
       ++instance;
@@ -300,6 +384,17 @@ std::uint16_t FusionWindow<Estimators, Capacity>::consume(base::Micros t, const 
     if (!taken) ++not_used;
     timeline_.consume(i);
   }
+  instance = 0;
+  each_lane([&](auto& lane) {
+    using EstimatorSlot = std::remove_cvref_t<decltype(lane)>;
+    if constexpr (!EstimatorSlot::kDelayed) {
+      if (lane.replay_due() && left > 0) {
+        catch_up(lane, instance, due, left, ctx, note);
+        left = 0;
+      }
+    }
+    ++instance;
+  });
   return not_used;
 }
 

@@ -329,6 +329,7 @@ void Node<Estimators, Capacity>::close_window(base::Micros t) {
 template <class Estimators, std::size_t Capacity>
 void Node<Estimators, Capacity>::note(std::size_t instance, const sensor::Sample& sample,
                                       const estimators::Innovation& innovation) {
+  if (innovation.verdict == sensor::Verdict::kTooLate) ++counters_.too_late;
   const bool frequent = sample.sensor <= sensor::Sensor::kBodySpeed || sample.sensor == sensor::Sensor::kMagnetometer ||
                         sample.sensor == sensor::Sensor::kBarometer;
   const bool ordinary = innovation.verdict == sensor::Verdict::kAccepted && frequent;
@@ -422,10 +423,10 @@ bool Node<Estimators, Capacity>::healthy(const Estimates& estimates) {
 template <class Estimators, std::size_t Capacity>
 estimators::Disagreement Node<Estimators, Capacity>::judge() {
   estimators::Disagreement apart;
-  if constexpr (requires { history_.primary().inertial(context()); }) {
+  if constexpr (requires { history_.primary().inertial_attitude(); }) {
     history_.each_lane([&](const auto& lane) {
       if constexpr (requires { lane.attitude(context()); })
-        apart = disagreement(in_map(lane.attitude(context())), attitude_of(history_.primary().inertial(context())));
+        apart = disagreement(in_map(lane.attitude(context())), history_.primary().inertial_attitude());
     });
     disagreement_.step(apart, now_, parameters_.disagreement);
   }

@@ -3,6 +3,7 @@
 // one can still be fused at its own time. A ring: what leaves at the front moves nothing.
 #pragma once
 
+#include "base/state_hash.hpp"
 #include "sensor/sample.hpp"
 #include "sensor/window.hpp"
 
@@ -28,7 +29,10 @@ class Timeline {
     moves = size_ - at;
     if (at > 0 && (*this)[at - 1].order(sample) == 0) {
       // Two that claim to be one sample and differ: the one whose frames have the smaller sum, whichever came first.
-      if (!consumed(at - 1) && sample.bits < (*this)[at - 1].bits) samples_[place(at - 1)] = sample;
+      if (!consumed(at - 1) && sample.bits < (*this)[at - 1].bits) {
+        digest_ += digest_of(sample) - digest_of((*this)[at - 1]);
+        samples_[place(at - 1)] = sample;
+      }
       return Insert::kDuplicate;
     }
     if (size_ == Capacity) return Insert::kFull;
@@ -40,7 +44,8 @@ class Timeline {
       to = from;
     }
     samples_[to] = sample;
-    consumed_[to] = false;
+    consumed_[to] = 0;
+    digest_ += digest_of(sample);
     ++size_;
     ++new_;
     if (at < known_) known_ = at;
@@ -63,27 +68,18 @@ class Timeline {
 
   constexpr void drop_front(std::size_t count) {
     for (std::size_t i = known_; i < count; ++i) new_ -= consumed(i) ? 0 : 1;
+    for (std::size_t i = 0; i < count; ++i) digest_ -= digest_of((*this)[i]);
     begin_ = place(count);
     size_ -= count;
     known_ = new_ == 0 ? size_ : known_ > count ? known_ - count : 0;
   }
-  constexpr void clear() { size_ = known_ = new_ = 0; }
-  constexpr void power_on() { begin_ = size_ = known_ = new_ = 0, high_water_ = 0; }
+  constexpr void clear() { size_ = known_ = new_ = 0, digest_ = 0; }
+  constexpr void power_on() { clear(), begin_ = 0, high_water_ = 0; }
 
-  /// Digest of the content, in order: a polynomial in an odd number modulo 2^32. A sample's payload is in its frames'
-  /// CRC already, so this one only has to identify the samples.
-  [[nodiscard]] constexpr std::uint32_t digest() const {
-    constexpr std::uint32_t kOdd = 0x01000193;
-    std::uint32_t sum = static_cast<std::uint32_t>(size_);
-    for (std::size_t i = 0; i < size_; ++i) {
-      const sensor::Sample& sample = (*this)[i];
-      const auto stamp = static_cast<std::uint64_t>(sample.stamp.us);
-      sum = sum * kOdd + static_cast<std::uint32_t>(stamp);
-      sum = sum * kOdd + static_cast<std::uint32_t>(stamp >> 32);
-      sum = sum * kOdd + sample.bits;
-    }
-    return sum;
-  }
+  /// Digest of the content: the sum of what its samples give, modulo 2^32, kept up to date by what comes and goes. The
+  /// stamps are the order, and a sample's payload is in its frames' CRC already, so this one only has to identify the
+  /// samples.
+  [[nodiscard]] constexpr std::uint32_t digest() const { return digest_ + static_cast<std::uint32_t>(size_); }
 
   /// Its first `size` samples.
   [[nodiscard]] constexpr sensor::Window window(std::size_t size) const {
@@ -91,20 +87,39 @@ class Timeline {
   }
   [[nodiscard]] constexpr const sensor::Sample& operator[](std::size_t i) const { return samples_[place(i)]; }
   /// The current estimate has it, and its record went out.
-  [[nodiscard]] constexpr bool consumed(std::size_t i) const { return consumed_[place(i)]; }
+  [[nodiscard]] constexpr bool consumed(std::size_t i) const { return (consumed_[place(i)] & 1U) != 0; }
   constexpr void consume(std::size_t i) {
     if (consumed(i)) return;
-    consumed_[place(i)] = true;
+    consumed_[place(i)] = static_cast<std::uint8_t>(consumed_[place(i)] | 1U);
     --new_;
     if (i == known_) ++known_;
     if (new_ == 0) known_ = size_;
   }
+  /// Estimator `lane` does not have the consumed sample yet: its record is to come.
+  constexpr void await(std::size_t i, std::size_t lane) {
+    consumed_[place(i)] = static_cast<std::uint8_t>(consumed_[place(i)] | 2U << lane);
+  }
+  /// Whether the estimator's record was to come; once.
+  [[nodiscard]] constexpr bool take_awaited(std::size_t i, std::size_t lane) {
+    std::uint8_t& state = consumed_[place(i)];
+    const bool awaited = (state & (2U << lane)) != 0;
+    if (awaited) state = static_cast<std::uint8_t>(state & ~(2U << lane));
+    return awaited;
+  }
   /// Number of samples at the front that are certainly consumed; all when all are.
   [[nodiscard]] constexpr std::size_t known() const { return known_; }
+  /// False: nothing new belongs before a consumed sample.
+  [[nodiscard]] constexpr bool any_late() const { return new_ != size_ - known_; }
   [[nodiscard]] constexpr std::size_t size() const { return size_; }
   [[nodiscard]] constexpr std::uint16_t high_water() const { return high_water_; }
 
  private:
+  [[nodiscard]] static constexpr std::uint32_t digest_of(const sensor::Sample& sample) {
+    base::StateHash hash;
+    hash(sample.stamp.us);
+    hash(sample.bits);
+    return hash.value();
+  }
   /// Index in samples_ of the i-th sample, i <= Capacity.
   [[nodiscard]] constexpr std::size_t place(std::size_t i) const {
     const std::size_t at = begin_ + i;
@@ -112,9 +127,11 @@ class Timeline {
   }
 
   std::array<sensor::Sample, Capacity> samples_{};
-  std::array<bool, Capacity> consumed_{};
+  std::array<std::uint8_t, Capacity>
+      consumed_{};  ///< bit 0: consumed; bit 1 + lane: that estimator's record is to come
   std::size_t begin_ = 0, size_ = 0;
   std::size_t known_ = 0, new_ = 0;  ///< places of consumed samples, and of those that are not
+  std::uint32_t digest_ = 0;         ///< sum of the samples' digests
   std::uint16_t high_water_ = 0;
 };
 

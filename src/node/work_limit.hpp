@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// How much work a bus may give a tick: places that samples out of their order move others by, samples that push others
-// out of a full window, and samples at all. An honest bus stays below, with room for what a gateway held back; when one
-// limit is reached, or many samples of one tick are late, the limits are tight for a second, and estimators that would
-// work through their window again wait for a short one. Counted per tick, so a replay refuses alike.
+// Limits of the work that a bus may give a tick: samples, places that samples out of their order move others by, and
+// samples that push others out of a full window. An honest bus stays below, with room for what a gateway held back.
+// The limits are tight for a second after one was reached or many samples of a tick were late.
 #pragma once
 
 #include <cstddef>
@@ -38,14 +37,9 @@ class WorkLimit {
   [[nodiscard]] bool admits_room() { return rooms_ > 0 ? (--rooms_, true) : refuse(); }
   bool refuse() { return tight_ = kTightTicks, false; }
 
-  /// Whether an estimator works through `samples` again in this tick; `turn`: none does before it.
-  [[nodiscard]] bool admits_rework(std::size_t samples, bool turn) const {
-    return tight_ == 0 || (turn && samples <= kRework);
-  }
-
  private:
   static constexpr std::uint16_t kMoves = 6 * Capacity, kSamples = 4 * Capacity, kRooms = 24, kTightTicks = 100;
-  static constexpr std::uint16_t kLate = 8, kRework = Capacity / 2;
+  static constexpr std::uint16_t kLate = 8;
   static void add(std::uint16_t& left, std::uint32_t more, std::uint16_t most) {
     left = static_cast<std::uint16_t>(left + more < most ? left + more : most);
   }

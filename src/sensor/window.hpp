@@ -22,6 +22,21 @@ class Window {
       : Window(samples.data(), samples.size(), 0, samples.size()) {}
 
   [[nodiscard]] constexpr std::size_t size() const { return size_; }
+  /// Calls f(sample) for each, in order: two straight runs of the ring.
+  template <class F>
+  [[gnu::always_inline]] constexpr void each(const F& f) const {
+    const std::size_t straight = places_ - begin_ < size_ ? places_ - begin_ : size_;
+    const Sample* sample = ring_ + begin_;
+    const Sample* end = sample + straight;
+    std::size_t rest = size_ - straight;
+    while (true) {
+      for (; sample != end; ++sample) f(*sample);
+      if (rest == 0) return;
+      sample = ring_;
+      end = sample + rest;
+      rest = 0;
+    }
+  }
   [[nodiscard]] constexpr const Sample& operator[](std::size_t i) const {
     const std::size_t at = begin_ + i;
     return ring_[at < places_ ? at : at - places_];

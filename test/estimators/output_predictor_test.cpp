@@ -233,6 +233,40 @@ TEST(OutputPredictor, SaysWhenASampleComesThatItWentOnWithout) {
   EXPECT_TRUE(ahead.note_arrival({110'000}));
 }
 
+/// Half of the samples of a fast IMU are lost, in a curve: the sums of a cell and what is missing between them lead
+/// where all samples lead, and the time without samples is that of the lost ones.
+TEST(OutputPredictor, BridgesTheHolesOfAFastImuCellByCell) {
+  const param::InertialParameters n;
+  const nav::Earth earth;
+  constexpr std::int64_t kFast_us = 2'500, kBegin_us = 100'000;
+  std::mt19937 random(5);
+  std::normal_distribution<float> normal;
+  nav::InsState each;
+  each.v_n_mps = {2, 0, 0};
+  const nav::InsState begin = each;
+  std::vector<sensor::Sample> window;
+  int lost = 0;
+  for (int k = 1; k <= 192; ++k) {
+    const nav::Vector3 noise{normal(random), normal(random), normal(random)};
+    const sensor::Sample s = imu_sample(kBegin_us + k * kFast_us, nav::Vector3{0, 0, 0.2F} + 1e-3F * noise,
+                                        nav::Vector3{0, 0.4F, earth.gravity_mps2} + 1e-2F * noise, kFast_us);
+    static_cast<void>(nav::strapdown(each, checks::increment_of(s.payload.imu), earth));
+    if (k % 2 == 0 || k < 3) {
+      window.push_back(s);
+    } else {
+      ++lost;
+    }
+  }
+  OutputPredictor ahead;
+  ahead.rebuild({.x = begin, .reached = {kBegin_us}, .last = {kBegin_us}}, window, inputs(n, earth));
+  EXPECT_EQ(ahead.place().reached.us, kBegin_us + 192 * kFast_us);
+  EXPECT_NEAR(ahead.place().unseen_s, static_cast<float>(lost) * 2.5e-3F, 1e-4F);
+  const auto off = ahead.place().x.minus(each);
+  EXPECT_LT(off.head<3>().norm(), 5e-3F);
+  EXPECT_LT(off.segment<3>(3).norm(), 0.01F);
+  EXPECT_LT(off.segment<3>(6).norm(), 1e-3F);
+}
+
 /// Missing samples at the end are bridged: the turn is kept for a few samples, then the wheels' word taken.
 TEST(OutputPredictor, GoesOnStraightThroughWhatIsMissing) {
   param::InertialParameters n;

@@ -161,5 +161,37 @@ TEST(StructuredKalman, TheGateRejectsAndTheGuardsRefuseWithoutAChange) {
   EXPECT_EQ(bare.p.packed(), well.p.packed());
 }
 
+/// The cheap test never accepts what the factor refuses, and accepts nearly all that is no borderline case.
+TEST(StructuredKalman, TheCheapTestOfConditionIsSufficient) {
+  std::mt19937 random(7);
+  std::normal_distribution<float> normal;
+  int accepted = 0, well = 0;
+  constexpr int kTrials = 200'000;
+  for (int trial = 0; trial < kTrials; ++trial) {
+    // P = L L^T with a last column that is anything from independent to a copy of the others.
+    const float own = std::pow(10.0F, -5.0F * static_cast<float>(trial % 100) / 99.0F);
+    float l[3][3] = {{normal(random), 0, 0},
+                     {normal(random), normal(random), 0},
+                     {normal(random), normal(random), own * normal(random)}};
+    const float scale[3] = {1e3F, 1.0F, 1e-4F};
+    Symmetric<float, 3> p;
+    for (int r = 0; r < 3; ++r)
+      for (int c = r; c < 3; ++c) {
+        float sum = 0;
+        for (int k = 0; k < 3; ++k) sum += l[r][k] * l[c][k];
+        p(r, c) = sum * scale[r] * scale[c] * (trial % 7 == 0 && r != c ? 1.0F + 1e-3F * normal(random) : 1.0F);
+      }
+    const bool fine = filter::well_conditioned(p), surely = filter::surely_well_conditioned(p);
+    EXPECT_TRUE(fine || !surely) << trial;
+    accepted += surely ? 1 : 0;
+    well += fine ? 1 : 0;
+  }
+  EXPECT_GT(accepted, well / 2);
+  EXPECT_LT(accepted, well) << "trials without borderline cases prove little";
+  Symmetric<float, 3> nan = Symmetric<float, 3>::diagonal({1, 1, 1});
+  nan(0, 1) = base::kNan;
+  EXPECT_FALSE(filter::surely_well_conditioned(nan));
+}
+
 }  // namespace
 }  // namespace tetap

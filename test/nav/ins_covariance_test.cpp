@@ -73,6 +73,14 @@ void expect_dense(double tolerance) {
         filter::unroll<0, 15>(
             [&](auto c) { entries(int{r}, int{c}) = static_cast<double>(nav::predicted_covariance<r, c>(p, step)); });
       });
+      for (int first = 0; first < 15; first += 3) {
+        const filter::Symmetric<float, 3> block = nav::predicted_block(p, step, first);
+        for (int r = 0; r < 3; ++r)
+          for (int c = 0; c < 3; ++c) {
+            const double size = std::sqrt(entries(first + r, first + r) * entries(first + c, first + c));
+            EXPECT_NEAR(static_cast<double>(block(r, c)), entries(first + r, first + c), 1e-5 * size) << first;
+          }
+      }
     }
     nav::predict_covariance(p, step);
     const Matrix15 f = keep * transition(dt, dv, r_dt);

@@ -82,7 +82,34 @@ TEST(Timeline, IsAListThatNeverMovesWhatStays) {
       ASSERT_TRUE(timeline[k].order(model[k].first) == 0);
       ASSERT_EQ(timeline.consumed(k), model[k].second);
     }
+    node::Timeline<16> fresh;
+    for (auto m = model.rbegin(); m != model.rend(); ++m) static_cast<void>(fresh.insert(m->first));
+    ASSERT_EQ(timeline.digest(), fresh.digest()) << "of the content alone, however it came about";
+    std::size_t seen = 0;
+    timeline.window(timeline.size()).each([&](const sensor::Sample& one) {
+      ASSERT_LT(seen, model.size());
+      ASSERT_TRUE(one.order(model[seen++].first) == 0);
+    });
+    ASSERT_EQ(seen, model.size());
   }
+}
+
+TEST(Timeline, EveryBitOfASampleChangesItsDigest) {
+  node::Timeline<4> timeline;
+  static_cast<void>(timeline.insert(sample(1'000'000)));
+  for (int bit = 0; bit < 32; ++bit) {
+    node::Timeline<4> other;
+    sensor::Sample changed = sample(1'000'000);
+    changed.bits ^= 1U << bit;
+    static_cast<void>(other.insert(changed));
+    EXPECT_NE(timeline.digest(), other.digest()) << bit;
+  }
+  const std::uint32_t one = timeline.digest();
+  static_cast<void>(timeline.insert(sample(2'000'000)));
+  timeline.drop_front(1);
+  EXPECT_NE(timeline.digest(), one);
+  timeline.clear();
+  EXPECT_EQ(timeline.digest(), node::Timeline<4>{}.digest());
 }
 
 }  // namespace

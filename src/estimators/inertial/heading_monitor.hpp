@@ -68,9 +68,11 @@ class HeadingMonitor {
     has_velocity_ = from.has_velocity_;
     runs_ = true;
   }
+  /// `aligning`: the finder looks for the first heading, whether the monitor runs or not. Otherwise a monitor that does
+  /// not run restarts its finder before its next use, so that the finder is no state.
   template <class Sink>
-  void hash_state(Sink&& sink) const {
-    finder_.hash_state(sink);
+  void hash_state(Sink&& sink, bool aligning) const {
+    if (aligning || runs_) finder_.hash_state(sink);
     contradicted_.hash_state(sink);
     sink(static_cast<std::uint32_t>((has_velocity_ ? 1U : 0U) | (runs_ ? 2U : 0U)));
   }

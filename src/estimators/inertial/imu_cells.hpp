@@ -38,6 +38,10 @@ struct ImuCell {
            !checks::ImuClassifier::overlaps(pause, {early_us});
   }
   [[nodiscard]] bool plain() const { return late_us != kEach; }
+  /// After samples that end at `reached`, samples are missing, and nothing else is wrong.
+  [[nodiscard]] bool has_holes(base::Micros reached) const {
+    return plain() && !checks::ImuClassifier::overlaps(begin - reached, {early_us});
+  }
   void add(const nav::ImuIncrement& next, base::Micros stamp) {
     const auto dt_us = static_cast<std::int32_t>(next.dt.us);
     const auto late = static_cast<std::int32_t>((stamp - next.dt - begin - gather.sum().dt).us);

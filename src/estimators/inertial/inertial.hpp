@@ -58,6 +58,8 @@ class Inertial {
   [[nodiscard]] Estimate estimate(const Context& ctx) const;
   [[nodiscard]] MotionVariance motion_variance(const Context& ctx) const;
   [[nodiscard]] InertialEstimate inertial(const Context& ctx) const;
+  /// Attitude of that estimate alone.
+  [[nodiscard]] AttitudeEstimate inertial_attitude() const { return attitude_of(present(), tracking()); }
   /// Level plane of the place, in the map.
   [[nodiscard]] const nav::LocalLevel& level() const { return level_; }
   [[nodiscard]] sensor::Mode mode(const Context& ctx) const;
@@ -174,7 +176,7 @@ void Inertial::hash_state(Sink&& sink) const {
   if (recovery_.step_unknown()) predictor_.present().hash_state(sink);
   budget_.hash_state(sink);
   alignment_.hash_state(sink);
-  heading_monitor_.hash_state(sink);
+  heading_monitor_.hash_state(sink, !tracking());
   sink(static_cast<std::uint32_t>(phase_));
   sink(time_.us);
   sink(levelled_at_.us);

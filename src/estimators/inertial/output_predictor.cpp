@@ -22,7 +22,34 @@ nav::ImuIncrement OutputPredictor::unseen(base::Micros gap, const Inputs& in) co
   return {.dtheta_b_rad = dtheta, .dv_b_mps = dv + 0.5F * nav::cross(dtheta, dv), .dt = gap};
 }
 
-void OutputPredictor::add(const Sample& sample, const Inputs& in, const ImuSample*& newest) {
+void OutputPredictor::bridge(base::Micros gap, const Inputs& in) {
+  if (gap.us <= 0) return;
+  static_cast<void>(nav::strapdown(place_.x, unseen(gap, in), in.earth));
+  note_bridged(gap);
+}
+
+void OutputPredictor::note_bridged(base::Micros gap) {
+  place_.reached += gap;
+  place_.unseen_s += base::seconds(gap);
+  place_.unseen_turn_s += base::seconds(gap);
+}
+
+/// Up to the end of the cell in two steps: by the sum of its samples, and without IMU over the time between them.
+void OutputPredictor::add_with_holes(const ImuCell& cell, const Inputs& in) {
+  gather_ = cell.gather;
+  const nav::ImuIncrement& sum = gather_.sum();
+  place_.rate_b_radps = sensor::times(in.parameters.mounting_bs, sum.dtheta_b_rad) / base::seconds(sum.dt);
+  place_.reached += sum.dt;
+  fold(in);
+  bridge(cell.last() - place_.reached, in);
+}
+
+/// The holes that are left are one step at the end.
+void OutputPredictor::bridge_rest(const Holes& holes, const Inputs& in) {
+  if (holes.rest.us > 0) static_cast<void>(nav::strapdown(place_.x, unseen(holes.rest, in), in.earth));
+}
+
+void OutputPredictor::add(const Sample& sample, const Inputs& in, const ImuSample*& newest, Holes& holes) {
   const param::InertialParameters& n = in.parameters;
   const ImuSample& imu = sample.payload.imu;
   last_seen_ = sample.stamp;
@@ -32,12 +59,15 @@ void OutputPredictor::add(const Sample& sample, const Inputs& in, const ImuSampl
   const checks::ImuClass found = place_.classifier.classify(imu, increment, gap, in.turn_known, n);
   if (found < checks::ImuClass::kAfterGap) return;
   if (found == checks::ImuClass::kAfterGap) {
-    fold(in);
-    if (newest != nullptr) place_.rate_b_radps = rate_of(*newest, n);
-    static_cast<void>(nav::strapdown(place_.x, unseen(gap, in), in.earth));
-    place_.reached += gap;
-    place_.unseen_s += base::seconds(gap);
-    place_.unseen_turn_s += base::seconds(gap);
+    if (holes.bridged < kMostHoles) {
+      ++holes.bridged;
+      fold(in);
+      if (newest != nullptr) place_.rate_b_radps = rate_of(*newest, n);
+      bridge(gap, in);
+    } else {
+      holes.rest += gap;
+      note_bridged(gap);
+    }
   }
   if (imu.clipped_accel > 0 || imu.clipped_gyro > 0) place_.unseen_s += base::seconds(increment.dt);
   if (imu.clipped_gyro > 0) place_.unseen_turn_s += base::seconds(increment.dt);
@@ -52,10 +82,12 @@ void OutputPredictor::extend(const sensor::Window& window, const Inputs& in) {
   std::size_t i = window.size();
   while (i > 0 && window[i - 1].stamp > last_seen_) --i;
   const ImuSample* newest = nullptr;
+  Holes holes;
   for (; i < window.size(); ++i)
-    if (is_of(window[i], in.parameters)) add(window[i], in, newest);
+    if (is_of(window[i], in.parameters)) add(window[i], in, newest, holes);
   fold(in);
   if (newest != nullptr) place_.rate_b_radps = rate_of(*newest, in.parameters);
+  bridge_rest(holes, in);
   cells_.follow(window, in.parameters);
 }
 
@@ -65,18 +97,24 @@ bool OutputPredictor::rebuild(const Place& far, const sensor::Window& window, co
   cells_.follow(window, n);
   std::size_t i = 0;
   const ImuSample* newest = nullptr;
+  std::size_t added = 0;  // one by one
+  Holes holes;
   const auto add_until = [&](base::Micros until) {
     for (; i < window.size(); ++i) {
       const Sample& sample = window[i];
       if (sample.stamp > until) return;
-      if (is_of(sample, n)) add(sample, in, newest);
+      if (!is_of(sample, n)) continue;
+      add(sample, in, newest, holes);
+      ++added;
     }
   };
   // First, sample by sample, the grid place that begins to leave; then cells, but for those with a sample that has to
   // be classified by itself; then samples without a cell.
   add_until(cells_.leaving_until());
+  const bool fast = newest != nullptr && newest->interval_us < kFast_us;
   bool skipped = false;
   bool samplewise = false;
+  std::size_t left = fast ? kSamplewiseFast : kSamplewise;  // of samples in cells that may be classified by themselves
   const auto catch_up = [&]() {
     if (!skipped) return;
     skipped = false;
@@ -94,9 +132,21 @@ bool OutputPredictor::rebuild(const Place& far, const sensor::Window& window, co
       place_.reached += gather_.sum().dt;
       place_.last = last_seen_ = cell.last();
       skipped = true;
+    } else if ((fast || left == 0) && cell.has_holes(place_.reached) && !in.imu_distrusted) {
+      add_with_holes(cell, in);
+      place_.last = last_seen_ = cell.last();
+      skipped = true;
+    } else if (left == 0) {
+      // Its samples may be anything: neither the rate nor the classifier is taken from them.
+      catch_up();
+      while (i < window.size() && window[i].stamp <= cell.last()) ++i;
+      bridge(cell.last() - place_.reached, in);
+      last_seen_ = cell.last();
     } else {
       catch_up();
+      added = 0;
       add_until(cell.last());
+      left -= added < left ? added : left;
       samplewise = true;
     }
   }
@@ -105,6 +155,7 @@ bool OutputPredictor::rebuild(const Place& far, const sensor::Window& window, co
   add_until({std::numeric_limits<std::int64_t>::max()});
   fold(in);
   if (newest != nullptr) place_.rate_b_radps = rate_of(*newest, n);
+  bridge_rest(holes, in);
   return samplewise;
 }
 

@@ -88,11 +88,28 @@ class OutputPredictor {
   }
 
  private:
+  /// Samples of cells that a rebuild classifies one by one; cells beyond are bridged as if their samples were missing.
+  /// A window of 200 ms of an IMU of 200 Hz has no more.
+  static constexpr std::size_t kSamplewise = 40, kSamplewiseFast = 8;
+  /// An IMU with shorter intervals has too many samples in a cell for a step at each lost one.
+  static constexpr std::uint16_t kFast_us = 3'500;
+
+  /// Holes between samples that are worked one by one: a step for each of the first, one step for all others.
+  struct Holes {
+    int bridged = 0;
+    base::Micros rest;
+  };
+  static constexpr int kMostHoles = 12;
+
+  void bridge(base::Micros gap, const Inputs& in);
+  void note_bridged(base::Micros gap);
+  void bridge_rest(const Holes& holes, const Inputs& in);
+  void add_with_holes(const ImuCell& cell, const Inputs& in);
   [[nodiscard]] nav::ImuIncrement unseen(base::Micros gap, const Inputs& in) const;
   void fold(const Inputs& in) {
     if (!gather_.empty()) static_cast<void>(nav::strapdown(place_.x, mounted(gather_.take(), in.parameters), in.earth));
   }
-  void add(const Sample& sample, const Inputs& in, const ImuSample*& newest);
+  void add(const Sample& sample, const Inputs& in, const ImuSample*& newest, Holes& holes);
   [[nodiscard]] static nav::Vector3 rate_of(const ImuSample& s, const param::InertialParameters& n) {
     return sensor::times(n.mounting_bs, checks::increment_of(s).dtheta_b_rad) /
            base::seconds(base::Micros{s.interval_us});

@@ -12,7 +12,7 @@ REGION = re.compile(r"<!-- figures: (\w+) -->\n.*?<!-- end -->\n", re.S)
 IMAGES = [("tetap-zynqmp_r5-rover", "Cortex-R5F, rover"), ("tetap-mps2_m7-rover", "Cortex-M7, rover"), ("tetap-mps2_m4f-rover", "Cortex-M4F, rover"),
           ("tetap-zynqmp_r5-mrclam", "Cortex-R5F, mrclam")]
 WORKLOADS = ["sincos", "atan2", "exp", "log", "w1_kf", "w1_kf_conditioned", "w2_textbook", "w2_ekf", "w3_ukf", "w3_ukf_sqrt", "w6_pf1000", "fuse_range_bearing", "w4_ahrs6", "w4_ahrs9", "ahrs9", "ins_strapdown",
-             "ins_covariance", "w5_ins", "ins_tick", "ins_tick_rover", "ins_tick_car", "ins_tick_iris", "node_tick", "mrclam_tick"]
+             "ins_covariance", "w5_ins", "ins_tick", "ins_tick_rover", "ins_tick_car", "ins_tick_iris", "node_tick", "node_tick_faults", "mrclam_tick"]
 ESTIMATORS = [("`Inertial`, a tick with an IMU of 200 Hz", "ins_tick_rover"), ("`PoseEkf`, a sighting of a landmark", "fuse_range_bearing"),
               ("`filter::Ekf`, a step with range and bearing", "w2_ekf"), ("`filter::Ukf`, the same", "w3_ukf"), ("`filter::UkfSqrt`, the same", "w3_ukf_sqrt"),
               ("`PoseParticles`, 1000 particles and four landmarks", "w6_pf1000"), ("`Attitude`, a step with magnetometer", "ahrs9"),
