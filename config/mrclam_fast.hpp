@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The robots of config/mrclam.hpp without a map: FastSLAM 2 with a hundred particles of up to fifteen landmarks. Motion
-// is that of config/mrclam_slam.hpp; the other numbers were chosen on the five robots together
+// and camera are those of config/mrclam_slam.hpp; the other numbers were chosen on the five robots together
 // (docs/explanation/fast_slam.md).
 #pragma once
 
@@ -13,9 +13,9 @@ using Estimators = node::Estimators<estimators::Odometry, estimators::FastSlam10
 inline constexpr param::Parameters parameters = param::checked([] {
   param::Parameters n = mrclam_slam::parameters;
   n.wheels.noise.yaw_rate = 0.0005F;
-  n.landmark.sigma_range_m = 0.1F;
+  n.landmark.sigma_range_m = 0.07F;
   n.landmark.sigma_range_per_m = 0.05F;
-  n.mapping = {.correlation_m = 0.015F, .resample_share = 0.25F};
+  n.mapping = {.correlation_m = 0.015F, .resample_share = 0.5F};
   return n;
 }());
 

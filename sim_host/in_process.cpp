@@ -16,6 +16,7 @@ int with_node_in_process(const std::string& robot, const ParameterSettings& sett
     parameters.can_base = can_base;
     // A node in the player's own process is the player's.
     if (parameters.loop.lockstep == param::Lockstep::kAuthenticated) parameters.loop.lockstep = param::Lockstep::kPlain;
+    require_map_ids<Estimators>(robot, can_base);
     hal::MemoryBus bus;
     hal::MemoryCan node_end = bus.node_end();
     CanAdapter can(node_end);

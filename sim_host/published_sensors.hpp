@@ -14,13 +14,25 @@
 
 namespace tetap::sim {
 
+/// An estimator that maps landmarks which its sightings do not name.
+template <class E>
+concept MapsNameless = requires {
+  requires E::kTakesNameless;
+};
+
+/// With the sensor's instance or without.
 template <class E, class Payload>
 concept Takes = requires(E& e, const Payload& payload, base::Micros stamp, const estimators::Context& ctx) {
   e.fuse(payload, stamp, ctx);
+}
+|| requires(E& e, const Payload& payload, base::Micros stamp, const estimators::Context& ctx) {
+  e.fuse(payload, stamp, std::uint8_t{}, ctx);
 };
 
 struct Sent {
   bool imu = false, landmarks = false, magnetometer = false, barometer = false;
+  bool own_map = false;   ///< the robot makes its map, so it is given none
+  bool nameless = false;  ///< the map needs no identities
   bool inertial = false;  ///< an inertial filter is there: what is a matched world for it is another one
   VehicleKind kind = VehicleKind::kDifferentialDrive;
   friend bool operator==(const Sent&, const Sent&) = default;
@@ -36,6 +48,8 @@ template <class... E>
           .landmarks = (Takes<E, sensor::LandmarkSighting> || ...),
           .magnetometer = n.magnetic.use != 0 && (Takes<E, sensor::MagneticFlux> || ...),
           .barometer = n.baro.use != 0 && (Takes<E, sensor::AirPressure> || ...),
+          .own_map = (estimators::MakesMap<E> || ...),
+          .nameless = (MapsNameless<E> || ...),
           .inertial = kInertial,
           .kind = vehicle_kind(n, kInertial)};
 }
@@ -65,7 +79,12 @@ inline void simulate(const std::string& robot, const Sent& sent, const param::Pa
                      World::Options& world) {
   const bool from_world = robot.ends_with("_matched");  // sim_host/matched_rover.hpp
   simulate(parameters,
-           {.kind = sent.kind, .inertial = sent.inertial, .landmarks = sent.landmarks, .own_noise = !from_world},
+           {.kind = sent.kind,
+            .inertial = sent.inertial,
+            .landmarks = sent.landmarks,
+            .own_map = sent.own_map,
+            .nameless = sent.nameless,
+            .own_noise = !from_world},
            world);
 }
 

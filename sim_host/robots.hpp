@@ -6,6 +6,9 @@
 #include "sim_host/matched_rover.hpp"
 #include "sim_host/parameter_settings.hpp"
 
+#include <array>
+#include <cstdint>
+#include <cstdio>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -29,11 +32,23 @@ template <class F>
 void for_robot(const std::string& name, F&& f) {
   if (!with_robot(name, f)) throw std::runtime_error("no robot '" + name + "'; there are: " + std::string(kRobotNames));
 }
+/// Throws std::runtime_error where a robot that makes its map has no ids for it.
+template <class Estimators>
+void require_map_ids(const std::string& name, std::uint32_t can_base) {
+  if (!Estimators::kMakesMap || param::has_map_ids(can_base)) return;
+  std::array<char, 16> hex{};
+  std::snprintf(hex.data(), hex.size(), "0x%X", static_cast<unsigned>(can_base));
+  throw std::runtime_error("robot " + name + ": can_base is " + hex.data() + "; it has to be " + param::kMapIdsRule);
+}
 /// The same with these settings over the robot's parameters.
 template <class F>
 void for_robot(const std::string& name, const ParameterSettings& settings, F&& f) {
   for_robot(name,
-            [&](auto estimators, const param::Parameters& parameters) { f(estimators, settings.over(parameters)); });
+            [&]<class Estimators>(std::type_identity<Estimators> estimators, const param::Parameters& parameters) {
+              const param::Parameters stated = settings.over(parameters);
+              require_map_ids<Estimators>(name, stated.can_base);
+              f(estimators, stated);
+            });
 }
 
 [[nodiscard]] inline param::Parameters parameters_of(const std::string& robot, const ParameterSettings& settings = {}) {

@@ -27,7 +27,9 @@ namespace tetap::sim {
 struct SimulatedAs {
   VehicleKind kind = VehicleKind::kDifferentialDrive;
   bool inertial = false;   ///< an inertial filter is there, whose parameters state the noise of its sensors
-  bool landmarks = false;  ///< it is given a map, which fixes its frame
+  bool landmarks = false;  ///< it sees landmarks, whose map fixes its frame
+  bool own_map = false;    ///< the robot makes that map and is given none
+  bool nameless = false;   ///< the landmarks have no identities
   bool own_noise = true;   ///< false: the world's own numbers are already those of the robot's parameters
 };
 
@@ -200,6 +202,8 @@ inline void simulate(const param::Parameters& n, const SimulatedAs& as, World::O
   if (as.kind == VehicleKind::kMulticopter) detail::set_multicopter(world);
   if (as.inertial && n.recovery.at_least * 500'000LL < n.recovery.after_us) p.gnss.rate_hz = 1;  // fixes come seldom
   world.surveyed = as.landmarks || n.gnss.origin_configured != 0;
+  world.map_given = !as.own_map;
+  p.camera.identities = !as.nameless;
   if (!as.own_noise) return;
   detail::set_mounting(n, as.inertial, p);
   p.camera.sigma_range_m = std::min(p.camera.sigma_range_m, detail::wide(n.landmark.sigma_range_m));

@@ -86,6 +86,7 @@ int main(int argc, char** argv) try {
                         [&]<class Estimators>(std::type_identity<Estimators>, tetap::param::Parameters parameters) {
                           if (boot_line) return print_boot_line<Estimators>(robot, parameters);
                           parameters.can_base = base;
+                          tetap::sim::require_map_ids<Estimators>(robot, base);
                           run<Estimators>(robot, interface, parameters);
                         });
   return 0;

@@ -44,9 +44,17 @@ std::string help() {
           "  --seed N           every draw follows from it (default 1)\n"
           "  --duration S       at most so long (default: the whole course)\n"
           "  --matched          only errors that the filters model, as large as the robot's parameters say\n"
-          "  --course NAME      yard (on wheels), road: 1.1 km at 5 m/s, street (of a car), flight (of what flies), "
-          "or\n"
-          "                     stand: it stays where it is; default: that of the robot's class\n"
+          "  --course NAME      yard, loop (on wheels), road: 1.1 km at 5 m/s, street (of a car), flight (of what "
+          "flies),\n"
+          "                     or stand: it stays where it is; default: loop for a robot that makes its map, else "
+          "that "
+          "of\n"
+          "                     the robot's class\n"
+          "  --loop-m L         loop: metres of a lap (default 60)\n"
+          "  --landmarks N      loop: so many beside the way, 4 to 254 (default 24)\n"
+          "  --ids              landmarks name themselves to a robot that could do without\n"
+          "  --clutter X        false sightings a look, on average (default 0)\n"
+          "  --movers N         moving obstacles that look like landmarks (default 0)\n"
           "  --start LAT,LON,H  where it starts [deg, deg, m above the ellipsoid] (default: the robot's origin, else\n"
           "                     48.2627,11.6683,520)\n"
           "  --origin-distance EAST,NORTH   the start so many metres from the origin, by the origin's axes; with "
@@ -55,7 +63,7 @@ std::string help() {
           "  --east M           the same for M,0\n"
           "  --built            the robot is built as --params and --set say; else they are what the node is told of "
           "it\n"
-          "  --laps N           the course so many times (default 1; 2 for gnss_far)\n"
+          "  --laps N           the course so many times (default 1; 2 for gnss_far and on a loop)\n"
           "  --imu-hz N         IMU samples a second (default 100)\n"
           "  --gnss-m S         1 sigma of GNSS positions per horizontal axis (default 0.85 or the robot's floor)\n"
           "  --gnss-hz N        fixes a second (default 5; 1 where the robot expects them seldom)\n"
@@ -113,6 +121,20 @@ sim::OutFile write_truth(const sim::SessionOptions& about, const param::Paramete
   return file;
 }
 
+/// Landmark of each sighting, as tools/dataset/import_mrclam writes it; 255: clutter or a moving obstacle.
+sim::OutFile write_sightings(const std::string& folder, const sim::World& world) {
+  sim::OutFile file(folder + "/truth.sightings.csv");
+  sim::Line line;
+  file.write("time_s,landmark\n");
+  for (const sim::TrueSighting& one : world.sightings()) {
+    line.clear();
+    line.fixed(one.stamp.us, 6).text(",").integer(one.landmark);
+    file.write(line.text("\n").view());
+  }
+  file.end();
+  return file;
+}
+
 struct Run {
   sim::World::Options world;
   std::uint64_t seed = 1;
@@ -156,6 +178,7 @@ int drive(L& link, const Run& run) {
     const sim::GeodeticOrigin origin =
         run.world.surveyed ? world.origin() : node_origin.from_fix().value_or(world.origin());
     session.add(write_truth(about, parameters, source, origin, !run.realtime));
+    if (!world.map_given()) session.add(write_sightings(about.folder, world));
   });
 }
 
@@ -231,13 +254,21 @@ void set_place(sim::Arguments& arguments, const param::GnssParameters& node, boo
   set("gnss.origin_height_m", world.origin.height_m);
 }
 
-void set_course(sim::Arguments& arguments, sim::VehicleKind kind, sim::World::Options& world) {
-  const bool car = kind == sim::VehicleKind::kCar, flies = kind == sim::VehicleKind::kMulticopter;
-  const std::string course = arguments.text("--course").value_or(flies ? "flight" : car ? "street" : "yard");
+void set_course(sim::Arguments& arguments, const sim::Sent& sent, sim::World::Options& world) {
+  const bool car = sent.kind == sim::VehicleKind::kCar, flies = sent.kind == sim::VehicleKind::kMulticopter;
+  const std::string course = arguments.text("--course")
+                                 .value_or(flies          ? "flight"
+                                           : car          ? "street"
+                                           : sent.own_map ? "loop"
+                                                          : "yard");
   // Four minutes of one fault, and what comes after it, take two laps.
   const bool far = std::any_of(world.faults.begin(), world.faults.end(),
                                [](const sim::FaultSetting& s) { return s.fault == sim::Fault::kGnssFar; });
-  const int laps = counted(arguments, "--laps", far ? 2 : 1, 1000);
+  const int laps = counted(arguments, "--laps", far || course == "loop" ? 2 : 1, 1000);
+  const double loop_m = arguments.real("--loop-m", 0, 20, 10'000);
+  const auto landmarks = static_cast<int>(arguments.integer("--landmarks", 0, 4, 254));
+  if (course != "loop" && (loop_m > 0 || landmarks > 0))
+    throw sim::UsageError("--loop-m and --landmarks are of --course loop; the course is " + course);
   if (course == "stand") {
     world.course = {.waypoints = {{.x_m = 0, .y_m = 0, .stop_s = 86'400}, {.x_m = 1, .y_m = 0, .stop_s = 1}},
                     .landmarks = {}};
@@ -248,19 +279,30 @@ void set_course(sim::Arguments& arguments, sim::VehicleKind kind, sim::World::Op
     world.course = sim::street_course(laps);
   } else if (course == "flight" && flies) {
     world.course = sim::flight_course(laps);
+  } else if (course == "loop" && !car && !flies) {
+    world.course = sim::loop_course(loop_m > 0 ? loop_m : 60, laps, landmarks > 0 ? landmarks : 24);
   } else if (course == "yard" && !car && !flies) {
     world.course = sim::default_course(laps);
   } else {
     throw std::runtime_error("--course " + course + ": for this robot it is " +
                              (flies ? "flight"
                               : car ? "street, road"
-                                    : "yard, road") +
+                                    : "yard, loop, road") +
                              " or stand");
   }
 }
 
-void set_world(sim::Arguments& arguments, sim::VehicleKind kind, sim::World::Options& world) {
-  set_course(arguments, kind, world);
+void set_camera(sim::Arguments& arguments, const sim::Sent& sent, sim::CameraNumbers& camera) {
+  camera.identities = arguments.flag("--ids") || camera.identities;
+  camera.clutter = arguments.real("--clutter", 0, 0, 20);
+  camera.movers = static_cast<int>(arguments.integer("--movers", 0, 0, 50));
+  if ((camera.clutter > 0 || camera.movers > 0) && !sent.landmarks)
+    throw sim::UsageError("--clutter and --movers need a robot that sees landmarks");
+}
+
+void set_world(sim::Arguments& arguments, const sim::Sent& sent, sim::World::Options& world) {
+  set_course(arguments, sent, world);
+  set_camera(arguments, sent, world.parameters.camera);
   if (arguments.flag("--no-wheels")) world.parameters.wheels.rate_hz = 0;
   world.parameters.gnss.rate_hz = counted(arguments, "--gnss-hz", world.parameters.gnss.rate_hz, 100);
   world.parameters.imu.rate_hz = counted(arguments, "--imu-hz", world.parameters.imu.rate_hz, 2000);
@@ -301,7 +343,7 @@ int main(int argc, char** argv) try {
   const sim::Sent sent = sim::sent_to(robot, run.settings);
   set_robot(arguments, sent, run);
   set_place(arguments, sim::parameters_of(robot, run.settings).gnss, memory, run);
-  set_world(arguments, sent.kind, run.world);
+  set_world(arguments, sent, run.world);
   const std::string refused = sim::cannot_act(run.world, robot);
   sim::send_only(sent, run.world);
   run.realtime = arguments.flag("--realtime");

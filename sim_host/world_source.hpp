@@ -66,7 +66,7 @@ class WorldSource {
     frames_.swap(guarded_);
   }
   void introduce() {
-    for (const Landmark& mark : world_.map())
+    for (const Landmark& mark : world_.map_given() ? world_.map() : std::span<const Landmark>{})
       frames_.push_back(bus::frame(
           base_, bus::InMapEntry{.id = mark.id, .x_raw = millimetres(mark.x_m), .y_raw = millimetres(mark.y_m)}));
     const StartPose start = world_.start_pose();

@@ -53,7 +53,7 @@ Recorder::Recorder(const RecorderOptions& options)
       "corr_acc_bias_yz,corr_gyro_bias_xy,corr_gyro_bias_xz,corr_gyro_bias_yz\n");
   innovations_.write("epoch,time_s,estimator,sensor,inst,verdict,dof,nis,ratio,age_ms,landmark,failed\n");
   sensors_.write("epoch,time_s,estimator,sensor,inst,accepted,rejected,nis_mean,age_s\n");
-  status_.write("epoch,time_s,mode,used,faults,reset_ctr,reset_cause\n");
+  status_.write("epoch,time_s,mode,used,faults,reset_ctr,reset_cause,map_faults\n");
   sources_.write("epoch,time_s,estimator,source,state,failed\n");
   map_.write("epoch,time_s,landmark,x_m,y_m,std_x_m,std_y_m,corr_xy,hits,age_s,landmark_state\n");
 }
@@ -263,6 +263,7 @@ void Recorder::status_row(const bus::EstStatus& s) {
   put_name(line_, s.mode);
   line_.put(',').integer(s.used).put(',').integer(s.faults).put(',').integer(s.reset_ctr).put(',');
   put_name(line_, s.reset_cause);
+  line_.put(',').integer(s.map_faults);
   status_.write(line_.put('\n').view());
 }
 

@@ -40,6 +40,8 @@ enum class Stream : std::uint32_t {
   kBarometer,
   kBarometerLatency,
   kJitter,
+  kClutter,
+  kMovers,
 };
 
 class Chance {

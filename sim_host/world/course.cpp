@@ -125,6 +125,30 @@ Course flight_course(int laps) {
   return course;
 }
 
+Course loop_course(double length_m, int laps, int landmarks) {
+  constexpr double kBeside_m = 2;
+  if (!(length_m >= 20) || landmarks < 4 || landmarks > 254)
+    throw std::invalid_argument("a loop is at least 20 m long, with 4 to 254 landmarks");
+  const double radius_m = length_m / 20;
+  const double side_m = (length_m - (2 * kPi - 8) * radius_m) / 4;
+  Course course{.waypoints = {{.x_m = 0, .y_m = 0, .stop_s = 5}}, .landmarks = {}};
+  for (int k = 0; k < laps; ++k)
+    for (const auto& [x, y] :
+         {std::pair{side_m / 2, 0.0}, {side_m / 2, side_m}, {-side_m / 2, side_m}, {-side_m / 2, 0.0}})
+      course.waypoints.push_back({.x_m = x, .y_m = y, .radius_m = radius_m});
+  course.waypoints.push_back({.x_m = 0, .y_m = 0, .stop_s = 5});
+  const Plan plan(course, {});
+  for (int i = 0; i < landmarks; ++i) {
+    const PathPoint at = plan.path((i + 0.5) * length_m / landmarks);
+    const Direction ahead = direction(at.yaw_rad);
+    const double left_m = i % 2 == 0 ? -kBeside_m : kBeside_m;
+    course.landmarks.push_back({.id = static_cast<std::uint8_t>(i + 1),
+                                .x_m = at.x_m - left_m * ahead.sin,
+                                .y_m = at.y_m + left_m * ahead.cos});
+  }
+  return course;
+}
+
 Course circle_course(double radius_m, int turns) {
   const double r = radius_m;
   Course course{.waypoints = {{.x_m = -5, .y_m = 0, .stop_s = 2}}, .landmarks = {{1, 0, r}}};

@@ -48,6 +48,10 @@ struct Course {
 [[nodiscard]] Course street_course(int laps);
 /// Legs for a multicopter at up to 5 m/s, flown so many times, with a hover half way and once a lap.
 [[nodiscard]] Course flight_course(int laps);
+/// A square with rounded corners, `length_m` long in one lap, with so many landmarks in turn 2 m to the right and to
+/// the left of the way; standstill at the start and at the end. From 20 m and 4 landmarks on, 254 landmarks at the
+/// most.
+[[nodiscard]] Course loop_course(double length_m, int laps, int landmarks);
 /// A straight lead-in and full circles to the left, for laws that have closed forms.
 [[nodiscard]] Course circle_course(double radius_m, int turns);
 

@@ -169,6 +169,11 @@ struct CameraNumbers {
   double mount_error_rad = 0.004;  ///< yaw of the mount against the filter's parameter [own]
   double miss_probability = 0.15;
   double wrong_id_probability = 0.005;
+  bool identities = true;                    ///< false: a sighting names no landmark
+  double clutter = 0;                        ///< false sightings a look, on average, anywhere in the field of view
+  int movers = 0;                            ///< obstacles that move among the landmarks and look like them
+  double mover_mps = 0.5;                    ///< speed of each, to and fro on a straight line [own]
+  double mover_way_m = 6;                    ///< length of that line
   double survey_m = 0.015;                   ///< 1 sigma per axis of the landmark map
   double x_b_m = 0, y_b_m = 0, yaw_rad = 0;  ///< where it is mounted
   base::Micros phase{33'500};

@@ -352,28 +352,79 @@ Camera::Camera(const CameraNumbers& parameters, std::vector<Landmark> landmarks,
       map_{landmarks_},
       noise_{seed, Stream::kCamera},
       wrong_{seed, Stream::kCameraWrong},
-      outlier_{seed, Stream::kFaultOutlier} {
+      outlier_{seed, Stream::kFaultOutlier},
+      clutter_{seed, Stream::kClutter},
+      mover_noise_{seed, Stream::kMovers} {
   Chance survey{seed, Stream::kSurvey};
   for (auto& landmark : map_) {
     landmark.x_m += survey.normal(parameters.survey_m);
     landmark.y_m += survey.normal(parameters.survey_m);
   }
+  place_movers(mover_noise_);
 }
 
-std::vector<sensor::LandmarkSighting> Camera::sample(const Truth& truth, base::Micros now, const Faults& faults) {
-  std::vector<sensor::LandmarkSighting> sightings;
+/// Each begins beside a landmark, on a line of any direction.
+void Camera::place_movers(Chance& chance) {
+  for (int i = 0; i < parameters_.movers && !landmarks_.empty(); ++i) {
+    const auto nearest = static_cast<std::size_t>(static_cast<double>(landmarks_.size()) * chance.uniform());
+    const double x_m = landmarks_[nearest].x_m + chance.uniform(-2, 2);
+    const double y_m = landmarks_[nearest].y_m + chance.uniform(-2, 2);
+    const Direction along = direction(chance.uniform(-kPi, kPi));
+    movers_.push_back({x_m, y_m, along, chance.uniform(0, 2 * parameters_.mover_way_m)});
+  }
+}
+
+Camera::Line Camera::line_from(const Place& eye, double x_m, double y_m) const {
+  const double dx = x_m - eye.x_m, dy = y_m - eye.y_m;
+  const double range_m = sim::sqrt(dx * dx + dy * dy);
+  const double bearing_rad = wrap(sim::atan2(dy, dx) - eye.yaw_rad - parameters_.yaw_rad);
+  return {range_m, bearing_rad,
+          range_m <= parameters_.range_max_m && magnitude(bearing_rad) <= 0.5 * parameters_.field_of_view_rad};
+}
+
+sensor::LandmarkSighting Camera::nameless(double range_m, double bearing_rad) {
+  return {
+      .landmark = kNoLandmark, .range_m = single(range_m > 0 ? range_m : 0), .bearing_rad = single(wrap(bearing_rad))};
+}
+
+void Camera::add_movers(const Place& eye, base::Micros now, std::vector<Seen>& seen) {
+  const double way_m = parameters_.mover_mps * static_cast<double>(now.us) * 1e-6;
+  const double round_m = 2 * parameters_.mover_way_m;
+  for (const Mover& mover : movers_) {
+    const double rounds = (mover.phase_m + way_m) / round_m;
+    const double on_m = round_m * (rounds - sim::floor(rounds));
+    const double at_m = on_m < parameters_.mover_way_m ? on_m : round_m - on_m;
+    const Line line = line_from(eye, mover.x_m + at_m * mover.along.cos, mover.y_m + at_m * mover.along.sin);
+    const double range_noise =
+        mover_noise_.normal(parameters_.sigma_range_m + parameters_.sigma_range_per_m * line.range_m);
+    const double bearing_noise = mover_noise_.normal(parameters_.sigma_bearing_rad);
+    if (line.visible) seen.push_back({nameless(line.range_m + range_noise, line.bearing_rad + bearing_noise)});
+  }
+}
+
+void Camera::add_clutter(std::vector<Seen>& seen) {
+  if (!(parameters_.clutter > 0)) return;
+  const double whole = sim::floor(parameters_.clutter);
+  const int count = static_cast<int>(whole) + (clutter_.happens(parameters_.clutter - whole) ? 1 : 0);
+  const double half_rad = 0.5 * parameters_.field_of_view_rad;
+  for (int i = 0; i < count; ++i) {
+    const double range_m = clutter_.uniform(0.5, parameters_.range_max_m);
+    seen.push_back({nameless(range_m, clutter_.uniform(-half_rad, half_rad))});
+  }
+}
+
+std::vector<Camera::Seen> Camera::sample(const Truth& truth, base::Micros now, const Faults& faults) {
+  std::vector<Seen> seen;
   const Direction d = direction(truth.yaw_rad);
-  const double x_m = truth.x_m + d.cos * parameters_.x_b_m - d.sin * parameters_.y_b_m;
-  const double y_m = truth.y_m + d.sin * parameters_.x_b_m + d.cos * parameters_.y_b_m;
+  const Place eye{.x_m = truth.x_m + d.cos * parameters_.x_b_m - d.sin * parameters_.y_b_m,
+                  .y_m = truth.y_m + d.sin * parameters_.x_b_m + d.cos * parameters_.y_b_m,
+                  .yaw_rad = truth.yaw_rad};
   for (std::size_t i = 0; i < landmarks_.size(); ++i) {
-    const double dx = landmarks_[i].x_m - x_m;
-    const double dy = landmarks_[i].y_m - y_m;
-    const double range_m = sim::sqrt(dx * dx + dy * dy);
-    const double bearing_rad = wrap(sim::atan2(dy, dx) - truth.yaw_rad - parameters_.yaw_rad);
-    if (range_m > parameters_.range_max_m || magnitude(bearing_rad) > 0.5 * parameters_.field_of_view_rad) continue;
+    const Line line = line_from(eye, landmarks_[i].x_m, landmarks_[i].y_m);
+    if (!line.visible) continue;
 
     const bool missed = noise_.happens(parameters_.miss_probability);
-    const double range_noise = noise_.normal(parameters_.sigma_range_m + parameters_.sigma_range_per_m * range_m);
+    const double range_noise = noise_.normal(parameters_.sigma_range_m + parameters_.sigma_range_per_m * line.range_m);
     const double bearing_noise = noise_.normal(parameters_.sigma_bearing_rad);
     const bool mistaken = wrong_.happens(parameters_.wrong_id_probability);
     const auto other = static_cast<std::size_t>(static_cast<double>(landmarks_.size()) * wrong_.uniform());
@@ -383,17 +434,18 @@ std::vector<sensor::LandmarkSighting> Camera::sample(const Truth& truth, base::M
         outlier_.uniform(-FaultNumbers::kOutlierBearing_rad, FaultNumbers::kOutlierBearing_rad);
     if (missed) continue;
 
-    double seen_m = range_m * (1 + parameters_.scale_error) + range_noise;
-    double seen_rad = bearing_rad - parameters_.mount_error_rad + bearing_noise;
+    double seen_m = line.range_m * (1 + parameters_.scale_error) + range_noise;
+    double seen_rad = line.bearing_rad - parameters_.mount_error_rad + bearing_noise;
     std::size_t named = mistaken ? other : i;
     if (faults.active(Fault::kLandmarkWrongId, now) && (named ^ 1U) < landmarks_.size()) named ^= 1U;
     if (outlier && faults.active(Fault::kLandmarkOutlier, now))
       seen_m += outlier_range_m, seen_rad += outlier_bearing_rad;
-    sightings.push_back({.landmark = landmarks_[named].id,
-                         .range_m = single(seen_m > 0 ? seen_m : 0),
-                         .bearing_rad = single(wrap(seen_rad))});
+    seen.push_back({.sighting = nameless(seen_m, seen_rad), .landmark = landmarks_[i].id});
+    if (parameters_.identities) seen.back().sighting.landmark = landmarks_[named].id;
   }
-  return sightings;
+  add_movers(eye, now, seen);
+  add_clutter(seen);
+  return seen;
 }
 
 }  // namespace tetap::sim

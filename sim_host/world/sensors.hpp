@@ -135,20 +135,44 @@ class Barometer {
   GaussMarkov drift_;
 };
 
-/// Range and bearing to landmarks with known identity.
+/// Range and bearing to landmarks, and to what passes for one: clutter and moving obstacles.
 class Camera {
  public:
+  static constexpr std::uint8_t kNoLandmark = 0xFF;
+  struct Seen {
+    sensor::LandmarkSighting sighting;
+    std::uint8_t landmark = kNoLandmark;  ///< truly seen; kNoLandmark: clutter or a moving obstacle
+  };
   Camera(const CameraNumbers& parameters, std::vector<Landmark> landmarks, std::uint64_t seed);
-  [[nodiscard]] std::vector<sensor::LandmarkSighting> sample(const Truth& truth, base::Micros now,
-                                                             const Faults& faults);
+  [[nodiscard]] std::vector<Seen> sample(const Truth& truth, base::Micros now, const Faults& faults);
   /// The surveyor's map: positions with an error of a few centimetres.
   [[nodiscard]] const std::vector<Landmark>& map() const { return map_; }
 
  private:
+  /// An obstacle goes from `x_m`, `y_m` along `along` and back.
+  struct Mover {
+    double x_m, y_m;
+    Direction along;
+    double phase_m;  ///< way behind it at the start
+  };
+  struct Line {
+    double range_m, bearing_rad;
+    bool visible;
+  };
+  struct Place {
+    double x_m, y_m, yaw_rad;  ///< place of the mount, heading of the body
+  };
+  [[nodiscard]] Line line_from(const Place& eye, double x_m, double y_m) const;
+  void place_movers(Chance& chance);
+  void add_movers(const Place& eye, base::Micros now, std::vector<Seen>& seen);
+  void add_clutter(std::vector<Seen>& seen);
+  [[nodiscard]] static sensor::LandmarkSighting nameless(double range_m, double bearing_rad);
+
   CameraNumbers parameters_;
   std::vector<Landmark> landmarks_;
   std::vector<Landmark> map_;
-  Chance noise_, wrong_, outlier_;
+  std::vector<Mover> movers_;
+  Chance noise_, wrong_, outlier_, clutter_, mover_noise_;
 };
 
 }  // namespace tetap::sim

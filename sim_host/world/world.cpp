@@ -47,6 +47,7 @@ World::World(const Options& options, std::uint64_t seed)
       faults_{options.faults},
       origin_{options.origin},
       surveyed_{options.surveyed},
+      map_given_{options.map_given},
       plan_{std::make_unique<const Plan>(options.course, options.limits)},
       earth_{std::make_unique<const Earth>(options.place.value_or(options.origin))},
       to_map_{*earth_, Earth{options.origin}},
@@ -169,8 +170,10 @@ void World::step() {
   }
   if (due(n.camera.rate_hz, n.camera.phase, now_)) {
     const base::Micros latency = camera_latency_.between(n.camera.latency_min, n.camera.latency_max);
-    for (const auto& sighting : camera_.sample(truth_here(), now_, faults_))
-      emit(sighting, sighting_sequence_++, {}, latency);
+    for (const Camera::Seen& seen : camera_.sample(truth_here(), now_, faults_)) {
+      sightings_.push_back({.stamp = start_ + now_, .landmark = seen.landmark});
+      emit(seen.sighting, sighting_sequence_++, {}, latency);
+    }
   }
   if (due(n.magnetometer.rate_hz, n.magnetometer.phase, now_))
     emit(magnetometer_.sample(truth_here(), now_, faults_), magnetometer_sequence_++, {},

@@ -25,6 +25,12 @@ struct StartPose {
   double sigma_m = 0, sigma_yaw_rad = 0;
 };
 
+/// A sighting is of a landmark, or of Camera::kNoLandmark.
+struct TrueSighting {
+  base::Micros stamp;
+  std::uint8_t landmark = Camera::kNoLandmark;
+};
+
 /// Position, velocity and attitude in the axes of another local frame.
 [[nodiscard]] Truth in_frame(Truth truth, const FrameChange& change);
 
@@ -35,6 +41,7 @@ class World {
     bool inertial = false;   ///< not mismatched, too: what an inertial filter models, see matched_inertial()
     bool as_given = false;   ///< `parameters` hold as they are, whatever the two above are
     bool latency = true;     ///< false: everything arrives at its stamp
+    bool map_given = true;   ///< false: the robot makes its own map of the landmarks
     Parameters parameters;
     Course course = default_course();
     CourseLimits limits;
@@ -64,6 +71,9 @@ class World {
   /// Start pose that a filter may be given.
   [[nodiscard]] StartPose start_pose() const;
   [[nodiscard]] std::span<const Landmark> map() const { return map_; }
+  [[nodiscard]] bool map_given() const { return map_given_; }
+  /// All sightings so far, in the order in which they were made.
+  [[nodiscard]] std::span<const TrueSighting> sightings() const { return sightings_; }
   [[nodiscard]] const GeodeticOrigin& origin() const { return origin_; }
   [[nodiscard]] const Parameters& parameters() const { return parameters_; }
   [[nodiscard]] const Faults& faults() const { return faults_; }
@@ -86,7 +96,7 @@ class World {
   base::Micros start_;
   Faults faults_;
   GeodeticOrigin origin_;
-  bool surveyed_;
+  bool surveyed_, map_given_;
   // Behind pointers, because sensors and vehicle point at them and a World may move.
   std::unique_ptr<const Plan> plan_;
   std::unique_ptr<const Earth> earth_;  ///< local frame of the course
@@ -97,6 +107,7 @@ class World {
   Gnss gnss_;
   Camera camera_;
   std::vector<Landmark> map_;
+  std::vector<TrueSighting> sightings_;
   Magnetometer magnetometer_;
   Barometer barometer_;
   Chance imu_latency_, wheel_latency_, gnss_latency_, camera_latency_, magnetometer_latency_, barometer_latency_, loss_;

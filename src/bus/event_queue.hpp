@@ -17,7 +17,10 @@ namespace tetap::bus {
 class EventQueue {
  public:
   void power_on() { size_ = first_ = 0; }
-  void tick_begins() { first_ = kNone; }
+  void tick_begins() {
+    first_ = kNone;
+    ++tick_;
+  }
   void tick_ends() { first_ = size_; }
 
   /// When the queue is full an accepted one makes room for one that was not; else the last refused has none.
@@ -25,10 +28,12 @@ class EventQueue {
            base::Micros now, Counters& counters);
 
   [[nodiscard]] bool empty() const { return size_ == 0; }
-  /// The oldest; not empty.
-  [[nodiscard]] bus::EstInnov take() {
-    const bus::EstInnov first = queue_[0];
+  /// The oldest, its age counted to this tick; not empty.
+  [[nodiscard]] bus::EstInnov take(std::int32_t period_us) {
+    bus::EstInnov first = queue_[0];
     remove(0);
+    const auto waited = static_cast<std::uint8_t>(tick_ - first.epoch);
+    first.age_s += base::seconds(base::Micros{std::int64_t{waited} * period_us});
     return first;
   }
 
@@ -46,6 +51,7 @@ class EventQueue {
 
   std::array<bus::EstInnov, kCapacity> queue_{};
   std::size_t size_ = 0;
+  std::uint8_t tick_ = 0;  ///< number of the last tick; a record in the queue has its own tick in `epoch`
   std::size_t first_ = 0;  ///< begin of the ordered events since the last tick; within a tick there are none
 };
 
@@ -67,7 +73,7 @@ inline void EventQueue::add(const estimators::Innovation& innovation, const sens
                               .ratio = ratio_of(innovation),
                               .id = innovation.landmark,
                               .check = innovation.failed,
-                              .epoch = 0};
+                              .epoch = tick_};
   if (size_ == kCapacity) {
     ++counters.events_dropped;
     if (innovation.verdict == sensor::Verdict::kAccepted) return;

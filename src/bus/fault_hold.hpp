@@ -4,7 +4,10 @@
 
 #include "bus/counters.hpp"
 #include "bus/messages.hpp"
+#include "estimators/own_map.hpp"
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 
 namespace tetap::bus {
@@ -49,6 +52,36 @@ class FaultHold {
   Counters last_;            ///< as they were an epoch ago
   std::uint32_t until_ = 0;  ///< epoch
   std::uint16_t bits_ = 0;   ///< raised since
+};
+
+/// A bit per MapFault, for a second after its counter in the report has moved.
+class MapFaultHold {
+ public:
+  /// Once an epoch; `second` is how many epochs one lasts. A counter that fell is that of a map begun anew.
+  void note(const estimators::MapReport& now, std::uint32_t epoch, std::uint32_t second) {
+    const std::array<std::uint32_t, kFaults> counts{now.refused, now.ambiguous, now.jobs_aborted};
+    for (std::size_t i = 0; i < kFaults; ++i) {
+      if (counts[i] > counts_[i]) until_[i] = epoch + second;
+      counts_[i] = counts[i];
+    }
+  }
+  [[nodiscard]] std::uint8_t faults(std::uint32_t epoch) const {
+    unsigned bits = 0;
+    for (std::size_t i = 0; i < kFaults; ++i) bits |= epoch < until_[i] ? 1U << i : 0U;
+    return static_cast<std::uint8_t>(bits);
+  }
+
+ private:
+  static constexpr std::size_t kFaults = 3;
+  static_assert(static_cast<int>(MapFault::kMapFull) == 0 && static_cast<int>(MapFault::kAssociationAmbiguous) == 1 &&
+                static_cast<int>(MapFault::kJobsAborted) == 2);
+  std::array<std::uint32_t, kFaults> counts_{};  ///< as they were an epoch ago
+  std::array<std::uint32_t, kFaults> until_{};   ///< epoch
+};
+/// Its place in a node without a map of its own.
+struct NoMapFaults {
+  void note(const estimators::MapReport&, std::uint32_t, std::uint32_t) {}
+  [[nodiscard]] std::uint8_t faults(std::uint32_t) const { return 0; }
 };
 
 }  // namespace tetap::bus

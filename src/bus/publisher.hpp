@@ -37,7 +37,8 @@ struct Summary {
   bool origin_known = false;
   std::uint16_t used = 0;  ///< a bit per sensor kind accepted within the last second
   bool rejecting = false;
-  std::uint16_t faults = 0;  ///< bits of sensor::Fault that estimators see
+  std::uint16_t faults = 0;     ///< bits of sensor::Fault that estimators see
+  std::uint8_t map_faults = 0;  ///< bits of MapFault
   std::uint8_t resets = 0;
   sensor::ResetCause cause = sensor::ResetCause::kPowerOn;
   bool restarted = false;  ///< within the last second, by ourselves
@@ -308,7 +309,8 @@ void Publisher<N>::status(const Summary& s, const LoopHealth& loop, Send& send) 
                                   .faults = faults.bits,
                                   .reset_ctr = s.resets,
                                   .reset_cause = s.cause,
-                                  .unlogged = loop.unlogged}),
+                                  .unlogged = loop.unlogged,
+                                  .map_faults = s.map_faults}),
       send);
 }
 
@@ -389,7 +391,7 @@ template <std::size_t N>
 template <class Send>
 void Publisher<N>::events(Send& send) {
   if (events_.empty() || !every(parameters_.publish.event_every)) return;
-  bus::EstInnov event = events_.take();
+  bus::EstInnov event = events_.take(parameters_.loop.period_us);
   event.epoch = tag();
   put(event, send);
 }

@@ -156,6 +156,8 @@ class Node {
   base::Micros restarted_at_;
   std::uint8_t jumps_ = 0;  ///< steps of the primary estimator that resets_ counts
   estimators::AttitudeDisagreement disagreement_;
+  using MapFaults = std::conditional_t<Estimators::kMakesMap, bus::MapFaultHold, bus::NoMapFaults>;
+  [[no_unique_address]] MapFaults map_faults_;
 };
 
 template <class Estimators, std::size_t Capacity>
@@ -168,6 +170,7 @@ void Node<Estimators, Capacity>::power_on(base::Micros t) {
   wraps_.power_on();
   counters_ = {};
   publisher_.power_on();
+  map_faults_ = {};
   pending_reset_ = {};
   pending_pose_.reset();
   now_ = restarted_at_ = t;
@@ -204,6 +207,7 @@ void Node<Estimators, Capacity>::resume(const Node& other) {
   restarted_at_ = other.restarted_at_;
   jumps_ = other.jumps_;
   disagreement_ = other.disagreement_;
+  map_faults_ = other.map_faults_;
 }
 
 template <class Estimators, std::size_t Capacity>
@@ -282,7 +286,11 @@ void Node<Estimators, Capacity>::tick(base::Micros t, const bus::LoopHealth& loo
           instance, [&] { return lane.inertial(context()); }, [&] { return lane.sources(context()); }, send);
     if constexpr (requires { lane.attitude(context()); })
       publisher_.attitude(instance, in_map(lane.attitude(context())), apart, send);
-    if constexpr (estimators::MakesMap<E>) publisher_.own_map(lane.map_maker(), send);
+    if constexpr (estimators::MakesMap<E>) {
+      map_faults_.note(lane.map_maker().own_map(), publisher_.epoch(),
+                       static_cast<std::uint32_t>(1'000'000 / parameters_.loop.period_us));
+      publisher_.own_map(lane.map_maker(), send);
+    }
     ++instance;
   });
   publisher_.status(summary(estimates[kPrimary]), loop, send);
@@ -478,6 +486,7 @@ bus::Summary Node<Estimators, Capacity>::summary(const estimators::Estimate& est
       faults.raise(sensor::Fault::kMagneticDisturbance, lane.attitude(context()).field_disturbed);
   });
   s.faults = faults.bits;
+  s.map_faults = map_faults_.faults(publisher_.epoch());
   for (const estimators::SensorStatistics& stat : primary.statistics()) {
     const bool used = stat.accepted > 0 && now_ - stat.last_accepted < base::Micros{1'000'000};
     if (used) s.used = static_cast<std::uint16_t>(s.used | (1U << static_cast<unsigned>(stat.sensor)));

@@ -167,6 +167,17 @@ consteval void require(const Rule& rule, const Parameters& parameters) {
 }
 }  // namespace detail
 
+/// The 16 ids of a robot's own map begin 64 above its block, so blocks of such robots are 128 apart.
+[[nodiscard]] constexpr bool has_map_ids(std::uint32_t can_base) { return can_base % 128 == 0; }
+inline constexpr const char* kMapIdsRule = "a multiple of 128, for its own map has ids behind the block of 64";
+
+/// To be asserted of a robot and its parameters.
+consteval bool checked_map_ids(bool makes_map, const Parameters& parameters) {
+  detail::require_rule(!makes_map || has_map_ids(parameters.can_base), "can_base", parameters.can_base, "",
+                       kMapIdsRule);
+  return true;
+}
+
 consteval Parameters checked(const Parameters& parameters) {
   for (const Row& row : kTable)
     for (std::size_t i = 0; i < row.elements; ++i) {

@@ -14,7 +14,24 @@ EstInnov record_of(const estimators::Innovation& innovation) {
   sensor::Sample sample;
   sample.sensor = sensor::Sensor::kGnssPosition;
   queue.add(innovation, sample, 0, {}, counters);
-  return queue.take();
+  return queue.take(10'000);
+}
+
+/// A record may wait for its frame: its age counts to the tick of that frame.
+TEST(EventQueue, TheAgeOfARecordThatWaitedCountsToItsFrame) {
+  EventQueue queue;
+  Counters counters;
+  sensor::Sample sample;
+  sample.stamp = base::Micros{1'000'000};
+  for (int tick = 0; tick < 253; ++tick) queue.tick_begins(), queue.tick_ends();
+  queue.tick_begins();
+  queue.add({}, sample, 0, base::Micros{1'200'000}, counters);
+  queue.add({}, sample, 0, base::Micros{1'200'000}, counters);
+  EXPECT_NEAR(static_cast<double>(queue.take(10'000).age_s), 0.2, 1e-6);
+  queue.tick_ends();
+  for (int tick = 0; tick < 7; ++tick) queue.tick_begins(), queue.tick_ends();
+  EXPECT_NEAR(static_cast<double>(queue.take(10'000).age_s), 0.27, 1e-6);
+  EXPECT_TRUE(queue.empty());
 }
 
 TEST(EventQueue, RatioIsThatOfTheFailedCheckElseOfTheInnovationGate) {

@@ -130,9 +130,15 @@ int aborted_by(const Frames& frames) {
   BenchOf<Robot> bench(n);
   for (int i = 0; i < 80; ++i) bench.epoch({body_speed(bench.now_us + 5000, 0.2F, 0.0F, i)});
   EXPECT_GT(last<bus::EstDiagMapper>(bench.idle(96))->work_left, 0);
+  const auto said = [](const Frames& out) {
+    return (last<bus::EstStatus>(out)->map_faults >> static_cast<unsigned>(bus::MapFault::kJobsAborted) & 1U) != 0;
+  };
+  EXPECT_FALSE(said(bench.idle(12)));
   bench.epoch(frames);
+  EXPECT_TRUE(said(bench.idle(12)));
   const auto page = last<bus::EstDiagMapper>(bench.idle(96));
   EXPECT_EQ(page->work_left, 0);
+  EXPECT_FALSE(said(bench.idle(12))) << "a second later";
   return page->jobs_aborted;
 }
 

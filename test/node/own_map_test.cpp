@@ -1,121 +1,28 @@
 // SPDX-License-Identifier: Apache-2.0
 // Robots that make a map of their own, as frames in and frames out: the map on the bus, set pose, reset, a full map,
 // late sightings.
-#include "bench.hpp"
-#include "estimators/mapping/planar_mapper.hpp"
+#include "mapping_bench.hpp"
 
 #include <gtest/gtest.h>
-#include <algorithm>
 #include <cmath>
-#include <map>
 #include <memory>
 #include <random>
 
 namespace tetap::test {
 namespace {
 
-using Ekf = node::Estimators<estimators::Odometry, estimators::EkfSlam30>;
-using Fast = node::Estimators<estimators::Odometry, estimators::FastSlam100>;
 static_assert(Ekf::kMakesMap && !Ekf::kUsesMap);
 static_assert(node::RecordsLater<estimators::EkfSlam30> && node::DigestsState<estimators::EkfSlam30>);
 static_assert(sizeof(estimators::EkfSlam30) < 32 * 1024 && sizeof(estimators::FastSlam100) < 40 * 1024,
               "the class of 64 kB holds either with the window and the stack");
 
-constexpr std::uint32_t kBase = 0x300;
-struct Place {
-  double x, y;
-};
-
-/// A robot on a circle of 3 m around the origin, at 0.5 m/s, among posts; sightings of what is within 6 m ten times a
-/// second, all of one stamp.
-template <class Estimators>
-class Mapping {
- public:
-  explicit Mapping(int posts = 8) : bench(std::make_unique<BenchOf<Estimators>>(numbers())) {
-    for (int i = 0; i < posts; ++i) {
-      const double angle = 2 * M_PI * i / posts;
-      truth[i + 1] = {(i % 2 == 0 ? 5.0 : 4.0) * std::cos(angle), (i % 2 == 0 ? 5.0 : 4.0) * std::sin(angle)};
-    }
-    for (const auto& frame : set_pose(1, 3000, 0, static_cast<float>(M_PI / 2), 0.0F, 0.0F)) now.push_back(frame);
-  }
-  /// A node keeps a reference to its parameters.
-  static const param::Parameters& numbers() {
-    static const param::Parameters n = [] {
-      param::Parameters p = kNumbers;
-      p.landmark = {.sigma_range_m = 0.05F, .sigma_bearing_rad = 0.02F, .gate_scale = 1.5F};
-      return p;
-    }();
-    return n;
-  }
-
-  /// Sightings are true but for a noise of `share` of their sigmas; `late_us`: they arrive so much later.
-  void drive(int epochs, double share = 1, std::int64_t late_us = 0, bool backwards = false) {
-    for (int i = 0; i < epochs; ++i, ++tick) {
-      const std::int64_t at_us = bench->now_us + 5000;
-      const double t = 1e-6 * static_cast<double>(at_us - bench->kStart_us), yaw = M_PI / 2 + t * kRate;
-      now.push_back(body_speed(at_us, static_cast<float>(kSpeed), static_cast<float>(kRate), tick));
-      Frames seen;
-      for (const auto& [id, post] : tick % 10 == 9 ? truth : std::map<int, Place>{}) {
-        const double dx = post.x - 3 * std::cos(t * kRate), dy = post.y - 3 * std::sin(t * kRate);
-        std::normal_distribution<double> normal(0, share);
-        const double range = std::hypot(dx, dy) + 0.05 * normal(draw);
-        const double bearing = std::remainder(std::atan2(dy, dx) - yaw + 0.02 * normal(draw), 2 * M_PI);
-        if (range < 6)
-          seen.push_back(sighting(at_us, id, static_cast<float>(range), static_cast<float>(bearing), tick / 10));
-      }
-      if (backwards) std::reverse(seen.begin(), seen.end());
-      for (const auto& frame : seen) waiting.push_back({bench->now_us + late_us, frame});
-      while (!waiting.empty() && waiting.front().first <= bench->now_us) {
-        now.push_back(waiting.front().second);
-        waiting.erase(waiting.begin());
-      }
-      step();
-    }
-  }
-  void step() {
-    out = bench->epoch(now);
-    now.clear();
-    for (const auto& frame : out) {
-      if (const auto one = message<bus::EstLandmark>(frame))
-        map[one->id] = {one->x_raw * bus::EstLandmark::kXScale, one->y_raw * bus::EstLandmark::kYScale};
-      if (const auto one = message<bus::EstDiagMapper>(frame)) page = *one;
-      if (const auto one = message<bus::EstInnov>(frame))
-        ++verdicts[one->sensor == sensor::Sensor::kRangeBearing ? one->verdict : sensor::Verdict::kNotUsed];
-      if (const auto one = message<bus::EstStatus>(frame)) status = *one;
-      if (const auto one = message<bus::EstStateCrc>(frame)) crc = one->crc;
-    }
-  }
-  template <class Message>
-  static std::optional<Message> message(const base::CanFrame& frame) {
-    if (frame.id != kBase + bus::offset_of<Message>()) return std::nullopt;
-    return bus::decode<Message>(bus::payload(frame));
-  }
-  [[nodiscard]] double worst_landmark_m() const {
-    double worst = 0;
-    for (const auto& [id, at] : map) worst = std::max(worst, std::hypot(at.x - truth.at(id).x, at.y - truth.at(id).y));
-    return worst;
-  }
-  [[nodiscard]] Place robot() const {
-    const auto pos = last<bus::EstPos>(out, 1);
-    return {pos->x_raw * bus::EstPos::kXScale, pos->y_raw * bus::EstPos::kYScale};
-  }
-
-  static constexpr double kSpeed = 0.5, kRate = kSpeed / 3;
-  std::unique_ptr<BenchOf<Estimators>> bench;
-  std::map<int, Place> truth, map;  ///< posts by number; as last published
-  bus::EstDiagMapper page;
-  bus::EstStatus status;
-  std::map<sensor::Verdict, int> verdicts;
-  std::uint32_t crc = 0;
-  Frames now, out;
-  std::vector<std::pair<std::int64_t, base::CanFrame>> waiting;
-  std::mt19937 draw{4};
-  int tick = 0;
-};
-
 template <class Estimators>
 class OwnMap : public testing::Test {};
 using Mappers = testing::Types<Ekf, Fast>;
+
+bool says(const bus::EstStatus& status, bus::MapFault fault) {
+  return (status.map_faults >> static_cast<unsigned>(fault) & 1U) != 0;
+}
 TYPED_TEST_SUITE(OwnMap, Mappers);
 
 TYPED_TEST(OwnMap, GoesOutOnTheBusAndIsTrue) {
@@ -130,6 +37,7 @@ TYPED_TEST(OwnMap, GoesOutOnTheBusAndIsTrue) {
   EXPECT_EQ(run.verdicts[sensor::Verdict::kPending], 0);  // fuse()'s own word is no record
   EXPECT_GT(run.verdicts[sensor::Verdict::kAccepted], 1000);
   EXPECT_EQ(run.status.mode, sensor::Mode::kNominal);
+  EXPECT_EQ(run.map_faults, 0U);
 }
 
 TEST(OwnMapFrames, HaveTheLayoutOfAMapEntry) {
@@ -199,7 +107,89 @@ TYPED_TEST(OwnMap, AFullMapRefusesCountsAndSays) {
   EXPECT_GT(run.page.map_refused, 100);
   EXPECT_GT(run.verdicts[sensor::Verdict::kNoRoom], 10);
   EXPECT_NE(run.status.faults & 1U << static_cast<unsigned>(sensor::Fault::kCapacity), 0);
+  EXPECT_NE(run.map_faults & 1U << static_cast<unsigned>(bus::MapFault::kMapFull), 0U);
   EXPECT_LT(run.worst_landmark_m(), 0.3);
+}
+
+/// A sighting between two posts half a metre apart names neither: it changes nothing, is counted and said for a second.
+TEST(OwnMapWithoutIdentities, AnAmbiguousSightingIsSaidAndCounted) {
+  auto bench = std::make_unique<BenchOf<Ekf>>(Mapping<Ekf>::numbers());
+  bench->epoch(set_pose(1, 0, 0, 0, 0.0F, 0.0F));
+  const auto look = [&](int id, float range_m, float bearing_rad, int seq) {
+    const auto at_us = bench->now_us + 5000;
+    return bench->epoch({body_speed(at_us, 0, 0, seq), sighting(at_us, id, range_m, bearing_rad, seq)});
+  };
+  for (int i = 0; i < 10; ++i) look(1, 4, 0.0625F, 2 * i), look(2, 4, -0.0625F, 2 * i + 1);
+  bus::EstStatus status = *last<bus::EstStatus>(bench->idle(130));
+  EXPECT_FALSE(says(status, bus::MapFault::kAssociationAmbiguous));
+  look(0xFF, 4, 0, 1);
+  const Frames out = bench->idle(60);
+  status = *last<bus::EstStatus>(out);
+  EXPECT_TRUE(says(status, bus::MapFault::kAssociationAmbiguous));
+  EXPECT_FALSE(says(status, bus::MapFault::kMapFull));
+  int ambiguous = 0;
+  for (const auto& one : all<bus::EstInnov>(out)) ambiguous += one.verdict == sensor::Verdict::kAmbiguous ? 1 : 0;
+  EXPECT_EQ(ambiguous, 1);
+  const Frames later = bench->idle(200);
+  EXPECT_FALSE(says(*last<bus::EstStatus>(later), bus::MapFault::kAssociationAmbiguous));
+  EXPECT_EQ(last<bus::EstDiagMapper>(later)->ambiguous, 1);
+  EXPECT_EQ(last<bus::EstDiagMapper>(later)->map_size, 2);
+}
+
+/// Two sightings of one post in one stamp: one landmark, and each sighting has a record of its own.
+TYPED_TEST(OwnMap, TwoSightingsOfOnePostInOneStampMakeOneLandmark) {
+  auto bench = std::make_unique<BenchOf<TypeParam>>(Mapping<TypeParam>::numbers());
+  bench->epoch(set_pose(1, 0, 0, 0, 0.0F, 0.0F));
+  Frames out;
+  for (int i = 0; i < 4; ++i) {
+    const auto at_us = bench->now_us + 5000;
+    for (const auto& frame : bench->epoch({body_speed(at_us, 0, 0, i), sighting(at_us, 7, 3, 0.1F, 2 * i),
+                                           sighting(at_us, 7, 3.01F, 0.1F, 2 * i + 1)}))
+      out.push_back(frame);
+  }
+  for (const auto& frame : bench->idle(130)) out.push_back(frame);
+  EXPECT_EQ(last<bus::EstDiagMapper>(out)->map_size, 1);
+  std::map<sensor::Verdict, int> verdicts;
+  for (const auto& one : all<bus::EstInnov>(out))
+    if (one.sensor == sensor::Sensor::kRangeBearing) ++verdicts[one.verdict];
+  EXPECT_EQ(verdicts[sensor::Verdict::kNewLandmark] + verdicts[sensor::Verdict::kPending], 2);
+  EXPECT_EQ(verdicts[sensor::Verdict::kAccepted], 6);
+}
+
+/// A sighting behind the window: refused, counted, said; the map stays as it was.
+TYPED_TEST(OwnMap, ASightingBehindTheWindowIsTooLate) {
+  Mapping<TypeParam> run;
+  run.drive(400);
+  const auto before = run.map;
+  const auto held = run.page.map_size;
+  for (int i = 0; i < 5; ++i) {
+    run.now.push_back(sighting(run.bench->now_us - 300'000, 99, 3, 0.2F, i));
+    run.step();
+  }
+  run.status = *last<bus::EstStatus>(run.bench->idle(20));
+  EXPECT_NE(run.status.faults & 1U << static_cast<unsigned>(sensor::Fault::kTooLate), 0);
+  for (int i = 0; i < 100; ++i) run.step();
+  EXPECT_EQ(run.page.map_size, held);
+  EXPECT_EQ(run.map.count(99), 0U);
+  for (const auto& [id, at] : before) EXPECT_LT(std::hypot(run.map.at(id).x - at.x, run.map.at(id).y - at.y), 0.05);
+  EXPECT_GE(run.verdicts[sensor::Verdict::kTooLate], 1);
+  EXPECT_EQ(last<bus::EstDiagOrder>(run.bench->idle(130))->too_late, 5);
+}
+
+/// A full map, a set pose and a reset of the map in one tick: the reset first, so that the pose is as it was set.
+TYPED_TEST(OwnMap, ResetAndSetPoseOfAFullMapInOneTick) {
+  constexpr int kPlaces = std::is_same_v<TypeParam, Ekf> ? 30 : 15;
+  Mapping<TypeParam> run(kPlaces + 2);
+  run.drive(2400, 0.2);
+  ASSERT_EQ(run.page.map_size, kPlaces);
+  run.now.push_back(in(bus::protect(bus::CmdReset{.ctr = 5, .what = bus::ResetWhat::kOwnMap})));
+  for (const auto& frame : set_pose(6, 20'000, 10'000, 0.5F, 0.01F, 0.001F)) run.now.push_back(frame);
+  run.step();
+  EXPECT_NEAR(run.robot().x, 20, 0.05);
+  EXPECT_NEAR(run.robot().y, 10, 0.05);
+  for (int i = 0; i < 130; ++i) run.step();
+  EXPECT_EQ(run.page.map_size, 0);
+  EXPECT_FALSE(says(run.status, bus::MapFault::kMapFull));
 }
 
 /// Any bits in sightings and speeds, set poses and resets in between: the estimate stays a number with a covariance.

@@ -142,6 +142,30 @@ TEST(Course, laps_follow_each_other_with_a_standstill_between) {
   EXPECT_EQ(standstills, 7);  // start, and twice a lap
 }
 
+TEST(Course, a_loop_is_as_long_as_it_was_asked_for_with_landmarks_beside_it) {
+  for (const double length_m : {20.0, 60.0, 400.0}) {
+    const Course course = loop_course(length_m, 3, 24);
+    const Plan plan(course, {});
+    EXPECT_NEAR(plan.length_m(), 3 * length_m, 1e-6);
+    ASSERT_EQ(course.landmarks.size(), 24U);
+    for (const Landmark& mark : course.landmarks) {
+      double nearest = 1e9;
+      for (double s = 0; s < length_m; s += 0.02) {
+        const PathPoint at = plan.path(s);
+        nearest = std::min(nearest, std::hypot(at.x_m - mark.x_m, at.y_m - mark.y_m));
+      }
+      EXPECT_NEAR(nearest, 2, 1.1) << "the inner side of a corner of a short loop is nearer";
+    }
+    for (double s = 0; s < length_m; s += 1) {
+      EXPECT_NEAR(plan.path(s).x_m, plan.path(s + length_m).x_m, 1e-6);
+      EXPECT_NEAR(plan.path(s).y_m, plan.path(s + length_m).y_m, 1e-6);
+    }
+  }
+  EXPECT_THROW(static_cast<void>(loop_course(19, 1, 24)), std::invalid_argument);
+  EXPECT_THROW(static_cast<void>(loop_course(60, 1, 3)), std::invalid_argument);
+  EXPECT_THROW(static_cast<void>(loop_course(60, 1, 255)), std::invalid_argument);
+}
+
 TEST(Course, the_road_is_driven_at_five_metres_a_second_for_a_minute_and_more) {
   const Plan plan{road_course(2), {.speed_mps = 5}};
   int fast = 0;

@@ -365,16 +365,16 @@ TEST(Camera, sees_what_is_in_range_and_in_view_and_nothing_else) {
   // ahead 5 m; 33 deg left 7.2 m; 90 deg left; 39 deg right 14.2 m; behind
   const auto seen = camera.sample({}, {200'000}, kNoFaults);
   ASSERT_EQ(seen.size(), 2U);
-  EXPECT_EQ(seen[0].landmark, 1);
-  EXPECT_FLOAT_EQ(seen[0].range_m, 5);
-  EXPECT_NEAR(seen[0].bearing_rad, 0, 1e-6F);
-  EXPECT_EQ(seen[1].landmark, 2);
-  EXPECT_NEAR(seen[1].range_m, std::sqrt(52.0F), 1e-5F);
-  EXPECT_NEAR(seen[1].bearing_rad, std::atan2(4.0F, 6.0F), 1e-6F);
+  EXPECT_EQ(seen[0].sighting.landmark, 1);
+  EXPECT_FLOAT_EQ(seen[0].sighting.range_m, 5);
+  EXPECT_NEAR(seen[0].sighting.bearing_rad, 0, 1e-6F);
+  EXPECT_EQ(seen[1].sighting.landmark, 2);
+  EXPECT_NEAR(seen[1].sighting.range_m, std::sqrt(52.0F), 1e-5F);
+  EXPECT_NEAR(seen[1].sighting.bearing_rad, std::atan2(4.0F, 6.0F), 1e-6F);
   const auto turned = camera.sample({.yaw_rad = kPi - 0.1}, {400'000}, kNoFaults);
   ASSERT_EQ(turned.size(), 1U);
-  EXPECT_EQ(turned[0].landmark, 5);
-  EXPECT_NEAR(turned[0].bearing_rad, 0.1F, 1e-6F);
+  EXPECT_EQ(turned[0].sighting.landmark, 5);
+  EXPECT_NEAR(turned[0].sighting.bearing_rad, 0.1F, 1e-6F);
 }
 
 TEST(Camera, noise_misses_and_wrong_names_come_as_often_as_stated) {
@@ -385,8 +385,9 @@ TEST(Camera, noise_misses_and_wrong_names_come_as_often_as_stated) {
     int wrong = 0;
     constexpr int kLooks = 40'000;
     for (int i = 0; i < kLooks; ++i)
-      for (const auto& s : camera.sample({}, {200'000}, kNoFaults)) {
+      for (const auto& [s, landmark] : camera.sample({}, {200'000}, kNoFaults)) {
         if (s.range_m > 6.2F) continue;  // landmark 1 only, by its range
+        EXPECT_EQ(landmark, 1);
         range.push_back(static_cast<double>(s.range_m) - 5);
         bearing.push_back(static_cast<double>(s.bearing_rad));
         wrong += s.landmark != 1 ? 1 : 0;
@@ -400,6 +401,75 @@ TEST(Camera, noise_misses_and_wrong_names_come_as_often_as_stated) {
     EXPECT_NEAR(wrong / static_cast<double>(range.size()), mismatched ? 0.005 * 0.8 : 0,
                 0.0015);  // one in five draws names itself
   }
+}
+
+TEST(Camera, withholds_identities_and_keeps_what_was_truly_seen) {
+  CameraNumbers n = perfect().camera;
+  n.identities = false;
+  Camera camera{n, parked_course(1).landmarks, 1};
+  const auto seen = camera.sample({}, {200'000}, kNoFaults);
+  ASSERT_EQ(seen.size(), 2U);
+  for (const auto& one : seen) EXPECT_EQ(one.sighting.landmark, Camera::kNoLandmark);
+  EXPECT_EQ(seen[0].landmark, 1);
+  EXPECT_EQ(seen[1].landmark, 2);
+}
+
+TEST(Camera, clutter_comes_as_often_as_stated_anywhere_in_view_and_changes_no_other_draw) {
+  CameraNumbers n;
+  n.clutter = 1.3;
+  Camera plain{CameraNumbers{}, parked_course(1).landmarks, 3}, cluttered{n, parked_course(1).landmarks, 3};
+  constexpr int kLooks = 20'000;
+  std::vector<double> bearing;
+  for (int i = 0; i < kLooks; ++i) {
+    const auto all = cluttered.sample({}, {200'000}, kNoFaults);
+    std::vector<Camera::Seen> landmarks;
+    for (const auto& one : all) {
+      if (one.landmark != Camera::kNoLandmark) {
+        landmarks.push_back(one);
+        continue;
+      }
+      EXPECT_EQ(one.sighting.landmark, Camera::kNoLandmark);
+      EXPECT_LE(static_cast<double>(one.sighting.range_m), n.range_max_m);
+      bearing.push_back(static_cast<double>(one.sighting.bearing_rad));
+    }
+    const auto expected = plain.sample({}, {200'000}, kNoFaults);
+    ASSERT_EQ(landmarks.size(), expected.size());
+    for (std::size_t k = 0; k < expected.size(); ++k) {
+      EXPECT_EQ(landmarks[k].sighting.range_m, expected[k].sighting.range_m);
+      EXPECT_EQ(landmarks[k].sighting.landmark, expected[k].sighting.landmark);
+    }
+  }
+  EXPECT_NEAR(static_cast<double>(bearing.size()) / kLooks, 1.3, 0.02);
+  EXPECT_NEAR(statistics(bearing).mean, 0, 0.02);
+  EXPECT_NEAR(sim::sqrt(statistics(bearing).variance), n.field_of_view_rad / std::sqrt(12.0), 0.01);
+}
+
+TEST(Camera, a_moving_obstacle_goes_to_and_fro_at_its_speed) {
+  CameraNumbers n = perfect().camera;
+  n.movers = 1;
+  n.range_max_m = 100;
+  n.field_of_view_rad = 2 * kPi;
+  Camera camera{n, parked_course(1).landmarks, 5};
+  double x = 0, y = 0, least_x = 1e9, most_x = -1e9, least_y = 1e9, most_y = -1e9;
+  int turns = 0;
+  for (int i = 0; i < 600; ++i) {
+    for (const auto& one : camera.sample({}, seconds_us(0.1 * i), kNoFaults)) {
+      if (one.landmark != Camera::kNoLandmark) continue;
+      const double at_x =
+          static_cast<double>(one.sighting.range_m) * std::cos(static_cast<double>(one.sighting.bearing_rad));
+      const double at_y =
+          static_cast<double>(one.sighting.range_m) * std::sin(static_cast<double>(one.sighting.bearing_rad));
+      const double step = std::hypot(at_x - x, at_y - y);
+      if (i > 0 && std::abs(step - 0.1 * n.mover_mps) > 1e-4) ++turns;  // it turns within the step
+      if (i > 0) EXPECT_LT(step, 0.1 * n.mover_mps + 1e-4);
+      x = at_x, y = at_y;
+      least_x = std::min(least_x, x), most_x = std::max(most_x, x);
+      least_y = std::min(least_y, y), most_y = std::max(most_y, y);
+    }
+  }
+  EXPECT_NEAR(std::hypot(most_x - least_x, most_y - least_y), n.mover_way_m, 0.05);
+  EXPECT_GE(turns, 4);
+  EXPECT_LE(turns, 5);
 }
 
 TEST(Imu, the_biases_of_the_truth_are_what_it_shows_too_much) {

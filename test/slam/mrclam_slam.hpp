@@ -3,8 +3,10 @@
 // motion that fits the map's landmarks.
 #pragma once
 
+#include "config/mrclam_slam.hpp"
 #include "landmark_world.hpp"
 #include "model/planar_increment.hpp"
+#include "sensor/calibration.hpp"
 #include "slam/sighting.hpp"
 #include "support/mrclam.hpp"
 
@@ -17,18 +19,21 @@ namespace tetap::test {
 [[nodiscard]] inline double d(float v) { return static_cast<double>(v); }
 [[nodiscard]] inline float f(double v) { return static_cast<float>(v); }
 
-/// The robots go 5 % less than they are told, and turn 2.5 % more than Mrclam::kTurnScale has it.
-inline constexpr double kSpeedScale = 0.95, kTurnScale = 0.975 / Mrclam::kTurnScale;
-struct MotionNoise {
-  double speed, yaw;  ///< m^2/s, rad^2/s at rest
-};
+/// The command as a robot of these parameters takes it; Mrclam's own scale of the turn is taken out.
 [[nodiscard]] inline model::PlanarIncrement increment_of(const Mrclam::Command& command, double dt_s,
-                                                         const MotionNoise& noise) {
-  const double rate = command.yaw_rate_radps * kTurnScale;
-  return {.ds_m = f(command.forward_mps * kSpeedScale * dt_s),
+                                                         const param::WheelParameters& n) {
+  const double rate = command.yaw_rate_radps * d(n.yaw_rate_scale) / Mrclam::kTurnScale;
+  const double of_turn = d(n.noise.yaw_rate_per_yaw_rate) * std::abs(rate);
+  const double of_speed = d(n.noise.yaw_rate_per_speed) * std::abs(command.forward_mps);
+  return {.ds_m = f(command.forward_mps * d(n.speed_scale) * dt_s),
           .dyaw_rad = f(rate * dt_s),
-          .var_ds = f(noise.speed * dt_s),
-          .var_dyaw = f((noise.yaw + 0.01 * std::abs(rate) + 0.0005 * std::abs(command.forward_mps)) * dt_s)};
+          .var_ds = f(d(n.noise.speed) * dt_s),
+          .var_dyaw = f((d(n.noise.yaw_rate) + of_turn + of_speed) * dt_s)};
+}
+[[nodiscard]] inline slam::SightingNoise noise_of(const param::LandmarkParameters& n) {
+  return {.sigma_range_m = n.sigma_range_m,
+          .sigma_range_per_m = n.sigma_range_per_m,
+          .sigma_bearing_rad = n.sigma_bearing_rad};
 }
 
 struct Point {
@@ -93,8 +98,11 @@ struct Figures {
           .y = base::Anchored{}.plus(f(run.start().y_m)),
           .yaw_rad = f(run.start().yaw_rad)};
 }
+/// With the camera's own errors taken out, as the robot mrclam_slam does.
 [[nodiscard]] inline slam::Sighting sighting_of(const Mrclam::Sighting& one) {
-  return {.id = static_cast<std::uint16_t>(one.barcode), .range_m = f(one.range_m), .bearing_rad = f(one.bearing_rad)};
+  sensor::LandmarkSighting seen{.range_m = f(one.range_m), .bearing_rad = f(one.bearing_rad)};
+  sensor::calibrate(seen, robot::mrclam_slam::parameters.landmark);
+  return {.id = static_cast<std::uint16_t>(one.barcode), .range_m = seen.range_m, .bearing_rad = seen.bearing_rad};
 }
 
 }  // namespace tetap::test

@@ -45,10 +45,10 @@ using Mapper = EkfMapper<12>;
 Scored map_posts(const Mrclam& barcodes, Ids ids) {
   const Posts posts(barcodes);
   Mapper mapper;
-  mapper.core.options.noise = {.sigma_range_m = 0.05F, .sigma_range_per_m = 0.04F, .sigma_bearing_rad = 0.02F};
+  mapper.core.options.noise = {.sigma_range_m = 0.05F, .sigma_range_per_m = 0.03F, .sigma_bearing_rad = 0.02F};
   mapper.core.options.correlation_m = 0.1F;
   mapper.options.method = AssociationMethod::kJoint;
-  mapper.options.gate = 7;
+  mapper.options.gate = 5;
   mapper.start(test::start_of(barcodes), filter::Symmetric<float, 3>::diagonal({4e-4F, 4e-4F, 4e-4F}));
   test::Track track;
   std::map<int, int> lives;  // of a landmark's number, which is given again after the landmark was removed
@@ -57,7 +57,7 @@ Scored map_posts(const Mrclam& barcodes, Ids ids) {
   barcodes.drive(
       barcodes.end_s(),
       [&](const Mrclam::Command& command, double dt_s) {
-        EXPECT_TRUE(mapper.predict(test::increment_of(command, dt_s, {.speed = 0.001, .yaw = 0.0008})));
+        EXPECT_TRUE(mapper.predict(test::increment_of(command, dt_s, robot::mrclam_slam::parameters.wheels)));
       },
       [&](const std::vector<Mrclam::Sighting>& seen) {
         std::vector<Sighting> sightings;
@@ -114,10 +114,11 @@ TEST(RecordedPosts, MapsWithoutIdentities) {
                 robot, known.figures.trajectory_m, withheld.figures.trajectory_m, 100 * withheld.wrong,
                 100 * withheld.silent, withheld.figures.nees);
     EXPECT_EQ(known.wrong, 0) << robot;
-    EXPECT_LT(withheld.wrong, robot == 3 ? 0.05 : 0.03) << robot;
-    if (robot == 3 || robot == 4) continue;  // docs/validation/shortfalls.md
     EXPECT_LE(withheld.silent, 0.01) << robot;
-    EXPECT_LE(withheld.figures.trajectory_m, 1.15 * known.figures.trajectory_m) << robot;
+    // Robots 3 and 4: docs/validation/shortfalls.md.
+    EXPECT_LT(withheld.wrong, robot == 4 ? 0.07 : 0.03) << robot;
+    EXPECT_LE(withheld.figures.trajectory_m, (robot == 3 ? 1.25 : 1.15) * known.figures.trajectory_m) << robot;
+    EXPECT_GT(withheld.figures.trajectory_m, 0.8 * known.figures.trajectory_m) << robot;
   }
 }
 

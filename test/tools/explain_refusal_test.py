@@ -57,6 +57,13 @@ class RefusedParameters(unittest.TestCase):
             robots = [WHEELS % ("0.0825F", "0.42F"), ORIGIN % ("24'131'350'000", "5'834'150'000"), ".inertial = {.gyro_scale = 0.1F}"]
             self.assertEqual(self.said(compiler, robots), (0, []), compiler)
 
+    def test_a_robot_that_maps_needs_ids_behind_its_block(self):
+        for compiler in COMPILERS:
+            for base, expected in ((".can_base = 0x340", (1, ["config/robot0.hpp: can_base is 832; it has to be a multiple of 128, for its own map has ids behind the block of 64"])),
+                                   (".can_base = 0x380", (0, []))):
+                self.assertEqual(self.said(compiler, [base], "static_assert(tetap::param::checked_map_ids(true, robot0));"), expected, compiler)
+            self.assertEqual(self.said(compiler, [".can_base = 0x340"], "static_assert(tetap::param::checked_map_ids(false, robot0));"), (0, []), compiler)
+
     def test_a_misspelt_field_is_told_by_its_robot(self):
         for compiler, words in (("g++", r"^config/robot0\.hpp:3: a field here is misspelt"), ("clang++", r"^config/robot0\.hpp:4: field designator 'sigma_flour_m' ")):
             status, lines = self.said(compiler, [".gnss = {.sigma_flour_m = 0.3F}"])

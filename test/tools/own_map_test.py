@@ -1,11 +1,14 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
 """Figures of mappers (tetap.report.own_map) on made-up maps whose errors are known, and the importer's logs without a map."""
+import importlib.machinery
+import importlib.util
 import json
 import os
 import subprocess
 import sys
 import tempfile
+import types
 import unittest
 
 import numpy as np
@@ -13,7 +16,7 @@ import numpy as np
 sys.dont_write_bytecode = True
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.realpath(__file__))))
 sys.path.insert(0, os.path.join(ROOT, "tools", "python"))
-from tetap.report import own_map  # noqa: E402
+from tetap.report import own_map, tables  # noqa: E402
 
 DATA = os.environ.get("TETAP_DATA") or os.path.join(os.path.dirname(ROOT), "shared", "data")
 MRCLAM = os.path.join(DATA, "mrclam", "MRCLAM_Dataset7")
@@ -64,6 +67,101 @@ class WrongAssociations(unittest.TestCase):
 
     def test_without_a_truth_at_the_stamp_nothing_is_judged(self):
         self.assertEqual(self.judged([1, 2], [99, 2]), (0, 1))
+
+
+    def test_a_landmark_that_is_none_may_have_what_is_none(self):
+        found = {250: 0.1 + 0j, 251: 10.1 + 0j, 252: 10 + 8j, 253: 6 + 4j}
+        pairs, fit = own_map.fitted(found, own_map.counterparts(found, TRUE), TRUE)
+        self.assertEqual((pairs[250], pairs[253]), (1, None))
+        self.assertLess(abs(fit(found[252]) - TRUE[3]), 0.2)
+
+    def test_a_sighting_of_clutter_belongs_to_no_landmark(self):
+        self.assertEqual(self.judged([1, 2], [255, 2]), (1, 2))
+
+
+def table(**columns):
+    made = {}
+    for name, values in columns.items():
+        made[name] = tables.Column()
+        made[name].add(np.array(values, dtype=float))
+    return tables.Table(made)
+
+
+class MapOverTime(unittest.TestCase):
+    def rows(self, landmarks, state=1):
+        count = len(landmarks)
+        return table(landmark=landmarks, landmark_state=[state] * count, x_m=np.arange(count), y_m=[0] * count, time_s=np.arange(count), hits=[9] * count)
+
+    def test_what_is_no_longer_published_is_not_in_the_map_at_the_end(self):
+        rows = self.rows([254, 253, 252] * 5 + [254, 253] * 5)
+        self.assertEqual(sorted(own_map.last_of_each(own_map.at_the_end(rows))), [253, 254])
+
+    def test_unconfirmed_landmarks_without_identity_are_not_in_the_map(self):
+        self.assertEqual(own_map.last_of_each(own_map.at_the_end(self.rows([254, 253] * 4, state=0))), {})
+        self.assertEqual(sorted(own_map.last_of_each(own_map.at_the_end(self.rows([7, 9] * 4, state=0)))), [7, 9])
+
+    def test_a_number_that_was_given_again_counts_from_then_on(self):
+        rows = table(landmark=[254, 253] * 4, time_s=np.arange(8), hits=[5, 5, 6, 6, 1, 7, 2, 8], x_m=[50, 10, 50, 10, 0, 10, 0, 10], y_m=[0] * 8, std_x_m=[0.1] * 8,
+                     std_y_m=[0.1] * 8, corr_xy=[0] * 8)
+        begun = own_map.begins(rows)
+        self.assertEqual(begun, {254: 4.0, 253: 1.0})
+        elsewhere = table(landmark=[254] * 3, time_s=[0, 1, 2], hits=[1, 2, 3], x_m=[50, 0, 0.1], y_m=[0] * 3)
+        self.assertEqual(own_map.begins(elsewhere), {254: 1.0})
+        time_s, nees = own_map.landmark_nees(rows, {254: 1, 253: 2}, TRUE)
+        self.assertEqual((list(time_s), nees.max()), ([1, 3, 4, 5, 6, 7], 0))
+        innovations = {"verdict": np.zeros(2), "landmark": np.array([254.0, 254.0]), "nis": np.ones(2), "time_s": np.array([2.0, 6.0]), "age_ms": np.zeros(2)}
+        sightings = {"time_s": np.array([2.0, 6.0]), "landmark": np.array([5.0, 1.0])}
+        self.assertEqual(own_map.wrong_associations(innovations, sightings, {254: 1, 253: 2}, TRUE, begun), (0, 1))
+
+    def test_the_nees_of_errors_of_the_published_size_is_two(self):
+        draw = np.random.default_rng(3)
+        count, corr = 20_000, 0.6
+        x, y = np.linalg.cholesky([[0.04, corr * 0.2 * 0.1], [corr * 0.2 * 0.1, 0.01]]) @ draw.standard_normal((2, count))
+        rows = table(landmark=[2] * count, x_m=10 + x, y_m=y, std_x_m=[0.2] * count, std_y_m=[0.1] * count, corr_xy=[corr] * count, time_s=np.arange(count), hits=[9] * count)
+        _, nees = own_map.landmark_nees(rows, {2: 2}, TRUE)
+        self.assertAlmostEqual(float(np.mean(nees)), 2, 1)
+        self.assertEqual(len(own_map.landmark_nees(rows, {}, TRUE)[1]), 0)
+
+    def test_the_file_of_sightings_lies_beside_the_truth(self):
+        for truth, expected in (("a/run.truth.csv", "a/run.sightings.csv"), ("a/truth.csv", "a/truth.sightings.csv")):
+            self.assertEqual(own_map.sightings_file(types.SimpleNamespace(path=truth)), expected)
+
+
+class ChoiceOfNumbers(unittest.TestCase):
+    """tools/report/choose_mapping"""
+
+    @classmethod
+    def setUpClass(cls):
+        loader = importlib.machinery.SourceFileLoader("choose_mapping", os.path.join(ROOT, "tools", "report", "choose_mapping"))
+        cls.choose = importlib.util.module_from_spec(importlib.util.spec_from_loader("choose_mapping", loader))
+        loader.exec_module(cls.choose)
+
+    def test_a_log_is_left_out_of_the_choice_of_its_own_numbers(self):
+        score = np.array([[0.0, 5.0, 5.0], [1.0, 1.0, 1.0], [2.0, 0.9, 0.9]])  # the first is the best on log 0 alone
+        order, without = self.choose.leave_one_out(score)
+        self.assertEqual(list(order), [1, 2, 0])
+        self.assertEqual(without, [2, 1, 1])
+
+    def test_a_nees_above_its_bound_and_a_bad_seed_cost_and_others_do_not(self):
+        table, worst = np.array([[[0.2, 0.1, 5.0]], [[0.2, 0.1, 1.0]], [[0.2, 0.1, 10.0]]]), np.array([[1.9], [1.0], [1.0]])
+        first, second, third = self.choose.scores(table, worst, True)[:, 0]
+        self.assertEqual(first, second)
+        self.assertAlmostEqual(third - first, np.log(2), 12)
+        self.assertEqual(self.choose.scores(table, worst, False)[2, 0], first)
+        self.assertAlmostEqual(self.choose.scores(table, np.full((3, 1), 4.0), True)[0, 0] - first, np.log(2), 12)
+
+    def test_the_nees_of_errors_of_the_published_size_is_three(self):
+        draw, count = np.random.default_rng(5), 20_000
+        correlation = np.array([[1, 0.5, -0.2], [0.5, 1, 0.3], [-0.2, 0.3, 1]])
+        error = (np.linalg.cholesky(correlation) @ draw.standard_normal((3, count))) * np.array([[0.3], [0.1], [0.02]])
+        rows = {"std_x_m": np.full(count, 0.3), "std_y_m": np.full(count, 0.1), "std_yaw_rad": np.full(count, 0.02), "corr_xy": np.full(count, 0.5),
+                "corr_x_yaw": np.full(count, -0.2), "corr_y_yaw": np.full(count, 0.3)}
+        self.assertAlmostEqual(self.choose.mean_nees(rows, *error), 3, 1)
+
+    def test_a_grid_is_every_combination_and_a_wrong_one_is_named(self):
+        self.assertEqual(self.choose.combinations(["a=1,2", "b=3"]), [["a=1", "b=3"], ["a=2", "b=3"]])
+        with self.assertRaisesRegex(Exception, "--grid a: PATH=VALUE"):
+            self.choose.combinations(["a"])
 
 
 @unittest.skipUnless(os.path.isdir(MRCLAM), "no mrclam in $TETAP_DATA")

@@ -19,7 +19,7 @@ sys.path.insert(0, os.path.join(TOOLS, "python"))
 sys.dont_write_bytecode = True
 
 from tetap.can import bus_writer  # noqa: E402
-from tetap.report import metrics, tables  # noqa: E402
+from tetap.report import metrics, own_map, tables  # noqa: E402
 
 RUN = {"frames_in": 1234, "frames_lost": 0, "estimates_out": 777, "times_realtime": 12.5, "bus_load_percent": 9.25, "estimates_sha256": "ab" * 32,
        "state_crc_last": "0x12345678", "bus": "memory", "way": "one process", "robot": "rover", "mode": "lockstep", "duration_s": 10.0, "seed": 7,
@@ -460,6 +460,42 @@ class Pictures(Case):
                      "RangeBearing NIS mean, with rejected", "NisMean on the bus"):
             self.assertIn(text, page)
             self.assertIn(text, result.stdout)
+
+    def mapped_run(self):
+        """A robot on a circle among three landmarks that it maps without identities; one of its sightings is given to a wrong landmark."""
+        time_s = 1 + 0.01 * np.arange(300)
+        heading = metrics.wrapped(time_s + np.pi / 2)
+        marks = [{"id": 1, "x_m": 3.0, "y_m": 0.0}, {"id": 2, "x_m": -3.0, "y_m": 1.0}, {"id": 3, "x_m": 0.0, "y_m": 4.0}]
+        truth = self.truth(time_s, np.cos(time_s), np.sin(time_s), heading, {"truth": "vicon", "landmarks": marks})
+        std = [None if n % 5 else (0.1, 0.1, 0.05) for n in range(300)]
+        self.estimates(time_s, np.cos(time_s) + 0.02, np.sin(time_s), heading, std=std, corr=[(0.1, 0, 0)] * 300)
+        kind = metrics.ESTIMATES.index("kind")
+        lines = [line.split(",") for line in text_of(self.path("estimates.csv")).splitlines()]
+        self.write("estimates.csv", "\n".join(",".join(field if i != kind or not number else "EkfSlam" for i, field in enumerate(line)) for number, line in enumerate(lines)) + "\n")
+        seen = [(n, t, 1 + n // 20 % 3) for n, t in enumerate(time_s) if n % 20 == 0]
+        self.write_rows("t.sightings.csv", own_map.SIGHTINGS, [(t - 0.1, landmark if n != 100 else 255) for n, t, landmark in seen])
+        self.write_rows("innovations.csv", metrics.INNOVATIONS, [self.innovation(n, t, 255 - landmark) for n, t, landmark in seen])
+        self.write_rows("map.csv", own_map.MAP, [[n, t, 254 - n // 10 % 3, marks[n // 10 % 3]["x_m"] + 0.1, marks[n // 10 % 3]["y_m"], 0.1, 0.2, 0.0, 9, 1, 1]
+                                                 for n, t in enumerate(time_s) if n % 10 == 0])
+        self.write_rows("status.csv", metrics.STATUS, [[n, t, 3, 24, 0, 0, 2] for n, t in enumerate(time_s)])
+        return truth
+
+    @staticmethod
+    def innovation(n, time_s, landmark):
+        values = dict.fromkeys(metrics.INNOVATIONS, 0.0) | {"epoch": n, "time_s": time_s, "estimator": 1, "sensor": 4, "dof": 2, "nis": 1.0, "age_ms": 100.0, "landmark": landmark}
+        return [values[name] for name in metrics.INNOVATIONS]
+
+    def test_a_robot_that_maps_has_pictures_of_its_map_and_figures_of_both(self):
+        truth = self.mapped_run()
+        result = self.report("--truth", truth)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        for name in ("map", "map_nees"):
+            self.assertTrue(os.path.getsize(self.path(f"{name}.png")) > 10_000, name)
+        found = json.loads(text_of(self.path("summary.json")))
+        self.assertEqual((found["wrong_associations"], found["fused"]["associations_judged"]), (1, 15))
+        self.assertAlmostEqual(found["map_rmse_m"], 0, 6)  # shifted as a whole
+        self.assertAlmostEqual(found["fused"]["landmark_nees_mean"], 1, 6)  # by one sigma of x
+        self.assertIn("Consistency of pose and map", text_of(self.path("report.html")))
 
     def test_the_page_begins_with_one_sentence_and_the_long_table_follows_the_pictures(self):
         truth = self.run_with_everything()

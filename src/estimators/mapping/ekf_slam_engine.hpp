@@ -20,6 +20,7 @@ class EkfSlamEngine {
  public:
   static constexpr sensor::EstimatorKind kKind = sensor::EstimatorKind::kEkfSlam;
   static constexpr std::size_t kBatch = 16;
+  static constexpr bool kTakesNameless = true;
 
   void configure(const param::Parameters& n) {
     slam::EkfSlamOptions& core = mapper_.core.options;

@@ -21,6 +21,7 @@ class FastSlamEngine {
  public:
   static constexpr sensor::EstimatorKind kKind = sensor::EstimatorKind::kFastSlam;
   static constexpr std::size_t kBatch = 16;
+  static constexpr bool kTakesNameless = false;
 
   void configure(const param::Parameters& n) {
     slam_.options = {.noise = {.sigma_range_m = n.landmark.sigma_range_m,

@@ -29,6 +29,8 @@ class PlanarMapper {
  public:
   static constexpr sensor::EstimatorKind kKind = Engine::kKind;
   static constexpr bool kDelayed = true;
+  /// Sightings without an identity find their landmarks by association.
+  static constexpr bool kTakesNameless = Engine::kTakesNameless;
   /// Sightings of one stamp; those beyond are counted as not used.
   static constexpr std::size_t kBatch = Engine::kBatch;
   /// Words of memory that enter the digest in one tick.

@@ -129,13 +129,14 @@ class Run:
     """The recorder's directory: run.json, estimates, innovations, status."""
 
     def __init__(self, directory):
+        self.start_s = 0.0  # zero of all times
         path = os.path.join(directory, "run.json")
         self.about = read_json(path)
         self.estimates = read_table(os.path.join(directory, "estimates.csv"), ESTIMATES)
         if len(self.estimates["time_s"]) == 0:
             raise BadInput(f"{directory}/estimates.csv: no estimate in it")
         self.innovations = self._optional(directory, "innovations.csv", INNOVATIONS)
-        self.status = self._optional(directory, "status.csv", STATUS)
+        self.status = self._optional(directory, "status.csv", STATUS, ["map_faults"])
         self.states = self._optional(directory, "states.csv", STATES)
         self.sensors = self._optional(directory, "sensors.csv", SENSORS)
         self.map = self._optional(directory, "map.csv", own_map.MAP)
@@ -149,16 +150,17 @@ class Run:
         return code_names()["EstimatorKind"].get(code, str(code))
 
     @staticmethod
-    def _optional(directory, name, columns):
+    def _optional(directory, name, columns, also=()):
         path = os.path.join(directory, name)
         if os.path.exists(path):
-            return read_table(path, columns)
+            return read_table(path, columns, also)
         return empty_table(columns)
 
     def since(self, start):
         """The same, with times counted from `start` [s]."""
         later = copy.copy(self)
-        for name in ("estimates", "innovations", "status", "states", "sensors"):
+        later.start_s = start
+        for name in ("estimates", "innovations", "status", "states", "sensors", "map"):
             setattr(later, name, getattr(self, name).since(start))
         return later
 
@@ -631,12 +633,12 @@ def story(run):
     at = status["time_s"]
     for i in np.flatnonzero(np.diff(status["mode"], prepend=np.nan) != 0) if len(at) else []:
         told.append((at[i], f"mode {names['Mode'].get(int(status['mode'][i]), int(status['mode'][i]))}"))
-    for bit in range(16):
-        on = np.nan_to_num(status["faults"]).astype(np.int64) >> bit & 1
+    for column, table, bit in [("faults", "Fault", bit) for bit in range(16)] + [("map_faults", "MapFault", bit) for bit in range(3) if "map_faults" in status]:
+        on = np.nan_to_num(status[column]).astype(np.int64) >> bit & 1
         edges = np.flatnonzero(np.diff(on, prepend=0, append=0))
         spans = [[at[a], at[min(b, len(at) - 1)]] for a, b in zip(edges[::2], edges[1::2])]
         for start, end in joined(spans, QUIET_S):
-            told.append((start, f"fault {names['Fault'].get(bit, f'bit {bit}')}, for {end - start:.1f} s"))
+            told.append((start, f"fault {names[table].get(bit, f'bit {bit}')}, for {end - start:.1f} s"))
     for bit, sensor in names["Sensor"].items():
         used = np.nan_to_num(status["used"]).astype(np.int64) >> bit & 1
         if not used.any():

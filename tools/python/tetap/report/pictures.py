@@ -396,7 +396,7 @@ def timeline(run, names, title):
     used = list(bits("used", "Sensor"))
     refused = rejections(run, names)
     used += [(name, np.zeros(len(time_s), dtype=bool)) for name in refused if name not in [one for one, _ in used]]
-    faults = list(bits("faults", "Fault"))
+    faults = list(bits("faults", "Fault")) + (list(bits("map_faults", "MapFault")) if "map_faults" in rows else [])
     lines = [("mode", None, None)] + [(f"{name} used", on, FUSED) for name, on in used] + [(f"reports {name}", on, REJECTED) for name, on in faults]
     fig, (axes,) = figure(9.0, 1.5 + 0.34 * len(lines), title)
     handles = []
