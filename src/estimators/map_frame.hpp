@@ -50,6 +50,8 @@ class LandmarkMap {
     return {.x = base::Anchored::from_um(std::int64_t{entries_[i].x_mm} * 1000),
             .y = base::Anchored::from_um(std::int64_t{entries_[i].y_mm} * 1000)};
   }
+  /// Identity of the landmark at a place below size().
+  [[nodiscard]] constexpr std::uint8_t id(std::size_t i) const { return entries_[i].id; }
   constexpr void clear() { size_ = 0; }
   [[nodiscard]] constexpr std::size_t size() const { return size_; }
   /// Feeds id and place of every entry to the sink, for hashes.

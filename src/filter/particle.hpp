@@ -48,6 +48,8 @@ class Particles {
 
   constexpr Particles() = default;
   explicit constexpr Particles(base::PhiloxKey key) : key_(key) {}
+  /// Key of the draws from now on.
+  constexpr void set_key(base::PhiloxKey key) { key_ = key; }
 
   [[nodiscard]] constexpr std::size_t size() const { return size_; }
   [[nodiscard]] constexpr const S& operator[](std::size_t i) const { return states_[i]; }

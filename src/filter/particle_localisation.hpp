@@ -163,7 +163,8 @@ class ParticleLocalisation {
       const ParticlePose& p = cloud[i];
       bins.add(bins.bin(whole(p.x_m * 2.0F), whole(p.y_m * 2.0F), whole(p.yaw_rad() * (24.0F / kTwoPi))));
     }
-    return particles_for(bins.count(), options.kld_error, options.kld_quantile, options.least, kMost);
+    const std::size_t least = options.least < kMost ? options.least : kMost;
+    return particles_for(bins.count(), options.kld_error, options.kld_quantile, least, kMost);
   }
   [[nodiscard]] static constexpr std::int32_t whole(float v) {
     const float bounded = base::clamp(v, -1e9F, 1e9F);

@@ -234,6 +234,12 @@ struct MappingParameters {
   std::int32_t publish_every = 10;   ///< ticks between landmarks on the bus, one at a time; 0: never
 };
 
+/// Localisation by particles.
+struct ParticleParameters {
+  float temper = 0.35F;  ///< power of the likelihood; below 1 where errors of one landmark's sightings are alike
+  float jitter = 0;      ///< m^2/s on both axes: motion that neither speed nor turn explains
+};
+
 /// Ticks between frames; 0 = never.
 struct PublishParameters {
   std::int32_t pose_every = 1;  ///< estimate 1: position and motion
@@ -304,6 +310,7 @@ struct Parameters {
   BusParameters bus;
   WiredParameters wired;
   MappingParameters mapping;
+  ParticleParameters particles;
 };
 
 }  // namespace tetap::param

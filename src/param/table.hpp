@@ -398,6 +398,11 @@ inline constexpr std::array kTable{
     TETAP_ROW(0x4C6, mapping.seed, "", 0, 1'000'000, kRestart, "Key of the particles' noise."),
     TETAP_ROW(0x4C7, mapping.publish_every, "ticks", 0, 100'000, kLive,
               "Period of one landmark of the own map on the bus; 0: never."),
+
+    TETAP_ROW(0x500, particles.temper, "", 0.01, 1, kLive,
+              "Power of the particles' likelihood; below 1 where errors of one landmark's sightings are alike."),
+    TETAP_ROW(0x501, particles.jitter, "m^2/s", 0, 1, kLive,
+              "Random walk of each particle's place, on both axes: motion that neither speed nor turn explains."),
 };
 
 #undef TETAP_ROW

@@ -54,5 +54,30 @@ TEST(PoseEkf, RecoveryAddsTheConfiguredVariances) {
   EXPECT_FLOAT_EQ(after(0, 1), before(0, 1));
 }
 
+/// The same sighting with and without its identity, among landmarks 2 m apart.
+TEST(PoseEkf, ASightingWithoutIdentityIsThatOfTheLandmarkItFitsBest) {
+  Robot named, nameless;
+  for (Robot* robot : {&named, &nameless})
+    for (const MapEntry& entry : {MapEntry{5000, 2000, 8}, MapEntry{5000, -2000, 9}})
+      ASSERT_TRUE(robot->map.put(entry));
+  const auto sees = [](Robot& robot, std::uint8_t landmark, float range_m, float bearing_rad) {
+    robot.us += 100'000;
+    return robot.estimator.fuse(
+        sensor::LandmarkSighting{.landmark = landmark, .range_m = range_m, .bearing_rad = bearing_rad}, {robot.us},
+        robot.ctx());
+  };
+  const Innovation with = sees(named, 8, 5.4F, 0.36F), without = sees(nameless, 0xFF, 5.4F, 0.36F);
+  EXPECT_EQ(without.verdict, sensor::Verdict::kAccepted);
+  EXPECT_EQ(without.landmark, 8);
+  EXPECT_EQ(with.nis, without.nis);
+  const Estimate a = named.estimator.estimate(named.ctx()), b = nameless.estimator.estimate(nameless.ctx());
+  EXPECT_EQ(a.pose.x.minus(b.pose.x), 0);
+  EXPECT_EQ(a.p.packed(), b.p.packed());
+  EXPECT_EQ(sees(nameless, 0xFF, 9.0F, 3.0F).verdict, sensor::Verdict::kRejected);
+  EXPECT_EQ(sees(nameless, 0xFF, base::kNan, base::kNan).verdict, sensor::Verdict::kNotFinite);
+  nameless.estimator.restart({nameless.us}, nameless.ctx());  // without a pose there is no nearest
+  EXPECT_EQ(sees(nameless, 0xFF, 5.4F, 0.36F).verdict, sensor::Verdict::kNotUsed);
+}
+
 }  // namespace
 }  // namespace tetap::estimators

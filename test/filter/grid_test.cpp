@@ -156,6 +156,87 @@ TEST(Grid, NothingMakesACellThatIsNoNumber) {
   }
 }
 
+/// A bell of place and heading, in two parts.
+struct Bell {
+  float x_m, y_m, yaw_rad;
+  [[nodiscard]] auto at(float x, float y) const {
+    const float d = (x - x_m) * (x - x_m) + (y - y_m) * (y - y_m);
+    return [d, centre = yaw_rad](float yaw) {
+      const float off = base::wrap_angle(yaw - centre);
+      return base::exp(-0.5F * d - 2.0F * off * off);
+    };
+  }
+};
+static_assert(LikelihoodByPlace<Bell>);
+
+TEST(Grid, ALikelihoodInTwoPartsGivesTheSameBitsAndUnitsAreTheLines) {
+  Grid<17, 13, 12> whole(0, 0, 0.5F), parts(0, 0, 0.5F);
+  const Bell bell{4, 3, -0.4F};
+  for (int k = 0; k < 3; ++k) {
+    const GridMotion motion{.forward_m = k == 1 ? 0.0F : 0.7F, .carried_share = 0.01F};
+    ASSERT_TRUE(whole.begin(motion, true));
+    whole.work(kAll, [&](const GridPose& p) { return bell.at(p.x_m, p.y_m)(p.yaw_rad); });
+    ASSERT_TRUE(parts.begin(motion, true));
+    std::uint32_t units = 0;
+    for (; !parts.done(); ++units) parts.work(1, bell);
+    EXPECT_EQ(units, parts.units());
+    EXPECT_EQ(units, k == 1 ? 2U * 17 * 13 : 13U * 12 + 17 * 12 + 3 * 17 * 13);
+    EXPECT_EQ(whole.cells(), parts.cells());
+    EXPECT_NEAR(mass_of(parts), 1, 2e-6);
+  }
+  ASSERT_TRUE(parts.begin({}, false));
+  EXPECT_TRUE(parts.done());  // neither motion nor update
+}
+
+TEST(Grid, ARobotThatMayBeCarriedOffIsFoundAgain) {
+  for (const float share : {0.0F, 1e-4F}) {
+    Grid<20, 20, 12> grid(0, 0, 0.5F);
+    grid.fill([](const GridPose& p) { return p.x_m < 1.0F && p.y_m < 1.0F && p.yaw_rad < 0.1F ? 1.0F : 0.0F; });
+    for (int k = 0; k < 12; ++k) {
+      ASSERT_TRUE(grid.begin({.carried_share = share}, true));
+      grid.work(kAll, Bell{8.25F, 7.25F, 1.5707963F});
+      EXPECT_NEAR(mass_of(grid), 1, 2e-6);
+    }
+    const GridPose best = grid.peak();
+    EXPECT_EQ(best.x_m > 8.0F && best.y_m > 7.0F, share > 0.0F);
+    EXPECT_EQ(best.x_m, grid.maximum_a_posteriori().x_m);
+  }
+}
+
+TEST(Grid, TheRegionAboutThePeakHasItsMomentsInDouble) {
+  Grid<40, 30, 24> grid(-3, 2, 0.25F);
+  ASSERT_TRUE(grid.begin({}, true));
+  grid.work(kAll, Bell{1.3F, 5.1F, 3.0F});  // across the heading of half a turn
+  constexpr int kPlaces = 6, kHeadings = 4;
+  const GridPose peak = grid.peak();
+  double mass = 0, first[3] = {}, second[3] = {}, xy = 0;
+  for (int yaw = 0; yaw < 24; ++yaw)
+    for (int y = 0; y < 30; ++y)
+      for (int x = 0; x < 40; ++x) {
+        const GridPose p = grid.at(x, y, yaw);
+        const double d[3] = {static_cast<double>(p.x_m - peak.x_m), static_cast<double>(p.y_m - peak.y_m),
+                             std::remainder(static_cast<double>(p.yaw_rad - peak.yaw_rad), 2 * M_PI)};
+        if (std::abs(d[0]) > 0.26 * kPlaces || std::abs(d[1]) > 0.26 * kPlaces || std::abs(d[2]) > 0.27 * kHeadings)
+          continue;
+        const auto m = static_cast<double>(grid.mass(x, y, yaw));
+        mass += m;
+        xy += m * d[0] * d[1];
+        for (int i = 0; i < 3; ++i) first[i] += m * d[i], second[i] += m * d[i] * d[i];
+      }
+  const GridRegion region = grid.around_peak(kPlaces, kHeadings);
+  EXPECT_NEAR(static_cast<double>(region.mass), mass, 1e-5);
+  EXPECT_LT(region.mass, 1);
+  const double width[3] = {0.25, 0.25, 2 * M_PI / 24};
+  for (int i = 0; i < 3; ++i) {
+    first[i] /= mass;
+    EXPECT_NEAR(static_cast<double>(region.p(i, i)), second[i] / mass - first[i] * first[i] + width[i] * width[i] / 12,
+                1e-4);
+  }
+  EXPECT_NEAR(static_cast<double>(region.p(0, 1)), xy / mass - first[0] * first[1], 1e-4);
+  EXPECT_NEAR(static_cast<double>(region.mean.x_m), static_cast<double>(peak.x_m) + first[0], 1e-4);
+  EXPECT_NEAR(std::remainder(static_cast<double>(region.mean.yaw_rad) - 3.0, 2 * M_PI), 0, 0.02);
+}
+
 // --- MRCLAM: 6 m x 12 m, cells of 0.25 m and 10 degrees, nothing known of the start.
 
 struct Search {

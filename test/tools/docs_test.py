@@ -119,7 +119,7 @@ class Pages(unittest.TestCase):
         self.assertEqual([line for line in lines if len(line) > MOST_COLUMNS], [])
 
     def test_the_functions_cite_the_equations_and_the_equations_name_the_functions(self):
-        for page in ("equations", "ekf_slam", "fast_slam"):
+        for page in ("equations", "ekf_slam", "fast_slam", "pose_grid"):
             rows = re.findall(r"^\| \((\d+)\) \|.*?\| `([^`]+)` in `([^`]+)` \|", read(f"docs/explanation/{page}.md"), re.M)
             self.assertGreater(len(rows), 7)
             self.assertEqual([int(number) for number, _, _ in rows], list(range(1, len(rows) + 1)))
@@ -238,6 +238,7 @@ class Generated(unittest.TestCase):
         self.assertEqual(rows["rover"], "`Odometry`, `Attitude`, `Inertial`")
         self.assertEqual(rows["husky"], "`Odometry`, `PoseEkf`")
         self.assertEqual(rows["mrclam_pf"], "`Odometry`, `PoseParticles<1000>`")
+        self.assertEqual(rows["mrclam_grid"], "`Odometry`, `PoseGrid<16, 32, 48>`")
         self.assertEqual(rows["fusion2"], "`PositionFusion<InverseVariance>`, `PositionFusion<Intersection>`")
 
     def test_a_robot_that_is_listed_and_not_there_is_an_error(self):

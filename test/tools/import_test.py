@@ -447,6 +447,53 @@ class BadInput(unittest.TestCase):
                 self.write("track.txt", text)
                 self.refused(run("import_udacity_track", os.path.join(self.set, "track.txt"), self.out), "track.txt", *words)
 
+    def test_mrclam_without_a_start_pose(self):
+        self.mrclam()
+        self.refused(run("import_mrclam", "--no-start", "--start-error", "1", "0", "0", self.set, 1, self.out), "--no-start")
+        self.assertEqual(run("import_mrclam", "--no-start", self.set, 1, self.out).returncode, 0)
+        about = json.loads(text_of(self.out + ".json"))
+        self.assertNotIn("Cmd_SetPos", about["messages"])
+        self.assertEqual(about["start_pose"]["x_m"], 0)
+
+    def kidnapped(self):
+        self.write("map_data.txt", "5.0\t-2.0\t7\n-1.5\t3.25\t2\n")
+        self.write("control_data.txt", "4.0 0.5\n4.0 62.9\n4.0 0.1\n")
+        self.write("gt_data.txt", "1.0 2.0 6.2\n1.4 2.0 6.25\n1.8 2.0 0.02\n")
+        self.write("observations.txt", "1 3.0 4.0\n1 -3.0 -4.0\n2 0.0 2.0\n")
+
+    def test_the_kidnapped_vehicle_is_imported(self):
+        self.kidnapped()
+        result = run("import_udacity_pf", self.set, self.out)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        about = json.loads(text_of(self.out + ".json"))
+        self.assertEqual(about["dropped"], {"steps without observations at the end": 1})
+        self.assertEqual(about["messages"], {"Cmd_SetPos": 1, "Cmd_SetYaw": 1, "In_BodySpeed": 2, "In_MapEntry": 2, "In_RangeBearing": 3})
+        self.assertEqual([one["id"] for one in about["landmarks"]], [2, 7])
+        of = {}
+        for t, i, data in read_log(self.out + ".log"):
+            name, signals = decode(judge(), i, data)
+            of.setdefault(name, []).append((t, {key: float(one.phys_value) if one.raw_value is not None else None for key, one in signals.items()}))
+        self.assertEqual([t for t, _ in of["In_RangeBearing"]], [1_000_000, 1_000_000, 1_100_000])
+        for (_, seen), (range_m, bearing) in zip(of["In_RangeBearing"], ((5, np.arctan2(4, 3)), (5, np.arctan2(-4, -3)), (2, np.pi / 2))):
+            self.assertAlmostEqual(seen["Range"], range_m, delta=0.0011)
+            self.assertAlmostEqual(seen["Bearing"], bearing, delta=0.00021)
+        # 62.9 rad/s is a turn of 6.29 rad in the step: the heading went from 6.25 to 0.02.
+        self.assertAlmostEqual(of["In_BodySpeed"][1][1]["YawRate"], (6.29 - 2 * np.pi) / 0.1, delta=0.001)
+        self.assertIn("1 yaw rates had a whole turn too much", " ".join(about["notes"]))
+        self.assertEqual(text_of(self.out + ".truth.csv").splitlines()[1:], ["1.000000,1.000000,2.000000,-0.083185", "1.100000,1.400000,2.000000,-0.033185"])
+
+    def test_the_kidnapped_vehicle_names_file_line_and_reason(self):
+        cases = [("map_data.txt", "1 2\n", ("map_data.txt:1", "2 columns, expected 3")), ("map_data.txt", "1 2 255\n", ("map_data.txt:1", "identity 255")),
+                 ("map_data.txt", "1 2 7\n3 4 7\n", ("map_data.txt:2", "second time")), ("control_data.txt", "4 nan\n", ("control_data.txt:1", "finite")),
+                 ("gt_data.txt", "1 2 3\n", ("3 rows of controls and 1 of truth",)), ("observations.txt", "4 1 1\n", ("observations.txt:1", "step 4")),
+                 ("observations.txt", "2 1 1\n1 1 1\n", ("observations.txt:2", "step 1 after step 2")),
+                 ("observations.txt", "1 1 1\n" * 17, ("step 1 has more than 16",)), ("observations2.txt", "1 1 1\n", ("2 files observations",))]
+        for name, text, words in cases:
+            with self.subTest(name=name, text=text[:20]):
+                self.kidnapped()
+                self.write(name, text)
+                self.refused(run("import_udacity_pf", self.set, self.out), *words)
+
     def test_mrclam_names_file_line_and_reason(self):
         cases = [("Robot1_Odometry.dat", "100.0 0.1 0.0\n100.5 0.1\n", ("Robot1_Odometry.dat:2", "2 columns, expected 3")),
                  ("Robot1_Odometry.dat", "100.0 0.1 zero\n", ("Robot1_Odometry.dat:1", "column 3", "not a number", "zero")),

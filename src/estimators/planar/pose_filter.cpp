@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "estimators/planar/landmark_sighting.hpp"
 #include "estimators/planar/pose_ekf.hpp"
 #include "estimators/planar/pose_ukf.hpp"
 
@@ -29,7 +30,16 @@ void PoseFilter<Filter>::recover(checks::Persistence& refused, base::Micros stam
 }
 
 template <class Filter>
-Innovation PoseFilter<Filter>::fuse(const sensor::LandmarkSighting& sighting, base::Micros stamp, const Context& ctx) {
+Innovation PoseFilter<Filter>::fuse(const sensor::LandmarkSighting& seen, base::Micros stamp, const Context& ctx) {
+  sensor::LandmarkSighting sighting = seen;
+  if (seen.landmark == kAnyLandmark) {
+    const std::optional<Innovation> refused = refusal_of(seen, ctx.map_frame.map);
+    if (refused) return *refused;
+    motion_.propagate(stamp, ctx.parameters);
+    give_up_when_lost();
+    sighting.landmark = nearest_landmark(seen, ctx);
+    if (sighting.landmark == kAnyLandmark) return {.landmark = sighting.landmark};
+  }
   const param::LandmarkParameters& n = ctx.parameters.landmark;
   const std::optional<model::Landmark> landmark =
       ctx.map_frame.map != nullptr ? ctx.map_frame.map->find(sighting.landmark) : std::nullopt;
@@ -64,6 +74,23 @@ Innovation PoseFilter<Filter>::fuse(const sensor::LandmarkSighting& sighting, ba
     return measure(model, kLandmark, n.gate_scale, stamp, ctx, sighting.landmark);
   }
   return {.verdict = sensor::Verdict::kNotFinite, .landmark = sighting.landmark, .failed = sensor::Check::kValue};
+}
+
+template <class Filter>
+std::uint8_t PoseFilter<Filter>::nearest_landmark(const sensor::LandmarkSighting& sighting, const Context& ctx) const {
+  if (phase_ != Phase::kTracking) return kAnyLandmark;
+  const LandmarkMap<kMapCapacity>& map = *ctx.map_frame.map;
+  std::uint8_t nearest = kAnyLandmark;
+  float least = base::kInfinity;
+  for (std::size_t i = 0; i < map.size(); ++i) {
+    const Innovation distance = distance_from(motion_.filter.x, covariance_of(motion_.filter), sighting, map.entry(i),
+                                              ctx.parameters.landmark, 0.0F);
+    const bool compared = distance.verdict == sensor::Verdict::kAccepted || distance.failed == sensor::Check::kGate;
+    if (!compared || !(distance.nis < least)) continue;
+    least = distance.nis;
+    nearest = map.id(i);
+  }
+  return nearest;
 }
 
 /// The candidate's own frame is the map; refused, it is one as good as any other.

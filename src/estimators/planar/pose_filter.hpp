@@ -70,6 +70,7 @@ class PoseFilter {
     return input_record(verdict);
   }
 
+  /// A sighting without identity, while tracking, is that of the landmark that it fits best (nearest neighbour).
   Innovation fuse(const sensor::LandmarkSighting& sighting, base::Micros stamp, const Context& ctx);
   Innovation fuse(const sensor::GnssPosition& fix, base::Micros stamp, const Context& ctx);
 
@@ -127,6 +128,8 @@ class PoseFilter {
   template <class Model>
   Innovation measure(const Model& model, Source source, float gate_scale, base::Micros stamp, const Context& ctx,
                      std::uint8_t landmark = 0xFF);
+  /// Identity of the landmark that the sighting fits best; that of any where the pose is not known.
+  [[nodiscard]] std::uint8_t nearest_landmark(const sensor::LandmarkSighting& sighting, const Context& ctx) const;
   /// A sighting while the pose is unknown.
   Innovation align(const model::RangeBearing& seen, base::Micros stamp, const Context& ctx, std::uint8_t landmark);
   void begin_tracking(base::Micros stamp) {

@@ -3,22 +3,10 @@
 
 #include "base/reinitialise.hpp"
 #include "estimators/planar/window_motion.hpp"
-#include "model/range_bearing.hpp"
 
 namespace tetap::estimators {
 
 namespace {
-
-struct FromBody {
-  float range_m, bearing_rad;
-};
-/// The sighting as it would be from the body's origin.
-FromBody from_body(float range_m, float bearing_rad, const model::PlanarMounting& mounting) {
-  const base::SinCos look = base::sincos(bearing_rad + mounting.yaw_rad);
-  const float x_m = mounting.x_b_m + range_m * look.cos;
-  const float y_m = mounting.y_b_m + range_m * look.sin;
-  return {.range_m = base::sqrt(x_m * x_m + y_m * y_m), .bearing_rad = base::atan2(y_m, x_m)};
-}
 
 /// The nearest multiple of a metre.
 float whole_metres(float m) {
@@ -31,6 +19,7 @@ float whole_metres(float m) {
 template <std::size_t kMost>
 void PoseParticles<kMost>::restart(base::Micros t, const Context& ctx) {
   base::reinitialise(*this);
+  cloud_.cloud.set_key({kKey, kFirstSeed + static_cast<std::uint32_t>(ctx.parameters.mapping.seed)});
   moved_ = last_absolute_ = now_ = t;
   const param::StartParameters& s = ctx.parameters.start;
   const SetPose start{
@@ -46,7 +35,7 @@ template <std::size_t kMost>
 void PoseParticles<kMost>::set_pose(base::Micros t, const SetPose& given, const Context& ctx) {
   batch_size_ = 0;  // seen from where the robot was
   motion_.propagate(t, ctx.parameters);
-  move_cloud(t);
+  move_cloud(t, ctx);
   const bool heading = given.sigma_yaw_rad < 3.14F;  // false for NaN too
   const float sigma_m = given.sigma_position_m > kFinest_m ? given.sigma_position_m : kFinest_m;
   const float sigma_rad = !heading ? base::kPi : given.sigma_yaw_rad > kFinest_rad ? given.sigma_yaw_rad : kFinest_rad;
@@ -74,51 +63,24 @@ void PoseParticles<kMost>::advance(base::Micros t, const Context& ctx, const sen
 template <std::size_t kMost>
 Innovation PoseParticles<kMost>::fuse(const sensor::LandmarkSighting& sighting, base::Micros stamp,
                                       const Context& ctx) {
-  Innovation record{.landmark = sighting.landmark};
-  const bool any = sighting.landmark == kAnyLandmark;
   const LandmarkMap<kMapCapacity>* map = ctx.map_frame.map;
-  const std::optional<model::Landmark> landmark = map != nullptr ? map->find(sighting.landmark) : std::nullopt;
-  if (map == nullptr || (any ? map->size() == 0 : !landmark.has_value())) {
-    record.verdict = sensor::Verdict::kUnknownLandmark;
-    return record;
-  }
-  const bool has_range = base::is_finite(sighting.range_m), has_bearing = base::is_finite(sighting.bearing_rad);
-  if (!has_range && !has_bearing) {
-    record.verdict = sensor::Verdict::kNotFinite;
-    record.failed = sensor::Check::kValue;
-    return record;
-  }
-  if (!has_range || !has_bearing || base::is_finite(sighting.range_rate_mps))
-    return record;  // a radar sees no landmark
+  const std::optional<Innovation> refused = refusal_of(sighting, map);
+  if (refused) return *refused;
+  Innovation record{.landmark = sighting.landmark};
   close_batch(stamp, ctx);
   if (batch_size_ == kBatch) return record;
   motion_.propagate(stamp, ctx.parameters);
-  move_cloud(stamp);
+  move_cloud(stamp, ctx);
   batch_stamp_ = stamp;
   batch_[batch_size_++] = sighting;
   record.verdict = sensor::Verdict::kAccepted;
-  if (any || !started_ || cloud_.lost()) return record;
-  return judge(sighting, *landmark, ctx.parameters.landmark);
-}
-
-/// Distance of the sighting from the estimate, of which no particle takes notice.
-template <std::size_t kMost>
-Innovation PoseParticles<kMost>::judge(const sensor::LandmarkSighting& sighting, const model::Landmark& landmark,
-                                       const param::LandmarkParameters& n) const {
-  PlanarEkf estimate;
-  estimate.x = motion_.filter.x;
-  estimate.p = motion_.filter.p;
-  const model::RangeBearing model{.range_m = sighting.range_m,
-                                  .bearing_rad = sighting.bearing_rad,
-                                  .sigma_range_m = n.sigma_range_m + n.sigma_range_per_m * sighting.range_m,
-                                  .sigma_bearing_rad = n.sigma_bearing_rad,
-                                  .landmark = landmark,
-                                  .mounting = n.mounting};
-  return record(estimate.update(model, cloud_.options.cap), sighting.landmark);
+  if (sighting.landmark == kAnyLandmark || !started_ || cloud_.lost()) return record;
+  return distance_from(motion_.filter.x, motion_.filter.p, sighting, *map->find(sighting.landmark),
+                       ctx.parameters.landmark, cloud_.options.cap);
 }
 
 template <std::size_t kMost>
-void PoseParticles<kMost>::move_cloud(base::Micros t) {
+void PoseParticles<kMost>::move_cloud(base::Micros t, const Context& ctx) {
   model::PlanarIncrement& travel = motion_.filter.travel;
   const bool any =
       base::abs(travel.ds_m) + base::abs(travel.dyaw_rad) > 0.0F || travel.var_ds > 0.0F || travel.var_dyaw > 0.0F;
@@ -128,6 +90,11 @@ void PoseParticles<kMost>::move_cloud(base::Micros t) {
                                       .sigma_ds_m = base::sqrt(travel.var_ds),
                                       .sigma_dyaw_rad = base::sqrt(travel.var_dyaw)}));
   travel = {};
+  const float jitter_m2 = t > moved_ ? ctx.parameters.particles.jitter * base::seconds(t - moved_) : 0.0F;
+  if (started_ && jitter_m2 > 0.0F) {
+    const float jitter_m = base::sqrt(jitter_m2);
+    static_cast<void>(cloud_.cloud.predict(filter::ParticleKernel{{jitter_m, 0, jitter_m, 0, 0, 0}}));
+  }
   moved_ = t;
 }
 
@@ -147,7 +114,7 @@ void PoseParticles<kMost>::weigh_batch(const Context& ctx) {
   float longest_m = 0;
   for (std::size_t i = 0; i < batch_size_; ++i) {
     const sensor::LandmarkSighting& one = batch_[i];
-    const FromBody at = from_body(one.range_m, one.bearing_rad, n.mounting);
+    const RangeAndBearing at = from_body(one.range_m, one.bearing_rad, n.mounting);
     const filter::LandmarkSeen candidate{
         .landmark = one.landmark == kAnyLandmark ? filter::LandmarkSeen::kAny : map.index(one.landmark),
         .range_m = at.range_m,
@@ -163,6 +130,7 @@ void PoseParticles<kMost>::weigh_batch(const Context& ctx) {
   batch_size_ = 0;
   if (size == 0) return;
   if (!started_) start_within(landmarks, longest_m);
+  cloud_.options.temper = ctx.parameters.particles.temper;
   if (!cloud_.update({seen.data(), size}, landmarks)) return;
   if (!cloud_.lost()) last_absolute_ = batch_stamp_;
   adopt_estimate();
@@ -208,6 +176,7 @@ void PoseParticles<kMost>::follow_origin() {
   });
 }
 
+template class PoseParticles<100>;
 template class PoseParticles<1000>;
 
 }  // namespace tetap::estimators

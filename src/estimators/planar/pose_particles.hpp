@@ -10,6 +10,7 @@
 #include "base/state_digest.hpp"
 #include "estimators/context.hpp"
 #include "estimators/planar/dead_reckoning.hpp"
+#include "estimators/planar/landmark_sighting.hpp"
 #include "estimators/planar/summing_ekf.hpp"
 #include "filter/particle_localisation.hpp"
 #include "sensor/window.hpp"
@@ -45,7 +46,7 @@ class PoseParticles {
   Innovation fuse(const Input& input, base::Micros stamp, const Context& ctx) {
     close_batch(stamp, ctx);
     const sensor::Verdict verdict = motion_.fuse(input, stamp, ctx.parameters);
-    if (stamp - moved_ >= kLongestArc) move_cloud(stamp);
+    if (stamp - moved_ >= kLongestArc) move_cloud(stamp, ctx);
     return input_record(verdict);
   }
   /// Range and bearing together; the landmark 0xFF is one without an identity. A sighting whose distance from the
@@ -102,7 +103,7 @@ class PoseParticles {
   static constexpr base::Micros kLongestArc{150'000};
   static constexpr float kFinest_m = 1e-3F, kFinest_rad = 1e-3F;
   static constexpr float kFarFromOrigin_m = 64;
-  static constexpr std::uint8_t kAnyLandmark = 0xFF;
+  static constexpr std::uint32_t kKey = 0x7E7A9, kFirstSeed = 0x9AC0;
 
   /// One pose, and a heading that is known within a radian.
   [[nodiscard]] bool tracking() const { return started_ && !cloud_.lost() && !(motion_.filter.p(2, 2) > 1.0F); }
@@ -111,9 +112,7 @@ class PoseParticles {
     const filter::ParticlePose& p = cloud_.cloud[i];
     for (const float v : {p.x_m, p.y_m, p.cos_yaw, p.sin_yaw, cloud_.cloud.log_weight(i)}) sink(v);
   }
-  [[nodiscard]] Innovation judge(const sensor::LandmarkSighting& sighting, const model::Landmark& landmark,
-                                 const param::LandmarkParameters& n) const;
-  void move_cloud(base::Micros t);
+  void move_cloud(base::Micros t, const Context& ctx);
   /// The batch of an earlier stamp goes into the cloud.
   void close_batch(base::Micros stamp, const Context& ctx) {
     if (batch_size_ > 0 && stamp > batch_stamp_) weigh_batch(ctx);
@@ -123,7 +122,7 @@ class PoseParticles {
   void adopt_estimate();
   void follow_origin();
 
-  Cloud cloud_{base::PhiloxKey{0x7E7A9, 0x9AC1}};
+  Cloud cloud_;
   Motion motion_;                       ///< at the far end of the window, from the last batch on
   Motion present_;                      ///< the same carried over the window
   base::Anchored origin_x_, origin_y_;  ///< zero of the cloud's coordinates

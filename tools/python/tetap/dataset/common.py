@@ -188,9 +188,11 @@ class Recording:
         """The landmark that each sighting shows, where the log does not say it or a mapper's word for it is judged."""
         self._sightings = (self.log_us(time_us), identifiers)
 
-    def start_pose(self, x_m, y_m, yaw_rad, sigma_position_m, sigma_yaw_rad, how):
-        self.log.add("Cmd_SetPos", POSE_US, Ctr=1, X=x_m, Y=y_m)
-        self.log.add("Cmd_SetYaw", POSE_US + 1_000, Ctr=1, Yaw=yaw_rad, StdPos=sigma_position_m, StdYaw=sigma_yaw_rad)
+    def start_pose(self, x_m, y_m, yaw_rad, sigma_position_m, sigma_yaw_rad, how, sent=True):
+        """`sent` False: the pose is in the description, and not on the bus."""
+        if sent:
+            self.log.add("Cmd_SetPos", POSE_US, Ctr=1, X=x_m, Y=y_m)
+            self.log.add("Cmd_SetYaw", POSE_US + 1_000, Ctr=1, Yaw=yaw_rad, StdPos=sigma_position_m, StdYaw=sigma_yaw_rad)
         self.about["start_pose"] = {"time_s": POSE_US / 1e6, "x_m": float(x_m), "y_m": float(y_m), "yaw_rad": float(yaw_rad),
                                     "sigma_position_m": float(sigma_position_m), "sigma_yaw_rad": float(sigma_yaw_rad), "from": how}
 
