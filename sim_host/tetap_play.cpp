@@ -21,8 +21,12 @@ int main(int count, char** values) {
     sim::PlayOptions options = sim::play_options(arguments, settings.can_base());
     options.version = hal::version_text(version()).c_str();
     if (options.robot.empty() && !settings.words().empty()) throw sim::UsageError("--params and --set need --robot");
-    if (!options.robot.empty())
+    if (!options.robot.empty()) {
       options.notes = sim::parameter_notes(sim::parameters_of(options.robot, settings), settings);
+      sim::for_robot(options.robot, [&]<class Estimators>(std::type_identity<Estimators>, const param::Parameters&) {
+        options.script.graph = Estimators::template kTakes<sensor::LoopClosure>;
+      });
+    }
     sim::Interruption::expect();
     // Before the bus, so that an unreadable log is reported also where there is no bus.
     sim::SurveyedLog log = sim::survey_for(options);

@@ -15,9 +15,9 @@ namespace tetap::sim {
 
 /// "?" for a code that has no name.
 [[nodiscard]] constexpr std::string_view name(sensor::Sensor value) {
-  constexpr std::array<std::string_view, 10> kNames{"Imu",          "WheelCounts",  "WheelSpeed",   "BodySpeed",
+  constexpr std::array<std::string_view, 12> kNames{"Imu",          "WheelCounts",  "WheelSpeed",   "BodySpeed",
                                                     "RangeBearing", "GnssPosition", "GnssVelocity", "Magnetometer",
-                                                    "Barometer",    "Heading"};
+                                                    "Barometer",    "Heading",      "Closure",      "Feature"};
   const auto i = static_cast<std::size_t>(value);
   return value == sensor::Sensor::kNotAvailable ? "NotAvailable" : i < kNames.size() ? kNames[i] : "?";
 }
@@ -50,6 +50,11 @@ namespace tetap::sim {
   return i < kNames.size() ? kNames[i] : "?";
 }
 
+[[nodiscard]] constexpr std::string_view name(bus::GraphStatus value) {
+  constexpr std::array<std::string_view, 5> kNames{"None", "Converged", "NotConverged", "Singular", "NoRoom"};
+  const auto i = static_cast<std::size_t>(value);
+  return i < kNames.size() ? kNames[i] : "?";
+}
 [[nodiscard]] constexpr std::string_view name(sensor::SourceState value) {
   constexpr std::array<std::string_view, 5> kNames{"Stopped", "Confirming", "Fusing", "Rejecting", "Distrusted"};
   const auto i = static_cast<std::size_t>(value);
@@ -87,6 +92,8 @@ namespace tetap::sim {
   if (offset == bus::EstLandmark::kOffset) return "Est_Landmark";
   if (offset == bus::EstLandmarkStd::kOffset) return "Est_LandmarkStd";
   if (offset == bus::EstKeyframe::kOffset) return "Est_Keyframe";
+  if (offset == bus::EstKeyframePose::kOffset) return "Est_KeyframePose";
+  if (offset == bus::EstGraph::kOffset) return "Est_Graph";
   return "offset " + std::to_string(offset);
 }
 

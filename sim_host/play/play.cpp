@@ -111,6 +111,7 @@ class Survey {
   /// `facts`: of the log, where it may be a record.
   Survey(const PlayOptions& options, LogFacts facts)
       : base_(options.script.log_base),
+        graph_(options.script.graph),
         grid_(options.script.period),
         record_(options.log, base_, std::move(facts)),
         surveys_record_(may_be_record(options)) {}
@@ -120,7 +121,7 @@ class Survey {
   }
 
   void add(const TimedFrame& entry) {
-    if (is_counted_input(entry.frame, base_)) {
+    if (is_counted_input(entry.frame, base_, graph_)) {
       ++inputs_;
       if (own_ticks_ == 0)
         while (grid_.due_before(entry.time)) ++grid_ticks_;
@@ -155,6 +156,7 @@ class Survey {
   }
 
   std::uint32_t base_;
+  bool graph_;
   TickGrid grid_;
   RecordSurvey record_;
   bool surveys_record_, has_node_frames_ = false;
@@ -167,7 +169,7 @@ class Survey {
 SurveyedLog survey_for(PlayOptions& options) {
   options.reading.base = options.script.log_base;
   SurveyedLog log{.file = LogFile(options.log, options.reading)};
-  Survey survey(options, Survey::may_be_record(options) ? facts_of(log.file, options.script.log_base) : LogFacts{});
+  Survey survey(options, Survey::may_be_record(options) ? facts_of(log.file, options.script) : LogFacts{});
   for (TimedFrame entry; log.file.next(entry);) survey.add(entry);
   const LogReport& report = log.file.report();
   if (report.data == 0)

@@ -28,9 +28,16 @@ inline constexpr std::uint64_t kTimeMask = 0xFFFFFFFFFFFF;
   if (frame.extended || frame.id < base || frame.id >= base + bus::kBlock + bus::kMapBlock) return std::nullopt;
   return frame.id - base;
 }
-/// A frame the node consumes and counts: of its inputs, sync frames and their guards excepted.
-[[nodiscard]] constexpr bool is_counted_input(const base::CanFrame& frame, std::uint32_t base) {
+/// Offsets of inputs: below kInputOffsets, and closures and features behind the map's outputs.
+[[nodiscard]] constexpr bool is_map_input(std::uint32_t offset) {
+  return offset == bus::InClosureFrames::kOffset || offset == bus::InFeature::kOffset;
+}
+[[nodiscard]] constexpr bool is_input(std::uint32_t offset) { return offset < kInputOffsets || is_map_input(offset); }
+/// A frame the node consumes and counts: of its inputs, sync frames and their guards excepted. Robots without a graph count none of the
+/// map's inputs.
+[[nodiscard]] constexpr bool is_counted_input(const base::CanFrame& frame, std::uint32_t base, bool graph = false) {
   const auto offset = offset_in_block(frame, base);
+  if (offset && is_map_input(*offset)) return graph;
   return offset && *offset < kInputOffsets && *offset != bus::InSync::kOffset && !bus::is_sync_guard(*offset, frame);
 }
 /// Frames with real time of loop and controller, and the program's version, differ between runs that are otherwise
@@ -102,7 +109,7 @@ class EpochCollector {
   /// A frame from the bus; the finished epoch when this was its last one. Frames of others are ignored.
   std::optional<NodeEpoch> add(const base::CanFrame& frame) {
     const auto offset = offset_in_block(frame, base_);
-    if (!offset || *offset < kInputOffsets || is_begin_response(frame) || is_snapshot_piece(frame, base_))
+    if (!offset || is_input(*offset) || is_begin_response(frame) || is_snapshot_piece(frame, base_))
       return std::nullopt;
     const bool of_map = *offset >= bus::kBlock;
     if (of_map && idle()) return std::nullopt;

@@ -37,7 +37,9 @@ Recorder::Recorder(const RecorderOptions& options)
       sensors_(options.folder + "/sensors.csv"),
       status_(options.folder + "/status.csv"),
       sources_(options.folder + "/sources.csv"),
-      map_(options.folder + "/map.csv") {
+      map_(options.folder + "/map.csv"),
+      keyframes_(options.folder + "/keyframes.csv"),
+      graph_(options.folder + "/graph.csv") {
   if (options.raw) raw_.emplace(options.folder + "/raw.log");
   estimates_.write(
       "epoch,time_s,estimator,kind,x_m,y_m,yaw_rad,speed_mps,yaw_rate_radps,std_x_m,std_y_m,std_yaw_rad,corr_xy,corr_x_"
@@ -55,6 +57,9 @@ Recorder::Recorder(const RecorderOptions& options)
   sensors_.write("epoch,time_s,estimator,sensor,inst,accepted,rejected,nis_mean,age_s\n");
   status_.write("epoch,time_s,mode,used,faults,reset_ctr,reset_cause,map_faults\n");
   sources_.write("epoch,time_s,estimator,source,state,failed\n");
+  keyframes_.write("epoch,time_s,keyframe,x_m,y_m,yaw_rad\n");
+  graph_.write(
+      "epoch,time_s,chi2,graph_status,closures,jobs,map_size,map_refused,contradicted,work_left,jobs_aborted\n");
   map_.write("epoch,time_s,landmark,x_m,y_m,std_x_m,std_y_m,corr_xy,hits,age_s,landmark_state\n");
 }
 
@@ -118,6 +123,12 @@ void Recorder::frame(const base::CanFrame& f) {
     landmark_ = bus::decode<bus::EstLandmark>(payload);
   } else if (offset == bus::EstLandmarkStd::kOffset) {
     if (const auto deviation = bus::decode<bus::EstLandmarkStd>(payload)) landmark_row(*deviation);
+  } else if (offset == bus::EstKeyframePose::kOffset) {
+    if (const auto keyframe = bus::decode<bus::EstKeyframePose>(payload)) keyframe_row(*keyframe);
+  } else if (offset == bus::EstGraph::kOffset) {
+    if (const auto graph = bus::decode<bus::EstGraph>(payload)) graph_row(*graph);
+  } else if (offset == bus::EstDiagMapper::kOffset) {
+    if (const auto mapper = bus::decode<bus::EstDiagMapper>(payload)) mapper_ = *mapper;
   } else if (offset >= bus::EstPos::kOffset) {
     const std::size_t k = (offset - bus::EstPos::kOffset) / bus::EstPos::kStride;
     if (k >= instances_.size()) return;
@@ -187,6 +198,27 @@ void Recorder::state_row(std::size_t k, const State& state) {
   row(time_).integer(static_cast<std::int64_t>(k));
   for (const double value : state.values) line_.put(',').real(value, 7);
   states_.write(line_.put('\n').view());
+}
+
+void Recorder::keyframe_row(const bus::EstKeyframePose& k) {
+  row(time_).integer(k.id);
+  for (const float value : {k.x_m, k.y_m, k.yaw_rad}) line_.put(',').real(static_cast<double>(value), 4);
+  keyframes_.write(line_.put('\n').view());
+}
+
+/// With the numbers of the last page about the map.
+void Recorder::graph_row(const bus::EstGraph& g) {
+  if (g.chi2_raw == bus::EstGraph::kChi2NotAvailable) {
+    row(time_);
+  } else {
+    row(time_).real(static_cast<double>(g.chi2_raw) * bus::EstGraph::kChi2Scale, 6);
+  }
+  line_.put(',');
+  put_name(line_, g.status);
+  for (const int value : {int{g.closures}, int{g.jobs}, int{mapper_.map_size}, int{mapper_.map_refused},
+                          int{mapper_.ambiguous}, int{mapper_.work_left}, int{mapper_.jobs_aborted}})
+    line_.put(',').integer(value);
+  graph_.write(line_.put('\n').view());
 }
 
 void Recorder::landmark_row(const bus::EstLandmarkStd& s) {
@@ -287,20 +319,21 @@ void Recorder::source_rows(std::size_t k, const bus::EstStateSources& s) {
 }
 
 void Recorder::flush() {
-  for (OutFile* file : {&estimates_log_, &estimates_, &states_, &innovations_, &sensors_, &status_, &sources_, &map_})
+  for (OutFile* file : {&estimates_log_, &estimates_, &states_, &innovations_, &sensors_, &status_, &sources_, &map_,
+                        &keyframes_, &graph_})
     file->flush();
   if (raw_) raw_->flush();
 }
 
 const Recorder::Totals& Recorder::end() {
   totals_.estimates_sha256 = estimates_log_.end();
-  for (OutFile* file : {&estimates_, &states_, &innovations_, &sensors_, &status_, &sources_, &map_}) file->end();
+  for (OutFile* file : {&estimates_, &states_, &innovations_, &sensors_, &status_, &sources_, &map_, &keyframes_, &graph_}) file->end();
   if (raw_) raw_->end();
   return totals_;
 }
 
 void Recorder::publish() {
-  for (OutFile* file : {&estimates_log_, &estimates_, &states_, &innovations_, &sensors_, &status_, &sources_, &map_})
+  for (OutFile* file : {&estimates_log_, &estimates_, &states_, &innovations_, &sensors_, &status_, &sources_, &map_, &keyframes_, &graph_})
     file->publish();
   if (raw_) raw_->publish();
 }

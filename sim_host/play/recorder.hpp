@@ -81,6 +81,8 @@ class Recorder {
   void state(State& state, std::uint32_t offset, std::span<const std::uint8_t> payload);
   void state_row(std::size_t k, const State& state);
   void landmark_row(const bus::EstLandmarkStd& std);
+  void keyframe_row(const bus::EstKeyframePose& k);
+  void graph_row(const bus::EstGraph& g);
   void sensor_row(const bus::EstSensorStat& statistics);
   void innovation_row(const bus::EstInnov& innovation);
   void status_row(const bus::EstStatus& status);
@@ -90,11 +92,12 @@ class Recorder {
   void raw_line(const base::CanFrame& frame, base::Micros time);
 
   RecorderOptions options_;
-  OutFile estimates_log_, estimates_, states_, innovations_, sensors_, status_, sources_, map_;
+  OutFile estimates_log_, estimates_, states_, innovations_, sensors_, status_, sources_, map_, keyframes_, graph_;
   std::optional<OutFile> raw_;
   Line line_;
   std::array<Instance, bus::EstPos::kCount> instances_{};
   std::array<State, bus::EstPos::kCount> states_now_{};
+  bus::EstDiagMapper mapper_;                 ///< last page about the map
   std::optional<bus::EstLandmark> landmark_;  ///< the last, until its sigmas come
   std::uint64_t number_ = 0;                  ///< number of the epoch
   std::uint8_t last_epoch_ = 0;

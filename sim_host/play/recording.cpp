@@ -25,8 +25,10 @@ void RecordReader::refuse(const std::string& why) const {
   throw std::runtime_error(name_ + ": cannot be repeated exactly: " + why);
 }
 
-LogFacts facts_of(Frames& log, std::uint32_t log_base) {
+LogFacts facts_of(Frames& log, const ScriptOptions& options) {
+  const std::uint32_t log_base = options.log_base;
   LogFacts facts;
+  facts.graph = options.graph;
   SnapshotCollector snapshots(log_base);
   std::uint64_t epochs = 0;
   bool late = false;  // the log begins after the node's start
@@ -55,7 +57,7 @@ RecordReader::Found RecordReader::add(const TimedFrame& entry) {
   const auto offset = offset_in_block(frame, log_base_);
   if (!offset) return found;
   const bool own = own_inputs_.add(frame);
-  if (is_counted_input(frame, log_base_)) {
+  if (is_counted_input(frame, log_base_, graph_)) {
     ++(own ? own_ : inputs_);
     found.input = true;
     found.own = own;
@@ -311,7 +313,7 @@ Recording RecordSurvey::finish() {
 }
 
 Recording recording_of(Frames& log, const std::string& name, const ScriptOptions& options) {
-  RecordSurvey survey(name, options.log_base, facts_of(log, options.log_base));
+  RecordSurvey survey(name, options.log_base, facts_of(log, options));
   for (TimedFrame entry; log.next(entry);) survey.add(entry);
   return survey.finish();
 }

@@ -23,11 +23,12 @@ namespace tetap::sim {
 struct LogFacts {
   std::optional<bus::EstDiagWired> wired;  ///< first page with the sensors that are wired to the node
   std::optional<Snapshot> snapshot;        ///< the first one of a log that begins after the node's start
+  bool graph = false;                      ///< the robot takes closures between keyframes
 };
 
 /// Reads the begin of a log: until the page is there, or so many epochs that it never comes; a log that begins after
 /// the node's start until its snapshot is whole.
-[[nodiscard]] LogFacts facts_of(Frames& log, std::uint32_t log_base);
+[[nodiscard]] LogFacts facts_of(Frames& log, const ScriptOptions& options);
 
 /// Where a record ends before its log does, and why.
 struct Hole {
@@ -66,6 +67,7 @@ class RecordReader {
   RecordReader(std::string name, std::uint32_t log_base, const LogFacts& facts)
       : name_(std::move(name)),
         log_base_(log_base),
+        graph_(facts.graph),
         collector_(log_base),
         own_inputs_(log_base, facts.wired),
         snapshot_(facts.snapshot ? &*facts.snapshot : nullptr) {}
@@ -112,6 +114,7 @@ class RecordReader {
 
   std::string name_;
   std::uint32_t log_base_;
+  bool graph_;
   EpochCollector collector_;
   OwnInputs own_inputs_;
   const Snapshot* snapshot_;

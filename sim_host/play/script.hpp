@@ -71,6 +71,7 @@ static_assert(Source<Script>);
 struct ScriptOptions {
   std::uint32_t base = 0x300;      ///< id base of the node that is played to
   std::uint32_t log_base = 0x300;  ///< id base of the log
+  bool graph = false;              ///< the robot takes closures between keyframes
   base::Micros period{10'000};
 };
 

@@ -136,4 +136,24 @@ constexpr void encode_sample(const sensor::OutsideHeading& v, const SampleHead& 
       .stamp_us = head.stamp_us, .seq = head.seq, .inst = head.inst, .angle_rad = v.yaw_rad, .acc_rad = v.acc_rad});
 }
 
+template <class Put>
+constexpr void encode_sample(const sensor::LoopClosure& v, const SampleHead& head, Put&& put) {
+  const auto number = [](std::int32_t steps, std::int64_t per_unit) {
+    return static_cast<float>(steps) / static_cast<float>(per_unit);
+  };
+  put(InClosureFrames{.seq = head.seq, .from_id = v.from, .to_id = v.to, .stamp_us = head.stamp_us});
+  put(InClosurePose{.seq = head.seq,
+                    .x_m = number(v.x, v.kStepsPerMetre),
+                    .y_m = number(v.y, v.kStepsPerMetre),
+                    .yaw_rad = number(v.yaw, v.kStepsPerRadian)});
+  put(InClosureStd{.seq = head.seq,
+                   .std_x_m = number(v.unpack(v.sigmas, 0), v.kStepsPerMetre),
+                   .std_y_m = number(v.unpack(v.sigmas, 1), v.kStepsPerMetre),
+                   .std_yaw_rad = number(v.unpack(v.sigmas, 2), v.kSigmaStepsPerRadian)});
+  put(InClosureCorr{.seq = head.seq,
+                    .corr_xy = number(v.unpack(v.correlations, 0), v.kCorrelationSteps),
+                    .corr_x_yaw = number(v.unpack(v.correlations, 1), v.kCorrelationSteps),
+                    .corr_y_yaw = number(v.unpack(v.correlations, 2), v.kCorrelationSteps)});
+}
+
 }  // namespace tetap::bus

@@ -142,6 +142,11 @@ class Publisher {
   }
 
  private:
+  static constexpr std::uint32_t kKeyframeIds = 0x3FFF;  ///< identities go round
+  template <estimators::MapsLandmarks Estimator, class Send>
+  void put_landmark(const Estimator& estimator, std::uint32_t size, Send& send);
+  template <estimators::MapsKeyframes Estimator, class Send>
+  void put_graph(const Estimator& estimator, std::uint32_t size, Send& send);
   template <class Message, class Send>
   void put(const Message& message, Send& send, std::size_t instance = 0) {
     ++frames_;
@@ -264,7 +269,7 @@ template <estimators::MakesMap Estimator, class Send>
 void Publisher<N>::own_map(const Estimator& estimator, Send& send) {
   const bool page = every(8 * parameters_.publish.diagnostics_every, 9);
   const bool landmark = every(parameters_.mapping.publish_every, 4);
-  if (!page && !landmark) return;
+  if (!page && !landmark && !estimators::MapsKeyframes<Estimator>) return;
   const estimators::MapReport map = estimator.own_map();
   if (page)
     put(bus::EstDiagMapper{.map_size = static_cast<std::uint16_t>(std::min<std::uint32_t>(map.size, 0xFFFF)),
@@ -273,9 +278,17 @@ void Publisher<N>::own_map(const Estimator& estimator, Send& send) {
                            .work_left = static_cast<std::uint16_t>(std::min<std::uint32_t>(map.work_left, 0xFFFF)),
                            .jobs_aborted = static_cast<std::uint8_t>(map.jobs_aborted)},
         send);
-  if (!landmark || map.size == 0) return;
+  if constexpr (estimators::MapsKeyframes<Estimator>) put_graph(estimator, map.size, send);
+  if constexpr (estimators::MapsLandmarks<Estimator>) {
+    if (landmark && map.size > 0) put_landmark(estimator, map.size, send);
+  }
+}
+
+template <std::size_t N>
+template <estimators::MapsLandmarks Estimator, class Send>
+void Publisher<N>::put_landmark(const Estimator& estimator, std::uint32_t size, Send& send) {
   const auto turn = epoch_ / static_cast<std::uint32_t>(parameters_.mapping.publish_every);
-  const estimators::MappedLandmark m = estimator.own_landmark(turn % map.size);
+  const estimators::MappedLandmark m = estimator.own_landmark(turn % size);
   put(bus::EstLandmark{.id = m.id, .x_raw = millimetres(m.place.x), .y_raw = millimetres(m.place.y)}, send);
   const float x = base::sqrt(m.xx_m2), y = base::sqrt(m.yy_m2);
   put(bus::EstLandmarkStd{.id = m.id,
@@ -286,6 +299,38 @@ void Publisher<N>::own_map(const Estimator& estimator, Send& send) {
                           .age_s = static_cast<std::uint8_t>(m.age.us < 255'000'000 ? m.age.us / 1'000'000 : 255),
                           .state = m.confirmed ? bus::LandmarkState::kKept : bus::LandmarkState::kTentative,
                           .epoch = tag()},
+      send);
+}
+
+/// New keyframes at once, those of the graph in turn, and the graph's state.
+template <std::size_t N>
+template <estimators::MapsKeyframes Estimator, class Send>
+void Publisher<N>::put_graph(const Estimator& estimator, std::uint32_t size, Send& send) {
+  estimator.new_keyframes([&](const estimators::NewKeyframe& k) {
+    put(bus::EstKeyframe{.id = static_cast<std::uint16_t>(k.id & kKeyframeIds),
+                         .stamp_us = static_cast<std::uint32_t>(static_cast<std::uint64_t>(k.stamp.us) & 0xFFFFF),
+                         .step_x_m = k.step_x_m,
+                         .step_y_m = k.step_y_m},
+        send);
+  });
+  if (every(parameters_.mapping.publish_every, 4) && size > 0) {
+    const auto turn = epoch_ / static_cast<std::uint32_t>(parameters_.mapping.publish_every);
+    const estimators::GraphKeyframe k = estimator.own_keyframe(turn % size);
+    put(bus::EstKeyframePose{.id = static_cast<std::uint16_t>(k.id & kKeyframeIds),
+                             .x_m = k.pose.x.minus({}),
+                             .y_m = k.pose.y.minus({}),
+                             .yaw_rad = k.pose.yaw_rad},
+        send);
+  }
+  if (!every(parameters_.publish.diagnostics_every, 10)) return;
+  const estimators::GraphReport g = estimator.graph();
+  const double steps = g.chi2 / bus::EstGraph::kChi2Scale;
+  const bool shown = g.end != estimators::GraphEnd::kNone && steps < 1e12;  // false for NaN
+  put(bus::EstGraph{.chi2_raw = shown ? static_cast<std::uint64_t>(static_cast<std::int64_t>(steps + 0.5))
+                                      : bus::EstGraph::kChi2NotAvailable,
+                    .status = static_cast<bus::GraphStatus>(g.end),
+                    .closures = static_cast<std::uint16_t>(std::min<std::uint32_t>(g.closures, 8191)),
+                    .jobs = static_cast<std::uint8_t>(g.jobs)},
       send);
 }
 

@@ -4,6 +4,7 @@
 
 #include "base/time.hpp"
 #include "model/landmark.hpp"
+#include "model/planar_pose.hpp"
 #include "sensor/vocabulary.hpp"
 
 #include <concepts>
@@ -11,6 +12,9 @@
 #include <cstdint>
 
 namespace tetap::estimators {
+
+/// How an optimisation of a pose graph ended.
+enum class GraphEnd : std::uint8_t { kNone = 0, kConverged = 1, kNotConverged = 2, kSingular = 3, kNoRoom = 4 };
 
 /// A landmark of the own map; errors in axes of n.
 struct MappedLandmark {
@@ -24,6 +28,28 @@ struct MappedLandmark {
   bool confirmed = false;  ///< false: the landmark gives way when there is no room
 };
 
+/// A keyframe that is new in this tick.
+struct NewKeyframe {
+  std::uint32_t id = 0;  ///< counted from 0
+  base::Micros stamp;
+  float step_x_m = 0;  ///< from the keyframe before it, in that one's frame; NaN: not known
+  float step_y_m = 0;
+};
+
+/// A keyframe that the graph holds.
+struct GraphKeyframe {
+  std::uint32_t id = 0;
+  model::PlanarPose pose;
+};
+
+/// The graph and its latest optimisation.
+struct GraphReport {
+  double chi2 = 0;  ///< over the edges that were not left out
+  GraphEnd end = GraphEnd::kNone;
+  std::uint32_t closures = 0;
+  std::uint32_t jobs = 0;  ///< optimisations that ended
+};
+
 /// State of the own map and of a job that lasts longer than a tick. Counters grow since the start of the estimator.
 struct MapReport {
   std::uint32_t size = 0;
@@ -33,11 +59,22 @@ struct MapReport {
   std::uint32_t jobs_aborted = 0;
 };
 
-/// An estimator that makes a map: `own_map()` reports on it, `own_landmark(i)` is its landmark i below `size`.
+/// An estimator that makes a map: `own_map()` reports on it.
 template <class E>
-concept MakesMap = requires(const E& e, std::size_t i) {
+concept MakesMap = requires(const E& e) {
   { e.own_map() } -> std::same_as<MapReport>;
+};
+/// `own_landmark(i)` is its landmark i below `size`.
+template <class E>
+concept MapsLandmarks = MakesMap<E> && requires(const E& e, std::size_t i) {
   { e.own_landmark(i) } -> std::same_as<MappedLandmark>;
+};
+/// `own_keyframe(i)` is its keyframe i below `size`; new ones are handed to a sink, each in one tick alone.
+template <class E>
+concept MapsKeyframes = MakesMap<E> && requires(const E& e, std::size_t i) {
+  { e.own_keyframe(i) } -> std::same_as<GraphKeyframe>;
+  { e.graph() } -> std::same_as<GraphReport>;
+  e.new_keyframes([](const NewKeyframe&) {});
 };
 
 /// An estimator that localises on the map it is given (MapFrame::map).

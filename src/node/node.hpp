@@ -4,6 +4,7 @@
 #pragma once
 
 #include "base/state_hash.hpp"
+#include "bus/closure_assembly.hpp"
 #include "bus/decoder.hpp"
 #include "bus/input_crc.hpp"
 #include "bus/publisher.hpp"
@@ -52,6 +53,8 @@ class Node {
 
   /// Whether an estimator makes a map of its own, which a command resets.
   static constexpr bool kMakesMap = Estimators::kMakesMap;
+  /// Whether an estimator takes displacements between keyframes.
+  static constexpr bool kTakesClosures = Estimators::template kTakes<sensor::LoopClosure>;
   /// Called by the inbox.
   void sample(const sensor::Sample& sample) {
     protection_.sample(sample, now_, counters_, [this](const sensor::Sample& vouched) { take(vouched); });
@@ -95,11 +98,13 @@ class Node {
   using Estimates = typename FusionWindow::Estimates;
   static constexpr std::size_t kPrimary = FusionWindow::kPrimary;
   static constexpr base::Micros kLongestStep{500'000};
+  using Closures = std::conditional_t<kTakesClosures, bus::ClosureAssembly, bus::NoClosures>;
   using Landmarks = std::conditional_t<Estimators::kUsesMap, node::Landmarks, node::NoLandmarks>;
 
-  /// Sightings, and speeds that are commands.
+  /// Sightings, closures, and speeds that are commands.
   [[nodiscard]] bool at_no_fixed_rate(const sensor::Sample& sample) const {
     const bool commanded = parameters_.wheels.hold == param::Hold::kForward;
+    if (kTakesClosures && sample.sensor == sensor::Sensor::kClosure) return true;
     return (Estimators::template kTakes<sensor::LandmarkSighting> && sample.sensor == sensor::Sensor::kRangeBearing) ||
            (Estimators::template kTakes<sensor::BodySpeed> && sample.sensor == sensor::Sensor::kBodySpeed && commanded);
   }
@@ -140,6 +145,7 @@ class Node {
   MapOrigin origin_;
   BusProtection<Estimators> protection_;
   bus::Decoder inbox_;
+  [[no_unique_address]] Closures closures_;
   bus::StampWraps wraps_;
   bus::Counters counters_;
   bus::Publisher<Estimators::kCount> publisher_;
@@ -167,6 +173,7 @@ void Node<Estimators, Capacity>::power_on(base::Micros t) {
   origin_.power_on(map_frame_, parameters_.gnss);
   protection_.power_on();
   inbox_.power_on();
+  closures_.power_on();
   wraps_.power_on();
   counters_ = {};
   publisher_.power_on();
@@ -193,6 +200,7 @@ void Node<Estimators, Capacity>::resume(const Node& other) {
   protection_.resume(other.protection_);
   inbox_ = other.inbox_;
   wraps_ = other.wraps_;
+  closures_ = other.closures_;
   counters_ = other.counters_;
   publisher_.resume(other.publisher_);
   landmarks_ = other.landmarks_;
@@ -214,6 +222,9 @@ template <class Estimators, std::size_t Capacity>
 void Node<Estimators, Capacity>::on_frame(const base::CanFrame& frame) {
   const auto offset = static_cast<std::uint8_t>(frame.id - parameters_.can_base);
   input_crc_.add(bus::frame_crc(offset, frame));
+  if constexpr (kTakesClosures) {
+    if (bus::ClosureAssembly::takes(offset)) return closures_.on_frame(offset, frame, now_, counters_, *this);
+  }
   const bool admitted =
       protection_.admits(offset, frame, now_, counters_, [this](const sensor::Sample& vouched) { take(vouched); });
   if (admitted) inbox_.on_frame(offset, frame, now_, counters_, *this);
@@ -258,6 +269,7 @@ void Node<Estimators, Capacity>::tick(base::Micros t, const bus::LoopHealth& loo
   input_crc_.close_epoch();
   protection_.tick(now_, counters_);
   inbox_.expire(now_, base::Micros{parameters_.loop.window_us}, counters_);
+  closures_.expire(now_, base::Micros{parameters_.loop.window_us}, counters_);
   apply_map(before);
   consume(now_);
   if (origin_.take_replaced()) restart_in_new_map();
@@ -319,6 +331,7 @@ void Node<Estimators, Capacity>::restart(base::Micros t, sensor::ResetCause caus
   jumps_ = 0;
   if (cause == sensor::ResetCause::kTimeJump) {
     inbox_.discard(counters_);
+    closures_.discard(counters_);
     wraps_.power_on();
     history_.clear();
     history_.open_from(t - base::Micros{parameters_.loop.period_us});

@@ -224,14 +224,18 @@ struct RecoveryParameters {
 
 /// Mappers: how the own map is made and sent.
 struct MappingParameters {
-  float correlation_m = 0;           ///< way over which errors of one landmark's sightings stay alike; 0: independent
-  float separation_m = 0.8F;         ///< without identities: no new landmark nearer than this to another one
-  std::int32_t association = 0;      ///< without identities: 0 nearest neighbour, 1 assignment, 2 joint compatibility
-  std::int32_t confirming_hits = 3;  ///< a landmark of fewer sightings gives way when there is no room
-  std::int32_t when_full = 0;        ///< 0: a new landmark is refused; 1: the landmark unseen for longest goes
-  float resample_share = 0.5F;       ///< share of effective particles below which they are drawn anew
-  std::int32_t seed = 1;             ///< key of the particles' noise
-  std::int32_t publish_every = 10;   ///< ticks between landmarks on the bus, one at a time; 0: never
+  float correlation_m = 0;            ///< way over which errors of one landmark's sightings stay alike; 0: independent
+  float separation_m = 0.8F;          ///< without identities: no new landmark nearer than this to another one
+  std::int32_t association = 0;       ///< without identities: 0 nearest neighbour, 1 assignment, 2 joint compatibility
+  std::int32_t confirming_hits = 3;   ///< a landmark of fewer sightings gives way when there is no room
+  std::int32_t when_full = 0;         ///< 0: a new landmark is refused; 1: the landmark unseen for longest goes
+  float resample_share = 0.5F;        ///< share of effective particles below which they are drawn anew
+  std::int32_t seed = 1;              ///< key of the particles' noise
+  std::int32_t publish_every = 10;    ///< ticks between landmarks or keyframes on the bus, one at a time; 0: never
+  std::int32_t keyframes = 0;         ///< made by 0: the wheels, 1: closures from the last keyframe to the next id
+  float keyframe_distance_m = 0.5F;   ///< way from which the wheels make a keyframe
+  float keyframe_turn_rad = 0.5F;     ///< turn from which they do
+  std::int32_t keyframe_time_ms = 0;  ///< time from which they do; 0: way and turn alone
 };
 
 /// Localisation by particles.

@@ -42,6 +42,11 @@ struct Plausible {
     return within(500.0F, s.v_n_mps[0], s.v_n_mps[1]) && number_or_none(s.v_n_mps[2], 500.0F) &&
            sigma_or_none(s.acc_mps, 1e4F);
   }
+  /// The decoder has refused what is no covariance by itself; three correlations together are the estimator's matter.
+  bool operator()(const LoopClosure& s) const {
+    return s.from != s.to && LoopClosure::unpack(s.sigmas, 0) > 0 && LoopClosure::unpack(s.sigmas, 1) > 0 &&
+           LoopClosure::unpack(s.sigmas, 2) > 0;
+  }
   bool operator()(const LandmarkSighting& s) const {
     const bool any = !base::is_nan(s.range_m) || !base::is_nan(s.bearing_rad);
     return any && sigma_or_none(s.range_m, 1e5F) && number_or_none(s.bearing_rad, 10.0F) &&

@@ -30,6 +30,7 @@ struct Sample {
     MagneticFlux magnetic;
     AirPressure pressure;
     OutsideHeading heading;
+    LoopClosure closure;
   } payload;
 
   static_assert(sizeof(Payload) == 32, "a window of them is most of the memory");
@@ -82,6 +83,10 @@ constexpr bool visit(const Sample& sample, F&& f) {
     case sensor::Sensor::kHeading:
       f(sample.payload.heading);
       return true;
+    case sensor::Sensor::kClosure:
+      f(sample.payload.closure);
+      return true;
+    case sensor::Sensor::kFeature:
     case sensor::Sensor::kNotAvailable:
       return false;
   }

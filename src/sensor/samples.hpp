@@ -89,4 +89,31 @@ struct LandmarkSighting {
   float range_rate_mps = base::kNan;  ///< radar only; positive: the distance grows
 };
 
+/// Displacement between two keyframes of a pose graph, in the integers of the bus: a factor of the covariance that is
+/// nearly singular would not survive a float. Correlations are of x and y, x and yaw, y and yaw.
+struct LoopClosure {
+  static constexpr int kBits = 20;
+  static constexpr std::int64_t kStepsPerMetre = 10'000,
+                                kStepsPerRadian = 10'000;  ///< x, y, yaw, and sigmas of x, y
+  static constexpr std::int64_t kSigmaStepsPerRadian = 100'000, kCorrelationSteps = 100'000;
+
+  std::uint16_t from = 0;  ///< keyframe whose frame the displacement is in
+  std::uint16_t to = 0;
+  std::int32_t x = 0;  ///< [0.1 mm]
+  std::int32_t y = 0;
+  std::int32_t yaw = 0;            ///< [0.1 mrad]
+  std::uint64_t sigmas = 0;        ///< pack() of sigma x, y [0.1 mm] and yaw [0.01 mrad]
+  std::uint64_t correlations = 0;  ///< pack() of the three correlations [1e-5]
+
+  [[nodiscard]] static constexpr std::uint64_t pack(std::int32_t a, std::int32_t b, std::int32_t c) {
+    constexpr std::uint64_t kMask = (std::uint64_t{1} << kBits) - 1;
+    const auto bits = [](std::int32_t x) { return static_cast<std::uint64_t>(std::int64_t{x}) & kMask; };
+    return bits(a) | bits(b) << kBits | bits(c) << (2 * kBits);
+  }
+  [[nodiscard]] static constexpr std::int32_t unpack(std::uint64_t word, int i) {
+    const auto left = static_cast<std::int64_t>(word << (64 - kBits * (i + 1)));
+    return static_cast<std::int32_t>(left >> (64 - kBits));
+  }
+};
+
 }  // namespace tetap::sensor

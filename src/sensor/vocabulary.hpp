@@ -19,6 +19,8 @@ enum class Sensor : std::uint8_t {
   kMagnetometer = 7,
   kBarometer = 8,
   kHeading = 9,
+  kClosure = 10,
+  kFeature = 11,
   kNotAvailable = 15,
 };
 

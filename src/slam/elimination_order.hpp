@@ -54,6 +54,7 @@ class EliminationOrder {
     for (int i = nodes_ - 1; i >= 0; --i) link(i, degree(i, graph));
   }
 
+  /// Implements docs/explanation/pose_graph.md (4).
   /// Eliminates the node of least degree; the last node waits for the end. Operations done, about one a word.
   int pivot(Adjacency<kNodes>& graph) {
     const int node = take_least();

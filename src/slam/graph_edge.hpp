@@ -12,6 +12,7 @@
 
 namespace tetap::slam {
 
+/// Implements docs/explanation/pose_graph.md (2).
 /// The inverse of the lower triangular factor L of a covariance L L^T, by rows. False, and nothing is set, when the
 /// covariance is not positive definite in this arithmetic, or no number.
 template <class Scalar>
@@ -48,6 +49,7 @@ struct GraphEdge {
     const auto& w = whitening;
     return {w[0] * x, w[1] * x + w[2] * y, w[3] * x + w[4] * y + w[5] * yaw};
   }
+  /// Implements docs/explanation/pose_graph.md (1).
   [[nodiscard]] Residual residual(const GraphPose<Scalar>& a, const GraphPose<Scalar>& b) const {
     const Displacement<Scalar> d = b.minus(a);
     return whiten(d.x_m - z.x_m, d.y_m - z.y_m, (d.yaw - z.yaw).radians());
@@ -116,6 +118,7 @@ template <class Scalar>
   return true;
 }
 
+/// Implements docs/explanation/pose_graph.md (5).
 /// Scale of residual and Jacobian, in (0, 1], for a squared error chi2 and the free parameter phi.
 template <class Scalar>
 [[nodiscard]] constexpr Scalar dynamic_scale(Scalar chi2, Scalar phi) {

@@ -26,6 +26,24 @@ struct KeyframeCounters {
   std::uint32_t jobs = 0, jobs_without_room = 0, jobs_not_converged = 0, jobs_aborted = 0;
 };
 
+/// Fate of a closure.
+enum class ClosureFate : std::uint8_t {
+  kTaken,
+  kNothingNew,    ///< both ends belong to one keyframe
+  kInvalid,       ///< no number, or no covariance
+  kUnknown,       ///< an end is a step long gone, or none
+  kContradicted,  ///< by odometry and the closures before
+  kNoRoom
+};
+template <class Scalar>
+struct ClosureRecord {
+  ClosureFate fate = ClosureFate::kInvalid;
+  Scalar contradiction = -1;  ///< squared error by all covariances; negative: not compared
+  [[nodiscard]] explicit operator bool() const {
+    return fate == ClosureFate::kTaken || fate == ClosureFate::kNothingNew;
+  }
+};
+
 /// As PoseGraph, and kTrail steps of odometry that closures may name.
 template <class Scalar_, int kPoses, int kEdges, int kBlocks, int kTrail>
 class KeyframeGraph {
@@ -48,28 +66,34 @@ class KeyframeGraph {
     return true;
   }
 
-  /// Step j as seen from step i. False when it was not taken, and counted why.
-  bool closure(std::uint32_t i, std::uint32_t j, const Motion& z) {
+  /// Step j as seen from step i. What is not taken is counted.
+  ClosureRecord<Scalar> closure(std::uint32_t i, std::uint32_t j, const Motion& z) {
+    using enum ClosureFate;
     std::array<Scalar, 6> whitening{};
-    if (!z.mean.valid() || !whitening_of(z.covariance, whitening)) return ++count_.invalid, false;
+    if (!z.mean.valid() || !whitening_of(z.covariance, whitening)) return ++count_.invalid, record(kInvalid);
     Link link;
-    if (!between_keyframes(i, j, z, link)) return ++count_.unknown, false;
-    if (link.a == link.b) return true;  // such a closure adds nothing to the graph
-    const Scalar contradiction = graph_.contradiction(link.a, link.b, link.z);
-    if (!(contradiction >= Scalar{0} && contradiction < static_cast<Scalar>(options_.contradiction)))
-      return ++count_.contradicted, false;
+    if (!between_keyframes(i, j, z, link)) return ++count_.unknown, record(kUnknown);
+    if (link.a == link.b) return record(kNothingNew);
+    const Scalar squared = graph_.contradiction(link.a, link.b, link.z);
+    if (!(squared >= Scalar{0} && squared < static_cast<Scalar>(options_.contradiction)))
+      return ++count_.contradicted, record(kContradicted, squared);
     if (graph_.edges() >= kEdges - 1) {  // one is kept for odometry
-      if (!thin() || !between_keyframes(i, j, z, link)) return ++count_.refused, false;
-      if (link.a == link.b) return true;
+      give_way();
+      if (!thin() || !between_keyframes(i, j, z, link)) return ++count_.refused, record(kNoRoom, squared);
+      if (link.a == link.b) return record(kNothingNew, squared);
     }
-    if (!graph_.close(link.a, link.b, link.z)) return ++count_.refused, false;
+    if (!graph_.close(link.a, link.b, link.z)) return ++count_.refused, record(kNoRoom, squared);
     ++waiting_;
-    return true;
+    return record(kTaken, squared);
   }
 
-  /// A share of the job; begins one when closures came since the last.
+  /// A share of the job; begins one when closures came since the last. Room for what comes while it runs is made first,
+  /// a keyframe a call.
   void work(int units) {
     if (!graph_.busy()) {
+      const bool due = to_thin_ > 0 || nearly_full();
+      if (to_thin_ > 0) --to_thin_;
+      if (waiting_ > 0 && due && thin()) return;
       if (waiting_ < options_.closures_a_job || waiting_ == 0 || !graph_.begin()) return;
       waiting_ = 0;
     }
@@ -80,8 +104,40 @@ class KeyframeGraph {
   /// The next work() begins a job, however few closures came.
   void optimise() { waiting_ = options_.closures_a_job > waiting_ ? options_.closures_a_job : waiting_; }
 
+  /// The job under way is given up, and another begins with the next work().
+  void cancel_job() {
+    if (!graph_.busy()) return;
+    graph_.cancel();
+    ++count_.jobs_aborted;
+    optimise();
+  }
+
   /// Where the latest step is.
   [[nodiscard]] Pose pose() const { return placed(local()); }
+  /// Covariance of the latest step relative to the first, along the axes in which pose() is.
+  [[nodiscard]] filter::Symmetric<Scalar, 3> covariance() const {
+    filter::Symmetric<Scalar, 3> c = graph_.covariance_of_last();
+    const int last = graph_.poses() - 1;
+    if (step_ != id_[at(last)]) c = carried(c, graph_.pose(last), pending_);
+    const auto turn = origin_.yaw.direction();
+    return detail::turned(c, turn.cos, turn.sin, Scalar{0}, Scalar{0}, Scalar{1}, {});
+  }
+  /// C of a pose, carried on by a displacement from it.
+  [[nodiscard]] static filter::Symmetric<Scalar, 3> carried(const filter::Symmetric<Scalar, 3>& c, const Pose& from,
+                                                            const Motion& by) {
+    const auto turn = from.yaw.direction();
+    const Scalar x = turn.cos * by.mean.x_m - turn.sin * by.mean.y_m;
+    const Scalar y = turn.sin * by.mean.x_m + turn.cos * by.mean.y_m;
+    const auto added = detail::turned(by.covariance, turn.cos, turn.sin, Scalar{0}, Scalar{0}, Scalar{1}, {});
+    return detail::turned(c, Scalar{1}, Scalar{0}, -y, x, Scalar{1}, added);
+  }
+  /// Way of a step of the trail, in 2 mm; false: not known any more, or too far.
+  [[nodiscard]] bool trail(std::uint32_t step, Displacement<Scalar>& way) const {
+    if (step == 0 || step > step_ || step_ - step >= static_cast<std::uint32_t>(kTrail)) return false;
+    if (!trail_[step % kTrail].known()) return false;
+    way = trail_[step % kTrail].displacement();
+    return true;
+  }
   [[nodiscard]] Pose keyframe(int k) const { return placed(graph_.pose(k)); }
   [[nodiscard]] std::uint32_t keyframe_step(int k) const { return id_[at(k)]; }
   [[nodiscard]] std::uint32_t step() const { return step_; }
@@ -100,10 +156,11 @@ class KeyframeGraph {
     step_ = 0;
     id_[0] = 0;
     origin_ = {};
-    waiting_ = 0;
+    waiting_ = to_thin_ = 0;
   }
 
  private:
+  static constexpr int kLeastPoses = kPoses / 4;  ///< keyframes that stay for want of room in a job
   /// A step of odometry in 2 mm and 2^-16 turns: closures are known to less.
   struct Step {
     static constexpr Scalar kUnit_m{0.002F};
@@ -129,6 +186,11 @@ class KeyframeGraph {
     }
   };
   static constexpr std::size_t at(int i) { return static_cast<std::size_t>(i); }
+  static ClosureRecord<Scalar> record(ClosureFate fate, Scalar contradiction = -1) { return {fate, contradiction}; }
+  /// A share of the places stays free for what comes during a job.
+  [[nodiscard]] bool nearly_full() const {
+    return graph_.poses() > kPoses - kPoses / 16 || graph_.edges() > kEdges - kEdges / 16;
+  }
 
   [[nodiscard]] Pose local() const {
     const int last = graph_.poses() - 1;
@@ -205,16 +267,33 @@ class KeyframeGraph {
     if (j != id_[at(b)]) link.z = compose(link.z, inverse(to_j));
     return true;
   }
+  /// A job under way gives way to a closure without room, but not twice in a row, so that jobs end.
+  void give_way() {
+    if (gave_way_ || !graph_.busy()) return;
+    cancel_job();
+    gave_way_ = true;
+  }
+  /// After a job without room: an eighth of the keyframes is composed away, which merges closures and loses none; the
+  /// newest closures go when there are too few keyframes for that, or when it had no effect.
+  void make_room() {
+    const bool thinned = count_.composed_away != thinned_before_ || count_.jobs_without_room == 1;
+    thinned_before_ = count_.composed_away;
+    to_thin_ = (graph_.poses() - kLeastPoses) / 8;
+    if (to_thin_ <= 0 || !thinned) {
+      to_thin_ = 0;
+      const int closures = graph_.edges() - (graph_.poses() - 1);
+      count_.refused += static_cast<std::uint32_t>(graph_.remove_closures(false, closures / 8 + 1));
+    }
+    optimise();
+  }
   void end_job() {
+    gave_way_ = false;
     ++count_.jobs;
     if (graph_.status() == GraphStatus::kConverged) {
       count_.contradicted += static_cast<std::uint32_t>(graph_.remove_closures(true, kEdges));
     } else if (graph_.status() == GraphStatus::kNoRoom) {
       ++count_.jobs_without_room;
-      const int closures = graph_.edges() - (graph_.poses() - 1);
-      const int removed = graph_.remove_closures(false, closures / 8 + 1);
-      count_.refused += static_cast<std::uint32_t>(removed);
-      if (removed > 0) optimise();
+      make_room();
     } else {
       ++count_.jobs_not_converged;
     }
@@ -226,7 +305,10 @@ class KeyframeGraph {
   Motion pending_{};
   KeyframeCounters count_;
   std::uint32_t step_ = 0;
-  int waiting_ = 0;  ///< closures since the last job began
+  int waiting_ = 0;                   ///< closures since the last job began
+  std::uint32_t thinned_before_ = 0;  ///< KeyframeCounters::composed_away at the last job without room
+  bool gave_way_ = false;             ///< the last job did not end
+  int to_thin_ = 0;                   ///< keyframes that are composed away before the next job
   std::array<std::uint32_t, kPoses> id_{};
   std::array<Step, kTrail> trail_{};
 };

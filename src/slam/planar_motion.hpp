@@ -131,7 +131,7 @@ template <class Scalar>
 
 }  // namespace detail
 
-/// First a, then b.
+/// First a, then b. Implements docs/explanation/pose_graph.md (6).
 template <class Scalar>
 [[nodiscard]] UncertainDisplacement<Scalar> compose(const UncertainDisplacement<Scalar>& a,
                                                     const UncertainDisplacement<Scalar>& b) {

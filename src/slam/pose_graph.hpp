@@ -78,6 +78,7 @@ class PoseGraph {
     return true;
   }
 
+  /// Implements docs/explanation/pose_graph.md (7).
   /// The squared error of closing i and j so, by the covariance of the closure and of the odometry between them: of
   /// chi-square with 3 degrees if the closure is true. Negative when that is no number. Cost: a composition a pose.
   [[nodiscard]] Scalar contradiction(int i, int j, const Motion& z) const {
@@ -167,6 +168,8 @@ class PoseGraph {
     return true;
   }
   [[nodiscard]] bool busy() const { return phase_ != Phase::kIdle; }
+  /// Poses that the elimination at hand has before it, at least one while a job runs or may begin.
+  [[nodiscard]] int rows_left() const { return phase_ == Phase::kEliminate ? solver_.rows_left() : 1; }
   /// Up to so many units of the job, a unit being about ten floating-point operations; an operation that is begun is
   /// ended, and what it took too much is taken from the next call. The result is the same however the units are dealt.
   void work(int units) {

@@ -74,7 +74,9 @@ class SquareRoot {
     next_row_[at(row)] = first_row_[at(node)];
     first_row_[at(node)] = static_cast<Index>(row);
   }
+  [[nodiscard]] int rows_left() const { return order_.nodes() - position_; }
   [[nodiscard]] bool rows_done() const { return position_ == order_.nodes() || singular_; }
+  /// Implements docs/explanation/pose_graph.md (3).
   /// One step of the elimination: a measurement, three rows of a front, or a front begun or ended.
   /// `source.linearise(row, block_row)` gives the measurement and returns its two nodes. The cost: entries that were
   /// visited.

@@ -151,6 +151,8 @@ class Run {
       case Sensor::kHeading:
         p.heading = {.yaw_rad = value(0, 1e-4F), .acc_rad = base::abs(value(1, 1e-4F))};
         break;
+      case Sensor::kClosure:  // this robot takes none
+      case Sensor::kFeature:
       case Sensor::kNotAvailable:
         return;
     }

@@ -14,7 +14,7 @@ from scipy.special import chdtri
 
 from tetap.can import bus_writer
 from tetap.can.bus_writer import BadInput
-from tetap.report import own_map
+from tetap.report import graph, own_map
 from tetap.report.tables import empty_table, read_table
 
 TICK_S = 0.01  # of the simulated world
@@ -140,6 +140,7 @@ class Run:
         self.states = self._optional(directory, "states.csv", STATES)
         self.sensors = self._optional(directory, "sensors.csv", SENSORS)
         self.map = self._optional(directory, "map.csv", own_map.MAP)
+        self.graph = self._optional(directory, "graph.csv", graph.GRAPH)
         self.estimators = sorted(int(one) for one in np.unique(self.estimates["estimator"]))
         self.kinds = {k: self._kind(k) for k in self.estimators}
         self.names = names_of(self.kinds)
@@ -558,6 +559,7 @@ def judge(run, estimator, truth, names):
     empty = dict.fromkeys(["position_rmse_m", "heading_rmse_deg", "final_error_m", "max_error_m", "nees_mean", "nees_inside_95",
                            "nees_inside_two_sided_95", "recovered_after_s"])
     result.update(empty, epochs_with_truth=0)
+    result.update(graph.figures(run, estimator, names))
     if truth is None:
         return result
     attitude = attitude_errors(run, estimator, truth)
@@ -712,6 +714,9 @@ def warnings_of(run, judged):
                 found.append(f"{one['name']} rejected {counts['rejected']} of {tested} {sensor} measurements")
         if one["nees_mean"] is not None and one["nees_mean"] > MOST_NEES:
             found.append(f"NEES mean of {one['name']} is {one['nees_mean']:.0f}, not {one['nees_dof']}")
+        if one.get("converged") is False:
+            state = "is under way at the end" if one["graph"]["optimisation_under_way"] else f"ended with {one['graph']['status']}"
+            found.append(f"the graph of {one['name']} did not converge: its last optimisation {state}")
         if one["kind"] != "Attitude" and one["epochs"] == one["epochs_not_valid"]:
             found.append(f"{one['name']} never had a valid position" + (last_mode(run) if one["name"] == run.names[run.best] else ""))
     length_s = float(run.estimates["time_s"][-1] - run.estimates["time_s"][0])
@@ -771,4 +776,5 @@ def summary(run, truth):
         if name in best:
             result[name] = best[name]
             result["pose_nees_mean"] = best["nees_mean"]
+    result.update({name: best[name] for name in ("chi2", "converged", "poses", "edges_refused") if name in best})
     return result

@@ -10,7 +10,7 @@ from tetap.can import bus_writer
 from tetap.can.bus_writer import BadInput
 
 ENUMERATIONS = {"failed": "Check", "state": "SourceState", "kind": "EstimatorKind", "sensor": "Sensor", "verdict": "Verdict", "mode": "Mode", "reset_cause": "ResetCause",
-                "landmark_state": "LandmarkState"}
+                "landmark_state": "LandmarkState", "graph_status": "GraphStatus"}
 BLOCK = 1 << 22  # bytes of text at once
 MOST_DECIMALS = 9
 LONGEST_NAME = 40
