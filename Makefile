@@ -27,7 +27,7 @@ ifneq ($(unknown),)
 $(error no setting $(unknown); there are: $(settings))
 endif
 
-.PHONY: help sim test quick proof replay record doctor firmware flash size heap stack count bits hashes soak matrix laws constants check docs dbc setup programs arm
+.PHONY: help sim board test quick proof replay record doctor firmware flash size heap stack count bits hashes soak matrix laws constants check docs dbc setup programs arm
 
 help: ## this list
 	@echo "tetap: state estimation on the robot's own microcontroller"; echo
@@ -38,6 +38,10 @@ help: ## this list
 
 sim: setup programs ## the simulated world over vcan0: table, report, pictures in out/sim (SEED= FAULT= REALTIME=1 BOARD=zynqmp_r5 BUS=memory OUT=DIR)
 	@tools/run/simulate_world
+
+board: setup programs ## a flash image's machine code on an emulated board in the simulated world, repeated on the host: report in out/board (ROBOT= SEED= FAULT=)
+	@tools/run/build_preset host:tetap-board
+	@tools/run/emulate_board
 
 test: setup ## every check on prefixes and samples, what is unchanged left out (STEPS="unit_tests check", TETAP_FRESH=1)
 	@tools/proof/run_checks test $(STEPS)

@@ -9,8 +9,8 @@
 #include "sim_host/play/realtime.hpp"
 #include "sim_host/play/session.hpp"
 #include "sim_host/published_sensors.hpp"
-#include "sim_host/residual_bias.hpp"
 #include "sim_host/robots.hpp"
+#include "sim_host/truth_file.hpp"
 #include "sim_host/world_source.hpp"
 #include "version.hpp"
 
@@ -81,46 +81,6 @@ std::string help() {
       "  --quiet            no progress line\n";
 }
 
-/// The landmark map as the report draws it.
-std::string landmarks_json(const sim::World& world) {
-  std::string text;
-  for (const sim::Landmark& mark : world.map()) {
-    char entry[96];
-    std::snprintf(entry, sizeof entry, R"(%s{"id": %d, "x_m": %.3f, "y_m": %.3f})", text.empty() ? "" : ", ",
-                  static_cast<int>(mark.id), mark.x_m, mark.y_m);
-    text += entry;
-  }
-  return "[" + text + "]";
-}
-
-/// The ended file. In lockstep each row is an epoch of the node, whatever became of the clock of the bus. Biases are
-/// those that the robot's own calibration leaves. `origin` is that of the node's map.
-sim::OutFile write_truth(const sim::SessionOptions& about, const param::Parameters& parameters,
-                         const sim::WorldSource& source, const sim::GeodeticOrigin& origin, bool lockstep) {
-  const sim::FrameChange change(sim::Earth(source.world().origin()), sim::Earth(origin));
-  const double temperature_degC = source.world().parameters().imu.temperature_degC;
-  sim::OutFile file(about.folder + "/truth.csv");
-  sim::Line line;
-  file.write(
-      "time_s,x_m,y_m,yaw_rad,z_m,roll_rad,pitch_rad,v_east_mps,v_north_mps,v_up_mps,gyro_bias_x_radps,gyro_bias_y_"
-      "radps,"
-      "gyro_bias_z_radps,acc_bias_x_mps2,acc_bias_y_mps2,acc_bias_z_mps2");
-  file.write(lockstep ? ",epoch\n" : "\n");
-  std::int64_t epoch = 0;
-  for (const sim::Truth& seen : source.truth()) {
-    const sim::Truth t = sim::in_frame(sim::residual_bias(seen, parameters, temperature_degC), change);
-    line.clear();
-    line.fixed(t.time.us, 6).text(",").real(t.x_m, 6).text(",").real(t.y_m, 6).text(",").real(t.yaw_rad, 6);
-    for (const double x : {t.z_m, t.roll_rad, t.pitch_rad}) line.text(",").real(x, 6);
-    for (const sim::Vector3& v : {t.v_n_mps, t.gyro_bias_b_radps, t.accel_bias_b_mps2})
-      for (const double x : v) line.text(",").real(x, 6);
-    if (lockstep) line.text(",").integer(++epoch);
-    file.write(line.text("\n").view());
-  }
-  file.end();
-  return file;
-}
-
 /// Landmark of each sighting, as tools/dataset/import_mrclam writes it; 255: clutter or a moving obstacle.
 sim::OutFile write_sightings(const std::string& folder, const sim::World& world) {
   sim::OutFile file(folder + "/truth.sightings.csv");
@@ -156,7 +116,7 @@ int drive(L& link, const Run& run) {
   sim::Session session(about);
   session.note("seed", std::to_string(run.seed));
   session.note("fault", sim::quoted(run.faults));
-  session.note("landmarks", landmarks_json(source.world()));
+  session.note("landmarks", sim::landmarks_json(source.world()));
   session.note("matched", run.world.mismatched ? "false" : "true");
   const param::Parameters parameters = sim::parameters_of(about.robot, run.settings);
   if (parameters.bus.guard != 0) source.send_guards();
@@ -177,7 +137,7 @@ int drive(L& link, const Run& run) {
     const auto& world = source.world();
     const sim::GeodeticOrigin origin =
         run.world.surveyed ? world.origin() : node_origin.from_fix().value_or(world.origin());
-    session.add(write_truth(about, parameters, source, origin, !run.realtime));
+    session.add(sim::write_truth(about.folder, parameters, world, source.truth(), origin, !run.realtime));
     if (!world.map_given()) session.add(write_sightings(about.folder, world));
   });
 }

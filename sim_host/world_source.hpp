@@ -16,6 +16,26 @@
 
 namespace tetap::sim {
 
+/// Appends a node's frames of the start: the map of landmarks, and the start pose where `pose` asks for it.
+inline void introduce(const World& world, std::uint32_t base, bool pose, std::vector<base::CanFrame>& frames) {
+  const auto millimetres = [](double m) { return static_cast<std::int32_t>(std::lround(m * 1000.0)); };
+  for (const Landmark& mark : world.map_given() ? world.map() : std::span<const Landmark>{})
+    frames.push_back(bus::frame(
+        base, bus::InMapEntry{.id = mark.id, .x_raw = millimetres(mark.x_m), .y_raw = millimetres(mark.y_m)}));
+  const StartPose start = world.start_pose();
+  // Further from the origin than the bus can carry, the robot has to find its place by itself.
+  constexpr double kFarthest_m = 67'000;
+  if (!pose || magnitude(start.x_m) > kFarthest_m || magnitude(start.y_m) > kFarthest_m) return;
+  frames.push_back(
+      bus::frame(base, bus::protect(bus::CmdSetPos{
+                           .ctr = 1, .x_raw = millimetres(start.x_m) / 2, .y_raw = millimetres(start.y_m) / 2})));
+  frames.push_back(
+      bus::frame(base, bus::protect(bus::CmdSetYaw{.ctr = 1,
+                                                   .yaw_rad = static_cast<float>(start.yaw_rad),
+                                                   .std_pos_m = static_cast<float>(start.sigma_m),
+                                                   .std_yaw_rad = static_cast<float>(start.sigma_yaw_rad)})));
+}
+
 class WorldSource {
  public:
   WorldSource(World world, std::uint32_t base, base::Micros period, base::Micros limit,
@@ -36,7 +56,7 @@ class WorldSource {
     measurements_.clear();
     frames_.clear();
     world_.advance_to(next_, measurements_);
-    if (truth_.empty()) introduce();
+    if (truth_.empty()) introduce(world_, base_, initial_pose_estimate_, frames_);
     for (const Measurement& m : measurements_) encode(base_, m, frames_);
     if (guards_) guard();
     truth_.push_back(world_.truth());
@@ -65,24 +85,6 @@ class WorldSource {
     }
     frames_.swap(guarded_);
   }
-  void introduce() {
-    for (const Landmark& mark : world_.map_given() ? world_.map() : std::span<const Landmark>{})
-      frames_.push_back(bus::frame(
-          base_, bus::InMapEntry{.id = mark.id, .x_raw = millimetres(mark.x_m), .y_raw = millimetres(mark.y_m)}));
-    const StartPose start = world_.start_pose();
-    // Further from the origin than the bus can carry, the robot has to find its place by itself.
-    constexpr double kFarthest_m = 67'000;
-    if (!initial_pose_estimate_ || magnitude(start.x_m) > kFarthest_m || magnitude(start.y_m) > kFarthest_m) return;
-    frames_.push_back(
-        bus::frame(base_, bus::protect(bus::CmdSetPos{
-                              .ctr = 1, .x_raw = millimetres(start.x_m) / 2, .y_raw = millimetres(start.y_m) / 2})));
-    frames_.push_back(
-        bus::frame(base_, bus::protect(bus::CmdSetYaw{.ctr = 1,
-                                                      .yaw_rad = static_cast<float>(start.yaw_rad),
-                                                      .std_pos_m = static_cast<float>(start.sigma_m),
-                                                      .std_yaw_rad = static_cast<float>(start.sigma_yaw_rad)})));
-  }
-  static std::int32_t millimetres(double m) { return static_cast<std::int32_t>(std::lround(m * 1000.0)); }
 
   World world_;
   bool initial_pose_estimate_;

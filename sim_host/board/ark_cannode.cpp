@@ -16,8 +16,10 @@ ArkCannode::ArkCannode(const BoardOptions& options, SensorWorld world)
     imu.on_int1 = [this](bool level) { chip.pins.drive(kImuReady, level); };
     chip.spi1.connect(imu, kImuSelect, chip.pins);
   }
-  chip.tim2.position = world_.left_edges;
-  chip.tim3.position = world_.right_edges;
+  left_.world = world_.left_edges;
+  right_.world = world_.right_edges;
+  if (left_.world) chip.tim2.position = [this](Picoseconds time) { return left_.at(time); };
+  if (right_.world) chip.tim3.position = [this](Picoseconds time) { return right_.at(time); };
   chip.usart2.on_sent = [this](std::uint8_t byte, std::int64_t) { console += static_cast<char>(byte); };
   chip.usart1.on_sent = [this](std::uint8_t byte, std::int64_t baud) {
     to_gnss += static_cast<char>(byte);
@@ -27,7 +29,17 @@ ArkCannode::ArkCannode(const BoardOptions& options, SensorWorld world)
   if (world_.next_gnss_byte) gnss_.set(0);
 }
 
-void ArkCannode::unplug_encoders() { chip.tim2.position = chip.tim3.position = nullptr; }
+void ArkCannode::Shaft::plug(bool in, Picoseconds time) {
+  if (!world || in == plugged) return;
+  if (in) lost = world(time) - held;
+  if (!in) held = at(time);
+  plugged = in;
+}
+
+void ArkCannode::plug_encoders(bool in) {
+  left_.plug(in, chip.scheduler.now());
+  right_.plug(in, chip.scheduler.now());
+}
 
 // Either a byte begins now, or the receiver is asked for the next one.
 void ArkCannode::poll_gnss() {

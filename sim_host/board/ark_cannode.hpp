@@ -7,6 +7,7 @@
 #include "sim_host/board/icm42688.hpp"
 #include "sim_host/board/sensor_world.hpp"
 
+#include <cstdint>
 #include <functional>
 #include <string>
 
@@ -33,13 +34,23 @@ class ArkCannode {
   std::string console;
   /// Every byte that USART1 sent to the GNSS connector, world or not.
   std::string to_gnss;
-  /// Faults of the wiring.
-  void unplug_encoders();
-  void unplug_gnss() { gnss_plugged_ = false; }
+  /// Connectors. Edges while the encoders' one is out are lost.
+  void plug_encoders(bool in);
+  void plug_gnss(bool in) { gnss_plugged_ = in; }
 
  private:
+  using Edges = std::function<std::int64_t(Picoseconds)>;
+  /// One encoder's lines.
+  struct Shaft {
+    Edges world;
+    bool plugged = true;
+    std::int64_t held = 0, lost = 0;
+    [[nodiscard]] std::int64_t at(Picoseconds time) const { return plugged ? world(time) - lost : held; }
+    void plug(bool in, Picoseconds time);
+  };
   void poll_gnss();
   SensorWorld world_;
+  Shaft left_, right_;
   Alarm gnss_;
   SensorWorld::GnssByte next_{};
   bool gnss_plugged_ = true;

@@ -52,6 +52,11 @@ void Icm42688::power_on() {
   bank0(kIntStatus) = kResetDone;
 }
 
+void Icm42688::dip() {
+  power_on();
+  dipped_ = true;
+}
+
 // Reset values of section 13, where they are not 0.
 void Icm42688::reset_registers() {
   for (auto& bank : registers_) bank.fill(0);
@@ -93,11 +98,12 @@ void Icm42688::deselect() {
 
 // 9.5: the first byte is the address with the read bit on top; then data, the address counts up but for FIFO_DATA.
 std::uint8_t Icm42688::exchange(std::uint8_t out) {
-  if (dead) return 0xFF;
+  const bool starts = scheduler_.now() < powered_ + kResetTime;
+  if (dead || (dipped_ && starts)) return 0xFF;
   if (phase_ == Phase::kAddress) {
     phase_ = (out & 0x80) != 0 ? Phase::kRead : Phase::kWrite;
     address_ = out & 0x7F;
-    if (reset_done_.pending() || scheduler_.now() < powered_ + kResetTime) {
+    if (reset_done_.pending() || starts) {
       complain("register access within 1 ms of power-on or soft reset");
     }
     return 0xFF;
@@ -278,7 +284,8 @@ void Icm42688::measure(std::array<std::int32_t, 3>& gyro, std::array<std::int32_
   const bool fast = fastest > kAfsrThreshold_radps;
   if (fast != fast_ && (bank0(kIntfConfig1) >> 6) != 1) frozen_until_ = now + kFrozen;
   fast_ = fast;
-  if (now < frozen_until_) gyro = last_gyro_;
+  if (now < frozen_until_ || truth.stuck) gyro = last_gyro_;
+  if (truth.stuck) accel = last_accel_;
   if (now < gyro_ready_) gyro.fill(kInvalid);
   if (now < accel_ready_) accel.fill(kInvalid);
 }

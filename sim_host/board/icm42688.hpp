@@ -45,6 +45,8 @@ class Icm42688 final : public SpiDevice {
   [[nodiscard]] std::int64_t limit_hz() const override { return 24'000'000; }
 
   void power_on();
+  /// The supply fails for an instant: as after power_on(), and no program can know that it must wait.
+  void dip();
   /// Samples since power-on.
   [[nodiscard]] std::uint64_t samples() const { return samples_; }
   [[nodiscard]] std::uint32_t lost_packets() const { return lost_; }
@@ -111,7 +113,7 @@ class Icm42688 final : public SpiDevice {
   std::uint8_t bank_ = 0, address_ = 0, latched_count_l_ = 0;
   enum class Phase : std::uint8_t { kIdle, kAddress, kRead, kWrite };
   Phase phase_ = Phase::kIdle;
-  bool int1_ = false;
+  bool int1_ = false, dipped_ = false;
   Picoseconds powered_ = 0, mode_changed_ = -kSecond, gyro_ready_ = kNever, accel_ready_ = kNever;
   Picoseconds next_sample_ = kNever, frozen_until_ = -1;
   bool fast_ = false;  ///< AFSR: beyond its threshold

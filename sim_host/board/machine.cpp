@@ -205,7 +205,8 @@ Machine::BlockInfo& Machine::block_info(std::uint32_t address, std::uint32_t siz
 
 void Machine::on_block(std::uint32_t address, std::uint32_t size) {
   const bool asked = hundredths_ >= stop_hundredths_ || (chip_.nvic.waiting() && chip_.nvic.next(masks()) != 0) ||
-                     chip_.pending_reset.has_value() || pending_fault_.number != 0;
+                     chip_.pending_reset.has_value() || pending_fault_.number != 0 ||
+                     stalled_until_ > chip_.scheduler.now();
   if (asked && !first_block_) {
     uc_emu_stop(uc_);
     return;
@@ -326,9 +327,14 @@ void Machine::run(Picoseconds until) {
     chip_.clock.settle(cycles());
     if (chip_.pending_reset) {
       chip_.system_reset(*chip_.pending_reset);
+      stalled_until_ = 0;
       ++resets_;
       reset_core();
       if (stop_at_reset) return;
+    }
+    if (stalled_until_ > chip_.scheduler.now()) {
+      pass(std::min(until, stalled_until_));
+      continue;
     }
     take_pending();
     if (chip_.scheduler.now() >= until) return;
@@ -341,10 +347,14 @@ void Machine::run(Picoseconds until) {
 }
 
 // Time jumps to the next event.
-void Machine::sleep(Picoseconds until) {
+void Machine::pass(Picoseconds until) {
   const Picoseconds next = std::min(chip_.scheduler.next(), until);
   hundredths_ = std::max(hundredths_, chip_.clock.cycle_at(next) * 100);
   chip_.scheduler.advance(next);
+}
+
+void Machine::sleep(Picoseconds until) {
+  pass(until);
   if (!locked_up_ && chip_.nvic.wakes(masks())) sleeping_ = false;
 }
 

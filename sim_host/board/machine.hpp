@@ -42,6 +42,8 @@ class Machine {
 
   /// Runs until `until`; resets are carried out and the run goes on.
   void run(Picoseconds until);
+  /// The core executes nothing until then, as while its flash is erased: RM0402, "Read while write". Blocks run on.
+  void stall(Picoseconds until) { stalled_until_ = until; }
   /// The next system reset asked for by software or watchdog ends run() as well.
   bool stop_at_reset = false;
 
@@ -63,6 +65,7 @@ class Machine {
   void copy(std::uint32_t address, std::span<const std::byte> bytes);
   void reset_core();
   void execute(Picoseconds until);
+  void pass(Picoseconds until);
   void sleep(Picoseconds until);
   void handle_stop(int error);
   void handle_interrupt();
@@ -101,7 +104,7 @@ class Machine {
 
   std::int64_t hundredths_ = 0;  ///< cycles times 100
   std::int64_t stop_hundredths_ = 0;
-  Picoseconds planned_for_ = 0, until_ = 0;
+  Picoseconds planned_for_ = 0, until_ = 0, stalled_until_ = 0;
   std::int64_t planned_hz_ = 0;
   std::uint32_t program_counter_ = 0;
   std::uint32_t image_ = 0xFFFF'FFFE;  ///< lowest address that was loaded

@@ -16,6 +16,7 @@ struct ImuTruth {
   std::array<double, 3> rate_radps{};
   std::array<double, 3> force_mps2{};  ///< specific force: +9.81 on the axis that points up at rest
   double temperature_c = 25;
+  bool stuck = false;  ///< the chip repeats its last sample
 };
 
 struct SensorWorld {

@@ -76,6 +76,8 @@ void Imu::sense(const Motion& motion, double speed_mps, base::Micros now, const 
   shake(Fault::kImuClipping, FaultNumbers::kClipVibration_mps2, FaultNumbers::kClipVibration_radps);
   shake(Fault::kVibration, FaultNumbers::kShake_mps2, FaultNumbers::kShake_radps);
 
+  rate_radps_ = rate;
+  force_mps2_ = force;
   bool gyro_clips = false;
   bool accel_clips = false;
   const auto within = [](double raw, double range, bool& clips) {
@@ -120,6 +122,15 @@ sensor::ImuSample Imu::sample(base::Micros now, const Faults& faults) {
   clipped_gyro_ = clipped_accel_ = 0;
   if (!faults.active(Fault::kImuStuck, now)) last_ = s;
   return last_;
+}
+
+Imu::Signals Imu::signals() const {
+  const Vector3 bias = gyro_bias_radps();
+  Vector3 felt;
+  for (std::size_t i = 0; i < 3; ++i) felt[i] = force_mps2_[i] + accel_bias_[i] + accel_walk_[i].value();
+  return {.rate_radps = rate_radps_ + bias,
+          .force_mps2 = uncalibrated_ * felt + parameters_.accel_bias_mps2,
+          .vibration_share = magnitude(speed_mps_) / parameters_.vibration_speed_mps};
 }
 
 Vector3 Imu::gyro_bias_radps() const {

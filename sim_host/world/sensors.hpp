@@ -25,6 +25,12 @@ class Imu {
   Imu(const ImuParameters& parameters, double wheel_radius_m, const Earth& earth, std::uint64_t seed);
   void sense(const Motion& motion, double speed_mps, base::Micros now, const Faults& faults);
   [[nodiscard]] sensor::ImuSample sample(base::Micros now, const Faults& faults);
+  /// Input of a chip's own model: the last step in the sensor's axes with all errors but white noise and limits.
+  struct Signals {
+    Vector3 rate_radps{}, force_mps2{};
+    double vibration_share = 0;  ///< speed over ImuParameters::vibration_speed_mps
+  };
+  [[nodiscard]] Signals signals() const;
   /// As of the last sample, as the truth has them.
   [[nodiscard]] Vector3 gyro_bias_radps() const;
   [[nodiscard]] Vector3 accel_bias_mps2() const;
@@ -45,6 +51,7 @@ class Imu {
   Vector3 gyro_bias_{}, accel_bias_{}, gyro_scale_{}, accel_scale_{};
   Processes gyro_walk_, accel_walk_;
   Vector3 angle_{}, velocity_{};
+  Vector3 rate_radps_{}, force_mps2_{};  ///< signals of the last step, without bias and noise
   double lug_phase_rad_ = 0;
   double speed_mps_ = 0;
   int clipped_gyro_ = 0, clipped_accel_ = 0;
@@ -60,6 +67,10 @@ class Wheels {
   [[nodiscard]] sensor::WheelCounts counts();
   [[nodiscard]] sensor::WheelSpeeds wheel_speeds();
   [[nodiscard]] sensor::BodySpeed body_speed();
+  /// Angles of both shafts in counts, left and right, as of the last step.
+  [[nodiscard]] std::array<double, 2> shafts() const {
+    return {left_.travel_m / left_.metres_per_count, right_.travel_m / right_.metres_per_count};
+  }
 
  private:
   struct Wheel {

@@ -12,6 +12,7 @@
 #include "sim_host/world/sensors.hpp"
 #include "sim_host/world/vehicle.hpp"
 
+#include <array>
 #include <memory>
 #include <optional>
 #include <span>
@@ -67,6 +68,10 @@ class World {
   [[nodiscard]] base::Micros duration() const { return plan_->duration(); }
   /// By how much the clock of the bus is off now (fault clock_jump): what sync frames add to the world's time.
   [[nodiscard]] base::Micros clock_offset() const { return clock_offset_at(now_); }
+
+  /// Signals of sensors that a board samples by itself, as of the last step.
+  [[nodiscard]] Imu::Signals imu_signals() const { return imu_.signals(); }
+  [[nodiscard]] std::array<double, 2> wheel_shafts() const { return wheels_.shafts(); }
 
   /// Start pose that a filter may be given.
   [[nodiscard]] StartPose start_pose() const;

@@ -111,9 +111,13 @@ TEST(Encoder, UnpluggedLinesStandStill) {
   board.start(tim::kTim2);
   board.edges = 7;
   EXPECT_EQ(board.count(tim::kTim2), 7U);
-  board.unplug_encoders();
+  board.plug_encoders(false);
   board.edges = 70;
   EXPECT_EQ(board.count(tim::kTim2), 7U);
+  board.plug_encoders(true);
+  EXPECT_EQ(board.count(tim::kTim2), 7U) << "edges of that time are lost";
+  board.edges = 75;
+  EXPECT_EQ(board.count(tim::kTim2), 12U);
 }
 
 }  // namespace

@@ -153,6 +153,22 @@ TEST(Machine, SupervisorCallReturnsBehindItself) {
   EXPECT_TRUE(run.complaints().empty()) << run.complaints().text();
 }
 
+TEST(Machine, StalledCoreExecutesNothingWhileTimeGoesOn) {
+  Emulated run("core", kSleep);
+  run.run_ms(3);
+  const std::uint64_t before = run.machine.instructions();
+  const std::uint32_t ticks = run.result(0);
+  run.machine.stall(run.board.chip.scheduler.now() + 20 * kMillisecond);
+  run.run_ms(15);
+  EXPECT_EQ(run.machine.instructions(), before);
+  EXPECT_EQ(run.board.chip.scheduler.now(), 18 * kMillisecond);
+  run.run_ms(10);
+  EXPECT_GT(run.machine.instructions(), before);
+  // SysTick goes on, and one pending tick is all that is left of those of the stall.
+  EXPECT_GE(run.result(0), ticks + 5);
+  EXPECT_LE(run.result(0), ticks + 7);
+}
+
 TEST(Hello, RunsFromTheCrystalAtNinetySixMegahertz) {
   Emulated run("hello", 0);
   run.run_ms(20);

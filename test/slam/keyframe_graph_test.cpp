@@ -104,7 +104,7 @@ TEST(KeyframeGraph, TenTimesMoreThanFitsWithFalseClosuresSetPoseAndReset) {
     EXPECT_GT(count.composed_away, 20U);
     EXPECT_GT(graph->graph().merged(), 10U);
     EXPECT_GT(count.contradicted, 0U);
-    EXPECT_GT(count.jobs, 5U);
+    EXPECT_GE(count.jobs, 2U) << "jobs give way to closures without room, but not twice in a row";
     graph->reset();
     EXPECT_EQ(graph->graph().poses(), 1);
     EXPECT_EQ(graph->graph().edges(), 0);

@@ -102,6 +102,8 @@ CALENDAR_S = 1e6  # eleven days: stamps beyond are of the calendar, or of a node
 def start_s(run):
     """What pictures and words count from: the start of a simulated world's run on the node's clock; the first estimate where a log's stamps are
     seconds since 1970, of which nobody can read the last four digits on an axis; else 0, the node's own time."""
+    if "world_start_s" in run.about:  # a board that ticked before the world began
+        return float(run.about["world_start_s"])
     first = int(np.argmin(run.estimates["epoch"]))
     time_s = float(run.estimates["time_s"][first])
     if "seed" in run.about:
@@ -115,6 +117,9 @@ def fault_spans(run):
     timed = [one for one in faults(run) if one.start_s is not None]
     if not timed:
         return []
+    if "world_start_s" in run.about:
+        start = start_s(run)
+        return [(one.name, start + one.start_s, start + one.start_s + one.duration_s) for one in timed]
     order = np.argsort(run.estimates["epoch"], kind="stable")
     epoch, time_s = run.estimates["epoch"][order], run.estimates["time_s"][order]
     spans = []
@@ -163,6 +168,8 @@ class Run:
         later.start_s = start
         for name in ("estimates", "innovations", "status", "states", "sensors", "map"):
             setattr(later, name, getattr(self, name).since(start))
+        if "world_start_s" in self.about:
+            later.about = {**self.about, "world_start_s": self.about["world_start_s"] - start}
         return later
 
     def of(self, estimator):

@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+// The simulated world behind the board's pins: rates and forces at the IMU, edges of the encoders, solutions for the
+// receiver. Sensors that are not wired send frames, as on any bus. The board's time since power-on is that of the bus.
+#pragma once
+
+#include "base/random.hpp"
+#include "param/parameters.hpp"
+#include "sim_host/board/sensor_world.hpp"
+#include "sim_host/board/ublox_receiver.hpp"
+#include "sim_host/world/world.hpp"
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+namespace tetap::board {
+
+class SimulatedSensors {
+ public:
+  /// `world` starts at World::start() of the bus; until then the robot stands where it begins.
+  SimulatedSensors(sim::World world, const param::Parameters& parameters, const UbloxOptions& options,
+                   std::uint64_t seed);
+  SimulatedSensors(const SimulatedSensors&) = delete;
+  SimulatedSensors& operator=(const SimulatedSensors&) = delete;
+
+  /// For ArkCannode; this object must live longer.
+  [[nodiscard]] SensorWorld door();
+  /// Measurements of sensors that are not wired, as they arrive by `now`.
+  void take_unwired(Picoseconds now, std::vector<sim::Measurement>& arrived);
+  /// Lets the world run to the end of what a judge compares.
+  void advance(Picoseconds now);
+
+  [[nodiscard]] const sim::World& world() const { return world_; }
+  /// One row each 10 ms of the bus's time, from 0 on.
+  [[nodiscard]] const std::vector<sim::Truth>& truth() const { return truth_; }
+  UbloxReceiver receiver;
+  /// Edges that disturbance adds to the right encoder's count.
+  std::int64_t extra_edges = 0;
+
+ private:
+  static constexpr std::int64_t kStep_us = 500, kTruth_us = 10'000;
+  struct Step {
+    Picoseconds end = 0;
+    sim::Imu::Signals imu;
+    std::array<double, 2> shafts{};
+  };
+  void step();
+  void sort(std::vector<sim::Measurement>& arrived);
+  void solve(const sim::Measurement& measurement);
+  [[nodiscard]] ImuTruth imu(Picoseconds now);
+  [[nodiscard]] std::int64_t edges(Picoseconds now, std::size_t wheel);
+  [[nodiscard]] std::array<double, 3> to_chip(const sim::Vector3& v_s) const;
+
+  sim::World world_;
+  param::WiredParameters wired_;
+  std::array<Step, 4> steps_{};  ///< the newest is the last
+  std::vector<sim::Truth> truth_;
+  std::vector<sim::Measurement> arrived_, unwired_;
+  GnssSolution solution_;
+  base::Random vibration_;
+  Picoseconds last_imu_ = -1;
+  sim::Vector3 shake_{};
+};
+
+}  // namespace tetap::board

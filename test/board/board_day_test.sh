@@ -1,0 +1,55 @@
+#!/bin/bash
+# SPDX-License-Identifier: Apache-2.0
+# board_day_test.sh SECONDS: the first SECONDS of the rover's day (at most the whole) on its flash image, as `make board` runs it: no model complains, the log
+# repeats byte for byte, two runs are equal, the estimate is as honest and as good as that of the same world over CAN, and all of it is faster than real time.
+set -eu
+seconds=${1:-40}
+root=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
+cd "$root"
+programs=build/host/sim_host
+[ -x "$programs/board/tetap-board" ] || { echo "board_day_test: skipped: no $programs/board/tetap-board (libunicorn-dev)" >&2; exit 77; }
+image=build/ark_cannode/hal/board/tetap-ark_cannode-rover.elf
+out=$(mktemp -d)
+trap 'rm -rf "$out"' EXIT
+fail() { echo "board_day_test: $*" >&2; exit 1; }
+
+TETAP_IMAGE=$image OUT=$out/day ROBOT=rover SEED=1 FAULT=usual WORLD="--seconds $seconds" REPORT=--no-pictures tools/run/emulate_board >"$out/said" 2>&1 ||
+  fail "status $?: $(tail -5 "$out/said")"
+# The same world, its sensors over CAN: what a node on the bus makes of it.
+"$programs/tetap-world" --memory --robot rover --seed 1 --duration "$seconds" --fault wheel_spin@45+3,gnss_outage@80+30,gnss_jump@150+2 --out "$out/bus" --quiet
+tools/report/write_report "$out/bus" --truth "$out/bus/truth.csv" --no-pictures >/dev/null
+/usr/bin/python3 - "$out/day/summary.json" "$out/bus/summary.json" "$seconds" <<'PYTHON' || exit 1
+import json, sys
+day, bus = (json.load(open(name, encoding="utf-8")) for name in sys.argv[1:3])
+seconds = min(float(sys.argv[3]), day["board_s"])
+wrong = []
+def must(holds, words):
+    if not holds:
+        wrong.append(words)
+must(day["complaints"] == 0, f"complaints: {day['complaint_texts']}")
+must(day["epochs_different"] == 0 and day["unlogged"] == 0, f"{day['epochs_different']} epochs differ, {day['unlogged']} are not in the log")
+must(day["epochs_compared"] >= 100 * (seconds - 1), f"only {day['epochs_compared']} epochs in {seconds} s")
+must(day["times_realtime"] > 1, f"{day['times_realtime']} times real time")
+must(day["resets"] == 0 and day["imu_packets_lost"] == 0, f"{day['resets']} resets, {day['imu_packets_lost']} packets lost")
+must(day["gnss_baud"] == 115200 and day["gnss_epochs"] > 3 * (seconds - 40), "the receiver was not configured")
+fused, other = day["Inertial"], bus["Inertial"]
+print(f"board {fused['position_rmse_m']:.3f} m {fused['heading_rmse_deg']:.3f} deg NEES {fused['nees_mean']:.2f}, "
+      f"bus {other['position_rmse_m']:.3f} m {other['heading_rmse_deg']:.3f} deg NEES {other['nees_mean']:.2f}, {day['times_realtime']:.1f} times real time")
+for key in ("position_rmse_m", "heading_rmse_deg"):
+    must(fused[key] < 1.5 * other[key] + 0.1, f"{key} is {fused[key]}, over CAN {other[key]}")
+must(0.05 < fused["nees_mean"] < 9, f"NEES is {fused['nees_mean']} of {fused['nees_dof']}")
+for words in wrong:
+    print(f"board_day_test: {words}", file=sys.stderr)
+sys.exit(bool(wrong))
+PYTHON
+
+for name in one two; do
+  "$programs/board/tetap-board" --robot rover --seed 2 --seconds 4 --out "$out/$name" "$image" >/dev/null 2>&1 || fail "seed 2"
+done
+cmp "$out/one/raw.log" "$out/two/raw.log" || fail "two runs differ"
+"$programs/board/tetap-board" --robot rover --seed 3 --seconds 4 --out "$out/three" "$image" >/dev/null 2>&1 || fail "seed 3"
+! cmp -s "$out/one/raw.log" "$out/three/raw.log" || fail "the seed changes nothing"
+status=0; "$programs/board/tetap-board" --robot rover --fault lost_frames "$image" >/dev/null 2>"$out/err" || status=$?
+[ $status = 2 ] && grep -q "of sensors on the bus" "$out/err" || fail "lost_frames of wired sensors: status $status, $(cat "$out/err")"
+status=0; "$programs/board/tetap-board" --robot rover --fault imu_dead@x "$image" >/dev/null 2>"$out/err" || status=$?
+[ $status = 2 ] && grep -q "NAME\[@START\[+DURATION\]\]" "$out/err" || fail "imu_dead@x: status $status, $(cat "$out/err")"

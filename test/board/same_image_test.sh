@@ -1,0 +1,22 @@
+#!/bin/bash
+# SPDX-License-Identifier: Apache-2.0
+# same_image_test.sh: two builds of one commit in folders of other names, neither with a compiler cache, give the same bytes: .bin and .hex of the ARK CANnode's rover.
+set -eu
+root=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
+cd "$root"
+command -v arm-none-eabi-g++ >/dev/null || { echo "same_image_test: skipped: no arm-none-eabi-g++" >&2; exit 77; }
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+export CCACHE_DISABLE=1
+for copy in "$work/one" "$work/another/place"; do
+  git clone --quiet --shared --no-checkout "$root" "$copy"  # the commit's number is in the image
+  git ls-files -z --cached --others --exclude-standard | xargs -0 cp --parents -t "$copy" 2>/dev/null || true  # without files that were removed
+  (cd "$copy" && tools/run/build_preset ark_cannode:tetap-ark_cannode-rover,tetap-ark_cannode_at_64k-rover 2>/dev/null) ||
+    { echo "same_image_test: $copy does not build" >&2; exit 1; }
+done
+for name in tetap-ark_cannode-rover tetap-ark_cannode_at_64k-rover; do
+  for kind in bin hex; do
+    cmp "$work/one/build/ark_cannode/hal/board/$name.$kind" "$work/another/place/build/ark_cannode/hal/board/$name.$kind" || exit 1
+  done
+  sha256sum "$work/one/build/ark_cannode/hal/board/$name.bin" | awk -v name="$name.bin" '{ print name, $1 }'
+done
