@@ -112,6 +112,38 @@ TEST(DeadReckoning, TheGyroscopeTurnsAndItsBiasIsLearntAtRest) {
   EXPECT_NEAR(motion.estimate(n).pose.yaw_rad - yaw_before, 0.5F, 0.01F);
 }
 
+// Without its gyroscope the robot turns as its wheels do, and not as the gyroscope last showed.
+TEST(DeadReckoning, WithoutItsGyroscopeTheWheelsShowTheTurn) {
+  param::Parameters n = kNumbers;
+  n.gyro.use = 1;
+  DeadReckoning motion;
+  motion.start({0}, {}, 0.01F, 0.01F);
+  const double per_m = 2000 / (0.2 * M_PI), track_m = static_cast<double>(n.wheels.drive.track_m);
+  double left = 0, right = 0, yaw = 0;
+  std::int64_t us = 0;
+  const auto run = [&](double for_s, double turn_radps, bool imu) {
+    for (int k = 0; k < std::lround(100 * for_s); ++k) {
+      us += 10'000;
+      yaw += turn_radps * 0.01;
+      left += (1 - 0.5 * track_m * turn_radps) * 0.01 * per_m, right += (1 + 0.5 * track_m * turn_radps) * 0.01 * per_m;
+      if (imu)
+        motion.fuse(
+            sensor::ImuSample{.dangle_b_rad = {0, 0, static_cast<float>(turn_radps * 0.01)}, .interval_us = 10'000},
+            {us}, n);
+      motion.fuse(sensor::WheelCounts{.left = static_cast<std::uint16_t>(std::lround(left)),
+                                      .right = static_cast<std::uint16_t>(std::lround(right))},
+                  {us}, n);
+    }
+    motion.advance({us});
+    return std::remainder(static_cast<double>(motion.estimate(n).pose.yaw_rad) - yaw, 2 * M_PI);
+  };
+  EXPECT_NEAR(run(5, 0.3, true), 0, 0.01);
+  const double timeout_s = 1e-6 * n.wheels.timeout_us;
+  EXPECT_NEAR(run(6, -0.3, false), 0, 1.1 * timeout_s * 0.6) << "but for the time-out";
+  const double before = run(1, 0.3, true);
+  EXPECT_NEAR(run(5, 0.3, true), before, 0.01) << "the gyroscope shows the turn again";
+}
+
 /// One metre a second straight ahead, by counters of which some begin at 0 again at `restart_s`.
 struct Restarted {
   double error_m = 0;  ///< at the end, from a drive whose counters go on

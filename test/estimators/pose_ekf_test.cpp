@@ -2,8 +2,13 @@
 // The planar filter's refusals name their test, and its recovery adds variance to the pose alone.
 #include "estimators/planar/pose_ekf.hpp"
 #include "config/mrclam.hpp"
+#include "config/rover_landmarks.hpp"
 
 #include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
 
 namespace tetap::estimators {
 namespace {
@@ -77,6 +82,96 @@ TEST(PoseEkf, ASightingWithoutIdentityIsThatOfTheLandmarkItFitsBest) {
   EXPECT_EQ(sees(nameless, 0xFF, base::kNan, base::kNan).verdict, sensor::Verdict::kNotFinite);
   nameless.estimator.restart({nameless.us}, nameless.ctx());  // without a pose there is no nearest
   EXPECT_EQ(sees(nameless, 0xFF, 5.4F, 0.36F).verdict, sensor::Verdict::kNotUsed);
+}
+
+TEST(PoseEkf, TheModeStaysDegradedWhenTheCovarianceIsWidened) {
+  Robot robot;
+  for (int k = 1; k <= 15; ++k) {
+    ASSERT_EQ(robot.sees(50.0F, 0.0F).verdict, sensor::Verdict::kRejected) << k;
+    EXPECT_EQ(robot.estimator.mode(robot.ctx()), k < 3 ? sensor::Mode::kNominal : sensor::Mode::kDegraded) << k;
+  }
+}
+
+/// The planar rover stands at the origin, 4 m from one landmark and 5 m from another, in sight of fixes and counters.
+struct Standing {
+  struct Motion {
+    double left_mps = 0, right_mps = 0;  ///< rims, as the counters show them
+    double turn_radps = 0;               ///< as the gyroscope shows it
+  };
+  explicit Standing(unsigned seed) : random(seed) {
+    static_cast<void>(map.put({.x_mm = 4000, .id = 7}));
+    static_cast<void>(map.put({.y_mm = 5000, .id = 8}));
+    frame.map = &map;
+    frame.frame = nav::LocalFrame(n.gnss.origin_latitude_2ndeg, n.gnss.origin_longitude_2ndeg, n.gnss.origin_height_m);
+    frame.origin = sensor::OriginSource::kConfigured;
+    estimator.restart({}, ctx());
+    estimator.set_pose({}, {.sigma_position_m = 0.05F, .sigma_yaw_rad = 0.02F}, ctx());
+    run(5, {});
+    beyond_s = 0;
+  }
+  [[nodiscard]] Context ctx() const { return {.parameters = n, .map_frame = frame}; }
+  /// 100 Hz of wheels and IMU, 5 Hz of landmarks and fixes.
+  void run(double for_s, const Motion& shown) {
+    const double per_m = static_cast<double>(n.wheels.drive.counts_per_turn) / (2 * 3.14159265358979 * 0.1);
+    for (int k = 0; k < std::lround(100 * for_s); ++k) {
+      us += 10'000;
+      left += shown.left_mps * 0.01 * per_m, right += shown.right_mps * 0.01 * per_m;
+      estimator.fuse(
+          sensor::ImuSample{.dangle_b_rad = {0, 0, static_cast<float>(shown.turn_radps * 0.01)}, .interval_us = 10'000},
+          {us}, ctx());
+      estimator.fuse(sensor::WheelCounts{static_cast<std::uint16_t>(std::lround(left)),
+                                         static_cast<std::uint16_t>(std::lround(right))},
+                     {us}, ctx());
+      if (us % 200'000 == 0) measure();
+      estimator.advance({us}, ctx());
+      judge();
+    }
+  }
+  void measure() {
+    const auto noise = [this](double sigma) { return static_cast<float>(sigma * normal(random)); };
+    estimator.fuse(sensor::LandmarkSighting{.landmark = 7, .range_m = 4 + noise(0.1), .bearing_rad = noise(0.02)}, {us},
+                   ctx());
+    estimator.fuse(
+        sensor::LandmarkSighting{.landmark = 8, .range_m = 5 + noise(0.1), .bearing_rad = 1.5707963F + noise(0.02)},
+        {us}, ctx());
+    estimator.fuse(sensor::GnssPosition{.latitude_2ndeg = n.gnss.origin_latitude_2ndeg,
+                                        .longitude_2ndeg = n.gnss.origin_longitude_2ndeg,
+                                        .height_m = n.gnss.origin_height_m,
+                                        .horizontal_acc_m = 0.3F,
+                                        .vertical_acc_m = 0.5F,
+                                        .fix = sensor::GnssFix::k3d},
+                   {us}, ctx());
+  }
+  void judge() {
+    const Estimate e = estimator.estimate(ctx());
+    const auto ratio = [&e](double off, int k) {
+      return std::abs(off) / (3 * std::sqrt(static_cast<double>(e.p(k, k))));
+    };
+    const double x = 1e-6 * static_cast<double>(e.pose.x.um()), y = 1e-6 * static_cast<double>(e.pose.y.um());
+    const double worst = std::max({ratio(x, 0), ratio(y, 1), ratio(static_cast<double>(e.pose.yaw_rad), 2)});
+    if (worst > 1.5) beyond_s += 0.01;
+  }
+
+  const param::Parameters n = robot::rover_landmarks::parameters;
+  LandmarkMap<kMapCapacity> map;
+  MapFrame frame;
+  PoseEkf estimator;
+  std::mt19937 random;
+  std::normal_distribution<double> normal;
+  std::int64_t us = 0;
+  double left = 0, right = 0;
+  double beyond_s = 0;  ///< time in which an error was above 1.5 times three sigma
+};
+
+TEST(PoseEkf, AGyroscopeOrWheelsThatErrAtRestLeaveThePoseHonest) {
+  const Standing::Motion wrong[] = {{.turn_radps = 0.1}, {.turn_radps = -1.0}, {.left_mps = 0.3}, {.right_mps = -1.2}};
+  for (const Standing::Motion& shown : wrong)
+    for (unsigned seed = 1; seed <= 3; ++seed) {
+      Standing robot(seed);
+      robot.run(5, shown);
+      robot.run(10, {});
+      EXPECT_LT(robot.beyond_s, 1.0) << shown.left_mps << ' ' << shown.right_mps << ' ' << shown.turn_radps;
+    }
 }
 
 }  // namespace

@@ -9,7 +9,8 @@
 namespace tetap::estimators {
 
 template <class Filter>
-model::PlanarIncrement PlanarDeadReckoning<Filter>::held_increment(float dt_s, const param::Parameters& n) const {
+model::PlanarIncrement PlanarDeadReckoning<Filter>::held_increment(float dt_s, bool gyro,
+                                                                   const param::Parameters& n) const {
   model::PlanarIncrement increment;
   switch (held_.kind) {
     case Held::Kind::kNone:
@@ -27,7 +28,7 @@ model::PlanarIncrement PlanarDeadReckoning<Filter>::held_increment(float dt_s, c
       break;
     }
   }
-  if (n.gyro.use != 0) turn(increment, gyro_rate_radps_ * dt_s, n.gyro.noise * dt_s);
+  if (gyro) turn(increment, gyro_rate_radps_ * dt_s, n.gyro.noise * dt_s);
   return increment;
 }
 
@@ -43,12 +44,13 @@ void PlanarDeadReckoning<Filter>::propagate(base::Micros t, const param::Paramet
   const base::Micros held_until = t < silent ? t : silent;
   if (time_ < held_until) {
     const float dt_s = base::seconds(held_until - time_);
-    filter.predict(held_increment(dt_s, n));
+    const bool gyro = gyro_shows(held_until, n);
+    filter.predict(held_increment(dt_s, gyro, n));
     if (held_.kind == Held::Kind::kWheels) {
       applied_left_m_ += held_.first_mps * dt_s;
       applied_right_m_ += held_.second * dt_s;
     }
-    if (n.gyro.use != 0) applied_yaw_rad_ += gyro_rate_radps_ * dt_s;
+    if (gyro) applied_yaw_rad_ += gyro_rate_radps_ * dt_s;
     time_ = held_until;
   }
   if (time_ < t) {
@@ -62,7 +64,8 @@ template <class Filter>
 sensor::Verdict PlanarDeadReckoning<Filter>::fuse(const sensor::WheelCounts& now, base::Micros stamp,
                                                   const param::Parameters& n) {
   const auto& drive = n.wheels.drive;
-  if (n.gyro.use != 0) propagate(stamp, n);  // the turn up to here; what the counts add is length
+  const bool gyro = gyro_shows(stamp, n);
+  if (gyro) propagate(stamp, n);  // the turn up to here; what the counts add is length
   const bool usable = have_counts_ && stamp > counts_time_ && stamp - counts_time_ <= base::Micros{n.wheels.timeout_us};
   sensor::Verdict verdict = sensor::Verdict::kAccepted;
   if (usable) {
@@ -71,7 +74,7 @@ sensor::Verdict PlanarDeadReckoning<Filter>::fuse(const sensor::WheelCounts& now
     const float dt_s = base::seconds(stamp - counts_time_);
     if (model::possible_step(left_m, right_m, n.wheels.most_mps * dt_s)) {
       model::PlanarIncrement increment = drive.increment(left_m - applied_left_m_, right_m - applied_right_m_);
-      if (n.gyro.use != 0) turn(increment, 0.0F, 0.0F);
+      if (gyro) turn(increment, 0.0F, 0.0F);
       filter.predict(increment);
       const float per_s = 1.0F / dt_s;
       held_ = {.kind = Held::Kind::kWheels, .first_mps = left_m * per_s, .second = right_m * per_s};
@@ -115,6 +118,7 @@ sensor::Verdict PlanarDeadReckoning<Filter>::fuse(const sensor::ImuSample& sampl
   const float raw_radps = (n.gyro.up_s[0] * sample.dangle_b_rad[0] + n.gyro.up_s[1] * sample.dangle_b_rad[1] +
                            n.gyro.up_s[2] * sample.dangle_b_rad[2]) /
                           interval_s;
+  if (!(base::abs(raw_radps) <= n.inertial.gyro_range_radps)) return sensor::Verdict::kRejected;
   const float forward = forward_mps();
   const bool still =
       held_.kind != Held::Kind::kNone && forward < n.gyro.standstill_mps && -forward < n.gyro.standstill_mps;
@@ -162,10 +166,10 @@ template <class Filter>
   if (!fresh(n)) return {};
   // Variance of the motion over one period: its share in that of the pose, and the steps of the counters.
   const float period_s = base::seconds(base::Micros{n.loop.period_us});
-  const model::PlanarIncrement one = held_increment(period_s, n);
+  const bool gyro = gyro_shows(out_time_, n);
+  const model::PlanarIncrement one = held_increment(period_s, gyro, n);
   const float step_m = have_counts_ ? 0.41F * n.wheels.drive.left_m(1) : 0.0F;
   const float track_m = n.wheels.drive.track_m;
-  const bool gyro = n.gyro.use != 0;
   const float step_rad = gyro || !have_counts_ ? 0.0F : step_m / track_m;
   // Samples are means, too: true in their middle.
   const float aged =

@@ -66,6 +66,12 @@ class PlanarDeadReckoning {
     return held_.kind == Held::Kind::kWheels ? (held_.second - held_.first_mps) / n.wheels.drive.track_m : held_.second;
   }
   [[nodiscard]] float gyro_turn_radps() const { return gyro_rate_radps_; }
+  /// The gyroscope's last turn rate holds at t; after the time-out of wheels the wheels show the turn.
+  [[nodiscard]] bool gyro_shows(base::Micros t, const param::Parameters& n) const {
+    return n.gyro.use != 0 && t - gyro_time_ <= base::Micros{n.wheels.timeout_us};
+  }
+  /// Forward speed as the wheels showed it last.
+  [[nodiscard]] float wheels_forward_mps() const { return forward_mps(); }
 
   /// Brings the state to t with what is held; called before a measurement is fused at its own time.
   void propagate(base::Micros t, const param::Parameters& n);
@@ -126,10 +132,11 @@ class PlanarDeadReckoning {
     return held_.kind == Held::Kind::kWheels ? 0.5F * (held_.first_mps + held_.second) : held_.first_mps;
   }
   [[nodiscard]] float yaw_rate_radps(const param::Parameters& n) const {
-    if (n.gyro.use != 0) return gyro_rate_radps_;
+    if (gyro_shows(out_time_, n)) return gyro_rate_radps_;
     return wheels_turn_radps(n);
   }
-  [[nodiscard]] model::PlanarIncrement held_increment(float dt_s, const param::Parameters& n) const;
+  /// `gyro`: the gyroscope shows the turn.
+  [[nodiscard]] model::PlanarIncrement held_increment(float dt_s, bool gyro, const param::Parameters& n) const;
   static void turn(model::PlanarIncrement& increment, float dyaw_rad, float variance) {
     increment.dyaw_rad = dyaw_rad;
     increment.var_dyaw = variance;

@@ -5,20 +5,93 @@
 
 namespace tetap::estimators {
 
+namespace {
+
+/// Square of the position's and of the heading's error that would explain an innovation alone.
+struct SquaredError {
+  float place_m2 = 0, yaw_rad2 = 0;
+};
+SquaredError squared_error(const model::GnssPosition&, const filter::Vector<float, 2>& nu) {
+  return {nu(0) * nu(0) + nu(1) * nu(1), 0};
+}
+SquaredError squared_error(const model::RangeBearing& seen, const filter::Vector<float, 2>& nu) {
+  const float aside_m = seen.range_m * nu(1);
+  return {nu(0) * nu(0) + aside_m * aside_m, nu(1) * nu(1)};
+}
+SquaredError squared_error(const model::Range&, const filter::Vector<float, 1>& nu) { return {nu(0) * nu(0), 0}; }
+SquaredError squared_error(const model::Bearing&, const filter::Vector<float, 1>& nu) { return {0, nu(0) * nu(0)}; }
+
+}  // namespace
+
 template <class Filter>
 template <class Model>
 Innovation PoseFilter<Filter>::measure(const Model& model, Source source, float gate_scale, base::Micros stamp,
                                        const Context& ctx, std::uint8_t landmark) {
   const auto result = motion_.filter.update(model, gate_scale * filter::chi_square_99(Model::kDimension));
   checks::Persistence& refused = refused_[source];
+  std::uint8_t& in_a_row = in_a_row_[source];
   if (result.verdict == filter::Verdict::kAccepted) {
     refused.update(false, stamp);
+    in_a_row = 0;
     last_absolute_ = stamp;
+    doubted_m2_ = 0;
   } else if (result.verdict == filter::Verdict::kRejected) {
     refused.update(true, stamp);
+    if (in_a_row < kDegraded) ++in_a_row;
+    if (both_refuse(source, stamp)) {
+      const auto [place_m2, yaw_rad2] = squared_error(model, result.nu);
+      const float most_rad = ctx.parameters.recovery.inflate_yaw_rad, most_rad2 = most_rad * most_rad;
+      widen_by_vote(place_m2, yaw_rad2 < most_rad2 ? yaw_rad2 : most_rad2, stamp);
+    }
     recover(refused, stamp, ctx.parameters.recovery);
   }
   return record(result, landmark);
+}
+
+/// The other source was refused last, too, within the time of dead reckoning.
+template <class Filter>
+bool PoseFilter<Filter>::both_refuse(Source source, base::Micros stamp) const {
+  const Source other = source == kGnss ? kLandmark : kGnss;
+  return refused_[source].count() >= 2 && refused_[other].holds() &&
+         refused_[other].held_for(stamp) < base::Micros{5'000'000};
+}
+
+template <class Filter>
+void PoseFilter<Filter>::widen_by_vote(float place_m2, float yaw_rad2, base::Micros stamp) {
+  constexpr base::Micros kLeast{200'000};
+  add_variance(motion_.filter, {place_m2, place_m2, yaw_rad2});
+  const base::Micros since = stamp - last_absolute_;
+  const float doubt_mps = base::sqrt(place_m2) / base::seconds(since > kLeast ? since : kLeast);
+  if (doubt_mps > doubt_mps_) doubt_mps_ = doubt_mps;
+  doubted_at_ = stamp;
+  for (checks::Persistence& refused : refused_) refused.reset();
+}
+
+template <class Filter>
+void PoseFilter<Filter>::judge_motion(base::Micros stamp, const param::Parameters& n) {
+  if (n.gyro.use != 0) {
+    wheel_turn_.update(motion_.wheels_turn_radps(n), motion_.gyro_turn_radps(), stamp, n.disagreement);
+    const float track_m = n.wheels.drive.track_m;
+    if (!(track_m > 0) || !motion_.gyro_shows(stamp, n)) {
+      turn_.reset();
+    } else {
+      const float per_m2 = (n.wheels.drive.noise_left + n.wheels.drive.noise_right) / (track_m * track_m);
+      const float variance = per_m2 * base::abs(motion_.wheels_forward_mps()) + n.gyro.noise;
+      const float turned_rad2 = turn_.update(motion_.gyro_turn_radps() - motion_.wheels_turn_radps(n), variance,
+                                             n.landmark.gate_scale * filter::chi_square_99(1), stamp);
+      const float place_m2 = 0.25F * track_m * track_m * turned_rad2;  // one rim alone
+      if (turned_rad2 > 0.0F) add_variance(motion_.filter, {place_m2, place_m2, turned_rad2});
+    }
+  }
+  constexpr base::Micros kDoubted{10'000'000};
+  if (!checks::recent(doubted_at_, stamp, kDoubted)) {
+    doubt_mps_ = doubted_m2_ = 0;
+    return;
+  }
+  const float way_m = doubt_mps_ * base::seconds(stamp - last_absolute_), more_m2 = way_m * way_m - doubted_m2_;
+  if (!(more_m2 > 0.0F)) return;
+  add_variance(motion_.filter, {more_m2, more_m2, 0.0F});
+  doubted_m2_ += more_m2;
 }
 
 template <class Filter>

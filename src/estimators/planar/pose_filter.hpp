@@ -4,6 +4,7 @@
 #pragma once
 
 #include "checks/persistence.hpp"
+#include "checks/turn_residual.hpp"
 #include "checks/wheel_turn.hpp"
 #include "estimators/context.hpp"
 #include "estimators/planar/dead_reckoning.hpp"
@@ -54,6 +55,8 @@ class PoseFilter {
     landmarks_.reset();
     last_absolute_ = t;
     refused_ = {};
+    in_a_row_ = {};
+    trust_motion();
   }
 
   void advance(base::Micros t, const Context&) { motion_.advance(t), now_ = t; }
@@ -64,9 +67,8 @@ class PoseFilter {
   }
   Innovation fuse(const Input& input, base::Micros stamp, const Context& ctx) {
     const sensor::Verdict verdict = motion_.fuse(input, stamp, ctx.parameters);
-    const param::Parameters& n = ctx.parameters;
-    if (!std::same_as<Input, sensor::ImuSample> && n.gyro.use != 0 && verdict == sensor::Verdict::kAccepted)
-      wheel_turn_.update(motion_.wheels_turn_radps(n), motion_.gyro_turn_radps(), stamp, n.disagreement);
+    if (!std::same_as<Input, sensor::ImuSample> && verdict == sensor::Verdict::kAccepted)
+      judge_motion(stamp, ctx.parameters);
     return input_record(verdict);
   }
 
@@ -94,8 +96,9 @@ class PoseFilter {
   [[nodiscard]] sensor::Mode mode(const Context&) const {
     if (phase_ == Phase::kWaiting) return sensor::Mode::kWaitingForPose;
     if (phase_ == Phase::kAligning) return sensor::Mode::kAligning;
-    for (const checks::Persistence& refused : refused_)
-      if (refused.count() >= 3) return sensor::Mode::kDegraded;
+    for (const std::uint8_t in_a_row : in_a_row_)
+      if (in_a_row >= kDegraded) return sensor::Mode::kDegraded;
+    if (turn_.contradicts()) return sensor::Mode::kDegraded;
     return now_ - last_absolute_ > base::Micros{5'000'000} ? sensor::Mode::kDeadReckoning : sensor::Mode::kNominal;
   }
   template <class Sink>
@@ -106,6 +109,11 @@ class PoseFilter {
     landmarks_.hash_state(sink);
     wheel_turn_.hash_state(sink);
     for (const checks::Persistence& refused : refused_) refused.hash_state(sink);
+    turn_.hash_state(sink);
+    for (const std::uint8_t in_a_row : in_a_row_) sink(std::uint32_t{in_a_row});
+    sink(doubt_mps_);
+    sink(doubted_m2_);
+    sink(doubted_at_.us);
     sink(last_absolute_.us);
   }
 
@@ -113,6 +121,7 @@ class PoseFilter {
   enum class Phase : std::uint8_t { kWaiting, kAligning, kTracking };
   enum Source : std::size_t { kLandmark, kGnss, kSources };
   static constexpr float kLost_rad = 1;
+  static constexpr std::uint8_t kDegraded = 3;  ///< rejections in a row
   /// 1 sigma of the heading before it is known. The mean of an unscented filter with a heading that could be anything
   /// would hardly move, so that filter counts in a frame of its own, where its heading is known.
   static constexpr float kFreeHeading_rad = kUnscented ? 0.0F : kUnknown_rad;
@@ -138,14 +147,29 @@ class PoseFilter {
     last_absolute_ = stamp;
   }
   void recover(checks::Persistence& refused, base::Micros stamp, const param::RecoveryParameters& n);
+  /// Wheels against the gyroscope, and what an earlier vote left of the trust in wheels.
+  void judge_motion(base::Micros stamp, const param::Parameters& n);
+  /// Landmarks and fixes both contradict the filter: the motion is wrong, by the innovation since the last agreement.
+  [[nodiscard]] bool both_refuse(Source source, base::Micros stamp) const;
+  void widen_by_vote(float place_m2, float yaw_rad2, base::Micros stamp);
+  void trust_motion() {
+    doubt_mps_ = doubted_m2_ = 0;
+    doubted_at_ = {};
+    turn_.reset();
+  }
 
   Motion motion_;
   GnssAlignment alignment_;
   LandmarkAlignment landmarks_;
   checks::WheelTurn wheel_turn_;
+  checks::TurnResidual turn_;
   Phase phase_ = Phase::kWaiting;
   std::array<checks::Persistence, kSources> refused_{};  ///< rejections in a row of one kind of sensor
-  base::Micros last_absolute_;                           ///< stamp of the last accepted landmark or fix
+  std::array<std::uint8_t, kSources> in_a_row_{};        ///< the same, which a widening does not end
+  float doubt_mps_ = 0;                                  ///< 1 sigma of the speed, beside the wheels' own noise
+  float doubted_m2_ = 0;        ///< variance of the position by it since the last accepted measurement
+  base::Micros doubted_at_;     ///< stamp at which landmarks and fixes last contradicted the motion; 0: never
+  base::Micros last_absolute_;  ///< stamp of the last accepted landmark or fix
   base::Micros now_;
 };
 

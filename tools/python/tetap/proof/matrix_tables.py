@@ -138,7 +138,11 @@ def bars(rows):
             f"{100 * KIND_LIMIT:.0f} %.")
 
 
-def page(rows):
+RECORDED = """`tools/proof/run_matrix --recorded` puts one fault into a recorded drive, at ten places that are evenly spread over it. Truth is the data set's
+position, and its heading where it has one."""
+
+
+def page(rows, recorded=()):
     parts = [PAGE.format(count=len(rows), all=100 * ALL_LIMIT, kind=100 * KIND_LIMIT)]
     for title, mine in parts_of(rows):
         parts += [f"## {title}", bars(mine), markdown(["robot", *WHOLE[1:]], of_whole(mine, lambda row: row["robot"])),
@@ -152,6 +156,10 @@ def page(rows):
                           f"{row['worst_ratio']:.1f} ({row['quantity']})", f"`{command(row)}`"])
         parts += [f"### The {len(worst)} worst kinds, each with its smallest example",
                   markdown(["kind", "broken", "promise", "how", "worst / 3 sigma", "command"], worst)]
+    if recorded:
+        mine = list(recorded)
+        parts += ["## Recorded drives with one fault", RECORDED, bars(mine),
+                  markdown(["drive", *WHOLE[1:]], of_whole(mine, lambda row: row["robot"])), markdown(HEAD, kind_rows(mine))]
     return "\n\n".join(part.rstrip("\n") for part in parts) + "\n"
 
 
