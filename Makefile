@@ -27,7 +27,7 @@ ifneq ($(unknown),)
 $(error no setting $(unknown); there are: $(settings))
 endif
 
-.PHONY: help sim board test quick proof replay record doctor firmware flash size heap stack count bits hashes soak matrix laws constants check docs dbc setup programs arm
+.PHONY: help sim board test quick proof replay record doctor firmware flash size heap stack count bits hashes soak matrix laws constants bench costs check docs dbc setup programs arm
 
 help: ## this list
 	@echo "tetap: state estimation on the robot's own microcontroller"; echo
@@ -79,6 +79,12 @@ stack: arm programs ## worst-case stack from the call graph, against the painted
 
 count: arm ## instructions per workload and per tick on the emulated cores, against the budgets
 	@tools/proof/count_instructions --all
+
+bench: setup ## time beside OpenCV, Orocos BFL, Eigen and Ceres on this machine, in out/bench.json (their packages are installed for it)
+	@tools/proof/run_benchmarks
+
+costs: setup ## each filter: accuracy on one scenario, RAM, flash, stack, instructions on three cores, in out/costs.json
+	@tools/proof/measure_costs
 
 bits: setup ## the same bits from every compiler, option and core: 2^24 values, 100000 steps (some 8 minutes)
 	@tools/proof/compare_bits --whole

@@ -59,7 +59,6 @@ class SimulatedSensors {
   GnssSolution solution_;
   base::Random vibration_;
   Picoseconds last_imu_ = -1;
-  sim::Vector3 shake_{};
 };
 
 }  // namespace tetap::board

@@ -95,7 +95,7 @@ void OutFile::publish() {
 }
 
 std::string OutFile::close() {
-  const std::string hash = end();
+  std::string hash = end();
   publish();
   return hash;
 }

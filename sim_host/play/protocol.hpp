@@ -33,8 +33,8 @@ inline constexpr std::uint64_t kTimeMask = 0xFFFFFFFFFFFF;
   return offset == bus::InClosureFrames::kOffset || offset == bus::InFeature::kOffset;
 }
 [[nodiscard]] constexpr bool is_input(std::uint32_t offset) { return offset < kInputOffsets || is_map_input(offset); }
-/// A frame the node consumes and counts: of its inputs, sync frames and their guards excepted. Robots without a graph count none of the
-/// map's inputs.
+/// A frame the node consumes and counts: of its inputs, sync frames and their guards excepted. Robots without a graph
+/// count none of the map's inputs.
 [[nodiscard]] constexpr bool is_counted_input(const base::CanFrame& frame, std::uint32_t base, bool graph = false) {
   const auto offset = offset_in_block(frame, base);
   if (offset && is_map_input(*offset)) return graph;

@@ -327,13 +327,16 @@ void Recorder::flush() {
 
 const Recorder::Totals& Recorder::end() {
   totals_.estimates_sha256 = estimates_log_.end();
-  for (OutFile* file : {&estimates_, &states_, &innovations_, &sensors_, &status_, &sources_, &map_, &keyframes_, &graph_}) file->end();
+  for (OutFile* file :
+       {&estimates_, &states_, &innovations_, &sensors_, &status_, &sources_, &map_, &keyframes_, &graph_})
+    file->end();
   if (raw_) raw_->end();
   return totals_;
 }
 
 void Recorder::publish() {
-  for (OutFile* file : {&estimates_log_, &estimates_, &states_, &innovations_, &sensors_, &status_, &sources_, &map_, &keyframes_, &graph_})
+  for (OutFile* file : {&estimates_log_, &estimates_, &states_, &innovations_, &sensors_, &status_, &sources_, &map_,
+                        &keyframes_, &graph_})
     file->publish();
   if (raw_) raw_->publish();
 }

@@ -326,7 +326,7 @@ void Publisher<N>::put_graph(const Estimator& estimator, std::uint32_t size, Sen
   const estimators::GraphReport g = estimator.graph();
   const double steps = g.chi2 / bus::EstGraph::kChi2Scale;
   const bool shown = g.end != estimators::GraphEnd::kNone && steps < 1e12;  // false for NaN
-  put(bus::EstGraph{.chi2_raw = shown ? static_cast<std::uint64_t>(static_cast<std::int64_t>(steps + 0.5))
+  put(bus::EstGraph{.chi2_raw = shown ? static_cast<std::uint64_t>((static_cast<std::int64_t>(2 * steps) + 1) / 2)
                                       : bus::EstGraph::kChi2NotAvailable,
                     .status = static_cast<bus::GraphStatus>(g.end),
                     .closures = static_cast<std::uint16_t>(std::min<std::uint32_t>(g.closures, 8191)),
@@ -408,8 +408,13 @@ template <class Send, class GuardPage>
 void Publisher<N>::refusals(const Counters& c, const LoopHealth& l, GuardPage&& guard_page, Send& send) {
   const std::int32_t period = 8 * parameters_.publish.diagnostics_every;
   if (every(period, 6)) put(limits_page(c, l), send);
-  if constexpr (requires { guard_page(); })
-    if (every(period, 54)) put(guard_page(), send);
+  // A node without guards and tags sends the page, too: a node with them repeats its recording frame by frame.
+  if (!every(period, 54)) return;
+  if constexpr (requires { guard_page(); }) {
+    put(guard_page(), send);
+  } else {
+    put(EstDiagGuard{}, send);
+  }
 }
 
 template <std::size_t N>

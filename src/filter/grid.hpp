@@ -21,6 +21,7 @@ struct GridKernel {
   std::int32_t shift = 0;
   std::array<float, 3> weight{0, 1, 0};
 
+  /// Implements docs/explanation/grid_filter.md (1).
   /// Implements docs/explanation/pose_grid.md (2).
   [[nodiscard]] static constexpr GridKernel of(float mean, float variance) {
     const float nearest = mean < 0.0F ? mean - 0.5F : mean + 0.5F;
@@ -175,8 +176,10 @@ class Grid {
   /// Updates that left no mass.
   [[nodiscard]] constexpr std::uint32_t refused() const { return refused_; }
 
+  /// Implements docs/explanation/grid_filter.md (5).
   /// Maximum likelihood: the cell that the last measurement fits best; the first of equals.
   [[nodiscard]] constexpr GridPose maximum_likelihood() const { return centre(likeliest_); }
+  /// Implements docs/explanation/grid_filter.md (6).
   /// Maximum a posteriori: the cell of most mass; the first of equals.
   [[nodiscard]] constexpr GridPose maximum_a_posteriori() const {
     int best = 0;
@@ -188,6 +191,7 @@ class Grid {
   [[nodiscard]] constexpr GridPose peak() const { return centre(peak_); }
   /// The mode's neighbourhood: cells at most so many places and headings from the peak, the mass of each even over it.
   [[nodiscard]] constexpr GridRegion around_peak(int places, int headings) const;
+  /// Implements docs/explanation/grid_filter.md (7).
   /// Least mean squared error: the mean of the cells that `use` picks, of headings by unit vectors.
   template <class Use>
   [[nodiscard]] constexpr GridPose mean(const Use& use) const {
@@ -221,7 +225,8 @@ class Grid {
   static constexpr std::int32_t kMostPasses = 16;
 
   [[nodiscard]] static constexpr std::size_t index(int x, int y, int yaw) {
-    return static_cast<std::size_t>((yaw * kY + y) * kX + x);
+    const int cell = (yaw * kY + y) * kX + x;
+    return static_cast<std::size_t>(cell);
   }
   [[nodiscard]] constexpr GridPose centre(int cell) const { return at(cell % kX, cell / kX % kY, cell / (kX * kY)); }
   [[nodiscard]] static constexpr float usable(float value) { return value > 0.0F && value < 1e30F ? value : 0.0F; }
@@ -266,6 +271,7 @@ class Grid {
                           per_pass_ * motion_.variance_turn / (kTurn_rad * kTurn_rad));
   }
 
+  /// Implements docs/explanation/grid_filter.md (2).
   /// Mass that would leave the grid stays in its last cell; headings close to a circle. Implements
   /// docs/explanation/pose_grid.md (1).
   template <int kLength>
@@ -301,6 +307,7 @@ class Grid {
     const float everywhere = motion_.carried_share / static_cast<float>(kCells);
     return (1.0F - motion_.carried_share) * cells_[static_cast<std::size_t>(cell)] + everywhere;
   }
+  /// Implements docs/explanation/grid_filter.md (3).
   template <class Likelihood>
   constexpr void sum_line(const Likelihood& likelihood) {
     float sum = 0.0F;
@@ -313,6 +320,7 @@ class Grid {
     lost_ = (next - sum_) - term;
     sum_ = next;
   }
+  /// Implements docs/explanation/grid_filter.md (4).
   /// Implements docs/explanation/pose_grid.md (4).
   template <class Likelihood>
   constexpr void multiply_line(const Likelihood& likelihood) {

@@ -38,6 +38,7 @@ class IteratedEkf : public Ekf<State_> {
   }
 
  private:
+  /// Implements docs/explanation/kalman_forms.md (10).
   /// Linearised at x = prior + dx, as a correction of the prior: nu = z - h(x) + H dx.
   template <class Measurement>
   static Update<Scalar, kErrors, Measurement::kDimension> correct_at(const Measurement& z, const State& x,

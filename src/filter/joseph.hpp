@@ -8,6 +8,7 @@
 
 namespace tetap::filter {
 
+/// Implements docs/explanation/kalman_forms.md (3).
 /// (I - K H) P (I - K H)^T + K R K^T, R = diag(noise).
 template <class Scalar, int N, int M>
 [[nodiscard]] Symmetric<Scalar, N> joseph_update(const Symmetric<Scalar, N>& p, const Matrix<Scalar, N, M>& gain,

@@ -34,6 +34,7 @@ class FormedKalman {
   [[nodiscard]] Symmetric<Scalar, kErrors> covariance() const { return p.covariance(); }
   void set_covariance(const Symmetric<Scalar, kErrors>& covariance) { p = Form(covariance); }
 
+  /// Implements docs/explanation/kalman_forms.md (1).
   /// x = f(x), P = F P F^T + Q. False, and nothing has changed, when either would be no number.
   template <LinearisedMotion<State> Motion>
   bool predict(const Motion& motion) {
@@ -58,6 +59,7 @@ class FormedKalman {
   }
 };
 
+/// Implements docs/explanation/kalman_forms.md (2).
 /// H P H^T + R.
 template <class Scalar, int N, int M>
 [[nodiscard]] Symmetric<Scalar, M> innovation_covariance(const Symmetric<Scalar, N>& p, const Matrix<Scalar, M, N>& h,

@@ -84,6 +84,7 @@ class Particles {
     for (std::size_t i = 0; i < size_; ++i) states_[i] = f(states_[i]);
   }
 
+  /// Implements docs/explanation/particle_filter.md (1).
   /// Moves every particle by a draw from the motion. False, and nothing has changed, when the motion is not valid.
   template <ParticleMotion<S> Motion>
   constexpr bool predict(const Motion& motion) {
@@ -94,6 +95,7 @@ class Particles {
     return true;
   }
 
+  /// Implements docs/explanation/particle_filter.md (2).
   /// One step of sequential importance sampling with a proposal that has seen the measurement. False, and nothing has
   /// changed, when the proposal is not valid.
   template <ParticleProposal<S> Proposal>
@@ -125,6 +127,7 @@ class Particles {
     return largest_ + base::log(sum() / before);
   }
 
+  /// Implements docs/explanation/particle_filter.md (4).
   /// Effective number of particles, (sum w)^2 / sum w^2 (Kong, Liu, Wong 1994): 1 to size().
   [[nodiscard]] constexpr float effective() const {
     std::uint64_t squares = 0;
@@ -199,6 +202,7 @@ class Particles {
     sum_ = static_cast<std::uint32_t>(size_) << kBits;
   }
   [[nodiscard]] static constexpr float bounded(float log_weight) { return log_weight > kLeast ? log_weight : kLeast; }
+  /// Implements docs/explanation/particle_filter.md (3).
   /// Adds a log-likelihood to each log-weight, the best of which is brought to zero before.
   template <bool kEqual, class LogLikelihood>
   constexpr void weigh_by(const LogLikelihood& log_likelihood) {

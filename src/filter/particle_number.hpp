@@ -43,6 +43,7 @@ class BinSet {
   std::size_t count_ = 0;
 };
 
+/// Implements docs/explanation/particle_filter.md (8).
 /// The number of particles with which the Kullback-Leibler distance between sample and distribution stays below
 /// `error` with the probability of the normal quantile `quantile`, for `bins` occupied bins, limited to [least, most].
 [[nodiscard]] constexpr std::size_t particles_for(std::size_t bins, float error, float quantile, std::size_t least,

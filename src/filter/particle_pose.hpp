@@ -89,6 +89,7 @@ struct ParticleSighting {
             .per_sigma_range = 1.0F / sigma_range_m,
             .twice_concentration = 2.0F / (sigma_bearing_rad * sigma_bearing_rad)};
   }
+  /// Implements docs/explanation/particle_filter.md (9).
   /// -2 log p(z | pose) without its constant: squared errors in units of the variances. NaN for a pose at the landmark.
   [[nodiscard]] constexpr float distance(const ParticlePose& pose) const { return distance(pose, x_m, y_m); }
   /// The same beside another landmark.

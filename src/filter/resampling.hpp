@@ -33,6 +33,7 @@ namespace detail {
   return static_cast<std::uint32_t>((std::uint64_t{word} * end) >> 32);
 }
 
+/// Implements docs/explanation/particle_filter.md (5).
 /// Pointers at (offset + j sum) / wanted, j = 0 ... wanted - 1, over the cumulative weights: one word for all.
 constexpr void systematic(std::span<const std::uint32_t> weights, std::uint32_t sum, std::uint32_t wanted,
                           std::uint32_t word, std::span<std::uint16_t> copies) {
@@ -45,6 +46,7 @@ constexpr void systematic(std::span<const std::uint32_t> weights, std::uint32_t 
   }
 }
 
+/// Implements docs/explanation/particle_filter.md (6).
 /// One pointer in each of `wanted` strata of equal weight, each with a word of its own.
 constexpr void stratified(std::span<const std::uint32_t> weights, std::uint32_t sum, std::uint32_t wanted,
                           base::Random& random, std::span<std::uint16_t> copies) {
@@ -83,6 +85,7 @@ constexpr void multinomial(std::span<std::uint32_t> weights, std::uint32_t draws
   }
 }
 
+/// Implements docs/explanation/particle_filter.md (7).
 /// The whole part of each expected number of copies, and the rest of them by independent draws on what is left.
 constexpr void residual(std::span<std::uint32_t> weights, std::uint32_t sum, std::uint32_t wanted, base::Random& random,
                         std::span<std::uint16_t> copies) {

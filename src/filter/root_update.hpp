@@ -7,6 +7,7 @@
 
 namespace tetap::filter {
 
+/// Implements docs/explanation/kalman_forms.md (9).
 /// Gate first; `root` becomes the root of P+ only when the verdict is kAccepted.
 template <class Scalar, int N, int M>
 [[nodiscard, gnu::always_inline]] inline Update<Scalar, N, M> root_update(Triangular<Scalar, N>& root,

@@ -19,6 +19,7 @@ class Sequential {
     return true;
   }
 
+  /// Implements docs/explanation/kalman_forms.md (4).
   /// The sum of the scalars' NIS is the joint NIS, because each takes the state that those before it have left.
   template <int M>
   [[nodiscard]] Update<Scalar, N, M> update(const Matrix<Scalar, M, N>& h, const Vector<Scalar, M>& nu,

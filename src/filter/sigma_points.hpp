@@ -53,6 +53,7 @@ inline constexpr bool kConstantScaling = requires {
   std::bool_constant<(Scaling::kAlpha > 0.0F)>{};
 };
 
+/// Implements docs/explanation/unscented.md (1).
 template <class Scalar>
 struct SigmaWeights {
   Scalar spread;   ///< sqrt(n + lambda): distance of the points in standard deviations

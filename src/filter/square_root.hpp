@@ -14,6 +14,7 @@ class SquareRoot {
   explicit SquareRoot(const Symmetric<Scalar, N>& p) : root_(root_of(p)) {}
   [[nodiscard]] Symmetric<Scalar, N> covariance() const { return root_.covariance(); }
 
+  /// Implements docs/explanation/kalman_forms.md (8).
   /// Rows of R F^T join the root of Q. False where the result is not positive definite.
   bool propagate(const Matrix<Scalar, N, N>& f, const Symmetric<Scalar, N>& q) {
     Triangular<Scalar, N> next = root_of(q);

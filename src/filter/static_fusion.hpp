@@ -69,6 +69,7 @@ class InformationSum {
   bool positive_ = true;
 };
 
+/// Implements docs/explanation/static_fusion.md (1).
 /// P^-1 = sum P_i^-1. Right only for independent errors; with any other it is too sure.
 template <class Scalar, int N>
 [[nodiscard]] Fusion<Estimate<Scalar, N>> inverse_variance(std::span<const Estimate<Scalar, N>> estimates) {
@@ -77,6 +78,7 @@ template <class Scalar, int N>
   return sum.fused();
 }
 
+/// Implements docs/explanation/static_fusion.md (3).
 /// The least of a function with one minimum on [0, 1]: golden section in 24 steps, to 1e-5 (Kiefer 1953).
 template <class Scalar, class Function>
 [[nodiscard]] Scalar golden_section(const Function& cost) {
@@ -103,6 +105,7 @@ template <class Scalar, class Function>
   return Scalar(0.5F) * (low + high);
 }
 
+/// Implements docs/explanation/static_fusion.md (2).
 /// P^-1 = omega A^-1 + (1 - omega) B^-1, omega for the least determinant of P.
 template <class Scalar, int N>
 [[nodiscard]] Fusion<Estimate<Scalar, N>> covariance_intersection(const Estimate<Scalar, N>& a,
@@ -123,6 +126,7 @@ template <class Scalar, int N>
 
 namespace detail {
 
+/// Implements docs/explanation/static_fusion.md (4).
 /// correlated / weight + independent.
 template <class Scalar, int N>
 [[nodiscard]] Symmetric<Scalar, N> widened(const SplitEstimate<Scalar, N>& e, Scalar weight) {
@@ -140,6 +144,7 @@ void add_turned(Symmetric<Scalar, N>& to, const Matrix<Scalar, N, N>& k, const S
 
 }  // namespace detail
 
+/// Implements docs/explanation/static_fusion.md (5).
 /// Correlated parts are widened by 1 / omega and 1 / (1 - omega), independent parts are not; omega for the least
 /// determinant. With no independent parts this is covariance_intersection(), with no correlated ones
 /// inverse_variance().

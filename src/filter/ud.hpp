@@ -10,6 +10,7 @@ namespace tetap::filter {
 template <class Scalar, int N>
 class Ud {
  public:
+  /// Implements docs/explanation/kalman_forms.md (5).
   /// A pivot that is not above zero gives a column of zeros.
   explicit Ud(Symmetric<Scalar, N> p) {
     for (int j = N - 1; j >= 0; --j) {
@@ -31,6 +32,7 @@ class Ud {
   [[nodiscard]] const Matrix<Scalar, N, N>& u() const { return u_; }
   [[nodiscard]] const Vector<Scalar, N>& d() const { return d_; }
 
+  /// Implements docs/explanation/kalman_forms.md (6).
   /// Rows of [F U, U_q] are made orthogonal under the weights [D, D_q], from the last one up.
   bool propagate(const Matrix<Scalar, N, N>& f, const Symmetric<Scalar, N>& q) {
     const Ud noise(q);
@@ -87,6 +89,7 @@ class Ud {
   }
 
  private:
+  /// Implements docs/explanation/kalman_forms.md (7).
   /// One scalar with row h and variance r. Gives S; `gain` is K S.
   Scalar absorb(const Vector<Scalar, N>& h, Scalar r, Vector<Scalar, N>& gain) {
     const Vector<Scalar, N> f = u_.transpose().lazyProduct(h);

@@ -23,6 +23,7 @@ struct PartialFactor {
   bool positive = true;
 };
 
+/// Implements docs/explanation/unscented.md (4).
 template <std::size_t A, class Scalar, int N>
 [[nodiscard, gnu::always_inline]] inline PartialFactor<Scalar, N, A> partial_factor(
     const Symmetric<Scalar, N>& p, const std::array<int, static_cast<std::size_t>(N)>& order) {
@@ -51,6 +52,7 @@ struct PairSum {
   Vector<Scalar, N> sum;
   Symmetric<Scalar, N> spread;  ///< sum of d+ d+^T + d- d-^T, twice
 
+  /// Implements docs/explanation/unscented.md (2).
   /// Takes one pair; gives d+ - d-, the slope along the pair. The first pair begins the sums.
   template <bool kFirst>
   [[gnu::always_inline]] Vector<Scalar, N> add(std::bool_constant<kFirst>, const Vector<Scalar, N>& up,
@@ -66,6 +68,7 @@ struct PairSum {
     });
     return t;
   }
+  /// Implements docs/explanation/unscented.md (3).
   [[nodiscard, gnu::always_inline]] Symmetric<Scalar, N> covariance(const Vector<Scalar, N>& shift,
                                                                     const SigmaWeights<Scalar>& w) const {
     Symmetric<Scalar, N> p;
@@ -133,6 +136,7 @@ class Ukf {
     }
   }
 
+  /// Implements docs/explanation/unscented.md (5).
   template <class Motion, int kNoises, class Function>
   [[gnu::always_inline]] bool propagate(const Function& f, const Vector<Scalar, kNoises>& noise,
                                         const Symmetric<Scalar, kErrors>& q) {
@@ -174,6 +178,7 @@ class Ukf {
     return true;
   }
 
+  /// Implements docs/explanation/unscented.md (6).
   template <class Measurement, int kNoises, class Function>
   [[gnu::always_inline]] Innovation<Scalar, Measurement::kDimension> fuse(
       const Measurement& z, const Function& h, const Vector<Scalar, kNoises>& noise,

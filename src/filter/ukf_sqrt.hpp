@@ -106,6 +106,7 @@ class UkfSqrt {
     return true;
   }
 
+  /// Implements docs/explanation/unscented.md (7).
   template <class Measurement, int kNoises, class Function>
   Innovation<Scalar, Measurement::kDimension> fuse(const Measurement& z, const Function& h,
                                                    const Vector<Scalar, kNoises>& noise,

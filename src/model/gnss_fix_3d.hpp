@@ -22,7 +22,7 @@ struct GnssFix3d {
 
   /// The antenna's place minus the fix: anchored numbers are differenced, so no digit is lost far from the origin.
   [[nodiscard]] filter::Vector<float, 3> predict(const nav::InsState& at) const {
-    const nav::Vector3 apart_m{nav::difference(at.x, x), nav::difference(at.y, y), nav::difference(at.z, z)};
+    nav::Vector3 apart_m{nav::difference(at.x, x), nav::difference(at.y, y), nav::difference(at.z, z)};
     if (!has_rest()) return apart_m;
     return at.q_nb.rotate(antenna_b_m) + apart_m;
   }

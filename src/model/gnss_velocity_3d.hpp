@@ -28,8 +28,10 @@ struct GnssVelocity3d {
   [[nodiscard]] filter::Vector<float, 3> residual(const filter::Vector<float, 3>& z_hat) const {
     return v_n_mps - z_hat;
   }
-  /// Whether there is a lever arm.
-  [[nodiscard]] bool has_rest() const { return !(antenna_b_m.squaredNorm() <= 0.0F); }
+  /// Whether there is a lever arm, or something that is no number and has to show.
+  [[nodiscard]] bool has_rest() const {
+    return !(antenna_b_m.squaredNorm() <= 0.0F) || !(gyro_b_radps.squaredNorm() < 1e30F);
+  }
   [[nodiscard]] filter::Vector<float, 3> noise() const {
     const float horizontal = sigma_horizontal_mps * sigma_horizontal_mps;
     return {horizontal, horizontal, sigma_vertical_mps * sigma_vertical_mps};

@@ -116,7 +116,8 @@ class Ins {
     }
     accel_n_mps2 = Vector3::Zero();
     // A few lost samples of a fast IMU add little: the watch over P, which goes on at every step, is enough.
-    if (gap.us > kShortGap_us) condition(p, condition_monitor_);
+    const bool usual = sigma_mps2 * sigma_mps2 <= kUsualGap && sigma_radps * sigma_radps <= kUsualGap;
+    if (gap.us > kShortGap_us || !usual) condition(p, condition_monitor_);
   }
   /// Turn of the body in such a gap, if something else shows it; in the navigation frame.
   void turn_without_imu(const Quaternion& turn) {
@@ -232,8 +233,7 @@ class Ins {
       }
       filter::sparse_update<Measurement>(p, at.h, measurement.residual(at.z_hat), measurement.noise(), gate, result);
     } else if constexpr (filter::Direct<Measurement>) {
-      filter::group_update<Measurement>(p, measurement.residual(measurement.predict(x)), measurement.noise(), gate,
-                                        result);
+      direct_update(measurement, gate, result);
     }
     if (result.innovation.verdict != filter::Verdict::kAccepted) return result.innovation;
     // Measurements of biases alone leave the scale's share in the heading; measurements in the body show no heading.
@@ -249,6 +249,14 @@ class Ins {
     if (held_ > 0) move_errors(result.dx.template segment<3>(InsState::kVelocity));
     if ((result.sharp || turned) && !condition(p, condition_monitor_)) note_conditioned();
     return result.innovation;
+  }
+
+  /// Apart from the update with a lever arm, so that the two are not on the stack together.
+  template <class Measurement>
+  [[gnu::noinline]] void direct_update(const Measurement& measurement, float gate,
+                                       filter::SparseUpdate<float, kErrors, Measurement::kDimension>& result) {
+    filter::group_update<Measurement>(p, measurement.residual(measurement.predict(x)), measurement.noise(), gate,
+                                      result);
   }
 
   bool start_with_p(const InsState& at) {
@@ -268,6 +276,7 @@ class Ins {
   static constexpr std::int64_t kGapStep_us = 100'000, kMostGap_us = 60'000'000;
   static constexpr float kGapStep_s = 0.1F;
   static constexpr std::int64_t kShortGap_us = 9'000;
+  static constexpr float kUsualGap = 1e4F;  ///< square of the largest sigma of a gap that a robot's parameters may have
 
   /// Motion of the state since the covariance was last predicted.
   struct Pending {

@@ -56,7 +56,6 @@ class FusionWindow {
   void power_on(base::Micros t, const estimators::Context& ctx) {
     timeline_.power_on();
     limit_.power_on();
-    consumed_until_ = t;
     closed_until_ = t;
     each_lane([&](auto& lane) {
       lane.restart(t, ctx);
@@ -183,7 +182,6 @@ class FusionWindow {
   Timeline<Capacity> timeline_;
   WorkLimit<Capacity> limit_;
   base::Micros closed_until_;
-  base::Micros consumed_until_;  ///< time of the last tick
 };
 
 template <class Estimators, std::size_t Capacity>
@@ -193,7 +191,7 @@ Insert FusionWindow<Estimators, Capacity>::insert(const sensor::Sample& sample, 
   std::size_t moves = limit_.moves();
   const Insert result = timeline_.insert(sample, moves);
   if (result == Insert::kTooMuch) limit_.refuse();
-  if (result == Insert::kTaken) limit_.spend_moves(moves, sample.stamp <= consumed_until_);
+  if (result == Insert::kTaken) limit_.spend_moves(moves);
   // A sample older than all of them came too late for so small a window.
   if (result != Insert::kFull || !timeline_.consumed(0) || sample.order(timeline_[0]) < 0) return result;
   if (!limit_.admits_room()) return Insert::kTooMuch;
@@ -343,7 +341,6 @@ std::uint16_t FusionWindow<Estimators, Capacity>::consume(base::Micros t, const 
     }
     ++instance;
   });
-  consumed_until_ = t;
   const param::LoopParameters& loop = ctx.parameters.loop;
   limit_.begin_tick(static_cast<std::uint32_t>(loop.window_us / loop.period_us));
   std::uint16_t not_used = 0;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Limits of the work that a bus may give a tick: samples, places that samples out of their order move others by, and
 // samples that push others out of a full window. An honest bus stays below, with room for what a gateway held back.
-// The limits are tight for a second after one was reached or many samples of a tick were late.
+// The limits are tight for a second after one was reached.
 #pragma once
 
 #include <cstddef>
@@ -21,32 +21,27 @@ class WorkLimit {
     add(moves_, tight_ > 0 ? Capacity : 4 * Capacity, kMoves);
     add(samples_, kSamples / share, kSamples);
     rooms_ = tight_ > 0 ? kRooms / 6 : kRooms;
-    late_ = 0;
   }
 
   /// One more sample.
   [[nodiscard]] bool admits_sample() { return samples_ > 0 ? (--samples_, true) : refuse(); }
   /// Places by which a sample may move those behind it.
   [[nodiscard]] std::size_t moves() const { return moves_; }
-  /// `late`: the sample is older than the last tick.
-  void spend_moves(std::size_t moves, bool late) {
-    moves_ = static_cast<std::uint16_t>(moves_ - moves);
-    if (moves > 0 && late && ++late_ > kLate) tight_ = kTightTicks;
-  }
+  void spend_moves(std::size_t moves) { moves_ = static_cast<std::uint16_t>(moves_ - moves); }
   /// One more sample leaves a full window early.
   [[nodiscard]] bool admits_room() { return rooms_ > 0 ? (--rooms_, true) : refuse(); }
   bool refuse() { return tight_ = kTightTicks, false; }
 
  private:
-  static constexpr std::uint16_t kMoves = 6 * Capacity, kSamples = 4 * Capacity, kRooms = 24, kTightTicks = 100;
-  static constexpr std::uint16_t kLate = 8;
+  static constexpr std::uint16_t kMoves = 6 * Capacity, kSamples = 4 * Capacity;
+  static constexpr std::uint8_t kRooms = 24, kTightTicks = 100;
   static void add(std::uint16_t& left, std::uint32_t more, std::uint16_t most) {
     left = static_cast<std::uint16_t>(left + more < most ? left + more : most);
   }
 
-  std::uint16_t moves_ = kMoves, samples_ = kSamples, rooms_ = kRooms;  ///< left
-  std::uint16_t late_ = 0;                                              ///< late samples since the last tick
-  std::uint16_t tight_ = 0;                                             ///< ticks
+  std::uint16_t moves_ = kMoves, samples_ = kSamples;  ///< left
+  std::uint8_t rooms_ = kRooms;                        ///< left in this tick
+  std::uint8_t tight_ = 0;                             ///< ticks
 };
 
 }  // namespace tetap::node

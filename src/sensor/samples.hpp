@@ -107,7 +107,7 @@ struct LoopClosure {
 
   [[nodiscard]] static constexpr std::uint64_t pack(std::int32_t a, std::int32_t b, std::int32_t c) {
     constexpr std::uint64_t kMask = (std::uint64_t{1} << kBits) - 1;
-    const auto bits = [](std::int32_t x) { return static_cast<std::uint64_t>(std::int64_t{x}) & kMask; };
+    const auto bits = [](std::int32_t raw) { return static_cast<std::uint64_t>(std::int64_t{raw}) & kMask; };
     return bits(a) | bits(b) << kBits | bits(c) << (2 * kBits);
   }
   [[nodiscard]] static constexpr std::int32_t unpack(std::uint64_t word, int i) {

@@ -163,7 +163,7 @@ class KeyframeGraph {
   static constexpr int kLeastPoses = kPoses / 4;  ///< keyframes that stay for want of room in a job
   /// A step of odometry in 2 mm and 2^-16 turns: closures are known to less.
   struct Step {
-    static constexpr Scalar kUnit_m{0.002F};
+    static constexpr Scalar kUnit_m = static_cast<Scalar>(0.002F);
     std::int16_t x = 0, y = 0, yaw = 0;
 
     static Step of(const Displacement<Scalar>& d) {

@@ -32,7 +32,7 @@ must(day["epochs_compared"] >= 100 * (seconds - 1), f"only {day['epochs_compared
 must(day["times_realtime"] > 1, f"{day['times_realtime']} times real time")
 must(day["resets"] == 0 and day["imu_packets_lost"] == 0, f"{day['resets']} resets, {day['imu_packets_lost']} packets lost")
 must(day["gnss_baud"] == 115200 and day["gnss_epochs"] > 3 * (seconds - 40), "the receiver was not configured")
-fused, other = day["Inertial"], bus["Inertial"]
+fused, other = day["fused"], bus["fused"]
 print(f"board {fused['position_rmse_m']:.3f} m {fused['heading_rmse_deg']:.3f} deg NEES {fused['nees_mean']:.2f}, "
       f"bus {other['position_rmse_m']:.3f} m {other['heading_rmse_deg']:.3f} deg NEES {other['nees_mean']:.2f}, {day['times_realtime']:.1f} times real time")
 for key in ("position_rmse_m", "heading_rmse_deg"):

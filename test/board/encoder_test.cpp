@@ -10,9 +10,10 @@ namespace tim = reg::tim;
 
 class Wheels : public DrivenChip {
  public:
-  Wheels() {
+  Wheels()
+      : DrivenChip({}, {.left_edges = [this](Picoseconds) { return edges; },
+                        .right_edges = [this](Picoseconds) { return edges; }}) {
     start_clocks();
-    chip.tim2.position = chip.tim3.position = [this](Picoseconds) { return edges; };
     alternate({'A', 0}, 1);
     alternate({'A', 1}, 1);
     alternate({'B', 4}, 2);

@@ -222,7 +222,7 @@ TEST_F(GraphMapperTest, SetPoseMovesTheGraphRigidlyAndRestartsTheJob) {
   ticks(3000);
   EXPECT_EQ(graph_.jobs, 1);
   EXPECT_EQ(graph_.status, bus::GraphStatus::kConverged);
-  const double length = std::hypot(keyframes_[10].x_m - keyframes_[0].x_m, keyframes_[10].y_m - keyframes_[0].y_m);
+  const auto length = std::hypot(keyframes_[10].x_m - keyframes_[0].x_m, keyframes_[10].y_m - keyframes_[0].y_m);
   EXPECT_NEAR(length, 10.4995, 0.015);
   EXPECT_NEAR(keyframes_[10].x_m - keyframes_[0].x_m, 0, 0.02) << "the line points north now";
 }

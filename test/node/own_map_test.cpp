@@ -183,7 +183,7 @@ TYPED_TEST(OwnMap, ResetAndSetPoseOfAFullMapInOneTick) {
   run.drive(2400, 0.2);
   ASSERT_EQ(run.page.map_size, kPlaces);
   run.now.push_back(in(bus::protect(bus::CmdReset{.ctr = 5, .what = bus::ResetWhat::kOwnMap})));
-  for (const auto& frame : set_pose(6, 20'000, 10'000, 0.5F, 0.01F, 0.001F)) run.now.push_back(frame);
+  for (const auto& frame : set_pose(2, 20'000, 10'000, 0.5F, 0.01F, 0.001F)) run.now.push_back(frame);
   run.step();
   EXPECT_NEAR(run.robot().x, 20, 0.05);
   EXPECT_NEAR(run.robot().y, 10, 0.05);

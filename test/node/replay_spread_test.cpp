@@ -131,7 +131,7 @@ TEST(ReplaySpread, EndsInTheStateOfASampleOnTimeWithinAHandfulOfTicks) {
   for (const std::int64_t late_us : {100'000, 250'000, 400'000, 480'000}) {
     const int ticks = ticks_until_equal(kWindow_us, late_us, most);
     EXPECT_GT(ticks, 0) << late_us;
-    EXPECT_LE(ticks, 14) << late_us;  // 250 samples of two estimators, 56 a tick of which 10 are new
+    EXPECT_LE(ticks, 20) << late_us;  // 250 samples of two estimators; a crowded window repeats fewer than 56 a tick
   }
   EXPECT_LE(most, kMostFused + kLanes);
   EXPECT_GT(most, kMostFused / 2);

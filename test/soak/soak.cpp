@@ -41,13 +41,15 @@ double now_s = 0;
 /// Cholesky of the correlations, in double.
 template <class Covariance>
 bool positive_definite(const Covariance& p) {
-  constexpr int kN = nav::InsState::kErrors;
+  constexpr std::size_t kN = nav::InsState::kErrors;
   std::array<std::array<double, kN>, kN> l{};
-  for (int i = 0; i < kN; ++i)
-    for (int j = 0; j <= i; ++j) {
-      double sum =
-          static_cast<double>(p(j, i)) / std::sqrt(static_cast<double>(p(i, i)) * static_cast<double>(p(j, j)));
-      for (int k = 0; k < j; ++k) sum -= l[i][k] * l[j][k];
+  const auto entry = [&p](std::size_t i, std::size_t j) {
+    return static_cast<double>(p(static_cast<int>(i), static_cast<int>(j)));
+  };
+  for (std::size_t i = 0; i < kN; ++i)
+    for (std::size_t j = 0; j <= i; ++j) {
+      double sum = entry(j, i) / std::sqrt(entry(i, i) * entry(j, j));
+      for (std::size_t k = 0; k < j; ++k) sum -= l[i][k] * l[j][k];
       if (i == j && !(sum > 0)) return false;
       l[i][j] = i == j ? std::sqrt(sum) : sum / l[j][j];
     }
@@ -63,7 +65,9 @@ class Watched : public robot::rover::Inertial {
     if (!e.valid) return;
     const auto& q = e.state.q_nb;
     double norm2 = 0;
-    for (const double part : {double{q.w}, double{q.x}, double{q.y}, double{q.z}}) norm2 += part * part;
+    for (const double part :
+         {static_cast<double>(q.w), static_cast<double>(q.x), static_cast<double>(q.y), static_cast<double>(q.z)})
+      norm2 += part * part;
     if (!e.state.finite()) complaints->add("a state that is not finite", now_s);
     if (!(std::abs(norm2 - 1) < 1e-3)) complaints->add("a quaternion that is no rotation", now_s);
     if (!positive_definite(e.p)) complaints->add("a covariance that is not positive definite", now_s);
@@ -113,7 +117,7 @@ struct Can {
       if (const auto motion = bus::decode<bus::EstMotion>(bytes)) position_valid = motion->pos_valid;
     if (offset == bus::offset_of<bus::EstStdPose>(kPrimary))
       if (const auto std = bus::decode<bus::EstStdPose>(bytes))
-        std_x_m = double{std->std_x_m}, std_y_m = double{std->std_y_m};
+        std_x_m = static_cast<double>(std->std_x_m), std_y_m = static_cast<double>(std->std_y_m);
     if (offset == bus::EstStatus::kOffset) {
       const auto status = bus::decode<bus::EstStatus>(bytes);
       if (status->reset_cause == sensor::ResetCause::kNotFinite ||

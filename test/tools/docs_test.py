@@ -16,7 +16,8 @@ import unittest
 sys.dont_write_bytecode = True
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.realpath(__file__))))
 sys.path.insert(0, os.path.join(ROOT, "tools", "python"))
-from tetap.docs import campaigns, figures, language, regions, robots, words  # noqa: E402
+from tetap.docs import bench, campaigns, figures, language, regions, robots, words  # noqa: E402
+from tetap.proof import costs  # noqa: E402
 
 PROGRAMS = os.environ.get("TETAP_PROGRAMS", os.path.join(ROOT, "build/host/sim_host"))
 WORLD = os.path.join(PROGRAMS, "tetap-world")
@@ -119,9 +120,9 @@ class Pages(unittest.TestCase):
         self.assertEqual([line for line in lines if len(line) > MOST_COLUMNS], [])
 
     def test_the_functions_cite_the_equations_and_the_equations_name_the_functions(self):
-        for page in ("equations", "ekf_slam", "fast_slam", "pose_grid"):
+        for page in ("equations", "ekf_slam", "fast_slam", "kalman_forms", "unscented", "particle_filter", "grid_filter", "static_fusion", "pose_grid"):
             rows = re.findall(r"^\| \((\d+)\) \|.*?\| `([^`]+)` in `([^`]+)` \|", read(f"docs/explanation/{page}.md"), re.M)
-            self.assertGreater(len(rows), 7)
+            self.assertGreater(len(rows), 4)
             self.assertEqual([int(number) for number, _, _ in rows], list(range(1, len(rows) + 1)))
             for number, function, path in rows:
                 source = read(path)
@@ -279,6 +280,45 @@ class Generated(unittest.TestCase):
             os.remove(os.path.join(out, "count.json"))
             self.assertEqual(figures.page(out, first), first)
 
+    def test_every_estimator_of_the_filters_has_a_row_of_costs_and_every_row_a_header(self):
+        """A header of src/filter is an estimator of the table, or a part that this list names."""
+        parts = {"attitude_bias", "attitude_clipping", "attitude_heading", "attitude_options", "big_covariance", "condition", "correction", "covariance_access", "inverse",
+                 "kalman_form", "linear_models", "low_pass", "particle_noise", "particle_number", "particle_pose", "quaternion", "resampling", "root_update", "sigma_points",
+                 "sparse_update", "state", "structure", "symmetric", "triangular", "unroll", "update", "wrap"}
+        rows = costs.listed(read("test/costs/list.hpp"))
+        headers = {os.path.basename(path)[:-4] for path in glob.glob(os.path.join(ROOT, "src/filter/*.hpp"))}
+        of_rows = {os.path.basename(header)[:-4] for _, _, header in rows if header.startswith("filter/")}
+        self.assertEqual(headers - parts, of_rows)
+        self.assertLessEqual(parts, headers)
+        self.assertEqual([header for _, _, header in rows if not os.path.exists(os.path.join(ROOT, "src", header))], [])
+        sizes = {}
+        for name, size, _ in rows:
+            sizes.setdefault(name, []).append(size)
+        self.assertEqual({name for name, of in sizes.items() if len(of) != 2 or not of[0] < of[1]}, {"complementary"})  # one axis is all it has
+        table = re.search(r"<!-- figures: costs -->\n(.*?)<!-- end -->", read("docs/explanation/which_estimator.md"), re.S)[1]
+        shown = [(name, int(size.replace(" ", ""))) for name, size in re.findall(r"^\| (\w+) \| [^|]* \| ([\d ]*\d)[^|]* \|", table, re.M) if name != "filter"]
+        self.assertEqual(shown, [(name, size) for name, size, _ in rows])
+
+    def test_a_row_of_costs_has_what_its_filter_adds_and_how_that_grows(self):
+        accuracy = [{"filter": "ekf", "size": size, "header": "filter/ekf.hpp", "scenario": "odometry", "grows": "states", "rmse_m": 0.1, "nees": 3.1, "nees_dof": 3, "seeds": 50}
+                    for size in (3, 5)] + [{"filter": "one", "size": 1, "header": "h", "scenario": "gyroscope", "grows": "axes", "rmse_deg": 0.5, "seeds": 20}]
+        count = {"ekf_3": 800, "ekf_5": 2000, "one_1": 100}
+        rows = costs.rows_of(accuracy, {"ekf_3": 40, "ekf_5": 100, "one_1": 16}, {"none_0": 9000, "none_1": 8000, "ekf_3": 11500, "ekf_5": 14000, "one_1": 8400},
+                             {"ekf_3": 200, "ekf_5": 400, "one_1": 50}, {"m7": count, "m4f": count, "r5": count})
+        self.assertEqual([(row["flash_b"], row["m7"], row["grows_with"]) for row in rows],
+                         [(2500, 800, "states 3 to 5: M7 x 2.5, RAM x 2.5"), (5000, 2000, "states 3 to 5: M7 x 2.5, RAM x 2.5"), (400, 100, "one size")])
+        self.assertEqual(costs.cells(rows)[1][:5], ["ekf", "odometry", "5 states", "0.100 m", "3.1, 3"])
+
+    def test_a_bar_that_is_missed_is_named(self):
+        report = {"benchmarks": [{"run_name": f"{workload}/{name}", "aggregate_name": aggregate, "items_per_second": value} for (workload, name), ns in
+                                 {("kalman", "tetap"): 20, ("kalman", "textbook"): 30, ("kalman", "opencv"): 2000, ("kalman", "bfl"): 2100, ("ekf", "tetap"): 40, ("ekf", "textbook"): 80,
+                                  ("ekf", "opencv"): 4000, ("ekf", "bfl"): 4100, ("pose_graph", "tetap"): 61e6, ("pose_graph", "ceres"): 33e6}.items()
+                                 for aggregate, value in (("median", 1e9 / ns), ("cv", 0.02))]}
+        rows = bench.rows_of(report)
+        self.assertEqual({(one["workload"], one["implementation"]): round(one["times"], 3) for one in rows}[("kalman", "textbook")], 1.5)
+        self.assertEqual(bench.missed(rows), ["Kalman step, 4 states, 2 measured: textbook Eigen takes 1.50 times as long, 2 are asked for",
+                                              "pose graph M3500: tetap takes 61.0 ms, at most 60 are asked for"])
+
     def test_every_region_of_the_pages_is_known_and_named_with_its_command(self):
         found = {}
         for page in pages():
@@ -366,8 +406,8 @@ class Lines(unittest.TestCase):
                 continue
             text = read(page)
             self.assertEqual(len(re.findall(r"^```(?:sh|bash|console|shell)", text, re.M)), len(blocks(text)), page)
-            for code in re.findall(r"Save this as `example.cpp`:\n\n```cpp\n(.*?)```", text, re.S):
-                with open(os.path.join(self.tree, "example.cpp"), "w", encoding="utf-8") as file:
+            for name, code in re.findall(r"Save this as `(\w+\.cpp)`:\n\n```cpp\n(.*?)```", text, re.S):
+                with open(os.path.join(self.tree, name), "w", encoding="utf-8") as file:
                     file.write(code)
             for how, lines in blocks(text):
                 data = re.fullmatch(r"data: (\S+)", how)
@@ -407,15 +447,34 @@ class Lines(unittest.TestCase):
                         ran += 1
         self.assertGreater(ran, 0)
 
-    def test_the_example_compiles_with_both_compilers_and_prints_what_stands_below_it(self):
-        text = read("docs/tutorial/your_filter.md")
-        code, command, printed = re.search(r"```cpp\n(.*?)```.*?```sh\n(g\+\+ [^\n]*)\n.*?```text\n(.*?)```", text, re.S).groups()
-        self.assertLessEqual(len([line for line in code.splitlines() if line.strip()]), 22)
-        with open(os.path.join(self.tree, "example.cpp"), "w", encoding="utf-8") as file:
-            file.write(code)
-        for compiler in ("g++", "clang++"):
-            self.run_here(command.replace("g++", compiler, 1) + " -Wall -Wextra -Werror")
-            self.assertEqual(self.run_here("./example"), printed)
+    def tutorial_programs(self):
+        """[(name, lines of code, command, output)] of your_filter.md; each file is written."""
+        found = re.findall(r"Save this as `(\w+)\.cpp`:\n\n```cpp\n(.*?)```.*?```sh\n(g\+\+ [^\n]*)\n.*?```text\n(.*?)```", read("docs/tutorial/your_filter.md"), re.S)
+        self.assertEqual([name for name, *_ in found], ["example", "beacon", "corridor"])
+        for name, code, *_ in found:
+            with open(os.path.join(self.tree, name + ".cpp"), "w", encoding="utf-8") as file:
+                file.write(code)
+        return [(name, [line for line in code.splitlines() if line.strip()], command, printed) for name, code, command, printed in found]
+
+    def test_the_filters_of_the_tutorial_compile_with_both_compilers_and_print_what_stands_below_them(self):
+        for name, lines, command, printed in self.tutorial_programs():
+            self.assertTrue(20 <= len(lines) <= 30, f"{name}: {len(lines)} lines")
+            for compiler in ("g++", "clang++"):
+                with self.subTest(name=name, compiler=compiler):
+                    self.run_here(command.replace("g++", compiler, 1) + " -Wall -Wextra -Werror")
+                    self.assertEqual(self.run_here(f"./{name}"), printed)
+
+    @unittest.skipUnless(shutil.which("arm-none-eabi-g++"), "no compiler for ARM")
+    def test_the_filters_of_the_tutorial_link_for_small_cores_and_allocate_nothing(self):
+        small = "-mthumb -Os -fno-exceptions -fno-rtti -fno-threadsafe-statics -DEIGEN_NO_DEBUG -DEIGEN_NO_MALLOC"
+        for name, *_ in self.tutorial_programs():
+            for core in ("-mcpu=cortex-m0plus", "-mcpu=cortex-m4 -mfpu=fpv4-sp-d16 -mfloat-abi=hard"):
+                with self.subTest(name=name, core=core):
+                    self.run_here(f"arm-none-eabi-g++ -std=c++20 -Isrc -isystem /usr/include/eigen3 {small} {core} -c {name}.cpp -o {name}.o")
+                    wanted = self.run_here(f"arm-none-eabi-nm -u {name}.o").split()
+                    self.assertIn("printf", wanted)
+                    self.assertEqual([one for one in wanted if re.search(r"alloc|_Zn[wa]|_Zd[la]|cxa|throw|sinf|cosf|expf|logf", one)], [])
+                    self.run_here(f"arm-none-eabi-g++ {core} -mthumb {name}.o -specs=nano.specs -specs=nosys.specs -o {name}.elf")
 
     def quoted_lines_are_those_of_the_run(self, summary):
         """Figures and lines of first_run.md against the run that it describes: every word of a quoted line is in the first line that its grep finds."""

@@ -91,13 +91,24 @@ void OutputPredictor::extend(const sensor::Window& window, const Inputs& in) {
   cells_.follow(window, in.parameters);
 }
 
+const ImuSample& OutputPredictor::newest_before(const sensor::Window& window, std::size_t i,
+                                                const param::InertialParameters& n) {
+  while (!is_of(window[i - 1], n)) --i;
+  return window[i - 1].payload.imu;
+}
+
+void OutputPredictor::take_whole(const ImuCell& cell) {
+  gather_ = cell.gather;
+  place_.reached += gather_.sum().dt;
+  place_.last = last_seen_ = cell.last();
+}
+
 bool OutputPredictor::rebuild(const Place& far, const sensor::Window& window, const Inputs& in) {
   const param::InertialParameters& n = in.parameters;
   place_ = far;
   cells_.follow(window, n);
-  std::size_t i = 0;
+  std::size_t i = 0, added = 0;  // one by one
   const ImuSample* newest = nullptr;
-  std::size_t added = 0;  // one by one
   Holes holes;
   const auto add_until = [&](base::Micros until) {
     for (; i < window.size(); ++i) {
@@ -108,29 +119,23 @@ bool OutputPredictor::rebuild(const Place& far, const sensor::Window& window, co
       ++added;
     }
   };
-  // First, sample by sample, the grid place that begins to leave; then cells, but for those with a sample that has to
-  // be classified by itself; then samples without a cell.
+  // Sample by sample the grid place that begins to leave; then cells; then samples without a cell.
   add_until(cells_.leaving_until());
   const bool fast = newest != nullptr && newest->interval_us < kFast_us;
-  bool skipped = false;
-  bool samplewise = false;
+  bool skipped = false, samplewise = false;
   std::size_t left = fast ? kSamplewiseFast : kSamplewise;  // of samples in cells that may be classified by themselves
   const auto catch_up = [&]() {
     if (!skipped) return;
     skipped = false;
     while (i < window.size() && window[i].stamp <= place_.last) ++i;
-    std::size_t at = i;
-    while (!is_of(window[at - 1], n)) --at;
-    newest = &window[at - 1].payload.imu;
+    newest = &newest_before(window, i, n);
     place_.classifier = checks::ImuClassifier::after(*newest);
   };
   for (std::size_t c = 0; c < cells_.size(); ++c) {
     const ImuCell& cell = cells_[c];
     fold(in);
     if (cell.plain() && cell.follows(place_.reached) && !in.imu_distrusted) {
-      gather_ = cell.gather;
-      place_.reached += gather_.sum().dt;
-      place_.last = last_seen_ = cell.last();
+      take_whole(cell);
       skipped = true;
     } else if ((fast || left == 0) && cell.has_holes(place_.reached) && !in.imu_distrusted) {
       add_with_holes(cell, in);

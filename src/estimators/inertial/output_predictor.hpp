@@ -105,6 +105,10 @@ class OutputPredictor {
   void note_bridged(base::Micros gap);
   void bridge_rest(const Holes& holes, const Inputs& in);
   void add_with_holes(const ImuCell& cell, const Inputs& in);
+  void take_whole(const ImuCell& cell);
+  /// The window's last sample of the IMU before index i; there is one.
+  [[nodiscard]] static const ImuSample& newest_before(const sensor::Window& window, std::size_t i,
+                                                      const param::InertialParameters& n);
   [[nodiscard]] nav::ImuIncrement unseen(base::Micros gap, const Inputs& in) const;
   void fold(const Inputs& in) {
     if (!gather_.empty()) static_cast<void>(nav::strapdown(place_.x, mounted(gather_.take(), in.parameters), in.earth));

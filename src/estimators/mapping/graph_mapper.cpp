@@ -148,7 +148,7 @@ void GraphMapper<Graph>::advance(base::Micros t, const Context& ctx, const senso
   motion_.advance(t);
   present_ = motion_;
   move_through(window, present_, ctx.parameters);
-  digest_.scan(elements(), kScanned, [this](std::size_t i, auto& sink) { hash_element(i, sink); });
+  digest_.scan(elements(), kScanned, [this](std::size_t i, auto& sink) { this->hash_element(i, sink); });
 }
 
 template <class Graph>

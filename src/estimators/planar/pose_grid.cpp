@@ -174,7 +174,7 @@ void PoseGrid<kX, kY, kYaw>::begin_step(const Context& ctx) {
 template <int kX, int kY, int kYaw>
 void PoseGrid<kX, kY, kYaw>::adopt() {
   if (ray_count_ == 0) return;
-  const auto cells = [](float width, float step) { return static_cast<int>(width / step + 0.5F); };
+  const auto cells = [](float width, float step) { return (static_cast<int>(2 * width / step) + 1) / 2; };
   const filter::GridRegion found =
       grid_.around_peak(cells(kNeighbourhood_m, grid_.step_m()), cells(kNeighbourhood_rad, Grid::turn_step_rad()));
   share_ = found.mass;

@@ -5,8 +5,9 @@ import json
 import os
 import re
 
-from tetap.docs import campaigns, recorded
+from tetap.docs import bench, campaigns, recorded
 from tetap.docs.figures import commit_before, spaced, table
+from tetap.proof import costs
 
 REGION = re.compile(r"<!-- figures: (\w+) -->\n.*?<!-- end -->\n", re.S)
 IMAGES = [("tetap-zynqmp_r5-rover", "Cortex-R5F, rover"), ("tetap-mps2_m7-rover", "Cortex-M7, rover"), ("tetap-mps2_m4f-rover", "Cortex-M4F, rover"),
@@ -95,9 +96,19 @@ def bounded(file):
     return made
 
 
+def benchmark(out):
+    return table(bench.HEAD, bench.cells(loaded(out, "bench.json")))
+
+
+def of_costs(out):
+    """The cost table; a filter's second row has its growth."""
+    return table(costs.HEAD, costs.cells(loaded(out, "costs.json")))
+
+
 # region: (command, files that it writes, table)
 REGIONS = {"memory": ("make size stack", ["size.json", "stack.json"], memory), "instructions": ("make count", ["count.json"], instructions),
            "campaign": ("tools/proof/run_campaign", ["campaign.json"], campaign),
+           "bench": ("make bench", ["bench.json"], benchmark), "costs": ("make costs", ["costs.json"], of_costs),
            "estimators": ("make count", ["count.json"], estimators),
            "drives": (WHOLE, ["inertial.json"], of_whole_runs(recorded.drive_table)),
            "outages": (WHOLE, ["inertial.json"], of_whole_runs(lambda result: recorded.outage_table(result["car"]["outages"]))),
