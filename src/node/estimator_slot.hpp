@@ -260,20 +260,16 @@ class EstimatorSlot {
     return innovation;
   }
 
-  template <class Payload>
-  static constexpr std::uint32_t bit_of(sensor::Sensor sensor) {
-    return kTakes<Payload> ? 1U << static_cast<unsigned>(sensor) : 0U;
-  }
-  /// A bit for each kind of sample that the estimator takes, as sensor::visit() names them.
-  static constexpr std::uint32_t kTaken =
-      bit_of<sensor::ImuSample>(sensor::Sensor::kImu) | bit_of<sensor::WheelCounts>(sensor::Sensor::kWheelCounts) |
-      bit_of<sensor::WheelSpeeds>(sensor::Sensor::kWheelSpeed) | bit_of<sensor::BodySpeed>(sensor::Sensor::kBodySpeed) |
-      bit_of<sensor::LandmarkSighting>(sensor::Sensor::kRangeBearing) |
-      bit_of<sensor::GnssPosition>(sensor::Sensor::kGnssPosition) |
-      bit_of<sensor::GnssVelocity>(sensor::Sensor::kGnssVelocity) |
-      bit_of<sensor::MagneticFlux>(sensor::Sensor::kMagnetometer) |
-      bit_of<sensor::AirPressure>(sensor::Sensor::kBarometer) |
-      bit_of<sensor::OutsideHeading>(sensor::Sensor::kHeading);
+  /// A bit for each kind of sample whose payload, as sensor::visit() gives it, the estimator takes.
+  static constexpr std::uint32_t kTaken = [] {
+    std::uint32_t taken = 0;
+    for (unsigned kind = 0; kind < static_cast<unsigned>(sensor::Sensor::kNotAvailable); ++kind) {
+      sensor::Sample sample;
+      sample.sensor = static_cast<sensor::Sensor>(kind);
+      sensor::visit(sample, [&]<class Payload>(const Payload&) { taken |= kTakes<Payload> ? 1U << kind : 0U; });
+    }
+    return taken;
+  }();
 
   struct Nothing {};
   struct Replay {

@@ -128,6 +128,8 @@ TEST_F(GraphMapperTest, AClosureGivesTheLeastSquaresOfAStraightLine) {
   EXPECT_NEAR(std_.std_x_m, 0.01, 0.003) << "odometry alone: 0.32 m";
   EXPECT_EQ(verdicts_[sensor::Verdict::kAccepted], 1) << "odometry makes no record";
   EXPECT_EQ(announced_.size(), 10U);
+  ticks(100);
+  EXPECT_EQ(refused_.not_used, 0) << "a closure is a sample that the graph takes";
 }
 
 TEST_F(GraphMapperTest, ClosuresThatAreFalseOrUnknownAreRefusedWithTheirReason) {

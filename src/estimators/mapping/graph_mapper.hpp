@@ -103,7 +103,6 @@ class GraphMapper {
 
  private:
   static constexpr std::int32_t kByWheels = 0;
-  static constexpr float kFinest_m = 0.5e-3F, kFinest_rad = 0.1e-3F;
   static constexpr std::uint32_t kMapReset = 0x4D41'5052;  ///< a word of its own in the digest
   static constexpr std::uint32_t kIds = 0x4000;            ///< identities on the bus go round
 
@@ -122,7 +121,6 @@ class GraphMapper {
   [[nodiscard]] filter::Symmetric<Scalar, 3> covariance() const;
   /// The robot, now at this pose with this covariance; nothing else of the graph changes.
   void place(base::Micros t, const model::PlanarPose& pose, const filter::Symmetric<float, 3>& p);
-  [[nodiscard]] static filter::Symmetric<float, 3> covariance_of_pose(float sigma_position_m, float sigma_yaw_rad);
   void note_refused();
 
   [[nodiscard]] std::size_t elements() const {

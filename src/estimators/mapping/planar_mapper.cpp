@@ -2,17 +2,10 @@
 #include "estimators/mapping/planar_mapper.hpp"
 
 #include "base/reinitialise.hpp"
+#include "estimators/mapping/pose_covariance.hpp"
 #include "estimators/planar/window_motion.hpp"
 
 namespace tetap::estimators {
-
-template <class Engine>
-filter::Symmetric<float, 3> PlanarMapper<Engine>::covariance_of_pose(float sigma_position_m, float sigma_yaw_rad) {
-  const bool heading = sigma_yaw_rad < 3.14F;  // false for NaN too
-  const float place_m = sigma_position_m > kFinest_m ? sigma_position_m : kFinest_m;
-  const float yaw_rad = !heading ? kUnknown_rad : sigma_yaw_rad > kFinest_rad ? sigma_yaw_rad : kFinest_rad;
-  return filter::Symmetric<float, 3>::diagonal({place_m * place_m, place_m * place_m, yaw_rad * yaw_rad});
-}
 
 template <class Engine>
 void PlanarMapper<Engine>::restart(base::Micros t, const Context& ctx) {

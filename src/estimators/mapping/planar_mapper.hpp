@@ -110,12 +110,9 @@ class PlanarMapper {
   }
 
  private:
-  static constexpr float kFinest_m = 0.5e-3F, kFinest_rad = 0.1e-3F;
   static constexpr std::uint8_t kAnyLandmark = 0xFF;
   static constexpr std::uint32_t kMapReset = 0x4D41'5052;  ///< a word of its own in the digest
 
-  /// Covariance of a pose that a command or the parameters state.
-  [[nodiscard]] static filter::Symmetric<float, 3> covariance_of_pose(float sigma_position_m, float sigma_yaw_rad);
   void move_engine() {
     for (const model::PlanarIncrement& step : motion_.filter.take_steps()) engine_.predict(step);
   }
