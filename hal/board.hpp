@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// All that the firmware asks of a board. A port is a struct that satisfies Board; the compiler names what is missing.
-// What else it has is found by the concepts below: a board without a watchdog or without a sensor is a board.
+// Demands of the firmware on a board. A port is a struct that satisfies Board; the compiler names what is missing. The
+// concepts below find what else a board has: one without a watchdog or without a sensor is a board.
 #pragma once
 
 #include "base/time.hpp"

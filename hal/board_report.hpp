@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a board knows about its own start and memory: sent as pages of Est_Diag.
+// Facts that a board knows about its own start and memory, sent as pages of Est_Diag.
 #pragma once
 
 #include <cstdint>
@@ -33,7 +33,7 @@ enum class CpuFault : std::uint8_t {
 struct FaultRecord {
   CpuFault fault = CpuFault::kNone;   ///< kNone: the last reset was not a fault's
   std::uint32_t program_counter = 0;  ///< address of the instruction, as stacked
-  std::uint32_t link_register = 0;    ///< its caller, as stacked
+  std::uint32_t link_register = 0;    ///< address of the caller, as stacked
   std::uint32_t address = 0;          ///< address of the access; 0: not known
   std::uint32_t status = 0;           ///< the core's own fault status register
 };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a driver asks of a serial line. Neither call waits; the port owns pins, framing and interrupts.
+// Demands of a driver on a serial line. Neither call waits; the port owns pins, framing and interrupts.
 #pragma once
 
 #include <concepts>
@@ -25,8 +25,8 @@ concept ByteStream = requires(S& s, const S& view, std::span<std::uint8_t> in, s
   { view.faults() } -> std::same_as<SerialFaults>;
 };
 
-/// A line whose baud rate can be changed. What was written before is sent at the old rate first; bytes that arrived at
-/// the old rate and were not read are lost.
+/// A line whose baud rate can be changed. Bytes written before go out at the old rate first. Bytes that arrived at the
+/// old rate and were not read are lost.
 template <class S>
 concept SerialPort = ByteStream<S> && requires(S& s, std::uint32_t baud) {
   { s.set_baud(baud) } -> std::same_as<void>;

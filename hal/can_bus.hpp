@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the firmware asks of a CAN controller. Frames are copied; the port owns filters, bit timing and bus-off
+// Demands of the firmware on a CAN controller. Frames are copied; the port owns filters, bit timing and bus-off
 // recovery.
 #pragma once
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A timer in quadrature mode as a driver needs it: its free-running count and, where the timer can capture it, the time
-// of the last counted edge.
+// A timer in quadrature mode as a driver needs it: its free-running count. On a timer that can capture it, the time of
+// the last counted edge comes too.
 #pragma once
 
 #include "base/time.hpp"

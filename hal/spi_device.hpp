@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a driver asks of a chip on an SPI bus: one transaction at a time. The port owns clock, mode and chip select.
+// Demands of a driver on a chip on an SPI bus: one transaction at a time. The port owns clock, mode and chip select.
 #pragma once
 
 #include <concepts>

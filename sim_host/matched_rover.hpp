@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The rover with exactly the matched world's noise: the numbers with which a filter is consistent there (Bar-Shalom,
-// Li, Kirubarajan 2001, sec. 5.4: the filter's model is the world's). For judging; there is no such robot, so no image.
+// The rover with exactly the matched world's noise, the numbers with which a filter is consistent there. The filter's
+// model is the world's (Bar-Shalom, Li, Kirubarajan 2001, sec. 5.4). It is for judging: there is no such robot, so no
+// image.
 #pragma once
 
 #include "config/rover.hpp"
@@ -36,7 +37,7 @@ namespace tetap::sim {
   return n;
 }
 
-/// Likewise the rover with inertial navigation, for a world with matched_inertial()'s errors.
+/// Parameters of the rover with inertial navigation, for a world with matched_inertial()'s errors.
 [[nodiscard]] inline param::Parameters matched_rover() {
   const World::Options options{.mismatched = false, .inertial = true};
   const Parameters world = matched_inertial(options.parameters);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where a node's map begins, as it publishes it: a map that begins at the first fix is no place a world could know
-// beforehand, and its truth is stated in the node's own frame.
+// Origin of a node's map, as the node publishes it. A map that begins at the first fix is no place a world could know
+// beforehand. Its truth is stated in the node's own frame.
 #pragma once
 
 #include "bus/codec.hpp"

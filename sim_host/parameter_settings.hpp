@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a user sets over a robot's compiled parameters, on the host: files of `path = value` lines and single settings,
-// checked against the table that compiled robots are checked against.
+// Settings of a user over a robot's compiled parameters, on the host: files of `path = value` lines and single
+// settings. They are checked against the table that compiled robots are checked against.
 #pragma once
 
 #include "param/limits.hpp"
@@ -30,7 +30,7 @@ class ParameterSettings {
   /// The parameters of a robot with all settings, the last of a path counting. Throws UsageError for a rule between
   /// fields that the result breaks.
   [[nodiscard]] param::Parameters over(param::Parameters parameters) const;
-  /// The same without a look at the rules between fields.
+  /// The parameters with all settings, without a look at the rules between fields.
   [[nodiscard]] param::Parameters unchecked_over(param::Parameters parameters) const;
   /// First identifier of the node's block: as set, else the default.
   [[nodiscard]] std::uint32_t can_base() const { return unchecked_over({}).can_base; }
@@ -56,7 +56,7 @@ inline constexpr std::string_view kParameterHelp =
 /// Elements with blanks between; the shortest decimals that read back as the same bits.
 [[nodiscard]] std::string value_text(const param::Row& row, const param::Parameters& parameters);
 
-/// The same for JSON: a list where the row has elements.
+/// Value as JSON: a list where the row has elements.
 [[nodiscard]] std::string json_value(const param::Row& row, const param::Parameters& parameters);
 
 /// An object of every path and its value.

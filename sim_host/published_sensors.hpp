@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which sensors a robot is sent: those that one of its estimators takes and its parameters use. The world has them all;
+// Sensors that a robot is sent: those that one of its estimators takes and its parameters use. The world has them all;
 // a bus need not. A fault of a sensor that is not sent cannot act.
 #pragma once
 
@@ -40,7 +40,7 @@ struct Sent {
 
 template <class... E>
 [[nodiscard]] constexpr Sent sent_to(node::Estimators<E...>, const param::Parameters& n) {
-  // Those that live on an IMU; to the others its gyroscope is one way to know the turn.
+  // These estimators need an IMU; for the others its gyroscope is one way to know the turn.
   constexpr bool kNeedsImu =
       ((E::kKind == sensor::EstimatorKind::kInertial || E::kKind == sensor::EstimatorKind::kAttitude) || ...);
   constexpr bool kInertial = ((E::kKind == sensor::EstimatorKind::kInertial) || ...);
@@ -108,8 +108,8 @@ inline void simulate(const std::string& robot, const Sent& sent, const param::Pa
   return names;
 }
 
-/// Why one of the faults of a world, from which nothing is taken yet, cannot act on that robot, what could, and on whom
-/// it would; empty where all can.
+/// Reason why one of the faults of a world cannot act on that robot, with what could act, and on whom it would. Nothing
+/// is taken from the world yet. Empty where all can.
 [[nodiscard]] inline std::string cannot_act(const World::Options& world, const std::string& robot) {
   World::Options as_sent = world;
   send_only(sent_to(robot), as_sent);

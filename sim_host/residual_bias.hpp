@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is left of the IMU's biases once the firmware has taken the robot's own calibration out of a sample
-// (src/sensor/calibration.hpp): the truth that a published bias is held against.
+// Rest of the IMU's biases once the firmware has taken the robot's own calibration out of a sample
+// (src/sensor/calibration.hpp). A published bias is held against this truth.
 #pragma once
 
 #include "param/parameters.hpp"

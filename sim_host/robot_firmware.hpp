@@ -83,7 +83,7 @@ class RobotFirmware {
   [[nodiscard]] virtual bool resume(std::span<const std::byte> state) = 0;
 };
 
-/// Firmware with these estimators, tags and guards included: a host has room for what parameters may ask for;
+/// Firmware with these estimators, tags and guards included: a host has room for what parameters may ask for. It is
 /// instantiated once for each robot, in a file that CMake makes. The board and the parameters outlive it.
 template <class Estimators>
 [[nodiscard]] std::unique_ptr<RobotFirmware> make_firmware(HostBoard& board, const param::Parameters& parameters,

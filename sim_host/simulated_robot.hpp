@@ -2,8 +2,8 @@
 // A robot's own body and sensors in the simulated world, from its parameters: class of vehicle, geometry, mounting,
 // course, noise. Nothing here asks for a robot's name, so a copy with other numbers is simulated with those.
 //
-// A robot's parameters state what a filter may count on. Each magnitude of the world is a share of that, below 1, for
-// the world has errors beside that no filter models; the shares are those of the default rover's data sheets
+// A robot's parameters state what a filter may count on. Each magnitude of the world is a share of that, below 1: the
+// world has errors beside that no filter models. The shares are those of the default rover's data sheets
 // (world/numbers.hpp) over its parameters.
 #pragma once
 
@@ -27,7 +27,7 @@ namespace tetap::sim {
 struct SimulatedAs {
   VehicleKind kind = VehicleKind::kDifferentialDrive;
   bool inertial = false;   ///< an inertial filter is there, whose parameters state the noise of its sensors
-  bool landmarks = false;  ///< it sees landmarks, whose map fixes its frame
+  bool landmarks = false;  ///< the robot sees landmarks, whose map fixes its frame
   bool own_map = false;    ///< the robot makes that map and is given none
   bool nameless = false;   ///< the landmarks have no identities
   bool own_noise = true;   ///< false: the world's own numbers are already those of the robot's parameters

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// tetap-matrix: cells of the fault matrix for one robot and one seed. The clean drive is played once; at the begin of
-// a fault the process is forked, so that each cell goes on from the same state of the node.
+// tetap-matrix: cells of the fault matrix for one robot and one seed. The clean drive is played once. At the begin of a
+// fault the process is forked: each cell goes on from the same state of the node.
 #include "sim_host/in_process.hpp"
 #include "sim_host/matrix/cell.hpp"
 #include "sim_host/node_origin.hpp"
@@ -159,7 +159,7 @@ class Group {
   [[nodiscard]] const std::string& situation() const { return situation_; }
   [[nodiscard]] std::size_t tick() const { return tick_; }
   [[nodiscard]] bool outage() const { return situation_ == "outage"; }
-  /// Where its own course of events begins.
+  /// Tick at which its own course of events begins.
   [[nodiscard]] std::size_t branch() const { return outage() ? tick_ - kOutageTicks : tick_; }
   void add(const sim::CellRequest& request) { requests_.push_back(request); }
 

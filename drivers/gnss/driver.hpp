@@ -35,8 +35,9 @@ class GnssDriver {
         nmea_clock_(settings.latency),
         baseline_clock_(settings.latency) {}
 
-  /// `handler(report, stamp)` for every epoch, also those without a fix; `handler(baseline, stamp)`, where it takes
-  /// one, for every line between two antennas, also those that are no heading. Reads a bounded number of bytes.
+  /// Calls `handler(report, stamp)` for every epoch, also those without a fix. A handler that takes a baseline gets
+  /// `handler(baseline, stamp)` for every line between two antennas, also those that are no heading. Reads a bounded
+  /// number of bytes.
   template <class Handler>
   constexpr void poll(base::Micros now, Handler&& handler) {
     Events<Handler> events{*this, handler, now};

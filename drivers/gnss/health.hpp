@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a GNSS receiver's driver refused, and why: a reason for everything that was not used, a count of each.
+// Refusals of a GNSS receiver's driver, and why: a reason for everything that was not used, a count of each.
 #pragma once
 
 #include <array>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// One epoch of a GNSS receiver, whichever protocol it spoke, in SI units and the frame n (east, north, up), and the
-// samples that estimators take from it. A field that the receiver did not send is NaN or empty.
+// One epoch of a GNSS receiver, whichever protocol it spoke, in SI units and the frame n (east, north, up). Estimators
+// take its samples. A field that the receiver did not send is NaN or empty.
 #pragma once
 
 #include "base/float_bits.hpp"

@@ -3,8 +3,8 @@
 // Inertial Navigation Integration Algorithm Design", J. Guidance 21(1), 1998: part 1 eqs. (31)-(38) coning, part 2
 // (2), (29)-(38) sculling; Titterton & Weston, Strapdown Inertial Navigation Technology, 2nd ed., ch. 11.
 //
-// The velocity increment is in the body's axes at the *start* of the interval, so that v_n += R_nb(start) dvelocity_b
-// plus gravity; the angle increment is the rotation vector from start to end. Between samples both are straight lines.
+// The velocity increment is in the body's axes at the *start* of the interval: v_n += R_nb(start) dvelocity_b plus
+// gravity. The angle increment is the rotation vector from start to end. Between samples both are straight lines.
 #pragma once
 
 #include "base/math.hpp"

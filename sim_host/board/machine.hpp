@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Executes an image's machine code on the chip: the Unicorn engine as a Cortex-M4F, with exceptions, faults, sleep and
-// time of our own. ARM DDI 0403E.e sections B1.5.6 to B1.5.8 (exception entry, return), B1.5.19 (WFI), B1.5.14
-// (faults).
+// Executes an image's machine code on the chip: the Unicorn engine as a Cortex-M4F, with our own exceptions, faults,
+// sleep and time. ARM DDI 0403E.e sections B1.5.6 to B1.5.8 (exception entry, return), B1.5.19 (WFI), B1.5.14 (faults).
 //
-// Cycles are executed instructions times CPI; a block of instructions is counted when it is entered, so a register
-// access has the time of its block's end. The engine is GPL-2.0: programs that link this are built, never shipped.
+// Cycles are executed instructions times CPI. A block of instructions is counted when it is entered: a register access
+// has the time of its block's end. The engine is GPL-2.0: programs that link this are built, never shipped.
 #pragma once
 
 #include "sim_host/board/chip.hpp"

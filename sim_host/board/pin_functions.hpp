@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Alternate functions of the STM32F412Cx pins that this board uses: data sheet DS11139, table "Alternate functions",
-// equal to the pin data that ST publishes for the F412C(E-G)Ux package.
+// Alternate functions of the STM32F412Cx pins that this board uses, from data sheet DS11139, table "Alternate
+// functions". They equal the pin data that ST publishes for the F412C(E-G)Ux package.
 #pragma once
 
 #include <array>

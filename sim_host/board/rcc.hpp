@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Reset and clock control with power scale and flash wait states: the clock tree of the STM32F412. RM0402 chapters
-// "Reset and clock control", "Power controller" and "Embedded flash memory interface"; limits and start-up times from
-// the data sheet DS11139 (tables of general operating conditions, HSE, HSI, LSI and PLL characteristics).
+// "Reset and clock control", "Power controller" and "Embedded flash memory interface". Limits and start-up times are
+// from the data sheet DS11139 (tables of general operating conditions, HSE, HSI, LSI and PLL characteristics).
 #pragma once
 
 #include "sim_host/board/peripheral.hpp"

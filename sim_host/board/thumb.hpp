@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// As much of the Thumb-2 encoding as the machine needs: lengths, floating-point instructions, and which register holds
-// the address of an access that must be aligned. ARM DDI 0403E.e chapter A5.
+// The part of the Thumb-2 encoding that the machine needs: lengths and floating-point instructions. It gives the
+// register that holds the address of an access that must be aligned. ARM DDI 0403E.e chapter A5.
 #pragma once
 
 #include <cstdint>

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// A u-blox receiver as its UART1 shows it: configuration by keys (generation 9) or by the older messages, their
-// acknowledgements, NAV-PVT, NAV-COV and NMEA at the rates that are set, all in RAM. u-blox UBX-18010854 R08 (F9 HPG
-// 1.13 interface description): 3.2 frame, 3.9 ACK, 3.10 CFG, 3.12 MON-VER, 3.15 NAV, 6 configuration; generation 8:
-// UBX-13003221 R19. Bytes that wait are sent at the rate that is set when their turn comes, as CFG-PRT warns.
+// A u-blox receiver as its UART1 shows it, with all its settings in RAM. It takes configuration by keys (generation 9)
+// or by the older messages, and acknowledges them. It sends NAV-PVT, NAV-COV and NMEA at the rates that are set. u-blox
+// UBX-18010854 R08 (F9 HPG 1.13 interface description): 3.2 frame, 3.9 ACK, 3.10 CFG, 3.12 MON-VER, 3.15 NAV,
+// 6 configuration. Generation 8: UBX-13003221 R19. Bytes that wait are sent at the rate that is set when their turn
+// comes, as CFG-PRT warns.
 #pragma once
 
 #include "sim_host/board/sensor_world.hpp"
@@ -44,7 +45,7 @@ class UbloxReceiver {
  public:
   explicit UbloxReceiver(const UbloxOptions& options);
 
-  /// Its supply comes back at `now`: what was configured in RAM is lost.
+  /// The receiver's supply comes back at `now`: settings in RAM are lost.
   void power_on(Picoseconds now);
   void on_solution(Picoseconds now, const GnssSolution& solution);
   /// A byte from the board with the rate it had on the line.

@@ -137,7 +137,7 @@ void Usart::arrive(std::uint8_t byte, std::int64_t baud) {
   received_.set(now() + periods(10, baud));
 }
 
-// The receiver samples a byte's ten bits, start and stop bit included, in the middle of its own bit times; the line is
+// The receiver samples a byte's ten bits, start and stop bit included, in the middle of its own bit times. The line is
 // high behind the stop bit.
 void Usart::received() {
   if (!on() || reg::cr1::kRe.of(cr1_) == 0) return;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Asynchronous serial port, 8 data bits. RM0402 chapter "Universal synchronous receiver transmitter": status flags and
-// how they are cleared, overrun, idle line, framing and noise, DMA requests, baud rate from BRR and OVER8.
+// Asynchronous serial port, 8 data bits. RM0402 chapter "Universal synchronous receiver transmitter" has its status
+// flags and how they are cleared, DMA requests, and the baud rate from BRR and OVER8. The flags are overrun, idle line,
+// framing and noise.
 #pragma once
 
 #include "sim_host/board/dma.hpp"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The time of the bus at each frame of a log: In_Sync where the log has it, else the node's epochs, else the log's own
-// clock. Between two of these the log's clock goes on, but by a period at most: a log of a lockstep run is written
-// faster than its time.
+// The time of the bus at each frame of a log. It is In_Sync where the log has it, else the node's epochs, else the
+// log's own clock. Between two of these the log's clock goes on, but by a period at most. A log of a lockstep run is
+// written faster than its time.
 #pragma once
 
 #include "base/time.hpp"

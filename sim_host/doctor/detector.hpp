@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What compares data of a log: it sees frames, whole samples and windows of a second, and at the end states its
-// findings. Its memory does not grow with the log.
+// Detector that compares data of a log: it sees frames, whole samples and windows of a second, and at the end states
+// its findings. Its memory does not grow with the log.
 #pragma once
 
 #include "base/can_frame.hpp"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The way by the fixes against the integral of the GNSS velocity, and against the path of wheels and gyroscope: axes
+// The way by the fixes against the integral of the GNSS velocity, and against the path of wheels and gyroscope. Axes
 // that are swapped or reversed on one side show as the map between the two.
 #pragma once
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The gyroscope's unit without wheels: against the course by GNSS, and against the magnetic field, which turns in the
-// body as the body turns in the field.
+// The gyroscope's unit without wheels: against the course by GNSS, and against the magnetic field. The field turns in
+// the body as the body turns in the field.
 #pragma once
 
 #include "sim_host/doctor/detector.hpp"

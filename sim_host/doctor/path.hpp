@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The path of wheels and gyroscope against the fixes, chord by chord: two chords one after the other have a ratio and
+// The path of wheels and gyroscope against the fixes, chord by chord. Two chords one after the other have a ratio and
 // an angle that no unknown heading changes. A mirror reverses the angle; swapped angles of the Earth stretch it, too.
 #pragma once
 

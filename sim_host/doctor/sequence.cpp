@@ -6,8 +6,8 @@
 namespace tetap::doctor {
 namespace {
 
-// A lost frame begins a new chain, and its old one may be met again once by chance. Two senders alternate all the time:
-// half of the frames for equal rates, a fifth of them for a second sender of a tenth of the rate.
+// A lost frame begins a new chain, and its old one may be met again once by chance. Two senders alternate all the time.
+// Half of the frames alternate at equal rates, a fifth of them for a second sender of a tenth of the rate.
 constexpr double kSwitches = 0.1;
 constexpr double kNewChains = 0.2;  ///< more breaks than that is no counter at all
 constexpr std::uint64_t kLeastSwitches = 20;

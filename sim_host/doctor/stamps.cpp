@@ -17,8 +17,8 @@ constexpr double kMajority = 0.8;
 constexpr std::int64_t kBlock_us = 5'000'000;
 constexpr double kLeastBlocks = 5;
 constexpr double kAhead_us = 30'000;  ///< a sample cannot come before it is true; ticks of 10 ms blur the arrival
-// Quartz clocks are within 50 ppm of each other; beyond, or where the age moves by 10 ms and far more than it scatters,
-// two clocks are at work.
+// Quartz clocks are within 50 ppm of each other. Beyond, two clocks are at work. They are at work too where the age
+// moves by 10 ms and far more than it scatters.
 constexpr double kDrift_ppm = 50, kDrift_us = 10'000, kDriftScatters = 5;
 constexpr double kFresh_us = 60'000;        ///< some device of a robot is read out faster than that
 constexpr double kSameOffset_us = 250'000;  ///< ages of devices on one clock differ by their delays, which are less

@@ -15,8 +15,8 @@
 
 namespace tetap::sim {
 
-/// "SITUATION SENSOR AXIS KIND SIZE": kinds are those of frame_fault.hpp, a spike with its number of samples (spike2);
-/// sizes 0.5g (gates), max (the largest that the frame carries), x0.1 (factor), s0.9 (seconds), or -.
+/// "SITUATION SENSOR AXIS KIND SIZE". Kinds are those of frame_fault.hpp, a spike with its number of samples (spike2).
+/// Sizes: 0.5g (gates), max (the largest that the frame carries), x0.1 (factor), s0.9 (seconds), or -.
 struct CellRequest {
   std::string situation;
   FrameFault fault;  ///< without start and size

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A robot's drive in the simulated world without a fault, as ticks of input frames with the truth at each; the
+// A robot's drive in the simulated world without a fault, as ticks of input frames with the truth at each. The
 // situations in which a fault may fall on it are found in that truth.
 #pragma once
 

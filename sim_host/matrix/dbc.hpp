@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The signals of the bus as config/tetap.dbc states them, read at run time: fields of a frame are read and written
+// The signals of the bus as config/tetap.dbc states them, read at run time. Fields of a frame are read and written
 // without the codec that the node uses.
 #pragma once
 
@@ -50,7 +50,7 @@ class BusDatabase {
   /// Throws std::runtime_error with the line for a `BO_` or `SG_` line that cannot be read. Big-endian signals are
   /// refused; the bus has none.
   explicit BusDatabase(std::istream& dbc);
-  /// The same of a file.
+  /// Reads a file, as the constructor from a stream does.
   explicit BusDatabase(const std::string& path);
 
   /// Null where no message has that offset within the block.

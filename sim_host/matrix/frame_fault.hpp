@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// One fault put into the frames of a log. The fields are found by the DBC alone, so recorded and simulated logs are
-// treated alike; frames of other devices stay as they are, bit for bit.
+// One fault put into the frames of a log. The DBC alone gives the fields: recorded and simulated logs are treated
+// alike. Frames of other devices stay as they are, bit for bit.
 #pragma once
 
 #include "sim_host/matrix/dbc.hpp"
@@ -39,8 +39,8 @@ struct FrameFault {
                        ///< barometer heading heading_accuracy landmarks stamps frames
   std::string axis;    ///< axis of the sensor; the device of stamps and frames
   FaultKind kind = FaultKind::kOffset;
-  /// Offset, spike, step and ramp: rad/s, m/s2, m/s, m, uT, Pa, rad; of stamps s. Scale: the factor. Delayed: s.
-  /// Of gnss_both it is that of the position; the velocity's is `velocity_mps`.
+  /// Size of offset, spike, step and ramp: rad/s, m/s2, m/s, m, uT, Pa, rad; for stamps s. Scale: the factor.
+  /// Delayed: s. For gnss_both it is that of the position; the velocity's is `velocity_mps`.
   double size = 0;
   double velocity_mps = 0;
   int samples = 0;  ///< length of a spike

@@ -14,16 +14,16 @@ struct Uncertainty {
   double velocity_mps = 0.1;
   double heading_rad = 0.1;
   double speed_mps = 0;        ///< speed of the robot
-  double gnss_position_m = 1;  ///< as the receiver states it
+  double gnss_position_m = 1;  ///< accuracy that the receiver states
   double gnss_velocity_mps = 0.1;
 };
 
-/// The smallest change of a sensor's value that its gate refuses, from the published sigma and the robot's noise: the
-/// root of (gate of one to three degrees of freedom times innovation variance).
+/// The smallest change of a sensor's value that its gate refuses, from the published sigma and the robot's noise. It is
+/// the root of (gate of one to three degrees of freedom times innovation variance).
 ///
 /// An IMU and the wheels of a planar filter have no gate. Their fault is measured by what it does to the velocity,
-/// position or heading that another device tests: a turn rate tilts the body, and the tilt leads the velocity astray
-/// by g times its time; a rate about the vertical turns the heading of the course.
+/// position or heading that another device tests. A turn rate tilts the body, and the tilt leads the velocity astray by
+/// g times its time. A rate about the vertical turns the heading of the course.
 /// Unit: that of FrameFault::size. 0 where a size in gates has no meaning (accuracies, whole frames).
 [[nodiscard]] double gate_of(const FrameFault& fault, double interval_s, const Uncertainty& u,
                              const param::Parameters& n, bool planar);

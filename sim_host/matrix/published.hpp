@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a node publishes of its primary estimate, tick by tick, and its errors against the truth in units of three
-// published sigma.
+// Primary estimate that a node publishes, tick by tick, and its errors against the truth in units of three published
+// sigma.
 #pragma once
 
 #include "sim_host/matrix/clean_log.hpp"

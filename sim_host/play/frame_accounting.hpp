@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Double-entry book-keeping of a run: frames sent against frames that the node counted as consumed
-// (Est_StateCrc.InCount), frames that the node counted as sent (Frames, Epoch) against frames that arrived.
+// Double-entry book-keeping of a run. Frames sent are held against frames that the node counted as consumed
+// (Est_StateCrc.InCount). Frames that the node counted as sent (Frames, Epoch) are held against frames that arrived.
 #pragma once
 
 #include "sim_host/play/protocol.hpp"

@@ -90,7 +90,7 @@ class LogParser {
   std::uint64_t number_ = 0;  ///< number of the line
 };
 
-/// A log file, read in blocks. What cannot be read twice (a pipe) is copied into a temporary file first.
+/// A log file, read in blocks. A source that cannot be read twice (a pipe) is copied into a temporary file first.
 class LogFile : public Frames {
  public:
   /// Throws std::runtime_error when the file cannot be opened.

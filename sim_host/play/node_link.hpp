@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What lockstep and real-time playing share: sending without loss, sync frames with their counter, and starting a node
-// (Begin until it answers with its version).
+// Parts that lockstep and real-time playing share: sending without loss, and sync frames with their counter. Starting a
+// node is shared, too (Begin until it answers with its version).
 #pragma once
 
 #include "hal/board/linux/clock.hpp"

@@ -47,7 +47,7 @@ Line& Line::hex(std::uint32_t value, int digits) {
 
 namespace {
 
-/// Where the text of `path` is written first.
+/// Path under which the text of `path` is written first.
 std::string aside(const std::string& path) {
   std::error_code none;
   const auto status = std::filesystem::status(path, none);

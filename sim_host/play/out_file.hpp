@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Text output that keeps up with runs at hundreds of times real time: lines are made by hand in a small buffer, files
+// Text output that keeps up with runs at hundreds of times real time. Lines are made by hand in a small buffer, files
 // are written in blocks. A write that fails (disk full) is an error, not a short file. A file has its name once it is
 // whole, and one program at a time writes into a folder.
 #pragma once

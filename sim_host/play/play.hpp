@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The log player as a function of its command line and a link to the node, so that one program plays over SocketCAN and
-// another to a firmware in its own process.
+// The log player as a function of its command line and a link to the node. One program plays over SocketCAN, another to
+// a firmware in its own process.
 #pragma once
 
 #include "sim_host/play/arguments.hpp"

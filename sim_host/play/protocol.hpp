@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the host programs know of a node's block of ids: which frames are inputs, sync frames, answers; and the frames
-// of one epoch collected into one.
+// A node's block of ids, for the host programs: the frames that are inputs, sync frames, answers. The frames of one
+// epoch are collected into one.
 #pragma once
 
 #include "base/can_frame.hpp"
@@ -22,7 +22,7 @@ inline constexpr std::uint32_t kInputOffsets =
     0x20;  ///< offsets below are inputs, the others of the block are the node's
 inline constexpr std::uint64_t kTimeMask = 0xFFFFFFFFFFFF;
 
-/// Position within the node's block and the map's behind it; nothing when the frame is of neither. Where no robot maps,
+/// Position within the node's block and the map's behind it; nothing when the frame is of neither. If no robot maps,
 /// another node may have the map's identifiers for inputs of its own.
 [[nodiscard]] constexpr std::optional<std::uint32_t> offset_in_block(const base::CanFrame& frame, std::uint32_t base) {
   if (frame.extended || frame.id < base || frame.id >= base + bus::kBlock + bus::kMapBlock) return std::nullopt;
@@ -40,8 +40,9 @@ inline constexpr std::uint64_t kTimeMask = 0xFFFFFFFFFFFF;
   if (offset && is_map_input(*offset)) return graph;
   return offset && *offset < kInputOffsets && *offset != bus::InSync::kOffset && !bus::is_sync_guard(*offset, frame);
 }
-/// Frames with real time of loop and controller, and the program's version, differ between runs that are otherwise
-/// the same; everything else must not: of the diagnostics, counters that follow from the frames (bus::Counters).
+/// Frames with real time of loop and controller, and the program's version, differ between runs that are otherwise the
+/// same. Everything else must not differ. Deterministic among the diagnostics are counters that follow from the frames
+/// (bus::Counters).
 [[nodiscard]] constexpr bool is_deterministic(const base::CanFrame& frame, std::uint32_t base) {
   const std::uint32_t offset = frame.id - base;
   if (offset == bus::EstDiagLoop::kOffset) {

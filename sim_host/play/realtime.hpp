@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Playing at the speed of the log: every frame at its time. The node ticks on Tick frames, or on its own timer after
-// one Clock frame; then what it does depends on real time, and the record of the run is what can be repeated
-// (as_recorded).
+// one Clock frame. With its own timer the node's output depends on real time. The record of such a run is what can be
+// repeated (as_recorded).
 #pragma once
 
 #include "sim_host/play/log.hpp"

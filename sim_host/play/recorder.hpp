@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Writes a node's output: estimates.log (candump format, stamped with the epoch's time, only frames that are the same
-// in every run of the same input), estimates.csv, states.csv (output of an inertial or attitude estimator beyond a
-// pose), innovations.csv, sensors.csv (statistics by sensor), status.csv, sources.csv (state and failed check of each
-// source), map.csv (landmarks of the map that the node makes), and on request raw.log (everything on the bus as it
-// came).
+// Writes a node's output. Frames that are the same in every run of the same input go to estimates.log (candump format,
+// stamped with the epoch's time). Tables are estimates.csv, states.csv (output of an inertial or attitude estimator
+// beyond a pose) and innovations.csv. Further tables are sensors.csv (statistics by sensor), status.csv and sources.csv
+// (state and failed check of each source). Landmarks of the map that the node makes go to map.csv. On request raw.log
+// has everything on the bus as it came.
 #pragma once
 
 #include "sim_host/play/out_file.hpp"
@@ -21,7 +21,7 @@ struct RecorderOptions {
   std::string folder;
   std::uint32_t base = 0x300;
   bool raw = false;
-  std::string interface = "vcan0";  ///< as written in raw.log
+  std::string interface = "vcan0";  ///< name written in raw.log
 };
 
 /// Bits of a classic frame on the wire with worst-case stuffing and interframe space (ISO 11898-1; Davis et al.,

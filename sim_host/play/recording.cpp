@@ -233,8 +233,8 @@ bool RecordSurvey::match_begin(std::uint64_t start, std::uint64_t end) const {
   return true;
 }
 
-/// Where in the log the node's consumption begins. With a Begin frame that is known; a node that was switched on while
-/// frames were flowing took some of those before its first epoch, and its own CRC of them shows which.
+/// Point in the log where the node's consumption begins. With a Begin frame that is known. A node that was switched on
+/// while frames were flowing took some of those before its first epoch. Its own CRC of them shows which.
 void RecordSurvey::find_start(std::uint64_t end, bool power_cycle_ended) {
   if (!power_cycle_ended) {
     if (waiting_.size() < kEnough) return;

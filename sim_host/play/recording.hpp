@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A log that holds a node's own frames is the record of a run. From it follows what the node consumed before each tick
-// (DESIGN.md 4.2), so the run can be played again exactly, and what it answered can be compared byte for byte. The log
-// is read twice, by RecordSurvey and by RecordedTicks, and held in memory only as far as a node lags behind its inputs.
+// A log that holds a node's own frames is the record of a run. It shows what the node consumed before each tick
+// (DESIGN.md 4.2). The run can be played again exactly, and its answers can be compared byte for byte. The log is read
+// twice, by RecordSurvey and by RecordedTicks. It is held in memory only as far as a node lags behind its inputs.
 #pragma once
 
 #include "bus/input_crc.hpp"
@@ -26,11 +26,11 @@ struct LogFacts {
   bool graph = false;                      ///< the robot takes closures between keyframes
 };
 
-/// Reads the begin of a log: until the page is there, or so many epochs that it never comes; a log that begins after
-/// the node's start until its snapshot is whole.
+/// Reads the begin of a log until the page is there, or so many epochs that it never comes. A log that begins after the
+/// node's start is read until its snapshot is whole.
 [[nodiscard]] LogFacts facts_of(Frames& log, const ScriptOptions& options);
 
-/// Where a record ends before its log does, and why.
+/// Place where a record ends before its log does, and why.
 struct Hole {
   base::Micros time;  ///< time of the first epoch that cannot be repeated, or of the last whole one
   std::string why;
@@ -41,7 +41,7 @@ struct Recording {
   /// Actions of a node between one start and the next; only of those whose epochs can be repeated.
   struct Life {
     std::optional<base::Micros> begin;
-    bool from_snapshot = false;     ///< it begins with the snapshot of the log
+    bool from_snapshot = false;     ///< the life begins with the snapshot of the log
     std::uint64_t first_input = 0;  ///< first input of others that it consumed, of all in the log
     std::uint64_t first_own = 0;    ///< first input that it sent itself, of all in the log
     std::uint64_t epochs = 0;       ///< epochs that can be repeated
@@ -53,8 +53,8 @@ struct Recording {
   std::uint64_t unlogged = 0;         ///< epochs behind a hole, up to the end or to the node's next start
   std::optional<Hole> hole;           ///< the first one
   std::uint64_t missing_outputs = 0;  ///< frames that the node counted as sent and the log does not hold
-  /// Where the inputs in the log first differ from those that the node consumed (Est_Epoch.InCrc): a frame was lost
-  /// between them.
+  /// Time at which the inputs in the log first differ from those that the node consumed (Est_Epoch.InCrc). A frame was
+  /// lost between them.
   std::optional<base::Micros> inputs_differ_at;
   std::uint16_t rx_overflow = 0;        ///< frames that the recorded node's receiver lost, by its last count
   std::optional<std::uint32_t> config;  ///< hash of the node's numbers, as last published
@@ -78,7 +78,7 @@ class RecordReader {
   };
   struct NewLife {
     std::optional<base::Micros> begin;   ///< by a Begin frame; empty: the node was switched on, or reset itself
-    const Snapshot* snapshot = nullptr;  ///< it begins with this state
+    const Snapshot* snapshot = nullptr;  ///< the life begins with this state
     std::uint64_t until = 0;             ///< inputs of others that the life before may have consumed
     std::uint64_t first_own = 0;         ///< inputs of its own before its start
   };
@@ -179,7 +179,7 @@ class RecordSurvey {
   // State of this life. Inputs are counted from the begin of the log.
   RecordReader::NewLife life_;
   bool has_entries_ = false;
-  bool started_ = false;               ///< its first input is known
+  bool started_ = false;               ///< the life's first input is known
   bool over_ = false;                  ///< behind a hole
   std::optional<std::uint64_t> best_;  ///< the latest first input that its first epoch allows
   std::deque<std::uint32_t> crcs_;     ///< CRCs of others' inputs that it has not consumed
@@ -195,8 +195,8 @@ class RecordSurvey {
 [[nodiscard]] Recording recording_of(Frames& log, const std::string& name, const ScriptOptions& options);
 
 /// The second reading: every tick with what the node consumed before it, and what it answered. Inputs that the node
-/// sent itself stand in the log before the epoch that consumed them, because one queue holds both; of those of others
-/// as many were consumed as the node's count has beyond these.
+/// sent itself stand in the log before the epoch that consumed them, because one queue holds both. The node's count
+/// beyond these is the number of others' inputs that were consumed.
 class RecordedTicks {
  public:
   RecordedTicks(Frames& log, const Recording& recording, const ScriptOptions& options)
@@ -240,8 +240,8 @@ class RecordedTicks {
   std::uint64_t life_epochs_ = 0;   ///< read of this life
   std::size_t played_lives_ = 0;    ///< begun
   std::uint64_t consumed_ = 0;      ///< inputs of others, or left behind
-  std::uint64_t own_consumed_ = 0;  ///< the same of the node's own
-  std::uint16_t in_count_ = 0;      ///< as the node counts
+  std::uint64_t own_consumed_ = 0;  ///< inputs of the node's own, or left behind
+  std::uint16_t in_count_ = 0;      ///< count of inputs as the node counts them
   std::uint64_t given_ = 0;         ///< ticks
   std::deque<base::CanFrame> inputs_, own_inputs_;
   std::deque<Entry> entries_;             ///< to be given as ticks

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a player sends: for every tick its input frames, then the tick. Read from a log, from a simulated world, or from
-// the record of another run.
+// Frames that a player sends: for every tick its input frames, then the tick. They are read from a log, from a
+// simulated world, or from the record of another run.
 #pragma once
 
 #include "base/can_frame.hpp"
@@ -125,7 +125,7 @@ class LogTicks {
   TickGrid grid_;
   std::vector<base::CanFrame> inputs_;    ///< inputs of the tick that is under way
   std::optional<TimedFrame> ahead_;       ///< an input of a later tick
-  std::optional<base::Micros> own_last_;  ///< as the bus has it: the log's own clock may be another one
+  std::optional<base::Micros> own_last_;  ///< time of the bus: the log's own clock may be another one
   bool begun_ = false;
   std::size_t count_ = 0;
 };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// One run of a node seen from the host: the sink that records, compares and shows progress, and at the end puts the
+// One run of a node seen from the host: the sink that records, compares and shows progress. At the end it puts the
 // result into run.json, one line and the exit status.
 #pragma once
 
@@ -32,8 +32,8 @@ struct SessionOptions {
   bool quiet = false;
 };
 
-/// The folder is this session's alone. Its files have their names once all of them are whole, run.json last; what was
-/// made of the files before them (summary, report) is removed then.
+/// The folder is this session's alone. Its files have their names once all of them are whole, run.json last. Results
+/// made of the files before them (summary, report) are removed then.
 class Session {
  public:
   /// `comparison`: every epoch goes there too; it has to outlive the session. Throws when another run has the folder.

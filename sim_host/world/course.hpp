@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A test course: waypoints joined by straight lines, every corner rounded by an arc, driven by a time plan within
+// A test course: waypoints joined by straight lines, every corner rounded by an arc. A time plan drives it within
 // limits of speed, acceleration, lateral acceleration and yaw rate.
 #pragma once
 
@@ -39,7 +39,7 @@ struct Course {
 /// Proving ground of 52 m x 30 m: straights, two skid pads (one each way), slalom, hairpin, standstill at the start, in
 /// the middle, at the end.
 [[nodiscard]] Course default_course();
-/// The same, driven so many times; a standstill between.
+/// The default course, driven so many times, with a standstill between.
 [[nodiscard]] Course default_course(int laps);
 /// A road of 1.1 km for 5 m/s and more, driven so many times: long curves both ways, standstill at the start and once a
 /// lap.
@@ -48,9 +48,9 @@ struct Course {
 [[nodiscard]] Course street_course(int laps);
 /// Legs for a multicopter at up to 5 m/s, flown so many times, with a hover half way and once a lap.
 [[nodiscard]] Course flight_course(int laps);
-/// A square with rounded corners, `length_m` long in one lap, with so many landmarks in turn 2 m to the right and to
-/// the left of the way; standstill at the start and at the end. From 20 m and 4 landmarks on, 254 landmarks at the
-/// most.
+/// A square with rounded corners, `length_m` long in one lap, with standstill at the start and at the end. The given
+/// number of landmarks stands in turn 2 m to the right and to the left of the way. From 20 m and 4 landmarks on, 254
+/// landmarks at the most.
 [[nodiscard]] Course loop_course(double length_m, int laps, int landmarks);
 /// A straight lead-in and full circles to the left, for laws that have closed forms.
 [[nodiscard]] Course circle_course(double radius_m, int turns);
@@ -62,7 +62,7 @@ struct PathPoint {
   double curvature_per_m = 0;  ///< positive to the left
 };
 
-/// Where the driver wants to be at a time.
+/// Place, speed and acceleration that the driver wants at a time.
 struct PlanPoint {
   double s_m = 0;
   double speed_mps = 0;
@@ -83,7 +83,7 @@ class Plan {
   [[nodiscard]] base::Micros time_at(double s_m) const;
   [[nodiscard]] double length_m() const { return length_m_; }
   [[nodiscard]] base::Micros duration() const { return duration_; }
-  /// When it first leaves, and when it last arrives.
+  /// Times at which the plan first leaves a stop, and last arrives.
   [[nodiscard]] double departure_s() const { return stops_m_.empty() || stops_m_.front() > 0 ? 0 : stops_s_.front(); }
   [[nodiscard]] double arrival_s() const { return arrival_s_; }
 

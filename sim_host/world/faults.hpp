@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What can go wrong in the world, by name: `--fault NAME[@START[+DURATION]]`, seconds from the start of the run.
+// Faults of the world, by name: `--fault NAME[@START[+DURATION]]`, seconds from the start of the run.
 #pragma once
 
 #include "base/time.hpp"
@@ -106,7 +106,7 @@ class Faults {
 
   /// Within [start, start + duration).
   [[nodiscard]] bool active(Fault fault, base::Micros at) const { return since(fault, at).has_value(); }
-  /// How long it has been on.
+  /// Time since the fault began; empty while it is off.
   [[nodiscard]] std::optional<base::Micros> since(Fault fault, base::Micros at) const;
   /// True for exactly one of a sequence of adjoining intervals (before, now]: where the fault starts.
   [[nodiscard]] bool starts(Fault fault, base::Micros before, base::Micros now) const;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What leaves the world: a sensor's sample with the time it claims and the time it is on the bus. Nothing of the truth
-// is in it.
+// Output of the world: a sensor's sample with the time it claims and the time it is on the bus. Nothing of the truth is
+// in it.
 #pragma once
 
 #include "base/time.hpp"

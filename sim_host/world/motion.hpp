@@ -32,7 +32,7 @@ struct Motion {
   double shaking_mps = 0;  ///< speed of what shakes the IMU: tyres on the ground, rotors in the air
 };
 
-/// Where a driver or pilot has brought the body: a control point of its path.
+/// Pose to which a driver or pilot has brought the body: a control point of its path.
 struct Pose {
   Vector3 position_n_m{};
   Vector3 attitude_rad{};  ///< yaw continuous: two turns to the left add 4 pi

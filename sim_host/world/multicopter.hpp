@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A multicopter: a pilot who takes off, flies the plan with climbs and descents, hovers where it stops, and lands.
-// Thrust along the body's z axis makes every acceleration, so the body tilts for it (Mellinger, Kumar, "Minimum snap
-// trajectory generation and control for quadrotors", ICRA 2011, sec. III).
+// A multicopter. Its pilot takes off, flies the plan with climbs and descents, hovers where it stops, and lands. Thrust
+// along the body's z axis makes every acceleration, so the body tilts for it. Source: Mellinger, Kumar, "Minimum snap
+// trajectory generation and control for quadrotors", ICRA 2011, sec. III.
 #pragma once
 
 #include "sim_host/world/chance.hpp"

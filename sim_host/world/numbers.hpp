@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How imperfect the world is: every magnitude with its source. The defaults are the mismatched world, with effects no
+// Imperfections of the world: every magnitude with its source. The defaults are the mismatched world, with effects no
 // planar filter models; matched() keeps only what a filter models exactly, for consistency tests.
 //
 // [ICM] TDK DS-000347 v1.7 (ICM-42688-P): sec. 3.1 table 1 (gyroscope), sec. 3.2 table 2 (accelerometer).
@@ -85,7 +85,7 @@ struct ImuParameters {
   Matrix3 accel_matrix;
   Vector3 accel_bias_mps2{};
   Vector3 gyro_bias_radps{};
-  base::Micros phase{9'000};  ///< when within its period it samples: no two clocks tick together [own]
+  base::Micros phase{9'000};  ///< offset of its samples within the period: no two clocks tick together [own]
   base::Micros latency_min{300}, latency_max{700};
 };
 
@@ -122,14 +122,14 @@ struct GnssParameters {
   double outage_min_s = 2, outage_max_s = 8;
   double glitch_probability = 0.004;  ///< per fix: multipath jump that the accuracy figure does not show [own]
   double glitch_min_m = 4, glitch_max_m = 15;
-  int glitch_fixes_max = 4;              ///< it lasts 1 to so many fixes
+  int glitch_fixes_max = 4;              ///< a glitch lasts 1 to so many fixes
   base::Micros quiet_start{20'000'000};  ///< no outage or glitch before, so that a first fix is a fix
   base::Micros phase{104'000};
   base::Micros latency_min{80'000}, latency_max{120'000};
 };
 
-/// The Earth's field is that of the default origin, rounded, as the IGRF has it (48.6 uT, 64.2 deg down, 4 deg east),
-/// in the axes of whatever place.
+/// The Earth's field is that of the default origin, rounded, as the IGRF has it (48.6 uT, 64.2 deg down, 4 deg east).
+/// It is in the axes of whatever place.
 struct MagnetometerNumbers {
   int rate_hz = 0;  ///< 0: none
   double field_uT = 48.6;
@@ -175,7 +175,7 @@ struct CameraNumbers {
   double mover_mps = 0.5;                    ///< speed of each, to and fro on a straight line [own]
   double mover_way_m = 6;                    ///< length of that line
   double survey_m = 0.015;                   ///< 1 sigma per axis of the landmark map
-  double x_b_m = 0, y_b_m = 0, yaw_rad = 0;  ///< where it is mounted
+  double x_b_m = 0, y_b_m = 0, yaw_rad = 0;  ///< place of its mounting
   base::Micros phase{33'500};
   base::Micros latency_min{20'000}, latency_max{60'000};
 };
@@ -218,10 +218,11 @@ struct Parameters {
   return n;
 }
 
-/// The world that an inertial filter models exactly: matched(), and on top biases that wander at random (a Gauss-Markov
-/// process much slower than the run is that: its first draw is the turn-on bias, and it drives 2 sigma^2 / tau), wheels
-/// whose error is a share of their travel, and a body that trembles, at rest as well: sideways and up as much as a
-/// filter takes for the noise of the non-holonomic constraint, ahead as much as it takes for that of the wheels.
+/// The world that an inertial filter models exactly: matched() with three additions. Biases wander at random. A
+/// Gauss-Markov process much slower than the run gives such biases: its first draw is the turn-on bias, and it drives
+/// 2 sigma^2 / tau. Wheels have an error that is a share of their travel. The body trembles, at rest as well. Sideways
+/// and up it trembles as much as a filter takes for the noise of the non-holonomic constraint. Ahead it trembles as
+/// much as a filter takes for that of the wheels.
 [[nodiscard]] inline Parameters matched_inertial(Parameters n) {
   const ImuParameters imu = n.imu;
   const double gnss_m = sim::sqrt(n.gnss.white_m * n.gnss.white_m + n.gnss.correlated_m * n.gnss.correlated_m);

@@ -89,8 +89,8 @@ void Imu::sense(const Motion& motion, double speed_mps, base::Micros now, const 
     turn[i] = within(rate[i], parameters_.gyro_range_radps, gyro_clips);
     push[i] = within(force[i], parameters_.accel_range_mps2, accel_clips);
   }
-  // As a driver does that reads the sensor at 1 kHz: coning and sculling, so that both are in the axes at the
-  // begin of the sample (Savage 1998; to first order of the angle within it).
+  // Coning and sculling as in a driver that reads the sensor at 1 kHz. Both are then in the axes at the begin of the
+  // sample (Savage 1998; to first order of the angle within it).
   velocity_ = velocity_ + push + cross(angle_ + 0.5 * turn, push);
   angle_ = angle_ + turn + 0.5 * cross(angle_, turn);
   clipped_gyro_ += gyro_clips ? 1 : 0;

@@ -17,8 +17,8 @@
 
 namespace tetap::sim {
 
-/// An ideal one would integrate the path's closed forms: specific force f = a + 2 w x v - g, with the
-/// Earth's rotation w and the gravity g of the place. Raw samples at 2 kHz, limited to full scale, summed to increments
+/// An ideal IMU would integrate the path's closed forms. Its specific force is f = a + 2 w x v - g, with the Earth's
+/// rotation w and the gravity g of the place. Raw samples at 2 kHz are limited to full scale, and summed to increments
 /// between two calls of sample().
 class Imu {
  public:
@@ -31,7 +31,7 @@ class Imu {
     double vibration_share = 0;  ///< speed over ImuParameters::vibration_speed_mps
   };
   [[nodiscard]] Signals signals() const;
-  /// As of the last sample, as the truth has them.
+  /// True biases at the last sample.
   [[nodiscard]] Vector3 gyro_bias_radps() const;
   [[nodiscard]] Vector3 accel_bias_mps2() const;
 

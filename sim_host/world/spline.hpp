@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A uniform B-spline of degree five: a curve with four continuous derivatives and all of them in closed form (de Boor,
-// A Practical Guide to Splines, 1978, ch. IX; the matrix of the basis: Qin, The Visual Computer 16, 2000, sec. 4).
+// A uniform B-spline of degree five: a curve with four continuous derivatives and all of them in closed form. Source:
+// de Boor, A Practical Guide to Splines, 1978, ch. IX. The matrix of the basis: Qin, The Visual Computer 16, 2000,
+// sec. 4.
 #pragma once
 
 #include <algorithm>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The vehicle's true path: a B-spline through what its driver or pilot does, so that position, velocity, acceleration,
-// attitude and turn rates are closed forms of each other (Furgale, Barfoot, Sibley, "Continuous-time batch estimation
-// using temporal basis functions", ICRA 2012). Wheels roll by the geometry of that path.
+// The vehicle's true path: a B-spline through what its driver or pilot does. Position, velocity, acceleration, attitude
+// and turn rates are closed forms of each other (Furgale, Barfoot, Sibley, "Continuous-time batch estimation using
+// temporal basis functions", ICRA 2012). Wheels roll by the geometry of that path.
 #pragma once
 
 #include "sim_host/world/chassis.hpp"
@@ -25,7 +25,7 @@ class Vehicle {
   Motion step();
   /// Set down elsewhere, with the motion that it has: where the plan is, now that it has jumped ahead.
   void place(const PathPoint& at);
-  /// How far ahead of time the plan is driven (kidnapping along the course).
+  /// Span by which the plan is driven ahead of time (kidnapping along the course).
   void set_ahead(base::Micros ahead) { ahead_ = ahead; }
   [[nodiscard]] base::Micros ahead() const { return ahead_; }
   [[nodiscard]] Truth truth() const;
@@ -43,7 +43,7 @@ class Vehicle {
   VehicleParameters parameters_;
   std::variant<Chassis, Multicopter> driver_;
   base::Micros ahead_;
-  base::Micros driven_;  ///< as far as the driver has come: three intervals before the path
+  base::Micros driven_;  ///< time that the driver has reached: three intervals before the path
   double track_m_;
 
   std::array<QuinticSpline, 6> path_;  ///< x, y, z, roll, pitch, yaw

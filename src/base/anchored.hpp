@@ -40,7 +40,7 @@ struct Anchored {
 
   static constexpr Anchored from_um(std::int64_t um) { return Anchored{.anchor_um = um, .offset_m = 0}; }
 
-  /// This coordinate moved by d metres.
+  /// The coordinate moved by d metres.
   [[nodiscard]] constexpr Anchored plus(float d_m) const {
     Anchored moved{.anchor_um = anchor_um, .offset_m = offset_m + d_m};
     constexpr float kNear_m = 128.0F;
@@ -48,7 +48,7 @@ struct Anchored {
     if (!(size_m <= kNear_m)) moved.settle();
     return moved;
   }
-  /// This minus other, in metres.
+  /// Difference from `other`, in metres.
   [[nodiscard]] constexpr float minus(const Anchored& other) const {
     const std::int64_t apart_um = anchor_um - other.anchor_um;
     const float offsets_m = offset_m - other.offset_m;
@@ -57,8 +57,8 @@ struct Anchored {
   [[nodiscard]] constexpr std::int64_t um() const { return anchor_um + micrometres(offset_m); }
 
  private:
-  /// Moves the anchor so that the offset is small again. The step of 256 m is exact in float and in micrometres. x -
-  /// 256 is exact for x in [128, 512] (Sterbenz), so no bit of the position is lost. A jump beyond is re-anchored
+  /// Moves the anchor so that the offset is small again. The step of 256 m is exact in float and in micrometres.
+  /// x - 256 is exact for x in [128, 512] (Sterbenz). No bit of the position is lost. A jump beyond is re-anchored
   /// whole.
   [[gnu::noinline]] constexpr void settle() {
     constexpr float kStep_m = 256.0F;

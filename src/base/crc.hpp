@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// CRC-32 (IEEE 802.3, reflected), CRC-16/IBM-3740 (polynomial 0x1021) and CRC-8 H2F (polynomial 0x2F), the last two as
-// in AUTOSAR CP SWS_CRCLibrary, byte by byte, also at compile time. Tables: 1 kB, 32 and 16 bytes. Check values over
-// "123456789": 0xCBF43926, 0x29B1 and 0xDF.
+// CRC-32 (IEEE 802.3, reflected), CRC-16/IBM-3740 (polynomial 0x1021) and CRC-8 H2F (polynomial 0x2F). The last two are
+// as in AUTOSAR CP SWS_CRCLibrary. All go byte by byte, also at compile time. Tables: 1 kB, 32 and 16 bytes. Check
+// values over "123456789": 0xCBF43926, 0x29B1 and 0xDF.
 #pragma once
 
 #include <array>

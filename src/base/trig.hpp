@@ -114,8 +114,9 @@ inline constexpr std::uint32_t kTwoOverPi[8] = {0x0000'0000U, 0xa2f9'836eU, 0x4e
   return from_bits(bits(value) ^ (((r.quadrant + 1U) << 30) & kSignBit));
 }
 
-/// x less whole turns, in (-kPi, kPi]; x itself where it is inside. Otherwise the nearest float to the true remainder,
-/// or its neighbour: the error is below 0.2 urad, whatever |x|. -kPi becomes kPi. kNan for NaN and infinity.
+/// x less whole turns, in (-kPi, kPi]. Inside, x comes back as it is. Outside, the result is the nearest float to the
+/// true remainder, or its neighbour. Its error is below 0.2 urad, whatever |x|. -kPi becomes kPi. kNan for NaN and
+/// infinity.
 [[nodiscard]] constexpr float wrap_angle(float x) {
   const std::uint32_t magnitude = bits(x) & ~kSignBit;
   if (magnitude < bits(kPi)) return x;

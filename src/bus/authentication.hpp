@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Commands with a tag: 32 bits of SipHash-2-4 under a key that node and host share, over the command, a counter and a
-// number that the node publishes (Diag_Nonce). SECURITY.md has what it promises.
+// Commands with a tag: 32 bits of SipHash-2-4 under a key that node and host share. The tag covers the command, a
+// counter and a number that the node publishes (Diag_Nonce). SECURITY.md has what it promises.
 #pragma once
 
 #include "base/can_frame.hpp"
@@ -34,8 +34,8 @@ struct TagContext {
   return static_cast<std::uint32_t>(hash.finish());
 }
 
-/// A nonce is a keyed hash of every input frame since power-on, chained tick by tick: it differs from start to start as
-/// the sensors' noise does, and nobody without the key can make it repeat. It holds for a turn of 2^21 us and the turn
+/// A nonce is a keyed hash of every input frame since power-on, chained tick by tick. It differs from start to start as
+/// the sensors' noise does. Nobody without the key can make it repeat. It holds for a turn of 2^21 us and the turn
 /// after; within it counters only rise.
 class Authentication {
  public:
@@ -111,7 +111,7 @@ class Authentication {
   std::array<Nonce, 2> nonces_{};  ///< nonces of this turn and of the one before
   std::array<Tag, 6> tags_{};      ///< by id offset
   std::uint8_t attempts_ = kAttempts;
-  base::Micros more_at_;  ///< when another wrong tag is bearable
+  base::Micros more_at_;  ///< time from which another wrong tag is bearable
   std::uint32_t turn_ = 0;
 };
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// In_Closure, four pages of one sequence number, as a sample. The pages come in their order from one sender, so a page
-// that is not the next one ends what was begun: pages of two closures are never mixed. In_Feature is decoded beside it.
+// In_Closure, four pages of one sequence number, as a sample. The pages come in their order from one sender. A page
+// that is not the next one ends what was begun, so pages of two closures are never mixed. In_Feature is decoded beside
+// it.
 #pragma once
 
 #include "base/time.hpp"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which commands are obeyed of those that arrive whole: the next ones by their counter, and few in a time. Both are
+// Commands that are obeyed, among those that arrive whole: the next ones by their counter, and few in a time. Both are
 // judged by the node's time, so a replay judges alike.
 #pragma once
 
@@ -20,8 +20,9 @@ class CommandPolicy {
 
   [[nodiscard]] bool repeats(CommandKind kind, std::uint8_t counter) const { return of(kind).last == counter; }
 
-  /// A command is obeyed when its counter is one to three ahead of the last one that was (two may be lost), or follows
-  /// a command that was refused for its counter: a sender that begins anew is obeyed with its second command.
+  /// A command is obeyed when its counter is one to three ahead of the last obeyed one (two may be lost). A command is
+  /// obeyed too when it follows one that was refused for its counter. A sender that begins anew is obeyed with its
+  /// second command.
   [[nodiscard]] [[gnu::cold, gnu::noinline]] bool admits(CommandKind kind, std::uint8_t counter, base::Micros now,
                                                          Counters& counters) {
     Sequence& sequence = of(kind);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the world did to us, counted once where it was noticed. Counters only grow (modulo 2^16) and go out in Est_Diag.
+// Counts of what the world did to us, each made once where it was noticed. Counters only grow (modulo 2^16) and go out
+// in Est_Diag.
 #pragma once
 
 #include "bus/messages.hpp"

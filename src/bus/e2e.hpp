@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// End-to-end protection of commands and status: CRC-8 in byte 0 over the id offset and bytes 1 to 7, counter in the low
-// nibble of byte 1 (layout and polynomial of AUTOSAR E2E profile 2, with the id offset as the data id). It finds damage
-// and mixed-up ids, not malice.
+// End-to-end protection of commands and status. Byte 0 is a CRC-8 over the id offset and bytes 1 to 7. The low nibble
+// of byte 1 is a counter. Layout and polynomial are those of AUTOSAR E2E profile 2, with the id offset as the data id.
+// It finds damage and mixed-up ids, not malice.
 #pragma once
 
 #include "base/crc.hpp"

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Records of measurements that wait for their frame: at most one goes out in so many ticks. Within a tick they come in
-// the order of the samples; what is refused between ticks is put in that order here, so that no arrival leaves a trace.
+// the order of the samples. Records refused between ticks are put in that order here, so that no arrival leaves a
+// trace.
 #pragma once
 
 #include "base/float_bits.hpp"
@@ -23,7 +24,7 @@ class EventQueue {
   }
   void tick_ends() { first_ = size_; }
 
-  /// When the queue is full an accepted one makes room for one that was not; else the last refused has none.
+  /// In a full queue an accepted record makes room for a refused one; without one the last refused has no room.
   void add(const estimators::Innovation& innovation, const sensor::Sample& sample, std::size_t instance,
            base::Micros now, Counters& counters);
 

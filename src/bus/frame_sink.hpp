@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where a node's frames go: onto the bus, or into a hash. One type for both, so that a node's tick is in an image once.
+// Destination of a node's frames: the bus, or a hash. One type for both, so that a node's tick is in an image once.
 #pragma once
 
 #include "base/can_frame.hpp"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What was consumed: a count and a CRC that a replay can be held against.
+// Record of the consumed inputs: a count and a CRC that a replay can be held against.
 #pragma once
 
 #include "base/bit_crc.hpp"
@@ -13,7 +13,7 @@ namespace tetap::bus {
 class InputCrc {
  public:
   constexpr InputCrc() = default;
-  /// As it was behind an epoch.
+  /// State of the CRC behind an epoch.
   constexpr InputCrc(std::uint32_t running, std::uint32_t count) : running_(running), count_(count) {}
   constexpr void add(std::uint32_t frame_crc) {
     sum_ += frame_crc;

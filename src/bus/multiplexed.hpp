@@ -88,8 +88,8 @@ void put_sources(const estimators::SourceStates& s, std::uint8_t tag, Put&& put)
 /// Whether this turn is that of the sources.
 [[nodiscard]] constexpr bool is_turn_of_sources(std::uint32_t page) { return page % 18 == 4; }
 
-/// One page, and with what has a covariance its sigmas and correlations: whole, and of one epoch (with Est_Std, which
-/// has those of x, y and yaw). Of nine turns one is that of the sources, every other time, and one stays free: the bus
+/// One page. A page with a covariance comes with its sigmas and correlations: whole, and of one epoch. Est_Std has
+/// those of x, y and yaw. One turn in nine is that of the sources, every other time. One more turn stays free: the bus
 /// has no more room (tools/can/generate_messages --load).
 template <class Put>
 void put_state_page(std::uint32_t page, const estimators::InertialEstimate& e, std::uint8_t tag, Put&& put) {

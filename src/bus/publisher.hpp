@@ -82,7 +82,7 @@ class Publisher {
     events_.tick_ends();
   }
 
-  /// This estimator's 1 sigma go out in this epoch: the motion's variance is needed then.
+  /// True when this estimator's 1 sigma go out in this epoch: the motion's variance is needed then.
   [[nodiscard]] bool publishes_sigma(std::size_t instance, bool primary) const {
     const param::PublishParameters& p = parameters_.publish;
     return primary ? every(p.std_every, kTogether) : every(p.side_every, side(instance));
@@ -225,8 +225,9 @@ void Publisher<N>::estimate(std::size_t instance, sensor::EstimatorKind kind, bo
   }
 }
 
-/// Attitude and velocity; of the rest one page at a time, in an epoch that has these and Est_Std too
-/// (param/limits.hpp): what turns and accelerates is to be judged by the covariance of its own time.
+/// Attitude and velocity, and the pages of the state, one at a time. A page goes out in an epoch that has these and
+/// Est_Std too (param/limits.hpp). A robot that turns and accelerates is to be judged by the covariance of its own
+/// time.
 template <std::size_t N>
 template <class Inertial, class Sources, class Send>
 void Publisher<N>::inertial(std::size_t instance, Inertial&& inertial, Sources&& sources, Send& send) {

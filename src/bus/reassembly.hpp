@@ -33,7 +33,8 @@ class Reassembly {
       if (partial.missing != 0) give_up(partial, counters);
   }
 
-  /// Where this frame's sample is put together: the half that waits for it, or a fresh one (the oldest makes room).
+  /// The place where this frame's sample is put together: the half that waits for it, or a fresh one (the oldest makes
+  /// room).
   Partial& slot(sensor::Sensor sensor, std::uint8_t instance, std::uint8_t sequence, std::uint8_t frames,
                 base::Micros reference, Counters& counters);
   /// One frame of it is there; the whole sample goes to out.sample().
@@ -57,8 +58,8 @@ inline Reassembly::Partial& Reassembly::slot(sensor::Sensor sensor, std::uint8_t
     const sensor::Sample& s = partial.sample;
     const bool same = partial.missing != 0 && s.sensor == sensor && s.instance == instance;
     // IMU frames but one have no stamp, and their sequence comes round in 16 samples. A half that is four or more
-    // samples behind has lost a frame for good (frames are not reordered that far), and must not meet those that come
-    // when its number comes again; nor may one that is old.
+    // samples behind has lost a frame for good: frames are not reordered that far. Such a half must not meet the frames
+    // that come when its number comes again. An old half must not meet them either.
     if (same && sensor == sensor::Sensor::kImu) {
       const int behind = (sequence - s.sequence) & 0x0F;
       if ((behind >= 4 && behind <= 12) || reference - partial.since > kImuPatience) {

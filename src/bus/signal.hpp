@@ -27,7 +27,7 @@ struct Signal {
   std::uint32_t per_unit = 1;  ///< steps per unit: 1 / the scale of the DBC
 
   [[nodiscard]] constexpr std::uint64_t mask() const { return ~std::uint64_t{0} >> (64U - length); }
-  /// Not available: all ones, or the most negative.
+  /// Code for a value that is not available: all ones, or the most negative.
   [[nodiscard]] constexpr std::int64_t gap() const {
     return is_signed ? -(std::int64_t{1} << (length - 1)) : static_cast<std::int64_t>(mask());
   }
@@ -42,7 +42,7 @@ struct Signal {
     const std::uint64_t sign = is_signed ? std::uint64_t{1} << (length - 1U) : 0U;
     return static_cast<std::int64_t>((bits ^ sign) - sign);
   }
-  /// That word's bits of `steps`; the other bits are 0.
+  /// Word that holds `steps` in this signal's bits; its other bits are 0.
   [[nodiscard]] constexpr std::uint64_t put(std::int64_t steps) const {
     return (static_cast<std::uint64_t>(steps) & mask()) << start;
   }

@@ -6,8 +6,8 @@
 
 namespace tetap::checks {
 
-/// Extra variance of correlated fixes: a filter without smoothing gives the first of many such fixes the weight of two
-/// (the best weights share it with the last), so its variance is up to a fifth above the sum of their information.
+/// Extra variance of correlated fixes. A filter without smoothing gives the first of many such fixes the weight of two.
+/// The best weights share it with the last. The filter's variance is up to a fifth above the sum of their information.
 inline constexpr float kColouredNoiseInflation = 1.22F;
 
 /// Factor of the receiver's accuracy at the start (with a given pose: of its height). Later fixes hardly correct the
@@ -16,10 +16,10 @@ inline constexpr float kColouredNoiseInflation = 1.22F;
 /// 3.68 times the figure, which is to be 3 sigma.
 inline constexpr float kStartPositionInflation = 1.23F;
 
-/// Factor of the variance of a fix whose error lasts for `correlation_s`, when the fix before was `since_s` ago: with
-/// phi = exp(-t / tau), z_k - phi z_(k-1) has a white error of variance (1 - phi^2) r and sees (1 - phi) of the
-/// position: (1 + phi) / (1 - phi) (measurement differencing). A fix after a long silence counts in full, and many in a
-/// row together as much as one every 2 tau.
+/// Factor of the variance of a fix whose error lasts for `correlation_s`, when the fix before was `since_s` ago. With
+/// phi = exp(-t / tau), z_k - phi z_(k-1) has a white error of variance (1 - phi^2) r. The difference sees (1 - phi) of
+/// the position: the factor is (1 + phi) / (1 - phi) (measurement differencing). A fix after a long silence counts in
+/// full. Many in a row count together as much as one every 2 tau.
 [[nodiscard]] constexpr float repeated(float since_s, float correlation_s) {
   if (!(correlation_s > 0.0F) || !(since_s < 10.0F * correlation_s)) return 1.0F;
   const float phi = base::exp(-(since_s > 1e-3F ? since_s : 1e-3F) / correlation_s);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The one rule of what an IMU sample is good for. The filter, the output predictor, its cells and the attitude filter
-// must agree on it, or the present would be carried over samples that the filter later refuses.
+// must agree on it. Otherwise the present would be carried over samples that the filter later refuses.
 #pragma once
 
 #include "base/math.hpp"
@@ -95,7 +95,7 @@ class ImuClassifier {
     return increment.dt.us > 0 && increment.dt <= nav::ImuIncrement::kLongest &&
            increment.dtheta_b_rad.squaredNorm() < angle * angle && increment.dv_b_mps.squaredNorm() < speed * speed;
   }
-  /// The same axis by axis, along the sensor's own. kContiguous: nothing is wrong with the sample's size.
+  /// Judges the size axis by axis, along the sensor's own. kContiguous: nothing is wrong with the sample's size.
   [[nodiscard, gnu::noinline]] static ImuClass judge_size(const sensor::ImuSample& s,
                                                           const nav::ImuIncrement& increment,
                                                           const param::InertialParameters& n) {

@@ -13,8 +13,9 @@ namespace tetap::checks {
 
 class OffsetHypothesis {
  public:
-  /// One more fix: the filter's offset, the variance of the fix on one axis, and that of the filter on two (by its
-  /// growth the offset may move). A fix that contradicts the hypothesis is left out; five in a row begin a new one.
+  /// One more fix: the filter's offset, and the variance of the fix on one axis and of the filter on two. The offset
+  /// may move by the growth of the filter's variance. A fix that contradicts the hypothesis is left out; five in a row
+  /// begin a new one.
   [[gnu::noinline]] void update(base::Micros stamp, float east_m, float north_m, float fix_m2, float filter_m2) {
     const float d_east_m = east_m - east_m_, d_north_m = north_m - north_m_;
     const float grown_m2 = filter_m2 > begun_m2_ ? filter_m2 - begun_m2_ : 0.0F;
@@ -62,7 +63,7 @@ class OffsetHypothesis {
   static constexpr std::uint8_t kAgainst = 5;
 
   Persistence supported_;           ///< fixes that support the hypothesis
-  float east_m_ = 0, north_m_ = 0;  ///< their mean offset
+  float east_m_ = 0, north_m_ = 0;  ///< mean offset of the fixes
   float begun_m2_ = 0;              ///< variance of the filter at the first of them
   std::uint8_t against_ = 0;        ///< fixes in a row that contradict the hypothesis
 };

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Drift of fixes away from the filter while the receiver's own velocity agrees with it: the mean innovation of the last
-// ten or so, less that of the last thirty. Each alone may be inside its gate (a ramp, spoofing); a constant offset, as
-// a filter's own error, leaves both means alike. Exponentially weighted means: Roberts 1959 (control charts);
-// innovations averaged against a slow fault: Diesel & Luu 1995.
+// Drift of fixes away from the filter while the receiver's own velocity agrees with it. Drift is the mean innovation of
+// the last ten or so, less that of the last thirty. Each alone may be inside its gate (a ramp, spoofing). A constant
+// offset, as a filter's own error, leaves both means alike. Exponentially weighted means: Roberts 1959 (control
+// charts). Innovations averaged against a slow fault: Diesel & Luu 1995.
 #pragma once
 
 #include <array>
@@ -46,8 +46,8 @@ class PositionDrift {
   using Mean = std::array<float, 2>;
   static constexpr std::uint8_t kFixesOfAVelocity = 10;  ///< velocities may come once a second
   static constexpr float kFast = 0.1F, kSlow = 0.03F;    ///< weights of the newest fix
-  /// Variance of the difference over that of one fix: that of a mean is w / (2 - w), the covariance of two
-  /// v w / (v + w - v w).
+  /// Variance of the difference over that of one fix. The variance of a mean is w / (2 - w). The covariance of two
+  /// means is v w / (v + w - v w).
   static constexpr float kShare =
       kFast / (2 - kFast) + kSlow / (2 - kSlow) - 2 * kFast * kSlow / (kFast + kSlow - kFast * kSlow);
   static void follow(Mean& mean_m, float weight, float east_m, float north_m) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Repeated readings: a sensor whose noise spans the steps of its interface repeats a value by chance a few times, not
-// ten or fifty; one that does is stuck.
+// Repeated readings. A sensor whose noise spans the steps of its interface repeats a value by chance a few times. One
+// that repeats it ten or fifty times is stuck.
 #pragma once
 
 #include "checks/persistence.hpp"
@@ -87,7 +87,7 @@ class StuckAxis {
   std::uint8_t count_ = 0;               ///< readings at which that one alone kept its value
 };
 
-/// The same to the last bit, with the time of the last reading.
+/// Readings that repeat to the last bit, with the time of the last reading.
 template <std::size_t kSize>
 class StuckValue {
  public:

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Turn rate of the gyroscope against that of the wheels. Where they contradict each other in the mean of a second,
-// either may be wrong, and the heading is uncertain by all that they differ since.
+// Turn rate of the gyroscope against that of the wheels. When their means over a second contradict each other, either
+// may be wrong. The heading is then uncertain by all that they differ from that time on.
 #pragma once
 
 #include "base/time.hpp"

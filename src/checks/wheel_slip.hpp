@@ -52,7 +52,7 @@ class WheelSlip {
   }
 
   /// Compares the wheels' last speed with GNSS velocity. True at the second contradiction in a row, when no slip was
-  /// known: what was taken from the wheels until now is as wrong as they are.
+  /// known. The speeds taken from the wheels until now are then as wrong as the wheels.
   bool update_ground(float forward_mps, float wheels_mps, float sigma_mps, base::Micros stamp,
                      const param::InertialParameters& n) {
     if (!(n.slip_mps > 0) || older(last_, stamp, kGap)) return false;

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// The attitude filter (filter/attitude.hpp) in the firmware: gyroscope, accelerometer and, where the robot has one,
-// magnetometer; nothing else, so that its answer can judge an estimator with more inputs. Delayed, because its
-// state is large: the present is the far end of the window, turned on by the gyroscope's samples in it.
+// The attitude filter (filter/attitude.hpp) in the firmware: gyroscope, accelerometer and, on a robot that has one,
+// magnetometer. It uses nothing else, so that its answer can judge an estimator with more inputs. The filter is
+// delayed, because its state is large. The present is the far end of the window, turned on by the gyroscope's samples
+// in it.
 #pragma once
 
 #include "checks/imu_classifier.hpp"

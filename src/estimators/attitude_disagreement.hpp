@@ -16,8 +16,8 @@ struct Disagreement {
   float heading_rad = base::kNan;  ///< about the vertical, -pi to pi; NaN: one of the two has no heading
 };
 
-/// From b to a in the axes of n: q_a q_b* is a turn about an axis that lies level, the tilt, after one about the
-/// vertical, the heading. At a tilt of half a turn no heading exists, and 0 stands for it.
+/// Turn from b to a in the axes of n. The turn q_a q_b* is one about the vertical, the heading, followed by one about a
+/// level axis, the tilt. At a tilt of half a turn no heading exists, and 0 stands for it.
 [[nodiscard]] [[gnu::noinline]] inline Disagreement disagreement(const AttitudeEstimate& a, const AttitudeEstimate& b) {
   if (!a.valid || !b.valid) return {};
   const filter::Quaternion d = a.q_nb * b.q_nb.conjugate();

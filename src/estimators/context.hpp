@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What every estimator is given with a sample, and the commands it can be sent.
+// Facts that every estimator is given with a sample, and the commands it can be sent.
 #pragma once
 
 #include "base/time.hpp"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What estimators give: an estimate with its uncertainty, and a record of every measurement they were offered.
+// Estimates with their uncertainty, and a record of every measurement that an estimator was offered.
 #pragma once
 
 #include "base/math.hpp"
@@ -33,7 +33,7 @@ struct Estimate {
 /// 1 sigma of what could be anything: of a place, and of a heading (pi / sqrt(3): even over the circle).
 inline constexpr float kUnknown_m = 1000, kUnknown_rad = 1.8138F;
 
-/// How uncertain the motion is, when somebody asks.
+/// Variance of the motion, made when somebody asks.
 struct MotionVariance {
   float forward_m2ps2 = base::kNan;     ///< variance of Estimate::forward_mps; NaN: not known
   float yaw_rate_rad2ps2 = base::kNan;  ///< variance of Estimate::yaw_rate_radps; NaN: not known
@@ -69,8 +69,8 @@ class SourceStates {
   std::array<Entry, kKinds> entries_{};
 };
 
-/// Output of an inertial estimator beyond the pose: the state at the present, the covariance of the far end of its
-/// window and how to carry an entry of it to the present.
+/// Output of an inertial estimator beyond the pose: the state at the present and the covariance at the far end of its
+/// window. A step carries an entry of the covariance to the present.
 struct InertialEstimate {
   nav::InsState state;
   const filter::Symmetric<float, nav::InsState::kErrors>& p;  ///< the estimator's own: as long as nothing changes it
@@ -105,7 +105,7 @@ struct InertialEstimate {
 struct AttitudeEstimate {
   filter::Quaternion q_nb;
   bool valid = false;            ///< tilt, at least
-  bool heading_valid = false;    ///< else the heading is free and drifts
+  bool heading_valid = false;    ///< false: the heading is free and drifts
   bool field_disturbed = false;  ///< the magnetometer is not followed
 };
 

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the robot knows of its surroundings and all estimators share: the origin of the local plane and the landmark
-// map.
+// Surroundings that all estimators share: the origin of the local plane and the landmark map.
 #pragma once
 
 #include "base/trig.hpp"
@@ -83,8 +82,8 @@ inline constexpr float kRange_m = 105'000;
   return east_m * east_m + north_m * north_m <= kRange_m * kRange_m;
 }
 
-/// The same for a fix, by the haversine of the distance on a sphere (Sinnott 1984, Sky and Telescope 68(2)) of the
-/// least radius of curvature: the fix of a position within the range is within it.
+/// The same for a fix, by the haversine of the distance on a sphere (Sinnott 1984, Sky and Telescope 68(2)). The sphere
+/// has the least radius of curvature: the fix of a position within the range is within it.
 [[nodiscard]] inline bool within_range(const nav::LocalFrame& frame, const sensor::GnssPosition& fix) {
   constexpr std::int64_t kNear_2ndeg = 150'000'000;  // 0.3 deg both ways: 50 km at most
   constexpr float kRad = 2e-9F * 0.0174532925F, kRadius_m = 6'335'000;

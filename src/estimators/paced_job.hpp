@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A job longer than a tick: its work is counted in units, and the tick in which its result is adopted is fixed when it
+// A job longer than a tick: its work is counted in units. The tick in which its result is adopted is fixed when the job
 // begins. How long a unit takes has no effect on any bit.
 #pragma once
 

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Attitude from gyroscope, accelerometer and, where there is one, magnetometer: a complementary filter whose slow part
-// is a low-pass of the accelerometer in axes that hardly turn, so that motion averages out before it counts
-// (Laidig & Seel 2023, Information Fusion 91, sec. 3; equations, own design). The gyroscope turns q_lb; the low-passed
-// accelerometer, carried in the level axes l, turns it back to level; heading is a separate angle from l to n (east,
-// north, up); the bias is estimated beside. Time is an argument; every sample may have its own interval.
+// Attitude from gyroscope, accelerometer and, on a body that has one, magnetometer, by a complementary filter. Its slow
+// part is a low-pass of the accelerometer in axes that hardly turn: motion averages out before it counts. Source:
+// Laidig & Seel 2023, Information Fusion 91, sec. 3; equations, own design. The gyroscope turns q_lb. The low-passed
+// accelerometer, carried in the level axes l, turns it back to level. Heading is a separate angle from l to n (east,
+// north, up). The bias is estimated beside. Time is an argument; every sample may have its own interval.
 #pragma once
 
 #include "filter/attitude_bias.hpp"
@@ -37,8 +37,8 @@ class Attitude {
     clipping_.set_range(range.gyroscope_radps);
   }
 
-  /// A sample of both that were constant over the last dt_s. kRefused: no numbers, or no time, and nothing has changed;
-  /// kAccelerometerRefused: clipped or in free fall, and the gyroscope alone was used.
+  /// A sample of both that were constant over the last dt_s. Without numbers or time the verdict is kRefused, and
+  /// nothing has changed. A clipped sample, or free fall, gives kAccelerometerRefused: the gyroscope alone was used.
   [[nodiscard]] AttitudeVerdict step(const Vector3& w_b_radps, const Vector3& f_b_mps2, float dt_s,
                                      ClippedSensors clipped = {}) {
     const float w2 = dot(w_b_radps, w_b_radps);
@@ -73,8 +73,9 @@ class Attitude {
     return true;
   }
 
-  /// The gyroscope missed a turn of up to this angle. The speed of a body is bounded, so a mean over T seconds of the
-  /// accelerometer is wrong by its change over g T: an error that is n times the settled one asks for 1/n of the time.
+  /// The gyroscope missed a turn of up to this angle. The speed of a body is bounded. A mean over T seconds of the
+  /// accelerometer is wrong by the change of speed over g T. An error of n times the settled one asks for 1/n of the
+  /// time.
   void lose(float turn_rad) {
     const float sigmas = turn_rad / o_.inclination_sigma_rad;
     tau_s_ /= 1.0F + sigmas;

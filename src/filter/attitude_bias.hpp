@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Gyroscope bias, at rest and in motion. In motion a bias shows as the rate at which the accelerometer has to turn the
-// attitude back; the gain follows from a Kalman filter of three states (the idea: Laidig & Seel 2023, sec. 3.5). Both
-// sides of that comparison go through the accelerometer's low-pass, or the filter would count one error many times.
-// Here: scalar updates instead of a matrix inverse, noise densities instead of a fixed sampling rate.
+// attitude back. The gain follows from a Kalman filter of three states (the idea: Laidig & Seel 2023, sec. 3.5). Both
+// sides of that comparison go through the accelerometer's low-pass. Otherwise the filter would count one error many
+// times. Here: scalar updates instead of a matrix inverse, noise densities instead of a fixed sampling rate.
 #pragma once
 
 #include "filter/attitude_options.hpp"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The turn that a gyroscope misses at the end of its range. Between the last reading below the limit and the next one
-// the rate is taken as the cubic through both with their slopes (Hermite interpolation): over T seconds its integral is
-// (w0 + w1) T/2 + (a + c) T^2/12 for slopes a at the entry and -c at the exit. The turn that the readings show is
+// the rate is taken as the cubic through both with their slopes (Hermite interpolation). Its integral over T seconds is
+// (w0 + w1) T/2 + (a + c) T^2/12, for slopes a at the entry and -c at the exit. The turn that the readings show is
 // taken off. A single wild reading has no slopes to support it, and adds nothing.
 #pragma once
 

@@ -19,8 +19,8 @@ class MagneticHeading {
         per_tau_(1.0F / o.tau_heading_s),
         declination_(base::sincos(o.declination_rad)) {}
 
-  /// m_l: the field in axes that are level, heading free. rate: how fast the body turns. level_variance: that of the
-  /// vertical, in units of the settled one, for the dip of the field turns an error of the level into one of heading.
+  /// m_l: the field in level axes, heading free. rate: how fast the body turns. level_variance: that of the vertical,
+  /// in units of the settled one. The dip of the field turns an error of the level into one of heading.
   void step(const Vector3& m_l, float rate_radps, float level_variance, float dt_s) {
     const float h2 = m_l(0) * m_l(0) + m_l(1) * m_l(1);
     const float horizontal = base::sqrt(h2);
@@ -35,7 +35,7 @@ class MagneticHeading {
     p_ *= rest;
     if (!(gain > 0.0F)) return;
     // Cosine and sine of the turn that brings the field to the declination's direction, by the half-angle formula
-    // t = tan(turn/2): a share of a turn is that share of t, exact for all of it and for small ones.
+    // t = tan(turn/2). A share of a turn is that share of t. The rule is exact for all of the turn and for small turns.
     const float c = half_.cos * half_.cos - half_.sin * half_.sin;
     const float s = 2.0F * half_.cos * half_.sin;
     const float east = c * m_l(0) - s * m_l(1);

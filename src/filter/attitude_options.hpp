@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// The numbers of the attitude filter. Defaults are those published with VQF (Laidig & Seel 2023, Information Fusion 91,
-// "VQF: Highly accurate IMU orientation estimation with bias estimation and magnetic disturbance rejection", table 1)
-// where that filter has the same parameter. tools/report/choose_attitude chose the others by leaving out one trial.
+// Numbers of the attitude filter. Defaults are those published with VQF where that filter has the same parameter.
+// Source: Laidig & Seel 2023, Information Fusion 91, "VQF: Highly accurate IMU orientation estimation with bias
+// estimation and magnetic disturbance rejection", table 1. tools/report/choose_attitude chose the others by leaving out
+// one trial.
 #pragma once
 
 namespace tetap::filter {

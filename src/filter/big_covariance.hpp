@@ -52,8 +52,8 @@ class BigCovariance {
     }
   }
 
-  /// P H^T in columns `column` to column + kRows - 1 of `product`, for kRows rows of H that are zero but at the first
-  /// kHead states and at kTail states from `tail` on. Row r of rows holds the head's elements, then the tail's.
+  /// P H^T in columns `column` to column + kRows - 1 of `product`, for kRows rows of H. The rows are zero but at the
+  /// first kHead states and at kTail states from `tail` on. Row r of rows holds the head's elements, then the tail's.
   template <int kRows, int kHead, int kTail, std::size_t kWidth>
   void times(const std::array<std::array<Scalar, static_cast<std::size_t>(kHead + kTail)>, kRows>& rows, int tail,
              Rows<kWidth>& product, int column) const {
@@ -88,8 +88,8 @@ class BigCovariance {
     }
   }
 
-  /// P = F P F^T + Q where F is the identity but for `swing`, the shares of the error of head state kHead - 1 in those
-  /// of the head states before it, and Q is zero but in the head (upper half of q is read).
+  /// P = F P F^T + Q where F is the identity but for `swing`. `swing` holds the shares of the error of head state
+  /// kHead - 1 in those of the head states before it. Q is zero but in the head (upper half of q is read).
   template <int kHead>
   void predict_head(const std::array<Scalar, kHead - 1>& swing, const std::array<std::array<Scalar, kHead>, kHead>& q) {
     constexpr int kLast = kHead - 1;

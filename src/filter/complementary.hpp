@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The complementary filter of one axis: what a rate knows of fast motion and what a slow sensor knows of the level,
-// split at one time constant (Higgins 1975, IEEE Trans. Aerosp. Electron. Syst. 11(3); Mahony, Hamel, Pflimlin 2008).
+// The complementary filter of one axis: what a rate knows of fast motion and what a slow sensor knows of the level. One
+// time constant splits the two (Higgins 1975, IEEE Trans. Aerosp. Electron. Syst. 11(3); Mahony, Hamel, Pflimlin 2008).
 // The high-pass is tau s/(tau s + 1), the low-pass 1/(tau s + 1), by backward differences: alpha = tau/(tau + dt).
 #pragma once
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Keeps a covariance among the matrices that float can hold as positive definite: rounding in a very sharp measurement,
-// or noise of one direction that is far above what was there, would take the smallest eigenvalue below zero.
+// Keeps a covariance among the matrices that float can hold as positive definite. Rounding in a very sharp measurement
+// would take the smallest eigenvalue below zero. Noise of one direction that is far above what was there would do so,
+// too.
 #pragma once
 
 #include "base/multiply_add.hpp"
@@ -34,8 +35,9 @@ template <class Scalar, int N>
   return true;
 }
 
-/// The same by a test that costs less and may refuse a P that is well conditioned: of three correlations with the
-/// determinant d, whose trace is 3, the least eigenvalue is above d / 2.25 (the product of the others is at most that).
+/// The same by a test that costs less and may refuse a P that is well conditioned. Three correlations have a trace of
+/// 3: with the determinant d, the least eigenvalue is above d / 2.25. The product of the other two eigenvalues is at
+/// most 2.25.
 template <class Scalar, int N>
 [[nodiscard, gnu::always_inline]] inline bool surely_well_conditioned(const Symmetric<Scalar, N>& p) {
   if constexpr (N != 3) {
@@ -51,8 +53,8 @@ template <class Scalar, int N>
   }
 }
 
-/// Makes all correlations smaller by a little, which adds that share to every conditional variance; by more if that is
-/// not enough, and in the end by all. Every entry has to be a number (Symmetric::bounded()).
+/// Makes all correlations smaller by a little, which adds that share to every conditional variance. The share grows if
+/// that is not enough, and in the end takes all. Every entry has to be a number (Symmetric::bounded()).
 template <class Scalar, int N>
 [[gnu::noinline]] void restore(Symmetric<Scalar, N>& p) {
   constexpr auto kLeast = Scalar(1e-20F);  // below, products of variances leave the normal numbers

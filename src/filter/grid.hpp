@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Bayes filter on a grid (Thrun, Burgard, Fox 2005, sec. 4.1 and 8.2): a line, a plane, or poses x * y * yaw.
-// Prediction by a separable kernel, update by a likelihood, both in place; the work can be cut anywhere between two
+// Prediction is by a separable kernel, update by a likelihood, both in place. The work can be cut anywhere between two
 // lines of cells and leaves the same bits.
 #pragma once
 
@@ -15,8 +15,9 @@
 
 namespace tetap::filter {
 
-/// Three weights at -1, 0, 1 beside a whole shift: exactly this mean, and this variance (in cells) as far as three
-/// points can have it: at least |m| (1 - |m|) and at most 1 - m^2, for the mean m that is left beside the shift.
+/// Three weights at -1, 0, 1 beside a whole shift. Their mean is exact. Their variance (in cells) is exact as far as
+/// three points can have it. The variance is at least |m| (1 - |m|) and at most 1 - m^2, for the mean m that is left
+/// beside the shift.
 struct GridKernel {
   std::int32_t shift = 0;
   std::array<float, 3> weight{0, 1, 0};
@@ -144,7 +145,7 @@ class Grid {
   }
 
   /// Does at most `units` lines of cells of the step that begin() began. likelihood(pose) is the same in all calls of a
-  /// step; a value that is no number or below zero counts as zero. An update that leaves no mass is left out.
+  /// step. A value that is no number or below zero counts as zero. An update that leaves no mass is left out.
   template <class Likelihood>
   constexpr void work(std::uint32_t units, const Likelihood& likelihood) {
     for (; units > 0 && !done(); --units) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Second-order Butterworth low-pass of N channels as a chain of two integrators, v'' = w^2 (x - v) - sqrt(2) w v', one
-// semi-implicit Euler step per sample: the interval enters as a factor, so it may differ from sample to sample.
+// Second-order Butterworth low-pass of N channels as a chain of two integrators: v'' = w^2 (x - v) - sqrt(2) w v'.
+// Every sample is one semi-implicit Euler step. The interval enters as a factor, so it may differ from sample to
+// sample.
 #pragma once
 
 #include "filter/quaternion.hpp"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Particle filter of static capacity: sequential importance sampling with any proposal, and the bootstrap filter with
-// resampling (Gordon, Salmond, Smith 1993; Doucet, Godsill, Andrieu, "On sequential Monte Carlo sampling methods for
-// Bayesian filtering", Statistics and Computing 10, 2000).
+// resampling. Source: Gordon, Salmond, Smith 1993; Doucet, Godsill, Andrieu, "On sequential Monte Carlo sampling
+// methods for Bayesian filtering", Statistics and Computing 10, 2000.
 #pragma once
 
 #include "filter/particle_noise.hpp"
@@ -179,8 +179,8 @@ class Particles {
     return total / sum();
   }
 
-  /// The particle with most weight in its neighbourhood, among `candidates` particles evenly spaced by place: the mode
-  /// of a kernel density with a box for kernel. near(a, b): is b in the neighbourhood of a?
+  /// The particle with most weight in its neighbourhood, among `candidates` particles evenly spaced by place. It is the
+  /// mode of a kernel density with a box for kernel. near(a, b): is b in the neighbourhood of a?
   template <class Near>
   [[nodiscard]] constexpr std::size_t mode(std::size_t candidates, const Near& near) const {
     std::size_t best = 0;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Monte Carlo localisation among known landmarks (Dellaert, Fox, Burgard, Thrun 1999): tempered likelihood, regularised
-// resampling, number of particles by KLD, and poses injected from a sighting while the track is lost (Thrun, Burgard,
-// Fox 2005, sec. 8.3.5, with a threshold on the mean likelihood instead of a ratio).
+// Monte Carlo localisation among known landmarks (Dellaert, Fox, Burgard, Thrun 1999). Likelihoods are tempered,
+// resampling is regularised, and KLD sets the number of particles. Poses are injected from a sighting while the track
+// is lost (Thrun, Burgard, Fox 2005, sec. 8.3.5). A threshold on the mean likelihood replaces the ratio there.
 #pragma once
 
 #include "filter/particle.hpp"

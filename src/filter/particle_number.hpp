@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// How many particles a distribution needs: KLD sampling (D. Fox, "Adapting the sample size in particle filters through
-// KLD-sampling", IJRR 22(12), 2003, eq. 13), with the occupied bins in a fixed set.
+// Number of particles that a distribution needs: KLD sampling, with the occupied bins in a fixed set. Source: D. Fox,
+// "Adapting the sample size in particle filters through KLD-sampling", IJRR 22(12), 2003, eq. 13.
 #pragma once
 
 #include "base/math.hpp"
@@ -11,8 +11,8 @@
 
 namespace tetap::filter {
 
-/// A set of bins. Bin numbers may be any words, spread by the caller's geometry; two bins that fall on one bit count
-/// once, so the number of bins comes out low by about k^2 / (2 kBits).
+/// A set of bins. Bin numbers may be any words, spread by the caller's geometry. Two bins that fall on one bit count
+/// once: the number of bins comes out low by about k^2 / (2 kBits).
 template <std::size_t kBits>
 class BinSet {
  public:
@@ -44,8 +44,8 @@ class BinSet {
 };
 
 /// Implements docs/explanation/particle_filter.md (8).
-/// The number of particles with which the Kullback-Leibler distance between sample and distribution stays below
-/// `error` with the probability of the normal quantile `quantile`, for `bins` occupied bins, limited to [least, most].
+/// Number of particles for `bins` occupied bins, limited to [least, most]. With it the Kullback-Leibler distance
+/// between sample and distribution stays below `error`, with the probability of the normal quantile `quantile`.
 [[nodiscard]] constexpr std::size_t particles_for(std::size_t bins, float error, float quantile, std::size_t least,
                                                   std::size_t most) {
   if (bins < 2) return least;

@@ -66,9 +66,9 @@ struct ParticleArc {
   }
 };
 
-/// Range and bearing to a point with independent errors: the range normal, the bearing von Mises with concentration
-/// 1/sigma^2 (Mardia & Jupp, Directional Statistics, 2000, sec. 3.5.4), the normal of the circle: no arctangent, no
-/// wrap. Rounding blurs the bearing by some 4e-4 rad.
+/// Range and bearing to a point with independent errors. The range is normal. The bearing is von Mises with
+/// concentration 1/sigma^2, the normal of the circle (Mardia & Jupp, Directional Statistics, 2000, sec. 3.5.4). It
+/// needs no arctangent and no wrap. Rounding blurs the bearing by some 4e-4 rad.
 struct ParticleSighting {
   float x_m = 0;  ///< the landmark
   float y_m = 0;
@@ -92,7 +92,7 @@ struct ParticleSighting {
   /// Implements docs/explanation/particle_filter.md (9).
   /// -2 log p(z | pose) without its constant: squared errors in units of the variances. NaN for a pose at the landmark.
   [[nodiscard]] constexpr float distance(const ParticlePose& pose) const { return distance(pose, x_m, y_m); }
-  /// The same beside another landmark.
+  /// Distance beside another landmark.
   [[nodiscard]] constexpr float distance(const ParticlePose& pose, float landmark_x_m, float landmark_y_m) const {
     const float dx = landmark_x_m - pose.x_m;
     const float dy = landmark_y_m - pose.y_m;
@@ -105,8 +105,8 @@ struct ParticleSighting {
   }
 };
 
-/// A step in (x, y, yaw) of a normal distribution, from the lower triangular root of its covariance: what a kernel
-/// density adds to each particle (Musso, Oudjane, Le Gland 2001, "Improving regularised particle filters").
+/// A step in (x, y, yaw) of a normal distribution, from the lower triangular root of its covariance. A kernel density
+/// adds one to each particle (Musso, Oudjane, Le Gland 2001, "Improving regularised particle filters").
 struct ParticleKernel {
   static constexpr int kNormals = 3;
   std::array<float, 6> root{};  ///< rows of the lower triangle

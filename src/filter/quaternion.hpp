@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Unit quaternions as the attitude filters need them: Hamilton, w first, q_nb turns body axes b into n (Sola 2017,
-// "Quaternion kinematics for the error-state Kalman filter", sec. 1 and 2).
+// Unit quaternions as the attitude filters need them: Hamilton, w first, q_nb turns body axes b into n. Source: Sola
+// 2017, "Quaternion kinematics for the error-state Kalman filter", sec. 1 and 2.
 #pragma once
 
 #include "base/math.hpp"
@@ -53,8 +53,8 @@ struct Rows {
   [[nodiscard]] Vector3 operator*(const Vector3& v_b) const { return {dot(x, v_b), dot(y, v_b), dot(z, v_b)}; }
 };
 
-/// q after a turn by `half` = half a rotation vector, in body axes. Sine and cosine by their series to |half|^5: for a
-/// turn of 0.5 rad in one step the error is below 1e-7; what is left of the norm goes with the Newton step.
+/// q after a turn by `half` = half a rotation vector, in body axes. Sine and cosine are their series to |half|^5. For a
+/// turn of 0.5 rad in one step the error is below 1e-7. The Newton step takes what is left of the norm.
 [[nodiscard]] inline Quaternion turned(const Quaternion& q, const Vector3& half) {
   const float h2 = dot(half, half);
   const float sinc = 1.0F - h2 * (1.0F / 6.0F - h2 * (1.0F / 120.0F));

@@ -2,7 +2,7 @@
 // Weights of the scaled unscented transform, and what a spread of symmetric pairs adds up to (Julier & Uhlmann 2004,
 // sec. IV; van der Merwe 2004, ch. 3).
 //
-// Every mean and covariance is written in the differences d from the central point, so angles are never averaged and no
+// Every mean and covariance is written in the differences d from the central point. Angles are never averaged and no
 // large numbers cancel. With pairs d+, d- and their sum and difference, the central weights fall out:
 //   mean - centre = shift = w sum(d+ + d-),
 //   covariance = w sum(d+ d+^T + d- d-^T) + (beta - alpha^2) shift shift^T,      w = 1 / (2 (n + lambda)).
@@ -24,7 +24,7 @@ struct UnitScaling {
   static constexpr float kAlpha = 1, kBeta = 2, kKappa = 0;
 };
 
-/// The same three numbers chosen at run time.
+/// Scaling whose three numbers are chosen at run time.
 struct RuntimeScaling {
   float kAlpha = 1, kBeta = 2, kKappa = 0;
 };

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The update of filter/update.hpp where states are many: the same equations, with the touched states as constants, so
-// that every index is one too; and for a measurement that sees a group of states as they are (its first columns are the
-// identity) the group's columns of P are taken without a product.
+// The update of filter/update.hpp for many states: the same equations, with the touched states as constants. Every
+// index is then a constant, too. A measurement may see a group of states as they are: its first columns are the
+// identity. The group's columns of P are then taken without a product.
 #pragma once
 
 #include "base/multiply_add.hpp"
@@ -42,8 +42,8 @@ struct Gains {
   }
 };
 
-/// P -= G G^T, in tiles of three columns by one row that are read into registers first (P and G are both floats in
-/// memory: after every store the compiler would have to read G again). One copy for all models.
+/// P -= G G^T, in tiles of three columns by one row that are read into registers first. P and G are both floats in
+/// memory: after every store the compiler would have to read G again. One copy for all models.
 template <class Scalar, int N, int M>
 [[gnu::noinline]] void subtract(Symmetric<Scalar, N>& p, const Gains<Scalar, N, M>& g) {
   constexpr int kWide = 3;
@@ -135,7 +135,7 @@ template <int kGroup, class Scalar, int N, int M>
 }  // namespace detail
 
 /// The measurement is a group of states as they are: H is the identity over the first kDimension of kTouches, which lie
-/// in a row, and nothing else (Direct, and has_rest() false). `result` begins as constructed.
+/// in a row. H has nothing else (Direct, and has_rest() false). `result` begins as constructed.
 template <class Measurement, class Scalar, int N>
 inline void group_update(Symmetric<Scalar, N>& p, const Vector<Scalar, Measurement::kDimension>& nu,
                          const Vector<Scalar, Measurement::kDimension>& noise, Scalar gate,
@@ -153,7 +153,7 @@ inline void group_update(Symmetric<Scalar, N>& p, const Vector<Scalar, Measureme
   detail::correct<kGroup>(p, g, noise, result);
 }
 
-/// As update(), over the states that Measurement::kTouches names. `result` begins as constructed.
+/// Does as update(), over the states that Measurement::kTouches names. `result` begins as constructed.
 template <class Measurement, class Scalar, int N>
 inline void sparse_update(
     Symmetric<Scalar, N>& p,

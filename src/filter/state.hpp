@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a filter asks of a state and of its models. A state lives on a manifold: x.plus(dx) moves it by an error vector,
-// x.minus(other) is the error vector that leads from other to x. Dense vectors are the trivial case.
+// Demands of a filter on a state and on its models. A state lives on a manifold: x.plus(dx) moves it by an error
+// vector, x.minus(other) is the error vector that leads from other to x. Dense vectors are the trivial case.
 #pragma once
 
 #include "filter/symmetric.hpp"
@@ -17,8 +17,8 @@ concept State = requires(const S& x, const Vector<typename S::Scalar, S::kErrors
   { x.minus(x) } -> std::same_as<Vector<typename S::Scalar, S::kErrors>>;
 };
 
-/// Result of a motion model that is asked for everything at once (step()), as linearised() of a measurement model: for
-/// models whose parts share work, trigonometry mostly. The filter asks for the whole where a model has it.
+/// Result of a motion model that is asked for everything at once (step()), as linearised() of a measurement model. It
+/// is for models whose parts share work, trigonometry mostly. The filter asks for the whole where a model has it.
 template <class S>
 struct Step {
   S x;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Zeros and ones of a model, declared by its types, so that no instruction multiplies by them: F that is the unit
-// matrix and a few entries, Q with a few entries, H that picks states or has constants.
+// Zeros and ones of a model, declared by its types, so that no instruction multiplies by them. F may be the unit matrix
+// and a few entries, Q a few entries. H may pick states or have constants.
 #pragma once
 
 #include "base/multiply_add.hpp"
@@ -44,8 +44,8 @@ struct SparseSymmetric {
   }
 };
 
-/// A coefficient of H that is known beforehand. A measurement model may have kShape, one for each entry, row by row;
-/// or kSelects, where row m of H is a one in column kTouches[m].
+/// A coefficient of H that is known beforehand. A measurement model may have kShape, one for each entry, row by row. It
+/// may have kSelects instead: row m of H is then a one in column kTouches[m].
 enum class Coefficient : std::uint8_t { kZero, kOne, kMinusOne, kValue };
 
 namespace detail {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Kalman filter, linear or extended, that pays for what a model's types leave open (structure.hpp) and for what its own
-// type asks: a gate, a record, guards. Equations as in correction.hpp (Bierman 1977, ch. V); results are those of Ekf.
+// Kalman filter, linear or extended, that pays for what a model's types leave open (structure.hpp). It pays too for
+// what its own type asks: a gate, a record, guards. Equations are as in correction.hpp (Bierman 1977, ch. V); results
+// are those of Ekf.
 #pragma once
 
 #include "filter/condition.hpp"
@@ -99,8 +100,8 @@ class StructuredKalman {
     x = moved;
     return true;
   }
-  /// The same where P has to be looked at closely: it is restored, or refused when a variance is negative or an entry
-  /// is no number.
+  /// The same for a P that has to be looked at closely: it is restored. A P with a negative variance, or an entry that
+  /// is no number, is refused.
   [[gnu::cold, gnu::noinline]] bool adopt_restored(const State& moved, const Symmetric<Scalar, kErrors>& next) {
     if (!next.no_variance_below_zero() || !next.bounded() || !moved.finite()) return false;
     p = next;

@@ -74,8 +74,8 @@ class Symmetric {
     return full;
   }
 
-  /// No entry is NaN or infinite, nor any variance above 2e30: if this is a covariance, the sum over its upper half is
-  /// at least half of its trace.
+  /// No entry is NaN or infinite, and no variance is above 2e30. The test holds for a covariance: the sum over its
+  /// upper half is at least half of its trace.
   [[nodiscard]] constexpr bool bounded() const {
     Scalar sum = 0;
 #pragma GCC unroll 16

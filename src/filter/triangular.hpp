@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Square root of a covariance: an upper triangular R with P = R^T R, kept by plane rotations, so that P is positive
-// whatever is rounded (Golub & Van Loan 2013, sec. 5.1.8 and 6.5; Bierman 1977, ch. V and VI; Kailath, Sayed, Hassibi
-// 2000, ch. 12).
+// Square root of a covariance: an upper triangular R with P = R^T R, kept by plane rotations. P is positive whatever is
+// rounded (Golub & Van Loan 2013, sec. 5.1.8 and 6.5; Bierman 1977, ch. V and VI; Kailath, Sayed, Hassibi 2000,
+// ch. 12).
 #pragma once
 
 #include "filter/symmetric.hpp"
@@ -113,7 +113,7 @@ template <class Scalar, int N>
 /// Correction in square-root form. Rows (slope(j) | R(j)) join the root of the innovation's remaining covariance:
 ///   [ E  0 ]                 [ S^1/2  W   ]
 ///   [ C  R ]  by rotations = [ 0      R+  ],   K nu = W^T S^-T/2 nu,   NIS = |S^-T/2 nu|^2.
-/// `e` is the root of that part of S that comes from noise, `slope` is C: row j is the measurement along row j of R.
+/// `e` is the root of that part of S that comes from noise. `slope` is C: row j is the measurement along row j of R.
 template <class Scalar, int N, int M>
 struct RootCorrection {
   Triangular<Scalar, M> s;     ///< S = s^T s

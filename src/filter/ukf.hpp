@@ -3,8 +3,8 @@
 // for additive and augmented noise, on any manifold state. No Jacobian is needed.
 //
 // Sigma points are drawn only over states that enter a model non-linearly. The Cholesky factor takes those first, so
-// its other columns move the linear states alone, and a symmetric pair of such points adds exactly that column's
-// covariance: the result is the full transform's (Briers, Maskell, Wright 2003, for models that are linear in part).
+// its other columns move the linear states alone. A symmetric pair of such points adds exactly that column's
+// covariance. The result is the full transform's (Briers, Maskell, Wright 2003, for models that are linear in part).
 #pragma once
 
 #include "filter/condition.hpp"

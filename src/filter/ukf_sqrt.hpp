@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Square-root unscented Kalman filter (van der Merwe & Wan 2001; van der Merwe 2004, ch. 3), for additive and
-// augmented noise. The root of P is rotated together from the differences of symmetric pairs; no down-date exists that
-// could fail, because the central weight is beta - alpha^2 >= 0 in that form (sigma_points.hpp).
+// Square-root unscented Kalman filter (van der Merwe & Wan 2001; van der Merwe 2004, ch. 3), for additive and augmented
+// noise. The root of P is rotated together from the differences of symmetric pairs. No down-date exists that could
+// fail: in that form the central weight is beta - alpha^2 >= 0 (sigma_points.hpp).
 #pragma once
 
 #include "filter/root_update.hpp"

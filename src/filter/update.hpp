@@ -4,8 +4,8 @@
 //
 // With S = H P H^T + R = L L^T (Cholesky), y = L^-1 nu and G = P H^T L^-T:
 //   NIS = y^T y,   dx = G y,   P+ = P - G G^T.
-// Column j of G is the gain of the j-th scalar update after those before it (Bierman 1977, ch. V, with the sequence
-// written as a factorisation), so the gate is known before anything is changed and P+ needs one pass over its upper
+// Column j of G is the gain of the j-th scalar update after those before it. Bierman 1977, ch. V, has the sequence,
+// here written as a factorisation. The gate is known before anything is changed, and P+ needs one pass over its upper
 // half.
 #pragma once
 
@@ -24,7 +24,7 @@ enum class Verdict : std::uint8_t { kAccepted, kRejected, kSingular, kNotFinite 
 template <class Scalar, int M>
 struct Innovation {
   Vector<Scalar, M> nu = Vector<Scalar, M>::Zero();  ///< measured minus predicted, units of the measurement
-  Symmetric<Scalar, M> s;                            ///< its covariance H P H^T + R
+  Symmetric<Scalar, M> s;                            ///< covariance H P H^T + R of the innovation
   Scalar nis = 0;   ///< nu^T S^-1 nu: chi-square with M degrees of freedom when all is well
   Scalar gate = 0;  ///< the NIS above which it is rejected
   Verdict verdict = Verdict::kNotFinite;
@@ -115,9 +115,8 @@ template <class Scalar, int N, int M, std::size_t K>
   for (int n = 0; n < N; ++n) result.dx(n) = g.row(n).dot(y.transpose());
 #pragma GCC unroll 16
   for (int c = 0; c < N; ++c) {
-    // In float the difference can lose every digit when the measurement is 10^7 times better than the prediction; a
-    // variance never falls below the rounding error of what it was, so P stays positive where the exact result would
-    // be.
+    // In float the difference can lose every digit when the measurement is 10^7 times better than the prediction. A
+    // variance never falls below the rounding error of what it was. P stays positive where the exact result would be.
     const Scalar floor = p(c, c) * Scalar(2.4e-7F);
 #pragma GCC unroll 16
     for (int r = 0; r <= c; ++r) p(r, c) -= g.row(r).dot(g.row(c));

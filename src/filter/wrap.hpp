@@ -24,8 +24,8 @@ template <class Scalar>
   }
 }
 
-/// The angle from one direction to another, from their cross and dot products: |angle| to 2e-7 of itself for the small
-/// angles between sigma points, where atan2 would cost five times as much.
+/// The angle from one direction to another, from their cross and dot products. Its error is 2e-7 of |angle| for the
+/// small angles between sigma points. atan2 would cost five times as much there.
 template <class Scalar>
 [[nodiscard]] constexpr Scalar angle_between(Scalar cross, Scalar dot) {
   const Scalar reach = Scalar(0.25F) * dot;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Constant turn rate and velocity: a target on circular arcs (Schubert, Richter, Wanielik 2008, "Comparison and
-// evaluation of advanced motion models for vehicle tracking"; Bar-Shalom, Li, Kirubarajan 2001, sec. 11.7).
+// Constant turn rate and velocity: a target on circular arcs. Source: Schubert, Richter, Wanielik 2008, "Comparison and
+// evaluation of advanced motion models for vehicle tracking"; Bar-Shalom, Li, Kirubarajan 2001, sec. 11.7.
 #pragma once
 
 #include "filter/sigma_points.hpp"
@@ -30,8 +30,8 @@ struct CtrvState {
   [[nodiscard]] bool finite() const { return filter::VectorState<Scalar, 5>{value}.finite(); }
 };
 
-/// Accelerations along the path and of the yaw, constant within a step, enter as noise w = (m/s^2, rad/s^2). predict(x,
-/// w) is for augmented filters; jacobian() and the Q that it forms are for the others.
+/// Accelerations along the path and of the yaw are constant within a step, and enter as noise w = (m/s^2, rad/s^2).
+/// predict(x, w) is for augmented filters; jacobian() and the Q that it forms are for the others.
 template <class Scalar>
 struct Ctrv {
   using State = CtrvState<Scalar>;

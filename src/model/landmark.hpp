@@ -12,7 +12,7 @@ struct Landmark {
   base::Anchored y;
 };
 
-/// Where the sensor sits on the body and how it is turned (counter-clockwise).
+/// Place of the sensor on the body, and its turn there (counter-clockwise).
 struct PlanarMounting {
   float x_b_m = 0;
   float y_b_m = 0;

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where a ground robot is: x east, y north (REP-103), yaw 0 = east, counter-clockwise. Error state (dx, dy, dyaw), in
-// n.
+// Pose of a ground robot: x east, y north (REP-103), yaw 0 = east, counter-clockwise. Error state (dx, dy, dyaw), in n.
 #pragma once
 
 #include "base/anchored.hpp"

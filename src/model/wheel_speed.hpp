@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Forward speed of a wheeled robot from its encoders, with the constraint that wheels move neither sideways nor up:
-// NonHolonomic alone where there are no encoders.
+// Forward speed of a wheeled robot from its encoders, with the constraint that wheels move neither sideways nor up. A
+// robot without encoders has NonHolonomic alone.
 #pragma once
 
 #include "model/body_velocity.hpp"

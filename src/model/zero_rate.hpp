@@ -26,7 +26,7 @@ struct ZeroRate {
     return gyro_b_radps - z_hat;
   }
   [[nodiscard]] filter::Vector<float, 3> noise() const { return (sigma_radps * sigma_radps) * variance_factor; }
-  /// That a wrong heading turns the Earth's rate is left out: 0.07 mrad/s per radian.
+  /// A wrong heading turns the Earth's rate, by 0.07 mrad/s per radian: this is left out.
   [[nodiscard]] filter::Matrix<float, 3, 3> jacobian(const nav::InsState&) const { return nav::Matrix3::Identity(); }
 };
 

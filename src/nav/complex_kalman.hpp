@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// A Kalman filter over N points of the plane, each one complex number (real = x, imaginary = y), for errors without a
-// preferred direction: the covariance E[x x^H] is Hermitian, and turning the whole plane changes nothing (proper
-// complex variables: Schreier & Scharf 2010, "Statistical Signal Processing of Complex-Valued Data", sec. 2.2 and 5.3).
-// Loops stay loops: it runs ten times a second, and code is what is short.
+// A Kalman filter over N points of the plane, each one complex number (real = x, imaginary = y). It is for errors
+// without a preferred direction: the covariance E[x x^H] is Hermitian, and turning the whole plane changes nothing.
+// They are proper complex variables (Schreier & Scharf 2010, "Statistical Signal Processing of Complex-Valued Data",
+// sec. 2.2 and 5.3). Loops stay loops: the filter runs ten times a second, and code is what is short.
 #pragma once
 
 #include "base/math.hpp"

@@ -6,11 +6,11 @@
 
 namespace tetap::nav {
 
-/// The heading is wrong by the scale's error times the angle turned: back and forth that comes to nothing, round and
-/// round it adds up, less what measurements of the heading took off on the way. The scale is considered, not
-/// estimated (Schmidt 1966; Simon 2006, sec. 10.3): kept is only its covariance with the heading. A way back makes the
-/// heading better known again; P is not made smaller for that (its other correlations would not fit): the next turns
-/// are free until it is used up.
+/// The heading is wrong by the scale's error times the angle turned. Turns back and forth cancel, turns round and round
+/// add up. Measurements of the heading on the way take off their part. The scale is considered, not estimated (Schmidt
+/// 1966; Simon 2006, sec. 10.3): kept is only its covariance with the heading. A way back makes the heading better
+/// known again. P is not made smaller for that: its other correlations would not fit. The next turns are free until
+/// that is used up.
 class GyroScaleConsider {
  public:
   /// Implements docs/explanation/equations.md (13).

@@ -41,7 +41,7 @@ class Ins {
   /// By the last increment, for what is true a little later than the state; none where there was none.
   Vector3 accel_n_mps2 = Vector3::Zero();
 
-  /// How much of the state's time the covariance does not have yet.
+  /// Part of the state's time that the covariance does not have yet.
   [[nodiscard]] float pending_s() const { return pending_.dt_s; }
 
   /// Moves the state; the covariance waits for predict_covariance(). Whatever is not accepted changes nothing: the
@@ -77,8 +77,9 @@ class Ins {
     maintain();
   }
 
-  /// The step that would bring the covariance to the time of a state that was carried on from x, ahead_s after it, in
-  /// the navigation frame; about as `present` is turned. Noise of the sensor counts as motion here (see motion_sigma).
+  /// The step that would bring the covariance to the time of `present`, a state carried on from x by ahead_s. The step
+  /// is in the navigation frame, turned about as `present` is. Noise of the sensor counts as motion here (see
+  /// motion_sigma).
   [[nodiscard, gnu::always_inline]] InsCovarianceStep<float> step_to(const InsState& present, float ahead_s) const {
     // Twice the vertical part of present q_nb times x.q_nb's inverse: x was carried there, so their signs agree.
     const Quaternion &to = present.q_nb, &from = x.q_nb;
@@ -142,7 +143,7 @@ class Ins {
     p = covariance;
     return start_with_p(at);
   }
-  /// The same with independent errors; nothing of the covariance's size passes over the stack.
+  /// Starts with independent errors; nothing of the covariance's size passes over the stack.
   bool start(const InsState& at, const std::array<float, InsState::kErrors>& variances) {
     if (!at.finite()) return false;
     for (int c = 0; c < InsState::kErrors; ++c) {
@@ -171,8 +172,8 @@ class Ins {
   }
   void recondition() { condition(p, condition_monitor_); }
 
-  /// Update by the gyroscope's mean over a standstill whose noise is also in the heading: `shared` is the covariance of
-  /// the two per axis of the bias, `wander` the variance of each bias's walk since the mean (Bar-Shalom, Li,
+  /// Update by the gyroscope's mean over a standstill whose noise is also in the heading. `shared` is the covariance of
+  /// the two per axis of the bias. `wander` is the variance of each bias's walk since the mean (Bar-Shalom, Li,
   /// Kirubarajan 2001, sec. 8.3). The covariance is up to date.
   template <filter::MeasurementModel<InsState> Measurement>
   [[nodiscard]] filter::Innovation<float, Measurement::kDimension> update_shared_noise(const Measurement& measurement,
@@ -210,7 +211,7 @@ class Ins {
     for (int i = 0; i < 3; ++i) sink(accel_n_mps2(i));
   }
 
-  /// How often the covariance had to be put right (see condition()).
+  /// Count of the times that the covariance had to be put right (see condition()).
   [[nodiscard]] std::uint32_t conditioned() const { return conditioned_; }
 
  private:
@@ -306,18 +307,18 @@ class Ins {
             .keep_b_g = keep(noise.gyro_bias_time_s)};
   }
 
-  /// Measurements in the body show no heading: turned as a whole, the robot's way looks the same. The filter sees it
-  /// so as long as its errors of v move with v, by all of it: by the IMU, and by whatever measurements make of it
-  /// (the error of an invariant filter: Barrau & Bonnabel 2017; the rule: Huang, Mourikis, Roumeliotis 2010). Not by a
-  /// leap: that is more than float can carry through P. Implements docs/explanation/equations.md (14).
+  /// Measurements in the body show no heading: turned as a whole, the robot's way looks the same. The filter sees it so
+  /// as long as its errors of v move with all changes of v, by the IMU and by measurements alike. The error is that of
+  /// an invariant filter (Barrau & Bonnabel 2017), the rule that of Huang, Mourikis, Roumeliotis 2010. A leap does not
+  /// move them: it is more than float can carry through P. Implements docs/explanation/equations.md (14).
   void move_errors(const Vector3& dv_n_mps) {
     if (dv_n_mps.squaredNorm() < kMostLeap_mps * kMostLeap_mps) pending_.dv_n_mps += dv_n_mps;
   }
 
-  /// Sensor noise taken for acceleration would let the filter see its heading at standstill: v gains
-  /// theta x (dv + noise), and every noisy sample looks like a known push whose direction was then observed. The
-  /// horizontal part of dv in F shrinks by the share of its energy that noise explains (James & Stein 1961). Not where
-  /// v is held in the body: there that noise is taken back, and of a gentle curve every sample alone passes for noise.
+  /// Sensor noise taken for acceleration would let the filter see its heading at standstill. Every noisy sample looks
+  /// like a known push whose direction was then observed: v gains theta x (dv + noise). The horizontal part of dv in F
+  /// shrinks by the share of its energy that noise explains (James & Stein 1961). It does not shrink while v is held in
+  /// the body. There the noise is taken back, and every single sample of a gentle curve passes for noise.
   void shrink_motion(InsCovarianceStep<float>& step) const {
     if (held_ > 0 && !stands) return;
     const Vector3 rest = (earth.gravity_mps2 * step.dt_s) * earth.up_n;
@@ -343,10 +344,10 @@ class Ins {
     if (conditioned_ < 0xFFFF) ++conditioned_;
   }
 
-  /// Tilt and the accelerometer's bias belong together in the body (g x tilt is what the bias shows, to a thousandth
-  /// of either), whatever the heading: when that is corrected, the errors of the tilt turn with it, and a correction of
-  /// the tilt is that of before. Else the bias would be seen from two sides that are none, as if the robot had turned.
-  /// True where rounding may have cost P its definiteness.
+  /// Tilt and the accelerometer's bias belong together in the body, whatever the heading. The product g x tilt is what
+  /// the bias shows, to a thousandth of either. When the heading is corrected, the errors of the tilt turn with it, and
+  /// a correction of the tilt is that of before. Otherwise the bias would be seen from two sides that are none, as if
+  /// the robot had turned. True where rounding may have cost P its definiteness.
   /// Implements docs/explanation/equations.md (16).
   [[nodiscard]] bool turn_tilt(InsState::Error& dx) {
     constexpr int kEast = InsState::kAttitude, kNorth = kEast + 1;
@@ -391,10 +392,10 @@ class Ins {
     p(kEast, kNorth) = (c2 - s2) * en + sc * (ee - nn);
   }
 
-  /// Second-order effect of a tilt error, which F leaves out: a body levelled by an accelerometer leans by that
-  /// sensor's error, and specific force of g/2 (theta_x^2 + theta_y^2) upward passes for bias for as long as the lean
-  /// lasts. The mean square, g^2 / 2 (P_xx + P_yy)^2 where both axes are alike, is added every 1.5 s (chosen on
-  /// simulated seeds: the filter forgets about as fast as it would learn the lean). Above ten times that nothing is
+  /// Second-order effect of a tilt error, which F leaves out. A body levelled by an accelerometer leans by that
+  /// sensor's error. Specific force of g/2 (theta_x^2 + theta_y^2) upward passes for bias for as long as the lean
+  /// lasts. The mean square, g^2 / 2 (P_xx + P_yy)^2 for like axes, is added every 1.5 s. The time was chosen on
+  /// simulated seeds: the filter forgets about as fast as it would learn the lean. Above ten times that nothing is
   /// added, so that a bias that is long unobserved does not walk on. Up is the body's: where the body leans far, the
   /// variance is added in the wrong axis. Implements docs/explanation/equations.md (15).
   void inflate_vertical_bias(float dt_s) {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// P = F P F^T + Q of inertial navigation, and a last digit, by the structure of F: three shears in place, each adding a
-// multiple of one group of errors to another, on the packed upper half. With dv = R (f - b_a) dt and B = -R dt:
+// P = F P F^T + Q of inertial navigation, and a last digit, by the structure of F. It is three shears in place on the
+// packed upper half. Each adds a multiple of one group of errors to another. With dv = R (f - b_a) dt and B = -R dt:
 //   p += dt v;  v += -[dv]x theta + B b_a;  theta += B b_g     (Sola 2017, sec. 7.3, global angular error)
-// Terms in dt^2 are left out: over T they are dt/T of what the same errors do through the velocity.
+// Terms in dt^2 are left out. Over T they are dt/T of what the same errors do through the velocity.
 #pragma once
 
 #include "base/multiply_add.hpp"
@@ -29,8 +29,8 @@ namespace detail {
 template <class Scalar>
 using InsP = filter::Symmetric<Scalar, InsState::kErrors>;
 
-/// The group at kTo gains a multiple of others: gain(to, r, j) adds its row r against error j. gain reads only rows of
-/// other groups.
+/// The group at kTo gains a multiple of others. The function gain(to, r, j) adds its row r against error j, and reads
+/// only rows of other groups.
 template <int kTo, class Scalar, class Gain>
 [[gnu::always_inline]] inline void shear(InsP<Scalar>& p, const Gain& gain) {
   using filter::unroll;
@@ -92,8 +92,8 @@ inline void predict_covariance(filter::Symmetric<Scalar, InsState::kErrors>& p, 
 /// The largest standard deviations the filter keeps: beyond them it knows nothing, and float would overflow in the end.
 inline constexpr std::array<float, 5> kInsMostSigma{1e6F, 1e4F, 4.0F, 10.0F, 1.0F};
 
-/// The factor of P less a share of its diagonal, made element by element: it exists when no eigenvalue of the
-/// correlations is below that share, the least that float separates from zero; and no variance is above its limit. A
+/// The factor of P less a share of its diagonal, made element by element. It exists when no eigenvalue of the
+/// correlations is below that share, the least that float separates from zero. No variance may be above its limit. A
 /// copy is factored in place, so that the work can be spread over many steps.
 class InsFactor {
  public:
@@ -136,9 +136,9 @@ class InsFactor {
   std::int32_t row_ = InsState::kErrors, column_ = 0;
 };
 
-/// Puts P back among the matrices that float can hold as positive definite, whatever it was: all correlations are made
-/// smaller by a little (which adds that share to every conditional variance), by more if that is not enough, and in the
-/// end by all. Variances above kInsMostSigma are scaled back with their rows, which keeps every correlation.
+/// Puts P back among the matrices that float can hold as positive definite, whatever it was. All correlations are made
+/// smaller by a little, which adds that share to every conditional variance. The share grows if that is not enough, and
+/// in the end takes all. Variances above kInsMostSigma are scaled back with their rows, which keeps every correlation.
 /// True when P was fine as it was. `factor` is room to work in.
 inline bool condition(filter::Symmetric<float, InsState::kErrors>& p, InsFactor& factor) {
   constexpr int kN = InsState::kErrors;
@@ -153,8 +153,8 @@ inline bool condition(filter::Symmetric<float, InsState::kErrors>& p, InsFactor&
     for (int j = 0; j < kN; ++j) p(i, j) = scale > 0.0F ? p(i, j) * scale : 0.0F;
     p(i, i) = small ? kLeast : most * most;
   }
-  // Over the second that may pass until the watch has seen all of P, each group takes on variance of the one that
-  // feeds it; with much less of its own it would end with none that float separates from rounding.
+  // Up to a second may pass until the watch has seen all of P. Each group takes on variance of the one that feeds it in
+  // that time. With much less of its own it would end with none that float separates from rounding.
   constexpr float kOwn = 1e-6F, kGravity2 = 100.0F;
   for (int i = 0; i < 3; ++i) {
     const auto at_least = [&p](int of, float variance) {

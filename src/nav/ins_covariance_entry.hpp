@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Single entries of F P F^T + Q (ins_covariance.hpp): what is asked of the covariance some time later, where P has to
+// Single entries of F P F^T + Q (ins_covariance.hpp). They answer for the covariance some time later, while P has to
 // stay that of its own time.
 #pragma once
 

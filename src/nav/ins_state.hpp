@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The state of inertial navigation: 16 numbers, 15 errors. The attitude error is in the navigation frame,
-// q_true = Exp(dtheta_n) q (Sola 2017, sec. 7: global angular error), so that gravity's coupling does not turn with the
-// body.
+// q_true = Exp(dtheta_n) q (Sola 2017, sec. 7: global angular error). Gravity's coupling does not turn with the body
+// there.
 #pragma once
 
 #include "base/anchored.hpp"
@@ -24,8 +24,8 @@ constexpr float carry(base::Anchored& coordinate, float m) {
 
 }  // namespace detail
 
-/// Moves a coordinate by d metres, |d| < 2e9, and keeps its offset within one metre: a float step of 60 nm, so that at
-/// 400 Hz a creep of 1 mm/s still adds up (in an offset of 100 m it would be rounded away).
+/// Moves a coordinate by d metres, |d| < 2e9, and keeps its offset within one metre. A float step is 60 nm there: at
+/// 400 Hz a creep of 1 mm/s still adds up. In an offset of 100 m it would be rounded away.
 constexpr void move(base::Anchored& coordinate, float d_m) {
   const float offset_m = coordinate.offset_m + d_m;
   if (offset_m <= 1.0F && offset_m >= -1.0F) {
@@ -47,7 +47,7 @@ constexpr void move(base::Anchored& coordinate, float d_m) {
 struct InsState {
   using Scalar = float;
   static constexpr int kErrors = 15;
-  /// Where each group of three begins in the error vector.
+  /// First index of each group of three in the error vector.
   static constexpr int kPosition = 0, kVelocity = 3, kAttitude = 6, kAccelBias = 9, kGyroBias = 12;
   using Error = filter::Vector<float, kErrors>;
 

@@ -9,7 +9,7 @@
 
 namespace tetap::nav {
 
-/// The level surface through the origin, by its principal radii (Torge & Mueller 2012, sec. 4.1.3): the normal at a
+/// The level surface through the origin, by its principal radii (Torge & Mueller 2012, sec. 4.1.3). The normal at a
 /// place d is along up + across d + along (axis . d) axis.
 struct Curvature {
   float across_per_m = 0;  ///< 1 / (N + h)

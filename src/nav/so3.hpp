@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Rotations as unit quaternions (Hamilton, w first; q_nb rotates b into n), with the exponential, its inverse and their
-// small-angle terms (Sola 2017, "Quaternion kinematics for the error-state Kalman filter", eq. 101 and 105).
+// Rotations as unit quaternions (Hamilton, w first; q_nb rotates b into n). The exponential, its inverse and their
+// small-angle terms are those of Sola 2017, "Quaternion kinematics for the error-state Kalman filter", eq. 101 and 105.
 #pragma once
 
 #include "base/math.hpp"

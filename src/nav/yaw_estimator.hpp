@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// Heading of a robot that starts in motion, from gyroscope, accelerometer and the velocity GNSS or wheels show; beside
-// a running filter an independent judge of its heading. With the heading written as a phasor z = exp(i yaw) in place of
-// an angle everything else becomes linear (large heading uncertainty: Scherzinger 1996, "Inertial navigator error
-// models for large heading uncertainty", PLANS; Rogers 1997, NAVIGATION 44(3)), so that one filter holds what a bank of
-// hypotheses (Sorenson & Alspach 1971, Automatica 7(4); EKF-GSF of PX4 and ArduPilot) only samples: on the circle
-// |z| = 1 its Gaussian is a von Mises density around arg z of concentration kappa = 2 |z| / P_zz (Mardia & Jupp 2000,
-// "Directional Statistics", sec. 3.5.4). A heading that nothing has shown is z = 0: it cannot look known.
+// Heading of a robot that starts in motion, from gyroscope, accelerometer and the velocity that GNSS or wheels show.
+// Beside a running filter it is an independent judge of its heading. The heading is written as a phasor z = exp(i yaw)
+// in place of an angle: everything else becomes linear. Large heading uncertainty: Scherzinger 1996, "Inertial
+// navigator error models for large heading uncertainty", PLANS; Rogers 1997, NAVIGATION 44(3). One filter holds what a
+// bank of hypotheses only samples (Sorenson & Alspach 1971, Automatica 7(4); EKF-GSF of PX4 and ArduPilot). On the
+// circle |z| = 1 its Gaussian is a von Mises density around arg z of concentration kappa = 2 |z| / P_zz. Mardia & Jupp
+// 2000, "Directional Statistics", sec. 3.5.4, have that density. A heading that nothing has shown is z = 0: it cannot
+// look known.
 #pragma once
 
 #include "base/anchored.hpp"
@@ -44,12 +45,13 @@ class YawEstimator {
     up_b_ = Vector3::Zero();
     begin(kFirstTilt_rad);
   }
-  /// The same with a level from outside, good to noise.tilt_rad; its yaw does not matter.
+  /// Begins anew with a level from outside, good to noise.tilt_rad; its yaw does not matter.
   void restart(const Quaternion& q_level);
 
-  /// Every increment, as the sensor shows it: the biases are found here. What is not accepted changes nothing.
+  /// Every increment, as the sensor shows it: the biases are found here. An increment that is not accepted changes
+  /// nothing.
   [[nodiscard]] ImuVerdict predict(const ImuIncrement& imu);
-  /// Increments are missing: it may have turned and sped up meanwhile.
+  /// Increments are missing: the robot may have turned and sped up meanwhile.
   void predict_without_imu(base::Micros gap);
 
   /// GNSS velocity; `lever_b_m`: the antenna from the IMU, forward and left.
@@ -65,7 +67,7 @@ class YawEstimator {
   [[nodiscard]] float sigma_rad() const;
   /// Sigma below noise.ready_rad after five fixes; sigma is small only while phasor and model agree.
   [[nodiscard]] bool ready() const { return fixes_ >= kFixes && sigma_rad() < noise.ready_rad; }
-  /// How far another heading is away; and in sigma of the difference, 0 while not ready.
+  /// Distance of another heading; and in sigma of the difference, 0 while not ready.
   [[nodiscard]] float apart_rad(float yaw_rad_other) const {
     return base::abs(base::wrap_angle(yaw_rad() - yaw_rad_other));
   }
@@ -92,9 +94,10 @@ class YawEstimator {
   [[nodiscard]] const auto& filter() const { return filter_; }
 
  private:
-  /// All in n, east + i north: position from the last fix, velocity, the heading's phasor; the acceleration the level's
-  /// error feigns, what drives it (the gyroscope's level biases times gravity), the accelerometer's bias, both along
-  /// the body but turned by z; and z times the gyroscope's bias about the vertical.
+  /// States, all in n, east + i north: position from the last fix (kP), velocity (kV), the heading's phasor (kZ). kW is
+  /// the acceleration that the level's error feigns. kR drives it: the gyroscope's level biases times gravity. kA is
+  /// the accelerometer's bias. kR and kA are along the body but turned by z. kU is z times the gyroscope's bias about
+  /// the vertical.
   enum : int { kP, kV, kZ, kW, kR, kA, kU, kStates };
   using Filter = ComplexKalman<kStates>;
 

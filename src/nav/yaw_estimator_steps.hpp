@@ -100,8 +100,8 @@ inline void YawEstimator::restart(const Quaternion& q) {
   for (const int k : {kR, kA}) filter_.add(k, with_z[static_cast<std::size_t>(k)] * Complex{0.0F, -t}, kU);
   filter_.add(kZ, {0.0F, -t}, kU);
   // Sensor noise taken for motion is a regressor with errors: it would show the heading at standstill. Its apparent
-  // information, noise_v / S a step, is taken back, and a little for what is not modelled: from the heading with all
-  // that hangs on it, for only their common phase is what nothing else shows.
+  // information, noise_v / S a step, is taken back. A little more is taken for what is not modelled. It is taken from
+  // the heading with all that hangs on it: only their common phase is what nothing else shows.
   const float variance_z = filter_.variance(kZ);
   filter_.spread(with_z, square(variance_z) * (0.25F * noise_v / filter_.variance(kV) + t / kMemory_s));
   // The gyroscope's noise turns the body, not the level's error. A scale error is the same all the way round: per turn
@@ -177,8 +177,8 @@ inline void YawEstimator::fuse_forward_speed(float mps, float sigma_mps, Complex
   if (!fits(mps, 0.0F, sigma_mps, axle_b_m) || wheels_s_ < kStep_s) return;
   flush();
   wheels_s_ = 0;
-  // A speed below its noise must not look like one that was seen (see flush()). And before the velocity is known,
-  // wheels and accelerometer only confirm each other: where they do not (slip, delay), z = 0 would satisfy both.
+  // A speed below its noise must not look like one that was seen (see flush()). Before the velocity is known, wheels
+  // and accelerometer only confirm each other. When they do not (slip, delay), z = 0 would satisfy both.
   const float speed2 = square(mps), explained = 9.0F * square(sigma_mps);
   const bool moves = speed2 > explained;
   if (moves && filter_.variance(kV) > 0.25F * speed2) return;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The frames that a node receives: its block of 64 ids, inputs and own outputs (a second node of the same ids is
-// noticed), and the block behind it for a robot that makes a map. A port's acceptance filter is made of this.
+// The frames that a node receives: its block of 64 ids, with inputs and own outputs. The own outputs show a second node
+// of the same ids. A robot that makes a map receives the block behind it, too. A port's acceptance filter is made of
+// this.
 #pragma once
 
 #include "bus/messages.hpp"

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// A run of the node on made-up input with everything that happens to a node: outliers, late, early, doubled and broken
-// frames, half samples, resets, jumps of time. Its hash over every deterministic byte sent (the state CRCs among them)
-// is the same wherever the arithmetic is the same: `make bits` compares it across compilers and cores, and an image
-// prints a short form at boot.
+// A run of the node on made-up input with everything that happens to a node. It gets outliers, late, early, doubled and
+// broken frames, half samples, resets and jumps of time. Its hash covers every deterministic byte sent, the state CRCs
+// among them. It is the same wherever the arithmetic is the same: `make bits` compares it across compilers and cores.
+// An image prints a short form at boot.
 #pragma once
 
 #include "bus/frame_sink.hpp"
@@ -44,7 +44,7 @@ class BootSelfCheck {
     run(epochs, hash);
     return hash.value();
   }
-  /// The same into an outlet that hashes.
+  /// Runs the check into an outlet that hashes.
   template <class Send>
   void run(std::uint32_t epochs, Send& send) {
     node_.power_on({kStart_us});

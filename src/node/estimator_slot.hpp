@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // One estimator in the firmware, with its statistics, in one of two ways.
-// A plain one has its current state and its state at the far end of the window.
-// A late sample is fused at its own time by starting again from `past` and repeating what came since: the result is the
-// one that would have been had the sample been on time. Costs: twice the estimator's memory; a burst only when
-// something is late that this estimator takes. What is too long to repeat in one tick is caught up over several: the
-// far end moves towards the present by a tick's share at a time, takes the late sample on its way, and stays there.
-// A delayed one (kDelayed) has its state at the far end of the window only: samples reach it in their order when they
-// leave the window, each once, and the present is that state carried over what the window holds. Costs: that carrying
-// in every tick, never a burst (what is due it may also leave for the next tick); its records are late by the window.
+// A plain one has its current state and its state at the far end of the window. A late sample is fused at its own time
+// by starting again from `past` and repeating the samples since. The result is the one that would have been had the
+// sample been on time. Costs: twice the estimator's memory; a burst only when something is late that this estimator
+// takes. A repetition too long for one tick is caught up over several. The far end moves towards the present by a
+// tick's share at a time, takes the late sample on its way, and stays there.
+// A delayed one (kDelayed) has its state at the far end of the window only. Samples reach it in their order when they
+// leave the window, each once. The present is that state carried over what the window holds. Costs: that carrying in
+// every tick, never a burst. Due work may also wait for the next tick, and records are late by the window.
 #pragma once
 
 #include "estimators/context.hpp"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The rule of order and lateness: samples are consumed in the order in which they were true, late ones at their own
-// time, and what left the window is final. Holds the estimators and the samples of the window.
+// The rule of order and lateness. Samples are consumed in the order in which they were true, late ones at their own
+// time. A sample that left the window is final. Holds the estimators and the samples of the window.
 #pragma once
 
 #include "bus/counters.hpp"
@@ -37,7 +37,7 @@ struct Estimators {
   static constexpr std::size_t kReplayedLess = 12, kLeastReplayed = 8;
 };
 
-/// The same with another number of places, for a faster IMU or a longer window (DESIGN.md, 4.3).
+/// A window with another number of places, for a faster IMU or a longer window (DESIGN.md, 4.3).
 template <std::size_t kPlaces, Estimator... E>
 struct EstimatorsWithPlaces : Estimators<E...> {
   static constexpr std::size_t kSamples = kPlaces;
@@ -90,7 +90,7 @@ class FusionWindow {
   void retire_until(base::Micros t, const estimators::Context& ctx, Note&& note) {
     leave_until(t, Past::kFollows, ctx, note);
   }
-  /// The same at once: nothing from before t is fused any more, and plain estimators' past is their present.
+  /// Closes the window at once: nothing from before t is fused any more, and plain estimators' past is their present.
   template <class Note>
   void close_window(base::Micros t, const estimators::Context& ctx, Note&& note) {
     finish_replays(ctx, note);
@@ -151,7 +151,7 @@ class FusionWindow {
   }
 
  private:
-  /// How a plain estimator's far end follows: by the samples that leave, or at once, as a copy of its present.
+  /// Way in which a plain estimator's far end follows: by the samples that leave, or at once, as a copy of its present.
   enum class Past : std::uint8_t { kFollows, kIsNow };
 
   template <class Note>

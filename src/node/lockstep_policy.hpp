@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Who may stop the node's own timer: a Begin or Step frame does, so it has to prove that it is meant. One that is taken
-// for another sender's or a damaged frame costs the robot its estimate.
+// Senders that may stop the node's own timer. A Begin or Step frame does so, and has to prove that it is meant. One
+// that is taken for another sender's or a damaged frame costs the robot its estimate.
 #pragma once
 
 #include "base/time.hpp"
@@ -12,7 +12,7 @@ namespace tetap::node {
 
 /// Evidence that a sync frame is meant.
 struct SyncProof {
-  bool guarded = false;        ///< its checksum, in a frame of its own
+  bool guarded = false;        ///< checksum of the frame, in a frame of its own
   bool authenticated = false;  ///< a tag
 };
 

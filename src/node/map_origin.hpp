@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Origin of the map: configured, or the first of fixes that confirm each other. An origin that the configuration only
-// proposes, or that fixes gave, is replaced when a run of fixes that began beyond the map's range outweighs the fixes
-// that the map held. docs/explanation/frames.md.
+// Origin of the map: configured, or the first of fixes that confirm each other. An origin that is only proposed, or
+// that fixes gave, may be replaced. A run of fixes that began beyond the map's range does so when it outweighs the
+// fixes that the map held. docs/explanation/frames.md.
 #pragma once
 
 #include "checks/startup_fix_check.hpp"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// When to tick: on the board's own timer, on the bus's sync frames, or in lockstep with a player. The only part of the
+// Times to tick: on the board's own timer, on the bus's sync frames, or in lockstep with a player. The only part of the
 // firmware that knows real time, and it decides nothing but the sequence of ticks, which every epoch frame states.
 #pragma once
 
@@ -13,15 +13,15 @@
 namespace tetap::node {
 
 /// Rules.
-///   Clock frame: sets the clock's offset; ticks stay the own timer's, at whole periods of the bus's time. One that
-///   moves a clock that runs by more than kFarthest periods is refused and counted, until three in a row agree or a
-///   guard vouches for it.
+///   Clock frame: sets the clock's offset; ticks stay the own timer's, at whole periods of the bus's time. A frame that
+///   moves a running clock by more than kFarthest periods is refused and counted. It is taken when three in a row agree
+///   or a guard vouches for it.
 ///   Tick frame:  tick at its time. Missing for three periods: hold over on the own timer. Back after three in a row
 ///   that are one period (+-10 %) apart and ahead of the last tick.
-///   Step frame:  tick at its time, whatever it is; no own timer until a Tick or Clock frame comes, or no Step has come
-///   for kLockstepPatience. Firmware asks LockstepPolicy before a Begin or Step gets here.
-///   A Tick whose time is not half a period ahead of the last tick, or more than kFarthest periods ahead, is refused
-///   and counted, until three in a row agree. So is one that lets the bus's time run ahead of the board's.
+///   Step frame:  tick at its time, whatever it is. There is no own timer until a Tick or Clock frame comes, or no Step
+///   has come for kLockstepPatience. Firmware asks LockstepPolicy before a Begin or Step gets here.
+///   A Tick less than half a period or more than kFarthest periods ahead of the last tick is refused and counted. It is
+///   taken when three in a row agree. A Tick that lets the bus's time run ahead of the board's is refused alike.
 class Pacer {
  public:
   explicit constexpr Pacer(base::Micros period) : period_(period), credit_(times(kFarthest)) {}
@@ -84,7 +84,7 @@ class Pacer {
     return {(t.us / period_.us + 1) * period_.us};
   }
 
-  /// Neither ticked nor been given a time.
+  /// True when the pacer has neither ticked nor been given a time.
   [[nodiscard]] constexpr bool fresh() const { return !on_bus_time_ && last_tick_.us == 0; }
 
   constexpr void lock(base::Micros time, base::Micros now) {
@@ -139,8 +139,8 @@ class Pacer {
     return time;
   }
 
-  /// Whether the bus has a Tick to spare: as many as a loop that stood still has missed, else little more than time
-  /// goes by on the board.
+  /// Whether the bus has a Tick to spare. It may send as many as a loop that stood still has missed. Otherwise it may
+  /// send little more than the time that goes by on the board.
   constexpr bool in_time(base::Micros now) {
     credit_ += base::Micros{(now - credit_at_).us / 4 * 5};
     credit_at_ = now;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The state of a node between two epochs as bytes on the bus: a log that begins after the node's start can be repeated
-// from there. The bytes are those of the node in memory, so only a program with the same layout can read them: the same
+// The state of a node between two epochs as bytes on the bus. A log that begins after the node's start can be repeated
+// from there. The bytes are those of the node in memory. Only a program with the same layout can read them: the same
 // commit, compiled for the same kind of machine.
 #pragma once
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Samples in the order in which they were true: those waiting for their tick, and the recent past kept so that a late
-// one can still be fused at its own time. A ring: what leaves at the front moves nothing.
+// Samples in the order in which they were true: those waiting for their tick, and the recent past. The past is kept so
+// that a late sample can still be fused at its own time. A ring: what leaves at the front moves nothing.
 #pragma once
 
 #include "base/state_hash.hpp"
@@ -53,13 +53,13 @@ class Timeline {
     return Insert::kTaken;
   }
 
-  /// The same without a limit.
+  /// Inserts without a limit of moves.
   [[nodiscard]] constexpr Insert insert(const sensor::Sample& sample) {
     std::size_t moves = Capacity;
     return insert(sample, moves);
   }
 
-  /// How many samples have a stamp <= t.
+  /// Number of samples with a stamp <= t.
   [[nodiscard]] constexpr std::size_t until(base::Micros t) const {
     std::size_t n = size_;
     while (n > 0 && (*this)[n - 1].stamp > t) --n;
@@ -81,7 +81,7 @@ class Timeline {
   /// samples.
   [[nodiscard]] constexpr std::uint32_t digest() const { return digest_ + static_cast<std::uint32_t>(size_); }
 
-  /// Its first `size` samples.
+  /// First `size` samples of the timeline.
   [[nodiscard]] constexpr sensor::Window window(std::size_t size) const {
     return {samples_.data(), Capacity, begin_, size};
   }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Sensors wired to the node's own board. Each sample becomes the frames of config/tetap.dbc, and whoever takes these
-// both sends and consumes them: the same integers by wire and by bus, and the log of the bus is the record.
+// Sensors wired to the node's own board. Each sample becomes the frames of config/tetap.dbc. Whoever takes these both
+// sends and consumes them: wire and bus have the same integers, and the log of the bus is the record.
 #pragma once
 
 #include "bus/counters.hpp"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Limits of the work that a bus may give a tick: samples, places that samples out of their order move others by, and
-// samples that push others out of a full window. An honest bus stays below, with room for what a gateway held back.
-// The limits are tight for a second after one was reached.
+// Limits of the work that a bus may give a tick. Counted are samples, places that samples out of their order move
+// others by, and samples that push others out of a full window. An honest bus stays below, with room for what a gateway
+// held back. The limits are tight for a second after one was reached.
 #pragma once
 
 #include <cstddef>

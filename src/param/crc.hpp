@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The CRC of the version frame: the stored bits of the rows, in the order of the table, without those on which no bit
-// of an estimate depends. The group `wired` counts only where a robot has a wired sensor.
+// The CRC of the version frame: the stored bits of the rows, in the order of the table. Bits on which no bit of an
+// estimate depends are left out. The group `wired` counts only where a robot has a wired sensor.
 #pragma once
 
 #include "base/bit_crc.hpp"

@@ -31,7 +31,7 @@ struct LoopParameters {
   Lockstep lockstep = Lockstep::kGuarded;
 };
 
-/// How a speed sample relates to its stamp.
+/// Relation of a speed sample to its stamp.
 enum class Hold : std::int32_t {
   kForward,   ///< a command: holds from its stamp on
   kBackward,  ///< a measurement: the mean since the sample before
@@ -76,7 +76,7 @@ struct LandmarkParameters {
   float sigma_range_m = 0.1F;
   float sigma_range_per_m = 0;  ///< grows with range
   float sigma_bearing_rad = 0.02F;
-  float sigma_range_only_m = 0.1F;  ///< when no bearing comes with it
+  float sigma_range_only_m = 0.1F;  ///< 1 sigma of a range without a bearing
   float gate_scale = 1;             ///< times the 99 % chi-square quantile
   std::int32_t depth = 0;           ///< 1: a stated range is the depth along the sensor's axis, range cos(bearing)
   float range_offset_m = 0;         ///< stated less true range, at the sensor
@@ -111,7 +111,7 @@ struct GnssParameters {
   /// Baseline of a receiver with two antennas: from the first to the second. Its heading is that of this line.
   std::array<float, 3> baseline_b_m{1, 0, 0};
   std::int32_t heading_stuck_samples = 50;  ///< repeated so often to the last bit, a heading is a stuck one; 0: never
-  /// 0: the first of fixes that confirm each other is the origin; 1: as given here; 2: as given, until fixes that
+  /// 0: the first of fixes that confirm each other is the origin. 1: as given here. 2: as given, until fixes that
   /// confirm each other lie beyond the map's range.
   std::int32_t origin_configured = 0;
   std::int64_t origin_latitude_2ndeg = 0;
@@ -306,7 +306,7 @@ struct Parameters {
   InertialParameters inertial;
   MagneticParameters magnetic;
   BaroParameters baro;
-  filter::AttitudeOptions attitude;  ///< its declination is the magnetometer's
+  filter::AttitudeOptions attitude;  ///< declination is the magnetometer's
   DisagreementParameters disagreement;
   StartParameters start;
   RecoveryParameters recovery;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is known of a sensor's own errors is taken out of its samples before any estimator sees them. A function of the
-// sample alone: a late one is corrected as it would have been in time.
+// Known errors of a sensor's own are taken out of its samples before any estimator sees them. A function of the sample
+// alone: a late one is corrected as it would have been in time.
 #pragma once
 
 #include "base/math.hpp"

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Plausibility of a sample, before anything computes with it: numbers where there must be numbers, of a size that a
-// sensor on a robot can mean. The limits are far beyond every robot; inside them no filter leaves the floats.
+// Plausibility of a sample, before anything computes with it. A sample needs numbers in the fields that must have them,
+// of a size that a sensor on a robot can mean. The limits are far beyond every robot; inside them no filter leaves the
+// floats.
 #pragma once
 
 #include "base/math.hpp"

@@ -89,7 +89,7 @@ struct LandmarkSighting {
   float range_rate_mps = base::kNan;  ///< radar only; positive: the distance grows
 };
 
-/// Displacement between two keyframes of a pose graph, in the integers of the bus: a factor of the covariance that is
+/// Displacement between two keyframes of a pose graph, in the integers of the bus. A factor of the covariance that is
 /// nearly singular would not survive a float. Correlations are of x and y, x and yaw, y and yaw.
 struct LoopClosure {
   static constexpr int kBits = 20;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The front of EKF-SLAM: the sightings of one stamp in an order of their own, their landmarks by identity or by
-// association, new landmarks, and what is ambiguous.
+// The front of EKF-SLAM: the sightings of one stamp in an order of their own, their landmarks, and new landmarks. A
+// sighting finds its landmark by identity or by association, or it is ambiguous.
 #pragma once
 
 #include "slam/association.hpp"
@@ -15,7 +15,7 @@
 
 namespace tetap::slam {
 
-/// How sightings without identity find their landmarks.
+/// Method by which sightings without identity find their landmarks.
 enum class AssociationMethod : std::uint8_t { kNearest, kAssignment, kJoint };
 
 struct EkfMapperOptions {

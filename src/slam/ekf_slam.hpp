@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // EKF-SLAM of fixed capacity: a planar pose and the landmarks that it sees, with one covariance (Smith, Self &
 // Cheeseman 1990; Thrun, Burgard, Fox 2005, ch. 10). Errors are those of the right-invariant filter (Barrau & Bonnabel
-// 2015, arXiv 1510.06263), kept as an additive covariance that moves with each correction, so that the heading never
+// 2015, arXiv 1510.06263). They are kept as an additive covariance that moves with each correction. The heading never
 // gains from landmarks that nothing but the robot itself has placed. docs/explanation/ekf_slam.md has the equations.
 #pragma once
 

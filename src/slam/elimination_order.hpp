@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// In which order the poses of a graph are eliminated, and which entries their rows of the square-root information get:
-// minimum degree (Tinney & Walker 1967; George & Liu, SIAM Review 31(1), 1989) on the elimination graph kept as bits,
-// with one node held back to the end, then a postorder of the elimination tree (Liu, SIAM J. Matrix Anal. 11(1), 1990).
+// Order in which the poses of a graph are eliminated, and the entries that their rows of the square-root information
+// get. The order is minimum degree on the elimination graph kept as bits (Tinney & Walker 1967; George & Liu, SIAM
+// Review 31(1), 1989). One node is held back to the end. A postorder of the elimination tree follows (Liu, SIAM J.
+// Matrix Anal. 11(1), 1990).
 #pragma once
 
 #include <array>
@@ -104,13 +105,13 @@ class EliminationOrder {
   [[nodiscard]] int nodes() const { return nodes_; }
   [[nodiscard]] int node(int position) const { return order_[at(position)]; }
   [[nodiscard]] int position(int node) const { return position_[at(node)]; }
-  /// How many entries off the diagonal the row at this position has.
+  /// Number of entries off the diagonal that the row at this position has.
   [[nodiscard]] int count(int position) const { return count_[at(order_[at(position)])]; }
   /// Position of entry k of that row: later than the row, ascending.
   [[nodiscard]] int entry(int position, int k) const {
     return index_[first_[at(order_[at(position)])] + static_cast<std::uint32_t>(k)];
   }
-  /// How many rows have their first entry in this row's column.
+  /// Number of rows with their first entry in this row's column.
   [[nodiscard]] int children(int position) const { return children_[at(position)]; }
   [[nodiscard]] std::uint32_t entries() const { return used_; }
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // FastSLAM of fixed capacity: particles of a planar pose, each with landmarks of its own (Montemerlo, Thrun, Koller,
 // Wegbreit, AAAI 2002, version 1, and IJCAI 2003, version 2). The motion since the last sighting is one displacement in
-// the robot's frame, the same for all particles: a prediction costs what it costs for one. The filter is not
+// the robot's frame, the same for all particles. A prediction costs what it costs for one. The filter is not
 // consistent; docs/explanation/fast_slam.md has the equations and by how much.
 #pragma once
 

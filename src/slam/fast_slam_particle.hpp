@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// One particle of FastSLAM: a pose, landmarks with a covariance each, the motion that all particles share, and the
-// pose's distribution given that motion and sightings. docs/explanation/fast_slam.md has the equations.
+// One particle of FastSLAM: a pose, landmarks with a covariance each, and the motion that all particles share. It has
+// the pose's distribution given that motion and sightings. docs/explanation/fast_slam.md has the equations.
 #pragma once
 
 #include "filter/symmetric.hpp"
@@ -19,8 +19,8 @@ struct PlanarOffset {
   float yaw_rad = 0;
 };
 
-/// A sighting from a pose against a landmark: innovation and the derivative by the landmark (x, y); that by the pose is
-/// its negative, and -1 of the bearing by yaw.
+/// A sighting from a pose against a landmark: innovation and the derivative by the landmark (x, y). The derivative by
+/// the pose is its negative, and -1 of the bearing by yaw.
 struct OffsetSight {
   std::array<float, 2> nu;
   float rx, ry, bx, by;  ///< d range / d (x, y), d bearing / d (x, y)
@@ -145,8 +145,8 @@ struct PosePosterior {
   }
 };
 
-/// The motion since the last sighting, as a displacement in the frame it began in, with its covariance: the same for
-/// every particle, whatever its pose. Implements docs/explanation/fast_slam.md (1) to (2).
+/// The motion since the last sighting, as a displacement in the frame it began in, with its covariance. It is the same
+/// for every particle, whatever its pose. Implements docs/explanation/fast_slam.md (1) to (2).
 class SharedMotion {
  public:
   /// False, and nothing has changed, when the increment is no number.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A measured displacement between two poses of a graph: residual, whitening, linearisation and the weight that dynamic
-// covariance scaling gives it (Agarwal, Tipaldi, Spinello, Stachniss, Burgard, ICRA 2013, eq. 15-16). Error and
+// A measured displacement between two poses of a graph: residual, whitening, linearisation and weight. The weight is
+// that of dynamic covariance scaling (Agarwal, Tipaldi, Spinello, Stachniss, Burgard, ICRA 2013, eq. 15-16). Error and
 // Jacobians: Grisetti, Kuemmerle, Stachniss, Burgard, IEEE ITS Magazine 2(4), 2010, sec. III-B.
 #pragma once
 

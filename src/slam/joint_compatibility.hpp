@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Joint compatibility: the pairing of several sightings with landmarks that pairs most of them and, among those, fits
-// best together (Neira & Tardos, "Data association in stochastic mapping using the joint compatibility test", IEEE
-// Trans. Robotics and Automation 17(6), 2001). Depth first over the sightings, with a bounded number of nodes.
+// Joint compatibility: the pairing of several sightings with landmarks that pairs most of them. Among equals, the
+// pairing that fits best together wins. Neira & Tardos, "Data association in stochastic mapping using the joint
+// compatibility test", IEEE Trans. Robotics and Automation 17(6), 2001. Depth first over the sightings, with a bounded
+// number of nodes.
 #pragma once
 
 #include "base/math.hpp"

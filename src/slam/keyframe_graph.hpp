@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A pose graph that never ends: odometry becomes keyframes, closures between any two steps are moved to the nearest
-// ones, and what does not fit any more is thinned out in three stages, each counted: a keyframe is not made, a keyframe
-// is composed away and closures of the same pair are merged, a closure is refused.
+// A pose graph that never ends. Odometry becomes keyframes, and closures between any two steps are moved to the nearest
+// ones. A graph too large for its room is thinned out in three stages, each counted. A keyframe is not made; a keyframe
+// is composed away and closures of the same pair are merged; a closure is refused.
 #pragma once
 
 #include "slam/pose_graph.hpp"
@@ -9,8 +9,8 @@
 namespace tetap::slam {
 
 struct KeyframeOptions {
-  float distance_m = 0.0F;      ///< a keyframe is made after so much way,
-  float turn_rad = 0.0F;        ///< or so much turn; both 0: each step
+  float distance_m = 0.0F;      ///< a keyframe is made after so much way
+  float turn_rad = 0.0F;        ///< a keyframe is made after so much turn; both 0: each step
   float contradiction = 30.0F;  ///< a closure above, by odometry's covariance, is refused
   int closures_a_job = 1;       ///< a job begins by itself when so many came
   GraphOptions graph;
@@ -44,7 +44,7 @@ struct ClosureRecord {
   }
 };
 
-/// As PoseGraph, and kTrail steps of odometry that closures may name.
+/// Sizes as PoseGraph's, and kTrail steps of odometry that closures may name.
 template <class Scalar_, int kPoses, int kEdges, int kBlocks, int kTrail>
 class KeyframeGraph {
  public:
@@ -66,7 +66,7 @@ class KeyframeGraph {
     return true;
   }
 
-  /// Step j as seen from step i. What is not taken is counted.
+  /// Step j as seen from step i. A closure that is not taken is counted.
   ClosureRecord<Scalar> closure(std::uint32_t i, std::uint32_t j, const Motion& z) {
     using enum ClosureFate;
     std::array<Scalar, 6> whitening{};
@@ -112,7 +112,7 @@ class KeyframeGraph {
     optimise();
   }
 
-  /// Where the latest step is.
+  /// Pose of the latest step.
   [[nodiscard]] Pose pose() const { return placed(local()); }
   /// Covariance of the latest step relative to the first, along the axes in which pose() is.
   [[nodiscard]] filter::Symmetric<Scalar, 3> covariance() const {
@@ -273,7 +273,7 @@ class KeyframeGraph {
     cancel_job();
     gave_way_ = true;
   }
-  /// After a job without room: an eighth of the keyframes is composed away, which merges closures and loses none; the
+  /// After a job without room an eighth of the keyframes is composed away, which merges closures and loses none. The
   /// newest closures go when there are too few keyframes for that, or when it had no effect.
   void make_room() {
     const bool thinned = count_.composed_away != thinned_before_ || count_.jobs_without_room == 1;

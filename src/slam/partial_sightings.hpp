@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Landmarks seen by bearing alone or range alone, kept until three sightings from different places make a place of
-// them. The motion between the sightings comes from odometry since then; its covariance is the difference of one that
+// them. The motion between the sightings comes from odometry since then. Its covariance is the difference of one that
 // accumulates (right-invariant errors of dead reckoning only add up).
 #pragma once
 
@@ -22,7 +22,7 @@ class PartialSightings {
   /// A place is good enough when its sigma in any direction is below this share of its distance.
   static constexpr float kSharpness = 0.2F;
 
-  /// Where a landmark is, from the robot's present pose, in b.
+  /// Place of a landmark, from the robot's present pose, in b.
   struct Place {
     bool known = false;
     float x_b_m = 0, y_b_m = 0;

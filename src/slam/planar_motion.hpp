@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Places, headings and displacements of a plane for graphs: coordinates and headings are stored as integers plus a
-// small rest, so that differences between far poses keep every digit of the scalar. Composition of uncertain
-// displacements: Smith, Self & Cheeseman 1990, "Estimating uncertain spatial relationships", sec. 3.
+// Places, headings and displacements of a plane for graphs. Coordinates and headings are stored as integers plus a
+// small rest. Differences between far poses keep every digit of the scalar. Composition of uncertain displacements:
+// Smith, Self & Cheeseman 1990, "Estimating uncertain spatial relationships", sec. 3.
 #pragma once
 
 #include "base/math.hpp"
@@ -70,7 +70,7 @@ struct Coordinate {
     if (moved > 2'000'000'000 || moved < -2'000'000'000) return *this;
     return {static_cast<std::int32_t>(moved), sum - static_cast<Scalar>(whole) * kUnit_m};
   }
-  /// This minus other, in metres.
+  /// Difference from `other`, in metres.
   [[nodiscard]] constexpr Scalar minus(const Coordinate& other) const {
     return static_cast<Scalar>(std::int64_t{unit} - other.unit) * kUnit_m + (rest_m - other.rest_m);
   }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A graph of planar poses in fixed memory: poses are appended as they come, closures wait for the next optimisation,
-// which is a job cut in units of work (Gauss-Newton on the square-root information; Dellaert & Kaess, IJRR 25(12),
-// 2006). False closures are held off by dynamic covariance scaling, then left out (see graph_edge.hpp).
+// A graph of planar poses in fixed memory. Poses are appended as they come, closures wait for the next optimisation. An
+// optimisation is a job cut in units of work (Gauss-Newton on the square-root information; Dellaert & Kaess, IJRR
+// 25(12), 2006). False closures are held off by dynamic covariance scaling, then left out (see graph_edge.hpp).
 #pragma once
 
 #include "slam/graph_edge.hpp"
@@ -79,8 +79,9 @@ class PoseGraph {
   }
 
   /// Implements docs/explanation/pose_graph.md (7).
-  /// The squared error of closing i and j so, by the covariance of the closure and of the odometry between them: of
-  /// chi-square with 3 degrees if the closure is true. Negative when that is no number. Cost: a composition a pose.
+  /// The squared error of closing i and j so, by the covariance of the closure and of the odometry between them. It is
+  /// of chi-square with 3 degrees if the closure is true, and negative when it is no number. Cost: a composition a
+  /// pose.
   [[nodiscard]] Scalar contradiction(int i, int j, const Motion& z) const {
     const int first = i < j ? i : j, last = i < j ? j : i;
     Motion between{};
@@ -98,9 +99,9 @@ class PoseGraph {
     return test.chi2(pose_[at(i)], pose_[at(j)]);
   }
 
-  /// Takes a pose out: the odometry before and after becomes one measurement, its closures move to the pose before it
-  /// through odometry (Smith, Self & Cheeseman 1990), and closures that then join the same poses are merged. The first
-  /// and the last pose stay, and nothing changes while a job runs: false.
+  /// Takes a pose out. The odometry before and after becomes one measurement. Its closures move to the pose before it
+  /// through odometry (Smith, Self & Cheeseman 1990). Closures that then join the same poses are merged. False, and
+  /// nothing changes, for the first and the last pose, and while a job runs.
   [[nodiscard]] bool compose_away(int k) {
     if (busy() || k < 1 || k >= poses_ - 1) return false;
     const int incoming = odometry_to(k), outgoing = odometry_to(k + 1);
@@ -170,8 +171,8 @@ class PoseGraph {
   [[nodiscard]] bool busy() const { return phase_ != Phase::kIdle; }
   /// Poses that the elimination at hand has before it, at least one while a job runs or may begin.
   [[nodiscard]] int rows_left() const { return phase_ == Phase::kEliminate ? solver_.rows_left() : 1; }
-  /// Up to so many units of the job, a unit being about ten floating-point operations; an operation that is begun is
-  /// ended, and what it took too much is taken from the next call. The result is the same however the units are dealt.
+  /// Up to so many units of the job, a unit being about ten floating-point operations. An operation that is begun is
+  /// ended, and the excess is taken from the next call. The result is the same however the units are dealt.
   void work(int units) {
     credit_ += units;
     while (credit_ > 0 && busy()) credit_ -= step();

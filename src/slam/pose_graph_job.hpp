@@ -40,8 +40,8 @@ void PoseGraph<Scalar_, kPoses, kEdges, kBlocks>::begin_second_attempt() {
   phase_ = Phase::kSpread;
 }
 
-/// One edge's part of how uncertain each pose is by odometry alone: as a motion of the whole plane about the first
-/// pose, where the parts of a way add up.
+/// One edge's part of how uncertain each pose is by odometry alone. It is written as a motion of the whole plane about
+/// the first pose: the parts of a way add up there.
 template <class Scalar_, int kPoses, int kEdges, int kBlocks>
 int PoseGraph<Scalar_, kPoses, kEdges, kBlocks>::spread() {
   auto& spread = solver_.scratch();

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Least squares of a graph of poses by orthogonal elimination: rows of the whitened Jacobian are rotated into the
-// triangular square root R of the information (Dellaert & Kaess, IJRR 25(12), 2006), one dense front a pose (Duff &
-// Reid 1983; Matstoms, ACM TOMS 20(1), 1994). J^T J is never formed: its condition number is beyond what float
+// Least squares of a graph of poses by orthogonal elimination. Rows of the whitened Jacobian are rotated into the
+// triangular square root R of the information (Dellaert & Kaess, IJRR 25(12), 2006). There is one dense front a pose
+// (Duff & Reid 1983; Matstoms, ACM TOMS 20(1), 1994). J^T J is never formed: its condition number is beyond what float
 // resolves. Three rows are rotated at a time (Householder; Golub & Van Loan 2013, alg. 5.1.1).
 #pragma once
 
@@ -289,7 +289,7 @@ class SquareRoot {
     return memory_.arena.data() + front_ + r * (columns_ + 1) - r * (r - 1) / 2 - r;
   }
   [[nodiscard]] Scalar* panel_row(int r) { return memory_.arena.data() + panel_ + r * (columns_ + 1); }
-  /// How many of three rows have a pivot. `row` is the first of them, and has n columns.
+  /// Number of three rows that have a pivot. `row` is the first of them, and has n columns.
   [[nodiscard]] static int held(const Scalar* row, int n) {
     int pivots = 0;
     for (const int i : {0, n + 1, 2 * n + 1}) pivots += row[i] > Scalar{0} || row[i] < Scalar{0} ? 1 : 0;
@@ -342,7 +342,7 @@ class SquareRoot {
   bool singular_ = false;
   int depth_ = 0;          ///< entries of pending_ in use
   int columns_ = 0;        ///< columns of the front, without the right-hand side
-  int children_left_ = 0;  ///< whose fronts were not taken in yet
+  int children_left_ = 0;  ///< children whose fronts were not taken in yet
   int child_row_ = 0;      ///< the next block row of the child at hand
   std::uint32_t finished_ = 0, top_ = 0, low_ = 0, front_ = 0, panel_ = 0, child_ = 0, above_ = 0, most_ = 0;
   Scalar decrease_ = 0;

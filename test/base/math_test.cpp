@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The functions of base/math.hpp against the C library in double, on a dense sample of all encodings and where a method
-// changes. math_exhaustive does the same for every float; limits and measure (support/ulp.hpp) are the same.
+// The functions of base/math.hpp against the C library in double. Samples are dense over all encodings and where a
+// method changes. math_exhaustive does the same for every float. Limits and measure (support/ulp.hpp) are the same.
 #include "base/math.hpp"
 
 #include "support/samples.hpp"

@@ -149,7 +149,7 @@ TEST(Uniform, FillsItsBinsAndPairsOfBinsAsChanceDoes) {
 constexpr int kStreams = 64, kPerStream = 1 << 16;
 
 TEST(Normal, HasMeanVarianceSkewnessAndKurtosisOfTheNormalDistribution) {
-  // The mean of the Hermite polynomial He_k of n normal variables has mean 0 and variance k!/n exactly; He_1 to He_4
+  // The mean of the Hermite polynomial He_k of n normal variables has mean 0 and variance k!/n exactly. He_1 to He_4
   // are deviations of mean, variance, skewness and kurtosis. Over the streams each is a chi-square: neither wrong nor
   // too even.
   std::array<double, 4> sums{}, totals{};

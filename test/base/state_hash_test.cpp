@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the hash of a state has to notice: one bit, an exchange, a word more; and that its value is the same everywhere.
+// Changes that the hash of a state has to notice: one bit, an exchange, a word more. Its value is the same everywhere.
 #include "base/state_hash.hpp"
 
 #include <array>

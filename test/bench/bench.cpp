@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// The same work by tetap and by others, in one run: tetap-bench M3500.g2o [Google Benchmark's options]
+// The same work by tetap and by others, in one run: tetap-bench M3500.g2o [Google Benchmark's options].
 //
-// Before anything is timed, every filter's state and covariance are held against Joseph's form in double, and every
-// solved graph against its file; who differs is an error, and no time is printed. One `item` is a step or a solution.
+// Before anything is timed, every filter's state and covariance are held against Joseph's form in double. Every solved
+// graph is held against its file. A difference is an error, and no time is printed. One `item` is a step or a solution.
 #include "bench/contestant.hpp"
 #include "slam/g2o.hpp"
 

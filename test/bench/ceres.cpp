@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The same pose graph by Ceres: sparse normal Cholesky on one thread, Jacobians in closed form, a trust region that
-// never binds, so that its steps are Gauss-Newton's. The trust radius of its default costs five times as long.
+// The same pose graph by Ceres: sparse normal Cholesky on one thread, Jacobians in closed form. The trust region never
+// binds, so that its steps are Gauss-Newton's. The trust radius of its default costs five times as long.
 #include <ceres/ceres.h>
 
 #include "bench/contestant.hpp"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the implementations of `make bench` have in common. Each one is a shared library of its own with hidden symbols:
-// compiled with other settings of Eigen, two of them in one program would share each other's functions.
+// Common parts of the implementations of `make bench`. Each one is a shared library of its own with hidden symbols. Two
+// of them in one program, compiled with other settings of Eigen, would share each other's functions.
 #pragma once
 
 #include <array>
@@ -51,7 +51,7 @@ using Make = std::unique_ptr<Filter<Input>> (*)();
 class GraphSolver {
  public:
   virtual ~GraphSolver() = default;
-  /// Not part of what is timed.
+  /// Resets the contestant, outside of the timed work.
   virtual void reset() = 0;
   virtual void solve() = 0;
   /// x, y, yaw of each pose.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// OpenCV's cv::KalmanFilter in float. As an extended filter in the way its users do it: F and H are set at each step,
-// the predicted state is replaced by f(x), and the measurement is handed over as H x + nu.
+// OpenCV's cv::KalmanFilter in float, as an extended filter in the way its users do it. F and H are set at each step,
+// and the predicted state is replaced by f(x). The measurement is handed over as H x + nu.
 #include "bench/contestant.hpp"
 
 #include <cmath>

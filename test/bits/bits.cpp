@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// One program for every compiler and core: prints "bits: NAME HASH" for each function and filter, first of a short
+// One program for every compiler and core. It prints "bits: NAME HASH" for each function and filter, first of a short
 // form, then of the whole one. tools/proof/compare_bits compares the lines. An image takes no arguments; whoever has
 // read enough ends the emulator.
 #include "attitude.hpp"

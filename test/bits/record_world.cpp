@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Prints the simulated world's frames as a C++ header: recorded inputs for an image without files. 20 s of the default
-// world, and 12 s of one whose IMU sends 200 samples a second.
+// Prints the simulated world's frames as a C++ header: recorded inputs for an image without files. It prints 20 s of
+// the default world, and 12 s of one whose IMU sends 200 samples a second.
 #include "sim_host/world_source.hpp"
 
 #include <algorithm>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The world behind the pins, by physics: gravity at rest, the turn that the gyroscope integrates, the way that edges
-// measure, and which axis of the chip sees what. The truth is that of the world, from the path's closed forms.
+// measure. The chip's axes are tested, too. The truth is that of the world, from the path's closed forms.
 #include "sim_host/board/simulated_sensors.hpp"
 
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the protection must notice: every damaged bit, a payload under another id, a frame sent twice or lost.
+// Faults that the protection must notice: every damaged bit, a payload under another id, a frame sent twice or lost.
 #include "bus/e2e.hpp"
 #include "bus/messages.hpp"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What an inertial estimator says of its covariance, put together again from the frames as anybody on the bus would.
+// Covariance of an inertial estimator, put together again from the frames as anybody on the bus would.
 #include "bus/multiplexed.hpp"
 
 #include "bus/codec.hpp"

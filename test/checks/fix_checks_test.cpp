@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The checks of fixes by themselves: agreement of fixes, repetition, the first fixes, and the worth of a fix that
-// repeats the error of the one before.
+// The checks of fixes by themselves: agreement of fixes, repetition, and the first fixes. The worth of a fix that
+// repeats the error of the one before is tested, too.
 #include "checks/coloured_noise.hpp"
 #include "checks/frozen_position.hpp"
 #include "checks/offset_hypothesis.hpp"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Accuracy of every row of list.hpp on the common scenario, as JSON: tetap-costs [--track]
-// With --track the errors of seed 1 over the steps instead, for pictures.
+// Accuracy of every row of list.hpp on the common scenario, as JSON: tetap-costs [--track]. With --track the errors of
+// seed 1 over the steps instead, for pictures.
 #include "costs/contestants.hpp"
 
 #include <Eigen/Geometry>

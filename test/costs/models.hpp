@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Models of the common scenario in two sizes: the unicycle of support/euler_pose.hpp with three states, and with the
-// errors of odometry (its scale, the drift of its heading a step) as a fourth and a fifth.
+// Models of the common scenario in two sizes. The small one is the unicycle of support/euler_pose.hpp with three
+// states. The large one has the errors of odometry (its scale, the drift of its heading a step) as a fourth and a
+// fifth.
 #pragma once
 
 #include "costs/scenario.hpp"

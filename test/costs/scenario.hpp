@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// The common scenario of the cost table: a robot drives rounds of some 4 m radius for 51.2 s among landmarks on a ring,
-// ten steps a second. Every step gives odometry, one landmark's range and bearing, two position fixes, and, from the
-// second round on, the pose one round ago as seen from now. A filter takes those that it can use. Errors are normal,
-// white and independent, with the sigmas below; the same on every machine, from a seed.
+// The common scenario of the cost table. A robot drives rounds of some 4 m radius for 51.2 s among landmarks on a ring,
+// ten steps a second. Every step gives odometry, one landmark's range and bearing, and two position fixes. From the
+// second round on it gives the pose one round ago as seen from now, too. A filter takes those that it can use. Errors
+// are normal, white and independent, with the sigmas below; the same on every machine, from a seed.
 #pragma once
 
 #include "base/math.hpp"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The attitude filters' part of the common scenario: a body that rolls to and fro while it turns, with jolts, at 100
-// Hz; gyroscope with a bias, accelerometer and magnetometer with noise.
+// The attitude filters' part of the common scenario: a body that rolls to and fro while it turns, with jolts, at
+// 100 Hz. It has a gyroscope with a bias, accelerometer and magnetometer with noise.
 #pragma once
 
 #include "base/random.hpp"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Instructions of filters on two small textbook workloads, inputs made beforehand: W1, constant velocity in the plane
-// with a position; W2 and W3, a unicycle of one Euler step with range and bearing to a landmark at (60, 20).
+// Instructions of filters on two small textbook workloads, with inputs made beforehand. W1 is constant velocity in the
+// plane with a position. W2 and W3 are a unicycle of one Euler step with range and bearing to a landmark at (60, 20).
 #include "base/random.hpp"
 #include "board.hpp"
 #include "filter/kalman.hpp"

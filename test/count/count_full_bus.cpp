@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The rover's node on a bus without a gap: the frames of a recorded run, and as many others as 500 kbit/s have room for
-// in a tick: valid samples from within the window, or pose commands. Counted: the tick, and the epoch with its frames.
+// The rover's node on a bus without a gap. The frames are those of a recorded run, and as many others as 500 kbit/s
+// have room for in a tick. The others are valid samples from within the window, or pose commands. Counted: the tick,
+// and the epoch with its frames.
 #include "board.hpp"
 #include "config/rover.hpp"
 #include "markers.hpp"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the default robot's node says on the bus of its inertial filter: modes, faults, jumps and how far the two
-// attitudes are apart. Samples in, frames out.
+// Frames of the default robot's node about its inertial filter: modes, faults, jumps and how far the two attitudes are
+// apart. Samples in, frames out.
 #include "config/rover.hpp"
 #include "estimators/attitude.hpp"
 #include "estimators/inertial/inertial.hpp"

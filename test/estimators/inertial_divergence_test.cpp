@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// An inertial estimator that is wrong about where it looks or how fast it goes: how far off it gets, how long it takes
-// to notice, and what it says.
+// An inertial estimator that is wrong about where it looks or how fast it goes. The tests hold how far off it gets, how
+// long it takes to notice, and what it publishes.
 #include "inertial_drive.hpp"
 
 #include <gtest/gtest.h>
@@ -12,9 +12,9 @@
 namespace tetap::estimators {
 namespace {
 
-/// A pose given with a wrong heading and a sigma of 0.02 rad. Less than a right angle is pulled round; beyond, the
-/// wheels seem to spin: the estimator has to notice that it looks the wrong way, begin anew, and say so. With a
-/// speedometer as well as with counts of two wheels.
+/// A pose given with a wrong heading and a sigma of 0.02 rad. Less than a right angle is pulled round. Beyond, the
+/// wheels seem to spin: the estimator has to notice that it looks the wrong way. It has to begin anew, and to publish
+/// that. It does so with a speedometer as well as with counts of two wheels.
 TEST(InertialDivergence, AWrongHeadingIsNotFlownAwayWith) {
   for (int k = 0; k < 22; ++k) {
     constexpr std::array kOff_rad{-3.1, -1.5, -1.1, -1.0, -0.9, 0.8, 0.9, 1.1, 1.8, 2.5, 3.14};
@@ -120,8 +120,8 @@ Alone drive_alone(Drive& d, double off_rad, double speed_mps) {
   return all;
 }
 
-/// Nobody but how it moves can say that the heading is wrong. It is noticed while the robot speeds up, or at the latest
-/// while it stops or turns: GNSS shows where the acceleration went that the IMU felt.
+/// Only the robot's motion can show that the heading is wrong. The error is noticed while the robot speeds up, or at
+/// the latest while it stops or turns. GNSS shows there the direction of the acceleration that the IMU felt.
 TEST(InertialDivergence, WithoutWheelsAWrongHeadingIsFoundByHowItMoves) {
   for (const unsigned seed : {1U, 2U, 3U})  // of 480 runs of 20 seeds 12 are outside: docs/validation/shortfalls.md
     for (const bool constrained : {false, true})
@@ -171,7 +171,7 @@ TEST(InertialDivergence, APositionReceiverAloneIsNotFlownAwayFrom) {
     }
 }
 
-/// The same, held to the line along which it believes to look: what it does not know is how far, not where to.
+/// The estimator held to the line along which it believes to look: unknown is how far, not where to.
 TEST(InertialDivergence, NorWhereItIsHeldToAWrongLine) {
   for (const unsigned seed : {1U, 2U, 3U})
     for (const double speed_mps : {1.0, 2.0, 5.0})
@@ -189,7 +189,7 @@ TEST(InertialDivergence, NorWhereItIsHeldToAWrongLine) {
       }
 }
 
-/// But what fixes say together is a jump, and has to last a minute.
+/// Fixes that agree on another place are a jump, and have to last a minute.
 TEST(InertialDivergence, AJumpOfAPositionReceiverAloneIsRefused) {
   Drive d(parameters(), 1);
   d.wheels = d.gnss_velocity = false;
@@ -279,8 +279,8 @@ TEST(InertialDivergence, WheelsThatAgreeDoNotHoldItForEver) {
   EXPECT_LT(d.error_m(), 40.0);  // 3 km if it believed its wheels
 }
 
-/// A receiver that is wrong in place and speed for half a minute (after a whole one its fixes are believed): the wheels
-/// say that the filter is right.
+/// A receiver that is wrong in place and speed for half a minute. After a whole minute its fixes are believed. The
+/// wheels show that the filter is right.
 TEST(InertialDivergence, AReceiverThatLiesInAllItSaysStartsNothingAnew) {
   Drive d = settled();
   d.tamper = [](Drive::Fix& fix) {

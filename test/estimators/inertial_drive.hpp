@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A rover drives on a flat plane for the inertial estimator alone: its IMU is as noisy as the estimator is told, its
-// wheels are exact, its receiver errs as stated. Errors are judged against what the estimator says of itself.
+// A rover drives on a flat plane for the inertial estimator alone. Its IMU is as noisy as the estimator's parameters
+// state, its wheels are exact, its receiver errs as stated. Errors are judged against the estimator's own uncertainty.
 #pragma once
 
 #include "estimators/inertial/inertial.hpp"
@@ -66,7 +66,7 @@ class Drive {
   MapFrame map_frame;
   Inertial estimator;
   double east_m = 0, north_m = 0, up_m = 0, yaw_rad = 0.3, speed_mps = 1, turn_radps = 0.05;
-  double unseen_east_m = 0;  ///< it is carried, and no sensor of motion shows it
+  double unseen_east_m = 0;  ///< the rover is carried, and no sensor of motion shows it
   double white_m = 1, lasting_m = 0, lasting_s = 60;
   double stated_ratio = 1;     ///< the receiver's own accuracy figure, in what it is
   double gyro_bias_radps = 0;  ///< about the vertical

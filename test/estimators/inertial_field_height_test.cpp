@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Magnetometer and barometer in the inertial estimator: what they find at the start, how far they are believed, what a
-// disturbance may do and how it ends. The world is a small one of its own: a robot that stands or drives curves, with
-// exact sensors but for what a test adds, each sample fused at its own time.
+// Magnetometer and barometer in the inertial estimator: what they find at the start, and how far they are believed. A
+// disturbance has limits and an end. The world is a small one of its own. Its robot stands or drives curves, with exact
+// sensors but for what a test adds, each sample fused at its own time.
 #include "estimators/inertial/inertial.hpp"
 
 #include <gtest/gtest.h>
@@ -256,7 +256,7 @@ TEST(InertialMagnetometer, finds_the_heading_before_the_place_and_keeps_it_throu
     robot.gnss = true;
     robot.run(1);
     ASSERT_TRUE(robot.tracking());
-    EXPECT_LT(robot.heading_off_deg(), 2.5) << seen_after_it;  // it turned 92 degrees between the two
+    EXPECT_LT(robot.heading_off_deg(), 2.5) << seen_after_it;  // the robot turned 92 degrees between the two
   }
 }
 
@@ -285,7 +285,7 @@ TEST(InertialMagnetometer, knows_what_it_turned_since_the_gyroscopes_last_sample
   robot.flux_after_s = 0.009;
   robot.yaw_rate_radps = 2;
   robot.run(10);
-  EXPECT_LT(robot.last_flux.nis, 6.0F);  // it turns by four sigma in 9 ms
+  EXPECT_LT(robot.last_flux.nis, 6.0F);  // the robot turns by four sigma in 9 ms
   EXPECT_LT(robot.heading_off_deg(), 1.0);
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What GNSS may do to the inertial estimator, and what it must not: jumps, ramps, silence, frozen and half wrong fixes,
-// glitches at the start.
+// Effects that GNSS may have on the inertial estimator, and those it must not have. Cases: jumps, ramps, silence,
+// frozen and half wrong fixes, glitches at the start.
 #include "inertial_drive.hpp"
 
 #include <gtest/gtest.h>
@@ -218,8 +218,8 @@ TEST(Glitch, AnOffsetThatStaysInsideItsGateIsFollowedAfterAWhile) {
   EXPECT_EQ(d.estimator.jump().count, 0);
 }
 
-/// After minutes without fixes the first that is believed moves the filter by many of a fix's sigmas; those it was off
-/// before are no drift. The same where somebody says where it is.
+/// After minutes without fixes the first that is believed moves the filter by many of a fix's sigmas. The offset from
+/// before is no drift. The same holds when a pose is given.
 TEST(Glitch, WhatMovedTheFilterIsNoDrift) {
   for (const bool published : {false, true})
     for (unsigned seed = 1; seed <= 5; ++seed) {
@@ -436,8 +436,8 @@ TEST(Lasting, ErrorsThatLastLeaveAnHonestCovarianceWhenTheyAreKnownToLast) {
 }
 
 TEST(Lasting, AStartWithoutAPlaceIsAsUncertainAsItsFirstFixes) {
-  // Their common error stays, and the accuracy figure of that moment is off by a fifth: what the start made of both is
-  // all that is known for minutes.
+  // The fixes' common error stays, and the accuracy figure of that moment is off by a fifth. For minutes nothing is
+  // known but what the start made of both.
   double nees = 0;
   constexpr unsigned kSeeds = 200;
   for (unsigned seed = 1; seed <= kSeeds; ++seed) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Every measurement is true at its own microsecond: between two IMU samples, too. A body on a plane that speeds up and
-// turns, exact sensors but for what keeps an IMU from looking stuck; each measurement 9 ms after an IMU sample.
+// Every measurement is true at its own microsecond: between two IMU samples, too. The body moves on a plane, speeds up
+// and turns. Its sensors are exact but for what keeps an IMU from looking stuck. Each measurement comes 9 ms after an
+// IMU sample.
 #include "estimators/inertial/inertial.hpp"
 
 #include <gtest/gtest.h>
@@ -46,7 +47,7 @@ class Body {
   }
   [[nodiscard]] double speed(std::int64_t at_us) const { return accel_ * driven_s(at_us); }
   [[nodiscard]] double yaw(std::int64_t at_us) const { return begin_yaw_rad_ + turn_ * driven_s(at_us); }
-  /// Where it is that only drives straight on.
+  /// Place of a body that only drives straight on.
   [[nodiscard]] nav::Local place(std::int64_t at_us) const {
     const double half_um_per_mps2 = 0.5e6 * driven_s(at_us) * driven_s(at_us);
     return {.east_um = std::llround(accel_ * std::cos(begin_yaw_rad_) * half_um_per_mps2),

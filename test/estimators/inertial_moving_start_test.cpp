@@ -93,8 +93,9 @@ void expect_honest(const Way& way, int beyond, double most = 1.66) {
   }
 }
 
-// Wheels tell how fast, not where to: linearised about the difference of two fixes they told a heading (up to 89 of 100
-// beyond five sigma). And of a curve the chord is not the course. What finds the heading is modest: below one is right.
+// Wheels show how fast, not where to. Linearised about the difference of two fixes they seemed to show a heading (up to
+// 89 of 100 beyond five sigma). The chord of a curve is not its course. The heading that is found is modest: below one
+// is right.
 TEST(InertialMovingStart, WheelsWithoutGnssVelocityEndWithAnHonestHeading) {
   for (const bool forwards : {false, true})
     for (const double mps : {0.5, 2.0}) expect_honest({.forwards = forwards, .mps = mps}, 0);
@@ -103,9 +104,9 @@ TEST(InertialMovingStart, WheelsWithoutGnssVelocityEndWithAnHonestHeading) {
   expect_honest({.mps = 2, .turn_radps = 0.2}, 0);
 }
 
-// The constraint without wheels waits until the doubts of speed and heading are small together. (Told from the start,
-// it made 36 of 40 headings too sure; told once the speed alone was known to 0.7 m/s, the heading's NEES was 29 with
-// fixes of 3 m, and 4.9 at 0.5 m/s.)
+// The constraint without wheels waits until the uncertainties of speed and heading are small together. Used from the
+// start, it made 36 of 40 headings too sure. Used once the speed alone was known to 0.7 m/s, the heading's NEES was 29
+// with fixes of 3 m, and 4.9 at 0.5 m/s.
 TEST(InertialMovingStart, TheConstraintAloneEndsWithAnHonestHeading) {
   for (const double mps : {0.5, 1.0, 2.0, 5.0, 10.0}) expect_honest({.wheels = false, .mps = mps}, 0);
   for (const double mps : {2.0, 5.0, 10.0}) expect_honest({.wheels = false, .mps = mps, .fixes_m = 3}, 0);
@@ -118,8 +119,9 @@ TEST(InertialMovingStart, NorIsAHeadingThatIsGivenInMotionMadeTooSure) {
       expect_honest({.wheels = false, .mps = mps, .fixes_m = fixes_m, .given_sigma_rad = 0.2}, 0);
 }
 
-// A curve shows no heading to wheels. (The change of v in it was taken for noise and left out of the covariance: the
-// heading's sigma fell from 11 to 1.4 deg while it drifted 57 deg off, without one fix or with positions alone.)
+// A curve shows no heading to wheels. The change of v in it was taken for noise and left out of the covariance. The
+// heading's sigma fell from 11 to 1.4 deg while it drifted 57 deg off. It was so without one fix, and with positions
+// alone.
 TEST(InertialMovingStart, CurvesTellNoHeading) {
   constexpr int kSeeds = 20;
   for (const bool fixes : {false, true})
@@ -190,8 +192,8 @@ TEST(InertialMovingStart, AGyroscopesBiasBeforeItDrivesOffIsNoCurve) {
   }
 }
 
-// Fixes tell a slow robot's speed to a fifth of it and hardly better: where its heading is known the constraint must
-// not wait for that.
+// Fixes show a slow robot's speed to a fifth of it and hardly better. The constraint must not wait for that when its
+// heading is known.
 TEST(InertialMovingStart, ASlowRobotHasItsConstraintToo) {
   double mean_m = 0;
   constexpr int kSeeds = 10;
@@ -240,8 +242,8 @@ TEST(InertialMovingStart, APlaceThatIsSaidLeavesTheSpeedKnown) {
   }
 }
 
-// Nor does a heading that agrees: it is a measurement. (All was begun anew, with the speed's doubt of a start that was
-// long over: 326 m off a minute later, 22 sigma at worst.)
+// A heading that agrees is a measurement and begins nothing anew. (A beginning anew, with the speed's sigma of a start
+// long over, was 326 m off a minute later, 22 sigma at worst.)
 TEST(InertialMovingStart, APoseThatAgreesLeavesAllElseKnown) {
   for (const bool gnss_velocity : {false, true})
     for (unsigned seed = 1; seed <= 10; ++seed) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a robot may have that the rover has not: a pair of antennas that does not point ahead, a gyroscope that feels
-// the Earth turn; and sensors that show the same for ever.
+// Sensors that a robot may have and the rover has not: antennas that do not point ahead, and a gyroscope that feels the
+// Earth turn. Sensors that show the same for ever are tested, too.
 #include "estimators/inertial/inertial.hpp"
 
 #include <gtest/gtest.h>
@@ -139,7 +139,7 @@ TEST(InertialOptions, AFirstWayThatIsLongIsACourse) {
   EXPECT_TRUE(ins.x.finite()) << "no heading is no reason to lose one";
 }
 
-/// How a start at the map's origin begins that knows of one velocity over ground only; none: without a heading.
+/// A start at the map's origin that knows of one velocity over ground only; none: without a heading.
 std::optional<nav::Ins> begun_by(const nav::Vector3& v_n_mps, float sigma_mps, bool forwards = true) {
   param::Parameters n = parameters();
   n.inertial.starts_forward = forwards ? 1 : 0;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the inertial estimator takes of a robot's memory. The samples of the window, and what carries them to the
-// present in cells, are the delay ring; the rest is the filter with all its rules.
+// Memory that the inertial estimator takes of a robot. The delay ring holds the samples of the window and the cells
+// that carry them to the present. The rest is the filter with all its rules.
 #include "estimators/inertial/inertial.hpp"
 
 #include <gtest/gtest.h>

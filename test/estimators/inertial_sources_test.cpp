@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// State and failed check of every source as a robot drives: one word a source, and a refusal names its test. And the
-// three verbs of Recovery on a covariance.
+// State and failed check of every source as a robot drives: one word a source, and a refusal names its test. The three
+// verbs of Recovery on a covariance.
 #include "inertial_drive.hpp"
 
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Trust: a device that lies is held by the others; a filter that is wrong gives way to devices that agree; a receiver
+// Trust. A device that lies is held by the others. A filter that is wrong gives way to devices that agree. A receiver
 // alone wins after the stated time. Directions, sizes and times are drawn, so that no one of them is the rule's.
 #include "estimators/inertial/vote.hpp"
 #include "inertial_drive.hpp"

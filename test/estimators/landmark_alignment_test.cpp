@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Landmarks with known ids find the pose of a robot that has none, or has lost it: two of them make a candidate, a
+// Landmarks with known ids find the pose of a robot that has none, or has lost it. Two of them make a candidate, a
 // later look makes it valid. Truth is the simulated drive's own; a misread barcode must not place the robot.
 #include "estimators/circling_robot.hpp"
 #include "estimators/planar/pose_ekf.hpp"
@@ -128,7 +128,7 @@ TYPED_TEST(LandmarkAlignmentOf, MisreadLandmarksDelayItAndDoNotMisplaceIt) {
   EXPECT_LE(wrong, 2);
 }
 
-// Its wheels are silent for ten seconds while it is carried off: the heading is lost, then landmarks place it anew.
+// A robot is carried off while its wheels are silent for ten seconds: it loses the heading, then landmarks place it.
 TYPED_TEST(LandmarkAlignmentOf, ARobotThatIsLostComesBack) {
   for (unsigned seed = 1; seed <= 10; ++seed) {
     ShortSighted<TypeParam> drive(seed);

@@ -125,8 +125,8 @@ OutputPredictor::Inputs inputs(const param::InertialParameters& n, const nav::Ea
   return {.parameters = n, .earth = earth, .turn_known = turn_known, .wheel_turn_radps = 0.1F};
 }
 
-/// Lost, late, repeated, clipped, broken samples, tumbling and calm: what grew sample by sample over the ticks has the
-/// bits of what is made at once of the same window.
+/// Lost, late, repeated, clipped, broken samples, tumbling and calm. Cells that grew sample by sample over the ticks
+/// have the bits of cells made at once of the same window.
 TEST(OutputPredictor, ItsCellsAreNoMoreThanACache) {
   const param::InertialParameters n;
   const nav::Earth earth;
@@ -154,8 +154,8 @@ TEST(OutputPredictor, ItsCellsAreNoMoreThanACache) {
   }
 }
 
-/// The same worlds, against every sample looked at by itself: what was reached, and by which sample, is exactly the
-/// same; the sums differ by rounding and by what second order leaves of a wild turn.
+/// The same worlds, against every sample looked at by itself. The place that was reached, and by which sample, is
+/// exactly the same. The sums differ by rounding and by what second order leaves of a wild turn.
 TEST(OutputPredictor, ItsCellsSayWhatTheirSamplesSay) {
   const param::InertialParameters n;
   const nav::Earth earth;
@@ -233,8 +233,8 @@ TEST(OutputPredictor, SaysWhenASampleComesThatItWentOnWithout) {
   EXPECT_TRUE(ahead.note_arrival({110'000}));
 }
 
-/// Half of the samples of a fast IMU are lost, in a curve: the sums of a cell and what is missing between them lead
-/// where all samples lead, and the time without samples is that of the lost ones.
+/// Half of the samples of a fast IMU are lost, in a curve. The sums of a cell and the missing samples between them lead
+/// where all samples lead. The time without samples is that of the lost ones.
 TEST(OutputPredictor, BridgesTheHolesOfAFastImuCellByCell) {
   const param::InertialParameters n;
   const nav::Earth earth;
@@ -443,8 +443,8 @@ TEST(InertialWork, AHoleInTheWindowIsDoubtedUntilTheFarEndHasCrossedIt) {
   EXPECT_LT(ticks.sigma_mps(), 1.5F * before);
 }
 
-/// Without an IMU, or with one that repeats itself, and with measurements waiting: it goes on without, and is no less
-/// sure than wheels and GNSS make it.
+/// An IMU that dies or repeats itself, with measurements waiting. The filter goes on without it, and is no less sure
+/// than wheels and GNSS make it.
 TEST(InertialWork, AnImuThatDiesIsGoneOnWithout) {
   for (const bool stuck : {false, true}) {
     param::Parameters n = rover_like();

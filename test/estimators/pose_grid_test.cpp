@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Laws of localisation by a grid of poses as an estimator: it finds itself, says when it is lost, and its work may be
+// Laws of localisation by a grid of poses as an estimator. It finds itself and reports when it is lost. Its work may be
 // cut anywhere.
 #include "estimators/planar/pose_grid.hpp"
 #include "estimators/circling_robot.hpp"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Laws of localisation by particles as an estimator: it tracks, finds itself again, says when it is lost, and neither
-// ticks nor the place on the map change what it does.
+// Laws of localisation by particles as an estimator. It tracks, finds itself again, and reports when it is lost.
+// Neither ticks nor the place on the map change what it does.
 #include "estimators/planar/pose_particles.hpp"
 #include "estimators/circling_robot.hpp"
 #include "node/estimator_slot.hpp"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Laws of the planar filters, whatever their kind: ticks do not change the state, a pose from outside is taken as it
-// is, no sensor makes them lose their numbers, and GNSS finds the heading of each. Where noise is small the unscented
+// Laws of the planar filters, whatever their kind. Ticks do not change the state, and a pose from outside is taken as
+// it is. No sensor makes them lose their numbers, and GNSS finds the heading of each. With small noise the unscented
 // filters are the extended one.
 #include "estimators/planar/pose_ukf.hpp"
 #include "estimators/circling_robot.hpp"

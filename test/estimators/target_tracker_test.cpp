@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Laws of the trackers: they follow a target within their uncertainty, begin anew when it is another one, ticks change
-// no bit, and no measurement leaves them without numbers.
+// Laws of the trackers. They follow a target within their uncertainty, and begin anew when it is another one. Ticks
+// change no bit, and no measurement leaves them without numbers.
 #include "estimators/target/target_tracker.hpp"
 #include "base/bit_crc.hpp"
 #include "config/tracker.hpp"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// One target seen by lidar and radar in turn, a set published with truth and with limits (Udacity CarND, projects
-// "Extended Kalman Filter" and "Unscented Kalman Filter"). One configuration per filter serves both files; sensor noise
-// is the course's. Without the data in $TETAP_DATA the tests are skipped.
+// One target seen by lidar and radar in turn, a set published with truth and with limits. Source: Udacity CarND,
+// projects "Extended Kalman Filter" and "Unscented Kalman Filter". One configuration per filter serves both files;
+// sensor noise is the course's. Without the data in $TETAP_DATA the tests are skipped.
 #include "filter/ekf.hpp"
 #include "filter/square_root.hpp"
 #include "filter/ukf.hpp"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// libFuzzer: bytes become samples of every sensor with fields of any value, late, early and out of order, between those
-// of a robot that drives on. The node has inertial navigation, the attitude filter and odometry. Plausible samples go
-// in. No estimator may leave the numbers for it, and the node answers the same a second time.
+// libFuzzer: bytes become samples of every sensor with fields of any value. They come late, early and out of order,
+// between those of a robot that drives on. The node has inertial navigation, the attitude filter and odometry.
+// Plausible samples go in. No estimator may leave the numbers for it, and the node answers the same a second time.
 #include "bus/frame_sink.hpp"
 #include "config/rover.hpp"
 #include "estimators/attitude.hpp"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a wrong scale of the gyroscope costs the heading, against what it does: error = scale times the angle turned.
+// Cost of a wrong scale of the gyroscope to the heading, against its effect: error = scale times the angle turned.
 #include "nav/gyro_scale_consider.hpp"
 
 #include <gtest/gtest.h>
@@ -30,7 +30,7 @@ TEST(GyroScaleConsider, ACornerAndACircleCostWhatTheyDoAtAnyRateAndCadence) {
 }
 
 TEST(GyroScaleConsider, WeavingAndNoiseCostLittle) {
-  // 0.3 rad/s at 0.5 Hz for ten minutes: 0.1 rad to either side. What it does is 0.1.
+  // 0.3 rad/s at 0.5 Hz for ten minutes: 0.1 rad to either side. The wrong scale's effect is 0.1.
   EXPECT_LT(sigma_after(600, 0.01, [](double t) { return 0.3 * std::cos(3.14159265 * t); }), 0.2);
   EXPECT_EQ(sigma_after(3600, 0.01, [](double t) { return std::lround(t / 0.01) % 2 == 0 ? 0.5 : -0.5; }), 0.0);
 }

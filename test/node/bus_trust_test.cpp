@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A bus that is not trusted: sync frames that nobody meant, commands that were replayed or made up, samples that were
-// damaged behind the CAN controller. What is refused is counted and changes no bit of an estimate.
+// A bus that is not trusted: sync frames that nobody meant, and commands that were replayed or made up. Samples damaged
+// behind the CAN controller come too. A refused frame is counted and changes no bit of an estimate.
 #include "bus/guard_sender.hpp"
 #include "node/bench.hpp"
 #include "node/firmware.hpp"
@@ -54,7 +54,7 @@ class LoopOnABus : public ::testing::Test {
   static bus::InSync sync(bus::SyncKind kind, std::int64_t time_us, int counter) {
     return {.time_us = static_cast<std::uint64_t>(time_us), .ctr = static_cast<std::uint8_t>(counter), .kind = kind};
   }
-  /// How many ticks there were.
+  /// Number of ticks that there were.
   int run(std::int64_t us) {
     const auto before = ticks();
     for (const base::Micros until = board.time + base::Micros{us}; board.time < until; board.time += base::Micros{250})

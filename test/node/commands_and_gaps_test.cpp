@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where lateness, commands and silence meet: the cases in which a node once gave wrong answers.
+// Lateness, commands and silence together: the cases in which a node once gave wrong answers.
 
 #include "node/bench.hpp"
 #include "node/pacer.hpp"

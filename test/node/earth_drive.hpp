@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A robot drives on the Earth of GeographicLib, which shares nothing with src/nav: its way is given in the tangent
-// frame of its start, its sensors show what the ellipsoid, its normal gravity and the level axes of the place make of
+// A robot drives on the Earth of GeographicLib, which shares nothing with src/nav. Its way is given in the tangent
+// frame of its start. Its sensors show what the ellipsoid, its normal gravity and the level axes of the place make of
 // it.
 #pragma once
 
@@ -76,7 +76,7 @@ class EarthDrive {
     unsigned seed = 1;
     bool wheels = true, gnss_velocity = true, climb_rate = true, compass = false, antennas = false, barometer = false;
     std::int64_t gnss_every_us = 200'000;
-    double turns_back_s = 1e9;  ///< it stops, and reverses as fast from then on
+    double turns_back_s = 1e9;  ///< the robot stops, and reverses as fast from then on
   };
   static constexpr double kRadius_m = 0.1, kTrack_m = 0.5, kCounts = 20'000, kSigmaFix_m = 0.5,
                           kSigmaVelocity_mps = 0.05;

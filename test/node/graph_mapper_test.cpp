@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A robot with a pose graph, as frames in and frames out: keyframes by wheels or by a front end, closures, bad input,
-// set pose and reset with a job in flight, and far more than fits.
+// A robot with a pose graph, as frames in and frames out: keyframes by wheels or by a front end, closures, bad input.
+// Set pose and reset come with a job in flight, and far more than fits is sent.
 #include "estimators/mapping/graph_mapper.hpp"
 #include "bench.hpp"
 #include "bus/encoder.hpp"
@@ -115,8 +115,8 @@ TEST_F(WheelsTest, WayMakesKeyframesThatTheBusAnnounces) {
   EXPECT_EQ(graph_.closures, 1);
 }
 
-/// Ten steps of 1 m with sigma s, and 10.5 m from end to end with sigma c: x = (10/10s^2 + 10.5/c^2)/(1/10s^2 + 1/c^2),
-/// and the sum of squares is 0.5^2 / (10 s^2 + c^2).
+/// Ten steps of 1 m with sigma s, and 10.5 m from end to end with sigma c. x = (10/10s^2 + 10.5/c^2)/(1/10s^2 + 1/c^2).
+/// The sum of squares is 0.5^2 / (10 s^2 + c^2).
 TEST_F(GraphMapperTest, AClosureGivesTheLeastSquaresOfAStraightLine) {
   drive(10);
   EXPECT_NEAR(x_m_, 10, 0.002);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Jobs longer than a tick: neither how much of a job a tick does nor how long that takes changes what is adopted, and
-// what makes a result worthless aborts the job.
+// Jobs longer than a tick. Neither how much of a job a tick does nor how long that takes changes what is adopted. A
+// change that makes a result worthless aborts the job.
 #include "bench.hpp"
 #include "estimators/own_map.hpp"
 #include "estimators/paced_job.hpp"
@@ -12,8 +12,8 @@
 namespace tetap::test {
 namespace {
 
-/// Odometry whose speed is smoothed in a job: of the speeds that were there when the job began a weighted mean of
-/// kUnits terms, one a unit. What came since is added when the result is adopted.
+/// Odometry whose speed is smoothed in a job. The job makes a weighted mean of kUnits terms of the speeds that were
+/// there when it began, one a unit. Later speeds are added when the result is adopted.
 class Smoother {
  public:
   static constexpr sensor::EstimatorKind kKind = sensor::EstimatorKind::kPoseGraph;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Origin and range of the map as a user of the node sees them on the bus: an origin from fixes that confirm each other,
-// a wrong one found out, a word beyond the range.
+// Origin and range of the map as a user of the node sees them on the bus. An origin comes from fixes that confirm each
+// other. A wrong one is found out. A robot beyond the range is reported.
 #include "bench.hpp"
 #include "earth_drive.hpp"
 #include "estimators/inertial/inertial.hpp"
@@ -27,7 +27,7 @@ struct Received {
   sensor::OriginSource origin = sensor::OriginSource::kNone;
   double origin_latitude_deg = 0, origin_longitude_deg = 0, origin_height_m = 0;
   std::int32_t x_mm = 0, y_mm = 0;
-  double valid_after_s = -1;  ///< when the position became valid
+  double valid_after_s = -1;  ///< time at which the position became valid
 
   [[nodiscard]] bool fault(sensor::Fault word) const { return (faults >> static_cast<unsigned>(word) & 1U) != 0; }
 };
@@ -135,7 +135,7 @@ param::Parameters configured(const GeoPlace& origin, int how) {
   return n;
 }
 EarthDrive::Options at(const GeoPlace& start) { return {.start = start, .noise = 0.2}; }
-/// The same place, so far to the east.
+/// A place so far to the east of another.
 GeoPlace east_of(const GeoPlace& place, double distance_m) {
   GeoPlace there = TangentFrame(place).geodetic({distance_m, 0, 0});
   there.height_m = place.height_m;

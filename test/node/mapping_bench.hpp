@@ -21,7 +21,7 @@ struct Place {
   double x, y;
 };
 
-/// A robot on a circle of 3 m around the origin, at 0.5 m/s, among posts; sightings of what is within 6 m ten times a
+/// A robot on a circle of 3 m around the origin, at 0.5 m/s, among posts. It sees what is within 6 m ten times a
 /// second, all of one stamp.
 template <class Estimators>
 class Mapping {

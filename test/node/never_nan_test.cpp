@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Every estimator behind everything that a sample or a frame can say: finite states, covariances that are positive
-// definite (judge: eigenvalues in double), and no restart because an invariant broke.
+// Every estimator behind everything that a sample or a frame can hold: finite states and covariances that are positive
+// definite. The judge is eigenvalues in double. No restart comes because an invariant broke.
 #include "support/never_nan.hpp"
 #include "bench.hpp"
 #include "config/rover.hpp"
@@ -215,7 +215,7 @@ std::vector<Field> fields_of(sensor::Sample& s) {
       return {};
   }
 }
-/// Also the sizes at which plausible() draws its line.
+/// Hostile values, and the sizes at which plausible() draws its line.
 std::vector<float> values() {
   std::vector<float> all(kHostile.begin(), kHostile.end());
   for (const float limit : {10.0F, 20.0F, 100.0F, 200.0F, 1e3F, 1e4F, 1e5F, 1e6F})
@@ -223,7 +223,7 @@ std::vector<float> values() {
   return all;
 }
 
-/// Or there would be nothing behind the door for the hostile ones to break.
+/// An unused sensor would leave nothing behind the door for the hostile ones to break.
 TEST(NeverNan, EverySensorIsUsedWhileItIsGood) {
   using sensor::Sensor;
   Wired wired;
@@ -241,8 +241,8 @@ TEST(NeverNan, EverySensorIsUsedWhileItIsGood) {
   EXPECT_TRUE(wired.took(kEkf, sensor::Sensor::kRangeBearing));
 }
 
-/// A run in which from tick `from` on, for two seconds, every sample of this kind is spoilt; `taken` hears whether that
-/// one was let in.
+/// A run in which every sample of this kind is spoilt, from tick `from` on, for two seconds. `taken` is told of each
+/// whether it was let in.
 template <class Spoil, class Taken>
 void run_spoilt(sensor::Sensor sensor, int from, Others others, Spoil&& spoil, Taken&& taken) {
   Wired wired;
@@ -261,7 +261,7 @@ void run_spoilt(sensor::Sensor sensor, int from, Others others, Spoil&& spoil, T
   }
   EXPECT_TRUE(wired.navigates());
 }
-/// This field has this value.
+/// Runs with one field of a sensor at one value.
 void run_broken(sensor::Sensor sensor, std::size_t field, float value, int from, Others others) {
   bool optional = false;
   run_spoilt(
@@ -485,7 +485,7 @@ TEST(NeverNan, RandomBitsInEveryInputFrame) {
       if (dice.one_in(9)) send(bus::frame(base, bus::InHeading{.stamp_us = stamp(), .seq = seq}), true);
       if (dice.one_in(5)) {
         const std::uint32_t t = stamp();
-        const bool place = dice.one_in(3);  // else where the robot is, with random accuracies
+        const bool place = dice.one_in(3);  // false: where the robot is, with random accuracies
         send(bus::frame(base, bus::InGnssLat{.stamp_us = t, .seq = seq, .lat_raw = 24'131'350'000}), place);
         send(bus::frame(base, bus::InGnssLon{.stamp_us = t, .seq = seq, .lon_raw = 5'834'150'000}), place);
         send(bus::frame(

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a user of the node relies on: order and lateness leave no trace, every epoch is accounted for, commands mean
-// what they say.
+// Promises that a user of the node relies on. Order and lateness leave no trace, every epoch is accounted for, commands
+// mean what their names state.
 #include "bench.hpp"
 
 #include <gtest/gtest.h>
@@ -235,9 +235,9 @@ TEST(Node, HalfAnImuSampleIsNeverMixedWithAnother) {
     return in(
         bus::ImuTime{.stamp_us = stamp(bench.now_us), .interval_us = 10'000, .seq = static_cast<std::uint8_t>(seq)});
   };
-  bench.epoch({gyro(1), accel(1)});           // its time never comes
+  bench.epoch({gyro(1), accel(1)});           // the sample's time never comes
   bench.epoch({gyro(2), accel(2), time(2)});  // whole
-  bench.epoch({time(3), gyro(3)});            // its acceleration never comes
+  bench.epoch({time(3), gyro(3)});            // the sample's acceleration never comes
   const Frames out = bench.idle(150);
   EXPECT_EQ(last<bus::EstDiagFrames>(out)->incomplete, 2);
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Robots that make a map of their own, as frames in and frames out: the map on the bus, set pose, reset, a full map,
-// late sightings.
+// Robots that make a map of their own, as frames in and frames out. The cases: the map on the bus, set pose, reset, a
+// full map, late sightings.
 #include "mapping_bench.hpp"
 
 #include <gtest/gtest.h>
@@ -176,7 +176,7 @@ TYPED_TEST(OwnMap, ASightingBehindTheWindowIsTooLate) {
   EXPECT_EQ(last<bus::EstDiagOrder>(run.bench->idle(130))->too_late, 5);
 }
 
-/// A full map, a set pose and a reset of the map in one tick: the reset first, so that the pose is as it was set.
+/// A full map, a set pose and a reset of the map in one tick. The reset comes first, so that the pose is as it was set.
 TYPED_TEST(OwnMap, ResetAndSetPoseOfAFullMapInOneTick) {
   constexpr int kPlaces = std::is_same_v<TypeParam, Ekf> ? 30 : 15;
   Mapping<TypeParam> run(kPlaces + 2);

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Runs an attitude filter over a recorded IMU log, for tools/report/compare_attitude: attitude_log FILTER IN OUT
-// [option=value...] IN: rows of ten little-endian floats, interval since the row before (s), gyroscope (rad/s),
-// accelerometer (m/s^2), magnetometer. OUT: one row each of q_nb (w x y z), gyroscope bias (rad/s) and flags (1 rest, 2
-// accelerometer, 4 magnetometer disturbed). The option names are those of AttitudeOptions,
-// gyroscope_range_radps and accelerometer_range_mps2. Madgwick's filter (2010) is
-// here as it was published, to show that the errors are measured as the published ones were.
+// [option=value...]. IN: rows of ten little-endian floats: interval since the row before (s), gyroscope (rad/s),
+// accelerometer (m/s^2), magnetometer. OUT: one row each of q_nb (w x y z), gyroscope bias (rad/s) and flags. Flags:
+// 1 rest, 2 accelerometer, 4 magnetometer disturbed. The option names are those of AttitudeOptions,
+// gyroscope_range_radps and accelerometer_range_mps2. Madgwick's filter (2010) is here as it was published, to show
+// that the errors are measured as the published ones were.
 #include "filter/attitude.hpp"
 #include "filter/mahony.hpp"
 

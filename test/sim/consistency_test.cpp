@@ -1,16 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-// Is the published uncertainty honest? The whole node in the matched world, told exactly that world's noise, over many
-// seeds: Bar-Shalom, Li, Kirubarajan, Estimation with Applications to Tracking and Navigation, 2001, sec. 5.4.2.
+// Is the published uncertainty honest? The whole node runs in the matched world, with exactly that world's noise, over
+// many seeds. Source: Bar-Shalom, Li, Kirubarajan, Estimation with Applications to Tracking and Navigation, 2001, sec.
+// 5.4.2.
 //
-// ANEES: the normalised squared error of the pose (3 degrees of freedom), averaged over the seeds at each time, is
-// chi-square with 3 N degrees of freedom over N, so inside its two-sided 95 % interval at 95 % of the times. Errors
-// last, so the times are not independent and the share scatters: 90 % is asked for. The other way round, averaged over
-// the times of each seed, the seeds are independent whatever lasts: Student's interval of their mean has to hold 3.
-// NIS: innovations of a correct filter are white, so their mean over all seeds and times has a chi-square interval of
-// its own. 99 % is taken where several things are asked at once.
+// ANEES: the normalised squared error of the pose (3 degrees of freedom), averaged over the seeds at each time. It is
+// chi-square with 3 N degrees of freedom over N: it lies inside its two-sided 95 % interval at 95 % of the times.
+// Errors last, so the times are not independent and the share scatters: 90 % is asked for. Averaged over the times of
+// each seed, the seeds are independent whatever lasts. Student's interval of their mean has to hold 3. NIS: innovations
+// of a correct filter are white. Their mean over all seeds and times has a chi-square interval of its own. 99 % is
+// taken where several things are asked at once.
 //
-// In the default matched world heading lasts for minutes (its gyroscope is as good as the data sheet's) and neither
-// gyroscope nor wheels could be noticed to be wrong. So there is a second one, in which every noise matters.
+// In the default matched world heading lasts for minutes: its gyroscope is as good as the data sheet's. Neither
+// gyroscope nor wheels could be noticed to be wrong there. A second matched world has noises that all matter.
 #include "node/node.hpp"
 #include "sim_host/matched_rover.hpp"
 #include "sim_host/world_source.hpp"
@@ -105,7 +106,7 @@ struct Judgement {
   double anees = 0;    ///< mean over all seeds and times
   double scatter = 0;  ///< half the width of Student's interval of it, from the seeds' own means
   double inside = 0;   ///< share of the times
-  double above = 0;    ///< too sure
+  double above = 0;    ///< share of the times that are too sure
   std::size_t times = 0;
   std::map<sensor::Sensor, Nis> nis;
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A robot that maps landmarks without identities, in the simulated world: its uncertainty is honest in the world that
-// the filter models, and clutter, moving obstacles and unmodelled errors do not lead it astray without a word.
+// A robot that maps landmarks without identities, in the simulated world. Its uncertainty is honest in the world that
+// the filter models. Clutter, moving obstacles and unmodelled errors do not lead it astray without a word.
 #include "config/mapper.hpp"
 #include "sim_host/matched_rover.hpp"
 #include "sim_host/simulated_robot.hpp"
@@ -174,8 +174,8 @@ Campaign campaign(const char* name, const World::Options& options, const param::
   return all;
 }
 
-/// The world that the filter models, from a start that is known to a few millimetres: an error of the start lasts for
-/// the whole run, so that a NEES would be one draw and no mean.
+/// The world that the filter models, from a start that is known to a few millimetres. An error of the start lasts for
+/// the whole run: a NEES would be one draw and no mean.
 World::Options modelled_world(double gyro_noise = 1, double wheel_noise = 1) {
   World::Options options = loop_world(60, 2, 24);
   options.parameters = matched(options.parameters);

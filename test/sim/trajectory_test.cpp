@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The path and its sensors, judged by means that neither world nor firmware use: inertial axes instead of local ones,
-// geocentric coordinates of GeographicLib, contact points of wheels.
+// The path and its sensors, judged by means that neither world nor firmware use. The means: inertial axes instead of
+// local ones, geocentric coordinates of GeographicLib, contact points of wheels.
 #include "test/sim/support.hpp"
 
 #include <gtest/gtest.h>

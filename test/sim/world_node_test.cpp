@@ -168,7 +168,7 @@ template <std::size_t kPlaces>
 using RoverWith =
     node::EstimatorsWithPlaces<kPlaces, estimators::Odometry, robot::rover::Attitude, robot::rover::Inertial>;
 
-/// How often samples became final early for want of places, if that frame says so.
+/// Count of samples that became final early for want of places, if the frame has it.
 int short_windows(const base::CanFrame& frame) {
   if (frame.id != 0x300 + bus::EstDiagCapacity::kOffset) return 0;
   const auto full = bus::decode<bus::EstDiagCapacity>(bus::payload(frame));
@@ -264,7 +264,7 @@ TEST(Motion, TheOneSigmaOfSpeedAndTurnRateIsThatOfTheirErrors) {
       const std::vector<Epoch> epochs = made({.mismatched = false, .inertial = robot.inertial}, seed, 60);
       std::map<std::size_t, bus::EstMotion> motion;
       run(robot, epochs, [&](std::size_t k, const base::CanFrame& frame) {
-        if (k < 500) return;  // it stands, then drives
+        if (k < 500) return;  // the robot stands, then drives
         for (std::size_t i = 0; i < 4; ++i) {
           if (frame.id == 0x300 + bus::offset_of<bus::EstMotion>(i))
             if (const auto said = bus::decode<bus::EstMotion>(bus::payload(frame))) motion[i] = *said;
@@ -293,7 +293,7 @@ TEST(Motion, TheOneSigmaOfSpeedAndTurnRateIsThatOfTheirErrors) {
   }
 }
 
-// Where the IMU repeats itself wheels tell the turn, or nothing does: that is said, too.
+// A stuck IMU leaves the turn to the wheels, or to nothing: the published sigmas grow either way.
 TEST(Motion, TheOneSigmaOfSpeedAndTurnRateGrowsWithTheirErrorsWhereTheImuIsStuck) {
   for (const bool wheels : {true, false}) {
     double speed = 0, rate = 0, count = 0;

@@ -151,7 +151,7 @@ TEST(EkfMapper, ClutterDoesNotStay) {
   EXPECT_LT(f.pose_nees, 6);
 }
 
-/// Pairs of landmarks 0.6 m apart, seen together by a robot that is unsure of its place: one-to-one assignment keeps
+/// Pairs of landmarks 0.6 m apart, seen together by a robot that is unsure of its place. One-to-one assignment keeps
 /// them apart, nearest neighbours may take one for both.
 double confused(AssociationMethod method) {
   double wrong = 0;

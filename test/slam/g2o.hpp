@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reader of planar pose graphs in text, for tests and host tools: g2o's VERTEX_SE2 / EDGE_SE2 (Kuemmerle, Grisetti,
-// Strasdat, Konolige, Burgard, ICRA 2011) and TORO's VERTEX2 / EDGE2 with its own order of the information (Grisetti,
-// Stachniss, Grzonka, Burgard, RSS 2007). Errors name the line and the cause.
+// Reader of planar pose graphs in text, for tests and host tools. Formats: g2o's VERTEX_SE2 / EDGE_SE2 (Kuemmerle,
+// Grisetti, Strasdat, Konolige, Burgard, ICRA 2011). TORO's VERTEX2 / EDGE2 with its own order of the information
+// (Grisetti, Stachniss, Grzonka, Burgard, RSS 2007). Errors name the line and the cause.
 #pragma once
 
 #include <Eigen/Cholesky>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the tests of graphs share: edges of a file as inputs of a graph, and the judges' figures, in double.
+// Parts that the tests of graphs share: edges of a file as inputs of a graph, and the judges' figures, in double.
 #pragma once
 
 #include "slam/g2o.hpp"

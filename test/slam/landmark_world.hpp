@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A simulated world of landmarks on both sides of a circular course, with clutter if asked for: a truth of its own in
-// double, noise of the size that is told to the filter.
+// A simulated world of landmarks on both sides of a circular course, with clutter if asked for. It has a truth of its
+// own in double, and noise of the size that is given to the filter.
 #pragma once
 
 #include "model/planar_increment.hpp"

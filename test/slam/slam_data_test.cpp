@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // EKF-SLAM and FastSLAM on MRCLAM, data set 7: identities known, map unknown, start given, one configuration for all
-// robots. The trajectory is aligned by the rigid motion that fits the map's landmarks. docs/explanation/ekf_slam.md
-// says how the numbers were chosen and what leaving one robot out gives.
+// robots. The trajectory is aligned by the rigid motion that fits the map's landmarks. The choice of the numbers, and
+// the result of leaving one robot out, are in docs/explanation/ekf_slam.md.
 #include "config/mrclam_fast.hpp"
 #include "filter/ekf.hpp"
 #include "model/range_bearing.hpp"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a bus may do to a node: damage to the frames of honest sensors, and frames of a sender that is not honest. Where
-// signals lie is taken from the messages that config/tetap.dbc makes.
+// Harm that a bus may do to a node: damage to the frames of honest sensors, and frames of a sender that is not honest.
+// The messages that config/tetap.dbc makes give the places of the signals.
 #pragma once
 
 #include "base/can_frame.hpp"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a broken sensor may hand over, and what has to hold after it.
+// Values that a broken sensor may hand over, and what has to hold after them.
 #pragma once
 
 #include "filter/update.hpp"

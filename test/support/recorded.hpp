@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where recorded data lie ($TETAP_DATA, else TETAP_DEFAULT_DATA, a definition of the build), and their tables of
+// Folder of recorded data ($TETAP_DATA, else TETAP_DEFAULT_DATA, a definition of the build), and their tables of
 // numbers.
 #pragma once
 

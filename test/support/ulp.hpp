@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How wrong a floating-point result is, in units of the last place of the true value: the one measure behind every
+// Error of a floating-point result, in units of the last place of the true value: the one measure behind every
 // limit in ulp.
 #pragma once
 
@@ -11,9 +11,9 @@
 namespace tetap::test {
 
 /// |got - truth| / ulp(truth). One ulp is 2^(e-23) for |truth| in [2^e, 2^(e+1)), and 2^-149 below 2^-126. Infinite, so
-/// above any limit: a NaN that is not the canonical one (7fc00000) or not due, another sign than the truth's (of zero
-/// too), a finite result for a truth of 2^128 and more. An infinite result for a smaller truth counts as 2^128. The
-/// truth comes in double: its own error is 2^-29 ulp.
+/// above any limit: a NaN that is not the canonical one (7fc00000) or not due. Infinite too: another sign than the
+/// truth's (of zero too), a finite result for a truth of 2^128 and more. An infinite result for a smaller truth counts
+/// as 2^128. The truth comes in double: its own error is 2^-29 ulp.
 [[nodiscard]] inline double ulp_error(float got, double truth) {
   constexpr double kNever = std::numeric_limits<double>::infinity();
   constexpr double kBeyond = 0x1p+128;

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Puts the UBX navigation messages of one time of week together into one report: NAV-PVT, NAV-COV and NAV-HPPOSLLH of a
-// current receiver, or the messages of an old one (NAV-SOL, -POSLLH, -VELNED, -STATUS, -DOP, -TIMEUTC; sources in
-// nav.hpp).
+// Puts the UBX navigation messages of one time of week together into one report. A current receiver sends NAV-PVT,
+// NAV-COV and NAV-HPPOSLLH. An old one sends NAV-SOL, -POSLLH, -VELNED, -STATUS, -DOP, -TIMEUTC (sources in nav.hpp).
 #pragma once
 
 #include "base/wgs84.hpp"

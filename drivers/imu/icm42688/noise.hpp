@@ -42,9 +42,9 @@ struct Noise {
           kAccel_g_rtHz * kStandardGravity_mps2 * root / scale.force_mps2};
 }
 
-/// Equal samples of one axis in a row that no healthy sensor at rest shows, once in 10^12 tries. That is as many as its
-/// noise, in the middle of a count, needs to leave it. Independent are two values per period of the bandwidth. `floor`:
-/// at least so many; 0: never. 0 too where the number cannot be counted.
+/// Number of equal samples of one axis in a row that no healthy sensor at rest shows more than once in 10^12 tries. It
+/// is as many as its noise, in the middle of a count, needs to leave it. Independent are two values per period of the
+/// bandwidth. `floor`: at least so many; 0: never. 0 too where the number cannot be counted.
 [[nodiscard]] constexpr std::uint16_t stuck_samples(std::uint16_t floor, float sigma_counts, const Settings& s) {
   constexpr float kLogOfTries = 27.6F;        // ln 10^12
   constexpr float kQuieter = 0.8F;            // ours: a sensor quieter than the typical one

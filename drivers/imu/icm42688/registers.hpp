@@ -46,9 +46,9 @@ inline constexpr std::uint8_t kIntfMarkBytesBigSpi = 0x33;
 
 inline constexpr Register kIntfConfig1{0, 0x4D};  // 14.35
 inline constexpr std::uint8_t kRtcMode = 0x04, kClockSelect = 0x03, kClockPll = 0x01;
-/// Not in the sheet, where these bits are reserved. With 10, as after a reset, the chip changes its range by itself,
-/// and the gyroscope repeats a value for 1 to 2 ms beyond 100 deg/s. 01 turns this off (ArduPilot 25025 and 25332, with
-/// the maker's answer; betaflight 12970).
+/// Not in the sheet, where these bits are reserved. With 10, as after a reset, the chip changes its range by itself.
+/// The gyroscope then repeats a value for 1 to 2 ms beyond 100 deg/s. 01 turns this off (ArduPilot 25025 and 25332,
+/// with the maker's answer; betaflight 12970).
 inline constexpr std::uint8_t kRangeSwitch = 0xC0, kRangeSwitchOff = 0x40;
 
 inline constexpr Register kPwrMgmt0{0, 0x4E};  // 14.36

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Self test of the ICM-42688-P (DS-000347, 4.9). Response = output with the actuation minus output without, compared
-// with the factory's (codes: 15.11-15.13, 16.4-16.6). The data sheet has neither the codes' meaning nor the limits;
-// they are facts of InvenSense's reference driver for this family. 2620 counts * 1.01^(code - 1) at 250 deg/s and 2 g,
-// ratio 0.5 to 1.5. Without codes 60 deg/s and 50 to 1200 mg. The robot has to stand still.
+// Self test of the ICM-42688-P (DS-000347, 4.9). Response is output with the actuation minus output without. It is
+// compared with the factory's (codes: 15.11-15.13, 16.4-16.6). The data sheet has neither the codes' meaning nor the
+// limits. They are facts of InvenSense's reference driver for this family. 2620 counts * 1.01^(code - 1) at 250 deg/s
+// and 2 g, ratio 0.5 to 1.5. Without codes 60 deg/s and 50 to 1200 mg. The robot has to stand still.
 #pragma once
 
 #include "base/time.hpp"

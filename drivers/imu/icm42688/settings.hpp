@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a robot chooses of the ICM-42688-P, and the register fields that follow from it. Sections: DS-000347 rev. 1.8.
+// Choices of a robot for its ICM-42688-P, and the register fields that follow from them. Sections: DS-000347 rev. 1.8.
 #pragma once
 
 #include "drivers/imu/icm42688/registers.hpp"

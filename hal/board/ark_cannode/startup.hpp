@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What lies in the image beside the board: the record that a fault handler leaves for the next start.
+// Data that lie in the image beside the board: the record that a fault handler leaves for the next start.
 #pragma once
 
 #include "hal/chip/arm/stored_fault.hpp"

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A CAN controller on Linux: a raw SocketCAN socket read and written in batches (recvmmsg, sendmmsg), so that a slow
-// kernel is asked once for many frames. Frames lost in the socket's buffer are counted by the kernel (SO_RXQ_OVFL), not
-// guessed.
+// A CAN controller on Linux: a raw SocketCAN socket read and written in batches (recvmmsg, sendmmsg). A slow kernel is
+// asked once for many frames. The kernel counts frames lost in the socket's buffer (SO_RXQ_OVFL): they are not guessed.
 #pragma once
 
 #include "base/can_frame.hpp"
@@ -43,7 +42,7 @@ class SocketCan {
   /// is looked for here.
   void wait(base::Micros timeout);
 
-  /// When the frame last returned by receive() arrived, since 1970; only with `arrival_times`.
+  /// Arrival time, since 1970, of the frame last returned by receive(); only with `arrival_times`.
   [[nodiscard]] base::Micros last_arrival() const { return last_arrival_; }
   /// Remote and error frames skipped.
   [[nodiscard]] std::uint64_t ignored() const { return ignored_; }

@@ -25,7 +25,7 @@ struct CanConfig {
   CanFilter filter{};  ///< a mask of 0 passes every data frame of its kind
 };
 
-/// Where the controller stands towards the bus.
+/// State of the controller towards the bus.
 enum class CanState : std::uint8_t {
   kStopped,  ///< not started, or the controller does not follow a change of its mode
   kJoining,  ///< waits for 11 recessive bits in a row: the transceiver is silent or the bus is stuck as long as it

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The lines that an image prints about itself. At boot: its version, the robot and the hashes of the self-check, the
-// same on every target; anybody with a board can compare them with `make bits`. Later: the stack's high-water mark.
+// same on every target. Anybody with a board can compare them with `make bits`. Later: the stack's high-water mark.
 #pragma once
 
 #include "hal/chip/support/text.hpp"

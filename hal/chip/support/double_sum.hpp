@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// IEEE 754 binary64 addition in integers, rounded to nearest even, for cores without a double-precision unit. libgcc
-// 12.2 (ieee754-df.S of ARMv7-M) rounds some differences to the wrong neighbour. They have operands of opposite sign
-// whose exponents are 33 apart; `make bits` met one. Its sum is then not the sum of the other targets. Every NaN is the
-// one canonical NaN.
+// IEEE 754 binary64 addition in integers, rounded to nearest even, for cores without a double-precision unit. Some
+// differences are rounded to the wrong neighbour by libgcc 12.2 (ieee754-df.S of ARMv7-M). They have operands of
+// opposite sign whose exponents are 33 apart. `make bits` met one: its sum is then not the sum of the other targets.
+// Every NaN is the one canonical NaN.
 #pragma once
 
 #include <bit>

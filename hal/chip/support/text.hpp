@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// One line of text put together without stdio: for boot messages, fault reports and target tests. What does not fit is
-// cut.
+// One line of text put together without stdio: for boot messages, fault reports and target tests. Text that does not
+// fit is cut.
 #pragma once
 
 #include <array>

@@ -52,7 +52,7 @@ inline constexpr std::uint32_t kRtr = 1U << 0;
   return {.id = high << 18 | ((word >> kIdLowShift) & kIdLowMask), .extended = true, .remote = (word & kRtr) != 0};
 }
 
-/// Where byte 0..3 of a data word sits: the first byte on the wire is the most significant.
+/// Place of byte 0..3 in a data word: the first byte on the wire is the most significant.
 [[nodiscard]] constexpr unsigned byte_shift(unsigned byte) { return 24U - 8U * byte; }
 
 }  // namespace silicon

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Silicon or emulator: the one named seam of this port. The data sheets (UG1085, UG1087) define kSilicon. kEmulated is
-// QEMU 7.2's xlnx-zcu102. It differs in identifier word and data words of the CAN controller (can_encoding.hpp), in
-// width and clock of the timer (ttc.hpp), and in the cost of an idle poll (rest(), here). One image runs on both;
-// Ttc::probe() distinguishes them at boot.
+// QEMU 7.2's xlnx-zcu102. It differs in identifier word and data words of the CAN controller (can_encoding.hpp). It
+// differs in width and clock of the timer (ttc.hpp), and in the cost of an idle poll (rest(), here). One image runs on
+// both; Ttc::probe() distinguishes them at boot.
 #pragma once
 
 namespace tetap::hal::zynqmp_r5 {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Alignment: the filter's start. Levels by gravity, then waits for a place and a heading: a given pose, an outside
-// heading, a magnetometer's, or the motion's (heading_monitor.hpp), forwards or in reverse. Of a robot that starts
-// forwards for sure the course of GNSS is enough (fast velocity, or the chord between fixes).
+// Alignment: the filter's start. It levels by gravity, then waits for a place and a heading. The heading is a given
+// pose's, an outside one, a magnetometer's, or the motion's (heading_monitor.hpp), forwards or in reverse. For a robot
+// that starts forwards for sure the course of GNSS is enough (fast velocity, or the chord between fixes).
 #pragma once
 
 #include "checks/coloured_noise.hpp"
@@ -28,7 +28,7 @@ class Alignment {
   bool level(const nav::ImuIncrement& imu, HeadingMonitor& monitor, const param::InertialParameters& n);
   /// Increments are missing.
   void gap(base::Micros gap, HeadingMonitor& monitor) {
-    if (gap > base::Micros{100'000}) fixed_ = false;  // it may have turned: the way begins anew
+    if (gap > base::Micros{100'000}) fixed_ = false;  // the robot may have turned: the way begins anew
     if (monitor.runs() || (levelling_.begun() && !headed_)) monitor.finder().predict_without_imu(gap);
   }
   /// Forward speed of wheels or speedometer.
@@ -191,9 +191,9 @@ inline void Alignment::velocity(const nav::Vector3& v_n_mps, float sigma_mps, bo
   monitor.find_by_velocity(v_n_mps, sigma_mps, n.gnss);
 }
 
-/// Without a receiver's velocity the robot goes where it points: linearised about another direction, wheels would seem
-/// to show the heading. Sideways the speed is uncertain by three times what the heading makes of it: the two are not
-/// correlated here, and the constraint would take the rest for knowledge of the heading.
+/// Without a receiver's velocity the robot goes where it points. Linearised about another direction, wheels would seem
+/// to show the heading. Sideways the speed is uncertain by three times what the heading makes of it. The two are not
+/// correlated here: the constraint would take the rest for knowledge of the heading.
 inline Alignment::Start Alignment::start(const nav::InsState* before, const nav::LocalLevel& place,
                                          const HeadingMonitor& monitor, const param::InertialParameters& n,
                                          float forward_mps) const {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Zero of a barometer: pressure is a height above an unknown zero, which drifts. Of zero and robot's height the one
-// that is known worse is found from the other, and never becomes better known than that: their errors are shared from
-// then on, and no cross covariance is kept of them.
+// Zero of a barometer: pressure is a height above an unknown zero, which drifts. The worse known of zero and robot's
+// height is found from the other, and never becomes better known than it. Their errors are shared from then on. No
+// cross covariance is kept of them.
 #pragma once
 
 #include "base/math.hpp"

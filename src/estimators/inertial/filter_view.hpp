@@ -50,8 +50,8 @@ class FilterView {
   [[nodiscard]] base::Micros time() const { return parts_.time; }
   [[nodiscard]] bool tracking() const { return parts_.tracking; }
 
-  /// Span from the last IMU sample to the measurement; 0 beyond a sample or two, where the last acceleration and turn
-  /// rate do not hold any more.
+  /// Span from the last IMU sample to the measurement. The span is 0 beyond a sample or two: the last acceleration and
+  /// turn rate do not hold any more there.
   [[nodiscard]] float later_s() const {
     constexpr base::Micros kMost{20'000};
     const base::Micros later = parts_.stamp - parts_.time;
@@ -89,8 +89,8 @@ class FilterView {
   [[nodiscard]] bool position_refused_for_long() const;
   /// A fix was fused within RecoveryParameters::after_us: the filter's heading is better than a magnetometer's.
   [[nodiscard]] bool position_holds_heading() const;
-  /// Vote of the wheels, or the speedometer, on what is refused since then; of the receiver's velocity; and of its
-  /// fixes on a velocity that is off by nu. Wheels that fixes contradicted for long do not vouch any more.
+  /// Votes on what is refused since then: by the wheels or the speedometer, and by the receiver's velocity. The fixes
+  /// vote on a velocity that is off by nu. Wheels that fixes contradicted for long do not vouch any more.
   [[nodiscard]] Vote wheels_vote(base::Micros since) const;
   [[nodiscard]] Vote velocity_vote(base::Micros since) const;
   [[nodiscard]] Vote fixes_vote(base::Micros since, const nav::Vector3& nu_mps) const;

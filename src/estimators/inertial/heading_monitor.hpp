@@ -55,7 +55,7 @@ class HeadingMonitor {
   [[nodiscard]] bool heading_wrong(const FilterView& filter) {
     return persists(contradicted_by_motion(filter), filter);
   }
-  /// The same for wheels: receiver and wheels agree on a speed, but not on its direction in the body.
+  /// Wheels show a wrong heading: receiver and wheels agree on a speed, but not on its direction in the body.
   [[nodiscard]] bool direction_wrong(const nav::Vector3& v_b_mps, float level_mps, float sigma_mps,
                                      const FilterView& filter) {
     return persists(sideways(v_b_mps, level_mps, sigma_mps, filter), filter);
@@ -94,8 +94,8 @@ class HeadingMonitor {
   bool runs_ = false;                 ///< the monitor runs beside the filter, or did before a restart
 };
 
-/// A magnetometer that is not trusted may have led the heading so surely that velocities alone do not pull it round:
-/// then a smaller difference counts.
+/// A magnetometer that is not trusted may have led the heading astray. Velocities alone may not pull so sure a heading
+/// round: then a smaller difference counts.
 [[gnu::noinline]] inline bool HeadingMonitor::contradicted_by_motion(const FilterView& filter) const {
   constexpr float kSuspectMagnetometer_rad = 0.1F, kSuspectMagnetometerSigmas = 3.0F;
   const float yaw_rad = nav::euler(filter.x().q_nb).yaw_rad, sigma_rad = base::sqrt(filter.heading_rad2());

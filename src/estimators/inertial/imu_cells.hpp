@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Sums of the window's IMU samples in cells on a grid of time: the present is reached over a handful of cells, and not
-// over every sample anew in every tick. A pure cache: cells that grew sample by sample are, bit for bit, those made at
-// once of all samples in the window.
+// Sums of the window's IMU samples in cells on a grid of time. The present is reached over a handful of cells, not over
+// every sample anew in every tick. The cells are a pure cache. Those that grew sample by sample are, bit for bit, those
+// made at once of all samples in the window.
 #pragma once
 
 #include "checks/imu_classifier.hpp"
@@ -68,8 +68,8 @@ class ImuCells {
   }
   void clear() { size_ = 0; }
 
-  /// Adds new samples of the window and drops those that begin to leave it: the grid place of the window's first sample
-  /// has no cell, and neither have samples beyond the last cell where there was no room for more.
+  /// Adds new samples of the window and drops those that begin to leave it. The grid place of the window's first sample
+  /// has no cell. Samples beyond the last cell have none either when there was no more room.
   void follow(const sensor::Window& window, const param::InertialParameters& n) {
     std::size_t first = 0;
     while (first < window.size() && !is_of(window[first], n)) ++first;

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Inertial navigation: an error-state filter at the horizon of the fusion window (its samples come in order, each
-// once), carried to the present by an output predictor. A composition: one object per source, alignment, standstill,
-// heading monitor, recovery, output predictor, work budget. The members of this class only pass facts between them.
+// Inertial navigation: an error-state filter at the horizon of the fusion window, carried to the present by an output
+// predictor. The filter's samples come in order, each once. The class is a composition: one object per source,
+// alignment, standstill, heading monitor, recovery, output predictor, work budget. Its members only pass facts between
+// them.
 #pragma once
 
 #include "base/reinitialise.hpp"

@@ -49,8 +49,8 @@ SourceStates Inertial::sources(const Context& ctx) const {
   return states;
 }
 
-/// Span to the present without IMU, squared, as the filter will grow there: over all of it, or over what is missing, at
-/// its end, too. Variance of velocity per (m/s^2)^2, or of attitude per (rad/s)^2.
+/// Span to the present without IMU, squared, as the filter will grow there. It covers all of the span without an IMU,
+/// else the missing parts, one at its end included. Variance of velocity per (m/s^2)^2, or of attitude per (rad/s)^2.
 float Inertial::unseen_s2(float unseen_s) const {
   constexpr float kLasts_s = 0.1F;  // Ins::predict_without_imu
   constexpr base::Micros kHole{25'000};
@@ -127,9 +127,9 @@ template <int kFirst, std::size_t kN>
 
 }  // namespace detail
 
-/// Variance of the speed ahead, x_b . R^T v at the present: by velocity, attitude (as far as the robot does not go
-/// where it points, and by what tilt made of acceleration since) and accelerometer bias; to second order by an
-/// uncertain heading. Variance of the turn: by gyroscope noise and bias, and by the age of its sample.
+/// Variance of the speed ahead, x_b . R^T v at the present: by velocity, attitude and accelerometer bias. Attitude
+/// counts as far as the robot does not go where it points, and by what tilt made of acceleration since. An uncertain
+/// heading adds to second order. Variance of the turn: by gyroscope noise and bias, and by the age of its sample.
 [[gnu::noinline]] MotionVariance Inertial::motion_variance(const Context& ctx) const {
   const InertialEstimate full = inertial(ctx);
   if (!full.valid) return {};

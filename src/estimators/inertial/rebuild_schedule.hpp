@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// When the output predictor starts over from the horizon: after a correction there, once the tick has work left for it.
+// New starts of the output predictor from the horizon: after a correction there, once the tick has work left for it.
 #pragma once
 
 #include "base/time.hpp"
@@ -34,8 +34,8 @@ class RebuildSchedule {
   }
   /// The rebuild had to classify samples one by one.
   void note_samplewise(bool is) { one_by_one_ = is; }
-  /// Span over which the covariance may wait for its prediction in this tick: a measurement brings it up to date, and
-  /// where this tick may take one, it is left to that.
+  /// Span over which the covariance may wait for its prediction in this tick. A measurement brings it up to date. A
+  /// tick that may take one leaves the prediction to it.
   [[nodiscard]] float covariance_every_s() const { return !rebuilt_ ? 20e-3F : one_by_one_ ? 30e-3F : 7.5e-3F; }
 
   template <class Sink>

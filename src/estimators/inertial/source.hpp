@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // One shape for every aiding source. A source assesses a measurement against a read-only view of the filter and changes
-// nothing but itself; the Assessment is what is to be done with the measurement, and with the filter. PX4 publishes
-// the like for every source (EstimatorAidSource).
+// nothing but itself. The Assessment is what is to be done with the measurement, and with the filter. PX4 publishes the
+// like for every source (EstimatorAidSource).
 #pragma once
 
 #include "base/time.hpp"

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Standstill: encoders that have not turned for half a second; without them, an IMU that shows nothing but its own
-// noise while GNSS velocity is none in the mean. Then the velocity is zero (zero-velocity update), and the gyroscope
-// shows its bias (zero-rate update). Errors of a standstill may be the same all the time: the velocity is fused only
-// while the filter knows less, and each mean of the gyroscope has samples of its own.
+// Standstill: encoders that have not turned for half a second. Without them, it is an IMU that shows nothing but its
+// own noise while GNSS velocity is none in the mean. Then the velocity is zero (zero-velocity update), and the
+// gyroscope shows its bias (zero-rate update). Errors of a standstill may be the same all the time. The velocity is
+// therefore fused only while the filter knows less. Each mean of the gyroscope has samples of its own.
 #pragma once
 
 #include "checks/persistence.hpp"
@@ -131,12 +131,12 @@ class Standstill {
   bool pending_ = false;                            ///< an update is due and waits for the next tick
 };
 
-/// The mean is the gyroscope's bias and its noise, and by the same noise the heading is wrong by now: the two are
-/// correlated (Bar-Shalom, Li, Kirubarajan 2001, sec. 8.3: measurement noise correlated with process noise). With that
-/// the heading is turned back to what it was, and an hour at rest costs it next to nothing. Of tilt the accelerometer
-/// has seen part of that noise already: there the measurement counts for less instead. The mean is of some time ago:
-/// the walk of the bias since is in its variance, and not in the mean (the part of the heading that came of that walk
-/// is left out: it is smaller by a thousand).
+/// The mean is the gyroscope's bias and its noise, and by the same noise the heading is wrong by now. The two are
+/// correlated: Bar-Shalom, Li, Kirubarajan 2001, sec. 8.3, measurement noise correlated with process noise. The update
+/// turns the heading back to what it was, and an hour at rest costs it next to nothing. The accelerometer has seen part
+/// of the tilt from that noise already: there the measurement counts for less instead. The mean is of some time ago.
+/// The walk of the bias since is in its variance, and not in the mean. The part of the heading that came of that walk
+/// is left out: it is smaller by a thousand.
 [[gnu::noinline]] inline Standstill::ZeroRateUpdate Standstill::take_rate(const nav::Ins& ins,
                                                                           const param::InertialParameters& n) {
   const float density = n.gyro_radps_rthz * n.gyro_radps_rthz;

@@ -61,8 +61,8 @@ void Inertial::relocated() {
 }
 
 /// As after power on, without a place. The size of the step is measured when the filter runs again, from the last
-/// estimate. Where the motion finds the heading once more, a magnetometer that led it astray, or did not keep it from
-/// that, has to agree first.
+/// estimate. When the motion finds the heading once more, a magnetometer that led it astray has to agree first. One
+/// that did not keep the heading from going astray has to agree first, too.
 [[gnu::noinline]] void Inertial::restart_filter(base::Micros t, sensor::ResetCause cause, const Context& ctx) {
   const auto count = static_cast<std::uint8_t>(recovery_.jump().count + 1);
   const nav::InsState last = predictor_.present();

@@ -87,8 +87,8 @@ struct LevelInnovation {
   float east_m = 0, north_m = 0, variance_m2 = 1;
 };
 
-/// Vote of the last fix, which came t after the velocity was first refused by nu: the log likelihood ratio of "off by
-/// d = nu t" to "not off" is twice (2 d v - d^2) / S. Accepted alone shows nothing.
+/// Vote of the last fix, which came t after the velocity was first refused by nu. (2 d v - d^2) / S is twice the log
+/// likelihood ratio of "off by d = nu t" to "not off". Accepted alone shows nothing.
 [[nodiscard]] inline Vote vote_of_fix(const LevelInnovation& fix, bool refused, const nav::Vector3& nu_mps, float t_s) {
   constexpr float kShare = 0.7F;  // a deviation grows from nothing
   constexpr float kRatio = 9.0F;  // 3 sigma

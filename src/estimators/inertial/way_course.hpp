@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Course from a way: of a robot that starts forwards for sure, the chord between two fixes far apart is its heading at
+// Course from a way, for a robot that starts forwards for sure. The chord between two fixes far apart is its heading at
 // the middle of the way.
 #pragma once
 
@@ -27,7 +27,7 @@ class WayCourse {
     const float turned_rad = base::wrap_angle(yaw_rad - first_yaw_rad_);
     return {.turned_rad = turned_rad, .arc_ends = base::abs(turned_rad) > kArc_rad};
   }
-  /// Measures the way to a fix. Two fixes of a robot that stands are never as far apart; a course takes two in a row,
+  /// Measures the way to a fix. Two fixes of a robot that stands are never as far apart. A course takes two in a row,
   /// for it is asked at every fix. At the end of an arc a shorter way is enough, too.
   void measure(Way& way, const model::GnssFix3d& fix, float dt_s, const param::Parameters& n) {
     way.east_m = fix.x.minus(first_x_), way.north_m = fix.y.minus(first_y_);
@@ -62,7 +62,7 @@ class WayCourse {
  private:
   static constexpr float kArc_rad = 0.5F;  ///< largest turn of a way whose chord is a course
 
-  base::Anchored first_x_, first_y_;  ///< where the way began
+  base::Anchored first_x_, first_y_;  ///< place where the way began
   float first_yaw_rad_ = 0;           ///< how the robot was turned there
   float way_s_ = 0;                   ///< time since
   bool far_ = false;                  ///< the last fix was far enough for a course

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Work budget of a tick at the horizon, in units of one IMU sample: enough to keep pace with the IMU and to take one
-// measurement, or to rebuild the prediction. More of it the farther the horizon is behind.
+// Work budget of a tick at the horizon, in units of one IMU sample. It is enough to keep pace with the IMU and to take
+// one measurement, or to rebuild the prediction. The farther the horizon is behind, the larger it is.
 #pragma once
 
 #include "base/time.hpp"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A pose graph as an estimator (graph-SLAM): odometry makes keyframes, displacements between them (In_Closure) close
-// loops, and relinearisation is a job in units of work. docs/explanation/pose_graph.md has the equations and what is
+// A pose graph as an estimator (graph-SLAM). Odometry makes keyframes, and displacements between them (In_Closure)
+// close loops. Relinearisation is a job in units of work. docs/explanation/pose_graph.md has the equations and what is
 // defined when.
 //
 // Delayed: the graph is at the far end of the window. Dead reckoning carries its pose to the present.

@@ -6,8 +6,8 @@
 
 namespace tetap::estimators {
 
-/// Independent place (both axes) and heading. Sigmas below half a step of the bus are that half step; a sigma of the
-/// heading from pi on, or none, is that of an unknown one.
+/// Independent place (both axes) and heading. Sigmas below half a step of the bus are that half step. A sigma of the
+/// heading from pi on, or none, stands for an unknown one.
 [[nodiscard]] inline filter::Symmetric<float, 3> covariance_of_pose(float sigma_position_m, float sigma_yaw_rad) {
   constexpr float kFinest_m = 0.5e-3F, kFinest_rad = 0.1e-3F;
   const bool heading = sigma_yaw_rad < 3.14F;  // false for NaN too

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Pose from wheels, and from a gyroscope where the robot has one: the motion half that every planar estimator shares.
-// The state only changes when a sample is fused; advance() moves the time for which estimate() extrapolates, so a tick
-// never splits an integration and the pose after n counts is the textbook's to the bit.
+// The state only changes when a sample is fused. advance() moves the time for which estimate() extrapolates. A tick
+// never splits an integration, and the pose after n counts is the textbook's to the bit.
 #pragma once
 
 #include "estimators/estimate.hpp"
@@ -44,8 +44,9 @@ class PlanarDeadReckoning {
     set_covariance(filter, filter::Symmetric<float, 3>::diagonal({p(0, 0), p(1, 1), kFinest_rad * kFinest_rad}));
   }
 
-  /// kNotUsed: this robot has no use for the sample (a speed without a turn, an IMU that is not used). kRejected: a
-  /// step of counts that no wheel can do; the held speeds stand for it, and the counters begin anew.
+  /// The verdict is kNotUsed when this robot has no use for the sample (a speed without a turn, an IMU that is not
+  /// used). A step of counts that no wheel can do is kRejected. The held speeds stand for a rejected step, and the
+  /// counters begin anew.
   sensor::Verdict fuse(const sensor::WheelCounts& now, base::Micros stamp, const param::Parameters& n);
   sensor::Verdict fuse(const sensor::WheelSpeeds& speeds, base::Micros stamp, const param::Parameters& n) {
     return fuse_speed({.kind = Held::Kind::kWheels, .first_mps = speeds.left_mps, .second = speeds.right_mps}, stamp,

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Heading from motion: while the heading is unknown, dead reckoning runs in a frame of its own; once GNSS has seen the
-// robot travel far enough, the direction of that travel in both frames gives the turn between them.
+// Heading from motion: while the heading is unknown, dead reckoning runs in a frame of its own. The directions of
+// travel by GNSS and in that frame give the turn between the frames. GNSS has to have seen the robot travel far enough.
 #pragma once
 
 #include "base/math.hpp"
@@ -13,8 +13,9 @@ namespace tetap::estimators {
 
 class GnssAlignment {
  public:
-  /// A fix and the dead-reckoned pose at its time. A pose once |travel by GNSS| >= distance_m and dead reckoning agrees
-  /// on the length within a quarter plus three sigma; else the walk is begun again when it has become too long.
+  /// A fix and the dead-reckoned pose at its time. A pose comes once |travel by GNSS| >= distance_m and dead reckoning
+  /// agrees on the length. The lengths may differ by a quarter plus three sigma. A larger difference begins the walk
+  /// anew.
   [[nodiscard]] std::optional<SetPose> add(const model::GnssPosition& fix, const model::PlanarPose& reckoned,
                                            float distance_m) {
     if (!begun_) return begin(fix, reckoned), std::nullopt;

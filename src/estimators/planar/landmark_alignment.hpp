@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Pose from known landmarks: while the pose is unknown, dead reckoning runs in a frame of its own. Two landmarks, seen
-// in one look or with dead reckoning between, fix the turn and the shift of that frame (two points of a rigid
-// transformation; Umeyama 1991, IEEE PAMI 13(4), for n = 2). One landmark does not, from however many places it is
-// seen: the frame may still turn about it.
+// Pose from known landmarks: while the pose is unknown, dead reckoning runs in a frame of its own. Two landmarks fix
+// the turn and the shift of that frame, seen in one look or with dead reckoning between. The two are points of a rigid
+// transformation (Umeyama 1991, IEEE PAMI 13(4), for n = 2). One landmark does not fix them, from however many places
+// it is seen: the frame may still turn about it.
 #pragma once
 
 #include "base/math.hpp"

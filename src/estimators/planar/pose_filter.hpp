@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The planar pose by a Kalman filter: dead reckoning corrected by known landmarks and GNSS, with a gate and a rule for
-// getting back in when everything is refused. The kind of filter is a type: extended, unscented, or its square root.
+// The planar pose by a Kalman filter: dead reckoning corrected by known landmarks and GNSS. It has a gate, and a rule
+// for getting back in when everything is refused. The kind of filter is a type: extended, unscented, or its square
+// root.
 #pragma once
 
 #include "checks/persistence.hpp"
@@ -122,8 +123,8 @@ class PoseFilter {
   enum Source : std::size_t { kLandmark, kGnss, kSources };
   static constexpr float kLost_rad = 1;
   static constexpr std::uint8_t kDegraded = 3;  ///< rejections in a row
-  /// 1 sigma of the heading before it is known. The mean of an unscented filter with a heading that could be anything
-  /// would hardly move, so that filter counts in a frame of its own, where its heading is known.
+  /// 1 sigma of the heading before it is known. The mean of an unscented filter would hardly move with a heading that
+  /// could be anything. An unscented filter counts in a frame of its own, where its heading is known.
   static constexpr float kFreeHeading_rad = kUnscented ? 0.0F : kUnknown_rad;
 
   /// A heading that could be anything is looked for afresh: a filter that linearises about it would never find it.

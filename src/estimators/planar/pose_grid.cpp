@@ -119,8 +119,8 @@ void PoseGrid<kX, kY, kYaw>::work(std::uint32_t units, const Context& ctx) {
       units, [this](std::uint32_t lines) { grid_.work(lines, likelihood()); }, [this] { adopt(); });
 }
 
-/// Waiting sightings go into the update. The grid moves from the mark to the pose of now only when that is a cell away:
-/// a kernel of three weights spreads the mass with every step that is no whole number of cells.
+/// Waiting sightings go into the update. The grid moves from the mark to the pose of now only when that is a cell away.
+/// A kernel of three weights spreads the mass with every step that is no whole number of cells.
 template <int kX, int kY, int kYaw>
 void PoseGrid<kX, kY, kYaw>::begin_step(const Context& ctx) {
   const bool moves = has_start_ || moved_by_a_cell();

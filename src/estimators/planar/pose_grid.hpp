@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The planar pose by a grid: Markov localisation among the landmarks of a map (Fox, Burgard, Thrun, "Markov
-// localization for mobile robots in dynamic environments", JAIR 11, 1999; Thrun, Burgard, Fox 2005, sec. 8.2). The
-// estimator finds the robot from no start at all, and again after a wrong one.
+// The planar pose by a grid: Markov localisation among the landmarks of a map. The estimator finds the robot from no
+// start at all, and again after a wrong one. Source: Fox, Burgard, Thrun, "Markov localization for mobile robots in
+// dynamic environments", JAIR 11, 1999. Thrun, Burgard, Fox 2005, sec. 8.2.
 //
 // Delayed, and in jobs: a step of the grid, motion and update, takes many ticks. Sightings that come meanwhile wait for
 // the next step, moved to its time by dead reckoning. After each step the mode's neighbourhood gives the mean pose and

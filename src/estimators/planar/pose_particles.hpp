@@ -3,8 +3,8 @@
 // identities. The estimator finds the robot again after a wrong start, and from no start at all.
 //
 // Delayed: the cloud is at the far end of the window, where sightings reach it in their order. After every batch of
-// sightings of one stamp the mode's neighbourhood gives pose and covariance, and dead reckoning carries both to the
-// present, so a tick without a sighting costs what dead reckoning costs.
+// sightings of one stamp the mode's neighbourhood gives pose and covariance. Dead reckoning carries both to the
+// present. A tick without a sighting costs what dead reckoning costs.
 #pragma once
 
 #include "base/state_digest.hpp"

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// The position of several GNSS receivers by static fusion, without a motion model: inverse variance where their errors
-// are independent, covariance intersection where they share a cause (satellites, atmosphere, multipath of one place).
-// Receivers fix at fractions of the GPS second, so fixes of one epoch have one stamp.
+// The position of several GNSS receivers by static fusion, without a motion model. Receivers with independent errors
+// are weighted by inverse variance. Covariance intersection joins those whose errors share a cause (satellites,
+// atmosphere, multipath of one place). Receivers fix at fractions of the GPS second, so fixes of one epoch have one
+// stamp.
 #pragma once
 
 #include "estimators/context.hpp"
@@ -18,8 +19,8 @@ namespace tetap::estimators {
 enum class FusionRule : std::uint8_t { kInverseVariance, kIntersection };
 
 /// Receivers are distinguished by their instance, 0 to 3. A fix that disagrees with those of its epoch beyond the gate
-/// is refused, so of two that contradict each other the first of the order stands. There is no state beyond the latest
-/// epoch: a pose from outside has no effect. Heading and speed are never valid.
+/// is refused. The first of the order stands when two contradict each other. There is no state beyond the latest epoch:
+/// a pose from outside has no effect. Heading and speed are never valid.
 template <FusionRule kRule>
 class PositionFusion {
  public:

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// One moving target seen by a sensor at rest in the origin: positions of a lidar (sightings of range and bearing) and
-// detections of a radar (with the range rate). The kind of filter and its motion model are types: constant velocity by
+// One moving target seen by a sensor at rest in the origin. A lidar gives positions (sightings of range and bearing), a
+// radar detections (with the range rate). The kind of filter and its motion model are types: constant velocity by
 // extended Kalman filter, constant turn rate and velocity by unscented filter.
 #pragma once
 

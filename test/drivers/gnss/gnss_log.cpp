@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// gnss_log FILE: the bytes of a receiver's log through the driver. Every report and every baseline is one line of JSON;
-// one line with the counts of refusals follows. logs_test.py and cases_test.py compare it with other decoders.
+// gnss_log FILE: the bytes of a receiver's log through the driver. Every report and every baseline is one line of JSON.
+// One line with the counts of refusals follows. logs_test.py and cases_test.py compare it with other decoders.
 #include "drivers/gnss/receiver.hpp"
 
 #include <cinttypes>

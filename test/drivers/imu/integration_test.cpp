@@ -63,7 +63,7 @@ Errors integrate(const Motion& rate, const Motion& force, double seconds, double
                                     .rate_b_radps = as_float(rate(0)),
                                     .force_b_mps2 = as_float(force(0)),
                                     .after_gap = true}));
-  // That reading is one of the first increment.
+  // The first reading is one of the first increment.
   const int steps = static_cast<int>(seconds / dt) / readings * readings - 1;
   for (int k = 1; k <= steps; ++k) {
     for (int j = 0; j < kFine; ++j) {

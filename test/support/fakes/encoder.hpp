@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A fake quadrature encoder on a timer's counter: two square waves a quarter period apart. Every edge of both is
-// counted, up or down by the level of the other, with the time of the last counted edge captured (STMicroelectronics
-// RM0365, general-purpose timers, Encoder interface mode, table 118 "Counting direction versus encoder signals"). Its
+// counted, up or down by the level of the other, with the time of the last counted edge captured. STMicroelectronics
+// RM0365, general-purpose timers, Encoder interface mode, table 118 "Counting direction versus encoder signals". Its
 // named faults are at the wires, so the counter does what the counting table makes of them.
 //
 //   Encoder<std::uint16_t> encoder;                                  // satisfies hal::EncoderCounter
@@ -94,9 +94,9 @@ class Encoder {
     const double from = position_;
     motion_ = [=](double s) { return from + edges_per_s * (s - start_s); };
   }
-  /// How far each of the four edges of a line is from its place, in edges: discs and detectors are not perfect.
+  /// Distance of each of a line's four edges from its place, in edges: discs and detectors are not perfect.
   void set_edge_errors(std::array<double, 4> errors) { edge_errors_ = errors; }
-  /// Where the counter stands, for a wrap soon.
+  /// Sets the counter, for a wrap soon.
   void set_count(Counter count) { count_ = count; }
 
   void inject(EncoderFault fault, const EncoderFaultDetail& detail = {}) {
@@ -192,7 +192,7 @@ class Encoder {
   void disturb(base::Micros step) {
     const double step_s = 1e-6 * static_cast<double>(step.us);
     if (has(EncoderFault::kGlitches) && drawn(detail(EncoderFault::kGlitches).rate_Hz * step_s)) {
-      const int direction = seen_.a == seen_.b ? 1 : -1;  // where a change of A would count
+      const int direction = seen_.a == seen_.b ? 1 : -1;  // the direction in which a change of A would count
       edge(direction, host_);
       edge(-direction, host_);
     }

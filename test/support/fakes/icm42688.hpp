@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A fake ICM-42688-P: answers over SPI like the chip and fails in named ways. Written from the data sheet alone (TDK
-// DS-000347 revision 1.8; the section stands beside each behaviour) and from no driver. What the sheet leaves open is
-// answered in the way that is hardest on the host, and says so.
+// A fake ICM-42688-P: answers over SPI like the chip and fails in named ways. It is written from the data sheet alone
+// (TDK DS-000347 revision 1.8; the section stands beside each behaviour) and from no driver. Open points of the sheet
+// are answered in the way that is hardest on the host, and a comment marks each.
 //
 //   Icm42688 chip;
 //   chip.set_motion({.rate_radps = {0.0, 0.0, 0.1}});
@@ -102,7 +102,7 @@ class Icm42688 {
     bool on = false;
     Picos ready = 0;  ///< end of start-up
     Picos switched_on = 0;
-    std::optional<Picos> next;  ///< when the next sample is due; empty: none will be
+    std::optional<Picos> next;  ///< time at which the next sample is due; empty: none will be
     std::array<double, 3> of_full_scale{};
     std::array<double, 3> of_20_bit_scale{};
     bool sampled = false;                      ///< ever, since reset
@@ -159,7 +159,7 @@ class Icm42688 {
   int clock_error_ppm_ = 0;
   bool filters_ = false;
   Picos chip_ps_ = 0;       ///< the chip's own time
-  Picos stamp_origin_ = 0;  ///< where the time-stamp counter was 0
+  Picos stamp_origin_ = 0;  ///< time at which the time-stamp counter was 0
   Picos odr_origin_ = 0;    ///< the grid of all output data rates
   Picos reset_until_ = 0;
   Picos quiet_until_ = 0;

@@ -38,8 +38,8 @@ inline bool Icm42688::transfer(std::span<const std::uint8_t> out, std::span<std:
     return true;
   }
 
-  // 9.6 burst read: the address counts up, and stays at FIFO_DATA so that a burst empties the FIFO. What is clocked
-  // while the host still sends is read too, and lost.
+  // 9.6 burst read: the address counts up, and stays at FIFO_DATA so that a burst empties the FIFO. Bytes clocked while
+  // the host still sends are read too, and lost.
   const bool bank_0 = (registers_[kRegBankSel] & 0x07) == 0;
   std::uint8_t address = sent[0] & 0x7F;
   fifo_.begin_burst();

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// A u-blox receiver at the other end of a UART, for tests. Written from the manuals by someone who has seen no driver,
-// and no earlier fake, of this project; key IDs and layouts were checked against public tables of them.
-//   UBX-18010854  ZED-F9P interface description, R04: what is cited without a document is a section of this one
+// A u-blox receiver at the other end of a UART, for tests. It was written from the manuals by someone who has seen no
+// driver, and no earlier fake, of this project. Key IDs and layouts were checked against public tables of them.
+//   UBX-18010854  ZED-F9P interface description, R04: a section cited without a document is one of this
 //   UBX-22008968  u-blox F9 HPG 1.32 interface description
 //   UBX-13003221  u-blox 8 / M8 receiver description including protocol specification (CFG-PRT, CFG-MSG, ...)
 //   UBX-18010802  ZED-F9P integration manual
-// What they leave open is answered in the way that is hardest on the host, and a comment says so.
+// Open points of the manuals are answered in the way that is hardest on the host, and a comment marks each.
 #pragma once
 
 #include "base/time.hpp"
@@ -107,7 +107,7 @@ class Ublox {
     now_ = now;
   }
   void set_solution(const Solution& solution) { solution_ = solution; }
-  /// When the first epoch, at the beginning of the test, is; what the others are follows.
+  /// Sets the time of the first epoch, at the beginning of the test; the others follow.
   void set_instant(const Instant& instant) { start_ = instant; }
   /// Sec. 6.6: RAM is built anew from the layers below it. `baud`: what the factory set.
   void power_cycle(std::uint32_t baud) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a u-blox receiver says of one epoch, as bytes. Manuals: UBX-18010854 (R04) sec. 4 (NMEA), 5.2 to 5.4 (frames),
+// Messages of a u-blox receiver on one epoch, as bytes. Manuals: UBX-18010854 (R04) sec. 4 (NMEA), 5.2 to 5.4 (frames),
 // 5.14 (NAV); UBX-22008968 sec. 3.15.2 (NAV-COV); UBX-13003221 (NAV-SOL, NAV-VELNED); UBX-18010802 (UTC).
 #pragma once
 
@@ -49,7 +49,7 @@ struct Solution {
   [[nodiscard]] bool corrected() const { return fix >= Fix::kDifferential; }
 };
 
-/// When it was: GPS week, milliseconds of it, and what the epoch truly lies beside them.
+/// Time of an epoch: GPS week, milliseconds of it, and what the epoch truly lies beside them.
 struct Instant {
   int week = 2306;
   std::uint32_t itow_ms = 0;
@@ -202,7 +202,7 @@ inline Bytes nav_cov(const Instant& at, const Solution& s) {
   return detail::covariance(p, s.velocity_cov_m2ps2).bytes();
 }
 
-/// Sec. 5.14.2, 18 bytes. What Solution does not say (time, north, east) is made up to fit.
+/// Sec. 5.14.2, 18 bytes. Values that Solution lacks (time, north, east) are made up to fit.
 inline Bytes nav_dop(const Instant& at, const Solution& s) {
   const double time = s.hdop, horizontal_part = s.hdop / std::sqrt(2.0);
   Payload p;

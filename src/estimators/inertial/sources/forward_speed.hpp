@@ -19,8 +19,8 @@ class ForwardSpeedSource {
     last_mps_ = mps;
     last_ = stamp;
   }
-  /// The constraint without a speed. Of a start in motion: linearised about a speed and a heading that are both
-  /// uncertain, it leaves out the product of the two errors. While that is more than the mean of its noise over some
+  /// The constraint without a speed, for a start in motion. Linearised about an uncertain speed and an uncertain
+  /// heading, it leaves out the product of the two errors. While that product exceeds the mean of its noise over some
   /// samples, the constraint would take it for a heading.
   [[nodiscard]] bool starting_conditions(const FilterView& filter) {
     constexpr float kMean_s = 0.04F;

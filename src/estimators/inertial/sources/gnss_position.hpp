@@ -215,8 +215,9 @@ inline void GnssPositionSource::confirm(Assessment& a, const param::RecoveryPara
   status_.confirming();
 }
 
-/// A filter that refuses fixes may have moved otherwise than it thinks, by as much as it is uncertain in any direction
-/// (twice the least eigenvalue): one that is held to a line is wrong across it, however little it knows along it.
+/// A filter that refuses fixes may have moved otherwise than it thinks, by as much as it is uncertain in any direction.
+/// Twice the least eigenvalue stands for it: a filter that is held to a line is wrong across it, however little it
+/// knows along it.
 [[gnu::noinline]] inline void GnssPositionSource::judge_refused(const FixMeasurement& z, const FilterView& filter,
                                                                 Assessment& a) {
   const param::RecoveryParameters& n = filter.parameters().recovery;
@@ -249,7 +250,7 @@ inline bool GnssPositionSource::reset_allowed(const FixMeasurement& z, const Fil
   a.remedy.undoes = confirmed && undoes_reset(z, filter);
   const bool is_lost = confirmed && lost(filter);
   if (is_lost && filter.wheels_timed_out() &&
-      !filter.velocity_recent()) {  // it moved otherwise than it thought, all along
+      !filter.velocity_recent()) {  // the filter moved otherwise than it thought, all along
     const float way2_m2 = offset_.east_m() * offset_.east_m() + offset_.north_m() * offset_.north_m();
     a.remedy.sigma_mps = base::sqrt(way2_m2) / base::seconds(record_.refused().held_for(filter.stamp()));
   }

@@ -13,7 +13,7 @@ struct VelocityMeasurement {
   nav::Vector3 v_n_mps = nav::Vector3::Zero();  ///< at the time of the last IMU sample
   nav::Vector3 v_b_mps = nav::Vector3::Zero();  ///< velocity of the middle of the axle, along the body's axes
   float sigma_mps = 0;                          ///< 1 sigma per axis
-  bool has_climb = true;                        ///< else the vertical part is the filter's own
+  bool has_climb = true;                        ///< false: the vertical part is the filter's own
 
   [[nodiscard]] float level_mps() const { return base::sqrt(v_b_mps(0) * v_b_mps(0) + v_b_mps(1) * v_b_mps(1)); }
 };
@@ -103,8 +103,7 @@ class GnssVelocitySource {
   static constexpr float kUnmodelled_mps = 0.05F,
                          kUnmodelled_mps2 = 0.3F;  ///< the IMU's own error between two velocities
 
-  /// Wheels do not see where the robot goes. Where the speed is alike all along, they abstain: the heading may be
-  /// wrong.
+  /// Wheels do not see where the robot goes. When the speed is alike all along, they abstain: the heading may be wrong.
   [[nodiscard]] Vote vote_of_wheels(const nav::Vector3& nu, base::Micros since, const FilterView& filter) {
     const Vote vote = filter.wheels_vote(since);
     const nav::Vector3 claimed = filter.x().v_n_mps + nu;

@@ -29,8 +29,8 @@ class Magnetometer {
                                                     const FilterView& filter);
   /// Strength and dip, and whether the sensor is stuck. At rest a good one shows the same for long.
   [[nodiscard]] Assessment assess_field(const FieldMeasurement& z, const FilterView& filter);
-  /// Heading against the filter's, and the motion's where there are no wheels: a magnetometer that is wrong all the
-  /// time leads the filter's heading, which then agrees with it.
+  /// Compares the heading with the filter's, and with the motion's on a robot without wheels. A magnetometer that is
+  /// wrong all the time leads the filter's heading, which then agrees with it.
   [[nodiscard]] Assessment assess(const FieldMeasurement& z, const FilterView& filter);
   /// The measurement with the variance at which the filter's heading ends at sigma_rad. False: the heading is as well
   /// known already, and an update would change nothing.

@@ -22,8 +22,8 @@ class Wheels {
 
   /// Decides which wheels roll. Without a gyroscope the wheels alone show a turn, and cannot be judged by it.
   [[nodiscard]] Assessment assess(const WheelReading& z, const FilterView& filter);
-  /// Forward speed of an assessed reading: the mean of both wheels, or, of one that rolls while the other spins, what
-  /// the gyroscope leaves of it at the middle of the axle.
+  /// Forward speed of an assessed reading: the mean of both wheels. When one rolls while the other spins, it is what
+  /// the gyroscope leaves of the rolling one at the middle of the axle.
   [[nodiscard]] ForwardReading forward(const WheelReading& z, const FilterView& filter) const;
   /// GNSS velocity of the middle of the axle. True: it contradicts the wheels, so the filter's velocity is as wrong.
   [[nodiscard]] bool contradicted_by_ground(float forward_mps, float wheels_mps, float sigma_mps, base::Micros stamp,
