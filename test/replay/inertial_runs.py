@@ -26,7 +26,7 @@ sys.dont_write_bytecode = True
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.realpath(__file__))))
 sys.path.insert(0, os.path.join(ROOT, "tools", "python"))
 from tetap.can import bus_writer  # noqa: E402
-from tetap.report import metrics  # noqa: E402
+from tetap.report import normalised_error, recorded_run  # noqa: E402
 
 DATA = os.environ.get("TETAP_DATA") or os.path.join(os.path.dirname(ROOT), "shared", "data")
 PLACES_S = (60, 80, 100, 120, 160, 175, 190, 205, 220, 230)
@@ -304,12 +304,12 @@ def px4(programs, out, name, checks):
         def said(names):
             return np.concatenate([at(then, states if one in states[0] else replay.poses, one) for one in names], axis=1)
         error_then = np.stack([np.interp(then, times, axis) for axis in error.T], axis=1)
-        return metrics.squares(error_then, said(sigmas), metrics.correlation_matrices(*said(correlations).T))
+        return normalised_error.squares(error_then, said(sigmas), normalised_error.correlation_matrices(*said(correlations).T))
 
-    nees = {name: nees_of_block(error, sigmas, metrics.CORRELATIONS[name]) for name, error, sigmas in (
+    nees = {name: nees_of_block(error, sigmas, recorded_run.CORRELATIONS[name]) for name, error, sigmas in (
         ("position", position, ["std_x_m", "std_y_m", "std_height_m"]),
-        ("velocity", velocity, [f"std_{one}" for one in metrics.VELOCITY]),
-        ("attitude", turn, [*metrics.STD_TILT, "std_yaw_rad"]))}
+        ("velocity", velocity, [f"std_{one}" for one in recorded_run.VELOCITY]),
+        ("attitude", turn, [*recorded_run.STD_TILT, "std_yaw_rad"]))}
     print(f"PX4's log {name}, against PX4's own EKF2, from {CONVERGED_S:.0f} s on:")
     sensors = replay.sensors()
     sensor_lines(name, sensors)

@@ -19,7 +19,8 @@ sys.path.insert(0, os.path.join(TOOLS, "python"))
 sys.dont_write_bytecode = True
 
 from tetap.proof import campaign_metrics as judge  # noqa: E402
-from tetap.report import metrics  # noqa: E402
+from tetap.can.bus_writer import BadInput  # noqa: E402
+from tetap.report import ground_truth, normalised_error, recorded_run  # noqa: E402
 
 LOADER = importlib.machinery.SourceFileLoader("campaign", os.path.join(TOOLS, "proof", "run_campaign"))
 campaign = importlib.util.module_from_spec(importlib.util.spec_from_loader("campaign", LOADER))
@@ -130,7 +131,7 @@ class Averages(unittest.TestCase):
         self.assertEqual(campaign.fault_times("gnss_jump@5", known), (5, 15))
         self.assertEqual(campaign.fault_times("gnss_jump@5+2.5", known), (5, 7.5))
         for wrong in ("nope", "gnss_jump@", "gnss_jump@x", "gnss_jump@1+", "gnss_jump,gnss_jump"):
-            self.assertRaises(metrics.BadInput, campaign.fault_times, wrong, known)
+            self.assertRaises(BadInput, campaign.fault_times, wrong, known)
 
 
 class Faults(unittest.TestCase):
@@ -140,7 +141,7 @@ class Faults(unittest.TestCase):
 
     def rows(self, sigma):
         n = len(self.at)
-        return {"epoch": self.at / metrics.TICK_S, "std_x_m": np.full(n, sigma), "std_y_m": np.full(n, sigma)}
+        return {"epoch": self.at / recorded_run.TICK_S, "std_x_m": np.full(n, sigma), "std_y_m": np.full(n, sigma)}
 
     def honesty(self, error, sigma=0.1):
         zero = np.zeros(len(self.at))
@@ -161,7 +162,7 @@ class Faults(unittest.TestCase):
 
     def test_words_count_from_the_fault_and_only_those_that_were_not_said_before(self):
         class Status:
-            status = {"epoch": self.at / metrics.TICK_S, "mode": np.where(self.at >= 12, 4.0, 3.0),
+            status = {"epoch": self.at / recorded_run.TICK_S, "mode": np.where(self.at >= 12, 4.0, 3.0),
                       "faults": np.where(self.at >= 10.5, 0b11, 0b01).astype(float), "reset_ctr": (self.at >= 14).astype(float),
                       "reset_cause": np.full(len(self.at), 6.0)}
         names = {"Mode": {3: "Nominal", 4: "DeadReckoning"}, "Fault": {0: "Always", 1: "Rejecting"}, "ResetCause": {6: "PositionJump"}}
@@ -197,14 +198,14 @@ class WithFiles(unittest.TestCase):
         return path
 
     def test_truth_with_epochs_is_paired_by_epoch_whatever_the_clock_says(self):
-        truth = metrics.Truth(self.truth("time_s,x_m,y_m,yaw_rad,epoch\n1.0,1,10,0.1,1\n1.1,2,20,0.2,2\n1.2,3,30,0.3,3\n"))
+        truth = ground_truth.Truth(self.truth("time_s,x_m,y_m,yaw_rad,epoch\n1.0,1,10,0.1,1\n1.1,2,20,0.2,2\n1.2,3,30,0.3,3\n"))
         rows = {"epoch": np.array([3.0, 1.0, 9.0]), "time_s": np.array([99.0, 1.2, 1.0])}
         x, y, yaw = truth.of(rows)
         np.testing.assert_array_equal(x, [3, 1, np.nan])
         np.testing.assert_array_equal(y, [30, 10, np.nan])
         np.testing.assert_array_equal(yaw, [0.3, 0.1, np.nan])
-        with self.assertRaisesRegex(metrics.BadInput, "row 3: epoch does not grow"):
-            metrics.Truth(self.truth("time_s,x_m,y_m,yaw_rad,epoch\n1.0,1,10,0.1,1\n1.1,2,20,0.2,2\n1.2,3,30,0.3,2\n"))
+        with self.assertRaisesRegex(BadInput, "row 3: epoch does not grow"):
+            ground_truth.Truth(self.truth("time_s,x_m,y_m,yaw_rad,epoch\n1.0,1,10,0.1,1\n1.1,2,20,0.2,2\n1.2,3,30,0.3,2\n"))
 
     @unittest.skipUnless(os.access(os.path.join(PROGRAMS, "tetap-world"), os.X_OK), "tetap-world is not built")
     def test_a_small_campaign_of_the_real_program(self):
@@ -221,7 +222,7 @@ class WithFiles(unittest.TestCase):
                 self.assertGreater(case[name]["anees"]["times"], 60)
             self.assertEqual(set(case["fused"]["sensors"]), {"GnssPosition", "GnssVelocity"})
             self.assertIn("WheelCounts", case["fused"]["bus"])
-            self.assertEqual(list(case["fused"]["blocks"]), metrics.BLOCKS)
+            self.assertEqual(list(case["fused"]["blocks"]), normalised_error.BLOCKS)
             self.assertLess(case["attitude"]["tilt_rmse_deg"]["worst"], 10)
             self.assertLess(case["fused"]["position_rmse_m"]["worst"], 3)
         self.assertEqual(os.listdir(self.directory), ["campaign.json"])  # the runs' own files are gone

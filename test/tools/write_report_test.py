@@ -19,7 +19,7 @@ sys.path.insert(0, os.path.join(TOOLS, "python"))
 sys.dont_write_bytecode = True
 
 from tetap.can import bus_writer  # noqa: E402
-from tetap.report import metrics, own_map, tables  # noqa: E402
+from tetap.report import attitude, events, ground_truth, metrics, normalised_error, own_map, recorded_run, tables  # noqa: E402
 
 RUN = {"frames_in": 1234, "frames_lost": 0, "estimates_out": 777, "times_realtime": 12.5, "bus_load_percent": 9.25, "estimates_sha256": "ab" * 32,
        "state_crc_last": "0x12345678", "bus": "memory", "way": "one process", "robot": "rover", "mode": "lockstep", "duration_s": 10.0, "seed": 7,
@@ -50,7 +50,7 @@ class Case(unittest.TestCase):
 
     def truth(self, time_s, x, y, yaw=None, about=None):
         yaw = [None] * len(time_s) if yaw is None else yaw
-        self.write_rows("t.truth.csv", metrics.TRUTH, zip(time_s, x, y, yaw))
+        self.write_rows("t.truth.csv", ground_truth.TRUTH, zip(time_s, x, y, yaw))
         if about is not None:
             self.write("t.json", json.dumps(about))
         return self.path("t.truth.csv")
@@ -63,7 +63,7 @@ class Case(unittest.TestCase):
             c = [None] * 3 if corr is None or std[n] is None else corr[n]
             ok = 1 if valid is None else valid[n]
             rows.append([n, t, estimator, 1 + estimator, x[n], y[n], yaw[n], 0.5, 0.1, *s, *c, ok, ok, 0.05, 0.02])
-        self.write_rows("estimates.csv", metrics.ESTIMATES, rows)
+        self.write_rows("estimates.csv", recorded_run.ESTIMATES, rows)
         self.write("run.json", json.dumps(RUN))
         return rows
 
@@ -82,8 +82,8 @@ class Errors(Case):
     def test_an_estimate_that_is_the_truth_has_no_error_also_between_its_rows_and_where_yaw_wraps(self):
         yaw = 3.0 + 0.1 * (self.time_s - 1)  # through +pi
         truth_t = 1 + 0.03 * np.arange(170)
-        truth = self.truth(truth_t, 2 * truth_t, -truth_t, metrics.wrapped(3.0 + 0.1 * (truth_t - 1)))
-        self.estimates(self.time_s, 2 * self.time_s, -self.time_s, metrics.wrapped(yaw))
+        truth = self.truth(truth_t, 2 * truth_t, -truth_t, attitude.wrapped(3.0 + 0.1 * (truth_t - 1)))
+        self.estimates(self.time_s, 2 * self.time_s, -self.time_s, attitude.wrapped(yaw))
         fused = self.summary("--truth", truth)["fused"]
         for key in ("position_rmse_m", "final_error_m", "max_error_m", "heading_rmse_deg"):
             self.assertLess(fused[key], 1e-6, key)
@@ -169,11 +169,11 @@ class Nees(Case):
         error[1::2] = 100.0
         zero = np.zeros(count)
         truth = self.truth(time_s, zero, zero, zero if yaw_known else None)
-        self.estimates(time_s, error[:, 0], error[:, 1], metrics.wrapped(error[:, 2]), std=published, corr=[(r[0, 1], r[0, 2], r[1, 2])] * count)
+        self.estimates(time_s, error[:, 0], error[:, 1], attitude.wrapped(error[:, 2]), std=published, corr=[(r[0, 1], r[0, 2], r[1, 2])] * count)
         brute = []
         for n in range(0, count, 2):
             p = np.outer(std[n], std[n]) * r
-            e = np.array([*error[n, :2], metrics.wrapped(error[n, 2])])
+            e = np.array([*error[n, :2], attitude.wrapped(error[n, 2])])
             d = 3 if yaw_known else 2
             brute.append(e[:d] @ np.linalg.inv(p[:d, :d]) @ e[:d])
         return truth, np.array(brute)
@@ -217,7 +217,7 @@ class Innovations(Case):
         self.estimates(time_s, zero, zero, zero)
         rows = [[0, 1, 1, 4, 0, 0, 2, 1.0, 0.1, 5, 7], [1, 1, 1, 4, 0, 0, 2, 3.0, 0.1, 5, 7], [2, 1, 1, 4, 0, 1, 2, 20.0, 2.0, 5, 7],
                 [3, 1, 1, 4, 0, 4, 2, None, None, 5, 99], [4, 1, 1, 5, 0, 3, 2, None, None, 500, None], [5, 1, 0, 4, 0, 0, 2, 9.0, 1, 5, 7]]
-        self.write_rows("innovations.csv", metrics.INNOVATIONS, rows)
+        self.write_rows("innovations.csv", recorded_run.INNOVATIONS, rows)
         measured = self.summary()["fused"]["measurements"]
         landmarks = measured["RangeBearing"]
         self.assertEqual((landmarks["accepted"], landmarks["rejected"], landmarks["other"]), (2, 1, 1))
@@ -234,7 +234,7 @@ class Innovations(Case):
     def test_names_of_the_bus_s_enumerations_stand_for_their_numbers(self):
         time_s, zero = 1 + 0.01 * np.arange(10), np.zeros(10)
         self.estimates(time_s, zero, zero, zero)
-        header = ",".join(metrics.INNOVATIONS)
+        header = ",".join(recorded_run.INNOVATIONS)
         self.write("innovations.csv", f"{header}\n0,1,1,RangeBearing,0,NotFinite,2,,,5,7\n0,1,1,RangeBearing,0,Accepted,2,1.5,0.1,5,7\n")
         measured = self.summary()["fused"]["measurements"]
         self.assertEqual(measured["RangeBearing"]["verdicts"], {"Accepted": 1, "NotFinite": 1})
@@ -248,7 +248,7 @@ class Warnings(Case):
         self.estimates(self.time_s, self.zero + error_m, self.zero, self.zero, estimator=estimator, std=[(0.1, 0.1, 0.1)] * 40,
                        corr=[(0, 0, 0)] * 40)
         self.write("run.json", json.dumps(about))
-        self.write_rows("innovations.csv", metrics.INNOVATIONS,
+        self.write_rows("innovations.csv", recorded_run.INNOVATIONS,
                         [[n, t, estimator, 4, 0, int(n < rejected), 2, 1.0, 0.1, 5, 7] for n, t in enumerate(self.time_s[:30])])
         result = self.report("--no-pictures", "--truth", truth)
         self.assertEqual(result.returncode, 0, result.stderr)
@@ -282,20 +282,20 @@ class Warnings(Case):
 
     def test_a_robot_without_a_position_is_named_with_the_mode_in_which_it_stayed(self):
         self.estimates(self.time_s, self.zero, self.zero, self.zero, valid=[0] * 40)
-        mode = {word: number for number, word in metrics.code_names()["Mode"].items()}
-        self.write_rows("status.csv", metrics.STATUS, [[n, self.time_s[n], mode["Boot" if n < 10 else "Aligning"], 0, 0, 0, 0] for n in range(40)])
+        mode = {word: number for number, word in recorded_run.code_names()["Mode"].items()}
+        self.write_rows("status.csv", recorded_run.STATUS, [[n, self.time_s[n], mode["Boot" if n < 10 else "Aligning"], 0, 0, 0, 0] for n in range(40)])
         self.assertIn(f"fused never had a valid position: its mode was Aligning for the last {self.time_s[-1] - self.time_s[10]:.0f} s (is rover the robot of this log?)",
                       self.report("--no-pictures").stdout)
 
     def counted(self, accepted, estimator=1, sensor="WheelCounts"):
-        code = {word: number for number, word in metrics.code_names()["Sensor"].items()}[sensor]
-        self.write_rows("sensors.csv", metrics.SENSORS, [[n, self.time_s[n], estimator, code, 0, accepted * (n + 1) // 40, 0, None, 0] for n in range(40)])
+        code = {word: number for number, word in recorded_run.code_names()["Sensor"].items()}[sensor]
+        self.write_rows("sensors.csv", recorded_run.SENSORS, [[n, self.time_s[n], estimator, code, 0, accepted * (n + 1) // 40, 0, None, 0] for n in range(40)])
         return code
 
     def test_measurements_that_are_only_counted_are_not_reported_as_none(self):
         """Accepted wheel counts have no frame each; one that was too late has."""
         self.estimates(self.time_s, self.zero, self.zero, self.zero)
-        self.write_rows("innovations.csv", metrics.INNOVATIONS, [[0, 1.0, 1, self.counted(1197), 0, 3, 0, None, None, 0, None]])
+        self.write_rows("innovations.csv", recorded_run.INNOVATIONS, [[0, 1.0, 1, self.counted(1197), 0, 3, 0, None, None, 0, None]])
         said = self.report("--no-pictures").stdout
         self.assertRegex(said, r"WheelCounts accepted / rejected +1197 / 0\n")
         self.assertRegex(said, r"WheelCounts too late +1\n")
@@ -342,11 +342,11 @@ class Faults(Case):
         zero = np.zeros(300)
         self.estimates(time_s, zero, zero, zero)  # epoch n is at time_s[n]
         self.write("run.json", json.dumps({**RUN, "fault": "clock_jump@1+1.5,kidnapped@0.5+0,gnss_jump"}))
-        run = metrics.Run(self.directory)
-        spans = metrics.fault_spans(run)
+        run = recorded_run.Run(self.directory)
+        spans = recorded_run.fault_spans(run)
         self.assertEqual([name for name, _, _ in spans], ["clock_jump", "kidnapped"])
         np.testing.assert_allclose([span[1:] for span in spans], [(2.0, 6.5), (1.5, 1.5)], atol=1e-9)
-        self.assertEqual([one.words for one in metrics.faults(run)], ["clock_jump at 1 s for 1.5 s", "kidnapped at 0.5 s", "gnss_jump"])
+        self.assertEqual([one.words for one in recorded_run.faults(run)], ["clock_jump at 1 s for 1.5 s", "kidnapped at 0.5 s", "gnss_jump"])
         result = self.report()
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertIn("fault: clock_jump at 1 s for 1.5 s, kidnapped at 0.5 s, gnss_jump\n", result.stdout)
@@ -357,13 +357,13 @@ class Faults(Case):
         truth = self.truth(time_s, zero, zero, zero)
         self.estimates(time_s, zero, zero, zero, std=[(0.1, 0.1, 0.1)] * 300, corr=[(0, 0, 0)] * 300)
         epochs = np.arange(10, 300, 10)
-        self.write_rows("status.csv", metrics.STATUS, [[n, 1 + 0.01 * n, 4 if 100 <= n < 200 else 3, 1, 2 if 100 <= n < 200 else 0, 0, 0] for n in epochs])
+        self.write_rows("status.csv", recorded_run.STATUS, [[n, 1 + 0.01 * n, 4 if 100 <= n < 200 else 3, 1, 2 if 100 <= n < 200 else 0, 0, 0] for n in epochs])
         about = {**RUN, "fault": "gnss_jump@1+1"}
         self.write("run.json", json.dumps(about))
-        run = metrics.Run(self.directory)
-        shown = run.since(metrics.start_s(run))
-        self.assertEqual(metrics.start_s(run), 1.0)
-        np.testing.assert_allclose(metrics.fault_spans(shown)[0][1:], (1.0, 2.0), atol=1e-9)
+        run = recorded_run.Run(self.directory)
+        shown = run.since(recorded_run.start_s(run))
+        self.assertEqual(recorded_run.start_s(run), 1.0)
+        np.testing.assert_allclose(recorded_run.fault_spans(shown)[0][1:], (1.0, 2.0), atol=1e-9)
         np.testing.assert_array_equal(shown.of(1)["x_m"], run.of(1)["x_m"])
         self.assertEqual(self.report("--truth", truth).returncode, 0)
         self.assertIn('<td>1.0 s</td><td class="text">fault Rejecting, for 1.0 s</td>', text_of(self.path("report.html")))
@@ -371,21 +371,21 @@ class Faults(Case):
         # A log that no world was asked for has the node's time only.
         del about["seed"]
         self.write("run.json", json.dumps(about))
-        self.assertEqual(metrics.start_s(metrics.Run(self.directory)), 0.0)
+        self.assertEqual(recorded_run.start_s(recorded_run.Run(self.directory)), 0.0)
 
     def test_a_board_that_ticked_before_the_world_began_counts_from_the_worlds_start(self):
         time_s, zero = 0.3 + 0.01 * np.arange(500), np.zeros(500)
         self.estimates(time_s, zero, zero, zero)
         self.write("run.json", json.dumps({**RUN, "fault": "gnss_jump@1+1", "world_start_s": 1.5}))
-        run = metrics.Run(self.directory)
-        self.assertEqual(metrics.start_s(run), 1.5)
-        np.testing.assert_allclose(metrics.fault_spans(run)[0][1:], (2.5, 3.5), atol=1e-9)
-        np.testing.assert_allclose(metrics.fault_spans(run.since(1.5))[0][1:], (1.0, 2.0), atol=1e-9)
+        run = recorded_run.Run(self.directory)
+        self.assertEqual(recorded_run.start_s(run), 1.5)
+        np.testing.assert_allclose(recorded_run.fault_spans(run)[0][1:], (2.5, 3.5), atol=1e-9)
+        np.testing.assert_allclose(recorded_run.fault_spans(run.since(1.5))[0][1:], (1.0, 2.0), atol=1e-9)
 
     def test_a_log_with_stamps_of_the_calendar_is_shown_from_its_first_estimate_and_says_which_that_is(self):
         time_s, zero = 1763900000.25 + 0.01 * np.arange(300), np.zeros(300)
         self.estimates(time_s, zero, zero, zero)
-        self.write_rows("status.csv", metrics.STATUS, [[n, time_s[n], 4 if 100 <= n < 200 else 3, 1, 2 if 100 <= n < 200 else 0, 0, 0] for n in range(10, 300, 10)])
+        self.write_rows("status.csv", recorded_run.STATUS, [[n, time_s[n], 4 if 100 <= n < 200 else 3, 1, 2 if 100 <= n < 200 else 0, 0, 0] for n in range(10, 300, 10)])
         self.write("run.json", json.dumps({key: value for key, value in RUN.items() if key != "seed"}))
         self.assertEqual(self.report().returncode, 0)
         page = text_of(self.path("report.html"))
@@ -405,10 +405,10 @@ class Axes(Case):
         from tetap.report import pictures
         n = 400
         time_s, zero = 1 + 0.01 * np.arange(n), np.zeros(n)
-        truth = metrics.Truth(self.truth(time_s, zero, zero, zero))
+        truth = ground_truth.Truth(self.truth(time_s, zero, zero, zero))
         self.estimates(time_s, np.where(np.arange(n) == 200, jump_m, 0.01), zero, zero, std=[(0.1, 0.1, 0.1)] * n, corr=[(0, 0, 0)] * n)
         self.write("run.json", json.dumps({**RUN, "fault": "kidnapped@2+1"}))
-        return pictures.errors(metrics.Run(self.directory), truth, 1, "t").axes
+        return pictures.errors(recorded_run.Run(self.directory), truth, 1, "t").axes
 
     def test_a_jump_leaves_the_band_visible_and_is_visible_itself(self):
         x, y = self.errors_picture(8.0)[:2]
@@ -425,12 +425,12 @@ class Axes(Case):
         from tetap.report import pictures
         zero = np.zeros(20)
         self.estimates(1 + 0.01 * np.arange(20), zero, zero, zero)
-        smallest, largest = metrics.limits("Est_Innov", "Nis")
+        smallest, largest = recorded_run.limits("Est_Innov", "Nis")
         self.assertEqual(smallest, 0.1)
         for nis, marked in ((largest, 1), (largest - 1, 0)):
-            self.write_rows("innovations.csv", metrics.INNOVATIONS,
+            self.write_rows("innovations.csv", recorded_run.INNOVATIONS,
                             [[n, 1 + n, 1, 4, 0, int(n == 3), 2, nis if n == 3 else 1.0, 0.1, 5, 7] for n in range(10)])
-            axes = pictures.nis(metrics.Run(self.directory), 1, metrics.code_names(), "t").axes[0]
+            axes = pictures.nis(recorded_run.Run(self.directory), 1, recorded_run.code_names(), "t").axes[0]
             points = {line.get_marker(): len(line.get_xdata()) for line in axes.lines if line.get_linestyle() == "None"}
             self.assertEqual((points["^"], points["x"]), (marked, 1 - marked))
             self.assertEqual("819 or more" in [text.get_text() for text in axes.get_legend().get_texts()], bool(marked))
@@ -440,14 +440,14 @@ class Pictures(Case):
     def run_with_everything(self, about=None, yaw=True):
         time_s = 1 + 0.01 * np.arange(300)
         x, y = np.cos(time_s), np.sin(time_s)
-        heading = metrics.wrapped(time_s + np.pi / 2)
+        heading = attitude.wrapped(time_s + np.pi / 2)
         truth = self.truth(time_s, x, y, heading if yaw else None, about)
         std = [None if n % 5 else (0.1, 0.1, 0.05) for n in range(300)]
         odometry = self.estimates(time_s, x + 0.1 * (time_s - 1), y, heading, estimator=0, std=std, corr=[(0.1, 0, 0)] * 300)
         self.estimates(time_s, x + 0.02, y, heading, std=std, corr=[(0.1, 0, 0)] * 300, more=odometry)
-        self.write_rows("innovations.csv", metrics.INNOVATIONS,
+        self.write_rows("innovations.csv", recorded_run.INNOVATIONS,
                         [[n, t, 1, 4, 0, int(n % 50 == 0), 2, 15.0 if n % 50 == 0 else 1.0, 0.1, 5, 7] for n, t in enumerate(time_s)])
-        self.write_rows("status.csv", metrics.STATUS, [[n, t, 3 if n > 50 else 1, 24, n // 250, n // 280, 2] for n, t in enumerate(time_s)])
+        self.write_rows("status.csv", recorded_run.STATUS, [[n, t, 3 if n > 50 else 1, 24, n // 250, n // 280, 2] for n, t in enumerate(time_s)])
         return truth
 
     def test_the_page_is_one_file_that_needs_no_network_and_shows_every_picture(self):
@@ -473,26 +473,26 @@ class Pictures(Case):
     def mapped_run(self):
         """A robot on a circle among three landmarks that it maps without identities; one of its sightings is given to a wrong landmark."""
         time_s = 1 + 0.01 * np.arange(300)
-        heading = metrics.wrapped(time_s + np.pi / 2)
+        heading = attitude.wrapped(time_s + np.pi / 2)
         marks = [{"id": 1, "x_m": 3.0, "y_m": 0.0}, {"id": 2, "x_m": -3.0, "y_m": 1.0}, {"id": 3, "x_m": 0.0, "y_m": 4.0}]
         truth = self.truth(time_s, np.cos(time_s), np.sin(time_s), heading, {"truth": "vicon", "landmarks": marks})
         std = [None if n % 5 else (0.1, 0.1, 0.05) for n in range(300)]
         self.estimates(time_s, np.cos(time_s) + 0.02, np.sin(time_s), heading, std=std, corr=[(0.1, 0, 0)] * 300)
-        kind = metrics.ESTIMATES.index("kind")
+        kind = recorded_run.ESTIMATES.index("kind")
         lines = [line.split(",") for line in text_of(self.path("estimates.csv")).splitlines()]
         self.write("estimates.csv", "\n".join(",".join(field if i != kind or not number else "EkfSlam" for i, field in enumerate(line)) for number, line in enumerate(lines)) + "\n")
         seen = [(n, t, 1 + n // 20 % 3) for n, t in enumerate(time_s) if n % 20 == 0]
         self.write_rows("t.sightings.csv", own_map.SIGHTINGS, [(t - 0.1, landmark if n != 100 else 255) for n, t, landmark in seen])
-        self.write_rows("innovations.csv", metrics.INNOVATIONS, [self.innovation(n, t, 255 - landmark) for n, t, landmark in seen])
+        self.write_rows("innovations.csv", recorded_run.INNOVATIONS, [self.innovation(n, t, 255 - landmark) for n, t, landmark in seen])
         self.write_rows("map.csv", own_map.MAP, [[n, t, 254 - n // 10 % 3, marks[n // 10 % 3]["x_m"] + 0.1, marks[n // 10 % 3]["y_m"], 0.1, 0.2, 0.0, 9, 1, 1]
                                                  for n, t in enumerate(time_s) if n % 10 == 0])
-        self.write_rows("status.csv", metrics.STATUS, [[n, t, 3, 24, 0, 0, 2] for n, t in enumerate(time_s)])
+        self.write_rows("status.csv", recorded_run.STATUS, [[n, t, 3, 24, 0, 0, 2] for n, t in enumerate(time_s)])
         return truth
 
     @staticmethod
     def innovation(n, time_s, landmark):
-        values = dict.fromkeys(metrics.INNOVATIONS, 0.0) | {"epoch": n, "time_s": time_s, "estimator": 1, "sensor": 4, "dof": 2, "nis": 1.0, "age_ms": 100.0, "landmark": landmark}
-        return [values[name] for name in metrics.INNOVATIONS]
+        values = dict.fromkeys(recorded_run.INNOVATIONS, 0.0) | {"epoch": n, "time_s": time_s, "estimator": 1, "sensor": 4, "dof": 2, "nis": 1.0, "age_ms": 100.0, "landmark": landmark}
+        return [values[name] for name in recorded_run.INNOVATIONS]
 
     def test_a_robot_that_maps_has_pictures_of_its_map_and_figures_of_both(self):
         truth = self.mapped_run()
@@ -731,15 +731,15 @@ class Tables(Case):
     def test_a_long_table_takes_a_third_of_its_floats_and_its_reading_not_much_more(self):
         count = 30_000
         random = np.random.default_rng(8)
-        self.write("a.csv", ",".join(metrics.ESTIMATES) + "\n" + "".join(
+        self.write("a.csv", ",".join(recorded_run.ESTIMATES) + "\n" + "".join(
             f"{n},{1 + 0.01 * n:.6f},2,Inertial,{x:.3f},{y:.3f},{yaw:.4f},{x / 9:.3f},{y / 9:.4f},,,,,,,1,1,,\n"
             for n, (x, y, yaw) in enumerate(random.uniform(-3, 3, (count, 3)))))
         tables.BLOCK = 1 << 16
         tracemalloc.start()
         self.addCleanup(tracemalloc.stop)
-        table = tables.read_table(self.path("a.csv"), metrics.ESTIMATES)
+        table = tables.read_table(self.path("a.csv"), recorded_run.ESTIMATES)
         held, most = tracemalloc.get_traced_memory()
-        floats = count * len(metrics.ESTIMATES) * 8
+        floats = count * len(recorded_run.ESTIMATES) * 8
         self.assertLess(held, floats / 3)
         self.assertLess(most, floats / 2)
         self.assertEqual(len(table["x_m"]), count)
@@ -755,17 +755,17 @@ class Inertial(Case):
     def test_two_attitudes_that_come_in_different_epochs_are_compared_at_the_same_time(self):
         """A turn of 1 rad/s: 50 ms apart the same attitude is 2.9 deg apart, unless one is brought to the other's time."""
         def yawed(epoch):
-            half = 0.5 * metrics.TICK_S * np.asarray(epoch, dtype=float)  # 1 rad/s
+            half = 0.5 * recorded_run.TICK_S * np.asarray(epoch, dtype=float)  # 1 rad/s
             return np.stack([np.cos(half), 0 * half, 0 * half, np.sin(half)], axis=1)
         one, other = 10.0 * np.arange(80) + 3, 10.0 * np.arange(80) + 8
-        tilt, heading = metrics.apart(yawed(other), metrics.attitudes_at(one, yawed(one), other, 20))
+        tilt, heading = attitude.apart(yawed(other), attitude.attitudes_at(one, yawed(one), other, 20))
         self.assertEqual(int(np.isfinite(heading).sum()), 79)  # none behind the last
         self.assertLess(np.degrees(np.nanmax(np.abs(heading))), 0.01)
         self.assertLess(np.degrees(np.nanmax(tilt)), 0.01)
         gap = np.delete(one, slice(40, 44))
-        self.assertEqual(int(np.isfinite(metrics.attitudes_at(gap, yawed(gap), other, 20)[:, 0]).sum()), 79 - 5)
+        self.assertEqual(int(np.isfinite(attitude.attitudes_at(gap, yawed(gap), other, 20)[:, 0]).sum()), 79 - 5)
         negated = yawed(one) * np.where(np.arange(80) % 2, -1.0, 1.0)[:, None]  # q and -q are one attitude
-        self.assertLess(np.degrees(np.nanmax(np.abs(metrics.apart(yawed(other), metrics.attitudes_at(one, negated, other, 20))[1]))), 0.01)
+        self.assertLess(np.degrees(np.nanmax(np.abs(attitude.apart(yawed(other), attitude.attitudes_at(one, negated, other, 20))[1]))), 0.01)
 
     def inertial(self, scale=1.0, turn=0.0, between=1.0):
         """A robot at rest at the origin whose estimate errs as it says, times `scale`; `turn`: by how much it is off about the vertical too;
@@ -781,32 +781,32 @@ class Inertial(Case):
         draw["velocity"][1::2] *= between
         position = draw["position"]
         rows = [[epoch[i], time_s[i], 2, 6, *position[i, :2], 0, 0, 0, 0.3, 0.3, self.std["attitude"], 0.9, 0, 0, 1, 1, 0.05, 0.02] for i in range(n)]
-        self.write_rows("estimates.csv", metrics.ESTIMATES, rows)
+        self.write_rows("estimates.csv", recorded_run.ESTIMATES, rows)
         angle = draw["attitude"] + [0, 0, turn]
         length = np.linalg.norm(angle, axis=1, keepdims=True)
         q = np.hstack([np.cos(length / 2), angle / length * np.sin(length / 2)])
         sigmas = {"velocity": self.std["velocity"], "gyro bias": self.std["gyro bias"], "acc bias": self.std["acc bias"]}
-        self.write_rows("states.csv", metrics.STATES, [
+        self.write_rows("states.csv", recorded_run.STATES, [
             [epoch[i], time_s[i], 2, *q[i], *draw["velocity"][i], position[i, 2], 0.3, *draw["acc bias"][i], *draw["gyro bias"][i],
              *[sigmas["velocity"]] * 3, *[self.std["attitude"]] * 2, *[sigmas["acc bias"]] * 3, *[sigmas["gyro bias"]] * 3, *[None] * 9,
              *self.corr["position"][1:], *(self.corr["velocity"] if i % 2 == 0 or between == 1.0 else [None] * 3), *self.corr["attitude"],
              *self.corr["acc bias"], *self.corr["gyro bias"]] for i in range(n)])
         self.write("run.json", json.dumps(RUN))
-        self.write_rows("t.truth.csv", [*metrics.TRUTH, "epoch", *metrics.TRUTH_MORE],
-                        [[time_s[i], 0, 0, 0, epoch[i], *[0] * len(metrics.TRUTH_MORE)] for i in range(n)])
+        self.write_rows("t.truth.csv", [*ground_truth.TRUTH, "epoch", *ground_truth.TRUTH_MORE],
+                        [[time_s[i], 0, 0, 0, epoch[i], *[0] * len(ground_truth.TRUTH_MORE)] for i in range(n)])
         return self.path("t.truth.csv")
 
     def test_honest_errors_of_every_block_have_a_nees_of_three(self):
         fused = self.summary("--truth", self.inertial())["fused"]
         self.assertEqual(fused["kind"], "Inertial")
-        for name in metrics.BLOCKS:
+        for name in normalised_error.BLOCKS:
             self.assertAlmostEqual(fused["blocks"][name]["nees_mean"], 3.0, delta=0.25, msg=name)
             self.assertAlmostEqual(fused["blocks"][name]["nees_inside_two_sided_95"], 0.95, delta=0.015, msg=name)
             self.assertGreater(fused["blocks"][name]["inside_3_sigma"], 0.98, name)
 
     def test_errors_twice_as_large_as_said_have_four_times_the_nees(self):
         fused = self.summary("--truth", self.inertial(2.0))["fused"]
-        for name in metrics.BLOCKS:
+        for name in normalised_error.BLOCKS:
             self.assertAlmostEqual(fused["blocks"][name]["nees_mean"], 12.0, delta=1.0, msg=name)
             self.assertLess(fused["blocks"][name]["inside_3_sigma"], 0.75, name)
 
@@ -823,14 +823,14 @@ class Inertial(Case):
     def test_turns_compose_as_rotations_do_and_the_vertical_is_the_last_axis(self):
         random = np.random.default_rng(9)
         roll, pitch, yaw = random.uniform(-1, 1, (3, 500))
-        q = metrics.quaternion(roll, pitch, yaw)
+        q = attitude.quaternion(roll, pitch, yaw)
         small = random.normal(0, 0.1, (500, 3))
         angle = np.linalg.norm(small, axis=1, keepdims=True)
-        turned = metrics.product(np.hstack([np.cos(angle / 2), small / angle * np.sin(angle / 2)]), q)
-        np.testing.assert_allclose(metrics.turns(turned, q), small, atol=1e-12)
-        np.testing.assert_allclose(metrics.turns(-turned, q), small, atol=1e-12)  # the same attitude
+        turned = attitude.product(np.hstack([np.cos(angle / 2), small / angle * np.sin(angle / 2)]), q)
+        np.testing.assert_allclose(attitude.turns(turned, q), small, atol=1e-12)
+        np.testing.assert_allclose(attitude.turns(-turned, q), small, atol=1e-12)  # the same attitude
         # R_nb of yaw alone takes forward to (cos, sin, 0).
-        w, _, _, z = metrics.quaternion(np.zeros(1), np.zeros(1), np.array([0.7]))[0]
+        w, _, _, z = attitude.quaternion(np.zeros(1), np.zeros(1), np.array([0.7]))[0]
         self.assertAlmostEqual(w * w - z * z, np.cos(0.7))
         self.assertAlmostEqual(2 * w * z, np.sin(0.7))
 
@@ -838,20 +838,20 @@ class Inertial(Case):
         one = np.array([[1.0, 0, 0, 0]])
         tilted = np.array([[np.cos(0.1), np.sin(0.1), 0, 0]])
         headed = np.array([[np.cos(0.2), 0, 0, np.sin(0.2)]])
-        for q, expected in ((one, (0, 0)), (tilted, (0.2, 0)), (headed, (0, 0.4)), (metrics.product(tilted, headed), (0.2, 0.4))):
-            tilt, heading = metrics.apart(q, one)
+        for q, expected in ((one, (0, 0)), (tilted, (0.2, 0)), (headed, (0, 0.4)), (attitude.product(tilted, headed), (0.2, 0.4))):
+            tilt, heading = attitude.apart(q, one)
             self.assertAlmostEqual(tilt[0], expected[0])
             self.assertAlmostEqual(heading[0], expected[1])
 
     def test_a_page_counts_until_it_is_too_old(self):
-        held = metrics.held_at(np.array([1.0, 5, 9, 30]), np.array([0.1, np.nan, 0.3, np.nan]), np.array([0.0, 1, 8, 9, 19, 20]), 10)
+        held = recorded_run.held_at(np.array([1.0, 5, 9, 30]), np.array([0.1, np.nan, 0.3, np.nan]), np.array([0.0, 1, 8, 9, 19, 20]), 10)
         np.testing.assert_array_equal(held, [np.nan, 0.1, 0.1, 0.3, 0.3, np.nan])
 
     def test_the_best_is_called_fused_whatever_its_place(self):
-        self.assertEqual(metrics.names_of({0: "Odometry", 1: "Attitude", 2: "Inertial"}), {0: "odometry", 1: "attitude", 2: "fused"})
-        self.assertEqual(metrics.names_of({0: "Odometry", 1: "Ekf"}), {0: "odometry", 1: "fused"})
-        self.assertEqual(metrics.names_of({0: "Odometry", 1: "Ekf", 2: "Inertial"}), {0: "odometry", 1: "estimator1", 2: "fused"})
-        self.assertEqual(metrics.names_of({0: "Odometry"}), {0: "odometry"})
+        self.assertEqual(recorded_run.names_of({0: "Odometry", 1: "Attitude", 2: "Inertial"}), {0: "odometry", 1: "attitude", 2: "fused"})
+        self.assertEqual(recorded_run.names_of({0: "Odometry", 1: "Ekf"}), {0: "odometry", 1: "fused"})
+        self.assertEqual(recorded_run.names_of({0: "Odometry", 1: "Ekf", 2: "Inertial"}), {0: "odometry", 1: "estimator1", 2: "fused"})
+        self.assertEqual(recorded_run.names_of({0: "Odometry"}), {0: "odometry"})
 
     def test_counters_that_wrap_go_on(self):
         self.assertEqual(metrics.unwrapped(np.array([65000.0, 65500, 400, 1000]), 65536), 66536)
@@ -859,13 +859,13 @@ class Inertial(Case):
     def test_what_happened_is_told_in_words_and_in_order(self):
         self.inertial()
         row = [100, 1.0, 2, 5, 0, 1, 3, 99.0, 8.0, 100, None]
-        self.write_rows("innovations.csv", metrics.INNOVATIONS, [[100 + i, 1.0 + 0.2 * i, *row[2:]] for i in range(5)] + [[900, 9.0, *row[2:]]])
-        self.write_rows("status.csv", metrics.STATUS, [[i * 10, 0.1 * i, 5 if 12 <= i < 20 else 3, 0 if 40 <= i < 55 else 32, 2 if 12 <= i < 20 else 0, int(i >= 30), 6]
+        self.write_rows("innovations.csv", recorded_run.INNOVATIONS, [[100 + i, 1.0 + 0.2 * i, *row[2:]] for i in range(5)] + [[900, 9.0, *row[2:]]])
+        self.write_rows("status.csv", recorded_run.STATUS, [[i * 10, 0.1 * i, 5 if 12 <= i < 20 else 3, 0 if 40 <= i < 55 else 32, 2 if 12 <= i < 20 else 0, int(i >= 30), 6]
                                                        for i in range(1, 60)])
-        self.write_rows("states.csv", metrics.STATES, [[310, 3.1, 2, *[None] * 26, 99.5, -0.25, 0.01, *[None] * 5, 3.5, *[None] * 14]])
-        run = metrics.Run(self.directory)
+        self.write_rows("states.csv", recorded_run.STATES, [[310, 3.1, 2, *[None] * 26, 99.5, -0.25, 0.01, *[None] * 5, 3.5, *[None] * 14]])
+        run = recorded_run.Run(self.directory)
         run.about["fault"] = "wheel_spin@1+2,kidnapped@4+0,gnss_jump"
-        told = metrics.story(run)
+        told = events.events(run)
         words = [text for _, text in told]
         self.assertEqual([t for t, _ in told], sorted(t for t, _ in told))
         self.assertIn("GnssPosition Rejected, 5 times until 1.8 s", words)
@@ -879,8 +879,8 @@ class Inertial(Case):
         # The height of a jump is in another frame, here of an epoch later, or never said.
         there = [310, 3.1, 2, *[None] * 26, 99.5, -0.25, 0.01, *[None] * 20]
         for rows, up in (([there, [314, 3.14, 2, *[None] * 34, 3.5, *[None] * 14]], ", 3.50 m up"), ([there], "")):
-            self.write_rows("states.csv", metrics.STATES, rows)
-            self.assertIn("reset: PositionJump, position moved by 99.50 m east, -0.25 m north" + up, [text for _, text in metrics.story(metrics.Run(self.directory))])
+            self.write_rows("states.csv", recorded_run.STATES, rows)
+            self.assertIn("reset: PositionJump, position moved by 99.50 m east, -0.25 m north" + up, [text for _, text in events.events(recorded_run.Run(self.directory))])
         self.assertFalse([one for one in words if "gnss_jump" in one])  # nobody knows when
 
     def test_the_pictures_of_an_inertial_run_are_drawn(self):

@@ -6,7 +6,7 @@ NEES and NIS with their intervals: Bar-Shalom, Li, Kirubarajan, "Estimation with
 import numpy as np
 from scipy.special import stdtrit
 
-from tetap.report import metrics
+from tetap.report import ground_truth, metrics, normalised_error, recorded_run
 
 SETTLED_S = 10.0  # after the end of a fault: "after" begins
 BEFORE_S = 20.0   # what the node said within so long before a fault is not said because of it
@@ -19,33 +19,33 @@ DRAWS, LEAST_TIMES, LEAST_SEEDS = 200, 20, 30  # of what chance makes of a filte
 def judged(run, truth, job):
     """The sums and series of one run, small enough to be kept for every seed."""
     result = {"duration_s": float(truth.time_s[-1] - truth.time_s[0]), "times_realtime": run.about["times_realtime"], "estimators": {}}
-    names = metrics.code_names()
+    names = recorded_run.code_names()
     since_start = truth.time_s - truth.time_s[0]
     for k in run.estimators:
         rows = run.of(k)
-        dx, dy, dyaw = metrics.errors(rows, truth)
+        dx, dy, dyaw = ground_truth.errors(rows, truth)
         distance = np.hypot(dx, dy)
-        nees, unusable = metrics.nees_by_row(rows, dx, dy, dyaw, DOF)
+        nees, unusable = normalised_error.nees_by_row(rows, dx, dy, dyaw, DOF)
         published = np.isfinite(rows["std_x_m"])
-        one = {"position_rmse_m": metrics.rms(distance), "heading_rmse_rad": metrics.rms(dyaw), "unusable": unusable,
+        one = {"position_rmse_m": normalised_error.rms(distance), "heading_rmse_rad": normalised_error.rms(dyaw), "unusable": unusable,
                "epochs": rows["epoch"][published], "nees": nees[published], "valid_share": float(np.isfinite(distance).mean()),
                "sensors": innovations(run.innovations, k, names), "bus": metrics.bus_nis(run, k, names)}
-        found, attitude = metrics.blocks(run, k, truth), metrics.attitude_errors(run, k, truth)
+        found, attitude = normalised_error.blocks(run, k, truth), normalised_error.attitude_errors(run, k, truth)
         if attitude is not None:
-            one["tilt_rmse_rad"], one["turn_rmse_rad"] = metrics.rms(attitude[2]), metrics.rms(attitude[3])
+            one["tilt_rmse_rad"], one["turn_rmse_rad"] = normalised_error.rms(attitude[2]), normalised_error.rms(attitude[3])
         if found is not None:
             one["blocks"] = {}
-            for name in metrics.BLOCKS:
+            for name in normalised_error.BLOCKS:
                 white = found.white(name)
                 whole = np.isfinite(white).all(axis=1)
                 one["blocks"][name] = {"epochs": found.epoch[whole], "white": white[whole], "nees": (white[whole] ** 2).sum(axis=1),
-                                       "rmse": metrics.rms(np.linalg.norm(found.error[name], axis=1)), "inside_3_sigma": inside(found, name)}
+                                       "rmse": normalised_error.rms(np.linalg.norm(found.error[name], axis=1)), "inside_3_sigma": inside(found, name)}
         if job.get("fault_times"):
             at = since_start[rows["epoch"].astype(int) - 1]
             start, end = job["fault_times"]
             during, after = (at >= start) & (at < end + SETTLED_S), at >= end + SETTLED_S
             one["during_max_m"], one["during_max_rad"] = largest(distance[during]), largest(np.abs(dyaw[during]))
-            one["after_rmse_m"], one["after_rmse_rad"] = metrics.rms(distance[after]), metrics.rms(dyaw[after])
+            one["after_rmse_m"], one["after_rmse_rad"] = normalised_error.rms(distance[after]), normalised_error.rms(dyaw[after])
             one.update(outage(rows, dx, dy, truth, start, end, since_start))
             one.update(honesty(rows, dx, dy, found, at, start, end))
         result["estimators"][run.names[k]] = one
@@ -93,7 +93,7 @@ def longest(time_s, on):
 def honesty(rows, dx, dy, found, at, start, end):
     """From a fault's start on: is there an error that the published sigmas deny, for how long, and how large are they at most? Of x and y
     and, of an inertial estimate, the height."""
-    sigma_x, sigma_y = (metrics.held_at(rows["epoch"], rows[name], rows["epoch"], metrics.HELD_S / metrics.TICK_S) for name in ("std_x_m", "std_y_m"))
+    sigma_x, sigma_y = (recorded_run.held_at(rows["epoch"], rows[name], rows["epoch"], recorded_run.HELD_S / recorded_run.TICK_S) for name in ("std_x_m", "std_y_m"))
     with np.errstate(invalid="ignore", divide="ignore"):
         ratio = np.fmax(np.abs(dx) / (3 * sigma_x), np.abs(dy) / (3 * sigma_y))
     three_sigma = 3 * np.fmax(sigma_x, sigma_y)
@@ -102,14 +102,14 @@ def honesty(rows, dx, dy, found, at, start, end):
     result = {"three_sigma_m": largest(three_sigma[affected & (at < end + SETTLED_S)]),
               "too_sure_s": longest(at[known], ratio[known] > 1), "worst_ratio": largest(ratio[known])}
     if found is not None:
-        seen = found.epoch * metrics.TICK_S >= start
-        during = seen & (found.epoch * metrics.TICK_S < end + SETTLED_S)
+        seen = found.epoch * recorded_run.TICK_S >= start
+        during = seen & (found.epoch * recorded_run.TICK_S < end + SETTLED_S)
         error, sigma = np.abs(found.error["position"][:, 2]), found.sigma["position"][:, 2]
         with np.errstate(invalid="ignore", divide="ignore"):
             up = error / (3 * sigma)
         use = seen & np.isfinite(up)
         result["during_max_height_m"] = largest(error[during])
-        result["too_sure_s"] = max(result["too_sure_s"], longest(found.epoch[use] * metrics.TICK_S, up[use] > 1))
+        result["too_sure_s"] = max(result["too_sure_s"], longest(found.epoch[use] * recorded_run.TICK_S, up[use] > 1))
         result["worst_ratio"] = max((one for one in (result["worst_ratio"], largest(up[use])) if one is not None), default=None)
     return result
 
@@ -117,7 +117,7 @@ def honesty(rows, dx, dy, found, at, start, end):
 def said(run, names, start, end):
     """What the node said of itself from a fault on until it had settled, and not in the time before; and how soon the first of it came."""
     status = run.status
-    at = status["epoch"] * metrics.TICK_S
+    at = status["epoch"] * recorded_run.TICK_S
     words = [set() for _ in at]
     for i, (mode, faults) in enumerate(zip(status["mode"], status["faults"])):
         words[i].add(names["Mode"].get(int(mode), f"mode {int(mode)}"))
@@ -154,7 +154,7 @@ def spread(values):
 
 def interval(dof, count):
     """Two-sided, of the mean of `count` chi-square variables with `dof` degrees of freedom in all."""
-    return [metrics.chi_square((1 - SHARE) / 2, dof) / count, metrics.chi_square((1 + SHARE) / 2, dof) / count]
+    return [normalised_error.chi_square((1 - SHARE) / 2, dof) / count, normalised_error.chi_square((1 + SHARE) / 2, dof) / count]
 
 
 def anees(runs):
@@ -251,11 +251,11 @@ def averaged(case, runs):
             if framed and counts["accepted"] > metrics.MOST_FRAMED * framed["compared"]:
                 del entry["sensors"][sensor]  # it has frames about what was rejected only
         if "blocks" in mine[0]:
-            entry["blocks"] = {block: {"anees": anees([one["blocks"][block] for one in mine]), "unit": metrics.UNITS[block],
+            entry["blocks"] = {block: {"anees": anees([one["blocks"][block] for one in mine]), "unit": normalised_error.UNITS[block],
                                        "by_chance": by_chance([one["blocks"][block] for one in mine]),
                                        "rmse": spread([one["blocks"][block]["rmse"] for one in mine]),
                                        "inside_3_sigma": float(np.mean([one["blocks"][block]["inside_3_sigma"] or 0 for one in mine]))}
-                               for block in metrics.BLOCKS}
+                               for block in normalised_error.BLOCKS}
         if case.get("fault_times"):
             entry.update(largest_error_m=spread([one["during_max_m"] for one in mine]), largest_heading_error_deg=degrees("during_max_rad"),
                          position_rmse_after_m=spread([one["after_rmse_m"] for one in mine]), heading_rmse_after_deg=degrees("after_rmse_rad"),

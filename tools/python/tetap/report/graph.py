@@ -15,7 +15,7 @@ def counted(column, wrap):
 
 
 def figures(run, estimator, names):
-    """Of summary.json, for a pose graph; else nothing."""
+    """Figures of a pose graph for summary.json; empty for other estimators."""
     rows = run.graph
     if run.kinds[estimator] != "PoseGraph" or len(rows["time_s"]) == 0:
         return {}

@@ -5,7 +5,7 @@ import numpy as np
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from tetap.report import metrics
+from tetap.report import normalised_error, recorded_run
 from tetap.report import pictures
 
 MRAD = 1000.0
@@ -33,7 +33,7 @@ def _limits(axes, band, value):
 
 def errors(run, truth, estimator, title):
     """Errors of position, velocity and attitude, each inside three times the sigma published for it."""
-    found = metrics.blocks(run, estimator, truth)
+    found = normalised_error.blocks(run, estimator, truth)
     fig, axes = pictures.figure(10.6, 6.8, title, 3, 3, sharex=True)
     color = pictures.color_of(run, estimator)
     shades = []
@@ -62,7 +62,7 @@ def errors(run, truth, estimator, title):
 
 def bands(run, truth, estimator):
     """(name, error, published 1 sigma) of position, velocity and attitude by axis."""
-    found = metrics.blocks(run, estimator, truth)
+    found = normalised_error.blocks(run, estimator, truth)
     return [(label.split(" [")[0], found.error[name][:, column], found.sigma[name][:, column])
             for name, labels, _ in PANELS for column, label in enumerate(labels)]
 
@@ -85,7 +85,7 @@ def biases(run, truth, estimator, title):
     fig, axes = pictures.figure(11.0, 6.4, title, 3, 2, sharex=True)
     color = pictures.color_of(run, estimator)
     shades = []
-    for column, (names, what, scale) in enumerate(((metrics.GYRO_BIAS, "gyroscope {} [mrad/s]", MRAD), (metrics.ACC_BIAS, "accelerometer {} [m/s²]", 1.0))):
+    for column, (names, what, scale) in enumerate(((recorded_run.GYRO_BIAS, "gyroscope {} [mrad/s]", MRAD), (recorded_run.ACC_BIAS, "accelerometer {} [m/s²]", 1.0))):
         for row, name in enumerate(names):
             one = axes[row * 2 + column]
             value, sigma = scale * states[name], scale * states[f"std_{name}"]
@@ -99,7 +99,7 @@ def biases(run, truth, estimator, title):
                 shown.append(scale * true[name][np.isfinite(true[name])])
             _around(one, np.concatenate(shown), sigma[valid & np.isfinite(sigma)])
             shades = pictures.shade_faults(one, run)
-            one.set_ylabel(what.format(metrics.AXES[row]))
+            one.set_ylabel(what.format(recorded_run.AXES[row]))
             if row == 2:
                 one.set_xlabel("time [s]")
     handles = [Line2D([], [], color=color, linewidth=1.2), Patch(color=color, alpha=0.16)]
@@ -120,7 +120,7 @@ def _around(axes, values, sigma):
 
 def disagreement(run, title):
     """How far the attitude filter and the best estimate are apart, as computed from the published attitudes."""
-    time_s, tilt, heading = metrics.disagreement(run)
+    time_s, tilt, heading = normalised_error.disagreement(run)
     fig, axes = pictures.figure(9.0, 4.4, title, 2, sharex=True)
     color = pictures.ESTIMATORS["attitude"]
     for one, value, label in ((axes[0], tilt, "tilt [deg]"), (axes[1], heading, "heading [deg]")):

@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.collections import EllipseCollection, LineCollection
 from matplotlib.lines import Line2D
 
-from tetap.report import metrics, own_map, pictures
+from tetap.report import ground_truth, normalised_error, own_map, pictures
 
 AMBIGUOUS = 9         # sensor::Verdict
 SHARE = 0.95          # probability of an ellipse, and of the dashed lines
@@ -46,7 +46,7 @@ class Mapped:
 
 def ellipses(rows):
     """Centres, widths, heights and angles [deg] of the landmarks as last published."""
-    scale = np.sqrt(metrics.chi_square(SHARE, 2))
+    scale = np.sqrt(normalised_error.chi_square(SHARE, 2))
     last = {int(k): i for i, k in enumerate(rows["landmark"])}
     centres, widths, heights, angles = [], [], [], []
     for i in last.values():
@@ -123,15 +123,15 @@ def _binned(time_s, values, edges):
 def consistency(run, estimator, truth, title):
     """NEES of pose and landmarks over time, means of short spans, with the share of a single value that is to lie below the dashed line."""
     mapped = Mapped(run, estimator, truth)
-    dx, dy, dyaw = metrics.errors(mapped.rows, truth)
-    of_pose, _ = metrics.nees_by_row(mapped.rows, dx, dy, dyaw, 3)
+    dx, dy, dyaw = ground_truth.errors(mapped.rows, truth)
+    of_pose, _ = normalised_error.nees_by_row(mapped.rows, dx, dy, dyaw, 3)
     time_s, of_landmarks = own_map.landmark_nees(run.map, mapped.pairs, mapped.true)
     edges = np.linspace(mapped.rows["time_s"][0], mapped.rows["time_s"][-1] + 1e-9, BINS + 1)
     fig, axes = pictures.figure(8.6, 4.6, title, 2, 1, sharex=True)
     for one, label, dof, at, values in ((axes[0], "pose", 3, mapped.rows["time_s"], of_pose), (axes[1], "landmarks", 2, time_s, of_landmarks)):
         one.plot(0.5 * (edges[1:] + edges[:-1]), _binned(at, values, edges), color=pictures.color_of(run, estimator), linewidth=1.2)
         one.axhline(dof, color=pictures.GREY, linewidth=0.8)
-        one.axhline(metrics.chi_square(SHARE, dof), color=pictures.GREY, linewidth=0.8, linestyle="--")
+        one.axhline(normalised_error.chi_square(SHARE, dof), color=pictures.GREY, linewidth=0.8, linestyle="--")
         one.set_ylabel(f"NEES, {label} ({dof})")
         one.set_yscale("log")
     axes[1].set_xlabel("time [s]")

@@ -146,7 +146,7 @@ def landmark_nees(rows, pairs, true):
 
 
 def figures(run, estimator, truth, dx_m, dy_m):
-    """Of summary.json, for a mapper with a truth that has landmarks; else nothing. dx, dy: errors of its rows, unaligned."""
+    """Figures of a mapper for summary.json where the truth has landmarks; else empty. dx, dy: errors of its rows [m], unaligned."""
     true = true_landmarks(run, truth)
     if run.kinds[estimator] not in MAPPERS or not true:
         return {}

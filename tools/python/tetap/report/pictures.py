@@ -12,7 +12,7 @@ from matplotlib.patches import Patch
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import NullLocator
 
-from tetap.report import metrics
+from tetap.report import ground_truth, metrics, normalised_error, recorded_run
 
 INK, GREY, FAINT = "#262626", "#6b6b6b", "#e3e3e3"
 TRUTH, ODOMETRY, FUSED = "#3c3c3c", "#e69f00", "#0072b2"
@@ -67,7 +67,7 @@ def save(fig, path):
 
 def shade_faults(axes, run):
     """The time of each fault of the world; a line where it was an instant. A handle for the legend, or none."""
-    spans = metrics.fault_spans(run)
+    spans = recorded_run.fault_spans(run)
     for _, start, end in spans:
         if end > start:
             axes.axvspan(start, end, color=FAULT_SHADE, linewidth=0, zorder=0)
@@ -113,7 +113,7 @@ def covariance_ellipses(rows, share, count):
     p[:, 0, 0], p[:, 1, 1] = sx ** 2, sy ** 2
     p[:, 0, 1] = p[:, 1, 0] = rows["corr_xy"][pick] * sx * sy
     values, vectors = np.linalg.eigh(p)
-    axes = 2 * np.sqrt(np.maximum(values, 0) * metrics.chi_square(share, 2))
+    axes = 2 * np.sqrt(np.maximum(values, 0) * normalised_error.chi_square(share, 2))
     angle = np.degrees(np.arctan2(vectors[:, 1, 1], vectors[:, 0, 1]))
     return np.stack([rows["x_m"][pick], rows["y_m"][pick]], axis=1), axes[:, 1], axes[:, 0], angle
 
@@ -136,7 +136,7 @@ def way_in_faults(run, truth, estimator):
     valid = rows["pos_valid"] == 1
     time_s, x, y = (truth.time_s, truth.x_m, truth.y_m) if truth is not None else (rows["time_s"][valid], rows["x_m"][valid], rows["y_m"][valid])
     found = []
-    for name, start, end in metrics.fault_spans(run):
+    for name, start, end in recorded_run.fault_spans(run):
         inside = np.flatnonzero((time_s >= start) & (time_s <= end)) if end > start else np.flatnonzero(time_s >= start)[:1]
         if len(inside):
             found.append((name, x[inside], y[inside]))
@@ -226,7 +226,7 @@ def path(run, truth, landmarks, title, fixes=None):
 def errors(run, truth, estimator, title):
     """Errors of one estimator's x, y and yaw inside of three times the sigma published for it."""
     rows = run.of(estimator)
-    dx, dy, dyaw = metrics.errors(rows, truth)
+    dx, dy, dyaw = ground_truth.errors(rows, truth)
     parts = [("x [m]", dx, rows["std_x_m"], 1.0), ("y [m]", dy, rows["std_y_m"], 1.0)]
     if truth.has_yaw:
         parts.append(("yaw [deg]", dyaw, rows["std_yaw_rad"], 180.0 / np.pi))
@@ -267,7 +267,7 @@ def errors(run, truth, estimator, title):
 def bands(run, truth, estimator):
     """(name, error, published 1 sigma) of x, y and yaw."""
     rows = run.of(estimator)
-    dx, dy, dyaw = metrics.errors(rows, truth)
+    dx, dy, dyaw = ground_truth.errors(rows, truth)
     parts = [("x", dx, rows["std_x_m"]), ("y", dy, rows["std_y_m"])]
     return parts + ([("yaw", dyaw, rows["std_yaw_rad"])] if truth.has_yaw else [])
 
@@ -310,7 +310,7 @@ def nis(run, estimator, names, title):
     sensors = sensors_with_nis(run, estimator)
     fig, axes = figure(9.0, 2.3 * len(sensors) + 0.7, title, len(sensors), sharex=True)
     rows = run.innovations
-    floor, largest = metrics.limits("Est_Innov", "Nis")
+    floor, largest = recorded_run.limits("Est_Innov", "Nis")
     any_most, shades = False, []
     for one, sensor in zip(axes, sensors):
         mine = (rows["estimator"] == estimator) & (rows["sensor"] == sensor) & np.isfinite(rows["nis"])
@@ -329,7 +329,7 @@ def nis(run, estimator, names, title):
         one.plot(rows["time_s"][most], value[most], linestyle="none", marker="^", markersize=6, color=REJECTED, markeredgewidth=0, zorder=4)
         any_most |= bool(most.any())
         for dof in np.unique(rows["dof"][mine]):
-            bound = metrics.chi_square(0.95, max(int(dof), 1))
+            bound = normalised_error.chi_square(0.95, max(int(dof), 1))
             one.axhline(bound, color=INK, linewidth=1.0, linestyle=(0, (5, 3)))
         one.set_yscale("log")
         one.set_ylim(floor * 0.7, max(30.0, 1.6 * float(value[mine].max())))
@@ -345,7 +345,7 @@ def nis(run, estimator, names, title):
                          "the line is the node's own mean of the last 50", (0.0, 1.0), xycoords="axes fraction", xytext=(0, 4),
                          textcoords="offset points", ha="left", va="bottom", fontsize=9, color=GREY)
             continue
-        below = np.mean(rows["nis"][accepted | rejected] <= metrics.chi_square(0.95, max(int(np.median(rows["dof"][mine])), 1)))
+        below = np.mean(rows["nis"][accepted | rejected] <= normalised_error.chi_square(0.95, max(int(np.median(rows["dof"][mine])), 1)))
         name = names["Sensor"].get(sensor, str(sensor))
         dofs = " and ".join(str(int(dof)) for dof in np.unique(rows["dof"][mine]))
         one.annotate(f"{name} ({dofs} dof): {100 * below:.1f} % below the line, {int(rejected.sum())} rejected", (0.0, 1.0),

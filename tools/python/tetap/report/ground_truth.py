@@ -1,0 +1,103 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The true or reference path of a run, by time or by epoch, and the errors of an estimate against it."""
+import copy
+import os
+
+import numpy as np
+
+from tetap.can.bus_writer import BadInput
+from tetap.report.attitude import wrapped
+from tetap.report.recorded_run import ACC_BIAS, GYRO_BIAS, VELOCITY, read_json
+from tetap.report.tables import read_table
+
+LEAST_GAP_S = 0.2  # truth rows further apart than this, or than 2.5 times their usual distance, are not interpolated between
+TRUTH = ["time_s", "x_m", "y_m", "yaw_rad"]  # and perhaps "epoch" and these
+TRUTH_MORE = ["z_m", "roll_rad", "pitch_rad", *VELOCITY, *GYRO_BIAS, *ACC_BIAS]
+
+
+class Truth:
+    """Where the robot was, by time. `about` is the JSON beside NAME.truth.csv, when there is one.
+
+    A simulated world says for each row which of the node's epochs it belongs to: then the rows are paired by epoch, because a fault may have
+    made the clock of the bus jump, which the truth does not."""
+
+    def __init__(self, path, max_gap_s=None):
+        self.path = path
+        self._rows = read_table(path, TRUTH, ["epoch", *TRUTH_MORE])
+        self.has_more = all(name in self._rows for name in ("epoch", *TRUTH_MORE))
+        epoch, time_s = self.epoch, self.time_s
+        if epoch is not None and not (np.diff(epoch) > 0).all():
+            raise BadInput(f"{path}: row {int(np.argmin(np.diff(epoch) > 0)) + 2}: epoch does not grow")
+        if len(time_s) < 2:
+            raise BadInput(f"{path}: fewer than two rows")
+        for name in ("time_s", "x_m", "y_m"):
+            known = np.isfinite(self._rows[name])
+            if not known.all():
+                raise BadInput(f"{path}: row {int(np.argmin(known)) + 1} has no {name}")
+        steps = np.diff(time_s)
+        if (steps < 0).any():
+            raise BadInput(f"{path}: row {int(np.argmax(steps < 0)) + 2}: time goes back")
+        self.max_gap_s = max(LEAST_GAP_S, 2.5 * float(np.median(steps))) if max_gap_s is None else max_gap_s
+        self.has_yaw = bool(np.isfinite(self.yaw_rad).any())
+        beside = path[:-len(".truth.csv")] + ".json" if path.endswith(".truth.csv") else ""
+        self.about = read_json(beside) if beside and os.path.exists(beside) else {}
+        self.is_reference = self.about.get("truth") == "gps track"
+
+    def since(self, start):
+        """The same, with times counted from `start` [s]."""
+        later = copy.copy(self)
+        later._rows = self._rows.since(start)
+        return later
+
+    def with_poses(self, x_m, y_m, yaw_rad):
+        """The same with other poses in its rows."""
+        other = copy.copy(self)
+        other._rows = self._rows.with_columns(x_m=x_m, y_m=y_m, yaw_rad=yaw_rad)
+        return other
+
+    epoch = property(lambda self: self._rows["epoch"] if "epoch" in self._rows else None)
+    time_s = property(lambda self: self._rows["time_s"])
+    x_m = property(lambda self: self._rows["x_m"])
+    y_m = property(lambda self: self._rows["y_m"])
+    yaw_rad = property(lambda self: self._rows["yaw_rad"])
+
+    def _in_epochs(self, epochs, names):
+        """These columns by name, in these epochs; NaN where there is no row."""
+        epoch = self.epoch
+        found = np.clip(np.searchsorted(epoch, epochs), 0, len(epoch) - 1)
+        known = epoch[found] == epochs
+        return {name: np.where(known, self._rows[name][found], np.nan) for name in names}
+
+    def of(self, rows):
+        """x, y, yaw for rows of estimates."""
+        if self.epoch is None:
+            return self.at(rows["time_s"])
+        return tuple(self._in_epochs(rows["epoch"], TRUTH[1:]).values())
+
+    def more_of(self, epochs):
+        """All that a simulated world says, for these epochs; None where the truth says only a pose."""
+        return self._in_epochs(epochs, [*TRUTH[1:], *TRUTH_MORE]) if self.has_more else None
+
+    def at(self, time_s):
+        """x, y, yaw at the times given, linear in between; NaN outside of the truth and in its gaps."""
+        known = self.time_s
+        after = np.clip(np.searchsorted(known, time_s), 1, len(known) - 1)
+        before = after - 1
+        span = known[after] - known[before]
+        with np.errstate(invalid="ignore", divide="ignore"):
+            part = np.where(span > 0, (time_s - known[before]) / span, 0.0)
+        inside = (time_s >= known[0]) & (time_s <= known[-1]) & ((span <= self.max_gap_s + 1e-9) | (part == 1.0))
+        part = np.where(inside, part, np.nan)
+        x, y, yaw = self.x_m, self.y_m, self.yaw_rad
+        return (x[before] + part * (x[after] - x[before]), y[before] + part * (y[after] - y[before]),
+                wrapped(yaw[before] + part * wrapped(yaw[after] - yaw[before])))
+
+
+def errors(rows, truth):
+    """Estimate minus truth of one estimator's rows: dx, dy, dyaw; NaN where there is no truth or the estimate is not valid."""
+    dx, dy, dyaw = truth.of(rows)
+    position, heading = rows["pos_valid"] == 1, rows["hdg_valid"] == 1
+    for name, error, known in (("x_m", dx, position), ("y_m", dy, position), ("yaw_rad", dyaw, position & heading)):
+        np.subtract(rows[name], error, out=error)
+        error[~known] = np.nan
+    return dx, dy, wrapped(dyaw)
