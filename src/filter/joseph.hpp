@@ -5,6 +5,7 @@
 
 #include "filter/inverse.hpp"
 #include "filter/kalman_form.hpp"
+#include "filter/whole_covariance.hpp"
 
 namespace tetap::filter {
 
@@ -23,17 +24,9 @@ template <class Scalar, int N, int M>
 }
 
 template <class Scalar, int N>
-class Joseph {
+class Joseph : public WholeCovariance<Scalar, N> {
  public:
-  explicit Joseph(const Symmetric<Scalar, N>& p) : p_(p) {}
-  [[nodiscard]] Symmetric<Scalar, N> covariance() const { return p_; }
-
-  bool propagate(const Matrix<Scalar, N, N>& f, const Symmetric<Scalar, N>& q) {
-    const Symmetric<Scalar, N> next = filter::propagate(p_, f, q);
-    if (!next.bounded()) return false;
-    p_ = next;
-    return true;
-  }
+  using WholeCovariance<Scalar, N>::WholeCovariance;
 
   template <int M>
   [[nodiscard]] Update<Scalar, N, M> update(const Matrix<Scalar, M, N>& h, const Vector<Scalar, M>& nu,
@@ -60,7 +53,7 @@ class Joseph {
   }
 
  private:
-  Symmetric<Scalar, N> p_;
+  using WholeCovariance<Scalar, N>::p_;
 };
 
 template <State S>

@@ -3,21 +3,14 @@
 #pragma once
 
 #include "filter/kalman_form.hpp"
+#include "filter/whole_covariance.hpp"
 
 namespace tetap::filter {
 
 template <class Scalar, int N>
-class Sequential {
+class Sequential : public WholeCovariance<Scalar, N> {
  public:
-  explicit Sequential(const Symmetric<Scalar, N>& p) : p_(p) {}
-  [[nodiscard]] Symmetric<Scalar, N> covariance() const { return p_; }
-
-  bool propagate(const Matrix<Scalar, N, N>& f, const Symmetric<Scalar, N>& q) {
-    const Symmetric<Scalar, N> next = filter::propagate(p_, f, q);
-    if (!next.bounded()) return false;
-    p_ = next;
-    return true;
-  }
+  using WholeCovariance<Scalar, N>::WholeCovariance;
 
   /// Implements docs/explanation/kalman_forms.md (4).
   /// The sum of the scalars' NIS is the joint NIS, because each takes the state that those before it have left.
@@ -58,7 +51,7 @@ class Sequential {
   }
 
  private:
-  Symmetric<Scalar, N> p_;
+  using WholeCovariance<Scalar, N>::p_;
 };
 
 template <State S>

@@ -12,6 +12,7 @@
 #include "filter/ukf.hpp"
 #include "filter/ukf_sqrt.hpp"
 #include "model/target_range.hpp"
+#include "support/filter_covariance.hpp"
 #include "support/least_eigenvalue.hpp"
 
 #include <gtest/gtest.h>
@@ -27,23 +28,6 @@ using filter::Symmetric;
 using filter::Vector;
 using filter::VectorState;
 using filter::Verdict;
-
-template <class Filter, int N>
-void set_covariance(Filter& filter, const Symmetric<typename Filter::Scalar, N>& p) {
-  if constexpr (requires { filter.set_covariance(p); }) {
-    filter.set_covariance(p);
-  } else {
-    filter.p = p;
-  }
-}
-template <class Filter>
-auto covariance(const Filter& filter) {
-  if constexpr (requires { filter.covariance(); }) {
-    return filter.covariance();
-  } else {
-    return filter.p;
-  }
-}
 
 struct EkfForm {
   template <class S>

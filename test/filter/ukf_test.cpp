@@ -7,6 +7,7 @@
 #include "model/planar_increment.hpp"
 #include "model/range_bearing.hpp"
 #include "support/euler_pose.hpp"
+#include "support/filter_covariance.hpp"
 #include "support/never_nan.hpp"
 
 #include <gtest/gtest.h>
@@ -21,23 +22,6 @@ using filter::Symmetric;
 using filter::Vector;
 using filter::VectorState;
 using filter::Verdict;
-
-template <class Filter, int N>
-void set_covariance(Filter& filter, const Symmetric<typename Filter::Scalar, N>& p) {
-  if constexpr (requires { filter.set_covariance(p); }) {
-    filter.set_covariance(p);
-  } else {
-    filter.p = p;
-  }
-}
-template <class Filter>
-auto covariance(const Filter& filter) {
-  if constexpr (requires { filter.covariance(); }) {
-    return filter.covariance();
-  } else {
-    return filter.p;
-  }
-}
 
 /// Whether P is positive definite: of a square root by its diagonal, for no rounding of R^T R is to be judged.
 template <class Filter>
