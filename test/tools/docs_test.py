@@ -284,7 +284,7 @@ class Generated(unittest.TestCase):
         """A header of src/filter is an estimator of the table, or a part that this list names."""
         parts = {"attitude_bias", "attitude_clipping", "attitude_heading", "attitude_options", "big_covariance", "condition", "correction", "covariance_access", "inverse",
                  "kalman_form", "linear_models", "low_pass", "particle_noise", "particle_number", "particle_pose", "quaternion", "resampling", "root_update", "sigma_points",
-                 "sparse_update", "state", "structure", "symmetric", "triangular", "unroll", "update", "wrap"}
+                 "sparse_update", "state", "structure", "symmetric", "triangular", "unroll", "update", "whole_covariance", "wrap"}
         rows = costs.listed(read("test/costs/list.hpp"))
         headers = {os.path.basename(path)[:-4] for path in glob.glob(os.path.join(ROOT, "src/filter/*.hpp"))}
         of_rows = {os.path.basename(header)[:-4] for _, _, header in rows if header.startswith("filter/")}
@@ -500,6 +500,21 @@ class Lines(unittest.TestCase):
             file.write('#include "config/mine.hpp"\n#include <memory>\nnamespace r = tetap::robot::mine;\nusing Node = tetap::node::Node<r::Estimators>;\n'
                        "std::unique_ptr<Node> f(const tetap::bus::Version& v) { return std::make_unique<Node>(r::parameters, v); }\n"
                        "static_assert(r::parameters.wheels.drive.noise_left > 0 && r::parameters.wheels.drive.noise_right > 0);\n")
+        os.makedirs(os.path.join(self.tree, "made/bus"))
+        self.run_here("tools/can/generate_messages --header made/bus/messages.hpp")
+        for compiler in ("g++", "clang++"):
+            self.run_here(f"{compiler} -std=c++20 -fsyntax-only -Wall -Wextra -Werror -Wno-missing-field-initializers -I. -Isrc -Imade -isystem /usr/include/eigen3 robot.cpp")
+
+    def test_the_estimator_of_extend_is_one_that_a_node_takes(self):
+        code = re.search(r"Save it as `gnss_track.hpp` in `src/estimators`:\n\n```cpp\n(.*?)```", read("docs/howto/extend.md"), re.S)[1]
+        with open(os.path.join(self.tree, "src/estimators/gnss_track.hpp"), "w", encoding="utf-8") as file:
+            file.write(code)
+        with open(os.path.join(self.tree, "robot.cpp"), "w", encoding="utf-8") as file:
+            file.write('#include "estimators/gnss_track.hpp"\n#include "node/node.hpp"\n#include "param/limits.hpp"\n#include <memory>\n'
+                       "using namespace tetap;\nusing Node = node::Node<node::Estimators<estimators::GnssTrack>>;\n"
+                       "static_assert(node::EstimatorSlot<estimators::GnssTrack>::kTakes<sensor::GnssPosition>);\n"
+                       "constexpr param::Parameters parameters = param::checked({.gnss = {.sigma_floor_m = 1.0F}});\n"
+                       "std::unique_ptr<Node> f(const bus::Version& v) { return std::make_unique<Node>(parameters, v); }\n")
         os.makedirs(os.path.join(self.tree, "made/bus"))
         self.run_here("tools/can/generate_messages --header made/bus/messages.hpp")
         for compiler in ("g++", "clang++"):

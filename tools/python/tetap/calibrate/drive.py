@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A drive on the clock of the IMU: what the wheels say it travelled, and how far the gyroscope turned."""
+"""A drive on the clock of the IMU: the way by the wheels, and how far the gyroscope turned."""
 import numpy as np
 
 from tetap.calibrate.robot_numbers import Refusal
 
-WINDOW_S = 2.0            # of one comparison of wheels and gyroscope
+WINDOW_S = 2.0            # span of one comparison of wheels and gyroscope
 SMOOTH_S = 0.1            # half the span over which speed and acceleration are taken
 KNOT_S = 60.0             # between two values of the gyroscope's bias
-GAP_S, CUT_S = 0.1, 2.0   # of the IMU: from the first on the heading may have jumped, at the second the run is cut
+GAP_S, CUT_S = 0.1, 2.0   # holes of the IMU: from the first on the heading may have jumped, at the second the run is cut
 
 
 class Run:

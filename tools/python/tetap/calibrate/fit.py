@@ -11,7 +11,7 @@ run (A. C. Aitken 1936),
 
 with ds = (dR + dL)/2 (1 - slip), slip = c_curve |v w| + c_acc a: tyres turn further than they roll under load, which is not a smaller
 wheel. Unknown besides the numbers: start pose, gyroscope bias (knots, random walk) and scale, slip, side slip, lever arm, delay; each with
-a stated prior, so what the run does not tell stays in the 1 sigma. GNSS errors are correlated: calibrate_noise.py.
+a stated prior, so an unknown that the run does not show stays in the 1 sigma. GNSS errors are correlated: calibrate_noise.py.
 """
 import numpy as np
 from scipy.linalg import solve_triangular
@@ -24,9 +24,9 @@ from tetap.dataset.inertial import to_enu
 
 REST_BIAS = 1e-3          # rad/s: 1 sigma of the bias against the one at rest, where there was one
 BIAS_WALK = 1e-5          # rad/s/sqrt(s), as InertialParameters::gyro_bias_radps2_rthz
-MOST_FIXES = 1000         # of one kind: more are averaged in groups
+MOST_FIXES = 1000         # comparisons of one kind: more are averaged in groups
 JUMP_RADPS = 0.2          # 1 sigma of what the turn rate did meanwhile, against the mean of before and after
-BLOCKS = 10               # of the run: each is left out in turn
+BLOCKS = 10               # parts of the run: each is left out in turn
 LEAST_DISTANCE_M, LEAST_FIXES = 30.0, 30
 SYSTEMATIC = 0.001        # relative, of the radius: lean of the antenna's mast, tyres' warmth, ground: what no term here has [own]
 OUTLIER = 6.0
@@ -270,7 +270,7 @@ class Fit:
             if outer == 1:
                 self.clean()
             if outer < 2:
-                if run.has_turn and run.kind != "body speed":  # what the comparison with the gyroscope scatters, each wheel has a share of
+                if run.has_turn and run.kind != "body speed":  # each wheel has a share of the scatter of the comparison with the gyroscope
                     self.weigh_wheels(self.at(self.p)[2])
                 starts = self.groups(self.fix_t)
                 t = self.mean(self.fix_t, starts)
@@ -305,9 +305,9 @@ class Fit:
         self.white_rms = [self.whitened(r, one) for (r, _), one in zip(series, noise)]
 
     def _without_blocks(self, series, wheel, j_wheel):
-        """Jackknife over BLOCKS parts of the run (B. Efron, C. Stein, Ann. Statist. 9, 1981): where it says more scatter than the model, it counts.
+        """Jackknife over BLOCKS parts of the run (B. Efron, C. Stein, Ann. Statist. 9, 1981): where its scatter exceeds the model's, it counts.
 
-        A robot whose wheels skid in some places and not in others is found out so, whatever the model believes.
+        A robot whose wheels skid in some places and not in others is found out so, whatever the model assumes.
         """
         run = self.run
         edges = np.interp(np.linspace(0, run.path[-1], BLOCKS + 1), run.path, run.t)

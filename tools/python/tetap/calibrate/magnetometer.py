@@ -15,7 +15,7 @@ from tetap.calibrate.robot_numbers import Part, Refusal
 
 AXES = ("x", "y", "z")
 CELLS = 240
-LEAST_CELLS = 40        # of them must have been seen
+LEAST_CELLS = 40        # least number of cells with a sample
 MOST_HARD, MOST_SOFT = 0.03, 0.03  # 1 sigma as a share of the field: with more the number is refused
 LEAST_SPREAD = 0.04     # smallest eigenvalue of the directions' covariance; 1/3 when all directions are there
 OUTLIER = 5.0           # times the scatter

@@ -33,7 +33,7 @@ def speed(log):
 
 
 def driving_force(log):
-    """Mean specific force while it drives, None when nothing says so: of starts and stops, left and right, gravity is left."""
+    """Mean specific force while it drives, None without evidence: of starts and stops, left and right, gravity is left."""
     source = speed(log)
     if source is None or not (np.abs(source[1]) > 0).any():
         return None
@@ -153,7 +153,7 @@ def _forward(log, part, up, bias, matrix, sigma_tilt, how):
         part.notes.append(f"forward by acceleration and by curves: {np.degrees(apart):+.2f} deg apart (1 sigma {np.degrees(both):.2f})")
         w = np.array([1 / sigmas[0] ** 2, 1 / sigmas[1] ** 2])
         alpha, sigma = alpha + apart * w[1] / w.sum(), 1 / np.sqrt(w.sum())
-        sigma *= max(1.0, abs(apart) / both)  # they disagree: neither knows better
+        sigma *= max(1.0, abs(apart) / both)  # both disagree: neither is preferred
         part.notes.append(f"arm from the axle to the sensor, not corrected: {(solution[2] * np.exp(-1j * alpha)).real:.2f} m forward, "
                           f"{(solution[2] * np.exp(-1j * alpha)).imag:.2f} m left")
     if sigma > MOST_YAW_RAD:

@@ -12,11 +12,11 @@ TUNE_FIXES = 200          # for the noise's own numbers
 
 
 class Noise:
-    """s_w^2 I + s_c^2 exp(-|dt|/tau) + path part; tuned by restricted likelihood, with a weak belief in what the receiver says."""
+    """s_w^2 I + s_c^2 exp(-|dt|/tau) + path part; tuned by restricted likelihood, with a weak prior at the receiver's own figure."""
 
     def __init__(self, t, path, path_noise, accuracy, tau_s):
         self.t, self.path = t, path
-        self.accuracy, self.tau0, self.walk0 = accuracy, tau_s, path_noise  # what is believed before the residuals speak
+        self.accuracy, self.tau0, self.walk0 = accuracy, tau_s, path_noise  # prior before the residuals
         self.found = np.array([accuracy / np.sqrt(2), accuracy / np.sqrt(2), tau_s] + ([path_noise] if path_noise else []))
 
     @property
@@ -48,7 +48,7 @@ class Noise:
         return np.linalg.cholesky(self.matrix(slice(None), *self.found))
 
     def tune(self, residual, jacobian, other):
-        """`residual` complex, `jacobian` complex columns; `other`: what the rest of the data says about the unknowns."""
+        """`residual` complex, `jacobian` complex columns; `other`: information of the rest of the data about the unknowns."""
         rows = np.arange(0, len(self.t), max(1, -(-len(self.t) // TUNE_FIXES)))
         r = np.stack([residual[rows].real, residual[rows].imag], axis=1)
         j = np.hstack([jacobian[rows].real, jacobian[rows].imag])

@@ -3,7 +3,8 @@
 
 A stamp holds the low 20 bits of a microsecond. It is extended around the node's own time (In_Sync, Est_Epoch) where the log has it, so a log
 that was recorded faster or slower than the world ran is right too; else around the time of reception, whose offset to the stamps is followed.
-A node that ticks by its own clock until a run begins (In_Sync of kind Begin) has said two times: only that of the run with the samples counts.
+A node that ticks by its own clock until a run begins (In_Sync of kind Begin) has published
+two times: only that of the run with the samples counts.
 Times are seconds since the first sample of any sensor.
 """
 
@@ -107,7 +108,7 @@ def _rows(path, dbc, base):
 
 
 def _of_one_run(path, nodes, begins, samples):
-    """Of the node's times those of the run that the samples (order in the log, ascending) belong to."""
+    """The node's times of the run that the samples (order in the log, ascending) belong to."""
     orders = [begin[0] for begin in begins]
     runs = np.unique(np.searchsorted(orders, samples))  # 0: before the first begin
     if not begins or not len(runs):
@@ -117,7 +118,7 @@ def _of_one_run(path, nodes, begins, samples):
     run = int(runs[0])
     first, last = 0 if run == 0 else orders[run - 1], orders[run] if run < len(orders) else np.inf
     mine = [one for one in nodes if first <= one[0] < last]
-    if run > 0:  # what it said by its old clock may come just after it was told the new one
+    if run > 0:  # a frame by its old clock may come just after the new one was set
         begun = mine[0][3]
         its = next((k for k, one in enumerate(mine[1:], 1) if begun <= one[3] <= begun + STAMP_SPAN), len(mine))
         del mine[1:its]
@@ -178,7 +179,7 @@ def _joined(*parts):
     pending, rows = {}, []
     for order, k, row in frames:
         begun = pending.setdefault(tuple(keys[k][row]), [order, {}])
-        if order - begun[0] > TOGETHER:  # of a sample of long ago: stamps come again
+        if order - begun[0] > TOGETHER:  # age of a sample of long ago: stamps come again
             begun[:] = [order, {}]
         begun[1][k] = row
         if len(begun[1]) == len(parts):

@@ -13,8 +13,8 @@ from tetap.calibrate.robot_numbers import Number, Part, Refusal
 
 AXES = ("x", "y", "z")
 FACES = ("+x", "-x", "+y", "-y", "+z", "-z")
-BLOCK_S = 0.25          # what is looked at at a time
-LEAST_S = 1.0           # of rest, without the blocks at both ends
+BLOCK_S = 0.25          # span that is judged at a time
+LEAST_S = 1.0           # least rest, without the blocks at both ends
 GYRO_CAP, ACCEL_CAP = 0.05, 0.5  # rad/s, m/s2: a block whose samples scatter more never rests
 RATE_CAP = 0.1          # rad/s: no sensor's bias is larger, so more is turning
 STILL_MPS, STILL_RADPS = 0.02, 0.02   # a stated speed below is a sensor at rest; counts have to stand
@@ -24,8 +24,8 @@ POSITION_DEG = 15.0     # rests closer together than this are one position
 FACE_DEG = 25.0         # from an axis: this face was up
 CROSS_AXIS = 0.02       # 1 sigma of the misalignment before anything is measured [data sheets of MEMS: 1 to 2 %]
 MOST_BIAS, MOST_SCALE = 0.1, 0.02   # m/s2, 1: with more 1 sigma the number is refused
-FLOOR_MPS2 = 0.002      # of one position: nonlinearity and hysteresis, [own]
-LEAST_DEGC = 5.0        # of temperature span for a slope
+FLOOR_MPS2 = 0.002      # scatter of one position: nonlinearity and hysteresis, [own]
+LEAST_DEGC = 5.0        # least temperature span for a slope
 SLOPE_BLOCK_S = 10.0
 EARTH_RADPS = 7.292115e-5
 
@@ -104,7 +104,7 @@ def find(log):
 def moving(wheels, start, end):
     """Whether the wheels did anything between these times (no sample there: not known, so no)."""
     slack = 0.0
-    if wheels.kind != "counts":  # a speedometer by Doppler or pulses never says quite zero
+    if wheels.kind != "counts":  # a speedometer by Doppler or pulses never reads quite zero
         slack = min(0.15, 2 * float(np.quantile(np.abs(wheels.one), 0.02)))
     if wheels.kind == "counts":
         change = np.append(0, (np.diff(wheels.one) != 0) | (np.diff(wheels.two) != 0))
@@ -116,7 +116,7 @@ def moving(wheels, start, end):
 
 
 def flying(velocity, start, end):
-    """Whether GNSS says that it moves: what hovers is quiet too."""
+    """Whether GNSS shows motion: a hovering robot is quiet too."""
     speed = np.sqrt(velocity.east**2 + velocity.north**2 + np.nan_to_num(velocity.up) ** 2)
     fast = speed > GNSS_MPS + 3 * np.nan_to_num(velocity.acc, nan=0.1)
     near = np.searchsorted(velocity.t, 0.5 * (start + end)).clip(1, len(velocity) - 1)
@@ -139,7 +139,7 @@ def positions(rests):
 
 
 def face(force):
-    """Which face is up (force points up at rest), None when none is within FACE_DEG."""
+    """The face that is up (force points up at rest), None when none is within FACE_DEG."""
     direction = force / np.linalg.norm(force)
     axis = int(np.argmax(np.abs(direction)))
     if abs(direction[axis]) < np.cos(np.radians(FACE_DEG)):

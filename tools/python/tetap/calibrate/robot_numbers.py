@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the parts of a calibration hand back: numbers with 1 sigma and their place in the parameter table, residuals, notes; or why there is none."""
+"""Results of the parts of a calibration: numbers with 1 sigma and their place in the parameter table, residuals, notes; or why there is none."""
 import dataclasses
 import os
 
@@ -40,7 +40,7 @@ class Number:
 
 
 class Part:
-    """What one part of the calibration found."""
+    """Result of one part of the calibration."""
 
     def __init__(self, name, title):
         self.name, self.title = name, title

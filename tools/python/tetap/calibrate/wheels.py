@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Wheels: radius of left and right, their difference, track width, from a drive with GNSS and the gyroscope (calibrate_fit.py says how)."""
+"""Wheels: radius of left and right, their difference, track width, from a drive with GNSS and the gyroscope (method: fit.py)."""
 import numpy as np
 
 from tetap.calibrate.drive import WINDOW_S, Run
@@ -83,7 +83,7 @@ def _numbers(part, fit, run, how):
         part.refuse("track" if sides else "yaw rate scale", Refusal(
             f"It turns by {np.degrees(fit.turned):.0f} deg in all and the number comes out to {100 * sigma_track:.1f} % (1 sigma).", how))
     elif sides:
-        # The gyroscope tells the ratio of radii and track: radii that stay where they are take a track that goes with them.
+        # The gyroscope shows the ratio of radii and track: radii that stay where they are take a track that goes with them.
         stays = fit.value("track")[0] if not kept else (1 + fit.value("track")[0]) / (1 + mean[0]) - 1
         part.add("track width", *fit.derived(lambda q: fit.track0 * (1 + q["track"])), "m", "wheels.drive.track_m", offered=fit.track0 * (1 + stays))
     else:
@@ -108,7 +108,7 @@ def _state(part, fit, run):
         part.residual(f"wheels' turn against the gyroscope's, {WINDOW_S:g} s ({fit.dropped['wheel']} slips left out)",
                       _rms(old[2]), _rms(new[2]), unit)
     one = fit.noise[0]
-    white = one.white * np.sqrt(len(fit.fix_t) / len(fit.starts))  # of one fix, not of a group's mean
+    white = one.white * np.sqrt(len(fit.fix_t) / len(fit.starts))  # sigma of one fix, not of a group's mean
     part.notes.append(f"before: {what}")
     worst = max(((fit.more[fit.names.index(name)], name) for name in ("mean", "difference", "track") if name in fit.names))
     if worst[0] > 1.5:

@@ -22,7 +22,7 @@ FAMILY = re.compile(r"^((?:In_Imu|Est))(\d)(_?\w+)$")   # one struct for all ins
 
 
 class Refused(Exception):
-    """The DBC is not acceptable; the text says where and why."""
+    """The DBC is not acceptable; the text names place and reason."""
 
 
 class Signal:
@@ -96,7 +96,7 @@ class Message:
 
     @staticmethod
     def _milliseconds(attribute, name):
-        """None when the DBC does not say, the text when it is no whole number."""
+        """None when the DBC has none, the text when it is no whole number."""
         text = attribute.get(name)
         return int(text) if text and re.fullmatch(r"-?\d+", str(text)) else text
 
@@ -106,7 +106,7 @@ class Message:
 
     @property
     def short(self):
-        """What its signals' names begin with."""
+        """Prefix of its signals' names."""
         prefix, rest = self.name.split("_", 1) if "_" in self.name else ("", self.name)
         return prefix + rest if prefix.startswith("Est") and prefix != "Est" else rest
 
@@ -242,7 +242,7 @@ def _check(database, text):
 
 
 def _check_sending(message, refuse):
-    """The bus load is the sum of what is said here, so nothing is left unsaid."""
+    """The bus load is the sum over all messages, so every message needs a rate."""
     cycle, delay, kind = message.cycle_ms, message.delay_ms, message.send_type
     if kind not in SEND_TYPES:
         refuse("GenMsgSendType is %s, not one of %s" % ("'%s'" % kind if kind else "missing", " ".join(SEND_TYPES)))

@@ -17,7 +17,7 @@ STAMP_MASK = (1 << 20) - 1
 
 
 class BadInput(Exception):
-    """What is wrong with a file of the user: the text names file, line and reason."""
+    """An error in a file of the user: the text names file, line and reason."""
 
 
 class Signal:

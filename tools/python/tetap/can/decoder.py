@@ -25,7 +25,7 @@ AUTO = range(0x300, 0x580, bus_database.BLOCK)  # bases looked for without --bas
 
 
 class Malformed(Exception):
-    """A line that is no frame; the text says why."""
+    """A line that is no frame; the text names the reason."""
 
 
 def crc8_table():

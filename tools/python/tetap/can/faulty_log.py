@@ -10,7 +10,7 @@ from typing import NamedTuple
 from tetap.can.bus_writer import DBC_BASE, STAMP_MASK, BadInput, Dbc
 
 _LINE = re.compile(r"\((\d+)\.(\d{6})\) (\S+) ([0-9A-F]{3})#([0-9A-F]{16})\s*$")
-INPUTS = range(DBC_BASE, DBC_BASE + 0x20)  # what a node hears
+INPUTS = range(DBC_BASE, DBC_BASE + 0x20)  # identifiers that a node receives
 _LONGEST_us = 1 << 62
 
 

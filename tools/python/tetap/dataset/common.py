@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the importers of recorded data sets share: reading tables with exact times, the time base of a log, writing all outputs or none.
+"""Shared parts of the importers of recorded data sets: reading tables with exact times, the time base of a log, writing all outputs or none.
 
-Time base of every imported log: 1.000000 s is the start (the first moment at which odometry and truth both exist). What a robot would be told
-before it drives (landmark map, start pose) comes in the second before.
+Time base of every imported log: 1.000000 s is the start (the first moment at which odometry and truth both exist). The facts known before
+a drive (landmark map, start pose) come in the second before.
 """
 import argparse
 import hashlib
@@ -157,7 +157,7 @@ def heading_of_odometry(time_us, forward_mps, yaw_rate_radps, truth_us, truth_x_
 
 
 class Recording:
-    """One imported set: the log being filled, the truth, and what OUT.json will say."""
+    """One imported set: the log being filled, the truth, and the content of OUT.json."""
 
     def __init__(self, arguments, dataset, start_us):
         self.log = bus_writer.Log(bus_writer.Dbc(arguments.dbc), arguments.base)
@@ -185,7 +185,7 @@ class Recording:
         self.about["landmarks"] = [{"id": int(i), "x_m": float(x), "y_m": float(y)} for i, x, y in zip(identifiers, x_m, y_m)]
 
     def true_sightings(self, time_us, identifiers):
-        """The landmark that each sighting shows, where the log does not say it or a mapper's word for it is judged."""
+        """The landmark that each sighting shows, where the log lacks it or a mapper's association is judged."""
         self._sightings = (self.log_us(time_us), identifiers)
 
     def start_pose(self, x_m, y_m, yaw_rad, sigma_position_m, sigma_yaw_rad, how, sent=True):
@@ -242,7 +242,7 @@ def _sha256(path):
 
 
 def set_aside(path):
-    """What is there by that name would be taken for this log's: it keeps its content as PATH.old."""
+    """A file of that name would be taken for this log's. Its content is kept as PATH.old."""
     if not os.path.exists(path):
         return
     try:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the importers of inertial sets share: body axes, IMU samples as increments, GNSS fixes, places on the ellipsoid."""
+"""Shared parts of the importers of inertial sets: body axes, IMU samples as increments, GNSS fixes, places on the ellipsoid."""
 import numpy as np
 
 from tetap.can import bus_writer

@@ -9,7 +9,7 @@ from tetap.dataset import common
 
 VERTICES, EDGES = {"VERTEX_SE2": 4, "VERTEX2": 4}, {"EDGE_SE2": 11, "EDGE2": 11}  # numbers behind the tag
 IGNORED = {"FIX": "fixed vertex"}  # the first pose is the fixed one
-INFORMATION = {"EDGE_SE2": (0, 1, 2, 1, 3, 4, 2, 4, 5), "EDGE2": (0, 1, 4, 1, 2, 5, 4, 5, 3)}  # of the six numbers, by rows of the matrix
+INFORMATION = {"EDGE_SE2": (0, 1, 2, 1, 3, 4, 2, 4, 5), "EDGE2": (0, 1, 4, 1, 2, 5, 4, 5, 3)}  # order of the six numbers, by rows of the matrix
 
 
 class Graph:

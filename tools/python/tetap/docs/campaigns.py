@@ -24,7 +24,7 @@ def plain(text):
 
 
 def campaign_of(out, folder, words):
-    """What that command wrote; None where another command wrote the file."""
+    """Result of that command; None where another command wrote the file."""
     with open(os.path.join(out, "campaigns", folder, "campaign.json"), encoding="utf-8") as file:
         found = json.load(file)
     return found if plain(found["command"]) == command(folder, words) else None

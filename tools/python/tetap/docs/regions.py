@@ -51,7 +51,7 @@ def instructions(out):
 def campaign(out):
     rows, found = [], loaded(out, "campaign.json")
     if campaigns.plain(found.get("command", campaigns.PROGRAM)) != campaigns.PROGRAM:
-        return None  # of other seeds or another scenario
+        return None  # a file of other seeds or another scenario
     for case in found["cases"]:
         one = case["fused"]
         nees, position, heading, sensors = one["anees"], one["position_rmse_m"], one["heading_rmse_deg"], one["bus"]

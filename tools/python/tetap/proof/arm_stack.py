@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 # Follows the stack pointer through the machine code of a linked image: what each function uses at each call, whom it calls, where it
-# returns. Instructions as objdump prints them; ARM DDI 0403 (ARMv7-M) and DDI 0406 (ARMv7-A and -R) say what they do to sp.
+# returns. Instructions as objdump prints them; ARM DDI 0403 (ARMv7-M) and DDI 0406 (ARMv7-A and -R) define their effect on sp.
 import bisect
 import re
 
@@ -48,7 +48,7 @@ def registers(text):
 
 
 class Problem(Exception):
-    """Machine code whose stack use cannot be told."""
+    """Machine code of unknown stack use."""
 
 
 class Code:
@@ -108,7 +108,7 @@ class Call:
 
 
 class Flow:
-    """What a walk from one entry found. Depths count from the stack pointer at the entry, or from `base` after a switch of stacks."""
+    """Result of a walk from one entry. Depths count from the stack pointer at the entry, or from `base` after a switch of stacks."""
 
     def __init__(self):
         self.calls, self.returns, self.deepest = {}, False, {}  # deepest: base -> (bytes, address)
@@ -131,7 +131,7 @@ def immediate(text):
 
 
 class Walker:
-    """Walks all paths from an entry. `noreturn(address)` tells of a called function whether it comes back."""
+    """Walks all paths from an entry. `noreturn(address)` is true for a called function that returns."""
 
     def __init__(self, code, noreturn):
         self.code, self.noreturn = code, noreturn

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What one run of a campaign says, and the averages over the seeds.
+"""Figures of one run of a campaign, and the averages over the seeds.
 
 NEES and NIS with their intervals: Bar-Shalom, Li, Kirubarajan, "Estimation with Applications to Tracking and Navigation", section 5.4.2.
 """
@@ -9,11 +9,11 @@ from scipy.special import stdtrit
 from tetap.report import ground_truth, metrics, normalised_error, recorded_run
 
 SETTLED_S = 10.0  # after the end of a fault: "after" begins
-BEFORE_S = 20.0   # what the node said within so long before a fault is not said because of it
+BEFORE_S = 20.0   # words of the status so long before a fault are not an effect of it
 TOO_SURE_S = 1.0  # an error beyond 3 sigma for longer than this is one that was not reported
 DOF = 3           # x, y, yaw; and of each block
 SHARE = 0.95
-DRAWS, LEAST_TIMES, LEAST_SEEDS = 200, 20, 30  # of what chance makes of a filter that is right
+DRAWS, LEAST_TIMES, LEAST_SEEDS = 200, 20, 30  # numbers of by_chance()
 
 
 def judged(run, truth, job):
@@ -91,8 +91,8 @@ def longest(time_s, on):
 
 
 def honesty(rows, dx, dy, found, at, start, end):
-    """From a fault's start on: is there an error that the published sigmas deny, for how long, and how large are they at most? Of x and y
-    and, of an inertial estimate, the height."""
+    """From a fault's start on: is there an error that the published sigmas deny, for how long, and how large are they at most? Axes x and y
+    and, for an inertial estimate, the height."""
     sigma_x, sigma_y = (recorded_run.held_at(rows["epoch"], rows[name], rows["epoch"], recorded_run.HELD_S / recorded_run.TICK_S) for name in ("std_x_m", "std_y_m"))
     with np.errstate(invalid="ignore", divide="ignore"):
         ratio = np.fmax(np.abs(dx) / (3 * sigma_x), np.abs(dy) / (3 * sigma_y))
@@ -115,7 +115,7 @@ def honesty(rows, dx, dy, found, at, start, end):
 
 
 def said(run, names, start, end):
-    """What the node said of itself from a fault on until it had settled, and not in the time before; and how soon the first of it came."""
+    """Words of the node's status from a fault on until it had settled, without those of the time before; and the delay of the first one."""
     status = run.status
     at = status["epoch"] * recorded_run.TICK_S
     words = [set() for _ in at]
@@ -174,7 +174,7 @@ def anees(runs):
 
 def repeated(each):
     """Mean ANEES and share of times inside of campaigns with seeds of their own, each with Student's interval of the mean from the campaigns: what
-    lasts within a campaign is chance in its share, and no longer in their mean. None throughout where one of them says nothing (None)."""
+    lasts within a campaign is chance in its share, and no longer in their mean. None throughout where one of them has no figure (None)."""
     if not all(each):
         figures = ("mean", "mean_plus_minus", "inside", "inside_plus_minus", "inside_least", "inside_most")
         return {"campaigns": len(each), **dict.fromkeys(figures)}
@@ -191,7 +191,7 @@ def repeated(each):
 def by_chance(runs):
     """The share of times inside that all but 5 % of campaigns with a filter that is right would exceed: errors that last make few independent
     times of many. Such a campaign is drawn by mixing the seeds' own errors: they last as long as these, and their covariance at each time is
-    what was said of it. With few seeds it comes out a little low: chance makes correlations between times, too."""
+    the published one. With few seeds it comes out a little low: chance makes correlations between times, too."""
     common = sorted(set.intersection(*[set(one["epochs"]) for one in runs]))
     if len(common) < LEAST_TIMES or len(runs) < LEAST_SEEDS:
         return None
@@ -249,7 +249,7 @@ def averaged(case, runs):
         for sensor, counts in entry["bus"].items():
             framed = entry["sensors"].get(sensor)
             if framed and counts["accepted"] > metrics.MOST_FRAMED * framed["compared"]:
-                del entry["sensors"][sensor]  # it has frames about what was rejected only
+                del entry["sensors"][sensor]  # its frames are about rejected samples alone
         if "blocks" in mine[0]:
             entry["blocks"] = {block: {"anees": anees([one["blocks"][block] for one in mine]), "unit": normalised_error.UNITS[block],
                                        "by_chance": by_chance([one["blocks"][block] for one in mine]),

@@ -19,8 +19,8 @@ TOO_SLOW = 75           # a step in real time: its last line has the figure by w
 LIMIT_S = {"test": 1800, "proof": 6 * 3600}
 TAIL = 25               # lines of a failed step that are shown
 BESIDE = 10             # niceness of what only computes
-FOREIGN_SHARE = 0.25    # of the processors; with more than that taken by others a step in real time is not judged
-# A proof of identity says in its log that bytes or state CRCs are not what they have to be. That is what it is there to find: no machine is too slow for it.
+FOREIGN_SHARE = 0.25    # share of the processors; with more than that taken by others a step in real time is not judged
+# A proof of identity reports bytes or state CRCs that differ. Such a finding is the proof's purpose: no machine is too slow for it.
 DIFFERS = re.compile(r"\bdiffer(s|ent)?\b|EOF on |came back as|every state CRC|does not move|the same as the undisturbed", re.I)
 
 
@@ -135,7 +135,7 @@ class Runner:
             process.returncode = os.waitstatus_to_exitcode(status)
             in_time = late.is_alive()
             late.cancel()
-            self.kill(process.pid)  # what it left running
+            self.kill(process.pid)  # child processes that still run
             with self.lock:
                 self.groups.discard(process.pid)
         job.wall, job.cpu = time.monotonic() - began, used.ru_utime + used.ru_stime

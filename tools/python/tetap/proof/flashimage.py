@@ -55,7 +55,7 @@ class Section:
 
 
 class Symbol:
-    """`address` has the Thumb bit of a function cleared, `thumb` says it was there."""
+    """`address` has the Thumb bit of a function cleared, `thumb` notes that it was set."""
 
     def __init__(self, name, value, size, kind, bind, shndx):
         self.name, self.size, self.bind = name, size, bind

@@ -214,7 +214,7 @@ class Replay:
 
 LAWS = ("imu_stamps", "least_digit", "tick_order", "twice", "longitude", "time", "mirror")
 MOST_m, MOST_SIGMA, MOST_rad = 1e-3, 0.05, 1e-6
-STEP_m, STEP_rad = 1e-3, 1e-4  # of the published position and heading
+STEP_m, STEP_rad = 1e-3, 1e-4  # bus steps of the published position and heading
 
 
 class Difference:

@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the node promises for a cell of the fault matrix, and whether it kept it.
+"""The node's promise for a cell of the fault matrix, and whether it was kept.
 
 The promise follows from the number of other devices that see what the fault hurts: two or more `held`, one `noticed`, none `blind`. A receiver
 with position and velocity is one device, and so are the wheels (or speedometer), the IMU, and each source of a heading.
 """
 QUANTITIES = ("position", "velocity", "heading", "tilt")
-LEAST_GATES = 1.5     # below, a fault is at most noticed: no gate can tell it from noise
+LEAST_GATES = 1.5     # below, a fault is at most noticed: no gate can separate it from noise
 GRACE_S = 2.0         # for how long an error may be too large, beside
-PERIODS = 3           # so many samples of the slowest device that vouches
+PERIODS = 3           # number of samples of the slowest device that vouches
 INSIDE_AFTER_S = 10.0  # from the end of a fault until the error is inside three sigma again
 NOTICED_RATIO = 3.0   # times three sigma: the most that is allowed without a word
 WORD_S = 10.0         # in which a word has to come
@@ -47,12 +47,12 @@ def hurt(sensor, axis, planar):
 
 
 def is_vertical(sensor, axis):
-    """What the fault hurts is a height or a climb."""
+    """Whether the fault affects a height or a climb."""
     return axis in ("up", "pressure") or (sensor, axis) == ("accel", "z")
 
 
 def sees(device, quantity, upward, situation, facts):
-    """Whether a device that works would contradict a wrong `quantity`. What is seen by way of its change needs a state to start from. That a robot
+    """Whether a device that works would contradict a wrong `quantity`. A fault that shows by a change needs a state to start from. That a robot
     does not leave the ground is a constraint and no device: wheels see no climb."""
     start = situation == "start"
     if device == "gnss":

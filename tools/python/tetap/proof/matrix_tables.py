@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from tetap.proof import matrix_cells
 
 WORST = 10
-KIND_LIMIT, ALL_LIMIT = 0.05, 0.01  # of the promise `held`: of one kind, of all cells
+KIND_LIMIT, ALL_LIMIT = 0.05, 0.01  # bars of the promise `held`: for one kind, for all cells
 KINDS = ("offset", "spike", "step", "ramp", "scale", "sign", "dead", "stuck", "not_available", "delayed", "repeated", "lost")
 ORDER = ("0.1g", "1g", "2g", "5g", "30g", "max")
 

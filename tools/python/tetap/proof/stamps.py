@@ -81,7 +81,7 @@ class Contents:
 
 
 class Versions:
-    """What tools say of themselves, asked once."""
+    """Version texts of the tools, asked once."""
 
     def __init__(self):
         self.known, self.lock = {}, threading.Lock()
@@ -151,7 +151,7 @@ class Stamps:
         return os.path.join(self.directory, re.sub(r"[^\w.+-]", "_", name) + ".json")
 
     def passed(self, name, stamp, makes=()):
-        """The record of the run that passed with the same inputs, or nothing. What it made has to be there still."""
+        """The record of the run that passed with the same inputs, or nothing. Its products have to be there still."""
         try:
             with open(self.file(name), encoding="utf-8") as file:
                 record = json.load(file)

@@ -9,11 +9,11 @@ from tetap.proof import stamps
 
 LISTS = ("each", "without", "inputs", "optional", "data", "tools", "environment", "after", "makes")
 WORDS = {"name": str, "command": str, "each_from": str, "form": str, "part_of": str, "slots": (int, float, str), "stamp": bool, "realtime": bool}
-MADE = ("build/", "out/")  # what is there only after steps have run
+MADE = ("build/", "out/")  # paths that exist only after steps have run
 
 
 class TableError(Exception):
-    """What is wrong with the table: the text says which step and what."""
+    """An error in the table. The text names the step and the error."""
 
 
 @dataclasses.dataclass

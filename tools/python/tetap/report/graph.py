@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the bus says of a pose graph: its sum of squares, whether the last optimisation converged, and the closures that are not in it."""
+"""Published figures of a pose graph: its sum of squares, whether the last optimisation converged, and the closures that are not in it."""
 import numpy as np
 
 GRAPH = ["epoch", "time_s", "chi2", "graph_status", "closures", "jobs", "map_size", "map_refused", "contradicted", "work_left", "jobs_aborted"]

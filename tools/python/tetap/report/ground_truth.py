@@ -11,14 +11,14 @@ from tetap.report.recorded_run import ACC_BIAS, GYRO_BIAS, VELOCITY, read_json
 from tetap.report.tables import read_table
 
 LEAST_GAP_S = 0.2  # truth rows further apart than this, or than 2.5 times their usual distance, are not interpolated between
-TRUTH = ["time_s", "x_m", "y_m", "yaw_rad"]  # and perhaps "epoch" and these
+TRUTH = ["time_s", "x_m", "y_m", "yaw_rad"]  # then optionally "epoch" and TRUTH_MORE
 TRUTH_MORE = ["z_m", "roll_rad", "pitch_rad", *VELOCITY, *GYRO_BIAS, *ACC_BIAS]
 
 
 class Truth:
     """Where the robot was, by time. `about` is the JSON beside NAME.truth.csv, when there is one.
 
-    A simulated world says for each row which of the node's epochs it belongs to: then the rows are paired by epoch, because a fault may have
+    The truth of a simulated world has the node's epoch in each row. Then the rows are paired by epoch, because a fault may have
     made the clock of the bus jump, which the truth does not."""
 
     def __init__(self, path, max_gap_s=None):
@@ -75,7 +75,7 @@ class Truth:
         return tuple(self._in_epochs(rows["epoch"], TRUTH[1:]).values())
 
     def more_of(self, epochs):
-        """All that a simulated world says, for these epochs; None where the truth says only a pose."""
+        """All columns of a simulated world's truth, for these epochs; None where the truth has only a pose."""
         return self._in_epochs(epochs, [*TRUTH[1:], *TRUTH_MORE]) if self.has_more else None
 
     def at(self, time_s):

@@ -71,7 +71,7 @@ def _above(fig, axes, title, handles, labels):
     """Title and legend over all columns: a line of the title's room is the legend's."""
     axes[0].set_title("", loc="left")
     head = fig.suptitle(title + "\n", x=0.012, ha="left", fontsize=11.5, color=pictures.INK)
-    fig.canvas.draw()  # so that it is known how much room the title takes
+    fig.canvas.draw()  # gives the room that the title takes
     bottom = head.get_window_extent().transformed(fig.transFigure.inverted()).y0
     words = fig.legend(handles=handles, labels=labels, ncol=len(labels), loc="lower left", bbox_to_anchor=(0.006, bottom - 0.02), frameon=False,
                        fontsize=9, labelcolor=pictures.INK)

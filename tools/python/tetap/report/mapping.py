@@ -11,12 +11,12 @@ from tetap.report import ground_truth, normalised_error, own_map, pictures
 
 AMBIGUOUS = 9         # sensor::Verdict
 SHARE = 0.95          # probability of an ellipse, and of the dashed lines
-BINS = 120            # of the NEES over time
-MOST_LINES = 4000     # of associations in the picture
+BINS = 120            # number of bins of the NEES over time
+MOST_LINES = 4000     # most associations in the picture
 
 
 class Mapped:
-    """What the pictures have in common: the map at the end, its counterparts, and the estimator's poses by time."""
+    """Shared data of the pictures: the map at the end, its counterparts, and the estimator's poses by time."""
 
     def __init__(self, run, estimator, truth):
         self.rows = run.of(estimator)

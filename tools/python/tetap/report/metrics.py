@@ -59,7 +59,7 @@ def measurements(innovations, estimator, names):
 
 
 def judge(run, estimator, truth, names):
-    """The metrics of one estimator. Without truth: what can be said without."""
+    """The metrics of one estimator. Without truth: the figures that need none."""
     rows = run.of(estimator)
     valid = rows["pos_valid"] == 1
     result = {"name": run.names[estimator], "kind": run.kinds[estimator],
@@ -98,12 +98,12 @@ def judge(run, estimator, truth, names):
     if np.isfinite(dyaw).any():
         result["final_heading_error_deg"] = float(np.degrees(dyaw[np.isfinite(dyaw)][-1]))
     result["recovered_after_s"] = recovered_after_s(rows["time_s"], distance, valid)
-    if truth.is_reference:  # the reference is fused itself and has errors of its own: consistency with it says nothing
+    if truth.is_reference:  # the reference is fused itself and has errors of its own: consistency with it means nothing
         return result
     dof = 3 if truth.has_yaw else 2
     values, unusable = nees(rows, dx, dy, dyaw, dof)
     result.update(own_map.figures(run, estimator, truth, dx, dy))
-    del dx, dy, dyaw, distance, known, valid  # of millions of rows, and the blocks need as much
+    del dx, dy, dyaw, distance, known, valid  # arrays of millions of rows, and the blocks need as much
     found = blocks(run, estimator, truth)
     if found is not None:
         result["blocks"] = {name: block_figures(found, name) for name in BLOCKS}

@@ -68,7 +68,8 @@ class Blocks:
 
     def white(self, name):
         """Errors in their own sigmas and without correlations, by the factor L of the covariance L L^T: independent with variance 1 where the
-        estimate is what it says. NaN in rows in whose epoch the whole covariance was not said, and where something of it is not known."""
+        covariance is right. NaN in rows in whose epoch the whole covariance was not published, and where a part of it
+        is not known."""
         # The estimate itself is rounded, too. Rounding is independent by component: it adds to variances, not to covariances.
         rounded = np.array([times * limits(*value)[0] / np.sqrt(12.0) for *value, times in VALUE_STEPS[name]])
         judged, correlation = np.hypot(self.sigma[name], rounded), three(self._states, CORRELATIONS[name])
@@ -94,7 +95,7 @@ class Blocks:
 
 
 def blocks(run, estimator, truth):
-    """None where the estimator or the truth says no more than a pose."""
+    """None where the estimator or the truth has no more than a pose."""
     states = run.states_of(estimator) if run.kinds[estimator] != "Attitude" else None
     true = truth.more_of(states["epoch"]) if truth is not None and states is not None else None
     return None if true is None else Blocks(states, true)
@@ -130,7 +131,8 @@ def disagreement(run):
 
 
 def nees_by_row(rows, dx, dy, dyaw, dof):
-    """Normalised squared error of each row; NaN without a published covariance or a known error. And how many covariances were of no use."""
+    """Normalised squared error of each row; NaN without a published covariance or a known error.
+    The second value counts the covariances that were of no use."""
     sigmas, errors_, correlations = ["std_x_m", "std_y_m", "std_yaw_rad"][:dof], [dx, dy, dyaw][:dof], ["corr_xy", "corr_x_yaw", "corr_y_yaw"]
     all_known = np.ones(len(dx), dtype=bool)
     for column in [*(rows[name] for name in [*sigmas, *correlations[:2 * dof - 3]]), *errors_]:

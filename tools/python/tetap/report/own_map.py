@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a mapper is worth: errors of its trajectory and its landmarks after the rigid motion that fits the landmarks (Horn, "Closed-form solution
+"""Figures of merit of a mapper: errors of its trajectory and its landmarks after the rigid motion that fits the landmarks (Horn, "Closed-form solution
 of absolute orientation using unit quaternions", JOSA A 4(4), 1987, in the plane), and sightings that it gave to a wrong landmark."""
 import os
 
@@ -43,7 +43,7 @@ def last_of_each(rows):
 
 def at_the_end(rows):
     """Rows of the landmarks that are in the map when it was last published: they take turns, so all of them are among twice as many rows as there
-    are landmarks. Of those without an identity the confirmed ones alone."""
+    are landmarks. Landmarks without an identity count only when confirmed."""
     count = 2 * len(np.unique(rows["landmark"]))
     late = np.arange(len(rows["landmark"])) >= len(rows["landmark"]) - count
     return rows.where(late & ((rows["landmark_state"] > 0) | (rows["landmark"] <= 64)))
@@ -68,7 +68,7 @@ def true_landmarks(run, truth):
 
 
 def sightings_file(truth):
-    """What each sighting was truly of; none beside most truths."""
+    """File with the true landmark of each sighting; most truths have none."""
     stem = truth.path.removesuffix(".truth.csv") if truth.path.endswith(".truth.csv") else truth.path.removesuffix(".csv")
     return stem + ".sightings.csv"
 

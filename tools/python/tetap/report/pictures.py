@@ -18,7 +18,7 @@ INK, GREY, FAINT = "#262626", "#6b6b6b", "#e3e3e3"
 TRUTH, ODOMETRY, FUSED = "#3c3c3c", "#e69f00", "#0072b2"
 LANDMARK, REJECTED = "#009e73", "#d55e00"
 FAULT_SHADE = "#f6d9c8"
-FAULT = "fault of the world"  # what the world did, beside the faults that the node reports
+FAULT = "fault of the world"  # faults of the world, beside the faults that the node reports
 FIX = "#7d7d7d"
 ESTIMATORS = {"odometry": ODOMETRY, "fused": FUSED, "attitude": "#cc79a7"}
 OTHER = "#56b4e9"
@@ -26,7 +26,7 @@ MODES = {"Boot": "#f2f2f2", "WaitingForPose": "#d9d9d9", "Aligning": "#f0e442", 
          "Degraded": "#cc79a7", "Fault": "#d55e00", "WaitingForImu": "#bdbdbd", "Levelling": "#b3cde3", "FindingHeading": "#8da0cb"}
 DPI = 120
 MOST_BANDS = 4.0  # an error of more usual bands than this gets an axis with two scales
-LARGEST_ELLIPSE = 0.25  # of the picture
+LARGEST_ELLIPSE = 0.25  # share of the picture's larger side
 WIDE_BAND = 10.0  # a band of so many times the RMS error is explained in words
 MOST_POINTS = 20_000  # per line; more than a picture has columns
 

@@ -11,7 +11,7 @@ from tetap.can.bus_writer import BadInput
 from tetap.report import graph, own_map
 from tetap.report.tables import empty_table, read_table
 
-TICK_S = 0.01  # of the simulated world
+TICK_S = 0.01  # period of a tick in the simulated world
 HELD_S = 1.5  # a page of an inertial estimate comes once a second: its numbers count for no longer than this
 ESTIMATES = ["epoch", "time_s", "estimator", "kind", "x_m", "y_m", "yaw_rad", "speed_mps", "yaw_rate_radps", "std_x_m", "std_y_m",
              "std_yaw_rad", "corr_xy", "corr_x_yaw", "corr_y_yaw", "pos_valid", "hdg_valid",
@@ -38,7 +38,7 @@ def code_names():
 
 
 def limits(message, signal):
-    """(step, largest) value that a signal of the bus can say."""
+    """(step, largest) value that a signal of the bus can carry."""
     one = bus_writer.Dbc().messages[message].signals[signal]
     return one.scale, one.raw_max * one.scale + one.offset
 
@@ -71,7 +71,7 @@ CALENDAR_S = 1e6  # eleven days: stamps beyond are of the calendar, or of a node
 
 
 def start_s(run):
-    """What pictures and words count from: the start of a simulated world's run on the node's clock; the first estimate where a log's stamps are
+    """Time zero of pictures and words: the start of a simulated world's run on the node's clock; the first estimate where a log's stamps are
     seconds since 1970, of which nobody can read the last four digits on an axis; else 0, the node's own time."""
     if "world_start_s" in run.about:  # a board that ticked before the world began
         return float(run.about["world_start_s"])
@@ -148,14 +148,14 @@ class Run:
         return self.estimates.where(self.estimates["estimator"] == estimator)
 
     def states_of(self, estimator):
-        """The estimator's attitudes, one row each, and beside them what was said last of everything else, where that is not too old; None
+        """The estimator's attitudes, one row each, and beside them the last published values of everything else, where that is not too old; None
         where it publishes none."""
         states = States(self.states.where(self.states["estimator"] == estimator), self.of(estimator))
         return states if len(states["epoch"]) > 0 else None
 
 
 class States:
-    """Columns by name, a row for every attitude; "new NAME": whether that was said in this very epoch."""
+    """Columns by name, a row for every attitude; "new NAME": whether that was published in this very epoch."""
     POSE = ("x_m", "y_m", "std_x_m", "std_y_m", "std_yaw_rad", "corr_xy", "pos_valid", "hdg_valid")
 
     def __init__(self, rows, pose):
@@ -173,7 +173,7 @@ class States:
 
 
 def names_of(kinds):
-    """What the estimators are called: odometry, attitude, and fused for the best of the others: an inertial one before any other."""
+    """Display names of the estimators: odometry, attitude, and fused for the best of the others: an inertial one before any other."""
     others = [k for k, kind in kinds.items() if kind not in ("Odometry", "Attitude")]
     best = max(others, key=lambda k: (kinds[k] == "Inertial", -k), default=None)
     names = {}

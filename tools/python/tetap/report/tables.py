@@ -17,12 +17,12 @@ LONGEST_NAME = 40
 
 
 class Column:
-    """Numbers in as few bytes as they need. What is no multiple of a small power of ten stays a float."""
+    """Numbers in as few bytes as they need. A value that is no multiple of a small power of ten stays a float."""
 
     def __init__(self):
         self._parts = []  # (numbers, decimals; None: as they are)
         self._rows = 0
-        self._decimals = 0  # of the last part: the next one is likely to have as many
+        self._decimals = 0  # decimals of the last part: the next one is likely to have as many
 
     def add(self, values):
         self._parts.append(self._packed(values))
@@ -57,7 +57,7 @@ class Column:
             return values.copy(), None
         self._decimals = decimals
         kind = next(one for one in (np.int8, np.int16, np.int32) if most < np.iinfo(one).max - 1)
-        least = np.iinfo(kind).min  # of this and the next number the one is not a number, the other minus zero
+        least = np.iinfo(kind).min  # stands for NaN, least + 1 for minus zero
         numbers = np.full(len(values), least, dtype=kind)
         numbers[finite] = np.where((known == 0) & np.signbit(known), least + 1, scaled)
         return numbers, decimals
@@ -140,7 +140,7 @@ def _blocks(file):
         if not block and not (blank and any_line):
             return
         last, block, blank = not block, blank + block, b""
-        if not last and not block.strip():  # what follows says whether these are lines without columns
+        if not last and not block.strip():  # the next part decides whether these are lines without columns
             blank = block
             continue
         any_line = True
@@ -197,7 +197,7 @@ def _write_codes(octets, begins, ends, codes):
 
 
 def _parse_names(body, codes, path, first_line):
-    """The slow way, which says where a line is wrong."""
+    """The slow way, which names the wrong line."""
     rows = []
     for number, line in enumerate(body.decode("utf-8", "replace").splitlines(), first_line):
         fields = [field.strip() for field in line.split(",")]
