@@ -10,6 +10,7 @@
 // every tick, never a burst. Due work may also wait for the next tick, and records are late by the window.
 #pragma once
 
+#include "base/state_hash.hpp"
 #include "estimators/context.hpp"
 #include "estimators/estimate.hpp"
 #include "estimators/own_map.hpp"
@@ -25,14 +26,25 @@
 
 namespace tetap::node {
 
+/// advance() carries the estimate to time t. A delayed estimator is given the samples behind its window, too.
 template <class E>
-concept Estimator = requires(E& e, const E& view, base::Micros t, const estimators::Context& ctx,
-                             const estimators::SetPose& pose) {
+concept Advances = requires(E& e, base::Micros t, const estimators::Context& ctx, const sensor::Window& window) {
+  e.advance(t, ctx);
+}
+|| requires(E& e, base::Micros t, const estimators::Context& ctx, const sensor::Window& window) {
+  requires E::kDelayed;
+  e.advance(t, ctx, window);
+};
+
+template <class E>
+concept Estimator = Advances<E> && requires(E& e, const E& view, base::Micros t, const estimators::Context& ctx,
+                                            const estimators::SetPose& pose, base::StateHash& hash) {
   { E::kKind } -> std::convertible_to<sensor::EstimatorKind>;
   { e.restart(t, ctx) } -> std::same_as<void>;
   { e.set_pose(t, pose, ctx) } -> std::same_as<void>;
   { view.estimate(ctx) } -> std::same_as<estimators::Estimate>;
   { view.mode(ctx) } -> std::same_as<sensor::Mode>;
+  view.hash_state(hash);
 };
 
 template <class E>

@@ -32,8 +32,8 @@ REFUSED = (
 
 
 class RefusedParameters(unittest.TestCase):
-    def said(self, compiler, robots, beside=""):
-        """What is said of a file that includes a robot's header for each of these fields."""
+    def sentences_of(self, compiler, robots, beside=""):
+        """(status of the compiler, sentences) of a file that includes a robot's header for each of these fields."""
         with tempfile.TemporaryDirectory() as folder:
             os.mkdir(os.path.join(folder, "config"))
             for number, fields in enumerate(robots):
@@ -43,36 +43,40 @@ class RefusedParameters(unittest.TestCase):
             with open(log, "w", encoding="utf-8") as file:
                 compiled = subprocess.run([compiler, "-std=c++20", "-fsyntax-only", f"-I{folder}", f"-I{ROOT}/src", "-isystem", "/usr/include/eigen3", "-x", "c++", "-"],
                                           input="".join(f'#include "config/robot{number}.hpp"\n' for number in range(len(robots))), text=True, stderr=file, check=False)
-            found = subprocess.run([os.path.join(ROOT, "tools/run/explain_refusal"), log], capture_output=True, text=True, check=False)
+            found = subprocess.run([os.path.join(ROOT, "tools/run/explain_parameter_error"), log], capture_output=True, text=True, check=False)
             self.assertEqual(found.returncode == 0, found.stdout != "")
             return compiled.returncode, found.stdout.splitlines()
 
     def test_an_implausible_parameter_is_one_sentence(self):
         sentences = [f"config/robot{number}.hpp: {sentence}" for number, (_, sentence) in enumerate(REFUSED)]
         for compiler in COMPILERS:
-            self.assertEqual(self.said(compiler, [fields for fields, _ in REFUSED]), (1, sentences), compiler)
+            self.assertEqual(self.sentences_of(compiler, [fields for fields, _ in REFUSED]), (1, sentences), compiler)
 
     def test_plausible_parameters_compile(self):
         for compiler in COMPILERS:
             robots = [WHEELS % ("0.0825F", "0.42F"), ORIGIN % ("24'131'350'000", "5'834'150'000"), ".inertial = {.gyro_scale = 0.1F}"]
-            self.assertEqual(self.said(compiler, robots), (0, []), compiler)
+            self.assertEqual(self.sentences_of(compiler, robots), (0, []), compiler)
 
     def test_a_robot_that_maps_needs_ids_behind_its_block(self):
         for compiler in COMPILERS:
             for base, expected in ((".can_base = 0x340", (1, ["config/robot0.hpp: can_base is 832; it has to be a multiple of 128, for its own map has ids behind the block of 64"])),
                                    (".can_base = 0x380", (0, []))):
-                self.assertEqual(self.said(compiler, [base], "static_assert(tetap::param::checked_map_ids(true, robot0));"), expected, compiler)
-            self.assertEqual(self.said(compiler, [".can_base = 0x340"], "static_assert(tetap::param::checked_map_ids(false, robot0));"), (0, []), compiler)
+                self.assertEqual(self.sentences_of(compiler, [base], "static_assert(tetap::param::checked_map_ids(true, robot0));"), expected, compiler)
+            self.assertEqual(self.sentences_of(compiler, [".can_base = 0x340"], "static_assert(tetap::param::checked_map_ids(false, robot0));"), (0, []), compiler)
 
     def test_a_misspelt_field_is_told_by_its_robot(self):
         for compiler, words in (("g++", r"^config/robot0\.hpp:3: a field here is misspelt"), ("clang++", r"^config/robot0\.hpp:4: field designator 'sigma_flour_m' ")):
-            status, lines = self.said(compiler, [".gnss = {.sigma_flour_m = 0.3F}"])
+            status, lines = self.sentences_of(compiler, [".gnss = {.sigma_flour_m = 0.3F}"])
             self.assertEqual((status, len(lines)), (1, 1), lines)
             self.assertRegex(lines[0], words)
 
+    def test_a_log_that_cannot_be_read_is_one_error(self):
+        found = subprocess.run([os.path.join(ROOT, "tools/run/explain_parameter_error"), ROOT], capture_output=True, text=True, check=False)
+        self.assertEqual((found.returncode, found.stdout, found.stderr), (2, "", f"explain_parameter_error: {ROOT}: Is a directory\n"))
+
     def test_other_errors_are_left_to_the_compiler(self):
         for compiler in COMPILERS:
-            self.assertEqual(self.said(compiler, [".gnss = {.sigma_floor_m = 0.3F}"], "int f() { return no_such_name; }"), (1, []), compiler)
+            self.assertEqual(self.sentences_of(compiler, [".gnss = {.sigma_floor_m = 0.3F}"], "int f() { return no_such_name; }"), (1, []), compiler)
 
 
 if __name__ == "__main__":
