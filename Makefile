@@ -39,9 +39,9 @@ help: ## this list
 sim: setup programs ## the simulated world over vcan0: table, report, pictures in out/sim (SEED= FAULT= REALTIME=1 BOARD=zynqmp_r5 BUS=memory OUT=DIR)
 	@tools/run/simulate_world
 
-board: setup programs ## a flash image's machine code on an emulated board in the simulated world, repeated on the host: report in out/board (ROBOT= SEED= FAULT=)
+board: setup programs ## a flash image's machine code on an emulated board in the simulated world, repeated on the host: report in out/board (ROBOT= SEED= FAULT= BUS=vcan in real time)
 	@tools/run/build_preset host:tetap-board
-	@tools/run/emulate_board
+	@BUS=$(if $(filter file,$(origin BUS)),memory,$(BUS)) tools/run/emulate_board
 
 test: setup ## every check on prefixes and samples, what is unchanged left out (STEPS="unit_tests check", TETAP_FRESH=1)
 	@tools/proof/run_checks test $(STEPS)

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // A sensor's own clock as seen by the MCU's. A sample cannot be read before it exists, and the luckiest reading comes
 // at once. The line under all pairs (ticks, time of reading) is the sensor's clock. Its offset follows the lowest pair
-// of each window, its rate the change of the offset between windows (a loop of second order; poles at 0.71).
+// of each window, its rate the change of the offset between windows (a loop of second order; poles at 0.71). At first
+// the rate is that of a growing base line between lowest pairs: a window alone has the chance of its readings.
 #pragma once
 
 #include "base/time.hpp"
@@ -26,6 +27,7 @@ class ClockMap {
     anchor_ = now;
     fraction_ = slew_ = 0;
     window_us_ = kFirstWindow_us;
+    if (long_windows_ < kFirstWindows) long_windows_ = 0;
     open_window(ticks);
   }
 
@@ -53,8 +55,10 @@ class ClockMap {
       anchor_ += base::Micros{late_us};
       pulled_us_ += late_us;
       least_us_ = 0;
+      low_ = {ticks, now};
     } else if (late_us < least_us_) {
       least_us_ = late_us;
+      low_ = {ticks, now};
     }
     if ((time(ticks) - window_start_).us >= window_us_) close_window(ticks);
     return true;
@@ -78,6 +82,12 @@ class ClockMap {
   static constexpr std::int64_t kSuspect_us = 5'000;
   static constexpr std::int64_t kLost_us = 3'000;  ///< no reading of a window closer than that: learn anew
   static constexpr std::int64_t kNone_us = 1'000'000;
+  static constexpr std::int64_t kLuck_us = 1'000;  ///< lowest pairs of short windows differ by up to a chip's sample
+  static constexpr int kFirstWindows = 8;          ///< long windows whose rate is that of a growing base line
+  struct Pair {
+    std::int64_t ticks = 0;
+    base::Micros time{};
+  };
 
   constexpr void open_window(std::int64_t ticks) {
     window_ticks_ = ticks;
@@ -90,6 +100,7 @@ class ClockMap {
     const bool settled = window_us_ >= kLastWindow_us;
     if (settled && least_us_ > kLost_us) {
       rate_known_ = false;
+      long_windows_ = 0;
       return start(ticks, time(ticks) + base::Micros{least_us_});
     }
     const std::int64_t moved_us = least_us_ + pulled_us_;
@@ -100,9 +111,7 @@ class ClockMap {
     anchor_ticks_ = ticks;
     const std::int64_t span = ticks - window_ticks_;
     if (span > 0) {
-      const std::int64_t error = (moved_us << 32) / span;
-      // After a restart only the place has to be found again.
-      rate_ += settled ? error / 8 : rate_known_ ? 0 : error;
+      learn_rate(moved_us, span, settled);
       const std::int64_t limit = nominal_ / kLimitParts;
       rate_ = rate_ > nominal_ + limit ? nominal_ + limit : rate_ < nominal_ - limit ? nominal_ - limit : rate_;
       slew_ = settled ? (least_us_ << 32) / (2 * span) : 0;
@@ -112,6 +121,31 @@ class ClockMap {
     rate_known_ |= settled;
     if (!settled) window_us_ *= 2;
     open_window(ticks);
+  }
+
+  /// `moved_us`: of the offset in a window of `span` ticks. Once the rate is known, a restart looks for the place
+  /// alone.
+  constexpr void learn_rate(std::int64_t moved_us, std::int64_t span, bool settled) {
+    if (long_windows_ == kFirstWindows) {
+      rate_ += settled ? (moved_us << 32) / span / 8 : 0;
+      return;
+    }
+    if (window_us_ == kFirstWindow_us) {
+      first_low_ = low_;
+      return;
+    }
+    // Readings meet samples by chance. The lowest pairs of two windows, far apart, have the least of that.
+    const std::int64_t apart = low_.ticks - first_low_.ticks;
+    const std::int64_t rate = apart > 0 ? ((low_.time - first_low_.time).us << 32) / apart : rate_;
+    const std::int64_t by_us = ((rate - rate_) * apart) >> 32;
+    if (long_windows_ > 1) {
+      if (apart * (nominal_ >> 16) >= kLastWindow_us << 16) rate_ = rate;
+    } else if (by_us > kLuck_us || by_us < -kLuck_us) {
+      rate_ = rate;
+    }
+    if (!settled) return;
+    if (long_windows_ == 0) first_low_ = low_;
+    ++long_windows_;
   }
 
   std::int64_t nominal_;
@@ -126,6 +160,9 @@ class ClockMap {
   std::int64_t least_us_ = kNone_us;  ///< the lowest pair of the window, above the line
   std::int64_t pulled_us_ = 0;        ///< sum by which the line was pulled down within the window
   std::int64_t suspect_us_ = 0;
+  Pair low_;              ///< the lowest of this window
+  Pair first_low_;        ///< lowest of the first window, then of the first long one
+  int long_windows_ = 0;  ///< closed, up to kFirstWindows
   bool running_ = false;
   bool rate_known_ = false;  ///< once settled
 };

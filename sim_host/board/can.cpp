@@ -229,10 +229,24 @@ void Can::mode_reached() {
   mode_ = reg::mcr::kInrq.of(mcr_) != 0    ? Mode::kInitialisation
           : reg::mcr::kSleep.of(mcr_) != 0 ? Mode::kSleep
                                            : Mode::kNormal;
-  if (mode_ != Mode::kNormal) recovery_.clear();
+  if (mode_ != Mode::kNormal) {
+    recovery_.clear();
+    recovers_ = false;
+  }
   // RM0402, "Bus-Off recovery": with ABOM = 0 the sequence begins when initialisation mode is left.
-  if (mode_ == Mode::kNormal && before != Mode::kNormal && bus_off_) wait_for_recovery();
+  if (mode_ == Mode::kNormal && before != Mode::kNormal && bus_off_) {
+    recovers_ = true;
+    wait_for_recovery();
+  }
   line.poke();
+}
+
+// A wait for recessive bits begins to count them.
+void Can::released() {
+  const std::uint32_t requests = reg::mcr::kInrq.mask() | reg::mcr::kSleep.mask();
+  if (mode_ != Mode::kNormal && (mcr_ & requests) == 0) return change_mode();
+  const bool asked = mode_ == Mode::kNormal && bus_off_ && !recovery_.pending();
+  if (asked && (recovers_ || reg::mcr::kAbom.of(mcr_) != 0)) wait_for_recovery();
 }
 
 // Recovery needs 128 times 11 recessive bits, none of them while the bus is held.
@@ -252,6 +266,7 @@ void Can::recovered() {
 
 void Can::enter_bus_off() {
   bus_off_ = true;
+  recovers_ = false;
   sending_ = -1;
   if (reg::mcr::kAbom.of(mcr_) != 0) wait_for_recovery();
 }

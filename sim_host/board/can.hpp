@@ -36,6 +36,7 @@ class Can final : public Peripheral, public CanController {
   [[nodiscard]] std::int64_t bit_rate() const override;
   [[nodiscard]] double rate_tolerance() const override;
   [[nodiscard]] bool error_passive() const override { return tec_ > 127 || rec_ > 127; }
+  void released() override;
 
  private:
   static constexpr int kMailboxes = 3;
@@ -96,6 +97,7 @@ class Can final : public Peripheral, public CanController {
   CanFilters filters_;
   int tec_ = 0, rec_ = 0;
   bool bus_off_ = false;
+  bool recovers_ = false;  ///< initialisation mode was left since bus-off
 };
 
 }  // namespace tetap::board

@@ -84,6 +84,13 @@ void CanLine::send(const base::CanFrame& frame, Picoseconds at) {
   poke();
 }
 
+void CanLine::release() {
+  if (!stuck_dominant) return;
+  stuck_dominant = false;
+  controller_.released();
+  poke();
+}
+
 void CanLine::poke() {
   if (end_.pending()) return;
   Picoseconds at = kNever;

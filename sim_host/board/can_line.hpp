@@ -43,6 +43,8 @@ class CanController {
   /// Largest relative difference to the bus's rate that its bit timing allows.
   [[nodiscard]] virtual double rate_tolerance() const = 0;
   [[nodiscard]] virtual bool error_passive() const = 0;
+  /// The receive pin, which was held dominant, follows the bus again.
+  virtual void released() = 0;
 };
 
 class CanLine {
@@ -56,8 +58,9 @@ class CanLine {
 
   bool partner = true;                   ///< another node acknowledges
   std::int64_t bit_rate = 500'000;       ///< rate of the other nodes
-  bool stuck_dominant = false;           ///< the receive pin stays low: transceiver without supply
+  bool stuck_dominant = false;           ///< the receive pin stays low: transceiver without supply; release() ends it
   std::function<bool()> transceiver_on;  ///< empty: always on
+  void release();
   /// Every frame is destroyed until then (a short circuit, a node with another bit rate).
   void disturb(Picoseconds until) { disturbed_until_ = until; }
   [[nodiscard]] bool disturbed() const { return scheduler_.now() < disturbed_until_; }

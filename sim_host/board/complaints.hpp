@@ -24,14 +24,18 @@ class Complaints {
   explicit Complaints(const Scheduler& scheduler) : scheduler_(scheduler) {}
 
   void add(std::string_view model, std::string_view text) {
-    for (Complaint& one : list_) {
+    std::vector<Complaint>& list = provoked_from_ == model ? provoked_ : list_;
+    for (Complaint& one : list) {
       if (one.model == model && one.text == text) {
         ++one.count;
         return;
       }
     }
-    list_.push_back({scheduler_.now(), std::string(model), std::string(text), 1});
+    list.push_back({scheduler_.now(), std::string(model), std::string(text), 1});
   }
+  /// An injected fault makes `model` complain until the next call: such complaints are apart. Empty: no model.
+  void expect_from(std::string_view model) { provoked_from_ = model; }
+  [[nodiscard]] const std::vector<Complaint>& provoked() const { return provoked_; }
   [[nodiscard]] const std::vector<Complaint>& list() const { return list_; }
   [[nodiscard]] bool empty() const { return list_.empty(); }
   /// Whether a complaint of `model` contains `part`.
@@ -54,7 +58,8 @@ class Complaints {
 
  private:
   const Scheduler& scheduler_;
-  std::vector<Complaint> list_;
+  std::vector<Complaint> list_, provoked_;
+  std::string provoked_from_;
 };
 
 }  // namespace tetap::board

@@ -7,12 +7,13 @@
 #include <cmath>
 #include <cstdio>
 #include <stdexcept>
+#include <utility>
 
 namespace tetap::board {
 
 namespace {
 
-constexpr std::int64_t kJump_edges = 5'000, kForeign_hz = 300;
+constexpr std::int64_t kJump_edges = 5'000, kForeign_hz = 300, kBurst = 128;
 
 constexpr std::array kTable{
     HardwareFaultInfo{HardwareFault::kImuDead, "imu_dead", 60, 10, "the IMU answers nothing: its MISO line floats"},
@@ -32,14 +33,29 @@ constexpr std::array kTable{
     HardwareFaultInfo{HardwareFault::kNoPartner, "no_partner", 60, 2, "no other node acknowledges"},
     HardwareFaultInfo{HardwareFault::kForeignFrames, "foreign_frames", 60, 10,
                       "another node sends 300 frames a second that this node takes"},
+    HardwareFaultInfo{HardwareFault::kForeignBurst, "foreign_burst", 60, 0,
+                      "another node sends 128 such frames back to back"},
     HardwareFaultInfo{HardwareFault::kCoreStalled, "core_stalled", 60, 0.12,
                       "the core executes nothing, as while its flash is erased; all blocks run on"},
+    HardwareFaultInfo{HardwareFault::kMisoLow, "miso_low", 60, 5, "a short circuit: the IMU's MISO line stays low"},
+    HardwareFaultInfo{HardwareFault::kMisoHigh, "miso_high", 60, 5, "the IMU's MISO line stays high"},
+    HardwareFaultInfo{HardwareFault::kStackOverflow, "stack_overflow", 60, 0, "the program recurses without an end"},
+    HardwareFaultInfo{HardwareFault::kBadRead, "bad_read", 60, 0, "the program reads where no memory is"},
+    HardwareFaultInfo{HardwareFault::kBadJump, "bad_jump", 60, 0, "the program jumps to where no memory is"},
+    HardwareFaultInfo{HardwareFault::kUndefinedInstruction, "undefined_instruction", 60, 0,
+                      "the program meets an undefined instruction"},
+    HardwareFaultInfo{HardwareFault::kUnalignedAccess, "unaligned_access", 60, 0,
+                      "the program reads two words at an unaligned address"},
+    HardwareFaultInfo{HardwareFault::kFloatingPointOff, "floating_point_off", 60, 0,
+                      "the floating-point unit is switched off"},
+    HardwareFaultInfo{HardwareFault::kLoopStalled, "loop_stalled", 60, 0,
+                      "the program's loop comes round no more; its interrupts go on"},
 };
 
 std::optional<double> seconds(std::string_view text) {
   double value = 0;
   const auto [end, code] = std::from_chars(text.data(), text.data() + text.size(), value, std::chars_format::fixed);
-  if (code != std::errc{} || end != text.data() + text.size() || !(value >= 0 && value <= 1e6)) return std::nullopt;
+  if (code != std::errc{} || end != text.data() + text.size() || !(value >= -1 && value <= 1e6)) return std::nullopt;
   return value;
 }
 
@@ -72,11 +88,27 @@ std::optional<HardwareFaultSetting> parse_hardware_fault(std::string_view text) 
   const auto start = seconds(when.substr(0, plus));
   const auto duration =
       plus == std::string_view::npos ? std::optional(row->duration_s) : seconds(when.substr(plus + 1));
-  if (!start || !duration)
-    throw std::runtime_error("fault '" + std::string(text) + "': the form is NAME[@START[+DURATION]], in seconds");
+  if (!start || !duration || *duration < 0)
+    throw std::runtime_error("fault '" + std::string(text) + "': the form is NAME[@START[+DURATION]], in seconds, " +
+                             "START from -1 on");
   setting.start = picoseconds(*start);
   setting.duration = picoseconds(*duration);
   return setting;
+}
+
+// True: one of the core, which has no end of its own.
+bool HardwareFaults::upset(HardwareFault fault) {
+  constexpr std::array kUpsets{std::pair{HardwareFault::kStackOverflow, Upset::kStackOverflow},
+                               std::pair{HardwareFault::kBadRead, Upset::kBadRead},
+                               std::pair{HardwareFault::kBadJump, Upset::kBadJump},
+                               std::pair{HardwareFault::kUndefinedInstruction, Upset::kUndefinedInstruction},
+                               std::pair{HardwareFault::kUnalignedAccess, Upset::kUnalignedAccess},
+                               std::pair{HardwareFault::kFloatingPointOff, Upset::kFloatingPointOff},
+                               std::pair{HardwareFault::kLoopStalled, Upset::kEndlessLoop}};
+  for (const auto& [one, what] : kUpsets) {
+    if (one == fault) return machine_.upset(what), true;
+  }
+  return false;
 }
 
 void HardwareFaults::add(const HardwareFaultSetting& setting, Picoseconds world_start) {
@@ -91,6 +123,7 @@ void HardwareFaults::add(const HardwareFaultSetting& setting, Picoseconds world_
 void HardwareFaults::begin(const HardwareFaultSetting& setting) {
   const Picoseconds now = board_.chip.scheduler.now();
   CanLine& line = board_.chip.can1.line;
+  if (upset(setting.fault)) return;
   switch (setting.fault) {
     case HardwareFault::kImuDead:
       board_.imu.dead = true;
@@ -123,10 +156,19 @@ void HardwareFaults::begin(const HardwareFaultSetting& setting) {
       line.partner = false;
       break;
     case HardwareFault::kForeignFrames:
-      send_foreign(now + setting.duration);
+      send_foreign(now + setting.duration, kSecond / kForeign_hz);
+      break;
+    case HardwareFault::kForeignBurst:
+      send_foreign(now + kBurst * kMicrosecond, kMicrosecond);
       break;
     case HardwareFault::kCoreStalled:
       machine_.stall(now + setting.duration);
+      break;
+    case HardwareFault::kMisoLow:
+    case HardwareFault::kMisoHigh:
+      board_.chip.spi1.stuck_miso = setting.fault == HardwareFault::kMisoHigh;
+      break;
+    default:
       break;
   }
 }
@@ -147,10 +189,14 @@ void HardwareFaults::end(HardwareFault fault) {
       board_.plug_encoders(true);
       break;
     case HardwareFault::kBusStuck:
-      line.stuck_dominant = false;
+      line.release();
       break;
     case HardwareFault::kNoPartner:
       line.partner = true;
+      break;
+    case HardwareFault::kMisoLow:
+    case HardwareFault::kMisoHigh:
+      board_.chip.spi1.stuck_miso.reset();
       break;
     default:
       break;
@@ -158,8 +204,7 @@ void HardwareFaults::end(HardwareFault fault) {
   line.poke();
 }
 
-void HardwareFaults::send_foreign(Picoseconds until) {
-  const Picoseconds every = kSecond / kForeign_hz;
+void HardwareFaults::send_foreign(Picoseconds until, Picoseconds every) {
   std::uint8_t number = 0;
   for (Picoseconds at = board_.chip.scheduler.now(); at < until; at += every)
     board_.chip.can1.line.send({.id = foreign_id_, .size = 8, .data = {number++}}, at);

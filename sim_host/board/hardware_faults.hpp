@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Faults of the board's hardware by name, NAME@START+DURATION in seconds after the world's start.
+// Faults of the board's hardware by name, NAME@START+DURATION in seconds after the world's start; from -1 on,
+// power-on.
 #pragma once
 
 #include "sim_host/board/ark_cannode.hpp"
@@ -27,7 +28,17 @@ enum class HardwareFault : std::uint8_t {
   kBusStuck,
   kNoPartner,
   kForeignFrames,
+  kForeignBurst,
   kCoreStalled,
+  kMisoLow,
+  kMisoHigh,
+  kStackOverflow,
+  kBadRead,
+  kBadJump,
+  kUndefinedInstruction,
+  kUnalignedAccess,
+  kFloatingPointOff,
+  kLoopStalled,
 };
 
 struct HardwareFaultInfo {
@@ -59,7 +70,8 @@ class HardwareFaults {
  private:
   void begin(const HardwareFaultSetting& setting);
   void end(HardwareFault fault);
-  void send_foreign(Picoseconds until);
+  void send_foreign(Picoseconds until, Picoseconds every);
+  [[nodiscard]] bool upset(HardwareFault fault);
 
   ArkCannode& board_;
   Machine& machine_;

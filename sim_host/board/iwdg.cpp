@@ -29,7 +29,6 @@ void Iwdg::reset() {
   pr_ = next_pr_ = 0;
   rlr_ = next_rlr_ = 0xFFF;
   unlocked_ = started_ = false;
-  longest_gap_ = 0;
 }
 
 std::uint32_t Iwdg::read(std::uint32_t offset) {

@@ -20,7 +20,7 @@ class Iwdg final : public Peripheral {
   std::function<void()> on_expired;
   [[nodiscard]] bool started() const { return started_; }
   [[nodiscard]] Picoseconds deadline() const { return expires_.at(); }
-  /// Longest time between two reloads since the start.
+  /// Longest time between two reloads since power-on.
   [[nodiscard]] Picoseconds longest_gap() const { return longest_gap_; }
 
  private:

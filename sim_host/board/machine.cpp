@@ -21,6 +21,34 @@ constexpr int kSupervisorCall = 2, kBreakpoint = 7, kExceptionReturn = 8;  // Un
 constexpr std::uint32_t kPage = 0x400;                                     // smallest page of the engine for this core
 constexpr int kStorm = 1000;  // entries in a row that only an uncleared interrupt explains
 
+constexpr std::uint32_t kCpacr = m4::kSystemControlSpace + m4::scb::kCpacr;
+
+// Code of upsets lies at the end of the SRAM, which no image of this board reaches.
+constexpr std::uint32_t kUpsetBytes = 16, kUpsetCode = Memory::kRam + Memory::kRamSize - 0x100;
+
+// Thumb encodings: ARM DDI 0403E.e A7.7. 0x60000000 is the external memory of chips that have more pins.
+std::vector<std::uint16_t> upset_code(Upset what) {
+  constexpr std::uint16_t kForEver = 0xE7FE;                              // b .
+  constexpr std::uint16_t kNowhereHigh = 0x2060, kNowhereShift = 0x0600;  // movs r0, #0x60; lsls r0, r0, #24
+  switch (what) {
+    case Upset::kStackOverflow:
+      return {0xB4FF, 0xE7FD};  // 1: push {r0-r7}; b 1b
+    case Upset::kBadRead:
+      return {kNowhereHigh, kNowhereShift, 0x6801, kForEver};  // ldr r1, [r0]
+    case Upset::kBadJump:
+      return {kNowhereHigh, kNowhereShift, 0x3001, 0x4700};  // adds r0, #1; bx r0
+    case Upset::kUndefinedInstruction:
+      return {0xDE00, kForEver};  // udf #0
+    case Upset::kUnalignedAccess:
+      return {0xE9D0, 0x1200, kForEver};  // ldrd r1, r2, [r0]
+    case Upset::kFloatingPointOff:
+      return {0xEE30, 0x0A00, kForEver};  // vadd.f32 s0, s0, s0
+    case Upset::kEndlessLoop:
+      break;
+  }
+  return {kForEver};
+}
+
 std::string hex(std::uint32_t value) {
   char text[16];
   std::snprintf(text, sizeof text, "0x%08X", value);
@@ -206,7 +234,7 @@ Machine::BlockInfo& Machine::block_info(std::uint32_t address, std::uint32_t siz
 void Machine::on_block(std::uint32_t address, std::uint32_t size) {
   const bool asked = hundredths_ >= stop_hundredths_ || (chip_.nvic.waiting() && chip_.nvic.next(masks()) != 0) ||
                      chip_.pending_reset.has_value() || pending_fault_.number != 0 ||
-                     stalled_until_ > chip_.scheduler.now();
+                     stalled_until_ > chip_.scheduler.now() || upset_due();
   if (asked && !first_block_) {
     uc_emu_stop(uc_);
     return;
@@ -217,6 +245,11 @@ void Machine::on_block(std::uint32_t address, std::uint32_t size) {
     chip_.complaints.add("core", "floating-point instruction near " + hex(address) + " with CPACR off");
     uc_emu_stop(uc_);
     return;
+  }
+  // The engine lets an unaligned LDRD pass.
+  if (address >= kUpsetCode && !options_.check_alignment) {
+    on_instruction(address, size);
+    if (pending_fault_.number != 0) return;
   }
   first_block_ = false;
   block_end_ = address + size;
@@ -328,7 +361,8 @@ void Machine::run(Picoseconds until) {
     if (chip_.pending_reset) {
       chip_.system_reset(*chip_.pending_reset);
       stalled_until_ = 0;
-      ++resets_;
+      reset_times_.push_back(chip_.scheduler.now());
+      chip_.complaints.expect_from("");
       reset_core();
       if (stop_at_reset) return;
     }
@@ -338,12 +372,30 @@ void Machine::run(Picoseconds until) {
     }
     take_pending();
     if (chip_.scheduler.now() >= until) return;
+    if (upset_due()) begin_upset();
     if (sleeping_ || locked_up_) {
       sleep(until);
     } else {
       execute(until);
     }
   }
+}
+
+bool Machine::upset_due() const {
+  return upset_.has_value() && active_.empty() && !sleeping_ && (reg(UC_ARM_REG_PRIMASK) & 1) == 0;
+}
+
+void Machine::begin_upset() {
+  const auto slot = static_cast<std::uint32_t>(*upset_);
+  const std::vector<std::uint16_t> code = upset_code(*upset_);
+  const std::uint32_t address = kUpsetCode + slot * kUpsetBytes;
+  std::memcpy(chip_.memory.writable(address, kUpsetBytes).data(), code.data(), 2 * code.size());
+  if (*upset_ == Upset::kFloatingPointOff) static_cast<void>(chip_.write(kCpacr, 4, 0));
+  if (*upset_ == Upset::kUnalignedAccess) set_reg(UC_ARM_REG_R0, Memory::kRam + 2);
+  chip_.complaints.expect_from("core");
+  program_counter_ = address;
+  upset_time_ = chip_.scheduler.now();
+  upset_.reset();
 }
 
 // Time jumps to the next event.

@@ -10,6 +10,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <utility>
@@ -22,6 +23,17 @@ namespace tetap::board {
 struct MachineOptions {
   int cpi_percent = 100;         ///< cycles of an instruction, times 100
   bool check_alignment = false;  ///< looks at every instruction for LDRD, LDM, VLDR ... at unaligned addresses; slow
+};
+
+/// Next instructions of a defective program or an upset core, in thread mode with interrupts on.
+enum class Upset : std::uint8_t {
+  kStackOverflow,         ///< pushes registers for ever, as a recursion without an end
+  kBadRead,               ///< reads where nothing is
+  kBadJump,               ///< jumps to where nothing is
+  kUndefinedInstruction,  ///< UDF
+  kUnalignedAccess,       ///< LDRD at an address that is no multiple of four
+  kFloatingPointOff,      ///< CPACR is cleared
+  kEndlessLoop,           ///< branches to itself; interrupts go on
 };
 
 /// Why run() returned.
@@ -43,12 +55,18 @@ class Machine {
   void run(Picoseconds until);
   /// The core executes nothing until then, as while its flash is erased: RM0402, "Read while write". Blocks run on.
   void stall(Picoseconds until) { stalled_until_ = until; }
+  /// Takes effect when the core is in thread mode and PRIMASK is 0. What the core then complains of until its reset is
+  /// in Complaints::provoked().
+  void upset(Upset what) { upset_ = what; }
   /// The next system reset asked for by software or watchdog ends run() as well.
   bool stop_at_reset = false;
 
   [[nodiscard]] std::uint64_t instructions() const { return instructions_; }
   [[nodiscard]] std::uint64_t exceptions() const { return exceptions_; }
-  [[nodiscard]] int resets() const { return resets_; }
+  [[nodiscard]] int resets() const { return static_cast<int>(reset_times_.size()); }
+  [[nodiscard]] const std::vector<Picoseconds>& reset_times() const { return reset_times_; }
+  /// When the last upset took effect; kNever: none did.
+  [[nodiscard]] Picoseconds upset_time() const { return upset_time_; }
   [[nodiscard]] bool locked_up() const { return locked_up_; }
   /// Lowest value the main stack pointer had at an exception entry.
   [[nodiscard]] std::uint32_t lowest_stack() const { return lowest_stack_; }
@@ -78,6 +96,8 @@ class Machine {
   std::uint64_t on_read(std::uint32_t address, unsigned size);
   void on_write(std::uint32_t address, unsigned size, std::uint64_t value);
   void plan_stop(Picoseconds until);
+  [[nodiscard]] bool upset_due() const;
+  void begin_upset();
   void apply_mpu();
   [[nodiscard]] bool guarded(std::uint32_t address, std::uint32_t size) const;
   std::uint64_t on_guard_read(std::uint32_t address, unsigned size);
@@ -126,7 +146,9 @@ class Machine {
   int storm_number_ = 0, storm_count_ = 0;
   std::uint64_t instructions_ = 0, exceptions_ = 0;
   std::uint32_t lowest_stack_ = 0xFFFF'FFFF;
-  int resets_ = 0;
+  std::vector<Picoseconds> reset_times_;
+  std::optional<Upset> upset_;
+  Picoseconds upset_time_ = kNever;
 };
 
 }  // namespace tetap::board

@@ -5,6 +5,7 @@
 #include "bus/messages.hpp"
 #include "sim_host/board/ark_cannode.hpp"
 #include "sim_host/board/hardware_faults.hpp"
+#include "sim_host/board/live_bus.hpp"
 #include "sim_host/board/machine.hpp"
 #include "sim_host/board/simulated_sensors.hpp"
 #include "sim_host/encode.hpp"
@@ -48,6 +49,8 @@ std::string help() {
          "  --no-crystal       HSE never starts\n"
          "  --no-imu           nothing answers on SPI1\n"
          "  --no-partner       no other node acknowledges\n"
+         "  --first-complaint  ends the run with the first complaint\n"
+         "  --can IFACE        joins the bus to a CAN interface of this machine, in real time\n"
          "  --check-alignment  looks at every instruction for accesses that must be aligned; slow\n\n"
          "The simulated world behind the pins:\n"
          "  --robot NAME       whose body and sensors: " +
@@ -70,12 +73,14 @@ struct Options {
   board::UbloxOptions receiver;
   std::optional<double> seconds;
   std::optional<double> imu_clock_ppm;
-  std::string log, image, robot, out, faults;
+  std::string log, image, robot, out, faults, can;
   std::vector<board::HardwareFaultSetting> hardware_faults;
   std::vector<sim::FaultSetting> world_faults;
   std::uint64_t seed = 1;
-  bool partner = true, time_master = true;
+  bool partner = true, time_master = true, first_complaint = false;
 };
+
+double to_seconds(board::Picoseconds time) { return static_cast<double>(time / board::kMicrosecond) * 1e-6; }
 
 /// Times of a fault as the report reads them.
 std::string fault_text(std::string_view name, double start_s, double duration_s) {
@@ -109,9 +114,9 @@ void add_faults(std::string_view all, Options& options) {
       continue;
     }
     options.hardware_faults.push_back(*hardware);
-    const auto to_s = [](board::Picoseconds t) { return static_cast<double>(t / board::kMicrosecond) * 1e-6; };
-    options.faults += (options.faults.empty() ? "" : ",") +
-                      fault_text(one.substr(0, one.find('@')), to_s(hardware->start), to_s(hardware->duration));
+    options.faults +=
+        (options.faults.empty() ? "" : ",") +
+        fault_text(one.substr(0, one.find('@')), to_seconds(hardware->start), to_seconds(hardware->duration));
   }
 }
 
@@ -140,6 +145,8 @@ Options parse(sim::Arguments& arguments) {
   options.board.imu.who_am_i = static_cast<std::uint8_t>(arguments.integer("--who-am-i", 0x47, 0, 0xFF));
   options.board.oscillators.crystal = !arguments.flag("--no-crystal");
   options.board.imu_present = !arguments.flag("--no-imu");
+  options.first_complaint = arguments.flag("--first-complaint");
+  options.can = arguments.text("--can").value_or("");
   options.partner = !arguments.flag("--no-partner");
   options.machine.check_alignment = arguments.flag("--check-alignment");
   parse_world(arguments, options);
@@ -229,10 +236,16 @@ struct Facts {
   double seconds = 0, cpu_s = 0;
 };
 
-std::string complaints_json(const board::Complaints& complaints) {
+std::string complaints_json(const std::vector<board::Complaint>& complaints) {
   std::string text;
-  for (const board::Complaint& one : complaints.list())
+  for (const board::Complaint& one : complaints)
     text += (text.empty() ? "" : ", ") + sim::quoted(one.model + ": " + one.text);
+  return "[" + text + "]";
+}
+
+std::string times_json(const std::vector<board::Picoseconds>& times) {
+  std::string text;
+  for (const board::Picoseconds one : times) text += (text.empty() ? "" : ", ") + std::to_string(to_seconds(one));
   return "[" + text + "]";
 }
 
@@ -248,15 +261,20 @@ void write_facts(const Options& options, const board::ArkCannode& node, const bo
       {"fault", sim::quoted(options.faults)},
       {"image", sim::quoted(options.image)},
       {"complaints", std::to_string(node.chip.complaints.list().size())},
-      {"complaint_texts", complaints_json(node.chip.complaints)},
+      {"complaint_texts", complaints_json(node.chip.complaints.list())},
+      {"provoked_complaints", complaints_json(node.chip.complaints.provoked())},
       {"board_s", real(facts.seconds)},
       {"board_cpu_s", real(facts.cpu_s)},
       {"times_realtime", real(facts.cpu_s > 0 ? facts.seconds / facts.cpu_s : 0)},
       {"instructions", std::to_string(machine.instructions())},
       {"exceptions", std::to_string(machine.exceptions())},
       {"resets", std::to_string(machine.resets())},
+      {"reset_times_s", times_json(machine.reset_times())},
+      {"upset_s", machine.upset_time() == board::kNever ? "null" : real(to_seconds(machine.upset_time()))},
+      {"watchdog_longest_gap_s", real(to_seconds(node.chip.iwdg.longest_gap()))},
       {"cpi", real(options.machine.cpi_percent / 100.0)},
       {"frames_on_bus", std::to_string(facts.frames)},
+      {"imu_clock_ppm", real(*options.imu_clock_ppm)},
       {"imu_samples", std::to_string(node.imu.samples())},
       {"imu_packets_lost", std::to_string(node.imu.lost_packets())},
       {"gnss_epochs", std::to_string(sensors.receiver.epochs)},
@@ -293,7 +311,10 @@ class Run {
     node.chip.can1.line.partner = options_.partner;
     if (!options_.log.empty()) log_ = std::make_unique<sim::OutFile>(options_.log);
     sim::NodeOrigin origin(parameters_.can_base);
-    node.chip.can1.line.on_frame = [&](board::Picoseconds time, const board::CanOffer& frame, bool) {
+    std::optional<board::LiveBus> live;
+    if (!options_.can.empty()) live.emplace(options_.can, node.chip.can1.line, node.chip.scheduler);
+    node.chip.can1.line.on_frame = [&](board::Picoseconds time, const board::CanOffer& frame, bool own) {
+      if (live) live->came_through(frame, own);
       if (sensors_ && !frame.remote) origin.received(frame.frame);
       record(time, frame);
     };
@@ -308,9 +329,12 @@ class Run {
       faults.add(one, sensors_->world().start().us * board::kMicrosecond);
     const std::clock_t began = std::clock();
     facts_.seconds = duration_s();
-    machine.run(static_cast<board::Picoseconds>(facts_.seconds * static_cast<double>(board::kSecond)));
+    run(machine, node.chip.complaints);
     facts_.cpu_s = static_cast<double>(std::clock() - began) / CLOCKS_PER_SEC;
     if (log_) log_->close();
+    if (live)
+      std::fprintf(stderr, "tetap-board: on %s in real time, at most %.3f s late\n", options_.can.c_str(),
+                   static_cast<double>(live->latest().us) * 1e-6);
     finish(node, machine, origin);
     return node.chip.complaints.empty() && !machine.locked_up() ? 0 : 1;
   }
@@ -322,6 +346,14 @@ class Run {
     if (!sensors_) return options_.seconds.value_or(10);
     const base::Micros all = sensors_->world().start() + sensors_->world().duration();
     return std::min(options_.seconds.value_or(1e9), static_cast<double>(all.us) * 1e-6);
+  }
+  void run(board::Machine& machine, const board::Complaints& complaints) {
+    const auto end = static_cast<board::Picoseconds>(facts_.seconds * static_cast<double>(board::kSecond));
+    if (!options_.first_complaint) return machine.run(end);
+    constexpr board::Picoseconds kSlice = 10 * board::kMillisecond;
+    board::Picoseconds now = 0;
+    while (now < end && complaints.empty()) machine.run(now = std::min(now + kSlice, end));
+    facts_.seconds = to_seconds(now);
   }
   void record(board::Picoseconds time, const board::CanOffer& frame) {
     ++facts_.frames;

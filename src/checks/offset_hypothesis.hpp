@@ -36,6 +36,11 @@ class OffsetHypothesis {
   }
   void reset() { *this = {}; }
 
+  /// Fixes that support it are used from now on.
+  void accept() { accepted_ = true; }
+  [[nodiscard]] bool accepted() const { return accepted_; }
+  /// The last fix did not support it.
+  [[nodiscard]] bool contradicted() const { return against_ != 0; }
   [[nodiscard]] bool holds() const { return supported_.holds(); }
   [[nodiscard]] bool confirmed(std::int32_t fixes) const { return supported_.count() >= fixes; }
   [[nodiscard]] bool persisted(base::Micros for_, std::int32_t fixes) const {
@@ -56,7 +61,7 @@ class OffsetHypothesis {
     sink(east_m_);
     sink(north_m_);
     sink(begun_m2_);
-    sink(static_cast<std::uint32_t>(against_));
+    sink(static_cast<std::uint32_t>(against_) | (accepted_ ? 0x100U : 0U));
   }
 
  private:
@@ -66,6 +71,7 @@ class OffsetHypothesis {
   float east_m_ = 0, north_m_ = 0;  ///< mean offset of the fixes
   float begun_m2_ = 0;              ///< variance of the filter at the first of them
   std::uint8_t against_ = 0;        ///< fixes in a row that contradict the hypothesis
+  bool accepted_ = false;
 };
 
 }  // namespace tetap::checks

@@ -289,7 +289,9 @@ struct WiredParameters {
   std::int32_t gnss = 0;                    ///< 0: none, 1: a receiver read as it is, 2: a u-blox one, configured
   std::int32_t gnss_baud = 115'200;         ///< baud rate that a configured receiver is set to
   std::int32_t gnss_period_ms = 200;        ///< period of a configured receiver's fixes
-  std::int32_t gnss_latency_us = 60'000;    ///< time from a measurement to the last byte of its message
+  /// Time from a measurement to the last byte of its message, of the least delayed one. ArduPilot
+  /// (AP_GPS_UBLOX::get_lag) has 120 ms as the mean of flight logs with u-blox 7 and 8.
+  std::int32_t gnss_latency_us = 100'000;
 
   [[nodiscard]] constexpr bool any() const { return imu != 0 || encoders != 0 || gnss != 0; }
 };

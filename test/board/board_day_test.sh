@@ -19,7 +19,7 @@ TETAP_IMAGE=$image OUT=$out/day ROBOT=rover SEED=1 FAULT=usual WORLD="--seconds 
 "$programs/tetap-world" --memory --robot rover --seed 1 --duration "$seconds" --fault wheel_spin@45+3,gnss_outage@80+30,gnss_jump@150+2 --out "$out/bus" --quiet
 tools/report/write_report "$out/bus" --truth "$out/bus/truth.csv" --no-pictures >/dev/null
 /usr/bin/python3 - "$out/day/summary.json" "$out/bus/summary.json" "$seconds" <<'PYTHON' || exit 1
-import json, sys
+import csv, json, os, sys
 day, bus = (json.load(open(name, encoding="utf-8")) for name in sys.argv[1:3])
 seconds = min(float(sys.argv[3]), day["board_s"])
 wrong = []
@@ -38,6 +38,10 @@ print(f"board {fused['position_rmse_m']:.3f} m {fused['heading_rmse_deg']:.3f} d
 for key in ("position_rmse_m", "heading_rmse_deg"):
     must(fused[key] < 1.5 * other[key] + 0.1, f"{key} is {fused[key]}, over CAN {other[key]}")
 must(0.05 < fused["nees_mean"] < 9, f"NEES is {fused['nees_mean']} of {fused['nees_dof']}")
+# Where nobody knew the height, the first fixes confirm each other; then each fix has all three axes.
+with open(os.path.join(os.path.dirname(sys.argv[1]), "innovations.csv"), encoding="utf-8") as file:
+    dof = [row["dof"] for row in csv.DictReader(file) if row["sensor"] == "GnssPosition" and row["verdict"] == "Accepted"]
+must(len(dof) - dof.count("3") <= 0.1 * len(dof) + 5, f"only {dof.count('3')} of {len(dof)} accepted fixes fused their height")
 for words in wrong:
     print(f"board_day_test: {words}", file=sys.stderr)
 sys.exit(bool(wrong))

@@ -328,6 +328,12 @@ TEST(Can, InitialisationNeverEndsWithoutItsReceivePin) {
   dominant.chip.advance_us(1'000'000);
   EXPECT_TRUE(dominant.initialising());
   EXPECT_NO_COMPLAINTS(dominant);
+  // RM0402, "Normal mode": after 11 recessive bits in a row, 22 us at 500 kbit/s.
+  dominant.chip.can1.line.release();
+  dominant.chip.advance_us(21);
+  EXPECT_TRUE(dominant.initialising());
+  dominant.chip.advance_us(3);
+  EXPECT_FALSE(dominant.initialising());
 }
 
 TEST(Can, SilentTransceiverIsBusOff) {

@@ -74,6 +74,34 @@ TEST(Sources, AHeightHasAStateOfItsOwnAndStopsWithItsFixes) {
   EXPECT_EQ(height(d), kStopped);
 }
 
+// A pose places the filter in the plane. Errors of the receiver last, so each fix moves the height a little: the filter
+// stays unsure for minutes, and asks once whether the fixes agree.
+TEST(Sources, AHeightThatNobodyKnewIsConfirmedOnce) {
+  Drive d(rover_like());
+  d.white_m = 0.3;
+  d.lasting_m = 0.5;
+  d.tamper = [](Drive::Fix&) { return false; };
+  d.place();
+  d.run(3);
+  ASSERT_TRUE(d.tracking());
+  d.tamper = [](Drive::Fix&) { return true; };
+  int whole = 0, half = 0;
+  for (int fix = 0; fix < 100; ++fix) {
+    d.run(0.2);
+    ++(d.last_fix.dof == 3 ? whole : half);
+  }
+  EXPECT_GE(whole, 95) << half;
+  EXPECT_EQ(height(d), kFusing);
+  // One fix that the gate lets through, as unsure as the filter is, and that contradicts the others.
+  d.tamper = [](Drive::Fix& fix) { return fix.up_m += 12, true; };
+  d.run(0.2);
+  EXPECT_EQ(d.last_fix.dof, 2);
+  EXPECT_EQ(d.last_fix.failed, Check::kNone) << "its horizontal part is right";
+  d.tamper = [](Drive::Fix&) { return true; };
+  d.run(0.4);
+  EXPECT_EQ(d.last_fix.dof, 3);
+}
+
 TEST(Sources, AFrozenReceiverIsDistrusted) {
   Drive d = settled();
   d.tamper = [](Drive::Fix& fix) { return fix.repeated = true; };

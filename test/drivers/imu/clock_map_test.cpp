@@ -60,6 +60,49 @@ TEST(ClockMap, IsAsGoodAsItsLuckiestReadings) {
   EXPECT_LT(follow(10'000, 900, 20).worst_us, 150);
 }
 
+/// Largest error of the rate after `after_s`, of a chip at 1 kHz that a loop of `every_us` looks at: readings meet
+/// samples once in a beat of both clocks.
+double worst_rate_ppm(std::int64_t every_us, double after_s) {
+  double worst = 0;
+  for (const double ppm :
+       {-9'000.0, -6'000.0, -3'000.0, -1'000.0, -200.0, -20.0, 20.0, 200.0, 1'000.0, 3'000.0, 6'000.0}) {
+    for (const double phase_us : {0.0, 300.0, 700.0}) {
+      ClockMap map(kNominal);
+      base::Random random(7);
+      for (std::int64_t t_us = 1'000; static_cast<double>(t_us) < after_s * 1e6; t_us += every_us) {
+        const auto read_us = t_us + static_cast<std::int64_t>(random.next() % 20);
+        const double sample = std::floor((static_cast<double>(read_us) - phase_us) * (1 + ppm * 1e-6) / 1'000);
+        const auto ticks = static_cast<std::int64_t>(std::floor(937.5 * sample));
+        if (!map.running()) map.start(ticks, {read_us});
+        map.observe(ticks, {read_us});
+      }
+      worst = std::max(worst, std::abs(map.rate_error_ppm() + 1e6 * ppm / (1e6 + ppm)));
+    }
+  }
+  return worst;
+}
+
+TEST(ClockMap, FindsTheRateInSecondsWhereReadingsBeatWithSamples) {
+  for (const std::int64_t every_us : {1'000, 2'000, 10'000}) {
+    EXPECT_LT(worst_rate_ppm(every_us, 5), 1'000) << every_us;
+    EXPECT_LT(worst_rate_ppm(every_us, 10), 200) << every_us;
+    EXPECT_LT(worst_rate_ppm(every_us, 30), 200) << every_us;
+  }
+}
+
+TEST(ClockMap, ARestartWithinTheFirstSecondsLearnsFromItsOwnTicks) {
+  ClockMap map(kNominal);
+  for (std::int64_t ms = 0; ms < 8'000; ++ms) {
+    if (ms == 0 || ms == 2'500) {
+      map.stop();
+      map.start(0, {ms * 1'000});
+    }
+    const std::int64_t since_ms = ms < 2'500 ? ms : ms - 2'500;
+    map.observe(since_ms * 937 + since_ms / 2, {ms * 1'000});
+  }
+  EXPECT_NEAR(map.rate_error_ppm(), 0, 50);
+}
+
 TEST(ClockMap, AReadingThatPulledTheLineDownIsForgottenWithinSeconds) {
   ClockMap map(kNominal);
   const auto ticks = [](std::int64_t ms) { return ms * 15 / 16 * 1000; };

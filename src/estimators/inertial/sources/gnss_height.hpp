@@ -20,7 +20,8 @@ class GnssHeightSource {
     const bool agrees = a.nis <= a.gate && !z.drifts;
     refused_.update(!agrees, filter.stamp());
     const float p_z = filter.p()(2, 2);
-    if (!agrees || p_z > FixMeasurement::kDecides * z.r(2)) {
+    const bool decides = p_z > FixMeasurement::kDecides * z.r(2);
+    if (!agrees || decides) {
       offset_.update(filter.stamp(), z.nu(2), 0.0F, z.r(2), p_z);
       if (agrees) {
         confirm(a, n.recovery);
@@ -28,7 +29,8 @@ class GnssHeightSource {
         judge_refused(z, a, n.recovery);
       }
     }
-    if (a.fuses()) offset_.reset();
+    // Fixes that repeat each other move an unsure height slowly: what was confirmed stays so until the filter is sure.
+    if (a.fuses() && !(agrees && decides)) offset_.reset();
     return a;
   }
   /// Offsets so far were measured from elsewhere.
@@ -39,7 +41,8 @@ class GnssHeightSource {
   /// A height comes with its fix, and times out with it.
   [[nodiscard]] static bool timed_out(base::Micros) { return false; }
   [[nodiscard]] SourceStatus status(base::Micros) const {
-    if (!refused_.holds() && offset_.holds()) return {SourceState::kConfirming, Check::kUnconfirmed};
+    if (!refused_.holds() && offset_.holds() && !offset_.accepted())
+      return {SourceState::kConfirming, Check::kUnconfirmed};
     return status_of(refused_);
   }
   template <class Sink>
@@ -50,7 +53,7 @@ class GnssHeightSource {
 
  private:
   void confirm(Assessment& a, const param::RecoveryParameters& n) {
-    if (offset_.confirmed(n.confirm_fixes)) return;
+    if (offset_.confirmed(n.confirm_fixes) && !offset_.contradicted()) return offset_.accept();
     a.action = Action::kSkip;
     a.failed = Check::kUnconfirmed;
   }
