@@ -1,6 +1,7 @@
 #!/bin/bash
 # SPDX-License-Identifier: Apache-2.0
-# same_image_test.sh: two builds of one commit in folders of other names, neither with a compiler cache, give the same bytes: .bin and .hex of the ARK CANnode's rover.
+# same_image_test.sh: two builds of one commit in folders of other names, neither with a compiler cache, give the same bytes: .bin and .hex of the rover
+# on the ARK CANnode and on the Nucleo-G474RE.
 set -eu
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
 cd "$root"
@@ -11,12 +12,12 @@ export CCACHE_DISABLE=1
 for copy in "$work/one" "$work/another/place"; do
   git clone --quiet --shared --no-checkout "$root" "$copy"  # the commit's number is in the image
   git ls-files -z --cached --others --exclude-standard | xargs -0 cp --parents -t "$copy" 2>/dev/null || true  # without files that were removed
-  (cd "$copy" && tools/run/build_preset ark_cannode:tetap-ark_cannode-rover,tetap-ark_cannode_at_64k-rover 2>/dev/null) ||
+  (cd "$copy" && tools/run/build_preset ark_cannode:tetap-ark_cannode-rover,tetap-ark_cannode_at_64k-rover nucleo_g474re:tetap-nucleo_g474re-rover 2>/dev/null) ||
     { echo "same_image_test: $copy does not build" >&2; exit 1; }
 done
-for name in tetap-ark_cannode-rover tetap-ark_cannode_at_64k-rover; do
+for image in ark_cannode/hal/board/tetap-ark_cannode-rover ark_cannode/hal/board/tetap-ark_cannode_at_64k-rover nucleo_g474re/hal/board/tetap-nucleo_g474re-rover; do
   for kind in bin hex; do
-    cmp "$work/one/build/ark_cannode/hal/board/$name.$kind" "$work/another/place/build/ark_cannode/hal/board/$name.$kind" || exit 1
+    cmp "$work/one/build/$image.$kind" "$work/another/place/build/$image.$kind" || exit 1
   done
-  sha256sum "$work/one/build/ark_cannode/hal/board/$name.bin" | awk -v name="$name.bin" '{ print name, $1 }'
+  sha256sum "$work/one/build/$image.bin" | awk -v name="$(basename "$image").bin" '{ print name, $1 }'
 done

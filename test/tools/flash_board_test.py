@@ -89,6 +89,15 @@ class FlashBoard(unittest.TestCase):
         self.assertEqual(self.called()[0], "openocd -f interface/cmsis-dap.cfg -f target/stm32f4x.cfg -c init; exit")
         self.assertIn(f"program {{{self.image}}} verify reset exit", self.called()[1])
 
+    def test_each_board_has_its_chip_and_its_connector(self):
+        self.install("openocd")
+        printed = self.flash("--probe", "openocd", board="nucleo_g474re")
+        self.assertIn("onto the Nucleo-G474RE by its USB connector CN1", printed)
+        self.assertEqual(self.called()[0], "openocd -f interface/stlink.cfg -f target/stm32g4x.cfg -c init; exit")
+        dry = self.flash("--probe", "dfu", "--dry-run", board="nucleo_g474re")
+        self.assertIn("PA11 and PA12", dry)
+        self.assertIn("dry run, nothing was written", dry)
+
     def test_what_is_missing_is_named_before_anything_is_written(self):
         self.assertIn("st-flash is not installed: apt-get install stlink-tools", self.flash("--probe", "stlink", status=2))
         self.install("st-flash")

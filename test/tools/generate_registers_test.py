@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
-# tools/run/generate_registers: what it makes of a small SVD file is what the file says, mistakes are one clear line, and the header that is checked
-# in is what the vendor's SVD file makes anew (skipped where $TETAP_DATA/svd is not there).
+# tools/run/generate_registers: what it makes of a small SVD file is what the file says, mistakes are one clear line, and the headers that are checked
+# in are what the vendor's SVD files make anew (skipped where $TETAP_DATA/svd is not there).
 import os
 import re
 import subprocess
@@ -10,7 +10,7 @@ import unittest
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.realpath(__file__))))
 TOOL = os.path.join(ROOT, "tools", "run", "generate_registers")
-HEADER = os.path.join(ROOT, "hal", "chip", "stm32", "registers_stm32f412.hpp")
+HEADERS = {name: os.path.join(ROOT, "hal", "chip", "stm32", f"registers_{name.lower()}.hpp") for name in ("STM32F412", "STM32G474")}
 DATA = os.environ.get("TETAP_DATA", os.path.join(ROOT, "..", "shared", "data"))
 
 REGISTER = ("<register><name>{name}</name><description>text</description><addressOffset>{offset}</addressOffset><resetValue>{reset}</resetValue>"
@@ -62,12 +62,30 @@ class Registers(unittest.TestCase):
         self.assertIn("STM32F412.svd: No such file", done.stderr)
 
     @unittest.skipUnless(os.path.exists(os.path.join(DATA, "svd", "STM32F412.svd")), "no $TETAP_DATA/svd")
-    def test_the_header_in_the_repository_is_what_the_vendors_file_makes(self):
+    def test_the_headers_in_the_repository_are_what_the_vendors_files_make(self):
         self.assertEqual(subprocess.run([TOOL, "--check"], capture_output=True, text=True, check=False).stderr, "")
         with open(os.path.join(DATA, "svd", "SHA256SUMS"), encoding="utf-8") as file:
             sums = {name: value for value, name in (line.split() for line in file)}
-        with open(HEADER, encoding="utf-8") as file:
-            self.assertEqual(re.search(r"sha256 ([0-9a-f]{64})", file.read())[1], sums["STM32F412.svd"])
+        for name, path in HEADERS.items():
+            with open(path, encoding="utf-8") as file:
+                self.assertEqual(re.search(r"sha256 ([0-9a-f]{64})", file.read())[1], sums[name + ".svd"])
+            with open(path.replace(".hpp", ".toml"), encoding="utf-8") as file:
+                wanted = file.read()
+            with tempfile.TemporaryDirectory() as folder:
+                stale = os.path.join(folder, "registers.toml")
+                with open(stale, "w", encoding="utf-8") as file:
+                    file.write(wanted)
+                with open(path, encoding="utf-8") as file, open(stale.replace(".toml", ".hpp"), "w", encoding="utf-8") as out:
+                    out.write(file.read().replace("kOffset = 0x008", "kOffset = 0x00C", 1))
+                done = subprocess.run([TOOL, "--check", stale], capture_output=True, text=True, check=False)
+            self.assertEqual(done.returncode, 1, name)
+            self.assertIn("stale", done.stderr)
+
+    def test_a_peripherals_own_name_in_front_of_a_register_is_left_out(self):
+        svd = SVD.replace("<name>CR</name>", "<name>ONE_CR</name>")
+        status, error, text = self.run_tool(svd, LIST)
+        self.assertEqual((status, error), (0, ""))
+        self.assertIn("/// ONE.CR: text\nnamespace cr {", text)
 
 
 if __name__ == "__main__":

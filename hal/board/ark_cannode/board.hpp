@@ -259,7 +259,7 @@ struct Board {
   stm32::EncoderTimer<Mmio, std::uint32_t> left_encoder{Mmio{chip::tim::kTim2}};
   stm32::EncoderTimer<Mmio, std::uint16_t> right_encoder{Mmio{chip::tim::kTim3}};
   GnssPort gnss{Mmio{chip::usart::kUsart1},
-                chip::usart::kUsart1 + chip::usart::dr::kOffset,
+                chip::usart::kUsart1,
                 {Mmio{chip::dma::kDma2}, kGnssReceiveStream, kGnssChannel},
                 {Mmio{chip::dma::kDma2}, kGnssTransmitStream, kGnssChannel}};
 };

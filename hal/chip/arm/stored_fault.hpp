@@ -88,4 +88,7 @@ class StoredFault {
   std::uint32_t check_;
 };
 
+/// The record of an image, which its startup.cpp defines.
+extern StoredFault stored_fault;
+
 }  // namespace tetap::hal

@@ -8,6 +8,7 @@
 #include "base/time.hpp"
 #include "hal/can_bus.hpp"
 #include "hal/chip/stm32/can_encoding.hpp"
+#include "hal/chip/stm32/can_state.hpp"
 #include "hal/chip/stm32/can_timing.hpp"
 
 #include <array>
@@ -23,16 +24,6 @@ namespace can_register = stm32f412::can;
 struct CanConfig {
   CanBitTiming timing;
   CanFilter filter{};  ///< a mask of 0 passes every data frame of its kind
-};
-
-/// State of the controller towards the bus.
-enum class CanState : std::uint8_t {
-  kStopped,  ///< not started, or the controller does not follow a change of its mode
-  kJoining,  ///< waits for 11 recessive bits in a row: the transceiver is silent or the bus is stuck as long as it
-             ///< lasts
-  kOnBus,
-  kAway,       ///< after bus-off, for kBusOffHold
-  kRecovering  ///< waits for 128 times 11 recessive bits
 };
 
 template <class Registers, class Clock, class Lock>

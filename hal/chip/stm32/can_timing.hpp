@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Bit timing of bxCAN, worked out by the compiler. RM0402 chapter "Controller area network (bxCAN)", section "Bit
-// timing": one quantum is (BRP + 1) clocks of APB1; the bit is 1 + (TS1 + 1) + (TS2 + 1) quanta.
+// Bit timing of bxCAN and FDCAN, worked out by the compiler. RM0402 chapter "Controller area network (bxCAN)", section
+// "Bit timing": one quantum is (BRP + 1) clocks of APB1; the bit is 1 + (TS1 + 1) + (TS2 + 1) quanta.
 #pragma once
 
 #include "hal/chip/stm32/registers_stm32f412.hpp"
@@ -26,6 +26,14 @@ struct CanBitTiming {
   friend constexpr bool operator==(const CanBitTiming&, const CanBitTiming&) = default;
 };
 
+/// The longest that the fields of a controller hold.
+struct CanTimingLimits {
+  std::uint32_t prescaler = 1U << stm32f412::can::btr::kBrp.width;
+  std::uint32_t segment1 = 1U << stm32f412::can::btr::kTs1.width;
+  std::uint32_t segment2 = 1U << stm32f412::can::btr::kTs2.width;
+  std::uint32_t jump = 1U << stm32f412::can::btr::kSjw.width;
+};
+
 namespace detail {
 // Not constexpr on purpose: the compiler names this function when no timing samples the bit at 87.5 % exactly.
 inline void no_bit_timing_with_the_sample_point_of_cia_301() {}
@@ -33,20 +41,18 @@ inline void no_bit_timing_with_the_sample_point_of_cia_301() {}
 
 /// The timing that gives the bit rate exactly and samples at 87.5 % (CiA 301), with as many quanta as possible; none is
 /// a compile error.
-[[nodiscard]] consteval CanBitTiming can_bit_timing(std::uint32_t clock_hz, std::uint32_t bit_rate) {
-  namespace btr = stm32f412::can::btr;
-  constexpr std::uint32_t kMostSegment1 = 1U << btr::kTs1.width, kMostSegment2 = 1U << btr::kTs2.width;
-  constexpr std::uint32_t kMostPrescaler = 1U << btr::kBrp.width, kMostJump = 1U << btr::kSjw.width;
-  for (std::uint32_t quanta = 1 + kMostSegment1 + kMostSegment2; quanta >= 8; --quanta) {
+[[nodiscard]] consteval CanBitTiming can_bit_timing(std::uint32_t clock_hz, std::uint32_t bit_rate,
+                                                    CanTimingLimits most = {}) {
+  for (std::uint32_t quanta = 1 + most.segment1 + most.segment2; quanta >= 8; --quanta) {
     if (quanta % 8 != 0 || clock_hz % (bit_rate * quanta) != 0) continue;
     const std::uint32_t prescaler = clock_hz / (bit_rate * quanta);
     const std::uint32_t segment2 = quanta / 8;
     const std::uint32_t segment1 = quanta - 1 - segment2;
-    if (prescaler > kMostPrescaler || segment1 > kMostSegment1 || segment2 > kMostSegment2) continue;
+    if (prescaler > most.prescaler || segment1 > most.segment1 || segment2 > most.segment2) continue;
     return {.prescaler = prescaler,
             .segment1 = segment1,
             .segment2 = segment2,
-            .jump = segment2 < kMostJump ? segment2 : kMostJump};
+            .jump = segment2 < most.jump ? segment2 : most.jump};
   }
   detail::no_bit_timing_with_the_sample_point_of_cia_301();
   return {};

@@ -4,7 +4,9 @@
 // memory interface"; limits: data sheet DS11139, tables "General operating conditions", "Main PLL characteristics".
 #pragma once
 
+#include "hal/chip/stm32/clock_source.hpp"
 #include "hal/chip/stm32/registers_stm32f412.hpp"
+#include "hal/chip/support/register_steps.hpp"
 
 #include <cstdint>
 
@@ -13,19 +15,6 @@ namespace tetap::hal::stm32 {
 namespace cr = stm32f412::rcc::cr;
 namespace cfgr = stm32f412::rcc::cfgr;
 namespace vos = stm32f412::pwr::cr;
-
-enum class ClockSource : std::uint8_t {
-  kCrystal,
-  kInternal,       ///< HSI through the PLL: 1 % off, too much for CAN at 500 kbit/s over all temperatures
-  kInternalDirect  ///< HSI without the PLL, which did not lock
-};
-
-struct Clocks {
-  ClockSource source = ClockSource::kInternalDirect;
-  std::uint32_t core_hz = 0;
-  std::uint32_t apb1_hz = 0;
-  std::uint32_t apb2_hz = 0;
-};
 
 /// The PLL's factors: input / m * n / p.
 struct PllPlan {
@@ -63,13 +52,13 @@ class ClockTree {
 
   [[nodiscard]] Clocks start(const PllPlan& plan) const {
     on_internal_oscillator();
-    set(rcc_, cr::kOffset, cr::kHseon.mask());
+    set_bits(rcc_, cr::kOffset, cr::kHseon.mask());
     const bool crystal = waits_for(rcc_, cr::kOffset, cr::kHserdy, 1, kCrystalPatience);
-    if (!crystal) clear(rcc_, cr::kOffset, cr::kHseon.mask());
+    if (!crystal) clear_bits(rcc_, cr::kOffset, cr::kHseon.mask());
     const ClockSource source = crystal ? ClockSource::kCrystal : ClockSource::kInternal;
     if (crystal && lock(plan, source)) return running(plan, source);
     if (lock(plan, ClockSource::kInternal)) return running(plan, ClockSource::kInternal);
-    clear(rcc_, cr::kOffset, cr::kPllon.mask());
+    clear_bits(rcc_, cr::kOffset, cr::kPllon.mask());
     return {.source = ClockSource::kInternalDirect,
             .core_hz = PllPlan::kInternal_hz,
             .apb1_hz = PllPlan::kInternal_hz,
@@ -90,41 +79,27 @@ class ClockTree {
   /// RCC_CFGR.PPRE1: divided by 2.
   static constexpr std::uint32_t kHalf = 4;
 
-  static void set(Registers block, std::uint32_t offset, std::uint32_t bits) {
-    block.write(offset, block.read(offset) | bits);
-  }
-  static void clear(Registers block, std::uint32_t offset, std::uint32_t bits) {
-    block.write(offset, block.read(offset) & ~bits);
-  }
-  [[nodiscard]] static bool waits_for(Registers block, std::uint32_t offset, Field field, std::uint32_t value,
-                                      int patience) {
-    for (int i = 0; i < patience; ++i) {
-      if (field.of(block.read(offset)) == value) return true;
-    }
-    return false;
-  }
-
   /// As after a reset, whatever a boot loader left.
   void on_internal_oscillator() const {
-    set(rcc_, cr::kOffset, cr::kHsion.mask());
+    set_bits(rcc_, cr::kOffset, cr::kHsion.mask());
     static_cast<void>(waits_for(rcc_, cr::kOffset, cr::kHsirdy, 1, kPatience));
     rcc_.write(cfgr::kOffset, cfgr::kSw(kOnInternal));
     static_cast<void>(waits_for(rcc_, cfgr::kOffset, cfgr::kSws, kOnInternal, kPatience));
-    clear(rcc_, cr::kOffset, cr::kPllon.mask() | cr::kCsson.mask());
+    clear_bits(rcc_, cr::kOffset, cr::kPllon.mask() | cr::kCsson.mask());
     static_cast<void>(waits_for(rcc_, cr::kOffset, cr::kPllrdy, 0, kPatience));
-    clear(rcc_, cr::kOffset, cr::kHseon.mask() | cr::kHsebyp.mask());
+    clear_bits(rcc_, cr::kOffset, cr::kHseon.mask() | cr::kHsebyp.mask());
   }
 
   [[nodiscard]] bool lock(const PllPlan& plan, ClockSource source) const {
-    clear(rcc_, cr::kOffset, cr::kPllon.mask());
+    clear_bits(rcc_, cr::kOffset, cr::kPllon.mask());
     static_cast<void>(waits_for(rcc_, cr::kOffset, cr::kPllrdy, 0, kPatience));
     // VOS can be written while the PLL is off, and takes effect when it runs.
     namespace apb1enr = stm32f412::rcc::apb1enr;
-    set(rcc_, apb1enr::kOffset, apb1enr::kPwren.mask());
+    set_bits(rcc_, apb1enr::kOffset, apb1enr::kPwren.mask());
     static_cast<void>(rcc_.read(apb1enr::kOffset));  // the enabled block answers two clocks later
     pwr_.write(vos::kOffset, vos::kVos.in(pwr_.read(vos::kOffset), kScale1));
     rcc_.write(stm32f412::rcc::pllcfgr::kOffset, plan.pllcfgr(source));
-    set(rcc_, cr::kOffset, cr::kPllon.mask());
+    set_bits(rcc_, cr::kOffset, cr::kPllon.mask());
     if (!waits_for(rcc_, cr::kOffset, cr::kPllrdy, 1, kPatience)) return false;
     return waits_for(pwr_, stm32f412::pwr::csr::kOffset, stm32f412::pwr::csr::kVosrdy, 1, kPatience);
   }
@@ -139,7 +114,7 @@ class ClockTree {
     rcc_.write(cfgr::kOffset, cfgr::kSw(kOnPll) | cfgr::kPpre1(kHalf));
     static_cast<void>(waits_for(rcc_, cfgr::kOffset, cfgr::kSws, kOnPll, kPatience));
     // A crystal that stops later is an NMI and a reset instead of a core without a clock.
-    if (source == ClockSource::kCrystal) set(rcc_, cr::kOffset, cr::kCsson.mask());
+    if (source == ClockSource::kCrystal) set_bits(rcc_, cr::kOffset, cr::kCsson.mask());
     return {.source = source, .core_hz = plan.core_hz, .apb1_hz = plan.core_hz / 2, .apb2_hz = plan.core_hz};
   }
 

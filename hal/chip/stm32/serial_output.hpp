@@ -3,7 +3,7 @@
 // receiver transmitter (USART)".
 #pragma once
 
-#include "hal/chip/stm32/registers_stm32f412.hpp"
+#include "hal/chip/stm32/usart_registers.hpp"
 
 #include <array>
 #include <cstddef>
@@ -11,18 +11,17 @@
 
 namespace tetap::hal::stm32 {
 
-template <class Registers, std::size_t Capacity>
+template <class Registers, std::size_t Capacity, class Usart = UsartOfF4>
 class SerialOutput {
  public:
   constexpr explicit SerialOutput(Registers registers) : registers_{registers} {}
 
   void start(std::uint32_t clock_hz, std::uint32_t baud) const {
-    namespace usart = stm32f412::usart;
-    registers_.write(usart::cr1::kOffset, 0);
-    registers_.write(usart::cr2::kOffset, 0);
-    registers_.write(usart::cr3::kOffset, 0);
-    registers_.write(usart::brr::kOffset, (clock_hz + baud / 2) / baud);
-    registers_.write(usart::cr1::kOffset, usart::cr1::kUe.mask() | usart::cr1::kTe.mask());
+    registers_.write(Usart::kControl1, 0);
+    registers_.write(Usart::kControl2, 0);
+    registers_.write(Usart::kControl3, 0);
+    registers_.write(Usart::kBaudRate, (clock_hz + baud / 2) / baud);
+    registers_.write(Usart::kControl1, Usart::kEnable | usart::cr1::kTe.mask());
   }
 
   /// Text that does not fit is cut: a console must not hold the loop.
@@ -32,9 +31,8 @@ class SerialOutput {
 
   /// As much as the line takes now.
   void drain() {
-    namespace usart = stm32f412::usart;
-    while (sent_ != put_ && usart::sr::kTxe.of(registers_.read(usart::sr::kOffset)) != 0) {
-      registers_.write(usart::dr::kOffset, static_cast<std::uint8_t>(ring_[sent_++ % Capacity]));
+    while (sent_ != put_ && usart::sr::kTxe.of(registers_.read(Usart::kStatus)) != 0) {
+      registers_.write(Usart::kTransmitData, static_cast<std::uint8_t>(ring_[sent_++ % Capacity]));
     }
   }
 

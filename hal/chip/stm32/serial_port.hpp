@@ -6,6 +6,7 @@
 #include "hal/byte_stream.hpp"
 #include "hal/chip/stm32/dma_ring_index.hpp"
 #include "hal/chip/stm32/registers_stm32f412.hpp"
+#include "hal/chip/stm32/usart_registers.hpp"
 
 #include <array>
 #include <cstddef>
@@ -14,8 +15,9 @@
 
 namespace tetap::hal::stm32 {
 
-namespace usart = stm32f412::usart;
 namespace dma = stm32f412::dma;
+
+enum class DmaDirection : std::uint8_t { kFromPeripheral = 0, kToPeripheral = 1 };
 
 /// One stream of a DMA controller, and the channel that it serves.
 template <class Registers>
@@ -24,10 +26,8 @@ class DmaStream {
   constexpr DmaStream(Registers registers, std::uint32_t number, std::uint32_t channel)
       : registers_{registers}, number_{number}, channel_{channel} {}
 
-  enum class Direction : std::uint8_t { kFromPeripheral = 0, kToPeripheral = 1 };
-
   /// Bytes between the peripheral's data register and memory, `count` of them, again and again when `circular`.
-  void start(Direction direction, std::uint32_t peripheral, std::uint32_t memory, std::uint32_t count,
+  void start(DmaDirection direction, std::uint32_t peripheral, std::uint32_t memory, std::uint32_t count,
              bool circular) const {
     stop();
     write(dma::sxpar::kOffset, peripheral);
@@ -85,21 +85,21 @@ class DmaStream {
 };
 
 /// `ReceiveSize`: bytes of the ring; more than that between two reads are counted as lapped.
-template <class Registers, class Lock, std::size_t ReceiveSize, std::size_t TransmitSize>
+template <class Registers, class Lock, std::size_t ReceiveSize, std::size_t TransmitSize,
+          class Stream = DmaStream<Registers>, class Usart = UsartOfF4>
 class SerialPort {
  public:
-  constexpr SerialPort(Registers registers, std::uint32_t data_address, DmaStream<Registers> receive,
-                       DmaStream<Registers> transmit)
-      : registers_{registers}, data_address_{data_address}, receive_{receive}, transmit_{transmit} {}
+  /// `address`: that of the USART, as DMA sees it.
+  constexpr SerialPort(Registers registers, std::uint32_t address, Stream receive, Stream transmit)
+      : registers_{registers}, address_{address}, receive_{receive}, transmit_{transmit} {}
 
   void start(std::uint32_t clock_hz, std::uint32_t baud) {
     clock_hz_ = clock_hz;
-    registers_.write(usart::cr1::kOffset, 0);
-    registers_.write(usart::cr2::kOffset, 0);
-    registers_.write(usart::brr::kOffset, divider(baud));
-    registers_.write(usart::cr1::kOffset, usart::cr1::kUe.mask() | usart::cr1::kTe.mask() | usart::cr1::kRe.mask());
-    registers_.write(usart::cr3::kOffset,
-                     usart::cr3::kDmar.mask() | usart::cr3::kDmat.mask() | usart::cr3::kEie.mask());
+    registers_.write(Usart::kControl1, 0);
+    registers_.write(Usart::kControl2, 0);
+    registers_.write(Usart::kBaudRate, divider(baud));
+    registers_.write(Usart::kControl1, Usart::kEnable | usart::cr1::kTe.mask() | usart::cr1::kRe.mask());
+    registers_.write(Usart::kControl3, usart::cr3::kDmar.mask() | usart::cr3::kDmat.mask() | usart::cr3::kEie.mask());
     begin_receiving();
   }
 
@@ -126,8 +126,8 @@ class SerialPort {
     const std::size_t count = out.size() < TransmitSize ? out.size() : TransmitSize;
     for (std::size_t i = 0; i < count; ++i) message_[i] = out[i];
     // TC is cleared: from here on it stands for this message's last bit.
-    registers_.write(usart::sr::kOffset, ~usart::sr::kTc.mask());
-    transmit_.start(Stream::Direction::kToPeripheral, data_address_, address_of(message_.data()),
+    Usart::clear_completed(registers_);
+    transmit_.start(DmaDirection::kToPeripheral, address_ + Usart::kTransmitData, address_of(message_.data()),
                     static_cast<std::uint32_t>(count), false);
     sending_ = true;
     return count;
@@ -148,18 +148,17 @@ class SerialPort {
     rounds_ = rounds_ + 1;
   }
 
-  /// The USART's interrupt, of errors alone: reading SR and then DR clears them, once DMA has taken the byte.
+  /// The USART's interrupt, of errors alone, which are cleared once DMA has taken the byte.
   void on_error_interrupt() {
-    const std::uint32_t status = registers_.read(usart::sr::kOffset);
-    for (int i = 0; i < kPatience && usart::sr::kRxne.of(registers_.read(usart::sr::kOffset)) != 0; ++i) {
+    const std::uint32_t status = registers_.read(Usart::kStatus);
+    for (int i = 0; i < kPatience && usart::sr::kRxne.of(registers_.read(Usart::kStatus)) != 0; ++i) {
     }
-    static_cast<void>(registers_.read(usart::dr::kOffset));
+    Usart::clear_errors(registers_);
     if (usart::sr::kOre.of(status) != 0) overruns_ = overruns_ + 1;
     if ((status & (usart::sr::kFe.mask() | usart::sr::kNf.mask())) != 0) damaged_ = damaged_ + 1;
   }
 
  private:
-  using Stream = DmaStream<Registers>;
   static constexpr int kPatience = 100;  ///< reads in which DMA must have served a request
 
   /// Sixteen samples a bit: BRR is the clock divided by the baud rate, with four fractional bits of the mantissa.
@@ -179,7 +178,8 @@ class SerialPort {
 
   void begin_receiving() {
     const Lock lock;
-    receive_.start(Stream::Direction::kFromPeripheral, data_address_, address_of(ring_.data()), ReceiveSize, true);
+    receive_.start(DmaDirection::kFromPeripheral, address_ + Usart::kReceiveData, address_of(ring_.data()), ReceiveSize,
+                   true);
     rounds_ = 0;
     taken_ = 0;
     index_.restart();
@@ -187,20 +187,20 @@ class SerialPort {
 
   /// Ends a message whose last bit is out, and changes the baud rate between two messages.
   void serve() {
-    if (sending_ && transmit_.completed() && usart::sr::kTc.of(registers_.read(usart::sr::kOffset)) != 0) {
+    if (sending_ && transmit_.completed() && usart::sr::kTc.of(registers_.read(Usart::kStatus)) != 0) {
       transmit_.stop();
       sending_ = false;
     }
     if (sending_ || new_baud_ == 0) return;
-    registers_.write(usart::cr1::kOffset, 0);
-    registers_.write(usart::brr::kOffset, divider(new_baud_));
-    registers_.write(usart::cr1::kOffset, usart::cr1::kUe.mask() | usart::cr1::kTe.mask() | usart::cr1::kRe.mask());
+    registers_.write(Usart::kControl1, 0);
+    registers_.write(Usart::kBaudRate, divider(new_baud_));
+    registers_.write(Usart::kControl1, Usart::kEnable | usart::cr1::kTe.mask() | usart::cr1::kRe.mask());
     new_baud_ = 0;
     begin_receiving();
   }
 
   Registers registers_;
-  std::uint32_t data_address_;  ///< address of the USART's DR, as DMA sees it
+  std::uint32_t address_;
   Stream receive_;
   Stream transmit_;
   std::uint32_t clock_hz_ = 0;

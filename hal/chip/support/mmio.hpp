@@ -18,6 +18,15 @@ struct Mmio {
     // NOLINTNEXTLINE(performance-no-int-to-ptr): the same
     *reinterpret_cast<volatile std::uint32_t*>(base + offset) = value;
   }
+  /// For registers whose access size counts.
+  [[nodiscard]] std::uint8_t read_byte(std::uint32_t offset) const {
+    // NOLINTNEXTLINE(performance-no-int-to-ptr): the same
+    return *reinterpret_cast<const volatile std::uint8_t*>(base + offset);
+  }
+  void write_byte(std::uint32_t offset, std::uint8_t value) const {
+    // NOLINTNEXTLINE(performance-no-int-to-ptr): the same
+    *reinterpret_cast<volatile std::uint8_t*>(base + offset) = value;
+  }
 };
 
 }  // namespace tetap::hal
