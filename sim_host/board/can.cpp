@@ -57,12 +57,8 @@ std::int64_t Can::bit_rate() const {
   return clock_hz_() / (std::int64_t{reg::btr::kBrp.of(btr_)} + 1) / quanta;
 }
 
-// ISO 11898-1, oscillator tolerance: df <= SJW / (20 NBT) and df <= PS / (2 (13 NBT - PS2)). Both hold for each of two
-// nodes that differ in opposite directions. The other nodes here are exact.
 double Can::rate_tolerance() const {
-  const double ts1 = reg::btr::kTs1.of(btr_) + 1.0, ts2 = reg::btr::kTs2.of(btr_) + 1.0;
-  const double quanta = 1 + ts1 + ts2, jump = reg::btr::kSjw.of(btr_) + 1.0;
-  return 2 * std::min(jump / (20 * quanta), std::min(ts1, ts2) / (2 * (13 * quanta - ts2)));
+  return rate_tolerance_of(reg::btr::kTs1.of(btr_) + 1.0, reg::btr::kTs2.of(btr_) + 1.0, reg::btr::kSjw.of(btr_) + 1.0);
 }
 
 std::uint32_t Can::msr() const {

@@ -73,6 +73,11 @@ std::uint64_t arbitration_key(const base::CanFrame& frame, bool remote) {
   return std::uint64_t{frame.id >> 18} << 21 | 3ULL << 19 | std::uint64_t{frame.id & 0x3FFFF} << 1 | rtr;
 }
 
+double rate_tolerance_of(double segment1, double segment2, double jump) {
+  const double quanta = 1 + segment1 + segment2;
+  return 2 * std::min(jump / (20 * quanta), std::min(segment1, segment2) / (2 * (13 * quanta - segment2)));
+}
+
 CanLine::CanLine(Scheduler& scheduler, CanController& controller)
     : scheduler_(scheduler),
       controller_(controller),

@@ -19,6 +19,11 @@ namespace tetap::board {
 /// Value that arbitration compares: the lower one wins. Standard before extended with the same first 11 bits.
 [[nodiscard]] std::uint64_t arbitration_key(const base::CanFrame& frame, bool remote);
 
+/// Relative difference to the bus's rate that a bit timing takes, all in time quanta. ISO 11898-1, oscillator
+/// tolerance: df <= SJW / (20 NBT) and df <= min(PS1, PS2) / (2 (13 NBT - PS2)) for each of two nodes that differ in
+/// opposite directions; the other nodes here are exact.
+[[nodiscard]] double rate_tolerance_of(double segment1, double segment2, double jump);
+
 struct CanOffer {
   base::CanFrame frame{};
   bool remote = false;

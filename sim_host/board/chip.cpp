@@ -2,18 +2,14 @@
 #include "sim_host/board/chip.hpp"
 
 #include "hal/chip/arm/cortex_m4.hpp"
-#include "hal/chip/stm32/registers_stm32f412.hpp"
 
 #include <cstdio>
 
 namespace tetap::board {
 
-namespace reg = hal::stm32f412;
 namespace m4 = hal::cortex_m4;
 
 namespace {
-
-constexpr std::uint32_t kPeripherals = 0x4000'0000;
 
 std::string hex(std::uint32_t value) {
   char text[16];
@@ -21,110 +17,39 @@ std::string hex(std::uint32_t value) {
   return text;
 }
 
-constexpr Usart::Wiring kUsart1{
-    Signal::kUsart1Tx,     Signal::kUsart1Rx,    {'A', 15}, {'B', 3}, reg::interrupt::kUsart1,
-    DmaRequest::kUsart1Tx, DmaRequest::kUsart1Rx};
-constexpr Usart::Wiring kUsart2{
-    Signal::kUsart2Tx,     Signal::kUsart2Rx,    {'A', 2}, {'A', 3}, reg::interrupt::kUsart2,
-    DmaRequest::kUsart2Tx, DmaRequest::kUsart2Rx};
-constexpr Spi::Wiring kSpi1{Signal::kSpi1Sck, Signal::kSpi1Miso,     Signal::kSpi1Mosi,   {'A', 5},           {'A', 6},
-                            {'A', 7},         reg::interrupt::kSpi1, DmaRequest::kSpi1Tx, DmaRequest::kSpi1Rx};
-constexpr Spi::Wiring kSpi2{Signal::kSpi2Sck, Signal::kSpi2Miso,     Signal::kSpi2Mosi,   {'B', 13},          {'B', 14},
-                            {'B', 15},        reg::interrupt::kSpi2, DmaRequest::kSpi2Tx, DmaRequest::kSpi2Rx};
-constexpr EncoderTimer::Wiring kTim2{Signal::kTim2Ch1, Signal::kTim2Ch2, {'A', 0}, {'A', 1}, reg::interrupt::kTim2, 32};
-constexpr EncoderTimer::Wiring kTim3{Signal::kTim3Ch1, Signal::kTim3Ch2, {'B', 4}, {'B', 5}, reg::interrupt::kTim3, 16};
-
 }  // namespace
 
-Chip::Chip(const Oscillators& oscillators)
-    : core(around_, clock, nvic),
-      pwr(around_),
-      flash(around_),
-      rcc(around_, oscillators, pwr, flash),
-      pins(around_),
-      syscfg(around_),
-      exti(around_, pins, syscfg),
-      dma1(around_, 1, reg::dma::kDma1, memory),
-      dma2(around_, 2, reg::dma::kDma2, memory),
-      usart1(
-          around_, "USART1", reg::usart::kUsart1, pins, kUsart1, [this] { return rcc.apb2_hz(); },
-          [this](DmaRequest request) { return dma2.serve(request); }),
-      usart2(
-          around_, "USART2", reg::usart::kUsart2, pins, kUsart2, [this] { return rcc.apb1_hz(); },
-          [this](DmaRequest request) { return dma1.serve(request); }),
-      spi1(
-          around_, "SPI1", reg::spi::kSpi1, pins, kSpi1, [this] { return rcc.apb2_hz(); },
-          [this](DmaRequest request) { return dma2.serve(request); }),
-      spi2(
-          around_, "SPI2", reg::spi::kSpi2, pins, kSpi2, [this] { return rcc.apb1_hz(); },
-          [this](DmaRequest request) { return dma1.serve(request); }),
-      tim2(around_, "TIM2", reg::tim::kTim2, pins, kTim2, [this] { return rcc.apb1_timer_hz(); }),
-      tim3(around_, "TIM3", reg::tim::kTim3, pins, kTim3, [this] { return rcc.apb1_timer_hz(); }),
-      can1(around_, pins, [this] { return rcc.apb1_hz(); }),
-      iwdg(around_, [this] { return rcc.lsi_hz(); }) {
-  add_blocks();
-  connect();
-  clock.change(0, rcc.hclk_hz());
-  rcc.add_reset_flags(ResetCause::kPowerOn);
+Chip::Chip(const MemoryLayout& layout, std::span<const BusWindow> windows)
+    : memory(layout), core(around_, clock, nvic), windows_(windows.begin(), windows.end()) {
+  for (const BusWindow& one : windows_) map_.emplace_back(one.size / 0x400, nullptr);
 }
 
-void Chip::add_blocks() {
-  const auto ahb1 = [this](Peripheral& block, hal::Field enable, hal::Field reset) {
-    rcc.add_block(block, reg::rcc::ahb1enr::kOffset, enable.mask(), reg::rcc::ahb1rstr::kOffset, reset.mask());
-  };
-  const auto apb1 = [this](Peripheral& block, hal::Field enable, hal::Field reset) {
-    rcc.add_block(block, reg::rcc::apb1enr::kOffset, enable.mask(), reg::rcc::apb1rstr::kOffset, reset.mask());
-  };
-  const auto apb2 = [this](Peripheral& block, hal::Field enable, hal::Field reset) {
-    rcc.add_block(block, reg::rcc::apb2enr::kOffset, enable.mask(), reg::rcc::apb2rstr::kOffset, reset.mask());
-  };
-  ahb1(pins.port('A'), reg::rcc::ahb1enr::kGpioaen, reg::rcc::ahb1rstr::kGpioarst);
-  ahb1(pins.port('B'), reg::rcc::ahb1enr::kGpioben, reg::rcc::ahb1rstr::kGpiobrst);
-  ahb1(pins.port('C'), reg::rcc::ahb1enr::kGpiocen, reg::rcc::ahb1rstr::kGpiocrst);
-  ahb1(dma1, reg::rcc::ahb1enr::kDma1en, reg::rcc::ahb1rstr::kDma1rst);
-  ahb1(dma2, reg::rcc::ahb1enr::kDma2en, reg::rcc::ahb1rstr::kDma2rst);
-  apb1(tim2, reg::rcc::apb1enr::kTim2en, reg::rcc::apb1rstr::kTim2rst);
-  apb1(tim3, reg::rcc::apb1enr::kTim3en, reg::rcc::apb1rstr::kTim3rst);
-  apb1(spi2, reg::rcc::apb1enr::kSpi2en, reg::rcc::apb1rstr::kSpi2rst);
-  apb1(usart2, reg::rcc::apb1enr::kUsart2en, reg::rcc::apb1rstr::kUart2rst);
-  apb1(can1, reg::rcc::apb1enr::kCan1en, reg::rcc::apb1rstr::kCan1rst);
-  apb1(pwr, reg::rcc::apb1enr::kPwren, reg::rcc::apb1rstr::kPwrrst);
-  apb2(usart1, reg::rcc::apb2enr::kUsart1en, reg::rcc::apb2rstr::kUsart1rst);
-  apb2(spi1, reg::rcc::apb2enr::kSpi1en, reg::rcc::apb2rstr::kSpi1rst);
-  apb2(syscfg, reg::rcc::apb2enr::kSyscfgen, reg::rcc::apb2rstr::kSyscfgrst);
-  const std::initializer_list<Peripheral*> all = {
-      &rcc,  &pwr,    &flash,  &pins.port('A'), &pins.port('B'), &pins.port('C'), &syscfg, &exti, &dma1,
-      &dma2, &usart1, &usart2, &spi1,           &spi2,           &tim2,           &tim3,   &can1, &iwdg};
-  for (Peripheral* block : all) map_[(block->base() - kPeripherals) / 0x400] = block;
-}
-
-void Chip::connect() {
-  for (Dma* dma : {&dma1, &dma2}) {
-    dma->bus_read = [this](std::uint32_t address, int size) {
-      std::uint32_t value = 0;
-      (void)read(address, size, value);
-      return value;
-    };
-    dma->bus_write = [this](std::uint32_t address, std::uint32_t value, int size) {
-      (void)write(address, size, value);
-    };
-    dma->clocked = [this, dma] { return rcc.clocked(*dma); };
+void Chip::place(Peripheral& block, std::uint32_t size) {
+  blocks_.push_back(&block);
+  for (std::size_t i = 0; i < windows_.size(); ++i) {
+    const std::uint32_t offset = block.base() - windows_[i].base;
+    for (std::uint32_t at = 0; at < size && offset < windows_[i].size; at += 0x400)
+      map_[i][(offset + at) / 0x400] = &block;
   }
-  dma2.on_enable = [this] { usart1.raise_requests(), spi1.raise_requests(); };
-  dma1.on_enable = [this] { usart2.raise_requests(), spi2.raise_requests(); };
-  flash.on_change = [this] { rcc.check_limits(); };
-  rcc.on_change = [this] {
-    if (rcc.hclk_hz() == clock.hz()) return;
-    clock.change(scheduler.now(), rcc.hclk_hz());
+}
+
+void Chip::start() {
+  clocks().on_change = [this] {
+    if (clocks().hclk_hz() == clock.hz()) return;
+    clock.change(scheduler.now(), clocks().hclk_hz());
     core.systick().replan();
   };
   core.on_reset_request = [this] { pending_reset = ResetCause::kSoftware; };
-  iwdg.on_expired = [this] { pending_reset = ResetCause::kWatchdog; };
+  clock.change(0, clocks().hclk_hz());
+  clocks().add_reset_flags(ResetCause::kPowerOn);
 }
 
-Peripheral* Chip::find(std::uint32_t address) {
-  const std::uint32_t index = (address - kPeripherals) / 0x400;
-  return address >= kPeripherals && index < map_.size() ? map_[index] : nullptr;
+Peripheral* Chip::find(std::uint32_t address) const {
+  for (std::size_t i = 0; i < windows_.size(); ++i) {
+    const std::uint32_t offset = address - windows_[i].base;
+    if (offset < windows_[i].size) return map_[i][offset / 0x400];
+  }
+  return nullptr;
 }
 
 bool Chip::check(const Peripheral& block, std::uint32_t address, int size, const char* verb) {
@@ -134,7 +59,7 @@ bool Chip::check(const Peripheral& block, std::uint32_t address, int size, const
     return false;
   }
   if ((block.widths() & size) == 0) complaints.add(block.name(), where + ": the registers do not take this width");
-  if (rcc.clocked(block)) return true;
+  if (clocks().clocked(block)) return true;
   complaints.add(block.name(), where + " without clock");
   return false;
 }
@@ -157,7 +82,7 @@ bool Chip::read(std::uint32_t address, int size, std::uint32_t& value) {
     return false;
   }
   if (!check(*block, address, size, "read")) return true;
-  value = block->read((address & ~3U) - block->base()) >> inside & mask;
+  value = block->read_part((address & ~3U) - block->base(), mask << inside) >> inside & mask;
   return true;
 }
 
@@ -184,12 +109,12 @@ bool Chip::write(std::uint32_t address, int size, std::uint32_t value) {
 }
 
 void Chip::system_reset(ResetCause cause) {
-  for (Peripheral* block : map_) {
-    if (block != nullptr && block != &rcc) block->reset();
+  for (Peripheral* block : blocks_) {
+    if (block != &clocks()) block->reset();
   }
   core.reset();
-  rcc.reset();
-  rcc.add_reset_flags(cause);
+  clocks().reset();
+  clocks().add_reset_flags(cause);
   pending_reset.reset();
 }
 

@@ -1,30 +1,32 @@
 // SPDX-License-Identifier: Apache-2.0
-// The STM32F412CG without its core: blocks, bus, clocks, interrupts. A test drives it by read(), write() and advance();
-// the machine executes an image on it.
+// What all chips with a Cortex-M4 have: memory, bus, interrupts, time. A test drives a chip by read(), write() and
+// advance(); the machine executes an image on it.
 #pragma once
 
-#include "sim_host/board/can.hpp"
-#include "sim_host/board/dma.hpp"
-#include "sim_host/board/encoder_timer.hpp"
-#include "sim_host/board/exti.hpp"
-#include "sim_host/board/gpio.hpp"
-#include "sim_host/board/iwdg.hpp"
+#include "sim_host/board/can_line.hpp"
+#include "sim_host/board/clock_controller.hpp"
 #include "sim_host/board/memory.hpp"
 #include "sim_host/board/nvic.hpp"
-#include "sim_host/board/rcc.hpp"
-#include "sim_host/board/spi.hpp"
 #include "sim_host/board/system_control.hpp"
-#include "sim_host/board/usart.hpp"
 
-#include <array>
 #include <cstdint>
 #include <optional>
+#include <span>
+#include <vector>
 
 namespace tetap::board {
 
+/// Addresses of the bus at which blocks lie.
+struct BusWindow {
+  std::uint32_t base, size;
+};
+
+class Iwdg;
+class Spi;
+
 class Chip {
  public:
-  explicit Chip(const Oscillators& oscillators = {});
+  virtual ~Chip() = default;
   Chip(const Chip&) = delete;
   Chip& operator=(const Chip&) = delete;
 
@@ -35,28 +37,24 @@ class Chip {
   Nvic nvic;
   Memory memory;
 
- private:
+ protected:
   Surroundings around_{scheduler, complaints, nvic};
 
  public:
   SystemControl core;
-  Pwr pwr;
-  FlashInterface flash;
-  Rcc rcc;
-  Pins pins;
-  Syscfg syscfg;
-  Exti exti;
-  Dma dma1, dma2;
-  Usart usart1, usart2;
-  Spi spi1, spi2;
-  EncoderTimer tim2, tim3;
-  Can can1;
-  Iwdg iwdg;
+
+  [[nodiscard]] virtual ClockController& clocks() = 0;
+  /// The bus at the first CAN controller.
+  [[nodiscard]] virtual CanLine& can_line() = 0;
+  /// The first SPI master.
+  [[nodiscard]] virtual Spi& spi() = 0;
+  [[nodiscard]] virtual Iwdg& watchdog() = 0;
 
   /// Register access of the core or of a test; `size` 1, 2 or 4 bytes. A place without a block reads 0 and is a
   /// complaint; the result is false.
   bool read(std::uint32_t address, int size, std::uint32_t& value);
   bool write(std::uint32_t address, int size, std::uint32_t value);
+  [[nodiscard]] std::span<const BusWindow> windows() const { return windows_; }
 
   /// Register words, for tests.
   [[nodiscard]] std::uint32_t word(std::uint32_t address) {
@@ -72,13 +70,20 @@ class Chip {
   /// A reset was asked for by software or watchdog and waits for the machine.
   std::optional<ResetCause> pending_reset;
 
+ protected:
+  Chip(const MemoryLayout& layout, std::span<const BusWindow> windows);
+  /// `block` answers from its base on, for `size` bytes of whole kilobytes.
+  void place(Peripheral& block, std::uint32_t size = 0x400);
+  /// The core follows the clocks; called once all blocks are made.
+  void start();
+
  private:
-  Peripheral* find(std::uint32_t address);
-  void add_blocks();
-  void connect();
+  [[nodiscard]] Peripheral* find(std::uint32_t address) const;
   bool check(const Peripheral& block, std::uint32_t address, int size, const char* verb);
 
-  std::array<Peripheral*, 512> map_{};  ///< by address - 0x40000000, 1 KiB each
+  std::vector<BusWindow> windows_;
+  std::vector<std::vector<Peripheral*>> map_;  ///< per window, 1 KiB each
+  std::vector<Peripheral*> blocks_;
 };
 
 }  // namespace tetap::board

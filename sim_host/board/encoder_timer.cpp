@@ -44,6 +44,8 @@ void EncoderTimer::check() {
   if (reg::ccmr1_input::kCc1s.of(ccmr1_) != 1 || reg::ccmr1_input::kCc2s.of(ccmr1_) != 1) {
     complain("encoder mode with CC1S or CC2S other than 01: the lines do not reach the counter");
   }
+  if ((smcr_ >> 16) != 0) complain("SMCR above bit 15 selects modes that are not modelled");
+  if (on_start) on_start();
   if (psc_ != 0) complain("encoder mode with PSC other than 0: edges are divided");
   if (arr_ != full()) complain("encoder mode with ARR below full width: the count jumps");
   if (sms() != 3) complain("encoder mode on one line only: half of the edges are lost");
@@ -123,6 +125,7 @@ void EncoderTimer::write(std::uint32_t offset, std::uint32_t value, std::uint32_
   switch (offset) {
     case reg::cr1::kOffset: {
       const bool was = reg::cr1::kCen.of(cr1_) != 0;
+      if ((value & mask & ~0x3FFU) != 0) complain("CR1 above bit 9 selects modes that are not modelled");
       merge(cr1_, value & 0x3FF, mask);
       if (reg::cr1::kCen.of(cr1_) != 0 && !was) check();
       break;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A general-purpose timer in encoder mode. RM0402 chapter "General-purpose timers (TIM2 to TIM5)", section "Encoder
+// A general-purpose timer in encoder mode. RM0440 chapter "General-purpose timers (TIM2/TIM3/TIM4/TIM5)" adds modes to
+// the same registers, which are not modelled. RM0402 chapter "General-purpose timers (TIM2 to TIM5)", section "Encoder
 // interface mode" with its table of counting direction against edges.
 #pragma once
 
@@ -31,6 +32,8 @@ class EncoderTimer final : public Peripheral {
 
   /// The shaft; the model looks at it whenever a register is used. Empty: unplugged, the lines stand still.
   EncoderPosition position;
+  /// Looks at what else the lines need when the counter is switched on; empty: nothing.
+  std::function<void()> on_start;
   /// Time that a level must last behind the input filter that is set (IC1F); the model does not apply it.
   [[nodiscard]] Picoseconds filter_time() const;
 

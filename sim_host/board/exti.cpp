@@ -7,7 +7,7 @@ namespace tetap::board {
 
 namespace reg = hal::stm32f412;
 
-Syscfg::Syscfg(Surroundings around) : Peripheral(around, "SYSCFG", reg::syscfg::kSyscfg, kBytes) {}
+Syscfg::Syscfg(Surroundings around, std::uint32_t base) : Peripheral(around, "SYSCFG", base, kBytes) {}
 
 std::uint32_t Syscfg::read(std::uint32_t offset) {
   const std::uint32_t index = (offset - reg::syscfg::exticrx::kOffset) / 4;
@@ -23,13 +23,14 @@ char Syscfg::port_of(int line) const {
   return static_cast<char>('A' + (exticr_[static_cast<std::size_t>(line / 4)] >> 4 * (line % 4) & 0xF));
 }
 
-Exti::Exti(Surroundings around, Pins& pins, const Syscfg& syscfg)
-    : Peripheral(around, "EXTI", reg::exti::kExti, kWords), syscfg_(syscfg) {
+Exti::Exti(Surroundings around, Pins& pins, const Syscfg& syscfg, const Layout& layout)
+    : Peripheral(around, "EXTI", layout.base, kWords), syscfg_(syscfg), layout_(layout), imr_(layout.imr_reset) {
   pins.watch_all([this](Pin pin, bool level) { edge(pin, level); });
 }
 
 void Exti::reset() {
-  imr_ = emr_ = rtsr_ = ftsr_ = swier_ = pr_ = 0;
+  emr_ = rtsr_ = ftsr_ = swier_ = pr_ = 0;
+  imr_ = layout_.imr_reset;
   update();
 }
 
@@ -69,7 +70,7 @@ std::uint32_t Exti::read(std::uint32_t offset) {
 }
 
 void Exti::write(std::uint32_t offset, std::uint32_t value, std::uint32_t mask) {
-  value &= mask & 0x007F'FFFF;
+  value &= mask & layout_.lines;
   switch (offset) {
     case reg::exti::imr::kOffset:
       imr_ = value;

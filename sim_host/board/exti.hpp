@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // External interrupts of pins (EXTI lines 0 to 15) and their port selection in SYSCFG. RM0402 chapters "Interrupts and
-// events" (EXTI) and "System configuration controller".
+// events" (EXTI) and "System configuration controller"; RM0440 chapters EXTI and SYSCFG, whose IMR1 to PR1 and EXTICR1
+// to EXTICR4 lie at the same offsets.
 #pragma once
 
 #include "sim_host/board/gpio.hpp"
@@ -13,7 +14,7 @@ namespace tetap::board {
 
 class Syscfg final : public Peripheral {
  public:
-  explicit Syscfg(Surroundings around);
+  Syscfg(Surroundings around, std::uint32_t base);
   std::uint32_t read(std::uint32_t offset) override;
   void write(std::uint32_t offset, std::uint32_t value, std::uint32_t mask) override;
   void reset() override { exticr_ = {}; }
@@ -26,7 +27,12 @@ class Syscfg final : public Peripheral {
 
 class Exti final : public Peripheral {
  public:
-  Exti(Surroundings around, Pins& pins, const Syscfg& syscfg);
+  struct Layout {
+    std::uint32_t base;
+    std::uint32_t lines;      ///< lines of the first 32 that are there
+    std::uint32_t imr_reset;  ///< IMR after reset
+  };
+  Exti(Surroundings around, Pins& pins, const Syscfg& syscfg, const Layout& layout);
   std::uint32_t read(std::uint32_t offset) override;
   void write(std::uint32_t offset, std::uint32_t value, std::uint32_t mask) override;
   void reset() override;
@@ -36,6 +42,7 @@ class Exti final : public Peripheral {
   void update();
 
   const Syscfg& syscfg_;
+  Layout layout_;
   std::uint32_t imr_ = 0, emr_ = 0, rtsr_ = 0, ftsr_ = 0, swier_ = 0, pr_ = 0;
 };
 

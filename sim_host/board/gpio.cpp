@@ -7,21 +7,21 @@ namespace tetap::board {
 
 namespace reg = hal::stm32f412::gpio;
 
-GpioPort::GpioPort(Surroundings around, char letter, std::uint32_t base, std::function<void(Pin)> on_change)
-    : Peripheral(around, std::string("GPIO") + letter, base, kBytes),
-      letter_(letter),
+namespace {
+constexpr std::uint32_t kBrr = 0x28;  // RM0440, GPIOx_BRR; reserved on the STM32F412
+}
+
+GpioPort::GpioPort(Surroundings around, const GpioPortLayout& layout, std::function<void(Pin)> on_change)
+    : Peripheral(around, std::string("GPIO") + layout.letter, layout.base, kBytes),
+      layout_(layout),
       on_change_(std::move(on_change)) {
   reset();
 }
 
 void GpioPort::reset() {
-  moder_ = letter_ == 'A'   ? reg::moder::kResetValueGpioa
-           : letter_ == 'B' ? reg::moder::kResetValueGpiob
-                            : reg::moder::kResetValueGpioc;
-  ospeedr_ = letter_ == 'B' ? reg::ospeedr::kResetValueGpiob : 0;
-  pupdr_ = letter_ == 'A'   ? reg::pupdr::kResetValueGpioa
-           : letter_ == 'B' ? reg::pupdr::kResetValueGpiob
-                            : reg::pupdr::kResetValueGpioc;
+  moder_ = layout_.moder;
+  ospeedr_ = layout_.ospeedr;
+  pupdr_ = layout_.pupdr;
   otyper_ = odr_ = 0;
   afr_ = {};
   changed(0xFFFF);
@@ -51,9 +51,9 @@ void GpioPort::changed(std::uint32_t pins) {
     if ((pins >> pin & 1) == 0) continue;
     const auto& driven = driven_[static_cast<std::size_t>(pin)];
     if (mode(pin) == Mode::kOutput && driven && (otyper_ >> pin & 1) == 0) {
-      complain(Pin{letter_, pin}.name() + " is an output, but another chip drives it");
+      complain(Pin{layout_.letter, pin}.name() + " is an output, but another chip drives it");
     }
-    on_change_({letter_, pin});
+    on_change_({layout_.letter, pin});
   }
 }
 
@@ -121,23 +121,23 @@ void GpioPort::write(std::uint32_t offset, std::uint32_t value, std::uint32_t ma
       return merge(afr_[0], value, mask);
     case reg::afrh::kOffset:
       return merge(afr_[1], value, mask);
+    case kBrr:
+      return write_outputs(odr_ & ~(value & mask & 0xFFFF));
     default:
       return;
   }
 }
 
-Pins::Pins(Surroundings around) {
-  constexpr std::uint32_t kBases[] = {reg::kGpioa, reg::kGpiob, reg::kGpioc};
-  for (std::size_t i = 0; i < ports_.size(); ++i) {
-    const auto letter = static_cast<char>('A' + i);
-    ports_[i] = std::make_unique<GpioPort>(around, letter, kBases[i], [this](Pin pin) { changed(pin); });
-  }
+Pins::Pins(Surroundings around, std::span<const GpioPortLayout> ports, std::span<const PinFunction> functions)
+    : functions_(functions), ports_(ports.size()) {
+  for (std::size_t i = 0; i < ports_.size(); ++i)
+    ports_[i] = std::make_unique<GpioPort>(around, ports[i], [this](Pin pin) { changed(pin); });
 }
 
 bool Pins::carries(Pin pin, Signal signal) const {
   const GpioPort& at = port(pin.port);
   if (at.mode(pin.number) != GpioPort::Mode::kAlternate) return false;
-  for (const PinFunction& one : kPinFunctions) {
+  for (const PinFunction& one : functions_) {
     if (one.signal == signal && one.pin == pin) return at.alternate(pin.number) == one.alternate;
   }
   return false;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// GPIO ports with alternate functions and the levels of the pins. RM0402 chapter "General-purpose I/Os"; reset values
-// of the SVD: PA13, PA14, PA15, PB3 and PB4 belong to the debug port (AF0).
+// GPIO ports with alternate functions and the levels of the pins. RM0402 chapter "General-purpose I/Os" and RM0440
+// chapter of the same name, whose port has BRR besides; reset values of the SVDs: PA13, PA14, PA15, PB3 and PB4 belong
+// to the debug port (AF0).
 #pragma once
 
 #include "sim_host/board/peripheral.hpp"
@@ -11,13 +12,20 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 namespace tetap::board {
 
+/// A port's place and its registers after reset.
+struct GpioPortLayout {
+  char letter;
+  std::uint32_t base, moder, ospeedr, pupdr;
+};
+
 class GpioPort final : public Peripheral {
  public:
-  GpioPort(Surroundings around, char letter, std::uint32_t base, std::function<void(Pin)> on_change);
+  GpioPort(Surroundings around, const GpioPortLayout& layout, std::function<void(Pin)> on_change);
 
   std::uint32_t read(std::uint32_t offset) override;
   void write(std::uint32_t offset, std::uint32_t value, std::uint32_t mask) override;
@@ -35,7 +43,7 @@ class GpioPort final : public Peripheral {
   void write_outputs(std::uint32_t odr);
   void changed(std::uint32_t pins);
 
-  char letter_;
+  GpioPortLayout layout_;
   std::function<void(Pin)> on_change_;
   std::uint32_t moder_ = 0, otyper_ = 0, ospeedr_ = 0, pupdr_ = 0, odr_ = 0;
   std::array<std::uint32_t, 2> afr_{};
@@ -45,7 +53,7 @@ class GpioPort final : public Peripheral {
 /// All pins: who is connected to which signal, and who wants to know of changes.
 class Pins {
  public:
-  explicit Pins(Surroundings around);
+  Pins(Surroundings around, std::span<const GpioPortLayout> ports, std::span<const PinFunction> functions);
 
   [[nodiscard]] GpioPort& port(char letter) { return *ports_[static_cast<std::size_t>(letter - 'A')]; }
   [[nodiscard]] const GpioPort& port(char letter) const { return *ports_[static_cast<std::size_t>(letter - 'A')]; }
@@ -68,7 +76,8 @@ class Pins {
   };
   void changed(Pin pin);
 
-  std::array<std::unique_ptr<GpioPort>, 3> ports_;
+  std::span<const PinFunction> functions_;
+  std::vector<std::unique_ptr<GpioPort>> ports_;  ///< from A on
   std::map<Pin, std::vector<Watcher>> watchers_;
   std::map<Pin, bool> last_;
   std::vector<std::function<void(Pin, bool)>> all_;

@@ -112,7 +112,7 @@ bool HardwareFaults::upset(HardwareFault fault) {
 }
 
 void HardwareFaults::add(const HardwareFaultSetting& setting, Picoseconds world_start) {
-  Scheduler& scheduler = board_.chip.scheduler;
+  Scheduler& scheduler = board_.processor.scheduler;
   alarms_.push_back(std::make_unique<Alarm>(scheduler, [this, setting] { begin(setting); }));
   alarms_.back()->set(world_start + setting.start);
   if (setting.duration == 0) return;
@@ -121,8 +121,8 @@ void HardwareFaults::add(const HardwareFaultSetting& setting, Picoseconds world_
 }
 
 void HardwareFaults::begin(const HardwareFaultSetting& setting) {
-  const Picoseconds now = board_.chip.scheduler.now();
-  CanLine& line = board_.chip.can1.line;
+  const Picoseconds now = board_.processor.scheduler.now();
+  CanLine& line = board_.processor.can_line();
   if (upset(setting.fault)) return;
   switch (setting.fault) {
     case HardwareFault::kImuDead:
@@ -166,7 +166,7 @@ void HardwareFaults::begin(const HardwareFaultSetting& setting) {
       break;
     case HardwareFault::kMisoLow:
     case HardwareFault::kMisoHigh:
-      board_.chip.spi1.stuck_miso = setting.fault == HardwareFault::kMisoHigh;
+      board_.processor.spi().stuck_miso = setting.fault == HardwareFault::kMisoHigh;
       break;
     default:
       break;
@@ -174,7 +174,7 @@ void HardwareFaults::begin(const HardwareFaultSetting& setting) {
 }
 
 void HardwareFaults::end(HardwareFault fault) {
-  CanLine& line = board_.chip.can1.line;
+  CanLine& line = board_.processor.can_line();
   switch (fault) {
     case HardwareFault::kImuDead:
       board_.imu.dead = false;
@@ -196,7 +196,7 @@ void HardwareFaults::end(HardwareFault fault) {
       break;
     case HardwareFault::kMisoLow:
     case HardwareFault::kMisoHigh:
-      board_.chip.spi1.stuck_miso.reset();
+      board_.processor.spi().stuck_miso.reset();
       break;
     default:
       break;
@@ -206,8 +206,8 @@ void HardwareFaults::end(HardwareFault fault) {
 
 void HardwareFaults::send_foreign(Picoseconds until, Picoseconds every) {
   std::uint8_t number = 0;
-  for (Picoseconds at = board_.chip.scheduler.now(); at < until; at += every)
-    board_.chip.can1.line.send({.id = foreign_id_, .size = 8, .data = {number++}}, at);
+  for (Picoseconds at = board_.processor.scheduler.now(); at < until; at += every)
+    board_.processor.can_line().send({.id = foreign_id_, .size = 8, .data = {number++}}, at);
 }
 
 }  // namespace tetap::board

@@ -3,7 +3,7 @@
 // power-on.
 #pragma once
 
-#include "sim_host/board/ark_cannode.hpp"
+#include "sim_host/board/board.hpp"
 #include "sim_host/board/machine.hpp"
 #include "sim_host/board/simulated_sensors.hpp"
 
@@ -63,7 +63,7 @@ struct HardwareFaultSetting {
 class HardwareFaults {
  public:
   /// `foreign_id`: identifier of kForeignFrames.
-  HardwareFaults(ArkCannode& board, Machine& machine, SimulatedSensors* sensors, std::uint32_t foreign_id) noexcept
+  HardwareFaults(Board& board, Machine& machine, SimulatedSensors* sensors, std::uint32_t foreign_id) noexcept
       : board_(board), machine_(machine), sensors_(sensors), foreign_id_(foreign_id) {}
   void add(const HardwareFaultSetting& setting, Picoseconds world_start);
 
@@ -73,7 +73,7 @@ class HardwareFaults {
   void send_foreign(Picoseconds until, Picoseconds every);
   [[nodiscard]] bool upset(HardwareFault fault);
 
-  ArkCannode& board_;
+  Board& board_;
   Machine& machine_;
   SimulatedSensors* sensors_;
   std::uint32_t foreign_id_;

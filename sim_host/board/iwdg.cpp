@@ -12,11 +12,12 @@ namespace reg = hal::stm32f412::iwdg;
 
 namespace {
 constexpr std::uint32_t kReload = 0xAAAA, kUnlock = 0x5555, kStart = 0xCCCC;  // RM0402, IWDG_KR
+constexpr std::uint32_t kWindow = 0x10, kNoWindow = 0xFFF;                    // RM0440, IWDG_WINR and its reset value
 constexpr std::int64_t kUpdateCycles = 5;                                     // RM0402, IWDG_SR: up to 5 cycles
 }  // namespace
 
-Iwdg::Iwdg(Surroundings around, std::function<std::int64_t()> lsi_hz)
-    : Peripheral(around, "IWDG", reg::kIwdg, kHalfWords),
+Iwdg::Iwdg(Surroundings around, std::uint32_t base, std::function<std::int64_t()> lsi_hz)
+    : Peripheral(around, "IWDG", base, kHalfWords),
       lsi_hz_(std::move(lsi_hz)),
       expires_(around.scheduler, [this] { on_expired(); }),
       prescaler_set_(around.scheduler, [this] { pr_ = next_pr_; }),
@@ -59,6 +60,7 @@ void Iwdg::write(std::uint32_t offset, std::uint32_t value, std::uint32_t) {
     }
     return;
   }
+  if (offset == kWindow && value != kNoWindow) return complain("the window is not modelled");
   const bool prescaler = offset == reg::pr::kOffset;
   if (!prescaler && offset != reg::rlr::kOffset) return;
   if (!unlocked_) return complain("PR or RLR written without the key 0x5555: ignored");

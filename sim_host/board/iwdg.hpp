@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Independent watchdog on the LSI, which lies between 17 and 47 kHz. RM0402 chapter "Independent watchdog".
+// Independent watchdog on the LSI, which lies between 17 and 47 kHz on the STM32F412. RM0402 and RM0440 chapters
+// "Independent watchdog"; the window register of the latter is not modelled.
 #pragma once
 
 #include "sim_host/board/peripheral.hpp"
@@ -11,7 +12,7 @@ namespace tetap::board {
 
 class Iwdg final : public Peripheral {
  public:
-  Iwdg(Surroundings around, std::function<std::int64_t()> lsi_hz);
+  Iwdg(Surroundings around, std::uint32_t base, std::function<std::int64_t()> lsi_hz);
   std::uint32_t read(std::uint32_t offset) override;
   void write(std::uint32_t offset, std::uint32_t value, std::uint32_t mask) override;
   /// System reset stops it; a started watchdog cannot be stopped otherwise.

@@ -24,7 +24,7 @@ constexpr int kStorm = 1000;  // entries in a row that only an uncleared interru
 constexpr std::uint32_t kCpacr = m4::kSystemControlSpace + m4::scb::kCpacr;
 
 // Code of upsets lies at the end of the SRAM, which no image of this board reaches.
-constexpr std::uint32_t kUpsetBytes = 16, kUpsetCode = Memory::kRam + Memory::kRamSize - 0x100;
+constexpr std::uint32_t kUpsetBytes = 16, kUpsetArea = 0x100;
 
 // Thumb encodings: ARM DDI 0403E.e A7.7. 0x60000000 is the external memory of chips that have more pins.
 std::vector<std::uint16_t> upset_code(Upset what) {
@@ -95,7 +95,10 @@ struct Machine::Engine {
 };
 
 Machine::Machine(Chip& chip, MachineOptions options)
-    : chip_(chip), options_(options), flash_blocks_(Memory::kFlashSize / 2), ram_blocks_(Memory::kRamSize / 2) {
+    : chip_(chip),
+      options_(options),
+      flash_blocks_(chip.memory.flash_size() / 2),
+      ram_blocks_(chip.memory.ram_size() / 2) {
   power_on();
 }
 
@@ -110,8 +113,17 @@ void Machine::power_on() {
   map(0, chip_.memory.flash(), UC_PROT_READ | UC_PROT_EXEC);
   map(Memory::kFlash, chip_.memory.flash(), UC_PROT_READ | UC_PROT_EXEC);
   map(Memory::kRam, chip_.memory.ram(), UC_PROT_ALL);
-  fine = fine && uc_mmio_map(uc_, 0x4000'0000, 0x8'0000, Engine::read<0x4000'0000>, this, Engine::write<0x4000'0000>,
-                             this) == UC_ERR_OK;
+  if (chip_.memory.layout().alias_size != 0) map(chip_.memory.layout().alias, chip_.memory.aliased(), UC_PROT_ALL);
+  for (const BusWindow& window : chip_.windows()) {
+    if (window.base == 0x4800'0000) {
+      fine = fine && uc_mmio_map(uc_, window.base, window.size, Engine::read<0x4800'0000>, this,
+                                 Engine::write<0x4800'0000>, this) == UC_ERR_OK;
+    } else {
+      fine = fine && window.base == 0x4000'0000 &&
+             uc_mmio_map(uc_, window.base, window.size, Engine::read<0x4000'0000>, this, Engine::write<0x4000'0000>,
+                         this) == UC_ERR_OK;
+    }
+  }
   fine = fine && uc_mmio_map(uc_, 0xE000'0000, 0x10'0000, Engine::read<0xE000'0000>, this, Engine::write<0xE000'0000>,
                              this) == UC_ERR_OK;
   const auto hook = [&](int type, auto* function) {
@@ -133,7 +145,7 @@ void Machine::load(std::uint32_t address, std::span<const std::byte> bytes) {
 }
 
 void Machine::copy(std::uint32_t address, std::span<const std::byte> bytes) {
-  if (address < Memory::kFlash || address - Memory::kFlash + bytes.size() > Memory::kFlashSize) {
+  if (address < Memory::kFlash || address - Memory::kFlash + bytes.size() > chip_.memory.flash_size()) {
     return chip_.complaints.add("machine", "image does not fit into the flash at " + hex(address));
   }
   std::memcpy(chip_.memory.flash().data() + (address - Memory::kFlash), bytes.data(), bytes.size());
@@ -162,7 +174,7 @@ std::string Machine::load_elf(const std::string& path) {
     if (word(at) != 1 || size == 0) continue;
     const std::uint32_t physical = word(at + 12);
     if (offset + size > file.size()) return path + ": a segment ends behind the file";
-    if (physical < Memory::kFlash || physical - Memory::kFlash + size > Memory::kFlashSize) {
+    if (physical < Memory::kFlash || physical - Memory::kFlash + size > chip_.memory.flash_size()) {
       return path + ": a segment at " + hex(physical) + " is not in the flash";
     }
     copy(physical, std::span(file).subspan(offset, size));
@@ -182,7 +194,7 @@ void Machine::set_reg(int id, std::uint32_t value) { uc_reg_write(uc_, id, &valu
 std::uint32_t Machine::program_counter() const { return program_counter_; }
 
 std::uint16_t Machine::half_word(std::uint32_t address) const {
-  const auto bytes = chip_.memory.readable(address < Memory::kFlashSize ? address + Memory::kFlash : address, 2);
+  const auto bytes = chip_.memory.readable(chip_.memory.resolve(address), 2);
   std::uint16_t value = 0;
   if (!bytes.empty()) std::memcpy(&value, bytes.data(), 2);
   return value;
@@ -215,8 +227,8 @@ void Machine::reset_core() {
 }
 
 Machine::BlockInfo& Machine::block_info(std::uint32_t address, std::uint32_t size) {
-  const bool in_ram = address >= Memory::kRam;
-  const std::uint32_t offset = in_ram ? address - Memory::kRam : address % Memory::kFlashSize;
+  const bool in_ram = chip_.memory.in_ram(address);
+  const std::uint32_t offset = chip_.memory.resolve(address) - (in_ram ? Memory::kRam : Memory::kFlash);
   auto& blocks = in_ram ? ram_blocks_ : flash_blocks_;
   BlockInfo& info = blocks[std::min<std::size_t>(offset / 2, blocks.size() - 1)];
   if (info.size == size && !in_ram) return info;
@@ -247,7 +259,7 @@ void Machine::on_block(std::uint32_t address, std::uint32_t size) {
     return;
   }
   // The engine lets an unaligned LDRD pass.
-  if (address >= kUpsetCode && !options_.check_alignment) {
+  if (address >= upset_area() && !options_.check_alignment) {
     on_instruction(address, size);
     if (pending_fault_.number != 0) return;
   }
@@ -331,7 +343,7 @@ void Machine::apply_mpu() {
     if (!on || m4::mpu::kAp.of(region.rasr) != 0) continue;
     const std::uint64_t size = std::uint64_t{2} << m4::mpu::kSize.of(region.rasr);
     const bool small = size <= kPage && region.rbar % size == 0;
-    if (!small || region.rbar < Memory::kRam || region.rbar >= Memory::kRam + Memory::kRamSize) {
+    if (!small || region.rbar < Memory::kRam || region.rbar >= Memory::kRam + chip_.memory.ram_size()) {
       chip_.complaints.add("core", "MPU region without access that is not up to 1 KiB of SRAM: not modelled");
       continue;
     }
@@ -381,6 +393,9 @@ void Machine::run(Picoseconds until) {
   }
 }
 
+// The code of an upset stands at the end of the SRAM.
+std::uint32_t Machine::upset_area() const { return Memory::kRam + chip_.memory.ram_size() - kUpsetArea; }
+
 bool Machine::upset_due() const {
   return upset_.has_value() && active_.empty() && !sleeping_ && (reg(UC_ARM_REG_PRIMASK) & 1) == 0;
 }
@@ -388,7 +403,7 @@ bool Machine::upset_due() const {
 void Machine::begin_upset() {
   const auto slot = static_cast<std::uint32_t>(*upset_);
   const std::vector<std::uint16_t> code = upset_code(*upset_);
-  const std::uint32_t address = kUpsetCode + slot * kUpsetBytes;
+  const std::uint32_t address = upset_area() + slot * kUpsetBytes;
   std::memcpy(chip_.memory.writable(address, kUpsetBytes).data(), code.data(), 2 * code.size());
   if (*upset_ == Upset::kFloatingPointOff) static_cast<void>(chip_.write(kCpacr, 4, 0));
   if (*upset_ == Upset::kUnalignedAccess) set_reg(UC_ARM_REG_R0, Memory::kRam + 2);

@@ -96,6 +96,7 @@ class Machine {
   std::uint64_t on_read(std::uint32_t address, unsigned size);
   void on_write(std::uint32_t address, unsigned size, std::uint64_t value);
   void plan_stop(Picoseconds until);
+  [[nodiscard]] std::uint32_t upset_area() const;
   [[nodiscard]] bool upset_due() const;
   void begin_upset();
   void apply_mpu();

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Nested vectored interrupt controller: pending, enabled, active, priorities with four bits. ARM DDI 0403E.e sections
-// B1.5 (exception model) and B3.4; RM0402 chapter "Interrupts and events" (97 interrupts, 16 priorities).
+// B1.5 (exception model) and B3.4; RM0402 chapter "Interrupts and events" (97 interrupts) and RM0440 chapter
+// "Nested vectored interrupt controller" (102), 16 priorities both.
 #pragma once
 
 #include "sim_host/board/peripheral.hpp"
@@ -24,7 +25,7 @@ struct Masks {
 
 class Nvic final : public InterruptLines {
  public:
-  static constexpr int kInterrupts = 97, kExceptions = exception::kInterrupt0 + kInterrupts;
+  static constexpr int kInterrupts = 102, kExceptions = exception::kInterrupt0 + kInterrupts;
   static constexpr int kLowest = 256;  ///< priority of thread mode
 
   Nvic() { reset(); }

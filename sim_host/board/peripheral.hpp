@@ -38,6 +38,8 @@ class Peripheral {
 
   /// The word at `offset`, a multiple of 4.
   virtual std::uint32_t read(std::uint32_t offset) = 0;
+  /// The bits of `mask` of that word, where the width of a read has an effect.
+  virtual std::uint32_t read_part(std::uint32_t offset, std::uint32_t /*mask*/) { return read(offset); }
   /// Writes the bits of `mask` of the word at `offset`.
   virtual void write(std::uint32_t offset, std::uint32_t value, std::uint32_t mask) = 0;
   /// As after power-on or a reset pulse of the RCC.

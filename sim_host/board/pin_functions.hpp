@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Alternate functions of the STM32F412Cx pins that this board uses, from data sheet DS11139, table "Alternate
-// functions". They equal the pin data that ST publishes for the F412C(E-G)Ux package.
+// Alternate functions of the pins that the boards use: data sheets DS11139 (STM32F412Cx) and DS12288 (STM32G474xE),
+// tables "Alternate functions", equal to the pin data that ST publishes for the packages.
 #pragma once
 
 #include <array>
@@ -36,12 +36,14 @@ enum class Signal : std::uint8_t {
   kTim3Ch2,
   kCan1Tx,
   kCan1Rx,
+  kFdcan1Tx,
+  kFdcan1Rx,
 };
 
 [[nodiscard]] inline const char* name_of(Signal signal) {
   constexpr const char* kNames[] = {"SPI1_SCK",  "SPI1_MISO", "SPI1_MOSI", "SPI2_SCK",  "SPI2_MISO", "SPI2_MOSI",
                                     "USART1_TX", "USART1_RX", "USART2_TX", "USART2_RX", "TIM2_CH1",  "TIM2_CH2",
-                                    "TIM3_CH1",  "TIM3_CH2",  "CAN1_TX",   "CAN1_RX"};
+                                    "TIM3_CH1",  "TIM3_CH2",  "CAN1_TX",   "CAN1_RX",   "FDCAN1_TX", "FDCAN1_RX"};
   return kNames[static_cast<int>(signal)];
 }
 
@@ -51,7 +53,7 @@ struct PinFunction {
   int alternate;  ///< AFR value
 };
 
-inline constexpr std::array kPinFunctions = {
+inline constexpr std::array kStm32f412PinFunctions = {
     PinFunction{Signal::kSpi1Sck, {'A', 5}, 5},   PinFunction{Signal::kSpi1Sck, {'B', 3}, 5},
     PinFunction{Signal::kSpi1Miso, {'A', 6}, 5},  PinFunction{Signal::kSpi1Miso, {'B', 4}, 5},
     PinFunction{Signal::kSpi1Mosi, {'A', 7}, 5},  PinFunction{Signal::kSpi1Mosi, {'B', 5}, 5},
@@ -68,6 +70,26 @@ inline constexpr std::array kPinFunctions = {
     PinFunction{Signal::kTim3Ch2, {'B', 5}, 2},   PinFunction{Signal::kCan1Tx, {'A', 12}, 9},
     PinFunction{Signal::kCan1Tx, {'B', 9}, 8},    PinFunction{Signal::kCan1Rx, {'A', 11}, 9},
     PinFunction{Signal::kCan1Rx, {'B', 8}, 8},
+};
+
+inline constexpr std::array kStm32g474PinFunctions = {
+    PinFunction{Signal::kSpi1Sck, {'A', 5}, 5},   PinFunction{Signal::kSpi1Sck, {'B', 3}, 5},
+    PinFunction{Signal::kSpi1Miso, {'A', 6}, 5},  PinFunction{Signal::kSpi1Miso, {'B', 4}, 5},
+    PinFunction{Signal::kSpi1Mosi, {'A', 7}, 5},  PinFunction{Signal::kSpi1Mosi, {'B', 5}, 5},
+    PinFunction{Signal::kUsart1Tx, {'A', 9}, 7},  PinFunction{Signal::kUsart1Tx, {'B', 6}, 7},
+    PinFunction{Signal::kUsart1Tx, {'C', 4}, 7},  PinFunction{Signal::kUsart1Rx, {'A', 10}, 7},
+    PinFunction{Signal::kUsart1Rx, {'B', 7}, 7},  PinFunction{Signal::kUsart1Rx, {'C', 5}, 7},
+    PinFunction{Signal::kUsart2Tx, {'A', 2}, 7},  PinFunction{Signal::kUsart2Tx, {'A', 14}, 7},
+    PinFunction{Signal::kUsart2Tx, {'B', 3}, 7},  PinFunction{Signal::kUsart2Rx, {'A', 3}, 7},
+    PinFunction{Signal::kUsart2Rx, {'A', 15}, 7}, PinFunction{Signal::kUsart2Rx, {'B', 4}, 7},
+    PinFunction{Signal::kTim2Ch1, {'A', 0}, 1},   PinFunction{Signal::kTim2Ch1, {'A', 5}, 1},
+    PinFunction{Signal::kTim2Ch1, {'A', 15}, 1},  PinFunction{Signal::kTim2Ch2, {'A', 1}, 1},
+    PinFunction{Signal::kTim2Ch2, {'B', 3}, 1},   PinFunction{Signal::kTim3Ch1, {'A', 6}, 2},
+    PinFunction{Signal::kTim3Ch1, {'B', 4}, 2},   PinFunction{Signal::kTim3Ch1, {'C', 6}, 2},
+    PinFunction{Signal::kTim3Ch2, {'A', 4}, 2},   PinFunction{Signal::kTim3Ch2, {'A', 7}, 2},
+    PinFunction{Signal::kTim3Ch2, {'B', 5}, 2},   PinFunction{Signal::kTim3Ch2, {'C', 7}, 2},
+    PinFunction{Signal::kFdcan1Tx, {'A', 12}, 9}, PinFunction{Signal::kFdcan1Tx, {'B', 9}, 9},
+    PinFunction{Signal::kFdcan1Rx, {'A', 11}, 9}, PinFunction{Signal::kFdcan1Rx, {'B', 8}, 9},
 };
 
 }  // namespace tetap::board

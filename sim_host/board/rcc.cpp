@@ -11,25 +11,15 @@ namespace reg = hal::stm32f412::rcc;
 
 namespace {
 
-constexpr Picoseconds kPllLock = 200 * kMicrosecond;   // data sheet: at most 200 us
-constexpr Picoseconds kLsiStart = 40 * kMicrosecond;   // data sheet: at most 40 us
+constexpr Picoseconds kPllLock = 200 * kMicrosecond;  // data sheet: at most 200 us
+constexpr Picoseconds kLsiStart = 40 * kMicrosecond;  // data sheet: at most 40 us
+constexpr std::size_t kRccWords = 0x25;
 constexpr std::uint32_t kHsi = 0, kHse = 1, kPll = 2;  // CFGR.SW
-
-/// HPRE: 0xxx is 1, 1000 is 2 ... 1011 is 16, 1100 is 64 ... 1111 is 512.
-constexpr int ahb_shift(std::uint32_t code) {
-  if (code < 8) return 0;
-  return static_cast<int>(code < 12 ? code - 7 : code - 6);
-}
-
-/// PPRE: 0xx is 1, 100 is 2 ... 111 is 16.
-constexpr int apb_shift(std::uint32_t code) { return code < 4 ? 0 : static_cast<int>(code - 3); }
-
-std::string mhz(std::int64_t hz) { return std::to_string(hz / 1'000) + " kHz"; }
 
 }  // namespace
 
 Rcc::Rcc(Surroundings around, const Oscillators& oscillators, const Pwr& pwr, const FlashInterface& flash)
-    : Peripheral(around, "RCC", reg::kRcc, kBytes),
+    : ClockController(around, reg::kRcc, kRccWords),
       oscillators_(oscillators),
       pwr_(pwr),
       flash_(flash),
@@ -42,7 +32,7 @@ Rcc::Rcc(Surroundings around, const Oscillators& oscillators, const Pwr& pwr, co
 
 void Rcc::reset() {
   const std::uint32_t flags = word(reg::csr::kOffset) & 0xFF00'0000;
-  words_.fill(0);
+  words_.assign(kRccWords, 0);
   word(reg::cr::kOffset) = reg::cr::kResetValue;
   word(reg::pllcfgr::kOffset) = reg::pllcfgr::kResetValue;
   word(reg::ahb1enr::kOffset) = reg::ahb1enr::kResetValue;
@@ -92,9 +82,9 @@ void Rcc::check_pll() {
   const std::int64_t m = reg::pllcfgr::kPllm.of(configured), n = reg::pllcfgr::kPlln.of(configured);
   if (m < 2 || n < 50 || n > 432) return complain("PLLM or PLLN out of range");
   const std::int64_t input = (from_hse ? oscillators_.hse_hz : oscillators_.hsi_hz) / m;
-  if (input < 950'000 || input > 2'100'000) complain("PLL input of " + mhz(input) + ": 1 to 2 MHz are allowed");
+  if (input < 950'000 || input > 2'100'000) complain("PLL input of " + khz(input) + ": 1 to 2 MHz are allowed");
   if (input * n < 100'000'000 || input * n > 440'000'000) {
-    complain("PLL oscillator at " + mhz(input * n) + ": 100 to 432 MHz are allowed");
+    complain("PLL oscillator at " + khz(input * n) + ": 100 to 432 MHz are allowed");
   }
 }
 
@@ -161,11 +151,11 @@ void Rcc::plan_buses() {
 }
 
 void Rcc::check_limits() {
-  if (hclk_hz() > 101'000'000) complain("HCLK of " + mhz(hclk_hz()) + ": 100 MHz is the limit");
-  if (hclk_hz() > pwr_.limit_hz()) complain("HCLK of " + mhz(hclk_hz()) + " is too fast for PWR_CR.VOS");
-  if (hclk_hz() > flash_.limit_hz()) complain("HCLK of " + mhz(hclk_hz()) + " with too few flash wait states");
-  if (apb1_hz() > 50'500'000) complain("APB1 at " + mhz(apb1_hz()) + ": 50 MHz is the limit");
-  if (apb2_hz() > 101'000'000) complain("APB2 at " + mhz(apb2_hz()) + ": 100 MHz is the limit");
+  if (hclk_hz() > 101'000'000) complain("HCLK of " + khz(hclk_hz()) + ": 100 MHz is the limit");
+  if (hclk_hz() > pwr_.limit_hz()) complain("HCLK of " + khz(hclk_hz()) + " is too fast for PWR_CR.VOS");
+  if (hclk_hz() > flash_.limit_hz()) complain("HCLK of " + khz(hclk_hz()) + " with too few flash wait states");
+  if (apb1_hz() > 50'500'000) complain("APB1 at " + khz(apb1_hz()) + ": 50 MHz is the limit");
+  if (apb2_hz() > 101'000'000) complain("APB2 at " + khz(apb2_hz()) + ": 100 MHz is the limit");
 }
 
 std::uint32_t Rcc::read(std::uint32_t offset) { return offset / 4 < words_.size() ? word(offset) : 0; }
@@ -185,26 +175,7 @@ void Rcc::write(std::uint32_t offset, std::uint32_t value, std::uint32_t mask) {
     if (!on) word(offset) &= ~reg::csr::kLsirdy.mask();
     return;
   }
-  const std::uint32_t before = word(offset);
-  word(offset) = merged;
-  for (const Block& block : blocks_) {
-    const bool pulse = block.reset_offset == offset && (merged & block.reset_mask) != 0;
-    if (pulse && (before & block.reset_mask) == 0) block.peripheral->reset();
-  }
-}
-
-void Rcc::add_block(Peripheral& block, std::uint32_t enable_offset, std::uint32_t enable_mask,
-                    std::uint32_t reset_offset, std::uint32_t reset_mask) {
-  blocks_.push_back({&block, enable_offset, enable_mask, reset_offset, reset_mask});
-}
-
-bool Rcc::clocked(const Peripheral& block) const {
-  for (const Block& one : blocks_) {
-    if (one.peripheral != &block) continue;
-    const bool held = one.reset_mask != 0 && (word(one.reset_offset) & one.reset_mask) != 0;
-    return !held && (one.enable_mask == 0 || (word(one.enable_offset) & one.enable_mask) != 0);
-  }
-  return true;
+  write_gate(offset, merged);
 }
 
 // RM0402, PWR_CR: reset value 0x0000 8000, so scale 2; the SVD has 0 there.

@@ -4,31 +4,17 @@
 // from the data sheet DS11139 (tables of general operating conditions, HSE, HSI, LSI and PLL characteristics).
 #pragma once
 
-#include "sim_host/board/peripheral.hpp"
+#include "sim_host/board/clock_controller.hpp"
 
-#include <array>
 #include <cstdint>
 #include <functional>
-#include <vector>
 
 namespace tetap::board {
-
-/// Oscillators as they are on one board.
-struct Oscillators {
-  bool crystal = true;               ///< false: HSE never becomes ready
-  std::int64_t hse_hz = 8'000'000;   ///< crystal of the ARK CANnode
-  std::int64_t hsi_hz = 16'000'000;  ///< 16 MHz +- 1 % at 25 degrees
-  std::int64_t lsi_hz = 32'000;      ///< 17 to 47 kHz
-  Picoseconds hse_start = 2 * kMillisecond;
-};
-
-/// Bits of the reset flags in RCC_CSR.
-enum class ResetCause : std::uint8_t { kPowerOn, kPin, kSoftware, kWatchdog };
 
 class Pwr;
 class FlashInterface;
 
-class Rcc final : public Peripheral {
+class Rcc final : public ClockController {
  public:
   Rcc(Surroundings around, const Oscillators& oscillators, const Pwr& pwr, const FlashInterface& flash);
 
@@ -36,10 +22,10 @@ class Rcc final : public Peripheral {
   void write(std::uint32_t offset, std::uint32_t value, std::uint32_t mask) override;
   /// System reset: everything but the reset flags.
   void reset() override;
-  void add_reset_flags(ResetCause cause);
+  void add_reset_flags(ResetCause cause) override;
 
   [[nodiscard]] std::int64_t sysclk_hz() const;
-  [[nodiscard]] std::int64_t hclk_hz() const { return sysclk_hz() >> hclk_shift_; }
+  [[nodiscard]] std::int64_t hclk_hz() const override { return sysclk_hz() >> hclk_shift_; }
   [[nodiscard]] std::int64_t apb1_hz() const { return hclk_hz() >> apb1_shift_; }
   [[nodiscard]] std::int64_t apb2_hz() const { return hclk_hz() >> apb2_shift_; }
   /// Clock of the timers on APB1: doubled where the bus is divided (DCKCFGR.TIMPRE = 0).
@@ -47,35 +33,21 @@ class Rcc final : public Peripheral {
   [[nodiscard]] std::int64_t lsi_hz() const { return oscillators_.lsi_hz; }
   [[nodiscard]] bool pll_on() const;
 
-  /// Clock and reset pulse of a block, by its bit numbers in an ENR and RSTR register.
-  void add_block(Peripheral& block, std::uint32_t enable_offset, std::uint32_t enable_mask, std::uint32_t reset_offset,
-                 std::uint32_t reset_mask);
-  [[nodiscard]] bool clocked(const Peripheral& block) const;
-
   /// Complains where core, buses and flash are faster than they may be; called after each change.
   void check_limits();
-  std::function<void()> on_change;
 
  private:
-  struct Block {
-    Peripheral* peripheral;
-    std::uint32_t enable_offset, enable_mask, reset_offset, reset_mask;
-  };
   [[nodiscard]] std::int64_t pll_hz() const;
   void write_cr(std::uint32_t value);
   void write_cfgr(std::uint32_t value);
   void check_pll();
   void oscillators_ready();
   void plan_buses();
-  [[nodiscard]] std::uint32_t& word(std::uint32_t offset) { return words_[offset / 4]; }
-  [[nodiscard]] std::uint32_t word(std::uint32_t offset) const { return words_[offset / 4]; }
 
   Oscillators oscillators_;
   const Pwr& pwr_;
   const FlashInterface& flash_;
   Alarm hse_ready_, pll_ready_, lsi_ready_;
-  std::vector<Block> blocks_;
-  std::array<std::uint32_t, 0x25> words_{};
   int hclk_shift_ = 0, apb1_shift_ = 0, apb2_shift_ = 0;
 };
 

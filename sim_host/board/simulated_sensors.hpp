@@ -23,7 +23,7 @@ class SimulatedSensors {
   SimulatedSensors(const SimulatedSensors&) = delete;
   SimulatedSensors& operator=(const SimulatedSensors&) = delete;
 
-  /// For ArkCannode; this object must live longer.
+  /// For a board; this object must live longer.
   [[nodiscard]] SensorWorld door();
   /// Measurements of sensors that are not wired, as they arrive by `now`.
   void take_unwired(Picoseconds now, std::vector<sim::Measurement>& arrived);

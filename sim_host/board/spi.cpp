@@ -29,7 +29,7 @@ int Spi::bits() const { return reg::cr1::kDff.of(cr1_) != 0 ? 16 : 8; }
 
 std::int64_t Spi::clock_rate_hz() const { return clock_hz_() >> (reg::cr1::kBr.of(cr1_) + 1); }
 
-std::uint32_t Spi::status() const { return sr_ | reg::sr::kBsy(finished_.pending() ? 1 : 0); }
+std::uint32_t Spi::status() const { return sr_ | reg::sr::kBsy(busy() ? 1 : 0); }
 
 std::uint32_t Spi::read(std::uint32_t offset) {
   switch (offset) {
@@ -60,12 +60,13 @@ void Spi::write_cr1(std::uint32_t value) {
   const std::uint32_t shape = ~(reg::cr1::kSpe.mask() | reg::cr1::kSsi.mask());
   const bool was = reg::cr1::kSpe.of(before) != 0, is = reg::cr1::kSpe.of(cr1_) != 0;
   if (was && ((before ^ cr1_) & shape) != 0) complain("CR1 changed while SPE = 1");
-  if (was && !is && finished_.pending()) complain("switched off while BSY");
+  if (was && !is && busy()) complain("switched off while BSY");
   if (!is) return;
   if (reg::cr1::kMstr.of(cr1_) == 0) return complain("slave mode is not modelled");
   if (reg::cr1::kCrcen.of(cr1_) != 0 || reg::cr1::kBidimode.of(cr1_) != 0 || reg::cr1::kRxonly.of(cr1_) != 0) {
     complain("CRC, one data line and receive-only mode are not modelled");
   }
+  check_shape();
   // RM0402, "Master mode fault": NSS low, by pin or by SSI = 0.
   if (reg::cr1::kSsm.of(cr1_) != 0 && reg::cr1::kSsi.of(cr1_) == 0) {
     complain("master with SSM = 1 and SSI = 0: mode fault");
@@ -76,6 +77,8 @@ void Spi::write_cr1(std::uint32_t value) {
     complain("master with SSM = 0 and SSOE = 0: the level of NSS decides");
   }
 }
+
+void Spi::check_shape() {}
 
 void Spi::write(std::uint32_t offset, std::uint32_t value, std::uint32_t mask) {
   switch (offset) {
@@ -178,7 +181,7 @@ void Spi::connect(SpiDevice& device, Pin select, Pins& pins) {
 }
 
 void Spi::select_changed(std::size_t index, bool level) {
-  if (finished_.pending()) complain("select line changed while BSY");
+  if (busy()) complain("select line changed while BSY");
   Connected& one = devices_[index];
   one.selected = !level;
   if (one.selected) {
@@ -188,10 +191,12 @@ void Spi::select_changed(std::size_t index, bool level) {
   }
 }
 
-void Spi::update() {
-  const bool level = (reg::cr2::kTxeie.of(cr2_) != 0 && reg::sr::kTxe.of(sr_) != 0) ||
-                     (reg::cr2::kRxneie.of(cr2_) != 0 && reg::sr::kRxne.of(sr_) != 0) ||
-                     (reg::cr2::kErrie.of(cr2_) != 0 && (sr_ & (reg::sr::kOvr.mask() | reg::sr::kModf.mask())) != 0);
+void Spi::update() { update_line(sr_); }
+
+void Spi::update_line(std::uint32_t status) {
+  const bool level = (reg::cr2::kTxeie.of(cr2_) != 0 && reg::sr::kTxe.of(status) != 0) ||
+                     (reg::cr2::kRxneie.of(cr2_) != 0 && reg::sr::kRxne.of(status) != 0) ||
+                     (reg::cr2::kErrie.of(cr2_) != 0 && (status & (reg::sr::kOvr.mask() | reg::sr::kModf.mask())) != 0);
   set_interrupt(wiring_.interrupt, level);
 }
 

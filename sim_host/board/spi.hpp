@@ -27,7 +27,7 @@ class SpiDevice {
   [[nodiscard]] virtual std::int64_t limit_hz() const = 0;
 };
 
-class Spi final : public Peripheral {
+class Spi : public Peripheral {
  public:
   struct Wiring {
     Signal sck_signal, miso_signal, mosi_signal;
@@ -47,23 +47,27 @@ class Spi final : public Peripheral {
   /// Fault of the wiring: the MISO line is stuck at a level; empty: it is whole.
   std::optional<bool> stuck_miso;
   [[nodiscard]] std::int64_t clock_rate_hz() const;
-  void raise_requests();
+  virtual void raise_requests();
 
- private:
+ protected:
   struct Connected {
     SpiDevice* device;
     Pin select;
     bool selected = false;
   };
-  void start();
-  void finished();
+  virtual void start();
+  virtual void finished();
   std::uint32_t exchange(std::uint32_t out);
   std::uint8_t exchange_byte(std::uint8_t out);
   void select_changed(std::size_t index, bool level);
   void write_cr1(std::uint32_t value);
+  virtual void check_shape();
+  [[nodiscard]] virtual bool busy() const { return finished_.pending(); }
+  void update_line(std::uint32_t status);
   void check_lines();
-  void update();
-  [[nodiscard]] int bits() const;
+  virtual void update();
+  /// Bits of a frame.
+  [[nodiscard]] virtual int bits() const;
   [[nodiscard]] std::uint32_t status() const;
 
   const Pins& pins_;

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// tetap-board: executes a flash image on the emulated ARK CANnode in virtual time; the bus goes to a log, the console
-// to the standard output. With --robot the simulated world is behind the pins. Any complaint of a model fails the run.
+// tetap-board: executes a flash image on an emulated board in virtual time; the bus goes to a log, the console to the
+// standard output. With --robot the simulated world is behind the pins. Any complaint of a model fails the run.
 #include "bus/codec.hpp"
 #include "bus/messages.hpp"
 #include "sim_host/board/ark_cannode.hpp"
 #include "sim_host/board/hardware_faults.hpp"
 #include "sim_host/board/live_bus.hpp"
 #include "sim_host/board/machine.hpp"
+#include "sim_host/board/nucleo_g474re.hpp"
 #include "sim_host/board/simulated_sensors.hpp"
 #include "sim_host/encode.hpp"
 #include "sim_host/node_origin.hpp"
@@ -38,12 +39,13 @@ namespace {
 using namespace tetap;
 
 std::string help() {
-  return "usage: tetap-board [OPTION]... IMAGE.elf\n\nExecutes the machine code of IMAGE on an emulated ARK "
-         "CANnode.\n\n"
+  return "usage: tetap-board [OPTION]... IMAGE.elf\n\nExecutes the machine code of IMAGE on an emulated board.\n\n"
+         "  --board NAME       ark_cannode or nucleo_g474re (default: named in IMAGE, else ark_cannode)\n"
          "  --seconds S        virtual time (default 10; with --robot: the whole course)\n"
          "  --log FILE         frames of the bus, as candump -L writes them\n"
          "  --cpi C            cycles of an instruction, 1.0 to 4.0 (default 1.5)\n"
-         "  --lsi HZ           oscillator of the watchdog, 17000 to 47000 (default 32000)\n"
+         "  --lsi HZ           oscillator of the watchdog, 17000 to 47000 (default 32000; nucleo_g474re: 29500 to\n"
+         "                     34000)\n"
          "  --imu-clock-ppm P  error of the IMU's clock (default 0; with --robot: drawn within its data sheet's 1 %)\n"
          "  --who-am-i N       what the IMU answers for its identity (default 0x47)\n"
          "  --no-crystal       HSE never starts\n"
@@ -73,7 +75,7 @@ struct Options {
   board::UbloxOptions receiver;
   std::optional<double> seconds;
   std::optional<double> imu_clock_ppm;
-  std::string log, image, robot, out, faults, can;
+  std::string log, image, robot, out, faults, can, kind;
   std::vector<board::HardwareFaultSetting> hardware_faults;
   std::vector<sim::FaultSetting> world_faults;
   std::uint64_t seed = 1;
@@ -81,6 +83,23 @@ struct Options {
 };
 
 double to_seconds(board::Picoseconds time) { return static_cast<double>(time / board::kMicrosecond) * 1e-6; }
+
+constexpr std::array<std::string_view, 2> kBoards = {"ark_cannode", "nucleo_g474re"};
+
+/// The board that the command line or the image's file name (tetap-BOARD-ROBOT.elf) names.
+std::string board_of(const std::string& given, const std::string& image) {
+  if (std::find(kBoards.begin(), kBoards.end(), given) != kBoards.end()) return given;
+  if (!given.empty()) throw sim::UsageError("--board " + given + ": there are ark_cannode and nucleo_g474re");
+  const std::string file = image.substr(image.rfind('/') + 1);
+  for (const std::string_view name : kBoards)
+    if (file.find(name) != std::string::npos) return std::string(name);
+  return std::string(kBoards.front());
+}
+
+std::unique_ptr<board::Board> make_board(const Options& options, board::SensorWorld world) {
+  if (options.kind == "nucleo_g474re") return std::make_unique<board::NucleoG474re>(options.board, std::move(world));
+  return std::make_unique<board::ArkCannode>(options.board, std::move(world));
+}
 
 /// Times of a fault as the report reads them.
 std::string fault_text(std::string_view name, double start_s, double duration_s) {
@@ -150,10 +169,16 @@ Options parse(sim::Arguments& arguments) {
   options.partner = !arguments.flag("--no-partner");
   options.machine.check_alignment = arguments.flag("--check-alignment");
   parse_world(arguments, options);
+  const std::string kind = arguments.text("--board").value_or("");
   const auto image = arguments.positional();
   arguments.finish();
   if (!image) throw sim::UsageError("no image is named (--help)");
   options.image = *image;
+  options.kind = board_of(kind, options.image);
+  // DS12288, LSI: 29.5 to 34 kHz over temperature; the older chip's range is that of --lsi.
+  const std::int64_t lsi_hz = options.board.oscillators.lsi_hz;
+  if (options.kind == "nucleo_g474re" && (lsi_hz < 29'500 || lsi_hz > 34'000))
+    throw sim::UsageError("--lsi " + std::to_string(lsi_hz) + ": the STM32G474's is 29500 to 34000");
   if (!options.robot.empty() && options.log.empty()) options.log = options.out + "/raw.log";
   return options;
 }
@@ -188,15 +213,15 @@ sim::World world_of(const Options& options, const param::Parameters& parameters)
 /// Other nodes of the bus: sensors that are not wired to the board, a master of the time, a sender of the start pose.
 class OtherNodes {
  public:
-  OtherNodes(board::ArkCannode& node, board::SimulatedSensors& sensors, std::uint32_t base, bool time_master)
-      : node_(node), sensors_(sensors), base_(base), poll_(node.chip.scheduler, [this] { poll(); }) {
+  OtherNodes(board::Board& node, board::SimulatedSensors& sensors, std::uint32_t base, bool time_master)
+      : node_(node), sensors_(sensors), base_(base), poll_(node.processor.scheduler, [this] { poll(); }) {
     if (!time_master) next_clock_ = board::kNever;
     poll_.set(0);
   }
 
  private:
   void poll() {
-    const board::Picoseconds now = node_.chip.scheduler.now();
+    const board::Picoseconds now = node_.processor.scheduler.now();
     poll_.set(now + board::kMillisecond);
     frames_.clear();
     measurements_.clear();
@@ -216,10 +241,10 @@ class OtherNodes {
     }
     sensors_.take_unwired(now, measurements_);
     for (const sim::Measurement& one : measurements_) sim::encode(base_, one, frames_);
-    for (const base::CanFrame& frame : frames_) node_.chip.can1.line.send(frame, now);
+    for (const base::CanFrame& frame : frames_) node_.processor.can_line().send(frame, now);
   }
 
-  board::ArkCannode& node_;
+  board::Board& node_;
   board::SimulatedSensors& sensors_;
   std::uint32_t base_;
   board::Alarm poll_;
@@ -249,7 +274,7 @@ std::string times_json(const std::vector<board::Picoseconds>& times) {
   return "[" + text + "]";
 }
 
-void write_facts(const Options& options, const board::ArkCannode& node, const board::Machine& machine,
+void write_facts(const Options& options, const board::Board& node, const board::Machine& machine,
                  const board::SimulatedSensors& sensors, const Facts& facts) {
   const auto real = [](double value) {
     std::array<char, 40> text{};
@@ -259,10 +284,11 @@ void write_facts(const Options& options, const board::ArkCannode& node, const bo
   const std::vector<std::pair<std::string, std::string>> fields{
       {"seed", std::to_string(options.seed)},
       {"fault", sim::quoted(options.faults)},
+      {"board", sim::quoted(options.kind)},
       {"image", sim::quoted(options.image)},
-      {"complaints", std::to_string(node.chip.complaints.list().size())},
-      {"complaint_texts", complaints_json(node.chip.complaints.list())},
-      {"provoked_complaints", complaints_json(node.chip.complaints.provoked())},
+      {"complaints", std::to_string(node.processor.complaints.list().size())},
+      {"complaint_texts", complaints_json(node.processor.complaints.list())},
+      {"provoked_complaints", complaints_json(node.processor.complaints.provoked())},
       {"board_s", real(facts.seconds)},
       {"board_cpu_s", real(facts.cpu_s)},
       {"times_realtime", real(facts.cpu_s > 0 ? facts.seconds / facts.cpu_s : 0)},
@@ -271,7 +297,7 @@ void write_facts(const Options& options, const board::ArkCannode& node, const bo
       {"resets", std::to_string(machine.resets())},
       {"reset_times_s", times_json(machine.reset_times())},
       {"upset_s", machine.upset_time() == board::kNever ? "null" : real(to_seconds(machine.upset_time()))},
-      {"watchdog_longest_gap_s", real(to_seconds(node.chip.iwdg.longest_gap()))},
+      {"watchdog_longest_gap_s", real(to_seconds(node.processor.watchdog().longest_gap()))},
       {"cpi", real(options.machine.cpi_percent / 100.0)},
       {"frames_on_bus", std::to_string(facts.frames)},
       {"imu_clock_ppm", real(*options.imu_clock_ppm)},
@@ -307,18 +333,19 @@ class Run {
 
   int operator()() {
     options_.board.imu.clock_error = 1e-6 * options_.imu_clock_ppm.value_or(0);
-    board::ArkCannode node(options_.board, sensors_ ? sensors_->door() : world_at_rest());
-    node.chip.can1.line.partner = options_.partner;
+    const std::unique_ptr<board::Board> made = make_board(options_, sensors_ ? sensors_->door() : world_at_rest());
+    board::Board& node = *made;
+    node.processor.can_line().partner = options_.partner;
     if (!options_.log.empty()) log_ = std::make_unique<sim::OutFile>(options_.log);
     sim::NodeOrigin origin(parameters_.can_base);
     std::optional<board::LiveBus> live;
-    if (!options_.can.empty()) live.emplace(options_.can, node.chip.can1.line, node.chip.scheduler);
-    node.chip.can1.line.on_frame = [&](board::Picoseconds time, const board::CanOffer& frame, bool own) {
+    if (!options_.can.empty()) live.emplace(options_.can, node.processor.can_line(), node.processor.scheduler);
+    node.processor.can_line().on_frame = [&](board::Picoseconds time, const board::CanOffer& frame, bool own) {
       if (live) live->came_through(frame, own);
       if (sensors_ && !frame.remote) origin.received(frame.frame);
       record(time, frame);
     };
-    board::Machine machine(node.chip, options_.machine);
+    board::Machine machine(node.processor, options_.machine);
     const std::string wrong = machine.load_elf(options_.image);
     if (!wrong.empty()) throw sim::UsageError(wrong);
     std::optional<OtherNodes> others;
@@ -329,14 +356,14 @@ class Run {
       faults.add(one, sensors_->world().start().us * board::kMicrosecond);
     const std::clock_t began = std::clock();
     facts_.seconds = duration_s();
-    run(machine, node.chip.complaints);
+    run(machine, node.processor.complaints);
     facts_.cpu_s = static_cast<double>(std::clock() - began) / CLOCKS_PER_SEC;
     if (log_) log_->close();
     if (live)
       std::fprintf(stderr, "tetap-board: on %s in real time, at most %.3f s late\n", options_.can.c_str(),
                    static_cast<double>(live->latest().us) * 1e-6);
     finish(node, machine, origin);
-    return node.chip.complaints.empty() && !machine.locked_up() ? 0 : 1;
+    return node.processor.complaints.empty() && !machine.locked_up() ? 0 : 1;
   }
 
  private:
@@ -362,13 +389,13 @@ class Run {
     sim::append_log_line(line, {time / board::kMicrosecond}, "can0", frame.frame);
     log_->write(line.view());
   }
-  void finish(const board::ArkCannode& node, const board::Machine& machine, const sim::NodeOrigin& origin) const {
+  void finish(const board::Board& node, const board::Machine& machine, const sim::NodeOrigin& origin) const {
     std::fputs(node.console.c_str(), stdout);
     std::fprintf(stderr, "tetap-board: %.3f s, %llu instructions, %llu frames, %llu exceptions, %d resets\n",
                  facts_.seconds, static_cast<unsigned long long>(machine.instructions()),
                  static_cast<unsigned long long>(facts_.frames), static_cast<unsigned long long>(machine.exceptions()),
                  machine.resets());
-    std::fputs(node.chip.complaints.text().c_str(), stderr);
+    std::fputs(node.processor.complaints.text().c_str(), stderr);
     if (!sensors_) return;
     const sim::World& world = sensors_->world();
     // A robot with a map of landmarks keeps to that, wherever its first fix fell.

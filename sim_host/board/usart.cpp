@@ -79,10 +79,8 @@ void Usart::write(std::uint32_t offset, std::uint32_t value, std::uint32_t mask)
     case reg::dr::kOffset:
       if (!on() || reg::cr1::kTe.of(cr1_) == 0) return complain("DR written with the transmitter off: lost");
       if (reg::sr::kTxe.of(sr_) == 0) complain("DR written before TXE: the waiting byte is lost");
-      waiting_ = static_cast<std::uint8_t>(value);
-      sr_ &= ~reg::sr::kTxe.mask();
       if (status_read_) sr_ &= ~reg::sr::kTc.mask();
-      if (!sent_.pending()) start_sending();
+      put_data(static_cast<std::uint8_t>(value));
       break;
     case reg::brr::kOffset:
       if (on() && (sent_.pending() || received_.pending())) complain("BRR written during a character");
@@ -107,6 +105,12 @@ void Usart::write(std::uint32_t offset, std::uint32_t value, std::uint32_t mask)
       break;
   }
   update();
+}
+
+void Usart::put_data(std::uint8_t byte) {
+  waiting_ = byte;
+  sr_ &= ~reg::sr::kTxe.mask();
+  if (!sent_.pending()) start_sending();
 }
 
 void Usart::start_sending() {
@@ -159,7 +163,7 @@ void Usart::received() {
 }
 
 void Usart::take(std::uint8_t byte, std::uint32_t errors) {
-  if (reg::sr::kRxne.of(sr_) != 0) {
+  if (reg::sr::kRxne.of(sr_) != 0 && !overrun_off()) {
     sr_ |= reg::sr::kOre.mask();  // the byte before stays, this one is lost
   } else {
     data_ = byte;

@@ -14,7 +14,7 @@
 
 namespace tetap::board {
 
-class Usart final : public Peripheral {
+class Usart : public Peripheral {
  public:
   struct Wiring {
     Signal tx_signal, rx_signal;
@@ -34,13 +34,16 @@ class Usart final : public Peripheral {
   void arrive(std::uint8_t byte, std::int64_t baud);
   /// A byte has left the port: its value, and the rate it was sent with.
   std::function<void(std::uint8_t byte, std::int64_t baud)> on_sent;
-  [[nodiscard]] std::int64_t baud() const;
+  [[nodiscard]] virtual std::int64_t baud() const;
   /// Called when a DMA stream was switched on.
   void raise_requests();
 
- private:
-  [[nodiscard]] bool on() const;
+ protected:
+  [[nodiscard]] virtual bool on() const;
+  /// A byte that arrives on top of an unread one takes its place without a word (CR3.OVRDIS of newer ports).
+  [[nodiscard]] virtual bool overrun_off() const { return false; }
   void start_sending();
+  void put_data(std::uint8_t byte);
   void sent();
   void received();
   void idle();

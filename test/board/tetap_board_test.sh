@@ -22,3 +22,13 @@ status=0; "$board" "$0" >/dev/null 2>"$out/err" || status=$?
 [ $status = 2 ] && grep -q 'not an ELF file' "$out/err" || fail "a script as image: status $status, $(cat "$out/err")"
 status=0; "$board" --cpi 9 "$programs/hello.elf" >/dev/null 2>"$out/err" || status=$?
 [ $status = 2 ] || fail "--cpi 9 is out of range: status $status"
+# A board is named by the option or by the image's file name.
+[ "$("$board" --board nucleo_g474re --seconds 0.1 "$programs/nucleo.elf" 2>"$out/err")" = "hello from 160 MHz" ] || fail "--board: $(cat "$out/err")"
+cp "$programs/nucleo.elf" "$out/tetap-nucleo_g474re-rover.elf"
+[ "$("$board" --seconds 0.1 "$out/tetap-nucleo_g474re-rover.elf" 2>"$out/err")" = "hello from 160 MHz" ] || fail "board by file name: $(cat "$out/err")"
+status=0; "$board" --seconds 0.1 "$programs/nucleo.elf" >/dev/null 2>"$out/err" || status=$?
+[ $status = 1 ] || fail "an image for another chip: status $status, $(cat "$out/err")"
+for wrong in "--board disco" "--board nucleo_g474re --lsi 17000"; do
+  status=0; "$board" $wrong "$programs/nucleo.elf" >/dev/null 2>"$out/err" || status=$?
+  [ $status = 2 ] || fail "$wrong: status $status"
+done

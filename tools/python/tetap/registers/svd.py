@@ -45,10 +45,11 @@ class Device:
         return number(self.peripheral(name).findtext("baseAddress").lower())
 
     def registers(self, name):
-        """By name, without the peripheral's own in front (RCC_CR is CR); those of the peripheral that it is derived from, with its own on top."""
+        """Registers by name, with and without the peripheral's own in front (RCC_CR, CR). A derived peripheral has those of its origin, too."""
         element = self.peripheral(name)
         inherited = self.registers(element.get("derivedFrom")) if element.get("derivedFrom") else {}
-        return inherited | {one.findtext("name").removeprefix(name + "_"): Register(one) for one in element.iterfind("registers/register")}
+        own = {one.findtext("name"): Register(one) for one in element.iterfind("registers/register")}
+        return inherited | own | {full.removeprefix(name + "_"): one for full, one in own.items()}
 
     def interrupt(self, name):
         if name not in self.interrupts:
