@@ -27,7 +27,7 @@ ifneq ($(unknown),)
 $(error no setting $(unknown); there are: $(settings))
 endif
 
-.PHONY: help sim board test quick proof replay record doctor firmware flash size heap stack count bits hashes soak matrix laws constants bench costs check docs dbc setup programs arm
+.PHONY: help sim board test quick proof replay record doctor firmware flash size heap stack count bits hashes soak matrix swarm mutants laws constants bench costs check docs dbc setup programs arm
 
 help: ## this list
 	@echo "tetap: state estimation on the robot's own microcontroller"; echo
@@ -102,6 +102,12 @@ hashes: setup programs ## a hash of each estimate over simulated and recorded ru
 matrix: setup ## faults of every sensor in every situation against what the node promises, in out/matrix.json (CELLS=1000); goes on where it was
 	@tools/run/build_preset host:tetap-matrix
 	@tools/proof/run_matrix $(if $(CELLS),--cells $(CELLS))
+
+swarm: setup programs ## seeds that draw which kinds of faults there are, and what is left a minute after all of them, in out/swarm.json (CELLS=100 seeds); goes on where it was
+	@tools/proof/run_swarm $(if $(CELLS),--seeds $(CELLS))
+
+mutants: setup ## constants of the inertial estimator doubled and halved: which no test notices, in out/mutants.json (CELLS=60: a sample); goes on where it was
+	@tools/proof/run_mutants $(if $(CELLS),--constants $(CELLS))
 
 laws: setup programs ## laws that need no truth (other stamps, order, time, place, mirror image) on LOG= of ROBOT=; figures in out/laws
 	@test -n "$(LOG)" || { echo "make laws: name a log: LOG=file ROBOT=$(ROBOT)" >&2; exit 2; }

@@ -34,12 +34,14 @@ struct TagContext {
   return static_cast<std::uint32_t>(hash.finish());
 }
 
-/// A nonce is a keyed hash of every input frame since power-on, chained tick by tick. It differs from start to start as
-/// the sensors' noise does. Nobody without the key can make it repeat. It holds for a turn of 2^21 us and the turn
-/// after; within it counters only rise.
+/// A nonce is a keyed hash of every input frame since power-on, chained tick by tick: it differs from start to start as
+/// the sensors' noise does, and nobody without the key can make it repeat. It holds for a turn of 2^21 us and the turn
+/// after; within it counters only rise. Within a tick the frames are a multiset whose hash is the sum of theirs
+/// (MSet-Add-Hash: Clarke et al., Incremental Multiset Hash Functions, ASIACRYPT 2003): a replay takes the
+/// frames of a tick in another order where some are the node's own.
 class Authentication {
  public:
-  explicit Authentication(const param::Parameters& parameters) : parameters_(parameters), inputs_(parameters.bus.key) {}
+  explicit Authentication(const param::Parameters& parameters) : parameters_(parameters), link_(parameters.bus.key) {}
 
   void power_on() {
     chain_ = 0;
@@ -51,7 +53,7 @@ class Authentication {
     turn_ = 0;
   }
   /// The key could be computed from a hash that is under way. Only right behind tick().
-  void hide_secrets() { inputs_ = base::SipHash({}); }
+  void hide_secrets() { link_ = base::SipHash({}); }
   /// All but the parameters, from a state whose secrets may be hidden.
   void resume(const Authentication& other) {
     chain_ = other.chain_;
@@ -64,9 +66,12 @@ class Authentication {
     turn_ = other.turn_;
   }
 
-  /// Every input frame, in the order of arrival.
+  /// Every input frame of a tick, in any order.
   void input(const base::CanFrame& frame) {
-    inputs_.add(frame.data);
+    base::SipHash hash = link_;
+    hash.add(frame.data);
+    hash.add(static_cast<std::uint8_t>(frame.id - parameters_.can_base));
+    sum_ += hash.finish();
     if (heard_ < kEnough) ++heard_;
   }
 
@@ -99,13 +104,15 @@ class Authentication {
   };
 
   void begin_link() {
-    inputs_ = base::SipHash(parameters_.bus.key);
-    inputs_.add_word(static_cast<std::uint32_t>(chain_));
-    inputs_.add_word(static_cast<std::uint32_t>(chain_ >> 32));
+    link_ = base::SipHash(parameters_.bus.key);
+    link_.add_word(static_cast<std::uint32_t>(chain_));
+    link_.add_word(static_cast<std::uint32_t>(chain_ >> 32));
+    sum_ = 0;
   }
 
   const param::Parameters& parameters_;
-  base::SipHash inputs_;     ///< hash of chain_ and the frames since the last tick
+  base::SipHash link_;       ///< key and chain_, before what is hashed in this tick
+  std::uint64_t sum_ = 0;    ///< sum of the hashes of this tick's frames
   std::uint64_t chain_ = 0;  ///< hash of all frames up to the last tick; without the key, nothing follows from it
   std::uint32_t heard_ = 0;
   std::array<Nonce, 2> nonces_{};  ///< nonces of this turn and of the one before
@@ -133,7 +140,10 @@ class Authentication {
 }
 
 inline void Authentication::tick(base::Micros now) {
-  chain_ = inputs_.finish();
+  base::SipHash inputs = link_;
+  inputs.add_word(static_cast<std::uint32_t>(sum_));
+  inputs.add_word(static_cast<std::uint32_t>(sum_ >> 32));
+  chain_ = inputs.finish();
   begin_link();
   if (now >= more_at_ || more_at_.us - now.us > 1'000'000) {
     more_at_ = now + base::Micros{(1 << kTurnBits) / 10};
@@ -143,7 +153,7 @@ inline void Authentication::tick(base::Micros now) {
   if (turn == turn_ || heard_ < kEnough) return;
   // A turn that was left out: the nonce before the last one is of no use any more.
   nonces_[1] = turn == nonces_[0].turn + 1 ? nonces_[0] : Nonce{};
-  base::SipHash hash = inputs_;
+  base::SipHash hash = link_;
   hash.add_word(turn);
   const auto number = static_cast<std::uint32_t>(hash.finish());
   nonces_[0] = {.number = number != 0 ? number : 1, .turn = turn};

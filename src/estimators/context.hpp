@@ -20,6 +20,7 @@ struct SetPose {
   float sigma_position_m = 0;
   float sigma_yaw_rad = 0;
   std::uint8_t counter = 0;  ///< counter of the command that carried the pose
+  std::uint8_t waited = 0;   ///< ticks since it came
 };
 
 }  // namespace tetap::estimators

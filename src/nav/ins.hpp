@@ -211,7 +211,9 @@ class Ins {
     for (int i = 0; i < 3; ++i) sink(accel_n_mps2(i));
   }
 
-  /// Count of the times that the covariance had to be put right (see condition()).
+  /// P was factored from end to end since the last step.
+  [[nodiscard]] bool factored() const { return condition_monitor_.idle(); }
+  /// How often the covariance had to be put right (see condition()).
   [[nodiscard]] std::uint32_t conditioned() const { return conditioned_; }
 
  private:

@@ -49,6 +49,8 @@ struct InsState {
   static constexpr int kErrors = 15;
   /// First index of each group of three in the error vector.
   static constexpr int kPosition = 0, kVelocity = 3, kAttitude = 6, kAccelBias = 9, kGyroBias = 12;
+  static constexpr int kUp = kPosition + 2, kVelocityNorth = kVelocity + 1, kVelocityUp = kVelocity + 2;
+  static constexpr int kYaw = kAttitude + 2;
   using Error = filter::Vector<float, kErrors>;
 
   base::Anchored x, y, z;  ///< east, north, up of the body's origin

@@ -78,6 +78,7 @@ class EstimatorSlot {
  public:
   using Type = E;
   static constexpr bool kDelayed = kIsDelayed<E>;
+  static constexpr bool kSharesOut = requires(E & e) { e.grant_share(); };
   static_assert(!WorksInJobs<E> || kDelayed, "a plain estimator repeats its window, and would repeat its jobs");
   /// An estimator that distinguishes sensors of one kind is given the instance, too.
   template <class Payload>
@@ -125,6 +126,11 @@ class EstimatorSlot {
       replay_.due = false;
     }
   }
+  /// The same up to this stamp, of which the window still holds samples for other estimators.
+  void close_until(base::Micros stamp) {
+    close();
+    if constexpr (!kDelayed) replay_.until = stamp;
+  }
   /// The far end has this sample of the window, or is beyond it.
   [[nodiscard]] bool past_has(const sensor::Sample& sample) const requires(!kDelayed) {
     return sample.stamp <= replay_.until;
@@ -149,6 +155,11 @@ class EstimatorSlot {
   [[nodiscard]] bool rests(const sensor::Sample& sample, const estimators::Context& ctx) {
     if constexpr (requires { now_.rests(sample, ctx); }) return takes(sample) && now_.rests(sample, ctx);
     return false;
+  }
+
+  /// More of the horizon's work in this tick: the window is about to end.
+  void grant_share() {
+    if constexpr (kSharesOut) now_.grant_share();
   }
 
   /// `window` is what the estimators have of the samples in the window, in order.

@@ -32,9 +32,12 @@ struct Estimators {
   static constexpr std::size_t kSamples = 88;
   /// Samples that plain estimators repeat in a tick when one came late; what is more is spread over several ticks. A
   /// delayed estimator beside them needs much of the tick for itself.
-  static constexpr std::size_t kReplayed = (EstimatorSlot<E>::kDelayed || ...) ? 40 : 56;
+  static constexpr bool kSpares = (EstimatorSlot<E>::kDelayed || ...);
+  /// Some estimator shares the work of a window that ends out among ticks.
+  static constexpr bool kSharesOut = (EstimatorSlot<E>::kSharesOut || ...);
+  static constexpr std::size_t kReplayed = kSpares ? 20 : 56;
   /// Fewer by so many for each IMU sample of the tick beyond the first: every estimator pays for those.
-  static constexpr std::size_t kReplayedLess = 12, kLeastReplayed = 8;
+  static constexpr std::size_t kReplayedLess = kSpares ? 4 : 12, kLeastReplayed = kSpares ? 2 : 8;
 };
 
 /// A window with another number of places, for a faster IMU or a longer window (DESIGN.md, 4.3).
@@ -85,7 +88,7 @@ class FusionWindow {
   std::uint16_t consume(base::Micros t, const estimators::Context& ctx, OnNew&& on_new, Note&& note);
 
   /// Samples until t leave the window and become final. A sample that a delayed estimator leaves to its next tick
-  /// stays, and all that follow it.
+  /// stays, and all that follow it; so do those beyond the share of a tick.
   template <class Note>
   void retire_until(base::Micros t, const estimators::Context& ctx, Note&& note) {
     leave_until(t, Past::kFollows, ctx, note);
@@ -102,6 +105,10 @@ class FusionWindow {
     });
     late_records(note);
   }
+
+  /// A tick's share of what close_window() would do. Whether all of it is done: nothing is left until t.
+  template <class Note>
+  [[nodiscard]] bool drain(base::Micros t, const estimators::Context& ctx, Note&& note);
 
   /// Brings every estimator to t.
   void advance(base::Micros t, const estimators::Context& ctx) {
@@ -178,6 +185,10 @@ class FusionWindow {
     note(instance, timeline_[i], innovation);
   }
 
+  /// Samples that leave in a tick: plain estimators take each of them once more. What is more stays for the next tick.
+  /// A window of 20 ticks that is full leaves half as many.
+  static constexpr std::size_t kMostLeaving = Capacity / 11;
+
   typename Estimators::Lanes lanes_;
   Timeline<Capacity> timeline_;
   WorkLimit<Capacity> limit_;
@@ -207,11 +218,31 @@ void FusionWindow<Estimators, Capacity>::leave_until(base::Micros t, Past past, 
                                                      Note& note) {
   std::size_t count = 0;
   while (count < timeline_.size() && timeline_.consumed(count) && timeline_[count].stamp <= t) {
-    if (past == Past::kFollows && rests(timeline_[count], ctx)) break;
+    if (past == Past::kFollows && (count == kMostLeaving || rests(timeline_[count], ctx))) break;
     leave(count++, past, ctx, note);
   }
   timeline_.drop_front(count);
   if (t > closed_until_) closed_until_ = t;
+}
+
+template <class Estimators, std::size_t Capacity>
+template <class Note>
+bool FusionWindow<Estimators, Capacity>::drain(base::Micros t, const estimators::Context& ctx, Note&& note) {
+  if constexpr (!Estimators::kSharesOut) return true;
+  finish_replays(ctx, note);
+  each_lane([t](auto& lane) {
+    lane.grant_share();
+    lane.close_until(t);
+  });
+  const auto due = [&](std::size_t i) {
+    return i < timeline_.size() && timeline_.consumed(i) && timeline_[i].stamp <= t;
+  };
+  std::size_t count = 0;
+  while (due(count) && count < 2 * kMostLeaving && !rests(timeline_[count], ctx))
+    leave(count++, Past::kFollows, ctx, note);
+  const bool done = !due(count);
+  timeline_.drop_front(count);
+  return done;
 }
 
 template <class Estimators, std::size_t Capacity>
@@ -261,10 +292,15 @@ std::size_t FusionWindow<Estimators, Capacity>::late_before(const EstimatorSlot&
 /// Samples that this tick may repeat.
 template <class Estimators, std::size_t Capacity>
 std::size_t FusionWindow<Estimators, Capacity>::replay_share(std::size_t due) const {
-  std::size_t imu = 0;
+  std::size_t imu = 0, first = due;
   for (std::size_t i = timeline_.known(); i < due; ++i)
-    if (timeline_[i].sensor == sensor::Sensor::kImu && !timeline_.consumed(i)) ++imu;
-  imu = std::max(imu, due / 64);  // a tick of a full window whose samples are all late has none
+    if (timeline_[i].sensor == sensor::Sensor::kImu && !timeline_.consumed(i)) {
+      ++imu;
+      if (i < first) first = i;
+    }
+  // A prediction begins anew behind the first of them. A tick of a full window whose samples are all late has none.
+  if constexpr (Estimators::kSpares) imu += (due - first) / 8;
+  imu = std::max(imu, due / (Estimators::kSpares ? 16 : 64));
   const std::size_t less = imu > 1 ? (imu - 1) * Estimators::kReplayedLess : 0;
   constexpr std::size_t kMost = Estimators::kReplayed, kLeast = Estimators::kLeastReplayed;
   return less + kLeast < kMost ? kMost - less : kLeast;

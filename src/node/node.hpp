@@ -62,12 +62,15 @@ class Node {
   void map_entry(const estimators::MapEntry& entry) { landmarks_.add(entry, counters_); }
   /// Start pose; of two within an epoch the one with the later counter stands, whichever came first.
   void set_pose(const estimators::SetPose& pose) {
-    if (!pending_pose_ || ((pose.counter - pending_pose_->counter) & 0x0F) < 8) pending_pose_ = pose;
+    if (pending_pose_ && ((pose.counter - pending_pose_->counter) & 0x0F) >= 8) return;
+    const std::uint8_t waited = pending_pose_ ? pending_pose_->waited : std::uint8_t{0};
+    pending_pose_ = pose;
+    pending_pose_->waited = waited;
   }
   void reset(bus::ResetWhat what) {
     if (what == bus::ResetWhat::kWiredOff || what == bus::ResetWhat::kWiredOn)
       return switch_wired(what == bus::ResetWhat::kWiredOff);
-    pending_reset_[static_cast<std::size_t>(what)] = true;
+    pending_reset_[static_cast<std::size_t>(what)] = 1;
   }
 
   /// A command has switched the wired sensors off.
@@ -90,7 +93,14 @@ class Node {
     publisher_.show_wired();
   }
   [[nodiscard]] bool take(bus::ResetWhat what) {
-    return std::exchange(pending_reset_[static_cast<std::size_t>(what)], false);
+    return std::exchange(pending_reset_[static_cast<std::size_t>(what)], std::uint8_t{0}) != 0;
+  }
+  /// Whether a command that ends the window is obeyed in this tick. What the window holds goes into the estimators
+  /// before it, by a share in each tick.
+  [[nodiscard]] bool window_ended(std::uint8_t& waited) {
+    if (waited < kMostWaited && !history_.drain(now_, context(), noting())) return ++waited, false;
+    close_window(now_);
+    return true;
   }
   void take(const sensor::Sample& sample);
 
@@ -98,6 +108,7 @@ class Node {
   using Estimates = typename FusionWindow::Estimates;
   static constexpr std::size_t kPrimary = FusionWindow::kPrimary;
   static constexpr base::Micros kLongestStep{500'000};
+  static constexpr std::uint8_t kMostWaited = 20;  ///< ticks until a command ends the window whatever is in it
   using Closures = std::conditional_t<kTakesClosures, bus::ClosureAssembly, bus::NoClosures>;
   using Landmarks = std::conditional_t<Estimators::kUsesMap, node::Landmarks, node::NoLandmarks>;
 
@@ -150,8 +161,8 @@ class Node {
   bus::Counters counters_;
   bus::Publisher<Estimators::kCount> publisher_;
   [[no_unique_address]] Landmarks landmarks_;
-  std::array<bool, 7> pending_reset_{};
-  bool wired_off_ = false;  ///< by command; a Begin frame leaves it
+  std::array<std::uint8_t, 7> pending_reset_{};  ///< 0: none; else 1 and the ticks that it has waited
+  bool wired_off_ = false;                       ///< by command; a Begin frame leaves it
   std::optional<estimators::SetPose> pending_pose_;
 
   base::Micros now_;
@@ -384,12 +395,14 @@ void Node<Estimators, Capacity>::apply_commands() {
     counters_ = {};
     history_.each_lane([](auto& lane) { lane.clear_statistics(); });
   }
-  if (take(What::kEstimators)) {
-    close_window(now_);
+  std::uint8_t& reset = pending_reset_[static_cast<std::size_t>(What::kEstimators)];
+  if (reset != 0) {
+    if (!window_ended(reset)) return;
+    reset = 0;
     restart(now_, sensor::ResetCause::kCommand);
   }
   if (pending_pose_) {
-    close_window(now_);
+    if (!window_ended(pending_pose_->waited)) return;
     history_.each_lane([&](auto& lane) { lane.set_pose(now_, *pending_pose_, context()); });
     pending_pose_.reset();
     ++resets_;

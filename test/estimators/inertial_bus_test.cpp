@@ -45,6 +45,9 @@ class Rover {
     for (int k = 0; k < std::lround(100 * seconds); ++k) step(out);
     return out;
   }
+  void hear(const Frames& frames) {
+    for (const auto& frame : frames) node_.on_frame(frame);
+  }
   /// Until it drives and knows where it looks.
   Frames drive() {
     Frames out = run(2);
@@ -144,6 +147,28 @@ std::vector<sensor::Mode> modes(const Frames& frames) {
   for (const auto& status : all<bus::EstStatus>(frames))
     if (found.empty() || found.back() != status.mode) found.push_back(status.mode);
   return found;
+}
+
+/// A command ends the window, which holds more samples than a tick may work on: they are used in a few ticks before it.
+TEST(InertialBus, AGivenPoseHoldsAFewTicksAfterTheCommand) {
+  Rover rover;
+  rover.drive();
+  rover.gnss = false;
+  const auto mm = [](double m) { return static_cast<int>(std::lround(1000 * m)); };
+  const double x_m = rover.east_m, y_m = rover.north_m + 4;
+  rover.hear(set_pose(1, mm(x_m), mm(y_m), 0.0F, 0.1F, 0.05F));
+  int ticks = 0;
+  for (bool moved = false; !moved && ticks < 30; ++ticks)
+    moved = 1e-3 * last<bus::EstPos>(rover.run(0.01), kInertial)->y_raw > rover.north_m + 2;
+  EXPECT_GE(ticks, 2) << "the whole window in one tick";
+  EXPECT_LE(ticks, 10);
+  const Frames out = rover.run(1);
+  EXPECT_EQ(last<bus::EstStatus>(out)->reset_cause, ResetCause::kSetPose);
+  for (const std::size_t instance : {std::size_t{0}, kInertial}) {
+    EXPECT_NEAR(1e-3 * last<bus::EstPos>(out, instance)->x_raw, rover.east_m, 0.15) << instance;
+    EXPECT_NEAR(1e-3 * last<bus::EstPos>(out, instance)->y_raw, y_m, 0.15) << instance;
+  }
+  EXPECT_FALSE(reported(out, Fault::kTooLate));
 }
 
 TEST(InertialBus, ItSaysWhatItWaitsForAndThenThatItNavigates) {

@@ -66,6 +66,38 @@ TEST(WiredNode, sends_guards_of_its_samples_where_samples_need_them) {
   expect_equal(both, rover.epochs());
 }
 
+/// Frames of others come between own frames, and the desk takes these in another order: tags are judged alike.
+TEST(WiredNode, a_tagged_command_is_obeyed_at_the_desk_as_it_was_on_the_robot) {
+  WiredRover rover;
+  rover.foreign_per_s = 300;
+  rover.parameters.bus = {.commands = param::CommandAccess::kAuthenticated, .key = {1, 2, 3, 4}};
+  rover.parameters.loop.lockstep = param::Lockstep::kAuthenticated;
+  rover.boot();
+  rover.run(10);
+  const std::uint32_t nonce = rover.said<bus::EstDiagGuard>().back().nonce;
+  ASSERT_NE(nonce, 0U);
+  // Pages come in turns: the nonce may be that of the turn before.
+  const std::uint64_t time_us = rover.said<bus::EstEpoch>().back().time_us;
+  const auto turn = static_cast<std::uint32_t>(time_us >> 21);
+  for (const std::uint32_t of : {turn, turn - 1}) {
+    const base::CanFrame command =
+        bus::frame(0x300, bus::protect(bus::CmdReset{.ctr = 1, .what = bus::ResetWhat::kEstimators}));
+    const bus::TagContext context{.nonce = nonce, .turn = of, .id = command.id, .counter = 7};
+    const bus::InGuardTag tag{.tag_id = bus::CmdReset::kOffset,
+                              .tag_ctr = 7,
+                              .tag_crc = bus::tag_of(rover.parameters.bus.key, context, command.data)};
+    rover.wire.foreign(bus::frame(0x300, tag));
+    rover.wire.foreign(command);
+  }
+  rover.run(4);
+  EXPECT_EQ(rover.said<bus::EstStatus>().back().reset_ctr, 1);
+  param::Parameters desk = rover.parameters;
+  desk.loop.lockstep = param::Lockstep::kPlain;  // as with_node_in_process() does
+  const Repetition r = repeat_at_the_desk(rover.wire.log, desk);
+  EXPECT_FALSE(r.recording.hole) << r.recording.hole->why;
+  expect_equal(r, rover.epochs());
+}
+
 TEST(WiredNode, samples_reach_estimates_in_the_bodys_axes_and_signs) {
   WiredRover rover;
   rover.run(15);

@@ -506,6 +506,37 @@ TEST_F(TaggedCommands, AreJudgedAlikeInAReplay) {
   EXPECT_EQ(again.resets, 1);
 }
 
+/// Frames of one tick in another order give the same nonce; any other change gives another one.
+TEST_F(TaggedCommands, TheNonceDependsOnTheFramesOfATickAndNotOnTheirOrder) {
+  const base::CanFrame heading = in(bus::InHeading{.stamp_us = 1, .seq = 3});
+  base::CanFrame other_id = heading, other_data = heading;
+  other_id.id += 1;
+  other_data.data[7] ^= 1;
+  const auto nonce_with = [&](const Frames& before, const Frames& after, bool tick_between) {
+    ProtectedBench life(parameters);
+    life.run(600);
+    life.sensors = [&](const base::CanFrame& wheels) {
+      Frames frames = before;
+      frames.push_back(wheels);
+      if (!tick_between) frames.insert(frames.end(), after.begin(), after.end());
+      return frames;
+    };
+    life.epoch();
+    life.sensors = nullptr;
+    life.epoch(tick_between ? after : Frames{});
+    life.run(500);
+    return life.nonce.nonce;
+  };
+  const std::uint32_t nonce = nonce_with({heading, other_data}, {}, false);
+  EXPECT_EQ(nonce, nonce_with({other_data, heading}, {}, false));
+  EXPECT_EQ(nonce, nonce_with({heading}, {other_data}, false));
+  EXPECT_EQ(nonce, nonce_with({}, {other_data, heading}, false));
+  EXPECT_NE(nonce, nonce_with({heading, other_id}, {}, false)) << "another frame";
+  EXPECT_NE(nonce, nonce_with({heading, heading}, {}, false)) << "one twice";
+  EXPECT_NE(nonce, nonce_with({heading}, {other_data}, true)) << "another tick";
+  EXPECT_NE(nonce, nonce_with({heading}, {}, false)) << "one less";
+}
+
 TEST(TaggedBegin, IsObeyedWhereNothingElseIs) {
   QuietBoard board;
   const param::Parameters parameters = [] {

@@ -63,7 +63,10 @@ class FilterView {
   [[nodiscard]] nav::Vector3 turn_b_radps() const { return parts_.imu.rate_b_radps() - parts_.ins.x.b_g_radps; }
   [[nodiscard]] float forward_mps() const { return parts_.ins.x.q_nb.rotated_x().dot(parts_.ins.x.v_n_mps); }
   /// Variance of the heading, limited to that of a small angle: an unknown heading turns a velocity by one radian.
-  [[nodiscard]] float heading_rad2() const { return parts_.ins.p(8, 8) < 1.0F ? parts_.ins.p(8, 8) : 1.0F; }
+  [[nodiscard]] float heading_rad2() const {
+    const float variance = parts_.ins.p(nav::InsState::kYaw, nav::InsState::kYaw);
+    return variance < 1.0F ? variance : 1.0F;
+  }
   /// Velocity of the middle of the axle by the receiver's velocity of its antenna, along the body's axes.
   [[nodiscard]] nav::Vector3 axle_mps(const nav::Vector3& v_n_mps) const;
 

@@ -51,6 +51,8 @@ class Inertial {
   void advance(base::Micros t, const Context& ctx, const sensor::Window& window);
   /// The sample asks for more work than this tick has left: it waits for the next one.
   [[nodiscard]] bool rests(const sensor::Sample& sample, const Context& ctx);
+  /// The window is about to end, and its samples are fused in the next few ticks.
+  void grant_share() { budget_.grant(WorkBudget::kShare); }
 
   /// Bits of sensor::Fault: IMU, wheels and stuck sensors.
   [[nodiscard]] std::uint16_t faults() const;
@@ -114,14 +116,20 @@ class Inertial {
   [[nodiscard]] filter::Innovation<float, Model::kDimension> update(const Model& model, float gate) {
     budget_.spend(WorkBudget::kMeasurement);
     predictor_.note_correction();
-    return ins_.update(model, gate);
+    const bool was_factored = ins_.factored();
+    const filter::Innovation<float, Model::kDimension> result = ins_.update(model, gate);
+    if (ins_.factored() && !was_factored) budget_.spend(WorkBudget::kConditioning);
+    return result;
   }
   template <class Model, class Source>
   Innovation measure(const Model& model, Source& source, float gate_scale, const FilterView& filter);
   template <int M, class Source>
   Innovation conclude(const filter::Innovation<float, M>& result, Source& source, const FilterView& filter);
   void apply(const Assessment& a, const FilterView& filter) {
-    if (recovery_.apply(a, ins_, filter.stamp(), filter.parameters())) predictor_.note_correction();
+    if (recovery_.apply(a, ins_, filter.stamp(), filter.parameters())) {
+      predictor_.note_correction();
+      budget_.spend(WorkBudget::kConditioning);
+    }
     if (a.action == Action::kWidenVelocity)
       sources_.wheels.reset_slip();  // a slip is judged by the speed that was wrong
   }

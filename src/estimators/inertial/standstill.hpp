@@ -64,7 +64,9 @@ class Standstill {
     if (since < kEvery) return false;
     const float sigma = sigma_mps(filter), least = sigma * sigma;
     const nav::Ins::Covariance& p = filter.p();
-    const bool news = p(3, 3) > least || p(4, 4) > least || p(5, 5) > least;
+    const bool news = p(nav::InsState::kVelocity, nav::InsState::kVelocity) > least ||
+                      p(nav::InsState::kVelocityNorth, nav::InsState::kVelocityNorth) > least ||
+                      p(nav::InsState::kVelocityUp, nav::InsState::kVelocityUp) > least;
     if (news && !budget.allows_due(since, kEvery)) {
       pending_ = true;
       return false;
@@ -142,12 +144,12 @@ class Standstill {
   const float density = n.gyro_radps_rthz * n.gyro_radps_rthz;
   const nav::Vector3 up_b = ins.x.q_nb.z_seen();
   // Unless another measurement knows the heading so well that the noise is not in it any more.
-  const float shared = ins.p(8, 8) > 4.0F * density * waiting_.s ? density : 0.0F;
+  const float shared = ins.p(nav::InsState::kYaw, nav::InsState::kYaw) > 4.0F * density * waiting_.s ? density : 0.0F;
   const float walk = n.gyro_bias_radps2_rthz * n.gyro_bias_radps2_rthz * (0.5F * waiting_.s + mean_.s);
   ZeroRateUpdate due;
   nav::Vector3 growth;
   for (int i = 0; i < 3; ++i) {
-    const float half = 0.5F * ins.p(12 + i, 12 + i);
+    const float half = 0.5F * ins.p(nav::InsState::kGyroBias + i, nav::InsState::kGyroBias + i);
     due.wander(i) = walk < half ? walk : half;
     due.shared(i) = shared * up_b(i);
     growth(i) = 4.0F - 3.0F * up_b(i) * up_b(i);

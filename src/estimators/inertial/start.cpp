@@ -16,7 +16,7 @@ void Inertial::restart(base::Micros t, const Context& ctx) {
 }
 
 void Inertial::set_pose(base::Micros, const SetPose& given, const Context& ctx) {
-  if (tracking()) alignment_.keep(ins_.x, base::sqrt(ins_.p(8, 8)));
+  if (tracking()) alignment_.keep(ins_.x, base::sqrt(ins_.p(nav::InsState::kYaw, nav::InsState::kYaw)));
   alignment_.place(given.pose, given.sigma_position_m, given.sigma_yaw_rad);
   sources_.position.reset();
   sources_.height.reset();
@@ -30,7 +30,7 @@ void Inertial::set_pose(base::Micros, const SetPose& given, const Context& ctx) 
 /// A given heading that does not contradict the filter's own is a measurement: all else that the filter knows stays.
 [[gnu::noinline]] bool Inertial::take_heading(const SetPose& given) {
   constexpr float kSmall_rad = 0.3F;  // no linear step turns rightly beyond that
-  if (!(ins_.p(8, 8) < kSmall_rad * kSmall_rad)) return false;
+  if (!(ins_.p(nav::InsState::kYaw, nav::InsState::kYaw) < kSmall_rad * kSmall_rad)) return false;
   const model::DirectionMeasurement ahead =
       model::DualHeading({1.0F, 0.0F, 0.0F}, given.pose.yaw_rad, given.sigma_yaw_rad);
   return update(ahead, filter::chi_square_99(1)).verdict == filter::Verdict::kAccepted;

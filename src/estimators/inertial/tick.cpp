@@ -61,8 +61,8 @@ void Inertial::predict_output(const OutputPredictor::Inputs& in, const sensor::W
                                               .rate_b_radps = imu_.rate_b_radps()},
                                              window, in);
   predictor_.schedule().note_samplewise(samplewise);
-  // Then the horizon leaves one of its own samples for later.
-  if (samplewise && budget_.left() > 1) budget_.spend(WorkBudget::kImuSample);
+  // Then the horizon leaves half of its own samples for later.
+  if (samplewise && budget_.left() > 1) budget_.spend(budget_.left() / 2);
 }
 
 void Inertial::advance(base::Micros t, const Context& ctx, const sensor::Window& window) {

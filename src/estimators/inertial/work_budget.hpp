@@ -12,7 +12,9 @@ namespace tetap::estimators {
 class WorkBudget {
  public:
   static constexpr std::int32_t kImuSample = 1, kMeasurement = 5;
-  static constexpr std::int32_t kFixChecks = 2;  ///< a fix's conversion to local axes and its checks
+  static constexpr std::int32_t kConditioning = 2 * kMeasurement;  ///< the covariance, factored from end to end
+  static constexpr std::int32_t kShare = 4 * kMeasurement;         ///< share of each tick while a window ends
+  static constexpr std::int32_t kFixChecks = 2;                    ///< a fix's conversion to local axes and its checks
 
   /// An IMU sample is new in the window.
   void note_arrival() { ++arrived_; }

@@ -27,7 +27,9 @@ class ForwardSpeedSource {
     const param::InertialParameters& n = filter.parameters().inertial;
     const nav::Ins::Covariance& p = filter.p();
     const float mean2 = n.lateral_mps * n.lateral_mps * base::seconds(base::Micros{n.constrain_every_us}) / kMean_s;
-    speed_known_ = speed_known_ || (p(3, 3) + p(4, 4)) * p(8, 8) < mean2;
+    const float level = p(nav::InsState::kVelocity, nav::InsState::kVelocity) +
+                        p(nav::InsState::kVelocityNorth, nav::InsState::kVelocityNorth);
+    speed_known_ = speed_known_ || level * p(nav::InsState::kYaw, nav::InsState::kYaw) < mean2;
     return speed_known_;
   }
   /// The innovation gate follows in the update.
@@ -113,7 +115,9 @@ class ForwardSpeedSource {
 inline model::WheelSpeed ForwardSpeedSource::model(const ForwardReading& z, const FilterView& filter) {
   const param::InertialParameters& n = filter.parameters().inertial;
   const nav::Ins::Covariance& p = filter.p();
-  const float variance = p(3, 3) + p(4, 4) + p(5, 5);
+  const float variance = p(nav::InsState::kVelocity, nav::InsState::kVelocity) +
+                         p(nav::InsState::kVelocityNorth, nav::InsState::kVelocityNorth) +
+                         p(nav::InsState::kVelocityUp, nav::InsState::kVelocityUp);
   const nav::Vector3 ahead_n = filter.x().q_nb.rotated_x();
   const float own_mps = ahead_n.dot(filter.x().v_n_mps);
   const float slip2 = n.slip_share * n.slip_share * (own_mps * own_mps + variance);

@@ -60,7 +60,8 @@ class GnssVelocitySource {
     const nav::Vector3& up_n = filter.level().up_n;
     const float lean2 = z.has_climb ? 0.0F : up_n(0) * up_n(0) + up_n(1) * up_n(1);
     return {.v_n_mps = z.v_n_mps,
-            .sigma_horizontal_mps = base::sqrt(z.sigma_mps * z.sigma_mps + lean2 * filter.p()(5, 5)),
+            .sigma_horizontal_mps = base::sqrt(
+                z.sigma_mps * z.sigma_mps + lean2 * filter.p()(nav::InsState::kVelocityUp, nav::InsState::kVelocityUp)),
             .sigma_vertical_mps = z.has_climb ? 1.5F * z.sigma_mps : kNoClimb_mps,
             .antenna_b_m = {n.antenna_x_b_m, n.antenna_y_b_m, n.antenna_z_b_m},
             .gyro_b_radps = filter.rate_b_radps()};

@@ -106,7 +106,8 @@ inline Magnetometer::Expected Magnetometer::expected(const model::DirectionMeasu
   Expected e;
   for (int c = 0; c < 3; ++c) {
     float column = 0;
-    for (int r = 0; r < 3; ++r) column += at.h(0, r) * filter.p()(6 + r, 6 + c);
+    for (int r = 0; r < 3; ++r)
+      column += at.h(0, r) * filter.p()(nav::InsState::kAttitude + r, nav::InsState::kAttitude + c);
     e.variance += column * at.h(0, c);
     e.with_heading = column;
   }
@@ -170,7 +171,7 @@ inline void Magnetometer::judge_trust(Assessment& a, float nu, const FilterView&
 inline bool Magnetometer::weigh(FieldMeasurement& z, const FilterView& filter) {
   constexpr float kWorth = 1.05F;  // a variance has to be off by so much for an update to change anything
   const float sigma_rad = filter.parameters().magnetic.sigma_rad, floor = sigma_rad * sigma_rad;
-  const float p_yaw = filter.p()(8, 8);
+  const float p_yaw = filter.p()(nav::InsState::kYaw, nav::InsState::kYaw);
   if (!(p_yaw > kWorth * floor)) return false;
   const Expected e = expected(z.direction, filter);
   const float target_variance = e.with_heading * e.with_heading / (p_yaw - floor) - e.variance;

@@ -65,7 +65,9 @@ class Wheels {
   if (!filter.tracking() || !(track_m > 0)) return {};
   const nav::Vector3 v_b = filter.x().q_nb.conjugate().rotate(filter.x().v_n_mps);
   const nav::Ins::Covariance& p = filter.p();
-  const float worst = p(3, 3) > p(4, 4) ? p(3, 3) : p(4, 4);
+  const float east = p(nav::InsState::kVelocity, nav::InsState::kVelocity);
+  const float north = p(nav::InsState::kVelocityNorth, nav::InsState::kVelocityNorth);
+  const float worst = east > north ? east : north;
   const checks::WheelSlip::Motion motion{
       .forward_mps = v_b(0), .sigma_mps = base::sqrt(worst), .turn_mps = rim_difference_mps(filter)};
   const Slip slip = slip_.update(z.wheels, motion, filter.stamp(), n);
