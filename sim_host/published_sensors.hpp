@@ -31,6 +31,7 @@ concept Takes = requires(E& e, const Payload& payload, base::Micros stamp, const
 
 struct Sent {
   bool imu = false, landmarks = false, magnetometer = false, barometer = false;
+  bool closures = false;  ///< a front end makes its keyframes and closes loops
   bool own_map = false;   ///< the robot makes its map, so it is given none
   bool nameless = false;  ///< the map needs no identities
   bool inertial = false;  ///< an inertial filter is there: what is a matched world for it is another one
@@ -48,6 +49,7 @@ template <class... E>
           .landmarks = (Takes<E, sensor::LandmarkSighting> || ...),
           .magnetometer = n.magnetic.use != 0 && (Takes<E, sensor::MagneticFlux> || ...),
           .barometer = n.baro.use != 0 && (Takes<E, sensor::AirPressure> || ...),
+          .closures = n.mapping.keyframes != 0 && (Takes<E, sensor::LoopClosure> || ...),
           .own_map = (estimators::MakesMap<E> || ...),
           .nameless = (MapsNameless<E> || ...),
           .inertial = kInertial,
@@ -70,6 +72,7 @@ inline void send_only(const Sent& sent, World::Options& world) {
   if (!sent.landmarks) world.parameters.camera.rate_hz = 0, world.course.landmarks.clear();
   world.parameters.magnetometer.rate_hz = sent.magnetometer ? 20 : 0;
   world.parameters.barometer.rate_hz = sent.barometer ? 10 : 0;
+  world.parameters.scan_matcher.rate_hz = sent.closures ? 10 : 0;
   if (sent.kind == VehicleKind::kMulticopter) world.parameters.wheels.rate_hz = 0;
   world.inertial = sent.inertial;
 }

@@ -81,20 +81,6 @@ std::string help() {
       "  --quiet            no progress line\n";
 }
 
-/// Landmark of each sighting, as tools/dataset/import_mrclam writes it; 255: clutter or a moving obstacle.
-sim::OutFile write_sightings(const std::string& folder, const sim::World& world) {
-  sim::OutFile file(folder + "/truth.sightings.csv");
-  sim::Line line;
-  file.write("time_s,landmark\n");
-  for (const sim::TrueSighting& one : world.sightings()) {
-    line.clear();
-    line.fixed(one.stamp.us, 6).text(",").integer(one.landmark);
-    file.write(line.text("\n").view());
-  }
-  file.end();
-  return file;
-}
-
 struct Run {
   sim::World::Options world;
   std::uint64_t seed = 1;
@@ -138,7 +124,7 @@ int drive(L& link, const Run& run) {
     const sim::GeodeticOrigin origin =
         run.world.surveyed ? world.origin() : node_origin.from_fix().value_or(world.origin());
     session.add(sim::write_truth(about.folder, parameters, world, source.truth(), origin, !run.realtime));
-    if (!world.map_given()) session.add(write_sightings(about.folder, world));
+    if (!world.map_given()) session.add(sim::write_sightings(about.folder, world));
   });
 }
 

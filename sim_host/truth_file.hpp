@@ -55,4 +55,18 @@ namespace tetap::sim {
   return file;
 }
 
+/// Landmark of each sighting, as tools/dataset/import_mrclam writes it; 255: clutter or a moving obstacle.
+[[nodiscard]] inline OutFile write_sightings(const std::string& folder, const World& world) {
+  OutFile file(folder + "/truth.sightings.csv");
+  Line line;
+  file.write("time_s,landmark\n");
+  for (const TrueSighting& one : world.sightings()) {
+    line.clear();
+    line.fixed(one.stamp.us, 6).text(",").integer(one.landmark);
+    file.write(line.text("\n").view());
+  }
+  file.end();
+  return file;
+}
+
 }  // namespace tetap::sim

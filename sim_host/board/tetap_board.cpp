@@ -203,6 +203,7 @@ sim::World world_of(const Options& options, const param::Parameters& parameters)
                     static_cast<double>(gnss.origin_longitude_2ndeg) * 2e-9, static_cast<double>(gnss.origin_height_m)};
   world.course = sent.kind == sim::VehicleKind::kMulticopter ? sim::flight_course(1)
                  : sent.kind == sim::VehicleKind::kCar       ? sim::street_course(1)
+                 : sent.own_map                              ? sim::loop_course(60, 2, 24)
                                                              : sim::default_course(1);
   const std::string refused = sim::cannot_act(world, options.robot);
   if (!refused.empty()) throw sim::UsageError(refused);
@@ -403,6 +404,7 @@ class Run {
     sim::write_truth(options_.out, parameters_, world, sensors_->truth(),
                      surveyed ? world.origin() : origin.from_fix().value_or(world.origin()), false)
         .publish();
+    if (!world.map_given()) sim::write_sightings(options_.out, world).publish();
     write_facts(options_, node, machine, *sensors_, facts_);
     sim::OutFile console(options_.out + "/console.txt");
     console.write(node.console);

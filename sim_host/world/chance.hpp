@@ -42,6 +42,8 @@ enum class Stream : std::uint32_t {
   kJitter,
   kClutter,
   kMovers,
+  kScanMatcher,
+  kScanMatcherLatency,
 };
 
 class Chance {

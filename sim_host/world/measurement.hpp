@@ -11,9 +11,9 @@
 
 namespace tetap::sim {
 
-using Value =
-    std::variant<sensor::ImuSample, sensor::WheelCounts, sensor::WheelSpeeds, sensor::BodySpeed, sensor::GnssPosition,
-                 sensor::GnssVelocity, sensor::LandmarkSighting, sensor::MagneticFlux, sensor::AirPressure>;
+using Value = std::variant<sensor::ImuSample, sensor::WheelCounts, sensor::WheelSpeeds, sensor::BodySpeed,
+                           sensor::GnssPosition, sensor::GnssVelocity, sensor::LandmarkSighting, sensor::MagneticFlux,
+                           sensor::AirPressure, sensor::LoopClosure>;
 
 struct Measurement {
   base::Micros stamp;
@@ -26,10 +26,11 @@ struct Measurement {
 };
 
 /// In how many frames a value travels: gyro, accel, time; latitude, longitude, height, accuracy; east and north, up;
-/// one.
+/// identities, displacement, sigmas, correlations; one.
 [[nodiscard]] constexpr int parts(const Value& value) {
   if (std::holds_alternative<sensor::ImuSample>(value)) return 3;
   if (std::holds_alternative<sensor::GnssPosition>(value)) return 4;
+  if (std::holds_alternative<sensor::LoopClosure>(value)) return 4;
   if (std::holds_alternative<sensor::GnssVelocity>(value)) return 2;
   return 1;
 }

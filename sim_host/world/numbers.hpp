@@ -180,6 +180,17 @@ struct CameraNumbers {
   base::Micros latency_min{20'000}, latency_max{60'000};
 };
 
+/// A laser scanner whose scans are matched with the last keyframe's and with those of earlier ones nearby.
+struct ScanMatcherNumbers {
+  int rate_hz = 0;                              ///< 0: none
+  double keyframe_m = 0.5, keyframe_rad = 0.3;  ///< way or turn after which a keyframe is due
+  double reach_m = 2, reach_rad = radians(45);  ///< an earlier keyframe within both is recognised [own]
+  int apart = 20;                               ///< keyframes that lie between the two of a loop, at least
+  double sigma_m = 0.02, sigma_rad = 0.005;     ///< white, per displacement and axis [own]
+  base::Micros phase{45'500};
+  base::Micros latency_min{20'000}, latency_max{20'000};  ///< its displacements come in their order
+};
+
 struct Parameters {
   VehicleParameters vehicle;
   ImuParameters imu;
@@ -188,6 +199,7 @@ struct Parameters {
   CameraNumbers camera;
   MagnetometerNumbers magnetometer;
   BarometerNumbers barometer;
+  ScanMatcherNumbers scan_matcher;
 };
 
 /// Only white noise of the stated sigma and encoder noise k |ds|: nothing a filter does not model. Accuracy figures are

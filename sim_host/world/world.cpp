@@ -37,6 +37,7 @@ Parameters World::effective(const Options& options) {
   check_rate("landmark", n.camera.rate_hz);
   check_rate("magnetometer", n.magnetometer.rate_hz);
   check_rate("barometer", n.barometer.rate_hz);
+  check_rate("scan matcher", n.scan_matcher.rate_hz);
   if (options.substeps < 1) throw std::invalid_argument("substeps must be 1 or more");
   return n;
 }
@@ -58,12 +59,14 @@ World::World(const Options& options, std::uint64_t seed)
       camera_{parameters_.camera, options.course.landmarks, seed},
       magnetometer_{parameters_.magnetometer, *earth_, seed},
       barometer_{parameters_.barometer, *earth_, seed},
+      scan_matcher_{parameters_.scan_matcher, seed},
       imu_latency_{seed, Stream::kImuLatency},
       wheel_latency_{seed, Stream::kWheelLatency},
       gnss_latency_{seed, Stream::kGnssLatency},
       camera_latency_{seed, Stream::kCameraLatency},
       magnetometer_latency_{seed, Stream::kMagnetometerLatency},
       barometer_latency_{seed, Stream::kBarometerLatency},
+      scan_matcher_latency_{seed, Stream::kScanMatcherLatency},
       loss_{seed, Stream::kFaultLoss} {
   for (const Landmark& mark : camera_.map()) {
     const Vector3 at = to_map_.point({mark.x_m, mark.y_m, 0});
@@ -181,6 +184,11 @@ void World::step() {
   if (due(n.barometer.rate_hz, n.barometer.phase, now_))
     emit(barometer_.sample(truth_here()), barometer_sequence_++, {},
          barometer_latency_.between(n.barometer.latency_min, n.barometer.latency_max));
+  if (due(n.scan_matcher.rate_hz, n.scan_matcher.phase, now_)) {
+    const base::Micros latency = scan_matcher_latency_.between(n.scan_matcher.latency_min, n.scan_matcher.latency_max);
+    for (const sensor::LoopClosure& closure : scan_matcher_.sample(truth_here()))
+      emit(closure, closure_sequence_++, {}, latency);
+  }
 }
 
 void World::advance_to(base::Micros t, std::vector<Measurement>& arrived) {

@@ -9,6 +9,7 @@
 #include "sim_host/world/faults.hpp"
 #include "sim_host/world/measurement.hpp"
 #include "sim_host/world/numbers.hpp"
+#include "sim_host/world/scan_matcher.hpp"
 #include "sim_host/world/sensors.hpp"
 #include "sim_host/world/vehicle.hpp"
 
@@ -115,10 +116,12 @@ class World {
   std::vector<TrueSighting> sightings_;
   Magnetometer magnetometer_;
   Barometer barometer_;
-  Chance imu_latency_, wheel_latency_, gnss_latency_, camera_latency_, magnetometer_latency_, barometer_latency_, loss_;
+  ScanMatcher scan_matcher_;
+  Chance imu_latency_, wheel_latency_, gnss_latency_, camera_latency_, magnetometer_latency_, barometer_latency_,
+      scan_matcher_latency_, loss_;
   base::Micros now_;  ///< time after the start
   std::uint8_t imu_sequence_ = 0, wheel_sequence_ = 0, position_sequence_ = 0, velocity_sequence_ = 0,
-               sighting_sequence_ = 0, magnetometer_sequence_ = 0, barometer_sequence_ = 0;
+               sighting_sequence_ = 0, magnetometer_sequence_ = 0, barometer_sequence_ = 0, closure_sequence_ = 0;
   std::uint64_t made_ = 0;
   std::vector<Pending> pending_;
 };

@@ -28,6 +28,8 @@ class TurnResidual {
     const float now2 = turned_rad_ * turned_rad_;
     return now2 > before2 ? now2 - before2 : 0.0F;
   }
+  /// A measurement has corrected what the difference did so far.
+  void corrected() { turned_rad_ = 0; }
   [[nodiscard]] bool contradicts() const { return contradicts_; }
   /// No wheels roll, or no gyroscope: nothing is compared.
   float reset() {

@@ -68,9 +68,10 @@ class WiredInputs {
 
   WiredInputs(Board& board, const param::Parameters& parameters)
       : can_base_(parameters.can_base),
-        imu_(make<kImu>([&] { return Imu(board.imu, parameters); })),
-        encoders_(make<kEncoders>([&] { return Encoders(board.left_encoder, board.right_encoder, parameters.wired); })),
-        gnss_(make<kGnss>([&] { return Gnss(board.gnss, parameters.wired); })) {}
+        imu_(make<kImu>(board, [&](auto& b) { return Imu(b.imu, parameters); })),
+        encoders_(make<kEncoders>(
+            board, [&](auto& b) { return Encoders(b.left_encoder, b.right_encoder, parameters.wired); })),
+        gnss_(make<kGnss>(board, [&](auto& b) { return Gnss(b.gnss, parameters.wired); })) {}
 
   /// put(frame) for each frame of a new sample. `on` false: the drivers run, and their samples are given up.
   template <class Put>
@@ -111,11 +112,11 @@ class WiredInputs {
 
  private:
   struct Nothing {};
-  /// Types of what is there; a part that is not there has no type of the board's to be named by.
+  /// maker(board), compiled only where the part is there: neither board nor robot need have all three.
   template <bool kThere, class Make>
-  [[nodiscard]] static auto make(Make&& maker) {
+  [[nodiscard]] static auto make(Board& board, Make&& maker) {
     if constexpr (kThere)
-      return maker();
+      return maker(board);
     else
       return Nothing{};
   }

@@ -214,13 +214,14 @@ class KeyframeGraph {
     }
     id_[at(graph_.poses() - 1)] = step_;
   }
-  /// Composes that keyframe away which leaves the shortest gap; one without closures counts as half as long.
+  /// Composes that keyframe away which costs least: the gap that it leaves, times the closures that have to move and
+  /// one.
   bool thin() {
     int best = -1;
     std::uint32_t least = 0xffff'ffffU;
     for (int k = 1; k + 1 < graph_.poses(); ++k) {
-      const std::uint32_t gap = (id_[at(k + 1)] - id_[at(k - 1)]) * (graph_.has_closure(k) ? 2U : 1U);
-      if (gap < least) least = gap, best = k;
+      const std::uint32_t cost = (id_[at(k + 1)] - id_[at(k - 1)]) * (1U + graph_.closures_of(k));
+      if (cost < least) least = cost, best = k;
     }
     if (best < 0 || !graph_.compose_away(best)) return false;
     for (int k = best; k < graph_.poses(); ++k) id_[at(k)] = id_[at(k + 1)];

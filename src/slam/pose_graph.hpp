@@ -139,12 +139,14 @@ class PoseGraph {
   [[nodiscard]] filter::Symmetric<Scalar, 3> odometry_covariance(int pose) const {
     return edge_[at(odometry_to(pose))].covariance();
   }
-  [[nodiscard]] bool has_closure(int pose) const {
+  /// Closures that begin or end at a pose.
+  [[nodiscard]] std::uint32_t closures_of(int pose) const {
+    std::uint32_t count = 0;
     for (int e = 0; e < edges_; ++e) {
       const Edge& edge = edge_[at(e)];
-      if (edge.closure != 0 && (static_cast<int>(edge.from) == pose || static_cast<int>(edge.to) == pose)) return true;
+      if (edge.closure != 0 && (static_cast<int>(edge.from) == pose || static_cast<int>(edge.to) == pose)) ++count;
     }
-    return false;
+    return count;
   }
   [[nodiscard]] std::uint32_t merged() const { return merged_; }  ///< closures that became one with another
   [[nodiscard]] std::uint32_t lost() const { return lost_; }      ///< closures that another one contradicted

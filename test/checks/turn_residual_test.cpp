@@ -72,5 +72,21 @@ TEST(TurnResidual, AfterAPauseOfTheWheelsTheComparisonBeginsAnew) {
   EXPECT_FALSE(check.contradicts());
 }
 
+TEST(TurnResidual, AfterACorrectionOnlyTheTurnSinceCounts) {
+  constexpr float kOff_radps = 1;
+  TurnResidual check;
+  std::int64_t us = 0;
+  const auto variance_of = [&](double for_s) {
+    float variance = 0;
+    for (const std::int64_t end = us + std::llround(1e6 * for_s); us < end; us += kPeriod_us)
+      variance += check.update(kOff_radps, 1e-4F, kLimit, {us});
+    return variance;
+  };
+  static_cast<void>(variance_of(4));
+  check.corrected();
+  EXPECT_TRUE(check.contradicts());
+  EXPECT_NEAR(std::sqrt(variance_of(2)), 2, 0.05);
+}
+
 }  // namespace
 }  // namespace tetap::checks

@@ -38,7 +38,9 @@ TEST(StampOffset, two_crystals_that_drift_apart_are_followed) {
   for (std::int64_t now_us = 0; now_us < 60'000'000; now_us += 250) {
     const Micros seen{now_us / 10'000};  // 100 ppm
     ASSERT_FALSE(offset.follow(seen, {now_us}));
-    if (now_us > 1'000'000) ASSERT_NEAR(static_cast<double>(offset.used().us), static_cast<double>(seen.us), 2.0);
+    if (now_us > 1'000'000) {
+      ASSERT_NEAR(static_cast<double>(offset.used().us), static_cast<double>(seen.us), 2.0);
+    }
   }
 }
 

@@ -233,6 +233,21 @@ TEST(Mapper, clutter_and_moving_obstacles_lead_it_astray_seldom_and_never_silent
   EXPECT_LT(all.mean.nees, 4.5);
 }
 
+/// One rim runs 2 m/s faster than it rolls, for 3 s: 3 m of way that there was not.
+TEST(Mapper, a_wheel_that_spins_does_not_lead_it_astray) {
+  World::Options options = loop_world(60, 2, 24);
+  simulate(robot::mapper::parameters, {.landmarks = true, .own_map = true, .nameless = true}, options);
+  options.faults = {{.fault = Fault::kWheelSpin, .start = {45'000'000}, .duration = {3'000'000}}};
+  const Campaign all = campaign("wheel spin", options, robot::mapper::parameters, 10);
+  EXPECT_LT(all.mean.rmse_m, 0.5);
+  EXPECT_GT(all.mean.rmse_m, 0.05);
+  EXPECT_LE(all.mean.silent, 0.01);
+  EXPECT_GT(all.mean.nees, 0.3);
+  EXPECT_LT(all.mean.nees, 4.5);
+  EXPECT_GT(all.mean.judged, 700 * 10);
+  EXPECT_LT(all.mean.wrong, 0.01 * all.mean.judged);
+}
+
 TEST(Mapper, a_loop_longer_than_its_map_ends_where_it_began) {
   World::Options options = loop_world(200, 1, 60);
   simulate(robot::mapper::parameters, {.landmarks = true, .own_map = true, .nameless = true}, options);

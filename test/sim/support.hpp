@@ -56,6 +56,11 @@ class Hash {
     for (const float x : s.flux_b_uT) add(x);
   }
   void fields(const sensor::AirPressure& s) { add(s.pressure_Pa), add(s.temperature_degC); }
+  void fields(const sensor::LoopClosure& s) {
+    add(std::uint64_t{s.from} | std::uint64_t{s.to} << 16);
+    for (const std::int32_t x : {s.x, s.y, s.yaw}) add(static_cast<std::uint64_t>(std::int64_t{x}));
+    add(s.sigmas), add(s.correlations);
+  }
   void fields(const sensor::LandmarkSighting& s) { add(std::uint64_t{s.landmark}), add(s.range_m), add(s.bearing_rad); }
 
   std::uint64_t hash_ = 0xCBF29CE484222325U;

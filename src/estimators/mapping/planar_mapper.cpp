@@ -36,6 +36,7 @@ void PlanarMapper<Engine>::set_pose(base::Micros t, const SetPose& given, const 
   pose.yaw_rad = base::wrap_angle(pose.yaw_rad);
   const filter::Symmetric<float, 3> p = covariance_of_pose(given.sigma_position_m, given.sigma_yaw_rad);
   motion_.start(t, pose, 0.0F, 0.0F);
+  motion_.trust();
   adopt_pose(pose, p);
   engine_.set_pose(pose, p);
   digest_.update(pose.x.um(), pose.y.um(), pose.yaw_rad, p(0, 0), p(2, 2));
@@ -78,6 +79,7 @@ void PlanarMapper<Engine>::close_batch(const Context& ctx) {
   engine_.configure(ctx.parameters);
   const auto found = engine_.update({batch_.data(), batch_size_}, batch_stamp_);
   const float gate_scale = ctx.parameters.landmark.gate_scale;
+  int accepted = 0;
   for (std::size_t i = 0; i < found.size(); ++i) {
     const slam::SightingRecord& one = found[i];
     const float gate = gate_scale * filter::chi_square_99(one.components == 2 ? 2 : 1);
@@ -85,7 +87,7 @@ void PlanarMapper<Engine>::close_batch(const Context& ctx) {
                   .sensor = sensor::Sensor::kRangeBearing,
                   .instance = batch_instance_[i],
                   .innovation = record(one, gate)};
-    if (one.verdict == slam::SightingVerdict::kAccepted) last_absolute_ = batch_stamp_;
+    if (one.verdict == slam::SightingVerdict::kAccepted) last_absolute_ = batch_stamp_, ++accepted;
     digest_.update(static_cast<std::uint32_t>(one.id) << 16 | static_cast<std::uint32_t>(one.verdict), one.nu[0],
                    one.nu[1], one.s.xx, one.s.xy, one.s.yy, one.nis);
   }
@@ -98,6 +100,8 @@ void PlanarMapper<Engine>::close_batch(const Context& ctx) {
   const model::PlanarPose& pose = motion_.filter.x;
   digest_.update(pose.x.um(), pose.y.um(), pose.yaw_rad, motion_.filter.p(0, 0), motion_.filter.p(1, 1),
                  motion_.filter.p(2, 2));
+  motion_.looked(accepted);
+  move_engine();
 }
 
 template class PlanarMapper<EkfSlamEngine<30>>;           // EkfSlam30

@@ -8,11 +8,10 @@
 
 #include "base/state_digest.hpp"
 #include "estimators/context.hpp"
+#include "estimators/mapping/checked_motion.hpp"
 #include "estimators/mapping/ekf_slam_engine.hpp"
 #include "estimators/mapping/fast_slam_engine.hpp"
-#include "estimators/mapping/recording_ekf.hpp"
 #include "estimators/own_map.hpp"
-#include "estimators/planar/dead_reckoning.hpp"
 #include "sensor/window.hpp"
 
 #include <array>
@@ -24,7 +23,7 @@ namespace tetap::estimators {
 /// Engine: EkfSlamEngine or FastSlamEngine.
 template <class Engine>
 class PlanarMapper {
-  using Motion = PlanarDeadReckoning<RecordingEkf>;
+  using Motion = CheckedMotion;
 
  public:
   static constexpr sensor::EstimatorKind kKind = Engine::kKind;
@@ -70,19 +69,23 @@ class PlanarMapper {
 
   [[nodiscard]] Estimate estimate(const Context& ctx) const {
     Estimate estimate = present_.estimate(ctx.parameters);
+    estimate.p.add_diagonal({0.0F, 0.0F, present_.heading_rad2()});
     estimate.heading_valid = !(estimate.p(2, 2) > 1.0F);
     return estimate;
   }
   [[nodiscard]] MotionVariance motion_variance(const Context& ctx) const {
     return present_.motion_variance(ctx.parameters);
   }
+  /// Degraded: wheels and gyroscope contradict each other.
   [[nodiscard]] sensor::Mode mode(const Context&) const {
+    if (motion_.contradicts()) return sensor::Mode::kDegraded;
     return now_ - last_absolute_ > base::Micros{5'000'000} ? sensor::Mode::kDeadReckoning : sensor::Mode::kNominal;
   }
-  /// Capacity, for a second after a landmark was refused.
+  /// Capacity, for a second after a landmark was refused; WheelSlip: wheels that turn otherwise than the gyroscope.
   [[nodiscard]] std::uint16_t faults() const {
     const bool full = refused_ > 0 && now_ - last_refused_ < base::Micros{1'000'000};
-    return full ? std::uint16_t{1U << static_cast<unsigned>(sensor::Fault::kCapacity)} : std::uint16_t{0};
+    const unsigned capacity = full ? 1U << static_cast<unsigned>(sensor::Fault::kCapacity) : 0U;
+    return static_cast<std::uint16_t>(capacity | motion_.faults());
   }
 
   [[nodiscard]] MapReport own_map() const { return engine_.report(); }

@@ -13,8 +13,9 @@
 namespace tetap::estimators {
 
 struct RecordingEkf : filter::Ekf<model::PlanarPose> {
-  /// Increments that one sample of PlanarDeadReckoning makes at the most: held speeds, the gap after them, the sample.
-  static constexpr std::size_t kMost = 4;
+  /// Increments that one sample makes at the most: held speeds, the gap after them, the sample, and by CheckedMotion
+  /// the uncertainty of way and heading.
+  static constexpr std::size_t kMost = 5;
 
   bool predict(const model::PlanarIncrement& increment) {
     if (count_ < kMost) steps_[count_++] = increment;

@@ -69,20 +69,9 @@ void PoseFilter<Filter>::widen_by_vote(float place_m2, float yaw_rad2, base::Mic
 
 template <class Filter>
 void PoseFilter<Filter>::judge_motion(base::Micros stamp, const param::Parameters& n) {
-  if (n.gyro.use != 0) {
-    wheel_turn_.update(motion_.wheels_turn_radps(n), motion_.gyro_turn_radps(), stamp, n.disagreement);
-    const float track_m = n.wheels.drive.track_m;
-    if (!(track_m > 0) || !motion_.gyro_shows(stamp, n)) {
-      turn_.reset();
-    } else {
-      const float per_m2 = (n.wheels.drive.noise_left + n.wheels.drive.noise_right) / (track_m * track_m);
-      const float variance = per_m2 * base::abs(motion_.wheels_forward_mps()) + n.gyro.noise;
-      const float turned_rad2 = turn_.update(motion_.gyro_turn_radps() - motion_.wheels_turn_radps(n), variance,
-                                             n.landmark.gate_scale * filter::chi_square_99(1), stamp);
-      const float place_m2 = 0.25F * track_m * track_m * turned_rad2;  // one rim alone
-      if (turned_rad2 > 0.0F) add_variance(motion_.filter, {place_m2, place_m2, turned_rad2});
-    }
-  }
+  const float turned_rad2 = turn_.update(motion_, stamp, n);
+  const float place_m2 = TurnCheck::place_m2(turned_rad2, n);
+  if (turned_rad2 > 0.0F) add_variance(motion_.filter, {place_m2, place_m2, turned_rad2});
   constexpr base::Micros kDoubted{10'000'000};
   if (!checks::recent(doubted_at_, stamp, kDoubted)) {
     doubt_mps_ = doubted_m2_ = 0;

@@ -5,12 +5,11 @@
 #pragma once
 
 #include "checks/persistence.hpp"
-#include "checks/turn_residual.hpp"
-#include "checks/wheel_turn.hpp"
 #include "estimators/context.hpp"
 #include "estimators/planar/dead_reckoning.hpp"
 #include "estimators/planar/gnss_alignment.hpp"
 #include "estimators/planar/landmark_alignment.hpp"
+#include "estimators/planar/turn_check.hpp"
 #include "model/bearing.hpp"
 #include "model/gnss_position.hpp"
 #include "model/range.hpp"
@@ -91,15 +90,13 @@ class PoseFilter {
     return motion_.motion_variance(ctx.parameters);
   }
   /// Bits of sensor::Fault: wheels that turn otherwise than the gyroscope.
-  [[nodiscard]] std::uint16_t faults() const {
-    return wheel_turn_.refuted() ? 1U << static_cast<unsigned>(sensor::Fault::kWheelSlip) : 0U;
-  }
+  [[nodiscard]] std::uint16_t faults() const { return turn_.faults(); }
   [[nodiscard]] sensor::Mode mode(const Context&) const {
     if (phase_ == Phase::kWaiting) return sensor::Mode::kWaitingForPose;
     if (phase_ == Phase::kAligning) return sensor::Mode::kAligning;
     for (const std::uint8_t in_a_row : in_a_row_)
       if (in_a_row >= kDegraded) return sensor::Mode::kDegraded;
-    if (turn_.contradicts()) return sensor::Mode::kDegraded;
+    if (turn_.residual.contradicts()) return sensor::Mode::kDegraded;
     return now_ - last_absolute_ > base::Micros{5'000'000} ? sensor::Mode::kDeadReckoning : sensor::Mode::kNominal;
   }
   template <class Sink>
@@ -108,9 +105,9 @@ class PoseFilter {
     sink(static_cast<std::uint32_t>(phase_));
     alignment_.hash_state(sink);
     landmarks_.hash_state(sink);
-    wheel_turn_.hash_state(sink);
+    turn_.wheel_turn.hash_state(sink);
     for (const checks::Persistence& refused : refused_) refused.hash_state(sink);
-    turn_.hash_state(sink);
+    turn_.residual.hash_state(sink);
     for (const std::uint8_t in_a_row : in_a_row_) sink(std::uint32_t{in_a_row});
     sink(doubt_mps_);
     sink(doubted_m2_);
@@ -156,14 +153,13 @@ class PoseFilter {
   void trust_motion() {
     doubt_mps_ = doubted_m2_ = 0;
     doubted_at_ = {};
-    turn_.reset();
+    turn_.residual.reset();
   }
 
   Motion motion_;
   GnssAlignment alignment_;
   LandmarkAlignment landmarks_;
-  checks::WheelTurn wheel_turn_;
-  checks::TurnResidual turn_;
+  TurnCheck turn_;
   Phase phase_ = Phase::kWaiting;
   std::array<checks::Persistence, kSources> refused_{};  ///< rejections in a row of one kind of sensor
   std::array<std::uint8_t, kSources> in_a_row_{};        ///< the same, which a widening does not end
