@@ -1,19 +1,19 @@
 #!/bin/bash
 # SPDX-License-Identifier: Apache-2.0
-# board_day_test.sh SECONDS: the first SECONDS of the rover's day (at most the whole) on its flash image, as `make board` runs it: no model complains, the log
+# board_day_test.sh SECONDS [BOARD]: the first SECONDS of the rover's day (at most the whole) on BOARD's flash image (default ark_cannode), as `make board` runs it: no model complains, the log
 # repeats byte for byte, two runs are equal, the estimate is as honest and as good as that of the same world over CAN, and all of it is faster than real time.
 set -eu
-seconds=${1:-40}
+seconds=${1:-40} board=${2:-ark_cannode}
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
 cd "$root"
 programs=build/host/sim_host
 [ -x "$programs/board/tetap-board" ] || { echo "board_day_test: skipped: no $programs/board/tetap-board (libunicorn-dev)" >&2; exit 77; }
-image=build/ark_cannode/hal/board/tetap-ark_cannode-rover.elf
+image=build/$board/hal/board/tetap-$board-rover.elf
 out=$(mktemp -d)
 trap 'rm -rf "$out"' EXIT
 fail() { echo "board_day_test: $*" >&2; exit 1; }
 
-TETAP_IMAGE=$image OUT=$out/day ROBOT=rover SEED=1 FAULT=usual WORLD="--seconds $seconds" REPORT=--no-pictures tools/run/emulate_board >"$out/said" 2>&1 ||
+TETAP_IMAGE=$image BOARD=$board OUT=$out/day ROBOT=rover SEED=1 FAULT=usual WORLD="--seconds $seconds" REPORT=--no-pictures tools/run/emulate_board >"$out/said" 2>&1 ||
   fail "status $?: $(tail -5 "$out/said")"
 # The same world, its sensors over CAN: what a node on the bus makes of it.
 "$programs/tetap-world" --memory --robot rover --seed 1 --duration "$seconds" --fault wheel_spin@45+3,gnss_outage@80+30,gnss_jump@150+2 --out "$out/bus" --quiet
