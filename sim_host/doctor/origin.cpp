@@ -2,6 +2,7 @@
 #include "sim_host/doctor/origin.hpp"
 
 #include "base/wgs84.hpp"
+#include "estimators/map_frame.hpp"
 #include "sim_host/doctor/plane.hpp"
 
 #include <array>
@@ -11,7 +12,7 @@
 namespace tetap::doctor {
 namespace {
 
-constexpr double kMapRange_m = 105'000;  ///< beyond, the node itself sets OriginOutOfRange
+constexpr auto kMapRange_m = static_cast<double>(estimators::kRange_m);  ///< beyond, the node sets OriginOutOfRange
 constexpr int kLeastFixes = 3;
 
 }  // namespace

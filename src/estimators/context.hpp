@@ -23,4 +23,11 @@ struct SetPose {
   std::uint8_t waited = 0;   ///< ticks since it came
 };
 
+/// The pose that the parameters state for the start. It counts where StartParameters::known is not 0.
+[[nodiscard]] inline SetPose start_pose(const param::StartParameters& s) {
+  return {.pose = {.x = base::Anchored{}.plus(s.x_m), .y = base::Anchored{}.plus(s.y_m), .yaw_rad = s.yaw_rad},
+          .sigma_position_m = s.sigma_position_m,
+          .sigma_yaw_rad = s.sigma_yaw_rad};
+}
+
 }  // namespace tetap::estimators

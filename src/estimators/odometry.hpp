@@ -13,15 +13,8 @@ class Odometry {
 
   void restart(base::Micros t, const Context& ctx) {
     *this = {};
-    const param::StartParameters& s = ctx.parameters.start;
-    const bool known = s.known != 0;
-    bound_ = known;
-    motion_.start(t,
-                  known ? model::PlanarPose{.x = base::Anchored{}.plus(s.x_m),
-                                            .y = base::Anchored{}.plus(s.y_m),
-                                            .yaw_rad = s.yaw_rad}
-                        : model::PlanarPose{},
-                  kStartSigma, kStartSigma);
+    bound_ = ctx.parameters.start.known != 0;
+    motion_.start(t, bound_ ? start_pose(ctx.parameters.start).pose : model::PlanarPose{}, kStartSigma, kStartSigma);
   }
   void set_pose(base::Micros t, const SetPose& given, const Context& ctx) {
     motion_.propagate(t, ctx.parameters);

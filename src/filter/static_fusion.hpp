@@ -8,6 +8,7 @@
 
 #include "filter/inverse.hpp"
 
+#include <limits>
 #include <span>
 
 namespace tetap::filter {
@@ -79,34 +80,44 @@ template <class Scalar, int N>
 }
 
 /// Implements docs/explanation/static_fusion.md (3).
-/// The least of a function with one minimum on [0, 1]: golden section in 24 steps, to 1e-5 (Kiefer 1953).
+/// The least of a convex function on [0, 1]: golden section in 24 steps, to 1e-5 (Kiefer 1953). Where both probes are
+/// equal to rounding the minimum lies between them, so both sides are cut, and a flat function gives its middle.
 template <class Scalar, class Function>
 [[nodiscard]] Scalar golden_section(const Function& cost) {
   constexpr auto kShare = static_cast<Scalar>(0.6180339887498949);
+  constexpr auto kRounding = 8 * std::numeric_limits<Scalar>::epsilon();
   constexpr int kSteps = 24;
-  Scalar low = 0, high = 1;
-  Scalar left = high - kShare * (high - low), right = low + kShare * (high - low);
-  Scalar at_left = cost(left), at_right = cost(right);
+  Scalar low = 0, high = 1, left = 0, right = 0, at_left = 0, at_right = 0;
+  const auto probe_left = [&] { left = high - kShare * (high - low), at_left = cost(left); };
+  const auto probe_right = [&] { right = low + kShare * (high - low), at_right = cost(right); };
+  probe_left();
+  probe_right();
   for (int i = 0; i < kSteps; ++i) {
-    if (at_left < at_right) {
+    const Scalar rise = at_right - at_left;
+    const Scalar rounding = kRounding * (Scalar{1} + (at_left < Scalar{0} ? -at_left : at_left));
+    if (rise <= rounding && rise >= -rounding) {
+      low = left;
+      high = right;
+      i += 2;  // what is left is the cube of kShare
+      probe_left();
+      probe_right();
+    } else if (rise > Scalar{0}) {
       high = right;
       right = left;
       at_right = at_left;
-      left = high - kShare * (high - low);
-      at_left = cost(left);
+      probe_left();
     } else {
       low = left;
       left = right;
       at_left = at_right;
-      right = low + kShare * (high - low);
-      at_right = cost(right);
+      probe_right();
     }
   }
   return Scalar(0.5F) * (low + high);
 }
 
 /// Implements docs/explanation/static_fusion.md (2).
-/// P^-1 = omega A^-1 + (1 - omega) B^-1, omega for the least determinant of P.
+/// P^-1 = omega A^-1 + (1 - omega) B^-1, omega for the least determinant of P; equal covariances give the mean.
 template <class Scalar, int N>
 [[nodiscard]] Fusion<Estimate<Scalar, N>> covariance_intersection(const Estimate<Scalar, N>& a,
                                                                   const Estimate<Scalar, N>& b) {
@@ -115,7 +126,8 @@ template <class Scalar, int N>
   const Scalar omega = golden_section<Scalar>([&](Scalar w) {
     Symmetric<Scalar, N> information;
     for (int c = 0; c < N; ++c)
-      for (int r = 0; r <= c; ++r) information(r, c) = w * of_a.value(r, c) + (Scalar{1} - w) * of_b.value(r, c);
+      for (int r = 0; r <= c; ++r)  // the same for every w where both are equal, without rounding
+        information(r, c) = of_b.value(r, c) + w * (of_a.value(r, c) - of_b.value(r, c));
     return -log_determinant(information);
   });
   InformationSum<Scalar, N> sum;

@@ -20,6 +20,8 @@ struct DifferentialDrive {
   /// Travel of a wheel for a difference of counts: 2 pi r / N * n.
   [[nodiscard]] constexpr float left_m(std::int32_t counts) const { return travel_m(left_radius_m, counts); }
   [[nodiscard]] constexpr float right_m(std::int32_t counts) const { return travel_m(right_radius_m, counts); }
+  /// 1 sigma of a travel by counts: a step has at each of its ends an even error of one count, so 1/sqrt(6) of a count.
+  [[nodiscard]] constexpr float count_sigma_m() const { return 0.41F * left_m(1); }
 
   /// ds = (r + l)/2, dyaw = (r - l)/b, covariance M Q_enc M^T with M = [1/2 1/2; 1/b -1/b]:
   /// docs/explanation/equations.md (12).

@@ -327,6 +327,17 @@ class Fusion : public OfDrive {
   filter::Estimate<float, N> fused_;
 };
 
+/// Odometry and sighting of a step, for mappers.
+[[nodiscard]] constexpr model::PlanarIncrement increment_of(const DriveInput& in) {
+  return {.ds_m = in.ds_m,
+          .dyaw_rad = in.dyaw_rad,
+          .var_ds = kSigmaDs_m * kSigmaDs_m,
+          .var_dyaw = kSigmaDyaw_rad * kSigmaDyaw_rad};
+}
+[[nodiscard]] constexpr slam::Sighting sighting_of(const DriveInput& in) {
+  return {.id = static_cast<std::uint16_t>(in.landmark), .range_m = in.range_m, .bearing_rad = in.bearing_rad};
+}
+
 /// Landmarks unknown at the start, identities known, one sighting a step.
 template <int kMap>
 class EkfMapper : public OfDrive {
@@ -342,12 +353,8 @@ class EkfMapper : public OfDrive {
                                                      kStartSigmaYaw_rad * kStartSigmaYaw_rad}));
   }
   void step(const DriveInput& in) {
-    static_cast<void>(slam_.predict({.ds_m = in.ds_m,
-                                     .dyaw_rad = in.dyaw_rad,
-                                     .var_ds = kSigmaDs_m * kSigmaDs_m,
-                                     .var_dyaw = kSigmaDyaw_rad * kSigmaDyaw_rad}));
-    const std::array<slam::Sighting, 1> seen{
-        {{.id = static_cast<std::uint16_t>(in.landmark), .range_m = in.range_m, .bearing_rad = in.bearing_rad}}};
+    static_cast<void>(slam_.predict(increment_of(in)));
+    const std::array<slam::Sighting, 1> seen{sighting_of(in)};
     int known = -1;
     for (int k = 0; k < slam_.map().size(); ++k)
       if (slam_.map()[k].id == in.landmark) known = k;
@@ -379,12 +386,8 @@ class FastMapper : public OfDrive {
     slam_.start({at.x_m, at.y_m, at.yaw_rad}, kStartSigma_m, kStartSigmaYaw_rad);
   }
   void step(const DriveInput& in) {
-    static_cast<void>(slam_.predict({.ds_m = in.ds_m,
-                                     .dyaw_rad = in.dyaw_rad,
-                                     .var_ds = kSigmaDs_m * kSigmaDs_m,
-                                     .var_dyaw = kSigmaDyaw_rad * kSigmaDyaw_rad}));
-    const std::array<slam::Sighting, 1> seen{
-        {{.id = static_cast<std::uint16_t>(in.landmark), .range_m = in.range_m, .bearing_rad = in.bearing_rad}}};
+    static_cast<void>(slam_.predict(increment_of(in)));
+    const std::array<slam::Sighting, 1> seen{sighting_of(in)};
     static_cast<void>(slam_.update(seen));
     const auto found = slam_.estimate();
     out_ = {.pose = {found.pose.x_m, found.pose.y_m, found.pose.yaw_rad}};
@@ -410,10 +413,7 @@ class GraphMapper : public OfDrive {
     step_ = 0;
   }
   void step(const DriveInput& in) {
-    const model::PlanarIncrement one{.ds_m = in.ds_m,
-                                     .dyaw_rad = in.dyaw_rad,
-                                     .var_ds = kSigmaDs_m * kSigmaDs_m,
-                                     .var_dyaw = kSigmaDyaw_rad * kSigmaDyaw_rad};
+    const model::PlanarIncrement one = increment_of(in);
     Motion moved{};
     moved.mean = {one.ds_m, 0.0F, slam::Heading<float>::from_radians(one.dyaw_rad)};
     // A straight step has no error across but the turn's, which the next step carries.

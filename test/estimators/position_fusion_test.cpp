@@ -64,6 +64,16 @@ TEST(PositionFusion, IntersectionClaimsNoMoreThanTheBetterReceiver) {
   EXPECT_NEAR(e.pose.y.minus({}), 0, 0.01);
 }
 
+TEST(PositionFusion, IntersectionOfEqualReceiversIsTheirMean) {
+  Site<Intersection> site;
+  static_cast<void>(site.fix(0, 0, 2, 1'000'000));
+  static_cast<void>(site.fix(1, 3, 2, 1'000'000));
+  const Estimate e = site.at(1'000'000);
+  EXPECT_NEAR(e.pose.y.minus({}), 1.5, 2e-3);
+  EXPECT_NEAR(e.p(0, 0), 4.0F, 1e-3F);
+  EXPECT_NEAR(e.p(1, 1), 4.0F, 1e-3F);
+}
+
 TEST(PositionFusion, OneReceiverIsEnoughAndNoneIsNotValid) {
   Site<Inverse> site;
   EXPECT_FALSE(site.at(500'000).position_valid);

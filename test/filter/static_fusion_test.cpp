@@ -153,6 +153,65 @@ TEST(CovarianceIntersection, TheSameEstimateTwiceTeachesNothing) {
   EXPECT_LT((fused.estimate.p.dense() - p).norm(), 1e-12 * p.norm());
 }
 
+template <class Scalar, int N>
+void expect_mean(const Eigen::Matrix<Scalar, N, N>& p, const Eigen::Matrix<Scalar, N, 1>& far, Scalar tolerance) {
+  filter::Estimate<Scalar, N> a{.p = Symmetric<Scalar, N>::upper_of(p)}, b = a;
+  b.x = far;
+  for (const auto& fused : {filter::covariance_intersection(a, b), filter::covariance_intersection(b, a)}) {
+    ASSERT_TRUE(fused.valid);
+    EXPECT_NEAR(fused.omega, Scalar(0.5F), Scalar(1e-5F));
+    EXPECT_LT((fused.estimate.x - far / 2).norm(), tolerance * far.norm());
+    EXPECT_LT((fused.estimate.p.dense() - p).norm(), tolerance * p.norm());
+  }
+}
+
+// Every weight claims the same covariance; only the middle favours neither.
+TEST(CovarianceIntersection, EqualCovariancesGiveTheMeanAndLeaveTheCovariance) {
+  Draw draw(49);
+  for (const double sigma_m : {1e-3, 0.3, 1.0, 7.0, 5e3}) {
+    const double variance = sigma_m * sigma_m;
+    expect_mean<float, 2>(Eigen::Matrix2f::Identity() * static_cast<float>(variance), {3, -1}, 1e-5F);
+    expect_mean<double, 2>(Eigen::Matrix2d::Identity() * variance, {3, -1}, 1e-5);
+    expect_mean<double, 1>(Eigen::Matrix<double, 1, 1>::Constant(variance), Eigen::Matrix<double, 1, 1>(2.0), 1e-5);
+  }
+  for (int i = 0; i < 200; ++i) {
+    const Matrix3d p = draw.covariance();
+    const Eigen::Vector3d far = draw.matrix().col(0);
+    expect_mean<double, 3>(p, far, 1e-5);
+    expect_mean<float, 3>(p.cast<float>(), far.cast<float>(), 1e-3F);
+  }
+}
+
+// A better estimate still wins, and rounding in a covariance does not turn the mean into one of its ends.
+TEST(CovarianceIntersection, TheMeanHoldsToRoundingAndABetterEstimateStands) {
+  const auto omega = [](float ratio) {
+    const filter::Estimate<float, 2> a{.p = Symmetric<float, 2>::diagonal({0.09F, 0.09F})};
+    const filter::Estimate<float, 2> b{.p = Symmetric<float, 2>::diagonal({0.09F * ratio, 0.09F * ratio})};
+    return filter::covariance_intersection(a, b).omega;
+  };
+  EXPECT_NEAR(omega(1.0000002F), 0.5F, 1e-5F);
+  EXPECT_NEAR(omega(0.9999998F), 0.5F, 1e-5F);
+  EXPECT_GT(omega(1.01F), 0.99F);
+  EXPECT_LT(omega(0.99F), 0.01F);
+}
+
+// Independent fixes of equal sigma: the mean's error is a share of 1/sqrt(2) of one fix's, and the claim holds.
+TEST(CovarianceIntersection, EqualFixesThatAreIndependentHaveTheErrorOfTheirMean) {
+  std::mt19937 random(50);
+  std::normal_distribution<float> normal(0.0F, 0.3F);
+  double squares = 0;
+  constexpr int kFixes = 20'000;
+  for (int i = 0; i < kFixes; ++i) {
+    std::array<filter::Estimate<float, 2>, 2> fix;
+    for (auto& one : fix) {
+      one.x = {normal(random), normal(random)};
+      one.p = Symmetric<float, 2>::diagonal({0.09F, 0.09F});
+    }
+    squares += static_cast<double>(filter::covariance_intersection(fix[0], fix[1]).estimate.x.squaredNorm());
+  }
+  EXPECT_NEAR(std::sqrt(squares / kFixes), 0.3, 0.005);  // one fix has 0.42 m
+}
+
 filter::SplitEstimate<double, 3> split(const Matrix3d& correlated, const Matrix3d& independent) {
   return {.correlated = Symmetric<double, 3>::upper_of(correlated),
           .independent = Symmetric<double, 3>::upper_of(independent)};
@@ -185,6 +244,10 @@ TEST(SplitCovarianceIntersection, ItsEndsAreIntersectionAndInverseVariance) {
     const Matrix3d pa = draw.covariance(), pb = draw.covariance();
     const auto none = filter::split_covariance_intersection(split(pa, Matrix3d::Zero()), split(pb, Matrix3d::Zero()));
     const auto intersection = filter::covariance_intersection(estimate(pa), estimate(pb));
+    const Matrix3d unit = pa(0, 0) * Matrix3d::Identity();
+    const auto equal =
+        filter::split_covariance_intersection(split(unit, Matrix3d::Zero()), split(unit, Matrix3d::Zero()));
+    EXPECT_NEAR(equal.omega, 0.5, 1e-5);
     EXPECT_NEAR(none.estimate.total().dense().determinant() / intersection.estimate.p.dense().determinant(), 1, 1e-3);
     const auto all = filter::split_covariance_intersection(split(Matrix3d::Zero(), pa), split(Matrix3d::Zero(), pb));
     const std::array<Estimate3<double>, 2> both{estimate(pa), estimate(pb)};

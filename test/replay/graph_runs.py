@@ -4,9 +4,7 @@
 that of the optimum which SciPy finds for the edges decoded from the log, and near the file's own. Robot `graph256` holds 256 keyframes, with and
 without false closures: its keyframes are compared with SciPy's optimum of the file. The short form runs two graphs, the whole one all four.
 Needs $TETAP_DATA (default ../shared/data); without it the status is 77. OUT/graphs.json holds the figures."""
-import concurrent.futures
 import csv
-import json
 import os
 import sys
 
@@ -16,7 +14,7 @@ import scipy.sparse.linalg
 
 sys.dont_write_bytecode = True
 sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
-from menu_runs import DATA, Bounds, Runs, run  # noqa: E402
+from menu_runs import DATA, run_campaign  # noqa: E402
 
 from tetap.can import bus_writer  # noqa: E402
 from tetap.dataset import pose_graph  # noqa: E402
@@ -96,16 +94,6 @@ def optimum(edges):
     return sums[-1], x
 
 
-def replayed(runs, log, robot, *settings):
-    """The summary of a replay."""
-    out = runs.path(f"{log}_{robot}")
-    words = [word for setting in settings for word in ("--set", setting)]
-    run(os.path.join(runs.programs, "tetap-play"), runs.path(f"{log}.log"), "--memory", "--robot", robot, *words, "--out", out, "--quiet")
-    run("tools/report/write_report", out, "--no-pictures")
-    with open(os.path.join(out, "summary.json"), encoding="utf-8") as file:
-        return json.load(file)
-
-
 def keyframes(folder, count):
     """{keyframe: (x, y)} of the last round: the keyframes take turns."""
     with open(os.path.join(folder, "keyframes.csv"), encoding="utf-8", newline="") as file:
@@ -126,7 +114,7 @@ def graph_path(name):
 
 def all_poses(runs, bounds, pool, names):
     logs = {name: pool.submit(runs.imported, name, "import_g2o", graph_path(name)) for name in names}
-    found = {name: pool.submit(lambda name=name: replayed(runs, logs[name].result(), "graph")) for name in names}
+    found = {name: pool.submit(lambda name=name: runs.replayed(logs[name].result(), "graph", truth=False)) for name in names}
     for name in names:
         summary = found[name].result()
         edges = edges_of_log(runs.path(f"{name}.log"))
@@ -145,7 +133,7 @@ def capacity(runs, bounds, pool, names):
         logs[name, 0] = pool.submit(lambda name=name: name)
         if name in WITH_FALSE:
             logs[name, FALSE] = pool.submit(runs.imported, f"{name}_false", "import_g2o", "--false", str(FALSE), graph_path(name))
-    found = {key: pool.submit(lambda log=log: replayed(runs, log.result(), "graph256")) for key, log in logs.items()}
+    found = {key: pool.submit(lambda log=log: runs.replayed(log.result(), "graph256", truth=False)) for key, log in logs.items()}
     for (name, false), summary in ((key, one.result()) for key, one in found.items()):
         _, x = optimum(edges_of_log(runs.path(f"{name}.log")))
         kept = keyframes(runs.path(f"{logs[name, false].result()}_graph256"), summary["poses"])
@@ -156,22 +144,11 @@ def capacity(runs, bounds, pool, names):
         bounds.check(f"{name}: graph256, {false} false closures, converged", float(summary["converged"]), 1, 1)
 
 
-def main():
-    programs, out = sys.argv[1:3]
-    whole = "--whole" in sys.argv[3:]
-    if not os.path.isdir(FOLDER):
-        print(f"  skipped: no {FOLDER} (set TETAP_DATA)")
-        sys.exit(77)
-    bounds, runs = Bounds(), Runs(programs, out)
+def campaign(runs, bounds, pool, whole):
     names = tuple(OPTIMUM) if whole else SHORT
-    with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
-        all_poses(runs, bounds, pool, names)
-        capacity(runs, bounds, pool, [name for name in names if name in ATE_256_M])
-    with open(runs.path("graphs.json"), "w", encoding="utf-8") as file:
-        json.dump(bounds.figures, file, indent=1)
-    if bounds.wrong:
-        sys.exit("outside their bounds: " + ", ".join(bounds.wrong))
+    all_poses(runs, bounds, pool, names)
+    capacity(runs, bounds, pool, [name for name in names if name in ATE_256_M])
 
 
 if __name__ == "__main__":
-    main()
+    run_campaign(FOLDER, "graphs.json", campaign)

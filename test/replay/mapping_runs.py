@@ -4,7 +4,6 @@
 MRCLAM Dataset 7 with one configuration each; a map that was recorded from the bus is the known map of the next robot. Bounds are two-sided: a
 result much better than its bound is as suspicious as a worse one. The short form runs two robots and one seed, the whole one all five and eight.
 Needs $TETAP_DATA (default ../shared/data); without it the status is 77. OUT/mapping.json holds the figures."""
-import concurrent.futures
 import csv
 import json
 import os
@@ -16,7 +15,7 @@ import numpy as np
 
 sys.dont_write_bytecode = True
 sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
-from menu_runs import DATA, Bounds, Runs, run  # noqa: E402
+from menu_runs import DATA, run_campaign  # noqa: E402
 
 from tetap.can import bus_writer  # noqa: E402
 from tetap.report import own_map  # noqa: E402
@@ -31,19 +30,9 @@ SHORT_ROBOTS, SHORT_SEEDS, SEEDS = (2, 4), (1,), range(1, 9)
 OWN_FRAMES = re.compile(r" (303|304|305)#")  # start pose and map of the importer
 
 
-def replayed(runs, log, robot, *settings, folder=None, truth=None):
-    """The summary of a replay."""
-    out = runs.path(folder or f"{log}_{robot}")
-    words = [word for setting in settings for word in ("--set", setting)]
-    run(os.path.join(runs.programs, "tetap-play"), runs.path(f"{log}.log"), "--memory", "--robot", robot, *words, "--out", out, "--quiet")
-    run("tools/report/write_report", out, "--truth", runs.path(f"{truth or log}.truth.csv"), "--no-pictures")
-    with open(os.path.join(out, "summary.json"), encoding="utf-8") as file:
-        return json.load(file)
-
-
 def ekf_slam(runs, bounds, pool, robots):
     logs = {k: pool.submit(runs.imported, f"slam{k}", "import_mrclam", "--no-map", FOLDER, str(k)) for k in robots}
-    found = {k: pool.submit(lambda k=k: replayed(runs, logs[k].result(), "mrclam_slam")) for k in robots}
+    found = {k: pool.submit(lambda k=k: runs.replayed(logs[k].result(), "mrclam_slam")) for k in robots}
     for k in robots:
         summary, (trajectory_m, map_m, nees) = found[k].result(), EKF_SLAM[k]
         bounds.check(f"robot {k}: mrclam_slam trajectory, aligned [m]", summary["trajectory_rmse_aligned_m"], LEAST_SHARE * trajectory_m, trajectory_m)
@@ -55,7 +44,7 @@ def ekf_slam(runs, bounds, pool, robots):
 
 
 def fast_slam(runs, bounds, pool, robots, seeds):
-    found = {(k, seed): pool.submit(replayed, runs, f"slam{k}", "mrclam_fast", f"mapping.seed={seed}", folder=f"slam{k}_fast{seed}")
+    found = {(k, seed): pool.submit(runs.replayed, f"slam{k}", "mrclam_fast", f"mapping.seed={seed}", folder=f"slam{k}_fast{seed}")
              for k in robots for seed in seeds}
     for k in robots:
         errors = [found[k, seed].result()["trajectory_rmse_aligned_m"] for seed in seeds]
@@ -103,30 +92,19 @@ def on_own_map(runs, k):
 
 
 def map_law(runs, bounds, pool, robots):
-    given = {k: pool.submit(lambda k=k: replayed(runs, runs.imported(f"given{k}", "import_mrclam", FOLDER, str(k)), "mrclam")) for k in robots}
-    own = {k: pool.submit(lambda k=k: replayed(runs, on_own_map(runs, k), "mrclam")) for k in robots}
+    given = {k: pool.submit(lambda k=k: runs.replayed(runs.imported(f"given{k}", "import_mrclam", FOLDER, str(k)), "mrclam")) for k in robots}
+    own = {k: pool.submit(lambda k=k: runs.replayed(on_own_map(runs, k), "mrclam")) for k in robots}
     for k in robots:
         on_given, on_own = given[k].result(), own[k].result()
         bounds.check(f"robot {k}: mrclam on the recorded map over the given one", on_own["position_rmse_m"] / on_given["position_rmse_m"], 0.5, MAP_LAW)
 
 
-def main():
-    programs, out = sys.argv[1:3]
-    whole = "--whole" in sys.argv[3:]
-    if not os.path.isdir(FOLDER):
-        print(f"  skipped: no {FOLDER} (set TETAP_DATA)")
-        sys.exit(77)
-    bounds, runs = Bounds(), Runs(programs, out)
+def campaign(runs, bounds, pool, whole):
     robots, seeds = (tuple(EKF_SLAM), tuple(SEEDS)) if whole else (SHORT_ROBOTS, SHORT_SEEDS)
-    with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
-        ekf_slam(runs, bounds, pool, robots)
-        fast_slam(runs, bounds, pool, robots if whole else robots[:1], seeds)
-        map_law(runs, bounds, pool, robots if whole else robots[:1])
-    with open(runs.path("mapping.json"), "w", encoding="utf-8") as file:
-        json.dump(bounds.figures, file, indent=1)
-    if bounds.wrong:
-        sys.exit("outside their bounds: " + ", ".join(bounds.wrong))
+    ekf_slam(runs, bounds, pool, robots)
+    fast_slam(runs, bounds, pool, robots if whole else robots[:1], seeds)
+    map_law(runs, bounds, pool, robots if whole else robots[:1])
 
 
 if __name__ == "__main__":
-    main()
+    run_campaign(FOLDER, "mapping.json", campaign)

@@ -48,11 +48,12 @@ class Runs:
         run(f"tools/dataset/{tool}", *words, self.path(name))
         return name
 
-    def replayed(self, log, robot, *settings, folder=None):
+    def replayed(self, log, robot, *settings, folder=None, truth=True):
         folder = self.path(folder or f"{log}_{robot}")
         words = [word for setting in settings for word in ("--set", setting)]
         run(os.path.join(self.programs, "tetap-play"), self.path(f"{log}.log"), "--memory", "--robot", robot, "--out", folder, "--quiet", *words)
-        run("tools/report/write_report", folder, "--truth", self.path(f"{log}.truth.csv"), "--no-pictures")
+        truth = ["--truth", self.path(f"{log}.truth.csv")] if truth else []
+        run("tools/report/write_report", folder, *truth, "--no-pictures")
         with open(os.path.join(folder, "summary.json"), encoding="utf-8") as file:
             return json.load(file)
 
@@ -68,6 +69,25 @@ class Bounds:
         self.figures[what] = {"value": value, "low": low, "high": high}
         if not held:
             self.wrong.append(what)
+
+    def finish(self, path):
+        """Writes the figures; ends the program where one is outside its bounds."""
+        with open(path, "w", encoding="utf-8") as file:
+            json.dump(self.figures, file, indent=1)
+        if self.wrong:
+            sys.exit("outside their bounds: " + ", ".join(self.wrong))
+
+
+def run_campaign(folder, figures, campaign):
+    """PROGRAMS OUT [--whole] from the command line: campaign(runs, bounds, pool, whole) on the data in `folder`; status 77 without it."""
+    programs, out, *words = sys.argv[1:]
+    if not os.path.isdir(folder):
+        print(f"  skipped: no {folder} (set TETAP_DATA)")
+        sys.exit(77)
+    bounds, runs = Bounds(), Runs(programs, out)
+    with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
+        campaign(runs, bounds, pool, "--whole" in words)
+    bounds.finish(runs.path(figures))
 
 
 def mrclam(runs, bounds, pool):
@@ -279,12 +299,9 @@ def main():
             there = True
             for part in parts:
                 part(runs, bounds, pool)
-    with open(runs.path("menu.json"), "w", encoding="utf-8") as file:
-        json.dump(bounds.figures, file, indent=1)
+    bounds.finish(runs.path("menu.json"))
     if not there:
         sys.exit(77)
-    if bounds.wrong:
-        sys.exit("outside their bounds: " + ", ".join(bounds.wrong))
 
 
 if __name__ == "__main__":

@@ -85,7 +85,7 @@ inline std::optional<WheelReading> EncoderInterval::update(const sensor::WheelCo
   const float per_s = 1.0F / base::seconds(interval);
   WheelReading reading{.wheels = {.left_mps = drive.left_m(left) * per_s, .right_mps = drive.right_m(right) * per_s},
                        .later_mps = later_mps};
-  const float count_mps = 0.41F * drive.left_m(1) * per_s;
+  const float count_mps = drive.count_sigma_m() * per_s;
   const float mean_mps = filter.tracking() ? filter.forward_mps() : reading.mean_mps();
   const float half_mps = filter.tracking() ? 0.5F * drive.track_m * filter.turn_b_radps()(2)
                                            : 0.5F * (reading.wheels.right_mps - reading.wheels.left_mps);

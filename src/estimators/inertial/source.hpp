@@ -18,6 +18,9 @@ namespace tetap::estimators {
 using sensor::Check;
 using sensor::SourceState;
 
+/// Ratio of two variances from which an update by the smaller one changes the larger one noticeably.
+inline constexpr float kLeastVarianceRatio = 1.05F;
+
 enum class Action : std::uint8_t {
   kFuse,            ///< update the filter
   kSkip,            ///< leave the measurement out: it is no news, or waits for others

@@ -9,10 +9,9 @@ void Inertial::restart(base::Micros t, const Context& ctx) {
   base::reinitialise(*this);
   time_ = t;
   set_noise(ctx.parameters.inertial);
-  const param::StartParameters& s = ctx.parameters.start;
-  if (s.known != 0)
-    alignment_.place({.x = base::Anchored{}.plus(s.x_m), .y = base::Anchored{}.plus(s.y_m), .yaw_rad = s.yaw_rad},
-                     s.sigma_position_m, s.sigma_yaw_rad);
+  if (ctx.parameters.start.known == 0) return;
+  const SetPose start = start_pose(ctx.parameters.start);
+  alignment_.place(start.pose, start.sigma_position_m, start.sigma_yaw_rad);
 }
 
 void Inertial::set_pose(base::Micros, const SetPose& given, const Context& ctx) {

@@ -78,14 +78,9 @@ template <class Graph>
 void GraphMapper<Graph>::restart(base::Micros t, const Context& ctx) {
   base::reinitialise(*this);
   now_ = before_ = stepped_ = last_closure_ = t;
-  const param::StartParameters& s = ctx.parameters.start;
-  const bool known = s.known != 0;
   motion_.start(t, {}, 0.0F, 0.0F);
-  const model::PlanarPose pose = known ? model::PlanarPose{.x = base::Anchored{}.plus(s.x_m),
-                                                           .y = base::Anchored{}.plus(s.y_m),
-                                                           .yaw_rad = s.yaw_rad}
-                                       : model::PlanarPose{};
-  place(t, pose, known ? covariance_of_pose(s.sigma_position_m, s.sigma_yaw_rad) : covariance_of_pose(0.0F, 0.0F));
+  const MapStart start(ctx.parameters.start);
+  place(t, start.pose, start.p);
   present_ = motion_;
 }
 

@@ -11,18 +11,11 @@ template <class Engine>
 void PlanarMapper<Engine>::restart(base::Micros t, const Context& ctx) {
   base::reinitialise(*this);
   last_absolute_ = now_ = t;
-  const param::StartParameters& s = ctx.parameters.start;
-  const bool known = s.known != 0;
-  const model::PlanarPose pose = known ? model::PlanarPose{.x = base::Anchored{}.plus(s.x_m),
-                                                           .y = base::Anchored{}.plus(s.y_m),
-                                                           .yaw_rad = s.yaw_rad}
-                                       : model::PlanarPose{};
-  const filter::Symmetric<float, 3> p =
-      known ? covariance_of_pose(s.sigma_position_m, s.sigma_yaw_rad) : covariance_of_pose(0.0F, 0.0F);
-  motion_.start(t, pose, 0.0F, 0.0F);
-  adopt_pose(pose, p);
+  const MapStart start(ctx.parameters.start);
+  motion_.start(t, start.pose, 0.0F, 0.0F);
+  adopt_pose(start.pose, start.p);
   engine_.configure(ctx.parameters);
-  engine_.start(pose, p);
+  engine_.start(start.pose, start.p);
   present_ = motion_;
 }
 

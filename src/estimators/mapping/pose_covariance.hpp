@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Covariance of a pose that a command or the parameters state, for estimators that make a map.
+// Pose and covariance that a command or the parameters state, for estimators that make a map.
 #pragma once
 
+#include "estimators/context.hpp"
 #include "estimators/estimate.hpp"
 
 namespace tetap::estimators {
@@ -15,5 +16,17 @@ namespace tetap::estimators {
   const float yaw_rad = !heading ? kUnknown_rad : sigma_yaw_rad > kFinest_rad ? sigma_yaw_rad : kFinest_rad;
   return filter::Symmetric<float, 3>::diagonal({place_m * place_m, place_m * place_m, yaw_rad * yaw_rad});
 }
+
+/// Where a map begins: the pose of the parameters where that is known, else the origin with certainty.
+struct MapStart {
+  model::PlanarPose pose;
+  filter::Symmetric<float, 3> p;
+
+  explicit MapStart(const param::StartParameters& s) : p(covariance_of_pose(0.0F, 0.0F)) {
+    if (s.known == 0) return;
+    pose = start_pose(s).pose;
+    p = covariance_of_pose(s.sigma_position_m, s.sigma_yaw_rad);
+  }
+};
 
 }  // namespace tetap::estimators

@@ -168,7 +168,7 @@ template <class Filter>
   const float period_s = base::seconds(base::Micros{n.loop.period_us});
   const bool gyro = gyro_shows(out_time_, n);
   const model::PlanarIncrement one = held_increment(period_s, gyro, n);
-  const float step_m = have_counts_ ? 0.41F * n.wheels.drive.left_m(1) : 0.0F;
+  const float step_m = have_counts_ ? n.wheels.drive.count_sigma_m() : 0.0F;
   const float track_m = n.wheels.drive.track_m;
   const float step_rad = gyro || !have_counts_ ? 0.0F : step_m / track_m;
   // Samples are means, too: true in their middle.

@@ -35,13 +35,8 @@ class PoseFilter {
 
   void restart(base::Micros t, const Context& ctx) {
     *this = {};
-    const param::StartParameters& s = ctx.parameters.start;
-    const SetPose start{
-        .pose = {.x = base::Anchored{}.plus(s.x_m), .y = base::Anchored{}.plus(s.y_m), .yaw_rad = s.yaw_rad},
-        .sigma_position_m = s.sigma_position_m,
-        .sigma_yaw_rad = s.sigma_yaw_rad};
-    if (s.known != 0) {
-      set_pose(t, start, ctx);
+    if (ctx.parameters.start.known != 0) {
+      set_pose(t, start_pose(ctx.parameters.start), ctx);
     } else {
       motion_.start(t, model::PlanarPose{}, kUnknown_m, kFreeHeading_rad);
     }

@@ -21,12 +21,7 @@ void PoseParticles<kMost>::restart(base::Micros t, const Context& ctx) {
   base::reinitialise(*this);
   cloud_.cloud.set_key({kKey, kFirstSeed + static_cast<std::uint32_t>(ctx.parameters.mapping.seed)});
   moved_ = last_absolute_ = now_ = t;
-  const param::StartParameters& s = ctx.parameters.start;
-  const SetPose start{
-      .pose = {.x = base::Anchored{}.plus(s.x_m), .y = base::Anchored{}.plus(s.y_m), .yaw_rad = s.yaw_rad},
-      .sigma_position_m = s.sigma_position_m,
-      .sigma_yaw_rad = s.sigma_yaw_rad};
-  if (s.known != 0) return set_pose(t, start, ctx);
+  if (ctx.parameters.start.known != 0) return set_pose(t, start_pose(ctx.parameters.start), ctx);
   motion_.start(t, model::PlanarPose{}, kUnknown_m, kUnknown_rad);
   present_ = motion_;
 }

@@ -59,8 +59,6 @@ class Barometer {
   }
 
  private:
-  static constexpr float kWorth = 1.05F;  ///< a variance has to be off by so much for an update to change anything
-
   [[nodiscard]] float innovation_m(const HeightMeasurement& z) const {
     return z.altitude_m - zero_.zero_m() - z.height_m;
   }
@@ -99,8 +97,8 @@ inline Assessment Barometer::assess_pressure(const sensor::AirPressure& air, con
     return a;
   }
   zero_.agreed(filter.stamp());
-  if (p_z > kWorth * p_b) return a;
-  if (p_b > kWorth * p_z) zero_.correct(nu, p_b, p_z, white, z.altitude_m);
+  if (p_z > kLeastVarianceRatio * p_b) return a;
+  if (p_b > kLeastVarianceRatio * p_z) zero_.correct(nu, p_b, p_z, white, z.altitude_m);
   a.action = Action::kSkip;
   return a;
 }

@@ -169,10 +169,9 @@ inline void Magnetometer::judge_trust(Assessment& a, float nu, const FilterView&
 }
 
 inline bool Magnetometer::weigh(FieldMeasurement& z, const FilterView& filter) {
-  constexpr float kWorth = 1.05F;  // a variance has to be off by so much for an update to change anything
   const float sigma_rad = filter.parameters().magnetic.sigma_rad, floor = sigma_rad * sigma_rad;
   const float p_yaw = filter.p()(nav::InsState::kYaw, nav::InsState::kYaw);
-  if (!(p_yaw > kWorth * floor)) return false;
+  if (!(p_yaw > kLeastVarianceRatio * floor)) return false;
   const Expected e = expected(z.direction, filter);
   const float target_variance = e.with_heading * e.with_heading / (p_yaw - floor) - e.variance;
   z.direction.sigma_rad = base::sqrt(target_variance > floor ? target_variance : floor);

@@ -12,11 +12,12 @@ from tetap.proof import costs
 REGION = re.compile(r"<!-- figures: (\w+) -->\n.*?<!-- end -->\n", re.S)
 IMAGES = [("tetap-zynqmp_r5-rover", "Cortex-R5F, rover"), ("tetap-mps2_m7-rover", "Cortex-M7, rover"), ("tetap-mps2_m4f-rover", "Cortex-M4F, rover"),
           ("tetap-zynqmp_r5-mrclam", "Cortex-R5F, mrclam")]
-WORKLOADS = ["sincos", "atan2", "exp", "log", "w1_kf", "w1_kf_conditioned", "w2_textbook", "w2_ekf", "w3_ukf", "w3_ukf_sqrt", "w6_pf1000", "fuse_range_bearing", "w4_ahrs6", "w4_ahrs9", "ahrs9", "ins_strapdown",
+WORKLOADS = ["sincos", "atan2", "exp", "log", "w1_kf", "w1_kf_conditioned", "w2_textbook", "w2_ekf", "w3_ukf", "w3_ukf_sqrt", "w6_pf1000", "pose_grid_work", "fuse_range_bearing", "w4_ahrs6", "w4_ahrs9", "ahrs9", "ins_strapdown",
              "ins_covariance", "w5_ins", "ins_tick", "ins_tick_rover", "ins_tick_car", "ins_tick_iris", "node_tick", "node_tick_faults", "mrclam_tick"]
 ESTIMATORS = [("`Inertial`, a tick with an IMU of 200 Hz", "ins_tick_rover"), ("`PoseEkf`, a sighting of a landmark", "fuse_range_bearing"),
               ("`filter::Ekf`, a step with range and bearing", "w2_ekf"), ("`filter::Ukf`, the same", "w3_ukf"), ("`filter::UkfSqrt`, the same", "w3_ukf_sqrt"),
-              ("`PoseParticles`, 1000 particles and four landmarks", "w6_pf1000"), ("`Attitude`, a step with magnetometer", "ahrs9"),
+              ("`PoseParticles`, 1000 particles and four landmarks", "w6_pf1000"), ("`PoseGrid`, a tick of a step: 100 of up to 3 840 lines", "pose_grid_work"),
+              ("`Attitude`, a step with magnetometer", "ahrs9"),
               ("plain Mahony, a step with magnetometer", "w4_ahrs9"), ("`Odometry`, a sample of wheel counts", "dead_reckoning_counts"),
               ("`Odometry`, a sample with gyroscope", "dead_reckoning_gyro"), ("`filter::Kalman`, an update of 2 in 4 states", "w1_kf_conditioned"),
               ("`filter::StructuredKalman`, the same", "w1_kf"), ("the rover's whole node, a tick of 10 ms", "node_tick")]
