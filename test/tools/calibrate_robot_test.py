@@ -237,7 +237,7 @@ class Gyroscope(Judged):
 class Magnetometer(Judged):
     FIELD = 48.0
 
-    def log(self, seed, directions, noise=0.3, disturbed=0):
+    def log(self, seed, directions, noise=0.3, disturbed=0, motor_uT=0.0):
         random, made = chance(seed), Made()
         soft = np.eye(3) + 0.1 * (lambda a: a + a.T)(random.normal(size=(3, 3))) / 2
         soft /= np.linalg.det(soft) ** (1 / 3)
@@ -245,6 +245,7 @@ class Magnetometer(Judged):
         flux = (self.FIELD * directions) @ np.linalg.inv(soft).T + hard + random.normal(0, noise, directions.shape)
         if disturbed:
             flux[200:200 + disturbed] += [15, -10, 5]
+        flux += motor_uT * np.array([0.6, 0.0, 0.8]) * (np.arange(len(flux)) // 250 % 2)[:, None]  # on and off every 5 s
         made.sensor("In_Mag", np.arange(len(flux)) * 0.02, FluxX=flux[:, 0], FluxY=flux[:, 1], FluxZ=flux[:, 2])
         return read(made), hard, soft
 
@@ -272,6 +273,14 @@ class Magnetometer(Judged):
     def test_a_disturbance_in_passing_does_not_count(self):
         log, hard, _ = self.log(3, self.tumbling(3), disturbed=60)
         np.testing.assert_allclose(magnetometer.magnetometer(log).number("hard iron").value, hard, atol=0.6)
+
+    def test_a_motor_that_runs_half_of_the_time_is_refused_and_a_noisy_sensor_is_not(self):
+        for seed in (0, 2, 3):
+            for motor_uT in (16, 24):
+                self.refuses(["field moves", "motor"], lambda seed=seed, uT=motor_uT: magnetometer.magnetometer(
+                    self.log(seed, self.tumbling(seed), motor_uT=uT)[0]))
+            log, hard, _ = self.log(seed, self.tumbling(seed), noise=3.0)
+            np.testing.assert_allclose(magnetometer.magnetometer(log).number("hard iron").value, hard, atol=3.0)
 
     def test_turning_on_the_spot_only_is_refused_with_what_to_do(self):
         angle = np.linspace(0, 30, 3000)

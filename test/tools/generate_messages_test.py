@@ -480,6 +480,7 @@ class Decode(Folder):
         self.assertEqual(self.said(plain).stdout, self.WORDS.split(" ", 1)[1])
         extra = " (1700000000.010000)  vcan0  RX - -  32F   [8]  10 27 18 FC 00 80 55 00   '.'....U.'\n"
         self.assertEqual(self.said(extra).stdout, self.WORDS)
+        self.assertIn("32F ? CAN FD, 8 bytes", self.said(plain.replace("[8]", "[08]")).stdout)
 
     def test_names_enums_pages_and_bits(self):
         self.assertIn("In_Sync Time=1 us Ctr=2 Kind=Step", self.said("(0.0) can0 300#0100000000000201\n").stdout)

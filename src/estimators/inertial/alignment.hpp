@@ -74,10 +74,10 @@ class Alignment {
   [[nodiscard]] bool ready() const { return placed_ && headed_; }
 
   /// State and variances to start with, on the level plane of the place. `before`: the filter's state where it ran,
-  /// whose tilt and biases stay; else null. forward_mps: of the wheels; NaN: none.
+  /// whose tilt and biases stay; else null. forward_mps: of the wheels; NaN: none. `now`: time of the state.
   [[nodiscard, gnu::cold]] Start start(const nav::InsState* before, const nav::LocalLevel& place,
                                        const HeadingMonitor& monitor, const param::InertialParameters& n,
-                                       float forward_mps) const;
+                                       float forward_mps, base::Micros now) const;
 
   template <class Sink>
   void hash_state(Sink&& sink) const {
@@ -196,7 +196,7 @@ inline void Alignment::velocity(const nav::Vector3& v_n_mps, float sigma_mps, bo
 /// correlated here: the constraint would take the rest for knowledge of the heading.
 inline Alignment::Start Alignment::start(const nav::InsState* before, const nav::LocalLevel& place,
                                          const HeadingMonitor& monitor, const param::InertialParameters& n,
-                                         float forward_mps) const {
+                                         float forward_mps, base::Micros now) const {
   const bool again = before != nullptr;
   const bool rolls = !again && !monitor.has_velocity() && base::abs(forward_mps) < kFastest_mps;
   nav::InsState x = again ? *before : nav::InsState{};
@@ -207,13 +207,20 @@ inline Alignment::Start Alignment::start(const nav::InsState* before, const nav:
   const nav::Quaternion level = again ? before->q_nb : place.q_nl * levelling_.attitude();
   x.q_nb = (nav::exp_quaternion(turn * place.up_n) * level).renormalised();
   if (!again) x.v_n_mps = rolls ? x.q_nb.rotated_x() * forward_mps : v_n_mps_;
-  const float h = at_.sigma_horizontal_m * at_.sigma_horizontal_m, v = at_.sigma_vertical_m * at_.sigma_vertical_m;
   const float sideways_mps = rolls ? 3.0F * sigma_yaw_rad_ * forward_mps : 0.0F;
   // A given pose has no speed.
   const bool unseen = !again && !monitor.has_velocity() && given_ && has_fixes_;
   const float own_mps = rolls ? kSlip_mps : unseen ? kUnseen_mps : sigma_v_mps_;
   const float speed = own_mps * own_mps + sideways_mps * sideways_mps;
   const float climb = sigma_climb_mps_ * sigma_climb_mps_;
+  // A fix is true at its own stamp, and the robot went on since then; a given pose is that of now.
+  const float since_s = given_ || again ? 0.0F : base::seconds(now - fixed_at_);
+  nav::move(x.x, x.v_n_mps(0) * since_s);
+  nav::move(x.y, x.v_n_mps(1) * since_s);
+  nav::move(x.z, x.v_n_mps(2) * since_s);
+  const float since_s2 = since_s * since_s;
+  const float h = at_.sigma_horizontal_m * at_.sigma_horizontal_m + speed * since_s2;
+  const float v = at_.sigma_vertical_m * at_.sigma_vertical_m + climb * since_s2;
   const float tilt = n.start_tilt_rad * n.start_tilt_rad;
   const float a = n.accel_turn_on_mps2 * n.accel_turn_on_mps2, g = n.gyro_turn_on_radps * n.gyro_turn_on_radps;
   return {x, {h, h, v, speed, speed, climb, tilt, tilt, sigma_yaw_rad_ * sigma_yaw_rad_, a, a, a, g, g, g}};

@@ -43,7 +43,7 @@ void Inertial::begin(const Context& ctx) {
   const float forward_mps = view(time_, ctx).wheels_timed_out() ? base::kNan : sources_.forward.last_mps();
   set_level(alignment_.at().x, alignment_.at().y, alignment_.at().z, ctx);
   const Alignment::Start start =
-      alignment_.start(tracking() ? &ins_.x : nullptr, level_, heading_monitor_, n, forward_mps);
+      alignment_.start(tracking() ? &ins_.x : nullptr, level_, heading_monitor_, n, forward_mps, time_);
   Recovery::restart(ins_, start.x, start.variances);
   phase_ = Phase::kTracking;
   standstill_.restart_means();

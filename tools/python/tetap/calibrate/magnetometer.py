@@ -16,7 +16,7 @@ from tetap.calibrate.robot_numbers import Part, Refusal
 AXES = ("x", "y", "z")
 CELLS = 240
 LEAST_CELLS = 40        # least number of cells with a sample
-MOST_HARD, MOST_SOFT = 0.03, 0.03  # 1 sigma as a share of the field: with more the number is refused
+MOST_HARD, MOST_SOFT = 0.03, 0.03  # 1 sigma, or residual that lasts, as a share of the field: with more the number is refused
 LEAST_SPREAD = 0.04     # smallest eigenvalue of the directions' covariance; 1/3 when all directions are there
 OUTLIER = 5.0           # times the scatter
 
@@ -69,6 +69,12 @@ def _rows(m, p):
     jacobian = np.concatenate([-(u @ s), np.stack([u[:, 0] * a, u[:, 1] * b, u[:, 2] * c, u[:, 0] * b + u[:, 1] * a,
                                                    u[:, 0] * c + u[:, 2] * a, u[:, 1] * c + u[:, 2] * b], axis=1)], axis=1)
     return size - 1, jacobian, u
+
+
+def _lasting(r):
+    """Scatter of the residuals less that from one sample to the next: noise is new in each sample, another field is not."""
+    noise = 1.4826 * np.median(np.abs(np.diff(r))) / 2**0.5
+    return max(0.0, np.var(r) - noise**2) ** 0.5
 
 
 def magnetometer(log):
@@ -144,6 +150,10 @@ def magnetometer(log):
     hard_sigma = np.sqrt(np.diag(covariance))[:3]
     if hard_sigma.max() > MOST_HARD * field or soft_sigma[:9].max() > MOST_SOFT:
         raise Refusal(f"Hard iron comes out to {hard_sigma.max():.1f} uT and soft iron to {soft_sigma[:9].max():.3f} only (1 sigma).", how)
+    lasting = _lasting(_rows(m, p)[0][keep])
+    if lasting > MOST_HARD:
+        raise Refusal(f"The field moves: on the best ellipsoid the readings are off by {lasting * field:.1f} of {field:.1f} uT for longer than a sample. "
+                      "A motor, a current or iron near the sensor adds a field of its own.", "the same with motors and loads off, or with a constant current")
     part.add("hard iron", p[:3], hard_sigma, "uT", "magnetic.hard_iron_uT", AXES, 4)
     part.add("soft iron: m = S (raw - hard)", s * field, soft_sigma[:9], "1", "magnetic.soft_iron", tuple(a + b for a in AXES for b in AXES))
     part.add("field strength", field, soft_sigma[9], "uT", "magnetic.norm_uT")

@@ -16,7 +16,7 @@ from tetap.can.bus_writer import DEFAULT_DBC
 
 # candump -L: (time) interface ID#DATA, ID#R[length] (remote), ID##FDATA (CAN FD), then R or T for the direction
 LOG = re.compile(rb"\s*\((\d+\.\d+)\)\s+(\S+)\s+([0-9A-Fa-f]{3}|[0-9A-Fa-f]{8})#(#[0-9A-Fa-f]|)([0-9A-Fa-f]*|R[0-9A-Fa-f]?)(?:\s+[RTB])?\s*$")
-# candump: [(time)] interface [RX - -] ID [length] bytes, then the bytes as text
+# candump: [(time)] interface [RX - -] ID [length] bytes, then the bytes as text; the length of a CAN FD frame has two digits (can-utils, lib.c)
 PLAIN = re.compile(rb"\s*(?:\((\d[\d.:\- ]*)\)\s+)?(\S+)\s+(?:(?:RX|TX)\s+\S\s+\S\s+)?([0-9A-Fa-f]{3}|[0-9A-Fa-f]{8})\s+\[(\d+)\]"
                    rb"((?:\s+[0-9A-Fa-f]{2})*)(?:\s+(remote request|ERRORFRAME))?(?:\s+'.*')?\s*$")
 
@@ -153,7 +153,7 @@ def parse(line):
             return time, interface, frame_id, None, "remote request"
         if len(data) != int(length):
             raise Malformed("%d bytes announced, %d there" % (int(length), len(data)))
-        if int(length) > 8:
+        if len(length) > 1:
             return time, interface, frame_id, None, "CAN FD, %d bytes" % len(data)
     if len(data) > 8:
         raise Malformed("%d bytes in a classic frame" % len(data))

@@ -2,8 +2,9 @@
 """Laws of a replay that need no truth: a log is changed so that the answer is known from the answer to the log itself.
 
 Metamorphic relations (Chen, Cheung, Yiu, HKUST-CS98-01, 1998). Four leave the answer alone: IMU stamps one microsecond later, one least digit
-of one field, another order of the frames of a tick, every frame twice. Three move it by a symmetry of the Earth and of the robot: another
-longitude, another time, and the mirror image. A log is a list of faulty_log.Frame; nothing here shares code with the node.
+of one field, another order of the frames of a tick, every frame twice. Four move it by a symmetry of the Earth and of the robot: another
+longitude, another time, the mirror image, and a quarter turn (turned_log). A log is a list of faulty_log.Frame; nothing here shares code with the
+node.
 
 A mirror swaps left and right of the robot and north and south of the Earth. Polar vectors change the sign of y, axial ones (turn rates, magnetic
 flux) those of x and z. The Earth's rotation and gravity are the same in the image, so the law holds for inertial navigation, too.
@@ -19,6 +20,7 @@ import numpy as np
 from tetap.can import faulty_log
 from tetap.can.bus_writer import STAMP_MASK, BadInput, Dbc, crc8
 from tetap.can.faulty_log import Fields
+from tetap.proof import turned_log
 
 LONGITUDE_2ndeg = 15_000_000_000   # 30 deg
 TIME_us = 3_600_123_457            # no whole wrap of a stamp, no whole tick
@@ -165,6 +167,11 @@ class Changes:
             out.append(self._sealed(frame))
         return out, mirrored(parameters)
 
+    def turn(self, frames, parameters, _):
+        """The run turned by 90 deg about the origin."""
+        turned = turned_log.TurnedLog(self.fields, self.name, frames, parameters).frames(frames)
+        return [self._sealed(frame) for frame in turned], turned_log.turned_parameters(parameters)
+
 
 def mirrored(parameters):
     """Parameters of the mirror image, by path as text."""
@@ -212,49 +219,94 @@ class Replay:
             return list(csv.DictReader(file))
 
 
-LAWS = ("imu_stamps", "least_digit", "tick_order", "twice", "longitude", "time", "mirror")
+LAWS = ("imu_stamps", "least_digit", "tick_order", "twice", "longitude", "time", "mirror", "turn")
+# Where a law asks for it, the image of a pose (x, y, yaw); and parameters that the log itself is replayed with, too.
+IMAGES = {"mirror": lambda pose: (pose[0], -pose[1], -pose[2]), "turn": turned_log.turned_pose}
+BASES = {"turn": turned_log.SAME_EARTH}
 MOST_m, MOST_SIGMA, MOST_rad = 1e-3, 0.05, 1e-6
 STEP_m, STEP_rad = 1e-3, 1e-4  # bus steps of the published position and heading
 
 
 class Difference:
-    """Largest difference between the poses of two replays; beyond what the rounding of the bus explains, in sigmas where it is more than 1 mm."""
+    """Largest difference between the poses of two replays; beyond what the rounding of the bus explains, in sigmas where it is more than 1 mm.
+    `late`: epochs at which one of the two took a step of the other a tick later."""
 
     def __init__(self):
-        self.epochs, self.missing, self.m, self.rad, self.broken, self.sigma, self.at_s = 0, 0, 0.0, 0.0, 0, 0.0, None
+        self.epochs, self.missing, self.late, self.m, self.rad, self.broken, self.sigma, self.at_s = 0, 0, 0, 0.0, 0.0, 0, 0.0, None
 
-    def add(self, one, other, sigma_m, sigma_rad, time_s):
-        """Poses (x, y, yaw) in metres and radians with the 1 sigma of the first."""
+    def add(self, pairs, sigma, time_s):
+        """`pairs`: ways in which two poses (x, y, yaw; metres, radians) may be the same, each a list of (one, other, steps of rounding) of which all
+        have to fit; the first is that of the same epoch. `sigma`: of the first pose, (metres, radians)."""
         self.epochs += 1
-        distance_m = math.hypot(one[0] - other[0], one[1] - other[1])
-        turn_rad = abs(math.remainder(one[2] - other[2], 2 * math.pi))
-        self.m, self.rad = max(self.m, distance_m), max(self.rad, turn_rad)
-        beyond_m, beyond_rad = max(0.0, distance_m - math.sqrt(2) * STEP_m), max(0.0, turn_rad - STEP_rad)
-        self.sigma = max(self.sigma, beyond_m / sigma_m if sigma_m else 0.0, beyond_rad / sigma_rad if sigma_rad else 0.0)
-        if beyond_m > max(MOST_m, MOST_SIGMA * sigma_m) or beyond_rad > max(MOST_rad, MOST_SIGMA * sigma_rad):
+        fits = [max((Fit(*pair, *sigma) for pair in way), key=lambda fit: (fit.broken, fit.sigma, fit.m)) for way in pairs]
+        best = next((fit for fit in fits if not fit.broken), fits[0])
+        self.late += best is not fits[0]
+        self.m, self.rad, self.sigma = max(self.m, best.m), max(self.rad, best.rad), max(self.sigma, best.sigma)
+        if best.broken:
             self.broken += 1
             self.at_s = time_s if self.at_s is None else self.at_s
 
 
+class Fit:
+    """How far one pose is from another."""
+
+    def __init__(self, one, other, steps, sigma_m, sigma_rad):
+        self.m = math.hypot(one[0] - other[0], one[1] - other[1])
+        self.rad = abs(math.remainder(one[2] - other[2], 2 * math.pi))
+        beyond_m, beyond_rad = max(0.0, self.m - steps * math.sqrt(2) * STEP_m), max(0.0, self.rad - steps * STEP_rad)
+        self.sigma = max(beyond_m / sigma_m if sigma_m else 0.0, beyond_rad / sigma_rad if sigma_rad else 0.0)
+        self.broken = beyond_m > max(MOST_m, MOST_SIGMA * sigma_m) or beyond_rad > max(MOST_rad, MOST_SIGMA * sigma_rad)
+
+
+def carried_on(rows, epoch, way=1):
+    """The pose at an epoch, if the motion of the tick before it went on (way -1: of the tick after it, backwards); None where a pose is missing. What
+    was corrected at this epoch is not in it."""
+    before, last = rows.get(epoch - 2 * way), rows.get(epoch - way)
+    if before is None or last is None:
+        return None
+    return tuple(2 * b - a for a, b in zip(before[:2], last[:2])) + (last[2] + math.remainder(last[2] - before[2], 2 * math.pi),)
+
+
+def ways(mine, theirs, epoch):
+    """How two runs may show the same at an epoch: at once, or one makes its step a tick after the other."""
+    found = [[(mine[epoch], theirs[epoch], 1)]]
+    for early, late in ((mine, theirs), (theirs, mine)):
+        before, after = carried_on(early, epoch), carried_on(late, epoch, -1)
+        if before is not None and after is not None:
+            found.append([(before, late[epoch], 2), (after, early[epoch], 2)])
+    return found
+
+
+def poses(rows, image=lambda pose: pose):
+    """Poses of a table of estimates (rows of estimates.csv) by estimator and epoch."""
+    found = {}
+    for row in rows:
+        if row["x_m"] and row.get("pos_valid") == "1":
+            found.setdefault(row["estimator"], {})[int(row["epoch"])] = image(tuple(float(row[key] or 0) for key in ("x_m", "y_m", "yaw_rad")))
+    return found
+
+
 def compared(one, other, image, shift_s=0.0):
-    """Difference of two tables of estimates (rows of estimates.csv); `image` maps a pose of the first to that expected of the second."""
+    """Difference of two tables of estimates (rows of estimates.csv); `image` maps a pose of the first to that expected of the second. A sample that
+    passes the end of the fusion window by a microsecond corrects the estimate one tick later; such a step is the same."""
     number = lambda row, key: float(row[key]) if row.get(key) else 0.0  # noqa: E731
-    found = {(row["epoch"], row["estimator"]): row for row in other if row["x_m"]}
+    time_s = {(row["epoch"], row["estimator"]): number(row, "time_s") for row in other if row["x_m"] and row.get("pos_valid") == "1"}
+    first, second = poses(one, image), poses(other)
     result = Difference()
     sigma = {}
     for row in one:
         if not row["x_m"]:
             continue
+        estimator, epoch = row["estimator"], int(row["epoch"])
         if row.get("std_x_m"):
-            sigma[row["estimator"]] = (math.hypot(number(row, "std_x_m"), number(row, "std_y_m")), number(row, "std_yaw_rad"))
+            sigma[estimator] = (math.hypot(number(row, "std_x_m"), number(row, "std_y_m")), number(row, "std_yaw_rad"))
         if row.get("pos_valid") != "1":
             continue
-        beside = found.get((row["epoch"], row["estimator"]))
-        if beside is None or beside.get("pos_valid") != "1" or abs(number(beside, "time_s") - number(row, "time_s") - shift_s) > 1e-3:
+        at_s = time_s.get((row["epoch"], estimator))
+        if at_s is None or abs(at_s - number(row, "time_s") - shift_s) > 1e-3:
             result.missing += 1
             continue
-        pose = lambda r: tuple(number(r, key) for key in ("x_m", "y_m", "yaw_rad"))  # noqa: E731
-        result.add(image(pose(row)), pose(beside), *sigma.get(row["estimator"], (0.0, 0.0)), number(row, "time_s"))
+        result.add(ways(first[estimator], second[estimator], epoch), sigma.get(estimator, (0.0, 0.0)), number(row, "time_s"))
     return result
 
 

@@ -40,8 +40,8 @@ RECORDED = {"skog": ("car", "import_skog", "skog_gnss_ins"), "px4": ("iris", "im
 PLACES = tuple(f"place{k}" for k in range(1, 11))
 RECORDED_FAULTS = (("gyro", "x", "spike1", "max"), ("gyro", "z", "spike2", "30g"), ("accel", "y", "spike1", "max"), ("gyro", "z", "dead", "-"),
                    ("accel", "x", "dead", "-"), ("gnss_velocity", "east", "offset", "5g"), ("gnss_position", "north", "offset", "5g"),
-                   ("speed", "forward", "offset", "5g"), ("speed", "forward", "dead", "-"), ("landmarks", "range", "offset", "5g"),
-                   ("landmarks", "bearing", "spike1", "max"))
+                   ("speed", "forward", "offset", "5g"), ("speed", "forward", "offset", "0.1g"), ("speed", "forward", "dead", "-"),
+                   ("landmarks", "range", "offset", "5g"), ("landmarks", "bearing", "spike1", "max"))
 
 
 def recorded(messages, planar):
