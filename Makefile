@@ -39,7 +39,7 @@ help: ## this list
 sim: setup programs ## the simulated world over vcan0: table, report, pictures in out/sim (SEED= FAULT= REALTIME=1 BOARD=zynqmp_r5 BUS=memory OUT=DIR)
 	@tools/run/simulate_world
 
-board: setup programs ## a flash image's machine code on an emulated board in the simulated world, repeated on the host: report in out/board (ROBOT= SEED= FAULT= BUS=vcan in real time)
+board: setup programs ## a flash image's machine code on an emulated board in the simulated world, repeated on the host: report in out/board (BOARD=ark_cannode or nucleo_g474re, ROBOT= SEED= FAULT= BUS=vcan in real time)
 	@tools/run/build_preset host:tetap-board
 	@BUS=$(if $(filter file,$(origin BUS)),memory,$(BUS)) tools/run/emulate_board
 
