@@ -12,7 +12,8 @@ namespace tetap::sim {
 
 namespace {
 
-constexpr std::size_t kEnough = 32;  ///< epochs, with 16 bits of CRC each, that fix where a node's consumption begins
+constexpr std::size_t kLeastEpochs =
+    32;  ///< epochs, with 16 bits of CRC each, that fix where a node's consumption begins
 constexpr std::uint64_t kFirstEpochs = 4096;  ///< a node that has wired sensors names them many times in so many epochs
 constexpr std::uint64_t kFirstFrames =
     200'000;                                   ///< frames of a log without an epoch among them: there is no node in it
@@ -226,7 +227,7 @@ RecordSurvey::Step RecordSurvey::consume(const Entry& entry, std::uint64_t end, 
 bool RecordSurvey::match_begin(std::uint64_t start, std::uint64_t end) const {
   Place place = place_;
   place.input = start;
-  for (std::size_t e = 0; e < waiting_.size() && e < kEnough; ++e) {
+  for (std::size_t e = 0; e < waiting_.size() && e < kLeastEpochs; ++e) {
     if (consume(waiting_[e], end, place) != Step::kDone) return false;
     if (static_cast<std::uint16_t>(place.tally.running()) != waiting_[e].in_crc) return false;
   }
@@ -237,10 +238,10 @@ bool RecordSurvey::match_begin(std::uint64_t start, std::uint64_t end) const {
 /// while frames were flowing took some of those before its first epoch. Its own CRC of them shows which.
 void RecordSurvey::find_start(std::uint64_t end, bool power_cycle_ended) {
   if (!power_cycle_ended) {
-    if (waiting_.size() < kEnough) return;
+    if (waiting_.size() < kLeastEpochs) return;
     Place place = place_;
     place.input = *best_;
-    for (std::size_t e = 0; e < kEnough; ++e)
+    for (std::size_t e = 0; e < kLeastEpochs; ++e)
       if (consume(waiting_[e], end, place) != Step::kDone) return;
   }
   for (std::uint64_t start = *best_ + 1; start-- > first_crc_;)

@@ -46,7 +46,7 @@ class Authentication {
   void power_on() {
     chain_ = 0;
     begin_link();
-    heard_ = 0;
+    inputs_hashed_ = 0;
     nonces_ = {};
     tags_ = {};
     attempts_ = kAttempts;
@@ -58,7 +58,7 @@ class Authentication {
   void resume(const Authentication& other) {
     chain_ = other.chain_;
     begin_link();
-    heard_ = other.heard_;
+    inputs_hashed_ = other.inputs_hashed_;
     nonces_ = other.nonces_;
     tags_ = other.tags_;
     attempts_ = other.attempts_;
@@ -72,7 +72,7 @@ class Authentication {
     hash.add(frame.data);
     hash.add(static_cast<std::uint8_t>(frame.id - parameters_.can_base));
     sum_ += hash.finish();
-    if (heard_ < kEnough) ++heard_;
+    if (inputs_hashed_ < kLeastInputs) ++inputs_hashed_;
   }
 
   /// A tag waits for the frame of its id; a later one takes its place.
@@ -89,8 +89,8 @@ class Authentication {
 
  private:
   static constexpr int kTurnBits = 21;
-  static constexpr std::uint32_t kEnough = 256;  ///< frames without which there is no nonce
-  static constexpr std::uint8_t kAttempts = 8;   ///< wrong tags at once; then ten in a turn
+  static constexpr std::uint32_t kLeastInputs = 256;  ///< frames without which there is no nonce
+  static constexpr std::uint8_t kAttempts = 8;        ///< wrong tags at once; then ten in a turn
 
   struct Nonce {
     std::uint32_t number = 0;
@@ -114,7 +114,7 @@ class Authentication {
   base::SipHash link_;       ///< key and chain_, before what is hashed in this tick
   std::uint64_t sum_ = 0;    ///< sum of the hashes of this tick's frames
   std::uint64_t chain_ = 0;  ///< hash of all frames up to the last tick; without the key, nothing follows from it
-  std::uint32_t heard_ = 0;
+  std::uint32_t inputs_hashed_ = 0;
   std::array<Nonce, 2> nonces_{};  ///< nonces of this turn and of the one before
   std::array<Tag, 6> tags_{};      ///< by id offset
   std::uint8_t attempts_ = kAttempts;
@@ -150,7 +150,7 @@ inline void Authentication::tick(base::Micros now) {
     if (attempts_ < kAttempts) ++attempts_;
   }
   const auto turn = static_cast<std::uint32_t>(static_cast<std::uint64_t>(now.us) >> kTurnBits);
-  if (turn == turn_ || heard_ < kEnough) return;
+  if (turn == turn_ || inputs_hashed_ < kLeastInputs) return;
   // A turn that was left out: the nonce before the last one is of no use any more.
   nonces_[1] = turn == nonces_[0].turn + 1 ? nonces_[0] : Nonce{};
   base::SipHash hash = link_;

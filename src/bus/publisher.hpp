@@ -101,8 +101,8 @@ class Publisher {
   void own_map(const Estimator& estimator, Send& send);
   template <class Send>
   void status(const Summary& summary, const LoopHealth& loop, Send& send);
-  template <class Lanes, class Send>
-  void statistics(const Lanes& lanes, base::Micros now, Send& send);
+  template <class Slots, class Send>
+  void statistics(const Slots& slots, base::Micros now, Send& send);
   template <class Send>
   void diagnostics(const Counters& counters, const LoopHealth& loop, std::uint16_t timeline_high, Send& send);
   /// Counts of refusals; `guard_page()` gives that of guards and tags, where the node has them.
@@ -362,20 +362,20 @@ void Publisher<N>::status(const Summary& s, const LoopHealth& loop, Send& send) 
 
 /// One active sensor of one estimator at a time.
 template <std::size_t N>
-template <class Lanes, class Send>
-void Publisher<N>::statistics(const Lanes& lanes, base::Micros now, Send& send) {
+template <class Slots, class Send>
+void Publisher<N>::statistics(const Slots& slots, base::Micros now, Send& send) {
   if (!every(parameters_.publish.statistics_every, 5)) return;
   for (std::size_t tried = 0; tried < estimators::kStatistics * N; ++tried) {
     const std::size_t index = statistic_++ % (estimators::kStatistics * N);
     const std::size_t estimator = index / estimators::kStatistics;
     const estimators::SensorStatistics* stat = nullptr;
-    std::size_t lane_index = 0;
+    std::size_t slot_index = 0;
     std::apply(
-        [&](const auto&... lane) {
-          ((lane_index++ == estimator ? void(stat = &lane.statistics()[index % estimators::kStatistics]) : void()),
+        [&](const auto&... slot) {
+          ((slot_index++ == estimator ? void(stat = &slot.statistics()[index % estimators::kStatistics]) : void()),
            ...);
         },
-        lanes);
+        slots);
     if (stat == nullptr || (stat->accepted == 0 && stat->rejected == 0)) continue;
     const float age_s = base::seconds(now - stat->last_accepted);
     put(bus::EstSensorStat{.sensor = stat->sensor,

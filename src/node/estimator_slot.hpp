@@ -152,8 +152,8 @@ class EstimatorSlot {
     if constexpr (requires { now_.arrived(sample, ctx); }) now_.arrived(sample, ctx);
   }
   /// A delayed estimator has done enough in this tick: the sample, true long enough ago, waits for the next.
-  [[nodiscard]] bool rests(const sensor::Sample& sample, const estimators::Context& ctx) {
-    if constexpr (requires { now_.rests(sample, ctx); }) return takes(sample) && now_.rests(sample, ctx);
+  [[nodiscard]] bool defers(const sensor::Sample& sample, const estimators::Context& ctx) {
+    if constexpr (requires { now_.defers(sample, ctx); }) return takes(sample) && now_.defers(sample, ctx);
     return false;
   }
 

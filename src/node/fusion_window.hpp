@@ -22,7 +22,7 @@ namespace tetap::node {
 template <Estimator... E>
 struct Estimators {
   static_assert(sizeof...(E) >= 1 && sizeof...(E) <= 4, "the bus has four output instances");
-  using Lanes = std::tuple<EstimatorSlot<E>...>;
+  using Slots = std::tuple<EstimatorSlot<E>...>;
   static constexpr std::size_t kCount = sizeof...(E);
   template <class Payload>
   static constexpr bool kTakes = (EstimatorSlot<E>::template kTakes<Payload> || ...);
@@ -60,13 +60,13 @@ class FusionWindow {
     timeline_.power_on();
     limit_.power_on();
     closed_until_ = t;
-    each_lane([&](auto& lane) {
-      lane.restart(t, ctx);
-      lane.clear_statistics();
+    each_slot([&](auto& slot) {
+      slot.restart(t, ctx);
+      slot.clear_statistics();
     });
   }
   void restart(base::Micros t, const estimators::Context& ctx) {
-    each_lane([&](auto& lane) { lane.restart(t, ctx); });
+    each_slot([&](auto& slot) { slot.restart(t, ctx); });
   }
   void clear() { timeline_.clear(); }
   /// The window begins after t.
@@ -98,10 +98,10 @@ class FusionWindow {
   void close_window(base::Micros t, const estimators::Context& ctx, Note&& note) {
     finish_replays(ctx, note);
     leave_until(t, Past::kIsNow, ctx, note);
-    each_lane([&](auto& lane) {
-      if constexpr (requires { lane.close_batch(ctx); }) lane.close_batch(ctx);
-      if constexpr (requires { lane.abort_job(); }) lane.abort_job();
-      lane.close();
+    each_slot([&](auto& slot) {
+      if constexpr (requires { slot.close_batch(ctx); }) slot.close_batch(ctx);
+      if constexpr (requires { slot.abort_job(); }) slot.abort_job();
+      slot.close();
     });
     late_records(note);
   }
@@ -113,21 +113,21 @@ class FusionWindow {
   /// Brings every estimator to t.
   void advance(base::Micros t, const estimators::Context& ctx) {
     const sensor::Window window = timeline_.window(timeline_.until(t));
-    each_lane([&](auto& lane) { lane.advance(t, ctx, window); });
+    each_slot([&](auto& slot) { slot.advance(t, ctx, window); });
   }
   /// The tick's share of jobs that are longer.
   void work(std::uint32_t units, const estimators::Context& ctx) {
-    each_lane([&](auto& lane) {
-      if constexpr (requires { lane.work(units, ctx); }) lane.work(units, ctx);
+    each_slot([&](auto& slot) {
+      if constexpr (requires { slot.work(units, ctx); }) slot.work(units, ctx);
     });
   }
   /// Notes the records that came later than fuse().
   template <class Note>
   void late_records(Note&& note) {
     std::size_t instance = 0;
-    each_lane([&](auto& lane) {
-      if constexpr (RecordsLater<typename std::remove_cvref_t<decltype(lane)>::Type>)
-        lane.late_records([&](const sensor::Sample& sample, const estimators::Innovation& innovation) {
+    each_slot([&](auto& slot) {
+      if constexpr (RecordsLater<typename std::remove_cvref_t<decltype(slot)>::Type>)
+        slot.late_records([&](const sensor::Sample& sample, const estimators::Innovation& innovation) {
           note(instance, sample, innovation);
         });
       ++instance;
@@ -137,23 +137,23 @@ class FusionWindow {
   using Estimates = std::array<estimators::Estimate, kCount>;
   void estimate(const estimators::Context& ctx, Estimates& estimates) const {
     std::size_t instance = 0;
-    each_lane([&](const auto& lane) { estimates[instance++] = lane.estimate(ctx); });
+    each_slot([&](const auto& slot) { estimates[instance++] = slot.estimate(ctx); });
   }
   template <class F>
-  void each_lane(F&& f) {
-    std::apply([&](auto&... lane) { (f(lane), ...); }, lanes_);
+  void each_slot(F&& f) {
+    std::apply([&](auto&... slot) { (f(slot), ...); }, slots_);
   }
   template <class F>
-  void each_lane(F&& f) const {
-    std::apply([&](const auto&... lane) { (f(lane), ...); }, lanes_);
+  void each_slot(F&& f) const {
+    std::apply([&](const auto&... slot) { (f(slot), ...); }, slots_);
   }
-  [[nodiscard]] const auto& lanes() const { return lanes_; }
-  [[nodiscard]] const auto& primary() const { return std::get<kPrimary>(lanes_); }
+  [[nodiscard]] const auto& slots() const { return slots_; }
+  [[nodiscard]] const auto& primary() const { return std::get<kPrimary>(slots_); }
   [[nodiscard]] std::uint16_t high_water() const { return timeline_.high_water(); }
 
   template <class Sink>
   void hash_state(Sink&& sink) const {
-    each_lane([&](const auto& lane) { lane.hash_state(sink); });
+    each_slot([&](const auto& slot) { slot.hash_state(sink); });
     sink(timeline_.digest());
   }
 
@@ -165,23 +165,23 @@ class FusionWindow {
   void leave_until(base::Micros t, Past past, const estimators::Context& ctx, Note& note);
   template <class Note>
   void leave(std::size_t i, Past past, const estimators::Context& ctx, Note& note);
-  [[nodiscard]] bool rests(const sensor::Sample& sample, const estimators::Context& ctx);
+  [[nodiscard]] bool defers(const sensor::Sample& sample, const estimators::Context& ctx);
   template <class EstimatorSlot>
-  [[nodiscard]] std::size_t late_before(const EstimatorSlot& lane, std::size_t due) const;
+  [[nodiscard]] std::size_t late_before(const EstimatorSlot& slot, std::size_t due) const;
   [[nodiscard]] std::size_t replay_share(std::size_t due) const;
   template <class EstimatorSlot>
-  [[nodiscard]] std::size_t replay_size(const EstimatorSlot& lane, std::size_t due, std::size_t most) const;
+  [[nodiscard]] std::size_t replay_size(const EstimatorSlot& slot, std::size_t due, std::size_t most) const;
   template <class EstimatorSlot, class Note>
-  void catch_up(EstimatorSlot& lane, std::size_t instance, std::size_t due, std::size_t share,
+  void catch_up(EstimatorSlot& slot, std::size_t instance, std::size_t due, std::size_t share,
                 const estimators::Context& ctx, Note& note);
   template <class Note>
   void finish_replays(const estimators::Context& ctx, Note& note);
   /// Accounts for and notes the innovation of a sample that came late.
   template <class EstimatorSlot, class Note>
-  void record_awaited(EstimatorSlot& lane, std::size_t instance, std::size_t i,
+  void record_awaited(EstimatorSlot& slot, std::size_t instance, std::size_t i,
                       const estimators::Innovation& innovation, Note& note) {
     if (!timeline_.take_awaited(i, instance)) return;
-    lane.account(timeline_[i], innovation);
+    slot.account(timeline_[i], innovation);
     note(instance, timeline_[i], innovation);
   }
 
@@ -189,7 +189,7 @@ class FusionWindow {
   /// A window of 20 ticks that is full leaves half as many.
   static constexpr std::size_t kMostLeaving = Capacity / 11;
 
-  typename Estimators::Lanes lanes_;
+  typename Estimators::Slots slots_;
   Timeline<Capacity> timeline_;
   WorkLimit<Capacity> limit_;
   base::Micros closed_until_;
@@ -218,7 +218,7 @@ void FusionWindow<Estimators, Capacity>::leave_until(base::Micros t, Past past, 
                                                      Note& note) {
   std::size_t count = 0;
   while (count < timeline_.size() && timeline_.consumed(count) && timeline_[count].stamp <= t) {
-    if (past == Past::kFollows && (count == kMostLeaving || rests(timeline_[count], ctx))) break;
+    if (past == Past::kFollows && (count == kMostLeaving || defers(timeline_[count], ctx))) break;
     leave(count++, past, ctx, note);
   }
   timeline_.drop_front(count);
@@ -230,15 +230,15 @@ template <class Note>
 bool FusionWindow<Estimators, Capacity>::drain(base::Micros t, const estimators::Context& ctx, Note&& note) {
   if constexpr (!Estimators::kSharesOut) return true;
   finish_replays(ctx, note);
-  each_lane([t](auto& lane) {
-    lane.grant_share();
-    lane.close_until(t);
+  each_slot([t](auto& slot) {
+    slot.grant_share();
+    slot.close_until(t);
   });
   const auto due = [&](std::size_t i) {
     return i < timeline_.size() && timeline_.consumed(i) && timeline_[i].stamp <= t;
   };
   std::size_t count = 0;
-  while (due(count) && count < 2 * kMostLeaving && !rests(timeline_[count], ctx))
+  while (due(count) && count < 2 * kMostLeaving && !defers(timeline_[count], ctx))
     leave(count++, Past::kFollows, ctx, note);
   const bool done = !due(count);
   timeline_.drop_front(count);
@@ -250,16 +250,16 @@ template <class Note>
 void FusionWindow<Estimators, Capacity>::leave(std::size_t i, Past past, const estimators::Context& ctx, Note& note) {
   const sensor::Sample& sample = timeline_[i];
   std::size_t instance = 0;
-  each_lane([&](auto& lane) {
-    if constexpr (std::remove_cvref_t<decltype(lane)>::kDelayed) {
-      const estimators::Innovation innovation = lane.fuse(sample, ctx);
-      if constexpr (RecordsLater<typename std::remove_cvref_t<decltype(lane)>::Type>) {
+  each_slot([&](auto& slot) {
+    if constexpr (std::remove_cvref_t<decltype(slot)>::kDelayed) {
+      const estimators::Innovation innovation = slot.fuse(sample, ctx);
+      if constexpr (RecordsLater<typename std::remove_cvref_t<decltype(slot)>::Type>) {
         if (innovation.verdict == sensor::Verdict::kPending) return void(++instance);
       }
-      lane.account(sample, innovation);
+      slot.account(sample, innovation);
       note(instance, sample, innovation);
-    } else if (past == Past::kFollows && !lane.past_has(sample)) {
-      record_awaited(lane, instance, i, lane.retire(sample, ctx), note);
+    } else if (past == Past::kFollows && !slot.past_has(sample)) {
+      record_awaited(slot, instance, i, slot.retire(sample, ctx), note);
     }
     ++instance;
   });
@@ -267,25 +267,25 @@ void FusionWindow<Estimators, Capacity>::leave(std::size_t i, Past past, const e
 }
 
 template <class Estimators, std::size_t Capacity>
-bool FusionWindow<Estimators, Capacity>::rests(const sensor::Sample& sample, const estimators::Context& ctx) {
-  bool rests = false;
-  each_lane([&](auto& lane) { rests = lane.rests(sample, ctx) || rests; });
-  return rests;
+bool FusionWindow<Estimators, Capacity>::defers(const sensor::Sample& sample, const estimators::Context& ctx) {
+  bool deferred = false;
+  each_slot([&](auto& slot) { deferred = slot.defers(sample, ctx) || deferred; });
+  return deferred;
 }
 
-/// Index of the last sample that the lane has fused already, when something new belongs before it; otherwise 0.
+/// Index of the last sample that the slot has fused already, when something new belongs before it; otherwise 0.
 template <class Estimators, std::size_t Capacity>
 template <class EstimatorSlot>
-std::size_t FusionWindow<Estimators, Capacity>::late_before(const EstimatorSlot& lane, std::size_t due) const {
-  if (!lane.replay_due() && !timeline_.any_late()) return 0;
+std::size_t FusionWindow<Estimators, Capacity>::late_before(const EstimatorSlot& slot, std::size_t due) const {
+  if (!slot.replay_due() && !timeline_.any_late()) return 0;
   std::size_t last = due;
   do {
     if (last == 0) return 0;
     --last;
   } while (!timeline_.consumed(last) || !EstimatorSlot::takes(timeline_[last]));
-  if (lane.replay_due()) return last;
+  if (slot.replay_due()) return last;
   for (std::size_t i = timeline_.known(); i < last; ++i)
-    if (!timeline_.consumed(i) && EstimatorSlot::takes(timeline_[i]) && !lane.past_has(timeline_[i])) return last;
+    if (!timeline_.consumed(i) && EstimatorSlot::takes(timeline_[i]) && !slot.past_has(timeline_[i])) return last;
   return 0;
 }
 
@@ -306,32 +306,32 @@ std::size_t FusionWindow<Estimators, Capacity>::replay_share(std::size_t due) co
   return less + kLeast < kMost ? kMost - less : kLeast;
 }
 
-/// Samples between the far end of the lane and the present; `most` + 1 when there are more.
+/// Samples between the far end of the slot and the present; `most` + 1 when there are more.
 template <class Estimators, std::size_t Capacity>
 template <class EstimatorSlot>
-std::size_t FusionWindow<Estimators, Capacity>::replay_size(const EstimatorSlot& lane, std::size_t due,
+std::size_t FusionWindow<Estimators, Capacity>::replay_size(const EstimatorSlot& slot, std::size_t due,
                                                             std::size_t most) const {
   std::size_t size = 0;
-  for (std::size_t i = due; i > 0 && size <= most && !lane.past_has(timeline_[i - 1]); --i)
+  for (std::size_t i = due; i > 0 && size <= most && !slot.past_has(timeline_[i - 1]); --i)
     if (EstimatorSlot::takes(timeline_[i - 1])) ++size;
   return size;
 }
 
-/// Moves the lane's far end by `share` samples, and on to the end of the last one's stamp.
+/// Moves the slot's far end by `share` samples, and on to the end of the last one's stamp.
 template <class Estimators, std::size_t Capacity>
 template <class EstimatorSlot, class Note>
-void FusionWindow<Estimators, Capacity>::catch_up(EstimatorSlot& lane, std::size_t instance, std::size_t due,
+void FusionWindow<Estimators, Capacity>::catch_up(EstimatorSlot& slot, std::size_t instance, std::size_t due,
                                                   std::size_t share, const estimators::Context& ctx, Note& note) {
   std::size_t i = 0;
-  while (i < due && lane.past_has(timeline_[i])) ++i;
+  while (i < due && slot.past_has(timeline_[i])) ++i;
   for (std::size_t done = 0; i < due; ++i) {
     const sensor::Sample& sample = timeline_[i];
     if (done >= share && sample.stamp != timeline_[i - 1].stamp) break;
     if (EstimatorSlot::takes(sample)) {
-      record_awaited(lane, instance, i, lane.retire(sample, ctx), note);
+      record_awaited(slot, instance, i, slot.retire(sample, ctx), note);
       ++done;
     }
-    if (i + 1 == due || timeline_[i + 1].stamp != sample.stamp) lane.catch_up_to(sample.stamp);
+    if (i + 1 == due || timeline_[i + 1].stamp != sample.stamp) slot.catch_up_to(sample.stamp);
   }
 }
 
@@ -340,13 +340,13 @@ template <class Estimators, std::size_t Capacity>
 template <class Note>
 void FusionWindow<Estimators, Capacity>::finish_replays(const estimators::Context& ctx, Note& note) {
   std::size_t instance = 0;
-  each_lane([&](auto& lane) {
-    if constexpr (!std::remove_cvref_t<decltype(lane)>::kDelayed) {
-      if (lane.replay_due()) {
-        lane.rewind();
+  each_slot([&](auto& slot) {
+    if constexpr (!std::remove_cvref_t<decltype(slot)>::kDelayed) {
+      if (slot.replay_due()) {
+        slot.rewind();
         for (std::size_t i = 0; i < timeline_.size(); ++i)
-          if (timeline_.consumed(i) && !lane.past_has(timeline_[i]))
-            record_awaited(lane, instance, i, lane.fuse(timeline_[i], ctx), note);
+          if (timeline_.consumed(i) && !slot.past_has(timeline_[i]))
+            record_awaited(slot, instance, i, slot.fuse(timeline_[i], ctx), note);
       }
     }
     ++instance;
@@ -363,16 +363,16 @@ std::uint16_t FusionWindow<Estimators, Capacity>::consume(base::Micros t, const 
   std::array<std::size_t, kCount> last{};  // samples before it are late
   bool anew = false;
   std::size_t instance = 0;
-  each_lane([&](auto& lane) {
-    using EstimatorSlot = std::remove_cvref_t<decltype(lane)>;
+  each_slot([&](auto& slot) {
+    using EstimatorSlot = std::remove_cvref_t<decltype(slot)>;
     if constexpr (!EstimatorSlot::kDelayed) {
-      last[instance] = late_before(lane, due);
-      if (last[instance] > 0) lane.note_late();
-      const std::size_t size = lane.replay_due() ? replay_size(lane, due, left) : 0;
+      last[instance] = late_before(slot, due);
+      if (last[instance] > 0) slot.note_late();
+      const std::size_t size = slot.replay_due() ? replay_size(slot, due, left) : 0;
       if (size > 0 && size <= left) {
         left -= size;
         again[instance] = anew = true;
-        lane.rewind();
+        slot.rewind();
       }
     }
     ++instance;
@@ -388,12 +388,12 @@ std::uint16_t FusionWindow<Estimators, Capacity>::consume(base::Micros t, const 
     if (is_new) on_new(sample);
     instance = 0;
     bool taken = false;
-    each_lane([&](auto& lane) {
-      using EstimatorSlot = std::remove_cvref_t<decltype(lane)>;
+    each_slot([&](auto& slot) {
+      using EstimatorSlot = std::remove_cvref_t<decltype(slot)>;
       if constexpr (EstimatorSlot::kDelayed) {
         taken = taken || EstimatorSlot::takes(sample);
-        if (is_new) lane.arrived(sample, ctx);
-      } else if (lane.past_has(sample)) {
+        if (is_new) slot.arrived(sample, ctx);
+      } else if (slot.past_has(sample)) {
         if (is_new && EstimatorSlot::takes(sample)) {
           taken = true;
           note(instance, sample, {.verdict = sensor::Verdict::kTooLate, .failed = sensor::Check::kTime});
@@ -402,13 +402,13 @@ std::uint16_t FusionWindow<Estimators, Capacity>::consume(base::Micros t, const 
         taken = taken || EstimatorSlot::takes(sample);
         if (EstimatorSlot::takes(sample)) timeline_.await(i, instance);
       } else if (is_new || again[instance]) {
-        const estimators::Innovation innovation = lane.fuse(sample, ctx);
+        const estimators::Innovation innovation = slot.fuse(sample, ctx);
         if (is_new) {
           taken = taken || innovation.verdict != sensor::Verdict::kNotUsed;
-          lane.account(sample, innovation);
+          slot.account(sample, innovation);
           note(instance, sample, innovation);
         } else {
-          record_awaited(lane, instance, i, innovation, note);
+          record_awaited(slot, instance, i, innovation, note);
         }
       }
       ++instance;
@@ -418,11 +418,11 @@ std::uint16_t FusionWindow<Estimators, Capacity>::consume(base::Micros t, const 
     timeline_.consume(i);
   }
   instance = 0;
-  each_lane([&](auto& lane) {
-    using EstimatorSlot = std::remove_cvref_t<decltype(lane)>;
+  each_slot([&](auto& slot) {
+    using EstimatorSlot = std::remove_cvref_t<decltype(slot)>;
     if constexpr (!EstimatorSlot::kDelayed) {
-      if (lane.replay_due() && left > 0) {
-        catch_up(lane, instance, due, left, ctx, note);
+      if (slot.replay_due() && left > 0) {
+        catch_up(slot, instance, due, left, ctx, note);
         left = 0;
       }
     }

@@ -98,7 +98,7 @@ class Node {
   /// Whether a command that ends the window is obeyed in this tick. What the window holds goes into the estimators
   /// before it, by a share in each tick.
   [[nodiscard]] bool window_ended(std::uint8_t& waited) {
-    if (waited < kMostWaited && !history_.drain(now_, context(), noting())) return ++waited, false;
+    if (waited < kMostWaited && !window_.drain(now_, context(), noting())) return ++waited, false;
     close_window(now_);
     return true;
   }
@@ -134,7 +134,7 @@ class Node {
       e.position_valid = e.position_valid && estimators::within_range(e.pose.x, e.pose.y);
   }
   [[nodiscard]] estimators::AttitudeEstimate in_map(const estimators::AttitudeEstimate& attitude) const {
-    const nav::LocalLevel* const place = history_.primary().level();
+    const nav::LocalLevel* const place = window_.primary().level();
     return place != nullptr ? estimators::in_map(attitude, *place) : attitude;
   }
   void note(std::size_t instance, const sensor::Sample& sample, const estimators::Innovation& innovation);
@@ -151,7 +151,7 @@ class Node {
   [[nodiscard]] bus::Summary summary(const estimators::Estimate& estimate) const;
 
   const param::Parameters& parameters_;
-  FusionWindow history_;
+  FusionWindow window_;
   estimators::MapFrame map_frame_;
   MapOrigin origin_;
   BusProtection<Estimators> protection_;
@@ -196,7 +196,7 @@ void Node<Estimators, Capacity>::power_on(base::Micros t) {
   input_crc_ = {};
   resets_ = 0;
   reset_cause_ = sensor::ResetCause::kPowerOn;
-  history_.power_on(t, context());
+  window_.power_on(t, context());
   disagreement_.restart(t);
   jumps_ = 0;
 }
@@ -204,7 +204,7 @@ void Node<Estimators, Capacity>::power_on(base::Micros t) {
 template <class Estimators, std::size_t Capacity>
 void Node<Estimators, Capacity>::resume(const Node& other) {
   const auto* const map = map_frame_.map;
-  history_ = other.history_;
+  window_ = other.window_;
   map_frame_ = other.map_frame_;
   map_frame_.map = map;
   origin_ = other.origin_;
@@ -245,20 +245,20 @@ template <class Estimators, std::size_t Capacity>
 void Node<Estimators, Capacity>::take(const sensor::Sample& arrived) {
   sensor::Sample sample = arrived;
   if (!ticked_ && now_.us == 0) return void(++counters_.no_time);
-  if (!history_.admits_sample()) return void(++counters_.overload);
+  if (!window_.admits_sample()) return void(++counters_.overload);
   if (!plausible(sample, parameters_.wheels.most_mps)) return void(++counters_.out_of_range);
   sample.stamp = at_no_fixed_rate(sample) ? wraps_.place_beside(sample, now_) : wraps_.place(sample, now_);
   calibrate(sample, parameters_);
   if constexpr (Estimators::template kTakes<sensor::LandmarkSighting>)
     if (sample.sensor == sensor::Sensor::kRangeBearing) calibrate(sample.payload.sighting, parameters_.landmark);
-  if (sample.stamp <= history_.closed_until()) {
+  if (sample.stamp <= window_.closed_until()) {
     ++counters_.too_late;
     publisher_.event({.verdict = sensor::Verdict::kTooLate, .failed = sensor::Check::kTime}, sample, kPrimary, now_,
                      counters_);
     return;
   }
   if (sample.stamp > now_ + base::Micros{parameters_.loop.ahead_us}) return void(++counters_.too_early);
-  const Insert result = history_.insert(sample, context(), noting());
+  const Insert result = window_.insert(sample, context(), noting());
   if (result == Insert::kDuplicate) ++counters_.duplicate;
   if (result == Insert::kFull) ++counters_.timeline_full;
   if (result == Insert::kMadeRoom) ++counters_.window_short;
@@ -285,12 +285,12 @@ void Node<Estimators, Capacity>::tick(base::Micros t, const bus::LoopHealth& loo
   consume(now_);
   if (origin_.take_replaced()) restart_in_new_map();
   apply_commands();
-  history_.advance(now_, context());
-  history_.late_records(noting());
-  history_.work(static_cast<std::uint32_t>(parameters_.loop.work_units), context());
+  window_.advance(now_, context());
+  window_.late_records(noting());
+  window_.work(static_cast<std::uint32_t>(parameters_.loop.work_units), context());
   Estimates estimates;
-  history_.estimate(context(), estimates);
-  if (!healthy(estimates)) history_.estimate(context(), estimates);
+  window_.estimate(context(), estimates);
+  if (!healthy(estimates)) window_.estimate(context(), estimates);
   invalidate_beyond_range(estimates);
 
   const estimators::Disagreement apart = judge();
@@ -298,27 +298,27 @@ void Node<Estimators, Capacity>::tick(base::Micros t, const bus::LoopHealth& loo
 
   publisher_.begin(now_, input_crc_, send);
   std::size_t instance = 0;
-  history_.each_lane([&](const auto& lane) {
-    using E = typename std::remove_cvref_t<decltype(lane)>::Type;
+  window_.each_slot([&](const auto& slot) {
+    using E = typename std::remove_cvref_t<decltype(slot)>::Type;
     const bool primary = instance == kPrimary;
     const estimators::MotionVariance motion =
-        publisher_.publishes_sigma(instance, primary) ? lane.motion_variance(context()) : estimators::MotionVariance{};
+        publisher_.publishes_sigma(instance, primary) ? slot.motion_variance(context()) : estimators::MotionVariance{};
     publisher_.estimate(instance, E::kKind, primary, estimates[instance], motion, send);
-    if constexpr (requires { lane.inertial(context()); })
+    if constexpr (requires { slot.inertial(context()); })
       publisher_.inertial(
-          instance, [&] { return lane.inertial(context()); }, [&] { return lane.sources(context()); }, send);
-    if constexpr (requires { lane.attitude(context()); })
-      publisher_.attitude(instance, in_map(lane.attitude(context())), apart, send);
+          instance, [&] { return slot.inertial(context()); }, [&] { return slot.sources(context()); }, send);
+    if constexpr (requires { slot.attitude(context()); })
+      publisher_.attitude(instance, in_map(slot.attitude(context())), apart, send);
     if constexpr (estimators::MakesMap<E>) {
-      map_faults_.note(lane.map_maker().own_map(), publisher_.epoch(),
+      map_faults_.note(slot.map_maker().own_map(), publisher_.epoch(),
                        static_cast<std::uint32_t>(1'000'000 / parameters_.loop.period_us));
-      publisher_.own_map(lane.map_maker(), send);
+      publisher_.own_map(slot.map_maker(), send);
     }
     ++instance;
   });
   publisher_.status(summary(estimates[kPrimary]), loop, send);
-  publisher_.statistics(history_.lanes(), now_, send);
-  publisher_.diagnostics(counters_, loop, history_.high_water(), send);
+  publisher_.statistics(window_.slots(), now_, send);
+  publisher_.diagnostics(counters_, loop, window_.high_water(), send);
   if constexpr (kHasBusProtection<Estimators>)
     publisher_.refusals(
         counters_, loop, [this] { return bus::guard_page(counters_, protection_.nonce()); }, send);
@@ -326,7 +326,7 @@ void Node<Estimators, Capacity>::tick(base::Micros t, const bus::LoopHealth& loo
     publisher_.refusals(counters_, loop, nullptr, send);
   publisher_.identity(map_frame_, send);
   publisher_.events(send);
-  history_.retire_until(now_ - base::Micros{parameters_.loop.window_us}, context(), noting());
+  window_.retire_until(now_ - base::Micros{parameters_.loop.window_us}, context(), noting());
   publisher_.end(state_crc(), input_crc_, send);
 }
 
@@ -337,23 +337,23 @@ void Node<Estimators, Capacity>::restart(base::Micros t, sensor::ResetCause caus
     reset_cause_ = cause;
     restarted_at_ = t;
   }
-  history_.restart(t, context());
+  window_.restart(t, context());
   disagreement_.restart(t);
   jumps_ = 0;
   if (cause == sensor::ResetCause::kTimeJump) {
     inbox_.discard(counters_);
     closures_.discard(counters_);
     wraps_.power_on();
-    history_.clear();
-    history_.open_from(t - base::Micros{parameters_.loop.period_us});
+    window_.clear();
+    window_.open_from(t - base::Micros{parameters_.loop.period_us});
   }
-  if (cause == sensor::ResetCause::kPowerOn) history_.open_from(t - base::Micros{parameters_.loop.window_us});
+  if (cause == sensor::ResetCause::kPowerOn) window_.open_from(t - base::Micros{parameters_.loop.window_us});
 }
 
 /// Makes consumed samples and the time up to t final: nothing from before t is fused any more.
 template <class Estimators, std::size_t Capacity>
 void Node<Estimators, Capacity>::close_window(base::Micros t) {
-  history_.close_window(t, context(), noting());
+  window_.close_window(t, context(), noting());
 }
 
 /// Sends the record of a compared or refused sample. Records with every tick would crowd out the rest: of accepted
@@ -386,14 +386,14 @@ void Node<Estimators, Capacity>::apply_commands() {
   if constexpr (kMakesMap) {
     if (take(What::kOwnMap)) {
       close_window(now_);
-      history_.each_lane([](auto& lane) {
-        if constexpr (requires { lane.reset_own_map(); }) lane.reset_own_map();
+      window_.each_slot([](auto& slot) {
+        if constexpr (requires { slot.reset_own_map(); }) slot.reset_own_map();
       });
     }
   }
   if (take(What::kCounters)) {
     counters_ = {};
-    history_.each_lane([](auto& lane) { lane.clear_statistics(); });
+    window_.each_slot([](auto& slot) { slot.clear_statistics(); });
   }
   std::uint8_t& reset = pending_reset_[static_cast<std::size_t>(What::kEstimators)];
   if (reset != 0) {
@@ -403,7 +403,7 @@ void Node<Estimators, Capacity>::apply_commands() {
   }
   if (pending_pose_) {
     if (!window_ended(pending_pose_->waited)) return;
-    history_.each_lane([&](auto& lane) { lane.set_pose(now_, *pending_pose_, context()); });
+    window_.each_slot([&](auto& slot) { slot.set_pose(now_, *pending_pose_, context()); });
     pending_pose_.reset();
     ++resets_;
     reset_cause_ = sensor::ResetCause::kSetPose;
@@ -412,7 +412,7 @@ void Node<Estimators, Capacity>::apply_commands() {
 
 template <class Estimators, std::size_t Capacity>
 void Node<Estimators, Capacity>::consume(base::Micros t) {
-  const std::uint16_t not_used = history_.consume(
+  const std::uint16_t not_used = window_.consume(
       t, context(),
       [this](const sensor::Sample& sample) {
         if (sample.sensor == sensor::Sensor::kGnssPosition)
@@ -426,9 +426,9 @@ void Node<Estimators, Capacity>::consume(base::Micros t) {
 template <class Estimators, std::size_t Capacity>
 void Node<Estimators, Capacity>::restart_in_new_map() {
   close_window(now_);
-  history_.each_lane([&](auto& lane) {
-    if constexpr (std::remove_cvref_t<decltype(lane)>::template kTakes<sensor::GnssPosition>)
-      lane.restart(now_, context());
+  window_.each_slot([&](auto& slot) {
+    if constexpr (std::remove_cvref_t<decltype(slot)>::template kTakes<sensor::GnssPosition>)
+      slot.restart(now_, context());
   });
   jumps_ = 0;
   ++resets_;
@@ -449,7 +449,7 @@ bool Node<Estimators, Capacity>::healthy(const Estimates& estimates) {
   if (finite && positive) return true;
   close_window(now_);
   restart(now_, finite ? sensor::ResetCause::kNotPositive : sensor::ResetCause::kNotFinite);
-  history_.advance(now_, context());
+  window_.advance(now_, context());
   return false;
 }
 
@@ -457,10 +457,10 @@ bool Node<Estimators, Capacity>::healthy(const Estimates& estimates) {
 template <class Estimators, std::size_t Capacity>
 estimators::Disagreement Node<Estimators, Capacity>::judge() {
   estimators::Disagreement apart;
-  if constexpr (requires { history_.primary().inertial_attitude(); }) {
-    history_.each_lane([&](const auto& lane) {
-      if constexpr (requires { lane.attitude(context()); })
-        apart = disagreement(in_map(lane.attitude(context())), history_.primary().inertial_attitude());
+  if constexpr (requires { window_.primary().inertial_attitude(); }) {
+    window_.each_slot([&](const auto& slot) {
+      if constexpr (requires { slot.attitude(context()); })
+        apart = disagreement(in_map(slot.attitude(context())), window_.primary().inertial_attitude());
     });
     disagreement_.step(apart, now_, parameters_.disagreement);
   }
@@ -470,7 +470,7 @@ estimators::Disagreement Node<Estimators, Capacity>::judge() {
 /// A step the primary estimator made of itself counts as a reset, with its cause.
 template <class Estimators, std::size_t Capacity>
 void Node<Estimators, Capacity>::note_jump() {
-  const estimators::Jump jump = history_.primary().jump();
+  const estimators::Jump jump = window_.primary().jump();
   if (jump.count == jumps_) return;
   resets_ = static_cast<std::uint8_t>(resets_ + static_cast<std::uint8_t>(jump.count - jumps_));
   jumps_ = jump.count;
@@ -481,7 +481,7 @@ void Node<Estimators, Capacity>::note_jump() {
 template <class Estimators, std::size_t Capacity>
 std::uint32_t Node<Estimators, Capacity>::state_crc() const {
   base::StateHash hash;
-  history_.hash_state(hash);
+  window_.hash_state(hash);
   hash(static_cast<std::uint32_t>(map_frame_.origin));
   origin_.hash_state(hash);
   disagreement_.hash_state(hash);
@@ -491,7 +491,7 @@ std::uint32_t Node<Estimators, Capacity>::state_crc() const {
 
 template <class Estimators, std::size_t Capacity>
 bus::Summary Node<Estimators, Capacity>::summary(const estimators::Estimate& estimate) const {
-  const auto& primary = history_.primary();
+  const auto& primary = window_.primary();
   bus::Summary s{.mode = primary.mode(context()),
                  .position_valid = estimate.position_valid,
                  .heading_valid = estimate.heading_valid,
@@ -507,9 +507,9 @@ bus::Summary Node<Estimators, Capacity>::summary(const estimators::Estimate& est
   if (far && (s.mode == sensor::Mode::kNominal || s.mode == sensor::Mode::kDeadReckoning))
     s.mode = sensor::Mode::kDegraded;
   faults.raise(sensor::Fault::kAttitudeDisagrees, disagreement_.disagrees());
-  history_.each_lane([&](const auto& lane) {
-    if constexpr (requires { lane.attitude(context()); })
-      faults.raise(sensor::Fault::kMagneticDisturbance, lane.attitude(context()).field_disturbed);
+  window_.each_slot([&](const auto& slot) {
+    if constexpr (requires { slot.attitude(context()); })
+      faults.raise(sensor::Fault::kMagneticDisturbance, slot.attitude(context()).field_disturbed);
   });
   s.faults = faults.bits;
   s.map_faults = map_faults_.faults(publisher_.epoch());

@@ -95,15 +95,15 @@ class Timeline {
     if (i == known_) ++known_;
     if (new_ == 0) known_ = size_;
   }
-  /// Estimator `lane` does not have the consumed sample yet: its record is to come.
-  constexpr void await(std::size_t i, std::size_t lane) {
-    consumed_[place(i)] = static_cast<std::uint8_t>(consumed_[place(i)] | 2U << lane);
+  /// Estimator `slot` does not have the consumed sample yet: its record is to come.
+  constexpr void await(std::size_t i, std::size_t slot) {
+    consumed_[place(i)] = static_cast<std::uint8_t>(consumed_[place(i)] | 2U << slot);
   }
   /// Whether the estimator's record was to come; once.
-  [[nodiscard]] constexpr bool take_awaited(std::size_t i, std::size_t lane) {
+  [[nodiscard]] constexpr bool take_awaited(std::size_t i, std::size_t slot) {
     std::uint8_t& state = consumed_[place(i)];
-    const bool awaited = (state & (2U << lane)) != 0;
-    if (awaited) state = static_cast<std::uint8_t>(state & ~(2U << lane));
+    const bool awaited = (state & (2U << slot)) != 0;
+    if (awaited) state = static_cast<std::uint8_t>(state & ~(2U << slot));
     return awaited;
   }
   /// Number of samples at the front that are certainly consumed; all when all are.
@@ -128,7 +128,7 @@ class Timeline {
 
   std::array<sensor::Sample, Capacity> samples_{};
   std::array<std::uint8_t, Capacity>
-      consumed_{};  ///< bit 0: consumed; bit 1 + lane: that estimator's record is to come
+      consumed_{};  ///< bit 0: consumed; bit 1 + slot: that estimator's record is to come
   std::size_t begin_ = 0, size_ = 0;
   std::size_t known_ = 0, new_ = 0;  ///< places of consumed samples, and of those that are not
   std::uint32_t digest_ = 0;         ///< sum of the samples' digests

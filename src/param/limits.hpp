@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Plausibility of parameters: each value within its row's limits, and rules between fields. A robot's parameters are
 // refused where they are written: `constexpr Parameters parameters = checked({...})` does not compile with an
-// implausible one. The compiler's message has path, value and limits; tools/run/explain_parameter_error forms one sentence of
-// it.
+// implausible one. The compiler's message has path, value and limits; tools/run/explain_parameter_error forms one
+// sentence of it.
 #pragma once
 
 #include "param/table.hpp"

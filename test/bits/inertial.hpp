@@ -168,18 +168,18 @@ class InertialRun {
       static_cast<void>(history_.consume(
           now_, context(), [](const sensor::Sample&) {}, noting()));
       history_.advance(now_, context());
-      history_.each_lane([&](const auto& lane) {
-        const estimators::Estimate e = lane.estimate(context());
+      history_.each_slot([&](const auto& slot) {
+        const estimators::Estimate e = slot.estimate(context());
         hash_(e.pose.x.um());
         hash_(e.pose.y.um());
         hash_(e.pose.yaw_rad);
         for (const float v : e.p.packed()) hash_(v);
-        if constexpr (requires { lane.inertial(context()); }) {
-          const estimators::InertialEstimate full = lane.inertial(context());
+        if constexpr (requires { slot.inertial(context()); }) {
+          const estimators::InertialEstimate full = slot.inertial(context());
           hash_state(hash_, full.state);
           for (const float v : full.p.packed()) hash_(v);
           filter::unroll<0, nav::InsState::kErrors>([&](auto i) { hash_(full.template covariance<i>()); });
-          const estimators::MotionVariance motion = lane.motion_variance(context());
+          const estimators::MotionVariance motion = slot.motion_variance(context());
           hash_(motion.forward_m2ps2);
           hash_(motion.yaw_rate_rad2ps2);
         }
@@ -214,7 +214,7 @@ class InertialRun {
     if (chance_.one_in(3)) return;  // then it finds place and heading by itself
     const estimators::SetPose pose{
         .pose = {.yaw_rad = chance_.spread()}, .sigma_position_m = 0.5F, .sigma_yaw_rad = 0.1F};
-    history_.each_lane([&](auto& lane) { lane.set_pose(now_, pose, context()); });
+    history_.each_slot([&](auto& slot) { slot.set_pose(now_, pose, context()); });
   }
   /// Mostly since the last tick; now and then late, or too late.
   [[nodiscard]] sensor::Sample fresh(sensor::Sensor sensor) {

@@ -49,7 +49,7 @@ class Navigator {
   void map_entry(const estimators::MapEntry&) {}
   void reset(bus::ResetWhat) {}
   void set_pose(const estimators::SetPose& pose) {
-    history_.each_lane([&](auto& lane) { lane.set_pose(now_, pose, context()); });
+    history_.each_slot([&](auto& slot) { slot.set_pose(now_, pose, context()); });
   }
 
   void tick(base::Micros t) {

@@ -294,8 +294,8 @@ class Ticks {
     map_frame_.frame = nav::LocalFrame(24'131'350'000, 5'834'150'000, 500.0F);
     map_frame_.origin = sensor::OriginSource::kConfigured;
     history_.power_on({us_}, context());
-    history_.each_lane([&](auto& lane) {
-      lane.set_pose({us_}, {.pose = {}, .sigma_position_m = 0.1F, .sigma_yaw_rad = 0.01F}, context());
+    history_.each_slot([&](auto& slot) {
+      slot.set_pose({us_}, {.pose = {}, .sigma_position_m = 0.1F, .sigma_yaw_rad = 0.01F}, context());
     });
   }
   bool imu = true, speeds = false, stuck = false;

@@ -73,16 +73,16 @@ class Wired {
   }
   /// Everything at once, or what is wrong.
   void judge() {
-    history_.each_lane([&](const auto& lane) {
-      const estimators::Estimate e = lane.estimate(context());
+    history_.each_slot([&](const auto& slot) {
+      const estimators::Estimate e = slot.estimate(context());
       EXPECT_TRUE(base::is_finite(e.pose.x.offset_m) && base::is_finite(e.pose.y.offset_m));
       EXPECT_TRUE(base::is_finite(e.pose.yaw_rad));
       EXPECT_TRUE(base::is_finite(e.forward_mps) && base::is_finite(e.yaw_rate_radps));
       EXPECT_GT(least_eigenvalue(e.p), 0);
     });
-    history_.each_lane([&](const auto& lane) {
-      if constexpr (requires { lane.inertial(context()); }) {
-        const estimators::InertialEstimate e = lane.inertial(context());
+    history_.each_slot([&](const auto& slot) {
+      if constexpr (requires { slot.inertial(context()); }) {
+        const estimators::InertialEstimate e = slot.inertial(context());
         EXPECT_TRUE(e.state.finite());
         EXPECT_NEAR(e.state.q_nb.norm2(), 1.0F, 1e-3F);
         if (e.valid) {
@@ -93,8 +93,8 @@ class Wired {
   }
   [[nodiscard]] bool navigates() {
     bool valid = false;
-    history_.each_lane([&](const auto& lane) {
-      if constexpr (requires { lane.inertial(context()); }) valid = lane.inertial(context()).valid;
+    history_.each_slot([&](const auto& slot) {
+      if constexpr (requires { slot.inertial(context()); }) valid = slot.inertial(context()).valid;
     });
     return valid;
   }

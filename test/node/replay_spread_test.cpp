@@ -77,9 +77,9 @@ class Bench {
   /// State of each estimator's present.
   [[nodiscard]] std::vector<std::uint32_t> estimates() const {
     std::vector<std::uint32_t> all;
-    window_.each_lane([&](const auto& lane) {
+    window_.each_slot([&](const auto& slot) {
       bool first = true;
-      lane.hash_state([&](std::uint32_t word) {
+      slot.hash_state([&](std::uint32_t word) {
         if (first) all.push_back(word);
         first = false;
       });

@@ -50,7 +50,7 @@ class Inertial {
   /// Brings the estimate to t: the state at the horizon, carried over the samples of the window.
   void advance(base::Micros t, const Context& ctx, const sensor::Window& window);
   /// The sample asks for more work than this tick has left: it waits for the next one.
-  [[nodiscard]] bool rests(const sensor::Sample& sample, const Context& ctx);
+  [[nodiscard]] bool defers(const sensor::Sample& sample, const Context& ctx);
   /// The window is about to end, and its samples are fused in the next few ticks.
   void grant_share() { budget_.grant(WorkBudget::kShare); }
 

@@ -32,7 +32,7 @@ std::int32_t Inertial::work_of(const sensor::Sample& sample, const Context& ctx)
   return free ? 0 : WorkBudget::kMeasurement;
 }
 
-bool Inertial::rests(const sensor::Sample& sample, const Context& ctx) {
+bool Inertial::defers(const sensor::Sample& sample, const Context& ctx) {
   if (!tracking() || budget_.allows(work_of(sample, ctx))) return false;
   budget_.defer();
   return true;

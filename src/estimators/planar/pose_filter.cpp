@@ -34,7 +34,7 @@ Innovation PoseFilter<Filter>::measure(const Model& model, Source source, float 
     refused.update(false, stamp);
     in_a_row = 0;
     last_absolute_ = stamp;
-    doubted_m2_ = 0;
+    speed_error_m2_ = 0;
   } else if (result.verdict == filter::Verdict::kRejected) {
     refused.update(true, stamp);
     if (in_a_row < kDegraded) ++in_a_row;
@@ -61,9 +61,9 @@ void PoseFilter<Filter>::widen_by_vote(float place_m2, float yaw_rad2, base::Mic
   constexpr base::Micros kLeast{200'000};
   add_variance(motion_.filter, {place_m2, place_m2, yaw_rad2});
   const base::Micros since = stamp - last_absolute_;
-  const float doubt_mps = base::sqrt(place_m2) / base::seconds(since > kLeast ? since : kLeast);
-  if (doubt_mps > doubt_mps_) doubt_mps_ = doubt_mps;
-  doubted_at_ = stamp;
+  const float speed_error_mps = base::sqrt(place_m2) / base::seconds(since > kLeast ? since : kLeast);
+  if (speed_error_mps > speed_error_mps_) speed_error_mps_ = speed_error_mps;
+  contradicted_at_ = stamp;
   for (checks::Persistence& refused : refused_) refused.reset();
 }
 
@@ -72,15 +72,16 @@ void PoseFilter<Filter>::judge_motion(base::Micros stamp, const param::Parameter
   const float turned_rad2 = turn_.update(motion_, stamp, n);
   const float place_m2 = TurnCheck::place_m2(turned_rad2, n);
   if (turned_rad2 > 0.0F) add_variance(motion_.filter, {place_m2, place_m2, turned_rad2});
-  constexpr base::Micros kDoubted{10'000'000};
-  if (!checks::recent(doubted_at_, stamp, kDoubted)) {
-    doubt_mps_ = doubted_m2_ = 0;
+  constexpr base::Micros kContradicted{10'000'000};
+  if (!checks::recent(contradicted_at_, stamp, kContradicted)) {
+    speed_error_mps_ = speed_error_m2_ = 0;
     return;
   }
-  const float way_m = doubt_mps_ * base::seconds(stamp - last_absolute_), more_m2 = way_m * way_m - doubted_m2_;
+  const float way_m = speed_error_mps_ * base::seconds(stamp - last_absolute_),
+              more_m2 = way_m * way_m - speed_error_m2_;
   if (!(more_m2 > 0.0F)) return;
   add_variance(motion_.filter, {more_m2, more_m2, 0.0F});
-  doubted_m2_ += more_m2;
+  speed_error_m2_ += more_m2;
 }
 
 template <class Filter>

@@ -104,9 +104,9 @@ class PoseFilter {
     for (const checks::Persistence& refused : refused_) refused.hash_state(sink);
     turn_.residual.hash_state(sink);
     for (const std::uint8_t in_a_row : in_a_row_) sink(std::uint32_t{in_a_row});
-    sink(doubt_mps_);
-    sink(doubted_m2_);
-    sink(doubted_at_.us);
+    sink(speed_error_mps_);
+    sink(speed_error_m2_);
+    sink(contradicted_at_.us);
     sink(last_absolute_.us);
   }
 
@@ -146,8 +146,8 @@ class PoseFilter {
   [[nodiscard]] bool both_refuse(Source source, base::Micros stamp) const;
   void widen_by_vote(float place_m2, float yaw_rad2, base::Micros stamp);
   void trust_motion() {
-    doubt_mps_ = doubted_m2_ = 0;
-    doubted_at_ = {};
+    speed_error_mps_ = speed_error_m2_ = 0;
+    contradicted_at_ = {};
     turn_.residual.reset();
   }
 
@@ -158,10 +158,10 @@ class PoseFilter {
   Phase phase_ = Phase::kWaiting;
   std::array<checks::Persistence, kSources> refused_{};  ///< rejections in a row of one kind of sensor
   std::array<std::uint8_t, kSources> in_a_row_{};        ///< the same, which a widening does not end
-  float doubt_mps_ = 0;                                  ///< 1 sigma of the speed, beside the wheels' own noise
-  float doubted_m2_ = 0;        ///< variance of the position by it since the last accepted measurement
-  base::Micros doubted_at_;     ///< stamp at which landmarks and fixes last contradicted the motion; 0: never
-  base::Micros last_absolute_;  ///< stamp of the last accepted landmark or fix
+  float speed_error_mps_ = 0;                            ///< 1 sigma of the speed, beside the wheels' own noise
+  float speed_error_m2_ = 0;      ///< variance of the position by it since the last accepted measurement
+  base::Micros contradicted_at_;  ///< stamp at which landmarks and fixes last contradicted the motion; 0: never
+  base::Micros last_absolute_;    ///< stamp of the last accepted landmark or fix
   base::Micros now_;
 };
 
