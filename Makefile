@@ -39,7 +39,7 @@ help: ## this list
 sim: setup programs ## the simulated world over vcan0: table, report, pictures in out/sim (SEED= FAULT= REALTIME=1 BOARD=zynqmp_r5 BUS=memory OUT=DIR)
 	@tools/run/simulate_world
 
-board: setup programs ## a flash image's machine code on an emulated board in the simulated world, repeated on the host: report in out/board (BOARD=ark_cannode or nucleo_g474re, ROBOT= SEED= FAULT= BUS=vcan in real time)
+board: setup programs ## a flash image on an emulated board in the simulated world, repeated on the host: report in out/board (BOARD=ark_cannode, nucleo_g474re ROBOT= SEED= FAULT= BUS=vcan)
 	@tools/run/build_preset host:tetap-board
 	@BUS=$(if $(filter file,$(origin BUS)),memory,$(BUS)) tools/run/emulate_board
 
@@ -103,7 +103,7 @@ matrix: setup ## faults of every sensor in every situation against what the node
 	@tools/run/build_preset host:tetap-matrix
 	@tools/proof/run_matrix $(if $(CELLS),--cells $(CELLS))
 
-swarm: setup programs ## seeds that draw which kinds of faults there are, and what is left a minute after all of them, in out/swarm.json (CELLS=100 seeds); goes on where it was
+swarm: setup programs ## faults drawn anew for each seed, and what is left a minute after all of them, in out/swarm.json (CELLS=100 seeds)
 	@tools/proof/run_swarm $(if $(CELLS),--seeds $(CELLS))
 
 mutants: setup ## constants of the inertial estimator doubled and halved: which no test notices, in out/mutants.json (CELLS=60: a sample); goes on where it was

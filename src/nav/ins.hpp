@@ -211,8 +211,6 @@ class Ins {
     for (int i = 0; i < 3; ++i) sink(accel_n_mps2(i));
   }
 
-  /// P was factored from end to end since the last step.
-  [[nodiscard]] bool factored() const { return condition_monitor_.idle(); }
   /// How often the covariance had to be put right (see condition()).
   [[nodiscard]] std::uint32_t conditioned() const { return conditioned_; }
 

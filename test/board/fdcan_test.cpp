@@ -555,7 +555,10 @@ class Off : public Bus {
     send(0x100);
     chip.advance_us(20'000);
   }
-  void hold(bool on) { chip.fdcan1.line.stuck_dominant = on; }
+  void hold(bool on) {
+    if (!on) return chip.fdcan1.line.release();
+    chip.fdcan1.line.stuck_dominant = true;
+  }
   void recover() { put(kCan, cccr::kOffset, 0); }
   [[nodiscard]] bool off() { return protocol(can::fdcan_psr::kBo) == 1; }
 };

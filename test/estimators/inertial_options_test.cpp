@@ -111,9 +111,10 @@ TEST(InertialOptions, AGyroscopeThatFeelsTheEarthHasNoBiasOfIt) {
   }
 }
 
-/// A filter that begins as aligned, without wheels.
-void begin(nav::Ins& ins, const Alignment& start, const HeadingMonitor& monitor, const param::Parameters& n) {
-  const Alignment::Start at = start.start(nullptr, nav::LocalLevel{}, monitor, n.inertial, base::kNan);
+/// A filter that begins as aligned, without wheels, at the time of the last fix.
+void begin(nav::Ins& ins, const Alignment& start, const HeadingMonitor& monitor, const param::Parameters& n,
+           base::Micros now) {
+  const Alignment::Start at = start.start(nullptr, nav::LocalLevel{}, monitor, n.inertial, base::kNan, now);
   Recovery::restart(ins, at.x, at.variances);
 }
 
@@ -131,11 +132,11 @@ TEST(InertialOptions, AFirstWayThatIsLongIsACourse) {
   start.fix(fix, {2'000'200'000}, monitor, n);
   ASSERT_TRUE(start.ready());
   nav::Ins ins;
-  begin(ins, start, monitor, n);
+  begin(ins, start, monitor, n, {2'000'200'000});
   EXPECT_NEAR(nav::euler(ins.x.q_nb).yaw_rad, 0.0F, 1e-6F);
   EXPECT_NEAR(ins.x.x.minus({}), 150'000.0F, 0.1F);
   start.set_heading(base::kNan, 0.1F);
-  begin(ins, start, monitor, n);
+  begin(ins, start, monitor, n, {2'000'200'000});
   EXPECT_TRUE(ins.x.finite()) << "no heading is no reason to lose one";
 }
 
@@ -149,7 +150,7 @@ std::optional<nav::Ins> begun_by(const nav::Vector3& v_n_mps, float sigma_mps, b
   start.velocity(v_n_mps, sigma_mps, true, monitor, n);
   if (!start.ready()) return std::nullopt;
   nav::Ins ins;
-  begin(ins, start, monitor, n);
+  begin(ins, start, monitor, n, {1'000'000});
   return ins;
 }
 

@@ -105,7 +105,7 @@ def mrclam(runs, bounds, pool):
             bounds.check(f"robot {k}: {robot} heading RMSE over the EKF's", of[robot]["heading_rmse_deg"] / ekf_deg, 0.9, 1.05)
         of_seeds = [one.result() for one in particles[k]] + [of["mrclam_pf"]]
         pf_m, pf_nees = (statistics.mean(one[figure] for one in of_seeds) for figure in ("position_rmse_m", "nees_mean"))
-        bounds.check(f"robot {k}: mrclam_pf position RMSE over the EKF's, {len(of_seeds)} seeds", pf_m / ekf_m, 0.7, 1.12)
+        bounds.check(f"robot {k}: mrclam_pf position RMSE over the EKF's, {len(of_seeds)} seeds", pf_m / ekf_m, 0.7, 1.17)
         bounds.check(f"robot {k}: mrclam_pf NEES (3 expected)", pf_nees, 0.5, 10)
         print(f"  robot {k}: " + ", ".join(f"{robot} {one['position_rmse_m']:.3f} m {one['heading_rmse_deg']:.2f} deg NEES {one['nees_mean']:.1f}" for robot, one in of.items()))
 

@@ -116,10 +116,7 @@ class Inertial {
   [[nodiscard]] filter::Innovation<float, Model::kDimension> update(const Model& model, float gate) {
     budget_.spend(WorkBudget::kMeasurement);
     predictor_.note_correction();
-    const bool was_factored = ins_.factored();
-    const filter::Innovation<float, Model::kDimension> result = ins_.update(model, gate);
-    if (ins_.factored() && !was_factored) budget_.spend(WorkBudget::kConditioning);
-    return result;
+    return ins_.update(model, gate);
   }
   template <class Model, class Source>
   Innovation measure(const Model& model, Source& source, float gate_scale, const FilterView& filter);
