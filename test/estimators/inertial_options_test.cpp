@@ -140,6 +140,24 @@ TEST(InertialOptions, AFirstWayThatIsLongIsACourse) {
   EXPECT_TRUE(ins.x.finite()) << "no heading is no reason to lose one";
 }
 
+// A fix of 1 s and a velocity of 2 m/s: the way since then is carried for seconds, and only its size is known later.
+TEST(InertialOptions, TheVelocityOfAnOldFixIsNoWay) {
+  param::Parameters n = parameters();
+  n.inertial.starts_forward = 1;
+  Alignment start;
+  HeadingMonitor monitor;
+  start.fix({.sigma_horizontal_m = 1, .sigma_vertical_m = 2}, {1'000'000}, monitor, n);
+  start.velocity({2.0F, 0.0F, 0.0F}, 0.1F, true, monitor, n);
+  ASSERT_TRUE(start.ready());
+  nav::Ins ins;
+  begin(ins, start, monitor, n, {3'000'000});
+  EXPECT_NEAR(ins.x.x.minus({}), 4.0F, 1e-3F);
+  EXPECT_LT(ins.p(0, 0), 4.0F);
+  begin(ins, start, monitor, n, {101'000'000});
+  EXPECT_NEAR(ins.x.x.minus({}), 0.0F, 1e-3F);
+  EXPECT_GT(ins.p(0, 0), 200.0F * 200.0F);
+}
+
 /// A start at the map's origin that knows of one velocity over ground only; none: without a heading.
 std::optional<nav::Ins> begun_by(const nav::Vector3& v_n_mps, float sigma_mps, bool forwards = true) {
   param::Parameters n = parameters();

@@ -213,13 +213,17 @@ inline Alignment::Start Alignment::start(const nav::InsState* before, const nav:
   const float own_mps = rolls ? kSlip_mps : unseen ? kUnseen_mps : sigma_v_mps_;
   const float speed = own_mps * own_mps + sideways_mps * sideways_mps;
   const float climb = sigma_climb_mps_ * sigma_climb_mps_;
-  // A fix is true at its own stamp, and the robot went on since then; a given pose is that of now.
-  const float since_s = given_ || again ? 0.0F : base::seconds(now - fixed_at_);
-  nav::move(x.x, x.v_n_mps(0) * since_s);
-  nav::move(x.y, x.v_n_mps(1) * since_s);
-  nav::move(x.z, x.v_n_mps(2) * since_s);
-  const float since_s2 = since_s * since_s;
-  const float h = at_.sigma_horizontal_m * at_.sigma_horizontal_m + speed * since_s2;
+  // A fix is true at its own stamp, and the robot went on since then; a given pose is that of now. The velocity of an
+  // old fix is no way: then the place stays, and its variance holds the way.
+  constexpr float kCarried_s = 5.0F;
+  const float since_s = given_ || again || !has_fixes_ ? 0.0F : base::seconds(now - fixed_at_);
+  const bool carried = since_s < kCarried_s;
+  const float carried_s = carried ? since_s : 0.0F;
+  nav::move(x.x, x.v_n_mps(0) * carried_s);
+  nav::move(x.y, x.v_n_mps(1) * carried_s);
+  nav::move(x.z, x.v_n_mps(2) * carried_s);
+  const float since_s2 = since_s * since_s, way_m2 = carried ? 0.0F : x.v_n_mps.squaredNorm() * since_s2;
+  const float h = at_.sigma_horizontal_m * at_.sigma_horizontal_m + speed * since_s2 + way_m2;
   const float v = at_.sigma_vertical_m * at_.sigma_vertical_m + climb * since_s2;
   const float tilt = n.start_tilt_rad * n.start_tilt_rad;
   const float a = n.accel_turn_on_mps2 * n.accel_turn_on_mps2, g = n.gyro_turn_on_radps * n.gyro_turn_on_radps;
