@@ -43,6 +43,7 @@ class Mutants(unittest.TestCase):
     def setUp(self):
         self.folder = tempfile.TemporaryDirectory()
         self.addCleanup(self.folder.cleanup)
+        self.read = os.path.join(self.folder.name, "read")
         self.constants = mutants.constants_of("src/check.hpp", SOURCE)
         for number, one in enumerate(self.constants):
             one.update(number=number, member=one["line"] < 10)
@@ -57,7 +58,7 @@ class Mutants(unittest.TestCase):
             with open(os.path.join(ROOT, "test", "mutants", "mutated.hpp"), encoding="utf-8") as source, open(os.path.join(self.folder.name, "base", "mutated.hpp"), "w", encoding="utf-8") as file:
                 file.write(source.read())
             subprocess.run(["clang++", "-std=c++20", "-Wall", "-Werror", "-I.", "main.cpp", "-o", "program"], cwd=self.folder.name, check=True)
-        environment = {**os.environ, **({"TETAP_MUTANT": f"{mutant[0]}:{mutant[1]}", "TETAP_MUTANT_REACHED": os.path.join(self.folder.name, "reached")} if mutant else {})}
+        environment = {**os.environ, **({"TETAP_MUTANT": f"{mutant[0]}:{mutant[1]}", "TETAP_MUTANT_READ": self.read} if mutant else {})}
         return subprocess.run([program], capture_output=True, text=True, check=True, env=environment).stdout
 
     def test_are_the_numbers_that_a_rule_has(self):
@@ -67,9 +68,25 @@ class Mutants(unittest.TestCase):
         self.assertEqual(self.run_with(), "11.25 0.5 25 10 10 0.75")
         for number, expected in enumerate(("22.5 0.5 25 10 10 0.75", "11.25 1 25 10 10 0.75", "11.25 0.5 50 10 10 0.75", "11.25 0.5 25 11 10 0.75", "11.25 0.5 25 10 10 1.5")):
             self.assertEqual(self.run_with(number, 2), expected)
-            self.assertTrue(os.path.exists(os.path.join(self.folder.name, "reached")))
-            os.remove(os.path.join(self.folder.name, "reached"))
         self.assertEqual(self.run_with(2, 0.5), "11.25 0.5 12 10 10 0.75")
+
+    def test_know_which_constants_a_program_reads(self):
+        self.constants = [one for one in self.constants if one["literal"] != "25"]
+        self.run_with(0, 2)
+        with open(self.read, encoding="ascii") as file:
+            self.assertEqual([int(line) for line in file], [one["number"] for one in self.constants])
+
+    def test_run_the_tests_alone_that_read_the_constant(self):
+        program = os.path.join(self.folder.name, "suite")
+        with open(program, "w", encoding="ascii") as file:
+            file.write('#!/bin/sh\necho "$@" >> "$0.calls"\n')
+        os.chmod(program, 0o755)
+        tree = type("OneProgram", (), {"program": staticmethod(lambda name: program)})
+        runs = [("suite", {"A.fast": 1, "A.slow": 900, "B.fast": 2}, {"A.fast": {3, 4}, "A.slow": {4}, "B.fast": {5}}, 1.0)]
+        self.assertEqual(mutants.judge(tree, runs, 4, 2.0), (False, True, ""))
+        with open(program + ".calls", encoding="ascii") as file:
+            self.assertEqual([line.split("--gtest_filter=")[1].strip() for line in file], ["A.fast", "A.slow"])
+        self.assertEqual(mutants.judge(tree, runs, 6, 2.0), (False, False, ""))
 
 
 if __name__ == "__main__":
