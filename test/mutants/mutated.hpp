@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A constant that the environment may scale: tools/proof/run_mutants writes these into a copy of the sources.
-// TETAP_MUTANT=NUMBER:FACTOR names the constant. TETAP_MUTANT_READ=FILE: at its end the program writes the numbers of the constants that it read.
+// TETAP_MUTANT=NUMBER:FACTOR names the constant. TETAP_MUTANT_READ=FILE: at its end the program writes the numbers of
+// the constants that it read.
 #pragma once
 
 #include <bitset>
