@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sim_host/board/clock_controller.hpp"
 
+#include <algorithm>
+
 namespace tetap::board {
 
 void ClockController::write_gate(std::uint32_t offset, std::uint32_t merged) {
@@ -12,13 +14,17 @@ void ClockController::write_gate(std::uint32_t offset, std::uint32_t merged) {
   }
 }
 
+// A polling loop asks for one block again and again.
 bool ClockController::clocked(const Peripheral& block) const {
-  for (const Block& one : blocks_) {
-    if (one.peripheral != &block) continue;
-    const bool held = one.reset_mask != 0 && (word(one.reset_offset) & one.reset_mask) != 0;
-    return !held && (one.enable_mask == 0 || (word(one.enable_offset) & one.enable_mask) != 0);
+  if (last_asked_ >= blocks_.size() || blocks_[last_asked_].peripheral != &block) {
+    const auto found =
+        std::find_if(blocks_.begin(), blocks_.end(), [&block](const Block& one) { return one.peripheral == &block; });
+    if (found == blocks_.end()) return true;
+    last_asked_ = static_cast<std::size_t>(found - blocks_.begin());
   }
-  return true;
+  const Block& one = blocks_[last_asked_];
+  const bool held = one.reset_mask != 0 && (word(one.reset_offset) & one.reset_mask) != 0;
+  return !held && (one.enable_mask == 0 || (word(one.enable_offset) & one.enable_mask) != 0);
 }
 
 }  // namespace tetap::board

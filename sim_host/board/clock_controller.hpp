@@ -61,6 +61,7 @@ class ClockController : public Peripheral {
     std::uint32_t enable_offset, enable_mask, reset_offset, reset_mask;
   };
   std::vector<Block> blocks_;
+  mutable std::size_t last_asked_ = 0;  ///< index of the block that clocked() found last
 };
 
 }  // namespace tetap::board

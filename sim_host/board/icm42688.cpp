@@ -244,12 +244,17 @@ void Icm42688::plan_sample() {
 }
 
 // 14.40 and 14.39: bandwidth in parts of the rate, order 1 to 3; one-pole stages in a row with the same 3 dB point.
-double Icm42688::filtered(Filter& filter, double value, int bandwidth_code, int order, double hz) const {
+double Icm42688::filter_gain(int bandwidth_code, int order, double hz) {
   constexpr double kParts[8] = {2, 4, 5, 8, 10, 16, 20, 40};
-  if (bandwidth_code >= 8 || bandwidth_code == 0) return value;
+  if (bandwidth_code >= 8 || bandwidth_code == 0) return 1;
   const double base_hz = std::max(400.0, hz);
   const double corner_hz = base_hz / kParts[bandwidth_code] / std::sqrt(std::pow(2.0, 1.0 / order) - 1);
-  const double gain = 1 - std::exp(-2 * 3.14159265358979323846 * corner_hz / hz);
+  return 1 - std::exp(-2 * 3.14159265358979323846 * corner_hz / hz);
+}
+
+double Icm42688::filtered(Filter& filter, double value, int bandwidth_code, int order, double hz) {
+  if (bandwidth_code >= 8 || bandwidth_code == 0) return value;
+  const double gain = filter_gain(bandwidth_code, order, hz);
   for (int i = 0; i < order; ++i) {
     double& stage = filter.stages[static_cast<std::size_t>(i)];
     stage = filter.begun ? stage + gain * (value - stage) : value;
@@ -302,6 +307,7 @@ void Icm42688::sample() {
   last_gyro_ = gyro;
   last_accel_ = accel;
   store_registers(gyro, accel, temperature_c);
+  if (on_reading && gyro[0] != kInvalid && accel[0] != kInvalid) report_reading(gyro, accel, temperature_c);
   if ((bank0(kFifoConfig) >> 6) != 0 && (bank0(kFifoConfig1) & 3) != 0) push_packet(gyro, accel, temperature_c);
   std::uint8_t events = kDataReady;
   const std::uint32_t watermark = bank0(kFifoConfig2) | (bank0(kFifoConfig3) & 0x0FU) << 8;
@@ -309,6 +315,24 @@ void Icm42688::sample() {
   if (watermark != 0 && filled >= watermark) events |= kFifoThreshold;
   if (fifo_bytes() + (fifo_.empty() ? 0 : fifo_.back().size) > kFifoBytes) events |= kFifoFull;
   raise(events);
+}
+
+// A stage of one pole lags by (1 - gain) / gain samples at 0 Hz.
+void Icm42688::report_reading(const std::array<std::int32_t, 3>& gyro, const std::array<std::int32_t, 3>& accel,
+                              double temperature_c) const {
+  const double hz = odr_hz() * (1 + options_.clock_error);
+  const int order = std::min(2, bank0(kGyroConfig1) >> 2 & 3) + 1;
+  const double gain = filter_gain(bank0(kGyroAccelConfig0) & 0x0F, order, odr_hz());
+  Reading reading{.time = scheduler_.now(),
+                  .delay = static_cast<Picoseconds>(order * (1 - gain) / gain / hz * 1e12),
+                  .temperature_c = temperature_c};
+  const double range_radps = 2000.0 / kDegrees / (1 << (bank0(kGyroConfig0) >> 5));
+  const double range_mps2 = 16 * kGravity_mps2 / (1 << (bank0(kAccelConfig0) >> 5));
+  for (std::size_t i = 0; i < 3; ++i) {
+    reading.rate_radps[i] = gyro[i] * range_radps / 524288;
+    reading.force_mps2[i] = accel[i] * range_mps2 / 524288;
+  }
+  on_reading(reading);
 }
 
 void Icm42688::put16(std::uint8_t address, std::int32_t value) {

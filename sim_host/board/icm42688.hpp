@@ -31,6 +31,14 @@ class Icm42688 final : public SpiDevice {
 
   /// Rates and forces at the chip; empty: it lies still at 25 degrees and weighs nothing.
   std::function<ImuTruth(Picoseconds)> world;
+  /// One sample as the registers have it, in SI, at the chip's axes.
+  struct Reading {
+    Picoseconds time = 0, delay = 0;  ///< delay: that of the interface filter at 0 Hz
+    std::array<double, 3> rate_radps{}, force_mps2{};
+    double temperature_c = 0;
+  };
+  /// Called with each valid sample; for observers that are no part of the board.
+  std::function<void(const Reading&)> on_reading;
   /// INT1 pin; called with each change of its level.
   std::function<void(bool level)> on_int1;
   /// From then on it answers nothing: MISO floats.
@@ -71,7 +79,11 @@ class Icm42688 final : public SpiDevice {
   void sample();
   void plan_sample();
   void measure(std::array<std::int32_t, 3>& gyro, std::array<std::int32_t, 3>& accel, double& temperature_c);
-  [[nodiscard]] double filtered(Filter& filter, double value, int bandwidth_code, int order, double odr_hz) const;
+  /// Share of the way to a new value that one stage goes with each sample; 1: no filter.
+  [[nodiscard]] static double filter_gain(int bandwidth_code, int order, double odr_hz);
+  [[nodiscard]] static double filtered(Filter& filter, double value, int bandwidth_code, int order, double odr_hz);
+  void report_reading(const std::array<std::int32_t, 3>& gyro, const std::array<std::int32_t, 3>& accel,
+                      double temperature_c) const;
   void store_registers(const std::array<std::int32_t, 3>& gyro, const std::array<std::int32_t, 3>& accel, double t_c);
   void push_packet(const std::array<std::int32_t, 3>& gyro, const std::array<std::int32_t, 3>& accel, double t_c);
   [[nodiscard]] std::uint8_t pop_fifo();

@@ -226,7 +226,10 @@ void Machine::reset_core() {
   if ((start & 1) == 0) fault(exception::kHardFault, m4::scb::kInvstate.mask(), false, 0);
 }
 
-Machine::BlockInfo& Machine::block_info(std::uint32_t address, std::uint32_t size) {
+const Machine::BlockInfo& Machine::block_info(std::uint32_t address, std::uint32_t size) {
+  const std::uint32_t in_flash = address - Memory::kFlash;
+  if (in_flash < chip_.memory.flash_size() && flash_blocks_[in_flash / 2].size == size)
+    return flash_blocks_[in_flash / 2];
   const bool in_ram = chip_.memory.in_ram(address);
   const std::uint32_t offset = chip_.memory.resolve(address) - (in_ram ? Memory::kRam : Memory::kFlash);
   auto& blocks = in_ram ? ram_blocks_ : flash_blocks_;
@@ -243,11 +246,21 @@ Machine::BlockInfo& Machine::block_info(std::uint32_t address, std::uint32_t siz
   return info;
 }
 
+// Alarms that are due run while the engine waits in its hook: most of them ask nothing of the core, and to stop and
+// start the engine costs as much as a hundred blocks.
+bool Machine::has_to_stop() {
+  if (hundredths_ >= stop_hundredths_) {
+    synchronise();
+    chip_.clock.settle(cycles());
+    plan_stop(until_);
+  }
+  return hundredths_ >= stop_hundredths_ || (chip_.nvic.waiting() && chip_.nvic.next(masks()) != 0) ||
+         chip_.pending_reset.has_value() || pending_fault_.number != 0 || stalled_until_ > chip_.scheduler.now() ||
+         upset_due();
+}
+
 void Machine::on_block(std::uint32_t address, std::uint32_t size) {
-  const bool asked = hundredths_ >= stop_hundredths_ || (chip_.nvic.waiting() && chip_.nvic.next(masks()) != 0) ||
-                     chip_.pending_reset.has_value() || pending_fault_.number != 0 ||
-                     stalled_until_ > chip_.scheduler.now() || upset_due();
-  if (asked && !first_block_) {
+  if (!first_block_ && has_to_stop()) {
     uc_emu_stop(uc_);
     return;
   }

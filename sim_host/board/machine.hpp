@@ -91,6 +91,7 @@ class Machine {
   void fault(int number, std::uint32_t cfsr, bool with_address, std::uint32_t address);
   void take_pending();
   void synchronise();
+  [[nodiscard]] bool has_to_stop();
   void on_block(std::uint32_t address, std::uint32_t size);
   void on_instruction(std::uint32_t address, std::uint32_t size);
   std::uint64_t on_read(std::uint32_t address, unsigned size);
@@ -115,7 +116,7 @@ class Machine {
     std::uint16_t size = 0, instructions = 0;
     bool floating_point = false;
   };
-  [[nodiscard]] BlockInfo& block_info(std::uint32_t address, std::uint32_t size);
+  [[nodiscard]] const BlockInfo& block_info(std::uint32_t address, std::uint32_t size);
 
   Chip& chip_;
   MachineOptions options_;

@@ -81,6 +81,7 @@ void SimulatedSensors::sort(std::vector<sim::Measurement>& arrived) {
     const bool wheels = std::holds_alternative<sensor::WheelCounts>(one.value);
     const bool fix = std::holds_alternative<sensor::GnssPosition>(one.value);
     const bool gnss = fix || std::holds_alternative<sensor::GnssVelocity>(one.value);
+    if (on_wired && ((wheels && wired_.encoders != 0) || (gnss && wired_.gnss != 0))) on_wired(one);
     if ((imu && wired_.imu != 0) || (wheels && wired_.encoders != 0)) continue;
     if (gnss && wired_.gnss != 0) {
       solve(one);
@@ -136,6 +137,16 @@ std::array<double, 3> SimulatedSensors::to_chip(const sim::Vector3& v_s) const {
     v_c[axis % 3] = axis < 3 ? v_s[i] : -v_s[i];
   }
   return v_c;
+}
+
+std::array<double, 3> SimulatedSensors::from_chip(const std::array<double, 3>& v_c) const {
+  std::array<double, 3> v_s{};
+  const std::array axes{wired_.imu_x, wired_.imu_y, wired_.imu_z};
+  for (std::size_t i = 0; i < 3; ++i) {
+    const auto axis = static_cast<std::size_t>(axes[i]);
+    v_s[i] = axis < 3 ? v_c[axis] : -v_c[axis % 3];
+  }
+  return v_s;
 }
 
 // Between the middles of two steps signals run straight. Broadband vibration is white at the rate of the questions.

@@ -11,6 +11,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 namespace tetap::board {
@@ -33,6 +34,10 @@ class SimulatedSensors {
   [[nodiscard]] const sim::World& world() const { return world_; }
   /// One row each 10 ms of the bus's time, from 0 on.
   [[nodiscard]] const std::vector<sim::Truth>& truth() const { return truth_; }
+  /// A vector at the chip's axes by those of the robot's samples.
+  [[nodiscard]] std::array<double, 3> from_chip(const std::array<double, 3>& v_c) const;
+  /// Counts and fixes of wired sensors as the world measures them, before they become edges and bytes.
+  std::function<void(const sim::Measurement&)> on_wired;
   UbloxReceiver receiver;
   /// Edges that disturbance adds to the right encoder's count.
   std::int64_t extra_edges = 0;

@@ -39,7 +39,8 @@ std::uint32_t Spi::read(std::uint32_t offset) {
       return cr2_;
     case reg::sr::kOffset: {
       const std::uint32_t value = status();
-      if (data_read_) sr_ &= ~reg::sr::kOvr.mask();  // RM0402: DR, then SR
+      if (!data_read_) return value;
+      sr_ &= ~reg::sr::kOvr.mask();  // RM0402: DR, then SR
       data_read_ = false;
       update();
       return value;

@@ -3,22 +3,27 @@
 // standard output. With --robot the simulated world is behind the pins. Any complaint of a model fails the run.
 #include "bus/codec.hpp"
 #include "bus/messages.hpp"
+#include "hal/chip/support/boot_line.hpp"
 #include "sim_host/board/ark_cannode.hpp"
+#include "sim_host/board/bus_twin.hpp"
 #include "sim_host/board/hardware_faults.hpp"
 #include "sim_host/board/live_bus.hpp"
 #include "sim_host/board/machine.hpp"
 #include "sim_host/board/nucleo_g474re.hpp"
 #include "sim_host/board/simulated_sensors.hpp"
 #include "sim_host/encode.hpp"
+#include "sim_host/in_process.hpp"
 #include "sim_host/node_origin.hpp"
 #include "sim_host/play/arguments.hpp"
 #include "sim_host/play/candump.hpp"
+#include "sim_host/play/lockstep.hpp"
 #include "sim_host/play/out_file.hpp"
 #include "sim_host/play/session.hpp"
 #include "sim_host/published_sensors.hpp"
 #include "sim_host/robots.hpp"
 #include "sim_host/truth_file.hpp"
 #include "sim_host/world_source.hpp"
+#include "version.hpp"
 
 #include <algorithm>
 #include <array>
@@ -29,6 +34,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -62,6 +68,7 @@ std::string help() {
          "  --seed N           every draw follows from it (default 1)\n"
          "  --gnss-baud N      rate of the receiver as it comes (default 38400)\n"
          "  --gnss-generation N  8 or 9 of u-blox (default 9)\n"
+         "  --twin             beside it a node of this host that gets the same sensors over CAN: DIR/twin\n"
          "  --no-clock         no other node sends the time of the bus\n"
          "  --fault NAME[@START[+DURATION]]   seconds after the world's start; several with commas. Of the "
          "hardware:\n" +
@@ -79,7 +86,7 @@ struct Options {
   std::vector<board::HardwareFaultSetting> hardware_faults;
   std::vector<sim::FaultSetting> world_faults;
   std::uint64_t seed = 1;
-  bool partner = true, time_master = true, first_complaint = false;
+  bool partner = true, time_master = true, first_complaint = false, twin = false;
 };
 
 double to_seconds(board::Picoseconds time) { return static_cast<double>(time / board::kMicrosecond) * 1e-6; }
@@ -147,8 +154,10 @@ void parse_world(sim::Arguments& arguments, Options& options) {
   options.receiver.baud = static_cast<std::int64_t>(
       arguments.integer("--gnss-baud", options.receiver.generation == 8 ? 9'600 : 38'400, 4'800, 921'600));
   options.time_master = !arguments.flag("--no-clock");
+  options.twin = arguments.flag("--twin");
   const auto faults = arguments.texts("--fault");
   if (options.robot.empty() && !faults.empty()) throw sim::UsageError("--fault needs --robot");
+  if (options.robot.empty() && options.twin) throw sim::UsageError("--twin needs --robot");
   for (const std::string& given : faults) add_faults(given, options);
 }
 
@@ -214,8 +223,9 @@ sim::World world_of(const Options& options, const param::Parameters& parameters)
 /// Other nodes of the bus: sensors that are not wired to the board, a master of the time, a sender of the start pose.
 class OtherNodes {
  public:
-  OtherNodes(board::Board& node, board::SimulatedSensors& sensors, std::uint32_t base, bool time_master)
-      : node_(node), sensors_(sensors), base_(base), poll_(node.processor.scheduler, [this] { poll(); }) {
+  OtherNodes(board::Board& node, board::SimulatedSensors& sensors, std::uint32_t base, bool time_master,
+             board::BusTwin* twin)
+      : node_(node), sensors_(sensors), twin_(twin), base_(base), poll_(node.processor.scheduler, [this] { poll(); }) {
     if (!time_master) next_clock_ = board::kNever;
     poll_.set(0);
   }
@@ -236,17 +246,20 @@ class OtherNodes {
                                                       .kind = bus::SyncKind::kClock}));
       next_clock_ = now + board::kSecond;
     }
+    const std::size_t synchronisation = frames_.size();
     if (!introduced_ && now >= sensors_.world().start().us * board::kMicrosecond) {
       introduced_ = true;
       sim::introduce(sensors_.world(), base_, true, frames_);
     }
     sensors_.take_unwired(now, measurements_);
     for (const sim::Measurement& one : measurements_) sim::encode(base_, one, frames_);
+    if (twin_ != nullptr) twin_->take(std::span(frames_).subspan(synchronisation));
     for (const base::CanFrame& frame : frames_) node_.processor.can_line().send(frame, now);
   }
 
   board::Board& node_;
   board::SimulatedSensors& sensors_;
+  board::BusTwin* twin_;  ///< null: none listens
   std::uint32_t base_;
   board::Alarm poll_;
   board::Picoseconds next_clock_ = 0;
@@ -350,7 +363,9 @@ class Run {
     const std::string wrong = machine.load_elf(options_.image);
     if (!wrong.empty()) throw sim::UsageError(wrong);
     std::optional<OtherNodes> others;
-    if (sensors_) others.emplace(node, *sensors_, parameters_.can_base, options_.time_master);
+    std::optional<board::BusTwin> twin;
+    if (options_.twin) twin.emplace(node, *sensors_, parameters_);
+    if (sensors_) others.emplace(node, *sensors_, parameters_.can_base, options_.time_master, twin ? &*twin : nullptr);
     board::HardwareFaults faults(node, machine, sensors_ ? &*sensors_ : nullptr,
                                  parameters_.can_base + bus::InBaro::kOffset);
     for (const auto& one : options_.hardware_faults)
@@ -364,6 +379,7 @@ class Run {
       std::fprintf(stderr, "tetap-board: on %s in real time, at most %.3f s late\n", options_.can.c_str(),
                    static_cast<double>(live->latest().us) * 1e-6);
     finish(node, machine, origin);
+    if (twin && play_twin(*twin) != 0) throw std::runtime_error("the twin's node did not keep up");
     return node.processor.complaints.empty() && !machine.locked_up() ? 0 : 1;
   }
 
@@ -409,6 +425,39 @@ class Run {
     sim::OutFile console(options_.out + "/console.txt");
     console.write(node.console);
     console.close();
+  }
+
+  /// The same sensors over CAN: a node of this host computes DIR/twin.
+  [[nodiscard]] int play_twin(board::BusTwin& twin) const {
+    const std::string folder = options_.out + "/twin";
+    const std::uint32_t base = parameters_.can_base;
+    const std::size_t ticks = twin.script().ticks();
+    return sim::with_node_in_process(options_.robot, {}, base, [&](auto& link) {
+      sim::Session session({.program = "tetap-board",
+                            .version = hal::version_text(version()).c_str(),
+                            .folder = folder,
+                            .base = base,
+                            .mode = "lockstep",
+                            .bus = "memory",
+                            .robot = options_.robot,
+                            .log = "sensors of the emulated board, over CAN",
+                            .ticks = ticks,
+                            .quiet = true});
+      session.note("seed", std::to_string(options_.seed));
+      session.note("fault", sim::quoted(options_.faults));
+      session.note("landmarks", sim::landmarks_json(sensors_->world()));
+      session.note("matched", "false");
+      sim::NodeOrigin origin(base);
+      sim::OriginWatch watch(session, origin);
+      return session.run(
+          [&] { sim::play_lockstep(link, twin.script(), watch, {.base = base}, session.counts()); },
+          [&] {
+            const sim::World& world = sensors_->world();
+            const auto rows = std::span(sensors_->truth()).subspan(twin.first_row());
+            session.add(sim::write_truth(folder, parameters_, world, rows.first(std::min(ticks, rows.size())),
+                                         origin.from_fix().value_or(world.origin()), true));
+          });
+    });
   }
 
   Options options_;

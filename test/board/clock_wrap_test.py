@@ -57,7 +57,7 @@ def main():
     failed = False
     for words, wrap_ms in WRAPS_MS.items():
         with tempfile.TemporaryDirectory() as folder:
-            image, error = seeded.build(overlay_with(wrap_ms - BEFORE_MS, os.path.join(folder, "overlay")), folder)
+            image, error = seeded.build("ark_cannode", overlay_with(wrap_ms - BEFORE_MS, os.path.join(folder, "overlay")), folder)
             if image is None:
                 print(f"clock_wrap_test: {words}: does not compile: {error}", file=sys.stderr)
                 return 1

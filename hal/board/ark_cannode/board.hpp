@@ -4,24 +4,7 @@
 // function mapping". Nobody has run this port on the board: it was executed in emulation.
 #pragma once
 
-#include "hal/board.hpp"
-#include "hal/chip/arm/cortex_m4.hpp"
-#include "hal/chip/arm/interrupt_lock.hpp"
-#include "hal/chip/arm/nvic.hpp"
-#include "hal/chip/arm/stored_fault.hpp"
-#include "hal/chip/arm/systick_clock.hpp"
-#include "hal/chip/stm32/boot_cause.hpp"
-#include "hal/chip/stm32/can_controller.hpp"
-#include "hal/chip/stm32/clock_tree.hpp"
-#include "hal/chip/stm32/encoder_timer.hpp"
-#include "hal/chip/stm32/gpio.hpp"
-#include "hal/chip/stm32/serial_output.hpp"
-#include "hal/chip/stm32/serial_port.hpp"
-#include "hal/chip/stm32/spi_master.hpp"
-#include "hal/chip/stm32/watchdog.hpp"
-#include "hal/chip/support/image.hpp"
-#include "hal/chip/support/mmio.hpp"
-#include "hal/chip/support/text.hpp"
+#include "hal/chip/stm32/f4_board.hpp"
 
 #include <array>
 #include <cstdint>
@@ -92,181 +75,32 @@ static_assert(kPll.valid());
 inline constexpr stm32::CanBitTiming kCanTiming = stm32::can_bit_timing(kPll.core_hz / 2, kCanBitRate);
 inline constexpr stm32::CanBitTiming kSlowCanTiming = stm32::can_bit_timing(stm32::PllPlan::kInternal_hz, kCanBitRate);
 
-/// 136 ms with the fastest oscillator, 377 ms with the slowest.
-inline constexpr stm32::WatchdogTime kWatchdogTime = stm32::watchdog_time(200'000);
-/// A poll with a tick in it, as GnssBoard allows.
-inline constexpr std::uint32_t kLongestPoll_us = 20'000;
-static_assert(kWatchdogTime.shortest_us() / 2 >= kLongestPoll_us, "kicked twice before the fastest oscillator is due");
+/// The bus's bit timing, the pins and the lights, as F4Board asks for them.
+struct Wiring {
+  static constexpr const char* kUp = "tetap: ark_cannode up";
+  static constexpr const auto& kPins = ark_cannode::kPins;
+  static constexpr Pin kImuSelect = ark_cannode::kImuSelect;
+  static constexpr stm32::PllPlan kPll = ark_cannode::kPll;
+  static constexpr stm32::CanBitTiming kCanTiming = ark_cannode::kCanTiming,
+                                       kSlowCanTiming = ark_cannode::kSlowCanTiming;
+  static constexpr std::uint32_t kConsoleBaud = ark_cannode::kConsoleBaud, kGnssBaud = ark_cannode::kGnssBaud,
+                                 kMostImuClock_hz = ark_cannode::kMostImuClock_hz;
 
-using SystemClock = SysTickClock<Mmio>;
-using GnssPort = stm32::SerialPort<Mmio, InterruptLock, 2048, 256>;
-static_assert(2048 >= 921'600 / 10 * kLongestPoll_us / 1'000'000, "the ring outlasts a poll at every baud rate");
-
-inline constexpr Mmio kSystem{cortex_m4::kSystemControlSpace};
-/// DMA2, channel 4: stream 5 receives for USART1, stream 7 sends.
-inline constexpr std::uint32_t kGnssReceiveStream = 5, kGnssTransmitStream = 7, kGnssChannel = 4;
-
-/// Interrupts that the board uses; Board::on_interrupt() serves them.
-inline constexpr std::array kInterrupts{chip::interrupt::kCan1Tx, chip::interrupt::kCan1Rx0, chip::interrupt::kUsart1,
-                                        chip::interrupt::kDma2Stream5};
-inline constexpr int kLastInterrupt = chip::interrupt::kDma2Stream5;
-
-struct Board {
-  /// Everything but the bus and the receiver, which start_sensors() starts. `stored`: what a fault handler may have
-  /// left; `filter`: the frames that the node takes.
-  [[gnu::noinline]] Board(StoredFault& stored, const stm32::CanFilter& filter) : filter_{filter} {
-    running = this;
-    boot_.cause = stm32::take_boot_cause(Mmio{chip::rcc::kRcc});
-    if (const auto fault = stored.take(); fault && boot_.cause == BootCause::kSoftware) {
-      boot_.cause = BootCause::kCpuFault;
-      boot_.fault = *fault;
-    }
-    clocks_ =
-        stm32::ClockTree<Mmio>{Mmio{chip::rcc::kRcc}, Mmio{chip::pwr::kPwr}, Mmio{chip::flash::kFlash}}.start(kPll);
-    boot_.fallback_clock = clocks_.source != stm32::ClockSource::kCrystal;
-    power_blocks();
-    for (const PinSetup& pin : kPins) stm32::set_up(Mmio{pin.pin.port}, pin);
-    kLedRed.clear();
-    Nvic<Mmio>{kSystem}.set_up_exceptions();
-    time_.start(clocks_.core_hz);
-    console_.start(clocks_.apb1_hz, kConsoleBaud);
-    imu.start(clocks_.apb2_hz, kMostImuClock_hz);
-    left_encoder.start();
-    right_encoder.start();
-    print_start();
+  static void show_start(bool starting) { (starting ? kLedRed.clear() : kLedRed.set()); }
+  static void show_bus(bool light, bool on_bus) {
+    (light && on_bus ? kLedGreen.clear() : kLedGreen.set());
+    (light && !on_bus ? kLedRed.clear() : kLedRed.set());
   }
-  Board(const Board&) = delete;  // handlers hold its address
-  Board& operator=(const Board&) = delete;
-
-  /// Joins the bus and opens the receiver's line: not before the self-check, which outlasts their rings.
-  void start_sensors() {
-    console_.finish();
-    gnss.start(clocks_.apb2_hz, kGnssBaud);
-    can.start({.timing = clocks_.source == stm32::ClockSource::kInternalDirect ? kSlowCanTiming : kCanTiming,
-               .filter = filter_});
-    for (const int interrupt : kInterrupts) Nvic<Mmio>{kSystem}.enable(interrupt);
-    kLedRed.set();
-  }
-
-  [[nodiscard]] base::Micros now() const { return time_.now(); }
-
-  /// Sleeps until an interrupt. One that comes between the look and WFI wakes the core, masked as it is.
-  void idle() {
-    console_.drain();
-    show_state();
-    const InterruptLock lock;
-    if (!can.has_received()) asm volatile("dsb\nwfi" ::: "memory");
-  }
-
-  void start_watchdog() {
-    if (!watchdog_.start(kWatchdogTime)) print("tetap: the watchdog did not take its time\n");
-  }
-  void kick() const { watchdog_.kick(); }
-
-  [[nodiscard]] const BootReport& boot() const { return boot_; }
-  [[nodiscard]] static StackUse stack() { return stack_use(); }
-  void print(const char* text) const { console_.print(text); }
-
-  /// SysTick and the interrupts of kInterrupts, by the exception's number.
-  void on_interrupt(std::uint32_t exception) {
-    constexpr int kFirst = 16, kSysTick = 15;
-    switch (static_cast<int>(exception)) {
-      case kSysTick:
-        return time_.on_interrupt();
-      case kFirst + chip::interrupt::kCan1Tx:
-        return can.on_transmit_interrupt();
-      case kFirst + chip::interrupt::kCan1Rx0:
-        return can.on_receive_interrupt();
-      case kFirst + chip::interrupt::kUsart1:
-        return gnss.on_error_interrupt();
-      case kFirst + chip::interrupt::kDma2Stream5:
-        return gnss.on_dma_interrupt();
-      default:
-        return;
-    }
-  }
-
-  static inline constinit Board* running = nullptr;  ///< the one whose interrupts are on
-
- private:
-  /// Clocks of the blocks in use; each is reset, whatever a boot loader left. SYSCFG stays off: no pin interrupts.
-  static void power_blocks() {
-    namespace rcc = chip::rcc;
-    constexpr Mmio kRcc{rcc::kRcc};
-    const auto start = [&kRcc](std::uint32_t enable, std::uint32_t enabled, std::uint32_t reset, std::uint32_t held) {
-      kRcc.write(enable, kRcc.read(enable) | enabled);
-      kRcc.write(reset, held);
-      kRcc.write(reset, 0);
-      static_cast<void>(kRcc.read(reset));  // "delay after an RCC peripheral clock enabling": two clocks of the bus
-    };
-    start(rcc::ahb1enr::kOffset,
-          rcc::ahb1enr::kGpioaen.mask() | rcc::ahb1enr::kGpioben.mask() | rcc::ahb1enr::kGpiocen.mask() |
-              rcc::ahb1enr::kDma2en.mask(),
-          rcc::ahb1rstr::kOffset, rcc::ahb1rstr::kDma2rst.mask());
-    start(rcc::apb1enr::kOffset,
-          rcc::apb1enr::kTim2en.mask() | rcc::apb1enr::kTim3en.mask() | rcc::apb1enr::kUsart2en.mask() |
-              rcc::apb1enr::kCan1en.mask(),
-          rcc::apb1rstr::kOffset,
-          rcc::apb1rstr::kTim2rst.mask() | rcc::apb1rstr::kTim3rst.mask() | rcc::apb1rstr::kUart2rst.mask() |
-              rcc::apb1rstr::kCan1rst.mask());
-    start(rcc::apb2enr::kOffset, rcc::apb2enr::kSpi1en.mask() | rcc::apb2enr::kUsart1en.mask(), rcc::apb2rstr::kOffset,
-          rcc::apb2rstr::kSpi1rst.mask() | rcc::apb2rstr::kUsart1rst.mask());
-  }
-
-  [[gnu::cold, gnu::noinline]] void print_start() {
-    print("tetap: ark_cannode up");
-    if (boot_.fallback_clock) print(", no crystal: the internal oscillator");
-    print("\n");
-    if (boot_.cause == BootCause::kWatchdog) print("tetap: the watchdog ended the last run\n");
-    if (boot_.cause != BootCause::kCpuFault) return;
-    Text<> line;
-    line.add("tetap: a fault ended the last run: kind ").dec(static_cast<std::uint32_t>(boot_.fault.fault));
-    line.add(" at ").hex(boot_.fault.program_counter).add(", address ").hex(boot_.fault.address);
-    print(line.add(", status ").hex(boot_.fault.status).add('\n').c_str());
-  }
-
-  /// Green blinks once a second while the node is on the bus, red while it is not; a change is one line, and so is a
-  /// bus that cannot be joined.
-  void show_state() {
-    const bool on_bus = can.state() == stm32::CanState::kOnBus;
-    const std::uint32_t failures = can.faults().bus_off;
-    if (failures != failures_shown_) print("tetap: can: off the bus\n");
-    if (on_bus && !was_on_bus_) print("tetap: can: on the bus\n");
-    was_on_bus_ = on_bus;
-    failures_shown_ = failures;
-    const base::Micros time = now();
-    if (time < next_blink_) return;
-    next_blink_ = time + base::Micros{500'000};
-    light_ = !light_;
-    (light_ && on_bus ? kLedGreen.clear() : kLedGreen.set());
-    (light_ && !on_bus ? kLedRed.clear() : kLedRed.set());
-  }
-
-  stm32::CanFilter filter_;
-  BootReport boot_{};
-  stm32::Clocks clocks_{};
-  bool was_on_bus_ = false;
-  std::uint32_t failures_shown_ = 0;  ///< count of CanFaults::bus_off
-  bool light_ = false;
-  base::Micros next_blink_{};
-  SystemClock time_{kSystem};
-  mutable stm32::SerialOutput<Mmio, 512> console_{Mmio{chip::usart::kUsart2}};  ///< text on its way is no state
-  stm32::Watchdog<Mmio> watchdog_{Mmio{chip::iwdg::kIwdg}};
-
- public:
-  stm32::CanController<Mmio, SystemClock, InterruptLock> can{Mmio{chip::can::kCan1}, time_};
-  stm32::SpiMaster<Mmio, Pin> imu{Mmio{chip::spi::kSpi1}, kImuSelect};
-  stm32::EncoderTimer<Mmio, std::uint32_t> left_encoder{Mmio{chip::tim::kTim2}};
-  stm32::EncoderTimer<Mmio, std::uint16_t> right_encoder{Mmio{chip::tim::kTim3}};
-  GnssPort gnss{Mmio{chip::usart::kUsart1},
-                chip::usart::kUsart1,
-                {Mmio{chip::dma::kDma2}, kGnssReceiveStream, kGnssChannel},
-                {Mmio{chip::dma::kDma2}, kGnssTransmitStream, kGnssChannel}};
 };
+
+using Board = stm32::F4Board<Wiring>;
+inline constexpr auto kSystem = stm32::kF4System;
+inline constexpr auto kInterrupts = stm32::kF4Interrupts;
+inline constexpr int kLastInterrupt = stm32::kF4LastInterrupt;
 
 static_assert(hal::SensorBoard<Board> && hal::IdleBoard<Board> && hal::WatchdogBoard<Board> &&
               hal::ReportingBoard<Board>);
 static_assert(hal::ImuBoard<Board> && hal::EncoderBoard<Board> && hal::GnssBoard<Board>);
-static_assert(hal::SerialPort<GnssPort>);
+static_assert(hal::SerialPort<stm32::F4GnssPort>);
 
 }  // namespace tetap::hal::ark_cannode
