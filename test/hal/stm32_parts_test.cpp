@@ -104,6 +104,10 @@ TEST(ClockTree, PlansOutsideOfTheDataSheetAreInvalid) {
   EXPECT_FALSE((PllPlan{.crystal_hz = 8'000'000, .core_hz = 102'000'000}).valid());
   EXPECT_FALSE((PllPlan{.crystal_hz = 3'000'000, .core_hz = 96'000'000}).valid());
   EXPECT_FALSE((PllPlan{.crystal_hz = 8'000'000, .core_hz = 96'000'000, .p = 8}).valid());  // VCO at 768 MHz
+  EXPECT_FALSE((PllPlan{.crystal_hz = 25'000'000, .core_hz = 96'000'000}).valid());         // no whole steps of 2 MHz
+  EXPECT_TRUE((PllPlan{.crystal_hz = 25'000'000, .core_hz = 80'000'000, .limits = kStm32f405Clocks}).valid());
+  // APB1 of the STM32F405 ends at 42 MHz.
+  EXPECT_FALSE((PllPlan{.crystal_hz = 25'000'000, .core_hz = 88'000'000, .limits = kStm32f405Clocks}).valid());
 }
 
 TEST(Watchdog, ItsTimeHoldsAtEveryFrequencyOfItsOscillator) {
