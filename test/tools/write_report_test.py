@@ -392,6 +392,24 @@ class Faults(Case):
         self.assertIn('<td>1.0 s</td><td class="text">fault Rejecting, for 1.0 s</td>', page)
         self.assertIn("1763900000.250000 s on the log", page)
 
+    def test_a_truth_of_another_clock_is_an_error_that_names_both(self):
+        time_s, zero = 1 + 0.01 * np.arange(300), np.zeros(300)
+        self.estimates(time_s, zero, zero, zero)
+        done = self.report("--no-pictures", "--truth", self.truth(1763900000 + time_s, zero, zero, zero))
+        self.assertEqual((done.returncode, done.stdout), (1, ""))
+        self.assertIn("no row meets an estimate: the truth is of 1763900001.000000 to", done.stderr)
+
+    def test_a_part_of_a_worlds_log_is_compared_by_time_and_a_clock_that_jumps_by_epoch(self):
+        epoch, zero = np.arange(600), np.zeros(600)
+        self.write_rows("t.truth.csv", [*ground_truth.TRUTH, "epoch"], zip(1 + 0.01 * epoch, 0.01 * epoch, zero, zero, epoch))
+        for since, jump_s in ((300, 0), (0, 3)):
+            time_s = 1 + 0.01 * epoch[since:] + jump_s * (epoch[since:] > 450)
+            self.estimates(time_s, 0.01 * epoch[since:], zero[since:], zero[since:])
+            self.write("run.json", json.dumps({key: value for key, value in RUN.items() if key != "seed"}))
+            self.assertEqual(self.report("--no-pictures", "--truth", self.path("t.truth.csv")).returncode, 0)
+            with open(self.path("summary.json"), encoding="utf-8") as file:
+                self.assertLess(json.load(file)["position_rmse_m"], 1e-6, since)
+
     def test_no_fault_is_no_line(self):
         zero = np.zeros(20)
         for none in ("", "none"):

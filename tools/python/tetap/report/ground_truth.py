@@ -11,6 +11,7 @@ from tetap.report.recorded_run import ACC_BIAS, GYRO_BIAS, VELOCITY, read_json
 from tetap.report.tables import read_table
 
 LEAST_GAP_S = 0.2  # truth rows further apart than this, or than 2.5 times their usual distance, are not interpolated between
+MOST_APART_S = 1.0  # between the time of the first common epoch in truth and run: more, and the epochs are those of another run
 TRUTH = ["time_s", "x_m", "y_m", "yaw_rad"]  # then optionally "epoch" and TRUTH_MORE
 TRUTH_MORE = ["z_m", "roll_rad", "pitch_rad", *VELOCITY, *GYRO_BIAS, *ACC_BIAS]
 
@@ -42,6 +43,24 @@ class Truth:
         beside = path[:-len(".truth.csv")] + ".json" if path.endswith(".truth.csv") else ""
         self.about = read_json(beside) if beside and os.path.exists(beside) else {}
         self.is_reference = self.about.get("truth") == "gps track"
+
+    def paired_with(self, run):
+        """The truth as this run is to be compared with it: by epoch, or by time where the log is a part of a world's run, whose epochs begin at
+        1 again. BadInput where no estimate has a truth."""
+        rows = run.estimates
+        if self.epoch is not None and "seed" not in run.about:
+            true_s = self._in_epochs(rows["epoch"], ["time_s"])["time_s"]
+            known = np.flatnonzero(np.isfinite(true_s))
+            # A clock that jumps does so after the start: the first common epoch shows whose run it is.
+            if len(known) > 0 and abs(rows["time_s"][known[0]] - true_s[known[0]]) > MOST_APART_S and np.isfinite(self.at(rows["time_s"])[0]).any():
+                other = copy.copy(self)
+                other._rows = self._rows.without("epoch")
+                other.has_more = False
+                return other
+        if not np.isfinite(self.of(rows)[0]).any():
+            raise BadInput(f"{self.path}: no row meets an estimate: the truth is of {self.time_s[0]:.6f} to {self.time_s[-1]:.6f} s, the node's time "
+                           f"(that of In_Sync, else of the log) of {rows['time_s'].min():.6f} to {rows['time_s'].max():.6f} s")
+        return self
 
     def since(self, start):
         """The same, with times counted from `start` [s]."""

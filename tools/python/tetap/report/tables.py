@@ -87,6 +87,12 @@ class Table:
             changed[name].add(values)
         return Table(changed, None, self._start)
 
+    def without(self, name):
+        """The same, whole, without this column."""
+        if self._index is not None:
+            raise ValueError("of a whole table alone")
+        return Table({one: column for one, column in self._columns.items() if one != name}, None, self._start)
+
     def where(self, mask):
         """The rows for which `mask` holds."""
         index = np.flatnonzero(mask)
