@@ -88,6 +88,13 @@ inline constexpr std::uint64_t kTimeMask = 0xFFFFFFFFFFFF;
       static_cast<std::int64_t>(ahead) - (ahead > kTimeMask / 2 ? static_cast<std::int64_t>(kTimeMask) + 1 : 0);
   return {reference.us + offset};
 }
+/// The first time of the bus in a log: near the log's own clock, or as it stands where the log counts the calendar and
+/// the bus counts from its boot.
+[[nodiscard]] constexpr base::Micros first_bus_time(std::uint64_t bus_us, base::Micros log_time) {
+  constexpr std::int64_t kDay_us = 86'400'000'000;
+  const std::int64_t near_us = extend_bus_time(bus_us, log_time).us, apart_us = near_us - log_time.us;
+  return {apart_us > -kDay_us && apart_us < kDay_us ? near_us : static_cast<std::int64_t>(bus_us)};
+}
 
 /// Everything a node sent for one tick, from Est_Epoch to Est_StateCrc.
 struct NodeEpoch {

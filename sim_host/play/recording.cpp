@@ -67,7 +67,7 @@ RecordReader::Found RecordReader::add(const TimedFrame& entry) {
   if (*offset == bus::InSync::kOffset) {
     const auto sync = bus::decode<bus::InSync>(bus::payload(frame));
     if (sync && sync->kind == bus::SyncKind::kBegin)
-      pending_ = Begin{extend_bus_time(sync->time_us, entry.time), inputs_};
+      pending_ = Begin{first_bus_time(sync->time_us, entry.time), inputs_};
     return found;
   }
   if (pending_ && collector_.is_begin_response(frame)) {

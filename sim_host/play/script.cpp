@@ -66,7 +66,7 @@ std::optional<base::Micros> LogTicks::own_tick() {
     const auto sync = sync_of(entry.frame, options_.log_base);
     if (sync && sync->kind == bus::SyncKind::kBegin) own_last_ = base::Micros{static_cast<std::int64_t>(sync->time_us)};
     if (!is_tick(sync)) continue;
-    own_last_ = extend_bus_time(sync->time_us, own_last_.value_or(entry.time));
+    own_last_ = own_last_ ? extend_bus_time(sync->time_us, *own_last_) : first_bus_time(sync->time_us, entry.time);
     return own_last_;
   }
   return std::nullopt;

@@ -84,6 +84,17 @@ TEST(Script, TicksCountFromTheBeginOfTheBusNotByTheClockOfTheLog) {
   EXPECT_EQ(all(log), expected);
 }
 
+TEST(Script, TicksFromBootStayAsTheyAreInALogOfTodayWithoutBegin) {
+  constexpr std::int64_t kToday_us = 1'795'555'498'360'954;
+  for (const std::int64_t start : {std::int64_t{46'010'000}, kToday_us}) {
+    const std::vector<TimedFrame> log{{{kToday_us}, sync_frame(0x300, bus::SyncKind::kStep, {start}, 1)},
+                                      input(kToday_us + 10, 1),
+                                      {{kToday_us + 20}, sync_frame(0x300, bus::SyncKind::kStep, {start + 10'000}, 2)}};
+    const std::vector<Played> expected{{start, {}, true}, {start + 10'000, {1}, false}};
+    EXPECT_EQ(all(log), expected);
+  }
+}
+
 TEST(Script, OnlyInputsOfTheNodesBlockArePlayedUnderItsIds) {
   const std::vector<TimedFrame> log{input(1, 1, 0x2FF), input(2, 2, 0x301),
                                     input(3, 3, 0x31F), input(4, 4, 0x320),
