@@ -2,7 +2,9 @@
 #include "sim_host/doctor/diagnosis.hpp"
 
 #include "bus/decoder.hpp"
+#include "sim_host/doctor/axes.hpp"
 #include "sim_host/doctor/bus_time.hpp"
+#include "sim_host/doctor/dead_axis.hpp"
 #include "sim_host/doctor/fixes.hpp"
 #include "sim_host/doctor/force.hpp"
 #include "sim_host/doctor/forward.hpp"
@@ -13,12 +15,14 @@
 #include "sim_host/doctor/sequence.hpp"
 #include "sim_host/doctor/stamps.hpp"
 #include "sim_host/doctor/turn.hpp"
+#include "sim_host/doctor/turn_scale.hpp"
 #include "sim_host/doctor/wheel_speed.hpp"
 #include "sim_host/play/protocol.hpp"
 
 #include <algorithm>
 #include <array>
 #include <stdexcept>
+#include <tuple>
 #include <utility>
 
 namespace tetap::doctor {
@@ -61,7 +65,10 @@ class Examination {
         velocity_(course_),
         path_(robot, windows_),
         wheel_speed_(robot),
-        origin_(robot) {
+        origin_(robot),
+        dead_axis_(robot),
+        axes_(robot, {.turn = turn_, .course = course_, .field = field_, .force = force_, .forward = forward_}),
+        turn_scale_({.turn = turn_, .course = course_, .field = field_, .force = force_, .forward = forward_}) {
     decoder_.power_on();
   }
 
@@ -104,8 +111,12 @@ class Examination {
   PathDetector path_;
   WheelSpeedDetector wheel_speed_;
   OriginDetector origin_;
-  std::array<Detector*, 12> all_{&halves_, &sequence_, &stamps_,   &force_, &turn_,        &forward_,
-                                 &course_, &field_,    &velocity_, &path_,  &wheel_speed_, &origin_};
+  DeadAxisDetector dead_axis_;
+  AxesDetector axes_;
+  TurnScaleDetector turn_scale_;
+  std::array<Detector*, 15> all_{&halves_,      &sequence_, &stamps_,    &force_,    &turn_,
+                                 &forward_,     &course_,   &field_,     &velocity_, &path_,
+                                 &wheel_speed_, &origin_,   &dead_axis_, &axes_,     &turn_scale_};
 };
 
 /// Codes of one comparison of several devices, which may not show whose axes are wrong.
@@ -114,24 +125,29 @@ bool is_gnss_axes(Code code) { return code >= Code::kLatLonSwapped && code <= Co
 }  // namespace
 
 Findings ranked(Findings findings) {
-  std::stable_sort(findings.begin(), findings.end(), [](const Finding& a, const Finding& b) {
-    const bool one_comparison = is_gnss_axes(a.code) && is_gnss_axes(b.code);
-    if (a.code != b.code && !one_comparison) return a.code < b.code;
-    return a.certainty > b.certainty;
-  });
+  // A finding beside another code follows it; the axes of GNSS stand at one place.
+  const auto place = [](const Finding& one) {
+    const Code code = one.beside ? std::max(*one.beside, one.code) : one.code;
+    return std::tuple(is_gnss_axes(code) ? Code::kLatLonSwapped : code, one.beside.has_value(), -one.certainty);
+  };
+  std::stable_sort(findings.begin(), findings.end(),
+                   [&](const Finding& a, const Finding& b) { return place(a) < place(b); });
   Findings kept;
-  Devices spoiled = 0, spoiled_axes = 0;
+  const auto spoils = [](const Finding& one) { return one.spoils != 0 ? one.spoils : row(one.code).spoils; };
+  const auto spoiled = [&](const Finding& one, bool by_axes) {
+    return std::any_of(kept.begin(), kept.end(), [&](const Finding& k) {
+      return k.code != one.beside && is_gnss_axes(k.code) == by_axes && (spoils(k) & one.uses) != 0;
+    });
+  };
   bool placed = false;  // by the robot's origin, which leaves no second reading of the axes
   for (Finding& one : findings) {
     const bool axes = is_gnss_axes(one.code);
-    if ((one.uses & spoiled) != 0 || (!axes && (one.uses & spoiled_axes) != 0) || (axes && placed)) continue;
-    const Devices spoils = one.spoils != 0 ? one.spoils : row(one.code).spoils;
+    if (spoiled(one, false) || (!axes && spoiled(one, true)) || (axes && placed)) continue;
     const auto same = std::find_if(kept.begin(), kept.end(), [&](const Finding& k) { return k.code == one.code; });
     if (same != kept.end()) {
       if (same->evidence.size() + one.evidence.size() < 600) same->evidence += " " + one.evidence;
       continue;
     }
-    (axes ? spoiled_axes : spoiled) |= spoils;
     placed |= axes && one.uses == kNoDevice;
     if (one.change.empty()) one.change = row(one.code).change;
     kept.push_back(std::move(one));

@@ -6,6 +6,7 @@
 
 #include <cstdarg>
 #include <cstdio>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -16,8 +17,9 @@ struct Finding {
   Devices uses = 0;      ///< devices whose data the comparison took for right
   double certainty = 1;  ///< 0 to 1: orders findings of one code, and codes that one comparison cannot part
   std::string evidence;
-  std::string change;  ///< empty: as the table has it
-  Devices spoils = 0;  ///< 0: as the table has it
+  std::string change;            ///< empty: as the table has it
+  Devices spoils = 0;            ///< 0: as the table has it
+  std::optional<Code> beside{};  ///< the same comparison fits that code as well: the two are named one after the other
 };
 using Findings = std::vector<Finding>;
 

@@ -5,6 +5,11 @@
 #include "sim_host/doctor/detector.hpp"
 #include "sim_host/doctor/robot_facts.hpp"
 
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+
 namespace tetap::doctor {
 
 class ForceDetector : public Detector {
@@ -14,15 +19,21 @@ class ForceDetector : public Detector {
   void sample(base::Micros time, const sensor::Sample& sample) override;
   void window(const Window& w) override;
   void finish(Findings& findings) override;
+  /// Cosine between the mean specific force and where up is stated; nothing where no up is stated.
+  [[nodiscard]] std::optional<double> upward() const;
 
  private:
+  static constexpr std::size_t kBins = 512;
   void judge_direction(Findings& findings) const;
+  void judge_scale(Findings& findings) const;
 
   const RobotFacts& robot_;
   int windows_ = 0;
   double magnitude_sum_ = 0;
   Vector3 force_sum_{};
   double samples_ = 0, increment_sum_mps_ = 0;
+  std::array<std::uint32_t, kBins> magnitudes_{};  ///< windows by the logarithm of their force over gravity
+  std::uint32_t whole_windows_ = 0;                ///< without lost samples
 };
 
 }  // namespace tetap::doctor

@@ -62,6 +62,24 @@ void ForwardDetector::window(const Window& w) {
   before_ = w;
 }
 
+ForwardDetector::Agreement ForwardDetector::agreement() const {
+  const bool wheels = wheels_.moments.count() >= kLeastWindows;
+  const Moments<4>& m = wheels ? wheels_.moments : gnss_.moments;
+  Agreement found{.device = wheels ? "the wheels" : "GNSS", .uses = wheels ? kWheels : kGnssVelocity};
+  if (m.count() < kLeastWindows) return found;
+  constexpr double kLeast2 = kLeast_mps2 * kLeast_mps2;
+  if (m.covariance(2, 2) > kLeast2)
+    found.ahead = correlation(m.covariance(0, 2), m.covariance(0, 0), m.covariance(2, 2));
+  if (m.covariance(3, 3) < kLeast2) return found;
+  found.left = correlation(m.covariance(1, 3), m.covariance(1, 1), m.covariance(3, 3));
+  found.turn = turn_ratio(m.covariance(3, 3), m.covariance(1, 3), m.covariance(1, 1), 0);
+  if (!found.turn) return found;
+  found.turn->device = "the sideways force in curves";
+  found.turn->uses = static_cast<Devices>(kAccelerometer | kMounting | found.uses);
+  found.turn->seconds = m.count();
+  return found;
+}
+
 void ForwardDetector::finish(Findings& findings) {
   if (wheels_.moments.count() >= kLeastWindows)
     judge(wheels_, "the wheels", kWheels, findings);

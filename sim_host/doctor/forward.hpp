@@ -6,6 +6,7 @@
 #include "sim_host/doctor/detector.hpp"
 #include "sim_host/doctor/moments.hpp"
 #include "sim_host/doctor/robot_facts.hpp"
+#include "sim_host/doctor/turn_ratio.hpp"
 
 #include <optional>
 
@@ -17,6 +18,15 @@ class ForwardDetector : public Detector {
 
   void window(const Window& w) override;
   void finish(Findings& findings) override;
+  /// Correlation of the force ahead with the acceleration, and of the force to the left with speed times turn rate; 0
+  /// where nothing is known.
+  struct Agreement {
+    double ahead = 0, left = 0;
+    const char* device = "";
+    Devices uses = kNoDevice;
+    std::optional<TurnRatio> turn{};  ///< turn by the gyroscope over that of the force to the left
+  };
+  [[nodiscard]] Agreement agreement() const;
 
  private:
   /// One source of the speed.

@@ -81,6 +81,21 @@ double CourseDetector::correlation_of(const Moments<4>& moments) const {
   return correlation(moments.covariance(gyro, course), moments.covariance(gyro, gyro), moments.covariance(3, 3));
 }
 
+std::optional<TurnRatio> CourseDetector::ratio() const {
+  const bool velocity = by_velocity_.count() >= kLeastWindows;
+  const Moments<4>& moments = velocity ? by_velocity_ : by_fixes_;
+  if (moments.count() < kLeastWindows || moments.covariance(3, 3) < kLeastTurn_radps * kLeastTurn_radps)
+    return std::nullopt;
+  const std::array<double, 4> gyro{up_s_[0], up_s_[1], up_s_[2], 0}, course{0, 0, 0, 1};
+  auto found =
+      turn_ratio(moments.covariance(gyro, gyro), moments.covariance(gyro, course), moments.covariance(3, 3), kFollows);
+  if (!found) return found;
+  found->device = velocity ? "the course of the GNSS velocity" : "the course of the fixes";
+  found->uses = velocity ? kGnssVelocity : kFixes;
+  found->seconds = moments.count();
+  return found;
+}
+
 void CourseDetector::finish(Findings& findings) {
   const bool velocity = by_velocity_.count() >= kLeastWindows;
   const Moments<4>& moments = velocity ? by_velocity_ : by_fixes_;
@@ -106,6 +121,7 @@ void FieldDetector::window(const Window& w) {
     const Vector3 was = field_b_uT(*before_->flux_s_uT), is = field_b_uT(*w.flux_s_uT);
     const Vector3 turn_s = scaled(0.5 * (w.start_s - before_->start_s), sum(*before_->turn_s_radps, *w.turn_s_radps));
     const Vector3 turn = rotated(*robot_.mounting, turn_s);
+    turns_.add(rotated(transposed(*robot_.mounting), was), rotated(transposed(*robot_.mounting), is), turn_s);
     const auto left2 = [&](double factor) {
       const Vector3 left = sum(is, scaled(-1, turned(scaled(-factor, turn), was)));
       return dot(left, left);

@@ -7,8 +7,11 @@
 #include "sim_host/doctor/moments.hpp"
 #include "sim_host/doctor/plane.hpp"
 #include "sim_host/doctor/robot_facts.hpp"
+#include "sim_host/doctor/turn_ratio.hpp"
+#include "sim_host/doctor/vector_turn.hpp"
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 
@@ -23,6 +26,8 @@ class CourseDetector : public Detector {
   void finish(Findings& findings) override;
   /// Correlation of the gyroscope's turn with that of the velocity's course; 0 where nothing is known.
   [[nodiscard]] double correlation_with_course() const { return correlation_of(by_velocity_); }
+  /// The gyroscope against the course; nothing where they do not turn alike.
+  [[nodiscard]] std::optional<TurnRatio> ratio() const;
 
  private:
   /// From one fix to another.
@@ -51,6 +56,8 @@ class FieldDetector : public Detector {
   explicit FieldDetector(const RobotFacts& robot) : robot_(robot) {}
   void window(const Window& w) override;
   void finish(Findings& findings) override;
+  /// True turn over measured turn about an axis of the gyroscope, by the field.
+  [[nodiscard]] std::optional<AxisFactor> factor(std::size_t axis) const { return turns_.factor(axis); }
 
  private:
   [[nodiscard]] Vector3 field_b_uT(const Vector3& flux_s_uT) const;
@@ -58,6 +65,7 @@ class FieldDetector : public Detector {
   const RobotFacts& robot_;
   std::optional<Window> before_;
   int windows_ = 0;
+  VectorTurn turns_;
   double still2_ = 0;              ///< sum of the squared changes of the field
   std::array<double, 3> left2_{};  ///< the same, after the turn in radians, from degrees, from radians twice converted
 };

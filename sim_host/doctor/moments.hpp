@@ -22,6 +22,13 @@ class Moments {
   [[nodiscard]] double mean(std::size_t i) const { return count_ > 0 ? sum_[i] / count_ : 0; }
   /// Mean product about zero.
   [[nodiscard]] double product(std::size_t i, std::size_t j) const { return count_ > 0 ? products_[i][j] / count_ : 0; }
+  /// Mean product of the combinations a and b of the quantities.
+  [[nodiscard]] double product(const std::array<double, N>& a, const std::array<double, N>& b) const {
+    double sum = 0;
+    for (std::size_t i = 0; i < N; ++i)
+      for (std::size_t j = 0; j < N; ++j) sum += a[i] * b[j] * product(i, j);
+    return sum;
+  }
   [[nodiscard]] double covariance(std::size_t i, std::size_t j) const { return product(i, j) - mean(i) * mean(j); }
   /// Covariance of the combinations a and b of the quantities.
   [[nodiscard]] double covariance(const std::array<double, N>& a, const std::array<double, N>& b) const {

@@ -13,6 +13,12 @@ constexpr double kLeastWindows = 20;
 constexpr double kLeastTurn_radps = 0.03;  ///< RMS: less, and slip and a gyroscope's bias are as large
 constexpr double kExplained = 0.35;  ///< share of the turn's variance: on a fast road slip makes half of the difference
 constexpr double kAlone = 0.7;  ///< share of one wheel combination in the other's, where one alone explains the turn
+constexpr double kSingular = 0.02;          ///< less, and the two combinations are one: a wheel that stands still
+constexpr double kStill = 0.9;              ///< sum and difference of the wheels are one: the other wheel stands still
+constexpr double kWhole = 0.8;              ///< share of the turn's square that the two wheels explain together
+constexpr double kLeastDrift_radps = 0.05;  ///< yaw rate of unequal wheels: above a gyroscope's bias
+constexpr double kUnequal = 0.03;  ///< half of the difference between the wheels: tyres are within some percent
+constexpr double kReversed = 0.7;  ///< more, and a wheel counts backwards or not at all
 
 }  // namespace
 
@@ -34,7 +40,21 @@ void TurnDetector::window(const Window& w) {
   if (w.turn_s_radps) up_s_ = w.up_s;
   if (!w.turn_s_radps || !w.wheels || !w.wheels->difference_mps) return;
   const Vector3& g = *w.turn_s_radps;
+  whole_.add({g[0], g[1], g[2], *w.wheels->difference_mps, w.wheels->sum_mps});
   moments_.add({g[0], g[1], g[2], difference_.limited(*w.wheels->difference_mps), sum_.limited(w.wheels->sum_mps)});
+}
+
+std::optional<TurnRatio> TurnDetector::ratio() const {
+  if (whole_.count() < kLeastWindows) return std::nullopt;
+  const std::array<double, 5> gyro{up_s_[0], up_s_[1], up_s_[2], 0, 0}, turn{0, 0, 0, 1 / scale_.track_m, 0};
+  const double turn2 = whole_.covariance(turn, turn);
+  if (turn2 < kLeastTurn_radps * kLeastTurn_radps) return std::nullopt;
+  auto found = turn_ratio(whole_.covariance(gyro, gyro), whole_.covariance(gyro, turn), turn2, std::sqrt(kExplained));
+  if (!found) return found;
+  found->device = "the wheels";
+  found->uses = kWheels;
+  found->seconds = whole_.count();
+  return found;
 }
 
 void TurnDetector::finish(Findings& findings) {
@@ -42,12 +62,46 @@ void TurnDetector::finish(Findings& findings) {
   const std::array<double, 5> gyro{up_s_[0], up_s_[1], up_s_[2], 0, 0}, difference{0, 0, 0, 1, 0}, total{0, 0, 0, 0, 1};
   const double gg = moments_.covariance(gyro, gyro), gd = moments_.covariance(gyro, difference),
                gs = moments_.covariance(gyro, total), dd = moments_.covariance(3, 3), ss = moments_.covariance(4, 4);
-  const double by_difference = correlation(gd, gg, dd), by_sum = correlation(gs, gg, ss);
-  judge_wheels(gg, by_difference, by_sum, findings);
-  const bool follows = by_difference * by_difference > kExplained;
-  const double turn_radps = std::sqrt(dd) / scale_.track_m;
-  if (follows && turn_radps > kLeastTurn_radps && (scale_.known || message_ == "In_BodySpeed"))
-    judge_gyroscope(std::sqrt(gg) / turn_radps, findings);
+  judge_wheels(gg, correlation(gd, gg, dd), correlation(gs, gg, ss), findings);
+  judge_unequal(findings);
+  if (const auto turn = ratio(); turn && knows_size())
+    name_gyro_unit(turn->value(), turn->device, kWheels, turn->seconds, findings);
+}
+
+void TurnDetector::judge_unequal(Findings& findings) const {
+  const std::array<double, 5> gyro{up_s_[0], up_s_[1], up_s_[2], 0, 0}, difference{0, 0, 0, 1, 0}, total{0, 0, 0, 0, 1};
+  const double dd = whole_.product(3, 3), ss = whole_.product(4, 4), ds = whole_.product(3, 4);
+  const double gd = whole_.product(gyro, difference), gs = whole_.product(gyro, total);
+  const double determinant = dd * ss - ds * ds;
+  if (!(determinant > kSingular * dd * ss)) return judge_still(ss, ds, findings);
+  const double by_difference = (gd * ss - gs * ds) / determinant, by_sum = (gs * dd - gd * ds) / determinant;
+  const double gg = whole_.product(gyro, gyro), explained = (by_difference * gd + by_sum * gs) / gg;
+  const double unequal = by_sum / by_difference;
+  if (explained < kWhole || by_difference <= 0 || std::abs(by_sum) * std::sqrt(ss) < kLeastDrift_radps) return;
+  if (std::abs(unequal) < kUnequal || std::abs(unequal) > kReversed) return;
+  // yaw rate = (right' - left') / track, where right' = (1 + u) right and left' = (1 - u) left but for a common factor
+  const double right_over_left = (1 + unequal) / (1 - unequal);
+  findings.push_back(
+      {.code = Code::kWheelsUnequal,
+       .uses = kGyroscope | kAccelerometer | kWheels,
+       .certainty = explained,
+       .evidence = text("The gyroscope turns by %.3f rad/s more than the wheels do, in proportion to their speed: a "
+                        "right wheel %.3f times as large as stated, or a left one %.3f times (%.0f s, %.0f %% of the "
+                        "turn explained).",
+                        by_sum * std::sqrt(ss), right_over_left, 1 / right_over_left, whole_.count(), 100 * explained),
+       .change = text("Multiply the right radius of wheels.drive by %.3f or the left one by %.3f; the speed by GNSS "
+                      "or a measured distance shows which (In_WheelSpeed: wheels.right_speed_scale).",
+                      right_over_left, 1 / right_over_left)});
+}
+
+void TurnDetector::judge_still(double sum2, double both, Findings& findings) const {
+  if (!(std::abs(both) > kStill * sum2)) return;  // a straight drive, or a turn on the spot
+  const char* wheel = both > 0 ? "left" : "right";
+  findings.push_back(
+      {.code = Code::kWheelsUnequal,
+       .uses = kWheels,
+       .evidence = text("The %s wheel stands still for %.0f s while the other one turns.", wheel, whole_.count()),
+       .change = text("Check the plug, the channels and the sender of the %s wheel's encoder.", wheel)});
 }
 
 void TurnDetector::judge_wheels(double gyro2, double by_difference, double by_sum, Findings& findings) const {
@@ -79,10 +133,6 @@ void TurnDetector::judge_wheels(double gyro2, double by_difference, double by_su
          .change = text("Negate the %s wheel in the sender of %s, or swap channels A and B of its encoder.", wheel,
                         message_.c_str())});
   }
-}
-
-void TurnDetector::judge_gyroscope(double ratio, Findings& findings) const {
-  name_gyro_unit(ratio, "the wheels", kWheels, moments_.count(), findings);
 }
 
 }  // namespace tetap::doctor

@@ -6,7 +6,9 @@
 
 #include "sim_host/doctor/detector.hpp"
 #include "sim_host/doctor/moments.hpp"
+#include "sim_host/doctor/turn_ratio.hpp"
 
+#include <optional>
 #include <string>
 
 namespace tetap::doctor {
@@ -18,6 +20,10 @@ class TurnDetector : public Detector {
   void sample(base::Micros time, const sensor::Sample& sample) override;
   void window(const Window& w) override;
   void finish(Findings& findings) override;
+  /// The gyroscope against the difference of the wheels; nothing where they do not turn alike.
+  [[nodiscard]] std::optional<TurnRatio> ratio() const;
+  /// Metres or speeds are known, so the magnitude of ratio() has a meaning.
+  [[nodiscard]] bool knows_size() const { return scale_.known || message_ == "In_BodySpeed"; }
 
  private:
   /// Keeps a value within three times the RMS of all up to it: a wheel that spins for seconds decides nothing.
@@ -29,11 +35,13 @@ class TurnDetector : public Detector {
     double squares_ = 0, count_ = 0;
   };
   void judge_wheels(double gyro2, double by_difference, double by_sum, Findings& findings) const;
-  void judge_gyroscope(double ratio, Findings& findings) const;
+  void judge_unequal(Findings& findings) const;
+  void judge_still(double sum2, double both, Findings& findings) const;
 
   WheelScale scale_;
   std::string message_;
-  Moments<5> moments_;  ///< gyroscope x y z [rad/s], difference and sum of the wheels [m/s]
+  Moments<5> moments_;  ///< gyroscope x y z [rad/s], difference and sum of the wheels [m/s], both limited
+  Moments<5> whole_;    ///< the same without a limit, which would make the turn by the wheels smaller
   Limit difference_, sum_;
   Vector3 up_s_{};
 };

@@ -25,6 +25,10 @@ using Matrix3 = std::array<Vector3, 3>;  ///< rows
 [[nodiscard]] inline Vector3 rotated(const Matrix3& rows, const Vector3& a) {
   return {dot(rows[0], a), dot(rows[1], a), dot(rows[2], a)};
 }
+[[nodiscard]] inline Matrix3 transposed(const Matrix3& rows) {
+  return {Vector3{rows[0][0], rows[1][0], rows[2][0]}, Vector3{rows[0][1], rows[1][1], rows[2][1]},
+          Vector3{rows[0][2], rows[1][2], rows[2][2]}};
+}
 /// a turned by the rotation vector (Rodrigues).
 [[nodiscard]] inline Vector3 turned(const Vector3& rotation_rad, const Vector3& a) {
   const double angle = norm(rotation_rad);

@@ -70,6 +70,7 @@ void Windows::add_imu(base::Micros time, const sensor::ImuSample& imu) {
   turn_rad_ = sum(turn_rad_, wide(imu.dangle_b_rad));
   velocity_change_mps_ = sum(velocity_change_mps_, wide(imu.dvelocity_b_mps));
   imu_s_ += dt_s;
+  intervals_s_ += 1e-6 * imu.interval_us;
 }
 
 void Windows::add_speeds(double dt_s, double left_mps, double right_mps) {
@@ -116,6 +117,7 @@ Window Windows::finished() {
     w.force_s_mps2 = scaled(1 / imu_s_, velocity_change_mps_);
     force_sum_ = sum(force_sum_, *w.force_s_mps2);
     up_s_ = unit(force_sum_);
+    w.imu_share = intervals_s_ / imu_s_;
   }
   if (wheels_s_ > kCovered_s) {
     w.wheels = WheelMotion{.sum_mps = wheel_sum_m_ / wheels_s_, .difference_mps = {}};
@@ -124,7 +126,7 @@ Window Windows::finished() {
   w.up_s = up_s_;
   velocity_ = flux_ = {};
   turn_rad_ = velocity_change_mps_ = {};
-  imu_s_ = wheels_s_ = wheel_sum_m_ = wheel_difference_m_ = 0;
+  imu_s_ = intervals_s_ = wheels_s_ = wheel_sum_m_ = wheel_difference_m_ = 0;
   has_difference_ = false;
   return w;
 }

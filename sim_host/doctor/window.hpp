@@ -27,7 +27,8 @@ struct Window {
   std::optional<WheelMotion> wheels;    ///< in counts per second where the robot's geometry is not known
   std::optional<Vector3> velocity_n_mps;
   std::optional<Vector3> flux_s_uT;
-  Vector3 up_s{};  ///< direction of the mean specific force up to here, in the sensor's axes; 0: not known yet
+  double imu_share = 1;  ///< intervals of the IMU's samples over the time in which they came: less where some are lost
+  Vector3 up_s{};        ///< direction of the mean specific force up to here, in the sensor's axes; 0: not known yet
 };
 
 /// Metres of a wheel's count, the track [m] over which a difference becomes a turn, and the scales of stated speeds.
@@ -75,7 +76,7 @@ class Windows {
   Sum3 velocity_, flux_;
   Vector3 turn_rad_{}, velocity_change_mps_{};
   std::optional<base::Micros> imu_last_;  ///< also of the window before
-  double imu_s_ = 0;
+  double imu_s_ = 0, intervals_s_ = 0;
   double wheels_s_ = 0, wheel_sum_m_ = 0, wheel_difference_m_ = 0;
   bool has_difference_ = false;
   std::optional<base::Micros> wheels_last_;

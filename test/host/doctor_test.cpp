@@ -5,10 +5,14 @@
 #include "sim_host/doctor/diagnosis.hpp"
 #include "sim_host/doctor/moments.hpp"
 #include "sim_host/doctor/sequence.hpp"
+#include "sim_host/doctor/turn_ratio.hpp"
+#include "sim_host/doctor/vector_turn.hpp"
 
 #include <gtest/gtest.h>
 
 #include <array>
+#include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -87,6 +91,64 @@ TEST(Ranking, OneFindingACodeWithTheEvidenceOfAllAndAChange) {
   ASSERT_EQ(found.size(), 1U);
   EXPECT_EQ(found[0].evidence, "e e");
   EXPECT_EQ(found[0].change, row(Code::kTwoClocks).change);
+}
+
+Finding beside(Code code, Devices uses, Code other) {
+  Finding one = finding(code, uses);
+  one.beside = other;
+  return one;
+}
+
+TEST(Ranking, TwoCausesOfOneComparisonAreNamedOneAfterTheOther) {
+  const Findings both = ranked({beside(Code::kGyroSign, kGyroscope | kWheels, Code::kWheelsSwapped),
+                                finding(Code::kWheelsSwapped, kGyroscope | kWheels), finding(Code::kOriginFar, 0)});
+  EXPECT_EQ(codes(both), (std::vector{Code::kWheelsSwapped, Code::kGyroSign, Code::kOriginFar}));
+  // An earlier cause that explains the one explains the other.
+  const Findings spoilt = ranked({beside(Code::kGyroSign, kGyroscope | kWheels, Code::kWheelsSwapped),
+                                  finding(Code::kWheelsSwapped, kGyroscope | kWheels), finding(Code::kDegForRad, 0)});
+  EXPECT_EQ(codes(spoilt), std::vector{Code::kDegForRad});
+}
+
+/// Gravity or a field that a body sees while it turns about all axes, a gyroscope with these factors beside it.
+std::array<AxisFactor, 3> seen_factors(const Vector3& world, const Vector3& gyro_factors) {
+  VectorTurn turns;
+  Vector3 seen = world;
+  for (int i = 0; i < 200; ++i) {
+    const double t = 0.1 * i;
+    const Vector3 turn{0.05 * std::sin(t), 0.04 * std::cos(1.3 * t), 0.06 * std::sin(0.7 * t + 1)};
+    const Vector3 after = turned(scaled(-1, turn), seen);
+    turns.add(seen, after, {gyro_factors[0] * turn[0], gyro_factors[1] * turn[1], gyro_factors[2] * turn[2]});
+    seen = after;
+  }
+  std::array<AxisFactor, 3> factors;
+  for (std::size_t i = 0; i < 3; ++i) factors[i] = turns.factor(i).value_or(AxisFactor{.value = -9});
+  return factors;
+}
+
+TEST(VectorTurn, GivesEachAxisItsFactor) {
+  const auto right = seen_factors({20, 3, -40}, {1, 1, 1});
+  for (const AxisFactor& one : right) EXPECT_NEAR(one.value, 1, 0.01);
+  const auto wrong = seen_factors({20, 3, -40}, {1, -1, 2});
+  EXPECT_NEAR(wrong[0].value, 1, 0.01);
+  EXPECT_NEAR(wrong[1].value, -1, 0.01);
+  EXPECT_NEAR(wrong[2].value, 0.5, 0.01);
+  for (const AxisFactor& one : wrong) EXPECT_LT(one.sigma, 0.02);
+}
+
+TEST(TurnRatio, NoiseOfEitherDeviceLeavesTheFactorBetweenTheTwoRegressions) {
+  for (const bool of_gyro : {true, false}) {
+    Moments<2> moments;  // a gyroscope that measures 1.5 times the turn, and the other device
+    for (int i = 0; i < 1000; ++i) {
+      const double turn = std::sin(0.1 * i), noise = 0.5 * std::cos(2.3 * i);
+      moments.add({1.5 * turn + (of_gyro ? noise : 0), turn + (of_gyro ? 0 : noise)});
+    }
+    const auto ratio = turn_ratio(moments.covariance(0, 0), moments.covariance(0, 1), moments.covariance(1, 1), 0.6);
+    ASSERT_TRUE(ratio);
+    EXPECT_LE(ratio->low, 1.501);
+    EXPECT_GE(ratio->high, 1.499);
+    EXPECT_GT(ratio->low, 0.9);
+    EXPECT_LT(ratio->high, 2.5);
+  }
 }
 
 TEST(BusClock, GoesOnBetweenSyncFramesButInLockstepByATickAtMost) {

@@ -137,12 +137,45 @@ def reverse_wheel(frames, side):
     return frames
 
 
+def counts_of(frames, side):
+    """First count, and the change from each to the next."""
+    counts = frames.get("In_WheelCounts", side)
+    return counts[0], np.mod(np.diff(counts) + 32768, 65536) - 32768
+
+
+def set_counts(frames, side, first, steps):
+    frames.set("In_WheelCounts", **{side: np.mod(np.rint(first + np.concatenate([[0], np.cumsum(steps)])), 65536)})
+
+
+def scale_wheel(frames, side, factor):
+    if frames.has("In_WheelCounts"):
+        first, steps = counts_of(frames, side)
+        set_counts(frames, side, first, factor * steps)
+    if frames.has("In_BodySpeed"):
+        forward, yaw_rate = frames.get("In_BodySpeed", "Forward"), frames.get("In_BodySpeed", "YawRate")
+        left, right = forward - yaw_rate * HUSKY_TRACK_M / 2, forward + yaw_rate * HUSKY_TRACK_M / 2
+        left, right = (left * factor, right) if side == "Left" else (left, right * factor)
+        frames.set("In_BodySpeed", Forward=(left + right) / 2, YawRate=(right - left) / HUSKY_TRACK_M)
+    return frames
+
+
+def scale_turn(frames, factor):
+    """The turn by the wheels, as of another track: their mean stays."""
+    if frames.has("In_WheelCounts"):
+        (left, left_steps), (right, right_steps) = counts_of(frames, "Left"), counts_of(frames, "Right")
+        mean, half = (left_steps + right_steps) / 2, factor * (right_steps - left_steps) / 2
+        set_counts(frames, "Left", left, mean - half)
+        set_counts(frames, "Right", right, mean + half)
+    if frames.has("In_BodySpeed"):
+        frames.set("In_BodySpeed", YawRate=frames.get("In_BodySpeed", "YawRate") * factor)
+    return frames
+
+
 def scale_wheels(frames, factor):
     if frames.has("In_WheelCounts"):
         for side in ("Left", "Right"):
-            counts = frames.get("In_WheelCounts", side)
-            steps = np.mod(np.diff(counts) + 32768, 65536) - 32768
-            frames.set("In_WheelCounts", **{side: np.mod(np.rint(counts[0] + factor * np.concatenate([[0], np.cumsum(steps)])), 65536)})
+            first, steps = counts_of(frames, side)
+            set_counts(frames, side, first, factor * steps)
     if frames.has("In_BodySpeed"):
         frames.set("In_BodySpeed", Forward=frames.get("In_BodySpeed", "Forward") * factor, YawRate=frames.get("In_BodySpeed", "YawRate") * factor)
     return frames
@@ -214,6 +247,23 @@ def second_sender(frames, names, later_us, counter, **values):
     return Frames(*both)
 
 
+def reverse_axis(message, signal):
+    return map_signal(message, signal, np.negative)
+
+
+def stop_axis(message, signal, value=0):
+    """An axis that reads one value, as a register that nobody fills."""
+    return map_signal(message, signal, lambda x: x * 0 + value)
+
+
+def scale_gyro(factor):
+    return lambda f: scale_imu(f, factor, 1)
+
+
+def scale_accel(factor):
+    return lambda f: scale_imu(f, 1, factor)
+
+
 ABOUT_X, ABOUT_Z, Y_FOR_Z = np.diag([1, -1, -1]), [[0, -1, 0], [1, 0, 0], [0, 0, 1]], [[1, 0, 0], [0, 0, 1], [0, -1, 0]]
 FIX = ["In_GnssLat", "In_GnssLon", "In_GnssAlt", "In_GnssAcc"]
 DEGREE = 180 / np.pi
@@ -263,6 +313,22 @@ MISTAKES = [
     ("imu_axes", "iris_gps", lambda f: f, "--set", "inertial.mounting_bs=0,0,1,1,0,0,0,1,0"),
     ("wheel_scale", "yard", lambda f: f, "--set", "wheels.drive.counts_per_turn=500"),
     ("origin_far", "iris_gps", lambda f: f, "--set", "gnss.origin_configured=1", "--set", "gnss.origin_latitude_deg=48.2627", "--set", "gnss.origin_longitude_deg=11.6683"),
+    ("dead_axis", "*yard", stop_axis(GYRO, "AngZ")), ("dead_axis", "skog", stop_axis(ACCEL, "VelY", 0.01)), ("dead_axis", "husky", stop_axis(GYRO, "AngY")),
+    ("dead_axis", "*iris_gps", stop_axis(ACCEL, "VelX")), ("dead_axis", "iris", stop_axis(GYRO, "AngX", 0.0001)), ("dead_axis", "road", stop_axis(ACCEL, "VelZ")),
+    ("accel_scale", "*yard", scale_accel(0.5)), ("accel_scale", "skog", scale_accel(1.15)), ("accel_scale", "*husky", scale_accel(2)),
+    ("accel_scale", "iris_gps", scale_accel(0.25)), ("accel_scale", "road", scale_accel(8)), ("accel_scale", "iris", scale_accel(0.85)),
+    ("gyro_scale", "*yard", scale_gyro(0.5)), ("gyro_scale", "road", scale_gyro(2)), ("gyro_scale", "husky", scale_gyro(2)), ("gyro_scale", "*skog", scale_gyro(4)),
+    ("gyro_scale", "iris", scale_gyro(0.5)), ("gyro_scale", "car", scale_gyro(2)), ("gyro_scale", "husky_sim", scale_gyro(1.5)),
+    ("gyro_sign", "*yard", reverse_axis(GYRO, "AngZ")), ("gyro_sign", "road", reverse_axis(GYRO, "AngZ")), ("gyro_sign", "skog", reverse_axis(GYRO, "AngZ")),
+    ("gyro_sign", "husky", reverse_axis(GYRO, "AngY")), ("gyro_sign", "*iris", reverse_axis(GYRO, "AngX")), ("gyro_sign", "iris", reverse_axis(GYRO, "AngY")),
+    ("accel_sign", "*yard", reverse_axis(ACCEL, "VelZ")), ("accel_sign", "yard", reverse_axis(ACCEL, "VelX")), ("accel_sign", "skog", reverse_axis(ACCEL, "VelX")),
+    ("accel_sign", "skog", reverse_axis(ACCEL, "VelY")), ("accel_sign", "skog", reverse_axis(ACCEL, "VelZ")), ("accel_sign", "husky", reverse_axis(ACCEL, "VelY")),
+    ("accel_sign", "road", reverse_axis(ACCEL, "VelY")), ("accel_sign", "iris", reverse_axis(ACCEL, "VelZ")),
+    ("track_width", "*yard", lambda f: scale_turn(f, 1.5)), ("track_width", "husky_sim", lambda f: scale_turn(f, 0.5)), ("track_width", "*husky", lambda f: scale_turn(f, 2)),
+    ("track_width", "husky_sim", lambda f: f, "--set", "wheels.yaw_rate_scale=0.6"), ("track_width", "yard", lambda f: f, "--set", "wheels.drive.track_m=0.35"),
+    ("wheels_unequal", "*yard", lambda f: scale_wheel(f, "Left", 1.2)), ("wheels_unequal", "husky_sim", lambda f: scale_wheel(f, "Right", 0.85)),
+    ("wheels_unequal", "husky", lambda f: scale_wheel(f, "Right", 1.3)), ("wheels_unequal", "yard", lambda f: scale_wheel(f, "Right", 0)),
+    ("wheels_unequal", "yard", lambda f: f, "--set", "wheels.drive.right_radius_m=0.15"),
     ("message_missing", "*yard", lambda f: f.without("In_GnssLon")), ("message_missing", "skog", lambda f: f.without(TIME)),
     ("message_missing", "iris_gps", lambda f: f.without("In_GnssVelU")), ("message_missing", "husky", lambda f: f.without("In_GnssAcc")),
     ("two_senders", "*yard", lambda f: second_sender(f, ["In_WheelCounts"], 1, 7, Left=1000, Right=2000)),
