@@ -2,6 +2,7 @@
 #include "node/bench.hpp"
 
 #include <gtest/gtest.h>
+#include <algorithm>
 #include <cmath>
 
 namespace tetap::test {
@@ -110,6 +111,34 @@ TEST(DeadReckoning, TheGyroscopeTurnsAndItsBiasIsLearntAtRest) {
   second(1.0F, 0.5F);
   motion.advance({t});
   EXPECT_NEAR(motion.estimate(n).pose.yaw_rad - yaw_before, 0.5F, 0.01F);
+}
+
+// The turn begins and ends within a second each, and a third of the IMU samples is lost: two of six. Each sample alone
+// would show a gap too little or too much turned, always in the sense of the change.
+TEST(DeadReckoning, LostImuSamplesCostNoTurnWhereTheRateChanges) {
+  param::Parameters n = kNumbers;
+  n.gyro.use = 1;
+  const auto rate_radps = [](int k) {
+    return static_cast<float>(std::min({0.01 * k, 0.5, 0.01 * std::max(200 - k, 0)}));
+  };
+  double whole_rad = 0, half_rad = 0;
+  for (const bool begin : {true, false}) {
+    DeadReckoning motion;
+    motion.start({0}, {}, 0.001F, 0.001F);
+    double turned_rad = 0;
+    for (int k = 1; k <= (begin ? 100 : 260); ++k) {
+      const base::Micros t{10'000 * k};
+      motion.fuse(sensor::WheelSpeeds{.left_mps = 1, .right_mps = 1}, t, n);
+      turned_rad += static_cast<double>(rate_radps(k)) * 0.01;
+      if (k % 6 == 2 || k % 6 == 3) continue;
+      motion.fuse(sensor::ImuSample{.dangle_b_rad = {0, 0, rate_radps(k) * 0.01F}, .interval_us = 10'000}, t, n);
+    }
+    const double error_rad = static_cast<double>(motion.filter.x.yaw_rad) - turned_rad;
+    (begin ? half_rad : whole_rad) = error_rad;
+    EXPECT_LT(std::abs(error_rad), 3.0 * std::sqrt(static_cast<double>(motion.filter.p(2, 2))));
+  }
+  EXPECT_LT(std::abs(half_rad), 0.0005) << "the turn has begun";
+  EXPECT_LT(std::abs(whole_rad), 0.0005) << "and ended";
 }
 
 // Without its gyroscope the robot turns as its wheels do, and not as the gyroscope last showed.

@@ -130,15 +130,22 @@ sensor::Verdict PlanarDeadReckoning<Filter>::fuse(const sensor::ImuSample& sampl
   } else if (stamp - still_since_ > base::Micros{1'000'000}) {
     gyro_bias_radps_ += (raw_radps - gyro_bias_radps_) * (interval_s / n.gyro.bias_time_s);
   }
+  const float before_radps = gyro_rate_radps_;
   gyro_rate_radps_ = raw_radps - gyro_bias_radps_;
-  // The extrapolation since the sample before is taken off; a gap between the samples is filled with this one's
-  // rate.
+  // The extrapolation since the sample before is taken off. In a gap between the samples the rate changed evenly.
   propagate(stamp, n);
   const base::Micros span = stamp - gyro_time_;
   const bool follows = gyro_time_.us != 0 && span.us > 0 && span <= base::Micros{n.wheels.timeout_us};
   if (follows) {
+    float turned_rad = gyro_rate_radps_ * base::seconds(span), variance = 0;
+    const base::Micros gap = span - interval;
+    if (2 * gap.us > interval.us) {  // all of the change may have come at either end of the gap: even between the two
+      const float changed_rad = (before_radps - gyro_rate_radps_) * base::seconds(gap);
+      turned_rad += 0.5F * changed_rad;
+      variance = changed_rad * changed_rad * (1.0F / 12);
+    }
     model::PlanarIncrement correction;
-    turn(correction, gyro_rate_radps_ * base::seconds(span) - applied_yaw_rad_, 0.0F);
+    turn(correction, turned_rad - applied_yaw_rad_, variance);
     filter.predict(correction);
   }
   applied_yaw_rad_ = 0;
