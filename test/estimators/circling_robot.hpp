@@ -48,7 +48,7 @@ struct CirclingRobot {
       static_cast<void>(
           estimator.fuse(sensor::BodySpeed{.forward_mps = 1.0F, .yaw_rate_radps = 1.0F / 3}, {us}, ctx()));
       if (!sees || k % 10 != 9) continue;
-      for (std::uint8_t id = 1; id <= 4; ++id) {
+      for (std::uint8_t id = 1; id <= seen; ++id) {
         const model::Landmark at = *map.find(id);
         const double dx = static_cast<double>(at.x.minus({})) - x, dy = static_cast<double>(at.y.minus({})) - y;
         verdicts.push_back(
@@ -88,7 +88,8 @@ struct CirclingRobot {
   std::vector<sensor::Verdict> verdicts;
   double x = 0, y = 0, yaw = 0;
   std::int64_t us = 0;
-  bool ids = true;  ///< landmarks are told apart
+  bool ids = true;        ///< landmarks are told apart
+  std::uint8_t seen = 4;  ///< landmarks 1 to this one are seen
 };
 
 inline param::Parameters held_backward() {

@@ -26,8 +26,10 @@ SquaredError squared_error(const model::Bearing&, const filter::Vector<float, 1>
 template <class Filter>
 template <class Model>
 Innovation PoseFilter<Filter>::measure(const Model& model, Source source, float gate_scale, base::Micros stamp,
-                                       const Context& ctx, std::uint8_t landmark) {
-  const auto result = motion_.filter.update(model, gate_scale * filter::chi_square_99(Model::kDimension));
+                                       const Context& ctx, std::uint8_t landmark, bool named) {
+  const float gate = gate_scale * filter::chi_square_99(Model::kDimension);
+  if (relocalisation_.searches()) relocalisation_.move(motion_.filter.x, covariance_of(motion_.filter));
+  const auto result = motion_.filter.update(model, gate);
   checks::Persistence& refused = refused_[source];
   std::uint8_t& in_a_row = in_a_row_[source];
   if (result.verdict == filter::Verdict::kAccepted) {
@@ -45,7 +47,29 @@ Innovation PoseFilter<Filter>::measure(const Model& model, Source source, float 
     }
     recover(refused, stamp, ctx.parameters.recovery);
   }
+  if (relocalisation_.searches() || in_a_row_[kLandmark] >= kDegraded)
+    relocalisation_.note(motion_.filter.x, covariance_of(motion_.filter));
+  if constexpr (std::same_as<Model, model::GnssPosition>) relocalisation_.add(model, stamp, gate);
+  if constexpr (std::same_as<Model, model::RangeBearing>)
+    if (named && relocalise(model, result, stamp, landmark))
+      return {.verdict = sensor::Verdict::kAccepted, .landmark = landmark};
   return record(result, landmark);
+}
+
+template <class Filter>
+bool PoseFilter<Filter>::relocalise(const model::RangeBearing& seen, const filter::Innovation<float, 2>& judged,
+                                    base::Micros stamp, std::uint8_t landmark) {
+  const bool begins = in_a_row_[kLandmark] >= kDegraded;
+  if (!relocalisation_.add(seen, landmark, stamp, judged, begins)) return false;
+  motion_.filter.x = relocalisation_.rival().x;
+  set_covariance(motion_.filter, relocalisation_.rival().p);
+  relocalisation_.reset();
+  for (checks::Persistence& refused : refused_) refused.reset();
+  in_a_row_ = {};
+  trust_motion();
+  last_absolute_ = stamp;
+  ++jumps_;
+  return true;
 }
 
 /// The other source was refused last, too, within the time of dead reckoning.
@@ -71,7 +95,7 @@ template <class Filter>
 void PoseFilter<Filter>::judge_motion(base::Micros stamp, const param::Parameters& n) {
   const float turned_rad2 = turn_.update(motion_, stamp, n);
   const float place_m2 = TurnCheck::place_m2(turned_rad2, n);
-  if (turned_rad2 > 0.0F) add_variance(motion_.filter, {place_m2, place_m2, turned_rad2});
+  if (turned_rad2 > 0.0F) widen({place_m2, place_m2, turned_rad2});
   constexpr base::Micros kContradicted{10'000'000};
   if (!checks::recent(contradicted_at_, stamp, kContradicted)) {
     speed_error_mps_ = speed_error_m2_ = 0;
@@ -80,7 +104,7 @@ void PoseFilter<Filter>::judge_motion(base::Micros stamp, const param::Parameter
   const float way_m = speed_error_mps_ * base::seconds(stamp - last_absolute_),
               more_m2 = way_m * way_m - speed_error_m2_;
   if (!(more_m2 > 0.0F)) return;
-  add_variance(motion_.filter, {more_m2, more_m2, 0.0F});
+  widen({more_m2, more_m2, 0.0F});
   speed_error_m2_ += more_m2;
 }
 
@@ -119,7 +143,7 @@ Innovation PoseFilter<Filter>::fuse(const sensor::LandmarkSighting& seen, base::
                                     .landmark = *landmark,
                                     .mounting = n.mounting};
     if (phase_ != Phase::kTracking) return align(model, stamp, ctx, sighting.landmark);
-    return measure(model, kLandmark, n.gate_scale, stamp, ctx, sighting.landmark);
+    return measure(model, kLandmark, n.gate_scale, stamp, ctx, sighting.landmark, seen.landmark != kAnyLandmark);
   }
   if (phase_ != Phase::kTracking) return {.verdict = sensor::Verdict::kNotUsed, .landmark = sighting.landmark};
   if (has_range) {

@@ -9,6 +9,7 @@
 #include "estimators/planar/dead_reckoning.hpp"
 #include "estimators/planar/gnss_alignment.hpp"
 #include "estimators/planar/landmark_alignment.hpp"
+#include "estimators/planar/relocalisation.hpp"
 #include "estimators/planar/turn_check.hpp"
 #include "model/bearing.hpp"
 #include "model/gnss_position.hpp"
@@ -48,6 +49,7 @@ class PoseFilter {
     phase_ = heading ? Phase::kTracking : Phase::kWaiting;
     alignment_ = {};
     landmarks_.reset();
+    relocalisation_.reset();
     last_absolute_ = t;
     refused_ = {};
     in_a_row_ = {};
@@ -86,6 +88,8 @@ class PoseFilter {
   }
   /// Bits of sensor::Fault: wheels that turn otherwise than the gyroscope.
   [[nodiscard]] std::uint16_t faults() const { return turn_.faults(); }
+  /// Last step to a pose that landmarks showed where the filter tracked another one.
+  [[nodiscard]] Jump jump() const { return {.count = jumps_}; }
   [[nodiscard]] sensor::Mode mode(const Context&) const {
     if (phase_ == Phase::kWaiting) return sensor::Mode::kWaitingForPose;
     if (phase_ == Phase::kAligning) return sensor::Mode::kAligning;
@@ -100,6 +104,7 @@ class PoseFilter {
     sink(static_cast<std::uint32_t>(phase_));
     alignment_.hash_state(sink);
     landmarks_.hash_state(sink);
+    relocalisation_.hash_state(sink);
     turn_.wheel_turn.hash_state(sink);
     for (const checks::Persistence& refused : refused_) refused.hash_state(sink);
     turn_.residual.hash_state(sink);
@@ -125,11 +130,16 @@ class PoseFilter {
     phase_ = Phase::kWaiting;
     alignment_ = {};
     landmarks_.reset();
+    relocalisation_.reset();
     if (kUnscented) motion_.forget_heading();
   }
   template <class Model>
   Innovation measure(const Model& model, Source source, float gate_scale, base::Micros stamp, const Context& ctx,
-                     std::uint8_t landmark = 0xFF);
+                     std::uint8_t landmark = 0xFF, bool named = false);
+  /// The search for another pose takes a sighting that names its landmark, and the filter's judgement of it. True: the
+  /// filter went to the pose that was found.
+  bool relocalise(const model::RangeBearing& seen, const filter::Innovation<float, 2>& judged, base::Micros stamp,
+                  std::uint8_t landmark);
   /// Identity of the landmark that the sighting fits best; that of any where the pose is not known.
   [[nodiscard]] std::uint8_t nearest_landmark(const sensor::LandmarkSighting& sighting, const Context& ctx) const;
   /// A sighting while the pose is unknown.
@@ -144,6 +154,11 @@ class PoseFilter {
   void judge_motion(base::Micros stamp, const param::Parameters& n);
   /// Landmarks and fixes both contradict the filter: the motion is wrong, by the innovation since the last agreement.
   [[nodiscard]] bool both_refuse(Source source, base::Micros stamp) const;
+  /// Makes the pose less certain between two measurements, for another reason than the way's own errors.
+  void widen(const std::array<float, 3>& variance) {
+    add_variance(motion_.filter, variance);
+    relocalisation_.ignore(variance);
+  }
   void widen_by_vote(float place_m2, float yaw_rad2, base::Micros stamp);
   void trust_motion() {
     speed_error_mps_ = speed_error_m2_ = 0;
@@ -154,6 +169,7 @@ class PoseFilter {
   Motion motion_;
   GnssAlignment alignment_;
   LandmarkAlignment landmarks_;
+  Relocalisation relocalisation_;
   TurnCheck turn_;
   Phase phase_ = Phase::kWaiting;
   std::array<checks::Persistence, kSources> refused_{};  ///< rejections in a row of one kind of sensor
@@ -163,6 +179,7 @@ class PoseFilter {
   base::Micros contradicted_at_;  ///< stamp at which landmarks and fixes last contradicted the motion; 0: never
   base::Micros last_absolute_;    ///< stamp of the last accepted landmark or fix
   base::Micros now_;
+  std::uint8_t jumps_ = 0;  ///< relocalisations since the start
 };
 
 }  // namespace tetap::estimators
