@@ -63,6 +63,7 @@ class Robot {
   double declination_rad = 0;
   bool gnss = true, baro = true, magnetometer = true;
   bool gnss_climbs = true;                        ///< says how fast it climbs; NMEA does not
+  double receiver_climbs_mps = 0;                 ///< error of the receiver's climb rate
   double unseen_turn_radps = 0;                   ///< turn of the world that the gyroscope does not show
   double field_noise_uT = 0.3, flux_after_s = 0;  ///< how long after an IMU sample the magnetometer's is taken
   nav::Vector3 accel_bias_mps2 = nav::Vector3::Zero();
@@ -157,7 +158,7 @@ class Robot {
     static_cast<void>(estimator.fuse(
         sensor::GnssVelocity{
             .v_n_mps = {narrow(speed_mps * std::cos(yaw_rad)) + v(0), narrow(speed_mps * std::sin(yaw_rad)) + v(1),
-                        gnss_climbs ? narrow(climb_mps) + v(2) : base::kNan},
+                        gnss_climbs ? narrow(climb_mps + receiver_climbs_mps) + v(2) : base::kNan},
             .acc_mps = 0.1F},
         {us}, ctx()));
   }
@@ -569,6 +570,54 @@ TEST(InertialBarometer, takes_a_door_for_a_new_zero_not_for_a_climb) {
     EXPECT_EQ(robot.last_air.verdict, sensor::Verdict::kAccepted);
     EXPECT_EQ(robot.estimator.jump().cause, sensor::ResetCause::kBarometerZero) << "and says so";
     EXPECT_NEAR(robot.height_off_m(), before_m, 1.0) << gnss;
+  }
+}
+
+/// Time for which height or climb is beyond 1.5 times its 3 sigma, while the robot runs.
+double beyond_s(Robot& robot, double duration_s) {
+  int steps = 0;
+  for (const double end = robot.time_s() + duration_s; robot.time_s() < end;) {
+    robot.run(0.05);
+    const InertialEstimate now = robot.now();
+    const double climb_off_mps = static_cast<double>(now.state.v_n_mps(2)) - robot.climb_mps;
+    const bool off = std::abs(robot.height_off_m()) > 4.5 * robot.height_sigma_m() ||
+                     std::abs(climb_off_mps) > 4.5 * std::sqrt(static_cast<double>(now.p(5, 5)));
+    steps += off ? 1 : 0;
+  }
+  return 0.05 * steps;
+}
+
+/// Grace of the fault matrix: 2 s and three samples of the receiver.
+constexpr double kGrace_s = 2.6;
+
+// Barometer and receiver agree with each other: the accelerometer along the plumb line is wrong.
+TEST(InertialBarometer, is_right_where_the_receiver_climbs_with_it) {
+  for (const float off_mps2 : {0.8F, -1.2F, 2.0F, -4.9F})
+    for (const double lean_rad : {0.0, 0.25}) {
+      Robot robot;
+      robot.roll_rad = lean_rad;
+      robot.run(60);
+      const std::uint8_t before = robot.estimator.jump().count;
+      robot.accel_bias_mps2 = {0.0F, 0.0F, off_mps2};
+      EXPECT_LT(beyond_s(robot, 10), kGrace_s) << off_mps2 << ' ' << lean_rad;
+      robot.accel_bias_mps2 = nav::Vector3::Zero();
+      EXPECT_LT(beyond_s(robot, 10), kGrace_s) << off_mps2 << ' ' << lean_rad;
+      EXPECT_EQ(robot.estimator.jump().count, before) << off_mps2 << ' ' << lean_rad << ": the zero stays";
+      EXPECT_EQ(robot.last_air.verdict, sensor::Verdict::kAccepted) << off_mps2 << ' ' << lean_rad;
+      EXPECT_LT(robot.height_sigma_m(), 1.5) << off_mps2 << ' ' << lean_rad;
+    }
+}
+
+// A receiver that climbs alone, against barometer and IMU.
+TEST(InertialBarometer, holds_the_height_against_a_receiver_that_climbs_alone) {
+  for (const double lie_mps : {1.5, -3.0, 20.0}) {
+    Robot robot;
+    robot.run(60);
+    robot.receiver_climbs_mps = lie_mps;
+    EXPECT_LT(beyond_s(robot, 15), 0.5) << lie_mps;
+    EXPECT_LT(std::abs(static_cast<double>(robot.now().state.v_n_mps(2))), 0.5) << lie_mps;
+    robot.receiver_climbs_mps = 0;
+    EXPECT_LT(beyond_s(robot, 10), 0.5) << lie_mps;
   }
 }
 

@@ -105,6 +105,95 @@ TEST(InertialTrust, AFilterWhoseTiltIsWrongGivesWayToGoodFixesAndAGoodSpeed) {
       }
 }
 
+// A receiver that is led away to the side, in position and velocity alike. The speed fits the wheels at first.
+TEST(InertialTrust, AReceiverThatIsLedAsideIsOneDeviceAgainstWheelsAndImu) {
+  param::Parameters n = rover_like();
+  n.gnss.sigma_floor_m = 0.05F;
+  for (const double speed : {1.5, 2.0})
+    for (const double aside_mps2 : {0.6, -1.0}) {
+      Drive d(n);
+      d.speed_mps = speed, d.turn_radps = 0, d.yaw_rad = 1.57;
+      d.white_m = 0.05;
+      d.place();
+      d.run(40);
+      d.clear();
+      const double from_s = d.time_s();
+      d.tamper = [&d, from_s, aside_mps2](Drive::Fix& fix) {
+        const double t_s = d.time_s() - from_s;
+        fix.east_m += 0.5 * aside_mps2 * t_s * t_s;
+        fix.east_off_mps = static_cast<float>(aside_mps2 * t_s);
+        return true;
+      };
+      d.run(10);
+      EXPECT_LT(d.worst_m, 2.5) << speed << ' ' << aside_mps2;
+      EXPECT_LT(d.yaw_error_rad(), 0.15) << speed << ' ' << aside_mps2;
+      d.tamper = [](Drive::Fix&) { return true; };
+      d.run(10);
+      EXPECT_LT(d.error_m(), 1.0) << speed << ' ' << aside_mps2;
+      EXPECT_LT(d.yaw_error_rad(), 0.1) << speed << ' ' << aside_mps2;
+    }
+}
+
+/// Without wheels the receiver has one device against it, the IMU. Its position and its velocity are one device.
+Drive without_wheels(const std::function<bool(Drive&, Drive::Fix&, double)>& tamper) {
+  Drive d = settled(rover_like());
+  d.wheels = false;
+  d.white_m = 0.3;
+  d.run(10);
+  d.clear();
+  const double from_s = d.time_s();
+  d.tamper = [&d, from_s, tamper](Drive::Fix& fix) { return tamper(d, fix, d.time_s() - from_s); };
+  d.run(8);
+  d.tamper = [](Drive::Fix&) { return true; };
+  d.run(10);
+  return d;
+}
+
+TEST(InertialTrust, AReceiverThatLeapsInPositionAndVelocityIsOneDevice) {
+  for (const double leap_m : {12.0, -40.0, 300.0})
+    for (const double share : {0.1, 0.5}) {
+      const Drive d = without_wheels([&](Drive&, Drive::Fix& fix, double) {
+        fix.east_m += leap_m;
+        fix.east_off_mps = static_cast<float>(share * leap_m);
+        return true;
+      });
+      EXPECT_LT(d.worst_m, 4.0) << leap_m << ' ' << share;
+      EXPECT_LT(d.worst_sigmas, 4.5) << leap_m << ' ' << share;
+      EXPECT_LT(d.error_m(), 1.5) << leap_m << ' ' << share;
+    }
+}
+
+// The receiver led the filter away before: its leap is the way back.
+TEST(InertialTrust, AReceiverThatLedTheFilterAwayIsFollowedBack) {
+  for (const double aside_mps2 : {0.6, -1.5}) {
+    const Drive d = without_wheels([&](Drive&, Drive::Fix& fix, double t_s) {
+      fix.east_m += 0.5 * aside_mps2 * t_s * t_s;
+      fix.east_off_mps = static_cast<float>(aside_mps2 * t_s);
+      return true;
+    });
+    EXPECT_LT(d.error_m(), 2.0) << aside_mps2;
+  }
+}
+
+// The velocity leaps, and the position goes along with it: the accelerometer erred.
+TEST(InertialTrust, AnAccelerometerThatErrsForATenthOfASecondGivesWayToTheReceiver) {
+  for (const float off_mps2 : {15.0F, -25.0F}) {
+    Drive d = settled(rover_like());
+    d.wheels = false;
+    d.white_m = 0.3;
+    d.run(10);
+    const double from_s = d.time_s();
+    d.tamper_imu = [&d, from_s, off_mps2](sensor::ImuSample& s) {
+      if (d.time_s() < from_s + 0.1) s.dvelocity_b_mps[0] += 0.01F * off_mps2;
+    };
+    d.run(5);
+    d.clear();
+    d.run(10);
+    EXPECT_LT(d.worst_m, 2.0) << off_mps2;
+    EXPECT_LT(d.worst_sigmas, 4.5) << off_mps2;
+  }
+}
+
 // A ferry: wheels and IMU stand, the receiver alone moves. It wins after RecoveryParameters::persist_us, not before.
 TEST(InertialTrust, AReceiverAloneWinsAfterTheStatedTime) {
   for (const double speed : {1.2, 3.0}) {

@@ -51,6 +51,8 @@ class BarometerZero {
     p_ = p - k * p;
     altitude_m_ = altitude_m;
   }
+  /// Variance of the zero itself.
+  [[nodiscard]] float variance() const { return p_; }
   [[nodiscard]] bool known() const { return known_; }
   [[nodiscard]] float zero_m() const { return zero_m_; }
   void agreed(base::Micros stamp) { agreed_ = stamp; }

@@ -103,6 +103,15 @@ class FilterView {
   [[nodiscard]] bool speeds_contradict() const;
   /// Stamp of the last IMU sample that was left out, or that leapt; 0: none.
   [[nodiscard]] base::Micros imu_last_suspect() const { return parts_.imu.last_suspect(); }
+  /// Climb rate that the filter lacks, as the receiver's velocities show it; 0 where they fit, or are not there.
+  [[nodiscard]] float missing_climb_mps() const;
+  /// The barometer agrees with the height, though a climb that is off by so much since then would show. Not for ever:
+  /// fixes that were refused for long are right.
+  [[nodiscard]] bool barometer_vouches(float climb_mps, base::Micros since) const;
+  /// The last fixes leapt away from the filter, as the IMU did not feel it.
+  [[nodiscard]] bool receiver_leapt() const;
+  /// Difference of the receiver's last velocity to the filter's.
+  [[nodiscard]] const nav::Vector3& velocity_difference_mps() const;
   /// A receiver's velocity came within 1 s.
   [[nodiscard]] bool velocity_recent() const;
   /// A magnetometer that is not trusted may have led the heading.

@@ -75,6 +75,20 @@ inline bool FilterView::speeds_contradict() const {
   return (receiver || wheels) && !(receiver && wheels && !speeds_agree());
 }
 
+inline float FilterView::missing_climb_mps() const { return parts_.sources.velocity.missing_climb_mps(*this); }
+
+inline bool FilterView::barometer_vouches(float climb_mps, base::Micros since) const {
+  return !position_refused_for_long() && parts_.sources.barometer.vouches(climb_mps, since, *this);
+}
+
+inline bool FilterView::receiver_leapt() const {
+  return !position_refused_for_long() && parts_.sources.position.leapt();
+}
+
+inline const nav::Vector3& FilterView::velocity_difference_mps() const {
+  return parts_.sources.velocity.difference_mps();
+}
+
 inline bool FilterView::velocity_recent() const { return parts_.sources.velocity.recent(stamp()); }
 
 inline bool FilterView::magnetometer_is_suspect() const { return parts_.sources.magnetometer.is_suspect(stamp()); }

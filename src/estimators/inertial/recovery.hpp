@@ -84,6 +84,7 @@ class Recovery {
   void widen(const Assessment& a, nav::Ins& ins, base::Micros stamp, const param::InertialParameters& n);
   static void widen_velocity(nav::Ins& ins, const nav::Vector3& nu, float since_s);
   static void widen_position(nav::Ins& ins, const nav::Vector3& nu, float since_s);
+  static void widen_climb(nav::Ins& ins, float climb_mps, float height_m);
   [[nodiscard]] static std::array<float, 2> tilt_of(float east_mps2, float north_mps2, float gravity_mps2);
 
   Jump jump_;
@@ -162,6 +163,19 @@ inline std::array<float, 2> Recovery::tilt_of(float east_mps2, float north_mps2,
   ins.recondition();
 }
 
+/// The climb is off, and the height by what came of it: an accelerometer errs along the plumb line. Its error made the
+/// climb in a second or longer.
+[[gnu::noinline]] inline void Recovery::widen_climb(nav::Ins& ins, float climb_mps, float height_m) {
+  constexpr float kSince_s = 1;
+  ins.predict_covariance();
+  const nav::Vector3& up_n = ins.earth.up_n;
+  const nav::Vector3 p_m = height_m * up_n, v_mps = climb_mps * up_n;
+  ins.inflate_along({p_m(0), p_m(1), p_m(2), v_mps(0), v_mps(1), v_mps(2), 0, 0, 0});
+  const nav::Vector3 bias_b = ins.x.q_nb.conjugate().rotate((1.0F / kSince_s) * v_mps);
+  for (int i = 0; i < 3; ++i) ins.inflate(nav::InsState::kAccelBias + i, bias_b(i) * bias_b(i));
+  ins.recondition();
+}
+
 /// Once more within ten seconds, it is not one of these causes alone: tilt and bias are as at the start.
 inline void Recovery::widen(const Assessment& a, nav::Ins& ins, base::Micros stamp,
                             const param::InertialParameters& n) {
@@ -186,6 +200,9 @@ inline void Recovery::widen(const Assessment& a, nav::Ins& ins, base::Micros sta
     case Action::kWidenVelocity:
     case Action::kWidenPosition:
       widen(a, ins, stamp, parameters.inertial);
+      return true;
+    case Action::kWidenClimb:
+      widen_climb(ins, a.remedy.climb_mps, a.remedy.height_m);
       return true;
     case Action::kInflateMotion:
       inflate_refused(ins, parameters);

@@ -31,11 +31,9 @@ inline void widen_by_innovation(Assessment& a, Action action, const nav::Vector3
 }
 
 /// A refused velocity of a device: the others vote. `speed`: the vote of the other velocity.
-inline void judge_velocity(Assessment& a, const nav::Vector3& nu_n_mps, Vote speed, DeviceRecord& witness,
+inline void judge_velocity(Assessment& a, const nav::Vector3& nu_n_mps, Vote speed, Vote fixes, DeviceRecord& witness,
                            const FilterView& filter) {
-  const Votes votes{.speed = speed,
-                    .fixes = filter.fixes_vote(witness.since(filter.stamp()), nu_n_mps),
-                    .speeds_agree = filter.speeds_agree()};
+  const Votes votes{.speed = speed, .fixes = fixes, .speeds_agree = filter.speeds_agree()};
   if (filter_yields(witness.refused(), votes, filter.stamp(), filter.parameters().recovery))
     widen_by_innovation(a, Action::kWidenVelocity, nu_n_mps, witness, filter.stamp());
 }

@@ -28,6 +28,7 @@ enum class Action : std::uint8_t {
   kInflateMotion,   ///< reject; the source was refused for too long: velocity and heading become less certain
   kWidenVelocity,   ///< reject; a velocity is right: what can have made the filter wrong by the innovation
   kWidenPosition,   ///< fuse, after the same of a fix
+  kWidenClimb,      ///< reject; barometer and receiver are right: the same of the climb
   kInflateHeading,  ///< the heading becomes as uncertain as the innovation
   kResetZero,       ///< reject; the source took a new zero
   kResetPosition,   ///< fuse, after the horizontal position was reset
@@ -40,6 +41,8 @@ struct Remedy {
   nav::Vector3 variance_m2 = nav::Vector3::Zero();  ///< variance of the position after a reset
   std::array<float, 2> pulled_m{};                  ///< 1 sigma by which refused fixes may have led the position before
   nav::Vector3 innovation = nav::Vector3::Zero();   ///< kWidenVelocity (m/s), kWidenPosition (m): level axes
+  float climb_mps = 0;                              ///< kWidenClimb: climb rate that the filter lacks
+  float height_m = 0;                               ///< kWidenClimb: height that the filter lacks
   float since_s = 0;                                ///< time in which the innovation grew
   float sigma_mps = 0;                              ///< 1 sigma of the velocity, beside
   float sigma_rad = 0;                              ///< 1 sigma of the heading, beside

@@ -13,6 +13,9 @@
 
 namespace tetap::estimators {
 
+/// Way of a deviation that grows from nothing, in that of its last velocity.
+inline constexpr float kGrowth = 0.7F;
+
 enum class Vote : std::uint8_t {
   kAbsent,    ///< the device is silent
   kAbstains,  ///< the device's measurements do not decide
@@ -90,9 +93,8 @@ struct LevelInnovation {
 /// Vote of the last fix, which came t after the velocity was first refused by nu. (2 d v - d^2) / S is twice the log
 /// likelihood ratio of "off by d = nu t" to "not off". Accepted alone shows nothing.
 [[nodiscard]] inline Vote vote_of_fix(const LevelInnovation& fix, bool refused, const nav::Vector3& nu_mps, float t_s) {
-  constexpr float kShare = 0.7F;  // a deviation grows from nothing
   constexpr float kRatio = 9.0F;  // 3 sigma
-  const float east_m = kShare * t_s * nu_mps(0), north_m = kShare * t_s * nu_mps(1);
+  const float east_m = kGrowth * t_s * nu_mps(0), north_m = kGrowth * t_s * nu_mps(1);
   const float for_filter =
       (east_m * (east_m - 2.0F * fix.east_m) + north_m * (north_m - 2.0F * fix.north_m)) / fix.variance_m2;
   if (for_filter < -kRatio) return Vote::kAgainst;

@@ -41,6 +41,22 @@ class Barometer {
     return zero_.refused_for(filter.stamp()) >= base::Micros{filter.parameters().recovery.after_us};
   }
 
+  /// The height agrees, though a climb that is off by so much since then would have moved it.
+  [[nodiscard]] bool vouches(float climb_mps, base::Micros since, const FilterView& filter) const {
+    const param::BaroParameters& n = filter.parameters().baro;
+    const base::Micros last = zero_.last();
+    if (!zero_.known() || timed_out(filter.stamp()) || zero_.refused_for(last).us != 0) return false;
+    const float off_m = kGrowth * climb_mps * base::seconds(last - since);
+    const float variance = filter.p()(2, 2) + zero_.variance() + n.sigma_m * n.sigma_m;
+    return off_m * off_m > kPower * n.gate_scale * filter::chi_square_99(1) * variance;
+  }
+  /// Barometer and receiver contradict the filter to the same side: the IMU's climb is wrong, and no door changed the
+  /// pressure.
+  [[nodiscard]] bool climb_wrong(float nu_m, const FilterView& filter) const {
+    constexpr base::Micros kLasts{200'000};
+    return zero_.refused_for(filter.stamp()) >= kLasts && nu_m * filter.missing_climb_mps() > 0.0F;
+  }
+
   [[nodiscard]] bool stuck(base::Micros at) const { return repeats_.stuck(at); }
   [[nodiscard]] bool timed_out(base::Micros at) const {
     return !checks::recent(repeats_.last(), at, base::Micros{2'000'000});
@@ -67,6 +83,8 @@ class Barometer {
     zero_.set(z.altitude_m, z.altitude_m - z.height_m, filter.p()(2, 2) + white, filter.stamp());
   }
   void judge_refused(const HeightMeasurement& z, const FilterView& filter, Assessment& a);
+
+  static constexpr float kPower = 4;  ///< an agreement decides where the height would be off by two gates
 
   BarometerZero zero_;
   checks::StuckValue<1> repeats_;
@@ -104,9 +122,15 @@ inline Assessment Barometer::assess_pressure(const sensor::AirPressure& air, con
 }
 
 inline void Barometer::judge_refused(const HeightMeasurement& z, const FilterView& filter, Assessment& a) {
-  a.action = Action::kReject;
-  a.failed = Check::kGate;
-  a.verdict = sensor::Verdict::kRejected;
+  a.reject(Check::kGate);
+  const float nu = innovation_m(z);
+  if (climb_wrong(nu, filter)) {
+    a.action = Action::kWidenClimb;
+    a.remedy.climb_mps = filter.missing_climb_mps();
+    a.remedy.height_m = nu;
+    zero_.agreed(filter.stamp());
+    return;
+  }
   if (!reset_allowed(filter)) return;
   set_zero(z, filter);
   a.action = Action::kResetZero;

@@ -99,7 +99,8 @@ class ForwardSpeedSource {
     record_.reset_refusals();
   }
   void judge(Assessment& a, const nav::Vector3& nu_n_mps, const FilterView& filter) {
-    judge_velocity(a, nu_n_mps, filter.velocity_vote(record_.since(filter.stamp())), record_, filter);
+    const base::Micros since = record_.since(filter.stamp());
+    judge_velocity(a, nu_n_mps, filter.velocity_vote(since), filter.fixes_vote(since, nu_n_mps), record_, filter);
   }
 
   DeviceRecord record_;

@@ -85,6 +85,8 @@ class GnssPositionSource {
                        base::seconds(record_.last_measurement() - since));
   }
 
+  /// Fixes leapt by an offset that stays.
+  [[nodiscard]] bool leapt() const { return leapt_; }
   [[nodiscard]] bool frozen() const { return frozen_.frozen(); }
   [[nodiscard]] const checks::Persistence& refused() const { return record_.refused(); }
   [[nodiscard]] base::Micros last_fused() const { return last_fused_; }
@@ -110,7 +112,7 @@ class GnssPositionSource {
     sink(last_fused_.us);
     sink(pulled_m_[0]);
     sink(pulled_m_[1]);
-    sink(static_cast<std::uint32_t>(pull_inflated_));
+    sink(static_cast<std::uint32_t>((pull_inflated_ ? 1U : 0U) | (leapt_ ? 2U : 0U)));
     status_.hash_state(sink);
   }
 
@@ -122,6 +124,7 @@ class GnssPositionSource {
   [[nodiscard]] bool filter_wrong(const FilterView& filter) const;
   [[nodiscard]] bool undoes_reset(const FixMeasurement& z, const FilterView& filter) const;
   [[nodiscard]] bool lost(const FilterView& filter) const;
+  [[nodiscard]] bool leaps(const FixMeasurement& z, const FilterView& filter) const;
 
   checks::StartupFixCheck startup_;
   checks::OffsetHypothesis offset_;  ///< offset of fixes that were not fused
@@ -132,6 +135,7 @@ class GnssPositionSource {
   checks::PositionDrift drift_;
   std::array<float, 2> pulled_m_{};  ///< by how much the last fixes moved the position
   bool pull_inflated_ = false;       ///< the position is already less certain by that
+  bool leapt_ = false;               ///< fixes are refused since one leapt, all by the same offset
   SourceStatus status_;
 };
 
@@ -162,6 +166,7 @@ inline GnssPositionSource::Converted GnssPositionSource::convert(const sensor::G
   const bool inside = a.nis <= a.gate || z.statistics.horizontal_nis <= fix_gate(n.gnss, 2);
   const bool agrees = inside && !drifts(z, n.gnss, a);
   if (!inside) a.failed = Check::kGate;
+  leapt_ = !agrees && (leapt_ || leaps(z, filter));
   record_.update(!agrees, filter.stamp());
   const std::array<float, 2>& expected_m2 = z.statistics.expected_m2;
   innovation_ = {z.nu(0), z.nu(1), 0.5F * (expected_m2[0] + expected_m2[1]) + z.r(0)};
@@ -179,9 +184,24 @@ inline GnssPositionSource::Converted GnssPositionSource::convert(const sensor::G
   return a;
 }
 
+/// Between two fixes the filter moves as the IMU feels, but for the error of its velocity, which the receiver's own
+/// velocity shows. A leap beyond is the receiver's.
+[[gnu::noinline]] inline bool GnssPositionSource::leaps(const FixMeasurement& z, const FilterView& filter) const {
+  if (!filter.velocity_recent() || filter.recovery().widened_lately(filter.stamp())) return false;
+  const nav::Ins::Covariance& p = filter.p();
+  constexpr int kEast = nav::InsState::kVelocity, kNorth = nav::InsState::kVelocityNorth;
+  const float dt_s = base::seconds(filter.stamp() - record_.last_measurement());
+  const nav::Vector3 grown_m = dt_s * filter.velocity_difference_mps();
+  const float east_m = z.nu(0) - innovation_.east_m - grown_m(0);
+  const float north_m = z.nu(1) - innovation_.north_m - grown_m(1);
+  const float moved_m2 = 0.5F * (p(0, 0) + p(1, 1) + dt_s * dt_s * (p(kEast, kEast) + p(kNorth, kNorth)));
+  return east_m * east_m + north_m * north_m > checks::kChiSquare999Of2 * (2.0F * z.r(0) + moved_m2);
+}
+
 /// The filter refuses a second fix while a velocity contradicts it, too, or did within five seconds, and none vouches.
+/// A receiver that leapt is one device with its velocity.
 inline bool GnssPositionSource::filter_wrong(const FilterView& filter) const {
-  if (record_.refused().count() < 2) return false;
+  if (record_.refused().count() < 2 || leapt_) return false;
   if (filter.recovery().widened_lately(filter.stamp())) return true;
   const base::Micros since = record_.since(filter.stamp());
   return filter.speeds_contradict() && filter.velocity_vote(since) != Vote::kFor &&
@@ -225,6 +245,7 @@ inline void GnssPositionSource::confirm(Assessment& a, const param::RecoveryPara
   const float half = 0.5F * (p(0, 0) - p(1, 1)), both = p(0, 1);
   const float longer = 2.0F * base::sqrt(half * half + both * both);
   offset_.update(filter.stamp(), z.nu(0), z.nu(1), z.r(0), p(0, 0) + p(1, 1) - longer);
+  leapt_ = leapt_ && !offset_.contradicted();  // fixes that go on moving may be on the way back
   a.action = Action::kReject;
   a.verdict = sensor::Verdict::kRejected;
   status_.rejecting(a.failed);

@@ -41,17 +41,28 @@ class GnssVelocitySource {
   /// receiver's, until the difference is gone.
   void note(const VelocityMeasurement& z, const FilterView& filter) {
     const nav::Vector3 off = z.v_n_mps - filter.x().v_n_mps;
-    const float dt_s = base::seconds(filter.stamp() - last_);
+    const float dt_s = base::seconds(filter.stamp() - record_.last_measurement());
     const float unmodelled = kUnmodelled_mps + kUnmodelled_mps2 * dt_s;
     const float most2 = 9.0F * (2.0F * z.sigma_mps * z.sigma_mps + unmodelled * unmodelled);
     const float off2 = off.squaredNorm();
     const bool leaps = dt_s < 1.5F && off2 > most2 && nav::Vector3(off - difference_mps_).squaredNorm() > most2;
     step_detected_ = (step_detected_ || leaps) && off2 >= 0.5F * most2 && filter.wheels_agree();
+    climb_mps_ += (dt_s < 1.5F ? kNewest : 1.0F) * (filter.level().up_n.dot(off) - climb_mps_);
+    sigma_mps_ = z.sigma_mps;
     difference_mps_ = off;
     ahead_mps_ = z.v_b_mps(0);
-    last_ = filter.stamp();
   }
   [[nodiscard]] bool step_detected() const { return step_detected_; }
+  /// Climb rate that the filter lacks by the last velocities; 0 where their mean fits the filter's own.
+  [[nodiscard]] float missing_climb_mps(const FilterView& filter) const {
+    constexpr float kSigmas2 = 9, kShare = kNewest / (2 - kNewest);
+    const float sigma_mps = kVertical * sigma_mps_;
+    const float variance =
+        kShare * sigma_mps * sigma_mps + filter.p()(nav::InsState::kVelocityUp, nav::InsState::kVelocityUp);
+    return recent(filter.stamp()) && climb_mps_ * climb_mps_ > kSigmas2 * variance ? climb_mps_ : 0.0F;
+  }
+  /// Difference of the last velocity to the filter's.
+  [[nodiscard]] const nav::Vector3& difference_mps() const { return difference_mps_; }
   /// Speed ahead by the last velocity.
   [[nodiscard]] float ahead_mps() const { return ahead_mps_; }
   [[nodiscard]] static model::GnssVelocity3d model(const VelocityMeasurement& z, const FilterView& filter) {
@@ -62,7 +73,7 @@ class GnssVelocitySource {
     return {.v_n_mps = z.v_n_mps,
             .sigma_horizontal_mps = base::sqrt(
                 z.sigma_mps * z.sigma_mps + lean2 * filter.p()(nav::InsState::kVelocityUp, nav::InsState::kVelocityUp)),
-            .sigma_vertical_mps = z.has_climb ? 1.5F * z.sigma_mps : kNoClimb_mps,
+            .sigma_vertical_mps = z.has_climb ? kVertical * z.sigma_mps : kNoClimb_mps,
             .antenna_b_m = {n.antenna_x_b_m, n.antenna_y_b_m, n.antenna_z_b_m},
             .gyro_b_radps = filter.rate_b_radps()};
   }
@@ -74,32 +85,37 @@ class GnssVelocitySource {
   void conclude(Assessment& a, const nav::Vector3& nu, const FilterView& filter) {
     const bool rejected = a.action == Action::kReject;
     record_.update(rejected, filter.stamp());
+    if (record_.refused().count() <= 1) speed_off_ = false;
     if (!rejected) return;
     const base::Micros since = record_.since(filter.stamp());
-    judge_velocity(a, nu, vote_of_wheels(nu, since, filter), record_, filter);
+    if (filter.receiver_leapt() || filter.barometer_vouches(missing_climb_mps(filter), since)) return;
+    judge_velocity(a, nu, vote_of_wheels(nu, since, filter), vote_of_fixes(nu, since, filter), record_, filter);
   }
   void begin() { record_.begin(); }
 
   [[nodiscard]] const DeviceRecord& witness() const { return record_; }
   [[nodiscard]] const checks::Persistence& refused() const { return record_.refused(); }
   /// A velocity came within one second.
-  [[nodiscard]] bool recent(base::Micros at) const { return checks::recent(last_, at, kFresh); }
-  [[nodiscard]] bool timed_out(base::Micros at) const { return checks::older(last_, at, kFresh + kFresh); }
+  [[nodiscard]] bool recent(base::Micros at) const { return checks::recent(record_.last_measurement(), at, kFresh); }
+  [[nodiscard]] bool timed_out(base::Micros at) const {
+    return checks::older(record_.last_measurement(), at, kFresh + kFresh);
+  }
   [[nodiscard]] SourceStatus status(base::Micros at) const {
     return timed_out(at) ? SourceStatus{} : status_of(record_.refused());
   }
   template <class Sink>
   void hash_state(Sink&& sink) const {
     record_.hash_state(sink);
-    for (const base::Micros at : {last_, speed_off_at_}) sink(at.us);
     for (int i = 0; i < 3; ++i) sink(difference_mps_(i));
-    sink(ahead_mps_);
-    sink(static_cast<std::uint32_t>(step_detected_));
+    for (const float v : {climb_mps_, sigma_mps_, ahead_mps_}) sink(v);
+    sink(static_cast<std::uint32_t>((step_detected_ ? 1U : 0U) | (speed_off_ ? 2U : 0U)));
   }
 
  private:
   static constexpr base::Micros kFresh{1'000'000};
   static constexpr float kNoClimb_mps = 1e3F;  ///< sigma of a climb rate that is not there (NMEA has none)
+  static constexpr float kVertical = 1.5F;     ///< sigma of a climb rate in that of a level velocity
+  static constexpr float kNewest = 0.2F;       ///< weight of the newest climb rate in the mean
 
   static constexpr float kUnmodelled_mps = 0.05F,
                          kUnmodelled_mps2 = 0.3F;  ///< the IMU's own error between two velocities
@@ -110,17 +126,24 @@ class GnssVelocitySource {
     const nav::Vector3 claimed = filter.x().v_n_mps + nu;
     const float level = base::sqrt(claimed(0) * claimed(0) + claimed(1) * claimed(1));
     const float rolled = base::abs(filter.recent_forward_mps());
-    if (base::abs(level - rolled) >= 0.3F + 0.1F * rolled) speed_off_at_ = filter.stamp();
+    if (base::abs(level - rolled) >= 0.3F + 0.1F * rolled) speed_off_ = true;
     const bool receiver = step_detected_ && filter.imu_last_suspect() <= record_.last_accepted();
-    return vote == Vote::kFor && speed_off_at_ < since && !receiver ? Vote::kAbstains : vote;
+    return vote == Vote::kFor && !speed_off_ && !receiver ? Vote::kAbstains : vote;
+  }
+
+  /// Fixes and velocity are one device: against the filter they add nothing where wheels may still decide.
+  [[nodiscard]] static Vote vote_of_fixes(const nav::Vector3& nu, base::Micros since, const FilterView& filter) {
+    const Vote vote = filter.fixes_vote(since, nu);
+    return vote == Vote::kAgainst && !filter.wheels_timed_out() ? Vote::kAbstains : vote;
   }
 
   DeviceRecord record_;
   nav::Vector3 difference_mps_ = nav::Vector3::Zero();  ///< difference of the last velocity to the filter's
-  base::Micros last_;                                   ///< stamp of the last velocity; 0: none
-  base::Micros speed_off_at_;  ///< stamp of the last refused one of another speed than the wheels'
+  float climb_mps_ = 0;  ///< mean difference of the last five or so climb rates to the filter's
+  float sigma_mps_ = 0;  ///< 1 sigma of the last velocity along a level axis
   float ahead_mps_ = 0;
   bool step_detected_ = false;  ///< the receiver leapt, and is not back
+  bool speed_off_ = false;      ///< one of the refused ones in a row had another speed than the wheels
 };
 
 }  // namespace tetap::estimators
