@@ -9,7 +9,8 @@ import time
 import numpy as np
 
 from tetap.can.bus_writer import crc8
-from tetap.report import metrics
+from tetap.report.ground_truth import errors
+from tetap.report.recorded_run import HELD_S, TICK_S, code_names, held_at
 
 ROBOTS = ("rover", "car", "iris", "husky_inertial")
 FAULTS_FROM_S, FAULTS_UNTIL_S = 15.0, 80.0  # phase 1
@@ -138,12 +139,12 @@ def longest(at, on):
 
 def judge(run, truth, faults=()):
     """{safe, recovered, words[], ratio, valid_s}: `safe` is phase 1, `recovered` or `words` is phase 2."""
-    names = metrics.code_names()
+    names = code_names()
     rows = run.of(run.best)
-    dx, dy, dyaw = metrics.errors(rows, truth)
-    at = rows["epoch"] * metrics.TICK_S
-    held = metrics.HELD_S / metrics.TICK_S
-    sigma = {name: metrics.held_at(rows["epoch"], rows[name], rows["epoch"], held) for name in ("std_x_m", "std_y_m", "std_yaw_rad")}
+    dx, dy, dyaw = errors(rows, truth)
+    at = rows["epoch"] * TICK_S
+    held = HELD_S / TICK_S
+    sigma = {name: held_at(rows["epoch"], rows[name], rows["epoch"], held) for name in ("std_x_m", "std_y_m", "std_yaw_rad")}
     with np.errstate(invalid="ignore", divide="ignore"):
         ratio = np.fmax(np.fmax(np.abs(dx) / (3 * sigma["std_x_m"]), np.abs(dy) / (3 * sigma["std_y_m"])), np.abs(dyaw) / (3 * sigma["std_yaw_rad"]))
     known = np.isfinite(ratio)
@@ -152,7 +153,7 @@ def judge(run, truth, faults=()):
     finite = bool(np.isfinite(rows["x_m"][rows["pos_valid"] == 1]).all())
     last = (at >= FAULTS_UNTIL_S + SETTLED_S) & (at < DURATION_S)
     status = run.status
-    late = status["epoch"] * metrics.TICK_S >= FAULTS_UNTIL_S + SETTLED_S
+    late = status["epoch"] * TICK_S >= FAULTS_UNTIL_S + SETTLED_S
     words = set()
     for mode, bits in zip(status["mode"][late], status["faults"][late]):
         words.add(names["Mode"].get(int(mode), f"mode {int(mode)}"))
