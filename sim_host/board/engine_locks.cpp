@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Unicorn 2.0.1 keeps QEMU's locks of pages for translating threads, which it does not have: at each store of the core
-// it makes a tree of locked pages and deletes it, a third of a run's time. These two stand in front of its own; a
+// it makes a tree of locked pages and deletes it. These two stand in front of its own; a
 // version of the engine without them does not ask.
 
 extern "C" {

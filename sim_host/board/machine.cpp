@@ -246,8 +246,8 @@ const Machine::BlockInfo& Machine::block_info(std::uint32_t address, std::uint32
   return info;
 }
 
-// Alarms that are due run while the engine waits in its hook: most of them ask nothing of the core, and to stop and
-// start the engine costs as much as a hundred blocks.
+// Alarms that are due run while the engine waits in its hook: most of them ask nothing of the core, and a stop of
+// the engine is dear.
 bool Machine::has_to_stop() {
   if (hundredths_ >= stop_hundredths_) {
     synchronise();

@@ -66,8 +66,9 @@ void DeadAxisDetector::judge(const Axes& axes, const char* message, const char* 
 }
 
 void DeadAxisDetector::finish(Findings& findings) {
-  judge(gyroscope_, "In_Imu0Gyro", "Ang", kGyroscope, findings);
-  judge(accelerometer_, "In_Imu0Accel", "Vel", kAccelerometer, findings);
+  const auto imu = static_cast<unsigned>(robot_.imu);
+  judge(gyroscope_, text("In_Imu%uGyro", imu).c_str(), "Ang", kGyroscope, findings);
+  judge(accelerometer_, text("In_Imu%uAccel", imu).c_str(), "Vel", kAccelerometer, findings);
 }
 
 }  // namespace tetap::doctor

@@ -95,7 +95,9 @@ void TurnDetector::judge_unequal(Findings& findings) const {
 }
 
 void TurnDetector::judge_still(double sum2, double both, Findings& findings) const {
-  if (!(std::abs(both) > kStill * sum2)) return;  // a straight drive, or a turn on the spot
+  if (message_ == "In_BodySpeed" && !scale_.known) return;  // the track is not known
+  // A straight drive, or a turn on the spot: with one wheel at rest sum and difference are alike.
+  if (!(std::abs(both) > kStill * sum2 && kStill * std::abs(both) < sum2)) return;
   const char* wheel = both > 0 ? "left" : "right";
   findings.push_back(
       {.code = Code::kWheelsUnequal,

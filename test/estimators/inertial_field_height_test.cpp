@@ -63,6 +63,7 @@ class Robot {
   double declination_rad = 0;
   bool gnss = true, baro = true, magnetometer = true;
   bool gnss_climbs = true;                        ///< says how fast it climbs; NMEA does not
+  bool air_is_stuck = false;                      ///< the barometer repeats its last pressure
   double receiver_climbs_mps = 0;                 ///< error of the receiver's climb rate
   double unseen_turn_radps = 0;                   ///< turn of the world that the gyroscope does not show
   double field_noise_uT = 0.3, flux_after_s = 0;  ///< how long after an IMU sample the magnetometer's is taken
@@ -137,7 +138,8 @@ class Robot {
   void take_air() {
     const double altitude_m = 500 + up_m;
     const double pressure_Pa = 101325 * std::pow(1 - altitude_m / 44330.77, 1 / 0.1902632) + weather_Pa(time_s());
-    last_air = estimator.fuse(sensor::AirPressure{.pressure_Pa = narrow(pressure_Pa) + air_noise_(2)(0)}, {us}, ctx());
+    if (!air_is_stuck) last_Pa_ = narrow(pressure_Pa) + air_noise_(2)(0);
+    last_air = estimator.fuse(sensor::AirPressure{.pressure_Pa = last_Pa_}, {us}, ctx());
     ++airs;
     refused_airs += last_air.verdict == sensor::Verdict::kRejected;
   }
@@ -169,6 +171,7 @@ class Robot {
   std::int64_t us = kBegin_us;
   double climbed_mps_ = 0;
   Noise noise_{11}, field_noise_{12}, air_noise_{13};
+  float last_Pa_ = 0;
 };
 
 /// Curves to both sides at a few metres per second.
@@ -619,6 +622,18 @@ TEST(InertialBarometer, holds_the_height_against_a_receiver_that_climbs_alone) {
     robot.receiver_climbs_mps = 0;
     EXPECT_LT(beyond_s(robot, 10), 0.5) << lie_mps;
   }
+}
+
+// A pressure that repeats itself shows no climb, however long it agreed before.
+TEST(InertialBarometer, is_no_witness_against_the_receiver_while_it_is_stuck) {
+  Robot robot;
+  robot.run(60);
+  robot.air_is_stuck = true;
+  robot.run(20);
+  robot.accel_bias_mps2 = {0.0F, 0.0F, 3.0F};
+  robot.run(10);
+  EXPECT_LT(std::abs(static_cast<double>(robot.now().state.v_n_mps(2))), 1.0);
+  EXPECT_LT(std::abs(robot.height_off_m()), 5.0);
 }
 
 TEST(InertialBarometer, does_not_take_a_silence_for_a_refusal) {

@@ -28,7 +28,8 @@ class BarometerZero {
   void predict(base::Micros stamp, const param::BaroParameters& n) {
     const base::Micros since = stamp - last_;
     if (since.us > 0) p_ += n.drift_m_rts * n.drift_m_rts * base::seconds(since);
-    if (checks::older(last_, stamp, kGap)) agreed_ = stamp;
+    if (checks::older(last_, stamp, kGap))
+      agreed_ = stamp - base::Micros{1};  // neither refused for long nor in agreement
     last_ = stamp;
   }
   /// Variance of a height above the zero: in air other than the standard's a share of the climb since the zero was

@@ -139,8 +139,10 @@ sensor::Verdict PlanarDeadReckoning<Filter>::fuse(const sensor::ImuSample& sampl
   if (follows) {
     float turned_rad = gyro_rate_radps_ * base::seconds(span), variance = 0;
     const base::Micros gap = span - interval;
-    if (2 * gap.us > interval.us) {  // all of the change may have come at either end of the gap: even between the two
+    if (2 * gap.us > interval.us) {  // half an interval or more: a sample is lost
       const float changed_rad = (before_radps - gyro_rate_radps_) * base::seconds(gap);
+      // The change may have come at any time in the gap: the turn is evenly distributed, with a variance of span^2
+      // / 12.
       turned_rad += 0.5F * changed_rad;
       variance = changed_rad * changed_rad * (1.0F / 12);
     }

@@ -113,6 +113,7 @@ class PoseFilter {
     sink(speed_error_m2_);
     sink(contradicted_at_.us);
     sink(last_absolute_.us);
+    sink(std::uint32_t{jumps_});
   }
 
  private:

@@ -47,7 +47,7 @@ class Relocalisation {
 
   [[nodiscard]] const PlanarEkf& rival() const { return rival_; }
 
-  /// Nothing while there is no search.
+  /// Beside the last fix nothing while there is no search.
   template <class Sink>
   void hash_state(Sink&& sink) const {
     if (last_fix_.us != 0) sink(last_fix_.us);
@@ -137,8 +137,12 @@ inline void Relocalisation::move(const model::PlanarPose& pose, const Covariance
 inline bool Relocalisation::add(const model::RangeBearing& seen, std::uint8_t id, base::Micros stamp,
                                 const filter::Innovation<float, 2>& judged, bool begins) {
   constexpr std::uint8_t kFound = 8;
+  if (judged.verdict > filter::Verdict::kRejected) return false;  // the filter could not judge it
   const bool refused = judged.verdict == filter::Verdict::kRejected;
-  accepted_ = refused ? 0 : static_cast<std::uint8_t>(accepted_ + 1);
+  if (refused)
+    accepted_ = 0;
+  else if (accepted_ < kFound)
+    ++accepted_;
   if (!searches_) {
     if (!begins) return false;
     searches_ = true;

@@ -45,7 +45,8 @@ class Barometer {
   [[nodiscard]] bool vouches(float climb_mps, base::Micros since, const FilterView& filter) const {
     const param::BaroParameters& n = filter.parameters().baro;
     const base::Micros last = zero_.last();
-    if (!zero_.known() || timed_out(filter.stamp()) || zero_.refused_for(last).us != 0) return false;
+    const bool agrees = zero_.known() && !timed_out(filter.stamp()) && !stuck(filter.stamp()) && last > since;
+    if (!agrees || zero_.refused_for(last).us != 0) return false;
     const float off_m = kGrowth * climb_mps * base::seconds(last - since);
     const float variance = filter.p()(2, 2) + zero_.variance() + n.sigma_m * n.sigma_m;
     return off_m * off_m > kPower * n.gate_scale * filter::chi_square_99(1) * variance;

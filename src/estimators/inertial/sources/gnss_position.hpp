@@ -75,6 +75,8 @@ class GnssPositionSource {
   void reset() {
     offset_.reset();
     drift_.reset();
+    leapt_ = false;
+    record_.begin();  // the next fix is compared with none before the pose
   }
   void begin() { record_.begin(); }
   /// Vote on a velocity that is off by nu since then.

@@ -88,8 +88,9 @@ class GnssVelocitySource {
     if (record_.refused().count() <= 1) speed_off_ = false;
     if (!rejected) return;
     const base::Micros since = record_.since(filter.stamp());
+    const Vote wheels = vote_of_wheels(nu, since, filter);
     if (filter.receiver_leapt() || filter.barometer_vouches(missing_climb_mps(filter), since)) return;
-    judge_velocity(a, nu, vote_of_wheels(nu, since, filter), vote_of_fixes(nu, since, filter), record_, filter);
+    judge_velocity(a, nu, wheels, vote_of_fixes(nu, since, filter), record_, filter);
   }
   void begin() { record_.begin(); }
 
