@@ -59,7 +59,7 @@ class Registers(unittest.TestCase):
         with tempfile.TemporaryDirectory() as folder:
             done = subprocess.run([TOOL, "--check"], env=os.environ | {"TETAP_DATA": folder}, capture_output=True, text=True, check=False)
         self.assertEqual(done.returncode, 2)
-        self.assertIn("STM32F412.svd: No such file", done.stderr)
+        self.assertRegex(done.stderr, r"STM32F4\d\d\.svd: No such file")
 
     @unittest.skipUnless(os.path.exists(os.path.join(DATA, "svd", "STM32F412.svd")), "no $TETAP_DATA/svd")
     def test_the_headers_in_the_repository_are_what_the_vendors_files_make(self):
