@@ -33,7 +33,7 @@ class WorkLimit {
   bool refuse() { return tight_ = kTightTicks, false; }
 
  private:
-  static constexpr std::uint16_t kMoves = 6 * Capacity, kSamples = 4 * Capacity;
+  static constexpr std::uint16_t kMoves = 6 * Capacity, kSamples = 3 * Capacity;
   static constexpr std::uint8_t kRooms = 24, kTightTicks = 100;
   static void add(std::uint16_t& left, std::uint32_t more, std::uint16_t most) {
     left = static_cast<std::uint16_t>(left + more < most ? left + more : most);

@@ -62,8 +62,8 @@ class Robot {
   double yaw_rate_radps = 0, acceleration_mps2 = 0;
   double declination_rad = 0;
   bool gnss = true, baro = true, magnetometer = true;
+  bool gnss_places = true;                        ///< has positions beside velocities
   bool gnss_climbs = true;                        ///< says how fast it climbs; NMEA does not
-  bool air_is_stuck = false;                      ///< the barometer repeats its last pressure
   double receiver_climbs_mps = 0;                 ///< error of the receiver's climb rate
   double unseen_turn_radps = 0;                   ///< turn of the world that the gyroscope does not show
   double field_noise_uT = 0.3, flux_after_s = 0;  ///< how long after an IMU sample the magnetometer's is taken
@@ -138,8 +138,7 @@ class Robot {
   void take_air() {
     const double altitude_m = 500 + up_m;
     const double pressure_Pa = 101325 * std::pow(1 - altitude_m / 44330.77, 1 / 0.1902632) + weather_Pa(time_s());
-    if (!air_is_stuck) last_Pa_ = narrow(pressure_Pa) + air_noise_(2)(0);
-    last_air = estimator.fuse(sensor::AirPressure{.pressure_Pa = last_Pa_}, {us}, ctx());
+    last_air = estimator.fuse(sensor::AirPressure{.pressure_Pa = narrow(pressure_Pa) + air_noise_(2)(0)}, {us}, ctx());
     ++airs;
     refused_airs += last_air.verdict == sensor::Verdict::kRejected;
   }
@@ -155,7 +154,7 @@ class Robot {
         .horizontal_acc_m = 1.0F,
         .vertical_acc_m = 2.0F,
         .fix = sensor::GnssFix::k3d};
-    static_cast<void>(estimator.fuse(fix, {us}, ctx()));
+    if (gnss_places) static_cast<void>(estimator.fuse(fix, {us}, ctx()));
     const nav::Vector3 v = noise_(0.1);
     static_cast<void>(estimator.fuse(
         sensor::GnssVelocity{
@@ -171,7 +170,6 @@ class Robot {
   std::int64_t us = kBegin_us;
   double climbed_mps_ = 0;
   Noise noise_{11}, field_noise_{12}, air_noise_{13};
-  float last_Pa_ = 0;
 };
 
 /// Curves to both sides at a few metres per second.
@@ -624,16 +622,34 @@ TEST(InertialBarometer, holds_the_height_against_a_receiver_that_climbs_alone) {
   }
 }
 
-// A pressure that repeats itself shows no climb, however long it agreed before.
-TEST(InertialBarometer, is_no_witness_against_the_receiver_while_it_is_stuck) {
+// The barometer was right against a receiver that climbs alone, and falls silent. Then the accelerometer errs.
+TEST(InertialBarometer, is_no_witness_against_the_receiver_once_it_is_silent) {
   Robot robot;
   robot.run(60);
-  robot.air_is_stuck = true;
-  robot.run(20);
-  robot.accel_bias_mps2 = {0.0F, 0.0F, 3.0F};
+  robot.gnss_places = false;
+  robot.receiver_climbs_mps = 3;
+  robot.run(2);
+  robot.baro = false;
+  robot.accel_bias_mps2 = {0.0F, 0.0F, -3.0F};
+  robot.run(3);
+  robot.receiver_climbs_mps = 0;
   robot.run(10);
-  EXPECT_LT(std::abs(static_cast<double>(robot.now().state.v_n_mps(2))), 1.0);
-  EXPECT_LT(std::abs(robot.height_off_m()), 5.0);
+  EXPECT_LT(std::abs(static_cast<double>(robot.now().state.v_n_mps(2))), 3.0);
+  EXPECT_LT(std::abs(robot.height_off_m()), 100.0);
+}
+
+TEST(BarometerZero, counts_from_the_stamp_at_which_it_was_set) {
+  constexpr std::int64_t kWrap_us = std::int64_t{1} << 32;
+  for (const std::int64_t stamp_us : {std::int64_t{1}, std::int64_t{60'000'000}, kWrap_us - 1, kWrap_us}) {
+    BarometerZero zero;
+    EXPECT_FALSE(zero.known());
+    zero.set(100, 90, 1, {stamp_us});
+    EXPECT_TRUE(zero.known());
+    for (const std::int64_t later_us : {0, 1, 200'000, 600'000'000}) {
+      EXPECT_GE(zero.known_for({stamp_us + later_us}).us, later_us);
+      EXPECT_LE(zero.known_for({stamp_us + later_us}).us, later_us + 1);
+    }
+  }
 }
 
 TEST(InertialBarometer, does_not_take_a_silence_for_a_refusal) {

@@ -43,7 +43,7 @@ class BarometerZero {
     zero_m_ = zero_m;
     p_ = variance;
     last_ = agreed_ = stamp;
-    known_ = true;
+    set_at_us_ = static_cast<std::uint32_t>(stamp.us - 1) | 1U;
   }
   /// Corrects the zero (variance p) by a height of variance p_z < p; `nu`: how much higher the zero should be.
   void correct(float nu, float p, float p_z, float white, float altitude_m) {
@@ -54,7 +54,11 @@ class BarometerZero {
   }
   /// Variance of the zero itself.
   [[nodiscard]] float variance() const { return p_; }
-  [[nodiscard]] bool known() const { return known_; }
+  [[nodiscard]] bool known() const { return set_at_us_ != 0; }
+  /// Time since the zero was set, modulo 2^32 us: before that no height agreed with it.
+  [[nodiscard]] base::Micros known_for(base::Micros stamp) const {
+    return {static_cast<std::uint32_t>(stamp.us) - set_at_us_};
+  }
   [[nodiscard]] float zero_m() const { return zero_m_; }
   void agreed(base::Micros stamp) { agreed_ = stamp; }
   [[nodiscard]] base::Micros refused_for(base::Micros stamp) const { return stamp - agreed_; }
@@ -68,14 +72,14 @@ class BarometerZero {
     sink(altitude_m_);
     sink(last_.us);
     sink(agreed_.us);
-    sink(static_cast<std::uint32_t>(known_));
+    sink(set_at_us_);
   }
 
  private:
   static constexpr base::Micros kGap{1'000'000};  ///< a longer silence does not count as refused
   float zero_m_ = 0, p_ = 0;
-  float altitude_m_ = 0;  ///< altitude at which the zero was found
-  bool known_ = false;
+  float altitude_m_ = 0;         ///< altitude at which the zero was found
+  std::uint32_t set_at_us_ = 0;  ///< stamp at which it was set, modulo 2^32, odd; 0: never
   base::Micros last_, agreed_;
 };
 

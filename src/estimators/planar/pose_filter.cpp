@@ -51,16 +51,15 @@ Innovation PoseFilter<Filter>::measure(const Model& model, Source source, float 
     relocalisation_.note(motion_.filter.x, covariance_of(motion_.filter));
   if constexpr (std::same_as<Model, model::GnssPosition>) relocalisation_.add(model, stamp, gate);
   if constexpr (std::same_as<Model, model::RangeBearing>)
-    if (named && relocalise(model, result, stamp, landmark))
+    if (named && relocalisation_.add(model, landmark, stamp, result, in_a_row_[kLandmark] >= kDegraded)) {
+      take_rival(stamp);
       return {.verdict = sensor::Verdict::kAccepted, .landmark = landmark};
+    }
   return record(result, landmark);
 }
 
 template <class Filter>
-bool PoseFilter<Filter>::relocalise(const model::RangeBearing& seen, const filter::Innovation<float, 2>& judged,
-                                    base::Micros stamp, std::uint8_t landmark) {
-  const bool begins = in_a_row_[kLandmark] >= kDegraded;
-  if (!relocalisation_.add(seen, landmark, stamp, judged, begins)) return false;
+[[gnu::noinline]] void PoseFilter<Filter>::take_rival(base::Micros stamp) {
   motion_.filter.x = relocalisation_.rival().x;
   set_covariance(motion_.filter, relocalisation_.rival().p);
   relocalisation_.reset();
@@ -69,7 +68,6 @@ bool PoseFilter<Filter>::relocalise(const model::RangeBearing& seen, const filte
   trust_motion();
   last_absolute_ = stamp;
   ++jumps_;
-  return true;
 }
 
 /// The other source was refused last, too, within the time of dead reckoning.

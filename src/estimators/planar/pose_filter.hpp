@@ -35,7 +35,7 @@ class PoseFilter {
   static constexpr bool kUsesMap = true;
 
   void restart(base::Micros t, const Context& ctx) {
-    *this = {};
+    clear();
     if (ctx.parameters.start.known != 0) {
       set_pose(t, start_pose(ctx.parameters.start), ctx);
     } else {
@@ -117,6 +117,9 @@ class PoseFilter {
   }
 
  private:
+  /// A function of its own: the empty filter leaves the stack before a pose is set.
+  [[gnu::noinline]] void clear() { *this = {}; }
+
   enum class Phase : std::uint8_t { kWaiting, kAligning, kTracking };
   enum Source : std::size_t { kLandmark, kGnss, kSources };
   static constexpr float kLost_rad = 1;
@@ -137,10 +140,8 @@ class PoseFilter {
   template <class Model>
   Innovation measure(const Model& model, Source source, float gate_scale, base::Micros stamp, const Context& ctx,
                      std::uint8_t landmark = 0xFF, bool named = false);
-  /// The search for another pose takes a sighting that names its landmark, and the filter's judgement of it. True: the
-  /// filter went to the pose that was found.
-  bool relocalise(const model::RangeBearing& seen, const filter::Innovation<float, 2>& judged, base::Micros stamp,
-                  std::uint8_t landmark);
+  /// The filter goes to the pose that the search found.
+  void take_rival(base::Micros stamp);
   /// Identity of the landmark that the sighting fits best; that of any where the pose is not known.
   [[nodiscard]] std::uint8_t nearest_landmark(const sensor::LandmarkSighting& sighting, const Context& ctx) const;
   /// A sighting while the pose is unknown.

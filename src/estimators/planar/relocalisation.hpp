@@ -83,6 +83,8 @@ class Relocalisation {
     evidence_ = 0;
     fixed_ = false;
   }
+  /// The rival takes the sighting, and its evidence grows by how much better it fits than the filter.
+  [[nodiscard]] bool explains(const model::RangeBearing& seen, const filter::Innovation<float, 2>& judged);
   void place(const model::RangeBearing& seen, std::uint8_t id, base::Micros stamp);
   void agree(std::uint8_t id) {
     for (std::uint8_t& known : agreed_) {
@@ -154,9 +156,7 @@ inline bool Relocalisation::add(const model::RangeBearing& seen, std::uint8_t id
   }
   if (landmarks_.has_candidate()) {
     if (!landmarks_.is_third(id, stamp)) return false;
-    const auto by_rival = rival_.update(seen, judged.gate);
-    if (by_rival.verdict == filter::Verdict::kAccepted) {
-      evidence_ += 0.5F * (cost(judged) - cost(by_rival));
+    if (explains(seen, judged)) {
       agree(id);
       return refused && proven(stamp);
     }
@@ -166,7 +166,16 @@ inline bool Relocalisation::add(const model::RangeBearing& seen, std::uint8_t id
   return false;
 }
 
-inline void Relocalisation::place(const model::RangeBearing& seen, std::uint8_t id, base::Micros stamp) {
+[[gnu::noinline]] inline bool Relocalisation::explains(const model::RangeBearing& seen,
+                                                       const filter::Innovation<float, 2>& judged) {
+  const filter::Innovation<float, 2> by_rival = rival_.update(seen, judged.gate);
+  if (by_rival.verdict != filter::Verdict::kAccepted) return false;
+  evidence_ += 0.5F * (cost(judged) - cost(by_rival));
+  return true;
+}
+
+[[gnu::noinline]] inline void Relocalisation::place(const model::RangeBearing& seen, std::uint8_t id,
+                                                    base::Micros stamp) {
   const LandmarkAlignment::Result found = landmarks_.add(seen, id, stamp, rival_.x, rival_.p);
   using Outcome = LandmarkAlignment::Outcome;
   constexpr float kNone_m2 = 0.25e-6F, kNone_rad2 = 1e-8F;

@@ -41,13 +41,15 @@ class Barometer {
     return zero_.refused_for(filter.stamp()) >= base::Micros{filter.parameters().recovery.after_us};
   }
 
-  /// The height agrees, though a climb that is off by so much since then would have moved it.
+  /// The height agreed within a second, though a climb that is off by so much since then would have moved it. A zero
+  /// shows nothing of the time before it was set.
   [[nodiscard]] bool vouches(float climb_mps, base::Micros since, const FilterView& filter) const {
     const param::BaroParameters& n = filter.parameters().baro;
     const base::Micros last = zero_.last();
-    const bool agrees = zero_.known() && !timed_out(filter.stamp()) && !stuck(filter.stamp()) && last > since;
-    if (!agrees || zero_.refused_for(last).us != 0) return false;
-    const float off_m = kGrowth * climb_mps * base::seconds(last - since);
+    const bool agreed = last > since && checks::recent(last, filter.stamp(), base::Micros{1'000'000});
+    if (!agreed || zero_.refused_for(last).us != 0) return false;
+    const base::Micros span = last - since, known = zero_.known_for(last);
+    const float off_m = kGrowth * climb_mps * base::seconds(known < span ? known : span);
     const float variance = filter.p()(2, 2) + zero_.variance() + n.sigma_m * n.sigma_m;
     return off_m * off_m > kPower * n.gate_scale * filter::chi_square_99(1) * variance;
   }
