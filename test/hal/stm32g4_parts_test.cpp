@@ -364,6 +364,17 @@ TEST_F(SerialPortG4Test, OneMessageAtATimeAndABaudRateBehindIt) {
   EXPECT_EQ(std::string(line.sent.begin(), line.sent.end()), text);
 }
 
+// The round's interrupt is still pending when the ring begins anew: it would count a round of the new ring.
+TEST_F(SerialPortG4Test, RingBeginsWithoutTheFlagsOfTheLastOne) {
+  for (int i = 0; i < 64; ++i) line.arrive(0);
+  ASSERT_TRUE(line.round_interrupt());
+  port.set_baud(115'200);
+  EXPECT_FALSE(line.round_interrupt());
+  EXPECT_TRUE(read().empty());
+  line.arrive(7);
+  EXPECT_EQ(read(), std::vector<std::uint8_t>{7});
+}
+
 TEST_F(SerialPortG4Test, DamageIsCountedAndCleared) {
   for (const std::uint32_t bit : {8U, 2U, 4U, 0U}) {
     line.usart[0x1C] |= bit;

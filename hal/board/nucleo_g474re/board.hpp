@@ -226,11 +226,15 @@ struct Board {
     print(line.add(", status ").hex(boot_.fault.status).add('\n').c_str());
   }
 
-  /// The diode blinks once a second while the node is on the bus, and lights while it is not; a change is one line.
+  /// The diode blinks once a second while the node is on the bus, and lights while it is not; a change is one line, and
+  /// so is a bus that cannot be joined.
   void show_state() {
     const bool on_bus = can.state() == stm32::CanState::kOnBus;
-    if (on_bus != was_on_bus_) print(on_bus ? "tetap: can: on the bus\n" : "tetap: can: off the bus\n");
+    const std::uint32_t failures = can.faults().bus_off;
+    if (failures != failures_shown_) print("tetap: can: off the bus\n");
+    if (on_bus && !was_on_bus_) print("tetap: can: on the bus\n");
     was_on_bus_ = on_bus;
+    failures_shown_ = failures;
     const base::Micros time = now();
     if (time < next_blink_) return;
     next_blink_ = time + base::Micros{500'000};
@@ -245,6 +249,7 @@ struct Board {
   BootReport boot_{};
   stm32::Clocks clocks_{};
   bool was_on_bus_ = false;
+  std::uint32_t failures_shown_ = 0;  ///< count of CanFaults::bus_off
   bool was_passive_ = false;
   bool light_ = false;
   base::Micros next_blink_{};
