@@ -37,6 +37,7 @@ class WheelSlip {
     const float most = allowed(m.forward_mps, n), more = most + 3.0F * m.sigma_mps;
     const float apart = magnitude(off_right_mps_ - off_left_mps_);
     const float both = 0.5F * magnitude(off_right_mps_ + off_left_mps_);
+    if (apart > most && both < kTurning * apart) turned_m_ += dt_s * (off_right_mps_ - off_left_mps_);
     if (apart > most || both > more) {
       slip_ = which(apart > most, more);
       seen_ = stamp;
@@ -47,6 +48,7 @@ class WheelSlip {
       seen_ = stamp;  // hysteresis: a slip is not over yet
     } else if (older(seen_, stamp, kClear)) {
       slip_ = Slip::kNone;
+      turned_m_ = 0;
     }
     return slip_;
   }
@@ -62,6 +64,9 @@ class WheelSlip {
   }
 
   [[nodiscard]] Slip slip() const { return slip_; }
+  /// Way of the right rim past the left one that the gyroscope does not show, since that began. Both are off by the
+  /// same, one ahead and one behind, as of a robot that turns: a wheel that spins is off alone.
+  [[nodiscard]] float turned_m() const { return turned_m_; }
   /// Stamp of the last wheels; 0: none.
   [[nodiscard]] base::Micros last() const { return last_; }
   void reset() { *this = {}; }
@@ -70,6 +75,7 @@ class WheelSlip {
   void hash_state(Sink&& sink) const {
     sink(off_left_mps_);
     sink(off_right_mps_);
+    sink(turned_m_);
     for (const base::Micros at : {last_, seen_}) sink(at.us);
     ground_contradicts_.hash_state(sink);
     sink(static_cast<std::uint32_t>(slip_));
@@ -78,6 +84,7 @@ class WheelSlip {
  private:
   static constexpr base::Micros kGap{500'000}, kClear{300'000}, kGroundGap{2'500'000};
   static constexpr float kSmooth_s = 0.1F;
+  static constexpr float kTurning = 0.25F;  ///< one wheel that spins has a half
   static constexpr std::int32_t kTwice = 2;
 
   static float magnitude(float x) { return x < 0 ? -x : x; }
@@ -95,6 +102,7 @@ class WheelSlip {
   float off_left_mps_ = 0, off_right_mps_ = 0;  ///< low-passed differences from the expected rim speed
   base::Micros last_, seen_;                    ///< stamps of the last wheels, and of the last sign of slip; 0: none
   Persistence ground_contradicts_;              ///< GNSS velocities in a row that contradicted the wheels
+  float turned_m_ = 0;
   Slip slip_ = Slip::kNone;
 };
 

@@ -66,6 +66,25 @@ TEST(WheelSlip, FindsEitherWheelThatSpinsWithinATenthOfASecondAndNamesIt) {
   }
 }
 
+TEST(WheelSlip, AddsUpTheTurnOfBothWheelsThatTheGyroscopeDoesNotShow) {
+  for (const float off_mps : {0.4F, -0.8F}) {
+    Drive d;
+    d.until(Slip::kBoth, 1);
+    EXPECT_EQ(d.watch.turned_m(), 0.0F);
+    d.left_slip_mps = -off_mps;
+    d.right_slip_mps = off_mps;
+    d.until(Slip::kNone, 0.01);
+    for (int i = 0; i < 200; ++i) d.step();
+    EXPECT_NEAR(d.watch.turned_m(), 4.0F * off_mps, 0.4F * std::abs(off_mps));  // 2 s of twice the difference
+    d.left_slip_mps = d.right_slip_mps = 0;
+    d.until(Slip::kNone, 1);
+    EXPECT_EQ(d.watch.turned_m(), 0.0F);
+    d.left_slip_mps = off_mps;
+    for (int i = 0; i < 200; ++i) d.step();
+    EXPECT_LT(std::abs(d.watch.turned_m()), 0.2F * std::abs(off_mps)) << "one wheel alone";
+  }
+}
+
 TEST(WheelSlip, FindsAWheelThatIsDragged) {
   Drive d;
   d.until(Slip::kBoth, 1);

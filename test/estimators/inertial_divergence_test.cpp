@@ -47,6 +47,37 @@ TEST(InertialDivergence, AWrongHeadingIsNotFlownAwayWith) {
   }
 }
 
+/// Both wheels turn otherwise than the gyroscope shows. The heading is as uncertain as the two are apart.
+TEST(InertialDivergence, AGyroscopeThatBothWheelsContradictMakesTheHeadingUncertain) {
+  for (const double bias_radps : {0.5, -0.5, -1.0}) {
+    Drive d(rover_like());
+    d.place();
+    d.run(25);
+    d.gyro_bias_radps = bias_radps;
+    int out = 0;
+    for (int k = 0; k < 60; ++k) {
+      d.run(0.1);
+      out += d.tracking() && d.yaw_error_rad() > 9 * d.sigma_yaw_rad();
+    }
+    EXPECT_LT(0.1 * out, 0.5) << bias_radps;
+  }
+}
+
+TEST(InertialDivergence, AWheelThatSpinsAloneLeavesTheHeadingAsItIs) {
+  for (const double slip_mps : {0.5, 2.0, -1.0}) {
+    Drive d(rover_like()), spins(rover_like());
+    for (Drive* one : {&d, &spins}) {
+      one->place();
+      one->run(20);
+    }
+    spins.left_slip_mps = slip_mps;
+    d.run(3);
+    spins.run(3);
+    EXPECT_LT(spins.sigma_yaw_rad(), 1.2 * d.sigma_yaw_rad()) << slip_mps;
+    EXPECT_LT(spins.yaw_error_rad(), 0.05) << slip_mps;
+  }
+}
+
 /// The heading was told wrong, and wheels show it; the magnetometer was right all the time. The robot stops where it is
 /// noticed, so nothing but the magnetometer can say the heading it begins anew with.
 TEST(InertialDivergence, WhereWheelsShowAWrongHeadingAMagnetometerThatIsRightIsBelieved) {

@@ -70,6 +70,7 @@ class Drive {
   double white_m = 1, lasting_m = 0, lasting_s = 60;
   double stated_ratio = 1;     ///< the receiver's own accuracy figure, in what it is
   double gyro_bias_radps = 0;  ///< about the vertical
+  double left_slip_mps = 0;    ///< the left wheel is so much faster than the ground below it
   std::int64_t gnss_every_us = 200'000, speedometer_every_us = 10'000;
   bool wheels = true, speedometer = false, gnss_velocity = true;
   /// Effect of the world on a fix; false: it does not come.
@@ -144,7 +145,7 @@ class Drive {
     last_imu = estimator.fuse(imu, {us}, ctx());
     if (wheels) {
       const double per_m = 20'000 / (2 * 3.14159265358979 * 0.1);
-      left_ += (speed_mps - 0.25 * turn_radps) * dt * per_m;
+      left_ += (speed_mps - 0.25 * turn_radps + left_slip_mps) * dt * per_m;
       right_ += (speed_mps + 0.25 * turn_radps) * dt * per_m;
       estimator.fuse(sensor::WheelCounts{static_cast<std::uint16_t>(std::llround(left_)),
                                          static_cast<std::uint16_t>(std::llround(right_))},

@@ -35,6 +35,8 @@ class Recovery {
     inflate(ins, nav::InsState::kVelocity, nav::Vector3::Constant(sigma_mps * sigma_mps));
     inflate(ins, nav::InsState::kAttitude, nav::Vector3::Constant(sigma_rad * sigma_rad));
   }
+  /// Verb 1 by a cause: both wheels contradict the gyroscope's turn by so much.
+  static void widen_turn(nav::Ins& ins, float sigma_rad);
   static void inflate_heading(nav::Ins& ins, float variance_rad2) {
     ins.inflate_up(nav::InsState::kAttitude, variance_rad2);
   }
@@ -173,6 +175,19 @@ inline std::array<float, 2> Recovery::tilt_of(float east_mps2, float north_mps2,
   ins.inflate_along({p_m(0), p_m(1), p_m(2), v_mps(0), v_mps(1), v_mps(2), 0, 0, 0});
   const nav::Vector3 bias_b = ins.x.q_nb.conjugate().rotate((1.0F / kSince_s) * v_mps);
   for (int i = 0; i < 3; ++i) ins.inflate(nav::InsState::kAccelBias + i, bias_b(i) * bias_b(i));
+  ins.recondition();
+}
+
+/// The heading is at least so uncertain. An error of the gyroscope made what it lacks in a second or longer.
+[[gnu::noinline]] inline void Recovery::widen_turn(nav::Ins& ins, float sigma_rad) {
+  constexpr float kSince_s = 1;
+  ins.predict_covariance();
+  const float lacking_rad2 = sigma_rad * sigma_rad - ins.p(nav::InsState::kYaw, nav::InsState::kYaw);
+  if (!(lacking_rad2 > 0.0F)) return;
+  inflate_heading(ins, lacking_rad2);
+  const nav::Vector3 up_b = ins.x.q_nb.conjugate().rotate(ins.earth.up_n);
+  constexpr float kPer_s2 = 1.0F / (kSince_s * kSince_s);
+  for (int i = 0; i < 3; ++i) ins.inflate(nav::InsState::kGyroBias + i, kPer_s2 * lacking_rad2 * up_b(i) * up_b(i));
   ins.recondition();
 }
 

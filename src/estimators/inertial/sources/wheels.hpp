@@ -80,9 +80,13 @@ class Wheels {
   }
   status_.rejecting(Check::kSlip);
   const bool usable = slip != Slip::kBoth && !filter.imu_missing();
-  return {.action = usable ? Action::kFuse : Action::kReject,
-          .failed = usable ? Check::kNone : Check::kSlip,
-          .verdict = usable ? sensor::Verdict::kAccepted : sensor::Verdict::kRejected};
+  Assessment a{.action = usable ? Action::kFuse : Action::kReject,
+               .failed = usable ? Check::kNone : Check::kSlip,
+               .verdict = usable ? sensor::Verdict::kAccepted : sensor::Verdict::kRejected};
+  constexpr float kCircle_rad = 3.1415927F;
+  const float turned_rad = filter.imu_missing() ? 0.0F : base::abs(slip_.turned_m()) / track_m;
+  a.remedy.sigma_rad = turned_rad < kCircle_rad ? turned_rad : kCircle_rad;
+  return a;
 }
 
 inline ForwardReading Wheels::forward(const WheelReading& z, const FilterView& filter) const {
