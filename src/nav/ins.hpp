@@ -26,6 +26,17 @@ struct InsNoise {
   float motion_sigma = 3;  ///< sigmas of the accelerometer's noise beyond which its readings are motion
 };
 
+/// Corrections of the level velocity by measurements, summed, and the variance of that sum along both axes. Corrections
+/// are independent of each other, and each has the variance that its measurement takes out of P (Kailath 1968).
+struct LevelCorrection {
+  float east_mps = 0, north_mps = 0, variance_m2ps2 = 0;
+};
+
+struct InsCounters {
+  std::uint16_t held = 0;         ///< time for which the velocity is held in the body, in 0.1 ms
+  std::uint16_t conditioned = 0;  ///< times that the covariance had to be put right
+};
+
 class Ins {
  public:
   static constexpr int kErrors = InsState::kErrors;
@@ -40,6 +51,9 @@ class Ins {
   bool stands = false;
   /// By the last increment, for what is true a little later than the state; none where there was none.
   Vector3 accel_n_mps2 = Vector3::Zero();
+
+  /// Corrections of late: whoever tests them lets them fade.
+  LevelCorrection corrected{};
 
   /// Part of the state's time that the covariance does not have yet.
   [[nodiscard]] float pending_s() const { return pending_.dt_s; }
@@ -70,7 +84,7 @@ class Ins {
     if (step.keep_b_g < 1.0F) x.b_g_radps *= step.keep_b_g;
     if (noise.motion_sigma > 0.0F) shrink_motion(step);
     const auto passed = static_cast<std::uint16_t>(pending_.dt_s < 1.0F ? pending_.dt_s * kHeldPerS : kHeld);
-    held_ = held_ > passed ? static_cast<std::uint16_t>(held_ - passed) : std::uint16_t{0};
+    counters_.held = counters_.held > passed ? static_cast<std::uint16_t>(counters_.held - passed) : std::uint16_t{0};
     inflate_vertical_bias(step.dt_s);
     nav::predict_covariance(p, step);
     pending_ = {};
@@ -200,8 +214,11 @@ class Ins {
     for (const float v : p.packed()) sink(v);
     sink(pending_.dt_s);
     sink(pending_.shown_rad);
-    sink(std::uint32_t{held_});
+    sink(std::uint32_t{counters_.held});
     turned_.hash_state(sink);
+    sink(corrected.east_mps);
+    sink(corrected.north_mps);
+    sink(corrected.variance_m2ps2);
     for (int i = 0; i < 3; ++i) {
       sink(pending_.dv_n_mps(i));
       for (int k = 0; k < 3; ++k) sink(pending_.r_dt(i, k));
@@ -212,7 +229,7 @@ class Ins {
   }
 
   /// How often the covariance had to be put right (see condition()).
-  [[nodiscard]] std::uint32_t conditioned() const { return conditioned_; }
+  [[nodiscard]] std::uint32_t conditioned() const { return counters_.conditioned; }
 
  private:
   /// Apart from the prediction, so that the two are not on the stack together.
@@ -221,6 +238,7 @@ class Ins {
                                                                                   float gate) {
     constexpr int kM = Measurement::kDimension, kYaw = InsState::kAttitude + 2;
     [[maybe_unused]] const float yaw_rad2 = p(kYaw, kYaw);
+    const float before_m2ps2 = level_m2ps2();
     filter::SparseUpdate<float, kErrors, kM> result;
     constexpr int kColumns = static_cast<int>(Measurement::kTouches.size());
     bool rest = !filter::Direct<Measurement> || kColumns > kM;
@@ -245,11 +263,19 @@ class Ins {
     bool turned = false;
     if constexpr (kObservesHeading && !kInBody) turned = turn_tilt(result.dx);
     x.correct(result.dx);
+    corrected.east_mps += result.dx(InsState::kVelocity);
+    corrected.north_mps += result.dx(InsState::kVelocity + 1);
+    corrected.variance_m2ps2 += before_m2ps2 - level_m2ps2();
     if constexpr (kInBody)
-      if (measurement.moves) held_ = kHeld;
-    if (held_ > 0) move_errors(result.dx.template segment<3>(InsState::kVelocity));
+      if (measurement.moves) counters_.held = kHeld;
+    if (counters_.held > 0) move_errors(result.dx.template segment<3>(InsState::kVelocity));
     if ((result.sharp || turned) && !condition(p, condition_monitor_)) note_conditioned();
     return result.innovation;
+  }
+
+  [[nodiscard]] float level_m2ps2() const {
+    constexpr int kEast = InsState::kVelocity, kNorth = kEast + 1;
+    return p(kEast, kEast) + p(kNorth, kNorth);
   }
 
   /// Apart from the update with a lever arm, so that the two are not on the stack together.
@@ -266,7 +292,8 @@ class Ins {
     pending_ = {};
     turned_ = {};
     stands = false;
-    held_ = 0;
+    counters_.held = 0;
+    corrected = {};
     accel_n_mps2 = Vector3::Zero();
     return true;
   }
@@ -320,7 +347,7 @@ class Ins {
   /// shrinks by the share of its energy that noise explains (James & Stein 1961). It does not shrink while v is held in
   /// the body. There the noise is taken back, and every single sample of a gentle curve passes for noise.
   void shrink_motion(InsCovarianceStep<float>& step) const {
-    if (held_ > 0 && !stands) return;
+    if (counters_.held > 0 && !stands) return;
     const Vector3 rest = (earth.gravity_mps2 * step.dt_s) * earth.up_n;
     const float east = step.dv_n_mps(0) - rest(0), north = step.dv_n_mps(1) - rest(1),
                 energy = east * east + north * north;
@@ -341,7 +368,7 @@ class Ins {
   }
 
   void note_conditioned() {
-    if (conditioned_ < 0xFFFF) ++conditioned_;
+    if (counters_.conditioned < 0xFFFF) ++counters_.conditioned;
   }
 
   /// Tilt and the accelerometer's bias belong together in the body, whatever the heading. The product g x tilt is what
@@ -412,11 +439,10 @@ class Ins {
   Pending pending_{};
   GyroScaleConsider turned_{};
   InsFactor condition_monitor_{};
-  /// Time for which held_ stays after a measurement in the body while moving, in 0.1 ms: wheels may slip for a while.
+  /// InsCounters::held after a measurement in the body while moving, in 0.1 ms: wheels may slip for a while.
   static constexpr float kHeldPerS = 10'000.0F, kMostLeap_mps = 30;
   static constexpr std::uint16_t kHeld = 50'000;
-  std::uint16_t held_ = 0;
-  std::uint16_t conditioned_ = 0;
+  InsCounters counters_;
 };
 
 }  // namespace tetap::nav

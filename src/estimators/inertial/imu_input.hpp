@@ -2,6 +2,7 @@
 // The IMU as the filter at the horizon uses it: its health, its last turn rate, and where the filter went without it.
 #pragma once
 
+#include "checks/imu_drift.hpp"
 #include "checks/imu_health.hpp"
 #include "estimators/inertial/source.hpp"
 #include "sensor/row_major.hpp"
@@ -19,6 +20,7 @@ class ImuInput {
  public:
   [[nodiscard]] checks::ImuHealth& health() { return health_; }
   [[nodiscard]] const checks::ImuHealth& health() const { return health_; }
+  [[nodiscard]] checks::ImuDrift& drift() { return drift_; }
   /// Turn rate as the gyroscope shows it, at the filter's time; its bias is in it.
   [[nodiscard]] const nav::Vector3& rate_b_radps() const { return rate_b_radps_; }
   void set_rate(const nav::Vector3& rate_b_radps) { rate_b_radps_ = rate_b_radps; }
@@ -43,12 +45,14 @@ class ImuInput {
   [[nodiscard]] SourceStatus status(base::Micros at, const param::InertialParameters& n) const {
     if (health_.stuck()) return {SourceState::kDistrusted, Check::kStuck};
     if (health_.last_valid().us == 0 || health_.stale(at, n)) return {SourceState::kStopped, Check::kNone};
+    if (drift_.shown()) return {SourceState::kDistrusted, Check::kDrift};
     return {unusable_ ? SourceState::kRejecting : SourceState::kFusing, unusable_ ? Check::kValue : Check::kNone};
   }
 
   template <class Sink>
   void hash_state(Sink&& sink) const {
     health_.hash_state(sink);
+    drift_.hash_state(sink);
     for (int i = 0; i < 3; ++i) sink(rate_b_radps_(i));
     sink(bridged_until_.us);
     sink(last_suspect_.us);
@@ -58,8 +62,9 @@ class ImuInput {
  private:
   checks::ImuHealth health_;
   base::Micros bridged_until_;  ///< time to which the filter last went without IMU; 0: never
+  base::Micros last_suspect_;   ///< stamp of the last sample that was left out, or that leapt; 0: none
   nav::Vector3 rate_b_radps_ = nav::Vector3::Zero();
-  base::Micros last_suspect_;  ///< stamp of the last sample that was left out, or that leapt; 0: none
+  checks::ImuDrift drift_;
   bool unusable_ = false;
 };
 

@@ -109,6 +109,7 @@ class Inertial {
   void follow_level(const Context& ctx);
   void set_level(const base::Anchored& x, const base::Anchored& y, const base::Anchored& z, const Context& ctx);
   void inflate_clipped(const sensor::ImuSample& sample, float dt_s, const param::InertialParameters& n);
+  void judge_drift(base::Micros since, const param::Parameters& n);
   void detect_standstill(base::Micros stamp, const Context& ctx);
   void fuse_zero_rate(const param::InertialParameters& n);
   // Measurements.

@@ -98,12 +98,13 @@ Innovation Inertial::propagate(const sensor::ImuSample& sample, const nav::ImuIn
   return {.verdict = sensor::Verdict::kAccepted};
 }
 
-/// The level plane follows the robot: every 0.2 s, in a tick that has work left, or soon after.
+/// The level plane follows the robot, and the IMU is judged: every 0.2 s, in a tick that has work left, or soon after.
 void Inertial::follow_level(const Context& ctx) {
   constexpr base::Micros kEvery{200'000}, kLatest{400'000};
   const base::Micros since = time_ - levelled_at_;
   if (since < kEvery || (since < kLatest && !budget_.allows(WorkBudget::kImuSample))) return;
   budget_.spend(WorkBudget::kImuSample);
+  judge_drift(since, ctx.parameters);
   set_level(ins_.x.x, ins_.x.y, ins_.x.z, ctx);
 }
 
@@ -122,6 +123,23 @@ void Inertial::follow_level(const Context& ctx) {
   const float growth = base::sqrt(dt_s * 0.1F);
   if (sample.clipped_accel > 0) ins_.accel_n_mps2 = nav::Vector3::Zero();
   Recovery::inflate_motion(ins_, n.gap_mps2 * growth, sample.clipped_gyro > 0 ? n.gap_radps * growth : 0.0F);
+}
+
+/// Measurements contradict the IMU for long: tilt and biases are as uncertain as what explains it.
+[[gnu::noinline]] void Inertial::judge_drift(base::Micros since, const param::Parameters& n) {
+  constexpr int kEast = nav::InsState::kVelocity, kNorth = kEast + 1;
+  const float fixes = n.gnss.gate_scale, wheels = n.inertial.wheel_gate_scale;
+  nav::LevelCorrection& sum = ins_.corrected;
+  const float lasting_m2ps2 = ins_.p(kEast, kEast) + ins_.p(kNorth, kNorth);
+  constexpr float kKnown_m2ps2 = 1;  // beyond, a heading is being found: corrections are not linear
+  if (lasting_m2ps2 > kKnown_m2ps2) sum = {};
+  if (imu_.drift().test(sum, lasting_m2ps2, fixes > wheels ? fixes : wheels)) {
+    constexpr float kRate_hz = 2;  // a sum that has not faded yet is of half a second
+    Recovery::widen_imu(ins_, kRate_hz * sum.east_mps, kRate_hz * sum.north_mps);
+    sum = {};
+    predictor_.note_correction();
+  }
+  checks::ImuDrift::fade(sum, base::seconds(since));
 }
 
 /// Goes on without IMU: the velocity stays what it is in the body, which turns as the wheels show, or not at all.

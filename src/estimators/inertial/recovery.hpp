@@ -37,6 +37,8 @@ class Recovery {
   }
   /// Verb 1 by a cause: both wheels contradict the gyroscope's turn by so much.
   static void widen_turn(nav::Ins& ins, float sigma_rad);
+  /// Verb 1 by a cause: the IMU shows an acceleration that is not there. A tilt of the last second makes it, or a bias.
+  static void widen_imu(nav::Ins& ins, float east_mps2, float north_mps2);
   static void inflate_heading(nav::Ins& ins, float variance_rad2) {
     ins.inflate_up(nav::InsState::kAttitude, variance_rad2);
   }
@@ -134,6 +136,18 @@ inline std::array<float, 2> Recovery::tilt_of(float east_mps2, float north_mps2,
   const float tilt = base::sqrt(east_mps2 * east_mps2 + north_mps2 * north_mps2) / gravity_mps2;
   const float share = (tilt > kMost_rad ? kMost_rad / tilt : 1.0F) / gravity_mps2;
   return {-north_mps2 * share, east_mps2 * share};
+}
+
+[[gnu::noinline]] inline void Recovery::widen_imu(nav::Ins& ins, float east_mps2, float north_mps2) {
+  const float g_mps2 = ins.earth.gravity_mps2;
+  const std::array<float, 2> tilt = tilt_of(east_mps2, north_mps2, g_mps2);
+  ins.inflate_along({0, 0, 0, 0, 0, 0, tilt[0], tilt[1], 0});
+  const nav::Vector3 turn_b = ins.x.q_nb.conjugate().rotate({tilt[0], tilt[1], 0});
+  const nav::Vector3 bias_b = ins.x.q_nb.conjugate().rotate({tilt[1], -tilt[0], 0}) * g_mps2;
+  for (int i = 0; i < 3; ++i) {
+    ins.inflate(nav::InsState::kAccelBias + i, bias_b(i) * bias_b(i));
+    ins.inflate(nav::InsState::kGyroBias + i, turn_b(i) * turn_b(i));
+  }
 }
 
 /// The velocity is off by nu. It leapt; or a tilt made it so, since the last agreement; or the heading is wrong.
