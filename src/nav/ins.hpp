@@ -238,7 +238,7 @@ class Ins {
                                                                                   float gate) {
     constexpr int kM = Measurement::kDimension, kYaw = InsState::kAttitude + 2;
     [[maybe_unused]] const float yaw_rad2 = p(kYaw, kYaw);
-    const float before_m2ps2 = level_m2ps2();
+    corrected.variance_m2ps2 += level_m2ps2();  // not kept beside: this path is the deepest on the stack
     filter::SparseUpdate<float, kErrors, kM> result;
     constexpr int kColumns = static_cast<int>(Measurement::kTouches.size());
     bool rest = !filter::Direct<Measurement> || kColumns > kM;
@@ -254,6 +254,7 @@ class Ins {
     } else if constexpr (filter::Direct<Measurement>) {
       direct_update(measurement, gate, result);
     }
+    corrected.variance_m2ps2 -= level_m2ps2();
     if (result.innovation.verdict != filter::Verdict::kAccepted) return result.innovation;
     // Measurements of biases alone leave the scale's share in the heading; measurements in the body show no heading.
     constexpr bool kObservesHeading = std::any_of(Measurement::kTouches.begin(), Measurement::kTouches.end(),
@@ -265,7 +266,6 @@ class Ins {
     x.correct(result.dx);
     corrected.east_mps += result.dx(InsState::kVelocity);
     corrected.north_mps += result.dx(InsState::kVelocity + 1);
-    corrected.variance_m2ps2 += before_m2ps2 - level_m2ps2();
     if constexpr (kInBody)
       if (measurement.moves) counters_.held = kHeld;
     if (counters_.held > 0) move_errors(result.dx.template segment<3>(InsState::kVelocity));
