@@ -117,12 +117,19 @@ void Inertial::follow_level(const Context& ctx) {
   ins_.earth.move_to(level_, ctx.map_frame.frame.curvature());
 }
 
-/// Clipped increments are used, and are as uncertain as none.
+/// Clipped increments are used. They are as uncertain as none, and as half of what they show: a motion that is beyond
+/// the range by more shows more.
 [[gnu::noinline]] void Inertial::inflate_clipped(const sensor::ImuSample& sample, float dt_s,
                                                  const param::InertialParameters& n) {
+  constexpr float kLost = 0.5F;
   const float growth = base::sqrt(dt_s * 0.1F);
+  const float lost_mps2 = kLost * base::sqrt(ins_.accel_n_mps2.squaredNorm());
+  const float lost_radps = kLost * base::sqrt(imu_.rate_b_radps().squaredNorm());
   if (sample.clipped_accel > 0) ins_.accel_n_mps2 = nav::Vector3::Zero();
-  Recovery::inflate_motion(ins_, n.gap_mps2 * growth, sample.clipped_gyro > 0 ? n.gap_radps * growth : 0.0F);
+  Recovery::inflate_motion(ins_, growth * (lost_mps2 > n.gap_mps2 ? lost_mps2 : n.gap_mps2),
+                           sample.clipped_gyro == 0   ? 0.0F
+                           : lost_radps > n.gap_radps ? growth * lost_radps
+                                                      : growth * n.gap_radps);
 }
 
 /// Measurements contradict the IMU for long: tilt and biases are as uncertain as what explains it.
