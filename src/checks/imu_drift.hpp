@@ -33,7 +33,6 @@ class ImuDrift {
   }
   /// Measurements contradicted the IMU in one of the last tests.
   [[nodiscard]] bool shown() const { return shown_ > 0; }
-  static constexpr float kFade_s = 1;
 
   template <class Sink>
   void hash_state(Sink&& sink) const {
@@ -41,6 +40,7 @@ class ImuDrift {
   }
 
  private:
+  static constexpr float kFade_s = 1;        ///< time constant of what corrections leave in the sum
   static constexpr float kGate = 3;          ///< squared sum in its variance along both axes
   static constexpr std::uint8_t kShown = 5;  ///< tests, one to two seconds
 

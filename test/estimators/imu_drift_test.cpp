@@ -3,6 +3,8 @@
 // uncertainty, and a word comes. A sound IMU that is driven hard brings none.
 #include "inertial_drive.hpp"
 
+#include <vector>
+
 namespace tetap::estimators {
 namespace {
 
@@ -29,10 +31,10 @@ void watch(Drive& d, double for_s, Seen& seen) {
 }
 
 /// A fault of `off` per second on an axis of the IMU (gyroscope 0 to 2, accelerometer 3 to 5), for a while.
-Seen with_fault(std::size_t axis, float off, double for_s, double speed_mps, bool velocity) {
+Seen with_fault(std::size_t axis, float off, double for_s, double speed_mps) {
   Drive d = settled(rover_like());
   d.white_m = 0.3;
-  d.gnss_velocity = velocity;
+  d.gnss_velocity = true;
   d.speed_mps = speed_mps;
   d.turn_radps = speed_mps > 0 ? d.turn_radps : 0;
   d.run(20);
@@ -46,26 +48,31 @@ Seen with_fault(std::size_t axis, float off, double for_s, double speed_mps, boo
   return seen;
 }
 
+struct Fault {
+  std::size_t axis = 0;
+  float off = 0;
+};
+
+/// The tilt is honest again within the time that a fault may be hidden, and an error beyond 3 sigma brings a word.
+void expect_honest(const std::vector<Fault>& faults, double for_s, const std::vector<double>& speeds_mps) {
+  for (const double speed_mps : speeds_mps)
+    for (const auto [axis, off] : faults) {
+      SCOPED_TRACE(testing::Message() << "axis " << axis << ", " << off << ", " << speed_mps << " m/s");
+      const Seen seen = with_fault(axis, off, for_s, speed_mps);
+      EXPECT_LT(seen.tilt_s, 2.6) << seen.tilt_ratio;
+      EXPECT_TRUE(seen.word || seen.tilt_ratio < 1);
+    }
+}
+
 TEST(ImuDrift, ATiltByTheGyroscopeIsNoticedAndTheTiltStaysHonest) {
-  for (const double speed : {0.0, 1.0, 3.0})
-    for (const std::size_t axis : {0U, 1U})
-      for (const float off : {0.02F, -0.05F}) {
-        const Seen seen = with_fault(axis, off, 3, speed, true);
-        EXPECT_LT(seen.tilt_s, 2.6) << axis << ' ' << off << " at " << speed << ": " << seen.tilt_ratio;
-        EXPECT_TRUE(seen.word || seen.tilt_ratio < 1) << axis << ' ' << off << " at " << speed;
-      }
+  expect_honest({{0, 0.02F}, {0, -0.05F}, {1, 0.02F}, {1, -0.05F}}, 3, {0.0, 1.0, 3.0});
 }
 
 TEST(ImuDrift, AnAccelerationThatIsNotThereIsNoticed) {
-  for (const double speed : {0.0, 1.0})
-    for (const std::size_t axis : {3U, 4U})
-      for (const float off : {0.2F, -0.3F}) {
-        const Seen seen = with_fault(axis, off, 5, speed, true);
-        EXPECT_LT(seen.tilt_s, 2.6) << axis << ' ' << off << " at " << speed << ": " << seen.tilt_ratio;
-        EXPECT_TRUE(seen.word || seen.tilt_ratio < 1) << axis << ' ' << off << " at " << speed;
-      }
+  expect_honest({{3, 0.2F}, {3, -0.3F}, {4, 0.2F}, {4, -0.3F}}, 5, {0.0, 1.0});
 }
 
+/// With seed 2 the drive is not settled within its metre when it begins.
 TEST(ImuDrift, NothingIsSaidOfASoundImuThatIsDrivenHard) {
   for (const unsigned seed : {1U, 3U, 4U}) {
     Drive d = settled(rover_like(), seed);

@@ -138,6 +138,8 @@ inline std::array<float, 2> Recovery::tilt_of(float east_mps2, float north_mps2,
   return {-north_mps2 * share, east_mps2 * share};
 }
 
+/// Nothing is taken out of P, so it stays positive definite without recondition(). The bias of the accelerometer is
+/// that of the limited tilt.
 [[gnu::noinline]] inline void Recovery::widen_imu(nav::Ins& ins, float east_mps2, float north_mps2) {
   const float g_mps2 = ins.earth.gravity_mps2;
   const std::array<float, 2> tilt = tilt_of(east_mps2, north_mps2, g_mps2);
@@ -192,16 +194,15 @@ inline std::array<float, 2> Recovery::tilt_of(float east_mps2, float north_mps2,
   ins.recondition();
 }
 
-/// The heading is at least so uncertain. An error of the gyroscope made what it lacks in a second or longer.
+/// The heading is at least so uncertain. An error of the gyroscope made what it lacks, in no less than a second: the
+/// bias is off by as many radians a second as the heading by radians.
 [[gnu::noinline]] inline void Recovery::widen_turn(nav::Ins& ins, float sigma_rad) {
-  constexpr float kSince_s = 1;
   ins.predict_covariance();
   const float lacking_rad2 = sigma_rad * sigma_rad - ins.p(nav::InsState::kYaw, nav::InsState::kYaw);
   if (!(lacking_rad2 > 0.0F)) return;
   inflate_heading(ins, lacking_rad2);
   const nav::Vector3 up_b = ins.x.q_nb.conjugate().rotate(ins.earth.up_n);
-  constexpr float kPer_s2 = 1.0F / (kSince_s * kSince_s);
-  for (int i = 0; i < 3; ++i) ins.inflate(nav::InsState::kGyroBias + i, kPer_s2 * lacking_rad2 * up_b(i) * up_b(i));
+  for (int i = 0; i < 3; ++i) ins.inflate(nav::InsState::kGyroBias + i, lacking_rad2 * up_b(i) * up_b(i));
   ins.recondition();
 }
 
