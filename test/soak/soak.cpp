@@ -184,7 +184,7 @@ bool leaves_no_trace(const Life& life) {
 }
 
 void live(std::uint64_t number) {
-  constexpr base::Micros kPeriod{10'000}, kFrom{20'000'000}, kUntil{60'000'000}, kCalm{60'000'000};
+  constexpr base::Micros kPeriod{10'000}, kFrom{20'000'000}, kUntil{120'000'000}, kCalm{60'000'000};
   const Life life = life_of(number);
   Complaints found;
   complaints = &found;
