@@ -5,10 +5,13 @@ import os
 import sys
 import unittest
 
+import numpy as np
+
 sys.dont_write_bytecode = True
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.realpath(__file__))))
 sys.path.insert(0, os.path.join(ROOT, "tools", "python"))
-from tetap.proof import swarm  # noqa: E402
+from tetap.can.faulty_log import Fields, Frame  # noqa: E402
+from tetap.proof import failing_log, swarm  # noqa: E402
 
 WORLD = ["gnss_jump", "clock_jump", "kidnapped", "slip_left", "imu_stuck", "moving_start", "gnss_far"]
 KINDS = {robot: swarm.kinds_of(WORLD) for robot in swarm.ROBOTS}
@@ -75,6 +78,141 @@ class Shrinking(unittest.TestCase):
 
     def test_keeps_all_of_what_cannot_be_shrunk(self):
         self.assertEqual(swarm.shrunk([1, 2, 3, 4], lambda part: len(part) == 4, 60), [1, 2, 3, 4])
+
+    def test_takes_what_only_a_later_chunk_made_free(self):
+        self.assertEqual(swarm.shrunk(list(range(8)), lambda part: {3, 6} <= set(part) and (0 in part or 7 not in part), 60), [3, 6])
+
+
+FIELDS = Fields()
+
+
+def frame(time_us, message, **values):
+    payload = 0
+    for name, raw in values.items():
+        payload = FIELDS.put(payload, message, name, raw)
+    return Frame(time_us, FIELDS.identifier[message], payload)
+
+
+def imu(number, turn=3):
+    """Sample of 10 ms: gyroscope, accelerometer, time."""
+    at = 10_000 * number
+    return [frame(at, "In_Imu0Gyro", AngZ=turn, Seq=number % 16), frame(at, "In_Imu0Accel", VelZ=-100 * number, Seq=number % 16),
+            frame(at, "In_Imu0Time", Stamp=at % (1 << 20), Interval=10_000, ClipGyro=9, Temp=number, Seq=number % 16)]
+
+
+def log(seconds):
+    """IMU at 100 Hz, a fix and a velocity each second, speed and ticks at 10 Hz, a start pose."""
+    frames = [frame(10_000, "Cmd_SetPos", Ctr=1), frame(10_000, "Cmd_SetYaw", Ctr=1)]
+    for number in range(1, 100 * seconds + 1):
+        at = 10_000 * number
+        frames += imu(number)
+        if number % 10 == 0:
+            frames += [frame(at, "In_BodySpeed", Forward=number), frame(at, "In_Sync", Kind=1, Time=at)]
+        if number % 100 == 50:
+            frames += [frame(at, name) for name in ("In_GnssLat", "In_GnssLon", "In_GnssAlt", "In_GnssAcc", "In_GnssVelEN", "In_GnssVelU")]
+    return frames
+
+
+class Units(unittest.TestCase):
+    def test_have_the_frames_of_one_sensor_and_one_time(self):
+        parts = failing_log.units(log(1), FIELDS)
+        kinds = [one.kind for one in parts]
+        self.assertEqual({kind: kinds.count(kind) for kind in kinds}, {"Pose": 1, "Imu0": 100, "BodySpeed": 10, "Sync": 10, "Gnss": 1})
+        self.assertEqual(failing_log.frames_of(parts, FIELDS), log(1))
+
+    def test_joined_samples_have_the_sum_of_their_increments_and_intervals(self):
+        parts = failing_log.joined(failing_log.units([one for number in range(1, 8) for one in imu(number)], FIELDS), FIELDS)
+        self.assertEqual([len(one.frames) for one in parts], [18, 3])
+        gyro, accel, at = failing_log.written(parts[0], FIELDS)
+        self.assertEqual(FIELDS.get(gyro.payload, "In_Imu0Gyro", "AngZ"), 18)
+        self.assertEqual(FIELDS.get(accel.payload, "In_Imu0Accel", "VelZ"), -2100)
+        values = [FIELDS.get(at.payload, "In_Imu0Time", name) for name in ("Stamp", "Interval", "ClipGyro", "Temp", "Seq")]
+        self.assertEqual(values, [60_000, 60_000, 15, 6, 6])
+        self.assertEqual(failing_log.size_of(parts), len(failing_log.frames_of(parts, FIELDS)))
+
+    def test_samples_with_a_hole_between_are_not_joined(self):
+        parts = failing_log.joined(failing_log.units([*imu(1), *imu(2), *imu(5)], FIELDS), FIELDS)
+        self.assertEqual([len(one.frames) for one in parts], [6, 3])
+
+    def test_a_late_start_has_first_fixes_samples_that_level_and_the_pose(self):
+        parts = failing_log.late(failing_log.units(log(20), FIELDS), 15_000_000, (10.0, -4.0, 1.5), FIELDS)
+        early = [one for one in parts if one.time_us <= 15_000_000 - failing_log.LEVEL_us]
+        self.assertEqual([(one.kind, len(one.frames)) for one in early], [("Gnss", 2)] + [("Gnss", 4)] * 5)
+        pose, = [one for one in parts if one.kind == "Pose"]
+        position, heading = pose.frames
+        self.assertEqual([FIELDS.get(position.payload, "Cmd_SetPos", name) for name in ("Ctr", "X", "Y")], [2, 5000, -2000])
+        self.assertEqual([FIELDS.get(heading.payload, "Cmd_SetYaw", name) for name in ("Ctr", "Yaw")], [2, 30_000])
+        levelling = [one for one in parts[len(early):parts.index(pose)] if one.kind == "Imu0"]
+        self.assertEqual(len(levelling), 110)
+        self.assertTrue(all(one.time_us > 15_000_000 for one in parts[parts.index(pose) + 1:]))
+
+    def test_a_twin_is_the_frame_of_that_time_without_the_fault(self):
+        faulty, clean = imu(1, turn=77), imu(1)
+        part, = failing_log.units(faulty, FIELDS)
+        self.assertEqual(failing_log.written(part, FIELDS, failing_log.twin_in(clean, FIELDS)), clean)
+        self.assertEqual(failing_log.written(part, FIELDS, failing_log.twin_in([], FIELDS)), [])
+
+
+class Reasons(unittest.TestCase):
+    """A log of speeds. Those of 3 to 4 s are a fault, and the estimate is astray where the log has one of these."""
+
+    def setUp(self):
+        self.frames = [frame(100_000 * number, "In_BodySpeed", Forward=500 if 30 <= number < 40 else 5) for number in range(60)]
+        self.clean = [one._replace(payload=self.frames[0].payload) for one in self.frames]
+        self.parts = failing_log.units(self.frames, FIELDS)
+        self.shown = {True: ("unsafe", 3.2, 0.5), False: ("ok", None, 0.5)}  # by fault: verdict, begin of the error, ratio before
+
+    def look(self, frames, _):
+        verdict, begin, before = self.shown[any(one.payload != self.frames[0].payload for one in frames)]
+        at = np.arange(0, 6, swarm.TICK_S)
+        return verdict, {"astray_at_s": begin}, (at, np.where(at >= (begin or 6), 20.0, before))
+
+    def failure(self, without=()):
+        return failing_log.Failure(self.look, FIELDS, self.look(self.frames, None), None, (failing_log.twin_in(self.clean, FIELDS), None), without)
+
+    def test_a_part_with_the_fault_fails_alike_and_one_without_does_not(self):
+        failure = self.failure()
+        self.assertTrue(failure.holds(self.parts[39:41]))
+        self.assertFalse(failure.holds(self.parts[:30]))
+
+    def test_a_log_whose_error_begins_elsewhere_or_was_always_there_has_another_reason(self):
+        failure = self.failure()
+        for begin, before, holds in ((5.0, 0.5, True), (5.0, 2.0, False), (0.0, 0.5, False), (20.0, 0.5, False), (None, 0.5, False)):
+            self.shown[True] = ("unsafe", begin, before)
+            self.assertEqual(failure.holds(self.parts), holds, (begin, before))
+
+    def test_a_log_that_errs_without_the_fault_too_has_another_reason(self):
+        failure = self.failure()
+        for verdict, begin, before, holds in (("ok", 5.9, 0.5, True), ("ok", None, 2.0, False), ("ok", 3.0, 0.5, False), ("unsafe", 5.9, 0.5, False)):
+            self.shown[False] = (verdict, begin, before)
+            self.assertEqual(failure.holds(self.parts), holds, (verdict, begin, before))
+
+    def test_each_needed_fault_is_still_needed(self):
+        still_faulty = failing_log.twin_in(self.frames, FIELDS), None
+        self.assertFalse(self.failure([still_faulty]).holds(self.parts))
+
+    def test_shares_of_right_epochs_are_of_those_that_the_failing_log_knows(self):
+        at = np.array([1.0, 1.01, 1.02, 1.03])
+        failing, clean = (at, np.array([np.nan, 20, 20, 20])), (at[1:], np.array([0.5, 2, np.nan]))
+        self.assertAlmostEqual(failing_log.right_share(failing, clean), 1 / 3)
+        self.assertEqual(failing_log.right_share((at, np.full(4, np.nan)), clean), 0.0)
+
+
+class Structure(unittest.TestCase):
+    def test_goes_before_single_frames(self):
+        parts, tries = failing_log.units(log(30), FIELDS), []
+
+        def fails(some):
+            """Speeds of 25.0 to 25.5 s, and levelled samples before."""
+            tries.append(len(some))
+            frames = failing_log.frames_of(some, FIELDS)
+            speeds = [one.time_us for one in frames if one.identifier == FIELDS.identifier["In_BodySpeed"]]
+            samples = sum(FIELDS.get(one.payload, "In_Imu0Time", "Interval") for one in frames if one.identifier == FIELDS.identifier["In_Imu0Time"])
+            return sum(25_000_000 <= at < 25_500_000 for at in speeds) == 5 and samples >= 1_000_000
+
+        few = failing_log.shrunk(parts, FIELDS, fails, lambda _: (0.0, 0.0, 0.0), 25_500_000, 60)
+        self.assertEqual(failing_log.size_of(few), 5 + 3 * 17)
+        self.assertLess(max(tries[3:]), len(parts) / 3)
 
 
 if __name__ == "__main__":

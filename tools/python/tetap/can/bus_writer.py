@@ -4,6 +4,7 @@
 Little-endian signals in frames of eight bytes, as config/tetap.dbc has them; anything else is refused, not guessed.
 CRC-8 of protected messages: AUTOSAR E2E profile, CRC8H2F (polynomial 0x2F, initial value and final xor 0xFF).
 """
+import functools
 import os
 import re
 import sys
@@ -108,6 +109,12 @@ class Dbc:
     def value(self, table, name):
         """Number of a name in a value table."""
         return self.tables[table][name]
+
+
+@functools.lru_cache(maxsize=1)
+def default_dbc():
+    """The project's own DBC, read once: not to be changed."""
+    return Dbc()
 
 
 def _crc_table():

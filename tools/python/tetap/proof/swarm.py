@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Swarm testing of the node (Groce, Zhang, Eide, Chen, Regehr, "Swarm testing", ISSTA 2012): each seed draws which kinds of faults exist at all,
 so that kinds which hide each other are also tried without each other. Pairs of kinds, the judge of a run, and delta debugging (Zeller and
-Hildebrandt, "Simplifying and isolating failure-inducing input", IEEE TSE 28(2), 2002, figure 2) of a log that fails."""
+Hildebrandt, "Simplifying and isolating failure-inducing input", IEEE TSE 28(2), 2002), in sweeps."""
 import itertools
 import random
 import time
@@ -137,23 +137,34 @@ def longest(at, on):
     return best, first
 
 
-def judge(run, truth, faults=()):
-    """{safe, recovered, words[], ratio, valid_s}: `safe` is phase 1, `recovered` or `words` is phase 2."""
-    names = code_names()
+def run_times(rows, start_s=None):
+    """Seconds of a run for rows of it: by epoch, or by the node's time since `start_s` where a log is only a part of the run."""
+    return rows["epoch"] * TICK_S if start_s is None else rows["time_s"] - start_s
+
+
+def ratios(run, truth, start_s=None):
+    """(times, largest error of each epoch in its own 3 sigma; NaN: not valid or not known)."""
     rows = run.of(run.best)
     dx, dy, dyaw = errors(rows, truth)
-    at = rows["epoch"] * TICK_S
     held = HELD_S / TICK_S
     sigma = {name: held_at(rows["epoch"], rows[name], rows["epoch"], held) for name in ("std_x_m", "std_y_m", "std_yaw_rad")}
     with np.errstate(invalid="ignore", divide="ignore"):
         ratio = np.fmax(np.fmax(np.abs(dx) / (3 * sigma["std_x_m"]), np.abs(dy) / (3 * sigma["std_y_m"])), np.abs(dyaw) / (3 * sigma["std_yaw_rad"]))
+    return run_times(rows, start_s), np.where(np.isfinite(ratio), ratio, np.nan)
+
+
+def judge(run, truth, faults=(), start_s=None):
+    """{safe, recovered, words[], ratio, valid_s}: `safe` is phase 1, `recovered` or `words` is phase 2. `start_s`: as run_times() has it."""
+    names = code_names()
+    rows = run.of(run.best)
+    at, ratio = ratios(run, truth, start_s)
     known = np.isfinite(ratio)
     out = np.where(known, ratio, 0.0) > VALID_RATIO
     valid_s, begin = longest(at, out)
     finite = bool(np.isfinite(rows["x_m"][rows["pos_valid"] == 1]).all())
     last = (at >= FAULTS_UNTIL_S + SETTLED_S) & (at < DURATION_S)
     status = run.status
-    late = status["epoch"] * TICK_S >= FAULTS_UNTIL_S + SETTLED_S
+    late = run_times(status, start_s) >= FAULTS_UNTIL_S + SETTLED_S
     words = set()
     for mode, bits in zip(status["mode"][late], status["faults"][late]):
         words.add(names["Mode"].get(int(mode), f"mode {int(mode)}"))
@@ -177,21 +188,20 @@ def verdict(judged):
 
 
 def shrunk(items, fails, seconds, clock=time.monotonic):
-    """Delta debugging: a part of `items` that fails(part) still holds for, and from which no chunk of the last size can be taken. `fails` is called
-    until `seconds` are over."""
-    end, chunks = clock() + seconds, 2
-    while len(items) >= 2 and clock() < end:
-        size = -(-len(items) // chunks)
-        starts = range(0, len(items), size)
-        for start in starts:
+    """Delta debugging in sweeps: a part of `items` that fails(part) still holds for, and from which no single item can be taken. Each sweep goes on behind
+    a chunk that was taken, and the next one has chunks of half the size. `fails` is called until `seconds` are over."""
+    end, size = clock() + seconds, max(len(items) // 2, 1)
+    while len(items) > 1:
+        start, before = 0, len(items)
+        while start < len(items):
             if clock() >= end:
                 return items
             rest = items[:start] + items[start + size:]
             if rest and fails(rest):
-                items, chunks = rest, max(chunks - 1, 2)
-                break
-        else:
-            if size == 1:
-                break
-            chunks = min(2 * chunks, len(items))
+                items = rest
+            else:
+                start += size
+        if size == 1 and len(items) == before:
+            break
+        size = max(size // 2, 1)
     return items

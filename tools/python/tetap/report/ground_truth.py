@@ -53,14 +53,18 @@ class Truth:
             known = np.flatnonzero(np.isfinite(true_s))
             # A clock that jumps does so after the start: the first common epoch shows whose run it is.
             if len(known) > 0 and abs(rows["time_s"][known[0]] - true_s[known[0]]) > MOST_APART_S and np.isfinite(self.at(rows["time_s"])[0]).any():
-                other = copy.copy(self)
-                other._rows = self._rows.without("epoch")
-                other.has_more = False
-                return other
+                return self.by_time()
         if not np.isfinite(self.of(rows)[0]).any():
             raise BadInput(f"{self.path}: no row meets an estimate: the truth is of {self.time_s[0]:.6f} to {self.time_s[-1]:.6f} s, the node's time "
                            f"(that of In_Sync, else of the log) of {rows['time_s'].min():.6f} to {rows['time_s'].max():.6f} s")
         return self
+
+    def by_time(self):
+        """The same, paired by time alone."""
+        other = copy.copy(self)
+        other._rows = self._rows.without("epoch")
+        other.has_more = False
+        return other
 
     def since(self, start):
         """The same, with times counted from `start` [s]."""

@@ -34,7 +34,7 @@ STATES = ["epoch", "time_s", "estimator", *Q, *VELOCITY, "height_m", "std_height
 
 def code_names():
     """Names of the bus's enumerations, by table and number, as the DBC has them."""
-    return {table: {code: name for name, code in codes.items()} for table, codes in bus_writer.Dbc().tables.items()}
+    return {table: {code: name for name, code in codes.items()} for table, codes in bus_writer.default_dbc().tables.items()}
 
 
 def limits(message, signal):

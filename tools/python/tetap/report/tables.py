@@ -126,7 +126,7 @@ def _read(file, path, columns, also):
         raise BadInput(f"{path}:{line}: no column {missing[0]!r}")
     found = {name: Column() for name in [*columns, *also] if name in names}
     line += 1
-    tables = bus_writer.Dbc().tables
+    tables = bus_writer.default_dbc().tables
     codes = [tables.get(ENUMERATIONS.get(name), {}) for name in names]
     for body in _blocks(file):
         values = _parse(body, codes)
