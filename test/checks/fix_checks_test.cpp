@@ -212,13 +212,13 @@ TEST(PositionDrift, AVelocityVouchesForAFewFixes) {
   PositionDrift fixes;
   EXPECT_FALSE(fixes.consume_velocity_agreement()) << "none was heard";
   fixes.velocity(true);
-  for (int i = 0; i < 5; ++i) EXPECT_TRUE(fixes.consume_velocity_agreement()) << "one a second, fixes five: " << i;
+  for (int i = 0; i < 8; ++i) EXPECT_TRUE(fixes.consume_velocity_agreement()) << "one a second, fixes eight: " << i;
   fixes.velocity(false);
   EXPECT_FALSE(fixes.consume_velocity_agreement());
   fixes.velocity(true);
   int vouched = 0;
   while (vouched < 100 && fixes.consume_velocity_agreement()) ++vouched;
-  EXPECT_LT(vouched, 20) << "it has ended";
+  EXPECT_LT(vouched, 16) << "it has ended";
   fixes.velocity(true);
   fixes.reset();
   EXPECT_FALSE(fixes.consume_velocity_agreement());

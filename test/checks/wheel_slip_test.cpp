@@ -166,6 +166,32 @@ TEST(WheelSlip, TheSlipThatWheelsAlwaysHaveIsNone) {
   }
 }
 
+/// A fast robot: the slip that wheels always have is larger than the fixed part.
+TEST(WheelSlip, AllowsThreeSigmaOfTheUsualSlipAndNotFive) {
+  for (const float sigmas : {3.0F, 5.0F}) {
+    Drive d;
+    d.forward_mps = 10;
+    const float apart_mps = d.n.slip_mps + sigmas * d.n.slip_share * d.forward_mps;
+    d.left_slip_mps = -0.5F * apart_mps;
+    d.right_slip_mps = 0.5F * apart_mps;
+    for (int i = 0; i < 100; ++i) d.step();
+    EXPECT_EQ(d.watch.slip() != Slip::kNone, sigmas > 4) << sigmas;
+  }
+}
+
+TEST(WheelSlip, AllowsTwoSigmaOfTheVelocityOverGroundAndNotFour) {
+  for (const float sigmas : {2.0F, 4.0F}) {
+    Drive d;
+    d.filter_follows = true;
+    constexpr float kSigma_mps = 0.3F;
+    d.left_slip_mps = d.right_slip_mps = d.n.slip_mps + 4 * d.n.slip_share * d.forward_mps + sigmas * kSigma_mps;
+    d.step();
+    EXPECT_FALSE(d.gnss(kSigma_mps));
+    d.until(Slip::kBoth, 0.2);
+    EXPECT_EQ(d.gnss(kSigma_mps), sigmas > 3) << sigmas;
+  }
+}
+
 TEST(WheelSlip, AVelocityThatIsNotKnownJudgesOneWheelByTheOtherOnly) {
   Drive d;
   d.sigma_mps = 1;
