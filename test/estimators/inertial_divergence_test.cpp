@@ -47,6 +47,32 @@ TEST(InertialDivergence, AWrongHeadingIsNotFlownAwayWith) {
   }
 }
 
+/// No sensor for five seconds, and a turn meanwhile: the heading is uncertain by more than half a radian. The first
+/// velocity that goes elsewhere begins the estimator anew. Fused, it would turn the heading by a part and make it sure.
+TEST(InertialDivergence, ATurnThatNoSensorSawBeginsAnewAtOnce) {
+  for (const double turned_rad : {-2.6, -1.8, 1.8, 2.2, 3.1}) {
+    Drive d(rover_like());
+    d.speed_mps = 2;
+    d.place();
+    d.run(30);
+    d.turn_radps = turned_rad / 5;
+    d.silent = true;
+    d.run(5);
+    d.turn_radps = 0.05;
+    d.silent = false;
+    d.clear();
+    d.run(0.5);
+    EXPECT_EQ(d.estimator.jump().count, 1) << turned_rad;
+    EXPECT_EQ(d.estimator.jump().cause, sensor::ResetCause::kHeadingWrong) << turned_rad;
+    d.run(2.5);
+    EXPECT_EQ(d.estimator.mode(d.ctx()), sensor::Mode::kNominal) << turned_rad;
+    EXPECT_LT(d.yaw_error_rad(), 0.1) << turned_rad;
+    EXPECT_LT(d.worst_sigmas, 4.0) << turned_rad;
+    d.run(27);
+    EXPECT_EQ(d.estimator.jump().count, 1) << turned_rad << ": once";
+  }
+}
+
 /// Both wheels turn otherwise than the gyroscope shows. The heading is as uncertain as the two are apart.
 TEST(InertialDivergence, AGyroscopeThatBothWheelsContradictMakesTheHeadingUncertain) {
   for (const double bias_radps : {0.5, -0.5, -1.0}) {

@@ -73,6 +73,7 @@ class Drive {
   double left_slip_mps = 0;    ///< the left wheel is so much faster than the ground below it
   std::int64_t gnss_every_us = 200'000, speedometer_every_us = 10'000;
   bool wheels = true, speedometer = false, gnss_velocity = true;
+  bool silent = false;  ///< the rover drives on, and no sensor's samples come
   /// Effect of the world on a fix; false: it does not come.
   struct Fix {
     double east_m = 0, north_m = 0, up_m = 0;
@@ -142,18 +143,18 @@ class Drive {
                                               gravity_mps2_ * static_cast<float>(dt) + shake(5e-4)},
                           .interval_us = kStep_us};
     tamper_imu(imu);
-    last_imu = estimator.fuse(imu, {us}, ctx());
+    if (!silent) last_imu = estimator.fuse(imu, {us}, ctx());
     if (wheels) {
       const double per_m = 20'000 / (2 * 3.14159265358979 * 0.1);
       left_ += (speed_mps - 0.25 * turn_radps + left_slip_mps) * dt * per_m;
       right_ += (speed_mps + 0.25 * turn_radps) * dt * per_m;
-      estimator.fuse(sensor::WheelCounts{static_cast<std::uint16_t>(std::llround(left_)),
-                                         static_cast<std::uint16_t>(std::llround(right_))},
-                     {us}, ctx());
+      const sensor::WheelCounts counts{static_cast<std::uint16_t>(std::llround(left_)),
+                                       static_cast<std::uint16_t>(std::llround(right_))};
+      if (!silent) estimator.fuse(counts, {us}, ctx());
     }
-    if (speedometer && (us - kBegin_us) % speedometer_every_us == 0)
+    if (!silent && speedometer && (us - kBegin_us) % speedometer_every_us == 0)
       estimator.fuse(sensor::BodySpeed{.forward_mps = static_cast<float>(speed_mps)}, {us}, ctx());
-    if ((us - kBegin_us) % gnss_every_us == 0) receive();
+    if (!silent && (us - kBegin_us) % gnss_every_us == 0) receive();
     estimator.advance({us}, ctx(), {});
     const InertialEstimate now = estimator.inertial(ctx());
     now_ = {.state = now.state, .p = now.p, .valid = now.valid};

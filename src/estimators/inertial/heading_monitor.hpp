@@ -55,10 +55,13 @@ class HeadingMonitor {
   [[nodiscard]] bool heading_wrong(const FilterView& filter) {
     return persists(contradicted_by_motion(filter), filter);
   }
-  /// Wheels show a wrong heading: receiver and wheels agree on a speed, but not on its direction in the body.
+  /// Wheels show a wrong heading: receiver and wheels agree on a speed, but not on its direction in the body. Once is
+  /// enough for a heading that is uncertain by as much: an update turns it by a part, and makes it sure.
   [[nodiscard]] bool direction_wrong(const nav::Vector3& v_b_mps, float level_mps, float sigma_mps,
                                      const FilterView& filter) {
-    return persists(sideways(v_b_mps, level_mps, sigma_mps, filter), filter);
+    const bool contradicted = sideways(v_b_mps, level_mps, sigma_mps, filter);
+    const bool uncertain = 1.0F - 0.5F * filter.heading_rad2() < kAhead;
+    return persists(contradicted, filter) || (contradicted && uncertain);
   }
 
   /// The motion's heading survives a restart of the filter.
@@ -78,6 +81,8 @@ class HeadingMonitor {
   }
 
  private:
+  static constexpr float kAhead = 0.88F;  ///< cosine of half a radian
+
   [[nodiscard]] bool contradicted_by_motion(const FilterView& filter) const;
   [[nodiscard]] static bool sideways(const nav::Vector3& v_b_mps, float level_mps, float sigma_mps,
                                      const FilterView& filter);
@@ -108,12 +113,11 @@ class HeadingMonitor {
 /// Nothing drives half a radian sideways: where receiver and wheels agree on the speed, the filter's heading is wrong.
 [[gnu::noinline]] inline bool HeadingMonitor::sideways(const nav::Vector3& v_b_mps, float level_mps, float sigma_mps,
                                                        const FilterView& filter) {
-  constexpr float kCosine = 0.88F;
   const float wheels = filter.recent_forward_mps();
   const float forward = wheels < 0.0F ? -v_b_mps(0) : v_b_mps(0);
   return level_mps > 4.0F * sigma_mps + 0.3F &&
          base::abs(level_mps - base::abs(wheels)) < 3.0F * sigma_mps + 0.05F * level_mps &&
-         forward < kCosine * level_mps - sigma_mps;
+         forward < kAhead * level_mps - sigma_mps;
 }
 
 }  // namespace tetap::estimators
