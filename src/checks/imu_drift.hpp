@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Drift of the IMU: level velocity that measurements took out of what the IMU made of late. Innovations of one sign for
+// Drift of the IMU: velocity that measurements took out of what the IMU made of late. Innovations of one sign for
 // seconds pass every gate, and add up here. A sound IMU's corrections are independent of each other (Kailath 1968, IEEE
 // TAC 13(6)), so their sum is as large as its variance. An error that began makes it grow: Willsky and Jones 1976, IEEE
 // TAC 21(1).
@@ -13,39 +13,47 @@ namespace tetap::checks {
 
 class ImuDrift {
  public:
-  /// Tests the corrections of late. `lasting_m2ps2` is the filter's variance of the level velocity: errors that
-  /// measurements have in common are in no correction's variance. `scale` is that of the innovation gates.
-  [[nodiscard]] bool test(const nav::LevelCorrection& sum, float lasting_m2ps2, float scale) {
-    const float energy = sum.east_mps * sum.east_mps + sum.north_mps * sum.north_mps;
-    const bool beyond = energy > kGate * scale * (sum.variance_m2ps2 + lasting_m2ps2);
-    const bool drifts = beyond && beyond_;  // a leap is gone by the second test
-    beyond_ = beyond && !drifts;
+  /// Axes along which measurements contradict the IMU.
+  struct Drift {
+    bool level = false, up = false;
+  };
+  /// Tests the corrections of late. Each variance [m2/s2] is the filter's, of both level axes and along up: errors that
+  /// measurements have in common are in no correction's variance. `scale` is that of the innovation gates, level alone.
+  [[nodiscard]] Drift test(const nav::VelocityCorrection& sum, float level_m2ps2, float up_m2ps2, float scale) {
+    const float level2 = sum.east_mps * sum.east_mps + sum.north_mps * sum.north_mps;
+    const bool level = level2 > kGate * scale * (sum.level_m2ps2 + level_m2ps2);
+    const bool up = sum.up_mps * sum.up_mps > kGate * (sum.up_m2ps2 + up_m2ps2);
+    const Drift drift{.level = level && level_, .up = up && up_};  // a leap is gone by the second test
+    level_ = level && !drift.level;
+    up_ = up && !drift.up;
     if (shown_ > 0) --shown_;
-    if (drifts) shown_ = kShown;
-    return drifts;
+    if (drift.level || drift.up) shown_ = kShown;
+    return drift;
   }
   /// Corrections fade with a time constant of a second.
-  static void fade(nav::LevelCorrection& sum, float since_s) {
+  static void fade(nav::VelocityCorrection& sum, float since_s) {
     const float keep = since_s < kFade_s ? 1.0F - since_s / kFade_s : 0.0F;
     sum.east_mps *= keep;
     sum.north_mps *= keep;
-    sum.variance_m2ps2 *= keep * keep;
+    sum.level_m2ps2 *= keep * keep;
+    sum.up_mps *= keep;
+    sum.up_m2ps2 *= keep * keep;
   }
   /// Measurements contradicted the IMU in one of the last tests.
   [[nodiscard]] bool shown() const { return shown_ > 0; }
 
   template <class Sink>
   void hash_state(Sink&& sink) const {
-    sink(static_cast<std::uint32_t>(shown_ | (beyond_ ? 256U : 0U)));
+    sink(static_cast<std::uint32_t>(shown_ | (level_ ? 256U : 0U) | (up_ ? 512U : 0U)));
   }
 
  private:
   static constexpr float kFade_s = 1;        ///< time constant of what corrections leave in the sum
-  static constexpr float kGate = 3;          ///< squared sum in its variance along both axes
+  static constexpr float kGate = 3;          ///< squared sum in its variance
   static constexpr std::uint8_t kShown = 5;  ///< tests, one to two seconds
 
-  std::uint8_t shown_ = 0;  ///< tests for which the last drift is still shown
-  bool beyond_ = false;     ///< the last test's sum was too large
+  std::uint8_t shown_ = 0;           ///< tests for which the last drift is still shown
+  bool level_ = false, up_ = false;  ///< the last test's sum was too large
 };
 
 }  // namespace tetap::checks

@@ -26,10 +26,12 @@ struct InsNoise {
   float motion_sigma = 3;  ///< sigmas of the accelerometer's noise beyond which its readings are motion
 };
 
-/// Corrections of the level velocity by measurements, summed, and the variance of that sum along both axes. Corrections
-/// are independent of each other, and each has the variance that its measurement takes out of P (Kailath 1968).
-struct LevelCorrection {
-  float east_mps = 0, north_mps = 0, variance_m2ps2 = 0;
+/// Corrections of the velocity by measurements, summed, and the variances of that sum: of both level axes, and along
+/// up. Corrections are independent of each other, and each has the variance that its measurement takes out of P
+/// (Kailath 1968).
+struct VelocityCorrection {
+  float east_mps = 0, north_mps = 0, up_mps = 0;
+  float level_m2ps2 = 0, up_m2ps2 = 0;
 };
 
 class Ins {
@@ -48,7 +50,7 @@ class Ins {
   Vector3 accel_n_mps2 = Vector3::Zero();
 
   /// Corrections of late: whoever tests them lets them fade.
-  LevelCorrection corrected{};
+  VelocityCorrection corrected{};
 
   /// Part of the state's time that the covariance does not have yet.
   [[nodiscard]] float pending_s() const { return pending_.dt_s; }
@@ -213,7 +215,9 @@ class Ins {
     turned_.hash_state(sink);
     sink(corrected.east_mps);
     sink(corrected.north_mps);
-    sink(corrected.variance_m2ps2);
+    sink(corrected.level_m2ps2);
+    sink(corrected.up_mps);
+    sink(corrected.up_m2ps2);
     for (int i = 0; i < 3; ++i) {
       sink(pending_.dv_n_mps(i));
       for (int k = 0; k < 3; ++k) sink(pending_.r_dt(i, k));
@@ -233,7 +237,8 @@ class Ins {
                                                                                   float gate) {
     constexpr int kM = Measurement::kDimension, kYaw = InsState::kAttitude + 2;
     [[maybe_unused]] const float yaw_rad2 = p(kYaw, kYaw);
-    corrected.variance_m2ps2 += level_m2ps2();  // not kept beside: this path is the deepest on the stack
+    corrected.up_m2ps2 += p(InsState::kVelocityUp, InsState::kVelocityUp);
+    corrected.level_m2ps2 += level_m2ps2();  // not kept beside: this path is the deepest on the stack
     filter::SparseUpdate<float, kErrors, kM> result;
     constexpr int kColumns = static_cast<int>(Measurement::kTouches.size());
     bool rest = !filter::Direct<Measurement> || kColumns > kM;
@@ -249,7 +254,8 @@ class Ins {
     } else if constexpr (filter::Direct<Measurement>) {
       direct_update(measurement, gate, result);
     }
-    corrected.variance_m2ps2 -= level_m2ps2();
+    corrected.level_m2ps2 -= level_m2ps2();
+    corrected.up_m2ps2 -= p(InsState::kVelocityUp, InsState::kVelocityUp);
     if (result.innovation.verdict != filter::Verdict::kAccepted) return result.innovation;
     // Measurements of biases alone leave the scale's share in the heading; measurements in the body show no heading.
     constexpr bool kObservesHeading = std::any_of(Measurement::kTouches.begin(), Measurement::kTouches.end(),
@@ -261,6 +267,7 @@ class Ins {
     x.correct(result.dx);
     corrected.east_mps += result.dx(InsState::kVelocity);
     corrected.north_mps += result.dx(InsState::kVelocity + 1);
+    corrected.up_mps += result.dx(InsState::kVelocityUp);
     if constexpr (kInBody)
       if (measurement.moves) held_ = kHeld;
     if (held_ > 0) move_errors(result.dx.template segment<3>(InsState::kVelocity));

@@ -132,20 +132,26 @@ void Inertial::follow_level(const Context& ctx) {
                                                       : growth * n.gap_radps);
 }
 
-/// Measurements contradict the IMU for long: tilt and biases are as uncertain as what explains it.
+/// Measurements contradict the IMU for long: tilt, biases and climb are as uncertain as what explains it.
 [[gnu::noinline]] void Inertial::judge_drift(base::Micros since, const param::Parameters& n) {
-  constexpr int kEast = nav::InsState::kVelocity, kNorth = kEast + 1;
+  constexpr int kEast = nav::InsState::kVelocity, kNorth = kEast + 1, kUp = nav::InsState::kVelocityUp;
   const float fixes = n.gnss.gate_scale, wheels = n.inertial.wheel_gate_scale;
-  nav::LevelCorrection& sum = ins_.corrected;
+  nav::VelocityCorrection& sum = ins_.corrected;
   const float lasting_m2ps2 = ins_.p(kEast, kEast) + ins_.p(kNorth, kNorth);
   constexpr float kKnown_m2ps2 = 1;  // beyond, a heading is being found: corrections are not linear
   if (lasting_m2ps2 > kKnown_m2ps2) sum = {};
-  if (imu_.drift().test(sum, lasting_m2ps2, fixes > wheels ? fixes : wheels)) {
+  const checks::ImuDrift::Drift drift =
+      imu_.drift().test(sum, lasting_m2ps2, ins_.p(kUp, kUp), fixes > wheels ? fixes : wheels);
+  if (drift.level) {
     constexpr float kRate_hz = 2;  // a sum that has not faded yet is of half a second
     Recovery::widen_imu(ins_, kRate_hz * sum.east_mps, kRate_hz * sum.north_mps);
-    sum = {};
-    predictor_.note_correction();
+    sum.east_mps = sum.north_mps = sum.level_m2ps2 = 0;
   }
+  if (drift.up) {
+    Recovery::widen_climb(ins_, sum.up_mps, 0);
+    sum.up_mps = sum.up_m2ps2 = 0;
+  }
+  if (drift.level || drift.up) predictor_.note_correction();
   checks::ImuDrift::fade(sum, base::seconds(since));
 }
 

@@ -39,6 +39,8 @@ class Recovery {
   static void widen_turn(nav::Ins& ins, float sigma_rad);
   /// Verb 1 by a cause: the IMU shows an acceleration that is not there. A tilt of the last second makes it, or a bias.
   static void widen_imu(nav::Ins& ins, float east_mps2, float north_mps2);
+  /// Verb 1 by a cause: climb and height are off, by an error of the accelerometer along the plumb line.
+  static void widen_climb(nav::Ins& ins, float climb_mps, float height_m);
   static void inflate_heading(nav::Ins& ins, float variance_rad2) {
     ins.inflate_up(nav::InsState::kAttitude, variance_rad2);
   }
@@ -88,7 +90,6 @@ class Recovery {
   void widen(const Assessment& a, nav::Ins& ins, base::Micros stamp, const param::InertialParameters& n);
   static void widen_velocity(nav::Ins& ins, const nav::Vector3& nu, float since_s);
   static void widen_position(nav::Ins& ins, const nav::Vector3& nu, float since_s);
-  static void widen_climb(nav::Ins& ins, float climb_mps, float height_m);
   [[nodiscard]] static std::array<float, 2> tilt_of(float east_mps2, float north_mps2, float gravity_mps2);
 
   Jump jump_;
