@@ -34,6 +34,11 @@ struct VelocityCorrection {
   float level_m2ps2 = 0, up_m2ps2 = 0;
 };
 
+struct InsCounters {
+  std::uint16_t held = 0;         ///< time for which the velocity is held in the body, in 0.1 ms
+  std::uint16_t conditioned = 0;  ///< times that the covariance had to be put right
+};
+
 class Ins {
  public:
   static constexpr int kErrors = InsState::kErrors;
@@ -81,7 +86,7 @@ class Ins {
     if (step.keep_b_g < 1.0F) x.b_g_radps *= step.keep_b_g;
     if (noise.motion_sigma > 0.0F) shrink_motion(step);
     const auto passed = static_cast<std::uint16_t>(pending_.dt_s < 1.0F ? pending_.dt_s * kHeldPerS : kHeld);
-    held_ = held_ > passed ? static_cast<std::uint16_t>(held_ - passed) : std::uint16_t{0};
+    counters_.held = counters_.held > passed ? static_cast<std::uint16_t>(counters_.held - passed) : std::uint16_t{0};
     inflate_vertical_bias(step.dt_s);
     nav::predict_covariance(p, step);
     pending_ = {};
@@ -211,7 +216,7 @@ class Ins {
     for (const float v : p.packed()) sink(v);
     sink(pending_.dt_s);
     sink(pending_.shown_rad);
-    sink(std::uint32_t{held_});
+    sink(std::uint32_t{counters_.held});
     turned_.hash_state(sink);
     sink(corrected.east_mps);
     sink(corrected.north_mps);
@@ -228,7 +233,7 @@ class Ins {
   }
 
   /// How often the covariance had to be put right (see condition()).
-  [[nodiscard]] std::uint32_t conditioned() const { return conditioned_; }
+  [[nodiscard]] std::uint32_t conditioned() const { return counters_.conditioned; }
 
  private:
   /// Apart from the prediction, so that the two are not on the stack together.
@@ -269,8 +274,8 @@ class Ins {
     corrected.north_mps += result.dx(InsState::kVelocity + 1);
     corrected.up_mps += result.dx(InsState::kVelocityUp);
     if constexpr (kInBody)
-      if (measurement.moves) held_ = kHeld;
-    if (held_ > 0) move_errors(result.dx.template segment<3>(InsState::kVelocity));
+      if (measurement.moves) counters_.held = kHeld;
+    if (counters_.held > 0) move_errors(result.dx.template segment<3>(InsState::kVelocity));
     if ((result.sharp || turned) && !condition(p, condition_monitor_)) note_conditioned();
     return result.innovation;
   }
@@ -294,7 +299,7 @@ class Ins {
     pending_ = {};
     turned_ = {};
     stands = false;
-    held_ = 0;
+    counters_.held = 0;
     corrected = {};
     accel_n_mps2 = Vector3::Zero();
     return true;
@@ -349,7 +354,7 @@ class Ins {
   /// shrinks by the share of its energy that noise explains (James & Stein 1961). It does not shrink while v is held in
   /// the body. There the noise is taken back, and every single sample of a gentle curve passes for noise.
   void shrink_motion(InsCovarianceStep<float>& step) const {
-    if (held_ > 0 && !stands) return;
+    if (counters_.held > 0 && !stands) return;
     const Vector3 rest = (earth.gravity_mps2 * step.dt_s) * earth.up_n;
     const float east = step.dv_n_mps(0) - rest(0), north = step.dv_n_mps(1) - rest(1),
                 energy = east * east + north * north;
@@ -370,7 +375,7 @@ class Ins {
   }
 
   void note_conditioned() {
-    if (conditioned_ < 0xFFFF) ++conditioned_;
+    if (counters_.conditioned < 0xFFFF) ++counters_.conditioned;
   }
 
   /// Tilt and the accelerometer's bias belong together in the body, whatever the heading. The product g x tilt is what
@@ -441,11 +446,10 @@ class Ins {
   Pending pending_{};
   GyroScaleConsider turned_{};
   InsFactor condition_monitor_{};
-  /// `held_` after a measurement in the body while moving, in 0.1 ms: wheels may slip for a while.
+  /// InsCounters::held after a measurement in the body while moving, in 0.1 ms: wheels may slip for a while.
   static constexpr float kHeldPerS = 10'000.0F, kMostLeap_mps = 30;
   static constexpr std::uint16_t kHeld = 50'000;
-  std::uint16_t held_ = 0;         ///< time for which the velocity is held in the body, in 0.1 ms
-  std::uint16_t conditioned_ = 0;  ///< times that the covariance had to be put right
+  InsCounters counters_;
 };
 
 }  // namespace tetap::nav
