@@ -32,6 +32,8 @@ struct InsNoise {
 struct VelocityCorrection {
   float east_mps = 0, north_mps = 0, up_mps = 0;
   float level_m2ps2 = 0, up_m2ps2 = 0;
+
+  void clear_level() { east_mps = north_mps = level_m2ps2 = 0; }
 };
 
 struct InsCounters {

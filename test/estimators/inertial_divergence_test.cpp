@@ -73,6 +73,22 @@ TEST(InertialDivergence, ATurnThatNoSensorSawBeginsAnewAtOnce) {
   }
 }
 
+/// A pose with a heading that is known roughly, and as far off as stated: the estimator finds it, anew or not.
+TEST(InertialDivergence, AGivenHeadingThatIsKnownRoughlyIsFoundWithinSeconds) {
+  for (const double off_rad : {-0.9, -0.6, 0.0, 0.6, 0.9}) {
+    Drive d(rover_like());
+    d.speed_mps = 2;
+    d.yaw_rad += off_rad;
+    d.place(0, 0.1F, 0.8F);
+    d.yaw_rad -= off_rad;
+    d.run(10);
+    EXPECT_EQ(d.estimator.mode(d.ctx()), sensor::Mode::kNominal) << off_rad;
+    EXPECT_LT(d.yaw_error_rad(), 0.1) << off_rad;
+    EXPECT_LT(d.error_m(), 2.0) << off_rad;
+    EXPECT_LE(d.estimator.jump().count, 1) << off_rad;
+  }
+}
+
 /// Both wheels turn otherwise than the gyroscope shows. The heading is as uncertain as the two are apart.
 TEST(InertialDivergence, AGyroscopeThatBothWheelsContradictMakesTheHeadingUncertain) {
   for (const double bias_radps : {0.5, -0.5, -1.0}) {

@@ -52,13 +52,13 @@ class Drive {
     estimator.restart({us}, ctx());
   }
   /// Somebody says where it is.
-  void place(double off_m = 0, float sigma_m = 0.1F) {
+  void place(double off_m = 0, float sigma_m = 0.1F, float sigma_yaw_rad = 0.02F) {
     estimator.set_pose({us},
                        {.pose = {.x = base::Anchored{}.plus(static_cast<float>(east_m + off_m)),
                                  .y = base::Anchored{}.plus(static_cast<float>(north_m)),
                                  .yaw_rad = static_cast<float>(yaw_rad)},
                         .sigma_position_m = sigma_m,
-                        .sigma_yaw_rad = 0.02F},
+                        .sigma_yaw_rad = sigma_yaw_rad},
                        ctx());
   }
 

@@ -62,6 +62,7 @@ class Robot {
   double yaw_rate_radps = 0, acceleration_mps2 = 0;
   double declination_rad = 0;
   bool gnss = true, baro = true, magnetometer = true;
+  bool stuck_air = false;                         ///< the barometer repeats its last pressure
   bool gnss_places = true;                        ///< has positions beside velocities
   bool gnss_climbs = true;                        ///< says how fast it climbs; NMEA does not
   double receiver_climbs_mps = 0;                 ///< error of the receiver's climb rate
@@ -138,7 +139,8 @@ class Robot {
   void take_air() {
     const double altitude_m = 500 + up_m;
     const double pressure_Pa = 101325 * std::pow(1 - altitude_m / 44330.77, 1 / 0.1902632) + weather_Pa(time_s());
-    last_air = estimator.fuse(sensor::AirPressure{.pressure_Pa = narrow(pressure_Pa) + air_noise_(2)(0)}, {us}, ctx());
+    if (!stuck_air) shown_Pa_ = narrow(pressure_Pa) + air_noise_(2)(0);
+    last_air = estimator.fuse(sensor::AirPressure{.pressure_Pa = shown_Pa_}, {us}, ctx());
     ++airs;
     refused_airs += last_air.verdict == sensor::Verdict::kRejected;
   }
@@ -169,6 +171,7 @@ class Robot {
   static float narrow(double x) { return static_cast<float>(x); }
   std::int64_t us = kBegin_us;
   double climbed_mps_ = 0;
+  float shown_Pa_ = 0;
   Noise noise_{11}, field_noise_{12}, air_noise_{13};
 };
 
@@ -650,6 +653,23 @@ TEST(BarometerZero, counts_from_the_stamp_at_which_it_was_set) {
       EXPECT_LE(zero.known_for({stamp_us + later_us}).us, later_us + 1);
     }
   }
+}
+
+// The IMU alone carries the height, which a pressure that stands would hold back.
+TEST(InertialBarometer, is_left_out_while_it_repeats_its_pressure) {
+  Robot robot;
+  robot.n.baro.stuck_samples = 20;
+  drive(robot, 60);
+  robot.gnss = false;
+  climb(robot, 0.3);
+  robot.stuck_air = true;
+  drive(robot, 10);
+  EXPECT_EQ(robot.last_air.verdict, sensor::Verdict::kStale);
+  EXPECT_EQ(robot.last_air.failed, Check::kStuck);
+  EXPECT_LT(std::abs(robot.height_off_m()), 2.0);
+  robot.stuck_air = false;
+  drive(robot, 1);
+  EXPECT_NE(robot.last_air.verdict, sensor::Verdict::kStale);
 }
 
 TEST(InertialBarometer, does_not_take_a_silence_for_a_refusal) {

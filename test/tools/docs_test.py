@@ -280,6 +280,11 @@ class Generated(unittest.TestCase):
             os.remove(os.path.join(out, "count.json"))
             self.assertEqual(figures.page(out, first), first)
 
+    def test_figures_beside_objects_have_a_table_of_their_own(self):
+        page = figures.of_flat({"lives": 1086, "worst": 2.99, "attacks": {"drop": {"lives": 68}, "flip": {"lives": 67}}, "first": []})
+        self.assertIn("| lives | 1 086 |\n| worst | 2.99 |\n\n|  | lives |", page)
+        self.assertIn("| flip | 67 |", page)
+
     def test_every_estimator_of_the_filters_has_a_row_of_costs_and_every_row_a_header(self):
         """A header of src/filter is an estimator of the table, or a part that this list names."""
         parts = {"attitude_bias", "attitude_clipping", "attitude_heading", "attitude_options", "big_covariance", "condition", "correction", "covariance_access", "inverse",

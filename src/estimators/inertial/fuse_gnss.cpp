@@ -97,7 +97,8 @@ Innovation Inertial::fuse(const sensor::GnssVelocity& velocity, base::Micros sta
   compare_with_ground(z, filter);
   heading_monitor_.fuse_velocity(z.v_n_mps, z.sigma_mps, n);
   if (filter.wheels_timed_out() ? heading_monitor_.heading_wrong(filter)
-                                : heading_monitor_.direction_wrong(z.v_b_mps, z.level_mps(), z.sigma_mps, filter)) {
+                                : heading_monitor_.direction_wrong(z.v_b_mps, z.level_mps(), z.sigma_mps,
+                                                                   sources_.velocity.step_detected(), filter)) {
     restart_filter(stamp, sensor::ResetCause::kHeadingWrong, ctx);
     return {.verdict = sensor::Verdict::kRejected, .failed = Check::kHeading};
   }

@@ -56,12 +56,13 @@ class HeadingMonitor {
     return persists(contradicted_by_motion(filter), filter);
   }
   /// Wheels show a wrong heading: receiver and wheels agree on a speed, but not on its direction in the body. Once is
-  /// enough for a heading that is uncertain by as much: an update turns it by a part, and makes it sure.
-  [[nodiscard]] bool direction_wrong(const nav::Vector3& v_b_mps, float level_mps, float sigma_mps,
+  /// enough for a heading whose 1 sigma is half a radian: an update turns it by a part, and makes it sure. `leapt`: the
+  /// receiver's velocity stepped by itself, so that once shows nothing.
+  [[nodiscard]] bool direction_wrong(const nav::Vector3& v_b_mps, float level_mps, float sigma_mps, bool leapt,
                                      const FilterView& filter) {
     const bool contradicted = sideways(v_b_mps, level_mps, sigma_mps, filter);
     const bool uncertain = 1.0F - 0.5F * filter.heading_rad2() < kAhead;
-    return persists(contradicted, filter) || (contradicted && uncertain);
+    return persists(contradicted, filter) || (contradicted && uncertain && !leapt);
   }
 
   /// The motion's heading survives a restart of the filter.

@@ -117,19 +117,23 @@ void Inertial::follow_level(const Context& ctx) {
   ins_.earth.move_to(level_, ctx.map_frame.frame.curvature());
 }
 
-/// Clipped increments are used. They are as uncertain as none, and as half of what they show: a motion that is beyond
-/// the range by more shows more.
+/// Clipped increments are used. They are as uncertain as none, and as half of what they show: the range that the motion
+/// exceeds.
 [[gnu::noinline]] void Inertial::inflate_clipped(const sensor::ImuSample& sample, float dt_s,
                                                  const param::InertialParameters& n) {
   constexpr float kLost = 0.5F;
+  float lost_mps2 = n.gap_mps2, lost_radps = 0;
+  if (sample.clipped_accel > 0) {
+    const float half_mps2 = kLost * base::sqrt(ins_.accel_n_mps2.squaredNorm());
+    lost_mps2 = half_mps2 > n.gap_mps2 ? half_mps2 : n.gap_mps2;
+    ins_.accel_n_mps2 = nav::Vector3::Zero();
+  }
+  if (sample.clipped_gyro > 0) {
+    const float half_radps = kLost * base::sqrt(imu_.rate_b_radps().squaredNorm());
+    lost_radps = half_radps > n.gap_radps ? half_radps : n.gap_radps;
+  }
   const float growth = base::sqrt(dt_s * 0.1F);
-  const float lost_mps2 = kLost * base::sqrt(ins_.accel_n_mps2.squaredNorm());
-  const float lost_radps = kLost * base::sqrt(imu_.rate_b_radps().squaredNorm());
-  if (sample.clipped_accel > 0) ins_.accel_n_mps2 = nav::Vector3::Zero();
-  Recovery::inflate_motion(ins_, growth * (lost_mps2 > n.gap_mps2 ? lost_mps2 : n.gap_mps2),
-                           sample.clipped_gyro == 0   ? 0.0F
-                           : lost_radps > n.gap_radps ? growth * lost_radps
-                                                      : growth * n.gap_radps);
+  Recovery::inflate_motion(ins_, lost_mps2 * growth, lost_radps * growth);
 }
 
 /// Measurements contradict the IMU for long: tilt, biases and climb are as uncertain as what explains it.
@@ -139,13 +143,13 @@ void Inertial::follow_level(const Context& ctx) {
   nav::VelocityCorrection& sum = ins_.corrected;
   const float lasting_m2ps2 = ins_.p(kEast, kEast) + ins_.p(kNorth, kNorth);
   constexpr float kKnown_m2ps2 = 1;  // beyond, a heading is being found: corrections are not linear
-  if (lasting_m2ps2 > kKnown_m2ps2) sum = {};
+  if (lasting_m2ps2 > kKnown_m2ps2) sum.clear_level();
   const checks::ImuDrift::Drift drift =
       imu_.drift().test(sum, lasting_m2ps2, ins_.p(kUp, kUp), fixes > wheels ? fixes : wheels);
   if (drift.level) {
     constexpr float kRate_hz = 2;  // a sum that has not faded yet is of half a second
     Recovery::widen_imu(ins_, kRate_hz * sum.east_mps, kRate_hz * sum.north_mps);
-    sum.east_mps = sum.north_mps = sum.level_m2ps2 = 0;
+    sum.clear_level();
   }
   if (drift.up) {
     Recovery::widen_climb(ins_, sum.up_mps, 0);

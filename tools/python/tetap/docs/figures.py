@@ -41,8 +41,12 @@ def of_count(count):
 
 
 def of_flat(rows):
-    """A list of objects with the same keys, or an object of numbers and objects."""
+    """A list of objects with the same keys, or an object of numbers and objects. Values beside objects are a table of their own."""
     if isinstance(rows, dict):
+        values = {name: value for name, value in rows.items() if not isinstance(value, (dict, list))}
+        inner = [value for value in rows.values() if isinstance(value, (dict, list)) and any(isinstance(one, dict) for one in (value.values() if isinstance(value, dict) else value))]
+        if values and inner and len(values) < len(rows):
+            return "\n\n".join([of_flat(values), *map(of_flat, inner)])
         rows = [{"": name, **(value if isinstance(value, dict) else {"value": value})} for name, value in rows.items()]
     rows = [one for one in rows if isinstance(one, dict)]
     keys = [key for key in dict.fromkeys(key for one in rows for key in one) if not any(isinstance(one.get(key), (dict, list)) for one in rows)]
