@@ -89,7 +89,7 @@ costs: setup ## each filter: accuracy on one scenario, RAM, flash, stack, instru
 bits: setup ## the same bits from every compiler, option and core: 2^24 values, 100000 steps (some 8 minutes)
 	@tools/proof/compare_bits --whole
 
-soak: setup ## the node on a hostile bus: 10^8 frames, 24 h of robot time, in out/soak.json; goes on where it was interrupted
+soak: setup ## the node on a hostile bus: 10^8 frames and 24 h of robot time at least, in out/soak.json; goes on where it was interrupted
 	@tools/run/build_preset host:soak
 	@tools/proof/run_soak
 

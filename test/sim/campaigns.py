@@ -36,7 +36,7 @@ TOO_SURE_SHARE = 0.02  # of many seeds, for more than a second: the world is not
 # A right filter's share, rounded up: three axes with some three independent errors each in 200 s, of which 1 in 370 is beyond 3 sigma.
 START_TOO_SURE_SHARE = 0.03
 # What docs/validation/shortfalls.md says is not met: the share of the seeds that is too sure for more than a second, and how far an error goes beyond 3 sigma at the worst.
-# And what loses its place, is as far off afterwards as a receiver is, and says so: stamps that are wrong for all sensors end in a start without a place.
+# A robot that loses its place is as far off afterwards as a receiver is, and its status shows it. Stamps that are wrong for all sensors end in a start without a place.
 KNOWN_TOO_SURE = {"gyro_bias_step": (1, 5), "kidnapped": (1, 30), "stale_stamps": (START_TOO_SURE_SHARE, 1.25),
                   "future_stamps": (START_TOO_SURE_SHARE, 1.25), "clock_jump": (0, 1.25)}
 KNOWN_SLIP_WORST_M = 0.6

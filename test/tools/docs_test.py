@@ -282,7 +282,7 @@ class Generated(unittest.TestCase):
 
     def test_figures_beside_objects_have_a_table_of_their_own(self):
         page = figures.of_flat({"lives": 1086, "worst": 2.99, "attacks": {"drop": {"lives": 68}, "flip": {"lives": 67}}, "first": []})
-        self.assertIn("| lives | 1 086 |\n| worst | 2.99 |\n\n|  | lives |", page)
+        self.assertIn("| lives | 1 086 |\n| worst | 2.99 |\n\nattacks:\n\n|  | lives |", page)
         self.assertIn("| flip | 67 |", page)
 
     def test_every_estimator_of_the_filters_has_a_row_of_costs_and_every_row_a_header(self):

@@ -181,6 +181,13 @@ class Reasons(unittest.TestCase):
             self.shown[True] = ("unsafe", begin, before)
             self.assertEqual(failure.holds(self.parts), holds, (begin, before))
 
+    def test_a_silent_log_was_inside_before_wherever_its_worst_error_begins(self):
+        for first, then, before, holds in ((None, None, 0.5, True), (2.0, None, 0.5, True), (None, None, 2.0, False)):
+            self.shown[True] = ("silent", first, 0.5)
+            failure = self.failure()
+            self.shown[True] = ("silent", then, before)
+            self.assertEqual(failure.holds(self.parts), holds, (first, then, before))
+
     def test_a_log_that_errs_without_the_fault_too_has_another_reason(self):
         failure = self.failure()
         for verdict, begin, before, holds in (("ok", 5.9, 0.5, True), ("ok", None, 2.0, False), ("ok", 3.0, 0.5, False), ("unsafe", 5.9, 0.5, False)):

@@ -40,18 +40,27 @@ def of_count(count):
     return table(["workload", *cores], [[name, *[spaced(count[core].get(name, "-")) for core in cores]] for name in names])
 
 
+def holds_objects(value):
+    return isinstance(value, (dict, list)) and any(isinstance(one, dict) for one in (value.values() if isinstance(value, dict) else value))
+
+
+def shown(value):
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return f"{value:.4g}" if isinstance(value, float) else spaced(value)
+
+
 def of_flat(rows):
     """A list of objects with the same keys, or an object of numbers and objects. Values beside objects are a table of their own."""
     if isinstance(rows, dict):
         values = {name: value for name, value in rows.items() if not isinstance(value, (dict, list))}
-        inner = [value for value in rows.values() if isinstance(value, (dict, list)) and any(isinstance(one, dict) for one in (value.values() if isinstance(value, dict) else value))]
-        if values and inner and len(values) < len(rows):
-            return "\n\n".join([of_flat(values), *map(of_flat, inner)])
+        inner = [(name, value) for name, value in rows.items() if holds_objects(value)]
+        if values and inner:
+            return "\n\n".join([of_flat(values), *(f"{name}:\n\n{of_flat(value)}" for name, value in inner)])
         rows = [{"": name, **(value if isinstance(value, dict) else {"value": value})} for name, value in rows.items()]
     rows = [one for one in rows if isinstance(one, dict)]
     keys = [key for key in dict.fromkeys(key for one in rows for key in one) if not any(isinstance(one.get(key), (dict, list)) for one in rows)]
-    return table(keys, [[spaced(one[key]) if isinstance(one.get(key), int) else f"{one[key]:.4g}" if isinstance(one.get(key), float) else str(one.get(key, ""))
-                         for key in keys] for one in rows])
+    return table(keys, [[shown(one.get(key, "")) for key in keys] for one in rows])
 
 
 def of_times(text):

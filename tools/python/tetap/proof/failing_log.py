@@ -167,6 +167,8 @@ class Failure:
 
     def _begins_right(self, found):
         begin, (at, ratio) = found[1]["astray_at_s"], found[2]
+        if self._verdict != "unsafe":  # silent: outside in the end
+            return bool((ratio <= 1).any())
         if begin is None or self.begin_s is None:
             return begin is self.begin_s
         return abs(begin - self.begin_s) <= swarm.HURT_S and bool((ratio[at < begin] <= 1).any())
