@@ -30,15 +30,8 @@ class ImuDrift {
     if (drift.level || drift.up) shown_ = kShown;
     return drift;
   }
-  /// Corrections fade with a time constant of a second.
-  static void fade(nav::VelocityCorrection& sum, float since_s) {
-    const float keep = since_s < kFade_s ? 1.0F - since_s / kFade_s : 0.0F;
-    sum.east_mps *= keep;
-    sum.north_mps *= keep;
-    sum.level_m2ps2 *= keep * keep;
-    sum.up_mps *= keep;
-    sum.up_m2ps2 *= keep * keep;
-  }
+  /// Share of the corrections that a span leaves: they fade with a time constant of a second.
+  [[nodiscard]] static float keep(float since_s) { return since_s < kFade_s ? 1.0F - since_s / kFade_s : 0.0F; }
   /// Measurements contradicted the IMU in one of the last tests.
   [[nodiscard]] bool shown() const { return shown_ > 0; }
 

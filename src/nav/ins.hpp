@@ -34,6 +34,15 @@ struct VelocityCorrection {
   float level_m2ps2 = 0, up_m2ps2 = 0;
 
   void clear_level() { east_mps = north_mps = level_m2ps2 = 0; }
+  void clear_up() { up_mps = up_m2ps2 = 0; }
+  /// Keeps a share of the sums, and its square of their variances.
+  void fade(float keep) {
+    east_mps *= keep;
+    north_mps *= keep;
+    level_m2ps2 *= keep * keep;
+    up_mps *= keep;
+    up_m2ps2 *= keep * keep;
+  }
 };
 
 struct InsCounters {
@@ -234,6 +243,11 @@ class Ins {
     for (int i = 0; i < 3; ++i) sink(accel_n_mps2(i));
   }
 
+  /// Variance of the velocity in the level plane, of both axes [m2/s2].
+  [[nodiscard]] float level_m2ps2() const {
+    constexpr int kEast = InsState::kVelocity, kNorth = kEast + 1;
+    return p(kEast, kEast) + p(kNorth, kNorth);
+  }
   /// How often the covariance had to be put right (see condition()).
   [[nodiscard]] std::uint32_t conditioned() const { return counters_.conditioned; }
 
@@ -280,11 +294,6 @@ class Ins {
     if (counters_.held > 0) move_errors(result.dx.template segment<3>(InsState::kVelocity));
     if ((result.sharp || turned) && !condition(p, condition_monitor_)) note_conditioned();
     return result.innovation;
-  }
-
-  [[nodiscard]] float level_m2ps2() const {
-    constexpr int kEast = InsState::kVelocity, kNorth = kEast + 1;
-    return p(kEast, kEast) + p(kNorth, kNorth);
   }
 
   /// Apart from the update with a lever arm, so that the two are not on the stack together.

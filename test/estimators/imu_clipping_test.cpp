@@ -15,12 +15,11 @@ Worst watch(Drive& d, double for_s) {
   for (int i = 0; i < std::lround(100 * for_s); ++i) {
     d.run(0.01);
     const InertialEstimate now = d.estimator.inertial(d.ctx());
-    const auto sigma = [&now](int k) { return std::sqrt(static_cast<double>(now.p(k, k))); };
     const double east = d.speed_mps * std::cos(d.yaw_rad), north = d.speed_mps * std::sin(d.yaw_rad);
     const double off =
         std::hypot(static_cast<double>(now.state.v_n_mps(0)) - east, static_cast<double>(now.state.v_n_mps(1)) - north);
-    worst.velocity = std::max(worst.velocity, off / (3 * std::hypot(sigma(3), sigma(4))));
-    worst.heading = std::max(worst.heading, d.yaw_error_rad() / (3 * sigma(8)));
+    worst.velocity = std::max(worst.velocity, off / three_sigma(now, {3, 4}));
+    worst.heading = std::max(worst.heading, d.yaw_error_rad() / three_sigma(now, {8}));
   }
   return worst;
 }

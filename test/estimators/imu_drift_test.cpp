@@ -20,13 +20,12 @@ void watch(Drive& d, double for_s, Seen& seen) {
   for (int i = 0; i < std::lround(100 * for_s); ++i) {
     d.run(0.01);
     const InertialEstimate now = d.estimator.inertial(d.ctx());
-    const auto p = [&now](int k) { return 3 * std::sqrt(static_cast<double>(now.p(k, k))); };
     const nav::Vector3 up_b = now.state.q_nb.z_seen();
     const double tilt = std::hypot(static_cast<double>(up_b(0)), static_cast<double>(up_b(1)));
-    const double tilt_ratio = tilt / std::hypot(p(6), p(7));
+    const double tilt_ratio = tilt / three_sigma(now, {6, 7});
     seen.tilt_ratio = std::max(seen.tilt_ratio, tilt_ratio);
     seen.tilt_s += tilt_ratio > 1.5 ? 0.01 : 0;
-    const double climb_ratio = std::abs(static_cast<double>(now.state.v_n_mps(2))) / p(5);
+    const double climb_ratio = std::abs(static_cast<double>(now.state.v_n_mps(2))) / three_sigma(now, {5});
     seen.climb_ratio = std::max(seen.climb_ratio, climb_ratio);
     seen.climb_s += climb_ratio > 1.5 ? 0.01 : 0;
     seen.drift = seen.drift || d.estimator.sources(d.ctx()).of(sensor::Sensor::kImu).failed == Check::kDrift;
@@ -40,7 +39,6 @@ void watch(Drive& d, double for_s, Seen& seen) {
 Seen with_fault(std::size_t axis, float off, double for_s, double speed_mps) {
   Drive d = settled(rover_like());
   d.white_m = 0.3;
-  d.gnss_velocity = true;
   d.speed_mps = speed_mps;
   d.turn_radps = speed_mps > 0 ? d.turn_radps : 0;
   d.run(20);

@@ -12,6 +12,7 @@
 #include <cmath>
 #include <cstdint>
 #include <functional>
+#include <initializer_list>
 #include <random>
 #include <string>
 #include <utility>
@@ -219,6 +220,13 @@ class Drive {
     bool valid = false;
   } now_;
 };
+
+/// 3 sigma of some of the errors, as one length.
+inline double three_sigma(const InertialEstimate& of, std::initializer_list<int> errors) {
+  double variance = 0;
+  for (const int k : errors) variance += static_cast<double>(of.p(k, k));
+  return 3 * std::sqrt(variance);
+}
 
 /// A drive that has found itself.
 inline Drive settled(const param::Parameters& of = parameters(), unsigned seed = 1) {

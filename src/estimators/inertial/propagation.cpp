@@ -138,10 +138,10 @@ void Inertial::follow_level(const Context& ctx) {
 
 /// Measurements contradict the IMU for long: tilt, biases and climb are as uncertain as what explains it.
 [[gnu::noinline]] void Inertial::judge_drift(base::Micros since, const param::Parameters& n) {
-  constexpr int kEast = nav::InsState::kVelocity, kNorth = kEast + 1, kUp = nav::InsState::kVelocityUp;
+  constexpr int kUp = nav::InsState::kVelocityUp;
   const float fixes = n.gnss.gate_scale, wheels = n.inertial.wheel_gate_scale;
   nav::VelocityCorrection& sum = ins_.corrected;
-  const float lasting_m2ps2 = ins_.p(kEast, kEast) + ins_.p(kNorth, kNorth);
+  const float lasting_m2ps2 = ins_.level_m2ps2();
   constexpr float kKnown_m2ps2 = 1;  // beyond, a heading is being found: corrections are not linear
   if (lasting_m2ps2 > kKnown_m2ps2) sum.clear_level();
   const checks::ImuDrift::Drift drift =
@@ -153,10 +153,10 @@ void Inertial::follow_level(const Context& ctx) {
   }
   if (drift.up) {
     Recovery::widen_climb(ins_, sum.up_mps, 0);
-    sum.up_mps = sum.up_m2ps2 = 0;
+    sum.clear_up();
   }
   if (drift.level || drift.up) predictor_.note_correction();
-  checks::ImuDrift::fade(sum, base::seconds(since));
+  sum.fade(checks::ImuDrift::keep(base::seconds(since)));
 }
 
 /// Goes on without IMU: the velocity stays what it is in the body, which turns as the wheels show, or not at all.

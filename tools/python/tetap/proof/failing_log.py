@@ -143,6 +143,14 @@ def right_share(failing, clean):
     return float(np.mean([one in inside for one in known])) if len(known) else 0.0
 
 
+def begin_of(whole):
+    """Where a failure begins [s]: where the estimate left its uncertainty, or where it had to be right again."""
+    verdict, judged, _ = whole
+    if verdict == "unsafe" and judged["astray_at_s"] is not None:
+        return judged["astray_at_s"]
+    return swarm.FAULTS_UNTIL_S + swarm.SETTLED_S
+
+
 class Failure:
     """What a part of a log has to show: the verdict of the whole, at about the same time, of an estimate that was right before. The same frames without any
     fault keep the estimate inside 3 sigma, and without one of the needed faults they do not have the verdict.
@@ -151,8 +159,7 @@ class Failure:
 
     def __init__(self, look, fields, whole, truth, clean, without):
         self._look, self._fields, self._truth, self._clean, self._without = look, fields, truth, clean, without
-        self._verdict, self.begin_s = whole[0], whole[1]["astray_at_s"]
-        self.tries = 0
+        self._whole, self._verdict, self.tries = whole, whole[0], 0
 
     def holds(self, parts):
         self.tries += 1
@@ -166,12 +173,14 @@ class Failure:
         return not any(self._fails_alike(parts, twin, truth) for twin, truth in self._without)
 
     def _begins_right(self, found):
-        begin, (at, ratio) = found[1]["astray_at_s"], found[2]
+        at, ratio = found[2]
         if self._verdict != "unsafe":  # silent: outside in the end
             return bool((ratio <= 1).any())
-        if begin is None or self.begin_s is None:
-            return begin is self.begin_s
-        return abs(begin - self.begin_s) <= swarm.HURT_S and bool((ratio[at < begin] <= 1).any())
+        astray = [one[1]["astray_at_s"] is not None for one in (found, self._whole)]
+        if not all(astray):
+            return not any(astray)
+        begin_s = begin_of(found)
+        return abs(begin_s - begin_of(self._whole)) <= swarm.HURT_S and bool((ratio[at < begin_s] <= 1).any())
 
     def _fails_alike(self, parts, twin, truth):
         found = self._look(frames_of(parts, self._fields, twin), truth)
