@@ -39,7 +39,7 @@ function(tetap_image)
     target_link_options(${ARG_NAME} PRIVATE
       -Wl,--wrap=__aeabi_dadd -Wl,--wrap=__aeabi_dsub -Wl,--wrap=__aeabi_drsub)
   endif()
-  set_target_properties(${ARG_NAME} PROPERTIES OUTPUT_NAME ${ARG_OUTPUT} SUFFIX .elf LINK_DEPENDS ${script}
+  set_target_properties(${ARG_NAME} PROPERTIES OUTPUT_NAME ${ARG_OUTPUT} SUFFIX .elf LINK_DEPENDS "${script};${PROJECT_SOURCE_DIR}/hal/chip/stm32/sections.ld"
     RUNTIME_OUTPUT_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR})
   target_include_directories(${ARG_NAME} PRIVATE ${PROJECT_SOURCE_DIR}/src ${PROJECT_SOURCE_DIR})
   target_compile_options(${ARG_NAME} PRIVATE -fstack-usage -fcallgraph-info=su)
@@ -50,7 +50,7 @@ function(tetap_image)
   target_link_libraries(${ARG_NAME} PRIVATE tetap_flashed_flags ${ARG_LIBRARIES})
   # Of the C library only what the compiler itself calls (memcpy, memset, memmove, memcmp) can be linked: nothing supplies _sbrk, so
   # malloc fails to link, and libm is not there at all.
-  target_link_options(${ARG_NAME} PRIVATE -nostdlib -nostartfiles -T ${script} -Wl,--gc-sections -Wl,--print-memory-usage
+  target_link_options(${ARG_NAME} PRIVATE -nostdlib -nostartfiles -L ${PROJECT_SOURCE_DIR} -T ${script} -Wl,--gc-sections -Wl,--print-memory-usage
     -Wl,--fatal-warnings -Wl,-Map=${output}.map $<$<BOOL:${ARG_STACK}>:-Wl,--defsym=_stack_size=${ARG_STACK}>
     $<$<STREQUAL:${ARG_DATA},ddr>:-Wl,--defsym=_data_in_ddr=1> $<$<NOT:$<OR:$<STREQUAL:${ARG_DATA},>,$<STREQUAL:${ARG_DATA},ddr>>>:-Wl,--defsym=_data_size=${ARG_DATA}>
     $<$<BOOL:${ARG_OFFSET}>:-Wl,--defsym=_flash_offset=${ARG_OFFSET}>)

@@ -5,6 +5,7 @@
 #include "hal/chip/stm32/clock_tree.hpp"
 #include "hal/chip/stm32/encoder_timer.hpp"
 #include "hal/chip/stm32/gpio.hpp"
+#include "hal/chip/stm32/pll_plan_f4.hpp"
 #include "hal/chip/stm32/spi_master.hpp"
 #include "hal/chip/stm32/watchdog.hpp"
 
@@ -57,7 +58,8 @@ struct BlockRegisters {
 struct Chip {
   Block flash{}, pwr{.is_power = true}, rcc{.is_rcc = true, .flash = &flash};
   Clocks start() {
-    return ClockTree<BlockRegisters>{{&rcc}, {&pwr}, {&flash}}.start({.crystal_hz = 8'000'000, .core_hz = 96'000'000});
+    return ClockTree<BlockRegisters>{{&rcc}, {&pwr}, {&flash}}.start(
+        F4PllPlan{.crystal_hz = 8'000'000, .core_hz = 96'000'000});
   }
   /// From PLLCFGR, as RM0402 has it.
   [[nodiscard]] std::uint32_t pll_hz() {
@@ -100,14 +102,14 @@ TEST(ClockTree, APllThatNeverLocksLeavesTheInternalOscillator) {
 }
 
 TEST(ClockTree, PlansOutsideOfTheDataSheetAreInvalid) {
-  EXPECT_TRUE((PllPlan{.crystal_hz = 24'000'000, .core_hz = 100'000'000}).valid());
-  EXPECT_FALSE((PllPlan{.crystal_hz = 8'000'000, .core_hz = 102'000'000}).valid());
-  EXPECT_FALSE((PllPlan{.crystal_hz = 3'000'000, .core_hz = 96'000'000}).valid());
-  EXPECT_FALSE((PllPlan{.crystal_hz = 8'000'000, .core_hz = 96'000'000, .p = 8}).valid());  // VCO at 768 MHz
-  EXPECT_FALSE((PllPlan{.crystal_hz = 25'000'000, .core_hz = 96'000'000}).valid());         // no whole steps of 2 MHz
-  EXPECT_TRUE((PllPlan{.crystal_hz = 25'000'000, .core_hz = 80'000'000, .limits = kStm32f405Clocks}).valid());
+  EXPECT_TRUE((F4PllPlan{.crystal_hz = 24'000'000, .core_hz = 100'000'000}).valid());
+  EXPECT_FALSE((F4PllPlan{.crystal_hz = 8'000'000, .core_hz = 102'000'000}).valid());
+  EXPECT_FALSE((F4PllPlan{.crystal_hz = 3'000'000, .core_hz = 96'000'000}).valid());
+  EXPECT_FALSE((F4PllPlan{.crystal_hz = 8'000'000, .core_hz = 96'000'000, .p = 8}).valid());  // VCO at 768 MHz
+  EXPECT_FALSE((F4PllPlan{.crystal_hz = 25'000'000, .core_hz = 96'000'000}).valid());         // no whole steps of 2 MHz
+  EXPECT_TRUE((F4PllPlan{.crystal_hz = 25'000'000, .core_hz = 80'000'000, .limits = kStm32f405Clocks}).valid());
   // APB1 of the STM32F405 ends at 42 MHz.
-  EXPECT_FALSE((PllPlan{.crystal_hz = 25'000'000, .core_hz = 88'000'000, .limits = kStm32f405Clocks}).valid());
+  EXPECT_FALSE((F4PllPlan{.crystal_hz = 25'000'000, .core_hz = 88'000'000, .limits = kStm32f405Clocks}).valid());
 }
 
 TEST(Watchdog, ItsTimeHoldsAtEveryFrequencyOfItsOscillator) {

@@ -2,8 +2,9 @@
 // The parts of the STM32 port on the G4: what it shares with the F4 has the same registers, what differs has a block
 // here that behaves as RM0440 has it. Offsets and bits are written down once more.
 #include "hal/chip/stm32/boot_cause.hpp"
-#include "hal/chip/stm32/clock_tree_g4.hpp"
+#include "hal/chip/stm32/clock_tree.hpp"
 #include "hal/chip/stm32/dma_channel.hpp"
+#include "hal/chip/stm32/pll_plan_g4.hpp"
 #include "hal/chip/stm32/serial_output.hpp"
 #include "hal/chip/stm32/serial_port.hpp"
 #include "hal/chip/stm32/spi_master.hpp"
@@ -22,7 +23,7 @@ namespace {
 namespace f4 = stm32f412;
 namespace g474 = stm32g474;
 
-// GPIO, IWDG and the timer's driver take the F4's header on both chips, USART and SPI the F4's fields.
+// GPIO, IWDG and the timer's driver take the F4's header on both chips, USART, SPI and clock tree the F4's fields.
 constexpr bool same(Field a, Field b) { return a.lsb == b.lsb && a.width == b.width; }
 static_assert(f4::gpio::moder::kOffset == g474::gpio::moder::kOffset);
 static_assert(f4::gpio::otyper::kOffset == g474::gpio::otyper::kOffset);
@@ -73,6 +74,15 @@ static_assert(same(f4::usart::cr3::kEie, g474::usart::cr3::kEie));
 static_assert(same(f4::usart::sr::kRxne, g474::usart::isr::kRxne) && same(f4::usart::sr::kTc, g474::usart::isr::kTc));
 static_assert(same(f4::usart::sr::kTxe, g474::usart::isr::kTxe) && same(f4::usart::sr::kOre, g474::usart::isr::kOre));
 static_assert(same(f4::usart::sr::kFe, g474::usart::isr::kFe) && same(f4::usart::sr::kNf, g474::usart::isr::kNf));
+static_assert(f4::rcc::cr::kOffset == g474::rcc::cr::kOffset && f4::rcc::cfgr::kOffset == g474::rcc::cfgr::kOffset);
+static_assert(same(f4::rcc::cr::kHseon, g474::rcc::cr::kHseon) && same(f4::rcc::cr::kHserdy, g474::rcc::cr::kHserdy));
+static_assert(same(f4::rcc::cr::kHsebyp, g474::rcc::cr::kHsebyp) && same(f4::rcc::cr::kCsson, g474::rcc::cr::kCsson));
+static_assert(same(f4::rcc::cr::kPllon, g474::rcc::cr::kPllon) && same(f4::rcc::cr::kPllrdy, g474::rcc::cr::kPllrdy));
+static_assert(same(f4::rcc::cfgr::kSw, g474::rcc::cfgr::kSw) && same(f4::rcc::cfgr::kSws, g474::rcc::cfgr::kSws));
+static_assert(f4::flash::acr::kOffset == g474::flash::acr::kOffset);
+static_assert(same(f4::flash::acr::kPrften, g474::flash::acr::kPrften));
+static_assert(same(f4::flash::acr::kIcen, g474::flash::acr::kIcen));
+static_assert(same(f4::flash::acr::kDcen, g474::flash::acr::kDcen));
 
 // Clocks.
 
@@ -116,13 +126,13 @@ struct BlockRegisters {
   void write(std::uint32_t offset, std::uint32_t value) const { block->write(offset, value); }
 };
 
-constexpr g4::PllPlan kPlan{.crystal_hz = 24'000'000, .core_hz = 160'000'000};
+constexpr G4PllPlan kPlan{.crystal_hz = 24'000'000, .core_hz = 160'000'000};
 static_assert(kPlan.valid());
 
 struct Chip {
   Block flash{}, pwr{.words = {{0x00, 0x200}, {0x80, 0x100}}, .is_power = true},
       rcc{.words = {{0x00, 0x63}, {0x08, 0x5}, {0x0C, 0x1000}}, .is_rcc = true, .flash = &flash, .pwr = &pwr};
-  Clocks start() { return g4::ClockTree<BlockRegisters>{{&rcc}, {&pwr}, {&flash}}.start(kPlan); }
+  Clocks start() { return ClockTree<BlockRegisters>{{&rcc}, {&pwr}, {&flash}}.start(kPlan); }
   /// From PLLCFGR, as RM0440 has it: output R, which is enabled apart.
   [[nodiscard]] std::uint32_t pll_hz() {
     const std::uint32_t word = rcc.words[0x0C];
@@ -168,11 +178,11 @@ TEST(ClockTreeG4, APllOrARegulatorThatIsNeverReadyLeavesTheInternalOscillator) {
 }
 
 TEST(ClockTreeG4, PlansOutsideOfTheDataSheetAreInvalid) {
-  EXPECT_TRUE((g4::PllPlan{.crystal_hz = 8'000'000, .core_hz = 170'000'000}).valid());
-  EXPECT_FALSE((g4::PllPlan{.crystal_hz = 24'000'000, .core_hz = 172'000'000}).valid());
-  EXPECT_FALSE((g4::PllPlan{.crystal_hz = 24'000'000, .core_hz = 96'000'000}).valid());  // other wait states
-  EXPECT_FALSE((g4::PllPlan{.crystal_hz = 25'000'000, .core_hz = 160'000'000}).valid());
-  EXPECT_FALSE((g4::PllPlan{.crystal_hz = 52'000'000, .core_hz = 160'000'000}).valid());
+  EXPECT_TRUE((G4PllPlan{.crystal_hz = 8'000'000, .core_hz = 170'000'000}).valid());
+  EXPECT_FALSE((G4PllPlan{.crystal_hz = 24'000'000, .core_hz = 172'000'000}).valid());
+  EXPECT_FALSE((G4PllPlan{.crystal_hz = 24'000'000, .core_hz = 96'000'000}).valid());  // other wait states
+  EXPECT_FALSE((G4PllPlan{.crystal_hz = 25'000'000, .core_hz = 160'000'000}).valid());
+  EXPECT_FALSE((G4PllPlan{.crystal_hz = 52'000'000, .core_hz = 160'000'000}).valid());
 }
 
 TEST(BootCauseG4, TheMostParticularFlagDecides) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The STM32F405 has the blocks, registers and fields that F4Board uses where the STM32F412 has them: both SVDs,
+// The STM32F405 has the blocks, registers and fields that F4Chip uses where the STM32F412 has them: both SVDs,
 // compared at compile time. The SVD of the STM32F405 lacks PWR_CR.VOS; RM0090 has one bit at 14.
 #pragma once
 

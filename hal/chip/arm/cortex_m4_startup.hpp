@@ -62,7 +62,7 @@ void tetap_exception();
 }
 
 void tetap_start() {
-  using tetap::hal::started::kSystem;
+  constexpr auto kSystem = tetap::hal::started::Board::kSystem;
   kSystem.write(tetap::hal::cortex_m4::scb::kVtor,
                 static_cast<std::uint32_t>(reinterpret_cast<std::uintptr_t>(__vectors)));
   tetap::hal::enable_fpu(kSystem);
@@ -82,7 +82,7 @@ void tetap_interrupt() {
 }
 
 void tetap_fault(const std::uint32_t* frame, std::uint32_t exception) {
-  using tetap::hal::started::kSystem;
+  constexpr auto kSystem = tetap::hal::started::Board::kSystem;
   namespace scb = tetap::hal::cortex_m4::scb;
   const bool on_stack = frame >= __stack_bottom && frame + 8 <= __stack_top;
   const tetap::hal::FaultState state{
@@ -102,7 +102,7 @@ using Handler = void (*)();
 inline constexpr std::size_t kExceptions = 16;
 struct Vectors {
   const void* stack_top;
-  std::array<Handler, kExceptions - 1 + tetap::hal::started::kLastInterrupt + 1> handlers;
+  std::array<Handler, kExceptions - 1 + tetap::hal::started::Board::kLastInterrupt + 1> handlers;
 };
 
 consteval Vectors make_vectors() {
@@ -111,7 +111,7 @@ consteval Vectors make_vectors() {
   constexpr std::size_t kSysTick = 15;
   table.handlers[0] = tetap_reset;
   table.handlers[kSysTick - 1] = tetap_interrupt;
-  for (const int interrupt : tetap::hal::started::kInterrupts) {
+  for (const int interrupt : tetap::hal::started::Board::kInterrupts) {
     table.handlers[kExceptions - 1 + static_cast<std::size_t>(interrupt)] = tetap_interrupt;
   }
   return table;

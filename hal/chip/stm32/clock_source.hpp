@@ -19,4 +19,7 @@ struct Clocks {
   std::uint32_t apb2_hz = 0;
 };
 
+/// Reads at 16 MHz, some 0.6 us each, until a clock or the regulator must be ready: 1.2 ms, and a PLL needs 0.3.
+inline constexpr int kClockPatience = 2'000;
+
 }  // namespace tetap::hal::stm32

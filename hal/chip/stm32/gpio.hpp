@@ -43,6 +43,14 @@ struct PinSetup {
   bool high = false;  ///< level of an output from the start on
 };
 
+/// A block's pin; `function` is the number of its alternate function.
+[[nodiscard]] constexpr PinSetup block_pin(Pin pin, std::uint8_t function, PinPull pull = PinPull::kNone) {
+  return {.pin = pin, .mode = PinMode::kAlternate, .alternate = function, .pull = pull, .speed = PinSpeed::kMedium};
+}
+[[nodiscard]] constexpr PinSetup output_pin(Pin pin, bool high, PinDrive drive = PinDrive::kPushPull) {
+  return {.pin = pin, .mode = PinMode::kOutput, .drive = drive, .high = high};
+}
+
 /// True when no pin has two owners and every number is one that a port has.
 [[nodiscard]] constexpr bool pins_distinct(std::span<const PinSetup> pins) {
   for (std::size_t i = 0; i < pins.size(); ++i) {
