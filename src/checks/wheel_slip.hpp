@@ -12,7 +12,8 @@ namespace tetap::checks {
 
 class WheelSlip {
  public:
-  enum class Slip : std::uint8_t { kNone, kLeft, kRight, kBoth };
+  /// kTurn: both rest and deny the gyroscope's turn, so their mean is good.
+  enum class Slip : std::uint8_t { kNone, kLeft, kRight, kTurn, kBoth };
 
   struct Wheels {
     float left_mps = 0;
@@ -22,7 +23,8 @@ class WheelSlip {
   struct Motion {
     float forward_mps = 0;
     float sigma_mps = 0;
-    float turn_mps = 0;  ///< yaw rate times track: how much faster the right rim has to be than the left
+    float turn_mps = 0;                 ///< yaw rate times track: how much faster the right rim has to be than the left
+    float still_mps = base::kInfinity;  ///< wheels that rest deny a faster turn
   };
 
   Slip update(const Wheels& w, const Motion& m, base::Micros stamp, const param::InertialParameters& n) {
@@ -37,9 +39,10 @@ class WheelSlip {
     const float most = allowed(m.forward_mps, n), more = most + 3.0F * m.sigma_mps;
     const float apart = magnitude(off_right_mps_ - off_left_mps_);
     const float both = 0.5F * magnitude(off_right_mps_ + off_left_mps_);
-    if (apart > most && both < kTurning * apart) turned_m_ += dt_s * (off_right_mps_ - off_left_mps_);
-    if (apart > most || both > more) {
-      slip_ = which(apart > most, more);
+    const bool turns = both < kTurning * apart, denied = turns && apart > m.still_mps;
+    if (denied || (turns && apart > most)) turned_m_ += dt_s * (off_right_mps_ - off_left_mps_);
+    if (denied || apart > most || both > more) {
+      slip_ = denied ? Slip::kTurn : which(apart > most, more);
       seen_ = stamp;
     } else if (ground_contradicts_.count() >= kTwice) {
       slip_ = Slip::kBoth;

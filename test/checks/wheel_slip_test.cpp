@@ -85,6 +85,25 @@ TEST(WheelSlip, AddsUpTheTurnOfBothWheelsThatTheGyroscopeDoesNotShow) {
   }
 }
 
+TEST(WheelSlip, WheelsThatRestDenyATurnThatRollingOnesLeaveOpen) {
+  for (const float turn_radps : {0.1F, -0.5F, 1.0F}) {
+    for (const bool rest : {false, true}) {
+      WheelSlip watch;
+      const param::InertialParameters n;
+      WheelSlip::Motion motion{.turn_mps = kTrack_m * turn_radps};
+      if (rest) motion.still_mps = kTrack_m * n.still_radps;
+      for (int i = 1; i <= 100; ++i) watch.update({}, motion, {10'000 * i}, n);
+      EXPECT_EQ(watch.slip() == Slip::kTurn, rest) << turn_radps;
+      if (rest) {
+        EXPECT_NEAR(watch.turned_m(), -kTrack_m * turn_radps, 0.2F * kTrack_m * base::abs(turn_radps));
+      }
+      motion.turn_mps = 0.1F * kTrack_m * n.still_radps;
+      for (int i = 101; i <= 200; ++i) watch.update({}, motion, {10'000 * i}, n);
+      EXPECT_EQ(watch.slip(), Slip::kNone) << turn_radps;
+    }
+  }
+}
+
 TEST(WheelSlip, FindsAWheelThatIsDragged) {
   Drive d;
   d.until(Slip::kBoth, 1);

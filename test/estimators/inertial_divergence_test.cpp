@@ -105,6 +105,28 @@ TEST(InertialDivergence, AGyroscopeThatBothWheelsContradictMakesTheHeadingUncert
   }
 }
 
+/// The robot stands, and the gyroscope alone turns for a while. The filter stays as unsure as the turn is large.
+TEST(InertialDivergence, ATurnAtRestThatBothWheelsDenyLeavesTheHeadingUncertain) {
+  for (const float antenna_m : {0.0F, 0.6F}) {
+    for (const double bias_radps : {0.05, -0.1, 0.3, -0.5, 1.0}) {
+      param::Parameters n = rover_like();
+      n.gnss.antenna_x_b_m = antenna_m;
+      Drive d = settled(n, 3);
+      d.white_m = 0.3;
+      d.speed_mps = d.turn_radps = 0;
+      d.run(20);
+      d.gyro_bias_radps = bias_radps;
+      double beyond_s = 0;
+      for (int k = 0; k < 1400; ++k) {
+        if (k == 400) d.gyro_bias_radps = 0;
+        d.run(0.01);
+        beyond_s += d.yaw_error_rad() > 3 * d.sigma_yaw_rad() ? 0.01 : 0;
+      }
+      EXPECT_LT(beyond_s, 0.3) << bias_radps << " rad/s, antenna at " << antenna_m << " m";
+    }
+  }
+}
+
 TEST(InertialDivergence, AWheelThatSpinsAloneLeavesTheHeadingAsItIs) {
   for (const double slip_mps : {0.5, 2.0, -1.0}) {
     Drive d(rover_like()), spins(rover_like());

@@ -35,7 +35,8 @@ Innovation Inertial::fuse(const sensor::BodySpeed& speed, base::Micros stamp, co
     return {.verdict = sensor::Verdict::kRejected, .failed = Check::kValue};
   sources_.forward.note(reading.mean_mps(), filter.stamp());
   Assessment a = sources_.wheels.assess(reading, filter);
-  if (a.remedy.sigma_rad > 0.0F) Recovery::widen_turn(ins_, a.remedy.sigma_rad);
+  const bool at_rest = sources_.wheels.slip() == Wheels::Slip::kTurn;
+  if (a.remedy.sigma_rad > 0.0F) Recovery::widen_turn(ins_, a.remedy.sigma_rad, at_rest);
   if (a.fuses()) {
     forward = sources_.wheels.forward(reading, filter);
     return {.verdict = sensor::Verdict::kAccepted};

@@ -36,7 +36,7 @@ class Recovery {
     inflate(ins, nav::InsState::kAttitude, nav::Vector3::Constant(sigma_rad * sigma_rad));
   }
   /// Verb 1 by a cause: both wheels contradict the gyroscope's turn by so much.
-  static void widen_turn(nav::Ins& ins, float sigma_rad);
+  static void widen_turn(nav::Ins& ins, float sigma_rad, bool at_rest);
   /// Verb 1 by a cause: the IMU shows an acceleration that is not there. A tilt of the last second makes it, or a bias.
   static void widen_imu(nav::Ins& ins, float east_mps2, float north_mps2);
   /// Verb 1 by a cause: climb and height are off, by an error of the accelerometer along the plumb line.
@@ -196,14 +196,17 @@ inline std::array<float, 2> Recovery::tilt_of(float east_mps2, float north_mps2,
 }
 
 /// The heading is at least so uncertain. An error of the gyroscope made what it lacks, in no less than a second: the
-/// bias is off by as many radians a second as the heading by radians.
-[[gnu::noinline]] inline void Recovery::widen_turn(nav::Ins& ins, float sigma_rad) {
+/// bias is off by as many radians a second as the heading by radians. At rest a zero-rate update may show the bias once
+/// the error has ended: the heading keeps its own share.
+[[gnu::noinline]] inline void Recovery::widen_turn(nav::Ins& ins, float sigma_rad, bool at_rest) {
+  constexpr int kYaw = nav::InsState::kYaw, kBias = nav::InsState::kGyroBias, kBiasZ = kBias + 2;
   ins.predict_covariance();
-  const float lacking_rad2 = sigma_rad * sigma_rad - ins.p(nav::InsState::kYaw, nav::InsState::kYaw);
+  const float shared = at_rest ? ins.p(kYaw, kBiasZ) : 0.0F, by_bias_rad2 = shared * shared / ins.p(kBiasZ, kBiasZ);
+  const float lacking_rad2 = sigma_rad * sigma_rad - (ins.p(kYaw, kYaw) - by_bias_rad2);
   if (!(lacking_rad2 > 0.0F)) return;
   inflate_heading(ins, lacking_rad2);
   const nav::Vector3 up_b = ins.x.q_nb.conjugate().rotate(ins.earth.up_n);
-  for (int i = 0; i < 3; ++i) ins.inflate(nav::InsState::kGyroBias + i, lacking_rad2 * up_b(i) * up_b(i));
+  for (int i = 0; i < 3; ++i) ins.inflate(kBias + i, lacking_rad2 * up_b(i) * up_b(i));
   ins.recondition();
 }
 

@@ -22,8 +22,8 @@ class Wheels {
 
   /// Decides which wheels roll. Without a gyroscope the wheels alone show a turn, and cannot be judged by it.
   [[nodiscard]] Assessment assess(const WheelReading& z, const FilterView& filter);
-  /// Forward speed of an assessed reading: the mean of both wheels. When one rolls while the other spins, it is what
-  /// the gyroscope leaves of the rolling one at the middle of the axle.
+  /// Forward speed of an assessed reading: the mean of both wheels, also where they rest and deny a turn. When one
+  /// rolls while the other spins, it is what the gyroscope leaves of the rolling one at the middle of the axle.
   [[nodiscard]] ForwardReading forward(const WheelReading& z, const FilterView& filter) const;
   /// GNSS velocity of the middle of the axle. True: it contradicts the wheels, so the filter's velocity is as wrong.
   [[nodiscard]] bool contradicted_by_ground(float forward_mps, float wheels_mps, float sigma_mps, base::Micros stamp,
@@ -69,7 +69,10 @@ class Wheels {
   const float north = p(nav::InsState::kVelocityNorth, nav::InsState::kVelocityNorth);
   const float worst = east > north ? east : north;
   const checks::WheelSlip::Motion motion{
-      .forward_mps = v_b(0), .sigma_mps = base::sqrt(worst), .turn_mps = rim_difference_mps(filter)};
+      .forward_mps = v_b(0),
+      .sigma_mps = base::sqrt(worst),
+      .turn_mps = rim_difference_mps(filter),
+      .still_mps = encoders_.at_rest(filter.stamp()) ? track_m * n.still_radps : base::kInfinity};
   const Slip slip = slip_.update(z.wheels, motion, filter.stamp(), n);
   if (slip == Slip::kNone) {
     constexpr float kShare = 0.2F;
@@ -93,7 +96,7 @@ inline ForwardReading Wheels::forward(const WheelReading& z, const FilterView& f
   if (!filter.tracking() || !(filter.parameters().wheels.drive.track_m > 0))
     return {.mps = z.mean_mps(), .sigma_mps = z.sigma_mps};
   const Slip slip = slip_.slip();
-  if (slip == Slip::kNone) return {.mps = z.mean_mps() + z.later_mps, .sigma_mps = z.sigma_mps};
+  if (slip == Slip::kNone || slip == Slip::kTurn) return {.mps = z.mean_mps() + z.later_mps, .sigma_mps = z.sigma_mps};
   const float turn = rim_difference_mps(filter);
   const float one = slip == Slip::kLeft ? z.wheels.right_mps - 0.5F * turn : z.wheels.left_mps + 0.5F * turn;
   constexpr float kOneWheel = 1.42F;  // of one wheel, not the mean of two
