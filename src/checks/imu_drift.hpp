@@ -20,8 +20,7 @@ class ImuDrift {
   /// Tests the corrections of late. Each variance [m2/s2] is the filter's, of both level axes and along up: errors that
   /// measurements have in common are in no correction's variance. `scale` is that of the innovation gates, level alone.
   [[nodiscard]] Drift test(const nav::VelocityCorrection& sum, float level_m2ps2, float up_m2ps2, float scale) {
-    const float level2 = sum.east_mps * sum.east_mps + sum.north_mps * sum.north_mps;
-    const bool level = level2 > kGate * scale * (sum.level_m2ps2 + level_m2ps2);
+    const bool level = contradicts(sum, level_m2ps2, scale);
     const bool up = sum.up_mps * sum.up_mps > kGate * (sum.up_m2ps2 + up_m2ps2);
     const Drift drift{.level = level && level_, .up = up && up_};  // a leap is gone by the second test
     level_ = level && !drift.level;
@@ -29,6 +28,10 @@ class ImuDrift {
     if (shown_ > 0) --shown_;
     if (drift.level || drift.up) shown_ = kShown;
     return drift;
+  }
+  /// Whether the corrections in the level plane are larger than their variance and the filter's allow.
+  [[nodiscard]] static bool contradicts(const nav::VelocityCorrection& sum, float level_m2ps2, float scale) {
+    return sum.level2() > kGate * scale * (sum.level_m2ps2 + level_m2ps2);
   }
   /// Share of the corrections that a span leaves: they fade with a time constant of a second.
   [[nodiscard]] static float keep(float since_s) { return since_s < kFade_s ? 1.0F - since_s / kFade_s : 0.0F; }

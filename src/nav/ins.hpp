@@ -33,6 +33,8 @@ struct VelocityCorrection {
   float east_mps = 0, north_mps = 0, up_mps = 0;
   float level_m2ps2 = 0, up_m2ps2 = 0;
 
+  /// Square of the sum in the level plane [m2/s2].
+  [[nodiscard]] float level2() const { return east_mps * east_mps + north_mps * north_mps; }
   void clear_level() { east_mps = north_mps = level_m2ps2 = 0; }
   void clear_up() { up_mps = up_m2ps2 = 0; }
   /// Keeps a share of the sums, and its square of their variances.

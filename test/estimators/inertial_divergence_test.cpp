@@ -218,7 +218,7 @@ Alone drive_alone(Drive& d, double off_rad, double speed_mps) {
 /// Only the robot's motion can show that the heading is wrong. The error is noticed while the robot speeds up, or at
 /// the latest while it stops or turns. GNSS shows there the direction of the acceleration that the IMU felt.
 TEST(InertialDivergence, WithoutWheelsAWrongHeadingIsFoundByHowItMoves) {
-  for (const unsigned seed : {1U, 2U, 3U})  // the bounds hold for 20 seeds
+  for (const unsigned seed : {1U, 2U, 3U, 74U})  // the bounds hold for 1 to 60
     for (const bool constrained : {false, true})
       for (const double speed_mps : {1.0, 2.0})
         for (const double off_rad : {0.0, 1.05, -1.57, 1.57, 2.62, 3.14}) {
@@ -244,7 +244,7 @@ TEST(InertialDivergence, WithoutWheelsAWrongHeadingIsFoundByHowItMoves) {
           if (seen && std::abs(off_rad) > 1.5) {
             EXPECT_LE(all.said, 1) << "velocities may pull it round";
             EXPECT_TRUE(all.said == 0 || all.last == sensor::ResetCause::kHeadingWrong);
-            EXPECT_LT(all.end_sigmas, 5.0);
+            EXPECT_LT(all.end_sigmas, 4.5);
           }
         }
 }

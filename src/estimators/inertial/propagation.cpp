@@ -142,10 +142,16 @@ void Inertial::follow_level(const Context& ctx) {
   const float fixes = n.gnss.gate_scale, wheels = n.inertial.wheel_gate_scale;
   nav::VelocityCorrection& sum = ins_.corrected;
   const float lasting_m2ps2 = ins_.level_m2ps2();
+  const float scale = fixes > wheels ? fixes : wheels;
   constexpr float kKnown_m2ps2 = 1;  // beyond, a heading is being found: corrections are not linear
-  if (lasting_m2ps2 > kKnown_m2ps2) sum.clear_level();
-  const checks::ImuDrift::Drift drift =
-      imu_.drift().test(sum, lasting_m2ps2, ins_.p(kUp, kUp), fixes > wheels ? fixes : wheels);
+  if (lasting_m2ps2 > kKnown_m2ps2) {
+    sum.clear_level();
+  } else if (lasting_m2ps2 + sum.level_m2ps2 > kKnown_m2ps2 &&
+             checks::ImuDrift::contradicts(sum, lasting_m2ps2, scale)) {
+    Recovery::widen_heading(ins_, sum);
+    sum.clear_level();
+  }
+  const checks::ImuDrift::Drift drift = imu_.drift().test(sum, lasting_m2ps2, ins_.p(kUp, kUp), scale);
   if (drift.level) {
     constexpr float kRate_hz = 2;  // a sum that has not faded yet is of half a second
     Recovery::widen_imu(ins_, kRate_hz * sum.east_mps, kRate_hz * sum.north_mps);

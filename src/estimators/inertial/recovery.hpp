@@ -37,6 +37,8 @@ class Recovery {
   }
   /// Verb 1 by a cause: both wheels contradict the gyroscope's turn by so much.
   static void widen_turn(nav::Ins& ins, float sigma_rad, bool at_rest);
+  /// Verb 1 by a cause: measurements that found the velocity took more out of it than P allowed. The heading is wrong.
+  static void widen_heading(nav::Ins& ins, const nav::VelocityCorrection& sum);
   /// Verb 1 by a cause: the IMU shows an acceleration that is not there. A tilt of the last second makes it, or a bias.
   static void widen_imu(nav::Ins& ins, float east_mps2, float north_mps2);
   /// Verb 1 by a cause: climb and height are off, by an error of the accelerometer along the plumb line.
@@ -90,6 +92,7 @@ class Recovery {
   void widen(const Assessment& a, nav::Ins& ins, base::Micros stamp, const param::InertialParameters& n);
   static void widen_velocity(nav::Ins& ins, const nav::Vector3& nu, float since_s);
   static void widen_position(nav::Ins& ins, const nav::Vector3& nu, float since_s);
+  [[nodiscard]] static float turn_of(const nav::Vector3& v_n_mps, float east_mps, float north_mps);
   [[nodiscard]] static std::array<float, 2> tilt_of(float east_mps2, float north_mps2, float gravity_mps2);
 
   Jump jump_;
@@ -139,6 +142,15 @@ inline std::array<float, 2> Recovery::tilt_of(float east_mps2, float north_mps2,
   return {-north_mps2 * share, east_mps2 * share};
 }
 
+/// Turn about the vertical that makes so much of a velocity, limited to what is still a small angle.
+inline float Recovery::turn_of(const nav::Vector3& v_n_mps, float east_mps, float north_mps) {
+  constexpr float kMost_rad = 0.7F;
+  const float v2 = v_n_mps(0) * v_n_mps(0) + v_n_mps(1) * v_n_mps(1);
+  const float across = north_mps * v_n_mps(0) - east_mps * v_n_mps(1);
+  if (!(base::abs(across) < kMost_rad * v2)) return across < 0.0F ? -kMost_rad : kMost_rad;
+  return across / v2;
+}
+
 /// Nothing is taken out of P, so it stays positive definite without recondition(). The bias of the accelerometer is
 /// that of the limited tilt.
 [[gnu::noinline]] inline void Recovery::widen_imu(nav::Ins& ins, float east_mps2, float north_mps2) {
@@ -153,6 +165,12 @@ inline std::array<float, 2> Recovery::tilt_of(float east_mps2, float north_mps2,
   }
 }
 
+/// The heading may be off by the angle that the corrections turned the velocity by.
+[[gnu::noinline]] inline void Recovery::widen_heading(nav::Ins& ins, const nav::VelocityCorrection& sum) {
+  const float yaw_rad = turn_of(ins.x.v_n_mps, sum.east_mps, sum.north_mps);
+  inflate_heading(ins, yaw_rad * yaw_rad);
+}
+
 /// The velocity is off by nu. It leapt; or a tilt made it so, since the last agreement; or the heading is wrong.
 [[gnu::noinline]] inline void Recovery::widen_velocity(nav::Ins& ins, const nav::Vector3& nu, float since_s) {
   ins.predict_covariance();
@@ -162,9 +180,7 @@ inline std::array<float, 2> Recovery::tilt_of(float east_mps2, float north_mps2,
   ins.inflate_along({0.5F * nu(0) * t, 0.5F * nu(1) * t, 0, nu(0), nu(1), 0, tilt[0], tilt[1], 0});
   const float ve = ins.x.v_n_mps(0), vn = ins.x.v_n_mps(1), v2 = ve * ve + vn * vn;
   if (v2 > 1.0F) {
-    constexpr float kMost_rad = 0.7F;
-    const float turn = (nu(1) * ve - nu(0) * vn) / v2;
-    const float yaw = turn > kMost_rad ? kMost_rad : turn < -kMost_rad ? -kMost_rad : turn;
+    const float yaw = turn_of(ins.x.v_n_mps, nu(0), nu(1));
     ins.inflate_along({-yaw * vn * t, yaw * ve * t, 0, -yaw * vn, yaw * ve, 0, 0, 0, yaw});
   }
   ins.recondition();
