@@ -213,7 +213,7 @@ inline float Recovery::turn_of(const nav::Vector3& v_n_mps, float east_mps, floa
 
 /// The heading is at least so uncertain. An error of the gyroscope made what it lacks, in no less than a second: the
 /// bias is off by as many radians a second as the heading by radians. At rest a zero-rate update may show the bias once
-/// the error has ended: the heading keeps its own share.
+/// the error has ended: the heading keeps its own share. Nothing is taken out of P: no recondition().
 [[gnu::noinline]] inline void Recovery::widen_turn(nav::Ins& ins, float sigma_rad, bool at_rest) {
   constexpr int kYaw = nav::InsState::kYaw, kBias = nav::InsState::kGyroBias, kBiasZ = kBias + 2;
   ins.predict_covariance();
@@ -223,7 +223,6 @@ inline float Recovery::turn_of(const nav::Vector3& v_n_mps, float east_mps, floa
   inflate_heading(ins, lacking_rad2);
   const nav::Vector3 up_b = ins.x.q_nb.conjugate().rotate(ins.earth.up_n);
   for (int i = 0; i < 3; ++i) ins.inflate(kBias + i, lacking_rad2 * up_b(i) * up_b(i));
-  ins.recondition();
 }
 
 /// Once more within ten seconds, it is not one of these causes alone: tilt and bias are as at the start.
