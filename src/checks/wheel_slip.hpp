@@ -12,8 +12,8 @@ namespace tetap::checks {
 
 class WheelSlip {
  public:
-  /// kTurn: both rest and deny the gyroscope's turn, so their mean is good.
-  enum class Slip : std::uint8_t { kNone, kLeft, kRight, kTurn, kBoth };
+  /// kTurn: both turn less than the gyroscope shows, and Motion::still_mps does not allow that. Their mean is good.
+  enum class Slip : std::uint8_t { kNone, kLeft, kRight, kBoth, kTurn };
 
   struct Wheels {
     float left_mps = 0;
@@ -39,7 +39,8 @@ class WheelSlip {
     const float most = allowed(m.forward_mps, n), more = most + 3.0F * m.sigma_mps;
     const float apart = magnitude(off_right_mps_ - off_left_mps_);
     const float both = 0.5F * magnitude(off_right_mps_ + off_left_mps_);
-    const bool turns = both < kTurning * apart, denied = turns && apart > m.still_mps;
+    const bool turns = both < kTurning * apart;
+    const bool denied = turns && apart > m.still_mps && ground_contradicts_.count() < kTwice;
     if (denied || (turns && apart > most)) turned_m_ += dt_s * (off_right_mps_ - off_left_mps_);
     if (denied || apart > most || both > more) {
       slip_ = denied ? Slip::kTurn : which(apart > most, more);
@@ -63,7 +64,7 @@ class WheelSlip {
     if (!(n.slip_mps > 0) || older(last_, stamp, kGap)) return false;
     const bool off = magnitude(wheels_mps - forward_mps) > allowed(forward_mps, n) + 3.0F * sigma_mps;
     ground_contradicts_.update(off, stamp, kGroundGap);
-    return ground_contradicts_.count() == kTwice && slip_ == Slip::kNone;
+    return ground_contradicts_.count() == kTwice && (slip_ == Slip::kNone || slip_ == Slip::kTurn);
   }
 
   [[nodiscard]] Slip slip() const { return slip_; }

@@ -85,8 +85,23 @@ TEST(WheelSlip, AddsUpTheTurnOfBothWheelsThatTheGyroscopeDoesNotShow) {
   }
 }
 
+/// A robot that is carried off turns and moves. Its wheels rest, and the receiver shows that both are wrong.
+TEST(WheelSlip, WheelsThatRestAreBothWrongWhereTheReceiverMoves) {
+  WheelSlip watch;
+  const param::InertialParameters n;
+  const WheelSlip::Motion motion{.turn_mps = kTrack_m * 0.1F, .still_mps = kTrack_m * n.still_radps};
+  bool contradicted = false;
+  for (int i = 1; i <= 200; ++i) {
+    watch.update({}, motion, {10'000 * i}, n);
+    if (i % 20 == 0) contradicted = watch.update_ground(2.0F, 0.0F, 0.05F, {10'000 * i}, n) || contradicted;
+  }
+  EXPECT_TRUE(contradicted);
+  EXPECT_EQ(watch.slip(), Slip::kBoth);
+}
+
 TEST(WheelSlip, WheelsThatRestDenyATurnThatRollingOnesLeaveOpen) {
-  for (const float turn_radps : {0.1F, -0.5F, 1.0F}) {
+  const float still_radps = param::InertialParameters{}.still_radps;
+  for (const float turn_radps : {1.2F * still_radps, 0.1F, -0.5F, 1.0F}) {
     for (const bool rest : {false, true}) {
       WheelSlip watch;
       const param::InertialParameters n;
@@ -97,7 +112,7 @@ TEST(WheelSlip, WheelsThatRestDenyATurnThatRollingOnesLeaveOpen) {
       if (rest) {
         EXPECT_NEAR(watch.turned_m(), -kTrack_m * turn_radps, 0.2F * kTrack_m * base::abs(turn_radps));
       }
-      motion.turn_mps = 0.1F * kTrack_m * n.still_radps;
+      motion.turn_mps = 0.8F * kTrack_m * n.still_radps;
       for (int i = 101; i <= 200; ++i) watch.update({}, motion, {10'000 * i}, n);
       EXPECT_EQ(watch.slip(), Slip::kNone) << turn_radps;
     }

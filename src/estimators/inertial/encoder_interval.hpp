@@ -44,7 +44,7 @@ class EncoderInterval {
   [[nodiscard]] bool counts_lately(base::Micros at) const {
     return checks::recent(counted_at_, at, base::Micros{1'000'000});
   }
-  /// Counts have not changed for 0.5 s.
+  /// Counts have not changed for 0.5 s; also true where none ever came.
   [[nodiscard]] bool at_rest(base::Micros at) const { return checks::older(moved_at_, at, base::Micros{500'000}); }
 
   template <class Sink>

@@ -37,7 +37,7 @@ class Recovery {
   }
   /// Verb 1 by a cause: both wheels contradict the gyroscope's turn by so much.
   static void widen_turn(nav::Ins& ins, float sigma_rad, bool at_rest);
-  /// Verb 1 by a cause: measurements that found the velocity took more out of it than P allowed. The heading is wrong.
+  /// Verb 1 by a cause: measurements that found the velocity turned it by more than P allowed.
   static void widen_heading(nav::Ins& ins, const nav::VelocityCorrection& sum);
   /// Verb 1 by a cause: the IMU shows an acceleration that is not there. A tilt of the last second makes it, or a bias.
   static void widen_imu(nav::Ins& ins, float east_mps2, float north_mps2);
@@ -165,7 +165,7 @@ inline float Recovery::turn_of(const nav::Vector3& v_n_mps, float east_mps, floa
   }
 }
 
-/// The heading may be off by the angle that the corrections turned the velocity by.
+/// The heading may be off by the turn that the corrections made of the velocity.
 [[gnu::noinline]] inline void Recovery::widen_heading(nav::Ins& ins, const nav::VelocityCorrection& sum) {
   const float yaw_rad = turn_of(ins.x.v_n_mps, sum.east_mps, sum.north_mps);
   inflate_heading(ins, yaw_rad * yaw_rad);
@@ -215,13 +215,18 @@ inline float Recovery::turn_of(const nav::Vector3& v_n_mps, float east_mps, floa
 /// bias is off by as many radians a second as the heading by radians. At rest a zero-rate update may show the bias once
 /// the error has ended: the heading keeps its own share. Nothing is taken out of P: no recondition().
 [[gnu::noinline]] inline void Recovery::widen_turn(nav::Ins& ins, float sigma_rad, bool at_rest) {
-  constexpr int kYaw = nav::InsState::kYaw, kBias = nav::InsState::kGyroBias, kBiasZ = kBias + 2;
+  constexpr int kYaw = nav::InsState::kYaw, kBias = nav::InsState::kGyroBias;
   ins.predict_covariance();
-  const float shared = at_rest ? ins.p(kYaw, kBiasZ) : 0.0F, by_bias_rad2 = shared * shared / ins.p(kBiasZ, kBiasZ);
+  const nav::Vector3 up_b = ins.x.q_nb.conjugate().rotate(ins.earth.up_n);
+  float shared = 0, bias_radps2 = 0;  // covariance of heading and the bias along up, and the latter's variance
+  for (int i = 0; i < 3; ++i) {
+    shared += ins.p(kYaw, kBias + i) * up_b(i);
+    for (int j = 0; j < 3; ++j) bias_radps2 += ins.p(kBias + i, kBias + j) * up_b(i) * up_b(j);
+  }
+  const float by_bias_rad2 = at_rest && bias_radps2 > 0.0F ? shared * shared / bias_radps2 : 0.0F;
   const float lacking_rad2 = sigma_rad * sigma_rad - (ins.p(kYaw, kYaw) - by_bias_rad2);
   if (!(lacking_rad2 > 0.0F)) return;
   inflate_heading(ins, lacking_rad2);
-  const nav::Vector3 up_b = ins.x.q_nb.conjugate().rotate(ins.earth.up_n);
   for (int i = 0; i < 3; ++i) ins.inflate(kBias + i, lacking_rad2 * up_b(i) * up_b(i));
 }
 

@@ -68,11 +68,11 @@ class Wheels {
   const float east = p(nav::InsState::kVelocity, nav::InsState::kVelocity);
   const float north = p(nav::InsState::kVelocityNorth, nav::InsState::kVelocityNorth);
   const float worst = east > north ? east : north;
-  const checks::WheelSlip::Motion motion{
-      .forward_mps = v_b(0),
-      .sigma_mps = base::sqrt(worst),
-      .turn_mps = rim_difference_mps(filter),
-      .still_mps = encoders_.at_rest(filter.stamp()) ? track_m * n.still_radps : base::kInfinity};
+  const bool rests = encoders_.counts_recently(filter.stamp()) && encoders_.at_rest(filter.stamp());
+  const checks::WheelSlip::Motion motion{.forward_mps = v_b(0),
+                                         .sigma_mps = base::sqrt(worst),
+                                         .turn_mps = rim_difference_mps(filter),
+                                         .still_mps = rests ? track_m * n.still_radps : base::kInfinity};
   const Slip slip = slip_.update(z.wheels, motion, filter.stamp(), n);
   if (slip == Slip::kNone) {
     constexpr float kShare = 0.2F;
