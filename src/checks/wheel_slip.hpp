@@ -64,10 +64,12 @@ class WheelSlip {
     if (!(n.slip_mps > 0) || older(last_, stamp, kGap)) return false;
     const bool off = magnitude(wheels_mps - forward_mps) > allowed(forward_mps, n) + 3.0F * sigma_mps;
     ground_contradicts_.update(off, stamp, kGroundGap);
-    return ground_contradicts_.count() == kTwice && (slip_ == Slip::kNone || slip_ == Slip::kTurn);
+    return ground_contradicts_.count() == kTwice && mean_holds();
   }
 
   [[nodiscard]] Slip slip() const { return slip_; }
+  /// The mean of both wheels is the forward speed.
+  [[nodiscard]] bool mean_holds() const { return slip_ == Slip::kNone || slip_ == Slip::kTurn; }
   /// Way of the right rim past the left one that the gyroscope does not show, since that began. Both are off by the
   /// same, one ahead and one behind, as of a robot that turns: a wheel that spins is off alone.
   [[nodiscard]] float turned_m() const { return turned_m_; }

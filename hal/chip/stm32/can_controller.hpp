@@ -100,6 +100,10 @@ class CanController {
     return all;
   }
   [[nodiscard]] CanState state() const { return state_; }
+  /// Nobody acknowledges, or the bus is disturbed: 128 errors and more. RM0402, "CAN error status register (CAN_ESR)".
+  [[nodiscard]] bool error_passive() const {
+    return can_register::esr::kEpvf.of(registers_.read(can_register::esr::kOffset)) != 0;
+  }
   [[nodiscard]] std::uint32_t rx_unsupported() const { return unsupported_; }  ///< remote frames, counted and dropped
 
   /// "Transmission handling": a mailbox became empty.

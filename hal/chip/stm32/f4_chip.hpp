@@ -32,9 +32,10 @@ struct F4Chip {
                        kGnssErrors = stm32f412::interrupt::kUsart1, kGnssDma = stm32f412::interrupt::kDma2Stream5;
   static constexpr ResetFlags kResetFlags = kResetFlagsF4;
   static constexpr CanTimingLimits kCanTimingLimits{};
-  /// DMA2, channel 4: stream 5 receives for USART1, stream 7 sends.
-  static constexpr Dma kGnssReceive{Mmio{stm32f412::dma::kDma2}, 5, 4},
-      kGnssTransmit{Mmio{stm32f412::dma::kDma2}, 7, 4};
+  /// USART1's places on DMA2: RM0402, table "DMA2 request mapping".
+  static constexpr std::uint32_t kReceiveStream = 5, kTransmitStream = 7, kUsart1Channel = 4;
+  static constexpr Dma kGnssReceive{Mmio{stm32f412::dma::kDma2}, kReceiveStream, kUsart1Channel},
+      kGnssTransmit{Mmio{stm32f412::dma::kDma2}, kTransmitStream, kUsart1Channel};
 
   static constexpr Pin pa(std::uint8_t number) { return {stm32f412::gpio::kGpioa, number}; }
   static constexpr Pin pb(std::uint8_t number) { return {stm32f412::gpio::kGpiob, number}; }

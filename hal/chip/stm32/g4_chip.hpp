@@ -32,10 +32,12 @@ struct G4Chip {
                        kGnssErrors = stm32g474::interrupt::kUsart1, kGnssDma = stm32g474::interrupt::kDma1Ch1;
   static constexpr ResetFlags kResetFlags = kResetFlagsG4;
   static constexpr CanTimingLimits kCanTimingLimits = kFdcanTimingLimits;
-  /// Channel 1 of DMA1 receives for USART1, channel 2 sends; the last number is USART1's request of DMAMUX: RM0440,
-  /// table "DMAMUX: assignment of multiplexer inputs to resources".
-  static constexpr Dma kGnssReceive{Mmio{stm32g474::dma::kDma1}, Mmio{stm32g474::dmamux::kDmamux}, 0, 24},
-      kGnssTransmit{Mmio{stm32g474::dma::kDma1}, Mmio{stm32g474::dmamux::kDmamux}, 1, 25};
+  /// Channels 1 and 2 of DMA1, counted from 0, and USART1's requests: RM0440, table "DMAMUX: assignment of multiplexer
+  /// inputs to resources".
+  static constexpr std::uint32_t kReceiveChannel = 0, kTransmitChannel = 1, kUsart1Receives = 24, kUsart1Sends = 25;
+  static constexpr Dma kGnssReceive{Mmio{stm32g474::dma::kDma1}, Mmio{stm32g474::dmamux::kDmamux}, kReceiveChannel,
+                                    kUsart1Receives},
+      kGnssTransmit{Mmio{stm32g474::dma::kDma1}, Mmio{stm32g474::dmamux::kDmamux}, kTransmitChannel, kUsart1Sends};
 
   static constexpr Pin pa(std::uint8_t number) { return {stm32g474::gpio::kGpioa, number}; }
   static constexpr Pin pb(std::uint8_t number) { return {stm32g474::gpio::kGpiob, number}; }

@@ -165,11 +165,9 @@ struct WiredBoard {
     next_blink_ = time + base::Micros{500'000};
     light_ = !light_;
     Wiring::show_bus(light_, on_bus);
-    if constexpr (requires { can.error_passive(); }) {
-      const bool passive = on_bus && can.error_passive();
-      if (passive && !was_passive_) print("tetap: can: nobody acknowledges, or the bus is disturbed\n");
-      was_passive_ = passive;
-    }
+    const bool passive = on_bus && can.error_passive();
+    if (passive && !was_passive_) print("tetap: can: nobody acknowledges, or the bus is disturbed\n");
+    was_passive_ = passive;
   }
 
   Acceptance filter_;

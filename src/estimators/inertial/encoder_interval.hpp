@@ -44,8 +44,10 @@ class EncoderInterval {
   [[nodiscard]] bool counts_lately(base::Micros at) const {
     return checks::recent(counted_at_, at, base::Micros{1'000'000});
   }
-  /// Counts have not changed for 0.5 s; also true where none ever came.
-  [[nodiscard]] bool at_rest(base::Micros at) const { return checks::older(moved_at_, at, base::Micros{500'000}); }
+  /// Counts come, and have not changed for 0.5 s.
+  [[nodiscard]] bool at_rest(base::Micros at) const {
+    return counts_recently(at) && checks::older(moved_at_, at, base::Micros{500'000});
+  }
 
   template <class Sink>
   void hash_state(Sink&& sink) const {

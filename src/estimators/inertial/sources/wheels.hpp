@@ -68,11 +68,11 @@ class Wheels {
   const float east = p(nav::InsState::kVelocity, nav::InsState::kVelocity);
   const float north = p(nav::InsState::kVelocityNorth, nav::InsState::kVelocityNorth);
   const float worst = east > north ? east : north;
-  const bool rests = encoders_.counts_recently(filter.stamp()) && encoders_.at_rest(filter.stamp());
-  const checks::WheelSlip::Motion motion{.forward_mps = v_b(0),
-                                         .sigma_mps = base::sqrt(worst),
-                                         .turn_mps = rim_difference_mps(filter),
-                                         .still_mps = rests ? track_m * n.still_radps : base::kInfinity};
+  const checks::WheelSlip::Motion motion{
+      .forward_mps = v_b(0),
+      .sigma_mps = base::sqrt(worst),
+      .turn_mps = rim_difference_mps(filter),
+      .still_mps = encoders_.at_rest(filter.stamp()) ? track_m * n.still_radps : base::kInfinity};
   const Slip slip = slip_.update(z.wheels, motion, filter.stamp(), n);
   if (slip == Slip::kNone) {
     constexpr float kShare = 0.2F;
@@ -95,10 +95,9 @@ class Wheels {
 inline ForwardReading Wheels::forward(const WheelReading& z, const FilterView& filter) const {
   if (!filter.tracking() || !(filter.parameters().wheels.drive.track_m > 0))
     return {.mps = z.mean_mps(), .sigma_mps = z.sigma_mps};
-  const Slip slip = slip_.slip();
-  if (slip == Slip::kNone || slip == Slip::kTurn) return {.mps = z.mean_mps() + z.later_mps, .sigma_mps = z.sigma_mps};
+  if (slip_.mean_holds()) return {.mps = z.mean_mps() + z.later_mps, .sigma_mps = z.sigma_mps};
   const float turn = rim_difference_mps(filter);
-  const float one = slip == Slip::kLeft ? z.wheels.right_mps - 0.5F * turn : z.wheels.left_mps + 0.5F * turn;
+  const float one = slip() == Slip::kLeft ? z.wheels.right_mps - 0.5F * turn : z.wheels.left_mps + 0.5F * turn;
   constexpr float kOneWheel = 1.42F;  // of one wheel, not the mean of two
   const nav::Vector3 v_b = filter.x().q_nb.conjugate().rotate(filter.x().v_n_mps);
   const float alone = kOneWheel * filter.parameters().inertial.slip_share * v_b(0);
