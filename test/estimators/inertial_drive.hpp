@@ -84,6 +84,7 @@ class Drive {
   std::function<bool(Fix&)> tamper = [](Fix&) { return true; };
 
   std::function<void(sensor::ImuSample&)> tamper_imu = [](sensor::ImuSample&) {};
+  std::function<void(sensor::WheelCounts&)> tamper_wheels = [](sensor::WheelCounts&) {};
 
   std::string verdicts;  ///< verdicts of positions, one letter each
   Innovation last_fix, last_velocity, last_imu;
@@ -149,8 +150,9 @@ class Drive {
       const double per_m = 20'000 / (2 * 3.14159265358979 * 0.1);
       left_ += (speed_mps - 0.25 * turn_radps + left_slip_mps) * dt * per_m;
       right_ += (speed_mps + 0.25 * turn_radps) * dt * per_m;
-      const sensor::WheelCounts counts{static_cast<std::uint16_t>(std::llround(left_)),
-                                       static_cast<std::uint16_t>(std::llround(right_))};
+      sensor::WheelCounts counts{static_cast<std::uint16_t>(std::llround(left_)),
+                                 static_cast<std::uint16_t>(std::llround(right_))};
+      tamper_wheels(counts);
       if (!silent) estimator.fuse(counts, {us}, ctx());
     }
     if (!silent && speedometer && (us - kBegin_us) % speedometer_every_us == 0)

@@ -26,8 +26,9 @@ class EncoderInterval {
            (below_min_interval(counted_at_, at, n) || (standstill_pending && at - counted_at_ < longest));
   }
   /// Counts that are left out.
-  void skip(const sensor::WheelCounts& counts, base::Micros stamp) {
+  void skip(const sensor::WheelCounts& counts, base::Micros stamp, const param::Parameters& n) {
     if (counts.left != counts_.left || counts.right != counts_.right) moved_at_ = stamp;
+    check_step(counts, stamp, n);
   }
   /// Speeds over the interval that ends here; none without a begin.
   [[nodiscard]] std::optional<WheelReading> update(const sensor::WheelCounts& counts, const FilterView& filter);
@@ -49,21 +50,39 @@ class EncoderInterval {
     return counts_recently(at) && checks::older(moved_at_, at, base::Micros{500'000});
   }
 
+  /// A wheel went farther than it can, within half a second: its counter is broken, and shorter steps are chance.
+  [[nodiscard]] bool leapt_recently(base::Micros at) const {
+    return checks::recent(leapt_at_, at, base::Micros{500'000});
+  }
+
   template <class Sink>
   void hash_state(Sink&& sink) const {
     sink(static_cast<std::uint32_t>(counts_.left | counts_.right << 16U));
     sink(counted_at_.us);
     sink(moved_at_.us);
+    sink(leapt_at_.us);
     sink(gained_mps_);
   }
 
  private:
   [[nodiscard]] bool has_counts() const { return counted_at_.us > 0; }
+  /// Differences of a long interval may have wrapped. Stamps of short intervals may be bunched.
+  void check_step(const sensor::WheelCounts& counts, base::Micros stamp, const param::Parameters& n) {
+    const base::Micros interval = stamp - counted_at_;
+    if (!has_counts() || interval.us <= 0 || interval > base::Micros{n.wheels.timeout_us}) return;
+    const base::Micros shortest{n.inertial.wheels_every_us};
+    const float most_m = n.wheels.most_mps * base::seconds(interval > shortest ? interval : shortest);
+    const model::DifferentialDrive& drive = n.wheels.drive;
+    if (!model::possible_step(drive.left_m(model::count_difference(counts.left, counts_.left)),
+                              drive.right_m(model::count_difference(counts.right, counts_.right)), most_m))
+      leapt_at_ = stamp;
+  }
 
   sensor::WheelCounts counts_;     ///< last counts
   float gained_mps_ = base::kNan;  ///< forward, by the IMU, since the last counts; NaN: not known
   base::Micros counted_at_;        ///< stamp of the last counts; 0: none
   base::Micros moved_at_;          ///< last stamp at which counts had changed; 0: never
+  base::Micros leapt_at_;          ///< last stamp of a step that no wheel can do; 0: none
 };
 
 /// Counts are the mean over the interval, the state is at its end: half of the speed gained in between is added. It is
@@ -78,6 +97,7 @@ inline std::optional<WheelReading> EncoderInterval::update(const sensor::WheelCo
       has_counts() && interval.us > 0 && interval <= base::Micros{filter.parameters().wheels.timeout_us};
   const std::int32_t left = model::count_difference(counts.left, counts_.left);
   const std::int32_t right = model::count_difference(counts.right, counts_.right);
+  check_step(counts, stamp, filter.parameters());
   counts_ = counts;
   counted_at_ = stamp;
   if (!usable || left != 0 || right != 0) moved_at_ = stamp;

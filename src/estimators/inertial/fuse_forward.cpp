@@ -8,7 +8,7 @@ namespace tetap::estimators {
 Innovation Inertial::fuse(const sensor::WheelCounts& counts, base::Micros stamp, const Context& ctx) {
   EncoderInterval& encoders = sources_.wheels.encoders();
   if (skips_counts(stamp, ctx.parameters.inertial)) {
-    encoders.skip(counts, stamp);
+    encoders.skip(counts, stamp, ctx.parameters);
     return {.verdict = sensor::Verdict::kAccepted};
   }
   const FilterView filter = view(stamp, ctx);
@@ -31,8 +31,7 @@ Innovation Inertial::fuse(const sensor::BodySpeed& speed, base::Micros stamp, co
 /// Its own frame, which is gone when the forward speed is fused: that path decides the stack.
 [[gnu::noinline]] Innovation Inertial::assess_wheels(const WheelReading& reading, const FilterView& filter,
                                                      ForwardReading& forward) {
-  if (!model::possible_step(reading.wheels.left_mps, reading.wheels.right_mps, filter.parameters().wheels.most_mps))
-    return {.verdict = sensor::Verdict::kRejected, .failed = Check::kValue};
+  if (sources_.wheels.leapt(filter.stamp())) return {.verdict = sensor::Verdict::kRejected, .failed = Check::kValue};
   sources_.forward.note(reading.mean_mps(), filter.stamp());
   Assessment a = sources_.wheels.assess(reading, filter);
   const bool at_rest = sources_.wheels.slip() == Wheels::Slip::kTurn;

@@ -20,6 +20,12 @@ class Wheels {
   [[nodiscard]] float turn_radps() const { return turn_radps_; }
   [[nodiscard]] base::Micros turned_at() const { return turned_at_; }
 
+  /// A counter is broken: nothing is learnt of the wheels.
+  [[nodiscard]] bool leapt(base::Micros stamp) {
+    const bool leapt = encoders_.leapt_recently(stamp);
+    if (leapt) status_.rejecting(Check::kValue);
+    return leapt;
+  }
   /// Decides which wheels roll. Without a gyroscope the wheels alone show a turn, and cannot be judged by it.
   [[nodiscard]] Assessment assess(const WheelReading& z, const FilterView& filter);
   /// Forward speed of an assessed reading: the mean of both wheels, also where they rest and deny a turn. When one
@@ -34,7 +40,7 @@ class Wheels {
   void reset_slip() { slip_.reset(); }
 
   [[nodiscard]] bool timed_out(base::Micros at) const {
-    return !checks::recent(slip_.last(), at, base::Micros{1'500'000});
+    return !checks::recent(slip_.last(), at, base::Micros{1'500'000}) && !encoders_.leapt_recently(at);
   }
   [[nodiscard]] SourceStatus status(base::Micros at) const { return timed_out(at) ? SourceStatus{} : status_; }
   template <class Sink>
