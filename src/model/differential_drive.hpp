@@ -53,7 +53,8 @@ struct DifferentialDrive {
 
 /// False: a wheel went farther than `most_m`, or not a number.
 [[nodiscard]] constexpr bool possible_step(float left_m, float right_m, float most_m) {
-  return left_m <= most_m && -left_m <= most_m && right_m <= most_m && -right_m <= most_m;
+  const float most_m2 = most_m * most_m;
+  return left_m * left_m <= most_m2 && right_m * right_m <= most_m2;
 }
 
 }  // namespace tetap::model

@@ -25,10 +25,15 @@ class EncoderInterval {
     return has_counts() &&
            (below_min_interval(counted_at_, at, n) || (standstill_pending && at - counted_at_ < longest));
   }
-  /// Counts that are left out.
+  /// Counts that skips() leaves out: a step is judged over `wheels_every_us` at least, for stamps may be bunched.
   void skip(const sensor::WheelCounts& counts, base::Micros stamp, const param::Parameters& n) {
     if (counts.left != counts_.left || counts.right != counts_.right) moved_at_ = stamp;
-    check_step(counts, stamp, n);
+    const std::int32_t us = static_cast<std::int32_t>((stamp - counted_at_).us), least_us = n.inertial.wheels_every_us;
+    const float most_m = n.wheels.most_mps * (1e-6F * static_cast<float>(us > least_us ? us : least_us));
+    const model::DifferentialDrive& drive = n.wheels.drive;
+    if (!model::possible_step(drive.left_m(model::count_difference(counts.left, counts_.left)),
+                              drive.right_m(model::count_difference(counts.right, counts_.right)), most_m))
+      leapt_at_ = stamp;
   }
   /// Speeds over the interval that ends here; none without a begin.
   [[nodiscard]] std::optional<WheelReading> update(const sensor::WheelCounts& counts, const FilterView& filter);
@@ -66,17 +71,6 @@ class EncoderInterval {
 
  private:
   [[nodiscard]] bool has_counts() const { return counted_at_.us > 0; }
-  /// Differences of a long interval may have wrapped. Stamps of short intervals may be bunched.
-  void check_step(const sensor::WheelCounts& counts, base::Micros stamp, const param::Parameters& n) {
-    const base::Micros interval = stamp - counted_at_;
-    if (!has_counts() || interval.us <= 0 || interval > base::Micros{n.wheels.timeout_us}) return;
-    const base::Micros shortest{n.inertial.wheels_every_us};
-    const float most_m = n.wheels.most_mps * base::seconds(interval > shortest ? interval : shortest);
-    const model::DifferentialDrive& drive = n.wheels.drive;
-    if (!model::possible_step(drive.left_m(model::count_difference(counts.left, counts_.left)),
-                              drive.right_m(model::count_difference(counts.right, counts_.right)), most_m))
-      leapt_at_ = stamp;
-  }
 
   sensor::WheelCounts counts_;     ///< last counts
   float gained_mps_ = base::kNan;  ///< forward, by the IMU, since the last counts; NaN: not known
@@ -97,7 +91,6 @@ inline std::optional<WheelReading> EncoderInterval::update(const sensor::WheelCo
       has_counts() && interval.us > 0 && interval <= base::Micros{filter.parameters().wheels.timeout_us};
   const std::int32_t left = model::count_difference(counts.left, counts_.left);
   const std::int32_t right = model::count_difference(counts.right, counts_.right);
-  check_step(counts, stamp, filter.parameters());
   counts_ = counts;
   counted_at_ = stamp;
   if (!usable || left != 0 || right != 0) moved_at_ = stamp;
@@ -107,6 +100,8 @@ inline std::optional<WheelReading> EncoderInterval::update(const sensor::WheelCo
   const float per_s = 1.0F / base::seconds(interval);
   WheelReading reading{.wheels = {.left_mps = drive.left_m(left) * per_s, .right_mps = drive.right_m(right) * per_s},
                        .later_mps = later_mps};
+  if (!model::possible_step(reading.wheels.left_mps, reading.wheels.right_mps, filter.parameters().wheels.most_mps))
+    leapt_at_ = stamp;
   const float count_mps = drive.count_sigma_m() * per_s;
   const float mean_mps = filter.tracking() ? filter.forward_mps() : reading.mean_mps();
   const float half_mps = filter.tracking() ? 0.5F * drive.track_m * filter.turn_b_radps()(2)
