@@ -105,7 +105,7 @@ struct GnssParameters {
   float sigma_velocity_floor_mps = 0.1F;
   float sigma_floor_m = 0.5F;  ///< lower limit of the receiver's own accuracy
   float sigma_scale = 1;       ///< times the receiver's own accuracy
-  float correlation_s = 0;     ///< inertial: how long the receiver's errors last; 0: a new one with every fix
+  float correlation_s = 0;     ///< how long the receiver's errors last; 0: a new one with every fix
   float gate_scale = 1;
   float align_distance_m = 8;  ///< travel by GNSS before a heading is derived from it
   /// Baseline of a receiver with two antennas: from the first to the second. Its heading is that of this line.

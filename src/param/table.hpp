@@ -132,7 +132,7 @@ inline constexpr std::array kTable{
               "Least 1 sigma of a GNSS position, whatever the receiver states."),
     TETAP_ROW(0x185, gnss.sigma_scale, "", 0.1, 20, kLive, "Factor on the accuracy that the receiver states."),
     TETAP_ROW(0x186, gnss.correlation_s, "s", 0, 3'600, kLive,
-              "Time constant of the receiver's position error in the inertial filter; 0: white."),
+              "Time constant of the receiver's position error; 0: white."),
     TETAP_ROW(0x187, gnss.gate_scale, "", 0.25, 25, kLive,
               "Innovation gate of GNSS over the 99 % quantile of chi-square."),
     TETAP_ROW(0x188, gnss.align_distance_m, "m", 0.5, 500, kLive, "Travel by GNSS from which a heading is derived."),

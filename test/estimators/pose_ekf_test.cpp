@@ -122,20 +122,34 @@ struct Standing {
       estimator.fuse(sensor::WheelCounts{static_cast<std::uint16_t>(std::lround(left)),
                                          static_cast<std::uint16_t>(std::lround(right))},
                      {us}, ctx());
-      if (us % 200'000 == 0) measure();
+      if (us % 200'000 == 0) sight();
+      if (us % 200'000 == 0) fix();
       estimator.advance({us}, ctx());
       judge();
     }
   }
-  void measure() {
+  /// As from `place_m` east of the origin the landmarks, as from `fix_east_m` the fixes.
+  void sight() {
+    if (landmarks < 1) return;
+    const double range7_m = 4 - place_m + range_off_m, range8_m = std::hypot(place_m, 5.0),
+                 bearing8_rad = std::atan2(5.0, -place_m);
     const auto noise = [this](double sigma) { return static_cast<float>(sigma * normal(random)); };
-    estimator.fuse(sensor::LandmarkSighting{.landmark = 7, .range_m = 4 + noise(0.1), .bearing_rad = noise(0.02)}, {us},
-                   ctx());
     estimator.fuse(
-        sensor::LandmarkSighting{.landmark = 8, .range_m = 5 + noise(0.1), .bearing_rad = 1.5707963F + noise(0.02)},
+        sensor::LandmarkSighting{
+            .landmark = 7, .range_m = static_cast<float>(range7_m) + noise(0.1), .bearing_rad = noise(0.02)},
         {us}, ctx());
+    if (landmarks < 2) return;
+    estimator.fuse(sensor::LandmarkSighting{.landmark = 8,
+                                            .range_m = static_cast<float>(range8_m) + noise(0.1),
+                                            .bearing_rad = static_cast<float>(bearing8_rad) + noise(0.02)},
+                   {us}, ctx());
+  }
+  void fix() {
+    constexpr double kEquator_m = 6378137, kPi = 3.14159265358979;
+    const double latitude_rad = static_cast<double>(n.gnss.origin_latitude_2ndeg) * 1e-9 * kPi / 90,
+                 east_2ndeg = fix_east_m / (kEquator_m * std::cos(latitude_rad)) * 90 / kPi * 1e9;
     estimator.fuse(sensor::GnssPosition{.latitude_2ndeg = n.gnss.origin_latitude_2ndeg,
-                                        .longitude_2ndeg = n.gnss.origin_longitude_2ndeg,
+                                        .longitude_2ndeg = n.gnss.origin_longitude_2ndeg + std::llround(east_2ndeg),
                                         .height_m = n.gnss.origin_height_m,
                                         .horizontal_acc_m = 0.3F,
                                         .vertical_acc_m = 0.5F,
@@ -152,7 +166,7 @@ struct Standing {
     if (worst > 1.5) beyond_s += 0.01;
   }
 
-  const param::Parameters n = robot::rover_landmarks::parameters;
+  param::Parameters n = robot::rover_landmarks::parameters;
   LandmarkMap<kMapCapacity> map;
   MapFrame frame;
   PoseEkf estimator;
@@ -160,7 +174,9 @@ struct Standing {
   std::normal_distribution<double> normal;
   std::int64_t us = 0;
   double left = 0, right = 0;
-  double beyond_s = 0;  ///< time in which an error was above 1.5 times three sigma
+  double place_m = 0, fix_east_m = 0, range_off_m = 0;  ///< what landmarks and fixes show
+  int landmarks = 2;                                    ///< in sight
+  double beyond_s = 0;                                  ///< time in which an error was above 1.5 times three sigma
 };
 
 TEST(PoseEkf, AGyroscopeOrWheelsThatErrAtRestLeaveThePoseHonest) {
@@ -172,6 +188,75 @@ TEST(PoseEkf, AGyroscopeOrWheelsThatErrAtRestLeaveThePoseHonest) {
       robot.run(10, {});
       EXPECT_LT(robot.beyond_s, 1.0) << shown.left_mps << ' ' << shown.right_mps << ' ' << shown.turn_radps;
     }
+}
+
+double sigma_m(const Standing& robot) {
+  const Estimate e = robot.estimator.estimate(robot.ctx());
+  return std::sqrt(static_cast<double>(std::max(e.p(0, 0), e.p(1, 1))));
+}
+
+TEST(PoseEkf, LandmarksAndFixesThatShowOnePlaceOutvoteTheMotion) {
+  for (unsigned seed = 1; seed <= 5; ++seed) {
+    Standing robot(seed);
+    robot.place_m = robot.fix_east_m = -6;
+    robot.run(0.4, {});
+    EXPECT_EQ(robot.estimator.mode(robot.ctx()), sensor::Mode::kDegraded) << seed;
+    robot.run(0.6, {});
+    EXPECT_NEAR(1e-6 * static_cast<double>(robot.estimator.estimate(robot.ctx()).pose.x.um()), -6, 0.5) << seed;
+    EXPECT_EQ(robot.estimator.mode(robot.ctx()), sensor::Mode::kDegraded) << seed;
+    robot.run(12, {});
+    EXPECT_EQ(robot.estimator.mode(robot.ctx()), sensor::Mode::kNominal) << seed;
+  }
+}
+
+/// Two places: fixes leap to 30 m, and two sightings of the one landmark in sight are 0.6 m off.
+TEST(PoseEkf, AFixThatLeapsBesideAWrongSightingIsNoVote) {
+  for (unsigned seed = 1; seed <= 5; ++seed) {
+    Standing robot(seed);
+    robot.fix_east_m = 30;
+    robot.landmarks = 1;
+    robot.range_off_m = 0.6;
+    robot.run(0.4, {});
+    EXPECT_LT(sigma_m(robot), 0.3) << seed;
+    robot.range_off_m = 0;
+    robot.run(1, {});
+    EXPECT_LT(sigma_m(robot), 0.3) << seed;
+    EXPECT_EQ(robot.beyond_s, 0) << seed;
+  }
+}
+
+TEST(PoseEkf, OneSightingThatAgreesWithALeapIsNoVote) {
+  for (unsigned seed = 1; seed <= 5; ++seed) {
+    Standing robot(seed);
+    robot.place_m = robot.fix_east_m = -6;
+    robot.landmarks = 1;
+    robot.run(0.2, {});
+    robot.landmarks = 0;
+    robot.run(0.4, {});
+    EXPECT_LT(sigma_m(robot), 0.3) << seed;
+    EXPECT_EQ(robot.beyond_s, 0) << seed;
+  }
+}
+
+/// A receiver whose error stays 0.75 m for two minutes, 1.5 of its sigmas; no landmark is in sight.
+TEST(PoseEkf, FixesWhoseErrorLastsWeighLess) {
+  for (const float correlation_s : {0.0F, 60.0F}) {
+    Standing robot(1);
+    robot.n.gnss.correlation_s = correlation_s;
+    robot.n.gnss.sigma_scale = 1;
+    robot.n.gnss.sigma_floor_m = 0.5F;
+    robot.estimator.set_pose({robot.us}, {.sigma_position_m = 2, .sigma_yaw_rad = 0.02F}, robot.ctx());
+    robot.fix_east_m = 0.75;
+    robot.landmarks = 0;
+    robot.run(120, {});
+    const double error_m = 1e-6 * static_cast<double>(robot.estimator.estimate(robot.ctx()).pose.x.um());
+    if (correlation_s > 0) {
+      EXPECT_LT(error_m, 3 * sigma_m(robot));
+      EXPECT_LT(sigma_m(robot), 0.75);  // two minutes are two independent fixes of 0.5 m, and more
+    } else {
+      EXPECT_GT(error_m, 3 * sigma_m(robot));
+    }
+  }
 }
 
 }  // namespace

@@ -29,17 +29,18 @@ Innovation PoseFilter<Filter>::measure(const Model& model, Source source, float 
                                        const Context& ctx, std::uint8_t landmark, bool named) {
   const float gate = gate_scale * filter::chi_square_99(Model::kDimension);
   if (relocalisation_.searches()) relocalisation_.move(motion_.filter.x, covariance_of(motion_.filter));
-  const auto result = motion_.filter.update(model, gate);
+  const auto result = update_by(model, gate, stamp, ctx.parameters.gnss);
   checks::Persistence& refused = refused_[source];
   std::uint8_t& in_a_row = in_a_row_[source];
   if (result.verdict == filter::Verdict::kAccepted) {
     refused.update(false, stamp);
     in_a_row = 0;
     last_absolute_ = stamp;
-    speed_error_m2_ = 0;
+    vote_.accepted();
   } else if (result.verdict == filter::Verdict::kRejected) {
     refused.update(true, stamp);
     if (in_a_row < kDegraded) ++in_a_row;
+    vote_.refused(model, motion_.filter.x, result);
     if (both_refuse(source, stamp)) {
       const auto [place_m2, yaw_rad2] = squared_error(model, result.nu);
       const float most_rad = ctx.parameters.recovery.inflate_yaw_rad, most_rad2 = most_rad * most_rad;
@@ -58,6 +59,27 @@ Innovation PoseFilter<Filter>::measure(const Model& model, Source source, float 
   return record(result, landmark);
 }
 
+/// A fix whose error lasts is judged by its own uncertainty, and weighs what it does not repeat of the fix before.
+template <class Filter>
+template <class Model>
+auto PoseFilter<Filter>::update_by(const Model& model, float gate, base::Micros stamp, const param::GnssParameters& n)
+    -> filter::Innovation<float, Model::kDimension> {
+  if constexpr (std::same_as<Model, model::GnssPosition>) {
+    if (n.correlation_s > 0.0F) {
+      Filter judge = motion_.filter;
+      const auto judged = judge.update(model, gate);
+      if (judged.verdict != filter::Verdict::kAccepted) return judged;
+      Model weighed = model;
+      weighed.sigma_m *= base::sqrt(checks::kColouredNoiseInflation *
+                                    checks::repeated(base::seconds(stamp - fixed_at_), n.correlation_s));
+      fixed_at_ = stamp;
+      static_cast<void>(motion_.filter.update(weighed, base::kInfinity));
+      return judged;
+    }
+  }
+  return motion_.filter.update(model, gate);
+}
+
 template <class Filter>
 [[gnu::noinline]] void PoseFilter<Filter>::take_rival(base::Micros stamp) {
   motion_.filter.x = relocalisation_.rival().x;
@@ -70,22 +92,18 @@ template <class Filter>
   ++jumps_;
 }
 
-/// The other source was refused last, too, within the time of dead reckoning.
+/// Each was refused twice in a row within the time of dead reckoning, and both for the same place.
 template <class Filter>
 bool PoseFilter<Filter>::both_refuse(Source source, base::Micros stamp) const {
   const Source other = source == kGnss ? kLandmark : kGnss;
-  return refused_[source].count() >= 2 && refused_[other].holds() &&
-         refused_[other].held_for(stamp) < base::Micros{5'000'000};
+  return refused_[source].count() >= 2 && refused_[other].count() >= 2 &&
+         refused_[other].held_for(stamp) < base::Micros{5'000'000} && vote_.one_place();
 }
 
 template <class Filter>
 void PoseFilter<Filter>::widen_by_vote(float place_m2, float yaw_rad2, base::Micros stamp) {
-  constexpr base::Micros kLeast{200'000};
   add_variance(motion_.filter, {place_m2, place_m2, yaw_rad2});
-  const base::Micros since = stamp - last_absolute_;
-  const float speed_error_mps = base::sqrt(place_m2) / base::seconds(since > kLeast ? since : kLeast);
-  if (speed_error_mps > speed_error_mps_) speed_error_mps_ = speed_error_mps;
-  contradicted_at_ = stamp;
+  vote_.contradict(base::sqrt(place_m2), stamp - last_absolute_, stamp);
   for (checks::Persistence& refused : refused_) refused.reset();
 }
 
@@ -94,16 +112,8 @@ void PoseFilter<Filter>::judge_motion(base::Micros stamp, const param::Parameter
   const float turned_rad2 = turn_.update(motion_, stamp, n);
   const float place_m2 = TurnCheck::place_m2(turned_rad2, n);
   if (turned_rad2 > 0.0F) widen({place_m2, place_m2, turned_rad2});
-  constexpr base::Micros kContradicted{10'000'000};
-  if (!checks::recent(contradicted_at_, stamp, kContradicted)) {
-    speed_error_mps_ = speed_error_m2_ = 0;
-    return;
-  }
-  const float way_m = speed_error_mps_ * base::seconds(stamp - last_absolute_),
-              more_m2 = way_m * way_m - speed_error_m2_;
-  if (!(more_m2 > 0.0F)) return;
-  widen({more_m2, more_m2, 0.0F});
-  speed_error_m2_ += more_m2;
+  const float more_m2 = vote_.added_m2(stamp - last_absolute_, stamp);
+  if (more_m2 > 0.0F) widen({more_m2, more_m2, 0.0F});
 }
 
 template <class Filter>

@@ -4,11 +4,13 @@
 // root.
 #pragma once
 
+#include "checks/coloured_noise.hpp"
 #include "checks/persistence.hpp"
 #include "estimators/context.hpp"
 #include "estimators/planar/dead_reckoning.hpp"
 #include "estimators/planar/gnss_alignment.hpp"
 #include "estimators/planar/landmark_alignment.hpp"
+#include "estimators/planar/motion_vote.hpp"
 #include "estimators/planar/relocalisation.hpp"
 #include "estimators/planar/turn_check.hpp"
 #include "model/bearing.hpp"
@@ -95,7 +97,7 @@ class PoseFilter {
     if (phase_ == Phase::kAligning) return sensor::Mode::kAligning;
     for (const std::uint8_t in_a_row : in_a_row_)
       if (in_a_row >= kDegraded) return sensor::Mode::kDegraded;
-    if (turn_.residual.contradicts()) return sensor::Mode::kDegraded;
+    if (turn_.residual.contradicts() || vote_.contradicts(now_)) return sensor::Mode::kDegraded;
     return now_ - last_absolute_ > base::Micros{5'000'000} ? sensor::Mode::kDeadReckoning : sensor::Mode::kNominal;
   }
   template <class Sink>
@@ -109,10 +111,9 @@ class PoseFilter {
     for (const checks::Persistence& refused : refused_) refused.hash_state(sink);
     turn_.residual.hash_state(sink);
     for (const std::uint8_t in_a_row : in_a_row_) sink(std::uint32_t{in_a_row});
-    sink(speed_error_mps_);
-    sink(speed_error_m2_);
-    sink(contradicted_at_.us);
+    vote_.hash_state(sink);
     sink(last_absolute_.us);
+    sink(fixed_at_.us);
     sink(std::uint32_t{jumps_});
   }
 
@@ -121,7 +122,8 @@ class PoseFilter {
   [[gnu::noinline]] void clear() { *this = {}; }
 
   enum class Phase : std::uint8_t { kWaiting, kAligning, kTracking };
-  enum Source : std::size_t { kLandmark, kGnss, kSources };
+  using Source = MotionVote::Source;
+  static constexpr Source kLandmark = MotionVote::kLandmark, kGnss = MotionVote::kGnss;
   static constexpr float kLost_rad = 1;
   static constexpr std::uint8_t kDegraded = 3;  ///< rejections in a row
   /// 1 sigma of the heading before it is known. The mean of an unscented filter would hardly move with a heading that
@@ -140,6 +142,9 @@ class PoseFilter {
   template <class Model>
   Innovation measure(const Model& model, Source source, float gate_scale, base::Micros stamp, const Context& ctx,
                      std::uint8_t landmark = 0xFF, bool named = false);
+  template <class Model>
+  auto update_by(const Model& model, float gate, base::Micros stamp, const param::GnssParameters& n)
+      -> filter::Innovation<float, Model::kDimension>;
   /// The filter goes to the pose that the search found.
   void take_rival(base::Micros stamp);
   /// Identity of the landmark that the sighting fits best; that of any where the pose is not known.
@@ -163,8 +168,7 @@ class PoseFilter {
   }
   void widen_by_vote(float place_m2, float yaw_rad2, base::Micros stamp);
   void trust_motion() {
-    speed_error_mps_ = speed_error_m2_ = 0;
-    contradicted_at_ = {};
+    vote_.reset();
     turn_.residual.reset();
   }
 
@@ -174,12 +178,11 @@ class PoseFilter {
   Relocalisation relocalisation_;
   TurnCheck turn_;
   Phase phase_ = Phase::kWaiting;
-  std::array<checks::Persistence, kSources> refused_{};  ///< rejections in a row of one kind of sensor
-  std::array<std::uint8_t, kSources> in_a_row_{};        ///< the same, which a widening does not end
-  float speed_error_mps_ = 0;                            ///< 1 sigma of the speed, beside the wheels' own noise
-  float speed_error_m2_ = 0;      ///< variance of the position by it since the last accepted measurement
-  base::Micros contradicted_at_;  ///< stamp at which landmarks and fixes last contradicted the motion; 0: never
-  base::Micros last_absolute_;    ///< stamp of the last accepted landmark or fix
+  std::array<checks::Persistence, MotionVote::kSources> refused_{};  ///< rejections in a row of one kind of sensor
+  std::array<std::uint8_t, MotionVote::kSources> in_a_row_{};        ///< the same, which a widening does not end
+  MotionVote vote_;
+  base::Micros last_absolute_;  ///< stamp of the last accepted landmark or fix
+  base::Micros fixed_at_;       ///< stamp of the last fix that was fused where its errors last; 0: none
   base::Micros now_;
   std::uint8_t jumps_ = 0;  ///< relocalisations since the start
 };
