@@ -99,6 +99,7 @@ int run(sim::Arguments& arguments) {
   if (!log) throw sim::UsageError("no LOG given (--help says more)");
   if (robot.empty() && !settings.words().empty()) throw sim::UsageError("--params and --set need --robot");
   const doctor::Diagnosis diagnosis = doctor::diagnose(*log, reading, robot_facts(robot, settings));
+  if (!diagnosis.cut_off.empty()) std::fprintf(stderr, "tetap-doctor: warning: %s\n", diagnosis.cut_off.c_str());
   if (!json.empty()) write_json(json, *log, robot, diagnosis);
   if (brief)
     print_brief(diagnosis);

@@ -45,12 +45,15 @@ void AxesDetector::window(const Window& w) {
   before_ = w;
 }
 
-AxesDetector::Votes AxesDetector::votes() const {
+AxesDetector::Votes AxesDetector::votes(bool upside_down) const {
   Votes yaw;
   if (const auto wheels = by_.turn.ratio()) yaw.add(wheels->correlation, kFollows, wheels->device, wheels->uses);
   if (const auto course = by_.course.ratio()) yaw.add(course->correlation, kFollows, course->device, course->uses);
   const ForwardDetector::Agreement forward = by_.forward.agreement();
-  yaw.add(forward.left, kFollows, "the sideways force in curves", kAccelerometer);
+  // Without a mounting, up and left turn over together, and a mirrored accelerometer looks like a mirrored gyroscope:
+  // the force then speaks for the gyroscope, or with another device against it.
+  if (robot_.mounting || (!upside_down && (forward.left > 0 || yaw.against > 0)))
+    yaw.add(forward.left, kFollows, "the sideways force in curves", kAccelerometer);
   return yaw;
 }
 
@@ -67,9 +70,10 @@ void AxesDetector::push(Code code, std::size_t axis, int uses, const std::string
 
 void AxesDetector::finish(Findings& findings) {
   if (up_s_ == Vector3{}) return;
-  const Votes yaw = votes();
   const auto upward = by_.force.upward();
-  if (upward && *upward < kDown) return judge_upside(yaw, *upward, findings);
+  const bool upside_down = upward && *upward < kDown;
+  const Votes yaw = votes(upside_down);
+  if (upside_down) return judge_upside(yaw, *upward, findings);
   judge_yaw(yaw, findings);
   judge_force(yaw, findings);
   for (std::size_t axis = 0; axis < 3; ++axis)

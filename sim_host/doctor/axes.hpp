@@ -40,7 +40,8 @@ class AxesDetector : public Detector {
     std::string words;         ///< those against, with their figures
     void add(double figure, double least, const char* device, Devices devices);
   };
-  [[nodiscard]] Votes votes() const;  ///< on the yaw rate about the mean specific force
+  /// On the yaw rate about the mean specific force.
+  [[nodiscard]] Votes votes(bool upside_down) const;
   void judge_upside(const Votes& yaw, double upward, Findings& findings) const;
   void judge_yaw(const Votes& yaw, Findings& findings) const;
   void judge_force(const Votes& yaw, Findings& findings) const;

@@ -136,7 +136,9 @@ Findings ranked(Findings findings) {
   const auto spoils = [](const Finding& one) { return one.spoils != 0 ? one.spoils : row(one.code).spoils; };
   const auto spoiled = [&](const Finding& one, bool by_axes) {
     return std::any_of(kept.begin(), kept.end(), [&](const Finding& k) {
-      return k.code != one.beside && is_gnss_axes(k.code) == by_axes && (spoils(k) & one.uses) != 0;
+      // The fixes are a third device: they show the velocity's axes.
+      const bool stays = k.code == one.beside && k.code != Code::kVelocityAxes;
+      return !stays && is_gnss_axes(k.code) == by_axes && (spoils(k) & one.uses) != 0;
     });
   };
   bool placed = false;  // by the robot's origin, which leaves no second reading of the axes
@@ -178,6 +180,7 @@ Diagnosis diagnose(const std::string& path, const sim::LogOptions& reading, cons
     examination.frame({.time = now, .offset = entry.frame.id - reading.base, .frame = entry.frame});
   }
   found.findings = ranked(examination.finish());
+  found.cut_off = log.report().cut_off;
   return found;
 }
 

@@ -15,6 +15,7 @@ struct Diagnosis {
   Findings findings;         ///< the likeliest cause first, one a code
   std::uint64_t inputs = 0;  ///< input frames of the node
   double duration_s = 0;     ///< on the bus's clock
+  std::string cut_off;       ///< as in sim::LogReport
 };
 
 /// Reads the log twice: for its clock, then for its data. Throws as LogFile does, and std::runtime_error for a log

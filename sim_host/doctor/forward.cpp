@@ -10,6 +10,7 @@ constexpr double kLeastWindows = 30;
 constexpr double kLeast_mps2 = 0.1;  ///< RMS of the motion's acceleration: less drowns in slopes and vibration
 constexpr double kSlow_mps = 1;      ///< below, the magnitude of a GNSS velocity is noise
 constexpr double kFits = 0.25;       ///< share of the force's variance, by the placing that fits best
+constexpr double kAhead = 0.6;       ///< correlation by which a force along the acceleration shows what is ahead
 constexpr double kStatedFits = 0.4;  ///< share of the best, by the one stated: a mounting 45 degrees off has half
 
 struct Placing {
@@ -37,12 +38,20 @@ double explained(const Moments<4>& m, const Placing& p) {
   return both > 0 && force2 > 0 && motion2 > 0 ? both * both / (force2 * motion2) : 0;
 }
 
+/// Two level axes of the sensor, the second to the left of the first, and up.
+Matrix3 level_axes(const Vector3& up) {
+  const Vector3 along = std::abs(up[0]) < 0.7 ? Vector3{1, 0, 0} : Vector3{0, 1, 0};
+  const Vector3 first = unit(sum(along, scaled(-dot(along, up), up)));
+  return {first, cross(up, first), up};
+}
+
 }  // namespace
 
 void ForwardDetector::add(Source& source, std::optional<double> speed_mps, const Window& w) {
   if (source.speed_mps && speed_mps && before_ && before_->force_s_mps2 && w.force_s_mps2 && w.turn_s_radps &&
       w.start_s - before_->start_s < 1.5) {
-    const Vector3 force = rotated(*robot_.mounting, scaled(0.5, sum(*before_->force_s_mps2, *w.force_s_mps2)));
+    const Matrix3 axes = robot_.mounting ? *robot_.mounting : level_axes(w.up_s);
+    const Vector3 force = rotated(axes, scaled(0.5, sum(*before_->force_s_mps2, *w.force_s_mps2)));
     const Vector3 turn = scaled(0.5, sum(*before_->turn_s_radps, *w.turn_s_radps));
     const double speed = 0.5 * (*source.speed_mps + *speed_mps);
     source.moments.add({force[0], force[1], (*speed_mps - *source.speed_mps) / (w.start_s - before_->start_s),
@@ -52,7 +61,6 @@ void ForwardDetector::add(Source& source, std::optional<double> speed_mps, const
 }
 
 void ForwardDetector::window(const Window& w) {
-  if (!robot_.mounting) return;
   std::optional<double> wheels, gnss;
   if (w.wheels) wheels = 0.5 * w.wheels->sum_mps;
   if (w.velocity_n_mps) gnss = std::hypot((*w.velocity_n_mps)[0], (*w.velocity_n_mps)[1]);
@@ -68,6 +76,10 @@ ForwardDetector::Agreement ForwardDetector::agreement() const {
   Agreement found{.device = wheels ? "the wheels" : "GNSS", .uses = wheels ? kWheels : kGnssVelocity};
   if (m.count() < kLeastWindows) return found;
   constexpr double kLeast2 = kLeast_mps2 * kLeast_mps2;
+  if (!robot_.mounting) {
+    if (m.covariance(2, 2) > kLeast2 && m.covariance(3, 3) > kLeast2) add_seen(m, found);
+    return found;
+  }
   if (m.covariance(2, 2) > kLeast2)
     found.ahead = correlation(m.covariance(0, 2), m.covariance(0, 0), m.covariance(2, 2));
   if (m.covariance(3, 3) < kLeast2) return found;
@@ -80,7 +92,20 @@ ForwardDetector::Agreement ForwardDetector::agreement() const {
   return found;
 }
 
+void ForwardDetector::add_seen(const Moments<4>& m, Agreement& found) {
+  const double first = m.covariance(0, 2), second = m.covariance(1, 2), size = std::hypot(first, second);
+  if (!(size > 0)) return;
+  const std::array<double, 4> forward{first / size, second / size, 0, 0}, left{-second / size, first / size, 0, 0};
+  const std::array<double, 4> acceleration{0, 0, 1, 0}, curve{0, 0, 0, 1};
+  const double ahead =
+      correlation(m.covariance(forward, acceleration), m.covariance(forward, forward), m.covariance(2, 2));
+  if (ahead < kAhead) return;
+  found.ahead = ahead;
+  found.left = correlation(m.covariance(left, curve), m.covariance(left, left), m.covariance(3, 3));
+}
+
 void ForwardDetector::finish(Findings& findings) {
+  if (!robot_.mounting) return;
   if (wheels_.moments.count() >= kLeastWindows)
     judge(wheels_, "the wheels", kWheels, findings);
   else if (gnss_.moments.count() >= kLeastWindows)

@@ -19,7 +19,7 @@ class ForwardDetector : public Detector {
   void window(const Window& w) override;
   void finish(Findings& findings) override;
   /// Correlation of the force ahead with the acceleration, and of the force to the left with speed times turn rate; 0
-  /// where nothing is known.
+  /// where nothing is known. Without a mounting, ahead is where the force follows the acceleration.
   struct Agreement {
     double ahead = 0, left = 0;
     const char* device = "";
@@ -35,6 +35,8 @@ class ForwardDetector : public Detector {
     Moments<4> moments;               ///< force forward and left, acceleration, speed times turn rate
   };
   void add(Source& source, std::optional<double> speed_mps, const Window& w);
+  /// Agreement of level axes whose heading in the robot is not known.
+  static void add_seen(const Moments<4>& m, Agreement& found);
   void judge(const Source& source, const char* name, Devices device, Findings& findings) const;
 
   const RobotFacts& robot_;

@@ -111,13 +111,13 @@ void TurnDetector::judge_wheels(double gyro2, double by_difference, double by_su
   const double difference2 = by_difference * by_difference, sum2 = by_sum * by_sum;
   const Devices uses = kGyroscope | kAccelerometer | kWheels;
   if (difference2 > kExplained && by_difference < 0 && sum2 < difference2) {
-    const std::string factor = scale_.known || message_ == "In_BodySpeed"
-                                   ? text("%.2f times", -std::sqrt(moments_.covariance(3, 3) / gyro2) / scale_.track_m)
-                                   : std::string("against");
+    const std::string factor =
+        knows_size() ? text("by %.2f times", -std::sqrt(moments_.covariance(3, 3) / gyro2) / scale_.track_m)
+                     : std::string("against");
     findings.push_back({.code = Code::kWheelsSwapped,
                         .uses = uses,
                         .certainty = -by_difference,
-                        .evidence = text("The wheels turn the robot by %s the gyroscope's yaw rate over %.0f s "
+                        .evidence = text("The wheels turn the robot %s the gyroscope's yaw rate over %.0f s "
                                          "(correlation %.2f).",
                                          factor.c_str(), moments_.count(), by_difference),
                         .change = message_ == "In_BodySpeed"

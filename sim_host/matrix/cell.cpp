@@ -53,17 +53,24 @@ std::string real(double value) {
 
 }  // namespace
 
+void set_kind(FrameFault& fault, const std::string& kind) {
+  const bool spike = kind.starts_with("spike");
+  if (spike) {
+    const char* const last = kind.data() + kind.size();
+    const auto [end, error] = std::from_chars(kind.data() + 5, last, fault.samples);
+    if (error != std::errc{} || end != last || fault.samples < 1)
+      throw std::runtime_error("kind of fault '" + kind + "': a spike has its number of samples, as in spike2");
+  }
+  fault.kind = fault_kind(spike ? "spike" : kind);
+  fault.duration = lasts(fault);
+}
+
 CellRequest::CellRequest(const std::string& line) {
   std::istringstream words(line);
   std::string kind, left;
   if (!(words >> situation >> fault.sensor >> fault.axis >> kind >> size) || words >> left)
     throw std::runtime_error("cell '" + line + "': it is SITUATION SENSOR AXIS KIND SIZE");
-  if (kind.starts_with("spike")) {
-    fault.samples = static_cast<int>(number_of(kind, 5, 0));
-    kind = "spike";
-  }
-  fault.kind = fault_kind(kind);
-  fault.duration = lasts(fault);
+  set_kind(fault, kind);
 }
 
 FrameGeometry geometry_of(const CleanLog& log) {

@@ -26,6 +26,10 @@ struct CellRequest {
   explicit CellRequest(const std::string& line);
 };
 
+/// Kind and usual duration of a fault whose sensor is known; a spike has its number of samples behind it (spike2).
+/// Throws std::runtime_error.
+void set_kind(FrameFault& fault, const std::string& kind);
+
 /// State of the robot and its devices when a fault begins.
 struct CellFacts {
   Uncertainty uncertainty;

@@ -189,6 +189,7 @@ CleanLog recorded_log(const std::string& robot, const std::string& path, const s
     }
     log.frames.push_back({log.ticks.back(), f.frame});
   }
+  if (!file.report().cut_off.empty()) throw std::runtime_error(file.report().cut_off);
   log.first.push_back(log.frames.size());
   log.truth = truth_at(log.ticks, truth_rows(truth));
   return log;

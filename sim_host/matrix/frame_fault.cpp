@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 #include <iterator>
+#include <numeric>
 #include <optional>
 #include <stdexcept>
 #include <utility>
@@ -50,6 +51,7 @@ class Channels {
 
  private:
   [[noreturn]] void refuse() const {
+    require_known(fault_);
     throw std::runtime_error("fault: sensor '" + fault_.sensor + "' has no axis '" + fault_.axis + "'");
   }
   void add(std::string_view message, std::string_view signal, Form form = Form::kValue, double per_unit = 1,
@@ -156,21 +158,36 @@ class Injector {
     for (std::size_t i = 0; i < frames_.size(); ++i) {
       const TimedFrame& f = frames_[i];
       if (f.frame.extended || f.frame.id < geometry_.base)
-        result_.frames.push_back(f);
+        put(f, i);
       else if (fault_.sensor == "frames")
-        whole_frame(f);
+        whole_frame(f, i);
       else
         values(i);
     }
-    std::stable_sort(result_.frames.begin(), result_.frames.end(),
-                     [](const auto& a, const auto& b) { return a.time < b.time; });
+    sort();
     return std::move(result_);
   }
 
  private:
   [[nodiscard]] bool during(base::Micros t) const { return t >= fault_.start && t < fault_.start + fault_.duration; }
 
-  void whole_frame(TimedFrame f) {
+  void put(const TimedFrame& frame, std::size_t origin) {
+    result_.frames.push_back(frame);
+    result_.origins.push_back(origin);
+  }
+  void sort() {
+    const std::vector<TimedFrame> frames = std::move(result_.frames);
+    const std::vector<std::size_t> origins = std::move(result_.origins);
+    std::vector<std::size_t> order(frames.size());
+    std::iota(order.begin(), order.end(), std::size_t{0});
+    std::stable_sort(order.begin(), order.end(),
+                     [&](std::size_t a, std::size_t b) { return frames[a].time < frames[b].time; });
+    result_.frames.clear();
+    result_.origins.clear();
+    for (const std::size_t i : order) put(frames[i], origins[i]);
+  }
+
+  void whole_frame(TimedFrame f, std::size_t i) {
     const std::uint32_t offset = f.frame.id - geometry_.base;
     const bool hit = during(f.time) && std::find(whole_.begin(), whole_.end(), offset) != whole_.end();
     result_.changed += hit ? 1 : 0;
@@ -179,8 +196,8 @@ class Injector {
     if (hit && fault_.kind == FaultKind::kNotAvailable)
       for (const DbcSignal& signal : dbc_.at(offset)->signals)
         if (signal.has_not_available()) signal.set_raw(f.frame, signal.not_available());
-    result_.frames.push_back(f);
-    if (hit && fault_.kind == FaultKind::kRepeated) result_.frames.push_back(f);
+    put(f, i);
+    if (hit && fault_.kind == FaultKind::kRepeated) put(f, i);
   }
 
   void values(std::size_t i) {
@@ -193,7 +210,7 @@ class Injector {
                                                        : value(channels_[k], memory_[k], f, i)) ||
                   changed;
     result_.changed += changed ? 1 : 0;
-    result_.frames.push_back(f);
+    put(f, i);
   }
 
   /// Whether this sample has the fault; counts it.
@@ -317,6 +334,27 @@ FaultKind fault_kind(std::string_view name) {
 
 std::string_view name(FaultKind kind) { return kNames[static_cast<std::size_t>(kind)]; }
 
+void require_known(const FrameFault& fault) {
+  const auto named = [](std::string_view words, std::string_view word) {
+    return !word.empty() && (" " + std::string(words) + " ").find(" " + std::string(word) + " ") != std::string::npos;
+  };
+  const auto sensor = std::find_if(kFaultSensors.begin(), kFaultSensors.end(),
+                                   [&](const FaultSensor& one) { return one.name == fault.sensor; });
+  if (sensor == kFaultSensors.end()) {
+    std::string all;
+    for (const FaultSensor& one : kFaultSensors) all += (all.empty() ? "" : " ") + std::string(one.name);
+    throw std::runtime_error("no sensor '" + fault.sensor + "'; there are: " + all);
+  }
+  const bool frames = fault.sensor == "frames", device = frames || fault.sensor == "stamps";
+  if (!named(sensor->axes, fault.axis))
+    throw std::runtime_error(fault.sensor + ": no " + (device ? "device '" : "axis '") + fault.axis +
+                             "'; there are: " + std::string(sensor->axes));
+  const std::string_view kinds = frames ? kFrameKinds : kValueKinds;
+  if (!named(kinds, name(fault.kind)))
+    throw std::runtime_error(fault.sensor + ": no kind '" + std::string(name(fault.kind)) +
+                             "'; there are: " + std::string(kinds));
+}
+
 std::vector<std::uint32_t> device_messages(std::string_view device, unsigned imu, const BusDatabase& dbc) {
   const std::string number = "In_Imu" + std::to_string(imu);
   const std::vector<std::pair<std::string_view, std::vector<std::string>>> devices{
@@ -331,7 +369,8 @@ std::vector<std::uint32_t> device_messages(std::string_view device, unsigned imu
   for (const auto& [name, messages] : devices)
     if (name == device)
       for (const std::string& message : messages) offsets.push_back(dbc.message(message).offset);
-  if (offsets.empty()) throw std::runtime_error("fault: no device '" + std::string(device) + "'");
+  if (offsets.empty())
+    throw std::runtime_error("no device '" + std::string(device) + "'; there are: " + std::string(kFaultDevices));
   return offsets;
 }
 

@@ -7,6 +7,7 @@
 #include "sim_host/play/log.hpp"
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <string>
@@ -34,9 +35,33 @@ enum class FaultKind : std::uint8_t {
 [[nodiscard]] FaultKind fault_kind(std::string_view name);
 [[nodiscard]] std::string_view name(FaultKind kind);
 
+/// A sensor that faults act on, and its axes with blanks between; those of stamps and frames are devices.
+struct FaultSensor {
+  std::string_view name, axes;
+};
+inline constexpr std::string_view kFaultDevices = "imu wheels gnss magnetometer barometer heading landmarks";
+inline constexpr std::array kFaultSensors{FaultSensor{"gyro", "x y z"},
+                                          FaultSensor{"accel", "x y z"},
+                                          FaultSensor{"wheels", "left right both"},
+                                          FaultSensor{"speed", "forward yaw"},
+                                          FaultSensor{"gnss_position", "north east up"},
+                                          FaultSensor{"gnss_velocity", "north east up"},
+                                          FaultSensor{"gnss_both", "north east up"},
+                                          FaultSensor{"gnss_accuracy", "horizontal vertical velocity all"},
+                                          FaultSensor{"magnetometer", "x y z"},
+                                          FaultSensor{"barometer", "pressure"},
+                                          FaultSensor{"heading", "angle"},
+                                          FaultSensor{"heading_accuracy", "angle"},
+                                          FaultSensor{"landmarks", "range bearing"},
+                                          FaultSensor{"stamps", kFaultDevices},
+                                          FaultSensor{"frames", kFaultDevices}};
+
+/// Kinds that act on values, and those of whole frames.
+inline constexpr std::string_view kValueKinds = "offset spike step ramp scale sign dead stuck not_available";
+inline constexpr std::string_view kFrameKinds = "delayed repeated lost not_available";
+
 struct FrameFault {
-  std::string sensor;  ///< gyro accel wheels speed gnss_position gnss_velocity gnss_both gnss_accuracy magnetometer
-                       ///< barometer heading heading_accuracy landmarks stamps frames
+  std::string sensor;  ///< name of kFaultSensors
   std::string axis;    ///< axis of the sensor; the device of stamps and frames
   FaultKind kind = FaultKind::kOffset;
   /// Size of offset, spike, step and ramp: rad/s, m/s2, m/s, m, uT, Pa, rad; for stamps s. Scale: the factor.
@@ -47,6 +72,9 @@ struct FrameFault {
   base::Micros start;
   base::Micros duration;
 };
+
+/// Throws std::runtime_error, with the names that there are, where no sensor, axis or kind of this sensor is called so.
+void require_known(const FrameFault& fault);
 
 /// Numbers of the robot that frames do not carry.
 struct FrameGeometry {
@@ -59,16 +87,17 @@ struct FrameGeometry {
 };
 
 struct Faulted {
-  std::vector<TimedFrame> frames;  ///< in the order of their times
-  std::uint64_t changed = 0;       ///< frames altered, taken out, put in or delayed
-  double largest = 0;              ///< largest change of a value, in the unit of the fault's size
+  std::vector<TimedFrame> frames;    ///< in the order of their times
+  std::vector<std::size_t> origins;  ///< indices of the frames that they come from
+  std::uint64_t changed = 0;         ///< frames altered, taken out, put in or delayed
+  double largest = 0;                ///< largest change of a value, in the unit of the fault's size
 };
 
-/// Throws std::runtime_error where the sensor has no such axis.
+/// Throws as require_known does.
 [[nodiscard]] Faulted put_fault(std::span<const TimedFrame> frames, const FrameFault& fault,
                                 const FrameGeometry& geometry, const BusDatabase& dbc);
 
-/// Offsets of the messages that a device sends: imu wheels speed gnss magnetometer barometer heading landmarks.
+/// Offsets of the messages that a device of kFaultDevices sends.
 [[nodiscard]] std::vector<std::uint32_t> device_messages(std::string_view device, unsigned imu, const BusDatabase& dbc);
 
 /// Largest size of a value fault that the sensor's frames can carry, in the fault's unit.

@@ -41,14 +41,19 @@ std::FILE* copy_of(std::FILE* from) {
 
 }  // namespace
 
-std::optional<TimedFrame> LogParser::add(std::string_view text) {
+std::optional<TimedFrame> LogParser::add(std::string_view text, bool ended) {
   constexpr base::Micros kLongGap{60'000'000};
   ++number_;
   const auto place = [this] { return report_.name + ":" + std::to_string(number_); };
+  const auto cut_off = [&] {
+    report_.cut_off = place() + ": the last line is cut off and left out: '" + excerpt(text) + "'";
+    return std::nullopt;
+  };
   const auto parsed = parse_log_line(text);
   const auto* line = std::get_if<LogLine>(&parsed);
   if (line == nullptr) {
     if (text.find_first_not_of(" \t\r") == std::string_view::npos) return std::nullopt;
+    if (!ended) return cut_off();
     const std::string message =
         place() + ": " + std::string(std::get<BadLine>(parsed).reason) + ": '" + excerpt(text) + "'";
     if (!options_.keep_going) throw std::runtime_error(message);
@@ -58,10 +63,12 @@ std::optional<TimedFrame> LogParser::add(std::string_view text) {
   if (!options_.interface.empty() && line->interface != options_.interface)
     return ++report_.other_interface, std::nullopt;
   if (line->kind != LogLine::Kind::kData) return ++report_.not_data, std::nullopt;
+  const base::CanFrame frame = line->classic();
+  // Every message of a node's block has eight bytes.
+  if (!ended && frame.size != 8 && !frame.extended && frame.id / 0x40 == options_.base / 0x40) return cut_off();
   if (line->time < latest_) ++report_.back_in_time;
   if (report_.data++ > 0 && kLongGap < line->time - latest_ && report_.gaps++ == 0) report_.first_gap = place();
   latest_ = std::max(latest_, line->time);
-  const base::CanFrame frame = line->classic();
   constexpr std::uint32_t kInputs = 0x20;
   const bool input = !frame.extended && frame.id >= options_.base && frame.id < options_.base + kInputs;
   if (input && frame.size != 8 && report_.wrong_length++ == 0) report_.first_wrong_length = place();
@@ -96,28 +103,28 @@ bool LogFile::read_block() {
   return got > 0;
 }
 
-bool LogFile::next_line(std::string_view& line) {
+bool LogFile::next_line(TextLine& line) {
   std::size_t searched = 0;
   for (;;) {
     const std::string_view rest(block_.data() + begin_, end_ - begin_);
     const std::size_t found = rest.find('\n', searched);
     if (found != std::string_view::npos) {
-      line = rest.substr(0, found);
+      line = {rest.substr(0, found), true};
       begin_ += found + 1;
       return true;
     }
     searched = rest.size();
     if (read_block()) continue;
-    line = std::string_view(block_.data() + begin_, end_ - begin_);
+    line = {std::string_view(block_.data() + begin_, end_ - begin_), false};
     begin_ = end_;
-    return !line.empty();
+    return !line.text.empty();
   }
 }
 
 bool LogFile::next(TimedFrame& frame) {
-  std::string_view line;
+  TextLine line;
   while (next_line(line)) {
-    const auto found = parser_.add(line);
+    const auto found = parser_.add(line.text, line.ended);
     if (!found) continue;
     frame = *found;
     return true;
@@ -142,7 +149,7 @@ Log parse_log(std::string_view text, const std::string& name, const LogOptions& 
   Log log;
   while (!text.empty()) {
     const std::size_t end = text.find('\n');
-    if (const auto frame = parser.add(text.substr(0, end))) log.frames.push_back(*frame);
+    if (const auto frame = parser.add(text.substr(0, end), end != std::string_view::npos)) log.frames.push_back(*frame);
     text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
   }
   static_cast<LogReport&>(log) = parser.report();

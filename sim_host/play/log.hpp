@@ -41,6 +41,7 @@ struct LogReport {
   std::string first_wrong_length;  ///< "file:line"
   std::uint64_t gaps = 0;          ///< pauses of more than a minute between frames
   std::string first_gap;           ///< "file:line"
+  std::string cut_off;             ///< "file:line: reason: 'text'": the last line, which ends within a frame
 };
 
 /// Classic data frames in the order of a log, as often as asked for.
@@ -79,8 +80,9 @@ class LogParser {
   LogParser(const std::string& name, const LogOptions& options) : options_(options) { report_.name = name; }
 
   /// The line's frame; nothing for a blank line and for what is counted instead. Throws
-  /// std::runtime_error("name:line: reason: 'text'") for a malformed line unless set to keep going.
-  std::optional<TimedFrame> add(std::string_view line);
+  /// std::runtime_error("name:line: reason: 'text'") for a malformed line unless set to keep going. `ended`: a newline
+  /// follows. A last line without one is a frame where it is whole, else it is reported as cut off.
+  std::optional<TimedFrame> add(std::string_view line, bool ended = true);
   [[nodiscard]] const LogReport& report() const { return report_; }
 
  private:
@@ -104,7 +106,11 @@ class LogFile : public Frames {
   [[nodiscard]] const LogReport& report() const { return report_ ? *report_ : parser_.report(); }
 
  private:
-  bool next_line(std::string_view& line);
+  struct TextLine {
+    std::string_view text;
+    bool ended = true;  ///< by a newline
+  };
+  bool next_line(TextLine& line);
   bool read_block();
   [[noreturn]] void refuse(const std::string& reason) const;
 

@@ -94,6 +94,12 @@ void OutFile::publish() {
     throw std::runtime_error(path_ + ": cannot be written: " + std::strerror(errno));
 }
 
+void OutFile::discard() {
+  file_.reset();
+  std::error_code none;
+  if (written_ != path_) std::filesystem::remove(written_, none);
+}
+
 std::string OutFile::close() {
   std::string hash = end();
   publish();

@@ -61,6 +61,8 @@ class OutFile {
   /// end() and publish().
   std::string close();
   void flush();
+  /// Takes the file away that was written aside, before publish().
+  void discard();
 
  private:
   static constexpr std::size_t kBlock = 1 << 18;

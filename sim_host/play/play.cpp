@@ -193,6 +193,7 @@ void warn_about(const LogReport& log, const char* program) {
   if (log.wrong_length > 0)
     warn(log.first_wrong_length + ": an input frame that has not 8 bytes; the node refuses and counts it (Malformed)" +
          (log.wrong_length > 1 ? ", the first of " + std::to_string(log.wrong_length) : std::string()));
+  if (!log.cut_off.empty()) warn(log.cut_off);
   if (log.gaps > 0)
     warn(log.first_gap + ": more than a minute after the frame before" +
          (log.gaps > 1 ? ", the first of " + std::to_string(log.gaps) + " such gaps" : std::string()));

@@ -141,6 +141,21 @@ TEST(Log, FramesThatAreNoneOfOursAreCountedNotPlayed) {
   EXPECT_EQ(log.not_data, 3U);
 }
 
+TEST(Log, ALastLineWithoutNewlineIsTakenWholeOrNamed) {
+  const std::string first = "(1.0) can0 301#0011223344556677\n", last = "(1.1) can0 302#0011223344556677";
+  EXPECT_EQ(parse_log(first + last, "x").frames.size(), 2U);
+  EXPECT_EQ(parse_log(first + last, "x").cut_off, "");
+  for (std::size_t kept = 1; kept < last.size(); ++kept) {
+    const Log log = parse_log(first + last.substr(0, kept), "x");
+    EXPECT_EQ(log.frames.size(), 1U) << kept;
+    EXPECT_EQ(log.cut_off, "x:2: the last line is cut off and left out: '" + last.substr(0, kept) + "'");
+    EXPECT_EQ(log.malformed + log.wrong_length, 0U);
+  }
+  // Frames of others may have fewer bytes.
+  EXPECT_EQ(parse_log(first + "(1.1) can0 123#0011", "x").frames.size(), 2U);
+  EXPECT_EQ(parse_log(first + "(1.1) can0 301#0011\n", "x").wrong_length, 1U);
+}
+
 /// A file that is gone with the test.
 class LogOnDisk : public testing::Test {
  protected:
@@ -231,6 +246,16 @@ TEST_F(LogOnDisk, ALogThatGrowsIsReadAgainAsFarAsBefore) {
   std::ofstream(path_, std::ios::app) << "11223344556677\n(3.0) can0 301#0011223344556677\n";
   file.rewind();
   expect_same(read(file), first);
+}
+
+TEST_F(LogOnDisk, ALastLineThatIsCutOffIsNamedAfterEveryReading) {
+  write("(1.0) can0 301#0011223344556677\n(2.0) can0 301#00");
+  LogFile file(path_, {});
+  for (int reading = 0; reading < 2; ++reading) {
+    EXPECT_EQ(read(file).size(), 1U);
+    EXPECT_EQ(file.report().cut_off, path_ + ":2: the last line is cut off and left out: '(2.0) can0 301#00'");
+    file.rewind();
+  }
 }
 
 TEST_F(LogOnDisk, ALogThatShrinksIsNamed) {

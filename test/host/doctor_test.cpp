@@ -109,6 +109,12 @@ TEST(Ranking, TwoCausesOfOneComparisonAreNamedOneAfterTheOther) {
   EXPECT_EQ(codes(spoilt), std::vector{Code::kDegForRad});
 }
 
+TEST(Ranking, AVelocityWhoseAxesTheFixesShowSaysNothingOfTheGyroscope) {
+  const Findings found = ranked({beside(Code::kGyroSign, kGyroscope | kGnssVelocity, Code::kVelocityAxes),
+                                 finding(Code::kVelocityAxes, kFixes | kGnssVelocity)});
+  EXPECT_EQ(codes(found), std::vector{Code::kVelocityAxes});
+}
+
 /// Gravity or a field that a body sees while it turns about all axes, a gyroscope with these factors beside it.
 std::array<AxisFactor, 3> seen_factors(const Vector3& world, const Vector3& gyro_factors) {
   VectorTurn turns;

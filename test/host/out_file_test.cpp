@@ -116,6 +116,16 @@ TEST_F(OutFileInAFolder, ThatIsGivenUpLeavesTheOldOne) {
   EXPECT_EQ(text_of("a.csv"), "old");
 }
 
+TEST_F(OutFileInAFolder, ThatIsDiscardedLeavesNothingAside) {
+  put("a.csv", "old");
+  OutFile file(path("a.csv"));
+  file.write("half");
+  file.flush();
+  file.discard();
+  EXPECT_EQ(text_of("a.csv"), "old");
+  EXPECT_EQ(files(), 1U);
+}
+
 TEST_F(OutFileInAFolder, BehindALinkIsReplacedAndTheLinkStays) {
   put("real.csv", "old");
   std::filesystem::create_symlink(path("real.csv"), path("link.csv"));

@@ -91,6 +91,9 @@ echo "(1.000000) vcan0 123#00" >"$work/bad.log"; refused "a log without the node
 refused "a record of a node with other numbers" 'the recorded node was another robot or ran with other numbers .Est_Version.Config.: .* differ.*; --lockstep plays' \
   "$programs/tetap-play" "$work/recorded/raw.log" --memory --robot rover_landmarks_matched --out "$work/out" --quiet
 log_with; refused "a log that is no record" 'bad.log: cannot be repeated' play --as-recorded
+printf '(1.0) vcan0 308#0000000000000000\n(1.01) vcan0 308#00000000' >"$work/bad.log"
+play 2>"$work/stderr" && grep -q 'bad.log:2: the last line is cut off and left out' "$work/stderr" || {
+  echo "WRONG  a last line that is cut off is left out and named"; failed=$((failed + 1)); }
 refused "no such log" 'nowhere.log: cannot be read: No such file' "$programs/tetap-play" "$work/nowhere.log" --memory --robot mrclam
 refused "no such log (over a bus that is none)" 'nowhere.log: cannot be read: No such file' "$programs/tetap-play" "$work/nowhere.log" --can nobus0
 doctor() { "$programs/tetap-doctor" "$work/bad.log" --robot rover "$@"; }
@@ -114,7 +117,7 @@ refused "a robot that does not exist (node)" "no robot 'tank'; $robots" "$progra
 refused "a robot that does not exist (player, over a bus)" "no robot 'tank'; $robots" "$programs/tetap-play" "$work/good.log" --robot tank
 refused "a robot that does not exist (world, over a bus)" "no robot 'tank'; $robots" "$programs/tetap-world" --robot tank --out "$work/out"
 refused "a robot that does not exist (world)" "no robot 'tank'; $robots" "$programs/tetap-world" --memory --robot tank --out "$work/out"
-for program in play node world record doctor; do
+for program in play node world record doctor inject; do
   refused "an unknown option (tetap-$program)" "tetap-$program: .*--frobnicate" "$programs/tetap-$program" --frobnicate
 done
 refused "an option without its value" '--robot' "$programs/tetap-play" "$work/good.log" --memory --robot
@@ -166,6 +169,8 @@ done
 # Tools
 refused "replay without a log" 'replay: which log' env -u LOG tools/run/replay_log
 refused "replay of no such log" 'replay: nowhere.log: no such file' env LOG=nowhere.log tools/run/replay_log
+refused "replay of a folder" "replay: $work: a folder, not a log" timeout 20 env LOG="$work" tools/run/replay_log
+refused "a folder for a log (make doctor)" "doctor: $work: a folder, not a log" env LOG="$work" tools/run/diagnose_log
 refused "replay against no such truth" 'replay: nowhere.csv: no such file' env LOG="$work/good.log" TRUTH=nowhere.csv tools/run/replay_log
 refused "replay on a bus of another kind" "replay: BUS=lin" env LOG="$work/good.log" BUS=lin tools/run/replay_log
 refused "replay of a board in memory" 'BUS=memory' env LOG="$work/good.log" BUS=memory BOARD=zynqmp_r5 tools/run/replay_log
@@ -190,6 +195,11 @@ for program in replay_log simulate_world; do
 done
 refused "replay on no such board" "no board 'arduino'" env LOG="$work/good.log" BOARD=arduino OUT="$work/out" tools/run/replay_log
 refused "sim on no such board" "no board 'arduino'" env BOARD=arduino OUT="$work/out" tools/run/simulate_world
+for board in ark_cannode nucleo_g474re; do
+  refused "sim on $board" "no board '$board' here; .*: make board BOARD=$board$" timeout 20 env BOARD=$board OUT="$work/out" tools/run/simulate_world
+  refused "replay on $board" "no board '$board' here; .*: make board BOARD=$board$" timeout 20 env LOG="$work/good.log" BOARD=$board OUT="$work/out" tools/run/replay_log
+done
+refused "sim at a pace that is not 1" 'sim: REALTIME=0: it is 1 or empty' env BUS=memory REALTIME=0 OUT="$work/out" WORLD="--duration 1" tools/run/simulate_world
 refused "sim with an unknown fault" 'meteor' env BUS=memory FAULT=meteor OUT="$work/out" tools/run/simulate_world
 refused "sim with a fault whose start is no number" "fault 'gnss_jump@soon': START is not" env BUS=memory FAULT=gnss_jump@soon OUT="$work/out" tools/run/simulate_world
 refused "sim with an unknown fault over a bus" "fault 'meteor'" timeout 20 env FAULT=meteor OUT="$work/out" tools/run/simulate_world

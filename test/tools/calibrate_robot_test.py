@@ -650,7 +650,40 @@ class Program(unittest.TestCase):
             for name in ("imu", "wheels", "gnss", "velocity"):
                 np.testing.assert_array_equal(getattr(log, name).t, getattr(alone, name).t)
         self.one_line(["begins anew here", "two runs in one log"], self.file(run + begin + run))
-        self.one_line(["node's time goes back from 1.490 s to 0.000 s"], self.file(own(1_000_000, 1_500_000) + own(0, 100_000) + run))
+        self.one_line(["node's time goes back from 1.490 s to 0.000 s"], self.file(own(1_000_000, 1_500_000) + own(0, 100_000) + run.replace(b" 300#", b" 7A0#")))
+
+    def test_epochs_before_the_first_step_are_left_out_and_named(self):
+        times = np.arange(1_010_000, 41_000_000, 10_000)
+        made = drive(3, np.eye(3), duration_s=40)
+        made.log.add("In_Sync", times, Time=times, Kind=1)
+        steps = made.text()
+        alone = recording.Log(self.file(steps), bus_writer.DEFAULT_DBC, 0x300)
+
+        def own(from_us, to_us):
+            return b"".join(b"(0.5) can0 320#" + int(t).to_bytes(6, "little").hex().upper().encode() + b"0000\n" for t in range(from_us, to_us, 10_000))
+
+        early = b"(0.5) can0 308#0000000000000000\n(0.5) can0 308#0000000000000000\n"  # samples by nobody knows which clock
+        for from_us in (0, 3_700_000, 60_000_000):
+            path = self.file(own(from_us, from_us + 300_000) + early + own(from_us + 300_000, from_us + 500_000) + steps)
+            log = recording.Log(path, bus_writer.DEFAULT_DBC, 0x300)
+            for name in ("imu", "wheels", "gnss", "velocity"):
+                np.testing.assert_array_equal(getattr(log, name).t, getattr(alone, name).t)
+            self.assertEqual(log.dropped["frames of sensors before the first In_Sync"], 2)
+            self.assertRegex(log.notes[0], r"a\.log:\d+: the first In_Sync tells 1\.010 s; left out: 50 epochs before it by the node's own clock")
+        # Epochs that agree with In_Sync are the node's time, too.
+        log = recording.Log(self.file(own(1_000_000, 1_010_000) + steps), bus_writer.DEFAULT_DBC, 0x300)
+        self.assertEqual((log.notes, log.dropped), ([], {}))
+
+    def test_a_last_line_without_newline_is_taken_whole_or_named(self):
+        good = drive(1, np.eye(3), duration_s=20).text()
+        whole = recording.Log(self.file(good), bus_writer.DEFAULT_DBC, 0x300)
+        taken = recording.Log(self.file(good[:-1]), bus_writer.DEFAULT_DBC, 0x300)
+        self.assertEqual((taken.notes, taken.duration_s, len(taken.wheels)), ([], whole.duration_s, len(whole.wheels)))
+        lines = good.count(b"\n")
+        for cut in (2, 3, 10, 20, 40):
+            log = recording.Log(self.file(good[:-cut]), bus_writer.DEFAULT_DBC, 0x300)
+            self.assertEqual(len(log.notes), 1)
+            self.assertIn(f"a.log:{lines}: the last line is cut off and left out: ", log.notes[0])
 
     def test_no_log_makes_it_fall_over_or_print_a_nan(self):
         """Bytes of a good log changed at random: a result, a refusal or one line; nothing else."""

@@ -463,6 +463,28 @@ class Doctor(unittest.TestCase):
         self.assertAlmostEqual(float(factor[1]), -1, delta=0.25)
         self.assertGreater(int(factor[2]), 60)
 
+    def test_without_a_robot_one_cause_is_named_where_a_third_device_shows_it(self):
+        for name, mistake, code, words in (
+                ("yard", swap_wheels, "wheels_swapped", r"^The wheels turn the robot against the gyroscope's yaw rate over \d+ s \(correlation -0\.9\d\)\.$"),
+                ("husky_sim", swap_wheels, "wheels_swapped", r"by -1\.\d\d times the gyroscope's yaw rate"),
+                ("yard", reverse_axis(GYRO, "AngZ"), "gyro_sign", r"against the wheels \(-0\.9\d\), the sideways force in curves \(-0\.\d\d\)"),
+                ("road", swap_velocity, "velocity_axes", r"East and North swapped")):
+            found = self.examine(mistake(self.logs.frames(name)), "")
+            self.assertEqual([one["code"] for one in found], [code], f"{code} in {name}")
+            self.assertRegex(found[0]["evidence"], words)
+
+    def test_a_last_line_that_is_cut_off_is_named(self):
+        log = os.path.join(self.directory.name, "cut.log")
+        self.logs.frames("yard").write(log)
+        with open(log, "rb") as file:
+            text = file.read()
+        for kept, said in ((text[:-1], ""), (text[:-5], f"tetap-doctor: warning: {log}:{text.count(bytes([10]))}: the last line is cut off and left out: ")):
+            with open(log, "wb") as file:
+                file.write(kept)
+            done = subprocess.run([os.path.join(PROGRAMS, "tetap-doctor"), log], capture_output=True, text=True)
+            self.assertEqual((done.returncode, done.stderr.count("\n")), (0, 1 if said else 0))
+            self.assertTrue(done.stderr.startswith(said))
+
     @unittest.skipUnless(WHOLE, "plays a whole log: whole form alone")
     def test_a_replay_ends_with_the_likeliest_cause(self):
         log, out = (os.path.join(self.directory.name, one) for one in ("played.log", "played"))

@@ -72,7 +72,7 @@ class FlashBoard(unittest.TestCase):
         printed = self.flash("--probe", "stlink")
         flashing = f"st-flash --reset write {self.image.replace('.elf', '.bin')} 0x08000000"
         self.assertIn(f"flash: {flashing}\n", printed)
-        self.assertIn(f"64 bytes at 0x08000000, sha256 of the .bin {hashlib.sha256(CODE).hexdigest()}", printed)
+        self.assertIn(f"robot.bin, 64 bytes, sha256 {hashlib.sha256(CODE).hexdigest()}, to 0x08000000", printed)
         self.assertIn("SWDIO is PA13", printed)
         self.assertEqual(self.called(), ["st-info --probe", flashing])
 
@@ -88,6 +88,17 @@ class FlashBoard(unittest.TestCase):
         self.flash("--probe", "openocd", TETAP_OPENOCD_INTERFACE="interface/cmsis-dap.cfg")
         self.assertEqual(self.called()[0], "openocd -f interface/cmsis-dap.cfg -f target/stm32f4x.cfg -c init; exit")
         self.assertIn(f"program {{{self.image}}} verify reset exit", self.called()[1])
+
+    def test_the_plan_has_size_and_hash_of_the_file_that_is_written(self):
+        for probe, ending in (("stlink", ".bin"), ("openocd", ".elf"), ("dfu", ".bin")):
+            path = self.image.replace(".elf", ending)
+            with open(path, "rb") as file:
+                content = file.read()
+            planned = self.flash("--probe", probe, "--dry-run")
+            self.assertIn(f"robot{ending}, {len(content)} bytes, sha256 {hashlib.sha256(content).hexdigest()}", planned)
+            self.assertIn(path, planned.splitlines()[-2])
+        os.remove(self.image.replace(".elf", ".bin"))
+        self.assertIn("robot.bin: No such file", self.flash("--probe", "dfu", "--dry-run", status=2))
 
     def test_each_board_has_its_chip_and_its_connector(self):
         self.install("openocd")
@@ -117,11 +128,29 @@ class FlashBoard(unittest.TestCase):
             self.assertIn(what, said)
             self.assertEqual(said.count("\n"), 1, said)
         self.assertIn("no board 'zynqmp_r5' that can be flashed; there are: ", self.flash(status=2, board="zynqmp_r5"))
+        for board in ("", "linux"):  # make without BOARD= passes linux
+            said = self.flash(status=2, board=board)
+            self.assertEqual(said, "flash: which board? BOARD=NAME, one of: ark_cannode nucleo_g474re\n")
+
+    def test_a_dry_run_is_1_or_nothing(self):
+        self.assertIn("dry run, nothing was written", self.flash("--probe", "stlink", DRY_RUN="1"))
+        for setting in ("0", "yes", "01"):
+            self.assertEqual(self.flash("--probe", "stlink", status=2, DRY_RUN=setting), f"flash: DRY_RUN={setting}: it is 1 or empty\n")
 
     def test_a_failed_tool_is_a_failure(self):
         self.install("st-info", "serial: 1")
         self.install("st-flash", "Unknown chip", 1)
         self.assertIn("Unknown chip", self.flash("--probe", "stlink", status=1))
+
+    def test_openocds_last_error_is_shown_whatever_it_says_afterwards(self):
+        talk = "Error: early\nError: init mode failed (unable to connect to the target)\nin procedure program\n** OpenOCD init failed **\nshutdown command invoked"
+        self.install("openocd", talk, 1)
+        self.assertIn("-c 'init; exit': Error: init mode failed (unable to connect to the target); plug", self.flash("--probe", "openocd", status=2))
+        with open(os.path.join(self.bin, "openocd"), "w", encoding="utf-8") as file:  # the probe is there, the flash is not
+            file.write(f"#!{shutil.which('bash')}\ncase \"$*\" in *program*) ;; *) exit 0 ;; esac\necho '{talk.replace('init mode', 'write')}' >&2\nexit 1\n")
+        said = self.flash("--probe", "openocd", status=1)
+        self.assertIn("Error: early\n", said)
+        self.assertTrue(said.endswith("flash: openocd failed: Error: write failed (unable to connect to the target)\n"), said)
 
     def test_a_dry_run_needs_no_tool_and_touches_nothing(self):
         for probe in ("stlink", "openocd", "dfu"):

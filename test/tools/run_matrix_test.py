@@ -355,12 +355,90 @@ class FaultsInFrames(unittest.TestCase):
         self.assertEqual({value for t, value in self.read(lines, "GnssAcc_Hor") if 1 <= round(t, 3) < 2}, {0.2})
 
     def test_what_cannot_be_is_one_clear_error(self):
-        for fault, text in (("gyro w offset", "no axis 'w'"), ("gyro z wild", "no kind of fault 'wild'"), ("gyro z", "SITUATION SENSOR AXIS KIND SIZE"),
-                            ("frames radar lost", "no device 'radar'")):
-            message = self.inject(fault, status=2)
-            self.assertIn(text, message)
+        for fault, text, *more in (("gyro w offset", "gyro: no axis 'w'; there are: x y z"), ("gyro z wild", "no kind of fault 'wild'; there are: offset spike "),
+                                   ("gyro z", "--fault needs \"SENSOR AXIS KIND\", not 'gyro z'"), ("gyro z spike", "as in spike2"), ("gyro z spikes", "as in spike2"),
+                                   ("radar z dead", "no sensor 'radar'; there are: gyro accel "), ("frames radar lost", "frames: no device 'radar'; there are: imu wheels "),
+                                   ("frames imu offset", "frames: no kind 'offset'; there are: delayed "), ("gyro z lost", "gyro: no kind 'lost'; there are: offset "),
+                                   ("gyro z dead", "no robot 'tank'; there are: car ", "--robot", "tank"),
+                                   ("gyro z dead", "--at is 3.500 s: " + self.log + " ends 2.990 s after its begin", "--at", "3.5"),
+                                   ("gyro z dead", self.log + ": no input frames of this id base", "--base", "0x400")):
+            message = self.inject(fault, *more, status=2)
+            self.assertTrue(message.startswith("tetap-inject: " + text) or text in message, message)
             self.assertEqual(message.count("\n"), 1)
-        self.assertIn("no frame", self.inject("barometer pressure offset", status=1))
+        message = self.inject("barometer pressure offset", status=1)
+        self.assertIn(f"{self.log}: no frame has 'barometer pressure offset' from 1.000 s to 4.000 s; nothing is written", message)
+
+    def test_what_fails_leaves_no_file(self):
+        out = os.path.join(self.folder, "none.log")
+        for words in (["--fault", "barometer pressure offset", "--at", "1"], ["--fault", "gyro z dead", "--at", "9"], ["--fault", "gyro z wild", "--at", "1"]):
+            self.assertNotEqual(subprocess.run([INJECT, self.log, out, "--dbc", DBC, *words], capture_output=True).returncode, 0)
+            self.assertEqual([name for name in os.listdir(self.folder) if name.startswith("none")], [])
+        # A disk that is full: the shell's limit on the size of a file.
+        with open(out, "w", encoding="ascii") as file:
+            file.write("old")
+        limited = ["bash", "-c", 'trap "" XFSZ; ulimit -f 10; exec "$@"', "bash", INJECT, self.log, out, "--dbc", DBC, "--fault", "gyro z dead", "--at", "1"]
+        done = subprocess.run(limited, capture_output=True, text=True)
+        self.assertEqual((done.returncode, done.stderr), (2, f"tetap-inject: {out}: cannot be written: File too large\n"))
+        self.assertEqual([name for name in os.listdir(self.folder) if name.startswith("none")], ["none.log"])
+        with open(out, encoding="ascii") as file:
+            self.assertEqual(file.read(), "old")
+        os.remove(out)
+
+    def test_every_sensor_axis_and_kind_of_the_help_is_known(self):
+        text = subprocess.run([INJECT, "--help"], capture_output=True, text=True, check=True).stdout
+        sensors = re.findall(r"^  (\w+) +([a-z ]+)$", text.split("sensors and their axes:\n")[1], re.M)
+        values, frames = (re.search(start + r".*: ([a-z_ ]+)$", text, re.M)[1].split() for start in (r"kinds \(", "kinds of frames"))
+        self.assertEqual((len(sensors), len(values), len(frames)), (15, 9, 4))
+        for sensor, axes in sensors:
+            for axis in axes.split():
+                for kind in frames if sensor == "frames" else values:
+                    kind = "spike2" if kind == "spike" else kind
+                    done = subprocess.run([INJECT, self.log, "/dev/null", "--fault", f"{sensor} {axis} {kind}", "--at", "1", "--dbc", DBC], capture_output=True, text=True)
+                    self.assertIn(done.returncode, (0, 1), done.stderr)
+
+    def test_the_time_is_that_of_the_robot_from_the_begin_on(self):
+        """A log in lockstep is received faster than the robot's time; In_Sync tells it, and it does not begin at 0."""
+        path, out = os.path.join(self.folder, "fast.log"), os.path.join(self.folder, "fast_out.log")
+        lines, received = [], 5_000_000.0
+        for line in self.clean:
+            at = float(line[1:line.index(")")])
+            if "310#" in line:  # the first frame of a tick
+                time_us = round(at * 1e6) - round(self.BEGIN_S * 1e6) + 77_000_000
+                lines.append(f"({received:017.6f}) vcan0 300#{(time_us | 1 << 56).to_bytes(8, 'little').hex().upper()}\n")
+            received += 1e-6
+            lines.append(f"({received:017.6f}) {line.split(' ', 1)[1]}")
+        with open(path, "w", encoding="ascii") as file:
+            file.writelines(lines)
+
+        def changed(*words):
+            done = subprocess.run([INJECT, path, out, "--dbc", DBC, *words], capture_output=True, text=True)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            with open(out, encoding="ascii") as file:
+                return file.readlines()
+        after = changed("--fault", "gyro z offset", "--size", "0.1", "--at", "1", "--for", "0.5")
+        differ = [k for k, (a, b) in enumerate(zip(lines, after)) if a != b]
+        gyro = [k for k, line in enumerate(lines) if " 310#" in line]
+        self.assertEqual((len(after), differ), (len(lines), gyro[100:150]))
+        late = changed("--fault", "frames imu delayed", "--size", "0.5", "--at", "1", "--for", "0.01")
+        self.assertEqual(sorted(line.split()[2] for line in late), sorted(line.split()[2] for line in lines))
+        times = [line.split()[0] for line in late]
+        self.assertEqual(times, sorted(times))
+        stamps = [k for k, line in enumerate(lines) if " 312#" in line]  # each of its own
+        moved = [line.split()[2] for line in late].index(lines[stamps[100]].split()[2])
+        self.assertLess(abs(late.index(lines[stamps[150]]) - moved), 8)
+        done = subprocess.run([INJECT, path, out, "--dbc", DBC, "--fault", "gyro z dead", "--at", "77"], capture_output=True, text=True)
+        self.assertEqual((done.returncode, done.stderr), (2, f"tetap-inject: --at is 77.000 s: {path} ends 2.990 s after its begin, by In_Sync\n"))
+
+    def test_a_last_line_without_newline_is_taken_whole_or_named(self):
+        path, out = os.path.join(self.folder, "cut.log"), os.path.join(self.folder, "cut_out.log")
+        text = "".join(self.clean)
+        for cut, said in ((1, ""), (5, f"tetap-inject: warning: {path}:{len(self.clean)}: the last line is cut off and left out: ")):
+            with open(path, "w", encoding="ascii") as file:
+                file.write(text[:-cut])
+            done = subprocess.run([INJECT, path, out, "--fault", "gyro x offset", "--size", "1", "--at", "1", "--dbc", DBC], capture_output=True, text=True)
+            self.assertEqual((done.returncode, done.stderr[:len(said)], done.stderr.count("\n")), (0, said, bool(said)))
+            with open(out, encoding="ascii") as file:
+                self.assertEqual(len(file.readlines()), len(self.clean) - bool(said))
 
 
 @unittest.skipUnless(os.access(MATRIX, os.X_OK), "tetap-matrix is not built")

@@ -17,6 +17,7 @@ settings_known() {
 board_known() {
   case $1 in
     linux | zynqmp_r5) ;;
+    ark_cannode | nucleo_g474re) echo "no board '$1' here; there are: linux zynqmp_r5; the simulated world on its emulated chip: make board BOARD=$1" >&2; return 2 ;;
     *) echo "no board '$1'; there are: linux zynqmp_r5" >&2; return 2 ;;
   esac
 }

@@ -4,7 +4,7 @@
 A stamp holds the low 20 bits of a microsecond. It is extended around the node's own time (In_Sync, Est_Epoch) where the log has it, so a log
 that was recorded faster or slower than the world ran is right too; else around the time of reception, whose offset to the stamps is followed.
 A node that ticks by its own clock until a run begins (In_Sync of kind Begin) has published
-two times: only that of the run with the samples counts.
+two times: only that of the run with the samples counts. The same holds where In_Sync begins without a Begin and tells another time.
 Times are seconds since the first sample of any sensor.
 """
 
@@ -65,9 +65,13 @@ def _time_us(text):
         return None
 
 
-def _rows(path, dbc, base):
+def _cut_off(path, number, line):
+    return f"{path}:{number}: the last line is cut off and left out: {decode.shown(line)}"
+
+
+def _rows(path, dbc, base, notes):
     """(rows by message name, node times, begins): rows and times are (order, line, time of reception, payload or time), begins the rows of
-    In_Sync that set the node's time anew."""
+    In_Sync that set the node's time anew. A last line without a newline that is no whole frame goes to `notes`."""
     by_id = {message.offset + base: message for message in dbc.messages}
     rows = {message.name: [] for message in dbc.messages}
     kind = next(signal for message in dbc.messages if message.name == "In_Sync" for signal in message.signals if signal.enum == "SyncKind")
@@ -82,6 +86,9 @@ def _rows(path, dbc, base):
                 try:
                     time, _, id_text, data, _ = decode.parse(line)
                 except decode.Malformed as reason:
+                    if not line.endswith(b"\n"):
+                        notes.append(_cut_off(path, number, line))
+                        break
                     raise BadInput(f"{path}:{number}: {reason}") from None
                 if data is None or len(id_text) != 3:
                     continue
@@ -90,6 +97,9 @@ def _rows(path, dbc, base):
                     others.add(int(id_text, 16))
                     continue
                 if len(data) != message.size:
+                    if not line.endswith(b"\n"):
+                        notes.append(_cut_off(path, number, line))
+                        break
                     raise BadInput(f"{path}:{number}: {message.name} has {len(data)} bytes, not {message.size}")
                 frames += 1
                 word = int.from_bytes(data, "little")
@@ -123,6 +133,19 @@ def _of_one_run(path, nodes, begins, samples):
         its = next((k for k, one in enumerate(mine[1:], 1) if begun <= one[3] <= begun + STAMP_SPAN), len(mine))
         del mine[1:its]
     return mine
+
+
+def _from_first_sync(path, nodes, notes):
+    """(the node's times without those of its own clock, order of the last one that is left out): before the first In_Sync the node ticks by itself."""
+    first = next((k for k, one in enumerate(nodes) if one[4] == "In_Sync"), 0)
+    own = [one for one in nodes[:first] if one[4] == "Est_Epoch"]
+    if not own or abs(nodes[first][3] - own[-1][3]) <= BACK_US:
+        return nodes, 0
+    notes.append(f"{path}:{nodes[first][1]}: the first In_Sync tells {nodes[first][3] / 1e6:.3f} s; left out: {len(own)} epochs before it by the node's own clock, "
+                 f"{own[0][3] / 1e6:.3f} to {own[-1][3] / 1e6:.3f} s")
+    begun = nodes[first][3]  # an epoch by the old clock may come just after the new one was set
+    its = next((k for k, one in enumerate(nodes[first + 1:], first + 1) if begun <= one[3] <= begun + STAMP_SPAN), len(nodes))
+    return [nodes[first], *nodes[its:]], own[-1][0]
 
 
 class Clock:
@@ -210,12 +233,14 @@ class Log:
             dbc = bus_database.read(dbc_path)
         except bus_database.Refused as refusal:
             raise BadInput(str(refusal)) from None
-        rows, nodes, begins = _rows(path, dbc, base)
+        rows, nodes, begins = _rows(path, dbc, base, self.notes)
         messages = {message.name: message for message in dbc.messages}
         names = WANTED + tuple(f"In_Imu{imu_instance}{kind}" for kind in ("Gyro", "Accel", "Time"))
-        frames = {name: Frames(messages[name], rows[name]) for name in names}
-        samples = sorted(order for name in names for order in frames[name].order.tolist())
-        clock = Clock(path, _of_one_run(path, nodes, begins, samples))
+        samples = sorted(row[0] for name in names for row in rows[name])
+        nodes, behind = _from_first_sync(path, _of_one_run(path, nodes, begins, samples), self.notes)
+        self._drop("frames of sensors before the first In_Sync", np.count_nonzero(np.array(samples, dtype=np.int64) <= behind))
+        frames = {name: Frames(messages[name], [row for row in rows[name] if row[0] > behind]) for name in names}
+        clock = Clock(path, nodes)
         wanted, stamps = [], []
 
         def stamped(name, value):

@@ -138,6 +138,6 @@ def wheels_without_noise(run):
     for sensor in sorted(used & set(WHEEL_NOISE)):
         zero = sorted({path for group in WHEEL_NOISE[sensor] if not any(parameters.get(path, 1) > 0 for path in group) for path in group})
         if zero:
-            found.append(f"{sensor} are used, but {' and '.join(zero)} {'is' if len(zero) == 1 else 'are'} 0: the covariance does not grow with the way "
+            found.append(f"{sensor} {'are' if sensor.endswith('s') else 'is'} used, but {' and '.join(zero)} {'is' if len(zero) == 1 else 'are'} 0: the covariance does not grow with the way "
                          "(docs/tutorial/your_robot.md has usual values)")
     return found
