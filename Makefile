@@ -27,6 +27,11 @@ ifneq ($(unknown),)
 $(error no setting $(unknown); there are: $(settings))
 endif
 
+# Refused here, before anything is built.
+ifneq ($(and $(LOG),$(wildcard $(LOG)/.)),)
+$(error LOG=$(LOG) is a folder, not a log)
+endif
+
 .PHONY: help sim board test quick proof replay record doctor firmware flash size heap stack count bits hashes soak matrix swarm mutants laws constants bench costs check docs dbc setup programs arm
 
 help: ## this list
