@@ -39,7 +39,7 @@ help: ## this list
 	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | while IFS=$$'\t' read -r name text; do printf '  make %-9s %s\n' "$$name" "$$text"; done
 	@echo; echo "  ROBOT=$(ROBOT) BOARD=$(BOARD) BUS=$(BUS) SEED=$(SEED) FAULT= REALTIME= LOG= TRUTH="
 	@echo "  robots: $$(tools/run/list_robots) (a config/NAME.hpp of your own is one, too)"
-	@echo "  and in simulation alone, told all of the world's noise: rover_landmarks_matched rover_matched"
+	@echo "  and in simulation alone, with parameters that equal the noise of the world: rover_landmarks_matched rover_matched"
 
 sim: setup programs ## the simulated world over vcan0: table, report, pictures in out/sim (SEED= FAULT= REALTIME=1 BOARD=zynqmp_r5 BUS=memory OUT=DIR)
 	@tools/run/simulate_world

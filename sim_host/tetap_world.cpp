@@ -67,7 +67,7 @@ std::string help() {
           "  --imu-hz N         IMU samples a second (default 100)\n"
           "  --gnss-m S         1 sigma of GNSS positions per horizontal axis (default 0.85 or the robot's floor)\n"
           "  --gnss-hz N        fixes a second (default 5; 1 where the robot expects them seldom)\n"
-          "  --no-wheels        no wheel says anything\n"
+          "  --no-wheels        the wheels send nothing\n"
           "  --no-pose          the node is not told where it starts\n"
           "  --fault NAME[@START[+DURATION]]   seconds; several with commas:\n") +
       sim::fault_help() +
