@@ -174,7 +174,7 @@ struct Standing {
   std::normal_distribution<double> normal;
   std::int64_t us = 0;
   double left = 0, right = 0;
-  double place_m = 0, fix_east_m = 0, range_off_m = 0;  ///< what landmarks and fixes show
+  double place_m = 0, fix_east_m = 0, range_off_m = 0;  ///< places that landmarks and fixes show, and an offset
   int landmarks = 2;                                    ///< in sight
   double beyond_s = 0;                                  ///< time in which an error was above 1.5 times three sigma
 };

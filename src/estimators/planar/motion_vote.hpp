@@ -25,7 +25,7 @@ struct SightedRange {
   float east_m = 0, north_m = 0;
   float range_m = 0;
   float m2 = 0;   ///< variance of the range
-  float nis = 0;  ///< of the whole sighting
+  float nis = 0;  ///< NIS of the whole sighting
 };
 
 class MotionVote {
