@@ -28,8 +28,10 @@ $(error no setting $(unknown); there are: $(settings))
 endif
 
 # Refused here, before anything is built.
+ifneq ($(filter replay doctor,$(MAKECMDGOALS)),)
 ifneq ($(and $(LOG),$(wildcard $(LOG)/.)),)
 $(error LOG=$(LOG) is a folder, not a log)
+endif
 endif
 
 .PHONY: help sim board test quick proof replay record doctor firmware flash size heap stack count bits hashes soak matrix swarm mutants laws constants bench costs check docs dbc setup programs arm

@@ -154,6 +154,7 @@ int run(sim::Arguments& arguments) {
   sim::FrameFault fault = fault_of(*given);
   fault.size = size;
   fault.velocity_mps = velocity_mps;
+  if (fault.kind == sim::FaultKind::kDelayed && size <= 0) throw sim::UsageError("a delay needs --size, in s");
   if (for_s > 0) fault.duration = {static_cast<std::int64_t>(for_s * 1e6)};
   sim::CleanLog about;
   about.parameters = sim::parameters_of(robot);

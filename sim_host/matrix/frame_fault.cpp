@@ -376,6 +376,7 @@ std::vector<std::uint32_t> device_messages(std::string_view device, unsigned imu
 
 Faulted put_fault(std::span<const TimedFrame> frames, const FrameFault& fault, const FrameGeometry& geometry,
                   const BusDatabase& dbc) {
+  require_known(fault);
   return Injector(frames, fault, geometry, dbc).run();
 }
 

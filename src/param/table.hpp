@@ -204,7 +204,7 @@ inline constexpr std::array kTable{
               "1 sigma of the upward velocity in the non-holonomic constraint."),
     TETAP_ROW(0x1DD, inertial.axle_x_b_m, "m", -20, 20, kRestart,
               "Place of the axle that does not steer, ahead of the body's origin."),
-    TETAP_ROW(0x1DE, inertial.wheels_every_us, "us", 0, 1'000'000, kLive,
+    TETAP_ROW(0x1DE, inertial.wheels_every_us, "us", 5'000, 1'000'000, kLive,
               "Least time between two fused wheel samples."),
     TETAP_ROW(0x1DF, inertial.wheel_gate_scale, "", 0.25, 25, kLive,
               "Innovation gate of wheels over the 99 % quantile of chi-square."),

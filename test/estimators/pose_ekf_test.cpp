@@ -134,10 +134,10 @@ struct Standing {
     const double range7_m = 4 - place_m + range_off_m, range8_m = std::hypot(place_m, 5.0),
                  bearing8_rad = std::atan2(5.0, -place_m);
     const auto noise = [this](double sigma) { return static_cast<float>(sigma * normal(random)); };
-    estimator.fuse(
-        sensor::LandmarkSighting{
-            .landmark = 7, .range_m = static_cast<float>(range7_m) + noise(0.1), .bearing_rad = noise(0.02)},
-        {us}, ctx());
+    estimator.fuse(sensor::LandmarkSighting{.landmark = 7,
+                                            .range_m = static_cast<float>(range7_m) + noise(0.1),
+                                            .bearing_rad = static_cast<float>(bearing_off_rad) + noise(0.02)},
+                   {us}, ctx());
     if (landmarks < 2) return;
     estimator.fuse(sensor::LandmarkSighting{.landmark = 8,
                                             .range_m = static_cast<float>(range8_m) + noise(0.1),
@@ -147,14 +147,16 @@ struct Standing {
   void fix() {
     constexpr double kEquator_m = 6378137, kPi = 3.14159265358979;
     const double latitude_rad = static_cast<double>(n.gnss.origin_latitude_2ndeg) * 1e-9 * kPi / 90,
-                 east_2ndeg = fix_east_m / (kEquator_m * std::cos(latitude_rad)) * 90 / kPi * 1e9;
-    estimator.fuse(sensor::GnssPosition{.latitude_2ndeg = n.gnss.origin_latitude_2ndeg,
-                                        .longitude_2ndeg = n.gnss.origin_longitude_2ndeg + std::llround(east_2ndeg),
-                                        .height_m = n.gnss.origin_height_m,
-                                        .horizontal_acc_m = 0.3F,
-                                        .vertical_acc_m = 0.5F,
-                                        .fix = sensor::GnssFix::k3d},
-                   {us}, ctx());
+                 per_m_2ndeg = 90 / kPi * 1e9 / kEquator_m,
+                 east_2ndeg = fix_east_m * per_m_2ndeg / std::cos(latitude_rad);
+    estimator.fuse(
+        sensor::GnssPosition{.latitude_2ndeg = n.gnss.origin_latitude_2ndeg + std::llround(fix_north_m * per_m_2ndeg),
+                             .longitude_2ndeg = n.gnss.origin_longitude_2ndeg + std::llround(east_2ndeg),
+                             .height_m = n.gnss.origin_height_m,
+                             .horizontal_acc_m = 0.3F,
+                             .vertical_acc_m = 0.5F,
+                             .fix = sensor::GnssFix::k3d},
+        {us}, ctx());
   }
   void judge() {
     const Estimate e = estimator.estimate(ctx());
@@ -174,7 +176,8 @@ struct Standing {
   std::normal_distribution<double> normal;
   std::int64_t us = 0;
   double left = 0, right = 0;
-  double place_m = 0, fix_east_m = 0, range_off_m = 0;  ///< places that landmarks and fixes show, and an offset
+  double place_m = 0, fix_east_m = 0, fix_north_m = 0;  ///< places that landmarks and fixes show
+  double range_off_m = 0, bearing_off_rad = 0;          ///< errors of landmark 7
   int landmarks = 2;                                    ///< in sight
   double beyond_s = 0;                                  ///< time in which an error was above 1.5 times three sigma
 };
@@ -209,17 +212,30 @@ TEST(PoseEkf, LandmarksAndFixesThatShowOnePlaceOutvoteTheMotion) {
   }
 }
 
-/// Two places: fixes leap to 30 m, and two sightings of the one landmark in sight are 0.6 m off.
+/// Two places: fixes leap to 30 m, and two sightings of the one landmark in sight are 16 m off.
 TEST(PoseEkf, AFixThatLeapsBesideAWrongSightingIsNoVote) {
   for (unsigned seed = 1; seed <= 5; ++seed) {
     Standing robot(seed);
     robot.fix_east_m = 30;
     robot.landmarks = 1;
-    robot.range_off_m = 0.6;
+    robot.range_off_m = 16;
     robot.run(0.4, {});
     EXPECT_LT(sigma_m(robot), 0.3) << seed;
     robot.range_off_m = 0;
     robot.run(1, {});
+    EXPECT_LT(sigma_m(robot), 0.3) << seed;
+    EXPECT_EQ(robot.beyond_s, 0) << seed;
+  }
+}
+
+/// A range that fits both places, beside a wrong bearing and a fix that leaps sideways.
+TEST(PoseEkf, AWrongBearingIsNoEvidenceForAFix) {
+  for (unsigned seed = 1; seed <= 5; ++seed) {
+    Standing robot(seed);
+    robot.fix_north_m = 5;
+    robot.bearing_off_rad = 0.4;
+    robot.landmarks = 1;
+    robot.run(0.4, {});
     EXPECT_LT(sigma_m(robot), 0.3) << seed;
     EXPECT_EQ(robot.beyond_s, 0) << seed;
   }

@@ -358,6 +358,7 @@ class FaultsInFrames(unittest.TestCase):
         for fault, text, *more in (("gyro w offset", "gyro: no axis 'w'; there are: x y z"), ("gyro z wild", "no kind of fault 'wild'; there are: offset spike "),
                                    ("gyro z", "--fault needs \"SENSOR AXIS KIND\", not 'gyro z'"), ("gyro z spike", "as in spike2"), ("gyro z spikes", "as in spike2"),
                                    ("radar z dead", "no sensor 'radar'; there are: gyro accel "), ("frames radar lost", "frames: no device 'radar'; there are: imu wheels "),
+                                   ("frames imu delayed", "a delay needs --size, in s"),
                                    ("frames imu offset", "frames: no kind 'offset'; there are: delayed "), ("gyro z lost", "gyro: no kind 'lost'; there are: offset "),
                                    ("gyro z dead", "no robot 'tank'; there are: car ", "--robot", "tank"),
                                    ("gyro z dead", "--at is 3.500 s: " + self.log + " ends 2.990 s after its begin", "--at", "3.5"),

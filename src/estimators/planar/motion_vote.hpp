@@ -10,6 +10,7 @@
 #include "model/gnss_position.hpp"
 #include "model/landmark.hpp"
 
+#include <cstddef>
 #include <cstdint>
 
 namespace tetap::estimators {
@@ -25,31 +26,31 @@ struct SightedRange {
   float east_m = 0, north_m = 0;
   float range_m = 0;
   float m2 = 0;   ///< variance of the range
-  float nis = 0;  ///< NIS of the whole sighting
+  float nis = 0;  ///< NIS of the range alone
 };
 
 class MotionVote {
  public:
   enum Source : std::size_t { kLandmark, kGnss, kSources };
 
-  void refused(const model::GnssPosition& fix, const model::PlanarPose&, const filter::Innovation<float, 2>& by) {
+  void note(const model::GnssPosition& fix, const model::PlanarPose&, const filter::Innovation<float, 2>& by) {
     fix_ = {.east_m = by.nu(0), .north_m = by.nu(1), .m2 = fix.sigma_m * fix.sigma_m};
   }
   template <class Sighting, int M>
-  void refused(const Sighting& seen, const model::PlanarPose& x, const filter::Innovation<float, M>& by) {
+  void note(const Sighting& seen, const model::PlanarPose& x, const filter::Innovation<float, M>& by) {
     if constexpr (requires { seen.range_m; }) {
       const model::Sight sight(x, seen.landmark, seen.mounting);
       seen_ = {.east_m = sight.dx_m,
                .north_m = sight.dy_m,
                .range_m = seen.range_m,
                .m2 = seen.sigma_range_m * seen.sigma_range_m,
-               .nis = by.nis};
+               .nis = by.nu(0) * by.nu(0) / by.s(0, 0)};
     } else {
       seen_ = {.nis = base::kNan};  // a bearing depends on the heading
     }
   }
-  /// The sighting's range is as likely from the fix's place as its NIS is not from the filter's: the logarithm of the
-  /// two likelihoods' ratio, doubled, is above the quantile of chi-square.
+  /// The sighting's range fits the fix's place, and is a thousand times as likely from there as from the filter's
+  /// place: 13.8 is twice the logarithm of a thousand. Both are Gaussian likelihoods without their factors.
   [[nodiscard]] bool one_place() const {
     const float east_m = seen_.east_m - fix_.east_m, north_m = seen_.north_m - fix_.north_m;
     const float off_m = base::sqrt(east_m * east_m + north_m * north_m) - seen_.range_m;

@@ -40,7 +40,7 @@ Innovation PoseFilter<Filter>::measure(const Model& model, Source source, float 
   } else if (result.verdict == filter::Verdict::kRejected) {
     refused.update(true, stamp);
     if (in_a_row < kDegraded) ++in_a_row;
-    vote_.refused(model, motion_.filter.x, result);
+    vote_.note(model, motion_.filter.x, result);
     if (both_refuse(source, stamp)) {
       const auto [place_m2, yaw_rad2] = squared_error(model, result.nu);
       const float most_rad = ctx.parameters.recovery.inflate_yaw_rad, most_rad2 = most_rad * most_rad;
@@ -67,11 +67,11 @@ auto PoseFilter<Filter>::update_by(const Model& model, float gate, base::Micros 
   if constexpr (std::same_as<Model, model::GnssPosition>) {
     if (n.correlation_s > 0.0F) {
       Filter judge = motion_.filter;
-      const auto judged = judge.update(model, gate);
+      auto judged = judge.update(model, gate);
       if (judged.verdict != filter::Verdict::kAccepted) return judged;
+      const float since_s = fixed_at_.us > 0 ? base::seconds(stamp - fixed_at_) : base::kInfinity;
       Model weighed = model;
-      weighed.sigma_m *= base::sqrt(checks::kColouredNoiseInflation *
-                                    checks::repeated(base::seconds(stamp - fixed_at_), n.correlation_s));
+      weighed.sigma_m *= base::sqrt(checks::kColouredNoiseInflation * checks::repeated(since_s, n.correlation_s));
       fixed_at_ = stamp;
       static_cast<void>(motion_.filter.update(weighed, base::kInfinity));
       return judged;
@@ -92,7 +92,7 @@ template <class Filter>
   ++jumps_;
 }
 
-/// Each was refused twice in a row within the time of dead reckoning, and both for the same place.
+/// Each was refused twice in a row, the other since less than the time of dead reckoning, and both for the same place.
 template <class Filter>
 bool PoseFilter<Filter>::both_refuse(Source source, base::Micros stamp) const {
   const Source other = source == kGnss ? kLandmark : kGnss;
@@ -246,6 +246,7 @@ Innovation PoseFilter<Filter>::fuse(const sensor::GnssPosition& fix, base::Micro
   if (aligned) {
     motion_.start(stamp, aligned->pose, aligned->sigma_position_m, aligned->sigma_yaw_rad);
     begin_tracking(stamp);
+    fixed_at_ = stamp;
   }
   return {.verdict = sensor::Verdict::kAccepted};
 }

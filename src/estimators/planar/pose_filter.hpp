@@ -154,6 +154,7 @@ class PoseFilter {
   void begin_tracking(base::Micros stamp) {
     phase_ = Phase::kTracking;
     landmarks_.reset();
+    vote_.reset();
     last_absolute_ = stamp;
   }
   void recover(checks::Persistence& refused, base::Micros stamp, const param::RecoveryParameters& n);
