@@ -394,7 +394,7 @@ class FaultsInFrames(unittest.TestCase):
             for axis in axes.split():
                 for kind in frames if sensor == "frames" else values:
                     kind = "spike2" if kind == "spike" else kind
-                    done = subprocess.run([INJECT, self.log, "/dev/null", "--fault", f"{sensor} {axis} {kind}", "--at", "1", "--dbc", DBC], capture_output=True, text=True)
+                    done = subprocess.run([INJECT, self.log, "/dev/null", "--fault", f"{sensor} {axis} {kind}", "--at", "1", "--size", "0.5", "--dbc", DBC], capture_output=True, text=True)
                     self.assertIn(done.returncode, (0, 1), done.stderr)
 
     def test_the_time_is_that_of_the_robot_from_the_begin_on(self):
