@@ -87,6 +87,11 @@ class Made:
         return path
 
 
+def own_epochs(from_us, to_us):
+    """Lines of Est_Epoch, 100 a second, of a node that ticks by its own clock."""
+    return b"".join(b"(0.5) can0 320#" + int(t).to_bytes(6, "little").hex().upper().encode() + b"0000\n" for t in range(from_us, to_us, 10_000))
+
+
 def read(made):
     with tempfile.TemporaryDirectory() as directory:
         return recording.Log(made.write(directory), bus_writer.DEFAULT_DBC, 0x300)
@@ -642,15 +647,12 @@ class Program(unittest.TestCase):
         alone = recording.Log(self.file(run), bus_writer.DEFAULT_DBC, 0x300)
         begin = b"(0.999000) can0 300#40420F0000000003\n"
 
-        def own(from_us, to_us):
-            return b"".join(b"(0.5) can0 320#" + int(t).to_bytes(6, "little").hex().upper().encode() + b"0000\n" for t in range(from_us, to_us, 10_000))
-
         for idle_us in (1_500_000, 2_600_000, 60_000_000):
-            log = recording.Log(self.file(own(idle_us - 500_000, idle_us) + begin + own(idle_us, idle_us + 10_000) + run), bus_writer.DEFAULT_DBC, 0x300)
+            log = recording.Log(self.file(own_epochs(idle_us - 500_000, idle_us) + begin + own_epochs(idle_us, idle_us + 10_000) + run), bus_writer.DEFAULT_DBC, 0x300)
             for name in ("imu", "wheels", "gnss", "velocity"):
                 np.testing.assert_array_equal(getattr(log, name).t, getattr(alone, name).t)
         self.one_line(["begins anew here", "two runs in one log"], self.file(run + begin + run))
-        self.one_line(["node's time goes back from 1.490 s to 0.000 s"], self.file(own(1_000_000, 1_500_000) + own(0, 100_000) + run.replace(b" 300#", b" 7A0#")))
+        self.one_line(["node's time goes back from 1.490 s to 0.000 s"], self.file(own_epochs(1_000_000, 1_500_000) + own_epochs(0, 100_000) + run.replace(b" 300#", b" 7A0#")))
 
     def test_epochs_before_the_first_step_are_left_out_and_named(self):
         times = np.arange(1_010_000, 41_000_000, 10_000)
@@ -659,19 +661,16 @@ class Program(unittest.TestCase):
         steps = made.text()
         alone = recording.Log(self.file(steps), bus_writer.DEFAULT_DBC, 0x300)
 
-        def own(from_us, to_us):
-            return b"".join(b"(0.5) can0 320#" + int(t).to_bytes(6, "little").hex().upper().encode() + b"0000\n" for t in range(from_us, to_us, 10_000))
-
-        early = b"(0.5) can0 308#0000000000000000\n(0.5) can0 308#0000000000000000\n"  # samples by nobody knows which clock
+        early = b"(0.5) can0 308#0000000000000000\n(0.5) can0 308#0000000000000000\n"  # samples of an unknown clock
         for from_us in (0, 3_700_000, 60_000_000):
-            path = self.file(own(from_us, from_us + 300_000) + early + own(from_us + 300_000, from_us + 500_000) + steps)
+            path = self.file(own_epochs(from_us, from_us + 300_000) + early + own_epochs(from_us + 300_000, from_us + 500_000) + steps)
             log = recording.Log(path, bus_writer.DEFAULT_DBC, 0x300)
             for name in ("imu", "wheels", "gnss", "velocity"):
                 np.testing.assert_array_equal(getattr(log, name).t, getattr(alone, name).t)
             self.assertEqual(log.dropped["frames of sensors before the first In_Sync"], 2)
             self.assertRegex(log.notes[0], r"a\.log:\d+: the first In_Sync tells 1\.010 s; left out: 50 epochs before it by the node's own clock")
         # Epochs that agree with In_Sync are the node's time, too.
-        log = recording.Log(self.file(own(1_000_000, 1_010_000) + steps), bus_writer.DEFAULT_DBC, 0x300)
+        log = recording.Log(self.file(own_epochs(1_000_000, 1_010_000) + steps), bus_writer.DEFAULT_DBC, 0x300)
         self.assertEqual((log.notes, log.dropped), ([], {}))
 
     def test_a_last_line_without_newline_is_taken_whole_or_named(self):

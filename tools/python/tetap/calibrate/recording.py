@@ -4,7 +4,7 @@
 A stamp holds the low 20 bits of a microsecond. It is extended around the node's own time (In_Sync, Est_Epoch) where the log has it, so a log
 that was recorded faster or slower than the world ran is right too; else around the time of reception, whose offset to the stamps is followed.
 A node that ticks by its own clock until a run begins (In_Sync of kind Begin) has published
-two times: only that of the run with the samples counts. The same holds where In_Sync begins without a Begin and tells another time.
+two times: only that of the run with the samples counts. The same holds where In_Sync begins without a Begin and has another time.
 Times are seconds since the first sample of any sensor.
 """
 
