@@ -90,6 +90,7 @@ class RobotTime {
     for (const sim::TimedFrame& f : frames) {
       clock.add(f.time, f.frame);
       unknown += clock.known() ? 0 : 1;
+      if (times_.size() > unknown) find_return(times_.back(), clock.now());
       times_.push_back(times_.size() > unknown ? std::max(times_.back(), clock.now()) : clock.now());
     }
     for (std::size_t i = 0; i < unknown && unknown < times_.size(); ++i) times_[i] = times_[unknown];
@@ -98,6 +99,9 @@ class RobotTime {
   [[nodiscard]] base::Micros begin() const { return times_.front(); }
   [[nodiscard]] base::Micros end() const { return times_.back(); }
   [[nodiscard]] const char* clock() const { return clock_; }
+  /// The longest way back of the clock, as of a node that began anew, and the robot time before it.
+  [[nodiscard]] base::Micros back() const { return back_; }
+  [[nodiscard]] base::Micros back_from() const { return back_from_; }
   [[nodiscard]] std::vector<sim::TimedFrame> frames() const {
     std::vector<sim::TimedFrame> moved = frames_;
     for (std::size_t i = 0; i < moved.size(); ++i) moved[i].time = times_[i];
@@ -114,8 +118,15 @@ class RobotTime {
   }
 
  private:
+  void find_return(base::Micros before, base::Micros now) {
+    if (before - now <= back_) return;
+    back_ = before - now;
+    back_from_ = before;
+  }
+
   const std::vector<sim::TimedFrame>& frames_;
   std::vector<base::Micros> times_;
+  base::Micros back_, back_from_;
   const char* clock_ = "";
 };
 
@@ -164,6 +175,14 @@ int run(sim::Arguments& arguments) {
 
   const std::vector<sim::TimedFrame> frames = frames_of(*log_name, first_id);
   const RobotTime time(frames, first_id);
+  constexpr base::Micros kReturn{1'000'000};  // a step of the clock is shorter, a run longer
+  if (time.back() > kReturn)
+    std::fprintf(
+        stderr,
+        "tetap-inject: warning: %s: %s goes back by %s at %s after the begin: two runs in one log? Split it to "
+        "put a fault into the second\n",
+        log_name->c_str(), time.clock(), sim::in_seconds(time.back()).c_str(),
+        sim::in_seconds(time.back_from() - time.begin()).c_str());
   fault.start = time.begin() + base::Micros{static_cast<std::int64_t>(at_s * 1e6)};
   if (fault.start > time.end())
     throw std::runtime_error("--at is " + sim::in_seconds(fault.start - time.begin()) + ": " + *log_name + " ends " +

@@ -84,11 +84,10 @@ ForwardDetector::Agreement ForwardDetector::agreement() const {
     found.ahead = correlation(m.covariance(0, 2), m.covariance(0, 0), m.covariance(2, 2));
   if (m.covariance(3, 3) < kLeast2) return found;
   found.left = correlation(m.covariance(1, 3), m.covariance(1, 1), m.covariance(3, 3));
-  found.turn = turn_ratio(m.covariance(3, 3), m.covariance(1, 3), m.covariance(1, 1), 0);
+  found.turn = turn_ratio(m.covariance(3, 3), m.covariance(1, 3), m.covariance(1, 1), m.count(), 0);
   if (!found.turn) return found;
   found.turn->device = "the sideways force in curves";
   found.turn->uses = static_cast<Devices>(kAccelerometer | kMounting | found.uses);
-  found.turn->seconds = m.count();
   return found;
 }
 

@@ -87,12 +87,11 @@ std::optional<TurnRatio> CourseDetector::ratio() const {
   if (moments.count() < kLeastWindows || moments.covariance(3, 3) < kLeastTurn_radps * kLeastTurn_radps)
     return std::nullopt;
   const std::array<double, 4> gyro{up_s_[0], up_s_[1], up_s_[2], 0}, course{0, 0, 0, 1};
-  auto found =
-      turn_ratio(moments.covariance(gyro, gyro), moments.covariance(gyro, course), moments.covariance(3, 3), kFollows);
+  auto found = turn_ratio(moments.covariance(gyro, gyro), moments.covariance(gyro, course), moments.covariance(3, 3),
+                          moments.count(), kFollows);
   if (!found) return found;
   found->device = velocity ? "the course of the GNSS velocity" : "the course of the fixes";
   found->uses = velocity ? kGnssVelocity : kFixes;
-  found->seconds = moments.count();
   return found;
 }
 

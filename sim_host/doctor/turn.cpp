@@ -49,11 +49,11 @@ std::optional<TurnRatio> TurnDetector::ratio() const {
   const std::array<double, 5> gyro{up_s_[0], up_s_[1], up_s_[2], 0, 0}, turn{0, 0, 0, 1 / scale_.track_m, 0};
   const double turn2 = whole_.covariance(turn, turn);
   if (turn2 < kLeastTurn_radps * kLeastTurn_radps) return std::nullopt;
-  auto found = turn_ratio(whole_.covariance(gyro, gyro), whole_.covariance(gyro, turn), turn2, std::sqrt(kExplained));
+  auto found = turn_ratio(whole_.covariance(gyro, gyro), whole_.covariance(gyro, turn), turn2, whole_.count(),
+                          std::sqrt(kExplained));
   if (!found) return found;
   found->device = "the wheels";
   found->uses = kWheels;
-  found->seconds = whole_.count();
   return found;
 }
 

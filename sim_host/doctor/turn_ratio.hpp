@@ -18,16 +18,22 @@ struct TurnRatio {
   double seconds = 0;
 
   [[nodiscard]] double value() const { return std::sqrt(low * high); }
-  [[nodiscard]] bool holds(double factor) const { return low < factor && factor < high; }
 };
 
-/// From the variances of gyroscope and reference and their covariance; nothing where they have nothing in common.
-[[nodiscard]] inline std::optional<TurnRatio> turn_ratio(double gyro2, double both, double reference2,
+/// From the variances of gyroscope and reference and their covariance over so many pairs; nothing where they have
+/// nothing in common. The bounds are two standard errors of a regression's slope wider (Draper and Smith, Applied
+/// Regression Analysis, section 1.4): few pairs of noisy chords have a factor of their own.
+[[nodiscard]] inline std::optional<TurnRatio> turn_ratio(double gyro2, double both, double reference2, double pairs,
                                                          double least_correlation) {
   if (!(gyro2 > 0) || !(reference2 > 0)) return std::nullopt;
   const double correlation = both / std::sqrt(gyro2 * reference2);
   if (std::abs(correlation) < least_correlation) return std::nullopt;
-  return TurnRatio{.low = std::abs(both) / reference2, .high = gyro2 / std::abs(both), .correlation = correlation};
+  constexpr double kErrors = 2;
+  const double wider = 1 + kErrors * std::sqrt((1 / (correlation * correlation) - 1) / (pairs - 2));
+  return TurnRatio{.low = std::abs(both) / reference2 / wider,
+                   .high = gyro2 / std::abs(both) * wider,
+                   .correlation = correlation,
+                   .seconds = pairs};
 }
 
 }  // namespace tetap::doctor

@@ -51,7 +51,6 @@ class Channels {
 
  private:
   [[noreturn]] void refuse() const {
-    require_known(fault_);
     throw std::runtime_error("fault: sensor '" + fault_.sensor + "' has no axis '" + fault_.axis + "'");
   }
   void add(std::string_view message, std::string_view signal, Form form = Form::kValue, double per_unit = 1,
@@ -190,12 +189,15 @@ class Injector {
   void whole_frame(TimedFrame f, std::size_t i) {
     const std::uint32_t offset = f.frame.id - geometry_.base;
     const bool hit = during(f.time) && std::find(whole_.begin(), whole_.end(), offset) != whole_.end();
-    result_.changed += hit ? 1 : 0;
-    if (hit && fault_.kind == FaultKind::kLost) return;
+    bool changed = hit;
     if (hit && fault_.kind == FaultKind::kDelayed) f.time = f.time + base::Micros{std::llround(fault_.size * 1e6)};
-    if (hit && fault_.kind == FaultKind::kNotAvailable)
+    if (hit && fault_.kind == FaultKind::kNotAvailable) {
       for (const DbcSignal& signal : dbc_.at(offset)->signals)
         if (signal.has_not_available()) signal.set_raw(f.frame, signal.not_available());
+      changed = f.frame.data != frames_[i].frame.data;
+    }
+    result_.changed += changed ? 1 : 0;
+    if (hit && fault_.kind == FaultKind::kLost) return;
     put(f, i);
     if (hit && fault_.kind == FaultKind::kRepeated) put(f, i);
   }
@@ -381,6 +383,7 @@ Faulted put_fault(std::span<const TimedFrame> frames, const FrameFault& fault, c
 }
 
 double largest_size(const FrameFault& fault, const FrameGeometry& geometry, const BusDatabase& dbc, double interval_s) {
+  require_known(fault);
   double largest = 0;
   const Channels channels(fault, geometry, dbc);
   for (const Channel& channel : channels.all()) {

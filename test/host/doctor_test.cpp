@@ -14,6 +14,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <random>
 #include <vector>
 
 namespace tetap::doctor {
@@ -148,13 +149,36 @@ TEST(TurnRatio, NoiseOfEitherDeviceLeavesTheFactorBetweenTheTwoRegressions) {
       const double turn = std::sin(0.1 * i), noise = 0.5 * std::cos(2.3 * i);
       moments.add({1.5 * turn + (of_gyro ? noise : 0), turn + (of_gyro ? 0 : noise)});
     }
-    const auto ratio = turn_ratio(moments.covariance(0, 0), moments.covariance(0, 1), moments.covariance(1, 1), 0.6);
+    const auto ratio =
+        turn_ratio(moments.covariance(0, 0), moments.covariance(0, 1), moments.covariance(1, 1), moments.count(), 0.6);
     ASSERT_TRUE(ratio);
     EXPECT_LE(ratio->low, 1.501);
     EXPECT_GE(ratio->high, 1.499);
     EXPECT_GT(ratio->low, 0.9);
     EXPECT_LT(ratio->high, 2.5);
   }
+}
+
+TEST(TurnRatio, FewNoisyPairsOfEqualDevicesHoldAFactorOfOne) {
+  std::mt19937 draws(5);
+  std::normal_distribution<double> normal;
+  int beside = 0;
+  double width = 0;
+  constexpr int kLogs = 500;
+  for (int log = 0; log < kLogs; ++log) {
+    Moments<2> moments;
+    for (int i = 0; i < 22; ++i) {
+      const double turn = normal(draws);
+      moments.add({turn, turn + 0.4 * normal(draws)});
+    }
+    const auto ratio =
+        turn_ratio(moments.covariance(0, 0), moments.covariance(0, 1), moments.covariance(1, 1), moments.count(), 0.6);
+    ASSERT_TRUE(ratio);
+    beside += ratio->low > 1 || ratio->high < 1 ? 1 : 0;
+    width += ratio->high / ratio->low / kLogs;
+  }
+  EXPECT_LT(beside, kLogs / 20);
+  EXPECT_LT(width, 1.7);
 }
 
 TEST(BusClock, GoesOnBetweenSyncFramesButInLockstepByATickAtMost) {

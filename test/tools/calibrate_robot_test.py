@@ -668,7 +668,7 @@ class Program(unittest.TestCase):
             for name in ("imu", "wheels", "gnss", "velocity"):
                 np.testing.assert_array_equal(getattr(log, name).t, getattr(alone, name).t)
             self.assertEqual(log.dropped["frames of sensors before the first In_Sync"], 2)
-            self.assertRegex(log.notes[0], r"a\.log:\d+: the first In_Sync tells 1\.010 s; left out: 50 epochs before it by the node's own clock")
+            self.assertRegex(log.notes[0], r"a\.log:\d+: the first In_Sync gives 1\.010 s; left out: 50 epochs before it by the node's own clock")
         # Epochs that agree with In_Sync are the node's time, too.
         log = recording.Log(self.file(own_epochs(1_000_000, 1_010_000) + steps), bus_writer.DEFAULT_DBC, 0x300)
         self.assertEqual((log.notes, log.dropped), ([], {}))

@@ -349,6 +349,12 @@ class FaultsInFrames(unittest.TestCase):
         self.assertEqual(len(self.inject("frames gnss lost", "--for", "1")), len(self.clean) - 5 * 4)
         lines = self.inject("frames gnss not_available", "--for", "1")
         self.assertEqual({value for t, value in self.read(lines, "GnssVelEN_East") if 1 <= round(t, 3) < 2}, {None})
+        empty = os.path.join(self.folder, "empty.log")
+        with open(empty, "w", encoding="ascii") as file:
+            file.writelines(lines)
+        again = subprocess.run([INJECT, empty, empty + ".out", "--fault", "frames gnss not_available", "--at", "1", "--for", "1", "--dbc", DBC],
+                               capture_output=True, text=True)
+        self.assertEqual((again.returncode, "no frame has" in again.stderr), (1, True), "frames that carry nothing already do not count")
 
     def test_an_accuracy_that_is_too_good(self):
         lines = self.inject("gnss_accuracy all scale", "--size", "0.1", "--for", "1")
@@ -398,7 +404,7 @@ class FaultsInFrames(unittest.TestCase):
                     self.assertIn(done.returncode, (0, 1), done.stderr)
 
     def test_the_time_is_that_of_the_robot_from_the_begin_on(self):
-        """A log in lockstep is received faster than the robot's time; In_Sync tells it, and it does not begin at 0."""
+        """A log in lockstep is received faster than the robot's time; In_Sync gives it, and it does not begin at 0."""
         path, out = os.path.join(self.folder, "fast.log"), os.path.join(self.folder, "fast_out.log")
         lines, received = [], 5_000_000.0
         for line in self.clean:
@@ -429,6 +435,27 @@ class FaultsInFrames(unittest.TestCase):
         self.assertLess(abs(late.index(lines[stamps[150]]) - moved), 8)
         done = subprocess.run([INJECT, path, out, "--dbc", DBC, "--fault", "gyro z dead", "--at", "77"], capture_output=True, text=True)
         self.assertEqual((done.returncode, done.stderr), (2, f"tetap-inject: --at is 77.000 s: {path} ends 2.990 s after its begin, by In_Sync\n"))
+
+    def test_two_runs_in_one_log_are_named(self):
+        """A node that began anew: its epochs go back, and a fault of the second run has no robot time of its own."""
+        path, out = os.path.join(self.folder, "two.log"), os.path.join(self.folder, "two_out.log")
+        epoch = self.frames["Est_Epoch"].arbitration_id.id
+        lines = []
+        for run in range(2):
+            for k, line in enumerate(self.clean):
+                at = float(line[1:line.index(")")]) + 5 * run
+                if "310#" in line:
+                    lines.append(f"({at:017.6f}) vcan0 {epoch:03X}#{round((at - 5 * run - self.BEGIN_S + 7) * 1e6).to_bytes(8, 'little').hex().upper()}\n")
+                lines.append(f"({at:017.6f}) {line.split(' ', 1)[1]}")
+        with open(path, "w", encoding="ascii") as file:
+            file.writelines(lines)
+        done = subprocess.run([INJECT, path, out, "--fault", "gyro z dead", "--at", "1", "--for", "0.5", "--dbc", DBC], capture_output=True, text=True)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn(f"tetap-inject: warning: {path}: Est_Epoch goes back by 2.990 s at 2.990 s after the begin: two runs in one log?", done.stderr)
+        with open(out, encoding="ascii") as file:
+            after = file.readlines()
+        gyro = [k for k, line in enumerate(lines) if " 310#" in line]
+        self.assertTrue({k for k, (a, b) in enumerate(zip(lines, after)) if a != b} <= set(gyro[100:150]))
 
     def test_a_last_line_without_newline_is_taken_whole_or_named(self):
         path, out = os.path.join(self.folder, "cut.log"), os.path.join(self.folder, "cut_out.log")

@@ -141,7 +141,7 @@ def _from_first_sync(path, nodes, notes):
     own = [one for one in nodes[:first] if one[4] == "Est_Epoch"]
     if not own or abs(nodes[first][3] - own[-1][3]) <= BACK_US:
         return nodes, 0
-    notes.append(f"{path}:{nodes[first][1]}: the first In_Sync tells {nodes[first][3] / 1e6:.3f} s; left out: {len(own)} epochs before it by the node's own clock, "
+    notes.append(f"{path}:{nodes[first][1]}: the first In_Sync gives {nodes[first][3] / 1e6:.3f} s; left out: {len(own)} epochs before it by the node's own clock, "
                  f"{own[0][3] / 1e6:.3f} to {own[-1][3] / 1e6:.3f} s")
     begun = nodes[first][3]  # an epoch by the old clock may come just after the new one was set
     its = next((k for k, one in enumerate(nodes[first + 1:], first + 1) if begun <= one[3] <= begun + STAMP_SPAN), len(nodes))
