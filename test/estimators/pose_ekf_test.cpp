@@ -279,5 +279,19 @@ TEST(PoseEkf, FixesWhoseErrorLastsWeighLess) {
   }
 }
 
+/// The fixes of before have no part in the new pose, so the next one repeats nothing.
+TEST(PoseEkf, TheFirstFixAfterAPoseThatIsGivenCountsInFull) {
+  Standing robot(1);
+  robot.n.gnss.correlation_s = 60;
+  robot.n.gnss.sigma_scale = 1;
+  robot.n.gnss.sigma_floor_m = 0.5F;
+  robot.landmarks = 0;
+  robot.run(2, {});
+  robot.estimator.set_pose({robot.us}, {.sigma_position_m = 2, .sigma_yaw_rad = 0.02F}, robot.ctx());
+  robot.run(0.2, {});
+  EXPECT_LT(sigma_m(robot), 0.6);
+  EXPECT_GT(sigma_m(robot), 0.5);
+}
+
 }  // namespace
 }  // namespace tetap::estimators

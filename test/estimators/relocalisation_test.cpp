@@ -200,5 +200,36 @@ TEST(Relocalisation, OddsDecideAndNotOneRefusal) {
   }
 }
 
+/// A hundred fixes in twenty seconds, whose error lasts for a minute or for none of the time between two.
+TEST(Relocalisation, FixesWhoseErrorLastsWeighLessInTheRival) {
+  for (const float correlation_s : {0.0F, 60.0F}) {
+    Relocalisation search;
+    const auto p = filter::Symmetric<float, 3>::diagonal({1e-3F, 1e-3F, 1e-4F});
+    filter::Innovation<float, 2> refused;
+    refused.verdict = filter::Verdict::kRejected, refused.nis = 1000, refused.gate = 9.2F;
+    search.note({}, p);
+    for (std::uint8_t id = 0; id < 2; ++id) {
+      const float along_m = id == 0 ? 3.0F : 5.0F, aside_m = id == 0 ? 2.0F : -1.0F;
+      model::RangeBearing seen{.sigma_range_m = 0.1F,
+                               .sigma_bearing_rad = 0.02F,
+                               .landmark = {.x = base::Anchored{}.plus(along_m), .y = base::Anchored{}.plus(aside_m)}};
+      const auto exact = seen.predict({});
+      seen.range_m = exact(0), seen.bearing_rad = exact(1);
+      EXPECT_FALSE(search.add(seen, id, {1'000'000 + 100'000 * id}, refused, true));
+    }
+    ASSERT_EQ(search.fixed_at().us, 0);
+    for (int k = 1; k <= 100; ++k)
+      search.add(model::GnssPosition{.sigma_m = 0.05F}, {1'100'000 + 200'000 * k}, 9.2F, correlation_s);
+    EXPECT_EQ(search.fixed_at().us, 21'100'000);
+    const float sigma_m = base::sqrt(search.rival().p(0, 0));
+    if (correlation_s > 0) {
+      EXPECT_GT(sigma_m, 0.03F);
+      EXPECT_LT(sigma_m, 0.06F);
+    } else {
+      EXPECT_LT(sigma_m, 0.006F);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace tetap::estimators

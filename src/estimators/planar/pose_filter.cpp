@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "estimators/planar/correlated_fix.hpp"
 #include "estimators/planar/landmark_sighting.hpp"
 #include "estimators/planar/pose_ekf.hpp"
 #include "estimators/planar/pose_ukf.hpp"
@@ -50,7 +51,8 @@ Innovation PoseFilter<Filter>::measure(const Model& model, Source source, float 
   }
   if (relocalisation_.searches() || in_a_row_[kLandmark] >= kDegraded)
     relocalisation_.note(motion_.filter.x, covariance_of(motion_.filter));
-  if constexpr (std::same_as<Model, model::GnssPosition>) relocalisation_.add(model, stamp, gate);
+  if constexpr (std::same_as<Model, model::GnssPosition>)
+    relocalisation_.add(model, stamp, gate, ctx.parameters.gnss.correlation_s);
   if constexpr (std::same_as<Model, model::RangeBearing>)
     if (named && relocalisation_.add(model, landmark, stamp, result, in_a_row_[kLandmark] >= kDegraded)) {
       take_rival(stamp);
@@ -59,31 +61,25 @@ Innovation PoseFilter<Filter>::measure(const Model& model, Source source, float 
   return record(result, landmark);
 }
 
-/// A fix whose error lasts is judged by its own uncertainty, and weighs what it does not repeat of the fix before.
 template <class Filter>
 template <class Model>
 auto PoseFilter<Filter>::update_by(const Model& model, float gate, base::Micros stamp, const param::GnssParameters& n)
     -> filter::Innovation<float, Model::kDimension> {
   if constexpr (std::same_as<Model, model::GnssPosition>) {
-    if (n.correlation_s > 0.0F) {
-      Filter judge = motion_.filter;
-      auto judged = judge.update(model, gate);
-      if (judged.verdict != filter::Verdict::kAccepted) return judged;
-      const float since_s = fixed_at_.us > 0 ? base::seconds(stamp - fixed_at_) : base::kInfinity;
-      Model weighed = model;
-      weighed.sigma_m *= base::sqrt(checks::kColouredNoiseInflation * checks::repeated(since_s, n.correlation_s));
-      fixed_at_ = stamp;
-      static_cast<void>(motion_.filter.update(weighed, base::kInfinity));
-      return judged;
-    }
+    const float since_s = fixed_at_.us > 0 ? base::seconds(stamp - fixed_at_) : base::kInfinity;
+    const auto judged = update_by_fix(motion_.filter, model, gate, since_s, n.correlation_s);
+    if (n.correlation_s > 0.0F && judged.verdict == filter::Verdict::kAccepted) fixed_at_ = stamp;
+    return judged;
+  } else {
+    return motion_.filter.update(model, gate);
   }
-  return motion_.filter.update(model, gate);
 }
 
 template <class Filter>
 [[gnu::noinline]] void PoseFilter<Filter>::take_rival(base::Micros stamp) {
   motion_.filter.x = relocalisation_.rival().x;
   set_covariance(motion_.filter, relocalisation_.rival().p);
+  fixed_at_ = relocalisation_.fixed_at();
   relocalisation_.reset();
   for (checks::Persistence& refused : refused_) refused.reset();
   in_a_row_ = {};

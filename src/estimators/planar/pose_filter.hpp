@@ -4,7 +4,6 @@
 // root.
 #pragma once
 
-#include "checks/coloured_noise.hpp"
 #include "checks/persistence.hpp"
 #include "estimators/context.hpp"
 #include "estimators/planar/dead_reckoning.hpp"
@@ -53,6 +52,7 @@ class PoseFilter {
     landmarks_.reset();
     relocalisation_.reset();
     last_absolute_ = t;
+    fixed_at_ = {};  // no fix has a part in the pose
     refused_ = {};
     in_a_row_ = {};
     trust_motion();
@@ -183,7 +183,7 @@ class PoseFilter {
   std::array<std::uint8_t, MotionVote::kSources> in_a_row_{};        ///< the same, which a widening does not end
   MotionVote vote_;
   base::Micros last_absolute_;  ///< stamp of the last accepted landmark or fix
-  base::Micros fixed_at_;       ///< stamp of the last fix that was fused where its errors last; 0: none
+  base::Micros fixed_at_;       ///< stamp of the last fix that has a part in the pose, where its errors last; 0: none
   base::Micros now_;
   std::uint8_t jumps_ = 0;  ///< relocalisations since the start
 };

@@ -7,6 +7,7 @@
 
 #include "base/math.hpp"
 #include "checks/persistence.hpp"
+#include "estimators/planar/correlated_fix.hpp"
 #include "estimators/planar/landmark_alignment.hpp"
 #include "estimators/planar/planar_ekf.hpp"
 #include "filter/update.hpp"
@@ -42,10 +43,12 @@ class Relocalisation {
   /// the rival is to replace the filter.
   [[nodiscard]] bool add(const model::RangeBearing& seen, std::uint8_t id, base::Micros stamp,
                          const filter::Innovation<float, 2>& judged, bool begins);
-  /// A fix: a rival that contradicts it is none.
-  void add(const model::GnssPosition& fix, base::Micros stamp, float gate);
+  /// A fix: a rival that contradicts it is none. `correlation_s` as of update_by_fix().
+  void add(const model::GnssPosition& fix, base::Micros stamp, float gate, float correlation_s);
 
   [[nodiscard]] const PlanarEkf& rival() const { return rival_; }
+  /// Stamp of the last fix that has a part in the rival's pose; 0: none.
+  [[nodiscard]] base::Micros fixed_at() const { return fixed_ ? last_fix_ : base::Micros{}; }
 
   /// Beside the last fix nothing while there is no search.
   template <class Sink>
@@ -189,10 +192,11 @@ inline bool Relocalisation::add(const model::RangeBearing& seen, std::uint8_t id
   way_m_ = 0;
 }
 
-inline void Relocalisation::add(const model::GnssPosition& fix, base::Micros stamp, float gate) {
+inline void Relocalisation::add(const model::GnssPosition& fix, base::Micros stamp, float gate, float correlation_s) {
+  const float since_s = fixed_ ? base::seconds(stamp - last_fix_) : base::kInfinity;
   last_fix_ = stamp;
   if (!searches_ || !landmarks_.has_candidate()) return;
-  fixed_ = rival_.update(fix, gate).verdict == filter::Verdict::kAccepted;
+  fixed_ = update_by_fix(rival_, fix, gate, since_s, correlation_s).verdict == filter::Verdict::kAccepted;
   if (!fixed_) search_anew();
 }
 

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+// A GNSS fix whose error lasts is judged by its own uncertainty, and weighs what it does not repeat of the fix before.
+#pragma once
+
+#include "base/math.hpp"
+#include "checks/coloured_noise.hpp"
+#include "filter/update.hpp"
+#include "model/gnss_position.hpp"
+
+namespace tetap::estimators {
+
+/// Update by a fix `since_s` after the one before (infinity: there was none). `correlation_s` 0: errors are white.
+template <class Filter>
+filter::Innovation<float, 2> update_by_fix(Filter& filter, const model::GnssPosition& fix, float gate, float since_s,
+                                           float correlation_s) {
+  if (!(correlation_s > 0.0F)) return filter.update(fix, gate);
+  Filter judge = filter;
+  const auto judged = judge.update(fix, gate);
+  if (judged.verdict != filter::Verdict::kAccepted) return judged;
+  model::GnssPosition weighed = fix;
+  weighed.sigma_m *= base::sqrt(checks::kColouredNoiseInflation * checks::repeated(since_s, correlation_s));
+  static_cast<void>(filter.update(weighed, base::kInfinity));
+  return judged;
+}
+
+}  // namespace tetap::estimators
