@@ -90,7 +90,7 @@ class RobotTime {
     for (const sim::TimedFrame& f : frames) {
       clock.add(f.time, f.frame);
       unknown += clock.known() ? 0 : 1;
-      if (times_.size() > unknown) find_return(times_.back(), clock.now());
+      if (times_.size() > unknown) note_return(times_.back(), clock.now());
       times_.push_back(times_.size() > unknown ? std::max(times_.back(), clock.now()) : clock.now());
     }
     for (std::size_t i = 0; i < unknown && unknown < times_.size(); ++i) times_[i] = times_[unknown];
@@ -100,8 +100,8 @@ class RobotTime {
   [[nodiscard]] base::Micros end() const { return times_.back(); }
   [[nodiscard]] const char* clock() const { return clock_; }
   /// The longest way back of the clock, as of a node that began anew, and the robot time before it.
-  [[nodiscard]] base::Micros back() const { return back_; }
-  [[nodiscard]] base::Micros back_from() const { return back_from_; }
+  [[nodiscard]] base::Micros longest_return() const { return longest_return_; }
+  [[nodiscard]] base::Micros return_begin() const { return return_begin_; }
   [[nodiscard]] std::vector<sim::TimedFrame> frames() const {
     std::vector<sim::TimedFrame> moved = frames_;
     for (std::size_t i = 0; i < moved.size(); ++i) moved[i].time = times_[i];
@@ -118,15 +118,15 @@ class RobotTime {
   }
 
  private:
-  void find_return(base::Micros before, base::Micros now) {
-    if (before - now <= back_) return;
-    back_ = before - now;
-    back_from_ = before;
+  void note_return(base::Micros before, base::Micros now) {
+    if (before - now <= longest_return_) return;
+    longest_return_ = before - now;
+    return_begin_ = before;
   }
 
   const std::vector<sim::TimedFrame>& frames_;
   std::vector<base::Micros> times_;
-  base::Micros back_, back_from_;
+  base::Micros longest_return_, return_begin_;
   const char* clock_ = "";
 };
 
@@ -145,6 +145,19 @@ void write(const std::string& path, const sim::Faulted& faulted, const RobotTime
     out.discard();
     throw;
   }
+}
+
+/// Robot time stands still in a second run until it is where the first ended: a fault that lasts until then has all of
+/// it.
+void refuse_second_run(const std::string& log, const RobotTime& time, const sim::FrameFault& fault) {
+  constexpr base::Micros kStep{1'000'000};  // a smaller way back is a step of one clock
+  if (time.longest_return() <= kStep) return;
+  const std::string found = log + ": " + time.clock() + " goes back by " + sim::in_seconds(time.longest_return()) +
+                            " at " + sim::in_seconds(time.return_begin() - time.begin()) +
+                            " after the begin. The log may hold two runs. ";
+  if (fault.start + fault.duration > time.return_begin())
+    throw std::runtime_error(found + "The fault would last until the second one; split the log");
+  std::fprintf(stderr, "tetap-inject: warning: %sThe fault is in the first one\n", found.c_str());
 }
 
 int run(sim::Arguments& arguments) {
@@ -175,18 +188,11 @@ int run(sim::Arguments& arguments) {
 
   const std::vector<sim::TimedFrame> frames = frames_of(*log_name, first_id);
   const RobotTime time(frames, first_id);
-  constexpr base::Micros kReturn{1'000'000};  // a step of the clock is shorter, a run longer
-  if (time.back() > kReturn)
-    std::fprintf(
-        stderr,
-        "tetap-inject: warning: %s: %s goes back by %s at %s after the begin: two runs in one log? Split it to "
-        "put a fault into the second\n",
-        log_name->c_str(), time.clock(), sim::in_seconds(time.back()).c_str(),
-        sim::in_seconds(time.back_from() - time.begin()).c_str());
   fault.start = time.begin() + base::Micros{static_cast<std::int64_t>(at_s * 1e6)};
   if (fault.start > time.end())
     throw std::runtime_error("--at is " + sim::in_seconds(fault.start - time.begin()) + ": " + *log_name + " ends " +
                              sim::in_seconds(time.end() - time.begin()) + " after its begin, by " + time.clock());
+  refuse_second_run(*log_name, time, fault);
   for (const sim::TimedFrame& f : frames)
     if (const auto* message = dbc.at(f.frame.id - first_id); message != nullptr && message->name == "In_GnssLat")
       geometry.latitude_deg = message->find("GnssLat_Lat")->value(f.frame);

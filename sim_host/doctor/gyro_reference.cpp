@@ -10,8 +10,9 @@
 namespace tetap::doctor {
 namespace {
 
-constexpr double kSlow_mps = 2;      ///< below, the course of a velocity with 0.1 m/s of noise is loose
-constexpr double kMostTurn_rad = 1;  ///< in a second: more may be a wrap
+constexpr double kSlow_mps = 2;           ///< below, the course of a velocity with 0.1 m/s of noise is loose
+constexpr double kMostTurn_rad = 1;       ///< in a second: more may be a wrap
+constexpr double kMostChordTurn_rad = 2;  ///< more may be a wrap; a course is noisy, and a lower limit cuts it alone
 constexpr double kLeastWindows = 15;
 constexpr double kLeastTurn_radps = 0.02;         ///< RMS of the course's rate
 constexpr double kFollows = 0.7;                  ///< correlation: the course of noisy fixes keeps that much
@@ -46,10 +47,11 @@ void CourseDetector::end_chord(double time_s, const PlanePoint& here, double sig
                     .middle_s = time_s - 0.5 * since_s,
                     .middle_turned_rad = scaled(0.5, sum(turned_rad_, turned_from_rad_))};
     const double turn = chord_ ? wrapped(now.course_rad - chord_->course_rad) : 0;
-    if (chord_ && std::abs(turn) < kMostTurn_rad) {
-      const double per_s = 1 / (now.middle_s - chord_->middle_s);
+    if (chord_ && std::abs(turn) < kMostChordTurn_rad) {
+      const double step_s = now.middle_s - chord_->middle_s, per_s = 1 / step_s;
       const Vector3 rate = scaled(per_s, sum(now.middle_turned_rad, scaled(-1, chord_->middle_turned_rad)));
       by_fixes_.add({rate[0], rate[1], rate[2], per_s * turn});
+      by_fixes_s_ += step_s;
     }
     chord_ = now;
   } else {
@@ -90,6 +92,7 @@ std::optional<TurnRatio> CourseDetector::ratio() const {
   auto found = turn_ratio(moments.covariance(gyro, gyro), moments.covariance(gyro, course), moments.covariance(3, 3),
                           moments.count(), kFollows);
   if (!found) return found;
+  if (!velocity) found->seconds = by_fixes_s_;
   found->device = velocity ? "the course of the GNSS velocity" : "the course of the fixes";
   found->uses = velocity ? kGnssVelocity : kFixes;
   return found;
@@ -102,7 +105,7 @@ void CourseDetector::finish(Findings& findings) {
   const std::array<double, 4> gyro{up_s_[0], up_s_[1], up_s_[2], 0};
   name_gyro_unit(std::sqrt(moments.covariance(gyro, gyro) / moments.covariance(3, 3)),
                  velocity ? "the course of the GNSS velocity" : "the course of the fixes",
-                 velocity ? kGnssVelocity : kFixes, moments.count(), findings);
+                 velocity ? kGnssVelocity : kFixes, velocity ? moments.count() : by_fixes_s_, findings);
 }
 
 Vector3 FieldDetector::field_b_uT(const Vector3& flux_s_uT) const {

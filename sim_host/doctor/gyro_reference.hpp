@@ -43,6 +43,7 @@ class CourseDetector : public Detector {
   Vector3 up_s_{};
   Moments<4> by_velocity_;  ///< gyroscope x y z, rate of the course [rad/s]
   Moments<4> by_fixes_;     ///< likewise
+  double by_fixes_s_ = 0;   ///< time between the chords that it has
   Plane plane_;
   Vector3 turned_rad_{};  ///< sum of the gyroscope's increments
   std::optional<double> began_s_;

@@ -47,9 +47,9 @@ std::optional<TurnRatio> TurnScaleDetector::by_field() const {
 void TurnScaleDetector::finish(Findings& findings) {
   if (windows_ < 1 || std::abs(share_sum_ / windows_ - 1) > kShare) return;
   const auto wheels = by_.turn.knows_size() ? following(by_.turn.ratio()) : std::nullopt;
-  auto third = following(by_.course.ratio());
-  if (!third) third = by_field();
-  if (!third) third = following(by_.forward.agreement().turn);
+  std::optional<TurnRatio> third;
+  for (const auto& one : {following(by_.course.ratio()), by_field(), following(by_.forward.agreement().turn)})
+    if (one && (!third || one->high / one->low < third->high / third->low)) third = one;
   if (!wheels || !shown(*wheels)) {
     if (third && shown(*third) && !wheels) name_gyroscope(*third, std::nullopt, findings);
     return;

@@ -84,19 +84,27 @@ TYPED_TEST(RelocalisationOf, MisreadLandmarksAreNoReasonToJump) {
   }
 }
 
-/// A fix of half a metre at the filter's own estimate.
 template <class E>
-void fix_agrees_with_filter(test::CirclingRobot<E>& robot) {
-  const Estimate e = robot.estimate();
-  const auto at =
-      robot.frame.frame.to_geodetic({.east_um = e.pose.x.um(), .north_um = e.pose.y.um(), .up_um = 0, .valid = true});
+void fix(test::CirclingRobot<E>& robot, base::Anchored x, base::Anchored y, float sigma_m) {
+  const auto at = robot.frame.frame.to_geodetic({.east_um = x.um(), .north_um = y.um(), .up_um = 0, .valid = true});
   ASSERT_TRUE(at.has_value());
   static_cast<void>(robot.estimator.fuse(sensor::GnssPosition{.latitude_2ndeg = at->latitude_2ndeg,
                                                               .longitude_2ndeg = at->longitude_2ndeg,
                                                               .height_m = static_cast<float>(at->height_m),
-                                                              .horizontal_acc_m = 0.5F,
+                                                              .horizontal_acc_m = sigma_m,
                                                               .fix = sensor::GnssFix::k3d},
                                          {robot.us}, robot.ctx()));
+}
+/// A fix of half a metre at the filter's own estimate.
+template <class E>
+void fix_agrees_with_filter(test::CirclingRobot<E>& robot) {
+  const Estimate e = robot.estimate();
+  fix(robot, e.pose.x, e.pose.y, 0.5F);
+}
+template <class E>
+void fix_at_robot(test::CirclingRobot<E>& robot) {
+  fix(robot, base::Anchored{}.plus(static_cast<float>(robot.x)), base::Anchored{}.plus(static_cast<float>(robot.y)),
+      0.01F);
 }
 
 // Receiver against camera: landmarks that all agree about another pose do not win while fixes contradict it.
@@ -126,6 +134,34 @@ TYPED_TEST(RelocalisationOf, AFixJustBeforeBarsItForTenSeconds) {
   EXPECT_EQ(robot.estimator.jump().count, 0) << "nine and a half seconds";
   robot.drive(30);
   EXPECT_EQ(robot.estimator.jump().count, 1);
+}
+
+/// A robot that was carried off and jumped: share of its position's sigma that the first fix afterwards leaves.
+template <class E>
+float share_left_by_first_fix(bool rival_has_a_fix) {
+  test::CirclingRobot<E> robot(test::held_backward());
+  robot.numbers.recovery.at_least = 1000;
+  robot.numbers.gnss.correlation_s = 60;
+  robot.numbers.gnss.sigma_scale = 1;
+  robot.numbers.gnss.sigma_floor_m = 0.01F;
+  robot.set(0, 0, 0, 0.05F, 0.02F);
+  robot.drive(200);
+  fix_at_robot(robot);  // a part of the pose that the filter leaves
+  robot.x += 1.5, robot.y -= 1, robot.yaw += 2.5;
+  for (int k = 0; k < 60 && robot.estimator.jump().count == 0; ++k) {
+    robot.drive(10);
+    if (rival_has_a_fix && k == 6) fix_at_robot(robot);
+  }
+  EXPECT_EQ(robot.estimator.jump().count, 1);
+  const float before_m2 = robot.estimate().p(0, 0);
+  fix_at_robot(robot);
+  return base::sqrt(robot.estimate().p(0, 0) / before_m2);
+}
+
+// With errors that last for a minute, a fix after the jump repeats those of the rival, and none of the filter's.
+TYPED_TEST(RelocalisationOf, AFixAfterTheJumpRepeatsThoseOfTheRivalAlone) {
+  EXPECT_LT(share_left_by_first_fix<TypeParam>(false), 0.6F);
+  EXPECT_GT(share_left_by_first_fix<TypeParam>(true), 0.8F);
 }
 
 // Landmarks seen at once, twice a second; fewer of them take longer, and one alone does nothing.
@@ -200,7 +236,7 @@ TEST(Relocalisation, OddsDecideAndNotOneRefusal) {
   }
 }
 
-/// A hundred fixes in twenty seconds, whose error lasts for a minute or for none of the time between two.
+/// A hundred fixes in twenty seconds. Their errors last for a minute, or are white.
 TEST(Relocalisation, FixesWhoseErrorLastsWeighLessInTheRival) {
   for (const float correlation_s : {0.0F, 60.0F}) {
     Relocalisation search;
@@ -217,10 +253,10 @@ TEST(Relocalisation, FixesWhoseErrorLastsWeighLessInTheRival) {
       seen.range_m = exact(0), seen.bearing_rad = exact(1);
       EXPECT_FALSE(search.add(seen, id, {1'000'000 + 100'000 * id}, refused, true));
     }
-    ASSERT_EQ(search.fixed_at().us, 0);
+    ASSERT_EQ(search.last_fused_fix().us, 0);
     for (int k = 1; k <= 100; ++k)
       search.add(model::GnssPosition{.sigma_m = 0.05F}, {1'100'000 + 200'000 * k}, 9.2F, correlation_s);
-    EXPECT_EQ(search.fixed_at().us, 21'100'000);
+    EXPECT_EQ(search.last_fused_fix().us, 21'100'000);
     const float sigma_m = base::sqrt(search.rival().p(0, 0));
     if (correlation_s > 0) {
       EXPECT_GT(sigma_m, 0.03F);

@@ -162,23 +162,36 @@ TEST(TurnRatio, NoiseOfEitherDeviceLeavesTheFactorBetweenTheTwoRegressions) {
 TEST(TurnRatio, FewNoisyPairsOfEqualDevicesHoldAFactorOfOne) {
   std::mt19937 draws(5);
   std::normal_distribution<double> normal;
-  int beside = 0;
-  double width = 0;
-  constexpr int kLogs = 500;
-  for (int log = 0; log < kLogs; ++log) {
-    Moments<2> moments;
-    for (int i = 0; i < 22; ++i) {
-      const double turn = normal(draws);
-      moments.add({turn, turn + 0.4 * normal(draws)});
+  for (const bool of_gyro : {true, false}) {
+    int too_high = 0, too_low = 0;
+    double width = 0;
+    constexpr int kLogs = 500;
+    for (int log = 0; log < kLogs; ++log) {
+      Moments<2> moments;
+      for (int i = 0; i < 22; ++i) {
+        const double turn = normal(draws), noise = 0.4 * normal(draws);
+        moments.add({turn + (of_gyro ? noise : 0), turn + (of_gyro ? 0 : noise)});
+      }
+      const auto ratio = turn_ratio(moments.covariance(0, 0), moments.covariance(0, 1), moments.covariance(1, 1),
+                                    moments.count(), 0.6);
+      ASSERT_TRUE(ratio);
+      too_high += ratio->low > 1 ? 1 : 0;
+      too_low += ratio->high < 1 ? 1 : 0;
+      width += ratio->high / ratio->low / kLogs;
     }
-    const auto ratio =
-        turn_ratio(moments.covariance(0, 0), moments.covariance(0, 1), moments.covariance(1, 1), moments.count(), 0.6);
-    ASSERT_TRUE(ratio);
-    beside += ratio->low > 1 || ratio->high < 1 ? 1 : 0;
-    width += ratio->high / ratio->low / kLogs;
+    EXPECT_LT(too_high, kLogs / 12) << of_gyro;
+    EXPECT_LT(too_low, kLogs / 12) << of_gyro;
+    EXPECT_LT(width, 1.95) << of_gyro;
   }
-  EXPECT_LT(beside, kLogs / 20);
-  EXPECT_LT(width, 1.7);
+}
+
+TEST(TurnRatio, PairsWithoutNoiseHaveNoWidthAndTwoHaveNoFactor) {
+  const auto exact = turn_ratio(4, 2, 1, 10, 0.6);
+  ASSERT_TRUE(exact);
+  EXPECT_NEAR(exact->low, 2, 1e-12);
+  EXPECT_NEAR(exact->high, 2, 1e-12);
+  EXPECT_TRUE(turn_ratio(4, 2.0000001, 1, 10, 0.6)) << "a correlation of one, rounded up";
+  EXPECT_FALSE(turn_ratio(4, 2, 1, 2, 0.6));
 }
 
 TEST(BusClock, GoesOnBetweenSyncFramesButInLockstepByATickAtMost) {

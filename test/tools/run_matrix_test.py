@@ -437,25 +437,32 @@ class FaultsInFrames(unittest.TestCase):
         self.assertEqual((done.returncode, done.stderr), (2, f"tetap-inject: --at is 77.000 s: {path} ends 2.990 s after its begin, by In_Sync\n"))
 
     def test_two_runs_in_one_log_are_named(self):
-        """A node that began anew: its epochs go back, and a fault of the second run has no robot time of its own."""
+        """A node that began anew: its epochs go back, and the second run has no robot time of its own."""
         path, out = os.path.join(self.folder, "two.log"), os.path.join(self.folder, "two_out.log")
         epoch = self.frames["Est_Epoch"].arbitration_id.id
         lines = []
         for run in range(2):
-            for k, line in enumerate(self.clean):
+            for line in self.clean:
                 at = float(line[1:line.index(")")]) + 5 * run
                 if "310#" in line:
                     lines.append(f"({at:017.6f}) vcan0 {epoch:03X}#{round((at - 5 * run - self.BEGIN_S + 7) * 1e6).to_bytes(8, 'little').hex().upper()}\n")
                 lines.append(f"({at:017.6f}) {line.split(' ', 1)[1]}")
         with open(path, "w", encoding="ascii") as file:
             file.writelines(lines)
-        done = subprocess.run([INJECT, path, out, "--fault", "gyro z dead", "--at", "1", "--for", "0.5", "--dbc", DBC], capture_output=True, text=True)
-        self.assertEqual(done.returncode, 0, done.stderr)
-        self.assertIn(f"tetap-inject: warning: {path}: Est_Epoch goes back by 2.990 s at 2.990 s after the begin: two runs in one log?", done.stderr)
+
+        def injected(*words):
+            return subprocess.run([INJECT, path, out, "--fault", "gyro z offset", "--size", "0.1", "--dbc", DBC, *words], capture_output=True, text=True)
+        done = injected("--at", "1", "--for", "0.5")
+        named = f"{path}: Est_Epoch goes back by 2.990 s at 2.990 s after the begin. The log may hold two runs. "
+        self.assertEqual((done.returncode, done.stderr), (0, f"tetap-inject: warning: {named}The fault is in the first one\n"))
         with open(out, encoding="ascii") as file:
             after = file.readlines()
         gyro = [k for k, line in enumerate(lines) if " 310#" in line]
-        self.assertTrue({k for k, (a, b) in enumerate(zip(lines, after)) if a != b} <= set(gyro[100:150]))
+        self.assertEqual([k for k, (a, b) in enumerate(zip(lines, after)) if a != b], gyro[100:150])
+        os.remove(out)
+        done = injected("--at", "2.5", "--for", "5")
+        self.assertEqual((done.returncode, done.stderr), (2, f"tetap-inject: {named}The fault would last until the second one; split the log\n"))
+        self.assertFalse(os.path.exists(out))
 
     def test_a_last_line_without_newline_is_taken_whole_or_named(self):
         path, out = os.path.join(self.folder, "cut.log"), os.path.join(self.folder, "cut_out.log")

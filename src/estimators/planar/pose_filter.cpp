@@ -66,9 +66,9 @@ template <class Model>
 auto PoseFilter<Filter>::update_by(const Model& model, float gate, base::Micros stamp, const param::GnssParameters& n)
     -> filter::Innovation<float, Model::kDimension> {
   if constexpr (std::same_as<Model, model::GnssPosition>) {
-    const float since_s = fixed_at_.us > 0 ? base::seconds(stamp - fixed_at_) : base::kInfinity;
-    const auto judged = update_by_fix(motion_.filter, model, gate, since_s, n.correlation_s);
-    if (n.correlation_s > 0.0F && judged.verdict == filter::Verdict::kAccepted) fixed_at_ = stamp;
+    const float since_s = last_fused_fix_.us > 0 ? base::seconds(stamp - last_fused_fix_) : base::kInfinity;
+    auto judged = update_by_fix(motion_.filter, model, gate, since_s, n.correlation_s);
+    if (judged.verdict == filter::Verdict::kAccepted) last_fused_fix_ = stamp;
     return judged;
   } else {
     return motion_.filter.update(model, gate);
@@ -79,7 +79,7 @@ template <class Filter>
 [[gnu::noinline]] void PoseFilter<Filter>::take_rival(base::Micros stamp) {
   motion_.filter.x = relocalisation_.rival().x;
   set_covariance(motion_.filter, relocalisation_.rival().p);
-  fixed_at_ = relocalisation_.fixed_at();
+  last_fused_fix_ = relocalisation_.last_fused_fix();
   relocalisation_.reset();
   for (checks::Persistence& refused : refused_) refused.reset();
   in_a_row_ = {};
@@ -242,7 +242,7 @@ Innovation PoseFilter<Filter>::fuse(const sensor::GnssPosition& fix, base::Micro
   if (aligned) {
     motion_.start(stamp, aligned->pose, aligned->sigma_position_m, aligned->sigma_yaw_rad);
     begin_tracking(stamp);
-    fixed_at_ = stamp;
+    last_fused_fix_ = stamp;
   }
   return {.verdict = sensor::Verdict::kAccepted};
 }

@@ -52,7 +52,7 @@ class PoseFilter {
     landmarks_.reset();
     relocalisation_.reset();
     last_absolute_ = t;
-    fixed_at_ = {};  // no fix has a part in the pose
+    last_fused_fix_ = {};  // no fix has a part in the pose
     refused_ = {};
     in_a_row_ = {};
     trust_motion();
@@ -113,7 +113,7 @@ class PoseFilter {
     for (const std::uint8_t in_a_row : in_a_row_) sink(std::uint32_t{in_a_row});
     vote_.hash_state(sink);
     sink(last_absolute_.us);
-    sink(fixed_at_.us);
+    sink(last_fused_fix_.us);
     sink(std::uint32_t{jumps_});
   }
 
@@ -156,6 +156,7 @@ class PoseFilter {
     landmarks_.reset();
     vote_.reset();
     last_absolute_ = stamp;
+    last_fused_fix_ = {};  // a start by fixes notes its own
   }
   void recover(checks::Persistence& refused, base::Micros stamp, const param::RecoveryParameters& n);
   /// Wheels against the gyroscope, and what an earlier vote left of the trust in wheels.
@@ -182,8 +183,8 @@ class PoseFilter {
   std::array<checks::Persistence, MotionVote::kSources> refused_{};  ///< rejections in a row of one kind of sensor
   std::array<std::uint8_t, MotionVote::kSources> in_a_row_{};        ///< the same, which a widening does not end
   MotionVote vote_;
-  base::Micros last_absolute_;  ///< stamp of the last accepted landmark or fix
-  base::Micros fixed_at_;       ///< stamp of the last fix that has a part in the pose, where its errors last; 0: none
+  base::Micros last_absolute_;   ///< stamp of the last accepted landmark or fix
+  base::Micros last_fused_fix_;  ///< stamp of the last fix that has a part in the pose; 0: none
   base::Micros now_;
   std::uint8_t jumps_ = 0;  ///< relocalisations since the start
 };

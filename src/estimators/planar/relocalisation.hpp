@@ -48,7 +48,7 @@ class Relocalisation {
 
   [[nodiscard]] const PlanarEkf& rival() const { return rival_; }
   /// Stamp of the last fix that has a part in the rival's pose; 0: none.
-  [[nodiscard]] base::Micros fixed_at() const { return fixed_ ? last_fix_ : base::Micros{}; }
+  [[nodiscard]] base::Micros last_fused_fix() const { return fixed_ ? last_fix_ : base::Micros{}; }
 
   /// Beside the last fix nothing while there is no search.
   template <class Sink>
