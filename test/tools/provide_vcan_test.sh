@@ -164,7 +164,7 @@ outside() {
   kill -TERM $running
   wait $running
   expect "uml: TERM during the boot is not lost" 143 $?
-  expect "uml: nothing is left behind" yes "$(until_true nothing_left && echo yes)"  # what was killed may still be ending
+  expect "uml: nothing is left behind" yes "$(nothing_left && echo yes)"
 
   rm "$work/up"
   "${uml[@]}" -q bash -c ': >"$work/up"; sleep 50' &
