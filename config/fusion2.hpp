@@ -3,9 +3,9 @@
 // intersection on the second, for receivers whose errors share a cause.
 #pragma once
 
-#include "estimators/planar/position_fusion.hpp"
-#include "node/node.hpp"
-#include "param/limits.hpp"
+#include "config/parameters/fusion2.hpp"
+#include "tetap/estimators/planar/position_fusion.hpp"
+#include "tetap/node/node.hpp"
 
 namespace tetap::robot::fusion2 {
 
@@ -13,10 +13,5 @@ using estimators::FusionRule;
 using estimators::PositionFusion;
 using Estimators =
     node::Estimators<PositionFusion<FusionRule::kInverseVariance>, PositionFusion<FusionRule::kIntersection>>;
-
-inline constexpr param::Parameters parameters = param::checked({
-    // Two receivers of the same make state 1 sigma per axis; the origin is the first fix.
-    .gnss = {.sigma_floor_m = 0.05F, .sigma_scale = 1.0F},
-});
 
 }  // namespace tetap::robot::fusion2

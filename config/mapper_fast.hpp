@@ -3,16 +3,13 @@
 // themselves.
 #pragma once
 
-#include "config/mapper.hpp"
+#include "config/parameters/mapper_fast.hpp"
+#include "tetap/estimators/mapping/planar_mapper.hpp"
+#include "tetap/estimators/odometry.hpp"
+#include "tetap/node/node.hpp"
 
 namespace tetap::robot::mapper_fast {
 
 using Estimators = node::Estimators<estimators::Odometry, estimators::FastSlam100>;
-
-inline constexpr param::Parameters parameters = param::checked([] {
-  param::Parameters n = mapper::parameters;
-  n.mapping = {.resample_share = 0.5F};
-  return n;
-}());
 
 }  // namespace tetap::robot::mapper_fast

@@ -3,17 +3,13 @@
 // filter. A step of the grid has up to 3840 lines of cells, so it takes up to 39 ticks.
 #pragma once
 
-#include "config/mrclam.hpp"
-#include "estimators/planar/pose_grid.hpp"
+#include "config/parameters/mrclam_grid.hpp"
+#include "tetap/estimators/odometry.hpp"
+#include "tetap/estimators/planar/pose_grid.hpp"
+#include "tetap/node/node.hpp"
 
 namespace tetap::robot::mrclam_grid {
 
 using Estimators = node::Estimators<estimators::Odometry, estimators::PoseGrid<16, 32, 48>>;
-
-inline constexpr param::Parameters parameters = param::checked([] {
-  param::Parameters n = mrclam::parameters;
-  n.loop.work_units = 100;
-  return n;
-}());
 
 }  // namespace tetap::robot::mrclam_grid

@@ -5,19 +5,13 @@
 // The tempered likelihood widens both sigmas, so a range as wide as the EKF's would make wrong places look right.
 #pragma once
 
-#include "config/mrclam.hpp"
-#include "estimators/planar/pose_particles.hpp"
+#include "config/parameters/mrclam_pf.hpp"
+#include "tetap/estimators/odometry.hpp"
+#include "tetap/estimators/planar/pose_particles.hpp"
+#include "tetap/node/node.hpp"
 
 namespace tetap::robot::mrclam_pf {
 
 using Estimators = node::Estimators<estimators::Odometry, estimators::PoseParticles<1000>>;
-
-inline constexpr param::Parameters parameters = param::checked([] {
-  param::Parameters n = mrclam::parameters;
-  n.landmark.sigma_range_m = 0.05F;
-  n.landmark.sigma_range_per_m = 0.025F;
-  n.landmark.sigma_bearing_rad = 0.04F;
-  return n;
-}());
 
 }  // namespace tetap::robot::mrclam_pf

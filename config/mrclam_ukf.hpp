@@ -2,13 +2,13 @@
 // The robots of config/mrclam.hpp, with the same numbers, and an unscented filter in the place of the extended one.
 #pragma once
 
-#include "config/mrclam.hpp"
-#include "estimators/planar/pose_ukf.hpp"
+#include "config/parameters/mrclam_ukf.hpp"
+#include "tetap/estimators/odometry.hpp"
+#include "tetap/estimators/planar/pose_ukf.hpp"
+#include "tetap/node/node.hpp"
 
 namespace tetap::robot::mrclam_ukf {
 
 using Estimators = node::Estimators<estimators::Odometry, estimators::PoseUkf>;
-
-inline constexpr param::Parameters parameters = mrclam::parameters;
 
 }  // namespace tetap::robot::mrclam_ukf

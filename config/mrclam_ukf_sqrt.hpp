@@ -3,13 +3,13 @@
 // extended one.
 #pragma once
 
-#include "config/mrclam.hpp"
-#include "estimators/planar/pose_ukf.hpp"
+#include "config/parameters/mrclam_ukf_sqrt.hpp"
+#include "tetap/estimators/odometry.hpp"
+#include "tetap/estimators/planar/pose_ukf.hpp"
+#include "tetap/node/node.hpp"
 
 namespace tetap::robot::mrclam_ukf_sqrt {
 
 using Estimators = node::Estimators<estimators::Odometry, estimators::PoseUkfSqrt>;
-
-inline constexpr param::Parameters parameters = mrclam::parameters;
 
 }  // namespace tetap::robot::mrclam_ukf_sqrt

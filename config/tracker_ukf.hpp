@@ -3,17 +3,12 @@
 // Noise of the sensors as in Udacity's course "Self-Driving Car": lidar 0.15 m; radar 0.3 m, 0.03 rad, 0.3 m/s.
 #pragma once
 
-#include "estimators/target/target_tracker.hpp"
-#include "node/node.hpp"
-#include "param/limits.hpp"
+#include "config/parameters/tracker_ukf.hpp"
+#include "tetap/estimators/target/target_tracker.hpp"
+#include "tetap/node/node.hpp"
 
 namespace tetap::robot::tracker_ukf {
 
 using Estimators = node::Estimators<estimators::TurnTracker>;
-
-inline constexpr param::Parameters parameters = param::checked({
-    .target = {.acceleration_mps2 = 1.5F, .yaw_acceleration_radps2 = 0.55F, .sigma_speed_mps = 5, .gate_scale = 3},
-    .recovery = {.after_us = 0, .at_least = 5},
-});
 
 }  // namespace tetap::robot::tracker_ukf

@@ -3,20 +3,13 @@
 // times a second, landmarks on a map without identities, and a first fix. A hundred particles.
 #pragma once
 
-#include "estimators/odometry.hpp"
-#include "estimators/planar/pose_particles.hpp"
-#include "node/node.hpp"
-#include "param/limits.hpp"
+#include "config/parameters/udacity_pf.hpp"
+#include "tetap/estimators/odometry.hpp"
+#include "tetap/estimators/planar/pose_particles.hpp"
+#include "tetap/node/node.hpp"
 
 namespace tetap::robot::udacity_pf {
 
 using Estimators = node::Estimators<estimators::Odometry, estimators::PoseParticles<100>>;
-
-inline constexpr param::Parameters parameters = param::checked({
-    .loop = {.window_us = 20'000},  // samples come in order
-    .wheels = {.noise = {.speed = 0.002F, .yaw_rate = 2e-5F}, .hold = param::Hold::kForward},
-    .landmark = {.sigma_range_m = 0.2F, .sigma_bearing_rad = 0.008F},
-    .particles = {.temper = 1, .jitter = 0.025F},
-});
 
 }  // namespace tetap::robot::udacity_pf

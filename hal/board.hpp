@@ -3,12 +3,12 @@
 // concepts below find what else a board has: one without a watchdog or without a sensor is a board.
 #pragma once
 
-#include "base/time.hpp"
 #include "hal/board_report.hpp"
 #include "hal/byte_stream.hpp"
 #include "hal/can_bus.hpp"
 #include "hal/encoder_counter.hpp"
 #include "hal/spi_device.hpp"
+#include "tetap/base/time.hpp"
 
 #include <concepts>
 #include <type_traits>

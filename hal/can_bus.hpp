@@ -3,21 +3,14 @@
 // recovery.
 #pragma once
 
-#include "base/can_frame.hpp"
+#include "tetap/base/can_faults.hpp"
+#include "tetap/base/can_frame.hpp"
 
 #include <concepts>
 #include <cstdint>
 #include <optional>
 
 namespace tetap::hal {
-
-/// Errors on the controller's side, counted since start, never reset.
-struct CanFaults {
-  std::uint32_t rx_overflow = 0;  ///< frames the controller or the socket had to drop
-  std::uint32_t tx_full = 0;      ///< frames send() refused
-  std::uint32_t bus_off = 0;      ///< times the controller left the bus, or the interface was down
-  std::uint32_t tx_high = 0;      ///< most frames that waited to be sent at once
-};
 
 /// Standard data frames whose identifier equals `id` in every bit of `mask`: all that a node asks a port to receive.
 struct Acceptance {
@@ -38,7 +31,7 @@ concept CanBus = requires(B& bus, const B& view, const base::CanFrame& frame) {
   { bus.receive() } -> std::same_as<std::optional<base::CanFrame>>;
   /// Called once at the end of each poll: hands on what send() collected (batched system calls, transmit FIFO).
   { bus.flush() } -> std::same_as<void>;
-  { view.faults() } -> std::same_as<CanFaults>;
+  { view.faults() } -> std::same_as<base::CanFaults>;
 };
 
 }  // namespace tetap::hal

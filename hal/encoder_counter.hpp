@@ -3,7 +3,7 @@
 // the last counted edge comes too.
 #pragma once
 
-#include "base/time.hpp"
+#include "tetap/base/time.hpp"
 
 #include <concepts>
 #include <cstdint>

@@ -2,8 +2,8 @@
 // A measurement of the world as the frames that reach the bus.
 #pragma once
 
-#include "bus/encoder.hpp"
 #include "sim_host/world/measurement.hpp"
+#include "tetap/bus/encoder.hpp"
 
 #include <cstdint>
 #include <vector>

@@ -4,8 +4,8 @@
 // image.
 #pragma once
 
-#include "config/rover.hpp"
-#include "config/rover_landmarks.hpp"
+#include "config/parameters/rover.hpp"
+#include "config/parameters/rover_landmarks.hpp"
 #include "sim_host/world/world.hpp"
 
 namespace tetap::sim {

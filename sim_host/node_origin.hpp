@@ -3,10 +3,10 @@
 // beforehand. Its truth is stated in the node's own frame.
 #pragma once
 
-#include "bus/codec.hpp"
-#include "bus/messages.hpp"
 #include "sim_host/play/link.hpp"
 #include "sim_host/world/earth.hpp"
+#include "tetap/bus/codec.hpp"
+#include "tetap/bus/messages.hpp"
 
 #include <cstdint>
 #include <optional>

@@ -3,8 +3,8 @@
 // settings. They are checked against the table that compiled robots are checked against.
 #pragma once
 
-#include "param/limits.hpp"
 #include "sim_host/play/arguments.hpp"
+#include "tetap/param/limits.hpp"
 
 #include <cstdint>
 #include <string>

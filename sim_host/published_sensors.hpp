@@ -3,31 +3,14 @@
 // a bus need not. A fault of a sensor that is not sent cannot act.
 #pragma once
 
-#include "node/node.hpp"
 #include "sim_host/robots.hpp"
 #include "sim_host/simulated_robot.hpp"
 #include "sim_host/world/world.hpp"
 
-#include <concepts>
 #include <sstream>
 #include <string>
 
 namespace tetap::sim {
-
-/// An estimator that maps landmarks which its sightings do not name.
-template <class E>
-concept MapsNameless = requires {
-  requires E::kTakesNameless;
-};
-
-/// With the sensor's instance or without.
-template <class E, class Payload>
-concept Takes = requires(E& e, const Payload& payload, base::Micros stamp, const estimators::Context& ctx) {
-  e.fuse(payload, stamp, ctx);
-}
-|| requires(E& e, const Payload& payload, base::Micros stamp, const estimators::Context& ctx) {
-  e.fuse(payload, stamp, std::uint8_t{}, ctx);
-};
 
 struct Sent {
   bool imu = false, landmarks = false, magnetometer = false, barometer = false;
@@ -39,31 +22,22 @@ struct Sent {
   friend bool operator==(const Sent&, const Sent&) = default;
 };
 
-template <class... E>
-[[nodiscard]] constexpr Sent sent_to(node::Estimators<E...>, const param::Parameters& n) {
-  // These estimators need an IMU; for the others its gyroscope is one way to know the turn.
-  constexpr bool kNeedsImu =
-      ((E::kKind == sensor::EstimatorKind::kInertial || E::kKind == sensor::EstimatorKind::kAttitude) || ...);
-  constexpr bool kInertial = ((E::kKind == sensor::EstimatorKind::kInertial) || ...);
-  return {.imu = kNeedsImu || (n.gyro.use != 0 && (Takes<E, sensor::ImuSample> || ...)),
-          .landmarks = (Takes<E, sensor::LandmarkSighting> || ...),
-          .magnetometer = n.magnetic.use != 0 && (Takes<E, sensor::MagneticFlux> || ...),
-          .barometer = n.baro.use != 0 && (Takes<E, sensor::AirPressure> || ...),
-          .closures = n.mapping.keyframes != 0 && (Takes<E, sensor::LoopClosure> || ...),
-          .own_map = (estimators::MakesMap<E> || ...),
-          .nameless = (MapsNameless<E> || ...),
-          .inertial = kInertial,
-          .kind = vehicle_kind(n, kInertial)};
+[[nodiscard]] inline Sent sent_to(const EstimatorFacts& takes, const param::Parameters& n) {
+  return {.imu = takes.needs_imu || (n.gyro.use != 0 && takes.imu),
+          .landmarks = takes.sightings,
+          .magnetometer = n.magnetic.use != 0 && takes.magnetic,
+          .barometer = n.baro.use != 0 && takes.pressure,
+          .closures = n.mapping.keyframes != 0 && takes.closures,
+          .own_map = takes.own_map,
+          .nameless = takes.nameless,
+          .inertial = takes.inertial,
+          .kind = vehicle_kind(n, takes.inertial)};
 }
 
-/// Throws std::runtime_error when there is no such robot.
+/// Throws as parameters_of().
 [[nodiscard]] inline Sent sent_to(const std::string& robot, const ParameterSettings& settings = {}) {
-  Sent sent;
-  for_robot(robot, settings,
-            [&]<class Estimators>(std::type_identity<Estimators>, const param::Parameters& parameters) {
-              sent = sent_to(Estimators{}, parameters);
-            });
-  return sent;
+  const param::Parameters parameters = parameters_of(robot, settings);
+  return sent_to(robot_named(robot).takes, parameters);
 }
 
 /// The world as that robot meets it.
@@ -99,11 +73,12 @@ inline void simulate(const std::string& robot, const Sent& sent, const param::Pa
   return names;
 }
 
-/// Names of the robots on which that fault acts in that world, with a space between each.
+/// Names of the robots that are built here and on which that fault acts in that world, with a space between each.
 [[nodiscard]] inline std::string applicable_robots(Fault fault, const World::Options& world) {
   std::string names;
-  std::istringstream all{kRobotNames};
+  std::istringstream all{robot_names()};
   for (std::string name; all >> name;) {
+    if (!is_built(name)) continue;
     World::Options as_sent = world;
     send_only(sent_to(name), as_sent);
     if (can_act(fault, as_sent)) (names += names.empty() ? "" : " ") += name;

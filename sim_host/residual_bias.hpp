@@ -3,9 +3,9 @@
 // (src/sensor/calibration.hpp). A published bias is held against this truth.
 #pragma once
 
-#include "param/parameters.hpp"
 #include "sim_host/world/motion.hpp"
 #include "sim_host/world/numbers.hpp"
+#include "tetap/param/parameters.hpp"
 
 #include <array>
 #include <cstddef>

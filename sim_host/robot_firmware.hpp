@@ -3,10 +3,10 @@
 // is put on.
 #pragma once
 
-#include "bus/version.hpp"
 #include "hal/board.hpp"
 #include "hal/board/linux/clock.hpp"
-#include "param/parameters.hpp"
+#include "tetap/bus/version.hpp"
+#include "tetap/param/parameters.hpp"
 
 #include <cstddef>
 #include <cstdint>
@@ -27,7 +27,7 @@ class AnyCan {
   virtual bool send(const base::CanFrame& frame) = 0;
   virtual std::optional<base::CanFrame> receive() = 0;
   virtual void flush() = 0;
-  [[nodiscard]] virtual hal::CanFaults faults() const = 0;
+  [[nodiscard]] virtual base::CanFaults faults() const = 0;
 };
 
 /// Forwards to a controller that outlives it.
@@ -39,7 +39,7 @@ class CanAdapter final : public AnyCan {
   bool send(const base::CanFrame& frame) override { return can_.send(frame); }
   std::optional<base::CanFrame> receive() override { return can_.receive(); }
   void flush() override { can_.flush(); }
-  [[nodiscard]] hal::CanFaults faults() const override { return can_.faults(); }
+  [[nodiscard]] base::CanFaults faults() const override { return can_.faults(); }
 
  private:
   Can& can_;
@@ -68,7 +68,7 @@ struct HostBoard {
   base::Micros looked_ = began_;
 };
 
-/// node::Firmware of some robot.
+/// firmware::Firmware of some robot.
 class RobotFirmware {
  public:
   RobotFirmware() = default;
@@ -82,11 +82,5 @@ class RobotFirmware {
   /// Goes on from a snapshot's state; false: that is of another layout.
   [[nodiscard]] virtual bool resume(std::span<const std::byte> state) = 0;
 };
-
-/// Firmware with these estimators, tags and guards included: a host has room for what parameters may ask for. It is
-/// instantiated once for each robot, in a file that CMake makes. The board and the parameters outlive it.
-template <class Estimators>
-[[nodiscard]] std::unique_ptr<RobotFirmware> make_firmware(HostBoard& board, const param::Parameters& parameters,
-                                                           const bus::Version& version);
 
 }  // namespace tetap::sim

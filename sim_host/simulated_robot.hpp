@@ -7,8 +7,8 @@
 // (world/numbers.hpp) over its parameters.
 #pragma once
 
-#include "param/parameters.hpp"
 #include "sim_host/world/world.hpp"
+#include "tetap/param/parameters.hpp"
 
 #include <algorithm>
 #include <array>

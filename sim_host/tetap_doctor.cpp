@@ -21,7 +21,7 @@ std::string help() {
          "  LOG                 candump -L log with the sensors' frames\n"
          "  --robot NAME        whose geometry, mounting and origin the log is held against (without: none):\n"
          "                      " +
-         sim::kRobotNames + "\n" + std::string(sim::kParameterHelp) +
+         sim::robot_names() + "\n" + std::string(sim::kParameterHelp) +
          "  --base ID           first id of the node's block (default: can_base of --set, else 0x300)\n"
          "  --log-interface I   only frames logged from this interface\n"
          "  --keep-going        count malformed lines of the log instead of stopping at the first\n"

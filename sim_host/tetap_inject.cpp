@@ -40,7 +40,7 @@ void print_help() {
   for (const sim::FaultSensor& one : sim::kFaultSensors)
     std::printf("  %-16s %s\n", std::string(one.name).c_str(), std::string(one.axes).c_str());
   std::printf("kinds (a spike with its number of samples: spike2): %s\nkinds of frames: %s\nrobots: %s\n",
-              std::string(sim::kValueKinds).c_str(), std::string(sim::kFrameKinds).c_str(), sim::kRobotNames.c_str());
+              std::string(sim::kValueKinds).c_str(), std::string(sim::kFrameKinds).c_str(), sim::robot_names().c_str());
 }
 
 sim::FrameFault fault_of(const std::string& given) {

@@ -345,7 +345,7 @@ int run(const Options& options, const sim::BusDatabase& dbc, bool facts) {
 int main(int argc, char** argv) try {
   sim::Arguments arguments(argc, argv);
   if (arguments.flag("--help") || arguments.flag("-h"))
-    return std::printf("%srobots: %s\n", kHelp, sim::kRobotNames.c_str()), 0;
+    return std::printf("%srobots: %s\n", kHelp, sim::robot_names().c_str()), 0;
   Options options{.robot = arguments.text("--robot").value_or("rover"),
                   .seed = arguments.integer("--seed", 1, 0, ~0ULL)};
   options.jobs = static_cast<std::size_t>(arguments.integer("--jobs", 1, 1, 256));

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // tetap-params: the table of parameters with a robot's values: as a file for --params, as JSON, as a page.
-#include "param/crc.hpp"
 #include "sim_host/parameter_settings.hpp"
 #include "sim_host/robots.hpp"
+#include "tetap/param/crc.hpp"
 
 #include <cstdio>
 #include <exception>
@@ -15,7 +15,7 @@ using namespace tetap;
 std::string help() {
   return "usage: tetap-params [OPTION]...\n\nPrints a robot's parameters as a file that --params and PARAMS= read.\n\n"
          "  --robot NAME       (default rover): " +
-         sim::kRobotNames + "\n" + std::string(sim::kParameterHelp) +
+         sim::robot_names() + "\n" + std::string(sim::kParameterHelp) +
          "  --json             a list of rows: path, index, unit, limits, default, value, whether a change needs a "
          "restart,"
          " text\n"

@@ -16,16 +16,14 @@ int main(int count, char** values) {
     using namespace tetap;
     sim::Arguments arguments(count, values);
     if (arguments.flag("--help") || arguments.flag("-h"))
-      return std::fputs(sim::play_help(sim::kRobotNames).c_str(), stdout), 0;
+      return std::fputs(sim::play_help(sim::robot_names()).c_str(), stdout), 0;
     const sim::ParameterSettings settings(arguments);
     sim::PlayOptions options = sim::play_options(arguments, settings.can_base());
     options.version = hal::version_text(version()).c_str();
     if (options.robot.empty() && !settings.words().empty()) throw sim::UsageError("--params and --set need --robot");
     if (!options.robot.empty()) {
       options.notes = sim::parameter_notes(sim::parameters_of(options.robot, settings), settings);
-      sim::for_robot(options.robot, [&]<class Estimators>(std::type_identity<Estimators>, const param::Parameters&) {
-        options.script.graph = Estimators::template kTakes<sensor::LoopClosure>;
-      });
+      options.script.graph = sim::robot_named(options.robot).takes.closures;
     }
     sim::Interruption::expect();
     // Before the bus, so that an unreadable log is reported also where there is no bus.

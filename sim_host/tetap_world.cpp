@@ -38,7 +38,7 @@ std::string help() {
           "  --can IFACE        the interface the node is on (default vcan0)\n"
           "  --memory           run a node in this process instead, without a bus\n"
           "  --robot NAME       what the node is (default rover): " +
-          sim::kRobotNames +
+          sim::robot_names() +
           "\n"
           "  --out DIR          for the record and truth.csv (default out/sim)\n"
           "  --seed N           every draw follows from it (default 1)\n"

@@ -2,10 +2,10 @@
 // The truth of a simulated run as files of the report: truth.csv, and the landmarks for run.json.
 #pragma once
 
-#include "param/parameters.hpp"
 #include "sim_host/play/out_file.hpp"
 #include "sim_host/residual_bias.hpp"
 #include "sim_host/world/world.hpp"
+#include "tetap/param/parameters.hpp"
 
 #include <cstdint>
 #include <cstdio>

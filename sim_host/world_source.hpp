@@ -3,11 +3,11 @@
 // never sent.
 #pragma once
 
-#include "bus/e2e.hpp"
-#include "bus/guard_sender.hpp"
 #include "sim_host/encode.hpp"
 #include "sim_host/play/script.hpp"
 #include "sim_host/world/world.hpp"
+#include "tetap/bus/e2e.hpp"
+#include "tetap/bus/guard_sender.hpp"
 
 #include <cmath>
 #include <cstdint>

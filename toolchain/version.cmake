@@ -25,7 +25,7 @@ endfunction()
 # The mark is for tools/python/tetap/proof/stamps.py: programs that differ in the number behind it alone compute the same.
 write_if_other(${OUTPUT}/version.hpp "// Generated.
 #pragma once
-#include \"bus/version.hpp\"
+#include \"tetap/bus/version.hpp\"
 #include <cstdint>
 namespace tetap {
 struct Commit {

@@ -4,9 +4,9 @@
 // al., IEEE Trans. Ind. Electron. IE-29(3), 1982). No edge: at most one count in the time since the last, towards zero.
 #pragma once
 
-#include "base/math.hpp"
-#include "base/time.hpp"
 #include "hal/encoder_counter.hpp"
+#include "tetap/base/math.hpp"
+#include "tetap/base/time.hpp"
 
 #include <array>
 #include <cstdint>

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "drivers/encoder/quadrature.hpp"
-#include "sensor/samples.hpp"
+#include "tetap/sensor/samples.hpp"
 
 namespace tetap::drivers {
 

@@ -3,7 +3,7 @@
 // least. The least delay of the last windows of epochs is taken as the constant one, the rest as waiting.
 #pragma once
 
-#include "base/time.hpp"
+#include "tetap/base/time.hpp"
 
 #include <cstdint>
 #include <optional>

@@ -3,9 +3,9 @@
 // take its samples. A field that the receiver did not send is NaN or empty.
 #pragma once
 
-#include "base/float_bits.hpp"
-#include "base/math.hpp"
-#include "sensor/samples.hpp"
+#include "tetap/base/float_bits.hpp"
+#include "tetap/base/math.hpp"
+#include "tetap/sensor/samples.hpp"
 
 #include <array>
 #include <cstdint>

@@ -5,7 +5,7 @@
 // the rate is that of a growing base line between lowest pairs: a window alone has the chance of its readings.
 #pragma once
 
-#include "base/time.hpp"
+#include "tetap/base/time.hpp"
 
 #include <cstdint>
 

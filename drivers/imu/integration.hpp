@@ -7,9 +7,9 @@
 // gravity. The angle increment is the rotation vector from start to end. Between samples both are straight lines.
 #pragma once
 
-#include "base/math.hpp"
 #include "drivers/imu/reading.hpp"
-#include "sensor/samples.hpp"
+#include "tetap/base/math.hpp"
+#include "tetap/sensor/samples.hpp"
 
 #include <optional>
 

@@ -2,8 +2,8 @@
 // One sample of an IMU in SI and in the body's axes, before it is integrated to increments.
 #pragma once
 
-#include "base/time.hpp"
 #include "drivers/imu/mounting.hpp"
+#include "tetap/base/time.hpp"
 
 namespace tetap::drivers {
 

@@ -5,9 +5,9 @@
 #include "hal/can_bus.hpp"
 #include "hal/chip/arm/stored_fault.hpp"
 #include "hal/chip/support/boot_line.hpp"
-#include "node/accepted_frames.hpp"
-#include "node/firmware.hpp"
 #include "robot.hpp"
+#include "tetap/firmware/accepted_frames.hpp"
+#include "tetap/firmware/firmware.hpp"
 #include "version.hpp"
 
 namespace tetap::hal {
@@ -16,10 +16,10 @@ namespace tetap::hal {
 template <class Board>
 [[noreturn, gnu::always_inline]] inline void run_wired_node() {
   namespace robot = tetap::robot::chosen;
-  constexpr auto kParts = node::WiredParts::of(robot::parameters);
+  constexpr auto kParts = firmware::WiredParts::of(robot::parameters);
   static_assert(node::has_protection_for<robot::Estimators>(robot::parameters), "name WithBusProtection");
-  static Board board{stored_fault, node::accepted_by<robot::Estimators>(robot::parameters)};
-  static node::Firmware<Board, robot::Estimators, kParts> firmware{board, robot::parameters, version()};
+  static Board board{stored_fault, firmware::accepted_by<robot::Estimators>(robot::parameters)};
+  static firmware::Firmware<Board, robot::Estimators, kParts> firmware{board, robot::parameters, version()};
   print_version_line(board, version());
   print_boot_line(board, tetap::robot::kName, firmware);
   print_stack_line(board);

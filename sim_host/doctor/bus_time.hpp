@@ -4,9 +4,9 @@
 // written faster than its time.
 #pragma once
 
-#include "base/time.hpp"
-#include "bus/codec.hpp"
 #include "sim_host/play/protocol.hpp"
+#include "tetap/base/time.hpp"
+#include "tetap/bus/codec.hpp"
 
 #include <algorithm>
 #include <cstdint>

@@ -3,10 +3,10 @@
 // its findings. Its memory does not grow with the log.
 #pragma once
 
-#include "base/can_frame.hpp"
-#include "sensor/sample.hpp"
 #include "sim_host/doctor/finding.hpp"
 #include "sim_host/doctor/window.hpp"
+#include "tetap/base/can_frame.hpp"
+#include "tetap/sensor/sample.hpp"
 
 #include <cstdint>
 

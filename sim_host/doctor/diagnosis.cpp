@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sim_host/doctor/diagnosis.hpp"
 
-#include "bus/decoder.hpp"
 #include "sim_host/doctor/axes.hpp"
 #include "sim_host/doctor/bus_time.hpp"
 #include "sim_host/doctor/dead_axis.hpp"
@@ -18,6 +17,7 @@
 #include "sim_host/doctor/turn_scale.hpp"
 #include "sim_host/doctor/wheel_speed.hpp"
 #include "sim_host/play/protocol.hpp"
+#include "tetap/bus/decoder.hpp"
 
 #include <algorithm>
 #include <array>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sim_host/doctor/halves.hpp"
 
-#include "bus/messages.hpp"
+#include "tetap/bus/messages.hpp"
 
 #include <algorithm>
 #include <span>

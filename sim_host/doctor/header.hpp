@@ -2,9 +2,9 @@
 // Counter, instance and stamp of an input frame, whatever its message.
 #pragma once
 
-#include "base/can_frame.hpp"
-#include "bus/codec.hpp"
-#include "bus/messages.hpp"
+#include "tetap/base/can_frame.hpp"
+#include "tetap/bus/codec.hpp"
+#include "tetap/bus/messages.hpp"
 
 #include <cstdint>
 #include <optional>

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sim_host/doctor/origin.hpp"
 
-#include "base/wgs84.hpp"
-#include "estimators/map_frame.hpp"
 #include "sim_host/doctor/plane.hpp"
+#include "tetap/base/wgs84.hpp"
+#include "tetap/estimators/map_frame.hpp"
 
 #include <array>
 #include <cmath>

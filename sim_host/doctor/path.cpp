@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sim_host/doctor/path.hpp"
 
-#include "model/differential_drive.hpp"
+#include "tetap/model/differential_drive.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sim_host/doctor/plane.hpp"
 
-#include "base/wgs84.hpp"
+#include "tetap/base/wgs84.hpp"
 
 #include <cmath>
 #include <numbers>

@@ -2,7 +2,7 @@
 // Fixes on the level plane of the first one, on a round Earth: enough to compare axes.
 #pragma once
 
-#include "sensor/samples.hpp"
+#include "tetap/sensor/samples.hpp"
 
 namespace tetap::doctor {
 

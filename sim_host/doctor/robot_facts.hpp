@@ -2,8 +2,8 @@
 // A robot as the doctor needs it: geometry, mounting of the IMU, origin.
 #pragma once
 
-#include "param/parameters.hpp"
 #include "sim_host/doctor/vector.hpp"
+#include "tetap/param/parameters.hpp"
 
 #include <cstdint>
 #include <optional>

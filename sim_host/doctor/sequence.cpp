@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sim_host/doctor/sequence.hpp"
 
-#include "bus/signal.hpp"
+#include "tetap/bus/signal.hpp"
 
 namespace tetap::doctor {
 namespace {

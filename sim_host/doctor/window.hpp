@@ -3,10 +3,10 @@
 // those of arrival, so a wrong stamp spoils no comparison.
 #pragma once
 
-#include "base/time.hpp"
-#include "sensor/sample.hpp"
 #include "sim_host/doctor/robot_facts.hpp"
 #include "sim_host/doctor/vector.hpp"
+#include "tetap/base/time.hpp"
+#include "tetap/sensor/sample.hpp"
 
 #include <cstdint>
 #include <optional>

@@ -63,11 +63,9 @@ class HeadingSensor {
 };
 
 bool takes_heading(const std::string& robot) {
-  bool takes = false;
-  for_robot(robot, [&]<class... E>(std::type_identity<node::Estimators<E...>>, const param::Parameters& n) {
-    takes = (Takes<E, sensor::OutsideHeading> || ...) && n.magnetic.use == 0 && n.inertial.starts_forward == 0;
-  });
-  return takes;
+  const Robot& chosen = robot_named(robot);
+  const param::Parameters& n = *chosen.parameters;
+  return chosen.takes.heading && n.magnetic.use == 0 && n.inertial.starts_forward == 0;
 }
 
 }  // namespace

@@ -3,9 +3,9 @@
 // situations in which a fault may fall on it are found in that truth.
 #pragma once
 
-#include "param/parameters.hpp"
 #include "sim_host/play/log.hpp"
 #include "sim_host/world/world.hpp"
+#include "tetap/param/parameters.hpp"
 
 #include <cstddef>
 #include <cstdint>

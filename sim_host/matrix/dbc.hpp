@@ -3,7 +3,7 @@
 // without the codec that the node uses.
 #pragma once
 
-#include "base/can_frame.hpp"
+#include "tetap/base/can_frame.hpp"
 
 #include <cstdint>
 #include <iosfwd>

@@ -2,8 +2,8 @@
 // The size of a fault in units of the gate that stands before it, so that one list of sizes serves every sensor.
 #pragma once
 
-#include "param/parameters.hpp"
 #include "sim_host/matrix/frame_fault.hpp"
+#include "tetap/param/parameters.hpp"
 
 namespace tetap::sim {
 

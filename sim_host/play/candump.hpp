@@ -3,9 +3,9 @@
 // "##<flags>data", optional direction " R" or " T". Format as in can-utils lib.c (parse_canframe, sprint_canframe).
 #pragma once
 
-#include "base/can_frame.hpp"
-#include "base/time.hpp"
 #include "sim_host/play/out_file.hpp"
+#include "tetap/base/can_frame.hpp"
+#include "tetap/base/time.hpp"
 
 #include <cstdint>
 #include <string_view>

@@ -34,7 +34,7 @@ class MemoryLink {
   bool send(const base::CanFrame& frame) { return can_.send(frame); }
   std::optional<base::CanFrame> receive() { return can_.receive(); }
   void flush() {}
-  [[nodiscard]] hal::CanFaults faults() const {
+  [[nodiscard]] base::CanFaults faults() const {
     return {.rx_overflow = 0, .tx_full = 0, .bus_off = 0};
   }  // a full queue is waited for
   void wait(base::Micros) { pump_(); }

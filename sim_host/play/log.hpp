@@ -3,8 +3,8 @@
 // frame by frame and never held whole.
 #pragma once
 
-#include "base/can_frame.hpp"
-#include "base/time.hpp"
+#include "tetap/base/can_frame.hpp"
+#include "tetap/base/time.hpp"
 
 #include <cstddef>
 #include <cstdint>

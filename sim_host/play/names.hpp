@@ -3,7 +3,7 @@
 // config/tetap.dbc.
 #pragma once
 
-#include "bus/messages.hpp"
+#include "tetap/bus/messages.hpp"
 
 #include <array>
 #include <cstddef>

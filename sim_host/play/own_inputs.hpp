@@ -3,9 +3,9 @@
 // and their guards.
 #pragma once
 
-#include "bus/e2e.hpp"
-#include "bus/guard.hpp"
 #include "sim_host/play/protocol.hpp"
+#include "tetap/bus/e2e.hpp"
+#include "tetap/bus/guard.hpp"
 
 #include <cstdint>
 #include <optional>

@@ -3,11 +3,11 @@
 // epoch are collected into one.
 #pragma once
 
-#include "base/can_frame.hpp"
-#include "base/time.hpp"
-#include "bus/codec.hpp"
-#include "bus/guard.hpp"
-#include "bus/messages.hpp"
+#include "tetap/base/can_frame.hpp"
+#include "tetap/base/time.hpp"
+#include "tetap/bus/codec.hpp"
+#include "tetap/bus/guard.hpp"
+#include "tetap/bus/messages.hpp"
 
 #include <algorithm>
 #include <array>

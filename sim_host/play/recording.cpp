@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sim_host/play/recording.hpp"
 
-#include "bus/decoder.hpp"
 #include "sim_host/play/names.hpp"
 #include "sim_host/play/node_link.hpp"
+#include "tetap/bus/decoder.hpp"
 
 #include <algorithm>
 #include <stdexcept>

@@ -4,11 +4,11 @@
 // twice, by RecordSurvey and by RecordedTicks. It is held in memory only as far as a node lags behind its inputs.
 #pragma once
 
-#include "bus/input_crc.hpp"
 #include "sim_host/play/own_inputs.hpp"
 #include "sim_host/play/protocol.hpp"
 #include "sim_host/play/script.hpp"
 #include "sim_host/play/snapshot.hpp"
+#include "tetap/bus/input_crc.hpp"
 
 #include <cstdint>
 #include <deque>

@@ -3,10 +3,10 @@
 // simulated world, or from the record of another run.
 #pragma once
 
-#include "base/can_frame.hpp"
-#include "base/time.hpp"
 #include "sim_host/play/log.hpp"
 #include "sim_host/play/snapshot.hpp"
+#include "tetap/base/can_frame.hpp"
+#include "tetap/base/time.hpp"
 
 #include <concepts>
 #include <cstddef>

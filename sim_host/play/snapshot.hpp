@@ -2,8 +2,8 @@
 // A node's state as its log holds it: pieces of Est_Diag put together.
 #pragma once
 
-#include "node/snapshot.hpp"
 #include "sim_host/play/protocol.hpp"
+#include "tetap/firmware/snapshot.hpp"
 
 #include <cstddef>
 #include <cstdint>
@@ -15,7 +15,7 @@
 namespace tetap::sim {
 
 struct Snapshot {
-  node::SnapshotHeader header;
+  firmware::SnapshotHeader header;
   std::vector<std::byte> state;
 };
 
@@ -33,7 +33,7 @@ class SnapshotCollector {
       if (piece->snap_piece != 0) return std::nullopt;
     }
     ++pieces_;
-    for (std::size_t i = 0; i < node::kSnapshotPiece; ++i)
+    for (std::size_t i = 0; i < firmware::kSnapshotPiece; ++i)
       bytes_.push_back(static_cast<std::byte>(piece->snap_bytes >> (8 * i) & 0xFF));
     return whole();
   }
@@ -49,7 +49,7 @@ class SnapshotCollector {
     snapshot.state.assign(first, first + static_cast<std::ptrdiff_t>(snapshot.header.length));
     bytes_.clear();
     pieces_ = 0;
-    if (node::snapshot_crc(snapshot.state) != snapshot.header.crc) return std::nullopt;
+    if (firmware::snapshot_crc(snapshot.state) != snapshot.header.crc) return std::nullopt;
     return snapshot;
   }
 

@@ -2,8 +2,8 @@
 // Asking a node for its state: once when it ran before the log began, and again while no answer comes.
 #pragma once
 
-#include "bus/e2e.hpp"
 #include "sim_host/play/snapshot.hpp"
+#include "tetap/bus/e2e.hpp"
 
 #include <cstdint>
 #include <optional>

@@ -3,9 +3,9 @@
 // as they were.
 #pragma once
 
-#include "base/random.hpp"
-#include "base/time.hpp"
 #include "sim_host/world/math.hpp"
+#include "tetap/base/random.hpp"
+#include "tetap/base/time.hpp"
 
 #include <cstdint>
 

@@ -3,7 +3,7 @@
 // limits of speed, acceleration, lateral acceleration and yaw rate.
 #pragma once
 
-#include "base/time.hpp"
+#include "tetap/base/time.hpp"
 
 #include <cstddef>
 #include <cstdint>

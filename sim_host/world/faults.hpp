@@ -2,7 +2,7 @@
 // Faults of the world, by name: `--fault NAME[@START[+DURATION]]`, seconds from the start of the run.
 #pragma once
 
-#include "base/time.hpp"
+#include "tetap/base/time.hpp"
 
 #include <cstdint>
 #include <optional>

@@ -3,8 +3,8 @@
 // gives the same bits on every host and with every C library.
 #pragma once
 
-#include "base/math.hpp"
-#include "base/math_double.hpp"
+#include "tetap/base/math.hpp"
+#include "tetap/base/math_double.hpp"
 
 #include <cmath>
 

@@ -3,8 +3,8 @@
 // in it.
 #pragma once
 
-#include "base/time.hpp"
-#include "sensor/samples.hpp"
+#include "tetap/base/time.hpp"
+#include "tetap/sensor/samples.hpp"
 
 #include <cstdint>
 #include <variant>

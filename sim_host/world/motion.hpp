@@ -2,8 +2,8 @@
 // Motion of the body as sensors and judges see it.
 #pragma once
 
-#include "base/time.hpp"
 #include "sim_host/world/rotation.hpp"
+#include "tetap/base/time.hpp"
 
 namespace tetap::sim {
 

@@ -8,8 +8,8 @@
 // 1996. [own] our choice, stated so that a report can name it.
 #pragma once
 
-#include "base/time.hpp"
 #include "sim_host/world/rotation.hpp"
+#include "tetap/base/time.hpp"
 
 #include <array>
 #include <cstdint>

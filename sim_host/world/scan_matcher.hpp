@@ -4,10 +4,10 @@
 // effect.
 #pragma once
 
-#include "sensor/samples.hpp"
 #include "sim_host/world/chance.hpp"
 #include "sim_host/world/motion.hpp"
 #include "sim_host/world/numbers.hpp"
+#include "tetap/sensor/samples.hpp"
 
 #include <vector>
 

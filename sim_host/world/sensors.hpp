@@ -3,13 +3,13 @@
 // A fault never changes how many random numbers are drawn, so with and without it everything else is the same.
 #pragma once
 
-#include "sensor/samples.hpp"
 #include "sim_host/world/chance.hpp"
 #include "sim_host/world/course.hpp"
 #include "sim_host/world/earth.hpp"
 #include "sim_host/world/faults.hpp"
 #include "sim_host/world/motion.hpp"
 #include "sim_host/world/numbers.hpp"
+#include "tetap/sensor/samples.hpp"
 
 #include <array>
 #include <optional>

@@ -3,7 +3,6 @@
 // measurements, bit for bit, on every host; the truth leaves only by truth(), for judges.
 #pragma once
 
-#include "base/time.hpp"
 #include "sim_host/world/course.hpp"
 #include "sim_host/world/earth.hpp"
 #include "sim_host/world/faults.hpp"
@@ -12,6 +11,7 @@
 #include "sim_host/world/scan_matcher.hpp"
 #include "sim_host/world/sensors.hpp"
 #include "sim_host/world/vehicle.hpp"
+#include "tetap/base/time.hpp"
 
 #include <array>
 #include <memory>

@@ -3,7 +3,7 @@
 // the filter arithmetic stays in float.
 #pragma once
 
-#include "base/float_bits.hpp"
+#include "tetap/base/float_bits.hpp"
 
 #include <cstdint>
 

@@ -4,7 +4,7 @@
 // place. Polynomial: minimax in z = q^2.
 #pragma once
 
-#include "base/float_bits.hpp"
+#include "tetap/base/float_bits.hpp"
 
 namespace tetap::base {
 

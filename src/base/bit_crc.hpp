@@ -2,7 +2,7 @@
 // CRC-32 over the raw bits of numbers, least significant byte first: of inputs and parameters.
 #pragma once
 
-#include "base/crc.hpp"
+#include "tetap/base/crc.hpp"
 
 #include <bit>
 #include <cstdint>

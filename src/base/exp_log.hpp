@@ -5,7 +5,7 @@
 // test/base/math_test.cpp.
 #pragma once
 
-#include "base/float_bits.hpp"
+#include "tetap/base/float_bits.hpp"
 
 namespace tetap::base {
 

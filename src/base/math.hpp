@@ -3,7 +3,7 @@
 // error).
 #pragma once
 
-#include "base/arctangent.hpp"
-#include "base/exp_log.hpp"
-#include "base/float_bits.hpp"
-#include "base/trig.hpp"
+#include "tetap/base/arctangent.hpp"
+#include "tetap/base/exp_log.hpp"
+#include "tetap/base/float_bits.hpp"
+#include "tetap/base/trig.hpp"

@@ -4,7 +4,7 @@
 // nothing.
 #pragma once
 
-#include "base/math.hpp"
+#include "tetap/base/math.hpp"
 
 #include <array>
 #include <cstdint>

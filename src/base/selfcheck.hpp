@@ -3,9 +3,9 @@
 // same bits.
 #pragma once
 
-#include "base/math.hpp"
-#include "base/math_double.hpp"
-#include "base/random.hpp"
+#include "tetap/base/math.hpp"
+#include "tetap/base/math_double.hpp"
+#include "tetap/base/random.hpp"
 
 #include <bit>
 #include <cstdint>

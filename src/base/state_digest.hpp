@@ -3,7 +3,7 @@
 // itself in parts, round-robin. A bit that differs shows with the update that uses it, at the latest after one round.
 #pragma once
 
-#include "base/bit_crc.hpp"
+#include "tetap/base/bit_crc.hpp"
 
 #include <cstddef>
 #include <cstdint>

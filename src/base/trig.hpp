@@ -6,7 +6,7 @@
 // place of the true value: see test/base/math_test.cpp.
 #pragma once
 
-#include "base/float_bits.hpp"
+#include "tetap/base/float_bits.hpp"
 
 namespace tetap::base {
 

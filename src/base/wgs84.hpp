@@ -4,7 +4,7 @@
 // as for gravity by latitude: a float holds 0.5 m of the Earth's radius.
 #pragma once
 
-#include "base/math_double.hpp"
+#include "tetap/base/math_double.hpp"
 
 #include <cstdint>
 #include <optional>

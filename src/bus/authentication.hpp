@@ -3,13 +3,13 @@
 // counter and a number that the node publishes (Diag_Nonce). SECURITY.md has what it promises.
 #pragma once
 
-#include "base/can_frame.hpp"
-#include "base/siphash.hpp"
-#include "base/time.hpp"
-#include "bus/codec.hpp"
-#include "bus/counters.hpp"
-#include "bus/messages.hpp"
-#include "param/parameters.hpp"
+#include "tetap/base/can_frame.hpp"
+#include "tetap/base/siphash.hpp"
+#include "tetap/base/time.hpp"
+#include "tetap/bus/codec.hpp"
+#include "tetap/bus/counters.hpp"
+#include "tetap/bus/messages.hpp"
+#include "tetap/param/parameters.hpp"
 
 #include <array>
 #include <cstddef>

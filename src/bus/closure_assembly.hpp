@@ -4,12 +4,12 @@
 // it.
 #pragma once
 
-#include "base/time.hpp"
-#include "bus/codec.hpp"
-#include "bus/counters.hpp"
-#include "bus/decoder.hpp"
-#include "bus/messages.hpp"
-#include "sensor/sample.hpp"
+#include "tetap/base/time.hpp"
+#include "tetap/bus/codec.hpp"
+#include "tetap/bus/counters.hpp"
+#include "tetap/bus/decoder.hpp"
+#include "tetap/bus/messages.hpp"
+#include "tetap/sensor/sample.hpp"
 
 #include <cstdint>
 

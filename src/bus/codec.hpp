@@ -6,8 +6,8 @@
 //   kMux, kPage  where the page number is and which it is, if the struct is one page of a multiplexed message
 #pragma once
 
-#include "base/can_frame.hpp"
-#include "bus/signal.hpp"
+#include "tetap/base/can_frame.hpp"
+#include "tetap/bus/signal.hpp"
 
 #include <cstddef>
 #include <cstdint>

@@ -3,8 +3,8 @@
 // judged by the node's time, so a replay judges alike.
 #pragma once
 
-#include "base/time.hpp"
-#include "bus/counters.hpp"
+#include "tetap/base/time.hpp"
+#include "tetap/bus/counters.hpp"
 
 #include <array>
 #include <cstddef>

@@ -2,13 +2,13 @@
 // Commands from the bus: protected by CRC and counter, each obeyed once; a set pose comes in two frames of one counter.
 #pragma once
 
-#include "base/math.hpp"
-#include "bus/codec.hpp"
-#include "bus/command_policy.hpp"
-#include "bus/counters.hpp"
-#include "bus/e2e.hpp"
-#include "bus/messages.hpp"
-#include "estimators/context.hpp"
+#include "tetap/base/math.hpp"
+#include "tetap/bus/codec.hpp"
+#include "tetap/bus/command_policy.hpp"
+#include "tetap/bus/counters.hpp"
+#include "tetap/bus/e2e.hpp"
+#include "tetap/bus/messages.hpp"
+#include "tetap/estimators/context.hpp"
 
 #include <array>
 #include <cstdint>

@@ -3,8 +3,8 @@
 // in Est_Diag.
 #pragma once
 
-#include "bus/messages.hpp"
-#include "hal/can_bus.hpp"
+#include "tetap/base/can_faults.hpp"
+#include "tetap/bus/messages.hpp"
 
 #include <array>
 #include <cstdint>
@@ -46,7 +46,7 @@ struct LoopHealth {
   std::uint16_t sync_gap = 0;      ///< sync frames that were sent, by their counter, and never came
   std::uint16_t sync_bad = 0;      ///< sync frames of wrong length
   std::uint16_t lock_refused = 0;  ///< Begin and Step frames that were refused
-  hal::CanFaults bus;
+  base::CanFaults bus;
   bool id_conflict = false;  ///< within the last second a frame came whose id is this node's own
   bool unlogged = false;     ///< a wired sample was consumed that the bus did not take
   /// Pages 9 to 11 of Est_Diag; null: nothing is wired, and these pages are empty.

@@ -2,13 +2,13 @@
 // From frames to samples and commands: decodes, puts samples of several frames together, counts what does not fit.
 #pragma once
 
-#include "base/crc.hpp"
-#include "bus/codec.hpp"
-#include "bus/commands.hpp"
-#include "bus/counters.hpp"
-#include "bus/messages.hpp"
-#include "bus/reassembly.hpp"
-#include "sensor/sample.hpp"
+#include "tetap/base/crc.hpp"
+#include "tetap/bus/codec.hpp"
+#include "tetap/bus/commands.hpp"
+#include "tetap/bus/counters.hpp"
+#include "tetap/bus/messages.hpp"
+#include "tetap/bus/reassembly.hpp"
+#include "tetap/sensor/sample.hpp"
 
 #include <cstdint>
 #include <limits>

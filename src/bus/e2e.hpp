@@ -4,8 +4,8 @@
 // It finds damage and mixed-up ids, not malice.
 #pragma once
 
-#include "base/crc.hpp"
-#include "bus/codec.hpp"
+#include "tetap/base/crc.hpp"
+#include "tetap/bus/codec.hpp"
 
 #include <cstddef>
 #include <cstdint>

@@ -3,10 +3,10 @@
 // same integers.
 #pragma once
 
-#include "base/time.hpp"
-#include "bus/codec.hpp"
-#include "bus/messages.hpp"
-#include "sensor/samples.hpp"
+#include "tetap/base/time.hpp"
+#include "tetap/bus/codec.hpp"
+#include "tetap/bus/messages.hpp"
+#include "tetap/sensor/samples.hpp"
 
 #include <cstdint>
 

@@ -4,10 +4,10 @@
 // trace.
 #pragma once
 
-#include "base/float_bits.hpp"
-#include "bus/counters.hpp"
-#include "estimators/estimate.hpp"
-#include "sensor/sample.hpp"
+#include "tetap/base/float_bits.hpp"
+#include "tetap/bus/counters.hpp"
+#include "tetap/estimators/estimate.hpp"
+#include "tetap/sensor/sample.hpp"
 
 #include <array>
 #include <cstddef>

@@ -2,9 +2,9 @@
 // Fault bits, and those that stand for a second after a counter has moved.
 #pragma once
 
-#include "bus/counters.hpp"
-#include "bus/messages.hpp"
-#include "estimators/own_map.hpp"
+#include "tetap/bus/counters.hpp"
+#include "tetap/bus/messages.hpp"
+#include "tetap/estimators/own_map.hpp"
 
 #include <array>
 #include <cstddef>

@@ -2,8 +2,8 @@
 // Destination of a node's frames: the bus, or a hash. One type for both, so that a node's tick is in an image once.
 #pragma once
 
-#include "base/can_frame.hpp"
-#include "bus/messages.hpp"
+#include "tetap/base/can_frame.hpp"
+#include "tetap/bus/messages.hpp"
 
 #include <cstddef>
 #include <cstdint>
@@ -36,7 +36,7 @@ class FrameSink {
   FrameSink(Can& can, FrameHash& hash) : can_(can), hash_(&hash) {}
   void operator()(const base::CanFrame& frame) const {
     if (hash_ != nullptr) return (*hash_)(frame);
-    static_cast<void>(can_.send(frame));  // refused frames: CanFaults::tx_full
+    static_cast<void>(can_.send(frame));  // refused frames: base::CanFaults::tx_full
   }
 
  private:

@@ -3,13 +3,13 @@
 // against malice. CRC-16/IBM-3740 over id offset and data.
 #pragma once
 
-#include "base/can_frame.hpp"
-#include "base/crc.hpp"
-#include "base/time.hpp"
-#include "bus/codec.hpp"
-#include "bus/counters.hpp"
-#include "bus/messages.hpp"
-#include "sensor/sample.hpp"
+#include "tetap/base/can_frame.hpp"
+#include "tetap/base/crc.hpp"
+#include "tetap/base/time.hpp"
+#include "tetap/bus/codec.hpp"
+#include "tetap/bus/counters.hpp"
+#include "tetap/bus/messages.hpp"
+#include "tetap/sensor/sample.hpp"
 
 #include <array>
 #include <cstddef>

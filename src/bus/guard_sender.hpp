@@ -2,7 +2,7 @@
 // For senders: the guard of each sample whose last frame has just been sent (bus/guard.hpp).
 #pragma once
 
-#include "bus/guard.hpp"
+#include "tetap/bus/guard.hpp"
 
 #include <array>
 #include <cstddef>

@@ -2,7 +2,7 @@
 // Record of the consumed inputs: a count and a CRC that a replay can be held against.
 #pragma once
 
-#include "base/bit_crc.hpp"
+#include "tetap/base/bit_crc.hpp"
 
 #include <cstdint>
 

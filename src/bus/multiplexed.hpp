@@ -2,10 +2,10 @@
 // Messages of several pages, one page at a time: counters, and what an inertial estimator has beyond pose and velocity.
 #pragma once
 
-#include "base/math.hpp"
-#include "bus/counters.hpp"
-#include "bus/messages.hpp"
-#include "estimators/estimate.hpp"
+#include "tetap/base/math.hpp"
+#include "tetap/bus/counters.hpp"
+#include "tetap/bus/messages.hpp"
+#include "tetap/estimators/estimate.hpp"
 
 #include <cstdint>
 

@@ -2,10 +2,10 @@
 // Between the bus and the decoder: which commands, map entries and samples get through (param::BusParameters).
 #pragma once
 
-#include "bus/authentication.hpp"
-#include "bus/guard.hpp"
-#include "bus/messages.hpp"
-#include "param/parameters.hpp"
+#include "tetap/bus/authentication.hpp"
+#include "tetap/bus/guard.hpp"
+#include "tetap/bus/messages.hpp"
+#include "tetap/param/parameters.hpp"
 
 #include <cstdint>
 

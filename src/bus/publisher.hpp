@@ -3,22 +3,22 @@
 // it is the same in every replay.
 #pragma once
 
-#include "base/math.hpp"
-#include "bus/codec.hpp"
-#include "bus/counters.hpp"
-#include "bus/e2e.hpp"
-#include "bus/event_queue.hpp"
-#include "bus/fault_hold.hpp"
-#include "bus/input_crc.hpp"
-#include "bus/multiplexed.hpp"
-#include "bus/version.hpp"
-#include "estimators/attitude_disagreement.hpp"
-#include "estimators/estimate.hpp"
-#include "estimators/map_frame.hpp"
-#include "estimators/own_map.hpp"
-#include "estimators/sensor_statistics.hpp"
-#include "param/crc.hpp"
-#include "sensor/sample.hpp"
+#include "tetap/base/math.hpp"
+#include "tetap/bus/codec.hpp"
+#include "tetap/bus/counters.hpp"
+#include "tetap/bus/e2e.hpp"
+#include "tetap/bus/event_queue.hpp"
+#include "tetap/bus/fault_hold.hpp"
+#include "tetap/bus/input_crc.hpp"
+#include "tetap/bus/multiplexed.hpp"
+#include "tetap/bus/version.hpp"
+#include "tetap/estimators/attitude_disagreement.hpp"
+#include "tetap/estimators/estimate.hpp"
+#include "tetap/estimators/map_frame.hpp"
+#include "tetap/estimators/own_map.hpp"
+#include "tetap/estimators/sensor_statistics.hpp"
+#include "tetap/param/crc.hpp"
+#include "tetap/sensor/sample.hpp"
 
 #include <algorithm>
 #include <array>

@@ -2,8 +2,8 @@
 // Samples that come in several frames: halves wait here for the rest, and are never mixed with those of another sample.
 #pragma once
 
-#include "bus/counters.hpp"
-#include "sensor/sample.hpp"
+#include "tetap/bus/counters.hpp"
+#include "tetap/sensor/sample.hpp"
 
 #include <array>
 #include <cstdint>

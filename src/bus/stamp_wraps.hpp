@@ -3,9 +3,9 @@
 // long looks fresh. Stamp and sequence of a sensor advance together, in steps of its period: they reveal the wraps.
 #pragma once
 
-#include "base/reinitialise.hpp"
-#include "checks/persistence.hpp"
-#include "sensor/sample.hpp"
+#include "tetap/base/reinitialise.hpp"
+#include "tetap/checks/persistence.hpp"
+#include "tetap/sensor/sample.hpp"
 
 #include <array>
 #include <cstdint>

@@ -2,7 +2,7 @@
 // Weight of fixes whose errors last: time-correlated measurement noise (Bryson & Henrikson 1968).
 #pragma once
 
-#include "base/exp_log.hpp"
+#include "tetap/base/exp_log.hpp"
 
 namespace tetap::checks {
 

@@ -2,7 +2,7 @@
 // Frozen position: fixes that keep their coordinates to the last digit while the filter moves on.
 #pragma once
 
-#include "sensor/samples.hpp"
+#include "tetap/sensor/samples.hpp"
 
 #include <bit>
 #include <cstdint>

@@ -3,11 +3,11 @@
 // must agree on it. Otherwise the present would be carried over samples that the filter later refuses.
 #pragma once
 
-#include "base/math.hpp"
-#include "checks/stuck_value.hpp"
-#include "nav/imu_increment.hpp"
-#include "param/parameters.hpp"
-#include "sensor/samples.hpp"
+#include "tetap/base/math.hpp"
+#include "tetap/checks/stuck_value.hpp"
+#include "tetap/nav/imu_increment.hpp"
+#include "tetap/param/parameters.hpp"
+#include "tetap/sensor/samples.hpp"
 
 #include <cstdint>
 

@@ -5,7 +5,7 @@
 // TAC 21(1).
 #pragma once
 
-#include "nav/ins.hpp"
+#include "tetap/nav/ins.hpp"
 
 #include <cstdint>
 

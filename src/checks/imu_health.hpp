@@ -3,10 +3,10 @@
 // show three equal axes twice by chance, let alone ten times.
 #pragma once
 
-#include "base/math.hpp"
-#include "checks/imu_classifier.hpp"
-#include "checks/vibration.hpp"
-#include "param/parameters.hpp"
+#include "tetap/base/math.hpp"
+#include "tetap/checks/imu_classifier.hpp"
+#include "tetap/checks/vibration.hpp"
+#include "tetap/param/parameters.hpp"
 
 #include <cstdint>
 

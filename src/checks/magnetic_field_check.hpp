@@ -4,9 +4,9 @@
 // stayed the same through a stretch of motion: no magnet on the way does that.
 #pragma once
 
-#include "base/math.hpp"
-#include "checks/persistence.hpp"
-#include "param/parameters.hpp"
+#include "tetap/base/math.hpp"
+#include "tetap/checks/persistence.hpp"
+#include "tetap/param/parameters.hpp"
 
 #include <cstdint>
 

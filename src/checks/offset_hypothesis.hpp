@@ -4,8 +4,8 @@
 // repeat an offset only if they move as the filter does.
 #pragma once
 
-#include "checks/chi_square.hpp"
-#include "checks/persistence.hpp"
+#include "tetap/checks/chi_square.hpp"
+#include "tetap/checks/persistence.hpp"
 
 #include <cstdint>
 

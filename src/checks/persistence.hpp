@@ -3,7 +3,7 @@
 // "never". PX4 has the first as `isTimedOut`, the second as `hysteresis`.
 #pragma once
 
-#include "base/time.hpp"
+#include "tetap/base/time.hpp"
 
 #include <cstdint>
 #include <limits>

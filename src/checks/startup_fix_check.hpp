@@ -3,10 +3,10 @@
 // drives. A first fix that is a glitch starts nothing.
 #pragma once
 
-#include "base/math.hpp"
-#include "base/trig.hpp"
-#include "nav/geodesy.hpp"
-#include "sensor/samples.hpp"
+#include "tetap/base/math.hpp"
+#include "tetap/base/trig.hpp"
+#include "tetap/nav/geodesy.hpp"
+#include "tetap/sensor/samples.hpp"
 
 #include <cstdint>
 

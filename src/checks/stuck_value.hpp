@@ -3,7 +3,7 @@
 // that repeats it ten or fifty times is stuck.
 #pragma once
 
-#include "checks/persistence.hpp"
+#include "tetap/checks/persistence.hpp"
 
 #include <array>
 #include <bit>

@@ -3,7 +3,7 @@
 // may be wrong. The heading is then uncertain by all that they differ from that time on.
 #pragma once
 
-#include "base/time.hpp"
+#include "tetap/base/time.hpp"
 
 #include <cstdint>
 

@@ -2,9 +2,9 @@
 // Vibration of an IMU: mean squares of what is too fast to be motion, and leaps from one sample to the next.
 #pragma once
 
-#include "base/math.hpp"
-#include "param/parameters.hpp"
-#include "sensor/samples.hpp"
+#include "tetap/base/math.hpp"
+#include "tetap/param/parameters.hpp"
+#include "tetap/sensor/samples.hpp"
 
 #include <array>
 #include <cstdint>

@@ -3,8 +3,8 @@
 // over ground. Encoders against other sensors of the body: Ward and Iagnemma 2008, IEEE T-RO 24(4).
 #pragma once
 
-#include "checks/persistence.hpp"
-#include "param/parameters.hpp"
+#include "tetap/checks/persistence.hpp"
+#include "tetap/param/parameters.hpp"
 
 #include <cstdint>
 

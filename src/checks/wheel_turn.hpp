@@ -3,9 +3,9 @@
 // backwards, turn otherwise. Wheels that skid turn by another amount, and are no worse than none.
 #pragma once
 
-#include "base/math.hpp"
-#include "base/time.hpp"
-#include "param/parameters.hpp"
+#include "tetap/base/math.hpp"
+#include "tetap/base/time.hpp"
+#include "tetap/param/parameters.hpp"
 
 #include <cstdint>
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "estimators/attitude.hpp"
+#include "tetap/estimators/attitude.hpp"
 
-#include "base/multiply_add.hpp"
+#include "tetap/base/multiply_add.hpp"
 
 namespace tetap::estimators {
 

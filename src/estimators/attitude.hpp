@@ -5,13 +5,13 @@
 // in it.
 #pragma once
 
-#include "checks/imu_classifier.hpp"
-#include "estimators/context.hpp"
-#include "estimators/estimate.hpp"
-#include "filter/attitude.hpp"
-#include "sensor/magnetic_field.hpp"
-#include "sensor/sample.hpp"
-#include "sensor/window.hpp"
+#include "tetap/checks/imu_classifier.hpp"
+#include "tetap/estimators/context.hpp"
+#include "tetap/estimators/estimate.hpp"
+#include "tetap/filter/attitude.hpp"
+#include "tetap/sensor/magnetic_field.hpp"
+#include "tetap/sensor/sample.hpp"
+#include "tetap/sensor/window.hpp"
 
 #include <cstdint>
 

@@ -2,10 +2,10 @@
 // Two attitudes of one body that were found in different ways: how far they are apart, and for how long.
 #pragma once
 
-#include "base/math.hpp"
-#include "base/time.hpp"
-#include "estimators/estimate.hpp"
-#include "param/parameters.hpp"
+#include "tetap/base/math.hpp"
+#include "tetap/base/time.hpp"
+#include "tetap/estimators/estimate.hpp"
+#include "tetap/param/parameters.hpp"
 
 #include <cstdint>
 

@@ -2,10 +2,10 @@
 // Facts that every estimator is given with a sample, and the commands it can be sent.
 #pragma once
 
-#include "base/time.hpp"
-#include "estimators/map_frame.hpp"
-#include "model/planar_pose.hpp"
-#include "param/parameters.hpp"
+#include "tetap/base/time.hpp"
+#include "tetap/estimators/map_frame.hpp"
+#include "tetap/model/planar_pose.hpp"
+#include "tetap/param/parameters.hpp"
 
 namespace tetap::estimators {
 

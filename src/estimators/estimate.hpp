@@ -2,17 +2,17 @@
 // Estimates with their uncertainty, and a record of every measurement that an estimator was offered.
 #pragma once
 
-#include "base/math.hpp"
-#include "base/time.hpp"
-#include "checks/imu_health.hpp"
-#include "filter/quaternion.hpp"
-#include "filter/update.hpp"
-#include "model/planar_pose.hpp"
-#include "nav/ins_covariance_entry.hpp"
-#include "nav/ins_state.hpp"
-#include "nav/local_level.hpp"
-#include "sensor/source_state.hpp"
-#include "sensor/vocabulary.hpp"
+#include "tetap/base/math.hpp"
+#include "tetap/base/time.hpp"
+#include "tetap/checks/imu_health.hpp"
+#include "tetap/filter/quaternion.hpp"
+#include "tetap/filter/update.hpp"
+#include "tetap/model/planar_pose.hpp"
+#include "tetap/nav/ins_covariance_entry.hpp"
+#include "tetap/nav/ins_state.hpp"
+#include "tetap/nav/local_level.hpp"
+#include "tetap/sensor/source_state.hpp"
+#include "tetap/sensor/vocabulary.hpp"
 
 #include <array>
 #include <cstdint>

@@ -2,11 +2,11 @@
 // Surroundings that all estimators share: the origin of the local plane and the landmark map.
 #pragma once
 
-#include "base/trig.hpp"
-#include "model/landmark.hpp"
-#include "nav/geodesy.hpp"
-#include "sensor/samples.hpp"
-#include "sensor/vocabulary.hpp"
+#include "tetap/base/trig.hpp"
+#include "tetap/model/landmark.hpp"
+#include "tetap/nav/geodesy.hpp"
+#include "tetap/sensor/samples.hpp"
+#include "tetap/sensor/vocabulary.hpp"
 
 #include <array>
 #include <cstddef>

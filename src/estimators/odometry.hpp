@@ -2,8 +2,8 @@
 // Odometry: dead reckoning alone, continuous and without jumps (REP-105 "odom").
 #pragma once
 
-#include "estimators/context.hpp"
-#include "estimators/planar/dead_reckoning.hpp"
+#include "tetap/estimators/context.hpp"
+#include "tetap/estimators/planar/dead_reckoning.hpp"
 
 namespace tetap::estimators {
 

@@ -2,10 +2,10 @@
 // Output of an estimator that makes a map of its own: landmarks one at a time, and how full the map is.
 #pragma once
 
-#include "base/time.hpp"
-#include "model/landmark.hpp"
-#include "model/planar_pose.hpp"
-#include "sensor/vocabulary.hpp"
+#include "tetap/base/time.hpp"
+#include "tetap/model/landmark.hpp"
+#include "tetap/model/planar_pose.hpp"
+#include "tetap/sensor/vocabulary.hpp"
 
 #include <concepts>
 #include <cstddef>

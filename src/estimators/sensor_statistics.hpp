@@ -2,8 +2,8 @@
 // Statistics of one sensor in one estimator: counts of its verdicts and a sliding mean of its NIS.
 #pragma once
 
-#include "base/time.hpp"
-#include "sensor/vocabulary.hpp"
+#include "tetap/base/time.hpp"
+#include "tetap/sensor/vocabulary.hpp"
 
 #include <cstddef>
 #include <cstdint>

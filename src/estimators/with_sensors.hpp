@@ -2,8 +2,8 @@
 // An estimator that takes fewer kinds of samples than it could: what it does not take is in no image.
 #pragma once
 
-#include "estimators/context.hpp"
-#include "estimators/estimate.hpp"
+#include "tetap/estimators/context.hpp"
+#include "tetap/estimators/estimate.hpp"
 
 #include <concepts>
 

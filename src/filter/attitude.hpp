@@ -6,9 +6,9 @@
 // north, up). The bias is estimated beside. Time is an argument; every sample may have its own interval.
 #pragma once
 
-#include "filter/attitude_bias.hpp"
-#include "filter/attitude_clipping.hpp"
-#include "filter/attitude_heading.hpp"
+#include "tetap/filter/attitude_bias.hpp"
+#include "tetap/filter/attitude_clipping.hpp"
+#include "tetap/filter/attitude_heading.hpp"
 
 #include <cstdint>
 

@@ -5,8 +5,8 @@
 // times. Here: scalar updates instead of a matrix inverse, noise densities instead of a fixed sampling rate.
 #pragma once
 
-#include "filter/attitude_options.hpp"
-#include "filter/low_pass.hpp"
+#include "tetap/filter/attitude_options.hpp"
+#include "tetap/filter/low_pass.hpp"
 
 namespace tetap::filter {
 

@@ -5,8 +5,8 @@
 // taken off. A single wild reading has no slopes to support it, and adds nothing.
 #pragma once
 
-#include "filter/attitude_options.hpp"
-#include "filter/quaternion.hpp"
+#include "tetap/filter/attitude_options.hpp"
+#include "tetap/filter/quaternion.hpp"
 
 #include <array>
 

@@ -6,8 +6,8 @@
 // Turning alone shows that a field is homogeneous: the reference forgets by the angle that the body turns, not by time.
 #pragma once
 
-#include "filter/attitude_options.hpp"
-#include "filter/low_pass.hpp"
+#include "tetap/filter/attitude_options.hpp"
+#include "tetap/filter/low_pass.hpp"
 
 namespace tetap::filter {
 

@@ -3,7 +3,7 @@
 // rank. Only the upper half exists, packed by columns, so that a new state is a new column at the end.
 #pragma once
 
-#include "base/multiply_add.hpp"
+#include "tetap/base/multiply_add.hpp"
 
 #include <array>
 #include <cstddef>

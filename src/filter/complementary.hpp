@@ -4,7 +4,7 @@
 // The high-pass is tau s/(tau s + 1), the low-pass 1/(tau s + 1), by backward differences: alpha = tau/(tau + dt).
 #pragma once
 
-#include "base/math.hpp"
+#include "tetap/base/math.hpp"
 
 namespace tetap::filter {
 

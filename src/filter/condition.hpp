@@ -4,8 +4,8 @@
 // too.
 #pragma once
 
-#include "base/multiply_add.hpp"
-#include "filter/symmetric.hpp"
+#include "tetap/base/multiply_add.hpp"
+#include "tetap/filter/symmetric.hpp"
 
 namespace tetap::filter {
 

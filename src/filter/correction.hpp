@@ -7,9 +7,9 @@
 // Golub & Van Loan 2013, sec. 4.1.2 (the factor); Bierman 1977, ch. V (one component after another).
 #pragma once
 
-#include "base/multiply_add.hpp"
-#include "filter/unroll.hpp"
-#include "filter/update.hpp"
+#include "tetap/base/multiply_add.hpp"
+#include "tetap/filter/unroll.hpp"
+#include "tetap/filter/update.hpp"
 
 namespace tetap::filter {
 

@@ -2,7 +2,7 @@
 // The covariance of a filter in one form, whether the filter holds P or a triangular root of it.
 #pragma once
 
-#include "filter/symmetric.hpp"
+#include "tetap/filter/symmetric.hpp"
 
 #include <array>
 #include <cstddef>

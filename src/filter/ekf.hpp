@@ -3,10 +3,10 @@
 // 2017, sec. 6).
 #pragma once
 
-#include "filter/condition.hpp"
-#include "filter/state.hpp"
-#include "filter/structure.hpp"
-#include "filter/update.hpp"
+#include "tetap/filter/condition.hpp"
+#include "tetap/filter/state.hpp"
+#include "tetap/filter/structure.hpp"
+#include "tetap/filter/update.hpp"
 
 namespace tetap::filter {
 

@@ -4,8 +4,8 @@
 // lines of cells and leaves the same bits.
 #pragma once
 
-#include "base/math.hpp"
-#include "filter/symmetric.hpp"
+#include "tetap/base/math.hpp"
+#include "tetap/filter/symmetric.hpp"
 
 #include <algorithm>
 #include <array>

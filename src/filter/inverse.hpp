@@ -2,7 +2,7 @@
 // Inverse and determinant of a positive definite matrix from its Cholesky factor (Golub & Van Loan 2013, sec. 4.2).
 #pragma once
 
-#include "filter/triangular.hpp"
+#include "tetap/filter/triangular.hpp"
 
 namespace tetap::filter {
 

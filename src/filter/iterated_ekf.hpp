@@ -3,7 +3,7 @@
 // on the posterior (Bell & Cathey 1993; Bar-Shalom, Li, Kirubarajan 2001, sec. 10.5.2).
 #pragma once
 
-#include "filter/ekf.hpp"
+#include "tetap/filter/ekf.hpp"
 
 namespace tetap::filter {
 

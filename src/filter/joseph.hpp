@@ -3,9 +3,9 @@
 // Kirubarajan 2001, eq. 5.2.3-18).
 #pragma once
 
-#include "filter/inverse.hpp"
-#include "filter/kalman_form.hpp"
-#include "filter/whole_covariance.hpp"
+#include "tetap/filter/inverse.hpp"
+#include "tetap/filter/kalman_form.hpp"
+#include "tetap/filter/whole_covariance.hpp"
 
 namespace tetap::filter {
 

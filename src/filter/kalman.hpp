@@ -2,7 +2,7 @@
 // Linear Kalman filter (Kalman 1960): the extended filter with matrices for models.
 #pragma once
 
-#include "filter/ekf.hpp"
+#include "tetap/filter/ekf.hpp"
 
 #include <array>
 

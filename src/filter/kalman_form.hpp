@@ -3,8 +3,8 @@
 // ud.hpp, square_root.hpp. The forms are equal in exact arithmetic; they differ in cost and in what rounding does to P.
 #pragma once
 
-#include "filter/state.hpp"
-#include "filter/update.hpp"
+#include "tetap/filter/state.hpp"
+#include "tetap/filter/update.hpp"
 
 #include <concepts>
 

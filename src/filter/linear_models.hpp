@@ -2,9 +2,9 @@
 // Linear models as matrices, which may be others at every step: x+ = F x + B u + w, z = H x + v.
 #pragma once
 
-#include "filter/sigma_points.hpp"
-#include "filter/state.hpp"
-#include "filter/triangular.hpp"
+#include "tetap/filter/sigma_points.hpp"
+#include "tetap/filter/state.hpp"
+#include "tetap/filter/triangular.hpp"
 
 namespace tetap::filter {
 

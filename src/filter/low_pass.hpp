@@ -4,7 +4,7 @@
 // sample.
 #pragma once
 
-#include "filter/quaternion.hpp"
+#include "tetap/filter/quaternion.hpp"
 
 namespace tetap::filter {
 

@@ -3,7 +3,7 @@
 // IEEE Trans. Autom. Control 53(5), 2008, eq. 32 to 34). East-north-up; magnetic north is n's second axis.
 #pragma once
 
-#include "filter/quaternion.hpp"
+#include "tetap/filter/quaternion.hpp"
 
 namespace tetap::filter {
 

@@ -4,8 +4,8 @@
 // methods for Bayesian filtering", Statistics and Computing 10, 2000.
 #pragma once
 
-#include "filter/particle_noise.hpp"
-#include "filter/resampling.hpp"
+#include "tetap/filter/particle_noise.hpp"
+#include "tetap/filter/resampling.hpp"
 
 #include <array>
 #include <concepts>

@@ -4,9 +4,9 @@
 // is lost (Thrun, Burgard, Fox 2005, sec. 8.3.5). A threshold on the mean likelihood replaces the ratio there.
 #pragma once
 
-#include "filter/particle.hpp"
-#include "filter/particle_number.hpp"
-#include "filter/particle_pose.hpp"
+#include "tetap/filter/particle.hpp"
+#include "tetap/filter/particle_number.hpp"
+#include "tetap/filter/particle_pose.hpp"
 
 #include <cstddef>
 #include <cstdint>

@@ -5,8 +5,8 @@
 // (Doornik 2005).
 #pragma once
 
-#include "base/math.hpp"
-#include "base/random.hpp"
+#include "tetap/base/math.hpp"
+#include "tetap/base/random.hpp"
 
 #include <array>
 #include <cstddef>

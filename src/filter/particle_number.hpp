@@ -3,7 +3,7 @@
 // "Adapting the sample size in particle filters through KLD-sampling", IJRR 22(12), 2003, eq. 13.
 #pragma once
 
-#include "base/math.hpp"
+#include "tetap/base/math.hpp"
 
 #include <array>
 #include <cstddef>

@@ -3,8 +3,8 @@
 // vector: a turn costs a short series, and a bearing is compared by products instead of an arctangent.
 #pragma once
 
-#include "base/math.hpp"
-#include "filter/symmetric.hpp"
+#include "tetap/base/math.hpp"
+#include "tetap/filter/symmetric.hpp"
 
 #include <array>
 #include <cstddef>

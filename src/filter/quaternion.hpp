@@ -3,8 +3,8 @@
 // 2017, "Quaternion kinematics for the error-state Kalman filter", sec. 1 and 2.
 #pragma once
 
-#include "base/math.hpp"
-#include "filter/symmetric.hpp"
+#include "tetap/base/math.hpp"
+#include "tetap/filter/symmetric.hpp"
 
 namespace tetap::filter {
 

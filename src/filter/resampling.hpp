@@ -5,7 +5,7 @@
 // Weights are integers, so sums are exact: the result has the same bits in any order of accumulation.
 #pragma once
 
-#include "base/random.hpp"
+#include "tetap/base/random.hpp"
 
 #include <bit>
 #include <cstddef>

@@ -2,8 +2,8 @@
 // The gate and the record of a correction in square-root form.
 #pragma once
 
-#include "filter/triangular.hpp"
-#include "filter/update.hpp"
+#include "tetap/filter/triangular.hpp"
+#include "tetap/filter/update.hpp"
 
 namespace tetap::filter {
 

@@ -2,8 +2,8 @@
 // Components of a measurement one after another, each a scalar: no matrix is inverted (Simon 2006, sec. 6.1).
 #pragma once
 
-#include "filter/kalman_form.hpp"
-#include "filter/whole_covariance.hpp"
+#include "tetap/filter/kalman_form.hpp"
+#include "tetap/filter/whole_covariance.hpp"
 
 namespace tetap::filter {
 

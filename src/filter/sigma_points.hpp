@@ -8,10 +8,10 @@
 //   covariance = w sum(d+ d+^T + d- d-^T) + (beta - alpha^2) shift shift^T,      w = 1 / (2 (n + lambda)).
 #pragma once
 
-#include "base/math.hpp"
-#include "base/math_double.hpp"
-#include "filter/state.hpp"
-#include "filter/unroll.hpp"
+#include "tetap/base/math.hpp"
+#include "tetap/base/math_double.hpp"
+#include "tetap/filter/state.hpp"
+#include "tetap/filter/unroll.hpp"
 
 #include <array>
 #include <cstddef>

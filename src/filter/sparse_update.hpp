@@ -4,9 +4,9 @@
 // identity. The group's columns of P are then taken without a product.
 #pragma once
 
-#include "base/multiply_add.hpp"
-#include "filter/unroll.hpp"
-#include "filter/update.hpp"
+#include "tetap/base/multiply_add.hpp"
+#include "tetap/filter/unroll.hpp"
+#include "tetap/filter/update.hpp"
 
 namespace tetap::filter {
 

@@ -3,8 +3,8 @@
 // 2000, ch. 12; Kaminski, Bryson, Schmidt 1971).
 #pragma once
 
-#include "filter/kalman_form.hpp"
-#include "filter/root_update.hpp"
+#include "tetap/filter/kalman_form.hpp"
+#include "tetap/filter/root_update.hpp"
 
 namespace tetap::filter {
 

@@ -3,7 +3,7 @@
 // vector, x.minus(other) is the error vector that leads from other to x. Dense vectors are the trivial case.
 #pragma once
 
-#include "filter/symmetric.hpp"
+#include "tetap/filter/symmetric.hpp"
 
 #include <array>
 #include <concepts>

@@ -6,7 +6,7 @@
 //     Multisensor Data Fusion, ch. 12).
 #pragma once
 
-#include "filter/inverse.hpp"
+#include "tetap/filter/inverse.hpp"
 
 #include <limits>
 #include <span>

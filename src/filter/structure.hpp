@@ -3,9 +3,9 @@
 // and a few entries, Q a few entries. H may pick states or have constants.
 #pragma once
 
-#include "base/multiply_add.hpp"
-#include "filter/symmetric.hpp"
-#include "filter/unroll.hpp"
+#include "tetap/base/multiply_add.hpp"
+#include "tetap/filter/symmetric.hpp"
+#include "tetap/filter/unroll.hpp"
 
 #include <array>
 #include <cstddef>

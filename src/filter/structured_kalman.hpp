@@ -4,10 +4,10 @@
 // are those of Ekf.
 #pragma once
 
-#include "filter/condition.hpp"
-#include "filter/correction.hpp"
-#include "filter/state.hpp"
-#include "filter/structure.hpp"
+#include "tetap/filter/condition.hpp"
+#include "tetap/filter/correction.hpp"
+#include "tetap/filter/state.hpp"
+#include "tetap/filter/structure.hpp"
 
 #include <type_traits>
 

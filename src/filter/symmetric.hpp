@@ -2,8 +2,8 @@
 // A covariance that is symmetric because only its upper half exists.
 #pragma once
 
-#include "base/math.hpp"
-#include "base/math_double.hpp"
+#include "tetap/base/math.hpp"
+#include "tetap/base/math_double.hpp"
 
 #include <Eigen/Core>
 #include <array>

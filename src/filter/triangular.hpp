@@ -4,8 +4,8 @@
 // ch. 12).
 #pragma once
 
-#include "filter/symmetric.hpp"
-#include "filter/unroll.hpp"
+#include "tetap/filter/symmetric.hpp"
+#include "tetap/filter/unroll.hpp"
 
 #include <array>
 #include <cstddef>

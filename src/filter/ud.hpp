@@ -3,7 +3,7 @@
 // update: Bierman 1977, ch. V; time update by weighted Gram-Schmidt: Thornton 1976 (Bierman 1977, ch. VI).
 #pragma once
 
-#include "filter/kalman_form.hpp"
+#include "tetap/filter/kalman_form.hpp"
 
 namespace tetap::filter {
 

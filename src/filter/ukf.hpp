@@ -7,11 +7,11 @@
 // covariance. The result is the full transform's (Briers, Maskell, Wright 2003, for models that are linear in part).
 #pragma once
 
-#include "filter/condition.hpp"
-#include "filter/correction.hpp"
-#include "filter/sigma_points.hpp"
-#include "filter/state.hpp"
-#include "filter/wrap.hpp"
+#include "tetap/filter/condition.hpp"
+#include "tetap/filter/correction.hpp"
+#include "tetap/filter/sigma_points.hpp"
+#include "tetap/filter/state.hpp"
+#include "tetap/filter/wrap.hpp"
 
 namespace tetap::filter {
 

@@ -4,11 +4,11 @@
 // fail: in that form the central weight is beta - alpha^2 >= 0 (sigma_points.hpp).
 #pragma once
 
-#include "filter/root_update.hpp"
-#include "filter/sigma_points.hpp"
-#include "filter/state.hpp"
-#include "filter/triangular.hpp"
-#include "filter/wrap.hpp"
+#include "tetap/filter/root_update.hpp"
+#include "tetap/filter/sigma_points.hpp"
+#include "tetap/filter/state.hpp"
+#include "tetap/filter/triangular.hpp"
+#include "tetap/filter/wrap.hpp"
 
 #include <type_traits>
 

@@ -9,8 +9,8 @@
 // half.
 #pragma once
 
-#include "base/math.hpp"
-#include "filter/symmetric.hpp"
+#include "tetap/base/math.hpp"
+#include "tetap/filter/symmetric.hpp"
 
 #include <array>
 #include <cstddef>

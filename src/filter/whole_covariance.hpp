@@ -2,7 +2,7 @@
 // The covariance as one symmetric matrix, not as factors: the part that the Joseph and the sequential form share.
 #pragma once
 
-#include "filter/symmetric.hpp"
+#include "tetap/filter/symmetric.hpp"
 
 namespace tetap::filter {
 

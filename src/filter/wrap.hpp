@@ -2,8 +2,8 @@
 // Differences of measurements whose components may be angles: the short way round, in float or double.
 #pragma once
 
-#include "base/math.hpp"
-#include "filter/symmetric.hpp"
+#include "tetap/base/math.hpp"
+#include "tetap/filter/symmetric.hpp"
 
 #include <cstdint>
 #include <type_traits>

@@ -2,7 +2,7 @@
 // Bearing to a known landmark: cameras, beacons seen by angle only.
 #pragma once
 
-#include "model/landmark.hpp"
+#include "tetap/model/landmark.hpp"
 
 #include <array>
 

@@ -3,8 +3,8 @@
 // and the non-holonomic constraint measure it (Dissanayake et al. 2001, IEEE T-RA 17(5)).
 #pragma once
 
-#include "filter/state.hpp"
-#include "nav/ins_state.hpp"
+#include "tetap/filter/state.hpp"
+#include "tetap/nav/ins_state.hpp"
 
 namespace tetap::model {
 

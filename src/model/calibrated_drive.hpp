@@ -4,7 +4,7 @@
 // filter to autocalibrate the odometry", FUSION 1998). What no measurement shows keeps its variance.
 #pragma once
 
-#include "model/differential_drive.hpp"
+#include "tetap/model/differential_drive.hpp"
 
 namespace tetap::model {
 

@@ -3,7 +3,7 @@
 // (Bar-Shalom, Li, Kirubarajan 2001, sec. 6.3.3: discrete Wiener process acceleration model).
 #pragma once
 
-#include "filter/state.hpp"
+#include "tetap/filter/state.hpp"
 
 namespace tetap::model {
 

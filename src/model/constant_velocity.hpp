@@ -4,7 +4,7 @@
 // q dt^3/3.
 #pragma once
 
-#include "filter/kalman.hpp"
+#include "tetap/filter/kalman.hpp"
 
 namespace tetap::model {
 

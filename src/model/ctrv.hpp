@@ -3,8 +3,8 @@
 // evaluation of advanced motion models for vehicle tracking"; Bar-Shalom, Li, Kirubarajan 2001, sec. 11.7.
 #pragma once
 
-#include "filter/sigma_points.hpp"
-#include "filter/wrap.hpp"
+#include "tetap/filter/sigma_points.hpp"
+#include "tetap/filter/wrap.hpp"
 
 #include <array>
 

@@ -3,7 +3,7 @@
 // (Siegwart, Nourbakhsh, Scaramuzza 2011, sec. 5.2.4: Q_enc = diag(k_r |ds_r|, k_l |ds_l|)).
 #pragma once
 
-#include "model/planar_increment.hpp"
+#include "tetap/model/planar_increment.hpp"
 
 #include <cstdint>
 

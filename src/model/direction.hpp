@@ -4,8 +4,8 @@
 // u by dtheta x u.
 #pragma once
 
-#include "filter/state.hpp"
-#include "nav/ins_state.hpp"
+#include "tetap/filter/state.hpp"
+#include "tetap/nav/ins_state.hpp"
 
 #include <array>
 

@@ -2,7 +2,7 @@
 // Heading of the line between two antennas, as a receiver with moving base reports it.
 #pragma once
 
-#include "model/direction.hpp"
+#include "tetap/model/direction.hpp"
 
 namespace tetap::model {
 

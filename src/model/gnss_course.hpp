@@ -3,7 +3,7 @@
 // the velocity across, over the speed.
 #pragma once
 
-#include "model/direction.hpp"
+#include "tetap/model/direction.hpp"
 
 namespace tetap::model {
 

@@ -3,8 +3,8 @@
 // own accuracy (Groves 2013, eq. 14.103).
 #pragma once
 
-#include "filter/state.hpp"
-#include "nav/ins_state.hpp"
+#include "tetap/filter/state.hpp"
+#include "tetap/nav/ins_state.hpp"
 
 #include <array>
 

@@ -2,8 +2,8 @@
 // A GNSS fix in the local plane: position of the antenna, which sits at a lever arm from the body's origin.
 #pragma once
 
-#include "base/math.hpp"
-#include "model/planar_pose.hpp"
+#include "tetap/base/math.hpp"
+#include "tetap/model/planar_pose.hpp"
 
 #include <array>
 

@@ -2,8 +2,8 @@
 // A height above the origin, of a barometer or whatever else knows only that.
 #pragma once
 
-#include "filter/state.hpp"
-#include "nav/ins_state.hpp"
+#include "tetap/filter/state.hpp"
+#include "tetap/nav/ins_state.hpp"
 
 #include <array>
 

@@ -3,7 +3,7 @@
 // that watches it.
 #pragma once
 
-#include "model/ctrv.hpp"
+#include "tetap/model/ctrv.hpp"
 
 namespace tetap::model {
 

@@ -2,8 +2,8 @@
 // A landmark at a known place, as seen from a sensor on the body.
 #pragma once
 
-#include "base/math.hpp"
-#include "model/planar_pose.hpp"
+#include "tetap/base/math.hpp"
+#include "tetap/model/planar_pose.hpp"
 
 namespace tetap::model {
 

@@ -3,7 +3,7 @@
 // dip of the field need be known. A wrong tilt turns the dipping field, and H contains that.
 #pragma once
 
-#include "model/direction.hpp"
+#include "tetap/model/direction.hpp"
 
 namespace tetap::model {
 

@@ -4,7 +4,7 @@
 // 5.2.4.
 #pragma once
 
-#include "filter/symmetric.hpp"
+#include "tetap/filter/symmetric.hpp"
 
 namespace tetap::model {
 

@@ -4,10 +4,10 @@
 // ds sin(h)/h, h = dyaw/2.
 #pragma once
 
-#include "base/math.hpp"
-#include "base/multiply_add.hpp"
-#include "filter/structure.hpp"
-#include "model/planar_pose.hpp"
+#include "tetap/base/math.hpp"
+#include "tetap/base/multiply_add.hpp"
+#include "tetap/filter/structure.hpp"
+#include "tetap/model/planar_pose.hpp"
 
 #include <array>
 #include <cstdint>

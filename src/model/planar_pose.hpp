@@ -2,9 +2,9 @@
 // Pose of a ground robot: x east, y north (REP-103), yaw 0 = east, counter-clockwise. Error state (dx, dy, dyaw), in n.
 #pragma once
 
-#include "base/anchored.hpp"
-#include "base/math.hpp"
-#include "filter/state.hpp"
+#include "tetap/base/anchored.hpp"
+#include "tetap/base/math.hpp"
+#include "tetap/filter/state.hpp"
 
 namespace tetap::model {
 

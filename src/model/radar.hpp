@@ -2,7 +2,7 @@
 // Radar at rest: range, bearing and range rate of a target (Bar-Shalom, Li, Kirubarajan 2001, ch. 10).
 #pragma once
 
-#include "model/kinematics.hpp"
+#include "tetap/model/kinematics.hpp"
 
 #include <array>
 

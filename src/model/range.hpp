@@ -2,7 +2,7 @@
 // Range to a known landmark: ultra-wideband anchors, acoustic beacons.
 #pragma once
 
-#include "model/landmark.hpp"
+#include "tetap/model/landmark.hpp"
 
 #include <array>
 

@@ -2,7 +2,7 @@
 // Range and bearing to a known landmark (Thrun, Burgard, Fox 2005, eq. 7.11-7.14, with a lever arm).
 #pragma once
 
-#include "model/landmark.hpp"
+#include "tetap/model/landmark.hpp"
 
 #include <array>
 

@@ -2,7 +2,7 @@
 // Bearing alone to a target, from a sensor whose place is known (Bar-Shalom, Li, Kirubarajan 2001, sec. 3.7).
 #pragma once
 
-#include "model/kinematics.hpp"
+#include "tetap/model/kinematics.hpp"
 
 #include <array>
 

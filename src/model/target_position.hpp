@@ -2,7 +2,7 @@
 // Position of a target, of a lidar or a camera above the scene.
 #pragma once
 
-#include "model/kinematics.hpp"
+#include "tetap/model/kinematics.hpp"
 
 #include <array>
 

@@ -2,7 +2,7 @@
 // Range alone to a target, from a sensor whose place is known (Bar-Shalom, Li, Kirubarajan 2001, ch. 10).
 #pragma once
 
-#include "model/kinematics.hpp"
+#include "tetap/model/kinematics.hpp"
 
 #include <array>
 

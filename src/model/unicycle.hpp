@@ -3,7 +3,7 @@
 // 2005, sec. 5.3 and 7.4: noise in control space, which grows with the motion.
 #pragma once
 
-#include "model/planar_increment.hpp"
+#include "tetap/model/planar_increment.hpp"
 
 namespace tetap::model {
 

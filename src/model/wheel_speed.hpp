@@ -3,7 +3,7 @@
 // robot without encoders has NonHolonomic alone.
 #pragma once
 
-#include "model/body_velocity.hpp"
+#include "tetap/model/body_velocity.hpp"
 
 #include <array>
 

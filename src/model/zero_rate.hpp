@@ -2,8 +2,8 @@
 // A gyroscope on a body that does not turn shows its bias, and the Earth's rotation.
 #pragma once
 
-#include "filter/state.hpp"
-#include "nav/ins_state.hpp"
+#include "tetap/filter/state.hpp"
+#include "tetap/nav/ins_state.hpp"
 
 #include <array>
 

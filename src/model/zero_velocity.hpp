@@ -2,8 +2,8 @@
 // A body that was found to stand still has no velocity (Skog et al. 2010, IEEE T-BME 57(11)).
 #pragma once
 
-#include "filter/state.hpp"
-#include "nav/ins_state.hpp"
+#include "tetap/filter/state.hpp"
+#include "tetap/nav/ins_state.hpp"
 
 #include <array>
 

@@ -5,7 +5,7 @@
 // sec. 2.2 and 5.3). Loops stay loops: the filter runs ten times a second, and code is what is short.
 #pragma once
 
-#include "base/math.hpp"
+#include "tetap/base/math.hpp"
 
 #include <array>
 

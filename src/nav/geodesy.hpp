@@ -2,9 +2,9 @@
 // Latitude, longitude, height to the local level plane (east, north, up) of an origin and back, by way of ECEF.
 #pragma once
 
-#include "base/math.hpp"
-#include "base/wgs84.hpp"
-#include "nav/local_level.hpp"
+#include "tetap/base/math.hpp"
+#include "tetap/base/wgs84.hpp"
+#include "tetap/nav/local_level.hpp"
 
 #include <cstdint>
 #include <optional>

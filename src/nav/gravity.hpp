@@ -3,9 +3,9 @@
 // and 3.4). Computed once, when the origin is known.
 #pragma once
 
-#include "base/wgs84.hpp"
-#include "nav/geodesy.hpp"
-#include "nav/so3.hpp"
+#include "tetap/base/wgs84.hpp"
+#include "tetap/nav/geodesy.hpp"
+#include "tetap/nav/so3.hpp"
 
 namespace tetap::nav {
 

@@ -2,7 +2,7 @@
 // Heading error by a gyroscope's scale error in turns about the vertical, where nothing levels the gyroscope.
 #pragma once
 
-#include "base/math.hpp"
+#include "tetap/base/math.hpp"
 
 namespace tetap::nav {
 

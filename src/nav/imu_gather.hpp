@@ -3,7 +3,7 @@
 // (Savage 1998, J. Guid. Control Dyn. 21(1) eq. 44-47 and 21(2) eq. 36-43), rotation to second order of the angle.
 #pragma once
 
-#include "nav/imu_increment.hpp"
+#include "tetap/nav/imu_increment.hpp"
 
 namespace tetap::nav {
 

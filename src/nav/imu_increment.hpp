@@ -3,8 +3,8 @@
 // included (Savage 1998, J. Guid. Control Dyn. 21(1) and 21(2)).
 #pragma once
 
-#include "base/time.hpp"
-#include "nav/so3.hpp"
+#include "tetap/base/time.hpp"
+#include "tetap/nav/so3.hpp"
 
 #include <cstdint>
 

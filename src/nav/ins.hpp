@@ -3,12 +3,12 @@
 // increment, covariance prediction whenever the caller wants one, measurements through the update all filters share.
 #pragma once
 
-#include "base/trig.hpp"
-#include "filter/sparse_update.hpp"
-#include "filter/state.hpp"
-#include "nav/gyro_scale_consider.hpp"
-#include "nav/ins_covariance.hpp"
-#include "nav/strapdown.hpp"
+#include "tetap/base/trig.hpp"
+#include "tetap/filter/sparse_update.hpp"
+#include "tetap/filter/state.hpp"
+#include "tetap/nav/gyro_scale_consider.hpp"
+#include "tetap/nav/ins_covariance.hpp"
+#include "tetap/nav/strapdown.hpp"
 
 #include <algorithm>
 

@@ -5,9 +5,9 @@
 // Terms in dt^2 are left out. Over T they are dt/T of what the same errors do through the velocity.
 #pragma once
 
-#include "base/multiply_add.hpp"
-#include "filter/unroll.hpp"
-#include "nav/ins_state.hpp"
+#include "tetap/base/multiply_add.hpp"
+#include "tetap/filter/unroll.hpp"
+#include "tetap/nav/ins_state.hpp"
 
 #include <limits>
 

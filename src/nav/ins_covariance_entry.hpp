@@ -3,7 +3,7 @@
 // stay that of its own time.
 #pragma once
 
-#include "nav/ins_covariance.hpp"
+#include "tetap/nav/ins_covariance.hpp"
 
 #include <array>
 #include <cstddef>

@@ -4,8 +4,8 @@
 // there.
 #pragma once
 
-#include "base/anchored.hpp"
-#include "nav/so3.hpp"
+#include "tetap/base/anchored.hpp"
+#include "tetap/nav/so3.hpp"
 
 namespace tetap::nav {
 

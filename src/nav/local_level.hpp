@@ -3,9 +3,9 @@
 // quadric: its normal is linear in the place, so no angle is needed. docs/explanation/frames.md.
 #pragma once
 
-#include "base/anchored.hpp"
-#include "base/wgs84.hpp"
-#include "nav/so3.hpp"
+#include "tetap/base/anchored.hpp"
+#include "tetap/base/wgs84.hpp"
+#include "tetap/nav/so3.hpp"
 
 namespace tetap::nav {
 

@@ -3,8 +3,8 @@
 // small-angle terms are those of Sola 2017, "Quaternion kinematics for the error-state Kalman filter", eq. 101 and 105.
 #pragma once
 
-#include "base/math.hpp"
-#include "filter/symmetric.hpp"
+#include "tetap/base/math.hpp"
+#include "tetap/filter/symmetric.hpp"
 
 namespace tetap::nav {
 

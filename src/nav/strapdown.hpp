@@ -3,9 +3,9 @@
 // is fixed to the Earth).
 #pragma once
 
-#include "nav/gravity.hpp"
-#include "nav/imu_increment.hpp"
-#include "nav/ins_state.hpp"
+#include "tetap/nav/gravity.hpp"
+#include "tetap/nav/imu_increment.hpp"
+#include "tetap/nav/ins_state.hpp"
 
 namespace tetap::nav {
 

@@ -9,9 +9,9 @@
 // look known.
 #pragma once
 
-#include "base/anchored.hpp"
-#include "nav/complex_kalman.hpp"
-#include "nav/imu_increment.hpp"
+#include "tetap/base/anchored.hpp"
+#include "tetap/nav/complex_kalman.hpp"
+#include "tetap/nav/imu_increment.hpp"
 
 namespace tetap::nav {
 
@@ -142,4 +142,4 @@ class YawEstimator {
 
 }  // namespace tetap::nav
 
-#include "nav/yaw_estimator_steps.hpp"  // IWYU pragma: keep
+#include "tetap/nav/yaw_estimator_steps.hpp"  // IWYU pragma: keep

@@ -2,7 +2,7 @@
 // YawEstimator's steps: own level and yaw at the IMU's rate, the filter ten times a second, the verdicts.
 #pragma once
 
-#include "nav/yaw_estimator.hpp"
+#include "tetap/nav/yaw_estimator.hpp"
 
 namespace tetap::nav {
 

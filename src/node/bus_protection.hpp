@@ -3,8 +3,8 @@
 // node::WithBusProtection<node::Estimators<...>>`.
 #pragma once
 
-#include "bus/protection.hpp"
-#include "param/parameters.hpp"
+#include "tetap/bus/protection.hpp"
+#include "tetap/param/parameters.hpp"
 
 #include <type_traits>
 

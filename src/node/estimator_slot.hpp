@@ -10,13 +10,13 @@
 // every tick, never a burst. Due work may also wait for the next tick, and records are late by the window.
 #pragma once
 
-#include "base/state_hash.hpp"
-#include "estimators/context.hpp"
-#include "estimators/estimate.hpp"
-#include "estimators/own_map.hpp"
-#include "estimators/sensor_statistics.hpp"
-#include "sensor/sample.hpp"
-#include "sensor/window.hpp"
+#include "tetap/base/state_hash.hpp"
+#include "tetap/estimators/context.hpp"
+#include "tetap/estimators/estimate.hpp"
+#include "tetap/estimators/own_map.hpp"
+#include "tetap/estimators/sensor_statistics.hpp"
+#include "tetap/sensor/sample.hpp"
+#include "tetap/sensor/window.hpp"
 
 #include <array>
 #include <concepts>

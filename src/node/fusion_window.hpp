@@ -3,10 +3,10 @@
 // time. A sample that left the window is final. Holds the estimators and the samples of the window.
 #pragma once
 
-#include "bus/counters.hpp"
-#include "node/estimator_slot.hpp"
-#include "node/timeline.hpp"
-#include "node/work_limit.hpp"
+#include "tetap/bus/counters.hpp"
+#include "tetap/node/estimator_slot.hpp"
+#include "tetap/node/timeline.hpp"
+#include "tetap/node/work_limit.hpp"
 
 #include <algorithm>
 #include <array>

@@ -2,9 +2,9 @@
 // The landmark map and the entries that wait for their tick to go into it.
 #pragma once
 
-#include "base/state_hash.hpp"
-#include "bus/counters.hpp"
-#include "estimators/map_frame.hpp"
+#include "tetap/base/state_hash.hpp"
+#include "tetap/bus/counters.hpp"
+#include "tetap/estimators/map_frame.hpp"
 
 #include <array>
 #include <cstddef>

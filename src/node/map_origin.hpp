@@ -4,10 +4,10 @@
 // fixes that the map held. docs/explanation/frames.md.
 #pragma once
 
-#include "checks/startup_fix_check.hpp"
-#include "estimators/map_frame.hpp"
-#include "param/parameters.hpp"
-#include "sensor/samples.hpp"
+#include "tetap/checks/startup_fix_check.hpp"
+#include "tetap/estimators/map_frame.hpp"
+#include "tetap/param/parameters.hpp"
+#include "tetap/sensor/samples.hpp"
 
 #include <algorithm>
 #include <cstdint>

@@ -3,18 +3,18 @@
 // calls gives the same bits on every machine; everything that follows from real time stays outside (Pacer, LoopHealth).
 #pragma once
 
-#include "base/state_hash.hpp"
-#include "bus/closure_assembly.hpp"
-#include "bus/decoder.hpp"
-#include "bus/input_crc.hpp"
-#include "bus/publisher.hpp"
-#include "bus/stamp_wraps.hpp"
-#include "node/bus_protection.hpp"
-#include "node/fusion_window.hpp"
-#include "node/landmarks.hpp"
-#include "node/map_origin.hpp"
-#include "sensor/calibration.hpp"
-#include "sensor/plausibility.hpp"
+#include "tetap/base/state_hash.hpp"
+#include "tetap/bus/closure_assembly.hpp"
+#include "tetap/bus/decoder.hpp"
+#include "tetap/bus/input_crc.hpp"
+#include "tetap/bus/publisher.hpp"
+#include "tetap/bus/stamp_wraps.hpp"
+#include "tetap/node/bus_protection.hpp"
+#include "tetap/node/fusion_window.hpp"
+#include "tetap/node/landmarks.hpp"
+#include "tetap/node/map_origin.hpp"
+#include "tetap/sensor/calibration.hpp"
+#include "tetap/sensor/plausibility.hpp"
 
 #include <array>
 #include <cstddef>

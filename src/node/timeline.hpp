@@ -3,9 +3,9 @@
 // that a late sample can still be fused at its own time. A ring: what leaves at the front moves nothing.
 #pragma once
 
-#include "base/state_hash.hpp"
-#include "sensor/sample.hpp"
-#include "sensor/window.hpp"
+#include "tetap/base/state_hash.hpp"
+#include "tetap/sensor/sample.hpp"
+#include "tetap/sensor/window.hpp"
 
 #include <array>
 #include <cstddef>

@@ -3,8 +3,8 @@
 // estimate depends are left out. The group `wired` counts only where a robot has a wired sensor.
 #pragma once
 
-#include "base/bit_crc.hpp"
-#include "param/table.hpp"
+#include "tetap/base/bit_crc.hpp"
+#include "tetap/param/table.hpp"
 
 #include <array>
 #include <cstddef>

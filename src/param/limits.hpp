@@ -5,7 +5,7 @@
 // sentence of it.
 #pragma once
 
-#include "param/table.hpp"
+#include "tetap/param/table.hpp"
 
 #include <array>
 #include <cstddef>

@@ -4,11 +4,11 @@
 // table's CRC is in the version frame.
 #pragma once
 
-#include "base/time.hpp"
-#include "filter/attitude_options.hpp"
-#include "model/differential_drive.hpp"
-#include "model/landmark.hpp"
-#include "model/unicycle.hpp"
+#include "tetap/base/time.hpp"
+#include "tetap/filter/attitude_options.hpp"
+#include "tetap/model/differential_drive.hpp"
+#include "tetap/model/landmark.hpp"
+#include "tetap/model/unicycle.hpp"
 
 #include <array>
 #include <cstdint>

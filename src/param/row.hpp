@@ -2,7 +2,7 @@
 // One row of the parameter table: path, stable index, unit, limits, and access to the member without its type.
 #pragma once
 
-#include "param/parameters.hpp"
+#include "tetap/param/parameters.hpp"
 
 #include <array>
 #include <cstddef>

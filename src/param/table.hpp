@@ -6,7 +6,7 @@
 // never changed (test/param/indices.txt); a group has 64 of them.
 #pragma once
 
-#include "param/row.hpp"
+#include "tetap/param/row.hpp"
 
 #include <array>
 #include <cstddef>

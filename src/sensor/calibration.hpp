@@ -3,10 +3,10 @@
 // alone: a late one is corrected as it would have been in time.
 #pragma once
 
-#include "base/math.hpp"
-#include "param/parameters.hpp"
-#include "sensor/row_major.hpp"
-#include "sensor/sample.hpp"
+#include "tetap/base/math.hpp"
+#include "tetap/param/parameters.hpp"
+#include "tetap/sensor/row_major.hpp"
+#include "tetap/sensor/sample.hpp"
 
 namespace tetap::sensor {
 

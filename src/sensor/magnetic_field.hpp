@@ -2,9 +2,9 @@
 // A magnetometer's sample as the field in body axes: calibrated, then turned as the sensor is mounted.
 #pragma once
 
-#include "param/parameters.hpp"
-#include "sensor/row_major.hpp"
-#include "sensor/samples.hpp"
+#include "tetap/param/parameters.hpp"
+#include "tetap/sensor/row_major.hpp"
+#include "tetap/sensor/samples.hpp"
 
 namespace tetap::sensor {
 

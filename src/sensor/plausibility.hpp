@@ -4,8 +4,8 @@
 // floats.
 #pragma once
 
-#include "base/math.hpp"
-#include "sensor/sample.hpp"
+#include "tetap/base/math.hpp"
+#include "tetap/sensor/sample.hpp"
 
 namespace tetap::sensor {
 

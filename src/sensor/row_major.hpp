@@ -2,7 +2,7 @@
 // Matrices as a robot's numbers have them, row by row, times a vector.
 #pragma once
 
-#include "filter/quaternion.hpp"
+#include "tetap/filter/quaternion.hpp"
 
 #include <array>
 

@@ -2,8 +2,8 @@
 // Any sample with its stamp and identity: what the timeline holds and orders.
 #pragma once
 
-#include "sensor/samples.hpp"
-#include "sensor/vocabulary.hpp"
+#include "tetap/sensor/samples.hpp"
+#include "tetap/sensor/vocabulary.hpp"
 
 #include <compare>
 #include <cstdint>

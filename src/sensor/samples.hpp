@@ -3,8 +3,8 @@
 // estimators. Small structs, passed by value. Frames: b = body (x forward, y left, z up).
 #pragma once
 
-#include "base/float_bits.hpp"
-#include "base/time.hpp"
+#include "tetap/base/float_bits.hpp"
+#include "tetap/base/time.hpp"
 
 #include <array>
 #include <cstdint>

@@ -2,7 +2,7 @@
 // The samples that the estimators have and that are not final yet, in the order of their stamps: a view into a ring.
 #pragma once
 
-#include "sensor/sample.hpp"
+#include "tetap/sensor/sample.hpp"
 
 #include <cstddef>
 

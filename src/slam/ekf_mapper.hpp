@@ -3,10 +3,10 @@
 // sighting finds its landmark by identity or by association, or it is ambiguous.
 #pragma once
 
-#include "slam/association.hpp"
-#include "slam/ekf_slam.hpp"
-#include "slam/joint_compatibility.hpp"
-#include "slam/partial_sightings.hpp"
+#include "tetap/slam/association.hpp"
+#include "tetap/slam/ekf_slam.hpp"
+#include "tetap/slam/joint_compatibility.hpp"
+#include "tetap/slam/partial_sightings.hpp"
 
 #include <array>
 #include <cstddef>

@@ -5,10 +5,10 @@
 // gains from landmarks that nothing but the robot itself has placed. docs/explanation/ekf_slam.md has the equations.
 #pragma once
 
-#include "filter/big_covariance.hpp"
-#include "model/planar_increment.hpp"
-#include "slam/landmark_map.hpp"
-#include "slam/sighting.hpp"
+#include "tetap/filter/big_covariance.hpp"
+#include "tetap/model/planar_increment.hpp"
+#include "tetap/slam/landmark_map.hpp"
+#include "tetap/slam/sighting.hpp"
 
 #include <algorithm>
 #include <array>
@@ -245,4 +245,4 @@ class EkfSlam {
 
 }  // namespace tetap::slam
 
-#include "slam/ekf_slam_update.hpp"
+#include "tetap/slam/ekf_slam_update.hpp"

@@ -3,7 +3,7 @@
 // Implements docs/explanation/ekf_slam.md (6) to (8).
 #pragma once
 
-#include "slam/ekf_slam.hpp"
+#include "tetap/slam/ekf_slam.hpp"
 
 namespace tetap::slam {
 

@@ -5,12 +5,12 @@
 // consistent; docs/explanation/fast_slam.md has the equations and by how much.
 #pragma once
 
-#include "filter/particle_noise.hpp"
-#include "filter/resampling.hpp"
-#include "filter/symmetric.hpp"
-#include "model/planar_increment.hpp"
-#include "slam/fast_slam_particle.hpp"
-#include "slam/sighting.hpp"
+#include "tetap/filter/particle_noise.hpp"
+#include "tetap/filter/resampling.hpp"
+#include "tetap/filter/symmetric.hpp"
+#include "tetap/model/planar_increment.hpp"
+#include "tetap/slam/fast_slam_particle.hpp"
+#include "tetap/slam/sighting.hpp"
 
 #include <array>
 #include <cstddef>

@@ -3,9 +3,9 @@
 // the pose's distribution given that motion and sightings. docs/explanation/fast_slam.md has the equations.
 #pragma once
 
-#include "filter/symmetric.hpp"
-#include "model/planar_increment.hpp"
-#include "slam/sighting.hpp"
+#include "tetap/filter/symmetric.hpp"
+#include "tetap/model/planar_increment.hpp"
+#include "tetap/slam/sighting.hpp"
 
 #include <array>
 #include <cstddef>

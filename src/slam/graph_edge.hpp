@@ -4,8 +4,8 @@
 // Jacobians: Grisetti, Kuemmerle, Stachniss, Burgard, IEEE ITS Magazine 2(4), 2010, sec. III-B.
 #pragma once
 
-#include "slam/planar_motion.hpp"
-#include "slam/square_root.hpp"
+#include "tetap/slam/planar_motion.hpp"
+#include "tetap/slam/square_root.hpp"
 
 #include <array>
 #include <cstdint>

@@ -5,8 +5,8 @@
 // number of nodes.
 #pragma once
 
-#include "base/math.hpp"
-#include "slam/sighting.hpp"
+#include "tetap/base/math.hpp"
+#include "tetap/slam/sighting.hpp"
 
 #include <algorithm>
 #include <array>

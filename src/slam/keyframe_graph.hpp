@@ -4,7 +4,7 @@
 // is composed away and closures of the same pair are merged; a closure is refused.
 #pragma once
 
-#include "slam/pose_graph.hpp"
+#include "tetap/slam/pose_graph.hpp"
 
 namespace tetap::slam {
 

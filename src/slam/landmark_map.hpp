@@ -3,8 +3,8 @@
 // takes its place, as it does in the covariance.
 #pragma once
 
-#include "model/landmark.hpp"
-#include "slam/sighting.hpp"
+#include "tetap/model/landmark.hpp"
+#include "tetap/slam/sighting.hpp"
 
 #include <array>
 #include <cstddef>

@@ -4,9 +4,9 @@
 // accumulates (right-invariant errors of dead reckoning only add up).
 #pragma once
 
-#include "filter/symmetric.hpp"
-#include "model/planar_increment.hpp"
-#include "slam/sighting.hpp"
+#include "tetap/filter/symmetric.hpp"
+#include "tetap/model/planar_increment.hpp"
+#include "tetap/slam/sighting.hpp"
 
 #include <array>
 #include <cstddef>

@@ -4,9 +4,9 @@
 // Smith, Self & Cheeseman 1990, "Estimating uncertain spatial relationships", sec. 3.
 #pragma once
 
-#include "base/math.hpp"
-#include "base/math_double.hpp"
-#include "filter/symmetric.hpp"
+#include "tetap/base/math.hpp"
+#include "tetap/base/math_double.hpp"
+#include "tetap/filter/symmetric.hpp"
 
 #include <cstdint>
 #include <type_traits>

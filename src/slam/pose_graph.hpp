@@ -4,7 +4,7 @@
 // 25(12), 2006). False closures are held off by dynamic covariance scaling, then left out (see graph_edge.hpp).
 #pragma once
 
-#include "slam/graph_edge.hpp"
+#include "tetap/slam/graph_edge.hpp"
 
 namespace tetap::slam {
 
@@ -358,4 +358,4 @@ class PoseGraph {
 
 }  // namespace tetap::slam
 
-#include "slam/pose_graph_job.hpp"
+#include "tetap/slam/pose_graph_job.hpp"

@@ -3,7 +3,7 @@
 // elimination, solution, judgement, adoption.
 #pragma once
 
-#include "slam/pose_graph.hpp"
+#include "tetap/slam/pose_graph.hpp"
 
 namespace tetap::slam {
 

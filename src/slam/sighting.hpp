@@ -2,9 +2,9 @@
 // A landmark as a mapper sees it: range, bearing or both, with or without identity, and the sighting's fate.
 #pragma once
 
-#include "base/math.hpp"
-#include "model/landmark.hpp"
-#include "model/planar_pose.hpp"
+#include "tetap/base/math.hpp"
+#include "tetap/model/landmark.hpp"
+#include "tetap/model/planar_pose.hpp"
 
 #include <array>
 #include <cstdint>

@@ -5,11 +5,11 @@
 // resolves. Three rows are rotated at a time (Householder; Golub & Van Loan 2013, alg. 5.1.1).
 #pragma once
 
-#include "base/math.hpp"
-#include "base/math_double.hpp"
-#include "base/reinitialise.hpp"
-#include "filter/symmetric.hpp"
-#include "slam/elimination_order.hpp"
+#include "tetap/base/math.hpp"
+#include "tetap/base/math_double.hpp"
+#include "tetap/base/reinitialise.hpp"
+#include "tetap/filter/symmetric.hpp"
+#include "tetap/slam/elimination_order.hpp"
 
 namespace tetap::slam {
 

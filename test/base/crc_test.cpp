@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Check values over "123456789": CRC-32/ISO-HDLC and AUTOSAR CP SWS_CRCLibrary (CRC-16, CRC-8 H2F).
-#include "base/crc.hpp"
+#include "tetap/base/crc.hpp"
 
 #include <array>
 #include <cstdint>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The functions of base/math_double.hpp against the C library in long double, to 2 ulp each (measure: support/ulp.hpp).
-#include "base/math_double.hpp"
+#include "tetap/base/math_double.hpp"
 
 #include "support/samples.hpp"
 #include "support/ulp.hpp"

@@ -2,9 +2,9 @@
 // Every function of base/math.hpp on every float, and atan2 on 10^9 pairs, against the C library in double (its error:
 // 2^-29 of our ulp). Prints one line per function: how many inputs, the largest error in ulp, where, the limit. Exit
 // status 1 when a limit is exceeded.
-#include "base/math.hpp"
 #include "support/samples.hpp"
 #include "support/ulp.hpp"
+#include "tetap/base/math.hpp"
 
 #include <algorithm>
 #include <atomic>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The functions of base/math.hpp against the C library in double. Samples are dense over all encodings and where a
 // method changes. math_exhaustive does the same for every float. Limits and measure (support/ulp.hpp) are the same.
-#include "base/math.hpp"
+#include "tetap/base/math.hpp"
 
 #include "support/samples.hpp"
 #include "support/ulp.hpp"

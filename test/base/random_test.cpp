@@ -2,7 +2,7 @@
 // Philox by its published answers; the draws by statistics with two-sided bounds: seeds are fixed, and a result too
 // good fails as well. Every bound leaves out 0.1 % in all (0.05 % on either side), so that among some dozens of honest
 // figures none is expected outside.
-#include "base/random.hpp"
+#include "tetap/base/random.hpp"
 
 #include "support/consistency.hpp"
 

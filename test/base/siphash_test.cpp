@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Against the example of the paper (Aumasson and Bernstein 2012, appendix A) and against OpenSSL 3.0.19:
 // openssl mac -macopt hexkey:000102..0f -macopt size:8 SIPHASH, messages of the bytes 0, 1, 2, ...
-#include "base/siphash.hpp"
+#include "tetap/base/siphash.hpp"
 
 #include <array>
 #include <cstddef>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A digest shows a differing bit of an update at once, of the memory within one round, and never forgets it.
-#include "base/state_digest.hpp"
-#include "base/float_bits.hpp"
+#include "tetap/base/state_digest.hpp"
+#include "tetap/base/float_bits.hpp"
 
 #include <gtest/gtest.h>
 #include <array>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Changes that the hash of a state has to notice: one bit, an exchange, a word more. Its value is the same everywhere.
-#include "base/state_hash.hpp"
+#include "tetap/base/state_hash.hpp"
 
 #include <array>
 #include <bit>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Time as data: stamps of few bits become absolute around a reference; spans become seconds and saturate.
-#include "base/time.hpp"
+#include "tetap/base/time.hpp"
 
 #include "support/samples.hpp"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "base/wgs84.hpp"
+#include "tetap/base/wgs84.hpp"
 
 #include <gtest/gtest.h>
 #include <cmath>

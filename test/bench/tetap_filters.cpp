@@ -2,9 +2,9 @@
 // tetap's own steps, compiled with the flags of the product: no gate and no guard as the others have none, and with
 // both.
 #include "bench/contestant.hpp"
-#include "filter/kalman.hpp"
-#include "filter/structured_kalman.hpp"
 #include "support/structured_models.hpp"
+#include "tetap/filter/kalman.hpp"
+#include "tetap/filter/structured_kalman.hpp"
 
 namespace tetap::bench {
 namespace {

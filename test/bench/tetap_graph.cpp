@@ -2,7 +2,7 @@
 // tetap's pose graph in double, without the robust kernel, which Ceres does not have here either.
 #include "bench/contestant.hpp"
 #include "slam/graphs.hpp"
-#include "slam/pose_graph.hpp"
+#include "tetap/slam/pose_graph.hpp"
 
 namespace tetap::bench {
 namespace {

@@ -2,11 +2,11 @@
 // The attitude filters on made-up motion, rest, pushes, magnets, clipped and broken samples; raw bits hashed per step.
 #pragma once
 
-#include "base/selfcheck.hpp"
-#include "filter/attitude.hpp"
-#include "filter/complementary.hpp"
-#include "filter/mahony.hpp"
 #include "filters.hpp"
+#include "tetap/base/selfcheck.hpp"
+#include "tetap/filter/attitude.hpp"
+#include "tetap/filter/complementary.hpp"
+#include "tetap/filter/mahony.hpp"
 
 #include <cstdint>
 

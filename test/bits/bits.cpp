@@ -3,7 +3,6 @@
 // form, then of the whole one. tools/proof/compare_bits compares the lines. An image takes no arguments; whoever has
 // read enough ends the emulator.
 #include "attitude.hpp"
-#include "base/selfcheck.hpp"
 #include "config/husky.hpp"
 #include "config/labyrinth.hpp"
 #include "config/mrclam.hpp"
@@ -12,8 +11,9 @@
 #include "hal/chip/support/boot_line.hpp"
 #include "hal/chip/support/text.hpp"
 #include "inertial.hpp"
-#include "node/node.hpp"
 #include "recorded_world.hpp"
+#include "tetap/base/selfcheck.hpp"
+#include "tetap/node/node.hpp"
 
 #include <array>
 #include <cstddef>
@@ -95,8 +95,8 @@ class Program {
   template <class Estimators>
   void node(const char* robot, const param::Parameters& parameters, std::uint32_t steps) {
     auto& node = fresh<node::Node<Estimators>>(parameters, bus::Version{});
-    line("boot_", robot, node::BootSelfCheck(node, parameters.can_base, 1).run(hal::kBootEpochs));
-    line("node_", robot, node::BootSelfCheck(node, parameters.can_base, 2).run(steps));
+    line("boot_", robot, firmware::BootSelfCheck(node, parameters.can_base, 1).run(hal::kBootEpochs));
+    line("node_", robot, firmware::BootSelfCheck(node, parameters.can_base, 2).run(steps));
   }
   /// One after the other in the same memory: a core that has little holds all of them.
   template <class T, class... Arguments>

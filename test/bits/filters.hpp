@@ -3,17 +3,17 @@
 // every step.
 #pragma once
 
-#include "base/selfcheck.hpp"
 #include "config/rover.hpp"
-#include "estimators/planar/dead_reckoning.hpp"
-#include "filter/kalman.hpp"
-#include "model/bearing.hpp"
-#include "model/constant_velocity.hpp"
-#include "model/gnss_position.hpp"
-#include "model/range.hpp"
-#include "model/range_bearing.hpp"
-#include "nav/geodesy.hpp"
-#include "node/boot_self_check.hpp"
+#include "tetap/base/selfcheck.hpp"
+#include "tetap/estimators/planar/dead_reckoning.hpp"
+#include "tetap/filter/kalman.hpp"
+#include "tetap/firmware/boot_self_check.hpp"
+#include "tetap/model/bearing.hpp"
+#include "tetap/model/constant_velocity.hpp"
+#include "tetap/model/gnss_position.hpp"
+#include "tetap/model/range.hpp"
+#include "tetap/model/range_bearing.hpp"
+#include "tetap/nav/geodesy.hpp"
 
 #include <array>
 #include <cstdint>
@@ -24,7 +24,7 @@ namespace tetap::bits {
 /// like; in braces they stand in order.
 struct Chance {
   base::Random random;
-  node::Dice dice{2026};
+  firmware::Dice dice{2026};
 
   float normal() { return random.normal(); }
   float spread() { return 2.0F * random.uniform() - 1.0F; }

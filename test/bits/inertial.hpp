@@ -3,21 +3,21 @@
 // and the estimator with samples that come late; raw bits are hashed at every step.
 #pragma once
 
-#include "base/selfcheck.hpp"
 #include "config/rover.hpp"
 #include "filters.hpp"
-#include "model/dual_heading.hpp"
-#include "model/gnss_course.hpp"
-#include "model/gnss_fix_3d.hpp"
-#include "model/gnss_velocity_3d.hpp"
-#include "model/height.hpp"
-#include "model/magnetic_heading.hpp"
-#include "model/wheel_speed.hpp"
-#include "model/zero_rate.hpp"
-#include "model/zero_velocity.hpp"
-#include "nav/imu_gather.hpp"
-#include "nav/ins.hpp"
-#include "node/fusion_window.hpp"
+#include "tetap/base/selfcheck.hpp"
+#include "tetap/model/dual_heading.hpp"
+#include "tetap/model/gnss_course.hpp"
+#include "tetap/model/gnss_fix_3d.hpp"
+#include "tetap/model/gnss_velocity_3d.hpp"
+#include "tetap/model/height.hpp"
+#include "tetap/model/magnetic_heading.hpp"
+#include "tetap/model/wheel_speed.hpp"
+#include "tetap/model/zero_rate.hpp"
+#include "tetap/model/zero_velocity.hpp"
+#include "tetap/nav/imu_gather.hpp"
+#include "tetap/nav/ins.hpp"
+#include "tetap/node/fusion_window.hpp"
 
 #include <array>
 #include <cstdint>

@@ -2,7 +2,7 @@
 // A recorded input as an array: frames, and after how many of them the node ticks.
 #pragma once
 
-#include "base/can_frame.hpp"
+#include "tetap/base/can_frame.hpp"
 
 #include <cstdint>
 

@@ -11,6 +11,6 @@ flock 9
 if [ -e "$header" ] && [ -z "$(find "$root"/{sim_host/world,src/base,src/bus,src/sensor,config,test/bits}/ "$root"/sim_host/*.hpp -newer "$header" -name '*.?pp' -print -quit)" ]; then
   exit 0
 fi
-g++ -std=c++20 -O1 -ffp-contract=off -I "$generated" -I "$root/src" -I "$root" -o "$header.program" "$root/test/bits/record_world.cpp" "$root"/sim_host/world/*.cpp -lGeographicLib
+g++ -std=c++20 -O1 -ffp-contract=off -I "$generated" -I "$root/include" -I "$root" -o "$header.program" "$root/test/bits/record_world.cpp" "$root"/sim_host/world/*.cpp -lGeographicLib
 "$header.program" >"$header.new"
 mv "$header.new" "$header"

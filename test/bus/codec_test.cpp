@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Laws that hold for every message of the DBC, then ids, pages and a few frames by hand.
-#include "bus/codec.hpp"
-#include "bus/messages.hpp"
+#include "tetap/bus/codec.hpp"
+#include "tetap/bus/messages.hpp"
 
 #include <array>
 #include <bit>

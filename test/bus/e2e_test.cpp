@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Faults that the protection must notice: every damaged bit, a payload under another id, a frame sent twice or lost.
-#include "bus/e2e.hpp"
-#include "bus/messages.hpp"
+#include "tetap/bus/e2e.hpp"
+#include "tetap/bus/messages.hpp"
 
 #include <array>
 #include <cstdint>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Whatever is encoded is decoded as the same sample: values, stamp, sequence and instance.
-#include "bus/encoder.hpp"
+#include "tetap/bus/encoder.hpp"
 #include "node/bench.hpp"
 
 #include <gtest/gtest.h>

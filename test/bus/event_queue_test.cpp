@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A record of a measurement carries the statistic of the test that decided, over that test's limit.
-#include "bus/event_queue.hpp"
+#include "tetap/bus/event_queue.hpp"
 
 #include <gtest/gtest.h>
 #include <cmath>

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Covariance of an inertial estimator, put together again from the frames as anybody on the bus would.
-#include "bus/multiplexed.hpp"
+#include "tetap/bus/multiplexed.hpp"
 
-#include "bus/codec.hpp"
+#include "tetap/bus/codec.hpp"
 
 #include <gtest/gtest.h>
 #include <Eigen/Core>

@@ -4,8 +4,8 @@
 //   (time) vcan0 ID#DATA ; START=GIVEN:DECODED ...
 // START is the signal's first bit, GIVEN what was encoded and DECODED what our decoder reads back; integers of scaled
 // signals are steps.
-#include "bus/codec.hpp"
-#include "bus/messages.hpp"
+#include "tetap/bus/codec.hpp"
+#include "tetap/bus/messages.hpp"
 
 #include <cinttypes>
 #include <cstdint>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Bits of one signal against a bit-by-bit reference; values against the range of the signal.
-#include "bus/signal.hpp"
+#include "tetap/bus/signal.hpp"
 
 #include <algorithm>
 #include <bit>

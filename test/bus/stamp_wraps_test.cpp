@@ -2,7 +2,7 @@
 // No delay is taken for another one. A sample that was held for longer than half a wrap of its stamp is placed at its
 // true time. Otherwise it is at least not placed where it would be fused. A model of a gateway holds it; the true stamp
 // is the model's.
-#include "bus/stamp_wraps.hpp"
+#include "tetap/bus/stamp_wraps.hpp"
 
 #include <gtest/gtest.h>
 

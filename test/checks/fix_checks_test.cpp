@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // The checks of fixes by themselves: agreement of fixes, repetition, and the first fixes. The worth of a fix that
 // repeats the error of the one before is tested, too.
-#include "checks/coloured_noise.hpp"
-#include "checks/frozen_position.hpp"
-#include "checks/offset_hypothesis.hpp"
-#include "checks/position_drift.hpp"
-#include "checks/startup_fix_check.hpp"
+#include "tetap/checks/coloured_noise.hpp"
+#include "tetap/checks/frozen_position.hpp"
+#include "tetap/checks/offset_hypothesis.hpp"
+#include "tetap/checks/position_drift.hpp"
+#include "tetap/checks/startup_fix_check.hpp"
 
 #include <gtest/gtest.h>
 

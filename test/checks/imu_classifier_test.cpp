@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Laws of the one rule of what an IMU sample is good for: whole, in time, and the same for whoever asks.
-#include "checks/imu_classifier.hpp"
+#include "tetap/checks/imu_classifier.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Health of an IMU, sample by sample. Then what the inertial estimator does about it, and when it takes itself to be
 // standing, in a small world of its own. Each sample is fused at its own time.
-#include "checks/imu_health.hpp"
+#include "tetap/checks/imu_health.hpp"
 
-#include "estimators/inertial/inertial.hpp"
+#include "tetap/estimators/inertial/inertial.hpp"
 
 #include <gtest/gtest.h>
 

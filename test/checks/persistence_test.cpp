@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Laws of time in checks, against a list of all tests so far (no counters): recent, older, and what persists.
-#include "checks/persistence.hpp"
+#include "tetap/checks/persistence.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The heading's sigma has to cover the turn by which gyroscope and wheels differ, whichever of them is wrong. It has to
 // stay as it is while they differ by no more than their noise. Truth is the difference that the test puts in.
-#include "checks/turn_residual.hpp"
+#include "tetap/checks/turn_residual.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Wheels that spin, one or both, and wheels that do not: what is taken for slip, when, and how it ends.
-#include "checks/wheel_slip.hpp"
+#include "tetap/checks/wheel_slip.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Wheels that turn the body otherwise than its gyroscope are refuted within ten seconds of driving a curve. Wheels that
 // skid, slip or drift are not. Truth is the drive's own speed and turn.
-#include "checks/wheel_turn.hpp"
+#include "tetap/checks/wheel_turn.hpp"
 
 #include <gtest/gtest.h>
 

@@ -5,8 +5,8 @@
 // are normal, white and independent, with the sigmas below; the same on every machine, from a seed.
 #pragma once
 
-#include "base/math.hpp"
-#include "base/random.hpp"
+#include "tetap/base/math.hpp"
+#include "tetap/base/random.hpp"
 
 #include <array>
 #include <cstdint>

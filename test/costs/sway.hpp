@@ -3,8 +3,8 @@
 // 100 Hz. It has a gyroscope with a bias, accelerometer and magnetometer with noise.
 #pragma once
 
-#include "base/random.hpp"
-#include "filter/quaternion.hpp"
+#include "tetap/base/random.hpp"
+#include "tetap/filter/quaternion.hpp"
 
 namespace tetap::costs {
 

@@ -1,20 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
 // The workloads whose instructions tools/proof/count_instructions counts and tools/budgets.json bounds. Inputs are
 // arrays made beforehand; what is between the markers are calls of headers that the firmware is made of.
-#include "base/random.hpp"
 #include "board.hpp"
 #include "config/rover.hpp"
-#include "filter/kalman.hpp"
-#include "filter/structured_kalman.hpp"
 #include "markers.hpp"
-#include "model/constant_velocity.hpp"
-#include "model/gnss_fix_3d.hpp"
-#include "model/gnss_velocity_3d.hpp"
-#include "model/range_bearing.hpp"
-#include "model/wheel_speed.hpp"
-#include "nav/ins.hpp"
-#include "node/node.hpp"
 #include "recorded_world.hpp"
+#include "tetap/base/random.hpp"
+#include "tetap/filter/kalman.hpp"
+#include "tetap/filter/structured_kalman.hpp"
+#include "tetap/model/constant_velocity.hpp"
+#include "tetap/model/gnss_fix_3d.hpp"
+#include "tetap/model/gnss_velocity_3d.hpp"
+#include "tetap/model/range_bearing.hpp"
+#include "tetap/model/wheel_speed.hpp"
+#include "tetap/nav/ins.hpp"
+#include "tetap/node/node.hpp"
 
 #include <array>
 

@@ -2,10 +2,10 @@
 // The attitude filters' workloads. A body tumbles at 100 Hz, so nothing is at rest and every branch of the steady
 // filter is taken. A filter's start is over before the counting begins.
 #include "board.hpp"
-#include "filter/attitude.hpp"
-#include "filter/complementary.hpp"
-#include "filter/mahony.hpp"
 #include "markers.hpp"
+#include "tetap/filter/attitude.hpp"
+#include "tetap/filter/complementary.hpp"
+#include "tetap/filter/mahony.hpp"
 
 namespace {
 

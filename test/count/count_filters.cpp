@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // Instructions of filters on two small textbook workloads, with inputs made beforehand. W1 is constant velocity in the
 // plane with a position. W2 and W3 are a unicycle of one Euler step with range and bearing to a landmark at (60, 20).
-#include "base/random.hpp"
 #include "board.hpp"
-#include "filter/kalman.hpp"
-#include "filter/structured_kalman.hpp"
-#include "filter/ukf.hpp"
-#include "filter/ukf_sqrt.hpp"
 #include "markers.hpp"
 #include "support/structured_models.hpp"
+#include "tetap/base/random.hpp"
+#include "tetap/filter/kalman.hpp"
+#include "tetap/filter/structured_kalman.hpp"
+#include "tetap/filter/ukf.hpp"
+#include "tetap/filter/ukf_sqrt.hpp"
 
 #include <array>
 

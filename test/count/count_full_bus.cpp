@@ -5,8 +5,8 @@
 #include "board.hpp"
 #include "config/rover.hpp"
 #include "markers.hpp"
-#include "node/node.hpp"
 #include "recorded_world.hpp"
+#include "tetap/node/node.hpp"
 
 #include <algorithm>
 #include <array>

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // The pose grid's workload: 24 576 cells, the robot of config/mrclam_grid.hpp on a circle of 3 m among four landmarks,
 // which are seen again as soon as a step of the grid is done. A tick does 100 lines of a step; there is no start pose.
-#include "base/random.hpp"
 #include "board.hpp"
 #include "config/mrclam_grid.hpp"
 #include "markers.hpp"
+#include "tetap/base/random.hpp"
 
 namespace {
 

@@ -4,7 +4,7 @@
 #include "config/mrclam.hpp"
 #include "hal/board/mps2/board.hpp"
 #include "markers.hpp"
-#include "node/node.hpp"
+#include "tetap/node/node.hpp"
 
 int main() {
   using namespace tetap;

@@ -7,7 +7,7 @@
 #include "config/rover_landmarks.hpp"
 #include "hal/board/mps2/board.hpp"
 #include "markers.hpp"
-#include "node/node.hpp"
+#include "tetap/node/node.hpp"
 
 #include <charconv>
 #include <cstring>

@@ -2,9 +2,9 @@
 // The particle filter's workload: 1000 particles, speed and yaw rate with noise, range and bearing to four landmarks,
 // systematic resampling every step, weighted mean.
 #include "board.hpp"
-#include "filter/particle.hpp"
-#include "filter/particle_pose.hpp"
 #include "markers.hpp"
+#include "tetap/filter/particle.hpp"
+#include "tetap/filter/particle_pose.hpp"
 
 #include <array>
 

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // EKF-SLAM's workload: 30 landmarks, a circle of 10 m at 1 m/s, in each step a prediction and range and bearing to five
 // landmarks whose identities are known.
-#include "base/random.hpp"
 #include "board.hpp"
 #include "markers.hpp"
-#include "slam/ekf_slam.hpp"
+#include "tetap/base/random.hpp"
+#include "tetap/slam/ekf_slam.hpp"
 
 #include <array>
 

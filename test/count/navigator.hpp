@@ -2,9 +2,9 @@
 // Inertial navigation between the inbox and the publisher, as a node has it: what ins_tick counts.
 #pragma once
 
-#include "bus/decoder.hpp"
-#include "estimators/inertial/inertial.hpp"
-#include "node/fusion_window.hpp"
+#include "tetap/bus/decoder.hpp"
+#include "tetap/estimators/inertial/inertial.hpp"
+#include "tetap/node/fusion_window.hpp"
 
 #include <array>
 #include <cstddef>

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // The attitude filter in the firmware: its present, what sensors do to it on their way, and how two attitudes are
 // compared. The filter itself is judged in test/filter/attitude_test.cpp.
-#include "estimators/attitude.hpp"
+#include "tetap/estimators/attitude.hpp"
 
-#include "estimators/attitude_disagreement.hpp"
-#include "node/estimator_slot.hpp"
+#include "tetap/estimators/attitude_disagreement.hpp"
+#include "tetap/node/estimator_slot.hpp"
 
 #include <gtest/gtest.h>
 #include <Eigen/LU>

@@ -2,11 +2,11 @@
 // A robot that drives a circle among four landmarks, and an estimator behind its sensors.
 #pragma once
 
-#include "base/bit_crc.hpp"
 #include "config/mrclam.hpp"
-#include "estimators/context.hpp"
-#include "estimators/estimate.hpp"
-#include "sensor/window.hpp"
+#include "tetap/base/bit_crc.hpp"
+#include "tetap/estimators/context.hpp"
+#include "tetap/estimators/estimate.hpp"
+#include "tetap/sensor/window.hpp"
 
 #include <cmath>
 #include <random>

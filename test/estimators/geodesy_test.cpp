@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "nav/geodesy.hpp"
+#include "tetap/nav/geodesy.hpp"
 
 #include "support/samples.hpp"
 

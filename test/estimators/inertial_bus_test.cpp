@@ -2,9 +2,9 @@
 // Frames of the default robot's node about its inertial filter: modes, faults, jumps and how far the two attitudes are
 // apart. Samples in, frames out.
 #include "config/rover.hpp"
-#include "estimators/attitude.hpp"
-#include "estimators/inertial/inertial.hpp"
 #include "node/bench.hpp"
+#include "tetap/estimators/attitude.hpp"
+#include "tetap/estimators/inertial/inertial.hpp"
 
 #include <gtest/gtest.h>
 

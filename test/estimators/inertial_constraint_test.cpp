@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Inertial navigation without wheel speeds: that there are wheels is all that is known (the non-holonomic constraint).
 // A robot drives level curves; its accelerometer errs sideways.
-#include "estimators/inertial/inertial.hpp"
+#include "tetap/estimators/inertial/inertial.hpp"
 
 #include <gtest/gtest.h>
 

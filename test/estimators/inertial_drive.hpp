@@ -3,7 +3,7 @@
 // state, its wheels are exact, its receiver errs as stated. Errors are judged against the estimator's own uncertainty.
 #pragma once
 
-#include "estimators/inertial/inertial.hpp"
+#include "tetap/estimators/inertial/inertial.hpp"
 
 #include <gtest/gtest.h>
 

@@ -2,7 +2,7 @@
 // Magnetometer and barometer in the inertial estimator: what they find at the start, and how far they are believed. A
 // disturbance has limits and an end. The world is a small one of its own. Its robot stands or drives curves, with exact
 // sensors but for what a test adds, each sample fused at its own time.
-#include "estimators/inertial/inertial.hpp"
+#include "tetap/estimators/inertial/inertial.hpp"
 
 #include <gtest/gtest.h>
 

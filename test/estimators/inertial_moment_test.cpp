@@ -2,7 +2,7 @@
 // Every measurement is true at its own microsecond: between two IMU samples, too. The body moves on a plane, speeds up
 // and turns. Its sensors are exact but for what keeps an IMU from looking stuck. Each measurement comes 9 ms after an
 // IMU sample.
-#include "estimators/inertial/inertial.hpp"
+#include "tetap/estimators/inertial/inertial.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Sensors that a robot may have and the rover has not: antennas that do not point ahead, and a gyroscope that feels the
 // Earth turn. Sensors that show the same for ever are tested, too.
-#include "estimators/inertial/inertial.hpp"
+#include "tetap/estimators/inertial/inertial.hpp"
 
 #include <gtest/gtest.h>
 

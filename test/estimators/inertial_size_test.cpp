@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Memory that the inertial estimator takes of a robot. The delay ring holds the samples of the window and the cells
 // that carry them to the present. The rest is the filter with all its rules.
-#include "estimators/inertial/inertial.hpp"
+#include "tetap/estimators/inertial/inertial.hpp"
 
 #include <gtest/gtest.h>
 #include <cstdio>

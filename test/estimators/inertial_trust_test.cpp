@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Trust. A device that lies is held by the others. A filter that is wrong gives way to devices that agree. A receiver
 // alone wins after the stated time. Directions, sizes and times are drawn, so that no one of them is the rule's.
-#include "estimators/inertial/vote.hpp"
 #include "inertial_drive.hpp"
+#include "tetap/estimators/inertial/vote.hpp"
 
 namespace tetap::estimators {
 namespace {

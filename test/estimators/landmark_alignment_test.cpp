@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Landmarks with known ids find the pose of a robot that has none, or has lost it. Two of them make a candidate, a
 // later look makes it valid. Truth is the simulated drive's own; a misread barcode must not place the robot.
-#include "estimators/planar/pose_ekf.hpp"
-#include "estimators/planar/pose_ukf.hpp"
 #include "estimators/short_sighted_robot.hpp"
+#include "tetap/estimators/planar/pose_ekf.hpp"
+#include "tetap/estimators/planar/pose_ukf.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // The present carried over the window, and how the work at its far end is shared out among ticks.
-#include "estimators/inertial/output_predictor.hpp"
+#include "tetap/estimators/inertial/output_predictor.hpp"
 
-#include "estimators/inertial/inertial.hpp"
-#include "node/fusion_window.hpp"
+#include "tetap/estimators/inertial/inertial.hpp"
+#include "tetap/node/fusion_window.hpp"
 
 #include <gtest/gtest.h>
 #include <algorithm>

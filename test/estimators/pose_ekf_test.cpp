@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The planar filter's refusals name their test, and its recovery adds variance to the pose alone.
-#include "estimators/planar/pose_ekf.hpp"
+#include "tetap/estimators/planar/pose_ekf.hpp"
 #include "config/mrclam.hpp"
 #include "config/rover_landmarks.hpp"
 

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Laws of localisation by a grid of poses as an estimator. It finds itself and reports when it is lost. Its work may be
 // cut anywhere.
-#include "estimators/planar/pose_grid.hpp"
+#include "tetap/estimators/planar/pose_grid.hpp"
 #include "estimators/circling_robot.hpp"
-#include "node/estimator_slot.hpp"
 #include "support/never_nan.hpp"
+#include "tetap/node/estimator_slot.hpp"
 
 #include <gtest/gtest.h>
 #include <Eigen/Dense>

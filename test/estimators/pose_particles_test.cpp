@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Laws of localisation by particles as an estimator. It tracks, finds itself again, and reports when it is lost.
 // Neither ticks nor the place on the map change what it does.
-#include "estimators/planar/pose_particles.hpp"
+#include "tetap/estimators/planar/pose_particles.hpp"
 #include "estimators/circling_robot.hpp"
-#include "node/estimator_slot.hpp"
 #include "support/never_nan.hpp"
+#include "tetap/node/estimator_slot.hpp"
 
 #include <gtest/gtest.h>
 #include <Eigen/Dense>

@@ -2,10 +2,10 @@
 // Laws of the planar filters, whatever their kind. Ticks do not change the state, and a pose from outside is taken as
 // it is. No sensor makes them lose their numbers, and GNSS finds the heading of each. With small noise the unscented
 // filters are the extended one.
-#include "estimators/planar/pose_ukf.hpp"
+#include "tetap/estimators/planar/pose_ukf.hpp"
 #include "estimators/circling_robot.hpp"
-#include "estimators/planar/pose_ekf.hpp"
 #include "support/never_nan.hpp"
+#include "tetap/estimators/planar/pose_ekf.hpp"
 
 #include <gtest/gtest.h>
 

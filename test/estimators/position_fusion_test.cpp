@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Static fusion of receivers as an estimator: the published formulas, a receiver that fails, one that contradicts, and
 // fixes that come late.
-#include "estimators/planar/position_fusion.hpp"
+#include "tetap/estimators/planar/position_fusion.hpp"
 #include "config/fusion2.hpp"
-#include "node/estimator_slot.hpp"
 #include "support/never_nan.hpp"
+#include "tetap/node/estimator_slot.hpp"
 
 #include <gtest/gtest.h>
 #include <cmath>

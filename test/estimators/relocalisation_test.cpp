@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // A robot that is carried off while it tracks: landmarks that agree about another pose place it there, with a word. A
 // camera or an identity that is wrong must not. Truth is the simulated drive's own.
-#include "estimators/planar/pose_ekf.hpp"
-#include "estimators/planar/pose_ukf.hpp"
 #include "estimators/short_sighted_robot.hpp"
+#include "tetap/estimators/planar/pose_ekf.hpp"
+#include "tetap/estimators/planar/pose_ukf.hpp"
 
 #include <gtest/gtest.h>
 

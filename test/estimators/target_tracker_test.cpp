@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // Laws of the trackers. They follow a target within their uncertainty, and begin anew when it is another one. Ticks
 // change no bit, and no measurement leaves them without numbers.
-#include "estimators/target/target_tracker.hpp"
-#include "base/bit_crc.hpp"
+#include "tetap/estimators/target/target_tracker.hpp"
 #include "config/tracker.hpp"
 #include "config/tracker_ukf.hpp"
 #include "support/never_nan.hpp"
+#include "tetap/base/bit_crc.hpp"
 
 #include <gtest/gtest.h>
 #include <cmath>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "base/anchored.hpp"
+#include "tetap/base/anchored.hpp"
 
 #include <gtest/gtest.h>
 #include <random>

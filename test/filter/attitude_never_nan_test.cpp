@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // The attitude filters stay finite with every gyroscope, accelerometer and magnetometer sample, report what they
 // refuse, and find the attitude again. No part keeps a value that is not a number.
-#include "filter/attitude.hpp"
-#include "filter/complementary.hpp"
-#include "filter/mahony.hpp"
 #include "support/never_nan.hpp"
+#include "tetap/filter/attitude.hpp"
+#include "tetap/filter/complementary.hpp"
+#include "tetap/filter/mahony.hpp"
 
 #include <gtest/gtest.h>
 #include <cmath>

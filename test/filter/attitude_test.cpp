@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Attitude: laws that hold for any motion first (equivariance, scaling, independence), then what a disturbed sensor may
 // do and how it ends. Truth is a double quaternion; sensors are ideal but for what a test adds.
-#include "filter/attitude.hpp"
+#include "tetap/filter/attitude.hpp"
 
-#include "filter/mahony.hpp"
+#include "tetap/filter/mahony.hpp"
 
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // Radii and track learnt on line: a radius that is 1 % off is found with GNSS in 200 m, and what no measurement shows
 // keeps its variance. The truth is integrated in double from the true wheels.
-#include "model/calibrated_drive.hpp"
-#include "filter/ekf.hpp"
-#include "model/gnss_position.hpp"
+#include "tetap/model/calibrated_drive.hpp"
 #include "support/consistency.hpp"
 #include "support/numeric_jacobian.hpp"
+#include "tetap/filter/ekf.hpp"
+#include "tetap/model/gnss_position.hpp"
 
 #include <gtest/gtest.h>
 #include <Eigen/Cholesky>

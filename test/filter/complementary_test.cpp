@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The one-axis complementary filter: the two halves are one whole, whatever the signal and the intervals.
-#include "filter/complementary.hpp"
+#include "tetap/filter/complementary.hpp"
 
 #include <gtest/gtest.h>
 

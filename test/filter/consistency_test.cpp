@@ -2,10 +2,10 @@
 // In a world that is exactly what the filter models, NEES and NIS must lie in their two-sided 95 % intervals: too good
 // is a failure too.
 #include "support/consistency.hpp"
-#include "filter/ekf.hpp"
-#include "model/constant_velocity.hpp"
-#include "model/range_bearing.hpp"
-#include "model/unicycle.hpp"
+#include "tetap/filter/ekf.hpp"
+#include "tetap/model/constant_velocity.hpp"
+#include "tetap/model/range_bearing.hpp"
+#include "tetap/model/unicycle.hpp"
 
 #include <gtest/gtest.h>
 #include <Eigen/Dense>

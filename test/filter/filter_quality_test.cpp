@@ -3,19 +3,19 @@
 // wrong by three it is not. Laws that estimators have by name stand below.
 #include "support/quality.hpp"
 
-#include "filter/iterated_ekf.hpp"
-#include "filter/joseph.hpp"
-#include "filter/kalman.hpp"
-#include "filter/sequential.hpp"
-#include "filter/square_root.hpp"
-#include "filter/structured_kalman.hpp"
-#include "filter/ud.hpp"
-#include "filter/ukf.hpp"
-#include "filter/ukf_sqrt.hpp"
-#include "model/constant_velocity.hpp"
-#include "model/planar_increment.hpp"
-#include "model/range_bearing.hpp"
-#include "model/target_bearing.hpp"
+#include "tetap/filter/iterated_ekf.hpp"
+#include "tetap/filter/joseph.hpp"
+#include "tetap/filter/kalman.hpp"
+#include "tetap/filter/sequential.hpp"
+#include "tetap/filter/square_root.hpp"
+#include "tetap/filter/structured_kalman.hpp"
+#include "tetap/filter/ud.hpp"
+#include "tetap/filter/ukf.hpp"
+#include "tetap/filter/ukf_sqrt.hpp"
+#include "tetap/model/constant_velocity.hpp"
+#include "tetap/model/planar_increment.hpp"
+#include "tetap/model/range_bearing.hpp"
+#include "tetap/model/target_bearing.hpp"
 
 #include <gtest/gtest.h>
 #include <Eigen/Dense>

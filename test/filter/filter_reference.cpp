@@ -2,19 +2,19 @@
 // Runs one filter over the inputs on stdin and prints its state and covariance after each step, for reference_test.py.
 // Usage: filter_reference SCENARIO FILTER SCALAR. A line of input is a step, numbers as the scenario's `step` takes
 // them.
-#include "filter/iterated_ekf.hpp"
-#include "filter/joseph.hpp"
-#include "filter/kalman.hpp"
-#include "filter/sequential.hpp"
-#include "filter/square_root.hpp"
-#include "filter/structured_kalman.hpp"
-#include "filter/ud.hpp"
-#include "filter/ukf.hpp"
-#include "filter/ukf_sqrt.hpp"
-#include "model/constant_velocity.hpp"
-#include "model/radar.hpp"
-#include "model/target_position.hpp"
 #include "support/euler_pose.hpp"
+#include "tetap/filter/iterated_ekf.hpp"
+#include "tetap/filter/joseph.hpp"
+#include "tetap/filter/kalman.hpp"
+#include "tetap/filter/sequential.hpp"
+#include "tetap/filter/square_root.hpp"
+#include "tetap/filter/structured_kalman.hpp"
+#include "tetap/filter/ud.hpp"
+#include "tetap/filter/ukf.hpp"
+#include "tetap/filter/ukf_sqrt.hpp"
+#include "tetap/model/constant_velocity.hpp"
+#include "tetap/model/radar.hpp"
+#include "tetap/model/target_position.hpp"
 
 #include <array>
 #include <cstdio>

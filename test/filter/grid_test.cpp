@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Laws of the Bayes filter on a grid, and the MRCLAM robots found on a grid of poses.
-#include "filter/grid.hpp"
+#include "tetap/filter/grid.hpp"
 #include "support/mrclam.hpp"
 
 #include <gtest/gtest.h>

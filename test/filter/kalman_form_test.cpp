@@ -1,19 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 // Laws of every form of the Kalman filter, each named in a list. The judges are the worked example and a dense
 // reference over matrices that change at every step. A refusal leaves state and covariance alone.
-#include "filter/iterated_ekf.hpp"
-#include "filter/joseph.hpp"
-#include "filter/kalman.hpp"
-#include "filter/linear_models.hpp"
-#include "filter/sequential.hpp"
-#include "filter/square_root.hpp"
-#include "filter/structured_kalman.hpp"
-#include "filter/ud.hpp"
-#include "filter/ukf.hpp"
-#include "filter/ukf_sqrt.hpp"
-#include "model/target_range.hpp"
 #include "support/filter_covariance.hpp"
 #include "support/least_eigenvalue.hpp"
+#include "tetap/filter/iterated_ekf.hpp"
+#include "tetap/filter/joseph.hpp"
+#include "tetap/filter/kalman.hpp"
+#include "tetap/filter/linear_models.hpp"
+#include "tetap/filter/sequential.hpp"
+#include "tetap/filter/square_root.hpp"
+#include "tetap/filter/structured_kalman.hpp"
+#include "tetap/filter/ud.hpp"
+#include "tetap/filter/ukf.hpp"
+#include "tetap/filter/ukf_sqrt.hpp"
+#include "tetap/model/target_range.hpp"
 
 #include <gtest/gtest.h>
 #include <Eigen/Dense>

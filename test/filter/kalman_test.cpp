@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "filter/kalman.hpp"
+#include "tetap/filter/kalman.hpp"
 
-#include "model/constant_velocity.hpp"
+#include "tetap/model/constant_velocity.hpp"
 
 #include <gtest/gtest.h>
 

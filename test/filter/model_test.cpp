@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 // Laws of every model, each named in a list with a few examples. Its Jacobian, its noise and "a perfect measurement
 // changes nothing" are tested.
-#include "filter/ekf.hpp"
-#include "model/bearing.hpp"
-#include "model/constant_velocity.hpp"
-#include "model/differential_drive.hpp"
-#include "model/gnss_position.hpp"
-#include "model/range.hpp"
-#include "model/range_bearing.hpp"
-#include "model/unicycle.hpp"
 #include "support/numeric_jacobian.hpp"
+#include "tetap/filter/ekf.hpp"
+#include "tetap/model/bearing.hpp"
+#include "tetap/model/constant_velocity.hpp"
+#include "tetap/model/differential_drive.hpp"
+#include "tetap/model/gnss_position.hpp"
+#include "tetap/model/range.hpp"
+#include "tetap/model/range_bearing.hpp"
+#include "tetap/model/unicycle.hpp"
 
 #include <gtest/gtest.h>
 #include <cmath>

@@ -2,14 +2,14 @@
 // Whatever a sensor says, the Kalman filters stay finite, their covariance stays positive definite (judge: eigenvalues
 // in double), and the refusal is told.
 #include "support/never_nan.hpp"
-#include "estimators/planar/planar_ekf.hpp"
-#include "filter/kalman.hpp"
-#include "model/bearing.hpp"
-#include "model/constant_velocity.hpp"
-#include "model/gnss_position.hpp"
-#include "model/range.hpp"
-#include "model/range_bearing.hpp"
-#include "model/unicycle.hpp"
+#include "tetap/estimators/planar/planar_ekf.hpp"
+#include "tetap/filter/kalman.hpp"
+#include "tetap/model/bearing.hpp"
+#include "tetap/model/constant_velocity.hpp"
+#include "tetap/model/gnss_position.hpp"
+#include "tetap/model/range.hpp"
+#include "tetap/model/range_bearing.hpp"
+#include "tetap/model/unicycle.hpp"
 
 #include <gtest/gtest.h>
 #include <cmath>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Predicted odometry errors against simulated wheels.
-#include "model/odometry_error.hpp"
+#include "tetap/model/odometry_error.hpp"
 
 #include <gtest/gtest.h>
 #include <cmath>

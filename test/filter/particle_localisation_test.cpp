@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // Particles as planar poses: motion and likelihood against other formulas, then localisation on recorded sets.
-#include "filter/particle_localisation.hpp"
-#include "filter/ekf.hpp"
-#include "model/planar_increment.hpp"
-#include "model/range_bearing.hpp"
+#include "tetap/filter/particle_localisation.hpp"
 #include "support/mrclam.hpp"
 #include "support/never_nan.hpp"
+#include "tetap/filter/ekf.hpp"
+#include "tetap/model/planar_increment.hpp"
+#include "tetap/model/range_bearing.hpp"
 
 #include <gtest/gtest.h>
 #include <Eigen/Dense>

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Laws of the particle filter: its numbers, its weights, its resampling, and the linear case, in which the Kalman
 // filter is exact.
-#include "filter/particle.hpp"
-#include "filter/particle_number.hpp"
+#include "tetap/filter/particle.hpp"
+#include "tetap/filter/particle_number.hpp"
 
 #include <gtest/gtest.h>
 #include <algorithm>

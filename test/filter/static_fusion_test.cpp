@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Fusion without motion. Each form's claim stands against the covariance that its own weights give the truth. The judge
 // knows the correlation of the errors, the fusion does not.
-#include "filter/static_fusion.hpp"
+#include "tetap/filter/static_fusion.hpp"
 
 #include <gtest/gtest.h>
 #include <Eigen/Dense>

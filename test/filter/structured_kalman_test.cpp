@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // The filter that skips declared zeros and ones, beside Joseph's form in double with dense models (held to SciPy by
 // reference_test.py). Each structure stands beside its dense matrix, with every option.
-#include "filter/structured_kalman.hpp"
+#include "tetap/filter/structured_kalman.hpp"
 
-#include "filter/joseph.hpp"
-#include "filter/kalman.hpp"
-#include "model/constant_velocity.hpp"
 #include "support/structured_models.hpp"
+#include "tetap/filter/joseph.hpp"
+#include "tetap/filter/kalman.hpp"
+#include "tetap/model/constant_velocity.hpp"
 
 #include <gtest/gtest.h>
 #include <cmath>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "filter/symmetric.hpp"
+#include "tetap/filter/symmetric.hpp"
 
 #include "support/least_eigenvalue.hpp"
 

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // Models of a tracked target. Every Jacobian stands against central differences in double, motion against fine
 // integration of its differential equation, noise against the effect of the noise inputs.
-#include "filter/ekf.hpp"
-#include "model/constant_acceleration.hpp"
-#include "model/constant_velocity.hpp"
-#include "model/radar.hpp"
-#include "model/target_bearing.hpp"
-#include "model/target_position.hpp"
-#include "model/target_range.hpp"
 #include "support/numeric_jacobian.hpp"
+#include "tetap/filter/ekf.hpp"
+#include "tetap/model/constant_acceleration.hpp"
+#include "tetap/model/constant_velocity.hpp"
+#include "tetap/model/radar.hpp"
+#include "tetap/model/target_bearing.hpp"
+#include "tetap/model/target_position.hpp"
+#include "tetap/model/target_range.hpp"
 
 #include <gtest/gtest.h>
 #include <cmath>

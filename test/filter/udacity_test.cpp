@@ -2,13 +2,13 @@
 // One target seen by lidar and radar in turn, a set published with truth and with limits. Source: Udacity CarND,
 // projects "Extended Kalman Filter" and "Unscented Kalman Filter". One configuration per filter serves both files;
 // sensor noise is the course's. Without the data in $TETAP_DATA the tests are skipped.
-#include "filter/ekf.hpp"
-#include "filter/square_root.hpp"
-#include "filter/ukf.hpp"
-#include "filter/ukf_sqrt.hpp"
-#include "model/constant_velocity.hpp"
-#include "model/radar.hpp"
-#include "model/target_position.hpp"
+#include "tetap/filter/ekf.hpp"
+#include "tetap/filter/square_root.hpp"
+#include "tetap/filter/ukf.hpp"
+#include "tetap/filter/ukf_sqrt.hpp"
+#include "tetap/model/constant_velocity.hpp"
+#include "tetap/model/radar.hpp"
+#include "tetap/model/target_position.hpp"
 
 #include <gtest/gtest.h>
 #include <array>

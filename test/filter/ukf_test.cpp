@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // Laws of both unscented filters: moments in closed form, angles, augmented noise, the choice of weights. The plain
 // form breaks with a sharp sensor; the square-root form does not.
-#include "filter/ukf.hpp"
-#include "filter/ekf.hpp"
-#include "filter/ukf_sqrt.hpp"
-#include "model/planar_increment.hpp"
-#include "model/range_bearing.hpp"
+#include "tetap/filter/ukf.hpp"
 #include "support/euler_pose.hpp"
 #include "support/filter_covariance.hpp"
 #include "support/never_nan.hpp"
+#include "tetap/filter/ekf.hpp"
+#include "tetap/filter/ukf_sqrt.hpp"
+#include "tetap/model/planar_increment.hpp"
+#include "tetap/model/range_bearing.hpp"
 
 #include <gtest/gtest.h>
 #include <Eigen/Dense>

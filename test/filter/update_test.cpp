@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "filter/update.hpp"
+#include "tetap/filter/update.hpp"
 
 #include <gtest/gtest.h>
 #include <Eigen/Dense>

@@ -3,7 +3,7 @@
 // board. It must not crash or do anything undefined. Every frame sent decodes, and the state stays finite. A node that
 // is powered on again answers as a new one does, whatever it went through before.
 #include "config/rover.hpp"
-#include "node/firmware.hpp"
+#include "tetap/firmware/firmware.hpp"
 
 #include <array>
 #include <cstdint>
@@ -148,7 +148,7 @@ struct MadeUpCan {
     return to_node[next++];
   }
   void flush() {}
-  [[nodiscard]] hal::CanFaults faults() const { return {}; }
+  [[nodiscard]] base::CanFaults faults() const { return {}; }
   [[nodiscard]] bool empty() const { return next == to_node.size(); }
 };
 
@@ -160,7 +160,8 @@ struct MadeUpBoard {
 
 void run_firmware(const std::vector<Record>& records) {
   MadeUpBoard board;
-  const auto firmware = std::make_unique<node::Firmware<MadeUpBoard, Estimators>>(board, parameters, bus::Version{});
+  const auto firmware =
+      std::make_unique<firmware::Firmware<MadeUpBoard, Estimators>>(board, parameters, bus::Version{});
   for (const Record& record : records) {
     if (!record.is_tick()) {
       base::CanFrame frame = record.frame();

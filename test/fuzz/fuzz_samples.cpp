@@ -2,12 +2,12 @@
 // libFuzzer: bytes become samples of every sensor with fields of any value. They come late, early and out of order,
 // between those of a robot that drives on. The node has inertial navigation, the attitude filter and odometry.
 // Plausible samples go in. No estimator may leave the numbers for it, and the node answers the same a second time.
-#include "bus/frame_sink.hpp"
 #include "config/rover.hpp"
-#include "estimators/attitude.hpp"
-#include "estimators/inertial/inertial.hpp"
-#include "estimators/odometry.hpp"
-#include "sensor/plausibility.hpp"
+#include "tetap/bus/frame_sink.hpp"
+#include "tetap/estimators/attitude.hpp"
+#include "tetap/estimators/inertial/inertial.hpp"
+#include "tetap/estimators/odometry.hpp"
+#include "tetap/sensor/plausibility.hpp"
 
 #include <array>
 #include <cstdint>

@@ -3,7 +3,7 @@
 // printed numbers read back as the same bits.
 #include "sim_host/parameter_settings.hpp"
 
-#include "param/crc.hpp"
+#include "tetap/param/crc.hpp"
 
 #include <gtest/gtest.h>
 

@@ -3,10 +3,10 @@
 // inputs instead of an estimate. It loses or doubles frames on demand.
 #pragma once
 
-#include "bus/decoder.hpp"
-#include "bus/publisher.hpp"
 #include "hal/can_bus.hpp"
 #include "sim_host/play/protocol.hpp"
+#include "tetap/bus/decoder.hpp"
+#include "tetap/bus/publisher.hpp"
 
 #include <cstdint>
 #include <functional>

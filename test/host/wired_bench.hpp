@@ -4,12 +4,12 @@
 #pragma once
 
 #include "config/rover.hpp"
-#include "node/bus_protection.hpp"
-#include "node/firmware.hpp"
 #include "sim_host/play/lockstep.hpp"
 #include "sim_host/play/recording.hpp"
 #include "sim_host/play/snapshot_request.hpp"
 #include "support/fakes/board.hpp"
+#include "tetap/firmware/firmware.hpp"
+#include "tetap/node/bus_protection.hpp"
 
 #include "host/stand_in_node.hpp"
 
@@ -54,7 +54,7 @@ class Wire {
     to_board_.pop_front();
     return frame;
   }
-  [[nodiscard]] hal::CanFaults faults() const { return faults_; }
+  [[nodiscard]] base::CanFaults faults() const { return faults_; }
 
   std::vector<sim::TimedFrame> log;
   bool cut = false;
@@ -65,7 +65,7 @@ class Wire {
 
   std::deque<base::CanFrame> own_, others_, to_board_;
   std::int64_t free_us_ = 0;
-  hal::CanFaults faults_;
+  base::CanFaults faults_;
   std::mt19937_64 draw_{5};
 };
 
@@ -74,7 +74,7 @@ struct WireEnd {
   bool send(const base::CanFrame& frame) { return wire->send(frame); }
   std::optional<base::CanFrame> receive() { return wire->receive(); }
   void flush() {}
-  [[nodiscard]] hal::CanFaults faults() const { return wire->faults(); }
+  [[nodiscard]] base::CanFaults faults() const { return wire->faults(); }
 };
 
 struct RoverBoard : fakes::WiredBoard<WireEnd> {
@@ -96,8 +96,8 @@ using ProtectedRover = node::WithBusProtection<robot::rover::Estimators>;
 /// Drives north: at rest for 4 s, then at 1 m/s.
 class WiredRover {
  public:
-  static constexpr node::WiredParts kParts{.imu = true, .encoders = true, .gnss = true};
-  using Firmware = node::Firmware<RoverBoard, ProtectedRover, kParts>;
+  static constexpr firmware::WiredParts kParts{.imu = true, .encoders = true, .gnss = true};
+  using Firmware = firmware::Firmware<RoverBoard, ProtectedRover, kParts>;
 
   WiredRover() {
     board.imu.set_motion([](double t) {
@@ -206,7 +206,7 @@ inline Repetition repeat_at_the_desk(const std::vector<sim::TimedFrame>& log,
   sim::RecordedTicks ticks(frames, r.recording, {});
   hal::MemoryBus bus;
   DeskBoard board{bus.node_end()};
-  using Firmware = node::Firmware<DeskBoard, ProtectedRover>;
+  using Firmware = firmware::Firmware<DeskBoard, ProtectedRover>;
   const auto firmware = std::make_unique<Firmware>(board, parameters, bus::Version{.git = 7});
   sim::MemoryLink link(bus, [&firmware] { firmware->poll(); });
   link.on_resume([&firmware](std::span<const std::byte> state) { return firmware->resume(state); });

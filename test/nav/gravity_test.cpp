@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Judged by the values published for WGS84 (NIMA TR8350.2, 3rd ed., table 3.4).
-#include "nav/gravity.hpp"
+#include "tetap/nav/gravity.hpp"
 
 #include <gtest/gtest.h>
 #include <cmath>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Cost of a wrong scale of the gyroscope to the heading, against its effect: error = scale times the angle turned.
-#include "nav/gyro_scale_consider.hpp"
+#include "tetap/nav/gyro_scale_consider.hpp"
 
 #include <gtest/gtest.h>
 #include <cmath>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "nav/imu_gather.hpp"
+#include "tetap/nav/imu_gather.hpp"
 
-#include "nav/strapdown.hpp"
+#include "tetap/nav/strapdown.hpp"
 #include "true_body.hpp"
 
 #include <gtest/gtest.h>

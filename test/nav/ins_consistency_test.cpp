@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // Consistency of inertial navigation: NEES with two-sided chi-square bounds (Bar-Shalom, Li, Kirubarajan 2001, sec.
 // 5.4). The world is the filter's model. An hour of standstill with centimetres stands beside it.
-#include "model/dual_heading.hpp"
-#include "model/gnss_fix_3d.hpp"
-#include "model/gnss_velocity_3d.hpp"
-#include "model/wheel_speed.hpp"
-#include "model/zero_rate.hpp"
-#include "model/zero_velocity.hpp"
-#include "nav/ins.hpp"
 #include "support/consistency.hpp"
+#include "tetap/model/dual_heading.hpp"
+#include "tetap/model/gnss_fix_3d.hpp"
+#include "tetap/model/gnss_velocity_3d.hpp"
+#include "tetap/model/wheel_speed.hpp"
+#include "tetap/model/zero_rate.hpp"
+#include "tetap/model/zero_velocity.hpp"
+#include "tetap/nav/ins.hpp"
 #include "true_body.hpp"
 
 #include <gtest/gtest.h>

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // The covariance prediction by structure against the dense product in double, F against numeric differences of the
 // strapdown equations, and what keeps P positive definite.
-#include "nav/ins_covariance.hpp"
-#include "nav/ins_covariance_entry.hpp"
+#include "tetap/nav/ins_covariance.hpp"
+#include "tetap/nav/ins_covariance_entry.hpp"
 
-#include "nav/strapdown.hpp"
 #include "support/least_eigenvalue.hpp"
+#include "tetap/nav/strapdown.hpp"
 #include "true_body.hpp"
 
 #include <gtest/gtest.h>

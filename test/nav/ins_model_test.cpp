@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 // Laws of every measurement model of inertial navigation. The Jacobian equals central differences, a perfect
 // measurement moves nothing, and 50 km from the origin both hold.
-#include "model/dual_heading.hpp"
-#include "model/gnss_course.hpp"
-#include "model/gnss_fix_3d.hpp"
-#include "model/gnss_velocity_3d.hpp"
-#include "model/height.hpp"
-#include "model/magnetic_heading.hpp"
-#include "model/wheel_speed.hpp"
-#include "model/zero_rate.hpp"
-#include "model/zero_velocity.hpp"
-#include "nav/ins.hpp"
 #include "support/numeric_jacobian.hpp"
+#include "tetap/model/dual_heading.hpp"
+#include "tetap/model/gnss_course.hpp"
+#include "tetap/model/gnss_fix_3d.hpp"
+#include "tetap/model/gnss_velocity_3d.hpp"
+#include "tetap/model/height.hpp"
+#include "tetap/model/magnetic_heading.hpp"
+#include "tetap/model/wheel_speed.hpp"
+#include "tetap/model/zero_rate.hpp"
+#include "tetap/model/zero_velocity.hpp"
+#include "tetap/nav/ins.hpp"
 #include "true_body.hpp"
 
 #include <gtest/gtest.h>

@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 // The filter as a whole: what it refuses, that it stays finite and positive definite, that the anchor does not matter.
-#include "nav/ins.hpp"
+#include "tetap/nav/ins.hpp"
 
-#include "model/dual_heading.hpp"
-#include "model/gnss_fix_3d.hpp"
-#include "model/gnss_velocity_3d.hpp"
-#include "model/height.hpp"
-#include "model/wheel_speed.hpp"
-#include "model/zero_rate.hpp"
-#include "model/zero_velocity.hpp"
-#include "nav/ins_covariance_entry.hpp"
 #include "support/least_eigenvalue.hpp"
+#include "tetap/model/dual_heading.hpp"
+#include "tetap/model/gnss_fix_3d.hpp"
+#include "tetap/model/gnss_velocity_3d.hpp"
+#include "tetap/model/height.hpp"
+#include "tetap/model/wheel_speed.hpp"
+#include "tetap/model/zero_rate.hpp"
+#include "tetap/model/zero_velocity.hpp"
+#include "tetap/nav/ins_covariance_entry.hpp"
 #include "true_body.hpp"
 
 #include <gtest/gtest.h>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Axes, height and gravity of a place in the map, against GeographicLib.
-#include "nav/geodesy.hpp"
-#include "nav/gravity.hpp"
+#include "tetap/nav/geodesy.hpp"
+#include "tetap/nav/gravity.hpp"
 
 #include <gtest/gtest.h>
 #include <GeographicLib/LocalCartesian.hpp>

@@ -2,16 +2,16 @@
 // Whatever a sensor says, inertial navigation stays finite, its covariance stays positive definite (judge: eigenvalues
 // in double), and the refusal is told.
 #include "support/never_nan.hpp"
-#include "model/dual_heading.hpp"
-#include "model/gnss_course.hpp"
-#include "model/gnss_fix_3d.hpp"
-#include "model/gnss_velocity_3d.hpp"
-#include "model/height.hpp"
-#include "model/magnetic_heading.hpp"
-#include "model/wheel_speed.hpp"
-#include "model/zero_rate.hpp"
-#include "model/zero_velocity.hpp"
-#include "nav/strapdown.hpp"
+#include "tetap/model/dual_heading.hpp"
+#include "tetap/model/gnss_course.hpp"
+#include "tetap/model/gnss_fix_3d.hpp"
+#include "tetap/model/gnss_velocity_3d.hpp"
+#include "tetap/model/height.hpp"
+#include "tetap/model/magnetic_heading.hpp"
+#include "tetap/model/wheel_speed.hpp"
+#include "tetap/model/zero_rate.hpp"
+#include "tetap/model/zero_velocity.hpp"
+#include "tetap/nav/strapdown.hpp"
 #include "true_body.hpp"
 
 #include <gtest/gtest.h>

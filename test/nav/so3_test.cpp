@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "nav/so3.hpp"
+#include "tetap/nav/so3.hpp"
 
 #include "true_body.hpp"
 

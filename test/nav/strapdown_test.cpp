@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Strapdown against motions whose course is known in closed form.
-#include "nav/strapdown.hpp"
+#include "tetap/nav/strapdown.hpp"
 
 #include "true_body.hpp"
 

@@ -2,7 +2,7 @@
 // The judge of inertial navigation: the same physics in double, with Eigen's quaternions, and a body that drives about.
 #pragma once
 
-#include "nav/ins.hpp"
+#include "tetap/nav/ins.hpp"
 
 #include <Eigen/Geometry>
 #include <array>

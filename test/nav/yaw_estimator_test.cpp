@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // The heading finder against the bank of hypotheses that it stands for, and in a world of its own. Drives of a car and
 // a rover in double, an IMU with biases and a wrong level, GNSS velocity or position, wheels.
-#include "nav/yaw_estimator.hpp"
+#include "tetap/nav/yaw_estimator.hpp"
 
-#include "base/random.hpp"
 #include "support/consistency.hpp"
 #include "support/least_eigenvalue.hpp"
+#include "tetap/base/random.hpp"
 #include "true_body.hpp"
 
 #include <gtest/gtest.h>

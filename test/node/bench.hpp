@@ -2,9 +2,9 @@
 // A node on the bench: frames in, frames out, nothing else.
 #pragma once
 
-#include "estimators/odometry.hpp"
-#include "estimators/planar/pose_ekf.hpp"
-#include "node/node.hpp"
+#include "tetap/estimators/odometry.hpp"
+#include "tetap/estimators/planar/pose_ekf.hpp"
+#include "tetap/node/node.hpp"
 
 #include <map>
 #include <optional>

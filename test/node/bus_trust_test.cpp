@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // A bus that is not trusted: sync frames that nobody meant, and commands that were replayed or made up. Samples damaged
 // behind the CAN controller come too. A refused frame is counted and changes no bit of an estimate.
-#include "bus/guard_sender.hpp"
 #include "node/bench.hpp"
-#include "node/firmware.hpp"
-#include "node/snapshot.hpp"
+#include "tetap/bus/guard_sender.hpp"
+#include "tetap/firmware/firmware.hpp"
+#include "tetap/firmware/snapshot.hpp"
 
 #include <gtest/gtest.h>
 
@@ -35,7 +35,7 @@ struct QuietBoard {
       return to_node[next++];
     }
     void flush() {}
-    [[nodiscard]] hal::CanFaults faults() const { return {}; }
+    [[nodiscard]] base::CanFaults faults() const { return {}; }
   } can;
   base::Micros time;
   [[nodiscard]] base::Micros now() const { return time; }
@@ -45,7 +45,7 @@ class LoopOnABus : public ::testing::Test {
  protected:
   void start(param::Lockstep lockstep) {
     parameters.loop.lockstep = lockstep;
-    firmware = std::make_unique<node::Firmware<QuietBoard, Robot>>(board, parameters, bus::Version{});
+    firmware = std::make_unique<firmware::Firmware<QuietBoard, Robot>>(board, parameters, bus::Version{});
   }
   void put(const bus::InSync& sync, bool guarded) {
     if (guarded) board.can.to_node.push_back(in(bus::guard_of_sync(sync)));
@@ -69,7 +69,7 @@ class LoopOnABus : public ::testing::Test {
 
   param::Parameters parameters = kNumbers;
   QuietBoard board;
-  std::unique_ptr<node::Firmware<QuietBoard, Robot>> firmware;
+  std::unique_ptr<firmware::Firmware<QuietBoard, Robot>> firmware;
 };
 
 TEST_F(LoopOnABus, OneFrameWithoutAChecksumStopsNothing) {
@@ -444,7 +444,7 @@ TEST_F(TaggedCommands, GuessesAreLimited) {
 
 /// Bytes of a snapshot's state, as everybody on the bus gets them.
 std::vector<std::byte> published_state(const node::Node<Robot>& node) {
-  node::SnapshotSender<node::Node<Robot>> sender(0x300, {10'000});
+  firmware::SnapshotSender<node::Node<Robot>> sender(0x300, {10'000});
   sender.freeze(node, {}, 0);
   std::vector<std::byte> bytes;
   for (int epoch = 0; epoch < 1'000; ++epoch)
@@ -452,14 +452,14 @@ std::vector<std::byte> published_state(const node::Node<Robot>& node) {
       for (std::size_t i = 2; i < 8; ++i) bytes.push_back(std::byte{frame.data[i]});
       return true;
     });
-  bytes.erase(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(sizeof(node::SnapshotHeader)));
+  bytes.erase(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(sizeof(firmware::SnapshotHeader)));
   bytes.resize(sizeof(node::Node<Robot>));
   return bytes;
 }
 
 TEST_F(TaggedCommands, GoOnBehindASnapshot) {
   const std::vector<std::byte> state = published_state(bench.node());
-  const auto sender = std::make_unique<node::SnapshotSender<node::Node<Robot>>>(0x300, base::Micros{10'000});
+  const auto sender = std::make_unique<firmware::SnapshotSender<node::Node<Robot>>>(0x300, base::Micros{10'000});
   ProtectedBench desk(parameters);
   const auto* const loaded = sender->load(state);
   ASSERT_NE(loaded, nullptr);
@@ -544,7 +544,7 @@ TEST(TaggedBegin, IsObeyedWhereNothingElseIs) {
     p.loop.lockstep = param::Lockstep::kAuthenticated;
     return p;
   }();
-  node::Firmware<QuietBoard, Robot> firmware(board, parameters, bus::Version{});
+  firmware::Firmware<QuietBoard, Robot> firmware(board, parameters, bus::Version{});
   const auto run = [&](std::int64_t us, bool wheels) {
     const auto before = all<bus::EstEpoch>(board.can.sent).size();
     for (const base::Micros until = board.time + base::Micros{us}; board.time < until;

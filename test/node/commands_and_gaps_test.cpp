@@ -2,7 +2,7 @@
 // Lateness, commands and silence together: the cases in which a node once gave wrong answers.
 
 #include "node/bench.hpp"
-#include "node/pacer.hpp"
+#include "tetap/firmware/pacer.hpp"
 
 #include <gtest/gtest.h>
 
@@ -210,7 +210,7 @@ TEST(Gaps, WhatIsIgnoredIsNotCalledUsed) {
 
 TEST(PacerLateness, IsCountedWhileFollowingAndNotForTheBusesSilence) {
   bus::LoopHealth stalled;
-  node::Pacer pacer({10'000});
+  firmware::Pacer pacer({10'000});
   std::int64_t now = 0;
   for (int k = 0; k < 50; ++k, now += 10'000)
     static_cast<void>(pacer.on_sync(bus::SyncKind::kTick, {1'000'000 + k * 10'000}, {now}, stalled));
@@ -221,7 +221,7 @@ TEST(PacerLateness, IsCountedWhileFollowingAndNotForTheBusesSilence) {
   EXPECT_EQ(stalled.ticks_late, 9);
 
   bus::LoopHealth silent;
-  node::Pacer lone({10'000});
+  firmware::Pacer lone({10'000});
   now = 0;
   for (int k = 0; k < 50; ++k, now += 10'000)
     static_cast<void>(lone.on_sync(bus::SyncKind::kTick, {1'000'000 + k * 10'000}, {now}, silent));
@@ -230,7 +230,7 @@ TEST(PacerLateness, IsCountedWhileFollowingAndNotForTheBusesSilence) {
   EXPECT_EQ(silent.ticks_late, 0);
 
   bus::LoopHealth back;
-  node::Pacer stepped({10'000});
+  firmware::Pacer stepped({10'000});
   ASSERT_TRUE(stepped.on_sync(bus::SyncKind::kStep, {50'000'000}, {0}, back).has_value());
   EXPECT_FALSE(stepped.on_sync(bus::SyncKind::kTick, {1'000}, {0}, back).has_value());
   EXPECT_EQ(back.sync_back, 1);

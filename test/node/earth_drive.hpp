@@ -4,7 +4,7 @@
 // it.
 #pragma once
 
-#include "sensor/samples.hpp"
+#include "tetap/sensor/samples.hpp"
 
 #include <GeographicLib/LocalCartesian.hpp>
 #include <GeographicLib/NormalGravity.hpp>

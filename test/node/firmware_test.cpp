@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The loop on a board whose clock the test turns: what it counts of its own lateness and of the sync frames.
-#include "node/firmware.hpp"
+#include "tetap/firmware/firmware.hpp"
 
 #include "bench.hpp"
 
@@ -28,7 +28,7 @@ struct SlowBoard {
       return to_node[next++];
     }
     void flush() {}
-    [[nodiscard]] hal::CanFaults faults() const { return {.tx_high = 7}; }
+    [[nodiscard]] base::CanFaults faults() const { return {.tx_high = 7}; }
   } can;
   base::Micros time;
   [[nodiscard]] base::Micros now() const { return time; }
@@ -58,8 +58,8 @@ class Loop : public ::testing::Test {
   [[nodiscard]] int ticks() const { return static_cast<int>(all<bus::EstEpoch>(board.can.sent).size()); }
 
   SlowBoard board;
-  std::unique_ptr<node::Firmware<SlowBoard, node::Estimators<estimators::Odometry, estimators::PoseEkf>>> firmware =
-      std::make_unique<node::Firmware<SlowBoard, node::Estimators<estimators::Odometry, estimators::PoseEkf>>>(
+  std::unique_ptr<firmware::Firmware<SlowBoard, node::Estimators<estimators::Odometry, estimators::PoseEkf>>> firmware =
+      std::make_unique<firmware::Firmware<SlowBoard, node::Estimators<estimators::Odometry, estimators::PoseEkf>>>(
           board, kNumbers, bus::Version{});
 };
 

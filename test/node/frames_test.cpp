@@ -2,8 +2,8 @@
 // Frames and range: an estimate is as right 100 km from the map's origin as at it, anywhere on the Earth. Judge:
 // GeographicLib (earth_drive.hpp).
 #include "earth_drive.hpp"
-#include "estimators/inertial/inertial.hpp"
-#include "estimators/planar/pose_ekf.hpp"
+#include "tetap/estimators/inertial/inertial.hpp"
+#include "tetap/estimators/planar/pose_ekf.hpp"
 
 #include <gtest/gtest.h>
 #include <string>

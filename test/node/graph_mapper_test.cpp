@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // A robot with a pose graph, as frames in and frames out: keyframes by wheels or by a front end, closures, bad input.
 // Set pose and reset come with a job in flight, and far more than fits is sent.
-#include "estimators/mapping/graph_mapper.hpp"
+#include "tetap/estimators/mapping/graph_mapper.hpp"
 #include "bench.hpp"
-#include "bus/encoder.hpp"
+#include "tetap/bus/encoder.hpp"
 
 #include <gtest/gtest.h>
 #include <cmath>

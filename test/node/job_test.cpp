@@ -2,8 +2,8 @@
 // Jobs longer than a tick. Neither how much of a job a tick does nor how long that takes changes what is adopted. A
 // change that makes a result worthless aborts the job.
 #include "bench.hpp"
-#include "estimators/own_map.hpp"
-#include "estimators/paced_job.hpp"
+#include "tetap/estimators/own_map.hpp"
+#include "tetap/estimators/paced_job.hpp"
 
 #include <gtest/gtest.h>
 #include <array>

@@ -3,7 +3,7 @@
 // other. A wrong one is found out. A robot beyond the range is reported.
 #include "bench.hpp"
 #include "earth_drive.hpp"
-#include "estimators/inertial/inertial.hpp"
+#include "tetap/estimators/inertial/inertial.hpp"
 
 #include <gtest/gtest.h>
 #include <functional>

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "bench.hpp"
-#include "estimators/mapping/planar_mapper.hpp"
+#include "tetap/estimators/mapping/planar_mapper.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -4,13 +4,13 @@
 #include "support/never_nan.hpp"
 #include "bench.hpp"
 #include "config/rover.hpp"
-#include "estimators/attitude.hpp"
-#include "estimators/inertial/inertial.hpp"
-#include "estimators/odometry.hpp"
-#include "estimators/planar/pose_ekf.hpp"
-#include "node/boot_self_check.hpp"
-#include "node/node.hpp"
-#include "sensor/plausibility.hpp"
+#include "tetap/estimators/attitude.hpp"
+#include "tetap/estimators/inertial/inertial.hpp"
+#include "tetap/estimators/odometry.hpp"
+#include "tetap/estimators/planar/pose_ekf.hpp"
+#include "tetap/firmware/boot_self_check.hpp"
+#include "tetap/node/node.hpp"
+#include "tetap/sensor/plausibility.hpp"
 
 #include <gtest/gtest.h>
 #include <limits>
@@ -448,7 +448,7 @@ TEST(NeverNan, RandomBitsInEveryInputFrame) {
       node::Estimators<estimators::Odometry, estimators::PoseEkf, estimators::Attitude, estimators::Inertial>>;
   for (std::uint32_t seed = 1; seed <= 4; ++seed) {
     static Node node{kNumbers, {}};
-    node::Dice dice(seed * 7919);
+    firmware::Dice dice(seed * 7919);
     std::int64_t now_us = 1'000'000;
     node.power_on({now_us});
     const std::uint32_t base = kNumbers.can_base;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "node/pacer.hpp"
+#include "tetap/firmware/pacer.hpp"
 
 #include <gtest/gtest.h>
 #include <vector>
@@ -11,7 +11,7 @@ using base::Micros;
 using bus::LoopHealth;
 using bus::SyncKind;
 using bus::SyncState;
-using node::Pacer;
+using firmware::Pacer;
 
 constexpr Micros kPeriod{10'000};
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A late sample in a long window: its replay is spread over ticks, and ends where a sample on time would have led.
-#include "node/fusion_window.hpp"
+#include "tetap/node/fusion_window.hpp"
 
 #include <gtest/gtest.h>
 #include <algorithm>

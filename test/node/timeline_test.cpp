@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "node/timeline.hpp"
+#include "tetap/node/timeline.hpp"
 
 #include <gtest/gtest.h>
 #include <algorithm>

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // The time base of wired samples, and what an image holds of their drivers.
-#include "node/wired_inputs.hpp"
+#include "tetap/firmware/wired_inputs.hpp"
 
 #include "hal/board/linux/memory_can.hpp"
-#include "node/pacer.hpp"
 #include "support/fakes/board.hpp"
+#include "tetap/firmware/pacer.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Each rule between fields is broken by the fields that it names, and by no other.
-#include "param/limits.hpp"
+#include "tetap/param/limits.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Laws of the parameter table. Paths and indices are unique and stable, every member has a row, and defaults lie inside
 // the limits. Access by a row touches its member alone, and the CRC of the version frame covers every element.
-#include "param/table.hpp"
+#include "tetap/param/table.hpp"
 
-#include "param/crc.hpp"
-#include "param/limits.hpp"
+#include "tetap/param/crc.hpp"
+#include "tetap/param/limits.hpp"
 
 #include <gtest/gtest.h>
 

@@ -5,8 +5,8 @@
 // 1 rest, 2 accelerometer, 4 magnetometer disturbed. The option names are those of AttitudeOptions,
 // gyroscope_range_radps and accelerometer_range_mps2. Madgwick's filter (2010) is here as it was published, to show
 // that the errors are measured as the published ones were.
-#include "filter/attitude.hpp"
-#include "filter/mahony.hpp"
+#include "tetap/filter/attitude.hpp"
+#include "tetap/filter/mahony.hpp"
 
 #include <array>
 #include <cmath>

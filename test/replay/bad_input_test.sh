@@ -148,7 +148,7 @@ number --gnss-hz 0 5.5
 number --gnss-m 0 nan
 number --east nan 60001
 # Every robot that there is stands in every program's help.
-every_robot=$({ tools/run/list_robots | tr ' ' '\n'; grep -oE 'name == "[A-Za-z0-9_]+"' sim_host/robots.hpp | cut -d'"' -f2; } | sort | xargs)
+every_robot=$({ tools/run/list_robots | tr ' ' '\n'; grep -oE '"[a-z_]+_matched"' sim_host/robots.cpp | tr -d '"'; } | sort | xargs)
 listed=$("$programs/tetap-node" --list-robots | tr ' ' '\n' | sort | xargs)
 [ "$listed" = "$every_robot" ] && [ "$(wc -w <<<"$listed")" -ge 10 ] || { echo "WRONG  tetap-node lists '$listed', there are '$every_robot'"; failed=$((failed + 1)); }
 for robot in $every_robot; do
@@ -213,7 +213,7 @@ refused "firmware for no such board" "no board 'arduino'; there are: zynqmp_r5" 
 refused "firmware for no such robot" "no image of robot 'tank'; there are: .*mrclam" env BOARD=zynqmp_r5 ROBOT=tank tools/run/build_firmware
 # An image that is over its budget, or allocates, is no firmware: in a tree whose tools say yes, but for one.
 mkdir -p "$work/tree/config"
-cp -r tools CMakePresets.json "$work/tree" && cp config/*.hpp "$work/tree/config"
+cp -r tools CMakePresets.json "$work/tree" && cp -r config/*.hpp config/parameters "$work/tree/config"
 for tool in proof/check_{heap,layers,size,stack}; do
   for one in run/build_preset proof/check_{heap,layers,size,stack}; do printf '#!/bin/sh\n' >"$work/tree/tools/$one"; done
   printf '#!/bin/sh\ncase $* in *tetap-zynqmp_r5-husky.elf*) echo "$0: no" >&2; exit 1 ;; esac\n' >"$work/tree/tools/$tool"

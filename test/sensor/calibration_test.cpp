@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // A sensor's known errors are taken out of its samples. The judge is Eigen in double, which makes the raw samples from
 // the truth; the second test goes through a whole node.
-#include "sensor/calibration.hpp"
+#include "tetap/sensor/calibration.hpp"
 
-#include "checks/imu_health.hpp"
 #include "node/bench.hpp"
+#include "tetap/checks/imu_health.hpp"
 
 #include <gtest/gtest.h>
 #include <Eigen/LU>

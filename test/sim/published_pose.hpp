@@ -2,8 +2,8 @@
 // The pose that a node publishes, against the truth of the simulated world.
 #pragma once
 
-#include "bus/codec.hpp"
 #include "sim_host/world/motion.hpp"
+#include "tetap/bus/codec.hpp"
 
 #include <Eigen/LU>
 

@@ -2,6 +2,7 @@
 // A robot gets the messages that it takes, and nothing else. Nothing that nobody reads loads its bus, and a fault of a
 // message that it does not get is refused.
 #include "sim_host/published_sensors.hpp"
+#include "sim_host/robot_of.hpp"
 
 #include "sim_host/world_source.hpp"
 
@@ -75,7 +76,7 @@ bool changes_a_frame(const std::vector<std::string>& without, Sending faulty) {
 /// One robot of each kind of diet: the world is the same to the others.
 std::vector<std::string> robots() {
   std::vector<std::string> found;
-  for (const std::string& name : words(kRobotNames))
+  for (const std::string& name : words(robot_names()))
     if (std::none_of(found.begin(), found.end(), [&](const auto& one) { return sent_to(one) == sent_to(name); }))
       found.push_back(name);
   return found;

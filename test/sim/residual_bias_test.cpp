@@ -2,7 +2,7 @@
 // The truth of a calibrated robot's biases is what the firmware's own calibration leaves in a sample.
 #include "sim_host/residual_bias.hpp"
 
-#include "sensor/calibration.hpp"
+#include "tetap/sensor/calibration.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "slam/association.hpp"
+#include "tetap/slam/association.hpp"
 
 #include <gtest/gtest.h>
 #include <limits>

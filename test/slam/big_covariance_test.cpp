@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "filter/big_covariance.hpp"
+#include "tetap/filter/big_covariance.hpp"
 
 #include <gtest/gtest.h>
 #include <algorithm>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // EKF-SLAM in a simulated world: consistency over laps, sightings without identity, clutter, sightings of one kind
 // alone, full maps.
-#include "slam/ekf_mapper.hpp"
+#include "tetap/slam/ekf_mapper.hpp"
 #include "landmark_world.hpp"
 #include "support/never_nan.hpp"
 

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Laws of EKF-SLAM, against a dense filter in double and against what no filter may gain.
-#include "slam/ekf_slam.hpp"
+#include "tetap/slam/ekf_slam.hpp"
 #include "dense_slam.hpp"
-#include "filter/ekf.hpp"
-#include "model/range_bearing.hpp"
 #include "support/never_nan.hpp"
+#include "tetap/filter/ekf.hpp"
+#include "tetap/model/range_bearing.hpp"
 
 #include <gtest/gtest.h>
 #include <Eigen/Dense>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "slam/elimination_order.hpp"
+#include "tetap/slam/elimination_order.hpp"
 
 #include <gtest/gtest.h>
 #include <algorithm>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // FastSLAM: parts against the Kalman filter, both versions in a simulated world, repeatability, full and hostile.
-#include "slam/fast_slam.hpp"
+#include "tetap/slam/fast_slam.hpp"
 #include "landmark_world.hpp"
 #include "support/never_nan.hpp"
 

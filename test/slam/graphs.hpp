@@ -3,7 +3,7 @@
 #pragma once
 
 #include "slam/g2o.hpp"
-#include "slam/planar_motion.hpp"
+#include "tetap/slam/planar_motion.hpp"
 
 #include <cstdlib>
 #include <filesystem>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "slam/joint_compatibility.hpp"
+#include "tetap/slam/joint_compatibility.hpp"
 
 #include <gtest/gtest.h>
 #include <random>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "slam/keyframe_graph.hpp"
+#include "tetap/slam/keyframe_graph.hpp"
 #include "slam/graphs.hpp"
 
 #include <gtest/gtest.h>

@@ -3,8 +3,8 @@
 // own in double, and noise of the size that is given to the filter.
 #pragma once
 
-#include "model/planar_increment.hpp"
-#include "slam/sighting.hpp"
+#include "tetap/model/planar_increment.hpp"
+#include "tetap/slam/sighting.hpp"
 
 #include <array>
 #include <cmath>

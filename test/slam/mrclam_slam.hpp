@@ -5,10 +5,10 @@
 
 #include "config/mrclam_slam.hpp"
 #include "landmark_world.hpp"
-#include "model/planar_increment.hpp"
-#include "sensor/calibration.hpp"
-#include "slam/sighting.hpp"
 #include "support/mrclam.hpp"
+#include "tetap/model/planar_increment.hpp"
+#include "tetap/sensor/calibration.hpp"
+#include "tetap/slam/sighting.hpp"
 
 #include <cmath>
 #include <map>

@@ -2,7 +2,7 @@
 // Public pose graphs, all poses in memory: the optimum that GTSAM, g2o and a textbook solver agree on, with and without
 // false closures. Skipped where the data is missing.
 #include "slam/graphs.hpp"
-#include "slam/pose_graph.hpp"
+#include "tetap/slam/pose_graph.hpp"
 
 #include <gtest/gtest.h>
 #include <chrono>

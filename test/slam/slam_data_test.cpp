@@ -3,11 +3,11 @@
 // robots. The trajectory is aligned by the rigid motion that fits the map's landmarks. The choice of the numbers, and
 // the result of leaving one robot out, are in docs/explanation/ekf_slam.md.
 #include "config/mrclam_fast.hpp"
-#include "filter/ekf.hpp"
-#include "model/range_bearing.hpp"
 #include "mrclam_slam.hpp"
-#include "slam/ekf_mapper.hpp"
-#include "slam/fast_slam.hpp"
+#include "tetap/filter/ekf.hpp"
+#include "tetap/model/range_bearing.hpp"
+#include "tetap/slam/ekf_mapper.hpp"
+#include "tetap/slam/fast_slam.hpp"
 
 #include <gtest/gtest.h>
 #include <cmath>

@@ -2,7 +2,7 @@
 // EKF-SLAM on MRCLAM, data set 7, without identities. The 15 barcodes stand on 6 posts, whose barcodes are 0.2 m apart
 // and cannot be told from each other: landmarks are scored by post.
 #include "mrclam_slam.hpp"
-#include "slam/ekf_mapper.hpp"
+#include "tetap/slam/ekf_mapper.hpp"
 
 #include <gtest/gtest.h>
 #include <algorithm>

@@ -3,12 +3,12 @@
 // The messages that config/tetap.dbc makes give the places of the signals.
 #pragma once
 
-#include "base/can_frame.hpp"
-#include "base/time.hpp"
-#include "bus/e2e.hpp"
-#include "bus/guard.hpp"
-#include "bus/messages.hpp"
-#include "bus/signal.hpp"
+#include "tetap/base/can_frame.hpp"
+#include "tetap/base/time.hpp"
+#include "tetap/bus/e2e.hpp"
+#include "tetap/bus/guard.hpp"
+#include "tetap/bus/messages.hpp"
+#include "tetap/bus/signal.hpp"
 
 #include <array>
 #include <cstddef>

@@ -4,12 +4,12 @@
 // tick: finite states, positive definite covariances, frames that decode, as many ticks as periods. A node that refuses
 // all of an attack computes the same bits as one that is left alone. Valid flags are honest where damaged samples have
 // guards, and a minute after an attack of any kind.
-#include "base/state_hash.hpp"
-#include "bus/decoder.hpp"
 #include "config/rover.hpp"
 #include "hostile_bus.hpp"
-#include "node/firmware.hpp"
 #include "sim_host/world_source.hpp"
+#include "tetap/base/state_hash.hpp"
+#include "tetap/bus/decoder.hpp"
+#include "tetap/firmware/firmware.hpp"
 
 #include <algorithm>
 #include <array>
@@ -135,7 +135,7 @@ struct Can {
     return to_node[next++];
   }
   void flush() {}
-  [[nodiscard]] hal::CanFaults faults() const { return {}; }
+  [[nodiscard]] base::CanFaults faults() const { return {}; }
   [[nodiscard]] bool empty() const { return next == to_node.size(); }
   void give(const std::vector<base::CanFrame>& frames) { to_node = frames, next = 0; }
 };
@@ -148,7 +148,7 @@ struct Board {
 struct Node {
   explicit Node(const param::Parameters& given)
       : parameters(given),
-        firmware(std::make_unique<node::Firmware<Board, Robot>>(board, parameters, bus::Version{})) {}
+        firmware(std::make_unique<firmware::Firmware<Board, Robot>>(board, parameters, bus::Version{})) {}
   /// Frames, then the board's time: the tick of its own timer.
   void step(const std::vector<base::CanFrame>& frames, base::Micros t) {
     board.can.give(frames);
@@ -158,7 +158,7 @@ struct Node {
   }
   param::Parameters parameters;
   Board board;
-  std::unique_ptr<node::Firmware<Board, Robot>> firmware;
+  std::unique_ptr<firmware::Firmware<Board, Robot>> firmware;
 };
 
 struct Life {

@@ -4,9 +4,9 @@
 // and tools/count counts it.
 #pragma once
 
-#include "base/math_double.hpp"
-#include "filter/state.hpp"
-#include "filter/wrap.hpp"
+#include "tetap/base/math_double.hpp"
+#include "tetap/filter/state.hpp"
+#include "tetap/filter/wrap.hpp"
 
 #include <array>
 

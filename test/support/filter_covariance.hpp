@@ -2,7 +2,7 @@
 // The covariance of any filter: some keep P as a member, others as factors behind functions.
 #pragma once
 
-#include "filter/symmetric.hpp"
+#include "tetap/filter/symmetric.hpp"
 
 namespace tetap {
 

@@ -3,7 +3,7 @@
 // that includes Eigen's solver takes to compile.
 #pragma once
 
-#include "filter/symmetric.hpp"
+#include "tetap/filter/symmetric.hpp"
 
 namespace tetap::test {
 

@@ -2,8 +2,8 @@
 // Values that a broken sensor may hand over, and what has to hold after them.
 #pragma once
 
-#include "filter/update.hpp"
 #include "support/least_eigenvalue.hpp"
+#include "tetap/filter/update.hpp"
 
 #include <gtest/gtest.h>
 #include <array>

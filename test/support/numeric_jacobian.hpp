@@ -2,7 +2,7 @@
 // The judge of every hand-written Jacobian: central differences on the manifold.
 #pragma once
 
-#include "filter/state.hpp"
+#include "tetap/filter/state.hpp"
 
 namespace tetap::test {
 

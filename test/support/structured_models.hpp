@@ -3,8 +3,8 @@
 // Equal to the dense models, entry by entry.
 #pragma once
 
-#include "filter/structure.hpp"
 #include "support/euler_pose.hpp"
+#include "tetap/filter/structure.hpp"
 
 namespace tetap::test {
 

@@ -65,25 +65,25 @@ class LayersTest(ImageTest):
         self.assertEqual(self.findings(), [])
 
     def test_includes_along_the_arrows_pass(self):
-        for name, include in (("src/bus/signal.hpp", "base/math.hpp"), ("src/base/math.hpp", "base/time.hpp"), ("src/base/math.hpp", "time.hpp"),
+        for name, include in (("src/bus/signal.hpp", "tetap/base/math.hpp"), ("src/base/math.hpp", "tetap/base/time.hpp"), ("src/base/math.hpp", "time.hpp"),
                               ("src/app/firmware.hpp", "hal/board.hpp"), ("src/app/firmware.hpp", "config/messages.hpp"),
-                              ("src/app/firmware.hpp", "drivers/imu.hpp"), ("drivers/imu.hpp", "app/samples.hpp"),
+                              ("src/app/firmware.hpp", "drivers/imu.hpp"), ("drivers/imu.hpp", "tetap/app/samples.hpp"),
                               ("hal/board/mps2/board.hpp", "hal/chip/support/text.hpp"), ("hal/board/mps2/main.cpp", "hal/board/mps2/board.hpp"),
-                              ("hal/board/mps2/main.cpp", "config/rover.hpp"), ("config/rover.hpp", "app/firmware.hpp"),
+                              ("hal/board/mps2/main.cpp", "config/rover.hpp"), ("config/rover.hpp", "tetap/app/firmware.hpp"),
                               ("sim_host/world.hpp", "hal/board/linux/clock.hpp"), ("hal/board/mps2/main.cpp", "robot.hpp")):
             with self.subTest(f"{name} includes {include}"):
                 self.assertEqual(self.findings(name, f'#include "{include}"\n'), [])
         self.assertEqual(self.findings("src/filter/ekf.hpp", "#include <Eigen/Core>\n#include <array>\n"), [])
 
     def test_includes_against_the_arrows_fail_with_file_and_line(self):
-        for name, include in (("src/base/math.hpp", "bus/signal.hpp"), ("src/bus/signal.hpp", "filter/ekf.hpp"), ("src/filter/ekf.hpp", "app/firmware.hpp"),
+        for name, include in (("src/base/math.hpp", "tetap/bus/signal.hpp"), ("src/bus/signal.hpp", "tetap/filter/ekf.hpp"), ("src/filter/ekf.hpp", "tetap/app/firmware.hpp"),
                               ("src/app/firmware.hpp", "hal/board/mps2/board.hpp"), ("src/app/firmware.hpp", "config/rover.hpp"),
-                              ("src/filter/ekf.hpp", "config/messages.hpp"), ("hal/board.hpp", "app/firmware.hpp"),
-                              ("hal/board.hpp", "hal/chip/support/text.hpp"), ("drivers/imu.hpp", "app/firmware.hpp"),
+                              ("src/filter/ekf.hpp", "config/messages.hpp"), ("hal/board.hpp", "tetap/app/firmware.hpp"),
+                              ("hal/board.hpp", "hal/chip/support/text.hpp"), ("drivers/imu.hpp", "tetap/app/firmware.hpp"),
                               ("hal/board/mps2/board.hpp", "hal/board/r5/board.hpp"), ("hal/board/mps2/main.cpp", "hal/board/r5/board.hpp"),
-                              ("hal/board/mps2/board.hpp", "app/firmware.hpp"), ("config/messages.hpp", "app/firmware.hpp"),
+                              ("hal/board/mps2/board.hpp", "tetap/app/firmware.hpp"), ("config/messages.hpp", "tetap/app/firmware.hpp"),
                               ("src/base/math.hpp", "sim_host/world.hpp"), ("src/base/math.hpp", "../bus/signal.hpp"),
-                              ("src/base/math.hpp", "bus/not_yet_generated.hpp"), ("hal/board/linux/clock.hpp", "app/firmware.hpp")):
+                              ("src/base/math.hpp", "tetap/bus/not_yet_generated.hpp"), ("hal/board/linux/clock.hpp", "tetap/app/firmware.hpp")):
             with self.subTest(f"{name} includes {include}"):
                 found = self.findings(name, f'#pragma once\n/* two\nlines */\n  # include "{include}"\n')
                 self.assertEqual(len(found), 1, found)
@@ -94,7 +94,7 @@ class LayersTest(ImageTest):
         self.assertIn("may not include Eigen", self.findings("src/base/math.hpp", "#include <Eigen/Core>\n")[0])
 
     def test_a_folder_outside_the_table_fails(self):
-        self.assertIn("not in the table", self.findings("src/new_folder/x.hpp", '#include "base/math.hpp"\n')[0])
+        self.assertIn("not in the table", self.findings("src/new_folder/x.hpp", '#include "tetap/base/math.hpp"\n')[0])
 
     def test_standard_headers_that_need_more_than_a_compiler_fail(self):
         for header in ("cmath", "iostream", "vector", "string", "functional", "memory", "chrono", "thread", "random", "cstdlib", "math.h", "ctime",
@@ -138,7 +138,7 @@ static_assert(noexcept(f())); std::string_view s; std::optional<int> o; using Ve
         self.assertEqual(self.findings("hal/board/linux/clock.hpp", "#include <vector>\nstd::vector<int> v; throw 1; clock_gettime(a, b);\n"), [])
 
     def test_the_table_is_read_from_the_design_and_a_broken_one_is_refused(self):
-        self.put("src/bus/signal.hpp", '#include "filter/ekf.hpp"\n')
+        self.put("src/bus/signal.hpp", '#include "tetap/filter/ekf.hpp"\n')
         self.assertEqual(len(self.findings()), 1)
         self.put("DESIGN.md", DESIGN.replace("src/bus       -> src/base", "src/bus       -> src/base, src/filter"))
         self.assertEqual(self.findings(), [])
@@ -162,14 +162,14 @@ static_assert(noexcept(f())); std::string_view s; std::optional<int> o; using Ve
 
     def test_the_build_of_one_program_or_image_rejects_it_before_anything_is_compiled(self):
         tree = self.path("tree")
-        shutil.copytree(ROOT, tree, ignore=lambda folder, names: (".git", "build", "out") if folder == ROOT else ())
+        shutil.copytree(ROOT, tree, symlinks=True, ignore=lambda folder, names: (".git", "build", "out") if folder == ROOT else ())
         with open(os.path.join(tree, "src/base/math.hpp"), "a", encoding="utf-8") as file:
-            file.write('#include "filter/update.hpp"\n')
+            file.write('#include "tetap/filter/update.hpp"\n')
         for target in ("host:tetap-world", "r5:tetap-zynqmp_r5-rover"):
             with self.subTest(target):
                 done = subprocess.run([os.path.join(tree, "tools", "run", "build_preset"), target], capture_output=True, text=True)
                 self.assertEqual(done.returncode, 1, done.stderr)
-                self.assertRegex(done.stderr, r'src/base/math.hpp:\d+: #include "filter/update.hpp": against the arrows: src/base -> \(nothing\)')
+                self.assertRegex(done.stderr, r'src/base/math.hpp:\d+: #include "tetap/filter/update.hpp": against the arrows: src/base -> \(nothing\)')
                 built = os.path.join(tree, "build", target.split(":")[0])
                 objects = [f for top, _, files in os.walk(built) for f in files if f.endswith((".o", ".obj")) and "CompilerId" not in top]
                 self.assertEqual(objects, [])

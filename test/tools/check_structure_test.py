@@ -79,8 +79,8 @@ class Structure(unittest.TestCase):
         self.green({"a.hpp": "inline bool f() { const float x = p(8, 8) + p(0, 1); return x == p(1, 1) && x <= p(2, 2); }  // p(8, 8) = 0\n"})
 
     def test_sources(self):
-        self.red({"sources/a.hpp": '#include "estimators/inertial/sources/b.hpp"\n'}, "includes the source b", "FilterView")
-        self.green({"sources/a.hpp": '#include "estimators/inertial/filter_view.hpp"\n', "all.hpp": '#include "estimators/inertial/sources/a.hpp"\n'})
+        self.red({"sources/a.hpp": '#include "tetap/estimators/inertial/sources/b.hpp"\n'}, "includes the source b", "FilterView")
+        self.green({"sources/a.hpp": '#include "tetap/estimators/inertial/filter_view.hpp"\n', "all.hpp": '#include "tetap/estimators/inertial/sources/a.hpp"\n'})
 
     def test_comments(self):
         self.red({"a.hpp": struct("A", "  int a_ = 0;  ///< that was heard\n")}, "relative")

@@ -31,8 +31,8 @@ message(STATUS "their standard: ${{CMAKE_CXX_STANDARD}}")
 """
 
 # The worked example of docs/explanation: x = [position, velocity], P- = [[10.101, 1], [1, 10.001]], S = 10.601.
-PROGRAM = """#include "filter/kalman.hpp"
-#include "filter/linear_models.hpp"
+PROGRAM = """#include "tetap/filter/kalman.hpp"
+#include "tetap/filter/linear_models.hpp"
 
 #include <cstdio>
 

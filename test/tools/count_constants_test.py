@@ -12,8 +12,8 @@ ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.realpath(__file__
 TOOL = os.path.join(ROOT, "tools", "proof", "count_constants")
 FILES = {
     "src/estimators/inertial/inertial.hpp": """// 17 things: 3.5
-#include "estimators/inertial/inside.hpp"
-#include "param/parameters.hpp"
+#include "tetap/estimators/inertial/inside.hpp"
+#include "tetap/param/parameters.hpp"
 /* 99 */ constexpr float kGate = 11.34F, kHalf = 0.5F, kTwo = 2, kBig = 1'000'000;
 constexpr auto kText = "88 \\" 77";  constexpr char kSeven = '7';  constexpr int kMask = 0xFF, k3 = -3, kExp = 1e-3;
 float f(const Parameters& p) { return p.gnss.floor_m * x1 + v2.y3 + 1.0F + 0x1p-2F; }

@@ -295,7 +295,7 @@ class Generated(unittest.TestCase):
         of_rows = {os.path.basename(header)[:-4] for _, _, header in rows if header.startswith("filter/")}
         self.assertEqual(headers - parts, of_rows)
         self.assertLessEqual(parts, headers)
-        self.assertEqual([header for _, _, header in rows if not os.path.exists(os.path.join(ROOT, "src", header))], [])
+        self.assertEqual([header for _, _, header in rows if not os.path.exists(os.path.join(ROOT, "include", header))], [])
         sizes = {}
         for name, size, _ in rows:
             sizes.setdefault(name, []).append(size)
@@ -386,7 +386,7 @@ class Lines(unittest.TestCase):
         folder = tempfile.TemporaryDirectory()
         self.addCleanup(folder.cleanup)
         self.tree = os.path.join(folder.name, "tetap")
-        shutil.copytree(ROOT, self.tree, ignore=lambda where, _: {"build", "out", ".git"} if where == ROOT else ())
+        shutil.copytree(ROOT, self.tree, symlinks=True, ignore=lambda where, _: {"build", "out", ".git"} if where == ROOT else ())
         os.makedirs(os.path.join(self.tree, "build/host"))
         os.symlink(PROGRAMS, os.path.join(self.tree, "build/host/sim_host"))
         # The programs are there already: packages and builds are other steps' matter.
@@ -475,7 +475,7 @@ class Lines(unittest.TestCase):
         for name, *_ in self.tutorial_programs():
             for core in ("-mcpu=cortex-m0plus", "-mcpu=cortex-m4 -mfpu=fpv4-sp-d16 -mfloat-abi=hard"):
                 with self.subTest(name=name, core=core):
-                    self.run_here(f"arm-none-eabi-g++ -std=c++20 -Isrc -isystem /usr/include/eigen3 {small} {core} -c {name}.cpp -o {name}.o")
+                    self.run_here(f"arm-none-eabi-g++ -std=c++20 -Iinclude -isystem /usr/include/eigen3 {small} {core} -c {name}.cpp -o {name}.o")
                     wanted = self.run_here(f"arm-none-eabi-nm -u {name}.o").split()
                     self.assertIn("printf", wanted)
                     self.assertEqual([one for one in wanted if re.search(r"alloc|_Zn[wa]|_Zd[la]|cxa|throw|sinf|cosf|expf|logf", one)], [])
@@ -506,24 +506,24 @@ class Lines(unittest.TestCase):
                        "std::unique_ptr<Node> f(const tetap::bus::Version& v) { return std::make_unique<Node>(r::parameters, v); }\n"
                        "static_assert(r::parameters.wheels.drive.noise_left > 0 && r::parameters.wheels.drive.noise_right > 0);\n")
         os.makedirs(os.path.join(self.tree, "made/bus"))
-        self.run_here("tools/can/generate_messages --header made/bus/messages.hpp")
+        self.run_here("tools/can/generate_messages --header made/tetap/bus/messages.hpp")
         for compiler in ("g++", "clang++"):
-            self.run_here(f"{compiler} -std=c++20 -fsyntax-only -Wall -Wextra -Werror -Wno-missing-field-initializers -I. -Isrc -Imade -isystem /usr/include/eigen3 robot.cpp")
+            self.run_here(f"{compiler} -std=c++20 -fsyntax-only -Wall -Wextra -Werror -Wno-missing-field-initializers -I. -Iinclude -Imade -isystem /usr/include/eigen3 robot.cpp")
 
     def test_the_estimator_of_extend_is_one_that_a_node_takes(self):
         code = re.search(r"Save it as `gnss_track.hpp` in `src/estimators`:\n\n```cpp\n(.*?)```", read("docs/howto/extend.md"), re.S)[1]
         with open(os.path.join(self.tree, "src/estimators/gnss_track.hpp"), "w", encoding="utf-8") as file:
             file.write(code)
         with open(os.path.join(self.tree, "robot.cpp"), "w", encoding="utf-8") as file:
-            file.write('#include "estimators/gnss_track.hpp"\n#include "node/node.hpp"\n#include "param/limits.hpp"\n#include <memory>\n'
+            file.write('#include "tetap/estimators/gnss_track.hpp"\n#include "tetap/node/node.hpp"\n#include "tetap/param/limits.hpp"\n#include <memory>\n'
                        "using namespace tetap;\nusing Node = node::Node<node::Estimators<estimators::GnssTrack>>;\n"
                        "static_assert(node::EstimatorSlot<estimators::GnssTrack>::kTakes<sensor::GnssPosition>);\n"
                        "constexpr param::Parameters parameters = param::checked({.gnss = {.sigma_floor_m = 1.0F}});\n"
                        "std::unique_ptr<Node> f(const bus::Version& v) { return std::make_unique<Node>(parameters, v); }\n")
         os.makedirs(os.path.join(self.tree, "made/bus"))
-        self.run_here("tools/can/generate_messages --header made/bus/messages.hpp")
+        self.run_here("tools/can/generate_messages --header made/tetap/bus/messages.hpp")
         for compiler in ("g++", "clang++"):
-            self.run_here(f"{compiler} -std=c++20 -fsyntax-only -Wall -Wextra -Werror -Wno-missing-field-initializers -I. -Isrc -Imade -isystem /usr/include/eigen3 robot.cpp")
+            self.run_here(f"{compiler} -std=c++20 -fsyntax-only -Wall -Wextra -Werror -Wno-missing-field-initializers -I. -Iinclude -Imade -isystem /usr/include/eigen3 robot.cpp")
 
     def test_the_table_of_the_readme_is_that_of_make_sim(self):
         self.run_here("make sim")

@@ -21,7 +21,7 @@ class YourOwn(unittest.TestCase):
         self.folder = tempfile.TemporaryDirectory()
         self.addCleanup(self.folder.cleanup)
         self.tree = os.path.join(self.folder.name, "tetap")
-        shutil.copytree(ROOT, self.tree, ignore=lambda folder, _: {"build", "out", ".git"} if folder == ROOT else ())
+        shutil.copytree(ROOT, self.tree, symlinks=True, ignore=lambda folder, _: {"build", "out", ".git"} if folder == ROOT else ())
         with open(os.path.join(ROOT, "docs/tutorial/your_robot.md"), encoding="utf-8") as file:
             section = file.read()
         self.section = re.sub(r"\bmyboard\b", BOARD, re.sub(r"\bmine\b", ROBOT, section))
@@ -46,7 +46,7 @@ class YourOwn(unittest.TestCase):
             return re.search(r'kConfiguredRobots = "(.*)"', file.read())[1].split()
 
     def test_a_robot_is_a_file_in_config(self):
-        self.copy(f"config/{ROBOT}.hpp")
+        self.run_here("bash", "-c", self.line("for at in config.*"))
         self.run_here("cmake", "--preset", "host")
         self.assertIn(ROBOT, self.robots())
         self.assertIn(f" {ROBOT} ", self.run_here("make", "help"))
@@ -66,7 +66,7 @@ class YourOwn(unittest.TestCase):
         self.assertIn("config/rover.old.hpp: a robot's name has letters", " ".join(self.run_here("tools/run/build_preset", "host", status=1).split()))
 
     def test_a_board_is_a_folder_and_a_preset(self):
-        self.copy(f"config/{ROBOT}.hpp")
+        self.run_here("bash", "-c", self.line("for at in config.*"))
         self.copy(f"hal/board/{BOARD}")
         self.assertEqual("", self.run_here("grep", "-r", "ark_cannode", f"hal/board/{BOARD}", status=1))
         preset = self.line(rf'\{{ "name": "{BOARD}".*\}}')
@@ -96,7 +96,7 @@ class YourOwn(unittest.TestCase):
             self.run_here("tools/run/build_preset", "host:tetap-node,tetap-board")
             boot = self.run_here("build/host/sim_host/tetap-node", "--boot-line", "--robot", ROBOT).strip()
             image = f"build/{BOARD}/hal/board/tetap-{BOARD}-{ROBOT}.elf"
-            self.assertIn(boot, self.run_here("build/host/sim_host/board/tetap-board", "--seconds", "3", image).splitlines())
+            self.assertIn(boot, self.run_here("build/host/sim_host/emulator/tetap-board", "--seconds", "3", image).splitlines())
 
     def test_a_list_of_presets_that_is_none_is_told(self):
         with open(os.path.join(self.tree, "CMakePresets.json"), "a", encoding="utf-8") as file:

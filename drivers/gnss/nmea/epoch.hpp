@@ -5,11 +5,11 @@
 // sec. 6.3; u-blox F9 HPG 1.32 interface description, sec. 2.7.
 #pragma once
 
-#include "base/crc.hpp"
-#include "base/trig.hpp"
 #include "drivers/gnss/epoch_end.hpp"
 #include "drivers/gnss/health.hpp"
 #include "drivers/gnss/nmea/sentences.hpp"
+#include "tetap/base/crc.hpp"
+#include "tetap/base/trig.hpp"
 
 #include <array>
 #include <cstddef>

@@ -4,8 +4,8 @@
 // and 6.
 #pragma once
 
-#include "base/float_bits.hpp"
 #include "drivers/gnss/calendar.hpp"
+#include "tetap/base/float_bits.hpp"
 
 #include <array>
 #include <cstddef>

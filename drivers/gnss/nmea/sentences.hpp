@@ -3,8 +3,8 @@
 // 1.32 interface description (UBX-22008968), sec. 2.7.
 #pragma once
 
-#include "base/math.hpp"
 #include "drivers/gnss/nmea/fields.hpp"
+#include "tetap/base/math.hpp"
 
 #include <array>
 #include <cstddef>

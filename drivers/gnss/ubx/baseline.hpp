@@ -3,9 +3,9 @@
 // (UBX-22008968), sec. 3.15, version 1; u-blox 8 / M8 protocol specification (UBX-13003221), sec. 32.17, version 0.
 #pragma once
 
-#include "base/math.hpp"
 #include "drivers/gnss/health.hpp"
 #include "drivers/gnss/ubx/nav.hpp"
+#include "tetap/base/math.hpp"
 
 #include <cstdint>
 #include <optional>

@@ -3,8 +3,8 @@
 // and reasons that the driver reports about them.
 #pragma once
 
-#include "base/time.hpp"
 #include "drivers/gnss/ubx/message.hpp"
+#include "tetap/base/time.hpp"
 
 #include <array>
 #include <cstddef>

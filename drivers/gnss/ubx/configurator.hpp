@@ -5,10 +5,10 @@
 // again.
 #pragma once
 
-#include "base/time.hpp"
 #include "drivers/gnss/receiver.hpp"
 #include "drivers/gnss/ubx/configuration.hpp"
 #include "hal/byte_stream.hpp"
+#include "tetap/base/time.hpp"
 
 #include <array>
 #include <cstddef>

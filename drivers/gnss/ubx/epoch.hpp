@@ -3,10 +3,10 @@
 // NAV-COV and NAV-HPPOSLLH. An old one sends NAV-SOL, -POSLLH, -VELNED, -STATUS, -DOP, -TIMEUTC (sources in nav.hpp).
 #pragma once
 
-#include "base/wgs84.hpp"
 #include "drivers/gnss/epoch_end.hpp"
 #include "drivers/gnss/health.hpp"
 #include "drivers/gnss/ubx/nav.hpp"
+#include "tetap/base/wgs84.hpp"
 
 #include <cstddef>
 #include <cstdint>

@@ -3,9 +3,9 @@
 // DS-000347 rev. 1.8: tables 1 and 2 (densities), 5.3 (anti-alias filter), 5.5 and 14.40 (interface filter).
 #pragma once
 
-#include "base/math.hpp"
 #include "drivers/imu/icm42688/packet.hpp"
 #include "drivers/imu/icm42688/settings.hpp"
+#include "tetap/base/math.hpp"
 
 #include <cstdint>
 

@@ -3,8 +3,8 @@
 // DS-000347 rev. 1.8, 6.1 (packets 3 and 4), 6.2 (header), 12.8 and 14.34 (markers), 3.1, 3.2 and 4.13 (scales).
 #pragma once
 
-#include "base/math.hpp"
 #include "drivers/imu/icm42688/settings.hpp"
+#include "tetap/base/math.hpp"
 
 #include <array>
 #include <cstdint>

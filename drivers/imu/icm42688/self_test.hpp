@@ -5,9 +5,9 @@
 // and 2 g, ratio 0.5 to 1.5. Without codes 60 deg/s and 50 to 1200 mg. The robot has to stand still.
 #pragma once
 
-#include "base/time.hpp"
 #include "drivers/imu/icm42688/bus.hpp"
 #include "drivers/imu/icm42688/packet.hpp"
+#include "tetap/base/time.hpp"
 
 #include <array>
 #include <cstdint>

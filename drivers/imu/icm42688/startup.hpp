@@ -3,10 +3,10 @@
 // back, sensors on, their samples discarded while they start. DS-000347 rev. 1.8; sections at the places.
 #pragma once
 
-#include "base/time.hpp"
 #include "drivers/imu/icm42688/bus.hpp"
 #include "drivers/imu/icm42688/health.hpp"
 #include "drivers/imu/icm42688/settings.hpp"
+#include "tetap/base/time.hpp"
 
 namespace tetap::drivers::icm42688 {
 

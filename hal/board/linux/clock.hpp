@@ -2,7 +2,7 @@
 // The machine's clocks as integer microseconds. Only ports and host programs may read them.
 #pragma once
 
-#include "base/time.hpp"
+#include "tetap/base/time.hpp"
 
 #include <ctime>
 

@@ -46,12 +46,12 @@ class MemoryCan {
   }
   std::optional<base::CanFrame> receive() { return in_->pop(); }
   void flush() {}
-  [[nodiscard]] CanFaults faults() const { return faults_; }
+  [[nodiscard]] base::CanFaults faults() const { return faults_; }
 
  private:
   MemoryQueue* out_;
   MemoryQueue* in_;
-  CanFaults faults_;
+  base::CanFaults faults_;
 };
 
 static_assert(CanBus<MemoryCan>);

@@ -3,9 +3,9 @@
 // asked once for many frames. The kernel counts frames lost in the socket's buffer (SO_RXQ_OVFL): they are not guessed.
 #pragma once
 
-#include "base/can_frame.hpp"
-#include "base/time.hpp"
 #include "hal/can_bus.hpp"
+#include "tetap/base/can_frame.hpp"
+#include "tetap/base/time.hpp"
 
 #include <cstddef>
 #include <cstdint>
@@ -36,7 +36,7 @@ class SocketCan {
   /// Data frames of others, in order of arrival. Remote and error frames are counted and skipped.
   std::optional<base::CanFrame> receive();
   void flush();
-  [[nodiscard]] CanFaults faults() const { return faults_; }
+  [[nodiscard]] base::CanFaults faults() const { return faults_; }
 
   /// Hands on what was collected, then sleeps until a frame is there or the time is over. An interface that was removed
   /// is looked for here.
@@ -67,7 +67,7 @@ class SocketCan {
   std::unique_ptr<Batches> batches_;
   Cursor received_;
   std::size_t to_send_ = 0;
-  CanFaults faults_;
+  base::CanFaults faults_;
   std::uint32_t socket_drops_ = 0;  ///< the kernel's count for this socket
   std::uint64_t ignored_ = 0;
   base::Micros last_arrival_;

@@ -2,7 +2,7 @@
 // One line of candump's log form, "(seconds) interface 123#DEADBEEF", as a frame; candump(1), option -L.
 #pragma once
 
-#include "base/can_frame.hpp"
+#include "tetap/base/can_frame.hpp"
 
 #include <cstddef>
 #include <cstdint>

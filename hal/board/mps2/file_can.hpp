@@ -4,10 +4,10 @@
 // a data frame is counted as a lost frame (rx_overflow) and passed over.
 #pragma once
 
-#include "base/can_frame.hpp"
 #include "hal/board/mps2/candump_line.hpp"
 #include "hal/can_bus.hpp"
 #include "hal/chip/arm/semihosting.hpp"
+#include "tetap/base/can_frame.hpp"
 
 #include <array>
 #include <cstddef>
@@ -74,7 +74,7 @@ class FileCan {
   void flush() {
     if (out_size_ > out_buffer_.size() / 2) drain();
   }
-  [[nodiscard]] CanFaults faults() const { return faults_; }
+  [[nodiscard]] base::CanFaults faults() const { return faults_; }
 
  private:
   int next() {
@@ -115,7 +115,7 @@ class FileCan {
   std::size_t out_size_ = 0;
   std::uint32_t sent_ = 0;
   std::uint32_t hash_ = 2'166'136'261U;
-  CanFaults faults_{};
+  base::CanFaults faults_{};
   std::array<char, 256> in_buffer_{};
   std::array<char, 512> out_buffer_{};
 };

@@ -3,9 +3,9 @@
 // may be missing). For on-target proofs: same bytes as the host, stack high-water mark, instructions per tick.
 #include "hal/board/mps2/board.hpp"
 #include "hal/chip/support/boot_line.hpp"
-#include "node/accepted_frames.hpp"
-#include "node/firmware.hpp"
 #include "robot.hpp"
+#include "tetap/firmware/accepted_frames.hpp"
+#include "tetap/firmware/firmware.hpp"
 #include "version.hpp"
 
 int main() {
@@ -19,8 +19,8 @@ int main() {
   }
   namespace robot = tetap::robot::chosen;
   static_assert(tetap::node::has_protection_for<robot::Estimators>(robot::parameters), "name WithBusProtection");
-  board.can.accept(tetap::node::accepted_by<robot::Estimators>(robot::parameters));
-  static tetap::node::Firmware<Board, robot::Estimators> firmware{board, robot::parameters, tetap::version()};
+  board.can.accept(tetap::firmware::accepted_by<robot::Estimators>(robot::parameters));
+  static tetap::firmware::Firmware<Board, robot::Estimators> firmware{board, robot::parameters, tetap::version()};
   tetap::hal::print_version_line(board, tetap::version());
   tetap::hal::print_boot_line(board, tetap::robot::kName, firmware);
   while (!board.can.at_end()) firmware.poll();

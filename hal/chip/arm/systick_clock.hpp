@@ -3,8 +3,8 @@
 // the counter goes from reload to 0; the step from 1 to 0 pends the exception, the next one reloads.
 #pragma once
 
-#include "base/time.hpp"
 #include "hal/chip/arm/cortex_m4.hpp"
+#include "tetap/base/time.hpp"
 
 #include <cstdint>
 

@@ -5,11 +5,11 @@
 // so that a model stands in on the host.
 #pragma once
 
-#include "base/time.hpp"
 #include "hal/can_bus.hpp"
 #include "hal/chip/stm32/can_encoding.hpp"
 #include "hal/chip/stm32/can_state.hpp"
 #include "hal/chip/stm32/can_timing.hpp"
+#include "tetap/base/time.hpp"
 
 #include <array>
 #include <atomic>
@@ -94,8 +94,8 @@ class CanController {
     return read_.load(std::memory_order_relaxed) != received_.load(std::memory_order_acquire);
   }
 
-  [[nodiscard]] CanFaults faults() const {
-    CanFaults all = faults_;
+  [[nodiscard]] base::CanFaults faults() const {
+    base::CanFaults all = faults_;
     all.rx_overflow += overruns_.load(std::memory_order_relaxed);
     return all;
   }
@@ -262,7 +262,7 @@ class CanController {
   bool counted_ = false;                          ///< this wait for the bus is in the faults
   base::Micros since_{};                          ///< begin of the wait for the bus or of the hold after bus-off
   base::Micros arrived_{};
-  CanFaults faults_{};                      ///< counts of the loop; rx_overflow is overruns_
+  base::CanFaults faults_{};                ///< counts of the loop; rx_overflow is overruns_
   std::atomic<std::uint32_t> overruns_{0};  ///< frames that FIFO 0 or the ring had no room for
   std::uint32_t unsupported_ = 0;
   // Positions in the rings count on for ever; each has one writer.

@@ -4,8 +4,8 @@
 // the mailbox registers.
 #pragma once
 
-#include "base/can_frame.hpp"
 #include "hal/chip/stm32/registers_stm32f412.hpp"
+#include "tetap/base/can_frame.hpp"
 
 #include <cstdint>
 #include <optional>

@@ -5,11 +5,11 @@
 // a model stands in on the host.
 #pragma once
 
-#include "base/time.hpp"
 #include "hal/can_bus.hpp"
 #include "hal/chip/stm32/can_state.hpp"
 #include "hal/chip/stm32/fdcan_encoding.hpp"
 #include "hal/chip/support/frame_ring.hpp"
+#include "tetap/base/time.hpp"
 
 #include <atomic>
 #include <cstdint>
@@ -91,8 +91,8 @@ class FdcanController {
   /// For a board that is about to sleep.
   [[nodiscard]] bool has_received() const { return receive_.size() != 0; }
 
-  [[nodiscard]] CanFaults faults() const {
-    CanFaults all = faults_;
+  [[nodiscard]] base::CanFaults faults() const {
+    base::CanFaults all = faults_;
     all.rx_overflow += overruns_.load(std::memory_order_relaxed);
     return all;
   }
@@ -252,7 +252,7 @@ class FdcanController {
   bool gave_up_ = false;                          ///< frames were given up since the controller joined last
   base::Micros since_{};                          ///< begin of the wait for the bus or of the hold after bus-off
   base::Micros arrived_{};
-  CanFaults faults_{};                      ///< counts of the loop; rx_overflow is overruns_
+  base::CanFaults faults_{};                ///< counts of the loop; rx_overflow is overruns_
   std::atomic<std::uint32_t> overruns_{0};  ///< frames that FIFO 0 or the ring had no room for
   std::uint32_t unsupported_ = 0;
   FrameRing<base::CanFrame, kTransmitCapacity> transmit_{};  ///< taken by the interrupt, or by the loop under the lock

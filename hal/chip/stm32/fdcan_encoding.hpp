@@ -5,10 +5,10 @@
 // message RAM: its places and fields are written down here.
 #pragma once
 
-#include "base/can_frame.hpp"
 #include "hal/can_bus.hpp"
 #include "hal/chip/stm32/can_timing.hpp"
 #include "hal/chip/stm32/registers_stm32g474.hpp"
+#include "tetap/base/can_frame.hpp"
 
 #include <cstdint>
 #include <optional>

@@ -174,7 +174,7 @@ struct WiredBoard {
   BootReport boot_{};
   Clocks clocks_{};
   bool was_on_bus_ = false;
-  std::uint32_t failures_shown_ = 0;  ///< count of CanFaults::bus_off
+  std::uint32_t failures_shown_ = 0;  ///< count of base::CanFaults::bus_off
   bool light_ = false;
   bool was_passive_ = false;
   base::Micros next_blink_{};

@@ -4,10 +4,10 @@
 // model stands in on the host.
 #pragma once
 
-#include "base/time.hpp"
 #include "hal/can_bus.hpp"
 #include "hal/chip/zynqmp/can_encoding.hpp"
 #include "hal/chip/zynqmp/can_timing.hpp"
+#include "tetap/base/time.hpp"
 
 #include <array>
 #include <cstddef>
@@ -89,7 +89,7 @@ class CanController {
     return std::nullopt;
   }
 
-  [[nodiscard]] CanFaults faults() const { return faults_; }
+  [[nodiscard]] base::CanFaults faults() const { return faults_; }
   [[nodiscard]] std::uint32_t rx_unsupported() const { return unsupported_; }  ///< remote frames, counted and dropped
 
  private:
@@ -155,7 +155,7 @@ class CanController {
   std::array<base::CanFrame, kTransmitCapacity> ring_{};
   std::size_t first_ = 0;
   std::size_t count_ = 0;
-  CanFaults faults_{};
+  base::CanFaults faults_{};
   std::uint32_t unsupported_ = 0;
 };
 

@@ -4,8 +4,8 @@
 // RXFIFO_ID, AFMR, AFIR.
 #pragma once
 
-#include "base/can_frame.hpp"
 #include "hal/chip/zynqmp/machine.hpp"
+#include "tetap/base/can_frame.hpp"
 
 #include <cstdint>
 #include <optional>

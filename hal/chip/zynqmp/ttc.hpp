@@ -4,8 +4,8 @@
 // older Zynq at 133 MHz.
 #pragma once
 
-#include "base/time.hpp"
 #include "hal/chip/zynqmp/machine.hpp"
+#include "tetap/base/time.hpp"
 
 #include <cstdint>
 

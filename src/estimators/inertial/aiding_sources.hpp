@@ -2,14 +2,14 @@
 // All aiding sources of the inertial filter.
 #pragma once
 
-#include "estimators/inertial/sources/barometer.hpp"
-#include "estimators/inertial/sources/forward_speed.hpp"
-#include "estimators/inertial/sources/gnss_height.hpp"
-#include "estimators/inertial/sources/gnss_position.hpp"
-#include "estimators/inertial/sources/gnss_velocity.hpp"
-#include "estimators/inertial/sources/magnetometer.hpp"
-#include "estimators/inertial/sources/outside_heading.hpp"
-#include "estimators/inertial/sources/wheels.hpp"
+#include "tetap/estimators/inertial/sources/barometer.hpp"
+#include "tetap/estimators/inertial/sources/forward_speed.hpp"
+#include "tetap/estimators/inertial/sources/gnss_height.hpp"
+#include "tetap/estimators/inertial/sources/gnss_position.hpp"
+#include "tetap/estimators/inertial/sources/gnss_velocity.hpp"
+#include "tetap/estimators/inertial/sources/magnetometer.hpp"
+#include "tetap/estimators/inertial/sources/outside_heading.hpp"
+#include "tetap/estimators/inertial/sources/wheels.hpp"
 
 namespace tetap::estimators {
 

@@ -4,15 +4,15 @@
 // that starts forwards for sure the course of GNSS is enough (fast velocity, or the chord between fixes).
 #pragma once
 
-#include "checks/coloured_noise.hpp"
-#include "estimators/inertial/heading_monitor.hpp"
-#include "estimators/inertial/levelling.hpp"
-#include "estimators/inertial/recovery.hpp"
-#include "estimators/inertial/way_course.hpp"
-#include "model/gnss_course.hpp"
-#include "model/gnss_fix_3d.hpp"
-#include "model/planar_pose.hpp"
-#include "nav/ins.hpp"
+#include "tetap/checks/coloured_noise.hpp"
+#include "tetap/estimators/inertial/heading_monitor.hpp"
+#include "tetap/estimators/inertial/levelling.hpp"
+#include "tetap/estimators/inertial/recovery.hpp"
+#include "tetap/estimators/inertial/way_course.hpp"
+#include "tetap/model/gnss_course.hpp"
+#include "tetap/model/gnss_fix_3d.hpp"
+#include "tetap/model/planar_pose.hpp"
+#include "tetap/nav/ins.hpp"
 
 namespace tetap::estimators {
 

@@ -4,10 +4,10 @@
 // cross covariance is kept of them.
 #pragma once
 
-#include "base/math.hpp"
-#include "base/time.hpp"
-#include "checks/persistence.hpp"
-#include "param/parameters.hpp"
+#include "tetap/base/math.hpp"
+#include "tetap/base/time.hpp"
+#include "tetap/checks/persistence.hpp"
+#include "tetap/param/parameters.hpp"
 
 #include <cstdint>
 

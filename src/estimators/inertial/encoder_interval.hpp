@@ -2,10 +2,10 @@
 // Encoder counts over an interval: wheel speeds, their uncertainty, and when the wheels moved last.
 #pragma once
 
-#include "checks/persistence.hpp"
-#include "estimators/inertial/filter_view.hpp"
-#include "estimators/inertial/wheel_reading.hpp"
-#include "model/differential_drive.hpp"
+#include "tetap/checks/persistence.hpp"
+#include "tetap/estimators/inertial/filter_view.hpp"
+#include "tetap/estimators/inertial/wheel_reading.hpp"
+#include "tetap/model/differential_drive.hpp"
 
 #include <optional>
 

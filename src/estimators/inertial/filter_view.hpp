@@ -3,12 +3,12 @@
 // one definition and one time-out; the bodies are in filter_view_facts.hpp. No source reads another one's members.
 #pragma once
 
-#include "checks/wheel_slip.hpp"
-#include "estimators/context.hpp"
-#include "estimators/inertial/imu_input.hpp"
-#include "estimators/inertial/source.hpp"
-#include "estimators/inertial/vote.hpp"
-#include "nav/ins.hpp"
+#include "tetap/checks/wheel_slip.hpp"
+#include "tetap/estimators/context.hpp"
+#include "tetap/estimators/inertial/imu_input.hpp"
+#include "tetap/estimators/inertial/source.hpp"
+#include "tetap/estimators/inertial/vote.hpp"
+#include "tetap/nav/ins.hpp"
 
 #include <cstdint>
 

@@ -2,8 +2,8 @@
 // Facts that cross sources: one definition and one time-out each.
 #pragma once
 
-#include "estimators/inertial/aiding_sources.hpp"
-#include "estimators/inertial/filter_view.hpp"
+#include "tetap/estimators/inertial/aiding_sources.hpp"
+#include "tetap/estimators/inertial/filter_view.hpp"
 
 namespace tetap::estimators {
 

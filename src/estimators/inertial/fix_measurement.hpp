@@ -2,11 +2,11 @@
 // A fix against the filter: innovation and its normalised square, of the whole fix and of its horizontal part alone.
 #pragma once
 
-#include "base/math.hpp"
-#include "filter/update.hpp"
-#include "model/gnss_fix_3d.hpp"
-#include "nav/ins.hpp"
-#include "param/parameters.hpp"
+#include "tetap/base/math.hpp"
+#include "tetap/filter/update.hpp"
+#include "tetap/model/gnss_fix_3d.hpp"
+#include "tetap/nav/ins.hpp"
+#include "tetap/param/parameters.hpp"
 
 #include <array>
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Inertial navigation: headings from outside, magnetometer, barometer.
-#include "estimators/inertial/inertial.hpp"
-#include "estimators/inertial/measure.hpp"
+#include "tetap/estimators/inertial/inertial.hpp"
+#include "tetap/estimators/inertial/measure.hpp"
 
 namespace tetap::estimators {
 

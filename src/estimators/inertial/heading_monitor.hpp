@@ -3,10 +3,10 @@
 // heading. Beside a filter without wheels it judges the filter's heading, and the magnetometer's.
 #pragma once
 
-#include "checks/persistence.hpp"
-#include "estimators/inertial/filter_view.hpp"
-#include "model/gnss_fix_3d.hpp"
-#include "nav/yaw_estimator.hpp"
+#include "tetap/checks/persistence.hpp"
+#include "tetap/estimators/inertial/filter_view.hpp"
+#include "tetap/model/gnss_fix_3d.hpp"
+#include "tetap/nav/yaw_estimator.hpp"
 
 namespace tetap::estimators {
 

@@ -4,11 +4,11 @@
 // made at once of all samples in the window.
 #pragma once
 
-#include "checks/imu_classifier.hpp"
-#include "nav/imu_gather.hpp"
-#include "param/parameters.hpp"
-#include "sensor/sample.hpp"
-#include "sensor/window.hpp"
+#include "tetap/checks/imu_classifier.hpp"
+#include "tetap/nav/imu_gather.hpp"
+#include "tetap/param/parameters.hpp"
+#include "tetap/sensor/sample.hpp"
+#include "tetap/sensor/window.hpp"
 
 #include <array>
 #include <cstdint>

@@ -2,10 +2,10 @@
 // The IMU as the filter at the horizon uses it: its health, its last turn rate, and where the filter went without it.
 #pragma once
 
-#include "checks/imu_drift.hpp"
-#include "checks/imu_health.hpp"
-#include "estimators/inertial/source.hpp"
-#include "sensor/row_major.hpp"
+#include "tetap/checks/imu_drift.hpp"
+#include "tetap/checks/imu_health.hpp"
+#include "tetap/estimators/inertial/source.hpp"
+#include "tetap/sensor/row_major.hpp"
 
 namespace tetap::estimators {
 

@@ -5,20 +5,20 @@
 // them.
 #pragma once
 
-#include "base/reinitialise.hpp"
-#include "estimators/context.hpp"
-#include "estimators/estimate.hpp"
-#include "estimators/inertial/aiding_sources.hpp"
-#include "estimators/inertial/alignment.hpp"
-#include "estimators/inertial/filter_view_facts.hpp"
-#include "estimators/inertial/imu_input.hpp"
-#include "estimators/inertial/output_predictor.hpp"
-#include "estimators/inertial/recovery.hpp"
-#include "estimators/inertial/standstill.hpp"
-#include "estimators/inertial/work_budget.hpp"
-#include "nav/ins.hpp"
-#include "sensor/sample.hpp"
-#include "sensor/window.hpp"
+#include "tetap/base/reinitialise.hpp"
+#include "tetap/estimators/context.hpp"
+#include "tetap/estimators/estimate.hpp"
+#include "tetap/estimators/inertial/aiding_sources.hpp"
+#include "tetap/estimators/inertial/alignment.hpp"
+#include "tetap/estimators/inertial/filter_view_facts.hpp"
+#include "tetap/estimators/inertial/imu_input.hpp"
+#include "tetap/estimators/inertial/output_predictor.hpp"
+#include "tetap/estimators/inertial/recovery.hpp"
+#include "tetap/estimators/inertial/standstill.hpp"
+#include "tetap/estimators/inertial/work_budget.hpp"
+#include "tetap/nav/ins.hpp"
+#include "tetap/sensor/sample.hpp"
+#include "tetap/sensor/window.hpp"
 
 #include <cstdint>
 

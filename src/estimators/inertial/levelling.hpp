@@ -2,8 +2,8 @@
 // Levelling: an attitude that turns with the gyroscope and leans towards the specific force.
 #pragma once
 
-#include "nav/imu_increment.hpp"
-#include "nav/so3.hpp"
+#include "tetap/nav/imu_increment.hpp"
+#include "tetap/nav/so3.hpp"
 
 namespace tetap::estimators {
 

@@ -2,7 +2,7 @@
 // Inertial navigation: one measurement through its innovation gate, and what follows from refusing it for long.
 #pragma once
 
-#include "estimators/inertial/inertial.hpp"
+#include "tetap/estimators/inertial/inertial.hpp"
 
 namespace tetap::estimators {
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Inertial navigation: what is published.
-#include "estimators/inertial/inertial.hpp"
+#include "tetap/estimators/inertial/inertial.hpp"
 
 namespace tetap::estimators {
 

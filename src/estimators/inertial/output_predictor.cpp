@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "estimators/inertial/output_predictor.hpp"
+#include "tetap/estimators/inertial/output_predictor.hpp"
 
 #include <limits>
 

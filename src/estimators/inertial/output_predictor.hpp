@@ -4,11 +4,11 @@
 // horizon and its output predictor are those of Khosravian, Trumpf, Mahony & Hamel 2015, and of PX4's EKF2.
 #pragma once
 
-#include "estimators/inertial/imu_cells.hpp"
-#include "estimators/inertial/imu_input.hpp"
-#include "estimators/inertial/rebuild_schedule.hpp"
-#include "nav/strapdown.hpp"
-#include "sensor/window.hpp"
+#include "tetap/estimators/inertial/imu_cells.hpp"
+#include "tetap/estimators/inertial/imu_input.hpp"
+#include "tetap/estimators/inertial/rebuild_schedule.hpp"
+#include "tetap/nav/strapdown.hpp"
+#include "tetap/sensor/window.hpp"
 
 #include <cstdint>
 

@@ -2,7 +2,7 @@
 // New starts of the output predictor from the horizon: after a correction there, once the tick has work left for it.
 #pragma once
 
-#include "base/time.hpp"
+#include "tetap/base/time.hpp"
 
 #include <cstdint>
 

@@ -3,11 +3,11 @@
 // inflate a block, reset a block, restart.
 #pragma once
 
-#include "checks/persistence.hpp"
-#include "estimators/estimate.hpp"
-#include "estimators/inertial/source.hpp"
-#include "nav/ins.hpp"
-#include "param/parameters.hpp"
+#include "tetap/checks/persistence.hpp"
+#include "tetap/estimators/estimate.hpp"
+#include "tetap/estimators/inertial/source.hpp"
+#include "tetap/nav/ins.hpp"
+#include "tetap/param/parameters.hpp"
 
 #include <array>
 #include <cstdint>

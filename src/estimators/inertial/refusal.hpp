@@ -2,10 +2,10 @@
 // Refusals of a source by its innovation gate, and when the filter has to give way.
 #pragma once
 
-#include "checks/persistence.hpp"
-#include "estimators/inertial/filter_view.hpp"
-#include "estimators/inertial/source.hpp"
-#include "estimators/inertial/vote.hpp"
+#include "tetap/checks/persistence.hpp"
+#include "tetap/estimators/inertial/filter_view.hpp"
+#include "tetap/estimators/inertial/source.hpp"
+#include "tetap/estimators/inertial/vote.hpp"
 
 namespace tetap::estimators {
 

@@ -4,10 +4,10 @@
 // like for every source (EstimatorAidSource).
 #pragma once
 
-#include "base/time.hpp"
-#include "nav/so3.hpp"
-#include "sensor/source_state.hpp"
-#include "sensor/vocabulary.hpp"
+#include "tetap/base/time.hpp"
+#include "tetap/nav/so3.hpp"
+#include "tetap/sensor/source_state.hpp"
+#include "tetap/sensor/vocabulary.hpp"
 
 #include <array>
 #include <concepts>

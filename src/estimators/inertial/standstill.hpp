@@ -5,11 +5,11 @@
 // therefore fused only while the filter knows less. Each mean of the gyroscope has samples of its own.
 #pragma once
 
-#include "checks/persistence.hpp"
-#include "estimators/inertial/filter_view.hpp"
-#include "estimators/inertial/work_budget.hpp"
-#include "model/zero_rate.hpp"
-#include "model/zero_velocity.hpp"
+#include "tetap/checks/persistence.hpp"
+#include "tetap/estimators/inertial/filter_view.hpp"
+#include "tetap/estimators/inertial/work_budget.hpp"
+#include "tetap/model/zero_rate.hpp"
+#include "tetap/model/zero_velocity.hpp"
 
 #include <utility>
 

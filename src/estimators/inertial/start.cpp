@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Inertial navigation: start, pose from outside, restart.
-#include "estimators/inertial/inertial.hpp"
-#include "model/dual_heading.hpp"
+#include "tetap/estimators/inertial/inertial.hpp"
+#include "tetap/model/dual_heading.hpp"
 
 namespace tetap::estimators {
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Inertial navigation: one tick. The present is predicted from the horizon, and the horizon's work is shared out.
-#include "estimators/inertial/inertial.hpp"
+#include "tetap/estimators/inertial/inertial.hpp"
 
 namespace tetap::estimators {
 

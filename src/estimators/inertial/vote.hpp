@@ -5,9 +5,9 @@
 // "Sequential tests of statistical hypotheses", Ann. Math. Stat. 16(2).
 #pragma once
 
-#include "checks/persistence.hpp"
-#include "nav/so3.hpp"
-#include "param/parameters.hpp"
+#include "tetap/checks/persistence.hpp"
+#include "tetap/nav/so3.hpp"
+#include "tetap/param/parameters.hpp"
 
 #include <cstdint>
 

@@ -3,9 +3,9 @@
 // the middle of the way.
 #pragma once
 
-#include "model/gnss_fix_3d.hpp"
-#include "nav/so3.hpp"
-#include "param/parameters.hpp"
+#include "tetap/model/gnss_fix_3d.hpp"
+#include "tetap/nav/so3.hpp"
+#include "tetap/param/parameters.hpp"
 
 namespace tetap::estimators {
 

@@ -2,7 +2,7 @@
 // Readings of wheels: speeds of two wheels, and the forward speed that follows.
 #pragma once
 
-#include "checks/wheel_slip.hpp"
+#include "tetap/checks/wheel_slip.hpp"
 
 namespace tetap::estimators {
 

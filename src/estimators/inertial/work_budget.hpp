@@ -3,7 +3,7 @@
 // one measurement, or to rebuild the prediction. The farther the horizon is behind, the larger it is.
 #pragma once
 
-#include "base/time.hpp"
+#include "tetap/base/time.hpp"
 
 #include <cstdint>
 

@@ -3,8 +3,8 @@
 // likelier cause, so the way is uncertain at once. The heading follows when the landmarks do not vouch for it.
 #pragma once
 
-#include "estimators/mapping/recording_ekf.hpp"
-#include "estimators/planar/turn_check.hpp"
+#include "tetap/estimators/mapping/recording_ekf.hpp"
+#include "tetap/estimators/planar/turn_check.hpp"
 
 #include <concepts>
 

@@ -2,11 +2,11 @@
 // EKF-SLAM as PlanarMapper asks for it.
 #pragma once
 
-#include "estimators/mapping/sighting_record.hpp"
-#include "estimators/own_map.hpp"
-#include "filter/update.hpp"
-#include "param/parameters.hpp"
-#include "slam/ekf_mapper.hpp"
+#include "tetap/estimators/mapping/sighting_record.hpp"
+#include "tetap/estimators/own_map.hpp"
+#include "tetap/filter/update.hpp"
+#include "tetap/param/parameters.hpp"
+#include "tetap/slam/ekf_mapper.hpp"
 
 #include <array>
 #include <cstddef>

@@ -3,11 +3,11 @@
 // is where the robot was when it was last put somewhere.
 #pragma once
 
-#include "estimators/mapping/sighting_record.hpp"
-#include "estimators/own_map.hpp"
-#include "filter/update.hpp"
-#include "param/parameters.hpp"
-#include "slam/fast_slam.hpp"
+#include "tetap/estimators/mapping/sighting_record.hpp"
+#include "tetap/estimators/own_map.hpp"
+#include "tetap/filter/update.hpp"
+#include "tetap/param/parameters.hpp"
+#include "tetap/slam/fast_slam.hpp"
 
 #include <array>
 #include <cstddef>

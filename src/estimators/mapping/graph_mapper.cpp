@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "estimators/mapping/graph_mapper.hpp"
+#include "tetap/estimators/mapping/graph_mapper.hpp"
 
-#include "base/reinitialise.hpp"
-#include "estimators/mapping/pose_covariance.hpp"
-#include "estimators/planar/window_motion.hpp"
+#include "tetap/base/reinitialise.hpp"
+#include "tetap/estimators/mapping/pose_covariance.hpp"
+#include "tetap/estimators/planar/window_motion.hpp"
 
 namespace tetap::estimators {
 

@@ -6,13 +6,13 @@
 // Delayed: the graph is at the far end of the window. Dead reckoning carries its pose to the present.
 #pragma once
 
-#include "base/state_digest.hpp"
-#include "estimators/context.hpp"
-#include "estimators/estimate.hpp"
-#include "estimators/own_map.hpp"
-#include "estimators/planar/dead_reckoning.hpp"
-#include "sensor/window.hpp"
-#include "slam/keyframe_graph.hpp"
+#include "tetap/base/state_digest.hpp"
+#include "tetap/estimators/context.hpp"
+#include "tetap/estimators/estimate.hpp"
+#include "tetap/estimators/own_map.hpp"
+#include "tetap/estimators/planar/dead_reckoning.hpp"
+#include "tetap/sensor/window.hpp"
+#include "tetap/slam/keyframe_graph.hpp"
 
 #include <array>
 #include <cstddef>

@@ -6,13 +6,13 @@
 // reckoning carries its pose to the present, so a tick without a sighting costs what dead reckoning costs.
 #pragma once
 
-#include "base/state_digest.hpp"
-#include "estimators/context.hpp"
-#include "estimators/mapping/checked_motion.hpp"
-#include "estimators/mapping/ekf_slam_engine.hpp"
-#include "estimators/mapping/fast_slam_engine.hpp"
-#include "estimators/own_map.hpp"
-#include "sensor/window.hpp"
+#include "tetap/base/state_digest.hpp"
+#include "tetap/estimators/context.hpp"
+#include "tetap/estimators/mapping/checked_motion.hpp"
+#include "tetap/estimators/mapping/ekf_slam_engine.hpp"
+#include "tetap/estimators/mapping/fast_slam_engine.hpp"
+#include "tetap/estimators/own_map.hpp"
+#include "tetap/sensor/window.hpp"
 
 #include <array>
 #include <cstddef>

@@ -2,8 +2,8 @@
 // Pose and covariance that a command or the parameters state, for estimators that make a map.
 #pragma once
 
-#include "estimators/context.hpp"
-#include "estimators/estimate.hpp"
+#include "tetap/estimators/context.hpp"
+#include "tetap/estimators/estimate.hpp"
 
 namespace tetap::estimators {
 

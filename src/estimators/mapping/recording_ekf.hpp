@@ -3,8 +3,8 @@
 // motion.
 #pragma once
 
-#include "filter/ekf.hpp"
-#include "model/planar_increment.hpp"
+#include "tetap/filter/ekf.hpp"
+#include "tetap/model/planar_increment.hpp"
 
 #include <array>
 #include <cstddef>

@@ -2,8 +2,8 @@
 // A mapper's landmarks and records in the words of the bus.
 #pragma once
 
-#include "estimators/estimate.hpp"
-#include "slam/sighting.hpp"
+#include "tetap/estimators/estimate.hpp"
+#include "tetap/slam/sighting.hpp"
 
 #include <cstdint>
 

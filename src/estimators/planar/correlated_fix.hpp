@@ -3,10 +3,10 @@
 // that repeats the fix before.
 #pragma once
 
-#include "base/math.hpp"
-#include "checks/coloured_noise.hpp"
-#include "filter/update.hpp"
-#include "model/gnss_position.hpp"
+#include "tetap/base/math.hpp"
+#include "tetap/checks/coloured_noise.hpp"
+#include "tetap/filter/update.hpp"
+#include "tetap/model/gnss_position.hpp"
 
 namespace tetap::estimators {
 

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "estimators/planar/dead_reckoning.hpp"
+#include "tetap/estimators/planar/dead_reckoning.hpp"
 
-#include "estimators/mapping/recording_ekf.hpp"
-#include "estimators/planar/summing_ekf.hpp"
-#include "filter/ukf.hpp"
-#include "filter/ukf_sqrt.hpp"
+#include "tetap/estimators/mapping/recording_ekf.hpp"
+#include "tetap/estimators/planar/summing_ekf.hpp"
+#include "tetap/filter/ukf.hpp"
+#include "tetap/filter/ukf_sqrt.hpp"
 
 namespace tetap::estimators {
 

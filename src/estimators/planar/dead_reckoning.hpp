@@ -4,12 +4,12 @@
 // never splits an integration, and the pose after n counts is the textbook's to the bit.
 #pragma once
 
-#include "estimators/estimate.hpp"
-#include "estimators/planar/planar_ekf.hpp"
-#include "filter/covariance_access.hpp"
-#include "model/planar_increment.hpp"
-#include "param/parameters.hpp"
-#include "sensor/samples.hpp"
+#include "tetap/estimators/estimate.hpp"
+#include "tetap/estimators/planar/planar_ekf.hpp"
+#include "tetap/filter/covariance_access.hpp"
+#include "tetap/model/planar_increment.hpp"
+#include "tetap/param/parameters.hpp"
+#include "tetap/sensor/samples.hpp"
 
 #include <cstdint>
 

@@ -3,9 +3,9 @@
 // travel by GNSS and in that frame give the turn between the frames. GNSS has to have seen the robot travel far enough.
 #pragma once
 
-#include "base/math.hpp"
-#include "estimators/context.hpp"
-#include "model/gnss_position.hpp"
+#include "tetap/base/math.hpp"
+#include "tetap/estimators/context.hpp"
+#include "tetap/model/gnss_position.hpp"
 
 #include <optional>
 

@@ -3,8 +3,8 @@
 // as wide as it is: the variance of an even distribution over it (step^2 / 12) is added to the sensor's.
 #pragma once
 
-#include "base/math.hpp"
-#include "filter/grid.hpp"
+#include "tetap/base/math.hpp"
+#include "tetap/filter/grid.hpp"
 
 #include <array>
 #include <cstddef>

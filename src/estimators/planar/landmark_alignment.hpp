@@ -5,10 +5,10 @@
 // it is seen: the frame may still turn about it.
 #pragma once
 
-#include "base/math.hpp"
-#include "estimators/context.hpp"
-#include "filter/update.hpp"
-#include "model/range_bearing.hpp"
+#include "tetap/base/math.hpp"
+#include "tetap/estimators/context.hpp"
+#include "tetap/filter/update.hpp"
+#include "tetap/model/range_bearing.hpp"
 
 #include <cstdint>
 

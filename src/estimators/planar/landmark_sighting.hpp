@@ -2,12 +2,12 @@
 // A sighting of a landmark of the map, for estimators that weigh places instead of correcting a pose.
 #pragma once
 
-#include "base/math.hpp"
-#include "estimators/context.hpp"
-#include "estimators/estimate.hpp"
-#include "estimators/planar/planar_ekf.hpp"
-#include "model/range_bearing.hpp"
-#include "sensor/samples.hpp"
+#include "tetap/base/math.hpp"
+#include "tetap/estimators/context.hpp"
+#include "tetap/estimators/estimate.hpp"
+#include "tetap/estimators/planar/planar_ekf.hpp"
+#include "tetap/model/range_bearing.hpp"
+#include "tetap/sensor/samples.hpp"
 
 #include <algorithm>
 #include <cstdint>

@@ -3,12 +3,12 @@
 // wheels. Where they show two places, one of them is wrong itself, and nothing is concluded.
 #pragma once
 
-#include "base/math.hpp"
-#include "checks/chi_square.hpp"
-#include "checks/persistence.hpp"
-#include "filter/update.hpp"
-#include "model/gnss_position.hpp"
-#include "model/landmark.hpp"
+#include "tetap/base/math.hpp"
+#include "tetap/checks/chi_square.hpp"
+#include "tetap/checks/persistence.hpp"
+#include "tetap/filter/update.hpp"
+#include "tetap/model/gnss_position.hpp"
+#include "tetap/model/landmark.hpp"
 
 #include <cstddef>
 #include <cstdint>

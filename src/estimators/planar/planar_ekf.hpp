@@ -2,8 +2,8 @@
 // The extended Kalman filter of the planar pose, whose motion and measurements declare their structure by type.
 #pragma once
 
-#include "filter/structured_kalman.hpp"
-#include "model/planar_pose.hpp"
+#include "tetap/filter/structured_kalman.hpp"
+#include "tetap/model/planar_pose.hpp"
 
 namespace tetap::estimators {
 

@@ -2,7 +2,7 @@
 // The planar pose by extended Kalman filter.
 #pragma once
 
-#include "estimators/planar/pose_filter.hpp"
+#include "tetap/estimators/planar/pose_filter.hpp"
 
 namespace tetap::estimators {
 

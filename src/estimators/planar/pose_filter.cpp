@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "estimators/planar/correlated_fix.hpp"
-#include "estimators/planar/landmark_sighting.hpp"
-#include "estimators/planar/pose_ekf.hpp"
-#include "estimators/planar/pose_ukf.hpp"
+#include "tetap/estimators/planar/correlated_fix.hpp"
+#include "tetap/estimators/planar/landmark_sighting.hpp"
+#include "tetap/estimators/planar/pose_ekf.hpp"
+#include "tetap/estimators/planar/pose_ukf.hpp"
 
 namespace tetap::estimators {
 

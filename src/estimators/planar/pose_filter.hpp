@@ -4,18 +4,18 @@
 // root.
 #pragma once
 
-#include "checks/persistence.hpp"
-#include "estimators/context.hpp"
-#include "estimators/planar/dead_reckoning.hpp"
-#include "estimators/planar/gnss_alignment.hpp"
-#include "estimators/planar/landmark_alignment.hpp"
-#include "estimators/planar/motion_vote.hpp"
-#include "estimators/planar/relocalisation.hpp"
-#include "estimators/planar/turn_check.hpp"
-#include "model/bearing.hpp"
-#include "model/gnss_position.hpp"
-#include "model/range.hpp"
-#include "model/range_bearing.hpp"
+#include "tetap/checks/persistence.hpp"
+#include "tetap/estimators/context.hpp"
+#include "tetap/estimators/planar/dead_reckoning.hpp"
+#include "tetap/estimators/planar/gnss_alignment.hpp"
+#include "tetap/estimators/planar/landmark_alignment.hpp"
+#include "tetap/estimators/planar/motion_vote.hpp"
+#include "tetap/estimators/planar/relocalisation.hpp"
+#include "tetap/estimators/planar/turn_check.hpp"
+#include "tetap/model/bearing.hpp"
+#include "tetap/model/gnss_position.hpp"
+#include "tetap/model/range.hpp"
+#include "tetap/model/range_bearing.hpp"
 
 #include <array>
 #include <concepts>

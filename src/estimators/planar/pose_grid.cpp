@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "estimators/planar/pose_grid.hpp"
+#include "tetap/estimators/planar/pose_grid.hpp"
 
-#include "base/reinitialise.hpp"
-#include "estimators/planar/window_motion.hpp"
+#include "tetap/base/reinitialise.hpp"
+#include "tetap/estimators/planar/window_motion.hpp"
 
 namespace tetap::estimators {
 

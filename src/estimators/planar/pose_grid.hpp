@@ -8,13 +8,13 @@
 // its covariance, and dead reckoning carries both to the present.
 #pragma once
 
-#include "base/state_digest.hpp"
-#include "estimators/paced_job.hpp"
-#include "estimators/planar/dead_reckoning.hpp"
-#include "estimators/planar/grid_likelihood.hpp"
-#include "estimators/planar/landmark_sighting.hpp"
-#include "estimators/planar/summing_ekf.hpp"
-#include "sensor/window.hpp"
+#include "tetap/base/state_digest.hpp"
+#include "tetap/estimators/paced_job.hpp"
+#include "tetap/estimators/planar/dead_reckoning.hpp"
+#include "tetap/estimators/planar/grid_likelihood.hpp"
+#include "tetap/estimators/planar/landmark_sighting.hpp"
+#include "tetap/estimators/planar/summing_ekf.hpp"
+#include "tetap/sensor/window.hpp"
 
 #include <array>
 #include <cstddef>

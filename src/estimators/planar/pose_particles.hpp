@@ -7,13 +7,13 @@
 // present. A tick without a sighting costs what dead reckoning costs.
 #pragma once
 
-#include "base/state_digest.hpp"
-#include "estimators/context.hpp"
-#include "estimators/planar/dead_reckoning.hpp"
-#include "estimators/planar/landmark_sighting.hpp"
-#include "estimators/planar/summing_ekf.hpp"
-#include "filter/particle_localisation.hpp"
-#include "sensor/window.hpp"
+#include "tetap/base/state_digest.hpp"
+#include "tetap/estimators/context.hpp"
+#include "tetap/estimators/planar/dead_reckoning.hpp"
+#include "tetap/estimators/planar/landmark_sighting.hpp"
+#include "tetap/estimators/planar/summing_ekf.hpp"
+#include "tetap/filter/particle_localisation.hpp"
+#include "tetap/sensor/window.hpp"
 
 #include <array>
 #include <cstddef>

@@ -2,9 +2,9 @@
 // The planar pose by unscented Kalman filter, with P or with a triangular root of it.
 #pragma once
 
-#include "estimators/planar/pose_filter.hpp"
-#include "filter/ukf.hpp"
-#include "filter/ukf_sqrt.hpp"
+#include "tetap/estimators/planar/pose_filter.hpp"
+#include "tetap/filter/ukf.hpp"
+#include "tetap/filter/ukf_sqrt.hpp"
 
 namespace tetap::estimators {
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "estimators/planar/position_fusion.hpp"
+#include "tetap/estimators/planar/position_fusion.hpp"
 
-#include "filter/update.hpp"
+#include "tetap/filter/update.hpp"
 
 namespace tetap::estimators {
 

@@ -5,10 +5,10 @@
 // stamp.
 #pragma once
 
-#include "estimators/context.hpp"
-#include "estimators/estimate.hpp"
-#include "filter/static_fusion.hpp"
-#include "sensor/samples.hpp"
+#include "tetap/estimators/context.hpp"
+#include "tetap/estimators/estimate.hpp"
+#include "tetap/filter/static_fusion.hpp"
+#include "tetap/sensor/samples.hpp"
 
 #include <array>
 #include <cstddef>

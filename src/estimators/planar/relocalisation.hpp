@@ -5,14 +5,14 @@
 // identity must not move the filter, so a rival has to explain every sighting, of several landmarks, over some time.
 #pragma once
 
-#include "base/math.hpp"
-#include "checks/persistence.hpp"
-#include "estimators/planar/correlated_fix.hpp"
-#include "estimators/planar/landmark_alignment.hpp"
-#include "estimators/planar/planar_ekf.hpp"
-#include "filter/update.hpp"
-#include "model/gnss_position.hpp"
-#include "model/planar_increment.hpp"
+#include "tetap/base/math.hpp"
+#include "tetap/checks/persistence.hpp"
+#include "tetap/estimators/planar/correlated_fix.hpp"
+#include "tetap/estimators/planar/landmark_alignment.hpp"
+#include "tetap/estimators/planar/planar_ekf.hpp"
+#include "tetap/filter/update.hpp"
+#include "tetap/model/gnss_position.hpp"
+#include "tetap/model/planar_increment.hpp"
 
 #include <array>
 #include <cstdint>

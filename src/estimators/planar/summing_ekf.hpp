@@ -3,8 +3,8 @@
 // for many of them.
 #pragma once
 
-#include "estimators/planar/planar_ekf.hpp"
-#include "model/planar_increment.hpp"
+#include "tetap/estimators/planar/planar_ekf.hpp"
+#include "tetap/model/planar_increment.hpp"
 
 namespace tetap::estimators {
 

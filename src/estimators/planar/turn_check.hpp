@@ -3,11 +3,11 @@
 // or reversed wheels, a difference that lasts makes heading and position uncertain.
 #pragma once
 
-#include "base/math.hpp"
-#include "checks/turn_residual.hpp"
-#include "checks/wheel_turn.hpp"
-#include "estimators/planar/dead_reckoning.hpp"
-#include "filter/update.hpp"
+#include "tetap/base/math.hpp"
+#include "tetap/checks/turn_residual.hpp"
+#include "tetap/checks/wheel_turn.hpp"
+#include "tetap/estimators/planar/dead_reckoning.hpp"
+#include "tetap/filter/update.hpp"
 
 #include <cstdint>
 

@@ -2,8 +2,8 @@
 // Motion from the far end of the fusion window to the present, by the samples in it.
 #pragma once
 
-#include "param/parameters.hpp"
-#include "sensor/window.hpp"
+#include "tetap/param/parameters.hpp"
+#include "tetap/sensor/window.hpp"
 
 namespace tetap::estimators {
 

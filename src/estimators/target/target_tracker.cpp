@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "estimators/target/target_tracker.hpp"
+#include "tetap/estimators/target/target_tracker.hpp"
 
-#include "model/radar.hpp"
-#include "model/target_position.hpp"
+#include "tetap/model/radar.hpp"
+#include "tetap/model/target_position.hpp"
 
 namespace tetap::estimators {
 

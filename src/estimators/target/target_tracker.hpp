@@ -4,15 +4,15 @@
 // extended Kalman filter, constant turn rate and velocity by unscented filter.
 #pragma once
 
-#include "checks/persistence.hpp"
-#include "estimators/context.hpp"
-#include "estimators/estimate.hpp"
-#include "filter/ekf.hpp"
-#include "filter/ukf.hpp"
-#include "model/constant_velocity.hpp"
-#include "model/ctrv.hpp"
-#include "model/kinematics.hpp"
-#include "sensor/samples.hpp"
+#include "tetap/checks/persistence.hpp"
+#include "tetap/estimators/context.hpp"
+#include "tetap/estimators/estimate.hpp"
+#include "tetap/filter/ekf.hpp"
+#include "tetap/filter/ukf.hpp"
+#include "tetap/model/constant_velocity.hpp"
+#include "tetap/model/ctrv.hpp"
+#include "tetap/model/kinematics.hpp"
+#include "tetap/sensor/samples.hpp"
 
 #include <cstdint>
 

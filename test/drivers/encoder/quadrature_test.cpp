@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "base/random.hpp"
+#include "tetap/base/random.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // From the receiver's bytes over the bus to the filter's input. The place is kept to the last unit. The heading of two
 // antennas becomes that of the body, however their line lies on the robot.
-#include "bus/encoder.hpp"
 #include "drivers/gnss/gnss_bytes.hpp"
-#include "estimators/inertial/sources/outside_heading.hpp"
 #include "node/bench.hpp"
+#include "tetap/bus/encoder.hpp"
+#include "tetap/estimators/inertial/sources/outside_heading.hpp"
 
 #include <gtest/gtest.h>
 

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "base/random.hpp"
+#include "tetap/base/random.hpp"
 
 #include <algorithm>
 #include <cmath>

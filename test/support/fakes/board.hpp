@@ -2,11 +2,11 @@
 // A board made of the fakes: every sensor that a node can have wired, a bus in memory, a clock that the test moves.
 #pragma once
 
-#include "base/time.hpp"
 #include "hal/board.hpp"
 #include "support/fakes/encoder.hpp"
 #include "support/fakes/icm42688.hpp"
 #include "support/fakes/ublox.hpp"
+#include "tetap/base/time.hpp"
 
 #include <cstdint>
 

@@ -10,9 +10,9 @@
 //   encoder.read();                                                  // {40, 10'000 us}
 #pragma once
 
-#include "base/random.hpp"
-#include "base/time.hpp"
 #include "hal/encoder_counter.hpp"
+#include "tetap/base/random.hpp"
+#include "tetap/base/time.hpp"
 
 #include <algorithm>
 #include <array>

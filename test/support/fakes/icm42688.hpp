@@ -10,12 +10,12 @@
 //   EXPECT_EQ(chip.broken_rules(), 0);    // did the host keep to what the sheet asks of it?
 #pragma once
 
-#include "base/random.hpp"
-#include "base/time.hpp"
 #include "support/fakes/icm42688_faults.hpp"
 #include "support/fakes/icm42688_fifo.hpp"
 #include "support/fakes/icm42688_registers.hpp"
 #include "support/fakes/icm42688_signal.hpp"
+#include "tetap/base/random.hpp"
+#include "tetap/base/time.hpp"
 
 #include <array>
 #include <concepts>

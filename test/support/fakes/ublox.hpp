@@ -8,10 +8,10 @@
 // Open points of the manuals are answered in the way that is hardest on the host, and a comment marks each.
 #pragma once
 
-#include "base/time.hpp"
 #include "hal/byte_stream.hpp"
 #include "support/fakes/ublox_items.hpp"
 #include "support/fakes/ublox_output.hpp"
+#include "tetap/base/time.hpp"
 
 #include <algorithm>
 #include <array>

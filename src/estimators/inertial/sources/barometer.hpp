@@ -2,10 +2,10 @@
 // Barometer: of the height and the barometer's zero the one that is known worse is corrected by the other.
 #pragma once
 
-#include "checks/stuck_value.hpp"
-#include "estimators/inertial/barometer_zero.hpp"
-#include "estimators/inertial/filter_view.hpp"
-#include "model/height.hpp"
+#include "tetap/checks/stuck_value.hpp"
+#include "tetap/estimators/inertial/barometer_zero.hpp"
+#include "tetap/estimators/inertial/filter_view.hpp"
+#include "tetap/model/height.hpp"
 
 namespace tetap::estimators {
 

@@ -3,10 +3,10 @@
 // speed comes.
 #pragma once
 
-#include "estimators/inertial/filter_view.hpp"
-#include "estimators/inertial/refusal.hpp"
-#include "estimators/inertial/wheel_reading.hpp"
-#include "model/wheel_speed.hpp"
+#include "tetap/estimators/inertial/filter_view.hpp"
+#include "tetap/estimators/inertial/refusal.hpp"
+#include "tetap/estimators/inertial/wheel_reading.hpp"
+#include "tetap/model/wheel_speed.hpp"
 
 namespace tetap::estimators {
 

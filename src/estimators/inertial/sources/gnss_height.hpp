@@ -2,10 +2,10 @@
 // GNSS position, vertical: a height may be refused by itself, and becomes true by persisting.
 #pragma once
 
-#include "checks/offset_hypothesis.hpp"
-#include "estimators/inertial/filter_view.hpp"
-#include "estimators/inertial/fix_measurement.hpp"
-#include "estimators/inertial/refusal.hpp"
+#include "tetap/checks/offset_hypothesis.hpp"
+#include "tetap/estimators/inertial/filter_view.hpp"
+#include "tetap/estimators/inertial/fix_measurement.hpp"
+#include "tetap/estimators/inertial/refusal.hpp"
 
 namespace tetap::estimators {
 

@@ -4,17 +4,17 @@
 // refused count only by persisting (checks/offset_hypothesis.hpp).
 #pragma once
 
-#include "checks/chi_square.hpp"
-#include "checks/coloured_noise.hpp"
-#include "checks/frozen_position.hpp"
-#include "checks/offset_hypothesis.hpp"
-#include "checks/position_drift.hpp"
-#include "checks/startup_fix_check.hpp"
-#include "estimators/inertial/filter_view.hpp"
-#include "estimators/inertial/fix_measurement.hpp"
-#include "estimators/inertial/recovery.hpp"
-#include "estimators/inertial/refusal.hpp"
-#include "model/gnss_fix_3d.hpp"
+#include "tetap/checks/chi_square.hpp"
+#include "tetap/checks/coloured_noise.hpp"
+#include "tetap/checks/frozen_position.hpp"
+#include "tetap/checks/offset_hypothesis.hpp"
+#include "tetap/checks/position_drift.hpp"
+#include "tetap/checks/startup_fix_check.hpp"
+#include "tetap/estimators/inertial/filter_view.hpp"
+#include "tetap/estimators/inertial/fix_measurement.hpp"
+#include "tetap/estimators/inertial/recovery.hpp"
+#include "tetap/estimators/inertial/refusal.hpp"
+#include "tetap/model/gnss_fix_3d.hpp"
 
 #include <array>
 #include <optional>

@@ -3,9 +3,9 @@
 // (vote.hpp).
 #pragma once
 
-#include "estimators/inertial/filter_view.hpp"
-#include "estimators/inertial/refusal.hpp"
-#include "model/gnss_velocity_3d.hpp"
+#include "tetap/estimators/inertial/filter_view.hpp"
+#include "tetap/estimators/inertial/refusal.hpp"
+#include "tetap/model/gnss_velocity_3d.hpp"
 
 namespace tetap::estimators {
 

@@ -3,11 +3,11 @@
 // variance that would end there. While the heading is better known already, headings are compared and nothing more.
 #pragma once
 
-#include "checks/magnetic_field_check.hpp"
-#include "checks/stuck_value.hpp"
-#include "estimators/inertial/heading_monitor.hpp"
-#include "model/magnetic_heading.hpp"
-#include "sensor/magnetic_field.hpp"
+#include "tetap/checks/magnetic_field_check.hpp"
+#include "tetap/checks/stuck_value.hpp"
+#include "tetap/estimators/inertial/heading_monitor.hpp"
+#include "tetap/model/magnetic_heading.hpp"
+#include "tetap/sensor/magnetic_field.hpp"
 
 namespace tetap::estimators {
 

@@ -2,10 +2,10 @@
 // Heading from outside: of a receiver with two antennas, for instance.
 #pragma once
 
-#include "checks/stuck_value.hpp"
-#include "estimators/inertial/filter_view.hpp"
-#include "estimators/inertial/refusal.hpp"
-#include "model/dual_heading.hpp"
+#include "tetap/checks/stuck_value.hpp"
+#include "tetap/estimators/inertial/filter_view.hpp"
+#include "tetap/estimators/inertial/refusal.hpp"
+#include "tetap/model/dual_heading.hpp"
 
 namespace tetap::estimators {
 

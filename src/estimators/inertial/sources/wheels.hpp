@@ -2,10 +2,10 @@
 // Wheels: encoder counts or speeds of two wheels, as far as they roll. Their forward speed is a source of its own.
 #pragma once
 
-#include "checks/wheel_slip.hpp"
-#include "estimators/inertial/encoder_interval.hpp"
-#include "estimators/inertial/filter_view.hpp"
-#include "estimators/inertial/wheel_reading.hpp"
+#include "tetap/checks/wheel_slip.hpp"
+#include "tetap/estimators/inertial/encoder_interval.hpp"
+#include "tetap/estimators/inertial/filter_view.hpp"
+#include "tetap/estimators/inertial/wheel_reading.hpp"
 
 namespace tetap::estimators {
 

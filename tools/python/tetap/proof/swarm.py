@@ -44,7 +44,7 @@ DEVICE = {"slip_left": "wheels", "slip_right": "wheels", "wheel_stuck": "wheels"
 EVERY = "every device"  # of faults that hurt all of them, or that no device shows
 # Values of enumerations that no run of the swarm has, and who has them.
 EXPLAINED = {
-    "BootCause": "boards only: test/hal/stm32_parts_test.cpp", "CpuFault": "boards only: test/board", "ImuState": "wired sensors: test/host/wired_replay_test.cpp",
+    "BootCause": "boards only: test/hal/stm32_parts_test.cpp", "CpuFault": "boards only: sim_host/emulator/test", "ImuState": "wired sensors: test/host/wired_replay_test.cpp",
     "GnssState": "wired sensors: test/host/wired_replay_test.cpp", "SyncState": "a run of the swarm is in lockstep: test/node/pacer_test.cpp",
     "SyncKind": "a run of the swarm is in lockstep: test/node/bus_trust_test.cpp", "EstimatorKind": "other robots, from recorded logs: test/replay",
     "GraphStatus": "pose graphs: test/node/graph_mapper_test.cpp", "LandmarkState": "test/slam/ekf_mapper_test.cpp", "OriginSource": "test/node/map_origin_test.cpp",

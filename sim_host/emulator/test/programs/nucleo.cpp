@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: Apache-2.0
+// For the emulated Nucleo-G474RE: clock to 160 MHz, a line on the console, frames by FDCAN from its interrupt, code in
+// the CCM SRAM. Each choice but 0 makes one mistake.
+#include "hal/chip/arm/cortex_m4.hpp"
+#include "hal/chip/support/mmio.hpp"
+#include "sim_host/emulator/registers_stm32g474.hpp"
+
+#include <cstdint>
+
+namespace reg = tetap::hal::stm32g474_model;
+namespace m4 = tetap::hal::cortex_m4;
+namespace can = reg::fdcan;
+using tetap::hal::Mmio;
+
+namespace {
+
+enum Mistake : std::uint32_t { kNone, kFlagNotCleared, kFifoNotAcknowledged, kWaitStates };
+
+struct Shared {
+  std::uint32_t choice;
+  std::uint32_t results[15];
+};
+volatile Shared& shared() { return *reinterpret_cast<volatile Shared*>(0x2001'6000); }
+bool is(Mistake mistake) { return shared().choice == mistake; }
+
+constexpr Mmio kRcc{reg::rcc::kRcc}, kPwr{reg::pwr::kPwr}, kFlash{reg::flash::kFlash}, kGpioA{reg::gpio::kGpioa},
+    kUsart2{reg::usart::kUsart2}, kCan{can::kFdcan1}, kRam{can::kFdcan}, kScs{m4::kSystemControlSpace};
+
+void set(Mmio block, std::uint32_t offset, std::uint32_t mask) { block.write(offset, block.read(offset) | mask); }
+
+void wait(Mmio block, std::uint32_t offset, std::uint32_t mask, std::uint32_t value) {
+  for (int i = 0; i < 200'000 && (block.read(offset) & mask) != value; ++i) continue;
+}
+
+void alternate(std::uint32_t pin, std::uint32_t function) {
+  const std::uint32_t afr = pin < 8 ? reg::gpio::afrl::kOffset : reg::gpio::afrh::kOffset, shift = 4 * (pin % 8);
+  kGpioA.write(afr, (kGpioA.read(afr) & ~(0xFU << shift)) | function << shift);
+  kGpioA.write(reg::gpio::moder::kOffset, (kGpioA.read(reg::gpio::moder::kOffset) & ~(3U << 2 * pin)) | 2U << 2 * pin);
+}
+
+void start_clock() {
+  namespace r = reg::rcc;
+  set(kRcc, r::rcc_apb1enr1::kOffset,
+      r::rcc_apb1enr1::kPwren.mask() | r::rcc_apb1enr1::kUsart2en.mask() | r::rcc_apb1enr1::kFdcanen.mask());
+  set(kRcc, r::rcc_ahb2enr::kOffset, r::rcc_ahb2enr::kGpioaen.mask());
+  kPwr.write(reg::pwr::pwr_cr5::kOffset, 0);
+  kFlash.write(reg::flash::flash_acr::kOffset, 0x0004'0600 | (is(kWaitStates) ? 3U : 4U));
+  set(kRcc, r::rcc_cr::kOffset, r::rcc_cr::kHseon.mask());
+  wait(kRcc, r::rcc_cr::kOffset, r::rcc_cr::kHserdy.mask(), r::rcc_cr::kHserdy.mask());
+  kRcc.write(r::rcc_pllcfgr::kOffset, r::rcc_pllcfgr::kPllsrc(3) | r::rcc_pllcfgr::kPllm(5) |
+                                          r::rcc_pllcfgr::kPlln(80) | r::rcc_pllcfgr::kPllren(1));
+  set(kRcc, r::rcc_cr::kOffset, r::rcc_cr::kPllon.mask());
+  wait(kRcc, r::rcc_cr::kOffset, r::rcc_cr::kPllrdy.mask(), r::rcc_cr::kPllrdy.mask());
+  kRcc.write(r::rcc_cfgr::kOffset, r::rcc_cfgr::kHpre(8) | r::rcc_cfgr::kSw(3));
+  for (int i = 0; i < 100; ++i) asm volatile("nop");
+  kRcc.write(r::rcc_cfgr::kOffset, r::rcc_cfgr::kSw(3));
+  kRcc.write(r::rcc_ccipr::kOffset, r::rcc_ccipr::kFdcansel(2));
+}
+
+void print(const char* text) {
+  alternate(2, 7);
+  kUsart2.write(reg::usart::brr::kOffset, 1389);
+  kUsart2.write(reg::usart::cr1::kOffset, reg::usart::cr1::kUe.mask() | reg::usart::cr1::kTe.mask());
+  for (; *text != '\0'; ++text) {
+    wait(kUsart2, reg::usart::isr::kOffset, reg::usart::isr::kTxe.mask(), reg::usart::isr::kTxe.mask());
+    kUsart2.write(reg::usart::tdr::kOffset, static_cast<std::uint8_t>(*text));
+  }
+}
+
+void start_can() {
+  namespace cccr = can::fdcan_cccr;
+  alternate(11, 9);
+  alternate(12, 9);
+  kCan.write(cccr::kOffset, cccr::kInit(1) | cccr::kCce(1));
+  kCan.write(can::fdcan_nbtp::kOffset, can::fdcan_nbtp::kNbrp(19) | can::fdcan_nbtp::kNtseg1(12) |
+                                           can::fdcan_nbtp::kNtseg2(1) | can::fdcan_nbtp::kNsjw(1));
+  kCan.write(can::fdcan_ie::kOffset, can::fdcan_ir::kRf0n.mask());
+  kCan.write(can::fdcan_ile::kOffset, can::fdcan_ile::kEint0(1));
+  kCan.write(cccr::kOffset, 0);
+  wait(kCan, cccr::kOffset, cccr::kInit.mask(), 0);
+  kScs.write(m4::nvic::kIser, 1U << reg::interrupt::kFdcan1It0);
+}
+
+/// Sends the element that was received back with its identifier raised by one.
+void echo(std::uint32_t index) {
+  const std::uint32_t from = 0x0B0 + 72 * index;
+  const std::uint32_t buffer = can::fdcan_txfqs::kTfqpi.of(kCan.read(can::fdcan_txfqs::kOffset)),
+                      to = 0x278 + 72 * buffer;
+  kRam.write(to, kRam.read(from) + (1U << 18));
+  kRam.write(to + 4, kRam.read(from + 4) & 0x000F'0000);
+  for (std::uint32_t i = 8; i < 16; i += 4) kRam.write(to + i, kRam.read(from + i));
+  kCan.write(can::fdcan_txbar::kOffset, 1U << buffer);
+}
+
+[[gnu::section(".ccm"), gnu::noinline]] std::uint32_t from_ccm(std::uint32_t value) { return 3 * value + 1; }
+
+extern "C" std::uint32_t __ccm_begin[], __ccm_end[], __ccm_load[];
+
+}  // namespace
+
+extern "C" {
+
+[[gnu::used]] void on_can() {
+  shared().results[1] = shared().results[1] + 1;
+  if (!is(kFlagNotCleared)) kCan.write(can::fdcan_ir::kOffset, can::fdcan_ir::kRf0n.mask());
+  for (;;) {
+    const std::uint32_t status = kCan.read(can::fdcan_rxf0s::kOffset);
+    if (can::fdcan_rxf0s::kF0fl.of(status) == 0) return;
+    const std::uint32_t index = can::fdcan_rxf0s::kF0gi.of(status);
+    echo(index);
+    kCan.write(can::fdcan_rxf0a::kOffset, is(kFifoNotAcknowledged) ? (index + 1) % 3 : index);
+    if (is(kFifoNotAcknowledged)) return;
+  }
+}
+
+[[gnu::used, noreturn]] void program_main() {
+  for (std::uint32_t* to = __ccm_begin; to < __ccm_end; ++to) *to = __ccm_load[to - __ccm_begin];
+  start_clock();
+  shared().results[0] = from_ccm(from_ccm(13));
+  print("hello from 160 MHz\n");
+  start_can();
+  for (;;) asm volatile("wfi");
+}
+
+[[gnu::naked, gnu::used, noreturn]] void reset() { asm volatile("b program_main\n"); }
+[[gnu::used]] void stray() {
+  shared().results[2] = 1;
+  for (;;) continue;
+}
+}
+
+extern "C" const std::uint32_t __stack_top;
+
+struct Vectors {
+  const void* stack;
+  void (*handlers[37])();
+};
+#define STRAY5 stray, stray, stray, stray, stray
+// Reset, 14 exceptions of the core, interrupts 0 to 20, FDCAN1_IT0.
+[[gnu::used, gnu::section(".vectors")]] const Vectors vectors{
+    &__stack_top, {reset, STRAY5, STRAY5, STRAY5, STRAY5, STRAY5, STRAY5, STRAY5, on_can}};
+#undef STRAY5

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+// A robot of config/ as host programs see it: its parameters, what its estimators take, and its node behind an
+// interface. A program knows no robot when it is compiled; each robot is a module of its own (robots.hpp).
+#pragma once
+
+#include "sim_host/robot_firmware.hpp"
+#include "tetap/param/parameters.hpp"
+
+#include <memory>
+
+namespace tetap::sim {
+
+/// Samples that the estimators of a robot take and maps that they make, whatever its parameters.
+struct EstimatorFacts {
+  bool inertial = false;   ///< an inertial filter is among them
+  bool needs_imu = false;  ///< one of them is nothing without an IMU
+  bool imu = false;        ///< one of them takes such samples, as the next five
+  bool sightings = false;  ///< landmarks
+  bool magnetic = false;
+  bool pressure = false;
+  bool closures = false;
+  bool heading = false;   ///< outside headings
+  bool own_map = false;   ///< one of them makes its map
+  bool nameless = false;  ///< needs no identities for its map
+};
+
+struct Robot {
+  const char* name = "";
+  const param::Parameters* parameters = nullptr;
+  EstimatorFacts takes;
+  std::unique_ptr<RobotFirmware> (*make_firmware)(HostBoard&, const param::Parameters&, const bus::Version&) = nullptr;
+};
+
+}  // namespace tetap::sim

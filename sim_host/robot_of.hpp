@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a robot's module is made of. Only the files that CMake writes for modules include this.
+#pragma once
+
+#include "sim_host/robot.hpp"
+#include "tetap/firmware/firmware.hpp"
+#include "tetap/node/bus_protection.hpp"
+#include "tetap/param/limits.hpp"
+
+#include <memory>
+
+namespace tetap::sim {
+
+/// With the sensor's instance or without.
+template <class E, class Payload>
+concept Takes = requires(E& e, const Payload& payload, base::Micros stamp, const estimators::Context& ctx) {
+  e.fuse(payload, stamp, ctx);
+}
+|| requires(E& e, const Payload& payload, base::Micros stamp, const estimators::Context& ctx) {
+  e.fuse(payload, stamp, std::uint8_t{}, ctx);
+};
+
+/// An estimator that maps landmarks which its sightings do not name.
+template <class E>
+concept MapsNameless = requires {
+  requires E::kTakesNameless;
+};
+
+template <class... E>
+[[nodiscard]] constexpr EstimatorFacts facts_of(node::Estimators<E...>) {
+  using Kind = sensor::EstimatorKind;
+  return {.inertial = ((E::kKind == Kind::kInertial) || ...),
+          .needs_imu = ((E::kKind == Kind::kInertial || E::kKind == Kind::kAttitude) || ...),
+          .imu = (Takes<E, sensor::ImuSample> || ...),
+          .sightings = (Takes<E, sensor::LandmarkSighting> || ...),
+          .magnetic = (Takes<E, sensor::MagneticFlux> || ...),
+          .pressure = (Takes<E, sensor::AirPressure> || ...),
+          .closures = (Takes<E, sensor::LoopClosure> || ...),
+          .heading = (Takes<E, sensor::OutsideHeading> || ...),
+          .own_map = (estimators::MakesMap<E> || ...),
+          .nameless = (MapsNameless<E> || ...)};
+}
+
+/// Firmware with these estimators, tags and guards included: a host has room for what parameters may ask for. The board
+/// and the parameters outlive it.
+template <class Estimators>
+[[nodiscard]] std::unique_ptr<RobotFirmware> make_firmware(HostBoard& board, const param::Parameters& parameters,
+                                                           const bus::Version& version) {
+  class Firmware final : public RobotFirmware {
+   public:
+    Firmware(HostBoard& board, const param::Parameters& parameters, const bus::Version& version)
+        : firmware_(board, parameters, version) {}
+    void poll() override { firmware_.poll(); }
+    std::uint32_t self_check(std::uint32_t epochs) override { return firmware_.self_check(epochs); }
+    bool resume(std::span<const std::byte> state) override { return firmware_.resume(state); }
+
+   private:
+    firmware::Firmware<HostBoard, node::WithBusProtection<Estimators>> firmware_;
+  };
+  return std::make_unique<Firmware>(board, parameters, version);
+}
+
+template <class Estimators>
+[[nodiscard]] Robot robot_of(const char* name, const param::Parameters& parameters) {
+  return {.name = name,
+          .parameters = &parameters,
+          .takes = facts_of(Estimators{}),
+          .make_firmware = &make_firmware<Estimators>};
+}
+
+}  // namespace tetap::sim

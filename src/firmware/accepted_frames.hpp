@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+// The frames that a node receives: its block of 64 ids, with inputs and own outputs. The own outputs show a second node
+// of the same ids. A robot that makes a map receives the block behind it, too. A port's acceptance filter is made of
+// this.
+#pragma once
+
+#include "hal/can_bus.hpp"
+#include "tetap/bus/messages.hpp"
+#include "tetap/param/parameters.hpp"
+
+#include <cstdint>
+
+namespace tetap::firmware {
+
+/// can_base is a multiple of 64; that of a robot that makes a map, of 128.
+[[nodiscard]] constexpr hal::Acceptance accepted_by(bool makes_map, const param::Parameters& parameters) {
+  const std::uint32_t ids = makes_map ? 2 * bus::kBlock : bus::kBlock;
+  return {.id = parameters.can_base, .mask = 0x7FFU & ~(ids - 1U)};
+}
+
+template <class Estimators>
+[[nodiscard]] constexpr hal::Acceptance accepted_by(const param::Parameters& parameters) {
+  return accepted_by(Estimators::kMakesMap, parameters);
+}
+
+}  // namespace tetap::firmware
