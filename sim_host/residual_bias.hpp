@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Rest of the IMU's biases once the firmware has taken the robot's own calibration out of a sample
-// (src/sensor/calibration.hpp). A published bias is held against this truth.
+// (src/tetap/sensor/calibration.hpp). A published bias is held against this truth.
 #pragma once
 
 #include "sim_host/world/motion.hpp"

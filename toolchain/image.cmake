@@ -41,7 +41,7 @@ function(tetap_image)
   endif()
   set_target_properties(${ARG_NAME} PROPERTIES OUTPUT_NAME ${ARG_OUTPUT} SUFFIX .elf LINK_DEPENDS "${script};${PROJECT_SOURCE_DIR}/hal/chip/stm32/sections.ld"
     RUNTIME_OUTPUT_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR})
-  target_include_directories(${ARG_NAME} PRIVATE ${PROJECT_SOURCE_DIR}/include ${PROJECT_SOURCE_DIR})
+  target_include_directories(${ARG_NAME} PRIVATE ${PROJECT_SOURCE_DIR}/src ${PROJECT_SOURCE_DIR})
   target_compile_options(${ARG_NAME} PRIVATE -fstack-usage -fcallgraph-info=su)
   # A compiler cache keeps objects but not their call graphs.
   set_target_properties(${ARG_NAME} PROPERTIES CXX_COMPILER_LAUNCHER "")

@@ -1,18 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sim_host/emulator/dma_g4.hpp"
 
-#include "sim_host/emulator/registers_stm32g474.hpp"
+#include "hal/chip/stm32/registers_stm32g474.hpp"
 
 #include <algorithm>
 #include <cstring>
 
 namespace tetap::board {
 
-namespace reg = hal::stm32g474_model::dma;
-namespace mux_reg = hal::stm32g474_model::dmamux;
-namespace spi = hal::stm32g474_model::spi;
-namespace usart = hal::stm32g474_model::usart;
-namespace irq = hal::stm32g474_model::interrupt;
+namespace reg = hal::stm32g474::dma;
+namespace mux_reg = hal::stm32g474::dmamux;
+namespace spi = hal::stm32g474::spi;
+namespace usart = hal::stm32g474::usart;
+namespace irq = hal::stm32g474::interrupt;
 
 namespace {
 

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sim_host/emulator/fdcan.hpp"
 
-#include "sim_host/emulator/registers_stm32g474.hpp"
+#include "hal/chip/stm32/registers_stm32g474.hpp"
 
 #include <algorithm>
 #include <cstring>
 
 namespace tetap::board {
 
-namespace reg = hal::stm32g474_model::fdcan;
-namespace irq = hal::stm32g474_model::interrupt;
+namespace reg = hal::stm32g474::fdcan;
+namespace irq = hal::stm32g474::interrupt;
 
 namespace {
 
@@ -24,8 +24,8 @@ constexpr hal::Field kXtd{30, 1}, kRtr{29, 1}, kStandardId{18, 11}, kExtendedId{
 constexpr hal::Field kMarker{24, 8}, kEventWanted{23, 1}, kFdf{21, 1}, kBrs{20, 1}, kDlc{16, 4};
 constexpr hal::Field kAnmf{31, 1}, kFidx{24, 7}, kEventType{22, 2};
 
-namespace cccr = reg::fdcan_cccr;
-namespace ir = reg::fdcan_ir;
+namespace cccr = reg::cccr;
+namespace ir = reg::ir;
 
 /// Bits of CCCR that need INIT and CCE.
 constexpr std::uint32_t kProtected = cccr::kAsm.mask() | cccr::kMon.mask() | cccr::kDar.mask() | cccr::kTest.mask() |
@@ -37,13 +37,13 @@ struct Group {
   std::uint32_t select, flags;
 };
 constexpr Group kGroups[] = {
-    {reg::fdcan_ils::kRxfifo0.mask(), ir::kRf0n.mask() | ir::kRf0f.mask() | ir::kRf0l.mask()},
-    {reg::fdcan_ils::kRxfifo1.mask(), ir::kRf1n.mask() | ir::kRf1f.mask() | ir::kRf1l.mask()},
-    {reg::fdcan_ils::kSmsg.mask(), ir::kHpm.mask() | ir::kTc.mask() | ir::kTcf.mask()},
-    {reg::fdcan_ils::kTferr.mask(), ir::kTfe.mask() | ir::kTefn.mask() | ir::kTeff.mask() | ir::kTefl.mask()},
-    {reg::fdcan_ils::kMisc.mask(), ir::kTsw.mask() | ir::kMraf.mask() | ir::kToo.mask()},
-    {reg::fdcan_ils::kBerr.mask(), ir::kElo.mask() | ir::kEp.mask()},
-    {reg::fdcan_ils::kPerr.mask(),
+    {reg::ils::kRxfifo0.mask(), ir::kRf0n.mask() | ir::kRf0f.mask() | ir::kRf0l.mask()},
+    {reg::ils::kRxfifo1.mask(), ir::kRf1n.mask() | ir::kRf1f.mask() | ir::kRf1l.mask()},
+    {reg::ils::kSmsg.mask(), ir::kHpm.mask() | ir::kTc.mask() | ir::kTcf.mask()},
+    {reg::ils::kTferr.mask(), ir::kTfe.mask() | ir::kTefn.mask() | ir::kTeff.mask() | ir::kTefl.mask()},
+    {reg::ils::kMisc.mask(), ir::kTsw.mask() | ir::kMraf.mask() | ir::kToo.mask()},
+    {reg::ils::kBerr.mask(), ir::kElo.mask() | ir::kEp.mask()},
+    {reg::ils::kPerr.mask(),
      ir::kEw.mask() | ir::kBo.mask() | ir::kWdi.mask() | ir::kPea.mask() | ir::kPed.mask() | ir::kAra.mask()},
 };
 
@@ -68,9 +68,9 @@ Fdcan::Fdcan(Surroundings around, FdcanRam& ram, const Pins& pins, Wiring wiring
 
 void Fdcan::reset() {
   cccr_ = cccr::kResetValue;
-  nbtp_ = reg::fdcan_nbtp::kResetValue;
-  dbtp_ = reg::fdcan_dbtp::kResetValue;
-  xidam_ = reg::fdcan_xidam::kResetValue;
+  nbtp_ = reg::nbtp::kResetValue;
+  dbtp_ = reg::dbtp::kResetValue;
+  xidam_ = reg::xidam::kResetValue;
   rxgfc_ = tscc_ = ckdiv_ = txbc_ = ir_ = ie_ = ils_ = ile_ = txbtie_ = txbcie_ = 0;
   lec_ = kNoChange;
   errors_logged_ = 0;
@@ -86,17 +86,17 @@ void Fdcan::reset() {
 
 bool Fdcan::initialising() const { return cccr::kInit.of(cccr_) != 0; }
 bool Fdcan::configurable() const { return initialising() && cccr::kCce.of(cccr_) != 0; }
-bool Fdcan::queue_mode() const { return reg::fdcan_txbc::kTfqm.of(txbc_) != 0; }
+bool Fdcan::queue_mode() const { return reg::txbc::kTfqm.of(txbc_) != 0; }
 
 std::int64_t Fdcan::bit_rate() const {
-  const std::int64_t quanta = 3 + std::int64_t{reg::fdcan_nbtp::kNtseg1.of(nbtp_)} + reg::fdcan_nbtp::kNtseg2.of(nbtp_);
+  const std::int64_t quanta = 3 + std::int64_t{reg::nbtp::kNtseg1.of(nbtp_)} + reg::nbtp::kNtseg2.of(nbtp_);
   const std::int64_t kernel = kernel_hz_() / (ckdiv_ == 0 ? 1 : 2 * std::int64_t{ckdiv_});
-  return std::max<std::int64_t>(kernel / (std::int64_t{reg::fdcan_nbtp::kNbrp.of(nbtp_)} + 1) / quanta, 1);
+  return std::max<std::int64_t>(kernel / (std::int64_t{reg::nbtp::kNbrp.of(nbtp_)} + 1) / quanta, 1);
 }
 
 double Fdcan::rate_tolerance() const {
-  return rate_tolerance_of(reg::fdcan_nbtp::kNtseg1.of(nbtp_) + 1.0, reg::fdcan_nbtp::kNtseg2.of(nbtp_) + 1.0,
-                           reg::fdcan_nbtp::kNsjw.of(nbtp_) + 1.0);
+  return rate_tolerance_of(reg::nbtp::kNtseg1.of(nbtp_) + 1.0, reg::nbtp::kNtseg2.of(nbtp_) + 1.0,
+                           reg::nbtp::kNsjw.of(nbtp_) + 1.0);
 }
 
 // RM0440, "Software initialization": CCE is set only where INIT reads 1, and falls with it.
@@ -147,9 +147,9 @@ void Fdcan::init_reached() {
 void Fdcan::check_timing() const {
   if (kernel_hz_() == 0) complain("INIT cleared, but the clock that RCC_CCIPR.FDCANSEL selects does not run");
   if (kernel_hz_() > bus_hz_()) complain("kernel clock above the clock of the APB");
-  const std::uint32_t segment2 = reg::fdcan_nbtp::kNtseg2.of(nbtp_) + 1, jump = reg::fdcan_nbtp::kNsjw.of(nbtp_) + 1;
+  const std::uint32_t segment2 = reg::nbtp::kNtseg2.of(nbtp_) + 1, jump = reg::nbtp::kNsjw.of(nbtp_) + 1;
   if (jump > segment2) complain("NBTP: the jump width is longer than segment 2");
-  if (reg::fdcan_nbtp::kNtseg1.of(nbtp_) == 0) complain("NBTP: NTSEG1 of 0 is not allowed");
+  if (reg::nbtp::kNtseg1.of(nbtp_) == 0) complain("NBTP: NTSEG1 of 0 is not allowed");
 }
 
 void Fdcan::check_start() const {
@@ -160,8 +160,8 @@ void Fdcan::check_start() const {
   for (std::uint32_t i = 0; i < 2 * extended_filters(rxgfc_); ++i) {
     if (!ram_.written(fdcan_ram::kExtended + i)) complain("RXGFC.LSE reaches filters that were never written");
   }
-  if (reg::fdcan_rxgfc::kLss.of(rxgfc_) > fdcan_ram::kStandardFilters) complain("RXGFC.LSS above 28");
-  if (reg::fdcan_rxgfc::kLse.of(rxgfc_) > fdcan_ram::kExtendedFilters) complain("RXGFC.LSE above 8");
+  if (reg::rxgfc::kLss.of(rxgfc_) > fdcan_ram::kStandardFilters) complain("RXGFC.LSS above 28");
+  if (reg::rxgfc::kLse.of(rxgfc_) > fdcan_ram::kExtendedFilters) complain("RXGFC.LSE above 8");
 }
 
 void Fdcan::leave_initialisation() {
@@ -223,7 +223,7 @@ void Fdcan::clear_by_cce() {
 }
 
 std::uint32_t Fdcan::txfqs() const {
-  namespace bits = reg::fdcan_txfqs;
+  namespace bits = reg::txfqs;
   if (!queue_mode()) {
     return bits::kTffl(kDepth - tx_.fill) | bits::kTfgi(tx_.get) | bits::kTfqpi(tx_.put()) |
            bits::kTfqf(tx_.fill == kDepth ? 1 : 0);
@@ -414,16 +414,15 @@ void Fdcan::store(const CanOffer& frame) {
   if (match.priority) {
     raise(ir::kHpm.mask());
     const bool stored = match.fifo >= 0;
-    hpms_ = reg::fdcan_hpms::kFidx(static_cast<std::uint32_t>(match.index)) |
-            reg::fdcan_hpms::kFlst(frame.frame.extended ? 1 : 0) |
-            (stored ? reg::fdcan_hpms::kMsi(static_cast<std::uint32_t>(2 + match.fifo)) |
-                          reg::fdcan_hpms::kBidx(rx_[static_cast<std::size_t>(match.fifo)].put())
+    hpms_ = reg::hpms::kFidx(static_cast<std::uint32_t>(match.index)) | reg::hpms::kFlst(frame.frame.extended ? 1 : 0) |
+            (stored ? reg::hpms::kMsi(static_cast<std::uint32_t>(2 + match.fifo)) |
+                          reg::hpms::kBidx(rx_[static_cast<std::size_t>(match.fifo)].put())
                     : 0);
   }
   if (match.fifo < 0) return;
   Fifo& fifo = rx_[static_cast<std::size_t>(match.fifo)];
   const int shift = match.fifo == 0 ? 0 : ir::kRf1n.lsb - ir::kRf0n.lsb;
-  const bool overwrites = (match.fifo == 0 ? reg::fdcan_rxgfc::kF0om : reg::fdcan_rxgfc::kF1om).of(rxgfc_) != 0;
+  const bool overwrites = (match.fifo == 0 ? reg::rxgfc::kF0om : reg::rxgfc::kF1om).of(rxgfc_) != 0;
   if (fifo.fill == kDepth && !overwrites) return raise(ir::kRf0l.mask() << shift);  // blocking: the new frame is lost
   if (fifo.fill == kDepth) {
     fifo.get = (fifo.get + 1) % kDepth;
@@ -446,7 +445,7 @@ void Fdcan::put_element(std::uint32_t base, const CanOffer& frame, const FdcanMa
 }
 
 std::uint32_t Fdcan::status_of(const Fifo& fifo, std::uint32_t lost_flag) const {
-  namespace bits = reg::fdcan_rxf0s;
+  namespace bits = reg::rxf0s;
   return bits::kF0fl(fifo.fill) | bits::kF0gi(fifo.get) | bits::kF0pi(fifo.put()) |
          bits::kF0f(fifo.fill == kDepth ? 1 : 0) | bits::kRf0l((ir_ & lost_flag) != 0 ? 1 : 0);
 }
@@ -478,7 +477,7 @@ const char* Fdcan::wrong_access(std::uint32_t word, bool write) const {
 }
 
 std::uint32_t Fdcan::psr() const {
-  namespace bits = reg::fdcan_psr;
+  namespace bits = reg::psr;
   std::uint32_t activity = state_ == State::kActive ? 1 : 0;
   if (state_ == State::kActive && line.busy()) activity = sending_ >= 0 ? 3 : 2;
   const bool counting = state_ == State::kRecovering && !line.stuck_dominant && !line.disturbed();
@@ -488,7 +487,7 @@ std::uint32_t Fdcan::psr() const {
 
 // While the bus-off recovery runs, REC counts the sequences of eleven recessive bits.
 std::uint32_t Fdcan::ecr() const {
-  namespace bits = reg::fdcan_ecr;
+  namespace bits = reg::ecr;
   auto rec = static_cast<std::uint32_t>(std::min(rec_, 127));
   if (state_ == State::kRecovering && now() > recovery_since_)
     rec = static_cast<std::uint32_t>(std::min<std::int64_t>((now() - recovery_since_) / periods(11, bit_rate()), 127));
@@ -498,8 +497,8 @@ std::uint32_t Fdcan::ecr() const {
 
 // RM0440, FDCAN_TSCC: TSS = 1 counts bit times, divided by TCP + 1.
 std::uint32_t Fdcan::timestamp(Picoseconds time) const {
-  if (reg::fdcan_tscc::kTss.of(tscc_) != 1) return 0;
-  const Picoseconds count = periods(std::int64_t{reg::fdcan_tscc::kTcp.of(tscc_)} + 1, bit_rate());
+  if (reg::tscc::kTss.of(tscc_) != 1) return 0;
+  const Picoseconds count = periods(std::int64_t{reg::tscc::kTcp.of(tscc_)} + 1, bit_rate());
   return static_cast<std::uint32_t>((time - stamp_zero_) / count) & 0xFFFF;
 }
 
@@ -518,8 +517,8 @@ void Fdcan::update() {
   for (const Group& group : kGroups) {
     if ((ir_ & ie_ & group.flags) != 0) lines[(ils_ & group.select) != 0 ? 1 : 0] = true;
   }
-  set_interrupt(irq::kFdcan1It0, lines[0] && reg::fdcan_ile::kEint0.of(ile_) != 0);
-  set_interrupt(irq::kFdcan1It1, lines[1] && reg::fdcan_ile::kEint1.of(ile_) != 0);
+  set_interrupt(irq::kFdcan1It0, lines[0] && reg::ile::kEint0.of(ile_) != 0);
+  set_interrupt(irq::kFdcan1It1, lines[1] && reg::ile::kEint1.of(ile_) != 0);
 }
 
 }  // namespace tetap::board

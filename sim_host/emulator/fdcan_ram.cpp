@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sim_host/emulator/fdcan_ram.hpp"
 
-#include "sim_host/emulator/registers_stm32g474.hpp"
+#include "hal/chip/stm32/registers_stm32g474.hpp"
 
 #include <algorithm>
 
 namespace tetap::board {
 
-namespace reg = hal::stm32g474_model::fdcan;
+namespace reg = hal::stm32g474::fdcan;
 
 namespace {
 
@@ -41,7 +41,7 @@ FdcanMatch match_standard(const FdcanRam& ram, std::uint32_t rxgfc, std::uint32_
     if (kSft.of(element) == 3 || code == 0 || code == 7) continue;
     if (fits(kSft.of(element), id, kSfid1.of(element), kSfid2.of(element))) return action(code, i);
   }
-  return unmatched(reg::fdcan_rxgfc::kAnfs.of(rxgfc));
+  return unmatched(reg::rxgfc::kAnfs.of(rxgfc));
 }
 
 // EFT = 11 is a range that XIDAM leaves alone.
@@ -53,7 +53,7 @@ FdcanMatch match_extended(const FdcanRam& ram, const FdcanFilterSettings& settin
     const std::uint32_t seen = type == 3 ? id : id & settings.xidam;
     if (fits(type == 3 ? 0 : type, seen, kEfid1.of(first), kEfid2.of(second))) return action(code, i);
   }
-  return unmatched(reg::fdcan_rxgfc::kAnfe.of(settings.rxgfc));
+  return unmatched(reg::rxgfc::kAnfe.of(settings.rxgfc));
 }
 
 }  // namespace
@@ -81,17 +81,16 @@ void FdcanRam::write(std::uint32_t offset, std::uint32_t value, std::uint32_t ma
 }
 
 std::uint32_t standard_filters(std::uint32_t rxgfc) {
-  return std::min(reg::fdcan_rxgfc::kLss.of(rxgfc), fdcan_ram::kStandardFilters);
+  return std::min(reg::rxgfc::kLss.of(rxgfc), fdcan_ram::kStandardFilters);
 }
 
 std::uint32_t extended_filters(std::uint32_t rxgfc) {
-  return std::min(reg::fdcan_rxgfc::kLse.of(rxgfc), fdcan_ram::kExtendedFilters);
+  return std::min(reg::rxgfc::kLse.of(rxgfc), fdcan_ram::kExtendedFilters);
 }
 
 FdcanMatch match_filters(const FdcanRam& ram, const FdcanFilterSettings& settings, const CanOffer& frame) {
   const bool extended = frame.frame.extended;
-  const std::uint32_t rejects =
-      extended ? reg::fdcan_rxgfc::kRrfe.of(settings.rxgfc) : reg::fdcan_rxgfc::kRrfs.of(settings.rxgfc);
+  const std::uint32_t rejects = extended ? reg::rxgfc::kRrfe.of(settings.rxgfc) : reg::rxgfc::kRrfs.of(settings.rxgfc);
   if (frame.remote && rejects != 0) return {};
   return extended ? match_extended(ram, settings, frame.frame.id) : match_standard(ram, settings.rxgfc, frame.frame.id);
 }

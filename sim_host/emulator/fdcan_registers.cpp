@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // Registers of FDCAN as the program reads and writes them. RM0440 chapter FDCAN, section "FDCAN registers".
+#include "hal/chip/stm32/registers_stm32g474.hpp"
 #include "sim_host/emulator/fdcan.hpp"
-#include "sim_host/emulator/registers_stm32g474.hpp"
 
 namespace tetap::board {
 
-namespace reg = hal::stm32g474_model::fdcan;
-namespace cccr = reg::fdcan_cccr;
-namespace ir = reg::fdcan_ir;
+namespace reg = hal::stm32g474::fdcan;
+namespace cccr = reg::cccr;
+namespace ir = reg::ir;
 
 namespace {
 constexpr std::uint32_t kNoChange = 7;  // PSR.LEC
@@ -16,45 +16,45 @@ constexpr std::uint32_t kBuffers = (1U << fdcan_ram::kDepth) - 1;
 
 std::uint32_t Fdcan::read(std::uint32_t offset) {
   switch (offset) {
-    case reg::fdcan_crel::kOffset:
-      return reg::fdcan_crel::kResetValue;
-    case reg::fdcan_endn::kOffset:
-      return reg::fdcan_endn::kResetValue;
-    case reg::fdcan_dbtp::kOffset:
+    case reg::crel::kOffset:
+      return reg::crel::kResetValue;
+    case reg::endn::kOffset:
+      return reg::endn::kResetValue;
+    case reg::dbtp::kOffset:
       return dbtp_;
     case cccr::kOffset:
       return cccr_;
-    case reg::fdcan_nbtp::kOffset:
+    case reg::nbtp::kOffset:
       return nbtp_;
-    case reg::fdcan_tscc::kOffset:
+    case reg::tscc::kOffset:
       return tscc_;
-    case reg::fdcan_tscv::kOffset:
+    case reg::tscv::kOffset:
       return timestamp(now());
-    case reg::fdcan_ecr::kOffset: {
+    case reg::ecr::kOffset: {
       const std::uint32_t value = ecr();
       errors_logged_ = 0;
       return value;
     }
-    case reg::fdcan_psr::kOffset: {
+    case reg::psr::kOffset: {
       const std::uint32_t value = psr();
       lec_ = kNoChange;
       return value;
     }
     case ir::kOffset:
       return ir_;
-    case reg::fdcan_ie::kOffset:
+    case reg::ie::kOffset:
       return ie_;
-    case reg::fdcan_ils::kOffset:
+    case reg::ils::kOffset:
       return ils_;
-    case reg::fdcan_ile::kOffset:
+    case reg::ile::kOffset:
       return ile_;
-    case reg::fdcan_rxgfc::kOffset:
+    case reg::rxgfc::kOffset:
       return rxgfc_;
-    case reg::fdcan_xidam::kOffset:
+    case reg::xidam::kOffset:
       return xidam_;
-    case reg::fdcan_hpms::kOffset:
+    case reg::hpms::kOffset:
       return hpms_;
-    case reg::fdcan_ckdiv::kOffset:
+    case reg::ckdiv::kOffset:
       return ckdiv_;
     default:
       return read_traffic(offset);
@@ -63,25 +63,25 @@ std::uint32_t Fdcan::read(std::uint32_t offset) {
 
 std::uint32_t Fdcan::read_traffic(std::uint32_t offset) const {
   switch (offset) {
-    case reg::fdcan_rxf0s::kOffset:
+    case reg::rxf0s::kOffset:
       return status_of(rx_[0], ir::kRf0l.mask());
-    case reg::fdcan_rxf1s::kOffset:
+    case reg::rxf1s::kOffset:
       return status_of(rx_[1], ir::kRf1l.mask());
-    case reg::fdcan_txbc::kOffset:
+    case reg::txbc::kOffset:
       return txbc_;
-    case reg::fdcan_txfqs::kOffset:
+    case reg::txfqs::kOffset:
       return txfqs();
-    case reg::fdcan_txbrp::kOffset:
+    case reg::txbrp::kOffset:
       return txbrp_;
-    case reg::fdcan_txbto::kOffset:
+    case reg::txbto::kOffset:
       return txbto_;
-    case reg::fdcan_txbcf::kOffset:
+    case reg::txbcf::kOffset:
       return txbcf_;
-    case reg::fdcan_txbtie::kOffset:
+    case reg::txbtie::kOffset:
       return txbtie_;
-    case reg::fdcan_txbcie::kOffset:
+    case reg::txbcie::kOffset:
       return txbcie_;
-    case reg::fdcan_txefs::kOffset:
+    case reg::txefs::kOffset:
       return status_of(events_, ir::kTefl.mask());
     default:
       return 0;
@@ -90,16 +90,16 @@ std::uint32_t Fdcan::read_traffic(std::uint32_t offset) const {
 
 // Registers that need INIT and CCE; the result is whether `offset` is one.
 bool Fdcan::write_protected(std::uint32_t offset, std::uint32_t value) {
-  std::uint32_t* target = offset == reg::fdcan_nbtp::kOffset    ? &nbtp_
-                          : offset == reg::fdcan_dbtp::kOffset  ? &dbtp_
-                          : offset == reg::fdcan_rxgfc::kOffset ? &rxgfc_
-                          : offset == reg::fdcan_xidam::kOffset ? &xidam_
-                          : offset == reg::fdcan_tscc::kOffset  ? &tscc_
-                          : offset == reg::fdcan_txbc::kOffset  ? &txbc_
-                          : offset == reg::fdcan_ckdiv::kOffset ? &ckdiv_
-                                                                : nullptr;
-  const bool other = offset == reg::fdcan_test::kOffset || offset == reg::fdcan_rwd::kOffset ||
-                     offset == reg::fdcan_tocc::kOffset || offset == reg::fdcan_tdcr::kOffset;
+  std::uint32_t* target = offset == reg::nbtp::kOffset    ? &nbtp_
+                          : offset == reg::dbtp::kOffset  ? &dbtp_
+                          : offset == reg::rxgfc::kOffset ? &rxgfc_
+                          : offset == reg::xidam::kOffset ? &xidam_
+                          : offset == reg::tscc::kOffset  ? &tscc_
+                          : offset == reg::txbc::kOffset  ? &txbc_
+                          : offset == reg::ckdiv::kOffset ? &ckdiv_
+                                                          : nullptr;
+  const bool other = offset == reg::test::kOffset || offset == reg::rwd::kOffset || offset == reg::tocc::kOffset ||
+                     offset == reg::tdcr::kOffset;
   if (target == nullptr && !other) return false;
   if (!configurable()) {
     complain("configuration written without INIT and CCE: ignored");
@@ -107,7 +107,7 @@ bool Fdcan::write_protected(std::uint32_t offset, std::uint32_t value) {
     complain("test, RAM watchdog, time-out counter and delay compensation are not modelled");
   } else {
     *target = value;
-    if (offset == reg::fdcan_tscc::kOffset && reg::fdcan_tscc::kTss.of(value) > 1)
+    if (offset == reg::tscc::kOffset && reg::tscc::kTss.of(value) > 1)
       complain("TSCC: the external time stamp counter is not modelled");
   }
   return true;
@@ -120,40 +120,40 @@ void Fdcan::write(std::uint32_t offset, std::uint32_t value, std::uint32_t mask)
     case cccr::kOffset:
       write_cccr(value);
       break;
-    case reg::fdcan_tscv::kOffset:
+    case reg::tscv::kOffset:
       stamp_zero_ = now();
       break;
     case ir::kOffset:  // written with 1 to clear
       ir_ &= ~value;
       break;
-    case reg::fdcan_ie::kOffset:
+    case reg::ie::kOffset:
       ie_ = value;
       break;
-    case reg::fdcan_ils::kOffset:
+    case reg::ils::kOffset:
       ils_ = value;
       break;
-    case reg::fdcan_ile::kOffset:
+    case reg::ile::kOffset:
       ile_ = value;
       break;
-    case reg::fdcan_rxf0a::kOffset:
-      acknowledge(rx_[0], reg::fdcan_rxf0a::kF0ai.of(value), "receive FIFO 0");
+    case reg::rxf0a::kOffset:
+      acknowledge(rx_[0], reg::rxf0a::kF0ai.of(value), "receive FIFO 0");
       break;
-    case reg::fdcan_rxf1a::kOffset:
-      acknowledge(rx_[1], reg::fdcan_rxf0a::kF0ai.of(value), "receive FIFO 1");
+    case reg::rxf1a::kOffset:
+      acknowledge(rx_[1], reg::rxf0a::kF0ai.of(value), "receive FIFO 1");
       break;
-    case reg::fdcan_txefa::kOffset:
-      acknowledge(events_, reg::fdcan_txefa::kEfai.of(value), "event FIFO");
+    case reg::txefa::kOffset:
+      acknowledge(events_, reg::txefa::kEfai.of(value), "event FIFO");
       break;
-    case reg::fdcan_txbar::kOffset:
+    case reg::txbar::kOffset:
       request(value);
       break;
-    case reg::fdcan_txbcr::kOffset:
+    case reg::txbcr::kOffset:
       cancel(value);
       break;
-    case reg::fdcan_txbtie::kOffset:
+    case reg::txbtie::kOffset:
       txbtie_ = value & kBuffers;
       break;
-    case reg::fdcan_txbcie::kOffset:
+    case reg::txbcie::kOffset:
       txbcie_ = value & kBuffers;
       break;
     default:

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sim_host/emulator/rcc_g4.hpp"
 
-#include "sim_host/emulator/registers_stm32g474.hpp"
+#include "hal/chip/stm32/registers_stm32g474.hpp"
 
 #include <algorithm>
 
 namespace tetap::board {
 
-namespace reg = hal::stm32g474_model::rcc;
-namespace pwr_reg = hal::stm32g474_model::pwr;
-namespace flash_reg = hal::stm32g474_model::flash;
+namespace reg = hal::stm32g474::rcc;
+namespace pwr_reg = hal::stm32g474::pwr;
+namespace flash_reg = hal::stm32g474::flash;
 
 namespace {
 
@@ -31,18 +31,18 @@ constexpr std::int64_t with_tolerance(std::int64_t hz) { return hz + hz / 100; }
 PwrG4::PwrG4(Surroundings around) : Peripheral(around, "PWR", pwr_reg::kPwr, kBytes) { reset(); }
 
 void PwrG4::reset() {
-  cr1_ = pwr_reg::pwr_cr1::kResetValue;
-  cr3_ = pwr_reg::pwr_cr3::kResetValue;
-  cr5_ = pwr_reg::pwr_cr5::kResetValue;
+  cr1_ = pwr_reg::cr1::kResetValue;
+  cr3_ = pwr_reg::cr3::kResetValue;
+  cr5_ = pwr_reg::cr5::kResetValue;
 }
 
 std::uint32_t PwrG4::read(std::uint32_t offset) {
   switch (offset) {
-    case pwr_reg::pwr_cr1::kOffset:
+    case pwr_reg::cr1::kOffset:
       return cr1_;
-    case pwr_reg::pwr_cr3::kOffset:
+    case pwr_reg::cr3::kOffset:
       return cr3_;
-    case pwr_reg::pwr_cr5::kOffset:
+    case pwr_reg::cr5::kOffset:
       return cr5_;
     default:
       return 0;  // SR2.VOSF = 0: the regulator has settled
@@ -50,20 +50,20 @@ std::uint32_t PwrG4::read(std::uint32_t offset) {
 }
 
 void PwrG4::write(std::uint32_t offset, std::uint32_t value, std::uint32_t mask) {
-  if (offset == pwr_reg::pwr_cr1::kOffset) {
+  if (offset == pwr_reg::cr1::kOffset) {
     merge(cr1_, value, mask);
-    const std::uint32_t vos = pwr_reg::pwr_cr1::kVos.of(cr1_);
+    const std::uint32_t vos = pwr_reg::cr1::kVos.of(cr1_);
     if (vos != 1 && vos != 2) complain("CR1.VOS of 0 or 3 is not allowed");
-    if (pwr_reg::pwr_cr1::kLpr.of(cr1_) != 0) complain("low-power run is not modelled");
+    if (pwr_reg::cr1::kLpr.of(cr1_) != 0) complain("low-power run is not modelled");
   }
-  if (offset == pwr_reg::pwr_cr3::kOffset) merge(cr3_, value, mask);
-  if (offset == pwr_reg::pwr_cr5::kOffset) merge(cr5_, value & pwr_reg::pwr_cr5::kR1mode.mask(), mask);
+  if (offset == pwr_reg::cr3::kOffset) merge(cr3_, value, mask);
+  if (offset == pwr_reg::cr5::kOffset) merge(cr5_, value & pwr_reg::cr5::kR1mode.mask(), mask);
   if (on_change) on_change();
 }
 
 PwrG4::Range PwrG4::range() const {
-  if (pwr_reg::pwr_cr1::kVos.of(cr1_) != 1) return Range::kLow;
-  return pwr_reg::pwr_cr5::kR1mode.of(cr5_) == 0 ? Range::kBoost : Range::kNormal;
+  if (pwr_reg::cr1::kVos.of(cr1_) != 1) return Range::kLow;
+  return pwr_reg::cr5::kR1mode.of(cr5_) == 0 ? Range::kBoost : Range::kNormal;
 }
 
 std::int64_t PwrG4::limit_hz() const {
@@ -71,7 +71,7 @@ std::int64_t PwrG4::limit_hz() const {
   return with_tolerance(kLimits[static_cast<std::size_t>(range())]);
 }
 
-bool PwrG4::dead_battery_pull_down() const { return pwr_reg::pwr_cr3::kUcpd1Dbdis.of(cr3_) == 0; }
+bool PwrG4::dead_battery_pull_down() const { return pwr_reg::cr3::kUcpd1Dbdis.of(cr3_) == 0; }
 
 FlashG4::FlashG4(Surroundings around, const PwrG4& pwr)
     : Peripheral(around, "FLASH", flash_reg::kFlash, kBytes), pwr_(pwr) {
@@ -81,14 +81,14 @@ FlashG4::FlashG4(Surroundings around, const PwrG4& pwr)
 // RM0440, FLASH_ACR: reset value 0x0004 0600; the SVD has one wait state there.
 void FlashG4::reset() { acr_ = 0x0004'0600; }
 
-std::uint32_t FlashG4::read(std::uint32_t offset) { return offset == flash_reg::flash_acr::kOffset ? acr_ : 0; }
+std::uint32_t FlashG4::read(std::uint32_t offset) { return offset == flash_reg::acr::kOffset ? acr_ : 0; }
 
 void FlashG4::write(std::uint32_t offset, std::uint32_t value, std::uint32_t mask) {
-  if (offset != flash_reg::flash_acr::kOffset) return complain("flash programming is not modelled");
+  if (offset != flash_reg::acr::kOffset) return complain("flash programming is not modelled");
   const std::uint32_t before = acr_;
   merge(acr_, value, mask);
-  const bool caches_on = flash_reg::flash_acr::kIcen.of(before) != 0 || flash_reg::flash_acr::kDcen.of(before) != 0;
-  if (caches_on && (acr_ & (flash_reg::flash_acr::kIcrst.mask() | flash_reg::flash_acr::kDcrst.mask())) != 0) {
+  const bool caches_on = flash_reg::acr::kIcen.of(before) != 0 || flash_reg::acr::kDcen.of(before) != 0;
+  if (caches_on && (acr_ & (flash_reg::acr::kIcrst.mask() | flash_reg::acr::kDcrst.mask())) != 0) {
     complain("ICRST or DCRST set while the caches are on");
   }
   if (on_change) on_change();
@@ -99,7 +99,7 @@ void FlashG4::write(std::uint32_t offset, std::uint32_t value, std::uint32_t mas
 std::int64_t FlashG4::limit_hz() const {
   constexpr std::int64_t kStep_mhz[] = {34, 30, 12}, kLast_mhz[] = {170, 150, 26};
   const auto range = static_cast<std::size_t>(pwr_.range());
-  const std::int64_t latency = flash_reg::flash_acr::kLatency.of(acr_);
+  const std::int64_t latency = flash_reg::acr::kLatency.of(acr_);
   return with_tolerance(1'000'000 * std::min((latency + 1) * kStep_mhz[range], kLast_mhz[range]));
 }
 
@@ -108,21 +108,21 @@ RccG4::RccG4(Surroundings around, const Oscillators& oscillators, const PwrG4& p
       oscillators_(oscillators),
       pwr_(pwr),
       flash_(flash),
-      hse_ready_(around.scheduler, [this] { word(reg::rcc_cr::kOffset) |= reg::rcc_cr::kHserdy.mask(); }),
-      pll_ready_(around.scheduler, [this] { word(reg::rcc_cr::kOffset) |= reg::rcc_cr::kPllrdy.mask(); }),
-      lsi_ready_(around.scheduler, [this] { word(reg::rcc_csr::kOffset) |= reg::rcc_csr::kLsirdy.mask(); }) {
+      hse_ready_(around.scheduler, [this] { word(reg::cr::kOffset) |= reg::cr::kHserdy.mask(); }),
+      pll_ready_(around.scheduler, [this] { word(reg::cr::kOffset) |= reg::cr::kPllrdy.mask(); }),
+      lsi_ready_(around.scheduler, [this] { word(reg::csr::kOffset) |= reg::csr::kLsirdy.mask(); }) {
   reset();
 }
 
 void RccG4::reset() {
-  const std::uint32_t flags = word(reg::rcc_csr::kOffset) & kAllFlags;
+  const std::uint32_t flags = word(reg::csr::kOffset) & kAllFlags;
   words_.assign(kRegisters, 0);
-  word(reg::rcc_cr::kOffset) = kResetCr;
-  word(reg::rcc_cfgr::kOffset) = reg::rcc_cfgr::kResetValue;
-  word(reg::rcc_pllcfgr::kOffset) = reg::rcc_pllcfgr::kResetValue;
-  word(reg::rcc_ahb1enr::kOffset) = reg::rcc_ahb1enr::kResetValue;
-  word(reg::rcc_apb1enr1::kOffset) = reg::rcc_apb1enr1::kResetValue;
-  word(reg::rcc_csr::kOffset) = flags;
+  word(reg::cr::kOffset) = kResetCr;
+  word(reg::cfgr::kOffset) = reg::cfgr::kResetValue;
+  word(reg::pllcfgr::kOffset) = reg::pllcfgr::kResetValue;
+  word(reg::ahb1enr::kOffset) = reg::ahb1enr::kResetValue;
+  word(reg::apb1enr1::kOffset) = reg::apb1enr1::kResetValue;
+  word(reg::csr::kOffset) = flags;
   hse_ready_.clear();
   pll_ready_.clear();
   lsi_ready_.clear();
@@ -131,30 +131,30 @@ void RccG4::reset() {
 
 // RM0440, "System reset": every reset pulls NRST low, too.
 void RccG4::add_reset_flags(ResetCause cause) {
-  std::uint32_t flags = reg::rcc_csr::kPinrstf.mask();
-  if (cause == ResetCause::kPowerOn) flags |= reg::rcc_csr::kBorrstf.mask();
-  if (cause == ResetCause::kSoftware) flags |= reg::rcc_csr::kSftrstf.mask();
-  if (cause == ResetCause::kWatchdog) flags |= reg::rcc_csr::kIwdgrstf.mask();
-  word(reg::rcc_csr::kOffset) |= flags;
+  std::uint32_t flags = reg::csr::kPinrstf.mask();
+  if (cause == ResetCause::kPowerOn) flags |= reg::csr::kBorrstf.mask();
+  if (cause == ResetCause::kSoftware) flags |= reg::csr::kSftrstf.mask();
+  if (cause == ResetCause::kWatchdog) flags |= reg::csr::kIwdgrstf.mask();
+  word(reg::csr::kOffset) |= flags;
 }
 
-bool RccG4::pll_on() const { return reg::rcc_cr::kPllon.of(word(reg::rcc_cr::kOffset)) != 0; }
-bool RccG4::pll_ready() const { return reg::rcc_cr::kPllrdy.of(word(reg::rcc_cr::kOffset)) != 0; }
-bool RccG4::hse_ready() const { return reg::rcc_cr::kHserdy.of(word(reg::rcc_cr::kOffset)) != 0; }
+bool RccG4::pll_on() const { return reg::cr::kPllon.of(word(reg::cr::kOffset)) != 0; }
+bool RccG4::pll_ready() const { return reg::cr::kPllrdy.of(word(reg::cr::kOffset)) != 0; }
+bool RccG4::hse_ready() const { return reg::cr::kHserdy.of(word(reg::cr::kOffset)) != 0; }
 
 std::int64_t RccG4::vco_hz() const {
-  const std::uint32_t configured = word(reg::rcc_pllcfgr::kOffset);
-  const std::uint32_t source = reg::rcc_pllcfgr::kPllsrc.of(configured);
+  const std::uint32_t configured = word(reg::pllcfgr::kOffset);
+  const std::uint32_t source = reg::pllcfgr::kPllsrc.of(configured);
   const std::int64_t input = source == kFromHse ? oscillators_.hse_hz : source == kFromHsi ? oscillators_.hsi_hz : 0;
-  return input * reg::rcc_pllcfgr::kPlln.of(configured) / (std::int64_t{reg::rcc_pllcfgr::kPllm.of(configured)} + 1);
+  return input * reg::pllcfgr::kPlln.of(configured) / (std::int64_t{reg::pllcfgr::kPllm.of(configured)} + 1);
 }
 
 std::int64_t RccG4::sysclk_hz() const {
-  switch (reg::rcc_cfgr::kSws.of(word(reg::rcc_cfgr::kOffset))) {
+  switch (reg::cfgr::kSws.of(word(reg::cfgr::kOffset))) {
     case kHse:
       return oscillators_.hse_hz;
     case kPll:  // PLLR: 2, 4, 6, 8
-      return vco_hz() / (2 * (std::int64_t{reg::rcc_pllcfgr::kPllr.of(word(reg::rcc_pllcfgr::kOffset))} + 1));
+      return vco_hz() / (2 * (std::int64_t{reg::pllcfgr::kPllr.of(word(reg::pllcfgr::kOffset))} + 1));
     default:
       return oscillators_.hsi_hz;
   }
@@ -162,28 +162,28 @@ std::int64_t RccG4::sysclk_hz() const {
 
 // RM0440, RCC_CCIPR.USARTxSEL: bus, SYSCLK, HSI16, LSE.
 std::int64_t RccG4::usart_hz(std::uint32_t select, std::int64_t bus_hz) const {
-  const std::int64_t hsi = reg::rcc_cr::kHsirdy.of(word(reg::rcc_cr::kOffset)) != 0 ? oscillators_.hsi_hz : 0;
+  const std::int64_t hsi = reg::cr::kHsirdy.of(word(reg::cr::kOffset)) != 0 ? oscillators_.hsi_hz : 0;
   const std::int64_t sources[] = {bus_hz, sysclk_hz(), hsi, 0};
   return sources[select];
 }
 
 std::int64_t RccG4::usart1_hz() const {
-  return usart_hz(reg::rcc_ccipr::kUsart1sel.of(word(reg::rcc_ccipr::kOffset)), apb2_hz());
+  return usart_hz(reg::ccipr::kUsart1sel.of(word(reg::ccipr::kOffset)), apb2_hz());
 }
 
 std::int64_t RccG4::usart2_hz() const {
-  return usart_hz(reg::rcc_ccipr::kUsart2sel.of(word(reg::rcc_ccipr::kOffset)), apb1_hz());
+  return usart_hz(reg::ccipr::kUsart2sel.of(word(reg::ccipr::kOffset)), apb1_hz());
 }
 
 // RM0440, RCC_CCIPR.FDCANSEL: HSE, PLL "Q", PCLK1, reserved.
-std::int64_t RccG4::fdcan_hz() const {
-  const std::uint32_t configured = word(reg::rcc_pllcfgr::kOffset);
-  switch (reg::rcc_ccipr::kFdcansel.of(word(reg::rcc_ccipr::kOffset))) {
+std::int64_t RccG4::hz() const {
+  const std::uint32_t configured = word(reg::pllcfgr::kOffset);
+  switch (reg::ccipr::kFdcansel.of(word(reg::ccipr::kOffset))) {
     case 0:
       return hse_ready() ? oscillators_.hse_hz : 0;
     case 1:
-      if (!pll_ready() || reg::rcc_pllcfgr::kPllqen.of(configured) == 0) return 0;
-      return vco_hz() / (2 * (std::int64_t{reg::rcc_pllcfgr::kPllq.of(configured)} + 1));
+      if (!pll_ready() || reg::pllcfgr::kPllqen.of(configured) == 0) return 0;
+      return vco_hz() / (2 * (std::int64_t{reg::pllcfgr::kPllq.of(configured)} + 1));
     case 2:
       return apb1_hz();
     default:
@@ -193,11 +193,11 @@ std::int64_t RccG4::fdcan_hz() const {
 
 // DS12288, PLL characteristics: input 2.66 to 16 MHz, VCO 96 to 344 MHz.
 void RccG4::check_pll() {
-  const std::uint32_t configured = word(reg::rcc_pllcfgr::kOffset);
-  const std::uint32_t source = reg::rcc_pllcfgr::kPllsrc.of(configured);
+  const std::uint32_t configured = word(reg::pllcfgr::kOffset);
+  const std::uint32_t source = reg::pllcfgr::kPllsrc.of(configured);
   if (source < kFromHsi) return complain("PLL switched on without a source");
   if (source == kFromHse && !hse_ready()) complain("PLL switched on before its source HSE is ready");
-  const std::int64_t n = reg::rcc_pllcfgr::kPlln.of(configured);
+  const std::int64_t n = reg::pllcfgr::kPlln.of(configured);
   if (n < 8) return complain("PLLN below 8");
   const std::int64_t input = vco_hz() / n;
   if (input < 2'660'000 || input > 16'000'000) complain("PLL input of " + khz(input) + ": 2.66 to 16 MHz are allowed");
@@ -207,58 +207,58 @@ void RccG4::check_pll() {
 }
 
 void RccG4::write_hsi(std::uint32_t value) {
-  std::uint32_t& cr = word(reg::rcc_cr::kOffset);
-  if (reg::rcc_cr::kHsion.of(value) != 0) {
-    cr |= reg::rcc_cr::kHsirdy.mask();
-  } else if (reg::rcc_cfgr::kSws.of(word(reg::rcc_cfgr::kOffset)) == kHsi) {  // hardware keeps what drives the core
+  std::uint32_t& cr = word(reg::cr::kOffset);
+  if (reg::cr::kHsion.of(value) != 0) {
+    cr |= reg::cr::kHsirdy.mask();
+  } else if (reg::cfgr::kSws.of(word(reg::cfgr::kOffset)) == kHsi) {  // hardware keeps what drives the core
     complain("HSI16 switched off while it is the system clock: ignored");
-    cr |= reg::rcc_cr::kHsion.mask();
+    cr |= reg::cr::kHsion.mask();
   } else {
-    cr &= ~reg::rcc_cr::kHsirdy.mask();
+    cr &= ~reg::cr::kHsirdy.mask();
   }
 }
 
 void RccG4::write_cr(std::uint32_t value) {
-  const std::uint32_t before = word(reg::rcc_cr::kOffset);
-  const std::uint32_t ready = reg::rcc_cr::kHserdy.mask() | reg::rcc_cr::kPllrdy.mask() | reg::rcc_cr::kHsirdy.mask();
-  const std::uint32_t used = reg::rcc_cfgr::kSws.of(word(reg::rcc_cfgr::kOffset));
-  word(reg::rcc_cr::kOffset) = (before & ready) | (value & ~ready);
+  const std::uint32_t before = word(reg::cr::kOffset);
+  const std::uint32_t ready = reg::cr::kHserdy.mask() | reg::cr::kPllrdy.mask() | reg::cr::kHsirdy.mask();
+  const std::uint32_t used = reg::cfgr::kSws.of(word(reg::cfgr::kOffset));
+  word(reg::cr::kOffset) = (before & ready) | (value & ~ready);
   write_hsi(value);
-  if (reg::rcc_cr::kHsebyp.of(value) != 0 && oscillators_.crystal) complain("HSEBYP with a crystal: it does not start");
+  if (reg::cr::kHsebyp.of(value) != 0 && oscillators_.crystal) complain("HSEBYP with a crystal: it does not start");
   // RM0440 section "Clock control register (RCC_CR)": a reset alone clears CSSON. A crystal here never stops once it
   // runs.
-  word(reg::rcc_cr::kOffset) |= before & reg::rcc_cr::kCsson.mask();
-  const bool hse_on = reg::rcc_cr::kHseon.of(value) != 0, hse_was = reg::rcc_cr::kHseon.of(before) != 0;
+  word(reg::cr::kOffset) |= before & reg::cr::kCsson.mask();
+  const bool hse_on = reg::cr::kHseon.of(value) != 0, hse_was = reg::cr::kHseon.of(before) != 0;
   if (hse_on && !hse_was && oscillators_.crystal) hse_ready_.set(now() + oscillators_.hse_start);
   if (!hse_on) {
     if (used == kHse) complain("HSE switched off while it is the system clock");
     hse_ready_.clear();
-    word(reg::rcc_cr::kOffset) &= ~reg::rcc_cr::kHserdy.mask();
+    word(reg::cr::kOffset) &= ~reg::cr::kHserdy.mask();
   }
-  const bool pll = reg::rcc_cr::kPllon.of(value) != 0, pll_was = reg::rcc_cr::kPllon.of(before) != 0;
+  const bool pll = reg::cr::kPllon.of(value) != 0, pll_was = reg::cr::kPllon.of(before) != 0;
   if (pll && !pll_was) {
     check_pll();
-    const std::uint32_t source = reg::rcc_pllcfgr::kPllsrc.of(word(reg::rcc_pllcfgr::kOffset));
+    const std::uint32_t source = reg::pllcfgr::kPllsrc.of(word(reg::pllcfgr::kOffset));
     if (source == kFromHsi || (source == kFromHse && hse_ready())) pll_ready_.set(now() + kPllLock);
   }
   if (!pll) {
     if (used == kPll) complain("PLL switched off while it is the system clock");
     pll_ready_.clear();
-    word(reg::rcc_cr::kOffset) &= ~reg::rcc_cr::kPllrdy.mask();
+    word(reg::cr::kOffset) &= ~reg::cr::kPllrdy.mask();
   }
 }
 
 void RccG4::write_cfgr(std::uint32_t value) {
-  const std::uint32_t wanted = reg::rcc_cfgr::kSw.of(value), cr = word(reg::rcc_cr::kOffset);
-  const bool output_r = reg::rcc_pllcfgr::kPllren.of(word(reg::rcc_pllcfgr::kOffset)) != 0;
-  const bool ready = wanted == kHsi   ? reg::rcc_cr::kHsirdy.of(cr) != 0
+  const std::uint32_t wanted = reg::cfgr::kSw.of(value), cr = word(reg::cr::kOffset);
+  const bool output_r = reg::pllcfgr::kPllren.of(word(reg::pllcfgr::kOffset)) != 0;
+  const bool ready = wanted == kHsi   ? reg::cr::kHsirdy.of(cr) != 0
                      : wanted == kHse ? hse_ready()
                      : wanted == kPll ? pll_ready() && output_r
                                       : false;
   const std::int64_t before = hclk_hz();
-  const std::uint32_t used = reg::rcc_cfgr::kSws.of(word(reg::rcc_cfgr::kOffset));
+  const std::uint32_t used = reg::cfgr::kSws.of(word(reg::cfgr::kOffset));
   if (!ready && wanted != used) complain("CFGR.SW selects a clock that is not ready: not switched");
-  word(reg::rcc_cfgr::kOffset) = reg::rcc_cfgr::kSws.in(value, ready ? wanted : used);
+  word(reg::cfgr::kOffset) = reg::cfgr::kSws.in(value, ready ? wanted : used);
   plan_buses();
   check_step(before, ready && wanted != used);
 }
@@ -275,21 +275,21 @@ void RccG4::check_step(std::int64_t before, bool source_changed) {
 
 // RM0440, RCC_PLLCFGR: only the outputs may be switched while the PLL is on.
 void RccG4::write_pllcfgr(std::uint32_t value) {
-  std::uint32_t& configured = word(reg::rcc_pllcfgr::kOffset);
+  std::uint32_t& configured = word(reg::pllcfgr::kOffset);
   const std::uint32_t outputs =
-      reg::rcc_pllcfgr::kPllpen.mask() | reg::rcc_pllcfgr::kPllqen.mask() | reg::rcc_pllcfgr::kPllren.mask();
+      reg::pllcfgr::kPllpen.mask() | reg::pllcfgr::kPllqen.mask() | reg::pllcfgr::kPllren.mask();
   if (pll_on() && ((configured ^ value) & ~outputs) != 0)
     return complain("PLLCFGR changed while the PLL is on: ignored");
-  const bool used = reg::rcc_cfgr::kSws.of(word(reg::rcc_cfgr::kOffset)) == kPll;
-  if (used && reg::rcc_pllcfgr::kPllren.of(value) == 0) return complain("PLLREN cleared while it is the system clock");
+  const bool used = reg::cfgr::kSws.of(word(reg::cfgr::kOffset)) == kPll;
+  if (used && reg::pllcfgr::kPllren.of(value) == 0) return complain("PLLREN cleared while it is the system clock");
   configured = value;
 }
 
 void RccG4::plan_buses() {
-  const std::uint32_t cfgr = word(reg::rcc_cfgr::kOffset);
-  hclk_shift_ = ahb_shift(reg::rcc_cfgr::kHpre.of(cfgr));
-  apb1_shift_ = apb_shift(reg::rcc_cfgr::kPpre1.of(cfgr));
-  apb2_shift_ = apb_shift(reg::rcc_cfgr::kPpre2.of(cfgr));
+  const std::uint32_t cfgr = word(reg::cfgr::kOffset);
+  hclk_shift_ = ahb_shift(reg::cfgr::kHpre.of(cfgr));
+  apb1_shift_ = apb_shift(reg::cfgr::kPpre1.of(cfgr));
+  apb2_shift_ = apb_shift(reg::cfgr::kPpre2.of(cfgr));
   check_limits();
   if (on_change) on_change();
 }
@@ -303,12 +303,12 @@ void RccG4::check_limits() {
 std::uint32_t RccG4::read(std::uint32_t offset) { return offset / 4 < words_.size() ? word(offset) : 0; }
 
 void RccG4::write_csr(std::uint32_t value) {
-  std::uint32_t& csr = word(reg::rcc_csr::kOffset);
-  const std::uint32_t flags = reg::rcc_csr::kRmvf.of(value) != 0 ? 0 : csr & kAllFlags;
-  const bool on = reg::rcc_csr::kLsion.of(value) != 0;
-  csr = flags | (csr & reg::rcc_csr::kLsirdy.mask()) | reg::rcc_csr::kLsion(on ? 1 : 0);
+  std::uint32_t& csr = word(reg::csr::kOffset);
+  const std::uint32_t flags = reg::csr::kRmvf.of(value) != 0 ? 0 : csr & kAllFlags;
+  const bool on = reg::csr::kLsion.of(value) != 0;
+  csr = flags | (csr & reg::csr::kLsirdy.mask()) | reg::csr::kLsion(on ? 1 : 0);
   if (on && !lsi_ready_.pending()) lsi_ready_.set(now() + kLsiStart);
-  if (!on) csr &= ~reg::rcc_csr::kLsirdy.mask();
+  if (!on) csr &= ~reg::csr::kLsirdy.mask();
 }
 
 void RccG4::write(std::uint32_t offset, std::uint32_t value, std::uint32_t mask) {
@@ -316,13 +316,13 @@ void RccG4::write(std::uint32_t offset, std::uint32_t value, std::uint32_t mask)
   std::uint32_t merged = word(offset);
   merge(merged, value, mask);
   switch (offset) {
-    case reg::rcc_cr::kOffset:
+    case reg::cr::kOffset:
       return write_cr(merged);
-    case reg::rcc_cfgr::kOffset:
+    case reg::cfgr::kOffset:
       return write_cfgr(merged);
-    case reg::rcc_pllcfgr::kOffset:
+    case reg::pllcfgr::kOffset:
       return write_pllcfgr(merged);
-    case reg::rcc_csr::kOffset:
+    case reg::csr::kOffset:
       return write_csr(merged);
     default:
       return write_gate(offset, merged);

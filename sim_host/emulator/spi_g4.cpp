@@ -2,13 +2,13 @@
 #include "sim_host/emulator/spi_g4.hpp"
 
 #include "hal/chip/stm32/registers_stm32f412.hpp"
-#include "sim_host/emulator/registers_stm32g474.hpp"
+#include "hal/chip/stm32/registers_stm32g474.hpp"
 
 #include <algorithm>
 
 namespace tetap::board {
 
-namespace reg = hal::stm32g474_model::spi;
+namespace reg = hal::stm32g474::spi;
 namespace older = hal::stm32f412::spi;
 
 // The base works on control bits and flags that lie at the same places in both.

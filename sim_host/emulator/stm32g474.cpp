@@ -2,14 +2,14 @@
 #include "sim_host/emulator/stm32g474.hpp"
 
 #include "hal/chip/stm32/registers_stm32f412.hpp"
-#include "sim_host/emulator/registers_stm32g474.hpp"
+#include "hal/chip/stm32/registers_stm32g474.hpp"
 
 #include <array>
 #include <initializer_list>
 
 namespace tetap::board {
 
-namespace reg = hal::stm32g474_model;
+namespace reg = hal::stm32g474;
 namespace older = hal::stm32f412;
 
 namespace {
@@ -45,11 +45,10 @@ static_assert(reg::interrupt::kExti0 == older::interrupt::kExti0 &&
               reg::interrupt::kExti4 == older::interrupt::kExti4 &&
               reg::interrupt::kExti95 == older::interrupt::kExti95 &&
               reg::interrupt::kExti1510 == older::interrupt::kExti1510);
-static_assert(reg::tim::tim2_cr1::kOffset == older::tim::cr1::kOffset &&
-              reg::tim::tim2_smcr::kOffset == older::tim::smcr::kOffset &&
-              reg::tim::tim2_ccmr1::kOffset == older::tim::ccmr1_input::kOffset &&
-              reg::tim::tim2_cnt::kOffset == older::tim::cnt::kOffset &&
-              reg::tim::tim2_arr::kOffset == older::tim::arr::kOffset);
+static_assert(reg::tim::cr1::kOffset == older::tim::cr1::kOffset &&
+              reg::tim::smcr::kOffset == older::tim::smcr::kOffset &&
+              reg::tim::ccmr1::kOffset == older::tim::ccmr1_input::kOffset &&
+              reg::tim::cnt::kOffset == older::tim::cnt::kOffset && reg::tim::arr::kOffset == older::tim::arr::kOffset);
 static_assert(reg::iwdg::kr::kOffset == older::iwdg::kr::kOffset &&
               reg::iwdg::pr::kOffset == older::iwdg::pr::kOffset &&
               reg::iwdg::rlr::kOffset == older::iwdg::rlr::kOffset &&
@@ -86,7 +85,7 @@ Stm32g474::Stm32g474(const Oscillators& oscillators, const Stm32g474Pins& wired)
       tim2(around_, "TIM2", reg::tim::kTim2, pins,
            {Signal::kTim2Ch1, Signal::kTim2Ch2, wired.tim2_ch1, wired.tim2_ch2, reg::interrupt::kTim2, 32},
            [this] { return rcc.apb1_timer_hz(); }),
-      tim3(around_, "TIM3", reg::tim3::kTim3, pins,
+      tim3(around_, "TIM3", reg::tim::kTim3, pins,
            {Signal::kTim3Ch1, Signal::kTim3Ch2, wired.tim3_ch1, wired.tim3_ch2, reg::interrupt::kTim3, 16},
            [this] { return rcc.apb1_timer_hz(); }),
       fdcan_ram(around_, reg::fdcan::kFdcan),
@@ -106,33 +105,33 @@ Stm32g474::Stm32g474(const Oscillators& oscillators, const Stm32g474Pins& wired)
 void Stm32g474::add_blocks() {
   namespace r = reg::rcc;
   const auto ahb1 = [this](Peripheral& block, hal::Field enable, hal::Field reset) {
-    rcc.add_block(block, r::rcc_ahb1enr::kOffset, enable.mask(), r::rcc_ahb1rstr::kOffset, reset.mask());
+    rcc.add_block(block, r::ahb1enr::kOffset, enable.mask(), r::ahb1rstr::kOffset, reset.mask());
   };
   const auto ahb2 = [this](Peripheral& block, hal::Field enable, hal::Field reset) {
-    rcc.add_block(block, r::rcc_ahb2enr::kOffset, enable.mask(), r::rcc_ahb2rstr::kOffset, reset.mask());
+    rcc.add_block(block, r::ahb2enr::kOffset, enable.mask(), r::ahb2rstr::kOffset, reset.mask());
   };
   const auto apb1 = [this](Peripheral& block, hal::Field enable, hal::Field reset) {
-    rcc.add_block(block, r::rcc_apb1enr1::kOffset, enable.mask(), r::rcc_apb1rstr1::kOffset, reset.mask());
+    rcc.add_block(block, r::apb1enr1::kOffset, enable.mask(), r::apb1rstr1::kOffset, reset.mask());
   };
   const auto apb2 = [this](Peripheral& block, hal::Field enable, hal::Field reset) {
-    rcc.add_block(block, r::rcc_apb2enr::kOffset, enable.mask(), r::rcc_apb2rstr::kOffset, reset.mask());
+    rcc.add_block(block, r::apb2enr::kOffset, enable.mask(), r::apb2rstr::kOffset, reset.mask());
   };
-  ahb1(dma1, r::rcc_ahb1enr::kDma1en, r::rcc_ahb1rstr::kDma1rst);
-  ahb1(dma2, r::rcc_ahb1enr::kDma2en, r::rcc_ahb1rstr::kDma2rst);
-  ahb1(dmamux, r::rcc_ahb1enr::kDmamux1en, r::rcc_ahb1rstr::kDmamux1rst);
-  rcc.add_block(flash, r::rcc_ahb1enr::kOffset, r::rcc_ahb1enr::kFlashen.mask(), 0, 0);
-  ahb2(pins.port('A'), r::rcc_ahb2enr::kGpioaen, r::rcc_ahb2rstr::kGpioarst);
-  ahb2(pins.port('B'), r::rcc_ahb2enr::kGpioben, r::rcc_ahb2rstr::kGpiobrst);
-  ahb2(pins.port('C'), r::rcc_ahb2enr::kGpiocen, r::rcc_ahb2rstr::kGpiocrst);
-  apb1(tim2, r::rcc_apb1enr1::kTim2en, r::rcc_apb1rstr1::kTim2rst);
-  apb1(tim3, r::rcc_apb1enr1::kTim3en, r::rcc_apb1rstr1::kTim3rst);
-  apb1(usart2, r::rcc_apb1enr1::kUsart2en, r::rcc_apb1rstr1::kUsart2rst);
-  apb1(fdcan1, r::rcc_apb1enr1::kFdcanen, r::rcc_apb1rstr1::kFdcanrst);
-  apb1(fdcan_ram, r::rcc_apb1enr1::kFdcanen, r::rcc_apb1rstr1::kFdcanrst);
-  apb1(pwr, r::rcc_apb1enr1::kPwren, r::rcc_apb1rstr1::kPwrrst);
-  apb2(usart1, r::rcc_apb2enr::kUsart1en, r::rcc_apb2rstr::kUsart1rst);
-  apb2(spi1, r::rcc_apb2enr::kSpi1en, r::rcc_apb2rstr::kSpi1rst);
-  apb2(syscfg, r::rcc_apb2enr::kSyscfgen, r::rcc_apb2rstr::kSyscfgrst);
+  ahb1(dma1, r::ahb1enr::kDma1en, r::ahb1rstr::kDma1rst);
+  ahb1(dma2, r::ahb1enr::kDma2en, r::ahb1rstr::kDma2rst);
+  ahb1(dmamux, r::ahb1enr::kDmamux1en, r::ahb1rstr::kDmamux1rst);
+  rcc.add_block(flash, r::ahb1enr::kOffset, r::ahb1enr::kFlashen.mask(), 0, 0);
+  ahb2(pins.port('A'), r::ahb2enr::kGpioaen, r::ahb2rstr::kGpioarst);
+  ahb2(pins.port('B'), r::ahb2enr::kGpioben, r::ahb2rstr::kGpiobrst);
+  ahb2(pins.port('C'), r::ahb2enr::kGpiocen, r::ahb2rstr::kGpiocrst);
+  apb1(tim2, r::apb1enr1::kTim2en, r::apb1rstr1::kTim2rst);
+  apb1(tim3, r::apb1enr1::kTim3en, r::apb1rstr1::kTim3rst);
+  apb1(usart2, r::apb1enr1::kUsart2en, r::apb1rstr1::kUsart2rst);
+  apb1(fdcan1, r::apb1enr1::kFdcanen, r::apb1rstr1::kFdcanrst);
+  apb1(fdcan_ram, r::apb1enr1::kFdcanen, r::apb1rstr1::kFdcanrst);
+  apb1(pwr, r::apb1enr1::kPwren, r::apb1rstr1::kPwrrst);
+  apb2(usart1, r::apb2enr::kUsart1en, r::apb2rstr::kUsart1rst);
+  apb2(spi1, r::apb2enr::kSpi1en, r::apb2rstr::kSpi1rst);
+  apb2(syscfg, r::apb2enr::kSyscfgen, r::apb2rstr::kSyscfgrst);
   const std::initializer_list<Peripheral*> all = {
       &rcc,  &pwr,  &flash,  &pins.port('A'), &pins.port('B'), &pins.port('C'), &syscfg, &exti,   &dmamux,
       &dma1, &dma2, &usart1, &usart2,         &spi1,           &tim2,           &tim3,   &fdcan1, &iwdg};

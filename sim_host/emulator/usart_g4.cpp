@@ -2,13 +2,13 @@
 #include "sim_host/emulator/usart_g4.hpp"
 
 #include "hal/chip/stm32/registers_stm32f412.hpp"
-#include "sim_host/emulator/registers_stm32g474.hpp"
+#include "hal/chip/stm32/registers_stm32g474.hpp"
 
 #include <algorithm>
 
 namespace tetap::board {
 
-namespace reg = hal::stm32g474_model::usart;
+namespace reg = hal::stm32g474::usart;
 namespace older = hal::stm32f412::usart;
 
 // The base works on flags and enable bits that lie at the same places in both ports.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The world's arithmetic: + - * / sqrt floor, which IEEE 754 makes exact, and src/base's functions in double. A seed
+// The world's arithmetic: + - * / sqrt floor, which IEEE 754 makes exact, and src/tetap/base's functions in double. A seed
 // gives the same bits on every host and with every C library.
 #pragma once
 

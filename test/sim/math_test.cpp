@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Angles of the world; the functions themselves are judged by the tests of src/base.
+// Angles of the world; the functions themselves are judged by the tests of src/tetap/base.
 #include "sim_host/world/math.hpp"
 
 #include "sim_host/world/chance.hpp"

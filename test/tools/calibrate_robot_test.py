@@ -538,7 +538,7 @@ class Program(unittest.TestCase):
         with open(source, "w", encoding="utf-8") as file:
             file.write('#include "tetap/param/limits.hpp"\nconstexpr tetap::param::Parameters numbers = tetap::param::checked({\n' + snippet + "\n});\n"
                        f"static_assert({assertion});\n")
-        subprocess.run(["g++", "-std=c++20", "-fsyntax-only", "-Wall", "-Werror", "-I", os.path.join(ROOT, "include"), "-I", ROOT,
+        subprocess.run(["g++", "-std=c++20", "-fsyntax-only", "-Wall", "-Werror", "-I", os.path.join(ROOT, "src"), "-I", ROOT,
                         "-isystem", "/usr/include/eigen3", source], check=True)
 
     def test_every_number_that_a_part_gives_is_one_that_the_firmware_has(self):

@@ -34,7 +34,7 @@ class Comments(unittest.TestCase):
         self.assertEqual(self.check("/// The state of a robot.\n/// It goes on here.\nint offset;  ///< offset that lasts\nint b;  ///< output; of the far end\n")[0], 0)
 
     def test_one_finding_is_red_in_every_folder_and_none_is_allowed(self):
-        for folder in ("src/estimators", "hal", "drivers", "config", "sim_host/world", "test", "toolchain"):
+        for folder in ("src/tetap/estimators", "hal", "drivers", "config", "sim_host/world", "test", "toolchain"):
             status, text = self.check("int a;\n// It is so.\n", folder)
             self.assertEqual(status, 1, folder)
             self.assertIn("check_comments: 1 comments", text)

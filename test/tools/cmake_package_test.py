@@ -122,9 +122,9 @@ class Package(unittest.TestCase):
         installed = os.path.join(self.prefix, "include", "tetap")
         self.assertEqual(sorted(os.listdir(installed)), sorted(FLOORS))
         for floor in FLOORS:
-            there = sorted(os.listdir(os.path.join(ROOT, "src", floor)))
+            there = sorted(os.listdir(os.path.join(ROOT, "src", "tetap", floor)))
             self.assertEqual(sorted(os.listdir(os.path.join(installed, floor))), there)
-        program = EVERY_HEADER.format(includes="\n".join(f'#include "{floor}/{name}"' for floor in FLOORS for name in sorted(os.listdir(os.path.join(installed, floor)))))
+        program = EVERY_HEADER.format(includes="\n".join(f'#include "tetap/{floor}/{name}"' for floor in FLOORS for name in sorted(os.listdir(os.path.join(installed, floor)))))
         source, build = self.theirs("every", "find_package(tetap REQUIRED)", floor="slam", program=program)
         self.configure(source, build)
         run("cmake", "--build", build)

@@ -183,7 +183,7 @@ class Pages(unittest.TestCase):
             for states in diagrams:
                 self.assertLessEqual(states, set(names), page)
             if page.endswith("/imu.md"):  # no source of its own: its input gives the states
-                expected = [set(re.findall(r"SourceState::k(\w+)", read("src/estimators/inertial/imu_input.hpp")))]
+                expected = [set(re.findall(r"SourceState::k(\w+)", read("src/tetap/estimators/inertial/imu_input.hpp")))]
             if expected:
                 self.assertEqual(diagrams, expected, page)
 
@@ -255,7 +255,7 @@ class Generated(unittest.TestCase):
 
     def test_sources_states_and_checks_are_read_from_the_headers(self):
         with tempfile.TemporaryDirectory() as tree:
-            os.makedirs(os.path.join(tree, "src/sensor"))
+            os.makedirs(os.path.join(tree, "src/tetap/sensor"))
             os.makedirs(os.path.join(tree, words.SOURCES))
             with open(os.path.join(tree, words.SOURCE_STATE), "w", encoding="utf-8") as file:
                 file.write("enum class SourceState : std::uint8_t {\n  kStopped,  ///< silent\n  kFusing,\n  kRejecting,  ///< refused\n};\n"
@@ -286,16 +286,16 @@ class Generated(unittest.TestCase):
         self.assertIn("| flip | 67 |", page)
 
     def test_every_estimator_of_the_filters_has_a_row_of_costs_and_every_row_a_header(self):
-        """A header of src/filter is an estimator of the table, or a part that this list names."""
+        """A header of src/tetap/filter is an estimator of the table, or a part that this list names."""
         parts = {"attitude_bias", "attitude_clipping", "attitude_heading", "attitude_options", "big_covariance", "condition", "correction", "covariance_access", "inverse",
                  "kalman_form", "linear_models", "low_pass", "particle_noise", "particle_number", "particle_pose", "quaternion", "resampling", "root_update", "sigma_points",
                  "sparse_update", "state", "structure", "symmetric", "triangular", "unroll", "update", "whole_covariance", "wrap"}
         rows = costs.listed(read("test/costs/list.hpp"))
-        headers = {os.path.basename(path)[:-4] for path in glob.glob(os.path.join(ROOT, "src/filter/*.hpp"))}
+        headers = {os.path.basename(path)[:-4] for path in glob.glob(os.path.join(ROOT, "src/tetap/filter/*.hpp"))}
         of_rows = {os.path.basename(header)[:-4] for _, _, header in rows if header.startswith("filter/")}
         self.assertEqual(headers - parts, of_rows)
         self.assertLessEqual(parts, headers)
-        self.assertEqual([header for _, _, header in rows if not os.path.exists(os.path.join(ROOT, "include", header))], [])
+        self.assertEqual([header for _, _, header in rows if not os.path.exists(os.path.join(ROOT, "src", header))], [])
         sizes = {}
         for name, size, _ in rows:
             sizes.setdefault(name, []).append(size)
@@ -475,7 +475,7 @@ class Lines(unittest.TestCase):
         for name, *_ in self.tutorial_programs():
             for core in ("-mcpu=cortex-m0plus", "-mcpu=cortex-m4 -mfpu=fpv4-sp-d16 -mfloat-abi=hard"):
                 with self.subTest(name=name, core=core):
-                    self.run_here(f"arm-none-eabi-g++ -std=c++20 -Iinclude -isystem /usr/include/eigen3 {small} {core} -c {name}.cpp -o {name}.o")
+                    self.run_here(f"arm-none-eabi-g++ -std=c++20 -Isrc -isystem /usr/include/eigen3 {small} {core} -c {name}.cpp -o {name}.o")
                     wanted = self.run_here(f"arm-none-eabi-nm -u {name}.o").split()
                     self.assertIn("printf", wanted)
                     self.assertEqual([one for one in wanted if re.search(r"alloc|_Zn[wa]|_Zd[la]|cxa|throw|sinf|cosf|expf|logf", one)], [])
@@ -508,11 +508,11 @@ class Lines(unittest.TestCase):
         os.makedirs(os.path.join(self.tree, "made/bus"))
         self.run_here("tools/can/generate_messages --header made/tetap/bus/messages.hpp")
         for compiler in ("g++", "clang++"):
-            self.run_here(f"{compiler} -std=c++20 -fsyntax-only -Wall -Wextra -Werror -Wno-missing-field-initializers -I. -Iinclude -Imade -isystem /usr/include/eigen3 robot.cpp")
+            self.run_here(f"{compiler} -std=c++20 -fsyntax-only -Wall -Wextra -Werror -Wno-missing-field-initializers -I. -Isrc -Imade -isystem /usr/include/eigen3 robot.cpp")
 
     def test_the_estimator_of_extend_is_one_that_a_node_takes(self):
-        code = re.search(r"Save it as `gnss_track.hpp` in `src/estimators`:\n\n```cpp\n(.*?)```", read("docs/howto/extend.md"), re.S)[1]
-        with open(os.path.join(self.tree, "src/estimators/gnss_track.hpp"), "w", encoding="utf-8") as file:
+        code = re.search(r"Save it as `gnss_track.hpp` in `src/tetap/estimators`:\n\n```cpp\n(.*?)```", read("docs/howto/extend.md"), re.S)[1]
+        with open(os.path.join(self.tree, "src/tetap/estimators/gnss_track.hpp"), "w", encoding="utf-8") as file:
             file.write(code)
         with open(os.path.join(self.tree, "robot.cpp"), "w", encoding="utf-8") as file:
             file.write('#include "tetap/estimators/gnss_track.hpp"\n#include "tetap/node/node.hpp"\n#include "tetap/param/limits.hpp"\n#include <memory>\n'
@@ -523,7 +523,7 @@ class Lines(unittest.TestCase):
         os.makedirs(os.path.join(self.tree, "made/bus"))
         self.run_here("tools/can/generate_messages --header made/tetap/bus/messages.hpp")
         for compiler in ("g++", "clang++"):
-            self.run_here(f"{compiler} -std=c++20 -fsyntax-only -Wall -Wextra -Werror -Wno-missing-field-initializers -I. -Iinclude -Imade -isystem /usr/include/eigen3 robot.cpp")
+            self.run_here(f"{compiler} -std=c++20 -fsyntax-only -Wall -Wextra -Werror -Wno-missing-field-initializers -I. -Isrc -Imade -isystem /usr/include/eigen3 robot.cpp")
 
     def test_the_table_of_the_readme_is_that_of_make_sim(self):
         self.run_here("make sim")

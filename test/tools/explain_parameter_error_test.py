@@ -41,7 +41,7 @@ class RefusedParameters(unittest.TestCase):
                     file.write(ROBOT % (f"robot{number}", fields, beside))
             log = os.path.join(folder, "log")
             with open(log, "w", encoding="utf-8") as file:
-                compiled = subprocess.run([compiler, "-std=c++20", "-fsyntax-only", f"-I{folder}", f"-I{ROOT}/include", "-isystem", "/usr/include/eigen3", "-x", "c++", "-"],
+                compiled = subprocess.run([compiler, "-std=c++20", "-fsyntax-only", f"-I{folder}", f"-I{ROOT}/src", "-isystem", "/usr/include/eigen3", "-x", "c++", "-"],
                                           input="".join(f'#include "config/robot{number}.hpp"\n' for number in range(len(robots))), text=True, stderr=file, check=False)
             found = subprocess.run([os.path.join(ROOT, "tools/run/explain_parameter_error"), log], capture_output=True, text=True, check=False)
             self.assertEqual(found.returncode == 0, found.stdout != "")

@@ -19,7 +19,7 @@ CORES = {
 FLAGS = ["-std=c++20", "-O2", "-ffp-contract=off", "-fno-math-errno", "-ffunction-sections", "-fdata-sections", "-fno-exceptions",
          "-fno-rtti", "-fno-threadsafe-statics", "-fno-use-cxa-atexit", "-fno-unwind-tables", "-fno-asynchronous-unwind-tables",
          "-DEIGEN_DONT_VECTORIZE", "-DEIGEN_NO_MALLOC", "-DEIGEN_CACHEFRIENDLY_PRODUCT_THRESHOLD=64", "-DEIGEN_NO_DEBUG",
-         "-isystem", "/usr/include/eigen3", "-I" + ROOT, "-I" + os.path.join(ROOT, "include"), "-fstack-usage", "-fcallgraph-info=su"]
+         "-isystem", "/usr/include/eigen3", "-I" + ROOT, "-I" + os.path.join(ROOT, "src"), "-fstack-usage", "-fcallgraph-info=su"]
 
 # libgcc's divisions refer to the unwinder, as in hal/chip/support/runtime.cpp.
 START = {"m": """

@@ -17,6 +17,32 @@ inline constexpr int kDma1Ch1 = 11;
 inline constexpr int kFdcan1It0 = 21;
 inline constexpr int kFdcan1It1 = 22;
 inline constexpr int kUsart1 = 37;
+inline constexpr int kUsart2 = 38;
+inline constexpr int kSpi1 = 35;
+inline constexpr int kTim2 = 28;
+inline constexpr int kTim3 = 29;
+inline constexpr int kExti0 = 6;
+inline constexpr int kExti1 = 7;
+inline constexpr int kExti2 = 8;
+inline constexpr int kExti3 = 9;
+inline constexpr int kExti4 = 10;
+inline constexpr int kExti95 = 23;
+inline constexpr int kExti1510 = 40;
+inline constexpr int kDma1Ch2 = 12;
+inline constexpr int kDma1Ch3 = 13;
+inline constexpr int kDma1Ch4 = 14;
+inline constexpr int kDma1Ch5 = 15;
+inline constexpr int kDma1Ch6 = 16;
+inline constexpr int kDma1Ch7 = 17;
+inline constexpr int kDma1Ch8 = 96;
+inline constexpr int kDma2Ch1 = 56;
+inline constexpr int kDma2Ch2 = 57;
+inline constexpr int kDma2Ch3 = 58;
+inline constexpr int kDma2Ch4 = 59;
+inline constexpr int kDma2Ch5 = 60;
+inline constexpr int kDma2Ch6 = 97;
+inline constexpr int kDma2Ch7 = 98;
+inline constexpr int kDma2Ch8 = 99;
 }  // namespace interrupt
 
 namespace rcc {
@@ -53,6 +79,11 @@ inline constexpr Field kPllm{4, 4};
 inline constexpr Field kPlln{8, 7};
 inline constexpr Field kPllren{24, 1};
 inline constexpr Field kPllr{25, 2};
+inline constexpr Field kPllpen{16, 1};
+inline constexpr Field kPllp{17, 1};
+inline constexpr Field kPllqen{20, 1};
+inline constexpr Field kPllq{21, 2};
+inline constexpr Field kPllpdiv{27, 5};
 }
 /// RCC.AHB1RSTR: AHB1 peripheral reset register
 namespace ahb1rstr {
@@ -60,6 +91,7 @@ inline constexpr std::uint32_t kOffset = 0x028;
 inline constexpr std::uint32_t kResetValue = 0x00000000;
 inline constexpr Field kDma1rst{0, 1};
 inline constexpr Field kDmamux1rst{2, 1};
+inline constexpr Field kDma2rst{1, 1};
 }
 /// RCC.APB1RSTR1: APB1 peripheral reset register 1
 namespace apb1rstr1 {
@@ -69,6 +101,7 @@ inline constexpr Field kTim2rst{0, 1};
 inline constexpr Field kTim3rst{1, 1};
 inline constexpr Field kUsart2rst{17, 1};
 inline constexpr Field kFdcanrst{25, 1};
+inline constexpr Field kPwrrst{28, 1};
 }
 /// RCC.APB2RSTR: APB2 peripheral reset register
 namespace apb2rstr {
@@ -76,6 +109,7 @@ inline constexpr std::uint32_t kOffset = 0x040;
 inline constexpr std::uint32_t kResetValue = 0x00000000;
 inline constexpr Field kSpi1rst{12, 1};
 inline constexpr Field kUsart1rst{14, 1};
+inline constexpr Field kSyscfgrst{0, 1};
 }
 /// RCC.AHB1ENR: AHB1 peripheral clock enable register
 namespace ahb1enr {
@@ -83,6 +117,8 @@ inline constexpr std::uint32_t kOffset = 0x048;
 inline constexpr std::uint32_t kResetValue = 0x00000100;
 inline constexpr Field kDma1en{0, 1};
 inline constexpr Field kDmamux1en{2, 1};
+inline constexpr Field kDma2en{1, 1};
+inline constexpr Field kFlashen{8, 1};
 }
 /// RCC.AHB2ENR: AHB2 peripheral clock enable register
 namespace ahb2enr {
@@ -108,12 +144,15 @@ inline constexpr std::uint32_t kOffset = 0x060;
 inline constexpr std::uint32_t kResetValue = 0x00000000;
 inline constexpr Field kSpi1en{12, 1};
 inline constexpr Field kUsart1en{14, 1};
+inline constexpr Field kSyscfgen{0, 1};
 }
 /// RCC.CCIPR: Peripherals independent clock configuration register
 namespace ccipr {
 inline constexpr std::uint32_t kOffset = 0x088;
 inline constexpr std::uint32_t kResetValue = 0x00000000;
 inline constexpr Field kFdcansel{24, 2};
+inline constexpr Field kUsart1sel{0, 2};
+inline constexpr Field kUsart2sel{2, 2};
 }
 /// RCC.CSR: Control/status register
 namespace csr {
@@ -126,6 +165,16 @@ inline constexpr Field kSftrstf{28, 1};
 inline constexpr Field kIwdgrstf{29, 1};
 inline constexpr Field kWwdgrstf{30, 1};
 inline constexpr Field kLpwrrstf{31, 1};
+inline constexpr Field kLsion{0, 1};
+inline constexpr Field kLsirdy{1, 1};
+}
+/// RCC.AHB2RSTR: AHB2 peripheral reset register
+namespace ahb2rstr {
+inline constexpr std::uint32_t kOffset = 0x02C;
+inline constexpr std::uint32_t kResetValue = 0x00000000;
+inline constexpr Field kGpioarst{0, 1};
+inline constexpr Field kGpiobrst{1, 1};
+inline constexpr Field kGpiocrst{2, 1};
 }
 }  // namespace rcc
 
@@ -136,6 +185,7 @@ namespace cr1 {
 inline constexpr std::uint32_t kOffset = 0x000;
 inline constexpr std::uint32_t kResetValue = 0x00000200;
 inline constexpr Field kVos{9, 2};
+inline constexpr Field kLpr{14, 1};
 }
 /// PWR.CR3: Power control register 3
 namespace cr3 {
@@ -167,6 +217,8 @@ inline constexpr Field kLatency{0, 4};
 inline constexpr Field kPrften{8, 1};
 inline constexpr Field kIcen{9, 1};
 inline constexpr Field kDcen{10, 1};
+inline constexpr Field kIcrst{11, 1};
+inline constexpr Field kDcrst{12, 1};
 }
 }  // namespace flash
 
@@ -223,6 +275,21 @@ inline constexpr std::uint32_t kOffset = 0x024;
 inline constexpr std::uint32_t kResetValue = 0x00000000;
 inline constexpr Field kAfrh8{0, 4};
 }
+/// GPIOA.IDR: GPIO port input data register
+namespace idr {
+inline constexpr std::uint32_t kOffset = 0x010;
+inline constexpr std::uint32_t kResetValue = 0x00000000;
+}
+/// GPIOA.ODR: GPIO port output data register
+namespace odr {
+inline constexpr std::uint32_t kOffset = 0x014;
+inline constexpr std::uint32_t kResetValue = 0x00000000;
+}
+/// GPIOA.BRR: GPIO port bit reset register
+namespace brr {
+inline constexpr std::uint32_t kOffset = 0x028;
+inline constexpr std::uint32_t kResetValue = 0x00000000;
+}
 }  // namespace gpio
 
 namespace spi {
@@ -238,6 +305,10 @@ inline constexpr Field kBr{3, 3};
 inline constexpr Field kSpe{6, 1};
 inline constexpr Field kSsi{8, 1};
 inline constexpr Field kSsm{9, 1};
+inline constexpr Field kLsbfirst{7, 1};
+inline constexpr Field kRxonly{10, 1};
+inline constexpr Field kCrcen{13, 1};
+inline constexpr Field kBidimode{15, 1};
 }
 /// SPI1.CR2: control register 2
 namespace cr2 {
@@ -245,6 +316,16 @@ inline constexpr std::uint32_t kOffset = 0x004;
 inline constexpr std::uint32_t kResetValue = 0x00000700;
 inline constexpr Field kDs{8, 4};
 inline constexpr Field kFrxth{12, 1};
+inline constexpr Field kRxdmaen{0, 1};
+inline constexpr Field kTxdmaen{1, 1};
+inline constexpr Field kSsoe{2, 1};
+inline constexpr Field kNssp{3, 1};
+inline constexpr Field kFrf{4, 1};
+inline constexpr Field kErrie{5, 1};
+inline constexpr Field kRxneie{6, 1};
+inline constexpr Field kTxeie{7, 1};
+inline constexpr Field kLdmaRx{13, 1};
+inline constexpr Field kLdmaTx{14, 1};
 }
 /// SPI1.SR: status register
 namespace sr {
@@ -255,6 +336,8 @@ inline constexpr Field kTxe{1, 1};
 inline constexpr Field kModf{5, 1};
 inline constexpr Field kOvr{6, 1};
 inline constexpr Field kBsy{7, 1};
+inline constexpr Field kFrlvl{9, 2};
+inline constexpr Field kFtlvl{11, 2};
 }
 /// SPI1.DR: data register
 namespace dr {
@@ -272,12 +355,16 @@ namespace cr1 {
 inline constexpr std::uint32_t kOffset = 0x000;
 inline constexpr std::uint32_t kResetValue = 0x00000000;
 inline constexpr Field kCen{0, 1};
+inline constexpr Field kUifremap{11, 1};
+inline constexpr Field kDithen{12, 1};
 }
 /// TIM2.SMCR: TIM2 slave mode control register
 namespace smcr {
 inline constexpr std::uint32_t kOffset = 0x008;
 inline constexpr std::uint32_t kResetValue = 0x00000000;
 inline constexpr Field kSms{0, 3};
+inline constexpr Field kSms1{16, 1};
+inline constexpr Field kSmspe{24, 1};
 }
 /// TIM2.CCMR1: TIM2 capture/compare mode register 1 [alternate]
 namespace ccmr1 {
@@ -330,6 +417,15 @@ inline constexpr std::uint32_t kResetValue = 0x00000000;
 inline constexpr Field kUe{0, 1};
 inline constexpr Field kRe{2, 1};
 inline constexpr Field kTe{3, 1};
+inline constexpr Field kIdleie{4, 1};
+inline constexpr Field kRxneie{5, 1};
+inline constexpr Field kTcie{6, 1};
+inline constexpr Field kTxeie{7, 1};
+inline constexpr Field kPce{10, 1};
+inline constexpr Field kM0{12, 1};
+inline constexpr Field kOver8{15, 1};
+inline constexpr Field kM1{28, 1};
+inline constexpr Field kFifoen{29, 1};
 }
 /// USART1.CR2: Control register 2
 namespace cr2 {
@@ -344,6 +440,8 @@ inline constexpr std::uint32_t kResetValue = 0x00000000;
 inline constexpr Field kEie{0, 1};
 inline constexpr Field kDmar{6, 1};
 inline constexpr Field kDmat{7, 1};
+inline constexpr Field kOnebit{11, 1};
+inline constexpr Field kOvrdis{12, 1};
 }
 /// USART1.BRR: Baud rate register
 namespace brr {
@@ -363,6 +461,10 @@ inline constexpr Field kOre{3, 1};
 inline constexpr Field kRxne{5, 1};
 inline constexpr Field kTc{6, 1};
 inline constexpr Field kTxe{7, 1};
+inline constexpr Field kIdle{4, 1};
+inline constexpr Field kBusy{16, 1};
+inline constexpr Field kTeack{21, 1};
+inline constexpr Field kReack{22, 1};
 }
 /// USART1.ICR: Interrupt flag clear register
 namespace icr {
@@ -373,6 +475,7 @@ inline constexpr Field kFecf{1, 1};
 inline constexpr Field kNcf{2, 1};
 inline constexpr Field kOrecf{3, 1};
 inline constexpr Field kTccf{6, 1};
+inline constexpr Field kIdlecf{4, 1};
 }
 /// USART1.RDR: Receive data register
 namespace rdr {
@@ -385,6 +488,19 @@ namespace tdr {
 inline constexpr std::uint32_t kOffset = 0x028;
 inline constexpr std::uint32_t kResetValue = 0x00000000;
 inline constexpr Field kTdr{0, 9};
+}
+/// USART1.RQR: Request register
+namespace rqr {
+inline constexpr std::uint32_t kOffset = 0x018;
+inline constexpr std::uint32_t kResetValue = 0x00000000;
+inline constexpr Field kRxfrq{3, 1};
+inline constexpr Field kTxfrq{4, 1};
+}
+/// USART1.PRESC: USART prescaler register
+namespace presc {
+inline constexpr std::uint32_t kOffset = 0x02C;
+inline constexpr std::uint32_t kResetValue = 0x00000000;
+inline constexpr Field kPrescaler{0, 4};
 }
 }  // namespace usart
 
@@ -415,16 +531,25 @@ inline constexpr std::uint32_t kResetValue = 0x00000000;
 inline constexpr Field kPvu{0, 1};
 inline constexpr Field kRvu{1, 1};
 }
+/// IWDG.WINR: Window register
+namespace winr {
+inline constexpr std::uint32_t kOffset = 0x010;
+inline constexpr std::uint32_t kResetValue = 0x00000FFF;
+}
 }  // namespace iwdg
 
 namespace dma {
 inline constexpr std::uint32_t kDma1 = 0x40020000;  ///< base address
+inline constexpr std::uint32_t kDma2 = 0x40020400;  ///< base address
 /// DMA1.ISR: interrupt status register
 namespace isr {
 inline constexpr std::uint32_t kOffset = 0x000;
 inline constexpr std::uint32_t kResetValue = 0x00000000;
 inline constexpr Field kTcif1{1, 1};
 inline constexpr Field kTcif2{5, 1};
+inline constexpr Field kGif1{0, 1};
+inline constexpr Field kHtif1{2, 1};
+inline constexpr Field kTeif1{3, 1};
 }
 /// DMA1.IFCR: DMA interrupt flag clear register
 namespace ifcr {
@@ -449,6 +574,10 @@ inline constexpr Field kMinc{7, 1};
 inline constexpr Field kPsize{8, 2};
 inline constexpr Field kMsize{10, 2};
 inline constexpr Field kPl{12, 2};
+inline constexpr Field kHtie{2, 1};
+inline constexpr Field kTeie{3, 1};
+inline constexpr Field kPinc{6, 1};
+inline constexpr Field kMem2mem{14, 1};
 }
 /// DMA1.CNDTR#: channel x number of data to transfer register
 namespace cndtrx {
@@ -479,6 +608,9 @@ inline constexpr std::uint32_t kOffset = 0x000;
 inline constexpr std::uint32_t kStride = 0x04, kCount = 16;
 inline constexpr std::uint32_t kResetValue = 0x00000000;
 inline constexpr Field kDmareqId{0, 7};
+inline constexpr Field kSoie{8, 1};
+inline constexpr Field kEge{9, 1};
+inline constexpr Field kSe{16, 1};
 }
 }  // namespace dmamux
 
@@ -491,6 +623,18 @@ inline constexpr std::uint32_t kOffset = 0x018;
 inline constexpr std::uint32_t kResetValue = 0x00000001;
 inline constexpr Field kInit{0, 1};
 inline constexpr Field kCce{1, 1};
+inline constexpr Field kAsm{2, 1};
+inline constexpr Field kCsa{3, 1};
+inline constexpr Field kCsr{4, 1};
+inline constexpr Field kMon{5, 1};
+inline constexpr Field kDar{6, 1};
+inline constexpr Field kTest{7, 1};
+inline constexpr Field kFdoe{8, 1};
+inline constexpr Field kBrse{9, 1};
+inline constexpr Field kPxhd{12, 1};
+inline constexpr Field kEfbi{13, 1};
+inline constexpr Field kTxp{14, 1};
+inline constexpr Field kNiso{15, 1};
 }
 /// FDCAN1.NBTP: FDCAN nominal bit timing and prescaler register
 namespace nbtp {
@@ -508,6 +652,9 @@ inline constexpr std::uint32_t kResetValue = 0x00000707;
 inline constexpr Field kAct{3, 2};
 inline constexpr Field kEp{5, 1};
 inline constexpr Field kBo{7, 1};
+inline constexpr Field kLec{0, 3};
+inline constexpr Field kEw{6, 1};
+inline constexpr Field kDlec{8, 3};
 }
 /// FDCAN1.IR: FDCAN interrupt register
 namespace ir {
@@ -516,6 +663,27 @@ inline constexpr std::uint32_t kResetValue = 0x00000000;
 inline constexpr Field kRf0n{0, 1};
 inline constexpr Field kRf0l{2, 1};
 inline constexpr Field kTc{7, 1};
+inline constexpr Field kRf0f{1, 1};
+inline constexpr Field kRf1n{3, 1};
+inline constexpr Field kRf1f{4, 1};
+inline constexpr Field kRf1l{5, 1};
+inline constexpr Field kHpm{6, 1};
+inline constexpr Field kTcf{8, 1};
+inline constexpr Field kTfe{9, 1};
+inline constexpr Field kTefn{10, 1};
+inline constexpr Field kTeff{11, 1};
+inline constexpr Field kTefl{12, 1};
+inline constexpr Field kTsw{13, 1};
+inline constexpr Field kMraf{14, 1};
+inline constexpr Field kToo{15, 1};
+inline constexpr Field kElo{16, 1};
+inline constexpr Field kEp{17, 1};
+inline constexpr Field kEw{18, 1};
+inline constexpr Field kBo{19, 1};
+inline constexpr Field kWdi{20, 1};
+inline constexpr Field kPea{21, 1};
+inline constexpr Field kPed{22, 1};
+inline constexpr Field kAra{23, 1};
 }
 /// FDCAN1.IE: FDCAN interrupt enable register
 namespace ie {
@@ -529,6 +697,12 @@ namespace ils {
 inline constexpr std::uint32_t kOffset = 0x058;
 inline constexpr std::uint32_t kResetValue = 0x00000000;
 inline constexpr Field kSmsg{2, 1};
+inline constexpr Field kRxfifo0{0, 1};
+inline constexpr Field kRxfifo1{1, 1};
+inline constexpr Field kTferr{3, 1};
+inline constexpr Field kMisc{4, 1};
+inline constexpr Field kBerr{5, 1};
+inline constexpr Field kPerr{6, 1};
 }
 /// FDCAN1.ILE: FDCAN interrupt line enable register
 namespace ile {
@@ -548,6 +722,7 @@ inline constexpr Field kAnfs{4, 2};
 inline constexpr Field kF0om{9, 1};
 inline constexpr Field kLss{16, 5};
 inline constexpr Field kLse{24, 4};
+inline constexpr Field kF1om{8, 1};
 }
 /// FDCAN1.RXF0S: FDCAN Rx FIFO 0 status register
 namespace rxf0s {
@@ -555,6 +730,9 @@ inline constexpr std::uint32_t kOffset = 0x090;
 inline constexpr std::uint32_t kResetValue = 0x00000000;
 inline constexpr Field kF0fl{0, 4};
 inline constexpr Field kF0gi{8, 2};
+inline constexpr Field kF0pi{16, 2};
+inline constexpr Field kF0f{24, 1};
+inline constexpr Field kRf0l{25, 1};
 }
 /// FDCAN1.RXF0A: CAN Rx FIFO 0 acknowledge register
 namespace rxf0a {
@@ -574,6 +752,8 @@ inline constexpr std::uint32_t kOffset = 0x0C4;
 inline constexpr std::uint32_t kResetValue = 0x00000003;
 inline constexpr Field kTffl{0, 3};
 inline constexpr Field kTfqpi{16, 2};
+inline constexpr Field kTfgi{8, 2};
+inline constexpr Field kTfqf{21, 1};
 }
 /// FDCAN1.TXBAR: FDCAN Tx buffer add request register
 namespace txbar {
@@ -599,6 +779,172 @@ inline constexpr std::uint32_t kOffset = 0x100;
 inline constexpr std::uint32_t kResetValue = 0x00000000;
 inline constexpr Field kPdiv{0, 4};
 }
+/// FDCAN1.CREL: FDCAN core release register
+namespace crel {
+inline constexpr std::uint32_t kOffset = 0x000;
+inline constexpr std::uint32_t kResetValue = 0x32141218;
+}
+/// FDCAN1.ENDN: FDCAN endian register
+namespace endn {
+inline constexpr std::uint32_t kOffset = 0x004;
+inline constexpr std::uint32_t kResetValue = 0x87654321;
+}
+/// FDCAN1.DBTP: FDCAN data bit timing and prescaler register
+namespace dbtp {
+inline constexpr std::uint32_t kOffset = 0x00C;
+inline constexpr std::uint32_t kResetValue = 0x00000A33;
+}
+/// FDCAN1.TEST: FDCAN test register
+namespace test {
+inline constexpr std::uint32_t kOffset = 0x010;
+inline constexpr std::uint32_t kResetValue = 0x00000000;
+}
+/// FDCAN1.RWD: FDCAN RAM watchdog register
+namespace rwd {
+inline constexpr std::uint32_t kOffset = 0x014;
+inline constexpr std::uint32_t kResetValue = 0x00000000;
+}
+/// FDCAN1.TSCC: FDCAN timestamp counter configuration register
+namespace tscc {
+inline constexpr std::uint32_t kOffset = 0x020;
+inline constexpr std::uint32_t kResetValue = 0x00000000;
+inline constexpr Field kTss{0, 2};
+inline constexpr Field kTcp{16, 4};
+}
+/// FDCAN1.TSCV: FDCAN timestamp counter value register
+namespace tscv {
+inline constexpr std::uint32_t kOffset = 0x024;
+inline constexpr std::uint32_t kResetValue = 0x00000000;
+}
+/// FDCAN1.TOCC: FDCAN timeout counter configuration register
+namespace tocc {
+inline constexpr std::uint32_t kOffset = 0x028;
+inline constexpr std::uint32_t kResetValue = 0xFFFF0000;
+inline constexpr Field kEtoc{0, 1};
+}
+/// FDCAN1.TOCV: FDCAN timeout counter value register
+namespace tocv {
+inline constexpr std::uint32_t kOffset = 0x02C;
+inline constexpr std::uint32_t kResetValue = 0x0000FFFF;
+}
+/// FDCAN1.ECR: FDCAN error counter register
+namespace ecr {
+inline constexpr std::uint32_t kOffset = 0x040;
+inline constexpr std::uint32_t kResetValue = 0x00000000;
+inline constexpr Field kTec{0, 8};
+inline constexpr Field kRec{8, 7};
+inline constexpr Field kRp{15, 1};
+inline constexpr Field kCel{16, 8};
+}
+/// FDCAN1.TDCR: FDCAN transmitter delay compensation register
+namespace tdcr {
+inline constexpr std::uint32_t kOffset = 0x048;
+inline constexpr std::uint32_t kResetValue = 0x00000000;
+}
+/// FDCAN1.XIDAM: FDCAN extended ID and mask register
+namespace xidam {
+inline constexpr std::uint32_t kOffset = 0x084;
+inline constexpr std::uint32_t kResetValue = 0x1FFFFFFF;
+}
+/// FDCAN1.HPMS: FDCAN high-priority message status register
+namespace hpms {
+inline constexpr std::uint32_t kOffset = 0x088;
+inline constexpr std::uint32_t kResetValue = 0x00000000;
+inline constexpr Field kBidx{0, 3};
+inline constexpr Field kMsi{6, 2};
+inline constexpr Field kFidx{8, 5};
+inline constexpr Field kFlst{15, 1};
+}
+/// FDCAN1.RXF1S: FDCAN Rx FIFO 1 status register
+namespace rxf1s {
+inline constexpr std::uint32_t kOffset = 0x098;
+inline constexpr std::uint32_t kResetValue = 0x00000000;
+}
+/// FDCAN1.RXF1A: FDCAN Rx FIFO 1 acknowledge register
+namespace rxf1a {
+inline constexpr std::uint32_t kOffset = 0x09C;
+inline constexpr std::uint32_t kResetValue = 0x00000000;
+}
+/// FDCAN1.TXBRP: FDCAN Tx buffer request pending register
+namespace txbrp {
+inline constexpr std::uint32_t kOffset = 0x0C8;
+inline constexpr std::uint32_t kResetValue = 0x00000000;
+}
+/// FDCAN1.TXBTO: FDCAN Tx buffer transmission occurred register
+namespace txbto {
+inline constexpr std::uint32_t kOffset = 0x0D4;
+inline constexpr std::uint32_t kResetValue = 0x00000000;
+}
+/// FDCAN1.TXBCF: FDCAN Tx buffer cancellation finished register
+namespace txbcf {
+inline constexpr std::uint32_t kOffset = 0x0D8;
+inline constexpr std::uint32_t kResetValue = 0x00000000;
+}
+/// FDCAN1.TXBCIE: FDCAN Tx buffer cancellation finished interrupt enable register
+namespace txbcie {
+inline constexpr std::uint32_t kOffset = 0x0E0;
+inline constexpr std::uint32_t kResetValue = 0x00000000;
+}
+/// FDCAN1.TXEFS: FDCAN Tx event FIFO status register
+namespace txefs {
+inline constexpr std::uint32_t kOffset = 0x0E4;
+inline constexpr std::uint32_t kResetValue = 0x00000000;
+inline constexpr Field kEffl{0, 3};
+inline constexpr Field kEfgi{8, 2};
+inline constexpr Field kEfpi{16, 2};
+inline constexpr Field kEff{24, 1};
+inline constexpr Field kTefl{25, 1};
+}
+/// FDCAN1.TXEFA: FDCAN Tx event FIFO acknowledge register
+namespace txefa {
+inline constexpr std::uint32_t kOffset = 0x0E8;
+inline constexpr std::uint32_t kResetValue = 0x00000000;
+inline constexpr Field kEfai{0, 2};
+}
 }  // namespace fdcan
+
+namespace syscfg {
+inline constexpr std::uint32_t kSyscfg = 0x40010000;  ///< base address
+/// SYSCFG.EXTICR#: external interrupt configuration register 1
+namespace exticrx {
+inline constexpr std::uint32_t kOffset = 0x008;
+inline constexpr std::uint32_t kStride = 0x04, kCount = 4;
+inline constexpr std::uint32_t kResetValue = 0x00000000;
+}
+}  // namespace syscfg
+
+namespace exti {
+inline constexpr std::uint32_t kExti = 0x40010400;  ///< base address
+/// EXTI.IMR1: Interrupt mask register
+namespace imr1 {
+inline constexpr std::uint32_t kOffset = 0x000;
+inline constexpr std::uint32_t kResetValue = 0xFF820000;
+}
+/// EXTI.EMR1: Event mask register
+namespace emr1 {
+inline constexpr std::uint32_t kOffset = 0x004;
+inline constexpr std::uint32_t kResetValue = 0x00000000;
+}
+/// EXTI.RTSR1: Rising Trigger selection register
+namespace rtsr1 {
+inline constexpr std::uint32_t kOffset = 0x008;
+inline constexpr std::uint32_t kResetValue = 0x00000000;
+}
+/// EXTI.FTSR1: Falling Trigger selection register
+namespace ftsr1 {
+inline constexpr std::uint32_t kOffset = 0x00C;
+inline constexpr std::uint32_t kResetValue = 0x00000000;
+}
+/// EXTI.SWIER1: Software interrupt event register
+namespace swier1 {
+inline constexpr std::uint32_t kOffset = 0x010;
+inline constexpr std::uint32_t kResetValue = 0x00000000;
+}
+/// EXTI.PR1: Pending register
+namespace pr1 {
+inline constexpr std::uint32_t kOffset = 0x014;
+inline constexpr std::uint32_t kResetValue = 0x00000000;
+}
+}  // namespace exti
 
 }  // namespace tetap::hal::stm32g474

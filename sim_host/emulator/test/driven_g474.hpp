@@ -2,8 +2,8 @@
 // A Nucleo-G474RE that a test drives by its registers, without a core: clocks as a port would set them, pins, waiting.
 #pragma once
 
+#include "hal/chip/stm32/registers_stm32g474.hpp"
 #include "sim_host/emulator/nucleo_g474re.hpp"
-#include "sim_host/emulator/registers_stm32g474.hpp"
 
 #include <gtest/gtest.h>
 
@@ -12,7 +12,7 @@
 
 namespace tetap::board {
 
-namespace g4 = hal::stm32g474_model;
+namespace g4 = hal::stm32g474;
 
 class DrivenG474 : public NucleoG474re {
  public:
@@ -44,35 +44,35 @@ class DrivenG474 : public NucleoG474re {
   /// All modelled blocks get their clocks.
   void open_gates() {
     namespace r = g4::rcc;
-    set(r::kRcc, r::rcc_ahb1enr::kOffset, 7);
-    set(r::kRcc, r::rcc_ahb2enr::kOffset, 7);
-    set(r::kRcc, r::rcc_apb1enr1::kOffset,
-        r::rcc_apb1enr1::kTim2en.mask() | r::rcc_apb1enr1::kTim3en.mask() | r::rcc_apb1enr1::kUsart2en.mask() |
-            r::rcc_apb1enr1::kFdcanen.mask() | r::rcc_apb1enr1::kPwren.mask());
-    set(r::kRcc, r::rcc_apb2enr::kOffset,
-        r::rcc_apb2enr::kSyscfgen.mask() | r::rcc_apb2enr::kSpi1en.mask() | r::rcc_apb2enr::kUsart1en.mask());
+    set(r::kRcc, r::ahb1enr::kOffset, 7);
+    set(r::kRcc, r::ahb2enr::kOffset, 7);
+    set(r::kRcc, r::apb1enr1::kOffset,
+        r::apb1enr1::kTim2en.mask() | r::apb1enr1::kTim3en.mask() | r::apb1enr1::kUsart2en.mask() |
+            r::apb1enr1::kFdcanen.mask() | r::apb1enr1::kPwren.mask());
+    set(r::kRcc, r::apb2enr::kOffset,
+        r::apb2enr::kSyscfgen.mask() | r::apb2enr::kSpi1en.mask() | r::apb2enr::kUsart1en.mask());
   }
   /// PLL of 320 MHz from the crystal of 24 MHz, output R of 160 MHz.
   void start_pll() {
     namespace r = g4::rcc;
-    set(r::kRcc, r::rcc_cr::kOffset, r::rcc_cr::kHseon.mask());
+    set(r::kRcc, r::cr::kOffset, r::cr::kHseon.mask());
     chip.advance_us(3'000);
-    put(r::kRcc, r::rcc_pllcfgr::kOffset,
-        r::rcc_pllcfgr::kPllsrc(3) | r::rcc_pllcfgr::kPllm(5) | r::rcc_pllcfgr::kPlln(80) | r::rcc_pllcfgr::kPllren(1));
-    set(r::kRcc, r::rcc_cr::kOffset, r::rcc_cr::kPllon.mask());
+    put(r::kRcc, r::pllcfgr::kOffset,
+        r::pllcfgr::kPllsrc(3) | r::pllcfgr::kPllm(5) | r::pllcfgr::kPlln(80) | r::pllcfgr::kPllren(1));
+    set(r::kRcc, r::cr::kOffset, r::cr::kPllon.mask());
     chip.advance_us(100);
   }
   /// Boost, wait states, then the PLL behind an AHB divided by two for a microsecond.
   void start_clocks(std::uint32_t latency = 4) {
     namespace r = g4::rcc;
     open_gates();
-    put(g4::pwr::kPwr, g4::pwr::pwr_cr5::kOffset, 0);
-    put(g4::flash::kFlash, g4::flash::flash_acr::kOffset, 0x0004'0600 | latency);
+    put(g4::pwr::kPwr, g4::pwr::cr5::kOffset, 0);
+    put(g4::flash::kFlash, g4::flash::acr::kOffset, 0x0004'0600 | latency);
     start_pll();
-    put(r::kRcc, r::rcc_cfgr::kOffset, r::rcc_cfgr::kHpre(8) | r::rcc_cfgr::kSw(3));
+    put(r::kRcc, r::cfgr::kOffset, r::cfgr::kHpre(8) | r::cfgr::kSw(3));
     chip.advance_us(2);
-    put(r::kRcc, r::rcc_cfgr::kOffset, r::rcc_cfgr::kSw(3));
-    put(r::kRcc, r::rcc_ccipr::kOffset, r::rcc_ccipr::kFdcansel(2));
+    put(r::kRcc, r::cfgr::kOffset, r::cfgr::kSw(3));
+    put(r::kRcc, r::ccipr::kOffset, r::ccipr::kFdcansel(2));
   }
   [[nodiscard]] bool pending(int interrupt) const { return chip.nvic.pending(exception::kInterrupt0 + interrupt); }
   [[nodiscard]] bool complained(const char* model, const char* part) const { return chip.complaints.has(model, part); }

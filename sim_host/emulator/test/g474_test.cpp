@@ -19,7 +19,7 @@ constexpr std::uint32_t kRcc = rcc::kRcc;
 TEST(G474Clock, StartsFromTheHsiAndReachesOneHundredAndSixty) {
   DrivenG474 board;
   EXPECT_EQ(board.chip.rcc.hclk_hz(), 16'000'000);
-  EXPECT_EQ(board.get(kRcc, rcc::rcc_cr::kOffset), 0x500U);
+  EXPECT_EQ(board.get(kRcc, rcc::cr::kOffset), 0x500U);
   board.start_clocks();
   EXPECT_EQ(board.chip.rcc.hclk_hz(), 160'000'000);
   EXPECT_EQ(board.chip.clock.hz(), 160'000'000);
@@ -35,16 +35,16 @@ TEST(G474Clock, WaitStatesFollowTheVoltageRange) {
   EXPECT_TRUE(few.complained("RCC", "HCLK of 160000 kHz with too few flash wait states"));
   DrivenG474 board;
   board.open_gates();
-  board.put(g4::flash::kFlash, g4::flash::flash_acr::kOffset, 0x0004'0600);
+  board.put(g4::flash::kFlash, g4::flash::acr::kOffset, 0x0004'0600);
   EXPECT_NO_COMPLAINTS(board);
-  board.put(g4::pwr::kPwr, g4::pwr::pwr_cr1::kOffset, 2U << 9);  // range 2: 12 MHz without a wait state, 16 MHz are set
+  board.put(g4::pwr::kPwr, g4::pwr::cr1::kOffset, 2U << 9);  // range 2: 12 MHz without a wait state, 16 MHz are set
   EXPECT_TRUE(board.complained("RCC", "HCLK of 16000 kHz with too few flash wait states"));
 }
 
 TEST(G474Clock, AboveOneHundredAndFiftyNeedsTheBoost) {
   DrivenG474 board;
   board.start_clocks();
-  board.put(g4::pwr::kPwr, g4::pwr::pwr_cr5::kOffset, g4::pwr::pwr_cr5::kR1mode.mask());
+  board.put(g4::pwr::kPwr, g4::pwr::cr5::kOffset, g4::pwr::cr5::kR1mode.mask());
   EXPECT_TRUE(board.complained("RCC", "too fast for PWR_CR1.VOS and PWR_CR5.R1MODE"));
 }
 
@@ -52,48 +52,47 @@ TEST(G474Clock, HighSpeedIsReachedInTwoSteps) {
   for (const bool early : {false, true}) {
     DrivenG474 board;
     board.open_gates();
-    board.put(g4::pwr::kPwr, g4::pwr::pwr_cr5::kOffset, 0);
-    board.put(g4::flash::kFlash, g4::flash::flash_acr::kOffset, 0x0004'0604);
+    board.put(g4::pwr::kPwr, g4::pwr::cr5::kOffset, 0);
+    board.put(g4::flash::kFlash, g4::flash::acr::kOffset, 0x0004'0604);
     board.start_pll();
-    if (early) board.put(kRcc, rcc::rcc_cfgr::kOffset, rcc::rcc_cfgr::kHpre(8) | rcc::rcc_cfgr::kSw(3));
-    board.put(kRcc, rcc::rcc_cfgr::kOffset, rcc::rcc_cfgr::kSw(3));
+    if (early) board.put(kRcc, rcc::cfgr::kOffset, rcc::cfgr::kHpre(8) | rcc::cfgr::kSw(3));
+    board.put(kRcc, rcc::cfgr::kOffset, rcc::cfgr::kSw(3));
     EXPECT_TRUE(board.complained("RCC", early ? "within 1 us of the switch" : "divide the AHB by two")) << early;
   }
 }
 
 TEST(G474Clock, PllHasItsLimitsAndItsOutputsGates) {
   DrivenG474 board;
-  board.set(kRcc, rcc::rcc_cr::kOffset, rcc::rcc_cr::kPllon.mask());
+  board.set(kRcc, rcc::cr::kOffset, rcc::cr::kPllon.mask());
   EXPECT_TRUE(board.complained("RCC", "without a source"));
-  board.clear(kRcc, rcc::rcc_cr::kOffset, rcc::rcc_cr::kPllon.mask());
-  board.put(kRcc, rcc::rcc_pllcfgr::kOffset,
-            rcc::rcc_pllcfgr::kPllsrc(2) | rcc::rcc_pllcfgr::kPllm(7) | rcc::rcc_pllcfgr::kPlln(20));
-  board.set(kRcc, rcc::rcc_cr::kOffset, rcc::rcc_cr::kPllon.mask());
+  board.clear(kRcc, rcc::cr::kOffset, rcc::cr::kPllon.mask());
+  board.put(kRcc, rcc::pllcfgr::kOffset, rcc::pllcfgr::kPllsrc(2) | rcc::pllcfgr::kPllm(7) | rcc::pllcfgr::kPlln(20));
+  board.set(kRcc, rcc::cr::kOffset, rcc::cr::kPllon.mask());
   EXPECT_TRUE(board.complained("RCC", "PLL input of 2000 kHz"));
   EXPECT_TRUE(board.complained("RCC", "PLL oscillator at 40000 kHz"));
   board.chip.advance_us(100);
-  board.put(kRcc, rcc::rcc_cfgr::kOffset, rcc::rcc_cfgr::kSw(3));
+  board.put(kRcc, rcc::cfgr::kOffset, rcc::cfgr::kSw(3));
   EXPECT_TRUE(board.complained("RCC", "not ready")) << "PLLREN is off";
-  EXPECT_EQ(rcc::rcc_cfgr::kSws.of(board.get(kRcc, rcc::rcc_cfgr::kOffset)), 1U);
-  board.set(kRcc, rcc::rcc_pllcfgr::kOffset, rcc::rcc_pllcfgr::kPllr(1));
+  EXPECT_EQ(rcc::cfgr::kSws.of(board.get(kRcc, rcc::cfgr::kOffset)), 1U);
+  board.set(kRcc, rcc::pllcfgr::kOffset, rcc::pllcfgr::kPllr(1));
   EXPECT_TRUE(board.complained("RCC", "while the PLL is on"));
 }
 
 TEST(G474Clock, DeadCrystalNeverBecomesReady) {
   DrivenG474 board({.oscillators = {.crystal = false}});
-  board.set(kRcc, rcc::rcc_cr::kOffset, rcc::rcc_cr::kHseon.mask());
+  board.set(kRcc, rcc::cr::kOffset, rcc::cr::kHseon.mask());
   board.chip.advance_us(1'000'000);
-  EXPECT_EQ(board.get(kRcc, rcc::rcc_cr::kOffset) & rcc::rcc_cr::kHserdy.mask(), 0U);
+  EXPECT_EQ(board.get(kRcc, rcc::cr::kOffset) & rcc::cr::kHserdy.mask(), 0U);
   EXPECT_EQ(board.chip.rcc.fdcan_hz(), 0) << "FDCAN hangs on the HSE after reset";
 }
 
 TEST(G474Clock, ResetFlagsStayUntilTheyAreRemoved) {
   DrivenG474 board;
   board.chip.system_reset(ResetCause::kWatchdog);
-  const std::uint32_t both = rcc::rcc_csr::kBorrstf.mask() | rcc::rcc_csr::kIwdgrstf.mask();
-  EXPECT_EQ(board.get(kRcc, rcc::rcc_csr::kOffset) & both, both);
-  board.set(kRcc, rcc::rcc_csr::kOffset, rcc::rcc_csr::kRmvf.mask());
-  EXPECT_EQ(board.get(kRcc, rcc::rcc_csr::kOffset) & 0xFE00'0000, 0U);
+  const std::uint32_t both = rcc::csr::kBorrstf.mask() | rcc::csr::kIwdgrstf.mask();
+  EXPECT_EQ(board.get(kRcc, rcc::csr::kOffset) & both, both);
+  board.set(kRcc, rcc::csr::kOffset, rcc::csr::kRmvf.mask());
+  EXPECT_EQ(board.get(kRcc, rcc::csr::kOffset) & 0xFE00'0000, 0U);
 }
 
 TEST(G474Pins, AreAnalogAfterResetButForTheDebugPort) {
@@ -245,7 +244,7 @@ TEST(G474Dma, OneRequestForTwoChannelsIsNoticed) {
 TEST(G474Dma, MultiplexerNeedsItsClock) {
   Serial board;
   board.start_ring(8);
-  board.clear(kRcc, rcc::rcc_ahb1enr::kOffset, rcc::rcc_ahb1enr::kDmamux1en.mask());
+  board.clear(kRcc, rcc::ahb1enr::kOffset, rcc::ahb1enr::kDmamux1en.mask());
   board.feed("abc");
   EXPECT_EQ(board.left(), 8U);
 }
@@ -373,14 +372,14 @@ class Wheels : public DrivenG474 {
       : DrivenG474({}, {.left_edges = [this](Picoseconds) { return edges; },
                         .right_edges = [this](Picoseconds) { return edges; }}) {
     start_clocks();
-    if (pull_down_off) set(g4::pwr::kPwr, g4::pwr::pwr_cr3::kOffset, g4::pwr::pwr_cr3::kUcpd1Dbdis.mask());
+    if (pull_down_off) set(g4::pwr::kPwr, g4::pwr::cr3::kOffset, g4::pwr::cr3::kUcpd1Dbdis.mask());
     for (const int pin : {0, 1}) alternate({'A', pin}, 1);
     for (const int pin : {4, 5}) alternate({'B', pin}, 2);
   }
   void start(std::uint32_t timer, std::uint32_t smcr = 3) {
-    put(timer, tim::tim2_smcr::kOffset, smcr);
-    put(timer, tim::tim2_ccmr1::kOffset, tim::tim2_ccmr1::kCc1s(1) | tim::tim2_ccmr1::kCc2s(1));
-    put(timer, tim::tim2_cr1::kOffset, 1);
+    put(timer, tim::smcr::kOffset, smcr);
+    put(timer, tim::ccmr1::kOffset, tim::ccmr1::kCc1s(1) | tim::ccmr1::kCc2s(1));
+    put(timer, tim::cr1::kOffset, 1);
   }
   std::int64_t edges = 0;
 };
@@ -388,25 +387,25 @@ class Wheels : public DrivenG474 {
 TEST(G474Encoder, CountsBothWaysInBothWidths) {
   Wheels board;
   board.start(tim::kTim2);
-  board.start(g4::tim3::kTim3);
-  EXPECT_EQ(board.get(g4::tim3::kTim3, tim::tim2_arr::kOffset), 0xFFFFU);
+  board.start(g4::tim::kTim3);
+  EXPECT_EQ(board.get(g4::tim::kTim3, tim::arr::kOffset), 0xFFFFU);
   for (const std::int64_t at : {1, 70'000, -70'000}) {
     board.edges = at;
-    EXPECT_EQ(board.get(tim::kTim2, tim::tim2_cnt::kOffset), static_cast<std::uint32_t>(at));
-    EXPECT_EQ(board.get(g4::tim3::kTim3, tim::tim2_cnt::kOffset), static_cast<std::uint32_t>(at) & 0xFFFF);
+    EXPECT_EQ(board.get(tim::kTim2, tim::cnt::kOffset), static_cast<std::uint32_t>(at));
+    EXPECT_EQ(board.get(g4::tim::kTim3, tim::cnt::kOffset), static_cast<std::uint32_t>(at) & 0xFFFF);
   }
   EXPECT_NO_COMPLAINTS(board);
 }
 
 TEST(G474Encoder, PullDownOfAnUnpoweredPortIsNoticed) {
   Wheels board(false);
-  board.start(g4::tim3::kTim3);
+  board.start(g4::tim::kTim3);
   EXPECT_TRUE(board.complained("PWR", "UCPD1_DBDIS is 0"));
 }
 
 TEST(G474Encoder, NewerModesAreNotTaken) {
   Wheels board;
-  board.start(tim::kTim2, tim::tim2_smcr::kSms1.mask() | 3);
+  board.start(tim::kTim2, tim::smcr::kSms1.mask() | 3);
   EXPECT_TRUE(board.complained("TIM2", "SMCR above bit 15"));
 }
 

@@ -2,12 +2,12 @@
 // For the emulated Nucleo-G474RE: clock to 160 MHz, a line on the console, frames by FDCAN from its interrupt, code in
 // the CCM SRAM. Each choice but 0 makes one mistake.
 #include "hal/chip/arm/cortex_m4.hpp"
+#include "hal/chip/stm32/registers_stm32g474.hpp"
 #include "hal/chip/support/mmio.hpp"
-#include "sim_host/emulator/registers_stm32g474.hpp"
 
 #include <cstdint>
 
-namespace reg = tetap::hal::stm32g474_model;
+namespace reg = tetap::hal::stm32g474;
 namespace m4 = tetap::hal::cortex_m4;
 namespace can = reg::fdcan;
 using tetap::hal::Mmio;
@@ -40,21 +40,21 @@ void alternate(std::uint32_t pin, std::uint32_t function) {
 
 void start_clock() {
   namespace r = reg::rcc;
-  set(kRcc, r::rcc_apb1enr1::kOffset,
-      r::rcc_apb1enr1::kPwren.mask() | r::rcc_apb1enr1::kUsart2en.mask() | r::rcc_apb1enr1::kFdcanen.mask());
-  set(kRcc, r::rcc_ahb2enr::kOffset, r::rcc_ahb2enr::kGpioaen.mask());
-  kPwr.write(reg::pwr::pwr_cr5::kOffset, 0);
-  kFlash.write(reg::flash::flash_acr::kOffset, 0x0004'0600 | (is(kWaitStates) ? 3U : 4U));
-  set(kRcc, r::rcc_cr::kOffset, r::rcc_cr::kHseon.mask());
-  wait(kRcc, r::rcc_cr::kOffset, r::rcc_cr::kHserdy.mask(), r::rcc_cr::kHserdy.mask());
-  kRcc.write(r::rcc_pllcfgr::kOffset, r::rcc_pllcfgr::kPllsrc(3) | r::rcc_pllcfgr::kPllm(5) |
-                                          r::rcc_pllcfgr::kPlln(80) | r::rcc_pllcfgr::kPllren(1));
-  set(kRcc, r::rcc_cr::kOffset, r::rcc_cr::kPllon.mask());
-  wait(kRcc, r::rcc_cr::kOffset, r::rcc_cr::kPllrdy.mask(), r::rcc_cr::kPllrdy.mask());
-  kRcc.write(r::rcc_cfgr::kOffset, r::rcc_cfgr::kHpre(8) | r::rcc_cfgr::kSw(3));
+  set(kRcc, r::apb1enr1::kOffset,
+      r::apb1enr1::kPwren.mask() | r::apb1enr1::kUsart2en.mask() | r::apb1enr1::kFdcanen.mask());
+  set(kRcc, r::ahb2enr::kOffset, r::ahb2enr::kGpioaen.mask());
+  kPwr.write(reg::pwr::cr5::kOffset, 0);
+  kFlash.write(reg::flash::acr::kOffset, 0x0004'0600 | (is(kWaitStates) ? 3U : 4U));
+  set(kRcc, r::cr::kOffset, r::cr::kHseon.mask());
+  wait(kRcc, r::cr::kOffset, r::cr::kHserdy.mask(), r::cr::kHserdy.mask());
+  kRcc.write(r::pllcfgr::kOffset,
+             r::pllcfgr::kPllsrc(3) | r::pllcfgr::kPllm(5) | r::pllcfgr::kPlln(80) | r::pllcfgr::kPllren(1));
+  set(kRcc, r::cr::kOffset, r::cr::kPllon.mask());
+  wait(kRcc, r::cr::kOffset, r::cr::kPllrdy.mask(), r::cr::kPllrdy.mask());
+  kRcc.write(r::cfgr::kOffset, r::cfgr::kHpre(8) | r::cfgr::kSw(3));
   for (int i = 0; i < 100; ++i) asm volatile("nop");
-  kRcc.write(r::rcc_cfgr::kOffset, r::rcc_cfgr::kSw(3));
-  kRcc.write(r::rcc_ccipr::kOffset, r::rcc_ccipr::kFdcansel(2));
+  kRcc.write(r::cfgr::kOffset, r::cfgr::kSw(3));
+  kRcc.write(r::ccipr::kOffset, r::ccipr::kFdcansel(2));
 }
 
 void print(const char* text) {
@@ -68,14 +68,14 @@ void print(const char* text) {
 }
 
 void start_can() {
-  namespace cccr = can::fdcan_cccr;
+  namespace cccr = can::cccr;
   alternate(11, 9);
   alternate(12, 9);
   kCan.write(cccr::kOffset, cccr::kInit(1) | cccr::kCce(1));
-  kCan.write(can::fdcan_nbtp::kOffset, can::fdcan_nbtp::kNbrp(19) | can::fdcan_nbtp::kNtseg1(12) |
-                                           can::fdcan_nbtp::kNtseg2(1) | can::fdcan_nbtp::kNsjw(1));
-  kCan.write(can::fdcan_ie::kOffset, can::fdcan_ir::kRf0n.mask());
-  kCan.write(can::fdcan_ile::kOffset, can::fdcan_ile::kEint0(1));
+  kCan.write(can::nbtp::kOffset,
+             can::nbtp::kNbrp(19) | can::nbtp::kNtseg1(12) | can::nbtp::kNtseg2(1) | can::nbtp::kNsjw(1));
+  kCan.write(can::ie::kOffset, can::ir::kRf0n.mask());
+  kCan.write(can::ile::kOffset, can::ile::kEint0(1));
   kCan.write(cccr::kOffset, 0);
   wait(kCan, cccr::kOffset, cccr::kInit.mask(), 0);
   kScs.write(m4::nvic::kIser, 1U << reg::interrupt::kFdcan1It0);
@@ -84,12 +84,11 @@ void start_can() {
 /// Sends the element that was received back with its identifier raised by one.
 void echo(std::uint32_t index) {
   const std::uint32_t from = 0x0B0 + 72 * index;
-  const std::uint32_t buffer = can::fdcan_txfqs::kTfqpi.of(kCan.read(can::fdcan_txfqs::kOffset)),
-                      to = 0x278 + 72 * buffer;
+  const std::uint32_t buffer = can::txfqs::kTfqpi.of(kCan.read(can::txfqs::kOffset)), to = 0x278 + 72 * buffer;
   kRam.write(to, kRam.read(from) + (1U << 18));
   kRam.write(to + 4, kRam.read(from + 4) & 0x000F'0000);
   for (std::uint32_t i = 8; i < 16; i += 4) kRam.write(to + i, kRam.read(from + i));
-  kCan.write(can::fdcan_txbar::kOffset, 1U << buffer);
+  kCan.write(can::txbar::kOffset, 1U << buffer);
 }
 
 [[gnu::section(".ccm"), gnu::noinline]] std::uint32_t from_ccm(std::uint32_t value) { return 3 * value + 1; }
@@ -102,13 +101,13 @@ extern "C" {
 
 [[gnu::used]] void on_can() {
   shared().results[1] = shared().results[1] + 1;
-  if (!is(kFlagNotCleared)) kCan.write(can::fdcan_ir::kOffset, can::fdcan_ir::kRf0n.mask());
+  if (!is(kFlagNotCleared)) kCan.write(can::ir::kOffset, can::ir::kRf0n.mask());
   for (;;) {
-    const std::uint32_t status = kCan.read(can::fdcan_rxf0s::kOffset);
-    if (can::fdcan_rxf0s::kF0fl.of(status) == 0) return;
-    const std::uint32_t index = can::fdcan_rxf0s::kF0gi.of(status);
+    const std::uint32_t status = kCan.read(can::rxf0s::kOffset);
+    if (can::rxf0s::kF0fl.of(status) == 0) return;
+    const std::uint32_t index = can::rxf0s::kF0gi.of(status);
     echo(index);
-    kCan.write(can::fdcan_rxf0a::kOffset, is(kFifoNotAcknowledged) ? (index + 1) % 3 : index);
+    kCan.write(can::rxf0a::kOffset, is(kFifoNotAcknowledged) ? (index + 1) % 3 : index);
     if (is(kFifoNotAcknowledged)) return;
   }
 }

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The parameter table (src/param/table.hpp) with a robot's values, as tetap-params prints it."""
+"""The parameter table (src/tetap/param/table.hpp) with a robot's values, as tetap-params prints it."""
 import functools
 import glob
 import json
@@ -15,7 +15,7 @@ def program():
     """tetap-params of $TETAP_PROGRAMS, else of the host's build folder, which is built when a robot or the table is newer."""
     folder = os.environ.get("TETAP_PROGRAMS")
     path = os.path.join(folder or os.path.join(ROOT, "build", "host", "sim_host"), "tetap-params")
-    if not folder and built_before(path, glob.glob(os.path.join(ROOT, "config", "**", "*.hpp"), recursive=True) + glob.glob(os.path.join(ROOT, "src", "param", "*.hpp"))):
+    if not folder and built_before(path, glob.glob(os.path.join(ROOT, "config", "**", "*.hpp"), recursive=True) + glob.glob(os.path.join(ROOT, "src", "tetap", "param", "*.hpp"))):
         subprocess.run([os.path.join(ROOT, "tools/run/build_preset"), "host:tetap-params"], check=True, stdout=subprocess.DEVNULL)
     return path
 

@@ -4,9 +4,9 @@ import glob
 import os
 import re
 
-VOCABULARY = "src/sensor/vocabulary.hpp"
-SOURCE_STATE = "src/sensor/source_state.hpp"
-SOURCES = "src/estimators/inertial/sources"
+VOCABULARY = "src/tetap/sensor/vocabulary.hpp"
+SOURCE_STATE = "src/tetap/sensor/source_state.hpp"
+SOURCES = "src/tetap/estimators/inertial/sources"
 INPUTS = {"sensor::ImuSample": "imu", "nav::ImuIncrement": "imu", "sensor::GnssPosition": "gnss_position", "model::GnssFix3d": "gnss_position",
           "sensor::GnssVelocity": "gnss_velocity", "WheelReading": "wheels", "ForwardReading": "forward_speed", "sensor::BodySpeed": "forward_speed",
           "sensor::OutsideHeading": "outside_heading", "sensor::MagneticFlux": "magnetometer", "sensor::AirPressure": "barometer"}  # payloads of Inertial's functions
@@ -118,7 +118,7 @@ def sources(root):
         text = read(root, os.path.relpath(path, root))
         stem = os.path.splitext(os.path.basename(path))[0]
         if f'#include "{REFUSAL}"' in text:
-            text += (read(root, "src/" + REFUSAL.removeprefix("tetap/")) if "status_of(" in text else "") + "Check::kGate"
+            text += (read(root, "src/" + REFUSAL) if "status_of(" in text else "") + "Check::kGate"
         ticks = ["x" if enters(text, word) else "" for word, _, _ in states]
         parts.append(f"| {stem.replace('_', ' ')} | " + " | ".join(ticks) + " | "
                      + ", ".join(cited_checks(text + "\n" + before.get(stem, ""), [word for word, _, _ in checks])) + " |")
