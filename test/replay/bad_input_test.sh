@@ -169,15 +169,15 @@ done
 # Tools
 refused "replay without a log" 'replay: which log' env -u LOG tools/run/replay_log
 refused "replay of no such log" 'replay: nowhere.log: no such file' env LOG=nowhere.log tools/run/replay_log
-refused "replay of a folder" "replay: $work: a folder, not a log" timeout 20 env LOG="$work" tools/run/replay_log
+refused "replay of a folder" "replay: $work: a folder, not a log" timeout 120 env LOG="$work" tools/run/replay_log
 refused "a folder for a log (make doctor)" "doctor: $work: a folder, not a log" env LOG="$work" tools/run/diagnose_log
 refused "replay against no such truth" 'replay: nowhere.csv: no such file' env LOG="$work/good.log" TRUTH=nowhere.csv tools/run/replay_log
 refused "replay on a bus of another kind" "replay: BUS=lin" env LOG="$work/good.log" BUS=lin tools/run/replay_log
 refused "replay of a board in memory" 'BUS=memory' env LOG="$work/good.log" BUS=memory BOARD=zynqmp_r5 tools/run/replay_log
 refused "replay for no such robot" "no robot 'tank'" env LOG="$work/good.log" BUS=memory ROBOT=tank OUT="$work/out" tools/run/replay_log
-refused "replay for no such robot over a bus" "no robot 'tank'; $robots" timeout 20 env LOG="$work/good.log" ROBOT=tank OUT="$work/out" tools/run/replay_log
-refused "sim for no such robot over a bus" "no robot 'tank'; $robots" timeout 20 env ROBOT=tank OUT="$work/out" tools/run/simulate_world
-refused "sim for no such robot on a board" "no robot 'tank'; $robots" timeout 20 env ROBOT=tank BOARD=zynqmp_r5 OUT="$work/out" tools/run/simulate_world
+refused "replay for no such robot over a bus" "no robot 'tank'; $robots" timeout 120 env LOG="$work/good.log" ROBOT=tank OUT="$work/out" tools/run/replay_log
+refused "sim for no such robot over a bus" "no robot 'tank'; $robots" timeout 120 env ROBOT=tank OUT="$work/out" tools/run/simulate_world
+refused "sim for no such robot on a board" "no robot 'tank'; $robots" timeout 120 env ROBOT=tank BOARD=zynqmp_r5 OUT="$work/out" tools/run/simulate_world
 refused "a misspelt setting" 'no setting FALUT; there are: ROBOT .*FAULT' make -s FALUT=gnss_jump help
 refused "sim from seed -1" "--seed .*'-1'" env BUS=memory SEED=-1 OUT="$work/out" tools/run/simulate_world
 # An image is built before it is started: a cmake that only notes what it is asked for, and fails.
@@ -187,26 +187,26 @@ chmod +x "$work/bin/cmake"
 for program in replay_log simulate_world; do
   tool=${program%%_*} tool=${tool/simulate/sim}
   refused "$tool of a robot without an image" "no image of robot 'rover_matched'; there are: .*husky_inertial" \
-    timeout 20 env LOG="$work/good.log" ROBOT=rover_matched BOARD=zynqmp_r5 OUT="$work/out" tools/run/$program
+    timeout 120 env LOG="$work/good.log" ROBOT=rover_matched BOARD=zynqmp_r5 OUT="$work/out" tools/run/$program
   : >"$work/asked"
   refused "$tool of an image that cannot be built" 'build: preset r5 failed' \
-    timeout 20 env PATH="$work/bin:$PATH" LOG="$work/good.log" ROBOT=husky BOARD=zynqmp_r5 OUT="$work/out" tools/run/$program
+    timeout 120 env PATH="$work/bin:$PATH" LOG="$work/good.log" ROBOT=husky BOARD=zynqmp_r5 OUT="$work/out" tools/run/$program
   grep -qE -- '^--build build/r5 (-j [0-9]+ )?--target tetap-zynqmp_r5-husky( -j [0-9]+)?$' "$work/asked" || { echo "WRONG  $tool does not build the image it is to run"; failed=$((failed + 1)); }
 done
 refused "replay on no such board" "no board 'arduino'" env LOG="$work/good.log" BOARD=arduino OUT="$work/out" tools/run/replay_log
 refused "sim on no such board" "no board 'arduino'" env BOARD=arduino OUT="$work/out" tools/run/simulate_world
 for board in ark_cannode nucleo_g474re; do
-  refused "sim on $board" "no board '$board' here; .*: make board BOARD=$board$" timeout 20 env BOARD=$board OUT="$work/out" tools/run/simulate_world
-  refused "replay on $board" "no board '$board' here; .*: make board BOARD=$board$" timeout 20 env LOG="$work/good.log" BOARD=$board OUT="$work/out" tools/run/replay_log
+  refused "sim on $board" "no board '$board' here; .*: make board BOARD=$board$" timeout 120 env BOARD=$board OUT="$work/out" tools/run/simulate_world
+  refused "replay on $board" "no board '$board' here; .*: make board BOARD=$board$" timeout 120 env LOG="$work/good.log" BOARD=$board OUT="$work/out" tools/run/replay_log
 done
 refused "sim at a pace that is not 1" 'sim: REALTIME=0: it is 1 or empty' env BUS=memory REALTIME=0 OUT="$work/out" WORLD="--duration 1" tools/run/simulate_world
 refused "sim with an unknown fault" 'meteor' env BUS=memory FAULT=meteor OUT="$work/out" tools/run/simulate_world
 refused "sim with a fault whose start is no number" "fault 'gnss_jump@soon': START is not" env BUS=memory FAULT=gnss_jump@soon OUT="$work/out" tools/run/simulate_world
-refused "sim with an unknown fault over a bus" "fault 'meteor'" timeout 20 env FAULT=meteor OUT="$work/out" tools/run/simulate_world
+refused "sim with an unknown fault over a bus" "fault 'meteor'" timeout 120 env FAULT=meteor OUT="$work/out" tools/run/simulate_world
 refused "sim with a fault of a sensor it has not" "fault 'mag_disturbance': robot rover has no magnetometer; faults that act on it: gnss_jump .*; robots on which it acts: iris" \
-  timeout 20 env FAULT=gnss_jump,mag_disturbance OUT="$work/out" tools/run/simulate_world
+  timeout 120 env FAULT=gnss_jump,mag_disturbance OUT="$work/out" tools/run/simulate_world
 refused "sim with a fault of landmarks it has not" "fault 'landmark_outlier': robot iris has no landmarks; .* mag_disturbance.*; in this world it acts on none" \
-  timeout 20 env ROBOT=iris FAULT=landmark_outlier@20+5 OUT="$work/out" tools/run/simulate_world
+  timeout 120 env ROBOT=iris FAULT=landmark_outlier@20+5 OUT="$work/out" tools/run/simulate_world
 refused "a world with a fault of wheels it has not" "fault 'wheel_spin': robot rover has no wheels" \
   "$programs/tetap-world" --memory --no-wheels --fault wheel_spin --out "$work/out"
 refused "firmware for no such board" "no board 'arduino'; there are: zynqmp_r5" env BOARD=arduino tools/run/build_firmware

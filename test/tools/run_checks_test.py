@@ -261,9 +261,21 @@ class Forms(Tree):
 
     def test_after_a_failed_build_nothing_that_needs_it_is_run(self):
         os.remove(os.path.join(self.root, "commit"))
-        self.write("table.toml", TABLE.replace("mkdir -p build &&", "cat commit &&"))
+        self.write("table.toml", TABLE.replace("mkdir -p build &&", "cat commit && mkdir -p build &&"))
         self.assertNotIn("of_program", self.run_all(status=1))
-        self.assertIn("not run, because build failed", self.said)
+        self.assertRegex(self.said, r"(?m)^of_program +not run: needs build$")
+        self.assertRegex(self.said, r"(?m)^failed: build$")
+        self.assertEqual(self.said.splitlines()[-1], "7 passed, 1 failed, 0 skipped, 1 not run")
+        self.write("commit", "1234")
+        self.assertEqual(self.run_all(), {"of_program"})  # goes on where the first call stopped
+
+    def test_a_step_without_what_a_failed_one_makes_is_not_run_and_what_needs_it_neither(self):
+        self.write("table.toml", TABLE.replace("mkdir -p out;", "exit 3;") + '[[step]]\nname = "last"\ncommand = "true"\ninputs = ["out/none"]\nafter = ["of_made"]\n')
+        self.assertNotIn("of_made", self.run_all(status=1))
+        self.assertRegex(self.said, r"(?m)^makes +FAILED")
+        self.assertRegex(self.said, r"(?m)^of_made +not run: needs makes$")
+        self.assertRegex(self.said, r"(?m)^last +not run: needs of_made$")
+        self.assertIn("1 failed, 0 skipped, 2 not run", self.said)
 
     def test_an_interrupted_proof_goes_on_and_a_finished_one_begins_anew(self):
         self.run_all()
@@ -281,6 +293,28 @@ class Forms(Tree):
         self.assertEqual(rows[0], ["step", "wall_s", "cpu_s", "status"])
         self.assertEqual({row[0] for row in rows[1:]}, {*ALL, "build"})
         self.assertTrue(all(float(row[1]) >= 0 and float(row[2]) > 0 for row in rows[1:]))
+
+
+class Limits(Tree):
+    TABLE = "[form.test]\n[limit.test]\nsilence_s = 1\ncpu_s = %d\n[[step]]\nname = 'step'\nstamp = false\ncommand = '%s'\n"
+
+    def step(self, command, cpu_s=60, status=0):
+        self.write("table.toml", self.TABLE % (cpu_s, command))
+        self.run_all(status=status)
+
+    def test_no_clock_ends_a_step_that_works_or_writes(self):
+        self.step("end=$((SECONDS + 3)); while [ $SECONDS -lt $end ]; do :; done")
+        self.step("for one in 1 2 3 4 5 6; do echo $one; sleep 0.5; done")
+
+    def test_a_silent_step_is_ended_and_the_reason_is_said(self):
+        self.step("echo begun; sleep 60; echo never", status=1)
+        self.assertRegex(self.said, r"step: status 124: silent for 1 s: it wrote nothing and used no CPU")
+        self.step("trap : TERM; while :; do sleep 60; done", status=1)  # killed at last
+        self.assertIn("silent for 1 s", self.said)
+
+    def test_a_step_that_never_ends_is_ended_by_its_cpu_time_that_of_its_children_included(self):
+        self.step("sh -c \"while :; do :; done\" & wait", cpu_s=1, status=1)
+        self.assertIn("used more than 1 s of CPU", self.said)
 
 
 class RealTime(Tree):

@@ -1,14 +1,14 @@
 #!/bin/bash
 # SPDX-License-Identifier: Apache-2.0
 # board_day_test.sh SECONDS [BOARD]: the first SECONDS of the rover's day (at most the whole) on BOARD's flash image (default ark_cannode), as `make board` runs it: no model complains, the log
-# repeats byte for byte, two runs are equal, and all of it is faster than real time. The estimate is honest, and as good as that of the board's twin: a node of this
+# repeats byte for byte, and two runs are equal. The estimate is honest, and as good as that of the board's twin: a node of this
 # host that gets the same sensors with their noise and delays over CAN, without drivers, lines and machine code.
 set -eu
 seconds=${1:-40} board=${2:-ark_cannode}
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/../../.." && pwd)
 cd "$root"
 programs=build/host/sim_host
-[ -x "$programs/emulator/tetap-board" ] || { echo "board_day_test: skipped: no $programs/board/tetap-board (libunicorn-dev)" >&2; exit 77; }
+[ -x "$programs/emulator/tetap-board" ] || { echo "board_day_test: skipped: no $programs/emulator/tetap-board (libunicorn-dev)" >&2; exit 77; }
 image=build/$board/hal/board/tetap-$board-rover.elf
 out=$(mktemp -d)
 trap 'rm -rf "$out"' EXIT
@@ -28,7 +28,6 @@ def must(holds, words):
 must(day["complaints"] == 0, f"complaints: {day['complaint_texts']}")
 must(day["epochs_different"] == 0 and day["unlogged"] == 0, f"{day['epochs_different']} epochs differ, {day['unlogged']} are not in the log")
 must(day["epochs_compared"] >= 100 * (seconds - 1), f"only {day['epochs_compared']} epochs in {seconds} s")
-must(day["times_realtime"] > 1, f"{day['times_realtime']} times real time")
 must(day["resets"] == 0 and day["imu_packets_lost"] == 0, f"{day['resets']} resets, {day['imu_packets_lost']} packets lost")
 must(day["gnss_baud"] == 115200 and day["gnss_epochs"] > 3 * (seconds - 40), "the receiver was not configured")
 fused, other = day["fused"], twin["fused"]

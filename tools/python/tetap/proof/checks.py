@@ -16,10 +16,13 @@ from tetap.proof.steps import Table, TableError
 
 SKIPPED = 77
 TOO_SLOW = 75           # a step in real time: its last line has the figure by which the machine was too slow
-LIMIT_S = {"test": 1800, "proof": 6 * 3600}
+NOT_RUN = 76            # a step for which another one had to pass
+STOPPED = 124           # a step that was silent for too long, or used too much of a processor
+ALIVE_SHARE = 0.01      # of one processor: a step that uses less and writes nothing is silent
 TAIL = 25               # lines of a failed step that are shown
 BESIDE = 10             # niceness of what only computes
 FOREIGN_SHARE = 0.25    # share of the processors; with more than that taken by others a step in real time is not judged
+WORDS = {0: "", SKIPPED: "  skipped", NOT_RUN: "  not run"}
 # A proof of identity reports bytes or state CRCs that differ. Such a finding is the proof's purpose: no machine is too slow for it.
 DIFFERS = re.compile(r"\bdiffer(s|ent)?\b|EOF on |came back as|every state CRC|does not move|the same as the undisturbed", re.I)
 
@@ -50,6 +53,58 @@ def busy_s():
     with open("/proc/stat", encoding="ascii") as file:
         user, nice, system, _, _, irq, softirq, steal = map(int, file.readline().split()[1:9])
     return (user + nice + system + irq + softirq + steal) / os.sysconf("SC_CLK_TCK")
+
+
+def processor_s(first):
+    """Seconds of CPU of a process, of all of its session and of their children, ended ones included where their parent waited for them."""
+    rows = {}
+    for name in os.listdir("/proc"):
+        if not name.isdigit():
+            continue
+        try:
+            with open(f"/proc/{name}/stat", encoding="utf-8", errors="replace") as file:
+                words = file.read().rpartition(")")[2].split()
+        except OSError:
+            continue
+        rows[int(name)] = int(words[1]), int(words[3]), sum(map(int, words[11:15]))
+    ours = {pid for pid, (_, session, _) in rows.items() if first in (pid, session)}
+    while more := {pid for pid, (parent, _, _) in rows.items() if parent in ours} - ours:
+        ours |= more
+    return sum(rows[pid][2] for pid in ours) / os.sysconf("SC_CLK_TCK")
+
+
+class Watch:
+    """Ends a step that is silent for too long or uses too much CPU. The clock alone ends none: a slow machine is no failure."""
+
+    def __init__(self, process, log, limits):
+        self.process, self.log, self.limits, self.reason = process, log, limits, ""
+        self.ended = threading.Event()
+        self.thread = threading.Thread(target=self.run, daemon=True)
+        self.thread.start()
+
+    def run(self):
+        silence_s = self.limits["silence_s"]
+        since, written, used = time.monotonic(), 0, 0.0
+        while not self.ended.wait(min(5.0, silence_s / 10)):
+            now, size, cpu = time.monotonic(), os.path.getsize(self.log), processor_s(self.process)
+            if cpu > self.limits["cpu_s"]:
+                return self.stop(f"used more than {self.limits['cpu_s']} s of CPU")
+            if size != written or not used <= cpu < used + ALIVE_SHARE * silence_s:
+                since, written, used = now, size, cpu
+            elif now - since > silence_s:
+                return self.stop(f"silent for {silence_s} s: it wrote nothing and used no CPU")
+        return None
+
+    def stop(self, reason):
+        self.reason = reason
+        Runner.kill(self.process)
+        if not self.ended.wait(5.0):
+            Runner.kill(self.process, signal.SIGKILL)
+
+    def end(self):
+        self.ended.set()
+        self.thread.join()
+        return self.reason
 
 
 class Runner:
@@ -92,6 +147,8 @@ class Runner:
         stamp = None
         if job.step.stamp:
             stamp, missing = self.stamp(job)
+            if missing and (failed := self.failed_before(job.step)):
+                return self.end(job, NOT_RUN, f"needs {' '.join(failed)}")
             if missing:
                 return self.end(job, 1, f"not there, so the step cannot run: {' '.join(missing)}")
             record = None if self.fresh else self.stamps.passed(job.name, stamp, job.step.makes)
@@ -129,22 +186,21 @@ class Runner:
                                        stdout=log, stderr=subprocess.STDOUT, start_new_session=True)
             with self.lock:
                 self.groups.add(process.pid)
-            late = threading.Timer(LIMIT_S.get(self.form, 1800), self.kill, [process.pid])
-            late.start()
+            watch = Watch(process.pid, job.log, self.table.limits[self.form])
             _, status, used = os.wait4(process.pid, 0)
             process.returncode = os.waitstatus_to_exitcode(status)
-            in_time = late.is_alive()
-            late.cancel()
+            stopped = watch.end()
             self.kill(process.pid)  # child processes that still run
             with self.lock:
                 self.groups.discard(process.pid)
         job.wall, job.cpu = time.monotonic() - began, used.ru_utime + used.ru_stime
-        return 124 if not in_time else process.returncode
+        job.note = stopped
+        return STOPPED if stopped else process.returncode
 
     @staticmethod
-    def kill(group):
+    def kill(group, how=signal.SIGTERM):
         try:
-            os.killpg(group, signal.SIGTERM)
+            os.killpg(group, how)
         except (ProcessLookupError, PermissionError):
             pass
 
@@ -183,14 +239,17 @@ class Runner:
     # -- all
     def tell(self, step, jobs):
         wall, cpu = sum(job.wall for job in jobs), sum(job.cpu for job in jobs)
-        bad = [job for job in jobs if job.status not in (0, SKIPPED)]
+        bad = [job for job in jobs if job.status not in (0, SKIPPED, NOT_RUN)]
+        needs = [job for job in jobs if job.status == NOT_RUN]
         skipped = [job for job in jobs if job.status == SKIPPED]
-        status = bad[0].status if bad else SKIPPED if len(skipped) == len(jobs) else 0
+        status = bad[0].status if bad else NOT_RUN if needs else SKIPPED if len(skipped) == len(jobs) else 0
         self.results[step.name] = (wall, cpu, status)
         unchanged = sum(job.unchanged for job in jobs)
         figures = f"{wall:7.1f} s {cpu:7.1f} s CPU" if unchanged < len(jobs) else ""
         if bad:
             text = "FAILED " + figures
+        elif status == NOT_RUN:
+            text = "not run: " + needs[0].note
         elif status == SKIPPED:
             text = "skipped: " + (skipped[0].note or (self.text(skipped[0]).strip().splitlines() or ["without a reason"])[-1])
         elif unchanged == len(jobs):
@@ -204,19 +263,24 @@ class Runner:
                 for line in self.text(job).splitlines()[-TAIL:]:
                     self.say(f"    {line}")
 
+    def failed_before(self, step):
+        """Steps that this one comes after and that have not passed."""
+        return [name for name in step.after if name in self.results and self.results[name][2] not in (0, SKIPPED)]
+
     def make_jobs(self, step):
-        items, reason = None, ""
-        unbuilt = [name for name in step.after if name in self.results and self.results[name][2] != 0 and not self.jobs[name][0].step.stamp]
+        items, status, reason = None, 1, ""
+        failed = self.failed_before(step)
+        unbuilt = [name for name in failed if not self.jobs[name][0].step.stamp]
         try:
-            if unbuilt:
-                raise TableError(f"not run, because {' '.join(unbuilt)} failed")
-            items = self.table.items(step)
+            items = None if unbuilt else self.table.items(step)
         except TableError as error:
             reason = str(error)
+        if items is None and failed:
+            status, reason = NOT_RUN, f"needs {' '.join(unbuilt or failed)}"
         jobs = [Job(step, item, os.path.join(self.out, (step.name + "." + os.path.basename(item) if item else step.name) + ".log")) for item in items or [""]]
         self.jobs[step.name] = jobs
         if items is None:
-            self.end(jobs[0], 1, reason)
+            self.end(jobs[0], status, reason)
             return []
         return jobs
 
@@ -279,17 +343,20 @@ class Runner:
         if spent:
             self.say("\nwhere the time went" + " " * 9 + "wall       CPU")
             for name, wall, cpu, status in sorted(spent, key=lambda row: -row[2]):
-                self.say(f"  {name:22} {wall:7.1f} s {cpu:7.1f} s{'' if status == 0 else '  skipped' if status == SKIPPED else '  FAILED'}")
+                self.say(f"  {name:22} {wall:7.1f} s {cpu:7.1f} s{WORDS.get(status, '  FAILED')}")
         whole = time.monotonic() - self.began
         self.say(f"  {'from begin to end':22} {whole:7.1f} s {sum(row[2] for row in order):7.1f} s on {self.processors} processors")
-        failed = [name for name, _, _, status in order if status not in (0, SKIPPED)]
+        failed = [name for name, _, _, status in order if status not in (0, SKIPPED, NOT_RUN)]
+        unrun = [name for name, _, _, status in order if status == NOT_RUN]
         if self.stopped:
             self.say("stopped; what has passed is kept")
         if failed:
             self.say(f"failed: {' '.join(failed)}")
+        if unrun:
+            self.say(f"not run, as what they need failed: {' '.join(unrun)}")
         skipped = sum(status == SKIPPED for *_, status in order)
-        self.say(f"\n{len(order) - len(failed) - skipped} passed, {len(failed)} failed, {skipped} skipped")
-        return not failed and not self.stopped
+        self.say(f"\n{len(order) - len(failed) - skipped - len(unrun)} passed, {len(failed)} failed, {skipped} skipped" + (f", {len(unrun)} not run" if unrun else ""))
+        return not failed and not unrun and not self.stopped
 
 
 def begin_proof(kept):

@@ -9,6 +9,7 @@ from tetap.proof import stamps
 
 LISTS = ("each", "without", "inputs", "optional", "data", "tools", "environment", "after", "makes")
 WORDS = {"name": str, "command": str, "each_from": str, "form": str, "part_of": str, "slots": (int, float, str), "stamp": bool, "realtime": bool}
+LIMIT = {"silence_s": 600, "cpu_s": 7200}  # of one step, where [limit.FORM] says nothing else
 MADE = ("build/", "out/")  # paths that exist only after steps have run
 
 
@@ -48,6 +49,7 @@ class Table:
         except tomllib.TOMLDecodeError as error:
             raise TableError(f"{path}: {error}") from None
         self.forms, self.groups = text.get("form", {}), text.get("group", {})
+        self.limits = {form: LIMIT | text.get("limit", {}).get(form, {}) for form in self.forms}
         self.steps = [self.step(row) for row in text.get("step", [])]
         names = [step.name for step in self.steps]
         for step in self.steps:
