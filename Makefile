@@ -5,7 +5,7 @@ SHELL := /bin/bash
 
 ROBOT ?= rover
 BOARD ?= linux
-BUS   ?= vcan
+BUS ?= $(if $(filter linux,$(BOARD)),memory,vcan)
 SEED  ?= 1
 FAULT ?=
 REALTIME ?=
@@ -34,6 +34,17 @@ $(error LOG=$(LOG) is a folder, not a log)
 endif
 endif
 
+comma := ,
+robots := $(shell tools/run/list_robots)
+# A robot of simulation alone is another one with other parameters.
+module := $(if $(filter $(ROBOT),$(robots)),$(ROBOT),$(patsubst %_matched,%,$(filter rover_matched rover_landmarks_matched,$(ROBOT))))
+ifneq ($(filter sim replay doctor programs firmware board flash laws,$(MAKECMDGOALS)),)
+ifeq ($(module),)
+$(error no robot '$(ROBOT)'; there are: $(robots) rover_landmarks_matched rover_matched)
+endif
+endif
+node := $(if $(filter memory,$(BUS)),,$(comma)tetap-node)
+
 .PHONY: help sim board test quick proof replay record doctor firmware flash size heap stack count bits hashes soak matrix swarm mutants laws constants bench costs check docs dbc setup programs arm
 
 help: ## this list
@@ -43,11 +54,12 @@ help: ## this list
 	@echo "  robots: $$(tools/run/list_robots) (a config/NAME.hpp of your own is one, too)"
 	@echo "  and in simulation alone, with parameters that equal the noise of the world: rover_landmarks_matched rover_matched"
 
-sim: setup programs ## the simulated world over vcan0: table, report, pictures in out/sim (SEED= FAULT= REALTIME=1 BOARD=zynqmp_r5 BUS=memory OUT=DIR)
+sim: setup ## a simulated world: table, report, pictures in out/sim (SEED= FAULT= OUT=DIR; over vcan0: BUS=vcan REALTIME=1 BOARD=zynqmp_r5)
+	@tools/run/build_preset host:tetap-world,tetap-doctor,robot_$(module)$(node)
 	@tools/run/simulate_world
 
-board: setup programs ## a flash image on an emulated board in the simulated world, repeated on the host: report in out/board (BOARD=ark_cannode, nucleo_g474re ROBOT= SEED= FAULT= BUS=vcan)
-	@tools/run/build_preset host:tetap-board
+board: setup ## a flash image on an emulated board in the simulated world, repeated on the host: report in out/board (BOARD=ark_cannode, nucleo_g474re ROBOT= SEED= FAULT= BUS=vcan)
+	@tools/run/build_preset host:tetap-board,tetap-world,tetap-play,robot_$(module)
 	@BUS=$(if $(filter file,$(origin BUS)),memory,$(BUS)) tools/run/emulate_board
 
 test: setup ## every check on prefixes and samples, what is unchanged left out (STEPS="unit_tests check", TETAP_FRESH=1)
@@ -60,13 +72,16 @@ quick: setup ## unit tests only
 proof: setup ## the same on whole lengths, every float, long runs; goes on where it was interrupted (STEPS=)
 	@tools/proof/run_checks proof $(STEPS)
 
-replay: setup programs ## a recorded log over vcan0: LOG=run.log [TRUTH=run.truth.csv] ROBOT=NAME [BOARD=] [BUS=memory]
+replay: setup ## a recorded log: LOG=run.log [TRUTH=run.truth.csv] ROBOT=NAME (over vcan0: BUS=vcan [BOARD=zynqmp_r5])
+	@tools/run/build_preset host:tetap-play,tetap-doctor,robot_$(module)$(node)
 	@tools/run/replay_log
 
-record: setup programs ## everything on vcan0 until ^C, in out/record: raw.log can be repeated, also of a node that runs already
+record: setup ## everything on vcan0 until ^C, in out/record: raw.log can be repeated, also of a node that runs already
+	@tools/run/build_preset host:tetap-record
 	@build/host/sim_host/tetap-record --snapshot
 
-doctor: setup programs ## the likeliest mistake in a log, by its devices alone: LOG=run.log [ROBOT=NAME], in out/doctor.json
+doctor: setup ## the likeliest mistake in a log, by its devices alone: LOG=run.log [ROBOT=NAME], in out/doctor.json
+	@tools/run/build_preset host:tetap-doctor$(if $(filter file,$(origin ROBOT)),,$(comma)robot_$(module))
 	@tools/run/diagnose_log $(if $(filter file,$(origin ROBOT)),,$(ROBOT))
 
 firmware: setup ## the flash image: BOARD=zynqmp_r5 ROBOT=rover, with its size table, no heap and stack proved
@@ -84,7 +99,8 @@ heap: arm ## no allocator in any linked image
 stack: arm programs ## worst-case stack from the call graph, against the painted high-water mark
 	@tools/proof/check_images stack
 
-count: arm ## instructions per workload and per tick on the emulated cores, against the budgets
+count: setup ## instructions per workload and per tick on the emulated cores, against the budgets
+	@tools/run/build_preset r5:counts m7:counts m4f:counts
 	@tools/proof/count_instructions --all
 
 bench: setup ## time beside OpenCV, Orocos BFL, Eigen and Ceres on this machine, in out/bench.json (their packages are installed for it)
@@ -107,7 +123,7 @@ hashes: setup programs ## a hash of each estimate over simulated and recorded ru
 	@tools/proof/hash_estimates
 
 matrix: setup ## faults of every sensor in every situation against what the node promises, in out/matrix.json (CELLS=1000); goes on where it was
-	@tools/run/build_preset host:tetap-matrix
+	@tools/run/build_preset host:tetap-matrix,robots
 	@tools/proof/run_matrix $(if $(CELLS),--cells $(CELLS))
 
 swarm: setup programs ## faults drawn anew for each seed, and what is left a minute after all of them, in out/swarm.json (CELLS=100 seeds)
@@ -132,8 +148,8 @@ dbc: setup ## docs/reference/messages.md from config/tetap.dbc; the C++ messages
 setup:
 	@tools/run/install_packages
 
-programs: setup
-	@tools/run/build_preset host:tetap-doctor,tetap-node,tetap-params,tetap-play,tetap-world,tetap-record,tetap-matrix,tetap-inject
+programs: setup ## all host programs with all robots (ROBOT=NAME: with this one alone)
+	@tools/run/build_preset host:programs,$(if $(filter file,$(origin ROBOT)),robots,robot_$(module))
 
 arm: setup
 	@tools/run/build_preset r5 m7 m4f

@@ -11,7 +11,7 @@ namespace {
 constexpr double kLeast_s = 10;       ///< a filter in the sensor or a coarse resolution repeats values for less
 constexpr double kLeastOthers = 200;  ///< samples in which another axis moved meanwhile
 constexpr double kNeeded = 0.7;       ///< cosine: a planar robot takes the gyroscope's axis that points up alone
-constexpr std::array<char, 3> kLetters{'X', 'Y', 'Z'};
+constexpr std::array<char, 3> kDeadAxisLetters{'X', 'Y', 'Z'};
 constexpr float kMostAngle_rad = 0.524F, kMostVelocity_mps = 5.24F;  ///< In_Imu0Gyro, In_Imu0Accel: the largest value
 
 }  // namespace
@@ -59,7 +59,7 @@ void DeadAxisDetector::judge(const Axes& axes, const char* message, const char* 
     findings.push_back({.code = Code::kDeadAxis,
                         .evidence = text("%s%c of %s kept one value for %.0f s, in which the other axes moved in %.0f "
                                          "samples.",
-                                         signal, kLetters[i], message, axis.longest_s, axis.most_others),
+                                         signal, kDeadAxisLetters[i], message, axis.longest_s, axis.most_others),
                         .change = {},
                         .spoils = static_cast<Devices>(device | kMounting)});
   }

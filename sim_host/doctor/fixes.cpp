@@ -15,7 +15,7 @@ constexpr double kRight =
     0.3;  ///< share of the legs' square left over with axes that fit: noise of fixes over short legs
 constexpr double kBetter = 0.4;        ///< share of the square that the stated axes leave
 constexpr double kAsGood = 1.3;        ///< another map that leaves at most that much more is named, too
-constexpr double kFollows = 0.8;       ///< course and gyroscope of a vehicle that drives ahead
+constexpr double kFixesFollows = 0.8;  ///< course and gyroscope of a vehicle that drives ahead
 constexpr double kLeastClimb_m = 1.5;  ///< RMS of a leg's climb: fixes of height scatter by a metre
 constexpr double kLeastClimbs = 10;
 
@@ -97,7 +97,7 @@ void VelocityDetector::finish(Findings& findings) {
   const double turn = course_.correlation_with_course();
   const auto name = [&](const Map& map, double left, bool fits_turn) {
     if (left > kAsGood * best + 0.02) return;
-    const bool known = std::abs(turn) > kFollows;
+    const bool known = std::abs(turn) > kFixesFollows;
     if (known && !fits_turn) return;
     findings.push_back(
         {.code = map.code,
@@ -122,7 +122,7 @@ void VelocityDetector::judge_up(Findings& findings) const {
       climbs_.covariance(1, 1) < kLeastClimb_m * kLeastClimb_m)
     return;
   const double follows = correlation(climbs_.covariance(0, 1), climbs_.covariance(0, 0), climbs_.covariance(1, 1));
-  if (follows > -kFollows) return;
+  if (follows > -kFixesFollows) return;
   findings.push_back(
       {.code = Code::kVelocityAxes,
        .uses = kFixes | kGnssVelocity,

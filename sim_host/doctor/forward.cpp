@@ -6,7 +6,7 @@
 namespace tetap::doctor {
 namespace {
 
-constexpr double kLeastWindows = 30;
+constexpr double kForwardLeastWindows = 30;
 constexpr double kLeast_mps2 = 0.1;  ///< RMS of the motion's acceleration: less drowns in slopes and vibration
 constexpr double kSlow_mps = 1;      ///< below, the magnitude of a GNSS velocity is noise
 constexpr double kFits = 0.25;       ///< share of the force's variance, by the placing that fits best
@@ -71,10 +71,10 @@ void ForwardDetector::window(const Window& w) {
 }
 
 ForwardDetector::Agreement ForwardDetector::agreement() const {
-  const bool wheels = wheels_.moments.count() >= kLeastWindows;
+  const bool wheels = wheels_.moments.count() >= kForwardLeastWindows;
   const Moments<4>& m = wheels ? wheels_.moments : gnss_.moments;
   Agreement found{.device = wheels ? "the wheels" : "GNSS", .uses = wheels ? kWheels : kGnssVelocity};
-  if (m.count() < kLeastWindows) return found;
+  if (m.count() < kForwardLeastWindows) return found;
   constexpr double kLeast2 = kLeast_mps2 * kLeast_mps2;
   if (!robot_.mounting) {
     if (m.covariance(2, 2) > kLeast2 && m.covariance(3, 3) > kLeast2) add_seen(m, found);
@@ -105,9 +105,9 @@ void ForwardDetector::add_seen(const Moments<4>& m, Agreement& found) {
 
 void ForwardDetector::finish(Findings& findings) {
   if (!robot_.mounting) return;
-  if (wheels_.moments.count() >= kLeastWindows)
+  if (wheels_.moments.count() >= kForwardLeastWindows)
     judge(wheels_, "the wheels", kWheels, findings);
-  else if (gnss_.moments.count() >= kLeastWindows)
+  else if (gnss_.moments.count() >= kForwardLeastWindows)
     judge(gnss_, "GNSS", kGnssVelocity, findings);
 }
 

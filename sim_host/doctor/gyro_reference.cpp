@@ -10,12 +10,12 @@
 namespace tetap::doctor {
 namespace {
 
-constexpr double kSlow_mps = 2;           ///< below, the course of a velocity with 0.1 m/s of noise is loose
-constexpr double kMostTurn_rad = 1;       ///< in a second: more may be a wrap
+constexpr double kGyroReferenceSlow_mps = 2;  ///< below, the course of a velocity with 0.1 m/s of noise is loose
+constexpr double kMostTurn_rad = 1;           ///< in a second: more may be a wrap
 constexpr double kMostChordTurn_rad = 2;  ///< more may be a wrap; a course is noisy, and a lower limit cuts it alone
-constexpr double kLeastWindows = 15;
+constexpr double kGyroReferenceLeastWindows = 15;
 constexpr double kLeastTurn_radps = 0.02;         ///< RMS of the course's rate
-constexpr double kFollows = 0.7;                  ///< correlation: the course of noisy fixes keeps that much
+constexpr double kGyroReferenceFollows = 0.7;     ///< correlation: the course of noisy fixes keeps that much
 constexpr double kChord_m = 6, kChordSigmas = 4;  ///< fixes one after the other share most of their error
 constexpr double kMostChord_s = 20;
 constexpr int kLeastFieldWindows = 20;
@@ -67,8 +67,8 @@ void CourseDetector::window(const Window& w) {
     const Vector3 &a = *before_->velocity_n_mps, &b = *w.velocity_n_mps;
     const double step_s = w.start_s - before_->start_s;
     const double turn = wrapped(std::atan2(b[1], b[0]) - std::atan2(a[1], a[0]));
-    if (std::hypot(a[0], a[1]) > kSlow_mps && std::hypot(b[0], b[1]) > kSlow_mps && step_s < 1.5 &&
-        std::abs(turn) < kMostTurn_rad) {
+    if (std::hypot(a[0], a[1]) > kGyroReferenceSlow_mps && std::hypot(b[0], b[1]) > kGyroReferenceSlow_mps &&
+        step_s < 1.5 && std::abs(turn) < kMostTurn_rad) {
       const Vector3 rate = scaled(0.5, sum(*before_->turn_s_radps, *w.turn_s_radps));
       by_velocity_.add({rate[0], rate[1], rate[2], turn / step_s});
     }
@@ -78,19 +78,20 @@ void CourseDetector::window(const Window& w) {
 }
 
 double CourseDetector::correlation_of(const Moments<4>& moments) const {
-  if (moments.count() < kLeastWindows || moments.covariance(3, 3) < kLeastTurn_radps * kLeastTurn_radps) return 0;
+  if (moments.count() < kGyroReferenceLeastWindows || moments.covariance(3, 3) < kLeastTurn_radps * kLeastTurn_radps)
+    return 0;
   const std::array<double, 4> gyro{up_s_[0], up_s_[1], up_s_[2], 0}, course{0, 0, 0, 1};
   return correlation(moments.covariance(gyro, course), moments.covariance(gyro, gyro), moments.covariance(3, 3));
 }
 
 std::optional<TurnRatio> CourseDetector::ratio() const {
-  const bool velocity = by_velocity_.count() >= kLeastWindows;
+  const bool velocity = by_velocity_.count() >= kGyroReferenceLeastWindows;
   const Moments<4>& moments = velocity ? by_velocity_ : by_fixes_;
-  if (moments.count() < kLeastWindows || moments.covariance(3, 3) < kLeastTurn_radps * kLeastTurn_radps)
+  if (moments.count() < kGyroReferenceLeastWindows || moments.covariance(3, 3) < kLeastTurn_radps * kLeastTurn_radps)
     return std::nullopt;
   const std::array<double, 4> gyro{up_s_[0], up_s_[1], up_s_[2], 0}, course{0, 0, 0, 1};
   auto found = turn_ratio(moments.covariance(gyro, gyro), moments.covariance(gyro, course), moments.covariance(3, 3),
-                          moments.count(), kFollows);
+                          moments.count(), kGyroReferenceFollows);
   if (!found) return found;
   if (!velocity) found->seconds = by_fixes_s_;
   found->device = velocity ? "the course of the GNSS velocity" : "the course of the fixes";
@@ -99,9 +100,9 @@ std::optional<TurnRatio> CourseDetector::ratio() const {
 }
 
 void CourseDetector::finish(Findings& findings) {
-  const bool velocity = by_velocity_.count() >= kLeastWindows;
+  const bool velocity = by_velocity_.count() >= kGyroReferenceLeastWindows;
   const Moments<4>& moments = velocity ? by_velocity_ : by_fixes_;
-  if (std::abs(correlation_of(moments)) < kFollows) return;
+  if (std::abs(correlation_of(moments)) < kGyroReferenceFollows) return;
   const std::array<double, 4> gyro{up_s_[0], up_s_[1], up_s_[2], 0};
   name_gyro_unit(std::sqrt(moments.covariance(gyro, gyro) / moments.covariance(3, 3)),
                  velocity ? "the course of the GNSS velocity" : "the course of the fixes",

@@ -9,16 +9,17 @@
 namespace tetap::doctor {
 namespace {
 
-constexpr double kChord_m = 12;      ///< a chord by the fixes at least ...
-constexpr double kSigmas = 8;        ///< ... and so many of their sigma
-constexpr double kMostChord_s = 60;  ///< a gyroscope's bias turns the path by a degree a minute and more
-constexpr double kMostResidual = 1;  ///< bound of one pair: jumps of a receiver do not decide
+constexpr double kPathChord_m = 12;      ///< a chord by the fixes at least ...
+constexpr double kPathSigmas = 8;        ///< ... and so many of their sigma
+constexpr double kPathMostChord_s = 60;  ///< a gyroscope's bias turns the path by a degree a minute and more
+constexpr double kMostResidual = 1;      ///< bound of one pair: jumps of a receiver do not decide
 constexpr double kLeastPairs = 6;
-constexpr double kRight = 0.15;  ///< mean square of log ratio and angle left over with axes that fit
-constexpr double kBetter = 0.5;  ///< share of the square that the stated axes leave
-constexpr double kAsGood = 1.5;
+constexpr double kPathRight = 0.15;  ///< mean square of log ratio and angle left over with axes that fit
+constexpr double kPathBetter = 0.5;  ///< share of the square that the stated axes leave
+constexpr double kPathAsGood = 1.5;
 constexpr std::size_t kLeastRatios = 8;
-constexpr double kScale = 1.15;  ///< wheels, tyres and slip are within some percent; a wrong radius is a tenth and more
+constexpr double kPathScale =
+    1.15;                        ///< wheels, tyres and slip are within some percent; a wrong radius is a tenth and more
 constexpr double kSpread = 1.5;  ///< between the quartiles of the chords' ratios: a factor is the same everywhere
 constexpr double kGap_s = 0.5;
 
@@ -85,11 +86,11 @@ void PathDetector::end_chord(base::Micros time, const PlanePoint& here, double s
   const Complex at{here.east_m, here.north_m};
   const double since = began_ ? static_cast<double>((time - *began_).us) * 1e-6 : -1;
   if (!wheels_at_) return;
-  if (!began_ || since < 0 || since > kMostChord_s) {
+  if (!began_ || since < 0 || since > kPathMostChord_s) {
     fixes_before_.reset();
   } else {
     const Complex fixes = at - from_, path = path_m_ - path_from_;
-    const double least = std::max(kChord_m, kSigmas * sigma_m);
+    const double least = std::max(kPathChord_m, kPathSigmas * sigma_m);
     if (std::abs(fixes) < least) return;
     if (fixes_before_ && std::abs(path) > 0 && std::abs(*path_before_) > 0)
       add_pair(*fixes_before_, *path_before_, fixes, path);
@@ -128,12 +129,12 @@ void PathDetector::finish(Findings& findings) {
   judge_scale(findings);
   if (pairs_ < kLeastPairs) return;
   const double best = *std::min_element(left_.begin(), left_.end());
-  if (best > kRight * pairs_ || best > kBetter * left_[0]) return;
+  if (best > kPathRight * pairs_ || best > kPathBetter * left_[0]) return;
   constexpr std::array kOf{Code::kLatLonSwapped, Code::kLatitudeSign, Code::kLongitudeSign};
   constexpr std::array kWords{"latitude and longitude swapped", "the latitude's sign changed",
                               "the longitude's sign changed"};
   for (std::size_t i = 0; i < kOf.size(); ++i) {
-    if (left_[i + 1] > kAsGood * best) continue;
+    if (left_[i + 1] > kPathAsGood * best) continue;
     findings.push_back({.code = kOf[i],
                         .uses = kFixes | kWheels | kGyroscope,
                         .certainty = 0.9 - left_[i + 1] / pairs_,
@@ -152,7 +153,7 @@ void PathDetector::judge_scale(Findings& findings) const {
   const double median = static_cast<double>(sorted[sorted.size() / 2]);
   const double low = static_cast<double>(sorted[sorted.size() / 4]),
                high = static_cast<double>(sorted[sorted.size() * 3 / 4]);
-  if (!(low > kScale || high < 1 / kScale) || high > kSpread * low) return;
+  if (!(low > kPathScale || high < 1 / kPathScale) || high > kSpread * low) return;
   findings.push_back(
       {.code = Code::kWheelScale,
        .uses = kFixes | kWheels | kGyroscope,

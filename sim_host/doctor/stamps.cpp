@@ -23,7 +23,7 @@ constexpr double kDrift_ppm = 50, kDrift_us = 10'000, kDriftScatters = 5;
 constexpr double kFresh_us = 60'000;        ///< some device of a robot is read out faster than that
 constexpr double kSameOffset_us = 250'000;  ///< ages of devices on one clock differ by their delays, which are less
 
-double wrapped(double us) { return us - kWrap_us * std::round(us / kWrap_us); }
+double wrapped_us(double us) { return us - kWrap_us * std::round(us / kWrap_us); }
 
 /// Streams whose stamp stands for its sample's: of the messages of a fix one.
 bool is_device(std::uint32_t offset) {
@@ -62,12 +62,12 @@ void StampDetector::vote(Stream& s, base::Micros time, std::uint32_t stamp) {
   const std::int64_t span = (time - s.anchor).us;
   if (span >= 0 && span < kLeastSpan_us) return;
   const auto span_us = static_cast<double>(span);
-  const double step = wrapped(static_cast<double>(stamp) - static_cast<double>(s.anchor_stamp));
+  const double step = wrapped_us(static_cast<double>(stamp) - static_cast<double>(s.anchor_stamp));
   s.anchor = time;
   s.anchor_stamp = stamp;
   if (span < 0 || span > kMostSpan_us) return;
   const double slack = kJitterShare * span_us + kJitter_us;
-  const double as_us = std::abs(wrapped(step - span_us)) / slack;
+  const double as_us = std::abs(wrapped_us(step - span_us)) / slack;
   const double as_ms = std::abs(step - 1e-3 * span_us) / (1e-3 * slack);
   const double as_s = std::abs(step - 1e-6 * span_us) / 2;
   Unit unit = as_us <= as_ms ? kMicroseconds : kMilliseconds;
@@ -77,8 +77,8 @@ void StampDetector::vote(Stream& s, base::Micros time, std::uint32_t stamp) {
 }
 
 void StampDetector::follow_age(Stream& s, base::Micros time, std::uint32_t stamp) {
-  const double age = wrapped(static_cast<double>(time.us % (1 << 20)) - static_cast<double>(stamp));
-  s.age_us = s.begun ? s.age_us + wrapped(age - s.age_us) : age;
+  const double age = wrapped_us(static_cast<double>(time.us % (1 << 20)) - static_cast<double>(stamp));
+  s.age_us = s.begun ? s.age_us + wrapped_us(age - s.age_us) : age;
   if (!s.begun) s.block_us = time.us;
   if (time.us >= s.block_us + kBlock_us || time.us < s.block_us) {
     close_block(s);
@@ -123,7 +123,7 @@ StampDetector::Age StampDetector::age_of(const Stream& s) {
   const double span_s = kBlock_us * 1e-6 * s.blocks.count();
   const double left = s.blocks.covariance(1, 1) - slope * s.blocks.covariance(0, 1);
   return {.message = s.message,
-          .mean_us = wrapped(s.blocks.mean(1)),
+          .mean_us = wrapped_us(s.blocks.mean(1)),
           .drift_ppm = s.blocks.count() >= kLeastBlocks ? slope : 0,
           .span_s = span_s,
           .scatter_us = std::sqrt(std::max(0.0, left))};
@@ -151,7 +151,7 @@ void StampDetector::finish(Findings& findings) {
 void StampDetector::judge_ages(const std::vector<Age>& ages, Findings& findings) const {
   const auto bad = [this](const Age& age) { return too_old_or_ahead(age); };
   const auto together = [&](const Age& age) {
-    return std::abs(wrapped(age.mean_us - ages.front().mean_us)) < kSameOffset_us;
+    return std::abs(wrapped_us(age.mean_us - ages.front().mean_us)) < kSameOffset_us;
   };
   const char* clock = source_ == ClockSource::kSync     ? "In_Sync"
                       : source_ == ClockSource::kEpochs ? "the node's own timer"

@@ -9,8 +9,8 @@
 namespace tetap::doctor {
 namespace {
 
-constexpr double kLeastWindows = 20;
-constexpr double kLeastTurn_radps = 0.03;  ///< RMS: less, and slip and a gyroscope's bias are as large
+constexpr double kTurnLeastWindows = 20;
+constexpr double kTurnLeastTurn_radps = 0.03;  ///< RMS: less, and slip and a gyroscope's bias are as large
 constexpr double kExplained = 0.35;  ///< share of the turn's variance: on a fast road slip makes half of the difference
 constexpr double kAlone = 0.7;  ///< share of one wheel combination in the other's, where one alone explains the turn
 constexpr double kSingular = 0.02;          ///< less, and the two combinations are one: a wheel that stands still
@@ -45,10 +45,10 @@ void TurnDetector::window(const Window& w) {
 }
 
 std::optional<TurnRatio> TurnDetector::ratio() const {
-  if (whole_.count() < kLeastWindows) return std::nullopt;
+  if (whole_.count() < kTurnLeastWindows) return std::nullopt;
   const std::array<double, 5> gyro{up_s_[0], up_s_[1], up_s_[2], 0, 0}, turn{0, 0, 0, 1 / scale_.track_m, 0};
   const double turn2 = whole_.covariance(turn, turn);
-  if (turn2 < kLeastTurn_radps * kLeastTurn_radps) return std::nullopt;
+  if (turn2 < kTurnLeastTurn_radps * kTurnLeastTurn_radps) return std::nullopt;
   auto found = turn_ratio(whole_.covariance(gyro, gyro), whole_.covariance(gyro, turn), turn2, whole_.count(),
                           std::sqrt(kExplained));
   if (!found) return found;
@@ -58,7 +58,7 @@ std::optional<TurnRatio> TurnDetector::ratio() const {
 }
 
 void TurnDetector::finish(Findings& findings) {
-  if (moments_.count() < kLeastWindows) return;
+  if (moments_.count() < kTurnLeastWindows) return;
   const std::array<double, 5> gyro{up_s_[0], up_s_[1], up_s_[2], 0, 0}, difference{0, 0, 0, 1, 0}, total{0, 0, 0, 0, 1};
   const double gg = moments_.covariance(gyro, gyro), gd = moments_.covariance(gyro, difference),
                gs = moments_.covariance(gyro, total), dd = moments_.covariance(3, 3), ss = moments_.covariance(4, 4);
@@ -107,7 +107,7 @@ void TurnDetector::judge_still(double sum2, double both, Findings& findings) con
 }
 
 void TurnDetector::judge_wheels(double gyro2, double by_difference, double by_sum, Findings& findings) const {
-  if (gyro2 < kLeastTurn_radps * kLeastTurn_radps) return;
+  if (gyro2 < kTurnLeastTurn_radps * kTurnLeastTurn_radps) return;
   const double difference2 = by_difference * by_difference, sum2 = by_sum * by_sum;
   const Devices uses = kGyroscope | kAccelerometer | kWheels;
   if (difference2 > kExplained && by_difference < 0 && sum2 < difference2) {

@@ -6,17 +6,18 @@
 namespace tetap::doctor {
 namespace {
 
-constexpr double kScale = 1.15;   ///< below it slip, tyres and a receiver's noise are as large
-constexpr double kFollows = 0.9;  ///< correlation: slip of a fast robot is in proportion to its turn, too
-constexpr double kUnit = 20;      ///< more is a unit, which has its own code
-constexpr double kShare = 0.05;   ///< lost samples make a turn smaller
-constexpr double kSigmas = 8;     ///< error of the field's factor: a hard iron lasts
+constexpr double kTurnScaleScale = 1.15;   ///< below it slip, tyres and a receiver's noise are as large
+constexpr double kTurnScaleFollows = 0.9;  ///< correlation: slip of a fast robot is in proportion to its turn, too
+constexpr double kTurnScaleUnit = 20;      ///< more is a unit, which has its own code
+constexpr double kShare = 0.05;            ///< lost samples make a turn smaller
+constexpr double kTurnScaleSigmas = 8;     ///< error of the field's factor: a hard iron lasts
 
 std::optional<TurnRatio> following(const std::optional<TurnRatio>& ratio) {
-  return ratio && std::abs(ratio->correlation) > kFollows ? ratio : std::nullopt;
+  return ratio && std::abs(ratio->correlation) > kTurnScaleFollows ? ratio : std::nullopt;
 }
 bool shown(const TurnRatio& ratio) {
-  return (ratio.low > kScale || ratio.high < 1 / kScale) && ratio.value() < kUnit && ratio.value() > 1 / kUnit;
+  return (ratio.low > kTurnScaleScale || ratio.high < 1 / kTurnScaleScale) && ratio.value() < kTurnScaleUnit &&
+         ratio.value() > 1 / kTurnScaleUnit;
 }
 
 }  // namespace
@@ -31,8 +32,8 @@ std::optional<TurnRatio> TurnScaleDetector::by_field() const {
   std::optional<TurnRatio> best;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const auto factor = by_.field.factor(axis);
-    if (!factor || std::abs(factor->value) < 2 * kSigmas * factor->sigma) continue;
-    const double size = std::abs(factor->value), error = kSigmas * factor->sigma;
+    if (!factor || std::abs(factor->value) < 2 * kTurnScaleSigmas * factor->sigma) continue;
+    const double size = std::abs(factor->value), error = kTurnScaleSigmas * factor->sigma;
     const TurnRatio ratio{.device = "the magnetic field",
                           .uses = kMounting,
                           .low = 1 / (size + error),
@@ -54,8 +55,9 @@ void TurnScaleDetector::finish(Findings& findings) {
     if (third && shown(*third) && !wheels) name_gyroscope(*third, std::nullopt, findings);
     return;
   }
-  const bool as_wheels = third && third->low < kScale * wheels->high && third->high * kScale > wheels->low;
-  const bool as_stated = third && third->low < kScale && third->high > 1 / kScale;
+  const bool as_wheels =
+      third && third->low < kTurnScaleScale * wheels->high && third->high * kTurnScaleScale > wheels->low;
+  const bool as_stated = third && third->low < kTurnScaleScale && third->high > 1 / kTurnScaleScale;
   if (as_wheels && !as_stated) return name_gyroscope(*third, std::nullopt, findings);
   name_track(*wheels, as_stated && !as_wheels ? &*third : nullptr, findings);
   if (!as_stated || as_wheels) name_gyroscope(*wheels, Code::kTrackWidth, findings);

@@ -6,25 +6,26 @@
 namespace tetap::doctor {
 namespace {
 
-constexpr double kSlow_mps = 0.5;  ///< below, the magnitude of a GNSS velocity is noise
-constexpr double kLeastWindows = 20;
-constexpr double kScale = 1.15;  ///< wheels, tyres and slip are within some percent; a wrong radius is a tenth and more
-constexpr double kFollows = 0.9;  ///< cosine between the two speeds: outages and spinning wheels lower it
+constexpr double kWheelSpeedSlow_mps = 0.5;  ///< below, the magnitude of a GNSS velocity is noise
+constexpr double kWheelSpeedLeastWindows = 20;
+constexpr double kWheelSpeedScale =
+    1.15;  ///< wheels, tyres and slip are within some percent; a wrong radius is a tenth and more
+constexpr double kWheelSpeedFollows = 0.9;  ///< cosine between the two speeds: outages and spinning wheels lower it
 
 }  // namespace
 
 void WheelSpeedDetector::window(const Window& w) {
   if (!w.wheels || !w.velocity_n_mps) return;
   const double gnss = std::hypot((*w.velocity_n_mps)[0], (*w.velocity_n_mps)[1]);
-  if (gnss < kSlow_mps) return;
+  if (gnss < kWheelSpeedSlow_mps) return;
   speeds_.add({0.5 * std::abs(w.wheels->sum_mps), gnss});
 }
 
 void WheelSpeedDetector::finish(Findings& findings) {
-  if (robot_.name.empty() || speeds_.count() < kLeastWindows || speeds_.product(0, 0) <= 0) return;
+  if (robot_.name.empty() || speeds_.count() < kWheelSpeedLeastWindows || speeds_.product(0, 0) <= 0) return;
   const double cosine = correlation(speeds_.product(0, 1), speeds_.product(0, 0), speeds_.product(1, 1));
   const double ratio = std::sqrt(speeds_.product(1, 1) / speeds_.product(0, 0));
-  if (cosine < kFollows || (ratio < kScale && ratio > 1 / kScale)) return;
+  if (cosine < kWheelSpeedFollows || (ratio < kWheelSpeedScale && ratio > 1 / kWheelSpeedScale)) return;
   findings.push_back({.code = Code::kWheelScale,
                       .uses = kWheels | kGnssVelocity,
                       .certainty = cosine,

@@ -10,8 +10,8 @@ namespace tetap::doctor {
 namespace {
 
 constexpr std::int64_t kWindow_us = 1'000'000;
-constexpr double kGap_s = 0.5;      ///< a longer pause of IMU or wheels is a hole, over which no rate is taken
-constexpr double kCovered_s = 0.5;  ///< less of a second with data is no mean of it
+constexpr double kWindowGap_s = 0.5;  ///< a longer pause of IMU or wheels is a hole, over which no rate is taken
+constexpr double kCovered_s = 0.5;    ///< less of a second with data is no mean of it
 
 Vector3 wide(const std::array<float, 3>& x) {
   return {static_cast<double>(x[0]), static_cast<double>(x[1]), static_cast<double>(x[2])};
@@ -66,7 +66,7 @@ std::optional<Window> Windows::add(base::Micros time, const sensor::Sample& samp
 void Windows::add_imu(base::Micros time, const sensor::ImuSample& imu) {
   const double dt_s = imu_last_ ? span_s(time - *imu_last_) : -1;
   imu_last_ = time;
-  if (dt_s < 0 || dt_s > kGap_s) return;
+  if (dt_s < 0 || dt_s > kWindowGap_s) return;
   turn_rad_ = sum(turn_rad_, wide(imu.dangle_b_rad));
   velocity_change_mps_ = sum(velocity_change_mps_, wide(imu.dvelocity_b_mps));
   imu_s_ += dt_s;
@@ -83,7 +83,7 @@ void Windows::add_speeds(double dt_s, double left_mps, double right_mps) {
 void Windows::add_wheels(base::Micros time, const sensor::Sample& sample) {
   const double dt_s = wheels_last_ ? span_s(time - *wheels_last_) : -1;
   wheels_last_ = time;
-  const bool usable = dt_s >= 0 && dt_s <= kGap_s;
+  const bool usable = dt_s >= 0 && dt_s <= kWindowGap_s;
   if (sample.sensor == sensor::Sensor::kWheelCounts) {
     const sensor::WheelCounts now = sample.payload.counts;
     if (usable && counts_last_) {

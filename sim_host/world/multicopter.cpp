@@ -6,12 +6,12 @@ namespace {
 
 // All [own]: a quadrotor of some 1.5 kg.
 constexpr double kPilot_s = 0.010;
-constexpr int kSteps = 5;  // of 2 ms
+constexpr int kMulticopterSteps = 5;  // of 2 ms
 constexpr double kHeight_m = 10, kClimb_mps = 1.5, kSink_mps = 1.0, kHover_s = 4;
 constexpr double kSwell_m = 4, kSwell_per_m = 2 * kPi / 90;  // climbs and descents along the way
 constexpr double kAlong = 1.2, kSpeed = 2.0;                 // pilot: 1/s^2, 1/s
 constexpr double kMost_mps2 = 4.0, kMostClimb_mps2 = 3.0, kMostTurn_radps = 1.0;
-constexpr double kAttitude_radps = 10, kDamping = 0.8;
+constexpr double kAttitude_radps = 10, kMulticopterDamping = 0.8;
 constexpr double kDrag_per_s = 0.15;
 constexpr double kGust_mps2 = 0.3, kGust_s = 2.0;
 constexpr double kShake_rad = 0.01, kShake_s = 0.3;
@@ -69,8 +69,8 @@ Multicopter::Height Multicopter::height(base::Micros at) const {
 
 void Multicopter::advance(base::Micros wanted) {
   decide(wanted);
-  const double h_s = kPilot_s / (kSteps * substeps_);
-  for (int k = 0; k < kSteps * substeps_; ++k) integrate(h_s);
+  const double h_s = kPilot_s / (kMulticopterSteps * substeps_);
+  for (int k = 0; k < kMulticopterSteps * substeps_; ++k) integrate(h_s);
 }
 
 void Multicopter::decide(base::Micros at) {
@@ -109,7 +109,7 @@ void Multicopter::decide(base::Micros at) {
 
 void Multicopter::integrate(double h_s) {
   const auto spring = [h_s](double goal, double& angle, double& angle_rate) {
-    angle_rate += h_s * kAttitude_radps * (kAttitude_radps * (goal - angle) - 2 * kDamping * angle_rate);
+    angle_rate += h_s * kAttitude_radps * (kAttitude_radps * (goal - angle) - 2 * kMulticopterDamping * angle_rate);
     angle += h_s * angle_rate;
   };
   spring(roll_goal_rad_, roll_rad_, roll_rate_radps_);

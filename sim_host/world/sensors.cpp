@@ -6,7 +6,7 @@
 namespace tetap::sim {
 namespace {
 
-constexpr double kStep_s = 500e-6;
+constexpr double kSensorsStep_s = 500e-6;
 constexpr int kGravitySteps = 200;
 constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
 
@@ -58,7 +58,7 @@ void Imu::sense(const Motion& motion, double speed_mps, base::Micros now, const 
   Vector3 rate = body_to_sensor_ * (to_b * earth_rate_n_radps_ + motion.rate_b_radps);
 
   // Tyre lugs: each axis vibrates with another phase.
-  lug_phase_rad_ = wrap(lug_phase_rad_ + parameters_.lugs * speed_mps * kStep_s / wheel_radius_m_);
+  lug_phase_rad_ = wrap(lug_phase_rad_ + parameters_.lugs * speed_mps * kSensorsStep_s / wheel_radius_m_);
   const Direction lug = direction(lug_phase_rad_);
   const double share = magnitude(speed_mps) / parameters_.vibration_speed_mps;
   const Vector3 shape{0.5 * lug.cos, 0.5 * lug.sin, 0.7 * (lug.cos + lug.sin)};
@@ -82,7 +82,7 @@ void Imu::sense(const Motion& motion, double speed_mps, base::Micros now, const 
   bool accel_clips = false;
   const auto within = [](double raw, double range, bool& clips) {
     clips = clips || magnitude(raw) > range;
-    return clamp(raw, -range, range) * kStep_s;
+    return clamp(raw, -range, range) * kSensorsStep_s;
   };
   Vector3 turn{}, push{};
   for (std::size_t i = 0; i < 3; ++i) {
@@ -165,9 +165,9 @@ Wheels::Wheels(const WheelSensorNumbers& parameters, const VehicleParameters& ve
 void Wheels::sense(const Motion& motion, base::Micros now, const Faults& faults) {
   double left_m = motion.rim_left_m;
   double right_m = motion.rim_right_m;
-  if (faults.active(Fault::kSlipLeft, now)) left_m += FaultNumbers::kSpin_mps * kStep_s;
-  if (faults.active(Fault::kSlipRight, now)) right_m += FaultNumbers::kSpin_mps * kStep_s;
-  if (faults.active(Fault::kWheelSpin, now)) right_m += FaultNumbers::kFreeWheel_mps * kStep_s;
+  if (faults.active(Fault::kSlipLeft, now)) left_m += FaultNumbers::kSpin_mps * kSensorsStep_s;
+  if (faults.active(Fault::kSlipRight, now)) right_m += FaultNumbers::kSpin_mps * kSensorsStep_s;
+  if (faults.active(Fault::kWheelSpin, now)) right_m += FaultNumbers::kFreeWheel_mps * kSensorsStep_s;
   if (faults.active(Fault::kWheelStuck, now)) left_m = 0;
   if (const auto on = faults.since(Fault::kEncoderDropout, now); on && on->us / FaultNumbers::kDropout_us % 2 == 0)
     right_m = 0;

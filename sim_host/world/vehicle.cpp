@@ -4,9 +4,9 @@
 namespace tetap::sim {
 namespace {
 
-constexpr double kStep_s = 500e-6;
+constexpr double kVehicleStep_s = 500e-6;
 constexpr int kTicks = 20;
-constexpr double kInterval_s = kTicks * kStep_s;
+constexpr double kInterval_s = kTicks * kVehicleStep_s;
 
 std::variant<Chassis, Multicopter> driver_of(const VehicleParameters& parameters, const Plan& plan, std::uint64_t seed,
                                              int substeps) {
@@ -36,9 +36,9 @@ Vehicle::Vehicle(const VehicleParameters& parameters, const Plan& plan, std::uin
       slip_left_{parameters.slip_random, parameters.slip_random_tau_s, kInterval_s, slip_chance_},
       slip_right_{parameters.slip_random, parameters.slip_random_tau_s, kInterval_s, slip_chance_},
       slip_yaw_{parameters.slip_yaw, parameters.slip_random_tau_s, kInterval_s, slip_chance_},
-      side_jitter_{parameters.jitter_mps, parameters.jitter_tau_s, kStep_s, jitter_chance_},
-      up_jitter_{parameters.jitter_mps, parameters.jitter_tau_s, kStep_s, jitter_chance_},
-      ahead_jitter_{parameters.jitter_ahead_mps, parameters.jitter_tau_s, kStep_s, jitter_chance_} {
+      side_jitter_{parameters.jitter_mps, parameters.jitter_tau_s, kVehicleStep_s, jitter_chance_},
+      up_jitter_{parameters.jitter_mps, parameters.jitter_tau_s, kVehicleStep_s, jitter_chance_},
+      ahead_jitter_{parameters.jitter_ahead_mps, parameters.jitter_tau_s, kVehicleStep_s, jitter_chance_} {
   for (int k = 0; k < 3; ++k) extend();
 }
 
@@ -98,8 +98,8 @@ void Vehicle::shake(double yaw_rad) {
   const double ahead = ahead_jitter_.next(jitter_chance_);
   const Direction d = direction(yaw_rad);
   const Vector3 next{ahead * d.cos - side * d.sin, ahead * d.sin + side * d.cos, up};
-  jitter_mps2_ = (1 / kStep_s) * (next - jitter_mps_);
-  jitter_m_ = jitter_m_ + 0.5 * kStep_s * (jitter_mps_ + next);
+  jitter_mps2_ = (1 / kVehicleStep_s) * (next - jitter_mps_);
+  jitter_m_ = jitter_m_ + 0.5 * kVehicleStep_s * (jitter_mps_ + next);
   jitter_mps_ = next;
 }
 
@@ -141,8 +141,8 @@ void Vehicle::roll_wheels(const State& now, Motion& motion) const {
   const double slip = parameters_.slip_per_mps2 * acceleration * (speed < 0 ? -1 : 1) +
                       parameters_.slip_curve_per_mps2 * magnitude(lateral);
   const double turn = 0.5 * track_m_ * rate * (1 + slip_yaw_.value());
-  motion.rim_left_m = kStep_s * (speed - turn) * (1 + slip + load * slip_left_.value());
-  motion.rim_right_m = kStep_s * (speed + turn) * (1 + slip + load * slip_right_.value());
+  motion.rim_left_m = kVehicleStep_s * (speed - turn) * (1 + slip + load * slip_left_.value());
+  motion.rim_right_m = kVehicleStep_s * (speed + turn) * (1 + slip + load * slip_right_.value());
   motion.shaking_mps = speed;
 }
 

@@ -637,6 +637,18 @@ class Pictures(Case):
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertTrue(os.path.exists(self.path("path.png")))
 
+    def test_parameters_that_are_set_take_a_few_lines_of_the_terminal(self):
+        def shown(count):
+            self.estimates(1 + 0.01 * np.arange(20), *[np.zeros(20)] * 3)
+            self.write("run.json", json.dumps({**RUN, "numbers": ", ".join(f"wheels.drive.part{n} {n}.5" for n in range(count))}))
+            said = self.report("--no-pictures").stdout
+            self.assertLessEqual(max(map(len, said.splitlines())), 200)
+            return said[said.index("parameters that are set: "):].splitlines()
+        self.assertEqual(shown(2)[0], "parameters that are set: wheels.drive.part0 0.5, wheels.drive.part1 1.5")
+        many = shown(200)
+        self.assertLessEqual(max(map(len, many[:4])), 110)
+        self.assertEqual(many[3], "  ... the rest is in run.json")
+
     def test_numbers_that_are_none_are_null_in_the_summary(self):
         truth = self.run_with_everything(yaw=False)
         self.report("--truth", truth, "--no-pictures")
