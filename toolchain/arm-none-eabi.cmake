@@ -1,5 +1,5 @@
-# Toolchain file of everything that is flashed. A preset names the core, TETAP_CORE: r5, m7 or m4f, and the board, TETAP_BOARD: a folder of
-# hal/board, or one for several cores with _m7 or _m4f behind its name.
+# Toolchain file of everything that is flashed. A preset names the core, TETAP_CORE: r5, m7 or m4f, and its boards, TETAP_BOARD: folders of
+# hal/board, or one for several cores with _m7 or _m4f behind its name. What is no board's own is compiled once for all of them.
 set(CMAKE_SYSTEM_NAME Generic)
 set(CMAKE_SYSTEM_PROCESSOR arm)
 set(CMAKE_C_COMPILER arm-none-eabi-gcc)
@@ -25,7 +25,7 @@ elseif(TETAP_CORE STREQUAL "m4f")
 else()
   message(FATAL_ERROR "TETAP_CORE is '${TETAP_CORE}'; it must be r5, m7 or m4f")
 endif()
-set(TETAP_BOARD "" CACHE STRING "a board of hal/board")
+set(TETAP_BOARD "" CACHE STRING "boards of hal/board; the first one runs the proofs of the core")
 # The flags below are taken at the first configure only, so another core in an old folder would go by without a word.
 if(DEFINED CACHE{TETAP_CONFIGURED_CORE} AND NOT TETAP_CONFIGURED_CORE STREQUAL TETAP_CORE)
   message(FATAL_ERROR "${CMAKE_BINARY_DIR} was configured for core ${TETAP_CONFIGURED_CORE}, the preset says ${TETAP_CORE}: remove that folder")

@@ -131,7 +131,7 @@ class CountTest(ImageTest):
                 status, text = self.count("--timeout", "2", f"m7={self.image(program)}")
                 self.assertEqual(status, 2, text)
                 self.assertIn(message, text)
-        for arguments, message in ((["m8=x.elf"], "expected BOARD=IMAGE"), (["m7=/nowhere.elf"], "No such file"),
+        for arguments, message in ((["m8=x.elf"], "expected BOARD=IMAGE"), (["m7=/nowhere.elf"], "No such file"), (["--all", "--cores", "m7,m8"], "--cores: no core 'm8'; there are: m7, m4f, r5"),
                                    (["r5=" + self.image(PROGRAM, "m7"), "--", "argument"], "takes no arguments")):
             status, text = self.count(*arguments)
             self.assertEqual(status, 2)

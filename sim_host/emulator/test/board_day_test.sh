@@ -9,7 +9,7 @@ root=$(cd "$(dirname "${BASH_SOURCE[0]}")/../../.." && pwd)
 cd "$root"
 programs=build/host/sim_host
 [ -x "$programs/emulator/tetap-board" ] || { echo "board_day_test: skipped: no $programs/emulator/tetap-board (libunicorn-dev)" >&2; exit 77; }
-image=build/$board/hal/board/tetap-$board-rover.elf
+image=build/m4f/hal/board/tetap-$board-rover.elf
 out=$(mktemp -d)
 trap 'rm -rf "$out"' EXIT
 fail() { echo "board_day_test: $*" >&2; exit 1; }

@@ -14,13 +14,13 @@ if [ "${1:-}" = --inside ]; then
   exit
 fi
 seconds=${1:-8}
-[ -x "$programs/emulator/tetap-board" ] || { echo "board_vcan_test: skipped: no $programs/board/tetap-board (libunicorn-dev)" >&2; exit 77; }
+[ -x "$programs/emulator/tetap-board" ] || { echo "board_vcan_test: skipped: no $programs/emulator/tetap-board (libunicorn-dev)" >&2; exit 77; }
 command -v candump cansend >/dev/null || { echo "board_vcan_test: skipped: no can-utils" >&2; exit 77; }
 out=$(mktemp -d "$root/build/board_vcan.XXXXXX")  # the guest of user-mode-linux has another /tmp
 trap 'rm -rf "$out"' EXIT
 fail() { echo "board_vcan_test: $*" >&2; exit 1; }
 
-export TETAP_IMAGE=build/ark_cannode/hal/board/tetap-ark_cannode-rover.elf OUT=$out ROBOT=rover BUS=vcan SEED=1 FAULT=none WORLD="--seconds $seconds"
+export TETAP_IMAGE=build/m4f/hal/board/tetap-ark_cannode-rover.elf OUT=$out ROBOT=rover BUS=vcan SEED=1 FAULT=none WORLD="--seconds $seconds"
 began=$(date +%s%N)
 tools/run/provide_vcan --private -q "$0" --inside >"$out/said" 2>&1 || fail "status $?: $(tail -5 "$out/said")"
 took_ms=$((($(date +%s%N) - began) / 1000000))

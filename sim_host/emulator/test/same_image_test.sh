@@ -12,10 +12,10 @@ export CCACHE_DISABLE=1
 for copy in "$work/one" "$work/another/place"; do
   git clone --quiet --shared --no-checkout "$root" "$copy"  # the commit's number is in the image
   git ls-files -z --cached --others --exclude-standard | xargs -0 cp --parents -t "$copy" 2>/dev/null || true  # without files that were removed
-  (cd "$copy" && tools/run/build_preset ark_cannode:tetap-ark_cannode-rover,tetap-ark_cannode_at_64k-rover nucleo_g474re:tetap-nucleo_g474re-rover 2>/dev/null) ||
+  (cd "$copy" && tools/run/build_preset m4f:tetap-ark_cannode-rover,tetap-ark_cannode_at_64k-rover,tetap-nucleo_g474re-rover 2>/dev/null) ||
     { echo "same_image_test: $copy does not build" >&2; exit 1; }
 done
-for image in ark_cannode/hal/board/tetap-ark_cannode-rover ark_cannode/hal/board/tetap-ark_cannode_at_64k-rover nucleo_g474re/hal/board/tetap-nucleo_g474re-rover; do
+for image in m4f/hal/board/tetap-{ark_cannode,ark_cannode_at_64k,nucleo_g474re}-rover; do
   for kind in bin hex; do
     cmp "$work/one/build/$image.$kind" "$work/another/place/build/$image.$kind" || exit 1
   done
