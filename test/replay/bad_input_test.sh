@@ -175,8 +175,8 @@ refused "replay against no such truth" 'replay: nowhere.csv: no such file' env L
 refused "replay on a bus of another kind" "replay: BUS=lin" env LOG="$work/good.log" BUS=lin tools/run/replay_log
 refused "replay of a board in memory" 'BUS=memory' env LOG="$work/good.log" BUS=memory BOARD=zynqmp_r5 tools/run/replay_log
 refused "replay for no such robot" "no robot 'tank'" env LOG="$work/good.log" BUS=memory ROBOT=tank OUT="$work/out" tools/run/replay_log
-refused "replay for no such robot over a bus" "no robot 'tank'; $robots" timeout 120 env LOG="$work/good.log" ROBOT=tank OUT="$work/out" tools/run/replay_log
-refused "sim for no such robot over a bus" "no robot 'tank'; $robots" timeout 120 env ROBOT=tank OUT="$work/out" tools/run/simulate_world
+refused "replay for no such robot over a bus" "no robot 'tank'; $robots" timeout 120 env BUS=vcan LOG="$work/good.log" ROBOT=tank OUT="$work/out" tools/run/replay_log
+refused "sim for no such robot over a bus" "no robot 'tank'; $robots" timeout 120 env BUS=vcan ROBOT=tank OUT="$work/out" tools/run/simulate_world
 refused "sim for no such robot on a board" "no robot 'tank'; $robots" timeout 120 env ROBOT=tank BOARD=zynqmp_r5 OUT="$work/out" tools/run/simulate_world
 refused "a misspelt setting" 'no setting FALUT; there are: ROBOT .*FAULT' make -s FALUT=gnss_jump help
 refused "sim from seed -1" "--seed .*'-1'" env BUS=memory SEED=-1 OUT="$work/out" tools/run/simulate_world
@@ -202,7 +202,7 @@ done
 refused "sim at a pace that is not 1" 'sim: REALTIME=0: it is 1 or empty' env BUS=memory REALTIME=0 OUT="$work/out" WORLD="--duration 1" tools/run/simulate_world
 refused "sim with an unknown fault" 'meteor' env BUS=memory FAULT=meteor OUT="$work/out" tools/run/simulate_world
 refused "sim with a fault whose start is no number" "fault 'gnss_jump@soon': START is not" env BUS=memory FAULT=gnss_jump@soon OUT="$work/out" tools/run/simulate_world
-refused "sim with an unknown fault over a bus" "fault 'meteor'" timeout 120 env FAULT=meteor OUT="$work/out" tools/run/simulate_world
+refused "sim with an unknown fault over a bus" "fault 'meteor'" timeout 120 env BUS=vcan FAULT=meteor OUT="$work/out" tools/run/simulate_world
 refused "sim with a fault of a sensor it has not" "fault 'mag_disturbance': robot rover has no magnetometer; faults that act on it: gnss_jump .*; robots on which it acts: iris" \
   timeout 120 env FAULT=gnss_jump,mag_disturbance OUT="$work/out" tools/run/simulate_world
 refused "sim with a fault of landmarks it has not" "fault 'landmark_outlier': robot iris has no landmarks; .* mag_disturbance.*; in this world it acts on none" \
