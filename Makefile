@@ -5,10 +5,11 @@ SHELL := /bin/bash
 
 ROBOT ?= rover
 BOARD ?= linux
-BUS ?= $(if $(filter linux,$(BOARD)),memory,vcan)
 SEED  ?= 1
 FAULT ?=
 REALTIME ?=
+# An image, and time as it passes, need a bus.
+BUS   ?= $(if $(REALTIME)$(filter-out linux,$(BOARD)),vcan,memory)
 LOG   ?=
 PROBE ?=
 DRY_RUN ?=
