@@ -105,7 +105,7 @@ def total(results, trials, which):
 
 
 class Bars:
-    """Of a data set: `published` is the mean that was stated for VQF, `recorded` the mean of this filter in docs/validation/attitude.md."""
+    """Of a data set: `published` is the mean that was stated for VQF, `recorded` the mean of this filter that the validation page has."""
     dataset, count, published, recorded = "", 0, 0.0, 0.0
 
     @classmethod

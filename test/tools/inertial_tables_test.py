@@ -66,7 +66,7 @@ class Tables(unittest.TestCase):
         self.assertFalse(recorded.is_whole({**whole, "husky": {**husky, "outages": []}}))
         lines = list(recorded.drive_table(whole))
         self.assertEqual(len(lines), 2 + 4 + 1 + 3)
-        self.assertIn("median 3.0 m (1.0 m at the 1 places that gave no mounting); 1 beyond 3 sigma", lines[2])
+        self.assertIn("median 3.0 m (1.0 m at the 1 positions that gave no mounting); 1 beyond 3 sigma", lines[2])
         self.assertIn("2.00 m; 0.75", lines[8])
 
     def test_places_with_the_hole_are_told_apart_from_the_others(self):

@@ -193,6 +193,16 @@ class Tables(unittest.TestCase):
         self.assertEqual(matrix_tables.smallest(rows)["size"], "5g")
         self.assertIn('--cell "rover curve gyro z step 5g 1"', matrix_tables.command(matrix_tables.smallest(rows)))
 
+    def test_the_page_has_the_shares_and_the_smallest_example_of_the_matrix_and_the_shares_alone_of_recorded_drives(self):
+        rows = [row("step", True, size="5g", ratio=9), row("step", False, size="1g"), row("spike1", False)]
+        page = matrix_tables.page(rows)
+        self.assertIn("33.3 % of the cells are broken", page)
+        self.assertIn('--cell "rover curve gyro z step 5g 1"', page)
+        recorded = matrix_tables.page(rows, recorded=True)
+        self.assertTrue(recorded.startswith("# Recorded drives with one fault"))
+        self.assertIn("33.3 % of the cells are broken", recorded)
+        self.assertNotIn("--cell", recorded)
+
 
 def database():
     logging.disable(logging.CRITICAL)  # canmatrix names the formats it has no reader for

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tables on recorded inertial data, of the file that test/replay/inertial_runs.py writes: drives, outages place by place, NEES."""
+"""Tables on recorded inertial data, of the file that test/replay/inertial_runs.py writes: drives, outages one by one, NEES."""
 import statistics
 
 CASES = [(True, 30), (True, 60), (False, 30), (False, 60)]
@@ -33,7 +33,7 @@ def cell(row):
 
 
 def outage_table(rows):
-    """Each place a line: error / 3 sigma, NEES. *: the mounting was taken from there; o: the IMU has a hole in its last minute."""
+    """Each position a line: error / 3 sigma, NEES. *: the mounting was taken from there; o: the IMU has a hole in its last minute."""
     cases = [case for case in CASES if case_of(rows, *case)]
     yield from heading(["cut from", "driven in 60 s", *[f"{SENSOR[speedometer]}, {seconds} s" for speedometer, seconds in cases]])
     for start in dict.fromkeys(row["start_s"] for row in rows):
@@ -80,8 +80,8 @@ def drive_table(result):
     for speedometer, seconds in sorted(CASES, key=lambda case: (not case[0], -case[1])):
         rows = case_of(result["car"]["outages"], speedometer, seconds)
         others = [row for row in rows if not row["calibrated_on"]]
-        yield line(["Skog's car", f"GNSS cut for {seconds} s at {len(rows)} places, {SENSOR[speedometer]}: error at the end",
-                    f"median {median(rows):.1f} m ({median(others):.1f} m at the {len(others)} places that gave no mounting); {sum(row['beyond'] for row in rows)} beyond 3 sigma"])
+        yield line(["Skog's car", f"GNSS cut for {seconds} s at {len(rows)} positions, {SENSOR[speedometer]}: error at the end",
+                    f"median {median(rows):.1f} m ({median(others):.1f} m at the {len(others)} positions that gave no mounting); {sum(row['beyond'] for row in rows)} beyond 3 sigma"])
     for name, one in result["px4"].items():
         yield line([f"PX4's log `{name}`", "attitude, velocity, position RMS from PX4's own EKF2, from 10 s on",
                     f"{one['attitude_rms_deg']:.2f} deg, {one['velocity_rms_mps']:.3f} m/s, {one['position_rms_m']:.2f} m"])
@@ -90,5 +90,5 @@ def drive_table(result):
     yield line(["Husky", "RMS from the GPS track, fixes fused; their NIS per degree of freedom",
                 f"{husky['gnss_rms_m']:.2f} m; {husky['gnss_sensors']['GnssPosition']['nis_per_dof']:.2f}"])
     rows = husky["outages"]
-    yield line(["Husky", f"fixes cut for 60 s at {len(rows)} places, odometry and IMU: error at the end",
+    yield line(["Husky", f"fixes cut for 60 s at {len(rows)} positions, odometry and IMU: error at the end",
                 f"median {median(rows):.1f} m, worst {max(row['error_m'] for row in rows):.1f} m; {sum(row['beyond'] for row in rows)} beyond 3 sigma"])

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tables of figures inside of pages that are written by hand. A region stands between `<!-- figures: NAME -->` and `<!-- end -->`; it is made from the files
-that its command wrote, with that command and the commit before them. A region whose files are missing stays as it was."""
+"""Tables of figures: all of them in the ledger out/validation.md, those that a reader decides with in pages of docs/, too. A region stands between
+`<!-- figures: NAME -->` and `<!-- end -->`; it is made from the files that its command wrote, with that command and the commit before them.
+A region whose files are missing stays as it was."""
 import json
 import os
 import re
 
-from tetap.docs import bench, campaigns, recorded
+from tetap.docs import bench, campaigns, figures, recorded
 from tetap.docs.figures import commit_before, spaced, table
 from tetap.proof import costs
 
@@ -131,3 +132,15 @@ def fill(text, out, root):
             return match[0]
         return f"<!-- figures: {match[1]} -->\n`{command}`{commit_before(root, max(paths, key=os.path.getmtime))}:\n\n{made}\n<!-- end -->\n"
     return REGION.sub(region, text)
+
+
+def ledger(out, before, root):
+    """The page out/validation.md: a section a file, then every region. What has no file stays as it was before, and what was never made is left out."""
+    old = {match[1]: match[0] for match in REGION.finditer(before)}
+    parts = [figures.page(out, before, root)]
+    for name in REGIONS:
+        empty = f"<!-- figures: {name} -->\n<!-- end -->\n"
+        text = fill(old.get(name, empty), out, root)
+        if text != empty:
+            parts.append(f"## Table {name}\n\n{text}")
+    return "\n".join(parts)
