@@ -3,15 +3,13 @@
 #pragma once
 
 #include "sim_host/parameter_settings.hpp"
-#include "sim_host/play/link.hpp"
+#include "sim_host/replay/memory_node.hpp"
 
 #include <cstdint>
 #include <functional>
 #include <string>
 
 namespace tetap::sim {
-
-using InProcessLink = MemoryLink<std::function<void()>>;
 
 /// Calls play(link) with a link to a node of that robot, with these settings, in this process; its status. Throws
 /// std::runtime_error when there is no such robot.

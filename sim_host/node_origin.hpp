@@ -3,7 +3,7 @@
 // beforehand. Its truth is stated in the node's own frame.
 #pragma once
 
-#include "sim_host/play/link.hpp"
+#include "sim_host/replay/link.hpp"
 #include "sim_host/world/earth.hpp"
 #include "tetap/bus/codec.hpp"
 #include "tetap/bus/messages.hpp"

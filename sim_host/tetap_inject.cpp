@@ -3,10 +3,11 @@
 #include "sim_host/doctor/bus_time.hpp"
 #include "sim_host/matrix/cell.hpp"
 #include "sim_host/play/arguments.hpp"
-#include "sim_host/play/candump.hpp"
-#include "sim_host/play/log.hpp"
-#include "sim_host/play/node_link.hpp"
+#include "sim_host/play/log_file.hpp"
 #include "sim_host/play/play.hpp"
+#include "sim_host/replay/candump.hpp"
+#include "sim_host/replay/log.hpp"
+#include "sim_host/replay/node_link.hpp"
 #include "sim_host/robots.hpp"
 
 #include <algorithm>

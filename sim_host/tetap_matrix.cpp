@@ -5,7 +5,7 @@
 #include "sim_host/matrix/cell.hpp"
 #include "sim_host/node_origin.hpp"
 #include "sim_host/play/arguments.hpp"
-#include "sim_host/play/node_link.hpp"
+#include "sim_host/replay/node_link.hpp"
 #include "sim_host/robots.hpp"
 
 #include <sys/wait.h>
@@ -66,13 +66,13 @@ class Player {
         states_(log.parameters.can_base),
         node_(link, sink_, log.parameters.can_base, counts_) {}
 
-  void begin() { node_.begin(log_.begin, {}); }
+  void begin() { require(node_.begin(log_.begin, {})); }
   void play(std::size_t tick, std::span<const sim::TimedFrame> frames) {
-    for (const sim::TimedFrame& f : frames) node_.send(f.frame);
-    node_.sync(bus::SyncKind::kStep, log_.ticks[tick]);
+    for (const sim::TimedFrame& f : frames) require(node_.send(f.frame));
+    require(node_.sync(bus::SyncKind::kStep, log_.ticks[tick]));
     bool done = false;
     for (int polls = 0; !done; ++polls) {
-      if (polls > 1000) throw sim::RunError("no answer to the tick at " + sim::in_seconds(log_.ticks[tick]));
+      if (polls > 1000) throw std::runtime_error("no answer to the tick at " + sim::in_seconds(log_.ticks[tick]));
       link_.wait({});
       node_.drain([&](const sim::NodeEpoch& epoch) {
         states_.epoch(epoch, tick);
@@ -98,6 +98,10 @@ class Player {
   }
 
  private:
+  static void require(const sim::Result<>& done) {
+    if (!done) throw std::runtime_error(done.failure().text);
+  }
+
   const sim::CleanLog& log_;
   sim::InProcessLink& link_;
   OriginSink sink_;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // tetap-play: plays a candump log to a node, on a CAN interface or in its own process, and records what it answers.
+#include "hal/board/linux/socket_can.hpp"
 #include "hal/chip/support/boot_line.hpp"
 #include "sim_host/in_process.hpp"
 #include "sim_host/parameter_settings.hpp"

@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 // tetap-world: the simulated world's sensors on a CAN bus, and what the node makes of them on record beside the truth.
+#include "hal/board/linux/socket_can.hpp"
 #include "hal/chip/support/boot_line.hpp"
 #include "sim_host/in_process.hpp"
 #include "sim_host/node_origin.hpp"
 #include "sim_host/play/arguments.hpp"
 #include "sim_host/play/interruption.hpp"
-#include "sim_host/play/lockstep.hpp"
 #include "sim_host/play/realtime.hpp"
 #include "sim_host/play/session.hpp"
 #include "sim_host/published_sensors.hpp"
+#include "sim_host/replay/lockstep.hpp"
 #include "sim_host/robots.hpp"
 #include "sim_host/truth_file.hpp"
 #include "sim_host/world_source.hpp"
@@ -109,14 +110,14 @@ int drive(L& link, const Run& run) {
   for (const auto& [name, json] : sim::parameter_notes(parameters, run.settings)) session.note(name, json);
   sim::NodeOrigin node_origin(about.base);
   sim::OriginWatch watch(session, node_origin);
-  const auto play = [&] {
+  const auto play = [&]() -> sim::Result<> {
     if (!run.realtime) return sim::play_lockstep(link, source, watch, run.lockstep, session.counts());
     std::vector<sim::TimedFrame> frames;
     sim::Tick tick;
     while (source.next(tick))
       for (const auto& frame : tick.inputs) frames.push_back({.time = tick.time, .frame = frame});
-    sim::RealtimeOptions options{.base = about.base};
-    sim::play_realtime(link, frames, watch, options, session.counts());
+    const sim::RealtimeOptions options{.base = about.base, .interrupted = &sim::Interruption::text};
+    return sim::play_realtime(link, frames, watch, options, session.counts());
   };
   return session.run(play, [&] {
     // A robot with a map of landmarks keeps to that, wherever its first fix fell.
@@ -296,6 +297,7 @@ int main(int argc, char** argv) try {
   run.lockstep.window = arguments.window();
   if (arguments.flag("--emulated")) run.lockstep.patience = sim::kEmulatedPatience;
   run.lockstep.base = base;
+  run.lockstep.interrupted = &sim::Interruption::text;
   sim::Interruption::expect();
   run.session = {.program = "tetap-world",
                  .version = hal::version_text(version()).c_str(),

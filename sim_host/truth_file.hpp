@@ -3,6 +3,7 @@
 #pragma once
 
 #include "sim_host/play/out_file.hpp"
+#include "sim_host/replay/line.hpp"
 #include "sim_host/residual_bias.hpp"
 #include "sim_host/world/world.hpp"
 #include "tetap/param/parameters.hpp"

@@ -4,7 +4,7 @@
 #pragma once
 
 #include "sim_host/encode.hpp"
-#include "sim_host/play/script.hpp"
+#include "sim_host/replay/script.hpp"
 #include "sim_host/world/world.hpp"
 #include "tetap/bus/e2e.hpp"
 #include "tetap/bus/guard_sender.hpp"

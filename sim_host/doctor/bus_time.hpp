@@ -4,7 +4,7 @@
 // written faster than its time.
 #pragma once
 
-#include "sim_host/play/protocol.hpp"
+#include "sim_host/replay/protocol.hpp"
 #include "tetap/base/time.hpp"
 #include "tetap/bus/codec.hpp"
 

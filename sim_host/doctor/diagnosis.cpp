@@ -16,7 +16,8 @@
 #include "sim_host/doctor/turn.hpp"
 #include "sim_host/doctor/turn_scale.hpp"
 #include "sim_host/doctor/wheel_speed.hpp"
-#include "sim_host/play/protocol.hpp"
+#include "sim_host/play/log_file.hpp"
+#include "sim_host/replay/protocol.hpp"
 #include "tetap/bus/decoder.hpp"
 
 #include <algorithm>

@@ -4,7 +4,7 @@
 
 #include "sim_host/doctor/finding.hpp"
 #include "sim_host/doctor/robot_facts.hpp"
-#include "sim_host/play/log.hpp"
+#include "sim_host/replay/log.hpp"
 
 #include <cstdint>
 #include <string>

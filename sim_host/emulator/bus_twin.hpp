@@ -5,7 +5,7 @@
 
 #include "sim_host/emulator/board.hpp"
 #include "sim_host/emulator/simulated_sensors.hpp"
-#include "sim_host/play/script.hpp"
+#include "sim_host/replay/script.hpp"
 #include "tetap/param/parameters.hpp"
 
 #include <array>

@@ -13,11 +13,11 @@
 #include "sim_host/in_process.hpp"
 #include "sim_host/node_origin.hpp"
 #include "sim_host/play/arguments.hpp"
-#include "sim_host/play/candump.hpp"
-#include "sim_host/play/lockstep.hpp"
 #include "sim_host/play/out_file.hpp"
 #include "sim_host/play/session.hpp"
 #include "sim_host/published_sensors.hpp"
+#include "sim_host/replay/candump.hpp"
+#include "sim_host/replay/lockstep.hpp"
 #include "sim_host/robots.hpp"
 #include "sim_host/truth_file.hpp"
 #include "sim_host/world_source.hpp"
@@ -450,7 +450,7 @@ class Run {
       sim::NodeOrigin origin(base);
       sim::OriginWatch watch(session, origin);
       return session.run(
-          [&] { sim::play_lockstep(link, twin.script(), watch, {.base = base}, session.counts()); },
+          [&] { return sim::play_lockstep(link, twin.script(), watch, {.base = base}, session.counts()); },
           [&] {
             const sim::World& world = sensors_->world();
             const auto rows = std::span(sensors_->truth()).subspan(twin.first_row());

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sim_host/matrix/clean_log.hpp"
 
-#include "sim_host/play/protocol.hpp"
+#include "sim_host/play/log_file.hpp"
 #include "sim_host/published_sensors.hpp"
+#include "sim_host/replay/protocol.hpp"
 #include "sim_host/robots.hpp"
 #include "sim_host/world_source.hpp"
 

@@ -3,7 +3,7 @@
 // situations in which a fault may fall on it are found in that truth.
 #pragma once
 
-#include "sim_host/play/log.hpp"
+#include "sim_host/replay/log.hpp"
 #include "sim_host/world/world.hpp"
 #include "tetap/param/parameters.hpp"
 

@@ -4,7 +4,7 @@
 #pragma once
 
 #include "sim_host/matrix/dbc.hpp"
-#include "sim_host/play/log.hpp"
+#include "sim_host/replay/log.hpp"
 
 #include <array>
 #include <cstddef>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sim_host/matrix/published.hpp"
 
-#include "sim_host/play/names.hpp"
+#include "sim_host/replay/names.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -4,7 +4,7 @@
 #pragma once
 
 #include "sim_host/matrix/clean_log.hpp"
-#include "sim_host/play/protocol.hpp"
+#include "sim_host/replay/protocol.hpp"
 #include "sim_host/world/world.hpp"
 
 #include <array>

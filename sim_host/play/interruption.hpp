@@ -19,8 +19,9 @@ class Interruption {
   }
   /// Number of the signal; 0: none came.
   [[nodiscard]] static int signal() { return signal_; }
+  /// Empty while none came (sim::Interrupted).
   [[nodiscard]] static std::string text() {
-    return signal_ == SIGINT ? "interrupted (INT)" : "ended from outside (TERM)";
+    return signal_ == 0 ? "" : signal_ == SIGINT ? "interrupted (INT)" : "ended from outside (TERM)";
   }
 
  private:

@@ -6,44 +6,11 @@
 #include <unistd.h>
 
 #include <cerrno>
-#include <charconv>
-#include <cmath>
 #include <cstring>
 #include <filesystem>
 #include <stdexcept>
 
 namespace tetap::sim {
-
-Line& Line::integer(std::int64_t value, int width) {
-  std::array<char, 24> digits{};
-  const bool negative = value < 0;
-  const std::uint64_t file_size = negative ? ~static_cast<std::uint64_t>(value) + 1 : static_cast<std::uint64_t>(value);
-  const char* end = std::to_chars(digits.data(), digits.data() + digits.size(), file_size).ptr;
-  if (negative) put('-');
-  for (auto n = static_cast<int>(end - digits.data()); n < width; ++n) put('0');
-  return text({digits.data(), end});
-}
-
-Line& Line::fixed(std::int64_t value, int decimals) {
-  std::int64_t unit = 1;
-  for (int i = 0; i < decimals; ++i) unit *= 10;
-  if (value < 0) put('-');
-  const std::int64_t whole = value / unit, part = value % unit;
-  integer(whole < 0 ? -whole : whole);
-  return decimals > 0 ? put('.').integer(part < 0 ? -part : part, decimals) : *this;
-}
-
-Line& Line::real(double value, int decimals) {
-  static constexpr std::array<double, 8> kUnit{1, 10, 100, 1e3, 1e4, 1e5, 1e6, 1e7};
-  const double scaled = value * kUnit[static_cast<std::size_t>(decimals) % kUnit.size()];
-  if (!(std::fabs(scaled) < 1e15)) return *this;
-  return fixed(std::llround(scaled), decimals);
-}
-
-Line& Line::hex(std::uint32_t value, int digits) {
-  for (int shift = 4 * (digits - 1); shift >= 0; shift -= 4) put("0123456789ABCDEF"[value >> shift & 0xF]);
-  return *this;
-}
 
 namespace {
 
@@ -65,16 +32,14 @@ std::string behind_links(const std::string& path) {
 
 }  // namespace
 
-OutFile::OutFile(const std::string& path, Hash hash)
+OutFile::OutFile(const std::string& path)
     : path_(behind_links(path)), written_(aside(path_)), file_(std::fopen(written_.c_str(), "wb")) {
   if (!file_) throw std::runtime_error(path + ": cannot be written: " + std::strerror(errno));
   std::setvbuf(file_.get(), nullptr, _IONBF, 0);
   buffer_.reserve(kBlock);
-  if (hash == Hash::kSha256) hash_.emplace();
 }
 
 void OutFile::spill() {
-  if (hash_) hash_->add(buffer_);
   if (std::fwrite(buffer_.data(), 1, buffer_.size(), file_.get()) != buffer_.size())
     throw std::runtime_error(path_ + ": cannot be written: " + std::strerror(errno));
   buffer_.clear();
@@ -82,11 +47,10 @@ void OutFile::spill() {
 
 void OutFile::flush() { spill(); }
 
-std::string OutFile::end() {
+void OutFile::end() {
   spill();
   if (std::fclose(file_.release()) != 0)
     throw std::runtime_error(path_ + ": cannot be written: " + std::strerror(errno));
-  return hash_ ? hash_->hex() : std::string{};
 }
 
 void OutFile::publish() {
@@ -100,10 +64,9 @@ void OutFile::discard() {
   if (written_ != path_) std::filesystem::remove(written_, none);
 }
 
-std::string OutFile::close() {
-  std::string hash = end();
+void OutFile::close() {
+  end();
   publish();
-  return hash;
 }
 
 void make_folder(const std::string& path) {

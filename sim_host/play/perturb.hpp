@@ -3,7 +3,7 @@
 // draws whatever the options, so that switching one effect on does not move the others.
 #pragma once
 
-#include "sim_host/play/log.hpp"
+#include "sim_host/replay/log.hpp"
 
 #include <cstdint>
 #include <span>

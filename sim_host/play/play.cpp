@@ -82,6 +82,7 @@ PlayOptions play_options(Arguments& arguments, std::uint32_t can_base) {
   o.lockstep.window = arguments.window();
   o.lockstep.burst = static_cast<std::size_t>(arguments.integer("--burst", 0, 1, 10'000));
   o.lockstep.burst_gap = milliseconds("--burst-gap", 5, 0);
+  o.lockstep.interrupted = o.realtime.interrupted = &Interruption::text;
   if (arguments.flag("--emulated")) o.lockstep.patience = o.realtime.patience = kEmulatedPatience;
 
   const std::string sync = arguments.text("--sync").value_or("tick");
@@ -103,81 +104,18 @@ PlayOptions play_options(Arguments& arguments, std::uint32_t can_base) {
   return o;
 }
 
-namespace {
-
-/// Goes along with one reading of the log and gathers what each mode has to know before it plays.
-class Survey {
- public:
-  /// `facts`: of the log, where it may be a record.
-  Survey(const PlayOptions& options, LogFacts facts)
-      : base_(options.script.log_base),
-        graph_(options.script.graph),
-        grid_(options.script.period),
-        record_(options.log, base_, std::move(facts)),
-        surveys_record_(may_be_record(options)) {}
-
-  [[nodiscard]] static bool may_be_record(const PlayOptions& options) {
-    return options.mode == PlayMode::kAutomatic || options.mode == PlayMode::kAsRecorded;
-  }
-
-  void add(const TimedFrame& entry) {
-    if (is_counted_input(entry.frame, base_, graph_)) {
-      ++inputs_;
-      if (own_ticks_ == 0)
-        while (grid_.due_before(entry.time)) ++grid_ticks_;
-    } else if (is_tick(entry.frame, base_)) {
-      ++own_ticks_;
-    } else if (offset_in_block(entry.frame, base_) == bus::EstStateCrc::kOffset) {
-      has_node_frames_ = true;
-    }
-    if (surveys_record_) repeatable([&] { record_.add(entry); });
-  }
-
-  void finish(PlayOptions& options, SurveyedLog& log) {
-    if (options.mode == PlayMode::kAutomatic)
-      options.mode = has_node_frames_ ? PlayMode::kAsRecorded : PlayMode::kLockstep;
-    log.has_ticks = own_ticks_ > 0;
-    log.inputs = inputs_;
-    log.ticks = log.has_ticks ? own_ticks_ : grid_ticks_ + (grid_.last() ? 1 : 0);
-    if (surveys_record_) repeatable([&] { log.recording = record_.finish(); });
-    log.refusal = refusal_;
-  }
-
- private:
-  /// A refusal matters only when a whole reading finds no worse, and the mode is to repeat.
-  template <class Step>
-  void repeatable(Step&& step) {
-    try {
-      step();
-    } catch (const std::runtime_error& error) {
-      refusal_ = error.what();
-      surveys_record_ = false;
-    }
-  }
-
-  std::uint32_t base_;
-  bool graph_;
-  TickGrid grid_;
-  RecordSurvey record_;
-  bool surveys_record_, has_node_frames_ = false;
-  std::uint64_t inputs_ = 0, own_ticks_ = 0, grid_ticks_ = 0;
-  std::string refusal_;
-};
-
-}  // namespace
-
 SurveyedLog survey_for(PlayOptions& options) {
   options.reading.base = options.script.log_base;
-  SurveyedLog log{.file = LogFile(options.log, options.reading)};
-  Survey survey(options, Survey::may_be_record(options) ? facts_of(log.file, options.script) : LogFacts{});
-  for (TimedFrame entry; log.file.next(entry);) survey.add(entry);
-  const LogReport& report = log.file.report();
+  LogFile file(options.log, options.reading);
+  auto survey = survey_of(file, options.log, options.mode, options.script);
+  if (!survey) throw std::runtime_error(survey.failure().text);
+  const LogReport& report = file.report();
   if (report.data == 0)
     throw std::runtime_error(
         options.log + ": " +
         (report.other_interface > 0 ? "no frame of interface " + options.reading.interface : std::string("no CAN data frame in it")));
-  survey.finish(options, log);
-  return log;
+  options.mode = survey->settled(options.mode);
+  return {std::move(*survey), std::move(file)};
 }
 
 void warn_about(const LogReport& log, const char* program) {

@@ -4,10 +4,13 @@
 #pragma once
 
 #include "sim_host/play/arguments.hpp"
-#include "sim_host/play/lockstep.hpp"
+#include "sim_host/play/interruption.hpp"
+#include "sim_host/play/log_file.hpp"
 #include "sim_host/play/perturb.hpp"
 #include "sim_host/play/realtime.hpp"
 #include "sim_host/play/session.hpp"
+#include "sim_host/replay/lockstep.hpp"
+#include "sim_host/replay/survey.hpp"
 
 #include <cstdint>
 #include <cstdio>
@@ -18,8 +21,6 @@
 #include <vector>
 
 namespace tetap::sim {
-
-enum class PlayMode : std::uint8_t { kAutomatic, kLockstep, kRealtime, kAsRecorded };
 
 struct PlayOptions {
   std::string log;
@@ -47,13 +48,8 @@ struct PlayOptions {
 [[nodiscard]] PlayOptions play_options(Arguments& arguments, std::uint32_t can_base = 0x300);
 
 /// A log that was read once, to its end, and is read again as it is played.
-struct SurveyedLog {
+struct SurveyedLog : LogSurvey {
   LogFile file;
-  bool has_ticks = false;    ///< Tick or Step frames
-  std::uint64_t inputs = 0;  ///< frames
-  std::uint64_t ticks = 0;   ///< to be played, when it is no recording
-  std::optional<Recording> recording;
-  std::string refusal;  ///< why it is a recording that cannot be repeated
 };
 
 /// Reads the log and settles the mode: a log with the node's own frames in it is a record to be repeated.
@@ -95,7 +91,7 @@ int play(L& link, const PlayOptions& options, SurveyedLog& log, const std::strin
     session.note("frames_dropped", std::to_string(sent.dropped));
     session.note("frames_duplicated", std::to_string(sent.duplicated));
     session.note("frames_reordered", std::to_string(sent.reordered));
-    return session.run([&] { play_realtime(link, sent.frames, session, options.realtime, session.counts()); });
+    return session.run([&] { return play_realtime(link, sent.frames, session, options.realtime, session.counts()); });
   }
 
   if (options.mode == PlayMode::kAsRecorded) {
@@ -108,7 +104,7 @@ int play(L& link, const PlayOptions& options, SurveyedLog& log, const std::strin
     Session session(about, &comparison);
     note_log(session);
     session.note("epochs_before_start", std::to_string(recording.skipped_epochs));
-    return session.run([&] { play_lockstep(link, ticks, session, options.lockstep, session.counts()); });
+    return session.run([&] { return play_lockstep(link, ticks, session, options.lockstep, session.counts()); });
   }
 
   if (log.ticks == 0) throw std::runtime_error(options.log + ": no input frames of this id base");
@@ -116,7 +112,7 @@ int play(L& link, const PlayOptions& options, SurveyedLog& log, const std::strin
   about.ticks = log.ticks;
   Session session(about);
   note_log(session);
-  return session.run([&] { play_lockstep(link, ticks, session, options.lockstep, session.counts()); });
+  return session.run([&] { return play_lockstep(link, ticks, session, options.lockstep, session.counts()); });
 }
 
 }  // namespace tetap::sim

@@ -4,8 +4,8 @@
 // repeated (as_recorded).
 #pragma once
 
-#include "sim_host/play/log.hpp"
-#include "sim_host/play/node_link.hpp"
+#include "sim_host/replay/log.hpp"
+#include "sim_host/replay/node_link.hpp"
 
 #include <algorithm>
 #include <span>
@@ -20,14 +20,15 @@ struct RealtimeOptions {
   base::Micros period{10'000};
   bool begin = true;  ///< start the node with a Begin frame; else it is taken as it is
   Patience patience;
+  Interrupted interrupted = nullptr;
 };
 
-/// Frames in the order of sending. Throws RunError when the node does not answer.
+/// Frames in the order of sending. Fails when the node does not answer.
 template <Link L, Sink K>
-void play_realtime(L& link, std::span<const TimedFrame> frames, K& sink, const RealtimeOptions& options,
-                   Counts& counts) {
-  if (frames.empty()) return;
-  NodeLink<L, K> node(link, sink, options.base, counts);
+Result<> play_realtime(L& link, std::span<const TimedFrame> frames, K& sink, const RealtimeOptions& options,
+                       Counts& counts) {
+  if (frames.empty()) return {};
+  NodeLink<L, K> node(link, sink, options.base, counts, options.interrupted);
   RealtimeFrameAccounting accounting(counts);
   const base::Micros period = options.period;
   base::Micros tick{std::max((frames.front().time.us + period.us - 1) / period.us, std::int64_t{1}) * period.us};
@@ -43,12 +44,12 @@ void play_realtime(L& link, std::span<const TimedFrame> frames, K& sink, const R
 
   accounting.begin(options.begin);
   if (options.begin) {
-    node.begin(tick - period, options.patience);
+    if (auto begun = node.begin(tick - period, options.patience); !begun) return begun;
   } else {
     while (!accounting.known()) {
-      end_if_interrupted(counts);
+      if (auto on = not_interrupted(options.interrupted, counts); !on) return on;
       if (hal::monotonic_clock() - last_answer > options.patience.begin)
-        throw RunError("no node is ticking on this bus");
+        return Failure{"no node is ticking on this bus"};
       link.wait({20'000});
       receive(tick);
     }
@@ -58,7 +59,7 @@ void play_realtime(L& link, std::span<const TimedFrame> frames, K& sink, const R
   const base::Micros first = std::min(frames.front().time, tick) - period;
   const auto log_time = [&] { return first + (hal::monotonic_clock() - began); };
   if (options.sync == Sync::kClock) {
-    node.sync(bus::SyncKind::kClock, first);
+    if (auto taken = node.sync(bus::SyncKind::kClock, first); !taken) return taken;
     ++counts.syncs;
     link.flush();
   }
@@ -66,16 +67,16 @@ void play_realtime(L& link, std::span<const TimedFrame> frames, K& sink, const R
   std::size_t next = 0;
   base::Micros quiet_end = end + base::Micros{std::max<std::int64_t>(period.us * 5, 1'000'000)};
   for (base::Micros now = log_time(); now < quiet_end; now = log_time()) {
-    end_if_interrupted(counts);
+    if (auto on = not_interrupted(options.interrupted, counts); !on) return on;
     for (bool due = true; due;) {
       const bool frame_due = next < frames.size() && frames[next].time <= now;
       const bool tick_due = options.sync == Sync::kTick && tick <= end && tick <= now;
       due = frame_due || tick_due;
       if (frame_due && (!tick_due || frames[next].time <= tick)) {
-        node.send(frames[next++].frame);
+        if (auto taken = node.send(frames[next++].frame); !taken) return taken;
         ++counts.inputs;
       } else if (tick_due) {
-        node.sync(bus::SyncKind::kTick, tick);
+        if (auto taken = node.sync(bus::SyncKind::kTick, tick); !taken) return taken;
         ++counts.syncs;
         tick += period;
       }
@@ -85,8 +86,8 @@ void play_realtime(L& link, std::span<const TimedFrame> frames, K& sink, const R
     const bool all_sent = next == frames.size() && (options.sync == Sync::kClock || tick > end);
     if (all_sent && now > end + period && accounting.consumed() == counts.inputs) break;
     if (hal::monotonic_clock() - last_answer > options.patience.epoch + period)
-      throw RunError("the node has not ticked for " + in_seconds(options.patience.epoch) + ", at " + in_seconds(now) +
-                     " of the log");
+      return Failure{"the node has not ticked for " + in_seconds(options.patience.epoch) + ", at " + in_seconds(now) +
+                     " of the log"};
     base::Micros until{20'000};
     if (next < frames.size()) until = std::min(until, frames[next].time - log_time());
     if (options.sync == Sync::kTick && tick <= end) until = std::min(until, tick - log_time());
@@ -95,6 +96,7 @@ void play_realtime(L& link, std::span<const TimedFrame> frames, K& sink, const R
   }
   accounting.close();
   counts.overflows = link.faults().rx_overflow;
+  return {};
 }
 
 }  // namespace tetap::sim

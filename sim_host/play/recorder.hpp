@@ -1,19 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-// Writes a node's output. Frames that are the same in every run of the same input go to estimates.log (candump format,
-// stamped with the epoch's time). Tables are estimates.csv, states.csv (output of an inertial or attitude estimator
-// beyond a pose) and innovations.csv. Further tables are sensors.csv (statistics by sensor), status.csv and sources.csv
-// (state and failed check of each source). Landmarks of the map that the node makes go to map.csv. On request raw.log
-// has everything on the bus as it came.
+// Writes a node's output (replay/tables.hpp) to the files of a folder. On request raw.log has everything on the bus as
+// it came.
 #pragma once
 
 #include "sim_host/play/out_file.hpp"
-#include "sim_host/play/protocol.hpp"
+#include "sim_host/replay/tables.hpp"
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
-#include <span>
 #include <string>
+#include <string_view>
 
 namespace tetap::sim {
 
@@ -24,35 +22,18 @@ struct RecorderOptions {
   std::string interface = "vcan0";  ///< name written in raw.log
 };
 
-/// Bits of a classic frame on the wire with worst-case stuffing and interframe space (ISO 11898-1; Davis et al.,
-/// Real-Time Systems 35, 2007, eq. 1 and its extended form).
-[[nodiscard]] constexpr std::uint64_t worst_case_bits(const base::CanFrame& frame) {
-  const std::uint64_t data = 8U * frame.size, stuffed = (frame.extended ? 54U : 34U) + data;
-  return stuffed + (stuffed - 1) / 4 + 13;
-}
-
 class Recorder {
  public:
-  struct Totals {
-    std::uint64_t epochs = 0;
-    std::uint64_t estimates = 0;        ///< Est<k>_Pos frames
-    std::uint64_t frames_sent = 0;      ///< by us
-    std::uint64_t frames_received = 0;  ///< anything on the bus
-    std::uint64_t bits_sent = 0;
-    std::uint64_t bits_received = 0;
-    std::uint32_t state_crc = 0;   ///< the last
-    base::Micros first, last;      ///< epochs
-    std::string estimates_sha256;  ///< after finish()
-  };
+  using Totals = Tables::Totals;
 
   /// Makes the folder and the files; throws when that is not possible.
   explicit Recorder(const RecorderOptions& options);
 
-  void restarted() { restarted_ = true; }
+  void restarted() { tables_.restarted(); }
   void sent(const base::CanFrame& frame);
   /// `arrival`: for raw.log; without it now.
   void received(const base::CanFrame& frame, std::optional<base::Micros> arrival = std::nullopt);
-  void epoch(const NodeEpoch& epoch, base::Micros time);
+  void epoch(const NodeEpoch& epoch, base::Micros time) { tables_.epoch(epoch, time); }
   /// Writes out what is buffered, so that a long recording can be looked at.
   void flush();
   /// Ends all files; throws when one could not be written whole.
@@ -61,49 +42,22 @@ class Recorder {
   void publish();
   /// end() and publish().
   const Totals& finish();
-  [[nodiscard]] const Totals& totals() const { return totals_; }
+  [[nodiscard]] const Totals& totals() const { return tables_.totals(); }
 
  private:
-  struct Instance {
-    std::optional<bus::EstPos> position;
-    std::optional<bus::EstMotion> motion;
-    std::optional<bus::EstStdPose> deviation;
-    std::optional<bus::EstStdMore> correlation;
+  class Files final : public TableSink {
+   public:
+    explicit Files(const std::string& folder);
+    void write(Table table, std::string_view lines) override { of[static_cast<std::size_t>(table)].write(lines); }
+    std::array<OutFile, kTableNames.size()> of;
   };
-  /// A row of states.csv: cells that this epoch does not carry are empty.
-  struct State {
-    static constexpr std::size_t kColumns = 49;
-    std::array<double, kColumns> values{};
-    bool reported = false;
-  };
-  void frame(const base::CanFrame& frame);
-  void estimate_row(std::size_t k, const Instance& instance);
-  void state(State& state, std::uint32_t offset, std::span<const std::uint8_t> payload);
-  void state_row(std::size_t k, const State& state);
-  void landmark_row(const bus::EstLandmarkStd& std);
-  void keyframe_row(const bus::EstKeyframePose& k);
-  void graph_row(const bus::EstGraph& g);
-  void sensor_row(const bus::EstSensorStat& statistics);
-  void innovation_row(const bus::EstInnov& innovation);
-  void status_row(const bus::EstStatus& status);
-  void source_row(std::size_t k, std::string_view source, sensor::SourceState state, sensor::Check failed);
-  void source_rows(std::size_t k, const bus::EstStateSources& sources);
-  Line& row(base::Micros time);
   void raw_line(const base::CanFrame& frame, base::Micros time);
 
   RecorderOptions options_;
-  OutFile estimates_log_, estimates_, states_, innovations_, sensors_, status_, sources_, map_, keyframes_, graph_;
+  Files files_;
+  Tables tables_;
   std::optional<OutFile> raw_;
   Line line_;
-  std::array<Instance, bus::EstPos::kCount> instances_{};
-  std::array<State, bus::EstPos::kCount> states_now_{};
-  bus::EstDiagMapper mapper_;                 ///< last page about the map
-  std::optional<bus::EstLandmark> landmark_;  ///< the last, until its sigmas come
-  std::uint64_t number_ = 0;                  ///< number of the epoch
-  std::uint8_t last_epoch_ = 0;
-  bool restarted_ = true;
-  base::Micros time_;
-  Totals totals_;
 };
 
 }  // namespace tetap::sim

@@ -2,6 +2,7 @@
 #include "sim_host/play/session.hpp"
 
 #include "sim_host/play/interruption.hpp"
+#include "sim_host/replay/line.hpp"
 
 #include <unistd.h>
 

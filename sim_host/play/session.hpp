@@ -4,11 +4,11 @@
 #pragma once
 
 #include "hal/board/linux/clock.hpp"
-#include "sim_host/play/frame_accounting.hpp"
-#include "sim_host/play/link.hpp"
 #include "sim_host/play/out_file.hpp"
 #include "sim_host/play/recorder.hpp"
-#include "sim_host/play/recording.hpp"
+#include "sim_host/replay/frame_accounting.hpp"
+#include "sim_host/replay/link.hpp"
+#include "sim_host/replay/recording.hpp"
 
 #include <cstdint>
 #include <string>
@@ -56,16 +56,12 @@ class Session {
   /// Another file of this run, which has ended: it gets its name with the others.
   void add(OutFile file) { files_.push_back(std::move(file)); }
 
-  /// Plays with `play()` and turns a RunError into a message; then `complete()` may add files. Returns the exit status:
+  /// Plays with `play()`, whose failure becomes a message; then `complete()` may add files. Returns the exit status:
   /// 0; 1 when frames were lost, came twice, or differ from the recording; 128 and the signal's number when one ended
   /// the run.
   template <class Play, class Complete>
   int run(Play&& play, Complete&& complete) {
-    try {
-      play();
-    } catch (const RunError& error) {
-      error_ = error.what();
-    }
+    if (const Result<> played = play(); !played) error_ = played.failure().text;
     complete();
     return finish();
   }

@@ -2,7 +2,7 @@
 // Asking a node for its state: once when it ran before the log began, and again while no answer comes.
 #pragma once
 
-#include "sim_host/play/snapshot.hpp"
+#include "sim_host/replay/snapshot.hpp"
 #include "tetap/bus/e2e.hpp"
 
 #include <cstdint>

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "sim_host/play/candump.hpp"
+#include "sim_host/replay/candump.hpp"
 
-#include "sim_host/play/log.hpp"
+#include "sim_host/play/log_file.hpp"
 #include "sim_host/play/play.hpp"
+#include "sim_host/replay/log.hpp"
 
 #include <gtest/gtest.h>
 
@@ -119,12 +120,11 @@ TEST(LogLine, AnyBytesAreEitherALineOrRefused) {
 
 TEST(Log, AMalformedLineStopsWithFileLineReasonAndText) {
   const std::string text = "(1.0) can0 301#11\n\n(1.1) can0 301#1\n(1.2) can0 302#22\n";
-  try {
-    static_cast<void>(parse_log(text, "some.log"));
-    FAIL() << "no error";
-  } catch (const std::runtime_error& error) {
-    EXPECT_STREQ(error.what(), "some.log:3: an odd number of data digits: '(1.1) can0 301#1'");
-  }
+  const Log strict = parse_log(text, "some.log");
+  ASSERT_TRUE(strict.failure);
+  EXPECT_EQ(strict.failure->text, "some.log:3: an odd number of data digits: '(1.1) can0 301#1'");
+  EXPECT_EQ(strict.failure->line, 3U);
+  EXPECT_EQ(strict.frames.size(), 1U) << "those before it";
   const Log log = parse_log(text, "some.log", {.interface = {}, .keep_going = true});
   EXPECT_EQ(log.frames.size(), 2U);
   EXPECT_EQ(log.malformed, 1U);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "sim_host/play/lockstep.hpp"
+#include "sim_host/replay/lockstep.hpp"
 
 #include "host/stand_in_node.hpp"
 
@@ -44,11 +44,9 @@ Outcome run(Sabotage sabotage = {}, std::size_t window = 8, Script script = regu
   node.silent = silent;
   MemoryLink link(bus, [&node] { node.poll(); });
   const Patience hasty{.epoch = {30'000}, .begin = {60'000}, .repeat = {10'000}};
-  try {
-    play_lockstep(link, script, outcome.kept, {.base = 0x300, .window = window, .patience = hasty}, outcome.counts);
-  } catch (const RunError& error) {
-    outcome.error = error.what();
-  }
+  const auto played =
+      play_lockstep(link, script, outcome.kept, {.base = 0x300, .window = window, .patience = hasty}, outcome.counts);
+  if (!played) outcome.error = played.failure().text;
   outcome.consumed = node.consumed();
   return outcome;
 }
@@ -224,7 +222,7 @@ TEST(Lockstep, GarbageOnTheBusIsNoNode) {
   Script script = regular_script(100);
   KeepAll sink;
   Counts counts;
-  play_lockstep(link, script, sink, {.base = 0x300}, counts);
+  ASSERT_TRUE(play_lockstep(link, script, sink, {.base = 0x300}, counts));
   EXPECT_EQ(counts.lost() + counts.extra(), 0U);
   EXPECT_EQ(counts.epochs, 100U);
 }

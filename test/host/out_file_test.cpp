@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sim_host/play/out_file.hpp"
 
+#include "sim_host/replay/line.hpp"
+#include "sim_host/replay/sha256.hpp"
+
 #include <gtest/gtest.h>
 #include <unistd.h>
 

@@ -2,10 +2,11 @@
 #include "sim_host/play/recorder.hpp"
 
 #include "host/stand_in_node.hpp"
-#include "sim_host/play/lockstep.hpp"
-#include "sim_host/play/log.hpp"
-#include "sim_host/play/names.hpp"
+#include "sim_host/play/log_file.hpp"
 #include "sim_host/play/session.hpp"
+#include "sim_host/replay/lockstep.hpp"
+#include "sim_host/replay/log.hpp"
+#include "sim_host/replay/names.hpp"
 
 #include <gtest/gtest.h>
 
@@ -54,7 +55,7 @@ class Folder : public testing::Test {
                      .log = "a \"log\"",
                      .quiet = true});
     return session.run(
-        [&] { play_lockstep(link, script, session, {.base = 0x300, .window = window}, session.counts()); });
+        [&] { return play_lockstep(link, script, session, {.base = 0x300, .window = window}, session.counts()); });
   }
   static Script script(int ticks) {
     Script s;
@@ -109,7 +110,7 @@ TEST_F(Folder, EpochsAreNumberedOnWhenTheNodeIsRestarted) {
 TEST_F(Folder, TheRawLogIsARecordingOfTheRun) {
   EXPECT_EQ(play(script(100)), 0);
   LogFile log(path_ + "/raw.log", {});
-  const Recording recording = recording_of(log, "raw.log", {});
+  const Recording recording = *recording_of(log, "raw.log", {});
   EXPECT_EQ(recording.epochs, 100U);
   EXPECT_FALSE(recording.inputs_differ_at);
 }

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "sim_host/play/script.hpp"
+#include "sim_host/replay/script.hpp"
 
 #include "sim_host/play/arguments.hpp"
 #include "sim_host/play/perturb.hpp"
-#include "sim_host/play/protocol.hpp"
+#include "sim_host/replay/protocol.hpp"
 
 #include <gtest/gtest.h>
 

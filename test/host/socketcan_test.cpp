@@ -5,7 +5,7 @@
 
 #include "hal/board/linux/clock.hpp"
 #include "host/stand_in_node.hpp"
-#include "sim_host/play/lockstep.hpp"
+#include "sim_host/replay/lockstep.hpp"
 
 #include <gtest/gtest.h>
 #include <sys/wait.h>
@@ -220,7 +220,7 @@ TEST_P(Throughput, LockstepOverVcanLosesNothing) {
   test::KeepAll sink;
   sim::Counts counts;
   const base::Micros began = monotonic_clock();
-  sim::play_lockstep(can, script, sink, {.base = 0x300, .window = GetParam()}, counts);
+  ASSERT_TRUE(sim::play_lockstep(can, script, sink, {.base = 0x300, .window = GetParam()}, counts));
   const double wall_s = static_cast<double>((monotonic_clock() - began).us) * 1e-6;
   kill(child, SIGTERM);
   waitpid(child, nullptr, 0);

@@ -4,7 +4,7 @@
 #pragma once
 
 #include "hal/can_bus.hpp"
-#include "sim_host/play/protocol.hpp"
+#include "sim_host/replay/protocol.hpp"
 #include "tetap/bus/decoder.hpp"
 #include "tetap/bus/publisher.hpp"
 

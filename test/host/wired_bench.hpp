@@ -4,9 +4,9 @@
 #pragma once
 
 #include "config/rover.hpp"
-#include "sim_host/play/lockstep.hpp"
-#include "sim_host/play/recording.hpp"
 #include "sim_host/play/snapshot_request.hpp"
+#include "sim_host/replay/lockstep.hpp"
+#include "sim_host/replay/recording.hpp"
 #include "support/fakes/board.hpp"
 #include "tetap/firmware/firmware.hpp"
 #include "tetap/node/bus_protection.hpp"
@@ -196,13 +196,16 @@ struct Repetition {
   sim::Counts counts;
   std::uint64_t compared = 0, different = 0, missing = 0;
   std::string first;
+  std::string refusal;  ///< why the log cannot be repeated
 };
 
 inline Repetition repeat_at_the_desk(const std::vector<sim::TimedFrame>& log,
                                      const param::Parameters& parameters = wired_rover()) {
   Repetition r;
   sim::FramesInMemory frames(log);
-  r.recording = sim::recording_of(frames, "wired.log", {});
+  const auto recording = sim::recording_of(frames, "wired.log", {});
+  if (!recording) return r.refusal = recording.failure().text, r;
+  r.recording = *recording;
   sim::RecordedTicks ticks(frames, r.recording, {});
   hal::MemoryBus bus;
   DeskBoard board{bus.node_end()};
@@ -216,7 +219,7 @@ inline Repetition repeat_at_the_desk(const std::vector<sim::TimedFrame>& log,
     void epoch(const sim::NodeEpoch& e, base::Micros t) { comparison->epoch(e, t); }
   } sink;
   sink.comparison = &comparison;
-  sim::play_lockstep(link, ticks, sink, {}, r.counts);
+  EXPECT_TRUE(sim::play_lockstep(link, ticks, sink, {}, r.counts));
   r.compared = comparison.compared();
   r.different = comparison.different();
   r.missing = comparison.missing();

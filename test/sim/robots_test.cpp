@@ -3,8 +3,8 @@
 // another body is simulated with that body.
 #include "sim_host/in_process.hpp"
 #include "sim_host/node_origin.hpp"
-#include "sim_host/play/lockstep.hpp"
 #include "sim_host/published_sensors.hpp"
+#include "sim_host/replay/lockstep.hpp"
 #include "sim_host/world_source.hpp"
 
 #include "test/sim/support.hpp"
@@ -106,7 +106,7 @@ Judged run(const Case& one, const World::Options& options, const ParameterSettin
   WorldSource source(World(options, seed), kBase, base::Micros{10'000}, seconds_us(seconds));
   Counts counts;
   with_node_in_process(one.robot, stated, kBase, [&](InProcessLink& link) {
-    play_lockstep(link, source, watch, {.base = kBase}, counts);
+    EXPECT_TRUE(play_lockstep(link, source, watch, {.base = kBase}, counts));
     return 0;
   });
   const FrameChange change(Earth(options.origin),

@@ -4,15 +4,13 @@
 #pragma once
 
 #include "hal/board/linux/memory_can.hpp"
-#include "hal/board/linux/socket_can.hpp"
 #include "hal/can_bus.hpp"
-#include "sim_host/play/protocol.hpp"
+#include "sim_host/replay/protocol.hpp"
 
 #include <concepts>
 #include <cstddef>
 #include <functional>
 #include <span>
-#include <stdexcept>
 #include <utility>
 
 namespace tetap::sim {
@@ -22,8 +20,6 @@ concept Link = hal::CanBus<L> && requires(L& link, base::Micros timeout) {
   /// Hands on what was sent, then waits until a frame may be there, at most so long.
   { link.wait(timeout) } -> std::same_as<void>;
 };
-
-static_assert(Link<hal::SocketCan>);
 
 /// The player's end of a bus in memory; `pump` lets the node poll once.
 template <class Pump>
@@ -57,11 +53,6 @@ concept Sink = requires(K& sink, const base::CanFrame& frame, const NodeEpoch& e
   { sink.sent(frame) } -> std::same_as<void>;         ///< by us
   { sink.received(frame) } -> std::same_as<void>;     ///< anything on the bus
   { sink.epoch(epoch, time) } -> std::same_as<void>;  ///< epoch of the node, at this time
-};
-
-/// A run that cannot go on: what was waited for, and what came.
-struct RunError : std::runtime_error {
-  using std::runtime_error::runtime_error;
 };
 
 }  // namespace tetap::sim

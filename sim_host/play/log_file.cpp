@@ -1,28 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "sim_host/play/log.hpp"
-
-#include "sim_host/play/candump.hpp"
+#include "sim_host/play/log_file.hpp"
 
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <stdexcept>
-#include <variant>
 
 namespace tetap::sim {
 
 namespace {
 
 constexpr std::size_t kBlock = 1 << 18;
-
-/// Printable part of a line that may be anything.
-std::string excerpt(std::string_view text) {
-  constexpr std::size_t kLongest = 60;
-  std::string shown(text.substr(0, kLongest));
-  for (char& c : shown)
-    if (c < ' ' || c > '~') c = '?';
-  return text.size() > kLongest ? shown + "..." : shown;
-}
 
 /// A temporary file with the rest of `from`.
 std::FILE* copy_of(std::FILE* from) {
@@ -40,40 +28,6 @@ std::FILE* copy_of(std::FILE* from) {
 }
 
 }  // namespace
-
-std::optional<TimedFrame> LogParser::add(std::string_view text, bool ended) {
-  constexpr base::Micros kLongGap{60'000'000};
-  ++number_;
-  const auto place = [this] { return report_.name + ":" + std::to_string(number_); };
-  const auto cut_off = [&] {
-    report_.cut_off = place() + ": the last line is cut off and left out: '" + excerpt(text) + "'";
-    return std::nullopt;
-  };
-  const auto parsed = parse_log_line(text);
-  const auto* line = std::get_if<LogLine>(&parsed);
-  if (line == nullptr) {
-    if (text.find_first_not_of(" \t\r") == std::string_view::npos) return std::nullopt;
-    if (!ended) return cut_off();
-    const std::string message =
-        place() + ": " + std::string(std::get<BadLine>(parsed).reason) + ": '" + excerpt(text) + "'";
-    if (!options_.keep_going) throw std::runtime_error(message);
-    if (report_.malformed++ == 0) report_.first_malformed = message;
-    return std::nullopt;
-  }
-  if (!options_.interface.empty() && line->interface != options_.interface)
-    return ++report_.other_interface, std::nullopt;
-  if (line->kind != LogLine::Kind::kData) return ++report_.not_data, std::nullopt;
-  const base::CanFrame frame = line->classic();
-  // Every message of a node's block has eight bytes.
-  if (!ended && frame.size != 8 && !frame.extended && frame.id / 0x40 == options_.base / 0x40) return cut_off();
-  if (line->time < latest_) ++report_.back_in_time;
-  if (report_.data++ > 0 && kLongGap < line->time - latest_ && report_.gaps++ == 0) report_.first_gap = place();
-  latest_ = std::max(latest_, line->time);
-  constexpr std::uint32_t kInputs = 0x20;
-  const bool input = !frame.extended && frame.id >= options_.base && frame.id < options_.base + kInputs;
-  if (input && frame.size != 8 && report_.wrong_length++ == 0) report_.first_wrong_length = place();
-  return TimedFrame{line->time, frame};
-}
 
 LogFile::LogFile(const std::string& path, const LogOptions& options)
     : path_(path), options_(options), file_(std::fopen(path.c_str(), "rb"), &std::fclose), parser_(path, options) {
@@ -125,8 +79,9 @@ bool LogFile::next(TimedFrame& frame) {
   TextLine line;
   while (next_line(line)) {
     const auto found = parser_.add(line.text, line.ended);
-    if (!found) continue;
-    frame = *found;
+    if (!found) throw std::runtime_error(found.failure().text);
+    if (!*found) continue;
+    frame = **found;
     return true;
   }
   if (!report_) {
@@ -142,18 +97,6 @@ void LogFile::rewind() {
   parser_ = LogParser(path_, options_);
   begin_ = end_ = 0;
   bytes_ = 0;
-}
-
-Log parse_log(std::string_view text, const std::string& name, const LogOptions& options) {
-  LogParser parser(name, options);
-  Log log;
-  while (!text.empty()) {
-    const std::size_t end = text.find('\n');
-    if (const auto frame = parser.add(text.substr(0, end), end != std::string_view::npos)) log.frames.push_back(*frame);
-    text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
-  }
-  static_cast<LogReport&>(log) = parser.report();
-  return log;
 }
 
 }  // namespace tetap::sim

@@ -3,7 +3,7 @@
 // (Est_StateCrc.InCount). Frames that the node counted as sent (Frames, Epoch) are held against frames that arrived.
 #pragma once
 
-#include "sim_host/play/protocol.hpp"
+#include "sim_host/replay/protocol.hpp"
 
 #include <algorithm>
 #include <cstddef>

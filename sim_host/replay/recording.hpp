@@ -4,10 +4,10 @@
 // twice, by RecordSurvey and by RecordedTicks. It is held in memory only as far as a node lags behind its inputs.
 #pragma once
 
-#include "sim_host/play/own_inputs.hpp"
-#include "sim_host/play/protocol.hpp"
-#include "sim_host/play/script.hpp"
-#include "sim_host/play/snapshot.hpp"
+#include "sim_host/replay/own_inputs.hpp"
+#include "sim_host/replay/protocol.hpp"
+#include "sim_host/replay/script.hpp"
+#include "sim_host/replay/snapshot.hpp"
 #include "tetap/bus/input_crc.hpp"
 
 #include <cstdint>
@@ -104,7 +104,7 @@ class RecordReader {
   /// A Begin frame that the node has not answered.
   [[nodiscard]] const std::optional<Begin>& pending() const { return pending_; }
 
-  [[noreturn]] void refuse(const std::string& why) const;
+  [[nodiscard]] Failure refusal(const std::string& why) const;
 
  private:
   [[nodiscard]] bool to_be_repeated(const NodeEpoch& epoch, base::Micros logged, Found& found);
@@ -138,9 +138,9 @@ class RecordSurvey {
   RecordSurvey(const RecordSurvey&) = delete;  // the reader looks at the facts
   RecordSurvey& operator=(const RecordSurvey&) = delete;
 
-  /// Both throw std::runtime_error when nothing can be repeated: the node's start is not in the log.
-  void add(const TimedFrame& entry);
-  [[nodiscard]] Recording finish();
+  /// Both fail when nothing can be repeated: the node's start is not in the log.
+  Result<> add(const TimedFrame& entry);
+  Result<Recording> finish();
 
  private:
   struct Entry {
@@ -160,14 +160,14 @@ class RecordSurvey {
   void note_node(const base::CanFrame& frame);
   void drop_before(std::uint64_t input);
   void drop_own_before(std::uint64_t own);
-  void start_life(const RecordReader::NewLife& life);
+  Result<> start_life(const RecordReader::NewLife& life);
   void start_at(std::uint64_t input);
   void add_epoch(const NodeEpoch& epoch);
   [[nodiscard]] Step consume(const Entry& entry, std::uint64_t end, Place& place) const;
   [[nodiscard]] bool match_begin(std::uint64_t start, std::uint64_t end) const;
   void find_start(std::uint64_t end, bool power_cycle_ended);
   void follow_until(std::uint64_t end, bool power_cycle_ended);
-  void close_life(std::uint64_t end);
+  Result<> close_life(std::uint64_t end);
   void end_life(base::Micros time, const std::string& why);
   [[nodiscard]] std::string reason_of_difference() const;
 
@@ -191,8 +191,8 @@ class RecordSurvey {
   bool unlogged_seen_ = false, conflict_seen_ = false;  ///< bits of Est_Status, anywhere in the log
 };
 
-/// Reads the whole log. Throws as RecordSurvey does.
-[[nodiscard]] Recording recording_of(Frames& log, const std::string& name, const ScriptOptions& options);
+/// Reads the whole log. Fails as RecordSurvey and the log do.
+Result<Recording> recording_of(Frames& log, const std::string& name, const ScriptOptions& options);
 
 /// The second reading: every tick with what the node consumed before it, and what it answered. Inputs that the node
 /// sent itself stand in the log before the epoch that consumed them, because one queue holds both. The node's count

@@ -4,8 +4,8 @@
 // speed.
 #pragma once
 
-#include "sim_host/play/node_link.hpp"
-#include "sim_host/play/script.hpp"
+#include "sim_host/replay/node_link.hpp"
+#include "sim_host/replay/script.hpp"
 
 namespace tetap::sim {
 
@@ -15,31 +15,35 @@ struct LockstepOptions {
   std::size_t burst = 0;   ///< frames sent at once before `burst_gap`; 0: all
   base::Micros burst_gap{0};
   Patience patience;
+  Interrupted interrupted = nullptr;
 };
 
-/// Throws RunError when the node stops answering; `counts` then holds what was so far.
+/// Fails when the node stops answering; `counts` then holds what was so far.
 template <Link L, Source S, Sink K>
-void play_lockstep(L& link, S& source, K& sink, const LockstepOptions& options, Counts& counts) {
-  NodeLink<L, K> node(link, sink, options.base, counts);
+Result<> play_lockstep(L& link, S& source, K& sink, const LockstepOptions& options, Counts& counts) {
+  NodeLink<L, K> node(link, sink, options.base, counts, options.interrupted);
   LockstepFrameAccounting accounting(counts);
 
-  const auto send = [&](const Tick& tick) {
+  const auto send = [&](const Tick& tick) -> Result<> {
     if (tick.begin) {
-      node.begin(*tick.begin, options.patience);
-      if (tick.snapshot != nullptr)
-        node.resume(*tick.snapshot), accounting.begin(tick.snapshot->header.in_count, tick.snapshot->header.epoch);
-      else
+      if (auto begun = node.begin(*tick.begin, options.patience); !begun) return begun;
+      if (tick.snapshot != nullptr) {
+        if (auto resumed = node.resume(*tick.snapshot); !resumed) return resumed;
+        accounting.begin(tick.snapshot->header.in_count, tick.snapshot->header.epoch);
+      } else {
         accounting.begin();
+      }
     }
     std::size_t sent = 0;
     for (const base::CanFrame& frame : tick.inputs) {
-      node.send(frame);
+      if (auto taken = node.send(frame); !taken) return taken;
       if (options.burst == 0 || ++sent % options.burst != 0) continue;
       link.flush();
       hal::sleep_for(options.burst_gap);
     }
-    node.sync(bus::SyncKind::kStep, tick.time);
+    if (auto taken = node.sync(bus::SyncKind::kStep, tick.time); !taken) return taken;
     accounting.asked(tick.inputs.size(), tick.time);
+    return {};
   };
   const auto receive = [&] {
     node.drain([&](const NodeEpoch& epoch) {
@@ -52,10 +56,10 @@ void play_lockstep(L& link, S& source, K& sink, const LockstepOptions& options, 
   constexpr base::Micros kNever{-1};
   base::Micros quiet_since = kNever;
   while (more || accounting.in_flight() > 0) {
-    end_if_interrupted(counts);
+    if (auto on = not_interrupted(options.interrupted, counts); !on) return on;
     if (accounting.in_flight() <= options.window / 2) {  // refill in groups: fewer wake-ups on both sides
       while (more && accounting.in_flight() < options.window && (!tick.begin || accounting.in_flight() == 0)) {
-        send(tick);
+        if (auto sent = send(tick); !sent) return sent;
         more = source.next(tick);
       }
       link.flush();
@@ -74,15 +78,16 @@ void play_lockstep(L& link, S& source, K& sink, const LockstepOptions& options, 
     if (quiet_since == kNever) quiet_since = now;
     if (now - quiet_since < options.patience.epoch) continue;
     const bool begun = node.collector().head().has_value() || !node.collector().idle();
-    throw RunError("no answer to the tick at " + in_seconds(accounting.oldest()) + " within " +
+    return Failure{"no answer to the tick at " + in_seconds(accounting.oldest()) + " within " +
                    in_seconds(options.patience.epoch) + ": " +
                    (begun ? "the epoch's last frame (Est_StateCrc) is missing, " +
                                 std::to_string(node.collector().received()) + " of its frames came"
                           : std::string("no frame of the epoch came")) +
                    "; " + std::to_string(counts.epochs) + " epochs before it, " + std::to_string(counts.lost()) +
-                   " frames lost so far");
+                   " frames lost so far"};
   }
   counts.overflows = link.faults().rx_overflow;
+  return {};
 }
 
 }  // namespace tetap::sim

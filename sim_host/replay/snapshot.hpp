@@ -2,7 +2,7 @@
 // A node's state as its log holds it: pieces of Est_Diag put together.
 #pragma once
 
-#include "sim_host/play/protocol.hpp"
+#include "sim_host/replay/protocol.hpp"
 #include "tetap/firmware/snapshot.hpp"
 
 #include <cstddef>

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "sim_host/play/recording.hpp"
+#include "sim_host/replay/recording.hpp"
 
-#include "sim_host/play/names.hpp"
-#include "sim_host/play/node_link.hpp"
+#include "sim_host/replay/line.hpp"
+#include "sim_host/replay/names.hpp"
 #include "tetap/bus/decoder.hpp"
 
 #include <algorithm>
-#include <stdexcept>
 
 namespace tetap::sim {
 
@@ -22,9 +21,7 @@ constexpr std::uint64_t kInFlight = 4096;      ///< inputs that may be on the bu
 
 }  // namespace
 
-void RecordReader::refuse(const std::string& why) const {
-  throw std::runtime_error(name_ + ": cannot be repeated exactly: " + why);
-}
+Failure RecordReader::refusal(const std::string& why) const { return {name_ + ": cannot be repeated exactly: " + why}; }
 
 LogFacts facts_of(Frames& log, const ScriptOptions& options) {
   const std::uint32_t log_base = options.log_base;
@@ -144,14 +141,15 @@ void RecordSurvey::note_node(const base::CanFrame& frame) {
     }
 }
 
-void RecordSurvey::add(const TimedFrame& entry) {
+Result<> RecordSurvey::add(const TimedFrame& entry) {
   const RecordReader::Found found = reader_.add(entry);
   if (found.input)
     (found.own ? own_crcs_ : crcs_)
         .push_back(bus::frame_crc(static_cast<std::uint8_t>(entry.frame.id - log_base_), entry.frame));
   else if (!entry.frame.extended)
     note_node(entry.frame);
-  if (found.new_life) start_life(*found.new_life);
+  if (found.new_life)
+    if (auto started = start_life(*found.new_life); !started) return started;
   if (reader_.skips() || over_) {
     const std::uint64_t bound = reader_.pending() ? reader_.pending()->inputs : reader_.inputs();
     drop_before(bound > kInFlight ? bound - kInFlight : 0);
@@ -160,6 +158,7 @@ void RecordSurvey::add(const TimedFrame& entry) {
   if (found.epoch) add_epoch(*found.epoch);
   // A Begin frame that is not answered yet may end this life: inputs behind it are left for the next one.
   if (!waiting_.empty()) follow_until(reader_.pending() ? reader_.pending()->inputs : reader_.inputs(), false);
+  return {};
 }
 
 void RecordSurvey::drop_before(std::uint64_t input) {
@@ -169,8 +168,8 @@ void RecordSurvey::drop_own_before(std::uint64_t own) {
   for (; first_own_crc_ < own && !own_crcs_.empty(); ++first_own_crc_) own_crcs_.pop_front();
 }
 
-void RecordSurvey::start_life(const RecordReader::NewLife& life) {
-  close_life(life.until);
+Result<> RecordSurvey::start_life(const RecordReader::NewLife& life) {
+  if (auto closed = close_life(life.until); !closed) return closed;
   if (life.begin && life.snapshot == nullptr) drop_before(life.until);
   drop_own_before(life.first_own);
   life_ = life;
@@ -180,6 +179,7 @@ void RecordSurvey::start_life(const RecordReader::NewLife& life) {
   place_ = {.tally = {}, .input = 0, .own = life.first_own};
   if (life.snapshot != nullptr)
     place_.tally = bus::InputCrc(life.snapshot->header.in_crc, life.snapshot->header.in_count);
+  return {};
 }
 
 void RecordSurvey::add_epoch(const NodeEpoch& epoch) {
@@ -276,15 +276,16 @@ void RecordSurvey::end_life(base::Micros time, const std::string& why) {
   if (!result_.hole) result_.hole = Hole{time, why};
 }
 
-void RecordSurvey::close_life(std::uint64_t end) {
-  if (waiting_.empty()) return;
+Result<> RecordSurvey::close_life(std::uint64_t end) {
+  if (waiting_.empty()) return {};
   follow_until(end, true);
-  if (waiting_.empty()) return;
+  if (waiting_.empty()) return {};
   if (reader_.inputs() + reader_.own() == 0)
-    throw std::runtime_error(result_.name + ": no input frames in this log, only what a node said");
+    return Failure{result_.name + ": no input frames in this log, only what a node said"};
   const base::Micros time = waiting_.front().time;
   end_life(time, "the node consumed more input frames until " + in_seconds(time) + " than the log holds" +
                      (unlogged_seen_ ? std::string(": its bus did not take all of its wired samples (Unlogged)") : ""));
+  return {};
 }
 
 std::string RecordSurvey::reason_of_difference() const {
@@ -297,25 +298,27 @@ std::string RecordSurvey::reason_of_difference() const {
   return other;
 }
 
-Recording RecordSurvey::finish() {
-  close_life(reader_.inputs());
+Result<Recording> RecordSurvey::finish() {
+  if (const auto closed = close_life(reader_.inputs()); !closed) return closed.failure();
   result_.skipped_epochs = reader_.skipped_epochs();
   result_.unlogged += reader_.unlogged();
   if (differs_first_) result_.hole->why = reason_of_difference();
   if (reader_.hole() && (!result_.hole || reader_.hole()->time < result_.hole->time)) result_.hole = reader_.hole();
-  if (result_.epochs == 0 && result_.hole) reader_.refuse(result_.hole->why);
+  if (result_.epochs == 0 && result_.hole) return reader_.refusal(result_.hole->why);
   if (result_.epochs == 0 && result_.skipped_epochs > 0)
-    reader_.refuse(
+    return reader_.refusal(
         "it begins after the node's start: no Begin frame, its first epoch is not the node's first, and no "
         "snapshot is in it (make record asks for one)");
-  if (result_.epochs == 0) reader_.refuse("no whole epoch of a node in it");
+  if (result_.epochs == 0) return reader_.refusal("no whole epoch of a node in it");
   result_.facts = std::move(facts_);
   return std::move(result_);
 }
 
-Recording recording_of(Frames& log, const std::string& name, const ScriptOptions& options) {
+Result<Recording> recording_of(Frames& log, const std::string& name, const ScriptOptions& options) {
   RecordSurvey survey(name, options.log_base, facts_of(log, options));
-  for (TimedFrame entry; log.next(entry);) survey.add(entry);
+  for (TimedFrame entry; log.next(entry);)
+    if (const auto added = survey.add(entry); !added) return added.failure();
+  if (log.failure()) return *log.failure();
   return survey.finish();
 }
 

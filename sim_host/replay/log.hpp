@@ -1,15 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// A candump log: its data frames with their times, and how many lines were something else. A log of hours is read
-// frame by frame and never held whole.
+// A candump log: its data frames with their times, and how many lines were something else.
 #pragma once
 
+#include "sim_host/replay/result.hpp"
 #include "tetap/base/can_frame.hpp"
 #include "tetap/base/time.hpp"
 
 #include <cstddef>
 #include <cstdint>
-#include <cstdio>
-#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -53,10 +51,15 @@ class Frames {
   Frames(Frames&&) = default;
   Frames& operator=(Frames&&) = default;
   virtual ~Frames() = default;
-  /// Fills in the next frame; false: no more.
+  /// Fills in the next frame; false: no more, or a failure.
   virtual bool next(TimedFrame& frame) = 0;
   /// The next frame is the first one again.
   virtual void rewind() = 0;
+  /// Why the frames end before the log does.
+  [[nodiscard]] virtual const std::optional<Failure>& failure() const {
+    static const std::optional<Failure> none;
+    return none;
+  }
 };
 
 class FramesInMemory : public Frames {
@@ -79,10 +82,10 @@ class LogParser {
  public:
   LogParser(const std::string& name, const LogOptions& options) : options_(options) { report_.name = name; }
 
-  /// The line's frame; nothing for a blank line and for what is counted instead. Throws
-  /// std::runtime_error("name:line: reason: 'text'") for a malformed line unless set to keep going. `ended`: a newline
-  /// follows. A last line without one is a frame where it is whole, else it is reported as cut off.
-  std::optional<TimedFrame> add(std::string_view line, bool ended = true);
+  /// The line's frame; nothing for a blank line and for what is counted instead. A malformed line is a failure,
+  /// "name:line: reason: 'text'", unless set to keep going. `ended`: a newline follows. A last line without one is a
+  /// frame where it is whole, else it is reported as cut off.
+  Result<std::optional<TimedFrame>> add(std::string_view line, bool ended = true);
   [[nodiscard]] const LogReport& report() const { return report_; }
 
  private:
@@ -92,45 +95,33 @@ class LogParser {
   std::uint64_t number_ = 0;  ///< number of the line
 };
 
-/// A log file, read in blocks. A source that cannot be read twice (a pipe) is copied into a temporary file first.
-class LogFile : public Frames {
+/// The text of a log in memory, read line by line.
+class LogText : public Frames {
  public:
-  /// Throws std::runtime_error when the file cannot be opened.
-  LogFile(const std::string& path, const LogOptions& options);
+  /// The text outlives it.
+  LogText(std::string_view text, const std::string& name, const LogOptions& options = {})
+      : text_(text), left_(text), name_(name), options_(options), parser_(name, options) {}
 
-  /// Throws as LogParser does, when the file cannot be read, and when a second reading does not give the frames of the
-  /// first.
   bool next(TimedFrame& frame) override;
   void rewind() override;
-  /// Report of the lines read up to now; after a second reading still that of the first.
-  [[nodiscard]] const LogReport& report() const { return report_ ? *report_ : parser_.report(); }
+  [[nodiscard]] const std::optional<Failure>& failure() const override { return failure_; }
+  /// Report of the lines read since the last rewind.
+  [[nodiscard]] const LogReport& report() const { return parser_.report(); }
 
  private:
-  struct TextLine {
-    std::string_view text;
-    bool ended = true;  ///< by a newline
-  };
-  bool next_line(TextLine& line);
-  bool read_block();
-  [[noreturn]] void refuse(const std::string& reason) const;
-
-  std::string path_;
+  std::string_view text_, left_;
+  std::string name_;
   LogOptions options_;
-  std::unique_ptr<std::FILE, int (*)(std::FILE*)> file_;
   LogParser parser_;
-  std::optional<LogReport> report_;  ///< report of a reading to the end
-  std::vector<char> block_;
-  std::size_t begin_ = 0, end_ = 0;  ///< unread part of block_
-  std::uint64_t bytes_ = 0;          ///< bytes of the file, read up to now
-  std::uint64_t length_ = 0;         ///< length at the first reading: a log that grows meanwhile ends there
+  std::optional<Failure> failure_;
 };
 
 /// A log in memory.
 struct Log : LogReport {
   std::vector<TimedFrame> frames;
+  std::optional<Failure> failure;  ///< a malformed line, which ended the reading
 };
 
-/// Throws as LogParser does.
 [[nodiscard]] Log parse_log(std::string_view text, const std::string& name, const LogOptions& options = {});
 
 }  // namespace tetap::sim

@@ -4,11 +4,11 @@
 #pragma once
 
 #include "hal/board/linux/clock.hpp"
-#include "sim_host/play/frame_accounting.hpp"
-#include "sim_host/play/interruption.hpp"
-#include "sim_host/play/link.hpp"
-#include "sim_host/play/out_file.hpp"
-#include "sim_host/play/snapshot.hpp"
+#include "sim_host/replay/frame_accounting.hpp"
+#include "sim_host/replay/line.hpp"
+#include "sim_host/replay/link.hpp"
+#include "sim_host/replay/result.hpp"
+#include "sim_host/replay/snapshot.hpp"
 
 #include <cstddef>
 #include <optional>
@@ -17,17 +17,14 @@
 
 namespace tetap::sim {
 
-/// "12.340 s", for messages.
-[[nodiscard]] inline std::string in_seconds(base::Micros t) {
-  Line text;
-  text.fixed(t.us / 1000, 3).text(" s");
-  return std::string(text.view());
-}
+/// Why a run has to end at once; empty: it goes on.
+using Interrupted = std::string (*)();
 
-/// Throws RunError when a signal has asked for the end.
-inline void end_if_interrupted(const Counts& counts) {
-  if (Interruption::signal() != 0)
-    throw RunError(Interruption::text() + " after " + std::to_string(counts.epochs) + " epochs");
+/// A run ends when it is asked to.
+[[nodiscard]] inline Result<> not_interrupted(Interrupted interrupted, const Counts& counts) {
+  const std::string why = interrupted != nullptr ? interrupted() : std::string();
+  if (why.empty()) return {};
+  return Failure{why + " after " + std::to_string(counts.epochs) + " epochs"};
 }
 
 struct Patience {
@@ -41,19 +38,22 @@ inline constexpr Patience kEmulatedPatience{.epoch = {20'000'000}, .begin = {120
 template <Link L, Sink K>
 class NodeLink {
  public:
-  NodeLink(L& link, K& sink, std::uint32_t base, Counts& counts)
-      : link_(link), sink_(sink), collector_(base), counts_(counts), base_(base) {}
+  NodeLink(L& link, K& sink, std::uint32_t base, Counts& counts, Interrupted interrupted = nullptr)
+      : link_(link), sink_(sink), collector_(base), counts_(counts), interrupted_(interrupted), base_(base) {}
 
-  void send(const base::CanFrame& frame) {
-    if (!link_.send(frame)) send_later(frame);
+  /// Fails when the bus takes nothing for two seconds.
+  Result<> send(const base::CanFrame& frame) {
+    if (!link_.send(frame))
+      if (auto sent = send_later(frame); !sent) return sent;
     sink_.sent(frame);
+    return {};
   }
-  void sync(bus::SyncKind kind, base::Micros time) {
+  Result<> sync(bus::SyncKind kind, base::Micros time) {
     const bus::InSync message = sync_message(kind, time, sync_counter_++);
     // A node takes its power-on state, and leaps in time, only at the request of a guarded frame.
     if (kind == bus::SyncKind::kBegin || kind == bus::SyncKind::kClock)
-      send(bus::frame(base_, bus::guard_of_sync(message)));
-    send(bus::frame(base_, message));
+      if (auto sent = send(bus::frame(base_, bus::guard_of_sync(message))); !sent) return sent;
+    return send(bus::frame(base_, message));
   }
 
   /// Takes every frame that is there; on_epoch(epoch) for each epoch that is complete.
@@ -65,48 +65,50 @@ class NodeLink {
     }
   }
 
-  /// Sends Begin until the node answers; throws RunError when it does not.
-  void begin(base::Micros time, const Patience& patience) {
+  /// Sends Begin until the node answers; fails when it does not.
+  Result<> begin(base::Micros time, const Patience& patience) {
     const base::Micros began = hal::monotonic_clock();
     for (base::Micros now = began; now - began < patience.begin; now = hal::monotonic_clock()) {
-      sync(bus::SyncKind::kBegin, time);
+      if (auto sent = sync(bus::SyncKind::kBegin, time); !sent) return sent;
       ++counts_.syncs;
       while (hal::monotonic_clock() - now < patience.repeat) {
-        end_if_interrupted(counts_);
+        if (auto on = not_interrupted(interrupted_, counts_); !on) return on;
         link_.wait({20'000});
         if (answered()) {
           collector_.reset();
-          return sink_.restarted();
+          sink_.restarted();
+          return {};
         }
       }
     }
     Line id;
     id.hex(base_, 3);
-    throw RunError("no node with id base 0x" + std::string(id.view()) + " answers on this bus: sent Begin for " +
-                   in_seconds(hal::monotonic_clock() - began));
+    return Failure{"no node with id base 0x" + std::string(id.view()) + " answers on this bus: sent Begin for " +
+                   in_seconds(hal::monotonic_clock() - began)};
   }
 
-  /// Hands the node a state to go on from; throws RunError when it cannot take it.
-  void resume(const Snapshot& snapshot) {
+  /// Hands the node a state to go on from; fails when it cannot take it.
+  Result<> resume(const Snapshot& snapshot) {
     if constexpr (requires { link_.resume(std::span<const std::byte>(snapshot.state)); }) {
-      if (link_.resume(snapshot.state)) return;
-      throw RunError("the snapshot in the log is of another robot or of a program with another layout: " +
-                     std::to_string(snapshot.state.size()) + " bytes");
+      if (link_.resume(snapshot.state)) return {};
+      return Failure{"the snapshot in the log is of another robot or of a program with another layout: " +
+                     std::to_string(snapshot.state.size()) + " bytes"};
     }
-    throw RunError("the log begins with a snapshot, which only a node in this process takes up: --memory --robot NAME");
+    return Failure{"the log begins with a snapshot, which only a node in this process takes up: --memory --robot NAME"};
   }
 
   [[nodiscard]] const EpochCollector& collector() const { return collector_; }
 
  private:
-  void send_later(const base::CanFrame& frame) {
+  Result<> send_later(const base::CanFrame& frame) {
     const base::Micros began = hal::monotonic_clock();
     do {
-      end_if_interrupted(counts_);
+      if (auto on = not_interrupted(interrupted_, counts_); !on) return on;
       if (hal::monotonic_clock() - began > base::Micros{2'000'000})
-        throw RunError("the bus takes no frames: is the interface up?");
+        return Failure{"the bus takes no frames: is the interface up?"};
       link_.wait({1000});
     } while (!link_.send(frame));
+    return {};
   }
   bool answered() {
     bool is = false;
@@ -122,6 +124,7 @@ class NodeLink {
   K& sink_;
   EpochCollector collector_;
   Counts& counts_;
+  Interrupted interrupted_;
   std::uint32_t base_;
   std::uint8_t sync_counter_ = 0;
 };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "sim_host/play/candump.hpp"
+#include "sim_host/replay/candump.hpp"
 
 #include <array>
 #include <cstdint>

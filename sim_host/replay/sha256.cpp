@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "sim_host/play/sha256.hpp"
+#include "sim_host/replay/sha256.hpp"
 
 #include <algorithm>
 #include <bit>

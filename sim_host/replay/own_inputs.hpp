@@ -3,7 +3,7 @@
 // and their guards.
 #pragma once
 
-#include "sim_host/play/protocol.hpp"
+#include "sim_host/replay/protocol.hpp"
 #include "tetap/bus/e2e.hpp"
 #include "tetap/bus/guard.hpp"
 

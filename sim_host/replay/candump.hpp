@@ -3,7 +3,7 @@
 // "##<flags>data", optional direction " R" or " T". Format as in can-utils lib.c (parse_canframe, sprint_canframe).
 #pragma once
 
-#include "sim_host/play/out_file.hpp"
+#include "sim_host/replay/line.hpp"
 #include "tetap/base/can_frame.hpp"
 #include "tetap/base/time.hpp"
 

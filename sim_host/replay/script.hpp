@@ -3,8 +3,8 @@
 // simulated world, or from the record of another run.
 #pragma once
 
-#include "sim_host/play/log.hpp"
-#include "sim_host/play/snapshot.hpp"
+#include "sim_host/replay/log.hpp"
+#include "sim_host/replay/snapshot.hpp"
 #include "tetap/base/can_frame.hpp"
 #include "tetap/base/time.hpp"
 
