@@ -10,6 +10,7 @@ import sys
 import tempfile
 import tracemalloc
 import unittest
+import unittest.mock
 
 import numpy as np
 
@@ -24,6 +25,15 @@ from tetap.report import attitude, events, ground_truth, metrics, normalised_err
 RUN = {"frames_in": 1234, "frames_lost": 0, "estimates_out": 777, "times_realtime": 12.5, "bus_load_percent": 9.25, "estimates_sha256": "ab" * 32,
        "state_crc_last": "0x12345678", "bus": "memory", "way": "one process", "robot": "rover", "mode": "lockstep", "duration_s": 10.0, "seed": 7,
        "fault": "none"}
+
+
+def round_all(value):
+    """Sums of parts differ in the last digits."""
+    if isinstance(value, dict):
+        return {key: round_all(one) for key, one in value.items()}
+    if isinstance(value, list):
+        return [round_all(one) for one in value]
+    return float(f"{value:.10g}") if isinstance(value, float) else value
 
 
 def text_of(path):
@@ -840,6 +850,54 @@ class Inertial(Case):
         for name in normalised_error.BLOCKS:
             self.assertAlmostEqual(fused["blocks"][name]["nees_mean"], 12.0, delta=1.0, msg=name)
             self.assertLess(fused["blocks"][name]["inside_3_sigma"], 0.75, name)
+
+    def test_a_long_run_that_is_judged_in_parts_has_the_figures_of_the_whole(self):
+        path = self.inertial(between=10.0)
+        # Sigmas come once in 50 epochs and hold on, across the parts too.
+        header, *rows = [line.split(",") for line in text_of(self.path("states.csv")).splitlines()]
+        for n, row in enumerate(rows):
+            for at, name in enumerate(header):
+                if name.startswith("std_") and n % 50:
+                    row[at] = ""
+        self.write("states.csv", "".join(",".join(row) + "\n" for row in [header, *rows]))
+
+        def figures():
+            run = recorded_run.Run(self.directory)
+            truth = ground_truth.Truth(path, None, run.every).paired_with(run)
+            return run, metrics.summary(run, truth)["fused"]
+        _, whole = figures()
+        size = os.path.getsize(self.path("estimates.csv"))
+        for span in (731, 1000, 100_000):
+            with unittest.mock.patch.multiple(recorded_run, LONG=size - 1, SPAN=span):
+                run, parts = figures()
+            self.assertEqual(run.every, 5)
+            self.assertLess(len(run.estimates["epoch"]), self.count / 4)  # for pictures: whole seconds, each with its pages
+            self.assertGreater(len(run.estimates["epoch"]), self.count / 8)
+            self.assertEqual(json.dumps(round_all(parts)), json.dumps(round_all(whole)), span)
+
+    def test_the_first_ten_right_seconds_are_found_in_parts_too(self):
+        random = np.random.default_rng(3)
+        for _ in range(300):
+            right = np.repeat(random.random(12) < 0.6, random.integers(1, 9, 12))
+            time_s, distance = 2.0 * np.arange(len(right)), np.where(right, 0.1, 3.0)
+            distance[random.random(len(right)) < 0.1] = np.nan
+            known = np.flatnonzero(np.isfinite(distance))
+            # By brute force: from each known time on, all right until the last one or ten seconds later.
+            expected = None
+            for i in known:
+                before = known[known < i]
+                after = known[known >= i]
+                wrong = after[distance[after] > metrics.RECOVERED_M]
+                end = time_s[wrong[0]] if len(wrong) else time_s[known[-1]]
+                starts = distance[i] <= metrics.RECOVERED_M and (len(before) == 0 or distance[before[-1]] > metrics.RECOVERED_M)
+                if expected is None and starts and end - time_s[i] >= metrics.RECOVERED_S:
+                    expected = time_s[i] - time_s[known[0]]
+            for cut in (len(right), 1, 7):
+                found = metrics.Recovery()
+                for first in range(0, len(right), cut):
+                    part = slice(first, first + cut)
+                    found.add(time_s[part], distance[part], np.ones(len(time_s[part]), dtype=bool))
+                self.assertEqual(found.value(), expected)
 
     def test_an_error_is_judged_by_the_covariance_of_its_own_epoch(self):
         blocks = self.summary("--truth", self.inertial(between=10.0))["fused"]["blocks"]

@@ -6,9 +6,10 @@ import os
 import numpy as np
 
 from tetap.can.bus_writer import BadInput
+from tetap.report import recorded_run
 from tetap.report.attitude import wrapped
-from tetap.report.recorded_run import ACC_BIAS, GYRO_BIAS, VELOCITY, read_json
-from tetap.report.tables import read_table
+from tetap.report.recorded_run import ACC_BIAS, GYRO_BIAS, VELOCITY, read_json, seconds
+from tetap.report.tables import read_parts, read_table
 
 LEAST_GAP_S = 0.2  # truth rows further apart than this, or than 2.5 times their usual distance, are not interpolated between
 MOST_APART_S = 1.0  # between the time of the first common epoch in truth and run: more, and the epochs are those of another run
@@ -22,9 +23,13 @@ class Truth:
     The truth of a simulated world has the node's epoch in each row. Then the rows are paired by epoch, because a fault may have
     made the clock of the bus jump, which the truth does not."""
 
-    def __init__(self, path, max_gap_s=None):
+    def __init__(self, path, max_gap_s=None, every=1):
+        """`every`: that of a long run (recorded_run.Run), of which the truth of a world is a sample too."""
         self.path = path
-        self._rows = read_table(path, TRUTH, ["epoch", *TRUTH_MORE])
+        beside = path[:-len(".truth.csv")] + ".json" if path.endswith(".truth.csv") else ""
+        self.about = read_json(beside) if beside and os.path.exists(beside) else {}
+        self._rows = read_table(path, TRUTH, ["epoch", *TRUTH_MORE], seconds(every))
+        self.is_sample = every > 1 and "epoch" in self._rows
         self.has_more = all(name in self._rows for name in ("epoch", *TRUTH_MORE))
         epoch, time_s = self.epoch, self.time_s
         if epoch is not None and not (np.diff(epoch) > 0).all():
@@ -40,8 +45,6 @@ class Truth:
             raise BadInput(f"{path}: row {int(np.argmax(steps < 0)) + 2}: time goes back")
         self.max_gap_s = max(LEAST_GAP_S, 2.5 * float(np.median(steps))) if max_gap_s is None else max_gap_s
         self.has_yaw = bool(np.isfinite(self.yaw_rad).any())
-        beside = path[:-len(".truth.csv")] + ".json" if path.endswith(".truth.csv") else ""
-        self.about = read_json(beside) if beside and os.path.exists(beside) else {}
         self.is_reference = self.about.get("truth") == "gps track"
 
     def paired_with(self, run):
@@ -62,9 +65,16 @@ class Truth:
     def by_time(self):
         """The same, paired by time alone."""
         other = copy.copy(self)
-        other._rows = self._rows.without("epoch")
-        other.has_more = False
+        other._rows = read_table(self.path, TRUTH) if self.is_sample else self._rows.without("epoch")
+        other.has_more = other.is_sample = False
         return other
+
+    def parts(self):
+        """(number, the truth with the rows of that part alone), of a sample: the parts of recorded_run.Run.parts."""
+        for number, rows in read_parts(self.path, TRUTH, ["epoch", *TRUTH_MORE], recorded_run.SPAN):
+            part = copy.copy(self)
+            part._rows = rows
+            yield number, part
 
     def since(self, start):
         """The same, with times counted from `start` [s]."""
@@ -87,6 +97,8 @@ class Truth:
     def _in_epochs(self, epochs, names):
         """These columns by name, in these epochs; NaN where there is no row."""
         epoch = self.epoch
+        if len(epoch) == 0:
+            return {name: np.full(len(epochs), np.nan) for name in names}
         found = np.clip(np.searchsorted(epoch, epochs), 0, len(epoch) - 1)
         known = epoch[found] == epochs
         return {name: np.where(known, self._rows[name][found], np.nan) for name in names}

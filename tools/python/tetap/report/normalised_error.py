@@ -158,13 +158,3 @@ def rms(values):
     values = values[np.isfinite(values)]
     return float(np.sqrt(np.mean(values ** 2))) if len(values) else None
 
-
-def block_figures(found, name):
-    """RMSE of each of the three, NEES (3 expected), and the share of times at which all three are inside 3 sigma."""
-    values = found.nees(name)
-    known, both = np.isfinite(values), np.isfinite(found.error[name] + found.sigma[name]).all(axis=1)
-    low, high = chi_square(0.025, 3), chi_square(0.975, 3)
-    return {"unit": UNITS[name], "rmse": [rms(column) for column in found.error[name].T],
-            "nees_mean": float(values[known].mean()) if known.any() else None,
-            "nees_inside_two_sided_95": float(((values[known] >= low) & (values[known] <= high)).mean()) if known.any() else None,
-            "inside_3_sigma": float(1 - found.outside(name)[both].mean()) if both.any() else None}

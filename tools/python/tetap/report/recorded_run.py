@@ -2,6 +2,7 @@
 """A recorded run: the recorder's tables, the kinds and names of its estimators, and the faults that its world had."""
 import copy
 import json
+import math
 import os
 
 import numpy as np
@@ -9,9 +10,11 @@ import numpy as np
 from tetap.can import bus_writer
 from tetap.can.bus_writer import BadInput
 from tetap.report import graph, own_map
-from tetap.report.tables import empty_table, read_table
+from tetap.report.tables import empty_table, joined, read_parts, read_table
 
 TICK_S = 0.01  # period of a tick in the simulated world
+LONG = 32 << 20  # bytes of estimates.csv, about an hour: a longer run is judged part by part, and its pictures are of a sample
+SPAN = 100_000  # epochs of such a part
 HELD_S = 1.5  # a page of an inertial estimate comes once a second: its numbers count for no longer than this
 ESTIMATES = ["epoch", "time_s", "estimator", "kind", "x_m", "y_m", "yaw_rad", "speed_mps", "yaw_rate_radps", "std_x_m", "std_y_m",
              "std_yaw_rad", "corr_xy", "corr_x_yaw", "corr_y_yaw", "pos_valid", "hdg_valid",
@@ -101,19 +104,37 @@ def fault_spans(run):
     return spans
 
 
+def sample_of(path):
+    """How many seconds of a long run stand for one of them: a sample has a quarter of LONG."""
+    try:
+        size = os.path.getsize(path)
+    except OSError as error:
+        raise BadInput(f"{path}: {error.strerror}") from None
+    return 1 if size <= LONG else math.ceil(4 * size / LONG)
+
+
+def seconds(every):
+    """For read_table: the epochs of one second of so many, the same in each table; None where all count."""
+    return None if every == 1 else lambda rows: rows["epoch"] * TICK_S // 1 % every == 0 if "epoch" in rows else np.ones(len(rows["time_s"]), dtype=bool)
+
+
 class Run:
     """The recorder's directory: run.json, estimates, innovations, status."""
 
     def __init__(self, directory):
+        self._first, self._held = 0, None  # of a part: its first epoch, and its rows with those that hold on
         self.start_s = 0.0  # zero of all times
-        path = os.path.join(directory, "run.json")
-        self.about = read_json(path)
-        self.estimates = read_table(os.path.join(directory, "estimates.csv"), ESTIMATES)
+        self._directory = directory
+        self.about = read_json(os.path.join(directory, "run.json"))
+        estimates = os.path.join(directory, "estimates.csv")
+        # Of a long run the tables of millions of rows are a sample: one second of so many.
+        self.every = sample_of(estimates)
+        self.estimates = read_table(estimates, ESTIMATES, keep=seconds(self.every))
         if len(self.estimates["time_s"]) == 0:
             raise BadInput(f"{directory}/estimates.csv: no estimate in it")
         self.innovations = self._optional(directory, "innovations.csv", INNOVATIONS)
         self.status = self._optional(directory, "status.csv", STATUS, ["map_faults"])
-        self.states = self._optional(directory, "states.csv", STATES)
+        self.states = self._optional(directory, "states.csv", STATES, keep=seconds(self.every))
         self.sensors = self._optional(directory, "sensors.csv", SENSORS)
         self.map = self._optional(directory, "map.csv", own_map.MAP)
         self.graph = self._optional(directory, "graph.csv", graph.GRAPH)
@@ -127,11 +148,40 @@ class Run:
         return code_names()["EstimatorKind"].get(code, str(code))
 
     @staticmethod
-    def _optional(directory, name, columns, also=()):
+    def _optional(directory, name, columns, also=(), keep=None):
         path = os.path.join(directory, name)
         if os.path.exists(path):
-            return read_table(path, columns, also)
+            return read_table(path, columns, also, keep)
         return empty_table(columns)
+
+    @property
+    def duration_s(self):
+        """From the first estimate to the last; of a sample as the player counted it."""
+        stated = self.about.get("duration_s")
+        if self.every > 1 and isinstance(stated, (int, float)):
+            return float(stated)
+        return float(self.estimates["time_s"][-1] - self.estimates["time_s"][0])
+
+    def parts(self):
+        """(number, the run with the rows of that part alone): itself where it is no sample, else each SPAN of epochs."""
+        if self.every == 1:
+            yield None, self
+            return
+        states = read_parts(os.path.join(self._directory, "states.csv"), STATES, span=SPAN)
+        held, (state_part, state_rows) = None, next(states)
+        for number, rows in read_parts(os.path.join(self._directory, "estimates.csv"), ESTIMATES, span=SPAN):
+            while state_part < number:
+                state_part, state_rows = next(states, (number + 1, None))
+            mine = state_rows if state_part == number else empty_table(STATES)
+            part = copy.copy(self)
+            part.estimates = rows
+            part._first = number * SPAN
+            # Values that hold on from the part before.
+            part._held = (rows, mine) if held is None else (joined(held[0], rows), joined(held[1], mine))
+            yield number, part
+            late = (number + 1) * SPAN - HELD_S / TICK_S
+            held = tuple(table.where(table["epoch"] >= late) for table in part._held)
+            held = tuple(joined(empty_table(table.names()), table) for table in held)
 
     def since(self, start):
         """The same, with times counted from `start` [s]."""
@@ -150,7 +200,8 @@ class Run:
     def states_of(self, estimator):
         """The estimator's attitudes, one row each, and beside them the last published values of everything else, where that is not too old; None
         where it publishes none."""
-        states = States(self.states.where(self.states["estimator"] == estimator), self.of(estimator))
+        pose, states = self._held or (self.estimates, self.states)
+        states = States(states.where(states["estimator"] == estimator), pose.where(pose["estimator"] == estimator), self._first)
         return states if len(states["epoch"]) > 0 else None
 
 
@@ -158,9 +209,9 @@ class States:
     """Columns by name, a row for every attitude; "new NAME": whether that was published in this very epoch."""
     POSE = ("x_m", "y_m", "std_x_m", "std_y_m", "std_yaw_rad", "corr_xy", "pos_valid", "hdg_valid")
 
-    def __init__(self, rows, pose):
+    def __init__(self, rows, pose, first=0):
         self._rows, self._pose = rows, pose
-        self._at = np.flatnonzero(np.isfinite(rows["q_w"]))
+        self._at = np.flatnonzero(np.isfinite(rows["q_w"]) & (rows["epoch"] >= first))
 
     def __getitem__(self, name):
         if name in ("epoch", "time_s", *Q):

@@ -2,6 +2,7 @@
 """The recorder's CSV files in little memory: read in blocks, kept as whole multiples of powers of ten, given out as the very floats of the text.
 
 A run of eight hours has three million rows of each large table. As floats they fill gigabytes; as the few digits that the text has, a tenth."""
+import contextlib
 import warnings
 
 import numpy as np
@@ -11,7 +12,7 @@ from tetap.can.bus_writer import BadInput
 
 ENUMERATIONS = {"failed": "Check", "state": "SourceState", "kind": "EstimatorKind", "sensor": "Sensor", "verdict": "Verdict", "mode": "Mode", "reset_cause": "ResetCause",
                 "landmark_state": "LandmarkState", "graph_status": "GraphStatus"}
-BLOCK = 1 << 22  # bytes of text at once
+BLOCK = 1 << 20  # bytes of text at once
 MOST_DECIMALS = 9
 LONGEST_NAME = 40
 
@@ -72,6 +73,9 @@ class Table:
     def __contains__(self, name):
         return name in self._columns
 
+    def names(self):
+        return list(self._columns)
+
     def __getitem__(self, name):
         values = self._columns[name].array()
         values = values if self._index is None else values[self._index]
@@ -107,16 +111,56 @@ def empty_table(columns):
     return Table({name: Column() for name in columns})
 
 
-def read_table(path, columns, also=()):
-    """Columns of a CSV file by name, and those of `also` that it has. Empty: NaN. Names of the bus's enumerations stand for their numbers."""
+def joined(first, second):
+    """Rows of the one, then of the other, which has the same columns."""
+    columns = {name: Column() for name in second.names()}
+    for name, column in columns.items():
+        for table in (first, second):
+            column.add(table[name])
+    return Table(columns)
+
+
+def read_table(path, columns, also=(), keep=None):
+    """Columns of a CSV file by name, and those of `also` that it has. Empty: NaN. Names of the bus's enumerations stand for their numbers. `keep`: mask
+    of the rows to keep, from a block of them by column."""
+    with _opened(path) as file:
+        names, blocks = _read(file, path, columns, also)
+        found = {name: Column() for name in names}
+        for block in blocks:
+            rows = slice(None) if keep is None else np.flatnonzero(keep(block))
+            for name, column in found.items():
+                column.add(block[name][rows])
+        return Table(found)
+
+
+def read_parts(path, columns, also=(), span=None):
+    """(number, table) of each `span` of epochs, in order: epoch // span is the number. Only one of them is in memory."""
+    with _opened(path) as file:
+        names, blocks = _read(file, path, columns, also)
+        number, found = 0, {name: Column() for name in names}
+        for block in blocks:
+            # A row without an epoch, or with an earlier one, goes with those before it.
+            numbers = np.maximum.accumulate(np.maximum(np.nan_to_num(block["epoch"]) // span, number).astype(int))
+            for rows in np.split(np.arange(len(numbers)), np.flatnonzero(np.diff(numbers)) + 1):
+                if len(rows) and numbers[rows[0]] != number:
+                    yield number, Table(found)
+                    number, found = int(numbers[rows[0]]), {name: Column() for name in names}
+                for name, column in found.items():
+                    column.add(block[name][rows])
+        yield number, Table(found)
+
+
+@contextlib.contextmanager
+def _opened(path):
     try:
         with open(path, "rb") as file:
-            return _read(file, path, columns, also)
+            yield file
     except OSError as error:
         raise BadInput(f"{path}: {error.strerror}") from None
 
 
 def _read(file, path, columns, also):
+    """(names of the columns that are there, blocks of rows by column)."""
     header, line = file.readline(), 1
     while header.startswith(b"#"):
         header, line = file.readline(), line + 1
@@ -124,18 +168,19 @@ def _read(file, path, columns, also):
     missing = [name for name in columns if name not in names]
     if missing:
         raise BadInput(f"{path}:{line}: no column {missing[0]!r}")
-    found = {name: Column() for name in [*columns, *also] if name in names}
-    line += 1
+    found = [name for name in [*columns, *also] if name in names]
     tables = bus_writer.default_dbc().tables
     codes = [tables.get(ENUMERATIONS.get(name), {}) for name in names]
+    return found, _rows(file, path, line + 1, names, found, codes)
+
+
+def _rows(file, path, line, names, found, codes):
     for body in _blocks(file):
         values = _parse(body, codes)
         if values is None:
             values = _parse_names(body, codes, path, line)
-        for name, column in found.items():
-            column.add(values[:, names.index(name)])
+        yield {name: values[:, names.index(name)] for name in found}
         line += body.count(b"\n")
-    return Table(found)
 
 
 def _blocks(file):
