@@ -8,6 +8,7 @@
 #include "sim_host/play/interruption.hpp"
 #include "sim_host/play/realtime.hpp"
 #include "sim_host/play/session.hpp"
+#include "sim_host/play/spool.hpp"
 #include "sim_host/published_sensors.hpp"
 #include "sim_host/replay/lockstep.hpp"
 #include "sim_host/robots.hpp"
@@ -22,8 +23,11 @@
 #include <cstdint>
 #include <cstdio>
 #include <exception>
+#include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
+#include <vector>
 
 namespace {
 
@@ -94,38 +98,78 @@ struct Run {
   sim::LockstepOptions lockstep;
 };
 
+/// The world as it is driven: its truth waits on disk until the frame of the node's map is known.
+class Drive {
+ public:
+  Drive(sim::World world, const Run& run)
+      : source_(std::move(world), run.session.base, base::Micros{10'000}, run.limit, run.initial_pose_estimate),
+        truth_(run.session.folder) {
+    for (const sim::FaultSetting& fault : run.world.faults) source_.inject(fault);
+    if (!source_.world().map_given()) sightings_.emplace(run.session.folder);
+  }
+
+  bool next(sim::Tick& tick) {
+    if (!source_.next(tick)) return false;
+    truth_.add(source_.truth());
+    const auto seen = source_.take_sightings();
+    if (sightings_) sightings_->add(seen);
+    return true;
+  }
+
+  [[nodiscard]] sim::WorldSource& source() { return source_; }
+  /// Hands over the files of the truth.
+  void finish(sim::Session& session, sim::TruthTable table) {
+    truth_.each([&table](const sim::Truth& row) { table.add(row); });
+    session.add(table.end());
+    if (sightings_) session.add(sightings_->end());
+  }
+
+ private:
+  sim::WorldSource source_;
+  sim::Spool<sim::Truth> truth_;
+  std::optional<sim::SightingTable> sightings_;
+};
+
+static_assert(sim::Source<Drive>);
+
+/// Its faults come with the drive.
+sim::World calm_world(const Run& run) {
+  sim::World::Options options = run.world;
+  options.faults.clear();
+  return {options, run.seed};
+}
+
 template <sim::Link L>
 int drive(L& link, const Run& run) {
-  sim::WorldSource source(sim::World(run.world, run.seed), run.session.base, base::Micros{10'000}, run.limit,
-                          run.initial_pose_estimate);
+  sim::World world = calm_world(run);
   auto about = run.session;
-  about.ticks = static_cast<std::uint64_t>(std::min(run.limit, source.world().duration()).us / 10'000);
+  about.ticks = static_cast<std::uint64_t>(std::min(run.limit, world.duration()).us / 10'000);
   sim::Session session(about);
   session.note("seed", std::to_string(run.seed));
   session.note("fault", sim::quoted(run.faults));
-  session.note("landmarks", sim::landmarks_json(source.world()));
+  session.note("landmarks", sim::landmarks_json(world));
   session.note("matched", run.world.mismatched ? "false" : "true");
   const param::Parameters parameters = sim::parameters_of(about.robot, run.settings);
-  if (parameters.bus.guard != 0) source.send_guards();
   for (const auto& [name, json] : sim::parameter_notes(parameters, run.settings)) session.note(name, json);
+  Drive drive(std::move(world), run);
+  if (parameters.bus.guard != 0) drive.source().send_guards();
   sim::NodeOrigin node_origin(about.base);
   sim::OriginWatch watch(session, node_origin);
   const auto play = [&]() -> sim::Result<> {
-    if (!run.realtime) return sim::play_lockstep(link, source, watch, run.lockstep, session.counts());
+    if (!run.realtime) return sim::play_lockstep(link, drive, watch, run.lockstep, session.counts());
     std::vector<sim::TimedFrame> frames;
     sim::Tick tick;
-    while (source.next(tick))
+    while (drive.next(tick))
       for (const auto& frame : tick.inputs) frames.push_back({.time = tick.time, .frame = frame});
     const sim::RealtimeOptions options{.base = about.base, .interrupted = &sim::Interruption::text};
     return sim::play_realtime(link, frames, watch, options, session.counts());
   };
   return session.run(play, [&] {
     // A robot with a map of landmarks keeps to that, wherever its first fix fell.
-    const auto& world = source.world();
+    const sim::World& driven = drive.source().world();
     const sim::GeodeticOrigin origin =
-        run.world.surveyed ? world.origin() : node_origin.from_fix().value_or(world.origin());
-    session.add(sim::write_truth(about.folder, parameters, world, source.truth(), origin, !run.realtime));
-    if (!world.map_given()) session.add(sim::write_sightings(about.folder, world));
+        run.world.surveyed ? driven.origin() : node_origin.from_fix().value_or(driven.origin());
+    drive.finish(session, {about.folder, parameters, driven, origin, !run.realtime});
   });
 }
 

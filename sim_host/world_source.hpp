@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The simulated world as a source of ticks: what its sensors send, as frames. The truth is kept for the report and
-// never sent.
+// The simulated world as a source of ticks: what its sensors send, as frames. The truth is for the report and never
+// sent.
 #pragma once
 
 #include "sim_host/encode.hpp"
@@ -12,6 +12,8 @@
 #include <cmath>
 #include <cstdint>
 #include <optional>
+#include <span>
+#include <utility>
 #include <vector>
 
 namespace tetap::sim {
@@ -36,40 +38,56 @@ inline void introduce(const World& world, std::uint32_t base, bool pose, std::ve
                                                    .std_yaw_rad = static_cast<float>(start.sigma_yaw_rad)})));
 }
 
+/// The world as whoever plays it sees it: step(), frames(), inject(). As a source it is stepped tick by tick.
 class WorldSource {
  public:
   WorldSource(World world, std::uint32_t base, base::Micros period, base::Micros limit,
               bool initial_pose_estimate = true)
       : world_(std::move(world)),
-        initial_pose_estimate_(initial_pose_estimate && !world_.faults().active(Fault::kMovingStart, {})),
+        initial_pose_estimate_(initial_pose_estimate),
         base_(base),
         period_(period),
-        next_(world_.start() + period),
+        now_(world_.start()),
         end_(world_.start() + (limit < world_.duration() ? limit : world_.duration())) {}
 
   /// From now on guards are sent with samples and map entries (param::BusParameters::guard).
   void send_guards() { guards_.emplace(); }
 
-  /// The first tick brings the landmark map and the start pose.
+  /// Lets the world run for so long. The first step brings the landmark map and the start pose.
+  void step(std::int64_t ms) { run_for({ms * 1'000}); }
+  /// Frames of the last step, in the order in which they are sent.
+  [[nodiscard]] std::span<const base::CanFrame> frames() const { return frames_; }
+  /// As World::inject().
+  void inject(const FaultSetting& fault) { world_.inject(fault); }
+  FaultSetting inject(Fault fault, base::Micros duration) { return world_.inject(fault, duration); }
+
   bool next(Tick& tick) {
-    if (next_ > end_) return false;
-    measurements_.clear();
-    frames_.clear();
-    world_.advance_to(next_, measurements_);
-    if (truth_.empty()) introduce(world_, base_, initial_pose_estimate_, frames_);
-    for (const Measurement& m : measurements_) encode(base_, m, frames_);
-    if (guards_) guard();
-    truth_.push_back(world_.truth());
-    tick = {.time = next_ + world_.clock_offset(), .inputs = frames_, .begin = {}};
-    if (truth_.size() == 1) tick.begin = next_ - period_;
-    next_ += period_;
+    if (now_ + period_ > end_) return false;
+    const bool first = !begun_;
+    run_for(period_);
+    tick = {.time = now_ + world_.clock_offset(), .inputs = frames_, .begin = {}};
+    if (first) tick.begin = now_ - period_;
     return true;
   }
 
-  [[nodiscard]] const std::vector<Truth>& truth() const { return truth_; }
+  /// As of the last step.
+  [[nodiscard]] const Truth& truth() const { return truth_; }
   [[nodiscard]] const World& world() const { return world_; }
+  /// Sightings since they were taken last.
+  [[nodiscard]] std::vector<TrueSighting> take_sightings() { return world_.take_sightings(); }
 
  private:
+  void run_for(base::Micros span) {
+    now_ += span;
+    measurements_.clear();
+    frames_.clear();
+    world_.advance_to(now_, measurements_);
+    const bool pose = initial_pose_estimate_ && !world_.faults().active(Fault::kMovingStart, {});
+    if (!std::exchange(begun_, true)) introduce(world_, base_, pose, frames_);
+    for (const Measurement& m : measurements_) encode(base_, m, frames_);
+    if (guards_) guard();
+    truth_ = world_.truth();
+  }
   /// Each guard behind the last frame of its sample, or before its map entry.
   void guard() {
     guarded_.clear();
@@ -90,13 +108,14 @@ class WorldSource {
   bool initial_pose_estimate_;
   std::uint32_t base_;
   base::Micros period_;
-  base::Micros next_;
+  base::Micros now_;
   base::Micros end_;
   std::vector<Measurement> measurements_;
   std::vector<base::CanFrame> frames_, guarded_;
   std::optional<bus::GuardSender> guards_;
   std::uint8_t entries_ = 0;  ///< map entries guarded
-  std::vector<Truth> truth_;
+  Truth truth_;
+  bool begun_ = false;
 };
 
 static_assert(Source<WorldSource>);

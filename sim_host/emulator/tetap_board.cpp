@@ -417,10 +417,15 @@ class Run {
     const sim::World& world = sensors_->world();
     // A robot with a map of landmarks keeps to that, wherever its first fix fell.
     const bool surveyed = !world.map().empty() || parameters_.gnss.origin_configured != 0;
-    sim::write_truth(options_.out, parameters_, world, sensors_->truth(),
-                     surveyed ? world.origin() : origin.from_fix().value_or(world.origin()), false)
-        .publish();
-    if (!world.map_given()) sim::write_sightings(options_.out, world).publish();
+    sim::TruthTable truth(options_.out, parameters_, world,
+                          surveyed ? world.origin() : origin.from_fix().value_or(world.origin()), false);
+    for (const sim::Truth& row : sensors_->truth()) truth.add(row);
+    truth.end().publish();
+    if (!world.map_given()) {
+      sim::SightingTable sightings(options_.out);
+      sightings.add(world.sightings());
+      sightings.end().publish();
+    }
     write_facts(options_, node, machine, *sensors_, facts_);
     sim::OutFile console(options_.out + "/console.txt");
     console.write(node.console);
@@ -454,8 +459,9 @@ class Run {
           [&] {
             const sim::World& world = sensors_->world();
             const auto rows = std::span(sensors_->truth()).subspan(twin.first_row());
-            session.add(sim::write_truth(folder, parameters_, world, rows.first(std::min(ticks, rows.size())),
-                                         origin.from_fix().value_or(world.origin()), true));
+            sim::TruthTable truth(folder, parameters_, world, origin.from_fix().value_or(world.origin()), true);
+            for (const sim::Truth& row : rows.first(std::min(ticks, rows.size()))) truth.add(row);
+            session.add(truth.end());
           });
     });
   }

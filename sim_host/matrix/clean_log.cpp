@@ -85,14 +85,14 @@ CleanLog clean_log(const std::string& robot, std::uint64_t seed) {
   for (Tick tick; source.next(tick);) {
     if (tick.begin) log.begin = *tick.begin;
     log.ticks.push_back(tick.time);
+    log.truth.push_back(source.truth());
     log.first.push_back(log.frames.size());
     more.clear();
-    if (heading && log.ticks.size() % 20 == 0) compass.sample(source.truth().back(), more);
+    if (heading && log.ticks.size() % 20 == 0) compass.sample(source.truth(), more);
     for (const base::CanFrame& frame : tick.inputs) log.frames.push_back({tick.time, frame});
     for (const base::CanFrame& frame : more) log.frames.push_back({tick.time, frame});
   }
   log.first.push_back(log.frames.size());
-  log.truth = source.truth();
   return log;
 }
 

@@ -127,6 +127,15 @@ FaultsParsed parse_faults(std::string_view text) {
   return parsed;
 }
 
+std::string text_of(const FaultSetting& setting) {
+  const auto seconds = [](base::Micros span) {
+    const std::string fraction = std::to_string(1'000'000 + span.us % 1'000'000);
+    return std::to_string(span.us / 1'000'000) + "." + fraction.substr(1);
+  };
+  const std::string start = std::string(info(setting.fault).name) + "@" + seconds(setting.start);
+  return setting.duration.us > 0 ? start + "+" + seconds(setting.duration) : start;
+}
+
 std::optional<base::Micros> Faults::since(Fault fault, base::Micros at) const {
   for (const auto& s : settings_)
     if (s.fault == fault && at >= s.start && at < s.start + s.duration) return at - s.start;

@@ -98,12 +98,16 @@ struct FaultsParsed {
 /// `NAME[@START[+DURATION]]`, several separated by commas; an empty text is no fault.
 [[nodiscard]] FaultsParsed parse_faults(std::string_view text);
 
+/// The same as `parse_faults` reads it.
+[[nodiscard]] std::string text_of(const FaultSetting& setting);
+
 /// The faults of a run; times count from its start.
 class Faults {
  public:
   Faults() = default;
   explicit Faults(std::vector<FaultSetting> settings) : settings_{std::move(settings)} {}
 
+  void add(const FaultSetting& setting) { settings_.push_back(setting); }
   /// Within [start, start + duration).
   [[nodiscard]] bool active(Fault fault, base::Micros at) const { return since(fault, at).has_value(); }
   /// Time since the fault began; empty while it is off.

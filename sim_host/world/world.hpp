@@ -17,6 +17,7 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 namespace tetap::sim {
@@ -62,6 +63,15 @@ class World {
   /// Lets the world run until `t`; appends what has arrived by then, in the order of arrival. Never runs backwards.
   void advance_to(base::Micros t, std::vector<Measurement>& arrived);
 
+  /// Adds a fault, whose start counts from that of the run; a start that is past does not come again.
+  void inject(const FaultSetting& fault) { faults_.add(fault); }
+  /// A fault from the next step on; its setting gives the same run again when it is there from the start.
+  FaultSetting inject(Fault fault, base::Micros duration) {
+    const FaultSetting setting{fault, now_ + Vehicle::kStep, duration};
+    inject(setting);
+    return setting;
+  }
+
   /// Times of the world: start() until start() + duration(). Truth is as of the last advance_to, on the grid of 0.5 ms,
   /// in the frame of the map.
   [[nodiscard]] Truth truth() const;
@@ -78,8 +88,9 @@ class World {
   [[nodiscard]] StartPose start_pose() const;
   [[nodiscard]] std::span<const Landmark> map() const { return map_; }
   [[nodiscard]] bool map_given() const { return map_given_; }
-  /// All sightings so far, in the order in which they were made.
+  /// All sightings so far, in the order in which they were made, without those that were taken.
   [[nodiscard]] std::span<const TrueSighting> sightings() const { return sightings_; }
+  [[nodiscard]] std::vector<TrueSighting> take_sightings() { return std::exchange(sightings_, {}); }
   [[nodiscard]] const GeodeticOrigin& origin() const { return origin_; }
   [[nodiscard]] const Parameters& parameters() const { return parameters_; }
   [[nodiscard]] const Faults& faults() const { return faults_; }

@@ -68,7 +68,7 @@ std::vector<Recorded> record(const World::Options& options) {
     Tick tick;
     while (source.next(tick)) {
       if (tick.begin) one.begin = *tick.begin;
-      one.epochs.push_back({{tick.inputs.begin(), tick.inputs.end()}, tick.time, source.truth().back()});
+      one.epochs.push_back({{tick.inputs.begin(), tick.inputs.end()}, tick.time, source.truth()});
     }
   }
   return made;

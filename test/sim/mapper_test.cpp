@@ -71,7 +71,7 @@ class Mapping {
         published.take(offset, bus::payload(frame), kMapper);
         take(offset, bus::payload(frame), tick.time);
       });
-      if (const auto nees = published.nees(source_.truth().back())) judge(*nees, *published.position, tick.time);
+      if (const auto nees = published.nees(source_.truth())) judge(*nees, *published.position, tick.time);
     }
     finish();
     return scored_;
@@ -118,7 +118,7 @@ class Mapping {
     scored_.wrong += seen ? 0 : 1;
   }
   void judge(double nees, const bus::EstPos& position, base::Micros now) {
-    const Truth& truth = source_.truth().back();
+    const Truth& truth = source_.truth();
     sum_ += nees;
     square_ += std::pow(bus::EstPos::kXScale * position.x_raw - truth.x_m, 2) +
                std::pow(bus::EstPos::kYScale * position.y_raw - truth.y_m, 2);

@@ -38,7 +38,7 @@ std::vector<Epoch> made(const World::Options& options, std::uint64_t seed, int s
     Epoch& one = epochs.emplace_back();
     one.inputs.assign(tick.inputs.begin(), tick.inputs.end());
     one.tick = tick;
-    one.truth = source.truth().back();
+    one.truth = source.truth();
   }
   return epochs;
 }

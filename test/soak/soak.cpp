@@ -223,7 +223,7 @@ void live(std::uint64_t number) {
     if (!says.position_valid) continue;
     ++valid;
     const bool judged = (is_damage(life.attack) && life.guarded) || compares || since < kFrom || since > kUntil + kCalm;
-    const sim::Truth& truth = source.truth().back();
+    const sim::Truth& truth = source.truth();
     const double ratio =
         std::max(std::abs(says.x_m - truth.x_m) / says.std_x_m, std::abs(says.y_m - truth.y_m) / says.std_y_m) / 3;
     if (!judged) continue;
