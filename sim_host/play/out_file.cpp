@@ -14,26 +14,28 @@ namespace tetap::sim {
 
 namespace {
 
-/// Path under which the text of `path` is written first.
+/// Path under which the text of `path` is written first. A link is refused: whoever planted it would choose the file.
 std::string aside(const std::string& path) {
   std::error_code none;
   const auto status = std::filesystem::status(path, none);
-  const bool ordinary = !std::filesystem::exists(status) || std::filesystem::is_regular_file(status);
-  return ordinary ? path + ".part" : path;
+  if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status)) return path;
+  if (std::filesystem::is_symlink(path, none))
+    throw std::runtime_error(path + ": cannot be written: it is a link; name the file itself");
+  return path + ".part";
 }
 
-/// The file that a link stands for: the link stays.
-std::string behind_links(const std::string& path) {
-  std::error_code error;
-  if (!std::filesystem::is_symlink(path, error)) return path;
-  const auto real = std::filesystem::canonical(path, error);
-  return error ? path : real.string();
+/// A file of one's own, whatever lay there; a device or pipe is opened as it is.
+std::FILE* open_for_writing(const std::string& path, bool ordinary) {
+  if (!ordinary) return std::fopen(path.c_str(), "wb");
+  if (unlink(path.c_str()) != 0 && errno != ENOENT) return nullptr;
+  const int file = open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);
+  return file < 0 ? nullptr : fdopen(file, "wb");
 }
 
 }  // namespace
 
 OutFile::OutFile(const std::string& path)
-    : path_(behind_links(path)), written_(aside(path_)), file_(std::fopen(written_.c_str(), "wb")) {
+    : path_(path), written_(aside(path)), file_(open_for_writing(written_, written_ != path)) {
   if (!file_) throw std::runtime_error(path + ": cannot be written: " + std::strerror(errno));
   std::setvbuf(file_.get(), nullptr, _IONBF, 0);
   buffer_.reserve(kBlock);

@@ -11,7 +11,7 @@
 
 namespace tetap::sim {
 
-/// Written as PATH.part, which publish() renames. A device or pipe is written as it is.
+/// Written as PATH.part, a new file that publish() renames; never through a link. A device or pipe is written as it is.
 class OutFile {
  public:
   /// Throws std::runtime_error when the file cannot be made.

@@ -129,14 +129,33 @@ TEST_F(OutFileInAFolder, ThatIsDiscardedLeavesNothingAside) {
   EXPECT_EQ(files(), 1U);
 }
 
-TEST_F(OutFileInAFolder, BehindALinkIsReplacedAndTheLinkStays) {
-  put("real.csv", "old");
-  std::filesystem::create_symlink(path("real.csv"), path("link.csv"));
-  OutFile file(path("link.csv"));
-  file.write("new");
-  file.close();
-  EXPECT_TRUE(std::filesystem::is_symlink(path("link.csv")));
-  EXPECT_EQ(text_of("real.csv"), "new");
+TEST_F(OutFileInAFolder, NeverGoesThroughALink) {
+  put("victim", "old");
+  for (const char* planted : {"a.csv.part", "b.csv"}) {
+    std::filesystem::create_symlink(path("victim"), path(planted));
+    std::filesystem::create_hard_link(path("victim"), path("c.csv.part"));
+    for (const char* name : {"a.csv", "c.csv"}) {
+      OutFile file(path(name));
+      file.write("new");
+      file.close();
+      EXPECT_EQ(text_of(name), "new");
+      EXPECT_FALSE(std::filesystem::is_symlink(path(name)));
+    }
+    EXPECT_EQ(text_of("victim"), "old") << planted;
+  }
+  try {
+    const OutFile file(path("b.csv"));
+    FAIL() << "no error";
+  } catch (const std::runtime_error& error) {
+    EXPECT_EQ(error.what(), path("b.csv") + ": cannot be written: it is a link; name the file itself");
+  }
+  // Planted while the file is written: the link gives way to it.
+  OutFile late(path("d.csv"));
+  std::filesystem::create_symlink(path("victim"), path("d.csv"));
+  late.write("new");
+  late.close();
+  EXPECT_FALSE(std::filesystem::is_symlink(path("d.csv")));
+  EXPECT_EQ(text_of("victim"), "old");
 }
 
 TEST_F(OutFileInAFolder, HasAWriterAtATime) {
