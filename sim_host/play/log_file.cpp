@@ -17,8 +17,11 @@ std::FILE* copy_of(std::FILE* from) {
   std::FILE* to = std::tmpfile();
   if (to == nullptr) return nullptr;
   std::vector<char> block(kBlock);
-  for (std::size_t got = kBlock; got == kBlock;) {
+  std::size_t line = 0;  // its length so far: a pipe without line ends is copied until it is refused
+  for (std::size_t got = kBlock; got == kBlock && line <= kLongestLine;) {
     got = std::fread(block.data(), 1, kBlock, from);
+    const std::size_t last = std::string_view(block.data(), got).rfind('\n');
+    line = last == std::string_view::npos ? line + got : got - last - 1;
     if (std::fwrite(block.data(), 1, got, to) == got) continue;
     std::fclose(to);
     return nullptr;
@@ -47,7 +50,6 @@ bool LogFile::read_block() {
   std::memmove(block_.data(), block_.data() + begin_, end_ - begin_);
   end_ -= begin_;
   begin_ = 0;
-  if (end_ == block_.size()) block_.resize(2 * block_.size());  // a line may be of any length
   std::size_t wanted = block_.size() - end_;
   if (report_) wanted = static_cast<std::size_t>(std::min<std::uint64_t>(wanted, length_ - bytes_));
   const std::size_t got = std::fread(block_.data() + end_, 1, wanted, file_.get());
@@ -68,7 +70,8 @@ bool LogFile::next_line(TextLine& line) {
       return true;
     }
     searched = rest.size();
-    if (read_block()) continue;
+    const bool too_long = searched > kLongestLine;  // refused by the parser
+    if (!too_long && read_block()) continue;
     line = {std::string_view(block_.data() + begin_, end_ - begin_), false};
     begin_ = end_;
     return !line.text.empty();

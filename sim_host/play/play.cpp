@@ -125,7 +125,8 @@ void warn_about(const LogReport& log, const char* program) {
   if (log.malformed > 0)
     warn(std::to_string(log.malformed) + " malformed lines skipped, the first: " + log.first_malformed);
   if (log.not_data > 0)
-    warn(log.name + ": " + std::to_string(log.not_data) + " remote, error or CAN FD frames skipped");
+    warn(log.name + ": " + std::to_string(log.not_data) +
+         (log.xl > 0 ? " remote, error, CAN FD or CAN XL" : " remote, error or CAN FD") + " frames skipped");
   if (log.back_in_time > 0)
     warn(log.name + ": " + std::to_string(log.back_in_time) + " frames are earlier than one before them");
   if (log.wrong_length > 0)

@@ -3,13 +3,18 @@
 
 #include <array>
 #include <cstdint>
+#include <initializer_list>
 #include <optional>
+#include <utility>
 
 namespace tetap::sim {
 
 namespace {
 
+constexpr std::size_t kCalendarDigits = 10;  ///< seconds since 1970 have so many; candump -t z and -t d write three
 constexpr std::uint32_t kErrorFlag = 0x20000000;  ///< candump writes error frames as 8-digit ids with this bit
+
+constexpr std::string_view kForm = "expected '(seconds.micros) interface id#data'";
 
 constexpr int digit(char c) { return c >= '0' && c <= '9' ? c - '0' : -1; }
 /// A table: digits of data are as good as random, and a processor guesses branches on them wrong.
@@ -28,6 +33,7 @@ class Cursor {
  public:
   explicit Cursor(std::string_view text) : text_(text) {}
 
+  [[nodiscard]] std::string_view rest() const { return text_; }
   [[nodiscard]] bool empty() const { return text_.empty(); }
   [[nodiscard]] char front() const { return text_.empty() ? '\0' : text_.front(); }
   bool eat(char c) {
@@ -35,6 +41,12 @@ class Cursor {
     text_.remove_prefix(1);
     return true;
   }
+  bool eat_word(std::string_view word) {
+    if (!text_.starts_with(word)) return false;
+    text_.remove_prefix(word.size());
+    return true;
+  }
+  void clear() { text_ = {}; }
   bool eat_blanks() {
     const std::size_t before = text_.size();
     while (!text_.empty() && blank(text_.front())) text_.remove_prefix(1);
@@ -62,8 +74,9 @@ std::optional<base::Micros> parse_time(std::string_view whole, std::string_view 
   return base::Micros{us};
 }
 
-std::string_view parse_id(std::string_view text, LogLine& line) {
+std::string_view parse_id(std::string_view text, bool of_xl, LogLine& line) {
   std::uint32_t id = 0;
+  if (text.size() > 8) return "an id has 3 or 8 hexadecimal digits";
   for (const char c : text) id = id << 4 | static_cast<std::uint32_t>(hex_digit(c));
   if (text.size() == 3) {
     if (id > 0x7FF) return "a 3-digit id is at most 7FF";
@@ -74,7 +87,7 @@ std::string_view parse_id(std::string_view text, LogLine& line) {
     }
     if (id > 0x1FFFFFFF) return "an 8-digit id is at most 1FFFFFFF";
     line.frame.extended = true;
-  } else {
+  } else if (!of_xl || text.size() != 5) {
     return "an id has 3 or 8 hexadecimal digits";
   }
   line.frame.id = id;
@@ -91,32 +104,134 @@ std::string_view parse_bytes(Cursor& in, std::size_t limit, base::BasicCanFrame<
   return {};
 }
 
-bool is_fd_size(std::uint8_t n) {
-  return n <= 8 || n == 12 || n == 16 || n == 20 || n == 24 || n == 32 || n == 48 || n == 64;
+constexpr std::size_t kLongestInterface = 64;  ///< a serial adapter's path and speed (python-can)
+constexpr std::size_t kMostXlBytes = 2048;
+
+/// Behind "id#": a raw length code above 8.
+std::string_view parse_raw_length(Cursor& in, std::uint8_t size) {
+  if (!in.eat('_')) return {};
+  const std::string_view code = in.take([](char c) { return hex_digit(c) >= 0; });
+  if (code.size() == 1 && hex_digit(code[0]) >= 9 && size == 8) return {};
+  return "a raw length code is 9 to F, after 8 bytes";
+}
+
+/// CAN XL behind "id##": "#flags:type:acceptance#data". Its frames are no node's.
+std::string_view parse_xl(Cursor& in, LogLine& line) {
+  line.kind = LogLine::Kind::kXl;
+  bool first = true;
+  for (const std::size_t digits : {2U, 2U, 8U}) {
+    if (!std::exchange(first, false) && !in.eat(':')) return "CAN XL is id###flags:type:field#data";
+    if (in.take([](char c) { return hex_digit(c) >= 0; }).size() != digits)
+      return "CAN XL is id###flags:type:field#data";
+  }
+  if (!in.eat('#')) return "CAN XL is id###flags:type:field#data";
+  const std::size_t digits = in.take([](char c) { return hex_digit(c) >= 0; }).size();
+  return digits % 2 == 0 && digits / 2 <= kMostXlBytes ? "" : "CAN XL has up to 2048 whole bytes";
 }
 
 std::string_view parse_payload(Cursor& in, LogLine& line) {
   if (in.eat('#')) {
+    if (in.eat('#')) return parse_xl(in, line);
     if (hex_digit(in.front()) < 0) return "CAN FD needs a digit of flags after ##";
     line.fd_flags = static_cast<std::uint8_t>(hex_digit(in.take([n = 0](char) mutable { return n++ == 0; })[0]));
     line.kind = LogLine::Kind::kFd;
-    if (const auto reason = parse_bytes(in, 64, line.frame); !reason.empty()) return reason;
-    return is_fd_size(line.frame.size) ? "" : "no CAN FD frame has this many data bytes";
+    return parse_bytes(in, 64, line.frame);
   }
   if (in.eat('R') || in.eat('r')) {
     line.kind = LogLine::Kind::kRemote;
     const std::string_view length = in.take([](char c) { return digit(c) >= 0; });
     if (length.size() > 1 || (length.size() == 1 && length[0] > '8')) return "a remote frame's length is 0 to 8";
     line.frame.size = length.empty() ? std::uint8_t{0} : static_cast<std::uint8_t>(digit(length[0]));
-    return {};
+    return parse_raw_length(in, line.frame.size);
   }
   if (const auto reason = parse_bytes(in, 8, line.frame); !reason.empty()) return reason;
-  if (in.eat('_')) {  // a raw length code above 8
-    const std::string_view code = in.take([](char c) { return hex_digit(c) >= 0; });
-    if (code.size() != 1 || hex_digit(code[0]) < 9 || line.frame.size != 8)
-      return "a raw length code is 9 to F, after 8 bytes";
+  return parse_raw_length(in, line.frame.size);
+}
+
+/// Bytes parted by blanks, `count` of them.
+std::string_view parse_spaced_bytes(Cursor& in, std::size_t count, LogLine& line) {
+  if (count > line.frame.data.size()) return "more than 64 data bytes";
+  line.frame.size = static_cast<std::uint8_t>(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    in.eat_blanks();
+    const std::string_view text = in.take([](char c) { return hex_digit(c) >= 0; });
+    if (text.size() != 2) return "fewer data bytes than the line announces";
+    line.frame.data[i] = static_cast<std::uint8_t>(hex_digit(text[0]) << 4 | hex_digit(text[1]));
   }
   return {};
+}
+
+/// The rest of a line of `candump -t`, behind the id: "[length] bytes", or two digits of length for CAN FD.
+std::string_view parse_listed(Cursor& in, LogLine& line) {
+  if (!in.eat('[')) return "no '#' after the id";
+  const std::string_view length = in.take([](char c) { return digit(c) >= 0; });
+  if (length.empty() || length.size() > 2 || !in.eat(']')) return "the length is [0] to [8], or [00] to [64]";
+  std::size_t count = 0;
+  for (const char c : length) count = count * 10 + static_cast<std::size_t>(digit(c));
+  if (length.size() == 2) line.kind = LogLine::Kind::kFd;
+  in.eat_blanks();
+  if (in.eat_word("remote request")) {
+    line.kind = LogLine::Kind::kRemote;
+  } else {
+    if (length.size() == 1 && count > 8) return "more than 8 data bytes";
+    if (const auto reason = parse_spaced_bytes(in, count, line); !reason.empty()) return reason;
+    in.eat_blanks();
+  }
+  if (in.eat_word("ERRORFRAME")) line.kind = LogLine::Kind::kError;
+  in.eat_blanks();
+  if (in.front() == '\'') in.clear();  // the bytes as text, candump -a
+  return {};
+}
+
+/// Lines of an .asc that are no frame.
+constexpr std::array<std::string_view, 8> kHeadings{
+    "date ", "base hex",           "internal events",    "no internal events",
+    "// ",   "Begin Triggerblock", "Begin TriggerBlock", "End "};
+
+/// "seconds channel id[x] Rx d length bytes", numbers in hexadecimal; CAN FD, errors and events are counted alone.
+std::variant<LogLine, BadLine> parse_asc(std::string_view text) {
+  LogLine line{.clock = LogLine::Clock::kRelative};
+  for (const std::string_view heading : kHeadings)
+    if (text.starts_with(heading)) return line.kind = LogLine::Kind::kHeading, line;
+  if (text.starts_with("base dec")) return BadLine{"an .asc with base dec; it is read with base hex"};
+  Cursor in(text);
+  const auto is_digit = [](char c) { return digit(c) >= 0; };
+  const auto is_word = [](char c) { return !blank(c); };
+  const std::string_view whole = in.take(is_digit);
+  if (whole.empty() || !in.eat('.')) return BadLine{kForm};
+  const auto time = parse_time(whole, in.take(is_digit));
+  if (!time || !in.eat_blanks()) return BadLine{kForm};
+  line.time = *time;
+  line.interface = in.take(is_word);
+  if (line.interface == "CANFD") return line.kind = LogLine::Kind::kFd, line;
+  for (const std::string_view event : {"Start", "SV:", "CAN"})
+    if (line.interface == event) return line.kind = LogLine::Kind::kHeading, line;
+  if (line.interface.empty() || digit(line.interface.front()) < 0) return BadLine{kForm};
+  in.eat_blanks();
+  std::string_view id = in.take(is_word);
+  if (id == "ErrorFrame") return line.kind = LogLine::Kind::kError, line;
+  if (id == "Statistic:") return line.kind = LogLine::Kind::kHeading, line;
+  line.frame.extended = id.ends_with('x');
+  if (line.frame.extended) id.remove_suffix(1);
+  if (id.empty() || id.size() > 8) return BadLine{"an id has 1 to 8 hexadecimal digits"};
+  for (const char c : id) {
+    if (hex_digit(c) < 0) return BadLine{"an id has 1 to 8 hexadecimal digits"};
+    line.frame.id = line.frame.id << 4 | static_cast<std::uint32_t>(hex_digit(c));
+  }
+  if (line.frame.id > (line.frame.extended ? 0x1FFFFFFFU : 0x7FFU))
+    return BadLine{"no such id: extended ones end with x"};
+  in.eat_blanks();
+  const std::string_view direction = in.take(is_word);
+  if (direction != "Rx" && direction != "Tx" && direction != "TxRq") return BadLine{"Rx or Tx is missing after the id"};
+  in.eat_blanks();
+  if (in.eat('r')) return line.kind = LogLine::Kind::kRemote, line;
+  if (!in.eat('d') || !in.eat_blanks()) return BadLine{"d or r is missing after the direction"};
+  const std::string_view length = in.take([](char c) { return hex_digit(c) >= 0; });
+  if (length.size() != 1) return BadLine{"the length is 0 to F"};
+  const auto code = static_cast<std::size_t>(hex_digit(length[0]));
+  if (const auto reason = parse_spaced_bytes(in, code < 8 ? code : 8, line); !reason.empty()) return BadLine{reason};
+  if (in.eat_blanks() || in.empty()) return line;  // Length = ..., BitCount = ... may follow
+  return BadLine{"unexpected text after the data"};
 }
 
 }  // namespace
@@ -126,8 +241,9 @@ std::variant<LogLine, BadLine> parse_log_line(std::string_view text) {
   Cursor in(text);
   LogLine line;
   const auto is_digit = [](char c) { return digit(c) >= 0; };
+  const auto is_hex = [](char c) { return hex_digit(c) >= 0; };
   in.eat_blanks();
-  if (!in.eat('(')) return BadLine{"expected '(seconds.micros) interface id#data'"};
+  if (!in.eat('(')) return parse_asc(in.rest());
   const std::string_view whole = in.take(is_digit);
   if (!in.eat('.')) return BadLine{"the time is not (seconds.micros)"};
   const std::string_view part = in.take(is_digit);
@@ -137,12 +253,20 @@ std::variant<LogLine, BadLine> parse_log_line(std::string_view text) {
   line.time = *time;
   if (!in.eat_blanks()) return BadLine{"no space after the time"};
   line.interface = in.take([](char c) { return !blank(c) && c != '#'; });
-  if (line.interface.empty() || line.interface.size() > 15) return BadLine{"no name of an interface after the time"};
+  if (line.interface.empty() || line.interface.size() > kLongestInterface)
+    return BadLine{"no name of an interface after the time"};
   if (!in.eat_blanks()) return BadLine{"no space after the interface"};
-  if (const auto reason = parse_id(in.take([](char c) { return hex_digit(c) >= 0; }), line); !reason.empty())
+  if (in.eat_word("RX ") || in.eat_word("TX ")) {  // candump -x: direction, then two flags
+    for (int flag = 0; flag < 2; ++flag) in.eat_blanks(), in.take([](char c) { return !blank(c); });
+    in.eat_blanks();
+  }
+  const std::string_view id = in.take(is_hex);
+  if (const auto reason = parse_id(id, in.rest().starts_with("###"), line); !reason.empty()) return BadLine{reason};
+  const bool listed = in.eat_blanks();
+  if (listed) line.clock = whole.size() < kCalendarDigits ? LogLine::Clock::kRelative : LogLine::Clock::kCalendar;
+  if (!listed && !in.eat('#')) return BadLine{"no '#' after the id"};
+  if (const auto reason = listed ? parse_listed(in, line) : parse_payload(in, line); !reason.empty())
     return BadLine{reason};
-  if (!in.eat('#')) return BadLine{"no '#' after the id"};
-  if (const auto reason = parse_payload(in, line); !reason.empty()) return BadLine{reason};
   if (in.eat_blanks() && !in.empty()) {
     if (!in.eat('R') && !in.eat('T')) return BadLine{"unexpected text after the data"};
     in.eat_blanks();

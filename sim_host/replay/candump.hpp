@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Lines of `candump -L`: "(seconds.micros) interface id#data", standard and extended ids, remote frames "#R", CAN FD
-// "##<flags>data", optional direction " R" or " T". Format as in can-utils lib.c (parse_canframe, sprint_canframe).
+// "##<flags>data", CAN XL "###", optional direction " R" or " T". Format as in can-utils lib.c (parse_canframe,
+// sprint_canframe). Also lines of `candump -t` ("interface id [length] bytes") and of Vector's .asc.
 #pragma once
 
 #include "sim_host/replay/line.hpp"
@@ -14,11 +15,21 @@
 namespace tetap::sim {
 
 struct LogLine {
-  enum class Kind : std::uint8_t { kData, kRemote, kError, kFd };
+  enum class Kind : std::uint8_t {
+    kData,
+    kRemote,
+    kError,
+    kFd,
+    kXl,
+    kHeading
+  };  ///< kHeading: no frame, but of an .asc
+  /// Begin of `time`: that of a calendar, or of the log. In the second case it may be a difference (candump -t d).
+  enum class Clock : std::uint8_t { kCalendar, kRelative };
 
   base::Micros time;
   std::string_view interface;  ///< points into the text that was parsed
   Kind kind = Kind::kData;
+  Clock clock = Clock::kCalendar;
   base::BasicCanFrame<64> frame;  ///< data frames have at most 8 bytes
   std::uint8_t fd_flags = 0;
 

@@ -21,6 +21,15 @@ std::string excerpt(std::string_view text) {
 
 }  // namespace
 
+/// candump -t z and an .asc count from the log's start, candump -t d from the frame before. A time of less than half of
+/// that before it shows differences: those before it were so small that their sum is near enough.
+base::Micros LogParser::since_start(base::Micros relative) {
+  differences_ = differences_ || relative.us < relative_.us / 2;
+  relative_ = relative;
+  sum_ += relative;
+  return differences_ ? sum_ : relative;
+}
+
 Result<std::optional<TimedFrame>> LogParser::add(std::string_view text, bool ended) {
   constexpr base::Micros kLongGap{60'000'000};
   ++number_;
@@ -30,6 +39,9 @@ Result<std::optional<TimedFrame>> LogParser::add(std::string_view text, bool end
     report_.cut_off = place() + ": the last line is cut off and left out: '" + excerpt(text) + "'";
     return kNone;
   };
+  if (text.size() > kLongestLine)
+    return Failure{place() + ": a line above " + std::to_string(kLongestLine) + " bytes: '" + excerpt(text) + "'",
+                   number_};
   const auto parsed = parse_log_line(text);
   const auto* line = std::get_if<LogLine>(&parsed);
   if (line == nullptr) {
@@ -41,18 +53,21 @@ Result<std::optional<TimedFrame>> LogParser::add(std::string_view text, bool end
     if (report_.malformed++ == 0) report_.first_malformed = message;
     return kNone;
   }
+  if (line->kind == LogLine::Kind::kHeading) return kNone;
+  const base::Micros time = line->clock == LogLine::Clock::kRelative ? since_start(line->time) : line->time;
   if (!options_.interface.empty() && line->interface != options_.interface) return ++report_.other_interface, kNone;
+  if (line->kind == LogLine::Kind::kXl) ++report_.xl;
   if (line->kind != LogLine::Kind::kData) return ++report_.not_data, kNone;
   const base::CanFrame frame = line->classic();
   // Every message of a node's block has eight bytes.
   if (!ended && frame.size != 8 && !frame.extended && frame.id / 0x40 == options_.base / 0x40) return cut_off();
-  if (line->time < latest_) ++report_.back_in_time;
-  if (report_.data++ > 0 && kLongGap < line->time - latest_ && report_.gaps++ == 0) report_.first_gap = place();
-  latest_ = std::max(latest_, line->time);
+  if (time < latest_) ++report_.back_in_time;
+  if (report_.data++ > 0 && kLongGap < time - latest_ && report_.gaps++ == 0) report_.first_gap = place();
+  latest_ = std::max(latest_, time);
   constexpr std::uint32_t kInputs = 0x20;
   const bool input = !frame.extended && frame.id >= options_.base && frame.id < options_.base + kInputs;
   if (input && frame.size != 8 && report_.wrong_length++ == 0) report_.first_wrong_length = place();
-  return std::optional(TimedFrame{line->time, frame});
+  return std::optional(TimedFrame{time, frame});
 }
 
 bool LogText::next(TimedFrame& frame) {

@@ -32,7 +32,8 @@ struct LogReport {
   std::uint64_t data = 0;       ///< classic data frames
   std::uint64_t malformed = 0;  ///< lines, only with keep_going
   std::string first_malformed;  ///< "file:line: reason: 'text'"
-  std::uint64_t not_data = 0;   ///< remote, error and CAN FD frames
+  std::uint64_t not_data = 0;   ///< remote, error, CAN FD and CAN XL frames
+  std::uint64_t xl = 0;         ///< CAN XL frames among these
   std::uint64_t other_interface = 0;
   std::uint64_t back_in_time = 0;  ///< frames earlier than the one before
   std::uint64_t wrong_length = 0;  ///< input frames that have not eight bytes: the node will count them as malformed
@@ -77,22 +78,30 @@ class FramesInMemory : public Frames {
   std::size_t next_ = 0;
 };
 
+/// The longest line of a log [bytes]: 4096 digits of CAN XL's data, and what stands before them. A longer one is no
+/// log, whatever follows.
+inline constexpr std::size_t kLongestLine = 4096 + 256;
+
 /// Makes frames of lines and counts what is none.
 class LogParser {
  public:
   LogParser(const std::string& name, const LogOptions& options) : options_(options) { report_.name = name; }
 
   /// The line's frame; nothing for a blank line and for what is counted instead. A malformed line is a failure,
-  /// "name:line: reason: 'text'", unless set to keep going. `ended`: a newline follows. A last line without one is a
-  /// frame where it is whole, else it is reported as cut off.
+  /// "name:line: reason: 'text'", unless set to keep going; a line that is too long always is one. `ended`: a newline
+  /// follows. A last line without one is a frame where it is whole, else it is reported as cut off.
   Result<std::optional<TimedFrame>> add(std::string_view line, bool ended = true);
   [[nodiscard]] const LogReport& report() const { return report_; }
 
  private:
+  [[nodiscard]] base::Micros since_start(base::Micros relative);
+
   LogOptions options_;
   LogReport report_;
   base::Micros latest_;
-  std::uint64_t number_ = 0;  ///< number of the line
+  base::Micros relative_, sum_;  ///< last time of a relative clock, and the sum of all
+  bool differences_ = false;     ///< they are differences
+  std::uint64_t number_ = 0;     ///< number of the line
 };
 
 /// The text of a log in memory, read line by line.

@@ -482,6 +482,24 @@ class Decode(Folder):
         self.assertEqual(self.said(extra).stdout, self.WORDS)
         self.assertIn("32F ? CAN FD, 8 bytes", self.said(plain.replace("[8]", "[08]")).stdout)
 
+    def test_reads_what_other_programs_write(self):
+        channel = self.MOTION.replace("vcan0", "/dev/ttyACM0@115200")
+        self.assertEqual(self.said(channel).stdout, self.WORDS.replace("vcan0", "/dev/ttyACM0@115200"))
+        asc = ("date Sat Nov 28 10:00:00.000 2026\r\nbase hex  timestamps absolute\r\n// version 13.0.0\r\nBegin Triggerblock\r\n   0.000000 Start of measurement\r\n"
+               "   0.010000 1  32F             Rx   d 8 10 27 18 FC 00 80 55 00  Length = 244000 BitCount = 126 ID = 815\r\n"
+               "   0.020000 1  18FEF100x       Tx   d 2 01 02\r\n   0.030000 1  ErrorFrame\r\n   0.040000 2  302             Rx   r 8\r\nEnd TriggerBlock\r\n")
+        self.assertEqual(self.said(asc).stdout, self.WORDS.replace("(1700000000.010000) vcan0", "(0.010000) 1")
+                         + "(0.020000) 1 18FEF100 ? 01 02\n(0.040000) 2 302 ? remote request\n")
+        for line, words in (("123#1122334455667788_F", "123 ? 11 22 33 44 55 66 77 88"), ("123#R8_9", "123 ? remote request"),
+                            ("123##1112233445566778899", "123 ? CAN FD, 9 bytes"), ("00123###81:00:12345678#112233445566", "00123 ? CAN XL, 6 bytes")):
+            self.assertEqual(self.said("(0.0) can0 " + line + "\n").stdout, "(0.0) can0 " + words + "\n")
+
+    def test_refuses_a_line_that_is_too_long_when_it_is_seen(self):
+        result = self.said(self.MOTION + "(0.0) can0 00123###81:00:12345678#" + "0" * 4096 + "\n" + "0" * 5000 + "\n" + self.MOTION, code=1)
+        self.assertEqual(result.stdout, self.WORDS + "(0.0) can0 00123 ? CAN XL, 2048 bytes\n")
+        self.assertTrue(result.stderr.startswith("tools/can/decode_log: stdin:3: a line above 4352 bytes: "), result.stderr)
+        self.assertEqual(self.said("", "/dev/zero", code=1).stdout, "")
+
     def test_names_enums_pages_and_bits(self):
         self.assertIn("In_Sync Time=1 us Ctr=2 Kind=Step", self.said("(0.0) can0 300#0100000000000201\n").stdout)
         self.assertIn("Est_Origin[Lon] Source=FirstFix Lon=0.000000002 deg", self.said("(0.0) can0 327#1900000000000000\n").stdout)
@@ -532,9 +550,10 @@ class Decode(Folder):
         length = 40_000
         for line in ("(" + "1" * length, "(1." + "1" * length, "(1" + " " * length, "can0 123 [8]" + " 00" * length + " x",
                      "can0 123 [8]" + " " * length + "x", "can0 123 [8] 00 '" + "'  " * length + "x", "(1.0) can0 123#" + "0" * length + "x",
-                     "(1.0) can0 123#00" + " " * length + "x", " " * length + "x", "(1.0) " + "a" * length, "can0 123 [" + "1" * length):
+                     "(1.0) can0 123#00" + " " * length + "x", " " * length + "x", "(1.0) " + "a" * length, "can0 123 [" + "1" * length, "1" * length, "1." + "1" * length + "x", "1.0 1 123 Rx d 8" + " 00" * length + "\nx",
+                     "(1.0) can0 00123###81:00:12345678#" + "0" * length + "x"):
             began = time.process_time()
-            for pattern in (decoder.LOG, decoder.PLAIN):
+            for pattern in (decoder.LOG, decoder.PLAIN, decoder.XL, decoder.ASC, decoder.ASC_OTHER):
                 self.assertIsNone(pattern.match(line.encode()), line[:20])
             self.assertLess(time.process_time() - began, 5, line[:20])
 

@@ -14,8 +14,13 @@ import sys
 from tetap.can import bus_database
 from tetap.can.bus_writer import DEFAULT_DBC
 
-# candump -L: (time) interface ID#DATA, ID#R[length] (remote), ID##FDATA (CAN FD), then R or T for the direction
-LOG = re.compile(rb"\s*\((\d+\.\d+)\)\s+(\S+)\s+([0-9A-Fa-f]{3}|[0-9A-Fa-f]{8})#(#[0-9A-Fa-f]|)([0-9A-Fa-f]*|R[0-9A-Fa-f]?)(?:\s+[RTB])?\s*$")
+# candump -L: (time) interface ID#DATA, with _ and a raw length above 8, ID#R[length] (remote), ID##FDATA (CAN FD), then R or T for the direction
+LOG = re.compile(rb"\s*\((\d+\.\d+)\)\s+(\S+)\s+([0-9A-Fa-f]{3}|[0-9A-Fa-f]{8})#(#[0-9A-Fa-f]|)([0-9A-Fa-f]*|R[0-8]?)(?:_[9A-Fa-f])?(?:\s+[RTB])?\s*$")
+# CAN XL: VCID and priority, then ###flags:type:acceptance#DATA
+XL = re.compile(rb"\s*\((\d+\.\d+)\)\s+(\S+)\s+([0-9A-Fa-f]{5})###[0-9A-Fa-f]{2}:[0-9A-Fa-f]{2}:[0-9A-Fa-f]{8}#((?:[0-9A-Fa-f]{2})*)(?:\s+[RTB])?\s*$")
+# Vector's .asc with base hex: seconds channel ID[x] Rx d length bytes; its headings, and events that are no frame
+ASC = re.compile(rb"\s*(\d+\.\d+)\s+(\d+)\s+([0-9A-Fa-f]{1,8})(x?)\s+(?:Rx|Tx|TxRq)\s+(?:r|d\s+([0-9A-Fa-f])((?:\s+[0-9A-Fa-f]{2}){0,8}))(?:\s.*)?$")
+ASC_OTHER = re.compile(rb"\s*(?:(?:date |base hex|(?:no )?internal events|// |Begin Trigger|End ).*|\d+\.\d+\s+(?:(?:Start|SV:|CAN|CANFD)\s.*|\d+\s+(?:ErrorFrame|Statistic:).*))$", re.IGNORECASE)
 # candump: [(time)] interface [RX - -] ID [length] bytes, then the bytes as text; the length of a CAN FD frame has two digits (can-utils, lib.c)
 PLAIN = re.compile(rb"\s*(?:\((\d[\d.:\- ]*)\)\s+)?(\S+)\s+(?:(?:RX|TX)\s+\S\s+\S\s+)?([0-9A-Fa-f]{3}|[0-9A-Fa-f]{8})\s+\[(\d+)\]"
                    rb"((?:\s+[0-9A-Fa-f]{2})*)(?:\s+(remote request|ERRORFRAME))?(?:\s+'.*')?\s*$")
@@ -131,8 +136,31 @@ class Decoder:
         return " ".join(text)
 
 
+def parse_asc(line):
+    """As parse(); None of a line that is no frame."""
+    found = ASC.match(line)
+    if not found:
+        return None
+    time, interface, frame_id, extended, length, payload = found.groups()
+    frame_id = frame_id.rjust(8 if extended else 3, b"0")
+    if length is None:
+        return time, interface, frame_id, None, "remote request"
+    data = bytes.fromhex(payload.decode())[:8]
+    if len(data) != min(int(length, 16), 8):
+        raise Malformed("%d bytes announced, %d there" % (min(int(length, 16), 8), len(data)))
+    return time, interface, frame_id, data, None
+
+
 def parse(line):
-    """(time, interface, id text, data or None, what it is when it is no data frame)"""
+    """(time, interface, id text, data or None, what it is when it is no data frame); None of an .asc's line that is no frame"""
+    if ASC_OTHER.match(line):
+        return None
+    found = parse_asc(line)
+    if found:
+        return found
+    found = XL.match(line)
+    if found:
+        return *found.groups()[:3], None, "CAN XL, %d bytes" % (len(found.group(4)) // 2)
     found = LOG.match(line)
     if found:
         time, interface, frame_id, fd, payload = found.groups()
@@ -165,14 +193,24 @@ def shown(line):
     return repr(text[:60] + ("..." if len(text) > 60 else ""))
 
 
-def decode(lines, name, decoder, out):
+LONGEST_LINE = 4096 + 256  # digits of the longest CAN XL frame, and what stands before them: nothing longer is a log
+
+
+def decode(source, name, decoder, out):
     """Number of lines and frames that were wrong."""
     wrong = 0
-    for number, line in enumerate(lines, 1):
+    for number, line in enumerate(iter(lambda: source.readline(LONGEST_LINE + 1), b""), 1):
+        if len(line) > LONGEST_LINE:
+            out.flush()
+            print("tools/can/decode_log: %s:%d: a line above %d bytes: %s" % (name, number, LONGEST_LINE, shown(line)), file=sys.stderr, flush=True)
+            return wrong + 1
         if not line.strip():
             continue
         try:
-            time, interface, id_text, data, other = parse(line)
+            found = parse(line)
+            if found is None:
+                continue
+            time, interface, id_text, data, other = found
             words = None
             if data is not None and len(id_text) == 3:
                 words = decoder.words(int(id_text, 16), data)
