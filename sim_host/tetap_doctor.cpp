@@ -2,12 +2,14 @@
 // tetap-doctor: names the likeliest mistake in a log: wiring, axes, units, clocks, signs, origin.
 #include "sim_host/doctor/diagnosis.hpp"
 #include "sim_host/parameter_settings.hpp"
+#include "sim_host/play/log_file.hpp"
 #include "sim_host/play/session.hpp"
 #include "sim_host/published_sensors.hpp"
 #include "sim_host/robots.hpp"
 
 #include <cstdio>
 #include <exception>
+#include <stdexcept>
 #include <string>
 
 namespace {
@@ -98,8 +100,12 @@ int run(sim::Arguments& arguments) {
   arguments.finish();
   if (!log) throw sim::UsageError("no LOG given (--help says more)");
   if (robot.empty() && !settings.words().empty()) throw sim::UsageError("--params and --set need --robot");
-  const doctor::Diagnosis diagnosis = doctor::diagnose(*log, reading, robot_facts(robot, settings));
-  if (!diagnosis.cut_off.empty()) std::fprintf(stderr, "tetap-doctor: warning: %s\n", diagnosis.cut_off.c_str());
+  sim::LogFile file(*log, reading);
+  const auto found = doctor::diagnose(file, *log, reading.base, robot_facts(robot, settings));
+  if (!found) throw std::runtime_error(found.failure().text);
+  const doctor::Diagnosis& diagnosis = *found;
+  const std::string& cut_off = file.report().cut_off;
+  if (!cut_off.empty()) std::fprintf(stderr, "tetap-doctor: warning: %s\n", cut_off.c_str());
   if (!json.empty()) write_json(json, *log, robot, diagnosis);
   if (brief)
     print_brief(diagnosis);

@@ -16,13 +16,11 @@
 #include "sim_host/doctor/turn.hpp"
 #include "sim_host/doctor/turn_scale.hpp"
 #include "sim_host/doctor/wheel_speed.hpp"
-#include "sim_host/play/log_file.hpp"
 #include "sim_host/replay/protocol.hpp"
 #include "tetap/bus/decoder.hpp"
 
 #include <algorithm>
 #include <array>
-#include <stdexcept>
 #include <tuple>
 #include <utility>
 
@@ -158,30 +156,31 @@ Findings ranked(Findings findings) {
   return kept;
 }
 
-Diagnosis diagnose(const std::string& path, const sim::LogOptions& reading, const RobotFacts& robot) {
-  sim::LogFile log(path, reading);
+sim::Result<Diagnosis> diagnose(sim::Frames& log, const std::string& name, std::uint32_t base,
+                                const RobotFacts& robot) {
   Survey survey;
-  for (sim::TimedFrame entry; log.next(entry);) survey.add(entry.frame, reading.base);
-  if (log.report().data == 0) throw std::runtime_error(path + ": no CAN data frame in it");
-  if (survey.inputs == 0) throw std::runtime_error(path + ": no input frames of this id base");
+  bool any = false;
+  for (sim::TimedFrame entry; log.next(entry); any = true) survey.add(entry.frame, base);
+  if (log.failure()) return *log.failure();
+  if (!any) return sim::Failure{name + ": no CAN data frame in it"};
+  if (survey.inputs == 0) return sim::Failure{name + ": no input frames of this id base"};
   log.rewind();
-  BusTime clock(survey.clock(), reading.base, survey.steps > 0);
+  BusTime clock(survey.clock(), base, survey.steps > 0);
   Examination examination(robot, survey.clock());
   Diagnosis found{.findings = {}, .inputs = survey.inputs};
   base::Micros last;
   bool begun = false;
   for (sim::TimedFrame entry; log.next(entry);) {
     clock.add(entry.time, entry.frame);
-    if (!clock.known() || !sim::is_counted_input(entry.frame, reading.base)) continue;
+    if (!clock.known() || !sim::is_counted_input(entry.frame, base)) continue;
     const base::Micros now = clock.now();
     if (begun && now > last && (now - last).us < kMostPause_us)
       found.duration_s += static_cast<double>((now - last).us) * 1e-6;
     begun = true;
     last = now;
-    examination.frame({.time = now, .offset = entry.frame.id - reading.base, .frame = entry.frame});
+    examination.frame({.time = now, .offset = entry.frame.id - base, .frame = entry.frame});
   }
   found.findings = ranked(examination.finish());
-  found.cut_off = log.report().cut_off;
   return found;
 }
 
