@@ -15,7 +15,7 @@ std::optional<bus::InSync> sync_of(const base::CanFrame& frame, std::uint32_t ba
   if (offset_in_block(frame, base) != bus::InSync::kOffset) return std::nullopt;
   return bus::decode<bus::InSync>(bus::payload(frame));
 }
-bool is_tick(const std::optional<bus::InSync>& sync) {
+bool tick_in(const std::optional<bus::InSync>& sync) {
   return sync && (sync->kind == bus::SyncKind::kTick || sync->kind == bus::SyncKind::kStep);
 }
 
@@ -35,7 +35,7 @@ std::vector<TimedFrame> inputs_of(Frames& log, const ScriptOptions& options) {
   return inputs;
 }
 
-bool is_tick(const base::CanFrame& frame, std::uint32_t log_base) { return is_tick(sync_of(frame, log_base)); }
+bool is_tick(const base::CanFrame& frame, std::uint32_t log_base) { return tick_in(sync_of(frame, log_base)); }
 
 std::optional<base::Micros> TickGrid::due_before(base::Micros time) {
   if (!next_) next_ = std::max(at_or_after(time), period_);
@@ -65,7 +65,7 @@ std::optional<base::Micros> LogTicks::own_tick() {
     if (is_counted_input(entry.frame, options_.log_base, options_.graph)) add_input(entry.frame);
     const auto sync = sync_of(entry.frame, options_.log_base);
     if (sync && sync->kind == bus::SyncKind::kBegin) own_last_ = base::Micros{static_cast<std::int64_t>(sync->time_us)};
-    if (!is_tick(sync)) continue;
+    if (!tick_in(sync)) continue;
     own_last_ = own_last_ ? extend_bus_time(sync->time_us, *own_last_) : first_bus_time(sync->time_us, entry.time);
     return own_last_;
   }
