@@ -57,6 +57,17 @@ class CountTest(ImageTest):
                 self.assertEqual(found["outer"], 36)
                 self.assertNotIn("outer_mean", found)
 
+    def test_an_operation_more_for_each_multiply_accumulate(self):
+        accumulated = PROGRAM.replace("loop3(n);", 'loop3(n);\n    asm volatile("vmla.f32 s0, s0, s0\\n vmls.f32 s0, s0, s0\\n vmul.f32 s0, s0, s0" ::: "s0");')
+        self.assertNotEqual(accumulated, PROGRAM)
+        status, text = self.count("--update", f"m7={self.image(accumulated)}")
+        self.assertEqual(status, 0, text)
+        found = self.json("count.json")["m7"]
+        self.assertEqual(found["loop"], 3003 + 3)
+        self.assertEqual(found["loop_operations"], 3003 + 3 + 2)
+        self.assertEqual(found["inner_operations"], found["inner"])
+        self.assertEqual(found["outer_operations"], found["outer"])
+
     def test_two_runs_give_the_same_numbers(self):
         elf = self.image(PROGRAM)
         self.assertEqual(self.count("--update", f"m7={elf}")[0], 0)

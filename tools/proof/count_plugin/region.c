@@ -1,16 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 // QEMU TCG plugin: counts the instructions that a guest executes inside named regions (test/count/markers.hpp), one
-// line per execution, and on request finds the deepest address of the stack that is written. tools/proof/count_instructions builds it,
-// writes its orders and reads its answers.
+// line per execution, and on request finds the deepest address of the stack that is written.
+// tools/proof/count_instructions builds it, writes its orders and reads its answers.
 //
 // -plugin region.so,orders=FILE,answers=FILE       orders, one a line, addresses in hexadecimal:
 //   code FIRST END         only instructions in such a range are counted, so other cores of the machine do not disturb
 //   region NAME BEGIN END  addresses of the two markers
+//   pair ADDRESS           an instruction of two operations; all that are not named have one; in rising order
 //   finish ADDRESS         executing this ends QEMU with status 0
 //   stack BOTTOM TOP START watch stores to this range (slow) from the execution of START on, when the stack has been
 //   painted
-// answers: `region NAME INSTRUCTIONS PAIRS` (PAIRS: other regions that began and ended inside), `stack LOWEST`, `error
-// TEXT`, `finished`.
+// answers: `region NAME INSTRUCTIONS PAIRS OPERATIONS` (PAIRS: other regions that began and ended inside), `stack
+// LOWEST`, `error TEXT`, `finished`.
 //
 // Debian 12 ships no qemu-plugin.h; these are the prototypes needed, as in QEMU 7.2 "QEMU TCG Plugins", API version 1.
 #include <inttypes.h>
@@ -46,12 +47,12 @@ uint64_t qemu_plugin_insn_vaddr(const struct qemu_plugin_insn*);
 
 __attribute__((visibility("default"))) int qemu_plugin_version = 1;
 
-enum { kRegions = 256, kRanges = 8, kNameLength = 63 };
+enum { kRegions = 256, kRanges = 8, kNameLength = 63, kPairs = 1 << 16 };
 
 struct Region {
   char name[kNameLength + 1];
   uint64_t begin, end;
-  uint64_t count_at_begin, pairs_at_begin;
+  uint64_t count_at_begin, pairs_at_begin, operations_at_begin;
   bool active;
 };
 struct Range {
@@ -62,7 +63,9 @@ static struct Region regions[kRegions];
 static struct Range code[kRanges], stack;
 static size_t region_count, code_count;
 static uint64_t finish = UINT64_MAX, stack_start = UINT64_MAX, lowest = UINT64_MAX;
-static uint64_t instructions, pairs;
+static uint64_t instructions, pairs, operations;
+static uint64_t two_operations[kPairs];  // addresses, rising
+static size_t two_operations_count;
 static FILE* answers;
 
 static void close_answers(bool finished) {
@@ -80,6 +83,7 @@ static void on_begin(unsigned cpu, void* data) {
   region->active = true;
   region->pairs_at_begin = pairs;
   region->count_at_begin = instructions;
+  region->operations_at_begin = operations;
 }
 
 static void on_end(unsigned cpu, void* data) {
@@ -91,8 +95,9 @@ static void on_end(unsigned cpu, void* data) {
     return;
   }
   region->active = false;
-  fprintf(answers, "region %s %" PRIu64 " %" PRIu64 "\n", region->name, instructions - region->count_at_begin,
-          pairs - region->pairs_at_begin);
+  fprintf(answers, "region %s %" PRIu64 " %" PRIu64 " %" PRIu64 "\n", region->name,
+          instructions - region->count_at_begin, pairs - region->pairs_at_begin,
+          operations - region->operations_at_begin);
   ++pairs;
 }
 
@@ -126,6 +131,15 @@ static bool is_counted(uint64_t address) {
   return false;
 }
 
+static int compare(const void* a, const void* b) {
+  const uint64_t left = *(const uint64_t*)a, right = *(const uint64_t*)b;
+  return left < right ? -1 : left > right;
+}
+
+static bool has_two_operations(uint64_t address) {
+  return bsearch(&address, two_operations, two_operations_count, sizeof address, compare) != NULL;
+}
+
 static void translate(qemu_plugin_id_t id, struct qemu_plugin_tb* block) {
   (void)id;
   for (size_t i = 0; i < qemu_plugin_tb_n_insns(block); ++i) {
@@ -144,6 +158,8 @@ static void translate(qemu_plugin_id_t id, struct qemu_plugin_tb* block) {
     if (stack.end != 0)
       qemu_plugin_register_vcpu_mem_cb(instruction, on_store, QEMU_PLUGIN_CB_NO_REGS, QEMU_PLUGIN_MEM_W, NULL);
     qemu_plugin_register_vcpu_insn_exec_inline(instruction, QEMU_PLUGIN_INLINE_ADD_U64, &instructions, 1);
+    qemu_plugin_register_vcpu_insn_exec_inline(instruction, QEMU_PLUGIN_INLINE_ADD_U64, &operations,
+                                               has_two_operations(address) ? 2 : 1);
   }
 }
 
@@ -164,6 +180,12 @@ static bool read_order(const char* line) {
   if (sscanf(line, "code %" SCNx64 " %" SCNx64, &range.first, &range.end) == 2) {
     if (code_count == kRanges) return false;
     code[code_count++] = range;
+    return true;
+  }
+  uint64_t pair;
+  if (sscanf(line, "pair %" SCNx64, &pair) == 1) {
+    if (two_operations_count == kPairs) return false;
+    two_operations[two_operations_count++] = pair;
     return true;
   }
   if (sscanf(line, "stack %" SCNx64 " %" SCNx64 " %" SCNx64, &stack.first, &stack.end, &stack_start) == 3) return true;

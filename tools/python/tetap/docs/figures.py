@@ -36,7 +36,8 @@ def of_hashes(hashes):
 def of_count(count):
     """core -> workload -> worst, and NAME_mean."""
     cores = [core for core, one in count.items() if isinstance(one, dict)]
-    names = sorted({name for core in cores for name, value in count[core].items() if isinstance(value, (int, float))})
+    names = sorted({name for core in cores for name, value in count[core].items()
+                    if isinstance(value, (int, float)) and not name.endswith("_operations")})
     return table(["workload", *cores], [[name, *[spaced(count[core].get(name, "-")) for core in cores]] for name in names])
 
 
