@@ -85,12 +85,12 @@ TEST(Timeline, IsAListThatNeverMovesWhatStays) {
     node::Timeline<16> fresh;
     for (auto m = model.rbegin(); m != model.rend(); ++m) static_cast<void>(fresh.insert(m->first));
     ASSERT_EQ(timeline.digest(), fresh.digest()) << "of the content alone, however it came about";
-    std::size_t seen = 0;
-    timeline.window(timeline.size()).each([&](const sensor::Sample& one) {
-      ASSERT_LT(seen, model.size());
-      ASSERT_TRUE(one.order(model[seen++].first) == 0);
-    });
-    ASSERT_EQ(seen, model.size());
+    const sensor::Window window = timeline.window(timeline.size());
+    ASSERT_EQ(window.size(), model.size());
+    for (std::size_t k = 0; k < model.size(); ++k) ASSERT_TRUE(window[k].order(model[k].first) == 0);
+    const base::Micros t{100 * i + below(900)};
+    ASSERT_EQ(window.until(t), static_cast<std::size_t>(std::count_if(
+                                   model.begin(), model.end(), [&](const auto& m) { return m.first.stamp <= t; })));
   }
 }
 

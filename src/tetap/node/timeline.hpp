@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Samples in the order in which they were true: those waiting for their tick, and the recent past. The past is kept so
-// that a late sample can still be fused at its own time. A ring: what leaves at the front moves nothing.
+// that a late sample can still be fused at its own time. The order is a ring of numbers: what leaves at the front moves
+// nothing, and what comes between moves no sample.
 #pragma once
 
 #include "tetap/base/state_hash.hpp"
@@ -23,28 +24,31 @@ class Timeline {
   /// Keeps the order; a sample equal in stamp, kind, instance, sequence and detail is a duplicate.
   /// It may move as many samples as `moves`; then this is how many it moved.
   [[nodiscard]] constexpr Insert insert(const sensor::Sample& sample, std::size_t& moves) {
-    std::size_t at = size_;
-    for (; at > 0 && (*this)[at - 1].order(sample) > 0; --at)
-      if (size_ - at == moves) return Insert::kTooMuch;
+    const std::size_t at = place_for(sample);
+    if (size_ - at > moves) return Insert::kTooMuch;
     moves = size_ - at;
     if (at > 0 && (*this)[at - 1].order(sample) == 0) {
       // Two that claim to be one sample and differ: the one whose frames have the smaller sum, whichever came first.
       if (!consumed(at - 1) && sample.bits < (*this)[at - 1].bits) {
         digest_ += digest_of(sample) - digest_of((*this)[at - 1]);
-        samples_[place(at - 1)] = sample;
+        samples_[number(at - 1)] = sample;
       }
       return Insert::kDuplicate;
     }
     if (size_ == Capacity) return Insert::kFull;
-    std::size_t to = place(size_);
-    for (std::size_t i = size_; i > at; --i) {
-      const std::size_t from = to > 0 ? to - 1 : Capacity - 1;
-      samples_[to] = samples_[from];
-      consumed_[to] = consumed_[from];
-      to = from;
+    const std::size_t to = place(at);
+    const std::size_t end = place(size_);
+    const std::uint16_t free = order_[end];
+    if (to <= end) {
+      shift(to, end);
+    } else {  // around the end of the ring
+      shift(0, end);
+      order_[0] = order_[Capacity - 1];
+      shift(to, Capacity - 1);
     }
-    samples_[to] = sample;
-    consumed_[to] = 0;
+    order_[to] = free;
+    samples_[free] = sample;
+    consumed_[free] = 0;
     digest_ += digest_of(sample);
     ++size_;
     ++new_;
@@ -74,7 +78,10 @@ class Timeline {
     known_ = new_ == 0 ? size_ : known_ > count ? known_ - count : 0;
   }
   constexpr void clear() { size_ = known_ = new_ = 0, digest_ = 0; }
-  constexpr void power_on() { clear(), begin_ = 0, high_water_ = 0; }
+  constexpr void power_on() {
+    clear(), begin_ = 0, high_water_ = 0;
+    for (std::size_t i = 0; i < Capacity; ++i) order_[i] = static_cast<std::uint16_t>(i);
+  }
 
   /// Digest of the content: the sum of what its samples give, modulo 2^32, kept up to date by what comes and goes. The
   /// stamps are the order, and a sample's payload is in its frames' CRC already, so this one only has to identify the
@@ -83,25 +90,25 @@ class Timeline {
 
   /// First `size` samples of the timeline.
   [[nodiscard]] constexpr sensor::Window window(std::size_t size) const {
-    return {samples_.data(), Capacity, begin_, size};
+    return {samples_.data(), order_.data(), Capacity, begin_, size};
   }
-  [[nodiscard]] constexpr const sensor::Sample& operator[](std::size_t i) const { return samples_[place(i)]; }
+  [[nodiscard]] constexpr const sensor::Sample& operator[](std::size_t i) const { return samples_[number(i)]; }
   /// The current estimate has it, and its record went out.
-  [[nodiscard]] constexpr bool consumed(std::size_t i) const { return (consumed_[place(i)] & 1U) != 0; }
+  [[nodiscard]] constexpr bool consumed(std::size_t i) const { return (consumed_[number(i)] & 1U) != 0; }
   constexpr void consume(std::size_t i) {
     if (consumed(i)) return;
-    consumed_[place(i)] = static_cast<std::uint8_t>(consumed_[place(i)] | 1U);
+    consumed_[number(i)] = static_cast<std::uint8_t>(consumed_[number(i)] | 1U);
     --new_;
     if (i == known_) ++known_;
     if (new_ == 0) known_ = size_;
   }
   /// Estimator `slot` does not have the consumed sample yet: its record is to come.
   constexpr void await(std::size_t i, std::size_t slot) {
-    consumed_[place(i)] = static_cast<std::uint8_t>(consumed_[place(i)] | 2U << slot);
+    consumed_[number(i)] = static_cast<std::uint8_t>(consumed_[number(i)] | 2U << slot);
   }
   /// Whether the estimator's record was to come; once.
   [[nodiscard]] constexpr bool take_awaited(std::size_t i, std::size_t slot) {
-    std::uint8_t& state = consumed_[place(i)];
+    std::uint8_t& state = consumed_[number(i)];
     const bool awaited = (state & (2U << slot)) != 0;
     if (awaited) state = static_cast<std::uint8_t>(state & ~(2U << slot));
     return awaited;
@@ -120,13 +127,42 @@ class Timeline {
     hash(sample.bits);
     return hash.value();
   }
-  /// Index in samples_ of the i-th sample, i <= Capacity.
+  /// How many samples are not behind this one: most come last or nearly so, any other place is found by halves.
+  [[nodiscard]] constexpr std::size_t place_for(const sensor::Sample& sample) const {
+    const auto behind = [&](std::size_t i) { return (*this)[i].order(sample) > 0; };
+    std::size_t high = size_;
+    for (int near = 3; near > 0; --near, --high)
+      if (high == 0 || !behind(high - 1)) return high;
+    std::size_t low = 0;
+    while (low < high) {
+      const std::size_t middle = (low + high) / 2;
+      if (behind(middle)) {
+        high = middle;
+      } else {
+        low = middle + 1;
+      }
+    }
+    return high;
+  }
+  /// Numbers from `from` to before `to` go one place on.
+  constexpr void shift(std::size_t from, std::size_t to) {
+    for (std::uint16_t* at = order_.data() + to; at != order_.data() + from; --at) *at = *(at - 1);
+  }
+  /// Place in order_ of the i-th sample, i <= Capacity.
   [[nodiscard]] constexpr std::size_t place(std::size_t i) const {
     const std::size_t at = begin_ + i;
     return at < Capacity ? at : at - Capacity;
   }
 
+  [[nodiscard]] constexpr std::size_t number(std::size_t i) const { return order_[place(i)]; }
+
   std::array<sensor::Sample, Capacity> samples_{};
+  /// Numbers in samples_ in the order of the stamps, from begin_ on; behind them those of free places.
+  std::array<std::uint16_t, Capacity> order_ = [] {
+    std::array<std::uint16_t, Capacity> order{};
+    for (std::size_t i = 0; i < Capacity; ++i) order[i] = static_cast<std::uint16_t>(i);
+    return order;
+  }();
   std::array<std::uint8_t, Capacity>
       consumed_{};  ///< bit 0: consumed; bit 1 + slot: that estimator's record is to come
   std::size_t begin_ = 0, size_ = 0;
