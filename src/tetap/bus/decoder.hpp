@@ -35,6 +35,10 @@ class Decoder {
   template <class Out>
   void on_frame(std::uint8_t offset, const base::CanFrame& frame, base::Micros reference, Counters& counters,
                 Out&& out);
+  /// The same where the frame's CRC, frame_crc(), is known already.
+  template <class Out>
+  void on_frame(std::uint8_t offset, const base::CanFrame& frame, std::uint32_t bits, base::Micros reference,
+                Counters& counters, Out&& out);
 
   void power_on() {
     assembly_.power_on();
@@ -155,8 +159,13 @@ void Decoder::gnss(const base::CanFrame& frame, sensor::Sensor sensor, std::uint
 template <class Out>
 void Decoder::on_frame(std::uint8_t offset, const base::CanFrame& frame, base::Micros reference, Counters& counters,
                        Out&& out) {
+  on_frame(offset, frame, frame_crc(offset, frame), reference, counters, out);
+}
+
+template <class Out>
+void Decoder::on_frame(std::uint8_t offset, const base::CanFrame& frame, std::uint32_t bits, base::Micros reference,
+                       Counters& counters, Out&& out) {
   const auto bytes = bus::payload(frame);
-  const std::uint32_t bits = frame_crc(offset, frame);
   // One frame, one sample: decode, refuse what must be there and is not, stamp, fill.
   const auto single = [&]<class Message>(std::type_identity<Message>, sensor::Sensor sensor, auto&& fill) {
     const auto message = bus::decode<Message>(bytes);

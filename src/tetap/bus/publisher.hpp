@@ -85,7 +85,15 @@ class Publisher {
   /// True when this estimator's 1 sigma go out in this epoch: the motion's variance is needed then.
   [[nodiscard]] bool publishes_sigma(std::size_t instance, bool primary) const {
     const param::PublishParameters& p = parameters_.publish;
-    return primary ? every(p.std_every, kTogether) : every(p.side_every, side(instance));
+    return primary ? every(p.std_every, kTogether) : publishes(instance);
+  }
+  /// True when this estimator's estimate goes out in this epoch, where it is not the primary one.
+  [[nodiscard]] bool publishes(std::size_t instance) const {
+    return every(parameters_.publish.side_every, side(instance));
+  }
+  /// True in the epochs that compare two attitudes: one in four, and those that publish the difference.
+  [[nodiscard]] bool compares_attitudes() const {
+    return epoch_ % 4 == 1 || every(parameters_.publish.side_every, kCompared);
   }
   template <class Send>
   void estimate(std::size_t instance, sensor::EstimatorKind kind, bool primary, const estimators::Estimate& e,
@@ -93,14 +101,15 @@ class Publisher {
   /// `inertial` gives the estimate and `sources` the states of its sources, when they are asked for.
   template <class Inertial, class Sources, class Send>
   void inertial(std::size_t instance, Inertial&& inertial, Sources&& sources, Send& send);
-  template <class Send>
-  void attitude(std::size_t instance, const estimators::AttitudeEstimate& e,
-                const estimators::Disagreement& from_primary, Send& send);
+  /// `attitude` gives the estimate when it is asked for.
+  template <class Attitude, class Send>
+  void attitude(std::size_t instance, Attitude&& attitude, const estimators::Disagreement& from_primary, Send& send);
   /// One landmark of the estimator's own map, and in its turn the page about the map.
   template <estimators::MakesMap Estimator, class Send>
   void own_map(const Estimator& estimator, Send& send);
-  template <class Send>
-  void status(const Summary& summary, const LoopHealth& loop, Send& send);
+  /// `summary` gives the content of the status when it is asked for.
+  template <class GiveSummary, class Send>
+  void status(GiveSummary&& summary, const LoopHealth& loop, Send& send);
   template <class Slots, class Send>
   void statistics(const Slots& slots, base::Micros now, Send& send);
   template <class Send>
@@ -168,12 +177,21 @@ class Publisher {
   }
   /// Phase of what is to be of one epoch: attitude, velocity, sigmas, pages of the primary estimator.
   static constexpr std::int32_t kTogether = 2;
+  /// Phase of the difference between two attitudes.
+  static constexpr std::int32_t kCompared = 1;
+  /// n / 1000 for n below 2^41, in two divisions of 32 bits: a core of 32 bits has no other.
+  [[nodiscard]] static constexpr std::uint32_t thousandth(std::uint64_t n) {
+    const auto high = static_cast<std::uint32_t>(n >> 16), low = static_cast<std::uint32_t>(n & 0xFFFF);
+    return (high / 1000 << 16) + ((high % 1000 << 16) + low) / 1000;
+  }
   /// A coordinate in steps of the bus; not available rather than at the signal's end.
   [[nodiscard]] static std::int32_t millimetres(const base::Anchored& a) {
     constexpr std::int64_t kMost_um = 134'217'727'000;
     const std::int64_t um = a.um();
     if (um > kMost_um || um < -kMost_um) return std::numeric_limits<std::int32_t>::min();
-    return static_cast<std::int32_t>((um + (um < 0 ? -500 : 500)) / 1000);
+    const auto rounded = static_cast<std::uint64_t>((um < 0 ? -um : um) + 500);
+    const std::uint32_t mm = thousandth(rounded);
+    return um < 0 ? -static_cast<std::int32_t>(mm) : static_cast<std::int32_t>(mm);
   }
   /// Spreads the estimators' slow frames over the epochs.
   [[nodiscard]] static std::int32_t side(std::size_t instance) { return static_cast<std::int32_t>(3 * instance); }
@@ -251,14 +269,17 @@ void Publisher<N>::inertial(std::size_t instance, Inertial&& inertial, Sources&&
 
 /// Attitude, and how far it is from the primary estimator's.
 template <std::size_t N>
-template <class Send>
-void Publisher<N>::attitude(std::size_t instance, const estimators::AttitudeEstimate& e,
-                            const estimators::Disagreement& from_primary, Send& send) {
-  if (!e.valid) return;
+template <class Attitude, class Send>
+void Publisher<N>::attitude(std::size_t instance, Attitude&& attitude, const estimators::Disagreement& from_primary,
+                            Send& send) {
   const param::PublishParameters& p = parameters_.publish;
-  if (every(p.attitude_every, 7))
+  const bool published = every(p.attitude_every, 7), compared = every(p.side_every, kCompared);
+  if (!published && !compared) return;
+  const estimators::AttitudeEstimate e = attitude();
+  if (!e.valid) return;
+  if (published)
     put(bus::EstAtt{.w = e.q_nb.w, .x = e.q_nb.x, .y = e.q_nb.y, .z = e.q_nb.z, .epoch = tag()}, send, instance);
-  if (every(p.side_every, 1))
+  if (compared)
     put(
         bus::EstStateDisagreement{
             .epoch = tag(), .disagree_tilt_rad = from_primary.tilt_rad, .disagree_yaw_rad = from_primary.heading_rad},
@@ -336,9 +357,10 @@ void Publisher<N>::put_graph(const Estimator& estimator, std::uint32_t size, Sen
 }
 
 template <std::size_t N>
-template <class Send>
-void Publisher<N>::status(const Summary& s, const LoopHealth& loop, Send& send) {
+template <class GiveSummary, class Send>
+void Publisher<N>::status(GiveSummary&& summary, const LoopHealth& loop, Send& send) {
   if (!every(parameters_.publish.status_every, 1)) return;
+  const Summary s = summary();
   FaultSet faults = troubles_.faults(epoch_);
   faults.bits = static_cast<std::uint16_t>(faults.bits | s.faults);
   faults.raise(sensor::Fault::kInputStale, !s.velocity_valid);

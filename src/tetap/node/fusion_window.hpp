@@ -135,9 +135,14 @@ class FusionWindow {
   }
 
   using Estimates = std::array<estimators::Estimate, kCount>;
-  void estimate(const estimators::Context& ctx, Estimates& estimates) const {
+  /// The estimates of the instances that are due; others keep what they are.
+  template <class Due>
+  void estimate(const estimators::Context& ctx, const Due& due, Estimates& estimates) const {
     std::size_t instance = 0;
-    each_slot([&](const auto& slot) { estimates[instance++] = slot.estimate(ctx); });
+    each_slot([&](const auto& slot) {
+      if (due(instance)) estimates[instance] = slot.estimate(ctx);
+      ++instance;
+    });
   }
   template <class F>
   void each_slot(F&& f) {

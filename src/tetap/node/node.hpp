@@ -144,7 +144,8 @@ class Node {
       note(instance, sample, innovation);
     };
   }
-  [[nodiscard]] bool healthy(const Estimates& estimates);
+  template <class Due>
+  [[nodiscard]] bool healthy(const Due& due, const Estimates& estimates);
   [[nodiscard]] [[gnu::noinline]] estimators::Disagreement judge();
   void note_jump();
   [[nodiscard]] std::uint32_t state_crc() const;
@@ -232,13 +233,14 @@ void Node<Estimators, Capacity>::resume(const Node& other) {
 template <class Estimators, std::size_t Capacity>
 void Node<Estimators, Capacity>::on_frame(const base::CanFrame& frame) {
   const auto offset = static_cast<std::uint8_t>(frame.id - parameters_.can_base);
-  input_crc_.add(bus::frame_crc(offset, frame));
+  const std::uint32_t bits = bus::frame_crc(offset, frame);
+  input_crc_.add(bits);
   if constexpr (kTakesClosures) {
     if (bus::ClosureAssembly::takes(offset)) return closures_.on_frame(offset, frame, now_, counters_, *this);
   }
   const bool admitted =
       protection_.admits(offset, frame, now_, counters_, [this](const sensor::Sample& vouched) { take(vouched); });
-  if (admitted) inbox_.on_frame(offset, frame, now_, counters_, *this);
+  if (admitted) inbox_.on_frame(offset, frame, bits, now_, counters_, *this);
 }
 
 template <class Estimators, std::size_t Capacity>
@@ -288,15 +290,16 @@ void Node<Estimators, Capacity>::tick(base::Micros t, const bus::LoopHealth& loo
   window_.advance(now_, context());
   window_.late_records(noting());
   window_.work(static_cast<std::uint32_t>(parameters_.loop.work_units), context());
+  publisher_.begin(now_, input_crc_, send);
   Estimates estimates;
-  window_.estimate(context(), estimates);
-  if (!healthy(estimates)) window_.estimate(context(), estimates);
+  const auto due = [this](std::size_t instance) { return instance == kPrimary || publisher_.publishes(instance); };
+  window_.estimate(context(), due, estimates);
+  if (!healthy(due, estimates)) window_.estimate(context(), due, estimates);
   invalidate_beyond_range(estimates);
 
-  const estimators::Disagreement apart = judge();
+  const estimators::Disagreement apart = publisher_.compares_attitudes() ? judge() : estimators::Disagreement{};
   note_jump();
 
-  publisher_.begin(now_, input_crc_, send);
   std::size_t instance = 0;
   window_.each_slot([&](const auto& slot) {
     using E = typename std::remove_cvref_t<decltype(slot)>::Type;
@@ -308,7 +311,8 @@ void Node<Estimators, Capacity>::tick(base::Micros t, const bus::LoopHealth& loo
       publisher_.inertial(
           instance, [&] { return slot.inertial(context()); }, [&] { return slot.sources(context()); }, send);
     if constexpr (requires { slot.attitude(context()); })
-      publisher_.attitude(instance, in_map(slot.attitude(context())), apart, send);
+      publisher_.attitude(
+          instance, [&] { return in_map(slot.attitude(context())); }, apart, send);
     if constexpr (estimators::MakesMap<E>) {
       map_faults_.note(slot.map_maker().own_map(), publisher_.epoch(),
                        static_cast<std::uint32_t>(1'000'000 / parameters_.loop.period_us));
@@ -316,7 +320,7 @@ void Node<Estimators, Capacity>::tick(base::Micros t, const bus::LoopHealth& loo
     }
     ++instance;
   });
-  publisher_.status(summary(estimates[kPrimary]), loop, send);
+  publisher_.status([&] { return summary(estimates[kPrimary]); }, loop, send);
   publisher_.statistics(window_.slots(), now_, send);
   publisher_.diagnostics(counters_, loop, window_.high_water(), send);
   if constexpr (kHasBusProtection<Estimators>)
@@ -436,12 +440,16 @@ void Node<Estimators, Capacity>::restart_in_new_map() {
   restarted_at_ = now_;
 }
 
-/// A broken invariant (NaN, a covariance that is none) restarts the estimators from their start, with a reset cause.
+/// A broken invariant (NaN, a covariance that is none) restarts the estimators from their start, with a reset cause. An
+/// estimator beside the primary one is looked at in the epochs that publish it.
 template <class Estimators, std::size_t Capacity>
-bool Node<Estimators, Capacity>::healthy(const Estimates& estimates) {
+template <class Due>
+bool Node<Estimators, Capacity>::healthy(const Due& due, const Estimates& estimates) {
   bool finite = true;
   bool positive = true;
-  for (const estimators::Estimate& e : estimates) {
+  for (std::size_t i = 0; i < estimates.size(); ++i) {
+    if (!due(i)) continue;
+    const estimators::Estimate& e = estimates[i];
     finite = finite && base::is_finite(e.pose.yaw_rad) && base::is_finite(e.pose.x.offset_m) &&
              base::is_finite(e.pose.y.offset_m);
     positive = positive && e.p.positive_definite();
