@@ -33,31 +33,48 @@ model::PlanarIncrement PlanarDeadReckoning<Filter>::held_increment(float dt_s, b
 }
 
 template <class Filter>
-void PlanarDeadReckoning<Filter>::propagate(base::Micros t, const param::Parameters& n) {
-  if (t <= time_) return;
-  if (held_.kind == Held::Kind::kNone) {  // no motion was ever measured: the robot stands where it was put
-    time_ = t;
-    return;
-  }
+template <class Predict>
+void PlanarDeadReckoning<Filter>::each_held(base::Micros t, const param::Parameters& n, Predict&& predict) const {
+  if (t <= time_ || held_.kind == Held::Kind::kNone) return;  // no motion was ever measured: the robot stands
   // Held speeds count until the time-out, as they were published; after that anything may have happened.
   const base::Micros silent = last_input_ + base::Micros{n.wheels.timeout_us};
   const base::Micros held_until = t < silent ? t : silent;
   if (time_ < held_until) {
     const float dt_s = base::seconds(held_until - time_);
     const bool gyro = gyro_shows(held_until, n);
-    filter.predict(held_increment(dt_s, gyro, n));
+    predict(held_increment(dt_s, gyro, n), dt_s, gyro);
+  }
+  const base::Micros from = time_ < held_until ? held_until : time_;
+  if (from < t) {
+    const float grown = n.wheels.timeout_noise * base::seconds(t - from);
+    predict(model::PlanarIncrement{.var_ds = grown, .var_dyaw = grown}, 0.0F, false);
+  }
+}
+
+template <class Filter>
+model::PlanarIncrement PlanarDeadReckoning<Filter>::take_held(base::Micros t, const param::Parameters& n) {
+  model::PlanarIncrement last;
+  bool two = false;
+  each_held(t, n, [&](const model::PlanarIncrement& increment, float dt_s, bool gyro) {
+    if (two) filter.predict(last);
+    last = increment;
+    two = true;
     if (held_.kind == Held::Kind::kWheels) {
       applied_left_m_ += held_.first_mps * dt_s;
       applied_right_m_ += held_.second * dt_s;
     }
     if (gyro) applied_yaw_rad_ += gyro_rate_radps_ * dt_s;
-    time_ = held_until;
-  }
-  if (time_ < t) {
-    const float grown = n.wheels.timeout_noise * base::seconds(t - time_);
-    filter.predict(model::PlanarIncrement{.var_ds = grown, .var_dyaw = grown});
-    time_ = t;
-  }
+  });
+  if (t > time_) time_ = t;
+  return last;
+}
+
+template <class Filter>
+void PlanarDeadReckoning<Filter>::propagate(base::Micros t, const param::Parameters& n) {
+  if (t <= time_) return;
+  const bool moves = held_.kind != Held::Kind::kNone;
+  const model::PlanarIncrement increment = take_held(t, n);
+  if (moves) filter.predict(increment);
 }
 
 template <class Filter>
@@ -65,7 +82,6 @@ sensor::Verdict PlanarDeadReckoning<Filter>::fuse(const sensor::WheelCounts& now
                                                   const param::Parameters& n) {
   const auto& drive = n.wheels.drive;
   const bool gyro = gyro_shows(stamp, n);
-  if (gyro) propagate(stamp, n);  // the turn up to here; what the counts add is length
   const bool usable = have_counts_ && stamp > counts_time_ && stamp - counts_time_ <= base::Micros{n.wheels.timeout_us};
   sensor::Verdict verdict = sensor::Verdict::kAccepted;
   if (usable) {
@@ -73,8 +89,14 @@ sensor::Verdict PlanarDeadReckoning<Filter>::fuse(const sensor::WheelCounts& now
     const float right_m = drive.right_m(model::count_difference(now.right, counts_.right));
     const float dt_s = base::seconds(stamp - counts_time_);
     if (model::possible_step(left_m, right_m, n.wheels.most_mps * dt_s)) {
+      // With a gyroscope: its turn up to here, to which the counts add length.
+      const model::PlanarIncrement held = gyro ? take_held(stamp, n) : model::PlanarIncrement{};
       model::PlanarIncrement increment = drive.increment(left_m - applied_left_m_, right_m - applied_right_m_);
-      if (gyro) turn(increment, 0.0F, 0.0F);
+      if (gyro) {
+        turn(increment, held.dyaw_rad, held.var_dyaw);
+        increment.ds_m += held.ds_m;
+        increment.var_ds += held.var_ds;
+      }
       filter.predict(increment);
       const float per_s = 1.0F / dt_s;
       held_ = {.kind = Held::Kind::kWheels, .first_mps = left_m * per_s, .second = right_m * per_s};
@@ -83,7 +105,7 @@ sensor::Verdict PlanarDeadReckoning<Filter>::fuse(const sensor::WheelCounts& now
       verdict = sensor::Verdict::kRejected;
     }
   } else {
-    if (have_counts_) propagate(stamp, n);  // variance of the gap stays; its way is not known
+    if (have_counts_ || gyro) propagate(stamp, n);  // variance of the gap stays; its way is not known
     held_ = {.kind = Held::Kind::kWheels};
   }
   if (stamp > time_) time_ = stamp;
@@ -133,7 +155,6 @@ sensor::Verdict PlanarDeadReckoning<Filter>::fuse(const sensor::ImuSample& sampl
   const float before_radps = gyro_rate_radps_;
   gyro_rate_radps_ = raw_radps - gyro_bias_radps_;
   // The extrapolation since the sample before is taken off. In a gap between the samples the rate changed evenly.
-  propagate(stamp, n);
   const base::Micros span = stamp - gyro_time_;
   const bool follows = gyro_time_.us != 0 && span.us > 0 && span <= base::Micros{n.wheels.timeout_us};
   if (follows) {
@@ -146,9 +167,12 @@ sensor::Verdict PlanarDeadReckoning<Filter>::fuse(const sensor::ImuSample& sampl
       turned_rad += 0.5F * changed_rad;
       variance = changed_rad * changed_rad * (1.0F / 12);
     }
-    model::PlanarIncrement correction;
-    turn(correction, turned_rad - applied_yaw_rad_, variance);
-    filter.predict(correction);
+    model::PlanarIncrement increment = take_held(stamp, n);
+    increment.dyaw_rad += turned_rad - applied_yaw_rad_;
+    increment.var_dyaw += variance;
+    filter.predict(increment);
+  } else {
+    propagate(stamp, n);
   }
   applied_yaw_rad_ = 0;
   gyro_time_ = stamp;
@@ -157,12 +181,12 @@ sensor::Verdict PlanarDeadReckoning<Filter>::fuse(const sensor::ImuSample& sampl
 
 template <class Filter>
 Estimate PlanarDeadReckoning<Filter>::estimate(const param::Parameters& n) const {
-  PlanarDeadReckoning ahead = *this;
-  ahead.propagate(out_time_, n);
+  Filter ahead = filter;
+  each_held(out_time_, n, [&ahead](const model::PlanarIncrement& increment, float, bool) { ahead.predict(increment); });
   const bool fresh = this->fresh(n);
   return {.time = out_time_,
-          .pose = ahead.filter.x,
-          .p = covariance_of(ahead.filter),
+          .pose = ahead.x,
+          .p = covariance_of(ahead),
           .forward_mps = fresh ? forward_mps() : 0.0F,
           .yaw_rate_radps = fresh ? yaw_rate_radps(n) : 0.0F,
           .position_valid = true,

@@ -138,6 +138,12 @@ class PlanarDeadReckoning {
   }
   /// `gyro`: the gyroscope shows the turn.
   [[nodiscard]] model::PlanarIncrement held_increment(float dt_s, bool gyro, const param::Parameters& n) const;
+  /// Calls predict(increment, seconds of held speeds, whether the gyroscope shows the turn) for what is held from the
+  /// state's time to t: the held speeds, then the span after their time-out.
+  template <class Predict>
+  void each_held(base::Micros t, const param::Parameters& n, Predict&& predict) const;
+  /// Brings the state to t but for its last increment, which the caller predicts with what a sample adds to it.
+  [[nodiscard]] model::PlanarIncrement take_held(base::Micros t, const param::Parameters& n);
   static void turn(model::PlanarIncrement& increment, float dyaw_rad, float variance) {
     increment.dyaw_rad = dyaw_rad;
     increment.var_dyaw = variance;
