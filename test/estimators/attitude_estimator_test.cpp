@@ -163,6 +163,49 @@ TEST(AttitudeEstimator, follows_the_fastest_turn_a_sensor_shows_through_the_wind
   EXPECT_LT(body.run(0.19), 0.1F);  // 5.7 rad in steps of 0.15, all in the window
 }
 
+/// Whatever came late, the present is in the end the one of samples that came in time, to the bit.
+TEST(AttitudeEstimator, has_the_bits_of_samples_in_time_once_a_late_one_is_there) {
+  const param::Parameters n = with_magnetometer();
+  const MapFrame map_frame;
+  const Context ctx{n, map_frame};
+  const auto sample = [](int k) {
+    const float turn = 0.01F * std::sin(0.3F * static_cast<float>(k));
+    sensor::Sample s{.stamp = {kBegin_us + k * kImu_us}, .sensor = sensor::Sensor::kImu};
+    s.payload.imu = {
+        .dangle_b_rad = {turn, 0.004F, -turn}, .dvelocity_b_mps = {0, 0, 0.04905F}, .interval_us = kImu_us};
+    return s;
+  };
+  constexpr int kHeld = 200, kDue = 220, kFirst = 190;  // the sample 200 comes after 220; 190 is the window's first
+  Attitude in_time, late;
+  for (Attitude* one : {&in_time, &late}) {
+    one->restart({kBegin_us}, ctx);
+    std::vector<sensor::Sample> window;
+    const auto advance = [&](int k) { one->advance({kBegin_us + k * kImu_us}, ctx, window); };
+    for (int k = 1; k <= kDue; ++k) {
+      if (k <= kFirst) {
+        one->fuse(sample(k).payload.imu, sample(k).stamp, ctx);
+      } else if (one == &in_time || k != kHeld) {
+        one->arrived(sample(k), ctx);
+        window.push_back(sample(k));
+      }
+      advance(k);
+    }
+    if (one == &late) {
+      const Quaternion without = late.attitude(ctx).q_nb, with = in_time.attitude(ctx).q_nb;
+      EXPECT_GT(degrees_between(without, with), 0.1F);
+      late.arrived(sample(kHeld), ctx);
+      window.insert(window.begin() + (kHeld - kFirst - 1), sample(kHeld));
+      advance(kDue);
+    }
+  }
+  const Quaternion a = in_time.attitude(ctx).q_nb, b = late.attitude(ctx).q_nb;
+  EXPECT_EQ(a.w, b.w);
+  EXPECT_EQ(a.x, b.x);
+  EXPECT_EQ(a.y, b.y);
+  EXPECT_EQ(a.z, b.z);
+  EXPECT_EQ(in_time.estimate(ctx).yaw_rate_radps, late.estimate(ctx).yaw_rate_radps);
+}
+
 TEST(AttitudeEstimator, is_the_same_however_the_imu_is_mounted) {
   static constexpr std::array<float, 9> kMounting{0, 0, 1, 1, 0, 0, 0, 1, 0};  // the sensor's z is the body's x
   param::Parameters n = with_magnetometer();

@@ -8,6 +8,7 @@
 #include "tetap/checks/imu_classifier.hpp"
 #include "tetap/estimators/context.hpp"
 #include "tetap/estimators/estimate.hpp"
+#include "tetap/estimators/gyro_turn.hpp"
 #include "tetap/filter/attitude.hpp"
 #include "tetap/sensor/magnetic_field.hpp"
 #include "tetap/sensor/sample.hpp"
@@ -27,8 +28,11 @@ class Attitude {
     options.declination_rad = ctx.parameters.magnetic.declination_rad;
     filter_ = filter::Attitude(options);
     ahead_ = {};
+    far_turn_ = turn_ = {};
+    anew_ = true;
     rate_b_radps_ = last_rate_b_radps_ = filter::Vector3::Zero();
     now_ = time_ = last_imu_ = field_time_ = t;
+    far_ = seen_ = {};
   }
   /// A pose from outside is not taken: this attitude stays independent of the other estimators' inputs.
   void set_pose(base::Micros, const SetPose&, const Context&) {}
@@ -36,6 +40,8 @@ class Attitude {
   Innovation fuse(const sensor::ImuSample& sample, base::Micros stamp, const Context& ctx);
   Innovation fuse(const sensor::MagneticFlux& sample, base::Micros stamp, const Context& ctx);
 
+  /// A sample is new in the window.
+  void arrived(const sensor::Sample& sample, const Context& ctx);
   void advance(base::Micros t, const Context& ctx, const sensor::Window& window);
 
   [[nodiscard]] AttitudeEstimate attitude(const Context&) const {
@@ -60,18 +66,21 @@ class Attitude {
   /// Between the stamps of samples that follow each other; drivers' clocks jitter.
   /// The filter's longest step: the gyroscope is taken to have shown the same throughout.
   static constexpr base::Micros kBridged{200'000};
-  static constexpr float kFastest_radps = 100;  ///< beyond is no turn but nonsense, as in the filter
 
+  void follow(const sensor::Window& window, const Context& ctx);
   [[nodiscard]] filter::Quaternion q_nb() const { return (filter_.q_nb() * ahead_).renormalised(); }
 
   filter::Attitude filter_;                                      ///< at the far end of the window
   filter::Quaternion ahead_;                                     ///< the turn from there to the present, in body axes
+  GyroTurn far_turn_, turn_;                                     ///< up to the far end, and up to the present
   filter::Vector3 rate_b_radps_ = filter::Vector3::Zero();       ///< at the far end, as the gyroscope shows it
   filter::Vector3 last_rate_b_radps_ = filter::Vector3::Zero();  ///< at the present
   base::Micros now_;
   base::Micros time_;      ///< stamp of the last IMU sample in the filter
   base::Micros last_imu_;  ///< stamp of the last IMU sample in the window
   base::Micros field_time_;
+  base::Micros far_, seen_;  ///< stamps of the last samples in far_turn_ and in turn_
+  bool anew_ = true;         ///< turn_ is not what the window's samples give
 };
 
 template <class Sink>
@@ -81,6 +90,10 @@ void Attitude::hash_state(Sink&& sink) const {
   sink(q.x);
   sink(q.y);
   sink(q.z);
+  sink(ahead_.w);
+  sink(ahead_.x);
+  sink(ahead_.y);
+  sink(ahead_.z);
   for (int i = 0; i < 3; ++i) sink(filter_.bias_b_radps()(i));
   sink(filter_.bias_sigma_radps());
   sink(filter_.magnetometer_disturbed_s());

@@ -25,11 +25,6 @@ class Window {
       : Window(samples.data(), nullptr, samples.size(), 0, samples.size()) {}
 
   [[nodiscard]] constexpr std::size_t size() const { return size_; }
-  /// Calls f(sample) for each, in order.
-  template <class F>
-  constexpr void each(const F& f) const {
-    for (std::size_t i = 0; i < size_; ++i) f((*this)[i]);
-  }
   /// How many samples are not later than t.
   [[nodiscard]] constexpr std::size_t until(base::Micros t) const {
     std::size_t low = 0, high = size_;
