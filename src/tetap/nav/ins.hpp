@@ -145,7 +145,7 @@ class Ins {
       pending_.dv_n_mps = Vector3::Zero();
     }
     accel_n_mps2 = Vector3::Zero();
-    // A few lost samples of a fast IMU add little: the watch over P, which goes on at every step, is enough.
+    // A few lost samples add little: the watch over P, which goes on at every step, is enough.
     const bool usual = sigma_mps2 * sigma_mps2 <= kUsualGap && sigma_radps * sigma_radps <= kUsualGap;
     if (gap.us > kShortGap_us || !usual) condition(p, condition_monitor_);
   }
@@ -323,7 +323,7 @@ class Ins {
   static constexpr float kLeastTurn_rad = 5e-4F, kSmallTurn_rad = 0.05F, kMostTurn_rad = 10.0F;
   static constexpr std::int64_t kGapStep_us = 100'000, kMostGap_us = 60'000'000;
   static constexpr float kGapStep_s = 0.1F;
-  static constexpr std::int64_t kShortGap_us = 9'000;
+  static constexpr std::int64_t kShortGap_us = 60'000;
   static constexpr float kUsualGap = 1e4F;  ///< square of the largest sigma of a gap that a robot's parameters may have
 
   /// Motion of the state since the covariance was last predicted.

@@ -100,8 +100,8 @@ class ImuCells {
   [[nodiscard]] const ImuCell& operator[](std::size_t i) const { return cells_[(begin_ + i) % kMost]; }
 
  private:
-  static constexpr std::size_t kMost = 6;
-  static constexpr int kGrid = 16;  ///< places of 2^16 us
+  static constexpr std::size_t kMost = 9;  ///< half a second and the place that leaves
+  static constexpr int kGrid = 16;         ///< places of 2^16 us
 
   [[nodiscard]] static constexpr std::int64_t grid(base::Micros t) { return t.us >> kGrid; }
   /// False when there is no room.

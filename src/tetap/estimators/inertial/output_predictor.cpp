@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tetap/estimators/inertial/output_predictor.hpp"
 
+#include <algorithm>
 #include <limits>
 
 namespace tetap::estimators {
@@ -127,7 +128,7 @@ bool OutputPredictor::rebuild(const Place& far, const sensor::Window& window, co
   const auto catch_up = [&]() {
     if (!skipped) return;
     skipped = false;
-    while (i < window.size() && window[i].stamp <= place_.last) ++i;
+    i = std::max(i, window.until(place_.last));
     newest = &newest_before(window, i, n);
     place_.classifier = checks::ImuClassifier::after(*newest);
   };
@@ -144,7 +145,7 @@ bool OutputPredictor::rebuild(const Place& far, const sensor::Window& window, co
     } else if (left == 0) {
       // Its samples may be anything: neither the rate nor the classifier is taken from them.
       catch_up();
-      while (i < window.size() && window[i].stamp <= cell.last()) ++i;
+      i = std::max(i, window.until(cell.last()));
       bridge(cell.last() - place_.reached, in);
       last_seen_ = cell.last();
     } else {
