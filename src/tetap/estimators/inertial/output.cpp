@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Inertial navigation: what is published.
+#include "tetap/base/multiply_add.hpp"
 #include "tetap/estimators/inertial/inertial.hpp"
+#include "tetap/filter/unroll.hpp"
 
 namespace tetap::estimators {
 
@@ -119,10 +121,15 @@ namespace detail {
 template <int kFirst, std::size_t kN>
 [[nodiscard]] inline float quadratic(const nav::Ins::Covariance& p, const std::array<float, kN>& row) {
   float sum = 0;
-  for (std::size_t c = 0; c < kN; ++c)
-    for (std::size_t r = 0; r < kN; ++r)
-      sum += row[r] * row[c] * p(kFirst + static_cast<int>(r), kFirst + static_cast<int>(c));
-  return sum;
+  filter::unroll<0, static_cast<int>(kN)>([&](auto c) __attribute__((always_inline)) {
+    const float own = row[static_cast<std::size_t>(c)];
+    float half = 0.5F * (own * p(kFirst + c, kFirst + c));  // each pair of errors is met once
+    filter::unroll<0, c>([&](auto r) __attribute__((always_inline)) {
+      half = base::add_product(half, row[static_cast<std::size_t>(r)], p(kFirst + r, kFirst + c));
+    });
+    sum = base::add_product(sum, own, half);
+  });
+  return 2.0F * sum;
 }
 
 }  // namespace detail
