@@ -21,6 +21,7 @@ class Reassembly {
 
   void power_on() {
     for (Partial& partial : partials_) partial.missing = 0;
+    last_ = 0;
   }
   /// Halves older than `patience`, or from a time still to come, are given up and counted.
   void expire(base::Micros now, base::Micros patience, Counters& counters) {
@@ -46,13 +47,25 @@ class Reassembly {
     partial.missing = 0;
     ++counters.incomplete;
   }
+  /// This place is the last one.
+  [[nodiscard]] Partial& at(Partial& partial) {
+    last_ = static_cast<std::uint8_t>(&partial - partials_.data());
+    return partial;
+  }
   static constexpr base::Micros kImuPatience{50'000};
 
   std::array<Partial, 8> partials_{};
+  std::uint8_t last_ = 0;  ///< place of the last frame's sample
 };
 
 inline Reassembly::Partial& Reassembly::slot(sensor::Sensor sensor, std::uint8_t instance, std::uint8_t sequence,
                                              std::uint8_t frames, base::Micros reference, Counters& counters) {
+  // Most frames continue the sample of the frame before; a new sample looks through all halves.
+  Partial& last = partials_[last_];
+  const bool fresh = sensor != sensor::Sensor::kImu || reference - last.since <= kImuPatience;
+  if (last.missing != 0 && last.sample.sequence == sequence && last.sample.sensor == sensor &&
+      last.sample.instance == instance && fresh)
+    return last;
   Partial* chosen = &partials_[0];
   for (Partial& partial : partials_) {
     const sensor::Sample& s = partial.sample;
@@ -65,10 +78,10 @@ inline Reassembly::Partial& Reassembly::slot(sensor::Sensor sensor, std::uint8_t
       if ((behind >= 4 && behind <= 12) || reference - partial.since > kImuPatience) {
         give_up(partial, counters);
       } else if (behind == 0) {
-        return partial;
+        return at(partial);
       }
     } else if (same && s.sequence == sequence) {
-      return partial;
+      return at(partial);
     }
     const bool better = chosen->missing != 0 && (partial.missing == 0 || partial.since < chosen->since);
     if (better) chosen = &partial;
@@ -81,7 +94,7 @@ inline Reassembly::Partial& Reassembly::slot(sensor::Sensor sensor, std::uint8_t
   chosen->sample.instance = instance;
   chosen->sample.sequence = sequence;
   chosen->sample.bits = 0;
-  return *chosen;
+  return at(*chosen);
 }
 
 template <class Out>
