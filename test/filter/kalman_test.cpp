@@ -1,14 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tetap/filter/kalman.hpp"
 
+#include "support/least_eigenvalue.hpp"
+#include "tetap/filter/joseph.hpp"
 #include "tetap/model/constant_velocity.hpp"
 
 #include <gtest/gtest.h>
+#include <cmath>
 
 namespace tetap {
 namespace {
 
 using filter::Vector;
+using test::least_eigenvalue;
 
 // The worked example every textbook has: position and velocity, 0.1 s, one position measured.
 TEST(Kalman, WorkedExampleStepByStep) {
@@ -67,6 +71,78 @@ TEST(Kalman, AMeasurementBeyondTheGateChangesNothing) {
   EXPECT_FLOAT_EQ(innovation.nis, 50.0F);
   EXPECT_EQ(kf.x.value, before.x.value);
   EXPECT_EQ(kf.p.packed(), before.p.packed());
+}
+
+/// Sharp measurements of position beside an uncertain state, step by step, against Joseph's form in double.
+struct Sharp {
+  filter::Kalman<float, 4> kf;
+  filter::JosephKalman<filter::VectorState<double, 4>> reference;
+
+  explicit Sharp(float variance) {
+    kf.p = filter::Symmetric<float, 4>::diagonal({variance, variance, variance, variance});
+    const auto p = static_cast<double>(variance);
+    reference.set_covariance(filter::Symmetric<double, 4>::diagonal({p, p, p, p}));
+  }
+  void predict() {
+    ASSERT_TRUE(kf.predict(model::ConstantVelocity<float>{.dt_s = 0.125F, .acceleration_variance = 0.25F}));
+    ASSERT_TRUE(reference.predict(model::ConstantVelocity<double>{.dt_s = 0.125, .acceleration_variance = 0.25}));
+  }
+  template <int... kStates>
+  filter::Verdict update(float r) {
+    constexpr int kM = sizeof...(kStates);
+    static_cast<void>(reference.update(
+        filter::DirectMeasurement<double, 4, kStates...>{
+            .z = Vector<double, kM>::Zero(), .variance = Vector<double, kM>::Constant(static_cast<double>(r))},
+        1e9));
+    return kf
+        .update(filter::DirectMeasurement<float, 4, kStates...>{.z = Vector<float, kM>::Zero(),
+                                                                .variance = Vector<float, kM>::Constant(r)},
+                1e9F)
+        .verdict;
+  }
+  /// Positive definite, and no sigma is below half of double's.
+  void judge() const {
+    ASSERT_GT(least_eigenvalue(kf.p), 0);
+    for (int i = 0; i < 4; ++i)
+      ASSERT_GE(std::sqrt(static_cast<double>(kf.p(i, i))), 0.5 * std::sqrt(reference.covariance()(i, i))) << i;
+  }
+};
+
+TEST(Kalman, StaysPositiveAndNeverTooSureUpToATrillionTimesSharper) {
+  for (int decades = 0; decades <= 12; ++decades) {
+    SCOPED_TRACE(decades);
+    Sharp at(1e6F);
+    const auto r = static_cast<float>(std::pow(10.0, 6 - decades));
+    ASSERT_EQ((at.update<0, 2>(r)), filter::Verdict::kAccepted) << "from rest";
+    ASSERT_NO_FATAL_FAILURE(at.judge());
+    for (int k = 0; k < 2000; ++k) {
+      ASSERT_NO_FATAL_FAILURE(at.predict());
+      ASSERT_EQ((at.update<0, 2>(r)), filter::Verdict::kAccepted) << k;
+      ASSERT_NO_FATAL_FAILURE(at.judge()) << k;
+    }
+  }
+}
+
+TEST(Kalman, TakesAMeasurementWithoutNoise) {
+  Sharp at(100.0F);
+  for (int k = 0; k < 2000; ++k) {
+    ASSERT_EQ((at.update<0, 2>(0.0F)), filter::Verdict::kAccepted) << k;
+    ASSERT_NO_FATAL_FAILURE(at.judge()) << k;
+    ASSERT_NO_FATAL_FAILURE(at.predict());
+  }
+}
+
+TEST(Kalman, TakesTwoEqualSharpSensorsAtOnce) {
+  for (const float r : {1.0F, 1e-3F, 1e-6F, 1e-9F, 1e-12F}) {
+    SCOPED_TRACE(r);
+    Sharp at(1.0F);
+    for (int k = 0; k < 2000; ++k) {
+      ASSERT_EQ((at.update<0, 0>(r)), filter::Verdict::kAccepted) << k;
+      ASSERT_NO_FATAL_FAILURE(at.judge()) << k;
+      ASSERT_LT(std::sqrt(at.kf.p(0, 0)), 1.1F * std::sqrt(r) + 1e-3F) << k;
+      ASSERT_NO_FATAL_FAILURE(at.predict());
+    }
+  }
 }
 
 }  // namespace

@@ -25,8 +25,9 @@ struct Decorrelated {
   bool positive = true;       ///< every d(j) is above zero and below 1e30
 };
 
-/// Takes T = cov(x, z), S and nu apart. S needs no positivity beforehand.
-template <class Scalar, int N, int M>
+/// Takes T = cov(x, z), S and nu apart. S needs no positivity beforehand. kFloor: what a component shows beyond those
+/// before it is no less than the rounding of its variance; equal sensors far sharper than the prediction stay two.
+template <bool kFloor = false, class Scalar, int N, int M>
 [[nodiscard, gnu::always_inline]] inline Decorrelated<Scalar, N, M> decorrelate(const Matrix<Scalar, N, M>& cross,
                                                                                 const Symmetric<Scalar, M>& s,
                                                                                 const Vector<Scalar, M>& nu) {
@@ -47,6 +48,10 @@ template <class Scalar, int N, int M>
       });
       u(k, j) = sum;
     });
+    if constexpr (kFloor && j > 0) {
+      const Scalar floor = s(j, j) * Scalar(2.4e-7F);
+      if (d < floor) d = floor;
+    }
     out.positive = out.positive && d > Scalar{0} && d < Scalar(1e30F);
     out.inverse(int{j}) = Scalar{1} / d;
     out.y(int{j}) = y;

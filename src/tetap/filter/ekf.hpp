@@ -28,7 +28,7 @@ class Ekf {
       const auto step = motion.sparse_step(x);
       Symmetric<Scalar, kErrors> covariance = turned(p, step.f);
       add_noise(covariance, step.q);
-      return adopt(step.x, covariance, step.q);
+      return adopt(step.x, covariance, dense(step.q));
     } else if constexpr (requires { motion.step(x); }) {
       const Step<State> step = motion.step(x);
       return adopt(step.x, propagate(p, step.f, step.q), step.q);

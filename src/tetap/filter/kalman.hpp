@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Linear Kalman filter (Kalman 1960): the extended filter with matrices for models.
+// Linear Kalman filter (Kalman 1960) with all guards: matrices for models, or models that declare their structure.
 #pragma once
 
 #include "tetap/filter/ekf.hpp"
+#include "tetap/filter/structured_kalman.hpp"
 
 #include <array>
 
@@ -45,6 +46,6 @@ struct DirectMeasurement {
 };
 
 template <class Scalar, int N>
-using Kalman = Ekf<VectorState<Scalar, N>>;
+using Kalman = StructuredKalman<VectorState<Scalar, N>, Guard::kConditioned>;
 
 }  // namespace tetap::filter

@@ -25,12 +25,12 @@ struct Step {
   Matrix<typename S::Scalar, S::kErrors, S::kErrors> f;
   Symmetric<typename S::Scalar, S::kErrors> q;
 };
-/// The same with a type for F that holds its zeros and ones (structure.hpp): result of sparse_step().
-template <class S, class F>
+/// The same with types for F and Q that hold their zeros and ones (structure.hpp): result of sparse_step().
+template <class S, class F, class Q = Symmetric<typename S::Scalar, S::kErrors>>
 struct SparseStep {
   S x;
   F f;
-  Symmetric<typename S::Scalar, S::kErrors> q;
+  Q q;
 };
 template <class Scalar, int M, int K>
 struct Linearised {

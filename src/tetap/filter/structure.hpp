@@ -102,6 +102,14 @@ template <class Scalar, int N, Entry... kEntries>
   });
 }
 template <class Scalar, int N>
+[[nodiscard]] const Symmetric<Scalar, N>& dense(const Symmetric<Scalar, N>& q) {
+  return q;
+}
+template <class Scalar, int N, Entry... kEntries>
+[[nodiscard]] Symmetric<Scalar, N> dense(const SparseSymmetric<Scalar, N, kEntries...>& q) {
+  return q.dense();
+}
+template <class Scalar, int N>
 [[gnu::always_inline]] inline void add_noise(Symmetric<Scalar, N>& p, const Symmetric<Scalar, N>& q) {
   unroll<0, N>([&](auto c) __attribute__((always_inline)) {
     unroll<0, c + 1>([&](auto r) __attribute__((always_inline)) { p(r, c) += q(r, c); });

@@ -52,7 +52,7 @@ class StructuredKalman {
     Innovation<Scalar, M> record;
     Matrix<Scalar, kErrors, M> cross;  // P H^T
     const bool sharp = linearise(z, record, cross);
-    const Decorrelated<Scalar, kErrors, M> by = decorrelate(cross, record.s, record.nu);
+    const Decorrelated<Scalar, kErrors, M> by = decorrelate<kGuard == Guard::kConditioned>(cross, record.s, record.nu);
     if (kGuard != Guard::kNone && !by.positive) {
       record.verdict = record.s.bounded() ? Verdict::kSingular : Verdict::kNotFinite;
       return record;

@@ -21,6 +21,16 @@ struct ConstantVelocity {
     next.value(2) += dt_s * x.value(3);
     return next;
   }
+  using Jacobian = filter::UnitPlus<Scalar, 4, filter::Entry{0, 1}, filter::Entry{2, 3}>;
+  using Noise = filter::SparseSymmetric<Scalar, 4, filter::Entry{0, 0}, filter::Entry{0, 1}, filter::Entry{1, 1},
+                                        filter::Entry{2, 2}, filter::Entry{2, 3}, filter::Entry{3, 3}>;
+
+  /// All at once, with the zeros and ones of F and Q in their types.
+  [[nodiscard]] filter::SparseStep<State, Jacobian, Noise> sparse_step(const State& x) const {
+    const Scalar dt2 = dt_s * dt_s, v = acceleration_variance * dt2;
+    const Scalar xx = v * dt2 * Scalar(0.25F), xv = v * dt_s * Scalar(0.5F);
+    return {.x = predict(x), .f = {{dt_s, dt_s}}, .q = {{xx, xv, v, xx, xv, v}}};
+  }
   [[nodiscard]] filter::Matrix<Scalar, 4, 4> jacobian(const State&) const {
     filter::Matrix<Scalar, 4, 4> f = filter::Matrix<Scalar, 4, 4>::Identity();
     f(0, 1) = dt_s;
