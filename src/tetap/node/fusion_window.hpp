@@ -193,6 +193,12 @@ class FusionWindow {
   /// Samples that leave in a tick: plain estimators take each of them once more. What is more stays for the next tick.
   /// A window of 20 ticks that is full leaves half as many.
   static constexpr std::size_t kMostLeaving = Capacity / 11;
+  /// Fewer of a window of more ticks, by as much as its samples are closer together.
+  [[nodiscard]] static std::size_t most_leaving(const param::LoopParameters& loop) {
+    constexpr std::uint32_t kTicks = 20;
+    const auto ticks = static_cast<std::uint32_t>(loop.window_us / loop.period_us);
+    return ticks > kTicks ? kMostLeaving * kTicks / ticks + 1 : kMostLeaving;
+  }
 
   typename Estimators::Slots slots_;
   Timeline<Capacity> timeline_;
@@ -222,8 +228,9 @@ template <class Note>
 void FusionWindow<Estimators, Capacity>::leave_until(base::Micros t, Past past, const estimators::Context& ctx,
                                                      Note& note) {
   std::size_t count = 0;
+  const std::size_t most = most_leaving(ctx.parameters.loop);
   while (count < timeline_.size() && timeline_.consumed(count) && timeline_[count].stamp <= t) {
-    if (past == Past::kFollows && (count == kMostLeaving || defers(timeline_[count], ctx))) break;
+    if (past == Past::kFollows && (count == most || defers(timeline_[count], ctx))) break;
     leave(count++, past, ctx, note);
   }
   timeline_.drop_front(count);
