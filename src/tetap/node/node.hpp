@@ -13,6 +13,7 @@
 #include "tetap/node/fusion_window.hpp"
 #include "tetap/node/landmarks.hpp"
 #include "tetap/node/map_origin.hpp"
+#include "tetap/node/without_bus.hpp"
 #include "tetap/sensor/calibration.hpp"
 #include "tetap/sensor/plausibility.hpp"
 
@@ -82,6 +83,16 @@ class Node {
   [[nodiscard]] std::uint32_t epoch() const { return publisher_.epoch(); }
   /// Inputs consumed up to the last tick.
   [[nodiscard]] const bus::InputCrc& consumed() const { return input_crc_; }
+  [[nodiscard]] const bus::Counters& counters() const { return counters_; }
+  [[nodiscard]] const estimators::MapFrame& map_frame() const { return map_frame_; }
+  /// Records since the last tick began, of a node without a bus.
+  [[nodiscard]] const auto& output() const requires(!kHasBus<Estimators>) { return publisher_; }
+  /// Hash of the estimators and of the window that they stand in.
+  [[nodiscard]] std::uint32_t window_crc() const {
+    base::StateHash hash;
+    window_.hash_state(hash);
+    return hash.value();
+  }
   /// Goes on from the state of another node of this robot. References and pointers stay its own.
   void resume(const Node& other);
   /// For a copy that others get: nothing is left from which the key of commands could be computed. Between ticks only.
@@ -156,11 +167,11 @@ class Node {
   estimators::MapFrame map_frame_;
   MapOrigin origin_;
   BusProtection<Estimators> protection_;
-  bus::Decoder inbox_;
+  typename Parts<Estimators>::Decoder inbox_;
   [[no_unique_address]] Closures closures_;
-  bus::StampWraps wraps_;
+  typename Parts<Estimators>::Wraps wraps_;
   bus::Counters counters_;
-  bus::Publisher<Estimators::kCount> publisher_;
+  typename Parts<Estimators>::Publisher publisher_;
   [[no_unique_address]] Landmarks landmarks_;
   std::array<std::uint8_t, 7> pending_reset_{};  ///< 0: none; else 1 and the ticks that it has waited
   bool wired_off_ = false;                       ///< by command; a Begin frame leaves it
@@ -331,7 +342,7 @@ void Node<Estimators, Capacity>::tick(base::Micros t, const bus::LoopHealth& loo
   publisher_.identity(map_frame_, send);
   publisher_.events(send);
   window_.retire_until(now_ - base::Micros{parameters_.loop.window_us}, context(), noting());
-  publisher_.end(state_crc(), input_crc_, send);
+  publisher_.end(kHasBus<Estimators> ? state_crc() : 0, input_crc_, send);
 }
 
 template <class Estimators, std::size_t Capacity>
@@ -366,6 +377,7 @@ template <class Estimators, std::size_t Capacity>
 void Node<Estimators, Capacity>::note(std::size_t instance, const sensor::Sample& sample,
                                       const estimators::Innovation& innovation) {
   if (innovation.verdict == sensor::Verdict::kTooLate) ++counters_.too_late;
+  if constexpr (!kHasBus<Estimators>) return publisher_.event(innovation, sample, instance, now_, counters_);
   const bool frequent = sample.sensor <= sensor::Sensor::kBodySpeed || sample.sensor == sensor::Sensor::kMagnetometer ||
                         sample.sensor == sensor::Sensor::kBarometer;
   const bool ordinary = innovation.verdict == sensor::Verdict::kAccepted && frequent;

@@ -38,9 +38,9 @@ enum class Hold : std::int32_t {
 };
 
 struct WheelParameters {
-  model::DifferentialDrive drive;
-  model::UnicycleNoise noise;   ///< for BodySpeed samples
-  float wheel_speed_noise = 0;  ///< m^2/s per wheel: white noise of WheelSpeed samples, at standstill
+  model::DifferentialDrive drive{};
+  model::UnicycleNoise noise{};  ///< for BodySpeed samples
+  float wheel_speed_noise = 0;   ///< m^2/s per wheel: white noise of WheelSpeed samples, at standstill
   Hold hold = Hold::kBackward;
   std::int32_t delay_us = 0;  ///< from a BodySpeed sample's stamp to the motion it speaks of: a command's dead time
   float speed_scale = 1;      ///< true speed over stated speed, of BodySpeed samples
@@ -72,7 +72,7 @@ struct GyroParameters {
 };
 
 struct LandmarkParameters {
-  model::PlanarMounting mounting;  ///< mounting of the sensor
+  model::PlanarMounting mounting{};  ///< mounting of the sensor
   float sigma_range_m = 0.1F;
   float sigma_range_per_m = 0;  ///< grows with range
   float sigma_bearing_rad = 0.02F;
@@ -298,25 +298,25 @@ struct WiredParameters {
 
 struct Parameters {
   std::uint32_t can_base = 0x300;
-  LoopParameters loop;
-  WheelParameters wheels;
-  ImuParameters imu;  ///< calibration of the IMU that is used: inertial.imu
-  GyroParameters gyro;
-  LandmarkParameters landmark;
-  TargetParameters target;
-  GnssParameters gnss;
-  InertialParameters inertial;
-  MagneticParameters magnetic;
-  BaroParameters baro;
-  filter::AttitudeOptions attitude;  ///< declination is the magnetometer's
-  DisagreementParameters disagreement;
-  StartParameters start;
-  RecoveryParameters recovery;
-  PublishParameters publish;
-  BusParameters bus;
-  WiredParameters wired;
-  MappingParameters mapping;
-  ParticleParameters particles;
+  LoopParameters loop{};
+  WheelParameters wheels{};
+  ImuParameters imu{};  ///< calibration of the IMU that is used: inertial.imu
+  GyroParameters gyro{};
+  LandmarkParameters landmark{};
+  TargetParameters target{};
+  GnssParameters gnss{};
+  InertialParameters inertial{};
+  MagneticParameters magnetic{};
+  BaroParameters baro{};
+  filter::AttitudeOptions attitude{};  ///< declination is the magnetometer's
+  DisagreementParameters disagreement{};
+  StartParameters start{};
+  RecoveryParameters recovery{};
+  PublishParameters publish{};
+  BusParameters bus{};
+  WiredParameters wired{};
+  MappingParameters mapping{};
+  ParticleParameters particles{};
 };
 
 }  // namespace tetap::param
