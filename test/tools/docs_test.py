@@ -486,6 +486,11 @@ class Lines(unittest.TestCase):
         self.assertEqual(done.returncode, 0, f"{line}\n{done.stdout[-2000:]}{done.stderr[-2000:]}")
         return done.stdout
 
+    def save_programs(self, page):
+        for name, code in re.findall(r"Save this as `(\w+\.cpp)`:\n\n```cpp\n(.*?)```", read(page), re.S):
+            with open(os.path.join(self.tree, name), "w", encoding="utf-8") as file:
+                file.write(code)
+
     def test_every_line_of_tutorial_and_howto_runs(self):
         ran = 0
         for page in pages():
@@ -493,9 +498,7 @@ class Lines(unittest.TestCase):
                 continue
             text = read(page)
             self.assertEqual(len(re.findall(r"^```(?:sh|bash|console|shell)", text, re.M)), len(blocks(text)), page)
-            for name, code in re.findall(r"Save this as `(\w+\.cpp)`:\n\n```cpp\n(.*?)```", text, re.S):
-                with open(os.path.join(self.tree, name), "w", encoding="utf-8") as file:
-                    file.write(code)
+            self.save_programs(page)
             for how, lines in blocks(text):
                 data = re.fullmatch(r"data: (\S+)", how)
                 if data and not os.path.isdir(os.path.join(DATA, data[1])):
@@ -527,6 +530,7 @@ class Lines(unittest.TestCase):
         for page in pages():
             if not page.startswith(("docs/tutorial/", "docs/howto/")) or page == "docs/tutorial/your_robot.md":
                 continue
+            self.save_programs(page)
             for how, lines in blocks(read(page)):
                 for line in lines.splitlines() if how.startswith("whole: ") else ():
                     with self.subTest(page=page, line=line):
