@@ -9,8 +9,12 @@ agree to 1e-12, float to the bounds below: states in standard deviations (or of 
 import subprocess
 import sys
 
-import numpy as np
-from scipy import linalg
+try:
+    import numpy as np
+    from scipy import linalg
+except ModuleNotFoundError as error:
+    print(f"{error}: skipped")
+    sys.exit(77)
 
 STEPS = 300
 DOUBLE = (1e-12, 1e-12)  # (state, covariance)
