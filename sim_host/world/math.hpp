@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The world's arithmetic: + - * / sqrt floor, which IEEE 754 makes exact, and src/tetap/base's functions in double. A seed
-// gives the same bits on every host and with every C library.
+// The world's arithmetic: + - * / sqrt floor, which IEEE 754 makes exact, and src/tetap/base's functions in double. A
+// seed gives the same bits on every host and with every C library.
 #pragma once
 
 #include "tetap/base/math.hpp"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A robot drives on the Earth of GeographicLib, which shares nothing with src/tetap/nav. Its way is given in the tangent
-// frame of its start. Its sensors show what the ellipsoid, its normal gravity and the level axes of the place make of
-// it.
+// A robot drives on the Earth of GeographicLib, which shares nothing with src/tetap/nav. Its way is given in the
+// tangent frame of its start. Its sensors show what the ellipsoid, its normal gravity and the level axes of the place
+// make of it.
 #pragma once
 
 #include "tetap/sensor/samples.hpp"

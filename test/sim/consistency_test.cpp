@@ -12,6 +12,8 @@
 //
 // In the default matched world heading lasts for minutes: its gyroscope is as good as the data sheet's. Neither
 // gyroscope nor wheels could be noticed to be wrong there. A second matched world has noises that all matter.
+#include "config/rover.hpp"
+#include "config/rover_landmarks.hpp"
 #include "sim_host/matched_rover.hpp"
 #include "sim_host/world_source.hpp"
 #include "tetap/node/node.hpp"

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // The node with the simulated world's frames: samples of several frames, late fixes, faults. Order of arrival leaves no
 // trace; and the 1 sigma of the motion says how far it is off.
+#include "config/rover.hpp"
+#include "config/rover_landmarks.hpp"
 #include "sim_host/matched_rover.hpp"
 #include "sim_host/world_source.hpp"
 #include "tetap/node/node.hpp"

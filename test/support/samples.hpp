@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Inputs for tests of the elementary functions: a function of an index, so that any one can be repeated and threads can
-// share them out. The generator is not the one of src/tetap/base, which is under test too: SplitMix64 (Steele, Lea, Flood,
-// OOPSLA 2014).
+// share them out. The generator is not the one of src/tetap/base, which is under test too: SplitMix64 (Steele, Lea,
+// Flood, OOPSLA 2014).
 #pragma once
 
 #include <array>
