@@ -12,7 +12,7 @@
 #include <cstdint>
 #include <random>
 
-namespace tetap::node {
+namespace tetap::firmware {
 namespace {
 
 using base::Micros;
@@ -100,4 +100,4 @@ TEST(WiredImu, takes_rate_and_axes_of_the_parameters) {
 }
 
 }  // namespace
-}  // namespace tetap::node
+}  // namespace tetap::firmware
