@@ -232,16 +232,20 @@ class Package(unittest.TestCase):
         there = [os.path.relpath(one, os.path.join(ROOT, "src")) for one in glob.glob(os.path.join(ROOT, "src/tetap/estimators/**/*.cpp"), recursive=True)]
         self.assertEqual(named, sorted(there))
 
-    def test_every_header_of_the_api_compiles_alone(self):
+    def test_every_header_of_the_api_is_installed(self):
         names = api()
         self.assertGreater(len(names), 60)
         self.assertEqual(len(names), len(set(names)))
+        self.assertEqual([name for name in names if not os.path.exists(os.path.join(self.prefix, "include", name))], [])
+
+    @unittest.skipUnless(WHOLE, "a compile for each: whole form alone")
+    def test_every_header_of_the_api_compiles_alone(self):
         eigen = os.path.join(self.folder.name, "eigen.hpp")  # read once: all of them need it
         with open(eigen, "w", encoding="utf-8") as file:
             file.write("#include <Eigen/Core>\n#include <Eigen/Geometry>\n")
         compiler = ("g++", "-std=c++20", "-isystem", "/usr/include/eigen3", "-x", "c++")
         run(*compiler[:-1], "c++-header", eigen)
-        for name in names:
+        for name in api():
             with self.subTest(name=name):
                 run(*compiler, "-fsyntax-only", "-I" + os.path.join(self.prefix, "include"), "-include", eigen, "-include", name, "/dev/null")
 
