@@ -176,7 +176,7 @@ class Recording:
             self.about["dropped"][what] = int(count)
 
     def source(self, path, rows):
-        self._files.append({"file": os.path.basename(path), "rows": int(rows), "sha256": _sha256(path)})
+        self._files.append({"file": os.path.basename(path), "rows": int(rows), "sha256": sha256(path)})
 
     def map_entries(self, identifiers, x_m, y_m, sent=True):
         """`sent` False: the places are truth to compare with, and not on the bus."""
@@ -218,7 +218,7 @@ class Recording:
         if self._sightings is not None:
             rows = zip(*self._sightings)
             truth[f"{out}.sightings.csv"] = ("time_s,landmark\n" + "".join(f"{us / 1e6:.6f},{int(k)}\n" for us, k in rows)).encode()
-        _replace_all({f"{out}.log": log, **truth, f"{out}.json": (json.dumps(self.about, indent=2) + "\n").encode()})
+        replace_all({f"{out}.log": log, **truth, f"{out}.json": (json.dumps(self.about, indent=2) + "\n").encode()})
         counts = ", ".join(f"{name} {count}" for name, count in self.about["messages"].items())
         print(f"{out}.log: {len(frame_times)} frames, {self.about['duration_s']:.1f} s ({counts})")
         for what, count in self.about["dropped"].items():
@@ -236,7 +236,7 @@ class Recording:
             f"{s}.{us:06d},{x:.6f},{y:.6f},{yaw}\n" for s, us, x, y, yaw in zip(seconds, micros, x_m, y_m, yaws))
 
 
-def _sha256(path):
+def sha256(path):
     with open(path, "rb") as file:
         return hashlib.sha256(file.read()).hexdigest()
 
@@ -252,7 +252,7 @@ def set_aside(path):
     print(f"  {path} is not of this log: now {path}.old")
 
 
-def _replace_all(contents):
+def replace_all(contents):
     """Writes files beside their final names, then renames them all."""
     temporary = {path: f"{path}.part{os.getpid()}" for path in contents}
     try:
