@@ -169,5 +169,51 @@ TEST(BigCovariance, WhenFullAStateIsRefused) {
   both.expect_equal(0);
 }
 
+TEST(BigCovariance, CopiedErrorsAreTheSameErrors) {
+  Both both(10);
+  both.p.copy(1, 6, 3);
+  for (int r = 0; r < 10; ++r)
+    for (int c = 0; c < 10; ++c) {
+      const auto from = [](int i) { return i >= 6 && i < 9 ? i - 5 : i; };
+      EXPECT_EQ(static_cast<double>(both.p(r, c)), both.full[at(from(r))][at(from(c))]) << r << "," << c;
+    }
+}
+
+TEST(BigCovariance, AShareOfAnErrorIsAShear) {
+  for (const auto& [to, from] : {std::pair(7, 2), std::pair(2, 7)}) {
+    Both both(9);
+    both.p.add_share(to, -1.5F, from);
+    for (int n = 0; n < 9; ++n) both.full[at(to)][at(n)] += -1.5 * both.full[at(from)][at(n)];
+    for (int n = 0; n < 9; ++n) both.full[at(n)][at(to)] += -1.5 * both.full[at(n)][at(from)];
+    both.expect_equal(1e-4);
+  }
+}
+
+TEST(BigCovariance, ProductsAreTakenOffAndAVarianceStaysAboveItsRounding) {
+  for (const int n : {8, 9}) {
+    Both both(n);
+    Covariance::Rows<6> g{};
+    for (auto& row : g)
+      for (float& value : row) value = 0.1F * both.normal(both.random);
+    both.p.subtract<3>(g, 2);
+    for (int r = 0; r < n; ++r)
+      for (int c = 0; c < n; ++c)
+        for (std::size_t k = 2; k < 5; ++k)
+          both.full[at(r)][at(c)] -= static_cast<double>(g[at(r)][k]) * static_cast<double>(g[at(c)][k]);
+    both.expect_equal(1e-4);
+  }
+  Covariance p;
+  Covariance::States ones{};
+  ones.fill(1.0F);
+  p.begin(ones);
+  EXPECT_EQ(p.size(), kMost);
+  Covariance::Rows<3> whole{};
+  whole[4][1] = 1.0F;
+  p.subtract<3>(whole, 0);
+  EXPECT_GT(p(4, 4), 0.0F);
+  EXPECT_LT(p(4, 4), 1e-6F);
+  EXPECT_EQ(p(3, 3), 1.0F);
+}
+
 }  // namespace
 }  // namespace tetap

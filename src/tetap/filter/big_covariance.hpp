@@ -29,6 +29,12 @@ class BigCovariance {
   [[nodiscard]] Scalar operator()(int r, int c) const { return packed_[index(r, c)]; }
   [[nodiscard]] Scalar& operator()(int r, int c) { return packed_[index(r, c)]; }
   void clear() { size_ = 0; }
+  /// All kMost states in use, independent.
+  void begin(const States& variances) {
+    size_ = kMost;
+    for (Scalar& word : packed_) word = Scalar{0};
+    for (int n = 0; n < kMost; ++n) packed_[index(n, n)] = variances[at(n)];
+  }
 
   /// One more state, by its covariance with each state before it and its own variance. False, and nothing has changed,
   /// when all kMost are in use.
@@ -50,6 +56,23 @@ class BigCovariance {
       if (gone != last) packed_[index(gone, gone)] = packed_[index(last, last)];
       --size_;
     }
+  }
+
+  /// The errors of `count` states from `to` become those of the states from `from`: P = T P T^T by copying. The two
+  /// groups do not overlap.
+  void copy(int from, int to, int count) {
+    for (int k = 0; k < count; ++k)
+      for (int n = 0; n < size_; ++n)
+        if (n < to || n >= to + count) packed_[index(n, to + k)] = packed_[index(n, from + k)];
+    for (int k = 0; k < count; ++k)
+      for (int j = 0; j <= k; ++j) packed_[index(to + j, to + k)] = packed_[index(from + j, from + k)];
+  }
+  /// The error of state `to` gains `share` times that of state `from`, another one.
+  void add_share(int to, Scalar share, int from) {
+    const Scalar before = packed_[index(to, from)], whole = packed_[index(from, from)];
+    for (int n = 0; n < size_; ++n)
+      if (n != to) packed_[index(n, to)] = base::add_product(packed_[index(n, to)], share, packed_[index(n, from)]);
+    packed_[index(to, to)] += share * (before + before + share * whole);
   }
 
   /// P H^T in columns `column` to column + kRows - 1 of `product`, for kRows rows of H. The rows are zero but at the
@@ -139,6 +162,35 @@ class BigCovariance {
     for (int r = 0; r <= c; ++r) column[r] = only.added_to(column[r], w[at(r)]);
   }
 
+  /// P = P - G G^T, G in columns `first` to first + kRank - 1 of g. A variance keeps the rounding error of what it was.
+  template <int kRank, std::size_t kWidth>
+  void subtract(const Rows<kWidth>& g, int first) {
+    const auto held = [](Scalar after, Scalar before) {
+      const Scalar floor = before * Scalar(2.4e-7F);
+      return after > floor ? after : floor;
+    };
+    int c = 0;
+    for (; c + 1 < size_; c += 2) {  // two columns at a time share what is loaded of each row
+      const auto left = taken<kRank>(g, c, first), right = taken<kRank>(g, c + 1, first);
+      Scalar* const low = &packed_[index(0, c)];
+      Scalar* const high = &packed_[index(0, c + 1)];
+      const Scalar before_low = low[c], before_high = high[c + 1];
+      for (int r = 0; r <= c; ++r) {
+        const Scalar* const row = &g[at(r)][at(first)];
+        low[r] = less<kRank>(low[r], left, row);
+        high[r] = less<kRank>(high[r], right, row);
+      }
+      low[c] = held(low[c], before_low);
+      high[c + 1] = held(less<kRank>(high[c + 1], right, right.data()), before_high);
+    }
+    if (c == size_) return;
+    const auto only = taken<kRank>(g, c, first);
+    Scalar* const column = &packed_[index(0, c)];
+    const Scalar before = column[c];
+    for (int r = 0; r <= c; ++r) column[r] = less<kRank>(column[r], only, &g[at(r)][at(first)]);
+    column[c] = held(column[c], before);
+  }
+
   /// Adds a share of each variance to itself.
   void inflate(Scalar share) {
     std::size_t i = 0;
@@ -202,6 +254,20 @@ class BigCovariance {
     }
   };
 
+  /// kRank elements of a row of g.
+  template <int kRank, std::size_t kWidth>
+  static std::array<Scalar, static_cast<std::size_t>(kRank)> taken(const Rows<kWidth>& g, int row, int first) {
+    std::array<Scalar, static_cast<std::size_t>(kRank)> value;
+#pragma GCC unroll 16
+    for (int k = 0; k < kRank; ++k) value[at(k)] = g[at(row)][at(first + k)];
+    return value;
+  }
+  template <int kRank>
+  static Scalar less(Scalar sum, const std::array<Scalar, static_cast<std::size_t>(kRank)>& a, const Scalar* b) {
+#pragma GCC unroll 16
+    for (int k = 0; k < kRank; ++k) sum = base::subtract_product(sum, a[at(k)], b[k]);
+    return sum;
+  }
   /// kRows sums of h times p, side by side.
   template <int kRows, class H, std::size_t kElements>
   static void put(const H& h, const std::array<Scalar, kElements>& p, Scalar* to) {
