@@ -1,0 +1,277 @@
+// SPDX-License-Identifier: Apache-2.0
+// One track as a measurement of the poses it was seen from: the multi-state constraint (Mourikis & Roumeliotis 2007).
+// Work is cut in steps of bounded cost. The point's own error leaves the rows by three Householder reflections, applied
+// to the residual, to S = H P H^T from both sides and to G = P H^T. P is multiplied by sparse rows alone.
+#pragma once
+
+#include "tetap/filter/big_covariance.hpp"
+#include "tetap/slam/point_sighting.hpp"
+#include "tetap/slam/triangulate.hpp"
+
+namespace tetap::slam {
+
+enum class TrackFate : std::uint8_t {
+  kPending,
+  kUsed,
+  kGated,    ///< NIS above 99 % of chi-square: nothing changed
+  kNoDepth,  ///< its point was not found, or lies behind a view
+  kSingular  ///< S has no factor, or something is no number
+};
+
+struct TrackRecord {
+  std::uint16_t id = 0;
+  std::uint8_t sightings = 0, degrees = 0;
+  TrackFate fate = TrackFate::kPending;
+  float nis = -1.0F;  ///< chi-square with `degrees` when all is well; negative: not reached
+};
+
+/// Chi-square at 99 % for 3, 5, ... 29 degrees (Abramowitz & Stegun, table 26.8): a track of n sightings has 2 n - 3.
+[[nodiscard]] constexpr float track_gate(int sightings) {
+  constexpr std::array<float, 14> kQuantile{11.345F, 15.086F, 18.475F, 21.666F, 24.725F, 27.688F, 30.578F,
+                                            33.409F, 36.191F, 38.932F, 41.638F, 44.314F, 46.963F, 49.588F};
+  return kQuantile[static_cast<std::size_t>(sightings < 3 ? 0 : sightings > 16 ? 13 : sightings - 3)];
+}
+
+/// States 0 to 2 are the camera's rotation, six from View::state on are those of the pose.
+template <int kStates, int kClones>
+class TrackUpdate {
+ public:
+  static constexpr int kRows = 2 * kClones, kPoint = 3;
+  using Covariance = filter::BigCovariance<float, kStates>;
+  using Dx = typename Covariance::States;
+
+  struct View {
+    WorldPose pose;
+    model::ImagePoint seen;
+    std::int32_t state = 0;
+  };
+
+  void begin(std::uint16_t id) {
+    record_ = {.id = id};
+    count_ = 0;
+    step_ = Step::kViews;
+    index_ = 0;
+  }
+  void add(const View& view) { view_[at(count_++)] = view; }
+  [[nodiscard]] bool busy() const { return step_ != Step::kNone; }
+  [[nodiscard]] const TrackRecord& record() const { return record_; }
+  /// Correction of all states: meaningful after an update whose fate is kUsed.
+  [[nodiscard]] const Dx& dx() const { return dx_; }
+
+  /// The next step; its cost in units of about ten floating-point operations. `sigma` is the noise of a direction,
+  /// `considered` the state that is not corrected, negative for none.
+  int step(Covariance& p, const model::CameraMounting& camera, float sigma, int considered) {
+    switch (step_) {
+      case Step::kNone:
+        return 0;
+      case Step::kViews:
+        return relate(camera);
+      case Step::kDepth:
+        return iterate(camera, sigma);
+      case Step::kRows:
+        return add_rows(p, camera);
+      case Step::kInnovation:
+        return add_innovation();
+      case Step::kProject:
+        return reflect();
+      case Step::kGate:
+        return gate(sigma);
+      case Step::kGain:
+        return gain();
+      case Step::kCorrect:
+        break;
+    }
+    return correct(p, considered);
+  }
+
+ private:
+  enum class Step : std::uint8_t { kNone, kViews, kDepth, kRows, kInnovation, kProject, kGate, kGain, kCorrect };
+  static constexpr std::size_t at(int i) { return static_cast<std::size_t>(i); }
+  [[nodiscard]] int rows() const { return 2 * count_; }
+
+  int end(TrackFate fate, int cost) {
+    record_.fate = fate;
+    step_ = Step::kNone;
+    return cost;
+  }
+  int next(Step step, int cost) {
+    step_ = step;
+    index_ = 0;
+    return cost;
+  }
+
+  int relate(const model::CameraMounting& camera) {
+    record_.sightings = static_cast<std::uint8_t>(count_);
+    record_.degrees = static_cast<std::uint8_t>(rows() - kPoint);
+    if (count_ < 3) return end(TrackFate::kNoDepth, 1);
+    const nav::Quaternion q_nc0 = view_[0].pose.q_nb * camera.q_cb.conjugate();
+    const nav::Vector3 origin = place(view_[0], camera);
+    for (int k = 0; k < count_; ++k) {
+      const nav::Quaternion q_cn = camera.q_cb * view_[at(k)].pose.q_nb.conjugate();
+      relative_[at(k)] = {.r = (q_cn * q_nc0).matrix(),
+                          .d_m = q_cn.rotate(origin - place(view_[at(k)], camera)),
+                          .seen = view_[at(k)].seen};
+    }
+    depth_ = InverseDepth(view_[0].seen);
+    return next(Step::kDepth, 15 * count_);
+  }
+  static nav::Vector3 place(const View& view, const model::CameraMounting& camera) {
+    return view.pose.p_n_m + view.pose.q_nb.rotate(camera.lever_b_m);
+  }
+
+  int iterate(const model::CameraMounting& camera, float sigma) {
+    const int cost = 5 + 12 * count_;
+    depth_.iterate({relative_.data(), at(count_)}, sigma);
+    if (depth_.fate() == DepthFate::kSought) return cost;
+    if (depth_.fate() != DepthFate::kFound) return end(TrackFate::kNoDepth, cost);
+    const nav::Quaternion q_nc0 = view_[0].pose.q_nb * camera.q_cb.conjugate();
+    point_n_m_ = place(view_[0], camera) + q_nc0.rotate(depth_.point_m());
+    return next(Step::kRows, cost);
+  }
+
+  /// Two rows of H, of the point's part of it and of the residual, and two columns of G = P H^T.
+  int add_rows(const Covariance& p, const model::CameraMounting& camera) {
+    const View& view = view_[at(index_)];
+    const PointSighting sighting(view.pose, camera, point_n_m_);
+    if (!sighting.at.seen) return end(TrackFate::kNoDepth, 15);
+    h_[at(index_)] = sighting.h;
+    of_point_[at(2 * index_)] = sighting.of_point[0];
+    of_point_[at(2 * index_ + 1)] = sighting.of_point[1];
+    nu_[at(2 * index_)] = view.seen.x - sighting.at.at.x;
+    nu_[at(2 * index_ + 1)] = view.seen.y - sighting.at.at.y;
+    p.template times<2, 3, 6>(h_[at(index_)], view.state, g_, 2 * index_);
+    if (++index_ == count_) return next(Step::kInnovation, 15 + 4 * kStates);
+    return 15 + 4 * kStates;
+  }
+
+  /// Rows 2 k and 2 k + 1 of H P H^T against all rows up to them.
+  int add_innovation() {
+    const int k = index_, cost = 8 * (k + 1);
+    for (int w = 0; w <= 2 * k + 1; ++w) {
+      const auto& row = h_[at(w / 2)][at(w % 2)];
+      const int state = view_[at(w / 2)].state;
+      for (int q = 2 * k; q < 2 * k + 2; ++q) {
+        float sum = 0.0F;
+        for (int n = 0; n < 3; ++n) sum += row[at(n)] * g_[at(n)][at(q)];
+        for (int n = 0; n < 6; ++n) sum += row[at(3 + n)] * g_[at(state + n)][at(q)];
+        s_[at(q)][at(w)] = s_[at(w)][at(q)] = sum;
+      }
+    }
+    if (++index_ == count_) return next(Step::kProject, cost);
+    return cost;
+  }
+
+  /// One Householder reflection (Golub & Van Loan 2013, alg. 5.1.1): column `index_` of the point's part is zero below.
+  int reflect() {
+    const int c = index_, m = rows(), cost = (m - c) * (kStates + 2 * m) * 2 / 5;
+    std::array<float, kRows> u{};
+    float square = 0.0F;
+    for (int q = c; q < m; ++q) {
+      u[at(q)] = of_point_[at(q)][at(c)];
+      square += u[at(q)] * u[at(q)];
+    }
+    if (!(square > 1e-20F) || !(square < 1e20F)) return end(TrackFate::kSingular, cost);
+    const float length = base::sqrt(square);
+    const float head = u[at(c)];
+    u[at(c)] += head > 0.0F ? length : -length;
+    const float scale = 1.0F / (square + length * base::abs(head));  // 2 / u^T u
+    const auto turn = [&](auto&& entry) __attribute__((always_inline)) {
+      float sum = 0.0F;
+      for (int q = c; q < m; ++q) sum += u[at(q)] * entry(q);
+      sum *= scale;
+      for (int q = c; q < m; ++q) entry(q) -= sum * u[at(q)];
+    };
+    for (int j = c; j < kPoint; ++j) turn([&](int q) -> float& { return of_point_[at(q)][at(j)]; });
+    turn([&](int q) -> float& { return nu_[at(q)]; });
+    for (int j = 0; j < m; ++j) turn([&](int q) -> float& { return s_[at(q)][at(j)]; });
+    for (int j = 0; j < m; ++j) turn([&](int q) -> float& { return s_[at(j)][at(q)]; });
+    for (auto& row : g_) turn([&](int q) -> float& { return row[at(q)]; });
+    if (++index_ == kPoint) return next(Step::kGate, cost);
+    return cost;
+  }
+
+  /// L of S + R in place, nu becomes L^-1 nu; the gate.
+  int gate(float sigma) {
+    const int m = rows(), cost = m * m * m / 30 + 10;
+    float nis = 0.0F;
+    for (int q = kPoint; q < m; ++q) {
+      for (int w = kPoint; w < q; ++w) {
+        float sum = s_[at(q)][at(w)];
+        for (int k = kPoint; k < w; ++k) sum -= s_[at(q)][at(k)] * s_[at(w)][at(k)];
+        s_[at(q)][at(w)] = sum * s_[at(w)][at(w)];
+      }
+      float pivot = s_[at(q)][at(q)] + sigma * sigma, rest = nu_[at(q)];
+      for (int k = kPoint; k < q; ++k) {
+        pivot -= s_[at(q)][at(k)] * s_[at(q)][at(k)];
+        rest -= s_[at(q)][at(k)] * nu_[at(k)];
+      }
+      if (!(pivot > 0.0F) || !(pivot < 1e20F)) return end(TrackFate::kSingular, cost);
+      s_[at(q)][at(q)] = 1.0F / base::sqrt(pivot);
+      nu_[at(q)] = rest * s_[at(q)][at(q)];
+      nis += nu_[at(q)] * nu_[at(q)];
+    }
+    if (!(nis < 1e20F)) return end(TrackFate::kSingular, cost);
+    record_.nis = nis;
+    if (!(nis <= track_gate(count_))) return end(TrackFate::kGated, cost);
+    return next(Step::kGain, cost);
+  }
+
+  /// G becomes G L^-T, and dx = G nu.
+  int gain() {
+    const int m = rows();
+    for (int n = 0; n < kStates; ++n) {
+      auto& row = g_[at(n)];
+      float sum = 0.0F;
+      for (int q = kPoint; q < m; ++q) {
+        float value = row[at(q)];
+        for (int k = kPoint; k < q; ++k) value = base::subtract_product(value, s_[at(q)][at(k)], row[at(k)]);
+        row[at(q)] = value * s_[at(q)][at(q)];
+        sum = base::add_product(sum, row[at(q)], nu_[at(q)]);
+      }
+      dx_[at(n)] = sum;
+    }
+    return next(Step::kCorrect, kStates * (m - kPoint) * (m - kPoint) / 8);
+  }
+
+  int correct(Covariance& p, int considered) {
+    int rank = rows() - kPoint, first = kPoint;
+    const int cost = kStates * kStates * rank / 10;
+    const float kept = considered >= 0 ? p(considered, considered) : 0.0F;
+    for (; rank > 9; rank -= 4, first += 4) p.template subtract<4>(g_, first);
+    switch (rank) {
+      case 3:
+        p.template subtract<3>(g_, first);
+        break;
+      case 5:
+        p.template subtract<5>(g_, first);
+        break;
+      case 7:
+        p.template subtract<7>(g_, first);
+        break;
+      default:
+        p.template subtract<9>(g_, first);
+        break;
+    }
+    if (considered >= 0) {
+      dx_[at(considered)] = 0.0F;
+      p(considered, considered) = kept;
+    }
+    return end(TrackFate::kUsed, cost);
+  }
+
+  std::array<View, kClones> view_{};
+  std::array<RelativeView, kClones> relative_{};
+  InverseDepth depth_;
+  nav::Vector3 point_n_m_ = nav::Vector3::Zero();
+  std::array<std::array<std::array<float, 9>, 2>, kClones> h_{};
+  std::array<std::array<float, kPoint>, kRows> of_point_{};
+  std::array<float, kRows> nu_{};
+  std::array<std::array<float, kRows>, kRows> s_{};
+  typename Covariance::template Rows<kRows> g_{};
+  Dx dx_{};
+  TrackRecord record_;
+  std::int32_t count_ = 0, index_ = 0;
+  Step step_ = Step::kNone;
+};
+
+}  // namespace tetap::slam
