@@ -176,7 +176,7 @@ std::int64_t RccG4::usart2_hz() const {
 }
 
 // RM0440, RCC_CCIPR.FDCANSEL: HSE, PLL "Q", PCLK1, reserved.
-std::int64_t RccG4::hz() const {
+std::int64_t RccG4::fdcan_hz() const {
   const std::uint32_t configured = word(reg::pllcfgr::kOffset);
   switch (reg::ccipr::kFdcansel.of(word(reg::ccipr::kOffset))) {
     case 0:
