@@ -66,6 +66,12 @@ void OutFile::discard() {
   if (written_ != path_) std::filesystem::remove(written_, none);
 }
 
+void OutFile::withdraw() {
+  discard();
+  std::error_code none;
+  if (written_ != path_) std::filesystem::remove(path_, none);
+}
+
 void OutFile::close() {
   end();
   publish();

@@ -30,6 +30,8 @@ class OutFile {
   void flush();
   /// Takes the file away that was written aside, before publish().
   void discard();
+  /// In place of publish(): takes away what was written aside, and what an earlier run left under the name.
+  void withdraw();
 
  private:
   static constexpr std::size_t kBlock = 1 << 18;

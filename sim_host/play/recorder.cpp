@@ -53,8 +53,19 @@ const Recorder::Totals& Recorder::end() {
   return tables_.end();
 }
 
+// A node that makes no map has no tables of one.
+void Recorder::Files::publish() {
+  for (std::size_t i = 0; i < of.size(); ++i) {
+    const bool of_map = i >= static_cast<std::size_t>(Table::kMap);
+    if (of_map && writes_[i] <= 1)
+      of[i].withdraw();
+    else
+      of[i].publish();
+  }
+}
+
 void Recorder::publish() {
-  for (OutFile& file : files_.of) file.publish();
+  files_.publish();
   if (raw_) raw_->publish();
 }
 

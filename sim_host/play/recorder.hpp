@@ -48,8 +48,15 @@ class Recorder {
   class Files final : public TableSink {
    public:
     explicit Files(const std::string& folder);
-    void write(Table table, std::string_view lines) override { of[static_cast<std::size_t>(table)].write(lines); }
+    void write(Table table, std::string_view lines) override {
+      of[static_cast<std::size_t>(table)].write(lines);
+      ++writes_[static_cast<std::size_t>(table)];
+    }
+    void publish();
     std::array<OutFile, kTableNames.size()> of;
+
+   private:
+    std::array<std::uint64_t, kTableNames.size()> writes_{};  ///< the first is the head of the table
   };
   void raw_line(const base::CanFrame& frame, base::Micros time);
 

@@ -89,6 +89,15 @@ TEST_F(Folder, ARunLeavesItsFilesBehind) {
   EXPECT_NE(json.find("\"estimates_sha256\": \"" + hash.hex() + "\""), std::string::npos);
 }
 
+TEST_F(Folder, ANodeWithoutAMapLeavesNoTableOfOneNotEvenAnOldOne) {
+  make_folder(path_);
+  std::ofstream(path_ + "/map.csv") << "of an earlier run\n";
+  EXPECT_EQ(play(script(20)), 0);
+  for (const char* const name : {"map.csv", "keyframes.csv", "graph.csv"})
+    for (const char* const end : {"", ".part"}) EXPECT_FALSE(std::filesystem::exists(path_ + "/" + name + end)) << name;
+  EXPECT_TRUE(std::filesystem::exists(path_ + "/sources.csv"));
+}
+
 TEST_F(Folder, EstimatesAreTheSameBytesForEveryWindow) {
   EXPECT_EQ(play(script(100), {}, path_ + "/a", 1), 0);
   EXPECT_EQ(play(script(100), {}, path_ + "/b", 64), 0);
