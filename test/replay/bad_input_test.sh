@@ -7,6 +7,7 @@ set -u
 cd "$root" || exit 2
 self=test/replay/bad_input_test.sh
 work=${BAD_INPUT_WORK:-}
+unset BUS  # as a user who has set none
 failed=0 count=0
 
 # refused NAME PATTERN COMMAND...: the one line has to match the pattern (extended regular expression).

@@ -210,7 +210,9 @@ def found_after_s(truth_path, estimates_path):
     valid = np.array([row["pos_valid"] == "1" for row in rows])
     found = np.array([[float(row["x_m"] or 0), float(row["y_m"] or 0)] for row in rows])
     error = found - np.column_stack([np.interp(time_s, truth[:, 0], truth[:, i]) for i in (1, 2)])
-    return metrics.recovered_after_s(time_s, np.hypot(*error.T), valid)
+    recovery = metrics.Recovery()
+    recovery.add(time_s, np.hypot(*error.T), valid)
+    return recovery.value()
 
 
 def udacity_particles(runs, bounds, pool):

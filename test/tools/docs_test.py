@@ -609,7 +609,7 @@ class Lines(unittest.TestCase):
             file.write('#include "config/mine.hpp"\n#include <memory>\nnamespace r = tetap::robot::mine;\nusing Node = tetap::node::Node<r::Estimators>;\n'
                        "std::unique_ptr<Node> f(const tetap::bus::Version& v) { return std::make_unique<Node>(r::parameters, v); }\n"
                        "static_assert(r::parameters.wheels.drive.noise_left > 0 && r::parameters.wheels.drive.noise_right > 0);\n")
-        os.makedirs(os.path.join(self.tree, "made/bus"))
+        os.makedirs(os.path.join(self.tree, "made/tetap/bus"))
         self.run_here("tools/can/generate_messages --header made/tetap/bus/messages.hpp")
         for compiler in ("g++", "clang++"):
             self.run_here(f"{compiler} -std=c++20 -fsyntax-only -Wall -Wextra -Werror -Wno-missing-field-initializers -I. -Isrc -Imade -isystem /usr/include/eigen3 robot.cpp")
@@ -624,7 +624,7 @@ class Lines(unittest.TestCase):
                        "static_assert(node::EstimatorSlot<estimators::GnssTrack>::kTakes<sensor::GnssPosition>);\n"
                        "constexpr param::Parameters parameters = param::checked({.gnss = {.sigma_floor_m = 1.0F}});\n"
                        "std::unique_ptr<Node> f(const bus::Version& v) { return std::make_unique<Node>(parameters, v); }\n")
-        os.makedirs(os.path.join(self.tree, "made/bus"))
+        os.makedirs(os.path.join(self.tree, "made/tetap/bus"))
         self.run_here("tools/can/generate_messages --header made/tetap/bus/messages.hpp")
         for compiler in ("g++", "clang++"):
             self.run_here(f"{compiler} -std=c++20 -fsyntax-only -Wall -Wextra -Werror -Wno-missing-field-initializers -I. -Isrc -Imade -isystem /usr/include/eigen3 robot.cpp")

@@ -63,8 +63,7 @@ class Registers(unittest.TestCase):
 
     @unittest.skipUnless(os.path.exists(os.path.join(DATA, "svd", "STM32F412.svd")), "no $TETAP_DATA/svd")
     def test_the_headers_in_the_repository_are_what_the_vendors_files_make(self):
-        for wanted in ([], [os.path.join(ROOT, "sim_host", "board", "registers_stm32g474.toml")]):
-            self.assertEqual(subprocess.run([TOOL, "--check", *wanted], capture_output=True, text=True, check=False).stderr, "")
+        self.assertEqual(subprocess.run([TOOL, "--check"], capture_output=True, text=True, check=False).stderr, "")
         with open(os.path.join(DATA, "svd", "SHA256SUMS"), encoding="utf-8") as file:
             sums = {name: value for value, name in (line.split() for line in file)}
         for name, path in HEADERS.items():

@@ -51,11 +51,11 @@ class Mutants(unittest.TestCase):
     def run_with(self, *mutant):
         program = os.path.join(self.folder.name, "program")
         if not os.path.exists(program):
-            os.makedirs(os.path.join(self.folder.name, "base"))
+            os.makedirs(os.path.join(self.folder.name, "tetap", "base"))
             for name, text in (("check.hpp", mutants.with_table(SOURCE, self.constants)), ("main.cpp", MAIN)):
                 with open(os.path.join(self.folder.name, name), "w", encoding="utf-8") as file:
                     file.write(text)
-            with open(os.path.join(ROOT, "test", "mutants", "mutated.hpp"), encoding="utf-8") as source, open(os.path.join(self.folder.name, "base", "mutated.hpp"), "w", encoding="utf-8") as file:
+            with open(os.path.join(ROOT, "test", "mutants", "mutated.hpp"), encoding="utf-8") as source, open(os.path.join(self.folder.name, "tetap", "base", "mutated.hpp"), "w", encoding="utf-8") as file:
                 file.write(source.read())
             subprocess.run(["clang++", "-std=c++20", "-Wall", "-Werror", "-I.", "main.cpp", "-o", "program"], cwd=self.folder.name, check=True)
         environment = {**os.environ, **({"TETAP_MUTANT": f"{mutant[0]}:{mutant[1]}", "TETAP_MUTANT_READ": self.read} if mutant else {})}

@@ -44,6 +44,24 @@ struct Summary {
   bool restarted = false;  ///< within the last second, by ourselves
 };
 
+// Epochs in which a node looks at more than its primary estimator. They decide when a side estimator that is not finite
+// begins anew, on a bus and without one.
+[[nodiscard]] constexpr bool one_of(std::uint32_t epoch, std::int32_t ticks, std::int32_t phase) {
+  return ticks > 0 && (epoch + static_cast<std::uint32_t>(phase)) % static_cast<std::uint32_t>(ticks) == 0;
+}
+[[nodiscard]] constexpr std::int32_t side_phase(std::size_t instance) {
+  return static_cast<std::int32_t>(3 * instance);
+}
+[[nodiscard]] constexpr bool side_published(std::uint32_t epoch, std::int32_t side_every, std::size_t instance) {
+  return one_of(epoch, side_every, side_phase(instance));
+}
+/// Phase of the difference between two attitudes.
+inline constexpr std::int32_t kCompared = 1;
+/// True in the epochs that compare two attitudes: one in four, and those that publish the difference.
+[[nodiscard]] constexpr bool attitudes_compared(std::uint32_t epoch, std::int32_t side_every) {
+  return epoch % 4 == 1 || one_of(epoch, side_every, kCompared);
+}
+
 template <std::size_t EstimatorCount>
 class Publisher {
  public:
@@ -89,12 +107,9 @@ class Publisher {
   }
   /// True when this estimator's estimate goes out in this epoch, where it is not the primary one.
   [[nodiscard]] bool publishes(std::size_t instance) const {
-    return every(parameters_.publish.side_every, side(instance));
+    return side_published(epoch_, parameters_.publish.side_every, instance);
   }
-  /// True in the epochs that compare two attitudes: one in four, and those that publish the difference.
-  [[nodiscard]] bool compares_attitudes() const {
-    return epoch_ % 4 == 1 || every(parameters_.publish.side_every, kCompared);
-  }
+  [[nodiscard]] bool compares_attitudes() const { return attitudes_compared(epoch_, parameters_.publish.side_every); }
   template <class Send>
   void estimate(std::size_t instance, sensor::EstimatorKind kind, bool primary, const estimators::Estimate& e,
                 const estimators::MotionVariance& motion, Send& send);
@@ -172,13 +187,9 @@ class Publisher {
   }
   /// Pages of Est_Diag of every node, and of one with wired sensors; the page that names these.
   static constexpr std::uint32_t kPages = 9, kAllPages = 12, kWiredPage = 10;
-  [[nodiscard]] bool every(std::int32_t ticks, std::int32_t phase = 0) const {
-    return ticks > 0 && (epoch_ + static_cast<std::uint32_t>(phase)) % static_cast<std::uint32_t>(ticks) == 0;
-  }
+  [[nodiscard]] bool every(std::int32_t ticks, std::int32_t phase = 0) const { return one_of(epoch_, ticks, phase); }
   /// Phase of what is to be of one epoch: attitude, velocity, sigmas, pages of the primary estimator.
   static constexpr std::int32_t kTogether = 2;
-  /// Phase of the difference between two attitudes.
-  static constexpr std::int32_t kCompared = 1;
   /// n / 1000 for n below 2^41, in two divisions of 32 bits: a core of 32 bits has no other.
   [[nodiscard]] static constexpr std::uint32_t thousandth(std::uint64_t n) {
     const auto high = static_cast<std::uint32_t>(n >> 16), low = static_cast<std::uint32_t>(n & 0xFFFF);
@@ -194,7 +205,6 @@ class Publisher {
     return um < 0 ? -static_cast<std::int32_t>(mm) : static_cast<std::int32_t>(mm);
   }
   /// Spreads the estimators' slow frames over the epochs.
-  [[nodiscard]] static std::int32_t side(std::size_t instance) { return static_cast<std::int32_t>(3 * instance); }
   [[nodiscard]] std::uint8_t tag() const { return static_cast<std::uint8_t>(epoch_ & 0x0F); }
 
   const param::Parameters& parameters_;
@@ -216,7 +226,7 @@ template <class Send>
 void Publisher<N>::estimate(std::size_t instance, sensor::EstimatorKind kind, bool primary,
                             const estimators::Estimate& e, const estimators::MotionVariance& motion, Send& send) {
   const param::PublishParameters& p = parameters_.publish;
-  if (every(primary ? p.pose_every : p.side_every, side(instance))) {
+  if (every(primary ? p.pose_every : p.side_every, side_phase(instance))) {
     put(bus::EstPos{.x_raw = millimetres(e.pose.x), .y_raw = millimetres(e.pose.y), .epoch = tag(), .kind = kind}, send,
         instance);
     put(bus::EstMotion{.yaw_rad = e.pose.yaw_rad,

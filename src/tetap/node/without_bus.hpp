@@ -51,7 +51,8 @@ struct WholeStamps {
 struct NoDecoder {
   static void power_on() {}
   template <class Out>
-  static void on_frame(std::uint8_t, const base::CanFrame&, base::Micros, bus::Counters& counters, Out&&) {
+  static void on_frame(std::uint8_t, const base::CanFrame&, std::uint32_t, base::Micros, bus::Counters& counters,
+                       Out&&) {
     ++counters.malformed;
   }
   static void expire(base::Micros, base::Micros, bus::Counters&) {}
@@ -62,7 +63,7 @@ struct NoDecoder {
 template <std::size_t kMostRecords>
 class DirectOutput {
  public:
-  DirectOutput(const param::Parameters&, const bus::Version&) {}
+  DirectOutput(const param::Parameters& parameters, const bus::Version&) : side_every_(parameters.publish.side_every) {}
   void power_on() { epoch_ = 0, begin_records(); }
   void resume(const DirectOutput& other) { *this = other; }
 
@@ -90,6 +91,10 @@ class DirectOutput {
     ++epoch_;
   }
   [[nodiscard]] static bool publishes_sigma(std::size_t, bool) { return true; }
+  [[nodiscard]] bool publishes(std::size_t instance) const {
+    return bus::side_published(epoch_, side_every_, instance);
+  }
+  [[nodiscard]] bool compares_attitudes() const { return bus::attitudes_compared(epoch_, side_every_); }
   template <class Out>
   static void estimate(std::size_t instance, sensor::EstimatorKind, bool, const estimators::Estimate& e,
                        const estimators::MotionVariance& motion, Out& out) {
@@ -99,14 +104,13 @@ class DirectOutput {
   static void inertial(std::size_t instance, Inertial&& inertial, Sources&&, Out& out) {
     out.inertial(instance, inertial());
   }
-  template <class Out>
-  static void attitude(std::size_t instance, const estimators::AttitudeEstimate& e, const estimators::Disagreement&,
-                       Out& out) {
-    out.attitude(instance, e);
+  template <class Attitude, class Out>
+  static void attitude(std::size_t instance, Attitude&& attitude, const estimators::Disagreement&, Out& out) {
+    out.attitude(instance, attitude());
   }
-  template <class Out>
-  static void status(const bus::Summary& summary, const bus::LoopHealth&, Out& out) {
-    out.status(summary);
+  template <class GiveSummary, class Out>
+  static void status(GiveSummary&& summary, const bus::LoopHealth&, Out& out) {
+    out.status(summary());
   }
   template <class Out>
   void end(std::uint32_t, const bus::InputCrc&, Out&) {
@@ -128,6 +132,7 @@ class DirectOutput {
   std::array<Record, kMostRecords> records_{};
   std::size_t size_ = 0, lost_ = 0;
   std::uint32_t epoch_ = 0;
+  std::int32_t side_every_;
   bool ended_ = false;  ///< the records are those of a tick that is over
 };
 
