@@ -4,7 +4,6 @@
 #include "tetap/estimators/planar/pose_grid.hpp"
 #include "estimators/circling_robot.hpp"
 #include "support/never_nan.hpp"
-#include "tetap/base/state_words.hpp"
 #include "tetap/node/estimator_slot.hpp"
 
 #include <gtest/gtest.h>
@@ -61,7 +60,7 @@ struct Robot : test::CirclingRobot<Grid> {
   }
   [[nodiscard]] std::uint32_t whole_hash() const {
     base::BitCrc crc;
-    base::each_word(estimator, crc);
+    estimator.hash_state(crc);
     estimator.hash_memory(crc);
     return crc.value();
   }

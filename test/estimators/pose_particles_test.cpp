@@ -4,7 +4,6 @@
 #include "tetap/estimators/planar/pose_particles.hpp"
 #include "estimators/circling_robot.hpp"
 #include "support/never_nan.hpp"
-#include "tetap/base/state_words.hpp"
 #include "tetap/node/estimator_slot.hpp"
 
 #include <gtest/gtest.h>
@@ -29,7 +28,7 @@ std::unique_ptr<Robot> robot_at(float x_m, float y_m, float yaw_rad) {
 }
 std::uint32_t whole_hash(const Robot& robot) {
   base::BitCrc crc;
-  base::each_word(robot.estimator, crc);
+  robot.estimator.hash_state(crc);
   robot.estimator.hash_memory(crc);
   return crc.value();
 }

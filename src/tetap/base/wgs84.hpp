@@ -5,7 +5,6 @@
 #pragma once
 
 #include "tetap/base/math_double.hpp"
-#include "tetap/base/members.hpp"
 
 #include <cstdint>
 #include <optional>
@@ -40,7 +39,6 @@ struct Level {
   SinCosDouble longitude{};
 
   constexpr Level() = default;
-  static constexpr auto members(auto& self) { return base::members(self.latitude, self.longitude); }
   constexpr Level(std::int64_t latitude_2ndeg, std::int64_t longitude_2ndeg)
       : latitude(sincos(static_cast<double>(latitude_2ndeg) * kRadPer2ndeg)),
         longitude(sincos(static_cast<double>(longitude_2ndeg) * kRadPer2ndeg)) {}

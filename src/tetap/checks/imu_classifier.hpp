@@ -4,7 +4,6 @@
 #pragma once
 
 #include "tetap/base/math.hpp"
-#include "tetap/base/members.hpp"
 #include "tetap/checks/stuck_value.hpp"
 #include "tetap/nav/imu_increment.hpp"
 #include "tetap/param/parameters.hpp"
@@ -75,7 +74,11 @@ class ImuClassifier {
            Repeats::alike(s.dvelocity_b_mps, before.dvelocity_b_mps, kStep_mps);
   }
 
-  static constexpr auto members(auto& self) { return base::members(self.gyro_, self.accel_); }
+  template <class Sink>
+  void hash_state(Sink&& sink) const {
+    gyro_.hash_state(sink);
+    accel_.hash_state(sink);
+  }
 
  private:
   using Repeats = RepeatCounter<3>;

@@ -5,7 +5,6 @@
 // TAC 21(1).
 #pragma once
 
-#include "tetap/base/members.hpp"
 #include "tetap/nav/ins.hpp"
 
 #include <cstdint>
@@ -39,7 +38,10 @@ class ImuDrift {
   /// Measurements contradicted the IMU in one of the last tests.
   [[nodiscard]] bool shown() const { return shown_ > 0; }
 
-  static constexpr auto members(auto& self) { return base::members(self.shown_, self.level_, self.up_); }
+  template <class Sink>
+  void hash_state(Sink&& sink) const {
+    sink(static_cast<std::uint32_t>(shown_ | (level_ ? 256U : 0U) | (up_ ? 512U : 0U)));
+  }
 
  private:
   static constexpr float kFade_s = 1;        ///< time constant of what corrections leave in the sum

@@ -6,7 +6,6 @@
 #pragma once
 
 #include "tetap/base/math.hpp"
-#include "tetap/base/members.hpp"
 
 #include <array>
 
@@ -104,8 +103,11 @@ class ComplexKalman {
     return positive ? Verdict::kAccepted : Verdict::kSingular;
   }
 
-  static constexpr auto members(auto& self) {
-    return base::members(base::in_turns(self.x_), base::in_turns(self.own_), base::in_turns(self.pair_));
+  template <class Sink>
+  void hash_state(Sink&& sink) const {
+    for (const Complex& value : x_) sink(value.re), sink(value.im);
+    for (const float variance : own_) sink(variance);
+    for (const Complex& value : pair_) sink(value.re), sink(value.im);
   }
 
  private:
