@@ -9,8 +9,8 @@ namespace tetap::sim {
 Line& Line::integer(std::int64_t value, int width) {
   std::array<char, 24> digits{};
   const bool negative = value < 0;
-  const std::uint64_t file_size = negative ? ~static_cast<std::uint64_t>(value) + 1 : static_cast<std::uint64_t>(value);
-  const char* end = std::to_chars(digits.data(), digits.data() + digits.size(), file_size).ptr;
+  const std::uint64_t magnitude = negative ? ~static_cast<std::uint64_t>(value) + 1 : static_cast<std::uint64_t>(value);
+  const char* end = std::to_chars(digits.data(), digits.data() + digits.size(), magnitude).ptr;
   if (negative) put('-');
   for (auto n = static_cast<int>(end - digits.data()); n < width; ++n) put('0');
   return text({digits.data(), end});

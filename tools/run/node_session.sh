@@ -23,21 +23,7 @@ board_known() {
 }
 
 # preset_of BOARD: the preset of CMakePresets.json whose TETAP_BOARD names that board.
-preset_of() {
-  /usr/bin/python3 - "$root/CMakePresets.json" "$1" <<'PYTHON'
-import json, sys
-path, wanted = sys.argv[1:]
-try:
-    with open(path, encoding="utf-8") as file:
-        presets = json.load(file)["configurePresets"]
-except ValueError as error:
-    sys.exit(f"CMakePresets.json: {error}")
-presets = {board: one["name"] for one in presets for board in one.get("cacheVariables", {}).get("TETAP_BOARD", "").split(";") if board}
-if wanted not in presets:
-    sys.exit(f"no board '{wanted}'; there are: {' '.join(presets)} (each is in the TETAP_BOARD of a preset in CMakePresets.json)")
-print(presets[wanted])
-PYTHON
-}
+preset_of() { /usr/bin/python3 -B "$root/tools/python/tetap/presets.py" "$root" "$1"; }
 
 one_of() { local name=$1 one; shift; for one; do [ "$one" != "$name" ] || return 0; done; return 1; }
 # robot_known ROBOT: to the programs; image_known ROBOT: there is a flash image of it.

@@ -49,6 +49,7 @@ struct Summary {
 [[nodiscard]] constexpr bool one_of(std::uint32_t epoch, std::int32_t ticks, std::int32_t phase) {
   return ticks > 0 && (epoch + static_cast<std::uint32_t>(phase)) % static_cast<std::uint32_t>(ticks) == 0;
 }
+/// Phase that spreads the estimators' slow frames over the epochs.
 [[nodiscard]] constexpr std::int32_t side_phase(std::size_t instance) {
   return static_cast<std::int32_t>(3 * instance);
 }
@@ -204,7 +205,6 @@ class Publisher {
     const std::uint32_t mm = thousandth(rounded);
     return um < 0 ? -static_cast<std::int32_t>(mm) : static_cast<std::int32_t>(mm);
   }
-  /// Spreads the estimators' slow frames over the epochs.
   [[nodiscard]] std::uint8_t tag() const { return static_cast<std::uint8_t>(epoch_ & 0x0F); }
 
   const param::Parameters& parameters_;

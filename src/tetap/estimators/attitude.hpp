@@ -63,7 +63,6 @@ class Attitude {
 
  private:
   static constexpr base::Micros kSilent{500'000};
-  /// Between the stamps of samples that follow each other; drivers' clocks jitter.
   /// The filter's longest step: the gyroscope is taken to have shown the same throughout.
   static constexpr base::Micros kBridged{200'000};
 

@@ -54,11 +54,11 @@ void PlanarDeadReckoning<Filter>::each_held(base::Micros t, const param::Paramet
 template <class Filter>
 model::PlanarIncrement PlanarDeadReckoning<Filter>::take_held(base::Micros t, const param::Parameters& n) {
   model::PlanarIncrement last;
-  bool two = false;
+  bool waits = false;  // one increment, of the held speeds, before that of the time-out
   each_held(t, n, [&](const model::PlanarIncrement& increment, float dt_s, bool gyro) {
-    if (two) filter.predict(last);
+    if (waits) filter.predict(last);
     last = increment;
-    two = true;
+    waits = true;
     if (held_.kind == Held::Kind::kWheels) {
       applied_left_m_ += held_.first_mps * dt_s;
       applied_right_m_ += held_.second * dt_s;
