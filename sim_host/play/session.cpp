@@ -2,6 +2,7 @@
 #include "sim_host/play/session.hpp"
 
 #include "sim_host/play/interruption.hpp"
+#include "sim_host/replay/complaint.hpp"
 #include "sim_host/replay/line.hpp"
 
 #include <unistd.h>
@@ -22,22 +23,6 @@ std::string number(double value, int decimals) {
 double to_seconds(base::Micros span) { return static_cast<double>(span.us) * 1e-6; }
 
 }  // namespace
-
-std::string quoted(std::string_view text) {
-  std::string out = "\"";
-  for (const char c : text) {
-    const auto byte = static_cast<unsigned char>(c);
-    if (c == '"' || c == '\\') out += '\\';
-    if (byte >= 0x20) {
-      out += c;
-    } else {
-      Line escape;
-      escape.text("\\u").hex(byte, 4);
-      out += escape.view();
-    }
-  }
-  return out + '"';
-}
 
 Session::Session(const SessionOptions& options, Comparison* comparison)
     : options_(options),
@@ -69,32 +54,6 @@ void Session::show_progress() {
   std::fwrite(line.view().data(), 1, line.view().size(), stderr);
 }
 
-std::string Session::complaint() const {
-  if (!error_.empty()) return error_;
-  const auto count = [](std::uint64_t n) { return std::to_string(n); };
-  if (counts_.lost() > 0)
-    return count(counts_.lost()) + " frames lost (" + count(counts_.lost_inputs) + " to the node, " +
-           count(counts_.lost_outputs) + " from it, of these " + count(counts_.overflows) + " in our own socket)";
-  if (counts_.extra() > 0)
-    return count(counts_.extra()) + " frames too many (" + count(counts_.extra_inputs) + " to the node, " +
-           count(counts_.extra_outputs) + " from it): is there another sender on this bus?";
-  if (comparison_ == nullptr) return {};
-  if (comparison_->different() > 0)
-    return (comparison_->other_numbers()
-                ? "the recorded node was another robot or ran with other numbers (Est_Version.Config): "
-                : std::string()) +
-           count(comparison_->different()) + " of " + count(comparison_->compared()) +
-           " epochs differ from the recording; first " + comparison_->first_difference() +
-           (comparison_->other_numbers() ? "; --lockstep plays its inputs alone (make replay PLAY=--lockstep)" : "");
-  if (comparison_->missing() > 0) return count(comparison_->missing()) + " recorded epochs were not repeated";
-  if (const auto& hole = comparison_->recording().hole)
-    return hole->why + "; " + count(comparison_->compared()) + " epochs up to there are equal, " +
-           count(comparison_->recording().unlogged) + " behind it cannot be repeated";
-  if (comparison_->recording().missing_outputs > 0)
-    return "the recording itself lacks " + count(comparison_->recording().missing_outputs) + " frames of the node";
-  return {};
-}
-
 int Session::finish() {
   const double wall_s = to_seconds(hal::monotonic_clock() - began_);
   recorder_.end();
@@ -102,7 +61,7 @@ int Session::finish() {
   write_json(json, wall_s);
   publish(json);
   if (terminal_ && !options_.quiet) std::fputs("\r\033[K", stderr);
-  const std::string wrong = complaint();
+  const std::string wrong = error_.empty() ? complaint(counts_, comparison_) : error_;
   const int signal = error_.empty() ? 0 : Interruption::signal();
   // Whoever sends TERM has a reason to print.
   if (!wrong.empty() && signal != SIGTERM) std::fprintf(stderr, "%s: %s\n", options_.program.c_str(), wrong.c_str());

@@ -7,6 +7,7 @@
 #include "sim_host/play/out_file.hpp"
 #include "sim_host/play/recorder.hpp"
 #include "sim_host/replay/frame_accounting.hpp"
+#include "sim_host/replay/line.hpp"
 #include "sim_host/replay/link.hpp"
 #include "sim_host/replay/recording.hpp"
 
@@ -73,7 +74,6 @@ class Session {
 
  private:
   void show_progress();
-  [[nodiscard]] std::string complaint() const;
   void write_json(OutFile& file, double wall_s);
   void publish(OutFile& json);
 
@@ -89,8 +89,5 @@ class Session {
   base::Micros shown_ = began_;
   bool terminal_ = false;
 };
-
-/// Text as a JSON string, quotes included.
-[[nodiscard]] std::string quoted(std::string_view text);
 
 }  // namespace tetap::sim

@@ -37,4 +37,20 @@ Line& Line::hex(std::uint32_t value, int digits) {
   return *this;
 }
 
+std::string quoted(std::string_view text) {
+  std::string out = "\"";
+  for (const char c : text) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (c == '"' || c == '\\') out += '\\';
+    if (byte >= 0x20) {
+      out += c;
+    } else {
+      Line escape;
+      escape.text("\\u").hex(byte, 4);
+      out += escape.view();
+    }
+  }
+  return out + '"';
+}
+
 }  // namespace tetap::sim

@@ -37,6 +37,9 @@ class Line {
   std::size_t size_ = 0;
 };
 
+/// Text as a JSON string, quotes included.
+[[nodiscard]] std::string quoted(std::string_view text);
+
 /// "12.340 s", for messages.
 [[nodiscard]] inline std::string in_seconds(base::Micros t) {
   Line text;

@@ -213,11 +213,12 @@ void RecordSurvey::start_at(std::uint64_t input) {
 /// Takes what this epoch consumed: its own inputs, then as many of others as its count has beyond them.
 RecordSurvey::Step RecordSurvey::consume(const Entry& entry, std::uint64_t end, Place& place) const {
   Place next = place;
-  for (; next.own < entry.own_until; ++next.own) next.tally.add(own_crcs_[next.own - first_own_crc_]);
+  for (; next.own < entry.own_until; ++next.own)
+    next.tally.add(own_crcs_[static_cast<std::size_t>(next.own - first_own_crc_)]);
   auto others = static_cast<std::uint16_t>(entry.in_count - next.tally.count());
   if (others >= 0x8000) others = 0;  // more of its own than it counted: the sum will not fit
   if (next.input + others > end) return Step::kLacksInputs;
-  for (; others > 0; --others) next.tally.add(crcs_[next.input++ - first_crc_]);
+  for (; others > 0; --others) next.tally.add(crcs_[static_cast<std::size_t>(next.input++ - first_crc_)]);
   next.tally.close_epoch();
   place = next;
   return Step::kDone;

@@ -32,6 +32,7 @@ class [[nodiscard]] Result {
   [[nodiscard]] T& operator*() { return *std::get_if<0>(&held_); }
   [[nodiscard]] const T& operator*() const { return *std::get_if<0>(&held_); }
   [[nodiscard]] T* operator->() { return std::get_if<0>(&held_); }
+  [[nodiscard]] const T* operator->() const { return std::get_if<0>(&held_); }
   /// Only where there is none.
   [[nodiscard]] const Failure& failure() const { return *std::get_if<1>(&held_); }
 
