@@ -39,18 +39,20 @@ comma := ,
 robots := $(shell tools/run/list_robots)
 # A robot of simulation alone is another one with other parameters.
 module := $(if $(filter $(ROBOT),$(robots)),$(ROBOT),$(patsubst %_matched,%,$(filter rover_matched rover_landmarks_matched,$(ROBOT))))
-ifneq ($(filter sim replay doctor programs firmware board flash laws,$(MAKECMDGOALS)),)
+ifneq ($(filter sim replay doctor programs firmware board flash laws page,$(MAKECMDGOALS)),)
 ifeq ($(module),)
 $(error no robot '$(ROBOT)'; there are: $(robots) rover_landmarks_matched rover_matched)
 endif
 endif
 node := $(if $(filter memory,$(BUS)),,$(comma)tetap-node)
+page_suffix := $(if $(filter file,$(origin ROBOT)),,.$(module))
+page_variant := $(if $(page_suffix),TETAP_VARIANT=$(module) TETAP_SETTINGS=-DTETAP_PAGE_ROBOTS=$(module))
 
-.PHONY: help sim board test quick proof replay record doctor firmware flash size heap stack count bits hashes soak matrix swarm mutants laws constants bench costs check docs dbc setup programs arm
+.PHONY: help sim board test quick proof replay record doctor firmware flash size heap stack count bits hashes soak matrix swarm mutants laws constants bench costs check docs dbc page page-test setup programs arm
 
 help: ## this list
 	@echo "tetap: state estimation on the robot's own microcontroller"; echo
-	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | while IFS=$$'\t' read -r name text; do printf '  make %-9s %s\n' "$$name" "$$text"; done
+	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | while IFS=$$'\t' read -r name text; do printf '  make %-9s %s\n' "$$name" "$$text"; done
 	@echo; echo "  ROBOT=$(ROBOT) BOARD=$(BOARD) BUS=$(BUS) SEED=$(SEED) FAULT= REALTIME= LOG= TRUTH="
 	@echo "  robots: $$(tools/run/list_robots) (a config/NAME.hpp of your own is one, too)"
 	@echo "  and in simulation alone, with parameters that equal the noise of the world: rover_landmarks_matched rover_matched"
@@ -145,6 +147,14 @@ docs: setup programs ## the generated pages of docs/
 
 dbc: setup ## docs/reference/messages.md from config/tetap.dbc; the C++ messages are made in each build folder
 	@tools/can/generate_messages config/tetap.dbc --table docs/reference/messages.md
+
+page: setup ## the player as one file for a browser, with all robots: out/page/tetap.html (ROBOT=NAME: with this one alone)
+	@$(page_variant) tools/run/build_preset page:page_module
+	@sim_host/page/pack build/page$(page_suffix)/sim_host/page/tetap.wasm out/page/tetap.html
+
+page-test: setup page ## the page in a headless browser against the host's programs, pictures in out/page (its browser is installed for it)
+	@tools/run/build_preset host:tetap-world,tetap-play,robot_rover,robot_mrclam,robot_husky
+	@sim_host/page/test/run
 
 setup:
 	@tools/run/install_packages

@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: Apache-2.0
+// The module's interface: what web/engine.js calls. A function returns 0, or 1 where it has written a refusal.
+#include "sim_host/doctor/diagnosis.hpp"
+#include "sim_host/page/module/browser.hpp"
+#include "sim_host/page/module/description.hpp"
+#include "sim_host/page/module/identity.hpp"
+#include "sim_host/page/module/json.hpp"
+#include "sim_host/page/module/replay.hpp"
+#include "sim_host/page/module/robots.hpp"
+#include "tetap/param/limits.hpp"
+
+#include <cmath>
+#include <cstdint>
+#include <string>
+
+#define TETAP_EXPORT(name) extern "C" [[clang::export_name(#name)]]
+
+namespace {
+
+using namespace tetap;
+
+struct Chosen {
+  const sim::Robot* robot = nullptr;
+  param::Parameters parameters;
+};
+Chosen chosen;
+
+std::uint32_t refuse(std::string_view why) {
+  page::write(page::Channel::kRefusal, why);
+  return 1;
+}
+
+std::string plain(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.7g", value);
+  return text;
+}
+
+}  // namespace
+
+TETAP_EXPORT(describe) void describe() { page::write(page::Channel::kDescription, page::description()); }
+
+/// The robot of that number, with its own parameters.
+TETAP_EXPORT(choose) std::uint32_t choose(std::uint32_t robot) {
+  if (robot >= page::robots().size()) return refuse("no robot of number " + std::to_string(robot));
+  chosen = {page::robots()[robot], *page::robots()[robot]->parameters};
+  return 0;
+}
+
+/// One element of a parameter, against the limits of its row.
+TETAP_EXPORT(set) std::uint32_t set(std::uint32_t number, std::uint32_t element, double value) {
+  if (number >= std::size(param::kTable)) return refuse("no parameter of number " + std::to_string(number));
+  const param::Row& row = param::kTable[number];
+  const std::string path = row.path, unit = *row.unit == '\0' ? "" : std::string(" ") + row.unit;
+  if (element >= row.elements) return refuse(path + " has no element " + std::to_string(element));
+  if (!param::within(row, value))
+    return refuse(path + " is " + plain(value) + unit + "; it has to be from " + plain(row.minimum) + " to " +
+                  plain(row.maximum));
+  if (row.storage == param::Storage::kWhole && std::abs(value - std::trunc(value)) > 0)
+    return refuse(path + " is " + plain(value) + unit + "; it has to be a whole number");
+  row.set(chosen.parameters, element, value);
+  return 0;
+}
+
+/// The rules between parameters.
+TETAP_EXPORT(check) std::uint32_t check() {
+  const param::Rule* const broken = param::broken_rule(chosen.parameters);
+  if (broken != nullptr) return refuse(std::string(broken->path) + " has to be " + broken->text);
+  if (chosen.robot != nullptr && chosen.robot->takes.own_map && !param::has_map_ids(chosen.parameters.can_base))
+    return refuse(std::string("can_base has to be ") + param::kMapIdsRule);
+  return 0;
+}
+
+/// The node whose log it is.
+TETAP_EXPORT(identify) std::uint32_t identify() {
+  const auto identity = page::identity_of_log();
+  if (!identity) return refuse(identity.failure().text);
+  page::write(page::Channel::kLog, *identity);
+  return 0;
+}
+
+/// Plays the log; `mode` is a sim::PlayMode.
+TETAP_EXPORT(replay) std::uint32_t replay(std::uint32_t base, std::uint32_t mode, std::uint32_t keep_going) {
+  if (chosen.robot == nullptr) return refuse("no robot is chosen");
+  const auto played =
+      page::replay(*chosen.robot, chosen.parameters,
+                   {.base = base, .mode = static_cast<sim::PlayMode>(mode), .keep_going = keep_going != 0});
+  return played ? 0 : refuse(played.failure().text);
+}
+
+/// The doctor's findings; `of_robot` 0: by the log alone.
+TETAP_EXPORT(diagnose) std::uint32_t diagnose(std::uint32_t base, std::uint32_t of_robot, std::uint32_t keep_going) {
+  page::BrowserLog log("log", {.interface = {}, .keep_going = keep_going != 0, .base = base});
+  const bool known = of_robot != 0 && chosen.robot != nullptr;
+  const auto facts = known ? doctor::facts_of(chosen.robot->name, chosen.parameters, chosen.robot->takes.inertial)
+                           : doctor::RobotFacts{};
+  const auto found = doctor::diagnose(log, "log", base, facts);
+  if (!found) return refuse(found.failure().text);
+  page::Json json;
+  json.begin('{').member("inputs", found->inputs).member("duration_s", found->duration_s).key("findings").begin('[');
+  for (const doctor::Finding& one : found->findings)
+    json.begin('{')
+        .member("code", doctor::row(one.code).name)
+        .member("cause", doctor::row(one.code).cause)
+        .member("evidence", one.evidence)
+        .member("change", one.change)
+        .end('}');
+  page::write(page::Channel::kDiagnosis, json.end(']').end('}').text());
+  return 0;
+}

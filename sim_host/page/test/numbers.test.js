@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+import { test } from "node:test";
+import assert from "node:assert/strict";
+import { Numbers, shortest } from "../web/numbers.js";
+
+test("a stored float is written with the fewest digits that read back as its bits", () => {
+  for (const [text, value] of [["0.1", Math.fround(0.1)], ["1e-7", Math.fround(1e-7)], ["0.33333334", Math.fround(1 / 3)], ["-2.5", -2.5], ["0", 0]])
+    assert.equal(shortest(value, "float"), text);
+  let bits = new Uint32Array([1]), float = new Float32Array(bits.buffer);
+  for (let i = 0; i < 20000; i++) {
+    bits[0] = (Math.imul(bits[0], 1664525) + 1013904223) >>> 0;
+    if (Number.isFinite(float[0])) assert.equal(Math.fround(Number(shortest(float[0], "float"))), float[0]);
+  }
+  assert.equal(shortest(48.262700002, "steps"), "48.262700002");
+});
+
+test("a value that is the robot's own is no change, and another is one", () => {
+  let calls = 0;
+  const numbers = new Numbers([{ path: "a.b", storage: "float" }, { path: "c", storage: "whole" }], () => calls++);
+  numbers.of({ name: "rover", values: [[Math.fround(0.1)], [3, 4]] });
+  numbers.take(0, { value: "0.1" });
+  assert.deepEqual(numbers.settings(), []);
+  numbers.take(1, { value: "3, 5" });
+  assert.deepEqual(numbers.settings(), [[1, 0, 3], [1, 1, 5]]);
+  assert.equal(numbers.file(), "# rover\nc = 3 5\n");
+  const input = { value: "fast" };
+  numbers.take(0, input);
+  assert.equal(input.value, "0.1");
+  assert.equal(calls, 2);
+});

@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: Apache-2.0
+// Charts over time (uPlot), tied to one view.
+import { colour } from "./dom.js";
+
+const base = (view, title, height) => ({
+  title,
+  height,
+  scales: { x: { time: false, range: () => view.span } },
+  cursor: { drag: { x: true, y: false, setScale: false }, sync: { key: "t" } },
+  legend: { live: true },
+  hooks: {},
+});
+
+const axis = (more = {}) => ({ stroke: () => colour("faint"), grid: { stroke: () => colour("grid"), width: 1 }, ticks: { stroke: () => colour("grid") }, ...more });
+
+export class Chart {
+  constructor(parent, view, { title, height = 200, series, bands = [], scales = {}, data, values, hooks = {}, onClick }) {
+    this.view = view;
+    const options = { ...base(view, title, height), bands, width: parent.clientWidth || 320 };
+    options.scales = { ...options.scales, ...scales };
+    options.axes = [axis(), axis(values ? { values, size: 60 } : { size: 60 })];
+    options.series = [{ label: "t [s]", value: (_, t) => (t == null ? "–" : t.toFixed(2)) }, ...series];
+    options.hooks = {
+      ...hooks,
+      setCursor: [({ cursor, posToVal }) => cursor.left >= 0 && !this.told && view.point(posToVal(cursor.left, "x"))],
+      setSelect: [(plot) => {
+        const { left, width } = plot.select;
+        if (width < 4) return;
+        view.show([plot.posToVal(left, "x"), plot.posToVal(left + width, "x")]);
+        plot.setSelect({ left: 0, width: 0, top: 0, height: 0 }, false);
+      }],
+    };
+    this.plot = new uPlot(options, data, parent);
+    this.plot.over.addEventListener("dblclick", () => view.show(view.whole));
+    this.plot.over.addEventListener("wheel", (event) => {
+      event.preventDefault();
+      view.zoom(event.deltaY < 0 ? 0.8 : 1.25, this.plot.posToVal(event.offsetX, "x"));
+    }, { passive: false });
+    if (onClick) this.plot.over.addEventListener("click", () => onClick(this.plot));
+    view.on((what) => this.follow(what));
+    addEventListener("resize", (this.resized = () => this.plot.setSize({ width: parent.clientWidth, height })));
+  }
+  follow(what) {
+    if (what === "span") this.plot.setScale("x", { min: this.view.span[0], max: this.view.span[1] });
+    if (what !== "cursor" || this.view.cursor === null) return;
+    this.told = true;
+    this.plot.setCursor({ left: this.plot.valToPos(this.view.cursor, "x"), top: 10 }, false);
+    this.told = false;
+  }
+  destroy() {
+    removeEventListener("resize", this.resized);
+    this.plot.destroy();
+  }
+}
+
+/** A value with its band of 3 sigma, of one run or of two. */
+export function bandChart(parent, view, title, runs) {
+  const series = [], bands = [], tables = [];
+  for (const { run, colour: ink, name, value, sigma, label } of runs) {
+    const [t, v] = run.series(value), [ts, s] = sigma ? run.series(sigma) : [[], []];
+    tables.push([t, v]);
+    series.push({ label: label ?? name, stroke: ink, width: 1.5, spanGaps: true });
+    if (ts.length === 0) continue;
+    const held = heldAt(t, v, ts);
+    tables.push([ts, s.map((x, i) => held[i] + 3 * x)], [ts, s.map((x, i) => held[i] - 3 * x)]);
+    const thin = { stroke: `${ink}66`, width: 0.5, spanGaps: true, points: { show: false } };
+    series.push({ ...thin, label: "+3σ" }, { ...thin, label: "−3σ" });
+    bands.push({ series: [series.length - 1, series.length], fill: `${ink}22` });
+  }
+  return new Chart(parent, view, { title, series, bands, data: uPlot.join(tables) });
+}
+
+function heldAt(t, v, wanted) {
+  let i = 0;
+  return wanted.map((time) => {
+    while (i + 1 < t.length && t[i + 1] <= time) i++;
+    return v[i];
+  });
+}
+
+/** Innovations over their gates, a point each: above 1 is beyond it. `onPoint` gets the one that was clicked. */
+export function innovationChart(parent, view, title, run, inks, onPoint) {
+  const names = [...run.sources.keys()], least = 0.01;
+  const points = { show: true, size: 4 }, paths = () => null;
+  const tables = names.map((name) => {
+    const all = run.sources.get(name);
+    return [all.map(({ time }) => time), all.map(({ ratio }) => Math.max(least, ratio))];
+  });
+  const series = names.map((name, i) => ({ label: name, stroke: inks[i % inks.length], paths, points: { ...points, fill: inks[i % inks.length] } }));
+  if (names.length === 0) return null;
+  const top = Math.max(10, ...run.refusals.map(({ ratio }) => ratio).filter(Number.isFinite).slice(0, 10000));
+  const gate = (plot) => {
+    const y = Math.round(plot.valToPos(1, "y", true)), { ctx, bbox } = plot;
+    ctx.save();
+    ctx.strokeStyle = colour("bad");
+    ctx.setLineDash([6, 4]);
+    ctx.beginPath();
+    ctx.moveTo(bbox.left, y), ctx.lineTo(bbox.left + bbox.width, y);
+    ctx.stroke();
+    ctx.restore();
+  };
+  return new Chart(parent, view, {
+    title, series, height: 300, data: tables.length === 1 ? tables[0] : uPlot.join(tables),
+    scales: { y: { distr: 3, range: () => [least, 10 ** Math.ceil(Math.log10(top))] } },
+    values: (_, ticks) => ticks.map((y) => (y == null ? "" : String(+y.toPrecision(3)))),
+    hooks: { draw: [gate] },
+    onClick: (plot) => {
+      const time = plot.posToVal(plot.cursor.left, "x"), ratio = plot.posToVal(plot.cursor.top, "y");
+      onPoint(nearest(plot, names.flatMap((name) => run.sources.get(name)), time, ratio));
+    },
+  });
+}
+
+function nearest(plot, all, time, ratio) {
+  let best = 20 ** 2, found = null;
+  const [x, y] = [plot.valToPos(time, "x"), plot.valToPos(ratio, "y")];
+  for (const one of all) {
+    const d = (plot.valToPos(one.time, "x") - x) ** 2 + (plot.valToPos(Math.max(0.01, one.ratio), "y") - y) ** 2;
+    if (d < best) [best, found] = [d, one];
+  }
+  return found;
+}

@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: Apache-2.0
+// The module that holds the flashed code: what it imports, and its functions with words for failures.
+
+/** Channels of module/browser.hpp. Below 16: a table of a run. */
+export const CHANNEL = { description: 16, refusal: 17, begun: 18, result: 19, diagnosis: 20, fixes: 21, log: 22 };
+export const MODE = { automatic: 0, lockstep: 1, asRecorded: 3 };
+
+/** What the module refuses: a sentence for people. */
+export class Refusal extends Error {}
+
+export class Engine {
+  /**
+   * @param module a compiled WebAssembly.Module; each engine is an instance with a memory of its own
+   * @param read (offset, length) -> Uint8Array of the log, empty behind its end
+   * @param onText (channel, Uint8Array that is valid during the call)
+   */
+  constructor(module, read, onText) {
+    const decoder = new TextDecoder();
+    const text = (bytes) => decoder.decode(bytes);
+    this.refusal = "";
+    this.objects = new Map();
+    const memory = () => new Uint8Array(this.exports.memory.buffer);
+    const imports = {
+      tetap: {
+        read: (offset, to, length) => {
+          const bytes = read(offset, length);
+          memory().set(bytes, to);
+          return bytes.length;
+        },
+        write: (channel, from, length) => {
+          const bytes = memory().subarray(from, from + length);
+          if (channel === CHANNEL.refusal) this.refusal = text(bytes);
+          else if (channel < 16 || channel === CHANNEL.fixes) onText(channel, bytes);
+          else {
+            const object = JSON.parse(text(bytes));
+            this.objects.set(channel, object);
+            onText(channel, object);
+          }
+        },
+      },
+      // The module has a clock for one question: whether a node in its own memory has stopped to answer.
+      wasi_snapshot_preview1: {
+        clock_time_get: (clock, precision, at) => {
+          new DataView(this.exports.memory.buffer).setBigUint64(at, BigInt(Math.round(performance.now() * 1e6)), true);
+          return 0;
+        },
+        // Linked by the C library and never of use here: no file is open (EBADF), and nobody waits (ENOSYS).
+        fd_close: () => 8,
+        fd_seek: () => 8,
+        fd_write: () => 8,
+        poll_oneoff: () => 52,
+      },
+    };
+    this.exports = new WebAssembly.Instance(module, imports).exports;
+    this.exports._initialize?.();
+  }
+
+  /** Calls a function of the module. @throws Refusal */
+  call(name, ...values) {
+    this.refusal = "";
+    if (this.exports[name](...values)) throw new Refusal(this.refusal);
+  }
+
+  describe() {
+    this.exports.describe();
+    return this.objects.get(CHANNEL.description);
+  }
+
+  /** The robot of that number with these settings: [[row, element, value], ...]. @throws Refusal */
+  choose(robot, settings = []) {
+    this.call("choose", robot);
+    for (const [row, element, value] of settings) this.call("set", row, element, value);
+    this.call("check");
+  }
+
+  /** Id base of the log, hash of its node's parameters, kinds of its frames. @throws Refusal */
+  identify() {
+    this.call("identify");
+    return this.objects.get(CHANNEL.log);
+  }
+
+  /** Plays the log; the tables come by onText. @throws Refusal */
+  replay(base, mode = MODE.automatic) {
+    this.call("replay", base, mode, 1);
+    return { ...this.objects.get(CHANNEL.begun), ...this.objects.get(CHANNEL.result) };
+  }
+
+  /** @throws Refusal */
+  diagnose(base, ofRobot) {
+    this.call("diagnose", base, ofRobot ? 1 : 0, 1);
+    return this.objects.get(CHANNEL.diagnosis);
+  }
+}

@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: Apache-2.0
+// Change a number: rows of the parameter table, what was changed, the parameter file.
+import { element, replace, save } from "./dom.js";
+import { say } from "./texts.js";
+
+const SHOWN = 8;
+/** Rows that a user tries first, in this order. */
+const FIRST = ["gnss.sigma_scale", "gnss.gate_scale", "inertial.gyro_radps_rthz", "inertial.accel_mps2_rthz", "wheels.drive.left_radius_m", "wheels.drive.track_m", "inertial.wheel_mps", "gnss.sigma_floor_m"];
+
+/** Decimals that read back as the same stored bits. */
+export function shortest(value, storage) {
+  if (storage !== "float") return String(value);
+  for (let digits = 1; digits < 10; digits++) {
+    const text = String(+value.toPrecision(digits));
+    if (Math.fround(Number(text)) === Math.fround(value)) return text;
+  }
+  return String(value);
+}
+
+export class Numbers {
+  /** `onChange` is called after each change; `rows` and `robot.values` are of the module's description. */
+  constructor(rows, onChange) {
+    this.rows = rows;
+    this.onChange = onChange;
+    this.changed = new Map(); // row -> [value of each element]
+    this.filter = "";
+  }
+  of(robot) {
+    this.robot = robot;
+    this.changed.clear();
+  }
+  value(row) {
+    return this.changed.get(row) ?? this.robot.values[row];
+  }
+  /** For Engine.choose. */
+  settings() {
+    return [...this.changed].flatMap(([row, values]) => values.map((value, element) => [row, element, value]));
+  }
+  text(row) {
+    return this.value(row).map((value) => shortest(value, this.rows[row].storage)).join(" ");
+  }
+  /** `path = value` lines, as tetap-play --params takes them. */
+  file() {
+    return [`# ${this.robot.name}`, ...[...this.changed.keys()].map((row) => `${this.rows[row].path} = ${this.text(row)}`), ""].join("\n");
+  }
+
+  render(parent, message) {
+    this.list = element("div", { class: "rows" });
+    const find = element("input", { type: "search", value: this.filter, placeholder: say("numbers.find"), "aria-label": say("numbers.find"),
+      oninput: () => ((this.filter = find.value), this.renderRows()) });
+    const words = [...this.changed.keys()].map((row) => `${this.rows[row].path} = ${this.text(row)}`).join(", ");
+    replace(parent, find, this.list,
+      this.changed.size > 0 && element("p", { class: "changed" }, say("numbers.changed", words)) || null,
+      message && element("p", { class: "effect", id: "effect", role: "status" }, message) || null,
+      element("div", { class: "buttons" },
+        element("button", { onclick: () => (this.changed.clear(), this.onChange()), disabled: this.changed.size === 0 }, say("numbers.reset")),
+        element("button", { onclick: () => save(`${this.robot.name}.params`, this.file()), disabled: this.changed.size === 0 }, say("numbers.save"))));
+    this.renderRows();
+  }
+
+  renderRows() {
+    const words = this.filter.toLowerCase().split(/\s+/).filter(Boolean);
+    const all = this.rows.map((row, i) => i).filter((i) => !this.rows[i].secret);
+    const found = words.length === 0
+      ? FIRST.map((path) => this.rows.findIndex((row) => row.path === path)).filter((i) => i >= 0)
+      : all.filter((i) => words.every((word) => `${this.rows[i].path} ${this.rows[i].text}`.toLowerCase().includes(word)));
+    const rest = (words.length === 0 ? all.length : found.length) - Math.min(found.length, SHOWN);
+    replace(this.list, ...found.slice(0, SHOWN).map((i) => this.row(i)), rest > 0 ? element("p", { class: "note" }, say("numbers.more", rest)) : null);
+  }
+
+  row(i) {
+    const row = this.rows[i], own = this.robot.values[i];
+    const input = element("input", { value: this.text(i), inputmode: "decimal", "aria-label": row.path, "data-path": row.path, onchange: () => this.take(i, input) });
+    const limits = say("numbers.limits", shortest(row.minimum, "float"), shortest(row.maximum, "float"), row.unit);
+    return element("label", { class: this.changed.has(i) ? "row is-changed" : "row" },
+      element("code", {}, row.path), input, element("span", { class: "unit" }, row.unit),
+      element("span", { class: "note" }, `${row.text} ${limits}; ${say("numbers.own", own.map((value) => shortest(value, row.storage)).join(" "))}${row.live ? "" : `; ${say("numbers.restart")}`}`));
+  }
+
+  take(i, input) {
+    const own = this.robot.values[i], texts = input.value.trim().split(/[\s,]+/);
+    const values = texts.map((text) => (text === "" ? NaN : Number(text)));
+    if (values.length !== own.length || values.some(Number.isNaN)) return void (input.value = this.text(i));
+    if (values.every((value, k) => shortest(value, this.rows[i].storage) === shortest(own[k], this.rows[i].storage))) this.changed.delete(i);
+    else this.changed.set(i, values);
+    this.onChange();
+  }
+}

@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: Apache-2.0
+// The worker: holds the compiled module and the log. Each task has an instance of its own, so none leaves anything
+// behind for the next.
+import { Engine, Refusal, CHANNEL } from "./engine.js";
+import { Table } from "./columns.js";
+
+const TABLES = ["estimates.log", "estimates", "states", "innovations", "sensors", "status", "sources", "map", "keyframes", "graph"];
+
+export class Tasks {
+  constructor() {
+    this.log = null;
+  }
+
+  /** Bytes of a Blob, synchronously; a block is kept, because the module asks for less. */
+  reader() {
+    const size = 1 << 22, files = new FileReaderSync();
+    let begin = 0, block = new Uint8Array(0);
+    return (offset, length) => {
+      if (offset < begin || offset + length > begin + block.length) {
+        begin = offset;
+        block = new Uint8Array(files.readAsArrayBuffer(this.log.slice(offset, offset + Math.max(size, length))));
+      }
+      return block.subarray(offset - begin, offset - begin + length);
+    };
+  }
+
+  engine(onText = () => {}) {
+    const read = this.log ? this.reader() : () => new Uint8Array(0);
+    return new Engine(this.module, read, onText);
+  }
+
+  describe() {
+    return this.engine().describe();
+  }
+  open({ log }) {
+    this.log = log;
+    return this.engine().identify();
+  }
+  diagnose({ robot, base, settings }) {
+    const engine = this.engine();
+    if (robot !== null) engine.choose(robot, settings);
+    return engine.diagnose(base, robot !== null);
+  }
+  check({ robot, settings }) {
+    this.engine().choose(robot, settings);
+    return true;
+  }
+  /** Tables and result; `progress(share)` as it goes. */
+  replay({ robot, base, settings, mode }, progress) {
+    const tables = TABLES.map(() => new Table()), fixes = new Table();
+    let ticks = 0, epochs = 0;
+    const engine = this.engine((channel, data) => {
+      if (channel === CHANNEL.begun) ticks = data.ticks;
+      else if (channel === CHANNEL.fixes) fixes.add(data);
+      else if (channel < TABLES.length) {
+        tables[channel].add(data);
+        if (channel !== 1 || ticks === 0) return;
+        const table = tables[1], now = table.values("epoch")[table.rows - 1];
+        if (now > epochs + ticks / 50) progress((epochs = now) / ticks);
+      }
+    });
+    engine.choose(robot, settings);
+    const result = engine.replay(base, mode);
+    const packed = { fixes: fixes.packed() };
+    TABLES.forEach((name, i) => (packed[name] = tables[i].packed()));
+    return { result, tables: packed };
+  }
+
+  async task({ id, name, module, ...values }) {
+    if (module) return void (this.module = module);
+    try {
+      const done = this[name](values, (share) => postMessage({ id, share }));
+      postMessage({ id, done }, transfers(done));
+    } catch (error) {
+      // A trap of the module is an error of WebAssembly: it ends the instance and nothing else.
+      postMessage({ id, failed: String(error.message), refused: error instanceof Refusal });
+    }
+  }
+}
+
+function transfers(done) {
+  if (!done?.tables) return [];
+  return Object.values(done.tables).flatMap(({ columns }) => columns.map(({ values }) => values.buffer));
+}
+
+if (typeof WorkerGlobalScope !== "undefined") {
+  const worker = new Tasks();
+  onmessage = ({ data }) => worker.task(data);
+}
