@@ -80,8 +80,44 @@ class ImportGraph(unittest.TestCase):
         self.assertEqual(len(self.edges()), len(EDGES) + 7)
         self.assertIn('"false_closures": 7', text_of(f"{self.out}.json"))
 
+    def test_every_spelling_of_a_planar_edge_is_taken_and_other_lines_are_counted(self):
+        toro_order = ((0, 0), (0, 1), (1, 1), (2, 2), (0, 2), (1, 2))
+        more = "".join(f"{line.split(' ', 3)[0]} {' '.join(line.split(' ')[1:3])} 77 {line.split(' ', 3)[3]}\n"
+                       for line in g2o(tag="EDGE_SE2_SWITCHABLE").splitlines())
+        others = ("EQUIV 0 1\nBR 0 9 0.1 2 1 1\nEDGE_SE2_XY 0 8 1 1 1 0 1\nEDGE_PRIOR_SE2 0 0 0 0 1 0 0 1 0 1\nPARAMS_SE2OFFSET 0 0 0 0\n"
+                  "VERTEX_XY 8 1 1\nFIX 0\nFIX 1\n")
+        self.assertEqual(self.imported(g2o()).returncode, 0)
+        expected = self.edges()
+        for text in (g2o(tag="EDGE2", order=toro_order), g2o(tag="ODOMETRY", order=toro_order), more, others + g2o()):
+            self.assertEqual(self.imported(text).returncode, 0)
+            self.assertEqual(str(self.edges()), str(expected))
+        for tag, count in (("EQUIV", 1), ("BR", 1), ("FIX", 2), ("PARAMS_SE2OFFSET", 1), ("EDGE_PRIOR_SE2", 1)):
+            self.assertRegex(text_of(f"{self.out}.json"), f'"{tag}": {count}')
+
+    def test_information_in_the_other_order_is_seen_by_what_is_positive_definite(self):
+        shape = "100 0 0 100 0 400", "100 0 100 400 0 0"  # g2o's and TORO's order of one matrix
+        for tag in ("EDGE_SE2", "EDGE2"):
+            for six in shape:
+                self.assertEqual(self.imported(f"{tag} 0 1 1 0 1.5708 {six}\n").returncode, 0)
+                np.testing.assert_allclose(self.edges()[0][5], np.diag((0.01, 0.01, 0.0025)), atol=1e-6)
+
+    def test_ids_are_names_with_any_gaps(self):
+        self.assertEqual(self.imported(g2o()).returncode, 0)
+        expected = self.edges()
+        for of in (lambda k: k + 1, lambda k: 7 * k + 3, lambda k: (ord("a") << 56) + k, lambda k: (ord("x") << 56) + 5 * k, lambda k: 90 - k):
+            self.assertEqual(self.imported(g2o([(of(i), of(j), *rest) for i, j, *rest in EDGES])).returncode, 0)
+            found = self.edges()
+            if of(1) > of(0):
+                self.assertEqual(str(found), str(expected))
+            else:  # by number the poses run backwards
+                self.assertEqual({frozenset(edge[:2]) for edge in found}, {frozenset((4 - i, 4 - j)) for i, j, *_ in EDGES})
+        shuffled = {0: 4, 1: 2, 2: 9, 3: 0, 4: 5}  # no edge joins 0 and 2: the order is that of the edges
+        self.assertEqual(self.imported(g2o([(shuffled[i], shuffled[j], *rest) for i, j, *rest in EDGES])).returncode, 0)
+        self.assertEqual(str(self.edges()), str(expected))
+
     def test_a_bad_file_is_refused_with_line_and_cause(self):
-        bad = {"EDGE_SE3:QUAT 0 1 1 2 3\n": (":1:", "neither a planar vertex nor a planar edge"),
+        bad = {"EDGE_SE3:QUAT 0 1 1 2 3\n": ("no planar edge in it", "1 of EDGE_SE3:QUAT"),
+               g2o() + "0 3 1 0 0 1 0 0 1 0 1\n": (":7:", "no tag"),
                g2o() + "EDGE_SE2 0 1 1 0 0 1 0 0\n": (":7:", "8 numbers, expected 11"),
                g2o() + "EDGE_SE2 2 2 1 0 0 1 0 0 1 0 1\n": (":7:", "to itself"),
                g2o() + "EDGE_SE2 0 3 1 0 0 1 0 0 -1 0 1\n": (":7:", "not positive definite"),
@@ -90,10 +126,10 @@ class ImportGraph(unittest.TestCase):
                g2o() + "EDGE_SE2 0 -3 1 0 0 1 0 0 1 0 1\n": (":7:", "below zero"),
                "VERTEX_SE2 0 0 0 0\nVERTEX_SE2 0 0 0 0\n" + g2o(): (":2:", "twice"),
                g2o(EDGES[:1] + EDGES[2:]): ("from pose 1 to pose 2",),
-               g2o() + "EDGE_SE2 4 9 1 0 0 1 0 0 1 0 1\n": ("pose 5 is missing",),
+               g2o() + "EDGE_SE2 2 9 1 0 0 1 0 0 1 0 1\n": ("from pose 4 to pose 9",),
                g2o() + "EDGE_SE2 0 3 200 0 0 1 0 0 1 0 1\n": ("longer than the bus",),
                g2o() + "EDGE_SE2 0 3 1 0 0 1e-4 0 0 1e-4 0 1\n": ("sigma above",),
-               "# nothing\n": ("no edge in it",)}
+               "# nothing\n": ("no planar edge in it",)}
         for text, words in bad.items():
             result = self.imported(text)
             self.assertEqual(result.returncode, 1, text)

@@ -1,22 +1,27 @@
 # SPDX-License-Identifier: Apache-2.0
 """Planar pose graphs of a file: g2o's VERTEX_SE2 / EDGE_SE2 (Kuemmerle, Grisetti, Strasdat, Konolige, Burgard, ICRA 2011) and TORO's VERTEX2 /
-EDGE2, whose information stands in the order 11 12 22 33 13 23 (Grisetti, Stachniss, Grzonka, Burgard, RSS 2007). An edge's error is
-(R_z^T (R_i^T (t_j - t_i) - t_z), yaw_j - yaw_i - yaw_z), so its information holds in axes turned by the measured yaw."""
+EDGE2, whose information stands in the order 11 12 22 33 13 23 (Grisetti, Stachniss, Grzonka, Burgard, RSS 2007). Tools write either order under
+either tag. An edge's error is (R_z^T (R_i^T (t_j - t_i) - t_z), yaw_j - yaw_i - yaw_z), so its information holds in axes turned by the measured yaw."""
+import collections
+
 import numpy as np
 
 from tetap.can.bus_writer import BadInput
 from tetap.dataset import common
 
-VERTICES, EDGES = {"VERTEX_SE2": 4, "VERTEX2": 4}, {"EDGE_SE2": 11, "EDGE2": 11}  # numbers behind the tag
-IGNORED = {"FIX": "fixed vertex"}  # the first pose is the fixed one
-INFORMATION = {"EDGE_SE2": (0, 1, 2, 1, 3, 4, 2, 4, 5), "EDGE2": (0, 1, 4, 1, 2, 5, 4, 5, 3)}  # order of the six numbers, by rows of the matrix
+G2O, TORO = (0, 1, 2, 1, 3, 4, 2, 4, 5), (0, 1, 4, 1, 2, 5, 4, 5, 3)  # order of the six numbers, by rows of the matrix
+VERTICES = ("VERTEX_SE2", "VERTEX2", "VERTEX")
+EDGES = {"EDGE_SE2": G2O, "EDGE2": TORO, "EDGE": TORO, "ODOMETRY": TORO, "EDGE_SE2_SWITCHABLE": G2O, "EDGE_SE2_MAXMIX": G2O}
+ONE_MORE = ("EDGE_SE2_SWITCHABLE", "EDGE_SE2_MAXMIX")  # a switch's id or a weight behind the two ids (Suenderhauf, Protzel, IROS 2012)
 
 
 class Graph:
-    """Edges in the order of the file: `first`, `second` (0 ... poses - 1), `z` (x, y, yaw of second in first), `covariance` (3 x 3, in first)."""
+    """Edges in the order of the file: `first`, `second` (0 ... poses - 1), `z` (x, y, yaw of second in first), `covariance` (3 x 3, in first).
+    `names`: the ids of the poses in the file. `others`: how many lines of each tag were not taken."""
 
-    def __init__(self, poses, first, second, z, covariance, vertices):
+    def __init__(self, poses, first, second, z, covariance, vertices, names=None, others=None):
         self.poses, self.first, self.second, self.z, self.covariance, self.vertices = poses, first, second, z, covariance, vertices
+        self.names, self.others = list(range(poses)) if names is None else names, others or {}
 
     def odometry(self):
         """Index of the edge from each pose to the next; of several the first."""
@@ -25,6 +30,9 @@ class Graph:
             if j == i + 1:
                 found.setdefault(int(i), e)
         return [found[i] for i in range(self.poses - 1)]
+
+    def edge(self, e):
+        return f"the edge {self.names[self.first[e]]} -> {self.names[self.second[e]]}"
 
 
 def identifier(text, where, column):
@@ -39,56 +47,84 @@ def identifier(text, where, column):
 
 def read(path):
     """The graph of a file; BadInput names the line and what is wrong with it."""
-    edges, vertices = [], {}
+    edges, vertices, others = [], {}, collections.Counter()
     for line, text in common.read_lines(path):
         where, (tag, *fields) = f"{path}:{line}", text.split()
-        if tag in IGNORED:
-            continue
-        count = VERTICES.get(tag) or EDGES.get(tag)
-        if count is None:
-            raise BadInput(f"{where}: {tag[:30]!r} is neither a planar vertex nor a planar edge ({', '.join([*VERTICES, *EDGES])})")
-        if len(fields) != count:
-            raise BadInput(f"{where}: {tag} with {len(fields)} numbers, expected {count}")
-        if tag in VERTICES:
+        if tag in EDGES:
+            edges.append(_edge(tag, fields, where))
+        elif tag in VERTICES:
+            _count(tag, fields, 4, where)
             vertex = identifier(fields[0], where, 2)
             if vertex in vertices:
                 raise BadInput(f"{where}: vertex {vertex} is there twice")
             vertices[vertex] = common.numbers(fields[1:], where)
+        elif tag[0].isalpha():
+            others[tag[:30]] += 1
         else:
-            edges.append(_edge(tag, fields, where))
+            raise BadInput(f"{where}: {tag[:30]!r} is no tag of a graph file ({', '.join((*VERTICES, *EDGES))} and others)")
     if not edges:
-        raise BadInput(f"{path}: no edge in it")
-    return _graph(path, edges, vertices)
+        rest = ", ".join(f"{count} of {tag}" for tag, count in others.most_common(4))
+        raise BadInput(f"{path}: no planar edge in it ({', '.join(EDGES)}){'; other lines: ' + rest if rest else ''}")
+    return _graph(path, edges, vertices, dict(others))
+
+
+def _count(tag, fields, expected, where):
+    if len(fields) != expected:
+        raise BadInput(f"{where}: {tag} with {len(fields)} numbers, expected {expected}")
 
 
 def _edge(tag, fields, where):
+    more = tag in ONE_MORE
+    _count(tag, fields, 11 + more, where)
     i, j = identifier(fields[0], where, 2), identifier(fields[1], where, 3)
     if i == j:
         raise BadInput(f"{where}: an edge from pose {i} to itself")
-    values = common.numbers(fields[2:], where)
-    information = np.array(values[3:])[list(INFORMATION[tag])].reshape(3, 3)
-    if np.linalg.eigvalsh(information)[0] <= 0:
-        raise BadInput(f"{where}: the information of the edge {i} -> {j} is not positive definite")
-    return i, j, values[:3], information, where
+    values = common.numbers(fields[2 + more:], where)
+    return i, j, values[:3], values[3:], tag, where
 
 
-def _graph(path, edges, vertices):
-    names = sorted(set(vertices) | {k for e in edges for k in e[:2]})
-    for name, expected in zip(names, range(len(names))):
-        if name != expected:
-            raise BadInput(f"{path}: pose {expected} is missing: ids are 0 to {names[-1]} without a gap")
-    first, second = (np.array([e[k] for e in edges]) for k in (0, 1))
-    backwards = first == second + 1
-    linked = set(second[second == first + 1]) | set(first[backwards])
-    for pose in range(1, len(names)):
-        if pose not in linked:
-            raise BadInput(f"{path}: no edge leads from pose {pose - 1} to pose {pose}: the log needs odometry between them")
-    z, information = np.array([e[2] for e in edges]), np.array([e[3] for e in edges])
+def _informations(edges):
+    """Of each edge. A tag's own order holds, unless only the other one makes all its edges positive definite."""
+    information = np.empty((len(edges), 3, 3))
+    for tag in {edge[4] for edge in edges}:
+        of_tag = [e for e, edge in enumerate(edges) if edge[4] == tag]
+        six = np.array([edges[e][3] for e in of_tag])
+        own = EDGES[tag]
+        tried = [six[:, order].reshape(-1, 3, 3) for order in (own, TORO if own == G2O else G2O)]
+        bad = [np.flatnonzero(np.linalg.eigvalsh(one)[:, 0] <= 0) for one in tried]
+        if len(bad[0]) and len(bad[1]):
+            i, j, _, _, _, where = edges[of_tag[bad[0][0]]]
+            raise BadInput(f"{where}: the information of the edge {i} -> {j} is not positive definite")
+        information[of_tag] = tried[1] if len(bad[0]) else tried[0]
+    return information
+
+
+def _chain(edges):
+    """Ids so that an edge leads from each to the next: by number, else as the edges name them. And the first gap of the order by number."""
+    linked = {frozenset(edge[:2]) for edge in edges}
+    by_number = sorted({k for edge in edges for k in edge[:2]})
+    gap = None
+    for names in (by_number, list(dict.fromkeys(k for edge in edges for k in edge[:2]))):
+        gaps = [pair for pair in zip(names, names[1:]) if frozenset(pair) not in linked]
+        if not gaps:
+            return names, None
+        gap = gap or gaps[0]
+    return by_number, gap
+
+
+def _graph(path, edges, vertices, others):
+    names, gap = _chain(edges)
+    if gap:
+        raise BadInput(f"{path}: no edge leads from pose {gap[0]} to pose {gap[1]}: the log needs odometry between them")
+    information = _informations(edges)
+    pose = {name: k for k, name in enumerate(names)}
+    first, second = (np.array([pose[e[k]] for e in edges]) for k in (0, 1))
+    z = np.array([e[2] for e in edges])
     turn = rotations(z[:, 2])
     covariance = turn @ np.linalg.inv(information) @ turn.transpose(0, 2, 1)
-    first, second, z, covariance = _forward(first, second, z, covariance, backwards)
-    known = np.array([vertices[k] for k in names]) if len(vertices) == len(names) else None
-    return Graph(len(names), first, second, z, covariance, known)
+    first, second, z, covariance = _forward(first, second, z, covariance, first == second + 1)
+    known = np.array([vertices[k] for k in names]) if all(k in vertices for k in names) else None
+    return Graph(len(names), first, second, z, covariance, known, names, others)
 
 
 def _forward(first, second, z, covariance, backwards):
