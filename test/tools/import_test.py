@@ -440,9 +440,22 @@ class BadInput(unittest.TestCase):
             self.assertAlmostEqual(float(radar[key].phys_value), value, delta=0.51 * step)
         self.assertEqual(text_of(self.out + ".truth.csv").splitlines()[2], "1.050000,3.200000,4.100000,0.000000")
 
+    def test_two_sensors_share_a_time_and_rows_beyond_the_signals_are_left_out(self):
+        self.write("track.txt", "L 3 4 1000000 3 4 1 0\nR 5 0.9 -1.5 1000000 3 4 1 0\nL 120 60 1100000 3 4 1 0\nR 134 0.4 90 1100000 3 4 1 0\n"
+                                "R 164 0.4 1 1200000 3 4 1 0\nL 131 2 1200000 3 4 1 0\nR 163.5 0.4 1 1300000 3 4 1 0\n")
+        result = run("import_udacity_track", os.path.join(self.set, "track.txt"), self.out)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        about = json.loads(text_of(self.out + ".json"))
+        self.assertEqual(about["dropped"], {"rows beyond what In_RangeBearing can say": 1, "rows beyond what In_Radar can say": 2})
+        self.assertEqual(about["limited"], {})
+        self.assertEqual([(t, i) for t, i, _ in read_log(self.out + ".log")],
+                         [(1_000_000, 0x309), (1_000_000, 0x31F), (1_200_000, 0x309), (1_300_000, 0x31F)])
+        self.assertEqual(len(text_of(self.out + ".truth.csv").splitlines()), 1 + 4)
+
     def test_a_track_names_file_line_and_reason(self):
         for text, words in (("X 1 2 3 4 5 6 7\n", (":1", "L or R")), ("L 1 2 3 4 5\n", (":1", "6 columns")), ("# nothing\n", ("no measurement",)),
-                            (self.TRACK + self.TRACK[:10] + "1000000 0 0 0 0\n", (":4", "time")), ("L 1 nan 5 0 0 0 0\n", (":1", "finite"))):
+                            (self.TRACK + self.TRACK[:10] + "1000000 0 0 0 0\n", (":4", "time")), ("L 1 nan 5 0 0 0 0\n", (":1", "finite")),
+                            ("L 300 4 1000000 3 4 1 0\n", ("beyond what the bus can say",))):
             with self.subTest(text=text):
                 self.write("track.txt", text)
                 self.refused(run("import_udacity_track", os.path.join(self.set, "track.txt"), self.out), "track.txt", *words)
