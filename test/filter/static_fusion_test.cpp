@@ -291,5 +291,23 @@ TEST(StaticFusion, WhatIsNoCovarianceIsRefused) {
   EXPECT_FALSE((filter::inverse_variance<double, 3>({}).valid)) << "none";
 }
 
+TEST(StaticFusion, AnEstimateThatIsNoNumberIsRefused) {
+  const auto good = estimate(Matrix3d::Identity());
+  const Matrix3d one = Matrix3d::Identity();
+  for (const double bad : {std::nan(""), HUGE_VAL, -HUGE_VAL}) {
+    for (int n = 0; n < 3; ++n) {
+      auto broken = good;
+      broken.x(n) = bad;
+      const std::array<Estimate3<double>, 2> both{good, broken};
+      EXPECT_FALSE((filter::inverse_variance<double, 3>(both).valid)) << bad;
+      EXPECT_FALSE(filter::covariance_intersection(good, broken).valid) << bad;
+      EXPECT_FALSE(filter::covariance_intersection(broken, good).valid) << bad;
+      auto half = split(one, one);
+      half.x(n) = bad;
+      EXPECT_FALSE(filter::split_covariance_intersection(half, split(one, one)).valid) << bad;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace tetap

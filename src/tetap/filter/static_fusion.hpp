@@ -38,7 +38,8 @@ struct SplitEstimate {
   }
 };
 
-/// `valid` is false, and `estimate` means nothing, when a covariance was not positive definite or there was none.
+/// `valid` is false, and `estimate` means nothing, when a covariance was not positive definite, a value no number, or
+/// there was none.
 template <class Estimate_>
 struct Fusion {
   Estimate_ estimate;
@@ -59,9 +60,10 @@ class InformationSum {
   }
   [[nodiscard]] Fusion<Estimate<Scalar, N>> fused(Scalar omega = 0) const {
     const Inverse<Scalar, N> p = inverse_of(information_);
-    return {.estimate = {.x = p.value.dense().lazyProduct(vector_), .p = p.value},
-            .omega = omega,
-            .valid = positive_ && p.positive};
+    const Vector<Scalar, N> x = p.value.dense().lazyProduct(vector_);
+    bool finite = true;  // the difference of infinity or NaN from itself is no number
+    for (int n = 0; n < N; ++n) finite = finite && x(n) - x(n) <= Scalar{0};
+    return {.estimate = {.x = x, .p = p.value}, .omega = omega, .valid = positive_ && p.positive && finite};
   }
 
  private:
