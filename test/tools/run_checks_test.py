@@ -54,7 +54,7 @@ class Retry(unittest.TestCase):
             self.assertTrue(differs(f"  mrclam1_mrclam         2000 epochs, moves   3.97 m, state CRC E09152E8: {verdict}\n"), verdict)
 
     def test_a_player_that_finds_another_epoch(self):
-        words = source("sim_host/play/session.cpp")
+        words = source("sim_host/replay/complaint.cpp")
         self.assertIn(" epochs differ from the recording; first ", words)
         self.assertTrue(differs("tetap-play: 3 of 2094 epochs differ from the recording; first epoch 7 at 0.070 s: recorded 321#00, now 321#01\n"))
         self.assertTrue(differs("  linux mrclam: at the desk 2116 epochs compared, different 3\n"))
