@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sim_host/parameter_settings.hpp"
 
+#include "sim_host/parameter_refusal.hpp"
+
 #include <algorithm>
 #include <cerrno>
 #include <charconv>
-#include <cmath>
-#include <cstdio>
 #include <cstring>
 #include <fstream>
 #include <sstream>
@@ -30,18 +30,6 @@ std::string element_text(const param::Row& row, double value) {
   return row.storage == param::Storage::kWhole ? shortest(static_cast<long long>(value)) : shortest(value);
 }
 
-std::string plain(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.7g", value);
-  return text;
-}
-
-/// "path is 420 m; it has to be".
-std::string refused(const param::Row& row, double value) {
-  const std::string unit = row.unit;
-  return std::string(row.path) + " is " + plain(value) + (unit.empty() ? "" : " " + unit) + "; it has to be ";
-}
-
 double number(std::string_view text, const param::Row& row, const std::string& where) {
   const std::string_view digits = text.starts_with("+") ? text.substr(1) : text;
   double value = 0;
@@ -58,10 +46,7 @@ double number(std::string_view text, const param::Row& row, const std::string& w
 
 double checked_number(std::string_view text, const param::Row& row, const std::string& where) {
   const double value = number(text, row, where);
-  if (!param::within(row, value))
-    throw UsageError(where + ": " + refused(row, value) + "from " + plain(row.minimum) + " to " + plain(row.maximum));
-  if (row.storage == param::Storage::kWhole && std::abs(value - std::trunc(value)) > 0)
-    throw UsageError(where + ": " + refused(row, value) + "a whole number");
+  if (const std::string why = refusal_of(row, value); !why.empty()) throw UsageError(where + ": " + why);
   return value;
 }
 

@@ -7,9 +7,9 @@
 #include "sim_host/page/module/json.hpp"
 #include "sim_host/page/module/replay.hpp"
 #include "sim_host/page/module/robots.hpp"
+#include "sim_host/parameter_refusal.hpp"
 #include "tetap/param/limits.hpp"
 
-#include <cmath>
 #include <cstdint>
 #include <string>
 
@@ -30,12 +30,6 @@ std::uint32_t refuse(std::string_view why) {
   return 1;
 }
 
-std::string plain(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.7g", value);
-  return text;
-}
-
 }  // namespace
 
 TETAP_EXPORT(describe) void describe() { page::write(page::Channel::kDescription, page::description()); }
@@ -51,13 +45,8 @@ TETAP_EXPORT(choose) std::uint32_t choose(std::uint32_t robot) {
 TETAP_EXPORT(set) std::uint32_t set(std::uint32_t number, std::uint32_t element, double value) {
   if (number >= std::size(param::kTable)) return refuse("no parameter of number " + std::to_string(number));
   const param::Row& row = param::kTable[number];
-  const std::string path = row.path, unit = *row.unit == '\0' ? "" : std::string(" ") + row.unit;
-  if (element >= row.elements) return refuse(path + " has no element " + std::to_string(element));
-  if (!param::within(row, value))
-    return refuse(path + " is " + plain(value) + unit + "; it has to be from " + plain(row.minimum) + " to " +
-                  plain(row.maximum));
-  if (row.storage == param::Storage::kWhole && std::abs(value - std::trunc(value)) > 0)
-    return refuse(path + " is " + plain(value) + unit + "; it has to be a whole number");
+  if (element >= row.elements) return refuse(std::string(row.path) + " has no element " + std::to_string(element));
+  if (const std::string why = sim::refusal_of(row, value); !why.empty()) return refuse(why);
   row.set(chosen.parameters, element, value);
   return 0;
 }
