@@ -5,17 +5,18 @@
 #include <cerrno>
 #include <cstring>
 #include <stdexcept>
+#include <string_view>
+#include <vector>
 
 namespace tetap::sim {
 
 namespace {
 
-constexpr std::size_t kBlock = 1 << 18;
-
 /// A temporary file with the rest of `from`.
 std::FILE* copy_of(std::FILE* from) {
   std::FILE* to = std::tmpfile();
   if (to == nullptr) return nullptr;
+  constexpr std::size_t kBlock = LineBlocks::kBlock;
   std::vector<char> block(kBlock);
   std::size_t line = 0;  // its length so far: a pipe without line ends is copied until it is refused
   for (std::size_t got = kBlock; got == kBlock && line <= kLongestLine;) {
@@ -40,47 +41,21 @@ LogFile::LogFile(const std::string& path, const LogOptions& options)
     if (copy == nullptr) refuse(std::string("cannot be copied into a temporary file: ") + std::strerror(errno));
     file_.reset(copy);
   }
-  block_.resize(kBlock);
 }
 
 void LogFile::refuse(const std::string& reason) const { throw std::runtime_error(path_ + ": " + reason); }
 
-/// Moves what is left to the front and reads on behind it; false: nothing more.
-bool LogFile::read_block() {
-  std::memmove(block_.data(), block_.data() + begin_, end_ - begin_);
-  end_ -= begin_;
-  begin_ = 0;
-  std::size_t wanted = block_.size() - end_;
-  if (report_) wanted = static_cast<std::size_t>(std::min<std::uint64_t>(wanted, length_ - bytes_));
-  const std::size_t got = std::fread(block_.data() + end_, 1, wanted, file_.get());
+std::size_t LogFile::read(char* to, std::size_t size) {
+  if (report_) size = static_cast<std::size_t>(std::min<std::uint64_t>(size, length_ - bytes_));
+  const std::size_t got = std::fread(to, 1, size, file_.get());
   if (std::ferror(file_.get()) != 0) refuse(std::string("cannot be read: ") + std::strerror(errno));
-  end_ += got;
   bytes_ += got;
-  return got > 0;
-}
-
-bool LogFile::next_line(TextLine& line) {
-  std::size_t searched = 0;
-  for (;;) {
-    const std::string_view rest(block_.data() + begin_, end_ - begin_);
-    const std::size_t found = rest.find('\n', searched);
-    if (found != std::string_view::npos) {
-      line = {rest.substr(0, found), true};
-      begin_ += found + 1;
-      return true;
-    }
-    searched = rest.size();
-    const bool too_long = searched > kLongestLine;  // refused by the parser
-    if (!too_long && read_block()) continue;
-    line = {std::string_view(block_.data() + begin_, end_ - begin_), false};
-    begin_ = end_;
-    return !line.text.empty();
-  }
+  return got;
 }
 
 bool LogFile::next(TimedFrame& frame) {
   TextLine line;
-  while (next_line(line)) {
+  while (lines_.next(line, [this](char* to, std::size_t size) { return read(to, size); })) {
     const auto found = parser_.add(line.text, line.ended);
     if (!found) throw std::runtime_error(found.failure().text);
     if (!*found) continue;
@@ -98,7 +73,7 @@ bool LogFile::next(TimedFrame& frame) {
 void LogFile::rewind() {
   std::rewind(file_.get());
   parser_ = LogParser(path_, options_);
-  begin_ = end_ = 0;
+  lines_.clear();
   bytes_ = 0;
 }
 

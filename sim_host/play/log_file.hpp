@@ -2,6 +2,7 @@
 // A candump log on disk. A log of hours is read frame by frame and never held whole.
 #pragma once
 
+#include "sim_host/replay/line_blocks.hpp"
 #include "sim_host/replay/log.hpp"
 
 #include <cstddef>
@@ -10,8 +11,6 @@
 #include <memory>
 #include <optional>
 #include <string>
-#include <string_view>
-#include <vector>
 
 namespace tetap::sim {
 
@@ -29,12 +28,8 @@ class LogFile : public Frames {
   [[nodiscard]] const LogReport& report() const { return report_ ? *report_ : parser_.report(); }
 
  private:
-  struct TextLine {
-    std::string_view text;
-    bool ended = true;  ///< by a newline
-  };
-  bool next_line(TextLine& line);
-  bool read_block();
+  /// Bytes of the file, at most `size`; 0 at its end.
+  std::size_t read(char* to, std::size_t size);
   [[noreturn]] void refuse(const std::string& reason) const;
 
   std::string path_;
@@ -42,10 +37,9 @@ class LogFile : public Frames {
   std::unique_ptr<std::FILE, int (*)(std::FILE*)> file_;
   LogParser parser_;
   std::optional<LogReport> report_;  ///< report of a reading to the end
-  std::vector<char> block_;
-  std::size_t begin_ = 0, end_ = 0;  ///< unread part of block_
-  std::uint64_t bytes_ = 0;          ///< bytes of the file, read up to now
-  std::uint64_t length_ = 0;         ///< length at the first reading: a log that grows meanwhile ends there
+  LineBlocks lines_;
+  std::uint64_t bytes_ = 0;   ///< bytes of the file, read up to now
+  std::uint64_t length_ = 0;  ///< length at the first reading: a log that grows meanwhile ends there
 };
 
 }  // namespace tetap::sim
