@@ -125,11 +125,39 @@ class Encode(unittest.TestCase):
         based = subprocess.run([TOOL, "-", "--base", "0x340", "--interface", "can1"], input=lines[1] + "\n", capture_output=True, text=True, timeout=60).stdout
         self.assertEqual(based, alone[1].replace("vcan0 306", "can1 346"))
 
+    def test_lines_of_one_form_are_what_each_is_word_by_word(self):
+        chance, lines = random.Random(7), []
+        for message in DATABASE.messages:
+            if message.mux or message.protected:
+                continue
+            for number in range(60):
+                words = []
+                for field in message.page_signals(None):
+                    low, high = field.steps
+                    raw = chance.choice([low, high, chance.randint(low, high)])
+                    value = raw * field.scale
+                    if field.scale != 1 and low < raw < high:  # halves of a step, exactly
+                        value += chance.choice([-1, 0, 1]) * field.scale / 2
+                    text = str(sorted(field.values)[0]) if field.enum else str(value)
+                    words.append("%s=%s" % (field.field, text))
+                lines.append(" ".join([message.name, *words, "--time", "%d.%0*d" % (chance.randrange(10**9), chance.randint(1, 6), chance.randrange(10))]))
+        lines += ["In_GnssLat Inst=0 Seq=1 Lat=%s --time 4294967295.999999" % text for text in ("48.", ".5", "-.5", "007", "1e1", "0x10", "+3")] * 20
+        chance.shuffle(lines)
+        done = subprocess.run([TOOL, "-"], input="\n".join(lines), capture_output=True, text=True, timeout=120)
+        self.assertEqual((done.returncode, done.stderr), (0, ""))
+        options = encode.parser().parse_args(["-"])
+        each = encode.line_parser(options)
+        alone = [encode.frame_text(DATABASE, each.parse_intermixed_args(line.split())) for line in lines]
+        self.assertEqual(done.stdout.splitlines(), alone)
+        fast = encode.forms.frames(DATABASE, options, lines)
+        self.assertGreater(sum(frame is not None for frame in fast), 0.9 * len(lines))
+
     def test_a_line_of_a_batch_that_is_wrong_is_named_and_nothing_is_printed(self):
         good = "In_MapEntry Id=7 X=1 Y=2 --time 0.5"
         for bad, reason in (("In_Nothing", "no message 'In_Nothing'"), ("In_MapEntry Id=300", "out of range"), ("In_MapEntry Id=1 X=1 Y=2 --time x", "no time in seconds"),
-                            ("In_MapEntry Id=1 X=1 Y=2 --tme 1", "unrecognized arguments: --tme"), ("In_MapEntry Id='1", "No closing quotation")):
-            done = subprocess.run([TOOL, "-"], input=f"{good}\n{good}\n{bad}\n", capture_output=True, text=True, timeout=60)
+                            ("In_MapEntry Id=1 X=1 Y=2 --tme 1", "unrecognized arguments: --tme"), ("In_MapEntry Id='1", "No closing quotation"), ("In_MapEntry Id=1 X=134217.728 Y=2 --time 0.5", "out of range"),
+                            ("In_MapEntry Id=1.5 X=1 Y=2 --time 0.5", "no whole number")):
+            done = subprocess.run([TOOL, "-"], input=f"{good}\n{good}\n{bad}\n" + f"{good}\n" * 40, capture_output=True, text=True, timeout=60)
             self.assertEqual((done.returncode, done.stdout, done.stderr.count("\n")), (1, "", 1), done)
             self.assertIn("line 3: ", done.stderr)
             self.assertIn(reason, done.stderr)
