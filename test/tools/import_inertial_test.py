@@ -101,7 +101,7 @@ class Imported(unittest.TestCase):
     def common_laws(self):
         self.assertTrue((np.diff(self.log.time_us) >= 0).all())
         self.assertEqual(len(self.log.time_us), self.about["frames"])
-        self.assertEqual(self.about["limited"], {})
+        self.assertEqual(self.about["beyond"], {})
 
     def check(self, name, signal, found, expected):
         np.testing.assert_allclose(found, expected, rtol=0, atol=half_a_step(name, signal) + 1e-9, err_msg=f"{name}.{signal}")

@@ -101,12 +101,13 @@ class Writer(unittest.TestCase):
                     checked += 1
         self.assertGreater(checked, 3000)
 
-    def test_values_beyond_the_range_are_limited_and_counted_and_never_wrap(self):
+    def test_values_beyond_the_range_leave_their_frame_out_and_are_counted(self):
         log = bus_writer.Log(self.dbc)
-        log.add("In_BodySpeed", [0, 1, 2], Forward=[1e9, -1e9, 1.0], YawRate=0.5)
-        self.assertEqual(log.limited, {"In_BodySpeed.Forward": 2})
+        log.add("In_BodySpeed", [0, 1, 2, 3, 4], Forward=[1e9, -1e9, 1.0, 26.2143, 26.2144], YawRate=0.5)
+        self.assertEqual(log.beyond, {"In_BodySpeed.Forward": 3})
         forward = [float(decode(self.matrix, int(i), int(p).to_bytes(8, "little"))[1]["Forward"].phys_value) for _, i, p in zip(*log.frames())]
-        np.testing.assert_allclose(forward, [26.2143, -26.2143, 1.0])
+        np.testing.assert_allclose(forward, [1.0, 26.2143])
+        self.assertEqual(log.inside(3, In_BodySpeed={"Forward": np.array([1, 27, np.nan]), "YawRate": 0.5}).tolist(), [True, False, True])
 
     def test_not_available_is_the_one_code_outside_the_range(self):
         log = bus_writer.Log(self.dbc)
@@ -200,7 +201,7 @@ class Imported(unittest.TestCase):
         self.assertEqual(times, sorted(times))
         self.assertEqual(len(self.frames), self.about["frames"])
         self.assertEqual(sum(self.about["messages"].values()), self.about["frames"])
-        self.assertEqual(self.about["limited"], {})
+        self.assertEqual(self.about["beyond"], {})
         self.assertEqual(self.truth[0]["time_s"], "1.000000")
         position, yaw = self.of("Cmd_SetPos"), self.of("Cmd_SetYaw")
         self.assertEqual((len(position), len(yaw)), (1, 1))
@@ -447,7 +448,7 @@ class BadInput(unittest.TestCase):
         self.assertEqual(result.returncode, 0, result.stderr)
         about = json.loads(text_of(self.out + ".json"))
         self.assertEqual(about["dropped"], {"rows beyond what In_RangeBearing can say": 1, "rows beyond what In_Radar can say": 2})
-        self.assertEqual(about["limited"], {})
+        self.assertEqual(about["beyond"], {})
         self.assertEqual([(t, i) for t, i, _ in read_log(self.out + ".log")],
                          [(1_000_000, 0x309), (1_000_000, 0x31F), (1_200_000, 0x309), (1_300_000, 0x31F)])
         self.assertEqual(len(text_of(self.out + ".truth.csv").splitlines()), 1 + 4)

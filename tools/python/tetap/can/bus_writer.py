@@ -35,18 +35,18 @@ class Signal:
         self.not_available = None if in_range else not_available
 
     def pack(self, values, name):
-        """Raw bits in place for an array of physical values, and how many of them had to be limited. NaN: not available."""
+        """Raw bits in place for an array of physical values, and which of them are within the signal's range. NaN: not available."""
         values = np.asarray(values, dtype=np.float64)
         missing = np.isnan(values)
         if missing.any() and self.not_available is None:
             raise ValueError(f"{name} has no code for a value that is not available")
         raw = np.rint((np.where(missing, 0.0, values) - self.offset) / self.scale)
-        limited = np.count_nonzero((raw < self.raw_min) | (raw > self.raw_max))
-        raw = np.clip(raw, self.raw_min, self.raw_max).astype(np.int64)
+        inside = (raw >= self.raw_min) & (raw <= self.raw_max)
+        raw = np.where(inside, raw, 0).astype(np.int64)
         if missing.any():
             raw[missing] = self.not_available
         mask = np.uint64((1 << self.length) - 1)
-        return (raw.astype(np.uint64) & mask) << np.uint64(self.start), limited
+        return (raw.astype(np.uint64) & mask) << np.uint64(self.start), inside
 
 
 class Message:
@@ -141,26 +141,39 @@ class Log:
 
     def __init__(self, dbc, base=DBC_BASE, channel="vcan0"):
         self.dbc, self.base, self.channel = dbc, base, channel
-        self.counts, self.limited = {}, {}
+        self.counts, self.beyond = {}, {}
         self._parts = []
 
     def add(self, name, time_us, **values):
-        """Appends one frame of message `name` per element of `time_us`. Signals are arrays or single values; those not given are 0."""
+        """Appends one frame of message `name` per element of `time_us`. Signals are arrays or single values; those not given are 0.
+
+        Frames with a value beyond its signal's range are left out and counted in `beyond`."""
         message = self.dbc.messages[name]
         time_us = np.atleast_1d(np.asarray(time_us, dtype=np.int64))
         payload = np.zeros(len(time_us), dtype=np.uint64)
+        inside = np.ones(len(time_us), dtype=bool)
         for key, value in values.items():
-            bits, limited = message.signals[key].pack(np.broadcast_to(value, time_us.shape), f"{name}.{key}")
+            bits, within = message.signals[key].pack(np.broadcast_to(value, time_us.shape), f"{name}.{key}")
             payload |= bits
-            if limited:
+            inside &= within
+            if not within.all():
                 where = f"{name}.{key}"
-                self.limited[where] = self.limited.get(where, 0) + int(limited)
+                self.beyond[where] = self.beyond.get(where, 0) + int(np.count_nonzero(~within))
+        time_us, payload = time_us[inside], payload[inside]
         offset = message.identifier - DBC_BASE
         if "Crc" in message.signals and message.signals["Crc"].length == 8:
             payload |= crc8(offset, payload).astype(np.uint64) << np.uint64(message.signals["Crc"].start)
         identifiers = np.full(len(time_us), self.base + offset, dtype=np.int64)
         self._parts.append((time_us, identifiers, payload))
         self.counts[name] = self.counts.get(name, 0) + len(time_us)
+
+    def inside(self, count, **messages):
+        """Which of `count` samples are within range in all frames that they take; `messages`: name -> {signal: values}."""
+        within = np.ones(count, dtype=bool)
+        for name, values in messages.items():
+            for key, value in values.items():
+                within &= self.dbc.messages[name].signals[key].pack(np.broadcast_to(value, within.shape), f"{name}.{key}")[1]
+        return within
 
     def frames(self):
         """(time_us, identifier, payload as 64-bit words), in order."""

@@ -212,7 +212,7 @@ class Recording:
         """OUT.log, OUT.truth.csv where there is one, and OUT.json: all of them or, when anything fails, none. An older truth is set aside."""
         log = self.log.text()
         frame_times = self.log.frames()[0]
-        self.about.update(messages=dict(sorted(self.log.counts.items())), frames=len(frame_times), limited=self.log.limited,
+        self.about.update(messages=dict(sorted(self.log.counts.items())), frames=len(frame_times), beyond=self.log.beyond,
                           duration_s=float(frame_times[-1] - START_US) / 1e6, sources=self._files)
         truth = {} if self.truth is None else {f"{out}.truth.csv": self._truth_text().encode()}
         if self._sightings is not None:
@@ -223,8 +223,8 @@ class Recording:
         print(f"{out}.log: {len(frame_times)} frames, {self.about['duration_s']:.1f} s ({counts})")
         for what, count in self.about["dropped"].items():
             print(f"  left out: {count} {what}")
-        for what, count in self.log.limited.items():
-            print(f"  limited to the signal's range: {count} values of {what}")
+        for what, count in self.log.beyond.items():
+            print(f"  left out, beyond the signal's range: {count} values of {what}")
         if self.truth is None:
             set_aside(f"{out}.truth.csv")
 

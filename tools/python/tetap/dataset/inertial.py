@@ -60,9 +60,13 @@ def add_imu(recording, imu, arrival):
         recording.about["imu_gaps"] = int(long.sum())
         recording.about["notes"].append("IMU samples after a gap carry the nominal interval")
     imu, arrival, interval = imu.keep(np.append(False, used)), arrival[1:][used], interval[used]
+    angle, velocity = imu.data[:, 1:4] * interval[:, None] * 1e-6, imu.data[:, 4:7] * interval[:, None] * 1e-6
+    inside = recording.log.inside(len(interval), In_Imu0Gyro=dict(zip(("AngX", "AngY", "AngZ"), angle.T)),
+                                  In_Imu0Accel=dict(zip(("VelX", "VelY", "VelZ"), velocity.T)))
+    recording.dropped("IMU samples beyond their signals' range", np.count_nonzero(~inside))
+    imu, arrival, interval, angle, velocity = imu.keep(inside), arrival[inside], interval[inside], angle[inside], velocity[inside]
     seq = np.arange(len(interval)) & 15
     stamp = recording.log_us(imu.time_us)
-    angle, velocity = imu.data[:, 1:4] * interval[:, None] * 1e-6, imu.data[:, 4:7] * interval[:, None] * 1e-6
     at, add = recording.log_us(arrival), recording.log.add
     add("In_Imu0Gyro", at, AngX=angle[:, 0], AngY=angle[:, 1], AngZ=angle[:, 2], Seq=seq)
     add("In_Imu0Accel", at, VelX=velocity[:, 0], VelY=velocity[:, 1], VelZ=velocity[:, 2], Seq=seq)
@@ -70,7 +74,12 @@ def add_imu(recording, imu, arrival):
 
 
 def add_fixes(recording, time_us, arrival_us, lat_deg, lon_deg, height_m, sigma_horizontal_m, sigma_vertical_m, kind):
-    """GNSS positions as four frames each."""
+    """GNSS positions as four frames each; one that a signal cannot hold is left out whole."""
+    inside = recording.log.inside(len(time_us), In_GnssLat={"Lat": lat_deg}, In_GnssLon={"Lon": lon_deg}, In_GnssAlt={"Height": height_m},
+                                  In_GnssAcc={"Hor": sigma_horizontal_m, "Ver": sigma_vertical_m})
+    recording.dropped("fixes beyond their signals' range", np.count_nonzero(~inside))
+    time_us, arrival_us, lat_deg, lon_deg, height_m, sigma_horizontal_m, sigma_vertical_m, kind = (
+        np.asarray(value)[inside] if np.ndim(value) else value for value in (time_us, arrival_us, lat_deg, lon_deg, height_m, sigma_horizontal_m, sigma_vertical_m, kind))
     recording.sensor("In_GnssLat", time_us, arrival_us, Lat=lat_deg)
     recording.sensor("In_GnssLon", time_us, arrival_us, Lon=lon_deg)
     recording.sensor("In_GnssAlt", time_us, arrival_us, Height=height_m, Fix=kind, NumSv=np.nan)
