@@ -1,0 +1,154 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "sim_host/csv/columns.hpp"
+
+#include "sim_host/csv/number.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <utility>
+
+namespace tetap::csv {
+
+namespace {
+
+bool is_of_file(std::string_view named, const Table& table) {
+  if (named == table.name() || named == table.stem()) return true;
+  return table.name().ends_with(named) && table.name()[table.name().size() - named.size() - 1] == '/';
+}
+
+/// The unit that the user names for a quantity.
+sim::Result<std::optional<Unit>> named_unit(const Quantity& quantity, const Options& options) {
+  std::optional<Unit> unit;
+  for (const Named& named : options.units) {
+    const bool whole = named.quantity == quantity.name;
+    if (!whole && named.quantity != kind_name(quantity.kind)) continue;
+    const auto found = unit_of(named.text, quantity.dimension);
+    if (found) unit = found;
+    if (!found && whole)
+      return sim::Failure{
+          "--unit " + named.quantity + "=" + named.text + ": no such unit; there are: " + units_of(quantity.dimension),
+          0};
+  }
+  return unit;
+}
+
+}  // namespace
+
+std::optional<std::size_t> named_column(std::string_view text, const Table& table) {
+  for (std::size_t i = 0; i < table.columns().size(); ++i) {
+    const std::string_view column = table.columns()[i];
+    if (column == text) return i;
+    if (text.ends_with(column) && text.size() > column.size() + 1) {
+      const std::string_view file = text.substr(0, text.size() - column.size());
+      if (file.back() == ':' && is_of_file(file.substr(0, file.size() - 1), table)) return i;
+    }
+  }
+  return std::nullopt;
+}
+
+sim::Result<std::vector<Bound>> bind_columns(const Table& table, const Options& options) {
+  const auto& columns = table.columns();
+  bool phone = false, placed = false;
+  for (const std::string& column : columns) {
+    phone = phone || column == "seconds_elapsed";
+    const auto guess = guess_column(column, table.stem(), false, true);
+    placed = placed || (guess && guess->quantity->name == "gnss.lat");
+  }
+  std::vector<Bound> bound;
+  for (std::size_t i = 0; i < columns.size(); ++i)
+    if (auto guess = guess_column(columns[i], table.stem(), phone, placed)) bound.push_back({i, std::move(*guess), {}});
+  for (const Named& named : options.columns) {
+    const Quantity* quantity = find_quantity(named.quantity);
+    if (quantity == nullptr)
+      return sim::Failure{"--column " + named.quantity + ": no such quantity; there are: " + quantity_names(), 0};
+    const auto column = named_column(named.text, table);
+    if (!column) continue;
+    std::string unit;
+    for (const Bound& b : bound)
+      if (b.column == *column) unit = b.guess.unit;
+    std::erase_if(bound, [&](const Bound& b) { return b.column == *column || b.guess.quantity == quantity; });
+    if (const auto brackets = columns[*column].find_last_of("(["); unit.empty() && brackets != std::string::npos)
+      unit = columns[*column].substr(brackets + 1, columns[*column].size() - brackets - 2);
+    bound.push_back({*column, {quantity, unit, -10}, {}});
+  }
+  // One column to a quantity: the best, and of equal ones the first.
+  std::stable_sort(bound.begin(), bound.end(), [](const Bound& a, const Bound& b) {
+    return std::pair(a.guess.quantity, a.guess.rank) < std::pair(b.guess.quantity, b.guess.rank);
+  });
+  const auto same = [](const Bound& a, const Bound& b) { return a.guess.quantity == b.guess.quantity; };
+  bound.erase(std::unique(bound.begin(), bound.end(), same), bound.end());
+  for (Bound& b : bound) {
+    const Quantity& quantity = *b.guess.quantity;
+    const auto named = named_unit(quantity, options);
+    if (!named) return named.failure();
+    auto unit = *named;
+    // phyphox writes degrees for the metres of a vertical accuracy.
+    const bool mislabelled = quantity.dimension == Dimension::kLength && unit_of(b.guess.unit, Dimension::kAngle);
+    if (!unit && !b.guess.unit.empty() && !mislabelled) unit = unit_of(b.guess.unit, quantity.dimension);
+    b.stated = unit.has_value();
+    if (!unit && !b.guess.unit.empty() && !mislabelled)
+      return sim::Failure{
+          table.name() + ":" + std::to_string(table.line()) + ": column " + std::to_string(b.column + 1) + " '" +
+              excerpt(columns[b.column]) + "': no unit '" + excerpt(b.guess.unit) + "' of " +
+              std::string(quantity.name) + "; name it, as in --unit " + std::string(quantity.name) + "=" +
+              std::string(usual_unit(quantity.dimension).name) + " (" + units_of(quantity.dimension) + ")",
+          table.line()};
+    b.unit = unit.value_or(usual_unit(quantity.dimension));
+    if (!unit && quantity.dimension == Dimension::kAngle && quantity.kind == Kind::kVelocity)
+      b.unit = *unit_of("deg", Dimension::kAngle);  // no receiver states a course in radians
+  }
+  return bound;
+}
+
+sim::Result<Clock> take_clock(const Table& table, std::vector<Bound>& bound) {
+  const auto found =
+      std::find_if(bound.begin(), bound.end(), [](const Bound& b) { return b.guess.quantity->kind == Kind::kTime; });
+  if (found == bound.end())
+    return sim::Failure{
+        table.name() + ":" + std::to_string(table.line()) + ": no column of time; name it, as in --column time=COLUMN",
+        table.line()};
+  Clock clock{.column = found->column, .power = found->unit.power};
+  const bool stated = found->stated;
+  bound.erase(found);
+  Table sample = table;
+  std::vector<std::string_view> cells;
+  std::optional<double> first;
+  bool fraction = false;
+  for (int row = 0; row < 64 && sample.next(cells); ++row) {
+    const std::string_view cell = cells[clock.column];
+    if (is_missing(cell)) continue;
+    if (parse_calendar(cell)) return clock.calendar = true, clock;
+    const auto value = parse_real(cell, sample.point());
+    if (!value) return sample.refuse(clock.column, cell, "is no time");
+    if (!first) first = value;
+    fraction = fraction || cell.find(sample.point()) != std::string_view::npos;
+  }
+  if (!first || stated) return clock;
+  const double size = std::abs(*first);
+  if (size >= 1e17) return clock.power = -3, clock;  // since 1970, in ns, us, ms or s
+  if (size >= 1e14) return clock.power = 0, clock;
+  if (size >= 1e11) return clock.power = 3, clock;
+  if (size >= 1e8 || fraction) return clock.power = 6, clock;
+  return sim::Failure{table.name() + ":" + std::to_string(table.line()) + ": column " +
+                          std::to_string(clock.column + 1) + " '" + excerpt(table.columns()[clock.column]) +
+                          "': whole numbers whose unit is not stated; name it, as in --unit time=ms (s ms us ns)",
+                      table.line()};
+}
+
+/// No pressure of air is below 200 hPa where robots are, nor above 1 200: its size names its unit.
+void guess_pressure(const Table& table, std::vector<Bound>& bound) {
+  for (Bound& b : bound) {
+    if (b.guess.quantity->dimension != Dimension::kPressure || b.stated) continue;
+    Table sample = table;
+    std::vector<std::string_view> cells;
+    for (int row = 0; row < 64 && sample.next(cells); ++row) {
+      const auto value = parse_real(cells[b.column], sample.point());
+      if (!value) continue;
+      b.unit = *unit_of(*value < 200 ? "kPa" : *value < 2'000 ? "hPa" : "Pa", Dimension::kPressure);
+      break;
+    }
+  }
+}
+
+}  // namespace tetap::csv
