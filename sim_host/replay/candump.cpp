@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sim_host/replay/candump.hpp"
 
+#include "sim_host/replay/calendar.hpp"
+
 #include <array>
 #include <cstdint>
 #include <initializer_list>
@@ -51,6 +53,12 @@ class Cursor {
     const std::size_t before = text_.size();
     while (!text_.empty() && blank(text_.front())) text_.remove_prefix(1);
     return text_.size() != before;
+  }
+  /// The first characters, which are there.
+  std::string_view take_first(std::size_t n) {
+    const std::string_view taken = text_.substr(0, n);
+    text_.remove_prefix(n);
+    return taken;
   }
   /// The longest prefix of characters that `is` accepts.
   template <class Is>
@@ -104,7 +112,7 @@ std::string_view parse_bytes(Cursor& in, std::size_t limit, base::BasicCanFrame<
   return {};
 }
 
-constexpr std::size_t kLongestInterface = 64;  ///< a serial adapter's path and speed (python-can)
+constexpr std::size_t kLongestInterface = 200;  ///< a serial adapter's path by its names, and its speed (python-can)
 constexpr std::size_t kMostXlBytes = 2048;
 
 /// Behind "id#": a raw length code above 8.
@@ -184,16 +192,30 @@ std::string_view parse_listed(Cursor& in, LogLine& line) {
 }
 
 /// Lines of an .asc that are no frame.
-constexpr std::array<std::string_view, 8> kHeadings{
-    "date ", "base hex",           "internal events",    "no internal events",
-    "// ",   "Begin Triggerblock", "Begin TriggerBlock", "End "};
+constexpr std::array<std::string_view, 7> kHeadings{
+    "date ", "internal events", "no internal events", "// ", "Begin Triggerblock", "Begin TriggerBlock", "End "};
 
-/// "seconds channel id[x] Rx d length bytes", numbers in hexadecimal; CAN FD, errors and events are counted alone.
-std::variant<LogLine, BadLine> parse_asc(std::string_view text) {
+/// A number of an .asc, and nothing where it is none or above `most`.
+std::optional<std::uint32_t> parse_number(std::string_view text, bool decimal, std::uint32_t most) {
+  std::uint64_t value = 0;
+  if (text.empty() || text.size() > 10) return std::nullopt;
+  for (const char c : text) {
+    const int one = decimal ? digit(c) : hex_digit(c);
+    if (one < 0) return std::nullopt;
+    value = value * (decimal ? 10 : 16) + static_cast<std::uint64_t>(one);
+  }
+  return value <= most ? std::optional(static_cast<std::uint32_t>(value)) : std::nullopt;
+}
+
+/// "seconds channel id[x] Rx d length bytes"; CAN FD, errors and events are counted alone.
+std::variant<LogLine, BadLine> parse_asc(std::string_view text, bool decimal) {
   LogLine line{.clock = LogLine::Clock::kRelative};
   for (const std::string_view heading : kHeadings)
     if (text.starts_with(heading)) return line.kind = LogLine::Kind::kHeading, line;
-  if (text.starts_with("base dec")) return BadLine{"an .asc with base dec; it is read with base hex"};
+  if (text.starts_with("base hex") || text.starts_with("base dec")) {
+    line.base = {.decimal = text.starts_with("base dec"), .differences = text.find(" relative") != text.npos};
+    return line.kind = LogLine::Kind::kHeading, line;
+  }
   Cursor in(text);
   const auto is_digit = [](char c) { return digit(c) >= 0; };
   const auto is_word = [](char c) { return !blank(c); };
@@ -213,44 +235,46 @@ std::variant<LogLine, BadLine> parse_asc(std::string_view text) {
   if (id == "Statistic:") return line.kind = LogLine::Kind::kHeading, line;
   line.frame.extended = id.ends_with('x');
   if (line.frame.extended) id.remove_suffix(1);
-  if (id.empty() || id.size() > 8) return BadLine{"an id has 1 to 8 hexadecimal digits"};
-  for (const char c : id) {
-    if (hex_digit(c) < 0) return BadLine{"an id has 1 to 8 hexadecimal digits"};
-    line.frame.id = line.frame.id << 4 | static_cast<std::uint32_t>(hex_digit(c));
-  }
-  if (line.frame.id > (line.frame.extended ? 0x1FFFFFFFU : 0x7FFU))
-    return BadLine{"no such id: extended ones end with x"};
+  const auto number = parse_number(id, decimal, line.frame.extended ? 0x1FFFFFFFU : 0x7FFU);
+  if (!number) return BadLine{"no such id: extended ones end with x"};
+  line.frame.id = *number;
   in.eat_blanks();
   const std::string_view direction = in.take(is_word);
   if (direction != "Rx" && direction != "Tx" && direction != "TxRq") return BadLine{"Rx or Tx is missing after the id"};
   in.eat_blanks();
   if (in.eat('r')) return line.kind = LogLine::Kind::kRemote, line;
   if (!in.eat('d') || !in.eat_blanks()) return BadLine{"d or r is missing after the direction"};
-  const std::string_view length = in.take([](char c) { return hex_digit(c) >= 0; });
-  if (length.size() != 1) return BadLine{"the length is 0 to F"};
-  const auto code = static_cast<std::size_t>(hex_digit(length[0]));
-  if (const auto reason = parse_spaced_bytes(in, code < 8 ? code : 8, line); !reason.empty()) return BadLine{reason};
+  const auto code = parse_number(in.take(is_word), decimal, 15);
+  if (!code) return BadLine{"the length is 0 to 15"};
+  line.frame.size = static_cast<std::uint8_t>(*code < 8 ? *code : 8);
+  for (std::size_t i = 0; i < line.frame.size; ++i) {
+    in.eat_blanks();
+    const auto byte = parse_number(in.take(is_word), decimal, 0xFF);
+    if (!byte) return BadLine{"fewer data bytes than the line announces"};
+    line.frame.data[i] = static_cast<std::uint8_t>(*byte);
+  }
   if (in.eat_blanks() || in.empty()) return line;  // Length = ..., BitCount = ... may follow
   return BadLine{"unexpected text after the data"};
 }
 
 }  // namespace
 
-std::variant<LogLine, BadLine> parse_log_line(std::string_view text) {
+std::variant<LogLine, BadLine> parse_log_line(std::string_view text, bool decimal) {
   if (!text.empty() && text.back() == '\r') text.remove_suffix(1);
   Cursor in(text);
   LogLine line;
   const auto is_digit = [](char c) { return digit(c) >= 0; };
   const auto is_hex = [](char c) { return hex_digit(c) >= 0; };
   in.eat_blanks();
-  if (!in.eat('(')) return parse_asc(in.rest());
-  const std::string_view whole = in.take(is_digit);
+  if (!in.eat('(')) return parse_asc(in.rest(), decimal);
+  const auto date = calendar_seconds(in.rest());  // candump -t A
+  const std::string_view whole = date ? in.take_first(kDateAndTime) : in.take(is_digit);
   if (!in.eat('.')) return BadLine{"the time is not (seconds.micros)"};
   const std::string_view part = in.take(is_digit);
   if (!in.eat(')')) return BadLine{"the time is not (seconds.micros)"};
-  const auto time = parse_time(whole, part);
+  const auto time = parse_time(date ? "0" : whole, part);
   if (!time) return BadLine{"the time is not (seconds.micros)"};
-  line.time = *time;
+  line.time = *time + base::Micros{date.value_or(0) * 1'000'000};
   if (!in.eat_blanks()) return BadLine{"no space after the time"};
   line.interface = in.take([](char c) { return !blank(c) && c != '#'; });
   if (line.interface.empty() || line.interface.size() > kLongestInterface)

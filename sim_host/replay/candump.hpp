@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Lines of `candump -L`: "(seconds.micros) interface id#data", standard and extended ids, remote frames "#R", CAN FD
 // "##<flags>data", CAN XL "###", optional direction " R" or " T". Format as in can-utils lib.c (parse_canframe,
-// sprint_canframe). Also lines of `candump -t` ("interface id [length] bytes") and of Vector's .asc.
+// sprint_canframe). Also lines of `candump -t` ("interface id [length] bytes"; -t A with a date) and of Vector's .asc.
 #pragma once
 
 #include "sim_host/replay/line.hpp"
@@ -9,6 +9,7 @@
 #include "tetap/base/time.hpp"
 
 #include <cstdint>
+#include <optional>
 #include <string_view>
 #include <variant>
 
@@ -32,6 +33,12 @@ struct LogLine {
   Clock clock = Clock::kCalendar;
   base::BasicCanFrame<64> frame;  ///< data frames have at most 8 bytes
   std::uint8_t fd_flags = 0;
+  /// Form of the lines behind an .asc's line "base ...".
+  struct Base {
+    bool decimal = false;      ///< numbers are decimal, not hexadecimal
+    bool differences = false;  ///< times count from the line before
+  };
+  std::optional<Base> base;
 
   /// For a data frame only.
   [[nodiscard]] base::CanFrame classic() const {
@@ -47,7 +54,8 @@ struct BadLine {
 };
 
 /// One line without its newline (a carriage return before it is allowed). No globals, no allocation: fit for a fuzzer.
-[[nodiscard]] std::variant<LogLine, BadLine> parse_log_line(std::string_view line);
+/// `decimal`: after an .asc's line "base dec".
+[[nodiscard]] std::variant<LogLine, BadLine> parse_log_line(std::string_view line, bool decimal = false);
 
 /// Appends a data frame as one line, newline included.
 void append_log_line(Line& out, base::Micros time, std::string_view interface, const base::CanFrame& frame);

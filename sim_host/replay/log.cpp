@@ -22,9 +22,12 @@ std::string excerpt(std::string_view text) {
 }  // namespace
 
 /// candump -t z and an .asc count from the log's start, candump -t d from the frame before. A time of less than half of
-/// that before it shows differences: those before it were so small that their sum is near enough.
+/// that before it shows differences, and so do times of which a quarter do not grow: their sum so far is near enough.
 base::Micros LogParser::since_start(base::Micros relative) {
-  differences_ = differences_ || relative.us < relative_.us / 2;
+  constexpr base::Micros kBurst{1'000};  // the first frames of a log may share a microsecond
+  falls_ += relative <= relative_ && relative > kBurst ? 1 : 0;
+  ++steps_;
+  differences_ = differences_ || relative.us < relative_.us / 2 || (falls_ >= 2 && 4 * falls_ >= steps_);
   relative_ = relative;
   sum_ += relative;
   return differences_ ? sum_ : relative;
@@ -42,7 +45,7 @@ Result<std::optional<TimedFrame>> LogParser::add(std::string_view text, bool end
   if (text.size() > kLongestLine)
     return Failure{place() + ": a line above " + std::to_string(kLongestLine) + " bytes: '" + excerpt(text) + "'",
                    number_};
-  const auto parsed = parse_log_line(text);
+  const auto parsed = parse_log_line(text, decimal_);
   const auto* line = std::get_if<LogLine>(&parsed);
   if (line == nullptr) {
     if (text.find_first_not_of(" \t\r") == std::string_view::npos) return kNone;
@@ -53,8 +56,13 @@ Result<std::optional<TimedFrame>> LogParser::add(std::string_view text, bool end
     if (report_.malformed++ == 0) report_.first_malformed = message;
     return kNone;
   }
-  if (line->kind == LogLine::Kind::kHeading) return kNone;
+  if (line->base) {
+    decimal_ = line->base->decimal;
+    differences_ = line->base->differences;
+  }
+  if (line->kind == LogLine::Kind::kHeading && (line->base || line->interface.empty())) return kNone;
   const base::Micros time = line->clock == LogLine::Clock::kRelative ? since_start(line->time) : line->time;
+  if (line->kind == LogLine::Kind::kHeading) return kNone;
   if (!options_.interface.empty() && line->interface != options_.interface) return ++report_.other_interface, kNone;
   if (line->kind == LogLine::Kind::kXl) ++report_.xl;
   if (line->kind != LogLine::Kind::kData) return ++report_.not_data, kNone;

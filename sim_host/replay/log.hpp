@@ -99,9 +99,11 @@ class LogParser {
   LogOptions options_;
   LogReport report_;
   base::Micros latest_;
-  base::Micros relative_, sum_;  ///< last time of a relative clock, and the sum of all
-  bool differences_ = false;     ///< they are differences
-  std::uint64_t number_ = 0;     ///< number of the line
+  base::Micros relative_, sum_;          ///< last time of a relative clock, and the sum of all
+  std::uint64_t steps_ = 0, falls_ = 0;  ///< relative times, and those not above the one before
+  bool differences_ = false;             ///< they are differences
+  bool decimal_ = false;                 ///< an .asc with base dec
+  std::uint64_t number_ = 0;             ///< number of the line
 };
 
 /// The text of a log in memory, read line by line.

@@ -96,6 +96,9 @@ TEST(LogLine, FormsOfOtherWritersAreReadOrCounted) {
   EXPECT_EQ(good(" (1795907698.303588)  vcan0  301   [3]  09 00 CD   '..'").time.us, 1'795'907'698'303'588);
   EXPECT_EQ(good(" (000.000023)  vcan0  RX - -  301   [3]  09 00 CD").classic(), frame);
   EXPECT_EQ(good(" (000.000023)  vcan0  301   [3]  09 00 CD").clock, LogLine::Clock::kRelative);
+  const LogLine dated = good(" (2026-11-28 10:00:00.123456)  vcan0  301   [3]  09 00 CD");  // candump -t A
+  EXPECT_EQ(dated.time.us, 1'795'860'000'123'456);
+  EXPECT_EQ(dated.clock, LogLine::Clock::kCalendar);
   EXPECT_EQ(good(" (000.000023)  vcan0  18FEF100   [0]").frame.extended, true);
   EXPECT_EQ(good(" (000.000023)  vcan0  301   [8]  remote request").kind, LogLine::Kind::kRemote);
   EXPECT_EQ(good(" (000.000023)  vcan0  301  [09]  01 02 03 04 05 06 07 08 09").kind, LogLine::Kind::kFd);
@@ -110,9 +113,86 @@ TEST(LogLine, FormsOfOtherWritersAreReadOrCounted) {
   EXPECT_EQ(good("   0.010000 2  302             Rx   r 8").kind, LogLine::Kind::kRemote);
   EXPECT_EQ(good("   0.010000 2  ErrorFrame").kind, LogLine::Kind::kError);
   EXPECT_EQ(good("   0.010000 CANFD   1 Rx 303 1 0 9 12 00").kind, LogLine::Kind::kFd);
-  EXPECT_NE(reason("base dec  timestamps absolute").find("base hex"), std::string::npos);
   EXPECT_NE(reason("   0.010000 1  18FEF100        Tx   d 0").find("end with x"), std::string::npos);
   EXPECT_NE(reason("   0.010000 1  301   Rx   d 8 09 00").find("fewer"), std::string::npos);
+}
+
+/// Verdict on a line in the words of log_lines.txt.
+std::string verdict(std::string_view text) {
+  const auto parsed = parse_log_line(text);
+  if (std::holds_alternative<BadLine>(parsed)) return "bad";
+  const auto& line = std::get<LogLine>(parsed);
+  if (line.kind != LogLine::Kind::kData)
+    return std::array{"data", "remote", "error", "fd", "xl", "heading"}[static_cast<std::size_t>(line.kind)];
+  Line words;
+  words.text("data ").hex(line.frame.id, line.frame.extended ? 8 : 3).put(' ');
+  for (std::size_t i = 0; i < line.frame.size; ++i) words.hex(line.frame.data[i], 2);
+  return std::string(words.view());
+}
+
+TEST(LogLine, TheTableOfLinesHolds) {
+  const auto root = std::filesystem::path(TETAP_DBC).parent_path().parent_path();
+  std::ifstream table(root / "test/host/log_lines.txt");
+  std::size_t lines = 0;
+  for (std::string text; std::getline(table, text);) {
+    if (text.starts_with('#')) continue;
+    const std::size_t tab = text.find('\t');
+    ASSERT_NE(tab, std::string::npos) << text;
+    EXPECT_EQ(verdict(text.substr(tab + 1)), text.substr(0, tab)) << text;
+    ++lines;
+  }
+  EXPECT_GE(lines, 85U);
+}
+
+TEST(LogLine, AnAscWithDecimalNumbersIsReadAfterItsHeading) {
+  const std::string frame = "   0.250000 1  769             Rx   d 3 9 0 205\n";
+  const Log log = parse_log("base dec  timestamps absolute\n" + frame, "x");
+  ASSERT_EQ(log.frames.size(), 1U);
+  EXPECT_EQ(log.frames[0].frame, (base::CanFrame{.id = 0x301, .size = 3, .data = {0x09, 0x00, 0xCD}}));
+  EXPECT_TRUE(parse_log(frame, "x").failure) << "205 is no byte in hexadecimal";
+  EXPECT_TRUE(parse_log("base dec\n   0.25 1  2048  Rx   d 0\n", "x").failure);
+}
+
+/// Every line of an .asc with relative times counts from the one before it, frame or not.
+TEST(Log, RelativeTimesOfAnAscAreAddedUp) {
+  const Log log = parse_log(
+      "base hex  timestamps relative\n   1.000000 1  301  Rx   d 0\n   0.500000 1  Statistic: D 0\n"
+      "   1.500000 1  301  Rx   d 0\n   2.000000 1  301  Rx   d 0\n",
+      "x");
+  ASSERT_EQ(log.frames.size(), 3U);
+  EXPECT_EQ((log.frames[1].time - log.frames[0].time).us, 2'000'000);
+  EXPECT_EQ((log.frames[2].time - log.frames[1].time).us, 2'000'000);
+}
+
+/// candump -t d of a bus with one frame every 10 ms: its times hardly change.
+TEST(Log, DifferencesOfASteadyBusAreAddedUp) {
+  for (const int jitter_us : {0, 40}) {
+    std::string text;
+    for (int i = 0; i < 1000; ++i) {
+      char line[80];
+      std::snprintf(line, sizeof line, " (000.%06d)  can0  301   [1]  %02X\n",
+                    i == 0 ? 0 : 10'000 + (i % 3 - 1) * jitter_us, static_cast<unsigned>(i % 256));
+      text += line;
+    }
+    const Log log = parse_log(text, "x");
+    ASSERT_EQ(log.frames.size(), 1000U);
+    EXPECT_NEAR(static_cast<double>((log.frames[999].time - log.frames[10].time).us), 9'890'000, 100) << jitter_us;
+    EXPECT_NEAR(static_cast<double>((log.frames[999].time - log.frames[0].time).us), 9'990'000, 100'000) << jitter_us;
+  }
+}
+
+/// candump -t z of two interfaces: a few times go back by a little, and stay times since the start.
+TEST(Log, ALittleDisorderIsNoDifference) {
+  std::string text;
+  for (int i = 0; i < 1000; ++i) {
+    char line[80];
+    const int us = i * 1000 - (i % 9 == 5 ? 1500 : 0);
+    std::snprintf(line, sizeof line, " (%03d.%06d)  can%d  301   [0]\n", us / 1'000'000, us % 1'000'000, i % 2);
+    text += line;
+  }
+  const Log log = parse_log(text, "x");
+  ASSERT_EQ(log.frames.size(), 1000U);
+  EXPECT_EQ((log.frames[999].time - log.frames[0].time).us, 999'000);
 }
 
 TEST(LogLine, EveryOtherLineIsRefusedWithItsReason) {
