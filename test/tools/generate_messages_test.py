@@ -489,7 +489,7 @@ class Decode(Folder):
                "   0.010000 1  32F             Rx   d 8 10 27 18 FC 00 80 55 00  Length = 244000 BitCount = 126 ID = 815\r\n"
                "   0.020000 1  18FEF100x       Tx   d 2 01 02\r\n   0.030000 1  ErrorFrame\r\n   0.040000 2  302             Rx   r 8\r\nEnd TriggerBlock\r\n")
         self.assertEqual(self.said(asc).stdout, self.WORDS.replace("(1700000000.010000) vcan0", "(0.010000) 1")
-                         + "(0.020000) 1 18FEF100 ? 01 02\n(0.040000) 2 302 ? remote request\n")
+                         + "(0.020000) 1 18FEF100 ? 01 02\n(0.030000) 1 - ? error frame\n(0.040000) 2 302 ? remote request\n")
         for line, words in (("123#1122334455667788_F", "123 ? 11 22 33 44 55 66 77 88"), ("123#R8_9", "123 ? remote request"),
                             ("123##1112233445566778899", "123 ? CAN FD, 9 bytes"), ("00123###81:00:12345678#112233445566", "00123 ? CAN XL, 6 bytes")):
             self.assertEqual(self.said("(0.0) can0 " + line + "\n").stdout, "(0.0) can0 " + words + "\n")
