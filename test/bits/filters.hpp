@@ -5,6 +5,7 @@
 
 #include "config/rover.hpp"
 #include "tetap/base/selfcheck.hpp"
+#include "tetap/base/state_words.hpp"
 #include "tetap/estimators/planar/dead_reckoning.hpp"
 #include "tetap/filter/kalman.hpp"
 #include "tetap/firmware/boot_self_check.hpp"
@@ -228,7 +229,7 @@ void hash_vector(base::WordHash& hash, const filter::Vector<float, N>& x) {
     motion.fuse(sensor::ImuSample{.dangle_b_rad = {0.0F, 0.0F, 0.01F * chance.normal()}, .interval_us = 10'000}, stamp,
                 parameters);
     motion.advance({now_us});
-    motion.hash_state(hash);
+    base::each_word(motion, hash);
     const estimators::Estimate ahead = motion.estimate(parameters);
     hash(ahead.pose.x.um());
     hash(ahead.pose.y.um());

@@ -6,6 +6,7 @@
 #include "config/rover.hpp"
 #include "filters.hpp"
 #include "tetap/base/selfcheck.hpp"
+#include "tetap/base/state_words.hpp"
 #include "tetap/model/dual_heading.hpp"
 #include "tetap/model/gnss_course.hpp"
 #include "tetap/model/gnss_fix_3d.hpp"
@@ -184,7 +185,7 @@ class InertialRun {
           hash_(motion.yaw_rate_rad2ps2);
         }
       });
-      history_.hash_state(hash_);
+      base::each_word(history_, hash_);
       history_.retire_until(now_ - base::Micros{kNumbers.loop.window_us}, context(), noting());
     }
     return hash_.value();

@@ -4,6 +4,7 @@
 
 #include "config/mrclam.hpp"
 #include "tetap/base/bit_crc.hpp"
+#include "tetap/base/state_words.hpp"
 #include "tetap/estimators/context.hpp"
 #include "tetap/estimators/estimate.hpp"
 #include "tetap/sensor/window.hpp"
@@ -76,7 +77,7 @@ struct CirclingRobot {
   }
   [[nodiscard]] std::uint32_t hash() const {
     base::BitCrc crc;
-    estimator.hash_state(crc);
+    base::each_word(estimator, crc);
     return crc.value();
   }
 

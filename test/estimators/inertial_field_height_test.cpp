@@ -2,6 +2,7 @@
 // Magnetometer and barometer in the inertial estimator: what they find at the start, and how far they are believed. A
 // disturbance has limits and an end. The world is a small one of its own. Its robot stands or drives curves, with exact
 // sensors but for what a test adds, each sample fused at its own time.
+#include "tetap/base/state_words.hpp"
 #include "tetap/estimators/inertial/inertial.hpp"
 
 #include <gtest/gtest.h>
@@ -443,8 +444,8 @@ TEST(InertialMagnetometer, refuses_what_is_no_field) {
   drive(robot, 20);
   const auto bits = [&robot] {
     std::vector<std::uint64_t> all;
-    robot.estimator.hash_state(
-        [&all](auto value) { all.push_back(static_cast<std::uint64_t>(std::hash<decltype(value)>{}(value))); });
+    const auto sink = [&all](std::uint32_t word) { all.push_back(word); };
+    base::each_word(robot.estimator, sink);
     return all;
   };
   const auto before = bits();

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The present carried over the window, and how the work at its far end is shared out among ticks.
 #include "tetap/estimators/inertial/output_predictor.hpp"
+#include "tetap/base/state_words.hpp"
 
 #include "tetap/estimators/inertial/inertial.hpp"
 #include "tetap/node/fusion_window.hpp"
@@ -34,14 +35,8 @@ sensor::Sample imu_sample(std::int64_t us, const nav::Vector3& w_b_radps, const 
 
 std::vector<std::uint32_t> bits_of(const nav::InsState& x) {
   std::vector<std::uint32_t> all;
-  x.hash_state([&]<class T>(T value) {
-    if constexpr (sizeof(T) == 8) {
-      all.push_back(static_cast<std::uint32_t>(value));
-      all.push_back(static_cast<std::uint32_t>(static_cast<std::uint64_t>(value) >> 32));
-    } else {
-      all.push_back(std::bit_cast<std::uint32_t>(value));
-    }
-  });
+  const auto sink = [&](std::uint32_t word) { all.push_back(word); };
+  base::each_word(x, sink);
   return all;
 }
 
@@ -177,7 +172,8 @@ TEST(OutputPredictor, ItsCellsSayWhatTheirSamplesSay) {
       ASSERT_EQ(cells.place().rate_b_radps, each.place().rate_b_radps);
       const auto bits = [](const checks::ImuClassifier& r) {
         std::vector<std::uint32_t> all;
-        r.hash_state([&](auto v) { all.push_back(std::bit_cast<std::uint32_t>(v)); });
+        const auto sink = [&](std::uint32_t word) { all.push_back(word); };
+        base::each_word(r, sink);
         return all;
       };
       ASSERT_EQ(bits(cells.place().classifier), bits(each.place().classifier));

@@ -4,6 +4,7 @@
 #include "tetap/estimators/planar/pose_grid.hpp"
 #include "estimators/circling_robot.hpp"
 #include "support/never_nan.hpp"
+#include "tetap/base/state_words.hpp"
 #include "tetap/node/estimator_slot.hpp"
 
 #include <gtest/gtest.h>
@@ -60,7 +61,7 @@ struct Robot : test::CirclingRobot<Grid> {
   }
   [[nodiscard]] std::uint32_t whole_hash() const {
     base::BitCrc crc;
-    estimator.hash_state(crc);
+    base::each_word(estimator, crc);
     estimator.hash_memory(crc);
     return crc.value();
   }

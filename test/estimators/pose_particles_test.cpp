@@ -4,6 +4,7 @@
 #include "tetap/estimators/planar/pose_particles.hpp"
 #include "estimators/circling_robot.hpp"
 #include "support/never_nan.hpp"
+#include "tetap/base/state_words.hpp"
 #include "tetap/node/estimator_slot.hpp"
 
 #include <gtest/gtest.h>
@@ -28,7 +29,7 @@ std::unique_ptr<Robot> robot_at(float x_m, float y_m, float yaw_rad) {
 }
 std::uint32_t whole_hash(const Robot& robot) {
   base::BitCrc crc;
-  robot.estimator.hash_state(crc);
+  base::each_word(robot.estimator, crc);
   robot.estimator.hash_memory(crc);
   return crc.value();
 }

@@ -6,6 +6,7 @@
 #include "config/tracker_ukf.hpp"
 #include "support/never_nan.hpp"
 #include "tetap/base/bit_crc.hpp"
+#include "tetap/base/state_words.hpp"
 
 #include <gtest/gtest.h>
 #include <cmath>
@@ -58,7 +59,7 @@ struct Scene {
   }
   [[nodiscard]] std::uint32_t hash() const {
     base::BitCrc crc;
-    tracker.hash_state(crc);
+    base::each_word(tracker, crc);
     return crc.value();
   }
 

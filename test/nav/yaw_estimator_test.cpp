@@ -2,6 +2,7 @@
 // The heading finder against the bank of hypotheses that it stands for, and in a world of its own. Drives of a car and
 // a rover in double, an IMU with biases and a wrong level, GNSS velocity or position, wheels.
 #include "tetap/nav/yaw_estimator.hpp"
+#include "tetap/base/state_words.hpp"
 
 #include "support/consistency.hpp"
 #include "support/least_eigenvalue.hpp"
@@ -543,15 +544,13 @@ TEST(YawEstimator, SamplesThatWereLostCostCertaintyNotTruth) {
   }
 }
 
-/// All that hash_state() shows, as numbers.
-std::vector<std::uint64_t> bits_of(const nav::YawEstimator& finder) {
+/// All of the state, as numbers.
+std::vector<std::uint32_t> bits_of(const nav::YawEstimator& finder) {
   struct Sink {
-    std::vector<std::uint64_t> all;
-    void operator()(float x) { all.push_back(base::bits(x)); }
-    void operator()(std::uint32_t x) { all.push_back(x); }
-    void operator()(std::int64_t x) { all.push_back(static_cast<std::uint64_t>(x)); }
+    std::vector<std::uint32_t> all;
+    void operator()(std::uint32_t word) { all.push_back(word); }
   } sink;
-  finder.hash_state(sink);
+  base::each_word(finder, sink);
   return sink.all;
 }
 

@@ -62,10 +62,9 @@ class Smoother {
   }
   [[nodiscard]] estimators::MappedLandmark own_landmark(std::size_t) const { return {}; }
   void reset_own_map() { job_.cancel(); }
-  template <class Sink>
-  void hash_state(Sink&& sink) const {
-    job_.hash_state(sink);
-    for (const float v : {since_, snapshot_, sum_, adopted_}) sink(v);
+  static constexpr auto members(auto& self) {
+    return base::members(self.job_, self.now_, self.since_, self.snapshot_, self.sum_, self.adopted_, self.done_,
+                         self.count_, self.adoptions_);
   }
 
  private:

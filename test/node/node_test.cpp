@@ -285,10 +285,7 @@ class Fragile {
   }
   [[nodiscard]] estimators::Estimate estimate(const estimators::Context&) const { return estimate_; }
   [[nodiscard]] sensor::Mode mode(const estimators::Context&) const { return sensor::Mode::kNominal; }
-  template <class Sink>
-  void hash_state(Sink&& sink) const {
-    sink(estimate_.forward_mps);
-  }
+  static constexpr auto members(auto& self) { return base::members(base::unhashed(self.estimate_)); }
 
  private:
   estimators::Estimate estimate_;

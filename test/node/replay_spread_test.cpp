@@ -28,10 +28,7 @@ struct OrderSensitive {
   }
   [[nodiscard]] estimators::Estimate estimate(const estimators::Context&) const { return {}; }
   [[nodiscard]] sensor::Mode mode(const estimators::Context&) const { return sensor::Mode::kNominal; }
-  template <class Sink>
-  void hash_state(Sink&& sink) const {
-    sink(state.value());
-  }
+  static constexpr auto members(auto& self) { return base::members(base::unhashed(self.state)); }
 };
 
 using Two = node::EstimatorsWithPlaces<512, OrderSensitive, OrderSensitive>;
@@ -77,13 +74,7 @@ class Bench {
   /// State of each estimator's present.
   [[nodiscard]] std::vector<std::uint32_t> estimates() const {
     std::vector<std::uint32_t> all;
-    window_.each_slot([&](const auto& slot) {
-      bool first = true;
-      slot.hash_state([&](std::uint32_t word) {
-        if (first) all.push_back(word);
-        first = false;
-      });
-    });
+    window_.each_slot([&](const auto& slot) { all.push_back(std::get<0>(slot.members(slot)).state.value()); });
     return all;
   }
 

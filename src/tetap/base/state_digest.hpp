@@ -4,6 +4,7 @@
 #pragma once
 
 #include "tetap/base/bit_crc.hpp"
+#include "tetap/base/members.hpp"
 
 #include <cstddef>
 #include <cstdint>
@@ -34,6 +35,7 @@ class StateDigest {
   [[nodiscard]] constexpr std::uint32_t value() const { return value_; }
   /// Element of the memory that the next scan() begins with.
   [[nodiscard]] constexpr std::size_t next() const { return next_; }
+  static constexpr auto members(auto& self) { return base::members(self.value_, base::count(self.next_)); }
 
  private:
   std::uint32_t value_ = 0;

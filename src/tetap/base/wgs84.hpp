@@ -5,6 +5,7 @@
 #pragma once
 
 #include "tetap/base/math_double.hpp"
+#include "tetap/base/members.hpp"
 
 #include <cstdint>
 #include <optional>
@@ -39,6 +40,7 @@ struct Level {
   SinCosDouble longitude{};
 
   constexpr Level() = default;
+  static constexpr auto members(auto& self) { return base::members(self.latitude, self.longitude); }
   constexpr Level(std::int64_t latitude_2ndeg, std::int64_t longitude_2ndeg)
       : latitude(sincos(static_cast<double>(latitude_2ndeg) * kRadPer2ndeg)),
         longitude(sincos(static_cast<double>(longitude_2ndeg) * kRadPer2ndeg)) {}

@@ -4,6 +4,7 @@
 #pragma once
 
 #include "tetap/base/can_frame.hpp"
+#include "tetap/base/members.hpp"
 #include "tetap/base/siphash.hpp"
 #include "tetap/base/time.hpp"
 #include "tetap/bus/codec.hpp"
@@ -43,27 +44,21 @@ class Authentication {
  public:
   explicit Authentication(const param::Parameters& parameters) : parameters_(parameters), link_(parameters.bus.key) {}
 
+  static constexpr auto members(auto& self) {
+    return base::members(base::reference(self.parameters_), base::own(self.link_), base::own(self.sum_), self.chain_,
+                         self.inputs_hashed_, self.nonces_, self.tags_, self.attempts_, self.more_at_, self.turn_);
+  }
   void power_on() {
-    chain_ = 0;
-    begin_link();
-    inputs_hashed_ = 0;
-    nonces_ = {};
-    tags_ = {};
+    base::clear(*this);
     attempts_ = kAttempts;
-    turn_ = 0;
+    begin_link();
   }
   /// The key could be computed from a hash that is under way. Only right behind tick().
   void hide_secrets() { link_ = base::SipHash({}); }
   /// All but the parameters, from a state whose secrets may be hidden.
   void resume(const Authentication& other) {
-    chain_ = other.chain_;
+    base::resume(*this, other);
     begin_link();
-    inputs_hashed_ = other.inputs_hashed_;
-    nonces_ = other.nonces_;
-    tags_ = other.tags_;
-    attempts_ = other.attempts_;
-    more_at_ = other.more_at_;
-    turn_ = other.turn_;
   }
 
   /// Every input frame of a tick, in any order.

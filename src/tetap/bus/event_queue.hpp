@@ -5,6 +5,7 @@
 #pragma once
 
 #include "tetap/base/float_bits.hpp"
+#include "tetap/base/members.hpp"
 #include "tetap/bus/counters.hpp"
 #include "tetap/estimators/estimate.hpp"
 #include "tetap/sensor/sample.hpp"
@@ -36,6 +37,10 @@ class EventQueue {
     const auto waited = static_cast<std::uint8_t>(tick_ - first.epoch);
     first.age_s += base::seconds(base::Micros{std::int64_t{waited} * period_us});
     return first;
+  }
+  static constexpr auto members(auto& self) {
+    return base::members(base::first(self.queue_, self.size_), base::count(self.size_), self.tick_,
+                         base::count(self.first_));
   }
 
  private:

@@ -2,6 +2,7 @@
 // Fault bits, and those that stand for a second after a counter has moved.
 #pragma once
 
+#include "tetap/base/members.hpp"
 #include "tetap/bus/counters.hpp"
 #include "tetap/bus/messages.hpp"
 #include "tetap/estimators/own_map.hpp"
@@ -47,6 +48,9 @@ class FaultHold {
     last_ = now;
   }
   [[nodiscard]] FaultSet faults(std::uint32_t epoch) const { return {epoch < until_ ? bits_ : std::uint16_t{0}}; }
+  static constexpr auto members(auto& self) {
+    return base::members(base::in_turns(self.last_), self.until_, self.bits_);
+  }
 
  private:
   Counters last_;            ///< as they were an epoch ago
@@ -70,6 +74,7 @@ class MapFaultHold {
     for (std::size_t i = 0; i < kFaults; ++i) bits |= epoch < until_[i] ? 1U << i : 0U;
     return static_cast<std::uint8_t>(bits);
   }
+  static constexpr auto members(auto& self) { return base::members(self.counts_, self.until_); }
 
  private:
   static constexpr std::size_t kFaults = 3;

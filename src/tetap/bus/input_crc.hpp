@@ -3,6 +3,7 @@
 #pragma once
 
 #include "tetap/base/bit_crc.hpp"
+#include "tetap/base/members.hpp"
 
 #include <cstdint>
 
@@ -29,6 +30,9 @@ class InputCrc {
   }
   [[nodiscard]] constexpr std::uint32_t count() const { return count_; }
   [[nodiscard]] constexpr std::uint32_t running() const { return running_; }
+  static constexpr auto members(auto& self) {
+    return base::members(self.running_, self.sum_, self.in_epoch_, self.count_);
+  }
 
  private:
   std::uint32_t running_ = 0;

@@ -2,6 +2,7 @@
 // Between the bus and the decoder: which commands, map entries and samples get through (param::BusParameters).
 #pragma once
 
+#include "tetap/base/members.hpp"
 #include "tetap/bus/authentication.hpp"
 #include "tetap/bus/guard.hpp"
 #include "tetap/bus/messages.hpp"
@@ -50,19 +51,14 @@ class Protection {
  public:
   explicit Protection(const param::Parameters& parameters) : parameters_(parameters), authentication_(parameters) {}
 
-  void power_on() {
-    authentication_.power_on();
-    samples_.power_on();
-    entries_.power_on();
+  static constexpr auto members(auto& self) {
+    return base::members(base::reference(self.parameters_), self.authentication_, self.samples_, self.entries_);
   }
+  void power_on() { base::clear(*this); }
   /// Right behind a tick: nothing is left from which the key could be computed. For a copy that others get.
   void hide_secrets() { authentication_.hide_secrets(); }
   /// All but the parameters, from a state whose secrets may be hidden.
-  void resume(const Protection& other) {
-    authentication_.resume(other.authentication_);
-    samples_ = other.samples_;
-    entries_ = other.entries_;
-  }
+  void resume(const Protection& other) { base::resume(*this, other); }
   void tick(base::Micros now, Counters& counters) {
     if (authenticates()) authentication_.tick(now);
     samples_.expire(now, counters);

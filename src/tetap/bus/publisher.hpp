@@ -4,6 +4,7 @@
 #pragma once
 
 #include "tetap/base/math.hpp"
+#include "tetap/base/members.hpp"
 #include "tetap/bus/codec.hpp"
 #include "tetap/bus/counters.hpp"
 #include "tetap/bus/e2e.hpp"
@@ -70,11 +71,8 @@ class Publisher {
       : parameters_(parameters), version_(version), config_(param::crc(parameters)) {}
 
   void power_on() {
-    epoch_ = 0;
-    frames_ = status_counter_ = page_ = identity_ = statistic_ = 0;
+    base::clear(*this);
     show_wired();
-    events_.power_on();
-    troubles_.power_on();
   }
 
   /// Notes until end() come in the order of the samples' stamps, not of their arrival.
@@ -148,16 +146,10 @@ class Publisher {
     if (parameters_.wired.any()) page_ = kWiredPage;
   }
   /// All but parameters and version, which stay its own.
-  void resume(const Publisher& other) {
-    epoch_ = other.epoch_;
-    frames_ = other.frames_;
-    now_ = other.now_;
-    status_counter_ = other.status_counter_;
-    page_ = other.page_;
-    identity_ = other.identity_;
-    statistic_ = other.statistic_;
-    events_ = other.events_;
-    troubles_ = other.troubles_;
+  static constexpr auto members(auto& self) {
+    return base::members(base::reference(self.parameters_), base::own(self.version_), base::own(self.config_),
+                         self.epoch_, self.frames_, self.now_, self.status_counter_, self.page_, self.identity_,
+                         self.statistic_, self.events_, self.troubles_);
   }
 
   /// Queues the record of a measurement.

@@ -3,6 +3,7 @@
 // long looks fresh. Stamp and sequence of a sensor advance together, in steps of its period: they reveal the wraps.
 #pragma once
 
+#include "tetap/base/members.hpp"
 #include "tetap/base/reinitialise.hpp"
 #include "tetap/checks/persistence.hpp"
 #include "tetap/sensor/sample.hpp"
@@ -40,6 +41,10 @@ class StampWraps {
   /// is placed as the sample of another sensor was that came just before.
   [[nodiscard]] base::Micros place_beside(const sensor::Sample& sample, base::Micros now) const {
     return sample.stamp - base::Micros{checks::recent(held_at_, now, kAround) ? wraps_ * kWrap_us : 0};
+  }
+  static constexpr auto members(auto& self) {
+    return base::members(base::in_turns(self.streams_), base::in_turns(self.held_at_), base::in_turns(self.held_since_),
+                         base::in_turns(self.wraps_));
   }
 
  private:

@@ -2,6 +2,7 @@
 // Frozen position: fixes that keep their coordinates to the last digit while the filter moves on.
 #pragma once
 
+#include "tetap/base/members.hpp"
 #include "tetap/sensor/samples.hpp"
 
 #include <bit>
@@ -29,12 +30,8 @@ class FrozenPosition {
   }
   [[nodiscard]] bool frozen() const { return frozen_; }
 
-  template <class Sink>
-  void hash_state(Sink&& sink) const {
-    sink(coordinates_);
-    sink(east_m_);
-    sink(north_m_);
-    sink(static_cast<std::uint32_t>(frozen_));
+  static constexpr auto members(auto& self) {
+    return base::members(self.coordinates_, self.east_m_, self.north_m_, self.frozen_);
   }
 
  private:

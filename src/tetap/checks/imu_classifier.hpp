@@ -4,6 +4,7 @@
 #pragma once
 
 #include "tetap/base/math.hpp"
+#include "tetap/base/members.hpp"
 #include "tetap/checks/stuck_value.hpp"
 #include "tetap/nav/imu_increment.hpp"
 #include "tetap/param/parameters.hpp"
@@ -74,11 +75,7 @@ class ImuClassifier {
            Repeats::alike(s.dvelocity_b_mps, before.dvelocity_b_mps, kStep_mps);
   }
 
-  template <class Sink>
-  void hash_state(Sink&& sink) const {
-    gyro_.hash_state(sink);
-    accel_.hash_state(sink);
-  }
+  static constexpr auto members(auto& self) { return base::members(self.gyro_, self.accel_); }
 
  private:
   using Repeats = RepeatCounter<3>;

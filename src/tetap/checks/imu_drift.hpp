@@ -5,6 +5,7 @@
 // TAC 21(1).
 #pragma once
 
+#include "tetap/base/members.hpp"
 #include "tetap/nav/ins.hpp"
 
 #include <cstdint>
@@ -38,10 +39,7 @@ class ImuDrift {
   /// Measurements contradicted the IMU in one of the last tests.
   [[nodiscard]] bool shown() const { return shown_ > 0; }
 
-  template <class Sink>
-  void hash_state(Sink&& sink) const {
-    sink(static_cast<std::uint32_t>(shown_ | (level_ ? 256U : 0U) | (up_ ? 512U : 0U)));
-  }
+  static constexpr auto members(auto& self) { return base::members(self.shown_, self.level_, self.up_); }
 
  private:
   static constexpr float kFade_s = 1;        ///< time constant of what corrections leave in the sum

@@ -4,6 +4,7 @@
 #pragma once
 
 #include "tetap/base/math.hpp"
+#include "tetap/base/members.hpp"
 #include "tetap/checks/imu_classifier.hpp"
 #include "tetap/checks/vibration.hpp"
 #include "tetap/param/parameters.hpp"
@@ -63,15 +64,10 @@ class ImuHealth {
   }
   /// Vibration is below what is left at rest, where only the sensor's own noise shows.
   [[nodiscard]] bool calm(const param::InertialParameters& n) const { return begun() && vibration_.calm(n); }
-  template <class Sink>
-  void hash_state(Sink&& sink) const {
-    classifier_.hash_state(sink);
-    gyro_axis_.hash_state(sink);
-    accel_axis_.hash_state(sink);
-    vibration_.hash_state(sink);
-    for (const base::Micros at : {valid_, clipped_at_, stuck_at_}) sink(at.us);
-    sink(static_cast<std::uint32_t>(clipped_ | (stuck_ ? 0x10000U : 0U) | (vibration_.shaken() ? 0x20000U : 0U) |
-                                    (accel_turn_ ? 0x40000U : 0U)));
+  static constexpr auto members(auto& self) {
+    return base::members(self.classifier_, self.gyro_axis_, self.accel_axis_, self.vibration_, self.valid_,
+                         base::in_turns(self.clipped_at_), base::in_turns(self.stuck_at_), self.clipped_, self.stuck_,
+                         self.axis_stuck_, self.accel_turn_);
   }
 
  private:

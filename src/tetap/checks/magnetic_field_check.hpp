@@ -5,6 +5,7 @@
 #pragma once
 
 #include "tetap/base/math.hpp"
+#include "tetap/base/members.hpp"
 #include "tetap/checks/persistence.hpp"
 #include "tetap/param/parameters.hpp"
 
@@ -46,16 +47,9 @@ class MagneticFieldCheck {
   /// Stamp of the last sample; 0: none.
   [[nodiscard]] base::Micros last() const { return last_; }
 
-  template <class Sink>
-  void hash_state(Sink&& sink) const {
-    for (const Field& f : {known_field_, other_field_}) {
-      sink(f.horizontal_uT);
-      sink(f.up_uT);
-    }
-    sink(other_s_);
-    sink(last_.us);
-    sink(unchanged_since_.us);
-    sink(static_cast<std::uint32_t>((known_ ? 1U : 0U) | (distrusted_ ? 2U : 0U)));
+  static constexpr auto members(auto& self) {
+    return base::members(self.known_field_, self.other_field_, self.other_s_, self.known_, self.distrusted_,
+                         self.renewed_, self.last_, self.unchanged_since_);
   }
 
  private:

@@ -4,6 +4,7 @@
 // repeat an offset only if they move as the filter does.
 #pragma once
 
+#include "tetap/base/members.hpp"
 #include "tetap/checks/chi_square.hpp"
 #include "tetap/checks/persistence.hpp"
 
@@ -55,13 +56,8 @@ class OffsetHypothesis {
   [[nodiscard]] float east_m() const { return east_m_; }
   [[nodiscard]] float north_m() const { return north_m_; }
 
-  template <class Sink>
-  void hash_state(Sink&& sink) const {
-    supported_.hash_state(sink);
-    sink(east_m_);
-    sink(north_m_);
-    sink(begun_m2_);
-    sink(static_cast<std::uint32_t>(against_) | (accepted_ ? 0x100U : 0U));
+  static constexpr auto members(auto& self) {
+    return base::members(self.supported_, self.east_m_, self.north_m_, self.begun_m2_, self.against_, self.accepted_);
   }
 
  private:

@@ -3,6 +3,7 @@
 // "never". PX4 has the first as `isTimedOut`, the second as `hysteresis`.
 #pragma once
 
+#include "tetap/base/members.hpp"
 #include "tetap/base/time.hpp"
 
 #include <cstdint>
@@ -54,12 +55,7 @@ class Persistence {
     return persists(last(), for_, at_least);
   }
 
-  template <class Sink>
-  constexpr void hash_state(Sink&& sink) const {
-    sink(since_.us);
-    sink(span_us_);
-    sink(count_);
-  }
+  static constexpr auto members(auto& self) { return base::members(self.since_, self.span_us_, self.count_); }
 
  private:
   static constexpr std::int32_t kMost = 1'000'000;  ///< the count stays there

@@ -5,6 +5,8 @@
 // charts). Innovations averaged against a slow fault: Diesel & Luu 1995.
 #pragma once
 
+#include "tetap/base/members.hpp"
+
 #include <array>
 #include <cstdint>
 
@@ -33,14 +35,7 @@ class PositionDrift {
   void velocity(bool agrees) { agreements_left_ = agrees ? kFixesOfAVelocity : std::uint8_t{0}; }
   void reset() { *this = {}; }
 
-  template <class Sink>
-  void hash_state(Sink&& sink) const {
-    for (const Mean& mean : {fast_m_, slow_m_}) {
-      sink(mean[0]);
-      sink(mean[1]);
-    }
-    sink(static_cast<std::uint32_t>(agreements_left_));
-  }
+  static constexpr auto members(auto& self) { return base::members(self.fast_m_, self.slow_m_, self.agreements_left_); }
 
  private:
   using Mean = std::array<float, 2>;

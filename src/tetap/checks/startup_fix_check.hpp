@@ -4,6 +4,7 @@
 #pragma once
 
 #include "tetap/base/math.hpp"
+#include "tetap/base/members.hpp"
 #include "tetap/base/trig.hpp"
 #include "tetap/nav/geodesy.hpp"
 #include "tetap/sensor/samples.hpp"
@@ -33,12 +34,8 @@ class StartupFixCheck {
   /// Fixes in a row, up to the number needed.
   [[nodiscard]] std::int32_t fixes() const { return fixes_; }
 
-  template <class Sink>
-  void hash_state(Sink&& sink) const {
-    sink(latitude_2ndeg_);
-    sink(longitude_2ndeg_);
-    sink(last_.us);
-    sink(fixes_);
+  static constexpr auto members(auto& self) {
+    return base::members(self.latitude_2ndeg_, self.longitude_2ndeg_, self.last_, self.fixes_);
   }
 
  private:

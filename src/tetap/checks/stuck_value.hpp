@@ -3,6 +3,7 @@
 // that repeats it ten or fifty times is stuck.
 #pragma once
 
+#include "tetap/base/members.hpp"
 #include "tetap/checks/persistence.hpp"
 
 #include <array>
@@ -38,11 +39,7 @@ class RepeatCounter {
     count_ = 0;
     stuck_ = false;
   }
-  template <class Sink>
-  void hash_state(Sink&& sink) const {
-    for (const float v : last_) sink(v);
-    sink(static_cast<std::uint32_t>(count_ | (stuck_ ? 256U : 0U)));
-  }
+  static constexpr auto members(auto& self) { return base::members(self.last_, self.count_, self.stuck_); }
 
  private:
   Reading last_{};
@@ -68,11 +65,7 @@ class StuckAxis {
     return count_ >= kReadings;
   }
   [[nodiscard]] bool stuck() const { return count_ >= kReadings; }
-  template <class Sink>
-  void hash_state(Sink&& sink) const {
-    for (const std::uint32_t bits : last_) sink(bits);
-    sink(count_ | static_cast<std::uint32_t>(axis_) << 8U);
-  }
+  static constexpr auto members(auto& self) { return base::members(self.last_, self.axis_, self.count_); }
 
  private:
   /// At most one axis is as it was: a bit of `same`, or 0.
@@ -99,11 +92,7 @@ class StuckValue {
   /// The last reading is at most two seconds old and was a stuck one.
   [[nodiscard]] bool stuck(base::Micros at) const { return repeats_.stuck() && recent(last_, at, kFresh); }
   [[nodiscard]] base::Micros last() const { return last_; }
-  template <class Sink>
-  void hash_state(Sink&& sink) const {
-    sink(last_.us);
-    repeats_.hash_state(sink);
-  }
+  static constexpr auto members(auto& self) { return base::members(self.last_, self.repeats_); }
 
  private:
   static constexpr base::Micros kFresh{2'000'000};

@@ -3,6 +3,7 @@
 // may be wrong. The heading is then uncertain by all that they differ from that time on.
 #pragma once
 
+#include "tetap/base/members.hpp"
 #include "tetap/base/time.hpp"
 
 #include <cstdint>
@@ -38,12 +39,8 @@ class TurnResidual {
     return 0;
   }
 
-  template <class Sink>
-  void hash_state(Sink&& sink) const {
-    sink(mean_radps_);
-    sink(turned_rad_);
-    sink(last_us_);
-    sink(static_cast<std::uint32_t>(contradicts_));
+  static constexpr auto members(auto& self) {
+    return base::members(self.mean_radps_, self.turned_rad_, self.last_us_, self.contradicts_);
   }
 
  private:

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "tetap/base/math.hpp"
+#include "tetap/base/members.hpp"
 #include "tetap/param/parameters.hpp"
 #include "tetap/sensor/samples.hpp"
 
@@ -64,14 +65,9 @@ class Vibration {
   /// Mean square of the specific force [m^2/s^4] and of the turn rate [rad^2/s^2], of all axes together.
   [[nodiscard]] float force2() const { return accel2_; }
   [[nodiscard]] float rate2() const { return gyro2_; }
-  template <class Sink>
-  void hash_state(Sink&& sink) const {
-    for (std::size_t i = 0; i < 3; ++i) {
-      sink(slow_gyro_[i]);
-      sink(slow_accel_[i]);
-    }
-    sink(gyro2_);
-    sink(accel2_);
+  static constexpr auto members(auto& self) {
+    return base::members(self.slow_gyro_, self.slow_accel_, self.gyro2_, self.accel2_, self.leap_, self.shaken_,
+                         self.filtered_, self.leaps_);
   }
 
  private:

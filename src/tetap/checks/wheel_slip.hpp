@@ -3,6 +3,7 @@
 // over ground. Encoders against other sensors of the body: Ward and Iagnemma 2008, IEEE T-RO 24(4).
 #pragma once
 
+#include "tetap/base/members.hpp"
 #include "tetap/checks/persistence.hpp"
 #include "tetap/param/parameters.hpp"
 
@@ -77,14 +78,9 @@ class WheelSlip {
   [[nodiscard]] base::Micros last() const { return last_; }
   void reset() { *this = {}; }
 
-  template <class Sink>
-  void hash_state(Sink&& sink) const {
-    sink(off_left_mps_);
-    sink(off_right_mps_);
-    sink(turned_m_);
-    for (const base::Micros at : {last_, seen_}) sink(at.us);
-    ground_contradicts_.hash_state(sink);
-    sink(static_cast<std::uint32_t>(slip_));
+  static constexpr auto members(auto& self) {
+    return base::members(self.off_left_mps_, self.off_right_mps_, self.last_, self.seen_, self.ground_contradicts_,
+                         self.turned_m_, self.slip_);
   }
 
  private:

@@ -4,6 +4,7 @@
 #pragma once
 
 #include "tetap/base/math.hpp"
+#include "tetap/base/members.hpp"
 #include "tetap/base/time.hpp"
 #include "tetap/param/parameters.hpp"
 
@@ -34,13 +35,8 @@ class WheelTurn {
   /// The last turn that showed anything contradicted the wheels.
   [[nodiscard]] bool refuted() const { return refuted_; }
 
-  template <class Sink>
-  void hash_state(Sink&& sink) const {
-    sink(last_.us);
-    sink(begun_.us);
-    sink(wheels_rad_);
-    sink(gyro_rad_);
-    sink(static_cast<std::uint32_t>(refuted_));
+  static constexpr auto members(auto& self) {
+    return base::members(self.last_, self.begun_, self.wheels_rad_, self.gyro_rad_, self.refuted_);
   }
 
  private:

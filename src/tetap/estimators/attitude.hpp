@@ -5,6 +5,7 @@
 // in it.
 #pragma once
 
+#include "tetap/base/members.hpp"
 #include "tetap/checks/imu_classifier.hpp"
 #include "tetap/estimators/context.hpp"
 #include "tetap/estimators/estimate.hpp"
@@ -58,8 +59,11 @@ class Attitude {
     const bool disturbed = filter_.magnetometer_disturbed() || filter_.accelerometer_disturbed();
     return disturbed ? sensor::Mode::kDegraded : sensor::Mode::kNominal;
   }
-  template <class Sink>
-  void hash_state(Sink&& sink) const;
+  static constexpr auto members(auto& self) {
+    return base::members(self.filter_, self.ahead_, base::in_turns(self.far_turn_), self.turn_, self.rate_b_radps_,
+                         self.last_rate_b_radps_, self.now_, self.time_, self.last_imu_,
+                         base::in_turns(self.field_time_), self.far_, self.seen_, self.anew_);
+  }
 
  private:
   static constexpr base::Micros kSilent{500'000};
@@ -81,26 +85,5 @@ class Attitude {
   base::Micros far_, seen_;  ///< stamps of the last samples in far_turn_ and in turn_
   bool anew_ = true;         ///< turn_ is not what the window's samples give
 };
-
-template <class Sink>
-void Attitude::hash_state(Sink&& sink) const {
-  const filter::Quaternion q = filter_.q_nb();
-  sink(q.w);
-  sink(q.x);
-  sink(q.y);
-  sink(q.z);
-  sink(ahead_.w);
-  sink(ahead_.x);
-  sink(ahead_.y);
-  sink(ahead_.z);
-  for (int i = 0; i < 3; ++i) sink(filter_.bias_b_radps()(i));
-  sink(filter_.bias_sigma_radps());
-  sink(filter_.magnetometer_disturbed_s());
-  sink(static_cast<std::uint32_t>((filter_.started() ? 1U : 0U) | (filter_.heading_known() ? 2U : 0U) |
-                                  (filter_.magnetometer_disturbed() ? 4U : 0U) |
-                                  (filter_.accelerometer_disturbed() ? 8U : 0U) | (filter_.at_rest() ? 16U : 0U)));
-  sink(time_.us);
-  sink(field_time_.us);
-}
 
 }  // namespace tetap::estimators

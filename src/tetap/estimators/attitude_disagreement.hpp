@@ -3,6 +3,7 @@
 #pragma once
 
 #include "tetap/base/math.hpp"
+#include "tetap/base/members.hpp"
 #include "tetap/base/time.hpp"
 #include "tetap/estimators/estimate.hpp"
 #include "tetap/param/parameters.hpp"
@@ -48,11 +49,7 @@ class AttitudeDisagreement {
   void restart(base::Micros t) { since_ = t, disagrees_ = false; }
   [[nodiscard]] bool disagrees() const { return disagrees_; }
 
-  template <class Sink>
-  void hash_state(Sink&& sink) const {
-    sink(since_.us);
-    sink(static_cast<std::uint32_t>(disagrees_));
-  }
+  static constexpr auto members(auto& self) { return base::members(self.since_, self.disagrees_); }
 
  private:
   base::Micros since_;  ///< last time at which the limits agreed with disagrees_

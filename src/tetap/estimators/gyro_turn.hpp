@@ -3,6 +3,7 @@
 // is the quotient of two of these: no sample is walked over twice.
 #pragma once
 
+#include "tetap/base/members.hpp"
 #include "tetap/base/multiply_add.hpp"
 #include "tetap/filter/quaternion.hpp"
 #include "tetap/sensor/samples.hpp"
@@ -43,6 +44,9 @@ class GyroTurn {
   /// Sum of the samples' intervals since `earlier`, which is this turn some samples ago.
   [[nodiscard]] std::int32_t span_us(const GyroTurn& earlier) const {
     return static_cast<std::int32_t>(span_us_ - earlier.span_us_);
+  }
+  static constexpr auto members(auto& self) {
+    return base::members(self.q_, self.angle_s_rad_, self.gathered_us_, self.span_us_);
   }
 
  private:

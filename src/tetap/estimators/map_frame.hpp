@@ -2,6 +2,7 @@
 // Surroundings that all estimators share: the origin of the local plane and the landmark map.
 #pragma once
 
+#include "tetap/base/members.hpp"
 #include "tetap/base/trig.hpp"
 #include "tetap/model/landmark.hpp"
 #include "tetap/nav/geodesy.hpp"
@@ -54,13 +55,8 @@ class LandmarkMap {
   constexpr void clear() { size_ = 0; }
   [[nodiscard]] constexpr std::size_t size() const { return size_; }
   /// Feeds id and place of every entry to the sink, for hashes.
-  template <class Sink>
-  constexpr void hash_state(Sink&& sink) const {
-    for (std::size_t i = 0; i < size_; ++i) {
-      sink(static_cast<std::uint32_t>(entries_[i].id));
-      sink(entries_[i].x_mm);
-      sink(entries_[i].y_mm);
-    }
+  static constexpr auto members(auto& self) {
+    return base::members(base::first(self.entries_, self.size_), base::count(self.size_));
   }
 
  private:
@@ -101,6 +97,10 @@ struct MapFrame {
   sensor::OriginSource origin = sensor::OriginSource::kNone;
   nav::LocalFrame frame;
   const LandmarkMap<kMapCapacity>* map = nullptr;  ///< map for estimators that take landmarks; null: none does
+
+  static constexpr auto members(auto& self) {
+    return base::members(self.origin, base::in_turns(self.frame), base::own(self.map));
+  }
 };
 
 }  // namespace tetap::estimators

@@ -2,6 +2,7 @@
 // Odometry: dead reckoning alone, continuous and without jumps (REP-105 "odom").
 #pragma once
 
+#include "tetap/base/members.hpp"
 #include "tetap/estimators/context.hpp"
 #include "tetap/estimators/planar/dead_reckoning.hpp"
 
@@ -42,11 +43,7 @@ class Odometry {
     return motion_.motion_variance(ctx.parameters);
   }
   [[nodiscard]] sensor::Mode mode(const Context&) const { return sensor::Mode::kDeadReckoning; }
-  template <class Sink>
-  void hash_state(Sink&& sink) const {
-    motion_.hash_state(sink);
-    sink(static_cast<std::uint32_t>(bound_));
-  }
+  static constexpr auto members(auto& self) { return base::members(self.motion_, self.bound_); }
 
  private:
   static constexpr float kStartSigma =

@@ -3,6 +3,8 @@
 // begins. How long a unit takes has no effect on any bit.
 #pragma once
 
+#include "tetap/base/members.hpp"
+
 #include <cstdint>
 
 namespace tetap::estimators {
@@ -36,11 +38,8 @@ class PacedJob {
     if (busy_) ++aborted_;
     busy_ = false;
   }
-  template <class Sink>
-  void hash_state(Sink&& sink) const {
-    sink(busy_ ? left_ : 0U);
-    sink(busy_ ? ticks_left_ : 0U);
-    sink(aborted_);
+  static constexpr auto members(auto& self) {
+    return base::members(self.left_, self.ticks_left_, self.aborted_, self.busy_);
   }
 
  private:

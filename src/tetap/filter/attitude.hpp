@@ -6,6 +6,7 @@
 // north, up). The bias is estimated beside. Time is an argument; every sample may have its own interval.
 #pragma once
 
+#include "tetap/base/members.hpp"
 #include "tetap/filter/attitude_bias.hpp"
 #include "tetap/filter/attitude_clipping.hpp"
 #include "tetap/filter/attitude_heading.hpp"
@@ -92,6 +93,11 @@ class Attitude {
   [[nodiscard]] bool magnetometer_disturbed() const { return heading_.disturbed(); }
   [[nodiscard]] float magnetometer_disturbed_s() const { return heading_.disturbed_s(); }
   [[nodiscard]] bool accelerometer_disturbed() const { return off_; }
+  static constexpr auto members(auto& self) {
+    return base::members(base::in_turns(self.o_), base::in_turns(self.strongest_mps2_), self.q_lb_, self.up_,
+                         self.clipping_, self.rest_, self.bias_, self.heading_, self.tau_s_, self.held_s_, self.calm_s_,
+                         self.started_, self.off_);
+  }
 
  private:
   static constexpr float kShortest_s = 1e-6F, kLongest_s = 0.2F, kFastest_radps = 100.0F, kLeastForce_mps2 = 0.1F;

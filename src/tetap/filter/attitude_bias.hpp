@@ -5,6 +5,7 @@
 // times. Here: scalar updates instead of a matrix inverse, noise densities instead of a fixed sampling rate.
 #pragma once
 
+#include "tetap/base/members.hpp"
 #include "tetap/filter/attitude_options.hpp"
 #include "tetap/filter/low_pass.hpp"
 
@@ -27,6 +28,9 @@ class RestDetector {
   }
   [[nodiscard]] bool at_rest() const { return at_rest_; }
   [[nodiscard]] const Vector3& rate_b_radps() const { return rate_.value; }  ///< low-passed
+  static constexpr auto members(auto& self) {
+    return base::members(self.rate_, self.force_, base::in_turns(self.still_s_), self.started_, self.at_rest_);
+  }
 
  private:
   LowPass<3> rate_, force_;
@@ -77,6 +81,12 @@ class GyroscopeBias {
   [[nodiscard]] const Vector3& value() const { return bias_; }
   /// 1 sigma of the axis known worst.
   [[nodiscard]] float sigma_radps() const { return base::sqrt(base::max(p_(0, 0), base::max(p_(1, 1), p_(2, 2)))); }
+  static constexpr auto members(auto& self) {
+    return base::members(self.bias_, self.p_, base::in_turns(self.x_), base::in_turns(self.y_),
+                         base::in_turns(self.most_), base::in_turns(self.walk_), base::in_turns(self.motion_),
+                         base::in_turns(self.vertical_), base::in_turns(self.rest_), base::in_turns(self.limit_),
+                         self.phase_);
+  }
 
  private:
   static constexpr float square(float x) { return x * x; }

@@ -5,6 +5,7 @@
 // taken off. A single wild reading has no slopes to support it, and adds nothing.
 #pragma once
 
+#include "tetap/base/members.hpp"
 #include "tetap/filter/attitude_options.hpp"
 #include "tetap/filter/quaternion.hpp"
 
@@ -38,6 +39,9 @@ class ClippedSpan {
     clipped_s_ = 0.0F;
     return base::clamp(chord_rad + bulge_rad - shown_rad_, 0.0F, most_radps * span_s);
   }
+  static constexpr auto members(auto& self) {
+    return base::members(self.clipped_s_, self.shown_rad_, self.entry_radps_, self.slope_radps2_);
+  }
 
  private:
   float clipped_s_ = 0.0F, shown_rad_ = 0.0F, entry_radps_ = 0.0F, slope_radps2_ = 0.0F;
@@ -67,6 +71,11 @@ class ClippedTurn {
     return ended;
   }
   [[nodiscard]] const Vector3& rate_b_radps() const { return last_; }  ///< the last reading
+  static constexpr auto members(auto& self) {
+    return base::members(base::in_turns(self.spans_), base::in_turns(self.last_), base::in_turns(self.before_),
+                         base::in_turns(self.range_radps_), base::in_turns(self.limit_radps_), self.hidden_s_,
+                         self.hidden_radps2_, self.active_);
+  }
 
  private:
   [[gnu::noinline]] bool judge(const Vector3& w, bool reported, float dt_s, Missed& missed) {

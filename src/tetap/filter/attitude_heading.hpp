@@ -6,6 +6,7 @@
 // Turning alone shows that a field is homogeneous: the reference forgets by the angle that the body turns, not by time.
 #pragma once
 
+#include "tetap/base/members.hpp"
 #include "tetap/filter/attitude_options.hpp"
 #include "tetap/filter/low_pass.hpp"
 
@@ -59,6 +60,12 @@ class MagneticHeading {
   [[nodiscard]] Quaternion turned(const Quaternion& q_lb) const {
     const float w = half_.cos, z = half_.sin;
     return {w * q_lb.w - z * q_lb.z, w * q_lb.x - z * q_lb.y, w * q_lb.y + z * q_lb.x, w * q_lb.z + z * q_lb.w};
+  }
+  static constexpr auto members(auto& self) {
+    return base::members(base::in_turns(self.per_deviation2_), base::in_turns(self.per_turn_),
+                         base::in_turns(self.per_tau_), base::in_turns(self.declination_), self.half_,
+                         base::in_turns(self.reference_), self.p_, self.confirmed_s_, self.disturbed_s_,
+                         self.disturbed_share_, self.known_, self.odd_);
   }
 
  private:

@@ -4,6 +4,7 @@
 // fail: in that form the central weight is beta - alpha^2 >= 0 (sigma_points.hpp).
 #pragma once
 
+#include "tetap/base/members.hpp"
 #include "tetap/filter/root_update.hpp"
 #include "tetap/filter/sigma_points.hpp"
 #include "tetap/filter/state.hpp"
@@ -23,6 +24,8 @@ class UkfSqrt {
 
   State x{};
   Triangular<Scalar, kErrors> root;  ///< upper triangular R, P = R^T R
+
+  static constexpr auto members(auto& self) { return base::members(self.x, self.root); }
 
   [[nodiscard]] Symmetric<Scalar, kErrors> covariance() const { return root.covariance(); }
   void set_covariance(const Symmetric<Scalar, kErrors>& p) { root = root_of(p); }

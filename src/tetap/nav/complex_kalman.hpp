@@ -6,6 +6,7 @@
 #pragma once
 
 #include "tetap/base/math.hpp"
+#include "tetap/base/members.hpp"
 
 #include <array>
 
@@ -103,11 +104,8 @@ class ComplexKalman {
     return positive ? Verdict::kAccepted : Verdict::kSingular;
   }
 
-  template <class Sink>
-  void hash_state(Sink&& sink) const {
-    for (const Complex& value : x_) sink(value.re), sink(value.im);
-    for (const float variance : own_) sink(variance);
-    for (const Complex& value : pair_) sink(value.re), sink(value.im);
+  static constexpr auto members(auto& self) {
+    return base::members(base::in_turns(self.x_), base::in_turns(self.own_), base::in_turns(self.pair_));
   }
 
  private:

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "tetap/base/math.hpp"
+#include "tetap/base/members.hpp"
 #include "tetap/base/wgs84.hpp"
 #include "tetap/nav/local_level.hpp"
 
@@ -58,6 +59,10 @@ class LocalFrame {
     if (!at.valid || !near(d.east) || !near(d.north) || !near(d.up)) return {};
     const base::Ecef p = level_.to_ecef(d);
     return base::geodetic_of({origin_m_.x + p.x, origin_m_.y + p.y, origin_m_.z + p.z});
+  }
+  static constexpr auto members(auto& self) {
+    return base::members(self.latitude_2ndeg_, self.longitude_2ndeg_, self.height_m_, self.level_, self.origin_m_,
+                         self.curvature_);
   }
 
  private:

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "tetap/base/math.hpp"
+#include "tetap/base/members.hpp"
 
 namespace tetap::nav {
 
@@ -36,11 +37,8 @@ class GyroScaleConsider {
     with_heading_rad_ *= left;
     credit_rad2_ *= left * left;
   }
-  template <class Sink>
-  void hash_state(Sink&& sink) const {
-    sink(with_heading_rad_);
-    sink(credit_rad2_);
-    sink(waits_rad_);
+  static constexpr auto members(auto& self) {
+    return base::members(self.with_heading_rad_, self.credit_rad2_, self.waits_rad_);
   }
 
  private:

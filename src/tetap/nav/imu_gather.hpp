@@ -3,6 +3,7 @@
 // (Savage 1998, J. Guid. Control Dyn. 21(1) eq. 44-47 and 21(2) eq. 36-43), rotation to second order of the angle.
 #pragma once
 
+#include "tetap/base/members.hpp"
 #include "tetap/nav/imu_increment.hpp"
 
 namespace tetap::nav {
@@ -30,6 +31,8 @@ class ImuGather {
     sum_ = {};
     return all;
   }
+
+  static constexpr auto members(auto& self) { return base::members(self.sum_); }
 
  private:
   ImuIncrement sum_;

@@ -3,6 +3,7 @@
 // increment, covariance prediction whenever the caller wants one, measurements through the update all filters share.
 #pragma once
 
+#include "tetap/base/members.hpp"
 #include "tetap/base/trig.hpp"
 #include "tetap/filter/sparse_update.hpp"
 #include "tetap/filter/state.hpp"
@@ -222,27 +223,10 @@ class Ins {
     return result;
   }
 
-  /// The covariance, and what is to be added to it still.
-  template <class Sink>
-  void each_bit_of_p(Sink&& sink) const {
-#pragma GCC unroll 8
-    for (const float v : p.packed()) sink(v);
-    sink(pending_.dt_s);
-    sink(pending_.shown_rad);
-    sink(std::uint32_t{counters_.held});
-    turned_.hash_state(sink);
-    sink(corrected.east_mps);
-    sink(corrected.north_mps);
-    sink(corrected.level_m2ps2);
-    sink(corrected.up_mps);
-    sink(corrected.up_m2ps2);
-    for (int i = 0; i < 3; ++i) {
-      sink(pending_.dv_n_mps(i));
-      for (int k = 0; k < 3; ++k) sink(pending_.r_dt(i, k));
-    }
-    sink(vibration);
-    sink(stands ? 1.0F : 0.0F);
-    for (int i = 0; i < 3; ++i) sink(accel_n_mps2(i));
+  static constexpr auto members(auto& self) {
+    return base::members(self.x, base::in_turns_of<2>(self.p), base::in_turns(self.noise), base::in_turns(self.earth),
+                         self.vibration, self.stands, self.accel_n_mps2, self.corrected, self.pending_, self.turned_,
+                         self.condition_monitor_, self.counters_);
   }
 
   /// Variance of the velocity in the level plane, of both axes [m2/s2].

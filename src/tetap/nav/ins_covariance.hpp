@@ -5,6 +5,7 @@
 // Terms in dt^2 are left out. Over T they are dt/T of what the same errors do through the velocity.
 #pragma once
 
+#include "tetap/base/members.hpp"
 #include "tetap/base/multiply_add.hpp"
 #include "tetap/filter/unroll.hpp"
 #include "tetap/nav/ins_state.hpp"
@@ -129,6 +130,9 @@ class InsFactor {
   }
   [[nodiscard]] bool idle() const { return row_ >= InsState::kErrors; }
   void stop() { row_ = InsState::kErrors; }
+  static constexpr auto members(auto& self) {
+    return base::members(base::in_turns(self.l_), self.pivot_, self.row_, self.column_);
+  }
 
  private:
   filter::Symmetric<float, InsState::kErrors> l_;  ///< the diagonal holds 1 / L_jj where it is done

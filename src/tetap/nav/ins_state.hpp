@@ -5,6 +5,7 @@
 #pragma once
 
 #include "tetap/base/anchored.hpp"
+#include "tetap/base/members.hpp"
 #include "tetap/nav/so3.hpp"
 
 namespace tetap::nav {
@@ -82,18 +83,8 @@ struct InsState {
     dx.segment<3>(kGyroBias) = b_g_radps - other.b_g_radps;
     return dx;
   }
-  template <class Sink>
-  void hash_state(Sink&& sink) const {
-    for (const base::Anchored* coordinate : {&x, &y, &z}) {
-      sink(coordinate->anchor_um);
-      sink(coordinate->offset_m);
-    }
-    for (int i = 0; i < 3; ++i) {
-      sink(v_n_mps(i));
-      sink(b_a_mps2(i));
-      sink(b_g_radps(i));
-    }
-    for (const float v : {q_nb.w, q_nb.x, q_nb.y, q_nb.z}) sink(v);
+  static constexpr auto members(auto& self) {
+    return base::members(self.x, self.y, self.z, self.v_n_mps, self.q_nb, self.b_a_mps2, self.b_g_radps);
   }
   [[nodiscard]] bool finite() const {
     return base::is_finite(x.offset_m) && base::is_finite(y.offset_m) && base::is_finite(z.offset_m) &&

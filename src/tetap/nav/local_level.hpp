@@ -4,6 +4,7 @@
 #pragma once
 
 #include "tetap/base/anchored.hpp"
+#include "tetap/base/members.hpp"
 #include "tetap/base/wgs84.hpp"
 #include "tetap/nav/so3.hpp"
 
@@ -16,6 +17,10 @@ struct Curvature {
   float along_per_m = 0;   ///< (1 / (M + h) - 1 / (N + h)) / cos^2 of the latitude
   float axis_north = 1;    ///< Earth's axis: cosine of the origin's latitude
   float axis_up = 0;       ///< sine of the latitude
+
+  static constexpr auto members(auto& self) {
+    return base::members(self.across_per_m, self.along_per_m, self.axis_north, self.axis_up);
+  }
 
   constexpr Curvature() = default;
   constexpr Curvature(const base::Level& origin, double height_m)
@@ -62,6 +67,7 @@ struct LocalLevel {
   float height_m = 0;  ///< above the level surface of the origin
 
   LocalLevel() = default;
+  static constexpr auto members(auto& self) { return base::members(self.q_nl, self.up_n, self.height_m); }
   /// Within a kilometre of a pole, where no direction is east, the map's east stands for it.
   LocalLevel(const Curvature& c, const base::Anchored& x, const base::Anchored& y, const base::Anchored& z) {
     const Vector3 d = detail::coarse(x, y, z), bend = detail::bend(c, d);

@@ -10,6 +10,7 @@
 #pragma once
 
 #include "tetap/base/anchored.hpp"
+#include "tetap/base/members.hpp"
 #include "tetap/nav/complex_kalman.hpp"
 #include "tetap/nav/imu_increment.hpp"
 
@@ -77,17 +78,12 @@ class YawEstimator {
   /// Number of restarts because GNSS or the length of the phasor contradicted the state.
   [[nodiscard]] std::uint32_t restarts() const { return restarts_; }
 
-  template <class Sink>
-  void hash_state(Sink&& sink) const {
-    filter_.hash_state(sink);
-    for (const Complex& value : {pending_.v, pending_.p, pending_.turned, heading_}) sink(value.re), sink(value.im);
-    for (const float value : {pending_.dt_s, pending_.turn_rad, up_b_(0), up_b_(1), up_b_(2), bias_b_radps_(0),
-                              bias_b_radps_(1), bias_b_radps_(2), rate_radps_, wheels_s_})
-      sink(value);
-    sink(east_.um());
-    sink(north_.um());
-    sink(restarts_);
-    sink(static_cast<std::uint32_t>(refused_ + 16 * fixes_) | (placed_ ? 256U : 0U));
+  static constexpr auto members(auto& self) {
+    return base::members(base::in_turns(self.noise), self.filter_, base::in_turns(self.pending_),
+                         base::in_turns(self.heading_), base::in_turns(self.up_b_), base::in_turns(self.bias_b_radps_),
+                         base::in_turns(self.rate_radps_), base::in_turns(self.wheels_s_), base::in_turns(self.east_),
+                         base::in_turns(self.north_), base::in_turns(self.restarts_), self.refused_, self.fixes_,
+                         self.placed_);
   }
 
   /// For the tests: the covariance.

@@ -10,7 +10,7 @@
 // every tick, never a burst. Due work may also wait for the next tick, and records are late by the window.
 #pragma once
 
-#include "tetap/base/state_hash.hpp"
+#include "tetap/base/members.hpp"
 #include "tetap/estimators/context.hpp"
 #include "tetap/estimators/estimate.hpp"
 #include "tetap/estimators/own_map.hpp"
@@ -37,26 +37,18 @@ concept Advances = requires(E& e, base::Micros t, const estimators::Context& ctx
 };
 
 template <class E>
-concept Estimator = Advances<E> && requires(E& e, const E& view, base::Micros t, const estimators::Context& ctx,
-                                            const estimators::SetPose& pose, base::StateHash& hash) {
+concept Estimator = Advances<E> &&
+    requires(E& e, const E& view, base::Micros t, const estimators::Context& ctx, const estimators::SetPose& pose) {
   { E::kKind } -> std::convertible_to<sensor::EstimatorKind>;
   { e.restart(t, ctx) } -> std::same_as<void>;
   { e.set_pose(t, pose, ctx) } -> std::same_as<void>;
   { view.estimate(ctx) } -> std::same_as<estimators::Estimate>;
   { view.mode(ctx) } -> std::same_as<sensor::Mode>;
-  view.hash_state(hash);
 };
 
 template <class E>
 inline constexpr bool kIsDelayed = requires {
   requires E::kDelayed;
-};
-
-/// An estimator whose state is too large to hash in every tick: hash_state() feeds what is small, digest() stands for
-/// the rest (base::StateDigest).
-template <class E>
-concept DigestsState = requires(const E& e) {
-  { e.digest() } -> std::same_as<std::uint32_t>;
 };
 
 /// An estimator that judges samples together: fuse() gives the verdict Pending, and late_records(sink) hands out the
@@ -261,11 +253,8 @@ class EstimatorSlot {
     for (estimators::SensorStatistics& s : statistics_) s = {};
   }
 
-  template <class Sink>
-  void hash_state(Sink&& sink) const {
-    now_.hash_state(sink);
-    if constexpr (!kDelayed) sink(static_cast<std::uint32_t>(replay_.until.us) ^ (replay_.due ? 1U : 0U));
-    if constexpr (DigestsState<E>) sink(now_.digest());
+  static constexpr auto members(auto& self) {
+    return base::members(self.now_, base::in_turns(self.past_), self.replay_, base::in_turns(self.statistics_));
   }
 
  private:

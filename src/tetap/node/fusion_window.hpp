@@ -3,6 +3,7 @@
 // time. A sample that left the window is final. Holds the estimators and the samples of the window.
 #pragma once
 
+#include "tetap/base/members.hpp"
 #include "tetap/bus/counters.hpp"
 #include "tetap/node/estimator_slot.hpp"
 #include "tetap/node/timeline.hpp"
@@ -156,10 +157,9 @@ class FusionWindow {
   [[nodiscard]] const auto& primary() const { return std::get<kPrimary>(slots_); }
   [[nodiscard]] std::uint16_t high_water() const { return timeline_.high_water(); }
 
-  template <class Sink>
-  void hash_state(Sink&& sink) const {
-    each_slot([&](const auto& slot) { slot.hash_state(sink); });
-    sink(timeline_.digest());
+  /// The limit of the tick's work depends on the order of arrival.
+  static constexpr auto members(auto& self) {
+    return base::members(self.slots_, self.timeline_, base::unhashed(self.limit_), self.closed_until_);
   }
 
  private:

@@ -2,7 +2,9 @@
 // The landmark map and the entries that wait for their tick to go into it.
 #pragma once
 
+#include "tetap/base/members.hpp"
 #include "tetap/base/state_hash.hpp"
+#include "tetap/base/state_words.hpp"
 #include "tetap/bus/counters.hpp"
 #include "tetap/estimators/map_frame.hpp"
 
@@ -32,15 +34,15 @@ class Landmarks {
     map_.clear();
     digest();
   }
-  template <class Sink>
-  void hash_state(Sink&& sink) const {
-    sink(digest_);
+  static constexpr auto members(auto& self) {
+    return base::members(base::unhashed(self.map_), base::first(self.waiting_, self.size_), base::count(self.size_),
+                         self.digest_);
   }
 
  private:
   void digest() {
     base::StateHash hash;
-    map_.hash_state(hash);
+    base::each_word(map_, hash);
     digest_ = hash.value();
   }
 
@@ -57,8 +59,7 @@ struct NoLandmarks {
   [[nodiscard]] static bool waiting() { return false; }
   static void apply(bus::Counters&) {}
   static void clear() {}
-  template <class Sink>
-  static void hash_state(Sink&&) {}
+  static constexpr auto members(auto&) { return base::members(); }
 };
 
 inline void Landmarks::add(const estimators::MapEntry& entry, bus::Counters& counters) {

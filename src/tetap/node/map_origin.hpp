@@ -4,6 +4,7 @@
 // fixes that the map held. docs/explanation/frames.md.
 #pragma once
 
+#include "tetap/base/members.hpp"
 #include "tetap/checks/startup_fix_check.hpp"
 #include "tetap/estimators/map_frame.hpp"
 #include "tetap/param/parameters.hpp"
@@ -57,10 +58,9 @@ class MapOrigin {
     return outside_ && now - outside_at_ < base::Micros{3'000'000};
   }
 
-  template <class Sink>
-  void hash_state(Sink&& sink) const {
-    sink(static_cast<std::uint32_t>(inside_));
-    sink(static_cast<std::uint32_t>(4 * run_.fixes()) | (began_outside_ ? 1U : 0U) | (outside_ ? 2U : 0U));
+  static constexpr auto members(auto& self) {
+    return base::members(self.run_, self.first_, self.began_, self.first_inside_, self.last_inside_, self.outside_at_,
+                         self.inside_, self.began_outside_, self.outside_, self.replaced_);
   }
 
  private:

@@ -3,7 +3,9 @@
 // calls gives the same bits on every machine; everything that follows from real time stays outside (Pacer, LoopHealth).
 #pragma once
 
+#include "tetap/base/members.hpp"
 #include "tetap/base/state_hash.hpp"
+#include "tetap/base/state_words.hpp"
 #include "tetap/bus/closure_assembly.hpp"
 #include "tetap/bus/decoder.hpp"
 #include "tetap/bus/input_crc.hpp"
@@ -90,11 +92,21 @@ class Node {
   /// Hash of the estimators and of the window that they stand in.
   [[nodiscard]] std::uint32_t window_crc() const {
     base::StateHash hash;
-    window_.hash_state(hash);
+    base::each_word(window_, hash);
     return hash.value();
   }
   /// Goes on from the state of another node of this robot. References and pointers stay its own.
-  void resume(const Node& other);
+  void resume(const Node& other) { base::resume(*this, other); }
+  /// The intake is not hashed: half-received samples and commands, wraps of stamps. The CRC of the inputs has their
+  /// frames, and their places depend on the order of arrival.
+  static constexpr auto members(auto& self) {
+    return base::members(base::reference(self.parameters_), base::kept(self.window_), self.map_frame_,
+                         base::in_turns(self.origin_), base::unhashed(self.protection_), base::unhashed(self.inbox_),
+                         base::unhashed(self.closures_), base::unhashed(self.wraps_), base::in_turns(self.counters_),
+                         self.publisher_, self.landmarks_, self.pending_reset_, base::kept(self.wired_off_),
+                         self.pending_pose_, self.now_, self.ticked_, self.input_crc_, self.resets_, self.reset_cause_,
+                         self.restarted_at_, self.jumps_, self.disagreement_, self.map_faults_);
+  }
   /// For a copy that others get: nothing is left from which the key of commands could be computed. Between ticks only.
   void hide_secrets() { protection_.hide_secrets(); }
 
@@ -191,54 +203,12 @@ class Node {
 
 template <class Estimators, std::size_t Capacity>
 void Node<Estimators, Capacity>::power_on(base::Micros t) {
-  // Cleared in place: a fresh object assigned over the old one would pass over the stack.
+  base::clear(*this);
+  now_ = restarted_at_ = t;
   landmarks_.power_on(map_frame_);
   origin_.power_on(map_frame_, parameters_.gnss);
-  protection_.power_on();
-  inbox_.power_on();
-  closures_.power_on();
-  wraps_.power_on();
-  counters_ = {};
-  publisher_.power_on();
-  map_faults_ = {};
-  pending_reset_ = {};
-  pending_pose_.reset();
-  now_ = restarted_at_ = t;
-  ticked_ = false;
-  input_crc_ = {};
-  resets_ = 0;
-  reset_cause_ = sensor::ResetCause::kPowerOn;
   window_.power_on(t, context());
   disagreement_.restart(t);
-  jumps_ = 0;
-}
-
-template <class Estimators, std::size_t Capacity>
-void Node<Estimators, Capacity>::resume(const Node& other) {
-  const auto* const map = map_frame_.map;
-  window_ = other.window_;
-  map_frame_ = other.map_frame_;
-  map_frame_.map = map;
-  origin_ = other.origin_;
-  protection_.resume(other.protection_);
-  inbox_ = other.inbox_;
-  wraps_ = other.wraps_;
-  closures_ = other.closures_;
-  counters_ = other.counters_;
-  publisher_.resume(other.publisher_);
-  landmarks_ = other.landmarks_;
-  pending_reset_ = other.pending_reset_;
-  wired_off_ = other.wired_off_;
-  pending_pose_ = other.pending_pose_;
-  now_ = other.now_;
-  ticked_ = other.ticked_;
-  input_crc_ = other.input_crc_;
-  resets_ = other.resets_;
-  reset_cause_ = other.reset_cause_;
-  restarted_at_ = other.restarted_at_;
-  jumps_ = other.jumps_;
-  disagreement_ = other.disagreement_;
-  map_faults_ = other.map_faults_;
 }
 
 template <class Estimators, std::size_t Capacity>
@@ -501,11 +471,7 @@ void Node<Estimators, Capacity>::note_jump() {
 template <class Estimators, std::size_t Capacity>
 std::uint32_t Node<Estimators, Capacity>::state_crc() const {
   base::StateHash hash;
-  window_.hash_state(hash);
-  hash(static_cast<std::uint32_t>(map_frame_.origin));
-  origin_.hash_state(hash);
-  disagreement_.hash_state(hash);
-  landmarks_.hash_state(hash);
+  base::each_word_in_turn(*this, publisher_.epoch() % base::kTurns, hash);
   return hash.value();
 }
 

@@ -4,6 +4,7 @@
 // nothing, and what comes between moves no sample.
 #pragma once
 
+#include "tetap/base/members.hpp"
 #include "tetap/base/state_hash.hpp"
 #include "tetap/sensor/sample.hpp"
 #include "tetap/sensor/window.hpp"
@@ -119,6 +120,13 @@ class Timeline {
   [[nodiscard]] constexpr bool any_late() const { return new_ != size_ - known_; }
   [[nodiscard]] constexpr std::size_t size() const { return size_; }
   [[nodiscard]] constexpr std::uint16_t high_water() const { return high_water_; }
+  /// The numbers in order_ depend on the order of arrival; a wrong one shows as another sample.
+  static constexpr auto members(auto& self) {
+    return base::members(base::ring(self.samples_, self.begin_, self.size_, self.order_), base::unhashed(self.order_),
+                         base::ring(self.consumed_, self.begin_, self.size_, self.order_), base::count(self.begin_),
+                         base::count(self.size_), base::count(self.known_), base::count(self.new_), self.digest_,
+                         self.high_water_);
+  }
 
  private:
   [[nodiscard]] static constexpr std::uint32_t digest_of(const sensor::Sample& sample) {

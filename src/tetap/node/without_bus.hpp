@@ -3,6 +3,7 @@
 // are. A robot names it, `node::Node<node::WithoutBus<Estimators>>`; tetap/localizer.hpp does.
 #pragma once
 
+#include "tetap/base/members.hpp"
 #include "tetap/bus/counters.hpp"
 #include "tetap/bus/input_crc.hpp"
 #include "tetap/bus/publisher.hpp"
@@ -65,7 +66,10 @@ class DirectOutput {
  public:
   DirectOutput(const param::Parameters& parameters, const bus::Version&) : side_every_(parameters.publish.side_every) {}
   void power_on() { epoch_ = 0, begin_records(); }
-  void resume(const DirectOutput& other) { *this = other; }
+  static constexpr auto members(auto& self) {
+    return base::members(base::unhashed(self.records_), base::count(self.size_), base::count(self.lost_), self.epoch_,
+                         self.ended_);
+  }
 
   /// Measurements that were refused between ticks belong to the tick that follows.
   void tick_begins() {

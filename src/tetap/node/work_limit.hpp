@@ -4,6 +4,8 @@
 // held back. The limits are tight for a second after one was reached.
 #pragma once
 
+#include "tetap/base/members.hpp"
+
 #include <cstddef>
 #include <cstdint>
 
@@ -31,6 +33,9 @@ class WorkLimit {
   /// One more sample leaves a full window early.
   [[nodiscard]] bool admits_room() { return rooms_ > 0 ? (--rooms_, true) : refuse(); }
   bool refuse() { return tight_ = kTightTicks, false; }
+  static constexpr auto members(auto& self) {
+    return base::members(self.moves_, self.samples_, self.rooms_, self.tight_);
+  }
 
  private:
   static constexpr std::uint16_t kMoves = 6 * Capacity, kSamples = 3 * Capacity;

@@ -2,6 +2,7 @@
 // Any sample with its stamp and identity: what the timeline holds and orders.
 #pragma once
 
+#include "tetap/base/members.hpp"
 #include "tetap/sensor/samples.hpp"
 #include "tetap/sensor/vocabulary.hpp"
 
@@ -34,6 +35,11 @@ struct Sample {
   } payload;
 
   static_assert(sizeof(Payload) == 32, "a window of them is most of the memory");
+
+  static constexpr auto members(auto& self) {
+    return base::members(self.stamp, self.sensor, self.instance, self.sequence, self.detail, self.bits,
+                         base::active(self, self.payload));
+  }
 
   /// The order in which samples are consumed, whatever the order of arrival.
   [[nodiscard]] constexpr std::strong_ordering order(const Sample& other) const {

@@ -4,6 +4,7 @@
 #pragma once
 
 #include "tetap/base/float_bits.hpp"
+#include "tetap/base/members.hpp"
 #include "tetap/base/time.hpp"
 
 #include <array>
@@ -104,6 +105,11 @@ struct LoopClosure {
   std::int32_t yaw = 0;            ///< [0.1 mrad]
   std::uint64_t sigmas = 0;        ///< pack() of sigma x, y [0.1 mm] and yaw [0.01 mrad]
   std::uint64_t correlations = 0;  ///< pack() of the three correlations [1e-5]
+
+  static constexpr auto members(auto& self) {
+    return base::members(self.from, self.to, self.x, self.y, self.yaw, base::wide(self.sigmas),
+                         base::wide(self.correlations));
+  }
 
   [[nodiscard]] static constexpr std::uint64_t pack(std::int32_t a, std::int32_t b, std::int32_t c) {
     constexpr std::uint64_t kMask = (std::uint64_t{1} << kBits) - 1;

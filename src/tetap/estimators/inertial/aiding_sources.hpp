@@ -2,6 +2,7 @@
 // All aiding sources of the inertial filter.
 #pragma once
 
+#include "tetap/base/members.hpp"
 #include "tetap/estimators/inertial/sources/barometer.hpp"
 #include "tetap/estimators/inertial/sources/forward_speed.hpp"
 #include "tetap/estimators/inertial/sources/gnss_height.hpp"
@@ -41,16 +42,10 @@ class AidingSources {
     forward.begin(speed_known);
     heading.begin();
   }
-  template <class Sink>
-  void hash_state(Sink&& sink) const {
-    position.hash_state(sink);
-    height.hash_state(sink);
-    velocity.hash_state(sink);
-    wheels.hash_state(sink);
-    forward.hash_state(sink);
-    heading.hash_state(sink);
-    magnetometer.hash_state(sink);
-    barometer.hash_state(sink);
+  static constexpr auto members(auto& self) {
+    return base::members(base::in_turns(self.position), base::in_turns(self.height), base::in_turns(self.velocity),
+                         self.wheels, self.forward, base::in_turns(self.heading), base::in_turns(self.magnetometer),
+                         base::in_turns(self.barometer));
   }
 };
 

@@ -4,6 +4,7 @@
 // that starts forwards for sure the course of GNSS is enough (fast velocity, or the chord between fixes).
 #pragma once
 
+#include "tetap/base/members.hpp"
 #include "tetap/checks/coloured_noise.hpp"
 #include "tetap/estimators/inertial/heading_monitor.hpp"
 #include "tetap/estimators/inertial/levelling.hpp"
@@ -79,18 +80,10 @@ class Alignment {
                                        const HeadingMonitor& monitor, const param::InertialParameters& n,
                                        float forward_mps, base::Micros now) const;
 
-  template <class Sink>
-  void hash_state(Sink&& sink) const {
-    levelling_.hash_state(sink);
-    way_.hash_state(sink);
-    for (const base::Anchored* coordinate : {&at_.x, &at_.y, &at_.z}) sink(coordinate->um());
-    sink(at_.sigma_horizontal_m);
-    sink(at_.sigma_vertical_m);
-    sink(fixed_at_.us);
-    for (const float v : {yaw_rad_, level_yaw_rad_, sigma_yaw_rad_, sigma_v_mps_, sigma_climb_mps_}) sink(v);
-    for (int i = 0; i < 3; ++i) sink(v_n_mps_(i));
-    sink(static_cast<std::uint32_t>((placed_ ? 1U : 0U) | (headed_ ? 2U : 0U) | (fixed_ ? 4U : 0U) |
-                                    (given_ ? 8U : 0U) | (has_fixes_ ? 16U : 0U)));
+  static constexpr auto members(auto& self) {
+    return base::members(self.levelling_, self.way_, self.at_, self.fixed_at_, self.v_n_mps_, self.sigma_v_mps_,
+                         self.sigma_climb_mps_, self.yaw_rad_, self.sigma_yaw_rad_, self.level_yaw_rad_, self.placed_,
+                         self.headed_, self.fixed_, self.given_, self.has_fixes_);
   }
 
  private:

@@ -5,6 +5,7 @@
 #pragma once
 
 #include "tetap/base/math.hpp"
+#include "tetap/base/members.hpp"
 #include "tetap/base/time.hpp"
 #include "tetap/checks/persistence.hpp"
 #include "tetap/param/parameters.hpp"
@@ -65,14 +66,8 @@ class BarometerZero {
   /// Stamp of the last height; 0: none.
   [[nodiscard]] base::Micros last() const { return last_; }
 
-  template <class Sink>
-  void hash_state(Sink&& sink) const {
-    sink(zero_m_);
-    sink(p_);
-    sink(altitude_m_);
-    sink(last_.us);
-    sink(agreed_.us);
-    sink(set_at_us_);
+  static constexpr auto members(auto& self) {
+    return base::members(self.zero_m_, self.p_, self.altitude_m_, self.set_at_us_, self.last_, self.agreed_);
   }
 
  private:

@@ -2,6 +2,7 @@
 // Encoder counts over an interval: wheel speeds, their uncertainty, and when the wheels moved last.
 #pragma once
 
+#include "tetap/base/members.hpp"
 #include "tetap/checks/persistence.hpp"
 #include "tetap/estimators/inertial/filter_view.hpp"
 #include "tetap/estimators/inertial/wheel_reading.hpp"
@@ -60,13 +61,8 @@ class EncoderInterval {
     return checks::recent(leapt_at_, at, base::Micros{500'000});
   }
 
-  template <class Sink>
-  void hash_state(Sink&& sink) const {
-    sink(static_cast<std::uint32_t>(counts_.left | counts_.right << 16U));
-    sink(counted_at_.us);
-    sink(moved_at_.us);
-    sink(leapt_at_.us);
-    sink(gained_mps_);
+  static constexpr auto members(auto& self) {
+    return base::members(self.counts_, self.gained_mps_, self.counted_at_, self.moved_at_, self.leapt_at_);
   }
 
  private:

@@ -3,6 +3,7 @@
 // heading. Beside a filter without wheels it judges the filter's heading, and the magnetometer's.
 #pragma once
 
+#include "tetap/base/members.hpp"
 #include "tetap/checks/persistence.hpp"
 #include "tetap/estimators/inertial/filter_view.hpp"
 #include "tetap/model/gnss_fix_3d.hpp"
@@ -74,11 +75,8 @@ class HeadingMonitor {
   }
   /// `aligning`: the finder looks for the first heading, whether the monitor runs or not. Otherwise a monitor that does
   /// not run restarts its finder before its next use, so that the finder is no state.
-  template <class Sink>
-  void hash_state(Sink&& sink, bool aligning) const {
-    if (aligning || runs_) finder_.hash_state(sink);
-    contradicted_.hash_state(sink);
-    sink(static_cast<std::uint32_t>((has_velocity_ ? 1U : 0U) | (runs_ ? 2U : 0U)));
+  static constexpr auto members(auto& self) {
+    return base::members(self.finder_, base::in_turns(self.contradicted_), self.has_velocity_, self.runs_);
   }
 
  private:

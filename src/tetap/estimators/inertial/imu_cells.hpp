@@ -4,6 +4,7 @@
 // made at once of all samples in the window.
 #pragma once
 
+#include "tetap/base/members.hpp"
 #include "tetap/checks/imu_classifier.hpp"
 #include "tetap/nav/imu_gather.hpp"
 #include "tetap/param/parameters.hpp"
@@ -84,7 +85,7 @@ class ImuCells {
       return size_ > 0 ? stamp <= (*this)[size_ - 1].last() : grid(stamp) <= leaving;
     };
     std::size_t i = window.size();
-    while (!has(window[i - 1].stamp)) --i;
+    while (i > first + 1 && !has(window[i - 1].stamp)) --i;
     std::size_t before = i - 1;
     while (!is_of(window[before], n)) --before;
     for (; i < window.size(); ++i) {
@@ -98,6 +99,10 @@ class ImuCells {
 
   [[nodiscard]] std::size_t size() const { return size_; }
   [[nodiscard]] const ImuCell& operator[](std::size_t i) const { return cells_[(begin_ + i) % kMost]; }
+  static constexpr auto members(auto& self) {
+    return base::members(base::ring(self.cells_, self.begin_, self.size_), base::in_turns(self.leaving_until_),
+                         base::count(self.begin_), base::count(self.size_));
+  }
 
  private:
   static constexpr std::size_t kMost = 9;  ///< half a second and the place that leaves

@@ -2,6 +2,7 @@
 // The IMU as the filter at the horizon uses it: its health, its last turn rate, and where the filter went without it.
 #pragma once
 
+#include "tetap/base/members.hpp"
 #include "tetap/checks/imu_drift.hpp"
 #include "tetap/checks/imu_health.hpp"
 #include "tetap/estimators/inertial/source.hpp"
@@ -49,14 +50,9 @@ class ImuInput {
     return {unusable_ ? SourceState::kRejecting : SourceState::kFusing, unusable_ ? Check::kValue : Check::kNone};
   }
 
-  template <class Sink>
-  void hash_state(Sink&& sink) const {
-    health_.hash_state(sink);
-    drift_.hash_state(sink);
-    for (int i = 0; i < 3; ++i) sink(rate_b_radps_(i));
-    sink(bridged_until_.us);
-    sink(last_suspect_.us);
-    sink(static_cast<std::uint32_t>(unusable_));
+  static constexpr auto members(auto& self) {
+    return base::members(self.health_, base::in_turns(self.bridged_until_), base::in_turns(self.last_suspect_),
+                         self.rate_b_radps_, self.drift_, self.unusable_);
   }
 
  private:

@@ -5,6 +5,7 @@
 // them.
 #pragma once
 
+#include "tetap/base/members.hpp"
 #include "tetap/base/reinitialise.hpp"
 #include "tetap/estimators/context.hpp"
 #include "tetap/estimators/estimate.hpp"
@@ -68,8 +69,11 @@ class Inertial {
   [[nodiscard]] sensor::Mode mode(const Context& ctx) const;
   /// State of every source, and the test that failed last.
   [[nodiscard]] SourceStates sources(const Context& ctx) const;
-  template <class Sink>
-  void hash_state(Sink&& sink) const;
+  static constexpr auto members(auto& self) {
+    return base::members(self.ins_, self.predictor_, self.budget_, self.phase_, base::in_turns(self.alignment_),
+                         self.heading_monitor_, self.time_, self.levelled_at_, base::in_turns(self.level_), self.imu_,
+                         self.standstill_, self.sources_, base::in_turns(self.recovery_));
+  }
 
  private:
   enum class Phase : std::uint8_t { kLevelling, kFindingHeading, kTracking };
@@ -174,24 +178,6 @@ class Inertial {
   AidingSources sources_;
   Recovery recovery_;
 };
-
-template <class Sink>
-void Inertial::hash_state(Sink&& sink) const {
-  ins_.x.hash_state(sink);
-  ins_.each_bit_of_p(sink);
-  predictor_.hash_state(sink);
-  if (recovery_.step_unknown()) predictor_.present().hash_state(sink);
-  budget_.hash_state(sink);
-  alignment_.hash_state(sink);
-  heading_monitor_.hash_state(sink, !tracking());
-  sink(static_cast<std::uint32_t>(phase_));
-  sink(time_.us);
-  sink(levelled_at_.us);
-  imu_.hash_state(sink);
-  standstill_.hash_state(sink);
-  sources_.hash_state(sink);
-  recovery_.hash_state(sink);
-}
 
 /// Record of an assessment; an accepted measurement failed no test.
 [[nodiscard]] inline Innovation record_of(const Assessment& a) {

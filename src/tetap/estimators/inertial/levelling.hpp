@@ -2,6 +2,7 @@
 // Levelling: an attitude that turns with the gyroscope and leans towards the specific force.
 #pragma once
 
+#include "tetap/base/members.hpp"
 #include "tetap/nav/imu_increment.hpp"
 #include "tetap/nav/so3.hpp"
 
@@ -37,10 +38,7 @@ class Levelling {
     const bool level = levelled_s_ >= long_s;
     return {.used = true, .first = first, .level = level, .just_level = level && !before};
   }
-  template <class Sink>
-  void hash_state(Sink&& sink) const {
-    for (const float v : {q_nb_.w, q_nb_.x, q_nb_.y, q_nb_.z, levelled_s_}) sink(v);
-  }
+  static constexpr auto members(auto& self) { return base::members(self.q_nb_, self.levelled_s_); }
 
  private:
   /// The turn that brings a unit vector upright; upside down it goes over x.

@@ -4,6 +4,7 @@
 // horizon and its output predictor are those of Khosravian, Trumpf, Mahony & Hamel 2015, and of PX4's EKF2.
 #pragma once
 
+#include "tetap/base/members.hpp"
 #include "tetap/estimators/inertial/imu_cells.hpp"
 #include "tetap/estimators/inertial/imu_input.hpp"
 #include "tetap/estimators/inertial/rebuild_schedule.hpp"
@@ -74,17 +75,9 @@ class OutputPredictor {
   /// Stamp of the last sample in the prediction, of whatever class.
   [[nodiscard]] base::Micros last_seen() const { return last_seen_; }
 
-  template <class Sink>
-  void hash_state(Sink&& sink) const {
-    place_.x.hash_state(sink);
-    place_.classifier.hash_state(sink);
-    sink(place_.reached.us);
-    sink(place_.last.us);
-    sink(last_seen_.us);
-    for (int i = 0; i < 3; ++i) sink(place_.rate_b_radps(i));
-    sink(place_.unseen_s);
-    sink(place_.unseen_turn_s);
-    schedule_.hash_state(sink);
+  static constexpr auto members(auto& self) {
+    return base::members(self.place_, base::in_turns(self.present_), self.last_seen_, self.cells_,
+                         base::in_turns(self.gather_), self.schedule_, self.time_, self.without_imu_);
   }
 
  private:

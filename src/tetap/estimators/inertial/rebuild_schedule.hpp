@@ -2,6 +2,7 @@
 // New starts of the output predictor from the horizon: after a correction there, once the tick has work left for it.
 #pragma once
 
+#include "tetap/base/members.hpp"
 #include "tetap/base/time.hpp"
 
 #include <cstdint>
@@ -38,10 +39,8 @@ class RebuildSchedule {
   /// tick that may take one leaves the prediction to it.
   [[nodiscard]] float covariance_every_s() const { return !rebuilt_ ? 20e-3F : one_by_one_ ? 30e-3F : 7.5e-3F; }
 
-  template <class Sink>
-  void hash_state(Sink&& sink) const {
-    sink(rebuilt_at_.us);
-    sink(static_cast<std::uint32_t>((rebuilt_ ? 1U : 0U) | (one_by_one_ ? 2U : 0U) | unsigned{ticks_} << 8U));
+  static constexpr auto members(auto& self) {
+    return base::members(self.rebuilt_at_, self.ticks_, self.rebuilt_, self.one_by_one_);
   }
 
  private:

@@ -3,6 +3,7 @@
 // inflate a block, reset a block, restart.
 #pragma once
 
+#include "tetap/base/members.hpp"
 #include "tetap/checks/persistence.hpp"
 #include "tetap/estimators/estimate.hpp"
 #include "tetap/estimators/inertial/source.hpp"
@@ -69,13 +70,7 @@ class Recovery {
   void measure_step(const nav::InsState& from, const nav::InsState& to);
   void forbid_undo() { undoable_ = false; }
 
-  template <class Sink>
-  void hash_state(Sink&& sink) const {
-    for (const float v : {jump_.east_m, jump_.north_m, jump_.up_m, jump_.yaw_rad}) sink(v);
-    sink(static_cast<std::uint32_t>(jump_.cause));
-    sink(static_cast<std::uint32_t>(jump_.count | (undoable_ ? 256U : 0U)));
-    sink(widened_at_.us);
-  }
+  static constexpr auto members(auto& self) { return base::members(self.jump_, self.widened_at_, self.undoable_); }
 
  private:
   static constexpr float kRefused_m2ps2 = 0.25F;  ///< added to the velocity when a refused source is right

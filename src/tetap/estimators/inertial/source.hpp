@@ -4,6 +4,7 @@
 // like for every source (EstimatorAidSource).
 #pragma once
 
+#include "tetap/base/members.hpp"
 #include "tetap/base/time.hpp"
 #include "tetap/nav/so3.hpp"
 #include "tetap/sensor/source_state.hpp"
@@ -82,10 +83,7 @@ struct SourceStatus {
   void confirming() { *this = {SourceState::kConfirming, Check::kUnconfirmed}; }
   void rejecting(Check check) { *this = {SourceState::kRejecting, check}; }
   void distrusted(Check check) { *this = {SourceState::kDistrusted, check}; }
-  template <class Sink>
-  void hash_state(Sink&& sink) const {
-    sink(static_cast<std::uint32_t>(static_cast<unsigned>(state) | static_cast<unsigned>(failed) << 8U));
-  }
+  static constexpr auto members(auto& self) { return base::members(self.state, self.failed); }
 };
 
 class FilterView;
@@ -96,7 +94,7 @@ concept AidingSource = requires(S& s, const S& seen, const typename S::Measureme
   { s.assess(z, filter) } -> std::same_as<Assessment>;
   { seen.timed_out(at) } -> std::same_as<bool>;
   { seen.status(at) } -> std::same_as<SourceStatus>;
-  s.hash_state([](auto) {});
+  S::members(seen);
 };
 
 }  // namespace tetap::estimators

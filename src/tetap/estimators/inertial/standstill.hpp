@@ -5,6 +5,7 @@
 // therefore fused only while the filter knows less. Each mean of the gyroscope has samples of its own.
 #pragma once
 
+#include "tetap/base/members.hpp"
 #include "tetap/checks/persistence.hpp"
 #include "tetap/estimators/inertial/filter_view.hpp"
 #include "tetap/estimators/inertial/work_budget.hpp"
@@ -96,16 +97,9 @@ class Standstill {
   /// An update is due and waits for the next tick.
   [[nodiscard]] bool pending() const { return pending_; }
 
-  template <class Sink>
-  void hash_state(Sink&& sink) const {
-    for (const Mean& mean : {mean_, waiting_}) {
-      for (int i = 0; i < 3; ++i) sink(mean.rate_radps(i));
-      sink(mean.s);
-    }
-    calm_.hash_state(sink);
-    for (int i = 0; i < 3; ++i) sink(ground_mps_(i));
-    sink(velocity_at_.us);
-    sink(static_cast<std::uint32_t>(grounds_ | (pending_ ? 256U : 0U)));
+  static constexpr auto members(auto& self) {
+    return base::members(self.mean_, self.waiting_, self.calm_, self.velocity_at_, self.ground_mps_, self.grounds_,
+                         self.pending_);
   }
 
  private:

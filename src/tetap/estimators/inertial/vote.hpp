@@ -5,6 +5,7 @@
 // "Sequential tests of statistical hypotheses", Ann. Math. Stat. 16(2).
 #pragma once
 
+#include "tetap/base/members.hpp"
 #include "tetap/checks/persistence.hpp"
 #include "tetap/nav/so3.hpp"
 #include "tetap/param/parameters.hpp"
@@ -72,11 +73,8 @@ class DeviceRecord {
 
   static constexpr std::int32_t kRefusals = 3;
 
-  template <class Sink>
-  void hash_state(Sink&& sink) const {
-    refused_.hash_state(sink);
-    sink(last_measurement_.us);
-    sink(last_accepted_.us);
+  static constexpr auto members(auto& self) {
+    return base::members(self.refused_, self.last_measurement_, self.last_accepted_);
   }
 
  private:

@@ -3,6 +3,7 @@
 // the middle of the way.
 #pragma once
 
+#include "tetap/base/members.hpp"
 #include "tetap/model/gnss_fix_3d.hpp"
 #include "tetap/nav/so3.hpp"
 #include "tetap/param/parameters.hpp"
@@ -50,13 +51,8 @@ class WayCourse {
     far_ = way.far && !anew;
   }
 
-  template <class Sink>
-  void hash_state(Sink&& sink) const {
-    sink(first_x_.um());
-    sink(first_y_.um());
-    sink(first_yaw_rad_);
-    sink(way_s_);
-    sink(static_cast<std::uint32_t>(far_));
+  static constexpr auto members(auto& self) {
+    return base::members(self.first_x_, self.first_y_, self.first_yaw_rad_, self.way_s_, self.far_);
   }
 
  private:

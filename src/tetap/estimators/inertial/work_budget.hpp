@@ -3,6 +3,7 @@
 // one measurement, or to rebuild the prediction. The farther the horizon is behind, the larger it is.
 #pragma once
 
+#include "tetap/base/members.hpp"
 #include "tetap/base/time.hpp"
 
 #include <cstdint>
@@ -37,11 +38,7 @@ class WorkBudget {
   [[nodiscard]] bool deferred() const { return deferred_; }
   void clear_deferred() { deferred_ = false; }
 
-  template <class Sink>
-  void hash_state(Sink&& sink) const {
-    sink(left_);
-    sink(static_cast<std::uint32_t>(deferred_));
-  }
+  static constexpr auto members(auto& self) { return base::members(self.left_, self.arrived_, self.deferred_); }
 
  private:
   std::int32_t left_ = 0;     ///< units left in this tick

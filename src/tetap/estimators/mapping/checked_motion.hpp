@@ -3,6 +3,7 @@
 // likelier cause, so the way is uncertain at once. The heading follows when the landmarks do not vouch for it.
 #pragma once
 
+#include "tetap/base/members.hpp"
 #include "tetap/estimators/mapping/recording_ekf.hpp"
 #include "tetap/estimators/planar/turn_check.hpp"
 
@@ -42,13 +43,8 @@ class CheckedMotion : public PlanarDeadReckoning<RecordingEkf> {
   /// Variance of the heading by that contradiction, beside the filter's.
   [[nodiscard]] float heading_rad2() const { return heading_rad2_; }
 
-  template <class Sink>
-  void hash_state(Sink&& sink) const {
-    Motion::hash_state(sink);
-    turn_.wheel_turn.hash_state(sink);
-    turn_.residual.hash_state(sink);
-    sink(heading_rad2_);
-    sink(heading_since_.us);
+  static constexpr auto members(auto& self) {
+    return base::members(base::base_of<Motion>(self), self.turn_, self.heading_rad2_, self.heading_since_);
   }
 
  private:

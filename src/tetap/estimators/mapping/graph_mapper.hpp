@@ -6,6 +6,7 @@
 // Delayed: the graph is at the far end of the window. Dead reckoning carries its pose to the present.
 #pragma once
 
+#include "tetap/base/members.hpp"
 #include "tetap/base/state_digest.hpp"
 #include "tetap/estimators/context.hpp"
 #include "tetap/estimators/estimate.hpp"
@@ -87,12 +88,13 @@ class GraphMapper {
   }
 
   /// All but the graph, which digest() stands for.
-  template <class Sink>
-  void hash_state(Sink&& sink) const {
-    motion_.hash_state(sink);
-    for (const base::Micros t : {stepped_, last_closure_, last_refused_, placed_at_}) sink(t.us);
-    sink(refused_);
-    sink(static_cast<std::uint32_t>(announced_));
+  static constexpr auto members(auto& self) {
+    return base::members(base::unhashed(self.graph_), self.motion_, base::unhashed(self.present_),
+                         base::in_turns(self.placed_), base::in_turns(self.placed_pose_), base::in_turns(self.since_),
+                         base::in_turns(self.graph_then_), self.placed_at_, self.stepped_, self.last_closure_,
+                         self.last_refused_, self.now_, self.before_, self.refused_, self.jobs_,
+                         base::in_turns(self.announcement_), base::count(self.announced_),
+                         base::count(self.next_announcement_), self.digest_);
   }
   [[nodiscard]] std::uint32_t digest() const { return digest_.value(); }
   /// All poses and edges, for a comparison of whole states.

@@ -6,6 +6,7 @@
 // reckoning carries its pose to the present, so a tick without a sighting costs what dead reckoning costs.
 #pragma once
 
+#include "tetap/base/members.hpp"
 #include "tetap/base/state_digest.hpp"
 #include "tetap/estimators/context.hpp"
 #include "tetap/estimators/mapping/checked_motion.hpp"
@@ -92,18 +93,12 @@ class PlanarMapper {
   [[nodiscard]] MappedLandmark own_landmark(std::size_t i) const { return engine_.landmark(i, now_); }
 
   /// All but the engine, which digest() stands for.
-  template <class Sink>
-  void hash_state(Sink&& sink) const {
-    motion_.hash_state(sink);
-    sink(last_absolute_.us);
-    sink(last_refused_.us);
-    sink(refused_);
-    sink(batch_stamp_.us);
-    for (std::size_t i = 0; i < batch_size_; ++i) {
-      sink(static_cast<std::uint32_t>(batch_[i].id) << 8 | batch_instance_[i]);
-      sink(batch_[i].range_m);
-      sink(batch_[i].bearing_rad);
-    }
+  static constexpr auto members(auto& self) {
+    return base::members(base::unhashed(self.engine_), self.motion_, base::unhashed(self.present_),
+                         base::first(self.batch_, self.batch_size_),
+                         base::first(self.batch_instance_, self.batch_size_), base::unhashed(self.record_),
+                         base::count(self.batch_size_), base::count(self.records_), self.batch_stamp_,
+                         self.last_absolute_, self.last_refused_, self.now_, self.refused_, self.digest_);
   }
   [[nodiscard]] std::uint32_t digest() const { return digest_.value(); }
   /// All of the engine's memory, for a comparison of whole states.

@@ -3,6 +3,7 @@
 // motion.
 #pragma once
 
+#include "tetap/base/members.hpp"
 #include "tetap/filter/ekf.hpp"
 #include "tetap/model/planar_increment.hpp"
 
@@ -26,6 +27,10 @@ struct RecordingEkf : filter::Ekf<model::PlanarPose> {
     const std::span<const model::PlanarIncrement> steps{steps_.data(), count_};
     count_ = 0;
     return steps;
+  }
+  static constexpr auto members(auto& self) {
+    return base::members(base::base_of<filter::Ekf<model::PlanarPose>>(self), base::first(self.steps_, self.count_),
+                         base::count(self.count_));
   }
 
  private:

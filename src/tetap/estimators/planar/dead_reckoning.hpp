@@ -4,6 +4,7 @@
 // never splits an integration, and the pose after n counts is the textbook's to the bit.
 #pragma once
 
+#include "tetap/base/members.hpp"
 #include "tetap/estimators/estimate.hpp"
 #include "tetap/estimators/planar/planar_ekf.hpp"
 #include "tetap/filter/covariance_access.hpp"
@@ -81,29 +82,11 @@ class PlanarDeadReckoning {
   [[nodiscard]] Estimate estimate(const param::Parameters& n) const;
   [[nodiscard]] MotionVariance motion_variance(const param::Parameters& n) const;
 
-  template <class Sink>
-  void hash_state(Sink&& sink) const {
-    sink(time_.us);
-    sink(filter.x.x.anchor_um);
-    sink(filter.x.x.offset_m);
-    sink(filter.x.y.anchor_um);
-    sink(filter.x.y.offset_m);
-    sink(filter.x.yaw_rad);
-    hash_covariance(filter, sink);
-    sink(held_.first_mps);
-    sink(held_.second);
-    sink(applied_left_m_);
-    sink(applied_right_m_);
-    sink(applied_yaw_rad_);
-    sink(gyro_bias_radps_);
-    sink(gyro_rate_radps_);
-    sink(last_input_.us);
-    sink(static_cast<std::uint32_t>(held_.kind));
-    sink(static_cast<std::uint32_t>((have_counts_ ? 1U : 0U) | (moving_ ? 2U : 0U)));
-    sink(static_cast<std::uint32_t>(counts_.left) << 16 | counts_.right);
-    sink(counts_time_.us);
-    sink(still_since_.us);
-    sink(gyro_time_.us);
+  static constexpr auto members(auto& self) {
+    return base::members(self.filter, self.time_, self.out_time_, self.last_input_, self.counts_time_,
+                         self.still_since_, self.held_, self.counts_, self.have_counts_, self.moving_,
+                         self.applied_left_m_, self.applied_right_m_, self.gyro_time_, self.applied_yaw_rad_,
+                         self.gyro_rate_radps_, self.gyro_bias_radps_);
   }
 
  private:

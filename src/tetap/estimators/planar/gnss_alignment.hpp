@@ -4,6 +4,7 @@
 #pragma once
 
 #include "tetap/base/math.hpp"
+#include "tetap/base/members.hpp"
 #include "tetap/estimators/context.hpp"
 #include "tetap/model/gnss_position.hpp"
 
@@ -38,15 +39,8 @@ class GnssAlignment {
                    .sigma_yaw_rad = base::sqrt(cross * cross + 0.01F)};
   }
 
-  template <class Sink>
-  void hash_state(Sink&& sink) const {
-    sink(static_cast<std::uint32_t>(begun_));
-    sink(first_x_.um());
-    sink(first_y_.um());
-    sink(reckoned_.x.um());
-    sink(reckoned_.y.um());
-    sink(reckoned_.yaw_rad);
-    sink(first_sigma_m_);
+  static constexpr auto members(auto& self) {
+    return base::members(self.begun_, self.first_x_, self.first_y_, self.reckoned_, self.first_sigma_m_);
   }
 
  private:

@@ -6,6 +6,7 @@
 #pragma once
 
 #include "tetap/base/math.hpp"
+#include "tetap/base/members.hpp"
 #include "tetap/estimators/context.hpp"
 #include "tetap/filter/update.hpp"
 #include "tetap/model/range_bearing.hpp"
@@ -41,13 +42,9 @@ class LandmarkAlignment {
   [[nodiscard]] Result add(const model::RangeBearing& seen, std::uint8_t id, base::Micros stamp,
                            const model::PlanarPose& pose, const filter::Symmetric<float, 3>& drift);
 
-  template <class Sink>
-  void hash_state(Sink&& sink) const {
-    sink(static_cast<std::uint32_t>(stage_) | static_cast<std::uint32_t>(first_id_) << 8U |
-         static_cast<std::uint32_t>(second_id_) << 16U);
-    for (const base::Anchored& a : {first_.x, first_.y, first_x_, first_y_}) sink(a.um());
-    sink(first_m2_);
-    sink(candidate_at_.us);
+  static constexpr auto members(auto& self) {
+    return base::members(self.stage_, self.first_id_, self.second_id_, self.first_, self.first_x_, self.first_y_,
+                         self.first_m2_, self.candidate_at_);
   }
 
  private:

@@ -4,6 +4,7 @@
 #pragma once
 
 #include "tetap/base/math.hpp"
+#include "tetap/base/members.hpp"
 #include "tetap/checks/chi_square.hpp"
 #include "tetap/checks/persistence.hpp"
 #include "tetap/filter/update.hpp"
@@ -82,14 +83,8 @@ class MotionVote {
   void accepted() { speed_error_m2_ = 0; }
   void reset() { *this = {}; }
 
-  template <class Sink>
-  void hash_state(Sink&& sink) const {
-    for (const float x :
-         {fix_.east_m, fix_.north_m, fix_.m2, seen_.east_m, seen_.north_m, seen_.range_m, seen_.m2, seen_.nis})
-      sink(x);
-    sink(speed_error_mps_);
-    sink(speed_error_m2_);
-    sink(contradicted_at_.us);
+  static constexpr auto members(auto& self) {
+    return base::members(self.fix_, self.seen_, self.speed_error_mps_, self.speed_error_m2_, self.contradicted_at_);
   }
 
  private:

@@ -4,6 +4,7 @@
 // root.
 #pragma once
 
+#include "tetap/base/members.hpp"
 #include "tetap/checks/persistence.hpp"
 #include "tetap/estimators/context.hpp"
 #include "tetap/estimators/planar/dead_reckoning.hpp"
@@ -100,21 +101,10 @@ class PoseFilter {
     if (turn_.residual.contradicts() || vote_.contradicts(now_)) return sensor::Mode::kDegraded;
     return now_ - last_absolute_ > base::Micros{5'000'000} ? sensor::Mode::kDeadReckoning : sensor::Mode::kNominal;
   }
-  template <class Sink>
-  void hash_state(Sink&& sink) const {
-    motion_.hash_state(sink);
-    sink(static_cast<std::uint32_t>(phase_));
-    alignment_.hash_state(sink);
-    landmarks_.hash_state(sink);
-    relocalisation_.hash_state(sink);
-    turn_.wheel_turn.hash_state(sink);
-    for (const checks::Persistence& refused : refused_) refused.hash_state(sink);
-    turn_.residual.hash_state(sink);
-    for (const std::uint8_t in_a_row : in_a_row_) sink(std::uint32_t{in_a_row});
-    vote_.hash_state(sink);
-    sink(last_absolute_.us);
-    sink(last_fused_fix_.us);
-    sink(std::uint32_t{jumps_});
+  static constexpr auto members(auto& self) {
+    return base::members(self.motion_, base::in_turns(self.alignment_), base::in_turns(self.landmarks_),
+                         self.relocalisation_, self.turn_, self.phase_, base::in_turns(self.refused_), self.in_a_row_,
+                         self.vote_, self.last_absolute_, self.last_fused_fix_, self.now_, self.jumps_);
   }
 
  private:

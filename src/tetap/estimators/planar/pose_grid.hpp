@@ -8,6 +8,7 @@
 // its covariance, and dead reckoning carries both to the present.
 #pragma once
 
+#include "tetap/base/members.hpp"
 #include "tetap/base/state_digest.hpp"
 #include "tetap/estimators/paced_job.hpp"
 #include "tetap/estimators/planar/dead_reckoning.hpp"
@@ -78,8 +79,14 @@ class PoseGrid {
   [[nodiscard]] const Grid& grid() const { return grid_; }
 
   /// All but the cells, which digest() stands for.
-  template <class Sink>
-  void hash_state(Sink&& sink) const;
+  static constexpr auto members(auto& self) {
+    return base::members(base::unhashed(self.grid_), self.motion_, base::unhashed(self.present_), self.origin_x_,
+                         self.origin_y_, self.mark_, base::first(self.waiting_, self.waiting_count_),
+                         base::first(self.rays_, self.ray_count_), base::in_turns(self.start_), self.job_,
+                         base::count(self.waiting_count_), base::count(self.ray_count_), self.waiting_stamp_,
+                         self.step_stamp_, self.last_absolute_, self.now_, self.digest_, self.share_, self.phase_,
+                         self.laid_out_, self.has_start_);
+  }
   [[nodiscard]] std::uint32_t digest() const { return digest_.value(); }
   /// Every cell, for a comparison of whole states.
   template <class Sink>
@@ -135,23 +142,5 @@ class PoseGrid {
   bool laid_out_ = false;   ///< the grid has its place
   bool has_start_ = false;  ///< the first step takes dead reckoning's pose for a start
 };
-
-template <int kX, int kY, int kYaw>
-template <class Sink>
-void PoseGrid<kX, kY, kYaw>::hash_state(Sink&& sink) const {
-  motion_.hash_state(sink);
-  const model::PlanarIncrement& travel = motion_.filter.travel;
-  for (const float v : {travel.ds_m, travel.dyaw_rad, travel.var_ds, travel.var_dyaw, share_, mark_.yaw_rad}) sink(v);
-  for (const base::Anchored& a : {origin_x_, origin_y_, mark_.x, mark_.y}) sink(a.um());
-  sink(mark_.x.offset_m);
-  sink(mark_.y.offset_m);
-  for (const base::Micros t : {waiting_stamp_, step_stamp_, last_absolute_}) sink(t.us);
-  sink(static_cast<std::uint32_t>(phase_) | (laid_out_ ? 4U : 0U) | (has_start_ ? 8U : 0U));
-  for (std::size_t i = 0; i < waiting_count_; ++i)
-    for (const float v : {waiting_[i].ray.x_m, waiting_[i].ray.range_m, waiting_[i].ray.bearing_rad,
-                          waiting_[i].body.x_m, waiting_[i].body.yaw_rad})
-      sink(v);
-  job_.hash_state(sink);
-}
 
 }  // namespace tetap::estimators

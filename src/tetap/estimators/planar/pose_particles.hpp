@@ -7,6 +7,7 @@
 // present. A tick without a sighting costs what dead reckoning costs.
 #pragma once
 
+#include "tetap/base/members.hpp"
 #include "tetap/base/state_digest.hpp"
 #include "tetap/estimators/context.hpp"
 #include "tetap/estimators/planar/dead_reckoning.hpp"
@@ -72,23 +73,11 @@ class PoseParticles {
   [[nodiscard]] std::size_t size() const { return cloud_.cloud.size(); }
 
   /// All but the cloud, which digest() stands for.
-  template <class Sink>
-  void hash_state(Sink&& sink) const {
-    motion_.hash_state(sink);
-    for (const float v : {motion_.filter.travel.ds_m, motion_.filter.travel.dyaw_rad, motion_.filter.travel.var_ds,
-                          motion_.filter.travel.var_dyaw, cloud_.likelihood()})
-      sink(v);
-    sink(origin_x_.um());
-    sink(origin_y_.um());
-    sink(moved_.us);
-    sink(last_absolute_.us);
-    sink(static_cast<std::uint32_t>((started_ ? 1U : 0U) | (cloud_.lost() ? 2U : 0U)));
-    sink(batch_stamp_.us);
-    for (std::size_t i = 0; i < batch_size_; ++i) {
-      sink(static_cast<std::uint32_t>(batch_[i].landmark));
-      sink(batch_[i].range_m);
-      sink(batch_[i].bearing_rad);
-    }
+  static constexpr auto members(auto& self) {
+    return base::members(base::unhashed(self.cloud_), self.motion_, base::unhashed(self.present_), self.origin_x_,
+                         self.origin_y_, base::first(self.batch_, self.batch_size_), base::unhashed(self.landmarks_),
+                         base::count(self.batch_size_), self.batch_stamp_, self.moved_, self.last_absolute_, self.now_,
+                         self.digest_, self.started_);
   }
   [[nodiscard]] std::uint32_t digest() const { return digest_.value(); }
   /// Every particle, for a comparison of whole states.

@@ -5,6 +5,7 @@
 // stamp.
 #pragma once
 
+#include "tetap/base/members.hpp"
 #include "tetap/estimators/context.hpp"
 #include "tetap/estimators/estimate.hpp"
 #include "tetap/filter/static_fusion.hpp"
@@ -50,13 +51,8 @@ class PositionFusion {
   /// Receivers whose fix is in the latest epoch, one bit each.
   [[nodiscard]] std::uint8_t receivers() const { return receivers_; }
 
-  template <class Sink>
-  void hash_state(Sink&& sink) const {
-    sink(x_.um());
-    sink(y_.um());
-    for (const float v : {x_.offset_m, y_.offset_m, p_(0, 0), p_(0, 1), p_(1, 1)}) sink(v);
-    sink(epoch_.us);
-    sink(static_cast<std::uint32_t>(receivers_));
+  static constexpr auto members(auto& self) {
+    return base::members(self.x_, self.y_, self.p_, self.epoch_, self.now_, self.receivers_);
   }
 
  private:

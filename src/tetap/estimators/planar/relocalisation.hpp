@@ -6,6 +6,7 @@
 #pragma once
 
 #include "tetap/base/math.hpp"
+#include "tetap/base/members.hpp"
 #include "tetap/checks/persistence.hpp"
 #include "tetap/estimators/planar/correlated_fix.hpp"
 #include "tetap/estimators/planar/landmark_alignment.hpp"
@@ -51,21 +52,10 @@ class Relocalisation {
   [[nodiscard]] base::Micros last_fused_fix() const { return fixed_ ? last_fix_ : base::Micros{}; }
 
   /// Beside the last fix nothing while there is no search.
-  template <class Sink>
-  void hash_state(Sink&& sink) const {
-    if (last_fix_.us != 0) sink(last_fix_.us);
-    if (!searches_) return;
-    for (const PlanarEkf& ekf : {rival_, noted_}) {
-      for (const base::Anchored& a : {ekf.x.x, ekf.x.y}) sink(a.um());
-      for (const float v : {ekf.x.x.offset_m, ekf.x.y.offset_m, ekf.x.yaw_rad}) sink(v);
-      hash_covariance(ekf, sink);
-    }
-    landmarks_.hash_state(sink);
-    sink(evidence_);
-    sink(way_m_);
-    sink(since_.us);
-    sink(static_cast<std::uint32_t>(accepted_) | (fixed_ ? 256U : 0U));
-    for (const std::uint8_t id : agreed_) sink(std::uint32_t{id});
+  static constexpr auto members(auto& self) {
+    return base::members(base::in_turns(self.rival_), base::in_turns(self.noted_), base::in_turns(self.landmarks_),
+                         self.evidence_, self.way_m_, self.since_, self.last_fix_, self.agreed_, self.accepted_,
+                         self.searches_, self.fixed_);
   }
 
  private:

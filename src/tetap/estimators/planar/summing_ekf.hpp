@@ -3,6 +3,7 @@
 // for many of them.
 #pragma once
 
+#include "tetap/base/members.hpp"
 #include "tetap/estimators/planar/planar_ekf.hpp"
 #include "tetap/model/planar_increment.hpp"
 
@@ -16,6 +17,7 @@ struct SummingEkf : PlanarEkf {
     travel.var_dyaw += increment.var_dyaw;
     return PlanarEkf::predict(increment);
   }
+  static constexpr auto members(auto& self) { return base::members(base::base_of<PlanarEkf>(self), self.travel); }
   model::PlanarIncrement travel;  ///< sum since the owner set it back; the errors of length and turn are independent
 };
 

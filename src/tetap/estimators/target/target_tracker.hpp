@@ -4,6 +4,7 @@
 // extended Kalman filter, constant turn rate and velocity by unscented filter.
 #pragma once
 
+#include "tetap/base/members.hpp"
 #include "tetap/checks/persistence.hpp"
 #include "tetap/estimators/context.hpp"
 #include "tetap/estimators/estimate.hpp"
@@ -79,13 +80,8 @@ class TargetTracker {
     if (!tracks(ctx)) return sensor::Mode::kWaitingForPose;
     return refused_.count() >= 3 ? sensor::Mode::kDegraded : sensor::Mode::kNominal;
   }
-  template <class Sink>
-  void hash_state(Sink&& sink) const {
-    for (const float v : filter_.x.value) sink(v);
-    for (const float v : filter_.p.packed()) sink(v);
-    sink(time_.us);
-    sink(static_cast<std::uint32_t>(begun_));
-    refused_.hash_state(sink);
+  static constexpr auto members(auto& self) {
+    return base::members(self.filter_, self.time_, self.now_, self.refused_, self.begun_);
   }
 
  private:

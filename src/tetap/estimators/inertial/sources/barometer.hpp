@@ -2,6 +2,7 @@
 // Barometer: of the height and the barometer's zero the one that is known worse is corrected by the other.
 #pragma once
 
+#include "tetap/base/members.hpp"
 #include "tetap/checks/stuck_value.hpp"
 #include "tetap/estimators/inertial/barometer_zero.hpp"
 #include "tetap/estimators/inertial/filter_view.hpp"
@@ -71,11 +72,7 @@ class Barometer {
     return agrees ? SourceStatus{SourceState::kFusing, Check::kNone}
                   : SourceStatus{SourceState::kRejecting, Check::kGate};
   }
-  template <class Sink>
-  void hash_state(Sink&& sink) const {
-    zero_.hash_state(sink);
-    repeats_.hash_state(sink);
-  }
+  static constexpr auto members(auto& self) { return base::members(self.zero_, self.repeats_); }
 
  private:
   [[nodiscard]] float innovation_m(const HeightMeasurement& z) const {

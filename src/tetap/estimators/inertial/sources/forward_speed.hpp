@@ -3,6 +3,7 @@
 // speed comes.
 #pragma once
 
+#include "tetap/base/members.hpp"
 #include "tetap/estimators/inertial/filter_view.hpp"
 #include "tetap/estimators/inertial/refusal.hpp"
 #include "tetap/estimators/inertial/wheel_reading.hpp"
@@ -80,14 +81,8 @@ class ForwardSpeedSource {
   /// No speed came for 1.5 s; a speedometer may come once a second.
   [[nodiscard]] bool timed_out(base::Micros at) const { return !checks::recent(last_, at, base::Micros{1'500'000}); }
   [[nodiscard]] SourceStatus status(base::Micros at) const { return timed_out(at) ? SourceStatus{} : status_; }
-  template <class Sink>
-  void hash_state(Sink&& sink) const {
-    record_.hash_state(sink);
-    sink(last_mps_);
-    sink(last_.us);
-    sink(fused_at_.us);
-    sink(static_cast<std::uint32_t>(speed_known_));
-    status_.hash_state(sink);
+  static constexpr auto members(auto& self) {
+    return base::members(self.record_, self.last_, self.fused_at_, self.last_mps_, self.speed_known_, self.status_);
   }
 
  private:

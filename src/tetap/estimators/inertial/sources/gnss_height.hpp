@@ -2,6 +2,7 @@
 // GNSS position, vertical: a height may be refused by itself, and becomes true by persisting.
 #pragma once
 
+#include "tetap/base/members.hpp"
 #include "tetap/checks/offset_hypothesis.hpp"
 #include "tetap/estimators/inertial/filter_view.hpp"
 #include "tetap/estimators/inertial/fix_measurement.hpp"
@@ -45,11 +46,7 @@ class GnssHeightSource {
       return {SourceState::kConfirming, Check::kUnconfirmed};
     return status_of(refused_);
   }
-  template <class Sink>
-  void hash_state(Sink&& sink) const {
-    offset_.hash_state(sink);
-    refused_.hash_state(sink);
-  }
+  static constexpr auto members(auto& self) { return base::members(self.offset_, self.refused_); }
 
  private:
   void confirm(Assessment& a, const param::RecoveryParameters& n) {

@@ -4,6 +4,7 @@
 // refused count only by persisting (checks/offset_hypothesis.hpp).
 #pragma once
 
+#include "tetap/base/members.hpp"
 #include "tetap/checks/chi_square.hpp"
 #include "tetap/checks/coloured_noise.hpp"
 #include "tetap/checks/frozen_position.hpp"
@@ -103,19 +104,9 @@ class GnssPositionSource {
   [[nodiscard]] SourceStatus status(base::Micros at) const {
     return status_.state == SourceState::kFusing && timed_out(at) ? SourceStatus{} : status_;
   }
-  template <class Sink>
-  void hash_state(Sink&& sink) const {
-    startup_.hash_state(sink);
-    frozen_.hash_state(sink);
-    drift_.hash_state(sink);
-    offset_.hash_state(sink);
-    record_.hash_state(sink);
-    for (const float v : {innovation_.east_m, innovation_.north_m, innovation_.variance_m2}) sink(v);
-    sink(last_fused_.us);
-    sink(pulled_m_[0]);
-    sink(pulled_m_[1]);
-    sink(static_cast<std::uint32_t>((pull_inflated_ ? 1U : 0U) | (leapt_ ? 2U : 0U)));
-    status_.hash_state(sink);
+  static constexpr auto members(auto& self) {
+    return base::members(self.startup_, self.offset_, self.record_, self.innovation_, self.last_fused_, self.frozen_,
+                         self.drift_, self.pulled_m_, self.pull_inflated_, self.leapt_, self.status_);
   }
 
  private:

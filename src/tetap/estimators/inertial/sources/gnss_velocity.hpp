@@ -3,6 +3,7 @@
 // (vote.hpp).
 #pragma once
 
+#include "tetap/base/members.hpp"
 #include "tetap/estimators/inertial/filter_view.hpp"
 #include "tetap/estimators/inertial/refusal.hpp"
 #include "tetap/model/gnss_velocity_3d.hpp"
@@ -104,12 +105,9 @@ class GnssVelocitySource {
   [[nodiscard]] SourceStatus status(base::Micros at) const {
     return timed_out(at) ? SourceStatus{} : status_of(record_.refused());
   }
-  template <class Sink>
-  void hash_state(Sink&& sink) const {
-    record_.hash_state(sink);
-    for (int i = 0; i < 3; ++i) sink(difference_mps_(i));
-    for (const float v : {climb_mps_, sigma_mps_, ahead_mps_}) sink(v);
-    sink(static_cast<std::uint32_t>((step_detected_ ? 1U : 0U) | (speed_off_ ? 2U : 0U)));
+  static constexpr auto members(auto& self) {
+    return base::members(self.record_, self.difference_mps_, self.climb_mps_, self.sigma_mps_, self.ahead_mps_,
+                         self.step_detected_, self.speed_off_);
   }
 
  private:

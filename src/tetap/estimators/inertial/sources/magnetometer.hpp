@@ -3,6 +3,7 @@
 // variance that would end there. While the heading is better known already, headings are compared and nothing more.
 #pragma once
 
+#include "tetap/base/members.hpp"
 #include "tetap/checks/magnetic_field_check.hpp"
 #include "tetap/checks/stuck_value.hpp"
 #include "tetap/estimators/inertial/heading_monitor.hpp"
@@ -46,12 +47,7 @@ class Magnetometer {
     return !checks::recent(repeats_.last(), at, base::Micros{2'000'000});
   }
   [[nodiscard]] SourceStatus status(base::Micros at) const { return timed_out(at) ? SourceStatus{} : status_; }
-  template <class Sink>
-  void hash_state(Sink&& sink) const {
-    field_.hash_state(sink);
-    repeats_.hash_state(sink);
-    status_.hash_state(sink);
-  }
+  static constexpr auto members(auto& self) { return base::members(self.field_, self.repeats_, self.status_); }
 
  private:
   /// Variance of the direction, and its covariance with the heading.

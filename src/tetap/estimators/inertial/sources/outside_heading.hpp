@@ -2,6 +2,7 @@
 // Heading from outside: of a receiver with two antennas, for instance.
 #pragma once
 
+#include "tetap/base/members.hpp"
 #include "tetap/checks/stuck_value.hpp"
 #include "tetap/estimators/inertial/filter_view.hpp"
 #include "tetap/estimators/inertial/refusal.hpp"
@@ -53,11 +54,7 @@ class OutsideHeadingSource {
     if (timed_out(at)) return {};
     return stuck(at) ? SourceStatus{SourceState::kDistrusted, Check::kStuck} : status_of(refused_);
   }
-  template <class Sink>
-  void hash_state(Sink&& sink) const {
-    repeats_.hash_state(sink);
-    refused_.hash_state(sink);
-  }
+  static constexpr auto members(auto& self) { return base::members(self.repeats_, self.refused_); }
 
  private:
   checks::StuckValue<1> repeats_;

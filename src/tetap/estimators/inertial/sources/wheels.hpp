@@ -2,6 +2,7 @@
 // Wheels: encoder counts or speeds of two wheels, as far as they roll. Their forward speed is a source of its own.
 #pragma once
 
+#include "tetap/base/members.hpp"
 #include "tetap/checks/wheel_slip.hpp"
 #include "tetap/estimators/inertial/encoder_interval.hpp"
 #include "tetap/estimators/inertial/filter_view.hpp"
@@ -43,13 +44,8 @@ class Wheels {
     return !checks::recent(slip_.last(), at, base::Micros{1'500'000}) && !encoders_.leapt_recently(at);
   }
   [[nodiscard]] SourceStatus status(base::Micros at) const { return timed_out(at) ? SourceStatus{} : status_; }
-  template <class Sink>
-  void hash_state(Sink&& sink) const {
-    encoders_.hash_state(sink);
-    slip_.hash_state(sink);
-    sink(turned_at_.us);
-    sink(turn_radps_);
-    status_.hash_state(sink);
+  static constexpr auto members(auto& self) {
+    return base::members(self.encoders_, self.slip_, self.turned_at_, self.turn_radps_, self.status_);
   }
 
  private:
