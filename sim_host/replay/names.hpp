@@ -15,9 +15,9 @@ namespace tetap::sim {
 
 /// "?" for a code that has no name.
 [[nodiscard]] constexpr std::string_view name(sensor::Sensor value) {
-  constexpr std::array<std::string_view, 12> kNames{"Imu",          "WheelCounts",  "WheelSpeed",   "BodySpeed",
-                                                    "RangeBearing", "GnssPosition", "GnssVelocity", "Magnetometer",
-                                                    "Barometer",    "Heading",      "Closure",      "Feature"};
+  constexpr std::array<std::string_view, 14> kNames{
+      "Imu",          "WheelCounts", "WheelSpeed", "BodySpeed", "RangeBearing", "GnssPosition", "GnssVelocity",
+      "Magnetometer", "Barometer",   "Heading",    "Closure",   "Feature",      "Scan",         "RelativePose"};
   const auto i = static_cast<std::size_t>(value);
   return value == sensor::Sensor::kNotAvailable ? "NotAvailable" : i < kNames.size() ? kNames[i] : "?";
 }

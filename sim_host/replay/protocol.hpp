@@ -28,16 +28,16 @@ inline constexpr std::uint64_t kTimeMask = 0xFFFFFFFFFFFF;
   if (frame.extended || frame.id < base || frame.id >= base + bus::kBlock + bus::kMapBlock) return std::nullopt;
   return frame.id - base;
 }
-/// Offsets of inputs: below kInputOffsets, and closures and features behind the map's outputs.
+/// Offsets of inputs behind the map's outputs: displacements, scans, images, closures and features.
 [[nodiscard]] constexpr bool is_map_input(std::uint32_t offset) {
-  return offset == bus::InClosureFrames::kOffset || offset == bus::InFeature::kOffset;
+  return offset >= bus::InRelativePose::kOffset && offset <= bus::InFeature::kOffset;
 }
 [[nodiscard]] constexpr bool is_input(std::uint32_t offset) { return offset < kInputOffsets || is_map_input(offset); }
-/// A frame the node consumes and counts: of its inputs, sync frames and their guards excepted. Robots without a graph
-/// count none of the map's inputs.
+/// A frame the node consumes and counts: of its inputs, sync frames and their guards excepted. Robots with a graph
+/// count closures and features, others none of the map's inputs.
 [[nodiscard]] constexpr bool is_counted_input(const base::CanFrame& frame, std::uint32_t base, bool graph = false) {
   const auto offset = offset_in_block(frame, base);
-  if (offset && is_map_input(*offset)) return graph;
+  if (offset && is_map_input(*offset)) return graph && *offset >= bus::InClosureFrames::kOffset;
   return offset && *offset < kInputOffsets && *offset != bus::InSync::kOffset && !bus::is_sync_guard(*offset, frame);
 }
 /// Frames with real time of loop and controller, and the program's version, differ between runs that are otherwise the

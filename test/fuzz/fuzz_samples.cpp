@@ -153,6 +153,8 @@ class Run {
         break;
       case Sensor::kClosure:  // this robot takes none
       case Sensor::kFeature:
+      case Sensor::kScan:
+      case Sensor::kRelativePose:
       case Sensor::kNotAvailable:
         return;
     }

@@ -46,7 +46,7 @@ def frames(path):
 
 
 def is_input(identifier):
-    return BASE <= identifier < BASE + 0x20 or identifier in (BASE + 0x4E, BASE + 0x4F)
+    return BASE <= identifier < BASE + 0x20 or BASE + 0x49 <= identifier <= BASE + 0x4F
 
 
 def delayed(lines):

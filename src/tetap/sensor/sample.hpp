@@ -93,6 +93,8 @@ constexpr bool visit(const Sample& sample, F&& f) {
       f(sample.payload.closure);
       return true;
     case sensor::Sensor::kFeature:
+    case sensor::Sensor::kScan:
+    case sensor::Sensor::kRelativePose:
     case sensor::Sensor::kNotAvailable:
       return false;
   }

@@ -21,6 +21,8 @@ enum class Sensor : std::uint8_t {
   kHeading = 9,
   kClosure = 10,
   kFeature = 11,
+  kScan = 12,
+  kRelativePose = 13,
   kNotAvailable = 15,
 };
 
