@@ -3,6 +3,7 @@
 // interface. A program knows no robot when it is compiled; each robot is a module of its own (robots.hpp).
 #pragma once
 
+#include "sim_host/replay/protocol.hpp"
 #include "sim_host/robot_firmware.hpp"
 #include "tetap/param/parameters.hpp"
 
@@ -14,14 +15,20 @@ namespace tetap::sim {
 struct EstimatorFacts {
   bool inertial = false;   ///< an inertial filter is among them
   bool needs_imu = false;  ///< one of them is nothing without an IMU
-  bool imu = false;        ///< one of them takes such samples, as the next five
+  bool imu = false;        ///< one of them takes such samples, as the next six
   bool sightings = false;  ///< landmarks
   bool magnetic = false;
   bool pressure = false;
   bool closures = false;
+  bool scans = false;
   bool heading = false;   ///< outside headings
   bool own_map = false;   ///< one of them makes its map
   bool nameless = false;  ///< needs no identities for its map
+
+  /// Some of the robot's frames have identifiers of the map's block.
+  [[nodiscard]] constexpr bool needs_map_ids() const { return own_map || scans; }
+  /// Inputs that the robot takes of those behind the map's outputs.
+  [[nodiscard]] constexpr MapInputs map_inputs() const { return {.closures = closures, .scans = scans}; }
 };
 
 struct Robot {

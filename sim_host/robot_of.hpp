@@ -36,6 +36,7 @@ template <class... E>
           .magnetic = (Takes<E, sensor::MagneticFlux> || ...),
           .pressure = (Takes<E, sensor::AirPressure> || ...),
           .closures = (Takes<E, sensor::LoopClosure> || ...),
+          .scans = (Takes<E, sensor::PlanarScan> || ...),
           .heading = (Takes<E, sensor::OutsideHeading> || ...),
           .own_map = (estimators::MakesMap<E> || ...),
           .nameless = (MapsNameless<E> || ...)};

@@ -85,7 +85,7 @@ const Robot& robot_named(const std::string& name) {
 }
 
 void require_map_ids(const Robot& robot, std::uint32_t can_base) {
-  if (!robot.takes.own_map || param::has_map_ids(can_base)) return;
+  if (!robot.takes.needs_map_ids() || param::has_map_ids(can_base)) return;
   std::array<char, 16> hex{};
   std::snprintf(hex.data(), hex.size(), "0x%X", static_cast<unsigned>(can_base));
   throw std::runtime_error(std::string("robot ") + robot.name + ": can_base is " + hex.data() + "; it has to be " +

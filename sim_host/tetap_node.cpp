@@ -39,7 +39,8 @@ The firmware as a Linux program on SocketCAN. Ends on INT or TERM with status 0.
 }
 
 void run(const tetap::sim::Robot& robot, const std::string& interface, const tetap::param::Parameters& parameters) {
-  tetap::hal::SocketCan bus(interface, {.accept = tetap::firmware::accepted_by(robot.takes.own_map, parameters)});
+  tetap::hal::SocketCan bus(interface,
+                            {.accept = tetap::firmware::accepted_by(robot.takes.needs_map_ids(), parameters)});
   std::fprintf(stderr, "tetap-node: robot %s on %s, ids %03X to %03X, version %s\n", robot.name, interface.c_str(),
                parameters.can_base, parameters.can_base + 0x3F, tetap::hal::version_text(tetap::version()).c_str());
   tetap::sim::CanAdapter can(bus);

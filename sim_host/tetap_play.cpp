@@ -24,7 +24,7 @@ int main(int count, char** values) {
     if (options.robot.empty() && !settings.words().empty()) throw sim::UsageError("--params and --set need --robot");
     if (!options.robot.empty()) {
       options.notes = sim::parameter_notes(sim::parameters_of(options.robot, settings), settings);
-      options.script.graph = sim::robot_named(options.robot).takes.closures;
+      options.script.map_inputs = sim::robot_named(options.robot).takes.map_inputs();
     }
     sim::Interruption::expect();
     // Before the bus, so that an unreadable log is reported also where there is no bus.

@@ -43,9 +43,9 @@ namespace tetap::sim {
   return i < kNames.size() ? kNames[i] : "?";
 }
 [[nodiscard]] constexpr std::string_view name(sensor::EstimatorKind value) {
-  constexpr std::array<std::string_view, 14> kNames{"None",     "Odometry",  "Ekf",      "Kf",    "Ukf",
-                                                    "Particle", "Inertial",  "Attitude", "Grid",  "EkfSlam",
-                                                    "FastSlam", "PoseGraph", "Msckf",    "Fusion"};
+  constexpr std::array<std::string_view, 15> kNames{"None",     "Odometry",  "Ekf",      "Kf",     "Ukf",
+                                                    "Particle", "Inertial",  "Attitude", "Grid",   "EkfSlam",
+                                                    "FastSlam", "PoseGraph", "Msckf",    "Fusion", "ScanOdometry"};
   const auto i = static_cast<std::size_t>(value);
   return i < kNames.size() ? kNames[i] : "?";
 }

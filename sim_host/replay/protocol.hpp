@@ -33,11 +33,21 @@ inline constexpr std::uint64_t kTimeMask = 0xFFFFFFFFFFFF;
   return offset >= bus::InRelativePose::kOffset && offset <= bus::InFeature::kOffset;
 }
 [[nodiscard]] constexpr bool is_input(std::uint32_t offset) { return offset < kInputOffsets || is_map_input(offset); }
-/// A frame the node consumes and counts: of its inputs, sync frames and their guards excepted. Robots with a graph
-/// count closures and features, others none of the map's inputs.
-[[nodiscard]] constexpr bool is_counted_input(const base::CanFrame& frame, std::uint32_t base, bool graph = false) {
+/// Those of them that a robot takes; it counts the others as no inputs.
+struct MapInputs {
+  bool closures = false;  ///< features are counted with them
+  bool scans = false;
+
+  [[nodiscard]] constexpr bool has(std::uint32_t offset) const {
+    const bool scan = offset == bus::InScanHead::kOffset || offset == bus::InScan::kOffset;
+    return (scans && scan) || (closures && offset >= bus::InClosureFrames::kOffset);
+  }
+};
+/// A frame the node consumes and counts: of its inputs, sync frames and their guards excepted.
+[[nodiscard]] constexpr bool is_counted_input(const base::CanFrame& frame, std::uint32_t base,
+                                              MapInputs map_inputs = {}) {
   const auto offset = offset_in_block(frame, base);
-  if (offset && is_map_input(*offset)) return graph && *offset >= bus::InClosureFrames::kOffset;
+  if (offset && is_map_input(*offset)) return map_inputs.has(*offset);
   return offset && *offset < kInputOffsets && *offset != bus::InSync::kOffset && !bus::is_sync_guard(*offset, frame);
 }
 /// Frames with real time of loop and controller, and the program's version, differ between runs that are otherwise the

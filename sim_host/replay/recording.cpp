@@ -26,7 +26,7 @@ Failure RecordReader::refusal(const std::string& why) const { return {name_ + ":
 LogFacts facts_of(Frames& log, const ScriptOptions& options) {
   const std::uint32_t log_base = options.log_base;
   LogFacts facts;
-  facts.graph = options.graph;
+  facts.map_inputs = options.map_inputs;
   SnapshotCollector snapshots(log_base);
   std::uint64_t epochs = 0;
   bool late = false;  // the log begins after the node's start
@@ -55,7 +55,7 @@ RecordReader::Found RecordReader::add(const TimedFrame& entry) {
   const auto offset = offset_in_block(frame, log_base_);
   if (!offset) return found;
   const bool own = own_inputs_.add(frame);
-  if (is_counted_input(frame, log_base_, graph_)) {
+  if (is_counted_input(frame, log_base_, map_inputs_)) {
     ++(own ? own_ : inputs_);
     found.input = true;
     found.own = own;

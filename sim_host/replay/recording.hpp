@@ -23,7 +23,7 @@ namespace tetap::sim {
 struct LogFacts {
   std::optional<bus::EstDiagWired> wired;  ///< first page with the sensors that are wired to the node
   std::optional<Snapshot> snapshot;        ///< the first one of a log that begins after the node's start
-  bool graph = false;                      ///< the robot takes closures between keyframes
+  MapInputs map_inputs;                    ///< those of the robot
 };
 
 /// Reads the begin of a log until the page is there, or so many epochs that it never comes. A log that begins after the
@@ -67,7 +67,7 @@ class RecordReader {
   RecordReader(std::string name, std::uint32_t log_base, const LogFacts& facts)
       : name_(std::move(name)),
         log_base_(log_base),
-        graph_(facts.graph),
+        map_inputs_(facts.map_inputs),
         collector_(log_base),
         own_inputs_(log_base, facts.wired),
         snapshot_(facts.snapshot ? &*facts.snapshot : nullptr) {}
@@ -114,7 +114,7 @@ class RecordReader {
 
   std::string name_;
   std::uint32_t log_base_;
-  bool graph_;
+  MapInputs map_inputs_;
   EpochCollector collector_;
   OwnInputs own_inputs_;
   const Snapshot* snapshot_;

@@ -30,7 +30,7 @@ std::vector<TimedFrame> inputs_of(Frames& log, const ScriptOptions& options) {
   std::vector<TimedFrame> inputs;
   log.rewind();
   for (TimedFrame entry; log.next(entry);)
-    if (is_counted_input(entry.frame, options.log_base, options.graph))
+    if (is_counted_input(entry.frame, options.log_base, options.map_inputs))
       inputs.push_back({entry.time, moved(entry.frame, options)});
   return inputs;
 }
@@ -62,7 +62,7 @@ bool LogTicks::next(Tick& tick) {
 
 std::optional<base::Micros> LogTicks::own_tick() {
   for (TimedFrame entry; log_.next(entry);) {
-    if (is_counted_input(entry.frame, options_.log_base, options_.graph)) add_input(entry.frame);
+    if (is_counted_input(entry.frame, options_.log_base, options_.map_inputs)) add_input(entry.frame);
     const auto sync = sync_of(entry.frame, options_.log_base);
     if (sync && sync->kind == bus::SyncKind::kBegin) own_last_ = base::Micros{static_cast<std::int64_t>(sync->time_us)};
     if (!tick_in(sync)) continue;
@@ -75,7 +75,7 @@ std::optional<base::Micros> LogTicks::own_tick() {
 std::optional<base::Micros> LogTicks::grid_tick() {
   for (;;) {
     for (TimedFrame entry; !ahead_ && log_.next(entry);)
-      if (is_counted_input(entry.frame, options_.log_base, options_.graph)) ahead_ = entry;
+      if (is_counted_input(entry.frame, options_.log_base, options_.map_inputs)) ahead_ = entry;
     if (!ahead_) return grid_.last();
     if (const auto due = grid_.due_before(ahead_->time)) return due;
     add_input(ahead_->frame);

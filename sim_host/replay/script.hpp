@@ -4,6 +4,7 @@
 #pragma once
 
 #include "sim_host/replay/log.hpp"
+#include "sim_host/replay/protocol.hpp"
 #include "sim_host/replay/snapshot.hpp"
 #include "tetap/base/can_frame.hpp"
 #include "tetap/base/time.hpp"
@@ -71,7 +72,7 @@ static_assert(Source<Script>);
 struct ScriptOptions {
   std::uint32_t base = 0x300;      ///< id base of the node that is played to
   std::uint32_t log_base = 0x300;  ///< id base of the log
-  bool graph = false;              ///< the robot takes closures between keyframes
+  MapInputs map_inputs;            ///< those of the robot
   base::Micros period{10'000};
 };
 

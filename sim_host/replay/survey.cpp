@@ -12,13 +12,13 @@ class Surveyor {
  public:
   Surveyor(const std::string& name, const ScriptOptions& options, bool may_be_record, LogFacts facts)
       : base_(options.log_base),
-        graph_(options.graph),
+        map_inputs_(options.map_inputs),
         grid_(options.period),
         record_(name, base_, std::move(facts)),
         surveys_record_(may_be_record) {}
 
   void add(const TimedFrame& entry) {
-    if (is_counted_input(entry.frame, base_, graph_)) {
+    if (is_counted_input(entry.frame, base_, map_inputs_)) {
       ++survey_.inputs;
       if (own_ticks_ == 0)
         while (grid_.due_before(entry.time)) ++grid_ticks_;
@@ -51,7 +51,7 @@ class Surveyor {
   }
 
   std::uint32_t base_;
-  bool graph_;
+  MapInputs map_inputs_;
   TickGrid grid_;
   RecordSurvey record_;
   bool surveys_record_;

@@ -27,7 +27,7 @@ struct TextReplay final : TableSink {
 
 /// `log`: text of candump; `name`: what messages call it.
 inline void replay_text(std::string_view log, const std::string& name, const Robot& robot, TextReplay& out) {
-  const ScriptOptions options{.graph = robot.takes.closures};
+  const ScriptOptions options{.map_inputs = robot.takes.map_inputs()};
   LogText lines(log, name);
   auto survey = survey_of(lines, name, PlayMode::kAutomatic, options);
   if (!survey) return void(out.failure = survey.failure().text);

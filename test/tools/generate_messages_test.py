@@ -541,8 +541,8 @@ class Decode(Folder):
                             ("(0.0) can0 32F##100\n", "(0.0) can0 32F ? CAN FD, 1 bytes\n"),
                             ("(0.0) can0 123#\n", "(0.0) can0 123 ? no data\n")):
             self.assertEqual(self.said(line).stdout, words)
-        unused = self.said("(0.0) can0 345#0000000000000000\n", "--base", "0x300")
-        self.assertEqual(unused.stdout, "(0.0) can0 345 ? 00 00 00 00 00 00 00 00\n")
+        unused = self.said("(0.0) can0 348#0000000000000000\n", "--base", "0x300")
+        self.assertEqual(unused.stdout, "(0.0) can0 348 ? 00 00 00 00 00 00 00 00\n")
         self.assertIn("In_Guard page 13 (unknown) 0D00", self.said("(0.0) can0 301#0D00000000000000\n").stdout)
 
     def test_the_time_for_a_line_grows_as_its_length(self):

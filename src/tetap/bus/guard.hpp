@@ -74,6 +74,9 @@ struct SamplePart {
   std::uint8_t part = 0xFF;
 };
 
+/// Part of all blocks of a scan: the assembly checks their order.
+inline constexpr std::uint8_t kScanBlock = 1;
+
 [[nodiscard]] constexpr SamplePart part_of(std::uint8_t offset, const base::CanFrame& frame) {
   static_assert(InWheelCounts::kSeq.start == 20 && InGnssVelU::kSeq.start == 20 && InGnssLat::kInst.start == 24);
   static_assert(ImuGyro::kSeq.start == 60 && ImuTime::kSeq.start == 60);
@@ -96,7 +99,19 @@ struct SamplePart {
   if (offset == InBodySpeed::kOffset) is(Sensor::kBodySpeed, offset);
   if (offset >= InGnssLat::kOffset && offset <= InGnssAcc::kOffset) is(Sensor::kGnssPosition, InGnssLat::kOffset);
   if (offset == InGnssVelEN::kOffset || offset == InGnssVelU::kOffset) is(Sensor::kGnssVelocity, InGnssVelEN::kOffset);
+  if (offset == InScanHead::kOffset) is(Sensor::kScan, offset);
+  if (offset == InScan::kOffset) {  // of the instance of the latest head
+    static_assert(InScan::kSeq.start == 0 && InScan::kSeq.length == 4);
+    part = {.sensor = Sensor::kScan, .sequence = static_cast<std::uint8_t>(frame.data[0] & 0x0F), .part = kScanBlock};
+  }
   return part;
+}
+
+/// Samples that have guards: their places in a list of four instances each.
+inline constexpr std::size_t kGuardedSamples = 4 * (static_cast<std::size_t>(sensor::Sensor::kGnssVelocity) + 2);
+[[nodiscard]] constexpr std::size_t guarded_place(sensor::Sensor sensor, std::uint8_t instance) {
+  const std::size_t kind = static_cast<std::size_t>(sensor);
+  return (sensor == sensor::Sensor::kScan ? kGuardedSamples / 4 - 1 : kind) * 4 + instance;
 }
 
 /// The checksum that a sample's guard states, of the guard without it and of the sample's frames.
@@ -146,10 +161,14 @@ class SampleGuard {
 
   /// A frame of a sample, before the sample is put together.
   void frame(std::uint8_t offset, const base::CanFrame& frame, base::Micros now, Counters& counters) {
-    const SamplePart part = part_of(offset, frame);
+    SamplePart part = part_of(offset, frame);
     if (part.part == 0xFF) return;
+    const bool scan = part.sensor == sensor::Sensor::kScan, block = scan && part.part == kScanBlock;
+    if (block) part.instance = scan_instance_;
+    if (scan) scan_instance_ = part.instance;
     Slot* slot = &slot_of(part, now, counters);
-    if ((slot->parts >> part.part & 1U) != 0) {  // of the sample that had this number before
+    if (scan) slot->since = now;                           // its frames may take longer than a guard waits
+    if (!block && (slot->parts >> part.part & 1U) != 0) {  // of the sample that had this number before
       drop(*slot, counters);
       slot = &slot_of(part, now, counters);
     }
@@ -191,7 +210,7 @@ class SampleGuard {
   };
   [[nodiscard]] static constexpr bool guarded(sensor::Sensor sensor) {
     return sensor <= sensor::Sensor::kBodySpeed || sensor == sensor::Sensor::kGnssPosition ||
-           sensor == sensor::Sensor::kGnssVelocity;
+           sensor == sensor::Sensor::kGnssVelocity || sensor == sensor::Sensor::kScan;
   }
   static void drop(Slot& slot, Counters& counters) {
     if (slot.guard || slot.sample) ++counters.guard_bad;  // of a sample that is not whole that is counted already
@@ -217,13 +236,14 @@ class SampleGuard {
     const sensor::Sample sample = *slot.sample;
     const bool fits = guard.sample_crc == sample_guard_crc(guard, slot.sum);
     slot = {};
-    const std::size_t counter = static_cast<std::size_t>(sample.sensor) * 4 + sample.instance;
+    const std::size_t counter = guarded_place(sample.sensor, sample.instance);
     if (!fits || !counters_[counter].admits(guard.sample_ctr, now)) return void(++counters.guard_bad);
     out(sample);
   }
 
   std::array<Slot, 8> slots_{};
-  std::array<GuardCounter, (static_cast<std::size_t>(sensor::Sensor::kGnssVelocity) + 1) * 4> counters_{};
+  std::array<GuardCounter, kGuardedSamples> counters_{};
+  std::uint8_t scan_instance_ = 0;  ///< instance of the latest head of a scan
 };
 
 /// One map entry at a time has its guard before it.

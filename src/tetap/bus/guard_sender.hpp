@@ -16,12 +16,18 @@ class GuardSender {
   /// Empty where the frame is no part of a guarded sample, or not its last one. A sample's frames are sent in a row,
   /// others of its kind not between them.
   [[nodiscard]] std::optional<InGuardSample> after(std::uint8_t offset, const base::CanFrame& frame) {
-    const SamplePart part = part_of(offset, frame);
+    SamplePart part = part_of(offset, frame);
     if (part.part == 0xFF) return std::nullopt;
-    Sensor& sensor = sensors_[static_cast<std::size_t>(part.sensor) * 4 + part.instance];
+    if (offset == InScan::kOffset) part.instance = scan_instance_;
+    if (offset == InScanHead::kOffset) {
+      scan_instance_ = part.instance;
+      scan_blocks_ = (decode<InScanHead>(payload(frame)).value_or(InScanHead{}).count + 3) / 4;
+    }
+    Sensor& sensor = sensors_[guarded_place(part.sensor, part.instance)];
     if (sensor.sequence != part.sequence) sensor = {.sequence = part.sequence, .counter = sensor.counter};
     sensor.sum = static_cast<std::uint16_t>(sensor.sum + guard_crc(offset, payload(frame)));
-    if (++sensor.parts < parts_of(part.sensor)) return std::nullopt;
+    if (++sensor.parts < (part.sensor == sensor::Sensor::kScan ? 1 + scan_blocks_ : parts_of(part.sensor)))
+      return std::nullopt;
     InGuardSample guard{
         .sensor = part.sensor, .sample_inst = part.instance, .sample_seq = part.sequence, .sample_ctr = sensor.counter};
     guard.sample_crc = sample_guard_crc(guard, sensor.sum);
@@ -32,7 +38,7 @@ class GuardSender {
  private:
   struct Sensor {
     std::uint16_t sum = 0;         ///< sum of the frames' checksums
-    std::uint8_t parts = 0;        ///< number of frames sent
+    std::uint16_t parts = 0;       ///< number of frames sent
     std::uint8_t sequence = 0xFF;  ///< sequence number of the sample; 0xFF: none
     std::uint8_t counter = 0;
   };
@@ -43,7 +49,9 @@ class GuardSender {
                                                      : 1;
   }
 
-  std::array<Sensor, (static_cast<std::size_t>(sensor::Sensor::kGnssVelocity) + 1) * 4> sensors_{};
+  std::array<Sensor, kGuardedSamples> sensors_{};
+  int scan_blocks_ = 0;  ///< blocks of the latest scan that began
+  std::uint8_t scan_instance_ = 0;
 };
 
 }  // namespace tetap::bus

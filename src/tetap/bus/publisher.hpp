@@ -121,6 +121,23 @@ class Publisher {
   /// One landmark of the estimator's own map, and in its turn the page about the map.
   template <estimators::MakesMap Estimator, class Send>
   void own_map(const Estimator& estimator, Send& send);
+  /// A match that ended in this tick.
+  template <class Send>
+  void scan_match(const estimators::ScanMatchReport& match, base::Micros now, Send& send) {
+    if (match.ended != now) return;
+    static_assert(static_cast<int>(bus::ScanFate::kNoGeometry) == static_cast<int>(estimators::ScanEnd::kNoGeometry) &&
+                  static_cast<int>(bus::ScanFate::kFewPairs) == static_cast<int>(estimators::ScanEnd::kFewPairs));
+    put(bus::EstScanMatch{.epoch = tag(),
+                          .seq = match.sequence,
+                          .inst = match.instance,
+                          .fate = static_cast<bus::ScanFate>(match.end),
+                          .iterations = static_cast<std::uint8_t>(match.iterations),
+                          .pairs = static_cast<std::uint16_t>(match.pairs),
+                          .closure_id = bus::EstScanMatch::kClosureIdNotAvailable,
+                          .std_most_m = match.sigma_m,
+                          .std_yaw_rad = match.sigma_yaw_rad},
+        send);
+  }
   /// `summary` gives the content of the status when it is asked for.
   template <class GiveSummary, class Send>
   void status(GiveSummary&& summary, const LoopHealth& loop, Send& send);

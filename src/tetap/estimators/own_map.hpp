@@ -77,6 +77,27 @@ concept MapsKeyframes = MakesMap<E> && requires(const E& e, std::size_t i) {
   e.new_keyframes([](const NewKeyframe&) {});
 };
 
+/// How a match of a scan ended, in the order of bus::ScanFate.
+enum class ScanEnd : std::uint8_t { kMatched = 0, kFirst = 1, kFewPairs = 2, kSingular = 3, kNoGeometry = 4 };
+
+/// The latest match of a scan.
+struct ScanMatchReport {
+  base::Micros ended{-1};  ///< tick in which it ended; -1: none yet
+  std::uint8_t sequence = 0;
+  std::uint8_t instance = 0;
+  ScanEnd end = ScanEnd::kFirst;
+  int iterations = 0;
+  int pairs = 0;      ///< beams that had a partner
+  float sigma_m = 0;  ///< 1 sigma of the place in its least certain direction
+  float sigma_yaw_rad = 0;
+};
+
+/// An estimator that matches scans.
+template <class E>
+concept MatchesScans = requires(const E& e) {
+  { e.scan_match() } -> std::same_as<ScanMatchReport>;
+};
+
 /// An estimator that localises on the map it is given (MapFrame::map).
 template <class E>
 concept UsesMap = requires {

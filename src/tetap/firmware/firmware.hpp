@@ -79,9 +79,7 @@ class Firmware {
   bool on_frame(const base::CanFrame& frame) {
     const std::uint32_t offset = frame.id - parameters_.can_base;
     if (frame.extended || offset >= bus::kBlock + bus::kMapBlock) return false;
-    if constexpr (Node::kTakesClosures) {
-      if (bus::ClosureAssembly::takes(static_cast<std::uint8_t>(offset))) return node_.on_frame(frame), false;
-    }
+    if (Node::takes_map_input(static_cast<std::uint8_t>(offset))) return node_.on_frame(frame), false;
     if (offset >= bus::kBlock) return false;
     // A frame that only this node sends, or may send now, comes from a second node of the same ids.
     if (offset >= kInputs || is_own(offset)) return conflict_ticks_ = 1'000'000 / parameters_.loop.period_us, false;

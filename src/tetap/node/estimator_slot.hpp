@@ -218,6 +218,9 @@ class EstimatorSlot {
   void abort_job() requires WorksInJobs<E> { now_.abort_job(); }
   /// The window is closed: what waits for others of its stamp is judged now.
   void close_batch(const estimators::Context& ctx) requires RecordsLater<E> { now_.close_batch(ctx); }
+  [[nodiscard]] estimators::ScanMatchReport scan_match() const requires estimators::MatchesScans<E> {
+    return now_.scan_match();
+  }
   [[nodiscard]] const E& map_maker() const requires estimators::MakesMap<E> { return now_; }
   void reset_own_map() requires estimators::MakesMap<E> { now_.reset_own_map(); }
 

@@ -10,6 +10,7 @@
 #include "tetap/bus/decoder.hpp"
 #include "tetap/bus/input_crc.hpp"
 #include "tetap/bus/publisher.hpp"
+#include "tetap/bus/scan_assembly.hpp"
 #include "tetap/bus/stamp_wraps.hpp"
 #include "tetap/node/bus_protection.hpp"
 #include "tetap/node/fusion_window.hpp"
@@ -58,6 +59,12 @@ class Node {
   static constexpr bool kMakesMap = Estimators::kMakesMap;
   /// Whether an estimator takes displacements between keyframes.
   static constexpr bool kTakesClosures = Estimators::template kTakes<sensor::LoopClosure>;
+  /// Whether an estimator takes scans.
+  static constexpr bool kTakesScans = Estimators::template kTakes<sensor::PlanarScan>;
+  /// Whether a frame behind the map's outputs is an input of this robot.
+  [[nodiscard]] static constexpr bool takes_map_input(std::uint8_t offset) {
+    return (kTakesClosures && bus::ClosureAssembly::takes(offset)) || (kTakesScans && bus::ScanAssembly::takes(offset));
+  }
   /// Called by the inbox.
   void sample(const sensor::Sample& sample) {
     protection_.sample(sample, now_, counters_, [this](const sensor::Sample& vouched) { take(vouched); });
@@ -102,10 +109,11 @@ class Node {
   static constexpr auto members(auto& self) {
     return base::members(base::reference(self.parameters_), base::kept(self.window_), self.map_frame_,
                          base::in_turns(self.origin_), base::unhashed(self.protection_), base::unhashed(self.inbox_),
-                         base::unhashed(self.closures_), base::unhashed(self.wraps_), base::in_turns(self.counters_),
-                         self.publisher_, self.landmarks_, self.pending_reset_, base::kept(self.wired_off_),
-                         self.pending_pose_, self.now_, self.ticked_, self.input_crc_, self.resets_, self.reset_cause_,
-                         self.restarted_at_, self.jumps_, self.disagreement_, self.map_faults_);
+                         base::unhashed(self.closures_), base::unhashed(self.scans_), base::unhashed(self.wraps_),
+                         base::in_turns(self.counters_), self.publisher_, self.landmarks_, self.pending_reset_,
+                         base::kept(self.wired_off_), self.pending_pose_, self.now_, self.ticked_, self.input_crc_,
+                         self.resets_, self.reset_cause_, self.restarted_at_, self.jumps_, self.disagreement_,
+                         self.map_faults_);
   }
   /// For a copy that others get: nothing is left from which the key of commands could be computed. Between ticks only.
   void hide_secrets() { protection_.hide_secrets(); }
@@ -133,22 +141,33 @@ class Node {
   static constexpr base::Micros kLongestStep{500'000};
   static constexpr std::uint8_t kMostWaited = 20;  ///< ticks until a command ends the window whatever is in it
   using Closures = std::conditional_t<kTakesClosures, bus::ClosureAssembly, bus::NoClosures>;
+  using Scans = std::conditional_t<kTakesScans, bus::ScanAssembly, bus::NoScans>;
   using Landmarks = std::conditional_t<Estimators::kUsesMap, node::Landmarks, node::NoLandmarks>;
 
-  /// Sightings, closures, and speeds that are commands.
+  /// Sightings, closures, scans, and speeds that are commands.
   [[nodiscard]] bool at_no_fixed_rate(const sensor::Sample& sample) const {
     const bool commanded = parameters_.wheels.hold == param::Hold::kForward;
     if (kTakesClosures && sample.sensor == sensor::Sensor::kClosure) return true;
+    if (kTakesScans && sample.sensor == sensor::Sensor::kScan) return true;
     return (Estimators::template kTakes<sensor::LandmarkSighting> && sample.sensor == sensor::Sensor::kRangeBearing) ||
            (Estimators::template kTakes<sensor::BodySpeed> && sample.sensor == sensor::Sensor::kBodySpeed && commanded);
   }
-  [[nodiscard]] estimators::Context context() const { return {.parameters = parameters_, .map_frame = map_frame_}; }
+  [[nodiscard]] estimators::Context context() const {
+    estimators::Context context{.parameters = parameters_, .map_frame = map_frame_};
+    if constexpr (kTakesScans) context.scans = &scans_.pool();
+    return context;
+  }
   void restart(base::Micros t, sensor::ResetCause cause);
   void consume(base::Micros t);
   void close_window(base::Micros t);
   void apply_map(base::Micros before);
   void apply_commands();
   void restart_in_new_map();
+  /// Bit of a sensor in Status_Used. A scan that was matched has that of closures: there is no other.
+  [[nodiscard]] static constexpr unsigned bit_of(sensor::Sensor sensor) {
+    const auto bit = static_cast<unsigned>(sensor);
+    return bit < 12 ? bit : static_cast<unsigned>(sensor::Sensor::kClosure);
+  }
   [[nodiscard]] bool out_of_range(const estimators::Estimate& estimate) const {
     return origin_.fixes_outside(now_) || !estimators::within_range(estimate.pose.x, estimate.pose.y);
   }
@@ -181,6 +200,7 @@ class Node {
   BusProtection<Estimators> protection_;
   typename Parts<Estimators>::Decoder inbox_;
   [[no_unique_address]] Closures closures_;
+  [[no_unique_address]] Scans scans_;
   typename Parts<Estimators>::Wraps wraps_;
   bus::Counters counters_;
   typename Parts<Estimators>::Publisher publisher_;
@@ -218,6 +238,13 @@ void Node<Estimators, Capacity>::on_frame(const base::CanFrame& frame) {
   input_crc_.add(bits);
   if constexpr (kTakesClosures) {
     if (bus::ClosureAssembly::takes(offset)) return closures_.on_frame(offset, frame, now_, counters_, *this);
+  }
+  if constexpr (kTakesScans) {
+    if (bus::ScanAssembly::takes(offset)) {
+      if (protection_.admits(offset, frame, now_, counters_, [](const sensor::Sample&) {}))
+        scans_.on_frame(offset, frame, bits, now_, counters_, *this);
+      return;
+    }
   }
   const bool admitted =
       protection_.admits(offset, frame, now_, counters_, [this](const sensor::Sample& vouched) { take(vouched); });
@@ -264,6 +291,7 @@ void Node<Estimators, Capacity>::tick(base::Micros t, const bus::LoopHealth& loo
   protection_.tick(now_, counters_);
   inbox_.expire(now_, base::Micros{parameters_.loop.window_us}, counters_);
   closures_.expire(now_, base::Micros{parameters_.loop.window_us}, counters_);
+  scans_.expire(now_, base::Micros{parameters_.loop.window_us}, counters_);
   apply_map(before);
   consume(now_);
   if (origin_.take_replaced()) restart_in_new_map();
@@ -299,6 +327,7 @@ void Node<Estimators, Capacity>::tick(base::Micros t, const bus::LoopHealth& loo
                        static_cast<std::uint32_t>(1'000'000 / parameters_.loop.period_us));
       publisher_.own_map(slot.map_maker(), send);
     }
+    if constexpr (estimators::MatchesScans<E>) publisher_.scan_match(slot.scan_match(), now_, send);
     ++instance;
   });
   publisher_.status([&] { return summary(estimates[kPrimary]); }, loop, send);
@@ -328,6 +357,7 @@ void Node<Estimators, Capacity>::restart(base::Micros t, sensor::ResetCause caus
   if (cause == sensor::ResetCause::kTimeJump) {
     inbox_.discard(counters_);
     closures_.discard(counters_);
+    scans_.discard(counters_);
     wraps_.power_on();
     window_.clear();
     window_.open_from(t - base::Micros{parameters_.loop.period_us});
@@ -501,7 +531,7 @@ bus::Summary Node<Estimators, Capacity>::summary(const estimators::Estimate& est
   s.map_faults = map_faults_.faults(publisher_.epoch());
   for (const estimators::SensorStatistics& stat : primary.statistics()) {
     const bool used = stat.accepted > 0 && now_ - stat.last_accepted < base::Micros{1'000'000};
-    if (used) s.used = static_cast<std::uint16_t>(s.used | (1U << static_cast<unsigned>(stat.sensor)));
+    if (used) s.used = static_cast<std::uint16_t>(s.used | (1U << bit_of(stat.sensor)));
     s.rejecting = s.rejecting || stat.refused_in_a_row >= 3;
   }
   return s;

@@ -233,9 +233,20 @@ struct MappingParameters {
   std::int32_t seed = 1;              ///< key of the particles' noise
   std::int32_t publish_every = 10;    ///< ticks between landmarks or keyframes on the bus, one at a time; 0: never
   std::int32_t keyframes = 0;         ///< made by 0: the wheels, 1: closures from the last keyframe to the next id
-  float keyframe_distance_m = 0.5F;   ///< way from which the wheels make a keyframe
+  float keyframe_distance_m = 0.5F;   ///< way from which the wheels, or a scan, make a keyframe
   float keyframe_turn_rad = 0.5F;     ///< turn from which they do
   std::int32_t keyframe_time_ms = 0;  ///< time from which they do; 0: way and turn alone
+};
+
+/// A planar laser scanner: its place and heading on the body, and which ranges count.
+struct LidarParameters {
+  float x_b_m = 0;
+  float y_b_m = 0;
+  float yaw_rad = 0;
+  float min_m = 0.1F;         ///< a shorter range is none: the robot itself
+  float max_m = 30;           ///< a longer range is none; at most 32
+  std::int32_t turn_us = 0;   ///< time of a full turn; 0: all beams are of one time
+  std::int32_t delay_us = 0;  ///< time from the first beam to the stamp
 };
 
 /// Localisation by particles.
@@ -317,6 +328,7 @@ struct Parameters {
   WiredParameters wired{};
   MappingParameters mapping{};
   ParticleParameters particles{};
+  LidarParameters lidar{};
 };
 
 }  // namespace tetap::param

@@ -400,8 +400,8 @@ inline constexpr std::array kTable{
               "Period of one landmark or keyframe of the own map on the bus; 0: never."),
     TETAP_ROW(0x4C8, mapping.keyframes, "", 0, 1, kRestart,
               "Keyframes are made by 0 the wheels, 1 closures from the last keyframe to the next id."),
-    TETAP_ROW(0x4C9, mapping.keyframe_distance_m, "m", 0.01, 1'000, kLive, "Way from which wheels make a keyframe."),
-    TETAP_ROW(0x4CA, mapping.keyframe_turn_rad, "rad", 0.01, 4, kLive, "Turn from which wheels make a keyframe."),
+    TETAP_ROW(0x4C9, mapping.keyframe_distance_m, "m", 0.01, 1'000, kLive, "Way from which wheels, or a scan, make a keyframe."),
+    TETAP_ROW(0x4CA, mapping.keyframe_turn_rad, "rad", 0.01, 4, kLive, "Turn from which wheels, or a scan, make a keyframe."),
     TETAP_ROW(0x4CB, mapping.keyframe_time_ms, "ms", 0, 1'000'000'000, kLive,
               "Time from which wheels make a keyframe; 0: way and turn alone."),
 
@@ -409,6 +409,16 @@ inline constexpr std::array kTable{
               "Power of the particles' likelihood; below 1 where errors of one landmark's sightings are alike."),
     TETAP_ROW(0x501, particles.jitter, "m^2/s", 0, 1, kLive,
               "Random walk of each particle's place, on both axes: motion that neither speed nor turn explains."),
+
+    TETAP_ROW(0x540, lidar.x_b_m, "m", -10, 10, kRestart, "Place of the scanner on the body, forward."),
+    TETAP_ROW(0x541, lidar.y_b_m, "m", -10, 10, kRestart, "Place of the scanner on the body, left."),
+    TETAP_ROW(0x542, lidar.yaw_rad, "rad", -detail::kPi, detail::kPi, kRestart,
+              "Direction of the scanner's bearing 0 on the body, from forward to the left."),
+    TETAP_ROW(0x543, lidar.min_m, "m", 0, 30, kLive, "A shorter range counts as none."),
+    TETAP_ROW(0x544, lidar.max_m, "m", 0.5, 32, kLive, "A longer range counts as none."),
+    TETAP_ROW(0x545, lidar.turn_us, "us", 0, 1'000'000, kRestart,
+              "Time of a full turn of the scanner; 0: all beams of a scan are of one time."),
+    TETAP_ROW(0x546, lidar.delay_us, "us", 0, 500'000, kRestart, "Time from the first beam of a scan to its stamp."),
 };
 
 #undef TETAP_ROW

@@ -35,6 +35,12 @@ inline void calibrate(LandmarkSighting& s, const param::LandmarkParameters& n) {
   if (cosine > kLeastCosine) s.range_m /= cosine;
 }
 
+/// Time from the first beam of a scan to its last one.
+[[nodiscard]] inline float sweep_s(const PlanarScan& s, const param::LidarParameters& n) {
+  const float turns = base::abs(s.step_rad) * static_cast<float>(s.beams - 1) * (0.5F / base::kPi);
+  return turns * base::seconds(base::Micros{n.turn_us});
+}
+
 inline void calibrate(Sample& sample, const param::Parameters& n) {
   if (is_imu(sample, n.inertial.imu)) {
     calibrate(sample.payload.imu, n.imu);
@@ -45,6 +51,9 @@ inline void calibrate(Sample& sample, const param::Parameters& n) {
     sample.payload.body_speed.forward_mps *= n.wheels.speed_scale;
     sample.payload.body_speed.yaw_rate_radps *= n.wheels.yaw_rate_scale;  // NaN stays what it is
     sample.stamp += base::Micros{n.wheels.delay_us};
+  } else if (sample.sensor == sensor::Sensor::kScan) {  // a scan is of the middle of its sweep
+    const auto half_us = static_cast<std::int32_t>(0.5e6F * sweep_s(sample.payload.scan, n.lidar));
+    sample.stamp += base::Micros{half_us - n.lidar.delay_us};
   }
 }
 

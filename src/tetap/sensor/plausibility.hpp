@@ -48,6 +48,12 @@ struct Plausible {
     return s.from != s.to && LoopClosure::unpack(s.sigmas, 0) > 0 && LoopClosure::unpack(s.sigmas, 1) > 0 &&
            LoopClosure::unpack(s.sigmas, 2) > 0;
   }
+  /// Finer steps than 0.1 mrad, and more than a turn in all, are no scanner's.
+  bool operator()(const PlanarScan& s) const {
+    const float step_rad = base::abs(s.step_rad);
+    return s.beams >= 3 && within(4.0F, s.first_rad) && step_rad > 1e-4F &&
+           step_rad * static_cast<float>(s.beams - 1) < 6.3F;
+  }
   bool operator()(const LandmarkSighting& s) const {
     const bool any = !base::is_nan(s.range_m) || !base::is_nan(s.bearing_rad);
     return any && sigma_or_none(s.range_m, 1e5F) && number_or_none(s.bearing_rad, 10.0F) &&

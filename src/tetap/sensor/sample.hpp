@@ -32,6 +32,7 @@ struct Sample {
     AirPressure pressure;
     OutsideHeading heading;
     LoopClosure closure;
+    PlanarScan scan;
   } payload;
 
   static_assert(sizeof(Payload) == 32, "a window of them is most of the memory");
@@ -92,8 +93,10 @@ constexpr bool visit(const Sample& sample, F&& f) {
     case sensor::Sensor::kClosure:
       f(sample.payload.closure);
       return true;
-    case sensor::Sensor::kFeature:
     case sensor::Sensor::kScan:
+      f(sample.payload.scan);
+      return true;
+    case sensor::Sensor::kFeature:
     case sensor::Sensor::kRelativePose:
     case sensor::Sensor::kNotAvailable:
       return false;

@@ -122,4 +122,13 @@ struct LoopClosure {
   }
 };
 
+/// A planar scan whose ranges lie in a pool (sensor/scan_pool.hpp). Bearings of the scanner, counter-clockwise.
+struct PlanarScan {
+  std::uint32_t number = 0;  ///< count of the scans in the pool, from 1
+  float first_rad = 0;       ///< bearing of the first beam
+  float step_rad = 0;        ///< from one beam to the next
+  std::uint16_t beams = 0;
+  std::uint8_t sequence = 0;  ///< on the bus
+};
+
 }  // namespace tetap::sensor

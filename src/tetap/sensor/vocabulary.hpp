@@ -91,6 +91,7 @@ enum class EstimatorKind : std::uint8_t {
   kPoseGraph = 11,
   kMsckf = 12,
   kFusion = 13,
+  kScanOdometry = 14,
 };
 
 /// Bit numbers of the status' fault field.
