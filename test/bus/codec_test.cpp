@@ -286,12 +286,12 @@ static_assert(*decode<EstPos>(payload(frame(0x340, kSent, 1))) == kSent);
 static_assert(decode<InRangeBearing>(encode(InRangeBearing{.id = 9, .range_m = 1e30F, .bearing_rad = -0.25F}))
                   ->bearing_rad < -0.2498F);
 static_assert(!decode<EstStdPose>(encode(EstStdMore{})));
-// 1 m = 200, none = 0, the farthest = 8190 = 0x1FFE, 5 mm = 1; -3 rad = -6000, -0.0175 rad = -350, modulo 2^14.
+// 1 m = 200, none = 0, the farthest = 8190 = 0x1FFE, 5 mm = 1; -3 rad = -6000, -0.0175 rad = -1750, modulo 2^14.
 static_assert(encode(InScan{.seq = 5, .block = 2, .range0_m = 1, .range1_m = 0, .range2_m = 99, .range3_m = 0.005F}) ==
               Payload{0x25, 0x80, 0x0C, 0x00, 0x80, 0xFF, 0x0F, 0x00});
 static_assert(encode(InScanHead{
                   .stamp_us = 0x12345, .seq = 3, .inst = 1, .count = 360, .first_rad = -3, .step_rad = -0.0175F}) ==
-              Payload{0x45, 0x23, 0x31, 0xA1, 0x05, 0x89, 0x8A, 0xFA});
+              Payload{0x45, 0x23, 0x31, 0xA1, 0x05, 0x89, 0xAA, 0xE4});
 static_assert(encode(InMapEntry{.id = 7, .x_raw = 1, .y_raw = -1}) == Payload{7, 1, 0, 0, 0xF0, 0xFF, 0xFF, 0xFF});
 
 }  // namespace
