@@ -1,9 +1,11 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
 """The importer of laser scans, on logs written here and on the Intel set where its data is."""
+import gzip
 import json
 import lzma
 import os
+import struct
 import subprocess
 import tempfile
 import unittest
@@ -89,6 +91,45 @@ class ImportScansTest(unittest.TestCase):
             self.assertIn(words, result.stderr)
 
     @unittest.skipUnless(os.path.exists(INTEL), "scans is not in $TETAP_DATA")
+    @staticmethod
+    def rawlog(scan_version=6):
+        """A rawlog of two scans of three beams, with a step of odometry between them."""
+        def named(name, version):
+            return bytes([0x80 + len(name)]) + name + bytes([version])
+
+        def scan(time_s, *ranges):
+            pose = named(b"CPose3D", 2) + struct.pack("<7d", 0.2, -0.1, 0.5, 0.5 ** 0.5, 0, 0, 0.5 ** 0.5) + b"\x88"  # turned by 90 deg
+            return (named(b"CSensoryFrame", 2) + named(b"CObservation2DRangeScan", scan_version) + struct.pack("<f?f", np.pi, True, 30) + pose
+                    + struct.pack("<I3f3B", 3, *ranges, 1, 1, 0) + struct.pack("<fQ", 0.01, (11_644_473_600 + time_s) * 10_000_000) + b"\x88\x88")
+        step = (named(b"CActionCollection", 0) + named(b"CActionRobotMovement2D", 6) + struct.pack("<I", 0) + named(b"CPose2D", 1)
+                + struct.pack("<3d", 1, 0.5, 0.25) + b"\x88\x88\x88")
+        return scan(100, 1, 31, 2) + step + scan(101, 1, 2, 3)
+
+    def test_a_rawlog_brings_its_odometry_mounting_and_truth(self):
+        truth = self.file("truth", "100.0 0 0 0\n101.0 1 2 0.5\n102.0 9 9 9\n")
+        result = self.imports(gzip.compress(self.rawlog()), "--truth", truth)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        rows = self.rows(".scans")
+        np.testing.assert_allclose(rows[0], [3, -np.pi / 2, np.pi / 2], atol=1e-6)
+        np.testing.assert_allclose(rows[1], [1_000_000, 0, 0, 0, 200, 0, 0], atol=1e-6)
+        np.testing.assert_allclose(rows[2], [2_000_000, 1, 0.5, 0.25, 200, 400, 0], atol=1e-6)
+        self.assertEqual(self.rows(".truth"), [[0, 0, 0], [1, 2, 0.5]])
+        with open(self.out + ".json") as file:
+            about = json.load(file)
+        np.testing.assert_allclose(about["scanner_b"], [0.2, -0.1, np.pi / 2], atol=1e-6)
+        self.assertEqual(about["dropped"], {"true poses without a scan": 1})
+
+    def test_a_bad_rawlog_ends_in_one_line(self):
+        whole = self.rawlog()
+        for data, words in ((gzip.compress(whole)[:-9], "not unpacked by gzip"), (gzip.compress(whole[:-20]), "ends within an object"),
+                            (gzip.compress(self.rawlog(7)), "no CObservation2DRangeScan of version 6"), (gzip.compress(b"x"), "no scan in it")):
+            result = self.imports(data)
+            self.assertEqual(result.returncode, 1)
+            self.assertIn(words, result.stderr)
+            self.assertEqual(result.stderr.count("\n"), 1, result.stderr)
+        result = self.imports(gzip.compress(whole), "--truth", self.file("truth", "100.0 0 0 0\n"))
+        self.assertIn("1 poses for 2 scans", result.stderr)
+
     def test_the_intel_set_is_the_packed_file(self):
         with open(INTEL, "rb") as file:
             data = file.read()
