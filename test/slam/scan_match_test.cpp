@@ -1,17 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 // Laws of the scan matcher in rooms whose walls are cast by determinants in double, and the Intel Research Lab.
 #include "tetap/slam/scan_match.hpp"
-#include "support/recorded.hpp"
+#include "support/imported_scans.hpp"
+#include "support/scan_room.hpp"
 
 #include <gtest/gtest.h>
 #include <Eigen/Cholesky>
 #include <cstdio>
-#include <filesystem>
 #include <memory>
 #include <random>
 
 namespace tetap {
 namespace {
+
+using test::cast, test::kRoom, test::range_steps, test::Wall;
 
 constexpr int kBeams = 361;
 using Match = slam::ScanMatch<kBeams, 4>;
@@ -22,29 +24,9 @@ using Ranges = std::vector<std::uint16_t>;
 struct Place {
   double x = 0, y = 0, yaw = 0;
 };
-struct Wall {
-  double x0, y0, x1, y1;
-};
-/// A room of 8 m by 6 m with a pillar and a niche.
-const std::vector<Wall> kRoom = {{-4, -3, 4, -3},   {4, -3, 4, 3},       {4, 3, 1, 3},       {1, 3, 1, 3.8},
-                                 {1, 3.8, -1, 3.8}, {-1, 3.8, -1, 3},    {-1, 3, -4, 3},     {-4, 3, -4, -3},
-                                 {2, -1, 2.4, -1},  {2.4, -1, 2.4, -.6}, {2.4, -.6, 2, -.6}, {2, -.6, 2, -1}};
 const std::vector<Wall> kCorridor = {{-60, -1, 60, -1}, {-60, 1.2, 60, 1.2}};
 const slam::ScanGeometry kTurn{.beams = 360, .first_rad = -base::kPi, .step_rad = base::kPi / 180, .max_m = 12.0F};
 
-/// Distance along a ray to the nearest wall by Cramer's rule, in m; 1e9 where there is none.
-double cast(const std::vector<Wall>& walls, double x, double y, double bearing) {
-  double nearest = 1e9;
-  const double dx = std::cos(bearing), dy = std::sin(bearing);
-  for (const Wall& w : walls) {
-    const double ex = w.x1 - w.x0, ey = w.y1 - w.y0, det = ex * dy - ey * dx;
-    if (std::abs(det) < 1e-12) continue;
-    const double range = (ex * (w.y0 - y) - ey * (w.x0 - x)) / det, part = (dx * (w.y0 - y) - dy * (w.x0 - x)) / det;
-    if (range > 0 && part >= 0 && part <= 1) nearest = std::min(nearest, range);
-  }
-  return nearest;
-}
-std::uint16_t steps(double range_m) { return range_m > 40 ? 0 : static_cast<std::uint16_t>(range_m / 0.005 + 0.5); }
 double bearing(const slam::ScanGeometry& g, int i) {
   return static_cast<double>(g.first_rad) + static_cast<double>(g.step_rad) * i;
 }
@@ -53,7 +35,7 @@ Ranges look(const std::vector<Wall>& walls, const slam::ScanGeometry& g, const P
   std::normal_distribution<double> noise;
   Ranges ranges;
   for (int i = 0; i < g.beams; ++i)
-    ranges.push_back(steps(cast(walls, at.x, at.y, at.yaw + bearing(g, i)) + sigma_m * noise(random)));
+    ranges.push_back(range_steps(cast(walls, at.x, at.y, at.yaw + bearing(g, i)) + sigma_m * noise(random)));
   return ranges;
 }
 Motion motion(double x, double y, double yaw, double sigma_m, double sigma_rad) {
@@ -185,8 +167,8 @@ TEST_F(ScanMatching, AScanTakenInATurnIsAScanAtRest) {
     const double x = (1.0 * std::sin(a) - 0.2 * (1 - std::cos(a))) / 1.5;
     const double y = (1.0 * (1 - std::cos(a)) + 0.2 * std::sin(a)) / 1.5;
     const double towards = a + bearing(sweep, i), range = cast(kRoom, x, y, towards);
-    scan.place(i, steps(range));
-    smeared.place(i, steps(range));
+    scan.place(i, range_steps(range));
+    smeared.place(i, range_steps(range));
     const double hit_x = x + range * std::cos(towards), hit_y = y + range * std::sin(towards);
     const auto off = [&](const auto& of) {
       const auto& p = of.point[static_cast<std::size_t>(i)];
@@ -258,19 +240,8 @@ TEST_F(ScanMatching, TheCovarianceIsThatOfTheErrors) {
   EXPECT_LT(nees, 5.0);
 }
 
-/// The set as tools/dataset/import_scans writes it; empty where it is not there.
-std::string imported() {
-  const std::string folder = test::recorded_folder("scans");
-  if (folder.empty()) return {};
-  const std::string out = testing::TempDir() + "tetap_intel_scans";
-  const std::string command = std::string("'" TETAP_SOURCE "/tools/dataset/import_scans' '") + folder +
-                              "/intel_gfs.json.xz' '" + out + "' --relations '" + folder +
-                              "/intel.relations' > /dev/null";
-  return std::system(command.c_str()) == 0 ? out : "failed: " + command;
-}
-
 TEST(IntelLab, RelationsByHandAreMetOpenLoop) {
-  const std::string name = imported();
+  const std::string name = test::imported_scans("intel_gfs.json.xz", "--relations", "intel.relations");
   if (name.empty()) GTEST_SKIP() << "scans is not in $TETAP_DATA";
   const auto rows = test::read_rows(name + ".scans"), relations = test::read_rows(name + ".relations");
   ASSERT_EQ(rows.size(), 911U) << name;

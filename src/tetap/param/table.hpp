@@ -400,8 +400,10 @@ inline constexpr std::array kTable{
               "Period of one landmark or keyframe of the own map on the bus; 0: never."),
     TETAP_ROW(0x4C8, mapping.keyframes, "", 0, 1, kRestart,
               "Keyframes are made by 0 the wheels, 1 closures from the last keyframe to the next id."),
-    TETAP_ROW(0x4C9, mapping.keyframe_distance_m, "m", 0.01, 1'000, kLive, "Way from which wheels, or a scan, make a keyframe."),
-    TETAP_ROW(0x4CA, mapping.keyframe_turn_rad, "rad", 0.01, 4, kLive, "Turn from which wheels, or a scan, make a keyframe."),
+    TETAP_ROW(0x4C9, mapping.keyframe_distance_m, "m", 0.01, 1'000, kLive,
+              "Way from which wheels, or a scan, make a keyframe."),
+    TETAP_ROW(0x4CA, mapping.keyframe_turn_rad, "rad", 0.01, 4, kLive,
+              "Turn from which wheels, or a scan, make a keyframe."),
     TETAP_ROW(0x4CB, mapping.keyframe_time_ms, "ms", 0, 1'000'000'000, kLive,
               "Time from which wheels make a keyframe; 0: way and turn alone."),
 

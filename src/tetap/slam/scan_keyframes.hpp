@@ -22,6 +22,7 @@ class ScanKeyframes {
 
   explicit ScanKeyframes(const ScanKeyframeOptions& options = {}) : options_(options) {}
 
+  void set_options(const ScanKeyframeOptions& options) { options_ = options; }
   void clear() { count_ = 0; }
   [[nodiscard]] int count() const { return count_; }
   /// Keyframe k, 0 being the newest; k < count().

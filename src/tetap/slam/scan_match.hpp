@@ -37,9 +37,11 @@ class ScanMatch {
     return true;
   }
   [[nodiscard]] bool busy() const { return phase_ != Phase::kIdle; }
+  /// Whether the next unit still reads a range.
+  [[nodiscard]] bool reads_ranges() const { return phase_ == Phase::kPoints; }
   /// `units` of the job, a unit being the work for one beam: its point, its line, its score in one turn, or its
-  /// partner in one keyframe. The result is the same however the units are dealt. `ranges` (5 mm, 0: none) and the
-  /// keyframes are those of the first call until the job has ended.
+  /// partner in one keyframe. The result is the same however the units are dealt. `ranges` (5 mm, 0: none) are
+  /// those of the first call while reads_ranges(), and the keyframes until the job has ended.
   void work(int units, std::span<const std::uint16_t> ranges, const Keyframes& keyframes) {
     for (; units > 0 && phase_ != Phase::kIdle; --units) step(ranges, keyframes);
   }

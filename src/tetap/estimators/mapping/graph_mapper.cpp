@@ -2,6 +2,7 @@
 #include "tetap/estimators/mapping/graph_mapper.hpp"
 
 #include "tetap/base/reinitialise.hpp"
+#include "tetap/estimators/mapping/map_pose.hpp"
 #include "tetap/estimators/mapping/pose_covariance.hpp"
 #include "tetap/estimators/planar/window_motion.hpp"
 
@@ -9,46 +10,6 @@ namespace tetap::estimators {
 
 namespace {
 
-/// A place of the graph in the micrometres of the map: a unit of 2^-10 m is 15625 / 16 um.
-template <class Scalar>
-base::Anchored anchored(const slam::Coordinate<Scalar>& c) {
-  const std::int64_t sixteenths = std::int64_t{c.unit} * 15'625;
-  const std::int64_t um = (sixteenths - (sixteenths < 0 ? 15 : 0)) / 16;
-  return base::Anchored::from_um(um).plus(static_cast<float>(sixteenths - 16 * um) * 0.0625e-6F +
-                                          static_cast<float>(c.rest_m));
-}
-template <class Scalar>
-slam::Coordinate<Scalar> coordinate(const base::Anchored& a) {
-  const std::int64_t units = a.anchor_um * 16 / 15'625;
-  const std::int64_t rest_sixteenths = a.anchor_um * 16 - units * 15'625;
-  const slam::Coordinate<Scalar> whole{.unit = static_cast<std::int32_t>(units), .rest_m = 0};
-  return whole.plus(static_cast<Scalar>(rest_sixteenths) * static_cast<Scalar>(0.0625e-6) +
-                    static_cast<Scalar>(a.offset_m));
-}
-template <class Scalar>
-slam::GraphPose<Scalar> graph_pose(const model::PlanarPose& pose) {
-  return {.x = coordinate<Scalar>(pose.x),
-          .y = coordinate<Scalar>(pose.y),
-          .yaw = slam::Heading<Scalar>::from_radians(static_cast<Scalar>(pose.yaw_rad))};
-}
-template <class Scalar>
-model::PlanarPose planar_pose(const slam::GraphPose<Scalar>& pose) {
-  return {.x = anchored(pose.x), .y = anchored(pose.y), .yaw_rad = static_cast<float>(pose.yaw.radians())};
-}
-template <class To, class From>
-filter::Symmetric<To, 3> cast(const filter::Symmetric<From, 3>& from) {
-  filter::Symmetric<To, 3> to;
-  for (int c = 0; c < 3; ++c)
-    for (int r = 0; r <= c; ++r) to(r, c) = static_cast<To>(from(r, c));
-  return to;
-}
-template <class Scalar>
-filter::Symmetric<Scalar, 3> sum_of(const filter::Symmetric<Scalar, 3>& a, const filter::Symmetric<Scalar, 3>& b) {
-  filter::Symmetric<Scalar, 3> sum = a;
-  for (int c = 0; c < 3; ++c)
-    for (int r = 0; r <= c; ++r) sum(r, c) += b(r, c);
-  return sum;
-}
 template <class Scalar>
 Scalar trace_of(const filter::Symmetric<Scalar, 3>& c) {
   return c(0, 0) + c(1, 1) + c(2, 2);

@@ -1,0 +1,206 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tetap/estimators/mapping/scan_odometry.hpp"
+
+#include "tetap/base/reinitialise.hpp"
+#include "tetap/estimators/mapping/map_pose.hpp"
+#include "tetap/estimators/mapping/pose_covariance.hpp"
+#include "tetap/estimators/planar/window_motion.hpp"
+#include "tetap/sensor/calibration.hpp"
+
+namespace tetap::estimators {
+
+namespace {
+
+/// Motion of the scanner from that of the body: forward speed and yaw rate.
+slam::ScanMotion scanner_motion(float forward_mps, float yaw_rate_radps, const param::LidarParameters& n) {
+  const base::SinCos turn = base::sincos(n.yaw_rad);
+  const float x_mps = forward_mps - yaw_rate_radps * n.y_b_m, y_mps = yaw_rate_radps * n.x_b_m;
+  return {.forward_mps = turn.cos * x_mps + turn.sin * y_mps,
+          .left_mps = turn.cos * y_mps - turn.sin * x_mps,
+          .yaw_rate_radps = yaw_rate_radps};
+}
+
+/// Covariance of a pose, carried on by a displacement from it.
+filter::Symmetric<float, 3> carried(const filter::Symmetric<float, 3>& p, slam::Heading<float> yaw,
+                                    const slam::UncertainDisplacement<float>& by) {
+  const slam::UncertainDisplacement<float> pose{.mean = {0.0F, 0.0F, yaw}, .covariance = p};
+  return compose(pose, by).covariance;
+}
+
+}  // namespace
+
+template <int kBeams, int kFrames>
+auto ScanOdometry<kBeams, kFrames>::mounting(const Context& ctx) -> Step {
+  const param::LidarParameters& n = ctx.parameters.lidar;
+  return {.mean = {n.x_b_m, n.y_b_m, slam::Heading<float>::from_radians(n.yaw_rad)}, .covariance = {}};
+}
+
+template <int kBeams, int kFrames>
+auto ScanOdometry<kBeams, kFrames>::displaced(const Estimate& estimate) -> Step {
+  const model::PlanarPose& d = estimate.pose;
+  return {.mean = {d.x.minus({}), d.y.minus({}), slam::Heading<float>::from_radians(d.yaw_rad)},
+          .covariance = estimate.p};
+}
+
+template <int kBeams, int kFrames>
+void ScanOdometry<kBeams, kFrames>::restart(base::Micros t, const Context& ctx) {
+  base::reinitialise(*this);
+  now_ = t;
+  motion_.start(t, {}, 0.0F, 0.0F);
+  const MapStart start(ctx.parameters.start);
+  place(t, start.pose, start.p);
+  present_ = motion_;
+}
+
+template <int kBeams, int kFrames>
+void ScanOdometry<kBeams, kFrames>::place(base::Micros t, const model::PlanarPose& pose,
+                                          const filter::Symmetric<float, 3>& p) {
+  match_.cancel();
+  keyframes_.clear();
+  reference_ = graph_pose<float>(pose);
+  reference_p_ = p;
+  odometry_ = step_ = {};
+  motion_.relocate({}, 0.0F, 0.0F);
+  digest_.update(t.us, pose.x.um(), pose.y.um(), pose.yaw_rad, p(0, 0), p(2, 2));
+}
+
+template <int kBeams, int kFrames>
+void ScanOdometry<kBeams, kFrames>::set_pose(base::Micros t, const SetPose& given, const Context& ctx) {
+  motion_.propagate(t, ctx.parameters);
+  motion_.advance(t);
+  model::PlanarPose pose = given.pose;
+  if (!(given.sigma_yaw_rad < 3.14F)) {
+    present_ = motion_;
+    pose.yaw_rad = estimate(ctx).pose.yaw_rad;
+  }
+  pose.yaw_rad = base::wrap_angle(pose.yaw_rad);
+  place(t, pose, covariance_of_pose(given.sigma_position_m, given.sigma_yaw_rad));
+  present_ = motion_;
+}
+
+template <int kBeams, int kFrames>
+void ScanOdometry<kBeams, kFrames>::advance(base::Micros t, const Context& ctx, const sensor::Window& window) {
+  now_ = t;
+  motion_.advance(t);
+  present_ = motion_;
+  move_through(window, present_, ctx.parameters);
+}
+
+template <int kBeams, int kFrames>
+Innovation ScanOdometry<kBeams, kFrames>::fuse(const sensor::PlanarScan& scan, base::Micros stamp,
+                                               std::uint8_t instance, const Context& ctx) {
+  if (instance != 0) return {};
+  const param::LidarParameters& n = ctx.parameters.lidar;
+  motion_.propagate(stamp, ctx.parameters);
+  const slam::ScanGeometry geometry{.beams = scan.beams,
+                                    .first_rad = scan.first_rad,
+                                    .step_rad = scan.step_rad,
+                                    .sweep_s = sensor::sweep_s(scan, n),
+                                    .min_m = n.min_m,
+                                    .max_m = n.max_m};
+  const bool gyro = motion_.gyro_shows(stamp, ctx.parameters);
+  const slam::ScanMotion moves = scanner_motion(
+      motion_.wheels_forward_mps(), gyro ? motion_.gyro_turn_radps() : motion_.wheels_turn_radps(ctx.parameters), n);
+  const model::PlanarPose& d = motion_.filter.x;
+  const Step since{.mean = {d.x.minus({}), d.y.minus({}), slam::Heading<float>::from_radians(d.yaw_rad)},
+                   .covariance = covariance_of(motion_.filter)};
+  odometry_ = compose(odometry_, since);
+  // The prior's covariance is that of the wheels since the keyframe: an earlier match against it counts once.
+  step_ = {.mean = compose(step_, since).mean, .covariance = odometry_.covariance};
+  motion_.relocate({}, 0.0F, 0.0F);
+  scan_ = scan;
+  record_ = {.stamp = stamp, .sensor = sensor::Sensor::kScan, .instance = instance};
+  report_ = {.ended = report_.ended, .sequence = scan.sequence, .instance = instance};
+  if (ctx.scans == nullptr || ctx.scans->ranges(scan).empty())
+    return {.verdict = sensor::Verdict::kNoRoom, .failed = sensor::Check::kTime};
+  if (!match_.begin(geometry, moves, of_scanner(step_, mounting(ctx)))) {
+    report_.end = ScanEnd::kNoGeometry;
+    report_.ended = now_;
+    return {.verdict = sensor::Verdict::kRejected, .failed = sensor::Check::kValue};
+  }
+  return {.verdict = sensor::Verdict::kPending};
+}
+
+template <int kBeams, int kFrames>
+void ScanOdometry<kBeams, kFrames>::work(std::uint32_t units, const Context& ctx) {
+  if (!match_.busy()) return;
+  const auto ranges = ctx.scans->ranges(scan_);
+  if (match_.reads_ranges() && ranges.empty()) {  // a newer scan has its place
+    match_.cancel();
+    return record(sensor::Verdict::kNoRoom, sensor::Check::kTime);
+  }
+  match_.work(static_cast<int>(units), ranges, keyframes_);
+  if (!match_.busy()) conclude(ctx);
+}
+
+template <int kBeams, int kFrames>
+void ScanOdometry<kBeams, kFrames>::abort_job() {
+  if (!match_.busy()) return;
+  match_.cancel();
+  record(sensor::Verdict::kStale, sensor::Check::kNone);
+}
+
+template <int kBeams, int kFrames>
+void ScanOdometry<kBeams, kFrames>::record(sensor::Verdict verdict, sensor::Check failed) {
+  record_.innovation = {.verdict = verdict, .failed = failed};
+  recorded_ = true;
+}
+
+template <int kBeams, int kFrames>
+void ScanOdometry<kBeams, kFrames>::conclude(const Context& ctx) {
+  const slam::ScanMatchResult& result = match_.result();
+  const auto& p = result.pose.covariance;
+  report_.end = static_cast<ScanEnd>(result.fate);
+  static_assert(static_cast<int>(slam::ScanFate::kSingular) == static_cast<int>(ScanEnd::kSingular) &&
+                static_cast<int>(slam::ScanFate::kFewPairs) == static_cast<int>(ScanEnd::kFewPairs) &&
+                static_cast<int>(slam::ScanFate::kFirst) == static_cast<int>(ScanEnd::kFirst));
+  report_.ended = now_;
+  report_.iterations = result.iterations;
+  report_.pairs = result.pairs;
+  const float half = 0.5F * (p(0, 0) - p(1, 1));
+  report_.sigma_m = base::sqrt(0.5F * (p(0, 0) + p(1, 1)) + base::sqrt(half * half + p(0, 1) * p(0, 1)));
+  report_.sigma_yaw_rad = base::sqrt(p(2, 2));
+  if (result.matched()) {
+    step_ = of_body(result.pose, mounting(ctx));
+    matched_ = true;
+    last_match_ = record_.stamp;
+  }
+  const auto& mean = step_.mean;
+  digest_.update(record_.stamp.us, static_cast<std::uint32_t>(result.fate), mean.x_m, mean.y_m, mean.yaw.radians(),
+                 p(0, 0), p(1, 1), p(2, 2));
+  const param::MappingParameters& m = ctx.parameters.mapping;
+  keyframes_.set_options({.distance_m = m.keyframe_distance_m, .turn_rad = m.keyframe_turn_rad});
+  if (match_.scan().known > 0 && keyframes_.due(result.pose.mean)) make_keyframe(ctx);
+  switch (result.fate) {
+    case slam::ScanFate::kMatched:
+    case slam::ScanFate::kFirst:
+      return record(sensor::Verdict::kAccepted, sensor::Check::kNone);
+    case slam::ScanFate::kFewPairs:
+      return record(sensor::Verdict::kRejected, sensor::Check::kGate);
+    case slam::ScanFate::kSingular:
+      return record(sensor::Verdict::kSingular, sensor::Check::kValue);
+  }
+}
+
+template <int kBeams, int kFrames>
+void ScanOdometry<kBeams, kFrames>::make_keyframe(const Context& ctx) {
+  reference_p_ = carried(reference_p_, reference_.yaw, step_);
+  reference_ = reference_.plus(step_.mean);
+  odometry_ = step_ = {};
+  keyframes_.add(match_.scan(), reference_.plus(mounting(ctx).mean));
+}
+
+template <int kBeams, int kFrames>
+Estimate ScanOdometry<kBeams, kFrames>::estimate(const Context& ctx) const {
+  Estimate estimate = present_.estimate(ctx.parameters);
+  const Step since = displaced(estimate);
+  const Pose scan = reference_.plus(step_.mean);
+  estimate.pose = planar_pose(scan.plus(since.mean));
+  estimate.p = carried(carried(reference_p_, reference_.yaw, step_), scan.yaw, since);
+  estimate.heading_valid = !(estimate.p(2, 2) > 1.0F);
+  return estimate;
+}
+
+template class ScanOdometry<361, 4>;
+
+}  // namespace tetap::estimators
