@@ -43,7 +43,12 @@ struct Sent {
 /// The world as that robot meets it.
 inline void send_only(const Sent& sent, World::Options& world) {
   if (!sent.imu) world.parameters.imu.rate_hz = 0;
-  if (!sent.landmarks) world.parameters.camera.rate_hz = 0, world.course.landmarks.clear();
+  if (!sent.landmarks) {
+    world.parameters.camera.rate_hz = 0;
+    // A scanner and a camera see them whatever the node is told of them.
+    if (world.parameters.lidar.rate_hz == 0 && world.parameters.features.rate_hz == 0) world.course.landmarks.clear();
+    world.map_given = world.map_given && world.course.landmarks.empty();
+  }
   world.parameters.magnetometer.rate_hz = sent.magnetometer ? 20 : 0;
   world.parameters.barometer.rate_hz = sent.barometer ? 10 : 0;
   world.parameters.scan_matcher.rate_hz = sent.closures ? 10 : 0;
@@ -98,6 +103,8 @@ inline void simulate(const std::string& robot, const Sent& sent, const param::Pa
                               : row.falls_on == FallsOn::kWheels    ? "wheels"
                               : row.falls_on == FallsOn::kGnss      ? "GNSS"
                               : row.falls_on == FallsOn::kLandmarks ? "landmarks"
+                              : row.falls_on == FallsOn::kLidar     ? "LIDAR"
+                              : row.falls_on == FallsOn::kFeatures  ? "camera"
                                                                     : "magnetometer";
     const std::string robots = applicable_robots(setting.fault, world);
     return "fault '" + std::string{row.name} + "': robot " + robot + " has no " + lacks +

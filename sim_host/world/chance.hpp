@@ -44,11 +44,22 @@ enum class Stream : std::uint32_t {
   kMovers,
   kScanMatcher,
   kScanMatcherLatency,
+  kMapPoints,
+  kPeople,
+  kLidar,
+  kLidarLatency,
+  kFeatureNoise,
+  kFeatureTrack,
+  kFeatureMount,
+  kFeatureLatency,
 };
 
 class Chance {
  public:
   Chance(std::uint64_t seed, Stream stream) : random_{seed, static_cast<std::uint64_t>(stream)} {}
+  /// A stream for one of many things, whose draws depend on none of the others.
+  Chance(std::uint64_t seed, Stream stream, std::uint32_t thing)
+      : random_{seed, static_cast<std::uint64_t>(stream) | std::uint64_t{thing} << 32} {}
 
   /// In (0, 1), with 52 bits.
   [[nodiscard]] double uniform() {

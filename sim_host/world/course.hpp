@@ -3,6 +3,7 @@
 // limits of speed, acceleration, lateral acceleration and yaw rate.
 #pragma once
 
+#include "sim_host/world/walls.hpp"
 #include "tetap/base/time.hpp"
 
 #include <cstddef>
@@ -34,6 +35,7 @@ struct CourseLimits {
 struct Course {
   std::vector<Waypoint> waypoints;
   std::vector<Landmark> landmarks;
+  std::vector<Wall> walls = {};  ///< none: what there is to see is made from the rest (surroundings.hpp)
 };
 
 /// Proving ground of 52 m x 30 m: straights, two skid pads (one each way), slalom, hairpin, standstill at the start, in

@@ -38,10 +38,24 @@ enum class Fault : std::uint8_t {
   kVibration,
   kMagDisturbance,
   kMovingStart,
+  kLidarCovered,
+  kLidarGlass,
+  kLidarMirrored,
+  kLidarTurned,
+  kLidarLate,
+  kLorry,
+  kMovingFeatures,
+  kTracksSwapped,
+  kImagesLost,
+  kImagesLate,
+  kImagesMirrored,
+  kImagesTurned,
+  kFocalLength,
+  kImageStamps,
 };
 
 /// The sensor a fault falls on: without it, the fault is none.
-enum class FallsOn : std::uint8_t { kAny, kImu, kWheels, kGnss, kLandmarks, kMagnetometer };
+enum class FallsOn : std::uint8_t { kAny, kImu, kWheels, kGnss, kLandmarks, kMagnetometer, kLidar, kFeatures };
 
 struct FaultInfo {
   Fault fault;
@@ -77,6 +91,13 @@ struct FaultNumbers {
   static constexpr double kShake_mps2 = 20;    ///< amplitude, within the ranges
   static constexpr double kShake_radps = 1;
   static constexpr double kIron_uT = 30;  ///< towards east: a steel door, a car
+  static constexpr std::int64_t kScanLate_us = 100'000, kImageStamp_us = 100'000;  ///< stamps behind the truth
+  static constexpr double kLidarTurned_rad = 1.5707963267948966;                   ///< anticlockwise
+  static constexpr double kLorry_m = 3, kLorry_mps = 1.5;  ///< ahead of the camera; against it, to the right
+  static constexpr double kMovingAhead_m = 6;              ///< likewise, of the body with a share of the features
+  static constexpr double kMovingShare = 0.3;
+  static constexpr double kFocalScale = 1.2;
+  static constexpr std::int64_t kImageLate_us = 150'000;
 };
 
 [[nodiscard]] std::span<const FaultInfo> fault_table();

@@ -9,6 +9,7 @@
 #pragma once
 
 #include "sim_host/world/rotation.hpp"
+#include "sim_host/world/sight_numbers.hpp"
 #include "tetap/base/time.hpp"
 
 #include <array>
@@ -200,6 +201,9 @@ struct Parameters {
   MagnetometerNumbers magnetometer;
   BarometerNumbers barometer;
   ScanMatcherNumbers scan_matcher;
+  PeopleNumbers people;
+  LidarNumbers lidar;
+  FeatureCameraNumbers features;
 };
 
 /// Only white noise of the stated sigma and encoder noise k |ds|: nothing a filter does not model. Accuracy figures are
@@ -227,6 +231,8 @@ struct Parameters {
   n.magnetometer.phase = {18'500};
   n.barometer.drift_Pa = 0;
   n.barometer.phase = {58'500};
+  n.lidar = matched(n.lidar);
+  n.features = matched(n.features);
   return n;
 }
 
@@ -269,6 +275,8 @@ struct Parameters {
   n.gnss.latency_min = n.gnss.latency_max = n.camera.latency_min = n.camera.latency_max = {};
   n.magnetometer.latency_min = n.magnetometer.latency_max = {};
   n.barometer.latency_min = n.barometer.latency_max = {};
+  n.lidar.latency_min = n.lidar.latency_max = n.features.latency_min = n.features.latency_max = {};
+  n.lidar.frame = n.features.frame = {};
   return n;
 }
 

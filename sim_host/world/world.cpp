@@ -15,6 +15,8 @@ void check_rate(const char* what, int rate_hz) {
                                 " Hz does not divide 2000 Hz");
 }
 
+constexpr std::uint8_t kRecogniser = 3;  // instance of what a front end recognises
+
 bool due(int rate_hz, base::Micros phase, base::Micros now) {
   if (rate_hz == 0) return false;
   const std::int64_t period_us = 1'000'000 / rate_hz;
@@ -38,6 +40,8 @@ Parameters World::effective(const Options& options) {
   check_rate("magnetometer", n.magnetometer.rate_hz);
   check_rate("barometer", n.barometer.rate_hz);
   check_rate("scan matcher", n.scan_matcher.rate_hz);
+  check_rate("LIDAR", n.lidar.rate_hz);
+  check_rate("image", n.features.rate_hz);
   if (options.substeps < 1) throw std::invalid_argument("substeps must be 1 or more");
   return n;
 }
@@ -67,7 +71,14 @@ World::World(const Options& options, std::uint64_t seed)
       magnetometer_latency_{seed, Stream::kMagnetometerLatency},
       barometer_latency_{seed, Stream::kBarometerLatency},
       scan_matcher_latency_{seed, Stream::kScanMatcherLatency},
+      lidar_latency_{seed, Stream::kLidarLatency},
+      features_latency_{seed, Stream::kFeatureLatency},
       loss_{seed, Stream::kFaultLoss} {
+  const auto& n = parameters_;
+  if (n.lidar.rate_hz > 0 || n.features.rate_hz > 0)
+    surroundings_ = std::make_unique<const Surroundings>(options.course, *plan_, n.people, seed);
+  if (n.lidar.rate_hz > 0) lidar_.emplace(n.lidar, *surroundings_, seed);
+  if (n.features.rate_hz > 0) features_.emplace(n.features, *surroundings_, seed);
   for (const Landmark& mark : camera_.map()) {
     const Vector3 at = to_map_.point({mark.x_m, mark.y_m, 0});
     map_.push_back({.id = mark.id, .x_m = at[0], .y_m = at[1]});
@@ -122,17 +133,19 @@ void World::kidnap() {
   vehicle_.place(plan_->path(plan_->at(there).s_m));
 }
 
-void World::emit(Value value, std::uint8_t sequence, base::Micros stamp_late, base::Micros latency) {
+void World::emit(Value value, std::uint8_t sequence, base::Micros stamp_late, base::Micros latency,
+                 std::uint8_t instance, bool torn) {
   if (faults_.active(Fault::kMovingStart, now_)) return;
   const base::Micros at = start_ + now_;
   base::Micros stamp = at + stamp_late + clock_offset_at(now_);
   if (faults_.active(Fault::kStaleStamps, now_)) stamp = stamp - base::Micros{FaultNumbers::kStale_us};
   if (faults_.active(Fault::kFutureStamps, now_)) stamp = stamp + base::Micros{FaultNumbers::kFuture_us};
-  unsigned lost = 0;
+  unsigned lost = torn ? 1 : 0;
   if (faults_.active(Fault::kLostFrames, now_))
     for (int part = 0; part < parts(value); ++part) lost |= loss_.happens(FaultNumbers::kLossShare) ? 1U << part : 0U;
   pending_.push_back({Measurement{.stamp = stamp,
                                   .arrival = at + stamp_late + latency,
+                                  .instance = instance,
                                   .sequence = sequence,
                                   .lost_parts = static_cast<std::uint8_t>(lost),
                                   .value = value},
@@ -142,10 +155,42 @@ void World::emit(Value value, std::uint8_t sequence, base::Micros stamp_late, ba
   });
 }
 
+/// Frames of one scan or image come one by one, as a bus carries them.
+void World::emit(const Lidar::Scan& scan) {
+  const LidarNumbers& n = parameters_.lidar;
+  base::Micros latency = lidar_latency_.between(n.latency_min, n.latency_max);
+  base::Micros stamp_late = scan.first - now_;
+  if (faults_.active(Fault::kLidarLate, now_)) stamp_late += base::Micros{FaultNumbers::kScanLate_us};
+  const std::uint8_t sequence = scan_sequence_++;
+  emit(scan.head, sequence, stamp_late, latency - stamp_late);
+  for (std::size_t i = 0; i < scan.blocks(); ++i) {
+    latency += n.frame;
+    emit(scan.block(i), sequence, stamp_late, latency - stamp_late);
+  }
+}
+
+void World::emit(const FeatureCamera::Image& image, std::uint8_t sequence, base::Micros latency) {
+  const FeatureCameraNumbers& n = parameters_.features;
+  if (faults_.active(Fault::kImagesLate, now_)) latency += base::Micros{FaultNumbers::kImageLate_us};
+  const base::Micros stamp_late{faults_.active(Fault::kImageStamps, now_) ? FaultNumbers::kImageStamp_us : 0};
+  const auto send = [&](const std::vector<ImageFeature>& features, std::uint8_t instance) {
+    for (std::size_t i = 0; i < features.size(); ++i, latency += n.frame)
+      emit(features[i], sequence, stamp_late, latency - stamp_late, instance, image.torn && i == 0);
+    emit(ImageEnd{.count = static_cast<std::uint8_t>(features.size()),
+                  .exposure_10us = static_cast<std::uint16_t>(n.exposure.us / 10),
+                  .tracking = image.tracking},
+         sequence, stamp_late, latency - stamp_late, instance);
+    latency += n.frame;
+  };
+  send(image.features, 0);
+  if (n.recognise) send(image.recognised, kRecogniser);
+}
+
 void World::step() {
   const base::Micros before = now_;
   now_ += Vehicle::kStep;
   if (faults_.starts(Fault::kKidnapped, before, now_)) kidnap();
+  const Truth from = lidar_ ? vehicle_.truth() : Truth{};
   const Motion motion = vehicle_.step();
 
   const auto& n = parameters_;
@@ -189,6 +234,13 @@ void World::step() {
     for (const sensor::LoopClosure& closure : scan_matcher_.sample(truth_here()))
       emit(closure, closure_sequence_++, {}, latency);
   }
+  if (lidar_)
+    if (const auto scan = lidar_->sense(from, vehicle_.truth(), before, now_, faults_)) emit(*scan);
+  if (features_ && due(n.features.rate_hz, n.features.phase, now_)) {
+    const base::Micros latency = features_latency_.between(n.features.latency_min, n.features.latency_max);
+    const std::uint8_t sequence = image_sequence_++;
+    if (const auto image = features_->sample(truth_here(), now_, faults_)) emit(*image, sequence, latency);
+  }
 }
 
 void World::advance_to(base::Micros t, std::vector<Measurement>& arrived) {
@@ -218,6 +270,10 @@ bool can_act(Fault fault, const World::Options& options) {
       return n.camera.rate_hz > 0 && !options.course.landmarks.empty();
     case FallsOn::kMagnetometer:
       return n.magnetometer.rate_hz > 0;
+    case FallsOn::kLidar:
+      return n.lidar.rate_hz > 0;
+    case FallsOn::kFeatures:
+      return n.features.rate_hz > 0;
   }
   return false;
 }

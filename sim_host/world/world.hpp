@@ -6,10 +6,13 @@
 #include "sim_host/world/course.hpp"
 #include "sim_host/world/earth.hpp"
 #include "sim_host/world/faults.hpp"
+#include "sim_host/world/feature_camera.hpp"
+#include "sim_host/world/lidar.hpp"
 #include "sim_host/world/measurement.hpp"
 #include "sim_host/world/numbers.hpp"
 #include "sim_host/world/scan_matcher.hpp"
 #include "sim_host/world/sensors.hpp"
+#include "sim_host/world/surroundings.hpp"
 #include "sim_host/world/vehicle.hpp"
 #include "tetap/base/time.hpp"
 
@@ -95,6 +98,8 @@ class World {
   [[nodiscard]] const Parameters& parameters() const { return parameters_; }
   [[nodiscard]] const Faults& faults() const { return faults_; }
   [[nodiscard]] const Plan& plan() const { return *plan_; }
+  /// What scanner and camera see, in the frame of the course; null where there is neither.
+  [[nodiscard]] const Surroundings* surroundings() const { return surroundings_.get(); }
 
  private:
   struct Pending {
@@ -107,7 +112,10 @@ class World {
   [[nodiscard]] Truth truth_here() const;
   void step();
   void kidnap();
-  void emit(Value value, std::uint8_t sequence, base::Micros stamp_late, base::Micros latency);
+  void emit(Value value, std::uint8_t sequence, base::Micros stamp_late, base::Micros latency,
+            std::uint8_t instance = 0, bool torn = false);
+  void emit(const Lidar::Scan& scan);
+  void emit(const FeatureCamera::Image& image, std::uint8_t sequence, base::Micros latency);
 
   Parameters parameters_;
   base::Micros start_;
@@ -128,11 +136,15 @@ class World {
   Magnetometer magnetometer_;
   Barometer barometer_;
   ScanMatcher scan_matcher_;
+  std::unique_ptr<const Surroundings> surroundings_;
+  std::optional<Lidar> lidar_;
+  std::optional<FeatureCamera> features_;
   Chance imu_latency_, wheel_latency_, gnss_latency_, camera_latency_, magnetometer_latency_, barometer_latency_,
-      scan_matcher_latency_, loss_;
+      scan_matcher_latency_, lidar_latency_, features_latency_, loss_;
   base::Micros now_;  ///< time after the start
   std::uint8_t imu_sequence_ = 0, wheel_sequence_ = 0, position_sequence_ = 0, velocity_sequence_ = 0,
-               sighting_sequence_ = 0, magnetometer_sequence_ = 0, barometer_sequence_ = 0, closure_sequence_ = 0;
+               sighting_sequence_ = 0, magnetometer_sequence_ = 0, barometer_sequence_ = 0, closure_sequence_ = 0,
+               scan_sequence_ = 0, image_sequence_ = 0;
   std::uint64_t made_ = 0;
   std::vector<Pending> pending_;
 };

@@ -62,6 +62,20 @@ class Hash {
     add(s.sigmas), add(s.correlations);
   }
   void fields(const sensor::LandmarkSighting& s) { add(std::uint64_t{s.landmark}), add(s.range_m), add(s.bearing_rad); }
+  void fields(const ScanHead& s) {
+    add(std::uint64_t{s.count}), add(static_cast<std::uint64_t>(std::int64_t{s.first})),
+        add(static_cast<std::uint64_t>(std::int64_t{s.step}));
+  }
+  void fields(const ScanBlock& s) {
+    add(std::uint64_t{s.block});
+    for (const std::uint16_t range : s.ranges) add(std::uint64_t{range});
+  }
+  void fields(const ImageFeature& s) {
+    add(std::uint64_t{s.track} | std::uint64_t{s.u} << 16 | std::uint64_t{s.v} << 32);
+  }
+  void fields(const ImageEnd& s) {
+    add(std::uint64_t{s.count} | std::uint64_t{s.exposure_10us} << 16 | std::uint64_t{s.tracking} << 32);
+  }
 
   std::uint64_t hash_ = 0xCBF29CE484222325U;
 };

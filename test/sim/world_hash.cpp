@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Prints one hash over all measurements and truths of some worlds: the same whatever compiler and optimisation built
 // it.
+#include "sim_host/world/floor_plan.hpp"
 #include "test/sim/support.hpp"
 
 #include <cinttypes>
@@ -11,7 +12,7 @@ using namespace tetap::sim;
 
 int main() {
   Hash h;
-  for (const int which : {0, 1, 2, 3}) {
+  for (const int which : {0, 1, 2, 3, 4}) {
     World::Options options{.mismatched = which > 0};
     if (which == 2) {
       options.parameters.vehicle.kind = VehicleKind::kMulticopter;
@@ -24,6 +25,14 @@ int main() {
       options.parameters.vehicle.turning_radius_m = 5.5;
       options.parameters.wheels.output = WheelOutput::kBodySpeed;
       options.parameters.imu.mounting_bs = {{0, 0, -1, -1, 0, 0, 0, 1, 0}};
+    }
+    if (which == 4) {
+      options.course = lab_course(1);
+      options.course.landmarks = {{1, 20, 7}, {2, 31, 15}, {3, 5, 9}};
+      options.parameters.lidar.rate_hz = 10;
+      options.parameters.features.rate_hz = 10;
+      options.parameters.features.recognise = true;
+      options.parameters.people.count = 5;
     }
     options.parameters.magnetometer.rate_hz = 20;
     options.parameters.barometer.rate_hz = 10;
