@@ -13,6 +13,7 @@
 #include "sim_host/replay/lockstep.hpp"
 #include "sim_host/robots.hpp"
 #include "sim_host/truth_file.hpp"
+#include "sim_host/world/floor_plan.hpp"
 #include "sim_host/world_source.hpp"
 #include "version.hpp"
 
@@ -49,9 +50,15 @@ std::string help() {
           "  --seed N           every draw follows from it (default 1)\n"
           "  --duration S       at most so long (default: the whole course)\n"
           "  --matched          only errors that the filters model, as large as the robot's parameters say\n"
+          "  --lidar            a laser scanner sends its scans, whether the robot takes them or not\n"
+          "  --camera           a camera sends the features that it follows, likewise\n"
+          "  --recognise        with it: landmarks that it recognises, as features of camera 3\n"
+          "  --landmarks-only   with it: it follows landmarks and nothing else\n"
+          "  --people N         people who walk where scanner and camera see them (default 0)\n"
           "  --course NAME      yard, loop (on wheels), road: 1.1 km at 5 m/s, street (of a car), flight (of what "
           "flies),\n"
-          "                     or stand: it stays where it is; default: loop for a robot that makes its map, else "
+          "                     lab: corridor, halls and rooms, corridor (both inside, on wheels), or stand: it stays "
+          "where it is; default: loop for a robot that makes its map, else "
           "that "
           "of\n"
           "                     the robot's class\n"
@@ -272,13 +279,16 @@ void set_course(sim::Arguments& arguments, const sim::Sent& sent, sim::World::Op
     world.course = sim::flight_course(laps);
   } else if (course == "loop" && !car && !flies) {
     world.course = sim::loop_course(loop_m > 0 ? loop_m : 60, laps, landmarks > 0 ? landmarks : 24);
+  } else if ((course == "lab" || course == "corridor") && !car && !flies) {
+    world.course = course == "lab" ? sim::lab_course(laps) : sim::corridor_course();
+    world.limits.speed_mps = std::min(world.limits.speed_mps, 1.0);
   } else if (course == "yard" && !car && !flies) {
     world.course = sim::default_course(laps);
   } else {
     throw std::runtime_error("--course " + course + ": for this robot it is " +
                              (flies ? "flight"
                               : car ? "street, road"
-                                    : "yard, loop, road") +
+                                    : "yard, loop, lab, corridor, road") +
                              " or stand");
   }
 }
@@ -291,9 +301,24 @@ void set_camera(sim::Arguments& arguments, const sim::Sent& sent, sim::CameraNum
     throw sim::UsageError("--clutter and --movers need a robot that sees landmarks");
 }
 
+/// A scanner, and a camera that follows features.
+void set_sights(sim::Arguments& arguments, sim::World::Options& world) {
+  sim::Parameters& n = world.parameters;
+  if (arguments.flag("--lidar")) n.lidar.rate_hz = 10;
+  if (arguments.flag("--camera")) n.features.rate_hz = 10;
+  n.features.recognise = arguments.flag("--recognise");
+  n.features.landmarks_only = arguments.flag("--landmarks-only");
+  n.people.count = static_cast<int>(arguments.integer("--people", 0, 0, 50));
+  if ((n.features.recognise || n.features.landmarks_only) && n.features.rate_hz == 0)
+    throw sim::UsageError("--recognise and --landmarks-only need --camera");
+  if (n.people.count > 0 && n.lidar.rate_hz == 0 && n.features.rate_hz == 0)
+    throw sim::UsageError("--people needs --lidar or --camera");
+}
+
 void set_world(sim::Arguments& arguments, const sim::Sent& sent, sim::World::Options& world) {
   set_course(arguments, sent, world);
   set_camera(arguments, sent, world.parameters.camera);
+  set_sights(arguments, world);
   if (arguments.flag("--no-wheels")) world.parameters.wheels.rate_hz = 0;
   world.parameters.gnss.rate_hz = counted(arguments, "--gnss-hz", world.parameters.gnss.rate_hz, 100);
   world.parameters.imu.rate_hz = counted(arguments, "--imu-hz", world.parameters.imu.rate_hz, 2000);
