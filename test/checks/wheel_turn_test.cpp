@@ -14,7 +14,7 @@
 namespace tetap::checks {
 namespace {
 
-constexpr double kTrack_m = 0.5;
+constexpr double kTrackWidth_m = 0.5;
 
 struct Rims {
   double left_mps, right_mps;
@@ -33,10 +33,10 @@ double refuted_after_s(const Wiring& wired, double speed_mps, double turn_radps,
   for (int k = 1; k * kDt < limit_s; ++k) {
     const double turn = turn_radps * std::sin(2 * std::numbers::pi * k * kDt / 8);
     const double wheels = skid * turn + 0.02 * normal(random);
-    const Rims rims = wired({speed_mps - 0.5 * kTrack_m * wheels, speed_mps + 0.5 * kTrack_m * wheels});
+    const Rims rims = wired({speed_mps - 0.5 * kTrackWidth_m * wheels, speed_mps + 0.5 * kTrackWidth_m * wheels});
     left += rims.left_mps * kDt, right += rims.right_mps * kDt;
     const double now_left = std::floor(left / kStep_m), now_right = std::floor(right / kStep_m);
-    const double shown = ((now_right - counted_right) - (now_left - counted_left)) * kStep_m / kDt / kTrack_m;
+    const double shown = ((now_right - counted_right) - (now_left - counted_left)) * kStep_m / kDt / kTrackWidth_m;
     counted_left = now_left, counted_right = now_right;
     check.update(static_cast<float>(shown), static_cast<float>(turn + 0.01 + 0.005 * normal(random)), {20'000 * k}, n);
     if (check.refuted()) return k * kDt;

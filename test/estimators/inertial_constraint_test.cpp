@@ -12,7 +12,7 @@
 namespace tetap::estimators {
 namespace {
 
-constexpr std::int64_t kStep_us = 10'000;
+constexpr std::int64_t kSample_us = 10'000;
 constexpr float kStep_s = 0.01F;
 
 class Drive {
@@ -30,14 +30,14 @@ class Drive {
   }
   void run(float duration_s, float acceleration_mps2, float turn_radps, std::int64_t wheels_every_us = 0) {
     for (int i = 0; i < static_cast<int>(std::lround(duration_s / kStep_s)); ++i) {
-      us += kStep_us;
+      us += kSample_us;
       speed_mps += acceleration_mps2 * kStep_s;
       const float sideways = speed_mps * turn_radps + sideways_error_mps2;
       static_cast<void>(estimator.fuse(
           sensor::ImuSample{
               .dangle_b_rad = {0, 0, turn_radps * kStep_s},
               .dvelocity_b_mps = {acceleration_mps2 * kStep_s, sideways * kStep_s, gravity_mps2_ * kStep_s},
-              .interval_us = kStep_us},
+              .interval_us = kSample_us},
           {us}, ctx()));
       if (wheels_every_us > 0 && us % wheels_every_us == 0)
         static_cast<void>(

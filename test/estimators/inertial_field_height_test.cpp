@@ -22,7 +22,7 @@ constexpr double kField_uT = 48.6, kDip_rad = 64.2 * kDegree;  // WMM 2020, 48 N
 /// The angle from b to a the short way round, in degrees.
 double degrees_apart(double a_rad, double b_rad) { return std::remainder(a_rad - b_rad, 2 * kPi) / kDegree; }
 
-param::Parameters parameters() {
+param::Parameters robot_parameters() {
   param::Parameters n;
   n.inertial.gyro_radps_rthz = 2e-4F;
   n.inertial.accel_mps2_rthz = 5e-3F;
@@ -47,7 +47,7 @@ class Noise {
 
 class Robot {
  public:
-  explicit Robot(const param::Parameters& of = parameters()) : n(of) {
+  explicit Robot(const param::Parameters& of = robot_parameters()) : n(of) {
     map_frame.frame = nav::LocalFrame(kLatitude_2ndeg, kLongitude_2ndeg, 500.0F);
     map_frame.origin = sensor::OriginSource::kConfigured;
     estimator.restart({us}, ctx());
@@ -225,7 +225,7 @@ TEST(InertialMagnetometer, finds_each_of_36_headings_at_standstill_on_a_slope) {
 }
 
 TEST(InertialMagnetometer, says_nothing_to_a_robot_that_does_not_use_it) {
-  param::Parameters n = parameters();
+  param::Parameters n = robot_parameters();
   n.magnetic.use = 0;
   Robot robot(n);
   robot.run(5);
@@ -234,7 +234,7 @@ TEST(InertialMagnetometer, says_nothing_to_a_robot_that_does_not_use_it) {
 }
 
 TEST(InertialMagnetometer, points_to_true_north_by_the_declination_at_the_start_and_after) {
-  param::Parameters n = parameters();
+  param::Parameters n = robot_parameters();
   n.magnetic.declination_rad = 0.3F;
   Robot robot(n);
   robot.declination_rad = 0.3;
@@ -267,7 +267,7 @@ TEST(InertialMagnetometer, finds_the_heading_before_the_place_and_keeps_it_throu
 }
 
 TEST(InertialMagnetometer, leaves_a_heading_from_outside_that_is_better_than_its_own) {
-  param::Parameters n = parameters();
+  param::Parameters n = robot_parameters();
   n.inertial.gyro_turn_on_radps = 0.001F;
   Robot robot(n);
   robot.gnss = false;
@@ -283,7 +283,7 @@ TEST(InertialMagnetometer, leaves_a_heading_from_outside_that_is_better_than_its
 }
 
 TEST(InertialMagnetometer, knows_what_it_turned_since_the_gyroscopes_last_sample) {
-  param::Parameters n = parameters();
+  param::Parameters n = robot_parameters();
   n.magnetic.sigma_rad = 0.005F;
   Robot robot(n);
   robot.run(3);
@@ -427,7 +427,7 @@ TEST(InertialMagnetometer, takes_a_new_field_for_known_after_motion_in_it_not_be
 }
 
 TEST(InertialMagnetometer, waits_for_a_field_of_the_configured_strength) {
-  param::Parameters n = parameters();
+  param::Parameters n = robot_parameters();
   n.magnetic.norm_uT = static_cast<float>(kField_uT);
   Robot robot(n);
   robot.disturb = [](const nav::Vector3& m) { return nav::Vector3(1.3F * m); };

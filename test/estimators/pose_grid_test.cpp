@@ -22,8 +22,8 @@ static_assert(node::Estimator<Grid> && node::kIsDelayed<Grid> && node::DigestsSt
 static_assert(sizeof(Grid) < 100 * 1024, "the class of 128 kB holds it with the window and the stack");
 
 /// Landmarks about the circle, in a rectangle of 4 m by 7 m.
-struct Robot : test::CirclingRobot<Grid> {
-  explicit Robot(std::int32_t units = 100) : CirclingRobot(held_backward()) {
+struct GridRobot : test::CirclingRobot<Grid> {
+  explicit GridRobot(std::int32_t units = 100) : CirclingRobot(held_backward()) {
     numbers.loop.work_units = units;
     map.clear();
     for (const MapEntry& entry :
@@ -71,7 +71,7 @@ struct Robot : test::CirclingRobot<Grid> {
 };
 
 TEST(PoseGrid, FindsItselfFromNoStartAndIsConsistent) {
-  const auto robot = std::make_unique<Robot>();
+  const auto robot = std::make_unique<GridRobot>();
   EXPECT_EQ(robot->estimator.mode(robot->ctx()), sensor::Mode::kWaitingForPose);
   robot->go(9);
   EXPECT_FALSE(robot->estimate().position_valid);
@@ -98,7 +98,7 @@ TEST(PoseGrid, FindsItselfFromNoStartAndIsConsistent) {
 }
 
 TEST(PoseGrid, AStartIsUsedAndAWrongOneIsFoundOut) {
-  const auto right = std::make_unique<Robot>(), wrong = std::make_unique<Robot>();
+  const auto right = std::make_unique<GridRobot>(), wrong = std::make_unique<GridRobot>();
   right->set(0, 0, 0, 0.05F, 0.02F);
   wrong->set(2, 1, 1.5F, 0.05F, 0.02F);
   EXPECT_TRUE(right->estimate().position_valid);
@@ -115,7 +115,7 @@ TEST(PoseGrid, AStartIsUsedAndAWrongOneIsFoundOut) {
 }
 
 TEST(PoseGrid, AHeadingThatIsNotKnownIsFound) {
-  const auto robot = std::make_unique<Robot>();
+  const auto robot = std::make_unique<GridRobot>();
   robot->set(0, 0, 0, 0.1F, base::kNan);
   EXPECT_FALSE(robot->estimate().heading_valid);
   EXPECT_GE(robot->found_after(200), 0);
@@ -123,7 +123,7 @@ TEST(PoseGrid, AHeadingThatIsNotKnownIsFound) {
 
 TEST(PoseGrid, AStepInPiecesLeavesTheSameBits) {
   const auto after = [](std::int32_t units, int ticks) {
-    const auto robot = std::make_unique<Robot>(units);
+    const auto robot = std::make_unique<GridRobot>(units);
     robot->look();
     for (int tick = 0; tick < ticks; ++tick) robot->tick_once();
     robot->drive(30, false);
@@ -143,7 +143,7 @@ TEST(PoseGrid, AStepInPiecesLeavesTheSameBits) {
 }
 
 TEST(PoseGrid, SightingsWaitForTheStepUnderWayAndMoveWithTheRobot) {
-  const auto robot = std::make_unique<Robot>();
+  const auto robot = std::make_unique<GridRobot>();
   robot->set(0, 0, 0, 0.05F, 0.02F);
   robot->go(10);  // the first step has begun
   EXPECT_TRUE(robot->estimator.job().busy());
@@ -155,7 +155,7 @@ TEST(PoseGrid, SightingsWaitForTheStepUnderWayAndMoveWithTheRobot) {
 }
 
 TEST(PoseGrid, ASetPoseAbortsTheStepAndAClosedWindowDoesNot) {
-  const auto robot = std::make_unique<Robot>();
+  const auto robot = std::make_unique<GridRobot>();
   robot->go(10);
   ASSERT_TRUE(robot->estimator.job().busy());
   robot->estimator.abort_job();
@@ -170,20 +170,20 @@ TEST(PoseGrid, ASetPoseAbortsTheStepAndAClosedWindowDoesNot) {
 }
 
 TEST(PoseGrid, ASightingThatDiffersInOneBitDiffersInTheDigest) {
-  const auto a = std::make_unique<Robot>(), b = std::make_unique<Robot>();
-  for (Robot* robot : {a.get(), b.get()}) robot->go(12);
+  const auto a = std::make_unique<GridRobot>(), b = std::make_unique<GridRobot>();
+  for (GridRobot* robot : {a.get(), b.get()}) robot->go(12);
   ASSERT_EQ(a->hash(), b->hash());
   sensor::LandmarkSighting sighting{.landmark = 1, .range_m = 2, .bearing_rad = 0.1F};
   static_cast<void>(a->estimator.fuse(sighting, {a->us}, a->ctx()));
   sighting.range_m = std::nextafter(sighting.range_m, 3.0F);
   static_cast<void>(b->estimator.fuse(sighting, {b->us}, b->ctx()));
   EXPECT_NE(a->hash(), b->hash());
-  for (Robot* robot : {a.get(), b.get()}) robot->go(7), static_cast<void>(robot->estimate());
+  for (GridRobot* robot : {a.get(), b.get()}) robot->go(7), static_cast<void>(robot->estimate());
   EXPECT_NE(a->estimator.digest(), b->estimator.digest());
 }
 
 TEST(PoseGrid, WhatItCannotUseIsCountedAndChangesNothing) {
-  const auto robot = std::make_unique<Robot>();
+  const auto robot = std::make_unique<GridRobot>();
   robot->set(0, 0, 0, 0.05F, 0.02F);
   const std::uint32_t before = robot->whole_hash();
   const auto verdict = [&](const sensor::LandmarkSighting& sighting) {
@@ -201,7 +201,7 @@ TEST(PoseGrid, WhatItCannotUseIsCountedAndChangesNothing) {
 TEST(PoseGrid, NoSampleLeavesItWithoutNumbers) {
   for (const float value : test::kHostile)
     for (int field = 0; field < 3; ++field) {
-      const auto robot = std::make_unique<Robot>();
+      const auto robot = std::make_unique<GridRobot>();
       robot->set(0, 0, 0, field == 2 ? value : 0.05F, 0.02F);
       sensor::LandmarkSighting sighting{.landmark = 1, .range_m = 2, .bearing_rad = 0.1F};
       if (field < 2) (field == 0 ? sighting.range_m : sighting.bearing_rad) = value;

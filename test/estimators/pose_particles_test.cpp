@@ -15,19 +15,19 @@ namespace tetap::estimators {
 namespace {
 
 using Particles = PoseParticles<1000>;
-using Robot = test::CirclingRobot<Particles>;
+using ParticleRobot = test::CirclingRobot<Particles>;
 using test::held_backward;
 using test::kStep_us;
 
 static_assert(node::Estimator<Particles> && node::kIsDelayed<Particles> && node::DigestsState<Particles>);
 static_assert(sizeof(Particles) < 32 * 1024, "the class of 64 kB holds it with the window and the stack");
 
-std::unique_ptr<Robot> robot_at(float x_m, float y_m, float yaw_rad) {
-  auto robot = std::make_unique<Robot>(held_backward());
+std::unique_ptr<ParticleRobot> robot_at(float x_m, float y_m, float yaw_rad) {
+  auto robot = std::make_unique<ParticleRobot>(held_backward());
   robot->set(x_m, y_m, yaw_rad, 0.05F, 0.02F);
   return robot;
 }
-std::uint32_t whole_hash(const Robot& robot) {
+std::uint32_t whole_hash(const ParticleRobot& robot) {
   base::BitCrc crc;
   base::each_word(robot.estimator, crc);
   robot.estimator.hash_memory(crc);
@@ -103,7 +103,7 @@ TEST(PoseParticles, FindsItselfAfterAWrongStartAndSaysThatItIsLost) {
 }
 
 TEST(PoseParticles, WithoutAStartItLooksForItselfAmongTheLandmarks) {
-  const auto robot = std::make_unique<Robot>(held_backward());
+  const auto robot = std::make_unique<ParticleRobot>(held_backward());
   EXPECT_EQ(robot->estimator.mode(robot->ctx()), sensor::Mode::kWaitingForPose);
   robot->drive(9);
   EXPECT_FALSE(robot->estimate().position_valid);
@@ -119,7 +119,7 @@ TEST(PoseParticles, WithoutAStartItLooksForItselfAmongTheLandmarks) {
 }
 
 TEST(PoseParticles, AHeadingThatIsNotKnownIsNotValid) {
-  const auto robot = std::make_unique<Robot>(held_backward());
+  const auto robot = std::make_unique<ParticleRobot>(held_backward());
   robot->set(0, 0, 0, 0.1F, base::kNan);
   EXPECT_FALSE(robot->estimate().heading_valid);
   robot->drive(100);
@@ -129,7 +129,7 @@ TEST(PoseParticles, AHeadingThatIsNotKnownIsNotValid) {
 
 TEST(PoseParticles, FarFromTheOriginItDoesTheSame) {
   const auto here = robot_at(0, 0, 0);
-  const auto far = std::make_unique<Robot>(held_backward());
+  const auto far = std::make_unique<ParticleRobot>(held_backward());
   constexpr std::int32_t kFar_mm = 50'176'000;  // 196 steps of 256 m: exact in the anchor and in float
   for (const estimators::MapEntry& entry :
        {MapEntry{kFar_mm + 5000, kFar_mm, 1}, MapEntry{kFar_mm, kFar_mm + 8000, 2},

@@ -15,7 +15,7 @@
 namespace tetap::estimators {
 namespace {
 
-constexpr std::int64_t kStep_us = 50'000;
+constexpr std::int64_t kScan_us = 50'000;
 
 /// A target on a circle of 10 m about (12, 3) at 4 m/s, seen by lidar and radar in turn.
 template <class E>
@@ -42,7 +42,7 @@ struct Scene {
   }
   void drive(int count) {
     for (int k = 0; k < count; ++k) {
-      us += kStep_us;
+      us += kScan_us;
       angle += 4 * 0.05 / 10;
       ++steps;
       last = tracker.fuse(seen(), {us}, ctx());
@@ -115,7 +115,7 @@ TYPED_TEST(Tracker, TicksChangeNoBit) {
   auto quiet = scene<TypeParam>(), ticked = scene<TypeParam>();
   for (int k = 0; k < 100; ++k) {
     quiet.drive(3), ticked.drive(3);
-    for (std::int64_t ahead_us = 0; ahead_us < kStep_us; ahead_us += 10'000) {
+    for (std::int64_t ahead_us = 0; ahead_us < kScan_us; ahead_us += 10'000) {
       ticked.tracker.advance({ticked.us + ahead_us}, ticked.ctx());
       static_cast<void>(ticked.tracker.estimate(ticked.ctx()));
     }

@@ -27,16 +27,16 @@ TEST(Complementary, high_pass_and_low_pass_sum_to_the_input) {
 }
 
 TEST(Complementary, both_have_the_gain_of_their_transfer_functions) {
-  constexpr float kDt_s = 1e-3F;
+  constexpr float kStep_s = 1e-3F;
   constexpr double kTau_s = 0.5;
   for (const double ratio : {0.1, 1.0, 10.0}) {
     const double w = ratio / kTau_s;
-    const float alpha = complementary_weight(static_cast<float>(kTau_s), kDt_s);
+    const float alpha = complementary_weight(static_cast<float>(kTau_s), kStep_s);
     FirstOrderLowPass low;
     FirstOrderHighPass high;
     double low_peak = 0, high_peak = 0;
     for (int k = 0; k < 100'000; ++k) {
-      const auto x = static_cast<float>(std::sin(w * k * static_cast<double>(kDt_s)));
+      const auto x = static_cast<float>(std::sin(w * k * static_cast<double>(kStep_s)));
       const float l = low.step(x, alpha), h = high.step(x, alpha);
       if (k < 50'000) continue;
       low_peak = std::max(low_peak, std::abs(static_cast<double>(l)));
@@ -56,20 +56,20 @@ TEST(Complementary, weight_is_tau_over_tau_plus_dt) {
 }
 
 TEST(Complementary, angle_is_the_low_passed_measurement_plus_the_high_passed_integral) {
-  constexpr float kDt_s = 0.01F, kTau_s = 0.7F;
+  constexpr float kStep_s = 0.01F, kTau_s = 0.7F;
   ComplementaryAngle angle(kTau_s);
   FirstOrderLowPass low;
   FirstOrderHighPass high;
   std::mt19937 engine(4);
   std::normal_distribution<float> noise(0.0F, 0.05F);
-  const float alpha = complementary_weight(kTau_s, kDt_s);
+  const float alpha = complementary_weight(kTau_s, kStep_s);
   float integral = 0.0F;
   for (int k = 0; k < 5000; ++k) {
-    const float t_s = kDt_s * static_cast<float>(k);
+    const float t_s = kStep_s * static_cast<float>(k);
     const float rate = k == 0 ? 0.0F : 0.5F * std::cos(t_s) + 0.02F;
     const float measured = 0.5F * std::sin(t_s) + noise(engine);
-    integral += rate * kDt_s;
-    ASSERT_TRUE(angle.step(rate, measured, kDt_s));
+    integral += rate * kStep_s;
+    ASSERT_TRUE(angle.step(rate, measured, kStep_s));
     ASSERT_NEAR(angle.angle_rad(), low.step(measured, alpha) + high.step(integral, alpha), 2e-4F) << k;
   }
 }

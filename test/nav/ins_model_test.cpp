@@ -166,7 +166,7 @@ TYPED_TEST(InsMeasurementLaws, APerfectMeasurementLeavesTheStateAndShrinksTheCov
 }
 
 using Vector15 = filter::Vector<float, 15>;
-using Matrix15 = Eigen::Matrix<float, 15, 15>;
+using Matrix15f = Eigen::Matrix<float, 15, 15>;
 
 nav::Ins::Covariance correlated(test::Normal& normal) {
   Eigen::Matrix<double, 15, 15> a;
@@ -179,7 +179,7 @@ nav::Ins::Covariance correlated(test::Normal& normal) {
 /// tilt with it, its own correction by half.
 void expect_moved(const nav::Ins& ins, const InsState& from, const Vector15& dx, const nav::Ins::Covariance& updated,
                   bool from_outside, float scale) {
-  Matrix15 turn = Matrix15::Identity(), half = turn;
+  Matrix15f turn = Matrix15f::Identity(), half = turn;
   const float up_rad = dx(8), size_rad = std::abs(up_rad);
   if (from_outside && size_rad > 5e-4F) {
     turn.block<2, 2>(6, 6) = Eigen::Rotation2Df(up_rad).matrix();

@@ -21,7 +21,7 @@
 namespace tetap::test {
 namespace {
 
-using Robot = node::WithBusProtection<node::Estimators<estimators::Odometry, estimators::PoseEkf>>;
+using ProtectedRobot = node::WithBusProtection<node::Estimators<estimators::Odometry, estimators::PoseEkf>>;
 
 // ---- sync frames
 
@@ -45,7 +45,7 @@ class LoopOnABus : public ::testing::Test {
  protected:
   void start(param::Lockstep lockstep) {
     parameters.loop.lockstep = lockstep;
-    firmware = std::make_unique<firmware::Firmware<QuietBoard, Robot>>(board, parameters, bus::Version{});
+    firmware = std::make_unique<firmware::Firmware<QuietBoard, ProtectedRobot>>(board, parameters, bus::Version{});
   }
   void put(const bus::InSync& sync, bool guarded) {
     if (guarded) board.can.to_node.push_back(in(bus::guard_of_sync(sync)));
@@ -69,7 +69,7 @@ class LoopOnABus : public ::testing::Test {
 
   param::Parameters parameters = kNumbers;
   QuietBoard board;
-  std::unique_ptr<firmware::Firmware<QuietBoard, Robot>> firmware;
+  std::unique_ptr<firmware::Firmware<QuietBoard, ProtectedRobot>> firmware;
 };
 
 TEST_F(LoopOnABus, OneFrameWithoutAChecksumStopsNothing) {
@@ -233,9 +233,9 @@ class ProtectedBench {
     return {in(tag), command};
   }
 
-  [[nodiscard]] const node::Node<Robot>& node() const { return node_; }
+  [[nodiscard]] const node::Node<ProtectedRobot>& node() const { return node_; }
   /// Goes on where `other` is.
-  void resume(const ProtectedBench& other, const node::Node<Robot>& its_node) {
+  void resume(const ProtectedBench& other, const node::Node<ProtectedRobot>& its_node) {
     node_.resume(its_node);
     noise_ = other.noise_;
     left_ = other.left_;
@@ -251,7 +251,7 @@ class ProtectedBench {
 
  private:
   param::Parameters parameters_;
-  node::Node<Robot> node_;
+  node::Node<ProtectedRobot> node_;
   std::uint32_t noise_;
   std::uint32_t left_ = 0;
   int k_ = 0;
@@ -443,8 +443,8 @@ TEST_F(TaggedCommands, GuessesAreLimited) {
 }
 
 /// Bytes of a snapshot's state, as everybody on the bus gets them.
-std::vector<std::byte> published_state(const node::Node<Robot>& node) {
-  firmware::SnapshotSender<node::Node<Robot>> sender(0x300, {10'000});
+std::vector<std::byte> published_state(const node::Node<ProtectedRobot>& node) {
+  firmware::SnapshotSender<node::Node<ProtectedRobot>> sender(0x300, {10'000});
   sender.freeze(node, {}, 0);
   std::vector<std::byte> bytes;
   for (int epoch = 0; epoch < 1'000; ++epoch)
@@ -453,13 +453,14 @@ std::vector<std::byte> published_state(const node::Node<Robot>& node) {
       return true;
     });
   bytes.erase(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(sizeof(firmware::SnapshotHeader)));
-  bytes.resize(sizeof(node::Node<Robot>));
+  bytes.resize(sizeof(node::Node<ProtectedRobot>));
   return bytes;
 }
 
 TEST_F(TaggedCommands, GoOnBehindASnapshot) {
   const std::vector<std::byte> state = published_state(bench.node());
-  const auto sender = std::make_unique<firmware::SnapshotSender<node::Node<Robot>>>(0x300, base::Micros{10'000});
+  const auto sender =
+      std::make_unique<firmware::SnapshotSender<node::Node<ProtectedRobot>>>(0x300, base::Micros{10'000});
   ProtectedBench desk(parameters);
   const auto* const loaded = sender->load(state);
   ASSERT_NE(loaded, nullptr);
@@ -544,7 +545,7 @@ TEST(TaggedBegin, IsObeyedWhereNothingElseIs) {
     p.loop.lockstep = param::Lockstep::kAuthenticated;
     return p;
   }();
-  firmware::Firmware<QuietBoard, Robot> firmware(board, parameters, bus::Version{});
+  firmware::Firmware<QuietBoard, ProtectedRobot> firmware(board, parameters, bus::Version{});
   const auto run = [&](std::int64_t us, bool wheels) {
     const auto before = all<bus::EstEpoch>(board.can.sent).size();
     for (const base::Micros until = board.time + base::Micros{us}; board.time < until;

@@ -13,8 +13,8 @@
 namespace tetap::test {
 namespace {
 
-using Robot = node::Estimators<estimators::Odometry, estimators::GraphMapper128>;
-static_assert(Robot::kMakesMap && node::WorksInJobs<estimators::GraphMapper128> &&
+using GraphRobot = node::Estimators<estimators::Odometry, estimators::GraphMapper128>;
+static_assert(GraphRobot::kMakesMap && node::WorksInJobs<estimators::GraphMapper128> &&
               node::DigestsState<estimators::GraphMapper128> && estimators::MapsKeyframes<estimators::GraphMapper128>);
 static_assert(sizeof(estimators::GraphMapper128) < 53 * 1024, "an image of 64 kB holds it with window and stack");
 static_assert(sizeof(estimators::GraphMapper256) < 116 * 1024, "and one of 128 kB");
@@ -26,7 +26,7 @@ struct Sigmas {
 class GraphMapperTest : public testing::Test {
  protected:
   explicit GraphMapperTest(std::int32_t work_units = 100'000, std::int32_t keyframes = 1)
-      : numbers_(numbers(work_units, keyframes)), bench_(std::make_unique<BenchOf<Robot>>(numbers_)) {}
+      : numbers_(numbers(work_units, keyframes)), bench_(std::make_unique<BenchOf<GraphRobot>>(numbers_)) {}
   static param::Parameters numbers(std::int32_t work_units, std::int32_t keyframes) {
     param::Parameters n = kNumbers;
     n.loop.window_us = 20'000;
@@ -76,7 +76,7 @@ class GraphMapperTest : public testing::Test {
   }
 
   param::Parameters numbers_;
-  std::unique_ptr<BenchOf<Robot>> bench_;
+  std::unique_ptr<BenchOf<GraphRobot>> bench_;
   std::vector<bus::EstKeyframe> announced_;
   std::map<sensor::Verdict, int> verdicts_;
   std::map<int, bus::EstKeyframePose> keyframes_;
@@ -208,7 +208,7 @@ TEST_F(GraphMapperTest, AClosureFromBeforeTheWindowIsRefusedAndCounted) {
 TEST_F(GraphMapperTest, SetPoseMovesTheGraphRigidlyAndRestartsTheJob) {
   bench_.reset();
   numbers_.loop.work_units = 5;  // a job of many ticks
-  bench_ = std::make_unique<BenchOf<Robot>>(numbers_);
+  bench_ = std::make_unique<BenchOf<GraphRobot>>(numbers_);
   drive(10);
   tick(pages(0, 10, 10.5F, 0, 0, {.x_m = 0.01F, .y_m = 0.1F, .yaw_rad = 0.02F}));
   ticks(10);
@@ -249,7 +249,7 @@ TEST_F(GraphMapperTest, HowTheUnitsAreDealtChangesNoBit) {
   std::array<int, 2> first_adopted{};
   for (const std::size_t k : {0U, 1U}) {
     numbers_.loop.work_units = k == 0 ? 20 : 80;
-    bench_ = std::make_unique<BenchOf<Robot>>(numbers_);
+    bench_ = std::make_unique<BenchOf<GraphRobot>>(numbers_);
     steps_ = seq_ = 0;
     graph_ = {};
     drive(20);
