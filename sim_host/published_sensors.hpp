@@ -45,7 +45,7 @@ inline void send_only(const Sent& sent, World::Options& world) {
   if (!sent.imu) world.parameters.imu.rate_hz = 0;
   if (!sent.landmarks) {
     world.parameters.camera.rate_hz = 0;
-    // A scanner and a camera see them whatever the node is told of them.
+    // A scanner and a camera see them, whatever the node has of their map.
     if (world.parameters.lidar.rate_hz == 0 && world.parameters.features.rate_hz == 0) world.course.landmarks.clear();
     world.map_given = world.map_given && world.course.landmarks.empty();
   }

@@ -120,7 +120,7 @@ void FeatureCamera::limit_tracks(bool body, std::size_t most) {
   std::erase_if(tracks_, [&](const Track& track) { return on_body(track.key) == body && ++count > most; });
 }
 
-/// Of those in sight that nobody follows, the ones that the draw prefers.
+/// Points in sight that nobody follows, the draw's favourites first.
 void FeatureCamera::begin_tracks(base::Micros now, bool body, std::size_t most) {
   const auto count = [&] {
     return static_cast<std::size_t>(

@@ -39,7 +39,7 @@ class FeatureCamera {
   [[nodiscard]] std::optional<Pixel> project(const Vector3& point_m, const Truth& truth) const;
 
  private:
-  /// What is followed: a point of the map, of the moving body, or of a person.
+  /// A point in sight: of the map, of the moving body, or of a person.
   struct Candidate {
     std::uint32_t key;
     Pixel at;
@@ -60,7 +60,7 @@ class FeatureCamera {
   void look_at_people(const Eye& eye, base::Micros now);
   void look_at_body(const Truth& truth, base::Micros now, double ahead_m);
   void keep_tracks(base::Micros now);
-  /// Of the moving body or of the rest: no more than so many are followed, and as many as there are in sight.
+  /// Tracks of the moving body, or of the rest: no more than so many, then as many as there are points in sight.
   void limit_tracks(bool body, std::size_t most);
   void begin_tracks(base::Micros now, bool body, std::size_t most);
   [[nodiscard]] std::optional<ImageFeature> feature(const Candidate& seen, std::uint16_t id, bool recognised) const;

@@ -53,7 +53,7 @@ std::optional<Lidar::Scan> Lidar::sense(const Truth& from, const Truth& to, base
   }
 }
 
-/// Of the next beam. The same draws for each, whatever it hits.
+/// Range of the next beam. The draws are the same for each, whatever it hits.
 std::uint16_t Lidar::range(const Truth& truth, base::Micros at, const Faults& faults) {
   const double noise_m = chance_.normal(parameters_.sigma_m);
   const bool dropped = chance_.happens(parameters_.dropout_probability);

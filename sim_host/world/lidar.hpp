@@ -42,7 +42,7 @@ class Lidar {
   const Surroundings* surroundings_;
   Chance chance_;
   Scan scan_;
-  int step_;  ///< of the bus, without sign
+  int step_;  ///< angle between beams in steps of the bus, without sign
 };
 
 }  // namespace tetap::sim

@@ -36,7 +36,7 @@ struct ImageFeature {
 
 /// Ends an image.
 struct ImageEnd {
-  std::uint8_t count = 0;  ///< of its features
+  std::uint8_t count = 0;  ///< number of its features
   std::uint16_t exposure_10us = 0;
   bool tracking = true;  ///< false: the front end follows nothing
 };

@@ -22,7 +22,7 @@ struct PeopleNumbers {
 /// A planar scanner. It turns at a constant rate, and each beam sees the world at its own time.
 struct LidarNumbers {
   int rate_hz = 0;                                           ///< turns a second; 0: none; a divisor of 2000
-  int beams = 360;                                           ///< of a turn, 1023 at the most
+  int beams = 360;                                           ///< beams of a turn, 1023 at the most
   bool clockwise = true;                                     ///< as most small scanners turn; else anticlockwise
   double first_rad = 0;                                      ///< bearing of the first beam
   double x_b_m = 0.1, y_b_m = 0, z_b_m = 0.25, yaw_rad = 0;  ///< place of its mounting, from the ground
@@ -33,7 +33,7 @@ struct LidarNumbers {
   double glass_square_cos = 0.98;  ///< a pane returns where the beam is as square as this, within 11 deg [own]
   double glass_through = 0.6;      ///< else the share of beams that return from behind it; the rest is lost [own]
   double mount_error_rad = 0.003;  ///< yaw of the mount against the robot's parameter [own]
-  base::Micros phase{2'500};       ///< of the first beam
+  base::Micros phase{2'500};       ///< time of the first beam
   base::Micros frame{270};         ///< between two frames of a scan: 500 kbit/s
   base::Micros latency_min{2'000}, latency_max{6'000};  ///< from the last beam to the first frame
 };
@@ -47,7 +47,7 @@ struct LidarNumbers {
 struct FeatureCameraNumbers {
   int rate_hz = 0;  ///< 0: none; a divisor of 2000
   int width_px = 752, height_px = 480;
-  double fu_px = 460, fv_px = 460, cu_px = 375.5, cv_px = 239.5;  ///< of a usual global-shutter sensor [own]
+  double fu_px = 460, fv_px = 460, cu_px = 375.5, cv_px = 239.5;  ///< lens of a usual global-shutter sensor [own]
   double x_b_m = 0.2, y_b_m = 0, z_b_m = 0.6;                     ///< place of its mounting, from the ground
   double tilt_rad = 0;                                            ///< downwards
   double mount_sigma_rad = 0.002;           ///< 1 sigma per axis of its rotation against the drawing [own]
@@ -58,10 +58,10 @@ struct FeatureCameraNumbers {
   double life_min_s = 0.5, life_max_s = 3;  ///< a track ends after so long, if it is not lost before
   double loss_probability = 0.01;           ///< per feature and image [own]
   double wrong_probability = 0.01;          ///< per feature and image: a wrong match [own]
-  double wrong_px = 60;                     ///< which is up to so far off, per axis [own]
+  double wrong_px = 60;                     ///< distance of a wrong match, per axis at the most [own]
   bool recognise = false;           ///< landmarks are recognised as well: features of camera 3, tracks are their ids
   double recognise_m = 15;          ///< within that range
-  double miss_probability = 0.1;    ///< of a recognition [own]
+  double miss_probability = 0.1;    ///< share of recognitions that fail [own]
   double wrong_id_probability = 0;  ///< a landmark that is taken for another one
   base::Micros exposure{4'000};
   base::Micros phase{21'500};

@@ -37,7 +37,7 @@ struct MapPoint {
 
 class Surroundings {
  public:
-  /// Of a course with walls: those. Of another: a fence 6 m around it, and a post at each landmark.
+  /// Walls of the course; where it has none, a fence 6 m around it, and a post at each landmark.
   Surroundings(const Course& course, const Plan& plan, const PeopleNumbers& people, std::uint64_t seed);
 
   /// The nearest surface on the way at that time after the start. `through_glass`: panes are not there.

@@ -98,7 +98,7 @@ class World {
   [[nodiscard]] const Parameters& parameters() const { return parameters_; }
   [[nodiscard]] const Faults& faults() const { return faults_; }
   [[nodiscard]] const Plan& plan() const { return *plan_; }
-  /// What scanner and camera see, in the frame of the course; null where there is neither.
+  /// Map that scanner and camera see, in the frame of the course; null where there is neither.
   [[nodiscard]] const Surroundings* surroundings() const { return surroundings_.get(); }
 
  private:

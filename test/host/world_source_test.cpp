@@ -3,6 +3,7 @@
 #include "sim_host/world_source.hpp"
 
 #include "sim_host/play/spool.hpp"
+#include "sim_host/world/floor_plan.hpp"
 
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -85,6 +86,68 @@ TEST(WorldSource, SightingsAreTakenOnce) {
   EXPECT_GT(taken, 50U);
   EXPECT_EQ(taken, kept.world().sightings().size());
   EXPECT_TRUE(world.world().sightings().empty());
+}
+
+/// Bits `from` to `from + length` of a frame, from the least one up.
+std::int64_t bits(const base::CanFrame& frame, int from, int length, bool with_sign = false) {
+  std::uint64_t word = 0;
+  for (std::size_t i = 0; i < 8; ++i) word |= std::uint64_t{frame.data[i]} << (8 * i);
+  word = word << (64 - from - length);
+  return with_sign ? static_cast<std::int64_t>(word) >> (64 - length)
+                   : static_cast<std::int64_t>(word >> (64 - length));
+}
+
+TEST(WorldSource, ScansAndImagesTravelInTheBitsOfTheirFrames) {
+  World::Options options;
+  options.course = lab_course(1);
+  options.parameters.lidar.rate_hz = options.parameters.features.rate_hz = 10;
+  WorldSource played{World(options, 5), 0x300, base::Micros{10'000}, base::Micros{60'000'000}, false};
+  World seen{options, 5};
+  std::vector<Measurement> all;
+  Frames frames;
+  for (int i = 1; i <= 300; ++i) {
+    played.step(10);
+    for (const base::CanFrame& f : played.frames())
+      if (f.id == 0x34B || f.id == 0x34C || f.id == 0x34D || f.id == 0x34F) frames.push_back(f);
+    seen.advance_to(seen.start() + base::Micros{10'000 * i}, all);
+  }
+  std::erase_if(all, [](const Measurement& m) {
+    return !(std::holds_alternative<ScanHead>(m.value) || std::holds_alternative<ScanBlock>(m.value) ||
+             std::holds_alternative<ImageFeature>(m.value) || std::holds_alternative<ImageEnd>(m.value));
+  });
+  ASSERT_EQ(frames.size(), all.size());
+  ASSERT_GT(frames.size(), 3'000U);
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    const base::CanFrame& f = frames[i];
+    const Measurement& m = all[i];
+    if (const auto* scan = std::get_if<ScanBlock>(&m.value)) {
+      ASSERT_EQ(f.id, 0x34BU);
+      ASSERT_EQ(bits(f, 0, 4), m.sequence % 16);
+      ASSERT_EQ(bits(f, 4, 8), scan->block);
+      for (int k = 0; k < 4; ++k) ASSERT_EQ(bits(f, 12 + 13 * k, 13), scan->ranges[static_cast<std::size_t>(k)]);
+      continue;
+    }
+    ASSERT_EQ(bits(f, 0, 20), m.stamp.us % (1 << 20));
+    ASSERT_EQ(bits(f, 20, 4), m.sequence % 16);
+    ASSERT_EQ(bits(f, 24, 2), 0);
+    if (const auto* head = std::get_if<ScanHead>(&m.value)) {
+      ASSERT_EQ(f.id, 0x34CU);
+      ASSERT_EQ(bits(f, 26, 10), head->count);
+      ASSERT_EQ(bits(f, 36, 14, true), head->first);
+      ASSERT_EQ(bits(f, 50, 14, true), head->step);
+    } else if (const auto* feature = std::get_if<ImageFeature>(&m.value)) {
+      ASSERT_EQ(f.id, 0x34FU);
+      ASSERT_EQ(bits(f, 26, 12), feature->track);
+      ASSERT_EQ(bits(f, 38, 13), feature->u);
+      ASSERT_EQ(bits(f, 51, 13), feature->v);
+    } else {
+      const ImageEnd& end = std::get<ImageEnd>(m.value);
+      ASSERT_EQ(f.id, 0x34DU);
+      ASSERT_EQ(bits(f, 26, 8), end.count);
+      ASSERT_EQ(bits(f, 34, 12), end.exposure_10us);
+      ASSERT_EQ(bits(f, 46, 3), 1);
+    }
+  }
 }
 
 TEST(Spool, RowsComeBackAndLeaveNoFile) {

@@ -109,7 +109,7 @@ bool hidden(const Scene& scene, const Truth& t, std::size_t point) {
 TEST(FeatureCamera, a_track_stays_on_one_point_in_sight_and_ends_within_its_life) {
   Scene scene;
   struct Seen {
-    std::vector<std::size_t> points;  ///< of the map that it may be
+    std::vector<std::size_t> points;  ///< points of the map that it may be
     base::Micros begun, latest;
   };
   std::map<std::uint16_t, Seen> tracks;
