@@ -14,7 +14,7 @@ namespace tetap::sim {
 
 /// Begins a scan. Angles are in the steps of the bus, as a scanner's own.
 struct ScanHead {
-  static constexpr int kFirstStepsPerRadian = 2'000, kStepsPerRadian = 20'000;
+  static constexpr int kFirstStepsPerRadian = 2'000, kStepsPerRadian = 100'000;
   std::uint16_t count = 0;
   std::int16_t first = 0;  ///< bearing of the first beam, anticlockwise
   std::int16_t step = 0;   ///< to the next; below 0: clockwise

@@ -22,7 +22,7 @@ struct PeopleNumbers {
 /// A planar scanner. It turns at a constant rate, and each beam sees the world at its own time.
 struct LidarNumbers {
   int rate_hz = 0;                                           ///< turns a second; 0: none; a divisor of 2000
-  int beams = 360;                                           ///< beams of a turn, 1023 at the most
+  int beams = 360;                                           ///< beams of a turn, 77 to 1023
   bool clockwise = true;                                     ///< as most small scanners turn; else anticlockwise
   double first_rad = 0;                                      ///< bearing of the first beam
   double x_b_m = 0.1, y_b_m = 0, z_b_m = 0.25, yaw_rad = 0;  ///< place of its mounting, from the ground

@@ -28,7 +28,7 @@ struct Recording {
   explicit Recording(std::vector<FaultSetting> faults, bool sights = false) {
     World::Options options;
     options.faults = std::move(faults);
-    options.parameters.lidar.beams = 60;
+    options.parameters.lidar.beams = 90;
     if (sights) options.parameters.lidar.rate_hz = options.parameters.features.rate_hz = 10;
     options.parameters.magnetometer.rate_hz = 20;
     options.parameters.barometer.rate_hz = 10;

@@ -56,7 +56,7 @@ struct Scene {
 
 Truth standing(double) { return {}; }
 double bearing(const Lidar::Scan& scan, std::size_t beam) {
-  return scan.head.first * 0.0005 + scan.head.step * 0.00005 * static_cast<double>(beam);
+  return scan.head.first * 0.0005 + scan.head.step * 0.00001 * static_cast<double>(beam);
 }
 double metres(std::uint16_t range) { return range * 0.005; }
 /// From the middle of the square room.
@@ -202,7 +202,7 @@ TEST(Lidar, scans_of_a_run_are_whole_and_equally_spaced_with_all_blocks_in_order
     if (const auto* head = std::get_if<ScanHead>(&m.value)) {
       EXPECT_EQ(block, 90) << "all of the one before";
       EXPECT_EQ(head->count, 360);
-      EXPECT_EQ(head->step, -349);
+      EXPECT_EQ(head->step, -1745);
       if (scans > 0) {
         EXPECT_EQ(m.stamp.us - last_us, 100'000);
       }
