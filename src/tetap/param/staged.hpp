@@ -1,0 +1,146 @@
+// SPDX-License-Identifier: Apache-2.0
+// Parameters of a running node: the active ones, and a staged copy that commands write. An Apply takes the staged copy
+// as a whole or not at all. Live rows are active at once; the others wait for a restart.
+#pragma once
+
+#include "tetap/param/crc.hpp"
+#include "tetap/param/stored_row.hpp"
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <utility>
+
+namespace tetap::param {
+
+/// Answer to a command; the numbers are those on the bus.
+enum class Answer : std::uint8_t {
+  kDone,
+  kUnknown,      ///< no row of this index, or no such element
+  kOutOfLimits,  ///< a value beyond its row
+  kRefused,      ///< a row of access or identity
+  kOtherActive,  ///< the active set is not the one that the command names
+  kOtherStaged,  ///< the staged set is not the one that the command names
+  kNotTogether,  ///< a rule between rows is broken, by the staged set or by its live rows alone
+};
+
+class StagedParameters {
+ public:
+  /// The compiled parameters outlive it.
+  explicit StagedParameters(const Parameters& compiled) : compiled_(compiled), active_(compiled), staged_(compiled) {}
+
+  [[nodiscard]] const Parameters& active() const { return active_; }
+  [[nodiscard]] std::uint32_t active_crc() const { return crc(active_); }
+  [[nodiscard]] std::uint32_t staged_crc() const { return crc(staged_); }
+  /// Rows that wait for a restart.
+  [[nodiscard]] std::size_t pending() const {
+    std::size_t rows = 0;
+    for (std::size_t row = 0; row < kStoredRows.size(); ++row) rows += is_pending(row) ? 1U : 0U;
+    return rows;
+  }
+
+  /// One word of a row of the staged copy; a row that waited for a restart does not wait any more.
+  Answer set(std::uint16_t index, std::size_t word, std::uint32_t value) {
+    const std::size_t at = find(index);
+    if (at == kStoredRows.size() || word >= kStoredRows[at].words) return Answer::kUnknown;
+    const StoredRow& row = kStoredRows[at];
+    if (row.access) return Answer::kRefused;
+    if (!row.within(value)) return Answer::kOutOfLimits;
+    put(staged_, row, word, value);
+    wait(at, false);
+    return Answer::kDone;
+  }
+  /// `before` and `behind`: CRC of the active set that the sender knows, and of the staged one that it means.
+  Answer apply(std::uint32_t before, std::uint32_t behind) {
+    if (before != active_crc()) return Answer::kOtherActive;
+    if (behind != staged_crc()) return Answer::kOtherStaged;
+    const auto live = [](std::size_t row) { return kStoredRows[row].live; };
+    if (!plausible_together(staged_) || !exchange(live)) return Answer::kNotTogether;
+    for (std::size_t row = 0; row < kStoredRows.size(); ++row) {
+      if (live(row)) copy(active_, staged_, kStoredRows[row]);
+      wait(row, !live(row) && differ(active_, staged_, kStoredRows[row]));
+    }
+    return Answer::kDone;
+  }
+  /// The compiled parameters become the staged ones, but for rows of access.
+  void restore() {
+    for (std::size_t row = 0; row < kStoredRows.size(); ++row) {
+      if (kStoredRows[row].access) continue;
+      copy(compiled_, staged_, kStoredRows[row]);
+      wait(row, false);
+    }
+  }
+  /// At a restart: rows that wait are active. What is staged without an Apply is gone.
+  void restart() {
+    static_cast<void>(exchange([this](std::size_t row) { return is_pending(row); }));
+    staged_ = active_;
+    waits_ = {};
+  }
+  /// take(index, word, value) for each word that a save keeps: of what is active or waits, where it is not as compiled.
+  template <class Take>
+  void each_kept(Take&& take) const {
+    for (std::size_t at = 0; at < kStoredRows.size(); ++at) {
+      const StoredRow& row = kStoredRows[at];
+      const Parameters& from = is_pending(at) ? staged_ : active_;
+      for (std::size_t word = 0; word < row.words; ++word)
+        if (get(from, row, word) != get(compiled_, row, word)) take(row.index, word, get(from, row, word));
+    }
+  }
+
+ private:
+  static constexpr std::size_t kBits = 32;
+
+  [[nodiscard]] static std::size_t find(std::uint16_t index) {
+    std::size_t at = 0;
+    while (at < kStoredRows.size() && kStoredRows[at].index != index) ++at;
+    return at;
+  }
+  [[nodiscard]] static std::uint32_t get(const Parameters& p, const StoredRow& row, std::size_t word) {
+    std::uint32_t value = 0;
+    std::memcpy(&value, reinterpret_cast<const unsigned char*>(&p) + row.offset + 4 * word, sizeof value);
+    return value;
+  }
+  static void put(Parameters& p, const StoredRow& row, std::size_t word, std::uint32_t value) {
+    std::memcpy(reinterpret_cast<unsigned char*>(&p) + row.offset + 4 * word, &value, sizeof value);
+  }
+  static void copy(const Parameters& from, Parameters& to, const StoredRow& row) {
+    for (std::size_t word = 0; word < row.words; ++word) put(to, row, word, get(from, row, word));
+  }
+  [[nodiscard]] static bool differ(const Parameters& a, const Parameters& b, const StoredRow& row) {
+    bool differs = false;
+    for (std::size_t word = 0; word < row.words; ++word) differs = differs || get(a, row, word) != get(b, row, word);
+    return differs;
+  }
+  /// Exchanges rows of the active and of the staged set; not at all, where the active set then breaks a rule.
+  template <class Chosen>
+  [[nodiscard]] bool exchange(Chosen&& chosen) {
+    const auto turn = [&] {
+      for (std::size_t at = 0; at < kStoredRows.size(); ++at) {
+        if (!chosen(at)) continue;
+        const StoredRow& row = kStoredRows[at];
+        for (std::size_t word = 0; word < row.words; ++word) {
+          const std::uint32_t active = get(active_, row, word);
+          put(active_, row, word, get(staged_, row, word));
+          put(staged_, row, word, active);
+        }
+      }
+    };
+    turn();
+    const bool plausible = plausible_together(active_);
+    if (!plausible) turn();
+    return plausible;
+  }
+  [[nodiscard]] bool is_pending(std::size_t row) const { return (waits_[row / kBits] >> row % kBits & 1U) != 0; }
+  void wait(std::size_t row, bool waits) {
+    const std::uint32_t bit = 1U << row % kBits;
+    waits_[row / kBits] = waits ? waits_[row / kBits] | bit : waits_[row / kBits] & ~bit;
+  }
+
+  const Parameters& compiled_;
+  Parameters active_, staged_;
+  std::array<std::uint32_t, (kTable.size() + kBits - 1) / kBits>
+      waits_{};  ///< bit of each row that waits for a restart
+};
+
+}  // namespace tetap::param
