@@ -132,7 +132,8 @@ void put_on_moving_body(test::Drive& drive) {
     for (auto feature : image.features) {
       if (chosen.try_emplace(feature.id, random() % 10 < 3).first->second) {
         const auto ray = drive.camera.direction(feature.u_quarter_px, feature.v_quarter_px);
-        const Eigen::Vector3d born = eye + r_nc * Eigen::Vector3d(d(ray.x), d(ray.y), 1) * (8.0 + random() % 15);
+        const Eigen::Vector3d born =
+            eye + r_nc * Eigen::Vector3d(d(ray.x), d(ray.y), 1) * (8.0 + static_cast<double>(random() % 15));
         const Eigen::Vector3d mps = image.r_nb * Eigen::Vector3d(image.speed_b_mps(0) * 2 / 3, 1, 0);
         const OnBody& point = points.try_emplace(feature.id, OnBody{born, mps, image.time_s}).first->second;
         const Eigen::Vector3d l = r_nc.transpose() * (point.at + point.mps * (image.time_s - point.time_s) - eye);

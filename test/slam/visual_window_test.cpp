@@ -104,7 +104,9 @@ TEST(VisualWindow, ImagesOfTheSamePointsTeachNothingAboutYawAndPlace) {
     const Ride ride(world, world.options(), kNone);
     for (int i = 0; i < 6; ++i) EXPECT_NEAR(ride.variance(Window::kCore + i), 1e-6F, 1e-8F) << i << ", " << sway_m;
     EXPECT_NEAR(ride.window->pose().q_nb.z, 0.0F, 1e-4F);
-    if (sway_m > 0.5) EXPECT_GT(ride.window->counters().used, 300U);
+    if (sway_m > 0.5) {
+      EXPECT_GT(ride.window->counters().used, 300U);
+    }
   }
 }
 
@@ -204,13 +206,17 @@ TEST(VisualWindow, OrderOfFeaturesAndDealingOfWorkLeaveTheBits) {
       const slam::BodyMotion motion{.speed_b_mps = images[k].speed_b_mps.cast<float>(),
                                     .rate_b_radps = images[k].rate_b_radps.cast<float>(),
                                     .dt_s = 0.1F};
-      if (k > 0) ASSERT_TRUE(window.predict(motion));
+      if (k > 0) {
+        ASSERT_TRUE(window.predict(motion));
+      }
       auto features = images[k].features;
       std::reverse(features.begin(), features.end());
       ASSERT_TRUE(window.begin_image(features));
       EXPECT_FALSE(window.predict(motion)) << "the state rests while a job runs";
       EXPECT_FALSE(window.begin_image(features));
-      if (window.busy()) EXPECT_FALSE(window.end_image(features));
+      if (window.busy()) {
+        EXPECT_FALSE(window.end_image(features));
+      }
       for (int call = 0; window.busy(); ++call) {
         ASSERT_LT(call, 100'000) << "a job ends";
         window.work(units);

@@ -7,6 +7,7 @@
 // covariance. The result is the full transform's (Briers, Maskell, Wright 2003, for models that are linear in part).
 #pragma once
 
+#include "tetap/base/members.hpp"
 #include "tetap/filter/condition.hpp"
 #include "tetap/filter/correction.hpp"
 #include "tetap/filter/sigma_points.hpp"
@@ -90,6 +91,8 @@ class Ukf {
 
   State x{};
   Symmetric<Scalar, kErrors> p{};
+
+  static constexpr auto members(auto& self) { return base::members(self.x, self.p); }
 
   /// Takes other weights, or refuses them and keeps those it has. Only with RuntimeScaling.
   [[nodiscard]] ScalingVerdict set_scaling(const Scaling& scaling) requires(!kConstantScaling<Scaling>) {
