@@ -18,7 +18,7 @@ using Grid = PoseGrid<16, 32, 48>;
 using test::held_backward;
 using test::kStep_us;
 
-static_assert(node::Estimator<Grid> && node::kIsDelayed<Grid> && node::DigestsState<Grid> && node::WorksInJobs<Grid>);
+static_assert(node::Estimator<Grid> && node::kIsDelayed<Grid> && node::WorksInJobs<Grid>);
 static_assert(sizeof(Grid) < 100 * 1024, "the class of 128 kB holds it with the window and the stack");
 
 /// Landmarks about the circle, in a rectangle of 4 m by 7 m.

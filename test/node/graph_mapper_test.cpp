@@ -15,7 +15,7 @@ namespace {
 
 using GraphRobot = node::Estimators<estimators::Odometry, estimators::GraphMapper128>;
 static_assert(GraphRobot::kMakesMap && node::WorksInJobs<estimators::GraphMapper128> &&
-              node::DigestsState<estimators::GraphMapper128> && estimators::MapsKeyframes<estimators::GraphMapper128>);
+              estimators::MapsKeyframes<estimators::GraphMapper128>);
 static_assert(sizeof(estimators::GraphMapper128) < 53 * 1024, "an image of 64 kB holds it with window and stack");
 static_assert(sizeof(estimators::GraphMapper256) < 116 * 1024, "and one of 128 kB");
 

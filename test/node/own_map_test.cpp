@@ -12,7 +12,7 @@ namespace tetap::test {
 namespace {
 
 static_assert(Ekf::kMakesMap && !Ekf::kUsesMap);
-static_assert(node::RecordsLater<estimators::EkfSlam30> && node::DigestsState<estimators::EkfSlam30>);
+static_assert(node::RecordsLater<estimators::EkfSlam30>);
 static_assert(sizeof(estimators::EkfSlam30) < 32 * 1024 && sizeof(estimators::FastSlam100) < 40 * 1024,
               "the class of 64 kB holds either with the window and the stack");
 

@@ -45,7 +45,7 @@ World::Options as_made() { return {.mismatched = false}; }
 /// A gyroscope 20 times as noisy (0.056 deg/s/sqrt(Hz)) and wheels that err by 1.4 cm per root metre. Information of
 /// landmarks is lost within seconds, and the steps of the published 1-sigma are small beside it.
 World::Options noisy() {
-  Parameters parameters = matched({});
+  Parameters parameters = matched(Parameters{});
   parameters.imu.gyro_noise *= 20;
   parameters.wheels.noise_m = 2e-4;
   return {.parameters = parameters};

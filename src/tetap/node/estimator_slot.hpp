@@ -256,8 +256,9 @@ class EstimatorSlot {
     for (estimators::SensorStatistics& s : statistics_) s = {};
   }
 
+  /// The statistics sum in the order of arrival, and go out in Est_Stat.
   static constexpr auto members(auto& self) {
-    return base::members(self.now_, base::in_turns(self.past_), self.replay_, base::in_turns(self.statistics_));
+    return base::members(self.now_, base::in_turns(self.past_), self.replay_, base::unhashed(self.statistics_));
   }
 
  private:

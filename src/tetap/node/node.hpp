@@ -105,15 +105,16 @@ class Node {
   /// Goes on from the state of another node of this robot. References and pointers stay its own.
   void resume(const Node& other) { base::resume(*this, other); }
   /// The intake is not hashed: half-received samples and commands, wraps of stamps. The CRC of the inputs has their
-  /// frames, and their places depend on the order of arrival.
+  /// frames, and their places depend on the order of arrival. Nor is the output, which goes out as it is: tallies,
+  /// the queue of records, both CRCs.
   static constexpr auto members(auto& self) {
     return base::members(base::reference(self.parameters_), base::kept(self.window_), self.map_frame_,
                          base::in_turns(self.origin_), base::unhashed(self.protection_), base::unhashed(self.inbox_),
                          base::unhashed(self.closures_), base::unhashed(self.scans_), base::unhashed(self.wraps_),
-                         base::in_turns(self.counters_), self.publisher_, self.landmarks_, self.pending_reset_,
-                         base::kept(self.wired_off_), self.pending_pose_, self.now_, self.ticked_, self.input_crc_,
-                         self.resets_, self.reset_cause_, self.restarted_at_, self.jumps_, self.disagreement_,
-                         self.map_faults_);
+                         base::unhashed(self.counters_), base::unhashed(self.publisher_), self.landmarks_,
+                         self.pending_reset_, base::kept(self.wired_off_), self.pending_pose_, self.now_, self.ticked_,
+                         base::unhashed(self.input_crc_), self.resets_, self.reset_cause_, self.restarted_at_,
+                         self.jumps_, self.disagreement_, self.map_faults_);
   }
   /// For a copy that others get: nothing is left from which the key of commands could be computed. Between ticks only.
   void hide_secrets() { protection_.hide_secrets(); }

@@ -120,12 +120,13 @@ class Timeline {
   [[nodiscard]] constexpr bool any_late() const { return new_ != size_ - known_; }
   [[nodiscard]] constexpr std::size_t size() const { return size_; }
   [[nodiscard]] constexpr std::uint16_t high_water() const { return high_water_; }
-  /// The numbers in order_ depend on the order of arrival; a wrong one shows as another sample.
+  /// The numbers in order_ and the high-water mark depend on the order of arrival; a wrong number shows as another
+  /// sample, the mark goes out in Est_Diag.
   static constexpr auto members(auto& self) {
     return base::members(base::ring(self.samples_, self.begin_, self.size_, self.order_), base::unhashed(self.order_),
                          base::ring(self.consumed_, self.begin_, self.size_, self.order_), base::count(self.begin_),
                          base::count(self.size_), base::count(self.known_), base::count(self.new_), self.digest_,
-                         self.high_water_);
+                         base::unhashed(self.high_water_));
   }
 
  private:

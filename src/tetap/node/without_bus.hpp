@@ -68,7 +68,7 @@ class DirectOutput {
   void power_on() { epoch_ = 0, begin_records(); }
   static constexpr auto members(auto& self) {
     return base::members(base::unhashed(self.records_), base::count(self.size_), base::count(self.lost_), self.epoch_,
-                         self.ended_);
+                         self.side_every_, self.ended_);
   }
 
   /// Measurements that were refused between ticks belong to the tick that follows.

@@ -47,7 +47,7 @@ namespace detail {
 /// The outermost float that the row accepts: a limit's nearest float, or a neighbour within its rounding.
 constexpr std::uint32_t float_limit(const Row& row, double limit, bool upper) {
   auto bits = std::bit_cast<std::uint32_t>(static_cast<float>(limit));
-  if (limit == 0) return 0;
+  if (!(limit < 0 || limit > 0)) return 0;
   const bool outwards = (limit > 0) == upper;
   for (std::uint32_t next = bits; param::within(row, static_cast<double>(std::bit_cast<float>(next)));) {
     bits = next;

@@ -83,7 +83,7 @@ class PlanarDeadReckoning {
   [[nodiscard]] MotionVariance motion_variance(const param::Parameters& n) const;
 
   static constexpr auto members(auto& self) {
-    return base::members(self.filter, self.time_, self.out_time_, self.last_input_, self.counts_time_,
+    return base::members(self.filter, self.time_, base::unhashed(self.out_time_), self.last_input_, self.counts_time_,
                          self.still_since_, self.held_, self.counts_, self.have_counts_, self.moving_,
                          self.applied_left_m_, self.applied_right_m_, self.gyro_time_, self.applied_yaw_rad_,
                          self.gyro_rate_radps_, self.gyro_bias_radps_);
@@ -135,7 +135,7 @@ class PlanarDeadReckoning {
   void untravelled() { applied_left_m_ = applied_right_m_ = 0; }
 
   base::Micros time_;        ///< time of the state
-  base::Micros out_time_;    ///< time of the estimate
+  base::Micros out_time_;    ///< time of the estimate; unhashed: set anew by each tick
   base::Micros last_input_;  ///< stamp of the last wheel sample
   base::Micros counts_time_;
   base::Micros still_since_;

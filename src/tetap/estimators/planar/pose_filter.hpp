@@ -104,7 +104,7 @@ class PoseFilter {
   static constexpr auto members(auto& self) {
     return base::members(self.motion_, base::in_turns(self.alignment_), base::in_turns(self.landmarks_),
                          self.relocalisation_, self.turn_, self.phase_, base::in_turns(self.refused_), self.in_a_row_,
-                         self.vote_, self.last_absolute_, self.last_fused_fix_, self.now_, self.jumps_);
+                         self.vote_, self.last_absolute_, self.last_fused_fix_, base::unhashed(self.now_), self.jumps_);
   }
 
  private:
@@ -175,8 +175,8 @@ class PoseFilter {
   MotionVote vote_;
   base::Micros last_absolute_;   ///< stamp of the last accepted landmark or fix
   base::Micros last_fused_fix_;  ///< stamp of the last fix that has a part in the pose; 0: none
-  base::Micros now_;
-  std::uint8_t jumps_ = 0;  ///< relocalisations since the start
+  base::Micros now_;             ///< unhashed: of the last tick, set anew by the next
+  std::uint8_t jumps_ = 0;       ///< relocalisations since the start
 };
 
 }  // namespace tetap::estimators

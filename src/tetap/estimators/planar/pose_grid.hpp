@@ -84,8 +84,8 @@ class PoseGrid {
                          self.origin_y_, self.mark_, base::first(self.waiting_, self.waiting_count_),
                          base::first(self.rays_, self.ray_count_), base::in_turns(self.start_), self.job_,
                          base::count(self.waiting_count_), base::count(self.ray_count_), self.waiting_stamp_,
-                         self.step_stamp_, self.last_absolute_, self.now_, self.digest_, self.share_, self.phase_,
-                         self.laid_out_, self.has_start_);
+                         self.step_stamp_, self.last_absolute_, base::unhashed(self.now_), self.digest_, self.share_,
+                         self.phase_, self.laid_out_, self.has_start_);
   }
   [[nodiscard]] std::uint32_t digest() const { return digest_.value(); }
   /// Every cell, for a comparison of whole states.
@@ -135,7 +135,7 @@ class PoseGrid {
   base::Micros waiting_stamp_;  ///< stamp of the last sighting that waits
   base::Micros step_stamp_;     ///< stamp of the last sighting in the step under way
   base::Micros last_absolute_;
-  base::Micros now_;
+  base::Micros now_;  ///< unhashed: of the last tick, set anew by the next
   base::StateDigest digest_;
   float share_ = 0;
   Phase phase_ = Phase::kWaiting;

@@ -76,8 +76,8 @@ class PoseParticles {
   static constexpr auto members(auto& self) {
     return base::members(base::unhashed(self.cloud_), self.motion_, base::unhashed(self.present_), self.origin_x_,
                          self.origin_y_, base::first(self.batch_, self.batch_size_), base::unhashed(self.landmarks_),
-                         base::count(self.batch_size_), self.batch_stamp_, self.moved_, self.last_absolute_, self.now_,
-                         self.digest_, self.started_);
+                         base::count(self.batch_size_), self.batch_stamp_, self.moved_, self.last_absolute_,
+                         base::unhashed(self.now_), self.digest_, self.started_);
   }
   [[nodiscard]] std::uint32_t digest() const { return digest_.value(); }
   /// Every particle, for a comparison of whole states.
@@ -121,7 +121,7 @@ class PoseParticles {
   base::Micros batch_stamp_;
   base::Micros moved_;  ///< time of the cloud's last motion
   base::Micros last_absolute_;
-  base::Micros now_;
+  base::Micros now_;  ///< unhashed: of the last tick, set anew by the next
   base::StateDigest digest_;
   bool started_ = false;  ///< the cloud stands for a pose
 };

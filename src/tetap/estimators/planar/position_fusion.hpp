@@ -52,7 +52,7 @@ class PositionFusion {
   [[nodiscard]] std::uint8_t receivers() const { return receivers_; }
 
   static constexpr auto members(auto& self) {
-    return base::members(self.x_, self.y_, self.p_, self.epoch_, self.now_, self.receivers_);
+    return base::members(self.x_, self.y_, self.p_, self.epoch_, base::unhashed(self.now_), self.receivers_);
   }
 
  private:
@@ -63,7 +63,7 @@ class PositionFusion {
   base::Anchored x_, y_;
   filter::Symmetric<float, 2> p_;
   base::Micros epoch_;  ///< stamp of the fixes
-  base::Micros now_;
+  base::Micros now_;    ///< unhashed: of the last tick, set anew by the next
   std::uint8_t receivers_ = 0;
 };
 

@@ -81,7 +81,7 @@ class TargetTracker {
     return refused_.count() >= 3 ? sensor::Mode::kDegraded : sensor::Mode::kNominal;
   }
   static constexpr auto members(auto& self) {
-    return base::members(self.filter_, self.time_, self.now_, self.refused_, self.begun_);
+    return base::members(self.filter_, self.time_, base::unhashed(self.now_), self.refused_, self.begun_);
   }
 
  private:
@@ -98,8 +98,8 @@ class TargetTracker {
   }
 
   Filter filter_;
-  base::Micros time_;  ///< time of the state: stamp of the last measurement
-  base::Micros now_;
+  base::Micros time_;            ///< time of the state: stamp of the last measurement
+  base::Micros now_;             ///< unhashed: of the last tick, set anew by the next
   checks::Persistence refused_;  ///< measurements in a row
   bool begun_ = false;
 };
