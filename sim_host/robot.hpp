@@ -21,14 +21,17 @@ struct EstimatorFacts {
   bool pressure = false;
   bool closures = false;
   bool scans = false;
-  bool heading = false;   ///< outside headings
-  bool own_map = false;   ///< one of them makes its map
-  bool nameless = false;  ///< needs no identities for its map
+  bool heading = false;     ///< outside headings
+  bool own_map = false;     ///< one of them makes its map
+  bool nameless = false;    ///< needs no identities for its map
+  bool parameters = false;  ///< its parameters can be changed over the bus
 
   /// Some of the robot's frames have identifiers of the map's block.
-  [[nodiscard]] constexpr bool needs_map_ids() const { return own_map || scans; }
+  [[nodiscard]] constexpr bool needs_map_ids() const { return own_map || scans || parameters; }
   /// Inputs that the robot takes of those behind the map's outputs.
-  [[nodiscard]] constexpr MapInputs map_inputs() const { return {.closures = closures, .scans = scans}; }
+  [[nodiscard]] constexpr MapInputs map_inputs() const {
+    return {.closures = closures, .scans = scans, .parameters = parameters};
+  }
 };
 
 struct Robot {

@@ -41,6 +41,12 @@ template <class... E>
           .own_map = (estimators::MakesMap<E> || ...),
           .nameless = (MapsNameless<E> || ...)};
 }
+template <class Estimators>
+[[nodiscard]] constexpr EstimatorFacts facts_of_robot() {
+  EstimatorFacts facts = facts_of(Estimators{});
+  facts.parameters = node::kHasBusParameters<Estimators>;
+  return facts;
+}
 
 /// Firmware with these estimators, tags and guards included: a host has room for what parameters may ask for. The board
 /// and the parameters outlive it.
@@ -65,7 +71,7 @@ template <class Estimators>
 [[nodiscard]] Robot robot_of(const char* name, const param::Parameters& parameters) {
   return {.name = name,
           .parameters = &parameters,
-          .takes = facts_of(Estimators{}),
+          .takes = facts_of_robot<Estimators>(),
           .make_firmware = &make_firmware<Estimators>};
 }
 

@@ -28,19 +28,22 @@ inline constexpr std::uint64_t kTimeMask = 0xFFFFFFFFFFFF;
   if (frame.extended || frame.id < base || frame.id >= base + bus::kBlock + bus::kMapBlock) return std::nullopt;
   return frame.id - base;
 }
-/// Offsets of inputs behind the map's outputs: displacements, scans, images, closures and features.
+/// Offsets of inputs behind the map's outputs: parameters, displacements, scans, images, closures and features.
 [[nodiscard]] constexpr bool is_map_input(std::uint32_t offset) {
-  return offset >= bus::InRelativePose::kOffset && offset <= bus::InFeature::kOffset;
+  return offset == bus::CmdParamSet::kOffset ||
+         (offset >= bus::InRelativePose::kOffset && offset <= bus::InFeature::kOffset);
 }
 [[nodiscard]] constexpr bool is_input(std::uint32_t offset) { return offset < kInputOffsets || is_map_input(offset); }
 /// Those of them that a robot takes; it counts the others as no inputs.
 struct MapInputs {
   bool closures = false;  ///< features are counted with them
   bool scans = false;
+  bool parameters = false;
 
   [[nodiscard]] constexpr bool has(std::uint32_t offset) const {
     const bool scan = offset == bus::InScanHead::kOffset || offset == bus::InScan::kOffset;
-    return (scans && scan) || (closures && offset >= bus::InClosureFrames::kOffset);
+    return (scans && scan) || (closures && offset >= bus::InClosureFrames::kOffset) ||
+           (parameters && offset == bus::CmdParamSet::kOffset);
   }
 };
 /// A frame the node consumes and counts: of its inputs, sync frames and their guards excepted.

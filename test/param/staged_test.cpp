@@ -38,10 +38,16 @@ void stage(StagedParameters& staged, const Parameters& wanted, const Row& row) {
   for (std::size_t word = 0; word < row.size / 4; ++word)
     EXPECT_EQ(staged.set(row.index, word, word_of(wanted, row, word)), Answer::kDone) << row.path;
 }
-Answer apply(StagedParameters& staged) { return staged.apply(staged.active_crc(), staged.staged_crc()); }
+Answer apply_as(StagedParameters& staged, std::uint32_t before, std::uint32_t after) {
+  const Answer is = staged.judge(before, after);
+  if (is == Answer::kDone) staged.take_over();
+  return is;
+}
+Answer apply(StagedParameters& staged) { return apply_as(staged, staged.active_crc(), staged.staged_crc()); }
 bool is_access(const Row& row) {
   const std::string_view path(row.path);
-  return path == "can_base" || path == "loop.lockstep" || path.substr(0, 4) == "bus.";
+  return path == "can_base" || path == "loop.lockstep" || path == "loop.period_us" || path.starts_with("bus.") ||
+         path.starts_with("wired.");
 }
 
 TEST(StagedParameters, ActAtOnceWhereARowIsLiveAndElseAtARestart) {
@@ -64,7 +70,7 @@ TEST(StagedParameters, ActAtOnceWhereARowIsLiveAndElseAtARestart) {
     ++(is_live ? live : restart);
   }
   EXPECT_EQ(live, live_rows);
-  EXPECT_GE(restart, 80U);  // some need a second row to change
+  EXPECT_GE(restart, 75U);  // some need a second row to change
 }
 
 TEST(StagedParameters, AcceptTheValuesThatTheTableAccepts) {
@@ -100,8 +106,8 @@ TEST(StagedParameters, AreAppliedAsAWholeOrNotAtAll) {
   EXPECT_EQ(staged.set(row_of("publish.std_every")->index, 0, 7), Answer::kDone);
   EXPECT_EQ(staged.set(every.index, 0, 10), Answer::kDone);
   EXPECT_EQ(apply(staged), Answer::kNotTogether);
-  EXPECT_EQ(staged.apply(staged.active_crc(), one), Answer::kOtherStaged);
-  EXPECT_EQ(staged.apply(one, staged.staged_crc()), Answer::kOtherActive);
+  EXPECT_EQ(apply_as(staged, staged.active_crc(), one), Answer::kOtherStaged);
+  EXPECT_EQ(apply_as(staged, one, staged.staged_crc()), Answer::kOtherActive);
   EXPECT_TRUE(equal(staged.active(), kCompiled));
 }
 
@@ -132,8 +138,8 @@ TEST(StagedParameters, KeepWhatIsActiveAndWhatWaits) {
   });
   EXPECT_EQ(words, 2U);
   EXPECT_TRUE(equal(kept, wanted));
-  staged.restore();
-  EXPECT_EQ(apply(staged), Answer::kDone);
+  ASSERT_EQ(staged.restore(staged.active_crc()), Answer::kDone);
+  staged.take_over();
   EXPECT_TRUE(equal(staged.active(), kCompiled));
 }
 

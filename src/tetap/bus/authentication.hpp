@@ -74,7 +74,7 @@ class Authentication {
   void announce(const InGuardTag& tag) {
     if (tag.tag_id < tags_.size()) tags_[tag.tag_id] = {.counter = tag.tag_ctr, .tag = tag.tag_crc, .waits = true};
   }
-  [[nodiscard]] bool waits_for(std::uint8_t offset) const { return tags_[offset].waits; }
+  [[nodiscard]] bool waits_for(std::uint8_t offset) const { return tags_[slot_of(offset)].waits; }
   /// Whether the tag that waits for this frame is right and new; it is used up.
   [[nodiscard]] bool admits(std::uint8_t offset, const base::CanFrame& frame, Counters& counters);
 
@@ -98,6 +98,10 @@ class Authentication {
     bool waits = false;
   };
 
+  /// Guard_TagId of a command.
+  [[nodiscard]] static constexpr std::size_t slot_of(std::uint8_t offset) {
+    return offset == CmdParamSet::kOffset ? 6 : offset;
+  }
   void begin_link() {
     link_ = base::SipHash(parameters_.bus.key);
     link_.add_word(static_cast<std::uint32_t>(chain_));
@@ -111,14 +115,14 @@ class Authentication {
   std::uint64_t chain_ = 0;  ///< hash of all frames up to the last tick; without the key, nothing follows from it
   std::uint32_t inputs_hashed_ = 0;
   std::array<Nonce, 2> nonces_{};  ///< nonces of this turn and of the one before
-  std::array<Tag, 6> tags_{};      ///< by id offset
+  std::array<Tag, 7> tags_{};      ///< by id offset; the last is that of Cmd_Param
   std::uint8_t attempts_ = kAttempts;
   base::Micros more_at_;  ///< time from which another wrong tag is bearable
   std::uint32_t turn_ = 0;
 };
 
 [[gnu::cold]] inline bool Authentication::admits(std::uint8_t offset, const base::CanFrame& frame, Counters& counters) {
-  Tag& tag = tags_[offset];
+  Tag& tag = tags_[slot_of(offset)];
   if (!tag.waits || attempts_ == 0) return ++counters.auth_bad, false;
   for (Nonce& nonce : nonces_) {
     if (nonce.number == 0) continue;

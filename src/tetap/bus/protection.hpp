@@ -18,6 +18,13 @@ namespace tetap::bus {
   return offset >= CmdReset::kOffset && offset <= InMapEntry::kOffset;
 }
 
+/// A frame of Cmd_Param that acts on the active set or on what is kept: it needs what other commands need. A Get acts
+/// on nothing, and a Set on the staged copy alone.
+[[nodiscard]] constexpr bool acts_on_parameters(const base::CanFrame& frame) {
+  const auto bytes = payload(frame);
+  return !decode<CmdParamGet>(bytes) && !decode<CmdParamSet>(bytes);
+}
+
 /// For robots that name no protection: commands are obeyed where they are open to all, and samples are used as they
 /// come.
 class NoProtection {
@@ -37,6 +44,9 @@ class NoProtection {
     return !is_guard(offset, frame);
   }
   [[nodiscard]] bool admits_sync(const base::CanFrame&, Counters&) { return false; }
+  [[nodiscard]] bool admits_parameters(const base::CanFrame&, Counters&) const {
+    return parameters_.bus.commands == param::CommandAccess::kOpen;
+  }
   template <class Out>
   void sample(const sensor::Sample& sample, base::Micros, Counters&, Out&& out) {
     out(sample);
@@ -83,6 +93,13 @@ class Protection {
   [[nodiscard]] bool admits_sync(const base::CanFrame& frame, Counters& counters) {
     return authenticates() && authentication_.waits_for(InSync::kOffset) &&
            authentication_.admits(InSync::kOffset, frame, counters);
+  }
+  /// Whether a frame of Cmd_Param may do what it asks for.
+  [[nodiscard]] bool admits_parameters(const base::CanFrame& frame, Counters& counters) {
+    if (authenticates()) authentication_.input(frame);
+    if (parameters_.bus.commands == param::CommandAccess::kNone) return false;
+    return !authenticates() || !acts_on_parameters(frame) ||
+           authentication_.admits(CmdParamSet::kOffset, frame, counters);
   }
   template <class Out>
   void sample(const sensor::Sample& sample, base::Micros now, Counters& counters, Out&& out) {

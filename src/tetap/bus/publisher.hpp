@@ -157,6 +157,14 @@ class Publisher {
     put(bus::EstVersion{.dirty = version_.dirty, .git = version_.git, .config = config_}, send);
   }
 
+  /// The parameters are others now.
+  void renew_config() { config_ = param::crc(parameters_); }
+  /// The frame of this tick about parameters, if there is one.
+  template <class Commands, class Send>
+  void parameters(Commands& commands, Send& send) {
+    commands.publish(config_, [&](const auto& message) { put(message, send); });
+  }
+
   [[nodiscard]] std::uint32_t epoch() const { return epoch_; }
   /// The next page of diagnostics is the one with the wired sensors.
   void show_wired() {

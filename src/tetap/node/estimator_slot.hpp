@@ -256,6 +256,14 @@ class EstimatorSlot {
     for (estimators::SensorStatistics& s : statistics_) s = {};
   }
 
+  /// The parameters are others now: what the estimator keeps of them is taken anew.
+  void configure(const estimators::Context& ctx) {
+    if constexpr (requires { now_.configure(ctx); }) {
+      now_.configure(ctx);
+      close();
+    }
+  }
+
   /// The statistics sum in the order of arrival, and go out in Est_Stat.
   static constexpr auto members(auto& self) {
     return base::members(self.now_, base::in_turns(self.past_), self.replay_, base::unhashed(self.statistics_));

@@ -12,6 +12,7 @@
 #include "tetap/bus/publisher.hpp"
 #include "tetap/bus/scan_assembly.hpp"
 #include "tetap/bus/stamp_wraps.hpp"
+#include "tetap/node/bus_parameters.hpp"
 #include "tetap/node/bus_protection.hpp"
 #include "tetap/node/fusion_window.hpp"
 #include "tetap/node/landmarks.hpp"
@@ -33,7 +34,10 @@ template <class Estimators, std::size_t TimelineCapacity = Estimators::kSamples>
 class Node {
  public:
   Node(const param::Parameters& parameters, const bus::Version& version)
-      : parameters_(parameters), protection_(parameters), publisher_(parameters, version) {
+      : parameter_commands_(parameters),
+        parameters_(parameter_commands_.active(parameters)),
+        protection_(parameters_),
+        publisher_(parameters_, version) {
     power_on(base::Micros{});
   }
 
@@ -63,7 +67,8 @@ class Node {
   static constexpr bool kTakesScans = Estimators::template kTakes<sensor::PlanarScan>;
   /// Whether a frame behind the map's outputs is an input of this robot.
   [[nodiscard]] static constexpr bool takes_map_input(std::uint8_t offset) {
-    return (kTakesClosures && bus::ClosureAssembly::takes(offset)) || (kTakesScans && bus::ScanAssembly::takes(offset));
+    return (kTakesClosures && bus::ClosureAssembly::takes(offset)) ||
+           (kTakesScans && bus::ScanAssembly::takes(offset)) || BusParameters<Estimators>::takes(offset);
   }
   /// Called by the inbox.
   void sample(const sensor::Sample& sample) {
@@ -103,21 +108,27 @@ class Node {
     return hash.value();
   }
   /// Goes on from the state of another node of this robot. References and pointers stay its own.
-  void resume(const Node& other) { base::resume(*this, other); }
+  void resume(const Node& other) {
+    base::resume(*this, other);
+    if constexpr (kHasBusParameters<Estimators>) publisher_.renew_config();
+  }
   /// The intake is not hashed: half-received samples and commands, wraps of stamps. The CRC of the inputs has their
   /// frames, and their places depend on the order of arrival. Nor is the output, which goes out as it is: tallies,
   /// the queue of records, both CRCs.
   static constexpr auto members(auto& self) {
-    return base::members(base::reference(self.parameters_), base::kept(self.window_), self.map_frame_,
-                         base::in_turns(self.origin_), base::unhashed(self.protection_), base::unhashed(self.inbox_),
-                         base::unhashed(self.closures_), base::unhashed(self.scans_), base::unhashed(self.wraps_),
-                         base::unhashed(self.counters_), base::unhashed(self.publisher_), self.landmarks_,
-                         self.pending_reset_, base::kept(self.wired_off_), self.pending_pose_, self.now_, self.ticked_,
-                         base::unhashed(self.input_crc_), self.resets_, self.reset_cause_, self.restarted_at_,
-                         self.jumps_, self.disagreement_, self.map_faults_);
+    return base::members(
+        base::kept(self.parameter_commands_), base::reference(self.parameters_), base::kept(self.window_),
+        self.map_frame_, base::in_turns(self.origin_), base::unhashed(self.protection_), base::unhashed(self.inbox_),
+        base::unhashed(self.closures_), base::unhashed(self.scans_), base::unhashed(self.wraps_),
+        base::unhashed(self.counters_), base::unhashed(self.publisher_), self.landmarks_, self.pending_reset_,
+        base::kept(self.wired_off_), self.pending_pose_, self.now_, self.ticked_, base::unhashed(self.input_crc_),
+        self.resets_, self.reset_cause_, self.restarted_at_, self.jumps_, self.disagreement_, self.map_faults_);
   }
   /// For a copy that others get: nothing is left from which the key of commands could be computed. Between ticks only.
-  void hide_secrets() { protection_.hide_secrets(); }
+  void hide_secrets() {
+    protection_.hide_secrets();
+    parameter_commands_.hide_secrets();
+  }
 
  private:
   [[gnu::cold, gnu::noinline]] void switch_wired(bool off) {
@@ -161,6 +172,7 @@ class Node {
   void restart(base::Micros t, sensor::ResetCause cause);
   void consume(base::Micros t);
   void close_window(base::Micros t);
+  void apply_parameters(base::Micros before);
   void apply_map(base::Micros before);
   void apply_commands();
   void restart_in_new_map();
@@ -194,7 +206,8 @@ class Node {
   [[nodiscard]] std::uint32_t state_crc() const;
   [[nodiscard]] bus::Summary summary(const estimators::Estimate& estimate) const;
 
-  const param::Parameters& parameters_;
+  [[no_unique_address]] BusParameters<Estimators> parameter_commands_;
+  const param::Parameters& parameters_;  ///< the active ones
   FusionWindow window_;
   estimators::MapFrame map_frame_;
   MapOrigin origin_;
@@ -225,6 +238,10 @@ class Node {
 template <class Estimators, std::size_t Capacity>
 void Node<Estimators, Capacity>::power_on(base::Micros t) {
   base::clear(*this);
+  if constexpr (kHasBusParameters<Estimators>) {
+    parameter_commands_.power_on();
+    publisher_.renew_config();
+  }
   now_ = restarted_at_ = t;
   landmarks_.power_on(map_frame_);
   origin_.power_on(map_frame_, parameters_.gnss);
@@ -246,6 +263,10 @@ void Node<Estimators, Capacity>::on_frame(const base::CanFrame& frame) {
         scans_.on_frame(offset, frame, bits, now_, counters_, *this);
       return;
     }
+  }
+  if constexpr (kHasBusParameters<Estimators>) {
+    if (bus::ParameterCommands::takes(offset))
+      return parameter_commands_.on_frame(frame, protection_.admits_parameters(frame, counters_), counters_);
   }
   const bool admitted =
       protection_.admits(offset, frame, now_, counters_, [this](const sensor::Sample& vouched) { take(vouched); });
@@ -280,6 +301,7 @@ template <class Estimators, std::size_t Capacity>
 template <class Send>
 void Node<Estimators, Capacity>::tick(base::Micros t, const bus::LoopHealth& loop, Send&& send) {
   publisher_.tick_begins();
+  if (kHasBusParameters<Estimators> && !ticked_) apply_parameters(now_);  // before anything begins with the old ones
   if (!ticked_) {
     restart(t, sensor::ResetCause::kPowerOn);
     ticked_ = true;
@@ -293,6 +315,7 @@ void Node<Estimators, Capacity>::tick(base::Micros t, const bus::LoopHealth& loo
   inbox_.expire(now_, base::Micros{parameters_.loop.window_us}, counters_);
   closures_.expire(now_, base::Micros{parameters_.loop.window_us}, counters_);
   scans_.expire(now_, base::Micros{parameters_.loop.window_us}, counters_);
+  apply_parameters(before);
   apply_map(before);
   consume(now_);
   if (origin_.take_replaced()) restart_in_new_map();
@@ -340,6 +363,7 @@ void Node<Estimators, Capacity>::tick(base::Micros t, const bus::LoopHealth& loo
   else
     publisher_.refusals(counters_, loop, nullptr, send);
   publisher_.identity(map_frame_, send);
+  if constexpr (kHasBusParameters<Estimators>) publisher_.parameters(parameter_commands_, send);
   publisher_.events(send);
   window_.retire_until(now_ - base::Micros{parameters_.loop.window_us}, context(), noting());
   publisher_.end(kHasBus<Estimators> ? state_crc() : 0, input_crc_, send);
@@ -386,6 +410,20 @@ void Node<Estimators, Capacity>::note(std::size_t instance, const sensor::Sample
       innovation.verdict == sensor::Verdict::kRejected && innovation.failed == sensor::Check::kValue;
   if ((innovation.dof > 0 && !ordinary) || innovation.verdict > sensor::Verdict::kNotUsed || impossible)
     publisher_.event(innovation, sample, instance, now_, counters_);
+}
+
+template <class Estimators, std::size_t Capacity>
+void Node<Estimators, Capacity>::apply_parameters(base::Micros before) {
+  if constexpr (kHasBusParameters<Estimators>) {
+    if (!parameter_commands_.accepts()) return;
+    if (ticked_) {
+      consume(before);  // what came late belongs to the parameters as they were
+      close_window(before);
+    }
+    parameter_commands_.take_over();
+    publisher_.renew_config();
+    window_.each_slot([&](auto& slot) { slot.configure(context()); });
+  }
 }
 
 template <class Estimators, std::size_t Capacity>

@@ -20,7 +20,7 @@ namespace tetap::node {
 
 template <class Estimators, std::size_t kMostRecords>
 struct WithoutBus : Estimators {
-  static constexpr bool kBus = false;
+  static constexpr bool kBus = false, kBusParameters = false;
   static constexpr std::size_t kRecords = kMostRecords;
 };
 

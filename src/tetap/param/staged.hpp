@@ -3,6 +3,7 @@
 // as a whole or not at all. Live rows are active at once; the others wait for a restart.
 #pragma once
 
+#include "tetap/base/members.hpp"
 #include "tetap/param/crc.hpp"
 #include "tetap/param/stored_row.hpp"
 
@@ -25,19 +26,58 @@ enum class Answer : std::uint8_t {
   kNotTogether,  ///< a rule between rows is broken, by the staged set or by its live rows alone
 };
 
+/// The sets that a row is read from; the numbers are those on the bus.
+enum class Source : std::uint8_t { kActive, kStaged, kCompiled };
+
 class StagedParameters {
  public:
+  /// Bits of a CRC by which a command names a set.
+  static constexpr std::uint32_t kName = 0xFFFFFF;
+
   /// The compiled parameters outlive it.
   explicit StagedParameters(const Parameters& compiled) : compiled_(compiled), active_(compiled), staged_(compiled) {}
 
   [[nodiscard]] const Parameters& active() const { return active_; }
   [[nodiscard]] std::uint32_t active_crc() const { return crc(active_); }
   [[nodiscard]] std::uint32_t staged_crc() const { return crc(staged_); }
+  /// Whether there is such a row, with so many words.
+  [[nodiscard]] static bool has(std::uint16_t index, std::size_t word) {
+    const std::size_t at = find(index);
+    return at < kStoredRows.size() && word < kStoredRows[at].words && !is_secret(at);
+  }
+  /// 0 where there is none, and of the key.
+  [[nodiscard]] std::uint32_t value(Source source, std::uint16_t index, std::size_t word) const {
+    if (!has(index, word)) return 0;
+    const Parameters& of = source == Source::kActive ? active_ : source == Source::kStaged ? staged_ : compiled_;
+    return get(of, kStoredRows[find(index)], word);
+  }
+  /// The word of the active set is not as compiled; `row` counts in kStoredRows.
+  [[nodiscard]] bool is_changed(std::size_t row, std::size_t word) const {
+    return get(active_, kStoredRows[row], word) != get(compiled_, kStoredRows[row], word);
+  }
+  [[nodiscard]] std::size_t changed() const {
+    std::size_t words = 0;
+    for (std::size_t row = 0; row < kStoredRows.size(); ++row)
+      for (std::size_t word = 0; word < kStoredRows[row].words; ++word) words += is_changed(row, word) ? 1U : 0U;
+    return words;
+  }
   /// Rows that wait for a restart.
   [[nodiscard]] std::size_t pending() const {
     std::size_t rows = 0;
     for (std::size_t row = 0; row < kStoredRows.size(); ++row) rows += is_pending(row) ? 1U : 0U;
     return rows;
+  }
+
+  static constexpr auto members(auto& self) {
+    return base::members(base::reference(self.compiled_), base::unhashed(self.active_), base::unhashed(self.staged_),
+                         base::unhashed(self.waits_));
+  }
+  /// For a copy that others get.
+  void hide_secrets() { active_.bus.key = staged_.bus.key = {}; }
+  /// All but the compiled set, from a state whose secrets may be hidden: the key is always the compiled one.
+  void resume(const StagedParameters& other) {
+    active_ = other.active_, staged_ = other.staged_, waits_ = other.waits_;
+    active_.bus.key = staged_.bus.key = compiled_.bus.key;
   }
 
   /// One word of a row of the staged copy; a row that waited for a restart does not wait any more.
@@ -51,24 +91,26 @@ class StagedParameters {
     wait(at, false);
     return Answer::kDone;
   }
-  /// `before` and `behind`: CRC of the active set that the sender knows, and of the staged one that it means.
-  Answer apply(std::uint32_t before, std::uint32_t behind) {
-    if (before != active_crc()) return Answer::kOtherActive;
-    if (behind != staged_crc()) return Answer::kOtherStaged;
-    const auto live = [](std::size_t row) { return kStoredRows[row].live; };
-    if (!plausible_together(staged_) || !exchange(live)) return Answer::kNotTogether;
-    for (std::size_t row = 0; row < kStoredRows.size(); ++row) {
-      if (live(row)) copy(active_, staged_, kStoredRows[row]);
-      wait(row, !live(row) && differ(active_, staged_, kStoredRows[row]));
-    }
-    return Answer::kDone;
+  /// Whether take_over() may follow. `before` and `after`: names (kName) of the active set that the sender knows, and
+  /// of the staged one that it means.
+  [[nodiscard]] Answer judge(std::uint32_t before, std::uint32_t after) {
+    if (((before ^ active_crc()) & kName) != 0) return Answer::kOtherActive;
+    if (((after ^ staged_crc()) & kName) != 0) return Answer::kOtherStaged;
+    return judge();
   }
-  /// The compiled parameters become the staged ones, but for rows of access.
-  void restore() {
+  /// Stages the compiled parameters, but for rows of access, and judges them.
+  [[nodiscard]] Answer restore(std::uint32_t before) {
+    if (((before ^ active_crc()) & kName) != 0) return Answer::kOtherActive;
+    for (std::size_t row = 0; row < kStoredRows.size(); ++row)
+      if (!kStoredRows[row].access) copy(compiled_, staged_, kStoredRows[row]);
+    return judge();
+  }
+  /// Live rows are active, the others wait where they differ.
+  void take_over() {
     for (std::size_t row = 0; row < kStoredRows.size(); ++row) {
-      if (kStoredRows[row].access) continue;
-      copy(compiled_, staged_, kStoredRows[row]);
-      wait(row, false);
+      const bool live = kStoredRows[row].live;
+      if (live) copy(staged_, active_, kStoredRows[row]);
+      wait(row, !live && differ(active_, staged_, kStoredRows[row]));
     }
   }
   /// At a restart: rows that wait are active. What is staged without an Apply is gone.
@@ -90,6 +132,14 @@ class StagedParameters {
 
  private:
   static constexpr std::size_t kBits = 32;
+
+  [[nodiscard]] Answer judge() {
+    const auto live = [](std::size_t row) { return kStoredRows[row].live; };
+    if (!plausible_together(staged_) || !exchange(live)) return Answer::kNotTogether;
+    static_cast<void>(exchange(live));
+    return Answer::kDone;
+  }
+  static bool is_secret(std::size_t row) { return kStoredRows[row].secret; }
 
   [[nodiscard]] static std::size_t find(std::uint16_t index) {
     std::size_t at = 0;

@@ -22,7 +22,8 @@ struct StoredRow {
   std::uint8_t words;    ///< 32 bits each; two an element of kLong, low word first
   Kind kind;
   bool live;
-  bool access;                ///< who may speak to the node, and under which identity
+  bool access;                ///< identity, and what the firmware around the node reads once: never over the bus
+  bool secret;                ///< never told
   std::uint32_t least, most;  ///< limits as stored; not of kLong
 
   [[nodiscard]] constexpr bool within(std::uint32_t word) const {
@@ -70,7 +71,9 @@ constexpr StoredRow stored(const Row& row) {
           .words = static_cast<std::uint8_t>(row.size / 4),
           .kind = kind,
           .live = row.effect == Effect::kLive,
-          .access = path.starts_with("bus.") || path == "can_base" || path == "loop.lockstep",
+          .access = path.starts_with("bus.") || path.starts_with("wired.") || path == "can_base" ||
+                    path == "loop.lockstep" || path == "loop.period_us",
+          .secret = path == "bus.key",
           .least = kind == Kind::kFloat  ? float_limit(row, row.minimum, false)
                    : kind == Kind::kLong ? 0
                                          : whole(row.minimum),

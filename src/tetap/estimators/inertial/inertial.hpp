@@ -66,6 +66,8 @@ class Inertial {
   [[nodiscard]] AttitudeEstimate inertial_attitude() const { return attitude_of(present(), tracking()); }
   /// Level plane of the place, in the map.
   [[nodiscard]] const nav::LocalLevel& level() const { return level_; }
+  /// The parameters are others now.
+  void configure(const Context& ctx) { set_noise(ctx.parameters.inertial); }
   [[nodiscard]] sensor::Mode mode(const Context& ctx) const;
   /// State of every source, and the test that failed last.
   [[nodiscard]] SourceStates sources(const Context& ctx) const;

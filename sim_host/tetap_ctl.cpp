@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: Apache-2.0
+// tetapctl: reads and changes the parameters of a running node over its bus.
+#include "hal/board/linux/socket_can.hpp"
+#include "sim_host/control/parameter_client.hpp"
+#include "sim_host/parameter_settings.hpp"
+#include "tetap/param/crc.hpp"
+#include "tetap/param/table.hpp"
+
+#include <cstdio>
+#include <ctime>
+#include <exception>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace {
+
+using namespace tetap;
+using bus::ParamSource;
+
+constexpr const char* kHelp =
+    "usage: tetapctl [OPTION]... COMMAND\n\nParameters of a running node whose robot takes them from the bus.\n\n"
+    "  list               all rows with their active values\n"
+    "  get PATH...        rows of these paths\n"
+    "  diff               rows that are not as compiled: path, compiled value, active value\n"
+    "  set PATH=VALUE...  all of these at one tick, or none\n"
+    "  load FILE          the same with a file of `path = value` lines\n"
+    "  restore            the compiled values\n\n"
+    "  --interface NAME   (default vcan0)\n"
+    "  --base ID          first identifier of the node's block (default 0x300)\n"
+    "  --json             list, get, diff: a list of rows\n\n"
+    "A row that needs a restart waits for a Begin frame; it is lost with the node's power: no board keeps it yet.\n"
+    "Status: 0 done, 1 refused or no answer, 2 wrong command line.\n";
+
+base::Micros now() {
+  timespec time{};
+  clock_gettime(CLOCK_MONOTONIC, &time);
+  return {time.tv_sec * 1'000'000 + time.tv_nsec / 1'000};
+}
+
+std::optional<base::CanFrame> receive(hal::SocketCan& can, base::Micros patience) {
+  const base::Micros until = now() + patience;
+  for (;;) {
+    if (const auto frame = can.receive()) return frame;
+    const base::Micros left = until - now();
+    if (left.us <= 0) return std::nullopt;
+    can.wait(left);
+  }
+}
+
+const param::Row& row_of(const std::string& path) {
+  for (const param::Row& row : param::kTable)
+    if (path == row.path) return row;
+  throw sim::UsageError("there is no parameter '" + path + "'");
+}
+
+struct Printer {
+  bool json;
+  bool first = true;
+  void row(const param::Row& row, const param::Parameters& p, const param::Parameters* compiled = nullptr) {
+    if (json) {
+      std::printf("%s {\"path\": \"%s\", \"unit\": \"%s\", \"value\": %s", first ? "[\n" : ",\n", row.path, row.unit,
+                  sim::json_value(row, p).c_str());
+      if (compiled != nullptr) std::printf(", \"compiled\": %s", sim::json_value(row, *compiled).c_str());
+      std::printf(", \"needs_restart\": %s}", row.effect == param::Effect::kRestart ? "true" : "false");
+    } else if (compiled != nullptr) {
+      std::printf("%s: %s -> %s %s\n", row.path, sim::value_text(row, *compiled).c_str(),
+                  sim::value_text(row, p).c_str(), row.unit);
+    } else {
+      std::printf("%-48s %s%s\n", (std::string(row.path) + " = " + sim::value_text(row, p)).c_str(),
+                  *row.unit == '\0' ? "" : "# ", row.unit);
+    }
+    first = false;
+  }
+  void end() const {
+    if (json) std::fputs(first ? "[]\n" : "\n]\n", stdout);
+  }
+};
+
+void print_result(const bus::EstParamSet& set) {
+  std::printf("done: configuration 0x%08X, %u words are not as compiled", set.set_config, set.set_changed);
+  if (set.set_pending != 0) std::printf(", %u rows wait for a restart", set.set_pending);
+  std::fputs("\n", stdout);
+}
+
+void run(const std::string& command, const std::vector<std::string>& words, sim::ParameterClient& client, bool json) {
+  const param::Parameters active = client.read(ParamSource::kActive);
+  Printer printer{json};
+  if (command == "list") {
+    for (const param::Row& row : param::kTable)
+      if (!param::is_secret(row)) printer.row(row, active);
+    printer.end();
+  } else if (command == "get") {
+    for (const std::string& path : words) printer.row(row_of(path), active);
+    printer.end();
+  } else if (command == "diff") {
+    const param::Parameters compiled = client.read(ParamSource::kCompiled);
+    for (const param::Row& row : param::kTable)
+      if (sim::value_text(row, active) != sim::value_text(row, compiled)) printer.row(row, active, &compiled);
+    printer.end();
+  } else if (command == "restore") {
+    print_result(client.restore(active));
+  } else {
+    std::vector<std::string> arguments;
+    for (const std::string& word : words)
+      arguments.insert(arguments.end(), {command == "load" ? "--params" : "--set", word});
+    sim::Arguments given(arguments);
+    print_result(client.change(active, sim::ParameterSettings(given).over(active)));
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) try {
+  sim::Arguments arguments(argc, argv);
+  if (arguments.flag("--help") || arguments.flag("-h")) return std::fputs(kHelp, stdout), 0;
+  const std::string interface = arguments.text("--interface").value_or("vcan0");
+  const std::uint32_t base = arguments.base();
+  const bool json = arguments.flag("--json");
+  std::vector<std::string> words;
+  while (auto word = arguments.positional()) words.push_back(std::move(*word));
+  arguments.finish();
+  const std::string command = words.empty() ? "" : words.front();
+  if (!words.empty()) words.erase(words.begin());
+  const bool needs_words = command == "get" || command == "set" || command == "load";
+  if (!needs_words && command != "list" && command != "diff" && command != "restore")
+    throw sim::UsageError(command.empty() ? "no command; see tetapctl --help"
+                                          : "there is no command '" + command + "'");
+  if (needs_words == words.empty()) throw sim::UsageError(command + (needs_words ? " needs a path" : " takes no path"));
+  if (command == "get")
+    for (const std::string& path : words) static_cast<void>(row_of(path));
+  hal::SocketCan can(interface);
+  sim::ParameterClient client(
+      base,
+      [&](const base::CanFrame& frame) {
+        can.send(frame);
+        can.flush();
+      },
+      [&](base::Micros patience) { return receive(can, patience); }, now);
+  run(command, words, client, json);
+  return 0;
+} catch (const tetap::sim::UsageError& error) {
+  std::fprintf(stderr, "tetapctl: %s\n", error.what());
+  return 2;
+} catch (const std::exception& error) {
+  std::fprintf(stderr, "tetapctl: %s\n", error.what());
+  return 1;
+}

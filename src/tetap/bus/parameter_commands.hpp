@@ -1,0 +1,202 @@
+// SPDX-License-Identifier: Apache-2.0
+// Parameters of a running node over the bus: Cmd_Param in, Est_Param out. A Get or a Set is answered with a row; an
+// Apply or a Restore acts at the next tick and is answered with the set's CRC. One frame goes out a tick. After a
+// power-on and each change, every word that is not as compiled follows: a log tells the parameters of each epoch.
+#pragma once
+
+#include "tetap/base/members.hpp"
+#include "tetap/bus/codec.hpp"
+#include "tetap/bus/counters.hpp"
+#include "tetap/bus/e2e.hpp"
+#include "tetap/bus/messages.hpp"
+#include "tetap/param/staged.hpp"
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+
+namespace tetap::bus {
+
+class ParameterCommands {
+ public:
+  explicit ParameterCommands(const param::Parameters& compiled) : staged_(compiled) {}
+
+  [[nodiscard]] static constexpr bool takes(std::uint8_t offset) { return offset == CmdParamSet::kOffset; }
+  [[nodiscard]] const param::Parameters& active(const param::Parameters&) const { return staged_.active(); }
+
+  /// Rows that waited for a restart are active.
+  void power_on() {
+    staged_.restart();
+    size_ = next_row_ = 0;
+    next_word_ = 0;
+    asked_.reset();
+    answer({.page = EstParamSet::kSetPageIdNotAvailable});
+  }
+  void hide_secrets() { staged_.hide_secrets(); }
+  /// None is hashed: Est_Param has the CRC of what is active, and what was only asked for acts on nothing.
+  static constexpr auto members(auto& self) {
+    return base::members(base::unhashed(self.staged_), base::unhashed(self.asked_), base::unhashed(self.answers_),
+                         base::unhashed(self.size_), base::unhashed(self.next_row_), base::unhashed(self.next_word_));
+  }
+
+  /// A command; `admitted`: the node's protection lets it act.
+  void on_frame(const base::CanFrame& frame, bool admitted, Counters& counters);
+
+  /// At the begin of a tick: what is asked for is refused, or take_over() has to follow.
+  [[nodiscard]] bool accepts() { return asked_ && judge(); }
+  void take_over();
+
+  /// The CRC of the active set, as `config`; take(message) for the frame of this tick.
+  template <class Take>
+  void publish(std::uint32_t config, Take&& take);
+
+ private:
+  static constexpr std::size_t kAnswers = 8;      ///< between two ticks
+  static constexpr std::size_t kRowsPerTick = 8;  ///< looked at for one that is not as compiled
+
+  struct Answer {
+    std::uint8_t page = 0;  ///< of the command; not available: a power-on
+    std::uint8_t counter = EstParamSet::kSetCtrNotAvailable;
+    ParamAnswer is = ParamAnswer::kDone;
+    param::Source source = param::Source::kActive;
+    std::uint8_t word = 0;
+    std::uint16_t row = 0;
+  };
+  struct Asked {
+    std::uint8_t page = 0;
+    std::uint8_t counter = 0;
+    std::uint32_t before = 0, after = 0;
+  };
+
+  void answer(const Answer& answer) {
+    if (size_ < answers_.size()) answers_[size_++] = answer;
+  }
+  [[nodiscard]] bool judge();
+  void get(const CmdParamGet& command);
+  void set(const CmdParamSet& command, bool admitted);
+  /// One at a tick.
+  void ask(const Asked& asked) {
+    if (asked_) return answer({.page = asked.page, .counter = asked.counter, .is = ParamAnswer::kBusy});
+    asked_ = asked;
+  }
+  template <class Take>
+  void send(const Answer& of, std::uint32_t config, Take& take) const;
+
+  param::StagedParameters staged_;
+  std::optional<Asked> asked_;
+  std::array<Answer, kAnswers> answers_{};
+  std::size_t size_ = 0;
+  std::size_t next_row_ = 0;  ///< row that is looked at next; behind the last one: all words are told
+  std::uint8_t next_word_ = 0;
+};
+
+/// In place of it, in robots that take no parameters from the bus.
+class NoParameterCommands {
+ public:
+  explicit NoParameterCommands(const param::Parameters&) {}
+  [[nodiscard]] static constexpr bool takes(std::uint8_t) { return false; }
+  [[nodiscard]] static const param::Parameters& active(const param::Parameters& compiled) { return compiled; }
+  void power_on() {}
+  void hide_secrets() {}
+};
+
+[[gnu::cold]] inline void ParameterCommands::on_frame(const base::CanFrame& frame, bool admitted, Counters& counters) {
+  const auto bytes = payload(frame);
+  if (!e2e_valid(CmdParamSet::kOffset, bytes)) return void(++counters.command_refused);
+  if (size_ == answers_.size()) return void(++counters.command_rate);
+  if (const auto command = decode<CmdParamGet>(bytes)) return get(*command);
+  if (const auto command = decode<CmdParamSet>(bytes)) return set(*command, admitted);
+  const auto refuse = [&](std::uint8_t page, std::uint8_t counter, ParamAnswer why) {
+    answer({.page = page, .counter = counter, .is = why});
+  };
+  if (const auto command = decode<CmdParamSave>(bytes))
+    return refuse(CmdParamSave::kPage, command->ctr, admitted ? ParamAnswer::kNotKept : ParamAnswer::kRefused);
+  if (const auto command = decode<CmdParamApply>(bytes)) {
+    if (!admitted) return refuse(CmdParamApply::kPage, command->ctr, ParamAnswer::kRefused);
+    return ask({CmdParamApply::kPage, command->ctr, command->apply_before_crc, command->apply_after_crc});
+  }
+  if (const auto command = decode<CmdParamRestore>(bytes)) {
+    if (!admitted) return refuse(CmdParamRestore::kPage, command->ctr, ParamAnswer::kRefused);
+    return ask({CmdParamRestore::kPage, command->ctr, command->restore_before_crc, 0});
+  }
+  ++counters.malformed;
+}
+
+inline void ParameterCommands::get(const CmdParamGet& command) {
+  const auto source = static_cast<param::Source>(command.get_source);
+  const bool known = source <= param::Source::kCompiled && staged_.has(command.get_row_id, command.get_word);
+  answer({.page = CmdParamGet::kPage,
+          .counter = command.ctr,
+          .is = known ? ParamAnswer::kDone : ParamAnswer::kUnknown,
+          .source = source,
+          .word = command.get_word,
+          .row = command.get_row_id});
+}
+
+inline void ParameterCommands::set(const CmdParamSet& command, bool admitted) {
+  const ParamAnswer is =
+      admitted ? static_cast<ParamAnswer>(staged_.set(command.set_row_id, command.set_word, command.set_value))
+               : ParamAnswer::kRefused;
+  answer({.page = CmdParamSet::kPage,
+          .counter = command.ctr,
+          .is = is,
+          .source = param::Source::kStaged,
+          .word = command.set_word,
+          .row = command.set_row_id});
+}
+
+[[gnu::cold]] inline bool ParameterCommands::judge() {
+  const param::Answer is = asked_->page == CmdParamApply::kPage ? staged_.judge(asked_->before, asked_->after)
+                                                                : staged_.restore(asked_->before);
+  answer({.page = asked_->page, .counter = asked_->counter, .is = static_cast<ParamAnswer>(is)});
+  asked_.reset();
+  return is == param::Answer::kDone;
+}
+
+[[gnu::cold]] inline void ParameterCommands::take_over() {
+  staged_.take_over();
+  next_row_ = next_word_ = 0;
+}
+
+template <class Take>
+void ParameterCommands::send(const Answer& of, std::uint32_t config, Take& take) const {
+  if (of.page == CmdParamGet::kPage || of.page == CmdParamSet::kPage) {
+    take(EstParamRow{.row_source = static_cast<ParamSource>(of.source),
+                     .row_word = of.word,
+                     .row_id = of.row,
+                     .row_answer = of.is,
+                     .row_ctr = of.counter,
+                     .row_value = staged_.value(of.source, of.row, of.word)});
+    return;
+  }
+  const auto most = [](std::size_t count) { return static_cast<std::uint8_t>(count > 254 ? 254 : count); };
+  take(EstParamSet{.set_page_id = of.page,
+                   .set_answer = of.is,
+                   .set_ctr = of.counter,
+                   .set_pending = most(staged_.pending()),
+                   .set_changed = most(staged_.changed()),
+                   .set_config = config});
+}
+
+template <class Take>
+void ParameterCommands::publish(std::uint32_t config, Take&& take) {
+  if (size_ != 0) {
+    send(answers_[0], config, take);
+    --size_;
+    for (std::size_t i = 0; i < size_; ++i) answers_[i] = answers_[i + 1];
+    return;
+  }
+  for (std::size_t looked = 0; looked < kRowsPerTick && next_row_ < param::kStoredRows.size(); ++looked) {
+    const param::StoredRow& row = param::kStoredRows[next_row_];
+    while (next_word_ < row.words) {
+      const std::uint8_t word = next_word_++;
+      if (!staged_.is_changed(next_row_, word)) continue;
+      send({.page = CmdParamGet::kPage, .word = word, .row = row.index}, config, take);
+      return;
+    }
+    ++next_row_, next_word_ = 0;
+  }
+}
+
+}  // namespace tetap::bus
