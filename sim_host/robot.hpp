@@ -20,6 +20,7 @@ struct EstimatorFacts {
   bool magnetic = false;
   bool pressure = false;
   bool closures = false;
+  bool images = false;  ///< a camera's
   bool scans = false;
   bool heading = false;     ///< outside headings
   bool own_map = false;     ///< one of them makes its map
@@ -27,10 +28,10 @@ struct EstimatorFacts {
   bool parameters = false;  ///< its parameters can be changed over the bus
 
   /// Some of the robot's frames have identifiers of the map's block.
-  [[nodiscard]] constexpr bool needs_map_ids() const { return own_map || scans || parameters; }
+  [[nodiscard]] constexpr bool needs_map_ids() const { return own_map || images || scans || parameters; }
   /// Inputs that the robot takes of those behind the map's outputs.
   [[nodiscard]] constexpr MapInputs map_inputs() const {
-    return {.closures = closures, .scans = scans, .parameters = parameters};
+    return {.closures = closures, .images = images, .scans = scans, .parameters = parameters};
   }
 };
 

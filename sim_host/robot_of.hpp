@@ -36,6 +36,7 @@ template <class... E>
           .magnetic = (Takes<E, sensor::MagneticFlux> || ...),
           .pressure = (Takes<E, sensor::AirPressure> || ...),
           .closures = (Takes<E, sensor::LoopClosure> || ...),
+          .images = (Takes<E, sensor::CameraImage> || ...),
           .scans = (Takes<E, sensor::PlanarScan> || ...),
           .heading = (Takes<E, sensor::OutsideHeading> || ...),
           .own_map = (estimators::MakesMap<E> || ...),

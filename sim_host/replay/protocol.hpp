@@ -36,13 +36,15 @@ inline constexpr std::uint64_t kTimeMask = 0xFFFFFFFFFFFF;
 [[nodiscard]] constexpr bool is_input(std::uint32_t offset) { return offset < kInputOffsets || is_map_input(offset); }
 /// Those of them that a robot takes; it counts the others as no inputs.
 struct MapInputs {
-  bool closures = false;  ///< features are counted with them
+  bool closures = false;
+  bool images = false;
   bool scans = false;
   bool parameters = false;
 
   [[nodiscard]] constexpr bool has(std::uint32_t offset) const {
+    const bool image = offset == bus::InImage::kOffset || offset == bus::InFeature::kOffset;
     const bool scan = offset == bus::InScanHead::kOffset || offset == bus::InScan::kOffset;
-    return (scans && scan) || (closures && offset >= bus::InClosureFrames::kOffset) ||
+    return (images && image) || (scans && scan) || (closures && offset == bus::InClosureFrames::kOffset) ||
            (parameters && offset == bus::CmdParamSet::kOffset);
   }
 };

@@ -186,13 +186,6 @@ TEST_F(GraphMapperTest, BadClosuresAreCountedAndLoseNothing) {
   EXPECT_NEAR(x_m_, 11, 0.002) << "the graph goes on";
 }
 
-TEST_F(GraphMapperTest, FeaturesAreCountedAndUsedByNothing) {
-  tick({in(bus::InFeature{.u = 3.0F, .v = 5.0F}), in(bus::InFeature{.u = base::kNan, .v = 5.0F})});
-  ticks(30);
-  EXPECT_EQ(counted_.out_of_range, 1);
-  EXPECT_EQ(refused_.not_used, 1);
-}
-
 TEST_F(GraphMapperTest, AClosureFromBeforeTheWindowIsRefusedAndCounted) {
   drive(5);
   const Frames late = pages(0, 5, 5, 0, 0);

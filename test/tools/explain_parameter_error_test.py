@@ -59,7 +59,7 @@ class RefusedParameters(unittest.TestCase):
 
     def test_a_robot_that_maps_needs_ids_behind_its_block(self):
         for compiler in COMPILERS:
-            for base, expected in ((".can_base = 0x340", (1, ["config/robot0.hpp: can_base is 832; it has to be a multiple of 128, for its own map has ids behind the block of 64"])),
+            for base, expected in ((".can_base = 0x340", (1, ["config/robot0.hpp: can_base is 832; it has to be a multiple of 128, for maps and images have ids behind the block of 64"])),
                                    (".can_base = 0x380", (0, []))):
                 self.assertEqual(self.sentences_of(compiler, [base], "static_assert(tetap::param::checked_map_ids(true, robot0));"), expected, compiler)
             self.assertEqual(self.sentences_of(compiler, [".can_base = 0x340"], "static_assert(tetap::param::checked_map_ids(false, robot0));"), (0, []), compiler)

@@ -7,8 +7,10 @@
 
 namespace tetap::base {
 
-template <class T>
-requires(std::is_trivially_destructible_v<T>) void reinitialise(T& object) { ::new (static_cast<void*>(&object)) T(); }
+template <class T, class... Arguments>
+requires(std::is_trivially_destructible_v<T>) void reinitialise(T& object, const Arguments&... arguments) {
+  ::new (static_cast<void*>(&object)) T(arguments...);
+}
 
 /// Begins the life of a union's member in its own place; its numbers are not set.
 template <class T>

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // In_Closure, four pages of one sequence number, as a sample. The pages come in their order from one sender. A page
-// that is not the next one ends what was begun, so pages of two closures are never mixed. In_Feature is decoded beside
-// it.
+// that is not the next one ends what was begun, so pages of two closures are never mixed.
 #pragma once
 
 #include "tetap/base/time.hpp"
@@ -26,16 +25,12 @@ class ClosureAssembly {
   void discard(Counters& counters) {
     if (next_ != 0) give_up(counters);
   }
-  [[nodiscard]] static constexpr bool takes(std::uint8_t offset) {
-    return offset == InClosureFrames::kOffset || offset == InFeature::kOffset;
-  }
-  /// A frame of In_Closure or In_Feature; a whole closure goes to out.sample(). No estimator takes features.
+  [[nodiscard]] static constexpr bool takes(std::uint8_t offset) { return offset == InClosureFrames::kOffset; }
+  /// A frame of In_Closure; a whole closure goes to out.sample().
   template <class Out>
-  void on_frame(std::uint8_t offset, const base::CanFrame& frame, base::Micros reference, Counters& counters,
-                Out&& out) {
+  void on_frame(const base::CanFrame& frame, base::Micros reference, Counters& counters, Out&& out) {
     const auto bytes = payload(frame);
     if (bytes.size() != 8) return void(++counters.malformed);
-    if (offset == InFeature::kOffset) return feature(decode<InFeature>(bytes), counters);
     if (const auto frames = decode<InClosureFrames>(bytes)) return begin(*frames, reference, counters, bits(frame));
     bool good = false;
     if (const auto pose = decode<InClosurePose>(bytes)) {
@@ -72,12 +67,6 @@ class ClosureAssembly {
   [[nodiscard]] static std::int32_t steps(float value, std::int64_t per_unit) {
     const float scaled = value * static_cast<float>(per_unit);
     return static_cast<std::int32_t>(scaled < 0.0F ? scaled - 0.5F : scaled + 0.5F);
-  }
-  template <class Feature>
-  static void feature(const Feature& feature, Counters& counters) {
-    if (!feature) return void(++counters.malformed);
-    if (!all_finite(feature->u, feature->v)) return void(++counters.out_of_range);
-    ++counters.not_used;
   }
   void give_up(Counters& counters) {
     next_ = 0;

@@ -6,9 +6,11 @@
 #include "tetap/base/time.hpp"
 #include "tetap/bus/codec.hpp"
 #include "tetap/bus/messages.hpp"
+#include "tetap/model/camera.hpp"
 #include "tetap/sensor/samples.hpp"
 
 #include <cstdint>
+#include <span>
 
 namespace tetap::bus {
 
@@ -154,6 +156,26 @@ constexpr void encode_sample(const sensor::LoopClosure& v, const SampleHead& hea
                     .corr_xy = number(v.unpack(v.correlations, 0), v.kCorrelationSteps),
                     .corr_x_yaw = number(v.unpack(v.correlations, 1), v.kCorrelationSteps),
                     .corr_y_yaw = number(v.unpack(v.correlations, 2), v.kCorrelationSteps)});
+}
+
+/// An image and its features; place, number and count in `image` are not used.
+template <class Put>
+constexpr void encode_image(const sensor::CameraImage& image, std::span<const model::ImageFeature> features,
+                            const SampleHead& head, Put&& put) {
+  for (const model::ImageFeature& feature : features)
+    put(InFeature{.stamp_us = head.stamp_us,
+                  .seq = head.seq,
+                  .inst = head.inst,
+                  .track_id = feature.id,
+                  .u = 0.25F * static_cast<float>(feature.u_quarter_px),
+                  .v = 0.25F * static_cast<float>(feature.v_quarter_px)});
+  const bool exposed = image.exposure_10us != sensor::CameraImage::kNoExposure;
+  put(InImage{.stamp_us = head.stamp_us,
+              .seq = head.seq,
+              .inst = head.inst,
+              .count = static_cast<std::uint8_t>(features.size()),
+              .exposure_s = exposed ? 1e-5F * static_cast<float>(image.exposure_10us) : base::kNan,
+              .tracker_state = static_cast<TrackerState>(image.tracker_state)});
 }
 
 }  // namespace tetap::bus

@@ -72,6 +72,7 @@ struct SamplePart {
   std::uint8_t instance = 0;
   std::uint8_t sequence = 0;
   std::uint8_t part = 0xFF;
+  static constexpr std::uint8_t kRepeated = 7;  ///< one of any number of frames: a feature of an image
 };
 
 /// Part of all blocks of a scan: the assembly checks their order.
@@ -79,6 +80,8 @@ inline constexpr std::uint8_t kScanBlock = 1;
 
 [[nodiscard]] constexpr SamplePart part_of(std::uint8_t offset, const base::CanFrame& frame) {
   static_assert(InWheelCounts::kSeq.start == 20 && InGnssVelU::kSeq.start == 20 && InGnssLat::kInst.start == 24);
+  static_assert(InFeature::kSeq.start == 20 && InFeature::kInst.start == 24 && InImage::kSeq.start == 20 &&
+                InImage::kInst.start == 24);
   static_assert(ImuGyro::kSeq.start == 60 && ImuTime::kSeq.start == 60);
   using sensor::Sensor;
   if (offset >= ImuGyro::kOffset && offset < ImuGyro::kOffset + ImuGyro::kCount * ImuGyro::kStride) {
@@ -104,13 +107,17 @@ inline constexpr std::uint8_t kScanBlock = 1;
     static_assert(InScan::kSeq.start == 0 && InScan::kSeq.length == 4);
     part = {.sensor = Sensor::kScan, .sequence = static_cast<std::uint8_t>(frame.data[0] & 0x0F), .part = kScanBlock};
   }
+  if (offset == InImage::kOffset) is(Sensor::kFeature, offset);
+  if (offset == InFeature::kOffset) is(Sensor::kFeature, InFeature::kOffset - SamplePart::kRepeated);
   return part;
 }
 
 /// Samples that have guards: their places in a list of four instances each.
 inline constexpr std::size_t kGuardedSamples = 4 * (static_cast<std::size_t>(sensor::Sensor::kGnssVelocity) + 2);
 [[nodiscard]] constexpr std::size_t guarded_place(sensor::Sensor sensor, std::uint8_t instance) {
-  const std::size_t kind = static_cast<std::size_t>(sensor);
+  // Sightings have no guards: images are in their place.
+  const auto kind =
+      static_cast<std::size_t>(sensor == sensor::Sensor::kFeature ? sensor::Sensor::kRangeBearing : sensor);
   return (sensor == sensor::Sensor::kScan ? kGuardedSamples / 4 - 1 : kind) * 4 + instance;
 }
 
@@ -167,8 +174,9 @@ class SampleGuard {
     if (block) part.instance = scan_instance_;
     if (scan) scan_instance_ = part.instance;
     Slot* slot = &slot_of(part, now, counters);
-    if (scan) slot->since = now;                           // its frames may take longer than a guard waits
-    if (!block && (slot->parts >> part.part & 1U) != 0) {  // of the sample that had this number before
+    if (scan) slot->since = now;  // its frames may take longer than a guard waits
+    if (!block && part.part != SamplePart::kRepeated &&
+        (slot->parts >> part.part & 1U) != 0) {  // of the sample that had this number before
       drop(*slot, counters);
       slot = &slot_of(part, now, counters);
     }
@@ -191,6 +199,12 @@ class SampleGuard {
     slot.sample = sample;
     if (slot.guard) judge(slot, now, counters, out);
   }
+  /// Every whole sample that waits for its guard.
+  template <class F>
+  void each_waiting(F&& f) const {
+    for (const Slot& slot : slots_)
+      if (slot.sample) f(*slot.sample);
+  }
   /// At each tick: what still waits for its other half is given up and counted.
   void expire(base::Micros now, Counters& counters) {
     for (Slot& slot : slots_)
@@ -210,7 +224,8 @@ class SampleGuard {
   };
   [[nodiscard]] static constexpr bool guarded(sensor::Sensor sensor) {
     return sensor <= sensor::Sensor::kBodySpeed || sensor == sensor::Sensor::kGnssPosition ||
-           sensor == sensor::Sensor::kGnssVelocity || sensor == sensor::Sensor::kScan;
+           sensor == sensor::Sensor::kGnssVelocity || sensor == sensor::Sensor::kScan ||
+           sensor == sensor::Sensor::kFeature;
   }
   static void drop(Slot& slot, Counters& counters) {
     if (slot.guard || slot.sample) ++counters.guard_bad;  // of a sample that is not whole that is counted already

@@ -26,6 +26,7 @@ class GuardSender {
     Sensor& sensor = sensors_[guarded_place(part.sensor, part.instance)];
     if (sensor.sequence != part.sequence) sensor = {.sequence = part.sequence, .counter = sensor.counter};
     sensor.sum = static_cast<std::uint16_t>(sensor.sum + guard_crc(offset, payload(frame)));
+    if (part.part == SamplePart::kRepeated) return std::nullopt;
     if (++sensor.parts < (part.sensor == sensor::Sensor::kScan ? 1 + scan_blocks_ : parts_of(part.sensor)))
       return std::nullopt;
     InGuardSample guard{

@@ -51,6 +51,8 @@ class NoProtection {
   void sample(const sensor::Sample& sample, base::Micros, Counters&, Out&& out) {
     out(sample);
   }
+  template <class F>
+  static void each_waiting(F&&) {}
 
  private:
   const param::Parameters& parameters_;
@@ -105,6 +107,11 @@ class Protection {
   void sample(const sensor::Sample& sample, base::Micros now, Counters& counters, Out&& out) {
     if (!guards()) return out(sample);
     samples_.sample(sample, now, counters, out);
+  }
+  /// Every whole sample that waits for its guard.
+  template <class F>
+  void each_waiting(F&& f) const {
+    samples_.each_waiting(f);
   }
 
  private:

@@ -14,10 +14,12 @@
 #include "tetap/bus/multiplexed.hpp"
 #include "tetap/bus/version.hpp"
 #include "tetap/estimators/attitude_disagreement.hpp"
+#include "tetap/estimators/context.hpp"
 #include "tetap/estimators/estimate.hpp"
 #include "tetap/estimators/map_frame.hpp"
 #include "tetap/estimators/own_map.hpp"
 #include "tetap/estimators/sensor_statistics.hpp"
+#include "tetap/estimators/visual/visual_report.hpp"
 #include "tetap/param/crc.hpp"
 #include "tetap/sensor/sample.hpp"
 
@@ -138,6 +140,9 @@ class Publisher {
                           .std_yaw_rad = match.sigma_yaw_rad},
         send);
   }
+  /// Fates of the tracks of an image that ended in this tick, and in its turn the height.
+  template <estimators::SeesImages Estimator, class Send>
+  void visual(std::size_t instance, const Estimator& estimator, const estimators::Context& ctx, Send& send);
   /// `summary` gives the content of the status when it is asked for.
   template <class GiveSummary, class Send>
   void status(GiveSummary&& summary, const LoopHealth& loop, Send& send);
@@ -311,6 +316,27 @@ void Publisher<N>::attitude(std::size_t instance, Attitude&& attitude, const est
         bus::EstStateDisagreement{
             .epoch = tag(), .disagree_tilt_rad = from_primary.tilt_rad, .disagree_yaw_rad = from_primary.heading_rad},
         send, instance);
+}
+
+template <std::size_t N>
+template <estimators::SeesImages Estimator, class Send>
+void Publisher<N>::visual(std::size_t instance, const Estimator& estimator, const estimators::Context& ctx,
+                          Send& send) {
+  const auto most = [](std::uint32_t n) { return static_cast<std::uint8_t>(std::min<std::uint32_t>(n, 63)); };
+  if (const auto report = estimator.new_report())
+    put(bus::EstVisual{.epoch = tag(),
+                       .seq = report->number,
+                       .used = most(report->used),
+                       .gated = most(report->gated),
+                       .no_depth = most(report->no_depth),
+                       .left = most(report->left),
+                       .nis = report->nis,
+                       .direction_y_rad = report->direction_y_rad,
+                       .direction_z_rad = report->direction_z_rad},
+        send);
+  if (!every(parameters_.publish.state_every, kTogether)) return;
+  const estimators::Height height = estimator.height(ctx);
+  put(bus::EstStateHeight{.epoch = tag(), .height_m = height.height_m, .std_height_m = height.sigma_m}, send, instance);
 }
 
 template <std::size_t N>

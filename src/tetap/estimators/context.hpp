@@ -6,6 +6,7 @@
 #include "tetap/estimators/map_frame.hpp"
 #include "tetap/model/planar_pose.hpp"
 #include "tetap/param/parameters.hpp"
+#include "tetap/sensor/image_pool.hpp"
 #include "tetap/sensor/scan_pool.hpp"
 
 namespace tetap::estimators {
@@ -13,7 +14,8 @@ namespace tetap::estimators {
 struct Context {
   const param::Parameters& parameters;
   const MapFrame& map_frame;
-  const sensor::Scans* scans = nullptr;  ///< null: no estimator of the robot takes scans
+  const sensor::Scans* scans = nullptr;       ///< null: no estimator of the robot takes scans
+  const sensor::ImagePool* images = nullptr;  ///< features of the images in the window; null: no estimator takes any
 };
 
 /// A pose from outside. sigma_yaw_rad >= pi (or not available on the bus): the heading is not known.

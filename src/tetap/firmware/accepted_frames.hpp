@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The frames that a node receives: its block of 64 ids, with inputs and own outputs. The own outputs show a second node
-// of the same ids. A robot that makes a map or takes scans receives the block behind it, too. A port's acceptance
-// filter is made of this.
+// of the same ids. A robot that makes a map or takes scans or images receives the block behind it, too. A port's
+// acceptance filter is made of this.
 #pragma once
 
 #include "hal/can_bus.hpp"
@@ -12,7 +12,7 @@
 
 namespace tetap::firmware {
 
-/// can_base is a multiple of 64; that of a robot that makes a map or takes scans, of 128.
+/// can_base is a multiple of 64; that of a robot that makes a map or takes scans or images, of 128.
 [[nodiscard]] constexpr hal::Acceptance accepted_by(bool needs_map_ids, const param::Parameters& parameters) {
   const std::uint32_t ids = needs_map_ids ? 2 * bus::kBlock : bus::kBlock;
   return {.id = parameters.can_base, .mask = 0x7FFU & ~(ids - 1U)};

@@ -14,6 +14,11 @@ struct ImagePoint {
   float x = 0, y = 0;
 };
 
+/// A feature of an image, as the bus has it: pixels in quarters.
+struct ImageFeature {
+  std::uint16_t id = 0, u_quarter_px = 0, v_quarter_px = 0;
+};
+
 /// Focal lengths and the point that the axis meets, in pixels.
 struct PinholeCamera {
   float fu_px = 0, fv_px = 0, cu_px = 0, cv_px = 0;

@@ -15,6 +15,7 @@
 #include "tetap/estimators/estimate.hpp"
 #include "tetap/estimators/own_map.hpp"
 #include "tetap/estimators/sensor_statistics.hpp"
+#include "tetap/estimators/visual/visual_report.hpp"
 #include "tetap/sensor/sample.hpp"
 #include "tetap/sensor/window.hpp"
 
@@ -221,6 +222,7 @@ class EstimatorSlot {
   [[nodiscard]] estimators::ScanMatchReport scan_match() const requires estimators::MatchesScans<E> {
     return now_.scan_match();
   }
+  [[nodiscard]] const E& eyes() const requires estimators::SeesImages<E> { return now_; }
   [[nodiscard]] const E& map_maker() const requires estimators::MakesMap<E> { return now_; }
   void reset_own_map() requires estimators::MakesMap<E> { now_.reset_own_map(); }
 

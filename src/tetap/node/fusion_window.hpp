@@ -30,7 +30,7 @@ struct Estimators {
   static constexpr bool kUsesMap = (estimators::UsesMap<E> || ...);
   static constexpr bool kMakesMap = (estimators::MakesMap<E> || ...);
   /// Some frames of the robot have identifiers of the map's block.
-  static constexpr bool kNeedsMapIds = kMakesMap || kTakes<sensor::PlanarScan>;
+  static constexpr bool kNeedsMapIds = kMakesMap || kTakes<sensor::PlanarScan> || kTakes<sensor::CameraImage>;
   /// Places for the samples of the window: 200 ms of an IMU at 200 Hz with wheels at 100 Hz and GNSS need 64.
   static constexpr std::size_t kSamples = 88;
   /// Samples that plain estimators repeat in a tick when one came late; what is more is spread over several ticks. A
@@ -158,6 +158,11 @@ class FusionWindow {
   [[nodiscard]] const auto& slots() const { return slots_; }
   [[nodiscard]] const auto& primary() const { return std::get<kPrimary>(slots_); }
   [[nodiscard]] std::uint16_t high_water() const { return timeline_.high_water(); }
+  /// Every sample in the window.
+  template <class F>
+  void each_sample(F&& f) const {
+    for (std::size_t i = 0; i < timeline_.size(); ++i) f(timeline_[i]);
+  }
 
   /// The limit of the tick's work depends on the order of arrival.
   static constexpr auto members(auto& self) {

@@ -8,6 +8,7 @@
 #include "tetap/base/state_words.hpp"
 #include "tetap/bus/closure_assembly.hpp"
 #include "tetap/bus/decoder.hpp"
+#include "tetap/bus/image_assembly.hpp"
 #include "tetap/bus/input_crc.hpp"
 #include "tetap/bus/publisher.hpp"
 #include "tetap/bus/scan_assembly.hpp"
@@ -63,16 +64,27 @@ class Node {
   static constexpr bool kMakesMap = Estimators::kMakesMap;
   /// Whether an estimator takes displacements between keyframes.
   static constexpr bool kTakesClosures = Estimators::template kTakes<sensor::LoopClosure>;
-  /// Whether an estimator takes scans.
+  /// Whether an estimator takes scans, and a camera's features.
   static constexpr bool kTakesScans = Estimators::template kTakes<sensor::PlanarScan>;
+  static constexpr bool kTakesImages = Estimators::template kTakes<sensor::CameraImage>;
   /// Whether a frame behind the map's outputs is an input of this robot.
   [[nodiscard]] static constexpr bool takes_map_input(std::uint8_t offset) {
     return (kTakesClosures && bus::ClosureAssembly::takes(offset)) ||
-           (kTakesScans && bus::ScanAssembly::takes(offset)) || BusParameters<Estimators>::takes(offset);
+           (kTakesScans && bus::ScanAssembly::takes(offset)) || (kTakesImages && bus::ImageAssembly::takes(offset)) ||
+           BusParameters<Estimators>::takes(offset);
   }
   /// Called by the inbox.
   void sample(const sensor::Sample& sample) {
     protection_.sample(sample, now_, counters_, [this](const sensor::Sample& vouched) { take(vouched); });
+  }
+  /// Images that are to be used yet, for whoever fills their pool.
+  template <class F>
+  void each_image(F&& f) const {
+    const auto image = [&f](const sensor::Sample& sample) {
+      if (sample.sensor == sensor::Sensor::kFeature) f(sample.payload.image);
+    };
+    window_.each_sample(image);
+    protection_.each_waiting(image);
   }
   void map_entry(const estimators::MapEntry& entry) { landmarks_.add(entry, counters_); }
   /// Start pose; of two within an epoch the one with the later counter stands, whichever came first.
@@ -116,13 +128,14 @@ class Node {
   /// frames, and their places depend on the order of arrival. Nor is the output, which goes out as it is: tallies,
   /// the queue of records, both CRCs.
   static constexpr auto members(auto& self) {
-    return base::members(
-        base::kept(self.parameter_commands_), base::reference(self.parameters_), base::kept(self.window_),
-        self.map_frame_, base::in_turns(self.origin_), base::unhashed(self.protection_), base::unhashed(self.inbox_),
-        base::unhashed(self.closures_), base::unhashed(self.scans_), base::unhashed(self.wraps_),
-        base::unhashed(self.counters_), base::unhashed(self.publisher_), self.landmarks_, self.pending_reset_,
-        base::kept(self.wired_off_), self.pending_pose_, self.now_, self.ticked_, base::unhashed(self.input_crc_),
-        self.resets_, self.reset_cause_, self.restarted_at_, self.jumps_, self.disagreement_, self.map_faults_);
+    return base::members(base::kept(self.parameter_commands_), base::reference(self.parameters_),
+                         base::kept(self.window_), self.map_frame_, base::in_turns(self.origin_),
+                         base::unhashed(self.protection_), base::unhashed(self.inbox_), base::unhashed(self.closures_),
+                         base::unhashed(self.scans_), base::unhashed(self.images_), base::unhashed(self.wraps_),
+                         base::unhashed(self.counters_), base::unhashed(self.publisher_), self.landmarks_,
+                         self.pending_reset_, base::kept(self.wired_off_), self.pending_pose_, self.now_, self.ticked_,
+                         base::unhashed(self.input_crc_), self.resets_, self.reset_cause_, self.restarted_at_,
+                         self.jumps_, self.disagreement_, self.map_faults_);
   }
   /// For a copy that others get: nothing is left from which the key of commands could be computed. Between ticks only.
   void hide_secrets() {
@@ -154,19 +167,22 @@ class Node {
   static constexpr std::uint8_t kMostWaited = 20;  ///< ticks until a command ends the window whatever is in it
   using Closures = std::conditional_t<kTakesClosures, bus::ClosureAssembly, bus::NoClosures>;
   using Scans = std::conditional_t<kTakesScans, bus::ScanAssembly, bus::NoScans>;
+  using Images = std::conditional_t<kTakesImages, bus::ImageAssembly, bus::NoImages>;
   using Landmarks = std::conditional_t<Estimators::kUsesMap, node::Landmarks, node::NoLandmarks>;
 
-  /// Sightings, closures, scans, and speeds that are commands.
+  /// Sightings, closures, scans, images, and speeds that are commands.
   [[nodiscard]] bool at_no_fixed_rate(const sensor::Sample& sample) const {
     const bool commanded = parameters_.wheels.hold == param::Hold::kForward;
     if (kTakesClosures && sample.sensor == sensor::Sensor::kClosure) return true;
     if (kTakesScans && sample.sensor == sensor::Sensor::kScan) return true;
+    if (kTakesImages && sample.sensor == sensor::Sensor::kFeature) return true;
     return (Estimators::template kTakes<sensor::LandmarkSighting> && sample.sensor == sensor::Sensor::kRangeBearing) ||
            (Estimators::template kTakes<sensor::BodySpeed> && sample.sensor == sensor::Sensor::kBodySpeed && commanded);
   }
   [[nodiscard]] estimators::Context context() const {
     estimators::Context context{.parameters = parameters_, .map_frame = map_frame_};
     if constexpr (kTakesScans) context.scans = &scans_.pool();
+    if constexpr (kTakesImages) context.images = images_.pool();
     return context;
   }
   void restart(base::Micros t, sensor::ResetCause cause);
@@ -215,6 +231,7 @@ class Node {
   typename Parts<Estimators>::Decoder inbox_;
   [[no_unique_address]] Closures closures_;
   [[no_unique_address]] Scans scans_;
+  [[no_unique_address]] Images images_;
   typename Parts<Estimators>::Wraps wraps_;
   bus::Counters counters_;
   typename Parts<Estimators>::Publisher publisher_;
@@ -255,7 +272,7 @@ void Node<Estimators, Capacity>::on_frame(const base::CanFrame& frame) {
   const std::uint32_t bits = bus::frame_crc(offset, frame);
   input_crc_.add(bits);
   if constexpr (kTakesClosures) {
-    if (bus::ClosureAssembly::takes(offset)) return closures_.on_frame(offset, frame, now_, counters_, *this);
+    if (bus::ClosureAssembly::takes(offset)) return closures_.on_frame(frame, now_, counters_, *this);
   }
   if constexpr (kTakesScans) {
     if (bus::ScanAssembly::takes(offset)) {
@@ -270,6 +287,12 @@ void Node<Estimators, Capacity>::on_frame(const base::CanFrame& frame) {
   }
   const bool admitted =
       protection_.admits(offset, frame, now_, counters_, [this](const sensor::Sample& vouched) { take(vouched); });
+  if constexpr (kTakesImages) {
+    if (bus::ImageAssembly::takes(offset)) {
+      if (admitted) images_.on_frame(offset, frame, bits, now_, counters_, *this);
+      return;
+    }
+  }
   if (admitted) inbox_.on_frame(offset, frame, bits, now_, counters_, *this);
 }
 
@@ -315,6 +338,7 @@ void Node<Estimators, Capacity>::tick(base::Micros t, const bus::LoopHealth& loo
   inbox_.expire(now_, base::Micros{parameters_.loop.window_us}, counters_);
   closures_.expire(now_, base::Micros{parameters_.loop.window_us}, counters_);
   scans_.expire(now_, base::Micros{parameters_.loop.window_us}, counters_);
+  images_.expire(now_, base::Micros{parameters_.loop.window_us}, counters_);
   apply_parameters(before);
   apply_map(before);
   consume(now_);
@@ -346,6 +370,7 @@ void Node<Estimators, Capacity>::tick(base::Micros t, const bus::LoopHealth& loo
     if constexpr (requires { slot.attitude(context()); })
       publisher_.attitude(
           instance, [&] { return in_map(slot.attitude(context())); }, apart, send);
+    if constexpr (estimators::SeesImages<E>) publisher_.visual(instance, slot.eyes(), context(), send);
     if constexpr (estimators::MakesMap<E>) {
       map_faults_.note(slot.map_maker().own_map(), publisher_.epoch(),
                        static_cast<std::uint32_t>(1'000'000 / parameters_.loop.period_us));
@@ -383,6 +408,7 @@ void Node<Estimators, Capacity>::restart(base::Micros t, sensor::ResetCause caus
     inbox_.discard(counters_);
     closures_.discard(counters_);
     scans_.discard(counters_);
+    images_.discard(counters_);
     wraps_.power_on();
     window_.clear();
     window_.open_from(t - base::Micros{parameters_.loop.period_us});

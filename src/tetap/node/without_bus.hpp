@@ -123,6 +123,7 @@ class DirectOutput {
   /// Frames that nobody waits for.
   static void own_map(const auto&, auto&) {}
   static void scan_match(const auto&, base::Micros, auto&) {}
+  static void visual(std::size_t, const auto&, const auto&, auto&) {}
   static void statistics(const auto&, base::Micros, auto&) {}
   static void diagnostics(const bus::Counters&, const bus::LoopHealth&, std::uint16_t, auto&) {}
   static void refusals(const bus::Counters&, const bus::LoopHealth&, auto&&, auto&) {}

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The CRC of the version frame: the stored bits of the rows, in the order of the table. Bits on which no bit of an
-// estimate depends are left out. The group `wired` counts only where a robot has a wired sensor.
+// estimate depends are left out. The groups `wired` and `camera` count only where a robot has a wired sensor or a
+// camera.
 #pragma once
 
 #include "tetap/base/bit_crc.hpp"
@@ -22,11 +23,14 @@ struct Run {
 constexpr bool is_wired(std::size_t offset) {
   return offset >= offsetof(Parameters, wired) && offset < offsetof(Parameters, wired) + sizeof(WiredParameters);
 }
+constexpr bool is_camera(std::size_t offset) {
+  return offset >= offsetof(Parameters, camera) && offset < offsetof(Parameters, camera) + sizeof(CameraParameters);
+}
 constexpr bool begins_run(std::size_t row) {
   if (row == 0) return true;
   const Row &now = kTable[row], &before = kTable[row - 1];
   return is_outside_crc(before) || now.offset != before.offset + before.size ||
-         is_wired(now.offset) != is_wired(before.offset);
+         is_wired(now.offset) != is_wired(before.offset) || is_camera(now.offset) != is_camera(before.offset);
 }
 constexpr std::size_t runs_before(std::size_t row) {
   std::size_t runs = 0;
@@ -51,6 +55,7 @@ inline constexpr auto kRuns = [] {
   base::BitCrc sum;
   for (const detail::Run& run : detail::kRuns) {
     if (detail::is_wired(run.offset) && !parameters.wired.any()) continue;
+    if (detail::is_camera(run.offset) && !parameters.camera.any()) continue;
     for (std::size_t i = 0; i < run.size; i += 4) {
       std::uint32_t word = 0;
       std::memcpy(&word, bytes + run.offset + i, sizeof word);

@@ -124,6 +124,9 @@ inline constexpr std::array kRules{
          "set where bus.commands is 1"},
     Rule{"recovery.confirm_fixes", [](const P& p) { return p.recovery.confirm_fixes <= p.recovery.persist_fixes; },
          "at most recovery.persist_fixes"},
+    Rule{"camera.fv_px", [](const P& p) { return (p.camera.fu_px > 1) == (p.camera.fv_px > 1); },
+         "0 with camera.fu_px, or both above 1"},
+    Rule{"camera.mounting_bc", [](const P& p) { return detail::rotation(p.camera.mounting_bc); }, "a rotation"},
     Rule{"wired.imu_x", [](const P& p) { return detail::axes(p.wired); },
          "one of three different axes that with imu_y and imu_z make a right-handed frame"},
     Rule{"wired.imu_rate_hz",
@@ -169,11 +172,11 @@ consteval void require(const Rule& rule, const Parameters& parameters) {
 
 /// The 16 ids of a robot's own map begin 64 above its block, so blocks of such robots are 128 apart.
 [[nodiscard]] constexpr bool has_map_ids(std::uint32_t can_base) { return can_base % 128 == 0; }
-inline constexpr const char* kMapIdsRule = "a multiple of 128, for its own map has ids behind the block of 64";
+inline constexpr const char* kMapIdsRule = "a multiple of 128, for maps and images have ids behind the block of 64";
 
 /// To be asserted of a robot and its parameters.
-consteval bool checked_map_ids(bool makes_map, const Parameters& parameters) {
-  detail::require_rule(!makes_map || has_map_ids(parameters.can_base), "can_base", parameters.can_base, "",
+consteval bool checked_map_ids(bool needs_map_ids, const Parameters& parameters) {
+  detail::require_rule(!needs_map_ids || has_map_ids(parameters.can_base), "can_base", parameters.can_base, "",
                        kMapIdsRule);
   return true;
 }

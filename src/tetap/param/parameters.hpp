@@ -255,6 +255,26 @@ struct ParticleParameters {
   float jitter = 0;      ///< m^2/s on both axes: motion that neither speed nor turn explains
 };
 
+/// A camera whose front end follows features: an ideal pinhole, z along the view, x right, y down.
+struct CameraParameters {
+  float fu_px = 0;  ///< focal lengths; 0: no camera, and this part is not in the CRC
+  float fv_px = 0;
+  float cu_px = 0;  ///< the pixel that the axis meets
+  float cv_px = 0;
+  /// From the camera's axes into the body's, row by row; a camera that looks ahead.
+  std::array<float, 9> mounting_bc{0, 0, 1, -1, 0, 0, 0, -1, 0};
+  std::array<float, 3> place_b_m{0, 0, 0};
+  std::int32_t delay_us = 0;          ///< from the middle of the exposure to the stamp
+  float sigma_px = 1.2F;              ///< a feature's noise, per axis; a track's errors are alike from image to image
+  float sigma_mounting_rad = 0.003F;  ///< 1 sigma of the mounting, per axis
+  float sigma_scale = 0.015F;         ///< 1 sigma of the speed's scale, which no image can show
+  float sigma_direction_rad = 0.03F;  ///< 1 sigma of the speed's direction in the body, at the start
+  float direction_walk = 0.01F;       ///< its drift; rad per square root of a second
+  float sigma_tilt_rad = 0.05F;       ///< 1 sigma of roll and pitch at the start, where the robot is taken to be level
+
+  [[nodiscard]] constexpr bool any() const { return fu_px > 0; }
+};
+
 /// Ticks between frames; 0 = never.
 struct PublishParameters {
   std::int32_t pose_every = 1;  ///< estimate 1: position and motion
@@ -329,6 +349,7 @@ struct Parameters {
   MappingParameters mapping{};
   ParticleParameters particles{};
   LidarParameters lidar{};
+  CameraParameters camera{};
 };
 
 }  // namespace tetap::param

@@ -54,6 +54,8 @@ inline void calibrate(Sample& sample, const param::Parameters& n) {
   } else if (sample.sensor == sensor::Sensor::kScan) {  // a scan is of the middle of its sweep
     const auto half_us = static_cast<std::int32_t>(0.5e6F * sweep_s(sample.payload.scan, n.lidar));
     sample.stamp += base::Micros{half_us - n.lidar.delay_us};
+  } else if (sample.sensor == sensor::Sensor::kFeature) {
+    sample.stamp = sample.stamp - base::Micros{n.camera.delay_us};
   }
 }
 

@@ -54,6 +54,7 @@ struct Plausible {
     return s.beams >= 3 && within(4.0F, s.first_rad) && step_rad > 1e-4F &&
            step_rad * static_cast<float>(s.beams - 1) < 6.3F;
   }
+  bool operator()(const CameraImage&) const { return true; }
   bool operator()(const LandmarkSighting& s) const {
     const bool any = !base::is_nan(s.range_m) || !base::is_nan(s.bearing_rad);
     return any && sigma_or_none(s.range_m, 1e5F) && number_or_none(s.bearing_rad, 10.0F) &&

@@ -33,6 +33,7 @@ struct Sample {
     OutsideHeading heading;
     LoopClosure closure;
     PlanarScan scan;
+    CameraImage image;
   } payload;
 
   static_assert(sizeof(Payload) == 32, "a window of them is most of the memory");
@@ -93,10 +94,12 @@ constexpr bool visit(const Sample& sample, F&& f) {
     case sensor::Sensor::kClosure:
       f(sample.payload.closure);
       return true;
+    case sensor::Sensor::kFeature:
+      f(sample.payload.image);
+      return true;
     case sensor::Sensor::kScan:
       f(sample.payload.scan);
       return true;
-    case sensor::Sensor::kFeature:
     case sensor::Sensor::kRelativePose:
     case sensor::Sensor::kNotAvailable:
       return false;

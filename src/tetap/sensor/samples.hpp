@@ -131,4 +131,16 @@ struct PlanarScan {
   std::uint8_t sequence = 0;  ///< on the bus
 };
 
+/// An image of a camera, whose features lie in a place of the pool (sensor/image_pool.hpp).
+struct CameraImage {
+  static constexpr std::uint8_t kNoTracker = 7;
+  static constexpr std::uint16_t kNoExposure = 0xFFF;
+
+  std::uint8_t place = 0;
+  std::uint8_t number = 0;                  ///< low 4 bits of its number
+  std::uint8_t features = 0;                ///< how many
+  std::uint8_t tracker_state = kNoTracker;  ///< the front end's own word; it decides nothing
+  std::uint16_t exposure_10us = kNoExposure;
+};
+
 }  // namespace tetap::sensor

@@ -20,7 +20,7 @@ enum class Sensor : std::uint8_t {
   kBarometer = 8,
   kHeading = 9,
   kClosure = 10,
-  kFeature = 11,
+  kFeature = 11,  ///< an image: all features of one moment
   kScan = 12,
   kRelativePose = 13,
   kNotAvailable = 15,

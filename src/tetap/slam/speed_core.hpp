@@ -12,6 +12,7 @@ struct BodyMotion {
   nav::Vector3 speed_b_mps = nav::Vector3::Zero();
   nav::Vector3 rate_b_radps = nav::Vector3::Zero();
   float dt_s = 0;
+  float var_way_m2 = 0, var_turn_rad2 = 0;  ///< per axis, beside that of SpeedNoise
 };
 
 struct SpeedNoise {
@@ -43,7 +44,8 @@ class SpeedCore {
 
   [[nodiscard]] static bool valid(const BodyMotion& motion) {
     return nav::is_finite(motion.speed_b_mps) && nav::is_finite(motion.rate_b_radps) && motion.dt_s >= 0.0F &&
-           motion.dt_s < 10.0F;
+           motion.dt_s < 10.0F && motion.var_way_m2 >= 0.0F && motion.var_way_m2 < 1e6F &&
+           motion.var_turn_rad2 >= 0.0F && motion.var_turn_rad2 < 1e3F;
   }
   void start(const nav::Quaternion& q_nb) {
     pose_ = {.q_nb = q_nb};
@@ -75,8 +77,8 @@ class SpeedCore {
     for (int i = 0; i < 3; ++i)
       for (int j = 0; j < 3; ++j) p.add_share(first + 3 + i, way(i, j), first + 6 + j);
     // A turn of the body by n is theta = n and rho = p x n.
-    const float var_turn = noise_.angle_walk_rad * noise_.angle_walk_rad * dt_s,
-                var_way = noise_.position_walk_m * noise_.position_walk_m * dt_s,
+    const float var_turn = noise_.angle_walk_rad * noise_.angle_walk_rad * dt_s + motion.var_turn_rad2,
+                var_way = noise_.position_walk_m * noise_.position_walk_m * dt_s + motion.var_way_m2,
                 var_direction = noise_.direction_walk_rad * noise_.direction_walk_rad * dt_s;
     const nav::Matrix3 lever = nav::skew(pose_.p_n_m), lever2 = lever * lever.transpose();
     for (int i = 0; i < 3; ++i) {

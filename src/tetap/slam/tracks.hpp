@@ -3,6 +3,8 @@
 // bits and wrap: a track that is absent in one image is a new one when its identity comes again.
 #pragma once
 
+#include "tetap/model/camera.hpp"
+
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -10,10 +12,7 @@
 
 namespace tetap::slam {
 
-/// A feature of an image, as the bus has it: pixels in quarters.
-struct ImageFeature {
-  std::uint16_t id = 0, u_quarter_px = 0, v_quarter_px = 0;
-};
+using model::ImageFeature;
 
 struct TrackCounters {
   std::uint32_t no_room = 0;     ///< features of new tracks that found the store full

@@ -46,17 +46,22 @@ class VisualWindow {
   using Tracks = TrackStore<kClones, kTracks>;
   using Records = std::array<TrackRecord, Tracks::kUsed>;
 
-  explicit VisualWindow(const VisualOptions& options, const Core& core = Core())
+  explicit VisualWindow(const VisualOptions& options = {}, const Core& core = Core())
       : options_(options), camera_(options.mounting), core_(core), tracks_(options.least_sightings) {}
 
   /// A pose with independent errors of attitude and place. The origin of p_n_m becomes `origin_um`, where the robot is.
   void start(const nav::Quaternion& q_nb, float sigma_attitude_rad, const std::array<std::int64_t, 3>& origin_um,
              float sigma_place_m) {
+    start(q_nb, nav::Vector3::Constant(sigma_attitude_rad), origin_um, nav::Vector3::Constant(sigma_place_m));
+  }
+  /// The same with sigmas along the world's axes.
+  void start(const nav::Quaternion& q_nb, const nav::Vector3& sigma_attitude_rad,
+             const std::array<std::int64_t, 3>& origin_um, const nav::Vector3& sigma_place_m) {
     typename Covariance::States variance{};
     for (int i = 0; i < 3; ++i) {
       variance[at(kCamera + i)] = options_.sigma_mounting_rad * options_.sigma_mounting_rad;
-      variance[at(kCore + i)] = sigma_attitude_rad * sigma_attitude_rad;
-      variance[at(kCore + 3 + i)] = sigma_place_m * sigma_place_m;
+      variance[at(kCore + i)] = sigma_attitude_rad(i) * sigma_attitude_rad(i);
+      variance[at(kCore + 3 + i)] = sigma_place_m(i) * sigma_place_m(i);
     }
     core_.start(q_nb);
     for (int i = WorldPose::kErrors; i < Core::kErrors; ++i) variance[at(kCore + i)] = core_.variance(i);
@@ -98,6 +103,11 @@ class VisualWindow {
     }
     if (!busy()) credit_ = 0;
   }
+  /// Leaves the rest of the job undone: its tracks are lost, and the image can end.
+  void give_up() {
+    if (busy()) job_ = tracks_.chosen_count();
+    credit_ = 0;
+  }
   /// Ends the image: the present pose is cloned, and its features join their tracks. False while work is left.
   [[nodiscard]] bool end_image(std::span<const ImageFeature> image) {
     if (job_ == kIdle || busy()) return ++count_.refused, false;
@@ -118,6 +128,9 @@ class VisualWindow {
   [[nodiscard]] const VisualCounters& counters() const { return count_; }
   [[nodiscard]] const Tracks& tracks() const { return tracks_; }
   [[nodiscard]] const Records& records() const { return records_; }  ///< tracks of the latest image
+  [[nodiscard]] int concluded() const {
+    return job_ == kIdle ? tracks_.chosen_count() : job_;
+  }  ///< how many have a fate
   /// Covariance of (theta, error of the place): with the error rho + theta x p of the place.
   [[nodiscard]] filter::Symmetric<float, 6> pose_covariance() const {
     filter::Symmetric<float, 6> out;
@@ -142,6 +155,12 @@ class VisualWindow {
       lever_rho(state_of(s), a);
     }
     ++count_.origin_moves;
+  }
+  /// Words of memory that a digest reads in turn.
+  [[nodiscard]] std::size_t words() const { return p_.words(); }
+  template <class Sink>
+  void hash_word(std::size_t i, Sink&& sink) const {
+    sink(base::bits(p_.word(i)));
   }
   template <class Sink>
   void hash_state(Sink&& sink) const {
