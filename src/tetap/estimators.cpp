@@ -21,3 +21,4 @@
 #include "tetap/estimators/planar/pose_particles.cpp"
 #include "tetap/estimators/planar/position_fusion.cpp"
 #include "tetap/estimators/target/target_tracker.cpp"
+#include "tetap/estimators/visual/visual_odometry.cpp"

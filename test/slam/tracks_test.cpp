@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tetap/slam/tracks.hpp"
 
+#include "tetap/base/state_words.hpp"
+
 #include <gtest/gtest.h>
 #include <algorithm>
 #include <vector>
@@ -84,7 +86,8 @@ TEST(Tracks, TheOrderOfAnImageHasNoEffect) {
       film.add(image);
     }
     std::vector<std::uint32_t> state;
-    film.store.hash_state([&](std::uint32_t word) { state.push_back(word); });
+    const auto sink = [&](std::uint32_t word) { state.push_back(word); };
+    base::each_word(film.store, sink);
     if (turn == 0) expected = state;
     EXPECT_EQ(state, expected) << turn;
   }

@@ -2,6 +2,7 @@
 // The laws of the visual window, in a simulated world whose noise is the filter's.
 #include "tetap/slam/visual_window.hpp"
 #include "slam/visual_world.hpp"
+#include "tetap/base/state_words.hpp"
 
 #include <gtest/gtest.h>
 #include <algorithm>
@@ -22,7 +23,8 @@ constexpr slam::SpeedNoise kNone{
 
 std::vector<std::uint32_t> bits_of(const Window& window) {
   std::vector<std::uint32_t> words;
-  window.hash_state([&](std::uint32_t word) { words.push_back(word); });
+  const auto sink = [&](std::uint32_t word) { words.push_back(word); };
+  base::each_word(window, sink);
   return words;
 }
 /// Drives through a world and collects what each track came to.

@@ -3,6 +3,7 @@
 // rank. Only the upper half exists, packed by columns, so that a new state is a new column at the end.
 #pragma once
 
+#include "tetap/base/members.hpp"
 #include "tetap/base/multiply_add.hpp"
 
 #include <array>
@@ -222,6 +223,10 @@ class BigCovariance {
       packed_[index(pair, pair + 1)] = c * s * (xx - yy) + (c * c - s * s) * xy;
       packed_[index(pair + 1, pair + 1)] = s * s * xx + 2 * c * s * xy + c * c * yy;
     }
+  }
+
+  static constexpr auto members(auto& self) {
+    return base::members(self.size_, base::first(self.packed_, self.words()));
   }
 
  private:

@@ -2,6 +2,7 @@
 // The core of a visual window that moves its pose by body speed and turn rate: wheels and a gyroscope.
 #pragma once
 
+#include "tetap/base/members.hpp"
 #include "tetap/filter/big_covariance.hpp"
 #include "tetap/slam/world_pose.hpp"
 
@@ -90,11 +91,8 @@ class SpeedCore {
     p(first + 7, first + 7) += var_direction;
     p(first + 8, first + 8) += var_direction;
   }
-  template <class Sink>
-  void hash_state(Sink&& sink) const {
-    for (const float value : {pose_.q_nb.w, pose_.q_nb.x, pose_.q_nb.y, pose_.q_nb.z, pose_.p_n_m(0), pose_.p_n_m(1),
-                              pose_.p_n_m(2), direction_y_rad_, direction_z_rad_})
-      sink(base::bits(value));
+  static constexpr auto members(auto& self) {
+    return base::members(base::unhashed(self.noise_), self.pose_, self.direction_y_rad_, self.direction_z_rad_);
   }
 
  private:

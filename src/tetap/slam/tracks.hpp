@@ -3,6 +3,7 @@
 // bits and wrap: a track that is absent in one image is a new one when its identity comes again.
 #pragma once
 
+#include "tetap/base/members.hpp"
 #include "tetap/model/camera.hpp"
 
 #include <array>
@@ -98,18 +99,8 @@ class TrackStore {
     }
   }
 
-  template <class Sink>
-  void hash_state(Sink&& sink) const {
-    for (const Track& track : track_) {
-      sink(track.live ? std::uint32_t{track.id} << 16 | std::uint32_t{track.first} << 8 | track.count : 0U);
-      for (int k = 0; track.live && k < track.count; ++k) {
-        const auto& pixel = track.seen[at(track.slot(k))];
-        sink(std::uint32_t{pixel[0]} << 16 | pixel[1]);
-      }
-    }
-    sink(count_.no_room);
-    sink(count_.duplicates);
-    sink(count_.left);
+  static constexpr auto members(auto& self) {
+    return base::members(self.track_, self.chosen_, self.chosen_count_, self.least_, self.count_);
   }
 
  private:

@@ -4,6 +4,7 @@
 // (docs/explanation/visual_window.md). A core moves the present pose. Images are paced jobs.
 #pragma once
 
+#include "tetap/base/members.hpp"
 #include "tetap/slam/track_update.hpp"
 #include "tetap/slam/tracks.hpp"
 
@@ -162,18 +163,11 @@ class VisualWindow {
   void hash_word(std::size_t i, Sink&& sink) const {
     sink(base::bits(p_.word(i)));
   }
-  template <class Sink>
-  void hash_state(Sink&& sink) const {
-    core_.hash_state(sink);
-    for (const std::int64_t um : origin_um_) {
-      sink(static_cast<std::uint32_t>(um));
-      sink(static_cast<std::uint32_t>(static_cast<std::uint64_t>(um) >> 32));
-    }
-    for (std::size_t i = 0; i < p_.words(); ++i) sink(base::bits(p_.word(i)));
-    tracks_.hash_state(sink);
-    for (const std::int32_t value : {live_, slot_, job_, credit_}) sink(static_cast<std::uint32_t>(value));
-    for (const std::uint32_t value : {count_.images, count_.used, count_.gated, count_.no_depth, count_.singular})
-      sink(value);
+  /// The options are parameters, the update begins anew with each track, and nothing follows from the counts.
+  static constexpr auto members(auto& self) {
+    return base::members(base::unhashed(self.options_), self.camera_, self.core_, self.p_, self.clone_, self.tracks_,
+                         base::unhashed(self.update_), self.origin_um_, self.records_, base::unhashed(self.count_),
+                         self.live_, self.slot_, self.job_, self.credit_);
   }
 
  private:
