@@ -74,7 +74,7 @@ struct Drive {
   const auto f = [&](std::size_t i) { return static_cast<float>(camera[i]); };
   drive.camera = {.fu_px = f(0), .fv_px = f(1), .cu_px = f(2), .cv_px = f(3)};
   drive.mounting = {.q_cb = {f(4), f(5), f(6), f(7)}, .lever_b_m = {f(8), f(9), f(10)}};
-  const auto motion = read_rows(stem + ".motion.csv", 7), truth = read_rows(stem + ".truth.csv", 8);
+  const auto motion = read_rows(stem + ".motion.csv", 7), truth = read_rows(stem + ".truth.csv", 9);
   for (std::size_t k = 0; k < motion.size(); ++k) {
     const auto& m = motion[k];
     const auto& t = truth.at(k);
@@ -82,8 +82,8 @@ struct Drive {
     image.time_s = m[0];
     image.speed_b_mps = {m[1], m[2], m[3]};
     image.rate_b_radps = {m[4], m[5], m[6]};
-    image.p_n_m = {t[1], t[2], t[3]};
-    image.r_nb = Eigen::Quaterniond(t[4], t[5], t[6], t[7]).normalized().toRotationMatrix();
+    image.p_n_m = {t[1], t[2], t[4]};
+    image.r_nb = Eigen::Quaterniond(t[5], t[6], t[7], t[8]).normalized().toRotationMatrix();
     drive.images.push_back(image);
   }
   for (const auto& row : read_rows(stem + ".features.csv", 4))
