@@ -7,6 +7,7 @@
 #include "sim_host/simulated_robot.hpp"
 #include "sim_host/world/world.hpp"
 
+#include <algorithm>
 #include <sstream>
 #include <string>
 
@@ -14,13 +15,19 @@ namespace tetap::sim {
 
 struct Sent {
   bool imu = false, landmarks = false, magnetometer = false, barometer = false;
-  bool closures = false;  ///< a front end makes its keyframes and closes loops
-  bool own_map = false;   ///< the robot makes its map, so it is given none
-  bool nameless = false;  ///< the map needs no identities
-  bool inertial = false;  ///< an inertial filter is there: what is a matched world for it is another one
+  bool closures = false;            ///< a front end makes its keyframes and closes loops
+  bool own_map = false;             ///< the robot makes its map, so it is given none
+  bool nameless = false;            ///< the map needs no identities
+  bool inertial = false;            ///< an inertial filter is there: what is a matched world for it is another one
+  int scans_hz = 0, images_hz = 0;  ///< 0: none
   VehicleKind kind = VehicleKind::kDifferentialDrive;
   friend bool operator==(const Sent&, const Sent&) = default;
 };
+
+/// Turns a second; where all beams of a scan are of one time, as many as a usual scanner has.
+[[nodiscard]] constexpr int scans_hz(const param::LidarParameters& n) {
+  return n.turn_us > 0 ? std::max(1, 1'000'000 / n.turn_us) : 10;
+}
 
 [[nodiscard]] inline Sent sent_to(const EstimatorFacts& takes, const param::Parameters& n) {
   return {.imu = takes.needs_imu || (n.gyro.use != 0 && takes.imu),
@@ -31,6 +38,8 @@ struct Sent {
           .own_map = takes.own_map,
           .nameless = takes.nameless,
           .inertial = takes.inertial,
+          .scans_hz = takes.scans ? scans_hz(n.lidar) : 0,
+          .images_hz = takes.images && n.camera.any() ? 10 : 0,
           .kind = vehicle_kind(n, takes.inertial)};
 }
 
@@ -43,6 +52,8 @@ struct Sent {
 /// The world as that robot meets it.
 inline void send_only(const Sent& sent, World::Options& world) {
   if (!sent.imu) world.parameters.imu.rate_hz = 0;
+  if (sent.scans_hz > 0) world.parameters.lidar.rate_hz = sent.scans_hz;
+  if (sent.images_hz > 0) world.parameters.features.rate_hz = sent.images_hz;
   if (!sent.landmarks) {
     world.parameters.camera.rate_hz = 0;
     // A scanner and a camera see them, whatever the node has of their map.
@@ -66,6 +77,8 @@ inline void simulate(const std::string& robot, const Sent& sent, const param::Pa
             .landmarks = sent.landmarks,
             .own_map = sent.own_map,
             .nameless = sent.nameless,
+            .scans = sent.scans_hz > 0,
+            .images = sent.images_hz > 0,
             .own_noise = !from_world},
            world);
 }

@@ -30,7 +30,9 @@ struct SimulatedAs {
   bool landmarks = false;  ///< the robot sees landmarks, whose map fixes its frame
   bool own_map = false;    ///< the robot makes that map and is given none
   bool nameless = false;   ///< the landmarks have no identities
-  bool own_noise = true;   ///< false: the world's own numbers are already those of the robot's parameters
+  bool scans = false;      ///< the robot has a laser scanner, and a camera whose features are followed
+  bool images = false;
+  bool own_noise = true;  ///< false: the world's own numbers are already those of the robot's parameters
 };
 
 namespace detail {
@@ -140,6 +142,32 @@ inline void set_mounting(const param::Parameters& n, bool inertial, Parameters& 
   if (n.magnetic.norm_uT > 0) world.magnetometer.field_uT = wide(n.magnetic.norm_uT);
 }
 
+inline void set_scanner(const param::LidarParameters& n, LidarNumbers& lidar) {
+  lidar.x_b_m = wide(n.x_b_m);
+  lidar.y_b_m = wide(n.y_b_m);
+  lidar.yaw_rad = wide(n.yaw_rad);
+  lidar.min_m = wide(n.min_m);
+  lidar.max_m = wide(n.max_m);
+  lidar.stamp_late = {n.delay_us};
+}
+
+/// An image whose middle the camera's axis meets.
+inline void set_camera(const param::CameraParameters& n, FeatureCameraNumbers& camera) {
+  camera.fu_px = wide(n.fu_px);
+  camera.fv_px = wide(n.fv_px);
+  camera.cu_px = wide(n.cu_px);
+  camera.cv_px = wide(n.cv_px);
+  camera.width_px = static_cast<int>(2 * camera.cu_px + 1);
+  camera.height_px = static_cast<int>(2 * camera.cv_px + 1);
+  camera.mounting_bc = {wide(n.mounting_bc)};
+  camera.x_b_m = wide(n.place_b_m[0]);
+  camera.y_b_m = wide(n.place_b_m[1]);
+  camera.z_b_m = wide(n.place_b_m[2]);
+  camera.stamp_late = {n.delay_us};
+  camera.noise_px = std::min(camera.noise_px, wide(n.sigma_px));
+  camera.mount_sigma_rad = std::min(camera.mount_sigma_rad, wide(n.sigma_mounting_rad));
+}
+
 inline void set_imu_noise(const param::InertialParameters& n, ImuParameters& imu) {
   imu.gyro_noise = std::min(imu.gyro_noise, wide(n.gyro_radps_rthz));
   for (double& one : imu.accel_noise) one = std::min(one, wide(n.accel_mps2_rthz));
@@ -204,6 +232,8 @@ inline void simulate(const param::Parameters& n, const SimulatedAs& as, World::O
   world.surveyed = as.landmarks || n.gnss.origin_configured != 0;
   world.map_given = !as.own_map;
   p.camera.identities = !as.nameless;
+  if (as.scans) detail::set_scanner(n.lidar, p.lidar);
+  if (as.images) detail::set_camera(n.camera, p.features);
   if (!as.own_noise) return;
   detail::set_mounting(n, as.inertial, p);
   p.camera.sigma_range_m = std::min(p.camera.sigma_range_m, detail::wide(n.landmark.sigma_range_m));

@@ -302,23 +302,23 @@ void set_camera(sim::Arguments& arguments, const sim::Sent& sent, sim::CameraNum
 }
 
 /// A scanner, and a camera that follows features.
-void set_sights(sim::Arguments& arguments, sim::World::Options& world) {
+void set_sights(sim::Arguments& arguments, const sim::Sent& sent, sim::World::Options& world) {
   sim::Parameters& n = world.parameters;
   if (arguments.flag("--lidar")) n.lidar.rate_hz = 10;
   if (arguments.flag("--camera")) n.features.rate_hz = 10;
   n.features.recognise = arguments.flag("--recognise");
   n.features.landmarks_only = arguments.flag("--landmarks-only");
   n.people.count = static_cast<int>(arguments.integer("--people", 0, 0, 50));
-  if ((n.features.recognise || n.features.landmarks_only) && n.features.rate_hz == 0)
+  const bool camera = n.features.rate_hz > 0 || sent.images_hz > 0, scanner = n.lidar.rate_hz > 0 || sent.scans_hz > 0;
+  if ((n.features.recognise || n.features.landmarks_only) && !camera)
     throw sim::UsageError("--recognise and --landmarks-only need --camera");
-  if (n.people.count > 0 && n.lidar.rate_hz == 0 && n.features.rate_hz == 0)
-    throw sim::UsageError("--people needs --lidar or --camera");
+  if (n.people.count > 0 && !scanner && !camera) throw sim::UsageError("--people needs --lidar or --camera");
 }
 
 void set_world(sim::Arguments& arguments, const sim::Sent& sent, sim::World::Options& world) {
   set_course(arguments, sent, world);
   set_camera(arguments, sent, world.parameters.camera);
-  set_sights(arguments, world);
+  set_sights(arguments, sent, world);
   if (arguments.flag("--no-wheels")) world.parameters.wheels.rate_hz = 0;
   world.parameters.gnss.rate_hz = counted(arguments, "--gnss-hz", world.parameters.gnss.rate_hz, 100);
   world.parameters.imu.rate_hz = counted(arguments, "--imu-hz", world.parameters.imu.rate_hz, 2000);

@@ -27,9 +27,7 @@ FeatureCamera::FeatureCamera(const FeatureCameraNumbers& parameters, const Surro
   const double roll = mount.normal(parameters.mount_sigma_rad);
   const double pitch = mount.normal(parameters.mount_sigma_rad);
   const double yaw = mount.normal(parameters.mount_sigma_rad);
-  // The camera's x is the mount's right, its y down, its z ahead.
-  constexpr Matrix3 kAxes{{0, -1, 0, 0, 0, -1, 1, 0, 0}};
-  body_to_camera_ = kAxes * rotation({roll, parameters.tilt_rad + pitch, yaw}).transposed();
+  body_to_camera_ = parameters.mounting_bc.transposed() * rotation({roll, pitch, yaw}).transposed();
 }
 
 FeatureCamera::Eye FeatureCamera::eye_at(const Truth& truth) const {

@@ -3,7 +3,7 @@
 // [own] our choice, as in numbers.hpp.
 #pragma once
 
-#include "sim_host/world/math.hpp"
+#include "sim_host/world/rotation.hpp"
 #include "tetap/base/time.hpp"
 
 #include <array>
@@ -35,6 +35,7 @@ struct LidarNumbers {
   double mount_error_rad = 0.003;  ///< yaw of the mount against the robot's parameter [own]
   base::Micros phase{2'500};       ///< time of the first beam
   base::Micros frame{270};         ///< between two frames of a scan: 500 kbit/s
+  base::Micros stamp_late{0};      ///< from the first beam to the stamp
   base::Micros latency_min{2'000}, latency_max{6'000};  ///< from the last beam to the first frame
 };
 
@@ -43,13 +44,14 @@ struct LidarNumbers {
   return n;
 }
 
-/// A pinhole camera and a front end that follows features from image to image. It looks ahead where its tilt is 0.
+/// A pinhole camera and a front end that follows features from image to image.
 struct FeatureCameraNumbers {
   int rate_hz = 0;  ///< 0: none; a divisor of 2000
   int width_px = 752, height_px = 480;
   double fu_px = 460, fv_px = 460, cu_px = 375.5, cv_px = 239.5;  ///< lens of a usual global-shutter sensor [own]
   double x_b_m = 0.2, y_b_m = 0, z_b_m = 0.6;                     ///< place of its mounting, from the ground
-  double tilt_rad = 0;                                            ///< downwards
+  /// From the camera's axes (z along the view, x right, y down) into the body's; it looks ahead.
+  Matrix3 mounting_bc{{0, 0, 1, -1, 0, 0, 0, -1, 0}};
   double mount_sigma_rad = 0.002;           ///< 1 sigma per axis of its rotation against the drawing [own]
   double near_m = 0.5, far_m = 30;          ///< depths at which a feature is found
   int features = 40;                        ///< followed at a time, 200 at the most
@@ -66,6 +68,7 @@ struct FeatureCameraNumbers {
   base::Micros exposure{4'000};
   base::Micros phase{21'500};
   base::Micros frame{135};                                ///< between two frames of an image: 1 Mbit/s
+  base::Micros stamp_late{0};                             ///< from the middle of the exposure to the stamp
   base::Micros latency_min{30'000}, latency_max{60'000};  ///< from the middle of the exposure to the first frame
 };
 

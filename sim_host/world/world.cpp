@@ -159,7 +159,7 @@ void World::emit(Value value, std::uint8_t sequence, base::Micros stamp_late, ba
 void World::emit(const Lidar::Scan& scan) {
   const LidarNumbers& n = parameters_.lidar;
   base::Micros latency = lidar_latency_.between(n.latency_min, n.latency_max);
-  base::Micros stamp_late = scan.first - now_;
+  base::Micros stamp_late = scan.first - now_ + n.stamp_late;
   if (faults_.active(Fault::kLidarLate, now_)) stamp_late += base::Micros{FaultNumbers::kScanLate_us};
   const std::uint8_t sequence = scan_sequence_++;
   emit(scan.head, sequence, stamp_late, latency - stamp_late);
@@ -172,7 +172,8 @@ void World::emit(const Lidar::Scan& scan) {
 void World::emit(const FeatureCamera::Image& image, std::uint8_t sequence, base::Micros latency) {
   const FeatureCameraNumbers& n = parameters_.features;
   if (faults_.active(Fault::kImagesLate, now_)) latency += base::Micros{FaultNumbers::kImageLate_us};
-  const base::Micros stamp_late{faults_.active(Fault::kImageStamps, now_) ? FaultNumbers::kImageStamp_us : 0};
+  base::Micros stamp_late = n.stamp_late;
+  if (faults_.active(Fault::kImageStamps, now_)) stamp_late += base::Micros{FaultNumbers::kImageStamp_us};
   const auto send = [&](const std::vector<ImageFeature>& features, std::uint8_t instance) {
     for (std::size_t i = 0; i < features.size(); ++i, latency += n.frame)
       emit(features[i], sequence, stamp_late, latency - stamp_late, instance, image.torn && i == 0);

@@ -63,7 +63,8 @@ struct Scene {
 
 TEST(FeatureCamera, projects_as_rotations_of_another_library_say) {
   FeatureCameraNumbers n = exact();
-  n.x_b_m = 0.3, n.y_b_m = -0.1, n.z_b_m = 0.8, n.tilt_rad = 0.2;
+  n.x_b_m = 0.3, n.y_b_m = -0.1, n.z_b_m = 0.8;
+  n.mounting_bc = {{0, -std::sin(0.2), std::cos(0.2), -1, 0, 0, 0, -std::cos(0.2), -std::sin(0.2)}};  // tilted down
   const Scene scene{n};
   const Truth truth{.x_m = 12, .y_m = 8, .z_m = 0.1, .roll_rad = 0.05, .pitch_rad = -0.08, .yaw_rad = 2.5};
   using Eigen::AngleAxisd, Eigen::Vector3d;

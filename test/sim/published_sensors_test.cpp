@@ -102,6 +102,15 @@ TEST(Sent, a_robot_without_landmarks_gets_no_map_and_no_sightings) {
   EXPECT_FALSE(planar.contains(bus::InBaro::kOffset));
 }
 
+TEST(Sent, scans_and_images_go_to_robots_that_take_them) {
+  const auto scanner = sent_frames("scanner", 20), visual = sent_frames("visual", 20), rover = sent_frames("rover", 20);
+  EXPECT_NEAR(scanner.at(bus::InScanHead::kOffset), 200, 2);
+  EXPECT_NEAR(visual.at(bus::InImage::kOffset), 200, 2);
+  EXPECT_FALSE(scanner.contains(bus::InImage::kOffset) || visual.contains(bus::InScanHead::kOffset));
+  EXPECT_FALSE(rover.contains(bus::InImage::kOffset) || rover.contains(bus::InScanHead::kOffset));
+  EXPECT_FALSE(visual.contains(bus::InMapEntry::kOffset)) << "it sees the posts, and is not told where they are";
+}
+
 TEST(Sent, every_fault_that_a_robot_accepts_changes_what_it_is_sent_and_no_other_does) {
   std::set<std::string_view> acted;
   ASSERT_GE(robots().size(), 4U);

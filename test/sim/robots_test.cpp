@@ -187,7 +187,9 @@ INSTANTIATE_TEST_SUITE_P(All, Robots,
                          ::testing::Values(Case{"rover", 2, 80, VehicleKind::kDifferentialDrive},
                                            Case{"husky_inertial", 1, 80, VehicleKind::kDifferentialDrive},
                                            Case{"car", 0, 300, VehicleKind::kCar},
-                                           Case{"iris", 1, 100, VehicleKind::kMulticopter}),
+                                           Case{"iris", 1, 100, VehicleKind::kMulticopter},
+                                           Case{"scanner", 1, 40, VehicleKind::kDifferentialDrive},
+                                           Case{"visual", 1, 80, VehicleKind::kDifferentialDrive}),
                          [](const auto& which) { return std::string(which.param.robot); });
 
 /// The rover's node told of another body; the world has it, or not.
