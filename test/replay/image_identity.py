@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
-"""Robots that make their map, as Cortex-M7 images in QEMU and as host program: image_identity.py PROGRAMS IMAGES OUT [SECONDS]. Both get the same frames of the
-simulated world: sightings that come late, others that come too late, more landmarks or keyframes than there is room for, jobs that last many ticks. All frames
+"""Robots that make their map, or take scans or images, as Cortex-M7 images in QEMU and as host program: image_identity.py PROGRAMS IMAGES OUT [SECONDS]. Both get the same frames of the
+simulated world: sightings and images that come late, others that come too late, more landmarks or keyframes than there is room for, jobs that last many ticks. All frames
 that a node sends have to be equal, byte for byte, and one flipped bit of a wheel's count has to change the state's CRC. OUT/identity.json holds the figures."""
 import json
 import os
@@ -17,12 +17,17 @@ BASE = 0x300
 ROBOTS = {
     "mapper": (["--landmarks", "60", "--clutter", "0.3"], {"MapSize": 30, "MapRefused": 1, "TooLate": 1}),
     "mapper_fast": (["--landmarks", "24"], {"MapSize": 15, "MapRefused": 1, "TooLate": 1}),
+    "scanner": ([], {"Pairs": 100}),
+    "visual": ([], {"Used": 1, "TooLate": 1}),
     "graph128": (["--loop-m", "20", "--laps", "4"], {"MapSize": 90, "Keyframe": 140, "WorkLeft": 1, "Jobs": 5}),
 }
 LATE_STEPS, TOO_LATE_STEPS = 9, 40  # ticks of 10 ms; the window is 200 ms
 DBC = bus_writer.Dbc()
-DIAG, INNOV, STATE_CRC, VERSION, GRAPH, KEYFRAME = (DBC.messages[name].identifier for name in ("Est_Diag", "Est_Innov", "Est_StateCrc", "Est_Version", "Est_Graph", "Est_Keyframe"))
-STEP, SIGHTING, WHEELS = (DBC.messages[name].identifier for name in ("In_Sync", "In_RangeBearing", "In_WheelCounts"))
+DIAG, INNOV, STATE_CRC, VERSION = (DBC.messages[name].identifier for name in ("Est_Diag", "Est_Innov", "Est_StateCrc", "Est_Version"))
+STEP, SIGHTING, IMAGE, WHEELS = (DBC.messages[name].identifier for name in ("In_Sync", "In_RangeBearing", "In_Image", "In_WheelCounts"))
+SHOWN = {DBC.messages[message].identifier: (message, fields) for message, fields in {  # what shows that something happened
+    "Est_Graph": {"Jobs": "Jobs"}, "Est_Keyframe": {"Id": "Keyframe"}, "Est_Visual": {"Used": "Used"}, "Est_ScanMatch": {"Pairs": "Pairs"}}.items()}
+MAP_FIELDS = ("Est_Diag", {name: name for name in ("MapSize", "MapRefused", "WorkLeft")})
 TIMED_PAGES, MAP_PAGE = (0, 1), 15  # pages of Est_Diag; the first two have real times
 TOO_LATE = DBC.tables["Verdict"]["TooLate"]
 
@@ -50,11 +55,11 @@ def is_input(identifier):
 
 
 def delayed(lines):
-    """Each seventh sighting comes some ticks later, each fiftieth after the window."""
+    """Each seventh sighting, or end of an image, comes some ticks later, each fiftieth after the window."""
     waiting, seen, ticks = {}, 0, 0
     for line in lines:
         identifier = int(line.split()[2].split("#")[0], 16)
-        if identifier == SIGHTING:
+        if identifier in (SIGHTING, IMAGE):
             seen += 1
             later = TOO_LATE_STEPS if seen % 50 == 0 else LATE_STEPS if seen % 7 == 0 else 0
             if later:
@@ -99,16 +104,13 @@ def largest(all_sent):
     most = {"TooLate": 0}
     for identifier, data in all_sent:
         if identifier == DIAG and int(data[:2], 16) & 15 == MAP_PAGE:
-            names, message = ("MapSize", "MapRefused", "WorkLeft"), "Est_Diag"
-        elif identifier == GRAPH:
-            names, message = ("Jobs",), "Est_Graph"
-        elif identifier == KEYFRAME:
-            names, message = ("Id",), "Est_Keyframe"
+            message, fields = MAP_FIELDS
+        elif identifier in SHOWN:
+            message, fields = SHOWN[identifier]
         else:
             most["TooLate"] += identifier == INNOV and signal("Est_Innov", data, "Verdict") == TOO_LATE
             continue
-        for name in names:
-            key = "Keyframe" if name == "Id" else name
+        for name, key in fields.items():
             most[key] = max(most.get(key, 0), signal(message, data, name))
     return most
 
