@@ -381,6 +381,7 @@ int main(int argc, char** argv) try {
   const bool list = arguments.flag("--list-faults");
   arguments.finish();
   if (!refused.empty()) throw std::runtime_error(refused);
+  if (const std::string why = sim::World::refusal(run.world); !why.empty()) throw std::runtime_error(why);
   if (list) return std::printf("%s\n", sim::applicable_faults(run.world).c_str()), 0;
   if (memory) return sim::with_node_in_process(robot, run.settings, base, [&](auto& link) { return drive(link, run); });
   hal::SocketCan can(interface);

@@ -4,7 +4,7 @@
 #include "sim_host/world/math.hpp"
 
 #include <algorithm>
-#include <stdexcept>
+#include <cstdlib>
 #include <string>
 
 namespace tetap::sim {
@@ -127,8 +127,7 @@ Course flight_course(int laps) {
 
 Course loop_course(double length_m, int laps, int landmarks) {
   constexpr double kBeside_m = 2;
-  if (!(length_m >= 20) || landmarks < 4 || landmarks > 254)
-    throw std::invalid_argument("a loop is at least 20 m long, with 4 to 254 landmarks");
+  if (!(length_m >= 20) || landmarks < 4 || landmarks > 254) return {.waypoints = {}, .landmarks = {}};
   const double radius_m = length_m / 20;
   const double side_m = (length_m - (2 * kPi - 8) * radius_m) / 4;
   Course course{.waypoints = {{.x_m = 0, .y_m = 0, .stop_s = 5}}, .landmarks = {}};
@@ -160,15 +159,17 @@ Course circle_course(double radius_m, int turns) {
 }
 
 Plan::Plan(const Course& course, const CourseLimits& limits) {
-  if (course.waypoints.size() < 2) throw std::invalid_argument("a course needs two waypoints");
-  add_pieces(course);
+  if (!add_pieces(course).empty()) std::abort();
   add_speeds(limits);
 }
 
-void Plan::add_pieces(const Course& course) {
+std::string Plan::refusal(const Course& course) { return Plan().add_pieces(course); }
+
+std::string Plan::add_pieces(const Course& course) {
   const auto& way = course.waypoints;
-  const auto complain = [](std::size_t index, const std::string& why) {
-    throw std::invalid_argument("course, waypoint " + std::to_string(index) + ": " + why);
+  if (way.size() < 2) return "a course needs two waypoints";
+  const auto refused = [](std::size_t index, const std::string& why) {
+    return "course, waypoint " + std::to_string(index) + ": " + why;
   };
   double yaw_rad = sim::atan2(way[1].y_m - way[0].y_m, way[1].x_m - way[0].x_m);
   double x_m = way[0].x_m;
@@ -182,7 +183,7 @@ void Plan::add_pieces(const Course& course) {
   };
 
   for (std::size_t i = 0; i < way.size(); ++i) {
-    if (way[i].stop_s > 0 && way[i].radius_m > 0) complain(i, "a standstill within a corner");
+    if (way[i].stop_s > 0 && way[i].radius_m > 0) return refused(i, "a standstill within a corner");
     if (i > 0) {
       const double dx = way[i].x_m - x_m;
       const double dy = way[i].y_m - y_m;
@@ -192,14 +193,15 @@ void Plan::add_pieces(const Course& course) {
         turn_rad = wrap(sim::atan2(way[i + 1].y_m - way[i].y_m, way[i + 1].x_m - way[i].x_m) - yaw_rad);
       const double half_tangent = sim::sin(magnitude(turn_rad) / 2) / sim::cos(magnitude(turn_rad) / 2);
       const double tangent_m = way[i].radius_m * half_tangent;
-      if (way[i].radius_m <= 0 && magnitude(turn_rad) > 1e-6) complain(i, "a corner without a radius");
+      if (way[i].radius_m <= 0 && magnitude(turn_rad) > 1e-6) return refused(i, "a corner without a radius");
       // A tangent may use all that is left of a leg; rounding must not make it one bit too long.
-      if (tangent_m > straight_m + 1e-9) complain(i, "its arc does not fit");
+      if (tangent_m > straight_m + 1e-9) return refused(i, "its arc does not fit");
       add(straight_m - tangent_m, 0);
       if (tangent_m > 0) add(way[i].radius_m * magnitude(turn_rad), (turn_rad > 0 ? 1 : -1) / way[i].radius_m);
     }
     if (way[i].stop_s > 0) stops_m_.push_back(length_m_), stops_s_.push_back(way[i].stop_s);
   }
+  return "";
 }
 
 void Plan::add_speeds(const CourseLimits& limits) {

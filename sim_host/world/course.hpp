@@ -8,6 +8,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <string>
 #include <vector>
 
 namespace tetap::sim {
@@ -51,8 +52,8 @@ struct Course {
 /// Legs for a multicopter at up to 5 m/s, flown so many times, with a hover half way and once a lap.
 [[nodiscard]] Course flight_course(int laps);
 /// A square with rounded corners, `length_m` long in one lap, with standstill at the start and at the end. The given
-/// number of landmarks stands in turn 2 m to the right and to the left of the way. From 20 m and 4 landmarks on, 254
-/// landmarks at the most.
+/// number of landmarks stands in turn 2 m to the right and to the left of the way. A loop below 20 m, and one with less
+/// than 4 or more than 254 landmarks, has no waypoints, so that no plan takes it.
 [[nodiscard]] Course loop_course(double length_m, int laps, int landmarks);
 /// A straight lead-in and full circles to the left, for laws that have closed forms.
 [[nodiscard]] Course circle_course(double radius_m, int turns);
@@ -75,8 +76,9 @@ struct PlanPoint {
 /// The course as a function of path length, and path length as a function of time.
 class Plan {
  public:
-  /// Throws std::invalid_argument where the waypoints cannot be driven: a corner whose arc does not fit, a stop in a
-  /// corner.
+  /// Why the waypoints cannot be driven: a corner whose arc does not fit, a stop in a corner; empty where they can.
+  [[nodiscard]] static std::string refusal(const Course& course);
+  /// Ends the program where the course is refused.
   Plan(const Course& course, const CourseLimits& limits);
 
   [[nodiscard]] PathPoint path(double s_m) const;
@@ -96,7 +98,9 @@ class Plan {
   struct Node {
     double s_m, speed_mps, time_s;  ///< two nodes with the same s_m bracket a standstill
   };
-  void add_pieces(const Course& course);
+  Plan() = default;
+  /// Returns the refusal.
+  std::string add_pieces(const Course& course);
   void add_speeds(const CourseLimits& limits);
   [[nodiscard]] const Piece& piece(double s_m) const;
 

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cstdio>
 
 namespace tetap::sim {
@@ -91,14 +90,6 @@ std::string names() {
   return all;
 }
 
-/// Seconds, decimal, 0 to 1e6, the whole of the text.
-std::optional<base::Micros> parse_seconds(std::string_view text) {
-  double value = 0;
-  const auto [end, code] = std::from_chars(text.data(), text.data() + text.size(), value, std::chars_format::fixed);
-  if (code != std::errc{} || end != text.data() + text.size() || !(value >= 0 && value <= 1e6)) return std::nullopt;
-  return base::Micros{static_cast<std::int64_t>(sim::floor(value * 1e6 + 0.5))};
-}
-
 base::Micros micros(double seconds) { return {static_cast<std::int64_t>(sim::floor(seconds * 1e6 + 0.5))}; }
 
 }  // namespace
@@ -153,13 +144,34 @@ FaultsParsed parse_faults(std::string_view text) {
   return parsed;
 }
 
+std::optional<base::Micros> parse_seconds(std::string_view text) {
+  constexpr std::int64_t kMost_us = 1'000'000'000'000;
+  std::int64_t us = 0, unit_us = 1'000'000;
+  bool point = false, any = false;
+  for (const char c : text) {
+    if (c == '.' && !point) {
+      point = true;
+      continue;
+    }
+    if (c < '0' || c > '9') return std::nullopt;
+    any = true;
+    if (point)
+      us += (c - '0') * (unit_us /= 10);  // below a microsecond: nothing
+    else
+      us = 10 * us + (c - '0') * unit_us;
+    if (us > kMost_us) return std::nullopt;
+  }
+  return any ? std::optional(base::Micros{us}) : std::nullopt;
+}
+
+std::string seconds_text(base::Micros span) {
+  const std::string fraction = std::to_string(1'000'000 + span.us % 1'000'000);
+  return std::to_string(span.us / 1'000'000) + "." + fraction.substr(1);
+}
+
 std::string text_of(const FaultSetting& setting) {
-  const auto seconds = [](base::Micros span) {
-    const std::string fraction = std::to_string(1'000'000 + span.us % 1'000'000);
-    return std::to_string(span.us / 1'000'000) + "." + fraction.substr(1);
-  };
-  const std::string start = std::string(info(setting.fault).name) + "@" + seconds(setting.start);
-  return setting.duration.us > 0 ? start + "+" + seconds(setting.duration) : start;
+  const std::string start = std::string(info(setting.fault).name) + "@" + seconds_text(setting.start);
+  return setting.duration.us > 0 ? start + "+" + seconds_text(setting.duration) : start;
 }
 
 std::optional<base::Micros> Faults::since(Fault fault, base::Micros at) const {

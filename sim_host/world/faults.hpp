@@ -119,6 +119,11 @@ struct FaultsParsed {
 /// `NAME[@START[+DURATION]]`, several separated by commas; an empty text is no fault.
 [[nodiscard]] FaultsParsed parse_faults(std::string_view text);
 
+/// Decimal seconds from 0 to 1e6, the whole of the text, down to the microsecond; empty for anything else.
+[[nodiscard]] std::optional<base::Micros> parse_seconds(std::string_view text);
+/// The same as `parse_seconds` reads it.
+[[nodiscard]] std::string seconds_text(base::Micros span);
+
 /// The same as `parse_faults` reads it.
 [[nodiscard]] std::string text_of(const FaultSetting& setting);
 

@@ -2,18 +2,12 @@
 #include "sim_host/world/world.hpp"
 
 #include <algorithm>
-#include <stdexcept>
+#include <cstdlib>
 #include <string>
 #include <utility>
 
 namespace tetap::sim {
 namespace {
-
-void check_rate(const char* what, int rate_hz) {
-  if (rate_hz < 0 || (rate_hz > 0 && (2000 % rate_hz != 0)))
-    throw std::invalid_argument(std::string{what} + " rate of " + std::to_string(rate_hz) +
-                                " Hz does not divide 2000 Hz");
-}
 
 constexpr std::uint8_t kRecogniser = 3;  // instance of what a front end recognises
 
@@ -30,20 +24,28 @@ bool later(base::Micros a_arrival, std::uint64_t a_order, base::Micros b_arrival
 }  // namespace
 
 Parameters World::effective(const Options& options) {
+  if (!refusal(options).empty()) std::abort();
   Parameters n = options.parameters;
   if (!options.mismatched && !options.as_given) n = options.inertial ? matched_inertial(n) : matched(n);
   if (!options.latency) n = without_latency(n);
-  check_rate("IMU", n.imu.rate_hz);
-  check_rate("wheel", n.wheels.rate_hz);
-  check_rate("GNSS", n.gnss.rate_hz);
-  check_rate("landmark", n.camera.rate_hz);
-  check_rate("magnetometer", n.magnetometer.rate_hz);
-  check_rate("barometer", n.barometer.rate_hz);
-  check_rate("scan matcher", n.scan_matcher.rate_hz);
-  check_rate("LIDAR", n.lidar.rate_hz);
-  check_rate("image", n.features.rate_hz);
-  if (options.substeps < 1) throw std::invalid_argument("substeps must be 1 or more");
   return n;
+}
+
+std::string World::refusal(const Options& options) {
+  const Parameters& n = options.parameters;
+  for (const auto& [what, rate_hz] : {std::pair{"IMU", n.imu.rate_hz},
+                                      {"wheel", n.wheels.rate_hz},
+                                      {"GNSS", n.gnss.rate_hz},
+                                      {"landmark", n.camera.rate_hz},
+                                      {"magnetometer", n.magnetometer.rate_hz},
+                                      {"barometer", n.barometer.rate_hz},
+                                      {"scan matcher", n.scan_matcher.rate_hz},
+                                      {"LIDAR", n.lidar.rate_hz},
+                                      {"image", n.features.rate_hz}})
+    if (rate_hz < 0 || (rate_hz > 0 && 2000 % rate_hz != 0))
+      return std::string{what} + " rate of " + std::to_string(rate_hz) + " Hz does not divide 2000 Hz";
+  if (options.substeps < 1) return "substeps must be 1 or more";
+  return Plan::refusal(options.course);
 }
 
 World::World(const Options& options, std::uint64_t seed)

@@ -20,6 +20,7 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -60,7 +61,9 @@ class World {
     int substeps = 1;               ///< integration steps per 0.5 ms
   };
 
-  /// Throws std::invalid_argument where a rate does not divide 2000 Hz or the course cannot be driven.
+  /// Why there is no such world: a rate that does not divide 2000 Hz, a course that cannot be driven; empty: there is.
+  [[nodiscard]] static std::string refusal(const Options& options);
+  /// Ends the program where the options are refused.
   World(const Options& options, std::uint64_t seed);
 
   /// Lets the world run until `t`; appends what has arrived by then, in the order of arrival. Never runs backwards.

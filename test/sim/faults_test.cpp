@@ -143,6 +143,10 @@ TEST(Faults, several_are_separated_by_commas_and_what_is_not_understood_is_named
        {"gnss_jump@", "gnss_jump@x", "gnss_jump@5+", "gnss_jump@5+x", "gnss_jump@-1", "gnss_jump@1e9", "gnss_jump@nan",
         "gnss_jump@5 ", "gnss_jump@5+1+2", "gnss_jump@5+0", "gnss_jump,,slip_left", "@5"})
     EXPECT_NE(parse_faults(bad).error, "") << bad;
+  for (const std::int64_t us : {0L, 1L, 999'999L, 12'345'678L, 1'000'000'000'000L})
+    EXPECT_EQ(parse_seconds(seconds_text({us})), base::Micros{us});
+  for (const char* bad : {"", ".", "1.2.3", "+1", "1e3", "1000000.000001", "99999999999999999999999"})
+    EXPECT_EQ(parse_seconds(bad), std::nullopt) << bad;
 }
 
 TEST(Faults, gnss_jump_is_a_hundred_metres_to_the_east) {

@@ -7,7 +7,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <stdexcept>
 
 namespace tetap::sim {
 namespace {
@@ -454,10 +453,15 @@ TEST(World, in_the_matched_world_the_map_is_exact_and_the_body_level) {
 
 TEST(World, a_rate_that_is_no_divisor_is_refused) {
   World::Options options;
+  EXPECT_EQ(World::refusal(options), "");
   options.parameters.imu.rate_hz = 300;
-  EXPECT_THROW((World{options, 1}), std::invalid_argument);
+  EXPECT_EQ(World::refusal(options), "IMU rate of 300 Hz does not divide 2000 Hz");
   options.parameters.imu.rate_hz = -1;
-  EXPECT_THROW((World{options, 1}), std::invalid_argument);
+  EXPECT_NE(World::refusal(options), "");
+  EXPECT_DEATH((World{options, 1}), "");
+  options.parameters.imu.rate_hz = 100;
+  options.course.waypoints.clear();
+  EXPECT_EQ(World::refusal(options), Plan::refusal(options.course));
 }
 
 TEST(World, in_the_world_matched_to_an_inertial_filter_the_body_trembles_without_memory_also_at_rest) {
