@@ -13,7 +13,6 @@
 #include "sim_host/replay/lockstep.hpp"
 #include "sim_host/robots.hpp"
 #include "sim_host/truth_file.hpp"
-#include "sim_host/world/floor_plan.hpp"
 #include "sim_host/world_source.hpp"
 #include "version.hpp"
 
@@ -212,9 +211,7 @@ constexpr double kFarthest_m = 120'000;
 /// Course, place and origin; the node's part of the origin goes to its settings.
 void set_place(sim::Arguments& arguments, const param::GnssParameters& node, bool memory, Run& run) {
   sim::World::Options& world = run.world;
-  if (node.origin_configured != 0)
-    world.origin = {static_cast<double>(node.origin_latitude_2ndeg) * 2e-9,
-                    static_cast<double>(node.origin_longitude_2ndeg) * 2e-9, static_cast<double>(node.origin_height_m)};
+  world.origin = sim::origin_of(node, world.origin);
   std::array<double, 2> distance_m{arguments.real("--east", 0, -60'000, 60'000), 0};
   const auto distance = arguments.text("--origin-distance");
   if (distance) distance_m = numbers<2>(*distance, "--origin-distance", {kFarthest_m, kFarthest_m});
@@ -253,44 +250,19 @@ void set_place(sim::Arguments& arguments, const param::GnssParameters& node, boo
 }
 
 void set_course(sim::Arguments& arguments, const sim::Sent& sent, sim::World::Options& world) {
-  const bool car = sent.kind == sim::VehicleKind::kCar, flies = sent.kind == sim::VehicleKind::kMulticopter;
-  const std::string course = arguments.text("--course")
-                                 .value_or(flies          ? "flight"
-                                           : car          ? "street"
-                                           : sent.own_map ? "loop"
-                                                          : "yard");
+  const std::string course = arguments.text("--course").value_or(std::string(sim::usual_course(sent)));
   // Four minutes of one fault, and what comes after it, take two laps.
   const bool far = std::any_of(world.faults.begin(), world.faults.end(),
                                [](const sim::FaultSetting& s) { return s.fault == sim::Fault::kGnssFar; });
-  const int laps = counted(arguments, "--laps", far || course == "loop" ? 2 : 1, 1000);
+  const int laps = counted(arguments, "--laps", far ? 2 : sim::usual_laps(course), 1000);
   const double loop_m = arguments.real("--loop-m", 0, 20, 10'000);
   const auto landmarks = static_cast<int>(arguments.integer("--landmarks", 0, 4, 254));
   if (course != "loop" && (loop_m > 0 || landmarks > 0))
     throw sim::UsageError("--loop-m and --landmarks are of --course loop; the course is " + course);
-  if (course == "stand") {
-    world.course = {.waypoints = {{.x_m = 0, .y_m = 0, .stop_s = 86'400}, {.x_m = 1, .y_m = 0, .stop_s = 1}},
-                    .landmarks = {}};
-  } else if (course == "road" && !flies) {
-    world.course = sim::road_course(laps);
-    world.limits.speed_mps = 5;
-  } else if (course == "street" && car) {
-    world.course = sim::street_course(laps);
-  } else if (course == "flight" && flies) {
-    world.course = sim::flight_course(laps);
-  } else if (course == "loop" && !car && !flies) {
-    world.course = sim::loop_course(loop_m > 0 ? loop_m : 60, laps, landmarks > 0 ? landmarks : 24);
-  } else if ((course == "lab" || course == "corridor") && !car && !flies) {
-    world.course = course == "lab" ? sim::lab_course(laps) : sim::corridor_course();
-    world.limits.speed_mps = std::min(world.limits.speed_mps, 1.0);
-  } else if (course == "yard" && !car && !flies) {
-    world.course = sim::default_course(laps);
-  } else {
+  const sim::Loop loop{.length_m = loop_m > 0 ? loop_m : 60, .landmarks = landmarks > 0 ? landmarks : 24};
+  if (!sim::set_course(course, sent.kind, laps, loop, world))
     throw std::runtime_error("--course " + course + ": for this robot it is " +
-                             (flies ? "flight"
-                              : car ? "street, road"
-                                    : "yard, loop, lab, corridor, road") +
-                             " or stand");
-  }
+                             std::string(sim::course_names(sent.kind)));
 }
 
 void set_camera(sim::Arguments& arguments, const sim::Sent& sent, sim::CameraNumbers& camera) {

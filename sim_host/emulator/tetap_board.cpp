@@ -206,14 +206,9 @@ sim::World world_of(const Options& options, const param::Parameters& parameters)
   sim::World::Options world;
   world.faults = options.world_faults;
   sim::simulate(options.robot, sent, parameters, world);
-  const param::GnssParameters& gnss = parameters.gnss;
-  if (gnss.origin_configured != 0)
-    world.origin = {static_cast<double>(gnss.origin_latitude_2ndeg) * 2e-9,
-                    static_cast<double>(gnss.origin_longitude_2ndeg) * 2e-9, static_cast<double>(gnss.origin_height_m)};
-  world.course = sent.kind == sim::VehicleKind::kMulticopter ? sim::flight_course(1)
-                 : sent.kind == sim::VehicleKind::kCar       ? sim::street_course(1)
-                 : sent.own_map                              ? sim::loop_course(60, 2, 24)
-                                                             : sim::default_course(1);
+  world.origin = sim::origin_of(parameters.gnss, world.origin);
+  const std::string_view course = sim::usual_course(sent);
+  static_cast<void>(sim::set_course(course, sent.kind, sim::usual_laps(course), {}, world));
   const std::string refused = sim::cannot_act(world, options.robot);
   if (!refused.empty()) throw sim::UsageError(refused);
   sim::send_only(sent, world);

@@ -33,10 +33,7 @@ World world_of(const std::string& robot, std::uint64_t seed, param::Parameters& 
   parameters = parameters_of(robot);
   sent = sent_to(robot);
   simulate(robot, sent, parameters, world);
-  if (parameters.gnss.origin_configured != 0)
-    world.origin = {static_cast<double>(parameters.gnss.origin_latitude_2ndeg) * 2e-9,
-                    static_cast<double>(parameters.gnss.origin_longitude_2ndeg) * 2e-9,
-                    static_cast<double>(parameters.gnss.origin_height_m)};
+  world.origin = origin_of(parameters.gnss, world.origin);
   world.course = sent.kind == VehicleKind::kMulticopter ? flight_course(1)
                  : sent.kind == VehicleKind::kCar       ? street_course(1)
                                                         : default_course(1);

@@ -300,9 +300,4 @@ void Tables::source_rows(std::size_t k, const bus::EstStateSources& s) {
   source_row(k, "Barometer", s.baro_state, s.baro_check);
 }
 
-const Tables::Totals& Tables::end() {
-  totals_.estimates_sha256 = estimates_.hex();
-  return totals_;
-}
-
 }  // namespace tetap::sim

@@ -64,7 +64,7 @@ class Tables {
     std::uint64_t bits_received = 0;
     std::uint32_t state_crc = 0;   ///< the last
     base::Micros first, last;      ///< epochs
-    std::string estimates_sha256;  ///< after end()
+    std::string estimates_sha256;  ///< in so_far(), and behind end()
   };
 
   /// `base`: first id of the node's block. Writes the heading of every table; the sink outlives it.
@@ -80,8 +80,14 @@ class Tables {
     totals_.bits_received += worst_case_bits(frame);
   }
   void epoch(const NodeEpoch& epoch, base::Micros time);
-  /// Ends the hash of the estimates. Nothing comes behind it.
-  const Totals& end();
+  /// With the hash of the estimates up to now.
+  [[nodiscard]] Totals so_far() const {
+    Totals totals = totals_;
+    totals.estimates_sha256 = Sha256(estimates_).hex();
+    return totals;
+  }
+  /// The same, kept in totals().
+  const Totals& end() { return totals_ = so_far(); }
   [[nodiscard]] const Totals& totals() const { return totals_; }
 
  private:
