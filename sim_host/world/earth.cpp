@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sim_host/world/earth.hpp"
 
-#include <GeographicLib/NormalGravity.hpp>
-#include <vector>
-
 namespace tetap::sim {
 namespace {
 
@@ -14,34 +11,14 @@ std::int64_t units(double angle_deg) {
 }
 double degrees(std::int64_t units) { return static_cast<double>(units) / kUnitsPerDegree; }
 
-/// A point of the local frame.
-struct Place {
-  GeodeticOrigin at;
-  Matrix3 axes;
-};
-
-Place place_of(const GeographicLib::LocalCartesian& local, const Vector3& p) {
-  Place found;
-  std::vector<double> turn(9);  // row by row, from east north up of the point into the local frame
-  local.Reverse(p[0], p[1], p[2], found.at.latitude_deg, found.at.longitude_deg, found.at.height_m, turn);
-  for (std::size_t i = 0; i < 9; ++i) found.axes.m[i] = turn[i];
-  return found;
-}
-
 }  // namespace
 
 Earth::Earth(const GeodeticOrigin& origin)
-    : origin_{origin}, local_{origin.latitude_deg, origin.longitude_deg, origin.height_m} {
-  const Direction latitude = direction(radians(origin.latitude_deg));
-  const double rate_radps = GeographicLib::NormalGravity::WGS84().AngularVelocity();
-  earth_rate_n_radps_ = {0, rate_radps * latitude.cos, rate_radps * latitude.sin};
+    : origin_{origin}, origin_e_m_{wgs84::geocentric(origin)}, r_en_{wgs84::axes(origin)} {
+  earth_rate_n_radps_ = wgs84::kRate_radps * (r_en_.transposed() * Vector3{0, 0, 1});
 }
 
-GeodeticOrigin Earth::place(const Vector3& p_n_m) const {
-  GeodeticOrigin at;
-  local_.Reverse(p_n_m[0], p_n_m[1], p_n_m[2], at.latitude_deg, at.longitude_deg, at.height_m);
-  return at;
-}
+GeodeticOrigin Earth::place(const Vector3& p_n_m) const { return wgs84::geodetic(geocentric_m(p_n_m)); }
 
 GeodeticPoint Earth::geodetic(const Vector3& p_n_m) const {
   const GeodeticOrigin at = place(p_n_m);
@@ -50,22 +27,17 @@ GeodeticPoint Earth::geodetic(const Vector3& p_n_m) const {
 }
 
 Vector3 Earth::point_m(const GeodeticOrigin& place) const {
-  Vector3 p;
-  local_.Forward(place.latitude_deg, place.longitude_deg, place.height_m, p[0], p[1], p[2]);
-  return p;
+  return r_en_.transposed() * (wgs84::geocentric(place) - origin_e_m_);
 }
 
 Vector3 Earth::enu_m(const GeodeticPoint& point) const {
   return point_m({degrees(point.latitude_2ndeg), degrees(point.longitude_2ndeg), point.height_m});
 }
 
-Matrix3 Earth::axes(const Vector3& p_n_m) const { return place_of(local_, p_n_m).axes; }
+Matrix3 Earth::axes(const Vector3& p_n_m) const { return r_en_.transposed() * wgs84::axes(place(p_n_m)); }
 
 Vector3 Earth::gravity_n_mps2(const Vector3& p_n_m) const {
-  const Place place = place_of(local_, p_n_m);
-  double north_mps2 = 0, up_mps2 = 0;
-  GeographicLib::NormalGravity::WGS84().Gravity(place.at.latitude_deg, place.at.height_m, north_mps2, up_mps2);
-  return place.axes * Vector3{0, north_mps2, up_mps2};
+  return r_en_.transposed() * wgs84::gravity(geocentric_m(p_n_m));
 }
 
 FrameChange::FrameChange(const Earth& from, const Earth& to) {

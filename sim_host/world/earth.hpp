@@ -1,20 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// The Earth of the world: places, axes and gravity by GeographicLib (C. Karney), which shares nothing with the
-// firmware.
+// The Earth of the world: places, axes and gravity in local frames.
 #pragma once
 
-#include "sim_host/world/rotation.hpp"
+#include "sim_host/world/wgs84.hpp"
 
-#include <GeographicLib/LocalCartesian.hpp>
 #include <cstdint>
 
 namespace tetap::sim {
-
-struct GeodeticOrigin {
-  double latitude_deg = 0;
-  double longitude_deg = 0;
-  double height_m = 0;  ///< above the ellipsoid
-};
 
 /// Form on the bus: angles in 2e-9 deg.
 struct GeodeticPoint {
@@ -23,7 +15,7 @@ struct GeodeticPoint {
   double height_m = 0;
 };
 
-/// A local Cartesian frame n, fixed to the Earth: east, north, up of its origin (GeographicLib::LocalCartesian, WGS84).
+/// A local Cartesian frame n, fixed to the Earth: east, north, up of its origin.
 class Earth {
  public:
   explicit Earth(const GeodeticOrigin& origin);
@@ -38,7 +30,7 @@ class Earth {
   [[nodiscard]] Vector3 enu_m(const GeodeticPoint& point) const;
   /// Rotation from east, north, up of the point `p_n_m` into n.
   [[nodiscard]] Matrix3 axes(const Vector3& p_n_m) const;
-  /// Normal gravity at the point, in n: attraction and centrifugal force (GeographicLib::NormalGravity, WGS84).
+  /// Normal gravity at the point, in n: attraction and centrifugal force.
   [[nodiscard]] Vector3 gravity_n_mps2(const Vector3& p_n_m) const;
   /// Its magnitude at the origin.
   [[nodiscard]] double gravity_mps2() const { return -gravity_n_mps2({})[2]; }
@@ -46,8 +38,11 @@ class Earth {
   [[nodiscard]] Vector3 earth_rate_n_radps() const { return earth_rate_n_radps_; }
 
  private:
+  [[nodiscard]] Vector3 geocentric_m(const Vector3& p_n_m) const { return origin_e_m_ + r_en_ * p_n_m; }
+
   GeodeticOrigin origin_;
-  GeographicLib::LocalCartesian local_;
+  Vector3 origin_e_m_;
+  Matrix3 r_en_;
   Vector3 earth_rate_n_radps_{};
 };
 

@@ -6,6 +6,10 @@
 #include <gtest/gtest.h>
 
 #include <GeographicLib/Geocentric.hpp>
+#include <GeographicLib/LocalCartesian.hpp>
+#include <GeographicLib/NormalGravity.hpp>
+#include <algorithm>
+#include <cmath>
 #include <vector>
 
 namespace tetap::sim {
@@ -98,6 +102,46 @@ TEST(Earth, axes_are_those_of_geocentric_coordinates) {
   for (std::size_t i = 0; i < 9; ++i) a.m[i] = of_place[i], b.m[i] = of_origin[i];
   const Matrix3 expected = b.transposed() * a, axes = earth.axes(p);
   for (std::size_t i = 0; i < 9; ++i) EXPECT_NEAR(axes.m[i], expected.m[i], 1e-12);
+}
+
+/// Largest differences from GeographicLib over places from pole to pole.
+struct Differences {
+  double point_m = 0, height_m = 0, gravity_mps2 = 0;
+};
+
+Differences differences_of(const GeodeticOrigin& origin, const Vector3& p) {
+  const Earth earth{origin};
+  const GeographicLib::LocalCartesian judge(origin.latitude_deg, origin.longitude_deg, origin.height_m);
+  double latitude_deg = 0, longitude_deg = 0, height_m = 0, north_mps2 = 0, up_mps2 = 0;
+  std::vector<double> turn(9);
+  judge.Reverse(p[0], p[1], p[2], latitude_deg, longitude_deg, height_m, turn);
+  GeographicLib::NormalGravity::WGS84().Gravity(latitude_deg, height_m, north_mps2, up_mps2);
+  const GeodeticOrigin place = earth.place(p);
+  const Vector3 there = earth.point_m({latitude_deg, longitude_deg, height_m}), g = earth.gravity_n_mps2(p);
+  // The place that the world has, as the judge sees it.
+  Vector3 back;
+  judge.Forward(place.latitude_deg, place.longitude_deg, place.height_m, back[0], back[1], back[2]);
+  Differences most{.height_m = std::abs(place.height_m - height_m)};
+  for (std::size_t i = 0; i < 3; ++i) {
+    most.point_m = std::max({most.point_m, std::abs(there[i] - p[i]), std::abs(back[i] - p[i])});
+    const double judged_mps2 = turn[3 * i + 1] * north_mps2 + turn[3 * i + 2] * up_mps2;
+    most.gravity_mps2 = std::max(most.gravity_mps2, std::abs(g[i] - judged_mps2));
+  }
+  return most;
+}
+
+TEST(Earth, places_and_gravity_are_those_of_geographiclib_from_pole_to_pole) {
+  for (const double latitude_deg : {-90.0, -80.0, -33.9, -6.9, 0.0, 0.001, 30.0, 48.2627, 70.5, 89.9, 90.0})
+    for (const double longitude_deg : {-180.0, -21.9, 0.0, 11.6683, 179.9})
+      for (const double height_m : {-100.0, 0.0, 520.0, 9000.0})
+        for (const Vector3& p : {Vector3{0, 0, 0}, {5000, -3000, 200}, {-1e5, 8e4, -300}, {3, -4, 1000}}) {
+          const Differences d = differences_of({latitude_deg, longitude_deg, height_m}, p);
+          ASSERT_LT(d.point_m, 1e-8) << latitude_deg << " " << longitude_deg << " " << height_m;
+          ASSERT_LT(d.height_m, 1e-8) << latitude_deg;
+          ASSERT_LT(d.gravity_mps2, 1e-12) << latitude_deg;
+        }
+  EXPECT_EQ(wgs84::kRate_radps, GeographicLib::NormalGravity::WGS84().AngularVelocity());
+  EXPECT_EQ(wgs84::kGm_m3ps2, GeographicLib::NormalGravity::WGS84().MassConstant());
 }
 
 TEST(Earth, a_change_of_frame_there_and_back_leaves_everything_as_it_was) {
