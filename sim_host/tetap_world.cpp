@@ -9,6 +9,7 @@
 #include "sim_host/play/realtime.hpp"
 #include "sim_host/play/session.hpp"
 #include "sim_host/play/spool.hpp"
+#include "sim_host/played_run.hpp"
 #include "sim_host/published_sensors.hpp"
 #include "sim_host/replay/lockstep.hpp"
 #include "sim_host/robots.hpp"
@@ -18,12 +19,16 @@
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <charconv>
 #include <cstddef>
 #include <cstdint>
 #include <cstdio>
+#include <cstring>
 #include <exception>
+#include <fstream>
 #include <optional>
+#include <sstream>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -82,6 +87,7 @@ std::string help() {
           "  --no-pose          the node is not told where it starts\n"
           "  --fault NAME[@START[+DURATION]]   seconds; several with commas:\n") +
       sim::fault_help() +
+      "  --script FILE      a run that was played: its robot, seed and length, and its faults beside those of --fault\n"
       "  --list-faults      names of those that act on the robot, and nothing else\n"
       "  --realtime         at the speed of the world, with Tick frames; else lockstep, as fast as the node can\n"
       "  --window N         lockstep: ticks in flight (default 8)\n"
@@ -249,11 +255,12 @@ void set_place(sim::Arguments& arguments, const param::GnssParameters& node, boo
   set("gnss.origin_height_m", world.origin.height_m);
 }
 
-void set_course(sim::Arguments& arguments, const sim::Sent& sent, sim::World::Options& world) {
+/// `played`: the course is that of the page.
+void set_course(sim::Arguments& arguments, const sim::Sent& sent, bool played, sim::World::Options& world) {
   const std::string course = arguments.text("--course").value_or(std::string(sim::usual_course(sent)));
   // Four minutes of one fault, and what comes after it, take two laps.
-  const bool far = std::any_of(world.faults.begin(), world.faults.end(),
-                               [](const sim::FaultSetting& s) { return s.fault == sim::Fault::kGnssFar; });
+  const bool far = !played && std::any_of(world.faults.begin(), world.faults.end(),
+                                          [](const sim::FaultSetting& s) { return s.fault == sim::Fault::kGnssFar; });
   const int laps = counted(arguments, "--laps", far ? 2 : sim::usual_laps(course), 1000);
   const double loop_m = arguments.real("--loop-m", 0, 20, 10'000);
   const auto landmarks = static_cast<int>(arguments.integer("--landmarks", 0, 4, 254));
@@ -287,8 +294,8 @@ void set_sights(sim::Arguments& arguments, const sim::Sent& sent, sim::World::Op
   if (n.people.count > 0 && !scanner && !camera) throw sim::UsageError("--people needs --lidar or --camera");
 }
 
-void set_world(sim::Arguments& arguments, const sim::Sent& sent, sim::World::Options& world) {
-  set_course(arguments, sent, world);
+void set_world(sim::Arguments& arguments, const sim::Sent& sent, bool played, sim::World::Options& world) {
+  set_course(arguments, sent, played, world);
   set_camera(arguments, sent, world.parameters.camera);
   set_sights(arguments, sent, world);
   if (arguments.flag("--no-wheels")) world.parameters.wheels.rate_hz = 0;
@@ -296,6 +303,17 @@ void set_world(sim::Arguments& arguments, const sim::Sent& sent, sim::World::Opt
   world.parameters.imu.rate_hz = counted(arguments, "--imu-hz", world.parameters.imu.rate_hz, 2000);
   const double gnss_m = arguments.real("--gnss-m", 0, 0.001, 100);
   if (gnss_m > 0) world.parameters.gnss = sim::with_error(world.parameters.gnss, gnss_m);
+}
+
+std::optional<sim::PlayedRun> script_of(sim::Arguments& arguments) {
+  const auto name = arguments.text("--script");
+  if (!name) return std::nullopt;
+  std::ifstream file(*name);
+  std::ostringstream text;
+  if (!file || !(text << file.rdbuf())) throw sim::UsageError("--script " + *name + ": " + std::strerror(errno));
+  const auto run = sim::played_run(text.view(), *name);
+  if (!run) throw sim::UsageError(run.failure().text);
+  return *run;
 }
 
 /// The robot's body is that of its header; parameters of the command line are the node's.
@@ -314,14 +332,18 @@ int main(int argc, char** argv) try {
   Run run;
   const std::string interface = arguments.text("--can").value_or("vcan0");
   const bool memory = arguments.flag("--memory");
-  const std::string robot = arguments.text("--robot").value_or("rover");
+  const std::optional<sim::PlayedRun> script = script_of(arguments);
+  const std::string robot = arguments.text("--robot").value_or(script ? script->robot : "rover");
   run.settings = sim::ParameterSettings(arguments);
   const std::uint32_t base = arguments.base("--base", run.settings.can_base());
-  run.seed = arguments.integer("--seed", 1, 0, ~std::uint64_t{0});
+  run.seed = arguments.integer("--seed", script ? script->seed : 1, 0, ~std::uint64_t{0});
   run.limit = {static_cast<std::int64_t>(arguments.real("--duration", 86'400, 0.01, 1e7) * 1e6)};
+  if (script) run.limit = std::min(run.limit, script->duration);
   run.world.mismatched = !arguments.flag("--matched");
   run.initial_pose_estimate = !arguments.flag("--no-pose");
-  for (const std::string& given : arguments.texts("--fault")) {
+  std::vector<std::string> faults = arguments.texts("--fault");
+  if (script && !script->faults.empty()) faults.push_back(sim::fault_words(*script));
+  for (const std::string& given : faults) {
     const sim::FaultsParsed parsed = sim::parse_faults(given);
     if (!parsed.error.empty()) throw std::runtime_error(parsed.error);
     run.world.faults.insert(run.world.faults.end(), parsed.settings.begin(), parsed.settings.end());
@@ -331,7 +353,7 @@ int main(int argc, char** argv) try {
   const sim::Sent sent = sim::sent_to(robot, run.settings);
   set_robot(arguments, sent, run);
   set_place(arguments, sim::parameters_of(robot, run.settings).gnss, memory, run);
-  set_world(arguments, sent, run.world);
+  set_world(arguments, sent, script.has_value(), run.world);
   const std::string refused = sim::cannot_act(run.world, robot);
   sim::send_only(sent, run.world);
   run.realtime = arguments.flag("--realtime");
