@@ -24,8 +24,14 @@ enum class Channel : std::uint8_t {
   kBegun,             ///< beginning of a replay, before its tables
   kResult,            ///< result of a replay, behind its tables
   kDiagnosis,
-  kFixes,  ///< a table: positions of GNSS receivers in the log
-  kLog,    ///< node whose log it is
+  kFixes,   ///< a table: positions of GNSS receivers in the log
+  kLog,     ///< node whose log it is
+  kStage,   ///< stage of a play: robot, length, faults that act, landmarks
+  kTruth,   ///< a table, in the frame of the node's map: cells are empty while that has no origin
+  kFrames,  ///< lines of a log: all that is on the bus
+  kPlayed,  ///< time of the play
+  kInjected,
+  kScript,  ///< a text that repeats the run, and its hash
 };
 
 inline void write(std::uint32_t channel, std::string_view text) {

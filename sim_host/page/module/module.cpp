@@ -5,12 +5,14 @@
 #include "sim_host/page/module/description.hpp"
 #include "sim_host/page/module/identity.hpp"
 #include "sim_host/page/module/json.hpp"
+#include "sim_host/page/module/play.hpp"
 #include "sim_host/page/module/replay.hpp"
 #include "sim_host/page/module/robots.hpp"
 #include "sim_host/parameter_refusal.hpp"
 #include "tetap/param/limits.hpp"
 
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #define TETAP_EXPORT(name) extern "C" [[clang::export_name(#name)]]
@@ -24,6 +26,7 @@ struct Chosen {
   param::Parameters parameters;
 };
 Chosen chosen;
+std::optional<page::Play> in_play;
 
 std::uint32_t refuse(std::string_view why) {
   page::write(page::Channel::kRefusal, why);
@@ -55,7 +58,7 @@ TETAP_EXPORT(set) std::uint32_t set(std::uint32_t number, std::uint32_t element,
 TETAP_EXPORT(check) std::uint32_t check() {
   const param::Rule* const broken = param::broken_rule(chosen.parameters);
   if (broken != nullptr) return refuse(std::string(broken->path) + " has to be " + broken->text);
-  if (chosen.robot != nullptr && chosen.robot->takes.own_map && !param::has_map_ids(chosen.parameters.can_base))
+  if (chosen.robot != nullptr && chosen.robot->takes.needs_map_ids() && !param::has_map_ids(chosen.parameters.can_base))
     return refuse(std::string("can_base has to be ") + param::kMapIdsRule);
   return 0;
 }
@@ -95,5 +98,31 @@ TETAP_EXPORT(diagnose) std::uint32_t diagnose(std::uint32_t base, std::uint32_t 
         .member("change", one.change)
         .end('}');
   page::write(page::Channel::kDiagnosis, json.end(']').end('}').text());
+  return 0;
+}
+
+/// A play of the robot of that number, with its own parameters, from its beginning.
+TETAP_EXPORT(play) std::uint32_t play(std::uint32_t robot, std::uint32_t seed) {
+  if (robot >= page::robots().size()) return refuse("no robot of number " + std::to_string(robot));
+  in_play.emplace(*page::robots()[robot], seed);
+  return 0;
+}
+
+TETAP_EXPORT(advance) std::uint32_t advance(std::uint32_t ticks) {
+  if (!in_play) return refuse("nothing is played");
+  const auto done = in_play->advance(ticks);
+  return done ? 0 : refuse(done.failure().text);
+}
+
+TETAP_EXPORT(inject) std::uint32_t inject(std::uint32_t fault, std::uint32_t duration_ms) {
+  if (!in_play) return refuse("nothing is played");
+  const auto done = in_play->inject(fault, {std::int64_t{1'000} * duration_ms});
+  return done ? 0 : refuse(done.failure().text);
+}
+
+/// The play up to now, as a script.
+TETAP_EXPORT(script) std::uint32_t script() {
+  if (!in_play) return refuse("nothing is played");
+  in_play->script();
   return 0;
 }

@@ -2,9 +2,8 @@
 #include "sim_host/page/module/replay.hpp"
 
 #include "sim_host/page/module/browser.hpp"
-#include "sim_host/page/module/fixes.hpp"
 #include "sim_host/page/module/json.hpp"
-#include "sim_host/page/module/page_tables.hpp"
+#include "sim_host/page/module/observer.hpp"
 #include "sim_host/replay/complaint.hpp"
 #include "sim_host/replay/lockstep.hpp"
 #include "sim_host/replay/memory_node.hpp"
@@ -18,43 +17,6 @@ namespace {
 
 constexpr const char* kName = "log";  ///< name of the log in messages
 
-/// Records, compares.
-class Run {
- public:
-  explicit Run(std::uint32_t base, sim::Comparison* comparison = nullptr)
-      : tables_(base, files_), fixes_(base), comparison_(comparison) {}
-
-  void restarted() { tables_.restarted(); }
-  void sent(const base::CanFrame& frame) {
-    tables_.sent(frame);
-    fixes_.sent(frame);
-  }
-  void received(const base::CanFrame& frame) {
-    tables_.received(frame);
-    fixes_.received(frame);
-  }
-  void epoch(const sim::NodeEpoch& epoch, base::Micros time) {
-    tables_.epoch(epoch, time);
-    fixes_.epoch(time);
-    if (comparison_ != nullptr) comparison_->epoch(epoch, time);
-  }
-
-  sim::Counts counts;
-  const sim::Tables::Totals& end() {
-    const sim::Tables::Totals& totals = tables_.end();
-    files_.flush();
-    fixes_.flush();
-    return totals;
-  }
-  [[nodiscard]] std::optional<FixTable::Origin> origin() const { return fixes_.origin(); }
-
- private:
-  PageTables files_;
-  sim::Tables tables_;
-  FixTable fixes_;
-  sim::Comparison* comparison_;
-};
-
 void put_report(Json& json, const sim::LogReport& report) {
   json.member("malformed_lines", report.malformed)
       .member("first_malformed", report.first_malformed)
@@ -67,7 +29,7 @@ void put_report(Json& json, const sim::LogReport& report) {
       .member("cut_off", report.cut_off);
 }
 
-void put_result(Run& run, const sim::Result<>& played, const sim::Comparison* comparison) {
+void put_result(Observer& run, const sim::Result<>& played, const sim::Comparison* comparison) {
   const sim::Tables::Totals& totals = run.end();
   sim::Line crc;
   crc.hex(totals.state_crc, 8);
@@ -111,7 +73,8 @@ void put_begun(const BrowserLog& log, const char* mode, std::uint64_t ticks) {
 
 sim::Result<> replay(const sim::Robot& robot, const param::Parameters& parameters, const ReplayOptions& options) {
   BrowserLog log(kName, {.interface = {}, .keep_going = options.keep_going, .base = options.base});
-  const sim::ScriptOptions script{.base = options.base, .log_base = options.base, .graph = robot.takes.closures};
+  const sim::ScriptOptions script{
+      .base = options.base, .log_base = options.base, .map_inputs = robot.takes.map_inputs()};
   const auto survey = sim::survey_of(log, kName, options.mode, script);
   if (!survey) return survey.failure();
   if (log.report().data == 0) return sim::Failure{"no CAN data frame in the log"};
@@ -127,11 +90,11 @@ sim::Result<> replay(const sim::Robot& robot, const param::Parameters& parameter
   if (repeats) {
     sim::RecordedTicks ticks(log, *survey->recording, script);
     sim::Comparison comparison(ticks, *survey->recording, script);
-    Run run(options.base, &comparison);
+    Observer run(options.base, &comparison);
     put_result(run, sim::play_lockstep(node.link(), ticks, run, lockstep, run.counts), &comparison);
   } else {
     sim::LogTicks ticks(log, script, survey->has_ticks);
-    Run run(options.base);
+    Observer run(options.base);
     put_result(run, sim::play_lockstep(node.link(), ticks, run, lockstep, run.counts), nullptr);
   }
   if (log.failure()) return *log.failure();

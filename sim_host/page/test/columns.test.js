@@ -29,3 +29,23 @@ test("words are kept, over blocks and to another thread", () => {
   assert.equal(other.values("t")[2], 3);
   assert.equal(other.values("nothing").length, 0);
 });
+
+test("a table that grows from parts of another is that table", () => {
+  const whole = new Table(), part = new Table(), grown = new Table(), heading = "t,mode,x\n";
+  whole.add(bytes(heading));
+  part.add(bytes(heading));
+  for (let i = 0; i < 5000; i++) {
+    const line = bytes(`${i},${["Boot", "", "Nominal"][(i * i) % 3]},${i % 7 ? i / 8 : ""}\n`);
+    whole.add(line);
+    part.add(line);
+    if (i % 900 === 0) grown.append(structuredClone(part.taken()));
+  }
+  grown.append(part.taken());
+  assert.equal(grown.rows, whole.rows);
+  assert.deepEqual(grown.values("x"), whole.values("x"));
+  for (let row = 0; row < 5000; row++) assert.equal(grown.word("mode", row), whole.word("mode", row));
+  const other = new Table();
+  other.add(bytes(`${heading}1,Fault,2\n2,Boot,3\n`));
+  grown.append(other.packed());
+  assert.deepEqual([5000, 5001].map((row) => grown.word("mode", row)), ["Fault", "Boot"]);
+});

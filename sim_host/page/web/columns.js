@@ -113,6 +113,23 @@ export class Table {
       columns: this.columns.map(({ name, values, words }) => ({ name, values: values.slice(0, this.rows), words })),
     };
   }
+  /** The same, and the rows are gone from here. */
+  taken() {
+    const packed = this.packed();
+    this.rows = 0;
+    return packed;
+  }
+  /** Further rows, as packed() or taken() has them. */
+  append({ rows, columns }) {
+    if (this.columns.length === 0) this.columns = columns.map(({ name }) => new Column(name));
+    columns.forEach(({ values, words }, i) => {
+      const column = this.columns[i];
+      while (column.values.length <= this.rows + rows) column.grow(column.values.length);
+      const codes = words?.map((word) => column.word(word));
+      for (let row = 0; row < rows; row++) column.values[this.rows + row] = codes && !Number.isNaN(values[row]) ? codes[values[row]] : values[row];
+    });
+    this.rows += rows;
+  }
   static unpacked({ rows, columns }) {
     const table = new Table();
     table.rows = rows;

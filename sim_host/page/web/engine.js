@@ -2,7 +2,8 @@
 // The module that holds the flashed code: what it imports, and its functions with words for failures.
 
 /** Channels of module/browser.hpp. Below 16: a table of a run. */
-export const CHANNEL = { description: 16, refusal: 17, begun: 18, result: 19, diagnosis: 20, fixes: 21, log: 22 };
+export const CHANNEL = { description: 16, refusal: 17, begun: 18, result: 19, diagnosis: 20, fixes: 21, log: 22, stage: 23, truth: 24, frames: 25, played: 26, injected: 27, script: 28 };
+const RAW = new Set([CHANNEL.fixes, CHANNEL.truth, CHANNEL.frames]);
 export const MODE = { automatic: 0, lockstep: 1, asRecorded: 3 };
 
 /** What the module refuses: a sentence for people. */
@@ -30,7 +31,7 @@ export class Engine {
         write: (channel, from, length) => {
           const bytes = memory().subarray(from, from + length);
           if (channel === CHANNEL.refusal) this.refusal = text(bytes);
-          else if (channel < 16 || channel === CHANNEL.fixes) onText(channel, bytes);
+          else if (channel < 16 || RAW.has(channel)) onText(channel, bytes);
           else {
             const object = JSON.parse(text(bytes));
             this.objects.set(channel, object);
@@ -83,6 +84,27 @@ export class Engine {
   replay(base, mode = MODE.automatic) {
     this.call("replay", base, mode, 1);
     return { ...this.objects.get(CHANNEL.begun), ...this.objects.get(CHANNEL.result) };
+  }
+
+  /** The robot of that number in the simulated world, from the beginning: what there is to play with. @throws Refusal */
+  play(robot, seed) {
+    this.call("play", robot, seed);
+    return this.objects.get(CHANNEL.stage);
+  }
+  /** So many ticks of 10 ms; tables, truth and frames come by onText. @throws Refusal */
+  advance(ticks) {
+    this.call("advance", ticks);
+    return this.objects.get(CHANNEL.played);
+  }
+  /** A fault from now on. @throws Refusal */
+  inject(fault, seconds) {
+    this.call("inject", fault, Math.round(1000 * seconds));
+    return this.objects.get(CHANNEL.injected);
+  }
+  /** The run up to now: its script, and the hash of its estimates. @throws Refusal */
+  script() {
+    this.call("script");
+    return this.objects.get(CHANNEL.script);
   }
 
   /** @throws Refusal */

@@ -9,6 +9,7 @@ const TABLES = ["estimates.log", "estimates", "states", "innovations", "sensors"
 export class Tasks {
   constructor() {
     this.log = null;
+    this.play = null; // an engine that lasts, with what it wrote since it was asked last
   }
 
   /** Bytes of a Blob, synchronously; a block is kept, because the module asks for less. */
@@ -64,6 +65,33 @@ export class Tasks {
     const packed = { fixes: fixes.packed() };
     TABLES.forEach((name, i) => (packed[name] = tables[i].packed()));
     return { result, tables: packed };
+  }
+
+  /** A play from its beginning. */
+  begin({ robot, seed }) {
+    const tables = TABLES.map(() => new Table()), fixes = new Table(), truth = new Table(), frames = [];
+    const engine = new Engine(this.module, () => new Uint8Array(0), (channel, data) => {
+      if (channel === CHANNEL.frames) frames.push(data.slice());
+      else if (channel === CHANNEL.fixes) fixes.add(data);
+      else if (channel === CHANNEL.truth) truth.add(data);
+      else if (channel < TABLES.length) tables[channel].add(data);
+    });
+    this.play = { engine, tables, fixes, truth, frames };
+    return engine.play(robot, seed);
+  }
+  /** Rows and frames of these ticks. */
+  advance({ ticks }) {
+    const { engine, tables, fixes, truth, frames } = this.play;
+    const played = engine.advance(ticks);
+    const packed = { fixes: fixes.taken(), truth: truth.taken() };
+    TABLES.forEach((name, i) => (packed[name] = tables[i].taken()));
+    return { played, tables: packed, frames: frames.splice(0) };
+  }
+  inject({ fault, seconds }) {
+    return this.play.engine.inject(fault, seconds);
+  }
+  script() {
+    return this.play.engine.script();
   }
 
   async task({ id, name, module, ...values }) {
