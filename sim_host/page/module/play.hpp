@@ -49,7 +49,7 @@ class Play {
 
     Observer run;
     sim::NodeOrigin origin;
-    bool origin_stated = false;  ///< since the flag was taken down
+    bool origin_stated = false;  ///< flag of a frame with it, to be taken down
     std::string frames;
     base::Micros now;  ///< time of the world
 

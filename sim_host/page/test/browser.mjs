@@ -1,44 +1,98 @@
 // SPDX-License-Identifier: Apache-2.0
-// node browser.mjs PUPPETEER PAGE.html OUT JSON: opens the page from disk in a headless Chromium and does what a user does. JSON: cases
+// node browser.mjs PUPPETEER PAGE.html OUT CASES SEEN: opens the page from disk in a headless Chromium and does what a user does. CASES: a file
 // [{robot, log, sha, crc, epochs, settings: [{path, value, sha}]}], hashes as the host's programs have them. A picture of each view goes to
-// OUT. Status 1 where something differs, with a line for each.
+// OUT. SEEN gets {robots: {robot: {hash_page, epochs_different, cpu_s}}, play: {robot, hash_page, epochs, script, log}, requests, console_errors};
+// script and log are files that the page saved. Status 1 where something differs, with a line for each.
 import { createRequire } from "node:module";
-import { readFileSync, mkdirSync } from "node:fs";
-import { resolve } from "node:path";
+import { existsSync, readFileSync, rmSync, writeFileSync, mkdirSync } from "node:fs";
+import { dirname, join, resolve } from "node:path";
 
-const [modules, file, out, cases] = process.argv.slice(2);
+const [modules, file, out, cases, result] = process.argv.slice(2);
 const puppeteer = createRequire(`${resolve(modules)}/`)("puppeteer-core");
 mkdirSync(out, { recursive: true });
 
-const failures = [];
+const failures = [], seenOf = { robots: {}, play: null };
 const expect = (is, what) => {
   console.log(`${is ? "ok  " : "FAIL"} ${what}`);
   if (!is) failures.push(what);
 };
 
 const browser = await puppeteer.launch({ executablePath: "/usr/bin/chromium", headless: true, args: ["--no-sandbox", "--disable-gpu", "--disable-background-networking"], timeout: 120000, protocolTimeout: 240000 });
-const page = await browser.newPage();
 const heard = { requests: [], errors: [] };
-page.on("pageerror", ({ message }) => heard.errors.push(message));
-page.on("console", (message) => heard.errors.push(`${message.type()}: ${message.text()}`));
-page.on("request", (request) => /^(file|blob|data):/.test(request.url()) || heard.requests.push(request.url()));
+async function newPage() {
+  const page = await browser.newPage();
+  page.on("pageerror", ({ message }) => heard.errors.push(message));
+  page.on("console", (message) => heard.errors.push(`${message.type()}: ${message.text()}`));
+  page.on("request", (request) => /^(file|blob|data):/.test(request.url()) || heard.requests.push(request.url()));
+  return page;
+}
+const page = await newPage();
 
-const until = (state) => page.waitForFunction((wanted) => [wanted, "failed"].includes(document.body.dataset.state), { timeout: 120000 }, state);
+const untilState = (state) => page.waitForFunction((wanted) => [wanted, "failed"].includes(document.body.dataset.state), { timeout: 120000 }, state);
 const data = () => page.evaluate(() => ({ ...document.body.dataset, status: document.getElementById("status").textContent, wide: document.documentElement.scrollWidth - innerWidth }));
 const picture = (name) => page.screenshot({ path: `${out}/${name}.png`, fullPage: true });
 const drawn = () => page.evaluate(() => [...document.querySelectorAll("canvas")].filter((canvas) => canvas.width > 0).map((canvas) => {
-  const pixels = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data, colours = new Set();
+  // A copy: a canvas of the page that is read out again and again would be warned about.
+  const copy = new OffscreenCanvas(canvas.width, canvas.height).getContext("2d", { willReadFrequently: true }), colours = new Set();
+  copy.drawImage(canvas, 0, 0);
+  const pixels = copy.getImageData(0, 0, canvas.width, canvas.height).data;
   for (let i = 0; i < pixels.length; i += 4 * 7) colours.add((pixels[i] << 16) | (pixels[i + 1] << 8) | pixels[i + 2]);
   return colours.size;
 }));
 
+/** Seconds of CPU of the page's processes. */
+const system = await browser.target().createCDPSession();
+const cpu = async () => (await system.send("SystemInfo.getProcessInfo")).processInfo.filter(({ type }) => type === "renderer").reduce((sum, { cpuTime }) => sum + cpuTime, 0);
+
+/** A button that saves a file: its path. */
+async function saved(button, name) {
+  const path = join(dirname(resolve(result)), name);
+  rmSync(path, { force: true });
+  await page.click(button);
+  for (let i = 0; i < 200 && !existsSync(path); i++) await new Promise((done) => setTimeout(done, 50));
+  return path;
+}
+
+/** Drives, breaks two things, hears what the node says, saves the run and looks at it. */
+async function play() {
+  const until = (seconds) => page.waitForFunction((wanted) => parseFloat(document.querySelector("#play .clock").textContent) >= wanted, { timeout: 120000 }, seconds);
+  const heard = (kind, words) => page.waitForFunction((kind, words) => [...document.querySelectorAll(`#play .said [data-kind=${kind}]`)].some((li) => li.textContent.includes(words)), { timeout: 60000 }, kind, words).then(() => true, () => false);
+  await system.send("Browser.setDownloadBehavior", { behavior: "allow", downloadPath: dirname(resolve(result)) });
+  await page.select("#play-speed", "10");
+  await page.focus("#play canvas");
+  await page.keyboard.press("Space");
+  await until(20);
+  expect(await heard("mode", "nominal"), "play: 20 s are driven, and the node says that it is nominal");
+  await page.click("[data-fault=gnss_jump]");
+  expect(await heard("refusal", "GNSS position: refused"), "play: the node refuses fixes that jump");
+  await picture("play");
+  await until(45);
+  await page.click("[data-fault=slip_left]");
+  expect(await heard("fault", "a wheel slips"), "play: the node says that a wheel slips");
+  await until(60);
+  await page.click("#play-go");
+  await page.waitForFunction(() => document.body.dataset.played, { timeout: 60000 });
+  const seen = await data(), summary = await page.$eval("#play .summary", (p) => p.textContent);
+  expect(parseFloat(summary.match(/[\d.]+ %/)) > 50, `play: ${summary}`);
+  expect((await drawn()).every((colours) => colours > 3), "play: path and errors have been drawn");
+  seenOf.play = { robot: "rover", hash_page: seen.played, epochs: Number(seen.playedEpochs), script: await saved("#play-script", "rover_1.faults"), log: await saved("#play-log", "rover_1.log") };
+  await page.click("#play-look");
+  await page.waitForFunction(() => document.body.dataset.state === "busy").catch(() => {});
+  await untilState("done");
+  const looked = await data();
+  expect(looked.sha === seen.played && looked.different === "0", `play: looked at, it is the run that was played (${looked.sha?.slice(0, 12)}, ${looked.different} different)`);
+  await page.waitForFunction(() => document.body.dataset.diagnosed, { timeout: 60000 });
+  await picture("play_looked_at");
+}
+
 async function open({ robot, log, sha, crc, epochs }) {
   await page.evaluate(() => delete document.body.dataset.diagnosed);
-  const began = Date.now();
+  const began = Date.now(), before = await cpu();
   await (await page.$("#file")).uploadFile(log);
   await page.waitForFunction(() => document.body.dataset.state === "busy").catch(() => {});
-  await until("done");
+  await untilState("done");
   const took = Date.now() - began, seen = await data();
+  seenOf.robots[robot] = { hash_page: seen.sha, epochs_different: Number(seen.different), cpu_s: (await cpu()) - before };
   expect(seen.sha === sha && seen.crc === crc, `${robot}: hash and CRC of the host (${seen.sha?.slice(0, 12)}, ${seen.crc}; ${took} ms; ${seen.status})`);
   expect(seen.different === "0", `${robot}: ${epochs} epochs as recorded`);
   await page.waitForFunction(() => document.body.dataset.diagnosed, { timeout: 60000 });
@@ -51,26 +105,38 @@ async function change({ path, value, sha }, before) {
   await page.$eval("#numbers input[type=search]", (input, text) => ((input.value = text), input.dispatchEvent(new Event("input"))), path);
   await page.$eval(`[data-path="${path}"]`, (input, text) => ((input.value = text), input.dispatchEvent(new Event("change"))), value);
   await page.waitForFunction(() => document.body.dataset.state === "busy").catch(() => {});
-  await until("done");
+  await untilState("done");
   const seen = await data(), words = await page.$eval("#effect", (p) => p.textContent).catch(() => "");
   const same = sha === before;
   expect(same ? seen.second === "" && /no effect/.test(words) : seen.second === sha, `${path} = ${value}: ${same ? "said to have no effect" : "hash of the host"} (${words})`);
+}
+
+/** Page, log and numbers in one file, opened by somebody else. */
+async function passOn(robot) {
+  const file = await saved("#save-case", "raw.html"), before = await data(), other = await newPage();
+  await other.goto(`file://${file}`);
+  await other.waitForFunction((second) => document.body.dataset.second === second, { timeout: 120000 }, before.second).catch(() => {});
+  const { sha, second } = await other.evaluate(() => ({ ...document.body.dataset }));
+  expect(sha === before.sha && second === before.second && second !== "", `${robot}: saved as one file, both runs are in it (${second?.slice(0, 12)})`);
+  await other.close();
 }
 
 const { width, height } = { width: 1180, height: 900 };
 await page.setViewport({ width, height });
 await page.emulateMediaFeatures([{ name: "prefers-color-scheme", value: "light" }]);
 await page.goto(`file://${resolve(file)}`);
-await until("ready");
+await untilState("ready");
 await picture("open");
+await play();
 for (const one of JSON.parse(readFileSync(cases, "utf8"))) {
   await open(one);
   await picture(one.robot);
   for (const setting of one.settings) {
     await change(setting, one.sha);
     await picture(`${one.robot}_${setting.path}`);
+    if ((await data()).second !== "") await passOn(one.robot);
     await page.click("#numbers .buttons button");
-    await until("done");
+    await untilState("done");
   }
 }
 // The keyboard: to the next refusal, and what is said of it.
@@ -90,6 +156,7 @@ expect((await page.$$eval("#views canvas", (all) => all.length)) >= 4, "the pict
 expect((await data()).wide <= 0, "nothing is wider than 390 pixels");
 await picture("narrow_dark_id");
 
+writeFileSync(result, JSON.stringify({ ...seenOf, requests: heard.requests.length, console_errors: heard.errors.length }));
 expect(heard.requests.length === 0, `no request to a network ${heard.requests.slice(0, 3)}`);
 expect(heard.errors.length === 0, `no message on the console ${heard.errors.slice(0, 3)}`);
 await browser.close();

@@ -23,6 +23,12 @@ test("a value that is the robot's own is no change, and another is one", () => {
   numbers.take(1, { value: "3, 5" });
   assert.deepEqual(numbers.settings(), [[1, 0, 3], [1, 1, 5]]);
   assert.equal(numbers.file(), "# rover\nc = 3 5\n");
+  const other = new Numbers(numbers.rows, () => {});
+  other.of(numbers.robot);
+  other.takeNamed({ "a.b": [1, 2] });
+  assert.deepEqual(other.settings(), []);
+  other.takeNamed({ ...numbers.named(), "a.b": ["1"], unknown: [1], __proto__: [2] });
+  assert.deepEqual(other.settings(), numbers.settings());
   const input = { value: "fast" };
   numbers.take(0, input);
   assert.equal(input.value, "0.1");

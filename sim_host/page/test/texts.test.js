@@ -32,3 +32,10 @@ test("each word of the node has a text", () => {
     for (const word of list(type)) for (const prefix of prefixes) assert.ok(`${prefix}.${word}` in TEXTS.en, `${prefix}.${word}`);
   }
 });
+
+test("each fault of the world has a text", () => {
+  const all = names("../../world/faults.cpp", /FaultInfo\{Fault::k\w+, FallsOn::k\w+, "(\w+)"/g);
+  assert.ok(all.length > 30);
+  for (const name of all) assert.ok(`inject.${name}` in TEXTS.en, name);
+  for (const on of names("../module/play.cpp", /return "(\w+)";/g)) assert.ok(`on.${on}` in TEXTS.en, on);
+});

@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 // The page: a log is opened, played, and shown.
-import { element, replace, colour } from "./dom.js";
+import { element, replace, colour, save } from "./dom.js";
 import { MODE } from "./engine.js";
 import { Run, at } from "./run.js";
 import { View } from "./view.js";
 import { PathView } from "./path_view.js";
 import { Timeline } from "./timeline.js";
 import { bandChart, innovationChart } from "./charts.js";
+import { caseFile, savedCase } from "./case_file.js";
 import { Numbers } from "./numbers.js";
+import { Play } from "./play.js";
 import { TaskQueue } from "./tasks.js";
 import { say, speak, languageNow } from "./texts.js";
 
@@ -28,8 +30,23 @@ class App {
     this.numbers = new Numbers(this.about.parameters, () => this.replayChanged());
     this.robot = Math.max(0, this.about.robots.findIndex(({ name }) => name === "rover"));
     this.numbers.of(this.about.robots[this.robot]);
+    this.play = new Play($("play"), this.tasks, this.about.robots, (file, truth) => this.open(file, truth).then(() => $("findings").scrollIntoView({ behavior: "smooth" })));
+    await this.play.begin();
     this.status(() => say("open.ready"), "ready");
     this.renderRobots();
+    const saved = await savedCase();
+    if (saved) await this.openSaved(saved);
+  }
+  /** The log that lies in the page, with the numbers that were changed. */
+  async openSaved({ log, robot, numbers }) {
+    await this.open(log);
+    const known = this.about.robots.findIndex(({ name }) => name === robot);
+    if (known >= 0 && known !== this.robot) await this.chooseRobot(known);
+    this.numbers.takeNamed(numbers ?? {});
+    if (this.numbers.changed.size > 0) await this.replayChanged();
+  }
+  async saveCase() {
+    save(`${this.file.name.replace(/\.\w+$/, "")}.html`, await caseFile(this.file, this.about.robots[this.robot].name, this.numbers.named()));
   }
   /** `words` is a text of the node or of the module, or gives one in the language of the moment. */
   status(words, state) {
@@ -42,8 +59,11 @@ class App {
     return this.file ? say("open.log", this.file.name, (this.file.size / 1e6).toFixed(1)) : say("open.ready");
   }
 
-  async open(file) {
+  /** `truth` {t, x, y}: of a log that was played here. */
+  async open(file, truth = null) {
+    this.play.pause();
     this.file = file;
+    this.truth = truth;
     this.run = this.second = this.findings = null;
     this.status(() => say("open.reading", file.name), "busy");
     try {
@@ -132,14 +152,19 @@ class App {
     if (this.said) this.status(this.said);
     const other = languageNow() === "en" ? "id" : "en";
     replace($("tools"),
-      element("button", { id: "language", lang: other, onclick: () => (speak(other), this.renderFrame(), this.renderRobots(), this.render(true)) }, say("lang.other")),
+      element("button", { id: "language", lang: other, onclick: () => (speak(other), this.renderFrame(), this.renderRobots(), this.play?.render(), this.render(true)) }, say("lang.other")),
       element("button", { id: "theme", onclick: () => this.otherTheme() }, say("theme.other")));
+    this.renderDrop();
+  }
+  renderDrop() {
     const file = element("input", { type: "file", id: "file", onchange: () => file.files[0] && this.open(file.files[0]) });
-    replace($("drop"), element("strong", {}, say("open.drop")), element("label", { class: "button" }, say("open.choose"), file), element("span", { class: "note" }, say("open.formats")));
+    replace($("drop"), element("strong", {}, say("open.drop")), element("label", { class: "button" }, say("open.choose"), file), element("span", { class: "note" }, say("open.formats")),
+      this.run && element("button", { id: "save-case", title: say("open.case"), onclick: () => this.saveCase() }, say("open.save")));
   }
   otherTheme() {
     const root = document.documentElement, dark = root.dataset.theme ?? (matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light");
     root.dataset.theme = dark === "dark" ? "light" : "dark";
+    this.play?.render();
     this.render(true);
   }
   renderRobots() {
@@ -153,6 +178,7 @@ class App {
   render(keep = false) {
     this.renderRobots();
     if (!this.run) return;
+    this.renderDrop();
     this.charts.forEach((chart) => chart?.destroy());
     this.charts = [];
     this.view.clear();
@@ -202,7 +228,7 @@ class App {
     const body = this.section("path", say("path.legend")), before = keep ? this.path : null;
     this.path = new PathView(body, this.view, (one) => this.renderWhy(one));
     if (before?.scale) Object.assign(this.path, { box: before.box, scale: before.scale });
-    this.path.show(this.runs(), null, Boolean(before?.scale));
+    this.path.show(this.runs(), this.truth, Boolean(before?.scale));
     body.append(element("button", { onclick: () => (this.path.fit(), this.view.show(this.view.whole), this.path.draw()) }, say("path.all")));
   }
   renderStates() {
@@ -248,7 +274,7 @@ addEventListener("dragover", (event) => event.preventDefault());
 addEventListener("drop", (event) => {
   event.preventDefault();
   const file = event.dataTransfer.files[0];
-  if (file && app.tasks) app.open(file);
+  if (file && app.play) app.open(file);
 });
 addEventListener("resize", () => app.run && (app.path.draw(), app.timeline.draw()));
 if (navigator.language.startsWith("id")) speak("id");

@@ -32,9 +32,9 @@ export function sized(canvas, height) {
   return [context, width, height];
 }
 
-/** Hands a text to the user as a file. */
-export function save(name, text) {
-  const link = element("a", { href: URL.createObjectURL(new Blob([text])), download: name });
+/** Hands a text or a blob to the user as a file. */
+export function save(name, content) {
+  const link = element("a", { href: URL.createObjectURL(new Blob([content])), download: name });
   link.click();
   setTimeout(() => URL.revokeObjectURL(link.href), 1000);
 }

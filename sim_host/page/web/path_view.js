@@ -7,8 +7,10 @@ import { say } from "./texts.js";
 const HEIGHT = 420, MARGIN = 24;
 
 export class PathView {
-  /** `onFix` gets a fix that was clicked. */
-  constructor(parent, view, onFix) {
+  /** `onFix` gets a fix that was clicked; nothing narrower than `least_m` is shown by itself. */
+  constructor(parent, view, onFix, least_m = 2) {
+    this.least_m = least_m;
+    this.landmarks = []; // [[x, y]]
     this.view = view;
     this.onFix = onFix;
     this.runs = [];
@@ -33,9 +35,11 @@ export class PathView {
       left = Math.min(left, x), right = Math.max(right, x), low = Math.min(low, y), high = Math.max(high, y);
     };
     for (const { run } of this.runs) for (let i = 0; i < run.x.length; i += 10) if (run.columns.pos_valid[i] > 0) take(run.x[i], run.y[i]);
+    for (let i = 0; this.truth && i < this.truth.x.length; i += 10) if (!Number.isNaN(this.truth.x[i])) take(this.truth.x[i], this.truth.y[i]);
     if (left > right) [left, right, low, high] = [-5, 5, -5, 5];
-    this.box = { x: (left + right) / 2, y: (low + high) / 2, width: Math.max(right - left, 2), height: Math.max(high - low, 2) };
+    this.box = { x: (left + right) / 2, y: (low + high) / 2, width: Math.max(right - left, this.least_m), height: Math.max(high - low, this.least_m) };
     this.scale = null;
+    this.moved = false; // by the user
   }
 
   place() {
@@ -52,9 +56,10 @@ export class PathView {
     context.fillStyle = colour("paper");
     context.fillRect(0, 0, width, height);
     this.drawGrid(context, width, height);
-    if (this.truth) this.drawLine(context, this.truth, colour("truth"), [5, 4]);
+    this.drawLandmarks(context);
     this.drawFixes(context);
     for (const { run, colour: ink } of this.runs) this.drawLine(context, run, ink);
+    if (this.truth) this.drawLine(context, this.truth, colour("truth"), [3, 6]);
     this.drawEllipses(context, this.runs[0]);
     this.drawCursor(context);
   }
@@ -78,6 +83,11 @@ export class PathView {
       if (this.down(y) < height - 18) context.fillText(label(y), 3, this.down(y) - 3);
     }
     context.stroke();
+  }
+
+  drawLandmarks(context) {
+    context.strokeStyle = colour("faint");
+    for (const [x, y] of this.landmarks) context.strokeRect(this.across(x) - 3, this.down(y) - 3, 6, 6);
   }
 
   /** The shown span strongly, the rest faintly; no line where the position is not valid. */
@@ -151,8 +161,18 @@ export class PathView {
   drawCursor(context) {
     const { cursor } = this.view;
     if (cursor === null) return;
+    if (this.truth) {
+      const i = at(this.truth.t, cursor);
+      context.strokeStyle = colour("truth");
+      context.lineWidth = 2;
+      context.beginPath();
+      context.arc(this.across(this.truth.x[i]), this.down(this.truth.y[i]), 6, 0, 2 * Math.PI);
+      context.stroke();
+    }
     for (const { run, colour: ink } of this.runs) {
       const i = at(run.t, cursor);
+      if (!(run.columns.pos_valid[i] > 0)) continue;
+      this.drawLastEllipse(context, run, i, ink);
       const px = this.across(run.x[i]), py = this.down(run.y[i]), yaw = run.columns.yaw_rad[i];
       context.fillStyle = ink;
       context.beginPath();
@@ -163,7 +183,20 @@ export class PathView {
     }
   }
 
+  /** The last that was published up to row `i`. */
+  drawLastEllipse(context, { x, y, columns: { std_x_m: sx, std_y_m: sy, corr_xy: correlation } }, i, ink) {
+    let k = i;
+    while (k > 0 && i - k < 20 && Number.isNaN(sx[k])) k--;
+    if (Number.isNaN(sx[k])) return;
+    context.strokeStyle = ink;
+    context.fillStyle = `${ink}22`;
+    context.lineWidth = 1.5;
+    this.ellipse(context, this.across(x[i]), this.down(y[i]), sx[k], sy[k], correlation[k] || 0);
+    context.fill();
+  }
+
   zoom(factor, px = null, py = null) {
+    this.moved = true;
     const width = this.canvas.clientWidth, height = this.canvas.clientHeight;
     const dx = px === null ? 0 : (px - width / 2) / this.scale, dy = py === null ? 0 : (height / 2 - py) / this.scale;
     this.box.x += dx * (1 - 1 / factor);
@@ -172,6 +205,7 @@ export class PathView {
     this.draw();
   }
   move(px, py) {
+    this.moved = true;
     this.box.x -= px / this.scale;
     this.box.y += py / this.scale;
     this.draw();

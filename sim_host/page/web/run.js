@@ -40,7 +40,7 @@ const NO_REFUSAL = new Set(["Accepted", "NotUsed", "NewLandmark", "Pending"]);
 export class Run {
   constructor({ result, tables }) {
     this.result = result;
-    this.tables = Object.fromEntries(Object.entries(tables).map(([name, packed]) => [name, Table.unpacked(packed)]));
+    this.tables = Object.fromEntries(Object.entries(tables).map(([name, table]) => [name, table instanceof Table ? table : Table.unpacked(table)]));
     this.chooseEstimator();
     this.span = this.t.length > 0 ? [this.t[0], this.t.at(-1)] : [0, 1];
     this.readInnovations();

@@ -1,11 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The page's end of the worker: the module out of the page's text, and a promise for each task.
-
-/** Bytes of an element's text: gzip in base64. */
-async function unpacked(id) {
-  const bytes = Uint8Array.from(atob(document.getElementById(id).textContent.trim()), (c) => c.charCodeAt(0));
-  return new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"))).arrayBuffer();
-}
+import { unpacked } from "./packing.js";
 
 export class TaskQueue {
   static async start() {

@@ -1,0 +1,220 @@
+// SPDX-License-Identifier: Apache-2.0
+// Play: the simulated robot and the flashed code in one loop, faults on buttons while it drives.
+import { element, replace, colour, save } from "./dom.js";
+import { Chart } from "./charts.js";
+import { Live } from "./live.js";
+import { PathView } from "./path_view.js";
+import { View } from "./view.js";
+import { say } from "./texts.js";
+
+const TICKS_PER_S = 100, MOST_TICKS = 150;
+const SPEEDS = [1, 2, 5, 10], LINES = 60;
+const TONE = { Nominal: "good", Fusing: "good", DeadReckoning: "warning", Degraded: "warning", Rejecting: "bad", Distrusted: "bad", Fault: "bad" };
+const GROUPS = ["gnss", "wheels", "imu", "magnetometer", "landmarks", "lidar", "features", "any"];
+
+export class Play {
+  /** `onLook(file, truth)` gets the run as a log. */
+  constructor(parent, tasks, robots, onLook) {
+    Object.assign(this, { parent, tasks, robots, onLook, robot: 0, seed: 1, speed: 1, error: "x_m", view: new View() });
+    this.robot = Math.max(0, robots.findIndex(({ name }) => name === "rover"));
+    this.faults = []; // [{name, start_s, end_s}]
+    addEventListener("keydown", (event) => this.key(event));
+    addEventListener("resize", () => this.path?.draw());
+  }
+
+  async begin() {
+    this.running = false;
+    this.faults = [];
+    this.stage = this.live = this.failed = null;
+    try {
+      this.stage = await this.tasks.run("begin", { robot: this.robot, seed: this.seed });
+      this.live = new Live(this.stage);
+    } catch (error) {
+      this.failed = error.message;
+    }
+    this.render();
+  }
+  async toggle() {
+    if (this.running) return void (this.running = false);
+    if (!this.live || this.live.played.over) await this.begin();
+    if (this.live) await this.drive();
+  }
+  pause() {
+    this.running = false;
+  }
+  /** Ticks as the clock wants them; what a slow machine cannot keep up with is left out of the speed, never of the run. */
+  async drive() {
+    this.running = true;
+    delete document.body.dataset.played;
+    replace(this.parts.keep);
+    this.renderControls();
+    let before = performance.now(), owed = 0;
+    while (this.running) {
+      const now = performance.now();
+      owed = Math.min(MOST_TICKS, owed + ((now - before) / 1000) * this.speed * TICKS_PER_S);
+      before = now;
+      const ticks = Math.floor(owed), { live } = this;
+      owed -= ticks;
+      try {
+        if (ticks > 0) live.take(await this.tasks.run("advance", { ticks }));
+      } catch (error) {
+        return void this.fail(error);
+      }
+      if (live !== this.live) return;
+      if (live.played.over) this.running = false;
+      this.renderLive();
+      await new Promise((done) => setTimeout(done, Math.max(40, 2 * this.drawn)));
+    }
+    await this.renderHash();
+    this.renderControls();
+  }
+  async inject({ number, name, duration_s }) {
+    if (!this.live) return;
+    const { live } = this, fault = await this.tasks.run("inject", { fault: number, seconds: duration_s }).catch((error) => this.fail(error));
+    if (!fault || live !== this.live) return;
+    this.faults.push(fault);
+    this.live.say(this.live.start + fault.start_s, { kind: "injected", name });
+    this.renderLive();
+    if (!this.running && !this.live.played.over) this.drive();
+  }
+  /** A play that has trapped is over; another may begin. */
+  fail({ message }) {
+    this.running = false;
+    this.live = null;
+    this.failed = message;
+    this.render();
+  }
+  script() {
+    return this.tasks.run("script");
+  }
+  file() {
+    return new File(this.live.frames, `${this.stage.robot}_${this.seed}.log`);
+  }
+
+  key(event) {
+    const { tagName } = event.target, typing = /^(INPUT|SELECT|TEXTAREA)$/.test(tagName);
+    if (typing || (event.key === " " && tagName === "BUTTON") || event.ctrlKey || event.metaKey || event.altKey || !this.live) return;
+    const fault = this.stage.faults[Number(event.key) - 1];
+    if (event.key !== " " && !fault) return;
+    event.preventDefault();
+    fault ? this.inject(fault) : this.toggle();
+  }
+
+  // Below: what is drawn.
+  render() {
+    this.parts = Object.fromEntries(["controls", "faults", "words", "chart", "keep"].map((name) => [name, element("div", { class: name })]));
+    const path = element("div", { class: "sight" });
+    this.summary = element("p", { class: "summary" });
+    replace(this.parent, element("h2", {}, say("play.title")), element("p", { class: "note" }, say("play.note")), this.parts.controls,
+      this.failed ? element("p", { class: "bad" }, this.failed) : null,
+      element("div", { class: "scene" }, path, this.parts.words), element("p", { class: "note" }, say("play.legend")), this.parts.faults, this.parts.chart, this.summary, this.parts.keep);
+    this.renderControls();
+    if (!this.live) return;
+    this.view.clear();
+    this.path = new PathView(path, this.view, () => {}, 20);
+    path.append(element("button", { onclick: () => (this.path.fit(), this.path.draw()) }, say("path.all")));
+    this.path.landmarks = this.stage.landmarks;
+    this.renderFaults();
+    this.renderChart();
+    this.renderLive();
+    this.renderHash();
+  }
+  renderControls() {
+    const { running } = this, over = this.live?.played.over;
+    const robot = element("select", { id: "play-robot", "aria-label": say("robot.label"), onchange: () => ((this.robot = Number(robot.value)), this.begin()) },
+      this.robots.map(({ name }, i) => element("option", { value: i, selected: i === this.robot }, name)));
+    const speed = element("select", { id: "play-speed", "aria-label": say("play.speed"), onchange: () => (this.speed = Number(speed.value)) },
+      SPEEDS.map((times) => element("option", { value: times, selected: times === this.speed }, `× ${times}`)));
+    const seed = element("input", { id: "play-seed", type: "number", min: 0, max: 4294967295, value: this.seed, "aria-label": say("play.seed"),
+      onchange: () => ((this.seed = Math.min(4294967295, Math.max(0, Math.floor(Number(seed.value) || 0)))), this.begin()) });
+    const button = element("button", { id: "play-go", class: "go", onclick: () => this.toggle() }, say(running ? "play.pause" : over ? "play.again" : this.live?.played.time_s > 0 ? "play.on" : "play.start"));
+    const focused = document.activeElement?.id;
+    this.clock = element("span", { class: "clock" });
+    replace(this.parts.controls, button, speed, element("button", { id: "play-again", onclick: () => this.begin() }, say("play.again")), robot,
+      element("label", {}, `${say("play.seed")} `, seed), this.clock);
+    if (focused && this.parts.controls.querySelector(`#${focused}`)) document.getElementById(focused).focus();
+    this.renderClock();
+  }
+  renderClock() {
+    if (this.live) this.clock.textContent = say("play.clock", this.live.played.time_s.toFixed(1), this.stage.duration_s.toFixed(0));
+  }
+  renderFaults() {
+    this.buttons = new Map();
+    const groups = GROUPS.map((on) => [on, this.stage.faults.filter((fault) => fault.on === on)]).filter(([, all]) => all.length > 0);
+    this.stage.faults = groups.flatMap(([, all]) => all);
+    replace(this.parts.faults, groups.map(([on, all]) => element("fieldset", {}, element("legend", {}, say(`on.${on}`)),
+      all.map((fault) => {
+        const button = element("button", { "data-fault": fault.name, title: fault.what, onclick: () => this.inject(fault) }, say(`inject.${fault.name}`));
+        this.buttons.set(fault.name, button);
+        return button;
+      }))));
+  }
+  /** All that moves. */
+  renderLive() {
+    const began = performance.now();
+    this.renderClock();
+    for (const [name, button] of this.buttons) {
+      const left = Math.max(0, ...this.faults.filter((one) => one.name === name).map(({ end_s }) => end_s - this.live.played.time_s));
+      button.setAttribute("aria-pressed", left > 0);
+      button.textContent = left > 0 ? `${say(`inject.${name}`)} · ${Math.ceil(left)} s` : say(`inject.${name}`);
+    }
+    if (this.live.tables.estimates?.rows > 0) {
+      const run = this.live.run(), truth = this.live.truth();
+      this.view.reset(run.span);
+      this.view.cursor = run.span[1];
+      this.path.show([{ run, colour: colour("first"), label: say("run.estimate") }], truth, this.path.moved);
+      this.renderErrors(run);
+    }
+    this.renderWords();
+    this.drawn = performance.now() - began;
+  }
+  renderChart() {
+    const select = element("select", { id: "play-error", "aria-label": say("state.label"), onchange: () => ((this.error = select.value), this.renderLive()) },
+      ["x_m", "y_m", "yaw_rad"].map((name) => element("option", { value: name, selected: name === this.error }, say(`state.${name}`))));
+    const box = element("div", {});
+    replace(this.parts.chart, element("p", {}, `${say("play.error")} `, select), box);
+    this.chart?.destroy();
+    const thin = { stroke: colour("first"), width: 1, points: { show: false } };
+    this.chart = new Chart(box, new View(), { title: "", height: 170, data: [[], [], [], []], bands: [{ series: [2, 3], fill: `${colour("first")}22` }],
+      series: [{ label: say("play.error"), stroke: colour("ink"), width: 1.5, points: { show: false } }, { ...thin, label: "+3σ" }, { ...thin, label: "−3σ" }] });
+  }
+  renderErrors(run) {
+    const [t, error, band] = this.live.errors(this.error, run);
+    this.chart.view.whole = this.chart.view.span = [0, Math.max(10, this.live.played.time_s)];
+    this.chart.plot.setData([t, error, band, band.map((x) => -x)]);
+    const inside = error.filter((x, i) => Math.abs(x) <= band[i]).length;
+    this.summary.textContent = t.length > 0 ? say("play.inside", ((100 * inside) / t.length).toFixed(1)) : "";
+  }
+  renderWords() {
+    const { mode, said } = this.live;
+    replace(this.parts.words, element("p", { class: `mode ${TONE[mode] ?? "note"}` }, mode ? say("play.mode", say(`word.${mode}`)) : say("play.silent")),
+      mode ? element("p", { class: "note" }, say(`mode.${mode}`)) : null,
+      element("ol", { class: "said", role: "log", "aria-label": say("play.said"), tabindex: "0" }, said.slice(-LINES).reverse().map((one) => this.line(one))));
+  }
+  line({ time, kind, ...one }) {
+    const words = {
+      mode: () => `${say("source.mode")}: ${say(`word.${one.word}`)}.`,
+      fault: () => say("why.faults", say(`fault.${one.bit}`)),
+      source: () => `${say(`source.${one.source}`)}: ${say(`word.${one.word}`)}. ${say(`check.${one.failed}`)}`,
+      refusal: () => `${say(`source.${one.source}`)}: ${say(`verdict.${one.verdict}`)}. ${say(`check.${one.failed}`)}${Number.isNaN(one.ratio) ? "" : ` ${say("why.ratio", one.ratio.toFixed(1))}`}`,
+      injected: () => say("play.injected", say(`inject.${one.name}`)),
+    };
+    const ink = kind === "injected" ? "own" : kind === "refusal" || kind === "fault" ? "bad" : TONE[one.word] ?? "";
+    return element("li", { class: ink, "data-kind": kind }, element("time", {}, `${time.toFixed(1)} s`), ` ${words[kind]()}`);
+  }
+  /** What can be kept of the run, once it stands still. */
+  async renderHash() {
+    if (this.running || !this.live || this.live.played.time_s === 0) return replace(this.parts.keep);
+    const { live } = this, script = await this.script();
+    if (live !== this.live || this.running) return;
+    const name = `${this.stage.robot}_${this.seed}.faults`;
+    Object.assign(document.body.dataset, { played: script.estimates_sha256, playedCrc: script.state_crc_last, playedEpochs: script.epochs });
+    replace(this.parts.keep,
+      element("div", { class: "buttons" },
+        element("button", { id: "play-look", onclick: () => this.onLook(this.file(), live.truth()) }, say("play.look")),
+        element("button", { id: "play-script", onclick: () => save(name, script.text) }, say("play.script")),
+        element("button", { id: "play-log", onclick: () => save(this.file().name, this.file()) }, say("play.log"))),
+      element("p", { class: "note" }, say("play.repeat", name)),
+      element("p", { class: "hash" }, say("bits.hash", script.estimates_sha256)));
+  }
+}
