@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "node/bench.hpp"
+#include "tetap/bus/fault_hold.hpp"
 
 #include <gtest/gtest.h>
 #include <cmath>
@@ -119,6 +120,22 @@ TEST(Decoder, AnImuSampleCarriesIncrementsIntervalAndClips) {
   EXPECT_NEAR(s.payload.imu.dvelocity_b_mps[2], 0.0981F, 1e-5F);
   EXPECT_EQ(s.payload.imu.clipped_gyro, 3);
   EXPECT_NEAR(s.payload.imu.temperature_degC, 30.5F, 0.05F);
+}
+
+TEST(Decoder, AnImuSampleOverNoTimeIsMalformedAndLeavesNoHalf) {
+  Desk desk;
+  for (std::uint8_t seq = 0; seq < 40; ++seq) {
+    const auto interval = static_cast<std::uint16_t>(seq == 20 ? 5'000 : 0);
+    desk.put(in(bus::ImuGyro{.ang_x_rad = 0.001F, .seq = seq}, 0));
+    desk.put(in(bus::ImuAccel{.vel_z_mps = 0.1F, .seq = seq}, 0));
+    desk.put(in(bus::ImuTime{.stamp_us = stamp(9'999'000), .interval_us = interval, .seq = seq}, 0));
+  }
+  EXPECT_EQ(desk.out.samples.size(), 1U);
+  EXPECT_EQ(desk.counters.out_of_range, 39);
+  EXPECT_EQ(desk.counters.incomplete + desk.counters.duplicate, 0);
+  bus::FaultHold faults;
+  faults.note(desk.counters, 1, 10);
+  EXPECT_EQ(faults.faults(1).bits, 1U << static_cast<unsigned>(sensor::Fault::kMalformed)) << "and no other word";
 }
 
 TEST(Decoder, AHeadingFromOutsideIsOneSampleWithOrWithoutItsAccuracy) {

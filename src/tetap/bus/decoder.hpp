@@ -117,6 +117,10 @@ void Decoder::imu(std::uint8_t offset, const base::CanFrame& frame, std::uint32_
     if (!time) return void(++counters.malformed);
     Reassembly::Partial& partial =
         assembly_.slot(sensor::Sensor::kImu, instance, time->seq, kImuFrames, reference, counters);
+    if (time->interval_us == 0) {  // increments over no time: the sample is given up
+      partial.missing = 0;
+      return void(++counters.out_of_range);
+    }
     partial.sample.stamp = base::extend(time->stamp_us, 20, reference);
     sensor::ImuSample& imu = partial.sample.payload.imu;
     imu.interval_us = time->interval_us;
