@@ -27,6 +27,18 @@ struct SparseUpdate {
   bool sharp = false;    ///< some component is that much better than its prediction
 };
 
+/// Watch over an update on its way: none. Others have innovation(l, y, record) before the gate's verdict, with
+/// S = L L^T and y = L^-1 nu, and gains(g) of a measurement that is used, with G = P H^T L^-T.
+struct Unwatched {
+  [[gnu::always_inline]] static void innovation(const auto&, const auto&, const auto&) {}
+  [[gnu::always_inline]] static void gains(const auto&) {}
+};
+
+/// H of a group of states as they are.
+struct IdentityJacobian {
+  [[nodiscard]] constexpr float operator()(int m, int k) const { return m == k ? 1.0F : 0.0F; }
+};
+
 namespace detail {
 
 /// The columns of P H^T, then of G: row n is m = 0 ... M - 1 in a row.
@@ -73,9 +85,9 @@ template <class Scalar, int N, int M>
 }
 
 /// From P H^T and S to the verdict, the correction and the new P. P H^T is in g, or it is the columns of P from kGroup.
-template <int kGroup, class Scalar, int N, int M>
+template <int kGroup, class Scalar, int N, int M, class Watch>
 [[gnu::noinline]] void correct(Symmetric<Scalar, N>& p, Gains<Scalar, N, M>& g, const Vector<Scalar, M>& noise,
-                               SparseUpdate<Scalar, N, M>& result) {
+                               SparseUpdate<Scalar, N, M>& result, Watch& watch) {
   Innovation<Scalar, M>& record = result.innovation;
   Symmetric<Scalar, M> l;  // l(i, j), i < j, is L_ji; the diagonal holds 1 / L_jj
   Vector<Scalar, M> y;
@@ -103,6 +115,7 @@ template <int kGroup, class Scalar, int N, int M>
   }
   record.nis = y.dot(y);
   if (!(record.nis < Scalar{1e30F})) return;  // NaN or beyond every gate: kNotFinite
+  watch.innovation(l, y, record);
   if (!(record.nis <= record.gate)) {
     record.verdict = Verdict::kRejected;
     return;
@@ -121,6 +134,7 @@ template <int kGroup, class Scalar, int N, int M>
     });
     result.dx(int{n}) = dx;
   });
+  watch.gains(g);
   subtract(p, g);
 #pragma GCC unroll 16
   for (int m = 0; m < M; ++m) result.sharp = result.sharp || noise(m) <= kSharp * record.s(m, m);
@@ -136,10 +150,10 @@ template <int kGroup, class Scalar, int N, int M>
 
 /// The measurement is a group of states as they are: H is the identity over the first kDimension of kTouches, which lie
 /// in a row. H has nothing else (Direct, and has_rest() false). `result` begins as constructed.
-template <class Measurement, class Scalar, int N>
+template <class Measurement, class Scalar, int N, class Watch>
 inline void group_update(Symmetric<Scalar, N>& p, const Vector<Scalar, Measurement::kDimension>& nu,
                          const Vector<Scalar, Measurement::kDimension>& noise, Scalar gate,
-                         SparseUpdate<Scalar, N, Measurement::kDimension>& result) {
+                         SparseUpdate<Scalar, N, Measurement::kDimension>& result, Watch& watch) {
   constexpr int kM = Measurement::kDimension, kGroup = Measurement::kTouches[0];
   static_assert(Direct<Measurement> && Measurement::kTouches[kM - 1] == kGroup + kM - 1);
   result.innovation.nu = nu;
@@ -150,16 +164,16 @@ inline void group_update(Symmetric<Scalar, N>& p, const Vector<Scalar, Measureme
     for (int r = 0; r <= c; ++r)
       result.innovation.s(r, c) = p(kGroup + r, kGroup + c) + (r == c ? noise(c) : Scalar{0});
   detail::Gains<Scalar, N, kM> g;
-  detail::correct<kGroup>(p, g, noise, result);
+  detail::correct<kGroup>(p, g, noise, result, watch);
 }
 
 /// Does as update(), over the states that Measurement::kTouches names. `result` begins as constructed.
-template <class Measurement, class Scalar, int N>
+template <class Measurement, class Scalar, int N, class Watch>
 inline void sparse_update(
     Symmetric<Scalar, N>& p,
     const Matrix<Scalar, Measurement::kDimension, static_cast<int>(Measurement::kTouches.size())>& h,
     const Vector<Scalar, Measurement::kDimension>& nu, const Vector<Scalar, Measurement::kDimension>& noise,
-    Scalar gate, SparseUpdate<Scalar, N, Measurement::kDimension>& result) {
+    Scalar gate, SparseUpdate<Scalar, N, Measurement::kDimension>& result, Watch& watch) {
   constexpr int kM = Measurement::kDimension, kK = static_cast<int>(Measurement::kTouches.size());
   constexpr int kFirst = Direct<Measurement> ? kM : 0;  // columns before are the identity
   constexpr auto touch = [](int k) { return Measurement::kTouches[static_cast<std::size_t>(k)]; };
@@ -188,7 +202,7 @@ inline void sparse_update(
       record.s(r, c) = sum;
     });
   });
-  detail::correct<-1>(p, g, noise, result);
+  detail::correct<-1>(p, g, noise, result, watch);
 }
 
 }  // namespace tetap::filter

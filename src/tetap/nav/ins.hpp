@@ -48,6 +48,17 @@ struct VelocityCorrection {
   }
 };
 
+/// Hypotheses that go along with the filter's errors: none. Others move with every step and turn as P does, and watch
+/// every update.
+struct NoFaults {
+  [[gnu::always_inline]] static void predict(const InsCovarianceStep<float>&) {}
+  [[gnu::always_inline]] static void turn_tilt(float) {}
+  template <class Measurement>
+  [[gnu::always_inline]] static filter::Unwatched pass(const Measurement&, const auto&) {
+    return {};
+  }
+};
+
 struct InsCounters {
   std::uint16_t held = 0;         ///< time for which the velocity is held in the body, in 0.1 ms
   std::uint16_t conditioned = 0;  ///< times that the covariance had to be put right
@@ -92,7 +103,8 @@ class Ins {
 
   /// Brings the covariance to the state's time: after every increment, or once for several (up to some 50 ms; the
   /// measurement that comes needs it).
-  void predict_covariance() {
+  template <class Faults = NoFaults>
+  void predict_covariance(Faults&& faults = {}) {
     if (!(pending_.dt_s > 0.0F)) return;
     InsCovarianceStep<float> step =
         noise_over(pending_, pending_.dt_s, turned_.turn(pending_turn_rad(), noise.gyro_scale));
@@ -103,6 +115,7 @@ class Ins {
     counters_.held = counters_.held > passed ? static_cast<std::uint16_t>(counters_.held - passed) : std::uint16_t{0};
     inflate_vertical_bias(step.dt_s);
     nav::predict_covariance(p, step);
+    faults.predict(step);
     pending_ = {};
     maintain();
   }
@@ -132,17 +145,20 @@ class Ins {
 
   /// A gap in the increments: the velocity is kept, and the noise is that of a robot that may have done anything of
   /// this size.
-  void predict_without_imu(base::Micros gap, float sigma_mps2, float sigma_radps) {
-    predict_covariance();
+  template <class Faults = NoFaults>
+  void predict_without_imu(base::Micros gap, float sigma_mps2, float sigma_radps, Faults&& faults = {}) {
+    predict_covariance(faults);
     for (std::int64_t left_us = gap.us < kMostGap_us ? gap.us : kMostGap_us; left_us > 0; left_us -= kGapStep_us) {
       const float dt_s = base::seconds({left_us < kGapStep_us ? left_us : kGapStep_us});
       move(x.x, x.v_n_mps(0) * dt_s);
       move(x.y, x.v_n_mps(1) * dt_s);
       move(x.z, x.v_n_mps(2) * dt_s);
-      nav::predict_covariance(p, {.dt_s = dt_s,
-                                  .dv_n_mps = pending_.dv_n_mps,
-                                  .var_v = sigma_mps2 * sigma_mps2 * dt_s * kGapStep_s,
-                                  .var_theta = sigma_radps * sigma_radps * dt_s * kGapStep_s});
+      const InsCovarianceStep<float> step{.dt_s = dt_s,
+                                          .dv_n_mps = pending_.dv_n_mps,
+                                          .var_v = sigma_mps2 * sigma_mps2 * dt_s * kGapStep_s,
+                                          .var_theta = sigma_radps * sigma_radps * dt_s * kGapStep_s};
+      nav::predict_covariance(p, step);
+      faults.predict(step);
       pending_.dv_n_mps = Vector3::Zero();
     }
     accel_n_mps2 = Vector3::Zero();
@@ -160,10 +176,11 @@ class Ins {
 
   /// Joint gate, then sequential scalar updates; a measurement that is not accepted changes nothing. The covariance is
   /// brought up to date first.
-  template <filter::MeasurementModel<InsState> Measurement>
-  [[nodiscard]] filter::Innovation<float, Measurement::kDimension> update(const Measurement& measurement, float gate) {
-    if (pending_.dt_s > 0.0F) predict_covariance();
-    return update_now(measurement, gate);
+  template <filter::MeasurementModel<InsState> Measurement, class Faults = NoFaults>
+  [[nodiscard]] filter::Innovation<float, Measurement::kDimension> update(const Measurement& measurement, float gate,
+                                                                          Faults&& faults = {}) {
+    if (pending_.dt_s > 0.0F) predict_covariance(faults);
+    return update_now(measurement, gate, faults);
   }
 
   /// Begins anew; whatever was pending is forgotten. False, and nothing has changed, when the state is no number; a
@@ -201,21 +218,24 @@ class Ins {
     p(error, error) = variance;
   }
   void recondition() { condition(p, condition_monitor_); }
+  /// The state takes a correction that its covariance has already, and the latter is looked at from end to end.
+  void take(const InsState::Error& dx) {
+    x.correct(dx);
+    condition(p, condition_monitor_);
+  }
 
   /// Update by the gyroscope's mean over a standstill whose noise is also in the heading. `shared` is the covariance of
   /// the two per axis of the bias. `wander` is the variance of each bias's walk since the mean (Bar-Shalom, Li,
   /// Kirubarajan 2001, sec. 8.3). The covariance is up to date.
-  template <filter::MeasurementModel<InsState> Measurement>
-  [[nodiscard]] filter::Innovation<float, Measurement::kDimension> update_shared_noise(const Measurement& measurement,
-                                                                                       float gate,
-                                                                                       const Vector3& shared,
-                                                                                       const Vector3& wander) {
+  template <filter::MeasurementModel<InsState> Measurement, class Faults = NoFaults>
+  [[nodiscard]] filter::Innovation<float, Measurement::kDimension> update_shared_noise(
+      const Measurement& measurement, float gate, const Vector3& shared, const Vector3& wander, Faults&& faults = {}) {
     constexpr int kYaw = InsState::kAttitude + 2, kBias = InsState::kGyroBias;
     for (int i = 0; i < 3; ++i) {
       p(kBias + i, kBias + i) -= wander(i);
       p(kYaw, kBias + i) -= shared(i);
     }
-    auto result = update(measurement, gate);
+    auto result = update(measurement, gate, faults);
     for (int i = 0; i < 3; ++i) {
       p(kYaw, kBias + i) += shared(i);
       p(kBias + i, kBias + i) += wander(i);
@@ -239,9 +259,9 @@ class Ins {
 
  private:
   /// Apart from the prediction, so that the two are not on the stack together.
-  template <class Measurement>
+  template <class Measurement, class Faults>
   [[gnu::noinline]] filter::Innovation<float, Measurement::kDimension> update_now(const Measurement& measurement,
-                                                                                  float gate) {
+                                                                                  float gate, Faults& faults) {
     constexpr int kM = Measurement::kDimension, kYaw = InsState::kAttitude + 2;
     [[maybe_unused]] const float yaw_rad2 = p(kYaw, kYaw);
     corrected.up_m2ps2 += p(InsState::kVelocityUp, InsState::kVelocityUp);
@@ -257,9 +277,11 @@ class Ins {
       } else {
         at = {.z_hat = measurement.predict(x), .h = measurement.jacobian(x)};
       }
-      filter::sparse_update<Measurement>(p, at.h, measurement.residual(at.z_hat), measurement.noise(), gate, result);
+      auto watch = faults.pass(measurement, at.h);
+      filter::sparse_update<Measurement>(p, at.h, measurement.residual(at.z_hat), measurement.noise(), gate, result,
+                                         watch);
     } else if constexpr (filter::Direct<Measurement>) {
-      direct_update(measurement, gate, result);
+      direct_update(measurement, gate, result, faults);
     }
     corrected.level_m2ps2 -= level_m2ps2();
     corrected.up_m2ps2 -= p(InsState::kVelocityUp, InsState::kVelocityUp);
@@ -270,7 +292,7 @@ class Ins {
     constexpr bool kInBody = requires { measurement.moves; };
     if constexpr (kObservesHeading) turned_.heading_measured(p(kYaw, kYaw) / yaw_rad2);
     bool turned = false;
-    if constexpr (kObservesHeading && !kInBody) turned = turn_tilt(result.dx);
+    if constexpr (kObservesHeading && !kInBody) turned = turn_tilt(result.dx, faults);
     x.correct(result.dx);
     corrected.east_mps += result.dx(InsState::kVelocity);
     corrected.north_mps += result.dx(InsState::kVelocity + 1);
@@ -283,11 +305,13 @@ class Ins {
   }
 
   /// Apart from the update with a lever arm, so that the two are not on the stack together.
-  template <class Measurement>
+  template <class Measurement, class Faults>
   [[gnu::noinline]] void direct_update(const Measurement& measurement, float gate,
-                                       filter::SparseUpdate<float, kErrors, Measurement::kDimension>& result) {
+                                       filter::SparseUpdate<float, kErrors, Measurement::kDimension>& result,
+                                       Faults& faults) {
+    auto watch = faults.pass(measurement, filter::IdentityJacobian{});
     filter::group_update<Measurement>(p, measurement.residual(measurement.predict(x)), measurement.noise(), gate,
-                                      result);
+                                      result, watch);
   }
 
   bool start_with_p(const InsState& at) {
@@ -380,12 +404,14 @@ class Ins {
   /// a correction of the tilt is that of before. Otherwise the bias would be seen from two sides that are none, as if
   /// the robot had turned. True where rounding may have cost P its definiteness.
   /// Implements docs/explanation/equations.md (16).
-  [[nodiscard]] bool turn_tilt(InsState::Error& dx) {
+  template <class Faults>
+  [[nodiscard]] bool turn_tilt(InsState::Error& dx, Faults& faults) {
     constexpr int kEast = InsState::kAttitude, kNorth = kEast + 1;
     const float up_rad = dx(kNorth + 1), size_rad = base::abs(up_rad), east = dx(kEast);
     if (!(size_rad > kLeastTurn_rad && size_rad < kMostTurn_rad)) return false;
     dx(kEast) -= 0.5F * up_rad * dx(kNorth);  // Exp(up) Exp(tilt), to second order
     dx(kNorth) += 0.5F * up_rad * east;
+    faults.turn_tilt(up_rad);
     const bool far = size_rad > kSmallTurn_rad;
     if (far) {
       turn_tilt_far(up_rad);
