@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: Apache-2.0
+// Faults of an inertial robot's sensors: a bias of the IMU that jumps, and offsets of the receiver and of the wheels.
+#pragma once
+
+#include "tetap/model/gnss_fix_3d.hpp"
+#include "tetap/model/gnss_velocity_3d.hpp"
+#include "tetap/model/wheel_speed.hpp"
+#include "tetap/nav/ins_covariance.hpp"
+#include "tetap/trust/fault_bank.hpp"
+
+#include <type_traits>
+
+namespace tetap::trust {
+
+struct InertialFaults {
+  static constexpr int kErrors = nav::InsState::kErrors;
+  static constexpr std::size_t kFix = 6, kVelocity = 9, kForward = 12;
+
+  /// Largest sizes: what the sensors of these robots show at all. Rates: a connector, a multipath, a spin.
+  static constexpr std::array<FaultRow, 13> kRows = [] {
+    std::array<FaultRow, 13> rows;
+    const auto three = [&rows](std::size_t first, const FaultRow& like, int jumps) {
+      for (std::size_t i = 0; i < 3; ++i) {
+        rows[first + i] = like;
+        rows[first + i].code = static_cast<std::uint8_t>(first + i);
+        rows[first + i].jumps = static_cast<std::int8_t>(jumps < 0 ? -1 : jumps + static_cast<int>(i));
+      }
+    };
+    three(0, {.device = Device::kImu, .unit = FaultUnit::kRadiansPerSecond, .largest = 0.5F, .per_hour = 1},
+          nav::InsState::kGyroBias);
+    three(3, {.device = Device::kImu, .unit = FaultUnit::kMetresPerSecond2, .largest = 5, .per_hour = 1},
+          nav::InsState::kAccelBias);
+    three(kFix,
+          {.device = Device::kReceiver, .unit = FaultUnit::kMetres, .largest = 20, .per_hour = 1, .wander_rts = 1}, -1);
+    three(kVelocity,
+          {.device = Device::kReceiver,
+           .unit = FaultUnit::kMetresPerSecond,
+           .largest = 5,
+           .per_hour = 1,
+           .wander_rts = 0.5F},
+          -1);
+    rows[kForward] = {.device = Device::kWheels,
+                      .unit = FaultUnit::kMetresPerSecond,
+                      .code = kForward,
+                      .largest = 3,
+                      .per_hour = 1,
+                      .wander_rts = 0.5F};
+    return rows;
+  }();
+
+  template <class Measurement>
+  [[nodiscard]] static constexpr float direct(const FaultRow& row, const Measurement&, int component) {
+    const int at = row.code;
+    constexpr bool kIsFix = std::is_same_v<Measurement, model::GnssFix3d>,
+                   kIsVelocity = std::is_same_v<Measurement, model::GnssVelocity3d>;
+    if constexpr (kIsFix) return at == static_cast<int>(kFix) + component ? 1.0F : 0.0F;
+    if constexpr (kIsVelocity) return at == static_cast<int>(kVelocity) + component ? 1.0F : 0.0F;
+    if constexpr (std::is_same_v<Measurement, model::WheelSpeed>)
+      return at == static_cast<int>(kForward) && component == 0 ? 1.0F : 0.0F;
+    return 0.0F;
+  }
+  /// phi <- F phi, by the step that moves P (nav/ins_covariance.hpp).
+  static void predict(const FaultRow&, std::array<float, kErrors>& phi, const nav::InsCovarianceStep<float>& step) {
+    constexpr std::size_t kV = nav::InsState::kVelocity, kT = nav::InsState::kAttitude, kA = nav::InsState::kAccelBias,
+                          kG = nav::InsState::kGyroBias;
+    const auto turned = [&](std::size_t r, std::size_t from) {
+      const int row = static_cast<int>(r);
+      return step.r_dt(row, 0) * phi[from] + step.r_dt(row, 1) * phi[from + 1] + step.r_dt(row, 2) * phi[from + 2];
+    };
+    for (std::size_t r = 0; r < 3; ++r) phi[r] += step.dt_s * phi[kV + r];
+    for (std::size_t r = 0; r < 3; ++r) {
+      const std::size_t a = r == 2 ? 0 : r + 1, b = r == 0 ? 2 : r - 1;
+      phi[kV + r] += phi[kT + a] * step.dv_n_mps(static_cast<int>(b)) -
+                     phi[kT + b] * step.dv_n_mps(static_cast<int>(a)) - turned(r, kA);
+    }
+    for (std::size_t r = 0; r < 3; ++r) phi[kT + r] -= turned(r, kG);
+    for (std::size_t r = 0; r < 3; ++r) {
+      phi[kA + r] *= step.keep_b_a;
+      phi[kG + r] *= step.keep_b_g;
+    }
+  }
+};
+
+/// The bank beside nav::Ins.
+class InertialBank : public FaultBank<InertialFaults> {
+ public:
+  template <class Measurement>
+  [[nodiscard]] Pass<static_cast<std::size_t>(Measurement::kDimension)> pass(const Measurement& z, const auto& h) {
+    return {*this, z, h};
+  }
+  /// The tilt errors turn with a corrected heading, as those of P do.
+  void turn_tilt(float up_rad) {
+    constexpr std::size_t kEast = nav::InsState::kAttitude, kNorth = kEast + 1;
+    const base::SinCos by = base::sincos(up_rad);
+    carry([&by](Errors& phi) {
+      const float east = phi[kEast], north = phi[kNorth];
+      phi[kEast] = by.cos * east - by.sin * north;
+      phi[kNorth] = by.cos * north + by.sin * east;
+    });
+  }
+};
+
+}  // namespace tetap::trust
