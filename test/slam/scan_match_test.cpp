@@ -1,49 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
-// Laws of the scan matcher in rooms whose walls are cast by determinants in double, and the Intel Research Lab.
+// Laws of the scan matcher in rooms whose walls are cast by determinants in double.
 #include "tetap/slam/scan_match.hpp"
-#include "support/imported_scans.hpp"
-#include "support/scan_room.hpp"
+#include "slam/scan_world.hpp"
 
 #include <gtest/gtest.h>
 #include <Eigen/Cholesky>
 #include <cstdio>
-#include <memory>
 #include <random>
 
 namespace tetap {
 namespace {
 
-using test::cast, test::kRoom, test::range_steps, test::Wall;
+using namespace test;
 
 constexpr int kBeams = 361;
 using Match = slam::ScanMatch<kBeams, 4>;
 using Keyframes = slam::ScanKeyframes<kBeams, 4>;
-using Motion = Match::Motion;
-using Ranges = std::vector<std::uint16_t>;
 
-struct Place {
-  double x = 0, y = 0, yaw = 0;
-};
-const std::vector<Wall> kCorridor = {{-60, -1, 60, -1}, {-60, 1.2, 60, 1.2}};
-const slam::ScanGeometry kTurn{.beams = 360, .first_rad = -base::kPi, .step_rad = base::kPi / 180, .max_m = 12.0F};
-
-double bearing(const slam::ScanGeometry& g, int i) {
-  return static_cast<double>(g.first_rad) + static_cast<double>(g.step_rad) * i;
-}
-Ranges look(const std::vector<Wall>& walls, const slam::ScanGeometry& g, const Place& at, double sigma_m,
-            std::mt19937& random) {
-  std::normal_distribution<double> noise;
-  Ranges ranges;
-  for (int i = 0; i < g.beams; ++i)
-    ranges.push_back(range_steps(cast(walls, at.x, at.y, at.yaw + bearing(g, i)) + sigma_m * noise(random)));
-  return ranges;
-}
-Motion motion(double x, double y, double yaw, double sigma_m, double sigma_rad) {
-  const auto m = static_cast<float>(sigma_m * sigma_m), r = static_cast<float>(sigma_rad * sigma_rad);
-  return {.mean = {static_cast<float>(x), static_cast<float>(y),
-                   slam::Heading<float>::from_radians(static_cast<float>(yaw))},
-          .covariance = filter::Symmetric<float, 3>::diagonal({m, m, r})};
-}
 /// x, y (m), yaw (rad).
 Eigen::Vector3d mean(const slam::ScanMatchResult& result) {
   const auto& d = result.pose.mean;
@@ -238,52 +211,6 @@ TEST_F(ScanMatching, TheCovarianceIsThatOfTheErrors) {
   std::printf("NEES of 3: %.2f\n", nees);
   EXPECT_GT(nees, 2.0);
   EXPECT_LT(nees, 5.0);
-}
-
-TEST(IntelLab, RelationsByHandAreMetOpenLoop) {
-  const std::string name = test::imported_scans("intel_gfs.json.xz", "--relations", "intel.relations");
-  if (name.empty()) GTEST_SKIP() << "scans is not in $TETAP_DATA";
-  const auto rows = test::read_rows(name + ".scans"), relations = test::read_rows(name + ".relations");
-  ASSERT_EQ(rows.size(), 911U) << name;
-  ASSERT_EQ(relations.size(), 105U);
-  const slam::ScanGeometry geometry{.beams = static_cast<int>(rows[0][0]),
-                                    .first_rad = static_cast<float>(rows[0][1]),
-                                    .step_rad = static_cast<float>(rows[0][2])};
-  const auto match = std::make_unique<Match>();
-  const auto keyframes = std::make_unique<Keyframes>();
-  std::vector<slam::GraphPose<float>> track;
-  slam::GraphPose<float> odometry_before;
-  for (std::size_t k = 1; k < rows.size(); ++k) {
-    const auto number = [&](std::size_t i) { return static_cast<float>(rows[k][i]); };
-    const slam::GraphPose<float> odometry{slam::Coordinate<float>{}.plus(number(1)),
-                                          slam::Coordinate<float>{}.plus(number(2)),
-                                          slam::Heading<float>::from_radians(number(3))};
-    const auto guess = track.empty() ? odometry : track.back().plus(odometry.minus(odometry_before));
-    odometry_before = odometry;
-    const slam::GraphPose<float> newest = track.empty() ? guess : keyframes->pose(0);
-    Motion prior = motion(0, 0, 0, 0.2, 0.2);
-    prior.mean = guess.minus(newest);
-    const auto& result = run(*match, *keyframes, geometry, Ranges(rows[k].begin() + 4, rows[k].end()), prior);
-    track.push_back(newest.plus(result.pose.mean));
-    if (keyframes->due(result.pose.mean)) keyframes->add(match->scan(), track.back());
-  }
-  double near_m = 0, near_rad = 0, all_m = 0, all_rad = 0, near = 0;
-  for (const auto& relation : relations) {
-    const auto d = track[static_cast<std::size_t>(relation[1])].minus(track[static_cast<std::size_t>(relation[0])]);
-    const Eigen::Vector3d e = Eigen::Vector3f(d.x_m, d.y_m, d.yaw.radians()).cast<double>() -
-                              Eigen::Vector3d(relation[2], relation[3], relation[4]);
-    const double m = e.head<2>().norm(), rad = std::abs(std::remainder(e[2], 2 * M_PI));
-    all_m += m / 105, all_rad += rad / 105;
-    if (std::abs(relation[1] - relation[0]) <= 3) near_m += m, near_rad += rad, near += 1;
-  }
-  std::printf("Intel: %.0f neighbours %.4f m, %.3f deg; 105 relations %.3f m, %.2f deg; %u of %zu by odometry alone\n",
-              near, near_m / near, near_rad / near * 180 / M_PI, all_m, all_rad * 180 / M_PI,
-              match->counters().few_pairs, track.size());
-  EXPECT_EQ(near, 78);
-  EXPECT_LE(near_m / near, 0.014);
-  EXPECT_LE(near_rad / near * 180 / M_PI, 0.45);
-  EXPECT_LE(all_m, 0.25);
-  EXPECT_LE(all_rad * 180 / M_PI, 1.5);
 }
 
 }  // namespace

@@ -153,4 +153,11 @@ template <class Scalar>
           .covariance = detail::turned(a.covariance, -turn.cos, turn.sin, y, -x, Scalar{-1}, {})};
 }
 
+/// A displacement of a body as one of what is mounted there on it.
+template <class Scalar>
+[[nodiscard]] UncertainDisplacement<Scalar> as_of(const UncertainDisplacement<Scalar>& body,
+                                                  const UncertainDisplacement<Scalar>& mounting) {
+  return compose(compose(inverse(mounting), body), mounting);
+}
+
 }  // namespace tetap::slam

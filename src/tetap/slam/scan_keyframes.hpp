@@ -41,6 +41,12 @@ class ScanKeyframes {
     pose_[static_cast<std::size_t>(newest_)] = pose;
     if (count_ < kFrames) ++count_;
   }
+  /// All keyframes as one body, which is at `to` instead of at `from`; nothing changes where these are equal.
+  void move(const Pose& from, const Pose& to) {
+    const Displacement<float> d = to.minus(from);
+    const bool same = d.yaw.turn == 0 && !(base::abs(d.x_m) + base::abs(d.y_m) > 0.0F);
+    for (int k = 0; k < count_ && !same; ++k) pose_[slot(k)] = to.plus(pose_[slot(k)].minus(from));
+  }
 
  private:
   [[nodiscard]] std::size_t slot(int k) const { return static_cast<std::size_t>((newest_ - k + kFrames) % kFrames); }

@@ -92,11 +92,16 @@ void GraphMapper<Graph>::reset_own_map() {
 
 template <class Graph>
 void GraphMapper<Graph>::advance(base::Micros t, const Context& ctx, const sensor::Window& window) {
+  advance(t);
+  present_ = motion_;
+  move_through(window, present_, ctx.parameters);
+}
+
+template <class Graph>
+void GraphMapper<Graph>::advance(base::Micros t) {
   before_ = now_;
   now_ = t;
   motion_.advance(t);
-  present_ = motion_;
-  move_through(window, present_, ctx.parameters);
   digest_.scan(elements(), kScanned, [this](std::size_t i, auto& sink) { this->hash_element(i, sink); });
 }
 
@@ -177,12 +182,16 @@ typename GraphMapper<Graph>::Displaced GraphMapper<Graph>::displaced(const senso
   return d;
 }
 
-/// From the last keyframe to the next: an odometer of its own, a scan matcher for instance, makes the keyframes.
+template <class Graph>
+bool GraphMapper<Graph>::step(const Displaced& displacement, base::Micros stamp) {
+  if (!append(displacement, stamp)) return false;
+  motion_.relocate({}, 0.0F, 0.0F);
+  return true;
+}
+
 template <class Graph>
 Innovation GraphMapper<Graph>::odometry(const sensor::LoopClosure& closure, base::Micros stamp) {
-  if (!append(displaced(closure), stamp))
-    return {.verdict = sensor::Verdict::kSingular, .failed = sensor::Check::kValue};
-  motion_.relocate({}, 0.0F, 0.0F);
+  if (!step(displaced(closure), stamp)) return {.verdict = sensor::Verdict::kSingular, .failed = sensor::Check::kValue};
   return input_record(sensor::Verdict::kAccepted);
 }
 
@@ -277,5 +286,6 @@ GraphKeyframe GraphMapper<Graph>::own_keyframe(std::size_t i) const {
 template class GraphMapper<Graph4096>;
 template class GraphMapper<Graph256>;
 template class GraphMapper<Graph128>;
+template class GraphMapper<Graph192>;
 
 }  // namespace tetap::estimators

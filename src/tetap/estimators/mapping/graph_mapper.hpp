@@ -45,6 +45,7 @@ class GraphMapper {
   void advance(base::Micros t, const Context& ctx, const sensor::Window& window);
   void work(std::uint32_t units, const Context& ctx);
   void abort_job() { graph_.cancel_job(); }
+  [[nodiscard]] bool idle() const { return graph_.idle(); }
 
   template <class Input>
   requires requires(DeadReckoning& motion, const Input& input, const param::Parameters& n) {
@@ -87,6 +88,17 @@ class GraphMapper {
     }
   }
 
+  /// For an odometer of its own, which makes the keyframes and carries the pose: a displacement from the last keyframe
+  /// to the next. False when it is no number or no covariance.
+  bool step(const Displaced& displacement, base::Micros stamp);
+  /// Without wheels and without the present.
+  void advance(base::Micros t);
+  /// Pose and covariance of the latest step in the map. Implements docs/explanation/pose_graph.md (8).
+  [[nodiscard]] Pose step_pose() const { return graph_.pose(); }
+  [[nodiscard]] filter::Symmetric<Scalar, 3> covariance() const;
+  /// For closures that it finds itself.
+  [[nodiscard]] Graph& keyframes() { return graph_; }
+
   /// All but the graph, which digest() stands for.
   static constexpr auto members(auto& self) {
     return base::members(base::unhashed(self.graph_), self.motion_, base::unhashed(self.present_),
@@ -119,8 +131,6 @@ class GraphMapper {
     return graph_.step() - ((graph_.step() - id) & (kIds - 1));
   }
   [[nodiscard]] Innovation odometry(const sensor::LoopClosure& closure, base::Micros stamp);
-  /// Covariance of the latest step in the map. Implements docs/explanation/pose_graph.md (8).
-  [[nodiscard]] filter::Symmetric<Scalar, 3> covariance() const;
   /// The robot, now at this pose with this covariance; nothing else of the graph changes.
   void place(base::Micros t, const model::PlanarPose& pose, const filter::Symmetric<float, 3>& p);
   void note_refused();
@@ -175,6 +185,8 @@ class GraphMapper {
 using Graph4096 = slam::KeyframeGraph<double, 4096, 8192, 32768, 4096>;
 using Graph256 = slam::KeyframeGraph<float, 256, 560, 1312, 3584>;
 using Graph128 = slam::KeyframeGraph<float, 128, 288, 576, 1024>;
+/// Beside a scanner, in the 256 kB class.
+using Graph192 = slam::KeyframeGraph<float, 192, 448, 1312, 2048>;
 using GraphMapper4096 = GraphMapper<Graph4096>;
 using GraphMapper256 = GraphMapper<Graph256>;
 using GraphMapper128 = GraphMapper<Graph128>;

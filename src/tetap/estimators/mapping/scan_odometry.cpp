@@ -12,7 +12,7 @@ namespace tetap::estimators {
 namespace {
 
 /// Motion of the scanner from that of the body: forward speed and yaw rate.
-slam::ScanMotion scanner_motion(float forward_mps, float yaw_rate_radps, const param::LidarParameters& n) {
+slam::ScanMotion motion_of_scanner(float forward_mps, float yaw_rate_radps, const param::LidarParameters& n) {
   const base::SinCos turn = base::sincos(n.yaw_rad);
   const float x_mps = forward_mps - yaw_rate_radps * n.y_b_m, y_mps = yaw_rate_radps * n.x_b_m;
   return {.forward_mps = turn.cos * x_mps + turn.sin * y_mps,
@@ -33,6 +33,17 @@ template <int kBeams, int kFrames>
 auto ScanOdometry<kBeams, kFrames>::mounting(const Context& ctx) -> Step {
   const param::LidarParameters& n = ctx.parameters.lidar;
   return {.mean = {n.x_b_m, n.y_b_m, slam::Heading<float>::from_radians(n.yaw_rad)}, .covariance = {}};
+}
+
+template <int kBeams, int kFrames>
+slam::ScanGeometry ScanOdometry<kBeams, kFrames>::geometry(const sensor::PlanarScan& scan, const Context& ctx) {
+  const param::LidarParameters& n = ctx.parameters.lidar;
+  return {.beams = scan.beams,
+          .first_rad = scan.first_rad,
+          .step_rad = scan.step_rad,
+          .sweep_s = sensor::sweep_s(scan, n),
+          .min_m = n.min_m,
+          .max_m = n.max_m};
 }
 
 template <int kBeams, int kFrames>
@@ -90,17 +101,11 @@ template <int kBeams, int kFrames>
 Innovation ScanOdometry<kBeams, kFrames>::fuse(const sensor::PlanarScan& scan, base::Micros stamp,
                                                std::uint8_t instance, const Context& ctx) {
   if (instance != 0) return {};
-  const param::LidarParameters& n = ctx.parameters.lidar;
   motion_.propagate(stamp, ctx.parameters);
-  const slam::ScanGeometry geometry{.beams = scan.beams,
-                                    .first_rad = scan.first_rad,
-                                    .step_rad = scan.step_rad,
-                                    .sweep_s = sensor::sweep_s(scan, n),
-                                    .min_m = n.min_m,
-                                    .max_m = n.max_m};
   const bool gyro = motion_.gyro_shows(stamp, ctx.parameters);
-  const slam::ScanMotion moves = scanner_motion(
-      motion_.wheels_forward_mps(), gyro ? motion_.gyro_turn_radps() : motion_.wheels_turn_radps(ctx.parameters), n);
+  scanner_motion_ = motion_of_scanner(motion_.wheels_forward_mps(),
+                                      gyro ? motion_.gyro_turn_radps() : motion_.wheels_turn_radps(ctx.parameters),
+                                      ctx.parameters.lidar);
   const model::PlanarPose& d = motion_.filter.x;
   const Step since{.mean = {d.x.minus({}), d.y.minus({}), slam::Heading<float>::from_radians(d.yaw_rad)},
                    .covariance = covariance_of(motion_.filter)};
@@ -113,7 +118,7 @@ Innovation ScanOdometry<kBeams, kFrames>::fuse(const sensor::PlanarScan& scan, b
   report_ = {.ended = report_.ended, .sequence = scan.sequence, .instance = instance};
   if (ctx.scans == nullptr || ctx.scans->ranges(scan).empty())
     return {.verdict = sensor::Verdict::kNoRoom, .failed = sensor::Check::kTime};
-  if (!match_.begin(geometry, moves, of_scanner(step_, mounting(ctx)))) {
+  if (!match_.begin(geometry(scan, ctx), scanner_motion_, as_of(step_, mounting(ctx)))) {
     report_.end = ScanEnd::kNoGeometry;
     report_.ended = now_;
     return {.verdict = sensor::Verdict::kRejected, .failed = sensor::Check::kValue};
@@ -161,7 +166,7 @@ void ScanOdometry<kBeams, kFrames>::conclude(const Context& ctx) {
   report_.sigma_m = base::sqrt(0.5F * (p(0, 0) + p(1, 1)) + base::sqrt(half * half + p(0, 1) * p(0, 1)));
   report_.sigma_yaw_rad = base::sqrt(p(2, 2));
   if (result.matched()) {
-    step_ = of_body(result.pose, mounting(ctx));
+    step_ = as_of(result.pose, inverse(mounting(ctx)));
     matched_ = true;
     last_match_ = record_.stamp;
   }
@@ -186,8 +191,25 @@ template <int kBeams, int kFrames>
 void ScanOdometry<kBeams, kFrames>::make_keyframe(const Context& ctx) {
   reference_p_ = carried(reference_p_, reference_.yaw, step_);
   reference_ = reference_.plus(step_.mean);
+  keyframe_step_ = step_;
+  new_keyframe_ = true;
   odometry_ = step_ = {};
   keyframes_.add(match_.scan(), reference_.plus(mounting(ctx).mean));
+}
+
+template <int kBeams, int kFrames>
+slam::Displacement<float> ScanOdometry<kBeams, kFrames>::since_keyframe(base::Micros t, const Context& ctx) {
+  motion_.propagate(t, ctx.parameters);
+  const model::PlanarPose& d = motion_.filter.x;
+  const slam::Displacement<float> since{d.x.minus({}), d.y.minus({}), slam::Heading<float>::from_radians(d.yaw_rad)};
+  return compose(step_, Step{.mean = since, .covariance = {}}).mean;
+}
+
+template <int kBeams, int kFrames>
+void ScanOdometry<kBeams, kFrames>::move_keyframe(const Pose& pose, const filter::Symmetric<float, 3>& p) {
+  keyframes_.move(reference_, pose);
+  reference_ = pose;
+  reference_p_ = p;
 }
 
 template <int kBeams, int kFrames>

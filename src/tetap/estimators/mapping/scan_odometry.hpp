@@ -17,16 +17,17 @@
 #include "tetap/slam/scan_match.hpp"
 
 #include <cstdint>
+#include <utility>
 
 namespace tetap::estimators {
 
 template <int kBeams, int kFrames>
 class ScanOdometry {
   using Match = slam::ScanMatch<kBeams, kFrames>;
-  using Pose = slam::GraphPose<float>;
-  using Step = slam::UncertainDisplacement<float>;
 
  public:
+  using Pose = slam::GraphPose<float>;
+  using Step = slam::UncertainDisplacement<float>;
   static constexpr sensor::EstimatorKind kKind = sensor::EstimatorKind::kScanOdometry;
   static constexpr bool kDelayed = true;
   static constexpr int kMostBeams = kBeams;
@@ -71,25 +72,34 @@ class ScanOdometry {
   [[nodiscard]] ScanMatchReport scan_match() const { return report_; }
   [[nodiscard]] const slam::ScanMatchCounters& counters() const { return match_.counters(); }
 
+  /// For a map on top of the odometry: a keyframe is new since the last call.
+  [[nodiscard]] bool take_new_keyframe() { return std::exchange(new_keyframe_, false); }
+  /// The body's displacement that led to the newest keyframe, and its time.
+  [[nodiscard]] const Step& keyframe_step() const { return keyframe_step_; }
+  [[nodiscard]] base::Micros keyframe_stamp() const { return record_.stamp; }
+  /// Points of the newest keyframe while it is new.
+  [[nodiscard]] const slam::Scan<kBeams>& keyframe_scan() const { return match_.scan(); }
+  [[nodiscard]] bool busy() const { return match_.busy(); }
+  /// The scanner on the body, its beams, and its motion at the scan that was fused last.
+  [[nodiscard]] static Step mounting(const Context& ctx);
+  [[nodiscard]] static slam::ScanGeometry geometry(const sensor::PlanarScan& scan, const Context& ctx);
+  [[nodiscard]] const slam::ScanMotion& scanner_motion() const { return scanner_motion_; }
+  /// The body from the newest keyframe to the far end of the window.
+  [[nodiscard]] slam::Displacement<float> since_keyframe(base::Micros t, const Context& ctx);
+  /// The newest keyframe, all others and the robot with it, is there; p is its covariance.
+  void move_keyframe(const Pose& pose, const filter::Symmetric<float, 3>& p);
+
   /// The keyframes and the job are not hashed: the digest stands for them, by what each match found.
   static constexpr auto members(auto& self) {
     return base::members(base::unhashed(self.match_), base::unhashed(self.keyframes_), self.motion_,
                          base::unhashed(self.present_), self.reference_, self.reference_p_,
                          base::in_turns(self.odometry_), base::in_turns(self.step_), base::unhashed(self.scan_),
                          base::unhashed(self.record_), base::unhashed(self.report_), self.now_, self.last_match_,
-                         self.matched_, self.recorded_, self.digest_);
+                         self.matched_, self.recorded_, self.new_keyframe_, base::in_turns(self.scanner_motion_),
+                         base::in_turns(self.keyframe_step_), self.digest_);
   }
 
  private:
-  /// The scanner on the body.
-  [[nodiscard]] static Step mounting(const Context& ctx);
-  /// A displacement of the body as one of the scanner, and back.
-  [[nodiscard]] static Step of_scanner(const Step& body, const Step& mounting) {
-    return compose(compose(inverse(mounting), body), mounting);
-  }
-  [[nodiscard]] static Step of_body(const Step& scanner, const Step& mounting) {
-    return compose(compose(mounting, scanner), inverse(mounting));
-  }
   [[nodiscard]] static Step displaced(const Estimate& estimate);
   /// The robot, now at this pose with this covariance.
   void place(base::Micros t, const model::PlanarPose& pose, const filter::Symmetric<float, 3>& p);
@@ -110,7 +120,9 @@ class ScanOdometry {
   ScanMatchReport report_;
   base::Micros now_;
   base::Micros last_match_;
-  bool matched_ = false, recorded_ = false;
+  bool matched_ = false, recorded_ = false, new_keyframe_ = false;
+  slam::ScanMotion scanner_motion_;
+  Step keyframe_step_;
   base::StateDigest digest_;
 };
 
