@@ -2,10 +2,8 @@
 // A robot with a scanner, as frames in and frames out: a drive through a room whose walls are cast in double, with
 // slipping wheels; scans that are lost or bad, a pose given, guards; the Intel Research Lab.
 #include "tetap/estimators/mapping/scan_odometry.hpp"
-#include "bench.hpp"
 #include "config/parameters/scanner.hpp"
-#include "support/imported_scans.hpp"
-#include "support/scan_frames.hpp"
+#include "scan_robot.hpp"
 #include "support/scan_room.hpp"
 #include "tetap/bus/guard_sender.hpp"
 
@@ -25,33 +23,7 @@ static_assert(Robot::kNeedsMapIds && !Robot::kMakesMap && estimators::MatchesSca
               node::RecordsLater<estimators::ScanOdometry361> && node::WorksInJobs<estimators::ScanOdometry361>);
 static_assert(sizeof(node::Node<Robot>) < 32 * 1024, "an image of 64 kB holds it with stack and drivers");
 
-/// Wheels as body speeds that are means since the sample before, and scans.
-struct Driven {
-  explicit Driven(const param::Parameters& numbers) : parameters(numbers), bench(parameters) {}
-
-  void tick(Frames frames, float forward_mps, float yaw_rate_radps) {
-    frames.push_back(body_speed(bench.now_us + 10'000, forward_mps, yaw_rate_radps, seq++));
-    const Frames out = bench.epoch(frames);
-    for (const auto& one : all<bus::EstScanMatch>(out)) matches.push_back(one);
-    for (const auto& one : all<bus::EstInnov>(out))
-      if (one.sensor == sensor::Sensor::kScan) refused.push_back(one.verdict);
-    if (const auto pos = last<bus::EstPos>(out, 1)) x_m = 1e-3 * pos->x_raw, y_m = 1e-3 * pos->y_raw;
-    if (const auto motion = last<bus::EstMotion>(out, 1)) yaw_rad = static_cast<double>(motion->yaw_rad);
-    if (const auto std = last<bus::EstStdPose>(out, 1)) sigma = *std;
-    if (const auto status = last<bus::EstStatus>(out)) used |= status->used;
-    crcs.push_back(last<bus::EstStateCrc>(out)->crc);
-  }
-
-  param::Parameters parameters;
-  BenchOf<Robot> bench;
-  std::vector<bus::EstScanMatch> matches;
-  std::vector<sensor::Verdict> refused;
-  std::vector<std::uint32_t> crcs;
-  bus::EstStdPose sigma;
-  double x_m = 0, y_m = 0, yaw_rad = 0;
-  unsigned used = 0;
-  int seq = 0;
-};
+using Driven = DrivenOf<Robot>;
 
 struct Way {
   double x_m = 0, y_m = 0, yaw_rad = 0;
@@ -203,56 +175,12 @@ TEST(ScanOdometry, UsesAGuardedScanWithItsGuardAlone) {
   EXPECT_EQ(bench.node.counters().guard_bad, refused + 1);
 }
 
-struct Place {
-  double x, y, yaw;
-};
-Place seen_from(const Place& a, const Place& b) {
-  const double c = std::cos(a.yaw), s = std::sin(a.yaw), dx = b.x - a.x, dy = b.y - a.y;
-  return {c * dx + s * dy, c * dy - s * dx, std::remainder(b.yaw - a.yaw, 2 * std::numbers::pi)};
-}
-/// Robot scanner with a recorded set's odometry: it is off by centimetres and degrees at each step, whatever its
-/// length.
-param::Parameters recorded() {
-  param::Parameters n = robot::scanner::parameters;
-  n.lidar = {.min_m = 0.05F, .max_m = 30};
-  n.loop.work_units = 40'000;
-  n.wheels.noise = {.speed = 0.05F, .yaw_rate = 0.05F};
-  return n;
-}
-/// Poses of the scans of a recorded set: rows as tools/dataset/import_scans writes them.
-std::vector<Place> replayed(Driven& node, const std::vector<Row>& rows) {
-  std::vector<Place> track;
-  node.tick({}, 0, 0);  // a sample of the time of power-on is too late
-  for (std::size_t k = 1; k < rows.size(); ++k) {
-    const Row& row = rows[k];
-    if (k > 1) {  // the step of odometry as a turn, a way and a turn of 0.2 s each
-      const Row& before = rows[k - 1];
-      const Place d = seen_from({before[1], before[2], before[3]}, {row[1], row[2], row[3]});
-      const double back = d.x < 0 ? -1 : 1, turn = std::atan2(back * d.y, back * d.x);
-      const auto leg = [&](double speed, double rate) {
-        for (int i = 0; i < 20; ++i) node.tick({}, static_cast<float>(speed), static_cast<float>(rate));
-      };
-      leg(0, turn / 0.2);
-      leg(back * std::hypot(d.x, d.y) / 0.2, 0);
-      leg(0, std::remainder(d.yaw - turn, 2 * std::numbers::pi) / 0.2);
-    }
-    std::vector<std::uint16_t> ranges;
-    for (std::size_t i = 4; i < row.size(); ++i) ranges.push_back(static_cast<std::uint16_t>(row[i]));
-    const auto first = static_cast<float>(rows[0][1]), step = static_cast<float>(rows[0][2]);
-    node.tick(scan_frames(node.bench.now_us, static_cast<int>(k), ranges, first, step), 0, 0);
-    for (int i = 0; i < 13; ++i) node.tick({}, 0, 0);  // the window, and the job
-    track.push_back({node.x_m, node.y_m, node.yaw_rad});
-    EXPECT_EQ(node.matches.size(), k) << "a match for each scan";
-  }
-  return track;
-}
-
 TEST(ScanOdometry, MeetsTheRelationsOfTheIntelLab) {
   const std::string name = imported_scans("intel_gfs.json.xz", "--relations", "intel.relations");
   if (name.empty()) GTEST_SKIP() << "scans is not in $TETAP_DATA";
   const auto rows = read_rows(name + ".scans"), relations = read_rows(name + ".relations");
   ASSERT_EQ(rows.size(), 911U) << name;
-  Driven node(recorded());
+  Driven node(recorded(robot::scanner::parameters));
   const std::vector<Place> track = replayed(node, rows);
   double near_m = 0, near_rad = 0, near = 0, all_m = 0, all_rad = 0;
   for (const auto& r : relations) {
@@ -277,7 +205,7 @@ TEST(ScanOdometry, DriftsLittleOverTwoHundredMetres) {
   if (name.empty()) GTEST_SKIP() << "scans/simul.rawlog is not in $TETAP_DATA";
   const auto rows = read_rows(name + ".scans"), truth = read_rows(name + ".truth");
   ASSERT_EQ(rows.size(), truth.size() + 1) << name;
-  param::Parameters n = recorded();
+  param::Parameters n = recorded(robot::scanner::parameters);
   n.lidar.x_b_m = 0.2F;  // scanner_b of the log
   Driven node(n);
   const std::vector<Place> track = replayed(node, rows);
