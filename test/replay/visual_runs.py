@@ -17,6 +17,8 @@ from menu_runs import DATA, run, run_campaign  # noqa: E402
 FOLDER = os.path.join(DATA, "kitti_klt")
 DRIVES = {"0001": (97, 0.24), "0036": (238, 0.48), "0051": (113, 0.42), "0095": (138, 0.76)}  # last image, bar [m]
 MEAN_M, ROTATION_RAD = 0.46, 0.010
+NEES = (1.0, 6.7)  # of four: the two thirds of [1.5, 10] of six
+SETTLED = 4  # the drives begin in motion, and the first speed is known with the second image
 LEAST_SHARE = 0.4
 ESTIMATOR = 1
 
@@ -33,7 +35,7 @@ def at_times(time_s, rows, columns):
 
 
 def judge(out, truth, last):
-    """Errors [m], [rad] and mean NEES of (x, y, yaw, height) at the images from 1 to `last`."""
+    """Errors [m] and [rad] at the images from 1 to `last`; mean NEES of (x, y, yaw, height) from the settled one on."""
     truth = truth[1:last + 1]
     plane = table(os.path.join(out, "estimates.csv"), ("x_m", "y_m", "yaw_rad"))
     plane["yaw_rad"] = np.unwrap(plane["yaw_rad"])
@@ -62,7 +64,7 @@ def judge(out, truth, last):
         p[:, i, j] = p[:, j, i] = corr[:, k]
     scaled = error / std
     nees = np.einsum("ki,kij,kj->k", scaled, np.linalg.inv(p), scaled) + (miss[:, 2] / height[:, 1]) ** 2
-    return np.linalg.norm(miss, axis=1).mean() / 3 ** 0.5, rotation_rad.mean(), nees.mean()
+    return np.linalg.norm(miss, axis=1).mean() / 3 ** 0.5, rotation_rad.mean(), nees[SETTLED:].mean()
 
 
 def drive(runs, name):
@@ -79,7 +81,7 @@ def campaign(runs, bounds, pool, whole):
     for name, (position_m, rotation_rad, nees) in found.items():
         bounds.check(f"drive {name}: position, three axes [m]", position_m, LEAST_SHARE * DRIVES[name][1], DRIVES[name][1])
         bounds.check(f"drive {name}: rotation [rad]", rotation_rad, 0.0005, ROTATION_RAD)
-        bounds.check(f"drive {name}: NEES (4 expected)", nees, 1.0, 10)
+        bounds.check(f"drive {name}: NEES (4 expected)", nees, *NEES)
     bounds.check("mean of the drives: position [m]", sum(one[0] for one in found.values()) / len(found), 0.3, MEAN_M)
 
 

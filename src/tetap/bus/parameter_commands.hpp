@@ -99,6 +99,7 @@ class NoParameterCommands {
   [[nodiscard]] static const param::Parameters& active(const param::Parameters& compiled) { return compiled; }
   void power_on() {}
   void hide_secrets() {}
+  static constexpr auto members(auto&) { return base::members(); }
 };
 
 [[gnu::cold]] inline void ParameterCommands::on_frame(const base::CanFrame& frame, bool admitted, Counters& counters) {

@@ -65,7 +65,7 @@ void VisualOdometry<Window>::begin(base::Micros t, const model::PlanarPose& pose
   window_.start(nav::from_euler({pose.yaw_rad, tilt.pitch_rad, tilt.roll_rad}), sigma_rad,
                 {pose.x.um(), pose.y.um(), window_.origin_um()[2]}, {sigma_place_m, sigma_place_m, kHeight_m});
   motion_.start(t, {}, 0.0F, 0.0F);
-  turn_b_rad_ = {};
+  turn_b_rad_ = ahead_b_rad_ = {};
   stepped_ = latest_ = t;
   speed_at_ = {};
   passed_m_ = owed_m_ = 0;
@@ -99,11 +99,11 @@ void VisualOdometry<Window>::set_pose(base::Micros t, const SetPose& given, cons
 }
 
 template <class Window>
-void VisualOdometry<Window>::tilt(const sensor::ImuSample& imu, const Context& ctx) {
+void VisualOdometry<Window>::tilt(std::array<float, 2>& turn_b_rad, const sensor::ImuSample& imu, const Context& ctx) {
   const auto& angle = imu.dangle_b_rad;
   const filter::Vector3 turned = sensor::times(ctx.parameters.inertial.mounting_bs, {angle[0], angle[1], angle[2]});
-  turn_b_rad_[0] += turned(0);
-  turn_b_rad_[1] += turned(1);
+  turn_b_rad[0] += turned(0);
+  turn_b_rad[1] += turned(1);
 }
 
 template <class Window>
@@ -245,6 +245,9 @@ void VisualOdometry<Window>::advance(base::Micros t, const Context& ctx, const s
   motion_.advance(t);
   present_ = motion_;
   move_through(window, present_, ctx.parameters);
+  ahead_b_rad_ = turn_b_rad_;
+  for (std::size_t i = 0; i < window.size(); ++i)
+    if (is_imu(window[i], ctx.parameters.inertial.imu)) tilt(ahead_b_rad_, window[i].payload.imu, ctx);
   digest_.scan(window_.words(), kScanned, [this](std::size_t i, auto& sink) { window_.hash_word(i, sink); });
 }
 
@@ -292,7 +295,8 @@ Estimate VisualOdometry<Window>::estimate(const Context& ctx) const {
 template <class Window>
 AttitudeEstimate VisualOdometry<Window>::attitude(const Context& ctx) const {
   const nav::Quaternion q =
-      (window_.pose().q_nb * nav::exp_quaternion({0.0F, 0.0F, ahead(ctx).pose.yaw_rad})).renormalised();
+      (window_.pose().q_nb * nav::exp_quaternion({ahead_b_rad_[0], ahead_b_rad_[1], ahead(ctx).pose.yaw_rad}))
+          .renormalised();
   return {.q_nb = {q.w, q.x, q.y, q.z}, .valid = true, .heading_valid = true};
 }
 

@@ -57,7 +57,7 @@ class VisualOdometry {
     if constexpr (std::same_as<Input, sensor::BodySpeed> || std::same_as<Input, sensor::WheelSpeeds>)
       if (verdict == sensor::Verdict::kAccepted) settle_speed(stamp, ctx);
     if constexpr (requires { input.dangle_b_rad; })
-      if (verdict == sensor::Verdict::kAccepted) tilt(input, ctx);
+      if (verdict == sensor::Verdict::kAccepted) tilt(turn_b_rad_, input, ctx);
     return input_record(verdict);
   }
   /// Pending where tracks of the image before are judged: their records come with the job.
@@ -86,8 +86,9 @@ class VisualOdometry {
 
   /// The window filter is not hashed: the digest stands for it, by each fate and by the covariance, a part a tick.
   static constexpr auto members(auto& self) {
-    return base::members(base::unhashed(self.window_), self.motion_, base::unhashed(self.present_), self.now_,
-                         self.stepped_, self.latest_, self.turn_b_rad_, self.speed_at_, self.passed_m_, self.owed_m_,
+    return base::members(base::unhashed(self.window_), self.motion_, base::unhashed(self.present_),
+                         base::unhashed(self.now_), self.stepped_, self.latest_, self.turn_b_rad_,
+                         base::unhashed(self.ahead_b_rad_), self.speed_at_, self.passed_m_, self.owed_m_,
                          base::unhashed(self.image_), base::count(self.features_), self.in_image_, self.job_stamp_,
                          self.last_used_, self.job_number_, self.told_, base::unhashed(self.record_),
                          base::count(self.records_), base::unhashed(self.report_), self.left_before_, self.ended_,
@@ -104,7 +105,8 @@ class VisualOdometry {
   /// The window filter follows to the stamp of the last sample, where the dead reckoning is.
   void step_to(base::Micros t, const Context& ctx, bool whole = false);
   void finish_job();
-  void tilt(const sensor::ImuSample& imu, const Context& ctx);
+  /// Turns about x and y, with those of one more sample.
+  static void tilt(std::array<float, 2>& turn_b_rad, const sensor::ImuSample& imu, const Context& ctx);
   /// A speed is the mean since the one before. The gyroscope's samples between them went on with the older one.
   void settle_speed(base::Micros stamp, const Context& ctx);
   /// Way of the dead reckoning since the last step, along the arc.
@@ -116,15 +118,16 @@ class VisualOdometry {
   [[nodiscard]] Estimate ahead(const Context& ctx) const { return present_.estimate(ctx.parameters); }
 
   Window window_;
-  DeadReckoning motion_;   ///< at the far end of the fusion window: from the last step of the window filter
-  DeadReckoning present_;  ///< the same carried over the fusion window
-  base::Micros now_;
+  DeadReckoning motion_;               ///< at the far end of the fusion window: from the last step of the window filter
+  DeadReckoning present_;              ///< the same carried over the fusion window
+  base::Micros now_;                   ///< unhashed: of the last tick, set anew by the next
   base::Micros stepped_;               ///< time of the window filter
   base::Micros latest_;                ///< stamp of the last sample of motion
   std::array<float, 2> turn_b_rad_{};  ///< about x and y since the last step
-  base::Micros speed_at_;              ///< stamp of the last speed; 0: none
-  float passed_m_ = 0;                 ///< way of the dead reckoning's steps since then
-  float owed_m_ = 0;                   ///< way by the speeds that is in no step yet
+  std::array<float, 2> ahead_b_rad_{};  ///< the same carried over the fusion window
+  base::Micros speed_at_;               ///< stamp of the last speed; 0: none
+  float passed_m_ = 0;                  ///< way of the dead reckoning's steps since then
+  float owed_m_ = 0;                    ///< way by the speeds that is in no step yet
   std::array<model::ImageFeature, kFeatures> image_{};
   std::size_t features_ = 0;  ///< number of them in the image whose job runs
   bool in_image_ = false;     ///< an image was begun and has not ended
