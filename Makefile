@@ -35,6 +35,10 @@ $(error LOG=$(LOG) is a folder, not a log)
 endif
 endif
 
+# A run that was played in the page names its robot.
+ifneq ($(and $(FAULT),$(wildcard $(FAULT))),)
+override ROBOT := $(shell sed -n 's/^robot *= *\([^ \#]*\).*/\1/p' $(FAULT))
+endif
 comma := ,
 robots := $(shell tools/run/list_robots)
 # A robot of simulation alone is another one with other parameters.

@@ -17,6 +17,6 @@ namespace tetap::robot::rover {
 using Attitude = estimators::WithSensors<estimators::Attitude, sensor::ImuSample>;
 using Inertial = estimators::WithSensors<estimators::Inertial, sensor::ImuSample, sensor::WheelCounts,
                                          sensor::GnssPosition, sensor::GnssVelocity>;
-using Estimators = node::WithBusParameters<node::Estimators<estimators::Odometry, Attitude, Inertial>>;
+using Estimators = node::Estimators<estimators::Odometry, Attitude, Inertial>;
 
 }  // namespace tetap::robot::rover

@@ -115,7 +115,7 @@ bus::EstParamSet ParameterClient::act(const Message& message, Done&& done) {
     while (const auto frame = answer(until)) {
       const auto told = bus::decode<bus::EstParamSet>(bus::payload(*frame));
       if (!told || told->set_ctr != counter || told->set_page_id != Message::kPage) continue;
-      // Of a second attempt: the first one was obeyed, and its answer was lost.
+      // A second attempt may follow one that was obeyed, whose answer was lost.
       if (told->set_answer == bus::ParamAnswer::kDone || (attempt > 0 && done(*told))) return *told;
       throw ControlError(why(told->set_answer));
     }

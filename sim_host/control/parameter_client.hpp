@@ -18,7 +18,7 @@
 
 namespace tetap::sim {
 
-/// One line that says what the node did not do.
+/// One line on what the node did not do.
 struct ControlError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };

@@ -40,7 +40,7 @@ struct Bus {
 
   unsigned lose;
   std::mt19937 random{5};
-  node::Node<robot::rover::Estimators> node{robot::rover::parameters, {}};
+  node::Node<node::WithBusParameters<robot::rover::Estimators>> node{robot::rover::parameters, {}};
   std::deque<base::CanFrame> frames;
   std::int64_t us = 1'000'000;
 };

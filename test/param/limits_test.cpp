@@ -55,6 +55,8 @@ const std::vector<Break> kBreaks{
     {"wired.imu_rate_hz", [](Parameters& p) { p.wired.imu_rate_hz = 999; }},
     {"wired.imu_readings", [](Parameters& p) { p.wired.imu_readings = 7, p.wired.imu_rate_hz = 100; }},
     {"wired.gnss_baud", [](Parameters& p) { p.wired.gnss = 2, p.wired.gnss_baud = 9'600; }},
+    {"camera.fv_px", [](Parameters& p) { p.camera.fu_px = 400; }},
+    {"camera.mounting_bc", [](Parameters& p) { p.camera.mounting_bc[0] = 0.9F; }},
     {"recovery.confirm_fixes", [](Parameters& p) { p.recovery.confirm_fixes = p.recovery.persist_fixes + 1; }},
 };
 

@@ -19,7 +19,7 @@
 namespace tetap::sim {
 namespace {
 
-using Robot = node::WithBusProtection<robot::rover::Estimators>;
+using Robot = node::WithBusProtection<node::WithBusParameters<robot::rover::Estimators>>;
 using Node = node::Node<Robot>;
 using Frames = std::vector<base::CanFrame>;
 using bus::ParamAnswer;
@@ -103,7 +103,7 @@ std::vector<Message> said(const Frames& sent) {
       if (const auto message = bus::decode<Message>(bus::payload(frame))) all.push_back(*message);
   return all;
 }
-/// What the node answers to a frame that it gets in the middle of nothing.
+/// Answer of the node to one frame.
 template <class Message>
 ParamAnswer answer(Bench& bench, std::size_t& at, const Message& message) {
   Frames sent = bench.epoch(half_a_minute()[at++], {bench.command(message)});

@@ -206,7 +206,7 @@ class Refusals(Folder):
     def test_estimator_at_an_uneven_distance(self):
         text = read(DBC)
         broken = self.path("broken.dbc")
-        write(broken, text.replace(" 827 ", " 840 "))
+        write(broken, text.replace(" 827 ", " 8 27 ").replace(" 828 ", " 827 ").replace(" 8 27 ", " 828 "))
         result = run(TOOL, broken)
         self.assertEqual(result.returncode, 1)
         self.assertIn("Est3_Motion: id is not at an even distance from Est0_Motion", result.stderr)
@@ -541,8 +541,8 @@ class Decode(Folder):
                             ("(0.0) can0 32F##100\n", "(0.0) can0 32F ? CAN FD, 1 bytes\n"),
                             ("(0.0) can0 123#\n", "(0.0) can0 123 ? no data\n")):
             self.assertEqual(self.said(line).stdout, words)
-        unused = self.said("(0.0) can0 348#0000000000000000\n", "--base", "0x300")
-        self.assertEqual(unused.stdout, "(0.0) can0 348 ? 00 00 00 00 00 00 00 00\n")
+        unused = self.said("(0.0) can0 350#0000000000000000\n", "--base", "0x300")
+        self.assertEqual(unused.stdout, "(0.0) can0 350 ? 00 00 00 00 00 00 00 00\n")
         self.assertIn("In_Guard page 13 (unknown) 0D00", self.said("(0.0) can0 301#0D00000000000000\n").stdout)
 
     def test_the_time_for_a_line_grows_as_its_length(self):

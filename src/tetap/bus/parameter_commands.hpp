@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Parameters of a running node over the bus: Cmd_Param in, Est_Param out. A Get or a Set is answered with a row; an
 // Apply or a Restore acts at the next tick and is answered with the set's CRC. One frame goes out a tick. After a
-// power-on and each change, every word that is not as compiled follows: a log tells the parameters of each epoch.
+// power-on and each change, every word that is not as compiled follows: a log has the parameters of each epoch.
 #pragma once
 
 #include "tetap/base/members.hpp"
@@ -56,7 +56,7 @@ class ParameterCommands {
   static constexpr std::size_t kRowsPerTick = 8;  ///< looked at for one that is not as compiled
 
   struct Answer {
-    std::uint8_t page = 0;  ///< of the command; not available: a power-on
+    std::uint8_t page = 0;  ///< page of the command; not available: a power-on
     std::uint8_t counter = EstParamSet::kSetCtrNotAvailable;
     ParamAnswer is = ParamAnswer::kDone;
     param::Source source = param::Source::kActive;
@@ -86,9 +86,9 @@ class ParameterCommands {
   param::StagedParameters staged_;
   std::optional<Asked> asked_;
   std::array<Answer, kAnswers> answers_{};
-  std::size_t size_ = 0;
-  std::size_t next_row_ = 0;  ///< row that is looked at next; behind the last one: all words are told
-  std::uint8_t next_word_ = 0;
+  std::uint32_t size_ = 0;       ///< answers that wait
+  std::uint16_t next_row_ = 0;   ///< row that is looked at next; behind the last one: all words are sent
+  std::uint16_t next_word_ = 0;  // no padding follows: a node's next member would lie in it
 };
 
 /// In place of it, in robots that take no parameters from the bus.
@@ -191,7 +191,7 @@ void ParameterCommands::publish(std::uint32_t config, Take&& take) {
   for (std::size_t looked = 0; looked < kRowsPerTick && next_row_ < param::kStoredRows.size(); ++looked) {
     const param::StoredRow& row = param::kStoredRows[next_row_];
     while (next_word_ < row.words) {
-      const std::uint8_t word = next_word_++;
+      const auto word = static_cast<std::uint8_t>(next_word_++);
       if (!staged_.is_changed(next_row_, word)) continue;
       send({.page = CmdParamGet::kPage, .word = word, .row = row.index}, config, take);
       return;

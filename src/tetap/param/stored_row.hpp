@@ -23,7 +23,7 @@ struct StoredRow {
   Kind kind;
   bool live;
   bool access;                ///< identity, and what the firmware around the node reads once: never over the bus
-  bool secret;                ///< never told
+  bool secret;                ///< never sent
   std::uint32_t least, most;  ///< limits as stored; not of kLong
 
   [[nodiscard]] constexpr bool within(std::uint32_t word) const {
