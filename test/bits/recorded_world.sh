@@ -11,6 +11,6 @@ flock 9
 if [ -e "$header" ] && [ -z "$(find "$root"/{sim_host/world,src/tetap/base,src/tetap/bus,src/tetap/sensor,config,test/bits}/ "$root"/sim_host/*.hpp -newer "$header" -name '*.?pp' -print -quit)" ]; then
   exit 0
 fi
-g++ -std=c++20 -O1 -ffp-contract=off -I "$generated" -I "$root/src" -I "$root" -o "$header.program" "$root/test/bits/record_world.cpp" "$root"/sim_host/world/*.cpp
+g++ -std=c++20 -O1 -ffp-contract=off -I "$generated" -I "$root/src" -I "$root" -isystem /usr/include/eigen3 -o "$header.program" "$root/test/bits/record_world.cpp" "$root"/sim_host/world/*.cpp
 "$header.program" >"$header.new"
 mv "$header.new" "$header"

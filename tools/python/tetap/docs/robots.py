@@ -10,11 +10,11 @@ LIST = "docs/reference/robots.tsv"
 
 def estimators(text, path):
     """Names of the estimators of a robot's file, in the order of their outputs."""
-    found = re.search(r"^using Estimators =\s*(?:node::With\w+<\s*)*node::Estimators(?:WithPlaces<\d+,\s*|<)(.*?)>+;$", text, re.S | re.M)
+    found = re.search(r"^using Estimators =\s*((?:node::With\w+<\s*)*)node::Estimators(?:WithPlaces<\d+,\s*|<)(.*?)>;$", text, re.S | re.M)
     if found is None:
         raise WordError(f"{path}: no `using Estimators = node::Estimators<...>;`")
     aliases = dict(re.findall(r"^using (\w+) = estimators::WithSensors<\s*estimators::(\w+),", text, re.M))
-    names = [re.sub(r"\b(?:estimators|FusionRule)::k?", "", " ".join(one.split())) for one in re.split(r",\s*(?![^<]*>)", found[1])]
+    names = [re.sub(r"\b(?:estimators|FusionRule)::k?", "", " ".join(one.split())) for one in re.split(r",\s*(?![^<]*>)", found[2][:len(found[2]) - found[1].count("<")])]
     return [aliases.get(name, name) for name in names]
 
 
