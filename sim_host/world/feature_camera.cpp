@@ -2,6 +2,7 @@
 #include "sim_host/world/feature_camera.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 namespace tetap::sim {
@@ -214,7 +215,7 @@ std::optional<FeatureCamera::Image> FeatureCamera::sample(const Truth& truth, ba
   keep_tracks(now);
   const auto all = static_cast<std::size_t>(parameters_.features);
   const std::size_t body = lorry    ? all
-                           : moving ? static_cast<std::size_t>(FaultNumbers::kMovingShare * parameters_.features + 0.5)
+                           : moving ? static_cast<std::size_t>(std::lround(FaultNumbers::kMovingShare * parameters_.features))
                                     : 0;
   limit_tracks(false, all - body);
   begin_tracks(now, true, body);
