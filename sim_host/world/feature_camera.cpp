@@ -214,9 +214,10 @@ std::optional<FeatureCamera::Image> FeatureCamera::sample(const Truth& truth, ba
   if (lorry || moving) look_at_body(truth, now, lorry ? FaultNumbers::kLorry_m : FaultNumbers::kMovingAhead_m);
   keep_tracks(now);
   const auto all = static_cast<std::size_t>(parameters_.features);
-  const std::size_t body = lorry    ? all
-                           : moving ? static_cast<std::size_t>(std::lround(FaultNumbers::kMovingShare * parameters_.features))
-                                    : 0;
+  const std::size_t body =
+      lorry    ? all
+      : moving ? static_cast<std::size_t>(std::lround(FaultNumbers::kMovingShare * parameters_.features))
+               : 0;
   limit_tracks(false, all - body);
   begin_tracks(now, true, body);
   begin_tracks(now, false, all - body);
