@@ -86,26 +86,31 @@ class ExportMapTest(unittest.TestCase):
                 self.assertEqual(one.read().replace(b"room", b"room2"), two.read())
 
     def test_the_log_of_a_node_is_drawn_where_its_last_round_has_the_keyframes(self):
+        for within_us in (0, 400):
+            result = self.export(self.file("raw.log", self.mapping_log(within_us)), self.out)
+            self.assertEqual(result.returncode, 0, result.stderr)
+            self.assertIn("1 keyframes left out", result.stdout)
+            self.check_room(occupancy.read(self.out + ".yaml"))
+
+    def mapping_log(self, within_us):
         def frame(offset, value):
             return "(%d.000000) can0 %03X#%s" % (len(lines), 0x300 + offset, (value & (1 << 64) - 1).to_bytes(8, "little").hex().upper())
 
         def pose(keyframe, x, y, yaw):
             return frame(835 - 768, keyframe | (round(x * 100) & 0x3FFFF) << 14 | (round(y * 100) & 0x3FFFF) << 32 | (round(yaw * 2000) & 0x3FFF) << 50)
-        lines = []
-        places = [(0, 0, 0), (2, 1, 0.7), (-2.5, -1, 1.5)]
+        places, lines = [(0, 0, 0), (2, 1, 0.7), (-2.5, -1, 1.5)], []
         for k, place in enumerate(places):
             first = round(-3.14 * 2000)
             lines.append(frame(844 - 768, 1000 * k | k << 20 | BEAMS << 26 | (first & 0x3FFF) << 36 | round(STEP * 1e5) << 50))
             steps = np.round(box(*place, first=first / 2000) / 0.005).astype(int)
             for block in range(BEAMS // 4):
                 lines.append(frame(843 - 768, k | block << 4 | sum(int(steps[4 * block + i]) << 12 + 13 * i for i in range(4))))
-            lines.append(frame(834 - 768, k | 1000 * k << 14))
+            if within_us:  # the stamp of a scanner that turns is within the scan: Est_ScanMatch says which one it was
+                lines.append(frame(838 - 768, k << 4))
+            lines.append(frame(834 - 768, k | 1000 * k + within_us << 14))
         lines += [pose(k, 9, 9, 1) for k in range(3)]                     # before the loop was closed
         lines += [pose(k, *places[k]) for k in (0, 1)] + [pose(0, *places[0]), pose(1, *places[1])]  # 2 was composed away
-        result = self.export(self.file("raw.log", "\n".join(lines)), self.out)
-        self.assertEqual(result.returncode, 0, result.stderr)
-        self.assertIn("1 keyframes left out", result.stdout)
-        self.check_room(occupancy.read(self.out + ".yaml"))
+        return "\n".join(lines)
 
     def test_files_of_other_hands_are_read(self):
         self.file("m.pgm", "P2\n# made by hand\n3 2\n100\n0 100 80\n100 100 0\n")

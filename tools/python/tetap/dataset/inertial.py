@@ -17,9 +17,9 @@ def to_ecef(lat_deg, lon_deg, height_m):
 
 
 def east_north_up(lat_deg, lon_deg):
-    """Rows: east, north and up of a place, in earth-centred axes."""
+    """Rows: east, north and up of a place, in earth-centred axes; of places 3 x 3 x n."""
     lat, lon = np.radians(lat_deg), np.radians(lon_deg)
-    return np.array([[-np.sin(lon), np.cos(lon), 0.0],
+    return np.array([[-np.sin(lon), np.cos(lon), 0.0 * lon],
                      [-np.sin(lat) * np.cos(lon), -np.sin(lat) * np.sin(lon), np.cos(lat)],
                      [np.cos(lat) * np.cos(lon), np.cos(lat) * np.sin(lon), np.sin(lat)]])
 
