@@ -10,7 +10,7 @@ Times are seconds since the first sample of any sensor.
 
 import numpy as np
 
-from tetap.can import bus_database
+from tetap.can import bus_database, columns
 from tetap.can import decoder as decode
 from tetap.can.bus_writer import BadInput
 
@@ -40,18 +40,10 @@ class Frames:
     """All frames of one message: order in the log, line, time of reception and the signals as physical values (NaN: not available)."""
 
     def __init__(self, message, rows):
-        columns = zip(*rows) if rows else ((),) * 4
-        self.order, self.line, self.log_us, word = (np.array(column, dtype=kind) for column, kind in zip(columns, (np.int64,) * 3 + (np.uint64,)))
+        parts = zip(*rows) if rows else ((),) * 4
+        self.order, self.line, self.log_us, word = (np.array(column, dtype=kind) for column, kind in zip(parts, (np.int64,) * 3 + (np.uint64,)))
         for signal in message.signals:
-            raw = (word >> np.uint64(signal.start) & np.uint64((1 << signal.length) - 1)).astype(np.int64)
-            if signal.signed:
-                raw -= (raw >> (signal.length - 1)) << signal.length
-            value = raw
-            if signal.physical:
-                value = np.where(raw == signal.gap_code, np.nan, raw / signal.per_unit)
-            elif signal.enum and signal.gap_code is not None:
-                value = np.where(raw == signal.gap_code, -1, raw)
-            setattr(self, signal.field.lower(), value)
+            setattr(self, signal.field.lower(), columns.signal(word, signal))
 
     def __len__(self):
         return len(self.order)

@@ -128,7 +128,8 @@ class Message:
 
 
 @functools.lru_cache(maxsize=2)
-def _database(path):
+def database(path):
+    """The messages of a DBC (bus_database), read once."""
     try:
         return bus_database.read(path)
     except bus_database.Refused as refusal:
@@ -141,9 +142,9 @@ class Messages:
 
     def __init__(self, frames, base=bus_database.BASE, dbc=DEFAULT_DBC):
         self.frames, self.base = frames, base
-        database = _database(dbc)
-        self.tables = database.tables
-        self._known = {message.name: message for message in database.messages}
+        known = database(dbc)
+        self.tables = known.tables
+        self._known = {message.name: message for message in known.messages}
         self._made = {}
 
     def __iter__(self):

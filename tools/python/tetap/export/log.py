@@ -22,11 +22,13 @@ class Scanner:
 
 
 class Export:
-    """The topics of one node's log. `utc_us` is UTC less the node's time, None where the log does not show it."""
+    """The topics of one node's log, a path or columns.Messages. `utc_us` is UTC less the node's time, None where the log does not show it."""
 
-    def __init__(self, path, base=0x300, prefix="/tetap", scanner=None, by_boot=False):
-        self.path, self.prefix, scanner = path, prefix.rstrip("/"), scanner or Scanner()
-        self.messages = messages = columns.Messages(columns.read(path), base)
+    def __init__(self, log, base=0x300, prefix="/tetap", scanner=None, by_boot=False):
+        read = isinstance(log, columns.Messages)
+        self.path, self.prefix, scanner = "log" if read else str(log), prefix.rstrip("/"), scanner or Scanner()
+        self.messages = messages = log if read else columns.Messages(columns.read(log), base)
+        path, base = self.path, messages.base
         self.clock = clock = Clock(messages)
         self.utc_us = None if by_boot else clock.utc_us
         found = estimates.estimates(messages, clock)
