@@ -29,7 +29,7 @@ $(error no setting $(unknown); there are: $(settings))
 endif
 
 # Refused here, before anything is built.
-ifneq ($(filter replay doctor,$(MAKECMDGOALS)),)
+ifneq ($(filter replay doctor export,$(MAKECMDGOALS)),)
 ifneq ($(and $(LOG),$(wildcard $(LOG)/.)),)
 $(error LOG=$(LOG) is a folder, not a log)
 endif
@@ -52,7 +52,7 @@ node := $(if $(filter memory,$(BUS)),,$(comma)tetap-node)
 page_suffix := $(if $(filter file,$(origin ROBOT)),,.$(module))
 page_variant := $(if $(page_suffix),TETAP_VARIANT=$(module) TETAP_SETTINGS=-DTETAP_PAGE_ROBOTS=$(module))
 
-.PHONY: help sim board test quick proof replay record doctor firmware flash size heap stack count bits hashes soak matrix swarm mutants laws constants bench costs check docs dbc page page-test setup programs arm
+.PHONY: help sim board test quick proof replay record doctor export firmware flash size heap stack count bits hashes soak matrix swarm mutants laws constants bench costs check docs dbc page page-test setup programs arm
 
 help: ## this list
 	@echo "tetap: state estimation on the robot's own microcontroller"; echo
@@ -90,6 +90,9 @@ record: setup ## everything on vcan0 until ^C, in out/record: raw.log can be rep
 doctor: setup ## the likeliest mistake in a log, by its devices alone: LOG=run.log [ROBOT=NAME], in out/doctor.json
 	@tools/run/build_preset host:tetap-doctor$(if $(filter file,$(origin ROBOT)),,$(comma)robot_$(module))
 	@tools/run/diagnose_log $(if $(filter file,$(origin ROBOT)),,$(ROBOT))
+
+export: setup ## a log as MCAP with messages of ROS 2: LOG=run.log [OUT=FILE.mcap]
+	@tools/can/export_log $(or $(LOG),$(error LOG=FILE is missing)) $(or $(OUT),out/export.mcap)
 
 firmware: setup ## the flash image: BOARD=zynqmp_r5 ROBOT=rover, with its size table, no heap and stack proved
 	@tools/run/build_firmware
