@@ -945,6 +945,11 @@ class Inertial(Case):
     def test_counters_that_wrap_go_on(self):
         self.assertEqual(metrics.unwrapped(np.array([65000.0, 65500, 400, 1000]), 65536), 66536)
 
+    def test_each_instance_of_a_sensor_has_its_own_counters(self):
+        sensors = {"inst": np.array([0.0, 1, 0, 1, 0, 1]), "accepted": np.array([60.0, 40, 65530, 70, 20, 100]), "rejected": np.array([1.0, 3, 4095, 5, 2, 8])}
+        self.assertEqual(metrics.counted(sensors, np.arange(6)), (65536 + 20 + 100, 4096 + 2 + 8))
+        self.assertEqual(metrics.counted(sensors, np.array([0, 2])), (65530, 4095))
+
     def test_what_happened_is_told_in_words_and_in_order(self):
         self.inertial()
         row = [100, 1.0, 2, 5, 0, 1, 3, 99.0, 8.0, 100, None]

@@ -20,10 +20,16 @@ def bus_nis(run, estimator, names):
     for sensor in np.unique(run.sensors["sensor"][mine]):
         rows = np.flatnonzero(mine & (run.sensors["sensor"] == sensor))
         nis = run.sensors["nis_mean"][rows]
+        accepted, rejected = counted(run.sensors, rows)
         result[names["Sensor"].get(int(sensor), str(int(sensor)))] = {
-            "nis_per_dof": float(np.nanmean(nis)) if np.isfinite(nis).any() else None,
-            "accepted": unwrapped(run.sensors["accepted"][rows], 65536), "rejected": unwrapped(run.sensors["rejected"][rows], 4096)}
+            "nis_per_dof": float(np.nanmean(nis)) if np.isfinite(nis).any() else None, "accepted": accepted, "rejected": rejected}
     return result
+
+
+def counted(sensors, rows):
+    """(accepted, rejected) of these rows of sensors.csv: each instance has counters of its own."""
+    of = [rows[sensors["inst"][rows] == one] for one in np.unique(sensors["inst"][rows])]
+    return tuple(sum(unwrapped(sensors[name][one], modulus) for one in of) for name, modulus in (("accepted", 65536), ("rejected", 4096)))
 
 
 def unwrapped(counts, modulus):

@@ -299,7 +299,7 @@ def counted_by_node(run, estimator, sensor, framed):
     mine = (run.sensors["estimator"] == estimator) & (run.sensors["sensor"] == sensor) & np.isfinite(run.sensors["nis_mean"])
     if not mine.any():
         return None
-    accepted, refused = metrics.unwrapped(run.sensors["accepted"][mine], 65536), metrics.unwrapped(run.sensors["rejected"][mine], 4096)
+    accepted, refused = metrics.counted(run.sensors, np.flatnonzero(mine))
     if accepted + refused <= metrics.MOST_FRAMED * framed.sum():
         return None
     return run.sensors["time_s"][mine], run.sensors["nis_mean"][mine], accepted, refused
