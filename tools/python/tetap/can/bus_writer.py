@@ -34,15 +34,18 @@ class Signal:
         in_range = self.raw_min <= not_available <= self.raw_max
         self.not_available = None if in_range else not_available
 
+    def steps(self, values):
+        """Physical values in steps of the signal, and which of them are within its range. NaN: not available, and within."""
+        steps = np.rint((np.asarray(values, dtype=np.float64) - self.offset) / self.scale)
+        return steps, ~((steps < self.raw_min) | (steps > self.raw_max))
+
     def pack(self, values, name):
         """Raw bits in place for an array of physical values, and which of them are within the signal's range. NaN: not available."""
-        values = np.asarray(values, dtype=np.float64)
-        missing = np.isnan(values)
+        steps, inside = self.steps(values)
+        missing = np.isnan(steps)
         if missing.any() and self.not_available is None:
             raise ValueError(f"{name} has no code for a value that is not available")
-        raw = np.rint((np.where(missing, 0.0, values) - self.offset) / self.scale)
-        inside = (raw >= self.raw_min) & (raw <= self.raw_max)
-        raw = np.where(inside, raw, 0).astype(np.int64)
+        raw = np.where(inside & ~missing, steps, 0).astype(np.int64)
         if missing.any():
             raw[missing] = self.not_available
         mask = np.uint64((1 << self.length) - 1)
@@ -172,7 +175,7 @@ class Log:
         within = np.ones(count, dtype=bool)
         for name, values in messages.items():
             for key, value in values.items():
-                within &= self.dbc.messages[name].signals[key].pack(np.broadcast_to(value, within.shape), f"{name}.{key}")[1]
+                within &= self.dbc.messages[name].signals[key].steps(value)[1]
         return within
 
     def frames(self):
