@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // tetap-import: tables of sensors (CSV) as a candump log.
 #include "sim_host/csv/import.hpp"
+#include "sim_host/csv/units.hpp"
 #include "sim_host/play/arguments.hpp"
 #include "sim_host/play/out_file.hpp"
 
@@ -34,9 +35,8 @@ Columns are known by their names, units by the names as well: gyro_x_dps, Accele
 A heading is taken only where it is named: that of a telephone has a zero of its own.
 
 Quantities: %s
-Units: time s ms us ns; angles rad deg mrad; rates rad/s deg/s rpm; forces m/s2 g mg; speeds m/s km/h knots mph;
-       places deg rad e7 ddmm.mmmm; flux uT nT gauss; pressure Pa hPa kPa; temperatures degC K degF
-
+Units:
+%s
 Exit status: 0; 2 bad usage or a table that cannot be read, with file, line and column.
 )--";
 
@@ -106,7 +106,8 @@ int import(sim::Arguments& arguments) {
 int main(int count, char** values) {
   try {
     sim::Arguments arguments(count, values);
-    if (arguments.flag("--help") || arguments.flag("-h")) return std::printf(kHelp, csv::quantity_names().c_str()), 0;
+    if (arguments.flag("--help") || arguments.flag("-h"))
+      return std::printf(kHelp, csv::quantity_names().c_str(), csv::unit_table().c_str()), 0;
     return import(arguments);
   } catch (const std::exception& error) {
     std::fprintf(stderr, "tetap-import: %s\n", error.what());

@@ -5,6 +5,14 @@
 
 namespace tetap::csv {
 
+namespace {
+
+sim::Failure refused_quantity(const std::string& option) {
+  return {option + ": no such quantity; there are: " + quantity_names(), 0};
+}
+
+}  // namespace
+
 sim::Result<Imported> import_tables(std::span<const File> files, const Options& options) {
   if (files.empty()) return sim::Failure{"no table to import", 0};
   for (const Named& named : options.units) {
@@ -18,14 +26,12 @@ sim::Result<Imported> import_tables(std::span<const File> files, const Options& 
     for (const Quantity& quantity : all)
       if (units.empty() && (named.quantity == quantity.name || named.quantity == kind_name(quantity.kind)))
         units = units_of(quantity.dimension);
-    return sim::Failure{"--unit " + named.quantity + "=" + named.text +
-                            (units.empty() ? ": no such quantity; there are: " + quantity_names()
-                                           : ": no such unit; there are: " + units),
-                        0};
+    const std::string option = "--unit " + named.quantity + "=" + named.text;
+    if (units.empty()) return refused_quantity(option);
+    return sim::Failure{option + ": no such unit; there are: " + units, 0};
   }
   for (const Named& named : options.columns)
-    if (find_quantity(named.quantity) == nullptr)
-      return sim::Failure{"--column " + named.quantity + ": no such quantity; there are: " + quantity_names(), 0};
+    if (find_quantity(named.quantity) == nullptr) return refused_quantity("--column " + named.quantity);
   auto tables = read_tables(files, options);
   if (!tables) return tables.failure();
   return Importer(std::move(*tables), files, options).run();

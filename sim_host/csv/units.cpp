@@ -200,4 +200,21 @@ std::string units_of(Dimension dimension) {
   return names;
 }
 
+std::string unit_table() {
+  constexpr std::array<std::pair<std::string_view, Dimension>, 10> kNames{{{"time", kTime},
+                                                                           {"angle", kAngle},
+                                                                           {"rate", kAngularRate},
+                                                                           {"force", kAcceleration},
+                                                                           {"speed", kSpeed},
+                                                                           {"length", kLength},
+                                                                           {"place", kPlace},
+                                                                           {"flux", kFlux},
+                                                                           {"pressure", kPressure},
+                                                                           {"temperature", kTemperature}}};
+  std::string lines;
+  for (const auto& [name, dimension] : kNames)
+    lines += "  " + std::string(name) + std::string(13 - name.size(), ' ') + units_of(dimension) + '\n';
+  return lines;
+}
+
 }  // namespace tetap::csv

@@ -38,5 +38,7 @@ struct Unit {
 [[nodiscard]] Unit usual_unit(Dimension dimension);
 /// "rad/s deg/s rpm", for messages.
 [[nodiscard]] std::string units_of(Dimension dimension);
+/// A line a dimension, "  angular rate  rad/s deg/s rpm", for help.
+[[nodiscard]] std::string unit_table();
 
 }  // namespace tetap::csv
