@@ -51,8 +51,7 @@ def read(path):
             found = _single(path, line, text[at:end], decimal)
             if found:
                 parts.append(found)
-            if text[at:end].lstrip().startswith(b"base "):  # of an .asc
-                decimal = b"base dec" in text[at:end]
+            decimal = decoder.asc_decimal(text[at:end], decimal)
             line, at = line + 1, end
     if not parts:
         return Frames(*(np.zeros(0, kind) for kind in (np.int64, np.int64, np.uint64)))

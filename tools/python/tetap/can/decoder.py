@@ -195,6 +195,11 @@ class Rows:
         return "".join("%s%s,%s,%s,%s\n" % (head, name, label[:-1], cell(value), self.units[message, label[:-1]]) for label, value in fields)
 
 
+def asc_decimal(line, before):
+    """Whether numbers of an .asc after this line are decimal; `before`: whether they were until it."""
+    return b"base dec" in line if line.lstrip().startswith(b"base ") else before
+
+
 def asc_number(text, decimal, most):
     try:
         value = int(text, 10 if decimal else 16)
@@ -300,8 +305,7 @@ def decode(source, name, decoder, out):
         try:
             found = parse(line, decimal)
             if found is None:
-                if line.lstrip().startswith(b"base "):
-                    decimal = b"base dec" in line
+                decimal = asc_decimal(line, decimal)
                 continue
             time, interface, id_text, data, other = found
             words = None
