@@ -26,14 +26,15 @@ run() { # NAME OPTION...
 for seed in $(seq 1 "$seeds"); do run "seed$seed" --seed "$seed" --duration "$seconds"; done
 faults=$("$programs/tetap-world" --help | sed -n 's/^  \([a-z_]*\) *@[0-9].*/\1/p')
 [ "$(wc -w <<<"$faults")" -ge 15 ] || { echo "  tetap-world --help lists fewer than 15 faults"; failed=1; }
+robots="rover rover_landmarks iris scanner visual"
+declare -A acts
+for robot in $robots; do acts[$robot]=$("$programs/tetap-world" --robot "$robot" --list-faults | tr "\n" " "); done
 for fault in $faults; do
-  case $fault in  # a robot that has the sensor it falls on
-    landmark_*) robot=rover_landmarks ;;
-    mag_*) robot=iris ;;
-    lidar_*) robot=scanner ;;
-    image*|tracks_*|moving_features|focal_length|lorry) robot=visual ;;
-    *) robot=rover ;;
-  esac
+  robot=
+  for one in $robots; do  # the first that has the sensor it falls on
+    case " ${acts[$one]} " in *" $fault "*) robot=$one; break ;; esac
+  done
+  [ -n "$robot" ] || { echo "  $fault acts on none of $robots"; failed=1; continue; }
   # Robots with scanner or camera are compiled by g++ alone; clang++'s nodes of theirs are in `bits`.
   case $robot in scanner|visual) compilers=host ;; *) compilers="host clang" ;; esac
   at=10
