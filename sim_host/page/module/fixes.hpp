@@ -3,6 +3,7 @@
 #pragma once
 
 #include "sim_host/page/module/browser.hpp"
+#include "sim_host/page/module/json.hpp"
 #include "sim_host/replay/line.hpp"
 #include "tetap/bus/codec.hpp"
 #include "tetap/bus/decoder.hpp"
@@ -85,5 +86,16 @@ class FixTable {
   std::optional<bus::EstOriginLon> longitude_;
   std::optional<bus::EstOriginHeight> height_;
 };
+
+/// The member "origin" [deg, deg, m], if the node has one.
+inline void put_origin(Json& json, const std::optional<FixTable::Origin>& origin) {
+  if (!origin) return;
+  json.key("origin")
+      .begin('[')
+      .value(origin->latitude_deg)
+      .value(origin->longitude_deg)
+      .value(origin->height_m)
+      .end(']');
+}
 
 }  // namespace tetap::page

@@ -110,13 +110,7 @@ sim::Result<> Play::advance(std::uint32_t ticks) {
   bus_.frames.clear();
   Json json;
   json.begin('{').member("time_s", in_s(played_.duration)).member("over", bool{over});
-  if (const auto origin = bus_.run.origin())
-    json.key("origin")
-        .begin('[')
-        .value(origin->latitude_deg)
-        .value(origin->longitude_deg)
-        .value(origin->height_m)
-        .end(']');
+  put_origin(json, bus_.run.origin());
   write(Channel::kPlayed, json.end('}').text());
   return {};
 }

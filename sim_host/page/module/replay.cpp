@@ -42,13 +42,7 @@ void put_result(Observer& run, const sim::Result<>& played, const sim::Compariso
       .member("estimates_sha256", totals.estimates_sha256)
       .member("state_crc_last", crc.view())
       .member("wrong", played ? sim::complaint(run.counts, comparison) : played.failure().text);
-  if (const auto origin = run.origin())
-    json.key("origin")
-        .begin('[')
-        .value(origin->latitude_deg)
-        .value(origin->longitude_deg)
-        .value(origin->height_m)
-        .end(']');
+  put_origin(json, run.origin());
   if (comparison != nullptr) {
     const auto& hole = comparison->recording().hole;
     json.member("epochs_compared", comparison->compared())
