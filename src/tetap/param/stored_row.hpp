@@ -82,9 +82,12 @@ constexpr StoredRow stored(const Row& row) {
                                         : whole(row.maximum)};
 }
 
+/// A constant, so that the call has one target.
+template <std::size_t i>
+inline constexpr auto kRuleHolds = kRules[i].holds;
 template <std::size_t... i>
 [[nodiscard]] constexpr bool rules_hold(const Parameters& p, std::index_sequence<i...>) {
-  return (kRules[i].holds(p) && ...);  // one by one: an image then has no text of a rule
+  return (kRuleHolds<i>(p) && ...);  // one by one: an image then has no text of a rule
 }
 
 }  // namespace detail
