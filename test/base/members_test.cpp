@@ -7,6 +7,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <map>
 #include <optional>
 #include <vector>
@@ -104,6 +105,57 @@ struct Forgotten {
   std::uint32_t a = 0, b = 0, c = 0;
 };
 static_assert(!detail::covers<Forgotten>() && detail::covers<Listed>());
+
+struct Runs {
+  std::vector<std::uint32_t> all;
+  std::size_t in_runs = 0;
+  void operator()(std::uint32_t word) { all.push_back(word); }
+  void run(const void* from, std::size_t count) {
+    in_runs += count;
+    for (std::size_t i = 0; i < count; ++i) {
+      std::uint32_t word = 0;
+      std::memcpy(&word, static_cast<const char*>(from) + 4 * i, sizeof word);
+      all.push_back(word);
+    }
+  }
+};
+class Mixed {
+ public:
+  static constexpr auto members(auto& self) {
+    return base::members(self.matrix_, self.time_us_, self.scale_, self.on_, self.count_, self.far_us_, self.low_,
+                         in_turns(self.many_), self.high_, self.pair_, self.last_);
+  }
+
+ private:
+  std::array<float, 3> matrix_{1.0F, 2.0F, 3.0F};
+  std::int64_t time_us_ = 0x0000'0006'0000'0005;  // padding before it
+  float scale_ = 7.0F;
+  bool on_ = true;
+  std::uint32_t count_ = 8;
+  std::int64_t far_us_ = -9;
+  std::int32_t low_ = -10;
+  std::array<std::uint32_t, 20> many_{11, 12, 13};
+  float high_ = 14.0F;
+  std::array<std::int32_t, 2> pair_{15, 16};
+  std::int32_t last_ = 17;
+};
+
+TEST(Members, RunsOfPlainMembersHaveTheirWordsOneByOne) {
+  const Mixed object;
+  Runs runs;
+  each_word(object, runs);
+  EXPECT_EQ(runs.all, words_of(object));
+  EXPECT_EQ(runs.in_runs, 3U + 3 + 3 + 20 + 4)
+      << "matrix_, time_us_ and scale_, far_us_ and low_, many_, high_ to last_";
+  for (unsigned turn = 0; turn < kTurns; ++turn) {
+    Runs in_turn;
+    each_word_in_turn(object, turn, in_turn);
+    EXPECT_EQ(in_turn.all, words_of(object, turn)) << turn;
+    EXPECT_EQ(in_turn.in_runs, 0U) << "a loop costs an epoch time";
+  }
+}
+static_assert(detail::plain_bytes<std::array<std::int64_t, 2>>() == 16 && detail::plain_bytes<bool>() == 0 &&
+              detail::plain_bytes<Plain>() == 0 && detail::plain_bytes<std::optional<float>>() == 0);
 
 TEST(Members, AnOptionalHasItsValueOnlyWhereThereIsOne) {
   EXPECT_EQ(words_of(std::optional<std::uint32_t>{}), (std::vector<std::uint32_t>{0}));

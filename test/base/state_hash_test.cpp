@@ -54,6 +54,13 @@ TEST(StateHash, AFlippedBitChangesHalfOfTheValueInTheMean) {
   EXPECT_NEAR(changed / flips, 16.0, 0.5);
 }
 
+TEST(StateHash, ARunIsItsWordsOneByOne) {
+  const std::vector<std::uint32_t> given = state();
+  StateHash hash;
+  hash.run(given.data(), given.size());
+  EXPECT_EQ(hash.value(), hash_of(given));
+}
+
 TEST(StateHash, ExchangedWordsAndLeadingOrTrailingZerosCount) {
   const std::vector<std::uint32_t> given = state();
   std::set<std::uint32_t> seen{hash_of(given)};

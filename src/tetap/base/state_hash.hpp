@@ -6,21 +6,31 @@
 #pragma once
 
 #include <bit>
+#include <cstddef>
 #include <cstdint>
+#include <cstring>
 
 namespace tetap::base {
 
 class StateHash {
  public:
-  constexpr void operator()(std::uint32_t word) {
-    const std::uint32_t mixed = (state_ ^ word) * kGoldenRatio;
-    state_ = mixed ^ (mixed >> 15);
-  }
+  constexpr void operator()(std::uint32_t word) { state_ = mixed(state_, word); }
   constexpr void operator()(std::int32_t word) { (*this)(static_cast<std::uint32_t>(word)); }
   constexpr void operator()(float number) { (*this)(std::bit_cast<std::uint32_t>(number)); }
   constexpr void operator()(std::int64_t word) {
     (*this)(static_cast<std::uint32_t>(static_cast<std::uint64_t>(word)));
     (*this)(static_cast<std::uint32_t>(static_cast<std::uint64_t>(word) >> 32));
+  }
+  /// The words that lie in memory from `from` on.
+  [[gnu::noinline]] void run(const void* from, std::size_t count) {
+    const auto* bytes = static_cast<const unsigned char*>(from);
+    std::uint32_t state = state_;
+    for (std::size_t i = 0; i < count; ++i) {
+      std::uint32_t word = 0;
+      std::memcpy(&word, bytes + i * sizeof word, sizeof word);
+      state = mixed(state, word);
+    }
+    state_ = state;
   }
   /// Every bit of the state spread over all bits of the value.
   [[nodiscard]] constexpr std::uint32_t value() const {
@@ -31,6 +41,10 @@ class StateHash {
   }
 
  private:
+  [[nodiscard]] static constexpr std::uint32_t mixed(std::uint32_t state, std::uint32_t word) {
+    const std::uint32_t product = (state ^ word) * kGoldenRatio;
+    return product ^ (product >> 15);
+  }
   static constexpr std::uint32_t kGoldenRatio = 0x9E3779B1U;  ///< 2^32 divided by the golden ratio, the next odd prime
   std::uint32_t state_ = kGoldenRatio;                        ///< not 0, so that leading zeros count
 };

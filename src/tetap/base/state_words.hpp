@@ -5,6 +5,7 @@
 
 #include "tetap/base/fields.hpp"
 #include "tetap/base/members.hpp"
+#include "tetap/base/plain_words.hpp"
 
 #include <array>
 #include <bit>
@@ -87,10 +88,13 @@ template <class T>
 
 /// Feeds state to `out` as words. kAll: all of it, whatever the turn. Out::mark(address, size), if there is one,
 /// gets the place of each hashed member; mark_index() that of an index, mark_unhashed() that of a listed, unhashed one.
+/// Out::run(address, count), if there is one, gets plain members that lie one behind the other where all is fed: in
+/// each epoch a loop over them would cost time.
 template <bool kAll, class Out>
 struct Words {
   Out& out;
   unsigned turn;
+  static constexpr bool kRuns = kAll && requires(Out & o, const void* from) { o.run(from, std::size_t{}); };
 
   template <class T>
   [[gnu::always_inline]] constexpr void mark(const T& value) const {
@@ -100,7 +104,9 @@ struct Words {
 
   template <unsigned kTurn = 0, class T>
   [[gnu::always_inline]] constexpr void add(const T& value) const {
-    if constexpr (std::is_enum_v<T> || kSmall<T>) {
+    if constexpr (kRuns && plain_bytes<T>() >= kLeastRun) {
+      out.run(&value, sizeof(T) / 4);
+    } else if constexpr (std::is_enum_v<T> || kSmall<T>) {
       mark(value);
       word(small_bits(value));
     } else if constexpr (std::is_floating_point_v<T> || std::is_integral_v<T>) {
@@ -216,6 +222,16 @@ struct Words {
   template <unsigned kTurn, std::size_t kSize>
   [[gnu::always_inline]] constexpr void entry(const Beside<kSize>&) const {}
 
+  /// Each member ends where the next one begins; the compiler knows the answer.
+  template <std::size_t kAt, class Tuple, std::size_t... kNext>
+  [[gnu::always_inline]] static bool adjacent(const Tuple& list, std::index_sequence<kNext...>) {
+    return (... && (static_cast<const void*>(&std::get<kAt + kNext>(list) + 1) ==
+                    static_cast<const void*>(&std::get<kAt + kNext + 1>(list))));
+  }
+  template <std::size_t kAt, class Tuple, std::size_t... kNext>
+  [[gnu::always_inline]] constexpr void each(const Tuple& list, std::index_sequence<kNext...>) const {
+    (add(std::get<kAt + kNext>(list)), ...);
+  }
   /// The members from the kAt-th on; `shared` has kBits bits of small ones before it.
   template <unsigned kTurn, std::size_t kAt, unsigned kBits, class Tuple>
   [[gnu::always_inline]] constexpr void walk(const Tuple& list, std::uint32_t shared) const {
@@ -233,6 +249,14 @@ struct Words {
         } else {
           walk<kTurn, kAt + 1, kBits + kMore>(list, shared | small_bits(member) << kBits);
         }
+      } else if constexpr (kRuns && run_of<Tuple, kAt>().bytes >= kLeastRun) {
+        constexpr Run kRun = run_of<Tuple, kAt>();
+        if (adjacent<kAt>(list, std::make_index_sequence<kRun.end - kAt - 1>())) {
+          out.run(&member, kRun.bytes / 4);
+        } else {
+          each<kAt>(list, std::make_index_sequence<kRun.end - kAt>());
+        }
+        walk<kTurn, kRun.end, kBits>(list, shared);
       } else {
         entry<kTurn>(member);
         walk<(kTurn + turns_of_entry<Member>()) % kTurns, kAt + 1, kBits>(list, shared);
