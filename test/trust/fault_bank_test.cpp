@@ -32,8 +32,10 @@ constexpr FaultRow kSpeed{.device = Device::kWheels, .code = 2, .largest = 5, .w
 struct Table {
   static constexpr int kErrors = 3;
   static constexpr std::array<FaultRow, 3> kRows{kBias, kFix, kSpeed};
-  static float direct(const FaultRow& row, const Fix&, int) { return row.device == Device::kReceiver ? 1.0F : 0.0F; }
-  static float direct(const FaultRow& row, const Speed&, int) { return row.device == Device::kWheels ? 1.0F : 0.0F; }
+  template <class Measurement>
+  static constexpr trust::Shown shown_by() {
+    return {std::is_same_v<Measurement, Fix> ? kFix.code : kSpeed.code, 1};
+  }
   static void predict(const FaultRow&, std::array<float, 3>& phi, float dt_s) {
     phi[0] += dt_s * phi[1];
     phi[1] -= dt_s * phi[2];
@@ -202,10 +204,13 @@ TEST(fault_bank, suspicion_widens_what_is_published_before_a_decision) {
 TEST(fault_bank, a_fold_adds_the_size_and_its_variance) {
   Bench<Table> run(3);
   for (int k = 0; k < 10; ++k) run.bank.predict(0.1F);
-  typename trust::FaultBank<Table>::template Pass<1> pass(run.bank, Speed{}, filter::Matrix<float, 1, 1>{1.0F});
+  const filter::Matrix<float, 1, 1> h{1.0F};
+  typename trust::FaultBank<Table>::template Pass<1> pass(run.bank, Speed{}, h);
   filter::Innovation<float, 1> record;
   record.nis = 900, record.gate = 1e9F;
-  pass.innovation(filter::Symmetric<float, 1>::diagonal({10.0F}), filter::Vector<float, 1>{-30.0F}, record);
+  const auto l = filter::Symmetric<float, 1>::diagonal({10.0F});
+  pass.innovation(l, filter::Vector<float, 1>{-30.0F}, record);
+  pass.gains(filter::detail::Gains<float, 3, 1>{});
   const auto bias = run.bank.best(0);
   static_cast<void>(run.bank.judge(0.1F));
   const filter::Symmetric<float, 3> before = run.p;

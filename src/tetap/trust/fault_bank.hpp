@@ -7,9 +7,11 @@
 #include "tetap/base/math.hpp"
 #include "tetap/base/members.hpp"
 #include "tetap/filter/fault_signature.hpp"
+#include "tetap/filter/sparse_update.hpp"
 #include "tetap/trust/fault_row.hpp"
 
 #include <cstdint>
+#include <type_traits>
 
 namespace tetap::trust {
 
@@ -23,8 +25,34 @@ struct Suspicion {
   [[nodiscard]] bool decided() const { return probability >= 0.99F; }
 };
 
+/// Rows of a table that show in a measurement: the component m shows the row of the code first + m.
+struct Shown {
+  int first = 0, count = 0;
+};
+
+/// S = L L^T, as filter/sparse_update.hpp has it.
+template <std::size_t M>
+using Factor = filter::Symmetric<float, static_cast<int>(M)>;
+
+/// A measurement as every signature sees it: H by columns.
+template <std::size_t M>
+struct Seen {
+  const float* h;
+  const int* touches;
+  std::size_t columns;
+  Shown shown;
+  Factor<M> l{};
+  std::array<float, M> y{};
+};
+template <std::size_t M>
+inline constexpr std::array<float, M * M> kIdentity = [] {
+  std::array<float, M * M> h{};
+  for (std::size_t m = 0; m < M; ++m) h[m * M + m] = 1;
+  return h;
+}();
+
 /// `Table` has kErrors, kRows, predict(phi, step), which is phi <- F phi + Gamma for a step of its filter, and
-/// direct(row, measurement, component): what a unit of the row's fault adds to that component.
+/// shown_by<Measurement>(): the rows of the measurement's own faults.
 template <class Table>
 class FaultBank {
  public:
@@ -52,49 +80,45 @@ class FaultBank {
       for (Signature& one : entry.ages) f(one.phi);
   }
   template <class Step>
-  void predict(const Step& step) {
+  [[gnu::noinline]] void predict(const Step& step) {
     for (std::size_t i = 0; i < kRows; ++i)
       for (Signature& one : rows_[i].ages) Table::predict(Table::kRows[i], one.phi, step);
   }
 
-  /// One measurement of M components on its way through an update (filter/sparse_update.hpp).
+  /// One measurement of M components on its way through an update (filter/sparse_update.hpp). H outlasts it.
   template <std::size_t M>
   class Pass {
    public:
     template <class Measurement, class Jacobian>
-    Pass(FaultBank& bank, const Measurement& z, const Jacobian& h) : bank_(bank) {
-      for (std::size_t i = 0; i < kRows; ++i)
-        for (std::size_t age = 0; age < kAges; ++age)
-          for (std::size_t m = 0; m < M; ++m) {
-            float sum = Table::direct(Table::kRows[i], z, static_cast<int>(m));
-            for (std::size_t k = 0; k < Measurement::kTouches.size(); ++k)
-              sum += h(static_cast<int>(m), static_cast<int>(k)) *
-                     bank.rows_[i].ages[age].phi[static_cast<std::size_t>(Measurement::kTouches[k])];
-            w_[i][age][m] = sum;
-          }
+    Pass(FaultBank& bank, const Measurement&, const Jacobian& h)
+        : bank_(bank),
+          seen_{.h = entries(h),
+                .touches = Measurement::kTouches.data(),
+                .columns = Measurement::kTouches.size(),
+                .shown = Table::template shown_by<Measurement>()} {
+      if constexpr (std::is_same_v<Jacobian, filter::IdentityJacobian>) seen_.columns = M;
     }
-    /// Before the verdict: y = L^-1 nu. A measurement that the gate refuses counts as much as the gate.
-    template <class Innovation, class Vector>
-    void innovation(const filter::Symmetric<float, static_cast<int>(M)>& l, const Vector& y, const Innovation& record) {
-      const float share = record.nis > record.gate ? record.gate / record.nis : 1.0F;
-      std::array<float, M> seen;
-      for (std::size_t m = 0; m < M; ++m) seen[m] = y(static_cast<int>(m));
-      for (std::size_t i = 0; i < kRows; ++i)
-        for (std::size_t age = 0; age < kAges; ++age) {
-          filter::whiten(l, w_[i][age]);
-          bank_.rows_[i].ages[age].score(w_[i][age], seen, share);
-        }
+    /// Before the verdict: y = L^-1 nu, and S = L L^T. A measurement that the gate refuses counts as much as the gate.
+    template <class Vector>
+    void innovation(const Factor<M>& l, const Vector& y, const filter::Innovation<float, static_cast<int>(M)>& record) {
+      seen_.l = l;
+      for (std::size_t m = 0; m < M; ++m) seen_.y[m] = y(static_cast<int>(m));
+      if (!(record.nis <= record.gate)) bank_.template take<M>(seen_, record.gate / record.nis, nullptr);
     }
     /// The measurement is used: G = P H^T L^-T.
     template <class Gains>
     void gains(const Gains& g) {
-      for (std::size_t i = 0; i < kRows; ++i)
-        for (std::size_t age = 0; age < kAges; ++age) bank_.rows_[i].ages[age].correct(g, w_[i][age]);
+      bank_.template take<M>(seen_, 1.0F, g.value.data());
     }
 
    private:
+    [[nodiscard]] static const float* entries(const filter::IdentityJacobian&) { return kIdentity<M>.data(); }
+    template <class Matrix>
+    [[nodiscard]] static const float* entries(const Matrix& h) {
+      return h.data();
+    }
     FaultBank& bank_;
-    std::array<std::array<std::array<float, M>, 2>, kRows> w_;
+    Seen<M> seen_;
   };
 
   /// After dt_s more: signatures without evidence begin anew at their age, and the rest are weighed.
@@ -209,6 +233,25 @@ class FaultBank {
   static constexpr std::array<float, kAges> kAge_s{1.0F, 6.0F};
 
  private:
+  /// Every signature sees the innovation, and is moved by the gains of a measurement that is used.
+  template <std::size_t M>
+  [[gnu::noinline]] void take(const Seen<M>& z, float share, const float* gains) {
+    for (std::size_t i = 0; i < kRows; ++i) {
+      const int own = row(i).code - z.shown.first;
+      for (Signature& one : rows_[i].ages) {
+        std::array<float, M> w;
+        for (std::size_t m = 0; m < M; ++m) w[m] = own == static_cast<int>(m) && own < z.shown.count ? 1.0F : 0.0F;
+        for (std::size_t k = 0; k < z.columns; ++k) {
+          const float phi = one.phi[static_cast<std::size_t>(z.touches[k])];
+          for (std::size_t m = 0; m < M; ++m) w[m] += z.h[k * M + m] * phi;
+        }
+        filter::whiten(z.l, w);
+        one.score(w, z.y, share);
+        if (gains != nullptr) one.correct([gains](int n, int m) { return gains[n * static_cast<int>(M) + m]; }, w);
+      }
+    }
+  }
+
   struct Entry {
     std::array<Signature, kAges> ages;
     float weight = 0;   ///< probability of the row

@@ -49,15 +49,11 @@ struct InertialFaults {
   }();
 
   template <class Measurement>
-  [[nodiscard]] static constexpr float direct(const FaultRow& row, const Measurement&, int component) {
-    const int at = row.code;
-    constexpr bool kIsFix = std::is_same_v<Measurement, model::GnssFix3d>,
-                   kIsVelocity = std::is_same_v<Measurement, model::GnssVelocity3d>;
-    if constexpr (kIsFix) return at == static_cast<int>(kFix) + component ? 1.0F : 0.0F;
-    if constexpr (kIsVelocity) return at == static_cast<int>(kVelocity) + component ? 1.0F : 0.0F;
-    if constexpr (std::is_same_v<Measurement, model::WheelSpeed>)
-      return at == static_cast<int>(kForward) && component == 0 ? 1.0F : 0.0F;
-    return 0.0F;
+  [[nodiscard]] static constexpr Shown shown_by() {
+    if constexpr (std::is_same_v<Measurement, model::GnssFix3d>) return {kFix, 3};
+    if constexpr (std::is_same_v<Measurement, model::GnssVelocity3d>) return {kVelocity, 3};
+    if constexpr (std::is_same_v<Measurement, model::WheelSpeed>) return {kForward, 1};
+    return {};
   }
   /// phi <- F phi, by the step that moves P (nav/ins_covariance.hpp).
   static void predict(const FaultRow&, std::array<float, kErrors>& phi, const nav::InsCovarianceStep<float>& step) {
