@@ -40,6 +40,7 @@ struct GraphEdge {
   std::uint32_t closure : 1;   ///< may be false, so it is weighted; 0: odometry
   std::uint32_t off : 1;       ///< taken for false by the job at hand
   std::uint32_t left_out : 1;  ///< taken for false by the job that gave the poses
+  std::uint32_t refused : 1;   ///< counts for nothing until a trial shows that it fits
   Displacement<Scalar> z;
   std::array<Scalar, 6> whitening;  ///< lower triangle, by rows
 

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // A pose graph that never ends. Odometry becomes keyframes, and closures between any two steps are moved to the nearest
 // ones. A graph too large for its room is thinned out in three stages, each counted. A keyframe is not made; a keyframe
-// is composed away and closures of the same pair are merged; a closure is refused.
+// is composed away and closures of the same pair are merged; a closure is refused. A closure that is contradicted is
+// judged again whenever others moved the graph.
 #pragma once
 
 #include "tetap/slam/pose_graph.hpp"
@@ -20,9 +21,11 @@ struct KeyframeCounters {
   std::uint32_t skipped = 0;        ///< stage 1: steps that wanted a keyframe and got none
   std::uint32_t composed_away = 0;  ///< stage 2
   std::uint32_t refused = 0;        ///< stage 3: closures without room
-  std::uint32_t contradicted = 0;   ///< closures that odometry or later closures make false
+  std::uint32_t contradicted = 0;   ///< closures that odometry or later closures made false at some time
+  std::uint32_t taken_later = 0;    ///< those of them that were right in the end
   std::uint32_t unknown = 0;        ///< closures that name steps long gone, or none
   std::uint32_t invalid = 0;        ///< inputs that are no number or no covariance
+  std::uint32_t trials = 0;         ///< trials of contradicted closures
   std::uint32_t jobs = 0, jobs_without_room = 0, jobs_not_converged = 0, jobs_aborted = 0;
 };
 
@@ -75,9 +78,11 @@ class KeyframeGraph {
     if (!between_keyframes(i, j, z, link)) return ++count_.unknown, record(kUnknown);
     if (link.a == link.b) return record(kNothingNew);
     const Scalar squared = graph_.contradiction(link.a, link.b, link.z);
-    if (!(squared >= Scalar{0} && squared < static_cast<Scalar>(options_.contradiction)))
+    if (!(squared >= Scalar{0} && squared < static_cast<Scalar>(options_.contradiction))) {
+      keep_for_later(link);
       return ++count_.contradicted, record(kContradicted, squared);
-    if (graph_.edges() >= kEdges - 1) {  // one is kept for odometry
+    }
+    if (graph_.edges() >= kEdges - 1 && graph_.forget_refused(1) == 0) {  // one is kept for odometry
       give_way();
       if (!thin() || !between_keyframes(i, j, z, link)) return ++count_.refused, record(kNoRoom, squared);
       if (link.a == link.b) return record(kNothingNew, squared);
@@ -90,17 +95,29 @@ class KeyframeGraph {
   /// A share of the job; begins one when closures came since the last. Room for what comes while it runs is made first,
   /// a keyframe a call.
   void work(int units) {
+    if (graph_.busy() && graph_.tried() && (waiting_ >= options_.closures_a_job || nearly_full())) cancel_job();
     if (!graph_.busy()) {
+      keep_share_free();
       const bool due = to_thin_ > 0 || nearly_full();
       if (to_thin_ > 0) --to_thin_;
       if (waiting_ > 0 && due && thin()) return;
-      if (waiting_ < options_.closures_a_job || waiting_ == 0 || !graph_.begin()) return;
-      waiting_ = 0;
+      if (waiting_ >= options_.closures_a_job && waiting_ > 0) {
+        if (!graph_.begin()) return;
+        waiting_ = 0;
+      } else if (!begin_trial()) {
+        return;
+      }
     }
     graph_.work(units);
     if (!graph_.busy()) end_job();
   }
-  [[nodiscard]] bool idle() const { return !graph_.busy() && waiting_ < options_.closures_a_job; }
+  /// An optimisation of all closures runs or is due; a trial of a refused one is none.
+  [[nodiscard]] bool optimising() const {
+    return (graph_.busy() && !graph_.tried()) || waiting_ >= options_.closures_a_job;
+  }
+  [[nodiscard]] bool idle() const {
+    return !graph_.busy() && waiting_ < options_.closures_a_job && (to_judge_ == 0 || waiting_ > 0 || !settled_);
+  }
   /// The next work() begins a job, however few closures came.
   void optimise() { waiting_ = options_.closures_a_job > waiting_ ? options_.closures_a_job : waiting_; }
 
@@ -108,6 +125,7 @@ class KeyframeGraph {
   void cancel_job() {
     if (!graph_.busy()) return;
     graph_.cancel();
+    if (graph_.tried()) return judge_all_again();
     ++count_.jobs_aborted;
     optimise();
   }
@@ -156,10 +174,13 @@ class KeyframeGraph {
     step_ = 0;
     id_[0] = 0;
     origin_ = {};
-    waiting_ = to_thin_ = 0;
+    waiting_ = to_thin_ = to_judge_ = 0;
+    settled_ = true;
   }
 
  private:
+  static constexpr int kMostRefused = kEdges / 8;  ///< closures that wait to be judged again
+  static constexpr Scalar kNear = 10;  ///< share of the limit for a trial: far from the optimum (7) is not linear
   static constexpr int kLeastPoses = kPoses / 4;  ///< keyframes that stay for want of room in a job
   /// A step of odometry in 2 mm and 2^-16 turns: closures are known to less.
   struct Step {
@@ -189,7 +210,7 @@ class KeyframeGraph {
   static ClosureRecord<Scalar> record(ClosureFate fate, Scalar contradiction = -1) { return {fate, contradiction}; }
   /// A share of the places stays free for what comes during a job.
   [[nodiscard]] bool nearly_full() const {
-    return graph_.poses() > kPoses - kPoses / 16 || graph_.edges() > kEdges - kEdges / 16;
+    return graph_.poses() > kPoses - kPoses / 16 || graph_.edges() - graph_.refused() > kEdges - kEdges / 16;
   }
 
   [[nodiscard]] Pose local() const {
@@ -204,6 +225,7 @@ class KeyframeGraph {
     return x * x + y * y >= way * way || turn >= angle || turn <= -angle;
   }
   void make_keyframe() {
+    if (graph_.edges() == kEdges) static_cast<void>(graph_.forget_refused(1));
     if (!graph_.has_room_for_pose() && !thin()) {
       ++count_.skipped;
       return;
@@ -224,6 +246,7 @@ class KeyframeGraph {
       if (cost < least) least = cost, best = k;
     }
     if (best < 0 || !graph_.compose_away(best)) return false;
+    settled_ = false;
     for (int k = best; k < graph_.poses(); ++k) id_[at(k)] = id_[at(k + 1)];
     ++count_.composed_away;
     return true;
@@ -282,16 +305,55 @@ class KeyframeGraph {
     to_thin_ = (graph_.poses() - kLeastPoses) / 8;
     if (to_thin_ <= 0 || !thinned) {
       to_thin_ = 0;
-      const int closures = graph_.edges() - (graph_.poses() - 1);
-      count_.refused += static_cast<std::uint32_t>(graph_.remove_closures(false, closures / 8 + 1));
+      count_.refused += static_cast<std::uint32_t>(graph_.remove_closures(graph_.closures() / 8 + 1));
     }
     optimise();
   }
+  /// A closure that is contradicted today waits among the edges, where that costs no closure its place.
+  void keep_for_later(const Link& link) {
+    forget_beyond(kMostRefused - 1);
+    if (graph_.edges() < kEdges - kEdges / 16 && graph_.refused() < kMostRefused)
+      to_judge_ += graph_.keep_refused(link.a, link.b, link.z) ? 1 : 0;
+  }
+  void forget_beyond(int most) {
+    if (graph_.refused() > most) static_cast<void>(graph_.forget_refused(graph_.refused() - most));
+  }
+  /// Refused closures leave the places that what comes during a job may need.
+  void keep_share_free() {
+    const int over = graph_.edges() - (kEdges - kEdges / 16);
+    if (over > 0) static_cast<void>(graph_.forget_refused(over));
+  }
+  void judge_all_again() { to_judge_ = graph_.refused(); }
+  /// Looks at the next refused closure: whether it is near enough by odometry's covariance for a trial of the graph
+  /// with it. One a call; false: no trial has begun.
+  bool begin_trial() {
+    if (to_judge_ == 0 || waiting_ > 0 || !settled_) return false;
+    --to_judge_;
+    int e = graph_.next_refused(next_refused_);
+    if (e < 0) e = graph_.next_refused(0);
+    if (e < 0) return to_judge_ = 0, false;
+    next_refused_ = e + 1;
+    const Scalar squared = graph_.contradiction(e);
+    const auto limit = static_cast<Scalar>(options_.contradiction);
+    if (!(squared >= Scalar{0} && squared < kNear * limit) || !graph_.begin_trial(e, limit)) return false;
+    ++count_.trials;
+    return true;
+  }
+  void end_trial() {
+    if (!graph_.taken()) return;
+    ++count_.jobs;
+    ++count_.taken_later;
+    judge_all_again();
+  }
   void end_job() {
     gave_way_ = false;
+    if (graph_.tried()) return end_trial();
     ++count_.jobs;
-    if (graph_.status() == GraphStatus::kConverged) {
-      count_.contradicted += static_cast<std::uint32_t>(graph_.remove_closures(true, kEdges));
+    settled_ = graph_.status() == GraphStatus::kConverged;
+    if (settled_) {
+      count_.contradicted += static_cast<std::uint32_t>(graph_.refuse_left_out());
+      forget_beyond(kMostRefused);
+      judge_all_again();
     } else if (graph_.status() == GraphStatus::kNoRoom) {
       ++count_.jobs_without_room;
       make_room();
@@ -310,6 +372,9 @@ class KeyframeGraph {
   std::uint32_t thinned_before_ = 0;  ///< KeyframeCounters::composed_away at the last job without room
   bool gave_way_ = false;             ///< the last job did not end
   int to_thin_ = 0;                   ///< keyframes that are composed away before the next job
+  bool settled_ = true;               ///< poses are at the optimum of the closures that count, but for waiting_
+  int to_judge_ = 0;                  ///< refused closures that the poses of now have not been held against
+  int next_refused_ = 0;              ///< place of an edge from which the next one is looked for
   std::array<std::uint32_t, kPoses> id_{};
   std::array<Step, kTrail> trail_{};
 };

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // A graph of planar poses in fixed memory. Poses are appended as they come, closures wait for the next optimisation. An
 // optimisation is a job cut in units of work (Gauss-Newton on the square-root information; Dellaert & Kaess, IJRR
-// 25(12), 2006). False closures are held off by dynamic covariance scaling, then left out (see graph_edge.hpp).
+// 25(12), 2006). False closures are held off by dynamic covariance scaling, then left out (see graph_edge.hpp). A
+// closure that was refused stays where there is room, and counts for nothing until a trial of it fits.
 #pragma once
 
 #include "tetap/slam/graph_edge.hpp"
@@ -48,9 +49,13 @@ class PoseGraph {
     status_ = GraphStatus::kNone;
     chi2_ = 0;
     left_out_ = 0;
+    refused_ = 0;
   }
   [[nodiscard]] int poses() const { return poses_; }
   [[nodiscard]] int edges() const { return edges_; }
+  /// Closures that count, and those that were refused.
+  [[nodiscard]] int closures() const { return edges_ - (poses_ - 1) - refused_; }
+  [[nodiscard]] int refused() const { return refused_; }
   [[nodiscard]] bool has_room_for_pose() const { return poses_ < kPoses && edges_ < kEdges; }
   [[nodiscard]] const Pose& pose(int i) const { return pose_[at(i)]; }
   [[nodiscard]] const Edge& edge(int e) const { return edge_[at(e)]; }
@@ -76,6 +81,47 @@ class PoseGraph {
     if (i < 0 || j < 0 || i >= poses_ || j >= poses_ || i == j || !add_edge(i, j, z, true)) return false;
     if (!busy()) join(edges_ - 1);
     return true;
+  }
+  /// The same for a closure that counts for nothing yet.
+  [[nodiscard]] bool keep_refused(int i, int j, const Motion& z) {
+    if (i < 0 || j < 0 || i >= poses_ || j >= poses_ || i == j || !add_edge(i, j, z, true)) return false;
+    edge_[at(edges_ - 1)].refused = 1;
+    ++refused_;
+    return true;
+  }
+  /// Closures that the latest job left out are refused from now on; their number. Nothing while a job runs.
+  int refuse_left_out() {
+    int count = 0;
+    for (int e = 0; e < edges_ && !busy(); ++e) {
+      if (edge_[at(e)].left_out == 0) continue;
+      edge_[at(e)].left_out = 0;
+      edge_[at(e)].refused = 1;
+      ++count;
+    }
+    refused_ += count;
+    left_out_ -= count;
+    return count;
+  }
+  /// Forgets so many refused closures, the oldest first; their number. Nothing while a job runs.
+  int forget_refused(int most) {
+    int count = 0;
+    for (int e = 0; e < edges_ && count < most && !busy();) {
+      if (edge_[at(e)].refused != 0)
+        remove_edge(e), ++count;
+      else
+        ++e;
+    }
+    return count;
+  }
+  /// The place of the next refused closure from place e on, or -1.
+  [[nodiscard]] int next_refused(int e) const {
+    while (e < edges_ && edge_[at(e)].refused == 0) ++e;
+    return e < edges_ ? e : -1;
+  }
+  /// Implements docs/explanation/pose_graph.md (7) for an edge.
+  [[nodiscard]] Scalar contradiction(int e) const {
+    const Edge& edge = edge_[at(e)];
+    return contradiction(static_cast<int>(edge.from), static_cast<int>(edge.to), motion(e));
   }
 
   /// Implements docs/explanation/pose_graph.md (7).
@@ -127,24 +173,24 @@ class PoseGraph {
     }
     return true;
   }
-  /// Removes closures that the latest job left out, or the `most` newest ones; nothing while a job runs.
-  int remove_closures(bool only_left_out, int most) {
+  /// Removes the `most` newest closures that count; nothing while a job runs.
+  int remove_closures(int most) {
     int removed = 0;
     for (int e = busy() ? -1 : edges_ - 1; e >= 0 && removed < most; --e)
-      if (edge_[at(e)].closure != 0 && (edge_[at(e)].left_out != 0 || !only_left_out)) remove_edge(e), ++removed;
-    if (only_left_out) left_out_ -= removed;
+      if (edge_[at(e)].closure != 0 && edge_[at(e)].refused == 0) remove_edge(e), ++removed;
     return removed;
   }
   /// Covariance of the odometry that leads to a pose.
   [[nodiscard]] filter::Symmetric<Scalar, 3> odometry_covariance(int pose) const {
     return edge_[at(odometry_to(pose))].covariance();
   }
-  /// Closures that begin or end at a pose.
+  /// Closures that count and begin or end at a pose.
   [[nodiscard]] std::uint32_t closures_of(int pose) const {
     std::uint32_t count = 0;
     for (int e = 0; e < edges_; ++e) {
       const Edge& edge = edge_[at(e)];
-      if (edge.closure != 0 && (static_cast<int>(edge.from) == pose || static_cast<int>(edge.to) == pose)) ++count;
+      if (edge.closure == 0 || edge.refused != 0) continue;
+      if (static_cast<int>(edge.from) == pose || static_cast<int>(edge.to) == pose) ++count;
     }
     return count;
   }
@@ -154,11 +200,13 @@ class PoseGraph {
   /// next. False when a job is running or there is nothing to do.
   [[nodiscard]] bool begin() {
     if (phase_ != Phase::kIdle || poses_ < 2) return false;
+    trial_edge_ = -1;
+    taken_ = false;
     job_poses_ = poses_;
     job_edges_ = edges_;
     for (int i = 0; i < poses_; ++i) trial_[at(i)] = pose_[at(i)];
     solver_.begin(poses_ - 1);
-    stage_ = options_.robust && edges_ >= poses_ ? Stage::kWeighted : Stage::kPlain;
+    stage_ = options_.robust && closures() > 0 ? Stage::kWeighted : Stage::kPlain;
     attempt_ = 0;
     least_cost_ = static_cast<Scalar>(1e30);
     known_false_ = left_out_;
@@ -170,6 +218,21 @@ class PoseGraph {
     phase_ = Phase::kConnect;
     return true;
   }
+  /// Begins a trial of the refused closure e, from the poses of the latest job: least squares with it and without
+  /// weights. It is taken, and the poses with it, when the sum of squares rises by less than `most` and no closure then
+  /// is an outlier. Otherwise nothing changes, nor does status().
+  [[nodiscard]] bool begin_trial(int e, Scalar most) {
+    if (e < 0 || e >= edges_ || edge_[at(e)].refused == 0 || !begin()) return false;
+    trial_edge_ = e;
+    trial_most_ = most;
+    trial_from_ = 0;
+    stage_ = Stage::kPlain;
+    attempt_ = 1;
+    return true;
+  }
+  /// Whether the latest job was a trial, and whether that took its closure.
+  [[nodiscard]] bool tried() const { return trial_edge_ >= 0; }
+  [[nodiscard]] bool taken() const { return taken_; }
   [[nodiscard]] bool busy() const { return phase_ != Phase::kIdle; }
   /// Poses that the elimination at hand has before it, at least one while a job runs or may begin.
   [[nodiscard]] int rows_left() const { return phase_ == Phase::kEliminate ? solver_.rows_left() : 1; }
@@ -244,7 +307,10 @@ class PoseGraph {
     while (e < edges_ && (edge_[at(e)].closure != 0 || static_cast<int>(edge_[at(e)].to) != pose)) ++e;
     return e;
   }
+  /// Whether edge e is part of the job at hand.
+  [[nodiscard]] bool in_job(int e) const { return edge_[at(e)].refused == 0 || e == trial_edge_; }
   void remove_edge(int e) {
+    refused_ -= static_cast<int>(edge_[at(e)].refused);
     for (int k = e; k + 1 < edges_; ++k) edge_[at(k)] = edge_[at(k + 1)];
     --edges_;
   }
@@ -257,7 +323,7 @@ class PoseGraph {
     }
     for (int other = 0; other < edges_; ++other) {
       Edge& into = edge_[at(other)];
-      if (other == e || into.closure == 0) continue;
+      if (other == e || into.closure == 0 || (into.refused | edge_[at(e)].refused) != 0) continue;
       const bool same = into.from == edge_[at(e)].from && into.to == edge_[at(e)].to;
       const bool opposite = into.from == edge_[at(e)].to && into.to == edge_[at(e)].from;
       if (!same && !opposite) continue;
@@ -279,6 +345,7 @@ class PoseGraph {
                          .closure = closure ? 1U : 0U,
                          .off = 0,
                          .left_out = 0,
+                         .refused = 0,
                          .z = z.mean,
                          .whitening = whitening};
     ++edges_;
@@ -328,6 +395,7 @@ class PoseGraph {
   void end_stage();
   int judge();
   int end_attempt();
+  int end_trial(bool converged);
   void adopt();
   int end(GraphStatus status);
   void carry_covariance(int i);
@@ -340,7 +408,7 @@ class PoseGraph {
   filter::Symmetric<Scalar, 3> covariance_{};
   GraphStatus status_ = GraphStatus::kNone;
   Scalar chi2_ = 0;
-  int left_out_ = 0;
+  int left_out_ = 0, refused_ = 0;
   std::uint32_t merged_ = 0, lost_ = 0;
   int total_iterations_ = 0;
 
@@ -348,7 +416,9 @@ class PoseGraph {
   Stage stage_ = Stage::kPlain;
   bool last_step_ = false;
   int credit_ = 0, cursor_ = 0, iteration_ = 0, job_poses_ = 0, job_edges_ = 0, out_ = 0, attempt_ = 0,
-      known_false_ = 0;
+      known_false_ = 0, trial_edge_ = -1;
+  bool taken_ = false;
+  Scalar trial_most_ = 0, trial_from_ = 0;  ///< a trial: the rise that it may cost, the sum of squares before it
   Scalar least_cost_ = 0, before_ = 0;
   mutable Scalar sum_ = 0;  ///< squares summed at the trial poses
   Scalar judged_ = 0;       ///< likewise, after the last step

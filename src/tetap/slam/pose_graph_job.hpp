@@ -10,7 +10,7 @@ namespace tetap::slam {
 template <class Scalar_, int kPoses, int kEdges, int kBlocks>
 int PoseGraph<Scalar_, kPoses, kEdges, kBlocks>::connect() {
   const Edge& edge = edge_[at(cursor_)];
-  solver_.connect(static_cast<int>(edge.from) - 1, static_cast<int>(edge.to) - 1);
+  if (in_job(cursor_)) solver_.connect(static_cast<int>(edge.from) - 1, static_cast<int>(edge.to) - 1);
   if (++cursor_ < job_edges_) return 1;
   solver_.sort();
   phase_ = Phase::kOrder;
@@ -57,7 +57,7 @@ template <class Scalar_, int kPoses, int kEdges, int kBlocks>
 int PoseGraph<Scalar_, kPoses, kEdges, kBlocks>::screen() {
   const auto& spread = solver_.scratch();
   Edge& edge = edge_[at(cursor_)];
-  if (edge.closure != 0) {
+  if (edge.closure != 0 && edge.refused == 0) {
     const Pose& from = trial_[edge.from];
     const bool later = edge.from < edge.to;
     const auto& more = spread[later ? edge.to : edge.from];
@@ -91,7 +91,7 @@ bool PoseGraph<Scalar_, kPoses, kEdges, kBlocks>::consistent(const Edge& edge, c
   const auto s = detail::turned(in_world, turn.cos, -turn.sin, Scalar{0}, Scalar{0}, Scalar{1}, edge.covariance());
   std::array<Scalar, 6> w{};
   if (!whitening_of(s, w)) return true;
-  const Edge test{.from = 0, .to = 0, .closure = 1, .off = 0, .left_out = 0, .z = edge.z, .whitening = w};
+  const Edge test{.from = 0, .to = 0, .closure = 1, .off = 0, .left_out = 0, .refused = 0, .z = edge.z, .whitening = w};
   const auto r = test.whiten(d.x_m - edge.z.x_m, d.y_m - edge.z.y_m, (d.yaw - edge.z.yaw).radians());
   return r[0] * r[0] + r[1] * r[1] + r[2] * r[2] < Scalar{30};
 }
@@ -107,10 +107,12 @@ void PoseGraph<Scalar_, kPoses, kEdges, kBlocks>::begin_iteration() {
 template <class Scalar_, int kPoses, int kEdges, int kBlocks>
 int PoseGraph<Scalar_, kPoses, kEdges, kBlocks>::add_row() {
   const Edge& edge = edge_[at(cursor_)];
-  if (edge.off == 0 || stage_ == Stage::kWeighted)
+  const bool first_of_trial = trial_edge_ >= 0 && iteration_ == 0;
+  if (first_of_trial && edge.refused == 0) trial_from_ += edge.chi2(trial_[edge.from], trial_[edge.to]);
+  if (in_job(cursor_) && (edge.off == 0 || stage_ == Stage::kWeighted))
     solver_.add_row(cursor_, static_cast<int>(edge.from) - 1, static_cast<int>(edge.to) - 1);
   if (++cursor_ == job_edges_) phase_ = Phase::kEliminate;
-  return 1;
+  return first_of_trial ? 10 : 1;
 }
 
 template <class Scalar_, int kPoses, int kEdges, int kBlocks>
@@ -175,10 +177,10 @@ int PoseGraph<Scalar_, kPoses, kEdges, kBlocks>::judge() {
   const Scalar chi2 = edge.chi2(trial_[edge.from], trial_[edge.to]);
   const auto limit = static_cast<Scalar>(options_.outlier_chi2) * (stage_ == Stage::kWeighted ? kNear : Scalar{1});
   if (stage_ != Stage::kPlain && edge.closure != 0) edge.off = chi2 > limit ? 1U : 0U;
-  if (edge.off == 0)
-    judged_ += chi2;
-  else
-    ++out_;
+  if (in_job(cursor_)) {
+    if (edge.off == 0) judged_ += chi2;
+    if (edge.off != 0 || (trial_edge_ >= 0 && edge.closure != 0 && chi2 > limit)) ++out_;
+  }
   if (++cursor_ < job_edges_) return 10;
   if (stage_ == Stage::kPlain) return end_attempt();
   stage_ = stage_ == Stage::kWeighted ? Stage::kNear : Stage::kPlain;
@@ -193,6 +195,7 @@ int PoseGraph<Scalar_, kPoses, kEdges, kBlocks>::end_attempt() {
   const bool settled =
       judged_ <= sum_ * (Scalar{1} + static_cast<Scalar>(options_.weighted_tolerance)) + static_cast<Scalar>(1e-6);
   const bool converged = last_step_ && settled;
+  if (trial_edge_ >= 0) return end_trial(converged);
   const Scalar cost = judged_ + static_cast<Scalar>(out_) * static_cast<Scalar>(options_.outlier_chi2);
   if (converged && cost < least_cost_) {
     least_cost_ = cost;
@@ -206,11 +209,24 @@ int PoseGraph<Scalar_, kPoses, kEdges, kBlocks>::end_attempt() {
 }
 
 template <class Scalar_, int kPoses, int kEdges, int kBlocks>
+int PoseGraph<Scalar_, kPoses, kEdges, kBlocks>::end_trial(bool converged) {
+  if (converged && out_ == 0 && judged_ - trial_from_ < trial_most_) {
+    edge_[at(trial_edge_)].refused = 0;
+    --refused_;
+    taken_ = true;
+    status_ = GraphStatus::kConverged;
+    adopt();
+  }
+  phase_ = Phase::kIdle;
+  return 1;
+}
+
+template <class Scalar_, int kPoses, int kEdges, int kBlocks>
 void PoseGraph<Scalar_, kPoses, kEdges, kBlocks>::adopt() {
   const Pose was = pose_[at(job_poses_ - 1)], is = trial_[at(job_poses_ - 1)];
   for (int i = job_poses_; i < poses_; ++i) pose_[at(i)] = is.plus(pose_[at(i)].minus(was));
   for (int i = 0; i < job_poses_; ++i) pose_[at(i)] = trial_[at(i)];
-  for (int e = 0; e < job_edges_; ++e) edge_[at(e)].left_out = edge_[at(e)].off;
+  for (int e = 0; e < job_edges_; ++e) edge_[at(e)].left_out = edge_[at(e)].off & (edge_[at(e)].refused ^ 1U);
   covariance_ = solver_.covariance_of_last();
   for (int i = job_poses_; i < poses_; ++i) carry_covariance(i);
   chi2_ = judged_;
@@ -219,7 +235,7 @@ void PoseGraph<Scalar_, kPoses, kEdges, kBlocks>::adopt() {
 
 template <class Scalar_, int kPoses, int kEdges, int kBlocks>
 int PoseGraph<Scalar_, kPoses, kEdges, kBlocks>::end(GraphStatus status) {
-  status_ = least_cost_ < static_cast<Scalar>(1e30) ? GraphStatus::kConverged : status;
+  if (trial_edge_ < 0) status_ = least_cost_ < static_cast<Scalar>(1e30) ? GraphStatus::kConverged : status;
   phase_ = Phase::kIdle;
   return 1;
 }

@@ -261,7 +261,7 @@ MapReport GraphMapper<Graph>::own_map() const {
   return {.size = static_cast<std::uint32_t>(graph_.graph().poses()),
           .refused = count.refused,
           .ambiguous = count.contradicted,
-          .work_left = graph_.idle() ? 0U : static_cast<std::uint32_t>(graph_.graph().rows_left()),
+          .work_left = graph_.optimising() ? static_cast<std::uint32_t>(graph_.graph().rows_left()) : 0U,
           .jobs_aborted = count.jobs_aborted};
 }
 
@@ -273,7 +273,7 @@ GraphReport GraphMapper<Graph>::graph() const {
                 static_cast<int>(slam::GraphStatus::kConverged) == static_cast<int>(GraphEnd::kConverged));
   return {.chi2 = static_cast<double>(graph.chi2()),
           .end = end(graph.status()),
-          .closures = static_cast<std::uint32_t>(graph.edges() - (graph.poses() - 1)),
+          .closures = static_cast<std::uint32_t>(graph.closures()),
           .jobs = graph_.counters().jobs};
 }
 

@@ -144,7 +144,8 @@ class GraphMapper {
     if (i < poses) return hash_pose(graph_.graph().pose(static_cast<int>(i)), sink);
     const auto& edge = graph_.graph().edge(static_cast<int>(i - poses));
     sink(static_cast<std::uint32_t>(edge.from) | static_cast<std::uint32_t>(edge.to) << 14 |
-         static_cast<std::uint32_t>(edge.closure) << 28 | static_cast<std::uint32_t>(edge.left_out) << 29);
+         static_cast<std::uint32_t>(edge.closure) << 28 | static_cast<std::uint32_t>(edge.left_out) << 29 |
+         static_cast<std::uint32_t>(edge.refused) << 30);
     for (const Scalar value : {edge.z.x_m, edge.z.y_m, edge.z.yaw.radians()}) sink(static_cast<float>(value));
     for (const Scalar value : edge.whitening) sink(static_cast<float>(value));
   }
