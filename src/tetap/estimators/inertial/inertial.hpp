@@ -17,6 +17,7 @@
 #include "tetap/estimators/inertial/recovery.hpp"
 #include "tetap/estimators/inertial/standstill.hpp"
 #include "tetap/estimators/inertial/work_budget.hpp"
+#include "tetap/filter/viewed.hpp"
 #include "tetap/nav/ins.hpp"
 #include "tetap/sensor/sample.hpp"
 #include "tetap/sensor/window.hpp"
@@ -166,7 +167,7 @@ class Inertial {
   [[nodiscard]] float unseen_s2(float unseen_s) const;
   [[nodiscard]] nav::InsCovarianceStep<float> step_ahead(const Context& ctx) const;
 
-  nav::Ins ins_;
+  filter::Viewable<nav::Ins> ins_;
   OutputPredictor predictor_;
   WorkBudget budget_;
   Phase phase_ = Phase::kLevelling;

@@ -3,10 +3,11 @@
 #pragma once
 
 #include "tetap/filter/structured_kalman.hpp"
+#include "tetap/filter/viewed.hpp"
 #include "tetap/model/planar_pose.hpp"
 
 namespace tetap::estimators {
 
-using PlanarEkf = filter::StructuredKalman<model::PlanarPose, filter::Guard::kConditioned>;
+using PlanarEkf = filter::Viewable<filter::StructuredKalman<model::PlanarPose, filter::Guard::kConditioned>>;
 
 }  // namespace tetap::estimators

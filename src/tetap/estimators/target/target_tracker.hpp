@@ -10,6 +10,7 @@
 #include "tetap/estimators/estimate.hpp"
 #include "tetap/filter/ekf.hpp"
 #include "tetap/filter/ukf.hpp"
+#include "tetap/filter/viewed.hpp"
 #include "tetap/model/constant_velocity.hpp"
 #include "tetap/model/ctrv.hpp"
 #include "tetap/model/kinematics.hpp"
@@ -22,7 +23,7 @@ namespace tetap::estimators {
 /// Constant velocity, state (x, vx, y, vy), extended Kalman filter; the acceleration is white noise per axis.
 struct VelocityTracking {
   static constexpr sensor::EstimatorKind kKind = sensor::EstimatorKind::kEkf;
-  using Filter = filter::Ekf<filter::VectorState<float, 4>>;
+  using Filter = filter::Viewable<filter::Ekf<filter::VectorState<float, 4>>>;
 
   [[nodiscard]] static model::ConstantVelocity<float> motion(float dt_s, const param::TargetParameters& n) {
     return {.dt_s = dt_s, .acceleration_variance = n.acceleration_mps2 * n.acceleration_mps2};
