@@ -6,17 +6,22 @@
 #include "sim_host/replay/protocol.hpp"
 #include "sim_host/robot_firmware.hpp"
 #include "tetap/param/parameters.hpp"
+#include "tetap/sensor/vocabulary.hpp"
 
+#include <cstddef>
+#include <cstdint>
 #include <memory>
+#include <span>
 
 namespace tetap::sim {
 
 /// Samples that the estimators of a robot take and maps that they make, whatever its parameters.
 struct EstimatorFacts {
-  bool inertial = false;   ///< an inertial filter is among them
-  bool needs_imu = false;  ///< one of them is nothing without an IMU
-  bool imu = false;        ///< one of them takes such samples, as the next six
-  bool sightings = false;  ///< landmarks
+  std::uint32_t sensors = 0;  ///< a bit for each sensor::Sensor of which one takes samples
+  bool inertial = false;      ///< an inertial filter is among them
+  bool needs_imu = false;     ///< one of them is nothing without an IMU
+  bool imu = false;           ///< one of them takes such samples, as the next six
+  bool sightings = false;     ///< landmarks
   bool magnetic = false;
   bool pressure = false;
   bool closures = false;
@@ -35,10 +40,17 @@ struct EstimatorFacts {
   }
 };
 
+/// One of a robot's estimators.
+struct EstimatorInfo {
+  sensor::EstimatorKind kind;
+  std::size_t bytes;  ///< size of its state in the node, with that at the far end of the window
+};
+
 struct Robot {
   const char* name = "";
   const param::Parameters* parameters = nullptr;
   EstimatorFacts takes;
+  std::span<const EstimatorInfo> estimators;
   std::unique_ptr<RobotFirmware> (*make_firmware)(HostBoard&, const param::Parameters&, const bus::Version&) = nullptr;
 };
 

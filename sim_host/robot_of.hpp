@@ -6,7 +6,10 @@
 #include "tetap/firmware/firmware.hpp"
 #include "tetap/node/bus_protection.hpp"
 #include "tetap/param/limits.hpp"
+#include "tetap/sensor/sample.hpp"
 
+#include <array>
+#include <cstdint>
 #include <memory>
 
 namespace tetap::sim {
@@ -26,10 +29,31 @@ concept MapsNameless = requires {
   requires E::kTakesNameless;
 };
 
+/// A bit for each kind of sample that one of them takes.
 template <class... E>
-[[nodiscard]] constexpr EstimatorFacts facts_of(node::Estimators<E...>) {
+[[nodiscard]] constexpr std::uint32_t sensors_of(node::Estimators<E...>) {
+  std::uint32_t taken = 0;
+  for (unsigned kind = 0; kind < static_cast<unsigned>(sensor::Sensor::kNotAvailable); ++kind) {
+    sensor::Sample sample;
+    sample.sensor = static_cast<sensor::Sensor>(kind);
+    sensor::visit(sample,
+                  [&]<class Payload>(const Payload&) { taken |= (Takes<E, Payload> || ...) ? 1U << kind : 0U; });
+  }
+  return taken;
+}
+
+template <class... E>
+[[nodiscard]] constexpr auto infos_of(node::Estimators<E...>) {
+  return std::array<EstimatorInfo, sizeof...(E)>{EstimatorInfo{E::kKind, sizeof(node::EstimatorSlot<E>)}...};
+}
+template <class Estimators>
+inline constexpr auto kEstimatorInfos = infos_of(Estimators{});
+
+template <class... E>
+[[nodiscard]] constexpr EstimatorFacts facts_of(node::Estimators<E...> all) {
   using Kind = sensor::EstimatorKind;
-  return {.inertial = ((E::kKind == Kind::kInertial) || ...),
+  return {.sensors = sensors_of(all),
+          .inertial = ((E::kKind == Kind::kInertial) || ...),
           .needs_imu = ((E::kKind == Kind::kInertial || E::kKind == Kind::kAttitude) || ...),
           .imu = (Takes<E, sensor::ImuSample> || ...),
           .sightings = (Takes<E, sensor::LandmarkSighting> || ...),
@@ -73,6 +97,7 @@ template <class Estimators>
   return {.name = name,
           .parameters = &parameters,
           .takes = facts_of_robot<Estimators>(),
+          .estimators = kEstimatorInfos<Estimators>,
           .make_firmware = &make_firmware<Estimators>};
 }
 

@@ -31,7 +31,10 @@ enum class Channel : std::uint8_t {
   kFrames,  ///< lines of a log: all that is on the bus
   kPlayed,  ///< time of the play
   kInjected,
-  kScript,  ///< a text that repeats the run, and its hash
+  kScript,    ///< a text that repeats the run, and its hash
+  kColumns,   ///< columns of tables, with quantity and unit as far as their names show
+  kImported,  ///< report of an import of tables
+  kUpdates,   ///< updates of the node's filters
 };
 
 inline void write(std::uint32_t channel, std::string_view text) {

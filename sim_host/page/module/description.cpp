@@ -4,6 +4,7 @@
 #include "sim_host/doctor/codes.hpp"
 #include "sim_host/page/module/json.hpp"
 #include "sim_host/page/module/robots.hpp"
+#include "sim_host/replay/names.hpp"
 #include "tetap/param/crc.hpp"
 #include "tetap/param/table.hpp"
 #include "version.hpp"
@@ -14,7 +15,13 @@ namespace {
 
 void put_robot(Json& json, const sim::Robot& robot) {
   json.begin('{').member("name", robot.name).member("config", param::crc(*robot.parameters));
-  json.member("inertial", robot.takes.inertial).member("sightings", robot.takes.sightings).key("values").begin('[');
+  json.key("takes").begin('[');
+  for (unsigned kind = 0; kind < static_cast<unsigned>(sensor::Sensor::kNotAvailable); ++kind)
+    if ((robot.takes.sensors >> kind & 1U) != 0) json.value(sim::name(static_cast<sensor::Sensor>(kind)));
+  json.end(']').member("needs_imu", bool{robot.takes.needs_imu}).key("estimators").begin('[');
+  for (const sim::EstimatorInfo& one : robot.estimators)
+    json.begin('{').member("kind", sim::name(one.kind)).member("bytes", one.bytes).end('}');
+  json.end(']').key("values").begin('[');
   for (const param::Row& row : param::kTable) {
     json.begin('[');
     for (std::size_t i = 0; i < row.elements; ++i)

@@ -5,12 +5,18 @@
 #include "sim_host/page/module/description.hpp"
 #include "sim_host/page/module/identity.hpp"
 #include "sim_host/page/module/json.hpp"
+#include "sim_host/page/module/lesson.hpp"
 #include "sim_host/page/module/play.hpp"
 #include "sim_host/page/module/replay.hpp"
 #include "sim_host/page/module/robots.hpp"
+#include "sim_host/page/module/tables.hpp"
 #include "sim_host/parameter_refusal.hpp"
+#include "sim_host/replay/candump.hpp"
+#include "tetap/bus/codec.hpp"
+#include "tetap/bus/e2e.hpp"
 #include "tetap/param/limits.hpp"
 
+#include <cmath>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -27,11 +33,15 @@ struct Chosen {
 };
 Chosen chosen;
 std::optional<page::Play> in_play;
+std::optional<page::Lesson> lesson;
+page::SensorTables tables;
 
 std::uint32_t refuse(std::string_view why) {
   page::write(page::Channel::kRefusal, why);
   return 1;
 }
+
+std::uint32_t ended(const sim::Result<>& done) { return done ? 0 : refuse(done.failure().text); }
 
 }  // namespace
 
@@ -63,6 +73,14 @@ TETAP_EXPORT(check) std::uint32_t check() {
   return 0;
 }
 
+/// The estimators of another robot, with the numbers that were chosen.
+TETAP_EXPORT(borrow) std::uint32_t borrow(std::uint32_t robot) {
+  if (robot >= page::robots().size()) return refuse("no robot of number " + std::to_string(robot));
+  if (chosen.robot == nullptr) return refuse("no robot is chosen");
+  chosen.robot = page::robots()[robot];
+  return 0;
+}
+
 /// The node whose log it is.
 TETAP_EXPORT(identify) std::uint32_t identify() {
   const auto identity = page::identity_of_log();
@@ -74,10 +92,19 @@ TETAP_EXPORT(identify) std::uint32_t identify() {
 /// Plays the log; `mode` is a sim::PlayMode.
 TETAP_EXPORT(replay) std::uint32_t replay(std::uint32_t base, std::uint32_t mode, std::uint32_t keep_going) {
   if (chosen.robot == nullptr) return refuse("no robot is chosen");
-  const auto played =
-      page::replay(*chosen.robot, chosen.parameters,
-                   {.base = base, .mode = static_cast<sim::PlayMode>(mode), .keep_going = keep_going != 0});
-  return played ? 0 : refuse(played.failure().text);
+  return ended(page::replay(*chosen.robot, chosen.parameters,
+                            {.base = base, .mode = static_cast<sim::PlayMode>(mode), .keep_going = keep_going != 0}));
+}
+
+/// The updates of the node's filters for `span_s` up to the epoch of that time.
+TETAP_EXPORT(updates)
+std::uint32_t updates(std::uint32_t base, std::uint32_t mode, std::uint32_t keep_going, double time_s, double span_s) {
+  if (chosen.robot == nullptr) return refuse("no robot is chosen");
+  if (!(time_s > -1e9 && time_s < 1e9 && span_s >= 0 && span_s <= 10)) return refuse("no time");
+  const page::ReplayOptions options{
+      .base = base, .mode = static_cast<sim::PlayMode>(mode), .keep_going = keep_going != 0};
+  return ended(page::updates_until(*chosen.robot, chosen.parameters, options, {std::llround(time_s * 1e6)},
+                                   {std::llround(span_s * 1e6)}));
 }
 
 /// The doctor's findings; `of_robot` 0: by the log alone.
@@ -110,19 +137,54 @@ TETAP_EXPORT(play) std::uint32_t play(std::uint32_t robot, std::uint32_t seed) {
 
 TETAP_EXPORT(advance) std::uint32_t advance(std::uint32_t ticks) {
   if (!in_play) return refuse("nothing is played");
-  const auto done = in_play->advance(ticks);
-  return done ? 0 : refuse(done.failure().text);
+  return ended(in_play->advance(ticks));
 }
 
 TETAP_EXPORT(inject) std::uint32_t inject(std::uint32_t fault, std::uint32_t duration_ms) {
   if (!in_play) return refuse("nothing is played");
-  const auto done = in_play->inject(fault, {std::int64_t{1'000} * duration_ms});
-  return done ? 0 : refuse(done.failure().text);
+  return ended(in_play->inject(fault, {std::int64_t{1'000} * duration_ms}));
 }
 
 /// The play up to now, as a script.
 TETAP_EXPORT(script) std::uint32_t script() {
   if (!in_play) return refuse("nothing is played");
   in_play->script();
+  return 0;
+}
+
+/// Room for a text of the page: its place in the memory.
+TETAP_EXPORT(room) char* room(std::uint32_t size) { return tables.room(size); }
+TETAP_EXPORT(add_table) std::uint32_t add_table() { return ended(tables.add_file()); }
+TETAP_EXPORT(name_column) std::uint32_t name_column() { return ended(tables.add_column()); }
+TETAP_EXPORT(name_unit) std::uint32_t name_unit() { return ended(tables.add_unit()); }
+TETAP_EXPORT(columns) void columns() { page::write(page::Channel::kColumns, tables.columns()); }
+TETAP_EXPORT(import_tables) std::uint32_t import_tables(std::uint32_t base) { return ended(tables.import(base)); }
+
+/// The lesson from its beginning.
+TETAP_EXPORT(begin_lesson)
+std::uint32_t begin_lesson(double dt_s, double p0, double q, double r_m2, double gate) {
+  for (const double number : {dt_s, p0, q, r_m2})
+    if (!(number >= 0 && number <= 1e6)) return refuse("no number of this lesson: " + std::to_string(number));
+  lesson.emplace(page::LessonNumbers{.dt_s = static_cast<float>(dt_s),
+                                     .p0 = static_cast<float>(p0),
+                                     .q = static_cast<float>(q),
+                                     .r_m2 = static_cast<float>(r_m2),
+                                     .gate = static_cast<float>(gate)});
+  return 0;
+}
+TETAP_EXPORT(step_lesson) std::uint32_t step_lesson(double z_m) {
+  if (!lesson) return refuse("no lesson has begun");
+  page::write(page::Channel::kUpdates, lesson->step(static_cast<float>(z_m)));
+  return 0;
+}
+
+/// Writes the frame that asks a node for its state, as a line of a log.
+TETAP_EXPORT(ask_snapshot) std::uint32_t ask_snapshot(std::uint32_t base, std::uint32_t counter) {
+  if (base > 0x7C0) return refuse("no id base: " + std::to_string(base));
+  sim::Line line;
+  sim::append_log_line(line, {}, "page",
+                       bus::frame(base, bus::protect(bus::CmdReset{.ctr = static_cast<std::uint8_t>(counter & 0x0FU),
+                                                                   .what = bus::ResetWhat::kSnapshot})));
+  page::write(page::Channel::kFrames, line.view());
   return 0;
 }

@@ -4,6 +4,7 @@
 #include "sim_host/page/module/browser.hpp"
 #include "sim_host/page/module/json.hpp"
 #include "sim_host/page/module/observer.hpp"
+#include "sim_host/page/module/updates.hpp"
 #include "sim_host/replay/complaint.hpp"
 #include "sim_host/replay/lockstep.hpp"
 #include "sim_host/replay/memory_node.hpp"
@@ -63,35 +64,92 @@ void put_begun(const BrowserLog& log, const char* mode, std::uint64_t ticks) {
   write(Channel::kBegun, json.end('}').text());
 }
 
+/// Looks at the updates up to an epoch, then ends the run.
+class UpdatesUntil {
+ public:
+  UpdatesUntil(base::Micros time, base::Micros span) : time_(time), span_(span) { over_ = false; }
+
+  void restarted() {}
+  void sent(const base::CanFrame&) {}
+  void received(const base::CanFrame&) {}
+  void epoch(const sim::NodeEpoch&, base::Micros time) {
+    over_ = over_ || time >= time_;
+    log_.takes = !over_ && time >= time_ - span_;
+    if (!over_) log_.next(time, time_ - span_);
+  }
+  [[nodiscard]] static std::string interrupted() { return over_ ? "over" : ""; }
+  [[nodiscard]] static bool over() { return over_; }
+  [[nodiscard]] std::string json() const { return log_.json(); }
+
+ private:
+  static inline bool over_ = false;
+  base::Micros time_, span_;
+  UpdateLog log_;
+};
+
+/// A log that has been read once, and the way it is played.
+struct Prepared {
+  sim::LogSurvey survey;
+  bool repeats = false;
+};
+
+sim::Result<Prepared> prepared(BrowserLog& log, const ReplayOptions& options, const sim::ScriptOptions& script) {
+  const auto survey = sim::survey_of(log, kName, options.mode, script);
+  if (!survey) return survey.failure();
+  if (log.report().data == 0) return sim::Failure{"no CAN data frame in the log"};
+  const bool repeats = survey->settled(options.mode) == sim::PlayMode::kAsRecorded;
+  if (repeats && !survey->recording) return sim::Failure{survey->refusal};
+  if (!repeats && survey->ticks == 0) return sim::Failure{"no input frames of this id base in the log"};
+  return Prepared{*survey, repeats};
+}
+
+sim::ScriptOptions script_of(const sim::Robot& robot, const ReplayOptions& options) {
+  return {.base = options.base, .log_base = options.base, .map_inputs = robot.takes.map_inputs()};
+}
+
 }  // namespace
 
 sim::Result<> replay(const sim::Robot& robot, const param::Parameters& parameters, const ReplayOptions& options) {
   BrowserLog log(kName, {.interface = {}, .keep_going = options.keep_going, .base = options.base});
-  const sim::ScriptOptions script{
-      .base = options.base, .log_base = options.base, .map_inputs = robot.takes.map_inputs()};
-  const auto survey = sim::survey_of(log, kName, options.mode, script);
-  if (!survey) return survey.failure();
-  if (log.report().data == 0) return sim::Failure{"no CAN data frame in the log"};
-  const sim::PlayMode mode = survey->settled(options.mode);
-  const bool repeats = mode == sim::PlayMode::kAsRecorded;
-  if (repeats && !survey->recording) return sim::Failure{survey->refusal};
-  if (!repeats && survey->ticks == 0) return sim::Failure{"no input frames of this id base in the log"};
-  put_begun(log, repeats ? "as-recorded" : "lockstep", repeats ? survey->recording->epochs : survey->ticks);
+  const sim::ScriptOptions script = script_of(robot, options);
+  const auto ready = prepared(log, options, script);
+  if (!ready) return ready.failure();
+  const auto& recording = ready->survey.recording;
+  put_begun(log, ready->repeats ? "as-recorded" : "lockstep", ready->repeats ? recording->epochs : ready->survey.ticks);
 
   const param::Parameters of_node = sim::MemoryNode::for_player(parameters, options.base);
   sim::MemoryNode node(robot, of_node, version());
   const sim::LockstepOptions lockstep{.base = options.base};
-  if (repeats) {
-    sim::RecordedTicks ticks(log, *survey->recording, script);
-    sim::Comparison comparison(ticks, *survey->recording, script);
+  if (ready->repeats) {
+    sim::RecordedTicks ticks(log, *recording, script);
+    sim::Comparison comparison(ticks, *recording, script);
     Observer run(options.base, &comparison);
     put_result(run, sim::play_lockstep(node.link(), ticks, run, lockstep, run.counts), &comparison);
   } else {
-    sim::LogTicks ticks(log, script, survey->has_ticks);
+    sim::LogTicks ticks(log, script, ready->survey.has_ticks);
     Observer run(options.base);
     put_result(run, sim::play_lockstep(node.link(), ticks, run, lockstep, run.counts), nullptr);
   }
   if (log.failure()) return *log.failure();
+  return {};
+}
+
+sim::Result<> updates_until(const sim::Robot& robot, const param::Parameters& parameters, const ReplayOptions& options,
+                            base::Micros time, base::Micros span) {
+  BrowserLog log(kName, {.interface = {}, .keep_going = options.keep_going, .base = options.base});
+  const sim::ScriptOptions script = script_of(robot, options);
+  const auto ready = prepared(log, options, script);
+  if (!ready) return ready.failure();
+  const param::Parameters of_node = sim::MemoryNode::for_player(parameters, options.base);
+  sim::MemoryNode node(robot, of_node, version());
+  const sim::LockstepOptions lockstep{.base = options.base, .window = 1, .interrupted = &UpdatesUntil::interrupted};
+  UpdatesUntil run(time, span);
+  sim::Counts counts;
+  const auto play = [&](auto&& ticks) { return sim::play_lockstep(node.link(), ticks, run, lockstep, counts); };
+  const auto played = ready->repeats ? play(sim::RecordedTicks(log, *ready->survey.recording, script))
+                                     : play(sim::LogTicks(log, script, ready->survey.has_ticks));
+  if (!played && !UpdatesUntil::over()) return played;
+  write(Channel::kUpdates, run.json());
   return {};
 }
 

@@ -20,4 +20,9 @@ struct ReplayOptions {
 /// record that cannot be repeated.
 sim::Result<> replay(const sim::Robot& robot, const param::Parameters& parameters, const ReplayOptions& options);
 
+/// Plays the log up to the epoch of that time, and writes kUpdates: the updates of every filter in the `span` before
+/// its end. The node is asked tick by tick, so that each update belongs to an epoch.
+sim::Result<> updates_until(const sim::Robot& robot, const param::Parameters& parameters, const ReplayOptions& options,
+                            base::Micros time, base::Micros span);
+
 }  // namespace tetap::page
