@@ -3,34 +3,15 @@
 // [{robot, log, sha, crc, epochs, settings: [{path, value, sha}]}], hashes as the host's programs have them. A picture of each view goes to
 // OUT. SEEN gets {robots: {robot: {hash_page, epochs_different, cpu_s}}, play: {robot, hash_page, epochs, script, log}, requests, console_errors};
 // script and log are files that the page saved. Status 1 where something differs, with a line for each.
-import { createRequire } from "node:module";
-import { existsSync, readFileSync, rmSync, writeFileSync, mkdirSync } from "node:fs";
+import { existsSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { dirname, join, resolve } from "node:path";
+import { session } from "./session.mjs";
 
 const [modules, file, out, cases, result] = process.argv.slice(2);
-const puppeteer = createRequire(`${resolve(modules)}/`)("puppeteer-core");
-mkdirSync(out, { recursive: true });
+const { browser, page, newPage, expect, data, picture, untilState, heard, end } = await session(modules, file, out);
+const seenOf = { robots: {}, play: null };
+await picture("open");
 
-const failures = [], seenOf = { robots: {}, play: null };
-const expect = (is, what) => {
-  console.log(`${is ? "ok  " : "FAIL"} ${what}`);
-  if (!is) failures.push(what);
-};
-
-const browser = await puppeteer.launch({ executablePath: "/usr/bin/chromium", headless: true, args: ["--no-sandbox", "--disable-gpu", "--disable-background-networking"], timeout: 120000, protocolTimeout: 240000 });
-const heard = { requests: [], errors: [] };
-async function newPage() {
-  const page = await browser.newPage();
-  page.on("pageerror", ({ message }) => heard.errors.push(message));
-  page.on("console", (message) => heard.errors.push(`${message.type()}: ${message.text()}`));
-  page.on("request", (request) => /^(file|blob|data):/.test(request.url()) || heard.requests.push(request.url()));
-  return page;
-}
-const page = await newPage();
-
-const untilState = (state) => page.waitForFunction((wanted) => [wanted, "failed"].includes(document.body.dataset.state), { timeout: 120000 }, state);
-const data = () => page.evaluate(() => ({ ...document.body.dataset, status: document.getElementById("status").textContent, wide: document.documentElement.scrollWidth - innerWidth }));
-const picture = (name) => page.screenshot({ path: `${out}/${name}.png`, fullPage: true });
 const drawn = () => page.evaluate(() => [...document.querySelectorAll("canvas")].filter((canvas) => canvas.width > 0).map((canvas) => {
   // A copy: a canvas of the page that is read out again and again would be warned about.
   const copy = new OffscreenCanvas(canvas.width, canvas.height).getContext("2d", { willReadFrequently: true }), colours = new Set();
@@ -121,12 +102,6 @@ async function passOn(robot) {
   await other.close();
 }
 
-const { width, height } = { width: 1180, height: 900 };
-await page.setViewport({ width, height });
-await page.emulateMediaFeatures([{ name: "prefers-color-scheme", value: "light" }]);
-await page.goto(`file://${resolve(file)}`);
-await untilState("ready");
-await picture("open");
 await play();
 for (const one of JSON.parse(readFileSync(cases, "utf8"))) {
   await open(one);
@@ -157,7 +132,4 @@ expect((await data()).wide <= 0, "nothing is wider than 390 pixels");
 await picture("narrow_dark_id");
 
 writeFileSync(result, JSON.stringify({ ...seenOf, requests: heard.requests.length, console_errors: heard.errors.length }));
-expect(heard.requests.length === 0, `no request to a network ${heard.requests.slice(0, 3)}`);
-expect(heard.errors.length === 0, `no message on the console ${heard.errors.slice(0, 3)}`);
-await browser.close();
-process.exit(failures.length > 0 ? 1 : 0);
+await end();

@@ -27,10 +27,16 @@ test("each word of the node has a text", () => {
     const body = source.slice(source.indexOf(`name(sensor::${type} value)`));
     return [...body.slice(body.indexOf("kNames{"), body.indexOf("};")).matchAll(/"(\w+)"/g)].map((found) => found[1]);
   };
-  for (const [type, prefixes] of [["Mode", ["word", "mode"]], ["SourceState", ["word"]], ["Verdict", ["verdict"]], ["Check", ["check"]], ["Sensor", ["source"]]]) {
+  for (const [type, prefixes] of [["Mode", ["word", "mode"]], ["SourceState", ["word"]], ["Verdict", ["verdict"]], ["Check", ["check"]], ["Sensor", ["source"]], ["EstimatorKind", ["kind"]]]) {
     assert.ok(list(type).length > 4, type);
     for (const word of list(type)) for (const prefix of prefixes) assert.ok(`${prefix}.${word}` in TEXTS.en, `${prefix}.${word}`);
   }
+});
+
+test("each sensor of a table has a text", () => {
+  const all = new Set(names("../../csv/quantities.cpp", /\{"(\w+)[.\w]*", Kind::k/g));
+  assert.ok(all.size > 10);
+  for (const kind of all) assert.ok(`column.${kind}` in TEXTS.en, kind);
 });
 
 test("each fault of the world has a text", () => {

@@ -10,6 +10,16 @@ import { bandChart, innovationChart } from "./charts.js";
 import { caseFile, savedCase } from "./case_file.js";
 import { Numbers } from "./numbers.js";
 import { Play } from "./play.js";
+import { TablesView } from "./tables_view.js";
+import { tablesOf } from "./tables.js";
+import { renderBits, renderFindings, renderWhy, sourceLine } from "./log_views.js";
+import { renderAsk } from "./ask_view.js";
+import { renderUpdate } from "./update_view.js";
+import { updateOf } from "./equations.js";
+import { CompareView } from "./compare_view.js";
+import { LessonView } from "./lesson_view.js";
+import { CableView } from "./cable_view.js";
+import { parsed } from "./settings_text.js";
 import { TaskQueue } from "./tasks.js";
 import { say, speak, languageNow } from "./texts.js";
 
@@ -22,6 +32,7 @@ class App {
     this.view = new View();
     this.state = "x_m";
     this.charts = [];
+    this.described = []; // numbers of a recording's robot that its form has: [[row, element, value]]
   }
   async start() {
     this.renderFrame();
@@ -30,23 +41,39 @@ class App {
     this.numbers = new Numbers(this.about.parameters, () => this.replayChanged());
     this.robot = Math.max(0, this.about.robots.findIndex(({ name }) => name === "rover"));
     this.numbers.of(this.about.robots[this.robot]);
-    this.play = new Play($("play"), this.tasks, this.about.robots, (file, truth) => this.open(file, truth).then(() => $("findings").scrollIntoView({ behavior: "smooth" })));
+    this.play = new Play($("play"), this.tasks, this.about.robots, (file, truth) => this.open(file, { truth }).then(() => $("findings").scrollIntoView({ behavior: "smooth" })));
+    this.tables = new TablesView($("tables"), this.tasks, this.about, (file, more) => this.open(file, more));
+    this.compare = new CompareView(this.tasks, this.about, JSON.parse($("costs").textContent));
+    this.lesson = new LessonView($("lesson"), this.tasks);
+    this.cable = new CableView($("cable"), this.tasks, (file) => this.open(file));
+    this.renderMore();
     await this.play.begin();
     this.status(() => say("open.ready"), "ready");
     this.renderRobots();
     const saved = await savedCase();
     if (saved) await this.openSaved(saved);
+    else if (parsed(location.hash)) await this.takeSettings(location.hash);
+  }
+  /** Settings as text, of another copy of this page: false where they are none. */
+  async takeSettings(text) {
+    const given = parsed(text), known = given ? this.about.robots.findIndex(({ name }) => name === given.robot) : -1;
+    if (known < 0) return false;
+    if (known !== this.robot) await this.chooseRobot(known);
+    this.numbers.takeNamed(given.numbers);
+    if (this.file) await this.replayChanged();
+    else this.given = given; // for the first log
+    return true;
   }
   /** The log that lies in the page, with the numbers that were changed. */
-  async openSaved({ log, robot, numbers }) {
-    await this.open(log);
+  async openSaved({ log, robot, numbers, described }) {
     const known = this.about.robots.findIndex(({ name }) => name === robot);
-    if (known >= 0 && known !== this.robot) await this.chooseRobot(known);
+    await this.open(log, { robot: known < 0 ? null : known, described: described ?? [] });
+    if (known < 0) return;
     this.numbers.takeNamed(numbers ?? {});
     if (this.numbers.changed.size > 0) await this.replayChanged();
   }
   async saveCase() {
-    save(`${this.file.name.replace(/\.\w+$/, "")}.html`, await caseFile(this.file, this.about.robots[this.robot].name, this.numbers.named()));
+    save(`${this.file.name.replace(/\.\w+$/, "")}.html`, await caseFile(this.file, this.about.robots[this.robot].name, this.numbers.named(), this.described));
   }
   /** `words` is a text of the node or of the module, or gives one in the language of the moment. */
   status(words, state) {
@@ -59,26 +86,67 @@ class App {
     return this.file ? say("open.log", this.file.name, (this.file.size / 1e6).toFixed(1)) : say("open.ready");
   }
 
-  /** `truth` {t, x, y}: of a log that was played here. */
-  async open(file, truth = null) {
+  /** Files that were dropped together: a log, or tables of one recording. */
+  async openFiles(files) {
+    if (files.length === 0) return;
+    this.status(() => say("open.reading", files[0].name), "busy");
+    try {
+      const tables = await tablesOf(files);
+      if (!tables) return await this.open(files[0]);
+      this.play.pause();
+      await this.tables.show(tables);
+      this.status(() => say("tables.status"), "tables");
+    } catch (error) {
+      this.fail(error);
+    }
+  }
+  /** `truth` {t, x, y}: of a log that was played here. `robot`: number of the one that the user has named; null: the log's own. */
+  async open(file, { truth = null, robot = null, described = [] } = {}) {
     this.play.pause();
-    this.file = file;
-    this.truth = truth;
-    this.run = this.second = this.findings = null;
+    if (robot === null) this.tables.hide();
+    Object.assign(this, { file, truth, described, run: null, second: null, findings: null, why: null, opened: null });
+    this.compare.forget();
+    $("ask").hidden = true;
     this.status(() => say("open.reading", file.name), "busy");
     try {
       this.identity = await this.tasks.run("open", { log: file });
       const known = this.about.robots.findIndex(({ config }) => config === this.identity.config);
-      if (known >= 0) this.robot = known;
-      this.known = known >= 0;
-      this.numbers.of(this.about.robots[this.robot]);
+      this.known = known >= 0 && (robot === null || robot === known);
+      if (known < 0 && robot === null) return this.ask();
+      this.robot = robot ?? known;
+      this.numbers.of(this.describedRobot());
       await this.replayAll();
+      await this.takeGiven();
     } catch (error) {
-      this.status(say("open.failed", error.message), "failed");
+      this.fail(error);
     }
   }
+  /** Settings that came before any log. */
+  async takeGiven() {
+    const { given } = this;
+    this.given = null;
+    if (given?.robot !== this.about.robots[this.robot].name) return;
+    this.numbers.takeNamed(given.numbers);
+    await this.replayChanged();
+  }
+  /** The robot with what a recording's form says of it. */
+  describedRobot() {
+    const robot = this.about.robots[this.robot], values = robot.values.map((own) => [...own]);
+    for (const [row, element, value] of this.described) if (values[row]) values[row][element] = value;
+    return { ...robot, values };
+  }
+  /** The page knows no robot with the log's numbers: which one is to be played is the user's word. */
+  ask() {
+    $("views").hidden = true;
+    renderAsk($("ask"), this.about.robots, this.identity, (robot) => this.chooseRobot(robot).then(() => ($("ask").hidden = true)));
+    this.status(() => say("ask.status", this.file.name), "asks");
+    this.renderRobots();
+  }
+  fail(error) {
+    this.status(() => (error.trapped ? say("open.trapped", error.message) : say("open.failed", error.message)), "failed");
+  }
   task(extra = {}) {
-    return { robot: this.robot, base: this.identity.base, settings: [], ...extra };
+    return { robot: this.robot, base: this.identity.base, ...extra, settings: [...this.described, ...(extra.settings ?? [])] };
   }
   async replayAll() {
     this.second = null;
@@ -138,11 +206,29 @@ class App {
   async chooseRobot(number) {
     this.robot = number;
     this.known = this.about.robots[number].config === this.identity?.config;
-    this.numbers.of(this.about.robots[number]);
+    this.numbers.of(this.describedRobot());
+    this.compare?.forget();
     this.renderRobots();
     if (!this.file) return;
-    this.status(say("open.reading", this.file.name), "busy");
-    await this.replayAll().catch((error) => this.status(say("open.failed", error.message), "failed"));
+    this.status(() => say("open.reading", this.file.name), "busy");
+    await this.replayAll().catch((error) => this.fail(error));
+  }
+  /** The update behind a record of an innovation, from the flashed filter itself. */
+  async openUpdate(one) {
+    const mode = this.lockstep === this.file ? MODE.lockstep : MODE.automatic;
+    this.opened = { one, wait: true };
+    this.renderUpdate();
+    const updates = await this.tasks.run("updates", this.task({ settings: this.numbers.settings(), mode, time_s: one.time, span_s: 1.2 })).catch((error) => error);
+    if (this.opened?.one !== one) return;
+    this.opened = updates instanceof Error ? { one, failed: updates.message } : { one, update: updateOf(updates, one) };
+    this.renderUpdate();
+    document.body.dataset.update = this.opened.update ? this.opened.update.model : "none";
+  }
+  async compareAll(progress) {
+    const truth = this.truth && { ...this.truth };
+    await this.compare.run(this.robot, this.identity.inputs, (extra) => this.task({ settings: this.numbers.settings(), ...extra }), truth, progress);
+    this.renderCompare();
+    document.body.dataset.compared = "yes";
   }
 
   // Below: what is drawn. A change of language draws all of it anew.
@@ -152,12 +238,19 @@ class App {
     if (this.said) this.status(this.said);
     const other = languageNow() === "en" ? "id" : "en";
     replace($("tools"),
-      element("button", { id: "language", lang: other, onclick: () => (speak(other), this.renderFrame(), this.renderRobots(), this.play?.render(), this.render(true)) }, say("lang.other")),
+      element("button", { id: "language", lang: other, onclick: () => (speak(other), this.renderFrame(), this.renderMore(), this.play?.render(), this.render(true)) }, say("lang.other")),
       element("button", { id: "theme", onclick: () => this.otherTheme() }, say("theme.other")));
     this.renderDrop();
   }
+  /** What stands beside a log. */
+  renderMore() {
+    if (document.body.dataset.state === "asks") this.ask();
+    this.tables?.render();
+    this.lesson?.render();
+    this.cable?.render();
+  }
   renderDrop() {
-    const file = element("input", { type: "file", id: "file", onchange: () => file.files[0] && this.open(file.files[0]) });
+    const file = element("input", { type: "file", id: "file", multiple: true, onchange: () => this.openFiles([...file.files]) });
     replace($("drop"), element("strong", {}, say("open.drop")), element("label", { class: "button" }, say("open.choose"), file), element("span", { class: "note" }, say("open.formats")),
       this.run && element("button", { id: "save-case", title: say("open.case"), onclick: () => this.saveCase() }, say("open.save")));
   }
@@ -165,12 +258,14 @@ class App {
     const root = document.documentElement, dark = root.dataset.theme ?? (matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light");
     root.dataset.theme = dark === "dark" ? "light" : "dark";
     this.play?.render();
+    this.lesson?.render();
     this.render(true);
   }
   renderRobots() {
     if (!this.about) return;
     const select = element("select", { id: "robot", "aria-label": say("robot.label"), onchange: () => this.chooseRobot(Number(select.value)) },
       this.about.robots.map(({ name }, i) => element("option", { value: i, selected: i === this.robot }, name)));
+    if (document.body.dataset.state === "asks") return replace($("robots"));
     const name = this.about.robots[this.robot].name;
     const words = !this.identity ? "" : this.known ? say("robot.known", name) : say(this.identity.config === undefined ? "robot.silent" : "robot.unknown", name);
     replace($("robots"), say("robot.label"), " ", select, element("span", { class: this.known || !this.identity ? "note" : "warning" }, ` ${words}`));
@@ -190,7 +285,9 @@ class App {
     this.renderInnovations();
     this.renderTimeline();
     this.renderWhy(this.why ?? null);
-    this.numbers.render(this.section("numbers"), this.message);
+    this.renderUpdate();
+    this.renderCompare();
+    this.numbers.render(this.section("numbers"), this.message, (text) => this.takeSettings(text));
   }
   section(name, note) {
     const body = element("div", { class: "body" });
@@ -202,27 +299,12 @@ class App {
     return this.second ? [first, { run: this.second, colour: colour("second"), label: say("numbers.after") }] : [first];
   }
   renderBits() {
-    const { result } = this.run, compared = result.epochs_compared ?? 0;
-    const same = compared > 0 && result.epochs_different === 0;
-    const verdict = compared === 0 ? say("bits.none") : same ? say("bits.same", compared) : say("bits.differ", result.epochs_different, compared, result.first_difference);
-    const warnings = [result.first_malformed, result.cut_off, result.first_gap, result.first_wrong_length].filter(Boolean).join("; ");
-    replace(this.section("bits"),
-      element("p", { class: same ? "good" : compared === 0 ? "note" : "bad", id: "same" }, verdict),
-      result.other_numbers ? element("p", { class: "warning" }, say("bits.numbers")) : null,
-      this.note ? element("p", { class: "warning" }, this.note) : null,
-      result.wrong && same ? element("p", { class: "warning" }, result.wrong) : null,
-      warnings ? element("p", { class: "warning" }, say("open.warnings", warnings)) : null,
-      element("p", { class: "hash" }, say("bits.hash", result.estimates_sha256)), element("p", { class: "hash" }, say("bits.crc", result.state_crc_last)));
+    const { result } = this.run;
+    renderBits(this.section("bits"), this.run, this.note);
     Object.assign(document.body.dataset, { sha: result.estimates_sha256, crc: result.state_crc_last, different: result.epochs_different ?? "", second: this.second?.result.estimates_sha256 ?? "" });
   }
   renderFindings() {
-    const body = this.section("findings"), found = this.findings;
-    if (!found) return replace(body, element("p", { class: "note" }, say("findings.wait")));
-    if (found.failed) return replace(body, element("p", { class: "warning" }, say("findings.failed", found.failed)));
-    if (found.findings.length === 0) return replace(body, element("p", { class: "good" }, say("findings.none")));
-    replace(body, element("ol", {}, found.findings.map(({ code, cause, evidence, change }) =>
-      element("li", { "data-code": code }, element("strong", {}, cause), element("p", {}, `${say("findings.evidence")}: ${evidence}`),
-        element("p", { class: "change" }, `${say("findings.change")}: ${change}`)))));
+    renderFindings(this.section("findings"), this.findings);
   }
   renderPath(keep) {
     const body = this.section("path", say("path.legend")), before = keep ? this.path : null;
@@ -243,29 +325,33 @@ class App {
     this.charts.push(bandChart(chart, this.view, say(`state.${name}`), this.runs().map((one) => ({ ...one, value: name, sigma: SIGMAS[name] }))));
   }
   renderInnovations() {
-    const body = this.section("innovation", say("innovation.note"));
+    const body = this.section("innovation", say("innovation.note")), names = [...this.run.sources.keys()];
+    const only = names.includes(this.source) ? this.source : null;
+    const select = element("select", { id: "innovation-source", "aria-label": say("innovation.source"), onchange: () => ((this.source = select.value), this.render(true)) },
+      ["", ...names].map((name) => element("option", { value: name, selected: name === (only ?? "") }, name === "" ? say("innovation.all") : sourceLine(this.run, name))));
+    body.append(select);
     const inks = ["first", "second", "good", "warn", "third"].map(colour);
-    this.charts.push(innovationChart(body, this.view, "", this.run, inks, (one) => one && this.renderWhy(one)));
+    this.charts.push(innovationChart(body, this.view, "", this.run, only, inks, (one) => one && this.renderWhy(one)));
   }
   renderTimeline() {
     const body = this.section("timeline", say("timeline.help"));
     this.timeline = new Timeline(body, this.view, (one) => this.renderWhy(one));
     this.timeline.show(this.run);
   }
-  /** In words, what became of one measurement. */
   renderWhy(one) {
     this.why = one;
-    const body = this.section("why");
-    if (!one) return replace(body, element("p", { class: "note" }, say("why.nothing")));
-    this.view.point(one.time);
-    const faults = this.run.faults(one.time), named = [...Array(16).keys()].filter((bit) => (faults >> bit) & 1).map((bit) => say(`fault.${bit}`));
-    const mode = this.run.mode(one.time);
-    replace(body,
-      element("p", {}, say("why.when", say(`source.${one.source}`), one.time.toFixed(2), say(`verdict.${one.verdict}`))),
-      element("p", {}, say(`check.${one.failed}`)),
-      Number.isNaN(one.ratio) ? null : element("p", {}, say("why.ratio", one.ratio.toFixed(2))),
-      mode ? element("p", {}, say("why.mode", say(`word.${mode}`), say(`mode.${mode}`))) : null,
-      named.length > 0 ? element("p", {}, say("why.faults", named.join(", "))) : null);
+    if (one) this.view.point(one.time);
+    renderWhy(this.section("why"), this.run, one, (which) => this.openUpdate(which));
+  }
+  renderUpdate() {
+    $("update").hidden = !this.opened;
+    if (!this.opened) return;
+    const { one, update, wait, failed } = this.opened, body = this.section("update", say("update.of", say(`source.${one.source}`), one.time.toFixed(2)));
+    if (update) return renderUpdate(body, update);
+    replace(body, element("p", { class: failed ? "bad" : "note" }, failed ?? (wait ? say("update.wait") : say(one.refused ? "update.before" : "update.none", say(`check.${one.failed}`)))));
+  }
+  renderCompare() {
+    this.compare.render(this.section("compare", say("compare.what")), (progress) => this.compareAll(progress));
   }
 }
 
@@ -273,8 +359,7 @@ const app = new App();
 addEventListener("dragover", (event) => event.preventDefault());
 addEventListener("drop", (event) => {
   event.preventDefault();
-  const file = event.dataTransfer.files[0];
-  if (file && app.play) app.open(file);
+  if (app.play) app.openFiles([...event.dataTransfer.files]);
 });
 addEventListener("resize", () => app.run && (app.path.draw(), app.timeline.draw()));
 if (navigator.language.startsWith("id")) speak("id");

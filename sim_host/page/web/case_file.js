@@ -14,19 +14,20 @@ function stored(id, text) {
   return script;
 }
 
-/** `numbers` {path: [value of each element]}: a blob of the file. */
-export async function caseFile(log, robot, numbers) {
+/** `numbers` {path: [value of each element]}, `described` [[row, element, value]] of a recording's form: a blob of the file. */
+export async function caseFile(log, robot, numbers, described = []) {
   const page = PRISTINE.cloneNode(true), body = page.querySelector("body");
   const gzipped = await new Response(log.stream().pipeThrough(new CompressionStream("gzip"))).blob();
-  body.prepend(stored("saved", await base64Of(new Blob([JSON.stringify({ name: log.name, robot, numbers })]))), stored("saved-log", await base64Of(gzipped)));
+  body.prepend(stored("saved", await base64Of(new Blob([JSON.stringify({ name: log.name, robot, numbers, described })]))), stored("saved-log", await base64Of(gzipped)));
   return new Blob([`<!doctype html>\n${page.outerHTML}\n`], { type: "text/html" });
 }
 
-/** What the file was saved with: {log, robot, numbers}, or null. */
+/** What the file was saved with: {log, robot, numbers, described}, or null. */
 export async function savedCase() {
   const about = document.getElementById("saved");
   if (!about) return null;
   const bytes = Uint8Array.from(atob(about.textContent), (c) => c.charCodeAt(0));
-  const { name, robot, numbers } = JSON.parse(new TextDecoder().decode(bytes));
-  return { log: new File([await unpacked("saved-log")], String(name)), robot: String(robot), numbers };
+  const { name, robot, numbers, described } = JSON.parse(new TextDecoder().decode(bytes));
+  const rows = Array.isArray(described) ? described.filter((one) => Array.isArray(one) && one.length === 3 && one.every(Number.isFinite)) : [];
+  return { log: new File([await unpacked("saved-log")], String(name)), robot: String(robot), numbers, described: rows };
 }

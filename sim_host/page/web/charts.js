@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Charts over time (uPlot), tied to one view.
 import { colour } from "./dom.js";
+import { say } from "./texts.js";
 
 const base = (view, title, height) => ({
   title,
@@ -78,17 +79,17 @@ function heldAt(t, v, wanted) {
   });
 }
 
-/** Innovations over their gates, a point each: above 1 is beyond it. `onPoint` gets the one that was clicked. */
-export function innovationChart(parent, view, title, run, inks, onPoint) {
-  const names = [...run.sources.keys()], least = 0.01;
+/** Innovations over their gates, a point each, of one source or (null) of all: above 1 is beyond it. `onPoint` gets the one that was clicked. */
+export function innovationChart(parent, view, title, run, only, inks, onPoint) {
+  const names = only === null ? [...run.sources.keys()] : [only], least = 0.01;
   const points = { show: true, size: 4 }, paths = () => null;
   const tables = names.map((name) => {
     const all = run.sources.get(name);
     return [all.map(({ time }) => time), all.map(({ ratio }) => Math.max(least, ratio))];
   });
-  const series = names.map((name, i) => ({ label: name, stroke: inks[i % inks.length], paths, points: { ...points, fill: inks[i % inks.length] } }));
+  const series = names.map((name, i) => ({ label: say(`source.${name}`), stroke: inks[i % inks.length], paths, points: { ...points, fill: inks[i % inks.length] } }));
   if (names.length === 0) return null;
-  const top = Math.max(10, ...run.refusals.map(({ ratio }) => ratio).filter(Number.isFinite).slice(0, 10000));
+  const top = Math.max(10, ...run.refusals.filter(({ source }) => names.includes(source)).map(({ ratio }) => ratio).filter(Number.isFinite).slice(0, 10000));
   const gate = (plot) => {
     const y = Math.round(plot.valToPos(1, "y", true)), { ctx, bbox } = plot;
     ctx.save();

@@ -2,7 +2,7 @@
 // The module that holds the flashed code: what it imports, and its functions with words for failures.
 
 /** Channels of module/browser.hpp. Below 16: a table of a run. */
-export const CHANNEL = { description: 16, refusal: 17, begun: 18, result: 19, diagnosis: 20, fixes: 21, log: 22, stage: 23, truth: 24, frames: 25, played: 26, injected: 27, script: 28 };
+export const CHANNEL = { description: 16, refusal: 17, begun: 18, result: 19, diagnosis: 20, fixes: 21, log: 22, stage: 23, truth: 24, frames: 25, played: 26, injected: 27, script: 28, columns: 29, imported: 30, updates: 31 };
 const RAW = new Set([CHANNEL.fixes, CHANNEL.truth, CHANNEL.frames]);
 export const MODE = { automatic: 0, lockstep: 1, asRecorded: 3 };
 
@@ -105,6 +105,39 @@ export class Engine {
   script() {
     this.call("script");
     return this.objects.get(CHANNEL.script);
+  }
+
+  /** A text into the module's memory. */
+  text(bytes) {
+    const from = typeof bytes === "string" ? new TextEncoder().encode(bytes) : bytes, to = this.exports.room(from.length);
+    new Uint8Array(this.exports.memory.buffer).set(from, to);
+  }
+  /** `files` [{name, bytes}], `named` {columns: [[quantity, column]], units: [[quantity, unit]]}. @throws Refusal */
+  tables(files, { columns, units }) {
+    for (const { name, bytes } of files) this.text(name), this.text(bytes), this.call("add_table");
+    for (const [quantity, column] of columns) this.text(quantity), this.text(column), this.call("name_column");
+    for (const [quantity, unit] of units) this.text(quantity), this.text(unit), this.call("name_unit");
+  }
+  columns(files, named) {
+    this.tables(files, named);
+    this.exports.columns();
+    return this.objects.get(CHANNEL.columns);
+  }
+  /** Tables as a log, whose lines come by onText. @throws Refusal */
+  importTables(files, named, base) {
+    this.tables(files, named);
+    this.call("import_tables", base);
+    return this.objects.get(CHANNEL.imported);
+  }
+  /** Updates of the node's filters in `span_s` before the end of the epoch at `time_s`. @throws Refusal */
+  updates(base, mode, time_s, span_s) {
+    this.call("updates", base, mode, 1, time_s, span_s);
+    return this.objects.get(CHANNEL.updates);
+  }
+  /** An update of the lesson's filter for each position. @throws Refusal */
+  lesson({ dt_s, p0, q, r_m2, gate = 0 }, positions) {
+    this.call("begin_lesson", dt_s, p0, q, r_m2, gate);
+    return positions.map((z) => (this.call("step_lesson", z), this.objects.get(CHANNEL.updates)[0]));
   }
 
   /** @throws Refusal */

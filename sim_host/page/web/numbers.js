@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Change a number: rows of the parameter table, what was changed, the parameter file.
 import { element, replace, save } from "./dom.js";
+import { textOf } from "./settings_text.js";
 import { say } from "./texts.js";
 
 const SHOWN = 8;
@@ -54,7 +55,8 @@ export class Numbers {
     return [`# ${this.robot.name}`, ...[...this.changed.keys()].map((row) => `${this.rows[row].path} = ${this.text(row)}`), ""].join("\n");
   }
 
-  render(parent, message) {
+  /** `onText(text)` is given settings that the user pastes; its promise says whether they are some. */
+  render(parent, message, onText) {
     this.list = element("div", { class: "rows" });
     const find = element("input", { type: "search", value: this.filter, placeholder: say("numbers.find"), "aria-label": say("numbers.find"),
       oninput: () => ((this.filter = find.value), this.renderRows()) });
@@ -64,8 +66,16 @@ export class Numbers {
       message && element("p", { class: "effect", id: "effect", role: "status" }, message) || null,
       element("div", { class: "buttons" },
         element("button", { onclick: () => (this.changed.clear(), this.onChange()), disabled: this.changed.size === 0 }, say("numbers.reset")),
-        element("button", { onclick: () => save(`${this.robot.name}.params`, this.file()), disabled: this.changed.size === 0 }, say("numbers.save"))));
+        element("button", { onclick: () => save(`${this.robot.name}.params`, this.file()), disabled: this.changed.size === 0 }, say("numbers.save"))), this.exchange(onText));
     this.renderRows();
+  }
+
+  /** Settings as text: to copy, and to take. */
+  exchange(onText) {
+    const said = element("span", { role: "status", class: "note" });
+    const text = element("input", { id: "settings", value: textOf(this.robot.name, this.named()), "aria-label": say("numbers.text"), spellcheck: "false",
+      onfocus: () => text.select(), onchange: async () => (await onText(text.value)) || (said.textContent = say("numbers.nosettings")) });
+    return element("label", { class: "settings" }, `${say("numbers.text")} `, text, said);
   }
 
   renderRows() {

@@ -73,13 +73,13 @@ export class Run {
 
   readInnovations() {
     const table = this.tables.innovations, estimator = table.values("estimator"), time = table.values("time_s");
-    const ratio = table.values("ratio"), age = table.values("age_ms");
+    const ratio = table.values("ratio"), age = table.values("age_ms"), dof = table.values("dof"), nis = table.values("nis");
     this.sources = new Map();
     this.refusals = [];
     for (let row = 0; row < table.rows; row++) {
       if (estimator[row] !== this.estimator) continue;
       const source = table.word("sensor", row), verdict = table.word("verdict", row);
-      const one = { time: time[row], stamp: time[row] - age[row] / 1000, ratio: ratio[row], source, verdict, failed: table.word("failed", row) };
+      const one = { time: time[row], stamp: time[row] - age[row] / 1000, ratio: ratio[row], dof: dof[row], nis: nis[row], source, verdict, failed: table.word("failed", row) };
       one.refused = !NO_REFUSAL.has(verdict);
       if (!this.sources.has(source)) this.sources.set(source, []);
       this.sources.get(source).push(one);
@@ -117,6 +117,12 @@ export class Run {
     this.states = new Map([...by].map(([source, [t, words]]) => [source, spans(t, words, end)]));
   }
 
+  /** The measurement whose record is nearest to a moment. */
+  measurementAt(time) {
+    let best = null;
+    for (const all of this.sources.values()) for (const one of all) if (best === null || Math.abs(one.time - time) < Math.abs(best.time - time)) best = one;
+    return best;
+  }
   /** Bits of Est_Status.Faults at a moment. */
   faults(time) {
     const status = this.tables.status;

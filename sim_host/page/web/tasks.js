@@ -19,13 +19,13 @@ export class TaskQueue {
     this.worker.onerror = ({ message }) => this.fail(message || "the worker has ended");
     this.worker.postMessage({ module: this.module });
   }
-  answer({ id, share, done, failed, refused }) {
+  answer({ id, share, done, failed, refused, trapped }) {
     const one = this.waiting.get(id);
     if (!one) return;
     if (share !== undefined) return one.progress(share);
     this.waiting.delete(id);
     if (failed === undefined) one.resolve(done);
-    else one.reject(Object.assign(new Error(failed), { refused }));
+    else one.reject(Object.assign(new Error(failed), { refused, trapped }));
   }
   fail(why) {
     const waiting = this.waiting;

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // All words of the page, in each language under the same keys. {0}, {1} stand for values.
+import { MORE } from "./texts_more.js";
+
 export const TEXTS = {
   en: {
     "title.tag": "The flashed code, in this page. Nothing leaves it.",
@@ -71,7 +73,7 @@ export const TEXTS = {
     "inject.image_stamps": "image stamps 0.1 s late",
     "open.drop": "Drop a log here",
     "open.choose": "Choose a log",
-    "open.formats": "candump -L, candump -t, Vector .asc",
+    "open.formats": "candump -L, candump -t, Vector .asc; tables (CSV), also phyphox and Sensor Logger as .zip",
     "open.save": "Save page, log and numbers as one file",
     "open.case": "For a report of a mistake: whoever opens the file sees what you see.",
     "open.reading": "reading {0}",
@@ -110,8 +112,8 @@ export const TEXTS = {
     "innovation.title": "Innovation over its gate",
     "innovation.note": "Each dot is a measurement. Above the line it is refused. Click one.",
     "timeline.title": "Modes, sources, refusals",
-    "timeline.label": "Time line. Arrows move, plus and minus zoom, n and p go to the next refusal and to the one before.",
-    "timeline.help": "Click a red stroke, or press n and p.",
+    "timeline.label": "Time line. Arrows move, plus and minus zoom, n and p go to the next refusal and to the one before, u to the measurement at the cursor.",
+    "timeline.help": "Click a red stroke, or press n and p; u for the measurement at the cursor.",
     "why.title": "Why",
     "why.nothing": "Click a refusal to see why.",
     "why.when": "{0}, {1} s: {2}.",
@@ -300,7 +302,7 @@ export const TEXTS = {
     "inject.image_stamps": "stempel waktu gambar telat 0,1 s",
     "open.drop": "Letakkan log di sini",
     "open.choose": "Pilih log",
-    "open.formats": "candump -L, candump -t, Vector .asc",
+    "open.formats": "candump -L, candump -t, Vector .asc; tabel (CSV), juga phyphox dan Sensor Logger sebagai .zip",
     "open.save": "Simpan halaman, log, dan angka dalam satu berkas",
     "open.case": "Untuk laporan kesalahan: siapa pun yang membuka berkas ini melihat hal yang sama.",
     "open.reading": "membaca {0}",
@@ -339,8 +341,8 @@ export const TEXTS = {
     "innovation.title": "Inovasi dibagi gate",
     "innovation.note": "Setiap titik adalah satu pengukuran. Di atas garis, pengukuran ditolak. Klik salah satu.",
     "timeline.title": "Mode, sumber, penolakan",
-    "timeline.label": "Garis waktu. Panah untuk geser, plus dan minus untuk zoom, n dan p ke penolakan berikutnya dan sebelumnya.",
-    "timeline.help": "Klik garis merah, atau tekan n dan p.",
+    "timeline.label": "Garis waktu. Panah untuk geser, plus dan minus untuk zoom, n dan p ke penolakan berikutnya dan sebelumnya, u ke pengukuran pada kursor.",
+    "timeline.help": "Klik garis merah, atau tekan n dan p; u untuk pengukuran pada kursor.",
     "why.title": "Mengapa",
     "why.nothing": "Klik sebuah penolakan untuk melihat sebabnya.",
     "why.when": "{0}, {1} s: {2}.",
@@ -460,6 +462,8 @@ export const TEXTS = {
     "state.std_yaw_rad": "1σ heading [rad]",
   },
 };
+
+for (const [language, texts] of Object.entries(MORE)) Object.assign(TEXTS[language], texts);
 
 let language = "en";
 export const languageNow = () => language;

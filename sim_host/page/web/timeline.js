@@ -90,13 +90,13 @@ export class Timeline {
     });
     canvas.addEventListener("keydown", (event) => this.key(event));
   }
-  /** Arrows move, + and - zoom, n and p go to the next refusal and to the one before. */
+  /** Arrows move, + and - zoom, n and p go to the next refusal and to the one before, u to the measurement at the cursor. */
   key(event) {
     const { view } = this, from = view.cursor ?? view.span[0];
     const jump = (one) => one && (view.point(one.time), this.onRefusal(one));
     const keys = { "+": () => view.zoom(0.8), "=": () => view.zoom(0.8), "-": () => view.zoom(1.25), 0: () => view.show(view.whole),
       ArrowLeft: () => view.pan(-0.2), ArrowRight: () => view.pan(0.2),
-      n: () => jump(this.run.refusals.find(({ time }) => time > from)), p: () => jump(this.run.refusals.findLast(({ time }) => time < from)) };
+      n: () => jump(this.run.refusals.find(({ time }) => time > from)), p: () => jump(this.run.refusals.findLast(({ time }) => time < from)), u: () => jump(this.run.measurementAt(from)) };
     if (!keys[event.key]) return;
     event.preventDefault();
     keys[event.key]();

@@ -42,12 +42,36 @@ export class Tasks {
     if (robot !== null) engine.choose(robot, settings);
     return engine.diagnose(base, robot !== null);
   }
+  /** Columns of tables as their names and what the user has named show them; `files` [{name, bytes}]. */
+  columns({ files, named }) {
+    return this.engine().columns(files, named);
+  }
+  /** The tables as a log: {about, frames}. */
+  importTables({ files, named, base }) {
+    const frames = [], engine = this.engine((channel, data) => channel === CHANNEL.frames && frames.push(data.slice()));
+    return { about: engine.importTables(files, named, base), frames };
+  }
+  /** Updates of the node's filters up to an epoch. */
+  updates({ robot, base, settings, mode, time_s, span_s }) {
+    const engine = this.engine();
+    engine.choose(robot, settings);
+    return engine.updates(base, mode, time_s, span_s);
+  }
+  /** Updates of the lesson's filter by these positions. */
+  lesson({ numbers, positions }) {
+    return this.engine().lesson(numbers, positions);
+  }
+  snapshotRequest({ base, counter }) {
+    let line = "";
+    this.engine((channel, data) => channel === CHANNEL.frames && (line = new TextDecoder().decode(data))).call("ask_snapshot", base, counter);
+    return line.trim().split(" ")[2];
+  }
   check({ robot, settings }) {
     this.engine().choose(robot, settings);
     return true;
   }
   /** Tables and result; `progress(share)` as it goes. */
-  replay({ robot, base, settings, mode }, progress) {
+  replay({ robot, base, settings, mode, borrow = null }, progress) {
     const tables = TABLES.map(() => new Table()), fixes = new Table();
     let ticks = 0, epochs = 0;
     const engine = this.engine((channel, data) => {
@@ -61,6 +85,7 @@ export class Tasks {
       }
     });
     engine.choose(robot, settings);
+    if (borrow !== null) engine.call("borrow", borrow);
     const result = engine.replay(base, mode);
     const packed = { fixes: fixes.packed() };
     TABLES.forEach((name, i) => (packed[name] = tables[i].packed()));
@@ -101,7 +126,7 @@ export class Tasks {
       postMessage({ id, done }, transfers(done));
     } catch (error) {
       // A trap of the module is an error of WebAssembly: it ends the instance and nothing else.
-      postMessage({ id, failed: String(error.message), refused: error instanceof Refusal });
+      postMessage({ id, failed: String(error.message), refused: error instanceof Refusal, trapped: error instanceof WebAssembly.RuntimeError || error instanceof RangeError });
     }
   }
 }

@@ -1,0 +1,170 @@
+// SPDX-License-Identifier: Apache-2.0
+// node features.mjs PUPPETEER PAGE.html OUT CASES: what a user does beside a log of a known robot. CASES {tables: [{file, robot, sha, frames}], unknown: {file, robot, sha},
+// rover: {log, sha}}, hashes and counts as the host's programs have them. A picture of each view goes to OUT. Status 1 where something differs.
+import { readFileSync } from "node:fs";
+import { session } from "./session.mjs";
+
+const [modules, file, out, cases] = process.argv.slice(2);
+const { tables, unknown, rover } = JSON.parse(readFileSync(cases, "utf8"));
+const { page, expect, data, picture, untilState, end } = await session(modules, file, out, { serial: true });
+const text = (selector) => page.$eval(selector, (one) => one.textContent).catch(() => "");
+const open = async (path) => {
+  await page.evaluate(() => delete document.body.dataset.diagnosed);
+  await (await page.$("#file")).uploadFile(...[path].flat());
+};
+const number = (words, at = 0) => Number((words.match(/-?\d+(\.\d+)?(e[-+]?\d+)?/gi) ?? [])[at]);
+
+// Tables: the form, the log, and the host's hash.
+for (const one of tables) {
+  await open(one.file);
+  await untilState("tables");
+  const fields = await page.$$eval("#tables select, #tables input", (all) => all.filter((one) => one.checkVisibility()).length);
+  expect(fields >= 9 && fields <= 16, `${one.name}: a form of ${fields} fields`);
+  expect((await page.$$eval("#views", ([views]) => views.hidden)) || (await data()).sha !== one.sha, "nothing is played before the user has looked");
+  await page.select("#tables-robot", await page.$eval("#tables-robot", (select, name) => [...select.options].find(({ textContent }) => textContent === name).value, one.robot));
+  await picture(`tables_${one.name}`);
+  await page.click("#tables-play");
+  await untilState("done");
+  expect((await data()).sha === one.sha, `${one.name}: the host's hash by tetap-import and tetap-play (${(await data()).sha?.slice(0, 12)}, ${(await data()).status})`);
+  expect(number(await text("#tables-made")) === one.frames, `${one.name}: ${await text("#tables-made p")}`);
+}
+// A unit that no table has is asked for, and one that the user names makes another log.
+await page.select("#tables [data-unit=gyro]", "deg/s");
+await page.click("#tables-play");
+await page.waitForFunction((sha) => document.body.dataset.state === "done" && document.body.dataset.sha !== sha, { timeout: 60000 }, tables.at(-1).sha).catch(() => {});
+expect((await data()).sha !== tables.at(-1).sha, "another unit is another log");
+await page.$eval("[data-described='gnss.antenna_z_b_m']", (input) => ((input.value = "99"), input.dispatchEvent(new Event("change"))));
+await page.click("#tables-play");
+await page.waitForSelector("#tables-wrong");
+expect(/antenna_z_b_m/.test(await text("#tables-wrong")), `a number beyond its limits: ${await text("#tables-wrong")}`);
+
+// A robot that the page does not know.
+await open(unknown.file);
+await untilState("asks");
+expect(await page.$eval("#views", ({ hidden }) => hidden), "nothing is played for an unknown robot");
+expect((await page.$$("#ask [data-offer]")).length === 3 && /Hz/.test(await text("#ask")), `offers: ${(await text("#ask")).slice(0, 160)}`);
+await picture("ask");
+await page.click(`#ask [data-offer=${unknown.robot}]`);
+await untilState("done");
+expect((await data()).sha === unknown.sha, "the offer that was taken: the host's hash");
+
+// One update, opened.
+await open(rover.log);
+await untilState("done");
+expect((await data()).sha === rover.sha, "the filter that is looked at has the host's hash");
+await page.focus("#timeline canvas");
+let opened = 0, refused = 0;
+for (let i = 0; i < 12; i++) {
+  await page.keyboard.press("n");
+  await page.evaluate(() => delete document.body.dataset.update);
+  await page.click("#open-update");
+  await page.waitForFunction(() => document.body.dataset.update, { timeout: 60000 });
+  refused++;
+  if ((await data()).update !== "none") opened++;
+  await page.focus("#timeline canvas");
+}
+expect(refused === 12, `refusals: ${opened} of 12 are updates that can be opened, of the others a test before is named: ${(await text("#update .body")).slice(0, 90)}`);
+const models = new Set();
+let worst = 0;
+for (let i = 1; i <= 24; i++) {
+  await page.focus("#timeline canvas");
+  const box = await (await page.$("#timeline canvas")).boundingBox();
+  await page.mouse.move(box.x + 130 + ((box.width - 150) * i) / 25, box.y + 5);
+  await page.keyboard.press("u");
+  await page.evaluate(() => delete document.body.dataset.update);
+  await page.click("#open-update");
+  await page.waitForFunction(() => document.body.dataset.update, { timeout: 60000 });
+  const model = (await data()).update;
+  if (model === "none") continue;
+  models.add(model);
+  worst = Math.max(worst, number(await text("#update-apart"), 0) || 0);
+}
+expect(models.size >= 2, `updates of ${[...models].join(", ")} are opened`);
+expect(worst > 0 && worst < 0.01, `the five equations give the filter's P+ to ${worst} of its sigmas`);
+expect((await page.$$("#update table")).length >= 2 && (await page.$("#update canvas")) !== null, "an update has its tables and its ellipses");
+await picture("update");
+
+// Every estimator, on a run with its truth.
+await page.select("#play-speed", "10");
+await page.click("#play-go");
+await page.waitForFunction(() => parseFloat(document.querySelector("#play .clock").textContent) >= 60, { timeout: 120000 });
+await page.click("#play-go");
+await page.waitForSelector("#play-look", { timeout: 60000 });
+await page.click("#play-look");
+await page.waitForFunction(() => document.body.dataset.state === "busy").catch(() => {});
+await untilState("done");
+await page.$eval("#compare-run", (button) => button.click()); // the page may still scroll
+await page.waitForFunction(() => document.body.dataset.compared, { timeout: 240000 });
+const rows = await page.$$eval("#compare-table tbody tr", (all) => all.map((row) => [...row.children].map((cell) => cell.textContent)));
+const main = rows.find(([kind, robot]) => kind === "Inertial navigation" && robot === "rover"), odometry = rows.find(([kind]) => kind === "Odometry");
+expect(rows.length >= 2 && main && odometry, `estimators: ${rows.map((row) => row.slice(0, 4).join(" ")).join("; ")}`);
+expect(Number(main?.[2]) < 3 && Number(odometry?.[2]) > Number(main?.[2]), "with truth: navigation is better than odometry");
+expect(Number(main?.[3]) > 0.1 && Number(main?.[3]) < 8 && Number(main?.[8]) > 1000, `NEES ${main?.[3]}, RAM ${main?.[8]}, instructions ${main?.[9]}`);
+expect(rows[0][2] === String(Math.min(...rows.map((row) => Number(row[2]))).toFixed(3)), "the best is first");
+await picture("compare");
+
+// The lesson: its numbers, a failure, three questions; by the keyboard.
+await page.focus("#lesson-start");
+await page.keyboard.press("Enter");
+await page.waitForSelector("#lesson-figures", { timeout: 60000 });
+const example = await text("#lesson-example");
+for (const wanted of ["10.101", "10.601", "(0.953, 0.094)"]) expect(example.includes(wanted), `the worked example has ${wanted}`);
+expect(await page.$eval("#lesson-figures", ({ className }) => className === "good"), `lesson: ${await text("#lesson-figures")}`);
+await page.click("#lesson-brakes");
+await page.waitForFunction(() => document.querySelector("#lesson-figures").className === "bad", { timeout: 60000 });
+expect(number(await text("#lesson-figures"), 5) < 97, `it fails: ${await text("#lesson-figures")}`);
+await page.$eval("#lesson-step", (input) => ((input.value = "150"), input.dispatchEvent(new Event("input"))));
+await picture("lesson");
+const answer = async (name, value) => {
+  await page.$eval(`#answer-${name}`, (input, given) => ((input.value = given), input.dispatchEvent(new Event("input"))), value);
+  await page.$eval(`[data-graded=${name}]`, (said) => (said.textContent = ""));
+  await page.click(`#grade-${name}`);
+  await page.waitForFunction((which) => document.querySelector(`[data-graded=${which}]`).textContent !== "", { timeout: 60000 }, name);
+  return page.$eval(`[data-graded=${name}]`, ({ className }) => className === "good");
+};
+for (const [name, right, wrong] of [["prediction", "10,101", "10.001"], ["noise", "2", "0.5"], ["braking", "0.03", "0.001"]]) {
+  expect(!(await answer(name, wrong)), `${name}: ${wrong} is wrong: ${await text(`[data-graded=${name}]`)}`);
+  expect(await answer(name, right), `${name}: ${right} is right: ${await text(`[data-graded=${name}]`)}`);
+}
+expect(!(await answer("braking", "x")) && !(await answer("braking", "10")), "no number and a filter that repeats the sensor are wrong");
+
+// The cable: a log through a port, at once, is the host's run again.
+const sent = readFileSync(rover.log, "ascii").trimEnd().split("\n").map((line) => line.split(" ")[2]);
+await page.click("#cable-connect");
+await page.waitForSelector("#cable-look", { timeout: 60000 });
+for (let i = 0; i < sent.length; i += 20000) await page.evaluate((frames) => window.fakePort.feed(frames), sent.slice(i, i + 20000));
+await page.waitForFunction((count) => parseInt(document.querySelector("#cable-counts").textContent) >= count, { timeout: 60000 }, sent.length).catch(() => {});
+expect(parseInt(await text("#cable-counts")) === sent.length, `cable: ${await text("#cable-counts")} of ${sent.length}`);
+expect((await page.evaluate(() => window.fakePort.said.join())) === "C,S6,L", "the adapter was told to listen, and nothing else");
+await picture("cable");
+await page.click("#cable-look");
+await page.waitForFunction(() => document.body.dataset.state === "busy").catch(() => {});
+await untilState("done");
+expect((await data()).sha === rover.sha && (await data()).different === "0", "the recording of the cable is the host's run to the bit");
+
+// Settings as text, into another page's address.
+await page.$eval("#settings", (input) => ((input.value = "rover;inertial.gyro_radps_rthz=0.02"), input.dispatchEvent(new Event("change"))));
+await page.waitForFunction(() => document.body.dataset.second, { timeout: 60000 });
+const second = (await data()).second;
+await page.goto(`file://${process.cwd()}/nothing`).catch(() => {});
+await page.goto(`${session.url(file)}#rover;inertial.gyro_radps_rthz=0.02`);
+await untilState("ready");
+await open(rover.log);
+await page.waitForFunction((sha) => document.body.dataset.second === sha, { timeout: 60000 }, second).catch(() => {});
+expect((await data()).second === second, `a link carries settings to the first log (${second.slice(0, 12)})`);
+
+// 390 pixels, dark, Indonesian.
+await page.setViewport({ width: 390, height: 844 });
+await page.emulateMediaFeatures([{ name: "prefers-color-scheme", value: "dark" }]);
+await page.click("#language");
+await page.click("#lesson-start");
+await page.waitForSelector("#lesson-figures", { timeout: 60000 });
+await open(tables[0].file);
+await page.waitForSelector("#tables-play");
+expect((await data()).wide <= 0, `nothing of tables and lesson is wider than 390 pixels (${(await data()).wide})`);
+await picture("more_narrow_dark_id");
+await open(unknown.file);
+await untilState("asks");
+expect((await data()).wide <= 0, "nor are the offers");
+await picture("ask_narrow_dark_id");
+await end();
