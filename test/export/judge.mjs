@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// An MCAP file by libraries of other hands: node judge.mjs FILE.mcap, with @mcap/core, @foxglove/rosmsg, rosmsg2-serialization and
+// An MCAP file by libraries of other hands: node judge.mjs FILE.mcap LOG, with @mcap/core, @foxglove/rosmsg, rosmsg2-serialization and
 // rosmsg-msgs-common beside it. Every CRC, every index, every schema against the definitions of ROS 2 Humble, and every message decoded and encoded
-// again to the same bytes. Prints, as JSON, the number of messages of each topic, their first and last times, and the first and last message.
+// again to the same bytes; the attached log beside the file, LOG. Prints, as JSON, the number of messages of each topic, their first and last times, and the first and last message.
 import { McapIndexedReader, McapStreamReader } from '@mcap/core';
 import { parse } from '@foxglove/rosmsg';
 import { ros2humble } from '@foxglove/rosmsg-msgs-common';
 import { MessageReader, MessageWriter } from '@foxglove/rosmsg2-serialization';
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
+import { gunzipSync } from 'node:zlib';
 
 const bytes = readFileSync(process.argv[2]);
 const readable = { size: async () => BigInt(bytes.length), read: async (offset, size) => bytes.subarray(Number(offset), Number(offset + size)) };
@@ -51,6 +52,12 @@ for await (const message of indexed.readMessages({ validateCrcs: true })) {
 }
 assert.equal(BigInt(count), indexed.statistics.messageCount);
 assert.equal(indexed.statistics.chunkCount, indexed.chunkIndexes.length);
+
+// The log, as it was recorded.
+const attached = [];
+for await (const one of indexed.readAttachments({ validateCrcs: true })) attached.push(one);
+assert.deepEqual(attached.map(({ name, mediaType }) => [name, mediaType]), [['raw.log.gz', 'application/gzip']]);
+assert.ok(gunzipSync(attached[0].data).equals(readFileSync(process.argv[3])), 'the attached log is the log');
 
 // The same without an index, from the first byte to the last.
 const stream = new McapStreamReader({ validateCrcs: true });

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Logs as messages of ROS 2: bytes of another hand's encoder, poses and covariances against scipy's rotations, places against GeographicLib, the file's own
 checksums, and what is refused. test/export/judge reads whole files with the libraries of others."""
+import gzip
 import os
 import struct
 import subprocess
@@ -258,7 +259,7 @@ class ExportLogTest(unittest.TestCase):
         with open(self.path("a.mcap"), "rb") as file:
             data = file.read()
         self.assertEqual((len(data), data[:8], data[-8:]), (size, b"\x89MCAP0\r\n", b"\x89MCAP0\r\n"))
-        at, chunks, messages = 8, 0, 0
+        at, chunks, messages, attached = 8, 0, 0, []
         while at < size - 8:
             opcode, length = struct.unpack_from("<BQ", data, at)
             body = data[at + 9:at + 9 + length]
@@ -270,7 +271,13 @@ class ExportLogTest(unittest.TestCase):
                 self.assertEqual(struct.unpack("<I", body)[0], zlib.crc32(data[:at]))
             messages += struct.unpack_from("<Q", body)[0] if opcode == 11 else 0
             at += 9 + length
+            if opcode == 9:
+                begin = 16 + 4 + len("raw.log.gz") + 4 + len("application/gzip") + 8
+                attached.append(gzip.decompress(body[begin:-4]))
+                self.assertEqual(zlib.crc32(body[:-4]), struct.unpack("<I", body[-4:])[0])
         self.assertGreater(chunks, 1)
+        with open(self.path("raw.log"), "rb") as log:
+            self.assertEqual(attached, [log.read()])
         self.assertEqual((at, messages), (size - 8, 6000))
 
     def test_bad_input_ends_in_one_line(self):

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // node features.mjs PUPPETEER PAGE.html OUT CASES: what a user does beside a log of a known robot. CASES {tables: [{file, robot, sha, frames}], unknown: {file, robot, sha},
-// rover: {log, sha}}, hashes and counts as the host's programs have them. A picture of each view goes to OUT. Status 1 where something differs.
+// rover: {log, sha, mcap}}, hashes and counts as the host's programs have them. A picture of each view goes to OUT. Status 1 where something differs.
 import { readFileSync } from "node:fs";
 import { session } from "./session.mjs";
 
@@ -47,6 +47,11 @@ await picture("ask");
 await page.click(`#ask [data-offer=${unknown.robot}]`);
 await untilState("done");
 expect((await data()).sha === unknown.sha, "the offer that was taken: the host's hash");
+
+// The log in an MCAP file.
+await open(rover.mcap);
+await untilState("done");
+expect((await data()).sha === rover.sha, `an exported MCAP: the log's hash (${(await data()).status})`);
 
 // One update, opened.
 await open(rover.log);

@@ -12,6 +12,7 @@ import { Numbers } from "./numbers.js";
 import { Play } from "./play.js";
 import { TablesView } from "./tables_view.js";
 import { tablesOf } from "./tables.js";
+import { logOfMcap } from "./mcap.js";
 import { renderBits, renderFindings, renderWhy, sourceLine } from "./log_views.js";
 import { renderAsk } from "./ask_view.js";
 import { renderUpdate } from "./update_view.js";
@@ -91,6 +92,8 @@ class App {
     if (files.length === 0) return;
     this.status(() => say("open.reading", files[0].name), "busy");
     try {
+      const log = files.length === 1 ? await logOfMcap(files[0]) : null;
+      if (log) return await this.open(log);
       const tables = await tablesOf(files);
       if (!tables) return await this.open(files[0]);
       this.play.pause();

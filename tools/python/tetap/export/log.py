@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A log as topics of ROS 2, and these as one MCAP file or a CSV for each: what tools/can/export_log does."""
+import gzip
 import os
 
 import numpy as np
@@ -27,6 +28,7 @@ class Export:
     def __init__(self, log, base=0x300, prefix="/tetap", scanner=None, by_boot=False):
         read = isinstance(log, columns.Messages)
         self.path, self.prefix, scanner = "log" if read else str(log), prefix.rstrip("/"), scanner or Scanner()
+        self.is_file = not read
         self.messages = messages = log if read else columns.Messages(columns.read(log), base)
         path, base = self.path, messages.base
         self.clock = clock = Clock(messages)
@@ -71,9 +73,10 @@ class Export:
         return made
 
     def write_mcap(self, path):
-        """The file; (messages, bytes)."""
+        """The file; (messages, bytes). The log itself is attached, so that its frames can be replayed."""
         offset = self.utc_us or 0
-        file = mcap.File(LIBRARY, {"tetap": {"log": os.path.basename(self.path), "clock": "UTC of the recording host" if self.utc_us is not None else "node"}})
+        file = mcap.File(LIBRARY, {"tetap": {"log": os.path.basename(self.path), "clock": "UTC of the recording host" if self.utc_us is not None else "node"}},
+                         [self._attached()] if self.is_file else [])
         numbers, count = {}, 0
         for topic in [*self.topics, *self.status]:
             if topic.name not in numbers:
@@ -84,6 +87,10 @@ class Export:
         data = bytes(file)
         _write(path, data)
         return count, len(data)
+
+    def _attached(self):
+        with open(self.path, "rb") as file:
+            return os.path.basename(self.path) + ".gz", "application/gzip", gzip.compress(file.read(), 6, mtime=0)
 
     def write_tables(self, folder):
         """A CSV for each topic but transforms and the map, which the other tables and tools/dataset/export_map have; their names."""

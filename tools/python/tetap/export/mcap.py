@@ -6,7 +6,7 @@ import zlib
 import numpy as np
 
 MAGIC = b"\x89MCAP0\r\n"
-HEADER, FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK, MESSAGE_INDEX, CHUNK_INDEX = range(1, 9)
+HEADER, FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK, MESSAGE_INDEX, CHUNK_INDEX, ATTACHMENT, ATTACHMENT_INDEX = range(1, 11)
 STATISTICS, METADATA, METADATA_INDEX, SUMMARY_OFFSET, DATA_END = range(0x0B, 0x10)
 CHUNK_BYTES = 1 << 20
 MESSAGE_HEAD = np.dtype({"names": ["opcode", "length", "channel", "sequence", "log_time", "publish_time"], "formats": ["u1", "<u8", "<u2", "<u4", "<u8", "<u8"],
@@ -33,8 +33,8 @@ def texts(pairs):
 class File:
     """Channels and their messages; bytes() is the file. Times are in ns from 0."""
 
-    def __init__(self, library, metadata=None):
-        self.library, self.metadata = library, metadata or {}
+    def __init__(self, library, metadata=None, attachments=()):
+        self.library, self.metadata, self.attachments = library, metadata or {}, attachments  # attachments: (name, media type, bytes)
         self.schemas, self.channels, self.blocks = {}, [], []
 
     def channel(self, topic, type_name, definition):
@@ -72,6 +72,7 @@ class File:
             one = record(METADATA, text(name) + texts(pairs))
             metadata_index += record(METADATA_INDEX, struct.pack("<QQ", len(out), len(one)) + text(name))
             out += one
+        attachment_index = b"".join(self._attach(out, *one) for one in self.attachments)
         out += b"".join(definitions + channels)
         records, chunk_index = self._records(), b""
         chunks = 0
@@ -83,8 +84,15 @@ class File:
                 chunks, first, size = chunks + 1, i, 0
         out += record(DATA_END, struct.pack("<I", zlib.crc32(out)))
         self._summary(out, [(SCHEMA, b"".join(definitions)), (CHANNEL, b"".join(channels)), (CHUNK_INDEX, chunk_index),
-                            (METADATA_INDEX, metadata_index), (STATISTICS, self._statistics(records, chunks))])
+                            (ATTACHMENT_INDEX, attachment_index), (METADATA_INDEX, metadata_index), (STATISTICS, self._statistics(records, chunks))])
         return bytes(out)
+
+    @staticmethod
+    def _attach(out, name, media_type, data):
+        """Appends an attachment without a time; its record of the index."""
+        begin, content = len(out), struct.pack("<QQ", 0, 0) + text(name) + text(media_type) + struct.pack("<Q", len(data)) + data
+        out += record(ATTACHMENT, content + struct.pack("<I", zlib.crc32(content)))
+        return record(ATTACHMENT_INDEX, struct.pack("<QQQQQ", begin, len(out) - begin, 0, 0, len(data)) + text(name) + text(media_type))
 
     def _chunk(self, out, records):
         """Appends a chunk and its message indexes; its record of the chunk index."""
@@ -108,7 +116,7 @@ class File:
         for _, channel, _ in records:
             counts[channel] = counts.get(channel, 0) + 1
         ends = (records[0][0], records[-1][0]) if records else (0, 0)
-        return record(STATISTICS, struct.pack("<QHIIIIQQ", len(records), len(self.schemas), len(self.channels), 0, len(self.metadata), chunks, *ends) +
+        return record(STATISTICS, struct.pack("<QHIIIIQQ", len(records), len(self.schemas), len(self.channels), len(self.attachments), len(self.metadata), chunks, *ends) +
                       listed(b"".join(struct.pack("<HQ", *one) for one in counts.items())))
 
     @staticmethod
