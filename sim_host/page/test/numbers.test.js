@@ -29,6 +29,8 @@ test("a value that is the robot's own is no change, and another is one", () => {
   assert.deepEqual(other.settings(), []);
   other.takeNamed({ ...numbers.named(), "a.b": ["1"], unknown: [1], __proto__: [2] });
   assert.deepEqual(other.settings(), numbers.settings());
+  other.takeNamed({ "a.b": [2] });
+  assert.deepEqual(other.settings(), [[0, 0, 2]], "settings replace what was changed");
   const input = { value: "fast" };
   numbers.take(0, input);
   assert.equal(input.value, "0.1");

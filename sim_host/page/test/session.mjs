@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A page from disk in a headless Chromium, with what tests ask of it. Requests to a network and messages on the console are failures.
+// A page from disk in a headless browser (BROWSER: chromium, firefox), with what tests ask of it. Requests to a network and messages on the console are failures.
 import { createRequire } from "node:module";
 import { mkdirSync } from "node:fs";
 import { resolve } from "node:path";
@@ -19,10 +19,15 @@ function fakeSerial() {
   Object.defineProperty(navigator, "serial", { value: { requestPort: async () => port } });
 }
 
+const LAUNCHED = {
+  chromium: { executablePath: "/usr/bin/chromium", args: ["--no-sandbox", "--disable-gpu", "--disable-background-networking"] },
+  firefox: { browser: "firefox", executablePath: "/usr/bin/firefox-esr", extraPrefsFirefox: { "layout.css.prefers-color-scheme.content-override": 1 } },
+};
+
 export async function session(modules, file, out, { serial = false, width = 1180, height = 900 } = {}) {
   const puppeteer = createRequire(`${resolve(modules)}/`)("puppeteer-core"), failures = [], heard = { requests: [], errors: [] };
   mkdirSync(out, { recursive: true });
-  const browser = await puppeteer.launch({ executablePath: "/usr/bin/chromium", headless: true, args: ["--no-sandbox", "--disable-gpu", "--disable-background-networking"], timeout: 120000, protocolTimeout: 240000 });
+  const browser = await puppeteer.launch({ ...LAUNCHED[process.env.BROWSER ?? "chromium"], headless: true, timeout: 120000, protocolTimeout: 240000 });
   const newPage = async () => {
     const made = await browser.newPage();
     made.on("pageerror", ({ message }) => heard.errors.push(message));
@@ -38,7 +43,7 @@ export async function session(modules, file, out, { serial = false, width = 1180
   };
   const untilState = (state) => page.waitForFunction((wanted) => [wanted, "failed"].includes(document.body.dataset.state), { timeout: 120000 }, state);
   await page.setViewport({ width, height });
-  await page.emulateMediaFeatures([{ name: "prefers-color-scheme", value: "light" }]);
+  if (!process.env.BROWSER) await page.emulateMediaFeatures([{ name: "prefers-color-scheme", value: "light" }]);
   await page.goto(session.url(file));
   await untilState("ready");
   return {

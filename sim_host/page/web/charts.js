@@ -20,7 +20,7 @@ export class Chart {
     const options = { ...base(view, title, height), bands, width: parent.clientWidth || 320 };
     options.scales = { ...options.scales, ...scales };
     options.axes = [axis(), axis(values ? { values, size: 60 } : { size: 60 })];
-    options.series = [{ label: "t [s]", value: (_, t) => (t == null ? "–" : t.toFixed(2)) }, ...series];
+    options.series = [{ label: "t [s]", value: (_, t) => (t == null ? "–" : t.toFixed(2)) }, ...series.map((one) => ({ value: (_, v) => (v == null ? "–" : String(+v.toPrecision(7))), ...one }))];
     options.hooks = {
       ...hooks,
       setCursor: [({ cursor, posToVal }) => cursor.left >= 0 && !this.told && view.point(posToVal(cursor.left, "x"))],

@@ -37,11 +37,12 @@ export class Numbers {
   settings() {
     return [...this.changed].flatMap(([row, values]) => values.map((value, element) => [row, element, value]));
   }
-  /** {path: values} of what is changed, and the same taken back; of what this page does not know nothing. */
+  /** {path: values} of what is changed, and the same taken back in place of what was changed; of what this page does not know nothing. */
   named() {
     return Object.fromEntries([...this.changed].map(([row, values]) => [this.rows[row].path, values]));
   }
   takeNamed(values) {
+    this.changed.clear();
     this.rows.forEach(({ path }, row) => {
       const own = this.robot.values[row], given = Object.hasOwn(values, path) ? values[path] : null;
       if (Array.isArray(given) && given.length === own.length && given.every((value) => typeof value === "number")) this.changed.set(row, given);
