@@ -127,13 +127,13 @@ class Mixed {
   }
 
  private:
-  std::array<float, 3> matrix_{1.0F, 2.0F, 3.0F};
+  std::array<float, 5> matrix_{1.0F, 2.0F, 3.0F};
   std::int64_t time_us_ = 0x0000'0006'0000'0005;  // padding before it
-  float scale_ = 7.0F;
+  std::array<float, 2> scale_{7.0F};
   bool on_ = true;
   std::uint32_t count_ = 8;
   std::int64_t far_us_ = -9;
-  std::int32_t low_ = -10;
+  std::array<std::int32_t, 2> low_{-10};
   std::array<std::uint32_t, 20> many_{11, 12, 13};
   float high_ = 14.0F;
   std::array<std::int32_t, 2> pair_{15, 16};
@@ -145,7 +145,7 @@ TEST(Members, RunsOfPlainMembersHaveTheirWordsOneByOne) {
   Runs runs;
   each_word(object, runs);
   EXPECT_EQ(runs.all, words_of(object));
-  EXPECT_EQ(runs.in_runs, 3U + 3 + 3 + 20 + 4)
+  EXPECT_EQ(runs.in_runs, 5U + 4 + 4 + 20 + 4)
       << "matrix_, time_us_ and scale_, far_us_ and low_, many_, high_ to last_";
   for (unsigned turn = 0; turn < kTurns; ++turn) {
     Runs in_turn;

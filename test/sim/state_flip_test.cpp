@@ -140,8 +140,8 @@ TEST_P(Flips, OfAnyByteShowInTheStateCrcWithinTenEpochs) {
     }
   }
   EXPECT_TRUE(unseen.empty()) << unseen.size() << " bytes, the first at " << unseen.front();
-  EXPECT_LE(late, 4U) << "bytes that show as their sample is fused";
-  // One byte in a thousand: that of a sample which leaves the window before its turn.
+  // One byte in a thousand: that of a sample which slow state alone has, as it is fused or before it leaves the window.
+  EXPECT_LE(late, sizeof(Node) / 1'000) << "bytes that show as their sample is fused";
   EXPECT_LE(gone, sizeof(Node) / 1'000) << "bytes that show in a frame alone";
   EXPECT_GT(found, sizeof(Node) / 3);
   std::printf("of %zu bytes %zu are seen, the latest after %zu epochs, %zu of them after another frame; ", sizeof(Node),

@@ -25,6 +25,7 @@ class StateHash {
   [[gnu::noinline]] void run(const void* from, std::size_t count) {
     const auto* bytes = static_cast<const unsigned char*>(from);
     std::uint32_t state = state_;
+#pragma GCC unroll 4
     for (std::size_t i = 0; i < count; ++i) {
       std::uint32_t word = 0;
       std::memcpy(&word, bytes + i * sizeof word, sizeof word);

@@ -29,7 +29,8 @@ class RestDetector {
   [[nodiscard]] bool at_rest() const { return at_rest_; }
   [[nodiscard]] const Vector3& rate_b_radps() const { return rate_.value; }  ///< low-passed
   static constexpr auto members(auto& self) {
-    return base::members(self.rate_, self.force_, base::in_turns(self.still_s_), self.started_, self.at_rest_);
+    return base::members(base::in_turns(self.rate_), base::in_turns(self.force_), base::in_turns(self.still_s_),
+                         self.started_, self.at_rest_);
   }
 
  private:

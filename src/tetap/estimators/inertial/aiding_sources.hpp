@@ -44,8 +44,8 @@ class AidingSources {
   }
   static constexpr auto members(auto& self) {
     return base::members(base::in_turns(self.position), base::in_turns(self.height), base::in_turns(self.velocity),
-                         self.wheels, self.forward, base::in_turns(self.heading), base::in_turns(self.magnetometer),
-                         base::in_turns(self.barometer));
+                         base::in_turns(self.wheels), base::in_turns(self.forward), base::in_turns(self.heading),
+                         base::in_turns(self.magnetometer), base::in_turns(self.barometer));
   }
 };
 

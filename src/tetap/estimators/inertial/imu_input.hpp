@@ -51,8 +51,8 @@ class ImuInput {
   }
 
   static constexpr auto members(auto& self) {
-    return base::members(self.health_, base::in_turns(self.bridged_until_), base::in_turns(self.last_suspect_),
-                         self.rate_b_radps_, self.drift_, self.unusable_);
+    return base::members(base::in_turns(self.health_), base::in_turns(self.bridged_until_),
+                         base::in_turns(self.last_suspect_), self.rate_b_radps_, self.drift_, self.unusable_);
   }
 
  private:

@@ -74,8 +74,8 @@ class Inertial {
   [[nodiscard]] SourceStates sources(const Context& ctx) const;
   static constexpr auto members(auto& self) {
     return base::members(self.ins_, self.predictor_, self.budget_, self.phase_, base::in_turns(self.alignment_),
-                         self.heading_monitor_, self.time_, self.levelled_at_, self.level_, self.imu_, self.standstill_,
-                         self.sources_, base::in_turns(self.recovery_));
+                         self.heading_monitor_, self.time_, self.levelled_at_, base::in_turns(self.level_), self.imu_,
+                         base::in_turns(self.standstill_), self.sources_, base::in_turns(self.recovery_));
   }
 
  private:
