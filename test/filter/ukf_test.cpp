@@ -7,6 +7,7 @@
 #include "support/never_nan.hpp"
 #include "tetap/filter/ekf.hpp"
 #include "tetap/filter/ukf_sqrt.hpp"
+#include "tetap/model/ctrv.hpp"
 #include "tetap/model/planar_increment.hpp"
 #include "tetap/model/range_bearing.hpp"
 
@@ -49,6 +50,117 @@ template <class Form>
 class Unscented : public testing::Test {};
 using Forms = testing::Types<Plain, Root>;
 TYPED_TEST_SUITE(Unscented, Forms);
+
+// -- a heading that nobody knows -------------------------------------------------------------------------------------
+
+/// A step of way_m ahead, next to no noise.
+struct Ahead {
+  float way_m = 0;
+  model::PlanarPose predict(const model::PlanarPose& p) const {
+    return {.x = p.x.plus(way_m * base::sincos(p.yaw_rad).cos),
+            .y = p.y.plus(way_m * base::sincos(p.yaw_rad).sin),
+            .yaw_rad = p.yaw_rad};
+  }
+  Symmetric<float, 3> noise(const model::PlanarPose&) const {
+    return Symmetric<float, 3>::diagonal({1e-6F, 1e-6F, 1e-6F});
+  }
+};
+constexpr float kSigmas[] = {0.1F, 0.5F, 1.0F, 1.5F, 1.8F, 1.82F, 1.9F, 2.2F, 2.62F, 3.1416F, 3.6276F, 5.0F, 10.0F};
+
+TYPED_TEST(Unscented, IsNeverSurerOfAHeadingWithoutAMeasurement) {
+  for (const float sigma : kSigmas)
+    for (const float way_m : {0.0F, 0.1F, 3.0F}) {
+      typename TypeParam::template Of<model::PlanarPose> kf;
+      set_covariance(kf, Symmetric<float, 3>::diagonal({0.01F, 0.01F, sigma * sigma}));
+      auto before = covariance(kf);
+      for (int k = 0; k < 200; ++k) {
+        ASSERT_TRUE(kf.predict(Ahead{way_m}));
+        const auto after = covariance(kf);
+        for (int i = 0; i < 3; ++i) ASSERT_GT(after(i, i), 0.9999F * before(i, i)) << sigma << " " << way_m << " " << k;
+        before = after;
+      }
+      EXPECT_NEAR(before(2, 2), sigma * sigma + 200e-6F, 1e-3F * sigma * sigma) << sigma;
+    }
+}
+
+TYPED_TEST(Unscented, AStepSpreadsAtLeastAsDrawnPathsDo) {
+  std::mt19937 random(5);
+  std::normal_distribution<double> normal;
+  for (const float sigma : kSigmas)
+    for (const float way_m : {0.1F, 1.0F, 8.0F})
+      for (const float yaw : {0.0F, 0.8F, 2.9F}) {
+        typename TypeParam::template Of<model::PlanarPose> kf;
+        kf.x.yaw_rad = yaw;
+        set_covariance(kf, Symmetric<float, 3>::diagonal({0.01F, 0.01F, sigma * sigma}));
+        ASSERT_TRUE(kf.predict(Ahead{way_m}));
+        Eigen::Matrix2d drawn = Eigen::Matrix2d::Zero();
+        constexpr int kDraws = 20'000;
+        for (int k = 0; k < kDraws; ++k) {
+          const double at = static_cast<double>(yaw) + static_cast<double>(sigma) * normal(random);
+          const Eigen::Vector2d e(
+              0.1 * normal(random) + static_cast<double>(way_m) * std::cos(at) - static_cast<double>(kf.x.x.minus({})),
+              0.1 * normal(random) + static_cast<double>(way_m) * std::sin(at) - static_cast<double>(kf.x.y.minus({})));
+          drawn += e * e.transpose() / kDraws;
+        }
+        const auto p = covariance(kf);
+        const Eigen::Matrix2d claimed = p.dense().template cast<double>().template topLeftCorner<2, 2>();
+        const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::Matrix2d> ratio(claimed, drawn);
+        EXPECT_GT(ratio.eigenvalues()(0), 0.9) << sigma << " " << way_m << " " << yaw;
+        if (sigma <= 0.5F) {
+          EXPECT_LT(ratio.eigenvalues()(1), 2.5) << sigma << " " << way_m << " " << yaw;
+        }
+      }
+}
+
+TYPED_TEST(Unscented, ATargetThatTurnsSpreadsAtLeastAsDrawnPathsDo) {
+  std::mt19937 random(6);
+  std::normal_distribution<double> normal;
+  constexpr double kT = 0.5, kSigmaTurn = 0.3;
+  for (const float sigma : kSigmas)
+    for (const double speed : {1.0, 8.0})
+      for (const double turn : {-1.0, 0.0, 1.0}) {
+        typename TypeParam::template Of<model::CtrvState<float>> kf;
+        kf.x.value << 0, 0, static_cast<float>(speed), 0.8F, static_cast<float>(turn);
+        set_covariance(kf, Symmetric<float, 5>::diagonal({0.01F, 0.01F, 0.01F, sigma * sigma, 0.09F}));
+        ASSERT_TRUE(kf.predict(model::Ctrv<float>{0.5F, 1e-4F, 1e-4F}));
+        Eigen::Matrix2d drawn = Eigen::Matrix2d::Zero();
+        constexpr int kDraws = 20'000;
+        for (int k = 0; k < kDraws; ++k) {  // an arc between two headings
+          const double v = speed + 0.1 * normal(random), w = turn + kSigmaTurn * normal(random);
+          const double from = static_cast<double>(0.8F) + static_cast<double>(sigma) * normal(random),
+                       to = from + w * kT;
+          const Eigen::Vector2d e(
+              0.1 * normal(random) + v / w * (std::sin(to) - std::sin(from)) - static_cast<double>(kf.x.value(0)),
+              0.1 * normal(random) + v / w * (std::cos(from) - std::cos(to)) - static_cast<double>(kf.x.value(1)));
+          drawn += e * e.transpose() / kDraws;
+        }
+        const Eigen::Matrix<double, 5, 5> p = covariance(kf).dense().template cast<double>();
+        const Eigen::Matrix2d claimed = p.topLeftCorner<2, 2>();
+        const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::Matrix2d> ratio(claimed, drawn);
+        EXPECT_GT(ratio.eigenvalues()(0), 0.9) << sigma << " " << speed << " " << turn;
+        const double yaw = static_cast<double>(sigma) * static_cast<double>(sigma) + kT * kT * kSigmaTurn * kSigmaTurn;
+        EXPECT_NEAR(p(3, 3) / yaw, 1, 0.01) << sigma;
+      }
+}
+
+TYPED_TEST(Unscented, OneSightingTurnsAHeadingThatNobodyKnowsTowardsTheTruth) {
+  for (const float sigma : kSigmas)
+    for (const float truth : {0.3F, 1.0F, 2.0F, -2.5F, 3.1F}) {
+      typename TypeParam::template Of<model::PlanarPose> kf;
+      set_covariance(kf, Symmetric<float, 3>::diagonal({0.01F, 0.01F, sigma * sigma}));
+      if (sigma < 1.5F) continue;
+      const model::RangeBearing z{.range_m = 5,
+                                  .bearing_rad = base::wrap_angle(0.7F - truth),
+                                  .sigma_range_m = 0.1F,
+                                  .sigma_bearing_rad = 0.05F,
+                                  .landmark = {.x = base::Anchored{}.plus(5 * base::sincos(0.7F).cos),
+                                               .y = base::Anchored{}.plus(5 * base::sincos(0.7F).sin)}};
+      ASSERT_EQ(kf.update(z, 1e9F).verdict, Verdict::kAccepted);
+      const float error = base::wrap_angle(kf.x.yaw_rad - truth), sigma_now = std::sqrt(covariance(kf)(2, 2));
+      EXPECT_LT(std::abs(error), 3 * sigma_now) << sigma << " " << truth;
+      EXPECT_LT(sigma_now, 0.2F);
+    }
+}
 
 // -- moments --------------------------------------------------------------------------------------------------------
 

@@ -125,4 +125,38 @@ template <class Model, int N>
   }
 }
 
+/// Largest turn between a pair's points and the centre. Beyond half a turn a pair would wrap on itself, and an angle
+/// that nobody knows would become sure without a measurement. At 1 rad sines are still nearly straight.
+inline constexpr float kMostTurn = 1.0F;
+
+/// How many times nearer than its distance a pair has to be: above 1 where a turn is more than kMostTurn. What the pair
+/// shows is then taken as many times.
+template <class Scalar>
+[[nodiscard, gnu::always_inline]] constexpr Scalar nearer(Scalar turn) {
+  const Scalar size = turn < Scalar{0} ? -turn : turn;
+  return size > Scalar(kMostTurn) ? size * (Scalar{1} / Scalar(kMostTurn)) : Scalar{1};
+}
+
+/// Implements docs/explanation/unscented.md (8).
+/// The same of a pair of states. A state names its angle in kAngle; a motion may turn it by turn(dx) besides.
+template <class S, class Model, class Scalar, int N>
+[[nodiscard, gnu::always_inline]] constexpr Scalar nearer(const Model& model, const Vector<Scalar, N>& dx) {
+  Scalar times = 1;
+  if constexpr (requires { S::kAngle; }) times = nearer(Scalar{dx(S::kAngle)});
+  if constexpr (requires { model.turn(dx); }) {
+    const Scalar by_motion = nearer(Scalar{model.turn(dx)});
+    times = by_motion > times ? by_motion : times;
+  }
+  return times;
+}
+
+/// The same of a pair of noises: noise_turn(w).
+template <class Model, class Scalar, int N>
+[[nodiscard, gnu::always_inline]] constexpr Scalar nearer_noise(const Model& model, const Vector<Scalar, N>& w) {
+  if constexpr (requires { model.noise_turn(w); })
+    return nearer(Scalar{model.noise_turn(w)});
+  else
+    return Scalar{1};
+}
+
 }  // namespace tetap::filter

@@ -106,12 +106,13 @@ class Ukf {
   template <MotionModel<State> Motion>
   requires(!AugmentedMotion<Motion, State>) bool predict(const Motion& motion) {
     const Symmetric<Scalar, kErrors> q = motion.noise(x);
-    return propagate<Motion, 0>([&](const State& from, const auto&) { return motion.predict(from); }, {}, q);
+    return propagate<Motion, 0>(
+        motion, [&](const State& from, const auto&) { return motion.predict(from); }, {}, q);
   }
   template <AugmentedMotion<State> Motion>
   bool predict(const Motion& motion) {
-    return propagate<Motion, Motion::kNoises>([&](const State& from, const auto& w) { return motion.predict(from, w); },
-                                              motion.noise(), {});
+    return propagate<Motion, Motion::kNoises>(
+        motion, [&](const State& from, const auto& w) { return motion.predict(from, w); }, motion.noise(), {});
   }
 
   /// Joint gate, then the correction; a measurement that is rejected changes nothing.
@@ -141,7 +142,7 @@ class Ukf {
 
   /// Implements docs/explanation/unscented.md (5).
   template <class Motion, int kNoises, class Function>
-  [[gnu::always_inline]] bool propagate(const Function& f, const Vector<Scalar, kNoises>& noise,
+  [[gnu::always_inline]] bool propagate(const Motion& motion, const Function& f, const Vector<Scalar, kNoises>& noise,
                                         const Symmetric<Scalar, kErrors>& q) {
     require_scaling<kNoises>();
     const SigmaWeights<Scalar> w(scaling_, kErrors + kNoises);
@@ -153,15 +154,21 @@ class Ukf {
     const State centre = f(x, still);
     PairSum<Scalar, kErrors> pairs;
     unroll<0, kPoints>([&](auto j) __attribute__((always_inline)) {
-      const Vector<Scalar, kErrors> dx = w.spread * factor.l.col(j);
-      pairs.add(std::bool_constant<j == 0>{}, f(x.plus(dx), still).minus(centre), f(x.plus(-dx), still).minus(centre));
+      Vector<Scalar, kErrors> dx = w.spread * factor.l.col(j);
+      const Scalar times = nearer<State>(motion, dx);
+      if (times > Scalar{1}) dx /= times;
+      Vector<Scalar, kErrors> up = f(x.plus(dx), still).minus(centre), down = f(x.plus(-dx), still).minus(centre);
+      if (times > Scalar{1}) up *= times, down *= times;
+      pairs.add(std::bool_constant<j == 0>{}, up, down);
     });
     unroll<0, kNoises>([&](auto k) __attribute__((always_inline)) {
-      const Scalar far = w.spread * base::sqrt(noise(int{k}));
-      Vector<Scalar, kNoises> up = still, down = still;
-      up(int{k}) = far;
-      down(int{k}) = -far;
-      pairs.add(std::false_type{}, f(x, up).minus(centre), f(x, down).minus(centre));
+      Vector<Scalar, kNoises> far = still;
+      far(int{k}) = w.spread * base::sqrt(noise(int{k}));
+      const Scalar times = nearer_noise(motion, far);
+      if (times > Scalar{1}) far /= times;
+      Vector<Scalar, kErrors> up = f(x, far).minus(centre), down = f(x, -far).minus(centre);
+      if (times > Scalar{1}) up *= times, down *= times;
+      pairs.add(std::false_type{}, up, down);
     });
     const Vector<Scalar, kErrors> shift = w.pair * pairs.sum;
     Symmetric<Scalar, kErrors> next = pairs.covariance(shift, w);
@@ -200,8 +207,11 @@ class Ukf {
     Matrix<Scalar, kErrors, M> cross;
     unroll<0, kPoints>([&](auto j) __attribute__((always_inline)) {
       const Vector<Scalar, kErrors> dx = w.spread * factor.l.col(j);
-      const Vector<Scalar, M> slope =
-          pairs.add(std::bool_constant<j == 0>{}, difference(h(x.plus(dx), still)), difference(h(x.plus(-dx), still)));
+      const Scalar times = nearer<State>(z, dx);
+      const Vector<Scalar, kErrors> near = times > Scalar{1} ? Vector<Scalar, kErrors>(dx / times) : dx;
+      Vector<Scalar, M> up = difference(h(x.plus(near), still)), down = difference(h(x.plus(-near), still));
+      if (times > Scalar{1}) up *= times, down *= times;
+      const Vector<Scalar, M> slope = pairs.add(std::bool_constant<j == 0>{}, up, down);
       unroll<0, M>([&](auto m) __attribute__((always_inline)) {
         unroll<j, kErrors>([&](auto n) __attribute__((always_inline)) {
           const Scalar product = (w.pair * slope(int{m})) * dx(kOrder[n]);

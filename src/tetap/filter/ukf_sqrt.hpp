@@ -41,11 +41,12 @@ class UkfSqrt {
   /// result would be no number, or P not positive definite.
   template <MotionModel<State> Motion>
   requires(!AugmentedMotion<Motion, State>) bool predict(const Motion& motion) {
-    return propagate<0>([&](const State& from, const auto&) { return motion.predict(from); }, {}, motion.noise(x));
+    return propagate<0>(
+        motion, [&](const State& from, const auto&) { return motion.predict(from); }, {}, motion.noise(x));
   }
   template <AugmentedMotion<State> Motion>
   bool predict(const Motion& motion) {
-    return propagate<Motion::kNoises>([&](const State& from, const auto& w) { return motion.predict(from, w); },
+    return propagate<Motion::kNoises>(motion, [&](const State& from, const auto& w) { return motion.predict(from, w); },
                                       motion.noise(), {});
   }
 
@@ -77,8 +78,9 @@ class UkfSqrt {
     return d;
   }
 
-  template <int kNoises, class Function>
-  bool propagate(const Function& f, const Vector<Scalar, kNoises>& noise, const Symmetric<Scalar, kErrors>& q) {
+  template <int kNoises, class Motion, class Function>
+  bool propagate(const Motion& motion, const Function& f, const Vector<Scalar, kNoises>& noise,
+                 const Symmetric<Scalar, kErrors>& q) {
     require_scaling<kNoises>();
     const SigmaWeights<Scalar> w(scaling_, kErrors + kNoises);
     const Scalar half = base::sqrt(Scalar(0.5F) * w.pair);
@@ -86,19 +88,24 @@ class UkfSqrt {
     const State centre = f(x, still);
     Vector<Scalar, kErrors> sum = Vector<Scalar, kErrors>::Zero();
     Triangular<Scalar, kErrors> next = root_of(q);
-    const auto add = [&](const Vector<Scalar, kErrors>& up, const Vector<Scalar, kErrors>& down) {
+    const auto add = [&](Vector<Scalar, kErrors> up, Vector<Scalar, kErrors> down, Scalar times) {
+      if (times > Scalar{1}) up *= times, down *= times;
       sum += up + down;
       next.absorb(half * (up - down));
       next.absorb(half * (up + down));
     };
     for (int j = 0; j < kErrors; ++j) {
-      const Vector<Scalar, kErrors> dx = w.spread * direction(j);
-      add(f(x.plus(dx), still).minus(centre), f(x.plus(-dx), still).minus(centre));
+      Vector<Scalar, kErrors> dx = w.spread * direction(j);
+      const Scalar times = nearer<State>(motion, dx);
+      if (times > Scalar{1}) dx /= times;
+      add(f(x.plus(dx), still).minus(centre), f(x.plus(-dx), still).minus(centre), times);
     }
     for (int k = 0; k < kNoises; ++k) {
       Vector<Scalar, kNoises> far = still;
       far(k) = w.spread * base::sqrt(noise(k));
-      add(f(x, far).minus(centre), f(x, -far).minus(centre));
+      const Scalar times = nearer_noise(motion, far);
+      if (times > Scalar{1}) far /= times;
+      add(f(x, far).minus(centre), f(x, -far).minus(centre), times);
     }
     const Vector<Scalar, kErrors> shift = w.pair * sum;
     next.absorb(base::sqrt(w.central) * shift);
@@ -125,21 +132,24 @@ class UkfSqrt {
     Triangular<Scalar, M> e;  // root of what is in S beside the slopes
     for (int m = 0; m < M; ++m) e(m, m) = base::sqrt(additive(m));
     Matrix<Scalar, kErrors, M> slope;
-    const auto pair = [&](const State& up, const State& down, const auto& v, const auto& minus_v) {
-      const Vector<Scalar, M> above = difference_of(z, h(up, v), centre);
-      const Vector<Scalar, M> below = difference_of(z, h(down, minus_v), centre);
+    const auto pair = [&](const State& up, const State& down, const auto& v, const auto& minus_v, Scalar times) {
+      Vector<Scalar, M> above = difference_of(z, h(up, v), centre);
+      Vector<Scalar, M> below = difference_of(z, h(down, minus_v), centre);
+      if (times > Scalar{1}) above *= times, below *= times;
       sum += above + below;
       e.absorb(half * (above + below));
       return Vector<Scalar, M>(above - below);
     };
     for (int j = 0; j < kErrors; ++j) {
-      const Vector<Scalar, kErrors> dx = w.spread * direction(j);
-      slope.row(j) = (Scalar(0.5F) / w.spread) * pair(x.plus(dx), x.plus(-dx), still, still).transpose();
+      Vector<Scalar, kErrors> dx = w.spread * direction(j);
+      const Scalar times = nearer<State>(z, dx);
+      if (times > Scalar{1}) dx /= times;
+      slope.row(j) = (Scalar(0.5F) / w.spread) * pair(x.plus(dx), x.plus(-dx), still, still, times).transpose();
     }
     for (int k = 0; k < kNoises; ++k) {
       Vector<Scalar, kNoises> far = still;
       far(k) = w.spread * base::sqrt(noise(k));
-      e.absorb(half * pair(x, x, far, -far));
+      e.absorb(half * pair(x, x, far, -far, Scalar{1}));
     }
     const Vector<Scalar, M> shift = w.pair * sum;
     e.absorb(base::sqrt(w.central) * shift);

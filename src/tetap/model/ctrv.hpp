@@ -14,7 +14,7 @@ namespace tetap::model {
 template <class Scalar_>
 struct CtrvState {
   using Scalar = Scalar_;
-  static constexpr int kErrors = 5;
+  static constexpr int kErrors = 5, kAngle = 3;
   filter::Vector<Scalar, 5> value = filter::Vector<Scalar, 5>::Zero();
 
   [[nodiscard]] CtrvState plus(const filter::Vector<Scalar, 5>& dx) const {
@@ -56,6 +56,11 @@ struct Ctrv {
     next.value(3) = filter::wrapped(x.value(3) + dt_s * x.value(4) + half * w(1));
     next.value(4) += dt_s * w(1);
     return next;
+  }
+  /// By how much yaw turns more at x + dx than at x, or by the noise.
+  [[nodiscard]] Scalar turn(const filter::Vector<Scalar, 5>& dx) const { return dx(3) + dt_s * dx(4); }
+  [[nodiscard]] Scalar noise_turn(const filter::Vector<Scalar, 2>& w) const {
+    return Scalar(0.5F) * dt_s * dt_s * w(1);
   }
   [[nodiscard]] filter::Matrix<Scalar, 5, 5> jacobian(const State& x) const {
     const Arc arc(x, dt_s);

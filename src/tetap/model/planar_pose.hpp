@@ -10,7 +10,7 @@ namespace tetap::model {
 
 struct PlanarPose {
   using Scalar = float;
-  static constexpr int kErrors = 3;
+  static constexpr int kErrors = 3, kAngle = 2;
 
   base::Anchored x;
   base::Anchored y;
