@@ -9,7 +9,11 @@
 #include "tetap/base/state_words.hpp"
 
 #include <gtest/gtest.h>
+#include <Eigen/Dense>
+#include <algorithm>
 #include <cmath>
+#include <cstdio>
+#include <memory>
 #include <random>
 
 namespace tetap::estimators {
@@ -90,9 +94,7 @@ TYPED_TEST_SUITE(Tracker, Trackers);
 TYPED_TEST(Tracker, FollowsWithinItsUncertainty) {
   auto s = scene<TypeParam>();
   s.drive(100);
-  // A turn track begins with a heading of 0 and 1 rad: a target that crosses is refused until the track begins anew.
-  const int at_first = s.rejected;
-  EXPECT_LE(at_first, TypeParam::kKind == sensor::EstimatorKind::kUkf ? 15 : 0);
+  EXPECT_EQ(s.rejected, 0);
   double square = 0, sigma2 = 0, speed2 = 0, turn2 = 0;
   constexpr int kLooks = 200;
   for (int k = 0; k < kLooks; ++k) {
@@ -108,7 +110,62 @@ TYPED_TEST(Tracker, FollowsWithinItsUncertainty) {
   EXPECT_GT(square / sigma2, 0.3);
   EXPECT_LT(std::sqrt(speed2), 0.6);
   EXPECT_LT(std::sqrt(turn2), 0.2);
-  EXPECT_EQ(s.rejected, at_first);
+  EXPECT_EQ(s.rejected, 0);
+}
+
+/// A straight target from (20, 10) by lidar alone: root mean square and largest error, the latter in sigmas.
+struct Crossing {
+  double square = 0, sigmas = 0;
+  int looks = 0, refused = 0;
+
+  template <class E>
+  void watch(const param::Parameters& parameters, double dt_s, double speed_mps, double heading, unsigned seed) {
+    auto tracker = std::make_unique<E>();
+    const MapFrame frame;
+    const Context ctx{.parameters = parameters, .map_frame = frame};
+    tracker->restart({}, ctx);
+    std::mt19937 random(seed);
+    std::normal_distribution<double> noise(0, 0.15);
+    for (int k = 1; k <= 40; ++k) {
+      const double x = 20 + speed_mps * k * dt_s * std::cos(heading), y = 10 + speed_mps * k * dt_s * std::sin(heading);
+      const double px = x + noise(random), py = y + noise(random);
+      const base::Micros t{std::llround(k * dt_s * 1e6)};
+      const Innovation seen = tracker->fuse({.landmark = 0xFF,
+                                             .range_m = static_cast<float>(std::hypot(px, py)),
+                                             .bearing_rad = static_cast<float>(std::atan2(py, px))},
+                                            t, ctx);
+      refused += seen.verdict == sensor::Verdict::kAccepted ? 0 : 1;
+      tracker->advance(t, ctx);
+      const Estimate e = tracker->estimate(ctx);
+      const Eigen::Vector2d d(static_cast<double>(e.pose.x.minus({})) - x, static_cast<double>(e.pose.y.minus({})) - y);
+      Eigen::Matrix2d p;
+      p << static_cast<double>(e.p(0, 0)), static_cast<double>(e.p(0, 1)), static_cast<double>(e.p(0, 1)),
+          static_cast<double>(e.p(1, 1));
+      square += d.squaredNorm();
+      sigmas = std::max(sigmas, std::sqrt(d.dot(p.inverse() * d)));
+      ++looks;
+    }
+  }
+};
+
+TEST(TurnTracker, FollowsATargetThatCrossesAsTheVelocityTrackerDoes) {
+  for (const double dt_s : {0.1, 0.5, 1.0})
+    for (const double speed_mps : {1.0, 3.0, 8.0}) {
+      Crossing straight, turn;
+      for (unsigned k = 0; k < 200; ++k) {
+        const double heading = 2 * M_PI * k / 200;
+        straight.watch<VelocityTracker>(robot::tracker::parameters, dt_s, speed_mps, heading, k);
+        turn.watch<TurnTracker>(robot::tracker_ukf::parameters, dt_s, speed_mps, heading, k);
+      }
+      const double ratio = std::sqrt(turn.square / straight.square);
+      std::printf(
+          "%.1f s, %.0f m/s: %.3f m, %.2f of the velocity tracker's; worst %.1f and %.1f sigma, refused %d and %d\n",
+          dt_s, speed_mps, std::sqrt(turn.square / turn.looks), ratio, turn.sigmas, straight.sigmas, turn.refused,
+          straight.refused);
+      EXPECT_LT(ratio, 1.2);
+      EXPECT_LT(turn.sigmas, 1.25 * std::max(straight.sigmas, 4.0));  // 8000 looks: Gaussian errors reach 4.2 sigma
+      EXPECT_EQ(turn.refused, 0);
+    }
 }
 
 TYPED_TEST(Tracker, TicksChangeNoBit) {

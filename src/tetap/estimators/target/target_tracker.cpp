@@ -6,10 +6,29 @@
 
 namespace tetap::estimators {
 
+/// The same position and velocity in polar form; the yaw rate is as of a new track.
+void TurnTracking::begin_to_turn(const param::TargetParameters& n) {
+  const TargetMotion motion = straight_.motion();
+  const float vx = motion.mean(2), vy = motion.mean(3), speed = base::sqrt(vx * vx + vy * vy);
+  filter::Vector<float, 4> across;
+  const float variance = motion.direction_variance(across);
+  if (!(speed > 1e-3F) || !(variance < n.sigma_yaw_rad * n.sigma_yaw_rad)) return;
+  filter::Matrix<float, 4, 4> j = filter::Matrix<float, 4, 4>::Zero();
+  j(0, 0) = j(1, 1) = 1;
+  j(2, 2) = vx / speed, j(2, 3) = vy / speed;
+  j(3, 2) = -vy / (speed * speed), j(3, 3) = vx / (speed * speed);
+  const filter::Matrix<float, 4, 4> c = j.lazyProduct(motion.covariance).lazyProduct(j.transpose());
+  filter_.x.value << motion.mean(0), motion.mean(1), speed, base::atan2(vy, vx), 0;
+  filter_.p = {};
+  for (int k = 0; k < 4; ++k)
+    for (int r = 0; r <= k; ++r) filter_.p(r, k) = c(r, k);
+  filter_.p(4, 4) = n.sigma_yaw_rate_radps * n.sigma_yaw_rate_radps;
+  turns_ = true;
+}
+
 template <class Tracking>
 Innovation TargetTracker<Tracking>::fuse(const sensor::LandmarkSighting& sighting, base::Micros stamp,
                                          const Context& ctx) {
-  using State = typename Filter::State;
   const param::TargetParameters& n = ctx.parameters.target;
   const bool radar = base::is_finite(sighting.range_rate_mps);
   if (!base::is_finite(sighting.range_m) || !base::is_finite(sighting.bearing_rad))
@@ -24,21 +43,25 @@ Innovation TargetTracker<Tracking>::fuse(const sensor::LandmarkSighting& sightin
     return {.verdict = sensor::Verdict::kAccepted};
   }
   if (stamp > time_) {
-    static_cast<void>(filter_.predict(Tracking::motion(base::seconds(stamp - time_), n)));
+    target_.predict(base::seconds(stamp - time_), n);
     time_ = stamp;
   }
   Innovation result;
   if (radar) {
-    const model::Radar<State> model{.range_m = sighting.range_m,
-                                    .bearing_rad = sighting.bearing_rad,
-                                    .range_rate_mps = sighting.range_rate_mps,
-                                    .sigma_range_m = n.sigma_range_m,
-                                    .sigma_bearing_rad = n.sigma_bearing_rad,
-                                    .sigma_range_rate_mps = n.sigma_range_rate_mps};
-    result = record(filter_.update(model, n.gate_scale * filter::chi_square_99(3)));
+    const auto model = [&]<class State>(std::type_identity<State>) {
+      return model::Radar<State>{.range_m = sighting.range_m,
+                                 .bearing_rad = sighting.bearing_rad,
+                                 .range_rate_mps = sighting.range_rate_mps,
+                                 .sigma_range_m = n.sigma_range_m,
+                                 .sigma_bearing_rad = n.sigma_bearing_rad,
+                                 .sigma_range_rate_mps = n.sigma_range_rate_mps};
+    };
+    result = record(target_.update(model, n.gate_scale * filter::chi_square_99(3), n));
   } else {
-    const model::TargetPosition<State> model{.x_m = x_m, .y_m = y_m, .sigma_m = n.sigma_position_m};
-    result = record(filter_.update(model, n.gate_scale * filter::chi_square_99(2)));
+    const auto model = [&]<class State>(std::type_identity<State>) {
+      return model::TargetPosition<State>{.x_m = x_m, .y_m = y_m, .sigma_m = n.sigma_position_m};
+    };
+    result = record(target_.update(model, n.gate_scale * filter::chi_square_99(2), n));
   }
   if (result.verdict == sensor::Verdict::kAccepted || result.verdict == sensor::Verdict::kRejected)
     refused_.update(result.verdict == sensor::Verdict::kRejected, stamp);
@@ -47,27 +70,22 @@ Innovation TargetTracker<Tracking>::fuse(const sensor::LandmarkSighting& sightin
 
 template <class Tracking>
 Estimate TargetTracker<Tracking>::estimate(const Context& ctx) const {
-  Filter ahead = filter_;
+  Tracking ahead = target_;
   const bool tracks = this->tracks(ctx);
-  if (tracks && now_ > time_)
-    static_cast<void>(ahead.predict(Tracking::motion(base::seconds(now_ - time_), ctx.parameters.target)));
+  if (tracks && now_ > time_) ahead.predict(base::seconds(now_ - time_), ctx.parameters.target);
   Estimate estimate{.time = now_};
   estimate.p = filter::Symmetric<float, 3>::diagonal(
       {kUnknown_m * kUnknown_m, kUnknown_m * kUnknown_m, kUnknown_rad * kUnknown_rad});
   if (!begun_) return estimate;
-  const model::Kinematics<float> k = model::kinematics(ahead.x);
-  const float speed2 = k(2) * k(2) + k(3) * k(3);
+  const TargetMotion motion = ahead.motion();
+  const model::Kinematics<float>& k = motion.mean;
+  const filter::Matrix<float, 4, 4>& c = motion.covariance;
   estimate.pose = {
       .x = base::Anchored{}.plus(k(0)), .y = base::Anchored{}.plus(k(1)), .yaw_rad = base::atan2(k(3), k(2))};
-  estimate.forward_mps = base::sqrt(speed2);
-  estimate.yaw_rate_radps = Tracking::yaw_rate_radps(ahead);
-  // Covariance of position and velocity; the direction of the velocity from it, as far as that is linear.
-  const auto j = model::kinematics_jacobian(ahead.x);
-  const filter::Matrix<float, 4, 4> c = j.lazyProduct(ahead.p.dense()).lazyProduct(j.transpose());
-  const filter::Vector<float, 4> turn{0, 0, -k(3) / (speed2 > 1e-6F ? speed2 : 1e-6F),
-                                      k(2) / (speed2 > 1e-6F ? speed2 : 1e-6F)};
-  const filter::Vector<float, 4> across = c.lazyProduct(turn);
-  const float variance = turn.dot(across);
+  estimate.forward_mps = base::sqrt(k(2) * k(2) + k(3) * k(3));
+  estimate.yaw_rate_radps = motion.yaw_rate_radps;
+  filter::Vector<float, 4> across;
+  const float variance = motion.direction_variance(across);
   const bool directed = variance < kUnknown_rad * kUnknown_rad && variance > 0.0F;
   estimate.p(0, 0) = c(0, 0), estimate.p(0, 1) = c(0, 1), estimate.p(1, 1) = c(1, 1);
   if (directed) {
