@@ -27,7 +27,11 @@ template <class Scalar, int N, int M>
   }
   const Vector<Scalar, M> y = by.whitened(nu);
   record.nis = y.dot(y);
-  if (!(record.nis < Scalar(1e30F)) || !by.root.regular()) return result;
+  if (!(record.nis < Scalar(1e30F))) return result;
+  if (!by.root.regular()) {  // a state would be known without an error
+    record.verdict = Verdict::kSingular;
+    return result;
+  }
   if (!(record.nis <= gate)) {
     record.verdict = Verdict::kRejected;
     return result;
