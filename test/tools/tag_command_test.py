@@ -32,7 +32,8 @@ class TagCommand(unittest.TestCase):
 
     def test_the_frames_of_a_command(self):
         done = self.said("--nonce", "0xDEADBEEF", "--turn", "1234", "--counter", "77", "303#7901000000000000")
-        self.assertEqual(done.stdout, "301#384D0000DFFA674E\n303#7901000000000000\n")  # openssl 3.0.19: DFFA674E5D0AE3D1
+        # openssl 3.0.19 over EFBEADDED2040000030300004D000000, and with 7901000000000000 behind it: DFFA674E5D0AE3D1
+        self.assertEqual(done.stdout, "301#384D0000883CCC33\n301#384D0000DFFA674E\n303#7901000000000000\n")
 
     @unittest.skipUnless(shutil.which("openssl"), "no openssl")
     def test_tags_are_those_of_openssl(self):
@@ -44,8 +45,10 @@ class TagCommand(unittest.TestCase):
             can_id = 64 * dice.randrange(0x1F) + offset
             message = b"".join(x.to_bytes(4, "little") for x in (nonce, turn, can_id, counter)) + data
             done = self.said("--nonce", str(nonce), "--turn", str(turn), "--counter", str(counter), "%03X#%s" % (can_id, data.hex()), key=key)
-            guard, command = done.stdout.split()
+            opening, guard, command = done.stdout.split()
+            self.assertEqual(opening[-8:], openssl(key, message[:16])[:8])
             self.assertEqual(guard[-8:], openssl(key, message)[:8])
+            self.assertEqual(opening[:12], guard[:12])
             self.assertEqual(command, "%03X#%s" % (can_id, data.hex().upper()))
             self.assertEqual(int(guard[:3], 16), can_id - offset + 1)
             self.assertEqual(int.from_bytes(bytes.fromhex(guard[6:12]), "little"), counter)

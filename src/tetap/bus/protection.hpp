@@ -121,7 +121,7 @@ class Protection {
   template <class Out>
   void guard(const base::CanFrame& frame, base::Micros now, Counters& counters, Out& out) {
     const auto bytes = payload(frame);
-    if (const auto tag = decode<InGuardTag>(bytes)) return authentication_.announce(*tag);
+    if (const auto tag = decode<InGuardTag>(bytes)) return authentication_.announce(*tag, counters);
     if (const auto entry = decode<InGuardEntry>(bytes)) return entries_.announce(*entry);
     const auto sample = decode<InGuardSample>(bytes);
     if (sample && guards()) samples_.guard(*sample, now, counters, out);
