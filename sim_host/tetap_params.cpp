@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // tetap-params: the table of parameters with a robot's values: as a file for --params, as JSON, as a page.
+#include "sim_host/datasheet.hpp"
 #include "sim_host/parameter_settings.hpp"
 #include "sim_host/robots.hpp"
 #include "tetap/param/crc.hpp"
@@ -19,7 +20,11 @@ std::string help() {
          "  --json             a list of rows: path, index, unit, limits, default, value, whether a change needs a "
          "restart,"
          " text\n"
-         "  --markdown         the reference page: the same but for the robot's values\n";
+         "  --markdown         the reference page: the same but for the robot's values\n"
+         "  --from-datasheet QUANTITY=NUMBER UNIT\n"
+         "                     lines of such a file for an IMU's noise, alone: gyro-noise=2.8mdps/rtHz; may be given "
+         "more\n"
+         "                     than once (docs/howto/imu_noise.md)\n";
 }
 
 std::string limits(const param::Row& row) {
@@ -73,8 +78,15 @@ int main(int argc, char** argv) try {
   if (arguments.flag("--help") || arguments.flag("-h")) return std::fputs(help().c_str(), stdout), 0;
   const std::string robot = arguments.text("--robot").value_or("rover");
   const bool json = arguments.flag("--json"), markdown = arguments.flag("--markdown");
+  const auto datasheet = arguments.texts("--from-datasheet");
   const sim::ParameterSettings settings(arguments);
   arguments.finish();
+  if (!datasheet.empty()) {
+    std::string lines =
+        "# From a data sheet. On a moving robot vibration adds to it: the NIS of a drive is the judge.\n";
+    for (const std::string& one : datasheet) lines += sim::datasheet_lines(one);
+    return std::fputs(lines.c_str(), stdout), 0;
+  }
   if (json && markdown) throw sim::UsageError("only one of --json, --markdown");
   const param::Parameters values = sim::parameters_of(robot, settings);
   if (json)

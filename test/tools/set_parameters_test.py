@@ -3,11 +3,14 @@
 """Parameters without a compiler: --params and --set change what the node runs with, the CRC of its version frame says so, and what is wrong is named
 with file and line by every program. No text of the table is in a flash image."""
 import json
+import math
 import os
 import re
 import subprocess
 import tempfile
 import unittest
+
+import numpy as np
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.realpath(__file__))))
 PROGRAMS = os.environ.get("TETAP_PROGRAMS", os.path.join(ROOT, "build/host/sim_host"))
@@ -96,6 +99,30 @@ class SetParameters(unittest.TestCase):
                 for value in row["value"] if row["elements"] > 1 else [row["value"]]:
                     slack = 1e-6 * max(abs(row["minimum"]), abs(row["maximum"]))
                     self.assertTrue(row["minimum"] - slack <= value <= row["maximum"] + slack, (robot, row["path"], value))
+
+    def test_the_noise_of_a_data_sheet_is_a_file_of_parameters(self):
+        """ICM-42688-P (DS-000347): 2.8 mdps/rtHz, 70 ug/rtHz. White noise of a density N has the Allan deviation N at 1 s (IEEE Std 952)."""
+        said = run("params", "--from-datasheet", "gyro-noise=2.8mdps/rtHz", "--from-datasheet", "accel-noise=70 ug/rtHz", "--from-datasheet", "gyro-scale=0.5%")
+        value = {line.split(" = ")[0]: float(line.split(" = ")[1].split()[0]) for line in said.splitlines() if not line.startswith("#")}
+        self.assertAlmostEqual(value["inertial.gyro_radps_rthz"], math.radians(0.0028), delta=1e-9)
+        self.assertAlmostEqual(value["inertial.accel_mps2_rthz"], 70e-6 * 9.80665, delta=1e-8)
+        self.assertAlmostEqual(value["inertial.gyro_scale"], 0.005)
+        rate = np.random.default_rng(1).normal(0, math.sqrt(value["gyro.noise"] * 100), 400_000).reshape(-1, 100).mean(axis=1)
+        allan_dps = math.degrees(math.sqrt(0.5 * np.mean(np.diff(rate) ** 2)))
+        self.assertAlmostEqual(allan_dps, 0.0028, delta=0.0002)
+        values = {row["path"]: row["value"] for row in table("--params", self.path("imu.params", said))["parameters"]}
+        self.assertAlmostEqual(values["gyro.noise"] / value["gyro.noise"], 1, places=5)
+        walk = float(run("params", "--from-datasheet", "gyro-instability=5deg/h").splitlines()[1].split(" = ")[1].split()[0])
+        # A Markov process of 300 s: its sigma times 0.617 is its largest Allan deviation, at 1.89 of that time.
+        self.assertTrue(0.5 < 0.617 * walk * math.sqrt(300 / 2) / math.radians(5 / 3600) < 1.5, walk)
+
+    def test_words_that_no_data_sheet_has_are_named(self):
+        for words, reason in (("gyro-noise=2.8furlong", "no unit 'furlong'; there are: rad/s/rtHz dps/rtHz"), ("gyro=1dps", "no such quantity; there are: gyro-noise accel-noise"),
+                              ("gyro-noise", "no such quantity"), ("accel-noise=ug/rtHz", "a number above zero"), ("accel-noise=-3ug/rtHz", "a number above zero")):
+            said = run("params", "--from-datasheet", words, status=2)
+            self.assertEqual(said.count("\n"), 1)
+            self.assertIn(f"--from-datasheet {words}: ", said)
+            self.assertIn(reason, said)
 
     def test_the_reference_is_that_of_the_table(self):
         page = run("params", "--markdown")
