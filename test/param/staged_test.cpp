@@ -12,7 +12,7 @@
 namespace tetap::param {
 namespace {
 
-constexpr Parameters kCompiled = checked({.wheels = {.drive = {0.1F, 0.1F, 0.5F}}});
+constexpr Parameters kCompiled = checked({.wheels = {.drive = {0.1F, 0.1F, 0.5F, 1, 1e-3F, 1e-3F}}});
 
 std::uint32_t word_of(const Parameters& p, const Row& row, std::size_t word) {
   std::uint32_t value = 0;

@@ -73,6 +73,10 @@ constexpr bool axes(const WiredParameters& w) {
   row(2, w.imu_z);
   return rotation(rows);
 }
+constexpr bool wheels_have_noise(const WheelParameters& w) {
+  return !(w.drive.left_radius_m > 0) || (w.drive.noise_left > 0 && w.drive.noise_right > 0) || w.noise.speed > 0 ||
+         w.wheel_speed_noise > 0;
+}
 constexpr bool one_of(std::int32_t x, auto... values) { return ((x == values) || ...); }
 /// An epoch of a configured receiver, 1720 bits with its covariance, takes at most half of the period.
 constexpr bool line_suffices(const WiredParameters& w) {
@@ -141,6 +145,14 @@ inline constexpr std::array kRules{
          "fast enough for 3440 bits in each wired.gnss_period_ms"},
 };
 
+/// Judged when a robot compiles only: no image holds them, and a world without noise may be played.
+inline constexpr std::array kCompiledRules{
+    Rule{"wheels.drive.noise_left", [](const P& p) { return detail::wheels_have_noise(p.wheels); },
+         "above 0 with noise_right, or else wheels.noise.speed or wheels.wheel_speed_noise: no wheel is without noise"},
+    Rule{"gyro.noise", [](const P& p) { return p.gyro.use == 0 || p.gyro.noise > 0; },
+         "above 0 where gyro.use is 1: no gyroscope is without noise"},
+};
+
 /// The first rule that does not hold; null when all do.
 [[nodiscard]] constexpr const Rule* broken_rule(const Parameters& parameters) {
   for (const Rule& rule : kRules)
@@ -188,6 +200,7 @@ consteval Parameters checked(const Parameters& parameters) {
       detail::require_within(within(row, value), row.path, value, row.unit, row.minimum, row.maximum);
     }
   for (const Rule& rule : kRules) detail::require(rule, parameters);
+  for (const Rule& rule : kCompiledRules) detail::require(rule, parameters);
   return parameters;
 }
 
