@@ -16,6 +16,7 @@
 #include <cstdio>
 #include <exception>
 #include <iostream>
+#include <map>
 #include <optional>
 #include <set>
 #include <span>
@@ -44,6 +45,7 @@ const char* const kHelp =
     "  --truth FILE   with this truth\n"
     "  --jobs N       cells at a time (default 1)\n"
     "  --dbc FILE     default config/tetap.dbc\n"
+    "  --oracle       beside each cell the same drive without what its faulty device sends meanwhile\n"
     "  --facts        messages and situations of the drive as JSON, instead of cells\n";
 
 /// Sink of the link: keeps the origin that the node publishes.
@@ -140,8 +142,8 @@ bool waited(pid_t child) {
   return ::waitpid(child, &status, 0) == child && WIFEXITED(status) && WEXITSTATUS(status) == 0;
 }
 
-/// Record of the run without the fault, against which cells are held.
-struct CleanRun {
+/// Record of a run that others are held against: without the fault, or without the faulty device.
+struct Record {
   std::vector<sim::Judged> judged;
   sim::PublishedState first;  ///< the first state with all its sigma
   std::set<std::string> words;
@@ -152,6 +154,7 @@ struct Options {
   std::uint64_t seed = 1;
   std::optional<std::string> log, truth;
   std::size_t jobs = 1;
+  bool oracle = false;
 };
 
 /// All cells of one situation.
@@ -175,9 +178,17 @@ class Group {
       if (when.last + kRecent >= tick_) recent.insert(word);
     player.states().forget_words();
     player.states().forget_states();
-    CleanRun clean = clean_run(player, frames);
+    Record clean = record(player, frames, {static_cast<std::int64_t>(kLongest) * 10'000});
     clean.words.merge(recent);
     const sim::CellFacts facts = sim::facts_of(*log_, tick_, clean.first, dbc);
+    std::map<std::pair<std::string, std::int64_t>, Record> oracles;  // by device and duration
+    if (options.oracle)
+      for (const sim::CellRequest& request : requests_) {
+        double gate = 0;
+        const sim::FrameFault fault = sim::sized(request, *log_, tick_, facts, dbc, gate);
+        const auto [at, is_new] = oracles.try_emplace({sim::device_of(fault), fault.duration.us});
+        if (is_new) at->second = record(player, without(frames, fault, dbc), fault.duration);
+      }
     std::size_t running = 0;
     const auto ended = [&running] {
       int status = 0;
@@ -187,7 +198,7 @@ class Group {
     };
     for (const sim::CellRequest& request : requests_) {
       if (running >= options.jobs) ended();
-      static_cast<void>(forked([&] { cell(player, request, frames, clean, facts, options, dbc); }));
+      static_cast<void>(forked([&] { cell(player, request, frames, clean, oracles, facts, options, dbc); }));
       ++running;
     }
     while (running > 0) ended();
@@ -202,12 +213,20 @@ class Group {
     const auto part = all.subspan(log_->first[from], log_->first[to] - log_->first[from]);
     if (!outage()) return {part.begin(), part.end()};
     sim::FrameFault off;
-    off.sensor = "frames";
-    off.axis = "gnss";
-    off.kind = sim::FaultKind::kLost;
+    off.sensor = "gnss_position";
     off.start = log_->ticks[tick_] - sim::kOutageBefore;
     off.duration = sim::kOutageBefore + sim::kOutageAfter;
-    return sim::put_fault(part, off, sim::geometry_of(*log_), dbc).frames;
+    return without(part, off, dbc);
+  }
+
+  /// Nothing comes from the fault's device while the fault lasts.
+  [[nodiscard]] std::vector<sim::TimedFrame> without(std::span<const sim::TimedFrame> frames,
+                                                     const sim::FrameFault& fault, const sim::BusDatabase& dbc) const {
+    sim::FrameFault off = fault;
+    off.axis = sim::device_of(fault);
+    off.sensor = "frames";
+    off.kind = sim::FaultKind::kLost;
+    return sim::put_fault(frames, off, sim::geometry_of(*log_), dbc).frames;
   }
 
   [[nodiscard]] std::size_t last_tick(base::Micros lasts) const {
@@ -216,11 +235,11 @@ class Group {
   }
 
   /// Through a file, because the process that plays it ends.
-  [[nodiscard]] CleanRun clean_run(Player& player, std::span<const sim::TimedFrame> frames) const {
+  [[nodiscard]] Record record(Player& player, std::span<const sim::TimedFrame> frames, base::Micros lasts) const {
     std::FILE* const file = std::tmpfile();
     if (file == nullptr) throw std::runtime_error("no temporary file");
     const bool well = waited(forked([&] {
-      player.play(tick_, last_tick({static_cast<std::int64_t>(kLongest) * 10'000}), frames);
+      player.play(tick_, last_tick(lasts), frames);
       const auto judged = player.judged();
       const sim::PublishedState first = first_whole(player.states().states());
       std::fwrite(&first, sizeof first, 1, file);
@@ -231,7 +250,7 @@ class Group {
       std::fwrite(&end, sizeof end, 1, file);
       std::fwrite(words.data(), 1, words.size(), file);
     }));
-    CleanRun clean;
+    Record clean;
     std::rewind(file);
     bool whole = well && std::fread(&clean.first, sizeof clean.first, 1, file) == 1;
     for (sim::Judged one; whole && std::fread(&one, sizeof one, 1, file) == 1 && one.tick != 0;)
@@ -242,7 +261,8 @@ class Group {
       if (c == '\n') clean.words.insert(std::exchange(word, {}));
     }
     std::fclose(file);
-    if (!whole || clean.judged.empty()) throw std::runtime_error("situation " + situation_ + ": the clean run failed");
+    if (!whole || clean.judged.empty())
+      throw std::runtime_error("situation " + situation_ + ": a run to hold against failed");
     return clean;
   }
 
@@ -257,14 +277,16 @@ class Group {
   }
 
   void cell(Player& player, const sim::CellRequest& request, std::span<const sim::TimedFrame> frames,
-            const CleanRun& clean, const sim::CellFacts& facts, const Options& options,
-            const sim::BusDatabase& dbc) const {
+            const Record& clean, const std::map<std::pair<std::string, std::int64_t>, Record>& oracles,
+            const sim::CellFacts& facts, const Options& options, const sim::BusDatabase& dbc) const {
     sim::CellResult result;
     const sim::FrameFault fault = sim::sized(request, *log_, tick_, facts, dbc, result.gate);
     const sim::Faulted faulted = sim::put_fault(frames, fault, sim::geometry_of(*log_), dbc);
     const std::size_t end = tick_ + static_cast<std::size_t>(fault.duration.us / 10'000);
     player.play(tick_, last_tick(fault.duration), faulted.frames);
     result.figures = sim::compare(player.judged(), clean.judged, end);
+    if (const auto oracle = oracles.find({sim::device_of(fault), fault.duration.us}); oracle != oracles.end())
+      result.oracle = sim::compare(oracle->second.judged, clean.judged, end);
     for (const auto& [word, when] : player.states().words())
       if (!clean.words.contains(word)) result.said.emplace_back(word, 0.01 * static_cast<double>(when.first - tick_));
     result.at_s = static_cast<double>((fault.start - log_->begin).us) * 1e-6;
@@ -358,6 +380,7 @@ int main(int argc, char** argv) try {
   if (options.log.has_value() != options.truth.has_value()) throw sim::UsageError("--log and --truth belong together");
   const sim::BusDatabase dbc(arguments.text("--dbc").value_or("config/tetap.dbc"));
   const bool facts = arguments.flag("--facts");
+  options.oracle = arguments.flag("--oracle");
   arguments.finish();
   return run(options, dbc, facts);
 } catch (const std::exception& error) {

@@ -8,6 +8,7 @@
 #include <charconv>
 #include <cmath>
 #include <cstdlib>
+#include <limits>
 #include <sstream>
 #include <stdexcept>
 #include <string_view>
@@ -26,15 +27,6 @@ base::Micros lasts(const FrameFault& fault) {
   return slow ? kSlowLasts : kOtherLasts;
 }
 
-std::string device_of(const FrameFault& fault) {
-  const std::string& s = fault.sensor;
-  if (s == "frames" || s == "stamps") return fault.axis;
-  if (s == "gyro" || s == "accel") return "imu";
-  if (s == "speed") return "wheels";
-  if (s.starts_with("gnss")) return "gnss";
-  return s == "heading_accuracy" ? "heading" : s;
-}
-
 double number_of(const std::string& text, std::size_t from, std::size_t behind) {
   double value = 0;
   const char* const last = text.data() + text.size() - behind;
@@ -44,6 +36,30 @@ double number_of(const std::string& text, std::size_t from, std::size_t behind) 
   return value;
 }
 
+/// A message that brings a sample of a device, and the signal by which a filter can use it or not.
+struct Head {
+  std::string_view device, message, signal;
+  std::int64_t least = std::numeric_limits<std::int64_t>::min();  ///< raw number of a sample that can be used
+};
+constexpr std::int64_t kFix2d = 2;  // a receiver that lost the sky goes on talking
+constexpr std::array kHeads{Head{"imu", "In_Imu0Time", ""},
+                            Head{"wheels", "In_WheelCounts", ""},
+                            Head{"wheels", "In_WheelSpeed", "WheelSpeed_Left"},
+                            Head{"wheels", "In_BodySpeed", "BodySpeed_Forward"},
+                            Head{"gnss", "In_GnssAlt", "GnssAlt_Fix", kFix2d},
+                            Head{"gnss_velocity", "In_GnssVelEN", "GnssVelEN_East"},
+                            Head{"magnetometer", "In_Mag", "Mag_FluxX"},
+                            Head{"barometer", "In_Baro", "Baro_Pressure"},
+                            Head{"heading", "In_Heading", "Heading_Angle"},
+                            Head{"landmarks", "In_RangeBearing", ""}};
+
+bool usable(const Head& head, const DbcMessage& message, const base::CanFrame& frame) {
+  const DbcSignal* const signal = message.find(head.signal);
+  if (signal == nullptr) return true;
+  const std::int64_t raw = signal->raw(frame);
+  return raw >= head.least && !(signal->has_not_available() && raw == signal->not_available());
+}
+
 std::string real(double value) {
   if (!std::isfinite(value)) return "null";
   std::array<char, 32> text{};
@@ -51,7 +67,36 @@ std::string real(double value) {
   return text.data();
 }
 
+std::string object_of(const std::map<std::string, double>& numbers) {
+  std::string text;
+  for (const auto& [name, value] : numbers) text += (text.empty() ? "\"" : ", \"") + name + "\": " + real(value);
+  return "{" + text + "}";
+}
+
+std::string object_of(const std::array<Figures, kQuantities>& figures) {
+  std::string text;
+  for (std::size_t q = 0; q < kQuantities; ++q) {
+    const Figures& f = figures[q];
+    text += std::string(q == 0 ? "" : ", ") + "\"" + kQuantityNames[q] +
+            "\": {\"worst_ratio\": " + real(f.worst_ratio) + ", \"worst_error\": " + real(f.worst_error) +
+            ", \"clean_ratio\": " + real(f.clean_ratio) + ", \"clean_error\": " + real(f.clean_error) +
+            ", \"beyond_s\": " + real(f.beyond_s) +
+            ", \"inside_after_s\": " + (f.inside_after_s ? real(*f.inside_after_s) : "null") +
+            ", \"valid_while_out_s\": " + real(f.valid_while_out_s) + "}";
+  }
+  return "{" + text + "}";
+}
+
 }  // namespace
+
+std::string device_of(const FrameFault& fault) {
+  const std::string& s = fault.sensor;
+  if (s == "frames" || s == "stamps") return fault.axis;
+  if (s == "gyro" || s == "accel") return "imu";
+  if (s == "speed") return "wheels";
+  if (s.starts_with("gnss")) return "gnss";
+  return s == "heading_accuracy" ? "heading" : s;
+}
 
 void set_kind(FrameFault& fault, const std::string& kind) {
   const bool spike = kind.starts_with("spike");
@@ -98,18 +143,19 @@ CellFacts facts_of(const CleanLog& log, std::size_t tick, const PublishedState& 
     u.height_m = clean.std_position_m[2] > 0 ? clean.std_position_m[2] : u.position_m;
   }
   u.speed_mps = facts.moving.speed_mps;
-  static const std::vector<std::pair<std::string_view, std::string_view>> kHeads{
-      {"imu", "In_Imu0Time"},          {"wheels", "In_WheelCounts"}, {"wheels", "In_WheelSpeed"},
-      {"wheels", "In_BodySpeed"},      {"gnss", "In_GnssLat"},       {"gnss_velocity", "In_GnssVelEN"},
-      {"magnetometer", "In_Mag"},      {"barometer", "In_Baro"},     {"heading", "In_Heading"},
-      {"landmarks", "In_RangeBearing"}};
   std::map<std::string, int> samples;
   const std::size_t until = std::min(tick + kPeriodWindow, log.ticks.size());
   for (std::size_t i = log.first[tick]; i < log.first[until]; ++i) {
     const base::CanFrame& frame = log.frames[i].frame;
     const DbcMessage* const message = dbc.at(frame.id - log.parameters.can_base);
     if (message == nullptr) continue;
-    for (const auto& [device, head] : kHeads) samples[std::string(device)] += message->name == head ? 1 : 0;
+    for (const Head& head : kHeads) {
+      if (message->name != head.message) continue;
+      const std::string device(head.device);
+      ++samples[device];
+      if (usable(head, *message, frame))
+        facts.usable_after_s.try_emplace(device, 1e-6 * static_cast<double>((log.frames[i].time - log.ticks[tick]).us));
+    }
     if (message->name == "In_GnssAcc") u.gnss_position_m = message->find("GnssAcc_Hor")->value(frame);
     if (message->name == "In_GnssVelU") u.gnss_velocity_mps = message->find("GnssVelU_Acc")->value(frame);
     const DbcSignal* const turn = message->find("BodySpeed_YawRate");
@@ -117,7 +163,7 @@ CellFacts facts_of(const CleanLog& log, std::size_t tick, const PublishedState& 
                         (turn != nullptr && turn->raw(frame) != turn->not_available());
   }
   for (const auto& [device, count] : samples)
-    if (count > 0) facts.period_s[device] = kTick_s * static_cast<double>(until - tick) / count;
+    facts.period_s[device] = kTick_s * static_cast<double>(until - tick) / count;
   return facts;
 }
 
@@ -156,27 +202,16 @@ std::string row_of(const std::string& robot, std::uint64_t seed, const CellReque
   field("at_s", real(result.at_s));
   field("lasts_s", real(static_cast<double>(fault.duration.us) * 1e-6));
   field("changed", std::to_string(result.changed));
-  std::string quantities;
-  for (std::size_t q = 0; q < kQuantities; ++q) {
-    const Figures& f = result.figures[q];
-    quantities += std::string(q == 0 ? "" : ", ") + "\"" + kQuantityNames[q] +
-                  "\": {\"worst_ratio\": " + real(f.worst_ratio) + ", \"worst_error\": " + real(f.worst_error) +
-                  ", \"clean_ratio\": " + real(f.clean_ratio) + ", \"clean_error\": " + real(f.clean_error) +
-                  ", \"beyond_s\": " + real(f.beyond_s) +
-                  ", \"inside_after_s\": " + (f.inside_after_s ? real(*f.inside_after_s) : "null") +
-                  ", \"valid_while_out_s\": " + real(f.valid_while_out_s) + "}";
-  }
-  field("quantities", "{" + quantities + "}");
+  field("quantities", object_of(result.figures));
+  if (result.oracle) field("oracle", object_of(*result.oracle));
   std::string said;
   for (const auto& [word, after_s] : result.said)
     said += (said.empty() ? "\"" : ", \"") + word + "\": " + real(after_s);
   field("said", "{" + said + "}");
-  std::string periods;
-  for (const auto& [device, period_s] : facts.period_s)
-    periods += (periods.empty() ? "\"" : ", \"") + device + "\": " + real(period_s);
   const Uncertainty& u = facts.uncertainty;
   field("facts",
-        "{\"period_s\": {" + periods + "}, \"wheels_turn\": " + (facts.wheels_turn ? "true" : "false") +
+        "{\"period_s\": " + object_of(facts.period_s) + ", \"usable_after_s\": " + object_of(facts.usable_after_s) +
+            ", \"wheels_turn\": " + (facts.wheels_turn ? "true" : "false") +
             ", \"planar\": " + (facts.planar ? "true" : "false") + ", \"speed_mps\": " + real(u.speed_mps) +
             ", \"turn_radps\": " + real(facts.moving.turn_radps) + ", \"sigma_heading_rad\": " + real(u.heading_rad) +
             ", \"gnss_velocity_mps\": " + real(u.gnss_velocity_mps) + ", \"gate\": " + real(result.gate) + "}");

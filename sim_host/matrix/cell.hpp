@@ -30,12 +30,17 @@ struct CellRequest {
 /// Throws std::runtime_error.
 void set_kind(FrameFault& fault, const std::string& kind);
 
+/// Device whose fault it is, by its name in kFaultDevices.
+[[nodiscard]] std::string device_of(const FrameFault& fault);
+
 /// State of the robot and its devices when a fault begins.
 struct CellFacts {
   Uncertainty uncertainty;
   Moving moving;
   std::map<std::string, double> period_s;  ///< sample period by device: imu wheels gnss gnss_velocity ...
-  bool wheels_turn = false;                ///< wheels or speeds that show a turn
+  /// From the fault's begin to a device's first sample that a filter can use; none in the longest fault: not there.
+  std::map<std::string, double> usable_after_s;
+  bool wheels_turn = false;  ///< wheels or speeds that show a turn
   bool planar = false;
 };
 
@@ -51,6 +56,8 @@ struct CellFacts {
 
 struct CellResult {
   std::array<Figures, kQuantities> figures;
+  /// Floor of the cell: the oracle is not sent what the faulty device sends while the fault lasts.
+  std::optional<std::array<Figures, kQuantities>> oracle;
   std::vector<std::pair<std::string, double>> said;  ///< word, and seconds after the fault's begin
   double at_s = 0;
   double largest = 0;  ///< change of a value, in the unit of the size

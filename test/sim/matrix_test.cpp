@@ -157,6 +157,36 @@ TEST(Dbc, a_line_that_cannot_be_read_is_named) {
   }
 }
 
+TEST(CellFacts, a_receiver_without_a_fix_talks_and_is_of_no_use) {
+  std::istringstream text(
+      "BO_ 780 In_GnssAlt: 8 H\n SG_ GnssAlt_Fix : 50|4@1+ (1,0) [0|15] \"\" A\n"
+      "BO_ 782 In_GnssVelEN: 8 H\n SG_ GnssVelEN_East : 26|19@1- (0.001,0) [-262.143|262.143] \"m/s\" A\n"
+      "BO_ 784 In_Mag: 8 H\n SG_ Mag_FluxX : 0|16@1- (0.1,0) [-3276.7|3276.7] \"uT\" A\n");
+  const sim::BusDatabase dbc(text);
+  sim::CleanLog log = at_rest(0);
+  log.truth.assign(1'700, log.truth.front());
+  const auto put = [&](const char* message, const char* signal, std::int64_t raw) {
+    base::CanFrame frame{.id = log.parameters.can_base + dbc.message(message).offset};
+    dbc.signal(message, signal).set_raw(frame, raw);
+    log.frames.push_back({log.ticks.back(), frame});
+  };
+  for (int tick = 0; tick < 1'600; ++tick) {
+    log.ticks.push_back(base::Micros{10'000 * tick});
+    log.first.push_back(log.frames.size());
+    if (tick % 20 != 0) continue;
+    put("In_GnssAlt", "GnssAlt_Fix", tick < 350 ? 1 : 2);  // the time alone, then a fix without a height
+    put("In_GnssVelEN", "GnssVelEN_East", tick < 450 ? -262'144 : 0);
+    put("In_Mag", "Mag_FluxX", -32'768);
+  }
+  log.first.push_back(log.frames.size());
+  const sim::CellFacts facts = sim::facts_of(log, 100, exact(0), dbc);
+  for (const char* const device : {"gnss", "gnss_velocity", "magnetometer"})
+    EXPECT_NEAR(facts.period_s.at(device), 0.2, 1e-9) << device;
+  EXPECT_NEAR(facts.usable_after_s.at("gnss"), 2.6, 1e-9);
+  EXPECT_NEAR(facts.usable_after_s.at("gnss_velocity"), 3.6, 1e-9);
+  EXPECT_FALSE(facts.usable_after_s.contains("magnetometer"));
+}
+
 TEST(CellRequest, a_line_is_a_cell_or_an_error) {
   const sim::CellRequest request("curve gyro z spike10 0.1g");
   EXPECT_EQ(request.fault.samples, 10);

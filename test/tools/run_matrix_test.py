@@ -107,6 +107,51 @@ class Promise(unittest.TestCase):
         self.assertAlmostEqual(matrix_promise.allowed_s([], facts(CAR)), 2.0)
 
 
+class Usable(unittest.TestCase):
+    """The mended promise, worked out by hand: the rover's receiver sends at 5 Hz, and a fault of the gyroscope lasts 3 s."""
+
+    def seen(self, gnss, velocity, lasts=3.0, sensor="gyro", axis="x"):
+        after = {"imu": 0.0, "wheels": 0.0, "gnss": gnss, "gnss_velocity": velocity}
+        about = {**facts(ROVER), "lasts_s": lasts, "usable_after_s": {device: s for device, s in after.items() if s is not None}}
+        return matrix_promise.witnesses(sensor, axis, "straight", about), matrix_promise.promise(sensor, axis, "straight", 5, about)
+
+    def test_a_witness_that_sent_nothing_usable_in_the_time_of_the_fault_has_seen_nothing(self):
+        self.assertEqual(self.seen(0.1, 3.0), (["gnss", "wheels"], "held"))
+        self.assertEqual(self.seen(0.1, 3.1), (["wheels"], "noticed"), "a tilt shows in the velocity")
+        self.assertEqual(self.seen(0.1, None), (["wheels"], "noticed"))
+        self.assertEqual(self.seen(None, 0.1), (["gnss", "wheels"], "held"))
+        self.assertEqual(self.seen(None, 0.1, sensor="wheels", axis="both"), (["gnss", "imu"], "held"))
+
+    def test_a_spike_is_seen_by_the_next_three_samples(self):
+        self.assertEqual(self.seen(0.1, 0.6, lasts=0.01), (["gnss", "wheels"], "held"))
+        self.assertEqual(self.seen(0.1, 0.61, lasts=0.01), (["wheels"], "noticed"))
+
+    def test_a_word_is_due_from_when_a_test_could_speak(self):
+        about = {**facts(ROVER), "lasts_s": 10.0, "usable_after_s": {"wheels": 0.5, "gnss": 4.0}}
+        self.assertAlmostEqual(matrix_promise.speaks_s("offset", 5, ["wheels", "gnss"], about), 0.5)
+        self.assertAlmostEqual(matrix_promise.speaks_s("ramp", 5, ["wheels"], about), 2.0)
+        self.assertAlmostEqual(matrix_promise.speaks_s("ramp", 0.5, ["wheels"], about), 10.0, msg="it never reaches its gate")
+        self.assertAlmostEqual(matrix_promise.speaks_s("ramp", 5, ["gnss"], about), 4.0)
+        self.assertAlmostEqual(matrix_promise.speaks_s("ramp", 5, ["wheels"], facts(ROVER)), 0.0, msg="by wiring alone")
+
+    def test_a_row_has_both_promises_and_the_floor(self):
+        def quantities(error, beyond=0.0):
+            return figures(worst_error=error, worst_ratio=3 * error, beyond_s=beyond)
+        about = {**facts(ROVER), "usable_after_s": {"imu": 0.0, "wheels": 0.0, "gnss": 0.0, "gnss_velocity": 4.0}}
+        one = {**dict.fromkeys(("robot", "size", "situation"), "straight"), "sensor": "gyro", "axis": "x", "kind": "ramp", "seed": 1, "gates": 2.0, "size_value": 1.0,
+               "lasts_s": 3.0, "facts": about, "said": {"Degraded": 11.4}, "quantities": quantities(2.0, 9.0), "oracle": quantities(0.5)}
+        judged = matrix_promise.judged(one)
+        self.assertEqual((judged["promise"], judged["witnesses"], judged["broken"]), ("noticed", ["wheels"], []), "the word is due 11.5 s after the begin")
+        self.assertEqual(judged["wired"], {"promise": "held", "broken": ["beyond"]})
+        self.assertNotIn("over_oracle", judged)
+        about["usable_after_s"]["gnss_velocity"] = 0.1
+        judged = matrix_promise.judged(one)
+        self.assertEqual((judged["promise"], judged["broken"], judged["oracle_broken"]), ("held", ["beyond"], []))
+        self.assertAlmostEqual(judged["over_oracle"]["position"], 4.0)
+        del one["oracle"]
+        self.assertNotIn("oracle_broken", matrix_promise.judged(one))
+
+
 def figures(**changes):
     good = {"worst_ratio": 0.5, "worst_error": 0.5, "clean_ratio": 0.4, "clean_error": 0.4, "beyond_s": 0.0, "inside_after_s": 0.0, "valid_while_out_s": 0.0}
     return {"position": {**good, **changes}, "heading": good}
@@ -192,6 +237,19 @@ class Tables(unittest.TestCase):
         rows = [row("step", True, size="max"), row("step", True, size="5g", ratio=9), row("step", False, size="1g")]
         self.assertEqual(matrix_tables.smallest(rows)["size"], "5g")
         self.assertIn('--cell "rover curve gyro z step 5g 1"', matrix_tables.command(matrix_tables.smallest(rows)))
+
+    def test_cells_that_left_held_and_the_floor_are_counted(self):
+        def beside(kind, broken, oracle, over, promise="held"):
+            more = {"oracle_broken": ["beyond"] if oracle else [], "over_oracle": {"position": over, "velocity": 1.0, "heading": 2.0}} if promise == "held" else {}
+            return {**row(kind, broken, promise), "wired": {"promise": "held", "broken": ["outside"]}, **more}
+        rows = [beside("step", True, True, 1.1), beside("step", True, False, 9.0), beside("step", False, False, 1.3), beside("ramp", False, False, 5.0, "noticed")]
+        self.assertIn("1 of 4 held cells (25.0 %)", matrix_tables.left_held(rows))
+        self.assertEqual(matrix_tables.of_floor(rows)[0], ["all", "3", "2", "1", "1", "1.30", "1.30", "1.00", "2.00"])
+        self.assertEqual(matrix_tables.of_whole(matrix_tables.by_wiring(rows), lambda one: one["robot"])[0][:3], ["all", "4", "4"])
+        for text in (matrix_tables.text(rows), matrix_tables.page(rows)):
+            self.assertIn("1 of 4 held cells (25.0 %)", text)
+            self.assertIn("oracle", text)
+        self.assertNotIn("oracle", matrix_tables.text([row("step", True)]))
 
     def test_the_page_has_the_shares_and_the_smallest_example_of_the_matrix_and_the_shares_alone_of_recorded_drives(self):
         rows = [row("step", True, size="5g", ratio=9), row("step", False, size="1g"), row("spike1", False)]
@@ -513,6 +571,23 @@ class Runs(unittest.TestCase):
         step = rows["east", "step"]
         self.assertAlmostEqual(step["gates"], 30, delta=0.2)
         self.assertNotEqual(step["quantities"]["velocity"]["worst_error"], step["quantities"]["velocity"]["clean_error"])
+
+    def test_the_oracle_of_a_device_that_is_silent_is_the_cell_itself(self):
+        cells = "start frames gnss lost -\nstart gnss_velocity east step 30g\n"
+        done = subprocess.run([MATRIX, "--dbc", DBC, "--oracle"], input=cells, capture_output=True, text=True, check=True)
+        lost, step = sorted(map(json.loads, done.stdout.splitlines()), key=lambda row: row["sensor"])
+        self.assertGreater(lost["changed"], 0)
+        self.assertEqual(lost["quantities"], lost["oracle"])
+        self.assertNotEqual(step["quantities"], step["oracle"])
+        self.assertEqual(sorted(step["facts"]["usable_after_s"]), sorted(step["facts"]["period_s"]), "the rover's receiver has a fix at its start")
+
+    def test_seeds_have_so_many_cells_each(self):
+        self.run_matrix("--only", "start", "--seeds", "6", "8", "--cells", "2", "--oracle")
+        with open(os.path.join(self.out, "matrix.json"), encoding="utf-8") as file:
+            rows = json.load(file)
+        self.assertEqual([row["seed"] for row in rows], [6, 6, 8, 8])
+        self.assertEqual([row["axis"] for row in rows[:2]], [row["axis"] for row in rows[2:]])
+        self.assertTrue(all(("oracle_broken" in row) == (row["promise"] == "held") for row in rows))
 
     def test_a_run_goes_on_where_it_was(self):
         self.run_matrix("--only", "start", "--cells", "4")

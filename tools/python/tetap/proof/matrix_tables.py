@@ -87,6 +87,35 @@ def of_whole(rows, names):
 WHOLE = ["", "held", "broken", "[%]", "noticed", "broken", "[%]", "blind"]
 
 
+FLOOR = ["", "held", "broken", "oracle", "both", "position", "90 %", "velocity", "heading"]
+
+
+def of_floor(rows):
+    """Held cells beside their oracle: how many each breaks, and the error over the oracle's, median and (of the position) the 90th of a hundred."""
+    held = [row for row in rows if row["promise"] == "held" and "over_oracle" in row]
+    cells = []
+    for name, mine in [("all", held), *sorted(grouped(held, lambda row: row["robot"]).items())] if held else []:
+        def at(quantity, part, mine=mine):
+            return f"{sorted(row['over_oracle'][quantity] for row in mine)[int(part * (len(mine) - 1))]:.2f}"
+        broken = [bool(row["broken"]) for row in mine]
+        oracle = [bool(row["oracle_broken"]) for row in mine]
+        cells.append([name, str(len(mine)), str(sum(broken)), str(sum(oracle)), str(sum(map(min, broken, oracle))),
+                      at("position", 0.5), at("position", 0.9), at("velocity", 0.5), at("heading", 0.5)])
+    return cells
+
+
+def by_wiring(rows):
+    """The rows with the promise that follows from wiring alone."""
+    return [{**row, **row["wired"]} for row in rows if "wired" in row]
+
+
+def left_held(rows):
+    """One sentence on the cells whose witness sent nothing."""
+    was = [row for row in rows if row["wired"]["promise"] == "held"]
+    left = sum(row["promise"] != "held" for row in was)
+    return f"{left} of {len(was)} held cells ({share((left, len(was)))} %) are not, because a witness sent nothing usable while the fault lasted."
+
+
 def columns(head, rows):
     widths = [max(len(row[i]) for row in [head, *rows]) for i in range(len(head))]
     return "\n".join("  ".join(cell.ljust(width) if i < 2 else cell.rjust(width) for i, (cell, width) in enumerate(zip(row, widths))).rstrip() for row in [head, *rows])
@@ -107,6 +136,11 @@ def text(rows):
     for title, mine in parts_of(rows):
         parts.append(f"{title}\n" + columns(WHOLE, of_whole(mine, lambda row: row["robot"])))
         parts.append(columns(WHOLE, of_whole(mine, lambda row: row["situation"])))
+        wired = by_wiring(mine)
+        if wired:
+            parts.append("By wiring alone. " + left_held(mine) + "\n" + columns(WHOLE, of_whole(wired, lambda row: row["robot"])))
+        if of_floor(mine):
+            parts.append("Held cells and the oracle\n" + columns(FLOOR, of_floor(mine)))
         parts.append(columns(HEAD, kind_rows(mine)))
     return "\n\n".join(parts)
 
@@ -120,6 +154,7 @@ clean drive in the simulated world, mismatched. The promise follows from the dev
 * *held*: two or more other devices see it. The error stays within 1.5 times 3 sigma, but for 2 s and three samples, and is inside 10 s after the fault.
 * *noticed*: one other device sees it, or the size is below 1.5 gates. The error stays within 3 times 3 sigma, or a word comes within 10 s.
 * *blind*: none sees it; listed, not judged.
+* A device sees a fault if it is wired so and sent a usable sample while the fault lasted. A word counts from when a witness's 3-sigma test could speak.
 * An error counts only above twice that of the run without the fault. `valid`: a valid flag stays 1 beyond ten times 3 sigma.
 * Bars: at most {all:.0f} % of all held cells are broken, and at most {kind:.0f} % of those of one kind.
 
@@ -137,6 +172,17 @@ def bars(rows):
             f"{100 * KIND_LIMIT:.0f} %.")
 
 
+def more_tables(rows):
+    """The promise by wiring alone, and held cells beside their oracle."""
+    parts = []
+    if by_wiring(rows):
+        parts += ["### By wiring alone\n\n" + left_held(rows), markdown(["robot", *WHOLE[1:]], of_whole(by_wiring(rows), lambda row: row["robot"]))]
+    if of_floor(rows):
+        parts += ["### Held cells and their floor\n\nThe oracle is the same node without what the faulty device sends meanwhile. Errors are over the oracle's.",
+                  markdown(["robot", *FLOOR[1:]], of_floor(rows))]
+    return parts
+
+
 RECORDED = """# Recorded drives with one fault
 
 `tools/proof/run_matrix --recorded` puts one fault into a recorded drive, at ten places that are evenly spread over it. Truth is the data set's
@@ -151,7 +197,7 @@ def page(rows, recorded=False):
     parts = [PAGE.format(count=len(rows), all=100 * ALL_LIMIT, kind=100 * KIND_LIMIT)]
     for title, mine in parts_of(rows):
         parts += [f"## {title}", bars(mine), markdown(["robot", *WHOLE[1:]], of_whole(mine, lambda row: row["robot"])),
-                  markdown(["situation", *WHOLE[1:]], of_whole(mine, lambda row: row["situation"])),
+                  markdown(["situation", *WHOLE[1:]], of_whole(mine, lambda row: row["situation"])), *more_tables(mine),
                   markdown(HEAD, kind_rows(mine))]
         worst = []
         for (sensor, kind), cells in worst_kinds(mine):
