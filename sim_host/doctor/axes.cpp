@@ -90,9 +90,17 @@ void AxesDetector::judge_upside(const Votes& yaw, double upward, Findings& findi
   if (no_votes && !surely(by_.field.factor(up_axis()), -1))
     return push(Code::kAccelSign, up_axis(), kGyroscope,
                 down + "; no device shows whether the gyroscope is turned, too.", Code::kImuUpsideDown, findings);
-  if (yaw.against > yaw.with)
-    push(Code::kAccelSign, up_axis(), kGyroscope | yaw.uses,
-         down + ", and yet these turn against an IMU that is upside down: " + yaw.words + ".", std::nullopt, findings);
+  // With all axes reversed the curves, taken about a reversed up, agree with the force to the left.
+  const ForwardDetector::Agreement forward = by_.forward.agreement();
+  const bool all = robot_.mounting && forward.ahead < -kFollows;
+  if (yaw.against <= yaw.with - (all && forward.left > kFollows ? 1 : 0)) return;
+  push(Code::kAccelSign, up_axis(), kGyroscope | yaw.uses,
+       down + ", and yet these turn against an IMU that is upside down: " + yaw.words + ".", std::nullopt, findings);
+  if (!all) return;
+  findings.back().evidence +=
+      text(" The force ahead goes against the acceleration by %s (correlation %.2f).", forward.device, forward.ahead);
+  findings.back().change = text("Negate VelX, VelY and VelZ of In_Imu%uAccel in the sender: gravity is +9.81 upwards.",
+                                static_cast<unsigned>(robot_.imu));
 }
 
 void AxesDetector::judge_yaw(const Votes& yaw, Findings& findings) const {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sim_host/doctor/diagnosis.hpp"
 
+#include "sim_host/doctor/antenna.hpp"
 #include "sim_host/doctor/axes.hpp"
 #include "sim_host/doctor/bus_time.hpp"
 #include "sim_host/doctor/dead_axis.hpp"
@@ -9,9 +10,11 @@
 #include "sim_host/doctor/forward.hpp"
 #include "sim_host/doctor/gyro_reference.hpp"
 #include "sim_host/doctor/halves.hpp"
+#include "sim_host/doctor/lateness.hpp"
 #include "sim_host/doctor/origin.hpp"
 #include "sim_host/doctor/path.hpp"
 #include "sim_host/doctor/sequence.hpp"
+#include "sim_host/doctor/speed_vote.hpp"
 #include "sim_host/doctor/stamps.hpp"
 #include "sim_host/doctor/turn.hpp"
 #include "sim_host/doctor/turn_scale.hpp"
@@ -63,7 +66,10 @@ class Examination {
         field_(robot),
         velocity_(course_),
         path_(robot, windows_),
+        lateness_(path_),
         wheel_speed_(robot),
+        speed_vote_({.velocity_by_wheels = wheel_speed_, .fixes_by_wheels = path_, .fixes_by_velocity = velocity_}),
+        antenna_(robot),
         origin_(robot),
         dead_axis_(robot),
         axes_(robot, {.turn = turn_, .course = course_, .field = field_, .force = force_, .forward = forward_}),
@@ -108,14 +114,17 @@ class Examination {
   FieldDetector field_;
   VelocityDetector velocity_;
   PathDetector path_;
+  LatenessDetector lateness_;
   WheelSpeedDetector wheel_speed_;
+  SpeedVoteDetector speed_vote_;
+  AntennaDetector antenna_;
   OriginDetector origin_;
   DeadAxisDetector dead_axis_;
   AxesDetector axes_;
   TurnScaleDetector turn_scale_;
-  std::array<Detector*, 15> all_{&halves_,      &sequence_, &stamps_,    &force_,    &turn_,
-                                 &forward_,     &course_,   &field_,     &velocity_, &path_,
-                                 &wheel_speed_, &origin_,   &dead_axis_, &axes_,     &turn_scale_};
+  std::array<Detector*, 18> all_{&halves_,     &sequence_, &stamps_,   &force_,     &turn_,     &forward_,
+                                 &course_,     &field_,    &velocity_, &path_,      &lateness_, &wheel_speed_,
+                                 &speed_vote_, &antenna_,  &origin_,   &dead_axis_, &axes_,     &turn_scale_};
 };
 
 /// Codes of one comparison of several devices, which may not show whose axes are wrong.

@@ -15,6 +15,7 @@ constexpr double kRight =
     0.3;  ///< share of the legs' square left over with axes that fit: noise of fixes over short legs
 constexpr double kBetter = 0.4;        ///< share of the square that the stated axes leave
 constexpr double kAsGood = 1.3;        ///< another map that leaves at most that much more is named, too
+constexpr double kAlike = 0.9;         ///< cosine between two ways that differ by a factor
 constexpr double kFixesFollows = 0.8;  ///< course and gyroscope of a vehicle that drives ahead
 constexpr double kLeastClimb_m = 1.5;  ///< RMS of a leg's climb: fixes of height scatter by a metre
 constexpr double kLeastClimbs = 10;
@@ -115,6 +116,20 @@ void VelocityDetector::finish(Findings& findings) {
   for (const Map& map : of_fixes) name(map, left_over(legs_, map, same), turn > 0);
   for (const Map& map : of_velocity)
     name(map, left_over(legs_, same, map), turn < 0 || map.ee * map.nn - map.en * map.ne > 0);
+}
+
+std::optional<SpeedRatio> VelocityDetector::ratio() const {
+  if (legs_.count() < kLeastLegs) return std::nullopt;
+  const double fixes2 = legs_.product(0, 0) + legs_.product(1, 1),
+               velocity2 = legs_.product(2, 2) + legs_.product(3, 3);
+  const double cosine = correlation(legs_.product(0, 2) + legs_.product(1, 3), fixes2, velocity2);
+  if (!(cosine > kAlike)) return std::nullopt;
+  const double ratio = std::sqrt(fixes2 / velocity2);
+  return SpeedRatio{.value = ratio,
+                    .certainty = cosine,
+                    .evidence = text("The way by the fixes is %.2f times the integral of the GNSS velocity over %.0f "
+                                     "legs of 8 s.",
+                                     ratio, legs_.count())};
 }
 
 void VelocityDetector::judge_up(Findings& findings) const {

@@ -8,6 +8,7 @@
 #include "sim_host/doctor/moments.hpp"
 #include "sim_host/doctor/plane.hpp"
 #include "sim_host/doctor/robot_facts.hpp"
+#include "sim_host/doctor/speed_ratio.hpp"
 
 #include <array>
 #include <optional>
@@ -20,6 +21,8 @@ class VelocityDetector : public Detector {
 
   void sample(base::Micros time, const sensor::Sample& sample) override;
   void finish(Findings& findings) override;
+  /// The way by the fixes over the integral of the velocity; nothing where their axes do not agree.
+  [[nodiscard]] std::optional<SpeedRatio> ratio() const;
 
  private:
   void end_leg(base::Micros time, const PlanePoint& here);

@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sim_host/doctor/forward.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <numbers>
+#include <string>
 
 namespace tetap::doctor {
 namespace {
@@ -10,19 +13,17 @@ constexpr double kForwardLeastWindows = 30;
 constexpr double kLeast_mps2 = 0.1;  ///< RMS of the motion's acceleration: less drowns in slopes and vibration
 constexpr double kSlow_mps = 1;      ///< below, the magnitude of a GNSS velocity is noise
 constexpr double kFits = 0.25;       ///< share of the force's variance, by the placing that fits best
-constexpr double kAhead = 0.6;       ///< correlation by which a force along the acceleration shows what is ahead
-constexpr double kStatedFits = 0.4;  ///< share of the best, by the one stated: a mounting 45 degrees off has half
+constexpr double kDegreesARadian = 180 / std::numbers::pi;
+constexpr double kAhead = 0.6;        ///< correlation by which a force along the acceleration shows what is ahead
+constexpr double kTurned_rad = 0.35;  ///< 20 deg: slopes and slip turn the force by less
+constexpr double kTurnedSigmas = 6;   ///< windows overlap, and motion colours what is left
 
 struct Placing {
   double forward_a, forward_q, left_a, left_q;
   const char* words;
 };
-/// Force forward and left for acceleration a and q = v w. The first is the stated one.
-constexpr Placing kPlacings[] = {
-    {1, 0, 0, 1, "as stated"},
-    {-1, 0, 0, -1, "turned by 180 deg about up"},
-    {0, 1, -1, 0, "turned by 90 deg about up: x of the robot lies along its left"},
-    {0, -1, 1, 0, "turned by -90 deg about up: x of the robot lies along its right"},
+/// Force forward and left for acceleration a and q = v w, of an IMU whose axes are mirrored.
+constexpr Placing kMirrors[] = {
     {1, 0, 0, -1, "with left for right"},
     {-1, 0, 0, 1, "with forward for backward"},
     {0, 1, 1, 0, "with x and y exchanged"},
@@ -114,18 +115,34 @@ void ForwardDetector::finish(Findings& findings) {
 void ForwardDetector::judge(const Source& source, const char* name, Devices device, Findings& findings) const {
   const Moments<4>& m = source.moments;
   if (m.covariance(2, 2) + m.covariance(3, 3) < kLeast_mps2 * kLeast_mps2) return;
-  const Placing* best = &kPlacings[0];
-  for (const Placing& one : kPlacings)
-    if (explained(m, one) > explained(m, *best)) best = &one;
-  const double fits = explained(m, *best), stated = explained(m, kPlacings[0]);
-  if (fits < kFits || stated > kStatedFits * fits) return;
-  findings.push_back(
-      {.code = Code::kImuAxes,
-       .uses = static_cast<Devices>(kGyroscope | kAccelerometer | kMounting | device),
-       .certainty = fits,
-       .evidence = text("The horizontal force follows acceleration and curves by %s as an IMU %s (%.0f %% "
-                        "of its variance over %.0f s; as stated: %.0f %%).",
-                        name, best->words, 100 * fits, m.count(), 100 * stated)});
+  // The turn about up that brings the force nearest to the motion: sums of a times force ahead and q times force left.
+  const double along = m.covariance(0, 2) + m.covariance(1, 3), across = m.covariance(0, 3) - m.covariance(1, 2);
+  const double force2 = m.covariance(0, 0) + m.covariance(1, 1), motion2 = m.covariance(2, 2) + m.covariance(3, 3);
+  const double turned = std::atan2(across, along), by_turn = (along * along + across * across) / (force2 * motion2);
+  const Placing* mirror = &kMirrors[0];
+  for (const Placing& one : kMirrors)
+    if (explained(m, one) > explained(m, *mirror)) mirror = &one;
+  const bool mirrored = explained(m, *mirror) > by_turn;
+  const double fits = mirrored ? explained(m, *mirror) : by_turn;
+  const double sigma_rad = std::sqrt(std::max(0.0, 1 / by_turn - 1) / (2 * m.count()));
+  if (fits < kFits || (!mirrored && std::abs(turned) < std::max(kTurned_rad, kTurnedSigmas * sigma_rad))) return;
+  const std::string placed = mirrored ? mirror->words : text("turned by %.0f deg about up", turned * kDegreesARadian);
+  const double stated = along > 0 ? along * along / (force2 * motion2) : 0;
+  findings.push_back({.code = Code::kImuAxes,
+                      .uses = static_cast<Devices>(kGyroscope | kAccelerometer | kMounting | device),
+                      .certainty = fits,
+                      .evidence = text("The horizontal force follows acceleration and curves by %s as an IMU %s "
+                                       "(%.0f %% of its variance over %.0f s; as stated: %.0f %%).",
+                                       name, placed.c_str(), 100 * fits, m.count(), 100 * stated),
+                      .change = {}});
+  if (mirrored) return;
+  const double c = std::cos(turned), s = std::sin(turned);
+  const Matrix3& rows = *robot_.mounting;
+  const Vector3 x = sum(scaled(c, rows[0]), scaled(-s, rows[1])), y = sum(scaled(s, rows[0]), scaled(c, rows[1]));
+  findings.back().change = text(
+      "Set inertial.mounting_bs = %.4f %.4f %.4f %.4f %.4f %.4f %.4f %.4f %.4f, or turn the "
+      "sensor; tools/calibrate/calibrate_robot finds it more finely.",
+      x[0], x[1], x[2], y[0], y[1], y[2], rows[2][0], rows[2][1], rows[2][2]);
 }
 
 }  // namespace tetap::doctor

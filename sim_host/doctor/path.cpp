@@ -79,6 +79,7 @@ void PathDetector::roll(base::Micros time, const sensor::Sample& sample) {
   }
   if (!usable) return;
   if (!gyroscope_) yaw_rad_ += turn;
+  rolled_m_ += way;
   path_m_ += way * Complex{std::cos(yaw_rad_), std::sin(yaw_rad_)};
 }
 
@@ -126,7 +127,6 @@ void PathDetector::add_pair(Complex fixes_before, Complex path_before, Complex f
 }
 
 void PathDetector::finish(Findings& findings) {
-  judge_scale(findings);
   if (pairs_ < kLeastPairs) return;
   const double best = *std::min_element(left_.begin(), left_.end());
   if (best > kPathRight * pairs_ || best > kPathBetter * left_[0]) return;
@@ -146,24 +146,20 @@ void PathDetector::finish(Findings& findings) {
   }
 }
 
-void PathDetector::judge_scale(Findings& findings) const {
-  if (ratios_.size() < kLeastRatios || robot_.name.empty()) return;
+std::optional<SpeedRatio> PathDetector::scale() const {
+  if (ratios_.size() < kLeastRatios || robot_.name.empty()) return std::nullopt;
   std::vector<float> sorted = ratios_;
   std::sort(sorted.begin(), sorted.end());
-  const double median = static_cast<double>(sorted[sorted.size() / 2]);
-  const double low = static_cast<double>(sorted[sorted.size() / 4]),
-               high = static_cast<double>(sorted[sorted.size() * 3 / 4]);
-  if (!(low > kPathScale || high < 1 / kPathScale) || high > kSpread * low) return;
-  findings.push_back(
-      {.code = Code::kWheelScale,
-       .uses = kFixes | kWheels | kGyroscope,
-       .certainty = 0.9,
-       .evidence = text("The fixes lie %.2f times as far apart as the path of the wheels is long (median "
-                        "of %zu chords; half of them from %.2f to %.2f).",
-                        median, seen_, low, high),
-       .change = text("Multiply the radii of wheels.drive by %.3f or divide counts_per_turn by it "
-                      "(In_BodySpeed: wheels.speed_scale).",
-                      median)});
+  const auto quartile = [&](std::size_t k) { return static_cast<double>(sorted[sorted.size() * k / 4]); };
+  const double low = quartile(1), median = quartile(2), high = quartile(3);
+  if (high > kSpread * low) return std::nullopt;
+  // Between the quartiles the factor is not known: it is 1 where they enclose that.
+  const bool shown = low > kPathScale || high < 1 / kPathScale;
+  return SpeedRatio{.value = shown ? median : 1,
+                    .certainty = 0.9,
+                    .evidence = text("The fixes lie %.2f times as far apart as the path of the wheels is long (median "
+                                     "of %zu chords; half of them from %.2f to %.2f).",
+                                     median, seen_, low, high)};
 }
 
 }  // namespace tetap::doctor

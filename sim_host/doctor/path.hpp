@@ -6,6 +6,7 @@
 #include "sim_host/doctor/detector.hpp"
 #include "sim_host/doctor/fixes.hpp"
 #include "sim_host/doctor/robot_facts.hpp"
+#include "sim_host/doctor/speed_ratio.hpp"
 
 #include <array>
 #include <complex>
@@ -22,6 +23,11 @@ class PathDetector : public Detector {
 
   void sample(base::Micros time, const sensor::Sample& sample) override;
   void finish(Findings& findings) override;
+  /// Chords by the fixes over those by the path; nothing where they have no factor in common, or the robot's geometry
+  /// is not known.
+  [[nodiscard]] std::optional<SpeedRatio> scale() const;
+  /// Way by the wheels up to now, forward and back.
+  [[nodiscard]] double rolled_m() const { return rolled_m_; }
 
  private:
   using Complex = std::complex<double>;
@@ -31,7 +37,6 @@ class PathDetector : public Detector {
   void roll(base::Micros time, const sensor::Sample& sample);
   void end_chord(base::Micros time, const PlanePoint& here, double sigma_m);
   void add_pair(Complex fixes_before, Complex path_before, Complex fixes, Complex path);
-  void judge_scale(Findings& findings) const;
 
   const RobotFacts& robot_;
   WheelScale scale_;
@@ -40,6 +45,7 @@ class PathDetector : public Detector {
   double yaw_rad_ = 0;
   bool gyroscope_ = false;
   Complex path_m_{};
+  double rolled_m_ = 0;
   std::optional<base::Micros> wheels_at_;
   std::optional<sensor::WheelCounts> counts_;
   std::optional<base::Micros> began_;

@@ -17,8 +17,9 @@ constexpr double kSingular = 0.02;          ///< less, and the two combinations 
 constexpr double kStill = 0.9;              ///< sum and difference of the wheels are one: the other wheel stands still
 constexpr double kWhole = 0.8;              ///< share of the turn's square that the two wheels explain together
 constexpr double kLeastDrift_radps = 0.05;  ///< yaw rate of unequal wheels: above a gyroscope's bias
-constexpr double kUnequal = 0.03;  ///< half of the difference between the wheels: tyres are within some percent
-constexpr double kReversed = 0.7;  ///< more, and a wheel counts backwards or not at all
+constexpr double kUnequal = 0.03;   ///< half of the difference between the wheels: tyres are within some percent
+constexpr double kBackwards = 0.5;  ///< share of the way: three quarters of it
+constexpr double kReversed = 0.7;   ///< more, and a wheel counts backwards or not at all
 
 }  // namespace
 
@@ -39,6 +40,8 @@ double TurnDetector::Limit::limited(double value) {
 void TurnDetector::window(const Window& w) {
   if (w.turn_s_radps) up_s_ = w.up_s;
   if (!w.turn_s_radps || !w.wheels || !w.wheels->difference_mps) return;
+  ahead_ += w.wheels->sum_mps;
+  either_way_ += std::abs(w.wheels->sum_mps);
   const Vector3& g = *w.turn_s_radps;
   whole_.add({g[0], g[1], g[2], *w.wheels->difference_mps, w.wheels->sum_mps});
   moments_.add({g[0], g[1], g[2], difference_.limited(*w.wheels->difference_mps), sum_.limited(w.wheels->sum_mps)});
@@ -106,23 +109,34 @@ void TurnDetector::judge_still(double sum2, double both, Findings& findings) con
        .change = text("Check the plug, the channels and the sender of the %s wheel's encoder.", wheel)});
 }
 
+/// The wheels turn against the gyroscope. A robot that is driven drives ahead most of its way.
+void TurnDetector::name_against(double by_difference, double gyro2, Findings& findings) const {
+  const std::string factor = knows_size()
+                                 ? text("by %.2f times", -std::sqrt(moments_.covariance(3, 3) / gyro2) / scale_.track_m)
+                                 : std::string("against");
+  const std::string turns = text("The wheels turn the robot %s the gyroscope's yaw rate over %.0f s (correlation %.2f)",
+                                 factor.c_str(), moments_.count(), by_difference);
+  const bool back = ahead_ < -kBackwards * either_way_;
+  findings.push_back({.code = back ? Code::kWheelsReversed : Code::kWheelsSwapped,
+                      .uses = kGyroscope | kAccelerometer | kWheels,
+                      .certainty = -by_difference,
+                      .evidence = back ? turns + text(", and drive it backwards for %.0f %% of its way.",
+                                                      50 - 50 * ahead_ / either_way_)
+                                       : turns + ".",
+                      .change = {}});
+  const bool body = message_ == "In_BodySpeed";
+  if (back && body) findings.back().change = "Negate Forward and YawRate in the sender of In_BodySpeed.";
+  if (back) return;
+  findings.back().change = body ? "Negate YawRate in the sender of In_BodySpeed, or swap the wheels behind it."
+                                : "Swap Left and Right in the sender of " + message_ + ", or the two plugs.";
+}
+
 void TurnDetector::judge_wheels(double gyro2, double by_difference, double by_sum, Findings& findings) const {
   if (gyro2 < kTurnLeastTurn_radps * kTurnLeastTurn_radps) return;
   const double difference2 = by_difference * by_difference, sum2 = by_sum * by_sum;
   const Devices uses = kGyroscope | kAccelerometer | kWheels;
   if (difference2 > kExplained && by_difference < 0 && sum2 < difference2) {
-    const std::string factor =
-        knows_size() ? text("by %.2f times", -std::sqrt(moments_.covariance(3, 3) / gyro2) / scale_.track_m)
-                     : std::string("against");
-    findings.push_back({.code = Code::kWheelsSwapped,
-                        .uses = uses,
-                        .certainty = -by_difference,
-                        .evidence = text("The wheels turn the robot %s the gyroscope's yaw rate over %.0f s "
-                                         "(correlation %.2f).",
-                                         factor.c_str(), moments_.count(), by_difference),
-                        .change = message_ == "In_BodySpeed"
-                                      ? "Negate YawRate in the sender of In_BodySpeed, or swap the wheels behind it."
-                                      : "Swap Left and Right in the sender of " + message_ + ", or the two plugs."});
+    name_against(by_difference, gyro2, findings);
   } else if (sum2 > kExplained && difference2 < kAlone * sum2) {
     const char* wheel = by_sum > 0 ? "left" : "right";
     findings.push_back(

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The turn by the gyroscope against the sum and the difference of the wheels. Right wheels: the turn follows the
-// difference. Swapped: its negative. One reversed: the sum, since the two have changed places. Up is where the mean
+// difference. Swapped: its negative, and both reversed as well, where most of the way is then backwards. One reversed:
+// the sum, since the two have changed places. Up is where the mean
 // specific force points, so an IMU in other axes changes nothing here.
 #pragma once
 
@@ -35,6 +36,7 @@ class TurnDetector : public Detector {
     double squares_ = 0, count_ = 0;
   };
   void judge_wheels(double gyro2, double by_difference, double by_sum, Findings& findings) const;
+  void name_against(double by_difference, double gyro2, Findings& findings) const;
   void judge_unequal(Findings& findings) const;
   void judge_still(double sum2, double both, Findings& findings) const;
 
@@ -43,6 +45,7 @@ class TurnDetector : public Detector {
   Moments<5> moments_;  ///< gyroscope x y z [rad/s], difference and sum of the wheels [m/s], both limited
   Moments<5> whole_;    ///< the same without a limit, which would make the turn by the wheels smaller
   Limit difference_, sum_;
+  double ahead_ = 0, either_way_ = 0;  ///< sum of the wheels' sums, and of their magnitudes [m/s]
   Vector3 up_s_{};
 };
 

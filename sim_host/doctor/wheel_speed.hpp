@@ -5,6 +5,9 @@
 #include "sim_host/doctor/detector.hpp"
 #include "sim_host/doctor/moments.hpp"
 #include "sim_host/doctor/robot_facts.hpp"
+#include "sim_host/doctor/speed_ratio.hpp"
+
+#include <optional>
 
 namespace tetap::doctor {
 
@@ -12,7 +15,9 @@ class WheelSpeedDetector : public Detector {
  public:
   explicit WheelSpeedDetector(const RobotFacts& robot) : robot_(robot) {}
   void window(const Window& w) override;
-  void finish(Findings& findings) override;
+  void finish(Findings&) override {}
+  /// GNSS over wheels; nothing where the two do not go alike, or the robot's geometry is not known.
+  [[nodiscard]] std::optional<SpeedRatio> ratio() const;
 
  private:
   const RobotFacts& robot_;

@@ -112,6 +112,11 @@ def turn_imu(frames, matrix):
     return frames
 
 
+def about_up(angle_deg):
+    c, s = np.cos(np.radians(angle_deg)), np.sin(np.radians(angle_deg))
+    return np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]])
+
+
 def scale_imu(frames, gyro, accel):
     for name, signals, factor in ((GYRO, ANGLES, gyro), (ACCEL, VELOCITIES, accel)):
         frames.set(name, **{one: frames.get(name, one) * factor for one in signals})
@@ -227,6 +232,53 @@ def map_signal(name, signal, function):
     return apply
 
 
+def reverse_wheels(frames):
+    if frames.has("In_WheelCounts"):
+        frames = reverse_wheel(reverse_wheel(frames, "Left"), "Right")
+    if frames.has("In_BodySpeed"):
+        frames.set("In_BodySpeed", Forward=-frames.get("In_BodySpeed", "Forward"), YawRate=-frames.get("In_BodySpeed", "YawRate"))
+    return frames
+
+
+def scale_velocity(factor):
+    def apply(frames):
+        frames.set("In_GnssVelEN", **{axis: factor * frames.get("In_GnssVelEN", axis) for axis in ("East", "North")})
+        frames.set("In_GnssVelU", Up=factor * frames.get("In_GnssVelU", "Up"))
+        return frames
+    return apply
+
+
+def write_places(function):
+    """Degrees written in another way: a function of their part behind the point."""
+    def apply(frames):
+        for name, signal in (("In_GnssLat", "Lat"), ("In_GnssLon", "Lon")):
+            value = frames.get(name, signal)
+            frames.set(name, **{signal: np.trunc(value) + function(value - np.trunc(value))})
+        return frames
+    return apply
+
+
+def decimals_as_minutes(part):
+    return part * 100 / 60
+
+
+def minutes_as_decimals(part):
+    return part * 60 / 100
+
+
+def late(seconds):
+    """The receiver's content of some time ago under the stamps and counters of now."""
+    def apply(frames):
+        for name, signals in (("In_GnssLat", ["Lat"]), ("In_GnssLon", ["Lon"]), ("In_GnssAlt", ["Height"]), ("In_GnssVelEN", ["East", "North"]), ("In_GnssVelU", ["Up"])):
+            rows = frames.where(name)
+            time_s = frames.time_us[rows] * 1e-6
+            back = np.searchsorted(time_s, time_s - seconds - 0.09)
+            for one in signals:
+                frames.set(name, **{one: frames.get(name, one)[back]})
+        return frames
+    return apply
+
+
 def swap_velocity(frames):
     frames.set("In_GnssVelEN", East=frames.get("In_GnssVelEN", "North"), North=frames.get("In_GnssVelEN", "East"))
     return frames
@@ -281,6 +333,7 @@ MISTAKES = [
     ("imu_axes", "skog", lambda f: turn_imu(f, np.diag([-1, -1, 1]))), ("imu_axes", "*husky", lambda f: turn_imu(f, Y_FOR_Z)),
     ("imu_axes", "iris", lambda f: turn_imu(f, Y_FOR_Z)), ("imu_axes", "car", lambda f: turn_imu(f, ABOUT_Z)),
     ("imu_axes", "road", lambda f: turn_imu(f, np.diag([-1, -1, 1]))),
+    ("imu_axes", "*yard", lambda f: turn_imu(f, about_up(45))), ("imu_axes", "skog", lambda f: turn_imu(f, about_up(-30))), ("imu_axes", "husky_sim", lambda f: turn_imu(f, about_up(135))),
     ("rates_for_increments", "yard", rates), ("rates_for_increments", "*skog", rates), ("rates_for_increments", "iris_gps", rates),
     ("rates_for_increments", "husky", rates),
     ("g_for_mps2", "yard", lambda f: scale_imu(f, 1, 1 / 9.80665)), ("g_for_mps2", "*skog", lambda f: scale_imu(f, 1, 1 / 9.80665)),
@@ -305,6 +358,13 @@ MISTAKES = [
     ("longitude_sign", "yard", map_signal("In_GnssLon", "Lon", np.negative)), ("longitude_sign", "*skog", map_signal("In_GnssLon", "Lon", np.negative)),
     ("longitude_sign", "iris", map_signal("In_GnssLon", "Lon", np.negative)), ("longitude_sign", "husky", map_signal("In_GnssLon", "Lon", np.negative)),
     ("velocity_axes", "*yard", swap_velocity), ("velocity_axes", "road", swap_velocity), ("velocity_axes", "iris", swap_velocity), ("velocity_axes", "road", map_signal("In_GnssVelEN", "North", np.negative)),
+    ("wheels_reversed", "*yard", reverse_wheels), ("wheels_reversed", "road", reverse_wheels), ("wheels_reversed", "*husky", reverse_wheels),
+    ("wheels_reversed", "husky_sim", reverse_wheels),
+    ("receiver_late", "*yard", late(0.4)), ("receiver_late", "road", late(1.2)), ("receiver_late", "husky_sim", late(0.2)), ("receiver_late", "yard", late(1.0)),
+    ("velocity_unit", "*yard", scale_velocity(1 / 0.514444)), ("velocity_unit", "road", scale_velocity(3.6)), ("velocity_unit", "yard", scale_velocity(0.514444)),
+    ("velocity_unit", "iris", scale_velocity(1 / 0.514444)), ("velocity_unit", "husky_sim", scale_velocity(1 / 0.44704)),
+    ("fix_unit", "*yard", write_places(decimals_as_minutes)), ("fix_unit", "road", write_places(minutes_as_decimals)), ("fix_unit", "iris", write_places(minutes_as_decimals)),
+    ("fix_unit", "husky_sim", write_places(decimals_as_minutes)),
     ("wheel_scale", "*yard", lambda f: scale_wheels(f, 1.3)), ("wheel_scale", "road", lambda f: scale_wheels(f, 0.5)),
     ("wheel_scale", "husky", lambda f: scale_wheels(f, 2)), ("wheel_scale", "skog", lambda f: scale_wheels(f, 1 / 3.6)),
     ("origin_far", "*yard", map_signal("In_GnssLat", "Lat", lambda lat: lat - 82.1)), ("origin_far", "road", map_signal("In_GnssLon", "Lon", lambda lon: lon + 30)),
@@ -324,11 +384,15 @@ MISTAKES = [
     ("accel_sign", "*yard", reverse_axis(ACCEL, "VelZ")), ("accel_sign", "yard", reverse_axis(ACCEL, "VelX")), ("accel_sign", "skog", reverse_axis(ACCEL, "VelX")),
     ("accel_sign", "skog", reverse_axis(ACCEL, "VelY")), ("accel_sign", "skog", reverse_axis(ACCEL, "VelZ")), ("accel_sign", "husky", reverse_axis(ACCEL, "VelY")),
     ("accel_sign", "road", reverse_axis(ACCEL, "VelY")), ("accel_sign", "iris", reverse_axis(ACCEL, "VelZ")),
+    ("accel_sign", "*yard", lambda f: scale_imu(f, 1, -1)), ("accel_sign", "road", lambda f: scale_imu(f, 1, -1)), ("accel_sign", "skog", lambda f: scale_imu(f, 1, -1)),
     ("track_width", "*yard", lambda f: scale_turn(f, 1.5)), ("track_width", "husky_sim", lambda f: scale_turn(f, 0.5)), ("track_width", "*husky", lambda f: scale_turn(f, 2)),
     ("track_width", "husky_sim", lambda f: f, "--set", "wheels.yaw_rate_scale=0.6"), ("track_width", "yard", lambda f: f, "--set", "wheels.drive.track_m=0.35"),
     ("wheels_unequal", "*yard", lambda f: scale_wheel(f, "Left", 1.2)), ("wheels_unequal", "husky_sim", lambda f: scale_wheel(f, "Right", 0.85)),
     ("wheels_unequal", "husky", lambda f: scale_wheel(f, "Right", 1.3)), ("wheels_unequal", "yard", lambda f: scale_wheel(f, "Right", 0)),
+    ("wheels_unequal", "yard", lambda f: scale_wheel(f, "Left", 4)),
     ("wheels_unequal", "yard", lambda f: f, "--set", "wheels.drive.right_radius_m=0.15"),
+    ("antenna_arm", "*yard", lambda f: f, "--set", "gnss.antenna_y_b_m=2"), ("antenna_arm", "road", lambda f: f, "--set", "gnss.antenna_x_b_m=3"),
+    ("antenna_arm", "husky_sim", lambda f: f, "--set", "gnss.antenna_y_b_m=-1.5"), ("antenna_arm", "yard", lambda f: f, "--set", "gnss.antenna_x_b_m=-1.5"),
     ("message_missing", "*yard", lambda f: f.without("In_GnssLon")), ("message_missing", "skog", lambda f: f.without(TIME)),
     ("message_missing", "iris_gps", lambda f: f.without("In_GnssVelU")), ("message_missing", "husky", lambda f: f.without("In_GnssAcc")),
     ("two_senders", "*yard", lambda f: second_sender(f, ["In_WheelCounts"], 1, 7, Left=1000, Right=2000)),

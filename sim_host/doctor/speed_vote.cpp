@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "sim_host/doctor/speed_vote.hpp"
+
+#include <array>
+#include <cmath>
+#include <string>
+
+namespace tetap::doctor {
+namespace {
+
+constexpr double kUnitFactor = 1.3;  ///< between two data of one receiver: a unit is more, their noise is less
+constexpr double kUnitWithin = 1.1;  ///< a unit is recognised within that ratio
+
+struct UnitFactor {
+  double factor;  ///< value sent over the right one
+  const char* words;
+};
+constexpr std::array kOfVelocity{
+    UnitFactor{1 / 0.514444, "knots"}, UnitFactor{3.6, "km/h"}, UnitFactor{1 / 0.44704, "miles an hour"},
+    UnitFactor{1 / 0.3048, "ft/s"},    UnitFactor{100, "cm/s"}, UnitFactor{0.514444, "m/s divided by those of a knot"}};
+constexpr std::array kOfFixes{UnitFactor{0.6, "ddmm.mmmm divided by 100"},
+                              UnitFactor{1 / 0.6, "decimals of a degree taken for minutes"}};
+
+std::string named(double factor, const auto& units) {
+  for (const UnitFactor& unit : units)
+    if (std::abs(std::log(factor / unit.factor)) < std::log(kUnitWithin)) return text(" That is %s.", unit.words);
+  return {};
+}
+
+Finding of_velocity(double factor, Devices uses, std::string evidence) {
+  return {.code = Code::kVelocityUnit,
+          .uses = uses,
+          .evidence = evidence + named(factor, kOfVelocity),
+          .change = text("Multiply In_GnssVelEN and In_GnssVelU by %.4g in the sender: they are in m/s.", 1 / factor)};
+}
+Finding of_fixes(double factor, Devices uses, std::string evidence) {
+  return {.code = Code::kFixUnit, .uses = uses, .evidence = evidence + named(factor, kOfFixes), .change = {}};
+}
+Finding of_wheels(const SpeedRatio& ratio, Devices uses, const std::string& more) {
+  return {.code = Code::kWheelScale,
+          .uses = uses,
+          .certainty = ratio.certainty,
+          .evidence = ratio.evidence + more,
+          .change = text("Multiply the radii of wheels.drive by %.3f or divide counts_per_turn by it "
+                         "(In_BodySpeed: wheels.speed_scale).",
+                         ratio.value)};
+}
+
+}  // namespace
+
+void SpeedVoteDetector::finish(Findings& findings) {
+  const auto velocity = by_.velocity_by_wheels.ratio(), fixes = by_.fixes_by_wheels.scale(),
+             receiver = by_.fixes_by_velocity.ratio();
+  const bool apart = receiver && off(*receiver, kUnitFactor);
+  constexpr Devices kGnss = kFixes | kGnssVelocity;
+  if (apart && velocity && fixes && off(*velocity) && !off(*fixes))
+    return findings.push_back(
+        of_velocity(velocity->value, kGnss | kWheels, receiver->evidence + " " + velocity->evidence));
+  if (apart && velocity && fixes && !off(*velocity) && off(*fixes))
+    return findings.push_back(of_fixes(fixes->value, kGnss | kWheels, receiver->evidence + " " + fixes->evidence));
+  if (apart && !velocity && !fixes) {  // two devices: a unit of one of them, or nobody knows which
+    const double as_velocity = 1 / receiver->value;
+    const bool place = !named(receiver->value, kOfFixes).empty(), speed = !named(as_velocity, kOfVelocity).empty();
+    if (speed || !place) findings.push_back(of_velocity(as_velocity, kGnss, receiver->evidence));
+    if (place || !speed) findings.push_back(of_fixes(receiver->value, kGnss, receiver->evidence));
+    if (speed == place) findings.back().beside = Code::kVelocityUnit;
+    return;
+  }
+  if (velocity && off(*velocity)) findings.push_back(of_wheels(*velocity, kWheels | kGnssVelocity, {}));
+  if (fixes && off(*fixes)) findings.push_back(of_wheels(*fixes, kFixes | kWheels | kGyroscope, {}));
+}
+
+}  // namespace tetap::doctor
