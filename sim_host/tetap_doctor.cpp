@@ -60,7 +60,7 @@ void write_json(const std::string& path, const std::string& log, const std::stri
                ", \"rank\": " + std::to_string(rank) + ", \"evidence\": " + sim::quoted(one.evidence) +
                ", \"change\": " + sim::quoted(one.change) + "}");
   }
-  file.write("]}\n");
+  file.write(diagnosis.untold ? "], \"cannot_tell\": " + sim::quoted(*diagnosis.untold) + "}\n" : "]}\n");
   file.close();
 }
 
@@ -75,6 +75,7 @@ void print(const std::string& log, const std::string& robot, const doctor::Diagn
                 std::string(row.cause).c_str(), one.evidence.c_str(), one.change.c_str());
   }
   if (rank == 0) std::printf("No mistake found: the devices agree with each other.\n");
+  if (diagnosis.untold) std::printf("The log cannot tell %s.\n", diagnosis.untold->c_str());
 }
 
 void print_brief(const doctor::Diagnosis& diagnosis) {

@@ -135,9 +135,12 @@ inline constexpr std::array kCodes{
     CodeRow{Code::kLongitudeSign, "longitude_sign", "The longitude has the wrong sign.",
             "The path by the fixes against GNSS velocity, wheels and the robot's origin.",
             "Send east as positive in In_GnssLon.", kFixes},
-    CodeRow{Code::kVelocityAxes, "velocity_axes", "The axes of the GNSS velocity are swapped or reversed.",
-            "The integral of the velocity against the path by the fixes.",
-            "Send East and North of In_GnssVelEN and Up of In_GnssVelU in these axes.", kGnssVelocity},
+    CodeRow{
+        Code::kVelocityAxes, "velocity_axes", "The axes of the GNSS velocity are swapped or reversed.",
+        "The integral of the velocity against the path by the fixes.",
+        "Send East and North of In_GnssVelEN and Up of In_GnssVelU in these axes. A receiver in NED gives north first, "
+        "and down for up.",
+        kGnssVelocity},
     CodeRow{Code::kFixUnit, "fix_unit", "Degrees of the fixes are written in another way.",
             "The way by the fixes against the GNSS velocity and the wheels, which agree.",
             "Send degrees with decimals: ddmm.mmmm is dd + mm.mmmm / 60.", kFixes},

@@ -89,6 +89,8 @@ class Examination {
     return findings;
   }
 
+  [[nodiscard]] std::optional<std::string> untold() const { return lateness_.untold(); }
+
   // The decoder hands these over.
   void sample(const sensor::Sample& sample) {
     if (const auto window = windows_.add(time_, sample))
@@ -149,9 +151,11 @@ Findings ranked(Findings findings) {
       return !stays && is_gnss_axes(k.code) == by_axes && (spoils(k) & one.uses) != 0;
     });
   };
-  bool placed = false;  // by the robot's origin, which leaves no second reading of the axes
+  bool wrong_stamps = false;  // which show no delay
+  bool placed = false;        // by the robot's origin, which leaves no second reading of the axes
   for (Finding& one : findings) {
     const bool axes = is_gnss_axes(one.code);
+    if (one.code == Code::kReceiverLate && wrong_stamps) continue;
     if (spoiled(one, false) || (!axes && spoiled(one, true)) || (axes && placed)) continue;
     const auto same = std::find_if(kept.begin(), kept.end(), [&](const Finding& k) { return k.code == one.code; });
     if (same != kept.end()) {
@@ -159,6 +163,7 @@ Findings ranked(Findings findings) {
       continue;
     }
     placed |= axes && one.uses == kNoDevice;
+    wrong_stamps |= one.code >= Code::kStampsInMs && one.code <= Code::kNoInSync;
     if (one.change.empty()) one.change = row(one.code).change;
     kept.push_back(std::move(one));
   }
@@ -176,7 +181,7 @@ sim::Result<Diagnosis> diagnose(sim::Frames& log, const std::string& name, std::
   log.rewind();
   BusTime clock(survey.clock(), base, survey.steps > 0);
   Examination examination(robot, survey.clock());
-  Diagnosis found{.findings = {}, .inputs = survey.inputs};
+  Diagnosis found{.findings = {}, .untold = {}, .inputs = survey.inputs};
   base::Micros last;
   bool begun = false;
   for (sim::TimedFrame entry; log.next(entry);) {
@@ -190,6 +195,7 @@ sim::Result<Diagnosis> diagnose(sim::Frames& log, const std::string& name, std::
     examination.frame({.time = now, .offset = entry.frame.id - base, .frame = entry.frame});
   }
   found.findings = ranked(examination.finish());
+  found.untold = examination.untold();
   return found;
 }
 

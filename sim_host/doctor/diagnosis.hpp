@@ -8,14 +8,16 @@
 #include "sim_host/replay/result.hpp"
 
 #include <cstdint>
+#include <optional>
 #include <string>
 
 namespace tetap::doctor {
 
 struct Diagnosis {
-  Findings findings;         ///< the likeliest cause first, one a code
-  std::uint64_t inputs = 0;  ///< input frames of the node
-  double duration_s = 0;     ///< on the bus's clock
+  Findings findings;                  ///< the likeliest cause first, one a code
+  std::optional<std::string> untold;  ///< question that the log leaves open, in words
+  std::uint64_t inputs = 0;           ///< input frames of the node
+  double duration_s = 0;              ///< on the bus's clock
 };
 
 /// Reads the log twice: for its clock, then for its data. `name` is what messages call it. Fails as the log does, and

@@ -15,7 +15,7 @@ constexpr double kRight =
     0.3;  ///< share of the legs' square left over with axes that fit: noise of fixes over short legs
 constexpr double kBetter = 0.4;        ///< share of the square that the stated axes leave
 constexpr double kAsGood = 1.3;        ///< another map that leaves at most that much more is named, too
-constexpr double kAlike = 0.9;         ///< cosine between two ways that differ by a factor
+constexpr double kAlike = 0.85;        ///< cosine between two ways that differ by a factor
 constexpr double kFixesFollows = 0.8;  ///< course and gyroscope of a vehicle that drives ahead
 constexpr double kLeastClimb_m = 1.5;  ///< RMS of a leg's climb: fixes of height scatter by a metre
 constexpr double kLeastClimbs = 10;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 #include <string>
+#include <utility>
 
 namespace tetap::doctor {
 namespace {
@@ -44,6 +45,21 @@ Matrix3 level_axes(const Vector3& up) {
   const Vector3 along = std::abs(up[0]) < 0.7 ? Vector3{1, 0, 0} : Vector3{0, 1, 0};
   const Vector3 first = unit(sum(along, scaled(-dot(along, up), up)));
   return {first, cross(up, first), up};
+}
+
+/// The turn about up that brings the force nearest to the motion, and the shares of the force's variance that it and
+/// the stated mounting explain.
+struct Turned {
+  double by_rad, fits, as_stated;
+};
+
+/// By the sums of a times force ahead and q times force left.
+Turned turned(const Moments<4>& m) {
+  const double along = m.covariance(0, 2) + m.covariance(1, 3), across = m.covariance(0, 3) - m.covariance(1, 2);
+  const double squares = (m.covariance(0, 0) + m.covariance(1, 1)) * (m.covariance(2, 2) + m.covariance(3, 3));
+  if (!(squares > 0)) return {0, 0, 0};
+  return {std::atan2(across, along), (along * along + across * across) / squares,
+          along > 0 ? along * along / squares : 0};
 }
 
 }  // namespace
@@ -106,37 +122,65 @@ void ForwardDetector::add_seen(const Moments<4>& m, Agreement& found) {
 
 void ForwardDetector::finish(Findings& findings) {
   if (!robot_.mounting) return;
+  if (judge_backwards(findings)) return;
   if (wheels_.moments.count() >= kForwardLeastWindows)
     judge(wheels_, "the wheels", kWheels, findings);
   else if (gnss_.moments.count() >= kForwardLeastWindows)
     judge(gnss_, "GNSS", kGnssVelocity, findings);
 }
 
+/// The force against the wheels' speed as on an IMU turned by 180 deg, against the speed by GNSS as stated: a robot
+/// that is driven drives ahead most of its way, so the wheels are wrong.
+bool ForwardDetector::judge_backwards(Findings& findings) const {
+  if (std::min(wheels_.moments.count(), gnss_.moments.count()) < kForwardLeastWindows) return false;
+  const Turned wheels = turned(wheels_.moments), gnss = turned(gnss_.moments);
+  if (std::min(wheels.fits, gnss.fits) < kFits) return false;
+  if (std::abs(gnss.by_rad) > kTurned_rad || std::abs(wheels.by_rad) < std::numbers::pi - kTurned_rad) return false;
+  findings.push_back(
+      {.code = Code::kWheelsReversed,
+       .uses = kGyroscope | kAccelerometer | kMounting | kGnssVelocity,
+       .certainty = wheels.fits,
+       .evidence =
+           text("The horizontal force follows acceleration and curves by GNSS as stated (%.0f %% of its variance "
+                "over %.0f s), and by the wheels as if they drove backwards (%.0f %%).",
+                100 * gnss.fits, gnss_.moments.count(), 100 * wheels.fits),
+       .change = {}});
+  return true;
+}
+
 void ForwardDetector::judge(const Source& source, const char* name, Devices device, Findings& findings) const {
   const Moments<4>& m = source.moments;
   if (m.covariance(2, 2) + m.covariance(3, 3) < kLeast_mps2 * kLeast_mps2) return;
-  // The turn about up that brings the force nearest to the motion: sums of a times force ahead and q times force left.
-  const double along = m.covariance(0, 2) + m.covariance(1, 3), across = m.covariance(0, 3) - m.covariance(1, 2);
-  const double force2 = m.covariance(0, 0) + m.covariance(1, 1), motion2 = m.covariance(2, 2) + m.covariance(3, 3);
-  const double turned = std::atan2(across, along), by_turn = (along * along + across * across) / (force2 * motion2);
+  const Turned best = turned(m);
   const Placing* mirror = &kMirrors[0];
   for (const Placing& one : kMirrors)
     if (explained(m, one) > explained(m, *mirror)) mirror = &one;
-  const bool mirrored = explained(m, *mirror) > by_turn;
-  const double fits = mirrored ? explained(m, *mirror) : by_turn;
-  const double sigma_rad = std::sqrt(std::max(0.0, 1 / by_turn - 1) / (2 * m.count()));
-  if (fits < kFits || (!mirrored && std::abs(turned) < std::max(kTurned_rad, kTurnedSigmas * sigma_rad))) return;
-  const std::string placed = mirrored ? mirror->words : text("turned by %.0f deg about up", turned * kDegreesARadian);
-  const double stated = along > 0 ? along * along / (force2 * motion2) : 0;
+  const bool mirrored = explained(m, *mirror) > best.fits;
+  const double fits = mirrored ? explained(m, *mirror) : best.fits;
+  const double sigma_rad = std::sqrt(std::max(0.0, 1 / best.fits - 1) / (2 * m.count()));
+  if (fits < kFits || (!mirrored && std::abs(best.by_rad) < std::max(kTurned_rad, kTurnedSigmas * sigma_rad))) return;
+  const std::string placed =
+      mirrored ? mirror->words : text("turned by %.0f deg about up", best.by_rad * kDegreesARadian);
   findings.push_back({.code = Code::kImuAxes,
                       .uses = static_cast<Devices>(kGyroscope | kAccelerometer | kMounting | device),
                       .certainty = fits,
                       .evidence = text("The horizontal force follows acceleration and curves by %s as an IMU %s "
                                        "(%.0f %% of its variance over %.0f s; as stated: %.0f %%).",
-                                       name, placed.c_str(), 100 * fits, m.count(), 100 * stated),
+                                       name, placed.c_str(), 100 * fits, m.count(), 100 * best.as_stated),
                       .change = {}});
   if (mirrored) return;
-  const double c = std::cos(turned), s = std::sin(turned);
+  // Without a velocity by GNSS, wheels that count backwards look the same.
+  if (device == kWheels && std::abs(best.by_rad) > std::numbers::pi - kTurned_rad &&
+      gnss_.moments.count() < kForwardLeastWindows) {
+    findings.push_back({.code = Code::kWheelsReversed,
+                        .uses = kGyroscope | kAccelerometer | kMounting,
+                        .certainty = fits,
+                        .evidence = findings.back().evidence + " Wheels that count backwards look the same.",
+                        .change = {},
+                        .beside = Code::kImuAxes});
+    std::swap(findings.back(), findings[findings.size() - 2]);
+  }
+  const double c = std::cos(best.by_rad), s = std::sin(best.by_rad);
   const Matrix3& rows = *robot_.mounting;
   const Vector3 x = sum(scaled(c, rows[0]), scaled(-s, rows[1])), y = sum(scaled(s, rows[0]), scaled(c, rows[1]));
   findings.back().change = text(

@@ -37,6 +37,7 @@ class ForwardDetector : public Detector {
   void add(Source& source, std::optional<double> speed_mps, const Window& w);
   /// Agreement of level axes whose heading in the robot is not known.
   static void add_seen(const Moments<4>& m, Agreement& found);
+  bool judge_backwards(Findings& findings) const;
   void judge(const Source& source, const char* name, Devices device, Findings& findings) const;
 
   const RobotFacts& robot_;

@@ -11,6 +11,7 @@
 #include <cstddef>
 #include <deque>
 #include <optional>
+#include <string>
 
 namespace tetap::doctor {
 
@@ -20,6 +21,8 @@ class LatenessDetector : public Detector {
   explicit LatenessDetector(const PathDetector& path) : path_(path) {}
   void sample(base::Micros time, const sensor::Sample& sample) override;
   void finish(Findings& findings) override;
+  /// The question that the log leaves open, in words; nothing where it shows delays or has no receiver.
+  [[nodiscard]] std::optional<std::string> untold() const;
 
  private:
   static constexpr double kStep_s = 0.05;
@@ -36,14 +39,19 @@ class LatenessDetector : public Detector {
   [[nodiscard]] std::optional<double> wheels_mps(double time_s) const;
   [[nodiscard]] std::optional<double> way_m(double time_s) const;
   void count_change(double speed_mps);
+  [[nodiscard]] bool tells() const;
 
   const PathDetector& path_;
   std::deque<Rolled> rolled_;
   std::deque<Speed> waiting_;
   std::array<Moments<2>, kDelays> speeds_;  ///< by GNSS and by wheels [m/s], a place a delay
   int changes_ = 0;                         ///< changes of speed by 1 m/s
+  std::optional<double> first_s_;           ///< arrival of the first velocity by GNSS
+  double last_s_ = 0;                       ///< arrival of the last one
+  int velocities_ = 0;
+  double stamped_s_ = 0;  ///< stamp of the last sample of the wheels
   double level_mps_ = 0;
-  bool rising_ = true;
+  bool level_known_ = false, rising_ = true, receiver_ = false;
 };
 
 }  // namespace tetap::doctor

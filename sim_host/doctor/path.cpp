@@ -21,6 +21,7 @@ constexpr std::size_t kLeastRatios = 8;
 constexpr double kPathScale =
     1.15;                        ///< wheels, tyres and slip are within some percent; a wrong radius is a tenth and more
 constexpr double kSpread = 1.5;  ///< between the quartiles of the chords' ratios: a factor is the same everywhere
+constexpr double kNarrow = 1.3;  ///< between the quartiles: more, and a factor near 1 is not known to be 1
 constexpr double kGap_s = 0.5;
 
 }  // namespace
@@ -155,6 +156,7 @@ std::optional<SpeedRatio> PathDetector::scale() const {
   if (high > kSpread * low) return std::nullopt;
   // Between the quartiles the factor is not known: it is 1 where they enclose that.
   const bool shown = low > kPathScale || high < 1 / kPathScale;
+  if (!shown && high > kNarrow * low) return std::nullopt;
   return SpeedRatio{.value = shown ? median : 1,
                     .certainty = 0.9,
                     .evidence = text("The fixes lie %.2f times as far apart as the path of the wheels is long (median "

@@ -9,6 +9,7 @@ namespace tetap::doctor {
 namespace {
 
 constexpr double kUnitFactor = 1.3;  ///< between two data of one receiver: a unit is more, their noise is less
+constexpr double kAgrees = 0.5;      ///< share of the larger disagreement: two devices agree, and the third is wrong
 constexpr double kUnitWithin = 1.1;  ///< a unit is recognised within that ratio
 
 struct UnitFactor {
@@ -27,6 +28,14 @@ std::string named(double factor, const auto& units) {
   return {};
 }
 
+/// The comparisons that were made, one after the other.
+std::string words(const std::array<SpeedRatio, 3>& ratios) {
+  std::string all;
+  for (const SpeedRatio& one : ratios)
+    if (!one.evidence.empty()) all += (all.empty() ? "" : " ") + one.evidence;
+  return all;
+}
+
 Finding of_velocity(double factor, Devices uses, std::string evidence) {
   return {.code = Code::kVelocityUnit,
           .uses = uses,
@@ -36,11 +45,11 @@ Finding of_velocity(double factor, Devices uses, std::string evidence) {
 Finding of_fixes(double factor, Devices uses, std::string evidence) {
   return {.code = Code::kFixUnit, .uses = uses, .evidence = evidence + named(factor, kOfFixes), .change = {}};
 }
-Finding of_wheels(const SpeedRatio& ratio, Devices uses, const std::string& more) {
+Finding of_wheels(const SpeedRatio& ratio, Devices uses) {
   return {.code = Code::kWheelScale,
           .uses = uses,
           .certainty = ratio.certainty,
-          .evidence = ratio.evidence + more,
+          .evidence = ratio.evidence,
           .change = text("Multiply the radii of wheels.drive by %.3f or divide counts_per_turn by it "
                          "(In_BodySpeed: wheels.speed_scale).",
                          ratio.value)};
@@ -49,25 +58,42 @@ Finding of_wheels(const SpeedRatio& ratio, Devices uses, const std::string& more
 }  // namespace
 
 void SpeedVoteDetector::finish(Findings& findings) {
-  const auto velocity = by_.velocity_by_wheels.ratio(), fixes = by_.fixes_by_wheels.scale(),
-             receiver = by_.fixes_by_velocity.ratio();
-  const bool apart = receiver && off(*receiver, kUnitFactor);
-  constexpr Devices kGnss = kFixes | kGnssVelocity;
-  if (apart && velocity && fixes && off(*velocity) && !off(*fixes))
-    return findings.push_back(
-        of_velocity(velocity->value, kGnss | kWheels, receiver->evidence + " " + velocity->evidence));
-  if (apart && velocity && fixes && !off(*velocity) && off(*fixes))
-    return findings.push_back(of_fixes(fixes->value, kGnss | kWheels, receiver->evidence + " " + fixes->evidence));
-  if (apart && !velocity && !fixes) {  // two devices: a unit of one of them, or nobody knows which
-    const double as_velocity = 1 / receiver->value;
-    const bool place = !named(receiver->value, kOfFixes).empty(), speed = !named(as_velocity, kOfVelocity).empty();
-    if (speed || !place) findings.push_back(of_velocity(as_velocity, kGnss, receiver->evidence));
-    if (place || !speed) findings.push_back(of_fixes(receiver->value, kGnss, receiver->evidence));
-    if (speed == place) findings.back().beside = Code::kVelocityUnit;
+  auto velocity = by_.velocity_by_wheels.ratio(), fixes = by_.fixes_by_wheels.scale();
+  auto receiver = by_.fixes_by_velocity.ratio();
+  // Two ratios of three devices give the third.
+  if (!receiver && velocity && fixes)
+    receiver = SpeedRatio{.value = fixes->value / velocity->value, .certainty = velocity->certainty, .evidence = {}};
+  if (!receiver || !off(*receiver, kUnitFactor)) {
+    if (velocity && off(*velocity)) findings.push_back(of_wheels(*velocity, kWheels | kGnssVelocity));
+    if (!fixes || !off(*fixes)) return;
+    findings.push_back(of_wheels(*fixes, kFixes | kWheels | kGyroscope));
+    if (velocity || receiver || named(fixes->value, kOfFixes).empty()) return;
+    findings.back().beside = Code::kFixUnit;  // of two devices either may be wrong
+    findings.push_back(of_fixes(fixes->value, kFixes | kWheels, fixes->evidence));
     return;
   }
-  if (velocity && off(*velocity)) findings.push_back(of_wheels(*velocity, kWheels | kGnssVelocity, {}));
-  if (fixes && off(*fixes)) findings.push_back(of_wheels(*fixes, kFixes | kWheels | kGyroscope, {}));
+  if (!velocity && !fixes) return name_either(*receiver, findings);
+  if (!velocity)
+    velocity = SpeedRatio{.value = fixes->value / receiver->value, .certainty = fixes->certainty, .evidence = {}};
+  if (!fixes)
+    fixes = SpeedRatio{.value = velocity->value * receiver->value, .certainty = velocity->certainty, .evidence = {}};
+  const std::string evidence = words({*receiver, *velocity, *fixes});
+  constexpr Devices kUses = kFixes | kGnssVelocity | kWheels;
+  const double velocity_off = std::abs(std::log(velocity->value)), fixes_off = std::abs(std::log(fixes->value));
+  if (fixes_off < kAgrees * velocity_off)
+    findings.push_back(of_velocity(velocity->value, kUses, evidence));
+  else if (velocity_off < kAgrees * fixes_off)
+    findings.push_back(of_fixes(fixes->value, kUses, evidence));
+}
+
+/// Two devices: a unit of one of them, or nobody knows which.
+void SpeedVoteDetector::name_either(const SpeedRatio& receiver, Findings& findings) {
+  constexpr Devices kUses = kFixes | kGnssVelocity;
+  const double as_velocity = 1 / receiver.value;
+  const bool place = !named(receiver.value, kOfFixes).empty(), speed = !named(as_velocity, kOfVelocity).empty();
+  if (speed || !place) findings.push_back(of_velocity(as_velocity, kUses, receiver.evidence));
+  if (place || !speed) findings.push_back(of_fixes(receiver.value, kUses, receiver.evidence));
+  if (speed == place) findings.back().beside = Code::kVelocityUnit;
 }
 
 }  // namespace tetap::doctor

@@ -22,6 +22,8 @@ class SpeedVoteDetector : public Detector {
   void finish(Findings& findings) override;
 
  private:
+  static void name_either(const SpeedRatio& receiver, Findings& findings);
+
   SpeedWitnesses by_;
 };
 

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace tetap::doctor {
 namespace {
@@ -12,14 +13,15 @@ namespace {
 constexpr double kTurnLeastWindows = 20;
 constexpr double kTurnLeastTurn_radps = 0.03;  ///< RMS: less, and slip and a gyroscope's bias are as large
 constexpr double kExplained = 0.35;  ///< share of the turn's variance: on a fast road slip makes half of the difference
-constexpr double kAlone = 0.7;  ///< share of one wheel combination in the other's, where one alone explains the turn
-constexpr double kSingular = 0.02;          ///< less, and the two combinations are one: a wheel that stands still
-constexpr double kStill = 0.9;              ///< sum and difference of the wheels are one: the other wheel stands still
+constexpr double kAlone = 0.7;   ///< share of one wheel combination in the other's, where one alone explains the turn
+constexpr double kStill = 1e-3;  ///< share of the other wheel's square: less, and the wheel stands still
+constexpr double kSingular = 5e-4;          ///< determinant of the wheels: less, and the robot hardly turns
 constexpr double kWhole = 0.8;              ///< share of the turn's square that the two wheels explain together
 constexpr double kLeastDrift_radps = 0.05;  ///< yaw rate of unequal wheels: above a gyroscope's bias
-constexpr double kUnequal = 0.03;   ///< half of the difference between the wheels: tyres are within some percent
-constexpr double kBackwards = 0.5;  ///< share of the way: three quarters of it
-constexpr double kReversed = 0.7;   ///< more, and a wheel counts backwards or not at all
+constexpr double kUnequal = 0.03;    ///< half of the difference between the wheels: tyres are within some percent
+constexpr double kBackwards = 0.5;   ///< share of the way: three quarters of it
+constexpr double kReversed = 0.9;    ///< a wheel of 19 times the other's size; beyond 1 it counts backwards
+constexpr double kRightWheel = 0.5;  ///< share of the other wheel's factor: that wheel is as stated
 
 }  // namespace
 
@@ -76,7 +78,9 @@ void TurnDetector::judge_unequal(Findings& findings) const {
   const double dd = whole_.product(3, 3), ss = whole_.product(4, 4), ds = whole_.product(3, 4);
   const double gd = whole_.product(gyro, difference), gs = whole_.product(gyro, total);
   const double determinant = dd * ss - ds * ds;
-  if (!(determinant > kSingular * dd * ss)) return judge_still(ss, ds, findings);
+  const double left2 = (ss - 2 * ds + dd) / 4, right2 = (ss + 2 * ds + dd) / 4;
+  if (std::min(left2, right2) < kStill * std::max(left2, right2)) return judge_still(right2 > left2, findings);
+  if (!(determinant > kSingular * 4 * left2 * right2)) return;
   const double by_difference = (gd * ss - gs * ds) / determinant, by_sum = (gs * dd - gd * ds) / determinant;
   const double gg = whole_.product(gyro, gyro), explained = (by_difference * gd + by_sum * gs) / gg;
   const double unequal = by_sum / by_difference;
@@ -84,6 +88,18 @@ void TurnDetector::judge_unequal(Findings& findings) const {
   if (std::abs(unequal) < kUnequal || std::abs(unequal) > kReversed) return;
   // yaw rate = (right' - left') / track, where right' = (1 + u) right and left' = (1 - u) left but for a common factor
   const double right_over_left = (1 + unequal) / (1 - unequal);
+  const double left = std::log((by_difference - by_sum) * scale_.track_m),
+               right = std::log((by_difference + by_sum) * scale_.track_m);
+  std::string change = text(
+      "Multiply the right radius of wheels.drive by %.3f or the left one by %.3f; the speed by GNSS "
+      "or a measured distance shows which (In_WheelSpeed: wheels.right_speed_scale).",
+      right_over_left, 1 / right_over_left);
+  if (scale_.known && std::abs(left) < kRightWheel * std::abs(right))
+    change = text("Multiply the right radius of wheels.drive by %.3f: the left wheel fits the stated track.",
+                  right_over_left);
+  if (scale_.known && std::abs(right) < kRightWheel * std::abs(left))
+    change = text("Multiply the left radius of wheels.drive by %.3f: the right wheel fits the stated track.",
+                  1 / right_over_left);
   findings.push_back(
       {.code = Code::kWheelsUnequal,
        .uses = kGyroscope | kAccelerometer | kWheels,
@@ -92,16 +108,12 @@ void TurnDetector::judge_unequal(Findings& findings) const {
                         "right wheel %.3f times as large as stated, or a left one %.3f times (%.0f s, %.0f %% of the "
                         "turn explained).",
                         by_sum * std::sqrt(ss), right_over_left, 1 / right_over_left, whole_.count(), 100 * explained),
-       .change = text("Multiply the right radius of wheels.drive by %.3f or the left one by %.3f; the speed by GNSS "
-                      "or a measured distance shows which (In_WheelSpeed: wheels.right_speed_scale).",
-                      right_over_left, 1 / right_over_left)});
+       .change = std::move(change)});
 }
 
-void TurnDetector::judge_still(double sum2, double both, Findings& findings) const {
+void TurnDetector::judge_still(bool is_left, Findings& findings) const {
   if (message_ == "In_BodySpeed" && !scale_.known) return;  // the track is not known
-  // A straight drive, or a turn on the spot: with one wheel at rest sum and difference are alike.
-  if (!(std::abs(both) > kStill * sum2 && kStill * std::abs(both) < sum2)) return;
-  const char* wheel = both > 0 ? "left" : "right";
+  const char* wheel = is_left ? "left" : "right";
   findings.push_back(
       {.code = Code::kWheelsUnequal,
        .uses = kWheels,

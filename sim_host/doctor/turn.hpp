@@ -38,7 +38,7 @@ class TurnDetector : public Detector {
   void judge_wheels(double gyro2, double by_difference, double by_sum, Findings& findings) const;
   void name_against(double by_difference, double gyro2, Findings& findings) const;
   void judge_unequal(Findings& findings) const;
-  void judge_still(double sum2, double both, Findings& findings) const;
+  void judge_still(bool is_left, Findings& findings) const;
 
   WheelScale scale_;
   std::string message_;

@@ -67,7 +67,7 @@ class Frames:
         rows = self.where(name)
         for signal, value in values.items():
             s = DBC.messages[name].signals[signal]
-            bits, _ = s.pack(np.asarray(value, dtype=float), signal)
+            bits, _ = s.pack(np.clip(np.asarray(value, dtype=float), s.raw_min * s.scale, s.raw_max * s.scale), signal)
             hole = np.uint64(((1 << s.length) - 1) << s.start)
             self.payload[rows] = (self.payload[rows] & ~hole) | bits
 
@@ -112,9 +112,12 @@ def turn_imu(frames, matrix):
     return frames
 
 
-def about_up(angle_deg):
-    c, s = np.cos(np.radians(angle_deg)), np.sin(np.radians(angle_deg))
-    return np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]])
+def about(axis, angle_deg):
+    """The sensor's axes turned about one of them: 2 is up on most robots, 1 on the Husky."""
+    c, s, i, j = np.cos(np.radians(angle_deg)), np.sin(np.radians(angle_deg)), (axis + 1) % 3, (axis + 2) % 3
+    matrix = np.eye(3)
+    matrix[i, i], matrix[i, j], matrix[j, i], matrix[j, j] = c, s, -s, c
+    return matrix
 
 
 def scale_imu(frames, gyro, accel):
@@ -267,15 +270,17 @@ def minutes_as_decimals(part):
 
 
 def late(seconds):
-    """The receiver's content of some time ago under the stamps and counters of now."""
+    """The receiver's samples come that much later, with stamps of then."""
     def apply(frames):
-        for name, signals in (("In_GnssLat", ["Lat"]), ("In_GnssLon", ["Lon"]), ("In_GnssAlt", ["Height"]), ("In_GnssVelEN", ["East", "North"]), ("In_GnssVelU", ["Up"])):
-            rows = frames.where(name)
-            time_s = frames.time_us[rows] * 1e-6
-            back = np.searchsorted(time_s, time_s - seconds - 0.09)
-            for one in signals:
-                frames.set(name, **{one: frames.get(name, one)[back]})
-        return frames
+        for name in RECEIVER:
+            if frames.has(name):
+                frames.set(name, Stamp=(frames.valid_us(name) + round(seconds * 1e6)) & MASK)
+        of_receiver = np.isin(frames.identifier, [DBC.messages[name].identifier for name in RECEIVER])
+        bus_us = frames.bus_us()
+        at = bus_us + np.where(of_receiver, round(seconds * 1e6), 0)
+        order = np.argsort(at, kind="stable")
+        order = order[at[order] <= bus_us[-1]]
+        return Frames(at[order], frames.identifier[order], frames.payload[order])
     return apply
 
 
@@ -317,6 +322,7 @@ def scale_accel(factor):
 
 
 ABOUT_X, ABOUT_Z, Y_FOR_Z = np.diag([1, -1, -1]), [[0, -1, 0], [1, 0, 0], [0, 0, 1]], [[1, 0, 0], [0, 0, 1], [0, -1, 0]]
+RECEIVER = ["In_GnssLat", "In_GnssLon", "In_GnssAlt", "In_GnssAcc", "In_GnssVelEN", "In_GnssVelU"]
 FIX = ["In_GnssLat", "In_GnssLon", "In_GnssAlt", "In_GnssAcc"]
 DEGREE = 180 / np.pi
 IMU_FRAMES = [GYRO, ACCEL, TIME]
@@ -333,7 +339,7 @@ MISTAKES = [
     ("imu_axes", "skog", lambda f: turn_imu(f, np.diag([-1, -1, 1]))), ("imu_axes", "*husky", lambda f: turn_imu(f, Y_FOR_Z)),
     ("imu_axes", "iris", lambda f: turn_imu(f, Y_FOR_Z)), ("imu_axes", "car", lambda f: turn_imu(f, ABOUT_Z)),
     ("imu_axes", "road", lambda f: turn_imu(f, np.diag([-1, -1, 1]))),
-    ("imu_axes", "*yard", lambda f: turn_imu(f, about_up(45))), ("imu_axes", "skog", lambda f: turn_imu(f, about_up(-30))), ("imu_axes", "husky_sim", lambda f: turn_imu(f, about_up(135))),
+    ("imu_axes", "*yard", lambda f: turn_imu(f, about(2, 45))), ("imu_axes", "skog", lambda f: turn_imu(f, about(2, -30))), ("imu_axes", "husky_sim", lambda f: turn_imu(f, about(1, 135))),
     ("rates_for_increments", "yard", rates), ("rates_for_increments", "*skog", rates), ("rates_for_increments", "iris_gps", rates),
     ("rates_for_increments", "husky", rates),
     ("g_for_mps2", "yard", lambda f: scale_imu(f, 1, 1 / 9.80665)), ("g_for_mps2", "*skog", lambda f: scale_imu(f, 1, 1 / 9.80665)),
@@ -359,11 +365,12 @@ MISTAKES = [
     ("longitude_sign", "iris", map_signal("In_GnssLon", "Lon", np.negative)), ("longitude_sign", "husky", map_signal("In_GnssLon", "Lon", np.negative)),
     ("velocity_axes", "*yard", swap_velocity), ("velocity_axes", "road", swap_velocity), ("velocity_axes", "iris", swap_velocity), ("velocity_axes", "road", map_signal("In_GnssVelEN", "North", np.negative)),
     ("wheels_reversed", "*yard", reverse_wheels), ("wheels_reversed", "road", reverse_wheels), ("wheels_reversed", "*husky", reverse_wheels),
-    ("wheels_reversed", "husky_sim", reverse_wheels),
-    ("receiver_late", "*yard", late(0.4)), ("receiver_late", "road", late(1.2)), ("receiver_late", "husky_sim", late(0.2)), ("receiver_late", "yard", late(1.0)),
+    ("wheels_reversed", "husky_sim", reverse_wheels), ("wheels_reversed", "car", reverse_wheels),
+    ("receiver_late", "*tour", late(0.4)), ("receiver_late", "road", late(1.2)), ("receiver_late", "husky_sim", late(0.2)), ("receiver_late", "car", late(1.0)),
     ("velocity_unit", "*yard", scale_velocity(1 / 0.514444)), ("velocity_unit", "road", scale_velocity(3.6)), ("velocity_unit", "yard", scale_velocity(0.514444)),
     ("velocity_unit", "iris", scale_velocity(1 / 0.514444)), ("velocity_unit", "husky_sim", scale_velocity(1 / 0.44704)),
     ("fix_unit", "*yard", write_places(decimals_as_minutes)), ("fix_unit", "road", write_places(minutes_as_decimals)), ("fix_unit", "iris", write_places(minutes_as_decimals)),
+    ("fix_unit", "husky", write_places(minutes_as_decimals)), ("fix_unit", "skog", write_places(decimals_as_minutes)),
     ("fix_unit", "husky_sim", write_places(decimals_as_minutes)),
     ("wheel_scale", "*yard", lambda f: scale_wheels(f, 1.3)), ("wheel_scale", "road", lambda f: scale_wheels(f, 0.5)),
     ("wheel_scale", "husky", lambda f: scale_wheels(f, 2)), ("wheel_scale", "skog", lambda f: scale_wheels(f, 1 / 3.6)),
@@ -389,7 +396,8 @@ MISTAKES = [
     ("track_width", "husky_sim", lambda f: f, "--set", "wheels.yaw_rate_scale=0.6"), ("track_width", "yard", lambda f: f, "--set", "wheels.drive.track_m=0.35"),
     ("wheels_unequal", "*yard", lambda f: scale_wheel(f, "Left", 1.2)), ("wheels_unequal", "husky_sim", lambda f: scale_wheel(f, "Right", 0.85)),
     ("wheels_unequal", "husky", lambda f: scale_wheel(f, "Right", 1.3)), ("wheels_unequal", "yard", lambda f: scale_wheel(f, "Right", 0)),
-    ("wheels_unequal", "yard", lambda f: scale_wheel(f, "Left", 4)),
+    ("wheels_unequal", "yard", lambda f: scale_wheel(f, "Left", 4)), ("wheels_unequal", "yard", lambda f: scale_wheel(f, "Right", 8)),
+    ("wheels_unequal", "yard", lambda f: scale_wheel(f, "Left", 0.1)), ("wheels_unequal", "husky", lambda f: scale_wheel(f, "Left", 0.25)),
     ("wheels_unequal", "yard", lambda f: f, "--set", "wheels.drive.right_radius_m=0.15"),
     ("antenna_arm", "*yard", lambda f: f, "--set", "gnss.antenna_y_b_m=2"), ("antenna_arm", "road", lambda f: f, "--set", "gnss.antenna_x_b_m=3"),
     ("antenna_arm", "husky_sim", lambda f: f, "--set", "gnss.antenna_y_b_m=-1.5"), ("antenna_arm", "yard", lambda f: f, "--set", "gnss.antenna_x_b_m=-1.5"),
@@ -404,6 +412,7 @@ MISTAKES = [
 # name: robot, and how the log is made: arguments of tetap-world, or an importer with its arguments ({DATA} is the folder of the sets)
 WORLDS = {"yard": ("rover", []), "road": ("rover", ["--course", "road"]), "car": ("car", []), "iris": ("iris", []),
           "husky_sim": ("husky_inertial", []),
+          "tour": ("rover", []), "stand": ("rover", ["--course", "stand"]),
           "usual": ("rover", ["--seed", "2", "--fault", "wheel_spin@45+3,gnss_outage@80+30,gnss_jump@150+2"])}
 SETS = {"skog": ("car", "import_skog", "skog_gnss_ins"), "husky": ("husky_inertial", "import_husky", "husky"),
         "iris_gps": ("iris", "import_px4", "px4_ecl", "iris_gps"),
@@ -411,6 +420,7 @@ SETS = {"skog": ("car", "import_skog", "skog_gnss_ins"), "husky": ("husky_inerti
         **{f"mrclam{i}": ("mrclam", "import_mrclam", "mrclam/MRCLAM_Dataset7", str(i)) for i in range(1, 6)}}
 SHORT_GOOD = ("yard", "skog", "husky", "iris_gps", "mrclam1", "labyrinth")
 SHORT_S = "90"
+LONG = ("tour",)  # of its whole length in the short form, too: a change of speed comes late
 
 
 class Logs:
@@ -434,7 +444,7 @@ class Logs:
     def _simulated(self, name):
         robot, arguments = WORLDS[name]
         out = os.path.join(self.folder, name)
-        run(os.path.join(PROGRAMS, "tetap-world"), "--memory", "--raw", "--quiet", "--robot", robot, "--out", out, *arguments, *([] if WHOLE else ["--duration", SHORT_S]))
+        run(os.path.join(PROGRAMS, "tetap-world"), "--memory", "--raw", "--quiet", "--robot", robot, "--out", out, *arguments, *([] if WHOLE or name in LONG else ["--duration", SHORT_S]))
         return Frames.read(os.path.join(out, "raw.log"))
 
     def _recorded(self, name):
@@ -466,7 +476,8 @@ class Doctor(unittest.TestCase):
         frames.write(log)
         said = run(os.path.join(PROGRAMS, "tetap-doctor"), log, *(["--robot", robot] if robot else []), "--json", answer, *arguments)
         with open(answer, encoding="utf-8") as file:
-            found = json.load(file)["findings"]
+            self.answer = json.load(file)
+        found = self.answer["findings"]
         for rank, one in enumerate(found, 1):
             self.assertEqual(one["rank"], rank)
             self.assertIn(one["evidence"], said)
@@ -536,6 +547,25 @@ class Doctor(unittest.TestCase):
             found = self.examine(mistake(self.logs.frames(name)), "")
             self.assertEqual([one["code"] for one in found], [code], f"{code} in {name}")
             self.assertRegex(found[0]["evidence"], words)
+
+    def test_a_late_receiver_is_measured_where_the_log_can_tell(self):
+        for name, seconds in (("tour", 0.13), ("tour", 1.45)) + ((("road", 0.5), ("husky_sim", 0.7)) if WHOLE else ()):
+            found = self.examine(late(seconds)(self.logs.frames(name)), self.logs.robot(name))
+            self.assertEqual([one["code"] for one in found], ["receiver_late"])
+            self.assertAlmostEqual(int(re.search(r"speed (\d+) ms before its stamp", found[0]["evidence"])[1]), 1e3 * seconds, delta=50)
+            self.assertNotIn("cannot_tell", self.answer)
+        for name, velocities in (("iris", 0), ("stand", 100)):  # no wheels; no change of speed
+            self.assertEqual(self.examine(late(0.7)(self.logs.frames(name)), self.logs.robot(name)), [])
+            said = re.fullmatch(r"whether the receiver is late: .* 2 changes of speed by 1 m/s \(0 seen, (\d+) velocities\)", self.answer["cannot_tell"])
+            self.assertGreaterEqual(int(said[1]), velocities)
+
+    def test_of_three_devices_only_the_wrong_one_gets_a_remedy(self):
+        for name in ("yard", "husky_sim"):
+            for code, mistake, change in (("velocity_unit", scale_velocity(1 / 0.514444), r"by 0\.5\d* in"), ("fix_unit", write_places(minutes_as_decimals), "ddmm"),
+                                          ("wheel_scale", lambda f: scale_wheels(f, 0.5), r"by (1\.9|2\.[01])\d*")):
+                found = self.examine(mistake(self.logs.frames(name)), self.logs.robot(name))
+                self.assertEqual([one["code"] for one in found], [code], name)
+                self.assertRegex(found[0]["change"], change)
 
     def test_a_last_line_that_is_cut_off_is_named(self):
         log = os.path.join(self.directory.name, "cut.log")
