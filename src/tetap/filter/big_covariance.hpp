@@ -30,11 +30,11 @@ class BigCovariance {
   [[nodiscard]] Scalar operator()(int r, int c) const { return packed_[index(r, c)]; }
   [[nodiscard]] Scalar& operator()(int r, int c) { return packed_[index(r, c)]; }
   void clear() { size_ = 0; }
-  /// All kMost states in use, independent.
-  void begin(const States& variances) {
-    size_ = kMost;
+  /// The first `count` states in use, independent.
+  void begin(const States& variances, int count = kMost) {
+    size_ = count;
     for (Scalar& word : packed_) word = Scalar{0};
-    for (int n = 0; n < kMost; ++n) packed_[index(n, n)] = variances[at(n)];
+    for (int n = 0; n < count; ++n) packed_[index(n, n)] = variances[at(n)];
   }
 
   /// One more state, by its covariance with each state before it and its own variance. False, and nothing has changed,

@@ -57,6 +57,7 @@ class SpeedCore {
     const float sigma = error == kConsidered ? noise_.sigma_scale : noise_.sigma_direction_rad;
     return sigma * sigma;
   }
+  void place(const WorldPose& pose) { pose_ = pose; }
   void shift(const nav::Vector3& by_m) { pose_.p_n_m += by_m; }
   void correct(const float* error) {
     pose_.correct(error);

@@ -13,9 +13,12 @@ namespace tetap::slam {
 enum class TrackFate : std::uint8_t {
   kPending,
   kUsed,
-  kGated,    ///< NIS above 99 % of chi-square: nothing changed
-  kNoDepth,  ///< its point was not found, or lies behind a view
-  kSingular  ///< S has no factor, or something is no number
+  kGated,     ///< NIS above 99 % of chi-square: nothing changed
+  kNoDepth,   ///< its point was not found, or lies behind a view
+  kSingular,  ///< S has no factor, or something is no number
+  kKept,      ///< used, and its point joined the map
+  kNoRoom,    ///< used, and the map had no room for its point
+  kAlone      ///< a sighting of the map that no other one of its image bears out, though the pose is uncertain
 };
 
 struct TrackRecord {
@@ -32,7 +35,8 @@ struct TrackRecord {
   return kQuantile[static_cast<std::size_t>(sightings < 3 ? 0 : sightings > 16 ? 13 : sightings - 3)];
 }
 
-/// States 0 to 2 are the camera's rotation, six from View::state on are those of the pose.
+/// States 0 to 2 are the camera's rotation, six from View::state on are those of the pose. Of kStates those are used
+/// that the covariance has.
 template <int kStates, int kClones>
 class TrackUpdate {
  public:
@@ -46,17 +50,22 @@ class TrackUpdate {
     std::int32_t state = 0;
   };
 
-  void begin(std::uint16_t id) {
+  /// `keep`: the point of the track joins the states when its depth is known well.
+  void begin(std::uint16_t id, bool keep = false) {
     record_ = {.id = id};
     count_ = 0;
+    keep_ = keep;
     step_ = Step::kViews;
     index_ = 0;
   }
   void add(const View& view) { view_[at(count_++)] = view; }
   [[nodiscard]] bool busy() const { return step_ != Step::kNone; }
   [[nodiscard]] const TrackRecord& record() const { return record_; }
-  /// Correction of all states: meaningful after an update whose fate is kUsed.
+  /// Correction of all states: meaningful after an update that was used.
   [[nodiscard]] const Dx& dx() const { return dx_; }
+  /// The point at which the update was linearised, and the step from there that its own rows ask for.
+  [[nodiscard]] const nav::Vector3& point_n_m() const { return point_n_m_; }
+  [[nodiscard]] const nav::Vector3& point_step_m() const { return point_step_m_; }
 
   /// The next step; its cost in units of about ten floating-point operations. `sigma` is the noise of a direction,
   /// `considered` the state that is not corrected, negative for none.
@@ -76,6 +85,8 @@ class TrackUpdate {
         return reflect();
       case Step::kGate:
         return gate(sigma);
+      case Step::kKeep:
+        return keep(p, sigma);
       case Step::kGain:
         return gain();
       case Step::kCorrect:
@@ -85,7 +96,9 @@ class TrackUpdate {
   }
 
  private:
-  enum class Step : std::uint8_t { kNone, kViews, kDepth, kRows, kInnovation, kProject, kGate, kGain, kCorrect };
+  enum class Step : std::uint8_t { kNone, kViews, kDepth, kRows, kInnovation, kProject, kGate, kKeep, kGain, kCorrect };
+  /// Greatest sigma of an inverse depth, as a share of it, with which a point joins the states: the row then is linear.
+  static constexpr float kSharp = 0.1F;
   static constexpr std::size_t at(int i) { return static_cast<std::size_t>(i); }
   [[nodiscard]] int rows() const { return 2 * count_; }
 
@@ -132,6 +145,7 @@ class TrackUpdate {
   /// Two rows of H, of the point's part of it and of the residual, and two columns of G = P H^T.
   int add_rows(const Covariance& p, const model::CameraMounting& camera) {
     const View& view = view_[at(index_)];
+    states_ = p.size();
     const PointSighting sighting(view.pose, camera, point_n_m_);
     if (!sighting.at.seen) return end(TrackFate::kNoDepth, 15);
     h_[at(index_)] = sighting.h;
@@ -140,8 +154,8 @@ class TrackUpdate {
     nu_[at(2 * index_)] = view.seen.x - sighting.at.at.x;
     nu_[at(2 * index_ + 1)] = view.seen.y - sighting.at.at.y;
     p.template times<2, 3, 6>(h_[at(index_)], view.state, g_, 2 * index_);
-    if (++index_ == count_) return next(Step::kInnovation, 15 + 4 * kStates);
-    return 15 + 4 * kStates;
+    if (++index_ == count_) return next(Step::kInnovation, 15 + 4 * states_);
+    return 15 + 4 * states_;
   }
 
   /// Rows 2 k and 2 k + 1 of H P H^T against all rows up to them.
@@ -163,7 +177,7 @@ class TrackUpdate {
 
   /// One Householder reflection (Golub & Van Loan 2013, alg. 5.1.1): column `index_` of the point's part is zero below.
   int reflect() {
-    const int c = index_, m = rows(), cost = (m - c) * (kStates + 2 * m) * 2 / 5;
+    const int c = index_, m = rows(), cost = (m - c) * (states_ + 2 * m) * 2 / 5;
     std::array<float, kRows> u{};
     float square = 0.0F;
     for (int q = c; q < m; ++q) {
@@ -185,7 +199,7 @@ class TrackUpdate {
     turn([&](int q) -> float& { return nu_[at(q)]; });
     for (int j = 0; j < m; ++j) turn([&](int q) -> float& { return s_[at(q)][at(j)]; });
     for (int j = 0; j < m; ++j) turn([&](int q) -> float& { return s_[at(j)][at(q)]; });
-    for (auto& row : g_) turn([&](int q) -> float& { return row[at(q)]; });
+    for (int n = 0; n < states_; ++n) turn([&](int q) -> float& { return g_[at(n)][at(q)]; });
     if (++index_ == kPoint) return next(Step::kGate, cost);
     return cost;
   }
@@ -213,13 +227,50 @@ class TrackUpdate {
     if (!(nis < 1e20F)) return end(TrackFate::kSingular, cost);
     record_.nis = nis;
     if (!(nis <= track_gate(count_))) return end(TrackFate::kGated, cost);
+    return next(keep_ && depth_.sigma_per_m() < kSharp * depth_.inverse_depth_per_m() ? Step::kKeep : Step::kGain,
+                cost);
+  }
+
+  /// The three rows that hold the point make it a state: nu_1 = H_1 x + T d + n, so the point steps by T^-1 nu_1 and
+  /// then errs by -T^-1 (H_1 x + n). The rows that are left correct it with the others (Li & Mourikis 2012).
+  int keep(Covariance& p, float sigma) {
+    const int m = rows(), cost = 3 * (states_ + m);
+    keep_ = false;
+    record_.fate = TrackFate::kNoRoom;
+    if (states_ + kPoint > kStates) return next(Step::kGain, cost);
+    nav::Matrix3 inverse = nav::Matrix3::Zero();  // of T, which is triangular
+    for (int c = 0; c < kPoint; ++c)
+      for (int r = c; r >= 0; --r) {
+        float sum = r == c ? 1.0F : 0.0F;
+        for (int k = r + 1; k <= c; ++k) sum -= of_point_[at(r)][at(k)] * inverse(k, c);
+        inverse(r, c) = sum / of_point_[at(r)][at(r)];
+      }
+    if (!nav::is_finite(nav::Vector3(inverse.rowwise().sum()))) return next(Step::kGain, cost);
+    nav::Matrix3 s;
+    for (int r = 0; r < kPoint; ++r)
+      for (int c = 0; c < kPoint; ++c) s(r, c) = s_[at(r)][at(c)] + (r == c ? sigma * sigma : 0.0F);
+    const nav::Matrix3 variance = inverse * s * inverse.transpose();
+    point_step_m_ = inverse * nav::Vector3{nu_[0], nu_[1], nu_[2]};
+    for (int a = 0; a < kPoint; ++a) {
+      const auto of_rows = [&](const auto& row) {
+        float sum = 0.0F;
+        for (int k = a; k < kPoint; ++k) sum -= inverse(a, k) * row(k);
+        return sum;
+      };
+      for (int n = 0; n < states_; ++n) dx_[at(n)] = of_rows([&](int k) { return g_[at(n)][at(k)]; });
+      for (int b = 0; b < a; ++b) dx_[at(states_ + b)] = variance(b, a);
+      if (!p.add(dx_, variance(a, a))) return next(Step::kGain, cost);
+      for (int q = kPoint; q < m; ++q) g_[at(states_ + a)][at(q)] = of_rows([&](int k) { return s_[at(k)][at(q)]; });
+    }
+    states_ += kPoint;
+    record_.fate = TrackFate::kKept;
     return next(Step::kGain, cost);
   }
 
   /// G becomes G L^-T, and dx = G nu.
   int gain() {
     const int m = rows();
-    for (int n = 0; n < kStates; ++n) {
+    for (int n = 0; n < states_; ++n) {
       auto& row = g_[at(n)];
       float sum = 0.0F;
       for (int q = kPoint; q < m; ++q) {
@@ -230,12 +281,12 @@ class TrackUpdate {
       }
       dx_[at(n)] = sum;
     }
-    return next(Step::kCorrect, kStates * (m - kPoint) * (m - kPoint) / 8);
+    return next(Step::kCorrect, states_ * (m - kPoint) * (m - kPoint) / 8);
   }
 
   int correct(Covariance& p, int considered) {
     int rank = rows() - kPoint, first = kPoint;
-    const int cost = kStates * kStates * rank / 10;
+    const int cost = states_ * states_ * rank / 10;
     const float kept = considered >= 0 ? p(considered, considered) : 0.0F;
     for (; rank > 9; rank -= 4, first += 4) p.template subtract<4>(g_, first);
     switch (rank) {
@@ -256,13 +307,13 @@ class TrackUpdate {
       dx_[at(considered)] = 0.0F;
       p(considered, considered) = kept;
     }
-    return end(TrackFate::kUsed, cost);
+    return end(record_.fate == TrackFate::kPending ? TrackFate::kUsed : record_.fate, cost);
   }
 
   std::array<View, kClones> view_{};
   std::array<RelativeView, kClones> relative_{};
   InverseDepth depth_;
-  nav::Vector3 point_n_m_ = nav::Vector3::Zero();
+  nav::Vector3 point_n_m_ = nav::Vector3::Zero(), point_step_m_ = nav::Vector3::Zero();
   std::array<std::array<std::array<float, 9>, 2>, kClones> h_{};
   std::array<std::array<float, kPoint>, kRows> of_point_{};
   std::array<float, kRows> nu_{};
@@ -270,8 +321,9 @@ class TrackUpdate {
   typename Covariance::template Rows<kRows> g_{};
   Dx dx_{};
   TrackRecord record_;
-  std::int32_t count_ = 0, index_ = 0;
+  std::int32_t count_ = 0, index_ = 0, states_ = kStates;
   Step step_ = Step::kNone;
+  bool keep_ = false;
 };
 
 }  // namespace tetap::slam

@@ -21,10 +21,11 @@ struct TrackCounters {
   std::uint32_t left = 0;        ///< long tracks that ended, or lost their oldest sighting, without being used
 };
 
-template <int kClones, int kTracks>
+/// kFull sightings fill a track: all images, or fewer where a slot is taken before the tracks are used.
+template <int kClones, int kTracks, int kFull = kClones>
 class TrackStore {
  public:
-  static_assert(kClones >= 3 && kClones <= 16 && kTracks >= 1 && kTracks <= 255);
+  static_assert(kFull >= 3 && kFull <= kClones && kClones <= 16 && kTracks >= 1 && kTracks <= 255);
   static constexpr int kUsed = 2;  ///< tracks that are used in an image, at most
 
   /// Sightings of a track: `count` images in a row from the slot `first` on, slots being used in turn.
@@ -75,11 +76,11 @@ class TrackStore {
     for (Track& track : track_) {
       if (!track.live) continue;
       if (track.chosen) track.count = 0;
-      const bool lost = !track.goes_on || track.count == kClones;
+      const bool lost = !track.goes_on || track.count == kFull;
       if (lost && track.count >= least_) ++count_.left;
       if (!track.goes_on) {
         track = {};
-      } else if (track.count == kClones) {
+      } else if (track.count == kFull) {
         track.first = static_cast<std::uint8_t>((track.first + 1) % kClones);
         --track.count;
       }
@@ -144,7 +145,7 @@ class TrackStore {
   void choose(bool going_on) {
     for (int i = 0; i < kTracks && chosen_count_ < kUsed; ++i) {
       Track& track = track_[at(i)];
-      if (!track.live || track.goes_on != going_on || track.count < (going_on ? kClones : least_)) continue;
+      if (!track.live || track.goes_on != going_on || track.count < (going_on ? kFull : least_)) continue;
       track.chosen = true;
       chosen_[at(chosen_count_++)] = i;
     }

@@ -5,6 +5,7 @@
 #pragma once
 
 #include "tetap/base/members.hpp"
+#include "tetap/slam/point_map.hpp"
 #include "tetap/slam/track_update.hpp"
 #include "tetap/slam/tracks.hpp"
 
@@ -33,15 +34,17 @@ struct VisualCounters {
   std::uint32_t origin_moves = 0;
 };
 
-/// Core: SpeedCore or its like. State: the camera's rotation, the core, then six errors of each clone.
-template <class Core_, int kClones_, int kTracks_>
+/// Core: SpeedCore or its like. State: the camera's rotation, the core, six errors of each clone, then three of each
+/// point of the map, where there is one (VisualMap).
+template <class Core_, int kClones_, int kTracks_, int kPoints_ = 0>
 class VisualWindow {
  public:
   using Core = Core_;
   using Motion = typename Core::Motion;
   static constexpr int kClones = kClones_, kTracks = kTracks_;
   static constexpr int kCamera = 0, kCore = 3, kFirstClone = kCore + Core::kErrors;
-  static constexpr int kStates = kFirstClone + WorldPose::kErrors * kClones;
+  static constexpr int kFirstPoint = kFirstClone + WorldPose::kErrors * kClones, kPoints = kPoints_;
+  static constexpr int kStates = kFirstPoint + 3 * kPoints;
   using Update = TrackUpdate<kStates, kClones>;
   using Covariance = typename Update::Covariance;
   using Tracks = TrackStore<kClones, kTracks>;
@@ -66,20 +69,18 @@ class VisualWindow {
     }
     core_.start(q_nb);
     for (int i = WorldPose::kErrors; i < Core::kErrors; ++i) variance[at(kCore + i)] = core_.variance(i);
-    p_.begin(variance);
+    p_.begin(variance, kFirstPoint);
+    map_.clear();
     camera_ = options_.mounting;
     origin_um_ = origin_um;
-    clone_ = {};
-    live_ = 0;
-    slot_ = 0;
-    tracks_.clear();
-    job_ = kIdle;
+    forget_images();
   }
 
   /// One interval of the core. False, and nothing changes, while an image's job runs or when something is no number.
   [[nodiscard]] bool predict(const Motion& motion) {
     if (job_ != kIdle || !Core::valid(motion)) return ++count_.refused, false;
     core_.predict(motion, p_, kCore);
+    moved_ = true;
     return true;
   }
 
@@ -150,6 +151,7 @@ class VisualWindow {
     const nav::Vector3 a{static_cast<float>(by_m[0]), static_cast<float>(by_m[1]), static_cast<float>(by_m[2])};
     for (std::size_t i = 0; i < 3; ++i) origin_um_[i] += std::int64_t{by_m[i]} * 1'000'000;
     core_.shift(-a);
+    map_.shift(-a);
     lever_rho(kCore, a);
     for (int s = 0; s < live_; ++s) {
       clone_[at(s)].p_n_m -= a;
@@ -167,19 +169,29 @@ class VisualWindow {
   static constexpr auto members(auto& self) {
     return base::members(base::unhashed(self.options_), self.camera_, self.core_, self.p_, self.clone_, self.tracks_,
                          base::unhashed(self.update_), self.origin_um_, self.records_, base::unhashed(self.count_),
-                         self.live_, self.slot_, self.job_, self.credit_);
+                         self.live_, self.slot_, self.job_, self.credit_, self.moved_, self.map_);
   }
 
- private:
+ protected:
   static constexpr std::int32_t kIdle = -1;
   static constexpr std::size_t at(int i) { return static_cast<std::size_t>(i); }
   static constexpr int state_of(int slot) { return kFirstClone + WorldPose::kErrors * slot; }
   static constexpr int considered() { return Core::kConsidered < 0 ? -1 : kCore + Core::kConsidered; }
 
+  void forget_images() {
+    clone_ = {};
+    live_ = 0;
+    slot_ = 0;
+    tracks_.clear();
+    job_ = kIdle;
+    moved_ = true;
+  }
   void next_track() {
-    if (!busy()) return;
-    const auto& track = tracks_.chosen(job_);
-    update_.begin(track.id);
+    if (busy()) begin_track(tracks_.chosen(job_));
+  }
+  template <class Track>
+  void begin_track(const Track& track, bool keep = false) {
+    update_.begin(track.id, keep);
     for (int k = 0; k < track.count; ++k) {
       const int slot = track.slot(k);
       const auto& pixel = track.seen[at(slot)];
@@ -190,23 +202,28 @@ class VisualWindow {
   void conclude() {
     const TrackRecord& record = update_.record();
     records_[at(job_)] = record;
+    count(record);
+    if (record.fate == TrackFate::kUsed) correct(update_.dx().data());
+    ++job_;
+    next_track();
+  }
+  void count(const TrackRecord& record) {
     count_.used += record.fate == TrackFate::kUsed ? 1U : 0U;
     count_.gated += record.fate == TrackFate::kGated ? 1U : 0U;
     count_.no_depth += record.fate == TrackFate::kNoDepth ? 1U : 0U;
     count_.singular += record.fate == TrackFate::kSingular ? 1U : 0U;
-    if (record.fate == TrackFate::kUsed) correct(update_.dx().data());
-    ++job_;
-    next_track();
   }
   void correct(const float* dx) {
     camera_.q_cb = (nav::exp_quaternion({dx[kCamera], dx[kCamera + 1], dx[kCamera + 2]}) * camera_.q_cb).renormalised();
     core_.correct(dx + kCore);
     for (int s = 0; s < live_; ++s) clone_[at(s)].correct(dx + state_of(s));
+    map_.correct(dx + kFirstPoint);
   }
   void clone() {
     clone_[at(slot_)] = pose();
     p_.copy(kCore, state_of(slot_), WorldPose::kErrors);
     if (live_ <= slot_) live_ = slot_ + 1;
+    moved_ = false;
   }
   void follow() {
     const nav::Vector3& p = pose().p_n_m;
@@ -233,6 +250,8 @@ class VisualWindow {
   Records records_{};
   VisualCounters count_;
   std::int32_t live_ = 0, slot_ = 0, job_ = kIdle, credit_ = 0;
+  bool moved_ = true;  ///< the pose moved since the latest clone
+  [[no_unique_address]] PointMap<kPoints> map_;
 };
 
 }  // namespace tetap::slam

@@ -1,0 +1,211 @@
+// SPDX-License-Identifier: Apache-2.0
+// Visual SLAM: laws of the map in the window's state, and a batch solution in double as its judge.
+#include "tetap/slam/visual_map.hpp"
+#include "slam/map_batch.hpp"
+#include "slam/map_world.hpp"
+#include "tetap/base/state_words.hpp"
+
+#include <gtest/gtest.h>
+#include <algorithm>
+#include <functional>
+#include <memory>
+
+namespace tetap {
+namespace {
+
+using Map = slam::VisualMap<slam::SpeedCore, 6, 40, 64>;
+static_assert(sizeof(Map) <= 176 * 1024);
+
+template <class Window>
+void take_recognised(Window& window, std::vector<slam::ImageFeature> features, int units = 1'000'000) {
+  ASSERT_TRUE(window.begin_recognised(features));
+  while (window.busy()) window.work(units);
+  ASSERT_TRUE(window.end_recognised(features));
+}
+
+/// A drive through a world; what was seen can be changed on its way.
+template <class Window>
+struct Trip {
+  using Features = std::vector<slam::ImageFeature>;
+  std::unique_ptr<Window> window;
+  std::vector<slam::TrackRecord> records;
+  std::vector<double> error_m;  ///< horizontal, at each image
+  double nees = 0, beyond_s = 0;
+
+  explicit Trip(const test::MapWorld& world, bool with_map = true, const std::function<void(Features&)>& change = {},
+                const slam::SpeedNoise& noise = {}, int units = 1'000'000)
+      : window(std::make_unique<Window>(world.options(), slam::SpeedCore(noise))) {
+    const auto& images = world.drive().images;
+    window->start(test::in_float(images[0].r_nb), 1e-3F, std::array<std::int64_t, 3>{}, 1e-3F);
+    test::PathJudge<Window> judge;
+    for (std::size_t k = 0; k < images.size(); ++k) {
+      if (k > 0)
+        EXPECT_TRUE(window->predict({.speed_b_mps = images[k].speed_b_mps.cast<float>(),
+                                     .rate_b_radps = images[k].rate_b_radps.cast<float>(),
+                                     .dt_s = 0.1F}));
+      test::take_image(*window, images[k].features);
+      if (with_map) {
+        Features seen = world.recognised[k];
+        if (change) change(seen);
+        take_recognised(*window, seen, units);
+        for (int i = 0; i < window->map_concluded(); ++i)
+          records.push_back(window->map_records()[static_cast<std::size_t>(i)]);
+      }
+      judge.add(*window, images[k], 0.1);
+      const auto place = [&](int i) {
+        return 1e-6 * static_cast<double>(window->origin_um()[static_cast<std::size_t>(i)]) +
+               static_cast<double>(window->pose().p_n_m(i));
+      };
+      error_m.push_back(std::hypot(place(0) - images[k].p_n_m(0), place(1) - images[k].p_n_m(1)));
+    }
+    nees = judge.result().nees;
+    beyond_s = judge.result().beyond_s;
+  }
+};
+
+TEST(VisualMap, IsTheBatchSolutionOfTheSameSightings) {
+  using Batch = test::MapBatch;
+  constexpr int kUnused = 5;  // the image in which the tracks of the five before it become points
+  for (const unsigned seed : {1U, 2U}) {
+    Batch batch(seed);
+    batch.solve(kUnused);
+    const slam::SpeedNoise noise{.sigma_scale = 0};  // what is considered is no part of a batch solution
+    Map map({.camera = {.fu_px = 458, .fv_px = 458, .cu_px = 319.5F, .cv_px = 239.5F},
+             .mounting = {.q_cb = {0.5F, 0.5F, -0.5F, 0.5F}, .lever_b_m = Batch::lever().cast<float>()},
+             .sigma_px = static_cast<float>(Batch::kSigma_px)},
+            slam::SpeedCore(noise));
+    map.start(nav::Quaternion{}, 0.01F, std::array<std::int64_t, 3>{}, 0.01F);
+    for (int k = 0; k < Batch::kImages; ++k) {
+      if (k > 0)
+        ASSERT_TRUE(map.predict(
+            {.speed_b_mps = Batch::speed().cast<float>(), .rate_b_radps = Batch::rate().cast<float>(), .dt_s = 0.1F}));
+      test::take_image(map, {});
+      std::vector<slam::ImageFeature> features;
+      for (int post = 0; post < Batch::kPosts; ++post) {
+        const Eigen::Vector2d at = batch.seen(k, post);
+        features.push_back({static_cast<std::uint16_t>(post), static_cast<std::uint16_t>(std::lround(4 * at(0))),
+                            static_cast<std::uint16_t>(std::lround(4 * at(1)))});
+      }
+      take_recognised(map, features);
+      const auto expected = k < kUnused    ? slam::TrackFate::kPending
+                            : k == kUnused ? slam::TrackFate::kKept
+                                           : slam::TrackFate::kUsed;
+      for (int i = 0; i < Batch::kPosts; ++i)
+        ASSERT_EQ(map.map_records()[static_cast<std::size_t>(i)].fate, expected) << k;
+    }
+    const auto covariance = [&](int state) {
+      Eigen::Matrix3d p;
+      for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j) p(i, j) = static_cast<double>(map.covariance()(state + i, state + j));
+      return p;
+    };
+    const auto compare = [](const Eigen::Vector3d& found, const Eigen::Matrix3d& p, const Eigen::Vector3d& wanted,
+                            const Eigen::Matrix3d& q, const char* what) {
+      const double apart = std::sqrt((found - wanted).dot(q.ldlt().solve(found - wanted)));
+      EXPECT_LT(apart, 0.5) << what << ": " << found.transpose() << " for " << wanted.transpose();
+      // Eigenvalues of P against those of the judge, along the judge's axes.
+      const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::Matrix3d> ratio(p, q);
+      EXPECT_GT(ratio.eigenvalues().minCoeff(), 0.65) << what;
+      EXPECT_LT(ratio.eigenvalues().maxCoeff(), 1.5) << what;
+    };
+    for (int post = 0; post < Batch::kPosts; ++post) {
+      const int i = map.map().find(static_cast<std::uint16_t>(post));
+      ASSERT_GE(i, 0);
+      const auto place = [&](const Batch::Unknown& z) -> Eigen::VectorXd {
+        return z.segment<3>(Batch::kPoints + 3 * post);
+      };
+      compare(test::in_double(map.map()[i].at_n_m), covariance(Map::kFirstPoint + 3 * i), place(batch.solution),
+              batch.covariance_of(place), "post");
+    }
+    const auto place = [](const Batch::Unknown& z) -> Eigen::VectorXd { return Batch::pose(z, Batch::kImages - 1).p; };
+    const auto pose = map.pose_covariance();
+    Eigen::Matrix3d p;
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) p(i, j) = static_cast<double>(pose(3 + i, 3 + j));
+    compare(test::in_double(map.pose().p_n_m), p, place(batch.solution), batch.covariance_of(place), "place");
+  }
+}
+
+std::vector<std::uint32_t> bits_of(const Map& map) {
+  std::vector<std::uint32_t> words;
+  const auto sink = [&](std::uint32_t word) { words.push_back(word); };
+  base::each_word(map, sink);
+  return words;
+}
+
+TEST(VisualMap, TheOrderOfFeaturesAndOfWorkLeavesEveryBit) {
+  const test::MapWorld world({.laps = 1, .wrong_share = 0.1});
+  const Trip<Map> plain(world);
+  const Trip<Map> shuffled(
+      world, true, [](auto& seen) { std::reverse(seen.begin(), seen.end()); }, {}, 700);
+  EXPECT_GT(plain.window->map().size(), 15);
+  EXPECT_EQ(bits_of(*plain.window), bits_of(*shuffled.window));
+}
+
+TEST(VisualMap, NamesOfPointsHaveNoEffect) {
+  const test::MapWorld world({.laps = 1});
+  const Trip<Map> plain(world);
+  const Trip<Map> renamed(world, true, [](auto& seen) {
+    for (auto& one : seen) one.id = static_cast<std::uint16_t>(3 * one.id + 1000);
+  });
+  EXPECT_EQ(plain.error_m, renamed.error_m);
+  ASSERT_GT(plain.window->map().size(), 0);
+  EXPECT_EQ(3 * plain.window->map()[0].id + 1000, renamed.window->map()[0].id);
+}
+
+TEST(VisualMap, ATurnOfTheWorldTurnsTheEstimate) {
+  constexpr double kTurn_rad = 2.1;
+  const test::MapWorld world({}), turned({.start_yaw_rad = kTurn_rad});
+  const Trip<Map> a(world), b(turned);
+  ASSERT_EQ(a.records.size(), b.records.size());
+  for (std::size_t i = 0; i < a.records.size(); ++i) EXPECT_EQ(a.records[i].fate, b.records[i].fate) << i;
+  EXPECT_NEAR(a.error_m.back(), b.error_m.back(), 0.02);
+  EXPECT_NEAR(a.nees, b.nees, 0.2);
+}
+
+/// A map made in a lap, and what the next image would recognise.
+struct Mapped {
+  test::MapWorld world{{.laps = 1, .missed_share = 0}};
+  Trip<Map> trip{world};
+  Map& map = *trip.window;
+  Trip<Map>::Features next = world.recognised.back();
+};
+
+TEST(VisualMap, TheMapMovesWithARobotThatIsPutElsewhere) {
+  Mapped m;
+  const auto seen_from = [&](int i) {
+    const slam::WorldPose& pose = m.map.pose();
+    return nav::Vector3(pose.q_nb.conjugate().rotate(m.map.map()[i].at_n_m - pose.p_n_m));
+  };
+  // Variances of a point as the robot sees it, along the robot's axes: its error less that of the pose.
+  const auto relative = [&](int i) {
+    Eigen::Matrix<double, 3, 9> t;
+    const nav::Vector3 f = m.map.map()[i].first_n_m;
+    t.leftCols<3>() << 0, -f(2), f(1), f(2), 0, -f(0), -f(1), f(0), 0;
+    t.rightCols<6>() << -Eigen::Matrix3d::Identity(), Eigen::Matrix3d::Identity();
+    Eigen::Matrix<double, 9, 9> p;
+    const auto state = [&](int k) { return k < 6 ? Map::kCore + k : Map::kFirstPoint + 3 * i + k - 6; };
+    for (int r = 0; r < 9; ++r)
+      for (int c = 0; c < 9; ++c) p(r, c) = static_cast<double>(m.map.covariance()(state(r), state(c)));
+    const Eigen::Matrix3d r_nb = test::in_double(m.map.pose().q_nb);
+    return Eigen::Matrix3d(r_nb.transpose() * t * p * t.transpose() * r_nb);
+  };
+  std::vector<nav::Vector3> places;
+  std::vector<Eigen::Matrix3d> before;
+  for (int i = 0; i < m.map.map().size(); ++i) places.push_back(seen_from(i)), before.push_back(relative(i));
+  const auto rotated = nav::from_euler({1.2F, 0.0F, 0.0F}) * m.map.pose().q_nb;
+  m.map.move(rotated, {.attitude_rad = {0.01F, 0.01F, 0.02F}, .place_m = {0.3F, 0.2F, 0.1F}}, {5'000'000, 0, 0});
+  EXPECT_EQ(m.map.origin_um()[0], 5'000'000);
+  EXPECT_FLOAT_EQ(m.map.pose_covariance()(3, 3), 0.09F);
+  EXPECT_FLOAT_EQ(m.map.pose_covariance()(2, 2), 0.0004F);
+  for (int i = 0; i < m.map.map().size(); ++i) {
+    EXPECT_LT((seen_from(i) - places[static_cast<std::size_t>(i)]).norm(), 1e-4F);
+    const Eigen::Matrix3d& old = before[static_cast<std::size_t>(i)];
+    EXPECT_LT((relative(i) - old).norm(), 0.02 * old.norm() + 1e-5) << i;
+  }
+  take_recognised(m.map, m.next);
+  EXPECT_EQ(m.map.map_records()[0].fate, slam::TrackFate::kUsed);
+}
+
+}  // namespace
+}  // namespace tetap
