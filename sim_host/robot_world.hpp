@@ -50,6 +50,7 @@ inline void send_only(const Sent& sent, World::Options& world) {
   if (!sent.imu) world.parameters.imu.rate_hz = 0;
   if (sent.scans_hz > 0) world.parameters.lidar.rate_hz = sent.scans_hz;
   if (sent.images_hz > 0) world.parameters.features.rate_hz = sent.images_hz;
+  if (sent.images_hz > 0 && sent.own_map) world.parameters.features.recognise = true;
   if (!sent.landmarks) {
     world.parameters.camera.rate_hz = 0;
     // A scanner and a camera see them, whatever the node has of their map.

@@ -42,6 +42,7 @@ inline constexpr double kGyroShare = 0.1;   ///< broadband vibration of a gyrosc
 inline constexpr double kAccelTurnOnShare = 0.25;
 inline constexpr double kGyroTurnOnShare = 0.1745;  ///< 0.1 deg/s for 0.01 rad/s
 inline constexpr double kVelocityShare = 0.5;       ///< speed error over the floor of its 1 sigma
+inline constexpr double kWrongIds = 0.05;           ///< share of recognitions that name another landmark [own]
 inline constexpr double kOwnSpeed_radps = 20;       ///< fastest turn of a gear motor's wheel [own]
 
 template <std::size_t N>
@@ -234,6 +235,7 @@ inline void simulate(const param::Parameters& n, const SimulatedAs& as, World::O
   p.camera.identities = !as.nameless;
   if (as.scans) detail::set_scanner(n.lidar, p.lidar);
   if (as.images) detail::set_camera(n.camera, p.features);
+  if (as.images && as.own_map) p.features.wrong_id_probability = detail::kWrongIds;
   if (!as.own_noise) return;
   detail::set_mounting(n, as.inertial, p);
   p.camera.sigma_range_m = std::min(p.camera.sigma_range_m, detail::wide(n.landmark.sigma_range_m));

@@ -57,6 +57,9 @@ std::string help() {
           "  --lidar            a laser scanner sends its scans, whether the robot takes them or not\n"
           "  --camera           a camera sends the features that it follows, likewise\n"
           "  --recognise        with it: landmarks that it recognises, as features of camera 3\n"
+          "  --wrong-ids X      share of its recognitions that name another landmark (default 0; 0.05 for a robot "
+          "that\n"
+          "                     maps by images)\n"
           "  --landmarks-only   with it: it follows landmarks and nothing else\n"
           "  --people N         people who walk where scanner and camera see them (default 0)\n"
           "  --course NAME      yard, loop (on wheels), road: 1.1 km at 5 m/s, street (of a car), flight (of what "
@@ -285,12 +288,15 @@ void set_sights(sim::Arguments& arguments, const sim::Sent& sent, sim::World::Op
   sim::Parameters& n = world.parameters;
   if (arguments.flag("--lidar")) n.lidar.rate_hz = 10;
   if (arguments.flag("--camera")) n.features.rate_hz = 10;
-  n.features.recognise = arguments.flag("--recognise");
+  n.features.recognise = arguments.flag("--recognise") || (sent.images_hz > 0 && sent.own_map);
+  const double wrong_ids = arguments.real("--wrong-ids", -1, 0, 1);
+  if (wrong_ids >= 0) n.features.wrong_id_probability = wrong_ids;
   n.features.landmarks_only = arguments.flag("--landmarks-only");
   n.people.count = static_cast<int>(arguments.integer("--people", 0, 0, 50));
   const bool camera = n.features.rate_hz > 0 || sent.images_hz > 0, scanner = n.lidar.rate_hz > 0 || sent.scans_hz > 0;
   if ((n.features.recognise || n.features.landmarks_only) && !camera)
     throw sim::UsageError("--recognise and --landmarks-only need --camera");
+  if (wrong_ids >= 0 && !n.features.recognise) throw sim::UsageError("--wrong-ids needs --recognise");
   if (n.people.count > 0 && !scanner && !camera) throw sim::UsageError("--people needs --lidar or --camera");
 }
 

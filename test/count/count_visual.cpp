@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // The visual window's workload: a camera drives ahead at 8 m/s between points on both sides, 20 features an image, a
-// tenth of a second apart. A full track is one that all six images of the window saw.
+// tenth of a second apart. A full track is one that all six images of the window saw. The same way again with a map:
+// each point is recognised, and the map of 64 becomes full.
 #include "board.hpp"
 #include "markers.hpp"
 #include "tetap/base/random.hpp"
 #include "tetap/slam/speed_core.hpp"
-#include "tetap/slam/visual_window.hpp"
+#include "tetap/slam/visual_map.hpp"
 
 #include <array>
 #include <cstdint>
@@ -16,9 +17,10 @@ using namespace tetap;
 using count::opaque;
 using count::Region;
 
-constexpr int kImages = 16, kPoints = 20;
+constexpr int kImages = 16, kImagesOfMap = 96, kPoints = 20;
 constexpr float kStep_m = 0.8F, kNearest_m = 4.0F, kFocal_px = 700.0F, kU_px = 600.0F, kV_px = 200.0F;
 using Window = slam::VisualWindow<slam::SpeedCore, 6, 40>;
+using Map = slam::VisualMap<slam::SpeedCore, 6, 40, 64>;
 using Image = std::array<slam::ImageFeature, kPoints>;
 
 struct Point {
@@ -45,9 +47,53 @@ void see(std::array<Point, kPoints>& points, float at_m, std::uint16_t& next_id,
   }
 }
 
+slam::VisualOptions options() {
+  return {.camera = {.fu_px = kFocal_px, .fv_px = kFocal_px, .cu_px = kU_px, .cv_px = kV_px},
+          .mounting = {.q_cb = {0.5F, 0.5F, -0.5F, 0.5F}, .lever_b_m = {1.0F, 0.0F, 0.5F}}};
+}
+
+/// Eight sightings and two new tracks, and the two tracks of the camera's own image: with a full map.
+void visual_map() {
+  static Map map(options());
+  std::array<Point, kPoints> points{};
+  std::uint16_t next_id = 1;
+  base::Random noise(1);
+  map.start(nav::Quaternion{}, 1e-3F, std::array<std::int64_t, 3>{}, 1e-3F);
+  for (int k = 0; k < kImagesOfMap; ++k) {
+    static Image image;
+    see(points, kStep_m * static_cast<float>(k), next_id, noise, image);
+    const bool full = map.map().size() == Map::kPoints;
+    static_cast<void>(map.predict({.speed_b_mps = {10.0F * kStep_m, 0.0F, 0.0F}, .dt_s = 0.1F}));
+    static_cast<void>(map.begin_image(image));
+    while (map.busy()) {
+      const auto track = [] {
+        for (const int done = map.concluded(); map.busy() && map.concluded() == done;) map.work(1);
+      };
+      if (!full) {
+        track();
+        continue;
+      }
+      const Region<struct visual_map_track> counted;
+      track();
+    }
+    static_cast<void>(map.end_image(image));
+    static_cast<void>(map.begin_recognised(image));
+    const auto recognise = [] {
+      while (map.busy()) map.work(1);
+    };
+    if (full) {
+      const Region<struct visual_map_recognised> counted;
+      recognise();
+    } else {
+      recognise();
+    }
+    static_cast<void>(map.end_recognised(image));
+  }
+  opaque(map);
+}
+
 void visual_window() {
-  static Window window({.camera = {.fu_px = kFocal_px, .fv_px = kFocal_px, .cu_px = kU_px, .cv_px = kV_px},
-                        .mounting = {.q_cb = {0.5F, 0.5F, -0.5F, 0.5F}, .lever_b_m = {1.0F, 0.0F, 0.5F}}});
+  static Window window(options());
   static std::array<Image, kImages> images;
   std::array<Point, kPoints> points{};
   std::uint16_t next_id = 1;
@@ -74,6 +120,7 @@ int main() {
   static Board board;
   count::calibrate();
   visual_window();
+  visual_map();
   board.print("count: done\n");
   count::finish();
   return 0;

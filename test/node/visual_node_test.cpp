@@ -18,6 +18,10 @@ namespace {
 
 using Visual = estimators::VisualOdometry6;
 using Robot = node::Estimators<estimators::Odometry, Visual>;
+using Slam = estimators::VisualSlam64;
+using Mapper = node::Estimators<estimators::Odometry, Slam>;
+static_assert(Mapper::kMakesMap && estimators::MapsLandmarks<Slam> && !estimators::MakesMap<Visual>);
+static_assert(sizeof(Slam) <= 160 * 1024);
 static_assert(Robot::kNeedsMapIds && !Robot::kMakesMap && node::WorksInJobs<Visual> && node::RecordsLater<Visual> &&
               estimators::SeesImages<Visual>);
 static_assert(sizeof(Visual) <= 16 * 1024 && sizeof(estimators::VisualOdometry4) <= 8 * 1024);
@@ -29,9 +33,10 @@ struct Sent {
 };
 using Fault = std::function<void(std::size_t image, Sent& sent)>;
 
-class Road {
+template <class Robot>
+class RoadOf {
  public:
-  explicit Road(std::int32_t work_units = 4'000, int images = 60) : world_({.images = images}), numbers_(kNumbers) {
+  explicit RoadOf(std::int32_t work_units = 4'000, int images = 60) : world_({.images = images}), numbers_(kNumbers) {
     const VisualWorldOptions o;
     const Drive& drive = world_.drive();
     numbers_.loop.work_units = work_units;
@@ -67,6 +72,15 @@ class Road {
                         [&](const auto& message) { sent.frames.push_back(in(message)); });
       if (fault) fault(k, sent);
       due.push_back({now_us + sent.late_us, sent.frames});
+      if (recognised_every == 0) continue;
+      std::vector<model::ImageFeature> known;
+      for (const auto& feature : images[k].features)
+        if (feature.id % recognised_every == 0) known.push_back(feature);
+      sent = {};
+      bus::encode_image({}, known, bus::SampleHead::of({now_us}, static_cast<std::uint8_t>(k), 3),
+                        [&](const auto& message) { sent.frames.push_back(in(message)); });
+      if (fault_of_recognised) fault_of_recognised(k, sent);
+      due.push_back({now_us + sent.late_us, sent.frames});
     }
     std::stable_sort(due.begin(), due.end(), [](const Due& a, const Due& b) { return a.at_us < b.at_us; });
     last_us_ = at(images.back());
@@ -100,8 +114,11 @@ class Road {
   [[nodiscard]] std::uint16_t incomplete() const { return bench_->node.counters().incomplete; }
   [[nodiscard]] const bus::Counters& counters() const { return bench_->node.counters(); }
 
+  unsigned recognised_every = 0;  ///< features whose identities are multiples of it are recognised as well; 0: none
+  Fault fault_of_recognised;
   std::vector<bus::EstVisual> visual;
   std::vector<bus::EstInnov> records;
+  std::vector<bus::EstLandmark> landmarks;
   std::array<double, 2> x_m{}, y_m{};
   std::uint32_t crc = 0;
 
@@ -128,6 +145,7 @@ class Road {
     for (const auto& one : all<bus::EstVisual>(out)) visual.push_back(one);
     for (const auto& one : all<bus::EstInnov>(out))
       if (one.sensor == sensor::Sensor::kFeature) records.push_back(one);
+    for (const auto& one : all<bus::EstLandmark>(out)) landmarks.push_back(one);
     for (std::size_t i = 0; i < 2 && bench_->now_us <= last_us_; ++i)
       if (const auto pos = last<bus::EstPos>(out, i)) x_m[i] = 1e-3 * pos->x_raw, y_m[i] = 1e-3 * pos->y_raw;
     crc = last<bus::EstStateCrc>(out)->crc;
@@ -138,6 +156,8 @@ class Road {
   std::unique_ptr<BenchOf<Robot>> bench_;
   std::int64_t last_us_ = 0;  ///< stamp of the last image
 };
+
+using Road = RoadOf<Robot>;
 
 TEST(VisualNode, FollowsTheFilterFedByHandAndTellsOfEachImage) {
   Road road;
@@ -217,6 +237,44 @@ TEST(VisualNode, AFullPoolAndAJobThatIsTooLongLoseImagesAndNoMore) {
   EXPECT_LT(slow.visual.size(), 50U);
   EXPECT_GE(slow.visual.size() + slow.counters().timeline_full, 55U) << "each is done or counted";
   EXPECT_LT(slow.error_m(1), 0.03 * 48);
+}
+
+TEST(VisualNode, WhatIsRecognisedBecomesAMapOnTheBus) {
+  RoadOf<Mapper> road(30'000);
+  road.recognised_every = 4;
+  road.drive();
+  EXPECT_EQ(road.incomplete(), 0);
+  EXPECT_EQ(road.counters().not_used, 0);
+  EXPECT_EQ(road.visual.size(), 60U) << "one report an image, none of the recogniser's";
+  std::array<int, 16> verdicts{};
+  for (const bus::EstInnov& one : road.records)
+    if (one.id != 0xFF) ++verdicts[static_cast<std::size_t>(one.verdict)];
+  EXPECT_GT(verdicts[static_cast<std::size_t>(sensor::Verdict::kNewLandmark)], 3);
+  EXPECT_GT(verdicts[static_cast<std::size_t>(sensor::Verdict::kAccepted)], 20);
+  ASSERT_FALSE(road.landmarks.empty());
+  for (const bus::EstLandmark& one : road.landmarks) EXPECT_TRUE(one.id % 4 == 0 || one.id == 0xFF) << int{one.id};
+  EXPECT_LT(road.error_m(1), 0.03 * 48);
+  Road blind;
+  blind.recognised_every = 4;
+  blind.drive();
+  EXPECT_GT(blind.counters().not_used, 60) << "a robot without a map counts them and uses none";
+  Road plain;
+  plain.drive();
+  EXPECT_EQ(plain.x_m, blind.x_m);
+}
+
+TEST(VisualNode, WhatIsRecognisedLateOrInAnotherOrderLeavesTheBits) {
+  RoadOf<Mapper> on_time(30'000), late(30'000);
+  on_time.recognised_every = late.recognised_every = 4;
+  std::mt19937 random(5);
+  late.fault_of_recognised = [&](std::size_t k, Sent& sent) {
+    sent.late_us = k % 3 == 1 ? 120'000 : 0;
+    std::shuffle(sent.frames.begin(), sent.frames.end() - 1, random);
+  };
+  on_time.drive();
+  late.drive();
+  EXPECT_EQ(late.counters().too_late, 0);
+  EXPECT_EQ(on_time.crc, late.crc);
 }
 
 }  // namespace

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // An image as one sample: In_Feature frames, then In_Image, which ends it and holds their count. An image that
 // does not match is dropped whole. The frames of an image come from one sender, and In_Image comes last; the order of
-// its features has no effect. Camera 0 is assembled, others are counted as not used.
+// its features has no effect. Camera 0 is assembled, and for a robot that makes a map camera 3, a recogniser. Others
+// are counted as not used.
 #pragma once
 
 #include "tetap/base/reinitialise.hpp"
@@ -14,13 +15,16 @@
 #include "tetap/sensor/sample.hpp"
 
 #include <algorithm>
+#include <array>
+#include <cstddef>
 #include <cstdint>
 
 namespace tetap::bus {
 
-class ImageAssembly {
+template <bool kRecognises>
+class ImageAssemblyOf {
  public:
-  using Pool = sensor::ImagePool;
+  using Pool = sensor::ImagePoolOf<kRecognises ? 8 : 4>;
 
   void power_on() { base::reinitialise(*this); }
   /// At each tick: an image without its end that is older than `patience`, or from a time still to come, is given up
@@ -58,7 +62,7 @@ class ImageAssembly {
   /// All frames of one image have it.
   struct Head {
     std::uint32_t stamp_us = 0;
-    std::uint8_t seq = 0;
+    std::uint8_t seq = 0, camera = 0;
     [[nodiscard]] bool operator==(const Head&) const = default;
   };
 
@@ -70,11 +74,12 @@ class ImageAssembly {
 
   /// Whether the frame belongs to the image under way, which it may begin.
   template <class Out>
-  [[nodiscard]] bool continues(const Head& head, std::uint8_t camera, base::Micros reference, Counters& counters,
-                               Out& out) {
-    if (camera != 0) return ++counters.not_used, false;
+  [[nodiscard]] bool continues(const Head& head, base::Micros reference, Counters& counters, Out& out) {
+    if (head.camera != 0 && !(kRecognises && head.camera == sensor::CameraImage::kRecogniser))
+      return ++counters.not_used, false;
     if (begun_ && head == head_) return true;
-    if (ended_ && head == ended_head_ && reference - since_ <= kRepeats) return ++counters.duplicate, false;
+    const std::size_t kind = head.camera == 0 ? 0 : 1;
+    if (ended_[kind] && head == ended_head_[kind] && reference - since_ <= kRepeats) return ++counters.duplicate, false;
     if (begun_) give_up(counters);
     begun_ = true;
     head_ = head;
@@ -97,7 +102,8 @@ class ImageAssembly {
 
   template <class Out>
   void add(const InFeature& frame, std::uint32_t bits, base::Micros reference, Counters& counters, Out& out) {
-    if (!continues({.stamp_us = frame.stamp_us, .seq = frame.seq}, frame.inst, reference, counters, out)) return;
+    if (!continues({.stamp_us = frame.stamp_us, .seq = frame.seq, .camera = frame.inst}, reference, counters, out))
+      return;
     if (place_ == Pool::kNone) return;
     const model::ImageFeature feature{
         .id = frame.track_id, .u_quarter_px = quarters(frame.u), .v_quarter_px = quarters(frame.v)};
@@ -117,11 +123,12 @@ class ImageAssembly {
 
   template <class Out>
   void end(const InImage& frame, std::uint32_t bits, base::Micros reference, Counters& counters, Out& out) {
-    const Head head{.stamp_us = frame.stamp_us, .seq = frame.seq};
-    if (!continues(head, frame.inst, reference, counters, out)) return;
+    const Head head{.stamp_us = frame.stamp_us, .seq = frame.seq, .camera = frame.inst};
+    if (!continues(head, reference, counters, out)) return;
     begun_ = false;
-    ended_ = true;
-    ended_head_ = head;
+    const std::size_t kind = head.camera == 0 ? 0 : 1;
+    ended_[kind] = true;
+    ended_head_[kind] = head;
     if (place_ == Pool::kNone) return;  // counted
     if (frame.count != seen_) return void(++counters.incomplete);
     sensor::Sample sample;
@@ -146,12 +153,16 @@ class ImageAssembly {
 
   Pool pool_;
   base::Micros since_;
-  Head head_, ended_head_;  ///< image under way, and the latest that ended
+  Head head_;                         ///< image under way
+  std::array<Head, 2> ended_head_{};  ///< the latest that ended, of the camera and of the recogniser
   std::uint32_t bits_ = 0;
   std::uint8_t place_ = Pool::kNone;  ///< kNone: there is no room for the image under way
   std::uint8_t seen_ = 0;
-  bool begun_ = false, ended_ = false;
+  bool begun_ = false;
+  std::array<bool, 2> ended_{};
 };
+
+using ImageAssembly = ImageAssemblyOf<false>;
 
 /// For robots none of whose estimators takes images: no memory.
 struct NoImages {

@@ -14,8 +14,8 @@ namespace tetap::estimators {
 struct Context {
   const param::Parameters& parameters;
   const MapFrame& map_frame;
-  const sensor::Scans* scans = nullptr;       ///< null: no estimator of the robot takes scans
-  const sensor::ImagePool* images = nullptr;  ///< features of the images in the window; null: no estimator takes any
+  const sensor::Scans* scans = nullptr;  ///< null: no estimator of the robot takes scans
+  sensor::ImagesInWindow images{};       ///< features of the images in the window
 };
 
 /// A pose from outside. sigma_yaw_rad >= pi (or not available on the bus): the heading is not known.

@@ -167,7 +167,7 @@ class Node {
   static constexpr std::uint8_t kMostWaited = 20;  ///< ticks until a command ends the window whatever is in it
   using Closures = std::conditional_t<kTakesClosures, bus::ClosureAssembly, bus::NoClosures>;
   using Scans = std::conditional_t<kTakesScans, bus::ScanAssembly, bus::NoScans>;
-  using Images = std::conditional_t<kTakesImages, bus::ImageAssembly, bus::NoImages>;
+  using Images = std::conditional_t<kTakesImages, bus::ImageAssemblyOf<kMakesMap>, bus::NoImages>;
   using Landmarks = std::conditional_t<Estimators::kUsesMap, node::Landmarks, node::NoLandmarks>;
 
   /// Sightings, closures, scans, images, and speeds that are commands.
@@ -182,7 +182,7 @@ class Node {
   [[nodiscard]] estimators::Context context() const {
     estimators::Context context{.parameters = parameters_, .map_frame = map_frame_};
     if constexpr (kTakesScans) context.scans = &scans_.pool();
-    if constexpr (kTakesImages) context.images = images_.pool();
+    if constexpr (kTakesImages) context.images = images_.pool()->view();
     return context;
   }
   void restart(base::Micros t, sensor::ResetCause cause);

@@ -135,6 +135,7 @@ struct PlanarScan {
 struct CameraImage {
   static constexpr std::uint8_t kNoTracker = 7;
   static constexpr std::uint16_t kNoExposure = 0xFFF;
+  static constexpr std::uint8_t kRecogniser = 3;  ///< instance of what a camera's front end recognises
 
   std::uint8_t place = 0;
   std::uint8_t number = 0;                  ///< low 4 bits of its number

@@ -4,6 +4,7 @@
 #include "tetap/base/reinitialise.hpp"
 #include "tetap/estimators/mapping/pose_covariance.hpp"
 #include "tetap/estimators/planar/window_motion.hpp"
+#include "tetap/filter/update.hpp"
 #include "tetap/sensor/row_major.hpp"
 
 namespace tetap::estimators {
@@ -60,16 +61,20 @@ constexpr std::uint8_t counted(std::uint8_t n) { return n < 255 ? static_cast<st
 
 template <class Window>
 void VisualOdometry<Window>::begin(base::Micros t, const model::PlanarPose& pose, const nav::Euler& tilt,
-                                   const nav::Vector3& sigma_rad, float sigma_place_m) {
+                                   const nav::Vector3& sigma_rad, float sigma_place_m, bool keep) {
   constexpr float kHeight_m = 0.5e-3F;  // heights are counted from the start
-  window_.start(nav::from_euler({pose.yaw_rad, tilt.pitch_rad, tilt.roll_rad}), sigma_rad,
-                {pose.x.um(), pose.y.um(), window_.origin_um()[2]}, {sigma_place_m, sigma_place_m, kHeight_m});
+  const nav::Quaternion q_nb = nav::from_euler({pose.yaw_rad, tilt.pitch_rad, tilt.roll_rad});
+  const std::array<std::int64_t, 3> origin_um{pose.x.um(), pose.y.um(), window_.origin_um()[2]};
+  const nav::Vector3 sigma_m{sigma_place_m, sigma_place_m, kHeight_m};
+  if constexpr (kMaps)
+    if (keep) window_.move(q_nb, {.attitude_rad = sigma_rad, .place_m = sigma_m}, origin_um);
+  if (!kMaps || !keep) window_.start(q_nb, sigma_rad, origin_um, sigma_m);
   motion_.start(t, {}, 0.0F, 0.0F);
   turn_b_rad_ = ahead_b_rad_ = {};
   stepped_ = latest_ = t;
   speed_at_ = {};
   passed_m_ = owed_m_ = 0;
-  in_image_ = false;
+  in_image_ = recognising_ = false;
   features_ = 0;
   present_ = motion_;
 }
@@ -81,7 +86,8 @@ void VisualOdometry<Window>::restart(base::Micros t, const Context& ctx) {
   base::reinitialise(window_, options_of(n), slam::SpeedCore(noise_of(n)));
   now_ = last_used_ = t;
   const MapStart start(ctx.parameters.start);
-  begin(t, start.pose, {}, {n.sigma_tilt_rad, n.sigma_tilt_rad, base::sqrt(start.p(2, 2))}, base::sqrt(start.p(0, 0)));
+  begin(t, start.pose, {}, {n.sigma_tilt_rad, n.sigma_tilt_rad, base::sqrt(start.p(2, 2))}, base::sqrt(start.p(0, 0)),
+        false);
 }
 
 template <class Window>
@@ -94,7 +100,8 @@ void VisualOdometry<Window>::set_pose(base::Micros t, const SetPose& given, cons
   if (!(given.sigma_yaw_rad < 3.14F)) pose.yaw_rad = now.yaw_rad;
   pose.yaw_rad = base::wrap_angle(pose.yaw_rad);
   const filter::Symmetric<float, 3> stated = covariance_of_pose(given.sigma_position_m, given.sigma_yaw_rad);
-  begin(t, pose, now, {base::sqrt(p(0, 0)), base::sqrt(p(1, 1)), base::sqrt(stated(2, 2))}, base::sqrt(stated(0, 0)));
+  begin(t, pose, now, {base::sqrt(p(0, 0)), base::sqrt(p(1, 1)), base::sqrt(stated(2, 2))}, base::sqrt(stated(0, 0)),
+        true);
   digest_.update(pose.x.um(), pose.y.um(), pose.yaw_rad, stated(0, 0), stated(2, 2));
 }
 
@@ -149,20 +156,30 @@ void VisualOdometry<Window>::step_to(base::Micros t, const Context& ctx, bool wh
 }
 
 template <class Window>
-Innovation VisualOdometry<Window>::fuse(const sensor::CameraImage& image, base::Micros stamp, const Context& ctx) {
-  if (ctx.images == nullptr || !ctx.parameters.camera.any()) return {};
+void VisualOdometry<Window>::take_features(const sensor::CameraImage& image, base::Micros stamp, const Context& ctx) {
   finish_job();
   step_to(stamp, ctx, true);
-  latest_ = stamp;
-  const auto features = ctx.images->features(image.place);
+  latest_ = job_stamp_ = stamp;
   features_ = 0;
-  for (const model::ImageFeature& feature : features) image_[features_++] = feature;
-  if (!window_.begin_image({image_.data(), features_})) return {};
-  in_image_ = true;
-  job_stamp_ = stamp;
-  job_number_ = image.number;
+  for (const model::ImageFeature& feature : ctx.images.features(image.place)) image_[features_++] = feature;
   told_ = 0;
-  report_ = {.number = image.number};
+}
+
+template <class Window>
+Innovation VisualOdometry<Window>::fuse(const sensor::CameraImage& image, base::Micros stamp, std::uint8_t instance,
+                                        const Context& ctx) {
+  const bool recognised = kMaps && instance == sensor::CameraImage::kRecogniser;
+  if (ctx.images.images == nullptr || !ctx.parameters.camera.any() || (instance != 0 && !recognised)) return {};
+  take_features(image, stamp, ctx);
+  if constexpr (kMaps)
+    if (recognised && !window_.begin_recognised({image_.data(), features_}, stamp.us)) return {};
+  if (!recognised) {
+    if (!window_.begin_image({image_.data(), features_})) return {};
+    job_number_ = image.number;
+    report_ = {.number = image.number};
+  }
+  in_image_ = true;
+  recognising_ = recognised;
   const bool judged = window_.busy();
   conclude();
   return {.verdict = judged ? sensor::Verdict::kPending : sensor::Verdict::kNotUsed};
@@ -182,42 +199,69 @@ void VisualOdometry<Window>::finish_job() {
   conclude();
 }
 
+/// The next one whose fate is known and untold.
+template <class Window>
+const slam::TrackRecord* VisualOdometry<Window>::next_record() const {
+  const auto i = static_cast<std::size_t>(told_);
+  if constexpr (kMaps)
+    if (recognising_) return told_ < window_.map_concluded() ? &window_.map_records()[i] : nullptr;
+  return told_ < window_.concluded() ? &window_.records()[i] : nullptr;
+}
+
+template <class Window>
+void VisualOdometry<Window>::tell(const slam::TrackRecord& track) {
+  Innovation innovation{.verdict = sensor::Verdict::kNotUsed};
+  VisualReport unseen;
+  VisualReport& report = recognising_ ? unseen : report_;
+  switch (track.fate) {
+    case slam::TrackFate::kUsed:
+    case slam::TrackFate::kKept:
+    case slam::TrackFate::kNoRoom:
+      innovation.verdict = track.fate == slam::TrackFate::kKept     ? sensor::Verdict::kNewLandmark
+                           : track.fate == slam::TrackFate::kNoRoom ? sensor::Verdict::kNoRoom
+                                                                    : sensor::Verdict::kAccepted;
+      report.used = counted(report.used);
+      last_used_ = job_stamp_;
+      break;
+    case slam::TrackFate::kGated:
+      innovation.verdict = sensor::Verdict::kOutlier;
+      innovation.failed = sensor::Check::kGate;
+      report.gated = counted(report.gated);
+      break;
+    case slam::TrackFate::kAlone:
+      innovation.verdict = sensor::Verdict::kAmbiguous;
+      break;
+    case slam::TrackFate::kSingular:
+      innovation.verdict = sensor::Verdict::kSingular;
+      innovation.failed = sensor::Check::kValue;
+      break;
+    case slam::TrackFate::kNoDepth:
+      report.no_depth = counted(report.no_depth);
+      break;
+    case slam::TrackFate::kPending:
+      break;
+  }
+  if (track.nis >= 0.0F) {
+    innovation.dof = track.degrees;
+    innovation.nis = track.nis;
+    innovation.gate = track.sightings == 1 ? filter::chi_square_99(2) : slam::track_gate(track.sightings);
+    report.nis = track.nis / static_cast<float>(track.degrees);
+  }
+  if (recognising_) innovation.landmark = landmark_of(track.id);
+  digest_.update(static_cast<std::uint32_t>(track.id) << 16 | static_cast<std::uint32_t>(track.fate), track.nis);
+  if (innovation.verdict == sensor::Verdict::kNotUsed || records_ == record_.size()) return;
+  record_[records_++] = {.stamp = job_stamp_,
+                         .sensor = sensor::Sensor::kFeature,
+                         .instance = recognising_ ? sensor::CameraImage::kRecogniser : std::uint8_t{0},
+                         .innovation = innovation};
+}
+
 template <class Window>
 void VisualOdometry<Window>::conclude() {
   if (!in_image_) return;
-  for (; told_ < window_.concluded(); ++told_) {
-    const slam::TrackRecord& track = window_.records()[static_cast<std::size_t>(told_)];
-    Innovation innovation{.verdict = sensor::Verdict::kNotUsed};
-    switch (track.fate) {
-      case slam::TrackFate::kUsed:
-        innovation.verdict = sensor::Verdict::kAccepted;
-        report_.used = counted(report_.used);
-        last_used_ = job_stamp_;
-        break;
-      case slam::TrackFate::kGated:
-        innovation.verdict = sensor::Verdict::kOutlier;
-        innovation.failed = sensor::Check::kGate;
-        report_.gated = counted(report_.gated);
-        break;
-      case slam::TrackFate::kSingular:
-        innovation.verdict = sensor::Verdict::kSingular;
-        innovation.failed = sensor::Check::kValue;
-        break;
-      case slam::TrackFate::kNoDepth:
-        report_.no_depth = counted(report_.no_depth);
-        break;
-      case slam::TrackFate::kPending:
-        break;
-    }
-    if (track.nis >= 0.0F) {
-      innovation.dof = track.degrees;
-      innovation.nis = track.nis;
-      innovation.gate = slam::track_gate(track.sightings);
-      report_.nis = track.nis / static_cast<float>(track.degrees);
-    }
-    digest_.update(static_cast<std::uint32_t>(track.id) << 16 | static_cast<std::uint32_t>(track.fate), track.nis);
-    if (innovation.verdict == sensor::Verdict::kNotUsed || records_ == record_.size()) continue;
-    record_[records_++] = {.stamp = job_stamp_, .sensor = sensor::Sensor::kFeature, .innovation = innovation};
+  for (const slam::TrackRecord* track = next_record(); track != nullptr; track = next_record()) {
+    tell(*track);
+    ++told_;
   }
   if (!window_.busy()) end_image();
 }
@@ -225,13 +269,23 @@ void VisualOdometry<Window>::conclude() {
 template <class Window>
 void VisualOdometry<Window>::end_image() {
   in_image_ = false;
-  static_cast<void>(window_.end_image({image_.data(), features_}));
-  const std::uint32_t left = window_.tracks().counters().left;
-  report_.left = left - left_before_;
-  left_before_ = left;
-  report_.direction_y_rad = window_.core().direction_y_rad();
-  report_.direction_z_rad = window_.core().direction_z_rad();
-  ended_ = true;
+  if constexpr (kMaps) {
+    if (recognising_) {
+      static_cast<void>(window_.end_recognised({image_.data(), features_}));
+      const std::uint32_t refused = window_.map_counters().no_room;
+      if (refused != refused_) last_refused_ = now_;
+      refused_ = refused;
+    }
+  }
+  if (!recognising_) {
+    static_cast<void>(window_.end_image({image_.data(), features_}));
+    const std::uint32_t left = window_.tracks().counters().left;
+    report_.left = left - left_before_;
+    left_before_ = left;
+    report_.direction_y_rad = window_.core().direction_y_rad();
+    report_.direction_z_rad = window_.core().direction_z_rad();
+    ended_ = true;
+  }
   const slam::WorldPose& pose = window_.pose();
   digest_.update(static_cast<std::uint32_t>(features_), pose.p_n_m(0), pose.p_n_m(1), pose.p_n_m(2), pose.q_nb.w,
                  pose.q_nb.x, pose.q_nb.y, pose.q_nb.z);
@@ -307,7 +361,8 @@ Height VisualOdometry<Window>::height(const Context& ctx) const {
   return {.height_m = z_m + ahead_n_m(ahead(ctx))(2), .sigma_m = base::sqrt(p(5, 5))};
 }
 
-template class VisualOdometry<slam::VisualWindow<slam::SpeedCore, 6, 40>>;  // VisualOdometry6
-template class VisualOdometry<slam::VisualWindow<slam::SpeedCore, 4, 20>>;  // VisualOdometry4
+template class VisualOdometry<slam::VisualWindow<slam::SpeedCore, 6, 40>>;   // VisualOdometry6
+template class VisualOdometry<slam::VisualWindow<slam::SpeedCore, 4, 20>>;   // VisualOdometry4
+template class VisualOdometry<slam::VisualMap<slam::SpeedCore, 6, 40, 64>>;  // VisualSlam64
 
 }  // namespace tetap::estimators

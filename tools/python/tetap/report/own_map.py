@@ -17,7 +17,7 @@ ASTRAY_M = 0.5       # a landmark without identity that is further than this fro
 CONFIRMED = 3        # sightings of a landmark that no longer gives way to another one
 MOVED_M = 1.0        # no update moves a landmark so far while it is unconfirmed
 NO_LANDMARK = 255    # in the truth of a simulated world
-MAPPERS = ("EkfSlam", "FastSlam")
+MAPPERS = ("EkfSlam", "FastSlam", "Msckf")  # the last with a map or without
 
 
 class Rigid:
@@ -148,7 +148,7 @@ def landmark_nees(rows, pairs, true):
 def figures(run, estimator, truth, dx_m, dy_m):
     """Figures of a mapper for summary.json where the truth has landmarks; else empty. dx, dy: errors of its rows [m], unaligned."""
     true = true_landmarks(run, truth)
-    if run.kinds[estimator] not in MAPPERS or not true:
+    if run.kinds[estimator] not in MAPPERS or not true or (run.kinds[estimator] == "Msckf" and not len(run.map["time_s"])):
         return {}
     found = last_of_each(at_the_end(run.map))
     pairs = counterparts(found, true)
