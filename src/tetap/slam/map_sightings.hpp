@@ -47,7 +47,7 @@ class MapSightings {
   [[nodiscard]] const Dx& dx() const { return dx_; }
 
   /// The next step; its cost in units of about ten floating-point operations. `sigma` is the noise of a direction,
-  /// `considered` the state that is not corrected, negative for none.
+  /// `considered` the scale's state, which no image corrects, negative for none.
   template <class Map>
   int step(Covariance& p, const WorldPose& pose, const model::CameraMounting& camera, const Map& map, float sigma,
            int considered) {
@@ -56,15 +56,15 @@ class MapSightings {
       case Step::kNone:
         return 0;
       case Step::kRows:
-        return relate(p, pose, camera, map, sigma);
+        return relate(p, pose, camera, map, sigma, considered);
       case Step::kAgree:
         return agree(sigma);
       case Step::kGain:
-        return gain(p, pose, camera, map, sigma);
+        return gain(p, pose, camera, map, sigma, considered);
       case Step::kCorrect:
         break;
     }
-    return correct(p, considered);
+    return correct(p);
   }
 
  private:
@@ -98,9 +98,23 @@ class MapSightings {
     nu = {seen.at.x - sighting.at.at.x, seen.at.y - sighting.at.at.y};
     return true;
   }
-  /// H_i P H_j^T.
+  /// H_i P_s over the root of P_ss: what the rows see of the considered scale s, which is taken out (TrackUpdate).
+  [[nodiscard]] Pair seen_scale(const Covariance& p, int i, int considered) const {
+    Pair sum{};
+    const float variance = considered < 0 ? 0.0F : p(considered, considered);
+    if (!(variance > 0.0F)) return sum;
+    const float inverse = 1.0F / base::sqrt(variance);
+    for (int k = 0; k < kElements; ++k) {
+      const float share = inverse * p(state_of(k, seen_[at(i)].point), considered);
+      for (std::size_t a = 0; a < 2; ++a) sum[a] += h_[at(i)][a][at(k)] * share;
+    }
+    return sum;
+  }
+  /// H_i P H_j^T for a known scale.
   [[nodiscard]] Block across(const Covariance& p, int i, int j) const {
     Block s{};
+    for (std::size_t a = 0; a < 2; ++a)
+      for (std::size_t b = 0; b < 2; ++b) s[a][b] = -scale_[at(i)][a] * scale_[at(j)][b];
     for (int l = 0; l < kElements; ++l) {
       const int to = state_of(l, seen_[at(j)].point);
       Pair sum{};
@@ -124,11 +138,12 @@ class MapSightings {
 
   template <class Map>
   int relate(const Covariance& p, const WorldPose& pose, const model::CameraMounting& camera, const Map& map,
-             float sigma) {
+             float sigma, int considered) {
     const int i = index_;
     nis_[at(i)] = -1.0F;
     in_front_[at(i)] = look(seen_[at(i)], pose, camera, map, h_[at(i)], nu_[at(i)]);
     if (in_front_[at(i)]) {
+      scale_[at(i)] = seen_scale(p, i, considered);
       for (int j = 0; j <= i; ++j)
         if (in_front_[at(j)]) s_[at(i)][at(j)] = across(p, i, j);
       for (std::size_t a = 0; a < 2; ++a) s_[at(i)][at(i)][a][a] += sigma * sigma;
@@ -199,16 +214,23 @@ class MapSightings {
 
   /// G = P H^T at the state as it is by now, S, the gate, L of S, G L^-T and dx.
   template <class Map>
-  int gain(const Covariance& p, const WorldPose& pose, const model::CameraMounting& camera, const Map& map,
-           float sigma) {
+  int gain(const Covariance& p, const WorldPose& pose, const model::CameraMounting& camera, const Map& map, float sigma,
+           int considered) {
     const int i = order_[at(index_)];
     if (fate_[at(i)] != TrackFate::kPending) return conclude(fate_[at(i)], nis_[at(i)], 1);
-    const int states = p.size(), cost = 4 * states + 40;
+    const int states = p.size(), cost = 5 * states + 40;
     Rows& h = h_[at(i)];
     Pair& nu = nu_[at(i)];
     if (!look(seen_[at(i)], pose, camera, map, h, nu)) return conclude(TrackFate::kGated, -1.0F, 20);
     const int point = seen_[at(i)].point;
     p.template times<2, kHead, 3>(h, kFirstPoint + 3 * point, g_, 0);
+    if (considered >= 0 && p(considered, considered) > 0.0F) {
+      const float inverse = 1.0F / p(considered, considered);
+      const auto of_scale = g_[at(considered)];
+      for (int n = 0; n < states; ++n)
+        for (std::size_t a = 0; a < 2; ++a) g_[at(n)][a] -= inverse * p(n, considered) * of_scale[a];
+      g_[at(considered)] = {};
+    }
     Block s{};
     for (int k = 0; k < kElements; ++k)
       for (std::size_t a = 0; a < 2; ++a)
@@ -231,20 +253,15 @@ class MapSightings {
     step_ = Step::kCorrect;
     return cost;
   }
-  int correct(Covariance& p, int considered) {
+  int correct(Covariance& p) {
     const int cost = p.size() * p.size() / 5;
-    const float kept = considered >= 0 ? p(considered, considered) : 0.0F;
     p.template subtract<2>(g_, 0);
-    if (considered >= 0) {
-      dx_[at(considered)] = 0.0F;
-      p(considered, considered) = kept;
-    }
     return conclude(TrackFate::kUsed, nis_[at(order_[at(index_)])], cost);
   }
 
   std::array<Seen, static_cast<std::size_t>(kMost)> seen_{};
   std::array<Rows, static_cast<std::size_t>(kMost)> h_{};
-  std::array<Pair, static_cast<std::size_t>(kMost)> nu_{};
+  std::array<Pair, static_cast<std::size_t>(kMost)> nu_{}, scale_{};
   std::array<std::array<Block, static_cast<std::size_t>(kMost)>, static_cast<std::size_t>(kMost)> s_{};
   std::array<float, static_cast<std::size_t>(kMost)> nis_{};
   std::array<TrackFate, static_cast<std::size_t>(kMost)> fate_{};

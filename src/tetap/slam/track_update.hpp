@@ -68,7 +68,7 @@ class TrackUpdate {
   [[nodiscard]] const nav::Vector3& point_step_m() const { return point_step_m_; }
 
   /// The next step; its cost in units of about ten floating-point operations. `sigma` is the noise of a direction,
-  /// `considered` the state that is not corrected, negative for none.
+  /// `considered` the scale's state, which no image corrects, negative for none.
   int step(Covariance& p, const model::CameraMounting& camera, float sigma, int considered) {
     switch (step_) {
       case Step::kNone:
@@ -84,7 +84,7 @@ class TrackUpdate {
       case Step::kProject:
         return reflect();
       case Step::kGate:
-        return gate(sigma);
+        return gate(p, sigma, considered);
       case Step::kKeep:
         return keep(p, sigma);
       case Step::kGain:
@@ -92,7 +92,7 @@ class TrackUpdate {
       case Step::kCorrect:
         break;
     }
-    return correct(p, considered);
+    return correct(p);
   }
 
  private:
@@ -204,9 +204,26 @@ class TrackUpdate {
     return cost;
   }
 
+  /// No image sees the considered scale. Rows see some of it where an estimate moved after its way was driven. Without
+  /// that part P H^T and S are those of a known scale, and what P has of the scale stays.
+  void leave_scale(const Covariance& p, int considered) {
+    if (considered < 0 || !(p(considered, considered) > 0.0F)) return;
+    const int m = rows();
+    const float inverse = 1.0F / p(considered, considered);
+    const auto seen = g_[at(considered)];  // H P_s
+    for (int n = 0; n < states_; ++n) {
+      const float share = inverse * p(n, considered);
+      for (int q = kPoint; q < m; ++q) g_[at(n)][at(q)] -= share * seen[at(q)];
+    }
+    for (int q = 0; q < m; ++q)
+      for (int w = kPoint; w < m; ++w) s_[at(q)][at(w)] -= inverse * seen[at(q)] * seen[at(w)];
+    for (int q = kPoint; q < m; ++q) g_[at(considered)][at(q)] = 0.0F;  // without a rounding error
+  }
+
   /// L of S + R in place, nu becomes L^-1 nu; the gate.
-  int gate(float sigma) {
-    const int m = rows(), cost = m * m * m / 30 + 10;
+  int gate(const Covariance& p, float sigma, int considered) {
+    const int m = rows(), cost = m * m * m / 30 + (m - kPoint) * (states_ + m) / 5 + 10;
+    leave_scale(p, considered);
     float nis = 0.0F;
     for (int q = kPoint; q < m; ++q) {
       for (int w = kPoint; w < q; ++w) {
@@ -284,10 +301,9 @@ class TrackUpdate {
     return next(Step::kCorrect, states_ * (m - kPoint) * (m - kPoint) / 8);
   }
 
-  int correct(Covariance& p, int considered) {
+  int correct(Covariance& p) {
     int rank = rows() - kPoint, first = kPoint;
     const int cost = states_ * states_ * rank / 10;
-    const float kept = considered >= 0 ? p(considered, considered) : 0.0F;
     for (; rank > 9; rank -= 4, first += 4) p.template subtract<4>(g_, first);
     switch (rank) {
       case 3:
@@ -302,10 +318,6 @@ class TrackUpdate {
       default:
         p.template subtract<9>(g_, first);
         break;
-    }
-    if (considered >= 0) {
-      dx_[at(considered)] = 0.0F;
-      p(considered, considered) = kept;
     }
     return end(record_.fate == TrackFate::kPending ? TrackFate::kUsed : record_.fate, cost);
   }
