@@ -29,6 +29,7 @@ struct EstimatorFacts {
   bool scans = false;
   bool heading = false;     ///< outside headings
   bool own_map = false;     ///< one of them makes its map
+  bool given_map = false;   ///< a scanner's map is among its data: that of the laboratory
   bool nameless = false;    ///< needs no identities for its map
   bool parameters = false;  ///< its parameters can be changed over the bus
 

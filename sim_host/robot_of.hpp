@@ -70,6 +70,7 @@ template <class Estimators>
 [[nodiscard]] constexpr EstimatorFacts facts_of_robot() {
   EstimatorFacts facts = facts_of(Estimators{});
   facts.parameters = node::kHasBusParameters<Estimators>;
+  facts.given_map = node::kHasField<Estimators>;
   return facts;
 }
 

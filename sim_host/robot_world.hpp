@@ -19,6 +19,7 @@ struct Sent {
   bool imu = false, landmarks = false, magnetometer = false, barometer = false;
   bool closures = false;            ///< a front end makes its keyframes and closes loops
   bool own_map = false;             ///< the robot makes its map, so it is given none
+  bool in_lab = false;              ///< it has a map of the laboratory
   bool nameless = false;            ///< the map needs no identities
   bool inertial = false;            ///< an inertial filter is there: what is a matched world for it is another one
   int scans_hz = 0, images_hz = 0;  ///< 0: none
@@ -38,6 +39,7 @@ struct Sent {
           .barometer = n.baro.use != 0 && takes.pressure,
           .closures = n.mapping.keyframes != 0 && takes.closures,
           .own_map = takes.own_map,
+          .in_lab = takes.given_map,
           .nameless = takes.nameless,
           .inertial = takes.inertial,
           .scans_hz = takes.scans ? scans_hz(n.lidar) : 0,
@@ -78,6 +80,7 @@ inline void simulate(const std::string& robot, const Sent& sent, const param::Pa
             .images = sent.images_hz > 0,
             .own_noise = !from_world},
            world);
+  world.surveyed = world.surveyed || sent.in_lab;
 }
 
 /// Origin of the robot's map where its parameters have one, else `otherwise`.
@@ -91,6 +94,7 @@ inline void simulate(const std::string& robot, const Sent& sent, const param::Pa
 [[nodiscard]] inline std::string_view usual_course(const Sent& sent) {
   return sent.kind == VehicleKind::kMulticopter ? "flight"
          : sent.kind == VehicleKind::kCar       ? "street"
+         : sent.in_lab                          ? "lab"
          : sent.own_map                         ? "loop"
                                                 : "yard";
 }

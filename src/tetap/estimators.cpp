@@ -14,6 +14,7 @@
 #include "tetap/estimators/inertial/tick.cpp"
 #include "tetap/estimators/mapping/graph_mapper.cpp"
 #include "tetap/estimators/mapping/planar_mapper.cpp"
+#include "tetap/estimators/mapping/scan_localizer.cpp"
 #include "tetap/estimators/mapping/scan_mapper.cpp"
 #include "tetap/estimators/mapping/scan_odometry.cpp"
 #include "tetap/estimators/planar/dead_reckoning.cpp"

@@ -36,7 +36,7 @@ struct DrivenOf {
     if (const auto pos = last<bus::EstPos>(out, 1)) x_m = 1e-3 * pos->x_raw, y_m = 1e-3 * pos->y_raw;
     if (const auto motion = last<bus::EstMotion>(out, 1)) yaw_rad = static_cast<double>(motion->yaw_rad);
     if (const auto std = last<bus::EstStdPose>(out, 1)) sigma = *std;
-    if (const auto status = last<bus::EstStatus>(out)) used |= status->used;
+    if (const auto status = last<bus::EstStatus>(out)) used |= status->used, valid = status->pos_valid != 0;
     crcs.push_back(last<bus::EstStateCrc>(out)->crc);
   }
 
@@ -48,6 +48,7 @@ struct DrivenOf {
   bus::EstStdPose sigma;
   double x_m = 0, y_m = 0, yaw_rad = 0;
   unsigned used = 0;
+  bool valid = false;
   int seq = 0;
   struct Keyframe {
     std::size_t scan = 0;  ///< number of the scan
@@ -74,9 +75,9 @@ inline param::Parameters recorded(param::Parameters n) {
   n.wheels.noise = {.speed = 0.05F, .yaw_rate = 0.05F};
   return n;
 }
-/// Poses of the scans of a recorded set: rows as tools/dataset/import_scans writes them.
+/// Poses of the scans of a recorded set: rows as tools/dataset/import_scans writes them. each() comes after each scan.
 template <class Robot>
-std::vector<Place> replayed(DrivenOf<Robot>& node, const std::vector<Row>& rows) {
+std::vector<Place> replayed(DrivenOf<Robot>& node, const std::vector<Row>& rows, auto&& each) {
   std::vector<Place> track;
   node.tick({}, 0, 0);  // a sample of the time of power-on is too late
   for (std::size_t k = 1; k < rows.size(); ++k) {
@@ -100,8 +101,13 @@ std::vector<Place> replayed(DrivenOf<Robot>& node, const std::vector<Row>& rows)
     for (int i = 0; i < 13; ++i) node.tick({}, 0, 0);  // the window, and the job
     track.push_back({node.x_m, node.y_m, node.yaw_rad});
     EXPECT_EQ(node.matches.size(), k) << "a match for each scan";
+    each();
   }
   return track;
+}
+template <class Robot>
+std::vector<Place> replayed(DrivenOf<Robot>& node, const std::vector<Row>& rows) {
+  return replayed(node, rows, [] {});
 }
 
 }  // namespace tetap::test

@@ -8,14 +8,16 @@
 #include "tetap/param/parameters.hpp"
 #include "tetap/sensor/image_pool.hpp"
 #include "tetap/sensor/scan_pool.hpp"
+#include "tetap/slam/likelihood_field.hpp"
 
 namespace tetap::estimators {
 
 struct Context {
   const param::Parameters& parameters;
   const MapFrame& map_frame;
-  const sensor::Scans* scans = nullptr;  ///< null: no estimator of the robot takes scans
-  sensor::ImagesInWindow images{};       ///< features of the images in the window
+  const sensor::Scans* scans = nullptr;          ///< null: no estimator of the robot takes scans
+  sensor::ImagesInWindow images{};               ///< features of the images in the window
+  const slam::LikelihoodField* field = nullptr;  ///< the map that a scanner is given; null: none
 };
 
 /// A pose from outside. sigma_yaw_rad >= pi (or not available on the bus): the heading is not known.

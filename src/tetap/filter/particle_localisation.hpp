@@ -4,9 +4,7 @@
 // is lost (Thrun, Burgard, Fox 2005, sec. 8.3.5). A threshold on the mean likelihood replaces the ratio there.
 #pragma once
 
-#include "tetap/filter/particle.hpp"
-#include "tetap/filter/particle_number.hpp"
-#include "tetap/filter/particle_pose.hpp"
+#include "tetap/filter/pose_cloud.hpp"
 
 #include <cstddef>
 #include <cstdint>
@@ -36,39 +34,21 @@ struct LandmarkSeen {
   }
 };
 
-struct LocalisationOptions {
-  float temper = 0.35F;         ///< power of the likelihood: errors of one landmark's sightings are not independent
-  float cap = 13.8F;            ///< largest squared distance of a sighting: an outlier decides no more than that
-  float resample_below = 0.5F;  ///< effective share of the particles
-  float bandwidth = 0.3F;       ///< kernel after resampling, in standard deviations
-  float lost_below = 0.3F;      ///< mean likelihood of a sighting, its largest being 1: the search begins
-  float found_above = 0.5F;     ///< the search ends
-  float injection_gain = 0.1F;  ///< low-pass on the mean likelihood, per batch, while there is a track
-  float search_gain = 0.2F;     ///< the same while there is none
-  float inject_share = 0.2F;    ///< particles replaced at each batch while lost
-  float kld_error = 0.05F;      ///< Kullback-Leibler distance
-  float kld_quantile = 2.326F;  ///< normal quantile of the probability 0.99
-  std::size_t least = 500;      ///< particles
-};
-
 template <std::size_t kMost>
-class ParticleLocalisation {
- public:
-  using Cloud = Particles<ParticlePose, kMost>;
+class ParticleLocalisation : public PoseCloud<kMost> {
+  using Base = PoseCloud<kMost>;
+  using Base::kTwoPi;
 
-  LocalisationOptions options;
-  Cloud cloud;
+ public:
+  using Base::cloud;
+  using Base::options;
 
   constexpr ParticleLocalisation() = default;
-  constexpr explicit ParticleLocalisation(base::PhiloxKey key) : cloud(key) {}
+  constexpr explicit ParticleLocalisation(base::PhiloxKey key) : Base(key) {}
 
   /// A normal distribution about a pose.
   constexpr void start(std::size_t count, const ParticlePose& pose, float sigma_m, float sigma_yaw_rad) {
-    const float yaw = pose.yaw_rad();
-    cloud.fill(count, [&](const Draw& draw) {
-      return ParticlePose::at(pose.x_m + sigma_m * draw.normal(0), pose.y_m + sigma_m * draw.normal(1),
-                              yaw + sigma_yaw_rad * draw.normal(2));
-    });
+    Base::start(count, pose, sigma_m, sigma_yaw_rad);
     likelihood_ = 0.5F * (options.lost_below + options.found_above);  // a start has yet to be confirmed
     lost_ = false;
   }
@@ -95,11 +75,11 @@ class ParticleLocalisation {
     likelihood_ += (lost_ ? options.search_gain : options.injection_gain) * (mean - likelihood_);
     lost_ = likelihood_ < (lost_ ? options.found_above : options.lost_below);
     if (lost_) {
-      resample(kMost);
+      Base::resample(kMost, false);
       inject(seen, map);
     } else if (cloud.effective() <
                options.resample_below * static_cast<float>(static_cast<std::int32_t>(cloud.size()))) {
-      resample(wanted());
+      Base::resample(Base::wanted(), true);
     }
     return true;
   }
@@ -109,31 +89,7 @@ class ParticleLocalisation {
   /// Low-passed mean likelihood of a sighting, 0 to 1.
   [[nodiscard]] constexpr float likelihood() const { return likelihood_; }
 
-  struct Estimate {
-    ParticlePose pose;
-    Symmetric<float, 3> p;  ///< x, y, yaw
-    float share = 0;        ///< share of the weight that lies in the mode's neighbourhood
-  };
-  /// Mean and covariance of the mode's neighbourhood: half a metre and an eighth of a turn for the mode, then 0.7 m.
-  [[nodiscard]] Estimate estimate() const {
-    const std::size_t best =
-        cloud.mode(kCandidates, [](const ParticlePose& a, const ParticlePose& b) { return near(a, b, 0.5F * 0.5F); });
-    const ParticlePose centre = cloud[best];
-    const auto around = [&centre](const ParticlePose& p) { return near(centre, p, 0.7F * 0.7F); };
-    Estimate result{.pose = mean_pose(cloud, around)};
-    result.p = pose_covariance(cloud, result.pose, around);
-    for (std::size_t i = 0; i < cloud.size(); ++i) result.share += around(cloud[i]) ? cloud.weight(i) : 0.0F;
-    return result;
-  }
-
  private:
-  static constexpr float kTwoPi = 6.28318531F;
-  static constexpr std::size_t kCandidates = 24;
-
-  [[nodiscard]] static constexpr bool near(const ParticlePose& a, const ParticlePose& b, float radius2_m2) {
-    const float dx = a.x_m - b.x_m, dy = a.y_m - b.y_m;
-    return dx * dx + dy * dy < radius2_m2 && a.cos_yaw * b.cos_yaw + a.sin_yaw * b.sin_yaw > 0.70710678F;
-  }
   constexpr float weigh(const LandmarkSeen& one, std::span<const ParticleLandmark> map) {
     const std::size_t first = one.landmark < 0 ? 0 : static_cast<std::size_t>(one.landmark);
     const std::span<const ParticleLandmark> candidates = map.subspan(first, one.landmark < 0 ? map.size() : 1);
@@ -148,28 +104,6 @@ class ParticleLocalisation {
       }
       return scale * least;
     });
-  }
-  void resample(std::size_t count) {
-    const auto all = [](const ParticlePose&) { return true; };
-    const auto kernel = ParticleKernel::of(pose_covariance(cloud, mean_pose(cloud), all), options.bandwidth);
-    cloud.resample(Resampling::kSystematic, count);
-    if (!lost_) static_cast<void>(cloud.predict(kernel));  // many modes have no common width
-  }
-  /// Bins of half a metre and 15 degrees that hold weight.
-  [[nodiscard]] std::size_t wanted() const {
-    BinSet<2048> bins;
-    for (std::size_t i = 0; i < cloud.size(); ++i) {
-      if (cloud.weight(i) * static_cast<float>(static_cast<std::int32_t>(cloud.size())) < 0.1F) continue;
-      const ParticlePose& p = cloud[i];
-      bins.add(bins.bin(whole(p.x_m * 2.0F), whole(p.y_m * 2.0F), whole(p.yaw_rad() * (24.0F / kTwoPi))));
-    }
-    const std::size_t least = options.least < kMost ? options.least : kMost;
-    return particles_for(bins.count(), options.kld_error, options.kld_quantile, least, kMost);
-  }
-  [[nodiscard]] static constexpr std::int32_t whole(float v) {
-    const float bounded = base::clamp(v, -1e9F, 1e9F);
-    const auto towards_zero = static_cast<std::int32_t>(bounded);
-    return towards_zero - (bounded < static_cast<float>(towards_zero) ? 1 : 0);
   }
   /// Poses from which one of the sightings looks as it does, on a circle about its landmark.
   constexpr void inject(std::span<const LandmarkSeen> seen, std::span<const ParticleLandmark> map) {

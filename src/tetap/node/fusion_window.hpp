@@ -43,6 +43,12 @@ struct Estimators {
   static constexpr std::size_t kReplayedLess = kSpares ? 4 : 12, kLeastReplayed = kSpares ? 2 : 8;
 };
 
+/// A robot whose scanner is given a map: it names the field as its kField.
+template <class Estimators>
+inline constexpr bool kHasField = requires {
+  Estimators::kField;
+};
+
 /// A window with another number of places, for a faster IMU or a longer window (DESIGN.md, 4.3).
 template <std::size_t kPlaces, Estimator... E>
 struct EstimatorsWithPlaces : Estimators<E...> {

@@ -183,6 +183,7 @@ class Node {
     estimators::Context context{.parameters = parameters_, .map_frame = map_frame_};
     if constexpr (kTakesScans) context.scans = &scans_.pool();
     if constexpr (kTakesImages) context.images = images_.pool()->view();
+    if constexpr (kHasField<Estimators>) context.field = &Estimators::kField;
     return context;
   }
   void restart(base::Micros t, sensor::ResetCause cause);

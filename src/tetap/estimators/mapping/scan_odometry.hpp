@@ -80,6 +80,8 @@ class ScanOdometry {
   /// Points of the newest keyframe while it is new.
   [[nodiscard]] const slam::Scan<kBeams>& keyframe_scan() const { return match_.scan(); }
   [[nodiscard]] bool busy() const { return match_.busy(); }
+  /// The body at the scan that was fused last, in the odometry's own frame.
+  [[nodiscard]] Pose scan_pose() const { return reference_.plus(step_.mean); }
   /// The scanner on the body, its beams, and its motion at the scan that was fused last.
   [[nodiscard]] static Step mounting(const Context& ctx);
   [[nodiscard]] static slam::ScanGeometry geometry(const sensor::PlanarScan& scan, const Context& ctx);

@@ -9,8 +9,8 @@ LIST = "docs/reference/robots.tsv"
 
 
 def estimators(text, path):
-    """Names of the estimators of a robot's file, in the order of their outputs."""
-    found = re.search(r"^using Estimators =\s*((?:node::With\w+<\s*)*)node::Estimators(?:WithPlaces<\d+,\s*|<)(.*?)>;$", text, re.S | re.M)
+    """Names of the estimators of a robot's file, in the order of their outputs. A robot with a map among its data is a struct that derives from its list."""
+    found = re.search(r"^(?:using Estimators =|struct Estimators :)\s*((?:node::With\w+<\s*)*)node::Estimators(?:WithPlaces<\d+,\s*|<)(.*?)>(?:;| \{)$", text, re.S | re.M)
     if found is None:
         raise WordError(f"{path}: no `using Estimators = node::Estimators<...>;`")
     aliases = dict(re.findall(r"^using (\w+) = estimators::WithSensors<\s*estimators::(\w+),", text, re.M))
