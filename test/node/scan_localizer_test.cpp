@@ -120,6 +120,7 @@ TEST(ScanLocalizer, AGivenPoseIsKeptAndAWrongOneIsFoundOut) {
                     0.0F, 0.0F);
   };
   give(right, 0), give(wrong, 2.5);
+  right.drive(0.1), wrong.drive(0.1);  // the window
   EXPECT_TRUE(right.node.valid);
   right.drive(6), wrong.drive(2);
   EXPECT_TRUE(right.node.valid);

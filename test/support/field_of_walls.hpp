@@ -41,7 +41,8 @@ inline void make_field(const std::vector<Wall>& walls, double cell_m, double low
         const double y = low_y + cell_m * (16 * (t / columns) + (i + half) / 16 + 0.5);
         double least = 1e9;
         for (const Wall& w : walls) least = std::min(least, distance_to(w, x, y));
-        both |= std::min(15, static_cast<int>(std::lround(least / (0.5 * cell_m)))) << 4 * half;
+        both |= std::min(slam::LikelihoodField::kFar, static_cast<int>(std::lround(least / (0.5 * cell_m))))
+                << 4 * half;
       }
       own.tiles.push_back(static_cast<std::uint8_t>(both));
     }

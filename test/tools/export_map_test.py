@@ -79,6 +79,14 @@ class ExportMapTest(unittest.TestCase):
         self.assertEqual(result.returncode, 0, result.stderr)
         grid = occupancy.read(self.out + ".yaml")
         self.check_room(grid)
+        x0, y0, turn = poses[1]
+        c, s = np.cos(turn), np.sin(turn)
+        from_start = [(c * (x - x0) + s * (y - y0), c * (y - y0) - s * (x - x0), yaw - turn) for x, y, yaw in poses]
+        result = self.export(self.file("a.scans", "\n".join(scans)), self.out + "3", "--scans", "--poses",
+                             self.file("b.truth", "\n".join("%.9g %.9g %.9g" % pose for pose in from_start)), "--mounting", *map(str, mounting),
+                             "--start", *map(str, poses[1]))
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.check_room(occupancy.read(self.out + "3.yaml"))
         again = self.export(self.out + ".yaml", self.out + "2")
         self.assertEqual(again.returncode, 0, again.stderr)
         for end in (".pgm", ".yaml"):

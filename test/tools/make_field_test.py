@@ -22,9 +22,10 @@ class MakeFieldTest(unittest.TestCase):
     def path(self, name):
         return os.path.join(self.folder.name, name)
 
-    def map(self, occupied, shape, resolution=0.1, origin=(-2.0, 3.0)):
-        """A free map with these cells occupied, as (row from below, column)."""
+    def map(self, occupied, shape, resolution=0.1, origin=(-2.0, 3.0), unseen=0):
+        """A free map with these cells occupied, as (row from below, column); the last columns are unknown."""
         shade = np.full(shape, 254, np.uint8)
+        shade[:, shape[1] - unseen:] = 205
         for row, column in occupied:
             shade[shape[0] - 1 - row, column] = 0
         with open(self.path("m.pgm"), "wb") as file:
@@ -43,13 +44,15 @@ class MakeFieldTest(unittest.TestCase):
         cell, step, x, y = map(float, words[:4])
         columns, rows, tiles = map(int, words[4:])
         self.assertEqual(len(data), columns * rows + 128 * tiles)
-        levels = np.full((rows * 16, columns * 16), 15)
+        levels = np.zeros((rows * 16, columns * 16), int)
         for number in range(columns * rows):
-            if data[number]:
+            row, column = divmod(number, columns)
+            body = {0: 14, 255: 15}.get(data[number])
+            if body is None:
                 at = columns * rows + 128 * (data[number] - 1)
                 body = np.frombuffer(data[at:at + 128], np.uint8)
-                row, column = divmod(number, columns)
-                levels[16 * row:16 * row + 16, 16 * column:16 * column + 16] = np.column_stack([body & 15, body >> 4]).reshape(16, 16)
+                body = np.column_stack([body & 15, body >> 4]).reshape(16, 16)
+            levels[16 * row:16 * row + 16, 16 * column:16 * column + 16] = body
         return cell, step, (x, y), levels, data
 
     def test_every_cell_has_its_distance(self):
@@ -59,10 +62,19 @@ class MakeFieldTest(unittest.TestCase):
         x = low[0] + (np.arange(levels.shape[1]) + 0.5) * cell
         y = low[1] + (np.arange(levels.shape[0]) + 0.5) * cell
         away = np.min(np.hypot(x[None, :, None] - walls[:, 0], y[:, None, None] - walls[:, 1]), axis=2)
-        np.testing.assert_array_less(abs(levels[away < 14.4 * step] * step - away[away < 14.4 * step]), 0.51 * step)
-        self.assertTrue((levels[away > 15.5 * step] == 15).all())
+        np.testing.assert_array_less(abs(levels[away < 13.4 * step] * step - away[away < 13.4 * step]), 0.51 * step)
+        self.assertTrue((levels[away > 14.5 * step] >= 14).all())
         self.assertEqual(levels[away < 0.4 * step].max(), 0)
         self.assertLess(x[0], -2.0), self.assertGreater(y[-1], 9.0)
+
+    def test_what_the_map_never_saw_is_no_free_space(self):
+        self.map([(r, 80) for r in range(200)], (200, 300), unseen=150)
+        self.assertEqual(self.make("f", "--cell", "0.1").returncode, 0)
+        cell, _, low, levels, _ = self.read("f")
+        x, y = (corner + (np.arange(count) + 0.5) * cell for corner, count in zip(low, levels.shape[::-1]))
+        inside = levels[(y > 3) & (y < 23)]
+        for low_x, high_x, level in ((8, 11.4, 14), (14.6, 27, 15)):  # a tile of 1.6 m is one or the other
+            self.assertEqual(set(inside[:, (x > low_x) & (x < high_x)].ravel()), {level})
 
     def test_the_header_has_the_same_bytes(self):
         self.map([(5, c) for c in range(10, 80)], (60, 100))
@@ -95,7 +107,7 @@ class MakeFieldTest(unittest.TestCase):
         self.map([(r, c) for r in range(0, 1000, 8) for c in range(0, 1000, 8)], (1000, 1000))
         result = self.make("f", "--cell", "0.05")
         self.assertEqual(result.returncode, 1)
-        self.assertIn("expected at most 255 and 32768", result.stderr)
+        self.assertIn("expected at most 254 and 32768", result.stderr)
         self.assertIn("--cell is 7.0", self.make("f", "--cell", "7").stderr)
         self.assertFalse(os.path.exists(self.path("f")))
 

@@ -15,13 +15,15 @@ struct FieldOptions {
   float temper = 0.1F;     ///< power of the likelihood: neighbouring beams and errors of the map are not independent
   float sigma_m = 0.15F;   ///< noise of a point's distance from the wall of the map
   float any = 0.1F;        ///< share of points that may be anywhere
+  float unknown = 0.4F;    ///< likelihood of a point where the map saw nothing; 0 while the pose is not valid
   float weigh_m = 0.15F;   ///< a scan is weighed after so much way
   float weigh_rad = 0.1F;  ///< or so much turn
-  float fits_m = 0.35F;    ///< a point within this distance of a wall fits
-  float fits = 0.7F;       ///< share of points that fit, from which the pose is confirmed
-  float holds = 0.55F;     ///< share from which one place is kept, and the map not searched
-  float lost = 0.35F;      ///< share below which the pose is given up
-  float confirm_m = 4.0F;  ///< way over which the particles are at one place
+  float fits_m = 0.1F, fits_cells = 1.5F;              ///< a point within this distance of a wall fits
+  float fits = 0.7F;                                   ///< share of points that fit, from which the pose is confirmed
+  float holds = 0.55F;                                 ///< share from which one place is kept, and the map not searched
+  float lost = 0.5F;                                   ///< share below which the pose is given up
+  float one = 0.95F;                                   ///< share of the weight that is at one place
+  float confirm_m = 4.0F;                              ///< way over which the particles are at one place
   float most_sigma_m = 0.25F, most_sigma_rad = 0.06F;  ///< widest spread at one place
   float search_m = 4.0F;                   ///< way without a valid pose after which the map is searched anew
   float place_m = 0.02F, per_way = 0.05F;  ///< errors of the odometry between two scans that are weighed
@@ -100,7 +102,7 @@ class FieldLocalisation {
     fresh_ = false;
     return true;
   }
-  /// A unit is ten points of a particle, or a pose of the search. True: estimate() is of the scan that was weighed.
+  /// A unit is ten points of a particle or of a pose of the search. True: estimate() is of the scan that was weighed.
   bool work(int units, const LikelihoodField& field) {
     if (weighing_) {
       for (; units > 0 && cursor_ < cloud_.cloud.size(); units -= kUnits) weigh_next(field);
@@ -149,9 +151,11 @@ class FieldLocalisation {
   /// Logarithm of a point's likelihood by its level, the largest being 0.
   void make_table(const LikelihoodField& field) {
     const float largest = base::log(1.0F + options.any);
-    for (int level = 0; level <= field.kFar; ++level) {
+    for (int level = 0; level < field.kLevels; ++level) {
       const float d = static_cast<float>(level) * field.step_m / options.sigma_m;
-      const float hit = level == field.kFar ? 0.0F : base::exp(-0.5F * d * d);
+      const float hit = level == field.kUnknown ? (valid_ ? options.unknown : 0.0F)
+                        : level == field.kFar   ? 0.0F
+                                                : base::exp(-0.5F * d * d);
       table_[static_cast<std::size_t>(level)] = options.temper * (base::log(hit + options.any) - largest);
     }
   }
@@ -165,13 +169,16 @@ class FieldLocalisation {
     std::size_t i = 0;  // weigh() asks in the order of the particles
     static_cast<void>(cloud_.cloud.weigh([&](const filter::ParticlePose&) { return log_likelihood_[i++]; }));
     estimate_ = cloud_.estimate();
-    int near = 0;
+    const float fits_m = options.fits_m + options.fits_cells * field.cell_m;
+    int near = 0, all = 0;
     beams_.each_level(estimate_.pose, field, [&](int level) {
-      near += level < field.kFar && static_cast<float>(level) * field.step_m <= options.fits_m ? 1 : 0;
+      all += valid_ && level == field.kUnknown ? 0 : 1;  // where the map saw nothing, a point refutes no valid pose
+      near += level < field.kFar && static_cast<float>(level) * field.step_m <= fits_m ? 1 : 0;
     });
-    fit_ += 0.2F * (static_cast<float>(near) / static_cast<float>(beams_.count) - fit_);
+    fit_ += 0.2F * (static_cast<float>(near) - fit_ * static_cast<float>(all)) / static_cast<float>(beams_.count);
     const auto& p = estimate_.p;
-    const bool one_place = estimate_.share > 0.95F && p(0, 0) + p(1, 1) < options.most_sigma_m * options.most_sigma_m &&
+    const bool one_place = estimate_.share > options.one &&
+                           p(0, 0) + p(1, 1) < options.most_sigma_m * options.most_sigma_m &&
                            p(2, 2) < options.most_sigma_rad * options.most_sigma_rad;
     holds_ = one_place && fit_ >= options.holds;
     confirmed_m_ = one_place && fit_ >= options.fits ? confirmed_m_ + weighed_m_ : 0.0F;
@@ -187,7 +194,7 @@ class FieldLocalisation {
   void place() {
     ++searches_;
     const auto found = search_.found();
-    if (found.empty() || valid_) return;
+    if (found.empty() || valid_ || holds_) return;
     const ParticleDisplacement way{.x_m = since_search_.x_m,
                                    .y_m = since_search_.y_m,
                                    .yaw_rad = since_search_.yaw.radians(),
@@ -209,7 +216,7 @@ class FieldLocalisation {
   FieldSearch<kBest> search_;
   ScanBeams beams_;
   std::array<float, kMost> log_likelihood_{};
-  std::array<float, LikelihoodField::kFar + 1> table_{};
+  std::array<float, LikelihoodField::kLevels> table_{};
   Estimate estimate_{};
   Displacement<float> since_weighed_{}, since_search_{};
   std::size_t cursor_ = 0;

@@ -17,7 +17,7 @@ class FieldSearch {
  public:
   struct Found {
     filter::ParticlePose pose;
-    int score = 0;  ///< kFar for each point in a wall
+    int score = 0;  ///< as ScanBeams::score
   };
 
   /// Searches for where this scan was taken.
@@ -32,10 +32,10 @@ class FieldSearch {
   }
   void cancel() { phase_ = Phase::kIdle; }
   [[nodiscard]] bool busy() const { return phase_ != Phase::kIdle; }
-  /// A unit is one pose; true when the search has ended with them.
+  /// A unit is ten points of a pose, or a pose where no robot can be; true when the search has ended with them.
   bool work(int units, const LikelihoodField& field) {
-    for (; units > 0 && phase_ == Phase::kScore; --units) score_next(field);
-    for (; units > 0 && phase_ == Phase::kClimb; --units) climb(field);
+    while (units > 0 && phase_ == Phase::kScore) units -= score_next(field);
+    for (; units > 0 && phase_ == Phase::kClimb; units -= ScanBeams::kMost / kStride) climb(field);
     return phase_ == Phase::kIdle;
   }
   /// Best places, each apart from the others, in no order.
@@ -46,7 +46,7 @@ class FieldSearch {
  private:
   enum class Phase : std::uint8_t { kIdle, kScore, kClimb };
   static constexpr float kGrid_m = 0.45F;
-  static constexpr int kHeadings = 90, kLeastBeams = 8;
+  static constexpr int kHeadings = 90, kLeastBeams = 8, kStride = 10;
   static constexpr float kTwoPi = 6.28318531F;
   static constexpr std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
@@ -62,15 +62,24 @@ class FieldSearch {
     }
     x_ = y_ = step_cells_ / 2;
   }
-  /// Implements docs/explanation/scan_matching.md (9).
-  void score_next(const LikelihoodField& field) {
-    if (field.level(x_, y_) > 0) {
-      int sum = 0;
-      const int x = 256 * x_ + 128, y = 256 * y_ + 128;
-      for (int i = 0; i < beams_.count; ++i)
-        sum += field.kFar - field.level((x + east_[at(i)]) >> 8, (y + north_[at(i)]) >> 8);
-      note(sum, field);
+  /// Implements docs/explanation/scan_matching.md (9). Returns the units of work.
+  int score_next(const LikelihoodField& field) {
+    const int here = field.level(x_, y_);
+    int units = 1;
+    if (here > 0 && here != field.kUnknown) {
+      const int x = 256 * x_ + 128, y = 256 * y_ + 128, least = count_ == kBest ? worst_ : 0;
+      int sum = 0, i = 0;
+      while (i < beams_.count && sum + field.kFar * (beams_.count - i) > least) {  // it can be among the best
+        for (const int end = i + kStride < beams_.count ? i + kStride : beams_.count; i < end; ++i)
+          sum += ScanBeams::worth(field.level((x + east_[at(i)]) >> 8, (y + north_[at(i)]) >> 8));
+        ++units;
+      }
+      if (i == beams_.count) note(sum, field);
     }
+    next_place(field);
+    return units;
+  }
+  void next_place(const LikelihoodField& field) {
     x_ += step_cells_;
     if (x_ < field.columns * field.kTile) return;
     x_ = step_cells_ / 2;

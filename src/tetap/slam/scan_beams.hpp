@@ -48,10 +48,13 @@ struct ScanBeams {
       f(field.level(cell(x + c * b.x_m - s * b.y_m), cell(y + s * b.x_m + c * b.y_m)));
     }
   }
-  /// kFar for each point in a wall, less with its distance.
+  /// A level in a score: most in a wall, nothing far from all.
+  [[nodiscard]] static constexpr int worth(int level) {
+    return level < LikelihoodField::kFar ? LikelihoodField::kFar - level : 0;
+  }
   [[nodiscard]] int score(const filter::ParticlePose& pose, const LikelihoodField& field) const {
     int sum = 0;
-    each_level(pose, field, [&sum](int level) { sum += LikelihoodField::kFar - level; });
+    each_level(pose, field, [&sum](int level) { sum += worth(level); });
     return sum;
   }
 

@@ -68,12 +68,12 @@ void ScanLocalizer<kBeams, kFrames, kParticles>::abort_job() {
   localisation_.cancel();
 }
 
-/// The map's cells and what all beams have in common make an error that no number of particles shows.
+/// The map's walls, its cells and what all beams have in common make an error that no number of particles shows.
 template <int kBeams, int kFrames, std::size_t kParticles>
 void ScanLocalizer<kBeams, kFrames, kParticles>::adopt(const Context& ctx) {
-  constexpr float kLeast_rad = 0.01F;
+  constexpr float kMap_m = 0.05F, kCells = 0.25F, kLeast_rad = 0.01F;
   const auto& e = localisation_.estimate();
-  const float least_m = 0.4F * ctx.field->cell_m;
+  const float least_m = kMap_m + kCells * ctx.field->cell_m;
   seen_ = weighed_;
   pose_ = {slam::Coordinate<float>{}.plus(e.pose.x_m), slam::Coordinate<float>{}.plus(e.pose.y_m),
            slam::Heading<float>::from_radians(e.pose.yaw_rad())};
