@@ -862,7 +862,6 @@ inline constexpr std::array<std::uint8_t, 26112> kTiles{
 255,255,255,255,255,255,255,255,255,255,255,255,255,255,255,255,255,255,255,255,255,255,255,255,255,255,255,255,255,
 255,255,255,255,255,
 };
-// clang-format on
 }  // namespace lab_data
 
 inline constexpr slam::LikelihoodField kLab{.cell_m = 0.125F,
@@ -873,6 +872,7 @@ inline constexpr slam::LikelihoodField kLab{.cell_m = 0.125F,
     .rows = 14,
     .index = lab_data::kIndex,
     .tiles = lab_data::kTiles};
+// clang-format on
 static_assert(kLab.valid());
 
 }  // namespace tetap::robot::maps

@@ -18,12 +18,12 @@ struct FieldOptions {
   float unknown = 0.4F;    ///< likelihood of a point where the map saw nothing; 0 while the pose is not valid
   float weigh_m = 0.15F;   ///< a scan is weighed after so much way
   float weigh_rad = 0.1F;  ///< or so much turn
-  float fits_m = 0.1F, fits_cells = 1.5F;              ///< a point within this distance of a wall fits
-  float fits = 0.7F;                                   ///< share of points that fit, from which the pose is confirmed
-  float holds = 0.55F;                                 ///< share from which one place is kept, and the map not searched
-  float lost = 0.5F;                                   ///< share below which the pose is given up
-  float one = 0.95F;                                   ///< share of the weight that is at one place
-  float confirm_m = 4.0F;                              ///< way over which the particles are at one place
+  float fits_m = 0.1F, fits_cells = 1.5F;  ///< a point within this distance of a wall fits
+  float clean = 0.85F;     ///< share of the points on seen ground that fit, from which the pose is confirmed
+  float lost = 0.5F;       ///< the same share, below which the pose is given up
+  float holds = 0.55F;     ///< share of all points that fit, from which one place is kept, and the map not searched
+  float one = 0.95F;       ///< share of the weight that is at one place
+  float confirm_m = 4.0F;  ///< way over which the particles are at one place
   float most_sigma_m = 0.25F, most_sigma_rad = 0.06F;  ///< widest spread at one place
   float search_m = 4.0F;                   ///< way without a valid pose after which the map is searched anew
   float place_m = 0.02F, per_way = 0.05F;  ///< errors of the odometry between two scans that are weighed
@@ -65,7 +65,7 @@ class FieldLocalisation {
     cancel();
     cloud_.start(kMost, pose, sigma_m, sigma_yaw_rad);
     started_ = valid_ = true;
-    fit_ = 1.0F;
+    fit_ = clean_ = 1.0F;
     confirmed_m_ = options.confirm_m;
     estimate_ = cloud_.estimate();
     fresh_ = true;
@@ -122,8 +122,9 @@ class FieldLocalisation {
   [[nodiscard]] bool busy() const { return weighing_ || search_.busy(); }
   [[nodiscard]] bool started() const { return started_; }
   [[nodiscard]] bool valid() const { return valid_; }
-  /// Low-passed share of points that fit.
+  /// Low-passed share of points that fit, of all, and of those where the map saw something.
   [[nodiscard]] float fit() const { return fit_; }
+  [[nodiscard]] float clean() const { return clean_; }
   /// The pose at the scan that was weighed last.
   [[nodiscard]] const Estimate& estimate() const { return estimate_; }
   [[nodiscard]] const auto& particles() const { return cloud_.cloud; }
@@ -170,20 +171,22 @@ class FieldLocalisation {
     static_cast<void>(cloud_.cloud.weigh([&](const filter::ParticlePose&) { return log_likelihood_[i++]; }));
     estimate_ = cloud_.estimate();
     const float fits_m = options.fits_m + options.fits_cells * field.cell_m;
-    int near = 0, all = 0;
+    int near = 0, known = 0;
     beams_.each_level(estimate_.pose, field, [&](int level) {
-      all += valid_ && level == field.kUnknown ? 0 : 1;  // where the map saw nothing, a point refutes no valid pose
+      known += level != field.kUnknown ? 1 : 0;
       near += level < field.kFar && static_cast<float>(level) * field.step_m <= fits_m ? 1 : 0;
     });
-    fit_ += 0.2F * (static_cast<float>(near) - fit_ * static_cast<float>(all)) / static_cast<float>(beams_.count);
+    const auto fitting = static_cast<float>(near), all = static_cast<float>(beams_.count);
+    fit_ += 0.2F * (fitting / all - fit_);
+    clean_ += 0.2F * (fitting - clean_ * static_cast<float>(known)) / all;
     const auto& p = estimate_.p;
     const bool one_place = estimate_.share > options.one &&
                            p(0, 0) + p(1, 1) < options.most_sigma_m * options.most_sigma_m &&
                            p(2, 2) < options.most_sigma_rad * options.most_sigma_rad;
     holds_ = one_place && fit_ >= options.holds;
-    confirmed_m_ = one_place && fit_ >= options.fits ? confirmed_m_ + weighed_m_ : 0.0F;
+    confirmed_m_ = holds_ && clean_ >= options.clean ? confirmed_m_ + weighed_m_ : 0.0F;
     if (!valid_ && confirmed_m_ >= options.confirm_m) valid_ = true;
-    if (valid_ && (fit_ < options.lost || estimate_.share < 0.5F)) {
+    if (valid_ && (clean_ < options.lost || estimate_.share < 0.5F)) {
       valid_ = holds_ = false;
       unlocated_m_ = options.search_m;
     }
@@ -206,7 +209,7 @@ class FieldLocalisation {
     });
     started_ = fresh_ = true;
     holds_ = false;
-    fit_ = 0.5F;
+    fit_ = clean_ = 0.5F;
     confirmed_m_ = 0.0F;
     since_weighed_ = {};
     way_m_ = turn_rad_ = 0.0F;
@@ -220,7 +223,7 @@ class FieldLocalisation {
   Estimate estimate_{};
   Displacement<float> since_weighed_{}, since_search_{};
   std::size_t cursor_ = 0;
-  float way_m_ = 0, turn_rad_ = 0, weighed_m_ = 0, confirmed_m_ = 0, unlocated_m_ = 0, fit_ = 0;
+  float way_m_ = 0, turn_rad_ = 0, weighed_m_ = 0, confirmed_m_ = 0, unlocated_m_ = 0, fit_ = 0, clean_ = 0;
   int searches_ = 0;
   bool started_ = false, valid_ = false, holds_ = false, weighing_ = false, fresh_ = false;
 };
