@@ -18,6 +18,7 @@ ROBOTS = {
     "mapper": (["--landmarks", "60", "--clutter", "0.3"], {"MapSize": 30, "MapRefused": 1, "TooLate": 1}),
     "mapper_fast": (["--landmarks", "24"], {"MapSize": 15, "MapRefused": 1, "TooLate": 1}),
     "scanner": ([], {"Pairs": 100}),
+    "scanner_localize": ([], {"Pairs": 100}),
     "visual": ([], {"Used": 1}),
     "graph128": (["--loop-m", "20", "--laps", "4"], {"MapSize": 90, "Keyframe": 140, "WorkLeft": 1, "Jobs": 5}),
 }
