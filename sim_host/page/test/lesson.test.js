@@ -3,6 +3,7 @@
 import { test } from "node:test";
 import assert from "node:assert/strict";
 import { byTheBook } from "../web/equations.js";
+import { TEXTS } from "../web/texts.js";
 import { GRID, HIDDEN, LESSON, band, drive, figures, gaussian, gradeBraking, gradeNoise, gradePrediction } from "../web/lesson.js";
 
 /** Position and speed, F = (1 dt; 0 1), Q = q I: updates as the module gives them. */
@@ -55,4 +56,12 @@ test("band() has the quantiles of tables: 162.728 and 241.058 of 200 degrees", (
 test("drawn numbers are normal", () => {
   const draw = gaussian(5), n = 40000, all = Array.from({ length: n }, draw), mean = all.reduce((a, b) => a + b) / n, square = all.reduce((a, b) => a + b * b, 0) / n;
   assert.ok(Math.abs(mean) < 0.02 && Math.abs(square - 1) < 0.03);
+});
+
+test("the text on the failure has the figures of the chart", () => {
+  const steps = drive({ seed: LESSON.seed, sigma_m: Math.sqrt(LESSON.r_m2), brakes: true }), run = textbook(base, steps), x = run.map(({ at, moved }) => at[0] + moved[0]), apart = x.map((v, i) => Math.abs(v - steps[i].x));
+  const turn = (all) => steps[all.indexOf(Math.max(...all))].t, out = steps.filter((_, i) => i > 50 && apart[i] > 3 * Math.sqrt(run[i].posterior[0]));
+  const said = { turn: turn(steps.map((one) => one.x)).toFixed(1), later: (turn(x) - turn(steps.map((one) => one.x))).toFixed(1), off: Math.max(...apart.slice(50)).toFixed(1), until: out.at(-1).t.toFixed(1) };
+  assert.deepEqual(said, { turn: "10.6", later: "0.6", off: "1.8", until: "15.3" });
+  for (const text of [TEXTS.en, TEXTS.id]) for (const figure of Object.values(said)) assert.ok(text["lesson.fail.note"].replaceAll(",", ".").includes(figure), figure);
 });

@@ -2,7 +2,8 @@
 import { test } from "node:test";
 import assert from "node:assert/strict";
 import { readFileSync, readdirSync } from "node:fs";
-import { TEXTS } from "../web/texts.js";
+import { TEXTS, decimal, say, speak } from "../web/texts.js";
+import { FAULTS_ID, PIECES_ID, ofModule } from "../web/texts_module.js";
 
 const web = new URL("../web/", import.meta.url);
 const names = (file, pattern) => [...readFileSync(new URL(file, import.meta.url), "utf8").matchAll(pattern)].map((found) => found[1]);
@@ -43,5 +44,20 @@ test("each fault of the world has a text", () => {
   const all = names("../../world/faults.cpp", /FaultInfo\{Fault::k\w+, FallsOn::k\w+, "(\w+)"/g);
   assert.ok(all.length > 30);
   for (const name of all) assert.ok(`inject.${name}` in TEXTS.en, name);
+  assert.deepEqual(Object.keys(FAULTS_ID).sort(), [...all].sort(), "and says in Indonesian what it does");
   for (const on of names("../module/play.cpp", /return "(\w+)";/g)) assert.ok(`on.${on}` in TEXTS.en, on);
+});
+
+test("Indonesian has a comma in numbers, and in nothing else", () => {
+  speak("id");
+  assert.deepEqual(["0.5", "-1.25e-7", "≥ 40.9", "rover.log", "1.2.3", "7"].map(decimal), ["0,5", "-1,25e-7", "≥ 40,9", "rover.log", "1.2.3", "7"]);
+  assert.equal(say("numbers.limits", "0.1", "2.5", "m/s"), "Rentang 0,1 sampai 2,5 m/s");
+  assert.equal(ofModule("1 gyroscope rows without one before them"), "1 baris giroskop tanpa baris sebelumnya");
+  speak("en");
+  assert.deepEqual([decimal("0.5"), say("numbers.limits", "0.1", "2.5", "m/s"), ofModule("a [rad/s assumed]")], ["0.5", "Range 0.1 to 2.5 m/s", "a [rad/s assumed]"]);
+});
+
+test("each sentence that is put into Indonesian is one of the module", () => {
+  const folders = ["../../csv/", "../module/"], code = folders.flatMap((folder) => readdirSync(new URL(folder, import.meta.url)).filter((file) => file.endsWith(".cpp")).map((file) => readFileSync(new URL(folder + file, import.meta.url), "utf8"))).join("");
+  for (const [english] of PIECES_ID) assert.ok(code.includes(english), english);
 });

@@ -2,9 +2,9 @@
 // One update of the flashed filter, opened: prior, innovation, S, gain, posterior, in numbers and as ellipses, beside the textbook's equations.
 import { element, replace, colour, sized } from "./dom.js";
 import { apart, byTheBook, ellipse, plane, stateNames } from "./equations.js";
-import { say } from "./texts.js";
+import { decimal, say } from "./texts.js";
 
-export const short = (x) => (x === 0 ? "0" : Math.abs(x) >= 1e4 || Math.abs(x) < 1e-3 ? x.toExponential(2) : String(+x.toPrecision(4)));
+export const short = (x) => decimal(x === 0 ? "0" : Math.abs(x) >= 1e4 || Math.abs(x) < 1e-3 ? x.toExponential(2) : String(+x.toPrecision(4)));
 
 function table(heads, rows, label) {
   return element("div", { class: "wide", tabindex: "0", role: "region", "aria-label": label }, element("table", {}, element("caption", {}, label),
@@ -20,7 +20,7 @@ export function renderUpdate(parent, update) {
   const measured = Array.from({ length: m }, (_, c) => `${c + 1}`);
   const far = book ? apart(update, book) : null, canvas = plane(n) ? element("canvas", { role: "img", "aria-label": say("update.picture") }) : null;
   replace(parent,
-    element("p", { class: used ? "good" : "bad" }, say("update.what", update.model, say(`verdict.${update.verdict}`), short(update.nis), update.gate < 1e29 ? short(update.gate) : say("update.nogate"))),
+    element("p", { class: used ? "good" : "bad" }, say("update.what", update.model, say(`verdict.${update.verdict}`), short(update.nis), update.gate < 1e29 ? say("update.gate", short(update.gate)) : say("update.nogate"))),
     canvas, canvas && element("p", { class: "note" }, say("update.legend")),
     table(["", "ν = z − h(x⁻)", "R", "S", "σ = √S", "ν/σ"], measured.map((name, c) => [name, short(nu[c]), short(noise[c]), short(s[c * m + c]), short(Math.sqrt(s[c * m + c])), short(nu[c] / Math.sqrt(s[c * m + c]))]), say("update.innovation")),
     m > 1 && matrix(s, m, "S = H P⁻ Hᵀ + R") || null,
