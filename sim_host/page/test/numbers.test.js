@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 import { test } from "node:test";
 import assert from "node:assert/strict";
-import { Numbers, shortest } from "../web/numbers.js";
+import { Numbers, shortest, typed } from "../web/numbers.js";
 
 test("a stored float is written with the fewest digits that read back as its bits", () => {
   for (const [text, value] of [["0.1", Math.fround(0.1)], ["1e-7", Math.fround(1e-7)], ["0.33333334", Math.fround(1 / 3)], ["-2.5", -2.5], ["0", 0]])
@@ -32,7 +32,13 @@ test("a value that is the robot's own is no change, and another is one", () => {
   other.takeNamed({ "a.b": [2] });
   assert.deepEqual(other.settings(), [[0, 0, 2]], "settings replace what was changed");
   const input = { value: "fast" };
-  numbers.take(0, input);
-  assert.equal(input.value, "0.1");
+  assert.match(numbers.take(0, input), /a\.b: 1 number.*; 0 given/);
+  assert.match(numbers.take(1, { value: "1 2 3" }), /c: 2 number.*; 3 given/);
+  assert.deepEqual(numbers.settings(), [[1, 0, 3], [1, 1, 5]], "what is not understood changes nothing");
   assert.equal(calls, 2);
+});
+
+test("a comma is a decimal point where it separates nothing", () => {
+  for (const [text, count, wanted] of [["0,002", 1, [0.002]], ["0 -1 0", 3, [0, -1, 0]], ["1, 2, 3", 3, [1, 2, 3]], ["1,2,3", 3, [1, 2, 3]], ["0,5 1 2,5", 3, [0.5, 1, 2.5]], ["1 x", 2, [1, NaN]], ["", 1, [NaN]], ["1e-3", 1, [0.001]]])
+    assert.deepEqual(typed(text, count), wanted, text);
 });

@@ -39,7 +39,9 @@ async function look(columns, series, times) {
     await page.mouse.click(box.x + box.width / 2, y, { count: 2 });
     for (let closer = Math.floor(draw() * 4); closer > 0; closer--) {
       await page.mouse.move(x(), y);
+      await page.keyboard.down("Control"); // without it the page scrolls
       await page.mouse.wheel({ deltaY: -200 });
+      await page.keyboard.up("Control");
     }
     await page.mouse.move(x(), y);
     await page.mouse.move(x(), y, { steps: 2 });

@@ -23,10 +23,17 @@ import { CableView } from "./cable_view.js";
 import { parsed } from "./settings_text.js";
 import { TaskQueue } from "./tasks.js";
 import { say, speak, languageNow } from "./texts.js";
+import { ofModule } from "./texts_module.js";
+
+/** The language of the last visit; a page from disk may have no memory. */
+const memory = { get: () => { try { return localStorage.getItem("tetap.language"); } catch { return null; } }, set: (name) => { try { localStorage.setItem("tetap.language", name); } catch { /* forgotten */ } } };
 
 const $ = (id) => document.getElementById(id);
 const SIGMAS = { x_m: "std_x_m", y_m: "std_y_m", yaw_rad: "std_yaw_rad", speed_mps: "std_speed_mps", yaw_rate_radps: "std_yaw_rate_radps", height_m: "std_height_m",
   v_east_mps: "std_v_east_mps", v_north_mps: "std_v_north_mps", v_up_mps: "std_v_up_mps", gyro_bias_z_radps: "std_gyro_bias_z_radps", acc_bias_x_mps2: "std_acc_bias_x_mps2", std_x_m: null, std_yaw_rad: null };
+
+/** Cards that show the first run alone, also where there is a second. */
+const FIRST_RUN = new Set(["findings", "bits", "innovation", "timeline", "why"]);
 
 class App {
   constructor() {
@@ -36,14 +43,15 @@ class App {
     this.described = []; // numbers of a recording's robot that its form has: [[row, element, value]]
   }
   async start() {
+    speak(memory.get());
     this.renderFrame();
     this.tasks = await TaskQueue.start();
     this.about = await this.tasks.run("describe");
     this.numbers = new Numbers(this.about.parameters, () => this.replayChanged());
     this.robot = Math.max(0, this.about.robots.findIndex(({ name }) => name === "rover"));
     this.numbers.of(this.about.robots[this.robot]);
-    this.play = new Play($("play"), this.tasks, this.about.robots, (file, truth) => this.open(file, { truth }).then(() => $("findings").scrollIntoView({ behavior: "smooth" })));
-    this.tables = new TablesView($("tables"), this.tasks, this.about, (file, more) => this.open(file, more));
+    this.play = new Play($("play"), this.tasks, this.about.robots, (file, truth) => this.open(file, { truth }));
+    this.tables = new TablesView($("tables"), this.tasks, this.about, (file, more) => this.open(file, more), () => this.status(() => say("open.ready"), "ready"));
     this.compare = new CompareView(this.tasks, this.about, JSON.parse($("costs").textContent));
     this.lesson = new LessonView($("lesson"), this.tasks);
     this.cable = new CableView($("cable"), this.tasks, (file) => this.open(file));
@@ -98,18 +106,32 @@ class App {
       if (!tables) return await this.open(files[0]);
       this.play.pause();
       await this.tables.show(tables);
+      this.forget();
       this.status(() => say("tables.status"), "tables");
     } catch (error) {
+      this.forget();
       this.fail(error);
     }
+  }
+  /** {maker, shown, choose()} where a robot of this page made the log, and another is shown; else null. */
+  other() {
+    const { robots } = this.about, maker = robots.findIndex(({ config }) => config === this.identity?.config);
+    return maker < 0 || this.known || maker === this.robot ? null : { maker: robots[maker].name, shown: robots[this.robot].name, choose: () => this.chooseRobot(maker) };
+  }
+  /** What was opened before: nothing of it stays beside other words. */
+  forget() {
+    Object.assign(this, { file: null, identity: null, truth: null, described: [], run: null, second: null, findings: null, why: null, opened: null });
+    $("views").hidden = $("ask").hidden = true;
+    this.renderRobots();
+    this.renderDrop();
   }
   /** `truth` {t, x, y}: of a log that was played here. `robot`: number of the one that the user has named; null: the log's own. */
   async open(file, { truth = null, robot = null, described = [] } = {}) {
     this.play.pause();
     if (robot === null) this.tables.hide();
-    Object.assign(this, { file, truth, described, run: null, second: null, findings: null, why: null, opened: null });
+    this.forget();
+    Object.assign(this, { file, truth, described });
     this.compare.forget();
-    $("ask").hidden = true;
     this.status(() => say("open.reading", file.name), "busy");
     try {
       this.identity = await this.tasks.run("open", { log: file });
@@ -146,7 +168,9 @@ class App {
     this.renderRobots();
   }
   fail(error) {
-    this.status(() => (error.trapped ? say("open.trapped", error.message) : say("open.failed", error.message)), "failed");
+    this.run = null;
+    $("views").hidden = true;
+    this.status(() => (error.trapped ? say("open.trapped", error.message) : say("open.failed", ofModule(error.message))), "failed");
   }
   task(extra = {}) {
     return { robot: this.robot, base: this.identity.base, ...extra, settings: [...this.described, ...(extra.settings ?? [])] };
@@ -159,6 +183,7 @@ class App {
     this.view.reset(this.run.span);
     this.render();
     this.status(() => this.title(), "done");
+    $("status").scrollIntoView();
     this.findings = await this.tasks.run("diagnose", this.task()).catch((error) => ({ failed: error.message }));
     this.renderFindings();
     document.body.dataset.diagnosed = "yes";
@@ -204,7 +229,7 @@ class App {
       const k = at(this.run.t, second.t[i]), d = Math.hypot(second.x[i] - this.run.x[k], second.y[i] - this.run.y[k]);
       if (second.columns.pos_valid[i] > 0 && this.run.columns.pos_valid[k] > 0 && d > most) [most, when] = [d, second.t[i]];
     }
-    return say("numbers.effect", most < 0 ? "–" : most.toFixed(3), when.toFixed(1));
+    return say("numbers.effect", most < 0 ? "–" : most.toFixed(3), when.toFixed(1), this.run.refusedOf()[0], second.refusedOf()[0]);
   }
   async chooseRobot(number) {
     this.robot = number;
@@ -241,7 +266,7 @@ class App {
     if (this.said) this.status(this.said);
     const other = languageNow() === "en" ? "id" : "en";
     replace($("tools"),
-      element("button", { id: "language", lang: other, onclick: () => (speak(other), this.renderFrame(), this.renderMore(), this.play?.render(), this.render(true)) }, say("lang.other")),
+      element("button", { id: "language", lang: other, onclick: () => (speak(other), memory.set(other), this.renderFrame(), this.renderMore(), this.play?.render(), this.render(true)) }, say("lang.other")),
       element("button", { id: "theme", onclick: () => this.otherTheme() }, say("theme.other")));
     this.renderDrop();
   }
@@ -270,7 +295,7 @@ class App {
       this.about.robots.map(({ name }, i) => element("option", { value: i, selected: i === this.robot }, name)));
     if (document.body.dataset.state === "asks") return replace($("robots"));
     const name = this.about.robots[this.robot].name;
-    const words = !this.identity ? "" : this.known ? say("robot.known", name) : say(this.identity.config === undefined ? "robot.silent" : "robot.unknown", name);
+    const other = this.other(), words = !this.identity ? "" : this.known ? say("robot.known", name) : other ? say("findings.robot", other.maker, name) : say(this.identity.config === undefined ? "robot.silent" : "robot.unknown", name);
     replace($("robots"), say("robot.label"), " ", select, element("span", { class: this.known || !this.identity ? "note" : "warning" }, ` ${words}`));
   }
   render(keep = false) {
@@ -293,8 +318,8 @@ class App {
     this.numbers.render(this.section("numbers"), this.message, (text) => this.takeSettings(text));
   }
   section(name, note) {
-    const body = element("div", { class: "body" });
-    replace($(name), element("h2", {}, say(`${name}.title`)), note ? element("p", { class: "note" }, note) : null, body);
+    const body = element("div", { class: "body" }), first = this.second && FIRST_RUN.has(name) ? element("span", { class: "mark" }, say("view.first")) : null;
+    replace($(name), element("h2", {}, say(`${name}.title`), first), note ? element("p", { class: "note" }, note) : null, body);
     return body;
   }
   runs() {
@@ -307,10 +332,10 @@ class App {
     Object.assign(document.body.dataset, { sha: result.estimates_sha256, crc: result.state_crc_last, different: result.epochs_different ?? "", second: this.second?.result.estimates_sha256 ?? "" });
   }
   renderFindings() {
-    renderFindings(this.section("findings"), this.findings);
+    renderFindings(this.section("findings"), this.findings, this.run, this.about.codes, this.other());
   }
   renderPath(keep) {
-    const body = this.section("path", say("path.legend")), before = keep ? this.path : null;
+    const body = this.section("path", [say("path.legend"), ...(this.second ? [say("path.second")] : []), say("path.zoom")].join(" ")), before = keep ? this.path : null;
     this.path = new PathView(body, this.view, (one) => this.renderWhy(one));
     if (before?.scale) Object.assign(this.path, { box: before.box, scale: before.scale });
     this.path.show(this.runs(), this.truth, Boolean(before?.scale));
@@ -323,7 +348,7 @@ class App {
       known.map((name) => element("option", { value: name, selected: name === this.state }, say(`state.${name}`))));
     const chart = element("div", {});
     body.append(select, chart);
-    if (known.length === 0) return;
+    if (known.length === 0) return replace(body, element("p", { class: "note" }, say("view.nothing")));
     const name = known.includes(this.state) ? this.state : known[0];
     this.charts.push(bandChart(chart, this.view, say(`state.${name}`), this.runs().map((one) => ({ ...one, value: name, sigma: SIGMAS[name] }))));
   }
@@ -332,6 +357,7 @@ class App {
     const only = names.includes(this.source) ? this.source : null;
     const select = element("select", { id: "innovation-source", "aria-label": say("innovation.source"), onchange: () => ((this.source = select.value), this.render(true)) },
       ["", ...names].map((name) => element("option", { value: name, selected: name === (only ?? "") }, name === "" ? say("innovation.all") : sourceLine(this.run, name))));
+    if (names.length === 0) return replace(body, element("p", { class: "note" }, say("view.nothing")));
     body.append(select);
     const inks = ["first", "second", "good", "warn", "third"].map(colour);
     this.charts.push(innovationChart(body, this.view, "", this.run, only, inks, (one) => one && this.renderWhy(one)));
@@ -340,6 +366,7 @@ class App {
     const body = this.section("timeline", say("timeline.help"));
     this.timeline = new Timeline(body, this.view, (one) => this.renderWhy(one));
     this.timeline.show(this.run);
+    body.append(element("p", { class: "note" }, say("timeline.legend")));
   }
   renderWhy(one) {
     this.why = one;
@@ -359,6 +386,10 @@ class App {
 }
 
 const app = new App();
+addEventListener("keydown", (event) => {
+  if (event.defaultPrevented || event.ctrlKey || event.metaKey || event.altKey || /^(INPUT|SELECT|TEXTAREA)$/.test(event.target.tagName)) return;
+  if (app.run && !$("views").hidden && ["n", "p", "u"].includes(event.key)) app.timeline?.key(event);
+});
 addEventListener("dragover", (event) => event.preventDefault());
 addEventListener("drop", (event) => {
   event.preventDefault();

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Charts over time (uPlot), tied to one view.
 import { colour } from "./dom.js";
-import { say } from "./texts.js";
+import { decimal, say } from "./texts.js";
 
 const base = (view, title, height) => ({
   title,
@@ -12,15 +12,28 @@ const base = (view, title, height) => ({
   hooks: {},
 });
 
+const ticks = (_, all) => all.map((v) => (v == null ? "" : decimal(String(+v.toPrecision(6)))));
+/** What a chart shows of its values: all, but for a few (1 % at each end) that would make a hairline of the others. */
+export function shownRange(values) {
+  const all = values.filter((v) => v != null && Number.isFinite(v)).sort((a, b) => a - b), n = all.length;
+  if (n === 0) return [-1, 1];
+  let [low, high] = [all[0], all[n - 1]];
+  const [first, last] = [all[Math.floor(0.01 * n)], all[Math.ceil(0.99 * n) - 1]];
+  if (last > first && high - low > 4 * (last - first)) [low, high] = [first, last];
+  const space = 0.06 * (high - low) || Math.abs(high) * 0.01 || 1;
+  return [low - space, high + space];
+}
 const axis = (more = {}) => ({ stroke: () => colour("faint"), grid: { stroke: () => colour("grid"), width: 1 }, ticks: { stroke: () => colour("grid") }, ...more });
 
 export class Chart {
-  constructor(parent, view, { title, height = 200, series, bands = [], scales = {}, data, values, hooks = {}, onClick }) {
+  constructor(parent, view, { title, height = 200, series, bands = [], scales = {}, data, values = ticks, labels = [], hooks = {}, onClick }) {
     this.view = view;
     const options = { ...base(view, title, height), bands, width: parent.clientWidth || 320 };
-    options.scales = { ...options.scales, ...scales };
-    options.axes = [axis(), axis(values ? { values, size: 60 } : { size: 60 })];
-    options.series = [{ label: "t [s]", value: (_, t) => (t == null ? "–" : t.toFixed(2)) }, ...series.map((one) => ({ value: (_, v) => (v == null ? "–" : String(+v.toPrecision(7))), ...one }))];
+    options.padding = [null, 24, null, null];
+    options.scales = { ...options.scales, y: { range: (plot) => shownRange(this.seen(plot)) }, ...scales };
+    const label = (text) => (text ? { label: text, labelSize: 18, labelGap: 0, labelFont: "12px system-ui, sans-serif" } : {});
+    options.axes = [axis({ values: ticks, ...label(labels[0]) }), axis({ values, size: 60, space: 24, ...label(labels[1]) })];
+    options.series = [{ label: "t [s]", value: (_, t) => (t == null ? "–" : decimal(t.toFixed(2))) }, ...series.map((one) => ({ value: (_, v) => (v == null ? "–" : decimal(String(+v.toPrecision(7)))), ...one }))];
     options.hooks = {
       ...hooks,
       setCursor: [({ cursor, posToVal }) => cursor.left >= 0 && !this.told && view.point(posToVal(cursor.left, "x"))],
@@ -34,6 +47,7 @@ export class Chart {
     this.plot = new uPlot(options, data, parent);
     this.plot.over.addEventListener("dblclick", () => view.show(view.whole));
     this.plot.over.addEventListener("wheel", (event) => {
+      if (!event.ctrlKey) return; // without it the page scrolls
       event.preventDefault();
       view.zoom(event.deltaY < 0 ? 0.8 : 1.25, this.plot.posToVal(event.offsetX, "x"));
     }, { passive: false });
@@ -47,6 +61,13 @@ export class Chart {
     this.told = true;
     this.plot.setCursor({ left: this.plot.valToPos(this.view.cursor, "x"), top: 10 }, false);
     this.told = false;
+  }
+  /** Values of all series in the shown span; of many some. */
+  seen({ data }) {
+    const [t, ...all] = data ?? [[]], [begin, end] = this.view.span, rows = [];
+    for (let i = 0; i < t.length; i++) if (t[i] >= begin && t[i] <= end) rows.push(i);
+    const step = Math.ceil(rows.length / 4000);
+    return all.flatMap((values) => rows.filter((_, k) => k % step === 0).map((i) => values[i]));
   }
   destroy() {
     removeEventListener("resize", this.resized);
@@ -103,7 +124,7 @@ export function innovationChart(parent, view, title, run, only, inks, onPoint) {
   return new Chart(parent, view, {
     title, series, height: 300, data: tables.length === 1 ? tables[0] : uPlot.join(tables),
     scales: { y: { distr: 3, range: () => [least, 10 ** Math.ceil(Math.log10(top))] } },
-    values: (_, ticks) => ticks.map((y) => (y == null ? "" : String(+y.toPrecision(3)))),
+    values: ticks,
     hooks: { draw: [gate] },
     onClick: (plot) => {
       const time = plot.posToVal(plot.cursor.left, "x"), ratio = plot.posToVal(plot.cursor.top, "y");

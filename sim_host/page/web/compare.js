@@ -92,13 +92,15 @@ export function lines({ result, tables }, robot, truth, costs) {
   });
 }
 
-/** Without a second line of one kind whose figures are the same: robots may share an estimator. */
+/** One line for those of one kind and size whose figures read the same, with the names of their `robots`: they share an estimator. */
 export function distinct(all) {
-  const seen = new Set();
-  return all.filter(({ kind, bytes, truth, fixes, records }) => {
-    const key = JSON.stringify([kind, bytes, truth, fixes, records]);
-    return !seen.has(key) && seen.add(key);
-  });
+  const found = new Map();
+  for (const one of all) {
+    const { kind, bytes, truth, fixes, records } = one, key = JSON.stringify([kind, bytes, truth, fixes, records], (_, x) => (typeof x === "number" ? +x.toPrecision(4) : x));
+    if (found.has(key)) found.get(key).robots.push(one.robot);
+    else found.set(key, { ...one, robots: [one.robot] });
+  }
+  return [...found.values()];
 }
 
 /** The best first: by the error where there is truth, else by the likelihood of the fixes, else by the share refused. */

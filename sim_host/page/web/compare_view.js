@@ -4,9 +4,9 @@ import { element, replace } from "./dom.js";
 import { contestants, distinct, lines, ranked } from "./compare.js";
 import { MODE } from "./engine.js";
 import { Run } from "./run.js";
-import { say } from "./texts.js";
+import { decimal, say } from "./texts.js";
 
-const number = (x, digits = 2) => (x == null || Number.isNaN(x) ? "–" : x.toFixed(digits));
+const number = (x, digits = 2) => (x == null || Number.isNaN(x) ? "–" : decimal(x.toFixed(digits)));
 
 export class CompareView {
   /** `costs` {kind: {instructions, rows}} of the page. */
@@ -43,11 +43,11 @@ export class CompareView {
     const heads = [say("compare.estimator"), say("robot.label"), ...(truth ? [say("compare.rms"), say("compare.nees")] : []), say("compare.likelihood"), say("compare.fixes"), say("compare.nis"), say("compare.refused"), say("compare.ram"), say("compare.instructions")];
     replace(parent, element("div", { class: "wide", tabindex: "0", role: "region", "aria-label": say("compare.title") }, element("table", { id: "compare-table" },
       element("thead", {}, element("tr", {}, heads.map((head) => element("th", { scope: "col" }, head)))),
-      element("tbody", {}, this.found.map((one) => element("tr", {}, element("th", { scope: "row" }, say(`kind.${one.kind}`)), element("td", {}, one.robot),
+      element("tbody", {}, this.found.map((one) => element("tr", {}, element("th", { scope: "row" }, say(`kind.${one.kind}`)), element("td", { class: "names" }, one.robots.join(", ")),
         truth ? [element("td", {}, number(one.truth?.rms_m, 3)), element("td", {}, number(one.truth?.nees))] : null,
         element("td", {}, number(one.fixes?.likelihood)), element("td", {}, number(one.fixes?.rms_m, 3)), element("td", {}, number(one.records?.nis)), element("td", {}, one.records ? `${number(100 * one.records.refused, 1)} %` : "–"),
         element("td", {}, String(one.bytes)), element("td", { title: this.costs[one.kind]?.rows ?? "" }, one.instructions === null ? "–" : String(one.instructions))))))),
-    element("p", { class: "note" }, say(truth ? "compare.note.truth" : "compare.note")), element("p", { class: "note" }, say("compare.cost.note")),
+    element("p", { class: "note" }, say(truth ? "compare.note.truth" : "compare.note")), element("p", { class: "note" }, say("compare.same")), element("p", { class: "note" }, say("compare.cost.note")),
     this.refused.length > 0 ? element("p", { class: "warning" }, say("compare.failed", this.refused.join("; "))) : null);
   }
 }

@@ -1,7 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the page says of a log in words: its bits, what is wrong with it, and what became of one measurement.
 import { element, replace } from "./dom.js";
+import { times } from "./run.js";
 import { say } from "./texts.js";
+
+/** A share of refusals up to which they are outliers as every sensor has them. */
+const FEW = 0.02;
+
+/** What became of a measurement; where a check has failed, its reason follows and is the only one. */
+export const verdictOf = ({ verdict, failed }) => say(`verdict.${verdict === "Stale" && failed !== "None" ? "Rejected" : verdict}`);
 
 /** The replay beside the log's own node; `note`: how it was played. */
 export function renderBits(body, { result }, note) {
@@ -17,31 +24,40 @@ export function renderBits(body, { result }, note) {
     element("p", { class: "hash" }, say("bits.hash", result.estimates_sha256)), element("p", { class: "hash" }, say("bits.crc", result.state_crc_last)));
 }
 
-/** `found` of the doctor; null while it works. */
-export function renderFindings(body, found) {
-  if (!found) return replace(body, element("p", { class: "note" }, say("findings.wait")));
-  if (found.failed) return replace(body, element("p", { class: "warning" }, say("findings.failed", found.failed)));
-  if (found.findings.length === 0) return replace(body, element("p", { class: "good" }, say("findings.none")));
-  replace(body, element("ol", {}, found.findings.map(({ code, cause, evidence, change }) =>
-    element("li", { "data-code": code }, element("strong", {}, cause), element("p", {}, `${say("findings.evidence")}: ${evidence}`),
-      element("p", { class: "change" }, `${say("findings.change")}: ${change}`)))));
+/** A finding in words that can be followed: a factor that is rounded to nothing gives way to the code's own advice. `codes` of the description. */
+export function followable({ code, cause, evidence, change }, codes) {
+  const nothing = /\b0\.0+ times|\bby 0\.0+\b/;
+  return { code, cause, evidence: nothing.test(evidence) ? "" : evidence, change: nothing.test(change) ? codes.find(({ name }) => name === code)?.change ?? "" : change };
 }
 
-/** `one` of Run.sources; `onOpen(one)` is to open its update. */
+/** `found` of the doctor, null while it works; `other` {maker, shown, choose()} where the log was made by another robot than is shown. */
+export function renderFindings(body, found, run, codes, other) {
+  const [refused, all] = run.refusedOf(), counted = refused === 0 ? null : element("p", { class: "note", id: "refused" }, say(refused <= FEW * all ? "findings.refused" : "findings.many", refused, all));
+  const wrong = other ? element("li", { "data-code": "other_robot" }, element("strong", {}, say("findings.robot", other.maker, other.shown)), element("p", {}, element("button", { onclick: other.choose }, say("findings.choose", other.maker)))) : null;
+  const list = (...items) => element("ol", {}, wrong, ...items);
+  if (!found) return replace(body, wrong && list(), element("p", { class: "note" }, say("findings.wait")), counted);
+  if (found.failed) return replace(body, wrong && list(), element("p", { class: "warning" }, say("findings.failed", found.failed)), counted);
+  if (found.findings.length === 0) return replace(body, wrong ? list() : element("p", { class: "good" }, say("findings.none")), counted);
+  replace(body, list(found.findings.map((one) => followable(one, codes)).map(({ code, cause, evidence, change }) =>
+    element("li", { "data-code": code }, element("strong", {}, cause), evidence ? element("p", {}, `${say("findings.evidence")}: ${evidence}`) : null,
+      change ? element("p", { class: "change" }, `${say("findings.change")}: ${change}`) : null))), counted);
+}
+
+/** `one` of Run.sources, or {time, source, word} of a stretch of the time line; `onOpen(one)` is to open its update. */
 export function renderWhy(body, run, one, onOpen) {
   if (!one) return replace(body, element("p", { class: "note" }, say("why.nothing")));
   const faults = run.faults(one.time), named = [...Array(16).keys()].filter((bit) => (faults >> bit) & 1).map((bit) => say(`fault.${bit}`)), mode = run.mode(one.time);
   replace(body,
-    element("p", {}, say("why.when", say(`source.${one.source}`), one.time.toFixed(2), say(`verdict.${one.verdict}`))),
-    element("p", {}, say(`check.${one.failed}`)),
-    Number.isNaN(one.ratio) ? null : element("p", {}, say("why.ratio", one.ratio.toFixed(2))),
+    element("p", {}, one.word ? say("why.state", say(`source.${one.source}`), one.time.toFixed(2), say(`word.${one.word}`)) : say("why.when", say(`source.${one.source}`), one.time.toFixed(2), verdictOf(one))),
+    one.word ? null : element("p", {}, say(`check.${one.failed}`)),
+    one.word || Number.isNaN(one.ratio) ? null : element("p", {}, say("why.ratio", times(one.ratio, 2))),
     mode ? element("p", {}, say("why.mode", say(`word.${mode}`), say(`mode.${mode}`))) : null,
     named.length > 0 ? element("p", {}, say("why.faults", named.join(", "))) : null,
-    element("button", { id: "open-update", onclick: () => onOpen(one) }, say("why.open")));
+    one.word ? null : element("button", { id: "open-update", onclick: () => onOpen(one) }, say("why.open")));
 }
 
 /** A source in a line: how many of its measurements were refused, and the largest of them over its gate. */
 export function sourceLine(run, name) {
   const all = run.sources.get(name), refused = all.filter((one) => one.refused), most = refused.reduce((top, { ratio }) => (ratio > top ? ratio : top), 0);
-  return say("innovation.line", say(`source.${name}`), all.length, refused.length, most > 0 ? most.toFixed(1) : "–");
+  return say("innovation.line", say(`source.${name}`), all.length, refused.length) + (most > 0 ? say("innovation.far", times(most)) : "");
 }

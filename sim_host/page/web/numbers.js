@@ -2,7 +2,7 @@
 // Change a number: rows of the parameter table, what was changed, the parameter file.
 import { element, replace, save } from "./dom.js";
 import { textOf } from "./settings_text.js";
-import { say } from "./texts.js";
+import { decimal, say } from "./texts.js";
 
 const SHOWN = 8;
 /** Rows that a user tries first, in this order. */
@@ -16,6 +16,12 @@ export function shortest(value, storage) {
     if (Math.fround(Number(text)) === Math.fround(value)) return text;
   }
   return String(value);
+}
+
+/** What was typed for `count` numbers: spaces lie between them, or commas; of a single one, and beside spaces, a comma is its decimal point. */
+export function typed(text, count) {
+  const parts = text.trim().split(/[\s;]+/).map((part) => part.replace(/,$/, "")), alone = parts.length === 1 && count > 1;
+  return (alone ? parts[0].split(",") : parts.map((part) => part.replace(",", "."))).map((part) => (part === "" ? NaN : Number(part)));
 }
 
 export class Numbers {
@@ -91,19 +97,21 @@ export class Numbers {
 
   row(i) {
     const row = this.rows[i], own = this.robot.values[i];
-    const input = element("input", { value: this.text(i), inputmode: "decimal", "aria-label": row.path, "data-path": row.path, onchange: () => this.take(i, input) });
-    const limits = say("numbers.limits", shortest(row.minimum, "float"), shortest(row.maximum, "float"), row.unit);
+    const said = element("span", { class: "bad", role: "alert" });
+    const input = element("input", { value: this.text(i), inputmode: own.length > 1 ? "text" : "decimal", class: own.length > 3 ? "long" : "", "aria-label": row.path, "data-path": row.path, onchange: () => (said.textContent = this.take(i, input)) });
+    const limits = say("numbers.limits", shortest(row.minimum, "float"), shortest(row.maximum, "float"), row.unit).trim();
     return element("label", { class: this.changed.has(i) ? "row is-changed" : "row" },
       element("code", {}, row.path), input, element("span", { class: "unit" }, row.unit),
-      element("span", { class: "note" }, `${row.text} ${limits}; ${say("numbers.own", own.map((value) => shortest(value, row.storage)).join(" "))}${row.live ? "" : `; ${say("numbers.restart")}`}`));
+      element("span", { class: "note" }, `${row.text} ${limits}; ${say("numbers.own", own.map((value) => decimal(shortest(value, row.storage))).join(" "))}${row.live ? "" : `; ${say("numbers.restart")}`}`), said);
   }
 
+  /** Takes what was typed, or says what is wanted. */
   take(i, input) {
-    const own = this.robot.values[i], texts = input.value.trim().split(/[\s,]+/);
-    const values = texts.map((text) => (text === "" ? NaN : Number(text)));
-    if (values.length !== own.length || values.some(Number.isNaN)) return void (input.value = this.text(i));
+    const own = this.robot.values[i], values = typed(input.value, own.length), given = values.filter((value) => !Number.isNaN(value)).length;
+    if (values.length !== own.length || given !== own.length) return say("numbers.wanted", this.rows[i].path, own.length, given);
     if (values.every((value, k) => shortest(value, this.rows[i].storage) === shortest(own[k], this.rows[i].storage))) this.changed.delete(i);
     else this.changed.set(i, values);
     this.onChange();
+    return "";
   }
 }

@@ -2,7 +2,7 @@
 // The path from above: estimate with ellipses of 3 sigma, fixes that were used and refused, truth, a second run.
 import { element, sized, colour } from "./dom.js";
 import { at } from "./run.js";
-import { say } from "./texts.js";
+import { decimal, say } from "./texts.js";
 
 const HEIGHT = 420, MARGIN = 24;
 
@@ -71,16 +71,16 @@ export class PathView {
     context.fillStyle = colour("faint");
     context.font = "11px system-ui, sans-serif";
     context.lineWidth = 1;
-    const label = (value) => `${+value.toPrecision(6)} m`;
+    const label = (value) => `${decimal(String(+value.toPrecision(6)))} m`;
     const left = this.box.x - width / 2 / this.scale, low = this.box.y - height / 2 / this.scale;
     context.beginPath();
     for (let x = Math.ceil(left / step) * step; this.across(x) < width; x += step) {
       context.moveTo(this.across(x), 0), context.lineTo(this.across(x), height);
-      context.fillText(label(x), this.across(x) + 3, height - 4);
+      if (this.across(x) + 3 + context.measureText(label(x)).width < width) context.fillText(label(x), this.across(x) + 3, height - 4);
     }
     for (let y = Math.ceil(low / step) * step; this.down(y) > 0; y += step) {
       context.moveTo(0, this.down(y)), context.lineTo(width, this.down(y));
-      if (this.down(y) < height - 18) context.fillText(label(y), 3, this.down(y) - 3);
+      if (this.down(y) > 14 && this.down(y) < height - 18) context.fillText(label(y), 3, this.down(y) - 3);
     }
     context.stroke();
   }
@@ -215,6 +215,7 @@ export class PathView {
     const { canvas } = this, fingers = new Map();
     let dragged = 0;
     canvas.addEventListener("wheel", (event) => {
+      if (!event.ctrlKey) return; // without it the page scrolls
       event.preventDefault();
       this.zoom(event.deltaY < 0 ? 1.2 : 1 / 1.2, event.offsetX, event.offsetY);
     }, { passive: false });

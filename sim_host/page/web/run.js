@@ -35,6 +35,11 @@ function spans(times, words, end) {
   return found;
 }
 
+/** Largest ratio that a frame of Est_Innov can say. */
+const MOST_RATIO = 40.92;
+/** A ratio in words: at the ceiling of its frame it may be anything above. */
+export const times = (ratio, digits = 1) => (ratio >= MOST_RATIO - 0.005 ? "≥ 40.9" : ratio.toFixed(digits));
+
 const NO_REFUSAL = new Set(["Accepted", "NotUsed", "NewLandmark", "Pending"]);
 
 export class Run {
@@ -122,6 +127,10 @@ export class Run {
     let best = null;
     for (const all of this.sources.values()) for (const one of all) if (best === null || Math.abs(one.time - time) < Math.abs(best.time - time)) best = one;
     return best;
+  }
+  /** [refused, all] of its measurements. */
+  refusedOf() {
+    return [this.refusals.length, [...this.sources.values()].reduce((sum, all) => sum + all.length, 0)];
   }
   /** Bits of Est_Status.Faults at a moment. */
   faults(time) {

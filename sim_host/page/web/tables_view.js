@@ -4,11 +4,12 @@ import { element, replace } from "./dom.js";
 import { DESCRIBED, formOf, named, robotsFor } from "./tables.js";
 import { shortest } from "./numbers.js";
 import { say } from "./texts.js";
+import { ofModule } from "./texts_module.js";
 
 export class TablesView {
-  /** `onLog(file, {robot, described})` gets the log that was made; `about` is the module's description. */
-  constructor(parent, tasks, about, onLog) {
-    Object.assign(this, { parent, tasks, about, onLog });
+  /** `onLog(file, {robot, described})` gets the log that was made; `about` is the module's description; `onClose()`: the form was closed. */
+  constructor(parent, tasks, about, onLog, onClose) {
+    Object.assign(this, { parent, tasks, about, onLog, onClose });
   }
   async show(files) {
     Object.assign(this, { files, made: null, described: new Map(), robot: null });
@@ -28,15 +29,16 @@ export class TablesView {
   }
   render() {
     if (!this.files) return;
+    const nothing = !this.rows.some(({ sensor }) => sensor);
     const robots = element("select", { id: "tables-robot", "aria-label": say("robot.label"), onchange: () => ((this.robot = Number(robots.value)), this.described.clear(), this.render()) },
       this.order.map(({ number, useless }) => element("option", { value: number, selected: number === this.robot }, `${this.about.robots[number].name}${useless ? ` – ${say("ask.useless")}` : ""}`)));
     replace(this.parent, element("h2", {}, say("tables.title")), element("p", { class: "note" }, say("tables.note", this.files.map(({ name }) => name).join(", "))),
-      this.wrong ? element("p", { class: "bad", id: "tables-wrong" }, this.wrong) : null,
+      this.wrong ? element("p", { class: "bad", id: "tables-wrong" }, ofModule(this.wrong)) : nothing ? element("p", { class: "bad", id: "tables-nothing" }, say("tables.nothing")) : null,
       element("div", { class: "form" }, this.rows.filter(({ sensor }) => sensor).map((row) => this.row(row))),
       element("details", {}, element("summary", {}, say("tables.times")), element("div", { class: "form" }, this.rows.filter(({ sensor }) => !sensor).map((row) => this.row(row)))),
       element("h3", {}, say("tables.robot")), element("p", { class: "note" }, say("tables.robot.note")),
       element("div", { class: "form" }, element("label", { class: "field" }, element("span", {}, say("robot.label")), robots), this.fields()),
-      element("div", { class: "buttons" }, element("button", { id: "tables-play", class: "go", onclick: () => this.play() }, say("tables.play")), element("button", { onclick: () => this.hide() }, say("tables.close"))),
+      element("div", { class: "buttons" }, element("button", { id: "tables-play", class: "go", disabled: nothing, onclick: () => this.play() }, say("tables.play")), element("button", { onclick: () => (this.hide(), this.onClose()) }, say("tables.close"))),
       this.made ? element("div", { id: "tables-made", role: "status" }, this.report()) : null);
   }
   /** A sensor of a file: its columns, and their unit. */
@@ -84,8 +86,8 @@ export class TablesView {
   report() {
     const { frames, rows, duration_s, sources, left_out: left, notes } = this.made;
     return [element("p", { class: "good" }, say("tables.made", frames, duration_s.toFixed(1), rows)),
-      element("ul", {}, sources.map(({ sensor, columns, samples, rate_hz }) => element("li", {}, say("tables.source", sensor, samples, rate_hz.toFixed(1), columns)))),
-      left.length > 0 ? element("p", { class: "warning" }, say("tables.left", left.map(({ what, count }) => `${count} ${what}`).join("; "))) : null,
-      notes.length > 0 ? element("p", { class: "note" }, notes.join("; ")) : null];
+      element("ul", {}, sources.map(({ sensor, columns, samples, rate_hz }) => element("li", {}, say("tables.source", sensor, samples, rate_hz.toFixed(1), ofModule(columns))))),
+      left.length > 0 ? element("p", { class: "warning" }, say("tables.left", left.map(({ what, count }) => `${count} ${ofModule(what)}`).join("; "))) : null,
+      notes.length > 0 ? element("p", { class: "note" }, notes.map(ofModule).join("; ")) : null];
   }
 }

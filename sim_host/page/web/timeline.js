@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // The time line: the mode, the state of each source, and a stroke for each refusal.
 import { element, sized, colour } from "./dom.js";
-import { say } from "./texts.js";
+import { decimal, say } from "./texts.js";
 
 const ROW = 24, LABEL = 118, AXIS = 20;
-const INK = { Nominal: "good", Fusing: "good", DeadReckoning: "warn", Degraded: "warn", Confirming: "warn", Rejecting: "bad", Distrusted: "bad", Fault: "bad" };
+const INK = { Nominal: "good", Fusing: "good", DeadReckoning: "third", Degraded: "warn", Confirming: "warn", Rejecting: "bad", Distrusted: "bad", Fault: "bad" };
 
 export class Timeline {
-  /** `onRefusal` gets a refusal that was clicked. */
+  /** `onRefusal` gets a refusal that was clicked, or {time, source, word} of a stretch without one. */
   constructor(parent, view, onRefusal) {
     this.view = view;
     this.onRefusal = onRefusal;
@@ -74,21 +74,33 @@ export class Timeline {
     const [begin, end] = this.view.span, raw = (end - begin) / 6, power = 10 ** Math.floor(Math.log10(raw));
     const step = [1, 2, 5, 10].map((n) => n * power).find((n) => n >= raw);
     context.fillStyle = colour("faint");
-    for (let t = Math.ceil(begin / step) * step; t <= end; t += step) context.fillText(`${+t.toPrecision(6)} s`, this.across(t), height - 5);
+    for (let t = Math.ceil(begin / step) * step; t <= end; t += step) {
+      const text = `${decimal(String(+t.toPrecision(6)))} s`;
+      context.fillText(text, Math.min(this.across(t), this.width - context.measureText(text).width - 2), height - 5);
+    }
   }
   listen() {
     const { canvas, view } = this;
     canvas.addEventListener("pointermove", ({ offsetX }) => offsetX > LABEL && view.point(this.time(offsetX)));
     canvas.addEventListener("wheel", (event) => {
+      if (!event.ctrlKey) return; // without it the page scrolls
       event.preventDefault();
       view.zoom(event.deltaY < 0 ? 0.8 : 1.25, this.time(event.offsetX));
     }, { passive: false });
     canvas.addEventListener("click", ({ offsetX, offsetY }) => {
-      const refused = this.rows[Math.floor(offsetY / ROW)]?.[2] ?? [];
-      const near = refused.reduce((best, one) => (Math.abs(this.across(one.time) - offsetX) < Math.abs(this.across(best?.time ?? -1e9) - offsetX) ? one : best), null);
-      if (near && Math.abs(this.across(near.time) - offsetX) < 12) this.onRefusal(near);
+      const one = offsetX > LABEL ? this.clicked(this.rows[Math.floor(offsetY / ROW)], offsetX) : null;
+      if (one) this.onRefusal(one);
     });
     canvas.addEventListener("keydown", (event) => this.key(event));
+  }
+  /** The refusal near a place of a row; else what the row's colour says there, by the nearest refusal of its stretch where there is one. */
+  clicked(row, px) {
+    if (!row) return null;
+    const [source, spans, refused] = row, time = this.time(px), nearest = (all) => all.reduce((best, one) => (best === null || Math.abs(one.time - time) < Math.abs(best.time - time) ? one : best), null);
+    const near = nearest(refused), span = spans.findLast(({ begin }) => begin <= time);
+    if (near && Math.abs(this.across(near.time) - px) < 12) return near;
+    if (!span || span.word === "Nominal" || span.word === "Fusing" || span.word === "Stopped") return null;
+    return (source === "mode" ? null : nearest(refused.filter((one) => one.time >= span.begin && one.time <= span.end))) ?? { time, source, word: span.word };
   }
   /** Arrows move, + and - zoom, n and p go to the next refusal and to the one before, u to the measurement at the cursor. */
   key(event) {

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the page says of findings, verdicts and ratios, and what its charts show of their values.
+import { test } from "node:test";
+import assert from "node:assert/strict";
+import { followable, verdictOf } from "../web/log_views.js";
+import { shownRange } from "../web/charts.js";
+import { times } from "../web/run.js";
+
+test("a factor that is rounded to nothing gives way to the code's own advice", () => {
+  const codes = [{ name: "wheel_scale", change: "Correct the radii." }], one = { code: "wheel_scale", cause: "c", evidence: "The robot drives 0.00 times as fast.", change: "Multiply the radii by 0.000." };
+  assert.deepEqual(followable(one, codes), { code: "wheel_scale", cause: "c", evidence: "", change: "Correct the radii." });
+  const good = { ...one, evidence: "The robot drives 1.05 times as fast.", change: "Multiply the radii by 1.050 or divide." };
+  assert.deepEqual(followable(good, codes), good);
+  assert.equal(followable({ ...good, change: "Move it by 0.005 m." }, codes).change, "Move it by 0.005 m.");
+});
+
+test("a ratio at the ceiling of its frame is at least that", () => {
+  assert.deepEqual([times(40.92), times(40.9), times(1.25, 2)], ["≥ 40.9", "40.9", "1.25"]);
+});
+
+test("a refusal has one reason", () => {
+  assert.equal(verdictOf({ verdict: "Stale", failed: "Time" }), "refused");
+  assert.equal(verdictOf({ verdict: "Stale", failed: "None" }), "refused: the sensor repeats itself");
+  assert.equal(verdictOf({ verdict: "TooLate", failed: "Time" }), "too late for the window of the fusion");
+});
+
+test("a chart shows all of its values, but for a few that would make a hairline of the others", () => {
+  const calm = Array.from({ length: 1000 }, (_, i) => Math.sin(i / 9));
+  const [low, high] = shownRange(calm);
+  assert.ok(low < -0.999 && low > -1.3 && high > 0.999 && high < 1.3);
+  const [under, over] = shownRange([100, -100, null, ...calm]);
+  assert.ok(under < -0.99 && under > -1.3 && over > 0.99 && over < 1.3);
+  const excursion = shownRange([...calm, ...Array.from({ length: 30 }, () => 21)]);
+  assert.ok(excursion[1] > 21, "3 % of the time is no few");
+  assert.deepEqual(shownRange([]), [-1, 1]);
+  const still = shownRange([5, 5, 5]);
+  assert.ok(still[0] < 5 && still[1] > 5);
+});
