@@ -31,6 +31,20 @@ test("errors are of the epoch's own truth, and a turn has no jump at pi", () => 
   assert.ok(Math.abs(live.errors("yaw_rad", run)[1][0] - (6.2 - 2 * Math.PI)) < 1e-9);
 });
 
+test("time without a position counts, of the main estimator alone", () => {
+  const live = new Live({ start_s: 1 });
+  live.take(part({ estimates: ["1,1.01,0,Odometry,0,0,0,1,1,1,0,0", "1,1.01,2,Inertial,0,0,0,1,1,1,0,1", "2,1.02,2,Inertial,0,0,0,,,,,0", "3,1.03,2,Inertial,0,0,0,,,,,0", "4,1.04,2,Inertial,0,0,0,1,1,1,0,1"], truth: ["1.01,0,0,0,0"] }));
+  assert.equal(live.unknown(live.run()), 0.5);
+});
+
+test("a sensor that never spoke is not said to have stopped, and one that did is", () => {
+  const live = new Live({ start_s: 1 });
+  live.take(part({ estimates: ["1,1.01,2,Inertial,0,0,0,1,1,1,0,1"], truth: ["1.01,0,0,0,0"],
+    sources: ["1,2,2,Barometer,Stopped,None", "1,2,2,GnssPosition,Stopped,None", "2,3,2,GnssPosition,Fusing,None", "3,4,2,Barometer,Stopped,None", "3,4,2,GnssPosition,Stopped,None"] }));
+  live.run();
+  assert.deepEqual(live.said.map(({ source, word }) => `${source} ${word}`), ["GnssPosition Fusing", "GnssPosition Stopped"]);
+});
+
 test("what changes is said once, and a refusal again after a pause", () => {
   const live = new Live({ start_s: 1 });
   const estimates = ["1,1.01,2,Inertial,0,0,0,1,1,1,0,1"], truth = ["1.01,0,0,0,0"];

@@ -5,7 +5,7 @@ import { Chart } from "./charts.js";
 import { View } from "./view.js";
 import { GRID, HIDDEN, LESSON, band, drive, figures, gradeBraking, gradeNoise, gradePrediction } from "./lesson.js";
 import { renderUpdate, short } from "./update_view.js";
-import { say } from "./texts.js";
+import { decimal, languageNow, say } from "./texts.js";
 
 const SLIDERS = [["q", -6, 1], ["r_m2", -2, 2], ["p0", -3, 3]];
 
@@ -35,7 +35,7 @@ export class LessonView {
     this.parts = Object.fromEntries(["chart", "figures", "update"].map((name) => [name, element("div", { class: name })]));
     replace(this.parent, element("h2", {}, say("lesson.title")), element("p", {}, say("lesson.cart")), element("p", {}, say("lesson.model")), this.example(),
       element("h3", {}, say("lesson.move")), element("p", {}, say("lesson.move.note")), element("div", { class: "controls" }, SLIDERS.map((one) => this.slider(one))), this.brakesButton(),
-      this.parts.chart, this.parts.figures,
+      this.parts.chart, element("p", { class: "note" }, say("lesson.legend")), this.parts.figures,
       element("h3", {}, say("lesson.open")), this.stepSlider(), this.parts.update,
       element("h3", {}, say("lesson.fail")), element("p", {}, say("lesson.fail.note")),
       element("h3", {}, say("lesson.questions")), element("ol", { class: "questions" }, this.questions()));
@@ -45,9 +45,9 @@ export class LessonView {
   }
   /** The first step with the numbers of the text, as the module has it. */
   example() {
-    const { prior, s } = this.worked, k = [prior[0] / s[0], prior[2] / s[0]];
+    const { prior, s } = this.worked, digits = (x) => decimal(x.toFixed(3)), k = [prior[0] / s[0], prior[2] / s[0]];
     return element("div", { class: "example", id: "lesson-example" }, element("p", {}, say("lesson.example", short(LESSON.p0), short(LESSON.q), short(LESSON.r_m2), short(LESSON.dt_s))),
-      element("ul", {}, [["F P F' + Q", `(1,1) = ${prior[0].toFixed(3)}`], ["S", s[0].toFixed(3)], ["K", `(${k.map((x) => x.toFixed(3)).join(", ")})`]].map(([name, value]) => element("li", {}, `${name} `, element("strong", {}, value)))));
+      element("ul", {}, [["F P F' + Q", `(1,1) = ${digits(prior[0])}`], ["S", digits(s[0])], ["K", `(${k.map(digits).join(languageNow() === "id" ? "; " : ", ")})`]].map(([name, value]) => element("li", {}, `${name} `, element("strong", {}, value)))));
   }
   slider([name, least, most]) {
     const shown = element("output", {}, short(this.numbers[name]));
@@ -78,7 +78,7 @@ export class LessonView {
       const view = new View();
       view.reset([0, t.at(-1)]);
       const thin = { stroke: `${colour("first")}66`, width: 0.5, points: { show: false } };
-      this.chart = new Chart(this.parts.chart, view, { title: "", height: 260, data, bands: [{ series: [4, 5], fill: `${colour("first")}22` }],
+      this.chart = new Chart(this.parts.chart, view, { title: "", height: 300, labels: [say("axis.time"), say("axis.position")], data, bands: [{ series: [4, 5], fill: `${colour("first")}22` }],
         series: [{ label: "z", stroke: colour("faint"), paths: () => null, points: { show: true, size: 4, fill: colour("faint") } }, { label: say("lesson.truth"), stroke: colour("truth"), width: 1.5, dash: [4, 4], points: { show: false } },
           { label: say("run.estimate"), stroke: colour("first"), width: 2, points: { show: false } }, { ...thin, label: "+3σ" }, { ...thin, label: "−3σ" }] });
       this.chart.plot.over.addEventListener("click", () => this.openAt(this.chart.plot.posToVal(this.chart.plot.cursor.left, "x")));
@@ -94,7 +94,7 @@ export class LessonView {
     this.renderStep();
   }
   renderStep() {
-    this.stepShown.textContent = `${this.step} (${(this.step * LESSON.dt_s).toFixed(1)} s)`;
+    this.stepShown.textContent = `${this.step} (${decimal((this.step * LESSON.dt_s).toFixed(1))} s)`;
     renderUpdate(this.parts.update, this.updates[this.step - 1]);
   }
 

@@ -56,6 +56,14 @@ export class Live {
     return [t, error, band];
   }
 
+  /** Share of the epochs up to now at which the estimator gave no position. */
+  unknown(run) {
+    const table = this.tables.estimates, number = table.values("estimator"), valid = table.values("pos_valid");
+    let all = 0, none = 0;
+    for (let row = 0; row < table.rows; row++) if (number[row] === run.estimator) all++, valid[row] > 0 || none++;
+    return all > 0 ? none / all : 1;
+  }
+
   say(time, what) {
     this.said.push({ time: Math.max(0, time - this.start), ...what });
   }
@@ -85,8 +93,9 @@ export class Live {
     this.rows("sources", (table, row, time) => {
       if (table.values("estimator")[row] !== estimator) return;
       const source = table.word("source", row), word = table.word("state", row);
-      if (this.states.get(source) === word) return;
+      const before = this.states.get(source);
       this.states.set(source, word);
+      if (before === word || (before === undefined && word === "Stopped")) return; // a sensor that the robot may not have
       this.say(time, { kind: "source", source, word, failed: table.word("failed", row) });
     });
   }

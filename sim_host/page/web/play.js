@@ -5,9 +5,16 @@ import { Chart } from "./charts.js";
 import { Live } from "./live.js";
 import { PathView } from "./path_view.js";
 import { View } from "./view.js";
-import { say } from "./texts.js";
+import { verdictOf } from "./log_views.js";
+import { times } from "./run.js";
+import { decimal, say } from "./texts.js";
+import { faultText } from "./texts_module.js";
 
 const TICKS_PER_S = 100, MOST_TICKS = 150;
+/** A fault that does nothing new for so long: seconds that must be left for it to show. */
+const NEEDED_S = { gnss_far: 216 };
+/** Above this share without a position nothing is said of the errors of the rest. */
+const MOST_UNKNOWN = 0.2;
 const SPEEDS = [1, 2, 5, 10], LINES = 60;
 const TONE = { Nominal: "good", Fusing: "good", DeadReckoning: "warning", Degraded: "warning", Rejecting: "bad", Distrusted: "bad", Fault: "bad" };
 const GROUPS = ["gnss", "wheels", "imu", "magnetometer", "landmarks", "lidar", "features", "any"];
@@ -68,8 +75,12 @@ export class Play {
     await this.renderHash();
     this.renderControls();
   }
+  /** Whether what is left of the run is too short for a fault. */
+  late({ name }) {
+    return (NEEDED_S[name] ?? 0) > this.stage.duration_s - this.live.played.time_s;
+  }
   async inject({ number, name, duration_s }) {
-    if (!this.live) return;
+    if (!this.live || this.late({ name })) return;
     const { live } = this, fault = await this.tasks.run("inject", { fault: number, seconds: duration_s }).catch((error) => this.fail(error));
     if (!fault || live !== this.live) return;
     this.faults.push(fault);
@@ -107,7 +118,8 @@ export class Play {
     this.summary = element("p", { class: "summary" });
     replace(this.parent, element("h2", {}, say("play.title")), element("p", { class: "note" }, say("play.note")), this.parts.controls,
       this.failed ? element("p", { class: "bad" }, this.failed) : null,
-      element("div", { class: "scene" }, path, this.parts.words), element("p", { class: "note" }, say("play.legend")), this.parts.faults, this.parts.chart, this.summary, this.parts.keep);
+      element("div", { class: "scene" }, path, this.parts.faults, this.parts.words), element("p", { class: "note" }, say("play.legend")),
+      element("details", { open: true }, element("summary", {}, "σ, gate, outage"), ["sigma", "gate", "outage"].map((word) => element("p", { class: "note" }, say(`play.${word}`)))), this.parts.chart, this.summary, this.parts.keep);
     this.renderControls();
     if (!this.live) return;
     this.view.clear();
@@ -144,8 +156,11 @@ export class Play {
     this.stage.faults = groups.flatMap(([, all]) => all);
     replace(this.parts.faults, groups.map(([on, all]) => element("fieldset", {}, element("legend", {}, say(`on.${on}`)),
       all.map((fault) => {
-        const button = element("button", { "data-fault": fault.name, title: fault.what, onclick: () => this.inject(fault) }, say(`inject.${fault.name}`));
-        this.buttons.set(fault.name, button);
+        const button = element("button", { "data-fault": fault.name, title: faultText(fault), onclick: ({ currentTarget, detail }) => {
+          if (detail > 0) currentTarget.blur(); // Space starts and pauses again
+          this.inject(fault);
+        } }, say(`inject.${fault.name}`));
+        this.buttons.set(fault.name, { button, fault });
         return button;
       }))));
   }
@@ -153,9 +168,11 @@ export class Play {
   renderLive() {
     const began = performance.now();
     this.renderClock();
-    for (const [name, button] of this.buttons) {
+    for (const [name, { button, fault }] of this.buttons) {
       const left = Math.max(0, ...this.faults.filter((one) => one.name === name).map(({ end_s }) => end_s - this.live.played.time_s));
       button.setAttribute("aria-pressed", left > 0);
+      button.disabled = left === 0 && this.late(fault);
+      button.title = button.disabled ? say("play.late", NEEDED_S[name], Math.max(0, this.stage.duration_s - this.live.played.time_s).toFixed(0)) : faultText(fault);
       button.textContent = left > 0 ? `${say(`inject.${name}`)} · ${Math.ceil(left)} s` : say(`inject.${name}`);
     }
     if (this.live.tables.estimates?.rows > 0) {
@@ -182,8 +199,8 @@ export class Play {
     const [t, error, band] = this.live.errors(this.error, run);
     this.chart.view.whole = this.chart.view.span = [0, Math.max(10, this.live.played.time_s)];
     this.chart.plot.setData([t, error, band, band.map((x) => -x)]);
-    const inside = error.filter((x, i) => Math.abs(x) <= band[i]).length;
-    this.summary.textContent = t.length > 0 ? say("play.inside", ((100 * inside) / t.length).toFixed(1)) : "";
+    const inside = error.filter((x, i) => Math.abs(x) <= band[i]).length, unknown = this.live.unknown(run);
+    this.summary.textContent = [t.length > 0 && unknown <= MOST_UNKNOWN && say("play.inside", ((100 * inside) / t.length).toFixed(1)), unknown >= 0.0005 && say("play.unknown", (100 * unknown).toFixed(1))].filter(Boolean).join(" ");
   }
   renderWords() {
     const { mode, said } = this.live;
@@ -196,11 +213,11 @@ export class Play {
       mode: () => `${say("source.mode")}: ${say(`word.${one.word}`)}.`,
       fault: () => say("why.faults", say(`fault.${one.bit}`)),
       source: () => `${say(`source.${one.source}`)}: ${say(`word.${one.word}`)}. ${say(`check.${one.failed}`)}`,
-      refusal: () => `${say(`source.${one.source}`)}: ${say(`verdict.${one.verdict}`)}. ${say(`check.${one.failed}`)}${Number.isNaN(one.ratio) ? "" : ` ${say("why.ratio", one.ratio.toFixed(1))}`}`,
+      refusal: () => `${say(`source.${one.source}`)}: ${verdictOf(one)}. ${say(`check.${one.failed}`)}${Number.isNaN(one.ratio) ? "" : ` ${say("why.ratio", times(one.ratio))}`}`,
       injected: () => say("play.injected", say(`inject.${one.name}`)),
     };
     const ink = kind === "injected" ? "own" : kind === "refusal" || kind === "fault" ? "bad" : TONE[one.word] ?? "";
-    return element("li", { class: ink, "data-kind": kind }, element("time", {}, `${time.toFixed(1)} s`), ` ${words[kind]()}`);
+    return element("li", { class: ink, "data-kind": kind }, element("time", {}, `${decimal(time.toFixed(1))} s`), ` ${words[kind]()}`);
   }
   /** What can be kept of the run, once it stands still. */
   async renderHash() {
