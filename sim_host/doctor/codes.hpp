@@ -100,7 +100,7 @@ inline constexpr std::array kCodes{
             "The gyroscope against wheels, course or magnetic field.", "Multiply the gyroscope's values by pi/180.",
             kGyroscope},
     CodeRow{Code::kWheelsReversed, "wheels_reversed", "Both wheels count backwards.",
-            "The turn by the wheels against the gyroscope, and the way ahead against the way back.",
+            "The turn by the wheels against the gyroscope, and motion ahead against motion astern.",
             "Negate both wheels in the sender, or swap channels A and B of both encoders.", kWheels},
     CodeRow{Code::kAccelSign, "accel_sign", "An axis of the accelerometer, or all of them, has the wrong sign.",
             "Gravity, acceleration and curves by the accelerometer against the turns and speeds of other devices.",

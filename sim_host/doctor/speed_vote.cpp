@@ -36,13 +36,13 @@ std::string words(const std::array<SpeedRatio, 3>& ratios) {
   return all;
 }
 
-Finding of_velocity(double factor, Devices uses, std::string evidence) {
+Finding of_velocity(double factor, Devices uses, const std::string& evidence) {
   return {.code = Code::kVelocityUnit,
           .uses = uses,
           .evidence = evidence + named(factor, kOfVelocity),
           .change = text("Multiply In_GnssVelEN and In_GnssVelU by %.4g in the sender: they are in m/s.", 1 / factor)};
 }
-Finding of_fixes(double factor, Devices uses, std::string evidence) {
+Finding of_fixes(double factor, Devices uses, const std::string& evidence) {
   return {.code = Code::kFixUnit, .uses = uses, .evidence = evidence + named(factor, kOfFixes), .change = {}};
 }
 Finding of_wheels(const SpeedRatio& ratio, Devices uses) {

@@ -49,23 +49,23 @@ constexpr std::size_t plain_bytes_of_all(std::type_identity<std::tuple<E...>>, s
 template <class T>
 struct PlainBytes {
   static constexpr std::size_t kSize = [] {
-    if constexpr (std::is_same_v<T, bool> || std::is_pointer_v<T> || std::is_union_v<T> || std::is_empty_v<T>) {
-      return std::size_t{0};
-    } else if constexpr (std::is_arithmetic_v<T> || std::is_enum_v<T>) {
-      return sizeof(T) == 4 || sizeof(T) == 8 ? sizeof(T) : std::size_t{0};
-    } else if constexpr (requires { T::SizeAtCompileTime; }) {
-      constexpr std::size_t kBytes = T::SizeAtCompileTime * plain_bytes<typename T::Scalar>();
-      return kBytes == sizeof(T) ? kBytes : std::size_t{0};
-    } else if constexpr (requires(const T& t) { t.packed(); }) {
-      constexpr std::size_t kBytes = plain_bytes<std::remove_cvref_t<decltype(std::declval<const T&>().packed())>>();
-      return kBytes == sizeof(T) ? kBytes : std::size_t{0};
-    } else if constexpr (ListsMembers<const T>) {
-      return plain_bytes_of_all(std::type_identity<List<const T>>(), sizeof(T));
-    } else if constexpr (std::is_aggregate_v<T> && requires(const T& t) { fields(t); }) {
-      return plain_bytes_of_all(std::type_identity<decltype(fields(std::declval<const T&>()))>(), sizeof(T));
-    } else {
-      return std::size_t{0};
+    std::size_t bytes = 0;
+    if constexpr (!(std::is_same_v<T, bool> || std::is_pointer_v<T> || std::is_union_v<T> || std::is_empty_v<T>)) {
+      if constexpr (std::is_arithmetic_v<T> || std::is_enum_v<T>) {
+        bytes = sizeof(T) == 4 || sizeof(T) == 8 ? sizeof(T) : 0;
+      } else if constexpr (requires { T::SizeAtCompileTime; }) {
+        constexpr std::size_t kBytes = T::SizeAtCompileTime * plain_bytes<typename T::Scalar>();
+        bytes = kBytes == sizeof(T) ? kBytes : 0;
+      } else if constexpr (requires(const T& t) { t.packed(); }) {
+        constexpr std::size_t kBytes = plain_bytes<std::remove_cvref_t<decltype(std::declval<const T&>().packed())>>();
+        bytes = kBytes == sizeof(T) ? kBytes : 0;
+      } else if constexpr (ListsMembers<const T>) {
+        bytes = plain_bytes_of_all(std::type_identity<List<const T>>(), sizeof(T));
+      } else if constexpr (std::is_aggregate_v<T> && requires(const T& t) { fields(t); }) {
+        bytes = plain_bytes_of_all(std::type_identity<decltype(fields(std::declval<const T&>()))>(), sizeof(T));
+      }
     }
+    return bytes;
   }();
 };
 template <class T, std::size_t kLength>

@@ -29,7 +29,8 @@ struct LikelihoodField {
   std::span<const std::uint8_t> tiles;
 
   [[nodiscard]] constexpr std::uint8_t tile(int column, int row) const {
-    return index[static_cast<std::size_t>(row * columns + column)];
+    const int place = row * columns + column;
+    return index[static_cast<std::size_t>(place)];
   }
   /// Level of a cell, 0 in a wall; kUnknown outside of the map.
   [[nodiscard]] constexpr int level(int x, int y) const {
@@ -37,8 +38,8 @@ struct LikelihoodField {
     const std::uint8_t number = tile(x / kTile, y / kTile);
     if (number == kEmpty) return kFar;
     if (number == kUnseen) return kUnknown;
-    const auto place = static_cast<std::size_t>(y % kTile * kTile + x % kTile);
-    const std::uint8_t both = tiles[(number - 1U) * kTileBytes + place / 2];
+    const int place = y % kTile * kTile + x % kTile;
+    const std::uint8_t both = tiles[(number - 1U) * kTileBytes + static_cast<std::size_t>(place / 2)];
     return place % 2 == 0 ? both & 15 : both >> 4;
   }
   /// Sizes fit each other, and each number of the index has its tile.

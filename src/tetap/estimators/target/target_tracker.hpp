@@ -93,7 +93,7 @@ class TurnTracking {
   template <class Model>
   [[nodiscard]] auto update(const Model& model, float gate, const param::TargetParameters& n) {
     if (turns_) return filter_.update(model(std::type_identity<State>{}), gate);
-    const auto result = straight_.update(model, gate, n);
+    auto result = straight_.update(model, gate, n);
     if (result.verdict == filter::Verdict::kAccepted) begin_to_turn(n);
     return result;
   }
