@@ -8,7 +8,7 @@ namespace tetap::robot::tracker_ukf {
 
 inline constexpr param::Parameters parameters = param::checked({
     .target = {.acceleration_mps2 = 1.5F,
-               .yaw_acceleration_radps2 = 0.55F,
+               .yaw_acceleration_radps2 = 0.6F,
                .sigma_speed_mps = 5,
                .sigma_yaw_rad = 0.1F,
                .gate_scale = 3},
