@@ -6,20 +6,18 @@
 // Delayed, as the odometry by scans is.
 #pragma once
 
-#include "tetap/estimators/mapping/scan_odometry.hpp"
+#include "tetap/estimators/mapping/on_scan_odometry.hpp"
 #include "tetap/slam/field_localisation.hpp"
 
 namespace tetap::estimators {
 
 template <int kBeams, int kFrames, std::size_t kParticles>
-class ScanLocalizer {
+class ScanLocalizer : public OnScanOdometry<kBeams, kFrames> {
   using Odometer = ScanOdometry<kBeams, kFrames>;
   using Localisation = slam::FieldLocalisation<kParticles>;
 
  public:
   static constexpr sensor::EstimatorKind kKind = sensor::EstimatorKind::kParticle;
-  static constexpr bool kDelayed = true;
-  static constexpr int kMostBeams = kBeams;
 
   /// Without a start pose the robot looks for itself on the whole map.
   void restart(base::Micros t, const Context& ctx);
@@ -29,35 +27,19 @@ class ScanLocalizer {
   /// A scan's match first, then the particles, then the search of the map.
   void work(std::uint32_t units, const Context& ctx);
   void abort_job();
-  [[nodiscard]] bool defers(const sensor::Sample& sample, const Context& ctx) const {
-    return odometer_.defers(sample, ctx);
-  }
 
-  template <class Input>
-  requires requires(Odometer& odometer, const Input& input, const Context& ctx) {
-    odometer.fuse(input, base::Micros{}, ctx);
-  }
-  Innovation fuse(const Input& input, base::Micros stamp, const Context& ctx) {
-    return odometer_.fuse(input, stamp, ctx);
-  }
+  using OnScanOdometry<kBeams, kFrames>::fuse;
   Innovation fuse(const sensor::PlanarScan& scan, base::Micros stamp, std::uint8_t instance, const Context& ctx) {
     return odometer_.fuse(scan, stamp, instance, ctx);
   }
-  template <class Sink>
-  void late_records(Sink&& sink) {
-    odometer_.late_records(sink);
-  }
-  static void close_batch(const Context&) {}
 
   /// Not valid: the odometry since the start, or since the pose was lost.
   [[nodiscard]] Estimate estimate(const Context& ctx) const;
-  [[nodiscard]] MotionVariance motion_variance(const Context& ctx) const { return odometer_.motion_variance(ctx); }
   /// Aligning: the robot looks for itself. Waiting: there is no map.
   [[nodiscard]] sensor::Mode mode(const Context& ctx) const {
     if (ctx.field == nullptr) return sensor::Mode::kWaitingForPose;
     return localisation_.valid() ? odometer_.mode(ctx) : sensor::Mode::kAligning;
   }
-  [[nodiscard]] ScanMatchReport scan_match() const { return odometer_.scan_match(); }
   [[nodiscard]] const Localisation& localisation() const { return localisation_; }
 
   /// The particles and the search are not hashed: the digest stands for what each scan made of them.
@@ -84,7 +66,7 @@ class ScanLocalizer {
   void start(const SetPose& given);
   void adopt(const Context& ctx);
 
-  Odometer odometer_;
+  using OnScanOdometry<kBeams, kFrames>::odometer_;
   Localisation localisation_;
   typename Odometer::Pose last_;     ///< pose of the odometry at the latest scan
   typename Odometer::Pose weighed_;  ///< pose of the odometry at the scan that is being weighed

@@ -7,22 +7,20 @@
 #pragma once
 
 #include "tetap/estimators/mapping/graph_mapper.hpp"
-#include "tetap/estimators/mapping/scan_odometry.hpp"
+#include "tetap/estimators/mapping/on_scan_odometry.hpp"
 #include "tetap/slam/scan_closures.hpp"
 
 namespace tetap::estimators {
 
 /// Graph: slam::KeyframeGraph. Of each keyframe up to kKept ranges are kept, of up to kScans keyframes.
 template <int kBeams, int kFrames, class Graph, int kKept, int kScans>
-class ScanMapper {
+class ScanMapper : public OnScanOdometry<kBeams, kFrames> {
   using Odometer = ScanOdometry<kBeams, kFrames>;
   using Mapper = GraphMapper<Graph>;
   using Closures = slam::ScanClosures<kBeams, kKept, kScans>;
 
  public:
   static constexpr sensor::EstimatorKind kKind = Mapper::kKind;
-  static constexpr bool kDelayed = true;
-  static constexpr int kMostBeams = kBeams;
 
   void restart(base::Micros t, const Context& ctx);
   /// The whole map moves rigidly, so that the robot is there.
@@ -33,37 +31,21 @@ class ScanMapper {
   /// A scan's match first, then the graph's job, then the search for closures.
   void work(std::uint32_t units, const Context& ctx);
   void abort_job();
-  [[nodiscard]] bool defers(const sensor::Sample& sample, const Context& ctx) const {
-    return odometer_.defers(sample, ctx);
-  }
 
-  template <class Input>
-  requires requires(Odometer& odometer, const Input& input, const Context& ctx) {
-    odometer.fuse(input, base::Micros{}, ctx);
-  }
-  Innovation fuse(const Input& input, base::Micros stamp, const Context& ctx) {
-    return odometer_.fuse(input, stamp, ctx);
-  }
+  using OnScanOdometry<kBeams, kFrames>::fuse;
   Innovation fuse(const sensor::PlanarScan& scan, base::Micros stamp, std::uint8_t instance, const Context& ctx);
   /// A closure from elsewhere.
   Innovation fuse(const sensor::LoopClosure& closure, base::Micros stamp, const Context& ctx) {
     return mapper_.fuse(closure, stamp, ctx);
   }
-  template <class Sink>
-  void late_records(Sink&& sink) {
-    odometer_.late_records(sink);
-  }
-  static void close_batch(const Context&) {}
 
   [[nodiscard]] Estimate estimate(const Context& ctx) const { return odometer_.estimate(ctx); }
-  [[nodiscard]] MotionVariance motion_variance(const Context& ctx) const { return odometer_.motion_variance(ctx); }
   /// Degraded: the latest optimisation did not converge.
   [[nodiscard]] sensor::Mode mode(const Context& ctx) const {
     const sensor::Mode map = mapper_.mode(ctx);
     return map == sensor::Mode::kDegraded ? map : odometer_.mode(ctx);
   }
   [[nodiscard]] std::uint16_t faults() const { return mapper_.faults(); }
-  [[nodiscard]] ScanMatchReport scan_match() const { return odometer_.scan_match(); }
   [[nodiscard]] MapReport own_map() const { return mapper_.own_map(); }
   [[nodiscard]] GraphReport graph() const { return mapper_.graph(); }
   [[nodiscard]] GraphKeyframe own_keyframe(std::size_t i) const { return mapper_.own_keyframe(i); }
@@ -89,7 +71,7 @@ class ScanMapper {
   /// The odometry goes on from where the graph has its latest keyframe.
   void follow_graph();
 
-  Odometer odometer_;
+  using OnScanOdometry<kBeams, kFrames>::odometer_;
   Mapper mapper_;
   Closures closures_;
   base::StateDigest digest_;
