@@ -3,11 +3,10 @@
 // which the filter takes for given.
 #pragma once
 
-#include "slam/visual_drive.hpp"
+#include "slam/noisy_drive.hpp"
 #include "tetap/slam/visual_map.hpp"
 
 #include <optional>
-#include <random>
 
 namespace tetap::test {
 
@@ -22,33 +21,25 @@ struct MapWorldOptions {
   double sigma_mounting_rad = 0.003;
 };
 
-class MapWorld {
+class MapWorld : public NoisyDrive {
  public:
   using Features = std::vector<slam::ImageFeature>;
 
-  explicit MapWorld(const MapWorldOptions& options) : o_(options), random_(options.seed) {
-    drive_.camera = {.fu_px = 458, .fv_px = 458, .cu_px = 319.5F, .cv_px = 239.5F};
-    Eigen::Matrix3d c;
-    c << 0, -1, 0, 0, 0, -1, 1, 0, 0;
-    drive_.mounting = {.q_cb = in_float(c), .lever_b_m = {0.2F, 0.0F, 0.3F}};
-    drive_.means = true;
-    true_c_ = rotation(normals() * o_.sigma_mounting_rad) * c;
-    turn_ = rotation({0, 0, o_.start_yaw_rad});
-    error_ = {normal() * d(o_.noise.sigma_scale), normal() * d(o_.noise.sigma_direction_rad),
-              normal() * d(o_.noise.sigma_direction_rad)};
+  explicit MapWorld(const MapWorldOptions& options)
+      : NoisyDrive({.seed = options.seed,
+                    .step_s = options.step_s,
+                    .sigma_px = options.sigma_px,
+                    .start_yaw_rad = options.start_yaw_rad,
+                    .noise = options.noise,
+                    .sigma_mounting_rad = options.sigma_mounting_rad},
+                   {.fu_px = 458, .fv_px = 458, .cu_px = 319.5F, .cv_px = 239.5F}, {0.2F, 0.0F, 0.3F}),
+        o_(options) {
     for (int i = 0; i < o_.posts; ++i)
       posts.push_back(around((i + 0.5) * 2 * kPi_ / o_.posts, i % 2 == 0 ? -2 : 2, 0.4 + 0.3 * (i % 4)));
     for (int i = 0; i < 400; ++i) points_.push_back({around(uniform(0, 2 * kPi_), uniform(-6, 8), uniform(0, 2))});
     const double lap_s = 2 * kPi_ * o_.radius_m / o_.speed_mps;
     per_lap = static_cast<int>(std::lround(lap_s / o_.step_s));
     for (int k = 0; k <= o_.laps * per_lap; ++k) add_image(k);
-  }
-  [[nodiscard]] const Drive& drive() const { return drive_; }
-  [[nodiscard]] slam::VisualOptions options() const {
-    return {.camera = drive_.camera,
-            .mounting = drive_.mounting,
-            .sigma_px = static_cast<float>(o_.sigma_px),
-            .sigma_mounting_rad = static_cast<float>(o_.sigma_mounting_rad)};
   }
 
   std::vector<Eigen::Vector3d> posts;
@@ -61,34 +52,18 @@ class MapWorld {
     Eigen::Vector3d at;
     int id = -1;  ///< none: not followed
   };
-  static double d(float v) { return static_cast<double>(v); }
-  double normal() { return normal_(random_); }
-  double uniform(double low, double high) { return std::uniform_real_distribution<double>(low, high)(random_); }
-  Eigen::Vector3d normals() {
-    const double a = normal(), b = normal(), c = normal();
-    return {a, b, c};
-  }
   /// Beside the way, which is a circle that begins at the origin, towards x.
   Eigen::Vector3d around(double angle, double out_m, double z_m) const {
     const double r = o_.radius_m + out_m;
-    return turn_ * Eigen::Vector3d(r * std::sin(angle), o_.radius_m - r * std::cos(angle), z_m);
+    return start_r_ * Eigen::Vector3d(r * std::sin(angle), o_.radius_m - r * std::cos(angle), z_m);
   }
   void add_image(int k) {
     DriveImage image;
     image.time_s = 1.0 + k * o_.step_s;
     if (k == 0) {
-      image.r_nb = turn_;
+      image.r_nb = start_r_;
     } else {
-      const DriveImage& before = drive_.images.back();
-      const double dt_s = o_.step_s, root = std::sqrt(dt_s);
-      const Eigen::Vector3d rate(0, 0, o_.speed_mps / o_.radius_m), speed(o_.speed_mps, 0, 0);
-      image.p_n_m = before.p_n_m + before.r_nb * rotation(rate * dt_s / 2) * speed * dt_s;
-      image.r_nb = before.r_nb * rotation(rate * dt_s);
-      const double measured = o_.speed_mps / (1 + error_(0));
-      image.speed_b_mps = speed - measured * error_ + normals() * (d(o_.noise.position_walk_m) / root);
-      image.rate_b_radps = rate + normals() * (d(o_.noise.angle_walk_rad) / root);
-      error_(1) += normal() * d(o_.noise.direction_walk_rad) * root;
-      error_(2) += normal() * d(o_.noise.direction_walk_rad) * root;
+      move(drive_.images.back(), image, o_.speed_mps, {0, 0, o_.speed_mps / o_.radius_m});
     }
     follow(image);
     Features found;
@@ -127,11 +102,6 @@ class MapWorld {
   }
 
   MapWorldOptions o_;
-  std::mt19937 random_;
-  std::normal_distribution<double> normal_;
-  Drive drive_;
-  Eigen::Matrix3d true_c_, turn_;
-  Eigen::Vector3d error_;
   std::vector<Point> points_;
   unsigned next_id_ = 0;
 };

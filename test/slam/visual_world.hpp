@@ -2,9 +2,7 @@
 // A simulated road between points on both sides, seen by a camera whose noise is that which the filter takes for given.
 #pragma once
 
-#include "slam/visual_drive.hpp"
-
-#include <random>
+#include "slam/noisy_drive.hpp"
 
 namespace tetap::test {
 
@@ -21,42 +19,26 @@ struct VisualWorldOptions {
   Eigen::Vector3d moving_mps{6, 0.5, 0};
 };
 
-class VisualWorld {
+class VisualWorld : public NoisyDrive {
  public:
-  explicit VisualWorld(const VisualWorldOptions& options) : o_(options), random_(options.seed) {
-    drive_.camera = {.fu_px = 720, .fv_px = 720, .cu_px = 610, .cv_px = 185};
-    Eigen::Matrix3d c;
-    c << 0, -1, 0, 0, 0, -1, 1, 0, 0;
-    drive_.mounting = {.q_cb = in_float(c), .lever_b_m = {1.0F, 0.2F, 0.7F}};
-    drive_.means = true;
-    true_c_ = rotation(normals() * o_.sigma_mounting_rad) * c;
-    error_ = {normal() * d(o_.noise.sigma_scale), normal() * d(o_.noise.sigma_direction_rad),
-              normal() * d(o_.noise.sigma_direction_rad)};
-    start_r_ = rotation({0, 0, o_.start_yaw_rad});
+  explicit VisualWorld(const VisualWorldOptions& options)
+      : NoisyDrive({.seed = options.seed,
+                    .step_s = options.step_s,
+                    .sigma_px = options.sigma_px,
+                    .start_yaw_rad = options.start_yaw_rad,
+                    .noise = options.noise,
+                    .sigma_mounting_rad = options.sigma_mounting_rad},
+                   {.fu_px = 720, .fv_px = 720, .cu_px = 610, .cv_px = 185}, {1.0F, 0.2F, 0.7F}),
+        o_(options) {
     for (int k = 0; k < o_.images; ++k) add_image(k);
-  }
-  [[nodiscard]] const Drive& drive() const { return drive_; }
-  /// Options of a window that fit this world.
-  [[nodiscard]] slam::VisualOptions options() const {
-    return {.camera = drive_.camera,
-            .mounting = drive_.mounting,
-            .sigma_px = static_cast<float>(o_.sigma_px),
-            .sigma_mounting_rad = static_cast<float>(o_.sigma_mounting_rad)};
   }
 
  private:
-  static double d(float v) { return static_cast<double>(v); }
   struct Point {
     Eigen::Vector3d at;
     std::uint16_t id = 0;
     bool moves = false;
   };
-  double normal() { return normal_(random_); }
-  double uniform(double low, double high) { return std::uniform_real_distribution<double>(low, high)(random_); }
-  Eigen::Vector3d normals() {
-    const double a = normal(), b = normal(), c = normal();
-    return {a, b, c};
-  }
 
   void add_image(int k) {
     DriveImage image;
@@ -65,27 +47,17 @@ class VisualWorld {
       image.r_nb = start_r_;
       image.p_n_m = o_.start_n_m;
     } else {
-      move(drive_.images.back(), image, k * o_.step_s);
+      drive_on(drive_.images.back(), image, k * o_.step_s);
     }
     see(image);
     drive_.images.push_back(image);
   }
-  void move(const DriveImage& before, DriveImage& image, double t_s) {
-    const double dt_s = o_.step_s;
+  void drive_on(const DriveImage& before, DriveImage& image, double t_s) {
     const bool sways = o_.sway_m > 0;
     const Eigen::Vector3d rate =
         sways ? Eigen::Vector3d(0, 0, 0)
               : Eigen::Vector3d(0.02 * std::sin(1.1 * t_s), 0.02 * std::sin(0.9 * t_s + 1), 0.2 * std::sin(0.35 * t_s));
-    const double forward = sways ? 3 * o_.sway_m * std::cos(3 * t_s) : 8 + 2 * std::sin(0.3 * t_s);
-    const Eigen::Vector3d speed(forward, 0, 0);
-    image.p_n_m = before.p_n_m + before.r_nb * rotation(rate * dt_s / 2) * speed * dt_s;
-    image.r_nb = before.r_nb * rotation(rate * dt_s);
-    const double measured = forward / (1 + error_(0));
-    const double root = std::sqrt(dt_s);
-    image.speed_b_mps = speed - measured * error_ + normals() * (d(o_.noise.position_walk_m) / root);
-    image.rate_b_radps = rate + normals() * (d(o_.noise.angle_walk_rad) / root);
-    error_(1) += normal() * d(o_.noise.direction_walk_rad) * root;
-    error_(2) += normal() * d(o_.noise.direction_walk_rad) * root;
+    move(before, image, sways ? 3 * o_.sway_m * std::cos(3 * t_s) : 8 + 2 * std::sin(0.3 * t_s), rate);
   }
   /// Points stay tracked while they are seen; new ones are made up where room for 40 is left.
   void see(DriveImage& image) {
@@ -120,11 +92,6 @@ class VisualWorld {
   }
 
   VisualWorldOptions o_;
-  std::mt19937 random_;
-  std::normal_distribution<double> normal_;
-  Drive drive_;
-  Eigen::Matrix3d true_c_, start_r_;
-  Eigen::Vector3d error_;
   std::vector<Point> points_;
   unsigned next_id_ = 0;
 };
