@@ -53,6 +53,11 @@ def turn(yaw):
     return np.array([[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]])
 
 
+def placed(pose, frame):
+    """A pose given in a frame, in that in which the frame's own pose is given: x, y, yaw (m, m, rad)."""
+    return (*(np.asarray(frame[:2]) + turn(frame[2]) @ np.asarray(pose[:2])), pose[2] + frame[2])
+
+
 def cells(points, low, resolution, size):
     """Numbers of the cells, by rows from below."""
     column, row = (np.floor(points / resolution).astype(np.int64) - low).T

@@ -45,8 +45,7 @@ def keyframes(messages, path):
 
 def seen(drawn, mounting, least, most):
     """Poses of the scanner and the points it saw. `mounting`: the scanner on the robot as x, y, yaw (m, m, rad)."""
-    for (x, y, yaw), first, step, ranges in drawn:
+    for pose, first, step, ranges in drawn:
         bearing = first + step * np.arange(len(ranges))
         good = (ranges >= max(least, STEP_M)) & (ranges <= most)
-        place = np.array([x, y]) + occupancy.turn(yaw) @ np.asarray(mounting[:2])
-        yield (*place, yaw + mounting[2]), np.column_stack([np.cos(bearing), np.sin(bearing)])[good] * ranges[good, None]
+        yield occupancy.placed(mounting, pose), np.column_stack([np.cos(bearing), np.sin(bearing)])[good] * ranges[good, None]
