@@ -8,7 +8,7 @@ import { dirname, join, resolve } from "node:path";
 import { session } from "./session.mjs";
 
 const [modules, file, out, cases, result] = process.argv.slice(2);
-const { browser, page, newPage, expect, data, picture, untilState, heard, end } = await session(modules, file, out);
+const { browser, page, newPage, expect, data, picture, untilState, settled, diagnosed, upload, heard, end } = await session(modules, file, out);
 const seenOf = { robots: {}, play: null };
 await picture("open");
 
@@ -58,25 +58,22 @@ async function play() {
   expect((await drawn()).every((colours) => colours > 3), "play: path and errors have been drawn");
   seenOf.play = { robot: "rover", hash_page: seen.played, epochs: Number(seen.playedEpochs), script: await saved("#play-script", "rover_1.faults"), log: await saved("#play-log", "rover_1.log") };
   await page.click("#play-look");
-  await page.waitForFunction(() => document.body.dataset.state === "busy").catch(() => {});
-  await untilState("done");
+  await settled();
   const looked = await data();
   expect(looked.sha === seen.played && looked.different === "0", `play: looked at, it is the run that was played (${looked.sha?.slice(0, 12)}, ${looked.different} different)`);
-  await page.waitForFunction(() => document.body.dataset.diagnosed, { timeout: 60000 });
+  await diagnosed();
   await picture("play_looked_at");
 }
 
 async function open({ robot, log, sha, crc, epochs }) {
-  await page.evaluate(() => delete document.body.dataset.diagnosed);
   const began = Date.now(), before = await cpu();
-  await (await page.$("#file")).uploadFile(log);
-  await page.waitForFunction(() => document.body.dataset.state === "busy").catch(() => {});
-  await untilState("done");
+  await upload(log);
+  await settled();
   const took = Date.now() - began, seen = await data();
   seenOf.robots[robot] = { hash_page: seen.sha, epochs_different: Number(seen.different), cpu_s: (await cpu()) - before };
   expect(seen.sha === sha && seen.crc === crc, `${robot}: hash and CRC of the host (${seen.sha?.slice(0, 12)}, ${seen.crc}; ${took} ms; ${seen.status})`);
   expect(seen.different === "0", `${robot}: ${epochs} epochs as recorded`);
-  await page.waitForFunction(() => document.body.dataset.diagnosed, { timeout: 60000 });
+  await diagnosed();
   expect((await page.$eval("#robot", (select) => select.selectedOptions[0].textContent)) === robot, `${robot}: recognised by its parameters`);
   expect((await drawn()).every((colours) => colours > 3), `${robot}: every picture has been drawn`);
 }
@@ -85,8 +82,7 @@ async function change({ path, value, sha }, before) {
   await page.focus("#numbers input[type=search]");
   await page.$eval("#numbers input[type=search]", (input, text) => ((input.value = text), input.dispatchEvent(new Event("input"))), path);
   await page.$eval(`[data-path="${path}"]`, (input, text) => ((input.value = text), input.dispatchEvent(new Event("change"))), value);
-  await page.waitForFunction(() => document.body.dataset.state === "busy").catch(() => {});
-  await untilState("done");
+  await settled();
   const seen = await data(), words = await page.$eval("#effect", (p) => p.textContent).catch(() => "");
   const same = sha === before;
   expect(same ? seen.second === "" && /no effect/.test(words) : seen.second === sha, `${path} = ${value}: ${same ? "said to have no effect" : "hash of the host"} (${words})`);

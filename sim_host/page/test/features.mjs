@@ -6,12 +6,9 @@ import { session } from "./session.mjs";
 
 const [modules, file, out, cases] = process.argv.slice(2);
 const { tables, unknown, rover } = JSON.parse(readFileSync(cases, "utf8"));
-const { page, expect, data, picture, untilState, end } = await session(modules, file, out, { serial: true });
+const { page, expect, data, picture, untilState, settled, upload, end } = await session(modules, file, out, { serial: true });
 const text = (selector) => page.$eval(selector, (one) => one.textContent).catch(() => "");
-const open = async (path) => {
-  await page.evaluate(() => delete document.body.dataset.diagnosed);
-  await (await page.$("#file")).uploadFile(...[path].flat());
-};
+const open = (path) => upload(...[path].flat());
 const number = (words, at = 0) => Number((words.match(/-?\d+(\.\d+)?(e[-+]?\d+)?/gi) ?? [])[at]);
 
 // Tables: the form, the log, and the host's hash.
@@ -96,8 +93,7 @@ await page.waitForFunction(() => parseFloat(document.querySelector("#play .clock
 await page.click("#play-go");
 await page.waitForSelector("#play-look", { timeout: 60000 });
 await page.click("#play-look");
-await page.waitForFunction(() => document.body.dataset.state === "busy").catch(() => {});
-await untilState("done");
+await settled();
 await page.$eval("#compare-run", (button) => button.click()); // the page may still scroll
 await page.waitForFunction(() => document.body.dataset.compared, { timeout: 240000 });
 const rows = await page.$$eval("#compare-table tbody tr", (all) => all.map((row) => [...row.children].map((cell) => cell.textContent)));
@@ -143,8 +139,7 @@ expect(parseInt(await text("#cable-counts")) === sent.length, `cable: ${await te
 expect((await page.evaluate(() => window.fakePort.said.join())) === "C,S6,L", "the adapter was told to listen, and nothing else");
 await picture("cable");
 await page.click("#cable-look");
-await page.waitForFunction(() => document.body.dataset.state === "busy").catch(() => {});
-await untilState("done");
+await settled();
 expect((await data()).sha === rover.sha && (await data()).different === "0", "the recording of the cable is the host's run to the bit");
 
 // Settings as text, into another page's address.

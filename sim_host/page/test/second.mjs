@@ -5,7 +5,7 @@ import { readFileSync, writeFileSync } from "node:fs";
 import { session } from "./session.mjs";
 
 const [modules, file, out, cases, result] = process.argv.slice(2);
-const { page, expect, data, picture, untilState, heard, end } = await session(modules, file, out);
+const { page, expect, data, picture, settled, diagnosed, upload, heard, end } = await session(modules, file, out);
 const until = (seconds) => page.waitForFunction((wanted) => parseFloat(document.querySelector("#play .clock").textContent) >= wanted, { timeout: 120000 }, seconds);
 await page.select("#play-speed", "10");
 await page.click("#play-go");
@@ -17,16 +17,13 @@ await page.waitForFunction(() => document.body.dataset.played, { timeout: 60000 
 const said = await page.$$eval("#play .said [data-kind=refusal]", (all) => all.map(({ textContent }) => textContent).join(" "));
 expect(/GNSS position: refused/.test(said), `driven, and the node refuses fixes that jump: ${said.slice(0, 60)}`);
 await page.click("#play-look");
-await page.waitForFunction(() => document.body.dataset.state === "busy").catch(() => {});
-await untilState("done");
+await settled();
 expect((await data()).sha === (await data()).played && (await data()).different === "0", `the played run again: ${(await data()).sha?.slice(0, 12)}`);
 const robots = {};
 for (const { robot, log, sha } of JSON.parse(readFileSync(cases, "utf8"))) {
-  await page.evaluate(() => delete document.body.dataset.diagnosed);
-  await (await page.$("#file")).uploadFile(log);
-  await page.waitForFunction(() => document.body.dataset.state === "busy").catch(() => {});
-  await untilState("done");
-  await page.waitForFunction(() => document.body.dataset.diagnosed, { timeout: 60000 });
+  await upload(log);
+  await settled();
+  await diagnosed();
   const seen = await data();
   robots[robot] = { hash_page: seen.sha, epochs_different: Number(seen.different) };
   expect(seen.sha === sha && seen.different === "0", `${robot}: hash of the host (${seen.sha?.slice(0, 12)}, ${seen.different} different)`);

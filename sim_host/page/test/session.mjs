@@ -42,12 +42,22 @@ export async function session(modules, file, out, { serial = false, width = 1180
     if (!is) failures.push(what);
   };
   const untilState = (state) => page.waitForFunction((wanted) => [wanted, "failed"].includes(document.body.dataset.state), { timeout: 120000 }, state);
+  /** Until what was begun a moment ago has ended. */
+  const settled = async () => {
+    await page.waitForFunction(() => document.body.dataset.state === "busy").catch(() => {});
+    await untilState("done");
+  };
+  const diagnosed = () => page.waitForFunction(() => document.body.dataset.diagnosed, { timeout: 60000 });
+  const upload = async (...paths) => {
+    await page.evaluate(() => delete document.body.dataset.diagnosed);
+    await (await page.$("#file")).uploadFile(...paths);
+  };
   await page.setViewport({ width, height });
   if (!process.env.BROWSER) await page.emulateMediaFeatures([{ name: "prefers-color-scheme", value: "light" }]);
   await page.goto(session.url(file));
   await untilState("ready");
   return {
-    browser, page, newPage, expect, untilState, heard,
+    browser, page, newPage, expect, untilState, settled, diagnosed, upload, heard,
     data: () => page.evaluate(() => ({ ...document.body.dataset, status: document.getElementById("status").textContent, wide: document.documentElement.scrollWidth - innerWidth })),
     picture: (name) => page.screenshot({ path: `${out}/${name}.png`, fullPage: true }),
     end: async () => {

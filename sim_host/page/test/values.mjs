@@ -6,7 +6,7 @@ import { join } from "node:path";
 import { session } from "./session.mjs";
 
 const [modules, file, out, cases, count] = process.argv.slice(2);
-const { page, expect, data, untilState, end } = await session(modules, file, out);
+const { page, expect, data, settled, diagnosed, upload, end } = await session(modules, file, out);
 const STATES = ["x_m", "y_m", "yaw_rad", "speed_mps", "yaw_rate_radps", "v_east_mps", "height_m", "gyro_bias_z_radps"];
 let drawn = 20261;
 const draw = () => ((drawn = (Math.imul(drawn, 1664525) + 1013904223) >>> 0), drawn / 2 ** 32);
@@ -57,11 +57,9 @@ async function look(columns, series, times) {
 
 const all = JSON.parse(readFileSync(cases, "utf8")), runs = all.reduce((sum, { settings }) => sum + 1 + settings.length, 0);
 for (const { robot, log, tables, settings } of all) {
-  await page.evaluate(() => delete document.body.dataset.diagnosed);
-  await (await page.$("#file")).uploadFile(log);
-  await page.waitForFunction(() => document.body.dataset.state === "busy").catch(() => {});
-  await untilState("done");
-  await page.waitForFunction(() => document.body.dataset.diagnosed, { timeout: 60000 });
+  await upload(log);
+  await settled();
+  await diagnosed();
   await look(mainOf(tables), 0, Math.ceil(count / runs));
   for (const { path, value, tables: changed } of settings) {
     await page.evaluate(() => delete document.body.dataset.second);
