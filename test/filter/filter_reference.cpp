@@ -109,8 +109,8 @@ struct Turning {
   using State = model::CtrvState<Scalar>;
   template <class Filter>
   static bool run(Filter filter) {
-    set_covariance<Filter, 5>(
-        filter, filter::Symmetric<Scalar, 5>::diagonal({Scalar(0.5F), Scalar(0.5F), 1, Scalar(0.25F), Scalar(0.125F)}));
+    set_covariance<Filter, 5>(filter, filter::Symmetric<Scalar, 5>::diagonal(
+                                          {Scalar(0.5F), Scalar(0.5F), 1, Scalar(0.125F), Scalar(0.125F)}));
     filter.x.value << 1, 2, 4, Scalar(0.5F), Scalar(0.5F);
     for (std::array<Scalar, 4> in; read(in); print(filter)) {
       if (!filter.predict(model::Ctrv<Scalar>{.dt_s = static_cast<Scalar>(0.05),

@@ -108,7 +108,7 @@ class Planar:
 
 class Turning:
     """Constant turn rate and velocity with augmented noise, lidar and radar in turn."""
-    p0 = np.diag([0.5, 0.5, 1.0, 0.25, 0.125])
+    p0 = np.diag([0.5, 0.5, 1.0, 0.125, 0.125])
     x0 = np.array([1.0, 2.0, 4.0, 0.5, 0.5])
     angles_x = (3,)
     additive = False

@@ -350,8 +350,8 @@ class Generated(unittest.TestCase):
     def test_every_estimator_of_the_filters_has_a_row_of_costs_and_every_row_a_header(self):
         """A header of src/tetap/filter is an estimator of the table, or a part that this list names."""
         parts = {"attitude_bias", "attitude_clipping", "attitude_heading", "attitude_options", "big_covariance", "condition", "correction", "covariance_access", "fault_signature", "inverse",
-                 "kalman_form", "linear_models", "low_pass", "particle_noise", "particle_number", "particle_pose", "quaternion", "resampling", "root_update", "sigma_points",
-                 "sparse_update", "state", "structure", "symmetric", "triangular", "unroll", "update", "whole_covariance", "wrap"}
+                 "kalman_form", "linear_models", "low_pass", "particle_noise", "particle_number", "particle_pose", "pose_cloud", "quaternion", "resampling", "root_update", "sigma_points",
+                 "sparse_update", "state", "structure", "symmetric", "triangular", "unroll", "update", "viewed", "whole_covariance", "wrap"}
         rows = costs.listed(read("test/costs/list.hpp"))
         headers = {os.path.basename(path)[:-4] for path in glob.glob(os.path.join(ROOT, "src/tetap/filter/*.hpp"))}
         of_rows = {os.path.basename(header)[:-4] for _, _, header in rows if header.startswith("tetap/filter/")}
