@@ -27,7 +27,7 @@ std::string help() {
          "  --base ID           first id of the node's block (default: can_base of --set, else 0x300)\n"
          "  --log-interface I   only frames logged from this interface\n"
          "  --keep-going        count malformed lines of the log instead of stopping at the first\n"
-         "  --json FILE         also write {\"findings\": [{\"code\", \"rank\", \"evidence\", \"change\"}]}\n"
+         "  --json FILE         also write {\"findings\": [{\"code\", \"rank\", \"evidence\", \"change\", \"try\"}]}\n"
          "  --brief             nothing but the likeliest cause, and no line where nothing is found\n"
          "  --markdown          no LOG: print the page of the codes\n\n"
          "Exit status: 0, whatever is found; 2: bad usage, unreadable log.\n";
@@ -48,6 +48,31 @@ doctor::RobotFacts robot_facts(const std::string& name, const sim::ParameterSett
   return doctor::facts_of(name, sim::parameters_of(name, settings), sim::sent_to(name, settings).inertial);
 }
 
+/// As lines of a parameter file have it.
+std::string as_lines(const doctor::Remedy& remedy) {
+  std::string all;
+  for (const doctor::Setting& setting : remedy) {
+    all += (all.empty() ? "" : ", ") + std::string(setting.path) + " =";
+    for (const double value : setting.values) all += doctor::text(" %.7g", value);
+  }
+  return all;
+}
+
+/// [{path: [values]}]: each of them whole.
+std::string as_json(const std::vector<doctor::Remedy>& remedies) {
+  std::string all;
+  for (const doctor::Remedy& remedy : remedies) {
+    std::string rows;
+    for (const doctor::Setting& setting : remedy) {
+      std::string values;
+      for (const double value : setting.values) values += (values.empty() ? "" : ", ") + doctor::text("%.7g", value);
+      rows += (rows.empty() ? "" : ", ") + sim::quoted(setting.path) + ": [" + values + "]";
+    }
+    all += (all.empty() ? "{" : ", {") + rows + "}";
+  }
+  return "[" + all + "]";
+}
+
 void write_json(const std::string& path, const std::string& log, const std::string& robot,
                 const doctor::Diagnosis& diagnosis) {
   if (const auto folder = path.rfind('/'); folder != std::string::npos) sim::make_folder(path.substr(0, folder));
@@ -58,7 +83,7 @@ void write_json(const std::string& path, const std::string& log, const std::stri
     ++rank;
     file.write(std::string(rank == 1 ? "" : ",") + "\n {\"code\": " + sim::quoted(doctor::row(one.code).name) +
                ", \"rank\": " + std::to_string(rank) + ", \"evidence\": " + sim::quoted(one.evidence) +
-               ", \"change\": " + sim::quoted(one.change) + "}");
+               ", \"change\": " + sim::quoted(one.change) + ", \"try\": " + as_json(one.remedies) + "}");
   }
   file.write(diagnosis.untold ? "], \"cannot_tell\": " + sim::quoted(*diagnosis.untold) + "}\n" : "]}\n");
   file.close();
@@ -73,6 +98,7 @@ void print(const std::string& log, const std::string& robot, const doctor::Diagn
     const doctor::CodeRow& row = doctor::row(one.code);
     std::printf("%d. %s: %s\n   evidence: %s\n   change:   %s\n", ++rank, std::string(row.name).c_str(),
                 std::string(row.cause).c_str(), one.evidence.c_str(), one.change.c_str());
+    for (const doctor::Remedy& remedy : one.remedies) std::printf("   try:      %s\n", as_lines(remedy).c_str());
   }
   if (rank == 0) std::printf("No mistake found: the devices agree with each other.\n");
   if (diagnosis.untold) std::printf("The log cannot tell %s.\n", diagnosis.untold->c_str());

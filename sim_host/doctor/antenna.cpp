@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sim_host/doctor/antenna.hpp"
 
+#include "sim_host/doctor/remedy.hpp"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -68,6 +70,10 @@ void AntennaDetector::finish(Findings& findings) {
   const bool aside = differs(found[1] - y0, found[1] - y0, sigma(1));
   if (!aside && !differs(length - stated, found[2] - stated * stated, sigma(2))) return;
   const double ahead = std::sqrt(std::max(0.0, found[2] - found[1] * found[1]));
+  const auto at = [&](double x_m) -> Remedy {
+    return {{.path = "gnss.antenna_x_b_m", .values = {five_digits(x_m)}},
+            {.path = "gnss.antenna_y_b_m", .values = {five_digits(found[1])}}};
+  };
   findings.push_back(
       {.code = Code::kAntennaArm,
        .uses = kWheels | kGyroscope | kAccelerometer | kGnssVelocity,
@@ -77,7 +83,8 @@ void AntennaDetector::finish(Findings& findings) {
                 found[1], sigma(1), ahead, y0, x0, squares_.count()),
        .change = text("Measure the antenna's place. By the speeds gnss.antenna_y_b_m is %.1f and gnss.antenna_x_b_m is "
                       "%.1f or %.1f.",
-                      found[1], ahead, -ahead)});
+                      found[1], ahead, -ahead),
+       .remedies = {at(ahead), at(-ahead)}});
 }
 
 }  // namespace tetap::doctor

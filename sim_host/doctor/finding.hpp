@@ -12,6 +12,13 @@
 
 namespace tetap::doctor {
 
+/// A row of the parameter table and its values.
+struct Setting {
+  std::string_view path;
+  std::vector<double> values;
+};
+using Remedy = std::vector<Setting>;
+
 struct Finding {
   Code code;
   Devices uses = 0;      ///< devices whose data the comparison took for right
@@ -20,6 +27,7 @@ struct Finding {
   std::string change;            ///< empty: as the table has it
   Devices spoils = 0;            ///< 0: as the table has it
   std::optional<Code> beside{};  ///< the same comparison fits that code as well: the two are named one after the other
+  std::vector<Remedy> remedies{};  ///< each whole; several where the log does not tell which one
 };
 using Findings = std::vector<Finding>;
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sim_host/doctor/force.hpp"
 
+#include "sim_host/doctor/remedy.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -95,6 +97,18 @@ std::optional<double> ForceDetector::upward() const {
   return robot_.up_s ? dot(*robot_.up_s, up) : up[2];
 }
 
+/// An IMU is turned over about its forward axis or about its left one; gravity is the same for both.
+std::vector<Remedy> ForceDetector::upright() const {
+  if (robot_.mounting) {
+    const auto& [x, y, z] = *robot_.mounting;
+    const Vector3 down = scaled(-1, z);
+    return {mounting({x, scaled(-1, y), down}), mounting({scaled(-1, x), y, down})};
+  }
+  if (!robot_.up_s) return {};
+  const Vector3 up = *robot_.up_s;
+  return {{{.path = "gyro.up_s", .values = {-up[0], -up[1], -up[2]}}}};
+}
+
 void ForceDetector::judge_direction(Findings& findings) const {
   const auto stated = upward();
   if (!stated || *stated > kTilt) return;
@@ -109,7 +123,8 @@ void ForceDetector::judge_direction(Findings& findings) const {
          .evidence =
              text("The mean specific force in %s axes is (%.1f, %.1f, %.1f) m/s2: it points down, %.0f deg from "
                   "where up is stated.",
-                  axes, body[0], body[1], body[2], std::acos(upward) * 180 / std::numbers::pi)});
+                  axes, body[0], body[1], body[2], std::acos(upward) * 180 / std::numbers::pi),
+         .remedies = upright()});
     return;
   }
   findings.push_back(
@@ -117,7 +132,9 @@ void ForceDetector::judge_direction(Findings& findings) const {
        .uses = kMounting,
        .evidence = text("The mean specific force in %s axes is (%.1f, %.1f, %.1f) m/s2: %.0f deg from where up is "
                         "stated.",
-                        axes, body[0], body[1], body[2], std::acos(upward) * 180 / std::numbers::pi)});
+                        axes, body[0], body[1], body[2], std::acos(upward) * 180 / std::numbers::pi),
+       .remedies =
+           robot_.mounting ? std::vector<Remedy>{levelled(*robot_.mounting, unit(mean))} : std::vector<Remedy>{}});
 }
 
 }  // namespace tetap::doctor

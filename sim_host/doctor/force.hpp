@@ -25,6 +25,7 @@ class ForceDetector : public Detector {
  private:
   static constexpr std::size_t kBins = 512;
   void judge_direction(Findings& findings) const;
+  [[nodiscard]] std::vector<Remedy> upright() const;
   void judge_scale(Findings& findings) const;
 
   const RobotFacts& robot_;

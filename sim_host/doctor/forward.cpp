@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sim_host/doctor/forward.hpp"
 
+#include "sim_host/doctor/remedy.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -187,6 +189,7 @@ void ForwardDetector::judge(const Source& source, const char* name, Devices devi
       "Set inertial.mounting_bs = %.4f %.4f %.4f %.4f %.4f %.4f %.4f %.4f %.4f, or turn the "
       "sensor; tools/calibrate/calibrate_robot finds it more finely.",
       x[0], x[1], x[2], y[0], y[1], y[2], rows[2][0], rows[2][1], rows[2][2]);
+  findings.back().remedies = {mounting({x, y, rows[2]})};
 }
 
 }  // namespace tetap::doctor

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sim_host/doctor/speed_vote.hpp"
 
+#include "sim_host/doctor/remedy.hpp"
+
 #include <array>
 #include <cmath>
 #include <string>
@@ -45,14 +47,15 @@ Finding of_velocity(double factor, Devices uses, const std::string& evidence) {
 Finding of_fixes(double factor, Devices uses, const std::string& evidence) {
   return {.code = Code::kFixUnit, .uses = uses, .evidence = evidence + named(factor, kOfFixes), .change = {}};
 }
-Finding of_wheels(const SpeedRatio& ratio, Devices uses) {
+Finding of_wheels(const SpeedRatio& ratio, Devices uses, const RobotFacts& robot) {
   return {.code = Code::kWheelScale,
           .uses = uses,
           .certainty = ratio.certainty,
           .evidence = ratio.evidence,
           .change = text("Multiply the radii of wheels.drive by %.3f or divide counts_per_turn by it "
                          "(In_BodySpeed: wheels.speed_scale).",
-                         ratio.value)};
+                         ratio.value),
+          .remedies = {wheels_by(robot.parameters, ratio.value, ratio.value)}};
 }
 
 }  // namespace
@@ -60,13 +63,14 @@ Finding of_wheels(const SpeedRatio& ratio, Devices uses) {
 void SpeedVoteDetector::finish(Findings& findings) {
   auto velocity = by_.velocity_by_wheels.ratio(), fixes = by_.fixes_by_wheels.scale();
   auto receiver = by_.fixes_by_velocity.ratio();
+  const RobotFacts& robot = by_.velocity_by_wheels.robot();
   // Two ratios of three devices give the third.
   if (!receiver && velocity && fixes)
     receiver = SpeedRatio{.value = fixes->value / velocity->value, .certainty = velocity->certainty, .evidence = {}};
   if (!receiver || !off(*receiver, kUnitFactor)) {
-    if (velocity && off(*velocity)) findings.push_back(of_wheels(*velocity, kWheels | kGnssVelocity));
+    if (velocity && off(*velocity)) findings.push_back(of_wheels(*velocity, kWheels | kGnssVelocity, robot));
     if (!fixes || !off(*fixes)) return;
-    findings.push_back(of_wheels(*fixes, kFixes | kWheels | kGyroscope));
+    findings.push_back(of_wheels(*fixes, kFixes | kWheels | kGyroscope, robot));
     if (velocity || receiver || named(fixes->value, kOfFixes).empty()) return;
     findings.back().beside = Code::kFixUnit;  // of two devices either may be wrong
     findings.push_back(of_fixes(fixes->value, kFixes | kWheels, fixes->evidence));

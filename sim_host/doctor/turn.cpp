@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sim_host/doctor/turn.hpp"
 
+#include "sim_host/doctor/remedy.hpp"
+
 #include "sim_host/doctor/gyro_unit.hpp"
 
 #include <algorithm>
@@ -90,16 +92,23 @@ void TurnDetector::judge_unequal(Findings& findings) const {
   const double right_over_left = (1 + unequal) / (1 - unequal);
   const double left = std::log((by_difference - by_sum) * scale_.track_m),
                right = std::log((by_difference + by_sum) * scale_.track_m);
+  const param::Parameters& p = robot_.parameters;
+  std::vector<Remedy> remedies{wheels_by(p, {}, right_over_left), wheels_by(p, 1 / right_over_left, {})};
   std::string change = text(
       "Multiply the right radius of wheels.drive by %.3f or the left one by %.3f; the speed by GNSS "
       "or a measured distance shows which (In_WheelSpeed: wheels.right_speed_scale).",
       right_over_left, 1 / right_over_left);
-  if (scale_.known && std::abs(left) < kRightWheel * std::abs(right))
+  if (scale_.known && std::abs(left) < kRightWheel * std::abs(right)) {
+    remedies.pop_back();
     change = text("Multiply the right radius of wheels.drive by %.3f: the left wheel fits the stated track.",
                   right_over_left);
-  if (scale_.known && std::abs(right) < kRightWheel * std::abs(left))
+  }
+  if (scale_.known && std::abs(right) < kRightWheel * std::abs(left)) {
+    remedies.erase(remedies.begin());
     change = text("Multiply the left radius of wheels.drive by %.3f: the right wheel fits the stated track.",
                   1 / right_over_left);
+  }
+  if (robot_.name.empty()) remedies.clear();
   findings.push_back(
       {.code = Code::kWheelsUnequal,
        .uses = kGyroscope | kAccelerometer | kWheels,
@@ -108,7 +117,15 @@ void TurnDetector::judge_unequal(Findings& findings) const {
                         "right wheel %.3f times as large as stated, or a left one %.3f times (%.0f s, %.0f %% of the "
                         "turn explained).",
                         by_sum * std::sqrt(ss), right_over_left, 1 / right_over_left, whole_.count(), 100 * explained),
-       .change = std::move(change)});
+       .change = std::move(change),
+       .remedies = std::move(remedies)});
+}
+
+Remedy TurnDetector::track(double factor) const {
+  const param::WheelParameters& w = robot_.parameters.wheels;
+  if (message_ == "In_BodySpeed")
+    return {{.path = "wheels.yaw_rate_scale", .values = {five_digits(static_cast<double>(w.yaw_rate_scale) * factor)}}};
+  return {{.path = "wheels.drive.track_m", .values = {five_digits(static_cast<double>(w.drive.track_m) / factor)}}};
 }
 
 void TurnDetector::judge_still(bool is_left, Findings& findings) const {

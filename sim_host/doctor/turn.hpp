@@ -16,13 +16,15 @@ namespace tetap::doctor {
 
 class TurnDetector : public Detector {
  public:
-  explicit TurnDetector(const RobotFacts& robot) : scale_(wheel_scale(robot)) {}
+  explicit TurnDetector(const RobotFacts& robot) : robot_(robot), scale_(wheel_scale(robot)) {}
 
   void sample(base::Micros time, const sensor::Sample& sample) override;
   void window(const Window& w) override;
   void finish(Findings& findings) override;
   /// The gyroscope against the difference of the wheels; nothing where they do not turn alike.
   [[nodiscard]] std::optional<TurnRatio> ratio() const;
+  /// A track with which the wheels turn `factor` times as fast.
+  [[nodiscard]] Remedy track(double factor) const;
   /// Metres or speeds are known, so the magnitude of ratio() has a meaning.
   [[nodiscard]] bool knows_size() const { return scale_.known || message_ == "In_BodySpeed"; }
 
@@ -40,6 +42,7 @@ class TurnDetector : public Detector {
   void judge_unequal(Findings& findings) const;
   void judge_still(bool is_left, Findings& findings) const;
 
+  const RobotFacts& robot_;
   WheelScale scale_;
   std::string message_;
   Moments<5> moments_;  ///< gyroscope x y z [rad/s], difference and sum of the wheels [m/s], both limited

@@ -87,7 +87,8 @@ void TurnScaleDetector::name_track(const TurnRatio& ratio, const TurnRatio* thir
                         ratio.value(), ratio.low, ratio.high, ratio.seconds) +
                    agrees,
        .change = text("Divide wheels.drive.track_m by %.3f (In_BodySpeed: multiply wheels.yaw_rate_scale by it).",
-                      ratio.value())});
+                      ratio.value()),
+       .remedies = {by_.turn.track(ratio.value())}});
 }
 
 }  // namespace tetap::doctor

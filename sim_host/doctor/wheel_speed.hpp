@@ -18,6 +18,7 @@ class WheelSpeedDetector : public Detector {
   void finish(Findings&) override {}
   /// GNSS over wheels; nothing where the two do not go alike, or the robot's geometry is not known.
   [[nodiscard]] std::optional<SpeedRatio> ratio() const;
+  [[nodiscard]] const RobotFacts& robot() const { return robot_; }
 
  private:
   const RobotFacts& robot_;

@@ -533,7 +533,7 @@ class Doctor(unittest.TestCase):
         with open(os.path.join(out, "doctor.json"), encoding="utf-8") as file:
             answer = json.load(file)
         self.assertEqual([one["code"] for one in answer["findings"]], ["wheels_swapped"])
-        self.assertEqual(sorted(answer["findings"][0]), ["change", "code", "evidence", "rank"])
+        self.assertEqual(sorted(answer["findings"][0]), ["change", "code", "evidence", "rank", "try"])
         factor = re.search(r"by (-?\d+\.\d+) times the gyroscope's yaw rate over (\d+) s", answer["findings"][0]["evidence"])
         self.assertAlmostEqual(float(factor[1]), -1, delta=0.25)
         self.assertGreater(int(factor[2]), 60)
@@ -566,6 +566,22 @@ class Doctor(unittest.TestCase):
                 found = self.examine(mistake(self.logs.frames(name)), self.logs.robot(name))
                 self.assertEqual([one["code"] for one in found], [code], name)
                 self.assertRegex(found[0]["change"], change)
+
+    def test_a_remedy_with_numbers_ends_its_finding(self):
+        set_antenna = ["--set", "gnss.antenna_y_b_m=2"]
+        for code, mistake, arguments in (("wheel_scale", lambda f: scale_wheels(f, 1.3), []), ("track_width", lambda f: scale_turn(f, 1.5), []),
+                                         ("wheels_unequal", lambda f: scale_wheel(f, "Left", 1.2), []), ("imu_upside_down", lambda f: turn_imu(f, ABOUT_X), []),
+                                         ("imu_axes", lambda f: turn_imu(f, about(2, 45)), []), ("imu_axes", lambda f: turn_imu(f, about(1, 50)), []),
+                                         ("antenna_arm", lambda f: f, set_antenna)):
+            with self.subTest(code):
+                frames = mistake(self.logs.frames("yard"))
+                remedies = next(one["try"] for one in self.examine(frames, "rover", *arguments) if one["code"] == code)
+                self.assertIn(len(remedies), (1, 2))
+                left = []
+                for remedy in remedies:
+                    settings = [word for path, values in remedy.items() for word in ("--set", f"{path}={','.join(map(str, values))}")]
+                    left.append([one["code"] for one in self.examine(frames, "rover", *arguments, *settings)])
+                self.assertIn([], left, remedies)
 
     def test_a_last_line_that_is_cut_off_is_named(self):
         log = os.path.join(self.directory.name, "cut.log")

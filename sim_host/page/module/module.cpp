@@ -117,14 +117,28 @@ TETAP_EXPORT(diagnose) std::uint32_t diagnose(std::uint32_t base, std::uint32_t 
   if (!found) return refuse(found.failure().text);
   page::Json json;
   json.begin('{').member("inputs", found->inputs).member("duration_s", found->duration_s).key("findings").begin('[');
-  for (const doctor::Finding& one : found->findings)
+  for (const doctor::Finding& one : found->findings) {
     json.begin('{')
         .member("code", doctor::row(one.code).name)
         .member("cause", doctor::row(one.code).cause)
         .member("evidence", one.evidence)
         .member("change", one.change)
-        .end('}');
-  page::write(page::Channel::kDiagnosis, json.end(']').end('}').text());
+        .key("remedies")
+        .begin('[');
+    for (const doctor::Remedy& remedy : one.remedies) {
+      json.begin('[');
+      for (const doctor::Setting& setting : remedy) {
+        json.begin('{').member("path", setting.path).key("values").begin('[');
+        for (const double value : setting.values) json.value(value);
+        json.end(']').end('}');
+      }
+      json.end(']');
+    }
+    json.end(']').end('}');
+  }
+  json.end(']');
+  if (found->untold) json.member("untold", *found->untold);
+  page::write(page::Channel::kDiagnosis, json.end('}').text());
   return 0;
 }
 

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// node features.mjs PUPPETEER PAGE.html OUT CASES: what a user does beside a log of a known robot. CASES {tables: [{file, robot, sha, frames}], unknown: {file, robot, sha},
+// node features.mjs PUPPETEER PAGE.html OUT CASES: what a user does beside a log of a known robot. CASES {tables: [{file, robot, sha, frames}], unknown: {file, robot, sha}, larger: {file, radius_m},
 // rover: {log, sha, mcap}}, hashes and counts as the host's programs have them. A picture of each view goes to OUT. Status 1 where something differs.
 import { readFileSync } from "node:fs";
 import { session } from "./session.mjs";
 
 const [modules, file, out, cases] = process.argv.slice(2);
-const { tables, unknown, rover } = JSON.parse(readFileSync(cases, "utf8"));
-const { page, expect, data, picture, untilState, settled, upload, end } = await session(modules, file, out, { serial: true });
+const { tables, unknown, larger, rover } = JSON.parse(readFileSync(cases, "utf8"));
+const { page, expect, data, picture, untilState, settled, diagnosed, upload, end } = await session(modules, file, out, { serial: true });
 const text = (selector) => page.$eval(selector, (one) => one.textContent).catch(() => "");
 const open = (path) => upload(...[path].flat());
 const number = (words, at = 0) => Number((words.match(/-?\d+(\.\d+)?(e[-+]?\d+)?/gi) ?? [])[at]);
@@ -44,6 +44,19 @@ await picture("ask");
 await page.click(`#ask [data-offer=${unknown.robot}]`);
 await untilState("done");
 expect((await data()).sha === unknown.sha, "the offer that was taken: the host's hash");
+
+// A robot whose wheels are larger than the page's: the doctor's numbers are tried, and are nearly those of the robot.
+await open(larger.file);
+await untilState("asks");
+await page.click("#ask [data-offer=rover]");
+await untilState("done");
+await diagnosed();
+await page.waitForSelector("[data-try=wheel_scale]");
+await picture("try");
+await page.click("[data-try=wheel_scale]");
+await settled();
+const radius = number(await page.$eval("[data-path='wheels.drive.left_radius_m']", ({ value }) => value));
+expect(Math.abs(radius / larger.radius_m - 1) < 0.02 && (await data()).second.length > 0, `the doctor's radius is ${radius} m of ${larger.radius_m}: ${await text("#effect")}`);
 
 // The log in an MCAP file.
 await open(rover.mcap);

@@ -8,9 +8,9 @@ import { times } from "../web/run.js";
 
 test("a factor that is rounded to nothing gives way to the code's own advice", () => {
   const codes = [{ name: "wheel_scale", change: "Correct the radii." }], one = { code: "wheel_scale", cause: "c", evidence: "The robot drives 0.00 times as fast.", change: "Multiply the radii by 0.000." };
-  assert.deepEqual(followable(one, codes), { code: "wheel_scale", cause: "c", evidence: "", change: "Correct the radii." });
+  assert.deepEqual(followable(one, codes), { code: "wheel_scale", cause: "c", evidence: "", change: "Correct the radii.", remedies: [] });
   const good = { ...one, evidence: "The robot drives 1.05 times as fast.", change: "Multiply the radii by 1.050 or divide." };
-  assert.deepEqual(followable(good, codes), good);
+  assert.deepEqual(followable(good, codes), { ...good, remedies: [] });
   assert.equal(followable({ ...good, change: "Move it by 0.005 m." }, codes).change, "Move it by 0.005 m.");
 });
 

@@ -4,6 +4,7 @@ import assert from "node:assert/strict";
 import { readFileSync, readdirSync } from "node:fs";
 import { TEXTS, decimal, say, speak } from "../web/texts.js";
 import { FAULTS_ID, PIECES_ID, ofModule } from "../web/texts_module.js";
+import { CODES_ID, ROWS_ID, codeText, rowText } from "../web/texts_rows.js";
 
 const web = new URL("../web/", import.meta.url);
 const names = (file, pattern) => [...readFileSync(new URL(file, import.meta.url), "utf8").matchAll(pattern)].map((found) => found[1]);
@@ -46,6 +47,20 @@ test("each fault of the world has a text", () => {
   for (const name of all) assert.ok(`inject.${name}` in TEXTS.en, name);
   assert.deepEqual(Object.keys(FAULTS_ID).sort(), [...all].sort(), "and says in Indonesian what it does");
   for (const on of names("../module/play.cpp", /return "(\w+)";/g)) assert.ok(`on.${on}` in TEXTS.en, on);
+});
+
+test("each row of the parameter table and each code of the doctor has Indonesian words", () => {
+  const rows = [...names("../../../src/tetap/param/table.hpp", /TETAP_ROW\(0x\w+,\s*([a-z][\w.]*),/g), ...names("../../../src/tetap/param/table.hpp", /TETAP_SCALED_ROW\(0x\w+,\s*"([\w.]+)"/g)];
+  assert.ok(rows.length > 200);
+  assert.deepEqual(Object.keys(ROWS_ID).sort(), rows.filter((path) => path !== "bus.key").sort());
+  assert.deepEqual(Object.keys(CODES_ID).sort(), names("../../doctor/codes.hpp", /CodeRow\{\s*Code::k\w+, "(\w+)"/g).sort());
+  const row = { path: "gnss.gate_scale", text: "Innovation gate." };
+  assert.deepEqual([rowText(row), codeText("wheel_scale", "c")], ["Innovation gate.", { cause: "c", remedy: "" }]);
+  speak("id");
+  assert.match(rowText(row), /^Gate inovasi/);
+  assert.match(codeText("wheel_scale", "c").cause, /^Jari-jari/);
+  assert.deepEqual([rowText({ path: "new.row", text: "As it is." }), codeText("new_code", "c")], ["As it is.", { cause: "c", remedy: "" }]);
+  speak("en");
 });
 
 test("Indonesian has a comma in numbers, and in nothing else", () => {

@@ -223,6 +223,13 @@ class App {
     }
     this.render(true);
   }
+  /** Plays the log with what a finding proposes; the figures of before and after are shown where parameters are changed. */
+  async tryRemedy(remedy) {
+    this.numbers.changed.clear();
+    this.numbers.add(remedy);
+    await this.replayChanged();
+    $("numbers").scrollIntoView();
+  }
   effect(second) {
     let most = -1, when = 0;
     for (let i = 0; i < second.t.length; i++) {
@@ -332,7 +339,7 @@ class App {
     Object.assign(document.body.dataset, { sha: result.estimates_sha256, crc: result.state_crc_last, different: result.epochs_different ?? "", second: this.second?.result.estimates_sha256 ?? "" });
   }
   renderFindings() {
-    renderFindings(this.section("findings"), this.findings, this.run, this.about.codes, this.other());
+    renderFindings(this.section("findings"), this.findings, this.run, this.about.codes, this.other(), (remedy) => this.tryRemedy(remedy));
   }
   renderPath(keep) {
     const body = this.section("path", [say("path.legend"), ...(this.second ? [say("path.second")] : []), say("path.zoom")].join(" ")), before = keep ? this.path : null;

@@ -3,6 +3,8 @@
 import { element, replace } from "./dom.js";
 import { times } from "./run.js";
 import { say } from "./texts.js";
+import { shortest } from "./numbers.js";
+import { codeText } from "./texts_rows.js";
 
 /** A share of refusals up to which they are outliers as every sensor has them. */
 const FEW = 0.02;
@@ -25,22 +27,32 @@ export function renderBits(body, { result }, note) {
 }
 
 /** A finding in words that can be followed: a factor that is rounded to nothing gives way to the code's own advice. `codes` of the description. */
-export function followable({ code, cause, evidence, change }, codes) {
+export function followable({ code, cause, evidence, change, remedies }, codes) {
   const nothing = /\b0\.0+ times|\bby 0\.0+\b/;
-  return { code, cause, evidence: nothing.test(evidence) ? "" : evidence, change: nothing.test(change) ? codes.find(({ name }) => name === code)?.change ?? "" : change };
+  return { code, cause, evidence: nothing.test(evidence) ? "" : evidence, change: nothing.test(change) ? codes.find(({ name }) => name === code)?.change ?? "" : change, remedies: remedies ?? [] };
+}
+const settingText = (remedy) => remedy.map(({ path, values }) => `${path} = ${values.map((value) => shortest(value, "float")).join(" ")}`).join(", ");
+
+/** What the doctor says of this log alone stays in its language. */
+function finding({ code, cause, evidence, change, remedies }, onTry) {
+  const own = codeText(code, cause);
+  return element("li", { "data-code": code }, element("strong", {}, own.cause), evidence ? element("p", {}, `${say("findings.evidence")}: `, element("span", { lang: "en" }, evidence)) : null,
+    own.remedy ? element("p", { class: "change" }, `${say("findings.change")}: ${own.remedy}`) : null,
+    change ? element("p", { class: own.remedy ? "note" : "change", lang: "en" }, own.remedy ? change : `${say("findings.change")}: ${change}`) : null,
+    remedies.length > 1 ? element("p", { class: "note" }, say("findings.several")) : null,
+    remedies.map((remedy) => element("p", {}, element("button", { "data-try": code, onclick: () => onTry(remedy) }, say("findings.try", settingText(remedy))))));
 }
 
-/** `found` of the doctor, null while it works; `other` {maker, shown, choose()} where the log was made by another robot than is shown. */
-export function renderFindings(body, found, run, codes, other) {
+/** `found` of the doctor, null while it works; `other` {maker, shown, choose()} where the log was made by another robot than is shown; `onTry(remedy)` plays the log with other parameters. */
+export function renderFindings(body, found, run, codes, other, onTry) {
   const [refused, all] = run.refusedOf(), counted = refused === 0 ? null : element("p", { class: "note", id: "refused" }, say(refused <= FEW * all ? "findings.refused" : "findings.many", refused, all));
   const wrong = other ? element("li", { "data-code": "other_robot" }, element("strong", {}, say("findings.robot", other.maker, other.shown)), element("p", {}, element("button", { onclick: other.choose }, say("findings.choose", other.maker)))) : null;
+  const untold = found?.untold ? element("p", { class: "note", id: "untold", lang: "en" }, say("findings.untold", found.untold)) : null;
   const list = (...items) => element("ol", {}, wrong, ...items);
   if (!found) return replace(body, wrong && list(), element("p", { class: "note" }, say("findings.wait")), counted);
   if (found.failed) return replace(body, wrong && list(), element("p", { class: "warning" }, say("findings.failed", found.failed)), counted);
-  if (found.findings.length === 0) return replace(body, wrong ? list() : element("p", { class: "good" }, say("findings.none")), counted);
-  replace(body, list(found.findings.map((one) => followable(one, codes)).map(({ code, cause, evidence, change }) =>
-    element("li", { "data-code": code }, element("strong", {}, cause), evidence ? element("p", {}, `${say("findings.evidence")}: ${evidence}`) : null,
-      change ? element("p", { class: "change" }, `${say("findings.change")}: ${change}`) : null))), counted);
+  if (found.findings.length === 0) return replace(body, wrong ? list() : element("p", { class: "good" }, say("findings.none")), untold, counted);
+  replace(body, list(found.findings.map((one) => finding(followable(one, codes), onTry))), untold, counted);
 }
 
 /** `one` of Run.sources, or {time, source, word} of a stretch of the time line; `onOpen(one)` is to open its update. */

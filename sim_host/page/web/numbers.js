@@ -3,6 +3,7 @@
 import { element, replace, save } from "./dom.js";
 import { textOf } from "./settings_text.js";
 import { decimal, say } from "./texts.js";
+import { rowText } from "./texts_rows.js";
 
 const SHOWN = 8;
 /** Rows that a user tries first, in this order. */
@@ -54,6 +55,13 @@ export class Numbers {
       if (Array.isArray(given) && given.length === own.length && given.every((value) => typeof value === "number")) this.changed.set(row, given);
     });
   }
+  /** These rows beside what is changed already, as a finding of the doctor gives them: [{path, values}]. */
+  add(remedy) {
+    for (const { path, values } of remedy) {
+      const row = this.rows.findIndex((one) => one.path === path);
+      if (row >= 0 && values.length === this.robot.values[row].length) this.changed.set(row, values);
+    }
+  }
   text(row) {
     return this.value(row).map((value) => shortest(value, this.rows[row].storage)).join(" ");
   }
@@ -90,7 +98,7 @@ export class Numbers {
     const all = this.rows.map((row, i) => i).filter((i) => !this.rows[i].secret);
     const found = words.length === 0
       ? FIRST.map((path) => this.rows.findIndex((row) => row.path === path)).filter((i) => i >= 0)
-      : all.filter((i) => words.every((word) => `${this.rows[i].path} ${this.rows[i].text}`.toLowerCase().includes(word)));
+      : all.filter((i) => words.every((word) => `${this.rows[i].path} ${this.rows[i].text} ${rowText(this.rows[i])}`.toLowerCase().includes(word)));
     const rest = (words.length === 0 ? all.length : found.length) - Math.min(found.length, SHOWN);
     replace(this.list, ...found.slice(0, SHOWN).map((i) => this.row(i)), rest > 0 ? element("p", { class: "note" }, say("numbers.more", rest)) : null);
   }
@@ -102,7 +110,7 @@ export class Numbers {
     const limits = say("numbers.limits", shortest(row.minimum, "float"), shortest(row.maximum, "float"), row.unit).trim();
     return element("label", { class: this.changed.has(i) ? "row is-changed" : "row" },
       element("code", {}, row.path), input, element("span", { class: "unit" }, row.unit),
-      element("span", { class: "note" }, `${row.text} ${limits}; ${say("numbers.own", own.map((value) => decimal(shortest(value, row.storage))).join(" "))}${row.live ? "" : `; ${say("numbers.restart")}`}`), said);
+      element("span", { class: "note" }, `${rowText(row)} ${limits}; ${say("numbers.own", own.map((value) => decimal(shortest(value, row.storage))).join(" "))}${row.live ? "" : `; ${say("numbers.restart")}`}`), said);
   }
 
   /** Takes what was typed, or says what is wanted. */
