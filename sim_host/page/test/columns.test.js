@@ -2,6 +2,7 @@
 import { test } from "node:test";
 import assert from "node:assert/strict";
 import { Table } from "../web/columns.js";
+import { ThinnedTable, beginningOf, tableOf } from "../web/thinning.js";
 
 const bytes = (text) => new TextEncoder().encode(text);
 
@@ -48,4 +49,44 @@ test("a table that grows from parts of another is that table", () => {
   other.add(bytes(`${heading}1,Fault,2\n2,Boot,3\n`));
   grown.append(other.packed());
   assert.deepEqual([5000, 5001].map((row) => grown.word("mode", row)), ["Fault", "Boot"]);
+});
+
+test("a long table keeps every change and refusal, and of each kind of rows every n-th", () => {
+  const table = new ThinnedTable({ most: 1000, kinds: ["estimator", "sensor"], changes: ["state"], refusals: true });
+  table.add(bytes("t,estimator,sensor,verdict,state\n"));
+  const refused = new Set(), changed = new Set([0, 1, 2]), rows = 60000;
+  for (let i = 0; i < rows; i++) {
+    const verdict = i % 977 === 3 ? "Rejected" : "Accepted", state = i > 41000 ? "Lost" : "Fusing";
+    if (verdict === "Rejected") refused.add(i);
+    if (i > 41000 && i <= 41003) changed.add(i);
+    table.add(bytes(`${i},2,${["A", "B", "C"][i % 3]},${verdict},${state}\n`));
+  }
+  assert.ok(table.rows < 1000 && table.rows > 400, `${table.rows} rows`);
+  assert.equal(table.every, 128);
+  const times = new Set(table.values("t"));
+  for (const row of [...refused, ...changed]) assert.ok(times.has(row), `row ${row} stays`);
+  for (const sensor of ["A", "B", "C"]) {
+    const own = [...table.values("t")].filter((t, row) => table.word("sensor", row) === sensor && !refused.has(t) && !changed.has(t));
+    assert.ok(own.every((t) => Math.floor(t / 3) % 128 === 0) && own.length > 150, `${sensor}: ${own.length}`);
+  }
+  assert.ok(times.has(rows - 96) || [...times].some((t) => t > rows - 400), "up to the end");
+});
+
+test("what stays may need more room than was given", () => {
+  const table = new ThinnedTable({ most: 64, kinds: [], refusals: true });
+  table.add(bytes("t,verdict\n"));
+  for (let i = 0; i < 500; i++) table.add(bytes(`${i},${i % 2 ? "Rejected" : "Accepted"}\n`));
+  const times = new Set(table.values("t"));
+  for (let i = 1; i < 500; i += 2) assert.ok(times.has(i));
+});
+
+test("a table that is short is kept whole", () => {
+  const thinned = tableOf("estimates"), whole = tableOf("map");
+  for (const table of [thinned, whole]) table.add(bytes("epoch,estimator,x\n1,2,3\n2,2,4\n3,2,5\n"));
+  assert.deepEqual([thinned.values("x"), thinned.packed().every], [whole.values("x"), 1]);
+});
+
+test("a log begins with whole lines", async () => {
+  const line = "(1.000000) can0 305#0011223344556677\n", log = new Blob([line.repeat(400_000)]), part = await beginningOf(log);
+  assert.ok(part.size > 11.9e6 && part.size < 12e6 && part.size % line.length === 0);
 });

@@ -50,7 +50,7 @@ test("each fault of the world has a text", () => {
 });
 
 test("each row of the parameter table and each code of the doctor has Indonesian words", () => {
-  const rows = [...names("../../../src/tetap/param/table.hpp", /TETAP_ROW\(0x\w+,\s*([a-z][\w.]*),/g), ...names("../../../src/tetap/param/table.hpp", /TETAP_SCALED_ROW\(0x\w+,\s*"([\w.]+)"/g)];
+  const rows = [...names("../../../src/tetap/param/table.hpp", /TETAP_ROW\(\s*0x\w+,\s*([a-z][\w.]*),/g), ...names("../../../src/tetap/param/table.hpp", /TETAP_SCALED_ROW\(0x\w+,\s*"([\w.]+)"/g)];
   assert.ok(rows.length > 200);
   assert.deepEqual(Object.keys(ROWS_ID).sort(), rows.filter((path) => path !== "bus.key").sort());
   assert.deepEqual(Object.keys(CODES_ID).sort(), names("../../doctor/codes.hpp", /CodeRow\{\s*Code::k\w+, "(\w+)"/g).sort());

@@ -22,6 +22,7 @@ import { LessonView } from "./lesson_view.js";
 import { CableView } from "./cable_view.js";
 import { parsed } from "./settings_text.js";
 import { TaskQueue } from "./tasks.js";
+import { LONG_BYTES, beginningOf } from "./thinning.js";
 import { say, speak, languageNow } from "./texts.js";
 import { ofModule } from "./texts_module.js";
 
@@ -178,6 +179,7 @@ class App {
   async replayAll() {
     this.second = null;
     this.message = this.note = "";
+    if (this.file.size > LONG_BYTES) await this.showBeginning();
     const played = await this.replay([]);
     this.run = new Run(played);
     this.view.reset(this.run.span);
@@ -187,6 +189,20 @@ class App {
     this.findings = await this.tasks.run("diagnose", this.task()).catch((error) => ({ failed: error.message }));
     this.renderFindings();
     document.body.dataset.diagnosed = "yes";
+  }
+  /** The first picture of a long log; what is refused here is said of the whole log. */
+  async showBeginning() {
+    const part = await beginningOf(this.file);
+    await this.tasks.run("open", { log: part });
+    const played = await this.tasks.run("replay", this.task({ mode: MODE.lockstep })).catch(() => null);
+    await this.tasks.run("open", { log: this.file });
+    if (!played) return;
+    this.run = new Run(played);
+    this.note = say("open.beginning", (part.size / 1e6).toFixed(0), (this.file.size / 1e6).toFixed(0));
+    this.view.reset(this.run.span);
+    this.render();
+    document.body.dataset.beginning = "yes";
+    this.note = "";
   }
   /** A log that is no whole record is played by its inputs, and the page says so. */
   async replay(settings) {
@@ -349,7 +365,7 @@ class App {
     body.append(element("button", { onclick: () => (this.path.fit(), this.view.show(this.view.whole), this.path.draw()) }, say("path.all")));
   }
   renderStates() {
-    const body = this.section("state", say("state.note"));
+    const body = this.section("state", [say("state.note"), ...(this.run.every > 1 ? [say("state.thinned", this.run.every)] : [])].join(" "));
     const known = Object.keys(SIGMAS).filter((name) => this.run.series(name)[0].length > 0);
     const select = element("select", { id: "state-name", "aria-label": say("state.label"), onchange: () => ((this.state = select.value), this.render(true)) },
       known.map((name) => element("option", { value: name, selected: name === this.state }, say(`state.${name}`))));

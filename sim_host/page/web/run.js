@@ -2,6 +2,7 @@
 // A replay as the pictures want it: the main estimator's path and states, innovations by source, modes, refusals.
 import { Table } from "./columns.js";
 import { mapAt } from "./earth.js";
+import { NO_REFUSAL } from "./thinning.js";
 
 /** Rows of a table for which `keep(row)` holds. */
 function rowsOf(table, keep) {
@@ -40,12 +41,11 @@ const MOST_RATIO = 40.92;
 /** A ratio in words: at the ceiling of its frame it may be anything above. */
 export const times = (ratio, digits = 1) => (ratio >= MOST_RATIO - 0.005 ? "≥ 40.9" : ratio.toFixed(digits));
 
-const NO_REFUSAL = new Set(["Accepted", "NotUsed", "NewLandmark", "Pending"]);
-
 export class Run {
   constructor({ result, tables }) {
     this.result = result;
     this.tables = Object.fromEntries(Object.entries(tables).map(([name, table]) => [name, table instanceof Table ? table : Table.unpacked(table)]));
+    this.every = Math.max(1, ...Object.values(tables).map(({ every }) => every ?? 1)); // of a long log
     this.chooseEstimator();
     this.span = this.t.length > 0 ? [this.t[0], this.t.at(-1)] : [0, 1];
     this.readInnovations();

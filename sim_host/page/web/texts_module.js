@@ -31,7 +31,7 @@ export const FAULTS_ID = {
   lidar_covered: "sesuatu menutupi LiDAR: pindaian datang, tanpa pantulan",
   lidar_glass: "semua dinding kaca: berkas hilang, atau kembali dari belakangnya",
   lidar_mirrored: "pindaian tercermin: kiri menjadi kanan, seperti LiDAR terpasang terbalik",
-  lidar_turned: "LiDAR berputar 90° berlawanan jarum jam di dudukannya",
+  lidar_turned: "LiDAR berputar 90° berlawanan arah jarum jam di dudukannya",
   lidar_late: "timestamp pindaian 100 ms setelah berkas pertamanya",
   lorry: "truk tanpa ujung lewat 3 m di depan dengan 1,5 m/s dan memenuhi gambar",
   moving_features: "30 % fitur berada pada benda yang bergerak 6 m di depan dengan 1,5 m/s",
@@ -41,7 +41,7 @@ export const FAULTS_ID = {
   images_mirrored: "kiri menjadi kanan di gambar",
   images_turned: "gambar berputar 90° searah jarum jam terhadap titik utamanya",
   focal_length: "panjang fokus 20 % lebih panjang daripada semestinya",
-  image_stamps: "timestamp gambar 100 ms setelah pencahayaannya",
+  image_stamps: "timestamp gambar 100 ms setelah eksposurnya",
 };
 
 /** Pieces of sentences, the longer ones first. */

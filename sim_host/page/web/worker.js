@@ -3,6 +3,7 @@
 // behind for the next.
 import { Engine, Refusal, CHANNEL } from "./engine.js";
 import { Table } from "./columns.js";
+import { tableOf } from "./thinning.js";
 
 const TABLES = ["estimates.log", "estimates", "states", "innovations", "sensors", "status", "sources", "map", "keyframes", "graph"];
 
@@ -72,7 +73,7 @@ export class Tasks {
   }
   /** Tables and result; `progress(share)` as it goes. */
   replay({ robot, base, settings, mode, borrow = null }, progress) {
-    const tables = TABLES.map(() => new Table()), fixes = new Table();
+    const tables = TABLES.map(tableOf), fixes = new Table();
     let ticks = 0, epochs = 0;
     const engine = this.engine((channel, data) => {
       if (channel === CHANNEL.begun) ticks = data.ticks;
@@ -80,7 +81,7 @@ export class Tasks {
       else if (channel < TABLES.length) {
         tables[channel].add(data);
         if (channel !== 1 || ticks === 0) return;
-        const table = tables[1], now = table.values("epoch")[table.rows - 1];
+        const table = tables[1], now = table.rows > 0 ? table.values("epoch")[table.rows - 1] : 0;
         if (now > epochs + ticks / 50) progress((epochs = now) / ticks);
       }
     });
