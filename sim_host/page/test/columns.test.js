@@ -72,6 +72,14 @@ test("a long table keeps every change and refusal, and of each kind of rows ever
   assert.ok(times.has(rows - 96) || [...times].some((t) => t > rows - 400), "up to the end");
 });
 
+test("cells that come at every tenth row are a kind of their own", () => {
+  const table = new ThinnedTable({ most: 256, kinds: [], parts: true });
+  table.add(bytes("t,sigma\n"));
+  for (let i = 0; i < 20000; i++) table.add(bytes(`${i},${i % 10 === 7 ? 1 : ""}\n`));
+  const filled = [...table.values("sigma")].filter((value) => !Number.isNaN(value)).length;
+  assert.ok(filled > 0.05 * table.rows && filled < 0.2 * table.rows, `${filled} of ${table.rows}`);
+});
+
 test("what stays may need more room than was given", () => {
   const table = new ThinnedTable({ most: 64, kinds: [], refusals: true });
   table.add(bytes("t,verdict\n"));

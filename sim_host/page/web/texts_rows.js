@@ -63,7 +63,7 @@ export const ROWS_ID = {
   "gnss.align_distance_m": "Jarak tempuh menurut GNSS untuk memperoleh heading.",
   "gnss.baseline_b_m": "Vektor dari antena pertama ke antena kedua pada receiver dua antena.",
   "gnss.heading_stuck_samples": "Jumlah heading yang sama berturut-turut sampai receiver dianggap macet; 0: tidak diuji.",
-  "gnss.origin_configured": "0: posisi pertama receiver menjadi titik asal peta; 1: titik asal di bawah ini yang dipakai.",
+  "gnss.origin_configured": "0: titik asal peta adalah posisi GNSS pertama yang terkonfirmasi; 1: seperti diberikan; 2: seperti diberikan, kecuali posisi GNSS di luar jangkauan.",
   "gnss.origin_latitude_deg": "Lintang titik asal peta.",
   "gnss.origin_longitude_deg": "Bujur titik asal peta.",
   "gnss.origin_height_m": "Tinggi titik asal peta di atas elipsoid.",

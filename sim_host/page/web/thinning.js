@@ -5,23 +5,23 @@ import { Table } from "./columns.js";
 /** Verdicts that refuse nothing. */
 export const NO_REFUSAL = new Set(["Accepted", "NotUsed", "NewLandmark", "Pending"]);
 
-/** By table: its most rows, the columns that part it into kinds, and the rows that stay: refusals, and those where one of `changes` changes. */
+/** By table: its most rows, the columns that part it into kinds (`parts`: and which of its cells are filled, as sigmas come at every tenth row), and the rows that stay: refusals, and those where one of `changes` changes. */
 const FORMS = {
-  estimates: { most: 1 << 18, kinds: ["estimator"] },
-  states: { most: 1 << 17, kinds: ["estimator"] },
-  innovations: { most: 1 << 17, kinds: ["estimator", "sensor"], refusals: true },
-  sensors: { most: 1 << 17, kinds: ["sensor", "estimator"] },
-  status: { most: 1 << 17, kinds: [], changes: ["mode", "faults"] },
-  sources: { most: 1 << 17, kinds: ["estimator", "source"], changes: ["state", "failed"] },
+  estimates: { most: 1 << 17, kinds: ["estimator"], parts: true },
+  states: { most: 1 << 16, kinds: ["estimator"], parts: true },
+  innovations: { most: 1 << 16, kinds: ["estimator", "sensor"], refusals: true },
+  sensors: { most: 1 << 16, kinds: ["sensor", "estimator"] },
+  status: { most: 1 << 16, kinds: [], changes: ["mode", "faults"] },
+  sources: { most: 1 << 16, kinds: ["estimator", "source"], changes: ["state", "failed"] },
 };
 
 /** A row that stays has no ordinal. */
 const STAYS = -1;
 
 export class ThinnedTable extends Table {
-  constructor({ most, kinds, changes = [], refusals = false }) {
+  constructor({ most, kinds, parts = false, changes = [], refusals = false }) {
     super();
-    Object.assign(this, { most: most - 1, kinds, changes, refusals, every: 1, seen: new Map(), ordinals: new Float64Array(most) });
+    Object.assign(this, { most: most - 1, kinds, parts, changes, refusals, every: 1, seen: new Map(), ordinals: new Float64Array(most) });
   }
   addLine(bytes, begin) {
     const end = super.addLine(bytes, begin), row = this.rows - 1, ordinal = this.ordinal(row);
@@ -38,7 +38,8 @@ export class ThinnedTable extends Table {
   }
   /** Of a row among those of its kind. */
   ordinal(row) {
-    const kind = this.kinds.reduce((key, name) => 4096 * key + this.value(name, row), 0), now = this.changes.map((name) => this.value(name, row));
+    const filled = this.parts ? this.columns.reduce((bits, { values }) => 2 * bits + (Number.isNaN(values[row]) ? 0 : 1), 0) : 0;
+    const kind = this.kinds.reduce((key, name) => 4096 * key + this.value(name, row), filled), now = this.changes.map((name) => this.value(name, row));
     const before = this.seen.get(kind) ?? { rows: 0, values: null };
     const changed = this.changes.length > 0 && !before.values?.every((value, i) => value === now[i]);
     this.seen.set(kind, { rows: before.rows + 1, values: now });
