@@ -127,6 +127,7 @@ inline void set_mounting(const param::Parameters& n, bool inertial, Parameters& 
   world.vehicle.axle_x_b_m = wide(n.inertial.axle_x_b_m);
   world.gnss.antenna_b_m = {wide(n.gnss.antenna_x_b_m), wide(n.gnss.antenna_y_b_m), wide(n.gnss.antenna_z_b_m)};
   world.imu.mounting_bs = imu_mounting(n, inertial);
+  world.imu.place_b_m = wide(n.inertial.place_b_m);
   world.camera.x_b_m = wide(n.landmark.mounting.x_b_m);
   world.camera.y_b_m = wide(n.landmark.mounting.y_b_m);
   world.camera.yaw_rad = wide(n.landmark.mounting.yaw_rad);

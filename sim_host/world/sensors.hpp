@@ -50,6 +50,7 @@ class Imu {
   Chance noise_, vibration_;
   Vector3 gyro_bias_{}, accel_bias_{}, gyro_scale_{}, accel_scale_{};
   Processes gyro_walk_, accel_walk_;
+  std::optional<Vector3> last_rate_radps_;
   Vector3 angle_{}, velocity_{};
   Vector3 rate_radps_{}, force_mps2_{};  ///< signals of the last step, without bias and noise
   double lug_phase_rad_ = 0;

@@ -137,6 +137,32 @@ TEST(Imu, at_rest_it_feels_gravity_upward_and_the_turning_earth) {
   EXPECT_NEAR(statistics(series[1]).mean, 7.292115e-5 * std::cos(48.2627 * kPi / 180), 1e-9);
 }
 
+// A second of 2 rad/s2 about up, then 2 rad/s: its own speed at (x, y) is w (-y, x), and the pull inward w^2 (x, y).
+TEST(Imu, away_from_the_origin_it_swings_round_it) {
+  ImuParameters parameters = matched(Parameters{}).imu;
+  parameters.earth_rotation = false;
+  parameters.gyro_noise = 0;
+  parameters.accel_noise = {};
+  parameters.place_b_m = {0.4, -0.3, 0.2};
+  Imu imu{parameters, 0.1, kEarth, 7};
+  Motion motion;
+  base::Micros now;
+  Vector3 gained{}, pulled{};
+  for (int k = 1; k <= 4'000; ++k) {
+    motion.rate_b_radps[2] = std::min(0.001 * k, 2.0);
+    imu.sense(motion, 0, now += Vehicle::kStep, kNoFaults);
+    if (k % (2'000 / parameters.rate_hz) != 0) continue;
+    const sensor::ImuSample s = imu.sample(now, kNoFaults);
+    Vector3& sum = k <= 2'000 ? gained : pulled;
+    for (std::size_t a = 0; a < 3; ++a) sum[a] += static_cast<double>(s.dvelocity_b_mps[a]);
+  }
+  EXPECT_NEAR(gained[0], 2 * 0.3 - 4.0 / 3 * 0.4, 0.02);
+  EXPECT_NEAR(gained[1], 2 * 0.4 + 4.0 / 3 * 0.3, 0.02);
+  EXPECT_NEAR(pulled[0], -4 * 0.4, 0.02);
+  EXPECT_NEAR(pulled[1], 4 * 0.3, 0.02);
+  EXPECT_NEAR(pulled[2], kEarth.gravity_mps2(), 0.001);
+}
+
 TEST(Imu, vibration_grows_with_speed_and_is_none_at_rest) {
   ImuParameters parameters = matched(Parameters{}).imu;
   parameters.accel_noise = {};

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tetap/estimators/attitude.hpp"
+#include "tetap/estimators/imu_place.hpp"
 
 namespace tetap::estimators {
 
@@ -17,9 +18,13 @@ Innovation Attitude::fuse(const sensor::ImuSample& sample, base::Micros stamp, c
   const bool lost = gap && span > kBridged;
   const param::InertialParameters& n = ctx.parameters.inertial;
   filter_.set_range({.gyroscope_radps = n.gyro_range_radps, .accelerometer_mps2 = n.accel_range_mps2});
-  const auto verdict =
-      filter_.step(rate, per_s * body(sample.dvelocity_b_mps), base::seconds(gap && !lost ? span : interval),
-                   {.gyroscope = sample.clipped_gyro > 0, .accelerometer = sample.clipped_accel > 0});
+  filter::Vector3 gained = body(sample.dvelocity_b_mps);
+  if (const ImuPlace place(n); !place.is_origin()) {
+    const filter::Vector3 now = rate - filter_.bias_b_radps();
+    gained -= place.swing_mps(now * base::seconds(interval), gap ? now : rate_b_radps_ - filter_.bias_b_radps(), now);
+  }
+  const auto verdict = filter_.step(rate, per_s * gained, base::seconds(gap && !lost ? span : interval),
+                                    {.gyroscope = sample.clipped_gyro > 0, .accelerometer = sample.clipped_accel > 0});
   if (verdict == filter::AttitudeVerdict::kRefused)
     return {.verdict = sensor::Verdict::kNotFinite, .failed = sensor::Check::kValue};
   // The turn in a gap is unknown by the rate before it and by the rate that the inertial filter assumes in gaps.

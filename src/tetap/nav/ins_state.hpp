@@ -92,4 +92,11 @@ struct InsState {
   }
 };
 
+/// Moves the place by d [m], in n.
+inline void move(InsState& at, const Vector3& d_n_m) {
+  move(at.x, d_n_m(0));
+  move(at.y, d_n_m(1));
+  move(at.z, d_n_m(2));
+}
+
 }  // namespace tetap::nav

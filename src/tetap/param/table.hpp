@@ -216,6 +216,7 @@ inline constexpr std::array kTable{
               "Full scale of the gyroscope on each axis; more is a garbled sample."),
     TETAP_ROW(0x1E3, inertial.accel_range_mps2, "m/s^2", 10, 1000, kLive,
               "Full scale of the accelerometer on each axis; more is a garbled sample."),
+    TETAP_ROW(0x1E4, inertial.place_b_m, "m", -20, 20, kRestart, "Place of the IMU in the body."),
 
     TETAP_ROW(0x200, magnetic.use, "", 0, 1, kRestart, "1: the magnetometer is fused."),
     TETAP_ROW(0x201, magnetic.declination_rad, "rad", -detail::kPi, detail::kPi, kRestart,

@@ -24,7 +24,15 @@ class ImuInput {
   [[nodiscard]] checks::ImuDrift& drift() { return drift_; }
   /// Turn rate as the gyroscope shows it, at the filter's time; its bias is in it.
   [[nodiscard]] const nav::Vector3& rate_b_radps() const { return rate_b_radps_; }
-  void set_rate(const nav::Vector3& rate_b_radps) { rate_b_radps_ = rate_b_radps; }
+  /// The rate as a sample without one before it shows it: it is taken to be steady.
+  void set_rate(const nav::Vector3& rate_b_radps) { rate_b_radps_ = end_rate_b_radps_ = rate_b_radps; }
+  /// The rate of a sample that follows the last one.
+  void follow_rate(const nav::Vector3& rate_b_radps) {
+    end_rate_b_radps_ = rate_b_radps + 0.5F * (rate_b_radps - rate_b_radps_);
+    rate_b_radps_ = rate_b_radps;
+  }
+  /// The same rate at the end of the last sample, where rate_b_radps() is that sample's mean.
+  [[nodiscard]] const nav::Vector3& end_rate_b_radps() const { return end_rate_b_radps_; }
   /// The last sample was beyond the sensor's range, or at full scale where wheels show the turn.
   [[nodiscard]] bool unusable() const { return unusable_; }
   void set_unusable(bool unusable) { unusable_ = unusable; }
@@ -52,7 +60,8 @@ class ImuInput {
 
   static constexpr auto members(auto& self) {
     return base::members(base::in_turns(self.health_), base::in_turns(self.bridged_until_),
-                         base::in_turns(self.last_suspect_), self.rate_b_radps_, self.drift_, self.unusable_);
+                         base::in_turns(self.last_suspect_), self.rate_b_radps_, base::unhashed(self.end_rate_b_radps_),
+                         self.drift_, self.unusable_);
   }
 
  private:
@@ -60,6 +69,7 @@ class ImuInput {
   base::Micros bridged_until_;  ///< time to which the filter last went without IMU; 0: never
   base::Micros last_suspect_;   ///< stamp of the last sample that was left out, or that leapt; 0: none
   nav::Vector3 rate_b_radps_ = nav::Vector3::Zero();
+  nav::Vector3 end_rate_b_radps_ = nav::Vector3::Zero();  ///< not hashed: the velocity shows it a sample later
   checks::ImuDrift drift_;
   bool unusable_ = false;
 };

@@ -65,6 +65,7 @@ void OutputPredictor::add(const Sample& sample, const Inputs& in, const ImuSampl
       fold(in);
       if (newest != nullptr) place_.rate_b_radps = rate_of(*newest, n);
       bridge(gap, in);
+      ImuPlace(n).change_rate(place_.x, rate_of(imu, n) - place_.rate_b_radps);
     } else {
       holes.rest += gap;
       note_bridged(gap);

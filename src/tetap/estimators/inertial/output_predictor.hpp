@@ -5,6 +5,7 @@
 #pragma once
 
 #include "tetap/base/members.hpp"
+#include "tetap/estimators/imu_place.hpp"
 #include "tetap/estimators/inertial/imu_cells.hpp"
 #include "tetap/estimators/inertial/imu_input.hpp"
 #include "tetap/estimators/inertial/rebuild_schedule.hpp"
@@ -26,7 +27,7 @@ class OutputPredictor {
     bool imu_distrusted = false;  ///< an axis is stuck: samples are left out
   };
   struct Place {
-    nav::InsState x;
+    nav::InsState x;       ///< place and velocity are those of the IMU
     base::Micros reached;  ///< sum of the intervals of samples and gaps
     base::Micros last;     ///< stamp of the last sample that was neither invalid nor stuck
     checks::ImuClassifier classifier;
@@ -57,6 +58,7 @@ class OutputPredictor {
     nav::InsState x = place_.x;
     const base::Micros gap = t - place_.reached;
     if (checks::ImuClassifier::is_gap(gap)) static_cast<void>(nav::strapdown(x, unseen(gap, in), in.earth));
+    ImuPlace(in.parameters).to_origin(x, place_.rate_b_radps - x.b_g_radps);
     return x;
   }
   /// The estimate's time.

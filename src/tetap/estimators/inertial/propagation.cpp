@@ -7,7 +7,7 @@ namespace tetap::estimators {
 Innovation Inertial::fuse(const sensor::ImuSample& sample, base::Micros stamp, const Context& ctx) {
   const param::InertialParameters& n = ctx.parameters.inertial;
   budget_.spend(WorkBudget::kImuSample);
-  const nav::ImuIncrement increment = mounted(checks::increment_of(sample), n);
+  nav::ImuIncrement increment = mounted(checks::increment_of(sample), n);
   const base::Micros pause = stamp - increment.dt - time_;
   const bool was_stuck = imu_.health().stuck();
   const bool turn_known = sample.clipped_gyro > 0 && tracking() && view(stamp, ctx).wheels_show_turn();
@@ -25,14 +25,31 @@ Innovation Inertial::fuse(const sensor::ImuSample& sample, base::Micros stamp, c
   }
   // All that was true at the last sample has been fused: wheels bring the constraint with them, and twice is too sure.
   if (tracking()) fuse_constraint(time_, ctx);
-  imu_.set_rate(increment.dtheta_b_rad / base::seconds(increment.dt));
+  const nav::Vector3 rate_b_radps = increment.dtheta_b_rad / base::seconds(increment.dt);
+  const bool follows = found == checks::ImuClass::kContiguous;
+  const nav::Vector3 before_b_radps = follows ? imu_.end_rate_b_radps() : rate_b_radps;
+  follows ? imu_.follow_rate(rate_b_radps) : imu_.set_rate(rate_b_radps);
+  const nav::Vector3 way_b_m = to_origin(increment, before_b_radps, n);
   if (!tracking()) return align(increment, pause, stamp, ctx);
   if (found == checks::ImuClass::kOverlapping) {
     predictor_.note_correction();
     return {.verdict = sensor::Verdict::kStale, .failed = Check::kTime};
   }
   if (found == checks::ImuClass::kAfterGap) bridge_lost_samples(pause, ctx);
-  return propagate(sample, increment, stamp, ctx);
+  return propagate(sample, increment, way_b_m, stamp, ctx);
+}
+
+/// Takes the IMU's swing round the origin out of the increment. Gives what the position is to be moved by beside, in
+/// the axes at the increment's end.
+[[gnu::noinline]] nav::Vector3 Inertial::to_origin(nav::ImuIncrement& increment, const nav::Vector3& before_b_radps,
+                                                   const param::InertialParameters& n) const {
+  const ImuPlace place(n);
+  if (place.is_origin()) return nav::Vector3::Zero();
+  const float dt_s = base::seconds(increment.dt);
+  const nav::Vector3 turn_b_rad = increment.dtheta_b_rad - ins_.x.b_g_radps * dt_s;
+  const nav::Vector3 before = before_b_radps - ins_.x.b_g_radps, after = imu_.end_rate_b_radps() - ins_.x.b_g_radps;
+  increment.dv_b_mps -= place.swing_mps(turn_b_rad, before, after);
+  return place.way_m(turn_b_rad, dt_s, before, after);
 }
 
 /// Repetitions before this one were taken for motion.
@@ -63,8 +80,8 @@ void Inertial::bridge_lost_samples(base::Micros gap, const Context& ctx) {
   imu_.set_rate(shown);
 }
 
-Innovation Inertial::propagate(const sensor::ImuSample& sample, const nav::ImuIncrement& increment, base::Micros stamp,
-                               const Context& ctx) {
+Innovation Inertial::propagate(const sensor::ImuSample& sample, const nav::ImuIncrement& increment,
+                               const nav::Vector3& way_b_m, base::Micros stamp, const Context& ctx) {
   const param::InertialParameters& n = ctx.parameters.inertial;
   const float dt_s = base::seconds(increment.dt);
   const float up_b = ins_.x.q_nb.rotated_x().dot(ins_.earth.up_n);  // share of gravity's reaction that points forward
@@ -77,6 +94,7 @@ Innovation Inertial::propagate(const sensor::ImuSample& sample, const nav::ImuIn
     time_ = stamp;
     return {.verdict = sensor::Verdict::kNotFinite, .failed = Check::kValue};
   }
+  if (!ImuPlace(n).is_origin()) nav::move(ins_.x, ins_.x.q_nb.rotate(way_b_m));
   ins_.vibration = imu_.health().vibration().noise_factor(n);
   if (ins_.pending_s() >= predictor_.schedule().covariance_every_s()) ins_.predict_covariance();
   if (sample.clipped_accel > 0 || sample.clipped_gyro > 0) inflate_clipped(sample, dt_s, n);

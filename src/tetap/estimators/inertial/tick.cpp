@@ -54,12 +54,13 @@ void Inertial::predict_output(const OutputPredictor::Inputs& in, const sensor::W
     budget_.grant(WorkBudget::kMeasurement + WorkBudget::kImuSample);
     return predictor_.extend(window, in);
   }
-  const bool samplewise = predictor_.rebuild({.x = ins_.x,
-                                              .reached = time_,
-                                              .last = imu_.health().last_valid(),
-                                              .classifier = imu_.health().classifier(),
-                                              .rate_b_radps = imu_.rate_b_radps()},
-                                             window, in);
+  OutputPredictor::Place far{.x = ins_.x,
+                             .reached = time_,
+                             .last = imu_.health().last_valid(),
+                             .classifier = imu_.health().classifier(),
+                             .rate_b_radps = imu_.rate_b_radps()};
+  ImuPlace(in.parameters).to_imu(far.x, imu_.end_rate_b_radps() - far.x.b_g_radps);
+  const bool samplewise = predictor_.rebuild(far, window, in);
   predictor_.schedule().note_samplewise(samplewise);
   // Then the horizon leaves half of its own samples for later.
   if (samplewise && budget_.left() > 1) budget_.spend(budget_.left() / 2);
