@@ -102,6 +102,7 @@ struct GnssParameters {
   float antenna_x_b_m = 0;
   float antenna_y_b_m = 0;
   float antenna_z_b_m = 0;
+  std::int32_t delay_us = 0;  ///< from the measurement to its stamp
   float sigma_velocity_floor_mps = 0.1F;
   float sigma_floor_m = 0.5F;  ///< lower limit of the receiver's own accuracy
   float sigma_scale = 1;       ///< times the receiver's own accuracy

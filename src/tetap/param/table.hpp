@@ -149,6 +149,8 @@ inline constexpr std::array kTable{
                      kRestart, "Longitude of the map's origin; the member counts steps of 2e-9 degrees."),
     TETAP_ROW(0x18E, gnss.origin_height_m, "m", -500, 10'000, kRestart,
               "Height of the map's origin above the ellipsoid."),
+    TETAP_ROW(0x18F, gnss.delay_us, "us", 0, 500'000, kRestart,
+              "Time from a measurement of the receiver (fix, velocity, heading) to its stamp."),
 
     TETAP_ROW(0x1C0, inertial.imu, "", 0, 3, kRestart,
               "Instance of the IMU that the inertial and attitude filters use."),

@@ -41,6 +41,11 @@ inline void calibrate(LandmarkSighting& s, const param::LandmarkParameters& n) {
   return turns * base::seconds(base::Micros{n.turn_us});
 }
 
+/// A GNSS receiver's own: one with two antennas shows a heading.
+[[nodiscard]] constexpr bool is_of_receiver(Sensor s) {
+  return s == Sensor::kGnssPosition || s == Sensor::kGnssVelocity || s == Sensor::kHeading;
+}
+
 inline void calibrate(Sample& sample, const param::Parameters& n) {
   if (is_imu(sample, n.inertial.imu)) {
     calibrate(sample.payload.imu, n.imu);
@@ -56,6 +61,8 @@ inline void calibrate(Sample& sample, const param::Parameters& n) {
     sample.stamp += base::Micros{half_us - n.lidar.delay_us};
   } else if (sample.sensor == sensor::Sensor::kFeature) {
     sample.stamp = sample.stamp - base::Micros{n.camera.delay_us};
+  } else if (is_of_receiver(sample.sensor)) {
+    sample.stamp = sample.stamp - base::Micros{n.gnss.delay_us};
   }
 }
 
