@@ -107,6 +107,21 @@ def of_costs(out):
     return table(costs.HEAD, costs.cells(loaded(out, "costs.json")))
 
 
+def mappers(out):
+    """Four ways to make a map; None where not all seeds or no images were run."""
+    found, cells = loaded(out, "mappers.json"), []
+    if found["seeds"] < 10 or "ram_bytes" not in found["rows"][0]:
+        return None
+    for one in found["rows"]:
+        row = [f"{one['method']}, `{one['robot']}`"]
+        for count in ("63", "14"):
+            run = one[count]
+            row += [f"{run['trajectory_m']:.2f} m", f"{run['map_m']:.2f} m", f"{run['points']:.0f}, {run['astray']:.1f}", f"{run['nees']:.1f}"]
+        cells.append([*row, spaced(one["ram_bytes"]), f"{spaced(one['instructions_mean'])} / {spaced(one['instructions_worst'])}", one["needs"], one["fails"]])
+    columns = [f"{name}, {count}" for count in (63, 14) for name in ("trajectory", "map", "held, astray", "NEES")]
+    return table(["method", *columns, "RAM B", "M7, mean / worst tick", "needs", "fails"], cells)
+
+
 # region: (command, files that it writes, table)
 REGIONS = {"memory": ("make size stack", ["size.json", "stack.json"], memory), "instructions": ("make count", ["count.json"], instructions),
            "campaign": ("tools/proof/run_campaign", ["campaign.json"], campaign),
@@ -117,6 +132,7 @@ REGIONS = {"memory": ("make size stack", ["size.json", "stack.json"], memory), "
            "nees": (WHOLE, ["inertial.json"], of_whole_runs(recorded.nees_table)),
            "menu": ("test/replay/menu_runs.py build/host/sim_host out/menu", ["menu/menu.json"], bounded("menu/menu.json")),
            "mapping": ("test/replay/mapping_runs.py build/host/sim_host out/mapping --whole", ["mapping/mapping.json"], bounded("mapping/mapping.json")),
+           "mappers": ("tools/report/compare_mappers --images build/m7/hal/board", ["mappers.json"], mappers),
            "mrclam": ("make test STEPS=recorded_runs", [f"recorded/mrclam{robot}/summary.json" for robot in range(1, 6)], mrclam), **campaigns.REGIONS}
 
 
