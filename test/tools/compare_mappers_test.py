@@ -67,10 +67,10 @@ class Judged(unittest.TestCase):
 
     def test_a_keyframe_has_the_time_of_its_stamp(self):
         signals = mappers.bus_writer.Dbc().messages["Est_Keyframe"]
-        time_us = 5_300_000
+        time_us = 5_300_000  # 0.8 s before its frame
         word = 9 << signals.signals["Id"].start | (time_us & ((1 << 20) - 1)) << signals.signals["Stamp"].start
         with open(os.path.join(self.folder, "estimates.log"), "w", encoding="ascii") as file:
-            file.write(f"(0000000005.310000) vcan0 {signals.identifier:03X}#{word.to_bytes(8, 'little').hex().upper()}\n")
+            file.write(f"(0000000006.100000) vcan0 {signals.identifier:03X}#{word.to_bytes(8, 'little').hex().upper()}\n")
         self.assertEqual(mappers.keyframes_made(self.folder), {9: 5.3})
 
 
