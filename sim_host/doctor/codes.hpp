@@ -41,6 +41,10 @@ enum class Code : std::uint8_t {
   kTrackWidth,
   kAntennaArm,
   kOriginFar,
+  kCameraTurned,
+  kCameraMirrored,
+  kFocalLength,
+  kImageStamps,
 };
 
 /// Devices whose data a mistake spoils; a comparison with a spoilt device gives no second finding.
@@ -165,6 +169,18 @@ inline constexpr std::array kCodes{
     CodeRow{Code::kOriginFar, "origin_far", "The robot's configured origin is far away.",
             "The distance of the fixes from gnss.origin.",
             "Set the origin of the site, or gnss.origin_configured = 0: the first fixes are the origin.", 0},
+    CodeRow{Code::kCameraTurned, "camera_turned", "The camera is turned about its view.",
+            "The turns by the images against the gyroscope, where the robot turns on its way.",
+            "Turn the camera or its image, or set camera.mounting_bc.", 0},
+    CodeRow{Code::kCameraMirrored, "camera_mirrored", "The camera's images are mirrored.",
+            "The turns by the images against the gyroscope, and the half of the image that shows what is near.",
+            "Switch off the mirror in the camera's driver, or send the width less U.", 0},
+    CodeRow{Code::kFocalLength, "focal_length", "The camera's focal length is wrong.",
+            "The turns by the images against the gyroscope.",
+            "Set camera.fu_px and camera.fv_px for the size of image that is sent.", 0},
+    CodeRow{Code::kImageStamps, "image_stamps", "The images are older than their stamps, or younger.",
+            "The turns by the images against the gyroscope before and after the stamp.",
+            "Stamp an image with the middle of its exposure, or set camera.delay_us.", 0},
 };
 
 [[nodiscard]] constexpr const CodeRow& row(Code code) { return kCodes[static_cast<std::size_t>(code)]; }

@@ -4,6 +4,7 @@
 #include "sim_host/doctor/antenna.hpp"
 #include "sim_host/doctor/axes.hpp"
 #include "sim_host/doctor/bus_time.hpp"
+#include "sim_host/doctor/camera.hpp"
 #include "sim_host/doctor/dead_axis.hpp"
 #include "sim_host/doctor/fixes.hpp"
 #include "sim_host/doctor/force.hpp"
@@ -73,11 +74,14 @@ class Examination {
         origin_(robot),
         dead_axis_(robot),
         axes_(robot, {.turn = turn_, .course = course_, .field = field_, .force = force_, .forward = forward_}),
-        turn_scale_({.turn = turn_, .course = course_, .field = field_, .force = force_, .forward = forward_}) {
+        turn_scale_({.turn = turn_, .course = course_, .field = field_, .force = force_, .forward = forward_}),
+        camera_(robot, path_) {
     decoder_.power_on();
   }
 
   void frame(const SeenFrame& seen) {
+    // Features share one Seq within an image: only their own comparison knows that.
+    if (sim::is_map_input(seen.offset)) return camera_.frame(seen);
     for (Detector* one : all_) one->frame(seen);
     time_ = seen.time;
     decoder_.expire(seen.time, kPatience, counters_);
@@ -124,9 +128,10 @@ class Examination {
   DeadAxisDetector dead_axis_;
   AxesDetector axes_;
   TurnScaleDetector turn_scale_;
-  std::array<Detector*, 18> all_{&halves_,     &sequence_, &stamps_,   &force_,     &turn_,     &forward_,
-                                 &course_,     &field_,    &velocity_, &path_,      &lateness_, &wheel_speed_,
-                                 &speed_vote_, &antenna_,  &origin_,   &dead_axis_, &axes_,     &turn_scale_};
+  CameraDetector camera_;
+  std::array<Detector*, 19> all_{&halves_, &sequence_,  &stamps_, &force_,      &turn_,        &forward_,    &course_,
+                                 &field_,  &velocity_,  &path_,   &lateness_,   &wheel_speed_, &speed_vote_, &antenna_,
+                                 &origin_, &dead_axis_, &axes_,   &turn_scale_, &camera_};
 };
 
 /// Codes of one comparison of several devices, which may not show whose axes are wrong.
@@ -186,7 +191,7 @@ sim::Result<Diagnosis> diagnose(sim::Frames& log, const std::string& name, std::
   bool begun = false;
   for (sim::TimedFrame entry; log.next(entry);) {
     clock.add(entry.time, entry.frame);
-    if (!clock.known() || !sim::is_counted_input(entry.frame, base)) continue;
+    if (!clock.known() || !sim::is_counted_input(entry.frame, base, {.images = true})) continue;
     const base::Micros now = clock.now();
     if (begun && now > last && (now - last).us < kMostPause_us)
       found.duration_s += static_cast<double>((now - last).us) * 1e-6;
