@@ -15,7 +15,7 @@ namespace tetap::robot::rover {
 
 // Sensors of this robot: no magnetometer, barometer or second antenna, so no code that fuses these is flashed.
 using Attitude = estimators::WithSensors<estimators::Attitude, sensor::ImuSample>;
-using Inertial = estimators::WithSensors<estimators::Inertial, sensor::ImuSample, sensor::WheelCounts,
+using Inertial = estimators::WithSensors<estimators::WatchedInertial, sensor::ImuSample, sensor::WheelCounts,
                                          sensor::GnssPosition, sensor::GnssVelocity>;
 using Estimators = node::Estimators<estimators::Odometry, Attitude, Inertial>;
 

@@ -15,9 +15,9 @@ namespace {
 using namespace tetap;
 
 /// True when the whole log was read and navigated.
-template <class Workload>
+template <class Workload, class Estimator = estimators::Inertial>
 [[gnu::noinline]] bool count_ticks(hal::mps2::Board& board, const param::Parameters& parameters) {
-  static count::Navigator<estimators::Inertial> navigator{parameters};
+  static count::Navigator<Estimator> navigator{parameters};
   const std::uint32_t sync_id = parameters.can_base + bus::InSync::kOffset;
   while (const auto frame = board.can.receive()) {
     const auto sync = frame->id == sync_id ? bus::decode<bus::InSync>(bus::payload(*frame)) : std::nullopt;
@@ -50,7 +50,8 @@ int main() {
   }
   count::calibrate();
   const std::string_view robot = words[1];
-  const bool navigated = robot == "rover" ? count_ticks<struct ins_tick_rover>(board, robot::rover::parameters)
+  const bool navigated = robot == "rover" ? count_ticks<struct ins_tick_rover, estimators::WatchedInertial>(
+                                                board, robot::rover::parameters)
                          : robot == "car" ? count_ticks<struct ins_tick_car>(board, robot::car::parameters)
                                           : count_ticks<struct ins_tick_iris>(board, robot::iris::parameters);
   if (!navigated) {

@@ -43,9 +43,10 @@ inline param::Parameters rover_like() {
   return n;
 }
 
-class Drive {
+template <class Estimator>
+class DriveOf {
  public:
-  explicit Drive(const param::Parameters& of = parameters(), unsigned seed = 1)
+  explicit DriveOf(const param::Parameters& of = parameters(), unsigned seed = 1)
       : n(of), engine_(seed), engine_imu_(98 + seed) {
     map_frame.frame = nav::LocalFrame(24'131'350'000, 5'834'150'000, 500.0F);
     map_frame.origin = sensor::OriginSource::kConfigured;
@@ -65,7 +66,7 @@ class Drive {
 
   param::Parameters n;
   MapFrame map_frame;
-  Inertial estimator;
+  Estimator estimator;
   double east_m = 0, north_m = 0, up_m = 0, yaw_rad = 0.3, speed_mps = 1, turn_radps = 0.05;
   double unseen_east_m = 0;  ///< the rover is carried, and no sensor of motion shows it
   double white_m = 1, lasting_m = 0, lasting_s = 60;
@@ -99,7 +100,7 @@ class Drive {
     const auto& x = now_.state;
     return std::hypot(off(x.x, east_m), off(x.y, north_m));
   }
-  [[nodiscard]] double apart_m(const Drive& other) const {
+  [[nodiscard]] double apart_m(const DriveOf& other) const {
     return std::hypot(static_cast<double>(now_.state.x.minus(other.now_.state.x)),
                       static_cast<double>(now_.state.y.minus(other.now_.state.y)));
   }
@@ -222,6 +223,7 @@ class Drive {
     bool valid = false;
   } now_;
 };
+using Drive = DriveOf<Inertial>;
 
 /// 3 sigma of some of the errors, as one length.
 inline double three_sigma(const InertialEstimate& of, std::initializer_list<int> errors) {
@@ -231,8 +233,9 @@ inline double three_sigma(const InertialEstimate& of, std::initializer_list<int>
 }
 
 /// A drive that has found itself.
-inline Drive settled(const param::Parameters& of = parameters(), unsigned seed = 1) {
-  Drive d(of, seed);
+template <class Estimator = Inertial>
+DriveOf<Estimator> settled(const param::Parameters& of = parameters(), unsigned seed = 1) {
+  DriveOf<Estimator> d(of, seed);
   d.place();
   d.run(60);
   EXPECT_TRUE(d.tracking());

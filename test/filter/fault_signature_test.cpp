@@ -26,7 +26,6 @@ struct Seen {
 struct Fault {
   int onset = 0, jumps = -1;
   bool grows = false, direct = false;
-  double wander = 0;  ///< variance of each step
 };
 
 struct System {
@@ -54,7 +53,6 @@ std::vector<Big> record(System& system, const Fault& fault, double size) {
   for (int k = 0; k < kSteps; ++k) {
     const auto i = static_cast<std::size_t>(k);
     const bool lasts = k >= fault.onset;
-    if (k > fault.onset) size += std::sqrt(fault.wander) * system.drawn(1, 1)(0);
     x = system.f[i] * x + std::sqrt(kNoise) * system.drawn(kN, 1);
     if (lasts && fault.grows) x += system.gamma[i] * size;
     if (k == fault.onset && fault.jumps >= 0) x(fault.jumps) += size;
@@ -64,23 +62,21 @@ std::vector<Big> record(System& system, const Fault& fault, double size) {
   return z;
 }
 
-/// Mean and covariance of the last state and the fault's last size.
+/// Mean and covariance of the last state and the fault's size.
 struct Posterior {
   Big mean, covariance;
 };
 Posterior least_squares(const System& system, const Fault& fault, const std::vector<Big>& z) {
-  const int own = kN * (kSteps + 1), count = own + kSteps;  // start, noises; size at the onset and its changes
+  const int own = kN * (kSteps + 1), count = own + 1;  // start, noises; size
   Big state = Big::Zero(kN, count), size = Big::Zero(1, count), information = Big::Zero(count, count);
   Eigen::VectorXd right = Eigen::VectorXd::Zero(count);
   state.leftCols(kN).setIdentity();
   for (int i = 0; i < own; ++i) information(i, i) = 1 / (i < kN ? kStart : kNoise);
-  for (int k = 0; k < kSteps; ++k)
-    information(own + k, own + k) = 1 / (k == 0 ? kLargest * kLargest : std::max(fault.wander, 1e-12));
+  information(own, own) = 1 / (kLargest * kLargest);
   for (int k = 0; k < kSteps; ++k) {
     const auto i = static_cast<std::size_t>(k);
     const bool lasts = k >= fault.onset;
     if (k == fault.onset) size(0, own) = 1;
-    if (k > fault.onset) size(0, own + k - fault.onset) = 1;
     state = (system.f[i] * state).eval();
     state.block(0, kN * (k + 1), kN, kN).setIdentity();
     if (lasts && fault.grows) state += system.gamma[i] * size;
@@ -100,7 +96,6 @@ struct Filtered {
   filter::Vector<float, kN> x = filter::Vector<float, kN>::Zero();
   filter::Symmetric<float, kN> p;
   Signature signature;
-  double found = 0;  ///< part of the size that the state has taken in
 };
 struct Watch {
   Signature* signature;
@@ -112,15 +107,8 @@ struct Watch {
   void gains(const auto& g) { signature->correct(g, w); }
 };
 
-void recentre(Filtered& it) {
-  const float size = it.signature.size();
-  it.x += size * Eigen::Map<Eigen::Vector4f>(it.signature.phi.data());
-  it.found += static_cast<double>(size);
-  it.signature.recentre();
-}
-
-/// The filter knows nothing of the fault. At step `recentred` its state takes in what the signature has found.
-Filtered filtered(const System& system, const Fault& fault, const std::vector<Big>& z, int recentred = -1) {
+/// The filter knows nothing of the fault.
+Filtered filtered(const System& system, const Fault& fault, const std::vector<Big>& z) {
   Filtered it;
   it.p = filter::Symmetric<float, kN>::diagonal({float{kStart}, float{kStart}, float{kStart}, float{kStart}});
   it.signature.begin(-1, float{kLargest});
@@ -130,11 +118,6 @@ Filtered filtered(const System& system, const Fault& fault, const std::vector<Bi
     const Eigen::Matrix4f f = system.f[i].cast<float>();
     const filter::Matrix<float, kM, kN> h = system.h[i].cast<float>();
     const bool lasts = k >= fault.onset;
-    if (k == recentred || (k > fault.onset && fault.wander > 0)) recentre(it);
-    if (k > fault.onset && fault.wander > 0) {
-      const Signature::Errors before = it.signature.phi;
-      filter::add_outer(it.p, before, it.signature.wander(static_cast<float>(fault.wander)));
-    }
     it.x = (f * it.x).eval();
     it.p = filter::propagate(it.p, filter::Matrix<float, kN, kN>(f), q);
     Eigen::Map<Eigen::Vector4f> phi(it.signature.phi.data());
@@ -147,11 +130,10 @@ Filtered filtered(const System& system, const Fault& fault, const std::vector<Bi
         it.signature.information = 1.0F / float{kLargest * kLargest};
     }
     Watch watch{&it.signature, {}};
-    filter::Vector<float, kM> nu = z[i].cast<float>() - h * it.x;
+    const filter::Vector<float, kM> nu = z[i].cast<float>() - h * it.x;
     for (int m = 0; m < kM; ++m) {
       const float direct = lasts && fault.direct ? static_cast<float>(system.d[i](m)) : 0.0F;
       watch.w[static_cast<std::size_t>(m)] = h.row(m).dot(phi) + direct;
-      nu(m) -= direct * static_cast<float>(it.found);
     }
     filter::SparseUpdate<float, kN, kM> result;
     const filter::Vector<float, kM> noise{float{kMeasured}, float{kMeasured}};
@@ -173,7 +155,7 @@ void expect_same(const Filtered& it, const Posterior& judge, double share) {
     EXPECT_NEAR(phi_d(i) * variance, judge.covariance(i, kN), share * sigma(i) * sigma(kN));
     for (int j = 0; j < kN; ++j) EXPECT_NEAR(p(i, j), judge.covariance(i, j), share * sigma(i) * sigma(j));
   }
-  EXPECT_NEAR(size + it.found, judge.mean(kN), share * sigma(kN));
+  EXPECT_NEAR(size, judge.mean(kN), share * sigma(kN));
   EXPECT_NEAR(variance, judge.covariance(kN, kN), share * sigma(kN) * sigma(kN));
 }
 
@@ -187,21 +169,6 @@ TEST(fault_signature, is_the_filter_that_has_the_fault_as_a_state) {
       const std::vector<Big> z = record(system, fault, 1.5);
       expect_same(filtered(system, fault, z), least_squares(system, fault, z), 1e-4);
     }
-}
-
-TEST(fault_signature, follows_a_fault_that_wanders) {
-  Fault fault = kFaults[1];
-  fault.wander = 0.05;
-  System system(7);
-  const std::vector<Big> z = record(system, fault, 1.5);
-  expect_same(filtered(system, fault, z), least_squares(system, fault, z), 1e-4);
-}
-
-TEST(fault_signature, a_recentred_state_is_the_same_posterior) {
-  System system(3);
-  const std::vector<Big> z = record(system, kFaults[1], 2);
-  for (const int at : {5, 17, kSteps - 1})
-    expect_same(filtered(system, kFaults[1], z, at), least_squares(system, kFaults[1], z), 1e-4);
 }
 
 /// 200 records of one fault, read at one fixed time, whatever the signature says.

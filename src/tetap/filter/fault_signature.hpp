@@ -7,6 +7,7 @@
 
 #include "tetap/base/math.hpp"
 #include "tetap/base/members.hpp"
+#include "tetap/base/multiply_add.hpp"
 #include "tetap/filter/symmetric.hpp"
 
 #include <array>
@@ -20,7 +21,7 @@ template <class Scalar, int M>
                                           std::array<Scalar, static_cast<std::size_t>(M)>& v) {
   for (int j = 0; j < M; ++j) {
     Scalar sum = v[static_cast<std::size_t>(j)];
-    for (int k = 0; k < j; ++k) sum -= l(k, j) * v[static_cast<std::size_t>(k)];
+    for (int k = 0; k < j; ++k) sum = base::subtract_product(sum, l(k, j), v[static_cast<std::size_t>(k)]);
     v[static_cast<std::size_t>(j)] = sum * l(j, j);
   }
 }
@@ -54,9 +55,8 @@ class FaultSignature {
   template <class Gains, std::size_t M>
   constexpr void correct(const Gains& gains, const std::array<Scalar, M>& w) {
     for (int n = 0; n < N; ++n) {
-      Scalar sum{0};
-      for (std::size_t j = 0; j < M; ++j) sum += gains(n, static_cast<int>(j)) * w[j];
-      phi[static_cast<std::size_t>(n)] -= sum;
+      Scalar& of = phi[static_cast<std::size_t>(n)];
+      for (std::size_t j = 0; j < M; ++j) of = base::subtract_product(of, Scalar{gains(n, static_cast<int>(j))}, w[j]);
     }
   }
   [[nodiscard]] constexpr Scalar size() const { return weighted / information; }
@@ -64,16 +64,6 @@ class FaultSignature {
   /// Twice the logarithm of the likelihood ratio to "no fault", for the prior N(0, largest^2).
   [[nodiscard]] Scalar evidence(Scalar largest) const {
     return weighted * size() - base::log(information * (largest * largest));
-  }
-  /// The estimate has taken the size in; what it was is unknown as before.
-  constexpr void recentre() { weighted = Scalar{0}; }
-  /// The size, just re-centred, wanders by so much variance: phi turns into that of the size as it is now. Returns the
-  /// factor of phi phi^T, as it was, that the covariance without the fault takes over.
-  constexpr Scalar wander(Scalar variance_more) {
-    const Scalar before = variance(), after = before + variance_more, keep = before / after;
-    for (Scalar& of : phi) of *= keep;
-    information = Scalar{1} / after;
-    return before - before * keep;
   }
   static constexpr auto members(auto& self) {
     return base::members(self.phi, self.information, self.weighted, self.age_s);

@@ -16,7 +16,7 @@ struct InertialFaults {
   static constexpr int kErrors = nav::InsState::kErrors;
   static constexpr std::size_t kFix = 6, kVelocity = 9, kForward = 12;
 
-  /// Largest sizes: what the sensors of these robots show at all. Rates: a connector, a multipath, a spin.
+  /// Largest sizes: what the sensors of these robots show at all. Each row's fault begins once an hour.
   static constexpr std::array<FaultRow, 13> kRows = [] {
     std::array<FaultRow, 13> rows;
     const auto three = [&rows](std::size_t first, const FaultRow& like, int jumps) {
@@ -26,25 +26,11 @@ struct InertialFaults {
         rows[first + i].jumps = static_cast<std::int8_t>(jumps < 0 ? -1 : jumps + static_cast<int>(i));
       }
     };
-    three(0, {.device = Device::kImu, .unit = FaultUnit::kRadiansPerSecond, .largest = 0.5F, .per_hour = 1},
-          nav::InsState::kGyroBias);
-    three(3, {.device = Device::kImu, .unit = FaultUnit::kMetresPerSecond2, .largest = 5, .per_hour = 1},
-          nav::InsState::kAccelBias);
-    three(kFix,
-          {.device = Device::kReceiver, .unit = FaultUnit::kMetres, .largest = 20, .per_hour = 1, .wander_rts = 1}, -1);
-    three(kVelocity,
-          {.device = Device::kReceiver,
-           .unit = FaultUnit::kMetresPerSecond,
-           .largest = 5,
-           .per_hour = 1,
-           .wander_rts = 0.5F},
-          -1);
-    rows[kForward] = {.device = Device::kWheels,
-                      .unit = FaultUnit::kMetresPerSecond,
-                      .code = kForward,
-                      .largest = 3,
-                      .per_hour = 1,
-                      .wander_rts = 0.5F};
+    three(0, {.largest = 0.5F}, nav::InsState::kGyroBias);
+    three(3, {.largest = 5}, nav::InsState::kAccelBias);
+    three(kFix, {.largest = 20}, -1);
+    three(kVelocity, {.largest = 5}, -1);
+    rows[kForward] = {.code = kForward, .largest = 3};
     return rows;
   }();
 

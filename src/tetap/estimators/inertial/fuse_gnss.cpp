@@ -5,7 +5,8 @@
 
 namespace tetap::estimators {
 
-Innovation Inertial::fuse(const sensor::GnssPosition& fix, base::Micros stamp, const Context& ctx) {
+template <class Watch>
+Innovation InertialWith<Watch>::fuse(const sensor::GnssPosition& fix, base::Micros stamp, const Context& ctx) {
   budget_.spend(WorkBudget::kFixChecks);
   const bool starts = !tracking() && fix.fix >= sensor::GnssFix::k2d &&
                       sources_.position.starting_conditions(fix, stamp, ctx.parameters.recovery);
@@ -37,8 +38,9 @@ Innovation Inertial::fuse(const sensor::GnssPosition& fix, base::Micros stamp, c
 }
 
 /// Horizontal part, then the height: each may be fused, skipped, or reset by itself.
-[[gnu::noinline]] Innovation Inertial::fuse_fix(model::GnssFix3d& fix, const FilterView& filter) {
-  ins_.predict_covariance();
+template <class Watch>
+[[gnu::noinline]] Innovation InertialWith<Watch>::fuse_fix(model::GnssFix3d& fix, const FilterView& filter) {
+  ins_.predict_covariance(watch_.bank());
   const auto at = fix.linearised(ins_.x);
   FixMeasurement z{.nu = -at.z_hat, .r = fix.noise()};
   z.statistics = fix_statistics(ins_.p, {at.h(1, 5), -at.h(0, 5), at.h(0, 4)}, z.nu, z.r);
@@ -46,6 +48,9 @@ Innovation Inertial::fuse(const sensor::GnssPosition& fix, base::Micros stamp, c
     return {.verdict = sensor::Verdict::kNotFinite, .failed = Check::kValue};
   const Assessment horizontal = sources_.position.assess(z, filter);
   apply(horizontal, filter);
+  if constexpr (Watch::kWatches)  // a gate that no innovation passes: the hypotheses alone see the fix
+    if (horizontal.verdict == sensor::Verdict::kRejected && !horizontal.fuses())
+      static_cast<void>(ins_.update(fix, -1.0F, watch_.bank()));
   if (!horizontal.fuses()) return record_of(horizontal);
   z.drifts = horizontal.failed == Check::kDrift;
   if (horizontal.action == Action::kResetPosition) sources_.height.reset();
@@ -55,8 +60,9 @@ Innovation Inertial::fuse(const sensor::GnssPosition& fix, base::Micros stamp, c
 }
 
 /// One update by a fix, with its height or without.
-[[gnu::noinline]] Innovation Inertial::update_by_fix(model::GnssFix3d& fix, const FixMeasurement& z, bool with_height,
-                                                     const FilterView& filter) {
+template <class Watch>
+[[gnu::noinline]] Innovation InertialWith<Watch>::update_by_fix(model::GnssFix3d& fix, const FixMeasurement& z,
+                                                                bool with_height, const FilterView& filter) {
   const param::GnssParameters& n = filter.parameters().gnss;
   Innovation fused{
       .verdict = sensor::Verdict::kAccepted, .dof = 3, .nis = z.statistics.joint_nis, .gate = fix_gate(n, 3)};
@@ -80,7 +86,8 @@ Innovation Inertial::fuse(const sensor::GnssPosition& fix, base::Micros stamp, c
   return fused;
 }
 
-Innovation Inertial::fuse(const sensor::GnssVelocity& velocity, base::Micros stamp, const Context& ctx) {
+template <class Watch>
+Innovation InertialWith<Watch>::fuse(const sensor::GnssVelocity& velocity, base::Micros stamp, const Context& ctx) {
   const param::GnssParameters& n = ctx.parameters.gnss;
   VelocityMeasurement z = GnssVelocitySource::measurement(velocity, level_, n);
   if (!tracking()) {
@@ -112,7 +119,9 @@ Innovation Inertial::fuse(const sensor::GnssVelocity& velocity, base::Micros sta
 
 /// GNSS velocity judges wheels and standstill. A leap that the IMU did not feel is the receiver's, and so is a motion
 /// while encoders and IMU stand. An unknown heading turns forward speed into sideways speed: its variance counts here.
-[[gnu::noinline]] void Inertial::compare_with_ground(const VelocityMeasurement& z, const FilterView& filter) {
+template <class Watch>
+[[gnu::noinline]] void InertialWith<Watch>::compare_with_ground(const VelocityMeasurement& z,
+                                                                const FilterView& filter) {
   standstill_.update_ground(z.v_n_mps);
   sources_.velocity.note(z, filter);
   if (sources_.velocity.step_detected() || (ins_.stands && filter.wheels_agree())) return;

@@ -5,7 +5,8 @@
 
 namespace tetap::estimators {
 
-Innovation Inertial::fuse(const sensor::OutsideHeading& heading, base::Micros stamp, const Context& ctx) {
+template <class Watch>
+Innovation InertialWith<Watch>::fuse(const sensor::OutsideHeading& heading, base::Micros stamp, const Context& ctx) {
   const FilterView filter = view(stamp, ctx);
   const Assessment a = sources_.heading.assess(heading, filter);
   if (!a.fuses()) return record_of(a);
@@ -19,7 +20,9 @@ Innovation Inertial::fuse(const sensor::OutsideHeading& heading, base::Micros st
                  filter);
 }
 
-[[gnu::noinline]] Innovation Inertial::fuse(const sensor::MagneticFlux& flux, base::Micros stamp, const Context& ctx) {
+template <class Watch>
+[[gnu::noinline]] Innovation InertialWith<Watch>::fuse(const sensor::MagneticFlux& flux, base::Micros stamp,
+                                                       const Context& ctx) {
   if (ctx.parameters.magnetic.use == 0 || phase_ == Phase::kLevelling) return {};
   const FilterView filter = view(stamp, ctx);
   Magnetometer& magnetometer = sources_.magnetometer;
@@ -38,7 +41,9 @@ Innovation Inertial::fuse(const sensor::OutsideHeading& heading, base::Micros st
   return record_of(a);
 }
 
-[[gnu::noinline]] Innovation Inertial::fuse(const sensor::AirPressure& air, base::Micros stamp, const Context& ctx) {
+template <class Watch>
+[[gnu::noinline]] Innovation InertialWith<Watch>::fuse(const sensor::AirPressure& air, base::Micros stamp,
+                                                       const Context& ctx) {
   const FilterView filter = view(stamp, ctx);
   Barometer& barometer = sources_.barometer;
   if (!Barometer::starting_conditions(filter)) return {};

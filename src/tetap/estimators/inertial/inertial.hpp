@@ -11,6 +11,7 @@
 #include "tetap/estimators/estimate.hpp"
 #include "tetap/estimators/inertial/aiding_sources.hpp"
 #include "tetap/estimators/inertial/alignment.hpp"
+#include "tetap/estimators/inertial/fault_watch.hpp"
 #include "tetap/estimators/inertial/filter_view_facts.hpp"
 #include "tetap/estimators/inertial/imu_input.hpp"
 #include "tetap/estimators/inertial/output_predictor.hpp"
@@ -26,7 +27,10 @@
 
 namespace tetap::estimators {
 
-class Inertial {
+/// `Watch`: hypotheses of faults beside the filter, or none. What they find widens the covariance that is published,
+/// and leaves the filter alone.
+template <class Watch>
+class InertialWith {
  public:
   static constexpr sensor::EstimatorKind kKind = sensor::EstimatorKind::kInertial;
   static constexpr bool kDelayed = true;
@@ -75,7 +79,7 @@ class Inertial {
   static constexpr auto members(auto& self) {
     return base::members(self.ins_, self.predictor_, self.budget_, self.phase_, base::in_turns(self.alignment_),
                          self.heading_monitor_, self.time_, self.levelled_at_, base::in_turns(self.level_), self.imu_,
-                         base::in_turns(self.standstill_), self.sources_, base::in_turns(self.recovery_));
+                         base::in_turns(self.standstill_), self.sources_, base::in_turns(self.recovery_), self.watch_);
   }
 
  private:
@@ -121,18 +125,25 @@ class Inertial {
   void judge_drift(base::Micros since, const param::Parameters& n);
   void detect_standstill(base::Micros stamp, const Context& ctx);
   void fuse_zero_rate(const param::InertialParameters& n);
+  /// Before someone else brings P to the state's time: the hypotheses go along.
+  void predict_watched() {
+    if constexpr (Watch::kWatches) ins_.predict_covariance(watch_.bank());
+  }
   // Measurements.
   template <class Model>
   [[nodiscard]] filter::Innovation<float, Model::kDimension> update(const Model& model, float gate) {
     budget_.spend(WorkBudget::kMeasurement);
     predictor_.note_correction();
-    return ins_.update(model, gate);
+    return ins_.update(model, gate, watch_.bank());
   }
   template <class Model, class Source>
   Innovation measure(const Model& model, Source& source, float gate_scale, const FilterView& filter);
   template <int M, class Source>
   Innovation conclude(const filter::Innovation<float, M>& result, Source& source, const FilterView& filter);
   void apply(const Assessment& a, const FilterView& filter) {
+    if (a.action == Action::kWidenVelocity || a.action == Action::kWidenPosition || a.action == Action::kWidenClimb)
+      predict_watched();
+    if (a.action == Action::kResetPosition || a.action == Action::kResetHeight) watch_.begin();
     if (recovery_.apply(a, ins_, filter.stamp(), filter.parameters())) {
       predictor_.note_correction();
       budget_.spend(WorkBudget::kConditioning);
@@ -182,7 +193,11 @@ class Inertial {
   Standstill standstill_;
   AidingSources sources_;
   Recovery recovery_;
+  [[no_unique_address]] Watch watch_;
 };
+
+using Inertial = InertialWith<NoWatch>;
+using WatchedInertial = InertialWith<FaultWatch>;
 
 /// Record of an assessment; an accepted measurement failed no test.
 [[nodiscard]] inline Innovation record_of(const Assessment& a) {

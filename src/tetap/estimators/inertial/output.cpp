@@ -6,7 +6,8 @@
 
 namespace tetap::estimators {
 
-sensor::Mode Inertial::mode(const Context& ctx) const {
+template <class Watch>
+sensor::Mode InertialWith<Watch>::mode(const Context& ctx) const {
   if (phase_ == Phase::kLevelling)
     return alignment_.levelling() ? sensor::Mode::kLevelling : sensor::Mode::kWaitingForImu;
   if (phase_ == Phase::kFindingHeading)
@@ -21,7 +22,8 @@ sensor::Mode Inertial::mode(const Context& ctx) const {
 }
 
 /// For the status of the present.
-std::uint16_t Inertial::faults() const {
+template <class Watch>
+std::uint16_t InertialWith<Watch>::faults() const {
   std::uint16_t bits = 0;
   const auto raise = [&bits](sensor::Fault fault, bool is) {
     if (is) bits = static_cast<std::uint16_t>(bits | 1U << static_cast<unsigned>(fault));
@@ -35,7 +37,8 @@ std::uint16_t Inertial::faults() const {
   return bits;
 }
 
-SourceStates Inertial::sources(const Context& ctx) const {
+template <class Watch>
+SourceStates InertialWith<Watch>::sources(const Context& ctx) const {
   SourceStates states;
   const auto row = [&](sensor::Sensor of, const SourceStatus& status) {
     states.set(of, {status.state, status.failed});
@@ -53,7 +56,8 @@ SourceStates Inertial::sources(const Context& ctx) const {
 
 /// Span to the present without IMU, squared, as the filter will grow there. It covers all of the span without an IMU,
 /// else the missing parts, one at its end included. Variance of velocity per (m/s^2)^2, or of attitude per (rad/s)^2.
-float Inertial::unseen_s2(float unseen_s) const {
+template <class Watch>
+float InertialWith<Watch>::unseen_s2(float unseen_s) const {
   constexpr float kLasts_s = 0.1F;  // Ins::predict_without_imu
   constexpr base::Micros kHole{25'000};
   if (predictor_.without_imu()) return ahead_s() * ahead_s();
@@ -62,7 +66,8 @@ float Inertial::unseen_s2(float unseen_s) const {
 }
 
 /// From the time of the covariance to the present. In place: a pose needs little of it.
-[[gnu::always_inline]] inline nav::InsCovarianceStep<float> Inertial::step_ahead(const Context& ctx) const {
+template <class Watch>
+[[gnu::always_inline]] inline nav::InsCovarianceStep<float> InertialWith<Watch>::step_ahead(const Context& ctx) const {
   const param::InertialParameters& n = ctx.parameters.inertial;
   nav::InsCovarianceStep<float> step = ins_.step_to(present(), ahead_s());
   const float unseen_m2ps2 = unseen_s2(predictor_.place().unseen_s) * n.gap_mps2 * n.gap_mps2;
@@ -73,11 +78,12 @@ float Inertial::unseen_s2(float unseen_s) const {
   return step;
 }
 
-InertialEstimate Inertial::inertial(const Context& ctx) const {
+template <class Watch>
+InertialEstimate InertialWith<Watch>::inertial(const Context& ctx) const {
   const bool fixes = sources_.position.status(time_).state != SourceState::kStopped;
   const SourceStatus height = fixes ? sources_.height.status(time_) : SourceStatus{};
   return {.state = present(),
-          .p = ins_.p,
+          .p = watch_.published_p(ins_.p),
           .ahead = step_ahead(ctx),
           .valid = tracking(),
           .jump = recovery_.jump(),
@@ -85,7 +91,8 @@ InertialEstimate Inertial::inertial(const Context& ctx) const {
           .gnss_height = {height.state, height.failed}};
 }
 
-Estimate Inertial::estimate(const Context& ctx) const {
+template <class Watch>
+Estimate InertialWith<Watch>::estimate(const Context& ctx) const {
   const nav::InsState& x = present();
   const bool valid = tracking();
   const nav::InsCovarianceStep<float> ahead = step_ahead(ctx);
@@ -94,13 +101,14 @@ Estimate Inertial::estimate(const Context& ctx) const {
   const nav::Vector3 w_n = x.q_nb.rotate(rate_b - x.b_g_radps);
   constexpr int kX = nav::InsState::kPosition, kY = kX + 1, kYaw = nav::InsState::kAttitude + 2;
   filter::Symmetric<float, 3> planar;
+  const nav::Ins::Covariance& p = watch_.published_p(ins_.p);
   if (valid) {
-    planar(0, 0) = nav::predicted_covariance<kX, kX>(ins_.p, ahead);
-    planar(0, 1) = nav::predicted_covariance<kX, kY>(ins_.p, ahead);
-    planar(1, 1) = nav::predicted_covariance<kY, kY>(ins_.p, ahead);
-    planar(0, 2) = nav::predicted_covariance<kX, kYaw>(ins_.p, ahead);
-    planar(1, 2) = nav::predicted_covariance<kY, kYaw>(ins_.p, ahead);
-    planar(2, 2) = nav::predicted_covariance<kYaw, kYaw>(ins_.p, ahead);
+    planar(0, 0) = nav::predicted_covariance<kX, kX>(p, ahead);
+    planar(0, 1) = nav::predicted_covariance<kX, kY>(p, ahead);
+    planar(1, 1) = nav::predicted_covariance<kY, kY>(p, ahead);
+    planar(0, 2) = nav::predicted_covariance<kX, kYaw>(p, ahead);
+    planar(1, 2) = nav::predicted_covariance<kY, kYaw>(p, ahead);
+    planar(2, 2) = nav::predicted_covariance<kYaw, kYaw>(p, ahead);
   } else {
     constexpr float kPlace = kUnknown_m * kUnknown_m;
     planar = filter::Symmetric<float, 3>::diagonal({kPlace, kPlace, kUnknown_rad * kUnknown_rad});
@@ -137,7 +145,8 @@ template <int kFirst, std::size_t kN>
 /// Variance of the speed ahead, x_b . R^T v at the present: by velocity, attitude and accelerometer bias. Attitude
 /// counts as far as the robot does not go where it points, and by what tilt made of acceleration since. An uncertain
 /// heading adds to second order. Variance of the turn: by gyroscope noise and bias, and by the age of its sample.
-[[gnu::noinline]] MotionVariance Inertial::motion_variance(const Context& ctx) const {
+template <class Watch>
+[[gnu::noinline]] MotionVariance InertialWith<Watch>::motion_variance(const Context& ctx) const {
   const InertialEstimate full = inertial(ctx);
   if (!full.valid) return {};
   const nav::Quaternion& q = full.state.q_nb;

@@ -4,7 +4,8 @@
 
 namespace tetap::estimators {
 
-Innovation Inertial::fuse(const sensor::ImuSample& sample, base::Micros stamp, const Context& ctx) {
+template <class Watch>
+Innovation InertialWith<Watch>::fuse(const sensor::ImuSample& sample, base::Micros stamp, const Context& ctx) {
   const param::InertialParameters& n = ctx.parameters.inertial;
   budget_.spend(WorkBudget::kImuSample);
   nav::ImuIncrement increment = mounted(checks::increment_of(sample), n);
@@ -41,8 +42,10 @@ Innovation Inertial::fuse(const sensor::ImuSample& sample, base::Micros stamp, c
 
 /// Takes the IMU's swing round the origin out of the increment. Gives what the position is to be moved by beside, in
 /// the axes at the increment's end.
-[[gnu::noinline]] nav::Vector3 Inertial::to_origin(nav::ImuIncrement& increment, const nav::Vector3& before_b_radps,
-                                                   const param::InertialParameters& n) const {
+template <class Watch>
+[[gnu::noinline]] nav::Vector3 InertialWith<Watch>::to_origin(nav::ImuIncrement& increment,
+                                                              const nav::Vector3& before_b_radps,
+                                                              const param::InertialParameters& n) const {
   const ImuPlace place(n);
   if (place.is_origin()) return nav::Vector3::Zero();
   const float dt_s = base::seconds(increment.dt);
@@ -53,7 +56,8 @@ Innovation Inertial::fuse(const sensor::ImuSample& sample, base::Micros stamp, c
 }
 
 /// Repetitions before this one were taken for motion.
-Innovation Inertial::imu_stuck(const nav::ImuIncrement& increment, bool was_stuck, const Context& ctx) {
+template <class Watch>
+Innovation InertialWith<Watch>::imu_stuck(const nav::ImuIncrement& increment, bool was_stuck, const Context& ctx) {
   const param::InertialParameters& n = ctx.parameters.inertial;
   if (!was_stuck) predictor_.note_correction();
   const float false_s = static_cast<float>(imu_.health().stuck_after(n)) * base::seconds(increment.dt);
@@ -62,8 +66,9 @@ Innovation Inertial::imu_stuck(const nav::ImuIncrement& increment, bool was_stuc
 }
 
 /// Before the filter runs.
-Innovation Inertial::align(const nav::ImuIncrement& increment, base::Micros pause, base::Micros stamp,
-                           const Context& ctx) {
+template <class Watch>
+Innovation InertialWith<Watch>::align(const nav::ImuIncrement& increment, base::Micros pause, base::Micros stamp,
+                                      const Context& ctx) {
   if (checks::ImuClassifier::is_gap(pause)) alignment_.gap(pause, heading_monitor_);
   time_ = stamp;
   if (alignment_.level(increment, heading_monitor_, ctx.parameters.inertial)) phase_ = Phase::kFindingHeading;
@@ -72,7 +77,8 @@ Innovation Inertial::align(const nav::ImuIncrement& increment, base::Micros paus
 }
 
 /// Lost samples are bridged; what was bridged already this sample does not show again.
-void Inertial::bridge_lost_samples(base::Micros gap, const Context& ctx) {
+template <class Watch>
+void InertialWith<Watch>::bridge_lost_samples(base::Micros gap, const Context& ctx) {
   const nav::Vector3 shown = imu_.rate_b_radps();
   const base::Micros before = imu_.bridged_until();
   bridge(gap, ctx);
@@ -80,8 +86,9 @@ void Inertial::bridge_lost_samples(base::Micros gap, const Context& ctx) {
   imu_.set_rate(shown);
 }
 
-Innovation Inertial::propagate(const sensor::ImuSample& sample, const nav::ImuIncrement& increment,
-                               const nav::Vector3& way_b_m, base::Micros stamp, const Context& ctx) {
+template <class Watch>
+Innovation InertialWith<Watch>::propagate(const sensor::ImuSample& sample, const nav::ImuIncrement& increment,
+                                          const nav::Vector3& way_b_m, base::Micros stamp, const Context& ctx) {
   const param::InertialParameters& n = ctx.parameters.inertial;
   const float dt_s = base::seconds(increment.dt);
   const float up_b = ins_.x.q_nb.rotated_x().dot(ins_.earth.up_n);  // share of gravity's reaction that points forward
@@ -96,7 +103,7 @@ Innovation Inertial::propagate(const sensor::ImuSample& sample, const nav::ImuIn
   }
   if (!ImuPlace(n).is_origin()) nav::move(ins_.x, ins_.x.q_nb.rotate(way_b_m));
   ins_.vibration = imu_.health().vibration().noise_factor(n);
-  if (ins_.pending_s() >= predictor_.schedule().covariance_every_s()) ins_.predict_covariance();
+  if (ins_.pending_s() >= predictor_.schedule().covariance_every_s()) ins_.predict_covariance(watch_.bank());
   if (sample.clipped_accel > 0 || sample.clipped_gyro > 0) inflate_clipped(sample, dt_s, n);
   if (imu_.health().vibration().leaps()) {
     const checks::Vibration::Leap& leap = imu_.health().vibration().leap();
@@ -117,18 +124,21 @@ Innovation Inertial::propagate(const sensor::ImuSample& sample, const nav::ImuIn
 }
 
 /// The level plane follows the robot, and the IMU is judged: every 0.2 s, in a tick that has work left, or soon after.
-void Inertial::follow_level(const Context& ctx) {
+template <class Watch>
+void InertialWith<Watch>::follow_level(const Context& ctx) {
   constexpr base::Micros kEvery{200'000}, kLatest{400'000};
   const base::Micros since = time_ - levelled_at_;
   if (since < kEvery || (since < kLatest && !budget_.allows(WorkBudget::kImuSample))) return;
   budget_.spend(WorkBudget::kImuSample);
+  watch_.judge(base::seconds(since));
   judge_drift(since, ctx.parameters);
   set_level(ins_.x.x, ins_.x.y, ins_.x.z, ctx);
 }
 
 /// Gravity is that of the place, and so are the axes of what a receiver or compass measures.
-[[gnu::noinline]] void Inertial::set_level(const base::Anchored& x, const base::Anchored& y, const base::Anchored& z,
-                                           const Context& ctx) {
+template <class Watch>
+[[gnu::noinline]] void InertialWith<Watch>::set_level(const base::Anchored& x, const base::Anchored& y,
+                                                      const base::Anchored& z, const Context& ctx) {
   levelled_at_ = time_;
   if (ctx.map_frame.origin == sensor::OriginSource::kNone) return;
   level_ = nav::LocalLevel(ctx.map_frame.frame.curvature(), x, y, z);
@@ -137,8 +147,9 @@ void Inertial::follow_level(const Context& ctx) {
 
 /// Clipped increments are used. They are as uncertain as none, and as half of what they show: the range that the motion
 /// exceeds.
-[[gnu::noinline]] void Inertial::inflate_clipped(const sensor::ImuSample& sample, float dt_s,
-                                                 const param::InertialParameters& n) {
+template <class Watch>
+[[gnu::noinline]] void InertialWith<Watch>::inflate_clipped(const sensor::ImuSample& sample, float dt_s,
+                                                            const param::InertialParameters& n) {
   constexpr float kLost = 0.5F;
   float lost_mps2 = n.gap_mps2, lost_radps = 0;
   if (sample.clipped_accel > 0) {
@@ -155,7 +166,8 @@ void Inertial::follow_level(const Context& ctx) {
 }
 
 /// Measurements contradict the IMU for long: tilt, biases and climb are as uncertain as what explains it.
-[[gnu::noinline]] void Inertial::judge_drift(base::Micros since, const param::Parameters& n) {
+template <class Watch>
+[[gnu::noinline]] void InertialWith<Watch>::judge_drift(base::Micros since, const param::Parameters& n) {
   constexpr int kUp = nav::InsState::kVelocityUp;
   const float fixes = n.gnss.gate_scale, wheels = n.inertial.wheel_gate_scale;
   nav::VelocityCorrection& sum = ins_.corrected;
@@ -176,6 +188,7 @@ void Inertial::follow_level(const Context& ctx) {
     sum.clear_level();
   }
   if (drift.up) {
+    predict_watched();
     Recovery::widen_climb(ins_, sum.up_mps, 0);
     sum.clear_up();
   }
@@ -184,11 +197,12 @@ void Inertial::follow_level(const Context& ctx) {
 }
 
 /// Goes on without IMU: the velocity stays what it is in the body, which turns as the wheels show, or not at all.
-[[gnu::noinline]] void Inertial::bridge(base::Micros gap, const Context& ctx) {
+template <class Watch>
+[[gnu::noinline]] void InertialWith<Watch>::bridge(base::Micros gap, const Context& ctx) {
   const param::InertialParameters& n = ctx.parameters.inertial;
   const bool wheels = view(time_, ctx).wheels_show_turn();
   const float dt_s = base::seconds(gap);
-  ins_.predict_without_imu(gap, n.gap_mps2, unseen_turn_radps(ctx));
+  ins_.predict_without_imu(gap, n.gap_mps2, unseen_turn_radps(ctx), watch_.bank());
   nav::Vector3 w_b = nav::Vector3::Zero();
   if (wheels) {
     w_b(2) = sources_.wheels.turn_radps();
@@ -208,7 +222,8 @@ void Inertial::follow_level(const Context& ctx) {
   standstill_.interrupt();
 }
 
-void Inertial::detect_standstill(base::Micros stamp, const Context& ctx) {
+template <class Watch>
+void InertialWith<Watch>::detect_standstill(base::Micros stamp, const Context& ctx) {
   const param::InertialParameters& n = ctx.parameters.inertial;
   const FilterView filter = view(stamp, ctx);
   ins_.stands = standstill_.detect(filter, imu_.health().calm(n));
@@ -219,13 +234,14 @@ void Inertial::detect_standstill(base::Micros stamp, const Context& ctx) {
   if (standstill_.rate_due(filter, budget_)) fuse_zero_rate(n);
 }
 
-[[gnu::noinline]] void Inertial::fuse_zero_rate(const param::InertialParameters& n) {
-  if (ins_.pending_s() > 0.0F) ins_.predict_covariance();
+template <class Watch>
+[[gnu::noinline]] void InertialWith<Watch>::fuse_zero_rate(const param::InertialParameters& n) {
+  if (ins_.pending_s() > 0.0F) ins_.predict_covariance(watch_.bank());
   const Standstill::ZeroRateUpdate due = standstill_.take_rate(ins_, n);
   budget_.spend(WorkBudget::kMeasurement);
   predictor_.note_correction();
   const float gate = filter::chi_square_99(3) * Standstill::kGateScale;
-  static_cast<void>(ins_.update_shared_noise(due.model, gate, due.shared, due.wander));
+  static_cast<void>(ins_.update_shared_noise(due.model, gate, due.shared, due.wander, watch_.bank()));
 }
 
 }  // namespace tetap::estimators

@@ -5,7 +5,8 @@
 
 namespace tetap::estimators {
 
-void Inertial::restart(base::Micros t, const Context& ctx) {
+template <class Watch>
+void InertialWith<Watch>::restart(base::Micros t, const Context& ctx) {
   base::reinitialise(*this);
   time_ = t;
   set_noise(ctx.parameters.inertial);
@@ -14,7 +15,8 @@ void Inertial::restart(base::Micros t, const Context& ctx) {
   alignment_.place(start.pose, start.sigma_position_m, start.sigma_yaw_rad);
 }
 
-void Inertial::set_pose(base::Micros, const SetPose& given, const Context& ctx) {
+template <class Watch>
+void InertialWith<Watch>::set_pose(base::Micros, const SetPose& given, const Context& ctx) {
   if (tracking()) alignment_.keep(ins_.x, base::sqrt(ins_.p(nav::InsState::kYaw, nav::InsState::kYaw)));
   alignment_.place(given.pose, given.sigma_position_m, given.sigma_yaw_rad);
   sources_.position.reset();
@@ -23,11 +25,13 @@ void Inertial::set_pose(base::Micros, const SetPose& given, const Context& ctx) 
   if (!tracking()) return;
   if (Alignment::is_heading(given.sigma_yaw_rad) && !take_heading(given)) return begin(ctx);
   Recovery::place(ins_, given.pose, given.sigma_position_m);
+  watch_.begin();
   relocated();
 }
 
 /// A given heading that does not contradict the filter's own is a measurement: all else that the filter knows stays.
-[[gnu::noinline]] bool Inertial::take_heading(const SetPose& given) {
+template <class Watch>
+[[gnu::noinline]] bool InertialWith<Watch>::take_heading(const SetPose& given) {
   constexpr float kSmall_rad = 0.3F;  // no linear step turns rightly beyond that
   if (!(ins_.p(nav::InsState::kYaw, nav::InsState::kYaw) < kSmall_rad * kSmall_rad)) return false;
   const model::DirectionMeasurement ahead =
@@ -36,7 +40,8 @@ void Inertial::set_pose(base::Micros, const SetPose& given, const Context& ctx) 
 }
 
 /// The filter begins where the alignment found the robot.
-void Inertial::begin(const Context& ctx) {
+template <class Watch>
+void InertialWith<Watch>::begin(const Context& ctx) {
   const param::InertialParameters& n = ctx.parameters.inertial;
   if (ctx.map_frame.origin != sensor::OriginSource::kNone)
     ins_.earth = nav::Earth::at(ctx.map_frame.frame, n.earth_rate != 0);
@@ -45,6 +50,7 @@ void Inertial::begin(const Context& ctx) {
   const Alignment::Start start =
       alignment_.start(tracking() ? &ins_.x : nullptr, level_, heading_monitor_, n, forward_mps, time_);
   Recovery::restart(ins_, start.x, start.variances);
+  watch_.begin();
   phase_ = Phase::kTracking;
   standstill_.restart_means();
   sources_.begin(!alignment_.has_fixes());
@@ -52,7 +58,8 @@ void Inertial::begin(const Context& ctx) {
 }
 
 /// The filter is elsewhere at once: the covariance is looked at from end to end, and the present has to follow.
-void Inertial::relocated() {
+template <class Watch>
+void InertialWith<Watch>::relocated() {
   sources_.position.relocated(time_);
   sources_.height.relocated();
   budget_.exhaust();
@@ -62,7 +69,9 @@ void Inertial::relocated() {
 /// As after power on, without a place. The size of the step is measured when the filter runs again, from the last
 /// estimate. When the motion finds the heading once more, a magnetometer that led it astray has to agree first. One
 /// that did not keep the heading from going astray has to agree first, too.
-[[gnu::noinline]] void Inertial::restart_filter(base::Micros t, sensor::ResetCause cause, const Context& ctx) {
+template <class Watch>
+[[gnu::noinline]] void InertialWith<Watch>::restart_filter(base::Micros t, sensor::ResetCause cause,
+                                                           const Context& ctx) {
   const auto count = static_cast<std::uint8_t>(recovery_.jump().count + 1);
   const nav::InsState last = predictor_.present();
   const HeadingMonitor before = heading_monitor_;

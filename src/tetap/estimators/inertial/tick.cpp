@@ -5,7 +5,8 @@
 namespace tetap::estimators {
 
 /// In units of the work budget: samples that are switched off or only gathered cost nothing.
-std::int32_t Inertial::work_of(const sensor::Sample& sample, const Context& ctx) const {
+template <class Watch>
+std::int32_t InertialWith<Watch>::work_of(const sensor::Sample& sample, const Context& ctx) const {
   const param::InertialParameters& n = ctx.parameters.inertial;
   bool free = false;
   switch (sample.sensor) {
@@ -32,14 +33,16 @@ std::int32_t Inertial::work_of(const sensor::Sample& sample, const Context& ctx)
   return free ? 0 : WorkBudget::kMeasurement;
 }
 
-bool Inertial::defers(const sensor::Sample& sample, const Context& ctx) {
+template <class Watch>
+bool InertialWith<Watch>::defers(const sensor::Sample& sample, const Context& ctx) {
   if (!tracking() || budget_.allows(work_of(sample, ctx))) return false;
   budget_.defer();
   return true;
 }
 
 /// Up to where no sample comes any more that the filter could fuse, it goes without IMU.
-void Inertial::bridge_to(base::Micros horizon, const Context& ctx) {
+template <class Watch>
+void InertialWith<Watch>::bridge_to(base::Micros horizon, const Context& ctx) {
   const bool missing =
       imu_.health().stuck() || imu_.unusable() || imu_.health().stale(horizon, ctx.parameters.inertial);
   if (horizon <= time_ || !missing) return;
@@ -47,7 +50,8 @@ void Inertial::bridge_to(base::Micros horizon, const Context& ctx) {
   detect_standstill(time_, ctx);
 }
 
-void Inertial::predict_output(const OutputPredictor::Inputs& in, const sensor::Window& window) {
+template <class Watch>
+void InertialWith<Watch>::predict_output(const OutputPredictor::Inputs& in, const sensor::Window& window) {
   const bool rebuild = predictor_.schedule().begin_tick(predictor_.time(), budget_.deferred());
   budget_.clear_deferred();
   if (!rebuild) {
@@ -66,7 +70,8 @@ void Inertial::predict_output(const OutputPredictor::Inputs& in, const sensor::W
   if (samplewise && budget_.left() > 1) budget_.spend(budget_.left() / 2);
 }
 
-void Inertial::advance(base::Micros t, const Context& ctx, const sensor::Window& window) {
+template <class Watch>
+void InertialWith<Watch>::advance(base::Micros t, const Context& ctx, const sensor::Window& window) {
   const param::InertialParameters& n = ctx.parameters.inertial;
   predictor_.begin_tick(t);
   const base::Micros due = t - base::Micros{ctx.parameters.loop.window_us};
@@ -93,6 +98,7 @@ void Inertial::advance(base::Micros t, const Context& ctx, const sensor::Window&
   }
   if (recovery_.step_unknown()) recovery_.measure_step(predictor_.present(), predictor_.at(t, in));
   predictor_.publish(in, imu_.unusable());
+  watch_.publish(ins_.p);
 }
 
 }  // namespace tetap::estimators

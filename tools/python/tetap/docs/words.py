@@ -87,7 +87,7 @@ def tests_before_a_source(root):
     found = {}
     for path in sorted(glob.glob(os.path.join(root, os.path.dirname(SOURCES), "*.cpp"))):
         text = read(root, os.path.relpath(path, root))
-        heads = list(re.finditer(r"^[^\s/].*\bInertial::\w+\(const ([\w:]+)& |^[^\s/].*\bInertial::\w+\(([\w:]+)& |^[^\s/].*\bInertial::\w+\(", text, re.M))
+        heads = list(re.finditer(r"^[^\s/].*\bInertial(?:With<Watch>)?::\w+\(const ([\w:]+)& |^[^\s/].*\bInertial(?:With<Watch>)?::\w+\(([\w:]+)& |^[^\s/].*\bInertial(?:With<Watch>)?::\w+\(", text, re.M))
         for head, after in zip(heads, [*heads[1:], None]):
             source = INPUTS.get(head[1] or head[2])
             if source:
