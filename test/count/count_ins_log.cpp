@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Instructions of every tick of inertial navigation over a log, from the start: a rover's, a car's, a multirotor's.
-// Arguments: rover, car or iris, and a candump log with sync frames.
+// Arguments: rover, watched (the rover with its bank of faults), car or iris, and a candump log with sync frames.
 #include "config/car.hpp"
 #include "config/iris.hpp"
 #include "config/rover.hpp"
@@ -50,8 +50,10 @@ int main() {
   }
   count::calibrate();
   const std::string_view robot = words[1];
-  const bool navigated = robot == "rover" ? count_ticks<struct ins_tick_rover, estimators::WatchedInertial>(
-                                                board, robot::rover::parameters)
+  const param::Parameters& rover = robot::rover::parameters;
+  const bool navigated = robot == "rover" ? count_ticks<struct ins_tick_rover>(board, rover)
+                         : robot == "watched"
+                             ? count_ticks<struct fault_bank, estimators::WatchedInertial>(board, rover)
                          : robot == "car" ? count_ticks<struct ins_tick_car>(board, robot::car::parameters)
                                           : count_ticks<struct ins_tick_iris>(board, robot::iris::parameters);
   if (!navigated) {

@@ -298,7 +298,7 @@ class Generated(unittest.TestCase):
         page = robots.robots(ROOT)
         rows = {robot: names for robot, names in re.findall(r"^\| `(\w+)` \| [^|]+ \| [^|]+ \| ([^|]+) \| [^|]+ \|$", page, re.M)}
         self.assertEqual(sorted(rows), sorted(shipped) if done.returncode == 0 else sorted(rows))
-        self.assertEqual(rows["rover"], "`Odometry`, `Attitude`, `Inertial`")
+        self.assertEqual(rows["rover"], "`Odometry`, `Attitude`, `WatchedInertial`")
         self.assertEqual(rows["husky"], "`Odometry`, `PoseEkf`")
         self.assertEqual(rows["mrclam_pf"], "`Odometry`, `PoseParticles<1000>`")
         self.assertEqual(rows["mrclam_grid"], "`Odometry`, `PoseGrid<16, 32, 48>`")
