@@ -19,8 +19,10 @@ namespace tetap::filter {
 template <class Scalar, int M>
 [[gnu::always_inline]] inline void whiten(const Symmetric<Scalar, M>& l,
                                           std::array<Scalar, static_cast<std::size_t>(M)>& v) {
+#pragma GCC unroll 4
   for (int j = 0; j < M; ++j) {
     Scalar sum = v[static_cast<std::size_t>(j)];
+#pragma GCC unroll 4
     for (int k = 0; k < j; ++k) sum = base::subtract_product(sum, l(k, j), v[static_cast<std::size_t>(k)]);
     v[static_cast<std::size_t>(j)] = sum * l(j, j);
   }
@@ -44,6 +46,7 @@ class FaultSignature {
   template <std::size_t M>
   constexpr void score(const std::array<Scalar, M>& w, const std::array<Scalar, M>& y, Scalar share = Scalar{1}) {
     Scalar ww{0}, wy{0};
+#pragma GCC unroll 4
     for (std::size_t j = 0; j < M; ++j) {
       ww += w[j] * w[j];
       wy += w[j] * y[j];
@@ -56,6 +59,7 @@ class FaultSignature {
   constexpr void correct(const Gains& gains, const std::array<Scalar, M>& w) {
     for (int n = 0; n < N; ++n) {
       Scalar& of = phi[static_cast<std::size_t>(n)];
+#pragma GCC unroll 4
       for (std::size_t j = 0; j < M; ++j) of = base::subtract_product(of, Scalar{gains(n, static_cast<int>(j))}, w[j]);
     }
   }

@@ -166,9 +166,11 @@ class FaultBank {
       Signature& one = signatures_[i];
       const int own = row(i).code - z.shown.first;
       std::array<float, M> w;
+#pragma GCC unroll 4
       for (std::size_t m = 0; m < M; ++m) w[m] = own == static_cast<int>(m) && own < z.shown.count ? 1.0F : 0.0F;
       for (std::size_t k = 0; k < z.columns; ++k) {
         const float phi = one.phi[static_cast<std::size_t>(z.touches[k])];
+#pragma GCC unroll 4
         for (std::size_t m = 0; m < M; ++m) w[m] = base::add_product(w[m], z.h[k * M + m], phi);
       }
       filter::whiten(z.l, w);

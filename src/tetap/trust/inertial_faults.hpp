@@ -2,6 +2,7 @@
 // Faults of an inertial robot's sensors: a bias of the IMU that jumps, and offsets of the receiver and of the wheels.
 #pragma once
 
+#include "tetap/base/multiply_add.hpp"
 #include "tetap/model/gnss_fix_3d.hpp"
 #include "tetap/model/gnss_velocity_3d.hpp"
 #include "tetap/model/wheel_speed.hpp"
@@ -16,7 +17,8 @@ struct InertialFaults {
   static constexpr int kErrors = nav::InsState::kErrors;
   static constexpr std::size_t kFix = 6, kVelocity = 9, kForward = 12;
 
-  /// Largest sizes: what the sensors of these robots show at all. Each row's fault begins once an hour.
+  /// Largest sizes (rad/s, m/s^2, m, m/s, m/s): what the sensors of these robots show at all. Each fault begins once
+  /// an hour.
   static constexpr std::array<FaultRow, 13> kRows = [] {
     std::array<FaultRow, 13> rows;
     const auto three = [&rows](std::size_t first, const FaultRow& like, int jumps) {
@@ -45,17 +47,24 @@ struct InertialFaults {
   static void predict(const FaultRow&, std::array<float, kErrors>& phi, const nav::InsCovarianceStep<float>& step) {
     constexpr std::size_t kV = nav::InsState::kVelocity, kT = nav::InsState::kAttitude, kA = nav::InsState::kAccelBias,
                           kG = nav::InsState::kGyroBias;
-    const auto turned = [&](std::size_t r, std::size_t from) {
-      const int row = static_cast<int>(r);
-      return step.r_dt(row, 0) * phi[from] + step.r_dt(row, 1) * phi[from + 1] + step.r_dt(row, 2) * phi[from + 2];
+    const nav::Matrix3 r_dt = step.r_dt;
+    const nav::Vector3 dv = step.dv_n_mps;
+    const auto turned = [&](int r, std::size_t from) {
+      const float two = base::add_product(r_dt(r, 0) * phi[from], float{r_dt(r, 1)}, phi[from + 1]);
+      return base::add_product(two, float{r_dt(r, 2)}, phi[from + 2]);
     };
-    for (std::size_t r = 0; r < 3; ++r) phi[r] += step.dt_s * phi[kV + r];
+#pragma GCC unroll 3
+    for (std::size_t r = 0; r < 3; ++r) phi[r] = base::add_product(phi[r], step.dt_s, phi[kV + r]);
+#pragma GCC unroll 3
     for (std::size_t r = 0; r < 3; ++r) {
-      const std::size_t a = r == 2 ? 0 : r + 1, b = r == 0 ? 2 : r - 1;
-      phi[kV + r] += phi[kT + a] * step.dv_n_mps(static_cast<int>(b)) -
-                     phi[kT + b] * step.dv_n_mps(static_cast<int>(a)) - turned(r, kA);
+      const std::size_t a = r == 2 ? 0 : r + 1, b = r == 0 ? 2 : r - 1;  // theta x dv
+      const float by_turn =
+          base::subtract_product(phi[kT + a] * dv(static_cast<int>(b)), phi[kT + b], float{dv(static_cast<int>(a))});
+      phi[kV + r] += by_turn - turned(static_cast<int>(r), kA);
     }
-    for (std::size_t r = 0; r < 3; ++r) phi[kT + r] -= turned(r, kG);
+#pragma GCC unroll 3
+    for (std::size_t r = 0; r < 3; ++r) phi[kT + r] -= turned(static_cast<int>(r), kG);
+    if (!(step.keep_b_a < 1.0F) && !(step.keep_b_g < 1.0F)) return;
     for (std::size_t r = 0; r < 3; ++r) {
       phi[kA + r] *= step.keep_b_a;
       phi[kG + r] *= step.keep_b_g;
