@@ -50,7 +50,7 @@ template <class Watch>
   apply(horizontal, filter);
   if constexpr (Watch::kWatches)  // a gate that no innovation passes: the hypotheses alone see the fix
     if (horizontal.verdict == sensor::Verdict::kRejected && !horizontal.fuses())
-      static_cast<void>(ins_.update(fix, -1.0F, watch_.bank()));
+      static_cast<void>(static_cast<nav::Ins&>(ins_).update(fix, -1.0F, watch_.bank()));
   if (!horizontal.fuses()) return record_of(horizontal);
   z.drifts = horizontal.failed == Check::kDrift;
   if (horizontal.action == Action::kResetPosition) sources_.height.reset();
