@@ -57,10 +57,13 @@ class FaultSignature {
   /// The measurement was used, with gains G = P H^T L^-T: G(n, j) of error n.
   template <class Gains, std::size_t M>
   constexpr void correct(const Gains& gains, const std::array<Scalar, M>& w) {
+#pragma GCC unroll 5
     for (int n = 0; n < N; ++n) {
-      Scalar& of = phi[static_cast<std::size_t>(n)];
+      Scalar left = phi[static_cast<std::size_t>(n)];
 #pragma GCC unroll 4
-      for (std::size_t j = 0; j < M; ++j) of = base::subtract_product(of, Scalar{gains(n, static_cast<int>(j))}, w[j]);
+      for (std::size_t j = 0; j < M; ++j)
+        left = base::subtract_product(left, Scalar{gains(n, static_cast<int>(j))}, w[j]);
+      phi[static_cast<std::size_t>(n)] = left;
     }
   }
   [[nodiscard]] constexpr Scalar size() const { return weighted / information; }
