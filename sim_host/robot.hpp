@@ -27,6 +27,7 @@ struct EstimatorFacts {
   bool closures = false;
   bool images = false;  ///< a camera's
   bool scans = false;
+  bool relatives = false;   ///< displacements between stamps
   bool heading = false;     ///< outside headings
   bool own_map = false;     ///< one of them makes its map
   bool given_map = false;   ///< a scanner's map is among its data: that of the laboratory
@@ -34,10 +35,10 @@ struct EstimatorFacts {
   bool parameters = false;  ///< its parameters can be changed over the bus
 
   /// Some of the robot's frames have identifiers of the map's block.
-  [[nodiscard]] constexpr bool needs_map_ids() const { return own_map || images || scans || parameters; }
+  [[nodiscard]] constexpr bool needs_map_ids() const { return own_map || images || scans || relatives || parameters; }
   /// Inputs that the robot takes of those behind the map's outputs.
   [[nodiscard]] constexpr MapInputs map_inputs() const {
-    return {.closures = closures, .images = images, .scans = scans, .parameters = parameters};
+    return {.closures = closures, .images = images, .scans = scans, .parameters = parameters, .relatives = relatives};
   }
 };
 

@@ -62,6 +62,7 @@ template <class... E>
           .closures = (Takes<E, sensor::LoopClosure> || ...),
           .images = (Takes<E, sensor::CameraImage> || ...),
           .scans = (Takes<E, sensor::PlanarScan> || ...),
+          .relatives = (Takes<E, sensor::RelativePose> || ...),
           .heading = (Takes<E, sensor::OutsideHeading> || ...),
           .own_map = (estimators::MakesMap<E> || ...),
           .nameless = (MapsNameless<E> || ...)};

@@ -40,12 +40,14 @@ struct MapInputs {
   bool images = false;
   bool scans = false;
   bool parameters = false;
+  bool relatives = false;
 
   [[nodiscard]] constexpr bool has(std::uint32_t offset) const {
     const bool image = offset == bus::InImage::kOffset || offset == bus::InFeature::kOffset;
     const bool scan = offset == bus::InScanHead::kOffset || offset == bus::InScan::kOffset;
-    return (images && image) || (scans && scan) || (closures && offset == bus::InClosureFrames::kOffset) ||
-           (parameters && offset == bus::CmdParamSet::kOffset);
+    const bool relative = offset == bus::InRelativePose::kOffset || offset == bus::InRelativePoseStdX::kOffset;
+    return (images && image) || (relatives && relative) || (scans && scan) ||
+           (closures && offset == bus::InClosureFrames::kOffset) || (parameters && offset == bus::CmdParamSet::kOffset);
   }
 };
 /// A frame the node consumes and counts: of its inputs, sync frames and their guards excepted.

@@ -18,6 +18,7 @@
 #include "tetap/estimators/mapping/scan_mapper.cpp"
 #include "tetap/estimators/mapping/scan_odometry.cpp"
 #include "tetap/estimators/planar/dead_reckoning.cpp"
+#include "tetap/estimators/planar/pose_clones.cpp"
 #include "tetap/estimators/planar/pose_filter.cpp"
 #include "tetap/estimators/planar/pose_grid.cpp"
 #include "tetap/estimators/planar/pose_particles.cpp"

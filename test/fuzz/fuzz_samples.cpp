@@ -154,7 +154,7 @@ class Run {
       case Sensor::kClosure:  // this robot takes none
       case Sensor::kFeature:
       case Sensor::kScan:
-      case Sensor::kRelativePose:
+      case Sensor::kRelativePose:  // likewise
       case Sensor::kNotAvailable:
         return;
     }

@@ -30,7 +30,8 @@ struct Estimators {
   static constexpr bool kUsesMap = (estimators::UsesMap<E> || ...);
   static constexpr bool kMakesMap = (estimators::MakesMap<E> || ...);
   /// Some frames of the robot have identifiers of the map's block.
-  static constexpr bool kNeedsMapIds = kMakesMap || kTakes<sensor::PlanarScan> || kTakes<sensor::CameraImage>;
+  static constexpr bool kNeedsMapIds =
+      kMakesMap || kTakes<sensor::PlanarScan> || kTakes<sensor::CameraImage> || kTakes<sensor::RelativePose>;
   /// Places for the samples of the window: 200 ms of an IMU at 200 Hz with wheels at 100 Hz and GNSS need 64.
   static constexpr std::size_t kSamples = 88;
   /// Samples that plain estimators repeat in a tick when one came late; what is more is spread over several ticks. A

@@ -11,6 +11,7 @@
 #include "tetap/bus/image_assembly.hpp"
 #include "tetap/bus/input_crc.hpp"
 #include "tetap/bus/publisher.hpp"
+#include "tetap/bus/relative_pose_assembly.hpp"
 #include "tetap/bus/scan_assembly.hpp"
 #include "tetap/bus/stamp_wraps.hpp"
 #include "tetap/node/bus_parameters.hpp"
@@ -67,11 +68,13 @@ class Node {
   /// Whether an estimator takes scans, and a camera's features.
   static constexpr bool kTakesScans = Estimators::template kTakes<sensor::PlanarScan>;
   static constexpr bool kTakesImages = Estimators::template kTakes<sensor::CameraImage>;
+  /// Whether an estimator takes displacements between stamps.
+  static constexpr bool kTakesRelatives = Estimators::template kTakes<sensor::RelativePose>;
   /// Whether a frame behind the map's outputs is an input of this robot.
   [[nodiscard]] static constexpr bool takes_map_input(std::uint8_t offset) {
     return (kTakesClosures && bus::ClosureAssembly::takes(offset)) ||
            (kTakesScans && bus::ScanAssembly::takes(offset)) || (kTakesImages && bus::ImageAssembly::takes(offset)) ||
-           BusParameters<Estimators>::takes(offset);
+           (kTakesRelatives && bus::RelativePoseAssembly::takes(offset)) || BusParameters<Estimators>::takes(offset);
   }
   /// Called by the inbox.
   void sample(const sensor::Sample& sample) {
@@ -131,11 +134,11 @@ class Node {
     return base::members(base::kept(self.parameter_commands_), base::reference(self.parameters_),
                          base::kept(self.window_), self.map_frame_, base::in_turns(self.origin_),
                          base::unhashed(self.protection_), base::unhashed(self.inbox_), base::unhashed(self.closures_),
-                         base::unhashed(self.scans_), base::unhashed(self.images_), base::unhashed(self.wraps_),
-                         base::unhashed(self.counters_), base::unhashed(self.publisher_), self.landmarks_,
-                         self.pending_reset_, base::kept(self.wired_off_), self.pending_pose_, self.now_, self.ticked_,
-                         base::unhashed(self.input_crc_), self.resets_, self.reset_cause_, self.restarted_at_,
-                         self.jumps_, self.disagreement_, self.map_faults_);
+                         base::unhashed(self.scans_), base::unhashed(self.relatives_), base::unhashed(self.images_),
+                         base::unhashed(self.wraps_), base::unhashed(self.counters_), base::unhashed(self.publisher_),
+                         self.landmarks_, self.pending_reset_, base::kept(self.wired_off_), self.pending_pose_,
+                         self.now_, self.ticked_, base::unhashed(self.input_crc_), self.resets_, self.reset_cause_,
+                         self.restarted_at_, self.jumps_, self.disagreement_, self.map_faults_);
   }
   /// For a copy that others get: nothing is left from which the key of commands could be computed. Between ticks only.
   void hide_secrets() {
@@ -167,14 +170,16 @@ class Node {
   static constexpr std::uint8_t kMostWaited = 20;  ///< ticks until a command ends the window whatever is in it
   using Closures = std::conditional_t<kTakesClosures, bus::ClosureAssembly, bus::NoClosures>;
   using Scans = std::conditional_t<kTakesScans, bus::ScanAssembly, bus::NoScans>;
+  using Relatives = std::conditional_t<kTakesRelatives, bus::RelativePoseAssembly, bus::NoRelativePoses>;
   using Images = std::conditional_t<kTakesImages, bus::ImageAssemblyOf<kMakesMap>, bus::NoImages>;
   using Landmarks = std::conditional_t<Estimators::kUsesMap, node::Landmarks, node::NoLandmarks>;
 
-  /// Sightings, closures, scans, images, and speeds that are commands.
+  /// Sightings, closures, displacements, scans, images, and speeds that are commands.
   [[nodiscard]] bool at_no_fixed_rate(const sensor::Sample& sample) const {
     const bool commanded = parameters_.wheels.hold == param::Hold::kForward;
     if (kTakesClosures && sample.sensor == sensor::Sensor::kClosure) return true;
     if (kTakesScans && sample.sensor == sensor::Sensor::kScan) return true;
+    if (kTakesRelatives && sample.sensor == sensor::Sensor::kRelativePose) return true;
     if (kTakesImages && sample.sensor == sensor::Sensor::kFeature) return true;
     return (Estimators::template kTakes<sensor::LandmarkSighting> && sample.sensor == sensor::Sensor::kRangeBearing) ||
            (Estimators::template kTakes<sensor::BodySpeed> && sample.sensor == sensor::Sensor::kBodySpeed && commanded);
@@ -232,6 +237,7 @@ class Node {
   typename Parts<Estimators>::Decoder inbox_;
   [[no_unique_address]] Closures closures_;
   [[no_unique_address]] Scans scans_;
+  [[no_unique_address]] Relatives relatives_;
   [[no_unique_address]] Images images_;
   typename Parts<Estimators>::Wraps wraps_;
   bus::Counters counters_;
@@ -274,6 +280,10 @@ void Node<Estimators, Capacity>::on_frame(const base::CanFrame& frame) {
   input_crc_.add(bits);
   if constexpr (kTakesClosures) {
     if (bus::ClosureAssembly::takes(offset)) return closures_.on_frame(frame, now_, counters_, *this);
+  }
+  if constexpr (kTakesRelatives) {
+    if (bus::RelativePoseAssembly::takes(offset))
+      return relatives_.on_frame(offset, frame, bits, now_, counters_, *this);
   }
   if constexpr (kTakesScans) {
     if (bus::ScanAssembly::takes(offset)) {
@@ -339,6 +349,7 @@ void Node<Estimators, Capacity>::tick(base::Micros t, const bus::LoopHealth& loo
   inbox_.expire(now_, base::Micros{parameters_.loop.window_us}, counters_);
   closures_.expire(now_, base::Micros{parameters_.loop.window_us}, counters_);
   scans_.expire(now_, base::Micros{parameters_.loop.window_us}, counters_);
+  relatives_.expire(now_, base::Micros{parameters_.loop.window_us}, counters_);
   images_.expire(now_, base::Micros{parameters_.loop.window_us}, counters_);
   apply_parameters(before);
   apply_map(before);
@@ -409,6 +420,7 @@ void Node<Estimators, Capacity>::restart(base::Micros t, sensor::ResetCause caus
     inbox_.discard(counters_);
     closures_.discard(counters_);
     scans_.discard(counters_);
+    relatives_.discard(counters_);
     images_.discard(counters_);
     wraps_.power_on();
     window_.clear();

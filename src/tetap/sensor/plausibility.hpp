@@ -48,6 +48,16 @@ struct Plausible {
     return s.from != s.to && LoopClosure::unpack(s.sigmas, 0) > 0 && LoopClosure::unpack(s.sigmas, 1) > 0 &&
            LoopClosure::unpack(s.sigmas, 2) > 0;
   }
+  /// A way that the robot can go in the interval, and a covariance: of an axis without a sigma nothing counts.
+  bool operator()(const RelativePose& s) const {
+    if (s.interval_us == 0 || !within(3.2F, s.yaw_rad)) return false;
+    const float most_m = most_mps * base::seconds(base::Micros{s.interval_us});
+    if (!within(s.unknown(0) ? 1e4F : most_m, s.x_m) || !within(s.unknown(1) ? 1e4F : most_m, s.y_m)) return false;
+    if (s.sigma[0] == 0 || s.sigma[1] == 0 || s.sigma[2] == 0) return false;
+    const float a = s.correlation_of(0), b = s.correlation_of(1), c = s.correlation_of(2);
+    constexpr float kLeast = 1e-3F;  // determinant of the correlations
+    return a * a < 1.0F && b * b < 1.0F && c * c < 1.0F && 1.0F + 2.0F * a * b * c - a * a - b * b - c * c > kLeast;
+  }
   /// Finer steps than 0.1 mrad, and more than a turn in all, are no scanner's.
   bool operator()(const PlanarScan& s) const {
     const float step_rad = base::abs(s.step_rad);

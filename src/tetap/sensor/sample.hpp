@@ -32,6 +32,7 @@ struct Sample {
     AirPressure pressure;
     OutsideHeading heading;
     LoopClosure closure;
+    RelativePose relative;
     PlanarScan scan;
     CameraImage image;
   } payload;
@@ -101,6 +102,8 @@ constexpr bool visit(const Sample& sample, F&& f) {
       f(sample.payload.scan);
       return true;
     case sensor::Sensor::kRelativePose:
+      f(sample.payload.relative);
+      return true;
     case sensor::Sensor::kNotAvailable:
       return false;
   }

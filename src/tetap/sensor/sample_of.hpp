@@ -23,6 +23,7 @@ struct Put {
   void operator()(const AirPressure& s) const { to.sensor = Sensor::kBarometer, to.payload.pressure = s; }
   void operator()(const OutsideHeading& s) const { to.sensor = Sensor::kHeading, to.payload.heading = s; }
   void operator()(const LoopClosure& s) const { to.sensor = Sensor::kClosure, to.payload.closure = s; }
+  void operator()(const RelativePose& s) const { to.sensor = Sensor::kRelativePose, to.payload.relative = s; }
   void operator()(const CameraImage& s) const { to.sensor = Sensor::kFeature, to.payload.image = s; }
   void operator()(const PlanarScan& s) const { to.sensor = Sensor::kScan, to.payload.scan = s; }
 };

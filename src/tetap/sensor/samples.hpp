@@ -122,6 +122,34 @@ struct LoopClosure {
   }
 };
 
+/// The body at the stamp as seen from the body `interval_us` before, found by a scan matcher, a camera or another
+/// odometry; sigmas and correlations in the steps of the bus. Correlations are of x and y, x and yaw, y and yaw.
+struct RelativePose {
+  static constexpr float kStepsPerMetre = 2000, kStepsPerRadian = 5000, kCorrelationSteps = 4000;
+  static constexpr std::uint16_t kFree = 0xFFFF;  ///< sigma of an axis of which nothing is known
+
+  float x_m = 0;
+  float y_m = 0;
+  float yaw_rad = 0;
+  std::uint32_t interval_us = 0;
+  std::array<std::uint16_t, 3> sigma{};       ///< those of x, y [0.5 mm] and yaw [0.2 mrad]
+  std::array<std::int16_t, 3> correlation{};  ///< [2.5e-4]
+
+  [[nodiscard]] constexpr bool unknown(std::size_t axis) const { return sigma[axis] == kFree; }
+  [[nodiscard]] constexpr float sigma_of(std::size_t axis) const {
+    return static_cast<float>(sigma[axis]) / (axis == 2 ? kStepsPerRadian : kStepsPerMetre);
+  }
+  /// Variances of a motion beside which the prior weighs a thousandth; `free_m`: 1 sigma of a free axis.
+  [[nodiscard]] constexpr std::array<float, 3> as_unknown_motion(float free_m) const {
+    float place_m2 = x_m * x_m + y_m * y_m;
+    for (std::size_t i = 0; i < 2; ++i) place_m2 += unknown(i) ? free_m * free_m : 1e3F * sigma_of(i) * sigma_of(i);
+    return {place_m2, place_m2, 1.0F};
+  }
+  [[nodiscard]] constexpr float correlation_of(std::size_t pair) const {
+    return static_cast<float>(correlation[pair]) / kCorrelationSteps;
+  }
+};
+
 /// A planar scan whose ranges lie in a pool (sensor/scan_pool.hpp). Bearings of the scanner, counter-clockwise.
 struct PlanarScan {
   std::uint32_t number = 0;  ///< count of the scans in the pool, from 1

@@ -2,6 +2,7 @@
 #include "tetap/estimators/planar/dead_reckoning.hpp"
 
 #include "tetap/estimators/mapping/recording_ekf.hpp"
+#include "tetap/estimators/planar/cloning_ekf.hpp"
 #include "tetap/estimators/planar/summing_ekf.hpp"
 #include "tetap/filter/ukf.hpp"
 #include "tetap/filter/ukf_sqrt.hpp"
@@ -215,6 +216,7 @@ template <class Filter>
 template class PlanarDeadReckoning<PlanarEkf>;
 template class PlanarDeadReckoning<RecordingEkf>;
 template class PlanarDeadReckoning<SummingEkf>;
+template class PlanarDeadReckoning<CloningEkf>;
 template class PlanarDeadReckoning<filter::Ukf<model::PlanarPose>>;
 template class PlanarDeadReckoning<filter::UkfSqrt<model::PlanarPose>>;
 

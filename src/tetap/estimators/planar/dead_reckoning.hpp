@@ -72,6 +72,10 @@ class PlanarDeadReckoning {
   [[nodiscard]] bool gyro_shows(base::Micros t, const param::Parameters& n) const {
     return n.gyro.use != 0 && t - gyro_time_ <= base::Micros{n.wheels.timeout_us};
   }
+  /// Wheels or a speed showed the motion until t.
+  [[nodiscard]] bool measured(base::Micros t, const param::Parameters& n) const {
+    return held_.kind != Held::Kind::kNone && t - last_input_ <= base::Micros{n.wheels.timeout_us};
+  }
   /// Forward speed as the wheels showed it last.
   [[nodiscard]] float wheels_forward_mps() const { return forward_mps(); }
 

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "tetap/estimators/planar/cloning_pose_ekf.hpp"
 #include "tetap/estimators/planar/correlated_fix.hpp"
 #include "tetap/estimators/planar/landmark_sighting.hpp"
 #include "tetap/estimators/planar/pose_ekf.hpp"
@@ -84,6 +85,7 @@ template <class Filter>
   for (checks::Persistence& refused : refused_) refused.reset();
   in_a_row_ = {};
   trust_motion();
+  forget_clones();
   last_absolute_ = stamp;
   ++jumps_;
 }
@@ -247,8 +249,41 @@ Innovation PoseFilter<Filter>::fuse(const sensor::GnssPosition& fix, base::Micro
   return {.verdict = sensor::Verdict::kAccepted};
 }
 
+/// Implements docs/explanation/equations.md (18).
+template <class Filter>
+Innovation PoseFilter<Filter>::fuse_relative(const sensor::RelativePose& displacement, base::Micros stamp,
+                                             const Context& ctx) {
+  Innovation result{.failed = sensor::Check::kUnconfirmed};
+  if constexpr (kTakesRelatives) {
+    constexpr float kFarthest_m2 = 1e3F;  // above, the float has too few digits left for a displacement
+    motion_.propagate(stamp, ctx.parameters);
+    give_up_when_lost();
+    Filter& filter = motion_.filter;
+    if (phase_ != Phase::kTracking || !(filter.p(0, 0) + filter.p(1, 1) < kFarthest_m2)) return result;
+    const base::Micros interval{displacement.interval_us};
+    const int from = filter.clones.find(stamp - interval);
+    int kept = PoseClones::kNone;
+    result.failed = sensor::Check::kTime;
+    if (from != PoseClones::kNone) {
+      if (relocalisation_.searches()) relocalisation_.move(filter.x, filter.p);
+      if (!motion_.measured(stamp, ctx.parameters)) {  // nothing but the displacement shows the way
+        const float free_m = ctx.parameters.wheels.most_mps * base::seconds(interval);
+        filter.p.add_diagonal(displacement.as_unknown_motion(free_m));
+      }
+      const auto judged = filter.update_relative(displacement, from, 1.0F);
+      result = record(judged);
+      result.dof = static_cast<std::uint8_t>(3 - (displacement.unknown(0) ? 1 : 0) - (displacement.unknown(1) ? 1 : 0));
+      if (judged.verdict == filter::Verdict::kAccepted) kept = from;
+      if (relocalisation_.searches()) relocalisation_.note(filter.x, filter.p);
+    }
+    filter.clones.add(stamp, filter.x, filter.p, kept);
+  }
+  return result;
+}
+
 template class PoseFilter<PlanarEkf>;                       // PoseEkf
 template class PoseFilter<filter::Ukf<model::PlanarPose>>;  // PoseUkf
 template class PoseFilter<filter::UkfSqrt<model::PlanarPose>>;
+template class PoseFilter<CloningEkf>;  // CloningPoseEkf
 
 }  // namespace tetap::estimators

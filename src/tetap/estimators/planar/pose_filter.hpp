@@ -31,10 +31,11 @@ class PoseFilter {
 
  public:
   /// The mean of an unscented filter depends on the spread of its points, that of an extended one does not.
-  static constexpr bool kUnscented = !std::same_as<Filter, PlanarEkf>;
+  static constexpr bool kUnscented = !std::derived_from<Filter, PlanarEkf>;
   static constexpr sensor::EstimatorKind kKind = kUnscented ? sensor::EstimatorKind::kUkf : sensor::EstimatorKind::kEkf;
 
   static constexpr bool kUsesMap = true;
+  static constexpr bool kTakesRelatives = requires(Filter & filter) { filter.clones; };
 
   void restart(base::Micros t, const Context& ctx) {
     clear();
@@ -57,6 +58,7 @@ class PoseFilter {
     refused_ = {};
     in_a_row_ = {};
     trust_motion();
+    forget_clones();
   }
 
   void advance(base::Micros t, const Context&) { motion_.advance(t), now_ = t; }
@@ -75,6 +77,12 @@ class PoseFilter {
   /// A sighting without identity, while tracking, is that of the landmark that it fits best (nearest neighbour).
   Innovation fuse(const sensor::LandmarkSighting& sighting, base::Micros stamp, const Context& ctx);
   Innovation fuse(const sensor::GnssPosition& fix, base::Micros stamp, const Context& ctx);
+  /// Not used, and failed by its time, where the pose of its earlier stamp is not held: it began neither where an
+  /// earlier one ended nor where one began that was used.
+  Innovation fuse(const sensor::RelativePose& displacement, base::Micros stamp,
+                  const Context& ctx) requires kTakesRelatives {
+    return fuse_relative(displacement, stamp, ctx);
+  }
 
   [[nodiscard]] Estimate estimate(const Context& ctx) const {
     Estimate estimate = motion_.estimate(ctx.parameters);
@@ -127,6 +135,7 @@ class PoseFilter {
     alignment_ = {};
     landmarks_.reset();
     relocalisation_.reset();
+    forget_clones();
     if (kUnscented) motion_.forget_heading();
   }
   template <class Model>
@@ -137,10 +146,15 @@ class PoseFilter {
       -> filter::Innovation<float, Model::kDimension>;
   /// The filter goes to the pose that the search found.
   void take_rival(base::Micros stamp);
+  Innovation fuse_relative(const sensor::RelativePose& displacement, base::Micros stamp, const Context& ctx);
   /// Identity of the landmark that the sighting fits best; that of any where the pose is not known.
   [[nodiscard]] std::uint8_t nearest_landmark(const sensor::LandmarkSighting& sighting, const Context& ctx) const;
   /// A sighting while the pose is unknown.
   Innovation align(const model::RangeBearing& seen, base::Micros stamp, const Context& ctx, std::uint8_t landmark);
+  /// The pose is another one now, without a relation to earlier ones.
+  void forget_clones() {
+    if constexpr (kTakesRelatives) motion_.filter.clones.forget();
+  }
   void begin_tracking(base::Micros stamp) {
     phase_ = Phase::kTracking;
     landmarks_.reset();
