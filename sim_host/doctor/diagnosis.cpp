@@ -14,6 +14,7 @@
 #include "sim_host/doctor/lateness.hpp"
 #include "sim_host/doctor/origin.hpp"
 #include "sim_host/doctor/path.hpp"
+#include "sim_host/doctor/scans.hpp"
 #include "sim_host/doctor/sequence.hpp"
 #include "sim_host/doctor/speed_vote.hpp"
 #include "sim_host/doctor/stamps.hpp"
@@ -71,6 +72,7 @@ class Examination {
         wheel_speed_(robot),
         speed_vote_({.velocity_by_wheels = wheel_speed_, .fixes_by_wheels = path_, .fixes_by_velocity = velocity_}),
         antenna_(robot),
+        scans_(robot, windows_),
         origin_(robot),
         dead_axis_(robot),
         axes_(robot, {.turn = turn_, .course = course_, .field = field_, .force = force_, .forward = forward_}),
@@ -87,6 +89,8 @@ class Examination {
     decoder_.expire(seen.time, kPatience, counters_);
     decoder_.on_frame(static_cast<std::uint8_t>(seen.offset), seen.frame, seen.time, counters_, *this);
   }
+  /// A frame of a scan, which is no counted input of every robot.
+  void scan_frame(const SeenFrame& seen) { scans_.scan_frame(seen); }
   Findings finish() {
     Findings findings;
     for (Detector* one : all_) one->finish(findings);
@@ -124,14 +128,15 @@ class Examination {
   WheelSpeedDetector wheel_speed_;
   SpeedVoteDetector speed_vote_;
   AntennaDetector antenna_;
+  ScanDetector scans_;
   OriginDetector origin_;
   DeadAxisDetector dead_axis_;
   AxesDetector axes_;
   TurnScaleDetector turn_scale_;
   CameraDetector camera_;
-  std::array<Detector*, 19> all_{&halves_, &sequence_,  &stamps_, &force_,      &turn_,        &forward_,    &course_,
-                                 &field_,  &velocity_,  &path_,   &lateness_,   &wheel_speed_, &speed_vote_, &antenna_,
-                                 &origin_, &dead_axis_, &axes_,   &turn_scale_, &camera_};
+  std::array<Detector*, 20> all_{&halves_, &sequence_, &stamps_,    &force_,    &turn_,        &forward_,    &course_,
+                                 &field_,  &velocity_, &path_,      &lateness_, &wheel_speed_, &speed_vote_, &antenna_,
+                                 &scans_,  &origin_,   &dead_axis_, &axes_,     &turn_scale_,  &camera_};
 };
 
 /// Codes of one comparison of several devices, which may not show whose axes are wrong.
@@ -191,7 +196,11 @@ sim::Result<Diagnosis> diagnose(sim::Frames& log, const std::string& name, std::
   bool begun = false;
   for (sim::TimedFrame entry; log.next(entry);) {
     clock.add(entry.time, entry.frame);
-    if (!clock.known() || !sim::is_counted_input(entry.frame, base, {.images = true})) continue;
+    if (!clock.known()) continue;
+    if (const auto offset = sim::offset_in_block(entry.frame, base);
+        offset && *offset <= 0xFF && bus::ScanAssembly::takes(static_cast<std::uint8_t>(*offset)))
+      examination.scan_frame({.time = clock.now(), .offset = *offset, .frame = entry.frame});
+    if (!sim::is_counted_input(entry.frame, base, {.images = true})) continue;
     const base::Micros now = clock.now();
     if (begun && now > last && (now - last).us < kMostPause_us)
       found.duration_s += static_cast<double>((now - last).us) * 1e-6;

@@ -24,6 +24,7 @@ DATA = os.environ.get("TETAP_DATA") or os.path.join(ROOT, "..", "shared", "data"
 WHOLE = os.environ.get("form") == "whole" or "--whole" in sys.argv
 DBC = bus_writer.Dbc()
 MASK = (1 << 20) - 1
+SCANS = [DBC.messages[name].identifier for name in ("In_ScanHead", "In_Scan")]
 GYRO, ACCEL, TIME = "In_Imu0Gyro", "In_Imu0Accel", "In_Imu0Time"
 ANGLES, VELOCITIES = ("AngX", "AngY", "AngZ"), ("VelX", "VelY", "VelZ")
 HUSKY_TRACK_M = 0.545
@@ -32,7 +33,7 @@ NAMED_SHARE = 0.9  # of all mistakes, first or second
 
 # ---- frames
 class Frames:
-    """Input and sync frames of a candump log, in numpy: time [us], identifier, payload."""
+    """Input and sync frames of a candump log, and those of scans, in numpy: time [us], identifier, payload."""
 
     def __init__(self, time_us, identifier, payload):
         self.time_us, self.identifier, self.payload = time_us, identifier, payload
@@ -42,7 +43,7 @@ class Frames:
         with open(path, encoding="ascii") as file:
             lines = [line for line in file.read().split("\n") if line]
         identifier = np.array([int(line.split(" ", 3)[2][:3], 16) for line in lines])
-        keep = np.flatnonzero((identifier >= 0x300) & (identifier < 0x320))
+        keep = np.flatnonzero(((identifier >= 0x300) & (identifier < 0x320)) | np.isin(identifier, SCANS))
         time_us = np.array([int(line[1:11]) * 1_000_000 + int(line[12:18]) for line in lines], dtype=np.int64)
         payload = np.array([int.from_bytes(bytes.fromhex(line.split("#", 1)[1]).ljust(8, b"\0"), "little") for line in lines], dtype=np.uint64)
         return cls(time_us[keep], identifier[keep], payload[keep])
@@ -284,6 +285,21 @@ def late(seconds):
     return apply
 
 
+def mirror_scans(frames):
+    frames.set("In_ScanHead", First=-frames.get("In_ScanHead", "First"), Step=-frames.get("In_ScanHead", "Step"))
+    return frames
+
+
+def turn_scans(angle_deg):
+    """Beams count from another place, as on a mount that is turned."""
+    return map_signal("In_ScanHead", "First", lambda first: np.remainder(first + np.radians(angle_deg) + np.pi, 2 * np.pi) - np.pi)
+
+
+def late_scans(frames):
+    frames.set("In_ScanHead", Stamp=(frames.valid_us("In_ScanHead") + 100_000) & MASK)
+    return frames
+
+
 def swap_velocity(frames):
     frames.set("In_GnssVelEN", East=frames.get("In_GnssVelEN", "North"), North=frames.get("In_GnssVelEN", "East"))
     return frames
@@ -401,6 +417,10 @@ MISTAKES = [
     ("wheels_unequal", "yard", lambda f: f, "--set", "wheels.drive.right_radius_m=0.15"),
     ("antenna_arm", "*yard", lambda f: f, "--set", "gnss.antenna_y_b_m=2"), ("antenna_arm", "road", lambda f: f, "--set", "gnss.antenna_x_b_m=3"),
     ("antenna_arm", "husky_sim", lambda f: f, "--set", "gnss.antenna_y_b_m=-1.5"), ("antenna_arm", "yard", lambda f: f, "--set", "gnss.antenna_x_b_m=-1.5"),
+    *[(code, log, mistake) for log in ("*lab", "lab_again", "lab_third") for code, mistake in (
+        ("scan_mirrored", mirror_scans), ("scan_turned", turn_scans(90)), ("scan_late", late_scans))],
+    *[("scan_mirrored", log, lambda f: f) for log in ("*lab_upside_down", "lab_again_upside_down", "lab_third_upside_down")],
+    ("scan_turned", "lab", turn_scans(-90)),
     ("message_missing", "*yard", lambda f: f.without("In_GnssLon")), ("message_missing", "skog", lambda f: f.without(TIME)),
     ("message_missing", "iris_gps", lambda f: f.without("In_GnssVelU")), ("message_missing", "husky", lambda f: f.without("In_GnssAcc")),
     ("two_senders", "*yard", lambda f: second_sender(f, ["In_WheelCounts"], 1, 7, Left=1000, Right=2000)),
@@ -412,13 +432,15 @@ MISTAKES = [
 # name: robot, and how the log is made: arguments of tetap-world, or an importer with its arguments ({DATA} is the folder of the sets)
 WORLDS = {"yard": ("rover", []), "road": ("rover", ["--course", "road"]), "car": ("car", []), "iris": ("iris", []),
           "husky_sim": ("husky_inertial", []),
+          "lab": ("scanner", []), "lab_again": ("scanner", ["--seed", "12"]), "lab_third": ("scanner", ["--seed", "13"]),
           "tour": ("rover", []), "stand": ("rover", ["--course", "stand"]),
           "usual": ("rover", ["--seed", "2", "--fault", "wheel_spin@45+3,gnss_outage@80+30,gnss_jump@150+2"])}
 SETS = {"skog": ("car", "import_skog", "skog_gnss_ins"), "husky": ("husky_inertial", "import_husky", "husky"),
         "iris_gps": ("iris", "import_px4", "px4_ecl", "iris_gps"),
         "labyrinth": ("labyrinth", "import_labyrinth", "tuc_labyrinth/Indoor_UWB"),
         **{f"mrclam{i}": ("mrclam", "import_mrclam", "mrclam/MRCLAM_Dataset7", str(i)) for i in range(1, 6)}}
-SHORT_GOOD = ("yard", "skog", "husky", "iris_gps", "mrclam1", "labyrinth")
+UPSIDE_DOWN = {f"{name}_upside_down": (WORLDS[name][0], [*WORLDS[name][1], "--fault", "lidar_mirrored@0+9999"]) for name in ("lab", "lab_again", "lab_third")}
+SHORT_GOOD = ("yard", "lab", "skog", "husky", "iris_gps", "mrclam1", "labyrinth")
 SHORT_S = "90"
 LONG = ("tour",)  # of its whole length in the short form, too: a change of speed comes late
 
@@ -430,19 +452,19 @@ class Logs:
         self.folder, self.made = folder, {}
 
     def available(self, name):
-        return name in WORLDS or os.path.exists(os.path.join(DATA, SETS[name][2]))
+        return name in WORLDS or name in UPSIDE_DOWN or os.path.exists(os.path.join(DATA, SETS[name][2]))
 
     @staticmethod
     def robot(name):
-        return (WORLDS.get(name) or SETS[name])[0]
+        return (WORLDS.get(name) or UPSIDE_DOWN.get(name) or SETS[name])[0]
 
     def frames(self, name):
         if name not in self.made:
-            self.made[name] = self._simulated(name) if name in WORLDS else self._recorded(name)
+            self.made[name] = self._recorded(name) if name in SETS else self._simulated(name)
         return self.made[name].copy()
 
     def _simulated(self, name):
-        robot, arguments = WORLDS[name]
+        robot, arguments = WORLDS.get(name) or UPSIDE_DOWN[name]
         out = os.path.join(self.folder, name)
         run(os.path.join(PROGRAMS, "tetap-world"), "--memory", "--raw", "--quiet", "--robot", robot, "--out", out, *arguments, *([] if WHOLE or name in LONG else ["--duration", SHORT_S]))
         return Frames.read(os.path.join(out, "raw.log"))
