@@ -120,6 +120,7 @@ void AxesDetector::judge_yaw(const Votes& yaw, Findings& findings) const {
 void AxesDetector::judge_force(const Votes& yaw, Findings& findings) const {
   if (!robot_.mounting) return;
   const ForwardDetector::Agreement forward = by_.forward.agreement();
+  if (forward.aside) return;  // an IMU that is turned about up
   const int uses = kAccelerometer | kMounting | forward.uses;
   // Both against is an IMU that is turned by 180 degrees.
   if (forward.ahead < -kFollows && forward.left > 0)

@@ -19,6 +19,7 @@ constexpr double kFits = 0.25;       ///< share of the force's variance, by the 
 constexpr double kDegreesARadian = 180 / std::numbers::pi;
 constexpr double kAhead = 0.6;        ///< correlation by which a force along the acceleration shows what is ahead
 constexpr double kTurned_rad = 0.35;  ///< 20 deg: slopes and slip turn the force by less
+constexpr double kAside_rad = 0.52;   ///< 30 deg from ahead and astern, where a reversed axis looks like a turn
 constexpr double kTurnedSigmas = 6;   ///< windows overlap, and motion colours what is left
 
 struct Placing {
@@ -102,6 +103,9 @@ ForwardDetector::Agreement ForwardDetector::agreement() const {
   if (m.covariance(2, 2) > kLeast2)
     found.ahead = correlation(m.covariance(0, 2), m.covariance(0, 0), m.covariance(2, 2));
   if (m.covariance(3, 3) < kLeast2) return found;
+  const Turned best = turned(m);
+  found.aside = std::abs(best.by_rad) > kAside_rad && std::abs(best.by_rad) < std::numbers::pi - kAside_rad &&
+                best.fits > kFits && best.fits > std::max(explained(m, kMirrors[0]), explained(m, kMirrors[1]));
   found.left = correlation(m.covariance(1, 3), m.covariance(1, 1), m.covariance(3, 3));
   found.turn = turn_ratio(m.covariance(3, 3), m.covariance(1, 3), m.covariance(1, 1), m.count(), 0);
   if (!found.turn) return found;

@@ -25,6 +25,8 @@ class ForwardDetector : public Detector {
     const char* device = "";
     Devices uses = kNoDevice;
     std::optional<TurnRatio> turn{};  ///< turn by the gyroscope over that of the force to the left
+    bool aside =
+        false;  ///< the force fits axes turned about up, neither as stated nor backwards, better than one reversed
   };
   [[nodiscard]] Agreement agreement() const;
 

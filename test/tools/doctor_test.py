@@ -355,7 +355,7 @@ MISTAKES = [
     ("imu_axes", "skog", lambda f: turn_imu(f, np.diag([-1, -1, 1]))), ("imu_axes", "*husky", lambda f: turn_imu(f, Y_FOR_Z)),
     ("imu_axes", "iris", lambda f: turn_imu(f, Y_FOR_Z)), ("imu_axes", "car", lambda f: turn_imu(f, ABOUT_Z)),
     ("imu_axes", "road", lambda f: turn_imu(f, np.diag([-1, -1, 1]))),
-    ("imu_axes", "*yard", lambda f: turn_imu(f, about(2, 45))), ("imu_axes", "skog", lambda f: turn_imu(f, about(2, -30))), ("imu_axes", "husky_sim", lambda f: turn_imu(f, about(1, 135))),
+    ("imu_axes", "*yard", lambda f: turn_imu(f, about(2, 45))), ("imu_axes", "skog", lambda f: turn_imu(f, about(2, -30))), ("imu_axes", "*yard", lambda f: turn_imu(f, about(2, -120))), ("imu_axes", "husky_sim", lambda f: turn_imu(f, about(1, 135))),
     ("rates_for_increments", "yard", rates), ("rates_for_increments", "*skog", rates), ("rates_for_increments", "iris_gps", rates),
     ("rates_for_increments", "husky", rates),
     ("g_for_mps2", "yard", lambda f: scale_imu(f, 1, 1 / 9.80665)), ("g_for_mps2", "*skog", lambda f: scale_imu(f, 1, 1 / 9.80665)),
