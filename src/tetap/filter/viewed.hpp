@@ -71,16 +71,16 @@ struct Viewed : Filter {
     constexpr int N = Filter::kErrors, M = Measurement::kDimension;
     if constexpr (requires { this->predict_covariance(); }) bring_up_to_date(more...);
     using State = std::remove_cvref_t<decltype(this->x)>;
-    const State x = this->x;
-    const auto at = x.minus(State{});
+    const State before = this->x;
+    const auto at = before.minus(State{});
     const auto prior = detail::whole<N>(this->p);
-    const auto noise = z.noise();
+    const auto variances = z.noise();
     std::array<float, static_cast<std::size_t>(M) * N> h{};
     const auto jacobian = [&] {
-      if constexpr (requires { z.linearised(x); }) {
-        return z.linearised(x).h;
+      if constexpr (requires { z.linearised(before); }) {
+        return z.linearised(before).h;
       } else {
-        return z.jacobian(x);
+        return z.jacobian(before);
       }
     }();
     for (int m = 0; m < M; ++m)
@@ -89,7 +89,7 @@ struct Viewed : Filter {
 
     const auto record = Filter::update(z, std::forward<More>(more)...);
 
-    const auto moved = this->x.minus(x);
+    const auto moved = this->x.minus(before);
     const auto posterior = detail::whole<N>(this->p);
     const auto s = detail::whole<M>(record.s);
     view({.model = detail::name_of_type<Measurement>(),
@@ -98,7 +98,7 @@ struct Viewed : Filter {
           .prior = prior,
           .posterior = posterior,
           .h = h,
-          .noise = {noise.data(), static_cast<std::size_t>(M)},
+          .noise = {variances.data(), static_cast<std::size_t>(M)},
           .nu = {record.nu.data(), static_cast<std::size_t>(M)},
           .s = s,
           .nis = record.nis,
