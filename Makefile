@@ -43,7 +43,7 @@ comma := ,
 robots := $(shell tools/run/list_robots)
 # A robot of simulation alone is another one with other parameters.
 module := $(if $(filter $(ROBOT),$(robots)),$(ROBOT),$(patsubst %_matched,%,$(filter rover_matched rover_landmarks_matched,$(ROBOT))))
-ifneq ($(filter sim replay doctor programs firmware board flash laws page,$(MAKECMDGOALS)),)
+ifneq ($(filter sim replay doctor programs firmware board flash laws page tune,$(MAKECMDGOALS)),)
 ifeq ($(module),)
 $(error no robot '$(ROBOT)'; there are: $(robots) rover_landmarks_matched rover_matched)
 endif
@@ -52,7 +52,7 @@ node := $(if $(filter memory,$(BUS)),,$(comma)tetap-node)
 page_suffix := $(if $(filter file,$(origin ROBOT)),,.$(module))
 page_variant := $(if $(page_suffix),TETAP_VARIANT=$(module) TETAP_SETTINGS=-DTETAP_PAGE_ROBOTS=$(module))
 
-.PHONY: help sim board test quick proof replay record doctor export firmware flash size heap stack count bits hashes soak matrix swarm mutants laws constants bench costs check docs dbc page page-test setup programs arm
+.PHONY: help sim board test quick proof replay record doctor export tune firmware flash size heap stack count bits hashes soak matrix swarm mutants laws constants bench costs check docs dbc page page-test setup programs arm
 
 help: ## this list
 	@echo "tetap: state estimation on the robot's own microcontroller"; echo
@@ -93,6 +93,12 @@ doctor: setup ## the likeliest mistake in a log, by its devices alone: LOG=run.l
 
 export: setup ## a log as MCAP with messages of ROS 2: LOG=run.log [OUT=FILE.mcap]
 	@tools/can/export_log $(or $(LOG),$(error LOG=FILE is missing)) $(or $(OUT),out/export.mcap)
+
+tune: setup ## noise rows by the likelihood of recorded drives: LOG="a.log b.log" ROBOT=NAME [TRUTH="a.truth.csv b.truth.csv"], in out/tune
+	@test -n "$(LOG)" || { echo "make tune: name a log: LOG=run.log ROBOT=$(ROBOT)" >&2; exit 2; }
+	@tools/run/build_preset host:tetap-params,tetap-play,robot_$(module)
+	@TETAP_VARIANT=views TETAP_SETTINGS=-DTETAP_VIEWS=ON tools/run/build_preset host:tetap-innovations,robot_$(module)
+	@tools/calibrate/tune_robot $(LOG) --robot $(ROBOT) $(addprefix --truth ,$(TRUTH)) $(if $(PARAMS),--params $(PARAMS)) $(addprefix --set ,$(SET)) --out $(or $(OUT),out/tune)
 
 firmware: setup ## the flash image: BOARD=zynqmp_r5 ROBOT=rover, with its size table, no heap and stack proved
 	@tools/run/build_firmware
