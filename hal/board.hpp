@@ -11,6 +11,7 @@
 #include "tetap/base/time.hpp"
 
 #include <concepts>
+#include <cstdint>
 #include <type_traits>
 
 namespace tetap::hal {
@@ -58,6 +59,15 @@ concept ReportingBoard = Board<B> && requires(B& board) {
 /// A board with memory for a second copy of the node's state, which a recording that begins after boot starts from.
 template <class B>
 concept SnapshotBoard = Board<B> && std::remove_cvref_t<B>::kSnapshots;
+
+/// A board on a CANopen bus.
+template <class B>
+concept CanopenBoard = Board<B> && requires(const B& board) {
+  /// 1 to 127, from switches or a constant, read once; 0: none, and the node is no CANopen node.
+  { board.canopen_id() } -> std::same_as<std::uint8_t>;
+  /// Its name and revision, 16 characters at most.
+  { B::kHardware } -> std::convertible_to<const char*>;
+};
 
 // Wired sensors: members of the board, each on the clock of now().
 

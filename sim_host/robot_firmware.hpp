@@ -60,7 +60,11 @@ struct HostBoard {
   }
 
   static constexpr bool kSnapshots = true;
+  static constexpr const char* kHardware = "Linux";
+  [[nodiscard]] std::uint8_t canopen_id() const { return node_id; }
+
   AnyCan& can;
+  std::uint8_t node_id = 0;  ///< on a CANopen bus; 0: none
 
  private:
   base::Micros longest_pause_;

@@ -7,6 +7,7 @@
 #include "sim_host/robot_firmware.hpp"
 #include "sim_host/robots.hpp"
 #include "tetap/firmware/accepted_frames.hpp"
+#include "tetap/firmware/canopen/ids.hpp"
 #include "version.hpp"
 
 #include <csignal>
@@ -33,23 +34,35 @@ The firmware as a Linux program on SocketCAN. Ends on INT or TERM with status 0.
   --base ID      first id of the node's block of 64 (default: can_base of the parameters)
 )" + std::string(tetap::sim::kParameterHelp) +
          R"(
+  --canopen ID   speak SDO (CiA 301) as CANopen node ID, for robots that take parameters from the bus
   --list-robots  print the names of the robots, nothing else
   --boot-line    print what a flash image of this robot says of its core at boot, nothing else
 )";
 }
 
-void run(const tetap::sim::Robot& robot, const std::string& interface, const tetap::param::Parameters& parameters) {
+void run(const tetap::sim::Robot& robot, const std::string& interface, const tetap::param::Parameters& parameters,
+         std::uint8_t node_id) {
   tetap::hal::SocketCan bus(interface,
-                            {.accept = tetap::firmware::accepted_by(robot.takes.needs_map_ids(), parameters)});
+                            {.accept = tetap::firmware::with_requests(
+                                 tetap::firmware::accepted_by(robot.takes.needs_map_ids(), parameters), node_id)});
   std::fprintf(stderr, "tetap-node: robot %s on %s, ids %03X to %03X, version %s\n", robot.name, interface.c_str(),
                parameters.can_base, parameters.can_base + 0x3F, tetap::hal::version_text(tetap::version()).c_str());
   tetap::sim::CanAdapter can(bus);
   tetap::sim::HostBoard board(can);
+  board.node_id = node_id;
   const auto firmware = robot.make_firmware(board, parameters, tetap::version());
   while (stop_requested == 0) {
     firmware->poll();
     bus.wait(tetap::base::Micros{500});
   }
+}
+
+void require_canopen(const tetap::sim::Robot& robot, std::uint8_t node_id, std::uint32_t base) {
+  if (node_id == 0) return;
+  if (!robot.takes.parameters)
+    throw tetap::sim::UsageError(std::string("--canopen: robot ") + robot.name + " takes no parameters from the bus");
+  if (!tetap::firmware::canopen::is_node_id(node_id, base))
+    throw tetap::sim::UsageError(std::string("--canopen has to be ") + tetap::firmware::canopen::kNodeIdRule);
 }
 
 /// Prints as a board does.
@@ -77,6 +90,8 @@ int main(int argc, char** argv) try {
   const tetap::sim::ParameterSettings settings(arguments);
   const std::uint32_t base = arguments.base("--base", settings.can_base());
   const bool boot_line = arguments.flag("--boot-line");
+  const auto node_id =
+      static_cast<std::uint8_t>(arguments.integer("--canopen", 0, 1, tetap::firmware::canopen::kMostNodeId));
   arguments.finish();
   if (list_robots) return std::printf("%s\n", tetap::sim::robot_names().c_str()), 0;
   std::signal(SIGINT, request_stop);
@@ -86,7 +101,8 @@ int main(int argc, char** argv) try {
   if (boot_line) return print_boot_line(chosen, parameters), 0;
   parameters.can_base = base;
   tetap::sim::require_map_ids(chosen, base);
-  run(chosen, interface, parameters);
+  require_canopen(chosen, node_id, base);
+  run(chosen, interface, parameters, node_id);
   return 0;
 } catch (const std::exception& error) {
   std::fprintf(stderr, "tetap-node: %s\n", error.what());

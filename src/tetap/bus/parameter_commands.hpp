@@ -25,6 +25,8 @@ class ParameterCommands {
   [[nodiscard]] static constexpr bool takes(std::uint8_t offset) { return offset == CmdParamSet::kOffset; }
   [[nodiscard]] const param::Parameters& active(const param::Parameters&) const { return staged_.active(); }
 
+  [[nodiscard]] const param::StagedParameters& sets() const { return staged_; }
+
   /// Rows that waited for a restart are active.
   void power_on() {
     staged_.restart();

@@ -6,6 +6,7 @@
 
 #include "hal/can_bus.hpp"
 #include "tetap/bus/messages.hpp"
+#include "tetap/firmware/canopen/ids.hpp"
 #include "tetap/param/parameters.hpp"
 
 #include <cstdint>
@@ -21,6 +22,13 @@ namespace tetap::firmware {
 template <class Estimators>
 [[nodiscard]] constexpr hal::Acceptance accepted_by(const param::Parameters& parameters) {
   return accepted_by(Estimators::kNeedsMapIds, parameters);
+}
+
+/// The same with the SDO requests to this node. A filter has one identifier and one mask: it takes others, too, which
+/// the firmware passes over.
+[[nodiscard]] constexpr hal::Acceptance with_requests(hal::Acceptance accepted, std::uint8_t node_id) {
+  if (node_id != 0) accepted.mask &= ~(accepted.id ^ (canopen::kRequestIds + node_id));
+  return accepted;
 }
 
 }  // namespace tetap::firmware

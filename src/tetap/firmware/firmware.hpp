@@ -7,6 +7,7 @@
 #include "tetap/bus/guard.hpp"
 #include "tetap/bus/guard_sender.hpp"
 #include "tetap/firmware/boot_self_check.hpp"
+#include "tetap/firmware/canopen/adapter.hpp"
 #include "tetap/firmware/lockstep_policy.hpp"
 #include "tetap/firmware/pacer.hpp"
 #include "tetap/firmware/snapshot.hpp"
@@ -31,13 +32,14 @@ class Firmware {
         parameters_(parameters),
         node_(parameters, version),
         pacer_(base::Micros{parameters.loop.period_us}),
-        extras_(board, parameters, version) {}
+        extras_(board, parameters, version),
+        canopen_(board, parameters, version, node_) {}
 
   /// Runs the exercise on this very node, then powers it on anew. For boot: the hash shows whether this core computes
   /// as all others do.
   [[nodiscard]] std::uint32_t self_check(std::uint32_t epochs) {
     bus::FrameHash hash(parameters_.can_base);
-    bus::FrameSink frame_sink(board_.can, hash);
+    bus::FrameSink frame_sink(can_end(), hash);
     BootSelfCheck(node_, parameters_.can_base, 1).run(epochs, frame_sink);
     node_.power_on({});
     return hash.value();
@@ -56,6 +58,7 @@ class Firmware {
       if (!frame || on_frame(*frame)) break;
     }
     if constexpr (kWired) poll_wired();
+    if constexpr (kCanopen) poll_canopen();
     if (const auto t = pacer_.on_poll(board_.now(), health_)) tick(*t);
     board_.can.flush();
     end_poll();
@@ -73,10 +76,14 @@ class Firmware {
   static constexpr std::uint32_t kInputs = 0x20;  ///< offsets below are inputs
   static constexpr bool kWired = WiredInputs<Board, kParts>::kAny;
   static constexpr bool kSnapshots = hal::SnapshotBoard<Board>;
+  static constexpr bool kCanopen = node::kHasBusParameters<Estimators> && hal::CanopenBoard<Board>;
   using Node = node::Node<Estimators>;
 
   /// True: the node ticked or began.
   bool on_frame(const base::CanFrame& frame) {
+    if constexpr (kCanopen) {
+      if (canopen_.adapter.take(frame)) return false;
+    }
     const std::uint32_t offset = frame.id - parameters_.can_base;
     if (frame.extended || offset >= bus::kBlock + bus::kMapBlock) return false;
     if (Node::takes_map_input(static_cast<std::uint8_t>(offset))) return node_.on_frame(frame), false;
@@ -102,7 +109,7 @@ class Firmware {
     if (begins) {
       node_.power_on(time);
       health_.unlogged = false;
-      bus::FrameSink frame_sink(board_.can);
+      bus::FrameSink frame_sink(can_end());
       node_.send_version(frame_sink);
     }
     const auto t = pacer_.on_sync(sync->kind, time, board_.now(), health_, proof.guarded || proof.authenticated);
@@ -129,8 +136,9 @@ class Firmware {
     health_.id_conflict = conflict_ticks_ > 0;
     if (conflict_ticks_ > 0) --conflict_ticks_;
     if constexpr (kWired) renew_pages();
-    bus::FrameSink frame_sink(board_.can);
+    bus::FrameSink frame_sink(can_end());
     node_.tick(t, health_, frame_sink);
+    if constexpr (kCanopen) canopen_.adapter.on_tick(health_, board_.now());
     if constexpr (kWired) extras_.ticked = true;
     if constexpr (kSnapshots) send_snapshot();
     const std::int64_t took_us = (board_.now() - began).us;
@@ -171,6 +179,22 @@ class Firmware {
     if (!board_.can.send(frame)) health_.unlogged = true;
     node_.on_frame(frame);
   }
+  void poll_canopen() requires kCanopen {
+    const auto send = [this](const base::CanFrame& frame) { return board_.can.send(frame); };
+    const auto command = [this](const base::CanFrame& frame) {
+      const bool sent = board_.can.send(frame);
+      if (sent) node_.on_frame(frame);
+      return sent;
+    };
+    canopen_.adapter.poll(board_.now(), pacer_.state() != bus::SyncState::kLockstep, send, command);
+  }
+  /// The bus for what the node sends.
+  [[nodiscard]] auto& can_end() {
+    if constexpr (kCanopen)
+      return canopen_.end;
+    else
+      return board_.can;
+  }
   void end_poll() {
     if constexpr (hal::WatchdogBoard<Board>) polled_ ? board_.kick() : board_.start_watchdog();
     polled_ = true;
@@ -204,6 +228,28 @@ class Firmware {
     extras_.snapshot.send([this](const base::CanFrame& frame) { return board_.can.send(frame); });
   }
 
+  /// The adapter, and the bus with its ear on what the node sends.
+  struct Canopen {
+    struct End {
+      std::remove_reference_t<decltype(Board::can)>& can;
+      canopen::Adapter& adapter;
+      /// Apart, for a node sends at many places.
+      [[gnu::noinline]] bool send(const base::CanFrame& frame) {
+        adapter.on_sent(frame);
+        return can.send(frame);
+      }
+    };
+    Canopen(Board& board, const param::Parameters& p, const bus::Version& version, const Node& node)
+        : adapter(
+              {.can_base = p.can_base, .node_id = board.canopen_id(), .version = version, .hardware = Board::kHardware},
+              node.parameter_sets(), base::Micros{p.loop.period_us}),
+          end{board.can, adapter} {}
+    canopen::Adapter adapter;
+    End end;
+  };
+  struct NoCanopen {
+    NoCanopen(const Board&, const param::Parameters&, const bus::Version&, const Node&) {}
+  };
   struct NoSnapshot {
     NoSnapshot(std::uint32_t, base::Micros) {}
   };
@@ -238,6 +284,7 @@ class Firmware {
   bus::SyncGuard sync_guard_;
   bus::LoopHealth health_;
   [[no_unique_address]] std::conditional_t<kWired || kSnapshots, Extras, NoExtras> extras_;
+  [[no_unique_address]] std::conditional_t<kCanopen, Canopen, NoCanopen> canopen_;
   std::int32_t conflict_ticks_ = 0;  ///< left until an id conflict is over
   std::uint64_t sync_time_us_ = 0;
   std::uint8_t sync_counter_ = 0;

@@ -113,6 +113,10 @@ class Node {
   /// Inputs consumed up to the last tick.
   [[nodiscard]] const bus::InputCrc& consumed() const { return input_crc_; }
   [[nodiscard]] const bus::Counters& counters() const { return counters_; }
+  /// Parameters as they are compiled, active and staged.
+  [[nodiscard]] const param::StagedParameters& parameter_sets() const requires kHasBusParameters<Estimators> {
+    return parameter_commands_.sets();
+  }
   [[nodiscard]] const estimators::MapFrame& map_frame() const { return map_frame_; }
   /// Records since the last tick began, of a node without a bus.
   [[nodiscard]] const auto& output() const requires(!kHasBus<Estimators>) { return publisher_; }
