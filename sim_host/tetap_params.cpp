@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // tetap-params: the table of parameters with a robot's values: as a file for --params, as JSON, as a page.
 #include "sim_host/datasheet.hpp"
+#include "sim_host/eds.hpp"
 #include "sim_host/parameter_settings.hpp"
 #include "sim_host/robots.hpp"
 #include "tetap/param/crc.hpp"
@@ -21,6 +22,7 @@ std::string help() {
          "restart,"
          " text\n"
          "  --markdown         the reference page: the same but for the robot's values\n"
+         "  --eds              the electronic data sheet (CiA 306) for clients of CANopen\n"
          "  --from-datasheet QUANTITY=NUMBER UNIT\n"
          "                     lines of such a file for an IMU's noise, alone: gyro-noise=2.8mdps/rtHz; may be given "
          "more\n"
@@ -77,7 +79,7 @@ int main(int argc, char** argv) try {
   sim::Arguments arguments(argc, argv);
   if (arguments.flag("--help") || arguments.flag("-h")) return std::fputs(help().c_str(), stdout), 0;
   const std::string robot = arguments.text("--robot").value_or("rover");
-  const bool json = arguments.flag("--json"), markdown = arguments.flag("--markdown");
+  const bool json = arguments.flag("--json"), markdown = arguments.flag("--markdown"), eds = arguments.flag("--eds");
   const auto datasheet = arguments.texts("--from-datasheet");
   const sim::ParameterSettings settings(arguments);
   arguments.finish();
@@ -87,12 +89,14 @@ int main(int argc, char** argv) try {
     for (const std::string& one : datasheet) lines += sim::datasheet_lines(one);
     return std::fputs(lines.c_str(), stdout), 0;
   }
-  if (json && markdown) throw sim::UsageError("only one of --json, --markdown");
+  if (json + markdown + eds > 1) throw sim::UsageError("only one of --json, --markdown, --eds");
   const param::Parameters values = sim::parameters_of(robot, settings);
   if (json)
     print_json(robot, values);
   else if (markdown)
     print_markdown();
+  else if (eds)
+    std::fputs(sim::electronic_data_sheet(robot, values).c_str(), stdout);
   else
     print_file(robot, values);
   return 0;
