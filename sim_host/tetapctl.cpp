@@ -2,10 +2,13 @@
 // tetapctl: reads and changes the parameters of a running node over its bus.
 #include "hal/board/linux/socket_can.hpp"
 #include "sim_host/control/parameter_client.hpp"
+#include "sim_host/control/scan.hpp"
 #include "sim_host/parameter_settings.hpp"
 #include "tetap/param/crc.hpp"
 #include "tetap/param/table.hpp"
 
+#include <algorithm>
+#include <array>
 #include <cstdio>
 #include <ctime>
 #include <exception>
@@ -21,15 +24,18 @@ using bus::ParamSource;
 
 constexpr const char* kHelp =
     "usage: tetapctl [OPTION]... COMMAND\n\nParameters of a running node whose robot takes them from the bus.\n\n"
+    "  scan               nodes on the bus: first identifier, commit, configuration, whether they take parameters\n"
     "  list               all rows with their active values\n"
     "  get PATH...        rows of these paths\n"
     "  diff               rows that are not as compiled: path, compiled value, active value\n"
     "  set PATH=VALUE...  all of these at one tick, or none\n"
     "  load FILE          the same with a file of `path = value` lines\n"
+    "  apply              makes active what is staged, by an SDO client for example\n"
+    "  save               keeps the parameters without power, where the board can\n"
     "  restore            the compiled values\n\n"
     "  --interface NAME   (default vcan0)\n"
     "  --base ID          first identifier of the node's block (default 0x300)\n"
-    "  --json             list, get, diff: a list of rows\n\n"
+    "  --json             scan, list, get, diff: a list; else an object with the result\n\n"
     "A row that needs a restart waits for a Begin frame; it is lost with the node's power: no board keeps it yet.\n"
     "Status: 0 done, 1 refused or no answer, 2 wrong command line.\n";
 
@@ -78,10 +84,30 @@ struct Printer {
   }
 };
 
-void print_result(const bus::EstParamSet& set) {
+void print_result(const bus::EstParamSet& set, bool json) {
+  if (json)
+    return void(std::printf("{\"configuration\": %u, \"words_not_as_compiled\": %u, \"rows_pending\": %u}\n",
+                            set.set_config, set.set_changed, set.set_pending));
   std::printf("done: configuration 0x%08X, %u words are not as compiled", set.set_config, set.set_changed);
   if (set.set_pending != 0) std::printf(", %u rows wait for a restart", set.set_pending);
   std::fputs("\n", stdout);
+}
+
+void print_nodes(const std::vector<sim::FoundNode>& nodes, bool json) {
+  if (nodes.empty() && !json) throw sim::ControlError("no node sends on this bus");
+  const char* separator = "[\n";
+  for (const sim::FoundNode& node : nodes) {
+    const bus::EstVersion version = node.version.value_or(bus::EstVersion{});  // commit 0: it did not come
+    const char* const dirty = version.dirty ? "-dirty" : "";
+    if (json)
+      std::printf("%s {\"base\": %u, \"commit\": \"%07x%s\", \"configuration\": %u, \"parameters\": %s}", separator,
+                  node.can_base, version.git, dirty, version.config, node.parameters ? "true" : "false");
+    else
+      std::printf("0x%03X  commit %07x%s, configuration 0x%08X, %s\n", node.can_base, version.git, dirty,
+                  version.config, node.parameters ? "takes parameters" : "takes no parameters from the bus");
+    separator = ",\n";
+  }
+  if (json) std::fputs(nodes.empty() ? "[]\n" : "\n]\n", stdout);
 }
 
 void run(const std::string& command, const std::vector<std::string>& words, sim::ParameterClient& client, bool json) {
@@ -99,14 +125,18 @@ void run(const std::string& command, const std::vector<std::string>& words, sim:
     for (const param::Row& row : param::kTable)
       if (sim::value_text(row, active) != sim::value_text(row, compiled)) printer.row(row, active, &compiled);
     printer.end();
+  } else if (command == "apply") {
+    print_result(client.apply(active), json);
+  } else if (command == "save") {
+    print_result(client.save(active), json);
   } else if (command == "restore") {
-    print_result(client.restore(active));
+    print_result(client.restore(active), json);
   } else {
     std::vector<std::string> arguments;
     for (const std::string& word : words)
       arguments.insert(arguments.end(), {command == "load" ? "--params" : "--set", word});
     sim::Arguments given(arguments);
-    print_result(client.change(active, sim::ParameterSettings(given).over(active)));
+    print_result(client.change(active, sim::ParameterSettings(given).over(active)), json);
   }
 }
 
@@ -124,20 +154,21 @@ int main(int argc, char** argv) try {
   const std::string command = words.empty() ? "" : words.front();
   if (!words.empty()) words.erase(words.begin());
   const bool needs_words = command == "get" || command == "set" || command == "load";
-  if (!needs_words && command != "list" && command != "diff" && command != "restore")
+  constexpr std::array kAlone{"scan", "list", "diff", "apply", "save", "restore"};
+  if (!needs_words && std::find(kAlone.begin(), kAlone.end(), command) == kAlone.end())
     throw sim::UsageError(command.empty() ? "no command; see tetapctl --help"
                                           : "there is no command '" + command + "'");
   if (needs_words == words.empty()) throw sim::UsageError(command + (needs_words ? " needs a path" : " takes no path"));
   if (command == "get")
     for (const std::string& path : words) static_cast<void>(row_of(path));
   hal::SocketCan can(interface);
-  sim::ParameterClient client(
-      base,
-      [&](const base::CanFrame& frame) {
-        can.send(frame);
-        can.flush();
-      },
-      [&](base::Micros patience) { return receive(can, patience); }, now);
+  const sim::ParameterClient::Send send = [&](const base::CanFrame& frame) {
+    can.send(frame);
+    can.flush();
+  };
+  const sim::ParameterClient::Receive next = [&](base::Micros patience) { return receive(can, patience); };
+  if (command == "scan") return print_nodes(sim::scan(send, next, now), json), 0;
+  sim::ParameterClient client(base, send, next, now);
   run(command, words, client, json);
   return 0;
 } catch (const tetap::sim::UsageError& error) {

@@ -134,10 +134,23 @@ bus::EstParamSet ParameterClient::change(const param::Parameters& before, const 
   exchange(words, bus::ParamSource::kStaged, [](const Word& word) {
     return bus::CmdParamSet{.set_word = word.word, .set_row_id = word.row->index, .set_value = word.value};
   });
+  return apply(before, wanted);
+}
+
+bus::EstParamSet ParameterClient::apply(const param::Parameters& before, const param::Parameters& staged) {
   constexpr std::uint32_t kName = param::StagedParameters::kName;
   return act(
-      bus::CmdParamApply{.apply_before_crc = param::crc(before) & kName, .apply_after_crc = param::crc(wanted) & kName},
-      [&](const bus::EstParamSet& told) { return told.set_config == param::crc(wanted); });
+      bus::CmdParamApply{.apply_before_crc = param::crc(before) & kName, .apply_after_crc = param::crc(staged) & kName},
+      [&](const bus::EstParamSet& told) { return told.set_config == param::crc(staged); });
+}
+
+bus::EstParamSet ParameterClient::apply(const param::Parameters& before) {
+  return apply(before, read(bus::ParamSource::kStaged));
+}
+
+bus::EstParamSet ParameterClient::save(const param::Parameters& before) {
+  return act(bus::CmdParamSave{.save_before_crc = param::crc(before) & param::StagedParameters::kName},
+             [](const bus::EstParamSet&) { return false; });
 }
 
 bus::EstParamSet ParameterClient::restore(const param::Parameters& before) {

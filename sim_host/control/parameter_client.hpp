@@ -39,6 +39,10 @@ class ParameterClient {
   /// Makes `wanted` active where it differs from `before`, which read() gave: all of it at one tick, or none. Throws
   /// ControlError with the row that the node refuses, or with the rule.
   bus::EstParamSet change(const param::Parameters& before, const param::Parameters& wanted);
+  /// Makes the staged set active as it is, whoever staged it.
+  bus::EstParamSet apply(const param::Parameters& before);
+  /// The node keeps its parameters without power. Throws ControlError where its board cannot.
+  bus::EstParamSet save(const param::Parameters& before);
   /// The compiled parameters are active again, but for those of access and identity.
   bus::EstParamSet restore(const param::Parameters& before);
 
@@ -55,6 +59,7 @@ class ParameterClient {
   /// Asks for words with `make`, and again for those that are not answered.
   template <class Make>
   void exchange(std::vector<Word>& words, bus::ParamSource source, Make&& make);
+  bus::EstParamSet apply(const param::Parameters& before, const param::Parameters& staged);
   /// `done`: whether an answer shows that an earlier attempt was obeyed.
   template <class Message, class Done>
   bus::EstParamSet act(const Message& message, Done&& done);

@@ -2,12 +2,16 @@
 // The client of parameters against a running node, over a bus that loses frames.
 #include "sim_host/control/parameter_client.hpp"
 #include "config/rover.hpp"
+#include "sim_host/control/scan.hpp"
+#include "tetap/bus/codec.hpp"
+#include "tetap/bus/e2e.hpp"
 #include "tetap/param/crc.hpp"
 #include "tetap/param/table.hpp"
 
 #include <gtest/gtest.h>
 
 #include <deque>
+#include <map>
 #include <random>
 
 namespace tetap::sim {
@@ -16,19 +20,24 @@ namespace {
 /// A node that ticks while its client waits; one frame in `lose_one_in` is lost, in either direction.
 struct Bus {
   explicit Bus(unsigned lose_one_in = 0) : lose(lose_one_in) { node.power_on({}); }
-  ParameterClient client() {
-    return {robot::rover::parameters.can_base,
-            [this](const base::CanFrame& frame) {
-              if (!lost()) node.on_frame(frame);
-            },
-            [this](base::Micros patience) -> std::optional<base::CanFrame> {
-              for (std::int64_t waited = 0; frames.empty() && waited < patience.us; waited += 10'000) tick();
-              if (frames.empty()) return std::nullopt;
-              const base::CanFrame frame = frames.front();
-              frames.pop_front();
-              return frame;
-            },
-            [this] { return base::Micros{us}; }};
+  ParameterClient client() { return {robot::rover::parameters.can_base, send(), receive(), clock()}; }
+  ParameterClient::Send send() {
+    return [this](const base::CanFrame& frame) {
+      ++asked[frame.id];
+      if (!lost()) node.on_frame(frame);
+    };
+  }
+  ParameterClient::Receive receive() {
+    return [this](base::Micros patience) -> std::optional<base::CanFrame> {
+      for (std::int64_t waited = 0; frames.empty() && waited < patience.us; waited += 10'000) tick();
+      if (frames.empty()) return std::nullopt;
+      const base::CanFrame frame = frames.front();
+      frames.pop_front();
+      return frame;
+    };
+  }
+  ParameterClient::Clock clock() {
+    return [this] { return base::Micros{us}; };
   }
   void tick() {
     us += 10'000;
@@ -42,6 +51,7 @@ struct Bus {
   std::mt19937 random{5};
   node::Node<node::WithBusParameters<robot::rover::Estimators>> node{robot::rover::parameters, {}};
   std::deque<base::CanFrame> frames;
+  std::map<std::uint32_t, int> asked;  ///< frames of the client by identifier
   std::int64_t us = 1'000'000;
 };
 
@@ -93,6 +103,40 @@ TEST(ParameterClient, SaysWhatTheNodeRefused) {
   late.gnss.gate_scale = 3;
   EXPECT_THROW(one.change(known, late), ControlError);
   EXPECT_EQ(two.read(bus::ParamSource::kActive).gnss.gate_scale, 2.0F);
+}
+
+TEST(ParameterClient, AppliesWhatIsStagedAndSaysThatNothingIsKept) {
+  Bus bus;
+  ParameterClient client = bus.client();
+  const param::Parameters before = client.read(bus::ParamSource::kActive);
+  bus::CmdParamSet set{.set_value = 0x40000000};  // 2.0
+  for (const param::Row& row : param::kTable)
+    if (std::string(row.path) == "gnss.gate_scale") set.set_row_id = row.index;
+  bus.send()(bus::frame(robot::rover::parameters.can_base, bus::protect(set)));
+  EXPECT_EQ(client.read(bus::ParamSource::kActive).gnss.gate_scale, before.gnss.gate_scale);
+  EXPECT_EQ(client.apply(before).set_changed, 1);
+  EXPECT_EQ(client.read(bus::ParamSource::kActive).gnss.gate_scale, 2.0F);
+  try {
+    client.save(before);
+    FAIL();
+  } catch (const ControlError& error) {
+    EXPECT_STREQ(error.what(), "this board keeps no parameters");
+  }
+}
+
+TEST(Scan, FindsANodeAndAsksNobodyElse) {
+  Bus bus(20);
+  // Others' frames on identifiers that would be a node's.
+  for (int i = 0; i < 100; ++i)
+    for (const std::uint32_t offset : {bus::EstEpoch::kOffset, bus::EstVersion::kOffset})
+      bus.frames.push_back({.id = 0x180 + offset, .size = 8, .data = {1, 2, 3, 4, 5, 6, 7, 8}});
+  const auto found = scan(bus.send(), bus.receive(), bus.clock());
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_EQ(found[0].can_base, robot::rover::parameters.can_base);
+  EXPECT_EQ(found[0].version->config, param::crc(robot::rover::parameters));
+  EXPECT_TRUE(found[0].parameters);
+  ASSERT_EQ(bus.asked.size(), 1U);
+  EXPECT_EQ(bus.asked.begin()->first, robot::rover::parameters.can_base + bus::CmdParamGet::kOffset);
 }
 
 TEST(ParameterClient, GivesUpWithoutANode) {
