@@ -127,7 +127,7 @@ inline void set_mounting(const param::Parameters& n, bool inertial, Parameters& 
   world.vehicle.axle_x_b_m = wide(n.inertial.axle_x_b_m);
   world.gnss.antenna_b_m = {wide(n.gnss.antenna_x_b_m), wide(n.gnss.antenna_y_b_m), wide(n.gnss.antenna_z_b_m)};
   world.imu.mounting_bs = imu_mounting(n, inertial);
-  world.imu.place_b_m = wide(n.inertial.place_b_m);
+  world.imu.position_b_m = wide(n.inertial.position_b_m);
   world.camera.x_b_m = wide(n.landmark.mounting.x_b_m);
   world.camera.y_b_m = wide(n.landmark.mounting.y_b_m);
   world.camera.yaw_rad = wide(n.landmark.mounting.yaw_rad);
@@ -162,9 +162,9 @@ inline void set_camera(const param::CameraParameters& n, FeatureCameraNumbers& c
   camera.width_px = static_cast<int>(2 * camera.cu_px + 1);
   camera.height_px = static_cast<int>(2 * camera.cv_px + 1);
   camera.mounting_bc = {wide(n.mounting_bc)};
-  camera.x_b_m = wide(n.place_b_m[0]);
-  camera.y_b_m = wide(n.place_b_m[1]);
-  camera.z_b_m = wide(n.place_b_m[2]);
+  camera.x_b_m = wide(n.position_b_m[0]);
+  camera.y_b_m = wide(n.position_b_m[1]);
+  camera.z_b_m = wide(n.position_b_m[2]);
   camera.stamp_late = {n.delay_us};
   camera.noise_px = std::min(camera.noise_px, wide(n.sigma_px));
   camera.mount_sigma_rad = std::min(camera.mount_sigma_rad, wide(n.sigma_mounting_rad));

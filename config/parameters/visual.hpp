@@ -14,7 +14,7 @@ inline constexpr param::Parameters parameters = param::checked([] {
   n.publish = {};
   n.wired = {.imu = 1, .encoders = 1};
   // 640 x 480 pixels, 70 degrees wide, above the front axle.
-  n.camera = {.fu_px = 458, .fv_px = 458, .cu_px = 319.5F, .cv_px = 239.5F, .place_b_m = {0.2F, 0.0F, 0.3F}};
+  n.camera = {.fu_px = 458, .fv_px = 458, .cu_px = 319.5F, .cv_px = 239.5F, .position_b_m = {0.2F, 0.0F, 0.3F}};
   return n;
 }());
 

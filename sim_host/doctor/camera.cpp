@@ -104,7 +104,7 @@ bool CameraDetector::moves_along() {
   if (std::abs(way_m) < kLeast_mps * (now_.time_s - before_.time_s)) return false;
   const auto from = angle_rad(before_.time_s), to = angle_rad(now_.time_s);
   const double turn_rad = from && to ? *to - *from : 0;
-  const double aside = turn_rad * static_cast<double>(robot_.parameters.camera.place_b_m[0]) / way_m;
+  const double aside = turn_rad * static_cast<double>(robot_.parameters.camera.position_b_m[0]) / way_m;
   along_c_ = unit(sum(ahead_c_, scaled(aside, left_c_)));
   return true;
 }

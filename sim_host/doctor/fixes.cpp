@@ -27,7 +27,7 @@ struct Map {
   const char* words;
 };
 
-/// Share of the squared legs that is left when the way by the fixes is mapped by `fix` and the velocity's by
+/// Share of the squared legs that is left when the distance by the fixes is mapped by `fix` and the velocity's by
 /// `velocity`.
 double left_over(const Moments<4>& m, const Map& fix, const Map& velocity) {
   const std::array<double, 4> east{fix.ee, fix.en, -velocity.ee, -velocity.en},
@@ -105,7 +105,7 @@ void VelocityDetector::finish(Findings& findings) {
          .uses = kFixes | kGnssVelocity,
          .certainty = 1 - left,
          .evidence =
-             text("Over %.0f legs of 8 s the way by the fixes fits the integral of GNSS velocity to %.0f %% with "
+             text("Over %.0f legs of 8 s the distance by the fixes fits the integral of GNSS velocity to %.0f %% with "
                   "%s, to %.0f %% as sent%s.",
                   legs_.count(), 100 * std::sqrt(left), map.words, 100 * std::sqrt(stated),
                   !known     ? ""
@@ -125,11 +125,12 @@ std::optional<SpeedRatio> VelocityDetector::ratio() const {
   const double cosine = correlation(legs_.product(0, 2) + legs_.product(1, 3), fixes2, velocity2);
   if (!(cosine > kAlike)) return std::nullopt;
   const double ratio = std::sqrt(fixes2 / velocity2);
-  return SpeedRatio{.value = ratio,
-                    .certainty = cosine,
-                    .evidence = text("The way by the fixes is %.2f times the integral of the GNSS velocity over %.0f "
-                                     "legs of 8 s.",
-                                     ratio, legs_.count())};
+  return SpeedRatio{
+      .value = ratio,
+      .certainty = cosine,
+      .evidence = text("The distance by the fixes is %.2f times the integral of the GNSS velocity over %.0f "
+                       "legs of 8 s.",
+                       ratio, legs_.count())};
 }
 
 void VelocityDetector::judge_up(Findings& findings) const {

@@ -125,7 +125,9 @@ void LatenessDetector::finish(Findings& findings) {
   if (best == 0 || best + 1 == kDelays || left[best] > 1 - kLateFollows * kLateFollows) return;
   const double bend = left[best - 1] - 2 * left[best] + left[best + 1];
   const double between = bend > 0 ? 0.5 * (left[best - 1] - left[best + 1]) / bend : 0;
-  const double late_s = kStep_s * (static_cast<double>(best) - kAhead + between);
+  const double measured_s = kStep_s * (static_cast<double>(best) - kAhead + between);
+  const double stated_us = path_.robot().parameters.gnss.delay_us;
+  const double late_s = measured_s - 1e-6 * stated_us;  // beyond what the robot states
   const double likelier = 0.5 * speeds_[0].count() * std::log(left[kAhead] / std::max(left[best], 1e-9));
   const double interval_s = (last_s_ - first_s_.value_or(last_s_)) / std::max(1, velocities_ - 1);
   if (late_s < kLeastLate_s + kShareOfInterval * interval_s || likelier < kLikelier) return;
@@ -135,9 +137,12 @@ void LatenessDetector::finish(Findings& findings) {
        .evidence =
            text("The GNSS velocity fits the wheels' speed %.0f ms before its stamp (correlation %.3f, %.3f at the "
                 "stamp; %.0f samples, %d changes of speed by 1 m/s).",
-                1e3 * late_s, std::sqrt(1 - left[best]), std::sqrt(1 - left[kAhead]), speeds_[0].count(), changes_),
-       .change = text("Stamp fixes and velocities with the time for which they hold, %.0f ms earlier.", 1e3 * late_s),
-       .spoils = late_s > kSpoils_s ? Devices{kFixes | kGnssVelocity} : Devices{kNoDevice}});
+                1e3 * measured_s, std::sqrt(1 - left[best]), std::sqrt(1 - left[kAhead]), speeds_[0].count(), changes_),
+       .change =
+           text("Stamp fixes and velocities with the time for which they hold, %.0f ms earlier, or set gnss.delay_us.",
+                1e3 * late_s),
+       .spoils = late_s > kSpoils_s ? Devices{kFixes | kGnssVelocity} : Devices{kNoDevice},
+       .remedies = {{{.path = "gnss.delay_us", .values = {stated_us + 1e3 * std::round(1e3 * late_s)}}}}});
 }
 
 }  // namespace tetap::doctor

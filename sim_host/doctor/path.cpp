@@ -136,14 +136,15 @@ void PathDetector::finish(Findings& findings) {
                               "the longitude's sign changed"};
   for (std::size_t i = 0; i < kOf.size(); ++i) {
     if (left_[i + 1] > kPathAsGood * best) continue;
-    findings.push_back({.code = kOf[i],
-                        .uses = kFixes | kWheels | kGyroscope,
-                        .certainty = 0.9 - left_[i + 1] / pairs_,
-                        .evidence = text("Over %.0f pairs of chords the way by the fixes fits the path of wheels%s to "
-                                         "%.2f (RMS of angle and ratio) with %s, to %.2f as sent.",
-                                         pairs_, gyroscope_ ? " and gyroscope" : "", std::sqrt(left_[i + 1] / pairs_),
-                                         kWords[i], std::sqrt(left_[0] / pairs_)),
-                        .change = {}});
+    findings.push_back(
+        {.code = kOf[i],
+         .uses = kFixes | kWheels | kGyroscope,
+         .certainty = 0.9 - left_[i + 1] / pairs_,
+         .evidence = text("Over %.0f pairs of chords the distance by the fixes fits the path of wheels%s to "
+                          "%.2f (RMS of angle and ratio) with %s, to %.2f as sent.",
+                          pairs_, gyroscope_ ? " and gyroscope" : "", std::sqrt(left_[i + 1] / pairs_), kWords[i],
+                          std::sqrt(left_[0] / pairs_)),
+         .change = {}});
   }
 }
 

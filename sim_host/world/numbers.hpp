@@ -82,7 +82,7 @@ struct ImuParameters {
   bool earth_rotation = true;
   double temperature_degC = 31;
   Matrix3 mounting_bs;  ///< from the sensor's axes into the body's
-  Vector3 place_b_m{};
+  Vector3 position_b_m{};
   /// Errors that a calibration of the robot has found, in the sensor's axes: it shows matrix^-1 y + bias for y.
   Matrix3 accel_matrix;
   Vector3 accel_bias_mps2{};

@@ -54,12 +54,12 @@ void Imu::sense(const Motion& motion, double speed_mps, base::Micros now, const 
   }
   const Matrix3 to_b = rotation(motion.attitude_rad).transposed();
   const Vector3 coriolis = 2 * cross(earth_rate_n_radps_, motion.velocity_n_mps);
-  const Vector3& place_b_m = parameters_.place_b_m;
+  const Vector3& position_b_m = parameters_.position_b_m;
   const Vector3& rate_b_radps = motion.rate_b_radps;
   Vector3 force_b = to_b * (motion.acceleration_n_mps2 + coriolis - gravity_n_mps2_);
-  if (place_b_m != Vector3{}) {
+  if (position_b_m != Vector3{}) {
     const Vector3 turned = (1 / kSensorsStep_s) * (rate_b_radps - last_rate_radps_.value_or(rate_b_radps));
-    force_b = force_b + cross(turned, place_b_m) + cross(rate_b_radps, cross(rate_b_radps, place_b_m));
+    force_b = force_b + cross(turned, position_b_m) + cross(rate_b_radps, cross(rate_b_radps, position_b_m));
   }
   last_rate_radps_ = rate_b_radps;
   Vector3 force = body_to_sensor_ * force_b;

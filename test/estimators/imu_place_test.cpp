@@ -44,9 +44,9 @@ float single(double x) { return static_cast<float>(x); }
 
 class Robot {
  public:
-  explicit Robot(const Vector& place_b_m) : place_b_m_(place_b_m) {
+  explicit Robot(const Vector& position_b_m) : position_b_m_(position_b_m) {
     n.wheels.drive = {.left_radius_m = 0.1F, .right_radius_m = 0.1F, .track_m = 0.5F, .counts_per_turn = 20'000};
-    n.inertial.place_b_m = {single(place_b_m(0)), single(place_b_m(1)), single(place_b_m(2))};
+    n.inertial.position_b_m = {single(position_b_m(0)), single(position_b_m(1)), single(position_b_m(2))};
     n.inertial.stuck_samples = 0;  // without noise, every standing IMU is stuck
     map_frame.frame = nav::LocalFrame(24'131'350'000, 5'834'150'000, 500.0F);
     map_frame.origin = sensor::OriginSource::kConfigured;
@@ -91,7 +91,9 @@ class Robot {
   [[nodiscard]] double off_m() const { return (place(inertial.inertial(ctx()).state) - place_m).norm(); }
   [[nodiscard]] double off_mps() const {
     const nav::Vector3& v = inertial.inertial(ctx()).state.v_n_mps;
-    return (Vector(v(0), v(1), v(2)) - Path::velocity(1e-6 * static_cast<double>(us))).norm();
+    return (Vector(static_cast<double>(v(0)), static_cast<double>(v(1)), static_cast<double>(v(2))) -
+            Path::velocity(1e-6 * static_cast<double>(us)))
+        .norm();
   }
   template <class Quaternion>
   [[nodiscard]] static double degrees(const Quaternion& q, const Quaternion& from) {
@@ -110,7 +112,7 @@ class Robot {
   /// Derivatives by the central difference: right to 1e-8.
   [[nodiscard]] Vector velocity_of_imu(double t) const {
     constexpr double h = 1e-4;
-    return Path::velocity(t) + (Path::attitude(t + h) - Path::attitude(t - h)) * place_b_m_ / (2 * h);
+    return Path::velocity(t) + (Path::attitude(t + h) - Path::attitude(t - h)) * position_b_m_ / (2 * h);
   }
   [[nodiscard]] static double yaw_rate(double t) {
     constexpr double h = 1e-4;
@@ -139,7 +141,7 @@ class Robot {
     attitude.advance({us}, ctx(), window_);
   }
 
-  Vector place_b_m_;
+  Vector position_b_m_;
   double gravity_mps2_ = 0;
   std::vector<sensor::Sample> window_;
 };

@@ -46,7 +46,7 @@ class RoadOf {
     numbers_.camera.fv_px = drive.camera.fv_px;
     numbers_.camera.cu_px = drive.camera.cu_px;
     numbers_.camera.cv_px = drive.camera.cv_px;
-    for (int i = 0; i < 3; ++i) numbers_.camera.place_b_m[static_cast<std::size_t>(i)] = drive.mounting.lever_b_m(i);
+    for (int i = 0; i < 3; ++i) numbers_.camera.position_b_m[static_cast<std::size_t>(i)] = drive.mounting.lever_b_m(i);
     numbers_.camera.sigma_px = static_cast<float>(o.sigma_px);
     numbers_.publish.diagnostics_every = 1;
     numbers_.publish.event_every = 1;

@@ -143,7 +143,7 @@ TEST(Imu, away_from_the_origin_it_swings_round_it) {
   parameters.earth_rotation = false;
   parameters.gyro_noise = 0;
   parameters.accel_noise = {};
-  parameters.place_b_m = {0.4, -0.3, 0.2};
+  parameters.position_b_m = {0.4, -0.3, 0.2};
   Imu imu{parameters, 0.1, kEarth, 7};
   Motion motion;
   base::Micros now;

@@ -594,9 +594,9 @@ class Doctor(unittest.TestCase):
         for code, mistake, arguments in (("wheel_scale", lambda f: scale_wheels(f, 1.3), []), ("track_width", lambda f: scale_turn(f, 1.5), []),
                                          ("wheels_unequal", lambda f: scale_wheel(f, "Left", 1.2), []), ("imu_upside_down", lambda f: turn_imu(f, ABOUT_X), []),
                                          ("imu_axes", lambda f: turn_imu(f, about(2, 45)), []), ("imu_axes", lambda f: turn_imu(f, about(1, 50)), []),
-                                         ("antenna_arm", lambda f: f, set_antenna)):
+                                         ("antenna_arm", lambda f: f, set_antenna), ("receiver_late", late(0.4), [])):
             with self.subTest(code):
-                frames = mistake(self.logs.frames("yard"))
+                frames = mistake(self.logs.frames("tour" if code == "receiver_late" else "yard"))
                 remedies = next(one["try"] for one in self.examine(frames, "rover", *arguments) if one["code"] == code)
                 self.assertIn(len(remedies), (1, 2))
                 left = []

@@ -86,7 +86,7 @@ class Room(unittest.TestCase):
             cv2.imwrite(cls.path("images", f"{i:04}.png"), room.image(paint, (x_m, y_m), yaw_rad, noise))
         with open(cls.path("drive.log"), "wb") as file:
             file.write(drive_log())
-        more = {"camera.place_b_m": " ".join(map(str, room.MOUNT_M)), "wheels.noise.speed": 0.001, "gyro.noise": 1e-4, "wired.imu": 0, "wired.encoders": 0}
+        more = {"camera.position_b_m": " ".join(map(str, room.MOUNT_M)), "wheels.noise.speed": 0.001, "gyro.noise": 1e-4, "wired.imu": 0, "wired.encoders": 0}
         with open(cls.path("room.params"), "w", encoding="utf-8") as file:
             file.writelines(f"{name} = {value}\n" for name, value in (CAMERA | more).items())
         cls.done = tool(cls.path("images"), cls.path("seen.log"), "--params", cls.path("room.params"), "--rate", str(RATE_HZ), "--start", str(START_US / 1e6),

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// node features.mjs PUPPETEER PAGE.html OUT CASES: what a user does beside a log of a known robot. CASES {tables: [{file, robot, sha, frames}], unknown: {file, robot, sha}, larger: {file, radius_m},
+// node features.mjs PUPPETEER PAGE.html OUT CASES: what a user does beside a log of a known robot. CASES {tables: [{file, robot, sha, frames}], unknown: {file, robot, sha}, larger: {file, radius_m}, long: {file, sha},
 // rover: {log, sha, mcap}}, hashes and counts as the host's programs have them. A picture of each view goes to OUT. Status 1 where something differs.
 import { readFileSync } from "node:fs";
 import { session } from "./session.mjs";
 
 const [modules, file, out, cases] = process.argv.slice(2);
-const { tables, unknown, larger, rover } = JSON.parse(readFileSync(cases, "utf8"));
+const { tables, unknown, larger, long, rover } = JSON.parse(readFileSync(cases, "utf8"));
 const { page, expect, data, picture, untilState, settled, diagnosed, upload, end } = await session(modules, file, out, { serial: true });
 const text = (selector) => page.$eval(selector, (one) => one.textContent).catch(() => "");
 const open = (path) => upload(...[path].flat());
@@ -165,6 +165,14 @@ await untilState("ready");
 await open(rover.log);
 await page.waitForFunction((sha) => document.body.dataset.second === sha, { timeout: 60000 }, second).catch(() => {});
 expect((await data()).second === second, `a link carries settings to the first log (${second.slice(0, 12)})`);
+
+// A log of half an hour: its beginning at once, then all of it.
+await open(long.file);
+await page.waitForFunction(() => document.body.dataset.beginning, { timeout: 60000 });
+expect((await data()).state === "busy" && (await page.$$eval("#views canvas", (all) => all.length)) > 3, `the beginning is shown while the rest is played: ${await text("#bits .warning")}`);
+await picture("beginning");
+await untilState("done");
+expect((await data()).sha === long.sha && (await data()).different === "0", `a long log: the host's run to the bit (${(await data()).status})`);
 
 // 390 pixels, dark, Indonesian.
 await page.setViewport({ width: 390, height: 844 });

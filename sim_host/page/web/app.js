@@ -201,6 +201,7 @@ class App {
     this.note = say("open.beginning", (part.size / 1e6).toFixed(0), (this.file.size / 1e6).toFixed(0));
     this.view.reset(this.run.span);
     this.render();
+    $("status").scrollIntoView();
     document.body.dataset.beginning = "yes";
     this.note = "";
   }

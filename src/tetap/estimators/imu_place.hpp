@@ -12,7 +12,8 @@ namespace tetap::estimators {
 /// Turn rates are in body axes and without bias [rad/s]. An IMU at the origin costs a comparison, and changes no bit.
 class ImuPlace {
  public:
-  explicit ImuPlace(const param::InertialParameters& n) : b_m_{n.place_b_m[0], n.place_b_m[1], n.place_b_m[2]} {}
+  explicit ImuPlace(const param::InertialParameters& n)
+      : b_m_{n.position_b_m[0], n.position_b_m[1], n.position_b_m[2]} {}
 
   [[nodiscard]] bool is_origin() const { return b_m_.squaredNorm() <= 0.0F; }
   /// Velocity that the IMU gains beyond the origin in an increment that turns by dtheta, in the axes at its begin
@@ -21,10 +22,10 @@ class ImuPlace {
                                        const nav::Vector3& after_b_radps) const {
     return nav::exp_quaternion(dtheta_b_rad).rotate(nav::cross(after_b_radps, b_m_)) - nav::cross(before_b_radps, b_m_);
   }
-  /// Way of the origin in an increment, beyond the trapezoid of velocities that swing_mps() was taken out of, in the
-  /// axes at its end [m]: rates at the ends show a turn within the increment to second order only.
-  [[nodiscard]] nav::Vector3 way_m(const nav::Vector3& dtheta_b_rad, float dt_s, const nav::Vector3& before_b_radps,
-                                   const nav::Vector3& after_b_radps) const {
+  /// Displacement of the origin in an increment, beyond the trapezoid of velocities that swing_mps() was taken out of,
+  /// in the axes at its end [m]: rates at the ends show a turn within the increment to second order only.
+  [[nodiscard]] nav::Vector3 moved_m(const nav::Vector3& dtheta_b_rad, float dt_s, const nav::Vector3& before_b_radps,
+                                     const nav::Vector3& after_b_radps) const {
     const nav::Quaternion back = nav::exp_quaternion(-dtheta_b_rad);
     const nav::Vector3 sum = back.rotate(nav::cross(before_b_radps, b_m_)) + nav::cross(after_b_radps, b_m_);
     return (0.5F * dt_s) * sum + back.rotate(b_m_) - b_m_;

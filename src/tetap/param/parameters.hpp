@@ -125,7 +125,7 @@ struct InertialParameters {
   std::int32_t imu = 0;  ///< instance of the IMU
   /// From the sensor's axes into the body's, row by row: x forward, y left, z up.
   std::array<float, 9> mounting_bs{1, 0, 0, 0, 1, 0, 0, 0, 1};
-  std::array<float, 3> place_b_m{0, 0, 0};  ///< the IMU in the body
+  std::array<float, 3> position_b_m{0, 0, 0};  ///< the IMU in the body
   float gyro_radps_rthz = 5e-5F;            ///< ICM-42688-P, DS-000347 table 1: 0.0028 deg/s/sqrt(Hz)
   float accel_mps2_rthz = 7e-4F;            ///< table 2: 70 ug/sqrt(Hz)
   float gyro_scale = 0.003F;                ///< 1 sigma of its scale; table 1: initial tolerance 0.5 %
@@ -265,7 +265,7 @@ struct CameraParameters {
   float cv_px = 0;
   /// From the camera's axes into the body's, row by row; a camera that looks ahead.
   std::array<float, 9> mounting_bc{0, 0, 1, -1, 0, 0, 0, -1, 0};
-  std::array<float, 3> place_b_m{0, 0, 0};
+  std::array<float, 3> position_b_m{0, 0, 0};
   std::int32_t delay_us = 0;          ///< from the middle of the exposure to the stamp
   float sigma_px = 1.2F;              ///< a feature's noise, per axis; a track's errors are alike from image to image
   float sigma_mounting_rad = 0.003F;  ///< 1 sigma of the mounting, per axis

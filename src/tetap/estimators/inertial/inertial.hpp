@@ -115,8 +115,8 @@ class InertialWith {
   Innovation align(const nav::ImuIncrement& increment, base::Micros pause, base::Micros stamp, const Context& ctx);
   [[nodiscard]] nav::Vector3 to_origin(nav::ImuIncrement& increment, const nav::Vector3& before_b_radps,
                                        const param::InertialParameters& n) const;
-  Innovation propagate(const sensor::ImuSample& sample, const nav::ImuIncrement& increment, const nav::Vector3& way_b_m,
-                       base::Micros stamp, const Context& ctx);
+  Innovation propagate(const sensor::ImuSample& sample, const nav::ImuIncrement& increment,
+                       const nav::Vector3& moved_b_m, base::Micros stamp, const Context& ctx);
   void bridge(base::Micros gap, const Context& ctx);
   void bridge_lost_samples(base::Micros gap, const Context& ctx);
   void follow_level(const Context& ctx);

@@ -30,14 +30,14 @@ Innovation InertialWith<Watch>::fuse(const sensor::ImuSample& sample, base::Micr
   const bool follows = found == checks::ImuClass::kContiguous;
   const nav::Vector3 before_b_radps = follows ? imu_.end_rate_b_radps() : rate_b_radps;
   follows ? imu_.follow_rate(rate_b_radps) : imu_.set_rate(rate_b_radps);
-  const nav::Vector3 way_b_m = to_origin(increment, before_b_radps, n);
+  const nav::Vector3 moved_b_m = to_origin(increment, before_b_radps, n);
   if (!tracking()) return align(increment, pause, stamp, ctx);
   if (found == checks::ImuClass::kOverlapping) {
     predictor_.note_correction();
     return {.verdict = sensor::Verdict::kStale, .failed = Check::kTime};
   }
   if (found == checks::ImuClass::kAfterGap) bridge_lost_samples(pause, ctx);
-  return propagate(sample, increment, way_b_m, stamp, ctx);
+  return propagate(sample, increment, moved_b_m, stamp, ctx);
 }
 
 /// Takes the IMU's swing round the origin out of the increment. Gives what the position is to be moved by beside, in
@@ -52,7 +52,7 @@ template <class Watch>
   const nav::Vector3 turn_b_rad = increment.dtheta_b_rad - ins_.x.b_g_radps * dt_s;
   const nav::Vector3 before = before_b_radps - ins_.x.b_g_radps, after = imu_.end_rate_b_radps() - ins_.x.b_g_radps;
   increment.dv_b_mps -= place.swing_mps(turn_b_rad, before, after);
-  return place.way_m(turn_b_rad, dt_s, before, after);
+  return place.moved_m(turn_b_rad, dt_s, before, after);
 }
 
 /// Repetitions before this one were taken for motion.
@@ -88,7 +88,7 @@ void InertialWith<Watch>::bridge_lost_samples(base::Micros gap, const Context& c
 
 template <class Watch>
 Innovation InertialWith<Watch>::propagate(const sensor::ImuSample& sample, const nav::ImuIncrement& increment,
-                                          const nav::Vector3& way_b_m, base::Micros stamp, const Context& ctx) {
+                                          const nav::Vector3& moved_b_m, base::Micros stamp, const Context& ctx) {
   const param::InertialParameters& n = ctx.parameters.inertial;
   const float dt_s = base::seconds(increment.dt);
   const float up_b = ins_.x.q_nb.rotated_x().dot(ins_.earth.up_n);  // share of gravity's reaction that points forward
@@ -101,7 +101,7 @@ Innovation InertialWith<Watch>::propagate(const sensor::ImuSample& sample, const
     time_ = stamp;
     return {.verdict = sensor::Verdict::kNotFinite, .failed = Check::kValue};
   }
-  if (!ImuPlace(n).is_origin()) nav::move(ins_.x, ins_.x.q_nb.rotate(way_b_m));
+  if (!ImuPlace(n).is_origin()) nav::move(ins_.x, ins_.x.q_nb.rotate(moved_b_m));
   ins_.vibration = imu_.health().vibration().noise_factor(n);
   if (ins_.pending_s() >= predictor_.schedule().covariance_every_s()) ins_.predict_covariance(watch_.bank());
   if (sample.clipped_accel > 0 || sample.clipped_gyro > 0) inflate_clipped(sample, dt_s, n);

@@ -37,7 +37,7 @@ SWAPPED = {"In_WheelCounts": ("Left", "Right"), "In_WheelSpeed": ("Left", "Right
 # The same of parameters: scalars, signs of vectors, matrices M to S M S, and pairs.
 NEGATED_PARAMETERS = ("gnss.antenna_y_b_m", "landmark.mounting.y_b_m", "landmark.mounting.yaw_rad", "start.y_m", "start.yaw_rad",
                       "magnetic.declination_rad", "gnss.origin_latitude_deg")
-VECTORS = {"gnss.baseline_b_m": POLAR, "gyro.up_s": POLAR, "imu.accel_bias_mps2": POLAR, "inertial.place_b_m": POLAR, "imu.gyro_bias_radps": AXIAL,
+VECTORS = {"gnss.baseline_b_m": POLAR, "gyro.up_s": POLAR, "imu.accel_bias_mps2": POLAR, "inertial.position_b_m": POLAR, "imu.gyro_bias_radps": AXIAL,
            "imu.gyro_bias_slope_radps_per_degC": AXIAL, "magnetic.hard_iron_uT": AXIAL}
 MATRICES = ("imu.accel_matrix", "inertial.mounting_bs", "magnetic.mounting_bs", "magnetic.soft_iron")
 PAIRS = (("wheels.drive.left_radius_m", "wheels.drive.right_radius_m"), ("wheels.drive.noise_left", "wheels.drive.noise_right"),
