@@ -27,7 +27,7 @@ struct Finding {
   std::string change;            ///< empty: as the table has it
   Devices spoils = 0;            ///< 0: as the table has it
   std::optional<Code> beside{};  ///< the same comparison fits that code as well: the two are named one after the other
-  std::vector<Remedy> remedies{};  ///< each whole; several where the log does not tell which one
+  std::vector<Remedy> remedies{};  ///< each whole; several where the log shows no single one
 };
 using Findings = std::vector<Finding>;
 

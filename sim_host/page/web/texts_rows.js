@@ -223,7 +223,7 @@ export const ROWS_ID = {
   "camera.cu_px": "Kolom piksel titik utama, yang dilalui sumbu kamera.",
   "camera.cv_px": "Baris piksel titik utama, yang dilalui sumbu kamera.",
   "camera.mounting_bc": "Rotasi dari sumbu kamera (z arah pandang, x kanan, y bawah) ke sumbu badan.",
-  "camera.place_b_m": "Posisi kamera pada badan.",
+  "camera.position_b_m": "Posisi kamera pada badan.",
   "camera.delay_us": "Waktu dari tengah eksposur sampai timestamp gambar.",
   "camera.sigma_px": "1 sigma posisi fitur, tiap sumbu.",
   "camera.sigma_mounting_rad": "1 sigma sudut pemasangan kamera, tiap sumbu.",
