@@ -126,10 +126,10 @@ struct InertialParameters {
   /// From the sensor's axes into the body's, row by row: x forward, y left, z up.
   std::array<float, 9> mounting_bs{1, 0, 0, 0, 1, 0, 0, 0, 1};
   std::array<float, 3> position_b_m{0, 0, 0};  ///< the IMU in the body
-  float gyro_radps_rthz = 5e-5F;            ///< ICM-42688-P, DS-000347 table 1: 0.0028 deg/s/sqrt(Hz)
-  float accel_mps2_rthz = 7e-4F;            ///< table 2: 70 ug/sqrt(Hz)
-  float gyro_scale = 0.003F;                ///< 1 sigma of its scale; table 1: initial tolerance 0.5 %
-  float gyro_bias_radps2_rthz = 1e-5F;      ///< random walk of the bias
+  float gyro_radps_rthz = 5e-5F;               ///< ICM-42688-P, DS-000347 table 1: 0.0028 deg/s/sqrt(Hz)
+  float accel_mps2_rthz = 7e-4F;               ///< table 2: 70 ug/sqrt(Hz)
+  float gyro_scale = 0.003F;                   ///< 1 sigma of its scale; table 1: initial tolerance 0.5 %
+  float gyro_bias_radps2_rthz = 1e-5F;         ///< random walk of the bias
   float accel_bias_mps3_rthz = 2e-4F;
   float gyro_turn_on_radps = 0.01F;  ///< 1 sigma of the bias at start
   float accel_turn_on_mps2 = 0.2F;

@@ -41,10 +41,11 @@ nav::Quaternion q_cb(const std::array<float, 9>& mounting_bc) {
 }
 
 slam::VisualOptions options_of(const param::CameraParameters& n) {
-  return {.camera = {.fu_px = n.fu_px, .fv_px = n.fv_px, .cu_px = n.cu_px, .cv_px = n.cv_px},
-          .mounting = {.q_cb = q_cb(n.mounting_bc), .lever_b_m = {n.position_b_m[0], n.position_b_m[1], n.position_b_m[2]}},
-          .sigma_px = n.sigma_px,
-          .sigma_mounting_rad = n.sigma_mounting_rad};
+  return {
+      .camera = {.fu_px = n.fu_px, .fv_px = n.fv_px, .cu_px = n.cu_px, .cv_px = n.cv_px},
+      .mounting = {.q_cb = q_cb(n.mounting_bc), .lever_b_m = {n.position_b_m[0], n.position_b_m[1], n.position_b_m[2]}},
+      .sigma_px = n.sigma_px,
+      .sigma_mounting_rad = n.sigma_mounting_rad};
 }
 /// Noise of speed and turn comes with each step of the dead reckoning.
 slam::SpeedNoise noise_of(const param::CameraParameters& n) {
