@@ -17,7 +17,8 @@ class Moved {
   /// An increment up to a time. A time that goes back, or a pause, begins anew.
   void add(double time_s, const Step& step) {
     constexpr double kLongestPause_s = 0.5;
-    if (!sums_.empty() && (time_s <= sums_.back().time_s || time_s > sums_.back().time_s + kLongestPause_s)) sums_.clear();
+    if (!sums_.empty() && (time_s <= sums_.back().time_s || time_s > sums_.back().time_s + kLongestPause_s))
+      sums_.clear();
     const Sum before = sums_.empty() ? Sum{} : sums_.back();
     sums_.push_back({time_s, before.way_m + step.way_m, before.turn_rad + step.turn_rad});
     while (sums_.front().time_s < time_s - kHistory_s || sums_.size() > kMost) sums_.pop_front();
