@@ -20,14 +20,14 @@ struct CloningEkf : PlanarEkf {
   auto update(const Measurement& z, const Gate& gate) {
     const model::PlanarPose before = x;
     const filter::Symmetric<float, 3> p_before = p;
-    const auto record = PlanarEkf::update(z, gate);
+    auto record = PlanarEkf::update(z, gate);
     if (record.verdict == filter::Verdict::kAccepted) clones.correct(before, p_before, x, p);
     return record;
   }
   /// A displacement from the clone of that number; false positives of the gate leave everything as it is.
   [[nodiscard]] filter::Innovation<float, 3> update_relative(const sensor::RelativePose& z, int from,
                                                              float gate_scale) {
-    const auto record = clones.update(z, from, x, p, gate_scale);
+    auto record = clones.update(z, from, x, p, gate_scale);
     if (!filter::well_conditioned(p)) {
       filter::restore(p);
       clones.forget();
