@@ -12,6 +12,7 @@
 #include "tetap/estimators/inertial/propagation.cpp"
 #include "tetap/estimators/inertial/start.cpp"
 #include "tetap/estimators/inertial/tick.cpp"
+#include "tetap/estimators/inertial/with_watch.cpp"
 #include "tetap/estimators/mapping/graph_mapper.cpp"
 #include "tetap/estimators/mapping/planar_mapper.cpp"
 #include "tetap/estimators/mapping/scan_localizer.cpp"
