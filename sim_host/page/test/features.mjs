@@ -48,7 +48,8 @@ expect((await data()).sha === unknown.sha, "the offer that was taken: the host's
 // A robot whose wheels are larger than the page's: the doctor's numbers are tried, and are nearly those of the robot.
 await open(larger.file);
 await untilState("asks");
-await page.click("#ask [data-offer=rover]");
+await page.waitForSelector("#ask [data-offer=rover]", { visible: true, timeout: 20000 });
+await page.$eval("#ask [data-offer=rover]", (button) => button.click()); // the page may still scroll
 await untilState("done");
 await diagnosed();
 await page.waitForSelector("[data-try=wheel_scale]");

@@ -164,7 +164,7 @@ class App {
   /** The page knows no robot with the log's numbers: which one is to be played is the user's word. */
   ask() {
     $("views").hidden = true;
-    renderAsk($("ask"), this.about.robots, this.identity, (robot) => this.chooseRobot(robot).then(() => ($("ask").hidden = true)));
+    renderAsk($("ask"), this.about.robots, this.identity, (robot) => (($("ask").hidden = true), this.chooseRobot(robot)));
     this.status(() => say("ask.status", this.file.name), "asks");
     this.renderRobots();
   }
