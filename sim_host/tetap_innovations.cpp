@@ -3,6 +3,7 @@
 // the innovations of every update. It sees what a build with TETAP_VIEWS shows; the estimates are those of the robot.
 #include "sim_host/parameter_settings.hpp"
 #include "sim_host/replay/complaint.hpp"
+#include "sim_host/replay/line.hpp"
 #include "sim_host/replay/lockstep.hpp"
 #include "sim_host/replay/memory_node.hpp"
 #include "sim_host/replay/survey.hpp"
@@ -102,15 +103,6 @@ void play(const Input& input, const sim::Robot& robot, const param::Parameters& 
       heard.log.terms());
 }
 
-std::string quoted(const std::string& text) {
-  std::string json = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\') json += '\\';
-    json += static_cast<unsigned char>(c) < ' ' ? ' ' : c;
-  }
-  return json + '"';
-}
-
 }  // namespace
 
 int main(int argc, char** argv) try {
@@ -136,7 +128,7 @@ int main(int argc, char** argv) try {
       for (std::string word; words >> word;) settings.set(word, word);
       parameters = settings.over(begun);
     } catch (const sim::UsageError& error) {
-      for (std::size_t i = 0; i < inputs.size(); ++i) put("{\"refused\": " + quoted(error.what()) + "}", {});
+      for (std::size_t i = 0; i < inputs.size(); ++i) put("{\"refused\": " + sim::quoted(error.what()) + "}", {});
       continue;
     }
     parameters = sim::MemoryNode::for_player(parameters, begun.can_base);
