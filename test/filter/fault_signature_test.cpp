@@ -104,7 +104,7 @@ struct Watch {
     filter::whiten(l, w);
     signature->score(w, std::array<float, kM>{y(0), y(1)});
   }
-  void gains(const auto& g) { signature->correct(g, w); }
+  void gains(const auto& g) { filter::correct(signature, std::array<std::array<float, kM>, 1>{w}, g); }
 };
 
 /// The filter knows nothing of the fault.

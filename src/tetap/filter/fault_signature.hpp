@@ -54,18 +54,6 @@ class FaultSignature {
     information += share * ww;
     weighted += share * wy;
   }
-  /// The measurement was used, with gains G = P H^T L^-T: G(n, j) of error n.
-  template <class Gains, std::size_t M>
-  constexpr void correct(const Gains& gains, const std::array<Scalar, M>& w) {
-#pragma GCC unroll 5
-    for (int n = 0; n < N; ++n) {
-      Scalar left = phi[static_cast<std::size_t>(n)];
-#pragma GCC unroll 4
-      for (std::size_t j = 0; j < M; ++j)
-        left = base::subtract_product(left, Scalar{gains(n, static_cast<int>(j))}, w[j]);
-      phi[static_cast<std::size_t>(n)] = left;
-    }
-  }
   [[nodiscard]] constexpr Scalar size() const { return weighted / information; }
   [[nodiscard]] constexpr Scalar variance() const { return Scalar{1} / information; }
   /// Twice the logarithm of the likelihood ratio to "no fault", for the prior N(0, largest^2).
@@ -81,6 +69,24 @@ class FaultSignature {
   Scalar weighted{0};     ///< b: size times information
   Scalar age_s{0};
 };
+
+/// A measurement was used, with gains G = P H^T L^-T: G(n, j) of error n. It moves the signatures from `first`
+/// on, each by its own w; a gain is read once for all of them.
+template <class Scalar, int N, std::size_t kCount, std::size_t M, class Gains>
+[[gnu::always_inline]] inline void correct(FaultSignature<Scalar, N>* first,
+                                           const std::array<std::array<Scalar, M>, kCount>& w, const Gains& gains) {
+  for (int n = 0; n < N; ++n) {
+    std::array<Scalar, M> gain;
+#pragma GCC unroll 4
+    for (std::size_t j = 0; j < M; ++j) gain[j] = gains(n, static_cast<int>(j));
+#pragma GCC unroll 4
+    for (std::size_t i = 0; i < kCount; ++i) {
+      Scalar& phi = first[i].phi[static_cast<std::size_t>(n)];
+#pragma GCC unroll 4
+      for (std::size_t j = 0; j < M; ++j) phi = base::subtract_product(phi, gain[j], w[i][j]);
+    }
+  }
+}
 
 /// P += scale phi phi^T.
 template <class Scalar, int N>

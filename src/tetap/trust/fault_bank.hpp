@@ -42,7 +42,7 @@ inline constexpr std::array<float, M * M> kIdentity = [] {
   return h;
 }();
 
-/// `Table` has kErrors, kRows, predict(phi, step), which is phi <- F phi + Gamma for a step of its filter, and
+/// `Table` has kErrors, kRows, predict(row, phi, step), which is phi <- F phi + Gamma for a step of its filter, and
 /// shown_by<Measurement>(): the rows of the measurement's own faults.
 template <class Table>
 class FaultBank {
@@ -68,7 +68,8 @@ class FaultBank {
     for (Signature& one : signatures_) f(one.phi);
   }
   template <class Step>
-  [[gnu::noinline]] void predict(const Step& step) {
+  [[gnu::noinline]] void predict(const Step& given) {
+    const Step step = given;  // no signature can be part of it: read once for all rows
     for (std::size_t i = 0; i < kRows; ++i) Table::predict(row(i), signatures_[i].phi, step);
   }
 
@@ -148,9 +149,7 @@ class FaultBank {
   [[nodiscard]] float weight(std::size_t i) const { return weights_[i]; }
   [[nodiscard]] const Signature& signature(std::size_t i) const { return signatures_[i]; }
   /// J, prior odds included: the fault begins within the time after which its row begins anew.
-  [[nodiscard]] float evidence(std::size_t i) const {
-    return signatures_[i].evidence(row(i).largest) + 2.0F * base::log(row(i).per_hour * (kAge_s / 3600.0F));
-  }
+  [[nodiscard]] float evidence(std::size_t i) const { return signatures_[i].evidence(row(i).largest) + kPriorOdds[i]; }
   static constexpr auto members(auto& self) {
     return base::members(base::in_turns(self.signatures_), base::in_turns(self.weights_));
   }
@@ -159,29 +158,52 @@ class FaultBank {
   static constexpr float kLeastWeight = 0.01F;  ///< less likely rows are in no mixture
 
  private:
-  /// Every signature sees the innovation, and is moved by the gains of a measurement that is used.
+  /// Every signature sees the innovation, and is moved by the gains of a measurement that is used. Four rows at a time:
+  /// an entry of H and a gain are read once for them.
   template <std::size_t M>
   [[gnu::noinline]] void take(const Seen<M>& z, float share, const float* gains) {
-    for (std::size_t i = 0; i < kRows; ++i) {
-      Signature& one = signatures_[i];
-      const int own = row(i).code - z.shown.first;
-      std::array<float, M> w;
+    constexpr std::size_t kTogether = 4, kLast = kRows / kTogether * kTogether;
+    for (std::size_t first = 0; first < kLast; first += kTogether) take_rows<kTogether>(first, z, share, gains);
+    if constexpr (kLast < kRows) take_rows<kRows - kLast>(kLast, z, share, gains);
+  }
+  template <std::size_t Count, std::size_t M>
+  [[gnu::always_inline]] void take_rows(std::size_t first, const Seen<M>& z, float share, const float* gains) {
+    std::array<std::array<float, M>, Count> w;  // L^-1 (H phi + d)
 #pragma GCC unroll 4
-      for (std::size_t m = 0; m < M; ++m) w[m] = own == static_cast<int>(m) && own < z.shown.count ? 1.0F : 0.0F;
-      for (std::size_t k = 0; k < z.columns; ++k) {
-        const float phi = one.phi[static_cast<std::size_t>(z.touches[k])];
+    for (std::size_t i = 0; i < Count; ++i) {
+      const int own = row(first + i).code - z.shown.first;
 #pragma GCC unroll 4
-        for (std::size_t m = 0; m < M; ++m) w[m] = base::add_product(w[m], z.h[k * M + m], phi);
-      }
-      filter::whiten(z.l, w);
-      one.score(w, z.y, share);
-      if (gains != nullptr) one.correct([gains](int n, int m) { return gains[n * static_cast<int>(M) + m]; }, w);
+      for (std::size_t m = 0; m < M; ++m) w[i][m] = own == static_cast<int>(m) && own < z.shown.count ? 1.0F : 0.0F;
     }
+    for (std::size_t k = 0; k < z.columns; ++k) {
+      std::array<float, M> h;
+#pragma GCC unroll 4
+      for (std::size_t m = 0; m < M; ++m) h[m] = z.h[k * M + m];
+#pragma GCC unroll 4
+      for (std::size_t i = 0; i < Count; ++i) {
+        const float phi = signatures_[first + i].phi[static_cast<std::size_t>(z.touches[k])];
+#pragma GCC unroll 4
+        for (std::size_t m = 0; m < M; ++m) w[i][m] = base::add_product(w[i][m], h[m], phi);
+      }
+    }
+#pragma GCC unroll 4
+    for (std::size_t i = 0; i < Count; ++i) {
+      filter::whiten(z.l, w[i]);
+      signatures_[first + i].score(w[i], z.y, share);
+    }
+    if (gains == nullptr) return;
+    filter::correct(&signatures_[first], w, [gains](int n, int m) { return gains[n * static_cast<int>(M) + m]; });
   }
 
   [[nodiscard]] static constexpr const FaultRow& row(std::size_t i) { return Table::kRows[i]; }
 
   static constexpr std::array<std::uint8_t, kRows> kOrder = by_code(Table::kRows);
+  /// Twice the logarithm.
+  static constexpr std::array<float, kRows> kPriorOdds = [] {
+    std::array<float, kRows> odds{};
+    for (std::size_t i = 0; i < kRows; ++i) odds[i] = 2.0F * base::log(Table::kRows[i].per_hour * (kAge_s / 3600.0F));
+    return odds;
+  }();
 
   std::array<Signature, kRows> signatures_;
   std::array<float, kRows> weights_{};  ///< probability of each row

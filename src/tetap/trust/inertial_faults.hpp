@@ -44,11 +44,12 @@ struct InertialFaults {
     return {};
   }
   /// phi <- F phi, by the step that moves P (nav/ins_covariance.hpp).
-  static void predict(const FaultRow&, std::array<float, kErrors>& phi, const nav::InsCovarianceStep<float>& step) {
+  [[gnu::always_inline]] static void predict(const FaultRow&, std::array<float, kErrors>& phi,
+                                             const nav::InsCovarianceStep<float>& step) {
     constexpr std::size_t kV = nav::InsState::kVelocity, kT = nav::InsState::kAttitude, kA = nav::InsState::kAccelBias,
                           kG = nav::InsState::kGyroBias;
-    const nav::Matrix3 r_dt = step.r_dt;
-    const nav::Vector3 dv = step.dv_n_mps;
+    const nav::Matrix3& r_dt = step.r_dt;
+    const nav::Vector3& dv = step.dv_n_mps;
     const auto turned = [&](int r, std::size_t from) {
       const float two = base::add_product(r_dt(r, 0) * phi[from], float{r_dt(r, 1)}, phi[from + 1]);
       return base::add_product(two, float{r_dt(r, 2)}, phi[from + 2]);
