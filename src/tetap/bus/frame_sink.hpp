@@ -34,7 +34,8 @@ class FrameSink {
  public:
   explicit FrameSink(Can& can) : can_(can) {}
   FrameSink(Can& can, FrameHash& hash) : can_(can), hash_(&hash) {}
-  void operator()(const base::CanFrame& frame) const {
+  /// Once in an image, not once for each kind of frame.
+  [[gnu::noinline]] void operator()(const base::CanFrame& frame) const {
     if (hash_ != nullptr) return (*hash_)(frame);
     static_cast<void>(can_.send(frame));  // refused frames: base::CanFaults::tx_full
   }

@@ -6,6 +6,7 @@
 #pragma once
 
 #include <array>
+#include <bit>
 #include <concepts>
 #include <cstddef>
 #include <cstdint>
@@ -115,16 +116,13 @@ template <Signal kSignal, class T>
   }
 }
 
+static_assert(std::endian::native == std::endian::little, "a payload is a word as it lies in memory");
 /// A payload as one little-endian word, and back. Missing bytes are 0.
 [[nodiscard]] constexpr std::uint64_t word(std::span<const std::uint8_t> bytes) {
-  std::uint64_t value = 0;
-  for (std::size_t i = 0; i < bytes.size() && i < 8; ++i) value |= static_cast<std::uint64_t>(bytes[i]) << (8 * i);
-  return value;
-}
-[[nodiscard]] constexpr Payload bytes(std::uint64_t value) {
   Payload payload{};
-  for (std::size_t i = 0; i < payload.size(); ++i) payload[i] = static_cast<std::uint8_t>(value >> (8 * i));
-  return payload;
+  for (std::size_t i = 0; i < bytes.size() && i < payload.size(); ++i) payload[i] = bytes[i];
+  return std::bit_cast<std::uint64_t>(payload);
 }
+[[nodiscard]] constexpr Payload bytes(std::uint64_t value) { return std::bit_cast<Payload>(value); }
 
 }  // namespace tetap::bus

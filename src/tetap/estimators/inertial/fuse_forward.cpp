@@ -40,7 +40,7 @@ template <class Watch>
   Assessment a = sources_.wheels.assess(reading, filter);
   const bool at_rest = sources_.wheels.slip() == Wheels::Slip::kTurn;
   if (a.remedy.sigma_rad > 0.0F) {
-    predict_watched();
+    predict_covariance();
     Recovery::widen_turn(ins_, a.remedy.sigma_rad, at_rest);
   }
   if (a.fuses()) {

@@ -40,7 +40,7 @@ Innovation InertialWith<Watch>::fuse(const sensor::GnssPosition& fix, base::Micr
 /// Horizontal part, then the height: each may be fused, skipped, or reset by itself.
 template <class Watch>
 [[gnu::noinline]] Innovation InertialWith<Watch>::fuse_fix(model::GnssFix3d& fix, const FilterView& filter) {
-  ins_.predict_covariance(watch_.bank());
+  predict_covariance();
   const auto at = fix.linearised(ins_.x);
   FixMeasurement z{.nu = -at.z_hat, .r = fix.noise()};
   z.statistics = fix_statistics(ins_.p, {at.h(1, 5), -at.h(0, 5), at.h(0, 4)}, z.nu, z.r);

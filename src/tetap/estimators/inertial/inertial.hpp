@@ -125,10 +125,8 @@ class InertialWith {
   void judge_drift(base::Micros since, const param::Parameters& n);
   void detect_standstill(base::Micros stamp, const Context& ctx);
   void fuse_zero_rate(const param::InertialParameters& n);
-  /// Before someone else brings P to the state's time: the hypotheses go along.
-  void predict_watched() {
-    if constexpr (Watch::kWatches) ins_.predict_covariance(watch_.bank());
-  }
+  /// P is that of the state's time, and the hypotheses go along.
+  void predict_covariance() { ins_.predict_covariance(watch_.bank()); }
   // Measurements.
   template <class Model>
   [[nodiscard]] filter::Innovation<float, Model::kDimension> update(const Model& model, float gate) {
@@ -142,7 +140,7 @@ class InertialWith {
   Innovation conclude(const filter::Innovation<float, M>& result, Source& source, const FilterView& filter);
   void apply(const Assessment& a, const FilterView& filter) {
     if (a.action == Action::kWidenVelocity || a.action == Action::kWidenPosition || a.action == Action::kWidenClimb)
-      predict_watched();
+      predict_covariance();
     if (a.action == Action::kResetPosition || a.action == Action::kResetHeight) watch_.begin();
     if (recovery_.apply(a, ins_, filter.stamp(), filter.parameters())) {
       predictor_.note_correction();

@@ -103,7 +103,7 @@ Innovation InertialWith<Watch>::propagate(const sensor::ImuSample& sample, const
   }
   if (!ImuPlace(n).is_origin()) nav::move(ins_.x, ins_.x.q_nb.rotate(moved_b_m));
   ins_.vibration = imu_.health().vibration().noise_factor(n);
-  if (ins_.pending_s() >= predictor_.schedule().covariance_every_s()) ins_.predict_covariance(watch_.bank());
+  if (ins_.pending_s() >= predictor_.schedule().covariance_every_s()) predict_covariance();
   if (sample.clipped_accel > 0 || sample.clipped_gyro > 0) inflate_clipped(sample, dt_s, n);
   if (imu_.health().vibration().leaps()) {
     const checks::Vibration::Leap& leap = imu_.health().vibration().leap();
@@ -188,7 +188,7 @@ template <class Watch>
     sum.clear_level();
   }
   if (drift.up) {
-    predict_watched();
+    predict_covariance();
     Recovery::widen_climb(ins_, sum.up_mps, 0);
     sum.clear_up();
   }
@@ -236,7 +236,7 @@ void InertialWith<Watch>::detect_standstill(base::Micros stamp, const Context& c
 
 template <class Watch>
 [[gnu::noinline]] void InertialWith<Watch>::fuse_zero_rate(const param::InertialParameters& n) {
-  if (ins_.pending_s() > 0.0F) ins_.predict_covariance(watch_.bank());
+  if (ins_.pending_s() > 0.0F) predict_covariance();
   const Standstill::ZeroRateUpdate due = standstill_.take_rate(ins_, n);
   budget_.spend(WorkBudget::kMeasurement);
   predictor_.note_correction();

@@ -36,6 +36,7 @@ class Recovery {
     inflate(ins, nav::InsState::kVelocity, nav::Vector3::Constant(sigma_mps * sigma_mps));
     inflate(ins, nav::InsState::kAttitude, nav::Vector3::Constant(sigma_rad * sigma_rad));
   }
+  // P of a widen_*() is that of the state's time.
   /// Verb 1 by a cause: both wheels contradict the gyroscope's turn by so much.
   static void widen_turn(nav::Ins& ins, float sigma_rad, bool at_rest);
   /// Verb 1 by a cause: measurements that found the velocity turned it by more than P allowed.
@@ -168,7 +169,6 @@ inline float Recovery::turn_of(const nav::Vector3& v_n_mps, float east_mps, floa
 
 /// The velocity is off by nu. It leapt; or a tilt made it so, since the last agreement; or the heading is wrong.
 [[gnu::noinline]] inline void Recovery::widen_velocity(nav::Ins& ins, const nav::Vector3& nu, float since_s) {
-  ins.predict_covariance();
   const float t = since_s > 0.1F ? since_s : 0.1F;
   ins.inflate_along({nu(0) * t, nu(1) * t, nu(2) * t, nu(0), nu(1), nu(2), 0, 0, 0});
   const std::array<float, 2> tilt = tilt_of(nu(0) / t, nu(1) / t, ins.earth.gravity_mps2);
@@ -183,7 +183,6 @@ inline float Recovery::turn_of(const nav::Vector3& v_n_mps, float east_mps, floa
 
 /// The position is off by nu. It leapt; or the velocity was wrong since the last agreement; or a tilt.
 [[gnu::noinline]] inline void Recovery::widen_position(nav::Ins& ins, const nav::Vector3& nu, float since_s) {
-  ins.predict_covariance();
   const float t = since_s > 0.2F ? since_s : 0.2F;
   ins.inflate_along({nu(0), nu(1), nu(2), 0, 0, 0, 0, 0, 0});
   ins.inflate_along({nu(0), nu(1), nu(2), nu(0) / t, nu(1) / t, nu(2) / t, 0, 0, 0});
@@ -197,7 +196,6 @@ inline float Recovery::turn_of(const nav::Vector3& v_n_mps, float east_mps, floa
 /// climb in a second or longer.
 [[gnu::noinline]] inline void Recovery::widen_climb(nav::Ins& ins, float climb_mps, float height_m) {
   constexpr float kSince_s = 1;
-  ins.predict_covariance();
   const nav::Vector3& up_n = ins.earth.up_n;
   const nav::Vector3 p_m = height_m * up_n, v_mps = climb_mps * up_n;
   ins.inflate_along({p_m(0), p_m(1), p_m(2), v_mps(0), v_mps(1), v_mps(2), 0, 0, 0});
@@ -211,7 +209,6 @@ inline float Recovery::turn_of(const nav::Vector3& v_n_mps, float east_mps, floa
 /// the error has ended: the heading keeps its own share. Nothing is taken out of P: no recondition().
 [[gnu::noinline]] inline void Recovery::widen_turn(nav::Ins& ins, float sigma_rad, bool at_rest) {
   constexpr int kYaw = nav::InsState::kYaw, kBias = nav::InsState::kGyroBias;
-  ins.predict_covariance();
   const nav::Vector3 up_b = ins.x.q_nb.conjugate().rotate(ins.earth.up_n);
   float shared = 0, bias_radps2 = 0;  // covariance of heading and the bias along up, and the latter's variance
   for (int i = 0; i < 3; ++i) {
