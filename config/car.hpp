@@ -9,6 +9,6 @@
 
 namespace tetap::robot::car {
 
-using Estimators = node::Estimators<estimators::Inertial>;
+using Estimators = node::Estimators<estimators::WatchedInertial>;
 
 }  // namespace tetap::robot::car

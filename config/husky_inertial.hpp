@@ -10,6 +10,6 @@
 
 namespace tetap::robot::husky_inertial {
 
-using Estimators = node::Estimators<estimators::Odometry, estimators::Inertial>;
+using Estimators = node::Estimators<estimators::Odometry, estimators::WatchedInertial>;
 
 }  // namespace tetap::robot::husky_inertial

@@ -11,6 +11,6 @@
 
 namespace tetap::robot::iris {
 
-using Estimators = node::Estimators<estimators::Attitude, estimators::Inertial>;
+using Estimators = node::Estimators<estimators::Attitude, estimators::WatchedInertial>;
 
 }  // namespace tetap::robot::iris
