@@ -59,15 +59,18 @@ class BothFilters {
   }
   template <class Model>
   void fuse(const Model& model, std::size_t first_row) {
-    Eigen::Matrix<double, 3, kErrors + 1> h = Eigen::Matrix<double, 3, kErrors + 1>::Zero();
+    constexpr int kM = Model::kDimension;
+    using Jacobian = Eigen::Matrix<double, kM, kErrors + 1>;
+    Jacobian h = Jacobian::Zero();
     const auto own = model.jacobian(ins_.x);
     for (std::size_t k = 0; k < Model::kTouches.size(); ++k)
-      for (int m = 0; m < 3; ++m) h(m, Model::kTouches[k]) = static_cast<double>(own(m, static_cast<int>(k)));
-    if (row_ >= first_row && row_ < first_row + (first_row == InertialFaults::kForward ? 1 : 3))
+      for (int m = 0; m < kM; ++m) h(m, Model::kTouches[k]) = static_cast<double>(own(m, static_cast<int>(k)));
+    if (row_ >= first_row && row_ < first_row + (first_row >= InertialFaults::kForward ? 1 : 3))
       h(static_cast<int>(row_ - first_row), kF) = 1;
-    const Eigen::Vector3d noise = model.noise().template cast<double>();
+    const Eigen::Vector<double, kM> noise = model.noise().template cast<double>();
     ASSERT_EQ(ins_.update(model, 100.0F, bank_).verdict, filter::Verdict::kAccepted);
-    const Eigen::Matrix3d s = h * dense_ * h.transpose() + Eigen::Matrix3d(noise.asDiagonal());
+    using Square = Eigen::Matrix<double, kM, kM>;
+    const Square s = h * dense_ * h.transpose() + Square(noise.asDiagonal());
     dense_ -= (dense_ * h.transpose() * s.inverse() * h * dense_).eval();
   }
   void drive(int steps) {
@@ -94,6 +97,9 @@ class BothFilters {
                                .sigma_vertical_mps = 2,
                                .moves = false},
              InertialFaults::kForward);
+      model::DirectionMeasurement heading{.sigma_rad = 0.1F};
+      heading.angle_rad = heading.predict(x)(0);
+      if (k % 30 == 0) fuse(heading, InertialFaults::kHeading);
     }
   }
   void expect_same(double share) const {

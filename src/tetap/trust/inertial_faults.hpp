@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Faults of an inertial robot's sensors: a bias of the IMU that jumps, and offsets of the receiver and of the wheels.
+// Faults of an inertial robot's sensors: a bias of the IMU that jumps, and offsets of receiver, wheels and headings.
 #pragma once
 
 #include "tetap/base/multiply_add.hpp"
+#include "tetap/model/direction.hpp"
 #include "tetap/model/gnss_fix_3d.hpp"
 #include "tetap/model/gnss_velocity_3d.hpp"
 #include "tetap/model/wheel_speed.hpp"
@@ -15,12 +16,12 @@ namespace tetap::trust {
 
 struct InertialFaults {
   static constexpr int kErrors = nav::InsState::kErrors;
-  static constexpr std::size_t kFix = 6, kVelocity = 9, kForward = 12;
+  static constexpr std::size_t kFix = 6, kVelocity = 9, kForward = 12, kHeading = 13;
 
-  /// Largest sizes (rad/s, m/s^2, m, m/s, m/s): what the sensors of these robots show at all. Each fault begins once
+  /// Largest sizes (rad/s, m/s^2, m, m/s, m/s, rad): what the sensors of these robots show at all. Each fault begins once
   /// an hour.
-  static constexpr std::array<FaultRow, 13> kRows = [] {
-    std::array<FaultRow, 13> rows;
+  static constexpr std::array<FaultRow, 14> kRows = [] {
+    std::array<FaultRow, 14> rows;
     const auto three = [&rows](std::size_t first, const FaultRow& like, int jumps) {
       for (std::size_t i = 0; i < 3; ++i) {
         rows[first + i] = like;
@@ -33,6 +34,7 @@ struct InertialFaults {
     three(kFix, {.largest = 20}, -1);
     three(kVelocity, {.largest = 5}, -1);
     rows[kForward] = {.code = kForward, .largest = 3};
+    rows[kHeading] = {.code = kHeading, .largest = 1};
     return rows;
   }();
 
@@ -41,6 +43,7 @@ struct InertialFaults {
     if constexpr (std::is_same_v<Measurement, model::GnssFix3d>) return {kFix, 3};
     if constexpr (std::is_same_v<Measurement, model::GnssVelocity3d>) return {kVelocity, 3};
     if constexpr (std::is_same_v<Measurement, model::WheelSpeed>) return {kForward, 1};
+    if constexpr (std::is_same_v<Measurement, model::DirectionMeasurement>) return {kHeading, 1};
     return {};
   }
   /// phi <- F phi, by the step that moves P (nav/ins_covariance.hpp).
