@@ -2,7 +2,9 @@
 #include "sim_host/emulator/chip.hpp"
 
 #include "hal/chip/arm/cortex_m4.hpp"
+#include "sim_host/emulator/flash_controller.hpp"
 
+#include <algorithm>
 #include <cstdio>
 
 namespace tetap::board {
@@ -109,10 +111,20 @@ bool Chip::write(std::uint32_t address, int size, std::uint32_t value) {
   }
   if (!check(*block, address, size, "write")) return true;
   block->write((address & ~3U) - block->base(), value, mask);
-  return true;
+  return !block->take_bus_error();
+}
+
+void Chip::lose_power() {
+  flash_controller().cut();
+  pending_reset = ResetCause::kPowerOn;
 }
 
 void Chip::system_reset(ResetCause cause) {
+  if (flash_controller().off()) cause = ResetCause::kPowerOn;  // whoever asked for a reset meanwhile
+  if (cause == ResetCause::kPowerOn) {
+    std::fill(memory.ram().begin(), memory.ram().end(), Memory::kAfterPowerOn);
+    flash_controller().power_on();
+  }
   for (Peripheral* block : blocks_) {
     if (block != &clocks()) block->reset();
   }

@@ -21,6 +21,7 @@ struct BusWindow {
   std::uint32_t base, size;
 };
 
+class FlashController;
 class Iwdg;
 class Spi;
 
@@ -49,6 +50,7 @@ class Chip {
   /// The first SPI master.
   [[nodiscard]] virtual Spi& spi() = 0;
   [[nodiscard]] virtual Iwdg& watchdog() = 0;
+  [[nodiscard]] virtual FlashController& flash_controller() = 0;
 
   /// Register access of the core or of a test; `size` 1, 2 or 4 bytes. A place without a block reads 0 and is a
   /// complaint; the result is false.
@@ -63,9 +65,11 @@ class Chip {
     return value;
   }
   void set_word(std::uint32_t address, std::uint32_t value) { (void)write(address, 4, value); }
+  /// The supply is lost now: a running operation of the flash stays half-done. pending_reset becomes a power-on.
+  void lose_power();
   void advance_us(std::int64_t us) { scheduler.advance(scheduler.now() + us * kMicrosecond); }
 
-  /// All blocks as after a system reset; SRAM keeps what it holds.
+  /// All blocks as after a system reset; SRAM keeps what it holds, but not over a power-on.
   void system_reset(ResetCause cause);
   /// A reset was asked for by software or watchdog and waits for the machine.
   std::optional<ResetCause> pending_reset;

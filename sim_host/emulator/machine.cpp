@@ -89,6 +89,19 @@ struct Machine::Engine {
   static std::uint64_t guard_read(uc_engine*, std::uint64_t offset, unsigned size, void* user) {
     return of(user).on_guard_read(of(user).guard_pages_.front() + static_cast<std::uint32_t>(offset), size);
   }
+  static bool flash_store(uc_engine*, uc_mem_type, std::uint64_t address, int size, std::int64_t value, void* user) {
+    return of(user).on_flash_store(static_cast<std::uint32_t>(address), static_cast<unsigned>(size),
+                                   static_cast<std::uint64_t>(value));
+  }
+  static std::uint64_t flash_read(uc_engine*, std::uint64_t offset, unsigned size, void* user) {
+    const auto& window = *static_cast<FlashWindow*>(user);
+    return window.machine->on_flash_read(window.base + static_cast<std::uint32_t>(offset), size);
+  }
+  static void flash_write(uc_engine*, std::uint64_t offset, unsigned size, std::uint64_t value, void* user) {
+    const auto& window = *static_cast<FlashWindow*>(user);
+    (void)window.machine->on_flash_store(window.base + static_cast<std::uint32_t>(offset), size, value);
+    window.machine->stored_.clear();  // nothing was written but by the controller
+  }
   static void guard_write(uc_engine*, std::uint64_t offset, unsigned size, std::uint64_t value, void* user) {
     of(user).on_guard_write(of(user).guard_pages_.front() + static_cast<std::uint32_t>(offset), size, value);
   }
@@ -98,7 +111,8 @@ Machine::Machine(Chip& chip, MachineOptions options)
     : chip_(chip),
       options_(options),
       flash_blocks_(chip.memory.flash_size() / 2),
-      ram_blocks_(chip.memory.ram_size() / 2) {
+      ram_blocks_(chip.memory.ram_size() / 2),
+      flash_(chip.flash_controller()) {
   power_on();
 }
 
@@ -135,8 +149,13 @@ void Machine::power_on() {
   hook(UC_HOOK_INTR, &Engine::interrupt);
   hook(UC_HOOK_MEM_INVALID, &Engine::invalid_memory);
   hook(UC_HOOK_INSN_INVALID, &Engine::invalid_instruction);
+  hook(UC_HOOK_MEM_WRITE_PROT, &Engine::flash_store);
   if (!fine) chip_.complaints.add("machine", "the engine cannot be set up");
   chip_.core.on_mpu_change = [this] { apply_mpu(); };
+  flash_.on_range = [this] {
+    flash_busy_ = flash_.busy();
+    flash_changed_ = true;
+  };
 }
 
 void Machine::load(std::uint32_t address, std::span<const std::byte> bytes) {
@@ -149,6 +168,7 @@ void Machine::copy(std::uint32_t address, std::span<const std::byte> bytes) {
     return chip_.complaints.add("machine", "image does not fit into the flash at " + hex(address));
   }
   std::memcpy(chip_.memory.flash().data() + (address - Memory::kFlash), bytes.data(), bytes.size());
+  flash_.written(address - Memory::kFlash, static_cast<std::uint32_t>(bytes.size()));
   image_ = std::min(image_, address);
 }
 
@@ -260,7 +280,8 @@ bool Machine::has_to_stop() {
 }
 
 void Machine::on_block(std::uint32_t address, std::uint32_t size) {
-  if (!first_block_ && has_to_stop()) {
+  undo_stores();
+  if (!first_block_ && (has_to_stop() || flash_changed_ || fetch_stalls(address))) {
     uc_emu_stop(uc_);
     return;
   }
@@ -305,6 +326,7 @@ void Machine::plan_stop(Picoseconds until) {
 }
 
 std::uint64_t Machine::on_read(std::uint32_t address, unsigned size) {
+  undo_stores();
   synchronise();
   std::uint32_t value = 0;
   if (!chip_.read(address, static_cast<int>(size), value)) {
@@ -315,11 +337,85 @@ std::uint64_t Machine::on_read(std::uint32_t address, unsigned size) {
 }
 
 void Machine::on_write(std::uint32_t address, unsigned size, std::uint64_t value) {
+  undo_stores();
   synchronise();
   if (!chip_.write(address, static_cast<int>(size), static_cast<std::uint32_t>(value))) {
     pending_fault_ = {exception::kBusFault, m4::scb::kImpreciserr.mask(), 0, false};
   }
+  catch_up();
   plan_stop(until_);
+}
+
+// A block that stalled the bus has moved the time on.
+void Machine::catch_up() {
+  const Picoseconds now = chip_.scheduler.now();
+  if (now > chip_.clock.time_of(cycles())) hundredths_ = chip_.clock.cycle_at(now) * 100;
+}
+
+// The engine itself stores after this call; undo_stores() takes that back, and the controller writes at its time.
+bool Machine::on_flash_store(std::uint32_t address, unsigned size, std::uint64_t value) {
+  const std::uint32_t offset = chip_.memory.resolve(address) - Memory::kFlash;
+  if (offset >= chip_.memory.flash_size()) return false;
+  undo_stores();
+  synchronise();
+  const unsigned once = std::min(size, 4U);  // the data bus has 32 bits
+  for (unsigned at = 0; at < size; at += once)
+    flash_.store(address + at, once, static_cast<std::uint32_t>(value >> 8 * at));
+  const auto bytes =
+      chip_.memory.flash().subspan(offset, std::min<std::size_t>(size, chip_.memory.flash_size() - offset));
+  stored_.push_back({offset, {bytes.begin(), bytes.end()}});
+  catch_up();
+  plan_stop(until_);
+  return true;
+}
+
+void Machine::undo_stores() {
+  for (const Stored& one : stored_)
+    std::memcpy(chip_.memory.flash().data() + one.offset, one.before.data(), one.before.size());
+  stored_.clear();
+}
+
+std::uint64_t Machine::on_flash_read(std::uint32_t address, unsigned size) {
+  undo_stores();
+  synchronise();
+  const std::uint64_t value = flash_.load(address, size);
+  catch_up();
+  plan_stop(until_);
+  return value;
+}
+
+bool Machine::fetch_stalls(std::uint32_t address) const { return flash_busy_ && flash_.busy_until(address) != 0; }
+
+// Both addresses of a part of the flash.
+void Machine::read_directly(std::uint32_t offset, std::uint32_t size, bool direct) {
+  for (const std::uint32_t base : {offset, Memory::kFlash + offset}) {
+    uc_mem_unmap(uc_, base, size);
+    if (direct) {
+      uc_mem_map_ptr(uc_, base, size, UC_PROT_READ | UC_PROT_EXEC, chip_.memory.flash().data() + offset);
+      continue;
+    }
+    FlashWindow* const window = windows_.emplace_back(std::make_unique<FlashWindow>(FlashWindow{this, base})).get();
+    uc_mmio_map(uc_, base, size, Engine::flash_read, window, Engine::flash_write, window);
+  }
+}
+
+// Banks that are busy, and pages with wrong check bits, are read through the controller. The engine stands meanwhile.
+void Machine::apply_flash() {
+  if (!flash_changed_) return;
+  flash_changed_ = false;
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> wanted;
+  const auto [busy, size] = flash_.busy_range();
+  if (size != 0) wanted.emplace_back(busy, size);
+  for (const auto& [index, check] : flash_.damaged()) {
+    const std::uint32_t page = index * 8 / kPage * kPage;
+    if (page - busy < size || (!wanted.empty() && wanted.back().first == page)) continue;
+    wanted.emplace_back(page, kPage);
+  }
+  if (wanted == watched_) return;
+  for (const auto& [offset, bytes] : watched_) read_directly(offset, bytes, true);
+  windows_.clear();
+  for (const auto& [offset, bytes] : wanted) read_directly(offset, bytes, false);
+  watched_ = std::move(wanted);
 }
 
 bool Machine::guarded(std::uint32_t address, std::uint32_t size) const {
@@ -384,8 +480,9 @@ void Machine::run(Picoseconds until) {
     synchronise();
     chip_.clock.settle(cycles());
     if (chip_.pending_reset) {
+      const bool supply_was_off = flash_.off();
       chip_.system_reset(*chip_.pending_reset);
-      stalled_until_ = 0;
+      stalled_until_ = supply_was_off ? chip_.scheduler.now() + kSupplyOff : 0;
       reset_times_.push_back(chip_.scheduler.now());
       chip_.complaints.expect_from("");
       reset_core();
@@ -395,6 +492,12 @@ void Machine::run(Picoseconds until) {
       pass(std::min(until, stalled_until_));
       continue;
     }
+    const bool vector_stalls = chip_.nvic.waiting() && fetch_stalls(chip_.core.vector_table());
+    if (!sleeping_ && !locked_up_ && (vector_stalls || fetch_stalls(program_counter_))) {
+      pass(until);
+      continue;
+    }
+    apply_flash();
     take_pending();
     if (chip_.scheduler.now() >= until) return;
     if (upset_due()) begin_upset();
@@ -445,6 +548,7 @@ void Machine::execute(Picoseconds until) {
   bad_instruction_ = false;
   const uc_err error = uc_emu_start(uc_, program_counter_ | 1, kNowhere, 0, 0);
   program_counter_ = reg(UC_ARM_REG_PC);
+  undo_stores();
   handle_stop(error);
 }
 
@@ -471,6 +575,7 @@ void Machine::handle_stop(int error) {
     }
     case UC_ERR_FETCH_UNMAPPED:
     case UC_ERR_FETCH_PROT:
+      if (flash_changed_ || fetch_stalls(program_counter_)) return;  // run() tries again
       chip_.complaints.add("core", "instruction fetch at " + hex(program_counter_));
       return fault(exception::kBusFault, m4::scb::kIbuserr.mask(), false, 0);
     default:

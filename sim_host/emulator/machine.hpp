@@ -7,6 +7,7 @@
 #pragma once
 
 #include "sim_host/emulator/chip.hpp"
+#include "sim_host/emulator/flash_controller.hpp"
 
 #include <cstdint>
 #include <memory>
@@ -41,6 +42,8 @@ enum class Stop : std::uint8_t { kTime, kReset, kLockup };
 
 class Machine {
  public:
+  static constexpr Picoseconds kSupplyOff = 100 * kMillisecond;
+
   Machine(Chip& chip, MachineOptions options);
   ~Machine();
   Machine(const Machine&) = delete;
@@ -51,7 +54,7 @@ class Machine {
   /// Copies raw bytes into flash at `address`.
   void load(std::uint32_t address, std::span<const std::byte> bytes);
 
-  /// Runs until `until`; resets are carried out and the run goes on.
+  /// Runs until `until`; resets are carried out and the run goes on. After a power-on the core starts kSupplyOff later.
   void run(Picoseconds until);
   /// The core executes nothing until then, as while its flash is erased: RM0402, "Read while write". Blocks run on.
   void stall(Picoseconds until) { stalled_until_ = until; }
@@ -101,6 +104,13 @@ class Machine {
   [[nodiscard]] bool upset_due() const;
   void begin_upset();
   void apply_mpu();
+  void apply_flash();
+  void undo_stores();
+  void catch_up();
+  bool on_flash_store(std::uint32_t address, unsigned size, std::uint64_t value);
+  std::uint64_t on_flash_read(std::uint32_t address, unsigned size);
+  [[nodiscard]] bool fetch_stalls(std::uint32_t address) const;
+  void read_directly(std::uint32_t offset, std::uint32_t size, bool direct);
   [[nodiscard]] bool guarded(std::uint32_t address, std::uint32_t size) const;
   std::uint64_t on_guard_read(std::uint32_t address, unsigned size);
   void on_guard_write(std::uint32_t address, unsigned size, std::uint64_t value);
@@ -144,6 +154,20 @@ class Machine {
 
   std::vector<std::pair<std::uint32_t, std::uint32_t>> guards_;  ///< first and last address of each region
   std::vector<std::uint32_t> guard_pages_;
+  /// Part of the flash that is looked at when it is read: it is busy, or its check bits are wrong.
+  struct FlashWindow {
+    Machine* machine;
+    std::uint32_t base;
+  };
+  struct Stored {
+    std::uint32_t offset;
+    std::vector<std::byte> before;
+  };
+  FlashController& flash_;
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> watched_;  ///< offset and size of each part
+  std::vector<std::unique_ptr<FlashWindow>> windows_;
+  std::vector<Stored> stored_;  ///< the engine writes into the flash; the controller decides what stays
+  bool flash_busy_ = false, flash_changed_ = false;
   std::vector<int> active_;  ///< stack of exceptions
   int storm_number_ = 0, storm_count_ = 0;
   std::uint64_t instructions_ = 0, exceptions_ = 0;

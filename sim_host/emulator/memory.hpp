@@ -20,9 +20,11 @@ class Memory {
  public:
   static constexpr std::uint32_t kFlash = 0x0800'0000, kRam = 0x2000'0000;
 
+  static constexpr std::byte kAfterPowerOn{0xCD};
+
   /// An erased flash reads 0xFF; SRAM is filled with a pattern, as nothing may rely on what power-on leaves there.
   explicit Memory(const MemoryLayout& layout)
-      : layout_(layout), flash_(layout.flash_size, std::byte{0xFF}), ram_(layout.ram_size, std::byte{0xCD}) {}
+      : layout_(layout), flash_(layout.flash_size, std::byte{0xFF}), ram_(layout.ram_size, kAfterPowerOn) {}
 
   [[nodiscard]] std::span<std::byte> flash() { return flash_; }
   [[nodiscard]] std::span<std::byte> ram() { return ram_; }

@@ -45,12 +45,16 @@ class Peripheral {
   /// As after power-on or a reset pulse of the RCC.
   virtual void reset() = 0;
 
+  /// Whether the last write ended in a bus error; asked once.
+  [[nodiscard]] bool take_bus_error() { return std::exchange(bus_error_, false); }
+
   [[nodiscard]] const std::string& name() const { return name_; }
   [[nodiscard]] std::uint32_t base() const { return base_; }
   [[nodiscard]] int widths() const { return widths_; }
 
  protected:
   void complain(const std::string& text) const { around_.complaints.add(name_, text); }
+  void bus_error() { bus_error_ = true; }
   [[nodiscard]] Picoseconds now() const { return around_.scheduler.now(); }
   [[nodiscard]] Scheduler& scheduler() const { return around_.scheduler; }
   void set_interrupt(int interrupt, bool level) const { around_.lines.set_level(interrupt, level); }
@@ -63,6 +67,7 @@ class Peripheral {
   std::string name_;
   std::uint32_t base_;
   int widths_;
+  bool bus_error_ = false;
 };
 
 }  // namespace tetap::board

@@ -2,6 +2,7 @@
 #include "sim_host/emulator/rcc.hpp"
 
 #include "hal/chip/stm32/registers_stm32f412.hpp"
+#include "sim_host/emulator/flash_f4.hpp"
 
 #include <utility>
 
@@ -18,7 +19,7 @@ constexpr std::uint32_t kHsi = 0, kHse = 1, kPll = 2;  // CFGR.SW
 
 }  // namespace
 
-Rcc::Rcc(Surroundings around, const Oscillators& oscillators, const Pwr& pwr, const FlashInterface& flash)
+Rcc::Rcc(Surroundings around, const Oscillators& oscillators, const Pwr& pwr, const FlashF4& flash)
     : ClockController(around, reg::kRcc, kRccWords),
       oscillators_(oscillators),
       pwr_(pwr),
@@ -46,6 +47,7 @@ void Rcc::reset() {
 // RM0402, RCC_CSR: every reset but power-on also pulls NRST low.
 void Rcc::add_reset_flags(ResetCause cause) {
   std::uint32_t flags = reg::csr::kPadrstf.mask();
+  if (cause == ResetCause::kPowerOn) word(reg::csr::kOffset) &= 0x00FF'FFFF;
   if (cause == ResetCause::kPowerOn) flags |= reg::csr::kPorrstf.mask() | reg::csr::kBorrstf.mask();
   if (cause == ResetCause::kSoftware) flags |= reg::csr::kSftrstf.mask();
   if (cause == ResetCause::kWatchdog) flags |= reg::csr::kWdgrstf.mask();
@@ -195,28 +197,6 @@ void Pwr::write(std::uint32_t offset, std::uint32_t value, std::uint32_t mask) {
 std::int64_t Pwr::limit_hz() const {
   constexpr std::int64_t kLimits[] = {64'000'000, 64'000'000, 84'000'000, 101'000'000};
   return kLimits[hal::stm32f412::pwr::cr::kVos.of(cr_)];
-}
-
-FlashInterface::FlashInterface(Surroundings around)
-    : Peripheral(around, "FLASH", hal::stm32f412::flash::kFlash, kBytes) {}
-
-void FlashInterface::reset() { acr_ = 0; }
-
-std::uint32_t FlashInterface::read(std::uint32_t offset) {
-  return offset == hal::stm32f412::flash::acr::kOffset ? acr_ : 0;
-}
-
-void FlashInterface::write(std::uint32_t offset, std::uint32_t value, std::uint32_t mask) {
-  if (offset != hal::stm32f412::flash::acr::kOffset) return complain("flash programming is not modelled");
-  merge(acr_, value & 0x1F0F, mask);
-  if (on_change) on_change();
-}
-
-// RM0402, table "Number of wait states according to CPU clock frequency", 2.7 to 3.6 V. One per cent is left for an HSI
-// at the end of its tolerance.
-std::int64_t FlashInterface::limit_hz() const {
-  constexpr std::int64_t kLimits[] = {30'300'000, 64'640'000, 90'900'000, 101'000'000};
-  return kLimits[acr_ % 16 > 3 ? 3 : acr_ % 16];
 }
 
 }  // namespace tetap::board

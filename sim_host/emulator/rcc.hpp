@@ -12,11 +12,11 @@
 namespace tetap::board {
 
 class Pwr;
-class FlashInterface;
+class FlashF4;
 
 class Rcc final : public ClockController {
  public:
-  Rcc(Surroundings around, const Oscillators& oscillators, const Pwr& pwr, const FlashInterface& flash);
+  Rcc(Surroundings around, const Oscillators& oscillators, const Pwr& pwr, const FlashF4& flash);
 
   std::uint32_t read(std::uint32_t offset) override;
   void write(std::uint32_t offset, std::uint32_t value, std::uint32_t mask) override;
@@ -46,7 +46,7 @@ class Rcc final : public ClockController {
 
   Oscillators oscillators_;
   const Pwr& pwr_;
-  const FlashInterface& flash_;
+  const FlashF4& flash_;
   Alarm hse_ready_, pll_ready_, lsi_ready_;
   int hclk_shift_ = 0, apb1_shift_ = 0, apb2_shift_ = 0;
 };
@@ -63,21 +63,6 @@ class Pwr final : public Peripheral {
 
  private:
   std::uint32_t cr_ = 0;
-};
-
-/// FLASH_ACR: wait states and caches. Programming is not modelled.
-class FlashInterface final : public Peripheral {
- public:
-  explicit FlashInterface(Surroundings around);
-  std::uint32_t read(std::uint32_t offset) override;
-  void write(std::uint32_t offset, std::uint32_t value, std::uint32_t mask) override;
-  void reset() override;
-  /// Fastest HCLK with the wait states that are set, at 2.7 to 3.6 V.
-  [[nodiscard]] std::int64_t limit_hz() const;
-  std::function<void()> on_change;
-
- private:
-  std::uint32_t acr_ = 0;
 };
 
 }  // namespace tetap::board

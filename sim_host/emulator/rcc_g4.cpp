@@ -2,6 +2,7 @@
 #include "sim_host/emulator/rcc_g4.hpp"
 
 #include "hal/chip/stm32/registers_stm32g474.hpp"
+#include "sim_host/emulator/flash_g4.hpp"
 
 #include <algorithm>
 
@@ -9,7 +10,6 @@ namespace tetap::board {
 
 namespace reg = hal::stm32g474::rcc;
 namespace pwr_reg = hal::stm32g474::pwr;
-namespace flash_reg = hal::stm32g474::flash;
 
 namespace {
 
@@ -73,36 +73,6 @@ std::int64_t PwrG4::limit_hz() const {
 
 bool PwrG4::dead_battery_pull_down() const { return pwr_reg::cr3::kUcpd1Dbdis.of(cr3_) == 0; }
 
-FlashG4::FlashG4(Surroundings around, const PwrG4& pwr)
-    : Peripheral(around, "FLASH", flash_reg::kFlash, kBytes), pwr_(pwr) {
-  reset();
-}
-
-// RM0440, FLASH_ACR: reset value 0x0004 0600; the SVD has one wait state there.
-void FlashG4::reset() { acr_ = 0x0004'0600; }
-
-std::uint32_t FlashG4::read(std::uint32_t offset) { return offset == flash_reg::acr::kOffset ? acr_ : 0; }
-
-void FlashG4::write(std::uint32_t offset, std::uint32_t value, std::uint32_t mask) {
-  if (offset != flash_reg::acr::kOffset) return complain("flash programming is not modelled");
-  const std::uint32_t before = acr_;
-  merge(acr_, value, mask);
-  const bool caches_on = flash_reg::acr::kIcen.of(before) != 0 || flash_reg::acr::kDcen.of(before) != 0;
-  if (caches_on && (acr_ & (flash_reg::acr::kIcrst.mask() | flash_reg::acr::kDcrst.mask())) != 0) {
-    complain("ICRST or DCRST set while the caches are on");
-  }
-  if (on_change) on_change();
-}
-
-// RM0440, section "Read access latency", table 29: steps of HCLK per wait state in range 1 boost, range 1 normal,
-// range 2.
-std::int64_t FlashG4::limit_hz() const {
-  constexpr std::int64_t kStep_mhz[] = {34, 30, 12}, kLast_mhz[] = {170, 150, 26};
-  const auto range = static_cast<std::size_t>(pwr_.range());
-  const std::int64_t latency = flash_reg::acr::kLatency.of(acr_);
-  return with_tolerance(1'000'000 * std::min((latency + 1) * kStep_mhz[range], kLast_mhz[range]));
-}
-
 RccG4::RccG4(Surroundings around, const Oscillators& oscillators, const PwrG4& pwr, const FlashG4& flash)
     : ClockController(around, reg::kRcc, kRegisters),
       oscillators_(oscillators),
@@ -132,6 +102,7 @@ void RccG4::reset() {
 // RM0440, "System reset": every reset pulls NRST low, too.
 void RccG4::add_reset_flags(ResetCause cause) {
   std::uint32_t flags = reg::csr::kPinrstf.mask();
+  if (cause == ResetCause::kPowerOn) word(reg::csr::kOffset) &= ~kAllFlags;
   if (cause == ResetCause::kPowerOn) flags |= reg::csr::kBorrstf.mask();
   if (cause == ResetCause::kSoftware) flags |= reg::csr::kSftrstf.mask();
   if (cause == ResetCause::kWatchdog) flags |= reg::csr::kIwdgrstf.mask();

@@ -10,6 +10,8 @@
 
 namespace tetap::board {
 
+class FlashG4;
+
 /// PWR_CR1.VOS and PWR_CR5.R1MODE: how fast the core may run. RM0440, "Dynamic voltage scaling management".
 class PwrG4 final : public Peripheral {
  public:
@@ -27,22 +29,6 @@ class PwrG4 final : public Peripheral {
 
  private:
   std::uint32_t cr1_ = 0, cr3_ = 0, cr5_ = 0;
-};
-
-/// FLASH_ACR: wait states and caches. Programming is not modelled.
-class FlashG4 final : public Peripheral {
- public:
-  FlashG4(Surroundings around, const PwrG4& pwr);
-  std::uint32_t read(std::uint32_t offset) override;
-  void write(std::uint32_t offset, std::uint32_t value, std::uint32_t mask) override;
-  void reset() override;
-  /// Fastest HCLK with the wait states and the voltage range that are set.
-  [[nodiscard]] std::int64_t limit_hz() const;
-  std::function<void()> on_change;
-
- private:
-  const PwrG4& pwr_;
-  std::uint32_t acr_ = 0;
 };
 
 class RccG4 final : public ClockController {

@@ -40,7 +40,7 @@ constexpr EncoderTimer::Wiring kTim3{Signal::kTim3Ch1, Signal::kTim3Ch2, {'B', 4
 Stm32f412::Stm32f412(const Oscillators& oscillators)
     : Chip(kMemory, kWindows),
       pwr(around_),
-      flash(around_),
+      flash(around_, memory),
       rcc(around_, oscillators, pwr, flash),
       pins(around_, kPorts, kStm32f412PinFunctions),
       syscfg(around_, reg::syscfg::kSyscfg),

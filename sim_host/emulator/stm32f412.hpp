@@ -7,6 +7,7 @@
 #include "sim_host/emulator/dma.hpp"
 #include "sim_host/emulator/encoder_timer.hpp"
 #include "sim_host/emulator/exti.hpp"
+#include "sim_host/emulator/flash_f4.hpp"
 #include "sim_host/emulator/gpio.hpp"
 #include "sim_host/emulator/iwdg.hpp"
 #include "sim_host/emulator/rcc.hpp"
@@ -21,7 +22,7 @@ class Stm32f412 final : public Chip {
 
   // In the order in which they are made.
   Pwr pwr;
-  FlashInterface flash;
+  FlashF4 flash;
   Rcc rcc;
   Pins pins;
   Syscfg syscfg;
@@ -37,6 +38,7 @@ class Stm32f412 final : public Chip {
   [[nodiscard]] CanLine& can_line() override { return can1.line; }
   [[nodiscard]] Spi& spi() override { return spi1; }
   [[nodiscard]] Iwdg& watchdog() override { return iwdg; }
+  [[nodiscard]] FlashController& flash_controller() override { return flash; }
 
  private:
   void add_blocks();

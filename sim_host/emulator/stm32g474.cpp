@@ -59,7 +59,7 @@ static_assert(reg::iwdg::kr::kOffset == older::iwdg::kr::kOffset &&
 Stm32g474::Stm32g474(const Oscillators& oscillators, const Stm32g474Pins& wired)
     : Chip(kMemory, kWindows),
       pwr(around_),
-      flash(around_, pwr),
+      flash(around_, memory, pwr),
       rcc(around_, oscillators, pwr, flash),
       pins(around_, kPorts, kStm32g474PinFunctions),
       syscfg(around_, reg::syscfg::kSyscfg),
@@ -153,6 +153,7 @@ void Stm32g474::connect() {
     dma->on_enable = [this] { usart1.raise_requests(), usart2.raise_requests(), spi1.raise_requests(); };
   }
   flash.on_change = [this] { rcc.check_limits(); };
+  flash.on_nmi = [this] { nvic.pend(exception::kNmi); };
   pwr.on_change = [this] { rcc.check_limits(); };
   iwdg.on_expired = [this] { pending_reset = ResetCause::kWatchdog; };
 }

@@ -8,6 +8,7 @@
 #include "sim_host/emulator/encoder_timer.hpp"
 #include "sim_host/emulator/exti.hpp"
 #include "sim_host/emulator/fdcan.hpp"
+#include "sim_host/emulator/flash_g4.hpp"
 #include "sim_host/emulator/gpio.hpp"
 #include "sim_host/emulator/iwdg.hpp"
 #include "sim_host/emulator/rcc_g4.hpp"
@@ -47,6 +48,7 @@ class Stm32g474 final : public Chip {
   [[nodiscard]] CanLine& can_line() override { return fdcan1.line; }
   [[nodiscard]] Spi& spi() override { return spi1; }
   [[nodiscard]] Iwdg& watchdog() override { return iwdg; }
+  [[nodiscard]] FlashController& flash_controller() override { return flash; }
 
  private:
   [[nodiscard]] bool serve(DmaRequest request) { return dma1.serve(request) || dma2.serve(request); }

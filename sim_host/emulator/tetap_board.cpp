@@ -27,10 +27,12 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <cmath>
 #include <cstdio>
 #include <ctime>
 #include <exception>
+#include <filesystem>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -59,6 +61,9 @@ std::string help() {
          "  --no-partner       no other node acknowledges\n"
          "  --first-complaint  ends the run with the first complaint\n"
          "  --can IFACE        joins the bus to a CAN interface of this machine, in real time\n"
+         "  --power-cycle S[,S...]  the supply is lost at these times of the run, for 0.1 s: RAM is lost, flash stays\n"
+         "  --flash FILE       the flash: read where FILE is there, before IMAGE is written; kept there at the end\n"
+         "  --flash-time T     of an erase: typical, maximum or fourfold (default: four times the typical one)\n"
          "  --check-alignment  looks at every instruction for accesses that must be aligned; slow\n\n"
          "The simulated world behind the pins:\n"
          "  --robot NAME       whose body and sensors: " +
@@ -82,7 +87,9 @@ struct Options {
   board::UbloxOptions receiver;
   std::optional<double> seconds;
   std::optional<double> imu_clock_ppm;
-  std::string log, image, robot, out, faults, can, kind;
+  std::string log, image, robot, out, faults, can, kind, flash;
+  board::FlashController::Pace flash_pace = board::FlashController::Pace::kFourfold;
+  std::vector<board::Picoseconds> power_cycles;
   std::vector<board::HardwareFaultSetting> hardware_faults;
   std::vector<sim::FaultSetting> world_faults;
   std::uint64_t seed = 1;
@@ -161,6 +168,28 @@ void parse_world(sim::Arguments& arguments, Options& options) {
   for (const std::string& given : faults) add_faults(given, options);
 }
 
+void parse_flash(sim::Arguments& arguments, Options& options) {
+  using Pace = board::FlashController::Pace;
+  constexpr std::array kPaces{std::pair{"typical", Pace::kTypical}, std::pair{"maximum", Pace::kMaximum},
+                              std::pair{"fourfold", Pace::kFourfold}};
+  options.flash = arguments.text("--flash").value_or("");
+  const std::string pace = arguments.text("--flash-time").value_or("fourfold");
+  const auto found = std::find_if(kPaces.begin(), kPaces.end(), [&](const auto& one) { return pace == one.first; });
+  if (found == kPaces.end()) throw sim::UsageError("--flash-time " + pace + ": it is typical, maximum or fourfold");
+  options.flash_pace = found->second;
+  const std::string times = arguments.text("--power-cycle").value_or("");
+  const char* at = times.data();
+  const char* const end = at + times.size();
+  while (at != end) {
+    double time_s = 0;
+    const auto [next, code] = std::from_chars(at, end, time_s, std::chars_format::fixed);
+    if (code != std::errc{} || !(time_s > 0 && time_s <= 1e6) || (next != end && (*next != ',' || next + 1 == end)))
+      throw sim::UsageError("--power-cycle " + times + ": times in seconds above 0, with commas between them");
+    options.power_cycles.push_back(std::llround(time_s * 1e6) * board::kMicrosecond);
+    at = next == end ? end : next + 1;
+  }
+}
+
 Options parse(sim::Arguments& arguments) {
   Options options;
   if (const double given = arguments.real("--seconds", 0, 0.001, 1e6); given > 0) options.seconds = given;
@@ -177,6 +206,7 @@ Options parse(sim::Arguments& arguments) {
   options.can = arguments.text("--can").value_or("");
   options.partner = !arguments.flag("--no-partner");
   options.machine.check_alignment = arguments.flag("--check-alignment");
+  parse_flash(arguments, options);
   parse_world(arguments, options);
   const std::string kind = arguments.text("--board").value_or("");
   const auto image = arguments.positional();
@@ -355,8 +385,12 @@ class Run {
       record(time, frame);
     };
     board::Machine machine(node.processor, options_.machine);
-    const std::string wrong = machine.load_elf(options_.image);
-    if (!wrong.empty()) throw sim::UsageError(wrong);
+    board::FlashController& flash = node.processor.flash_controller();
+    flash.seed = options_.seed;
+    flash.pace = options_.flash_pace;
+    if (!options_.flash.empty() && std::filesystem::exists(options_.flash)) check(flash.restore(options_.flash));
+    check(machine.load_elf(options_.image));
+    const auto cycles = power_cycles(node);
     std::optional<OtherNodes> others;
     std::optional<board::BusTwin> twin;
     if (options_.twin) twin.emplace(node, *sensors_, parameters_);
@@ -370,6 +404,7 @@ class Run {
     run(machine, node.processor.complaints);
     facts_.cpu_s = static_cast<double>(std::clock() - began) / CLOCKS_PER_SEC;
     if (log_) log_->close();
+    if (!options_.flash.empty()) check(flash.save(options_.flash));
     if (live)
       std::fprintf(stderr, "tetap-board: on %s in real time, at most %.3f s late\n", options_.can.c_str(),
                    static_cast<double>(live->latest().us) * 1e-6);
@@ -381,6 +416,22 @@ class Run {
  private:
   static constexpr std::uint64_t kClockStream = 1'001;
 
+  static void check(const std::string& wrong) {
+    if (!wrong.empty()) throw sim::UsageError(wrong);
+  }
+  /// The whole board loses its supply: chip, IMU and receiver start anew.
+  [[nodiscard]] std::vector<std::unique_ptr<board::Alarm>> power_cycles(board::Board& node) {
+    std::vector<std::unique_ptr<board::Alarm>> alarms;
+    for (const board::Picoseconds at : options_.power_cycles) {
+      alarms.push_back(std::make_unique<board::Alarm>(node.processor.scheduler, [this, &node] {
+        node.processor.lose_power();
+        node.imu.dip();
+        if (sensors_) sensors_->receiver.power_on(node.processor.scheduler.now());
+      }));
+      alarms.back()->set(at);
+    }
+    return alarms;
+  }
   [[nodiscard]] double duration_s() const {
     if (!sensors_) return options_.seconds.value_or(10);
     const base::Micros all = sensors_->world().start() + sensors_->world().duration();

@@ -73,7 +73,6 @@ TEST(Machine, FaultsComeAsOnSilicon) {
       {kUnalignedDouble, m4::scb::kUnaligned.mask(), true, "unaligned access of several words"},
       {kUnalignedFloat, m4::scb::kUnaligned.mask(), true, "unaligned access of several words"},
       {kArmState, m4::scb::kInvstate.mask(), true, "undefined instruction"},
-      {kFlashWrite, m4::scb::kPreciserr.mask() | m4::scb::kBfarvalid.mask(), true, "access to 0x08000100"},
   };
   for (const Fault& fault : faults) {
     Emulated run("core", fault.choice, {}, {.check_alignment = true});

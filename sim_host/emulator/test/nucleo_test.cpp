@@ -41,6 +41,34 @@ class Nucleo {
   static constexpr std::uint32_t kShared = 0x2001'6000;
 };
 
+TEST(Nucleo, RunsOnWhileItsOtherBankIsErased) {
+  Nucleo run(4);
+  run.run_ms(80);
+  EXPECT_EQ(run.result(4), 0U) << "88 ms at four times the typical figure";
+  EXPECT_GT(run.result(3), 100'000U);
+  run.run_ms(15);
+  EXPECT_EQ(run.result(4), 1U);
+  EXPECT_TRUE(run.board.chip.complaints.empty()) << run.board.chip.complaints.text();
+}
+
+TEST(Nucleo, ReadsADamagedDoubleWordIntoAnNmi) {
+  for (const bool damaged : {false, true}) {
+    Nucleo run(5);
+    if (damaged) {
+      run.board.chip.set_word(0x4002'1048, 0x100);  // FLASHEN
+      for (const std::uint32_t key : {0x4567'0123U, 0xCDEF'89ABU}) run.board.chip.set_word(0x4002'2008, key);
+      run.board.chip.set_word(0x4002'2014, 0x1'0802);
+      run.board.chip.advance_us(10);
+      run.board.chip.flash.cut();
+      run.board.chip.flash.power_on();
+      EXPECT_FALSE(run.board.chip.flash.damaged().empty());
+    }
+    run.run_ms(10);
+    EXPECT_EQ(run.result(2), damaged ? 2U : 0U) << "the exception's number";
+    EXPECT_EQ(run.result(4) == 512U * 0xFFFF'FFFFU, !damaged);
+  }
+}
+
 TEST(Nucleo, EchoesFramesAtOneHundredAndSixtyMegahertz) {
   Nucleo run(0);
   run.run_ms(10);

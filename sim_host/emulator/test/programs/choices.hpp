@@ -18,7 +18,6 @@ enum Choice : std::uint32_t {
   kUnalignedDouble,
   kArmState,
   kStackGuard,
-  kFlashWrite,
   kReset,
   kInterruptNotCleared,
   kCycles,
@@ -26,6 +25,16 @@ enum Choice : std::uint32_t {
   kUnalignedWord,
   kSupervisor,
   kUnalignedFloat,
+};
+
+/// programs/flash.cpp: what the core sees of its own flash's controller.
+enum FlashChoice : std::uint32_t {
+  kEraseFromFlash = 1,
+  kPollFromRam,
+  kReadFromRam,
+  kReturnToFlash,
+  kProgramWords,
+  kLockedStore,
 };
 
 /// programs/sensors.cpp: one mistake each, but for the first.

@@ -154,9 +154,6 @@ void fault_choice(std::uint32_t choice) {
     case kArmState:
       asm volatile("bx %0" ::"r"(0x0800'0100));
       return;
-    case kFlashWrite:
-      *reinterpret_cast<volatile std::uint32_t*>(0x0800'0100) = 1;
-      return;
     case kLockup:
       asm volatile("udf #1");
       return;

@@ -14,7 +14,7 @@ using tetap::hal::Mmio;
 
 namespace {
 
-enum Mistake : std::uint32_t { kNone, kFlagNotCleared, kFifoNotAcknowledged, kWaitStates };
+enum Mistake : std::uint32_t { kNone, kFlagNotCleared, kFifoNotAcknowledged, kWaitStates, kEraseOtherBank, kReadPage };
 
 struct Shared {
   std::uint32_t choice;
@@ -93,6 +93,23 @@ void echo(std::uint32_t index) {
 
 [[gnu::section(".ccm"), gnu::noinline]] std::uint32_t from_ccm(std::uint32_t value) { return 3 * value + 1; }
 
+/// Page 0 of bank 2 from code in bank 1: rounds of the loop while BSY = 1.
+void erase_other_bank() {
+  set(kRcc, reg::rcc::ahb1enr::kOffset, 0x100);
+  kFlash.write(0x08, 0x4567'0123);
+  kFlash.write(0x08, 0xCDEF'89AB);
+  kFlash.write(0x14, 0x1'0802);
+  while ((kFlash.read(0x10) & 0x1'0000) != 0) shared().results[3] = shared().results[3] + 1;
+  shared().results[4] = 1;
+}
+
+/// Sum of page 0 of bank 2, whose double words may be damaged.
+void read_page() {
+  for (std::uint32_t at = 0; at < 2048; at += 4)
+    shared().results[4] = shared().results[4] + *reinterpret_cast<const volatile std::uint32_t*>(0x0804'0000 + at);
+  shared().results[3] = kFlash.read(0x18);
+}
+
 extern "C" std::uint32_t __ccm_begin[], __ccm_end[], __ccm_load[];
 
 }  // namespace
@@ -116,6 +133,8 @@ extern "C" {
   for (std::uint32_t* to = __ccm_begin; to < __ccm_end; ++to) *to = __ccm_load[to - __ccm_begin];
   start_clock();
   shared().results[0] = from_ccm(from_ccm(13));
+  if (is(kEraseOtherBank)) erase_other_bank();
+  if (is(kReadPage)) read_page();
   print("hello from 160 MHz\n");
   start_can();
   for (;;) asm volatile("wfi");
@@ -123,7 +142,9 @@ extern "C" {
 
 [[gnu::naked, gnu::used, noreturn]] void reset() { asm volatile("b program_main\n"); }
 [[gnu::used]] void stray() {
-  shared().results[2] = 1;
+  std::uint32_t number = 0;
+  asm volatile("mrs %0, ipsr" : "=r"(number));
+  shared().results[2] = number;
   for (;;) continue;
 }
 }
