@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // tetapctl: reads and changes the parameters of a running node over its bus.
 #include "hal/board/linux/socket_can.hpp"
+#include "sim_host/control/image_header.hpp"
 #include "sim_host/control/parameter_client.hpp"
 #include "sim_host/control/scan.hpp"
 #include "sim_host/parameter_settings.hpp"
@@ -14,6 +15,7 @@
 #include <exception>
 #include <optional>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -32,9 +34,12 @@ constexpr const char* kHelp =
     "  load FILE          the same with a file of `path = value` lines\n"
     "  apply              makes active what is staged, by an SDO client for example\n"
     "  save               keeps the parameters without power, where the board can\n"
-    "  restore            the compiled values\n\n"
+    "  restore            the compiled values\n"
+    "  image FILE         what a flash image (.bin, .elf) is for; refused where it is damaged, cut or another "
+    "board's\n\n"
     "  --interface NAME   (default vcan0)\n"
     "  --base ID          first identifier of the node's block (default 0x300)\n"
+    "  --board NAME       image: refused where it is for another board; --robot NAME in the same way\n"
     "  --json             scan, list, get, diff: a list; else an object with the result\n\n"
     "A row that needs a restart waits for a Begin frame; it is lost with the node's power: no board keeps it yet.\n"
     "Status: 0 done, 1 refused or no answer, 2 wrong command line.\n";
@@ -110,6 +115,39 @@ void print_nodes(const std::vector<sim::FoundNode>& nodes, bool json) {
   if (json) std::fputs(nodes.empty() ? "[]\n" : "\n]\n", stdout);
 }
 
+std::vector<std::uint8_t> content_of(const std::string& path) {
+  std::FILE* const in = std::fopen(path.c_str(), "rb");
+  if (in == nullptr) throw sim::ImageRefused("cannot be opened");
+  std::vector<std::uint8_t> content;
+  std::array<std::uint8_t, 1 << 14> piece{};
+  for (std::size_t n = 0; (n = std::fread(piece.data(), 1, piece.size(), in)) > 0;)
+    content.insert(content.end(), piece.begin(), piece.begin() + static_cast<std::ptrdiff_t>(n));
+  const bool failed = std::ferror(in) != 0;
+  std::fclose(in);
+  if (failed) throw sim::ImageRefused("cannot be read");
+  return content;
+}
+
+/// Board and robot that an image must be for; empty: any.
+struct Wanted {
+  std::string board, robot;
+};
+
+void print_image(const std::string& path, const Wanted& wanted, bool json) try {
+  const sim::ImageHeader header = sim::read_image(content_of(path));
+  for (const auto& [what, name, given] :
+       {std::tuple{"board", header.board, wanted.board}, std::tuple{"robot", header.robot, wanted.robot}})
+    if (!given.empty() && name != given)
+      throw sim::ImageRefused(std::string("for ") + what + " '" + name + "', not for '" + given + "'");
+  std::printf(json ? "{\"board\": \"%s\", \"robot\": \"%s\", \"commit\": \"%07x%s\", \"length\": %u, \"address\": %u, "
+                     "\"crc32\": %u}\n"
+                   : "whole: board %s, robot %s, commit %07x%s, %u bytes for 0x%08X, CRC-32 0x%08X\n",
+              header.board.c_str(), header.robot.c_str(), header.commit >> 4,
+              (header.commit & 15U) != 0 ? "-dirty" : "", header.length, header.address, header.crc);
+} catch (const sim::ImageRefused& refused) {
+  throw sim::ImageRefused(path + ": " + refused.what());
+}
+
 void run(const std::string& command, const std::vector<std::string>& words, sim::ParameterClient& client, bool json) {
   const param::Parameters active = client.read(ParamSource::kActive);
   Printer printer{json};
@@ -148,12 +186,13 @@ int main(int argc, char** argv) try {
   const std::string interface = arguments.text("--interface").value_or("vcan0");
   const std::uint32_t base = arguments.base();
   const bool json = arguments.flag("--json");
+  const Wanted wanted{arguments.text("--board").value_or(""), arguments.text("--robot").value_or("")};
   std::vector<std::string> words;
   while (auto word = arguments.positional()) words.push_back(std::move(*word));
   arguments.finish();
   const std::string command = words.empty() ? "" : words.front();
   if (!words.empty()) words.erase(words.begin());
-  const bool needs_words = command == "get" || command == "set" || command == "load";
+  const bool needs_words = command == "image" || command == "get" || command == "set" || command == "load";
   constexpr std::array kAlone{"scan", "list", "diff", "apply", "save", "restore"};
   if (!needs_words && std::find(kAlone.begin(), kAlone.end(), command) == kAlone.end())
     throw sim::UsageError(command.empty() ? "no command; see tetapctl --help"
@@ -161,6 +200,11 @@ int main(int argc, char** argv) try {
   if (needs_words == words.empty()) throw sim::UsageError(command + (needs_words ? " needs a path" : " takes no path"));
   if (command == "get")
     for (const std::string& path : words) static_cast<void>(row_of(path));
+  if (command == "image") {
+    for (const std::string& path : words) print_image(path, wanted, json);
+    return 0;
+  }
+  if (!wanted.board.empty() || !wanted.robot.empty()) throw sim::UsageError("--board and --robot are for image");
   hal::SocketCan can(interface);
   const sim::ParameterClient::Send send = [&](const base::CanFrame& frame) {
     can.send(frame);

@@ -1,4 +1,5 @@
-# tetap_image(NAME target SOURCES main.cpp ... [BOARD name] [LIBRARIES tetap_node ...] [STACK bytes] [OUTPUT name] [DATA ddr|bytes] [OFFSET bytes])
+# tetap_image(NAME target SOURCES main.cpp ... [BOARD name] [LIBRARIES tetap_node ...] [STACK bytes] [OUTPUT name] [DATA ddr|bytes] [OFFSET bytes] [ROBOT name])
+# ROBOT: fills the image header (tools/run/seal_image), where the linker script keeps room for one.
 # OFFSET: bytes at the begin of the flash that stay a boot loader's, where the board's link.ld has _flash_offset.
 # makes NAME.elf .bin .hex .map in the binary directory, or OUTPUT.elf ... when another file name is wanted. Beside every object of
 # the image lie its .su and .ci (stack use and call graph, GCC's VCG form): CMakeFiles/NAME.dir/.
@@ -30,7 +31,7 @@ list(GET TETAP_BOARD 0 TETAP_FIRST_BOARD)
 set(CMAKE_CXX_STANDARD_LIBRARIES "-Wl,--start-group -lc -lgcc -Wl,--end-group")
 
 function(tetap_image)
-  cmake_parse_arguments(ARG "" "NAME;BOARD;STACK;OUTPUT;DATA;OFFSET" "SOURCES;LIBRARIES" ${ARGN})
+  cmake_parse_arguments(ARG "" "NAME;BOARD;STACK;OUTPUT;DATA;OFFSET;ROBOT" "SOURCES;LIBRARIES" ${ARGN})
   foreach(needed NAME SOURCES)
     if(NOT ARG_${needed})
       message(FATAL_ERROR "tetap_image: ${needed} is missing")
@@ -71,8 +72,13 @@ function(tetap_image)
     -Wl,--fatal-warnings -Wl,-Map=${output}.map $<$<BOOL:${ARG_STACK}>:-Wl,--defsym=_stack_size=${ARG_STACK}>
     $<$<STREQUAL:${ARG_DATA},ddr>:-Wl,--defsym=_data_in_ddr=1> $<$<NOT:$<OR:$<STREQUAL:${ARG_DATA},>,$<STREQUAL:${ARG_DATA},ddr>>>:-Wl,--defsym=_data_size=${ARG_DATA}>
     $<$<BOOL:${ARG_OFFSET}>:-Wl,--defsym=_flash_offset=${ARG_OFFSET}>)
+  set(seal "")
+  if(ARG_ROBOT)
+    set(seal COMMAND /usr/bin/python3 ${PROJECT_SOURCE_DIR}/tools/run/seal_image ${output}.elf --board ${folder} --robot ${ARG_ROBOT})
+  endif()
   add_custom_command(TARGET ${ARG_NAME} POST_BUILD
     COMMAND ${CMAKE_OBJCOPY} -O binary ${output}.elf ${output}.bin
+    ${seal}
     COMMAND ${CMAKE_OBJCOPY} -O ihex ${output}.elf ${output}.hex
     BYPRODUCTS ${output}.bin ${output}.hex ${output}.map)
 endfunction()

@@ -8,25 +8,42 @@ import shutil
 import struct
 import subprocess
 import tempfile
+import sys
 import unittest
 
+sys.dont_write_bytecode = True
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.realpath(__file__))))
 TOOL = os.path.join(ROOT, "tools", "run", "flash_board")
-CODE = bytes(range(64))
+sys.path.insert(0, os.path.join(ROOT, "tools", "python"))
+
+from tetap import image_header  # noqa: E402
 
 
-def elf(address):
+def code(address, board="ark_cannode", robot="rover"):
+    """A whole image that does nothing, with its header."""
+    header = image_header.Header(0, 0xABCDEF10, 1024, address, board, robot)
+    image = bytearray(1024)
+    image[0x200:0x25C] = header.packed()
+    header.crc = image_header.crc_of(image)
+    image[0x200:0x25C] = header.packed()
+    return bytes(image)
+
+
+
+
+def elf(address, stored):
     """An ELF file for ARM with one section of code at `address` and one symbol."""
     names, strings = b"\0.text\0.shstrtab\0.symtab\0.strtab\0", b"\0start\0"
     symbols = bytes(16) + struct.pack("<IIIBBH", 1, address, 4, 0x12, 0, 1)
-    parts, offset = [], 52
-    for content in (CODE, names, symbols, strings):
+    parts, offset = [], 84
+    for content in (stored, names, symbols, strings):
         parts.append((offset, len(content)))
         offset += len(content)
     sections = [(0,) * 10, (1, 1, 6, address, *parts[0], 0, 0, 4, 0), (7, 3, 0, 0, *parts[1], 0, 0, 1, 0), (17, 2, 0, 0, *parts[2], 4, 1, 4, 16),
                 (25, 3, 0, 0, *parts[3], 0, 0, 1, 0)]
-    start = b"\x7fELF\x01\x01\x01" + bytes(9) + struct.pack("<HHIIIIIHHHHHH", 2, 40, 1, address, 0, offset, 0x05000000, 52, 32, 0, 40, len(sections), 2)
-    return start + CODE + names + symbols + strings + b"".join(struct.pack("<10I", *section) for section in sections)
+    start = b"\x7fELF\x01\x01\x01" + bytes(9) + struct.pack("<HHIIIIIHHHHHH", 2, 40, 1, address, 52, offset, 0x05000000, 52, 32, 1, 40, len(sections), 2)
+    load = struct.pack("<8I", 1, 84, address, address, len(stored), len(stored), 5, 4)
+    return start + load + stored + names + symbols + strings + b"".join(struct.pack("<10I", *section) for section in sections)
 
 
 class FlashBoard(unittest.TestCase):
@@ -42,11 +59,12 @@ class FlashBoard(unittest.TestCase):
         self.image = os.path.join(self.folder.name, "robot.elf")
         self.store(0x08000000)
 
-    def store(self, address):
+    def store(self, address, board="ark_cannode", image=None):
+        self.code = code(address, board) if image is None else image
         with open(self.image, "wb") as file:
-            file.write(elf(address))
+            file.write(elf(address, self.code))
         with open(self.image.replace(".elf", ".bin"), "wb") as file:
-            file.write(CODE)
+            file.write(self.code)
 
     def install(self, tool, prints="", status=0):
         path = os.path.join(self.bin, tool)
@@ -72,7 +90,7 @@ class FlashBoard(unittest.TestCase):
         printed = self.flash("--probe", "stlink")
         flashing = f"st-flash --reset write {self.image.replace('.elf', '.bin')} 0x08000000"
         self.assertIn(f"flash: {flashing}\n", printed)
-        self.assertIn(f"robot.bin, 64 bytes, sha256 {hashlib.sha256(CODE).hexdigest()}, to 0x08000000", printed)
+        self.assertIn(f"robot.bin, 1024 bytes, sha256 {hashlib.sha256(self.code).hexdigest()}, to 0x08000000", printed)
         self.assertIn("SWDIO is PA13", printed)
         self.assertEqual(self.called(), ["st-info --probe", flashing])
 
@@ -102,6 +120,7 @@ class FlashBoard(unittest.TestCase):
 
     def test_each_board_has_its_chip_and_its_connector(self):
         self.install("openocd")
+        self.store(0x08000000, "nucleo_g474re")
         printed = self.flash("--probe", "openocd", board="nucleo_g474re")
         self.assertIn("onto the Nucleo-G474RE by its USB connector CN1", printed)
         self.assertEqual(self.called()[0], "openocd -f interface/stlink.cfg -f target/stm32g4x.cfg -c init; exit")
@@ -131,6 +150,22 @@ class FlashBoard(unittest.TestCase):
         for board in ("", "linux"):  # make without BOARD= passes linux
             said = self.flash(status=2, board=board)
             self.assertEqual(said, "flash: which board? BOARD=NAME, one of: ark_cannode nucleo_g474re\n")
+
+    def test_a_wrong_damaged_or_cut_image_is_refused_in_one_line(self):
+        self.install("st-flash")
+        self.install("st-info", "serial: 1")
+        whole = code(0x08000000)
+        flipped = whole[:700] + bytes([whole[700] ^ 1]) + whole[701:]
+        for image, what in ((code(0x08000000, "nucleo_g474re"), "for board 'nucleo_g474re', not for 'ark_cannode'"), (flipped, "damaged: CRC-32 "),
+                            (whole[:1000], "1000 bytes, its header says 1024: cut or joined"), (bytes(1024), "without an image header"),
+                            (code(0x08010000), "for 0x08010000, not for 0x08000000")):
+            self.store(0x08000000, image=image)
+            for probe in ("stlink", "openocd"):
+                said = self.flash("--probe", probe, "--dry-run", status=2)
+                if probe == "stlink":
+                    self.assertIn(what, said)
+                self.assertEqual(said.count("\n"), 1, said)
+        self.assertEqual(self.called(), [])
 
     def test_a_dry_run_is_1_or_nothing(self):
         self.assertIn("dry run, nothing was written", self.flash("--probe", "stlink", DRY_RUN="1"))

@@ -13,8 +13,8 @@ import subprocess
 import threading
 import time
 
-# The commit in a program (toolchain/version.cmake) and the linker's build id, made of it: where it is from, not what it does.
-COMMIT = re.compile(rb"tetap-git:.{6}|\x04\0\0\0\x14\0\0\0\x03\0\0\0GNU\0.{20}", re.S)
+# The commit in a program (toolchain/version.cmake), and what is made of it, the image header's CRC and the linker's build id: where it is from, not what it does.
+COMMIT = re.compile(rb"tetap-git:.{6}|tetapIMG.{8}|\x04\0\0\0\x14\0\0\0\x03\0\0\0GNU\0.{20}", re.S)
 RACY_NS = 2_000_000_000  # a file changed this recently may change again without another time: its hash is not kept
 ABSENT = "absent"
 
