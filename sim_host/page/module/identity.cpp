@@ -10,6 +10,7 @@
 #include <array>
 #include <cstdint>
 #include <optional>
+#include <utility>
 
 namespace tetap::page {
 
@@ -19,7 +20,7 @@ constexpr std::uint64_t kEnough = 400'000;  ///< frames: minutes of any bus
 
 struct Block {
   std::uint64_t frames = 0;
-  std::array<std::uint64_t, bus::kBlock> offsets{};
+  std::array<std::uint64_t, bus::kBlock + bus::kMapBlock> offsets{};
   std::optional<std::uint32_t> config;
   std::optional<std::uint64_t> first_us, last_us;  ///< times of its Sync frames, which are the node's own
 
@@ -27,6 +28,12 @@ struct Block {
   [[nodiscard]] double duration_s(base::Micros of_log) const {
     const bool known = first_us && *last_us > *first_us;
     return static_cast<double>(known ? static_cast<std::int64_t>(*last_us - *first_us) : of_log.us) * 1e-6;
+  }
+  /// Ids of maps, scans and images follow the node's first ones.
+  void take(Block& following) {
+    frames += following.frames;
+    std::copy_n(following.offsets.begin(), bus::kMapBlock, offsets.begin() + bus::kBlock);
+    following = {};
   }
 };
 
@@ -44,7 +51,9 @@ constexpr auto kFrames = std::to_array<FrameOf>({{sensor::Sensor::kImu, bus::Imu
                                                  {sensor::Sensor::kGnssVelocity, bus::InGnssVelEN::kOffset},
                                                  {sensor::Sensor::kMagnetometer, bus::InMag::kOffset},
                                                  {sensor::Sensor::kBarometer, bus::InBaro::kOffset},
-                                                 {sensor::Sensor::kHeading, bus::InHeading::kOffset}});
+                                                 {sensor::Sensor::kHeading, bus::InHeading::kOffset},
+                                                 {sensor::Sensor::kScan, bus::InScanHead::kOffset},
+                                                 {sensor::Sensor::kFeature, bus::InImage::kOffset}});
 
 void put_inputs(Json& json, const Block& block, double duration_s) {
   json.key("inputs").begin('[');
@@ -84,8 +93,12 @@ sim::Result<std::string> identity_of_log() {
   }
   if (log.failure()) return *log.failure();
   if (seen == 0) return sim::Failure{"no CAN data frame in the log"};
-  const auto most = std::max_element(blocks.begin(), blocks.end(),
-                                     [](const Block& a, const Block& b) { return a.frames < b.frames; });
+  for (std::size_t i = 0; i + 1 < blocks.size(); i += 2)
+    if (blocks[i].frames > 0 && !blocks[i + 1].config) blocks[i].take(blocks[i + 1]);
+  // A node that speaks is the log's, however much else the bus carries.
+  const auto most = std::max_element(blocks.begin(), blocks.end(), [](const Block& a, const Block& b) {
+    return std::pair(a.config.has_value(), a.frames) < std::pair(b.config.has_value(), b.frames);
+  });
   Json json;
   json.begin('{').member("base", static_cast<std::uint32_t>(most - blocks.begin()) * bus::kBlock);
   if (most->config) json.member("config", *most->config);

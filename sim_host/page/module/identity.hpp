@@ -8,8 +8,8 @@
 
 namespace tetap::page {
 
-/// JSON {base, config or null, inputs: [kinds of sensors]}. The block of 64 ids with the most frames of eight bytes is
-/// the node's. Fails as the log does, and for a log without a data frame.
+/// JSON {base, config or null, inputs: [kinds of sensors]}. The node's block of ids is that in which a node speaks,
+/// else the one with the most frames of eight bytes. Fails as the log does, and for a log without a data frame.
 sim::Result<std::string> identity_of_log();
 
 }  // namespace tetap::page

@@ -49,7 +49,7 @@ export async function session(modules, file, out, { serial = false, width = 1180
   };
   const diagnosed = () => page.waitForFunction(() => document.body.dataset.diagnosed, { timeout: 60000 });
   const upload = async (...paths) => {
-    await page.evaluate(() => delete document.body.dataset.diagnosed);
+    await page.evaluate(() => ["diagnosed", "state"].forEach((name) => delete document.body.dataset[name]));
     await (await page.$("#file")).uploadFile(...paths);
   };
   await page.setViewport({ width, height });

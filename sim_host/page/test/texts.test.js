@@ -5,6 +5,7 @@ import { readFileSync, readdirSync } from "node:fs";
 import { TEXTS, decimal, say, speak } from "../web/texts.js";
 import { FAULTS_ID, PIECES_ID, ofModule } from "../web/texts_module.js";
 import { CODES_ID, ROWS_ID, codeText, rowText } from "../web/texts_rows.js";
+import { DOCTOR_ID, WORDS_ID, doctorText } from "../web/texts_doctor.js";
 
 const web = new URL("../web/", import.meta.url);
 const names = (file, pattern) => [...readFileSync(new URL(file, import.meta.url), "utf8").matchAll(pattern)].map((found) => found[1]);
@@ -75,4 +76,33 @@ test("Indonesian has a comma in numbers, and in nothing else", () => {
 test("each sentence that is put into Indonesian is one of the module", () => {
   const folders = ["../../csv/", "../module/"], code = folders.flatMap((folder) => readdirSync(new URL(folder, import.meta.url)).filter((file) => file.endsWith(".cpp")).map((file) => readFileSync(new URL(folder + file, import.meta.url), "utf8"))).join("");
   for (const [english] of PIECES_ID) assert.ok(code.includes(english), english);
+});
+
+/** Literals of the doctor as its sentences have them: # for a number, @ for words. */
+const doctor = readdirSync(new URL("../../doctor/", import.meta.url)).filter((file) => /\.[ch]pp$/.test(file)).flatMap((file) => {
+  const code = readFileSync(new URL(`../../doctor/${file}`, import.meta.url), "utf8").replace(/\/\/.*$/gm, "").replace(/"\s*\n\s*"/g, "");
+  return [...code.matchAll(/"((?:[^"\\\n]|\\.)*)"/g)].map(([, text]) => text.replace(/%[-.\d]*(?:llu|zu|[dfgu])/g, "#").replace(/(?:%[sc])+/g, "@").replaceAll("%%", "%"));
+});
+
+test("each sentence of the doctor about a log has Indonesian words, with the same values", () => {
+  const all = doctor.join("\n");
+  for (const [english, own] of DOCTOR_ID) {
+    // Words may be joined to a sentence in pieces.
+    for (const piece of english.split("@").map((text) => text.trim())) assert.ok(all.includes(piece), english);
+    const values = english.match(/[#@]/g)?.length ?? 0;
+    assert.deepEqual([...own.matchAll(/\{(\d)\}/g)].map(([, i]) => Number(i)).sort(), [...Array(values).keys()], english);
+  }
+  for (const words of Object.keys(WORDS_ID)) assert.ok(all.includes(words) || /^(GNSS|the wheels|against)$/.test(words), words);
+  speak("id");
+  const sentences = doctor.filter((text) => /^[A-Z][a-z]+ .*[a-z]{3}.*\.$/.test(text) && text.includes("#"));
+  assert.ok(sentences.length > 30);
+  for (const text of sentences) {
+    const filled = [text, text.replace(/@\.$/, ".")].map((one) => one.replaceAll("#", "1.5").replaceAll("@", "left"));
+    assert.ok(filled.some((one) => doctorText(one).own), text);
+  }
+  const said = doctorText("The left wheel stands still for 12.5 s while the other one turns. The magnetic field turns with the gyroscope.");
+  assert.deepEqual(said, { text: "Roda kiri diam selama 12,5 s sementara roda lainnya berputar. Medan magnet berputar searah dengan giroskop.", own: true });
+  assert.deepEqual(doctorText("Nobody knows this."), { text: "Nobody knows this.", own: false });
+  speak("en");
+  assert.equal(doctorText("The left wheel").text, "The left wheel");
 });

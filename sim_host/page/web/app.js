@@ -36,9 +36,17 @@ const SIGMAS = { x_m: "std_x_m", y_m: "std_y_m", yaw_rad: "std_yaw_rad", speed_m
 /** Cards that show the first run alone, also where there is a second. */
 const FIRST_RUN = new Set(["findings", "bits", "innovation", "timeline", "why"]);
 
+/** Estimators whose updates are not those of src/tetap/filter/viewed.hpp. */
+const BY_OTHER_EQUATIONS = new Set(["Ukf", "Particle", "Grid"]);
+
+/** What a task throws whose log or robot has given way to another: nobody is told of it. */
+const OVERTAKEN = new Error("overtaken");
+
 class App {
   constructor() {
     this.view = new View();
+    this.turn = 0; // counts what was opened or chosen
+    this.maker = -1; // number of the robot that made the log
     this.state = "x_m";
     this.charts = [];
     this.described = []; // numbers of a recording's robot that its form has: [[row, element, value]]
@@ -99,29 +107,50 @@ class App {
   /** Files that were dropped together: a log, or tables of one recording. */
   async openFiles(files) {
     if (files.length === 0) return;
+    this.turn++;
     this.status(() => say("open.reading", files[0].name), "busy");
     try {
-      const log = files.length === 1 ? await logOfMcap(files[0]) : null;
+      const log = files.length === 1 ? await this.still(logOfMcap(files[0])) : null;
       if (log) return await this.open(log);
-      const tables = await tablesOf(files);
+      const tables = await this.still(tablesOf(files));
       if (!tables) return await this.open(files[0]);
       this.play.pause();
-      await this.tables.show(tables);
+      await this.still(this.tables.show(tables));
       this.forget();
       this.status(() => say("tables.status"), "tables");
     } catch (error) {
+      if (error === OVERTAKEN) return;
       this.forget();
       this.fail(error);
     }
   }
   /** {maker, shown, choose()} where a robot of this page made the log, and another is shown; else null. */
   other() {
-    const { robots } = this.about, maker = robots.findIndex(({ config }) => config === this.identity?.config);
-    return maker < 0 || this.known || maker === this.robot ? null : { maker: robots[maker].name, shown: robots[this.robot].name, choose: () => this.chooseRobot(maker) };
+    const { robots } = this.about, { maker } = this;
+    return maker < 0 || this.known ? null : { maker: robots[maker].name, shown: robots[this.robot].name, choose: () => this.chooseRobot(maker) };
+  }
+  /** Number of the robot that made the log, -1: none of this page. Robots that differ in their estimators alone have the same parameters: it is the one whose epochs come out as recorded. */
+  async makerOf(log) {
+    const { config, base } = this.identity, fitting = this.about.robots.flatMap((robot, i) => (robot.config === config ? [i] : []));
+    if (fitting.length < 2) return fitting[0] ?? -1;
+    const part = await this.still(beginningOf(log)), repeats = ({ result }) => result.epochs_compared > 0 && result.epochs_different === 0;
+    await this.still(this.tasks.run("open", { log: part }));
+    let found = -1;
+    for (const robot of fitting) if (found < 0 && (await this.still(this.tasks.run("replay", { robot, base, settings: [], mode: MODE.automatic }).then(repeats, () => false)))) found = robot;
+    await this.still(this.tasks.run("open", { log }));
+    return found < 0 ? fitting[0] : found;
+  }
+  /** What `task` resolves to, unless something else has been opened or chosen in the meantime. @throws OVERTAKEN */
+  async still(task) {
+    const { turn } = this, ended = await task.then((done) => ({ done }), (error) => ({ error }));
+    if (turn !== this.turn) throw OVERTAKEN;
+    if (ended.error) throw ended.error;
+    return ended.done;
   }
   /** What was opened before: nothing of it stays beside other words. */
   forget() {
-    Object.assign(this, { file: null, identity: null, truth: null, described: [], run: null, second: null, findings: null, why: null, opened: null });
+    this.turn++;
+    Object.assign(this, { file: null, identity: null, maker: -1, truth: null, described: [], run: null, second: null, findings: null, why: null, opened: null });
     $("views").hidden = $("ask").hidden = true;
     this.renderRobots();
     this.renderDrop();
@@ -135,11 +164,11 @@ class App {
     this.compare.forget();
     this.status(() => say("open.reading", file.name), "busy");
     try {
-      this.identity = await this.tasks.run("open", { log: file });
-      const known = this.about.robots.findIndex(({ config }) => config === this.identity.config);
-      this.known = known >= 0 && (robot === null || robot === known);
-      if (known < 0 && robot === null) return this.ask();
-      this.robot = robot ?? known;
+      this.identity = await this.still(this.tasks.run("open", { log: file }));
+      this.maker = await this.makerOf(file);
+      if (this.maker < 0 && robot === null) return this.ask();
+      this.robot = robot ?? this.maker;
+      this.known = this.robot === this.maker;
       this.numbers.of(this.describedRobot());
       await this.replayAll();
       await this.takeGiven();
@@ -169,6 +198,7 @@ class App {
     this.renderRobots();
   }
   fail(error) {
+    if (error === OVERTAKEN) return;
     this.run = null;
     $("views").hidden = true;
     this.status(() => (error.trapped ? say("open.trapped", error.message) : say("open.failed", ofModule(error.message))), "failed");
@@ -186,16 +216,16 @@ class App {
     this.render();
     this.status(() => this.title(), "done");
     $("status").scrollIntoView();
-    this.findings = await this.tasks.run("diagnose", this.task()).catch((error) => ({ failed: error.message }));
+    this.findings = await this.still(this.tasks.run("diagnose", this.task()).catch((error) => ({ failed: error.message })));
     this.renderFindings();
     document.body.dataset.diagnosed = "yes";
   }
   /** The first picture of a long log; what is refused here is said of the whole log. */
   async showBeginning() {
-    const part = await beginningOf(this.file);
-    await this.tasks.run("open", { log: part });
-    const played = await this.tasks.run("replay", this.task({ mode: MODE.lockstep })).catch(() => null);
-    await this.tasks.run("open", { log: this.file });
+    const part = await this.still(beginningOf(this.file));
+    await this.still(this.tasks.run("open", { log: part }));
+    const played = await this.still(this.tasks.run("replay", this.task({ mode: MODE.lockstep })).catch(() => null));
+    await this.still(this.tasks.run("open", { log: this.file }));
     if (!played) return;
     this.run = new Run(played);
     this.note = say("open.beginning", (part.size / 1e6).toFixed(0), (this.file.size / 1e6).toFixed(0));
@@ -207,16 +237,16 @@ class App {
   }
   /** A log that is no whole record is played by its inputs, and the page says so. */
   async replay(settings) {
-    const progress = (share) => this.status(say("open.playing", Math.round(100 * share)));
+    const { turn } = this, progress = (share) => turn === this.turn && this.status(() => say("open.playing", Math.round(100 * share)));
     if (this.lockstep !== this.file) {
       try {
-        return await this.tasks.run("replay", this.task({ settings, mode: MODE.automatic }), progress);
+        return await this.still(this.tasks.run("replay", this.task({ settings, mode: MODE.automatic }), progress));
       } catch (error) {
         if (!error.refused || settings.length > 0) throw error;
         this.refusal = error.message;
       }
     }
-    const played = await this.tasks.run("replay", this.task({ settings, mode: MODE.lockstep }), progress);
+    const played = await this.still(this.tasks.run("replay", this.task({ settings, mode: MODE.lockstep }), progress));
     this.lockstep = this.file;
     this.note = say("open.partly", this.refusal);
     return played;
@@ -227,7 +257,7 @@ class App {
     document.body.dataset.state = "busy";
     const settings = this.numbers.settings();
     try {
-      if (settings.length > 0) await this.tasks.run("check", this.task({ settings }));
+      if (settings.length > 0) await this.still(this.tasks.run("check", this.task({ settings })));
       if (settings.length > 0 && this.run) {
         const second = new Run(await this.replay(settings));
         if (second.result.estimates_sha256 === this.run.result.estimates_sha256) this.message = say("numbers.noeffect");
@@ -235,6 +265,7 @@ class App {
       }
       this.status(() => this.title(), "done");
     } catch (error) {
+      if (error === OVERTAKEN) return;
       this.message = error.message;
       this.status(error.message, "done");
     }
@@ -256,8 +287,9 @@ class App {
     return say("numbers.effect", most < 0 ? "–" : most.toFixed(3), when.toFixed(1), this.run.refusedOf()[0], second.refusedOf()[0]);
   }
   async chooseRobot(number) {
-    this.robot = number;
-    this.known = this.about.robots[number].config === this.identity?.config;
+    this.turn++;
+    Object.assign(this, { robot: number, findings: null, why: null, opened: null });
+    this.known = number === this.maker;
     this.numbers.of(this.describedRobot());
     this.compare?.forget();
     this.renderRobots();
@@ -361,8 +393,8 @@ class App {
   renderPath(keep) {
     const body = this.section("path", [say("path.legend"), ...(this.second ? [say("path.second")] : []), say("path.zoom")].join(" ")), before = keep ? this.path : null;
     this.path = new PathView(body, this.view, (one) => this.renderWhy(one));
-    if (before?.scale) Object.assign(this.path, { box: before.box, scale: before.scale });
-    this.path.show(this.runs(), this.truth, Boolean(before?.scale));
+    if (before?.moved) Object.assign(this.path, { box: before.box, scale: before.scale, moved: true });
+    this.path.show(this.runs(), this.truth, Boolean(before?.moved));
     body.append(element("button", { onclick: () => (this.path.fit(), this.view.show(this.view.whole), this.path.draw()) }, say("path.all")));
   }
   renderStates() {
@@ -402,7 +434,12 @@ class App {
     if (!this.opened) return;
     const { one, update, wait, failed } = this.opened, body = this.section("update", say("update.of", say(`source.${one.source}`), one.time.toFixed(2)));
     if (update) return renderUpdate(body, update);
-    replace(body, element("p", { class: failed ? "bad" : "note" }, failed ?? (wait ? say("update.wait") : say(one.refused ? "update.before" : "update.none", say(`check.${one.failed}`)))));
+    replace(body, element("p", { class: failed ? "bad" : "note" }, failed ?? (wait ? say("update.wait") : this.noUpdate(one))));
+  }
+  /** Why there is none behind a measurement. */
+  noUpdate({ refused, failed }) {
+    if (BY_OTHER_EQUATIONS.has(this.run.kind)) return say("update.kind", say(`kind.${this.run.kind}`));
+    return say(refused ? "update.before" : "update.none", say(`check.${failed}`));
   }
   renderCompare() {
     this.compare.render(this.section("compare", say("compare.what")), (progress) => this.compareAll(progress));
@@ -419,6 +456,6 @@ addEventListener("drop", (event) => {
   event.preventDefault();
   if (app.play) app.openFiles([...event.dataTransfer.files]);
 });
-addEventListener("resize", () => app.run && (app.path.draw(), app.timeline.draw()));
+addEventListener("resize", () => app.run && (app.path.resized(), app.timeline.draw()));
 if (navigator.language.startsWith("id")) speak("id");
 app.start().catch((error) => app.status(error.message, "failed"));

@@ -11,8 +11,7 @@ class Column {
     this.words = null; // of a column of text: code -> word
     this.codes = null;
   }
-  grow(rows) {
-    if (rows < this.values.length) return;
+  grow() {
     const wider = new Float64Array(2 * this.values.length);
     wider.set(this.values);
     this.values = wider;
@@ -49,10 +48,9 @@ export class Table {
 
   addLine(bytes, begin) {
     let at = begin;
-    for (const column of this.columns) {
-      column.grow(this.rows);
-      at = this.addCell(bytes, at, column) + 1;
-    }
+    // All columns have room for as many rows.
+    if (this.rows >= this.columns[0].values.length) this.columns.forEach((column) => column.grow());
+    for (const column of this.columns) at = this.addCell(bytes, at, column) + 1;
     this.rows++;
     return at;
   }
@@ -121,7 +119,7 @@ export class Table {
     if (this.columns.length === 0) this.columns = columns.map(({ name }) => new Column(name));
     columns.forEach(({ values, words }, i) => {
       const column = this.columns[i];
-      while (column.values.length <= this.rows + rows) column.grow(column.values.length);
+      while (column.values.length <= this.rows + rows) column.grow();
       const codes = words?.map((word) => column.word(word));
       for (let row = 0; row < rows; row++) column.values[this.rows + row] = codes && !Number.isNaN(values[row]) ? codes[values[row]] : values[row];
     });

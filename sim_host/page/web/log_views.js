@@ -2,9 +2,10 @@
 // What the page says of a log in words: its bits, what is wrong with it, and what became of one measurement.
 import { element, replace } from "./dom.js";
 import { times } from "./run.js";
-import { say } from "./texts.js";
+import { languageNow, say } from "./texts.js";
 import { shortest } from "./numbers.js";
 import { codeText } from "./texts_rows.js";
+import { doctorText } from "./texts_doctor.js";
 
 /** A share of refusals up to which they are outliers as every sensor has them. */
 const FEW = 0.02;
@@ -33,12 +34,14 @@ export function followable({ code, cause, evidence, change, remedies }, codes) {
 }
 const settingText = (remedy) => remedy.map(({ path, values }) => `${path} = ${values.map((value) => shortest(value, "float")).join(" ")}`).join(", ");
 
-/** What the doctor says of this log alone stays in its language. */
+/** A sentence of the doctor, marked as English where it is. */
+const said = (words) => element("span", { lang: doctorText(words).own ? languageNow() : "en" }, doctorText(words).text);
+
 function finding({ code, cause, evidence, change, remedies }, onTry) {
-  const own = codeText(code, cause);
-  return element("li", { "data-code": code }, element("strong", {}, own.cause), evidence ? element("p", {}, `${say("findings.evidence")}: `, element("span", { lang: "en" }, evidence)) : null,
-    own.remedy ? element("p", { class: "change" }, `${say("findings.change")}: ${own.remedy}`) : null,
-    change ? element("p", { class: own.remedy ? "note" : "change", lang: "en" }, own.remedy ? change : `${say("findings.change")}: ${change}`) : null,
+  const own = codeText(code, cause), remedy = change && (own.remedy === "" || doctorText(change).own) ? null : own.remedy;
+  return element("li", { "data-code": code }, element("strong", {}, own.cause), evidence ? element("p", {}, `${say("findings.evidence")}: `, said(evidence)) : null,
+    remedy ? element("p", { class: "change" }, `${say("findings.change")}: ${remedy}`) : null,
+    change ? element("p", { class: remedy ? "note" : "change" }, remedy ? null : `${say("findings.change")}: `, said(change)) : null,
     remedies.length > 1 ? element("p", { class: "note" }, say("findings.several")) : null,
     remedies.map((remedy) => element("p", {}, element("button", { "data-try": code, onclick: () => onTry(remedy) }, say("findings.try", settingText(remedy))))));
 }
@@ -47,7 +50,7 @@ function finding({ code, cause, evidence, change, remedies }, onTry) {
 export function renderFindings(body, found, run, codes, other, onTry) {
   const [refused, all] = run.refusedOf(), counted = refused === 0 ? null : element("p", { class: "note", id: "refused" }, say(refused <= FEW * all ? "findings.refused" : "findings.many", refused, all));
   const wrong = other ? element("li", { "data-code": "other_robot" }, element("strong", {}, say("findings.robot", other.maker, other.shown)), element("p", {}, element("button", { onclick: other.choose }, say("findings.choose", other.maker)))) : null;
-  const untold = found?.untold ? element("p", { class: "note", id: "untold", lang: "en" }, say("findings.untold", found.untold)) : null;
+  const untold = found?.untold ? element("p", { class: "note", id: "untold" }, say("findings.untold", doctorText(found.untold).text)) : null;
   const list = (...items) => element("ol", {}, wrong, ...items);
   if (!found) return replace(body, wrong && list(), element("p", { class: "note" }, say("findings.wait")), counted);
   if (found.failed) return replace(body, wrong && list(), element("p", { class: "warning" }, say("findings.failed", found.failed)), counted);

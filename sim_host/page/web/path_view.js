@@ -42,6 +42,12 @@ export class PathView {
     this.moved = false; // by the user
   }
 
+  /** Shows all of it at its new size, unless the user has chosen a part. */
+  resized() {
+    if (!this.moved) this.scale = null;
+    this.draw();
+  }
+
   place() {
     const [context, width, height] = sized(this.canvas, Math.min(HEIGHT, Math.max(280, innerHeight * 0.55)));
     this.scale ??= Math.min((width - 2 * MARGIN) / this.box.width, (height - 2 * MARGIN) / this.box.height);

@@ -204,7 +204,7 @@ export class Play {
   }
   renderWords() {
     const { mode, said } = this.live;
-    replace(this.parts.words, element("p", { class: `mode ${TONE[mode] ?? "note"}` }, mode ? say("play.mode", say(`word.${mode}`)) : say("play.silent")),
+    replace(this.parts.words, element("p", { class: `mode ${TONE[mode] ?? "note"}` }, mode ? say("play.mode", say(`word.${mode}`)) : say(this.live?.played.time_s > 0 ? "play.silent" : "play.ready")),
       mode ? element("p", { class: "note" }, say(`mode.${mode}`)) : null,
       element("ol", { class: "said", role: "log", "aria-label": say("play.said"), tabindex: "0" }, said.slice(-LINES).reverse().map((one) => this.line(one))));
   }

@@ -68,7 +68,7 @@ export const ROWS_ID = {
   "gnss.origin_latitude_deg": "Lintang titik asal peta.",
   "gnss.origin_longitude_deg": "Bujur titik asal peta.",
   "gnss.origin_height_m": "Tinggi titik asal peta di atas elipsoid.",
-  "inertial.imu": "Nomor IMU yang dipakai filter inersia dan filter attitude.",
+  "inertial.imu": "Nomor IMU yang dipakai filter inersia dan filter sikap.",
   "inertial.mounting_bs": "Rotasi dari sumbu IMU ke sumbu badan: x depan, y kiri, z atas.",
   "inertial.position_b_m": "Posisi IMU pada badan.",
   "inertial.gyro_radps_rthz": "Kerapatan derau giroskop.",

@@ -21,7 +21,7 @@ const STAYS = -1;
 export class ThinnedTable extends Table {
   constructor({ most, kinds, parts = false, changes = [], refusals = false }) {
     super();
-    Object.assign(this, { most: most - 1, kinds, parts, changes, refusals, every: 1, seen: new Map(), ordinals: new Float64Array(most) });
+    Object.assign(this, { most: most - 1, kinds, parts, changes, refusals, every: 1, seen: new Map(), ordinals: new Float64Array(most), found: null });
   }
   addLine(bytes, begin) {
     const end = super.addLine(bytes, begin), row = this.rows - 1, ordinal = this.ordinal(row);
@@ -33,17 +33,20 @@ export class ThinnedTable extends Table {
     }
     return end;
   }
-  value(name, row) {
-    return this.column(name)?.values[row] ?? NaN;
+  /** Columns by name, looked up once: the first line names them all. */
+  watched() {
+    const all = (names) => names.map((name) => this.column(name));
+    return (this.found ??= { kinds: all(this.kinds), changes: all(this.changes), verdict: this.refusals ? this.column("verdict") : null });
   }
   /** Of a row among those of its kind. */
   ordinal(row) {
+    const { kinds, changes, verdict } = this.watched(), value = (column) => column?.values[row] ?? NaN;
     const filled = this.parts ? this.columns.reduce((bits, { values }) => 2 * bits + (Number.isNaN(values[row]) ? 0 : 1), 0) : 0;
-    const kind = this.kinds.reduce((key, name) => 4096 * key + this.value(name, row), filled), now = this.changes.map((name) => this.value(name, row));
+    const kind = kinds.reduce((key, column) => 4096 * key + value(column), filled), now = changes.map(value);
     const before = this.seen.get(kind) ?? { rows: 0, values: null };
-    const changed = this.changes.length > 0 && !before.values?.every((value, i) => value === now[i]);
+    const changed = changes.length > 0 && !before.values?.every((value, i) => value === now[i]);
     this.seen.set(kind, { rows: before.rows + 1, values: now });
-    return changed || (this.refusals && !NO_REFUSAL.has(this.word("verdict", row))) ? STAYS : before.rows;
+    return changed || (verdict && !NO_REFUSAL.has(verdict.words?.[value(verdict)] ?? "")) ? STAYS : before.rows;
   }
   /** Twice as far apart. What stays may be more than half of the room: then there has to be more. */
   thin() {
@@ -75,8 +78,9 @@ export const tableOf = (name) => (FORMS[name] ? new ThinnedTable(FORMS[name]) : 
 export const LONG_BYTES = 64e6;
 const BEGINNING_BYTES = 12e6, LONGEST_LINE = 4096;
 
-/** Whole lines from the beginning of a log. */
+/** Whole lines from the beginning of a log; of a short one all. */
 export async function beginningOf(log) {
+  if (log.size <= BEGINNING_BYTES) return log;
   const tail = new Uint8Array(await log.slice(BEGINNING_BYTES - LONGEST_LINE, BEGINNING_BYTES).arrayBuffer());
   return log.slice(0, BEGINNING_BYTES - LONGEST_LINE + tail.lastIndexOf(10) + 1);
 }
