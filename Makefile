@@ -166,7 +166,6 @@ page: setup ## the player as one file for a browser, with all robots: out/page/t
 	@sim_host/page/pack build/page$(page_suffix)/sim_host/page/tetap.wasm out/page/tetap.html
 
 page-test: setup page ## the page in a headless browser against the host's programs, pictures in out/page (its browser is installed for it)
-	@tools/run/build_preset host:tetap-world,tetap-play,robot_rover,robot_mrclam,robot_husky
 	@sim_host/page/test/run
 
 setup:
