@@ -8,6 +8,7 @@
 #include "hal/can_bus.hpp"
 #include "hal/encoder_counter.hpp"
 #include "hal/spi_device.hpp"
+#include "hal/storage.hpp"
 #include "tetap/base/time.hpp"
 
 #include <concepts>
@@ -59,6 +60,17 @@ concept ReportingBoard = Board<B> && requires(B& board) {
 /// A board with memory for a second copy of the node's state, which a recording that begins after boot starts from.
 template <class B>
 concept SnapshotBoard = Board<B> && std::remove_cvref_t<B>::kSnapshots;
+
+/// A board that keeps what the node saves.
+template <class B>
+concept StorageBoard = Board<B> && requires(B& board) {
+  requires Storage<typename B::Storage>;
+  { B::storage() } -> std::same_as<typename B::Storage>;
+  /// The watchdog waits for two of the longest erases, from now on and anew from each call.
+  { board.begin_storing() } -> std::same_as<void>;
+  /// The watchdog waits as before; where it did not run, it runs.
+  { board.end_storing() } -> std::same_as<void>;
+};
 
 /// A board on a CANopen bus.
 template <class B>

@@ -41,7 +41,7 @@ constexpr const char* kHelp =
     "  --base ID          first identifier of the node's block (default 0x300)\n"
     "  --board NAME       image: refused where it is for another board; --robot NAME in the same way\n"
     "  --json             scan, list, get, diff: a list; else an object with the result\n\n"
-    "A row that needs a restart waits for a Begin frame; it is lost with the node's power: no board keeps it yet.\n"
+    "A row that needs a restart waits for a Begin frame or a save.\n"
     "Status: 0 done, 1 refused or no answer, 2 wrong command line.\n";
 
 base::Micros now() {

@@ -15,8 +15,9 @@ namespace tetap::sim {
 namespace {
 
 constexpr int kAttempts = 5;
-constexpr base::Micros kPatience{300'000};  ///< for the answers of one attempt
-constexpr std::size_t kAtOnce = 6;          ///< a node answers one a tick, and keeps eight
+constexpr base::Micros kPatience{300'000};         ///< for the answers of one attempt
+constexpr base::Micros kSavePatience{10'000'000};  ///< flash may be erased before the answer
+constexpr std::size_t kAtOnce = 6;                 ///< a node answers one a tick, and keeps eight
 
 std::uint32_t word_of(const param::Parameters& p, const param::Row& row, std::size_t word) {
   std::uint32_t value = 0;
@@ -38,9 +39,9 @@ std::string why(bus::ParamAnswer answer) {
     case bus::ParamAnswer::kNotTogether:
       return "a rule between rows is broken; nothing was changed";
     case bus::ParamAnswer::kNotKept:
-      return "this board keeps no parameters";
+      return "this board keeps no parameters, or its flash has failed";
     case bus::ParamAnswer::kBusy:
-      return "the node was busy with another command";
+      return "the node is busy with another command; or it moves, is in lockstep, or was saved within the last minute";
     default:
       return "the node gave answer " + std::to_string(static_cast<int>(answer));
   }
@@ -108,10 +109,10 @@ param::Parameters ParameterClient::read(bus::ParamSource source) {
 }
 
 template <class Message, class Done>
-bus::EstParamSet ParameterClient::act(const Message& message, Done&& done) {
+bus::EstParamSet ParameterClient::act(const Message& message, base::Micros patience, Done&& done) {
   for (int attempt = 0; attempt < kAttempts; ++attempt) {
     const std::uint8_t counter = send(message);
-    const base::Micros until = now_() + kPatience;
+    const base::Micros until = now_() + patience;
     while (const auto frame = answer(until)) {
       const auto told = bus::decode<bus::EstParamSet>(bus::payload(*frame));
       if (!told || told->set_ctr != counter || told->set_page_id != Message::kPage) continue;
@@ -141,7 +142,7 @@ bus::EstParamSet ParameterClient::apply(const param::Parameters& before, const p
   constexpr std::uint32_t kName = param::StagedParameters::kName;
   return act(
       bus::CmdParamApply{.apply_before_crc = param::crc(before) & kName, .apply_after_crc = param::crc(staged) & kName},
-      [&](const bus::EstParamSet& told) { return told.set_config == param::crc(staged); });
+      kPatience, [&](const bus::EstParamSet& told) { return told.set_config == param::crc(staged); });
 }
 
 bus::EstParamSet ParameterClient::apply(const param::Parameters& before) {
@@ -149,12 +150,12 @@ bus::EstParamSet ParameterClient::apply(const param::Parameters& before) {
 }
 
 bus::EstParamSet ParameterClient::save(const param::Parameters& before) {
-  return act(bus::CmdParamSave{.save_before_crc = param::crc(before) & param::StagedParameters::kName},
+  return act(bus::CmdParamSave{.save_before_crc = param::crc(before) & param::StagedParameters::kName}, kSavePatience,
              [](const bus::EstParamSet&) { return false; });
 }
 
 bus::EstParamSet ParameterClient::restore(const param::Parameters& before) {
-  return act(bus::CmdParamRestore{.restore_before_crc = param::crc(before) & param::StagedParameters::kName},
+  return act(bus::CmdParamRestore{.restore_before_crc = param::crc(before) & param::StagedParameters::kName}, kPatience,
              [](const bus::EstParamSet& told) { return told.set_changed == 0; });
 }
 

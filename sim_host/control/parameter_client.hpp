@@ -62,7 +62,7 @@ class ParameterClient {
   bus::EstParamSet apply(const param::Parameters& before, const param::Parameters& staged);
   /// `done`: whether an answer shows that an earlier attempt was obeyed.
   template <class Message, class Done>
-  bus::EstParamSet act(const Message& message, Done&& done);
+  bus::EstParamSet act(const Message& message, base::Micros patience, Done&& done);
 
   std::uint32_t can_base_;
   Send send_;

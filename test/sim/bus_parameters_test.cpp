@@ -284,7 +284,8 @@ TEST(BusParameters, ThatAreWrongChangeNothing) {
   for (const char* path : {"can_base", "bus.commands", "bus.key", "loop.lockstep", "loop.period_us"})
     EXPECT_EQ(answer(bench, at, bus::CmdParamSet{.set_row_id = index_of(path)}), ParamAnswer::kRefused) << path;
   EXPECT_EQ(answer(bench, at, bus::CmdParamGet{.get_row_id = index_of("bus.key")}), ParamAnswer::kUnknown);
-  EXPECT_EQ(answer(bench, at, bus::CmdParamSave{}), ParamAnswer::kNotKept);
+  EXPECT_EQ(answer(bench, at, bus::CmdParamSave{}), ParamAnswer::kBusy) << "the firmware around the node answers it";
+  EXPECT_TRUE(bench.node.parameter_commands().take_save());
   EXPECT_EQ(answer(bench, at, bus::CmdParamApply{.apply_before_crc = before ^ 1, .apply_after_crc = before}),
             ParamAnswer::kOtherActive);
   // Somebody else's row is staged: the Apply that does not know it fails.

@@ -6,6 +6,8 @@
 #include "hal/chip/arm/systick_clock.hpp"
 #include "hal/chip/stm32/boot_cause.hpp"
 #include "hal/chip/stm32/can_controller.hpp"
+#include "hal/chip/stm32/flash_cells.hpp"
+#include "hal/chip/stm32/flash_storage_f4.hpp"
 #include "hal/chip/stm32/gpio.hpp"
 #include "hal/chip/stm32/peripheral_clocks.hpp"
 #include "hal/chip/stm32/pll_plan_f4.hpp"
@@ -22,6 +24,7 @@ struct F4Chip {
   using Dma = DmaStream<Mmio>;
   using SpiData = SpiDataOfF4;
   using Usart = UsartOfF4;
+  using Storage = FlashStorageF4<Mmio, FlashCells>;
 
   static constexpr std::uint32_t kRcc = stm32f412::rcc::kRcc, kPwr = stm32f412::pwr::kPwr,
                                  kFlash = stm32f412::flash::kFlash, kIwdg = stm32f412::iwdg::kIwdg,
@@ -41,6 +44,7 @@ struct F4Chip {
   static constexpr Pin pb(std::uint8_t number) { return {stm32f412::gpio::kGpiob, number}; }
   static constexpr Pin pc(std::uint8_t number) { return {stm32f412::gpio::kGpioc, number}; }
   static Can can(const SysTickClock<Mmio>& clock) { return Can{Mmio{stm32f412::can::kCan1}, clock}; }
+  static Storage storage() { return Storage{Mmio{kFlash}, kept_cells()}; }
 
   /// SYSCFG stays off: no pin interrupts.
   static void power_blocks() {

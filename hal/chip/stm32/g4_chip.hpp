@@ -7,6 +7,9 @@
 #include "hal/chip/stm32/boot_cause.hpp"
 #include "hal/chip/stm32/dma_channel.hpp"
 #include "hal/chip/stm32/fdcan_controller.hpp"
+#include "hal/chip/stm32/flash_cells.hpp"
+#include "hal/chip/stm32/flash_ecc_trap.hpp"
+#include "hal/chip/stm32/flash_storage_g4.hpp"
 #include "hal/chip/stm32/gpio.hpp"
 #include "hal/chip/stm32/peripheral_clocks.hpp"
 #include "hal/chip/stm32/pll_plan_g4.hpp"
@@ -22,6 +25,7 @@ struct G4Chip {
   using Dma = DmaChannel<Mmio>;
   using SpiData = SpiDataOfG4;
   using Usart = UsartOfG4;
+  using Storage = FlashStorageG4<Mmio, FlashCells, FlashEccTrap>;
 
   static constexpr std::uint32_t kRcc = stm32g474::rcc::kRcc, kPwr = stm32g474::pwr::kPwr,
                                  kFlash = stm32g474::flash::kFlash, kIwdg = stm32g474::iwdg::kIwdg,
@@ -45,6 +49,8 @@ struct G4Chip {
   static Can can(const SysTickClock<Mmio>& clock) {
     return Can{Mmio{stm32g474::fdcan::kFdcan1}, Mmio{stm32g474::fdcan::kFdcan}, clock};
   }
+
+  static Storage storage() { return Storage{Mmio{kFlash}, kept_cells()}; }
 
   /// SYSCFG stays off: no pin interrupts.
   static void power_blocks() {

@@ -201,6 +201,38 @@ inline constexpr Field kDcen{10, 1};
 inline constexpr Field kIcrst{11, 1};
 inline constexpr Field kDcrst{12, 1};
 }
+/// FLASH.KEYR: Flash key register
+namespace keyr {
+inline constexpr std::uint32_t kOffset = 0x004;
+inline constexpr std::uint32_t kResetValue = 0x00000000;
+inline constexpr Field kKey{0, 32};
+}
+/// FLASH.SR: Status register
+namespace sr {
+inline constexpr std::uint32_t kOffset = 0x00C;
+inline constexpr std::uint32_t kResetValue = 0x00000000;
+inline constexpr Field kEop{0, 1};
+inline constexpr Field kOperr{1, 1};
+inline constexpr Field kWrperr{4, 1};
+inline constexpr Field kPgaerr{5, 1};
+inline constexpr Field kPgperr{6, 1};
+inline constexpr Field kPgserr{7, 1};
+inline constexpr Field kBsy{16, 1};
+}
+/// FLASH.CR: Control register
+namespace cr {
+inline constexpr std::uint32_t kOffset = 0x010;
+inline constexpr std::uint32_t kResetValue = 0x80000000;
+inline constexpr Field kPg{0, 1};
+inline constexpr Field kSer{1, 1};
+inline constexpr Field kMer{2, 1};
+inline constexpr Field kSnb{3, 4};
+inline constexpr Field kPsize{8, 2};
+inline constexpr Field kStrt{16, 1};
+inline constexpr Field kEopie{24, 1};
+inline constexpr Field kErrie{25, 1};
+inline constexpr Field kLock{31, 1};
+}
 }  // namespace flash
 
 namespace gpio {

@@ -220,6 +220,64 @@ inline constexpr Field kDcen{10, 1};
 inline constexpr Field kIcrst{11, 1};
 inline constexpr Field kDcrst{12, 1};
 }
+/// FLASH.KEYR: Flash key register
+namespace keyr {
+inline constexpr std::uint32_t kOffset = 0x008;
+inline constexpr std::uint32_t kResetValue = 0x00000000;
+inline constexpr Field kKeyr{0, 32};
+}
+/// FLASH.SR: Flash status register
+namespace sr {
+inline constexpr std::uint32_t kOffset = 0x010;
+inline constexpr std::uint32_t kResetValue = 0x00000000;
+inline constexpr Field kEop{0, 1};
+inline constexpr Field kOperr{1, 1};
+inline constexpr Field kProgerr{3, 1};
+inline constexpr Field kWrperr{4, 1};
+inline constexpr Field kPgaerr{5, 1};
+inline constexpr Field kSizerr{6, 1};
+inline constexpr Field kPgserr{7, 1};
+inline constexpr Field kMisserr{8, 1};
+inline constexpr Field kFasterr{9, 1};
+inline constexpr Field kRderr{14, 1};
+inline constexpr Field kOptverr{15, 1};
+inline constexpr Field kBsy{16, 1};
+}
+/// FLASH.CR: Flash control register
+namespace cr {
+inline constexpr std::uint32_t kOffset = 0x014;
+inline constexpr std::uint32_t kResetValue = 0xC0000000;
+inline constexpr Field kPg{0, 1};
+inline constexpr Field kPer{1, 1};
+inline constexpr Field kMer1{2, 1};
+inline constexpr Field kPnb{3, 7};
+inline constexpr Field kBker{11, 1};
+inline constexpr Field kMer2{15, 1};
+inline constexpr Field kStart{16, 1};
+inline constexpr Field kFstpg{18, 1};
+inline constexpr Field kEopie{24, 1};
+inline constexpr Field kErrie{25, 1};
+inline constexpr Field kLock{31, 1};
+}
+/// FLASH.ECCR: Flash ECC register
+namespace eccr {
+inline constexpr std::uint32_t kOffset = 0x018;
+inline constexpr std::uint32_t kResetValue = 0x00000000;
+inline constexpr Field kAddrEcc{0, 19};
+inline constexpr Field kBkEcc{21, 1};
+inline constexpr Field kSysfEcc{22, 1};
+inline constexpr Field kEcccie{24, 1};
+inline constexpr Field kEccc2{28, 1};
+inline constexpr Field kEccd2{29, 1};
+inline constexpr Field kEccc{30, 1};
+inline constexpr Field kEccd{31, 1};
+}
+/// FLASH.OPTR: 
+namespace optr {
+inline constexpr std::uint32_t kOffset = 0x020;
+inline constexpr std::uint32_t kResetValue = 0x00000000;
+inline constexpr Field kDbank{22, 1};
+}
 }  // namespace flash
 
 namespace gpio {

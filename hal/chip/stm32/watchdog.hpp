@@ -42,6 +42,13 @@ struct WatchdogTime {
   }
 }
 
+/// The finest step whose shortest time is above `least_us`; up to 22 s.
+[[nodiscard]] constexpr WatchdogTime watchdog_time_above(std::uint32_t least_us) {
+  const std::uint64_t nominal_us =
+      std::uint64_t{least_us} * WatchdogTime::kFastest_hz / WatchdogTime::kNominal_hz * 101 / 100;
+  return watchdog_time(static_cast<std::uint32_t>(nominal_us));
+}
+
 template <class Registers>
 class Watchdog {
  public:

@@ -46,6 +46,7 @@ static_assert(kGnssRing_bytes >= 921'600 / 10 * kLongestPoll_us / 1'000'000,
 template <class Wiring>
 struct WiredBoard {
   using Chip = typename Wiring::Chip;
+  using Storage = typename Chip::Storage;
   using GnssPort =
       SerialPort<Mmio, InterruptLock, kGnssRing_bytes, kGnssMessage_bytes, typename Chip::Dma, typename Chip::Usart>;
   static_assert(pins_distinct(Wiring::kPins) && Wiring::kPll.valid());
@@ -65,7 +66,7 @@ struct WiredBoard {
   [[gnu::noinline]] WiredBoard(StoredFault& stored, const Acceptance& filter) : filter_{filter} {
     static_assert(SensorBoard<WiredBoard> && IdleBoard<WiredBoard> && WatchdogBoard<WiredBoard> &&
                   ReportingBoard<WiredBoard> && ImuBoard<WiredBoard> && EncoderBoard<WiredBoard> &&
-                  GnssBoard<WiredBoard> && hal::SerialPort<GnssPort>);
+                  StorageBoard<WiredBoard> && GnssBoard<WiredBoard> && hal::SerialPort<GnssPort>);
     running = this;
     boot_.cause = take_boot_cause(Mmio{Chip::kRcc}, Chip::kResetFlags);
     if (const auto fault = stored.take(); fault && boot_.cause == BootCause::kSoftware) {
@@ -112,6 +113,15 @@ struct WiredBoard {
     if (!watchdog_.start(kWatchdogTime)) print("tetap: the watchdog did not take its time\n");
   }
   void kick() const { watchdog_.kick(); }
+
+  static Storage storage() { return Chip::storage(); }
+  void begin_storing() {
+    // Each as four times the data sheet's longest: a worn sector is slow.
+    constexpr WatchdogTime kTime = watchdog_time_above(2 * 4 * Storage::kLongestErase_us);
+    static_assert(kTime.shortest_us() >= 2 * 4 * Storage::kLongestErase_us);
+    if (!watchdog_.start(kTime)) print("tetap: the watchdog did not take its time\n");
+  }
+  void end_storing() { start_watchdog(); }
 
   [[nodiscard]] const BootReport& boot() const { return boot_; }
   [[nodiscard]] static StackUse stack() { return stack_use(); }

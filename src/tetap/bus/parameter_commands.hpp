@@ -15,6 +15,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <utility>
 
 namespace tetap::bus {
 
@@ -27,19 +28,40 @@ class ParameterCommands {
 
   [[nodiscard]] const param::StagedParameters& sets() const { return staged_; }
 
+  /// A Save that may act, for the firmware around the node: what becomes of it does not follow from the frames.
+  struct Save {
+    std::uint32_t before = 0;
+    std::uint8_t counter = 0;
+    bool asked = false;
+  };
+  [[nodiscard]] std::optional<Save> take_save() {
+    const Save save = std::exchange(save_, {});
+    return save.asked ? std::optional(save) : std::nullopt;
+  }
+  [[nodiscard]] EstParamSet answer_to(const Save& save, ParamAnswer is) const {
+    return told({.page = CmdParamSave::kPage, .counter = save.counter, .is = is}, staged_.active_crc());
+  }
+  /// As param::StagedParameters has it; power_on() follows.
+  template <class Each, class Refused>
+  [[nodiscard]] bool load(Each&& each_word, Refused&& refused) {
+    return staged_.load(each_word, refused);
+  }
+
   /// Rows that waited for a restart are active.
   void power_on() {
     staged_.restart();
     size_ = next_row_ = 0;
     next_word_ = 0;
     asked_.reset();
+    save_ = {};
     answer({.page = EstParamSet::kSetPageIdNotAvailable});
   }
   void hide_secrets() { staged_.hide_secrets(); }
   /// None is hashed: Est_Param has the CRC of what is active, and what was only asked for acts on nothing.
   static constexpr auto members(auto& self) {
-    return base::members(base::unhashed(self.staged_), base::unhashed(self.asked_), base::unhashed(self.answers_),
-                         base::unhashed(self.size_), base::unhashed(self.next_row_), base::unhashed(self.next_word_));
+    return base::members(base::unhashed(self.staged_), base::unhashed(self.asked_), base::unhashed(self.save_),
+                         base::unhashed(self.answers_), base::unhashed(self.size_), base::unhashed(self.next_row_),
+                         base::unhashed(self.next_word_));
   }
 
   /// A command; `admitted`: the node's protection lets it act.
@@ -74,6 +96,7 @@ class ParameterCommands {
   void answer(const Answer& answer) {
     if (size_ < answers_.size()) answers_[size_++] = answer;
   }
+  [[nodiscard]] EstParamSet told(const Answer& of, std::uint32_t config) const;
   [[nodiscard]] bool judge();
   void get(const CmdParamGet& command);
   void set(const CmdParamSet& command, bool admitted);
@@ -87,6 +110,7 @@ class ParameterCommands {
 
   param::StagedParameters staged_;
   std::optional<Asked> asked_;
+  Save save_;
   std::array<Answer, kAnswers> answers_{};
   std::uint32_t size_ = 0;       ///< answers that wait
   std::uint16_t next_row_ = 0;   ///< row that is looked at next; behind the last one: all words are sent
@@ -113,8 +137,10 @@ class NoParameterCommands {
   const auto refuse = [&](std::uint8_t page, std::uint8_t counter, ParamAnswer why) {
     answer({.page = page, .counter = counter, .is = why});
   };
-  if (const auto command = decode<CmdParamSave>(bytes))
-    return refuse(CmdParamSave::kPage, command->ctr, admitted ? ParamAnswer::kNotKept : ParamAnswer::kRefused);
+  if (const auto command = decode<CmdParamSave>(bytes)) {
+    if (!admitted) return refuse(CmdParamSave::kPage, command->ctr, ParamAnswer::kRefused);
+    return void(save_ = {command->save_before_crc, command->ctr, true});
+  }
   if (const auto command = decode<CmdParamApply>(bytes)) {
     if (!admitted) return refuse(CmdParamApply::kPage, command->ctr, ParamAnswer::kRefused);
     return ask({CmdParamApply::kPage, command->ctr, command->apply_before_crc, command->apply_after_crc});
@@ -162,6 +188,16 @@ inline void ParameterCommands::set(const CmdParamSet& command, bool admitted) {
   next_row_ = next_word_ = 0;
 }
 
+inline EstParamSet ParameterCommands::told(const Answer& of, std::uint32_t config) const {
+  const auto most = [](std::size_t count) { return static_cast<std::uint8_t>(count > 254 ? 254 : count); };
+  return {.set_page_id = of.page,
+          .set_answer = of.is,
+          .set_ctr = of.counter,
+          .set_pending = most(staged_.pending()),
+          .set_changed = most(staged_.changed()),
+          .set_config = config};
+}
+
 template <class Take>
 void ParameterCommands::send(const Answer& of, std::uint32_t config, Take& take) const {
   if (of.page == CmdParamGet::kPage || of.page == CmdParamSet::kPage) {
@@ -173,13 +209,7 @@ void ParameterCommands::send(const Answer& of, std::uint32_t config, Take& take)
                      .row_value = staged_.value(of.source, of.row, of.word)});
     return;
   }
-  const auto most = [](std::size_t count) { return static_cast<std::uint8_t>(count > 254 ? 254 : count); };
-  take(EstParamSet{.set_page_id = of.page,
-                   .set_answer = of.is,
-                   .set_ctr = of.counter,
-                   .set_pending = most(staged_.pending()),
-                   .set_changed = most(staged_.changed()),
-                   .set_config = config});
+  take(told(of, config));
 }
 
 template <class Take>

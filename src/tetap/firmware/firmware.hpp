@@ -8,6 +8,7 @@
 #include "tetap/bus/guard_sender.hpp"
 #include "tetap/firmware/boot_self_check.hpp"
 #include "tetap/firmware/canopen/adapter.hpp"
+#include "tetap/firmware/kept_parameters.hpp"
 #include "tetap/firmware/lockstep_policy.hpp"
 #include "tetap/firmware/pacer.hpp"
 #include "tetap/firmware/snapshot.hpp"
@@ -33,7 +34,9 @@ class Firmware {
         node_(parameters, version),
         pacer_(base::Micros{parameters.loop.period_us}),
         extras_(board, parameters, version),
-        canopen_(board, parameters, version, node_) {}
+        canopen_(board, parameters, version, node_),
+        kept_(board),
+        end_(*this) {}
 
   /// Runs the exercise on this very node, then powers it on anew. For boot: the hash shows whether this core computes
   /// as all others do.
@@ -51,6 +54,9 @@ class Firmware {
   void poll() {
     if constexpr (hal::SensorBoard<Board>) {
       if (!polled_) board_.start_sensors();
+    }
+    if constexpr (kKeeps) {
+      if (!polled_) load_parameters();
     }
     // As much as two full receivers: a bus that is never quiet must not keep the tick from its time.
     for (int i = 0; i < kMostPerPoll; ++i) {
@@ -77,6 +83,8 @@ class Firmware {
   static constexpr bool kWired = WiredInputs<Board, kParts>::kAny;
   static constexpr bool kSnapshots = hal::SnapshotBoard<Board>;
   static constexpr bool kCanopen = node::kHasBusParameters<Estimators> && hal::CanopenBoard<Board>;
+  /// A save outlives the power.
+  static constexpr bool kKeeps = node::kHasBusParameters<Estimators> && hal::StorageBoard<Board>;
   using Node = node::Node<Estimators>;
 
   /// True: the node ticked or began.
@@ -138,6 +146,7 @@ class Firmware {
     if constexpr (kWired) renew_pages();
     bus::FrameSink frame_sink(can_end());
     node_.tick(t, health_, frame_sink);
+    if constexpr (node::kHasBusParameters<Estimators>) save_parameters();
     if constexpr (kCanopen) canopen_.adapter.on_tick(health_, board_.now());
     if constexpr (kWired) extras_.ticked = true;
     if constexpr (kSnapshots) send_snapshot();
@@ -188,10 +197,38 @@ class Firmware {
     };
     canopen_.adapter.poll(board_.now(), pacer_.state() != bus::SyncState::kLockstep, send, command);
   }
+  [[gnu::cold, gnu::noinline]] void load_parameters() requires kKeeps {
+    kept_.load(node_, [this](const auto& message) { this->tell(message); });
+  }
+  /// Behind an epoch, of which the answer is no part. A save that wrote ends the record's stretch, as a reset does.
+  void save_parameters() requires node::kHasBusParameters<Estimators> {
+    if constexpr (kKeeps) kept_.on_tick(board_.now());
+    if (const auto asked = node_.parameter_commands().take_save()) save_parameters(*asked);
+  }
+  [[gnu::cold, gnu::noinline]] void save_parameters(
+      const bus::ParameterCommands::Save& asked) requires node::kHasBusParameters<Estimators> {
+    bus::ParamAnswer answer = bus::ParamAnswer::kNotKept;
+    bool wrote = false;
+    if constexpr (kKeeps) {
+      const bool lockstep = pacer_.state() == bus::SyncState::kLockstep;
+      const auto end = kept_.save(node_.parameter_sets(), asked.before, lockstep);
+      answer = end.answer, wrote = end.wrote;
+    }
+    tell(node_.parameter_commands().answer_to(asked, answer));
+    if (!wrote) return;
+    node_.power_on({});
+    health_.unlogged = false;
+    bus::FrameSink frame_sink(can_end());
+    node_.send_version(frame_sink);
+  }
+  template <class Message>
+  void tell(const Message& message) {
+    static_cast<void>(can_end().send(bus::frame(parameters_.can_base, message)));
+  }
   /// The bus for what the node sends.
   [[nodiscard]] auto& can_end() {
-    if constexpr (kCanopen)
-      return canopen_.end;
+    if constexpr (kCanopen || kKeeps)
+      return end_;
     else
       return board_.can;
   }
@@ -228,24 +265,32 @@ class Firmware {
     extras_.snapshot.send([this](const base::CanFrame& frame) { return board_.can.send(frame); });
   }
 
-  /// The adapter, and the bus with its ear on what the node sends.
+  /// The bus, and those who look at what the node sends.
+  struct End {
+    explicit End(Firmware& around) : firmware(around) {}
+    Firmware& firmware;
+    /// Apart, for a node sends at many places.
+    [[gnu::noinline]] bool send(const base::CanFrame& frame) {
+      if constexpr (kCanopen) firmware.canopen_.adapter.on_sent(frame);
+      if constexpr (kKeeps) firmware.kept_.on_sent(frame, firmware.parameters_.can_base);
+      return firmware.board_.can.send(frame);
+    }
+  };
+  struct NoEnd {
+    explicit NoEnd(const Firmware&) {}
+  };
+  struct NotKept {
+    explicit NotKept(const Board&) {}
+  };
   struct Canopen {
-    struct End {
-      std::remove_reference_t<decltype(Board::can)>& can;
-      canopen::Adapter& adapter;
-      /// Apart, for a node sends at many places.
-      [[gnu::noinline]] bool send(const base::CanFrame& frame) {
-        adapter.on_sent(frame);
-        return can.send(frame);
-      }
-    };
     Canopen(Board& board, const param::Parameters& p, const bus::Version& version, const Node& node)
-        : adapter(
-              {.can_base = p.can_base, .node_id = board.canopen_id(), .version = version, .hardware = Board::kHardware},
-              node.parameter_sets(), base::Micros{p.loop.period_us}),
-          end{board.can, adapter} {}
+        : adapter({.can_base = p.can_base,
+                   .node_id = board.canopen_id(),
+                   .keeps = kKeeps,
+                   .version = version,
+                   .hardware = Board::kHardware},
+                  node.parameter_sets(), base::Micros{p.loop.period_us}) {}
     canopen::Adapter adapter;
-    End end;
   };
   struct NoCanopen {
     NoCanopen(const Board&, const param::Parameters&, const bus::Version&, const Node&) {}
@@ -285,6 +330,8 @@ class Firmware {
   bus::LoopHealth health_;
   [[no_unique_address]] std::conditional_t<kWired || kSnapshots, Extras, NoExtras> extras_;
   [[no_unique_address]] std::conditional_t<kCanopen, Canopen, NoCanopen> canopen_;
+  [[no_unique_address]] std::conditional_t<kKeeps, KeptParameters<Board>, NotKept> kept_;
+  [[no_unique_address]] std::conditional_t<kCanopen || kKeeps, End, NoEnd> end_;
   std::int32_t conflict_ticks_ = 0;  ///< left until an id conflict is over
   std::uint64_t sync_time_us_ = 0;
   std::uint8_t sync_counter_ = 0;

@@ -117,6 +117,8 @@ class Node {
   [[nodiscard]] const param::StagedParameters& parameter_sets() const requires kHasBusParameters<Estimators> {
     return parameter_commands_.sets();
   }
+  /// Commands about parameters that the firmware around the node carries out.
+  [[nodiscard]] auto& parameter_commands() requires kHasBusParameters<Estimators> { return parameter_commands_; }
   [[nodiscard]] const estimators::MapFrame& map_frame() const { return map_frame_; }
   /// Records since the last tick began, of a node without a bus.
   [[nodiscard]] const auto& output() const requires(!kHasBus<Estimators>) { return publisher_; }

@@ -119,6 +119,21 @@ class StagedParameters {
     staged_ = active_;
     waits_ = {};
   }
+  /// A kept set at power-on: each_word(take) with take(index, word, value). Unknown words are passed over;
+  /// refused(index, word, answer) for others that are not taken. False: together they break a rule, and everything is
+  /// as compiled.
+  template <class Each, class Refused>
+  [[nodiscard]] bool load(Each&& each_word, Refused&& refused) {
+    active_ = staged_ = compiled_;
+    waits_ = {};
+    each_word([&](std::uint16_t index, std::size_t word, std::uint32_t value) {
+      const Answer is = set(index, word, value);
+      if (is != Answer::kDone && is != Answer::kUnknown) refused(index, word, is);
+    });
+    const bool plausible = plausible_together(staged_);
+    (plausible ? active_ : staged_) = plausible ? staged_ : active_;
+    return plausible;
+  }
   /// take(index, word, value) for each word that a save keeps: of what is active or waits, where it is not as compiled.
   template <class Take>
   void each_kept(Take&& take) const {

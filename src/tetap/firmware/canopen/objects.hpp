@@ -38,6 +38,7 @@ inline constexpr std::uint32_t kLayout = [] {
 struct Identity {
   std::uint32_t can_base = 0;
   std::uint8_t node_id = 0;
+  bool keeps = false;  ///< a save outlives the power
   bus::Version version;
   const char* hardware = "";
 };
@@ -70,8 +71,8 @@ class Objects {
         return read_text(object, content, identity_.hardware);
       case 0x100A:
         return read_version(object, content);
-      case 0x1010:  // no board keeps parameters yet
-        return read_record(object, content, {0});
+      case 0x1010:  // by command, where anything is kept
+        return read_record(object, content, {identity_.keeps ? 1U : 0U});
       case 0x1011:
         return read_record(object, content, {1});
       case 0x1014:
