@@ -18,8 +18,8 @@ struct InertialFaults {
   static constexpr int kErrors = nav::InsState::kErrors;
   static constexpr std::size_t kFix = 6, kVelocity = 9, kForward = 12, kHeading = 13;
 
-  /// Largest sizes (rad/s, m/s^2, m, m/s, m/s, rad): what the sensors of these robots show at all. Each fault begins once
-  /// an hour.
+  /// Largest sizes (rad/s, m/s^2, m, m/s, m/s, rad): what the sensors of these robots show at all. Each fault begins
+  /// once an hour.
   static constexpr std::array<FaultRow, 14> kRows = [] {
     std::array<FaultRow, 14> rows;
     const auto three = [&rows](std::size_t first, const FaultRow& like, int jumps) {
