@@ -65,6 +65,42 @@ TEST(InertialImuFault, ADeadAxisIsALostImuAndWheelsCarryOn) {
   }
 }
 
+/// The accelerometer's sign, of all axes and of the one along up: the IMU is named, and no wheels are.
+TEST(InertialImuFault, AReversedAccelerometerIsNamed) {
+  for (const bool all : {true, false}) {
+    Drive d(rover_like());
+    d.white_m = 0.3;
+    d.tamper_imu = [all](sensor::ImuSample& s) {
+      for (std::size_t axis = all ? 3 : 5; axis < 6; ++axis) axis_of(s, axis) *= -1.0F;
+    };
+    d.place();
+    int named = 0, wheels = 0;
+    for (int k = 0; k < 600; ++k) {
+      d.run(0.1);
+      const SourceState imu = d.estimator.sources(d.ctx()).of(sensor::Sensor::kImu).state;
+      named += imu == SourceState::kDistrusted ? 1 : 0;
+      wheels += static_cast<int>(d.estimator.faults() >> static_cast<unsigned>(sensor::Fault::kWheelSlip) & 1U);
+    }
+    EXPECT_GT(named, 570) << all;
+    EXPECT_LT(wheels, 30) << all;
+  }
+}
+
+/// Upside down in a flip the force is still the rotors'.
+TEST(InertialImuFault, AFlipIsNoReversedAccelerometer) {
+  Drive d = settled(rover_like());
+  d.wheels = false;
+  constexpr float kHalfTurn_rad = 3.1415927F;
+  d.tamper_imu = [](sensor::ImuSample& s) { s.dangle_b_rad[0] += 0.02F * kHalfTurn_rad; };
+  bool over = false;
+  for (int k = 0; k < 100; ++k) {
+    d.run(0.01);
+    over = over || d.estimator.inertial(d.ctx()).state.q_nb.z_seen()(2) < -0.9F;
+    EXPECT_NE(d.estimator.sources(d.ctx()).of(sensor::Sensor::kImu).failed, Check::kValue) << k;
+  }
+  EXPECT_TRUE(over);
+}
+
 TEST(InertialImuFault, AnIntervalOfNothingIsNamed) {
   Drive d = settled();
   d.tamper_imu = [](sensor::ImuSample& s) { s.interval_us = 0; };

@@ -6,6 +6,20 @@
 
 namespace tetap::estimators {
 
+namespace detail {
+
+/// Gravity presses the robot's roof down, which it does not even in a flip: then its accelerometer is reversed.
+/// `before`: the attitude while there is no filter, else null.
+[[nodiscard]] inline bool stands_on_its_roof(const nav::Ins& ins, const nav::Quaternion* before) {
+  constexpr float kRoof = -0.7F, kHalf_mps2 = 5;
+  const nav::Quaternion& q_nb = before != nullptr ? *before : ins.x.q_nb;
+  if (q_nb.z_seen()(2) > kRoof) return false;
+  const nav::Vector3 force_n_mps2 = ins.accel_n_mps2 + ins.earth.gravity_mps2 * ins.earth.up_n;
+  return before != nullptr || q_nb.conjugate().rotate(force_n_mps2)(2) < -kHalf_mps2;
+}
+
+}  // namespace detail
+
 template <class Watch>
 sensor::Mode InertialWith<Watch>::mode(const Context& ctx) const {
   if (phase_ == Phase::kLevelling)
@@ -29,7 +43,9 @@ std::uint16_t InertialWith<Watch>::faults() const {
     if (is) bits = static_cast<std::uint16_t>(bits | 1U << static_cast<unsigned>(fault));
   };
   const checks::ImuHealth& imu = imu_.health();
-  raise(sensor::Fault::kWheelSlip, sources_.wheels.slip() != Wheels::Slip::kNone);
+  // No turn of a reversed IMU judges wheels.
+  const bool judged = !detail::stands_on_its_roof(ins_, tracking() ? nullptr : &alignment_.attitude());
+  raise(sensor::Fault::kWheelSlip, judged && sources_.wheels.slip() != Wheels::Slip::kNone);
   raise(sensor::Fault::kImuClipped, imu.clipped_lately(time_));
   raise(sensor::Fault::kVibration, imu.vibration().shaken());
   raise(sensor::Fault::kSensorStuck, imu.stuck() || sources_.any_stuck(time_));
@@ -43,7 +59,11 @@ SourceStates InertialWith<Watch>::sources(const Context& ctx) const {
   const auto row = [&](sensor::Sensor of, const SourceStatus& status) {
     states.set(of, {status.state, status.failed});
   };
-  row(sensor::Sensor::kImu, imu_.status(time_, ctx.parameters.inertial));
+  SourceStatus imu = imu_.status(time_, ctx.parameters.inertial);
+  if (imu.state == SourceState::kFusing &&
+      detail::stands_on_its_roof(ins_, tracking() ? nullptr : &alignment_.attitude()))
+    imu.distrusted(Check::kValue);
+  row(sensor::Sensor::kImu, imu);
   row(sensor::Sensor::kGnssPosition, sources_.position.status(time_));
   row(sensor::Sensor::kGnssVelocity, sources_.velocity.status(time_));
   row(sensor::Sensor::kWheelSpeed, sources_.wheels.status(time_));

@@ -28,9 +28,14 @@ Innovation InertialWith<Watch>::fuse(const sensor::ImuSample& sample, base::Micr
   if (tracking()) fuse_constraint(time_, ctx);
   const nav::Vector3 rate_b_radps = increment.dtheta_b_rad / base::seconds(increment.dt);
   const bool follows = found == checks::ImuClass::kContiguous;
-  const nav::Vector3 before_b_radps = follows ? imu_.end_rate_b_radps() : rate_b_radps;
-  follows ? imu_.follow_rate(rate_b_radps) : imu_.set_rate(rate_b_radps);
-  const nav::Vector3 moved_b_m = to_origin(increment, before_b_radps, n);
+  nav::Vector3 moved_b_m = nav::Vector3::Zero();
+  if (ImuPlace(n).is_origin()) {  // the rate at a sample's end matters to an arm alone
+    imu_.set_rate(rate_b_radps);
+  } else {
+    const nav::Vector3 before_b_radps = follows ? imu_.end_rate_b_radps() : rate_b_radps;
+    follows ? imu_.follow_rate(rate_b_radps) : imu_.set_rate(rate_b_radps);
+    moved_b_m = to_origin(increment, before_b_radps, n);
+  }
   if (!tracking()) return align(increment, pause, stamp, ctx);
   if (found == checks::ImuClass::kOverlapping) {
     predictor_.note_correction();
@@ -47,7 +52,6 @@ template <class Watch>
                                                               const nav::Vector3& before_b_radps,
                                                               const param::InertialParameters& n) const {
   const ImuPlace place(n);
-  if (place.is_origin()) return nav::Vector3::Zero();
   const float dt_s = base::seconds(increment.dt);
   const nav::Vector3 turn_b_rad = increment.dtheta_b_rad - ins_.x.b_g_radps * dt_s;
   const nav::Vector3 before = before_b_radps - ins_.x.b_g_radps, after = imu_.end_rate_b_radps() - ins_.x.b_g_radps;
