@@ -3,6 +3,7 @@
 // true time. Otherwise it is at least not placed where it would be fused. A model of a gateway holds it; the true stamp
 // is the model's.
 #include "tetap/bus/stamp_wraps.hpp"
+#include "tetap/bus/fault_hold.hpp"
 
 #include <gtest/gtest.h>
 
@@ -47,6 +48,7 @@ std::vector<Arrival> clean(const Sensor& s, unsigned seed) {
 }
 
 struct Judged {
+  int twice = 0;    ///< two senders were named
   int wrong = 0;    ///< placed within the window, and not where it was true
   int refused = 0;  ///< true within the window, and placed elsewhere
   int held = 0;     ///< true beyond the window
@@ -62,6 +64,7 @@ Judged judge(const Sensor& s, std::vector<Arrival> arrivals) {
     sample.sequence = a.sequence;
     sample.stamp = base::extend(static_cast<std::uint32_t>(a.stamp_us & 0xFFFFF), 20, now);
     const std::int64_t placed_us = wraps.place(sample, now).us;
+    judged.twice += wraps.two_senders(sample) ? 1 : 0;
     const bool fused = placed_us > now.us - kWindow_us && placed_us <= now.us + kWindow_us;
     const bool fresh = a.stamp_us > now.us - kWindow_us;
     judged.wrong += fused && placed_us != a.stamp_us ? 1 : 0;
@@ -101,6 +104,7 @@ TEST(StampWraps, WhatComesLateForAWhileIsPlacedWhereItWasTrue) {
       const Judged j = judge(s, all);
       EXPECT_EQ(j.wrong, 0) << s.name << ' ' << delay_s;
       EXPECT_LE(j.refused, 2) << s.name << ' ' << delay_s;
+      EXPECT_EQ(j.twice, 0) << s.name << ' ' << delay_s;
     }
 }
 
@@ -114,6 +118,37 @@ TEST(StampWraps, SamplesThatAreLostForAWhileDoNotMakeTheRestLate) {
       refused += judge(s, all).refused > 0 ? 1 : 0, ++kinds;
     }
   EXPECT_EQ(refused, 0) << "of " << kinds;
+}
+
+// The other sender is as fast or half as fast, and counts by itself. Samples of one sender that are lost, or come in
+// another order, name nobody.
+TEST(StampWraps, TwoSendersOfOneIdentifierAreNamed) {
+  for (const Sensor& s : kSensors)
+    for (const int every : {1, 2}) {
+      auto all = clean(s, 5);
+      std::vector<Arrival> other;
+      for (std::size_t k = 0; k < all.size(); k += static_cast<std::size_t>(every)) {
+        const auto count = static_cast<std::size_t>(every);
+        other.push_back({all[k].at_us + s.period_us / 2, all[k].stamp_us + s.period_us / 2,
+                         static_cast<std::uint8_t>((k / count + 5) & 15)});
+      }
+      const std::size_t both = all.size() + other.size();
+      all.insert(all.end(), other.begin(), other.end());
+      EXPECT_GT(judge(s, all).twice, static_cast<int>(both / (every == 1 ? 2 : 5))) << s.name << ' ' << every;
+    }
+  for (const Sensor& s : kSensors) {
+    auto all = clean(s, 6);
+    std::mt19937 random(7);
+    std::erase_if(all, [&random](const Arrival&) { return random() % 3 == 0; });
+    EXPECT_EQ(judge(s, all).twice, 0) << s.name;
+    if (s.period_us > 500'000) continue;  // a later sample would be half a wrap ahead
+    all = clean(s, 8);
+    for (std::size_t k = 1; k < all.size(); k += 2 + random() % 3) std::swap(all[k - 1].at_us, all[k].at_us);
+    EXPECT_EQ(judge(s, all).twice, 0) << s.name;
+  }
+  FaultHold faults;
+  faults.note({.two_senders = 1}, 1, 10);
+  EXPECT_EQ(faults.faults(1).bits, 1U << static_cast<unsigned>(sensor::Fault::kIdConflict)) << "and no other word";
 }
 
 // A sensor that pauses and counts on cannot be told from one that is held, where its period happens to fit.

@@ -32,6 +32,7 @@ struct Counters {
   std::uint16_t replayed = 0;      ///< tags whose counter had been used
   std::uint16_t command_rate = 0;  ///< commands that came too fast
   std::uint16_t overload = 0;      ///< samples beyond those that a tick may work on
+  std::uint16_t two_senders = 0;   ///< samples while two senders number those of one sensor
 };
 
 /// Measurements of real time and the bus: different in each run, and never fed back into an estimate.

@@ -41,6 +41,7 @@ class FaultHold {
     raised.raise(sensor::Fault::kCommandRefused, now.command_refused != then.command_refused ||
                                                      now.command_rate != then.command_rate ||
                                                      now.auth_bad != then.auth_bad || now.replayed != then.replayed);
+    raised.raise(sensor::Fault::kIdConflict, now.two_senders != then.two_senders);
     if (raised.bits != 0) {
       bits_ = epoch < until_ ? static_cast<std::uint16_t>(bits_ | raised.bits) : raised.bits;
       until_ = epoch + second;

@@ -33,9 +33,14 @@ class StampWraps {
       s.period_us += s.period_us > 0 ? (step_us - s.period_us) / 8 : step_us;
     }
     s.stamp = stamp;
-    s.sequence = sample.sequence;
+    s.note_chain(sample.sequence, step.us < 0);
     s.arrived = now;
     return stamp;
+  }
+  /// Two senders number the samples of this sensor: two chains of its sequence cross, and their stamps interleave.
+  [[nodiscard]] bool two_senders(const sensor::Sample& sample) const {
+    const Stream& s = streams_[static_cast<std::size_t>(sample.sensor)];
+    return s.crosses() && s.instance == sample.instance;
   }
   /// The same of a sample that comes at no fixed rate: sightings and commands. Its sequence does not count time, so it
   /// is placed as the sample of another sensor was that came just before.
@@ -61,6 +66,25 @@ class StampWraps {
     base::Micros held_stamp, held_at;  ///< the same of the last held sample
     std::int32_t period_us = 0;
     std::uint8_t sequence = 0, held_sequence = 0, instance = 0;
+    std::uint8_t chains = 0;  ///< the last sequence but one, and sixteen times the crossings of two chains of late
+
+    [[nodiscard]] bool crosses() const { return chains >> 4U == kMostCrossings; }
+    /// A sample goes on with the last one, or with the last but one, where two chains cross. One crossing is worth
+    /// three samples in order. A sample that is older than the last one came late, and shows no chain.
+    void note_chain(std::uint8_t next, bool older) {
+      const auto follows = [next](unsigned of) { return ((next - of) & 0x0FU) == 1; };
+      unsigned crossings = chains >> 4U;
+      if (older) {
+        crossings = 0;
+      } else if (follows(sequence)) {
+        crossings -= crossings > 0 ? 1U : 0U;
+      } else if (follows(chains)) {
+        crossings = crossings + 3 < kMostCrossings ? crossings + 3 : kMostCrossings;
+      }
+      chains = static_cast<std::uint8_t>(crossings << 4U | (sequence & 0x0FU));
+      sequence = next;
+    }
+    static constexpr unsigned kMostCrossings = 15;
   };
 
   /// A span of as many periods as the sequence counts: `least` to eight, or so modulo 16.

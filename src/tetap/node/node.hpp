@@ -319,7 +319,14 @@ void Node<Estimators, Capacity>::take(const sensor::Sample& arrived) {
   if (!ticked_ && now_.us == 0) return void(++counters_.no_time);
   if (!window_.admits_sample()) return void(++counters_.overload);
   if (!plausible(sample, parameters_.wheels.most_mps)) return void(++counters_.out_of_range);
+  const bool known = wraps_.two_senders(sample);
   sample.stamp = at_no_fixed_rate(sample) ? wraps_.place_beside(sample, now_) : wraps_.place(sample, now_);
+  if (wraps_.two_senders(sample)) {
+    ++counters_.two_senders;
+    if (!known)
+      publisher_.event({.verdict = sensor::Verdict::kStale, .failed = sensor::Check::kTime}, sample, kPrimary, now_,
+                       counters_);
+  }
   calibrate(sample, parameters_);
   if constexpr (Estimators::template kTakes<sensor::LandmarkSighting>)
     if (sample.sensor == sensor::Sensor::kRangeBearing) calibrate(sample.payload.sighting, parameters_.landmark);

@@ -46,6 +46,7 @@ struct WholeStamps {
   static void power_on() {}
   [[nodiscard]] static base::Micros place(const sensor::Sample& sample, base::Micros) { return sample.stamp; }
   [[nodiscard]] static base::Micros place_beside(const sensor::Sample& sample, base::Micros) { return sample.stamp; }
+  [[nodiscard]] static bool two_senders(const sensor::Sample&) { return false; }
 };
 
 /// In place of bus::Decoder: no frame means anything.
