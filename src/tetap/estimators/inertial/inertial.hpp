@@ -82,7 +82,7 @@ class InertialWith {
                          base::in_turns(self.standstill_), self.sources_, base::in_turns(self.recovery_), self.watch_);
   }
 
- private:
+ protected:  // estimators/all_round adds a scanner
   enum class Phase : std::uint8_t { kLevelling, kFindingHeading, kTracking };
 
   [[nodiscard]] bool tracking() const { return phase_ == Phase::kTracking; }
