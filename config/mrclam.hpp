@@ -14,6 +14,7 @@
 
 namespace tetap::robot::mrclam {
 
-using Estimators = node::WithBusParameters<node::Estimators<estimators::Odometry, estimators::PoseEkf>>;
+using Estimators =
+    node::WithBusParameters<node::WithBusProtection<node::Estimators<estimators::Odometry, estimators::PoseEkf>>>;
 
 }  // namespace tetap::robot::mrclam

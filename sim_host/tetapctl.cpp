@@ -4,15 +4,27 @@
 #include "sim_host/control/image_header.hpp"
 #include "sim_host/control/parameter_client.hpp"
 #include "sim_host/control/scan.hpp"
+#include "sim_host/control/slcan.hpp"
 #include "sim_host/parameter_settings.hpp"
 #include "tetap/param/crc.hpp"
 #include "tetap/param/table.hpp"
 
+#include <fcntl.h>
+#include <sys/random.h>
+#include <unistd.h>
+
 #include <algorithm>
 #include <array>
+#include <cctype>
+#include <cerrno>
 #include <cstdio>
+#include <cstdlib>
+#include <cstring>
 #include <ctime>
 #include <exception>
+#include <fstream>
+#include <iterator>
+#include <memory>
 #include <optional>
 #include <string>
 #include <tuple>
@@ -34,12 +46,20 @@ constexpr const char* kHelp =
     "  load FILE          the same with a file of `path = value` lines\n"
     "  apply              makes active what is staged, by an SDO client for example\n"
     "  save               keeps the parameters without power, where the board can\n"
-    "  restore            the compiled values\n"
+    "  restore            the compiled values, but for those of access\n"
+    "  claim              gives a node without a key its first one, within a minute of power-on; a key file that is "
+    "not "
+    "there is made\n"
     "  image FILE         what a flash image (.bin, .elf) is for; refused where it is damaged, cut or another "
-    "board's\n\n"
-    "  --interface NAME   (default vcan0)\n"
+    "board's\n"
+    "  export LOG OUT.mcap [OPTION]...  a log as MCAP or tables; `tetapctl export --help`\n\n"
+    "  --can NAME         SocketCAN interface, --interface as well (default vcan0)\n"
+    "  --slcan PORT       a serial port with an slcan adapter instead, --bitrate N (default 500000)\n"
     "  --base ID          first identifier of the node's block (default 0x300)\n"
     "  --board NAME       image: refused where it is for another board; --robot NAME in the same way\n"
+    "  --key FILE         32 hexadecimal digits, for a node that obeys commands with a tag alone (default: TETAP_KEY "
+    "of "
+    "the environment)\n"
     "  --json             scan, list, get, diff: a list; else an object with the result\n\n"
     "A row that needs a restart waits for a Begin frame or a save.\n"
     "Status: 0 done, 1 refused or no answer, 2 wrong command line.\n";
@@ -59,6 +79,54 @@ std::optional<base::CanFrame> receive(hal::SocketCan& can, base::Micros patience
     can.wait(left);
   }
 }
+
+/// The key, or none where none is given. `made`: a file that is not there is made.
+std::optional<base::SipKey> read_key(const std::optional<std::string>& file, bool made) {
+  const char* const environment = std::getenv("TETAP_KEY");
+  if (!file && environment == nullptr) return std::nullopt;
+  std::string digits = file ? "" : environment;
+  if (file) {
+    if (const int create = made ? ::open(file->c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600) : -1;
+        create >= 0) {
+      std::array<unsigned char, 16> bytes{};
+      bool whole = ::getrandom(bytes.data(), bytes.size(), 0) == static_cast<ssize_t>(bytes.size());
+      for (const unsigned char byte : bytes) whole = whole && ::dprintf(create, "%02x", byte) == 2;
+      whole = ::fsync(create) == 0 && whole;
+      if (::close(create) != 0 || !whole) throw sim::UsageError(*file + ": cannot be written");
+    }
+    std::ifstream in(*file);
+    if (!in) throw sim::UsageError(*file + ": " + std::strerror(errno));
+    digits.assign(std::istreambuf_iterator<char>(in), {});
+  }
+  while (!digits.empty() && std::isspace(static_cast<unsigned char>(digits.back())) != 0) digits.pop_back();
+  const auto key = sim::key_of_digits(digits);
+  if (!key) throw sim::UsageError((file ? *file : "TETAP_KEY") + ": a key is 32 hexadecimal digits, not all zero");
+  return key;
+}
+
+/// tools/can/export_log takes over.
+int export_log(const std::vector<std::string>& words) {
+  std::vector<char*> arguments{const_cast<char*>(TETAP_EXPORT_LOG)};
+  for (const std::string& word : words) arguments.push_back(const_cast<char*>(word.c_str()));
+  arguments.push_back(nullptr);
+  ::execv(TETAP_EXPORT_LOG, arguments.data());
+  std::fprintf(stderr, "tetapctl: %s: %s\n", TETAP_EXPORT_LOG, std::strerror(errno));
+  return 1;
+}
+
+/// A bus by either adapter.
+struct Port {
+  std::unique_ptr<hal::SocketCan> can;
+  std::unique_ptr<sim::Slcan> slcan;
+  void send(const base::CanFrame& frame) const {
+    if (slcan) return slcan->send(frame);
+    can->send(frame);
+    can->flush();
+  }
+  [[nodiscard]] std::optional<base::CanFrame> next(base::Micros patience) const {
+    return slcan ? slcan->receive(patience) : receive(*can, patience);
+  }
+};
 
 const param::Row& row_of(const std::string& path) {
   for (const param::Row& row : param::kTable)
@@ -167,6 +235,8 @@ void run(const std::string& command, const std::vector<std::string>& words, sim:
     print_result(client.apply(active), json);
   } else if (command == "save") {
     print_result(client.save(active), json);
+  } else if (command == "claim") {
+    print_result(client.claim(active), json);
   } else if (command == "restore") {
     print_result(client.restore(active), json);
   } else {
@@ -181,9 +251,16 @@ void run(const std::string& command, const std::vector<std::string>& words, sim:
 }  // namespace
 
 int main(int argc, char** argv) try {
-  sim::Arguments arguments(argc, argv);
+  std::vector<std::string> given(argv + 1, argv + argc);
+  const auto first = std::find_if(given.begin(), given.end(), [](const auto& word) { return !word.starts_with("-"); });
+  if (first != given.end() && *first == "export") return given.erase(first), export_log(given);
+  sim::Arguments arguments(given);
   if (arguments.flag("--help") || arguments.flag("-h")) return std::fputs(kHelp, stdout), 0;
   const std::string interface = arguments.text("--interface").value_or("vcan0");
+  const std::string name = arguments.text("--can").value_or(interface);
+  const auto serial = arguments.text("--slcan");
+  const auto bitrate = static_cast<std::uint32_t>(arguments.integer("--bitrate", 500'000, 10'000, 1'000'000));
+  const auto key_file = arguments.text("--key");
   const std::uint32_t base = arguments.base();
   const bool json = arguments.flag("--json");
   const Wanted wanted{arguments.text("--board").value_or(""), arguments.text("--robot").value_or("")};
@@ -193,7 +270,7 @@ int main(int argc, char** argv) try {
   const std::string command = words.empty() ? "" : words.front();
   if (!words.empty()) words.erase(words.begin());
   const bool needs_words = command == "image" || command == "get" || command == "set" || command == "load";
-  constexpr std::array kAlone{"scan", "list", "diff", "apply", "save", "restore"};
+  constexpr std::array kAlone{"scan", "list", "diff", "apply", "save", "restore", "claim"};
   if (!needs_words && std::find(kAlone.begin(), kAlone.end(), command) == kAlone.end())
     throw sim::UsageError(command.empty() ? "no command; see tetapctl --help"
                                           : "there is no command '" + command + "'");
@@ -205,14 +282,18 @@ int main(int argc, char** argv) try {
     return 0;
   }
   if (!wanted.board.empty() || !wanted.robot.empty()) throw sim::UsageError("--board and --robot are for image");
-  hal::SocketCan can(interface);
-  const sim::ParameterClient::Send send = [&](const base::CanFrame& frame) {
-    can.send(frame);
-    can.flush();
-  };
-  const sim::ParameterClient::Receive next = [&](base::Micros patience) { return receive(can, patience); };
+  const auto key = read_key(key_file, command == "claim");
+  if (command == "claim" && !key) throw sim::UsageError("claim needs --key FILE, or TETAP_KEY in the environment");
+  Port port;
+  if (serial)
+    port.slcan = std::make_unique<sim::Slcan>(*serial, bitrate);
+  else
+    port.can = std::make_unique<hal::SocketCan>(name);
+  const sim::ParameterClient::Send send = [&](const base::CanFrame& frame) { port.send(frame); };
+  const sim::ParameterClient::Receive next = [&](base::Micros patience) { return port.next(patience); };
   if (command == "scan") return print_nodes(sim::scan(send, next, now), json), 0;
   sim::ParameterClient client(base, send, next, now);
+  if (key) client.use_key(*key);
   run(command, words, client, json);
   return 0;
 } catch (const tetap::sim::UsageError& error) {

@@ -53,7 +53,8 @@ struct Bus {
 
   unsigned lose;
   std::mt19937 random{5};
-  node::Node<node::WithBusParameters<robot::rover::Estimators>> node{robot::rover::parameters, {}};
+  node::Node<node::WithBusParameters<node::WithBusProtection<robot::rover::Estimators>>> node{robot::rover::parameters,
+                                                                                              {}};
   std::deque<base::CanFrame> frames;
   std::map<std::uint32_t, int> asked;  ///< frames of the client by identifier
   std::int64_t us = 1'000'000;
@@ -126,6 +127,75 @@ TEST(ParameterClient, AppliesWhatIsStagedAndSaysThatNothingIsKept) {
   } catch (const ControlError& error) {
     EXPECT_STREQ(error.what(), "this board keeps no parameters, or its flash has failed");
   }
+}
+
+std::string refusal_of(const std::function<void()>& act) {
+  try {
+    act();
+  } catch (const ControlError& error) {
+    return error.what();
+  }
+  return "";
+}
+constexpr base::SipKey kOwner{0x03020100U, 0x07060504U, 0x0B0A0908U, 0x0F0E0D0CU};
+
+TEST(ParameterClient, ClaimsANodeAndCommandsItByTagsOverABusThatLosesFrames) {
+  for (const unsigned lose : {0U, 30U}) {
+    Bus bus(lose);
+    ParameterClient owner = bus.client(), stranger = bus.client(), thief = bus.client(), second = bus.client();
+    owner.use_key(kOwner), second.use_key(kOwner), thief.use_key({1, 2, 3, 4});
+    param::Parameters before = owner.read(bus::ParamSource::kActive);
+    owner.claim(before);
+    EXPECT_NE(refusal_of([&] { thief.claim(before); }).find("no first key"), std::string::npos);
+    before = owner.read(bus::ParamSource::kActive);
+    EXPECT_EQ(before.bus.commands, param::CommandAccess::kAuthenticated);
+    EXPECT_NE(before.bus.key, kOwner) << "it is never read";
+    param::Parameters other = before;
+    other.gnss.gate_scale = 2;
+    EXPECT_NE(refusal_of([&] { stranger.change(before, other); }).find("key is missing"), std::string::npos);
+    EXPECT_NE(refusal_of([&] { thief.change(before, other); }).find("another key"), std::string::npos);
+    EXPECT_EQ(owner.read(bus::ParamSource::kActive).gnss.gate_scale, before.gnss.gate_scale);
+    owner.change(before, other);
+    before = second.read(bus::ParamSource::kActive);
+    EXPECT_EQ(before.gnss.gate_scale, 2.0F);
+    second.restore(before);  // right behind the other client's
+    before = second.read(bus::ParamSource::kActive);
+    EXPECT_EQ(before.gnss.gate_scale, robot::rover::parameters.gnss.gate_scale);
+    EXPECT_EQ(before.bus.commands, param::CommandAccess::kAuthenticated) << "restore keeps access";
+    owner.change(before, other);
+    EXPECT_EQ(refusal_of([&] { owner.save(other); }), "this board keeps no parameters, or its flash has failed");
+  }
+}
+
+TEST(ParameterClient, SaysThatAnotherSendersWordIsInTheKey) {
+  Bus bus;
+  const auto send = [&](const base::CanFrame& frame) {
+    const bus::CmdParamSet word{.ctr = 9, .set_word = 2, .set_row_id = param::row_of("bus.key")->index, .set_value = 7};
+    if (bus::decode<bus::CmdParamApply>(bus::payload(frame)))
+      bus.send()(bus::frame(robot::rover::parameters.can_base, bus::protect(word)));
+    bus.send()(frame);
+  };
+  ParameterClient owner(robot::rover::parameters.can_base, send, bus.receive(), bus.clock());
+  owner.use_key(kOwner);
+  const param::Parameters before = owner.read(bus::ParamSource::kActive);
+  EXPECT_NE(refusal_of([&] { owner.claim(before); }).find("another key"), std::string::npos);
+}
+
+TEST(ParameterClient, SaysThatAKeyComesTooLate) {
+  Bus bus;
+  for (int tick = 0; tick < 6'000; ++tick) bus.tick();
+  ParameterClient client = bus.client();
+  client.use_key(kOwner);
+  const param::Parameters before = client.read(bus::ParamSource::kActive);
+  EXPECT_NE(refusal_of([&] { client.claim(before); }).find("a minute ago"), std::string::npos);
+  EXPECT_EQ(param::crc(client.read(bus::ParamSource::kStaged)), param::crc(before)) << "nothing is half-done";
+}
+
+TEST(Tags, AreByAKeyOf32Digits) {
+  EXPECT_EQ(key_of_digits("000102030405060708090a0B0C0d0e0f"), kOwner);
+  for (const char* wrong : {"", "00", "000102030405060708090a0B0C0d0e0g", "000102030405060708090a0B0C0d0e0f0",
+                            "00000000000000000000000000000000", "+0-0+0-0+0-0+0-0+0-0+0-0+0-0+0-0"})
+    EXPECT_EQ(key_of_digits(wrong), std::nullopt) << wrong;
 }
 
 TEST(Scan, FindsANodeAndAsksNobodyElse) {

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Parameters of a running node over the bus: Cmd_Param in, Est_Param out. A Get or a Set is answered with a row; an
 // Apply or a Restore acts at the next tick and is answered with the set's CRC. One frame goes out a tick. After a
-// power-on and each change, every word that is not as compiled follows: a log has the parameters of each epoch.
+// power-on and each change, and each ten seconds, every word that is not as compiled follows: a log has the parameters
+// of each epoch. A node without a key takes its first one within a minute of power-on.
 #pragma once
 
 #include "tetap/base/members.hpp"
@@ -21,7 +22,7 @@ namespace tetap::bus {
 
 class ParameterCommands {
  public:
-  explicit ParameterCommands(const param::Parameters& compiled) : staged_(compiled) {}
+  explicit ParameterCommands(const param::Parameters& compiled) : staged_(compiled) { begin_claims(); }
 
   [[nodiscard]] static constexpr bool takes(std::uint8_t offset) { return offset == CmdParamSet::kOffset; }
   [[nodiscard]] const param::Parameters& active(const param::Parameters&) const { return staged_.active(); }
@@ -52,6 +53,7 @@ class ParameterCommands {
     staged_.restart();
     size_ = next_row_ = 0;
     next_word_ = 0;
+    pause_ticks_ = 0;
     asked_.reset();
     save_ = {};
     answer({.page = EstParamSet::kSetPageIdNotAvailable});
@@ -60,12 +62,19 @@ class ParameterCommands {
   /// None is hashed: Est_Param has the CRC of what is active, and what was only asked for acts on nothing.
   static constexpr auto members(auto& self) {
     return base::members(base::unhashed(self.staged_), base::unhashed(self.asked_), base::unhashed(self.save_),
-                         base::unhashed(self.answers_), base::unhashed(self.size_), base::unhashed(self.next_row_),
+                         base::unhashed(self.answers_), base::unhashed(self.size_), base::unhashed(self.claim_ticks_),
+                         base::unhashed(self.pause_ticks_), base::unhashed(self.next_row_),
                          base::unhashed(self.next_word_));
   }
 
-  /// A command; `admitted`: the node's protection lets it act.
-  void on_frame(const base::CanFrame& frame, bool admitted, Counters& counters);
+  /// A command; `admitted`: the node's protection lets it act. `takes_key`: the node can judge tags.
+  void on_frame(const base::CanFrame& frame, bool admitted, bool takes_key, Counters& counters);
+  /// A first key is taken for a minute from here on: the board's power-on, not a Begin.
+  void begin_claims() { claim_ticks_ = static_cast<std::uint32_t>(kClaim_us / staged_.active().loop.period_us); }
+  void end_claims() {
+    claim_ticks_ = 0;
+    staged_.withdraw_claim();
+  }
 
   /// At the begin of a tick: what is asked for is refused, or take_over() has to follow.
   [[nodiscard]] bool accepts() { return asked_ && judge(); }
@@ -76,8 +85,10 @@ class ParameterCommands {
   void publish(std::uint32_t config, Take&& take);
 
  private:
-  static constexpr std::size_t kAnswers = 8;      ///< between two ticks
-  static constexpr std::size_t kRowsPerTick = 8;  ///< looked at for one that is not as compiled
+  static constexpr std::size_t kAnswers = 8;              ///< between two ticks
+  static constexpr std::size_t kRowsPerTick = 8;          ///< looked at for one that is not as compiled
+  static constexpr std::int32_t kClaim_us = 60'000'000;   ///< from power-on, for the first key
+  static constexpr std::int32_t kRepeat_us = 10'000'000;  ///< from the last word that is not as compiled to the first
 
   struct Answer {
     std::uint8_t page = 0;  ///< page of the command; not available: a power-on
@@ -99,7 +110,7 @@ class ParameterCommands {
   [[nodiscard]] EstParamSet told(const Answer& of, std::uint32_t config) const;
   [[nodiscard]] bool judge();
   void get(const CmdParamGet& command);
-  void set(const CmdParamSet& command, bool admitted);
+  void set(const CmdParamSet& command, bool admitted, bool takes_key, Counters& counters);
   /// One at a tick.
   void ask(const Asked& asked) {
     if (asked_) return answer({.page = asked.page, .counter = asked.counter, .is = ParamAnswer::kBusy});
@@ -112,9 +123,11 @@ class ParameterCommands {
   std::optional<Asked> asked_;
   Save save_;
   std::array<Answer, kAnswers> answers_{};
-  std::uint32_t size_ = 0;       ///< answers that wait
-  std::uint16_t next_row_ = 0;   ///< row that is looked at next; behind the last one: all words are sent
-  std::uint16_t next_word_ = 0;  // no padding follows: a node's next member would lie in it
+  std::uint32_t size_ = 0;         ///< answers that wait
+  std::uint32_t claim_ticks_ = 0;  ///< left for a first key
+  std::uint32_t pause_ticks_ = 0;  ///< left until all words are sent again; 0: none was sent
+  std::uint16_t next_row_ = 0;     ///< row that is looked at next; behind the last one: all words are sent
+  std::uint16_t next_word_ = 0;    // no padding follows: a node's next member would lie in it
 };
 
 /// In place of it, in robots that take no parameters from the bus.
@@ -128,12 +141,13 @@ class NoParameterCommands {
   static constexpr auto members(auto&) { return base::members(); }
 };
 
-[[gnu::cold]] inline void ParameterCommands::on_frame(const base::CanFrame& frame, bool admitted, Counters& counters) {
+[[gnu::cold]] inline void ParameterCommands::on_frame(const base::CanFrame& frame, bool admitted, bool takes_key,
+                                                      Counters& counters) {
   const auto bytes = payload(frame);
   if (!e2e_valid(CmdParamSet::kOffset, bytes)) return void(++counters.command_refused);
   if (size_ == answers_.size()) return void(++counters.command_rate);
   if (const auto command = decode<CmdParamGet>(bytes)) return get(*command);
-  if (const auto command = decode<CmdParamSet>(bytes)) return set(*command, admitted);
+  if (const auto command = decode<CmdParamSet>(bytes)) return set(*command, admitted, takes_key, counters);
   const auto refuse = [&](std::uint8_t page, std::uint8_t counter, ParamAnswer why) {
     answer({.page = page, .counter = counter, .is = why});
   };
@@ -163,10 +177,13 @@ inline void ParameterCommands::get(const CmdParamGet& command) {
           .row = command.get_row_id});
 }
 
-inline void ParameterCommands::set(const CmdParamSet& command, bool admitted) {
-  const ParamAnswer is =
-      admitted ? static_cast<ParamAnswer>(staged_.set(command.set_row_id, command.set_word, command.set_value))
-               : ParamAnswer::kRefused;
+inline void ParameterCommands::set(const CmdParamSet& command, bool admitted, bool takes_key, Counters& counters) {
+  const bool claims = takes_key && claim_ticks_ != 0 && param::StagedParameters::is_key(command.set_row_id);
+  const param::Answer told = !admitted ? param::Answer::kRefused
+                             : claims  ? staged_.claim(command.set_word, command.set_value)
+                                       : staged_.set(command.set_row_id, command.set_word, command.set_value);
+  if (told == param::Answer::kRefused) ++counters.command_refused;
+  const auto is = static_cast<ParamAnswer>(told);
   answer({.page = CmdParamSet::kPage,
           .counter = command.ctr,
           .is = is,
@@ -186,6 +203,7 @@ inline void ParameterCommands::set(const CmdParamSet& command, bool admitted) {
 [[gnu::cold]] inline void ParameterCommands::take_over() {
   staged_.take_over();
   next_row_ = next_word_ = 0;
+  pause_ticks_ = 0;
 }
 
 inline EstParamSet ParameterCommands::told(const Answer& of, std::uint32_t config) const {
@@ -214,6 +232,7 @@ void ParameterCommands::send(const Answer& of, std::uint32_t config, Take& take)
 
 template <class Take>
 void ParameterCommands::publish(std::uint32_t config, Take&& take) {
+  if (claim_ticks_ != 0 && --claim_ticks_ == 0) end_claims();
   if (size_ != 0) {
     send(answers_[0], config, take);
     --size_;
@@ -226,10 +245,13 @@ void ParameterCommands::publish(std::uint32_t config, Take&& take) {
       const auto word = static_cast<std::uint8_t>(next_word_++);
       if (!staged_.is_changed(next_row_, word)) continue;
       send({.page = CmdParamGet::kPage, .word = word, .row = row.index}, config, take);
+      pause_ticks_ = static_cast<std::uint32_t>(kRepeat_us / staged_.active().loop.period_us);
       return;
     }
     ++next_row_, next_word_ = 0;
   }
+  const bool all_sent = next_row_ == param::kStoredRows.size();
+  if (all_sent && pause_ticks_ != 0 && --pause_ticks_ == 0) next_row_ = next_word_ = 0;
 }
 
 }  // namespace tetap::bus

@@ -45,6 +45,7 @@ class Firmware {
     bus::FrameSink frame_sink(can_end(), hash);
     BootSelfCheck(node_, parameters_.can_base, 1).run(epochs, frame_sink);
     node_.power_on({});
+    node_.begin_claims();
     return hash.value();
   }
 
@@ -110,7 +111,7 @@ class Firmware {
     const bool begins = sync->kind == bus::SyncKind::kBegin;
     const SyncProof proof{.guarded = sync_guard_.covers(frame), .authenticated = node_.admits_sync(frame)};
     if (begins || sync->kind == bus::SyncKind::kStep) {
-      if (!lockstep_.admits(sync->kind, proof, parameters_.loop.lockstep, pacer_.state(), board_.now()))
+      if (!lockstep_.admits(sync->kind, proof, lockstep(), pacer_.state(), board_.now()))
         return ++health_.lock_refused, false;
     }
     count_sync(*sync);
@@ -120,11 +121,19 @@ class Firmware {
       bus::FrameSink frame_sink(can_end());
       node_.send_version(frame_sink);
     }
+    // A desk's node is its player's: it takes a key as the robot did whose log is repeated.
+    if ((begins || sync->kind == bus::SyncKind::kStep) && lockstep() != param::Lockstep::kPlain) node_.end_claims();
     const auto t = pacer_.on_sync(sync->kind, time, board_.now(), health_, proof.guarded || proof.authenticated);
     if (t) tick(*t);
     return begins || t.has_value();
   }
 
+  [[nodiscard]] param::Lockstep lockstep() const {
+    if constexpr (node::kHasBusParameters<Estimators>)
+      return node_.parameter_sets().active().loop.lockstep;
+    else
+      return parameters_.loop.lockstep;
+  }
   /// Counts sync frames that the counter skipped, modulo 256. A repeated frame is no gap, nor is one out of its order:
   /// its time is not later.
   void count_sync(const bus::InSync& sync) {

@@ -4,6 +4,7 @@
 #pragma once
 
 #include "tetap/bus/parameter_commands.hpp"
+#include "tetap/node/bus_protection.hpp"
 
 #include <type_traits>
 
@@ -13,6 +14,9 @@ template <class Estimators>
 struct WithBusParameters : Estimators {
   static constexpr bool kBusParameters = true;
   static constexpr bool kNeedsMapIds = true;  ///< Cmd_Param and Est_Param have two of them
+  /// A first key may come over the bus; a host, which can judge tags for every robot, takes none that its robot
+  /// refuses.
+  static constexpr bool kTakesKey = kHasBusProtection<Estimators>;
 };
 
 template <class Estimators>

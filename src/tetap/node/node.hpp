@@ -119,6 +119,14 @@ class Node {
   }
   /// Commands about parameters that the firmware around the node carries out.
   [[nodiscard]] auto& parameter_commands() requires kHasBusParameters<Estimators> { return parameter_commands_; }
+  /// Another sender has taken the node's time: it takes no first key until power-on.
+  void end_claims() {
+    if constexpr (kHasBusParameters<Estimators>) parameter_commands_.end_claims();
+  }
+  /// The board has been switched on.
+  void begin_claims() {
+    if constexpr (kHasBusParameters<Estimators>) parameter_commands_.begin_claims();
+  }
   [[nodiscard]] const estimators::MapFrame& map_frame() const { return map_frame_; }
   /// Records since the last tick began, of a node without a bus.
   [[nodiscard]] const auto& output() const requires(!kHasBus<Estimators>) { return publisher_; }
@@ -300,7 +308,8 @@ void Node<Estimators, Capacity>::on_frame(const base::CanFrame& frame) {
   }
   if constexpr (kHasBusParameters<Estimators>) {
     if (bus::ParameterCommands::takes(offset))
-      return parameter_commands_.on_frame(frame, protection_.admits_parameters(frame, counters_), counters_);
+      return parameter_commands_.on_frame(frame, protection_.admits_parameters(frame, counters_), Estimators::kTakesKey,
+                                          counters_);
   }
   const bool admitted =
       protection_.admits(offset, frame, now_, counters_, [this](const sensor::Sample& vouched) { take(vouched); });

@@ -53,7 +53,7 @@ class StagedParameters {
   }
   /// The word of the active set is not as compiled; `row` counts in kStoredRows.
   [[nodiscard]] bool is_changed(std::size_t row, std::size_t word) const {
-    return get(active_, kStoredRows[row], word) != get(compiled_, kStoredRows[row], word);
+    return !is_secret(row) && get(active_, kStoredRows[row], word) != get(compiled_, kStoredRows[row], word);
   }
   [[nodiscard]] std::size_t changed() const {
     std::size_t words = 0;
@@ -91,6 +91,23 @@ class StagedParameters {
     wait(at, false);
     return Answer::kDone;
   }
+  [[nodiscard]] static bool is_key(std::uint16_t index) {
+    const std::size_t at = find(index);
+    return at < kStoredRows.size() && is_secret(at);
+  }
+  /// One word of the first key. From the Apply on, commands and lockstep need tags by it; a desk's lockstep stays open.
+  Answer claim(std::size_t word, std::uint32_t value) {
+    if (word >= staged_.bus.key.size()) return Answer::kUnknown;
+    if (active_.bus.key != decltype(active_.bus.key){}) return Answer::kRefused;
+    staged_.bus.key[word] = value;
+    staged_.bus.commands = CommandAccess::kAuthenticated;
+    if (active_.loop.lockstep == Lockstep::kGuarded) staged_.loop.lockstep = Lockstep::kAuthenticated;
+    return Answer::kDone;
+  }
+  /// A key that is staged only is gone.
+  void withdraw_claim() {
+    if (claims()) copy_access(active_, staged_);
+  }
   /// Whether take_over() may follow. `before` and `after`: names (kName) of the active set that the sender knows, and
   /// of the staged one that it means.
   [[nodiscard]] Answer judge(std::uint32_t before, std::uint32_t after) {
@@ -101,12 +118,14 @@ class StagedParameters {
   /// Stages the compiled parameters, but for rows of access, and judges them.
   [[nodiscard]] Answer restore(std::uint32_t before) {
     if (((before ^ active_crc()) & kName) != 0) return Answer::kOtherActive;
+    withdraw_claim();
     for (std::size_t row = 0; row < kStoredRows.size(); ++row)
       if (!kStoredRows[row].access) copy(compiled_, staged_, kStoredRows[row]);
     return judge();
   }
-  /// Live rows are active, the others wait where they differ.
+  /// Live rows and a claimed key are active, the others wait where they differ.
   void take_over() {
+    if (claims()) copy_access(staged_, active_);
     for (std::size_t row = 0; row < kStoredRows.size(); ++row) {
       const bool live = kStoredRows[row].live;
       if (live) copy(staged_, active_, kStoredRows[row]);
@@ -155,6 +174,10 @@ class StagedParameters {
     return Answer::kDone;
   }
   static bool is_secret(std::size_t row) { return kStoredRows[row].secret; }
+  [[nodiscard]] bool claims() const { return staged_.bus.commands != active_.bus.commands; }
+  static void copy_access(const Parameters& from, Parameters& to) {
+    to.bus.key = from.bus.key, to.bus.commands = from.bus.commands, to.loop.lockstep = from.loop.lockstep;
+  }
 
   [[nodiscard]] static std::size_t find(std::uint16_t index) {
     std::size_t at = 0;
