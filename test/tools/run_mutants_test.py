@@ -81,12 +81,17 @@ class Mutants(unittest.TestCase):
         with open(program, "w", encoding="ascii") as file:
             file.write('#!/bin/sh\necho "$@" >> "$0.calls"\n')
         os.chmod(program, 0o755)
-        tree = type("OneProgram", (), {"program": staticmethod(lambda name: program)})
-        runs = [("suite", {"A.fast": 1, "A.slow": 900, "B.fast": 2}, {"A.fast": {3, 4}, "A.slow": {4}, "B.fast": {5}}, 1.0)]
-        self.assertEqual(mutants.judge(tree, runs, 4, 2.0), (False, True, ""))
+        reads = {program: {"A.fast": {3, 4}, "B.fast": {5}, **{f"C.long{i}": set(range(4, 9 + i)) for i in range(5)}}}
+        groups = mutants.groups_of(reads, 4)
+        self.assertEqual(groups, [(program, ["A.fast", "C.long0", "C.long1"]), (program, ["C.long2", "C.long3", "C.long4"])])
+        job = {"number": 4, "factor": 2.0, "groups": groups, "most_s": 60}
+        self.assertEqual(mutants.judge(job), (False, ""))
         with open(program + ".calls", encoding="ascii") as file:
-            self.assertEqual([line.split("--gtest_filter=")[1].strip() for line in file], ["A.fast", "A.slow"])
-        self.assertEqual(mutants.judge(tree, runs, 6, 2.0), (False, False, ""))
+            self.assertEqual([line.split("--gtest_filter=")[1].strip() for line in file], ["A.fast:C.long0:C.long1", "C.long2:C.long3:C.long4"])
+        self.assertEqual(mutants.groups_of(reads, 60), [])
+        with open(program, "a", encoding="ascii") as file:
+            file.write('case "$@" in *C.long2*) echo "[  FAILED  ] C.long3 (1 ms)"; exit 1;; esac\n')
+        self.assertEqual(mutants.judge(job), (True, "C.long3"))
 
 
 if __name__ == "__main__":

@@ -74,7 +74,7 @@ class MatchedWorld(unittest.TestCase):
         subprocess.run([os.path.join(PROGRAMS, "tetap-play"), self.log, "--memory", "--robot", ROBOT, "--lockstep", "--quiet", "--out", into], check=True)
         with open(os.path.join(into, "run.json"), encoding="utf-8") as file:
             crc = int(json.load(file)["state_crc_last"], 16)
-        with Replays(VIEWED, [self.log], ROBOT, cores=1) as replays:
+        with Replays(VIEWED, [self.log], ROBOT, out=self.folder.name) as replays:
             (replay,), = replays.play([{}])
         self.assertEqual(replay.state_crc, crc)
         one = likelihood.Measurements(replay)

@@ -18,7 +18,7 @@ DRAWS, LEAST_TIMES, LEAST_SEEDS = 200, 20, 30  # numbers of by_chance()
 
 def judged(run, truth, job):
     """The sums and series of one run, small enough to be kept for every seed."""
-    result = {"duration_s": float(truth.time_s[-1] - truth.time_s[0]), "times_realtime": run.about["times_realtime"], "estimators": {}}
+    result = {"duration_s": float(truth.time_s[-1] - truth.time_s[0]), "estimators": {}}
     names = recorded_run.code_names()
     since_start = truth.time_s - truth.time_s[0]
     for k in run.estimators:
@@ -234,7 +234,7 @@ def bus_sensors(runs):
 
 def averaged(case, runs):
     result = {key: case[key] for key in ("world", "robot", "fault")}
-    result.update(seeds=len(runs), duration_s=runs[0]["duration_s"], times_realtime=float(np.median([one["times_realtime"] for one in runs])))
+    result.update(seeds=len(runs), duration_s=runs[0]["duration_s"])
     for name in runs[0]["estimators"]:
         mine = [one["estimators"][name] for one in runs]
 

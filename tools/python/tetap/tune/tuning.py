@@ -27,10 +27,10 @@ def refused_share(point):
     return refused / max(1, sum(len(one.verdict) for one in point.logs))
 
 
-def tune(program, logs, robot, given, chosen, cores=0, quiet=True):
+def tune(program, logs, robot, given, chosen, options):
     all_rows = [row for row, _, _ in chosen]
     said = {row.name: outcome.Said(row.name, start) for row, start, _ in chosen}
-    with Replays(program, logs, robot, given, cores or None, quiet) as replays:
+    with Replays(program, logs, robot, given, options, options.out, options.quiet) as replays:
         replays.progress.more(6 * len(chosen) + 12)
         kept, begin, why = list(range(len(chosen))), None, None
         while kept and why != {}:
