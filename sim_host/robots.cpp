@@ -10,9 +10,11 @@
 #include <array>
 #include <cstdio>
 #include <cstdlib>
+#include <filesystem>
 #include <map>
 #include <sstream>
 #include <stdexcept>
+#include <system_error>
 
 namespace tetap::sim {
 
@@ -35,7 +37,16 @@ bool is_configured(const std::string& name) {
   return false;
 }
 
-std::string module_of(const std::string& name) { return std::string(kModules) + "/" + name + ".so"; }
+/// In ../lib/tetap/robots of an installed program; else in the build's folder.
+std::string module_of(const std::string& name) {
+  static const std::string folder = [] {
+    std::error_code error;
+    const auto program = std::filesystem::read_symlink("/proc/self/exe", error);
+    const auto beside = program.parent_path().parent_path() / "lib/tetap/robots";
+    return !error && std::filesystem::is_directory(beside, error) ? beside.string() : std::string(kModules);
+  }();
+  return folder + "/" + name + ".so";
+}
 
 /// The module stays in memory until the program ends.
 const Robot* read_module(const std::string& name) {
