@@ -13,6 +13,8 @@ BUS   ?= $(if $(REALTIME)$(filter-out linux,$(BOARD)),vcan,memory)
 LOG   ?=
 PROBE ?=
 DRY_RUN ?=
+ENGINE ?=
+NODES ?=
 TRUTH ?=
 PARAMS ?=
 SET   ?=
@@ -21,7 +23,7 @@ CELLS ?=
 export ROBOT BOARD PROBE DRY_RUN BUS SEED FAULT REALTIME LOG TRUTH PARAMS SET
 
 # A misspelt name would be taken for the default without a word: FALUT=gnss_jump would run another world than its user thinks.
-settings := ROBOT BOARD PROBE DRY_RUN BUS SEED FAULT REALTIME LOG TRUTH OUT WORLD PLAY REPORT PARAMS SET STEPS CELLS TETAP_DATA
+settings := ROBOT BOARD PROBE DRY_RUN BUS SEED FAULT REALTIME LOG TRUTH OUT WORLD PLAY REPORT PARAMS SET STEPS CELLS ENGINE NODES TETAP_DATA
 given := $(foreach name,$(.VARIABLES),$(if $(findstring command line,$(origin $(name))),$(name)))
 unknown := $(filter-out $(settings) TETAP_% WITH_VCAN_% CMAKE_% CTEST_% CCACHE_% TMPDIR,$(given))
 ifneq ($(unknown),)
@@ -43,16 +45,17 @@ comma := ,
 robots := $(shell tools/run/list_robots)
 # A robot of simulation alone is another one with other parameters.
 module := $(if $(filter $(ROBOT),$(robots)),$(ROBOT),$(patsubst %_matched,%,$(filter rover_matched rover_landmarks_matched,$(ROBOT))))
-ifneq ($(filter sim replay doctor programs firmware board flash laws page tune,$(MAKECMDGOALS)),)
+ifneq ($(filter sim replay doctor programs firmware board flash laws page tune eds,$(MAKECMDGOALS)),)
 ifeq ($(module),)
 $(error no robot '$(ROBOT)'; there are: $(robots) rover_landmarks_matched rover_matched)
 endif
 endif
+engine := $(if $(ENGINE),--engine $(ENGINE)) $(if $(NODES),--nodes $(NODES))
 node := $(if $(filter memory,$(BUS)),,$(comma)tetap-node)
 page_suffix := $(if $(filter file,$(origin ROBOT)),,.$(module))
 page_variant := $(if $(page_suffix),TETAP_VARIANT=$(module) TETAP_SETTINGS=-DTETAP_PAGE_ROBOTS=$(module))
 
-.PHONY: help sim board test quick proof replay record doctor export tune firmware flash size heap stack count bits hashes soak matrix swarm mutants laws constants bench costs check docs dbc page page-test setup programs arm
+.PHONY: help sim board test quick proof replay record doctor export eds tune release firmware flash size heap stack count bits hashes soak matrix swarm mutants laws constants bench costs check docs dbc page page-test setup programs arm
 
 help: ## this list
 	@echo "tetap: state estimation on the robot's own microcontroller"; echo
@@ -98,7 +101,14 @@ tune: setup ## noise rows by the likelihood of recorded drives: LOG="a.log b.log
 	@test -n "$(LOG)" || { echo "make tune: name a log: LOG=run.log ROBOT=$(ROBOT)" >&2; exit 2; }
 	@tools/run/build_preset host:tetap-params,tetap-play,robot_$(module)
 	@TETAP_VARIANT=views TETAP_SETTINGS=-DTETAP_VIEWS=ON tools/run/build_preset host:tetap-innovations,robot_$(module)
-	@tools/calibrate/tune_robot $(LOG) --robot $(ROBOT) $(addprefix --truth ,$(TRUTH)) $(if $(PARAMS),--params $(PARAMS)) $(addprefix --set ,$(SET)) --out $(or $(OUT),out/tune)
+	@tools/calibrate/tune_robot $(LOG) --robot $(ROBOT) $(addprefix --truth ,$(TRUTH)) $(if $(PARAMS),--params $(PARAMS)) $(addprefix --set ,$(SET)) --out $(or $(OUT),out/tune) $(engine)
+
+eds: setup ## the CANopen data sheet of a robot that takes parameters from its bus: ROBOT=mrclam, in out/ROBOT.eds
+	@tools/run/build_preset host:tetap-params,robot_$(module)
+	@mkdir -p out && build/host/sim_host/tetap-params --robot $(ROBOT) --eds > out/$(ROBOT).eds && echo out/$(ROBOT).eds
+
+release: setup ## images, packages, DBC, data sheets, bill of materials and sums in out/release, of a committed tree
+	@tools/run/make_release
 
 firmware: setup ## the flash image: BOARD=zynqmp_r5 ROBOT=rover, with its size table, no heap and stack proved
 	@tools/run/build_firmware
@@ -140,13 +150,13 @@ hashes: setup programs ## a hash of each estimate over simulated and recorded ru
 
 matrix: setup ## faults of every sensor in every situation against what the node promises, in out/matrix.json (CELLS=1000); goes on where it was
 	@tools/run/build_preset host:tetap-matrix,robots
-	@tools/proof/run_matrix $(if $(CELLS),--cells $(CELLS))
+	@tools/proof/run_matrix $(if $(CELLS),--cells $(CELLS)) $(engine)
 
 swarm: setup programs ## faults drawn anew for each seed, and what is left a minute after all of them, in out/swarm.json (CELLS=100 seeds)
-	@tools/proof/run_swarm $(if $(CELLS),--seeds $(CELLS))
+	@tools/proof/run_swarm $(if $(CELLS),--seeds $(CELLS)) $(engine)
 
 mutants: setup ## constants of the inertial estimator doubled and halved: which no test notices, in out/mutants.json (CELLS=60: a sample); goes on where it was
-	@tools/proof/run_mutants $(if $(CELLS),--constants $(CELLS))
+	@tools/proof/run_mutants $(if $(CELLS),--constants $(CELLS)) $(engine)
 
 laws: setup programs ## laws that need no truth (other stamps, order, time, place, mirror image) on LOG= of ROBOT=; figures in out/laws
 	@test -n "$(LOG)" || { echo "make laws: name a log: LOG=file ROBOT=$(ROBOT)" >&2; exit 2; }
