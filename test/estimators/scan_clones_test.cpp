@@ -32,7 +32,7 @@ struct CloneBench {
     for (double& one : a.reshaped()) one = normal();
     a = size.asDiagonal() * a;
     p.topLeftCorner(kState, kState) = a * a.transpose() / kState;
-    p(kTurned, kTurned) = ScanClones::kMount_rad * ScanClones::kMount_rad;
+    p(kTurned, kTurned) = std::pow(static_cast<double>(ScanClones::kMount_rad), 2);
     nav::InsState x;
     x.v_n_mps << 0.8F, 1.1F, 0.0F;
     x.q_nb = nav::exp_quaternion({0.0F, 0.0F, 0.9F});

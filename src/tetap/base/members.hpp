@@ -179,15 +179,15 @@ constexpr std::size_t aligned(std::size_t at, std::size_t alignment) {
 template <class T>
 constexpr bool covers() {
   return []<class... E>(std::type_identity<std::tuple<E...>>) {
-    const auto covered = [](bool empty_has_place) {
+    const auto size = [](bool empty_has_place) {
       std::size_t end = 0;
       ((end = std::is_empty_v<EntryType<E>> && !empty_has_place
                   ? end
                   : aligned(end, alignof(EntryType<E>)) + sizeof(EntryType<E>)),
        ...);
-      return aligned(end == 0 ? 1 : end, alignof(T)) == sizeof(T);
+      return aligned(end == 0 ? 1 : end, alignof(T));
     };
-    return covered(false) || covered(true);
+    return size(false) <= sizeof(T) && sizeof(T) <= size(true);
   }(std::type_identity<List<T>>());
 }
 

@@ -33,7 +33,7 @@ class StampWraps {
       s.period_us += s.period_us > 0 ? (step_us - s.period_us) / 8 : step_us;
     }
     s.stamp = stamp;
-    s.note_chain(sample.sequence, step.us < 0);
+    s.note_chain(sample.sequence, step.us <= 0);
     s.arrived = now;
     return stamp;
   }
@@ -70,11 +70,11 @@ class StampWraps {
 
     [[nodiscard]] bool crosses() const { return chains >> 4U == kMostCrossings; }
     /// A sample goes on with the last one, or with the last but one, where two chains cross. One crossing is worth
-    /// three samples in order. A sample that is older than the last one came late, and shows no chain.
-    void note_chain(std::uint8_t next, bool older) {
+    /// three samples in order. A sample no younger than the last one came late or beside it, and shows no chain.
+    void note_chain(std::uint8_t next, bool late) {
       const auto follows = [next](unsigned of) { return ((next - of) & 0x0FU) == 1; };
       unsigned crossings = chains >> 4U;
-      if (older) {
+      if (late) {
         crossings = 0;
       } else if (follows(sequence)) {
         crossings -= crossings > 0 ? 1U : 0U;
