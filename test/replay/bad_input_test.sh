@@ -112,7 +112,7 @@ refused "a folder for a log" 'cannot be read: Is a directory' "$programs/tetap-p
 refused "an output folder that cannot be" "$work/good.log/x" "$programs/tetap-play" "$work/good.log" --memory --robot mrclam --out "$work/good.log/x" --quiet
 
 # Command lines
-robots='there are: car .*mrclam .*rover .*rover_matched'
+robots='there are: all_round car .*mrclam .*rover .*rover_matched'
 refused "a robot that does not exist (player)" "no robot 'tank'; $robots" "$programs/tetap-play" "$work/good.log" --memory --robot tank
 refused "a robot that does not exist (node)" "no robot 'tank'; $robots" "$programs/tetap-node" --robot tank
 refused "a robot that does not exist (player, over a bus)" "no robot 'tank'; $robots" "$programs/tetap-play" "$work/good.log" --robot tank

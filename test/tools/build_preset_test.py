@@ -85,7 +85,7 @@ class Commands(unittest.TestCase):
     def test_an_unknown_robot_is_refused_with_the_list_before_anything_is_built(self):
         for command in ("sim", "replay", "doctor", "programs", "firmware", "board"):
             said = self.make(command, "LOG=run.log", "ROBOT=tank", status=2)
-            self.assertRegex(said, r"no robot 'tank'; there are: car .*\brover\b.* rover_matched\b", command)
+            self.assertRegex(said, r"no robot 'tank'; there are: all_round car .*\brover\b.* rover_matched\b", command)
 
 
 if __name__ == "__main__":

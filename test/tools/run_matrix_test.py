@@ -434,7 +434,7 @@ class FaultsInFrames(unittest.TestCase):
                                    ("radar z dead", "no sensor 'radar'; there are: gyro accel "), ("frames radar lost", "frames: no device 'radar'; there are: imu wheels "),
                                    ("frames imu delayed", "a delay needs --size, in s"),
                                    ("frames imu offset", "frames: no kind 'offset'; there are: delayed "), ("gyro z lost", "gyro: no kind 'lost'; there are: offset "),
-                                   ("gyro z dead", "no robot 'tank'; there are: car ", "--robot", "tank"),
+                                   ("gyro z dead", "no robot 'tank'; there are: all_round car ", "--robot", "tank"),
                                    ("gyro z dead", "--at is 3.500 s: " + self.log + " ends 2.990 s after its begin", "--at", "3.5"),
                                    ("gyro z dead", self.log + ": no input frames of this id base", "--base", "0x400")):
             message = self.inject(fault, *more, status=2)

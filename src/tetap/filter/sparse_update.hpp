@@ -84,8 +84,8 @@ template <class Scalar, int N, int M>
   });
 }
 
-/// From P H^T, which is in g, and S to the verdict, the correction and the new P.
-template <class Scalar, int N, int M, class Watch>
+/// From P H^T and S to the verdict, the correction and the new P. P H^T is in g, or it is the columns of P from kGroup.
+template <int kGroup, class Scalar, int N, int M, class Watch>
 [[gnu::noinline]] void correct(Symmetric<Scalar, N>& p, Gains<Scalar, N, M>& g, const Vector<Scalar, M>& noise,
                                SparseUpdate<Scalar, N, M>& result, Watch& watch) {
   Innovation<Scalar, M>& record = result.innovation;
@@ -125,7 +125,7 @@ template <class Scalar, int N, int M, class Watch>
   unroll<0, N>([&](auto n) __attribute__((always_inline)) {
     Scalar dx;
     unroll<0, M>([&](auto j) __attribute__((always_inline)) {
-      Scalar gain = g(n, j);
+      Scalar gain = kGroup < 0 ? g(n, j) : p(n, kGroup < 0 ? 0 : kGroup + j);
       unroll<0, j>([&](auto k)
                        __attribute__((always_inline)) { gain = base::subtract_product(gain, g(n, k), l(k, j)); });
       gain *= l(j, j);
@@ -164,10 +164,14 @@ inline void group_update(Symmetric<Scalar, N>& p, const Vector<Scalar, Measureme
     for (int r = 0; r <= c; ++r)
       result.innovation.s(r, c) = p(kGroup + r, kGroup + c) + (r == c ? noise(c) : Scalar{0});
   detail::Gains<Scalar, N, kM> g;
-  unroll<0, N>([&](auto n) __attribute__((always_inline)) {
-    unroll<0, kM>([&](auto m) __attribute__((always_inline)) { g(n, m) = p(n, kGroup + m); });
-  });
-  detail::correct(p, g, noise, result, watch);
+  if constexpr (std::is_same_v<Watch, Unwatched>) {
+    detail::correct<kGroup>(p, g, noise, result, watch);
+  } else {  // an image has one correction of kM components, not one of each group
+    unroll<0, N>([&](auto n) __attribute__((always_inline)) {
+      unroll<0, kM>([&](auto m) __attribute__((always_inline)) { g(n, m) = p(n, kGroup + m); });
+    });
+    detail::correct<-1>(p, g, noise, result, watch);
+  }
 }
 
 /// Does as update(), over the states that Measurement::kTouches names. `result` begins as constructed.
@@ -205,7 +209,7 @@ inline void sparse_update(
       record.s(r, c) = sum;
     });
   });
-  detail::correct(p, g, noise, result, watch);
+  detail::correct<-1>(p, g, noise, result, watch);
 }
 
 }  // namespace tetap::filter

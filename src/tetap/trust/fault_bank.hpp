@@ -158,11 +158,11 @@ class FaultBank {
   static constexpr float kLeastWeight = 0.01F;  ///< less likely rows are in no mixture
 
  private:
-  /// Every signature sees the innovation, and is moved by the gains of a measurement that is used. Four rows at a time:
-  /// an entry of H and a gain are read once for them.
+  /// Every signature sees the innovation, and is moved by the gains of a measurement that is used. Rows go together: an
+  /// entry of H and a gain are read once for as many as the registers hold.
   template <std::size_t M>
   [[gnu::noinline]] void take(const Seen<M>& z, float share, const float* gains) {
-    constexpr std::size_t kTogether = 4, kLast = kRows / kTogether * kTogether;
+    constexpr std::size_t kTogether = M < 3 ? 4 : 2, kLast = kRows / kTogether * kTogether;
     for (std::size_t first = 0; first < kLast; first += kTogether) take_rows<kTogether>(first, z, share, gains);
     if constexpr (kLast < kRows) take_rows<kRows - kLast>(kLast, z, share, gains);
   }
