@@ -19,9 +19,9 @@ EXPECTED = {
     7: {30: 3, 31: NO_COPROCESSOR, 32: FORCED},
     8: {30: 3, 31: UNALIGNED, 32: FORCED},
     9: {30: 3, 31: INVALID_STATE, 32: FORCED},
-    16: {60: 0x600D},
-    17: {1: 11, 2: 400, 60: 0x600D},
-    18: {30: 3, 31: UNALIGNED, 32: FORCED},
+    15: {60: 0x600D},
+    16: {1: 11, 2: 400, 60: 0x600D},
+    17: {30: 3, 31: UNALIGNED, 32: FORCED},
 }
 
 
