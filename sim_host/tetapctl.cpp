@@ -22,11 +22,13 @@
 #include <cstring>
 #include <ctime>
 #include <exception>
+#include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <memory>
 #include <optional>
 #include <string>
+#include <system_error>
 #include <tuple>
 #include <utility>
 #include <vector>
@@ -104,13 +106,16 @@ std::optional<base::SipKey> read_key(const std::optional<std::string>& file, boo
   return key;
 }
 
-/// tools/can/export_log takes over.
+/// tools/can/export_log of the tree that this program was built in takes over: from build/PRESET/sim_host.
 int export_log(const std::vector<std::string>& words) {
-  std::vector<char*> arguments{const_cast<char*>(TETAP_EXPORT_LOG)};
+  std::error_code error;
+  const auto program = std::filesystem::read_symlink("/proc/self/exe", error);
+  const std::string tool = (program.parent_path() / "../../../tools/can/export_log").lexically_normal().string();
+  std::vector<char*> arguments{const_cast<char*>(tool.c_str())};
   for (const std::string& word : words) arguments.push_back(const_cast<char*>(word.c_str()));
   arguments.push_back(nullptr);
-  ::execv(TETAP_EXPORT_LOG, arguments.data());
-  std::fprintf(stderr, "tetapctl: %s: %s\n", TETAP_EXPORT_LOG, std::strerror(errno));
+  ::execv(tool.c_str(), arguments.data());
+  std::fprintf(stderr, "tetapctl: %s: %s; export needs the source tree\n", tool.c_str(), std::strerror(errno));
   return 1;
 }
 
