@@ -4,6 +4,7 @@ import { test } from "node:test";
 import assert from "node:assert/strict";
 import { setFlagsFromString } from "node:v8";
 import { runInNewContext } from "node:vm";
+import "./globals.mjs";
 import { Cable, SlcanReader } from "../web/slcan.js";
 
 setFlagsFromString("--expose-gc");

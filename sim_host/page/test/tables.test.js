@@ -6,6 +6,7 @@ import { execFileSync } from "node:child_process";
 import { mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
+import "./globals.mjs";
 import { formOf, isTable, named, robotsFor, tablesOf } from "../web/tables.js";
 import { unzipped } from "../web/unzip.js";
 
