@@ -3,11 +3,8 @@
 // hold. Not part of this tree's own builds, which compile each group apart (src/CMakeLists.txt).
 #pragma GCC diagnostic ignored "-Wmissing-field-initializers"  // designated initialisers leave the rest to the defaults
 
-#define TETAP_ESTIMATORS_TOGETHER
-
 #include "tetap/estimators/all_round/all_round.cpp"
 #include "tetap/estimators/all_round/scan_clones.cpp"
-#include "tetap/estimators/all_round/with_clones.cpp"
 #include "tetap/estimators/attitude.cpp"
 #include "tetap/estimators/inertial/fuse_forward.cpp"
 #include "tetap/estimators/inertial/fuse_gnss.cpp"
@@ -31,9 +28,4 @@
 #include "tetap/estimators/planar/position_fusion.cpp"
 #include "tetap/estimators/target/target_tracker.cpp"
 #include "tetap/estimators/visual/visual_odometry.cpp"
-
-namespace tetap::estimators {
-
-template class InertialWith<CloneWatch>;
-
-}  // namespace tetap::estimators
+#include "tetap/estimators/with_clones.cpp"

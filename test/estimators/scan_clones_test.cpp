@@ -138,6 +138,36 @@ TEST(ScanClones, AreTheDenseFilterOfAllErrors) {
   EXPECT_NEAR(static_cast<double>(bench.clones.mount_rad()), dx(kTurned), 2e-5);
 }
 
+/// Normal equations in double: the likelihood and the prior together are the posterior.
+TEST(ScanClones, ALikelihoodLeadsFromThePriorToThePosterior) {
+  CloneBench bench;
+  const Eigen::Vector3d size(0.05, 0.02, 0.004), off(0.03, -0.02, 0.006);
+  const auto drawn = [&] {
+    Eigen::Matrix3d a;
+    for (double& one : a.reshaped()) one = bench.normal();
+    return Eigen::Matrix3d(size.asDiagonal() * (a * a.transpose() + Eigen::Matrix3d::Identity()) * size.asDiagonal());
+  };
+  const Eigen::Matrix3d more = drawn(), prior = drawn();
+  const Eigen::Matrix3d posterior = (prior.inverse() + more.inverse()).inverse();
+  const auto single = [](const Eigen::Matrix3d& p) { return filter::Symmetric<float, 3>::upper_of(p.cast<float>()); };
+  const slam::Displacement<float> mean{1.0F, -0.5F, slam::Heading<float>::from_radians(0.2F)},
+      found{1.03F, -0.52F, slam::Heading<float>::from_radians(0.206F)};
+  const auto z = DisplacementLikelihood::between({.mean = mean, .covariance = single(prior)},
+                                                 {.mean = found, .covariance = single(posterior)});
+  const Eigen::Matrix3d information = more.inverse();
+  const Eigen::Vector3d weighted = posterior.inverse() * off;
+  for (int c = 0; c < 3; ++c) {
+    EXPECT_NEAR(static_cast<double>(z.weighted[static_cast<std::size_t>(c)]), weighted(c), 1e-3 * weighted.norm()) << c;
+    for (int r = 0; r <= c; ++r)
+      EXPECT_NEAR(static_cast<double>(z.information(r, c)), information(r, c),
+                  1e-3 * std::sqrt(information(r, r) * information(c, c)))
+          << r << c;
+  }
+  const auto none = DisplacementLikelihood::between({.mean = mean, .covariance = {}},
+                                                    {.mean = found, .covariance = single(posterior)});
+  EXPECT_EQ(none.information(2, 2), 0.0F);
+}
+
 TEST(ScanClones, ACorridorLeavesItsDirectionToTheFilter) {
   CloneBench bench;
   bench.to_second_scan();

@@ -12,6 +12,11 @@ struct ScanKeyframeOptions {
   float turn_rad = 0.3F;    ///< or so much turn
 };
 
+/// Whether a displacement is farther than that.
+[[nodiscard]] inline bool beyond(const Displacement<float>& d, const ScanKeyframeOptions& n) {
+  return d.x_m * d.x_m + d.y_m * d.y_m > n.distance_m * n.distance_m || base::abs(d.yaw.radians()) > n.turn_rad;
+}
+
 /// A ring of kFrames scans and their poses in one frame.
 template <int kBeams, int kFrames>
 class ScanKeyframes {
@@ -29,11 +34,7 @@ class ScanKeyframes {
   [[nodiscard]] const Scan<kBeams>& scan(int k) const { return scan_[slot(k)]; }
   [[nodiscard]] const Pose& pose(int k) const { return pose_[slot(k)]; }
   /// Whether a scan that lies there from the newest keyframe becomes one.
-  [[nodiscard]] bool due(const Displacement<float>& d) const {
-    const float way = d.x_m * d.x_m + d.y_m * d.y_m;
-    return count_ == 0 || way > options_.distance_m * options_.distance_m ||
-           base::abs(d.yaw.radians()) > options_.turn_rad;
-  }
+  [[nodiscard]] bool due(const Displacement<float>& d) const { return count_ == 0 || beyond(d, options_); }
   /// The oldest one gives way.
   void add(const Scan<kBeams>& scan, const Pose& pose) {
     newest_ = (newest_ + 1) % kFrames;

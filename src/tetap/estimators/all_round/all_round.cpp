@@ -1,26 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tetap/estimators/all_round/all_round.hpp"
 
-#include "tetap/sensor/calibration.hpp"
+#include "tetap/estimators/scanner.hpp"
 
 namespace tetap::estimators {
-
-namespace {
-
-slam::Displacement<float> mounting_of(const param::LidarParameters& n) {
-  return {n.x_b_m, n.y_b_m, slam::Heading<float>::from_radians(n.yaw_rad)};
-}
-
-slam::ScanGeometry geometry_of(const sensor::PlanarScan& scan, const param::LidarParameters& n) {
-  return {.beams = scan.beams,
-          .first_rad = scan.first_rad,
-          .step_rad = scan.step_rad,
-          .sweep_s = sensor::sweep_s(scan, n),
-          .min_m = n.min_m,
-          .max_m = n.max_m};
-}
-
-}  // namespace
 
 void AllRound::restart(base::Micros t, const Context& ctx) {
   Inertial::restart(t, ctx);
@@ -70,11 +53,12 @@ SourceStates AllRound::sources(const Context& ctx) const {
 bool AllRound::keyframe_due(const slam::Displacement<float>& d, base::Micros stamp, float times,
                             const Context& ctx) const {
   const param::MappingParameters& m = ctx.parameters.mapping;
-  const float way_m = times * m.keyframe_distance_m;
   const bool late =
       m.keyframe_time_ms > 0 && stamp - keyframe_at_ >= base::Micros{std::int64_t{1'000} * m.keyframe_time_ms};
-  return d.x_m * d.x_m + d.y_m * d.y_m > way_m * way_m || base::abs(d.yaw.radians()) > times * m.keyframe_turn_rad ||
-         (late && times <= 1.0F);
+  slam::ScanKeyframeOptions far = keyframe_options(m);
+  far.distance_m *= times;
+  far.turn_rad *= times;
+  return slam::beyond(d, far) || (late && times <= 1.0F);
 }
 
 Innovation AllRound::fuse(const sensor::PlanarScan& scan, base::Micros stamp, std::uint8_t instance,
@@ -91,7 +75,8 @@ Innovation AllRound::fuse(const sensor::PlanarScan& scan, base::Micros stamp, st
   ScanClones& clones = watch_.bank();
   scan_turn_rad_ = wheels_turn_rad_;
   const slam::ScanMotion motion = scanner_motion(ctx.parameters.lidar);
-  clones.take_scan(ins_, base::seconds(stamp - time_), motion.yaw_rate_radps, mounting_of(ctx.parameters.lidar));
+  clones.take_scan(ins_, base::seconds(stamp - time_), motion.yaw_rate_radps,
+                   scanner_mounting(ctx.parameters.lidar).mean);
   prior_ = {.mean = {}, .covariance = filter::Symmetric<float, 3>::diagonal({1, 1, 1})};
   if (clones.has_keyframe()) {
     prior_ = clones.displacement();
@@ -104,7 +89,7 @@ Innovation AllRound::fuse(const sensor::PlanarScan& scan, base::Micros stamp, st
   scan_ = scan;
   if (ctx.scans == nullptr || ctx.scans->ranges(scan).empty())
     return {.verdict = sensor::Verdict::kNoRoom, .failed = sensor::Check::kTime};
-  if (!match_.begin(geometry_of(scan, ctx.parameters.lidar), motion, prior_)) {
+  if (!match_.begin(scan_geometry(scan, ctx.parameters.lidar), motion, prior_)) {
     report_.end = ScanEnd::kNoGeometry;
     report_.ended = now_;
     return {.verdict = sensor::Verdict::kRejected, .failed = sensor::Check::kValue};
@@ -140,13 +125,7 @@ void AllRound::make_keyframe() {
 void AllRound::conclude(const Context& ctx) {
   const slam::ScanMatchResult& result = match_.result();
   const auto& p = result.pose.covariance;
-  report_.end = static_cast<ScanEnd>(result.fate);
-  report_.ended = now_;
-  report_.iterations = result.iterations;
-  report_.pairs = result.pairs;
-  const float half = 0.5F * (p(0, 0) - p(1, 1));
-  report_.sigma_m = base::sqrt(0.5F * (p(0, 0) + p(1, 1)) + base::sqrt(half * half + p(0, 1) * p(0, 1)));
-  report_.sigma_yaw_rad = base::sqrt(p(2, 2));
+  report_match(result, now_, report_);
   const auto& mean = result.pose.mean;
   digest_.update(record_.stamp.us, static_cast<std::uint32_t>(result.fate), mean.x_m, mean.y_m, mean.yaw.radians(),
                  p(0, 0), p(1, 1), p(2, 2));

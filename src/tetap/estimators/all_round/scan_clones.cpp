@@ -8,19 +8,6 @@ namespace tetap::estimators {
 
 namespace {
 
-/// Inverse of a covariance by its factor; false where there is none.
-bool inverse_of(const filter::Symmetric<float, 3>& c, filter::Symmetric<float, 3>& inverse) {
-  std::array<float, 6> w{};
-  if (!slam::whitening_of(c, w)) return false;
-  inverse(0, 0) = w[0] * w[0] + w[1] * w[1] + w[3] * w[3];
-  inverse(0, 1) = w[1] * w[2] + w[3] * w[4];
-  inverse(1, 1) = w[2] * w[2] + w[4] * w[4];
-  inverse(0, 2) = w[3] * w[5];
-  inverse(1, 2) = w[4] * w[5];
-  inverse(2, 2) = w[5] * w[5];
-  return true;
-}
-
 std::array<float, 3> difference(const slam::Displacement<float>& a, const slam::Displacement<float>& b) {
   return {a.x_m - b.x_m, a.y_m - b.y_m, (a.yaw - b.yaw).radians()};
 }
@@ -38,7 +25,7 @@ DisplacementLikelihood DisplacementLikelihood::between(const slam::UncertainDisp
                                                        const slam::UncertainDisplacement<float>& posterior) {
   DisplacementLikelihood z{.about = prior.mean, .information = {}};
   filter::Symmetric<float, 3> before, after;
-  if (!inverse_of(prior.covariance, before) || !inverse_of(posterior.covariance, after)) return z;
+  if (!slam::inverse_of(prior.covariance, before) || !slam::inverse_of(posterior.covariance, after)) return z;
   for (int c = 0; c < 3; ++c)
     for (int r = 0; r <= c; ++r) z.information(r, c) = after(r, c) - before(r, c);
   z.weighted = product(after, difference(posterior.mean, prior.mean));

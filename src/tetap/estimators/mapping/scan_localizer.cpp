@@ -3,6 +3,7 @@
 
 #include "tetap/base/reinitialise.hpp"
 #include "tetap/estimators/mapping/map_pose.hpp"
+#include "tetap/estimators/scanner.hpp"
 
 namespace tetap::estimators {
 
@@ -58,7 +59,8 @@ void ScanLocalizer<kBeams, kFrames, kParticles>::work(std::uint32_t units, const
   const auto now = odometer_.scan_pose();
   localisation_.move(now.minus(last_));
   last_ = now;
-  if (localisation_.see(slam::ScanBeams::of(odometer_.keyframe_scan(), Odometer::mounting(ctx).mean), *ctx.field))
+  if (localisation_.see(slam::ScanBeams::of(odometer_.keyframe_scan(), scanner_mounting(ctx.parameters.lidar).mean),
+                        *ctx.field))
     weighed_ = now;
 }
 

@@ -3,6 +3,7 @@
 
 #include "tetap/base/reinitialise.hpp"
 #include "tetap/estimators/mapping/map_pose.hpp"
+#include "tetap/estimators/scanner.hpp"
 
 namespace tetap::estimators {
 
@@ -47,7 +48,7 @@ Innovation ScanMapper<kBeams, kFrames, Graph, kKept, kScans>::fuse(const sensor:
                                                                    std::uint8_t instance, const Context& ctx) {
   const Innovation innovation = odometer_.fuse(scan, stamp, instance, ctx);
   if (innovation.verdict == sensor::Verdict::kPending)
-    closures_.hold(Odometer::geometry(scan, ctx), ctx.scans->ranges(scan), odometer_.scanner_motion());
+    closures_.hold(scan_geometry(scan, ctx.parameters.lidar), ctx.scans->ranges(scan), odometer_.scanner_motion());
   return innovation;
 }
 
@@ -57,7 +58,7 @@ void ScanMapper<kBeams, kFrames, Graph, kKept, kScans>::work(std::uint32_t units
     odometer_.work(units, ctx);
     if (!odometer_.take_new_keyframe()) return;
     if (!mapper_.step(closures_.widened(odometer_.keyframe_step()), odometer_.keyframe_stamp())) return;
-    closures_.add(mapper_.keyframes(), odometer_.keyframe_scan(), Odometer::mounting(ctx));
+    closures_.add(mapper_.keyframes(), odometer_.keyframe_scan(), scanner_mounting(ctx.parameters.lidar));
   } else if (!mapper_.idle()) {
     mapper_.work(kGraphUnits * units, ctx);
   } else {

@@ -5,7 +5,7 @@
 #include "tetap/estimators/mapping/map_pose.hpp"
 #include "tetap/estimators/mapping/pose_covariance.hpp"
 #include "tetap/estimators/planar/window_motion.hpp"
-#include "tetap/sensor/calibration.hpp"
+#include "tetap/estimators/scanner.hpp"
 
 namespace tetap::estimators {
 
@@ -28,23 +28,6 @@ filter::Symmetric<float, 3> carried(const filter::Symmetric<float, 3>& p, slam::
 }
 
 }  // namespace
-
-template <int kBeams, int kFrames>
-auto ScanOdometry<kBeams, kFrames>::mounting(const Context& ctx) -> Step {
-  const param::LidarParameters& n = ctx.parameters.lidar;
-  return {.mean = {n.x_b_m, n.y_b_m, slam::Heading<float>::from_radians(n.yaw_rad)}, .covariance = {}};
-}
-
-template <int kBeams, int kFrames>
-slam::ScanGeometry ScanOdometry<kBeams, kFrames>::geometry(const sensor::PlanarScan& scan, const Context& ctx) {
-  const param::LidarParameters& n = ctx.parameters.lidar;
-  return {.beams = scan.beams,
-          .first_rad = scan.first_rad,
-          .step_rad = scan.step_rad,
-          .sweep_s = sensor::sweep_s(scan, n),
-          .min_m = n.min_m,
-          .max_m = n.max_m};
-}
 
 template <int kBeams, int kFrames>
 auto ScanOdometry<kBeams, kFrames>::displaced(const Estimate& estimate) -> Step {
@@ -118,7 +101,8 @@ Innovation ScanOdometry<kBeams, kFrames>::fuse(const sensor::PlanarScan& scan, b
   report_ = {.ended = report_.ended, .sequence = scan.sequence, .instance = instance};
   if (ctx.scans == nullptr || ctx.scans->ranges(scan).empty())
     return {.verdict = sensor::Verdict::kNoRoom, .failed = sensor::Check::kTime};
-  if (!match_.begin(geometry(scan, ctx), scanner_motion_, as_of(step_, mounting(ctx)))) {
+  if (!match_.begin(scan_geometry(scan, ctx.parameters.lidar), scanner_motion_,
+                    as_of(step_, scanner_mounting(ctx.parameters.lidar)))) {
     report_.end = ScanEnd::kNoGeometry;
     report_.ended = now_;
     return {.verdict = sensor::Verdict::kRejected, .failed = sensor::Check::kValue};
@@ -155,26 +139,16 @@ template <int kBeams, int kFrames>
 void ScanOdometry<kBeams, kFrames>::conclude(const Context& ctx) {
   const slam::ScanMatchResult& result = match_.result();
   const auto& p = result.pose.covariance;
-  report_.end = static_cast<ScanEnd>(result.fate);
-  static_assert(static_cast<int>(slam::ScanFate::kSingular) == static_cast<int>(ScanEnd::kSingular) &&
-                static_cast<int>(slam::ScanFate::kFewPairs) == static_cast<int>(ScanEnd::kFewPairs) &&
-                static_cast<int>(slam::ScanFate::kFirst) == static_cast<int>(ScanEnd::kFirst));
-  report_.ended = now_;
-  report_.iterations = result.iterations;
-  report_.pairs = result.pairs;
-  const float half = 0.5F * (p(0, 0) - p(1, 1));
-  report_.sigma_m = base::sqrt(0.5F * (p(0, 0) + p(1, 1)) + base::sqrt(half * half + p(0, 1) * p(0, 1)));
-  report_.sigma_yaw_rad = base::sqrt(p(2, 2));
+  report_match(result, now_, report_);
   if (result.matched()) {
-    step_ = as_of(result.pose, inverse(mounting(ctx)));
+    step_ = as_of(result.pose, inverse(scanner_mounting(ctx.parameters.lidar)));
     matched_ = true;
     last_match_ = record_.stamp;
   }
   const auto& mean = step_.mean;
   digest_.update(record_.stamp.us, static_cast<std::uint32_t>(result.fate), mean.x_m, mean.y_m, mean.yaw.radians(),
                  p(0, 0), p(1, 1), p(2, 2));
-  const param::MappingParameters& m = ctx.parameters.mapping;
-  keyframes_.set_options({.distance_m = m.keyframe_distance_m, .turn_rad = m.keyframe_turn_rad});
+  keyframes_.set_options(keyframe_options(ctx.parameters.mapping));
   if (match_.scan().known > 0 && keyframes_.due(result.pose.mean)) make_keyframe(ctx);
   switch (result.fate) {
     case slam::ScanFate::kMatched:
@@ -194,7 +168,7 @@ void ScanOdometry<kBeams, kFrames>::make_keyframe(const Context& ctx) {
   keyframe_step_ = step_;
   new_keyframe_ = true;
   odometry_ = step_ = {};
-  keyframes_.add(match_.scan(), reference_.plus(mounting(ctx).mean));
+  keyframes_.add(match_.scan(), reference_.plus(scanner_mounting(ctx.parameters.lidar).mean));
 }
 
 template <int kBeams, int kFrames>

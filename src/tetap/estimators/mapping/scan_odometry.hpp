@@ -82,9 +82,7 @@ class ScanOdometry {
   [[nodiscard]] bool busy() const { return match_.busy(); }
   /// The body at the scan that was fused last, in the odometry's own frame.
   [[nodiscard]] Pose scan_pose() const { return reference_.plus(step_.mean); }
-  /// The scanner on the body, its beams, and its motion at the scan that was fused last.
-  [[nodiscard]] static Step mounting(const Context& ctx);
-  [[nodiscard]] static slam::ScanGeometry geometry(const sensor::PlanarScan& scan, const Context& ctx);
+  /// Motion of the scanner at the scan that was fused last, in its own axes.
   [[nodiscard]] const slam::ScanMotion& scanner_motion() const { return scanner_motion_; }
   /// The body from the newest keyframe to the far end of the window.
   [[nodiscard]] slam::Displacement<float> since_keyframe(base::Micros t, const Context& ctx);
