@@ -69,10 +69,8 @@ class GnssDriver {
       handler(r, driver.stamp(r, now));
     }
     constexpr void operator()(const Baseline& b) {
-      driver.configurator_.on_report(now);
-      const base::Micros itow{std::int64_t{b.itow_ms} * 1000};
-      const auto known = driver.ubx_clock_.at(itow, now);
-      const base::Micros stamp = known ? *known : driver.baseline_clock_.stamp(itow, now);
+      if (b.itow_ms) driver.configurator_.on_report(now);
+      const base::Micros stamp = driver.stamp(b, now);
       if constexpr (requires { handler(b, stamp); }) handler(b, stamp);
     }
     constexpr void operator()(const ubx::Acknowledge& ack) {
@@ -89,6 +87,14 @@ class GnssDriver {
     if (!r.utc.time_valid || r.time_uncertain) return now - settings_.latency;
     const std::int64_t s = r.utc.hour * 3600 + r.utc.minute * 60 + r.utc.second;
     return nmea_clock_.stamp({s * 1'000'000 + r.utc.nano / 1000}, now);
+  }
+
+  /// A heading of NMEA has no time: its arrival is all that is known.
+  constexpr base::Micros stamp(const Baseline& b, base::Micros now) {
+    if (!b.itow_ms) return now - settings_.latency;
+    const base::Micros itow{std::int64_t{*b.itow_ms} * 1000};
+    const auto known = ubx_clock_.at(itow, now);
+    return known ? *known : baseline_clock_.stamp(itow, now);
   }
 
   Port* port_;

@@ -5,7 +5,9 @@
 
 #include "drivers/gnss/framer.hpp"
 #include "drivers/gnss/nmea/epoch.hpp"
+#include "drivers/gnss/nmea/heading.hpp"
 #include "drivers/gnss/ubx/baseline.hpp"
+#include "drivers/gnss/ubx/dual_antenna.hpp"
 #include "drivers/gnss/ubx/epoch.hpp"
 
 #include <cstddef>
@@ -77,8 +79,9 @@ class GnssReceiver {
       constexpr auto kRelPosNed = ubx::kNavMessages[static_cast<std::size_t>(ubx::Nav::kRelPosNed)];
       if (message_class == ubx::kClassNav && id == kRelPosNed.id) {
         // On its own: it waits for the reference antenna's data, and the place need not wait with it.
-        const auto baseline = ubx::baseline(payload, receiver.settings_.baseline_m, receiver.health_);
-        if (baseline) publish(*baseline);
+        line(ubx::baseline(payload, receiver.settings_.baseline_m, receiver.health_));
+      } else if (message_class == ubx::kClassNav && id == ubx::kDualAntennaId) {
+        line(ubx::dual_antenna(payload, receiver.settings_.baseline_m, receiver.health_));
       } else if (message_class == ubx::kClassNav) {
         receiver.ubx_.on_nav(id, payload, receiver.health_, *this);
       } else if (message_class == ubx::kClassAck && id <= 1) {
@@ -90,7 +93,20 @@ class GnssReceiver {
         receiver.health_.add(Reason::kUnread);
       }
     }
-    constexpr void nmea(nmea::Text text) { receiver.nmea_.on_sentence(text, receiver.health_, *this); }
+    constexpr void nmea(nmea::Text text) {
+      nmea::Fields fields(text);
+      const auto kind = nmea::heading_kind(fields[0]);
+      if (!kind) return receiver.nmea_.on_sentence(text, receiver.health_, *this);
+      const auto heading = nmea::heading(fields, *kind, receiver.health_);
+      if (!heading) return;
+      if (!receiver.headings_.takes(*kind)) return receiver.health_.add(Reason::kSecondProtocol);
+      publish(*heading);
+    }
+    constexpr void line(const std::optional<Baseline>& baseline) {
+      if (!baseline) return;
+      if (baseline->valid) receiver.headings_.on_ubx();
+      publish(*baseline);
+    }
 
     /// UBX is the more exact of two protocols. Only a UBX epoch with a usable place holds NMEA back: NAV-STATUS,
     /// NAV-POSLLH or NAV-VELNED alone is no fix.
@@ -117,6 +133,7 @@ class GnssReceiver {
   ubx::Epoch ubx_{};
   nmea::Epoch nmea_{};
   Health health_{};
+  nmea::HeadingChoice headings_{};
   std::uint8_t nmea_held_back_ = 0;
 };
 

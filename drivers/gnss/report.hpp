@@ -58,8 +58,8 @@ struct Report {
 
 /// Line between two antennas of one robot, from the moving reference antenna to the rover's, at one time of week.
 struct Baseline {
-  std::uint32_t itow_ms = 0;  ///< GPS time of week
-  bool valid = false;         ///< course usable as a heading; the driver counts the others
+  std::optional<std::uint32_t> itow_ms;  ///< GPS time of week; UBX only
+  bool valid = false;                    ///< course usable as a heading; the driver counts the others
   std::array<float, 3> n_m{base::kNan, base::kNan, base::kNan};  ///< east, north, up; NaN: only its direction is known
   float length_m = base::kNan;
   float length_acc_m = base::kNan;

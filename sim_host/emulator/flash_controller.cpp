@@ -51,6 +51,22 @@ void FlashController::fill_ones(const Operation& operation) {
   std::fill(bytes.begin(), bytes.end(), std::byte{0xFF});
 }
 
+// RM0402: "Any wrong sequence will return a bus error and lock up the FLASH_CR register until the next reset." RM0440
+// agrees.
+void FlashController::take_key(KeyLock& lock, std::uint32_t key) {
+  if (lock.write(key)) return;
+  complain("wrong key: locked until the next reset");
+  bus_error();
+}
+
+bool FlashController::opens_cr(std::uint32_t set, std::uint32_t locks) {
+  await_idle();  // the bus stalls
+  if (off()) return false;
+  if (!lock_.locked()) return true;
+  if ((set & ~locks) != 0) complain("FLASH_CR written while LOCK = 1");
+  return false;
+}
+
 std::uint64_t FlashController::load(std::uint32_t address, unsigned size) {
   if (busy_until(address) != 0) await_idle();
   return content(offset_of(address), size);

@@ -67,8 +67,9 @@ class FlashController : public Peripheral {
   [[nodiscard]] std::string restore(const std::string& path);
 
   Pace pace = Pace::kFourfold;
-  std::uint64_t seed = 1;          ///< draws what half-done operations leave
-  std::function<void()> on_range;  ///< busy_range() or damaged() has changed
+  std::uint64_t seed = 1;           ///< draws what half-done operations leave
+  std::function<void()> on_range;   ///< busy_range() or damaged() has changed
+  std::function<void()> on_change;  ///< FLASH_ACR
 
  protected:
   struct Operation {
@@ -93,7 +94,12 @@ class FlashController : public Peripheral {
   void set_content(std::uint32_t offset, unsigned size, std::uint64_t value);
   void fill_ones(const Operation& operation);
   [[nodiscard]] std::uint32_t offset_of(std::uint32_t address) const;
+  void take_key(KeyLock& lock, std::uint32_t key);
+  /// Whether a store of `set` ones into FLASH_CR counts; one that a lock refuses is a complaint but for bits of
+  /// `locks`.
+  [[nodiscard]] bool opens_cr(std::uint32_t set, std::uint32_t locks);
 
+  KeyLock lock_{0x4567'0123, 0xCDEF'89AB}, option_lock_{0x0819'2A3B, 0x4C5D'6E7F};  ///< RM0402 and RM0440: equal keys
   std::map<std::uint32_t, std::uint8_t> damaged_;
 
  private:

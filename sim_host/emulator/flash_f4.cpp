@@ -60,8 +60,6 @@ constexpr const Durations& erase_time(std::uint32_t size) {
 
 FlashF4::FlashF4(Surroundings around, Memory& memory)
     : FlashController(around, kBase, memory, kFlashSize),
-      lock_(0x4567'0123, 0xCDEF'89AB),
-      option_lock_(0x0819'2A3B, 0x4C5D'6E7F),
       optcr_(kOptcrReset),
       protection_(kNwrp.of(kOptcrReset)),
       options_done_(around.scheduler, [this] { protection_ = kNwrp.of(optcr_); }) {}
@@ -117,20 +115,8 @@ void FlashF4::write_acr(std::uint32_t value, std::uint32_t mask) {
   if (on_change) on_change();
 }
 
-// "Any wrong sequence will return a bus error and lock up the FLASH_CR register until the next reset."
-void FlashF4::take_key(KeyLock& lock, std::uint32_t key) {
-  if (lock.write(key)) return;
-  complain("wrong key: locked until the next reset");
-  bus_error();
-}
-
 void FlashF4::write_cr(std::uint32_t value, std::uint32_t mask) {
-  await_idle();  // the bus stalls
-  if (off()) return;
-  if (lock_.locked()) {
-    if ((value & mask & ~kLock.mask()) != 0) complain("FLASH_CR written while LOCK = 1");
-    return;
-  }
+  if (!opens_cr(value & mask, kLock.mask())) return;
   merge(cr_, value & kCrBits, mask);
   if ((value & mask & kLock.mask()) != 0) lock_.lock();
   set_flags(0);

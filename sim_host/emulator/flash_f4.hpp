@@ -5,8 +5,6 @@
 
 #include "sim_host/emulator/flash_controller.hpp"
 
-#include <functional>
-
 namespace tetap::board {
 
 class FlashF4 final : public FlashController {
@@ -17,7 +15,6 @@ class FlashF4 final : public FlashController {
   void store(std::uint32_t address, unsigned size, std::uint32_t value) override;
   /// Fastest HCLK with the wait states that are set, at 2.7 to 3.6 V.
   [[nodiscard]] std::int64_t limit_hz() const;
-  std::function<void()> on_change;  ///< FLASH_ACR
 
  private:
   void reset_registers() override;
@@ -27,11 +24,9 @@ class FlashF4 final : public FlashController {
   void write_cr(std::uint32_t value, std::uint32_t mask);
   void write_optcr(std::uint32_t value, std::uint32_t mask);
   void start_erase();
-  void take_key(KeyLock& lock, std::uint32_t key);
   void fail(std::uint32_t flag, const std::string& why);
   void set_flags(std::uint32_t flags);
 
-  KeyLock lock_, option_lock_;
   std::uint32_t acr_ = 0, sr_ = 0, cr_ = 0, optcr_, protection_;
   Alarm options_done_;
 };

@@ -41,10 +41,7 @@ constexpr FlashController::Duration kProgram{81'700'000, 83'350'000},
 }  // namespace
 
 FlashG4::FlashG4(Surroundings around, Memory& memory, const PwrG4& pwr)
-    : FlashController(around, kBase, memory, kBank),
-      pwr_(pwr),
-      lock_(0x4567'0123, 0xCDEF'89AB),
-      option_lock_(0x0819'2A3B, 0x4C5D'6E7F) {
+    : FlashController(around, kBase, memory, kBank), pwr_(pwr) {
   reset_registers();
 }
 
@@ -111,20 +108,8 @@ void FlashG4::write_acr(std::uint32_t value, std::uint32_t mask) {
   if (on_change) on_change();
 }
 
-// "A wrong sequence locks up the FLASH_CR register until the next system reset", with a bus error.
-void FlashG4::take_key(KeyLock& lock, std::uint32_t key) {
-  if (lock.write(key)) return;
-  complain("wrong key: locked until the next reset");
-  bus_error();
-}
-
 void FlashG4::write_cr(std::uint32_t value, std::uint32_t mask) {
-  await_idle();  // the bus stalls
-  if (off()) return;
-  if (lock_.locked()) {
-    if ((value & mask & ~(kLock.mask() | kOptlock.mask())) != 0) complain("FLASH_CR written while LOCK = 1");
-    return;
-  }
+  if (!opens_cr(value & mask, kLock.mask() | kOptlock.mask())) return;
   if ((value & mask & (kOptstrt.mask() | kFstpg.mask() | kOblLaunch.mask())) != 0)
     complain("option bytes and fast programming are not modelled");
   merge(cr_, value & kCrBits, mask);

@@ -22,8 +22,7 @@ class FlashG4 final : public FlashController {
   [[nodiscard]] std::uint64_t load(std::uint32_t address, unsigned size) override;
   /// Fastest HCLK with the wait states and the voltage range that are set.
   [[nodiscard]] std::int64_t limit_hz() const;
-  std::function<void()> on_change;  ///< FLASH_ACR
-  std::function<void()> on_nmi;     ///< a double error of the check code
+  std::function<void()> on_nmi;  ///< a double error of the check code
 
   /// FLASH_WRP1AR and FLASH_WRP2AR as the option bytes load them: first and last protected page of each bank.
   std::array<std::uint32_t, 2> protected_pages{0x0000'007F, 0x0000'007F};
@@ -34,7 +33,6 @@ class FlashG4 final : public FlashController {
   void tear(const Operation& operation, base::Random& random) override;
   void write_acr(std::uint32_t value, std::uint32_t mask);
   void write_cr(std::uint32_t value, std::uint32_t mask);
-  void take_key(KeyLock& lock, std::uint32_t key);
   void start_erase();
   void program(std::uint32_t offset, std::uint64_t value);
   [[nodiscard]] bool is_protected(std::uint32_t offset, std::uint32_t size) const;
@@ -49,7 +47,6 @@ class FlashG4 final : public FlashController {
   };
 
   const PwrG4& pwr_;
-  KeyLock lock_, option_lock_;
   std::uint32_t acr_ = 0, sr_ = 0, cr_ = 0, eccr_ = 0;
   std::optional<FirstWord> first_word_;
 };

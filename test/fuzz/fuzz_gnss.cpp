@@ -53,7 +53,7 @@ void record(const Report& r, Words& out) {
 }
 
 void record(const Baseline& b, Words& out) {
-  out.push_back(b.itow_ms);
+  out.push_back(b.itow_ms.value_or(0));
   out.push_back(b.valid ? 1 : 0);
   for (const float x : {b.n_m[0], b.n_m[1], b.n_m[2], b.length_m, b.length_acc_m, b.course_rad, b.course_acc_rad}) {
     if (!base::is_nan(x) && !base::is_finite(x)) fail("an infinite number in a baseline");

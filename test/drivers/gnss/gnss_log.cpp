@@ -45,7 +45,8 @@ void print(const Report& r) {
 }
 
 void print(const Baseline& b) {
-  std::printf("{\"baseline\":%s,\"itow\":%" PRIu32, b.valid ? "true" : "false", b.itow_ms);
+  std::printf("{\"baseline\":%s", b.valid ? "true" : "false");
+  if (b.itow_ms) std::printf(",\"itow\":%" PRIu32, *b.itow_ms);
   number("east", b.n_m[0]);
   number("north", b.n_m[1]);
   number("up", b.n_m[2]);

@@ -255,7 +255,7 @@ TEST(UbxBaseline, ALateOneDoesNotTearTheEpochsOfThePlace) {
 struct Stamps {
   std::map<std::uint32_t, std::int64_t> places, headings;
   void operator()(const Report& r, base::Micros stamp) { places[*r.itow_ms] = stamp.us; }
-  void operator()(const Baseline& b, base::Micros stamp) { headings[b.itow_ms] = stamp.us; }
+  void operator()(const Baseline& b, base::Micros stamp) { headings[b.itow_ms.value()] = stamp.us; }
 };
 
 Stamps stamps_of(Line& line, std::int64_t until_us) {
