@@ -14,6 +14,7 @@ namespace {
 constexpr double kArmLeastWindows = 30;
 constexpr double kArmMostTurn_radps = 1.5;  ///< in a second: more, and the mean of a velocity has lost its size
 constexpr double kArmLeast_m = 0.5;         ///< nearer than that an antenna hardly matters beside its noise
+constexpr double kArmShown_m = 0.05;        ///< half of the last digit that is shown: less is 0.0
 constexpr double kArmSigmas = 8;            ///< slip in turns lasts
 
 using Three = std::array<double, 3>;
@@ -70,6 +71,7 @@ void AntennaDetector::finish(Findings& findings) {
   const bool aside = differs(found[1] - y0, found[1] - y0, sigma(1));
   if (!aside && !differs(length - stated, found[2] - stated * stated, sigma(2))) return;
   const double ahead = std::sqrt(std::max(0.0, found[2] - found[1] * found[1]));
+  const bool beside = ahead < kArmShown_m;
   const auto at = [&](double x_m) -> Remedy {
     return {{.path = "gnss.antenna_x_b_m", .values = {five_digits(x_m)}},
             {.path = "gnss.antenna_y_b_m", .values = {five_digits(found[1])}}};
@@ -81,10 +83,13 @@ void AntennaDetector::finish(Findings& findings) {
            text("By its speed in turns the antenna lies %.1f m to the left of the body's origin (sigma %.2f) and "
                 "%.1f m ahead of it or behind; stated are %.1f m and %.1f m (%.0f s).",
                 found[1], sigma(1), ahead, y0, x0, squares_.count()),
-       .change = text("Measure the antenna's place. By the speeds gnss.antenna_y_b_m is %.1f and gnss.antenna_x_b_m is "
-                      "%.1f or %.1f.",
-                      found[1], ahead, -ahead),
-       .remedies = {at(ahead), at(-ahead)}});
+       .change = beside ? text("Measure the antenna's place. By the speeds gnss.antenna_y_b_m is %.1f and "
+                               "gnss.antenna_x_b_m is 0.0.",
+                               found[1])
+                        : text("Measure the antenna's place. By the speeds gnss.antenna_y_b_m is %.1f and "
+                               "gnss.antenna_x_b_m is %.1f or %.1f.",
+                               found[1], ahead, -ahead),
+       .remedies = beside ? std::vector<Remedy>{at(0)} : std::vector<Remedy>{at(ahead), at(-ahead)}});
 }
 
 }  // namespace tetap::doctor

@@ -98,11 +98,14 @@ class Examination {
   }
 
   [[nodiscard]] std::optional<std::string> untold() const { return lateness_.untold(); }
+  [[nodiscard]] const std::vector<Window>& seconds() const { return seconds_.all(); }
 
   // The decoder hands these over.
   void sample(const sensor::Sample& sample) {
-    if (const auto window = windows_.add(time_, sample))
+    if (const auto window = windows_.add(time_, sample)) {
+      seconds_.add(*window);
       for (Detector* one : all_) one->window(*window);
+    }
     for (Detector* one : all_) one->sample(time_, sample);
   }
   void map_entry(const estimators::MapEntry&) {}
@@ -114,6 +117,7 @@ class Examination {
   bus::Counters counters_;
   base::Micros time_;
   Windows windows_;
+  KeptWindows seconds_;
   HalvesDetector halves_;
   SequenceDetector sequence_;
   StampDetector stamps_;
@@ -143,6 +147,15 @@ class Examination {
 bool is_gnss_axes(Code code) { return code >= Code::kLatLonSwapped && code <= Code::kVelocityAxes; }
 
 }  // namespace
+
+void KeptWindows::add(const Window& window) {
+  if (seen_++ % every_ != 0) return;
+  all_.push_back(window);
+  if (all_.size() < kMost) return;
+  for (std::size_t i = 0; i < kMost / 2; ++i) all_[i] = all_[2 * i];
+  all_.resize(kMost / 2);
+  every_ *= 2;
+}
 
 Findings ranked(Findings findings) {
   // A finding beside another code follows it; the axes of GNSS stand at one place.
@@ -191,7 +204,7 @@ sim::Result<Diagnosis> diagnose(sim::Frames& log, const std::string& name, std::
   log.rewind();
   BusTime clock(survey.clock(), base, survey.steps > 0);
   Examination examination(robot, survey.clock());
-  Diagnosis found{.findings = {}, .untold = {}, .inputs = survey.inputs};
+  Diagnosis found{.findings = {}, .untold = {}, .inputs = survey.inputs, .duration_s = 0, .seconds = {}};
   base::Micros last;
   bool begun = false;
   for (sim::TimedFrame entry; log.next(entry);) {
@@ -210,6 +223,7 @@ sim::Result<Diagnosis> diagnose(sim::Frames& log, const std::string& name, std::
   }
   found.findings = ranked(examination.finish());
   found.untold = examination.untold();
+  found.seconds = examination.seconds();
   return found;
 }
 

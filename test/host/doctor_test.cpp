@@ -49,6 +49,23 @@ TEST(Sequence, OneSenderWithLossesAndRepeatsIsOne) {
   EXPECT_TRUE(of_sequence(frames).empty());
 }
 
+TEST(KeptWindows, AreAllOfAShortLogAndEvenlySpacedOnesOfALongLog) {
+  for (const int count : {1, 4095, 4096, 100'000}) {
+    KeptWindows kept;
+    for (int second = 0; second < count; ++second) kept.add({.start_s = static_cast<double>(second)});
+    const std::vector<Window>& all = kept.all();
+    ASSERT_LT(all.size(), KeptWindows::kMost) << count;
+    const double spacing = all.size() > 1 ? all[1].start_s : 1;
+    for (std::size_t i = 0; i < all.size(); ++i) ASSERT_EQ(all[i].start_s, static_cast<double>(i) * spacing) << count;
+    EXPECT_GE(all.back().start_s, count - spacing) << count;
+    if (count < 4096) {
+      EXPECT_EQ(all.size(), static_cast<std::size_t>(count));
+    } else {
+      EXPECT_GE(all.size(), KeptWindows::kMost / 2) << count;
+    }
+  }
+}
+
 TEST(Sequence, TwoSendersAreFoundAtEveryOffsetOfTheirCounters) {
   for (unsigned offset = 0; offset < 16; ++offset) {
     std::vector<base::CanFrame> frames;

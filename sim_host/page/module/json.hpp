@@ -39,6 +39,7 @@ class Json {
   }
   template <std::integral N>
   requires(!std::same_as<N, bool>) Json& value(N number) { return put(std::to_string(number)); }
+  Json& nothing() { return put("null"); }
   /// Reads back as the same bits.
   Json& value(double number) {
     char digits[32];

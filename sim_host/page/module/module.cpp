@@ -9,6 +9,7 @@
 #include "sim_host/page/module/play.hpp"
 #include "sim_host/page/module/replay.hpp"
 #include "sim_host/page/module/robots.hpp"
+#include "sim_host/page/module/seconds.hpp"
 #include "sim_host/page/module/tables.hpp"
 #include "sim_host/parameter_refusal.hpp"
 #include "sim_host/replay/candump.hpp"
@@ -138,6 +139,7 @@ TETAP_EXPORT(diagnose) std::uint32_t diagnose(std::uint32_t base, std::uint32_t 
   }
   json.end(']');
   if (found->untold) json.member("untold", *found->untold);
+  if (!found->findings.empty()) page::put_seconds(json, found->seconds, facts);
   page::write(page::Channel::kDiagnosis, json.end('}').text());
   return 0;
 }

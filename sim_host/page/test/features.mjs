@@ -53,6 +53,7 @@ await page.$eval("#ask [data-offer=rover]", (button) => button.click()); // the 
 await untilState("done");
 await diagnosed();
 await page.waitForSelector("[data-try=wheel_scale]");
+expect((await page.$$("[data-code=wheel_scale] .evidence canvas")).length === 1, `the evidence is drawn: ${await text("[data-code=wheel_scale] .evidence .u-legend")}`);
 await picture("try");
 await page.click("[data-try=wheel_scale]");
 await settled();

@@ -60,3 +60,15 @@ test("what changes is said once, and a refusal again after a pause", () => {
       [4, "refusal", "GnssPosition"], [4.4, "refusal", "Wheels"], [8.5, "refusal", "GnssPosition"]]);
   assert.equal(live.said.at(-1).failed, "Gate");
 });
+
+test("the node's map has each landmark as it was sent last, but none of a round that is over", () => {
+  const live = new Live({ start_s: 0 });
+  HEADS.map = "epoch,time_s,landmark,x_m,y_m,std_x_m,std_y_m,corr_xy,hits,age_s,landmark_state";
+  HEADS.keyframes = "epoch,time_s,keyframe,x_m,y_m,yaw_rad";
+  live.take(part({ estimates: ["1,50,2,EkfSlam,0,0,0,0.1,0.1,0.1,0,1"], map: ["1,1,7,9,9,1,1,0,1,0,Kept", "2,40,3,1,2,0.5,0.4,0.1,1,0,Kept", "3,45,3,1.5,2.5,0.2,0.3,0.2,2,0,Kept", "4,60,4,5,5,1,1,0,1,0,Kept"], keyframes: ["1,44,0,0,0,0", "2,45,1,1,0,0"] }));
+  const run = live.run();
+  assert.deepEqual(run.mapAt(50), { landmarks: [{ x: 1.5, y: 2.5, sx: 0.2, sy: 0.3, correlation: 0.2 }], keyframes: [{ x: 1, y: 0 }, { x: 0, y: 0 }] });
+  assert.deepEqual(run.mapAt(41).landmarks.map(({ x }) => x), [1]);
+  assert.equal(run.hasMap(), true);
+  assert.deepEqual(run.mapAt(0.5), { landmarks: [], keyframes: [] });
+});

@@ -3,7 +3,7 @@
 import { test } from "node:test";
 import assert from "node:assert/strict";
 import { followable, verdictOf } from "../web/log_views.js";
-import { shownRange } from "../web/charts.js";
+import { errorsOf, shownRange } from "../web/charts.js";
 import { times } from "../web/run.js";
 
 test("a factor that is rounded to nothing gives way to the code's own advice", () => {
@@ -35,4 +35,14 @@ test("a chart shows all of its values, but for a few that would make a hairline 
   assert.deepEqual(shownRange([]), [-1, 1]);
   const still = shownRange([5, 5, 5]);
   assert.ok(still[0] < 5 && still[1] > 5);
+});
+
+test("errors are against the truth of the same epoch, in their band, with no jump at pi", () => {
+  const run = { t: [1, 1.01, 1.02, 1.03], columns: { x_m: [1, 2, 3, 4], std_x_m: [0.1, 0.2, NaN, 0.4], yaw_rad: [3.1, 3.1, 3.1, 3.1], std_yaw_rad: [0.1, 0.1, 0.1, 0.1], pos_valid: [1, 1, 1, 0] } };
+  const truth = { t: [1.01, 1.02, 1.03], x: [1.5, 3, 3], yaw: [-3.1, -3.1, -3.1] };
+  const [t, error, band] = errorsOf(run, truth, "x_m");
+  assert.deepEqual([t, error], [[1.01], [0.5]]);
+  assert.ok(Math.abs(band[0] - 0.6) < 1e-12);
+  for (const one of errorsOf(run, truth, "yaw_rad")[1]) assert.ok(Math.abs(one - (6.2 - 2 * Math.PI)) < 1e-9);
+  assert.deepEqual([errorsOf(run, truth, "height_m"), errorsOf(run, null, "x_m")], [null, null]);
 });

@@ -102,6 +102,8 @@ test("each sentence of the doctor about a log has Indonesian words, with the sam
   }
   const said = doctorText("The left wheel stands still for 12.5 s while the other one turns. The magnetic field turns with the gyroscope.");
   assert.deepEqual(said, { text: "Roda kiri diam selama 12,5 s sementara roda lainnya berputar. Medan magnet berputar searah dengan giroskop.", own: true });
+  assert.equal(doctorText("The wheels turn the robot by -1.00 times the gyroscope's yaw rate over 169 s (correlation -0.99).").text, "Roda memutar robot -1,00 kali laju yaw giroskop selama 169 s (korelasi -0,99).");
+  assert.match(doctorText("The horizontal force follows acceleration and curves by the wheels as an IMU turned by 90 deg about up (98 % of its variance over 168 s; as stated: 0 %).").text, /seperti IMU yang diputar 90 derajat terhadap sumbu tegak/);
   assert.deepEqual(doctorText("Nobody knows this."), { text: "Nobody knows this.", own: false });
   speak("en");
   assert.equal(doctorText("The left wheel").text, "The left wheel");

@@ -6,13 +6,14 @@ import { Run, at } from "./run.js";
 import { View } from "./view.js";
 import { PathView } from "./path_view.js";
 import { Timeline } from "./timeline.js";
-import { bandChart, innovationChart } from "./charts.js";
+import { bandChart, errorChart, errorsOf, innovationChart } from "./charts.js";
 import { caseFile, savedCase } from "./case_file.js";
 import { Numbers } from "./numbers.js";
 import { Play } from "./play.js";
 import { TablesView } from "./tables_view.js";
 import { tablesOf } from "./tables.js";
 import { logOfMcap } from "./mcap.js";
+import { evidenceChart, evidenceOf } from "./evidence.js";
 import { renderBits, renderFindings, renderWhy, sourceLine } from "./log_views.js";
 import { renderAsk } from "./ask_view.js";
 import { renderUpdate } from "./update_view.js";
@@ -322,6 +323,7 @@ class App {
     if (this.said) this.status(this.said);
     const other = languageNow() === "en" ? "id" : "en";
     replace($("tools"),
+      element("button", { id: "open-log", onclick: () => $("file").click() }, say("open.choose")),
       element("button", { id: "language", lang: other, onclick: () => (speak(other), memory.set(other), this.renderFrame(), this.renderMore(), this.play?.render(), this.render(true)) }, say("lang.other")),
       element("button", { id: "theme", onclick: () => this.otherTheme() }, say("theme.other")));
     this.renderDrop();
@@ -341,6 +343,10 @@ class App {
   otherTheme() {
     const root = document.documentElement, dark = root.dataset.theme ?? (matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light");
     root.dataset.theme = dark === "dark" ? "light" : "dark";
+    this.renderColours();
+  }
+  /** Charts keep the colours with which they were drawn. */
+  renderColours() {
     this.play?.render();
     this.lesson?.render();
     this.render(true);
@@ -388,10 +394,17 @@ class App {
     Object.assign(document.body.dataset, { sha: result.estimates_sha256, crc: result.state_crc_last, different: result.epochs_different ?? "", second: this.second?.result.estimates_sha256 ?? "" });
   }
   renderFindings() {
-    renderFindings(this.section("findings"), this.findings, this.run, this.about.codes, this.other(), (remedy) => this.tryRemedy(remedy));
+    const body = this.section("findings"), { findings, run } = this;
+    renderFindings(body, findings, run, this.about.codes, this.other(), (remedy) => this.tryRemedy(remedy));
+    for (const one of findings?.findings ?? []) {
+      const seen = evidenceOf(one, findings.seconds, run.fixes), picture = element("div", { class: "evidence" });
+      if (!seen) continue;
+      body.querySelector(`[data-code=${one.code}] .seen`).append(picture);
+      this.charts.push(evidenceChart(picture, this.view, seen));
+    }
   }
   renderPath(keep) {
-    const body = this.section("path", [say("path.legend"), ...(this.second ? [say("path.second")] : []), say("path.zoom")].join(" ")), before = keep ? this.path : null;
+    const body = this.section("path", [say("path.legend"), ...(this.truth ? [say("path.truth")] : []), ...(this.run.hasMap() ? [say("path.map")] : []), ...(this.second ? [say("path.second")] : []), say("path.zoom")].join(" ")), before = keep ? this.path : null;
     this.path = new PathView(body, this.view, (one) => this.renderWhy(one));
     if (before?.moved) Object.assign(this.path, { box: before.box, scale: before.scale, moved: true });
     this.path.show(this.runs(), this.truth, Boolean(before?.moved));
@@ -407,6 +420,10 @@ class App {
     if (known.length === 0) return replace(body, element("p", { class: "note" }, say("view.nothing")));
     const name = known.includes(this.state) ? this.state : known[0];
     this.charts.push(bandChart(chart, this.view, say(`state.${name}`), this.runs().map((one) => ({ ...one, value: name, sigma: SIGMAS[name] }))));
+    const errors = errorsOf(this.run, this.truth, name), box = element("div", { id: "errors" });
+    if (!errors) return;
+    body.append(element("p", { class: "note" }, say("play.error")), box);
+    this.charts.push(errorChart(box, this.view, say(`state.${name}`), errors));
   }
   renderInnovations() {
     const body = this.section("innovation", say("innovation.note")), names = [...this.run.sources.keys()];
@@ -415,8 +432,10 @@ class App {
       ["", ...names].map((name) => element("option", { value: name, selected: name === (only ?? "") }, name === "" ? say("innovation.all") : sourceLine(this.run, name))));
     if (names.length === 0) return replace(body, element("p", { class: "note" }, say("view.nothing")));
     body.append(select);
+    const hidden = (only === null ? names : [only]).flatMap((name) => this.run.sources.get(name)).filter(({ refused, ratio }) => refused && Number.isNaN(ratio)).length;
+    if (hidden > 0) body.append(element("p", { class: "note", id: "hidden" }, say("innovation.hidden", hidden)));
     const inks = ["first", "second", "good", "warn", "third"].map(colour);
-    this.charts.push(innovationChart(body, this.view, "", this.run, only, inks, (one) => one && this.renderWhy(one)));
+    this.charts.push(innovationChart(body, this.view, this.run, only, inks, (one) => one && this.renderWhy(one)));
   }
   renderTimeline() {
     const body = this.section("timeline", say("timeline.help"));
@@ -457,5 +476,6 @@ addEventListener("drop", (event) => {
   if (app.play) app.openFiles([...event.dataTransfer.files]);
 });
 addEventListener("resize", () => app.run && (app.path.resized(), app.timeline.draw()));
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => app.renderColours());
 if (navigator.language.startsWith("id")) speak("id");
 app.start().catch((error) => app.status(error.message, "failed"));

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Charts over time (uPlot), tied to one view.
 import { colour } from "./dom.js";
+import { at } from "./run.js";
 import { decimal, say } from "./texts.js";
 
 const base = (view, title, height) => ({
@@ -32,7 +33,7 @@ export class Chart {
     options.padding = [null, 24, null, null];
     options.scales = { ...options.scales, y: { range: (plot) => shownRange(this.seen(plot)) }, ...scales };
     const label = (text) => (text ? { label: text, labelSize: 18, labelGap: 0, labelFont: "12px system-ui, sans-serif" } : {});
-    options.axes = [axis({ values: ticks, ...label(labels[0]) }), axis({ values, size: 60, space: 24, ...label(labels[1]) })];
+    options.axes = [axis({ values: ticks, size: 30, ...label(labels[0]) }), axis({ values, size: 60, space: 24, ...label(labels[1]) })];
     options.series = [{ label: "t [s]", value: (_, t) => (t == null ? "–" : decimal(t.toFixed(2))) }, ...series.map((one) => ({ value: (_, v) => (v == null ? "–" : decimal(String(+v.toPrecision(7)))), ...one }))];
     options.hooks = {
       ...hooks,
@@ -89,7 +90,7 @@ export function bandChart(parent, view, title, runs) {
     series.push({ ...thin, label: "+3σ" }, { ...thin, label: "−3σ" });
     bands.push({ series: [series.length - 1, series.length], fill: `${ink}22` });
   }
-  return new Chart(parent, view, { title, series, bands, data: uPlot.join(tables) });
+  return new Chart(parent, view, { title: "", labels: [say("axis.time"), title], series, bands, data: uPlot.join(tables) });
 }
 
 function heldAt(t, v, wanted) {
@@ -100,8 +101,28 @@ function heldAt(t, v, wanted) {
   });
 }
 
+const TRUTH = { x_m: "x", y_m: "y", yaw_rad: "yaw" };
+/** [times, error, 3 sigma] of a state against `truth` {t, x, y, yaw}, where sigma is published and the pose is valid; null where the truth does not have that state. */
+export function errorsOf({ t, columns }, truth, name) {
+  const known = truth?.[TRUTH[name]], sigma = columns[`std_${name}`], [times, error, band] = [[], [], []];
+  if (!known) return null;
+  t.forEach((time, i) => {
+    const k = at(truth.t, time + 1e-6), d = columns[name][i] - known[k];
+    if (!(columns.pos_valid[i] > 0) || Number.isNaN(sigma[i]) || Number.isNaN(d) || Math.abs(truth.t[k] - time) > 0.005) return;
+    times.push(time), error.push(name === "yaw_rad" ? d - 2 * Math.PI * Math.round(d / (2 * Math.PI)) : d), band.push(3 * sigma[i]);
+  });
+  return [times, error, band];
+}
+
+/** The error of a state in its band of 3 sigma. */
+export function errorChart(parent, view, title, [t, error, band]) {
+  const thin = { stroke: colour("first"), width: 1, points: { show: false } };
+  return new Chart(parent, view, { title: "", labels: [say("axis.time"), title], data: [t, error, band, band.map((x) => -x)], bands: [{ series: [2, 3], fill: `${colour("first")}22` }],
+    series: [{ label: title, stroke: colour("ink"), width: 1.5, points: { show: false } }, { ...thin, label: "+3σ" }, { ...thin, label: "−3σ" }] });
+}
+
 /** Innovations over their gates, a point each, of one source or (null) of all: above 1 is beyond it. `onPoint` gets the one that was clicked. */
-export function innovationChart(parent, view, title, run, only, inks, onPoint) {
+export function innovationChart(parent, view, run, only, inks, onPoint) {
   const names = only === null ? [...run.sources.keys()] : [only], least = 0.01;
   const points = { show: true, size: 4 }, paths = () => null;
   const tables = names.map((name) => {
@@ -122,7 +143,7 @@ export function innovationChart(parent, view, title, run, only, inks, onPoint) {
     ctx.restore();
   };
   return new Chart(parent, view, {
-    title, series, height: 300, data: tables.length === 1 ? tables[0] : uPlot.join(tables),
+    title: "", labels: [say("axis.time"), say("innovation.axis")], series, height: 300, data: tables.length === 1 ? tables[0] : uPlot.join(tables),
     scales: { y: { distr: 3, range: () => [least, 10 ** Math.ceil(Math.log10(top))] } },
     values: ticks,
     hooks: { draw: [gate] },

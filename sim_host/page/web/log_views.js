@@ -39,7 +39,7 @@ const said = (words) => element("span", { lang: doctorText(words).own ? language
 
 function finding({ code, cause, evidence, change, remedies }, onTry) {
   const own = codeText(code, cause), remedy = change && (own.remedy === "" || doctorText(change).own) ? null : own.remedy;
-  return element("li", { "data-code": code }, element("strong", {}, own.cause), evidence ? element("p", {}, `${say("findings.evidence")}: `, said(evidence)) : null,
+  return element("li", { "data-code": code }, element("strong", {}, own.cause), evidence ? element("p", {}, `${say("findings.evidence")}: `, said(evidence)) : null, element("div", { class: "seen" }),
     remedy ? element("p", { class: "change" }, `${say("findings.change")}: ${remedy}`) : null,
     change ? element("p", { class: remedy ? "note" : "change" }, remedy ? null : `${say("findings.change")}: `, said(change)) : null,
     remedies.length > 1 ? element("p", { class: "note" }, say("findings.several")) : null,

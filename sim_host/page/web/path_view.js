@@ -36,6 +36,7 @@ export class PathView {
     };
     for (const { run } of this.runs) for (let i = 0; i < run.x.length; i += 10) if (run.columns.pos_valid[i] > 0) take(run.x[i], run.y[i]);
     for (let i = 0; this.truth && i < this.truth.x.length; i += 10) if (!Number.isNaN(this.truth.x[i])) take(this.truth.x[i], this.truth.y[i]);
+    for (const { run } of this.runs) for (const one of run.mapAt(this.view.whole[1]).landmarks) take(one.x, one.y);
     if (left > right) [left, right, low, high] = [-5, 5, -5, 5];
     this.box = { x: (left + right) / 2, y: (low + high) / 2, width: Math.max(right - left, this.least_m), height: Math.max(high - low, this.least_m) };
     this.scale = null;
@@ -49,7 +50,7 @@ export class PathView {
   }
 
   place() {
-    const [context, width, height] = sized(this.canvas, Math.min(HEIGHT, Math.max(280, innerHeight * 0.55)));
+    const [context, width, height] = sized(this.canvas, Math.min(HEIGHT, Math.max(280, Math.min(innerHeight * 0.55, innerWidth * 0.8))));
     this.scale ??= Math.min((width - 2 * MARGIN) / this.box.width, (height - 2 * MARGIN) / this.box.height);
     this.across = (x) => width / 2 + (x - this.box.x) * this.scale;
     this.down = (y) => height / 2 - (y - this.box.y) * this.scale;
@@ -57,12 +58,14 @@ export class PathView {
   }
 
   draw() {
-    if (this.runs.length === 0) return;
+    if (!this.box) return;
     const [context, width, height] = this.place();
     context.fillStyle = colour("paper");
     context.fillRect(0, 0, width, height);
     this.drawGrid(context, width, height);
     this.drawLandmarks(context);
+    if (this.runs.length === 0) return;
+    this.drawMap(context, this.runs[0]);
     this.drawFixes(context);
     for (const { run, colour: ink } of this.runs) this.drawLine(context, run, ink);
     if (this.truth) this.drawLine(context, this.truth, colour("truth"), [3, 6]);
@@ -94,6 +97,19 @@ export class PathView {
   drawLandmarks(context) {
     context.strokeStyle = colour("faint");
     for (const [x, y] of this.landmarks) context.strokeRect(this.across(x) - 3, this.down(y) - 3, 6, 6);
+  }
+
+  /** The node's own map at the end of the shown span: landmarks with 3 sigma, keyframes as dots. */
+  drawMap(context, { run, colour: ink }) {
+    const { landmarks, keyframes } = run.mapAt(this.view.span[1]);
+    context.strokeStyle = context.fillStyle = ink;
+    context.lineWidth = 1;
+    for (const { x, y, sx, sy, correlation } of landmarks) {
+      const [px, py] = [this.across(x), this.down(y)];
+      context.fillRect(px - 3, py - 3, 6, 6);
+      this.ellipse(context, px, py, sx, sy, correlation || 0);
+    }
+    for (const { x, y } of keyframes) context.strokeRect(this.across(x) - 2, this.down(y) - 2, 4, 4);
   }
 
   /** The shown span strongly, the rest faintly; no line where the position is not valid. */

@@ -126,6 +126,7 @@ export class Play {
     this.path = new PathView(path, this.view, () => {}, 20);
     path.append(element("button", { onclick: () => (this.path.fit(), this.path.draw()) }, say("path.all")));
     this.path.landmarks = this.stage.landmarks;
+    this.path.show([]);
     this.renderFaults();
     this.renderChart();
     this.renderLive();
@@ -192,7 +193,9 @@ export class Play {
     replace(this.parts.chart, element("p", {}, `${say("play.error")} `, select), box);
     this.chart?.destroy();
     const thin = { stroke: colour("first"), width: 1, points: { show: false } };
-    this.chart = new Chart(box, new View(), { title: "", height: 170, data: [[], [], [], []], bands: [{ series: [2, 3], fill: `${colour("first")}22` }],
+    const view = new View();
+    view.reset([0, 10]);
+    this.chart = new Chart(box, view, { title: "", height: 170, labels: [say("axis.time")], data: [[], [], [], []], bands: [{ series: [2, 3], fill: `${colour("first")}22` }],
       series: [{ label: say("play.error"), stroke: colour("ink"), width: 1.5, points: { show: false } }, { ...thin, label: "+3σ" }, { ...thin, label: "−3σ" }] });
   }
   renderErrors(run) {

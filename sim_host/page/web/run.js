@@ -36,6 +36,8 @@ function spans(times, words, end) {
   return found;
 }
 
+/** A node sends one landmark of at most 254 each 0.1 s. */
+const ROUND_S = 30;
 /** Largest ratio that a frame of Est_Innov can say. */
 const MOST_RATIO = 40.92;
 /** A ratio in words: at the ceiling of its frame it may be anything above. */
@@ -122,6 +124,17 @@ export class Run {
     this.states = new Map([...by].map(([source, [t, words]]) => [source, spans(t, words, end)]));
   }
 
+  /** The node's map at a moment: {landmarks: [{x, y, sx, sy, correlation}], keyframes: [{x, y}]}, each as it was sent last. */
+  mapAt(time) {
+    const { map, keyframes } = this.tables;
+    return {
+      landmarks: lastOf(map, "landmark", time, ["x_m", "y_m", "std_x_m", "std_y_m", "corr_xy"]).map(([x, y, sx, sy, correlation]) => ({ x, y, sx, sy, correlation })),
+      keyframes: lastOf(keyframes, "keyframe", time, ["x_m", "y_m"]).map(([x, y]) => ({ x, y })),
+    };
+  }
+  hasMap() {
+    return [this.tables.map, this.tables.keyframes].some((table) => table?.rows > 0);
+  }
   /** The measurement whose record is nearest to a moment. */
   measurementAt(time) {
     let best = null;
@@ -140,6 +153,14 @@ export class Run {
   mode(time) {
     return this.modes.findLast(({ begin }) => begin <= time)?.word ?? "";
   }
+}
+
+/** The last row of each `id` up to a moment, of those that were sent within a round before it. */
+function lastOf(table, id, time, names) {
+  if (!table || table.rows === 0) return [];
+  const times = table.values("time_s").subarray(0, table.rows), ids = table.values(id), columns = names.map((name) => table.values(name)), found = new Map();
+  for (let row = at(times, time); row >= 0 && times[row] >= time - ROUND_S; row--) if (!found.has(ids[row]) && times[row] <= time) found.set(ids[row], columns.map((values) => values[row]));
+  return [...found.values()];
 }
 
 function filtered(times, values, keep) {

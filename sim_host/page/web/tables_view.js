@@ -5,6 +5,7 @@ import { DESCRIBED, formOf, named, robotsFor } from "./tables.js";
 import { shortest } from "./numbers.js";
 import { say } from "./texts.js";
 import { ofModule } from "./texts_module.js";
+import { rowText } from "./texts_rows.js";
 
 export class TablesView {
   /** `onLog(file, {robot, described})` gets the log that was made; `about` is the module's description; `onClose()`: the form was closed. */
@@ -65,7 +66,7 @@ export class TablesView {
         if (input.value.trim() === "" || Number.isNaN(value)) input.value = this.described.get(i) ?? own;
         else this.described.set(i, value);
       } });
-      return element("label", { class: "field" }, element("span", {}, path), input, element("span", { class: "unit" }, row.unit));
+      return element("label", { class: "field described" }, element("span", { class: "note" }, rowText(row)), element("code", {}, path), input, element("span", { class: "unit" }, row.unit));
     });
   }
   async play() {

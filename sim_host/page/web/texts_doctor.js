@@ -5,6 +5,7 @@ import { decimal, languageNow } from "./texts.js";
 /** [sentence of the doctor, in Indonesian with the places of its values]. */
 export const DOCTOR_ID = [
   ["By its speed in turns the antenna lies # m to the left of the body's origin (sigma #) and # m ahead of it or behind; stated are # m and # m (# s).", "Menurut kecepatannya di tikungan, antena berada {0} m di kiri titik asal badan (sigma {1}) dan {2} m di depan atau di belakangnya; yang dinyatakan {3} m dan {4} m ({5} s)."],
+  ["Measure the antenna's place. By the speeds gnss.antenna_y_b_m is # and gnss.antenna_x_b_m is 0.0.", "Ukur posisi antena. Menurut kecepatan, gnss.antenna_y_b_m adalah {0} dan gnss.antenna_x_b_m 0,0."],
   ["Measure the antenna's place. By the speeds gnss.antenna_y_b_m is # and gnss.antenna_x_b_m is # or #.", "Ukur posisi antena. Menurut kecepatan, gnss.antenna_y_b_m adalah {0} dan gnss.antenna_x_b_m {1} atau {2}."],
   ["Negate VelX, VelY and VelZ of In_Imu#Accel in the sender: gravity is +9.81 upwards.", "Balik tanda VelX, VelY, dan VelZ di In_Imu{0}Accel pada pengirim: gravitasi adalah +9,81 ke atas."],
   ["Negate @ of In_Imu#@ in the sender.", "Balik tanda {0} di In_Imu{1}{2} pada pengirim."],
@@ -53,12 +54,12 @@ export const DOCTOR_ID = [
   ["The fixes lie at #, # deg, # km from the robot's configured origin; the map reaches 105 km.", "Posisi GNSS berada di {0}, {1} derajat, {2} km dari titik asal di konfigurasi robot; jangkauan peta 105 km."],
   ["Over # pairs of chords the distance by the fixes fits the path of wheels@ to # (RMS of angle and ratio) with @, to # as sent.", "Pada {0} pasang tali busur, jarak menurut posisi GNSS cocok dengan lintasan roda{1} sampai {2} (RMS sudut dan rasio) dengan {3}, sampai {4} seperti dikirim."],
   ["The fixes lie # times as far apart as the path of the wheels is long (median of # chords; half of them from # to #).", "Jarak antarposisi GNSS {0} kali panjang lintasan roda (median {1} tali busur; separuhnya dari {2} sampai {3})."],
-  ["The robot turns by its scans against", "Putaran robot menurut pindaian berlawanan dengan"],
+  ["The robot turns by its scans against", "Putaran robot menurut scan berlawanan dengan"],
   ["Negate First and Step of In_ScanHead and set lidar.yaw_rad to #.", "Balik tanda First dan Step di In_ScanHead dan isi lidar.yaw_rad dengan {0}."],
-  ["While the wheels drive straight ahead, the scans move at # deg to the left (# pairs, # m).", "Ketika roda berjalan lurus, pindaian bergeser pada {0} derajat ke kiri ({1} pasang, {2} m)."],
-  ["Set lidar.yaw_rad to # (# deg), or turn the scanner.", "Isi lidar.yaw_rad dengan {0} ({1} derajat), atau putar pemindainya."],
-  ["The turn between scans fits the @ # ms before their stamps (correlation #, # at the stamps; # pairs).", "Putaran antarpindaian cocok dengan {0} {1} ms sebelum timestamp-nya (korelasi {2}, pada timestamp {3}; {4} pasang)."],
-  ["Stamp In_ScanHead with the time of the first beam, or add # to lidar.delay_us.", "Beri In_ScanHead timestamp saat berkas pertama, atau tambahkan {0} ke lidar.delay_us."],
+  ["While the wheels drive straight ahead, the scans move at # deg to the left (# pairs, # m).", "Ketika roda berjalan lurus, scan bergeser pada {0} derajat ke kiri ({1} pasang, {2} m)."],
+  ["Set lidar.yaw_rad to # (# deg), or turn the scanner.", "Isi lidar.yaw_rad dengan {0} ({1} derajat), atau putar LiDAR-nya."],
+  ["The turn between scans fits the @ # ms before their stamps (correlation #, # at the stamps; # pairs).", "Putaran antar-scan cocok dengan {0} {1} ms sebelum timestamp-nya (korelasi {2}, pada timestamp {3}; {4} pasang)."],
+  ["Stamp In_ScanHead with the time of the first beam, or add # to lidar.delay_us.", "Beri In_ScanHead timestamp saat sinar laser pertama, atau tambahkan {0} ke lidar.delay_us."],
   ["Seq of @, instance #, runs in two chains: # of its # frames go on with the chain that is not the last frame's.", "Seq {0}, instance {1}, berjalan dalam dua urutan: {2} dari {3} frame melanjutkan urutan yang bukan milik frame terakhir."],
   ["Stop one of the two senders of @, or give the second device another Inst.", "Hentikan salah satu pengirim {0}, atau beri perangkat kedua Inst yang lain."],
   ["Multiply In_GnssVelEN and In_GnssVelU by # in the sender: they are in m/s.", "Kalikan In_GnssVelEN dan In_GnssVelU dengan {0} pada pengirim: satuannya m/s."],
@@ -101,8 +102,11 @@ export const WORDS_ID = {
   "East and North turned by 90 deg": "East dan North diputar 90 derajat", "with left for right": "yang kiri dan kanannya tertukar", "with forward for backward": "yang depan dan belakangnya tertukar",
   "with x and y exchanged": "yang x dan y-nya tertukar", "with x and y exchanged and reversed": "yang x dan y-nya tertukar dan terbalik", "the node's own timer": "timer milik node",
   "degrees and radians": "derajat dan radian", "radians and degrees": "radian dan derajat", "m/s divided by those of a knot": "m/s yang dibagi faktor knot", "ddmm.mmmm divided by 100": "ddmm.mmmm yang dibagi 100",
-  "decimals of a degree taken for minutes": "desimal derajat yang dianggap menit", knots: "knot", "miles an hour": "mil per jam",
+  "decimals of a degree taken for minutes": "desimal derajat yang dianggap menit", knots: "knot", "miles an hour": "mil per jam", "a thousandth": "seperseribu", "a millionth": "sepersejuta", "the log": "log",
 };
+/** Words with a number that stand for @. */
+const FORMS_ID = [[/^by (-?[\d.]+) times$/, (_, n) => `${decimal(n)} kali`], [/^turned by (-?[\d.]+) deg about up$/, (_, n) => `yang diputar ${decimal(n)} derajat terhadap sumbu tegak`]];
+const wordsInOwn = (words) => WORDS_ID[words] ?? FORMS_ID.reduce((said, [form, own]) => said.replace(form, own), words);
 
 const NUMBER = "(-?(?:\\d+(?:\\.\\d+)?(?:e[-+]?\\d+)?|inf|nan))", WORDS = "([^;:]{1,90}?)";
 const pattern = (sentence) => new RegExp(sentence.split(/([#@])/).map((part) => (part === "#" ? NUMBER : part === "@" ? WORDS : part.replace(/[.*+?^${}()|[\]\\]/g, "\\$&"))).join(""), "g");
@@ -115,7 +119,7 @@ export function doctorText(text) {
   let rest = text;
   const said = patterns.reduce((now, [form, words]) => {
     rest = rest.replace(form, "");
-    return now.replace(form, (...found) => words.replace(/\{(\d)\}/g, (_, i) => decimal(WORDS_ID[found[Number(i) + 1]] ?? found[Number(i) + 1])));
+    return now.replace(form, (...found) => words.replace(/\{(\d)\}/g, (_, i) => decimal(wordsInOwn(found[Number(i) + 1]))));
   }, text);
   return { text: said, own: !/[a-z]/i.test(rest) };
 }

@@ -21,7 +21,7 @@ export function renderUpdate(parent, update) {
   const far = book ? apart(update, book) : null, canvas = plane(n) ? element("canvas", { role: "img", "aria-label": say("update.picture") }) : null;
   replace(parent,
     element("p", { class: used ? "good" : "bad" }, say("update.what", update.model, say(`verdict.${update.verdict}`), short(update.nis), update.gate < 1e29 ? say("update.gate", short(update.gate)) : say("update.nogate"))),
-    canvas, canvas && element("p", { class: "note" }, say("update.legend")),
+    canvas, canvas && element("p", { class: "note" }, say(isDirect(update, plane(n)) ? "update.legend" : "update.legend.plane")),
     table(["", "ν = z − h(x⁻)", "R", "S", "σ = √S", "ν/σ"], measured.map((name, c) => [name, short(nu[c]), short(noise[c]), short(s[c * m + c]), short(Math.sqrt(s[c * m + c])), short(nu[c] / Math.sqrt(s[c * m + c]))]), say("update.innovation")),
     m > 1 && matrix(s, m, "S = H P⁻ Hᵀ + R") || null,
     table(["", "x⁻", "σ⁻", ...measured.map((name) => `H ${name}`), ...measured.map((name) => `K ${name}`), "K ν", "x⁺ − x⁻", "x⁺", "σ⁺"],
@@ -32,10 +32,13 @@ export function renderUpdate(parent, update) {
   if (canvas) draw(canvas, update, plane(n));
 }
 
+/** Whether the measurement is of the two places themselves. */
+const isDirect = ({ states: n, components: m, h }, [i, j]) => m >= 2 && Math.abs(h[i] - 1) < 1e-6 && Math.abs(h[n + j] - 1) < 1e-6;
+
 /** In each half another scale: with the innovation, where the measurement is of the two places themselves, and without it. */
 function draw(canvas, { states: n, components: m, moved, prior, posterior, h, nu, s, verdict }, [i, j]) {
   const [context, width, height] = sized(canvas, 260), before = ellipse(prior, n, [i, j]), after = ellipse(posterior, n, [i, j]);
-  const direct = m >= 2 && Math.abs(h[i] - 1) < 1e-6 && Math.abs(h[n + j] - 1) < 1e-6, seen = direct ? ellipse(s, m, [0, 1]) : null;
+  const direct = isDirect({ states: n, components: m, h }, [i, j]), seen = direct ? ellipse(s, m, [0, 1]) : null;
   context.fillStyle = colour("paper");
   context.fillRect(0, 0, width, height);
   const halves = direct ? [true, false] : [false], wide = width / halves.length, step = Math.hypot(moved[i], moved[j]);
@@ -60,7 +63,11 @@ function draw(canvas, { states: n, components: m, moved, prior, posterior, h, nu
     }
     context.fillStyle = colour("faint");
     context.font = "11px system-ui, sans-serif";
-    context.fillText(`${short(reach)} m`, x(reach) - 30, y(0) - 4);
-    context.fillRect(x(0), y(0), reach * scale, 1);
+    const left = wide * k + 14;
+    context.fillText(`${short(reach)} m`, left, height - 12);
+    context.fillRect(left, height - 8, reach * scale, 2);
+    const [across, up] = [i, j].map((state) => (stateNames(n) ? say(`axis.${stateNames(n)[state]}`) : `x${state + 1}`));
+    context.fillText(`${across} →`, Math.min(wide * (k + 1) - context.measureText(`${across} →`).width - 6, x(1.1 * reach)), y(0) + 4);
+    context.fillText(`${up} ↑`, x(0) + 4, 12);
   });
 }
