@@ -33,6 +33,43 @@ sim::Result<std::optional<Unit>> named_unit(const Quantity& quantity, const Opti
   return unit;
 }
 
+std::string small_letters(std::string_view text) {
+  std::string small(text);
+  for (char& c : small) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  return small;
+}
+
+template <class Is>
+std::optional<std::size_t> find_column(const Table& table, Is is) {
+  for (std::size_t i = 0; i < table.columns().size(); ++i)
+    if (is(small_letters(table.columns()[i]))) return i;
+  return std::nullopt;
+}
+
+/// "...nanosec" beside "...sec": ROS writes a stamp in two whole numbers.
+std::optional<std::size_t> nanoseconds_beside(const Table& table, std::size_t seconds) {
+  std::string begin = small_letters(table.columns()[seconds]);
+  if (begin.ends_with("secs")) begin.pop_back();
+  if (!begin.ends_with("sec")) return std::nullopt;
+  begin.resize(begin.size() - 3);
+  return find_column(table, [&](const std::string& name) {
+    if (!name.starts_with(begin)) return false;
+    const std::string_view rest = std::string_view(name).substr(begin.size());
+    return rest == "nanosec" || rest == "nanosecs" || rest == "nsec" || rest == "nsecs";
+  });
+}
+
+/// The column with the letter of a latitude or a longitude.
+std::optional<std::size_t> side_of(const Table& table, bool latitude) {
+  const std::string letters = latitude ? "ns" : "ew", axis = latitude ? "lat" : "lon";
+  return find_column(table, [&](std::string name) {
+    std::erase_if(name, [](char c) { return c < 'a' || c > 'z'; });
+    const bool hemisphere = name.starts_with(axis) && (name.ends_with("hemisphere") || name.ends_with("direction") ||
+                                                       name.ends_with("dir") || name.ends_with("ref"));
+    return name == letters || name == letters + "indicator" || name == axis + letters || hemisphere;
+  });
+}
+
 }  // namespace
 
 std::optional<std::size_t> named_column(std::string_view text, const Table& table) {
@@ -96,6 +133,7 @@ sim::Result<std::vector<Bound>> bind_columns(const Table& table, const Options& 
     b.unit = unit.value_or(usual_unit(quantity.dimension));
     if (!unit && quantity.dimension == Dimension::kAngle && quantity.kind == Kind::kVelocity)
       b.unit = *unit_of("deg", Dimension::kAngle);  // no receiver states a course in radians
+    if (quantity.dimension == Dimension::kPlace) b.side = side_of(table, quantity.name == "gnss.lat");
   }
   return bound;
 }
@@ -108,6 +146,7 @@ sim::Result<Clock> take_clock(const Table& table, std::vector<Bound>& bound) {
         table.name() + ":" + std::to_string(table.line()) + ": no column of time; name it, as in --column time=COLUMN",
         table.line()};
   Clock clock{.column = found->column, .power = found->unit.power};
+  clock.nanoseconds = nanoseconds_beside(table, found->column);
   const bool stated = found->stated;
   bound.erase(found);
   Table sample = table;
@@ -135,19 +174,52 @@ sim::Result<Clock> take_clock(const Table& table, std::vector<Bound>& bound) {
                       table.line()};
 }
 
-/// No pressure of air is below 200 hPa where robots are, nor above 1 200: its size names its unit.
-void guess_pressure(const Table& table, std::vector<Bound>& bound) {
-  for (Bound& b : bound) {
-    if (b.guess.quantity->dimension != Dimension::kPressure || b.stated) continue;
-    Table sample = table;
-    std::vector<std::string_view> cells;
-    for (int row = 0; row < 64 && sample.next(cells); ++row) {
-      const auto value = parse_real(cells[b.column], sample.point());
-      if (!value) continue;
-      b.unit = *unit_of(*value < 200 ? "kPa" : *value < 2'000 ? "hPa" : "Pa", Dimension::kPressure);
-      break;
+namespace {
+
+/// The median of a column's first values, of a field's axes the largest in each row. 0: the column has none.
+double usual_size(const Table& table, const std::vector<Bound>& bound, const Bound& of) {
+  Table sample = table;
+  std::vector<std::string_view> cells;
+  std::vector<double> sizes;
+  const Dimension dimension = of.guess.quantity->dimension;
+  while (sizes.size() < 64 && sample.next(cells)) {
+    double size = 0;
+    for (const Bound& one : bound) {
+      const bool axis = dimension == Dimension::kFlux && one.guess.quantity->dimension == dimension;
+      if (axis || one.column == of.column)
+        size = std::max(size, std::abs(parse_real(cells[one.column], sample.point()).value_or(0)));
     }
+    if (size > 0) sizes.push_back(size);
   }
+  if (sizes.empty()) return 0;
+  const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
+  std::nth_element(sizes.begin(), middle, sizes.end());
+  return *middle;
+}
+
+}  // namespace
+
+std::optional<std::size_t> instance_column(const Table& table) {
+  return find_column(table, [](const std::string& name) { return name == "i" || name == "instance"; });
+}
+
+void guess_sizes(const Table& table, std::vector<Bound>& bound) {
+  for (Bound& b : bound) {
+    const Dimension dimension = b.guess.quantity->dimension;
+    const double size = b.stated ? 0 : usual_size(table, bound, b);
+    // No pressure of air is below 200 hPa where robots are, nor above 1 200.
+    if (dimension == Dimension::kPressure && size > 0)
+      b.unit = *unit_of(size < 200 ? "kPa" : size < 2'000 ? "hPa" : "Pa", dimension);
+    // The earth has 360 degrees, and whole numbers of 1e-7 degrees exceed them all but at 0, 0.
+    if (dimension == Dimension::kPlace && size > 1e5) b.unit = *unit_of("e7", dimension);
+    // The earth's field is 22 to 67 uT.
+    if (dimension == Dimension::kFlux && size > 0 && (size < 1 || size > 1e4))
+      b.unit = *unit_of(size < 1e-3 ? "T" : size < 1 ? "gauss" : "nT", dimension);
+  }
+  const auto by_size = [](const Bound& b) { return !b.stated && b.unit.name == "e7"; };
+  if (std::none_of(bound.begin(), bound.end(), by_size)) return;
+  for (Bound& b : bound)  // receivers that write 1e-7 degrees write heights in millimetres
+    if (b.guess.quantity->name == "gnss.height" && !b.stated) b.unit = *unit_of("mm", Dimension::kLength);
 }
 
 }  // namespace tetap::csv

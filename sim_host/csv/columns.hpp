@@ -19,7 +19,8 @@ struct Bound {
   std::size_t column = 0;
   Guess guess;
   Unit unit;
-  bool stated = false;  ///< the unit stands in the table or was named
+  bool stated = false;              ///< the unit stands in the table or was named
+  std::optional<std::size_t> side;  ///< column of a place's letter: N, S, E or W
 };
 
 /// How the time of a table is written.
@@ -27,6 +28,7 @@ struct Clock {
   std::size_t column = 0;
   int power = 6;
   bool calendar = false;
+  std::optional<std::size_t> nanoseconds;  ///< column of the part below a second
 };
 
 /// The column of a table that the user's text names, "COLUMN" or "FILE:COLUMN".
@@ -35,7 +37,9 @@ struct Clock {
 [[nodiscard]] sim::Result<std::vector<Bound>> bind_columns(const Table& table, const Options& options);
 /// Takes the column of time out of `bound`. Looks at the first rows where no unit is stated.
 [[nodiscard]] sim::Result<Clock> take_clock(const Table& table, std::vector<Bound>& bound);
-/// The unit of a pressure by the size of its first value, where none is stated.
-void guess_pressure(const Table& table, std::vector<Bound>& bound);
+/// The column whose values part the rows of several like devices, as ArduPilot's I.
+[[nodiscard]] std::optional<std::size_t> instance_column(const Table& table);
+/// The units of a pressure, a place and a field by the size of their first values, where none is stated.
+void guess_sizes(const Table& table, std::vector<Bound>& bound);
 
 }  // namespace tetap::csv

@@ -171,6 +171,24 @@ std::optional<Guess> guess_name(const std::vector<std::string>& words, std::stri
   return guess_axis(words, unit, stem);
 }
 
+/// "gyro_rad[0]" of an array, as PX4 and ROS write three axes: the unit may stand before the index.
+std::optional<Guess> guess_element(std::string_view column, std::string_view stem) {
+  const bool indexed = column.size() > 3 && column.ends_with(']') && column[column.size() - 3] == '[';
+  if (!indexed || column[column.size() - 2] < '0' || column[column.size() - 2] > '2') return std::nullopt;
+  const std::vector<std::string> words = words_of(column.substr(0, column.size() - 3));
+  const std::span<const std::string> all(words);
+  for (std::size_t n = 0; n <= 2 && n < words.size(); ++n) {
+    const std::string suffix = joined(all.last(n));
+    std::vector<std::string> named(words.begin(), words.end() - static_cast<std::ptrdiff_t>(n));
+    named.emplace_back(1, static_cast<char>('x' + column[column.size() - 2] - '0'));
+    auto guess = guess_axis(std::move(named), suffix, stem);
+    if (!guess || (n != 0 && !unit_of(suffix, guess->quantity->dimension))) continue;
+    guess->unit = suffix;
+    return guess;
+  }
+  return std::nullopt;
+}
+
 }  // namespace
 
 std::span<const Quantity> quantities() { return kQuantities; }
@@ -193,7 +211,10 @@ std::size_t slots_of(Kind kind) {
 }
 
 std::optional<Guess> guess_column(std::string_view column, std::string_view stem, bool phone, bool placed) {
+  if (auto element = guess_element(column, stem)) return element;
+  const bool in_g = column.starts_with("gF");  // Physics Toolbox: the specific force beside the acceleration without it
   std::string unit = cut_unit(column);
+  if (unit == "txt") unit.clear();  // SensorLog: a date in words
   // ROS names the specific force so; telephones write the words apart where gravity is taken away.
   const bool of_ros = column.find("linear_acceleration") != std::string_view::npos;
   std::vector<std::string> words = words_of(column);
@@ -216,7 +237,7 @@ std::optional<Guess> guess_column(std::string_view column, std::string_view stem
   if (!placed && guess->quantity->name == "velocity.speed") guess->quantity = find_quantity("body.forward");
   if (!placed && guess->quantity->name == "velocity.course") guess->quantity = find_quantity("sighting.bearing");
   if (!placed && guess->quantity->kind == Kind::kFix) return std::nullopt;  // a height alone is no fix
-  guess->unit = unit;
+  guess->unit = in_g && unit.empty() ? "g" : unit;
   return guess;
 }
 

@@ -72,11 +72,14 @@ sim::Result<> Reader::add(std::size_t file, Table& table) {
   }
   const auto time = take_clock(table, *bound);
   if (!time) return time.failure();
-  guess_pressure(table, *bound);
+  guess_sizes(table, *bound);
   std::array<std::optional<std::size_t>, kKinds> place{};
   std::vector<Series> series;
   std::vector<bool> used(table.columns().size());
   used[time->column] = true;
+  if (time->nanoseconds) used[*time->nanoseconds] = true;
+  for (const Bound& b : *bound)
+    if (b.side) used[*b.side] = true;
   for (const Bound& b : *bound) {
     used[b.column] = true;
     auto& at = place[static_cast<std::size_t>(b.guess.quantity->kind)];
@@ -114,29 +117,57 @@ double from_minutes(double value) {
   return degrees + (value - 100 * degrees) / 60;
 }
 
+/// Cuts the letter behind a place. S and W are negative, there or in a column beside.
+bool is_south_or_west(std::string_view& place, std::string_view side, bool of_place) {
+  if (of_place && place.size() > 1 && std::string_view("NSEWnsew").find(place.back()) != std::string_view::npos) {
+    side = place.substr(place.size() - 1);
+    place.remove_suffix(1);
+    while (place.size() > 1 && place.back() == ' ') place.remove_suffix(1);
+  }
+  return side == "S" || side == "s" || side == "W" || side == "w";
+}
+
 sim::Result<> Reader::rows(Table& table, const Clock& clock, const std::vector<Bound>& bound,
                            std::span<Series> series) {
   struct Cell {
     std::size_t column, series, slot;
     Unit unit;
+    std::optional<std::size_t> side;
+    bool place;
   };
   std::vector<Cell> plan;
   for (const Bound& b : bound)
     for (std::size_t i = 0; i < series.size(); ++i)
-      if (series[i].kind == b.guess.quantity->kind) plan.push_back({b.column, i, b.guess.quantity->slot, b.unit});
+      if (series[i].kind == b.guess.quantity->kind)
+        plan.push_back(
+            {b.column, i, b.guess.quantity->slot, b.unit, b.side, b.guess.quantity->dimension == Dimension::kPlace});
   std::vector<std::array<double, kMostSlots>> row(series.size());
   std::vector<bool> any(series.size());
   std::vector<std::string_view> cells;
   std::optional<std::int64_t> latest;
   std::uint64_t count = 0, disordered = 0;
+  const auto instance = instance_column(table);
+  std::string first;
   while (table.next(cells)) {
+    if (instance && first.empty()) first = cells[*instance];
+    if (instance && cells[*instance] != first) {
+      count_left_out(tables_.left_out, "rows of " + table.name() + " of another device than " +
+                                           table.columns()[*instance] + " " + excerpt(first));
+      continue;
+    }
     const std::string_view text = cells[clock.column];
     if (is_missing(text)) {
       count_left_out(tables_.left_out, "rows of " + table.name() + " without a time");
       continue;
     }
-    const auto time = clock.calendar ? parse_calendar(text) : parse_whole(text, table.point(), clock.power);
+    auto time = clock.calendar ? parse_calendar(text) : parse_whole(text, table.point(), clock.power);
     if (!time) return table.refuse(clock.column, text, "is no time");
+    if (clock.nanoseconds) {
+      const auto part = parse_whole(cells[*clock.nanoseconds], table.point(), -3);
+      if (!part || *part < 0 || *part > 1'000'000)
+        return table.refuse(*clock.nanoseconds, cells[*clock.nanoseconds], "is no part of a second in nanoseconds");
+      *time += *part;
+    }
     if (latest && *time < *latest - kDisorder_us)
       return table.refuse(clock.column, text, "goes back by more than 0.1 s");
     if (latest && *time > *latest + kJump_us) return table.refuse(clock.column, text, "is more than an hour later");
@@ -145,10 +176,12 @@ sim::Result<> Reader::rows(Table& table, const Clock& clock, const std::vector<B
     ++count;
     for (std::size_t i = 0; i < series.size(); ++i) row[i].fill(kNan), any[i] = false;
     for (const Cell& cell : plan) {
-      const std::string_view number = cells[cell.column];
+      std::string_view number = cells[cell.column];
       if (is_missing(number)) continue;
-      const auto value = parse_real(number, table.point());
+      const bool negative = is_south_or_west(number, cell.side ? cells[*cell.side] : std::string_view(), cell.place);
+      auto value = parse_real(number, table.point());
       if (!value) return table.refuse(cell.column, number, "is no number");
+      if (negative) *value = -*value;
       const double degrees = cell.unit.minutes ? from_minutes(*value) : *value;
       row[cell.series][cell.slot] = cell.unit.factor * degrees + cell.unit.offset;
       any[cell.series] = true;

@@ -24,9 +24,9 @@ std::string_view unquoted(std::string_view cell) {
   return cell;
 }
 
-/// The first of tab, semicolon and comma that stands outside of quotes.
+/// The first of tab, semicolon, comma and blank that stands outside of quotes.
 char separator_of(std::string_view line) {
-  for (const char one : {'\t', ';', ','}) {
+  for (const char one : {'\t', ';', ',', ' '}) {
     bool quoted = false;
     for (const char c : line) {
       if (c == '"') quoted = !quoted;
@@ -71,6 +71,7 @@ void Table::split(std::string_view line, std::vector<std::string_view>& cells) c
   for (std::size_t i = 0; i < line.size(); ++i) {
     if (line[i] == '"') quoted = !quoted;
     if (line[i] != separator_ || quoted) continue;
+    if (separator_ == ' ' && line[i + 1] == ' ') continue;  // blanks part columns together, and end no line
     cells.push_back(unquoted(line.substr(begin, i - begin)));
     begin = i + 1;
   }
@@ -79,6 +80,10 @@ void Table::split(std::string_view line, std::vector<std::string_view>& cells) c
 
 sim::Result<Table> Table::open(const std::string& name, std::string_view text) {
   if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
+  if (text.starts_with("\xFF\xFE") || text.starts_with("\xFE\xFF"))
+    return sim::Failure{name + ":1: text in UTF-16; save the table as UTF-8", 1};
+  if (text.find('\n') == std::string_view::npos && text.find('\r') != std::string_view::npos)
+    return sim::Failure{name + ":1: its lines end with a carriage return alone; save the table with line feeds", 1};
   Table table(name, text);
   std::string_view line, remark, before = table.left_;
   bool ended = false;
@@ -88,6 +93,10 @@ sim::Result<Table> Table::open(const std::string& name, std::string_view text) {
       return sim::Failure{name + ":" + std::to_string(table.line_) + ": a line of " + std::to_string(line.size()) +
                               " bytes is no row of a table",
                           table.line_};
+    if (table.line_ == 1 && line.size() == 5 && line.starts_with("sep=")) {  // a note for a table calculator
+      line = {};
+      continue;
+    }
     if (!line.starts_with('#')) break;
     remark = line.substr(1);
     number = table.line_;

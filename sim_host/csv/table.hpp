@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A table in text: columns parted by comma, semicolon or tab, names in its first line, names and cells perhaps in
-// quotes. Lines that begin with # are remarks; the last of them has the names where no other line has.
+// A table in text: columns parted by comma, semicolon, tab or blanks, names in its first line, names and cells perhaps
+// in quotes. Lines that begin with # are remarks; the last of them has the names where no other line has.
 #pragma once
 
 #include "sim_host/replay/result.hpp"

@@ -24,6 +24,7 @@ using enum Dimension;
 constexpr auto kRows = std::to_array<Row>({
     {"s", kTime, {.power = 6, .name = "s"}},
     {"sec", kTime, {.power = 6, .name = "s"}},
+    {"secs", kTime, {.power = 6, .name = "s"}},
     {"second", kTime, {.power = 6, .name = "s"}},
     {"seconds", kTime, {.power = 6, .name = "s"}},
     {"ms", kTime, {.power = 3, .name = "ms"}},
@@ -46,6 +47,7 @@ constexpr auto kRows = std::to_array<Row>({
     {"degrees", kAngle, {.factor = kDegree, .name = "deg"}},
     {"mrad", kAngle, {.factor = 1e-3, .name = "mrad"}},
     {"rad/s", kAngularRate, {.name = "rad/s"}},
+    {"rad", kAngularRate, {.name = "rad/s"}},
     {"rads", kAngularRate, {.name = "rad/s"}},
     {"rads-1", kAngularRate, {.name = "rad/s"}},
     {"radps", kAngularRate, {.name = "rad/s"}},
@@ -115,6 +117,7 @@ constexpr auto kRows = std::to_array<Row>({
     {"tesla", kFlux, {.factor = 1e6, .name = "T"}},
     {"g", kFlux, {.factor = 1e2, .name = "gauss"}},
     {"gauss", kFlux, {.factor = 1e2, .name = "gauss"}},
+    {"ga", kFlux, {.factor = 1e2, .name = "gauss"}},
     {"mg", kFlux, {.factor = 1e-1, .name = "mgauss"}},
     {"mgauss", kFlux, {.factor = 1e-1, .name = "mgauss"}},
     {"pa", kPressure, {.name = "Pa"}},

@@ -92,13 +92,19 @@ void AxesDetector::judge_upside(const Votes& yaw, double upward, Findings& findi
                 down + "; no device shows whether the gyroscope is turned, too.", Code::kImuUpsideDown, findings);
   // With all axes reversed the curves, taken about a reversed up, agree with the force to the left.
   const ForwardDetector::Agreement forward = by_.forward.agreement();
-  const bool all = robot_.mounting && forward.ahead < -kFollows;
-  if (yaw.against <= yaw.with - (all && forward.left > kFollows ? 1 : 0)) return;
+  const bool astern = -forward.ahead > kFollows;
+  const bool curves = forward.left > kFollows;
+  const bool all = robot_.mounting && (astern || (curves && forward.ahead < kHalf * kFollows));
+  if (yaw.against <= yaw.with - (all && curves ? 1 : 0)) return;
   push(Code::kAccelSign, up_axis(), kGyroscope | yaw.uses,
        down + ", and yet these turn against an IMU that is upside down: " + yaw.words + ".", std::nullopt, findings);
+  // Turns are taken about the direction that is measured as up.
+  findings.back().spoils = kAccelerometer | kMounting | kGyroscope;
   if (!all) return;
   findings.back().evidence +=
-      text(" The force ahead goes against the acceleration by %s (correlation %.2f).", forward.device, forward.ahead);
+      astern ? text(" The force ahead goes against the acceleration by %s (correlation %.2f).", forward.device,
+                    forward.ahead)
+             : text(" The force to the left goes with the curves about that direction (%.2f).", forward.left);
   findings.back().change = text("Negate VelX, VelY and VelZ of In_Imu%uAccel in the sender: gravity is +9.81 upwards.",
                                 static_cast<unsigned>(robot_.imu));
 }

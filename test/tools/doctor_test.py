@@ -117,6 +117,13 @@ def turn_imu(frames, matrix):
     return frames
 
 
+def part(frames, begin_s, end_s):
+    """A log that begins and ends within the drive."""
+    at_s = (frames.bus_us() - frames.bus_us()[0]) / 1e6
+    kept = np.flatnonzero((at_s >= begin_s) & (at_s < end_s))
+    return Frames(frames.time_us[kept], frames.identifier[kept], frames.payload[kept])
+
+
 def about(axis, angle_deg):
     """The sensor's axes turned about one of them: 2 is up on most robots, 1 on the Husky."""
     c, s, i, j = np.cos(np.radians(angle_deg)), np.sin(np.radians(angle_deg)), (axis + 1) % 3, (axis + 2) % 3
@@ -593,6 +600,12 @@ class Doctor(unittest.TestCase):
                 found = self.examine(mistake(self.logs.frames(name)), self.logs.robot(name))
                 self.assertEqual([one["code"] for one in found], [code], name)
                 self.assertRegex(found[0]["change"], change)
+
+    def test_a_reversed_accelerometer_is_named_wherever_the_log_begins(self):
+        for begin_s in (21, 42):  # the speed hardly changes, the wheels alone show the turn
+            found = self.examine(scale_imu(part(self.logs.frames("yard"), begin_s, begin_s + 42), 1, -1), "rover")
+            self.assertEqual([one["code"] for one in found], ["accel_sign"], begin_s)
+            self.assertIn("Negate VelX, VelY and VelZ", found[0]["change"])
 
     def test_a_remedy_with_numbers_ends_its_finding(self):
         set_antenna = ["--set", "gnss.antenna_y_b_m=2"]

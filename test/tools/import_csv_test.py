@@ -386,6 +386,61 @@ class Tables(Case):
             log = self.imported({"b.csv": text})
             self.assertEqual([line for line in log.lines if "vcan0 308#" not in line], expected, text[:60])
 
+    def test_exports_of_px4_ardupilot_and_ros(self):
+        """Headers as ulog2csv, mavlogdump and rosbag's tools write them; every value once, by hand."""
+        imu = "timestamp,gyro_rad[0],gyro_rad[1],gyro_rad[2],gyro_integral_dt,accelerometer_m_s2[0],accelerometer_m_s2[1],accelerometer_m_s2[2]\n"
+        gps = "timestamp,time_utc_usec,lat,lon,alt,alt_ellipsoid,s_variance_m_s,eph,epv,vel_m_s,vel_n_m_s,vel_e_m_s,vel_d_m_s,cog_rad,satellites_used\n"
+        mag = "timestamp,device_id,magnetometer_ga[0],magnetometer_ga[1],magnetometer_ga[2]\n"
+        log = self.imported({"a_imu.csv": imu + "".join("%d,0.1,-0.2,0.3,4000,1,2,-9.8\n" % (10**7 + 5000 * i) for i in range(3)),
+                             "a_gps.csv": gps + "10000000,0,-473977420,85455940,488123,535120,0.5,0.9,1.4,5,3,4,-0.5,0.9,17\n",
+                             "a_mag.csv": mag + "10000000,1,0.21,-0.01,0.43\n"}, "--unit", "time=us")
+        self.near("In_Imu0Gyro", "AngZ", log["In_Imu0Gyro"]["AngZ"], np.full(2, 0.3 * 0.005))
+        self.near("In_Imu0Accel", "VelY", log["In_Imu0Accel"]["VelY"], np.full(2, 2 * 0.005))
+        for message, name, value in (("In_GnssLat", "Lat", -47.397742), ("In_GnssLon", "Lon", 8.545594), ("In_GnssAlt", "Height", 535.12),
+                                     ("In_GnssVelEN", "East", 4), ("In_GnssVelEN", "North", 3), ("In_GnssVelU", "Up", 0.5), ("In_GnssVelU", "Acc", 0.5),
+                                     ("In_GnssAcc", "Hor", 0.9), ("In_Mag", "FluxX", 21), ("In_Mag", "FluxY", -1)):
+            self.near(message, name, log[message][name], [value])
+        # Two IMUs in one table: the rows of one.
+        two = "timestamp,TimeUS,I,GyrX,GyrY,GyrZ,AccX,AccY,AccZ\n" + "".join("%.4f,1,%d,%d,0,0,0,0,9\n" % (i / 50 + k / 1000, k, k) for i in range(4) for k in (0, 1))
+        done, log = self.run_on({"IMU.csv": two})
+        self.assertEqual((log["In_Imu0Gyro"]["AngX"].tolist(), log["In_Imu0Time"]["Interval"].tolist()), ([0] * 3, [20_000] * 3))
+        self.assertIn("left out: 4 rows of IMU.csv of another device than I 0", done.stdout)
+        # A stamp in two whole numbers.
+        for names in ("header.stamp.sec,header.stamp.nanosec", "header.stamp.secs,header.stamp.nsecs"):
+            text = names + ",angular_velocity.x,angular_velocity.y,angular_velocity.z,linear_acceleration.x,linear_acceleration.y,linear_acceleration.z\n"
+            stamps = ((1_700_000_000, 980_000_000), (1_700_000_000, 990_000_000), (1_700_000_001, 0))
+            log = self.imported({"imu.csv": text + "".join("%d,%d,1,0,0,0,0,9\n" % stamp for stamp in stamps)})
+            self.assertEqual(log["In_Imu0Time"]["time_us"].tolist(), [START_US + 10_000, START_US + 20_000])
+        log = self.imported({"o.csv": "Time,twist.twist.linear.x,twist.twist.linear.y,twist.twist.angular.z\n0.5,1.5,9,0.25\n"})
+        self.assertTrue(np.allclose([log["In_BodySpeed"]["Forward"][0], log["In_BodySpeed"]["YawRate"][0]], [1.5, 0.25], atol=3e-5))
+
+    def test_shapes_of_other_phones_and_tables(self):
+        imu = "gx,gy,gz,ax,ay,az\n" + "".join("%.2f,1,0,0,0,0,9.8\n" % (i / 100) for i in range(3))
+        expected = self.imported({"a.csv": "time_s," + imu}).lines
+        for text in ("sep=;\n" + ("time_s," + imu).replace(",", ";"), ("time_s," + imu).replace(",", "   ")):
+            self.assertEqual(self.imported({"b.csv": text}).lines, expected)
+        # Physics Toolbox: ax is without gravity, gFx the specific force. SensorLog: a time in words.
+        toolbox = "time,gFx,gFy,gFz,ax,ay,az,wx,wy,wz,Bx,By,Bz\n" + "".join("%.2f,0,0,1,7,7,7,1,0,0,20,1,43\n" % (i / 100) for i in range(3))
+        words = "loggingTime(txt),accelerometerAccelerationX(G),accelerometerAccelerationY(G),accelerometerAccelerationZ(G),motionRotationRateX(rad/s)," \
+                "motionRotationRateY(rad/s),motionRotationRateZ(rad/s)\n" + "".join("2026-11-28 10:00:00.%02d0 +0100,0,0,1,1,0,0\n" % i for i in range(3))
+        for text in (toolbox, words):
+            log = self.imported({"p.csv": text})
+            self.near("In_Imu0Accel", "VelZ", log["In_Imu0Accel"]["VelZ"], np.full(2, 0.0980665))
+            self.near("In_Imu0Accel", "VelX", log["In_Imu0Accel"]["VelX"], np.zeros(2))
+        # Letters of a place, behind it or in a column of their own; an elevation.
+        for text, *options in (("time,lat,lon,elevation\n0.5,48.5S,11.25 W,500\n",), ("time,lat,ns,lon,ew,elevation\n0.5,4830.0,S,1115.0,W,500\n", "--unit", "gnss=nmea")):
+            log = self.imported({"g.csv": text}, *options)
+            self.near("In_GnssLat", "Lat", log["In_GnssLat"]["Lat"], [-48.5])
+            self.near("In_GnssLon", "Lon", log["In_GnssLon"]["Lon"], [-11.25])
+            self.near("In_GnssAlt", "Height", log["In_GnssAlt"]["Height"], [500])
+        log = self.imported({"m.csv": "time_s,magnetic_field.x,magnetic_field.y,magnetic_field.z\n0.5,2.1e-5,0,-4e-5\n"})  # tesla, as ROS has it
+        self.near("In_Mag", "FluxX", log["In_Mag"]["FluxX"], [21])
+        for text, reason in ((("time_s," + imu).replace("\n", "\r"), "carriage return alone"), ("time_s,lat,lon\n0.5,48N,S\n", "'S' is no number"),
+                             ("stamp.sec,stamp.nanosec,pressure\n1700000000,1e10,1000\n", "is no part of a second")):
+            done, log = self.run_on({"b.csv": text})
+            self.assertEqual((done.returncode, log, done.stderr.count("\n")), (2, None, 1), done.stderr)
+            self.assertIn(reason, done.stderr)
+
     def test_a_pause_and_rows_out_of_order(self):
         times = [0, 0.01, 0.03, 0.02, 0.04, 5.0, 5.01]
         text = "time_s,gx,gy,gz,ax,ay,az\n" + "".join("%.2f,%g,0,0,0,0,9.8\n" % (t, t) for t in times)

@@ -55,7 +55,7 @@ class Table:
 def read_lines(path):
     """(line number, text) of a text file's lines that hold something."""
     try:
-        with open(path, encoding="utf-8", errors="replace") as file:
+        with open(path, encoding="utf-8-sig", errors="replace") as file:
             for number, line in enumerate(file, 1):
                 text = line.strip()
                 if text and not text.startswith("#"):
@@ -64,10 +64,10 @@ def read_lines(path):
         raise BadInput(f"{path}: {error.strerror}") from None
 
 
-def numbers(fields, where):
-    """Fields as finite numbers."""
+def numbers(fields, where, first_column=1):
+    """Fields as finite numbers; `first_column`: of the first field in its line."""
     values = []
-    for column, field in enumerate(fields, 1):
+    for column, field in enumerate(fields, first_column):
         try:
             value = float(field)
         except ValueError:

@@ -57,7 +57,7 @@ def read(path):
             vertex = identifier(fields[0], where, 2)
             if vertex in vertices:
                 raise BadInput(f"{where}: vertex {vertex} is there twice")
-            vertices[vertex] = common.numbers(fields[1:], where)
+            vertices[vertex] = common.numbers(fields[1:], where, 3)
         elif tag[0].isalpha():
             others[tag[:30]] += 1
         else:
@@ -79,7 +79,7 @@ def _edge(tag, fields, where):
     i, j = identifier(fields[0], where, 2), identifier(fields[1], where, 3)
     if i == j:
         raise BadInput(f"{where}: an edge from pose {i} to itself")
-    values = common.numbers(fields[2 + more:], where)
+    values = common.numbers(fields[2 + more:], where, 4 + more)
     return i, j, values[:3], values[3:], tag, where
 
 
