@@ -6,13 +6,13 @@
 #include "tetap/firmware/firmware.hpp"
 
 #include "bench.hpp"
+#include "queued_can.hpp"
 #include "test/hal/fake_flash.hpp"
 
 #include <gtest/gtest.h>
 
 #include <bit>
 #include <cmath>
-#include <deque>
 #include <map>
 #include <memory>
 #include <string>
@@ -34,18 +34,7 @@ const param::Parameters kKept = [] {
 
 template <class Driver>
 struct KeepingBoard {
-  struct Can {
-    std::deque<base::CanFrame> to_node;
-    Frames sent;
-    bool send(const base::CanFrame& frame) { return sent.push_back(frame), true; }
-    std::optional<base::CanFrame> receive() {
-      if (to_node.empty()) return std::nullopt;
-      const base::CanFrame frame = to_node.front();
-      return to_node.pop_front(), frame;
-    }
-    void flush() {}
-    [[nodiscard]] static base::CanFaults faults() { return {}; }
-  } can;
+  QueuedCan can;
   using Storage = Driver;
   static inline FakeFlash* flash = nullptr;
   static Storage storage() { return Storage{FlashRegisters{flash}, FlashWords{flash}, 100}; }
