@@ -213,6 +213,22 @@ TYPED_TEST(KeptParametersTest, ASaveEndsTheStretchAndTheWatchdogWaitsMeanwhile) 
   EXPECT_EQ(bench.get(row_of("landmark.gate_scale").index), word_of(kKept, row_of("landmark.gate_scale"), 0));
 }
 
+TYPED_TEST(KeptParametersTest, AFloodOfSavesWritesOnceAMinute) {
+  Keeping<TypeParam> bench;
+  int written = 0, waiting = 0;
+  const base::Micros begin = bench.board->time;
+  for (std::uint32_t k = 0; bench.board->time - begin < base::Micros{130'000'000}; ++k) {
+    ASSERT_EQ(bench.stage(row_of("landmark.gate_scale"), kTwo + k), ParamAnswer::kDone);
+    ASSERT_EQ(bench.apply(), ParamAnswer::kDone);
+    const auto before = bench.flash.done.size();
+    const ParamAnswer is = bench.save();
+    EXPECT_EQ(bench.flash.done.size() > before, is == ParamAnswer::kDone);
+    ++(is == ParamAnswer::kDone ? written : waiting);
+  }
+  EXPECT_EQ(written, 3) << "at once, and after each minute";
+  EXPECT_GT(waiting, 500);
+}
+
 TYPED_TEST(KeptParametersTest, NothingIsSavedInMotionInLockstepOrOfAnotherSet) {
   Keeping<TypeParam> bench;
   EXPECT_EQ(bench.stage(row_of("landmark.gate_scale"), kTwo), ParamAnswer::kDone);
