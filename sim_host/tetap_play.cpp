@@ -3,18 +3,59 @@
 #include "hal/board/linux/socket_can.hpp"
 #include "hal/chip/support/boot_line.hpp"
 #include "sim_host/in_process.hpp"
+#include "sim_host/kept_words.hpp"
 #include "sim_host/parameter_settings.hpp"
 
 #include "sim_host/play/play.hpp"
 #include "sim_host/robots.hpp"
+#include "tetap/param/crc.hpp"
+#include "tetap/param/table.hpp"
 #include "version.hpp"
 
 #include <cstdio>
 #include <exception>
+#include <optional>
+#include <stdexcept>
+#include <string>
+
+namespace {
+
+using namespace tetap;
+
+/// Parameters of the node in this process, and those with which the node of the log began.
+struct Begun {
+  param::Parameters from, to;
+};
+
+/// Nothing where the log's node began as its robot is built. What the user sets stays as he sets it.
+std::optional<Begun> begun_of(sim::SurveyedLog& log, sim::PlayOptions& options,
+                              const sim::ParameterSettings& settings) {
+  if (options.robot.empty() || !sim::robot_named(options.robot).takes.parameters) return std::nullopt;
+  const auto kept = sim::kept_words_of(log.file, options.script.log_base);
+  if (!kept) return std::nullopt;
+  param::Parameters compiled = sim::parameters_of(options.robot);
+  compiled.can_base = options.script.log_base;
+  const param::Parameters active = kept->over(compiled);
+  const std::string words = sim::settings_between(compiled, active);
+  const bool exact = param::crc(active) == kept->config;
+  std::fprintf(stderr, "tetap-play: %s: its node began with %s%s%s\n", options.log.c_str(), words.c_str(),
+               exact ? "" : " and more, which the log does not name",
+               options.memory ? "" : "; the node that it is played to needs them as well (SET=)");
+  options.notes.emplace_back("began_with", sim::quoted(words));
+  if (!options.memory) return std::nullopt;
+  const param::Parameters set = sim::parameters_of(options.robot, settings);
+  Begun begun{.from = sim::MemoryNode::for_player(set, options.script.base), .to = {}};
+  begun.to = kept->over(begun.from);
+  for (const param::Row& row : param::kTable)
+    if (!param::is_secret(row) && sim::value_text(row, set) != sim::value_text(row, compiled))
+      for (std::size_t i = 0; i < row.elements; ++i) row.set(begun.to, i, row.get(begun.from, i));
+  return begun;
+}
+
+}  // namespace
 
 int main(int count, char** values) {
   try {
-    using namespace tetap;
     sim::Arguments arguments(count, values);
     if (arguments.flag("--help") || arguments.flag("-h"))
       return std::fputs(sim::play_help(sim::robot_names()).c_str(), stdout), 0;
@@ -29,8 +70,11 @@ int main(int count, char** values) {
     sim::Interruption::expect();
     // Before the bus, so that an unreadable log is reported also where there is no bus.
     sim::SurveyedLog log = sim::survey_for(options);
+    const auto begun = begun_of(log, options, settings);
     if (options.memory)
       return sim::with_node_in_process(options.robot, settings, options.script.base, [&](auto& link) {
+        const sim::Result<> made = begun ? sim::make_active(link, begun->from, begun->to) : sim::Result<>{};
+        if (!made) throw std::runtime_error(made.failure().text);
         return sim::play(link, options, log, "memory", "tetap-play");
       });
     hal::SocketCan can(options.interface);

@@ -3,6 +3,7 @@
 // form, then of the whole one. tools/proof/compare_bits compares the lines. An image takes no arguments; whoever has
 // read enough ends the emulator.
 #include "attitude.hpp"
+#include "changes.hpp"
 #include "config/husky.hpp"
 #include "config/labyrinth.hpp"
 #include "config/mrclam.hpp"
@@ -85,6 +86,10 @@ class Program {
     node<robot::mrclam::Estimators>("mrclam", robot::mrclam::parameters, length.steps);
     node<robot::husky::Estimators>("husky", robot::husky::parameters, length.steps);
     node<robot::labyrinth::Estimators>("labyrinth", robot::labyrinth::parameters, length.steps);
+    auto& changing = fresh<node::Node<robot::mrclam::Estimators>>(robot::mrclam::parameters, bus::Version{});
+    const bits::ChangedRun changed = bits::changed_run(changing, robot::mrclam::parameters.can_base);
+    if (!changed.whole) return board_.print("bits: a change of parameters was not made\n");
+    line("changed_", "mrclam", changed.hash);
     auto& rover = fresh<node::Node<robot::rover::Estimators>>(robot::rover::parameters, bus::Version{});
     line("recorded_", "rover", recorded(rover, robot::rover::parameters.can_base));
     board_.print(hal::Text<>{}.add("bits: end ").add(length.name).add('\n').c_str());

@@ -4,13 +4,13 @@
 #include "tetap/firmware/firmware.hpp"
 
 #include "bench.hpp"
+#include "queued_can.hpp"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <bit>
 #include <cstring>
-#include <deque>
 #include <memory>
 #include <random>
 #include <string>
@@ -24,19 +24,7 @@ using Robot =
     node::WithBusProtection<node::WithBusParameters<node::Estimators<estimators::Odometry, estimators::PoseEkf>>>;
 
 struct Board {
-  struct Can {
-    std::deque<base::CanFrame> to_node;
-    Frames sent;
-    base::CanFaults counted;
-    bool send(const base::CanFrame& frame) { return sent.push_back(frame), true; }
-    std::optional<base::CanFrame> receive() {
-      if (to_node.empty()) return std::nullopt;
-      const base::CanFrame frame = to_node.front();
-      return to_node.pop_front(), frame;
-    }
-    void flush() {}
-    [[nodiscard]] base::CanFaults faults() const { return counted; }
-  } can;
+  QueuedCan can;
   base::Micros time{1'000'000};
   std::uint8_t id = kId;
   [[nodiscard]] base::Micros now() const { return time; }

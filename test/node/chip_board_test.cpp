@@ -2,6 +2,7 @@
 // The Arduino sketch of docs/howto/own_chip.md, run on the host: it is the node that any other board makes, also when
 // the chip's clock begins anew.
 #include "bench.hpp"
+#include "queued_can.hpp"
 
 #include <gtest/gtest.h>
 #include "sketch/sketch.ino"
@@ -12,19 +13,7 @@ using namespace tetap;
 using test::all, test::in;
 
 struct PlainBoard {
-  struct Can {
-    std::deque<base::CanFrame> to_node;
-    std::vector<base::CanFrame> sent;
-    bool send(const base::CanFrame& frame) { return sent.push_back(frame), true; }
-    std::optional<base::CanFrame> receive() {
-      if (to_node.empty()) return std::nullopt;
-      const base::CanFrame frame = to_node.front();
-      to_node.pop_front();
-      return frame;
-    }
-    void flush() {}
-    [[nodiscard]] base::CanFaults faults() const { return {}; }
-  } can;
+  test::QueuedCan can;
   base::Micros time;
   [[nodiscard]] base::Micros now() const { return time; }
 };

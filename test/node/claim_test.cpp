@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // The first key of a node over its bus: who may give it and until when, and what intruders do before and behind it.
 #include "node/bench.hpp"
+#include "node/queued_can.hpp"
 #include "tetap/firmware/firmware.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cstring>
-#include <deque>
 #include <memory>
 #include <string_view>
 
@@ -20,18 +20,7 @@ constexpr base::SipKey kKey{0xA3020100U, 0xB7060504U, 0xCB0A0908U, 0xDF0E0D0CU};
 constexpr std::uint32_t kName = param::StagedParameters::kName;
 
 struct ClaimBoard {
-  struct Can {
-    std::deque<base::CanFrame> to_node;
-    Frames sent;
-    bool send(const base::CanFrame& frame) { return sent.push_back(frame), true; }
-    std::optional<base::CanFrame> receive() {
-      if (to_node.empty()) return std::nullopt;
-      const base::CanFrame frame = to_node.front();
-      return to_node.pop_front(), frame;
-    }
-    void flush() {}
-    [[nodiscard]] base::CanFaults faults() const { return {}; }
-  } can;
+  QueuedCan can;
   base::Micros time{1'000'000};
   [[nodiscard]] base::Micros now() const { return time; }
 };

@@ -6,13 +6,13 @@
 #include "tetap/firmware/firmware.hpp"
 
 #include "bench.hpp"
+#include "queued_can.hpp"
 #include "test/hal/fake_flash.hpp"
 
 #include <gtest/gtest.h>
 
 #include <bit>
 #include <cmath>
-#include <deque>
 #include <map>
 #include <memory>
 #include <string>
@@ -34,18 +34,7 @@ const param::Parameters kKept = [] {
 
 template <class Driver>
 struct KeepingBoard {
-  struct Can {
-    std::deque<base::CanFrame> to_node;
-    Frames sent;
-    bool send(const base::CanFrame& frame) { return sent.push_back(frame), true; }
-    std::optional<base::CanFrame> receive() {
-      if (to_node.empty()) return std::nullopt;
-      const base::CanFrame frame = to_node.front();
-      return to_node.pop_front(), frame;
-    }
-    void flush() {}
-    [[nodiscard]] static base::CanFaults faults() { return {}; }
-  } can;
+  QueuedCan can;
   using Storage = Driver;
   static inline FakeFlash* flash = nullptr;
   static Storage storage() { return Storage{FlashRegisters{flash}, FlashWords{flash}, 100}; }
@@ -222,6 +211,22 @@ TYPED_TEST(KeptParametersTest, ASaveEndsTheStretchAndTheWatchdogWaitsMeanwhile) 
   EXPECT_EQ(bench.save(), ParamAnswer::kDone);
   bench.power_cycle();
   EXPECT_EQ(bench.get(row_of("landmark.gate_scale").index), word_of(kKept, row_of("landmark.gate_scale"), 0));
+}
+
+TYPED_TEST(KeptParametersTest, AFloodOfSavesWritesOnceAMinute) {
+  Keeping<TypeParam> bench;
+  int written = 0, waiting = 0;
+  const base::Micros begin = bench.board->time;
+  for (std::uint32_t k = 0; bench.board->time - begin < base::Micros{130'000'000}; ++k) {
+    ASSERT_EQ(bench.stage(row_of("landmark.gate_scale"), kTwo + k), ParamAnswer::kDone);
+    ASSERT_EQ(bench.apply(), ParamAnswer::kDone);
+    const auto before = bench.flash.done.size();
+    const ParamAnswer is = bench.save();
+    EXPECT_EQ(bench.flash.done.size() > before, is == ParamAnswer::kDone);
+    ++(is == ParamAnswer::kDone ? written : waiting);
+  }
+  EXPECT_EQ(written, 3) << "at once, and after each minute";
+  EXPECT_GT(waiting, 500);
 }
 
 TYPED_TEST(KeptParametersTest, NothingIsSavedInMotionInLockstepOrOfAnotherSet) {

@@ -2,10 +2,10 @@
 // Zephyr's example of docs/howto/own_chip.md, run on the host until its sleep ends it: the frames of the Arduino
 // sketch's node, across the wrap of its clock.
 #include "bench.hpp"
+#include "queued_can.hpp"
 
 #include <gtest/gtest.h>
 
-#include <deque>
 #define main zephyr_main
 #include "zephyr/src/main.cpp"
 #undef main
@@ -37,19 +37,7 @@ void arrives(const base::CanFrame& frame) {
 }
 
 struct ZephyrTwin {
-  struct Can {
-    std::deque<base::CanFrame> to_node;
-    std::vector<base::CanFrame> sent;
-    bool send(const base::CanFrame& frame) { return sent.push_back(frame), true; }
-    std::optional<base::CanFrame> receive() {
-      if (to_node.empty()) return std::nullopt;
-      const base::CanFrame frame = to_node.front();
-      to_node.pop_front();
-      return frame;
-    }
-    void flush() {}
-    [[nodiscard]] base::CanFaults faults() const { return {}; }
-  } can;
+  test::QueuedCan can;
   base::Micros time;
   [[nodiscard]] base::Micros now() const { return time; }
 };
