@@ -493,6 +493,64 @@ class World(Judged):
         self.assertGreater(kept, 2 if WHOLE else 0, "the mean was right, and was moved")
 
 
+class Camera(Judged):
+    """The world's camera stands some degrees off what the robot says. A matched world has no other error of the mounting."""
+
+    TURNS_DEG = ((3.0, -2.0, 4.0), (-4.0, 3.0, -2.5))
+    STATED = np.array([[0, 0, 1.0], [-1, 0, 0], [0, -1, 0]])
+
+    @classmethod
+    def setUpClass(cls):
+        cls.directory = cls.enterClassContext(tempfile.TemporaryDirectory())
+
+    def drive(self, seed, *words):
+        """(log, true mounting) of two laps of 60 m."""
+        out = os.path.join(self.directory, str(seed) + "".join(words))
+        true = Rotation.from_euler("xyz", self.TURNS_DEG[seed - 1], degrees=True).as_matrix() @ self.STATED
+        subprocess.run([WORLD, "--memory", "--robot", "visual", "--course", "loop", "--raw", "--quiet", "--matched", "--built", "--seed", str(seed),
+                        "--set", "wheels.drive.counts_per_turn=20000", "--set", "camera.mounting_bc=" + " ".join(map(str, true.ravel())), "--out", out, *words],
+                       check=True, capture_output=True, timeout=900)
+        return os.path.join(out, "raw.log"), true
+
+    def found(self, path, status, *words):
+        return tool(path, "--robot", "visual", "--parts", "camera", "--counts-per-turn", "20000", "--out", path + ".c", *words, status=status)
+
+    def test_a_mounting_is_found_to_3_mrad_with_an_honest_sigma(self):
+        normalised = []
+        for seed in (1, 2):
+            path, true = self.drive(seed)
+            self.found(path, 0)
+            with open(path + ".c.json", encoding="utf-8") as file:
+                numbers = {n["field"]: n for n in json.load(file)["parts"]["camera"]["numbers"]}
+            rotation = np.reshape(numbers["camera.mounting_bc"]["value"], (3, 3))
+            error = Rotation.from_matrix(rotation @ true.T).as_rotvec()
+            self.assertLess(np.abs(error).max(), 0.003, error)
+            normalised.append(error / np.radians(numbers[None]["sigma"]))
+        self.consistent(normalised, low_factor=0.5, high_factor=1.5, what="mounting of the camera")
+
+    def test_what_shows_no_mounting_is_refused(self):
+        path, _ = self.drive(1, "--fault", "images_mirrored@0+300")
+        self.assertIn("tetap-doctor", self.found(path, 1).stdout)
+        path, _ = self.drive(1, "--duration", "12")
+        self.assertIn("Record: three minutes of driving", self.found(path, 1).stdout)
+        self.assertIn("no camera", tool(path, "--robot", "rover", "--parts", "camera", "--out", path + ".c", status=1).stdout)
+
+    def test_an_image_without_one_of_its_features_is_left_out(self):
+        with tempfile.TemporaryDirectory() as directory:
+            log = bus_writer.Log(bus_writer.Dbc())
+            for k in range(10):
+                stamp = 1_000_000 + 100_000 * k
+                common = {"Stamp": stamp & bus_writer.STAMP_MASK, "Seq": k & 15, "Inst": 0}
+                log.add("In_Feature", np.full(2 if k == 4 else 3, stamp), **common, TrackId=np.arange(3)[:2 if k == 4 else 3], U=100.0, V=50.0)
+                log.add("In_Image", stamp, **common, Count=3, Exposure=np.nan, TrackerState=1)
+            path = os.path.join(directory, "a.log")
+            with open(path, "wb") as file:
+                file.write(log.text())
+            read_back = recording.Log(path, bus_writer.DEFAULT_DBC, 0x300)
+        self.assertEqual((len(read_back.images), read_back.dropped), (9, {"images of which a feature is missing": 1}))
+        self.assertEqual(read_back.images.pixel[0].tolist(), [[100.0, 50.0]] * 3)
+
+
 class Program(unittest.TestCase):
     def setUp(self):
         self.directory = tempfile.TemporaryDirectory()

@@ -19,7 +19,7 @@ DENSE_US = 200_000      # node times closer together than this: a frame between 
 TOGETHER = 200          # frames of one sample are not further apart than so many frames
 BACK_US = 100_000       # stamps of one sensor may be out of order by so much: sorted and counted; and so may the node's times
 WANTED = ("In_WheelCounts", "In_WheelSpeed", "In_BodySpeed", "In_GnssLat", "In_GnssLon", "In_GnssAlt", "In_GnssAcc", "In_GnssVelEN",
-          "In_GnssVelU", "In_Mag")
+          "In_GnssVelU", "In_Mag", "In_Feature", "In_Image")
 
 
 class Samples:
@@ -217,7 +217,7 @@ def _imu_rows(gyro, accel, time):
 
 
 class Log:
-    """imu, wheels (`kind`: counts, wheel speeds, body speed), gnss, velocity, mag: Samples, or None; `dropped`: what was left out."""
+    """imu, wheels (`kind`: counts, wheel speeds, body speed), gnss, velocity, mag, images: Samples, or None; `dropped`: what was left out."""
 
     def __init__(self, path, dbc_path, base, imu_instance=0, gnss_instance=0):
         self.path, self.dropped, self.notes = path, {}, []
@@ -240,7 +240,7 @@ class Log:
             stamps.append((value, value.stamp))
 
         imu = [frames[name] for name in names[-3:]]
-        for name in ("In_WheelCounts", "In_WheelSpeed", "In_BodySpeed", "In_Mag", "In_GnssAcc", "In_GnssVelU", names[-1]):
+        for name in ("In_WheelCounts", "In_WheelSpeed", "In_BodySpeed", "In_Mag", "In_GnssAcc", "In_GnssVelU", "In_Image", names[-1]):
             if len(frames[name]):
                 stamped(name, frames[name])
         if not wanted:
@@ -253,6 +253,7 @@ class Log:
         self.wheels = self._wheels(frames, seconds)
         self.gnss, self.velocity = self._gnss(frames, seconds, gnss_instance)
         self.mag = self._mag(frames["In_Mag"], seconds.get("In_Mag"))
+        self.images = self._images(frames["In_Feature"], frames["In_Image"], seconds.get("In_Image"))
 
     def _drop(self, what, count):
         if count:
@@ -337,9 +338,29 @@ class Log:
         self._drop("magnetometer: samples not available or of other instances", np.count_nonzero(~ok))
         return self._in_order("magnetometer", Samples(t=seconds, flux=flux, line=part.line).keep(ok))
 
+    def _images(self, feature, image, seconds):
+        """Images of camera 0 whose features are all there: `track` and `pixel` [px] of each are arrays."""
+        if seconds is None:
+            return None
+        mine = np.flatnonzero(feature.inst == 0)
+        own = np.flatnonzero(image.inst == 0)
+        begun = np.searchsorted(feature.order[mine], image.order[own])  # features come before the frame that closes their image
+        track, pixel, whole = [], [], np.zeros(len(own), dtype=bool)
+        for i, (row, end, count) in enumerate(zip(own, begun, image.count[own])):
+            rows = mine[max(0, end - int(count)):end] if np.isfinite(count) else mine[:0]
+            at = np.stack([feature.u[rows], feature.v[rows]], axis=1).astype(float)
+            same = (feature.stamp[rows] == image.stamp[row]) & (feature.seq[rows] == image.seq[row]) & np.isfinite(at).all(axis=1)
+            whole[i] = len(rows) == count and same.all()
+            track.append(feature.trackid[rows].astype(int))
+            pixel.append(at)
+        self._drop("images of which a feature is missing", np.count_nonzero(~whole))
+        lists = np.empty((2, len(own)), dtype=object)
+        lists[0, :], lists[1, :] = track, pixel
+        return self._in_order("images", Samples(t=seconds[own], track=lists[0], pixel=lists[1], line=image.line[own]).keep(whole))
+
     def cut(self, spans):
         """Only what lies within the spans (start, end) [s]."""
-        for name in ("imu", "wheels", "gnss", "velocity", "mag"):
+        for name in ("imu", "wheels", "gnss", "velocity", "mag", "images"):
             samples = getattr(self, name)
             if samples is None:
                 continue
