@@ -74,5 +74,20 @@ TEST(likely_fault, the_page_names_the_broken_device) {
   }
 }
 
+/// A rover that is Degraded says by a bit of Faults why.
+TEST(likely_fault, degraded_has_a_fault_bit) {
+  int inertial = 0, planar = 0;
+  for (const Fault fault : {Fault::kGnssJump, Fault::kGnssWrongHeight, Fault::kImuStuck, Fault::kGyroBiasStep,
+                            Fault::kWheelSpin, Fault::kWheelStuck, Fault::kLandmarkWrongId, Fault::kKidnapped}) {
+    const NodeWords a = words_of<robot::rover::Estimators>(robot::rover::parameters, fault, 1);
+    const NodeWords b = words_of<robot::rover_landmarks::Estimators>(robot::rover_landmarks::parameters, fault, 1);
+    EXPECT_EQ(a.unnamed, 0) << static_cast<int>(fault) << ", inertial, of " << a.degraded;
+    EXPECT_EQ(b.unnamed, 0) << static_cast<int>(fault) << ", planar, of " << b.degraded;
+    inertial += a.degraded, planar += b.degraded;
+  }
+  EXPECT_GT(inertial, 100);
+  EXPECT_GT(planar, 100);
+}
+
 }  // namespace
 }  // namespace tetap::sim
