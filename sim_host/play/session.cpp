@@ -4,6 +4,7 @@
 #include "sim_host/play/interruption.hpp"
 #include "sim_host/replay/complaint.hpp"
 #include "sim_host/replay/line.hpp"
+#include "sim_host/replay/names.hpp"
 
 #include <unistd.h>
 
@@ -18,6 +19,17 @@ std::string number(double value, int decimals) {
   Line line;
   line.real(value, decimals);
   return line.view().empty() ? "null" : std::string(line.view());
+}
+
+/// "GnssEast 99.8 m, 1 sigma 0.4 m, probability 0.998, 31.2 s after the start"
+std::string fault_words(const bus::EstOriginFault& fault, base::Micros after) {
+  Line line;
+  const std::string_view in = unit(fault.fault_unit);
+  line.text(name(fault.fault_row)).put(' ').real(static_cast<double>(fault.fault_size), 4).put(' ').text(in);
+  line.text(", 1 sigma ").real(static_cast<double>(fault.fault_std), 4).put(' ').text(in);
+  line.text(", probability ").real(static_cast<double>(fault.fault_prob), 3);
+  line.text(", ").real(static_cast<double>(after.us) * 1e-6, 1).text(" s after the start");
+  return std::string(line.view());
 }
 
 double to_seconds(base::Micros span) { return static_cast<double>(span.us) * 1e-6; }
@@ -109,6 +121,7 @@ void Session::write_json(OutFile& file, double wall_s) {
       {"estimates_sha256", sim::quoted(t.estimates_sha256)},
       {"state_crc_last", sim::quoted(crc.view())},
   };
+  if (t.fault) fields.emplace_back("likeliest_fault", sim::quoted(fault_words(*t.fault, t.fault_time - t.first)));
   if (comparison_ != nullptr) {
     fields.emplace_back("epochs_compared", count(comparison_->compared()));
     fields.emplace_back("epochs_different", count(comparison_->different()));

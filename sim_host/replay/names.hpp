@@ -55,6 +55,19 @@ namespace tetap::sim {
   const auto i = static_cast<std::size_t>(value);
   return i < kNames.size() ? kNames[i] : "?";
 }
+[[nodiscard]] constexpr std::string_view name(bus::FaultRow value) {
+  constexpr std::array<std::string_view, 14> kNames{
+      "ImuGyroX",  "ImuGyroY", "ImuGyroZ",    "ImuAccelX",    "ImuAccelY", "ImuAccelZ",    "GnssEast",
+      "GnssNorth", "GnssUp",   "GnssVelEast", "GnssVelNorth", "GnssVelUp", "SpeedForward", "Heading"};
+  const auto i = static_cast<std::size_t>(value);
+  return value == bus::FaultRow::kNone ? "None" : i < kNames.size() ? kNames[i] : "?";
+}
+/// As a text prints it.
+[[nodiscard]] constexpr std::string_view unit(bus::FaultUnit value) {
+  constexpr std::array<std::string_view, 5> kUnits{"rad/s", "m/s2", "m", "m/s", "rad"};
+  const auto i = static_cast<std::size_t>(value);
+  return i < kUnits.size() ? kUnits[i] : "";
+}
 [[nodiscard]] constexpr std::string_view name(sensor::SourceState value) {
   constexpr std::array<std::string_view, 5> kNames{"Stopped", "Confirming", "Fusing", "Rejecting", "Distrusted"};
   const auto i = static_cast<std::size_t>(value);

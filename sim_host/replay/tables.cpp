@@ -100,6 +100,12 @@ void Tables::frame(const base::CanFrame& f) {
     if (const auto keyframe = bus::decode<bus::EstKeyframePose>(payload)) keyframe_row(*keyframe);
   } else if (offset == bus::EstGraph::kOffset) {
     if (const auto graph = bus::decode<bus::EstGraph>(payload)) graph_row(*graph);
+  } else if (offset == bus::EstOriginFault::kOffset) {
+    const auto page = bus::decode<bus::EstOriginFault>(payload);
+    if (!page || page->fault_row == bus::FaultRow::kNone) return;
+    if (totals_.fault && !(page->fault_prob > totals_.fault->fault_prob)) return;
+    totals_.fault = page;
+    totals_.fault_time = time_;
   } else if (offset == bus::EstDiagMapper::kOffset) {
     if (const auto mapper = bus::decode<bus::EstDiagMapper>(payload)) mapper_ = *mapper;
   } else if (offset >= bus::EstPos::kOffset) {

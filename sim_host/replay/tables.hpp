@@ -62,9 +62,11 @@ class Tables {
     std::uint64_t frames_received = 0;  ///< anything on the bus
     std::uint64_t bits_sent = 0;
     std::uint64_t bits_received = 0;
-    std::uint32_t state_crc = 0;   ///< the last
-    base::Micros first, last;      ///< epochs
-    std::string estimates_sha256;  ///< in so_far(), and behind end()
+    std::uint32_t state_crc = 0;               ///< the last
+    base::Micros first, last;                  ///< epochs
+    std::optional<bus::EstOriginFault> fault;  ///< the likeliest of all
+    base::Micros fault_time;                   ///< first time that it was
+    std::string estimates_sha256;              ///< in so_far(), and behind end()
   };
 
   /// `base`: first id of the node's block. Writes the heading of every table; the sink outlives it.

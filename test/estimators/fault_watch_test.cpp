@@ -88,6 +88,45 @@ TEST(FaultWatch, WhatIsPublishedCoversAFaultBelowTheGates) {
   }
 }
 
+/// Below every gate, in white noise: after 4 s the faulty device is the likeliest, with its size within 3 sigma. A bias
+/// counts from the begin of its row, which is not its own: 4 sigma.
+TEST(FaultWatch, TheLikeliestFaultIsTheTrueOneWithItsSize) {
+  for (const unsigned seed : {1U, 3U})
+    for (const bool gyro : {false, true}) {
+      auto d = sound<WatchedInertial>(seed, 3);
+      set(d, gyro ? Off{.gyro_radps = 0.08F} : Off{.east_mps = 0.5F});
+      d.run(4);
+      const trust::LikelyFault found = d.estimator.likeliest_fault();
+      EXPECT_EQ(found.code, gyro ? 2U : trust::InertialFaults::kVelocity) << seed;
+      EXPECT_GT(found.probability, 0.9F) << seed;
+      EXPECT_NEAR(found.size, gyro ? 0.08F : 0.5F, (gyro ? 4 : 3) * found.sigma) << seed;
+    }
+}
+
+/// Whatever sets the filter from outside begins the rows anew: nothing is suspected, and P is the filter's own.
+TEST(FaultWatch, ARestartAGivenPoseAndAResetBeginTheRowsAnew) {
+  const auto suspecting = [] {
+    auto d = sound<WatchedInertial>(1, 3);
+    set(d, {.east_mps = 0.5F});
+    for (int k = 0; k < 500 && d.estimator.likeliest_fault().code == trust::LikelyFault::kNone; ++k) d.run(0.01);
+    EXPECT_NE(d.estimator.likeliest_fault().code, trust::LikelyFault::kNone);
+    return d;
+  };
+  auto placed = suspecting();
+  placed.place();
+  EXPECT_EQ(placed.estimator.likeliest_fault().code, trust::LikelyFault::kNone) << "given pose";
+  auto restarted = suspecting();
+  restarted.estimator.restart({restarted.us}, restarted.ctx());
+  EXPECT_EQ(restarted.estimator.likeliest_fault().code, trust::LikelyFault::kNone) << "restart";
+  auto carried = suspecting();
+  set(carried, {});
+  carried.east_m += 200;
+  const auto before = carried.estimator.jump().count;
+  for (int k = 0; k < 15'000 && carried.estimator.jump().count == before; ++k) carried.run(0.01);
+  ASSERT_NE(carried.estimator.jump().count, before);
+  EXPECT_EQ(carried.estimator.likeliest_fault().code, trust::LikelyFault::kNone) << "reset of the position";
+}
+
 /// Every number of the bank is in the hash.
 TEST(FaultWatch, TheHashCoversTheBank) {
   const auto hash = [](const FaultWatch& watch) {

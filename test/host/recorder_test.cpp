@@ -210,6 +210,7 @@ TEST(Names, AreTheDbcs) {
   expect_names<sensor::Mode>(dbc.tables.at("Mode"));
   expect_names<sensor::ResetCause>(dbc.tables.at("ResetCause"));
   expect_names<sensor::EstimatorKind>(dbc.tables.at("EstimatorKind"));
+  expect_names<bus::FaultRow>(dbc.tables.at("FaultRow"));
   std::size_t checked = 0;
   for (const auto& [id, text] : dbc.messages) {
     if (id < 0x320 || id >= 0x340) continue;

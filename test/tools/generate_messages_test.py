@@ -160,7 +160,7 @@ class Refusals(Folder):
         self.refused('BA_ "EnumType" SG_ 768 Sync_Kind "SyncKind";', "", "Sync_Kind", "without EnumType")
 
     def test_words_of_a_selector_are_its_page_names(self):
-        words = 'VAL_ 807 Origin_Sel 0 "Lat" 1 "Lon" 2 "Height" ;'
+        words = 'VAL_ 807 Origin_Sel 0 "Lat" 1 "Lon" 2 "Height" 3 "Fault" ;'
         self.refused(words, "", "Origin_Sel", "VAL_ is missing, to be PageNames")
         self.refused(words, words.replace('0 "Lat" 1 "Lon"', '0 "Lon" 1 "Lat"'), "Origin_Sel", "differs from PageNames")
 

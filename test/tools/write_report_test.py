@@ -334,6 +334,13 @@ class Warnings(Case):
         lines = self.run_with(0, about={**RUN, "fault": "kidnapped@20+0,imu_stuck@0.1+3"})
         self.assertEqual(lines, ["warning: fault kidnapped at 20 s, after the end of the run (0 s): it did not happen"])
 
+    def test_the_likeliest_fault_is_one_line(self):
+        self.estimates(self.time_s, self.zero, self.zero, self.zero)
+        self.assertNotIn("likeliest", self.report("--no-pictures").stdout)
+        words = "GnssEast 99.8 m, 1 sigma 0.4 m, probability 0.998, 31.2 s after the start"
+        self.write("run.json", json.dumps({**RUN, "likeliest_fault": words}))
+        self.assertIn(f"\nlikeliest fault: {words}\n", self.report("--no-pictures").stdout)
+
     def test_what_a_repeated_log_was_compared_by_is_one_line(self):
         self.estimates(self.time_s, self.zero, self.zero, self.zero)
         self.assertNotIn("repeated", self.report("--no-pictures").stdout)

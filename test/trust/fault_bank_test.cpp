@@ -139,6 +139,10 @@ TEST(fault_bank, a_permuted_table_gives_the_same_bits) {
       ASSERT_EQ(run.bank.weight(0), other.bank.weight(1));
       ASSERT_EQ(run.published().packed(), other.published().packed());
       ASSERT_EQ(run.x, other.x);
+      const trust::LikelyFault a = run.bank.likeliest(), b = other.bank.likeliest();
+      ASSERT_EQ(a.code, b.code);
+      ASSERT_EQ(a.probability, b.probability);
+      if (a.code != trust::LikelyFault::kNone) ASSERT_EQ(a.size, b.size);
     }
   }
 }

@@ -62,6 +62,25 @@ void put_diagnostics(std::uint32_t page, const Counters& c, const LoopHealth& l,
   return {.guard_bad = c.guard_bad, .auth_bad = c.auth_bad, .replayed = c.replayed, .nonce = nonce};
 }
 
+/// The likeliest fault of a sensor (trust::LikelyFault), which goes with the origin's pages.
+template <class Fault>
+[[nodiscard]] constexpr EstOriginFault fault_page(const Fault& fault, sensor::OriginSource source, std::uint8_t tag) {
+  const auto row = static_cast<FaultRow>(fault.code);
+  const FaultUnit unit = row < FaultRow::kImuAccelX     ? FaultUnit::kRadPerS
+                         : row < FaultRow::kGnssEast    ? FaultUnit::kMPerS2
+                         : row < FaultRow::kGnssVelEast ? FaultUnit::kM
+                         : row < FaultRow::kHeading     ? FaultUnit::kMPerS
+                         : row == FaultRow::kHeading    ? FaultUnit::kRad
+                                                        : FaultUnit::kNotAvailable;
+  return {.source = source,
+          .fault_row = row,
+          .fault_unit = unit,
+          .fault_prob = fault.probability,
+          .fault_size = fault.size,
+          .fault_std = fault.sigma,
+          .fault_epoch = tag};
+}
+
 /// State and last failed check of every source.
 template <class Put>
 void put_sources(const estimators::SourceStates& s, std::uint8_t tag, Put&& put) {

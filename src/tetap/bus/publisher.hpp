@@ -153,8 +153,9 @@ class Publisher {
   /// Counts of refusals; `guard_page()` gives that of guards and tags, where the node has them.
   template <class Send, class GuardPage>
   void refusals(const Counters& counters, const LoopHealth& loop, GuardPage&& guard_page, Send& send);
-  template <class Send>
-  void identity(const estimators::MapFrame& map_frame, Send& send);
+  /// Version and origin; `likeliest()` gives the likeliest fault, where the node has hypotheses of faults.
+  template <class Likeliest, class Send>
+  void identity(const estimators::MapFrame& map_frame, Likeliest&& likeliest, Send& send);
   template <class Send>
   void events(Send& send);
   template <class Send>
@@ -494,10 +495,11 @@ void Publisher<N>::refusals(const Counters& c, const LoopHealth& l, GuardPage&& 
 }
 
 template <std::size_t N>
-template <class Send>
-[[gnu::cold]] void Publisher<N>::identity(const estimators::MapFrame& map_frame, Send& send) {
+template <class Likeliest, class Send>
+[[gnu::cold]] void Publisher<N>::identity(const estimators::MapFrame& map_frame, Likeliest&& likeliest, Send& send) {
   if (!every(parameters_.publish.identity_every, 7)) return;
-  switch (identity_++ % 4) {
+  constexpr bool kHasFaults = requires { likeliest(); };
+  switch (identity_++ % (kHasFaults ? 5 : 4)) {
     case 0:
       send_version(send);
       break;
@@ -506,6 +508,9 @@ template <class Send>
       break;
     case 2:
       put(bus::EstOriginLon{.source = map_frame.origin, .lon_raw = map_frame.frame.longitude_2ndeg()}, send);
+      break;
+    case 4:
+      if constexpr (kHasFaults) put(fault_page(likeliest(), map_frame.origin, tag()), send);
       break;
     default:
       put(bus::EstOriginHeight{.source = map_frame.origin, .height_m = map_frame.frame.height_m()}, send);

@@ -173,6 +173,9 @@ class EstimatorSlot {
     e.inertial(ctx);
   }
   { return now_.inertial(ctx); }
+  /// The likeliest fault of a sensor (trust::LikelyFault), of an estimator with hypotheses of faults.
+  [[nodiscard]] auto likeliest_fault() const requires requires(const E& e) { e.likeliest_fault(); }
+  { return now_.likeliest_fault(); }
   [[nodiscard]] estimators::AttitudeEstimate inertial_attitude() const requires requires(const E& e) {
     e.inertial_attitude();
   }

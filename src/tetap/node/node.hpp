@@ -421,7 +421,11 @@ void Node<Estimators, Capacity>::tick(base::Micros t, const bus::LoopHealth& loo
         counters_, loop, [this] { return bus::guard_page(counters_, protection_.nonce()); }, send);
   else
     publisher_.refusals(counters_, loop, nullptr, send);
-  publisher_.identity(map_frame_, send);
+  if constexpr (requires { window_.primary().likeliest_fault(); })
+    publisher_.identity(
+        map_frame_, [this] { return window_.primary().likeliest_fault(); }, send);
+  else
+    publisher_.identity(map_frame_, nullptr, send);
   if constexpr (kHasBusParameters<Estimators>) publisher_.parameters(parameter_commands_, send);
   publisher_.events(send);
   window_.retire_until(now_ - base::Micros{parameters_.loop.window_us}, context(), noting());

@@ -146,6 +146,21 @@ class FaultBank {
       filter::add_outer(p, signatures_[i].phi, weights_[i] * (f * f + signatures_[i].variance()));
     }
   }
+  /// The likeliest device, where some row is in the mixture.
+  [[nodiscard, gnu::noinline]] LikelyFault likeliest() const {
+    LikelyFault best;
+    if (!suspects()) return best;
+    std::array<float, kRows> device{};
+    for (const std::size_t i : kOrder) device[row(i).device] += weights_[i];
+    std::size_t at = kOrder[0];
+    for (const std::size_t i : kOrder) {
+      const float more = device[row(i).device] - device[row(at).device];
+      if (more > 0.0F || (!(more < 0.0F) && weights_[i] > weights_[at])) at = i;
+    }
+    const Signature& one = signatures_[at];
+    best = {row(at).code, device[row(at).device], one.size(), base::sqrt(one.variance())};
+    return best;
+  }
   [[nodiscard]] float weight(std::size_t i) const { return weights_[i]; }
   [[nodiscard]] const Signature& signature(std::size_t i) const { return signatures_[i]; }
   /// J, prior odds included: the fault begins within the time after which its row begins anew.

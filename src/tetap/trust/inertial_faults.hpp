@@ -16,6 +16,7 @@ namespace tetap::trust {
 
 struct InertialFaults {
   static constexpr int kErrors = nav::InsState::kErrors;
+  enum Device : std::uint8_t { kImu, kReceiver, kWheels, kCompass };
   static constexpr std::size_t kFix = 6, kVelocity = 9, kForward = 12, kHeading = 13;
 
   /// Largest sizes (rad/s, m/s^2, m, m/s, m/s, rad): what the sensors of these robots show at all. Each fault begins
@@ -31,10 +32,10 @@ struct InertialFaults {
     };
     three(0, {.largest = 0.5F}, nav::InsState::kGyroBias);
     three(3, {.largest = 5}, nav::InsState::kAccelBias);
-    three(kFix, {.largest = 20}, -1);
-    three(kVelocity, {.largest = 5}, -1);
-    rows[kForward] = {.code = kForward, .largest = 3};
-    rows[kHeading] = {.code = kHeading, .largest = 1};
+    three(kFix, {.device = kReceiver, .largest = 20}, -1);
+    three(kVelocity, {.device = kReceiver, .largest = 5}, -1);
+    rows[kForward] = {.code = kForward, .device = kWheels, .largest = 3};
+    rows[kHeading] = {.code = kHeading, .device = kCompass, .largest = 1};
     return rows;
   }();
 

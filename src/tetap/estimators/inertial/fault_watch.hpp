@@ -38,6 +38,7 @@ class FaultWatch {
     published_.copy_from(p);
     bank_.widen(published_);
   }
+  [[nodiscard]] trust::LikelyFault likeliest() const { return bank_.likeliest(); }
   /// The filter's own P to the bit while no row is likely.
   [[nodiscard]] const nav::Ins::Covariance& published_p(const nav::Ins::Covariance& p) const {
     return wider_ ? published_ : p;

@@ -76,6 +76,13 @@ class InertialWith {
   [[nodiscard]] sensor::Mode mode(const Context& ctx) const;
   /// State of every source, and the test that failed last.
   [[nodiscard]] SourceStates sources(const Context& ctx) const;
+  /// The likeliest fault of a sensor.
+  [[nodiscard]] trust::LikelyFault likeliest_fault() const requires requires(const Watch& watch) { watch.likeliest(); }
+  {
+    // Clang 14 makes it for every watch.
+    if constexpr (requires { watch_.likeliest(); }) return watch_.likeliest();
+    return {};
+  }
   static constexpr auto members(auto& self) {
     return base::members(self.ins_, self.predictor_, self.budget_, self.phase_, base::in_turns(self.alignment_),
                          self.heading_monitor_, self.time_, self.levelled_at_, base::in_turns(self.level_), self.imu_,

@@ -48,8 +48,12 @@ std::uint16_t InertialWith<Watch>::faults() const {
   raise(sensor::Fault::kWheelSlip, judged && sources_.wheels.slip() != Wheels::Slip::kNone);
   raise(sensor::Fault::kImuClipped, imu.clipped_lately(time_));
   raise(sensor::Fault::kVibration, imu.vibration().shaken());
-  raise(sensor::Fault::kSensorStuck, imu.stuck() || sources_.any_stuck(time_));
-  raise(sensor::Fault::kInputStale, predictor_.without_imu() && !imu.stuck() && !imu_.unusable());
+  // Each cause of the mode Degraded has a bit.
+  const bool missing = tracking() && imu_.missing_lately(time_), was_stuck = tracking() && imu.stuck_lately(time_);
+  raise(sensor::Fault::kSensorStuck, imu.stuck() || was_stuck || sources_.any_stuck(time_));
+  raise(sensor::Fault::kInputStale,
+        (predictor_.without_imu() || (missing && !was_stuck)) && !imu.stuck() && !imu_.unusable());
+  raise(sensor::Fault::kRejecting, tracking() && (imu_.unusable() || sources_.any_refused(3)));
   return bits;
 }
 

@@ -97,16 +97,20 @@ class PoseFilter {
   [[nodiscard]] MotionVariance motion_variance(const Context& ctx) const {
     return motion_.motion_variance(ctx.parameters);
   }
-  /// Bits of sensor::Fault: wheels that turn otherwise than the gyroscope.
-  [[nodiscard]] std::uint16_t faults() const { return turn_.faults(); }
+  /// Bits of sensor::Fault: each cause of the mode Degraded has one, and wheels that are refuted have one in any mode.
+  [[nodiscard]] std::uint16_t faults() const {
+    std::uint16_t bits = turn_.faults();
+    if (phase_ != Phase::kTracking) return bits;
+    if (moves_otherwise()) bits |= 1U << static_cast<unsigned>(sensor::Fault::kWheelSlip);
+    if (refuses()) bits |= 1U << static_cast<unsigned>(sensor::Fault::kRejecting);
+    return bits;
+  }
   /// Last step to a pose that landmarks showed where the filter tracked another one.
   [[nodiscard]] Jump jump() const { return {.count = jumps_}; }
   [[nodiscard]] sensor::Mode mode(const Context&) const {
     if (phase_ == Phase::kWaiting) return sensor::Mode::kWaitingForPose;
     if (phase_ == Phase::kAligning) return sensor::Mode::kAligning;
-    for (const std::uint8_t in_a_row : in_a_row_)
-      if (in_a_row >= kDegraded) return sensor::Mode::kDegraded;
-    if (turn_.residual.contradicts() || vote_.contradicts(now_)) return sensor::Mode::kDegraded;
+    if (refuses() || moves_otherwise()) return sensor::Mode::kDegraded;
     return now_ - last_absolute_ > base::Micros{5'000'000} ? sensor::Mode::kDeadReckoning : sensor::Mode::kNominal;
   }
   static constexpr auto members(auto& self) {
@@ -116,6 +120,15 @@ class PoseFilter {
   }
 
  private:
+  /// A kind of source is refused again and again.
+  [[nodiscard]] bool refuses() const {
+    for (const std::uint8_t in_a_row : in_a_row_)
+      if (in_a_row >= kDegraded) return true;
+    return false;
+  }
+  /// The wheels' motion is not that of the gyroscope, or not that of two other devices.
+  [[nodiscard]] bool moves_otherwise() const { return turn_.residual.contradicts() || vote_.contradicts(now_); }
+
   /// A function of its own: the empty filter leaves the stack before a pose is set.
   [[gnu::noinline]] void clear() { *this = {}; }
 

@@ -107,7 +107,7 @@ def sources(root):
     head = HEAD.format(f"{SOURCE_STATE} and {SOURCES}") + "# Sources, states and checks\n\n"
     words = read(root, SOURCE_STATE)
     states, checks = enumerators(words, "SourceState"), enumerators(words, "Check")
-    parts = [head + "One page a source explains the rules: [trust](../explanation/trust.md).\n\n## States\n\n| state | number | meaning |\n|---|---|---|"]
+    parts = [head + "The rules: [trust](../explanation/trust.md).\n\n## States\n\n| state | number | meaning |\n|---|---|---|"]
     parts += [f"| {word} | {number} | {comment or word} |" for word, number, comment in states]
     parts.append("\n## Checks\n\nEvery refusal of the inertial filter names one.\n\n| check | number | meaning |\n|---|---|---|")
     parts += [f"| {word} | {number} | {comment or word} |" for word, number, comment in checks]
