@@ -143,5 +143,36 @@ TEST(StagedParameters, KeepWhatIsActiveAndWhatWaits) {
   EXPECT_TRUE(equal(staged.active(), kCompiled));
 }
 
+TEST(StagedParameters, KeepAClaimedKeyAndNoOtherAccess) {
+  Parameters open = kCompiled;
+  open.loop.lockstep = Lockstep::kGuarded;
+  StagedParameters owned(open);
+  constexpr base::SipKey kKey{1, 0, 3, 4};
+  for (std::size_t word = 0; word < kKey.size(); ++word) ASSERT_EQ(owned.claim(word, kKey[word]), Answer::kDone);
+  owned.take_over();
+  const auto loaded = [&](const Parameters& compiled, std::size_t& refused) {
+    StagedParameters next(compiled);
+    EXPECT_TRUE(next.load([&](auto&& take) { owned.each_kept(take); }, [&](auto...) { ++refused; }));
+    return next.active();
+  };
+  std::size_t refused = 0;
+  EXPECT_TRUE(equal(loaded(open, refused), owned.active()));
+  EXPECT_EQ(refused, 0U);
+  // A key that is compiled stays, whatever was kept.
+  Parameters locked = open;
+  locked.bus.key = {9, 9, 9, 9}, locked.bus.commands = CommandAccess::kAuthenticated;
+  EXPECT_TRUE(equal(loaded(locked, refused), locked));
+  EXPECT_GE(refused, 3U);
+  // Neither identity nor an open door comes out of a flash.
+  open.loop.lockstep = Lockstep::kPlain;
+  for (const Row& row : kTable) {
+    if (!is_access(row) || row.path == std::string_view("bus.key")) continue;
+    StagedParameters next(open);
+    std::size_t named = 0;
+    static_cast<void>(next.load([&](auto&& take) { take(row.index, std::size_t{0}, 0U); }, [&](auto...) { ++named; }));
+    EXPECT_EQ(named, 1U) << row.path;
+  }
+}
+
 }  // namespace
 }  // namespace tetap::param

@@ -128,7 +128,7 @@ class DirectOutput {
   static void statistics(const auto&, base::Micros, auto&) {}
   static void diagnostics(const bus::Counters&, const bus::LoopHealth&, std::uint16_t, auto&) {}
   static void refusals(const bus::Counters&, const bus::LoopHealth&, auto&&, auto&) {}
-  static void identity(const estimators::MapFrame&, auto&) {}
+  static void identity(const estimators::MapFrame&, auto&&, auto&) {}
   static void events(auto&) {}
   static void send_version(auto&) {}
   static void show_wired() {}

@@ -81,16 +81,7 @@ class StagedParameters {
   }
 
   /// One word of a row of the staged copy; a row that waited for a restart does not wait any more.
-  Answer set(std::uint16_t index, std::size_t word, std::uint32_t value) {
-    const std::size_t at = find(index);
-    if (at == kStoredRows.size() || word >= kStoredRows[at].words) return Answer::kUnknown;
-    const StoredRow& row = kStoredRows[at];
-    if (row.access) return Answer::kRefused;
-    if (!row.within(value)) return Answer::kOutOfLimits;
-    put(staged_, row, word, value);
-    wait(at, false);
-    return Answer::kDone;
-  }
+  Answer set(std::uint16_t index, std::size_t word, std::uint32_t value) { return stage(index, word, value, false); }
   [[nodiscard]] static bool is_key(std::uint16_t index) {
     const std::size_t at = find(index);
     return at < kStoredRows.size() && is_secret(at);
@@ -138,7 +129,8 @@ class StagedParameters {
     staged_ = active_;
     waits_ = {};
   }
-  /// A kept set at power-on: each_word(take) with take(index, word, value). Unknown words are passed over;
+  /// A kept set at power-on, a claimed key among it: each_word(take) with take(index, word, value). Unknown words are
+  /// passed over;
   /// refused(index, word, answer) for others that are not taken. False: together they break a rule, and everything is
   /// as compiled.
   template <class Each, class Refused>
@@ -146,7 +138,7 @@ class StagedParameters {
     active_ = staged_ = compiled_;
     waits_ = {};
     each_word([&](std::uint16_t index, std::size_t word, std::uint32_t value) {
-      const Answer is = set(index, word, value);
+      const Answer is = stage(index, word, value, true);
       if (is != Answer::kDone && is != Answer::kUnknown) refused(index, word, is);
     });
     const bool plausible = plausible_together(staged_);
@@ -166,6 +158,27 @@ class StagedParameters {
 
  private:
   static constexpr std::size_t kBits = 32;
+
+  Answer stage(std::uint16_t index, std::size_t word, std::uint32_t value, bool kept) {
+    const std::size_t at = find(index);
+    if (at == kStoredRows.size() || word >= kStoredRows[at].words) return Answer::kUnknown;
+    const StoredRow& row = kStoredRows[at];
+    if (row.access && !(kept && is_of_claim(row, value))) return Answer::kRefused;
+    if (!row.within(value)) return Answer::kOutOfLimits;
+    put(staged_, row, word, value);
+    wait(at, false);
+    return Answer::kDone;
+  }
+  /// A word that claim() gives to a node that was compiled without a key.
+  [[nodiscard]] bool is_of_claim(const StoredRow& row, std::uint32_t value) const {
+    if (compiled_.bus.key != decltype(compiled_.bus.key){}) return false;
+    const auto needs_tags = [&](std::size_t offset, auto authenticated) {
+      return row.offset == offset && value == static_cast<std::uint32_t>(authenticated);
+    };
+    return row.secret || needs_tags(offsetof(Parameters, bus.commands), CommandAccess::kAuthenticated) ||
+           (compiled_.loop.lockstep == Lockstep::kGuarded &&
+            needs_tags(offsetof(Parameters, loop.lockstep), Lockstep::kAuthenticated));
+  }
 
   [[nodiscard]] Answer judge() {
     const auto live = [](std::size_t row) { return kStoredRows[row].live; };
