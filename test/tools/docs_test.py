@@ -127,8 +127,8 @@ class Pages(unittest.TestCase):
 
     def test_the_pages_that_are_written_by_hand_stay_short(self):
         words_of = {page: words_by_hand(page) for page in pages() if page not in MADE}
-        self.assertLessEqual(sum(count for page, count in words_of.items() if page.startswith("docs/")), 52300)  # 45 000, and what came since
-        for page, most in (("CHANGELOG.md", 900), ("docs/validation/shortfalls.md", 2500), ("docs/reference/commands.md", 600), ("docs/tutorial/first_run.md", 600)):
+        self.assertLessEqual(sum(count for page, count in words_of.items() if page.startswith("docs/")), 48200)  # 45 000, and what came since
+        for page, most in (("CHANGELOG.md", 1000), ("docs/validation/shortfalls.md", 2500), ("docs/reference/commands.md", 600), ("docs/tutorial/first_run.md", 600)):
             self.assertLessEqual(words_of[page], most, page)
 
     def test_a_limit_is_one_line_and_an_attempt_has_at_most_sixty_words(self):
