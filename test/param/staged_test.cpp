@@ -2,11 +2,14 @@
 // Staged parameters against the table that --set uses: the same values are accepted, and the same bits are active.
 #include "tetap/param/staged.hpp"
 
+#include "tetap/base/siphash.hpp"
+
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <string_view>
 #include <vector>
 
 namespace tetap::param {
@@ -160,7 +163,8 @@ TEST(StagedParameters, KeepAClaimedKeyAndNoOtherAccess) {
   EXPECT_EQ(refused, 0U);
   // A key that is compiled stays, whatever was kept.
   Parameters locked = open;
-  locked.bus.key = {9, 9, 9, 9}, locked.bus.commands = CommandAccess::kAuthenticated;
+  locked.bus = {.commands = CommandAccess::kAuthenticated, .key = {9, 9, 9, 9}};
+  locked.loop.lockstep = Lockstep::kAuthenticated;
   EXPECT_TRUE(equal(loaded(locked, refused), locked));
   EXPECT_GE(refused, 3U);
   // Neither identity nor an open door comes out of a flash.
