@@ -266,7 +266,7 @@ def main():
         if len(args) > 1 and name not in args[1:]:
             continue
         out = lines_of(subprocess.run([args[0], path], capture_output=True, text=True, check=True).stdout)
-        ours = [r for r in out[:-1] if r["fix"] >= 2 and "lat" in r]
+        ours = [r for r in out[:-1] if r.get("fix", 0) >= 2 and "lat" in r]  # a line without a fix is a heading
         for r in ours:
             if "date" in r:
                 r["day"] = day(r["date"])
