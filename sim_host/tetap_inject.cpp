@@ -63,7 +63,7 @@ std::vector<sim::TimedFrame> frames_of(const std::string& path, std::uint32_t ba
     inputs = inputs || sim::is_counted_input(one.frame, base);
     frames.push_back(one);
   }
-  if (frames.empty()) throw std::runtime_error(path + ": no CAN data frame in it");
+  if (frames.empty()) throw std::runtime_error(path + ": " + sim::no_data_frame(log.report()));
   if (!inputs) throw std::runtime_error(path + ": no input frames of this id base");
   sim::warn_about(log.report(), "tetap-inject");
   return frames;

@@ -80,9 +80,35 @@ void AxesDetector::finish(Findings& findings) {
     if (axis != up_axis()) judge_level(axis, findings);
 }
 
+/// No turned IMU measures both level axes against the motion or the gyroscope: its axes stay right-handed.
+std::string AxesDetector::all_reversed() const {
+  const ForwardDetector::Agreement forward = by_.forward.agreement();
+  if (robot_.mounting && forward.ahead < -kFollows && forward.left < -kFollows)
+    return text(
+        "the force ahead goes against the acceleration by %s (correlation %.2f) and the force to the left "
+        "against the curves (%.2f)",
+        forward.device, forward.ahead, forward.left);
+  const std::size_t a = (up_axis() + 1) % 3, b = (up_axis() + 2) % 3;
+  const auto both_against = [&](const auto& turn) { return surely(turn.factor(a), -1) && surely(turn.factor(b), -1); };
+  if (both_against(gravity_)) return "gravity turns against the gyroscope about both level axes";
+  return both_against(by_.field) ? "the magnetic field turns against the gyroscope about both level axes" : "";
+}
+
 /// A turned IMU turns with the other devices about the direction that it measures as up; a mirrored one against them.
 void AxesDetector::judge_upside(const Votes& yaw, double upward, Findings& findings) const {
   const std::string down = text("The mean specific force points down (cosine %.2f to the stated up)", upward);
+  if (const std::string reversed = yaw.against <= yaw.with ? all_reversed() : ""; !reversed.empty()) {
+    const std::string evidence = down + ", and " + reversed + ": no turned IMU does both.";
+    const auto imu = static_cast<unsigned>(robot_.imu);
+    push(Code::kAccelSign, up_axis(), kNoDevice, evidence, std::nullopt, findings);
+    findings.back().spoils = kAccelerometer | kMounting | kGyroscope;
+    findings.back().change =
+        text("Negate VelX, VelY and VelZ of In_Imu%uAccel in the sender: gravity is +9.81 upwards.", imu);
+    push(Code::kGyroSign, up_axis(), kNoDevice,
+         evidence + " The gyroscope's yaw rate is right about the reversed up alone.", std::nullopt, findings);
+    findings.back().change = text("Negate AngX, AngY and AngZ of In_Imu%uGyro in the sender.", imu);
+    return;
+  }
   const bool no_votes = yaw.with + yaw.against == 0;
   if (no_votes && surely(by_.field.factor(up_axis()), 1))
     return push(Code::kAccelSign, up_axis(), kGyroscope,

@@ -43,6 +43,8 @@ class AxesDetector : public Detector {
   /// On the yaw rate about the mean specific force.
   [[nodiscard]] Votes votes(bool upside_down) const;
   void judge_upside(const Votes& yaw, double upward, Findings& findings) const;
+  /// Comparison that shows every axis of both sensors reversed, where the force points down; empty: none.
+  [[nodiscard]] std::string all_reversed() const;
   void judge_yaw(const Votes& yaw, Findings& findings) const;
   void judge_force(const Votes& yaw, Findings& findings) const;
   void judge_level(std::size_t axis, Findings& findings) const;

@@ -113,7 +113,7 @@ inline constexpr std::array kCodes{
     CodeRow{Code::kAccelSign, "accel_sign", "An axis of the accelerometer, or all of them, has the wrong sign.",
             "Gravity, acceleration and curves by the accelerometer against the turns and speeds of other devices.",
             "Negate that axis of In_Imu0Accel in the sender.", kAccelerometer | kMounting},
-    CodeRow{Code::kGyroSign, "gyro_sign", "One axis of the gyroscope has the wrong sign.",
+    CodeRow{Code::kGyroSign, "gyro_sign", "An axis of the gyroscope, or all of them, has the wrong sign.",
             "The gyroscope against wheels, course, magnetic field and accelerometer.",
             "Negate that axis of In_Imu0Gyro in the sender.", kGyroscope | kMounting},
     CodeRow{Code::kAccelScale, "accel_scale", "The accelerometer's scale is wrong.",

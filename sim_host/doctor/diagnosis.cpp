@@ -66,7 +66,7 @@ class Examination {
         forward_(robot),
         course_(robot.imu),
         field_(robot),
-        velocity_(course_),
+        velocity_(course_, path_),
         path_(robot, windows_),
         lateness_(path_),
         wheel_speed_(robot),
@@ -174,11 +174,20 @@ Findings ranked(Findings findings) {
       return !stays && is_gnss_axes(k.code) == by_axes && (spoils(k) & one.uses) != 0;
     });
   };
+  // A path shows a mirror, and not which of two axes it reverses: the velocity does.
+  std::vector<Code> by_velocity;
+  for (const Finding& one : findings)
+    if (is_gnss_axes(one.code) && one.code != Code::kVelocityAxes && (one.uses & kGnssVelocity) != 0)
+      by_velocity.push_back(one.code);
+  const auto other_mirror = [&](const Finding& one) {
+    return is_gnss_axes(one.code) && (one.uses & kWheels) != 0 && !by_velocity.empty() &&
+           std::find(by_velocity.begin(), by_velocity.end(), one.code) == by_velocity.end();
+  };
   bool wrong_stamps = false;  // which show no delay
   bool placed = false;        // by the robot's origin, which leaves no second reading of the axes
   for (Finding& one : findings) {
     const bool axes = is_gnss_axes(one.code);
-    if (one.code == Code::kReceiverLate && wrong_stamps) continue;
+    if (other_mirror(one) || (one.code == Code::kReceiverLate && wrong_stamps)) continue;
     if (spoiled(one, false) || (!axes && spoiled(one, true)) || (axes && placed)) continue;
     const auto same = std::find_if(kept.begin(), kept.end(), [&](const Finding& k) { return k.code == one.code; });
     if (same != kept.end()) {

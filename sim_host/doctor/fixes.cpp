@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sim_host/doctor/fixes.hpp"
 
+#include "sim_host/doctor/path.hpp"
+
 #include <cmath>
 #include <span>
 
@@ -113,9 +115,12 @@ void VelocityDetector::finish(Findings& findings) {
                              : "; the gyroscope turns against the velocity's course"),
          .change = {}});
   };
-  for (const Map& map : of_fixes) name(map, left_over(legs_, map, same), turn > 0);
+  // The path of the wheels is a third device.
+  const std::optional<bool> fixes_fit = path_.fixes_fit();
+  for (const Map& map : of_fixes)
+    if (fixes_fit != true) name(map, left_over(legs_, map, same), turn > 0);
   for (const Map& map : of_velocity)
-    name(map, left_over(legs_, same, map), turn < 0 || map.ee * map.nn - map.en * map.ne > 0);
+    if (fixes_fit != false) name(map, left_over(legs_, same, map), turn < 0 || map.ee * map.nn - map.en * map.ne > 0);
 }
 
 std::optional<SpeedRatio> VelocityDetector::ratio() const {

@@ -15,9 +15,11 @@
 
 namespace tetap::doctor {
 
+class PathDetector;
+
 class VelocityDetector : public Detector {
  public:
-  explicit VelocityDetector(const CourseDetector& course) : course_(course) {}
+  VelocityDetector(const CourseDetector& course, const PathDetector& path) : course_(course), path_(path) {}
 
   void sample(base::Micros time, const sensor::Sample& sample) override;
   void finish(Findings& findings) override;
@@ -29,6 +31,7 @@ class VelocityDetector : public Detector {
   void judge_up(Findings& findings) const;
 
   const CourseDetector& course_;
+  const PathDetector& path_;
   Plane plane_;
   std::optional<base::Micros> velocity_at_;
   Vector3 velocity_{};

@@ -23,7 +23,7 @@ class ForceDetector : public Detector {
   [[nodiscard]] std::optional<double> upward() const;
 
  private:
-  static constexpr std::size_t kBins = 512;
+  static constexpr std::size_t kBins = 2048;  ///< factors up to e^10 either way: no unit lies beyond
   void judge_direction(Findings& findings) const;
   [[nodiscard]] std::vector<Remedy> upright() const;
   void judge_scale(Findings& findings) const;

@@ -127,10 +127,17 @@ void PathDetector::add_pair(Complex fixes_before, Complex path_before, Complex f
   ++pairs_;
 }
 
+std::optional<bool> PathDetector::fixes_fit() const {
+  if (pairs_ < kLeastPairs) return std::nullopt;
+  const double as_sent = left_[0], other = *std::min_element(left_.begin() + 1, left_.end());
+  if (std::min(as_sent, other) > kPathRight * pairs_) return std::nullopt;
+  if (other <= kPathBetter * as_sent) return false;
+  return as_sent <= kPathBetter * other ? std::optional(true) : std::nullopt;
+}
+
 void PathDetector::finish(Findings& findings) {
-  if (pairs_ < kLeastPairs) return;
+  if (fixes_fit() != false) return;
   const double best = *std::min_element(left_.begin(), left_.end());
-  if (best > kPathRight * pairs_ || best > kPathBetter * left_[0]) return;
   constexpr std::array kOf{Code::kLatLonSwapped, Code::kLatitudeSign, Code::kLongitudeSign};
   constexpr std::array kWords{"latitude and longitude swapped", "the latitude's sign changed",
                               "the longitude's sign changed"};

@@ -26,6 +26,8 @@ class PathDetector : public Detector {
   /// Chords by the fixes over those by the path; nothing where they have no factor in common, or the robot's geometry
   /// is not known.
   [[nodiscard]] std::optional<SpeedRatio> scale() const;
+  /// Whether the fixes go as the path of the wheels does, as sent; nothing where no reading of their axes fits.
+  [[nodiscard]] std::optional<bool> fixes_fit() const;
   [[nodiscard]] const RobotFacts& robot() const { return robot_; }
   /// Distance by the wheels up to now, forward and back.
   [[nodiscard]] double rolled_m() const { return rolled_m_; }

@@ -104,6 +104,20 @@ PlayOptions play_options(Arguments& arguments, std::uint32_t can_base) {
   return o;
 }
 
+namespace {
+
+/// Frames that no node takes, counted.
+std::string skipped(const LogReport& log) {
+  return std::to_string(log.not_data) + (log.xl > 0 ? " remote, error, CAN FD or CAN XL" : " remote, error or CAN FD") +
+         " frames";
+}
+
+}  // namespace
+
+std::string no_data_frame(const LogReport& log) {
+  return "no CAN data frame in it" + (log.not_data > 0 ? ", " + skipped(log) : std::string());
+}
+
 SurveyedLog survey_for(PlayOptions& options) {
   options.reading.base = options.script.log_base;
   LogFile file(options.log, options.reading);
@@ -113,7 +127,7 @@ SurveyedLog survey_for(PlayOptions& options) {
   if (report.data == 0)
     throw std::runtime_error(
         options.log + ": " +
-        (report.other_interface > 0 ? "no frame of interface " + options.reading.interface : std::string("no CAN data frame in it")));
+        (report.other_interface > 0 ? "no frame of interface " + options.reading.interface : no_data_frame(report)));
   options.mode = survey->settled(options.mode);
   return {std::move(*survey), std::move(file)};
 }
@@ -124,9 +138,7 @@ void warn_about(const LogReport& log, const char* program) {
   };
   if (log.malformed > 0)
     warn(std::to_string(log.malformed) + " malformed lines skipped, the first: " + log.first_malformed);
-  if (log.not_data > 0)
-    warn(log.name + ": " + std::to_string(log.not_data) +
-         (log.xl > 0 ? " remote, error, CAN FD or CAN XL" : " remote, error or CAN FD") + " frames skipped");
+  if (log.not_data > 0) warn(log.name + ": " + skipped(log) + " skipped");
   if (log.back_in_time > 0)
     warn(log.name + ": " + std::to_string(log.back_in_time) + " frames are earlier than one before them");
   if (log.wrong_length > 0)

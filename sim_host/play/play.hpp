@@ -55,6 +55,9 @@ struct SurveyedLog : LogSurvey {
 /// Reads the log and settles the mode: a log with the node's own frames in it is a record to be repeated.
 [[nodiscard]] SurveyedLog survey_for(PlayOptions& options);
 
+/// Refusal of a log without a data frame, with its other frames counted.
+[[nodiscard]] std::string no_data_frame(const LogReport& log);
+
 /// Warnings about the log, one line each.
 void warn_about(const LogReport& log, const char* program);
 

@@ -35,7 +35,8 @@ base::Micros LogParser::since_start(base::Micros relative) {
 
 Result<std::optional<TimedFrame>> LogParser::add(std::string_view text, bool ended) {
   constexpr base::Micros kLongGap{60'000'000};
-  ++number_;
+  constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";  // editors put it before UTF-8
+  if (++number_ == 1 && text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
   const auto place = [this] { return report_.name + ":" + std::to_string(number_); };
   constexpr std::optional<TimedFrame> kNone;
   const auto cut_off = [&] {

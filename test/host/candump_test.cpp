@@ -493,6 +493,29 @@ TEST_F(LogOnDisk, AsManyTicksAreAnnouncedAsAreGiven) {
   }
 }
 
+TEST_F(LogOnDisk, FramesOfAnotherKindAloneAreCounted) {
+  write(
+      "date Mon Nov 30 08:00:00 2026\nbase hex timestamps absolute\n"
+      "0.01 CANFD 1 Rx 301 a 0 0 8 8 00 11 22 33 44 55 66 77 0 0 0\n0.02 1 301 Rx r 8\n");
+  EXPECT_EQ(refusal(path_), path_ + ": no CAN data frame in it, 2 remote, error or CAN FD frames");
+}
+
+TEST_F(LogOnDisk, AByteOrderMarkBeginsAFileAndNoOtherLine) {
+  const std::string line = "(1.0) can0 301#0011223344556677\n", mark = "\xEF\xBB\xBF";
+  for (const std::string& first :
+       {line, std::string("(2026-11-30 08:00:00.000000) can0 301 [1] 00\n"), std::string("\n")}) {
+    write(first + line);
+    LogFile plain(path_, {});
+    const auto expected = read(plain);
+    write(mark + first + line);
+    LogFile marked(path_, {});
+    EXPECT_EQ(read(marked).size(), expected.size());
+  }
+  write(line + mark + line);
+  LogFile inside(path_, {});
+  EXPECT_THROW(read(inside), std::runtime_error);
+}
+
 TEST_F(LogOnDisk, AFileThatIsNotThereOrEmptyIsNamed) {
   EXPECT_EQ(refusal("/nowhere/at/all.log"), "/nowhere/at/all.log: cannot be read: No such file or directory");
   EXPECT_EQ(refusal("/dev/null"), "/dev/null: no CAN data frame in it");

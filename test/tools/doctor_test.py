@@ -444,7 +444,7 @@ MISTAKES = [
 WORLDS = {"yard": ("rover", []), "road": ("rover", ["--course", "road"]), "car": ("car", []), "iris": ("iris", []),
           "husky_sim": ("husky_inertial", []),
           "lab": ("scanner", []), "lab_again": ("scanner", ["--seed", "12"]), "lab_third": ("scanner", ["--seed", "13"]),
-          "tour": ("rover", []), "stand": ("rover", ["--course", "stand"]),
+          "tour": ("rover", []), "husky_tour": ("husky_inertial", ["--seed", "77"]), "stand": ("rover", ["--course", "stand"]),
           "usual": ("rover", ["--seed", "2", "--fault", "wheel_spin@45+3,gnss_outage@80+30,gnss_jump@150+2"])}
 SETS = {"skog": ("car", "import_skog", "skog_gnss_ins"), "husky": ("husky_inertial", "import_husky", "husky"),
         "iris_gps": ("iris", "import_px4", "px4_ecl", "iris_gps"),
@@ -453,7 +453,7 @@ SETS = {"skog": ("car", "import_skog", "skog_gnss_ins"), "husky": ("husky_inerti
 UPSIDE_DOWN = {f"{name}_upside_down": (WORLDS[name][0], [*WORLDS[name][1], "--fault", "lidar_mirrored@0+9999"]) for name in ("lab", "lab_again", "lab_third")}
 SHORT_GOOD = ("yard", "lab", "skog", "husky", "iris_gps", "mrclam1", "labyrinth")
 SHORT_S = "90"
-LONG = ("tour",)  # of its whole length in the short form, too: a change of speed comes late
+LONG = ("tour", "husky_tour")  # of their whole length in the short form, too: changes of speed and chords enough come late
 
 
 class Logs:
@@ -600,6 +600,21 @@ class Doctor(unittest.TestCase):
                 found = self.examine(mistake(self.logs.frames(name)), self.logs.robot(name))
                 self.assertEqual([one["code"] for one in found], [code], name)
                 self.assertRegex(found[0]["change"], change)
+
+    def test_a_mistake_gets_the_remedies_of_its_own_devices_alone(self):
+        reversed_imu = [("accel_sign", "VelX, VelY and VelZ"), ("gyro_sign", "AngX, AngY and AngZ")]
+        for name, mistake, remedies in (
+                ("yard", scale_accel(0.01), [("accel_scale", r"by (9[5-9]|10[0-5])\.")]),
+                ("yard", lambda f: scale_imu(f, -1, -1), reversed_imu), ("car", lambda f: scale_imu(f, -1, -1), reversed_imu), ("iris", lambda f: scale_imu(f, -1, -1), reversed_imu),
+                ("yard", lambda f: turn_imu(f, np.diag([-1, 1, -1])), [("imu_upside_down", "Axes forward, right")]), ("iris", lambda f: turn_imu(f, ABOUT_X), [("imu_upside_down", "Axes")]),
+                ("husky_tour", map_signal("In_GnssLat", "Lat", np.negative), [("latitude_sign", "north as positive")]),
+                ("husky_tour", map_signal("In_GnssLon", "Lon", np.negative), [("longitude_sign", "east as positive")]),
+                ("husky_tour", map_signal("In_GnssVelEN", "East", np.negative), [("velocity_axes", "East and North")])):
+            with self.subTest(f"{name}: {remedies[0][0]}"):
+                found = self.examine(mistake(self.logs.frames(name)), self.logs.robot(name))
+                self.assertEqual([one["code"] for one in found], [code for code, _ in remedies], found)
+                for one, (_, change) in zip(found, remedies):
+                    self.assertRegex(one["change"], change)
 
     def test_a_reversed_accelerometer_is_named_wherever_the_log_begins(self):
         for begin_s in (21, 42):  # the speed hardly changes, the wheels alone show the turn

@@ -94,6 +94,26 @@ class ImportGraph(unittest.TestCase):
         for tag, count in (("EQUIV", 1), ("BR", 1), ("FIX", 2), ("PARAMS_SE2OFFSET", 1), ("EDGE_PRIOR_SE2", 1)):
             self.assertRegex(text_of(f"{self.out}.json"), f'"{tag}": {count}')
 
+    def test_an_edge_between_sensors_is_one_between_their_poses(self):
+        """By drawn errors: 40 000 measurements Z exp(e), each taken to the poses by products of matrices."""
+        def matrix(x, y, yaw):
+            return np.array([[np.cos(yaw), -np.sin(yaw), x], [np.sin(yaw), np.cos(yaw), y], [0, 0, 1]])
+        of_first, of_second, z, six = (0.4, -0.3, 0.7), (-0.2, 0.5, -1.9), (1.5, 0.6, 2.4), "900 20 10 1600 -30 2500"
+        params = "".join(f"PARAMS_SE2OFFSET {k} {' '.join(map(str, place))}\n" for k, place in ((3, of_first), (5, of_second)))
+        edge = f"EDGE_SE2_OFFSET 0 1 3 5 {' '.join(map(str, z))} {six}\n"
+        self.assertEqual(self.imported(edge + params).returncode, 0)
+        ((i, j, *found, covariance),) = self.edges()
+        information = np.array([[900, 20, 10], [20, 1600, -30], [10, -30, 2500]])
+        drawn = np.random.default_rng(3).multivariate_normal(np.zeros(3), np.linalg.inv(information), 40_000)
+        poses = matrix(*of_first) @ matrix(*z) @ np.array([matrix(*e) for e in drawn]) @ np.linalg.inv(matrix(*of_second))
+        exact = matrix(*of_first) @ matrix(*z) @ np.linalg.inv(matrix(*of_second))
+        yaw = np.arctan2(poses[:, 1, 0], poses[:, 0, 0]) - np.arctan2(exact[1, 0], exact[0, 0])
+        expected = np.cov(np.stack([poses[:, 0, 2], poses[:, 1, 2], np.remainder(yaw + np.pi, 2 * np.pi) - np.pi]))
+        np.testing.assert_allclose(found, (exact[0, 2], exact[1, 2], np.arctan2(exact[1, 0], exact[0, 0])), atol=1e-3)
+        np.testing.assert_allclose(covariance, expected, atol=0.03 * expected.max())
+        self.assertIn(":1: no PARAMS_SE2OFFSET line states the offset 3", self.imported(edge).stderr)
+        self.assertIn("9 numbers, expected 13", self.imported(params + f"EDGE_SE2_OFFSET 0 1 1 2 3 {' '.join(six.split()[:4])}\n").stderr)
+
     def test_information_in_the_other_order_is_seen_by_what_is_positive_definite(self):
         shape = "100 0 0 100 0 400", "100 0 100 400 0 0"  # g2o's and TORO's order of one matrix
         for tag in ("EDGE_SE2", "EDGE2"):

@@ -11,8 +11,9 @@ from tetap.dataset import common
 
 G2O, TORO = (0, 1, 2, 1, 3, 4, 2, 4, 5), (0, 1, 4, 1, 2, 5, 4, 5, 3)  # order of the six numbers, by rows of the matrix
 VERTICES = ("VERTEX_SE2", "VERTEX2", "VERTEX")
-EDGES = {"EDGE_SE2": G2O, "EDGE2": TORO, "EDGE": TORO, "ODOMETRY": TORO, "EDGE_SE2_SWITCHABLE": G2O, "EDGE_SE2_MAXMIX": G2O}
+EDGES = {"EDGE_SE2": G2O, "EDGE2": TORO, "EDGE": TORO, "ODOMETRY": TORO, "EDGE_SE2_SWITCHABLE": G2O, "EDGE_SE2_MAXMIX": G2O, "EDGE_SE2_OFFSET": G2O}
 ONE_MORE = ("EDGE_SE2_SWITCHABLE", "EDGE_SE2_MAXMIX")  # a switch's id or a weight behind the two ids (Suenderhauf, Protzel, IROS 2012)
+OFFSET, OFFSETS = "EDGE_SE2_OFFSET", "PARAMS_SE2OFFSET"  # an edge between sensors, with the ids of their places on the two poses behind the two ids
 
 
 class Graph:
@@ -47,7 +48,7 @@ def identifier(text, where, column):
 
 def read(path):
     """The graph of a file; BadInput names the line and what is wrong with it."""
-    edges, vertices, others = [], {}, collections.Counter()
+    edges, vertices, offsets, others = [], {}, {}, collections.Counter()
     for line, text in common.read_lines(path):
         where, (tag, *fields) = f"{path}:{line}", text.split()
         if tag in EDGES:
@@ -58,6 +59,10 @@ def read(path):
             if vertex in vertices:
                 raise BadInput(f"{where}: vertex {vertex} is there twice")
             vertices[vertex] = common.numbers(fields[1:], where, 3)
+        elif tag == OFFSETS:
+            _count(tag, fields, 4, where)
+            offsets[identifier(fields[0], where, 2)] = common.numbers(fields[1:], where, 3)
+            others[tag] += 1
         elif tag[0].isalpha():
             others[tag[:30]] += 1
         else:
@@ -65,7 +70,7 @@ def read(path):
     if not edges:
         rest = ", ".join(f"{count} of {tag}" for tag, count in others.most_common(4))
         raise BadInput(f"{path}: no planar edge in it ({', '.join(EDGES)}){'; other lines: ' + rest if rest else ''}")
-    return _graph(path, edges, vertices, dict(others))
+    return _graph(path, [_with_offsets(edge, offsets) for edge in edges], vertices, dict(others))
 
 
 def _count(tag, fields, expected, where):
@@ -74,13 +79,32 @@ def _count(tag, fields, expected, where):
 
 
 def _edge(tag, fields, where):
-    more = tag in ONE_MORE
+    more = 2 if tag == OFFSET else int(tag in ONE_MORE)
     _count(tag, fields, 11 + more, where)
     i, j = identifier(fields[0], where, 2), identifier(fields[1], where, 3)
     if i == j:
         raise BadInput(f"{where}: an edge from pose {i} to itself")
     values = common.numbers(fields[2 + more:], where, 4 + more)
-    return i, j, values[:3], values[3:], tag, where
+    places = tuple(identifier(fields[k], where, k + 2) for k in (2, 3)) if tag == OFFSET else ()
+    return i, j, values[:3], values[3:], tag, where, places
+
+
+def _with_offsets(edge, offsets):
+    """Places of the two sensors in place of their ids; the lines that state them may follow the edge."""
+    for place in edge[6]:
+        if place not in offsets:
+            raise BadInput(f"{edge[5]}: no {OFFSETS} line states the offset {place}")
+    return *edge[:6], tuple(np.array(offsets[place]) for place in edge[6])
+
+
+def _between_poses(z, covariance, first_place, second_place):
+    """What two sensors measure of each other as an edge between their poses: T_ij = O_i Z O_j^-1, and its covariance in the first pose."""
+    turn, sensor = rotations(np.array([first_place[2], z[2] - second_place[2]]))[:, :2, :2]
+    arm = -sensor @ second_place[:2]
+    jacobian = np.eye(3)
+    jacobian[:2, :2], jacobian[:2, 2] = turn, turn @ (-arm[1], arm[0])
+    xy = first_place[:2] + turn @ (z[:2] + arm)
+    return np.array([*xy, np.remainder(first_place[2] + z[2] - second_place[2] + np.pi, 2 * np.pi) - np.pi]), jacobian @ covariance @ jacobian.T
 
 
 def _informations(edges):
@@ -93,7 +117,7 @@ def _informations(edges):
         tried = [six[:, order].reshape(-1, 3, 3) for order in (own, TORO if own == G2O else G2O)]
         bad = [np.flatnonzero(np.linalg.eigvalsh(one)[:, 0] <= 0) for one in tried]
         if len(bad[0]) and len(bad[1]):
-            i, j, _, _, _, where = edges[of_tag[bad[0][0]]]
+            i, j, _, _, _, where, _ = edges[of_tag[bad[0][0]]]
             raise BadInput(f"{where}: the information of the edge {i} -> {j} is not positive definite")
         information[of_tag] = tried[1] if len(bad[0]) else tried[0]
     return information
@@ -122,6 +146,9 @@ def _graph(path, edges, vertices, others):
     z = np.array([e[2] for e in edges])
     turn = rotations(z[:, 2])
     covariance = turn @ np.linalg.inv(information) @ turn.transpose(0, 2, 1)
+    for e, edge in enumerate(edges):
+        if edge[6]:
+            z[e], covariance[e] = _between_poses(z[e], covariance[e], *edge[6])
     first, second, z, covariance = _forward(first, second, z, covariance, first == second + 1)
     known = np.array([vertices[k] for k in names]) if all(k in vertices for k in names) else None
     return Graph(len(names), first, second, z, covariance, known, names, others)
