@@ -440,11 +440,12 @@ MISTAKES = [
     ("two_senders", "mrclam1", lambda f: second_sender(f, ["In_BodySpeed"], 50, 0, Forward=0.05)),
 ]
 
+SHORT_S = "90"
 # name: robot, and how the log is made: arguments of tetap-world, or an importer with its arguments ({DATA} is the folder of the sets)
 WORLDS = {"yard": ("rover", []), "road": ("rover", ["--course", "road"]), "car": ("car", []), "iris": ("iris", []),
           "husky_sim": ("husky_inertial", []),
           "lab": ("scanner", []), "lab_again": ("scanner", ["--seed", "12"]), "lab_third": ("scanner", ["--seed", "13"]),
-          "tour": ("rover", []), "husky_tour": ("husky_inertial", ["--seed", "77"]), "stand": ("rover", ["--course", "stand"]),
+          "tour": ("rover", []), "husky_tour": ("husky_inertial", ["--seed", "77"]), "stand": ("rover", ["--course", "stand", "--duration", SHORT_S]),
           "usual": ("rover", ["--seed", "2", "--fault", "wheel_spin@45+3,gnss_outage@80+30,gnss_jump@150+2"])}
 SETS = {"skog": ("car", "import_skog", "skog_gnss_ins"), "husky": ("husky_inertial", "import_husky", "husky"),
         "iris_gps": ("iris", "import_px4", "px4_ecl", "iris_gps"),
@@ -452,7 +453,6 @@ SETS = {"skog": ("car", "import_skog", "skog_gnss_ins"), "husky": ("husky_inerti
         **{f"mrclam{i}": ("mrclam", "import_mrclam", "mrclam/MRCLAM_Dataset7", str(i)) for i in range(1, 6)}}
 UPSIDE_DOWN = {f"{name}_upside_down": (WORLDS[name][0], [*WORLDS[name][1], "--fault", "lidar_mirrored@0+9999"]) for name in ("lab", "lab_again", "lab_third")}
 SHORT_GOOD = ("yard", "lab", "skog", "husky", "iris_gps", "mrclam1", "labyrinth")
-SHORT_S = "90"
 LONG = ("tour", "husky_tour")  # of their whole length in the short form, too: changes of speed and chords enough come late
 
 
@@ -477,7 +477,7 @@ class Logs:
     def _simulated(self, name):
         robot, arguments = WORLDS.get(name) or UPSIDE_DOWN[name]
         out = os.path.join(self.folder, name)
-        run(os.path.join(PROGRAMS, "tetap-world"), "--memory", "--raw", "--quiet", "--robot", robot, "--out", out, *arguments, *([] if WHOLE or name in LONG else ["--duration", SHORT_S]))
+        run(os.path.join(PROGRAMS, "tetap-world"), "--memory", "--raw", "--quiet", "--robot", robot, "--out", out, *arguments, *([] if WHOLE or name in LONG or "--duration" in arguments else ["--duration", SHORT_S]))
         return Frames.read(os.path.join(out, "raw.log"))
 
     def _recorded(self, name):
