@@ -35,6 +35,7 @@ enum class Channel : std::uint8_t {
   kColumns,   ///< columns of tables, with quantity and unit as far as their names show
   kImported,  ///< report of an import of tables
   kUpdates,   ///< updates of the node's filters
+  kTalk,      ///< words between a node at a cable and its user
 };
 
 inline void write(std::uint32_t channel, std::string_view text) {

@@ -11,6 +11,7 @@
 #include "sim_host/page/module/robots.hpp"
 #include "sim_host/page/module/seconds.hpp"
 #include "sim_host/page/module/tables.hpp"
+#include "sim_host/page/module/talk.hpp"
 #include "sim_host/parameter_refusal.hpp"
 #include "sim_host/replay/candump.hpp"
 #include "tetap/bus/codec.hpp"
@@ -35,6 +36,7 @@ struct Chosen {
 Chosen chosen;
 std::optional<page::Play> in_play;
 std::optional<page::Lesson> lesson;
+std::optional<page::Talk> talk;
 page::SensorTables tables;
 
 std::uint32_t refuse(std::string_view why) {
@@ -43,6 +45,13 @@ std::uint32_t refuse(std::string_view why) {
 }
 
 std::uint32_t ended(const sim::Result<>& done) { return done ? 0 : refuse(done.failure().text); }
+
+base::CanFrame frame_of(std::uint32_t id, std::uint32_t low, std::uint32_t high) {
+  base::CanFrame frame{.id = id, .size = 8};
+  for (std::size_t i = 0; i < frame.data.size(); ++i)
+    frame.data[i] = static_cast<std::uint8_t>((i < 4 ? low : high) >> 8 * (i % 4));
+  return frame;
+}
 
 }  // namespace
 
@@ -161,6 +170,13 @@ TETAP_EXPORT(inject) std::uint32_t inject(std::uint32_t fault, std::uint32_t dur
   return ended(in_play->inject(fault, {std::int64_t{1'000} * duration_ms}));
 }
 
+/// A frame of eight bytes to the robot that is played, at its next tick; `low` has the first four.
+TETAP_EXPORT(hand) std::uint32_t hand(std::uint32_t id, std::uint32_t low, std::uint32_t high) {
+  if (!in_play) return refuse("nothing is played");
+  in_play->hand(frame_of(id, low, high));
+  return 0;
+}
+
 /// The play up to now, as a script.
 TETAP_EXPORT(script) std::uint32_t script() {
   if (!in_play) return refuse("nothing is played");
@@ -202,5 +218,44 @@ TETAP_EXPORT(ask_snapshot) std::uint32_t ask_snapshot(std::uint32_t base, std::u
                        bus::frame(base, bus::protect(bus::CmdReset{.ctr = static_cast<std::uint8_t>(counter & 0x0FU),
                                                                    .what = bus::ResetWhat::kSnapshot})));
   page::write(page::Channel::kFrames, line.view());
+  return 0;
+}
+
+/// Parameters of a node at a cable, whose block of identifiers begins at `base`.
+TETAP_EXPORT(talk_begin) std::uint32_t talk_begin(std::uint32_t base) {
+  if (base > 0x780 || !param::has_map_ids(base)) return refuse("no id base: " + std::to_string(base));
+  talk.emplace(base);
+  talk->describe();
+  return 0;
+}
+TETAP_EXPORT(talk_get)
+std::uint32_t talk_get(std::uint32_t number, std::uint32_t word, std::uint32_t source, std::uint32_t counter) {
+  return talk ? ended(talk->get(number, word, source, counter)) : refuse("no talk has begun");
+}
+TETAP_EXPORT(talk_set) std::uint32_t talk_set(std::uint32_t number, std::uint32_t word, std::uint32_t counter) {
+  return talk ? ended(talk->set(number, word, counter)) : refuse("no talk has begun");
+}
+TETAP_EXPORT(talk_act) std::uint32_t talk_act(std::uint32_t page, std::uint32_t counter) {
+  return talk ? ended(talk->act(page, counter)) : refuse("no talk has begun");
+}
+TETAP_EXPORT(talk_hear) std::uint32_t talk_hear(std::uint32_t id, std::uint32_t low, std::uint32_t high) {
+  if (!talk) return refuse("no talk has begun");
+  talk->hear(frame_of(id, low, high));
+  return 0;
+}
+TETAP_EXPORT(talk_want_staged) std::uint32_t talk_want_staged() {
+  if (!talk) return refuse("no talk has begun");
+  talk->want_staged();
+  return 0;
+}
+TETAP_EXPORT(talk_want) std::uint32_t talk_want(std::uint32_t number, std::uint32_t element, double value) {
+  return talk ? ended(talk->want(number, element, value)) : refuse("no talk has begun");
+}
+TETAP_EXPORT(talk_check) std::uint32_t talk_check() {
+  return talk ? ended(talk->check()) : refuse("no talk has begun");
+}
+TETAP_EXPORT(talk_values) std::uint32_t talk_values() {
+  if (!talk) return refuse("no talk has begun");
+  talk->values();
   return 0;
 }

@@ -98,6 +98,12 @@ sim::Result<> Play::advance(std::uint32_t ticks) {
     }
     played_.duration += kTick;
     bus_.now = source_.truth().time;
+    if (!handed_.empty()) {
+      inputs_.assign(tick.inputs.begin(), tick.inputs.end());
+      inputs_.insert(inputs_.end(), handed_.begin(), handed_.end());
+      handed_.clear();
+      tick.inputs = inputs_;
+    }
     if (auto asked = lockstep_.ask(tick); !asked) return asked;
     while (lockstep_.in_flight() > 0)
       if (auto answered = lockstep_.answers(); !answered) return answered;

@@ -12,6 +12,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 namespace tetap::page {
 
@@ -26,6 +27,8 @@ class Play {
   sim::Result<> advance(std::uint32_t ticks);
   /// A fault of that number in sim::fault_table(), from now on and for so long; writes kInjected.
   sim::Result<> inject(std::uint32_t fault, base::Micros duration);
+  /// A frame that somebody beside the world sends to the node, before the next tick. A script does not have it.
+  void hand(const base::CanFrame& frame) { handed_.push_back(frame); }
   /// Writes kScript: the run up to now. It may go on.
   void script();
 
@@ -72,6 +75,7 @@ class Play {
   sim::LockstepOptions options_;
   sim::Lockstep<sim::InProcessLink, Bus> lockstep_;
   std::optional<sim::FrameChange> to_map_;
+  std::vector<base::CanFrame> handed_, inputs_;
   sim::Line line_;
   std::string truth_;
 };

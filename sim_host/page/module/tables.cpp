@@ -47,7 +47,7 @@ void put_file(Json& json, const csv::File& file, const csv::Options& options) {
   if (table) {
     auto bound = csv::bind_columns(*table, options);
     if (!bound) wrong = bound.failure().text;
-    if (bound) csv::guess_pressure(*table, *bound);
+    if (bound) csv::guess_sizes(*table, *bound);
     for (const csv::Bound& one : bound ? *bound : shown(*table)) put_bound(json, one);
   }
   json.end(']').member("wrong", wrong).end('}');

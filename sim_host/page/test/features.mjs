@@ -2,6 +2,7 @@
 // node features.mjs PUPPETEER PAGE.html OUT CASES: what a user does beside a log of a known robot. CASES {tables: [{file, robot, sha, frames}], unknown: {file, robot, sha}, larger: {file, radius_m}, long: {file, sha},
 // rover: {log, sha, mcap}}, hashes and counts as the host's programs have them. A picture of each view goes to OUT. Status 1 where something differs.
 import { readFileSync } from "node:fs";
+import { Bench, moduleOf } from "./bench.mjs";
 import { session } from "./session.mjs";
 
 const [modules, file, out, cases] = process.argv.slice(2);
@@ -165,6 +166,53 @@ await picture("cable");
 await page.click("#cable-look");
 await settled();
 expect((await data()).sha === rover.sha && (await data()).different === "0", "the recording of the cable is the host's run to the bit");
+
+// Talk: a node behind the cable is read and changed by the keyboard, while it stands; not while it drives.
+const bench = new Bench(moduleOf(file), "mrclam"), pages = () => bench.sent.map((line) => (parseInt(line.slice(6, 8), 16) >> 4) & 7);
+bench.feed = (lines) => page.evaluate((frames) => window.fakePort.feed(frames), lines);
+await page.exposeFunction("onSent", (command) => bench.command(command));
+const press = async (selector) => (await page.focus(selector), await page.keyboard.press("Enter"));
+const said = async (pattern) => (await page.waitForFunction((wanted) => new RegExp(wanted).test(document.querySelector("#talk-said")?.textContent), { timeout: 40000 }, pattern).catch(() => {}), text("#talk-said"));
+const type = async (path, value) => {
+  await page.$eval("#talk-find", (input, wanted) => ((input.value = wanted), input.dispatchEvent(new Event("input"))), path);
+  await page.$eval(`[data-talk="${path}"]`, (input, given) => ((input.value = given), input.dispatchEvent(new Event("change"))), value);
+};
+await page.click("#cable-connect");
+await page.waitForSelector("#talk-read");
+bench.run();
+expect((await page.evaluate(() => window.fakePort.said.join())) === "C,S6,L" && bench.sent.length === 0, "talk: nothing is sent in listen-only");
+await press("#talk-read");
+expect(/CRC/.test(await said("CRC")), `talk: ${await text("#talk-said")}`);
+bench.stop();
+bench.restart();
+await bench.feed(bench.advance(150));
+bench.run();
+await new Promise((done) => setTimeout(done, 1500)); // the vehicle has stood for a second
+await press("#talk-save");
+expect(/flash/.test(await said("flash")), `talk: ${await text("#talk-said")}`);
+await type("landmark.gate_scale", "99");
+expect(/landmark.gate_scale/.test(await said("landmark.gate_scale")), `talk: a value beyond its limits: ${await text("#talk-said")}`);
+await type("landmark.gate_scale", "2,5");
+await page.waitForSelector("#talk-changes");
+expect(/1\.5 → 2\.5/.test(await text("#talk-changes")) && /300 \(hex\), 500/.test(await text("#talk-changes")) && !pages().includes(0) && !pages().includes(1), `talk: old, new and device before anything is sent: ${await text("#talk-changes")}`);
+await picture("talk");
+await press("#talk-change");
+expect(/active/.test(await said("taken the change")) && pages().filter((one) => one === 1).length === 1, `talk: ${await text("#talk-said")}`);
+expect(/active 2\.5, compiled 1\.5/.test(await text("#talk .rows")), "talk: the row has its new value");
+bench.stop();
+while (bench.time_ms < 30000) await bench.feed(bench.advance(20));
+bench.run();
+await press("#talk-restore");
+expect(/moves/.test(await said("moves")) && !pages().includes(3), `talk: ${await text("#talk-said")}`);
+await page.setViewport({ width: 390, height: 844 });
+await page.click("#language");
+expect((await data()).wide <= 0 && /bergerak/.test(await text("#talk-said")), `nothing of talk is wider than 390 pixels (${(await data()).wide}): ${await text("#talk-said")}`);
+await picture("talk_narrow_id");
+await page.click("#language");
+await page.setViewport({ width: 1180, height: 900 });
+await page.click("#talk-listen");
+await page.waitForFunction(() => window.fakePort.said.at(-1) === "L");
+bench.stop();
 
 // Settings as text, into another page's address.
 await page.$eval("#settings", (input) => ((input.value = "rover;inertial.gyro_radps_rthz=0.02"), input.dispatchEvent(new Event("change"))));

@@ -4,19 +4,22 @@ import { createRequire } from "node:module";
 import { mkdirSync } from "node:fs";
 import { resolve } from "node:path";
 
-/** A port of Web Serial that the test feeds: window.fakePort.feed(["320#0011", ...]) writes frames as an adapter does. */
+/** A port of Web Serial that the test feeds: window.fakePort.feed(["320#0011", ...]) writes frames as an adapter does. Frames of the page go to window.onSent, where there is one. */
 function fakeSerial() {
-  const port = { said: [], open: async () => {}, close: async () => {} };
-  port.readable = new ReadableStream({ start: (controller) => (port.input = controller) });
-  port.writable = new WritableStream({ write: (chunk) => {
-    for (const command of new TextDecoder().decode(chunk).split("\r").filter(Boolean)) port.said.push(command), port.input.enqueue(new TextEncoder().encode("\r"));
-  } });
-  port.feed = (frames) => {
-    const bytes = new TextEncoder().encode(frames.map((frame) => frame.split("#")).map(([id, data]) => `t${id}${data.length / 2}${data}\r`).join(""));
-    for (let at = 0; at < bytes.length; at += 4093) port.input.enqueue(bytes.slice(at, at + 4093));
+  // A port that was closed is not opened again: each choice gives another one.
+  Object.defineProperty(navigator, "serial", { value: { requestPort: async () => (window.fakePort = made()) } });
+  const made = () => {
+    const port = { said: [], open: async () => {}, close: async () => {} };
+    port.readable = new ReadableStream({ start: (controller) => (port.input = controller) });
+    port.writable = new WritableStream({ write: (chunk) => {
+      for (const command of new TextDecoder().decode(chunk).split("\r").filter(Boolean)) port.said.push(command), port.input.enqueue(new TextEncoder().encode("\r")), command[0] === "t" && window.onSent?.(command);
+    } });
+    port.feed = (frames) => {
+      const bytes = new TextEncoder().encode(frames.map((frame) => frame.split("#")).map(([id, data]) => `t${id}${data.length / 2}${data}\r`).join(""));
+      for (let at = 0; at < bytes.length; at += 4093) port.input.enqueue(bytes.slice(at, at + 4093));
+    };
+    return port;
   };
-  window.fakePort = port;
-  Object.defineProperty(navigator, "serial", { value: { requestPort: async () => port } });
 }
 
 const LAUNCHED = {

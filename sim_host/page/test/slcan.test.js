@@ -58,6 +58,13 @@ test("an adapter without a listen-only mode is not opened in another one by itse
   await cable.close();
 });
 
+test("commands that meet wait for each other's answers", async () => {
+  const port = fakePort({ listens: false }), cable = new Cable(port);
+  await cable.open();
+  assert.deepEqual(await Promise.all([cable.tell("L"), cable.tell("O"), cable.tell("L")]), [false, true, false]);
+  await cable.close();
+});
+
 test("an adapter that is pulled out leaves what was recorded", async () => {
   const port = fakePort(), cable = new Cable(port);
   await cable.open();

@@ -64,7 +64,7 @@ class App {
     this.tables = new TablesView($("tables"), this.tasks, this.about, (file, more) => this.open(file, more), () => this.status(() => say("open.ready"), "ready"));
     this.compare = new CompareView(this.tasks, this.about, JSON.parse($("costs").textContent));
     this.lesson = new LessonView($("lesson"), this.tasks);
-    this.cable = new CableView($("cable"), this.tasks, (file) => this.open(file));
+    this.cable = new CableView($("cable"), this.tasks, this.about, (file) => this.open(file));
     this.renderMore();
     await this.play.begin();
     this.status(() => say("open.ready"), "ready");

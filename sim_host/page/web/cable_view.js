@@ -2,12 +2,13 @@
 // The cable: an slcan adapter by Web Serial. It listens; a recording is opened as a log.
 import { element, replace } from "./dom.js";
 import { BITRATES, Cable } from "./slcan.js";
+import { TalkView } from "./talk_view.js";
 import { say } from "./texts.js";
 
 export class CableView {
-  /** `onLog(file)` gets the recording. */
-  constructor(parent, tasks, onLog) {
-    Object.assign(this, { parent, tasks, onLog, bitrate: "S6", cable: null, failed: null });
+  /** `onLog(file)` gets the recording; `about` is the module's description. */
+  constructor(parent, tasks, about, onLog) {
+    Object.assign(this, { parent, tasks, onLog, bitrate: "S6", cable: null, failed: null, talk: new TalkView(tasks, about), talking: element("div", { id: "talk" }) });
   }
   async connect() {
     this.failed = null;
@@ -27,6 +28,7 @@ export class CableView {
     const { cable } = this;
     clearInterval(this.timer);
     this.cable = null;
+    this.talk.end();
     await cable.close();
     this.render();
     if (open) await this.onLog(cable.recording.file("cable.log"));
@@ -49,7 +51,8 @@ export class CableView {
         this.counts,
         element("div", { class: "buttons" }, element("button", { id: "cable-look", class: "go", onclick: () => this.stop(true) }, say("cable.look")), element("button", { onclick: () => this.stop(false) }, say("cable.stop")),
           element("button", { id: "cable-ask", title: say("cable.ask.note"), onclick: () => this.ask() }, say("cable.ask"))),
-        element("p", { class: "note" }, say("cable.ask.note")), this.asked ? element("p", { class: "note" }, say("cable.asked")) : null]);
+        element("p", { class: "note" }, say("cable.ask.note")), this.asked ? element("p", { class: "note" }, say("cable.asked")) : null, this.talking]);
+    this.talk.render(this.talking, cable);
     this.renderCounts();
   }
   renderCounts() {

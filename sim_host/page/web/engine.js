@@ -2,7 +2,7 @@
 // The module that holds the flashed code: what it imports, and its functions with words for failures.
 
 /** Channels of module/browser.hpp. Below 16: a table of a run. */
-export const CHANNEL = { description: 16, refusal: 17, begun: 18, result: 19, diagnosis: 20, fixes: 21, log: 22, stage: 23, truth: 24, frames: 25, played: 26, injected: 27, script: 28, columns: 29, imported: 30, updates: 31 };
+export const CHANNEL = { description: 16, refusal: 17, begun: 18, result: 19, diagnosis: 20, fixes: 21, log: 22, stage: 23, truth: 24, frames: 25, played: 26, injected: 27, script: 28, columns: 29, imported: 30, updates: 31, talk: 32 };
 const RAW = new Set([CHANNEL.fixes, CHANNEL.truth, CHANNEL.frames]);
 export const MODE = { automatic: 0, lockstep: 1, asRecorded: 3 };
 

@@ -66,11 +66,12 @@ export class SlcanReader {
   }
 }
 
-/** An adapter at a port of Web Serial ({open, close, readable, writable}): listens and records; sends nothing unless asked. */
+/** `heard(line)`, where it is set, gets each line of the recording as well. An adapter at a port of Web Serial ({open, close, readable, writable}): listens and records; sends nothing unless asked. */
 export class Cable {
   constructor(port, { onChange = () => {}, now = () => performance.timeOrigin + performance.now() } = {}) {
     Object.assign(this, { port, onChange, now, recording: new Recording(), listening: true, refused: null, over: false });
-    this.reader = new SlcanReader((line) => this.recording.add(line), (ok) => this.answered?.(ok));
+    this.reader = new SlcanReader((line) => (this.recording.add(line), this.heard?.(line)), (ok) => this.answered?.(ok));
+    this.turn = Promise.resolve(); // one command at a time: answers have no names
   }
   async open(command = "S6", listening = true) {
     await this.port.open({ baudRate: 115200, bufferSize: 1 << 20 });
@@ -88,7 +89,12 @@ export class Cable {
     this.onChange();
   }
   /** A command, and whether the adapter took it; null: it does not answer. */
-  async tell(command) {
+  tell(command) {
+    const told = this.turn.then(() => this.exchange(command));
+    this.turn = told.catch(() => {});
+    return told;
+  }
+  async exchange(command) {
     const answer = new Promise((done) => {
       const wait = setTimeout(() => done(null), 300);
       this.answered = (ok) => (clearTimeout(wait), done(ok));
@@ -103,7 +109,12 @@ export class Cable {
     if (this.listening) await this.channel(this.command, false);
     if (this.refused) return false;
     const [id, data] = line.split("#");
-    return this.tell(`t${id.padStart(3, "0")}${data.length / 2}${data}`);
+    const frame = `t${id.padStart(3, "0")}${data.length / 2}${data}`;
+    // An adapter that does not answer for its first frame is not waited for again.
+    if (this.silent) return (this.turn = this.turn.then(() => this.output.write(new TextEncoder().encode(`${frame}\r`))).then(() => null, () => false));
+    const ok = await this.tell(frame);
+    this.silent ??= ok === null;
+    return ok;
   }
   async listen() {
     this.input = this.port.readable.getReader();

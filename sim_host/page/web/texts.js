@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // All words of the page, in each language under the same keys. {0}, {1} stand for values.
 import { MORE } from "./texts_more.js";
+import { TALK } from "./texts_talk.js";
 
 export const TEXTS = {
   en: {
@@ -513,7 +514,7 @@ export const TEXTS = {
   },
 };
 
-for (const [language, texts] of Object.entries(MORE)) Object.assign(TEXTS[language], texts);
+for (const more of [MORE, TALK]) for (const [language, texts] of Object.entries(more)) Object.assign(TEXTS[language], texts);
 
 let language = "en";
 export const languageNow = () => language;

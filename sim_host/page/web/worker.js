@@ -67,6 +67,20 @@ export class Tasks {
     this.engine((channel, data) => channel === CHANNEL.frames && (line = new TextDecoder().decode(data))).call("ask_snapshot", base, counter);
     return line.trim().split(" ")[2];
   }
+  /** A node at a cable: `name` of the module's functions talk_*, what it says and the frames that it wants sent. "begin" begins anew. */
+  talk({ function: name, values }) {
+    if (name === "begin") {
+      const told = [], lines = [], decoder = new TextDecoder();
+      const engine = this.engine((channel, data) => {
+        if (channel === CHANNEL.talk) told.push(data);
+        else if (channel === CHANNEL.frames) lines.push(decoder.decode(data).trim().split(" ")[2]);
+      });
+      this.talking = { engine, told, lines };
+    }
+    const { engine, told, lines } = this.talking;
+    engine.call(`talk_${name}`, ...values);
+    return { told: told.splice(0), lines: lines.splice(0) };
+  }
   check({ robot, settings }) {
     this.engine().choose(robot, settings);
     return true;
