@@ -19,7 +19,9 @@ ROBOTS = {
     "mapper_fast": (["--landmarks", "24"], {"MapSize": 15, "MapRefused": 1, "TooLate": 1}),
     "scanner": ([], {"Pairs": 100}),
     "scanner_localize": ([], {"Pairs": 100}),
+    "all_round": ([], {"Pairs": 100}),
     "visual": ([], {"Used": 1}),
+    "visual_slam": ([], {"Used": 1}),
     "graph128": (["--loop-m", "20", "--laps", "4"], {"MapSize": 90, "Keyframe": 140, "WorkLeft": 1, "Jobs": 5}),
 }
 LATE_STEPS, TOO_LATE_STEPS = 9, 40  # ticks of 10 ms; the window is 200 ms

@@ -67,7 +67,6 @@ Innovation AllRound::fuse(const sensor::PlanarScan& scan, base::Micros stamp, st
   constexpr int kX = nav::InsState::kPosition;
   if (instance != 0 || !tracking()) return {};
   predict_covariance();
-  now_ = stamp;
   if (!(ins_.p(kX, kX) + ins_.p(kX + 1, kX + 1) < kFarthest_m2)) {
     watch_.begin();
     return {.failed = sensor::Check::kUnconfirmed};

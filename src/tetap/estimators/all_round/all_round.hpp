@@ -30,6 +30,10 @@ class AllRound : public InertialWith<CloneWatch> {
   static constexpr int kMostBeams = kBeams;
 
   void restart(base::Micros t, const Context& ctx);
+  void advance(base::Micros t, const Context& ctx, const sensor::Window& window) {
+    Inertial::advance(t, ctx, window);
+    now_ = t;
+  }
 
   using Inertial::fuse;
   Innovation fuse(const sensor::WheelCounts& counts, base::Micros stamp, const Context& ctx) {
