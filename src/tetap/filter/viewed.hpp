@@ -70,9 +70,8 @@ struct Viewed : Filter {
   auto update(const Measurement& z, More&&... more) {
     constexpr int N = Filter::kErrors, M = Measurement::kDimension;
     if constexpr (requires { this->predict_covariance(); }) bring_up_to_date(more...);
-    using State = std::remove_cvref_t<decltype(this->x)>;
-    const State before = this->x;
-    const auto at = before.minus(State{});
+    const auto before = this->x;
+    const auto at = before.minus({});
     const auto prior = detail::whole<N>(this->p);
     const auto variances = z.noise();
     std::array<float, static_cast<std::size_t>(M) * N> h{};
