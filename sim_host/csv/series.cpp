@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <limits>
 #include <numeric>
 #include <optional>
@@ -181,7 +182,7 @@ sim::Result<> Reader::rows(Table& table, const Clock& clock, const std::vector<B
       const bool negative = is_south_or_west(number, cell.side ? cells[*cell.side] : std::string_view(), cell.place);
       auto value = parse_real(number, table.point());
       if (!value) return table.refuse(cell.column, number, "is no number");
-      if (negative) *value = -*value;
+      if (negative) *value = -std::abs(*value);
       const double degrees = cell.unit.minutes ? from_minutes(*value) : *value;
       row[cell.series][cell.slot] = cell.unit.factor * degrees + cell.unit.offset;
       any[cell.series] = true;

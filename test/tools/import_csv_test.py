@@ -428,7 +428,8 @@ class Tables(Case):
             self.near("In_Imu0Accel", "VelZ", log["In_Imu0Accel"]["VelZ"], np.full(2, 0.0980665))
             self.near("In_Imu0Accel", "VelX", log["In_Imu0Accel"]["VelX"], np.zeros(2))
         # Letters of a place, behind it or in a column of their own; an elevation.
-        for text, *options in (("time,lat,lon,elevation\n0.5,48.5S,11.25 W,500\n",), ("time,lat,ns,lon,ew,elevation\n0.5,4830.0,S,1115.0,W,500\n", "--unit", "gnss=nmea")):
+        for text, *options in (("time,lat,lon,elevation\n0.5,48.5S,11.25 W,500\n",), ("time,lat,ns,lon,ew,elevation\n0.5,4830.0,S,1115.0,W,500\n", "--unit", "gnss=nmea"),
+                               ("time,lat,ns,lon,ew,elevation\n0.5,-48.5,S,-11.25,W,500\n",)):
             log = self.imported({"g.csv": text}, *options)
             self.near("In_GnssLat", "Lat", log["In_GnssLat"]["Lat"], [-48.5])
             self.near("In_GnssLon", "Lon", log["In_GnssLon"]["Lon"], [-11.25])

@@ -74,7 +74,7 @@ class Chip {
   [[nodiscard]] constexpr bosch::StreamSettings stream() const {
     constexpr std::array kDps{2000, 1000, 500, 250, 125};
     const auto code = [](auto value) { return static_cast<unsigned>(value); };
-    return bosch::stream_settings(2 << code(settings_.accel_range), kDps[code(settings_.gyro_range) % 5],
+    return bosch::stream_settings(2 << code(settings_.accel_range) % 4, kDps[code(settings_.gyro_range) % 5],
                                   (code(settings_.rate) - code(Rate::k100Hz)) % 5, settings_.delay_us,
                                   settings_.stuck_samples, settings_.mounting);
   }

@@ -132,12 +132,13 @@ class Driver {
   constexpr void give_up_turn() {
     if (begun_) ++health_.turns_cut;
     begun_ = false;
+    bin_ = 0;
   }
 
   /// `sent`: when the measurement's first byte was sent; it is taken to be of that time.
   template <class Handler>
   constexpr void on_node(const Node& node, base::Micros sent, Handler& handler) {
-    if (begun_ && sent - last_ > kGap) give_up_turn();
+    if (sent - last_ > kGap) give_up_turn();
     last_ = sent;
     const std::size_t bin = Turn::bin(node.angle_cdeg());
     if (bin + kHalf < bin_) {  // past the front: the next turn

@@ -84,10 +84,13 @@ export class TalkView {
     const at = document.activeElement;
     if (parent.contains(at)) this.held = at.id ? `#${at.id}` : `[data-talk="${at.dataset.talk}"]`;
     else if (at !== document.body) this.held = null;
-    const base = element("input", { id: "talk-base", value: this.base.toString(16).toUpperCase(), size: 4, spellcheck: "false", "aria-label": say("talk.base"), onchange: () => {
+    const base = element("input", { id: "talk-base", value: this.base.toString(16).toUpperCase(), size: 4, spellcheck: "false", "aria-label": say("talk.base"), disabled: Boolean(this.busy), onchange: () => {
       const value = parseInt(base.value, 16);
-      if (/^[0-9a-f]{1,3}$/i.test(base.value.trim()) && value % 128 === 0 && value <= 0x780) this.base = value;
-      else base.value = this.base.toString(16).toUpperCase();
+      if (/^[0-9a-f]{1,3}$/i.test(base.value.trim()) && value % 128 === 0 && value <= 0x780) {
+        if (value !== this.base) this.talk?.end(), (this.talk = this.said = null); // the rows of another node are read first
+        this.base = value;
+        this.render();
+      } else base.value = this.base.toString(16).toUpperCase();
     } });
     const { said, busy } = this;
     this.bar = busy ? element("progress", { max: 1, "aria-label": say(busy) }) : null;
