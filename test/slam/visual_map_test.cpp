@@ -41,10 +41,11 @@ struct Trip {
     window->start(test::in_float(images[0].r_nb), 1e-3F, std::array<std::int64_t, 3>{}, 1e-3F);
     test::PathJudge<Window> judge;
     for (std::size_t k = 0; k < images.size(); ++k) {
-      if (k > 0)
+      if (k > 0) {
         EXPECT_TRUE(window->predict({.speed_b_mps = images[k].speed_b_mps.cast<float>(),
                                      .rate_b_radps = images[k].rate_b_radps.cast<float>(),
                                      .dt_s = 0.1F}));
+      }
       test::take_image(*window, images[k].features);
       if (with_map) {
         Features seen = world.recognised[k];
@@ -82,9 +83,10 @@ TEST(VisualMap, IsTheBatchSolutionOfTheSameSightings) {
             slam::SpeedCore(noise));
     map.start(nav::Quaternion{}, 0.01F, std::array<std::int64_t, 3>{}, 0.01F);
     for (int k = 0; k < Batch::kImages; ++k) {
-      if (k > 0)
+      if (k > 0) {
         ASSERT_TRUE(map.predict(
             {.speed_b_mps = Batch::speed().cast<float>(), .rate_b_radps = Batch::rate().cast<float>(), .dt_s = 0.1F}));
+      }
       test::take_image(map, {});
       std::vector<slam::ImageFeature> features;
       for (int post = 0; post < Batch::kPosts; ++post) {
