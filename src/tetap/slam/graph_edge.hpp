@@ -33,17 +33,25 @@ template <class Scalar>
   return true;
 }
 
+/// W^T W of a lower triangular W by rows.
+template <class Scalar>
+[[nodiscard]] filter::Symmetric<Scalar, 3> square_of(const std::array<Scalar, 6>& w) {
+  filter::Symmetric<Scalar, 3> s;
+  s(0, 0) = w[0] * w[0] + w[1] * w[1] + w[3] * w[3];
+  s(0, 1) = w[1] * w[2] + w[3] * w[4];
+  s(1, 1) = w[2] * w[2] + w[4] * w[4];
+  s(0, 2) = w[3] * w[5];
+  s(1, 2) = w[4] * w[5];
+  s(2, 2) = w[5] * w[5];
+  return s;
+}
+
 /// The inverse of a covariance by the same factor. False, and nothing is set, where there is none.
 template <class Scalar>
 [[nodiscard]] bool inverse_of(const filter::Symmetric<Scalar, 3>& c, filter::Symmetric<Scalar, 3>& inverse) {
   std::array<Scalar, 6> w{};
   if (!whitening_of(c, w)) return false;
-  inverse(0, 0) = w[0] * w[0] + w[1] * w[1] + w[3] * w[3];
-  inverse(0, 1) = w[1] * w[2] + w[3] * w[4];
-  inverse(1, 1) = w[2] * w[2] + w[4] * w[4];
-  inverse(0, 2) = w[3] * w[5];
-  inverse(1, 2) = w[4] * w[5];
-  inverse(2, 2) = w[5] * w[5];
+  inverse = square_of(w);
   return true;
 }
 

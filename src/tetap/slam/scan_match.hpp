@@ -59,18 +59,6 @@ class ScanMatch {
   static constexpr float kMetre = 0.001F;  ///< a point's unit
   static constexpr int kCoarseEvery = 2;   ///< points that the coarse search leaves out
 
-  /// W^T W of a lower triangular W by rows.
-  static filter::Symmetric<float, 3> square_of(const std::array<float, 6>& w) {
-    filter::Symmetric<float, 3> s;
-    s(0, 0) = w[0] * w[0] + w[1] * w[1] + w[3] * w[3];
-    s(0, 1) = w[1] * w[2] + w[3] * w[4];
-    s(1, 1) = w[2] * w[2] + w[4] * w[4];
-    s(0, 2) = w[3] * w[5];
-    s(1, 2) = w[4] * w[5];
-    s(2, 2) = w[5] * w[5];
-    return s;
-  }
-
   void step(std::span<const std::uint16_t> ranges, const Keyframes& keyframes) {
     switch (phase_) {
       case Phase::kIdle:
