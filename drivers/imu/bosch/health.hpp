@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Health of a Bosch IMU as its driver reports it: a state, a reason for everything that went wrong, a count of each.
+// States and reasons in the health of a Bosch IMU.
 #pragma once
+
+#include "drivers/imu/health.hpp"
 
 #include <array>
 #include <cstddef>
@@ -50,20 +52,6 @@ inline constexpr auto kReasons = static_cast<std::size_t>(Reason::kCount);
   return reason < Reason::kCount ? kNames[static_cast<std::size_t>(reason)] : std::string_view{"?"};
 }
 
-struct Health {
-  State state = State::kStartup;
-  Reason last = Reason::kCount;  ///< kCount: nothing yet
-  std::uint32_t samples = 0;     ///< delivered since the start
-  std::uint32_t restarts = 0;
-  std::array<std::uint16_t, kReasons> counts{};  ///< saturating
-
-  [[nodiscard]] constexpr std::uint16_t of(Reason reason) const { return counts[static_cast<std::size_t>(reason)]; }
-  constexpr void add(Reason reason, std::int64_t times = 1) {
-    auto& count = counts[static_cast<std::size_t>(reason)];
-    const std::int64_t sum = count + times;
-    count = static_cast<std::uint16_t>(sum > 0xFFFF ? 0xFFFF : sum);
-    last = reason;
-  }
-};
+using Health = ImuDriverHealth<State, Reason>;
 
 }  // namespace tetap::drivers::bosch

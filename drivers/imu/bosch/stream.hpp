@@ -92,7 +92,7 @@ class Stream {
         return false;
       }
       if (follows_ && since > settings_.period_ticks)
-        health.add(Reason::kLostSamples, since / settings_.period_ticks - 1);
+        health.add(Reason::kLostSamples, static_cast<std::uint32_t>(since / settings_.period_ticks - 1));
       follows_ = follows_ && since == settings_.period_ticks;
     }
     taken_ = now;

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// Health of an ICM-42688-P as its driver reports it: a state, a reason for everything that went wrong, a count of each.
+// States and reasons in the health of an ICM-42688-P.
 #pragma once
 
+#include "drivers/imu/health.hpp"
+
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <string_view>
 
@@ -74,21 +77,6 @@ inline constexpr auto kReasons = static_cast<std::size_t>(Reason::kCount);
   return reason < Reason::kCount ? kNames[static_cast<std::size_t>(reason)] : std::string_view{"?"};
 }
 
-struct Health {
-  State state = State::kPowerUp;
-  Reason last = Reason::kCount;  ///< kCount: nothing yet
-  std::uint32_t samples = 0;     ///< delivered since the start
-  std::uint32_t restarts = 0;
-  std::array<std::uint16_t, kReasons> counts{};  ///< saturating
-
-  [[nodiscard]] constexpr std::uint16_t of(Reason reason) const { return counts[static_cast<std::size_t>(reason)]; }
-
-  constexpr void add(Reason reason, std::uint32_t times = 1) {
-    auto& count = counts[static_cast<std::size_t>(reason)];
-    const std::uint32_t sum = count + (times > 0xFFFF ? 0xFFFF : times);
-    count = static_cast<std::uint16_t>(sum > 0xFFFF ? 0xFFFF : sum);
-    last = reason;
-  }
-};
+using Health = ImuDriverHealth<State, Reason>;
 
 }  // namespace tetap::drivers::icm42688
