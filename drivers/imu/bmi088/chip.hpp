@@ -14,9 +14,9 @@
 
 namespace tetap::drivers::bmi088 {
 
-enum class AccelRange : std::uint8_t { k3g, k6g, k12g, k24g };                          // 5.3.10
-enum class GyroRange : std::uint8_t { k2000dps, k1000dps, k500dps, k250dps, k125dps };  // 5.5.5
-enum class Rate : std::uint8_t { k100Hz = 0x8, k200Hz, k400Hz, k800Hz, k1600Hz };       // 5.3.9
+enum class AccelRange : std::uint8_t { k3g, k6g, k12g, k24g };    // 5.3.10
+using bosch::GyroRange;                                           // 5.5.5
+using bosch::Rate;                                                // 5.3.9
 enum class GyroFilter : std::uint8_t { k532Hz, k230Hz, k116Hz };  // 5.5.6: output 2 kHz, 2 kHz, 1 kHz
 
 struct Settings {
@@ -64,17 +64,9 @@ class Chip {
   }
 
   [[nodiscard]] constexpr bool valid() const {
-    return settings_.accel_range <= AccelRange::k24g && settings_.gyro_range <= GyroRange::k125dps &&
-           settings_.rate >= Rate::k100Hz && settings_.rate <= Rate::k1600Hz &&
-           settings_.filter <= GyroFilter::k116Hz && settings_.mounting.valid();
+    return bosch::offered(settings_) && settings_.filter <= GyroFilter::k116Hz;
   }
-  [[nodiscard]] constexpr bosch::StreamSettings stream() const {
-    constexpr std::array kDps{2000, 1000, 500, 250, 125};
-    const auto code = [](auto value) { return static_cast<unsigned>(value); };
-    return bosch::stream_settings(3 << code(settings_.accel_range) % 4, kDps[code(settings_.gyro_range) % 5],
-                                  (code(settings_.rate) - code(Rate::k100Hz)) % 5, settings_.delay_us,
-                                  settings_.stuck_samples, settings_.mounting);
-  }
+  [[nodiscard]] constexpr bosch::StreamSettings stream() const { return bosch::stream_settings(3, settings_); }
   [[nodiscard]] constexpr std::span<const bosch::Action> actions() const { return actions_; }
 
   [[nodiscard]] constexpr bool read(std::uint8_t target, std::uint8_t address, std::span<std::uint8_t> in) {

@@ -15,9 +15,9 @@
 
 namespace tetap::drivers::bmi270 {
 
-enum class AccelRange : std::uint8_t { k2g, k4g, k8g, k16g };                           // ACC_RANGE
-enum class GyroRange : std::uint8_t { k2000dps, k1000dps, k500dps, k250dps, k125dps };  // GYR_RANGE
-enum class Rate : std::uint8_t { k100Hz = 0x8, k200Hz, k400Hz, k800Hz, k1600Hz };       // ACC_CONF and GYR_CONF, both
+enum class AccelRange : std::uint8_t { k2g, k4g, k8g, k16g };  // ACC_RANGE
+using bosch::GyroRange;                                        // GYR_RANGE
+using bosch::Rate;                                             // ACC_CONF and GYR_CONF, both
 
 struct Settings {
   AccelRange accel_range = AccelRange::k16g;
@@ -67,17 +67,9 @@ class Chip {
   }
 
   [[nodiscard]] constexpr bool valid() const {
-    return !file_.empty() && file_.size() % 2 == 0 && file_.size() <= kMostBytes &&
-           settings_.accel_range <= AccelRange::k16g && settings_.gyro_range <= GyroRange::k125dps &&
-           settings_.rate >= Rate::k100Hz && settings_.rate <= Rate::k1600Hz && settings_.mounting.valid();
+    return !file_.empty() && file_.size() % 2 == 0 && file_.size() <= kMostBytes && bosch::offered(settings_);
   }
-  [[nodiscard]] constexpr bosch::StreamSettings stream() const {
-    constexpr std::array kDps{2000, 1000, 500, 250, 125};
-    const auto code = [](auto value) { return static_cast<unsigned>(value); };
-    return bosch::stream_settings(2 << code(settings_.accel_range) % 4, kDps[code(settings_.gyro_range) % 5],
-                                  (code(settings_.rate) - code(Rate::k100Hz)) % 5, settings_.delay_us,
-                                  settings_.stuck_samples, settings_.mounting);
-  }
+  [[nodiscard]] constexpr bosch::StreamSettings stream() const { return bosch::stream_settings(2, settings_); }
   [[nodiscard]] constexpr std::span<const bosch::Action> actions() const { return actions_; }
 
   [[nodiscard]] constexpr bool read(std::uint8_t, std::uint8_t address, std::span<std::uint8_t> in) {

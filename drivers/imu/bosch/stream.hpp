@@ -41,17 +41,29 @@ struct StreamSettings {
   Mounting mounting;
 };
 
-/// Scales of 16 bits over ranges of +-`range_g` and +-`range_dps`, at 100 Hz times two to the power of `doublings`.
-[[nodiscard]] constexpr StreamSettings stream_settings(int range_g, int range_dps, unsigned doublings,
-                                                       std::int32_t delay_us, std::uint16_t stuck_samples,
-                                                       const Mounting& mounting) {
+enum class GyroRange : std::uint8_t { k2000dps, k1000dps, k500dps, k250dps, k125dps };
+enum class Rate : std::uint8_t { k100Hz = 0x8, k200Hz, k400Hz, k800Hz, k1600Hz };
+
+/// Whether a chip's settings are some it has. Its ranges of force are four.
+template <class Settings>
+[[nodiscard]] constexpr bool offered(const Settings& settings) {
+  return static_cast<unsigned>(settings.accel_range) < 4 && settings.gyro_range <= GyroRange::k125dps &&
+         settings.rate >= Rate::k100Hz && settings.rate <= Rate::k1600Hz && settings.mounting.valid();
+}
+
+/// Scales of 16 bits over a chip's ranges, the first of which is +-`least_g`; each next one is twice as wide.
+template <class Settings>
+[[nodiscard]] constexpr StreamSettings stream_settings(int least_g, const Settings& settings) {
   constexpr float kStandardGravity_mps2 = 9.80665F, kRadPerDeg = 0.017453293F, kFull = 32'768.0F;
-  return {.period_ticks = 256 >> doublings,
+  constexpr std::array kDps{2000, 1000, 500, 250, 125};
+  const auto code = [](auto value) { return static_cast<unsigned>(value); };
+  const int range_g = least_g << code(settings.accel_range) % 4, range_dps = kDps[code(settings.gyro_range) % 5];
+  return {.period_ticks = 256 >> (code(settings.rate) - code(Rate::k100Hz)) % 5,
           .rate_radps = static_cast<float>(range_dps) * kRadPerDeg / kFull,
           .force_mps2 = static_cast<float>(range_g) * kStandardGravity_mps2 / kFull,
-          .delay_us = delay_us,
-          .stuck_samples = stuck_samples,
-          .mounting = mounting};
+          .delay_us = settings.delay_us,
+          .stuck_samples = settings.stuck_samples,
+          .mounting = settings.mounting};
 }
 
 class Stream {
@@ -142,18 +154,20 @@ class Stream {
     return {static_cast<float>(raw[0]) * per_bit, static_cast<float>(raw[1]) * per_bit,
             static_cast<float>(raw[2]) * per_bit};
   }
-  [[nodiscard]] static constexpr bool clipped(const std::array<std::int32_t, 3>& raw) {
+  [[nodiscard]] static constexpr bool at_end(std::int32_t x) {
     constexpr std::int32_t kEnd = 32'767;
-    for (const std::int32_t x : raw)
-      if (x >= kEnd || x <= -kEnd) return true;
-    return false;
+    return x >= kEnd || x <= -kEnd;
+  }
+  [[nodiscard]] static constexpr bool clipped(const std::array<std::int32_t, 3>& raw) {
+    return at_end(raw[0]) || at_end(raw[1]) || at_end(raw[2]);
   }
   /// Any axis that repeats itself so often and is not at an end of its range: a living sensor has noise.
   constexpr bool stuck(const std::array<std::int32_t, 3>& now, Repeats& repeats) const {
     bool any = false;
     for (std::size_t i = 0; i < 3; ++i) {
       auto& times = repeats.times[i];
-      times = now[i] != repeats.value[i] ? std::uint16_t{0} : static_cast<std::uint16_t>(times + (times < 0xFFFF));
+      const bool repeats_itself = now[i] == repeats.value[i] && !at_end(now[i]);
+      times = repeats_itself ? static_cast<std::uint16_t>(times + (times < 0xFFFF)) : std::uint16_t{0};
       any |= settings_.stuck_samples != 0 && times >= settings_.stuck_samples;
     }
     repeats.value = now;
