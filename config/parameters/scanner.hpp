@@ -22,6 +22,7 @@ inline constexpr param::Parameters parameters = param::checked({
                          .yaw_rate_per_yaw_rate = 2e-2F,
                          .yaw_rate_per_speed = 2e-2F},
                .hold = param::Hold::kBackward},
+    .wired = {.lidar = 1},
     .mapping = {.keyframe_distance_m = 0.3F, .keyframe_turn_rad = 0.3F},
     .lidar = {.min_m = 0.1F, .max_m = 12, .turn_us = 100'000},
 });

@@ -13,7 +13,7 @@ using sim::operator+, sim::operator*;
 
 namespace {
 
-constexpr std::uint64_t kVibrationStream = 1'000;  // beyond those of sim::Stream
+constexpr std::uint64_t kVibrationStream = 1'000, kLidarStream = 1'002;  // beyond those of sim::Stream
 
 Picoseconds to_time(base::Micros t) { return t.us * kMicrosecond; }
 double share(Picoseconds from, Picoseconds at, Picoseconds to) {
@@ -25,6 +25,8 @@ double share(Picoseconds from, Picoseconds at, Picoseconds to) {
 SimulatedSensors::SimulatedSensors(sim::World world, const param::Parameters& parameters, const UbloxOptions& options,
                                    std::uint64_t seed)
     : receiver(options), world_(std::move(world)), wired_(parameters.wired), vibration_(seed, kVibrationStream) {
+  if (wired_.lidar != 0 && world_.surroundings() != nullptr)
+    lidar_.emplace(WiredScanner{parameters.lidar, base::Random(seed, kLidarStream), {}});
   // Before the world starts: the robot stands where it will begin.
   const std::int64_t start_us = world_.start().us;
   sim::Truth standing = world_.truth();
@@ -52,6 +54,11 @@ SensorWorld SimulatedSensors::door() {
       return receiver.next_byte(now);
     };
     door.to_gnss = [this](Picoseconds now, std::uint8_t byte, std::int64_t baud) { receiver.on_byte(now, byte, baud); };
+  } else if (lidar_) {
+    door.next_gnss_byte = [this](Picoseconds now) {
+      advance(now);
+      return lidar_->scanner.next_byte(now);
+    };
   }
   return door;
 }
@@ -65,7 +72,9 @@ void SimulatedSensors::step() {
   const Picoseconds end = std::max(steps_.back().end, to_time(world_.start())) + kStep_us * kMicrosecond;
   const base::Micros at{end / kMicrosecond};
   arrived_.clear();
+  const sim::Truth before = world_.truth();
   world_.advance_to(at, arrived_);
+  if (lidar_) turn_lidar(before, world_.truth());
   std::rotate(steps_.begin(), steps_.begin() + 1, steps_.end());
   steps_.back() = {end, world_.imu_signals(), world_.wheel_shafts()};
   if (at.us % kTruth_us == 0) {
@@ -75,14 +84,41 @@ void SimulatedSensors::step() {
   sort(arrived_);
 }
 
+// The points of one step: between its ends the pose runs straight. A pane returns nothing.
+void SimulatedSensors::turn_lidar(const sim::Truth& from, const sim::Truth& to) {
+  constexpr double kSigma_m = 0.01, kLeast_m = 0.02, kMost_m = 12;  // the manual's accuracy and range
+  auto& [mounting, noise, scanner] = *lidar_;
+  const Picoseconds start = to_time(world_.start());
+  while (start + scanner.next_point() < to_time(to.time)) {
+    const Picoseconds at = start + scanner.next_point();
+    const double k = share(to_time(from.time), at, to_time(to.time));
+    const auto between = [k](double a, double b) { return a + k * (b - a); };
+    const auto turned = [k](double a, double b) { return a + k * std::remainder(b - a, 2 * sim::kPi); };
+    const sim::Matrix3 to_n = sim::rotation(
+        {turned(from.roll_rad, to.roll_rad), turned(from.pitch_rad, to.pitch_rad), turned(from.yaw_rad, to.yaw_rad)});
+    const double clockwise_rad = static_cast<double>(scanner.next_angle_cdeg()) * sim::kPi / 18'000;
+    const double bearing_rad = static_cast<double>(mounting.yaw_rad) - clockwise_rad;
+    const sim::Vector3 place{between(from.x_m, to.x_m), between(from.y_m, to.y_m), between(from.z_m, to.z_m)};
+    const sim::Vector3 arm{static_cast<double>(mounting.x_b_m), static_cast<double>(mounting.y_b_m),
+                           world_.parameters().lidar.z_b_m};
+    const sim::Ray ray{place + to_n * arm, to_n * sim::Vector3{std::cos(bearing_rad), std::sin(bearing_rad), 0}};
+    const auto hit = world_.surroundings()->nearest(ray, {scanner.next_point() / kMicrosecond}, false);
+    const double drawn_m = kSigma_m * static_cast<double>(noise.normal());
+    const double range_m = hit && hit->surface != sim::Surface::kGlass ? hit->range_m + drawn_m : 0;
+    scanner.measure(range_m < kLeast_m || range_m > kMost_m ? 0 : range_m, start);
+  }
+}
+
 void SimulatedSensors::sort(std::vector<sim::Measurement>& arrived) {
   for (const sim::Measurement& one : arrived) {
     const bool imu = std::holds_alternative<sensor::ImuSample>(one.value);
     const bool wheels = std::holds_alternative<sensor::WheelCounts>(one.value);
     const bool fix = std::holds_alternative<sensor::GnssPosition>(one.value);
     const bool gnss = fix || std::holds_alternative<sensor::GnssVelocity>(one.value);
-    if (on_wired && ((wheels && wired_.encoders != 0) || (gnss && wired_.gnss != 0))) on_wired(one);
-    if ((imu && wired_.imu != 0) || (wheels && wired_.encoders != 0)) continue;
+    const bool scan = lidar_ && (std::holds_alternative<sim::ScanHead>(one.value) ||
+                                 std::holds_alternative<sim::ScanBlock>(one.value));
+    if (on_wired && ((wheels && wired_.encoders != 0) || (gnss && wired_.gnss != 0) || scan)) on_wired(one);
+    if ((imu && wired_.imu != 0) || (wheels && wired_.encoders != 0) || scan) continue;
     if (gnss && wired_.gnss != 0) {
       solve(one);
     } else {

@@ -3,6 +3,7 @@
 // receiver. Sensors that are not wired send frames, as on any bus. The board's time since power-on is that of the bus.
 #pragma once
 
+#include "sim_host/emulator/ld19_scanner.hpp"
 #include "sim_host/emulator/sensor_world.hpp"
 #include "sim_host/emulator/ublox_receiver.hpp"
 #include "sim_host/world/world.hpp"
@@ -12,6 +13,7 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <vector>
 
 namespace tetap::board {
@@ -24,6 +26,8 @@ class SimulatedSensors {
   SimulatedSensors(const SimulatedSensors&) = delete;
   SimulatedSensors& operator=(const SimulatedSensors&) = delete;
 
+  /// Packets of the LD19 on the receiver's line, which a robot with wired.lidar has where its world has walls.
+  [[nodiscard]] std::uint32_t lidar_packets() const { return lidar_ ? lidar_->scanner.packets() : 0; }
   /// For a board; this object must live longer.
   [[nodiscard]] SensorWorld door();
   /// Measurements of sensors that are not wired, as they arrive by `now`.
@@ -36,7 +40,7 @@ class SimulatedSensors {
   [[nodiscard]] const std::vector<sim::Truth>& truth() const { return truth_; }
   /// A vector at the chip's axes by those of the robot's samples.
   [[nodiscard]] std::array<double, 3> from_chip(const std::array<double, 3>& v_c) const;
-  /// Counts and fixes of wired sensors as the world measures them, before they become edges and bytes.
+  /// Counts, fixes and scans of wired sensors as the world measures them, before they become edges and bytes.
   std::function<void(const sim::Measurement&)> on_wired;
   UbloxReceiver receiver;
   /// Edges that disturbance adds to the right encoder's count.
@@ -49,7 +53,13 @@ class SimulatedSensors {
     sim::Imu::Signals imu;
     std::array<double, 2> shafts{};
   };
+  struct WiredScanner {
+    param::LidarParameters mounting;
+    base::Random noise;
+    Ld19Scanner scanner;
+  };
   void step();
+  void turn_lidar(const sim::Truth& from, const sim::Truth& to);
   void sort(std::vector<sim::Measurement>& arrived);
   void solve(const sim::Measurement& measurement);
   [[nodiscard]] ImuTruth imu(Picoseconds now);
@@ -63,6 +73,7 @@ class SimulatedSensors {
   std::vector<sim::Measurement> arrived_, unwired_;
   GnssSolution solution_;
   base::Random vibration_;
+  std::optional<WiredScanner> lidar_;
   Picoseconds last_imu_ = -1;
 };
 

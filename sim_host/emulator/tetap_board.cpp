@@ -345,6 +345,7 @@ void write_facts(const Options& options, const board::Board& node, const board::
       {"gnss_epochs", std::to_string(sensors.receiver.epochs)},
       {"gnss_baud", std::to_string(sensors.receiver.baud())},
       {"gnss_settings_refused", std::to_string(sensors.receiver.refused)},
+      {"lidar_packets", std::to_string(sensors.lidar_packets())},
       {"world_start_s", real(static_cast<double>(sensors.world().start().us) * 1e-6)},
       {"matched", "false"},
       {"landmarks", sim::landmarks_json(sensors.world())}};

@@ -54,11 +54,16 @@ class OwnInputs {
   }
 
  private:
+  /// A line that is read without a receiver is a scanner's.
+  [[nodiscard]] bool wired_lidar() const {
+    return !wired_.wired_gnss && wired_.gnss_state == bus::GnssState::kReadOnly;
+  }
   [[nodiscard]] bool owns(std::uint32_t offset) const {
     const std::uint32_t imu = bus::ImuGyro::kOffset + wired_.wired_inst * bus::ImuGyro::kStride;
     return (wired_.wired_imu && offset >= imu && offset < imu + bus::ImuGyro::kStride) ||
            (wired_.wired_encoders && offset == bus::InWheelCounts::kOffset) ||
-           (wired_.wired_gnss && offset >= bus::InGnssLat::kOffset && offset <= bus::InGnssVelU::kOffset);
+           (wired_.wired_gnss && offset >= bus::InGnssLat::kOffset && offset <= bus::InGnssVelU::kOffset) ||
+           (wired_lidar() && (offset == bus::InScanHead::kOffset || offset == bus::InScan::kOffset));
   }
   [[nodiscard]] bool owns(const bus::InGuardSample& guard) const {
     switch (guard.sensor) {
@@ -69,6 +74,8 @@ class OwnInputs {
       case sensor::Sensor::kGnssPosition:
       case sensor::Sensor::kGnssVelocity:
         return wired_.wired_gnss;
+      case sensor::Sensor::kScan:
+        return wired_lidar();
       default:
         return false;
     }

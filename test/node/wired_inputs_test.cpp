@@ -83,7 +83,9 @@ TEST(WiredParts, are_those_that_the_parameters_name) {
   EXPECT_FALSE(WiredParts::of(p).any());
   p.wired.gnss = 2;
   EXPECT_TRUE(WiredParts::of(p).gnss);
-  EXPECT_FALSE(WiredParts::of(p).imu || WiredParts::of(p).encoders);
+  EXPECT_FALSE(WiredParts::of(p).imu || WiredParts::of(p).encoders || WiredParts::of(p).lidar);
+  p.wired = {.lidar = 1};
+  EXPECT_TRUE(p.wired.any() && WiredParts::of(p).lidar && WiredParts::of(p).any());
 }
 
 TEST(WiredImu, takes_rate_and_axes_of_the_parameters) {

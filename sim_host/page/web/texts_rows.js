@@ -197,6 +197,7 @@ export const ROWS_ID = {
   "wired.gnss_baud": "Baud rate jalur serial, yang juga disetel pada receiver yang dikonfigurasi.",
   "wired.gnss_period_ms": "Periode posisi GNSS dari receiver yang dikonfigurasi.",
   "wired.gnss_latency_us": "Waktu dari saat receiver mengukur sampai byte terakhir pesannya.",
+  "wired.lidar": "Pemindai di jalur receiver: 0 tidak ada, 1 LD19.",
   "mapping.correlation_m": "Jarak tempuh selama galat pengamatan satu landmark tetap berkorelasi; 0: saling bebas.",
   "mapping.separation_m": "Jarak minimum landmark baru tanpa ID dari semua landmark lain.",
   "mapping.association": "Pengamatan tanpa ID: 0 nearest neighbour, 1 assignment, 2 joint compatibility.",

@@ -95,10 +95,11 @@ class Firmware {
     }
     const std::uint32_t offset = frame.id - parameters_.can_base;
     if (frame.extended || offset >= bus::kBlock + bus::kMapBlock) return false;
-    if (Node::takes_map_input(static_cast<std::uint8_t>(offset))) return node_.on_frame(frame), false;
-    if (offset >= bus::kBlock) return false;
+    const bool own = is_own(offset);
+    if (!own && Node::takes_map_input(static_cast<std::uint8_t>(offset))) return node_.on_frame(frame), false;
+    if (!own && offset >= bus::kBlock) return false;
     // A frame that only this node sends, or may send now, comes from a second node of the same ids.
-    if (offset >= kInputs || is_own(offset)) return conflict_ticks_ = 1'000'000 / parameters_.loop.period_us, false;
+    if (own || offset >= kInputs) return conflict_ticks_ = 1'000'000 / parameters_.loop.period_us, false;
     if (offset == bus::InSync::kOffset) return on_sync(frame);
     if (bus::is_sync_guard(offset, frame)) return sync_guard_.announce(frame), false;
     return node_.on_frame(frame), false;

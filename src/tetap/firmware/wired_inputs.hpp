@@ -4,6 +4,7 @@
 #pragma once
 
 #include "tetap/bus/counters.hpp"
+#include "tetap/firmware/wired_lidar.hpp"
 #include "tetap/firmware/wired_sensors.hpp"
 
 #include <array>
@@ -18,11 +19,15 @@ struct WiredParts {
   bool imu = false;
   bool encoders = false;
   bool gnss = false;
+  bool lidar = false;  ///< on the receiver's line
 
   [[nodiscard]] static constexpr WiredParts of(const param::Parameters& p) {
-    return {.imu = p.wired.imu != 0, .encoders = p.wired.encoders != 0, .gnss = p.wired.gnss != 0};
+    return {.imu = p.wired.imu != 0,
+            .encoders = p.wired.encoders != 0,
+            .gnss = p.wired.gnss != 0,
+            .lidar = p.wired.lidar != 0};
   }
-  [[nodiscard]] constexpr bool any() const { return imu || encoders || gnss; }
+  [[nodiscard]] constexpr bool any() const { return imu || encoders || gnss || lidar; }
 };
 
 /// Bus time minus board time as stamps use it. Sync frames come with jitter, which is followed slowly; a correction too
@@ -60,18 +65,22 @@ class StampOffset {
 /// Holds the drivers of what `kParts` asks for and the board has.
 template <hal::Board Board, WiredParts kParts>
 class WiredInputs {
+  static_assert(!(kParts.gnss && kParts.lidar), "one line for both");
+
  public:
   static constexpr bool kImu = kParts.imu && hal::ImuBoard<Board>;
   static constexpr bool kEncoders = kParts.encoders && hal::EncoderBoard<Board>;
   static constexpr bool kGnss = kParts.gnss && hal::GnssBoard<Board>;
-  static constexpr bool kAny = kImu || kEncoders || kGnss;
+  static constexpr bool kLidar = kParts.lidar && hal::GnssBoard<Board>;
+  static constexpr bool kAny = kImu || kEncoders || kGnss || kLidar;
 
   WiredInputs(Board& board, const param::Parameters& parameters)
       : can_base_(parameters.can_base),
         imu_(make<kImu>(board, [&](auto& b) { return Imu(b.imu, parameters); })),
         encoders_(make<kEncoders>(
             board, [&](auto& b) { return Encoders(b.left_encoder, b.right_encoder, parameters.wired); })),
-        gnss_(make<kGnss>(board, [&](auto& b) { return Gnss(b.gnss, parameters.wired); })) {}
+        gnss_(make<kGnss>(board, [&](auto& b) { return Gnss(b.gnss, parameters.wired); })),
+        lidar_(make<kLidar>(board, [&](auto& b) { return Lidar(b.gnss); })) {}
 
   /// put(frame) for each frame of a new sample. `on` false: the drivers run, and their samples are given up.
   template <class Put>
@@ -87,6 +96,8 @@ class WiredInputs {
     if constexpr (kImu) imu_.poll(now, offset_.used(), frames);
     if constexpr (kEncoders) encoders_.poll(now, offset_.used(), frames);
     if constexpr (kGnss) gnss_.poll(now, offset_.used(), frames);
+    if constexpr (kLidar)
+      lidar_.poll(now, offset_.used(), [&](const auto& message) { switched(bus::frame(can_base_, message)); });
   }
 
   /// Whether frames with this offset in the node's block are made here.
@@ -95,6 +106,7 @@ class WiredInputs {
     if constexpr (kImu) own = own || imu_.owns(offset);
     if constexpr (kEncoders) own = own || Encoders::owns(offset);
     if constexpr (kGnss) own = own || Gnss::owns(offset);
+    if constexpr (kLidar) own = own || Lidar::owns(offset);
     return own;
   }
 
@@ -107,6 +119,7 @@ class WiredInputs {
     if constexpr (kImu) page.wired_inst = imu_.instance();
     if constexpr (kEncoders) encoders_.note(page);
     if constexpr (kGnss) gnss_.note(page);
+    if constexpr (kLidar) lidar_.note(page);
     return page;
   }
 
@@ -146,9 +159,18 @@ class WiredInputs {
   struct GnssOf<B, true> {
     using Type = WiredGnss<std::remove_reference_t<decltype(std::declval<B&>().gnss)>>;
   };
+  template <class B, bool kThere>
+  struct LidarOf {
+    using Type = Nothing;
+  };
+  template <class B>
+  struct LidarOf<B, true> {
+    using Type = WiredLidar<std::remove_reference_t<decltype(std::declval<B&>().gnss)>>;
+  };
   using Imu = typename ImuOf<Board, kImu>::Type;
   using Encoders = typename EncodersOf<Board, kEncoders>::Type;
   using Gnss = typename GnssOf<Board, kGnss>::Type;
+  using Lidar = typename LidarOf<Board, kLidar>::Type;
 
   std::uint32_t can_base_;
   StampOffset offset_;
@@ -156,6 +178,7 @@ class WiredInputs {
   [[no_unique_address]] Imu imu_;
   [[no_unique_address]] Encoders encoders_;
   [[no_unique_address]] Gnss gnss_;
+  [[no_unique_address]] Lidar lidar_;
 };
 
 }  // namespace tetap::firmware

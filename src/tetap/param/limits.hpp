@@ -151,6 +151,8 @@ inline constexpr std::array kCompiledRules{
          "above 0 with noise_right, or else wheels.noise.speed or wheels.wheel_speed_noise: no wheel is without noise"},
     Rule{"gyro.noise", [](const P& p) { return p.gyro.use == 0 || p.gyro.noise > 0; },
          "above 0 where gyro.use is 1: no gyroscope is without noise"},
+    Rule{"wired.lidar", [](const P& p) { return p.wired.lidar == 0 || p.wired.gnss == 0; },
+         "0 where wired.gnss has the line"},
 };
 
 /// The first rule that does not hold; null when all do.

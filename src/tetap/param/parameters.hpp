@@ -325,8 +325,9 @@ struct WiredParameters {
   /// Time from a measurement to the last byte of its message, of the least delayed one. ArduPilot
   /// (AP_GPS_UBLOX::get_lag) has 120 ms as the mean of flight logs with u-blox 7 and 8.
   std::int32_t gnss_latency_us = 100'000;
+  std::int32_t lidar = 0;  ///< 0: none, 1: an LD19, on the line of a receiver that is not there
 
-  [[nodiscard]] constexpr bool any() const { return imu != 0 || encoders != 0 || gnss != 0; }
+  [[nodiscard]] constexpr bool any() const { return imu != 0 || encoders != 0 || gnss != 0 || lidar != 0; }
 };
 
 struct Parameters {

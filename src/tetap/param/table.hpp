@@ -388,6 +388,7 @@ inline constexpr std::array kTable{
     TETAP_ROW(0x48D, wired.gnss_period_ms, "ms", 25, 10'000, kRestart, "Period of a configured receiver's fixes."),
     TETAP_ROW(0x48E, wired.gnss_latency_us, "us", 0, 500'000, kRestart,
               "Time from a measurement of the receiver to the last byte of its message."),
+    TETAP_ROW(0x48F, wired.lidar, "", 0, 1, kRestart, "Scanner on the receiver's line: 0 none, 1 an LD19."),
 
     TETAP_ROW(0x4C0, mapping.correlation_m, "m", 0, 100, kLive,
               "Distance over which errors of one landmark's sightings stay alike; 0: independent."),
