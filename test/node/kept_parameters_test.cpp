@@ -317,6 +317,33 @@ TYPED_TEST(KeptParametersTest, WordsThatThisNodeDoesNotTakeAreAsCompiledAndNamed
   EXPECT_EQ(bench.get(index("landmark.sigma_range_m")), std::bit_cast<std::uint32_t>(0.1F));
 }
 
+TYPED_TEST(KeptParametersTest, ASetThatBreaksARuleKeepsItsClaim) {
+  Keeping<TypeParam> bench;
+  const auto begin_with = [&](std::map<std::uint16_t, std::uint32_t> words) {
+    words[firmware::KeptSet::key(row_of("wheels.drive.track_m").index, 0)] = 0;  // breaks a rule
+    words[firmware::KeptSet::key(row_of("landmark.gate_scale").index, 0)] = kTwo;
+    words[firmware::KeptSet::key(row_of("bus.commands").index, 0)] = 1;
+    auto storage = KeepingBoard<TypeParam>::storage();
+    firmware::Journal<TypeParam> journal(storage);
+    ASSERT_EQ(journal.save(Entries{words}), firmware::Saved::kDone);
+    bench.power_cycle();
+  };
+  const std::uint16_t key = firmware::KeptSet::key(row_of("bus.key").index, 0);
+  begin_with({{key, 7}, {static_cast<std::uint16_t>(key + 3), 9}});
+  EXPECT_EQ(bench.get(row_of("bus.commands").index), 1U) << "commands still need a tag";
+  EXPECT_EQ(bench.get(row_of("landmark.gate_scale").index), word_of(kKept, row_of("landmark.gate_scale"), 0));
+  EXPECT_EQ(bench.get(row_of("wheels.drive.track_m").index), std::bit_cast<std::uint32_t>(0.5F));
+  EXPECT_EQ(bench.set(row_of("landmark.gate_scale").index, kTwo), ParamAnswer::kRefused);
+  std::size_t named = 0;
+  for (const base::CanFrame& frame : bench.board->can.sent)
+    if (const auto set = bench.template said<bus::EstParamSet>(frame))
+      named += set->set_answer == ParamAnswer::kNotTogether ? 1U : 0U;
+  EXPECT_EQ(named, 1U);
+  // A claim without its key is none: nobody could command the node.
+  begin_with({});
+  EXPECT_EQ(bench.get(row_of("bus.commands").index), 0U);
+}
+
 TYPED_TEST(KeptParametersTest, AFlashThatFailsLeavesTheSetBefore) {
   Keeping<TypeParam> bench;
   EXPECT_EQ(bench.stage(row_of("landmark.gate_scale"), kTwo), ParamAnswer::kDone);

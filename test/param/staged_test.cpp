@@ -167,6 +167,17 @@ TEST(StagedParameters, KeepAClaimedKeyAndNoOtherAccess) {
   locked.loop.lockstep = Lockstep::kAuthenticated;
   EXPECT_TRUE(equal(loaded(locked, refused), locked));
   EXPECT_GE(refused, 3U);
+  // A rule that other rows break takes no key away.
+  StagedParameters broken(open);
+  std::size_t named_words = 0;
+  const auto with_broken_rule = [&](auto&& take) {
+    owned.each_kept(take);
+    take(row_of("wheels.drive.track_m")->index, std::size_t{0}, 0U);
+  };
+  EXPECT_FALSE(broken.load(with_broken_rule, [&](auto...) { ++named_words; }));
+  EXPECT_TRUE(equal(broken.active(), owned.active()));
+  EXPECT_EQ(broken.staged_crc(), broken.active_crc());
+  EXPECT_EQ(named_words, 0U);
   // Neither identity nor an open door comes out of a flash.
   open.loop.lockstep = Lockstep::kPlain;
   for (const Row& row : kTable) {

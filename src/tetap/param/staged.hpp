@@ -130,9 +130,8 @@ class StagedParameters {
     waits_ = {};
   }
   /// A kept set at power-on, a claimed key among it: each_word(take) with take(index, word, value). Unknown words are
-  /// passed over;
-  /// refused(index, word, answer) for others that are not taken. False: together they break a rule, and everything is
-  /// as compiled.
+  /// passed over; refused(index, word, answer) for others that are not taken. False: together they break a rule, and
+  /// everything but a claim is as compiled.
   template <class Each, class Refused>
   [[nodiscard]] bool load(Each&& each_word, Refused&& refused) {
     active_ = staged_ = compiled_;
@@ -142,8 +141,11 @@ class StagedParameters {
       if (is != Answer::kDone && is != Answer::kUnknown) refused(index, word, is);
     });
     const bool plausible = plausible_together(staged_);
-    (plausible ? active_ : staged_) = plausible ? staged_ : active_;
-    return plausible;
+    if (plausible) return active_ = staged_, true;
+    copy_access(staged_, active_);
+    if (!plausible_together(active_)) active_ = compiled_;
+    staged_ = active_;
+    return false;
   }
   /// take(index, word, value) for each word that a save keeps: of what is active or waits, where it is not as compiled.
   template <class Take>
