@@ -227,6 +227,19 @@ TYPED_TEST(KeptParametersTest, AFloodOfSavesWritesOnceAMinute) {
   }
   EXPECT_EQ(written, 3) << "at once, and after each minute";
   EXPECT_GT(waiting, 500);
+  bench.poll_for(2'000'000);
+  int counted = -1, told = 0, above = 0;
+  for (const base::CanFrame& frame : bench.board->can.sent) {
+    const auto set = bench.template said<bus::EstParamSet>(frame);
+    told += set && set->set_page_id == bus::CmdParamSave::kPage && set->set_answer == ParamAnswer::kBusy ? 1 : 0;
+    if (const auto limits = bench.template said<bus::EstDiagLimits>(frame)) {
+      above += limits->save_refused != counted ? 1 : 0;
+      counted = limits->save_refused;
+    }
+  }
+  EXPECT_EQ(told, waiting);
+  EXPECT_EQ(counted, waiting % 256) << "on the bus, modulo 256";
+  EXPECT_GE(above, 100) << "it shows while the flood is on";
 }
 
 TYPED_TEST(KeptParametersTest, NothingIsSavedInMotionInLockstepOrOfAnotherSet) {

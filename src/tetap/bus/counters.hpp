@@ -47,6 +47,7 @@ struct LoopHealth {
   std::uint16_t sync_gap = 0;      ///< sync frames that were sent, by their counter, and never came
   std::uint16_t sync_bad = 0;      ///< sync frames of wrong length
   std::uint16_t lock_refused = 0;  ///< Begin and Step frames that were refused
+  std::uint8_t save_refused = 0;   ///< saves of parameters that were refused
   base::CanFaults bus;
   bool id_conflict = false;  ///< within the last second a frame came whose id is this node's own
   bool unlogged = false;     ///< a wired sample was consumed that the bus did not take

@@ -56,7 +56,10 @@ void put_diagnostics(std::uint32_t page, const Counters& c, const LoopHealth& l,
 
 /// Pages that are not in this cycle: limits that were reached, and what guards and tags refused.
 [[nodiscard]] constexpr EstDiagLimits limits_page(const Counters& c, const LoopHealth& l) {
-  return {.overload = c.overload, .cmd_rate = c.command_rate, .lock_refused = l.lock_refused};
+  return {.overload = c.overload,
+          .cmd_rate = c.command_rate,
+          .lock_refused = l.lock_refused,
+          .save_refused = l.save_refused};
 }
 [[nodiscard]] constexpr EstDiagGuard guard_page(const Counters& c, std::uint32_t nonce) {
   return {.guard_bad = c.guard_bad, .auth_bad = c.auth_bad, .replayed = c.replayed, .nonce = nonce};

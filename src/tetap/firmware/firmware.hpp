@@ -224,6 +224,7 @@ class Firmware {
       const auto end = kept_.save(node_.parameter_sets(), asked.before, lockstep);
       answer = end.answer, wrote = end.wrote;
     }
+    if (answer != bus::ParamAnswer::kDone) ++health_.save_refused;
     tell(node_.parameter_commands().answer_to(asked, answer));
     if (!wrote) return;
     node_.power_on({});
