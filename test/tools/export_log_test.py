@@ -215,6 +215,47 @@ class ExportLogTest(unittest.TestCase):
         self.epochs(50, log_us=lambda k: begin + 50 * k, Pos={"X": 0, "Y": 0, "Kind": 6}, Motion={"PosValid": 1, "Yaw": 0, "Speed": 0, "YawRate": 0})
         self.assertIsNone(self.export().utc_us)
 
+    def test_time_goes_on_behind_a_power_cycle(self):
+        """Two runs of 300 epochs, the second 7 s behind the first by the clock of the recording host; times of a host, of none, and faster than time."""
+        begin, cycle = 1_795_940_861_000_000, 7_000_000
+        for log_us, apart in ((lambda k: begin + TICK_US * k, cycle), (lambda k: TICK_US * k, cycle), (lambda k: begin + 50 * k, 300 * TICK_US)):
+            self.log = bus_writer.Log(bus_writer.default_dbc())
+            moves = {"Pos": {"X": 0, "Y": 0, "Kind": 6}, "Motion": {"PosValid": 1, "Yaw": 0, "Speed": 0, "YawRate": 0}}
+            self.epochs(300, log_us=log_us, Std={"Sel": 0, "StdX": 3, "StdY": 1, "StdYaw": 0, "CorrXY": 0}, **moves)
+            for stamp in (20_000, 10_000):  # of samples from before its first epoch, the older one comes last
+                at = log_us(1) + cycle - 2000
+                for name, values in (("Gyro", "Ang"), ("Accel", "Vel")):
+                    self.log.add(f"In_Imu0{name}", at, Seq=stamp // TICK_US, **{values + axis: 0 for axis in "XYZ"})
+                self.log.add("In_Imu0Time", at, Stamp=stamp, Interval=10_000, Seq=stamp // TICK_US)
+            self.epochs(300, log_us=lambda k: log_us(k) + cycle, **moves)
+            export = self.export()
+            topic, of_node = self.topic(export, "/tetap/odometry"), TICK_US * np.arange(1, 301)
+            self.assertEqual(export.clock.restarts, 1)
+            np.testing.assert_array_equal(topic.time_us, np.append(of_node, of_node + apart))
+            self.assertEqual([one[0] for one in topic.columns["pose.covariance"]], [9.0] * 300 + [1e6] * 300)
+            if apart == cycle:
+                np.testing.assert_array_equal(self.topic(export, "/tetap/imu0").time_us, np.array([20_000, 10_000]) + cycle)
+            export.write_mcap(self.path("a.mcap"))
+            seen = self.messages(self.path("a.mcap"))
+            self.assertEqual([time for time, _, _ in seen], sorted(time for time, _, _ in seen))
+            for channel in {one for _, one, _ in seen}:
+                numbers = [sequence for _, one, sequence in seen if one == channel]
+                self.assertEqual(numbers, list(range(len(numbers))))
+
+    @staticmethod
+    def messages(path):
+        """(log time, channel, sequence) of each message, in the order of the file."""
+        with open(path, "rb") as file:
+            data = file.read()
+        found, at, end = [], 8, len(data) - 8
+        while at < end:
+            opcode, length = struct.unpack_from("<BQ", data, at)
+            if opcode == 5:
+                channel, sequence, time_ns = struct.unpack_from("<HIQ", data, at + 9)
+                found.append((time_ns, channel, sequence))
+            at += 9 + (40 if opcode == 6 else length)  # a chunk's records lie behind its head
+        return found
+
     def test_diagnostics_name_faults_and_refusals_with_their_reason(self):
         table = bus_writer.default_dbc().tables
         self.log.add("Est_Epoch", 1, Time=TICK_US)

@@ -12,12 +12,13 @@ INSTANCES = 4
 
 
 def held(clock, page, field, epochs):
-    """Values of a page's field at these epochs: the last that was sent up to each, NaN before the first."""
+    """Values of a page's field at these epochs: the last that was sent up to each, NaN before the first behind a power-on."""
     if not len(page):
         return np.full(len(epochs), np.nan)
     of = clock.index(page.at)
     last = np.searchsorted(of, epochs, side="right") - 1
-    return np.where(last >= 0, page[field][np.maximum(last, 0)].astype(float), np.nan)
+    known = (last >= 0) & (of[np.maximum(last, 0)] >= clock.power_on(epochs))
+    return np.where(known, page[field][np.maximum(last, 0)].astype(float), np.nan)
 
 
 def matrix(q):
@@ -78,7 +79,7 @@ class Estimate:
         sent = clock.index(attitude.at)
         last = np.searchsorted(sent, self.epoch, side="right") - 1
         q = np.stack([attitude[axis][np.maximum(last, 0)] for axis in "WXYZ"], axis=1)
-        known = (last >= 0) & np.isfinite(q).all(axis=1)
+        known = (last >= 0) & (sent[np.maximum(last, 0)] >= clock.power_on(self.epoch)) & np.isfinite(q).all(axis=1)
         q = np.where(known[:, None], q, (1, 0, 0, 0))
         q /= np.linalg.norm(q, axis=1, keepdims=True)
         ahead = np.arctan2(2 * (q[:, 0] * q[:, 3] + q[:, 1] * q[:, 2]), 1 - 2 * (q[:, 2] ** 2 + q[:, 3] ** 2))

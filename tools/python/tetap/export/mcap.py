@@ -11,6 +11,7 @@ STATISTICS, METADATA, METADATA_INDEX, SUMMARY_OFFSET, DATA_END = range(0x0B, 0x1
 CHUNK_BYTES = 1 << 20
 MESSAGE_HEAD = np.dtype({"names": ["opcode", "length", "channel", "sequence", "log_time", "publish_time"], "formats": ["u1", "<u8", "<u2", "<u4", "<u8", "<u8"],
                          "offsets": [0, 1, 9, 11, 15, 23], "itemsize": 31})
+SEQUENCE = slice(11, 15)
 
 
 def record(opcode, content):
@@ -47,13 +48,25 @@ class File:
         """Messages of one channel: rows is a matrix of bytes, a message a row."""
         head = np.zeros(len(time_ns), MESSAGE_HEAD)
         head["opcode"], head["length"], head["channel"] = MESSAGE, MESSAGE_HEAD.itemsize - 9 + rows.shape[1], channel
-        before = sum(len(block[1]) for block in self.blocks if block[0] == channel)
-        head["sequence"] = before + np.arange(len(time_ns))
         head["log_time"] = head["publish_time"] = time_ns
         self.blocks.append((channel, np.asarray(time_ns, np.uint64), np.hstack([head.view(np.uint8).reshape(len(time_ns), -1), rows])))
 
+    def _count(self):
+        """Numbers the messages of each channel in order of time, from 0: a reader finds a gap by `sequence`."""
+        if not self.blocks:
+            return
+        channel = np.concatenate([np.full(len(times), number) for number, times, _ in self.blocks])
+        order = np.lexsort((np.concatenate([times for _, times, _ in self.blocks]), channel))
+        ordered, sequence = channel[order], np.empty(len(order), "<u4")
+        sequence[order] = np.arange(len(order)) - np.searchsorted(ordered, ordered)
+        first = 0
+        for _, times, rows in self.blocks:
+            rows[:, SEQUENCE] = sequence[first:first + len(times)].view(np.uint8).reshape(-1, 4)
+            first += len(times)
+
     def _records(self):
         """(time, channel, bytes) of each message, in order of time."""
+        self._count()
         made = []
         for channel, time_ns, rows in self.blocks:
             data, size = memoryview(rows.tobytes()), rows.shape[1]
