@@ -2,15 +2,14 @@
 #include "sim_host/kept_words.hpp"
 
 #include "hal/board/linux/clock.hpp"
+#include "sim_host/parameter_word.hpp"
 #include "tetap/bus/codec.hpp"
 #include "tetap/bus/e2e.hpp"
 #include "tetap/param/crc.hpp"
 #include "tetap/param/staged.hpp"
 #include "tetap/param/stored_row.hpp"
-#include "tetap/param/table.hpp"
 
 #include <algorithm>
-#include <cstring>
 
 namespace tetap::sim {
 namespace {
@@ -18,12 +17,6 @@ namespace {
 constexpr int kEpochs = 6'000;      ///< a minute, six times as long as the node pauses between two lists
 constexpr std::size_t kAtOnce = 6;  ///< a node keeps eight answers
 constexpr base::Micros kPatience{2'000'000};
-
-std::uint32_t word_of(const param::Parameters& p, const param::StoredRow& row, std::size_t word) {
-  std::uint32_t value = 0;
-  std::memcpy(&value, reinterpret_cast<const char*>(&p) + row.offset + 4 * word, sizeof value);
-  return value;
-}
 
 /// Reads answers until `wanted(frame)` has been true for so many of them, or a command is refused.
 template <class Wanted>
@@ -49,8 +42,7 @@ Result<> await(InProcessLink& link, std::size_t count, Wanted&& wanted) {
 param::Parameters KeptWords::over(param::Parameters compiled) const {
   for (const KeptWord& one : words)
     for (const param::StoredRow& row : param::kStoredRows)
-      if (row.index == one.row && one.word < row.words && !row.access)
-        std::memcpy(reinterpret_cast<char*>(&compiled) + row.offset + std::size_t{4} * one.word, &one.value, 4);
+      if (row.index == one.row && one.word < row.words && !row.access) put_word(compiled, row, one.word, one.value);
   return compiled;
 }
 
@@ -81,15 +73,20 @@ std::optional<KeptWords> kept_words_of(Frames& log, std::uint32_t log_base) {
   return kept.words.empty() ? std::nullopt : std::optional(std::move(kept));
 }
 
-std::string settings_between(const param::Parameters& from, const param::Parameters& to) {
-  std::string words;
-  for (const param::Row& row : param::kTable) {
-    std::string value = value_text(row, to);
-    if (value == value_text(row, from)) continue;
-    std::replace(value.begin(), value.end(), ' ', ',');
-    words += (words.empty() ? "" : " ") + std::string(row.path) + "=" + value;
-  }
-  return words;
+std::optional<Begun> begun_of(Frames& log, std::uint32_t log_base, const Robot& robot,
+                              const param::Parameters& of_node) {
+  if (!robot.takes.parameters) return std::nullopt;
+  const auto kept = kept_words_of(log, log_base);
+  if (!kept) return std::nullopt;
+  param::Parameters built = *robot.parameters;
+  built.can_base = log_base;
+  Begun begun{.from = of_node, .to = kept->over(of_node), .built = built, .active = kept->over(built)};
+  begun.exact = param::crc(begun.active) == kept->config;
+  for (const param::StoredRow& row : param::kStoredRows)
+    for (std::size_t word = 0; word < row.words; ++word)
+      if (const std::uint32_t own = word_of(of_node, row, word); own != word_of(built, row, word))
+        put_word(begun.to, row, word, own);
+  return begun;
 }
 
 Result<> make_active(InProcessLink& link, const param::Parameters& from, const param::Parameters& to) {

@@ -3,7 +3,6 @@
 // changed them before. The log names them behind the begin (Est_Param); a replay makes them active before its own.
 #pragma once
 
-#include "sim_host/parameter_settings.hpp"
 #include "sim_host/replay/log.hpp"
 #include "sim_host/replay/memory_node.hpp"
 
@@ -32,8 +31,17 @@ struct KeptWords {
 /// rewinds the log.
 [[nodiscard]] std::optional<KeptWords> kept_words_of(Frames& log, std::uint32_t log_base);
 
-/// `PATH=VALUE` of each row that differs, with blanks between, as SET= takes them.
-[[nodiscard]] std::string settings_between(const param::Parameters& from, const param::Parameters& to);
+/// Begin of a log whose node had other parameters than its robot is built with.
+struct Begun {
+  param::Parameters from, to;       ///< parameters of the node in this process, and those that repeat the log
+  param::Parameters built, active;  ///< parameters of the robot, and those of the log's node
+  bool exact = false;               ///< the log names all of them
+};
+
+/// Nothing where the log's node began as its robot is built, or takes no parameters. `of_node` are those of the node
+/// in this process; what they set over the robot's own stays.
+[[nodiscard]] std::optional<Begun> begun_of(Frames& log, std::uint32_t log_base, const Robot& robot,
+                                            const param::Parameters& of_node);
 
 /// Makes `to` active on the node at the other end of the link, which is as `from`. Rows that need a restart wait for
 /// the next begin. Fails where the node refuses, or gives no answer for two seconds.

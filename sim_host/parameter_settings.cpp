@@ -135,6 +135,17 @@ std::string value_text(const param::Row& row, const param::Parameters& parameter
   return text;
 }
 
+std::string settings_between(const param::Parameters& from, const param::Parameters& to) {
+  std::string words;
+  for (const param::Row& row : param::kTable) {
+    std::string value = value_text(row, to);
+    if (value == value_text(row, from)) continue;
+    std::replace(value.begin(), value.end(), ' ', ',');
+    words += (words.empty() ? "" : " ") + std::string(row.path) + "=" + value;
+  }
+  return words;
+}
+
 std::string json_value(const param::Row& row, const param::Parameters& parameters) {
   std::string value = value_text(row, parameters);
   for (std::size_t at = 0; (at = value.find(' ', at)) != std::string::npos; at += 2) value.replace(at, 1, ", ");

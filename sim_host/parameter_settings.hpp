@@ -56,6 +56,9 @@ inline constexpr std::string_view kParameterHelp =
 /// Elements with blanks between; the shortest decimals that read back as the same bits.
 [[nodiscard]] std::string value_text(const param::Row& row, const param::Parameters& parameters);
 
+/// `PATH=VALUE` of each row that differs, with blanks between, as SET= takes them.
+[[nodiscard]] std::string settings_between(const param::Parameters& from, const param::Parameters& to);
+
 /// Value as JSON: a list where the row has elements.
 [[nodiscard]] std::string json_value(const param::Row& row, const param::Parameters& parameters);
 

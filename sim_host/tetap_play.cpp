@@ -8,8 +8,6 @@
 
 #include "sim_host/play/play.hpp"
 #include "sim_host/robots.hpp"
-#include "tetap/param/crc.hpp"
-#include "tetap/param/table.hpp"
 #include "version.hpp"
 
 #include <cstdio>
@@ -22,33 +20,19 @@ namespace {
 
 using namespace tetap;
 
-/// Parameters of the node in this process, and those with which the node of the log began.
-struct Begun {
-  param::Parameters from, to;
-};
-
-/// Nothing where the log's node began as its robot is built. What the user sets stays as he sets it.
-std::optional<Begun> begun_of(sim::SurveyedLog& log, sim::PlayOptions& options,
-                              const sim::ParameterSettings& settings) {
-  if (options.robot.empty() || !sim::robot_named(options.robot).takes.parameters) return std::nullopt;
-  const auto kept = sim::kept_words_of(log.file, options.script.log_base);
-  if (!kept) return std::nullopt;
-  param::Parameters compiled = sim::parameters_of(options.robot);
-  compiled.can_base = options.script.log_base;
-  const param::Parameters active = kept->over(compiled);
-  const std::string words = sim::settings_between(compiled, active);
-  const bool exact = param::crc(active) == kept->config;
+/// Begin of the log's node; a line on standard error where its parameters are not its robot's own.
+std::optional<sim::Begun> begun_of(sim::SurveyedLog& log, sim::PlayOptions& options,
+                                   const sim::ParameterSettings& settings) {
+  if (options.robot.empty()) return std::nullopt;
+  const param::Parameters of_node =
+      sim::MemoryNode::for_player(sim::parameters_of(options.robot, settings), options.script.base);
+  auto begun = sim::begun_of(log.file, options.script.log_base, sim::robot_named(options.robot), of_node);
+  if (!begun) return std::nullopt;
+  const std::string words = sim::settings_between(begun->built, begun->active);
   std::fprintf(stderr, "tetap-play: %s: its node began with %s%s%s\n", options.log.c_str(), words.c_str(),
-               exact ? "" : " and more, which the log does not name",
+               begun->exact ? "" : " and more, which the log does not name",
                options.memory ? "" : "; the node that it is played to needs them as well (SET=)");
   options.notes.emplace_back("began_with", sim::quoted(words));
-  if (!options.memory) return std::nullopt;
-  const param::Parameters set = sim::parameters_of(options.robot, settings);
-  Begun begun{.from = sim::MemoryNode::for_player(set, options.script.base), .to = {}};
-  begun.to = kept->over(begun.from);
-  for (const param::Row& row : param::kTable)
-    if (!param::is_secret(row) && sim::value_text(row, set) != sim::value_text(row, compiled))
-      for (std::size_t i = 0; i < row.elements; ++i) row.set(begun.to, i, row.get(begun.from, i));
   return begun;
 }
 

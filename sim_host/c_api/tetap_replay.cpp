@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sim_host/c_api/tetap_replay.h"
 
+#include "sim_host/kept_words.hpp"
 #include "sim_host/parameter_settings.hpp"
 #include "sim_host/replay/complaint.hpp"
 #include "sim_host/replay/lockstep.hpp"
@@ -114,7 +115,7 @@ struct tetap_replay {
   Frames frames;
   std::unique_ptr<Ticked> ticked;
   std::vector<base::CanFrame> inputs;  ///< for the next tick
-  std::string error, complaint, json;
+  std::string error, complaint, json, began_with;
 };
 
 sim::Result<> tetap_replay::push(std::span<const tetap_frame> given, int& taken) {
@@ -166,8 +167,14 @@ sim::Result<> tetap_replay::play(std::string_view text, const std::string& name,
   if (repeats && !survey->recording) return sim::Failure{survey->refusal};
   if (!repeats && survey->ticks == 0) return sim::Failure{name + ": no input frames of this id base"};
 
+  const auto begun = sim::begun_of(log, can_base(), robot, parameters);
   frames.clear();
   sim::MemoryNode node(robot, parameters, version());
+  if (begun) {
+    began_with = sim::settings_between(begun->built, begun->active);
+    if (auto made = sim::make_active(node.link(), begun->from, begun->to); !made)
+      return sim::Failure{name + ": its node began with " + began_with + "; " + made.failure().text};
+  }
   const sim::LockstepOptions lockstep{.base = can_base()};
   sim::Counts counts;
   const auto finished = [&](const sim::Result<>& played, const sim::Comparison* comparison) -> sim::Result<> {
@@ -283,6 +290,7 @@ int tetap_replay_play(tetap_replay* replay, const char* log, std::size_t size, c
                       tetap_replay_result* result) {
   return guarded(replay, [&]() -> sim::Result<> {
     replay->complaint.clear();
+    replay->began_with.clear();
     const auto settled = mode_of(mode);
     if (log == nullptr) return sim::Failure{"no log is given"};
     if (!settled) return sim::Failure{"no mode " + std::to_string(mode)};
@@ -295,4 +303,8 @@ int tetap_replay_play(tetap_replay* replay, const char* log, std::size_t size, c
 
 std::size_t tetap_replay_read(tetap_replay* replay, tetap_frame* frames, std::size_t room) {
   return replay == nullptr ? 0 : replay->frames.read(frames, room);
+}
+
+const char* tetap_replay_began_with(const tetap_replay* replay) {
+  return replay == nullptr ? "" : replay->began_with.c_str();
 }

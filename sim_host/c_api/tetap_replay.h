@@ -13,7 +13,7 @@ extern "C" {
 #endif
 
 /* Of this header. A library of the same number has all that is in it; it grows by functions at the end. */
-#define TETAP_REPLAY_API 1
+#define TETAP_REPLAY_API 2
 
 /* A node and the frames that it has sent. Two of them share nothing; one is for one thread at a time. */
 typedef struct tetap_replay tetap_replay;
@@ -84,6 +84,11 @@ const char* tetap_replay_complaint(const tetap_replay* replay);
 
 /* Takes up to `room` frames of the node, oldest first; their number. NULL for `frames`: how many there are. */
 size_t tetap_replay_read(tetap_replay* replay, tetap_frame* frames, size_t room);
+
+/* Since API 2. With which parameters the node of the last log that was played began, where they are not its robot's
+   own: `PATH=VALUE` with spaces between, as its board kept them or the bus had set them. The node of the play takes
+   them from the log; `settings` of the open stay. Empty: as its robot is built. */
+const char* tetap_replay_began_with(const tetap_replay* replay);
 
 #ifdef __cplusplus
 }

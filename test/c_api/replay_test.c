@@ -75,6 +75,7 @@ static void by_log(const char* log, size_t size) {
   CHECK(tetap_replay_play(one, log, size, "a.log", TETAP_REPLAY_AUTOMATIC, &record) == 0, one);
   CHECK(record.recorded == 1 && record.compared == record.epochs && record.epochs > 1000 && record.different == 0, one);
   CHECK(record.frames_lost == 0 && tetap_replay_complaint(one)[0] == '\0', one);
+  CHECK(tetap_replay_began_with(one)[0] == '\0' && tetap_replay_began_with(NULL)[0] == '\0', one);
   const size_t there = tetap_replay_read(one, NULL, 0);
   CHECK(there > 4 * record.epochs, one);
   CHECK(tetap_replay_play(one, log, size, NULL, TETAP_REPLAY_INPUTS, &inputs) == 0, one);

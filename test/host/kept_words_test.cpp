@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A log whose node began with other parameters than its robot is built with, and a node that repeats it.
 #include "sim_host/kept_words.hpp"
+#include "sim_host/parameter_settings.hpp"
 
 #include "node/bench.hpp"
 #include "tetap/firmware/firmware.hpp"

@@ -73,6 +73,34 @@ class ReplayLibraryTest(unittest.TestCase):
         stated = json.loads(run(os.path.join(PROGRAMS, "tetap-params"), "--robot", "rover", "--json").stdout)
         self.assertEqual(tetap.parameters("rover"), {row["path"]: row["value"] for row in stated["parameters"]})
 
+    def test_a_log_says_with_which_parameters_its_node_began(self):
+        """A record of a robot that is built with another radius, and the same as of a board that kept this radius: one word is told behind the begin."""
+        path, out = "wheels.drive.left_radius_m", os.path.join(self.folder.name, "kept")
+        with open(os.path.join(ROOT, "test/param/indices.txt"), encoding="ascii") as file:
+            row = int({line.split()[1]: line.split()[0] for line in file if line.startswith("0x")}[path], 16)
+        made = run(os.path.join(PROGRAMS, "tetap-world"), "--memory", "--robot", "mrclam", "--duration", "25", "--raw", "--quiet", "--set", path + "=0.05", "--out", out)
+        self.assertEqual(made.returncode, 0, made.stderr)
+        built = os.path.join(out, "raw.log")
+        with open(built, encoding="ascii") as file:
+            lines = file.readlines()
+        at = next(i for i, line in enumerate(lines) if " 348#1D3E0000" in line)  # Est_Param behind the begin: no word is not as compiled
+
+        def kept(radius):
+            log, value = os.path.join(out, f"kept_{radius}.log"), int.from_bytes(np.float32(radius).tobytes(), "little")
+            identifier, data = tetap.encode("Est_Param", Kind="Row", RowSource="Active", RowWord=0, RowId=row, RowAnswer="Done", RowCtr="NotAvailable", RowValue=value)
+            words = [lines[at].replace("#1D3E0000", "#1D3E0001"), f"{lines[at].split('#')[0][:-3]}{identifier:X}#{data.hex().upper()}\n"]
+            with open(log, "w", encoding="ascii") as file:
+                file.writelines(lines[:at] + words + lines[at + 1:])
+            return log
+        again, expected, without = tetap.replay(kept(0.05), "mrclam"), tetap.replay(built, "mrclam", set={path: 0.05}), tetap.replay(built, "mrclam")
+        self.assertEqual((again.began_with, expected.began_with, expected.different), (f"{path}=0.05", "", 0))
+        np.testing.assert_array_equal(again["Est_StateCrc"].Crc, expected["Est_StateCrc"].Crc)
+        self.assertGreater(np.count_nonzero(without["Est_StateCrc"].Crc != expected["Est_StateCrc"].Crc), 1000)
+        own = {path: 0.06}  # what the user sets stays
+        np.testing.assert_array_equal(tetap.replay(kept(0.05), "mrclam", set=own)["Est_StateCrc"].Crc, tetap.replay(built, "mrclam", set=own)["Est_StateCrc"].Crc)
+        with self.assertRaisesRegex(tetap.BadInput, f"kept_500.log: its node began with {path}=500.*; the node refuses the parameters"):
+            tetap.replay(kept(500), "mrclam")
+
     def test_ticks_of_ones_own_make_the_same_states(self):
         recorded, expected = tetap.decode(self.log), tetap.replay(self.log, "rover", mode="inputs")["Est_StateCrc"].Crc
         sync = recorded["In_Sync"]

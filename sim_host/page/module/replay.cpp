@@ -1,15 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sim_host/page/module/replay.hpp"
 
+#include "sim_host/kept_words.hpp"
 #include "sim_host/page/module/browser.hpp"
 #include "sim_host/page/module/json.hpp"
 #include "sim_host/page/module/observer.hpp"
 #include "sim_host/page/module/updates.hpp"
+#include "sim_host/parameter_word.hpp"
 #include "sim_host/replay/complaint.hpp"
 #include "sim_host/replay/lockstep.hpp"
 #include "sim_host/replay/memory_node.hpp"
+#include "tetap/param/table.hpp"
 #include "version.hpp"
 
+#include <cstddef>
+#include <iterator>
+#include <optional>
 #include <string>
 
 namespace tetap::page {
@@ -57,10 +63,22 @@ void put_result(Observer& run, const sim::Result<>& played, const sim::Compariso
   write(Channel::kResult, json.end('}').text());
 }
 
-void put_begun(const BrowserLog& log, const char* mode, std::uint64_t ticks) {
+void put_begun(const sim::LogReport& report, const char* mode, std::uint64_t ticks,
+               const std::optional<sim::Begun>& begun) {
   Json json;
-  json.begin('{').member("mode", mode).member("ticks", ticks);
-  put_report(json, log.report());
+  json.begin('{').member("mode", mode).member("ticks", ticks).key("began_with").begin('[');
+  for (std::size_t i = 0; begun && i < std::size(param::kTable); ++i) {
+    const param::Row& row = param::kTable[i];
+    bool same = true;
+    for (std::size_t word = 0; word < row.size / 4; ++word)
+      same = same && sim::word_of(begun->built, row, word) == sim::word_of(begun->active, row, word);
+    if (same) continue;
+    json.begin('{').member("path", row.path).key("values").begin('[');
+    for (std::size_t k = 0; k < row.elements; ++k) json.value(row.get(begun->active, k));
+    json.end(']').end('}');
+  }
+  json.end(']');
+  put_report(json, report);
   write(Channel::kBegun, json.end('}').text());
 }
 
@@ -103,6 +121,11 @@ sim::Result<Prepared> prepared(BrowserLog& log, const ReplayOptions& options, co
   return Prepared{*survey, repeats};
 }
 
+/// Parameters with which the log's node began, for the node that repeats it.
+sim::Result<> take(const std::optional<sim::Begun>& begun, sim::MemoryNode& node) {
+  return begun ? sim::make_active(node.link(), begun->from, begun->to) : sim::Result<>{};
+}
+
 sim::ScriptOptions script_of(const sim::Robot& robot, const ReplayOptions& options) {
   return {.base = options.base, .log_base = options.base, .map_inputs = robot.takes.map_inputs()};
 }
@@ -115,10 +138,14 @@ sim::Result<> replay(const sim::Robot& robot, const param::Parameters& parameter
   const auto ready = prepared(log, options, script);
   if (!ready) return ready.failure();
   const auto& recording = ready->survey.recording;
-  put_begun(log, ready->repeats ? "as-recorded" : "lockstep", ready->repeats ? recording->epochs : ready->survey.ticks);
-
   const param::Parameters of_node = sim::MemoryNode::for_player(parameters, options.base);
+  const sim::LogReport report = log.report();
+  const auto begun = sim::begun_of(log, options.base, robot, of_node);
+  put_begun(report, ready->repeats ? "as-recorded" : "lockstep",
+            ready->repeats ? recording->epochs : ready->survey.ticks, begun);
+
   sim::MemoryNode node(robot, of_node, version());
+  if (auto taken = take(begun, node); !taken) return taken;
   const sim::LockstepOptions lockstep{.base = options.base};
   if (ready->repeats) {
     sim::RecordedTicks ticks(log, *recording, script);
@@ -142,6 +169,7 @@ sim::Result<> updates_until(const sim::Robot& robot, const param::Parameters& pa
   if (!ready) return ready.failure();
   const param::Parameters of_node = sim::MemoryNode::for_player(parameters, options.base);
   sim::MemoryNode node(robot, of_node, version());
+  if (auto taken = take(sim::begun_of(log, options.base, robot, of_node), node); !taken) return taken;
   const sim::LockstepOptions lockstep{.base = options.base, .window = 1, .interrupted = &UpdatesUntil::interrupted};
   UpdatesUntil run(time, span);
   sim::Counts counts;

@@ -18,11 +18,11 @@ from tetap.library import Node, settings
 
 class Replay(Messages):
     """The frames that a node sent in a replay. `epochs`, `compared`, `different`, `frames_in`, `frames_lost`, `state_crc`, `recorded` as in
-    tetap_replay.h; `complaint` is what is wrong, or ""."""
+    tetap_replay.h; `complaint` is what is wrong, or ""; `began_with` as of Node."""
 
-    def __init__(self, frames, base, result, complaint):
+    def __init__(self, frames, base, result, complaint, began_with=""):
         super().__init__(frames, base)
-        self.complaint = complaint
+        self.complaint, self.began_with = complaint, began_with
         for name, _ in result._fields_:
             setattr(self, name, getattr(result, name))
 
@@ -52,7 +52,7 @@ def replay(log, robot, set=None, mode="automatic"):
         raise BadInput(f"{log}: {error.strerror}") from None
     with Node(robot, set) as node:
         result, complaint = node.play(text, str(log), mode)
-        return Replay(node.read(), node.parameters["can_base"], result, complaint)
+        return Replay(node.read(), node.parameters["can_base"], result, complaint, node.began_with)
 
 
 def parameters(robot, set=None):

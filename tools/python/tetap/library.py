@@ -10,7 +10,7 @@ import numpy as np
 from tetap.can import columns
 from tetap.can.bus_writer import ROOT, BadInput
 
-API = 1  # TETAP_REPLAY_API
+API = 2  # TETAP_REPLAY_API
 MODES = {"automatic": 0, "inputs": 1, "as-recorded": 2}
 FRAME = np.dtype({"names": ["time_us", "id", "size", "extended", "data"], "formats": ["<i8", "<u4", "u1", "u1", ("u1", 8)], "offsets": [0, 8, 12, 13, 16],
                   "itemsize": 24})
@@ -32,15 +32,16 @@ def library():
     except OSError as error:
         raise BadInput(f"{path}: not built (make programs): {error}") from None
     pointer, text = ctypes.c_void_p, ctypes.c_char_p
-    for name, result, arguments in (("api", ctypes.c_uint32, []), ("robots", text, []), ("open", pointer, [text, text]), ("close", None, [pointer]),
+    found.tetap_replay_api.restype = ctypes.c_uint32
+    if found.tetap_replay_api() < API:
+        raise BadInput(f"{path}: of API {found.tetap_replay_api()}, this needs {API}: make programs")
+    for name, result, arguments in (("robots", text, []), ("open", pointer, [text, text]), ("close", None, [pointer]),
                                     ("error", text, [pointer]), ("complaint", text, [pointer]), ("parameters", text, [pointer]),
                                     ("push", ctypes.c_int, [pointer, pointer, ctypes.c_size_t]), ("tick", ctypes.c_int, [pointer, ctypes.c_int64]),
                                     ("play", ctypes.c_int, [pointer, text, ctypes.c_size_t, text, ctypes.c_int, ctypes.POINTER(Result)]),
-                                    ("read", ctypes.c_size_t, [pointer, pointer, ctypes.c_size_t])):
+                                    ("read", ctypes.c_size_t, [pointer, pointer, ctypes.c_size_t]), ("began_with", text, [pointer])):
         function = getattr(found, "tetap_replay_" + name)
         function.restype, function.argtypes = result, arguments
-    if found.tetap_replay_api() < API:
-        raise BadInput(f"{path}: of API {found.tetap_replay_api()}, this needs {API}: make programs")
     return found
 
 
@@ -113,6 +114,12 @@ class Node:
         result = Result()
         self._done(self._library.tetap_replay_play(self._open(), log, len(log), name.encode(), MODES[mode], ctypes.byref(result)))
         return result, self._library.tetap_replay_complaint(self._node).decode()
+
+    @property
+    def began_with(self):
+        """Parameters with which the node of the last log began where they are not its robot's own, as "path=value path=value"; the play's node has
+        taken them from the log, but for those of `set`."""
+        return self._library.tetap_replay_began_with(self._open()).decode()
 
     def read(self):
         """The frames that the node has sent since the last read (columns.Frames), their times those of their epochs."""
