@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sim_host/control/parameter_client.hpp"
 
+#include "sim_host/parameter_word.hpp"
 #include "tetap/bus/codec.hpp"
 #include "tetap/bus/e2e.hpp"
 #include "tetap/param/crc.hpp"
@@ -8,7 +9,6 @@
 #include "tetap/param/staged.hpp"
 #include "tetap/param/table.hpp"
 
-#include <cstring>
 #include <string>
 
 namespace tetap::sim {
@@ -26,11 +26,6 @@ constexpr const char* kKeyWhy =
     "its robot names no WithBusProtection";
 constexpr const char* kTagWhy = "the node refuses the tag: it has another key";
 
-std::uint32_t word_of(const param::Parameters& p, const param::Row& row, std::size_t word) {
-  std::uint32_t value = 0;
-  std::memcpy(&value, reinterpret_cast<const char*>(&p) + row.offset + 4 * word, sizeof value);
-  return value;
-}
 std::string why(bus::ParamAnswer answer) {
   switch (answer) {
     case bus::ParamAnswer::kUnknown:
@@ -134,8 +129,7 @@ param::Parameters ParameterClient::read(bus::ParamSource source) {
   });
   param::Parameters p;
   p.bus.key = {};
-  for (const Word& word : words)
-    std::memcpy(reinterpret_cast<char*>(&p) + word.row->offset + std::size_t{4} * word.word, &word.value, 4);
+  for (const Word& word : words) put_word(p, *word.row, word.word, word.value);
   if (p.bus.commands == param::CommandAccess::kAuthenticated) p.bus.key = {1, 0, 0, 0};
   return p;
 }

@@ -13,54 +13,53 @@
 
 namespace tetap::sim {
 
-/// "?" for a code that has no name.
+/// The name of a code; "?" for one that has none.
+template <std::size_t kCount, class Code>
+[[nodiscard]] constexpr std::string_view named(const std::array<std::string_view, kCount>& names, Code code) {
+  const auto i = static_cast<std::size_t>(code);
+  return i < kCount ? names[i] : "?";
+}
+
 [[nodiscard]] constexpr std::string_view name(sensor::Sensor value) {
   constexpr std::array<std::string_view, 14> kNames{
       "Imu",          "WheelCounts", "WheelSpeed", "BodySpeed", "RangeBearing", "GnssPosition", "GnssVelocity",
       "Magnetometer", "Barometer",   "Heading",    "Closure",   "Feature",      "Scan",         "RelativePose"};
-  const auto i = static_cast<std::size_t>(value);
-  return value == sensor::Sensor::kNotAvailable ? "NotAvailable" : i < kNames.size() ? kNames[i] : "?";
+  return value == sensor::Sensor::kNotAvailable ? "NotAvailable" : named(kNames, value);
 }
 [[nodiscard]] constexpr std::string_view name(sensor::Verdict value) {
   constexpr std::array<std::string_view, 13> kNames{
       "Accepted", "Rejected",    "NotUsed",   "TooLate", "UnknownLandmark", "Singular", "NotFinite",
       "Stale",    "NewLandmark", "Ambiguous", "NoRoom",  "Pending",         "Outlier"};
-  const auto i = static_cast<std::size_t>(value);
-  return i < kNames.size() ? kNames[i] : "?";
+  return named(kNames, value);
 }
 [[nodiscard]] constexpr std::string_view name(sensor::Mode value) {
   constexpr std::array<std::string_view, 10> kNames{"Boot",          "WaitingForPose", "Aligning", "Nominal",
                                                     "DeadReckoning", "Degraded",       "Fault",    "WaitingForImu",
                                                     "Levelling",     "FindingHeading"};
-  const auto i = static_cast<std::size_t>(value);
-  return i < kNames.size() ? kNames[i] : "?";
+  return named(kNames, value);
 }
 [[nodiscard]] constexpr std::string_view name(sensor::ResetCause value) {
   constexpr std::array<std::string_view, 12> kNames{"PowerOn",   "Command",       "SetPose",       "TimeJump",
                                                     "NotFinite", "NotPositive",   "PositionJump",  "HeadingWrong",
                                                     "Diverged",  "BarometerZero", "MagneticField", "NewOrigin"};
-  const auto i = static_cast<std::size_t>(value);
-  return i < kNames.size() ? kNames[i] : "?";
+  return named(kNames, value);
 }
 [[nodiscard]] constexpr std::string_view name(sensor::EstimatorKind value) {
   constexpr std::array<std::string_view, 15> kNames{"None",     "Odometry",  "Ekf",      "Kf",     "Ukf",
                                                     "Particle", "Inertial",  "Attitude", "Grid",   "EkfSlam",
                                                     "FastSlam", "PoseGraph", "Msckf",    "Fusion", "ScanOdometry"};
-  const auto i = static_cast<std::size_t>(value);
-  return i < kNames.size() ? kNames[i] : "?";
+  return named(kNames, value);
 }
 
 [[nodiscard]] constexpr std::string_view name(bus::GraphStatus value) {
   constexpr std::array<std::string_view, 5> kNames{"None", "Converged", "NotConverged", "Singular", "NoRoom"};
-  const auto i = static_cast<std::size_t>(value);
-  return i < kNames.size() ? kNames[i] : "?";
+  return named(kNames, value);
 }
 [[nodiscard]] constexpr std::string_view name(bus::FaultRow value) {
   constexpr std::array<std::string_view, 14> kNames{
       "ImuGyroX",  "ImuGyroY", "ImuGyroZ",    "ImuAccelX",    "ImuAccelY", "ImuAccelZ",    "GnssEast",
       "GnssNorth", "GnssUp",   "GnssVelEast", "GnssVelNorth", "GnssVelUp", "SpeedForward", "Heading"};
-  const auto i = static_cast<std::size_t>(value);
-  return value == bus::FaultRow::kNone ? "None" : i < kNames.size() ? kNames[i] : "?";
+  return value == bus::FaultRow::kNone ? "None" : named(kNames, value);
 }
 /// As a text prints it.
 [[nodiscard]] constexpr std::string_view unit(bus::FaultUnit value) {
@@ -70,20 +69,17 @@ namespace tetap::sim {
 }
 [[nodiscard]] constexpr std::string_view name(sensor::SourceState value) {
   constexpr std::array<std::string_view, 5> kNames{"Stopped", "Confirming", "Fusing", "Rejecting", "Distrusted"};
-  const auto i = static_cast<std::size_t>(value);
-  return i < kNames.size() ? kNames[i] : "?";
+  return named(kNames, value);
 }
 [[nodiscard]] constexpr std::string_view name(sensor::Check value) {
   constexpr std::array<std::string_view, 12> kNames{"None",  "Value",   "Gate", "Drift",       "Frozen", "Stuck",
                                                     "Field", "Heading", "Slip", "Unconfirmed", "Trust",  "Time"};
-  const auto i = static_cast<std::size_t>(value);
-  return i < kNames.size() ? kNames[i] : "?";
+  return named(kNames, value);
 }
 
 [[nodiscard]] constexpr std::string_view name(bus::LandmarkState value) {
   constexpr std::array<std::string_view, 3> kNames{"Tentative", "Kept", "Frozen"};
-  const auto i = static_cast<std::size_t>(value);
-  return i < kNames.size() ? kNames[i] : "?";
+  return named(kNames, value);
 }
 
 /// Name of a frame that the node sends, by its place in the node's block.

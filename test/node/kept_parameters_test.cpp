@@ -3,6 +3,7 @@
 // powered on anew.
 #include "hal/chip/stm32/flash_storage_f4.hpp"
 #include "hal/chip/stm32/flash_storage_g4.hpp"
+#include "sim_host/parameter_word.hpp"
 #include "tetap/firmware/firmware.hpp"
 
 #include "bench.hpp"
@@ -93,7 +94,7 @@ struct Keeping {
   /// As the answers say that the node has it.
   ParamAnswer stage(const param::Row& row, std::uint32_t to, std::uint8_t word = 0) {
     const ParamAnswer is = set(row.index, to, word);
-    if (is == ParamAnswer::kDone) std::memcpy(reinterpret_cast<char*>(&staged) + row.offset + 4U * word, &to, 4);
+    if (is == ParamAnswer::kDone) sim::put_word(staged, row, word, to);
     return is;
   }
   ParamAnswer apply() {
@@ -126,11 +127,6 @@ const param::Row& row_of(const std::string& path) {
     if (path == row.path) return row;
   throw std::runtime_error(path);
 }
-std::uint32_t word_of(const param::Parameters& p, const param::Row& row, std::size_t word) {
-  std::uint32_t value = 0;
-  std::memcpy(&value, reinterpret_cast<const char*>(&p) + row.offset + 4 * word, 4);
-  return value;
-}
 constexpr std::uint32_t kTwo = 0x40000000;  ///< 2.0F
 
 TYPED_TEST(KeptParametersTest, EachRowIsSetRefusedOutOfItsLimitsSavedAndThereAfterAPowerCycle) {
@@ -158,15 +154,15 @@ TYPED_TEST(KeptParametersTest, EachRowIsSetRefusedOutOfItsLimitsSavedAndThereAft
     }
     ParamAnswer is = ParamAnswer::kDone;
     for (std::uint8_t word = 0; word < row.size / 4 && is == ParamAnswer::kDone; ++word)
-      if (word_of(wanted, row, word) != word_of(kKept, row, word))
-        is = bench.stage(row, word_of(wanted, row, word), word);
+      if (sim::word_of(wanted, row, word) != sim::word_of(kKept, row, word))
+        is = bench.stage(row, sim::word_of(wanted, row, word), word);
     if (is == ParamAnswer::kRefused) continue;
     EXPECT_EQ(is, ParamAnswer::kDone) << row.path;
     EXPECT_EQ(bench.apply(), ParamAnswer::kDone) << row.path;
     EXPECT_EQ(bench.save(), ParamAnswer::kDone) << row.path;
     bench.power_cycle();
     for (std::uint8_t word = 0; word < row.size / 4; ++word)
-      EXPECT_EQ(bench.get(row.index, word), word_of(wanted, row, word)) << row.path;
+      EXPECT_EQ(bench.get(row.index, word), sim::word_of(wanted, row, word)) << row.path;
     kept += bench.get(row.index) != compiled || row.size > 4 ? 1U : 0U;
   }
   EXPECT_GE(kept, 190U);
@@ -210,7 +206,7 @@ TYPED_TEST(KeptParametersTest, ASaveEndsTheStretchAndTheWatchdogWaitsMeanwhile) 
   bench.active = bench.staged = kKept;
   EXPECT_EQ(bench.save(), ParamAnswer::kDone);
   bench.power_cycle();
-  EXPECT_EQ(bench.get(row_of("landmark.gate_scale").index), word_of(kKept, row_of("landmark.gate_scale"), 0));
+  EXPECT_EQ(bench.get(row_of("landmark.gate_scale").index), sim::word_of(kKept, row_of("landmark.gate_scale"), 0));
 }
 
 TYPED_TEST(KeptParametersTest, AFloodOfSavesWritesOnceAMinute) {
@@ -313,7 +309,7 @@ TYPED_TEST(KeptParametersTest, WordsThatThisNodeDoesNotTakeAreAsCompiledAndNamed
                   {key("can_base"), 0x500},
                   {key("landmark.sigma_range_m"), std::bit_cast<std::uint32_t>(0.2F)}}),
             expected);
-  EXPECT_EQ(bench.get(index("landmark.gate_scale")), word_of(kKept, row_of("landmark.gate_scale"), 0));
+  EXPECT_EQ(bench.get(index("landmark.gate_scale")), sim::word_of(kKept, row_of("landmark.gate_scale"), 0));
   EXPECT_EQ(bench.get(index("can_base")), 0x300U) << "a node that keeps another identity is off its bus";
   EXPECT_EQ(bench.get(index("landmark.sigma_range_m")), std::bit_cast<std::uint32_t>(0.2F));
   // Wheels without a distance between them.

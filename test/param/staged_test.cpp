@@ -2,12 +2,12 @@
 // Staged parameters against the table that --set uses: the same values are accepted, and the same bits are active.
 #include "tetap/param/staged.hpp"
 
+#include "sim_host/parameter_word.hpp"
 #include "tetap/base/siphash.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <cstring>
 #include <limits>
 #include <string_view>
 #include <vector>
@@ -17,15 +17,10 @@ namespace {
 
 constexpr Parameters kCompiled = checked({.wheels = {.drive = {0.1F, 0.1F, 0.5F, 1, 1e-3F, 1e-3F}}});
 
-std::uint32_t word_of(const Parameters& p, const Row& row, std::size_t word) {
-  std::uint32_t value = 0;
-  std::memcpy(&value, reinterpret_cast<const char*>(&p) + row.offset + 4 * word, 4);
-  return value;
-}
 bool equal(const Parameters& a, const Parameters& b) {
   for (const Row& row : kTable)
     for (std::size_t word = 0; word < row.size / 4; ++word)
-      if (word_of(a, row, word) != word_of(b, row, word)) return false;
+      if (sim::word_of(a, row, word) != sim::word_of(b, row, word)) return false;
   return true;
 }
 /// Result of --set for one element: another value within the limits that breaks no rule; else the parameters as given.
@@ -39,7 +34,7 @@ Parameters with_other(const Parameters& p, const Row& row, std::size_t element) 
 }
 void stage(StagedParameters& staged, const Parameters& wanted, const Row& row) {
   for (std::size_t word = 0; word < row.size / 4; ++word)
-    EXPECT_EQ(staged.set(row.index, word, word_of(wanted, row, word)), Answer::kDone) << row.path;
+    EXPECT_EQ(staged.set(row.index, word, sim::word_of(wanted, row, word)), Answer::kDone) << row.path;
 }
 Answer apply_as(StagedParameters& staged, std::uint32_t before, std::uint32_t after) {
   const Answer is = staged.judge(before, after);
@@ -136,7 +131,7 @@ TEST(StagedParameters, KeepWhatIsActiveAndWhatWaits) {
   std::size_t words = 0;
   staged.each_kept([&](std::uint16_t index, std::size_t word, std::uint32_t value) {
     for (const Row& row : kTable)
-      if (row.index == index) std::memcpy(reinterpret_cast<char*>(&kept) + row.offset + 4 * word, &value, 4);
+      if (row.index == index) sim::put_word(kept, row, word, value);
     ++words;
   });
   EXPECT_EQ(words, 2U);

@@ -4,15 +4,16 @@
 #include "sim_host/page/module/browser.hpp"
 #include "sim_host/page/module/json.hpp"
 #include "sim_host/parameter_refusal.hpp"
+#include "sim_host/parameter_word.hpp"
 #include "sim_host/replay/candump.hpp"
 #include "tetap/bus/codec.hpp"
 #include "tetap/bus/e2e.hpp"
+#include "tetap/firmware/kept_parameters.hpp"
 #include "tetap/param/crc.hpp"
 #include "tetap/param/limits.hpp"
 #include "tetap/param/staged.hpp"
 #include "tetap/param/table.hpp"
 
-#include <cstring>
 #include <iterator>
 #include <string>
 
@@ -20,16 +21,8 @@ namespace tetap::page {
 
 namespace {
 
-constexpr float kStill_mps = 0.05F, kStill_radps = 0.05F;  // firmware::KeptParameters has the same for a save
-
-std::uint32_t word_of(const param::Parameters& p, const param::Row& row, std::size_t word) {
-  std::uint32_t value = 0;
-  std::memcpy(&value, reinterpret_cast<const char*>(&p) + row.offset + 4 * word, sizeof value);
-  return value;
-}
-void put_word(param::Parameters& p, const param::Row& row, std::size_t word, std::uint32_t value) {
-  std::memcpy(reinterpret_cast<char*>(&p) + row.offset + 4 * word, &value, sizeof value);
-}
+using sim::put_word;
+using sim::word_of;
 
 /// The row, where it has such a word and may be read.
 const param::Row* row_with(std::uint32_t number, std::uint32_t word) {
@@ -114,8 +107,8 @@ void Talk::hear(const base::CanFrame& frame) {
   if (frame.id != base_ + bus::EstParamRow::kOffset) {
     const auto motion = bus::decode<bus::EstMotion>(bytes);
     if (!motion) return;
-    const bool moves =
-        motion->vel_valid && (beyond(motion->speed_mps, kStill_mps) || beyond(motion->yaw_rate_radps, kStill_radps));
+    const bool moves = motion->vel_valid && (beyond(motion->speed_mps, firmware::kStill_mps) ||
+                                             beyond(motion->yaw_rate_radps, firmware::kStill_radps));
     return write(Channel::kTalk, moves ? R"({"moves":true})" : R"({"moves":false})");
   }
   if (const auto told = bus::decode<bus::EstParamSet>(bytes)) {

@@ -16,6 +16,9 @@
 
 namespace tetap::firmware {
 
+/// An estimate that is faster moves, and a save is refused.
+inline constexpr float kStill_mps = 0.05F, kStill_radps = 0.05F;
+
 /// Words that a save keeps, under keys of row and word.
 class KeptSet {
  public:
@@ -59,7 +62,6 @@ class KeptParameters {
   static_assert(hal::StorageBoard<Board>);
   static constexpr base::Micros kRest{1'000'000};      ///< without motion before a save
   static constexpr base::Micros kBetween{60'000'000};  ///< two saves that write
-  static constexpr float kStill_mps = 0.05F, kStill_radps = 0.05F;
 
   /// Reads the flash, and may erase it: on a new board, or behind a power cut.
   explicit KeptParameters(Board& board) : board_(board) {}
