@@ -199,8 +199,84 @@ double usual_size(const Table& table, const std::vector<Bound>& bound, const Bou
 
 }  // namespace
 
-std::optional<std::size_t> instance_column(const Table& table) {
-  return find_column(table, [](const std::string& name) { return name == "i" || name == "instance"; });
+namespace {
+
+constexpr std::size_t kMostDevices = 16, kFewestRows = 3;
+
+/// The rows of a table that have a time, and which value of a column each has.
+struct PartedRows {
+  std::vector<std::int64_t> time_us;
+  std::vector<std::size_t> device;
+  std::vector<std::string> values;
+};
+
+/// Nothing where the values are no numbers of devices: no whole numbers, or too many.
+std::optional<PartedRows> parted_rows(const Table& table, const Clock& clock, std::size_t column) {
+  PartedRows rows;
+  Table sample = table;
+  std::vector<std::string_view> cells;
+  while (sample.next(cells)) {
+    const std::string_view text = cells[clock.column];
+    if (is_missing(text)) continue;
+    const auto number = parse_whole(cells[column], sample.point(), 6);
+    const auto time = clock.calendar ? parse_calendar(text) : parse_whole(text, sample.point(), clock.power);
+    if (!time || !number || *number < 0 || *number % 1'000'000 != 0) return std::nullopt;
+    const auto part = clock.nanoseconds ? parse_whole(cells[*clock.nanoseconds], sample.point(), -3) : 0;
+    const auto known = std::find(rows.values.begin(), rows.values.end(), cells[column]);
+    if (known == rows.values.end() && rows.values.size() == kMostDevices) return std::nullopt;
+    rows.device.push_back(static_cast<std::size_t>(known - rows.values.begin()));
+    rows.time_us.push_back(*time + part.value_or(0));
+    if (known == rows.values.end()) rows.values.emplace_back(cells[column]);
+  }
+  return rows;
+}
+
+/// Whether nine of ten steps are within half of the usual one.
+bool is_regular(std::vector<std::int64_t> steps) {
+  std::sort(steps.begin(), steps.end());
+  const std::int64_t usual = steps[steps.size() / 2];
+  const auto near = [&](std::int64_t step) { return 2 * step >= usual && 2 * step <= 3 * usual; };
+  return 10 * std::count_if(steps.begin(), steps.end(), near) >= 9 * static_cast<std::ptrdiff_t>(steps.size());
+}
+
+/// Whether each value repeats the stamps of the others, or has regular ones of its own between theirs.
+bool are_devices(const PartedRows& rows) {
+  struct Device {
+    std::size_t rows = 0, beside_another = 0;
+    std::int64_t last_us = 0;
+    std::vector<std::int64_t> steps;
+  };
+  std::vector<Device> devices(rows.values.size());
+  const auto is_other = [&](std::size_t i, std::size_t k) { return rows.device[k] != rows.device[i]; };
+  const std::size_t count = rows.device.size();
+  std::size_t repeated = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    const bool before = i > 0 && is_other(i, i - 1), behind = i + 1 < count && is_other(i, i + 1);
+    repeated +=
+        (before && rows.time_us[i - 1] == rows.time_us[i]) || (behind && rows.time_us[i + 1] == rows.time_us[i]);
+    Device& device = devices[rows.device[i]];
+    if (device.rows++ > 0) device.steps.push_back(rows.time_us[i] - device.last_us);
+    device.last_us = rows.time_us[i];
+    device.beside_another += before || behind;
+  }
+  const auto fewer = [](const Device& a, const Device& b) { return a.rows < b.rows; };
+  const auto most = std::max_element(devices.begin(), devices.end(), fewer);
+  if (std::any_of(devices.begin(), devices.end(), [](const Device& one) { return one.rows < kFewestRows; }))
+    return false;
+  if (2 * repeated >= count) return true;
+  return std::all_of(devices.begin(), devices.end(), [&](const Device& one) {
+    return is_regular(one.steps) && (&one == &*most || 10 * one.beside_another >= 9 * one.rows);
+  });
+}
+
+}  // namespace
+
+std::optional<std::size_t> instance_column(const Table& table, const Clock& clock) {
+  if (const auto stated = find_column(table, [](const std::string& name) { return name == "instance"; })) return stated;
+  const auto column = find_column(table, [](const std::string& name) { return name == "i"; });
+  if (!column) return std::nullopt;
+  const auto rows = parted_rows(table, clock, *column);
+  return rows && are_devices(*rows) ? column : std::nullopt;
 }
 
 void guess_sizes(const Table& table, std::vector<Bound>& bound) {

@@ -37,8 +37,9 @@ struct Clock {
 [[nodiscard]] sim::Result<std::vector<Bound>> bind_columns(const Table& table, const Options& options);
 /// Takes the column of time out of `bound`. Looks at the first rows where no unit is stated.
 [[nodiscard]] sim::Result<Clock> take_clock(const Table& table, std::vector<Bound>& bound);
-/// The column whose values part the rows of several like devices, as ArduPilot's I.
-[[nodiscard]] std::optional<std::size_t> instance_column(const Table& table);
+/// The column whose values part the rows of several like devices, as ArduPilot's I. A column `i` with other values, a
+/// current or the number of the row, is none.
+[[nodiscard]] std::optional<std::size_t> instance_column(const Table& table, const Clock& clock);
 /// The units of a pressure, a place and a field by the size of their first values, where none is stated.
 void guess_sizes(const Table& table, std::vector<Bound>& bound);
 

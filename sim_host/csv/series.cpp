@@ -147,7 +147,7 @@ sim::Result<> Reader::rows(Table& table, const Clock& clock, const std::vector<B
   std::vector<std::string_view> cells;
   std::optional<std::int64_t> latest;
   std::uint64_t count = 0, disordered = 0;
-  const auto instance = instance_column(table);
+  const auto instance = instance_column(table, clock);
   std::string first;
   while (table.next(cells)) {
     if (instance && first.empty()) first = cells[*instance];

@@ -414,6 +414,22 @@ class Tables(Case):
         log = self.imported({"o.csv": "Time,twist.twist.linear.x,twist.twist.linear.y,twist.twist.angular.z\n0.5,1.5,9,0.25\n"})
         self.assertTrue(np.allclose([log["In_BodySpeed"]["Forward"][0], log["In_BodySpeed"]["YawRate"][0]], [1.5, 0.25], atol=3e-5))
 
+    def test_a_column_i_is_a_device_by_its_values(self):
+        """Two receivers of like stamps and of stamps between; a row's number, a current, one that switches, and a state that changes twice are none."""
+        def rows(values, times=None):
+            times = 0.02 * np.arange(len(values)) if times is None else times
+            return "time,i,v\n" + "".join("%.3f,%s,%.2f\n" % (time, value, k / 100) for k, (time, value) in enumerate(zip(times, values)))
+        chance = np.random.default_rng(5)
+        slower = np.arange(80).repeat([2, 1, 1, 1] * 20) / 50 + np.tile([0, 0.01, 0, 0, 0], 20)
+        for name, text, taken, devices in (("like stamps", rows([0, 1] * 40, np.repeat(np.arange(40) / 50, 2)), 40, True),
+                                           ("stamps between", rows([0, 1, 2] * 30, np.arange(90) / 200), 30, True), ("a slower one", rows([0, 1, 0, 0, 0] * 20, slower), 80, True),
+                                           ("row numbers", rows(range(80)), 80, False), ("a current", rows(["0.5", "1.25"] * 40), 80, False),
+                                           ("a whole current", rows(chance.integers(0, 3, 200)), 200, False), ("a state", rows([0] * 30 + [1] * 30 + [0] * 30), 90, False),
+                                           ("two rows of a second value", rows([0] * 30 + [1] * 2), 32, False)):
+            done, log = self.run_on({"wheels.csv": text}, "--column", "body.forward=v")
+            self.assertEqual((done.returncode, done.stderr, len(log["In_BodySpeed"]["Forward"])), (0, "", taken), name)
+            self.assertEqual("of another device than i 0" in done.stdout, devices, name)
+
     def test_shapes_of_other_phones_and_tables(self):
         imu = "gx,gy,gz,ax,ay,az\n" + "".join("%.2f,1,0,0,0,0,9.8\n" % (i / 100) for i in range(3))
         expected = self.imported({"a.csv": "time_s," + imu}).lines
