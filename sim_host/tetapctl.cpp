@@ -172,7 +172,8 @@ void print_result(const bus::EstParamSet& set, bool json) {
 }
 
 void print_nodes(const std::vector<sim::FoundNode>& nodes, bool json) {
-  if (nodes.empty() && !json) throw sim::ControlError("no node sends on this bus");
+  if (nodes.empty() && !json)
+    throw sim::ControlError("no node sends on this bus; a board with a new flash erases it first, for some seconds");
   const char* separator = "[\n";
   for (const sim::FoundNode& node : nodes) {
     const bus::EstVersion version = node.version.value_or(bus::EstVersion{});  // commit 0: it did not come

@@ -71,6 +71,7 @@ as_nobody() { setpriv --reuid=65534 --regid=65534 --clear-groups "$@"; }
 
 inside() { # runs in user-mode-linux, on a vcan0 of its own
   expect "uml: a frame that is sent is seen" "vcan0 1A0#CAFE" "$(see_frame 1A0#CAFE)"
+  expect "uml: memory is reserved beyond what there is" 1 "$(cat /proc/sys/vm/overcommit_memory)"
   candump -L vcan0 >"$work/outside" &
   local outside=$!
   until_true listening
