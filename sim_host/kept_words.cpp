@@ -59,7 +59,8 @@ std::optional<KeptWords> kept_words_of(Frames& log, std::uint32_t log_base) {
       if (begins && set->set_answer == bus::ParamAnswer::kDone) {
         kept = {.words = {}, .config = set->set_config};
         missing = set->set_changed;
-      } else if (set->set_page_id == bus::CmdParamApply::kPage || set->set_page_id == bus::CmdParamRestore::kPage) {
+      } else if (set->set_page_id == bus::CmdParamApply::kPage || set->set_page_id == bus::CmdParamRestore::kPage ||
+                 set->set_page_id == bus::CmdParamRestart::kPage) {
         if (set->set_answer == bus::ParamAnswer::kDone) break;  // words behind it are of another set
       }
     } else if (const auto row = bus::decode<bus::EstParamRow>(bus::payload(entry.frame));

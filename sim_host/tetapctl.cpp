@@ -46,7 +46,9 @@ constexpr const char* kHelp =
     "  diff               rows that are not as compiled: path, compiled value, active value\n"
     "  set PATH=VALUE...  all of these at one tick, or none\n"
     "  load FILE          the same with a file of `path = value` lines\n"
-    "  apply              makes active what is staged, by an SDO client for example\n"
+    "  apply              makes active what is staged, by an SDO client for example; with --restart the rows that "
+    "need\n"
+    "                     a restart too: the estimators begin anew, and a vehicle that moves refuses it\n"
     "  save               keeps the parameters without power, where the board can\n"
     "  restore            the compiled values, but for those of access\n"
     "  claim              gives a node without a key its first one, within a minute of power-on; a key file that is "
@@ -63,7 +65,7 @@ constexpr const char* kHelp =
     "of "
     "the environment)\n"
     "  --json             scan, list, get, diff: a list; else an object with the result\n\n"
-    "A row that needs a restart waits for a Begin frame or a save.\n"
+    "A row that needs a restart waits for a Begin frame, a save or `apply --restart`.\n"
     "Status: 0 done, 1 refused or no answer, 2 wrong command line.\n";
 
 base::Micros now() {
@@ -239,6 +241,8 @@ void run(const std::string& command, const std::vector<std::string>& words, sim:
     printer.end();
   } else if (command == "apply") {
     print_result(client.apply(active), json);
+  } else if (command == "restart") {
+    print_result(client.restart(active), json);
   } else if (command == "save") {
     print_result(client.save(active), json);
   } else if (command == "claim") {
@@ -270,6 +274,7 @@ int main(int argc, char** argv) try {
   const std::uint32_t base = arguments.base();
   const bool json = arguments.flag("--json");
   const Wanted wanted{arguments.text("--board").value_or(""), arguments.text("--robot").value_or("")};
+  const bool restarts = arguments.flag("--restart");
   std::vector<std::string> words;
   while (auto word = arguments.positional()) words.push_back(std::move(*word));
   arguments.finish();
@@ -281,6 +286,7 @@ int main(int argc, char** argv) try {
     throw sim::UsageError(command.empty() ? "no command; see tetapctl --help"
                                           : "there is no command '" + command + "'");
   if (needs_words == words.empty()) throw sim::UsageError(command + (needs_words ? " needs a path" : " takes no path"));
+  if (restarts && command != "apply") throw sim::UsageError("--restart is for apply");
   if (command == "get")
     for (const std::string& path : words) static_cast<void>(row_of(path));
   if (command == "image") {
@@ -300,7 +306,7 @@ int main(int argc, char** argv) try {
   if (command == "scan") return print_nodes(sim::scan(send, next, now), json), 0;
   sim::ParameterClient client(base, send, next, now);
   if (key) client.use_key(*key);
-  run(command, words, client, json);
+  run(restarts ? "restart" : command, words, client, json);
   return 0;
 } catch (const tetap::sim::UsageError& error) {
   std::fprintf(stderr, "tetapctl: %s\n", error.what());

@@ -213,6 +213,15 @@ bus::EstParamSet ParameterClient::apply(const param::Parameters& before) {
   return apply(before, read(bus::ParamSource::kStaged));
 }
 
+bus::EstParamSet ParameterClient::restart(const param::Parameters& before) {
+  constexpr std::uint32_t kName = param::StagedParameters::kName;
+  const std::uint32_t staged = param::crc(read(bus::ParamSource::kStaged));
+  return act(
+      bus::CmdParamRestart{.restart_before_crc = param::crc(before) & kName, .restart_after_crc = staged & kName},
+      before.bus.commands, kPatience,
+      [&](const bus::EstParamSet& told) { return told.set_config == staged && told.set_pending == 0; });
+}
+
 bus::EstParamSet ParameterClient::save(const param::Parameters& before) {
   return act(bus::CmdParamSave{.save_before_crc = param::crc(before) & param::StagedParameters::kName},
              before.bus.commands, kSavePatience, [](const bus::EstParamSet&) { return false; });

@@ -43,6 +43,8 @@ class ParameterClient {
   bus::EstParamSet change(const param::Parameters& before, const param::Parameters& wanted);
   /// Makes the staged set active as it is, whoever staged it.
   bus::EstParamSet apply(const param::Parameters& before);
+  /// The same with the rows that need a restart: the node's estimators begin anew. Throws ControlError where it moves.
+  bus::EstParamSet restart(const param::Parameters& before);
   /// The node keeps its parameters without power. Throws ControlError where its board cannot.
   bus::EstParamSet save(const param::Parameters& before);
   /// The compiled parameters are active again, but for those of access and identity.

@@ -48,8 +48,8 @@ struct MemoryTwin {
     EXPECT_TRUE(link.send(sync_frame(0x300, kind, {5'000'000 + 10'000 * k}, static_cast<std::uint8_t>(k))));
     link.wait({});
   }
-  /// Three seconds from a Begin; `commands` go before the tick 150.
-  TimedFrames drive(const std::vector<base::CanFrame>& commands = {}) {
+  /// Three seconds from a Begin, at rest before the tick `from`; `commands` go before the tick 150.
+  TimedFrames drive(const std::vector<base::CanFrame>& commands = {}, int from = 0) {
     TimedFrames log;
     const auto note = [&] {
       while (const auto frame = link.receive()) log.push_back({board.time, *frame});
@@ -60,7 +60,8 @@ struct MemoryTwin {
     for (int k = 1; k < 300; ++k) {
       if (k == 150)
         for (const auto& frame : commands) EXPECT_TRUE(link.send(frame));
-      EXPECT_TRUE(link.send(test::body_speed(5'000'000 + 10'000 * k - 1'000, 0.5F, 0.1F, k)));
+      EXPECT_TRUE(
+          link.send(test::body_speed(5'000'000 + 10'000 * k - 1'000, k < from ? 0 : 0.5F, k < from ? 0 : 0.1F, k)));
       sync(bus::SyncKind::kStep, k);
       note();
     }
@@ -110,6 +111,39 @@ TEST(KeptWords, AreNotThoseOfALaterChange) {
   EXPECT_FALSE(kept_in(changed)) << "the replay makes it from the commands of the log";
   const TimedFrames behind = twin.drive();
   ASSERT_TRUE(kept_in(behind));
+}
+
+TEST(KeptWords, ARestartOnTheBusIsRepeatedToTheBit) {
+  constexpr std::uint32_t kName = param::StagedParameters::kName;
+  param::Parameters later = kBuilt;
+  later.wheels.speed_scale = 1.25F;  // needs a restart
+  const bus::CmdParamSet set{
+      .ctr = 1, .set_row_id = param::row_of("wheels.speed_scale")->index, .set_value = 0x3FA00000};
+  const bus::CmdParamRestart restart{
+      .ctr = 2, .restart_before_crc = param::crc(kBuilt) & kName, .restart_after_crc = param::crc(later) & kName};
+  const std::vector<base::CanFrame> commands{test::in(bus::protect(set)), test::in(bus::protect(restart))};
+  const auto answer_in = [](const TimedFrames& log) {
+    std::optional<bus::EstParamSet> last;
+    for (const TimedFrame& one : log)
+      if (one.frame.id == 0x300 + bus::EstParamSet::kOffset)
+        if (const auto told = bus::decode<bus::EstParamSet>(bus::payload(one.frame));
+            told && told->set_page_id == bus::CmdParamRestart::kPage)
+          last = told;
+    return last;
+  };
+  MemoryTwin moving, resting, again;
+  const auto refused = answer_in(moving.drive(commands));
+  ASSERT_TRUE(refused);
+  EXPECT_EQ(refused->set_answer, bus::ParamAnswer::kBusy) << "it drives";
+  EXPECT_EQ(refused->set_config, param::crc(kBuilt));
+  const TimedFrames log = resting.drive(commands, 160);
+  const auto told_to = answer_in(log);
+  ASSERT_TRUE(told_to);
+  EXPECT_EQ(told_to->set_answer, bus::ParamAnswer::kDone);
+  EXPECT_EQ(told_to->set_config, param::crc(later));
+  EXPECT_EQ(told_to->set_pending, 0);
+  EXPECT_FALSE(kept_in(log)) << "the replay makes it from the commands of the log";
+  EXPECT_EQ(told(again.drive(commands, 160)), told(log));
 }
 
 TEST(KeptWords, ThatTheNodeRefusesAreNamed) {

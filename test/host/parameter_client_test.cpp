@@ -67,6 +67,20 @@ param::Parameters wanted() {
   return p;
 }
 
+TEST(ParameterClient, RestartsTheEstimatorsWithTheRowsThatWait) {
+  for (const unsigned lose : {0U, 20U}) {
+    Bus bus(lose);
+    ParameterClient client = bus.client();
+    const param::Parameters before = client.read(bus::ParamSource::kActive);
+    EXPECT_EQ(client.change(before, wanted()).set_pending, 1);
+    const bus::EstParamSet set = client.restart(client.read(bus::ParamSource::kActive));
+    EXPECT_EQ(set.set_pending, 0);
+    EXPECT_EQ(set.set_config, param::crc(wanted()));
+    EXPECT_EQ(param::crc(client.read(bus::ParamSource::kActive)), param::crc(wanted()));
+    EXPECT_THROW(static_cast<void>(client.restart(before)), ControlError) << "that set is active no longer";
+  }
+}
+
 TEST(ParameterClient, ReadsAndChangesOverABusThatLosesFrames) {
   for (const unsigned lose : {0U, 20U}) {
     Bus bus(lose);

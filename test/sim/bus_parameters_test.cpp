@@ -94,6 +94,20 @@ Frames estimates(const Frames& sent) {
   }
   return kept;
 }
+/// Position and motion of the rover's third estimate, which is its primary one, without the number of the epoch.
+Frames poses(const Frames& sent) {
+  Frames kept;
+  for (base::CanFrame frame : sent)
+    if (const std::uint32_t offset = frame.id - kCompiled.can_base;
+        offset == bus::EstPos::kOffset + 2 * bus::EstPos::kStride) {
+      frame.data[7] &= 0xF0;
+      kept.push_back(frame);
+    } else if (offset == bus::EstMotion::kOffset + 2 * bus::EstMotion::kStride) {
+      frame.data[6] &= 0xF0;
+      kept.push_back(frame);
+    }
+  return kept;
+}
 std::uint32_t state_of(const Frames& sent) { return bus::decode<bus::EstStateCrc>(bus::payload(sent.back()))->crc; }
 template <class Message>
 std::vector<Message> said(const Frames& sent) {
@@ -223,6 +237,59 @@ TEST(BusParameters, ActFromTheirTickOn) {
     }
   }
   EXPECT_EQ(idle, kLimits);
+}
+
+TEST(BusParameters, ThatNeedARestartActAsInARobotThatIsBuiltWithThemAndSwitchedOnThen) {
+  constexpr std::size_t kAt = 150;
+  const auto& epochs = half_a_minute();
+  Bench straight(kCompiled);
+  for (std::size_t k = 0; k < kAt; ++k) straight.epoch(epochs[k]);
+  std::size_t rows = 0;
+  for (std::size_t i = 0; i < param::kTable.size(); ++i) {
+    const param::Row& row = param::kTable[i];
+    if (param::kStoredRows[i].live || param::kStoredRows[i].access) continue;
+    const param::Parameters wanted = with_other(row, 0);
+    if (param::crc(wanted) == param::crc(kCompiled)) continue;
+    Bench changed(kCompiled), built(wanted);
+    changed.node.resume(straight.node);
+    Frames commands = changed.sets(wanted);
+    commands.push_back(changed.command(bus::CmdParamRestart{.restart_before_crc = param::crc(kCompiled) & kName,
+                                                            .restart_after_crc = param::crc(wanted) & kName}));
+    changed.epoch(epochs[kAt], commands);
+    built.node.power_on(epochs[kAt].time);
+    built.epoch({{}, epochs[kAt].time});
+    ASSERT_EQ(param::crc(changed.node.parameter_sets().active()), param::crc(wanted)) << row.path;
+    EXPECT_EQ(changed.node.parameter_sets().pending(), 0U);
+    for (std::size_t k = kAt + 1; k < kAt + 300; ++k) {
+      const Frames one = changed.epoch(epochs[k]), other = built.epoch(epochs[k]);
+      ASSERT_EQ(changed.node.window_crc(), built.node.window_crc()) << row.path << ", epoch " << k;
+      ASSERT_EQ(poses(one), poses(other)) << row.path << ", epoch " << k;
+    }
+    ++rows;
+  }
+  EXPECT_GE(rows, 70U);
+}
+
+TEST(BusParameters, RestartOnlyANodeThatRests) {
+  std::size_t at = 0;
+  Bench bench(kCompiled);
+  const std::uint32_t name = param::crc(kCompiled) & kName;
+  const bus::CmdParamRestart restart{.restart_before_crc = name, .restart_after_crc = name};
+  EXPECT_EQ(answer(bench, at, restart), ParamAnswer::kBusy) << "not for a second yet";
+  while (at < 150) bench.epoch(half_a_minute()[at++]);
+  EXPECT_EQ(answer(bench, at, bus::CmdParamRestart{.restart_before_crc = name ^ 1, .restart_after_crc = name}),
+            ParamAnswer::kOtherActive);
+  EXPECT_EQ(answer(bench, at, bus::CmdParamRestart{.restart_before_crc = name, .restart_after_crc = name ^ 1}),
+            ParamAnswer::kOtherStaged);
+  EXPECT_EQ(answer(bench, at, restart), ParamAnswer::kDone);
+  while (at < 2000) bench.epoch(half_a_minute()[at++]);
+  EXPECT_EQ(answer(bench, at, restart), ParamAnswer::kBusy) << "it drives";
+  param::Parameters locked = kCompiled;
+  locked.bus.commands = param::CommandAccess::kAuthenticated;
+  locked.bus.key = {1, 2, 3, 4};
+  Bench owned(locked);
+  for (at = 0; at < 150;) owned.epoch(half_a_minute()[at++]);
+  EXPECT_EQ(answer(owned, at, restart), ParamAnswer::kRefused) << "without a tag";
 }
 
 TEST(BusParameters, AreToldAfterAChangeAndAfterABegin) {

@@ -8,7 +8,7 @@
 #include "sim_host/replay/candump.hpp"
 #include "tetap/bus/codec.hpp"
 #include "tetap/bus/e2e.hpp"
-#include "tetap/firmware/kept_parameters.hpp"
+#include "tetap/bus/parameter_commands.hpp"
 #include "tetap/param/crc.hpp"
 #include "tetap/param/limits.hpp"
 #include "tetap/param/staged.hpp"
@@ -107,8 +107,8 @@ void Talk::hear(const base::CanFrame& frame) {
   if (frame.id != base_ + bus::EstParamRow::kOffset) {
     const auto motion = bus::decode<bus::EstMotion>(bytes);
     if (!motion) return;
-    const bool moves = motion->vel_valid && (beyond(motion->speed_mps, firmware::kStill_mps) ||
-                                             beyond(motion->yaw_rate_radps, firmware::kStill_radps));
+    const bool moves = motion->vel_valid && (beyond(motion->speed_mps, bus::ParameterCommands::kStill_mps) ||
+                                             beyond(motion->yaw_rate_radps, bus::ParameterCommands::kStill_radps));
     return write(Channel::kTalk, moves ? R"({"moves":true})" : R"({"moves":false})");
   }
   if (const auto told = bus::decode<bus::EstParamSet>(bytes)) {

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Parameters of a running node over the bus: Cmd_Param in, Est_Param out. A Get or a Set is answered with a row; an
-// Apply or a Restore acts at the next tick and is answered with the set's CRC. One frame goes out a tick. After a
-// power-on and each change, and each ten seconds, every word that is not as compiled follows: a log has the parameters
-// of each epoch. A node without a key takes its first one within a minute of power-on.
+// Apply, a Restore or a Restart acts at the next tick and is answered with the set's CRC. A Restart needs a node that
+// rests. One frame goes out a tick. After a power-on and each change, and each ten seconds, every word that is not as
+// compiled follows: a log has the parameters of each epoch. A node without a key takes its first one within a minute of
+// power-on.
 #pragma once
 
 #include "tetap/base/members.hpp"
@@ -15,6 +16,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <utility>
 
@@ -22,6 +24,9 @@ namespace tetap::bus {
 
 class ParameterCommands {
  public:
+  /// An estimate that is faster moves, and a save or a restart is refused.
+  static constexpr float kStill_mps = 0.05F, kStill_radps = 0.05F;
+
   explicit ParameterCommands(const param::Parameters& compiled) : staged_(compiled) { begin_claims(); }
 
   [[nodiscard]] static constexpr bool takes(std::uint8_t offset) { return offset == CmdParamSet::kOffset; }
@@ -51,8 +56,7 @@ class ParameterCommands {
   /// Rows that waited for a restart are active.
   void power_on() {
     staged_.restart();
-    size_ = next_row_ = 0;
-    next_word_ = 0;
+    size_ = still_ticks_ = next_row_ = next_word_ = 0;
     pause_ticks_ = 0;
     asked_.reset();
     save_ = {};
@@ -62,9 +66,9 @@ class ParameterCommands {
   /// None is hashed: Est_Param has the CRC of what is active, and what was only asked for acts on nothing.
   static constexpr auto members(auto& self) {
     return base::members(base::unhashed(self.staged_), base::unhashed(self.asked_), base::unhashed(self.save_),
-                         base::unhashed(self.answers_), base::unhashed(self.size_), base::unhashed(self.claim_ticks_),
-                         base::unhashed(self.pause_ticks_), base::unhashed(self.next_row_),
-                         base::unhashed(self.next_word_));
+                         base::unhashed(self.answers_), base::unhashed(self.size_), base::unhashed(self.still_ticks_),
+                         base::unhashed(self.claim_ticks_), base::unhashed(self.pause_ticks_),
+                         base::unhashed(self.next_row_), base::unhashed(self.next_word_));
   }
 
   /// A command; `admitted`: the node's protection lets it act. `takes_key`: the node can judge tags.
@@ -77,17 +81,28 @@ class ParameterCommands {
   }
 
   /// At the begin of a tick: what is asked for is refused, or take_over() has to follow.
-  [[nodiscard]] bool accepts() { return asked_ && judge(); }
-  void take_over();
+  enum class Change : std::uint8_t { kNone, kLive, kRestart };
+  [[nodiscard]] Change accepts() { return asked_ ? judge() : Change::kNone; }
+  /// kRestart: the estimators have to begin anew.
+  void take_over(Change change);
+
+  /// Each tick; `speed_mps` and `yaw_rate_radps` of each estimate that has a velocity.
+  void note_motion(float speed_mps, float yaw_rate_radps) {
+    const auto within = [](float value, float limit) { return value <= limit && value >= -limit; };
+    if (!within(speed_mps, kStill_mps) || !within(yaw_rate_radps, kStill_radps)) still_ticks_ = 0;
+  }
+  /// No estimate has shown motion for a second.
+  [[nodiscard]] bool rests() const { return still_ticks_ >= kRest_us / staged_.active().loop.period_us; }
 
   /// The CRC of the active set, as `config`; take(message) for the frame of this tick.
   template <class Take>
   void publish(std::uint32_t config, Take&& take);
 
  private:
-  static constexpr std::size_t kAnswers = 8;              ///< between two ticks
-  static constexpr std::size_t kRowsPerTick = 8;          ///< looked at for one that is not as compiled
-  static constexpr std::int32_t kClaim_us = 60'000'000;   ///< from power-on, for the first key
+  static constexpr std::size_t kAnswers = 8;             ///< between two ticks
+  static constexpr std::size_t kRowsPerTick = 8;         ///< looked at for one that is not as compiled
+  static constexpr std::int32_t kClaim_us = 60'000'000;  ///< from power-on, for the first key
+  static constexpr std::int32_t kRest_us = 1'000'000;
   static constexpr std::int32_t kRepeat_us = 10'000'000;  ///< from the last word that is not as compiled to the first
 
   struct Answer {
@@ -108,7 +123,7 @@ class ParameterCommands {
     if (size_ < answers_.size()) answers_[size_++] = answer;
   }
   [[nodiscard]] EstParamSet told(const Answer& of, std::uint32_t config) const;
-  [[nodiscard]] bool judge();
+  [[nodiscard]] Change judge();
   void get(const CmdParamGet& command);
   void set(const CmdParamSet& command, bool admitted, bool takes_key, Counters& counters);
   /// One at a tick.
@@ -123,7 +138,8 @@ class ParameterCommands {
   std::optional<Asked> asked_;
   Save save_;
   std::array<Answer, kAnswers> answers_{};
-  std::uint32_t size_ = 0;         ///< answers that wait
+  std::uint16_t size_ = 0;         ///< answers that wait
+  std::uint16_t still_ticks_ = 0;  ///< ticks since an estimate showed motion
   std::uint32_t claim_ticks_ = 0;  ///< left for a first key
   std::uint32_t pause_ticks_ = 0;  ///< left until all words are sent again; 0: none was sent
   std::uint16_t next_row_ = 0;     ///< row that is looked at next; behind the last one: all words are sent
@@ -159,6 +175,10 @@ class NoParameterCommands {
     if (!admitted) return refuse(CmdParamApply::kPage, command->ctr, ParamAnswer::kRefused);
     return ask({CmdParamApply::kPage, command->ctr, command->apply_before_crc, command->apply_after_crc});
   }
+  if (const auto command = decode<CmdParamRestart>(bytes)) {
+    if (!admitted) return refuse(CmdParamRestart::kPage, command->ctr, ParamAnswer::kRefused);
+    return ask({CmdParamRestart::kPage, command->ctr, command->restart_before_crc, command->restart_after_crc});
+  }
   if (const auto command = decode<CmdParamRestore>(bytes)) {
     if (!admitted) return refuse(CmdParamRestore::kPage, command->ctr, ParamAnswer::kRefused);
     return ask({CmdParamRestore::kPage, command->ctr, command->restore_before_crc, 0});
@@ -192,16 +212,21 @@ inline void ParameterCommands::set(const CmdParamSet& command, bool admitted, bo
           .row = command.set_row_id});
 }
 
-[[gnu::cold]] inline bool ParameterCommands::judge() {
-  const param::Answer is = asked_->page == CmdParamApply::kPage ? staged_.judge(asked_->before, asked_->after)
-                                                                : staged_.restore(asked_->before);
-  answer({.page = asked_->page, .counter = asked_->counter, .is = static_cast<ParamAnswer>(is)});
+[[gnu::cold]] inline ParameterCommands::Change ParameterCommands::judge() {
+  const Asked asked = *asked_;
   asked_.reset();
-  return is == param::Answer::kDone;
+  const bool restarts = asked.page == CmdParamRestart::kPage;
+  auto is = ParamAnswer::kBusy;
+  if (!restarts || rests())
+    is = static_cast<ParamAnswer>(restarts                             ? staged_.judge_all(asked.before, asked.after)
+                                  : asked.page == CmdParamApply::kPage ? staged_.judge(asked.before, asked.after)
+                                                                       : staged_.restore(asked.before));
+  answer({.page = asked.page, .counter = asked.counter, .is = is});
+  return is != ParamAnswer::kDone ? Change::kNone : restarts ? Change::kRestart : Change::kLive;
 }
 
-[[gnu::cold]] inline void ParameterCommands::take_over() {
-  staged_.take_over();
+[[gnu::cold]] inline void ParameterCommands::take_over(Change change) {
+  change == Change::kRestart ? staged_.take_over_all() : staged_.take_over();
   next_row_ = next_word_ = 0;
   pause_ticks_ = 0;
 }
@@ -233,6 +258,7 @@ void ParameterCommands::send(const Answer& of, std::uint32_t config, Take& take)
 template <class Take>
 void ParameterCommands::publish(std::uint32_t config, Take&& take) {
   if (claim_ticks_ != 0 && --claim_ticks_ == 0) end_claims();
+  if (still_ticks_ != std::numeric_limits<std::uint16_t>::max()) ++still_ticks_;
   if (size_ != 0) {
     send(answers_[0], config, take);
     --size_;

@@ -212,7 +212,6 @@ class Firmware {
   }
   /// Behind an epoch, of which the answer is no part. A save that wrote ends the record's stretch, as a reset does.
   void save_parameters() requires node::kHasBusParameters<Estimators> {
-    if constexpr (kKeeps) kept_.on_tick(board_.now());
     if (const auto asked = node_.parameter_commands().take_save()) save_parameters(*asked);
   }
   [[gnu::cold, gnu::noinline]] void save_parameters(
@@ -220,8 +219,8 @@ class Firmware {
     bus::ParamAnswer answer = bus::ParamAnswer::kNotKept;
     bool wrote = false;
     if constexpr (kKeeps) {
-      const bool lockstep = pacer_.state() == bus::SyncState::kLockstep;
-      const auto end = kept_.save(node_.parameter_sets(), asked.before, lockstep);
+      const bool may_stop = node_.parameter_commands().rests() && pacer_.state() != bus::SyncState::kLockstep;
+      const auto end = kept_.save(node_.parameter_sets(), asked.before, may_stop);
       answer = end.answer, wrote = end.wrote;
     }
     if (answer != bus::ParamAnswer::kDone) ++health_.save_refused;
@@ -238,7 +237,7 @@ class Firmware {
   }
   /// The bus for what the node sends.
   [[nodiscard]] auto& can_end() {
-    if constexpr (kCanopen || kKeeps)
+    if constexpr (kCanopen)
       return end_;
     else
       return board_.can;
@@ -276,14 +275,13 @@ class Firmware {
     extras_.snapshot.send([this](const base::CanFrame& frame) { return board_.can.send(frame); });
   }
 
-  /// The bus, and those who look at what the node sends.
+  /// The bus, and the adapter that looks at what the node sends.
   struct End {
     explicit End(Firmware& around) : firmware(around) {}
     Firmware& firmware;
     /// Apart, for a node sends at many places.
     [[gnu::noinline]] bool send(const base::CanFrame& frame) {
-      if constexpr (kCanopen) firmware.canopen_.adapter.on_sent(frame);
-      if constexpr (kKeeps) firmware.kept_.on_sent(frame, firmware.parameters_.can_base);
+      firmware.canopen_.adapter.on_sent(frame);
       return firmware.board_.can.send(frame);
     }
   };
@@ -342,7 +340,7 @@ class Firmware {
   [[no_unique_address]] std::conditional_t<kWired || kSnapshots, Extras, NoExtras> extras_;
   [[no_unique_address]] std::conditional_t<kCanopen, Canopen, NoCanopen> canopen_;
   [[no_unique_address]] std::conditional_t<kKeeps, KeptParameters<Board>, NotKept> kept_;
-  [[no_unique_address]] std::conditional_t<kCanopen || kKeeps, End, NoEnd> end_;
+  [[no_unique_address]] std::conditional_t<kCanopen, End, NoEnd> end_;
   std::int32_t conflict_ticks_ = 0;  ///< left until an id conflict is over
   std::uint64_t sync_time_us_ = 0;
   std::uint8_t sync_counter_ = 0;

@@ -4,7 +4,6 @@
 #pragma once
 
 #include "hal/board.hpp"
-#include "tetap/bus/codec.hpp"
 #include "tetap/bus/messages.hpp"
 #include "tetap/bus/parameter_commands.hpp"
 #include "tetap/firmware/journal.hpp"
@@ -15,9 +14,6 @@
 #include <optional>
 
 namespace tetap::firmware {
-
-/// An estimate that is faster moves, and a save is refused.
-inline constexpr float kStill_mps = 0.05F, kStill_radps = 0.05F;
 
 /// Words that a save keeps, under keys of row and word.
 class KeptSet {
@@ -60,7 +56,6 @@ template <class Board>
 class KeptParameters {
  public:
   static_assert(hal::StorageBoard<Board>);
-  static constexpr base::Micros kRest{1'000'000};      ///< without motion before a save
   static constexpr base::Micros kBetween{60'000'000};  ///< two saves that write
 
   /// Reads the flash, and may erase it: on a new board, or behind a power cut.
@@ -87,32 +82,17 @@ class KeptParameters {
     node.power_on({});
   }
 
-  /// A frame that the node sends: any estimate that shows motion counts.
-  void on_sent(const base::CanFrame& frame, std::uint32_t can_base) {
-    const std::uint32_t within = frame.id - can_base - bus::EstMotion::kOffset;
-    constexpr std::uint32_t kEnd = std::uint32_t{bus::EstMotion::kStride} * bus::EstMotion::kCount;
-    if (within >= kEnd || within % bus::EstMotion::kStride != 0) return;
-    const auto motion = bus::decode<bus::EstMotion>(bus::payload(frame));
-    const auto beyond = [](float value, float limit) { return value > limit || value < -limit; };
-    if (motion && motion->vel_valid &&
-        (beyond(motion->speed_mps, kStill_mps) || beyond(motion->yaw_rate_radps, kStill_radps)))
-      moves_ = true;
-  }
-  void on_tick(base::Micros now) {
-    if (moves_) moved_at_ = now;
-    moves_ = false;
-  }
-
   struct Outcome {
     bus::ParamAnswer answer = bus::ParamAnswer::kBusy;
     bool wrote = false;  ///< the flash was written: frames may be lost, and the board's clock may have stood
   };
-  [[nodiscard]] [[gnu::cold]] Outcome save(const param::StagedParameters& sets, std::uint32_t before, bool lockstep) {
+  /// `may_stop`: the vehicle rests, and no player waits for the node.
+  [[nodiscard]] [[gnu::cold]] Outcome save(const param::StagedParameters& sets, std::uint32_t before, bool may_stop) {
     if (((before ^ sets.active_crc()) & param::StagedParameters::kName) != 0) return {bus::ParamAnswer::kOtherActive};
     const KeptSet set(sets);
     if (holds(set)) return {bus::ParamAnswer::kDone};
     const base::Micros now = board_.now();
-    if (lockstep || now - moved_at_ < kRest || (written_ && now - written_at_ < kBetween)) return {};
+    if (!may_stop || (written_ && now - written_at_ < kBetween)) return {};
     board_.begin_storing();
     const Saved saved = journal_.save(set);
     board_.end_storing();
@@ -132,8 +112,7 @@ class KeptParameters {
   Board& board_;
   typename Board::Storage storage_ = (board_.begin_storing(), Board::storage());
   Journal<typename Board::Storage> journal_{storage_};
-  base::Micros moved_at_, written_at_;
-  bool moves_ = false;    ///< a frame of this tick shows motion
+  base::Micros written_at_;
   bool written_ = false;  ///< a save has written after power-on
 };
 

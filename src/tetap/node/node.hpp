@@ -209,6 +209,8 @@ class Node {
   void consume(base::Micros t);
   void close_window(base::Micros t);
   void apply_parameters(base::Micros before);
+  void begin_anew();
+  void forget_inputs();
   void apply_map(base::Micros before);
   void apply_commands();
   void restart_in_new_map();
@@ -387,6 +389,10 @@ void Node<Estimators, Capacity>::tick(base::Micros t, const bus::LoopHealth& loo
   window_.estimate(context(), due, estimates);
   if (!healthy(due, estimates)) window_.estimate(context(), due, estimates);
   invalidate_beyond_range(estimates);
+  if constexpr (kHasBusParameters<Estimators>) {
+    for (const estimators::Estimate& e : estimates)
+      if (e.velocity_valid) parameter_commands_.note_motion(e.forward_mps, e.yaw_rate_radps);
+  }
 
   const estimators::Disagreement apart = publisher_.compares_attitudes() ? judge() : estimators::Disagreement{};
   note_jump();
@@ -443,16 +449,39 @@ void Node<Estimators, Capacity>::restart(base::Micros t, sensor::ResetCause caus
   disagreement_.restart(t);
   jumps_ = 0;
   if (cause == sensor::ResetCause::kTimeJump) {
-    inbox_.discard(counters_);
-    closures_.discard(counters_);
-    scans_.discard(counters_);
-    relatives_.discard(counters_);
-    images_.discard(counters_);
-    wraps_.power_on();
-    window_.clear();
+    forget_inputs();
     window_.open_from(t - base::Micros{parameters_.loop.period_us});
   }
   if (cause == sensor::ResetCause::kPowerOn) window_.open_from(t - base::Micros{parameters_.loop.window_us});
+}
+
+/// Drops inputs that have arrived and are not consumed.
+template <class Estimators, std::size_t Capacity>
+void Node<Estimators, Capacity>::forget_inputs() {
+  inbox_.discard(counters_);
+  closures_.discard(counters_);
+  scans_.discard(counters_);
+  relatives_.discard(counters_);
+  images_.discard(counters_);
+  wraps_.power_on();
+  window_.clear();
+}
+
+/// As after power-on, but for counts, numbers and tags, which go on: a log goes on, and so does its replay.
+template <class Estimators, std::size_t Capacity>
+[[gnu::cold]] void Node<Estimators, Capacity>::begin_anew() {
+  landmarks_.power_on(map_frame_);
+  origin_.power_on(map_frame_, parameters_.gnss);
+  forget_inputs();
+  window_.power_on(now_, context());
+  window_.open_from(now_ - base::Micros{parameters_.loop.window_us});
+  disagreement_.restart(now_);
+  pending_pose_.reset();
+  pending_reset_ = {};
+  jumps_ = 0;
+  ++resets_;
+  reset_cause_ = sensor::ResetCause::kCommand;
+  restarted_at_ = now_;
 }
 
 /// Makes consumed samples and the time up to t final: nothing from before t is fused any more.
@@ -480,13 +509,16 @@ void Node<Estimators, Capacity>::note(std::size_t instance, const sensor::Sample
 template <class Estimators, std::size_t Capacity>
 void Node<Estimators, Capacity>::apply_parameters(base::Micros before) {
   if constexpr (kHasBusParameters<Estimators>) {
-    if (!parameter_commands_.accepts()) return;
-    if (ticked_) {
+    using Change = bus::ParameterCommands::Change;
+    const Change change = parameter_commands_.accepts();
+    if (change == Change::kNone) return;
+    if (ticked_ && change == Change::kLive) {
       consume(before);  // what came late belongs to the parameters as they were
       close_window(before);
     }
-    parameter_commands_.take_over();
+    parameter_commands_.take_over(change);
     publisher_.renew_config();
+    if (change == Change::kRestart) return begin_anew();
     window_.each_slot([&](auto& slot) { slot.configure(context()); });
   }
 }

@@ -106,6 +106,12 @@ class StagedParameters {
     if (((after ^ staged_crc()) & kName) != 0) return Answer::kOtherStaged;
     return judge();
   }
+  /// The same for take_over_all().
+  [[nodiscard]] Answer judge_all(std::uint32_t before, std::uint32_t after) const {
+    if (((before ^ active_crc()) & kName) != 0) return Answer::kOtherActive;
+    if (((after ^ staged_crc()) & kName) != 0) return Answer::kOtherStaged;
+    return plausible_together(staged_) ? Answer::kDone : Answer::kNotTogether;
+  }
   /// Stages the compiled parameters, but for rows of access, and judges them.
   [[nodiscard]] Answer restore(std::uint32_t before) {
     if (((before ^ active_crc()) & kName) != 0) return Answer::kOtherActive;
@@ -122,6 +128,11 @@ class StagedParameters {
       if (live) copy(staged_, active_, kStoredRows[row]);
       wait(row, !live && differ(active_, staged_, kStoredRows[row]));
     }
+  }
+  /// Every row is active: the estimators begin anew.
+  void take_over_all() {
+    active_ = staged_;
+    waits_ = {};
   }
   /// At a restart: rows that wait are active. What is staged without an Apply is gone.
   void restart() {
