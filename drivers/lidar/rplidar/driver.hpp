@@ -4,8 +4,9 @@
 // (MOTOCTL), which is the board's. Slamtec, RPLIDAR Interface Protocol and Application Notes, rev. 1.1.
 #pragma once
 
+#include "drivers/lidar/line.hpp"
 #include "drivers/lidar/rplidar/framer.hpp"
-#include "drivers/lidar/turn.hpp"
+#include "drivers/lidar/turn_assembly.hpp"
 #include "hal/byte_stream.hpp"
 #include "tetap/base/time.hpp"
 
@@ -36,13 +37,9 @@ class Driver {
   /// bounded number of bytes, never waits. The time is that of the bytes' arrival less what they took on the line.
   template <class Handler>
   constexpr void poll(base::Micros now, Handler&& handler) {
-    std::array<std::uint8_t, 64> bytes{};
-    for (int reads = 0; reads < kReads; ++reads) {
-      const std::size_t n = port_->read(bytes);
-      if (n == 0 || n > bytes.size()) break;
-      for (std::size_t i = 0; i < n; ++i) on_byte(bytes[i], now, n - 1 - i, handler);
-    }
+    read_line(*port_, [&](std::uint8_t byte, std::size_t after) { on_byte(byte, now, after, handler); });
     step(now);
+    health_.turns_cut = turns_.cut();
   }
 
   [[nodiscard]] constexpr const Health& health() const { return health_; }
@@ -51,18 +48,12 @@ class Driver {
  private:
   enum class State : std::uint8_t { kBegin, kQuiet, kBoot, kHealth, kStart, kScan };
 
-  static constexpr int kReads = 16;                    ///< 1 kB: 89 ms of the line
   static constexpr base::Micros kQuietTime{20'000};    ///< the notes ask for 1 ms after a stop; the line empties
   static constexpr base::Micros kBootTime{2'000'000};  ///< ours: the A1 prints its version as text meanwhile
   static constexpr base::Micros kAnswerTime{500'000};  ///< ours: no answer by then is none
   static constexpr base::Micros kSpinTime{5'000'000};  ///< ours: measurements begin when the motor is at its speed
   static constexpr base::Micros kSilence{1'000'000};   ///< ours: five turns without a measurement
   static constexpr base::Micros kGap{50'000};          ///< a quarter of a turn is missing
-  static constexpr std::size_t kHalf = Turn::kBins / 2;
-
-  [[nodiscard]] static constexpr base::Micros line_time(std::size_t bytes) {
-    return {static_cast<std::int64_t>(bytes) * 10'000'000 / static_cast<std::int64_t>(kBaud)};
-  }
 
   constexpr void go(State state, base::Micros due) {
     state_ = state;
@@ -84,7 +75,7 @@ class Driver {
       go(send(kAskHealth) ? State::kHealth : State::kBegin, now + kAnswerTime);
     } else {
       ++health_.restarts;
-      give_up_turn();
+      turns_.give_up();
       go(State::kBegin, now);
     }
   }
@@ -126,46 +117,20 @@ class Driver {
     if (!node) return;
     ++health_.nodes;
     due_ = now + kSilence;
-    on_node(*node, now - line_time(after + framer_.waiting() + kNodeBytes), handler);
-  }
-
-  constexpr void give_up_turn() {
-    if (begun_) ++health_.turns_cut;
-    begun_ = false;
-    bin_ = 0;
-  }
-
-  /// `sent`: when the measurement's first byte was sent; it is taken to be of that time.
-  template <class Handler>
-  constexpr void on_node(const Node& node, base::Micros sent, Handler& handler) {
-    if (sent - last_ > kGap) give_up_turn();
-    last_ = sent;
-    const std::size_t bin = Turn::bin(node.angle_cdeg());
-    if (bin + kHalf < bin_) {  // past the front: the next turn
-      if (begun_) handler(turn_.ranges(), first_);
-      turn_.clear();
-      begun_ = true;
-      first_ = sent;
-    } else if (begun_ && bin > bin_ + kHalf) {
-      return;  // a measurement of the turn that is done
-    }
-    bin_ = bin;
-    turn_.add(bin, node.distance_mm);
+    // The measurement is taken to be of the time at which its first byte was sent.
+    const base::Micros at = now - line_time(after + framer_.waiting() + kNodeBytes, kBaud);
+    turns_.add({.angle_cdeg = node->angle_cdeg(), .distance_mm = node->distance_mm, .at = at}, handler);
   }
 
   Port* port_;
   Framer framer_{};
   Health health_{};
-  Turn turn_{};
+  TurnAssembly turns_{kGap};
   State state_ = State::kBegin;
   base::Micros due_{};       ///< time of the next step, or the end of the patience for an answer
   std::size_t matched_ = 0;  ///< bytes of the descriptor that is awaited
   std::size_t answered_ = 0;
   std::array<std::uint8_t, kHealthBytes> answer_{};
-  std::size_t bin_ = 0;   ///< bin of the last measurement
-  base::Micros first_{};  ///< time of the beam at 0 degrees
-  base::Micros last_{};   ///< time of the last measurement
-  bool begun_ = false;    ///< turn_ began at 0 degrees
 };
 
 }  // namespace tetap::drivers::rplidar
