@@ -221,6 +221,14 @@ inline void set_matched_noise(const param::Parameters& n, Parameters& world) {
   imu.accel_turn_on_mps2 = rest(wide(n.inertial.accel_turn_on_mps2), imu.accel_walk_mps2);
 }
 
+/// World::effective()'s matched world, with the encoder and the antenna that the robot states.
+inline void set_matched_geometry(Parameters& world) {
+  const Parameters own = world;
+  world = matched(world);
+  world.wheels.counts_per_turn = own.wheels.counts_per_turn;
+  world.gnss.antenna_b_m = own.gnss.antenna_b_m;
+}
+
 }  // namespace detail
 
 /// Course and limits are those of its class; `world.mismatched`: all of the world's errors act.
@@ -241,11 +249,17 @@ inline void simulate(const param::Parameters& n, const SimulatedAs& as, World::O
   detail::set_mounting(n, as.inertial, p);
   p.camera.sigma_range_m = std::min(p.camera.sigma_range_m, detail::wide(n.landmark.sigma_range_m));
   p.camera.sigma_bearing_rad = std::min(p.camera.sigma_bearing_rad, detail::wide(n.landmark.sigma_bearing_rad));
-  if (!as.inertial) return;
-  detail::set_imu_noise(n.inertial, p.imu);
-  detail::set_gnss_noise(n.gnss, p.gnss);
-  world.as_given = !world.mismatched;
-  if (world.as_given) detail::set_matched_noise(n, p);
+  if (as.inertial) {
+    detail::set_imu_noise(n.inertial, p.imu);
+    detail::set_gnss_noise(n.gnss, p.gnss);
+  }
+  world.as_given = !world.mismatched && (as.inertial || n.wheels.drive.counts_per_turn > 1);
+  if (!world.as_given) return;
+  if (as.inertial) {
+    detail::set_matched_noise(n, p);
+  } else {
+    detail::set_matched_geometry(p);
+  }
 }
 
 }  // namespace tetap::sim

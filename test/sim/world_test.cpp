@@ -2,11 +2,18 @@
 // Laws of motion and of the world as a whole; what single sensors do is in sensors_test.cpp.
 #include "sim_host/world/world.hpp"
 
+#include "config/parameters/rover.hpp"
+#include "config/parameters/rover_landmarks.hpp"
+#include "config/parameters/visual.hpp"
+#include "sim_host/simulated_robot.hpp"
 #include "test/sim/support.hpp"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <optional>
+#include <utility>
+#include <variant>
 
 namespace tetap::sim {
 namespace {
@@ -508,6 +515,55 @@ TEST(World, a_gnss_error_that_is_asked_for_is_the_whole_error_in_every_world) {
   const World world{options, 1};
   EXPECT_NEAR(world.parameters().gnss.white_m, 1.5, 1e-12);
   EXPECT_EQ(world.parameters().gnss.correlated_m, 0);
+}
+
+/// Distance that a robot reads from the counts of its wheels, and the true one [m].
+std::pair<double, double> counted_and_driven_m(const param::Parameters& n, const SimulatedAs& as) {
+  World::Options options{.mismatched = false};
+  simulate(n, as, options);
+  World world{options, 1};
+  std::vector<Measurement> arrived;
+  std::optional<sensor::WheelCounts> last;
+  double counts = 0, driven_m = 0;
+  Truth before = world.truth();
+  for (base::Micros t = world.start(); t < world.start() + seconds_us(30); t += base::Micros{10'000}) {
+    world.advance_to(t, arrived);
+    driven_m += distance_m(before, world.truth());
+    before = world.truth();
+    for (const Measurement& m : arrived) {
+      const auto* now = std::get_if<sensor::WheelCounts>(&m.value);
+      if (now == nullptr) continue;
+      if (last)
+        counts += 0.5 * (static_cast<std::int16_t>(now->left - last->left) +
+                         static_cast<std::int16_t>(now->right - last->right));
+      last = *now;
+    }
+    arrived.clear();
+  }
+  const double radius_m = static_cast<double>(n.wheels.drive.left_radius_m);
+  return {counts * 2 * kPi * radius_m / static_cast<double>(n.wheels.drive.counts_per_turn), driven_m};
+}
+
+TEST(World, matched_to_a_robot_turns_the_encoder_that_the_robot_states) {
+  param::Parameters coarse = robot::visual::parameters;
+  coarse.wheels.drive.counts_per_turn = 500;
+  coarse.gnss.antenna_x_b_m = 0.7F;
+  for (const auto& [n, as] : {std::pair{robot::visual::parameters, SimulatedAs{.images = true}},
+                              {robot::rover_landmarks::parameters, SimulatedAs{.landmarks = true}},
+                              {robot::rover::parameters, SimulatedAs{.inertial = true}},
+                              {coarse, SimulatedAs{.images = true}}}) {
+    const auto [counted_m, driven_m] = counted_and_driven_m(n, as);
+    EXPECT_GT(driven_m, 10);
+    EXPECT_NEAR(counted_m / driven_m, 1, 0.02);
+  }
+  // The rest is the matched world: no error but noise.
+  World::Options options{.mismatched = false};
+  simulate(coarse, {.images = true}, options);
+  const World world{options, 1};
+  EXPECT_NEAR(world.parameters().gnss.antenna_b_m[0], 0.7, 1e-6);
+  EXPECT_EQ(world.parameters().vehicle.slip_random, 0);
+  EXPECT_EQ(world.parameters().imu.gyro_turn_on_radps, 0);
+  EXPECT_EQ(world.parameters().features.wrong_probability, 0);
 }
 
 }  // namespace

@@ -508,12 +508,12 @@ class Camera(Judged):
         out = os.path.join(self.directory, str(seed) + "".join(words))
         true = Rotation.from_euler("xyz", self.TURNS_DEG[seed - 1], degrees=True).as_matrix() @ self.STATED
         subprocess.run([WORLD, "--memory", "--robot", "visual", "--course", "loop", "--raw", "--quiet", "--matched", "--built", "--seed", str(seed),
-                        "--set", "wheels.drive.counts_per_turn=20000", "--set", "camera.mounting_bc=" + " ".join(map(str, true.ravel())), "--out", out, *words],
+                        "--set", "camera.mounting_bc=" + " ".join(map(str, true.ravel())), "--out", out, *words],
                        check=True, capture_output=True, timeout=900)
         return os.path.join(out, "raw.log"), true
 
     def found(self, path, status, *words):
-        return tool(path, "--robot", "visual", "--parts", "camera", "--counts-per-turn", "20000", "--out", path + ".c", *words, status=status)
+        return tool(path, "--robot", "visual", "--parts", "camera", "--out", path + ".c", *words, status=status)
 
     def test_a_mounting_is_found_to_3_mrad_with_an_honest_sigma(self):
         normalised = []

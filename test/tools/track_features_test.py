@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
 """tools/vision/track_features on images of a room whose points behind the pixels are exact: tracks stay on their points, an identity stays with its
-place, and the robots that take images get nearer to the truth than their wheels. Bad input is refused with its cause. Without OpenCV the status is 77.
+point, and the robots that take images get nearer to the truth than their wheels. Bad input is refused with its cause. Without OpenCV the status is 77.
 TETAP_KEEP names a folder that keeps the runs and their picture."""
 import os
 import subprocess
@@ -182,6 +182,7 @@ class Refused(unittest.TestCase):
             os.makedirs(pictures)
             for words, text in (((pictures, out, "--params", params), "0 pictures"), ((pictures, out, "--params", half), "half:2"),
                                 ((pictures, out, "--params", os.path.join(folder, "none")), "none"), (("camera:x", out, "--params", params), "no such camera"),
+                                (("camera:99", out, "--params", params), "no such camera"),
                                 ((pictures, out, "--params", params, "--lens", "1,2"), "--lens"), ((pictures, out, "--params", params, "--rate", "0"), "--rate")):
                 done = tool(*words)
                 self.assertEqual(done.returncode, 1, (words, done.stderr))
@@ -190,6 +191,11 @@ class Refused(unittest.TestCase):
             for name, shape in (("a.png", (48, 64)), ("b.png", (48, 60))):
                 cv2.imwrite(os.path.join(pictures, name), np.zeros(shape, np.uint8))
             self.assertIn("'a' is no time", tool(pictures, out, "--params", params).stderr)
+            numbered = os.path.join(folder, "numbered")
+            os.makedirs(numbered)
+            for name in ("0000.png", "0001.png"):
+                cv2.imwrite(os.path.join(numbered, name), np.zeros((48, 64), np.uint8))
+            self.assertIn("0001.png is not 1 ms after", tool(numbered, out, "--params", params).stderr)
             self.assertIn("60 x 48", tool(pictures, out, "--params", params, "--rate", "10").stderr)
             self.assertFalse(os.path.exists(out))
 

@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """Mounting of the camera: the rotation from its axes (z along the view, x right, y down) to the body's, of a drive with turns.
 
-A point keeps its bearings f1, f2 on one plane with the way b of the camera between two images (Hartley, Zisserman 2004, 9.6):
+A point keeps its bearings f1, f2 on one plane with the displacement b of the camera between two images (Hartley, Zisserman 2004, 9.6):
 
     e = b . (M f1 x R M f2) = 0,    b = p + R l - l
 
-M: the mounting; R, p: turn by the gyroscope and way by the wheels; l: where the camera is. Turns about the body's axes show two angles of M, the
-direction of the way the third. Each e is divided by its own slope along the four pixels (Sampson), so it is in pixels; least squares with Cauchy's
-weights over M and the gyroscope's bias. The bias has a prior. The jackknife over ten parts of the drive (Efron, Stein 1981) widens the 1 sigma.
+M: the mounting; R, p: turn by the gyroscope and displacement by the wheels; l: position of the camera. Turns about the body's axes show two angles of
+M, the direction of the displacement the third. Each e is divided by its own slope along the four pixels (Sampson), so it is in pixels; least squares
+with Cauchy's weights over M and the gyroscope's bias. The bias has a prior. The jackknife over ten parts of the drive (Efron, Stein 1981) widens the
+1 sigma.
 """
 import numpy as np
 from scipy.optimize import least_squares
@@ -17,7 +18,7 @@ from tetap.calibrate.drive import Run
 from tetap.calibrate.robot_numbers import Part, Refusal
 
 APART_S = 0.4           # between the two images of a pair
-LEAST_WAY_M = 0.1       # of the camera between them
+LEAST_DISTANCE_M = 0.1  # of the camera between them
 LEAST_FEATURES = 500    # in all pairs
 MOST_SIGMA_RAD = 0.003  # with more it is refused
 MOST_PX = 3.0           # RMS of the weighted residuals; with more these are no images of this drive
@@ -29,7 +30,7 @@ HOW = "three minutes of driving with curves to both sides, and what stands still
 
 
 class Pairs:
-    """Features of two images each: bearings (n, 3), turn vector [rad], duration [s] and way [m] of the body between them."""
+    """Features of two images each: bearings (n, 3), turn vector [rad], duration [s] and displacement [m] of the body between them."""
 
     def __init__(self, log, run, camera, axes):
         self.camera, self.axes, images = camera, axes, log.images
@@ -40,7 +41,7 @@ class Pairs:
         def turned(t):
             return np.stack([np.interp(t, clock, angle[:, i]) for i in range(3)], axis=-1)
 
-        first, second, turn, way, span, t = [], [], [], [], [], []
+        first, second, turn, displacement, span, t = [], [], [], [], [], []
         begin, end = run.t[0], run.t[-1]
         i = 0
         while i < len(images):
@@ -53,17 +54,17 @@ class Pairs:
                 middle = turned(0.5 * (steps[1:] + steps[:-1])) - turned(steps[0])
                 p = (Rotation.from_rotvec(middle).apply([1.0, 0.0, 0.0]) * moved[:, None]).sum(axis=0)
                 _, a, b = np.intersect1d(images.track[i], images.track[j], return_indices=True)
-                if np.abs(moved).sum() >= LEAST_WAY_M and len(a):
+                if np.abs(moved).sum() >= LEAST_DISTANCE_M and len(a):
                     first.append(images.pixel[i][a])
                     second.append(images.pixel[j][b])
-                    for rows, value in ((turn, turned(steps[-1]) - turned(steps[0])), (way, p), (span, steps[-1] - steps[0]), (t, steps[0])):
+                    for rows, value in ((turn, turned(steps[-1]) - turned(steps[0])), (displacement, p), (span, steps[-1] - steps[0]), (t, steps[0])):
                         rows.append(np.broadcast_to(value, (len(a), *np.shape(value))))
             i = j
         count = sum(map(len, first))
         if count < LEAST_FEATURES:
             raise Refusal(f"{count} features were followed for {APART_S:g} s while the robot drove, {LEAST_FEATURES} are needed.", HOW)
         self.first, self.second = (self._bearings(np.concatenate(rows)) for rows in (first, second))
-        self.turn, self.way, self.span, self.t = (np.concatenate(rows) for rows in (turn, way, span, t))
+        self.turn, self.displacement, self.span, self.t = (np.concatenate(rows) for rows in (turn, displacement, span, t))
 
     def _bearings(self, pixel):
         fu, fv, cu, cv = self.camera["pinhole"]
@@ -73,7 +74,7 @@ class Pairs:
         """Of the turn x[:3] of the mounting, in the body's axes, and of the bias x[3:], in pixels (n)."""
         mounting = Rotation.from_rotvec(x[:3]).as_matrix() @ self.camera["mounting"]
         turn = Rotation.from_rotvec(self.turn - x[3:] * self.span[:, None])
-        b = self.way + turn.apply(self.camera["place"]) - self.camera["place"]
+        b = self.displacement + turn.apply(self.camera["position"]) - self.camera["position"]
         one, two = self.first @ mounting.T, turn.apply(self.second @ mounting.T)
         to_one, to_two = np.cross(two, b), np.cross(b, one)  # e = one . to_one = two . to_two
         fu, fv = self.camera["pinhole"][:2]
@@ -83,11 +84,11 @@ class Pairs:
 
 
 def camera_of(robot):
-    """{pinhole (fu, fv, cu, cv) [px], mounting (3, 3), place [m]} as the robot has them."""
+    """{pinhole (fu, fv, cu, cv) [px], mounting (3, 3), position [m]} as the robot has them."""
     pinhole = [robot.rows[f"camera.{name}"]["value"] for name in ("fu_px", "fv_px", "cu_px", "cv_px")]
     if not robot.name or not min(pinhole[:2]) > 0:
         raise Refusal("The robot has no camera (camera.fu_px).", "the same with --robot, the name of a robot with a camera")
-    return {"pinhole": pinhole, "mounting": robot.now("camera.mounting_bc").reshape(3, 3), "place": robot.now("camera.position_b_m")}
+    return {"pinhole": pinhole, "mounting": robot.now("camera.mounting_bc").reshape(3, 3), "position": robot.now("camera.position_b_m")}
 
 
 def camera(log, up, robot):
@@ -109,8 +110,8 @@ def camera(log, up, robot):
     noise_px = float(np.sqrt((weight * left**2).sum() / weight.sum()))
     usable = float(np.mean(np.abs(left) < 3 * NOISE_PX))
     if noise_px > MOST_PX or usable < 0.5 or np.linalg.norm(found.x[:3]) > MOST_STEP_RAD:
-        raise Refusal(f"{100 * usable:.0f} % of the features fit the turns and the way, under a camera that is {np.degrees(np.linalg.norm(found.x[:3])):.0f} deg "
-                      "off; tetap-doctor names a camera that is turned, mirrored or late.", HOW)
+        raise Refusal(f"{100 * usable:.0f} % of the features fit the turns and the distance, under a camera that is "
+                      f"{np.degrees(np.linalg.norm(found.x[:3])):.0f} deg off; tetap-doctor names a camera that is turned, mirrored or late.", HOW)
     sigma = _sigma(pairs, found.x, left, weight, noise_px)
     if sigma[:3].max() > MOST_SIGMA_RAD:
         axis = ("roll", "pitch", "yaw")[int(sigma[:3].argmax())]
