@@ -157,6 +157,36 @@ test("an answer to another sender is not taken for the page's own", { skip }, as
   await end();
 });
 
+test("motion counts as seen when it has been read, and as of when it was heard", async () => {
+  let time = 5000, read;
+  const ask = (name) => (name === "begin" ? Promise.resolve({ told: [{ answers: 0x348, motions: [0x329], words: [] }] }) : new Promise((resolve, reject) => (read = { resolve, reject })));
+  const talk = new Talk({}, ask, [], { now: () => time });
+  await talk.begin();
+  talk.state = { access: 0 };
+  const hear = async (moves) => {
+    talk.hear("(1.0) can0 329#0000000000000000");
+    await new Promise((done) => setTimeout(done));
+    assert.throws(() => talk.mayChange(), refused("blind"), "it was not read yet");
+    time += 700;
+    moves === null ? read.reject(new Error("trap")) : read.resolve({ told: [{ moves }] });
+    await talk.heard;
+  };
+  await hear(null);
+  assert.throws(() => talk.mayChange(), refused("blind"), "it could not be read");
+  await hear(false);
+  talk.mayChange();
+  time += 400;
+  assert.throws(() => talk.mayChange(), refused("blind"), "1.1 s after it was heard");
+  await hear(true);
+  assert.throws(() => talk.mayChange(), refused("moves"));
+});
+
+test("what a Restore will change is known before: active rows that are not the compiled ones", () => {
+  const talk = new Talk({}, null, []);
+  talk.state = { rows: [{ active: [1], compiled: [1], wanted: [3] }, { active: [2, 5], compiled: [2, 4], wanted: [2, 5] }] };
+  assert.deepEqual(talk.restores(), [{ number: 1, old: [2, 5], next: [2, 4] }]);
+});
+
 test("each refusal has its words", () => {
   const source = readFileSync(new URL("../web/talk.js", import.meta.url), "utf8"), keys = [...source.matchAll(/TalkRefusal\("(\w+)"/g)].map((found) => found[1]).filter((key) => key !== "module");
   const dbc = readFileSync(new URL("../../../config/tetap.dbc", import.meta.url), "utf8"), last = Number(dbc.match(/^VAL_TABLE_ ParamAnswer .* (\d+) "\w+" ;/m)[1]);

@@ -47,13 +47,16 @@ export class Talk {
     if (!kind || data.length !== 16) return;
     // Motion is looked at ten times a second.
     if (kind === "motion" && this.now() - (this.looked.get(id) ?? -Infinity) < 100) return;
-    if (kind === "motion") this.looked.set(id, (this.motion_at = this.now()));
+    const at = this.now();
+    if (kind === "motion") this.looked.set(id, at);
     const half = (at) => parseInt(data.slice(at, at + 8).match(/../g).reverse().join(""), 16);
-    this.heard = this.heard.then(() => this.module("hear", parseInt(id, 16), half(0), half(8))).then(({ told }) => told.forEach((one) => this.take(one))).catch(() => {});
+    this.heard = this.heard.then(() => this.module("hear", parseInt(id, 16), half(0), half(8))).then(({ told }) => told.forEach((one) => this.take(one, at))).catch(() => {});
   }
-  take(told) {
+  /** What the module read in a frame that was heard `at`; motion counts as seen once it could be read. */
+  take(told, at) {
     if ("moves" in told) {
-      if (told.moves) this.moved_at = this.now();
+      this.motion_at = at;
+      if (told.moves) this.moved_at = at;
     } else for (const one of [...this.waiting]) if (one.fits(told)) this.waiting.splice(this.waiting.indexOf(one), 1), one.done(told);
   }
   /** A promise of the answer that `fits`, null after so long. */
@@ -121,6 +124,10 @@ export class Talk {
   /** [{number, old, next}] of all that an Apply will change; what others have staged is among it. */
   changes() {
     return this.state.rows.flatMap(({ active, wanted }, number) => (active.some((value, i) => value !== wanted[i]) ? [{ number, old: active, next: wanted }] : []));
+  }
+  /** [{number, old, next}] of all that a Restore will change. */
+  restores() {
+    return this.state.rows.flatMap(({ active, compiled }, number) => (active.some((value, i) => value !== compiled[i]) ? [{ number, old: active, next: compiled }] : []));
   }
   /** @throws TalkRefusal where the vehicle moves, or may do so */
   mayChange() {

@@ -13,16 +13,16 @@ const TALK_ROWS = 8;
 export class TalkView {
   /** `about` is the module's description. */
   constructor(tasks, about) {
-    Object.assign(this, { tasks, about, base: 0x300, filter: "", talk: null, said: null, busy: "" });
+    Object.assign(this, { tasks, about, base: 0x300, filter: "", talk: null, said: null, busy: "", asks: false });
   }
   end() {
     this.talk?.end();
-    Object.assign(this, { talk: null, said: null, busy: "" });
+    Object.assign(this, { talk: null, said: null, busy: "", asks: false });
   }
   /** Runs `work`; its result, a key of texts with its values, or why it was refused is said. */
   async run(busy, work) {
     if (this.busy) return;
-    Object.assign(this, { busy, said: null });
+    Object.assign(this, { busy, said: null, asks: false });
     this.render();
     try {
       const [key, ...values] = await work();
@@ -59,7 +59,14 @@ export class TalkView {
   save() {
     return this.run("talk.saving", async () => (await this.talk.save(), ["talk.saved"]));
   }
+  /** Whether a Restore waits for the user's yes. */
+  askRestore(asks) {
+    Object.assign(this, { asks, said: null });
+    this.render();
+    this.parent.querySelector(asks ? "#talk-restore-keep" : "#talk-restore")?.focus({ preventScroll: true });
+  }
   restore() {
+    this.parent.querySelector("#talk-restore")?.focus({ preventScroll: true });
     return this.run("talk.restoring", async () => ["talk.restored", (await this.talk.restore()).pending]);
   }
   take(number, input) {
@@ -75,7 +82,7 @@ export class TalkView {
   }
   /** The node, in words: which one a change is for. */
   device() {
-    return say("talk.device", this.base.toString(16).toUpperCase(), BITRATES[this.cable.command], this.talk.state.config);
+    return say("talk.device", this.talk.base.toString(16).toUpperCase(), BITRATES[this.cable.command], this.talk.state.config);
   }
 
   render(parent = this.parent, cable = this.cable) {
@@ -87,7 +94,7 @@ export class TalkView {
     const base = element("input", { id: "talk-base", value: this.base.toString(16).toUpperCase(), size: 4, spellcheck: "false", "aria-label": say("talk.base"), disabled: Boolean(this.busy), onchange: () => {
       const value = parseInt(base.value, 16);
       if (/^[0-9a-f]{1,3}$/i.test(base.value.trim()) && value % 128 === 0 && value <= 0x780) {
-        if (value !== this.base) this.talk?.end(), (this.talk = this.said = null); // the rows of another node are read first
+        if (value !== this.base) this.end(); // the rows of another node are read first
         this.base = value;
         this.render();
       } else base.value = this.base.toString(16).toUpperCase();
@@ -113,13 +120,20 @@ export class TalkView {
     const find = element("input", { id: "talk-find", type: "search", value: this.filter, placeholder: say("numbers.find"), "aria-label": say("numbers.find"), oninput: () => ((this.filter = find.value), this.renderRows()) });
     this.list = element("div", { class: "rows" });
     return [find, this.list,
-      changes.length > 0 ? element("div", { id: "talk-changes", role: "group", "aria-label": say("talk.changes") }, element("p", {}, say("talk.changes")), element("p", { class: "note" }, this.device()),
-        element("ul", {}, changes.map(({ number, old, next }) => element("li", {}, element("code", {}, this.about.parameters[number].path), ` ${decimal(this.text(old, number))} → `, element("strong", {}, `${decimal(this.text(next, number))} ${this.about.parameters[number].unit}`.trim()), this.about.parameters[number].live ? "" : `; ${say("numbers.restart")}`)))) : null,
+      changes.length > 0 ? this.listed("talk-changes", "talk.changes", changes) : null,
       element("div", { class: "buttons" },
         element("button", { id: "talk-change", class: "go", disabled: Boolean(busy) || changes.length === 0, onclick: () => this.change() }, say("talk.change")),
         element("button", { id: "talk-save", disabled: Boolean(busy), title: say("talk.save.note"), onclick: () => this.save() }, say("talk.save")),
-        element("button", { id: "talk-restore", disabled: Boolean(busy), title: say("talk.restore.note"), onclick: () => this.restore() }, say("talk.restore"))),
+        element("button", { id: "talk-restore", disabled: Boolean(busy), title: say("talk.restore.note"), onclick: () => this.askRestore(true) }, say("talk.restore"))),
+      this.asks ? this.listed("talk-restore-sure", "talk.restore.ask", this.talk.restores(), element("div", { class: "buttons" },
+        element("button", { id: "talk-restore-yes", class: "go", disabled: Boolean(busy), onclick: () => this.restore() }, say("talk.restore.yes")),
+        element("button", { id: "talk-restore-keep", onclick: () => this.askRestore(false) }, say("talk.restore.keep")))) : null,
       element("p", { class: "note" }, say("talk.save.note"), " ", say("talk.restore.note"))];
+  }
+  /** Rows that a command will change, on which node. */
+  listed(id, key, rows, ...more) {
+    return element("div", { id, role: "group", "aria-label": say(key) }, element("p", {}, say(key)), element("p", { class: "note" }, this.device()),
+      element("ul", {}, rows.length === 0 ? element("li", {}, say("talk.none")) : rows.map(({ number, old, next }) => element("li", {}, element("code", {}, this.about.parameters[number].path), ` ${decimal(this.text(old, number))} → `, element("strong", {}, `${decimal(this.text(next, number))} ${this.about.parameters[number].unit}`.trim()), this.about.parameters[number].live ? "" : `; ${say("numbers.restart")}`))), ...more);
   }
   /** Rows that differ from the compiled ones first, then those that are looked for. */
   renderRows() {
