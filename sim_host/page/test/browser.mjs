@@ -48,6 +48,7 @@ async function play() {
   expect(await heard("refusal", "GNSS position: refused"), "play: the node refuses fixes that jump");
   await picture("play");
   await until(45);
+  expect(await heard("ended", "fixes jump 100 m"), "play: the end of a fault is said");
   await page.click("[data-fault=slip_left]");
   expect(await heard("fault", "a wheel slips"), "play: the node says that a wheel slips");
   await until(60);

@@ -148,7 +148,7 @@ const answer = async (name, value) => {
   await page.waitForFunction((which) => document.querySelector(`[data-graded=${which}]`).textContent !== "", { timeout: 60000 }, name);
   return page.$eval(`[data-graded=${name}]`, ({ className }) => className === "good");
 };
-for (const [name, right, wrong] of [["prediction", "10,101", "10.001"], ["noise", "2", "0.5"], ["braking", "0.03", "0.001"]]) {
+for (const [name, right, wrong] of [["prediction", "4,041", "10.101"], ["noise", "2", "0.5"], ["braking", "0.03", "0.001"]]) {
   expect(!(await answer(name, wrong)), `${name}: ${wrong} is wrong: ${await text(`[data-graded=${name}]`)}`);
   expect(await answer(name, right), `${name}: ${right} is right: ${await text(`[data-graded=${name}]`)}`);
 }

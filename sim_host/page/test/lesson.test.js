@@ -25,6 +25,13 @@ test("the worked example: 10.101, 10.601, (0.953, 0.094)", () => {
   for (const wrong of [10.001, 10.1, 10, 10.11, 10.601]) assert.ok(!gradePrediction(wrong, first).right, String(wrong));
 });
 
+test("the asked prediction is 4.041, and stands nowhere in the lesson", () => {
+  const [asked] = textbook({ ...base, ...HIDDEN.prediction }, [{ z: 1 }]), [shown] = textbook(base, [{ z: 1 }]);
+  assert.equal(asked.prior[0].toFixed(3), "4.041");
+  assert.ok(gradePrediction(4.041, asked).right && !gradePrediction(shown.prior[0], asked).right);
+  for (const texts of Object.values(TEXTS)) for (const [key, text] of Object.entries(texts)) assert.ok(!/4[.,]04/.test(text), key);
+});
+
 test("the noise of the hidden sensor passes, and others do not", () => {
   const steps = drive(HIDDEN.noise), grade = (r) => gradeNoise(figures(steps, textbook({ ...base, r_m2: r }, steps))).right;
   for (const r of [1.9, 2, 2.1]) assert.ok(grade(r), String(r));

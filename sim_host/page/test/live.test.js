@@ -9,7 +9,7 @@ const HEADS = {
   innovations: "epoch,time_s,estimator,sensor,inst,verdict,dof,nis,ratio,age_ms,landmark,failed",
   status: "epoch,time_s,mode,used,faults,reset_ctr,reset_cause,map_faults",
   sources: "epoch,time_s,estimator,source,state,failed",
-  states: "epoch,time_s,estimator", fixes: "stamp_s,inst,lat_deg,lon_deg,height_m,std_m", truth: "time_s,x_m,y_m,yaw_rad,z_m",
+  states: "epoch,time_s,estimator,height_m,std_height_m", fixes: "stamp_s,inst,lat_deg,lon_deg,height_m,std_m", truth: "time_s,x_m,y_m,yaw_rad,z_m",
 };
 function part(lines) {
   const tables = Object.fromEntries(Object.entries(HEADS).map(([name, head]) => {
@@ -29,6 +29,12 @@ test("errors are of the epoch's own truth, and a turn has no jump at pi", () => 
   assert.deepEqual(error.map((x) => +x.toFixed(6)), [0.3, -0.5]);
   assert.deepEqual(band.map((x) => +x.toFixed(6)), [0.3, 0.3]);
   assert.ok(Math.abs(live.errors("yaw_rad", run)[1][0] - (6.2 - 2 * Math.PI)) < 1e-9);
+});
+
+test("the error of the height is of the states' own epoch", () => {
+  const live = new Live({ start_s: 1 });
+  live.take(part({ estimates: ["1,1.01,2,Inertial,0,0,0,1,1,1,0,1"], states: ["1,1.01,2,7.5,0.5", "1,1.01,0,9,0.5", "2,1.02,2,,", "3,1.03,2,8,0.25"], truth: ["1.01,0,0,0,7", "1.02,0,0,0,7", "1.03,0,0,0,9"] }));
+  assert.deepEqual(live.errors("height_m", live.run()).map((all) => all.map((x) => +x.toFixed(6))), [[0.01, 0.03], [0.5, -1], [1.5, 0.75]]);
 });
 
 test("time without a position counts, of the main estimator alone", () => {
@@ -59,6 +65,17 @@ test("what changes is said once, and a refusal again after a pause", () => {
     [[1, "mode", "Nominal"], [1, "source", "Fusing"], [2, "fault", 0], [3, "mode", "Degraded"], [3, "fault", 1], [3, "source", "Rejecting"],
       [4, "refusal", "GnssPosition"], [4.4, "refusal", "Wheels"], [8.5, "refusal", "GnssPosition"]]);
   assert.equal(live.said.at(-1).failed, "Gate");
+});
+
+test("a fault that comes and goes is said once, and again when it was away for five seconds", () => {
+  const live = new Live({ start_s: 0 }), rows = [[1, 8], [2, 0], [5, 8], [6, 0], [9, 8], [10, 0], [16, 8]];
+  live.take(part({ estimates: ["1,1,2,Inertial,0,0,0,1,1,1,0,1"], truth: ["1,0,0,0,0"], status: rows.map(([time, faults], i) => `${i},${time},Nominal,3,${faults},1,SetPose,0`) }));
+  live.run();
+  assert.deepEqual(live.said.filter(({ kind }) => kind === "fault").map(({ time }) => time), [1, 16]);
+  live.faulted.clear();
+  live.take(part({ status: ["8,17,Nominal,3,0,1,SetPose,0", "9,18,Nominal,3,8,1,SetPose,0"] }));
+  live.run();
+  assert.equal(live.said.at(-1).time, 18);
 });
 
 test("the node's map has each landmark as it was sent last, but none of a round that is over", () => {

@@ -50,6 +50,12 @@ test("each fault of the world has a text", () => {
   for (const on of names("../module/play.cpp", /return "(\w+)";/g)) assert.ok(`on.${on}` in TEXTS.en, on);
 });
 
+test("the receiver's latency that Play names is the world's", () => {
+  const world = readFileSync(new URL("../../world/numbers.hpp", import.meta.url), "utf8"), gnss = world.slice(world.indexOf("struct GnssParameters"));
+  const [longest] = gnss.match(/latency_max\{([\d']+)\}/).slice(1).map((us) => Number(us.replaceAll("'", "")) / 1000);
+  assert.deepEqual(names("../web/play.js", /RECEIVER_MS = (\d+);/g).map(Number), [longest]);
+});
+
 test("each row of the parameter table and each code of the doctor has Indonesian words", () => {
   const rows = [...names("../../../src/tetap/param/table.hpp", /TETAP_ROW\(\s*0x\w+,\s*([a-z][\w.]*),/g), ...names("../../../src/tetap/param/table.hpp", /TETAP_SCALED_ROW\(0x\w+,\s*"([\w.]+)"/g)];
   assert.ok(rows.length > 200);

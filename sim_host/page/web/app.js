@@ -60,7 +60,7 @@ class App {
     this.numbers = new Numbers(this.about.parameters, () => this.replayChanged());
     this.robot = Math.max(0, this.about.robots.findIndex(({ name }) => name === "rover"));
     this.numbers.of(this.about.robots[this.robot]);
-    this.play = new Play($("play"), this.tasks, this.about.robots, (file, truth) => this.open(file, { truth }));
+    this.play = new Play($("play"), this.tasks, this.about, (file, truth) => this.open(file, { truth }));
     this.tables = new TablesView($("tables"), this.tasks, this.about, (file, more) => this.open(file, more), () => this.status(() => say("open.ready"), "ready"));
     this.compare = new CompareView(this.tasks, this.about, JSON.parse($("costs").textContent));
     this.lesson = new LessonView($("lesson"), this.tasks);
@@ -396,10 +396,11 @@ class App {
   renderFindings() {
     const body = this.section("findings"), { findings, run } = this;
     renderFindings(body, findings, run, this.about.codes, this.other(), (remedy) => this.tryRemedy(remedy));
-    for (const one of findings?.findings ?? []) {
+    const places = body.querySelectorAll(".seen"); // one a finding, also where two have one code
+    for (const [i, one] of (findings?.findings ?? []).entries()) {
       const seen = evidenceOf(one, findings.seconds, run.fixes), picture = element("div", { class: "evidence" });
       if (!seen) continue;
-      body.querySelector(`[data-code=${one.code}] .seen`).append(picture);
+      places[i].append(picture);
       this.charts.push(evidenceChart(picture, this.view, seen));
     }
   }

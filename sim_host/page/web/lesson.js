@@ -3,7 +3,7 @@
 
 export const LESSON = { dt_s: 0.1, p0: 10, q: 0.001, r_m2: 0.5, steps: 200, seed: 7 };
 /** What the questions are about; nothing of it is shown before the answer. */
-export const HIDDEN = { noise: { seed: 24, sigma_m: Math.sqrt(2) }, brake: { seed: 42, sigma_m: Math.sqrt(0.5), brakes: true } };
+export const HIDDEN = { prediction: { p0: 4 }, noise: { seed: 24, sigma_m: Math.sqrt(2) }, brake: { seed: 42, sigma_m: Math.sqrt(0.5), brakes: true } };
 export const GRID = [1e-6, 1e-5, 1e-4, 1e-3, 3e-3, 0.01, 0.03, 0.1, 0.3, 1, 10];
 
 /** Numbers of a normal distribution: the same ones for a seed. */

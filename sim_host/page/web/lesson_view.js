@@ -47,7 +47,7 @@ export class LessonView {
   example() {
     const { prior, s } = this.worked, digits = (x) => decimal(x.toFixed(3)), k = [prior[0] / s[0], prior[2] / s[0]];
     return element("div", { class: "example", id: "lesson-example" }, element("p", {}, say("lesson.example", short(LESSON.p0), short(LESSON.q), short(LESSON.r_m2), short(LESSON.dt_s))),
-      element("ul", {}, [["F P F' + Q", `(1,1) = ${digits(prior[0])}`], ["S", digits(s[0])], ["K", `(${k.map(digits).join(languageNow() === "id" ? "; " : ", ")})`]].map(([name, value]) => element("li", {}, `${name} `, element("strong", {}, value)))));
+      element("ul", {}, [["F P Fᵀ + Q", `(1,1) = ${digits(prior[0])}`], ["S", digits(s[0])], ["K", `(${k.map(digits).join(languageNow() === "id" ? "; " : ", ")})`]].map(([name, value]) => element("li", {}, `${name} `, element("strong", {}, value)))));
   }
   slider([name, least, most]) {
     const shown = element("output", {}, short(this.numbers[name]));
@@ -95,7 +95,7 @@ export class LessonView {
   }
   renderStep() {
     this.stepShown.textContent = `${this.step} (${decimal((this.step * LESSON.dt_s).toFixed(1))} s)`;
-    renderUpdate(this.parts.update, this.updates[this.step - 1]);
+    renderUpdate(this.parts.update, { ...this.updates[this.step - 1], model: "z" });
   }
 
   questions() {
@@ -107,13 +107,14 @@ export class LessonView {
         this.graded[name] = await this.grade(name, Number(input.value.trim().replace(",", "."))).catch(({ message }) => ({ failed: message }));
         this.sayGraded(said, name);
       } }, say("lesson.grade"));
-      return element("li", {}, element("p", {}, say(`lesson.ask.${name}`)), element("div", { class: "controls" }, input, button), said);
+      return element("li", {}, element("p", {}, say(`lesson.ask.${name}`, short(HIDDEN.prediction.p0), short(LESSON.dt_s), short(LESSON.q))), element("div", { class: "controls" }, input, button), said);
     });
   }
   async grade(name, value) {
-    if (!Number.isFinite(value) || value <= 0) return { failed: say("lesson.nonumber") };
-    if (name === "prediction") return gradePrediction(value, this.worked);
-    const steps = drive(HIDDEN[name === "noise" ? "noise" : "brake"]), base = { dt_s: LESSON.dt_s, p0: LESSON.p0, q: LESSON.q, r_m2: LESSON.r_m2 };
+    if (!Number.isFinite(value) || value <= 0) return { key: "lesson.nonumber" };
+    const base = { dt_s: LESSON.dt_s, p0: LESSON.p0, q: LESSON.q, r_m2: LESSON.r_m2 };
+    if (name === "prediction") return gradePrediction(value, (await this.filter({ ...base, ...HIDDEN.prediction }, [{ z: 1 }]))[0]);
+    const steps = drive(HIDDEN[name === "noise" ? "noise" : "brake"]);
     if (name === "noise") return gradeNoise(figures(steps, await this.filter({ ...base, r_m2: value }, steps)));
     const of = async (q) => figures(steps, await this.filter({ ...base, q }, steps));
     const grid = [];
@@ -126,6 +127,6 @@ export class LessonView {
     said.className = one.right ? "good" : "bad";
     const about = { prediction: () => say("lesson.graded.prediction"), noise: () => say("lesson.graded.noise", one.nis.toFixed(2), one.low.toFixed(2), one.high.toFixed(2)),
       braking: () => say("lesson.graded.braking", (100 * one.inside).toFixed(1), one.rms_m.toFixed(2), (1.25 * one.best_m).toFixed(2)) };
-    said.textContent = one.failed ?? [say(one.right ? "lesson.right" : "lesson.wrong"), about[name](), one.right ? "" : say(`lesson.hint.${name}`)].join(" ");
+    said.textContent = one.key ? say(one.key) : one.failed ?? [say(one.right ? "lesson.right" : "lesson.wrong"), about[name](), one.right ? "" : say(`lesson.hint.${name}`)].join(" ");
   }
 }

@@ -3,9 +3,12 @@
 import { Table } from "./columns.js";
 import { Run } from "./run.js";
 
-const ERRORS = { x_m: "std_x_m", y_m: "std_y_m", yaw_rad: "std_yaw_rad" };
+/** Of a state: its table, its sigma, and the truth's column. */
+const ERRORS = { x_m: ["estimates", "std_x_m", "x_m"], y_m: ["estimates", "std_y_m", "y_m"], yaw_rad: ["estimates", "std_yaw_rad", "yaw_rad"], height_m: ["states", "std_height_m", "z_m"] };
 /** A refusal is said again when its source was not refused for so long. */
 const QUIET_S = 2;
+/** A fault of the node is said again when it was not set for so long, or the user has pressed something meanwhile. */
+const CLEAR_S = 5;
 
 const wrapped = (angle) => angle - 2 * Math.PI * Math.round(angle / (2 * Math.PI));
 
@@ -19,6 +22,7 @@ export class Live {
     this.played = { time_s: 0, over: false };
     this.mode = "";
     this.faults = 0;
+    this.faulted = new Map(); // bit -> time when it was set last
     this.states = new Map(); // source -> word
     this.refused = new Map(); // source -> time of the last refusal
     this.read = { status: 0, sources: 0, innovations: 0 };
@@ -42,14 +46,14 @@ export class Live {
     return { t: truth.values("time_s"), x: truth.values("x_m"), y: truth.values("y_m"), yaw: truth.values("yaw_rad") };
   }
 
-  /** [times, error, 3 sigma] where sigma is published and the pose is valid; `name` is x_m, y_m or yaw_rad. The truth has a row for each epoch. */
+  /** [times, error, 3 sigma] where sigma is published and the pose is valid; `name` is a key of ERRORS. The truth has a row for each epoch. */
   errors(name, run) {
-    const table = this.tables.estimates, [epoch, number, value, sigma] = ["epoch", "estimator", name, ERRORS[name]].map((column) => table.values(column));
-    const valid = table.values("pos_valid"), truth = this.tables.truth.values(name), times = this.tables.truth.values("time_s");
+    const [from, std, real] = ERRORS[name], table = this.tables[from], [epoch, number, value, sigma] = ["epoch", "estimator", name, std].map((column) => table.values(column));
+    const valid = from === "estimates" ? table.values("pos_valid") : null, truth = this.tables.truth.values(real), times = this.tables.truth.values("time_s");
     const t = [], error = [], band = [];
     for (let row = 0; row < table.rows; row++) {
       const k = epoch[row] - 1;
-      if (number[row] !== run.estimator || !(valid[row] > 0) || Number.isNaN(sigma[row]) || Number.isNaN(truth[k])) continue;
+      if (number[row] !== run.estimator || (valid && !(valid[row] > 0)) || Number.isNaN(sigma[row]) || Number.isNaN(value[row]) || Number.isNaN(truth[k])) continue;
       const d = value[row] - truth[k];
       t.push(times[k] - this.start), error.push(name === "yaw_rad" ? wrapped(d) : d), band.push(3 * sigma[row]);
     }
@@ -84,7 +88,11 @@ export class Live {
     this.rows("status", (table, row, time) => {
       const mode = table.word("mode", row), faults = table.values("faults")[row];
       if (mode !== this.mode) this.say(time, { kind: "mode", word: mode });
-      for (let bit = 0; bit < 16; bit++) if ((faults & ~this.faults) >> bit & 1) this.say(time, { kind: "fault", bit });
+      for (let bit = 0; bit < 16; bit++) {
+        if (!((faults >> bit) & 1)) continue;
+        if (!((this.faults >> bit) & 1) && time - (this.faulted.get(bit) ?? -Infinity) >= CLEAR_S) this.say(time, { kind: "fault", bit });
+        this.faulted.set(bit, time);
+      }
       this.mode = mode;
       this.faults = faults;
     });

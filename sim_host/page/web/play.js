@@ -15,14 +15,19 @@ const TICKS_PER_S = 100, MOST_TICKS = 150;
 const NEEDED_S = { gnss_far: 216 };
 /** Above this share without a position nothing is said of the errors of the rest. */
 const MOST_UNKNOWN = 0.2;
+/** Longest latency of a fix in the simulated world (sim_host/world/numbers.hpp) [ms]. */
+const RECEIVER_MS = 120;
 const SPEEDS = [1, 2, 5, 10], LINES = 60;
+/** States of every robot whose error is drawn. */
+const PLANE = ["x_m", "y_m", "yaw_rad"];
 const TONE = { Nominal: "good", Fusing: "good", DeadReckoning: "warning", Degraded: "warning", Rejecting: "bad", Distrusted: "bad", Fault: "bad" };
 const GROUPS = ["gnss", "wheels", "imu", "magnetometer", "landmarks", "lidar", "features", "any"];
 
 export class Play {
-  /** `onLook(file, truth)` gets the run as a log. */
-  constructor(parent, tasks, robots, onLook) {
-    Object.assign(this, { parent, tasks, robots, onLook, robot: 0, seed: 1, speed: 1, error: "x_m", view: new View() });
+  /** `about` is the module's description; `onLook(file, truth)` gets the run as a log. */
+  constructor(parent, tasks, about, onLook) {
+    const { robots } = about;
+    Object.assign(this, { parent, tasks, about, robots, onLook, robot: 0, seed: 1, speed: 1, error: "x_m", view: new View() });
     this.robot = Math.max(0, robots.findIndex(({ name }) => name === "rover"));
     this.faults = []; // [{name, start_s, end_s}]
     addEventListener("keydown", (event) => this.key(event));
@@ -32,6 +37,7 @@ export class Play {
   async begin() {
     this.running = false;
     this.faults = [];
+    this.error = PLANE.includes(this.error) ? this.error : PLANE[0];
     this.stage = this.live = this.failed = null;
     try {
       this.stage = await this.tasks.run("begin", { robot: this.robot, seed: this.seed });
@@ -79,11 +85,25 @@ export class Play {
   late({ name }) {
     return (NEEDED_S[name] ?? 0) > this.stage.duration_s - this.live.played.time_s;
   }
+  /** The robot's window for late samples where it is shorter than the receiver's latency [ms], else null. */
+  shortWindow() {
+    const row = this.about.parameters.findIndex(({ path }) => path === "loop.window_us"), window_ms = this.robots[this.robot].values[row][0] / 1000;
+    return window_ms < RECEIVER_MS && this.stage.faults.some(({ on }) => on === "gnss") ? window_ms : null;
+  }
+  /** Says which faults have ended, each once. */
+  hearEnds() {
+    const now = this.live.played.time_s;
+    for (const fault of this.faults.filter(({ told, start_s, end_s }) => !told && end_s > start_s && end_s <= now)) {
+      fault.told = true;
+      if (!this.faults.some(({ name, end_s }) => name === fault.name && end_s > now)) this.live.say(this.live.start + fault.end_s, { kind: "ended", name: fault.name });
+    }
+  }
   async inject({ number, name, duration_s }) {
     if (!this.live || this.late({ name })) return;
     const { live } = this, fault = await this.tasks.run("inject", { fault: number, seconds: duration_s }).catch((error) => this.fail(error));
     if (!fault || live !== this.live) return;
     this.faults.push(fault);
+    this.live.faulted.clear();
     this.live.say(this.live.start + fault.start_s, { kind: "injected", name });
     this.renderLive();
     if (!this.running && !this.live.played.over) this.drive();
@@ -118,13 +138,13 @@ export class Play {
     this.summary = element("p", { class: "summary" });
     replace(this.parent, element("h2", {}, say("play.title")), element("p", { class: "note" }, say("play.note")), this.parts.controls,
       this.failed ? element("p", { class: "bad" }, this.failed) : null,
-      element("div", { class: "scene" }, path, this.parts.faults, this.parts.words), element("p", { class: "note" }, say("play.legend")),
-      element("details", { open: true }, element("summary", {}, "σ, gate, outage"), ["sigma", "gate", "outage"].map((word) => element("p", { class: "note" }, say(`play.${word}`)))), this.parts.chart, this.summary, this.parts.keep);
+      element("div", { class: "scene" }, path, this.parts.faults, this.parts.words), this.parts.chart, this.summary,
+      element("details", { open: true }, element("summary", {}, "σ, gate, outage"), ["sigma", "gate", "outage"].map((word) => element("p", { class: "note" }, say(`play.${word}`)))), this.parts.keep);
     this.renderControls();
     if (!this.live) return;
     this.view.clear();
     this.path = new PathView(path, this.view, () => {}, 20);
-    path.append(element("button", { onclick: () => (this.path.fit(), this.path.draw()) }, say("path.all")));
+    path.append(element("button", { onclick: () => (this.path.fit(), this.path.draw()) }, say("path.all")), element("p", { class: "note" }, say("play.legend")));
     this.path.landmarks = this.stage.landmarks;
     this.path.show([]);
     this.renderFaults();
@@ -153,7 +173,7 @@ export class Play {
   }
   renderFaults() {
     this.buttons = new Map();
-    const groups = GROUPS.map((on) => [on, this.stage.faults.filter((fault) => fault.on === on)]).filter(([, all]) => all.length > 0);
+    const groups = GROUPS.map((on) => [on, this.stage.faults.filter((fault) => fault.on === on && (NEEDED_S[fault.name] ?? 0) <= this.stage.duration_s)]).filter(([, all]) => all.length > 0);
     this.stage.faults = groups.flatMap(([, all]) => all);
     replace(this.parts.faults, groups.map(([on, all]) => element("fieldset", {}, element("legend", {}, say(`on.${on}`)),
       all.map((fault) => {
@@ -176,6 +196,7 @@ export class Play {
       button.title = button.disabled ? say("play.late", NEEDED_S[name], Math.max(0, this.stage.duration_s - this.live.played.time_s).toFixed(0)) : faultText(fault);
       button.textContent = left > 0 ? `${say(`inject.${name}`)} · ${Math.ceil(left)} s` : say(`inject.${name}`);
     }
+    this.hearEnds();
     if (this.live.tables.estimates?.rows > 0) {
       const run = this.live.run(), truth = this.live.truth();
       this.view.reset(run.span);
@@ -187,8 +208,8 @@ export class Play {
     this.drawn = performance.now() - began;
   }
   renderChart() {
-    const select = element("select", { id: "play-error", "aria-label": say("state.label"), onchange: () => ((this.error = select.value), this.renderLive()) },
-      ["x_m", "y_m", "yaw_rad"].map((name) => element("option", { value: name, selected: name === this.error }, say(`state.${name}`))));
+    const select = this.states = element("select", { id: "play-error", "aria-label": say("state.label"), onchange: () => ((this.error = select.value), this.renderLive()) },
+      (this.hasHeight() ? [...PLANE, "height_m"] : PLANE).map((name) => element("option", { value: name, selected: name === this.error }, say(`state.${name}`))));
     const box = element("div", {});
     replace(this.parts.chart, element("p", {}, `${say("play.error")} `, select), box);
     this.chart?.destroy();
@@ -198,17 +219,24 @@ export class Play {
     this.chart = new Chart(box, view, { title: "", height: 170, labels: [say("axis.time")], data: [[], [], [], []], bands: [{ series: [2, 3], fill: `${colour("first")}22` }],
       series: [{ label: say("play.error"), stroke: colour("ink"), width: 1.5, points: { show: false } }, { ...thin, label: "+3σ" }, { ...thin, label: "−3σ" }] });
   }
+  /** Whether the node says its height; a robot of the plane has none. */
+  hasHeight() {
+    return this.live.tables.states?.rows > 0 && this.live.tables.states.values("std_height_m").some((sigma) => sigma > 0);
+  }
   renderErrors(run) {
+    if (this.states.length === PLANE.length && this.hasHeight()) this.states.append(element("option", { value: "height_m" }, say("state.height_m")));
     const [t, error, band] = this.live.errors(this.error, run);
     this.chart.view.whole = this.chart.view.span = [0, Math.max(10, this.live.played.time_s)];
     this.chart.plot.setData([t, error, band, band.map((x) => -x)]);
     const inside = error.filter((x, i) => Math.abs(x) <= band[i]).length, unknown = this.live.unknown(run);
-    this.summary.textContent = [t.length > 0 && unknown <= MOST_UNKNOWN && say("play.inside", ((100 * inside) / t.length).toFixed(1)), unknown >= 0.0005 && say("play.unknown", (100 * unknown).toFixed(1))].filter(Boolean).join(" ");
+    const judged = t.length > 0 && unknown <= MOST_UNKNOWN, out = judged && Math.abs(error.at(-1)) > band.at(-1);
+    this.summary.textContent = [judged && say("play.inside", ((100 * inside) / t.length).toFixed(1), say(`state.${this.error}`).replace(/ \[.*/, "")), out && say("play.outside"), unknown >= 0.0005 && say("play.unknown", (100 * unknown).toFixed(1))].filter(Boolean).join(" ");
   }
   renderWords() {
-    const { mode, said } = this.live;
+    const { mode, said } = this.live, window_ms = this.shortWindow();
     replace(this.parts.words, element("p", { class: `mode ${TONE[mode] ?? "note"}` }, mode ? say("play.mode", say(`word.${mode}`)) : say(this.live?.played.time_s > 0 ? "play.silent" : "play.ready")),
       mode ? element("p", { class: "note" }, say(`mode.${mode}`)) : null,
+      window_ms === null ? null : element("p", { class: "note", id: "play-window" }, say("play.window", RECEIVER_MS, window_ms)),
       element("ol", { class: "said", role: "log", "aria-label": say("play.said"), tabindex: "0" }, said.slice(-LINES).reverse().map((one) => this.line(one))));
   }
   line({ time, kind, ...one }) {
@@ -216,10 +244,11 @@ export class Play {
       mode: () => `${say("source.mode")}: ${say(`word.${one.word}`)}.`,
       fault: () => say("why.faults", say(`fault.${one.bit}`)),
       source: () => `${say(`source.${one.source}`)}: ${say(`word.${one.word}`)}. ${say(`check.${one.failed}`)}`,
-      refusal: () => `${say(`source.${one.source}`)}: ${verdictOf(one)}. ${say(`check.${one.failed}`)}${Number.isNaN(one.ratio) ? "" : ` ${say("why.ratio", times(one.ratio))}`}`,
+      refusal: () => `${say(`source.${one.source}`)}: ${verdictOf(one)}. ${say(one.verdict === "TooLate" ? "check.Late" : `check.${one.failed}`)}${Number.isNaN(one.ratio) ? "" : ` ${say("why.ratio", times(one.ratio))}`}`,
       injected: () => say("play.injected", say(`inject.${one.name}`)),
+      ended: () => say("play.ended", say(`inject.${one.name}`)),
     };
-    const ink = kind === "injected" ? "own" : kind === "refusal" || kind === "fault" ? "bad" : TONE[one.word] ?? "";
+    const ink = kind === "injected" || kind === "ended" ? "own" : kind === "refusal" || kind === "fault" ? "bad" : TONE[one.word] ?? "";
     return element("li", { class: ink, "data-kind": kind }, element("time", {}, `${decimal(time.toFixed(1))} s`), ` ${words[kind]()}`);
   }
   /** What can be kept of the run, once it stands still. */
