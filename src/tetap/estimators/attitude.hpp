@@ -24,7 +24,7 @@ class Attitude {
   static constexpr sensor::EstimatorKind kKind = sensor::EstimatorKind::kAttitude;
   static constexpr bool kDelayed = true;
 
-  [[gnu::noinline]] void restart(base::Micros t, const Context& ctx) {
+  void restart(base::Micros t, const Context& ctx) {
     filter::AttitudeOptions options = ctx.parameters.attitude;
     options.declination_rad = ctx.parameters.magnetic.declination_rad;
     filter_ = filter::Attitude(options);

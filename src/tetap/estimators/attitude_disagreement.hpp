@@ -19,7 +19,7 @@ struct Disagreement {
 
 /// Turn from b to a in the axes of n. The turn q_a q_b* is one about the vertical, the heading, followed by one about a
 /// level axis, the tilt. At a tilt of half a turn no heading exists, and 0 stands for it.
-[[nodiscard]] [[gnu::noinline]] inline Disagreement disagreement(const AttitudeEstimate& a, const AttitudeEstimate& b) {
+[[nodiscard]] inline Disagreement disagreement(const AttitudeEstimate& a, const AttitudeEstimate& b) {
   if (!a.valid || !b.valid) return {};
   const filter::Quaternion d = a.q_nb * b.q_nb.conjugate();
   const float level = base::sqrt(d.x * d.x + d.y * d.y);

@@ -127,7 +127,7 @@ class ScanClones {
   void move(const std::array<float, kAll>& dx);
 
   template <std::size_t M>
-  [[gnu::noinline]] void pass_update(const trust::Seen<M>& z, const float* gains) {
+  void pass_update(const trust::Seen<M>& z, const float* gains) {
     std::array<std::array<float, M>, kAll> w{};
     std::array<float, kAll> dx{};
     for (std::size_t i = 0; i < kAll; ++i) {

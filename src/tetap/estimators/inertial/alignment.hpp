@@ -60,7 +60,7 @@ class Alignment {
     headed_ = true;
   }
   /// A magnetic field in level axes that should point to angle_rad from east; a heading known otherwise stays.
-  [[gnu::noinline]] void field(const nav::Vector3& field_n, float angle_rad, float sigma_rad) {
+  void field(const nav::Vector3& field_n, float angle_rad, float sigma_rad) {
     if (headed_ && !(sigma_rad <= sigma_yaw_rad_)) return;
     const float turn = angle_rad - base::atan2(field_n(1), field_n(0));
     set_heading(base::wrap_angle(nav::euler(levelling_.attitude()).yaw_rad + turn), sigma_rad);

@@ -21,8 +21,7 @@ Innovation InertialWith<Watch>::fuse(const sensor::OutsideHeading& heading, base
 }
 
 template <class Watch>
-[[gnu::noinline]] Innovation InertialWith<Watch>::fuse(const sensor::MagneticFlux& flux, base::Micros stamp,
-                                                       const Context& ctx) {
+Innovation InertialWith<Watch>::fuse(const sensor::MagneticFlux& flux, base::Micros stamp, const Context& ctx) {
   if (ctx.parameters.magnetic.use == 0 || phase_ == Phase::kLevelling) return {};
   const FilterView filter = view(stamp, ctx);
   Magnetometer& magnetometer = sources_.magnetometer;
@@ -42,8 +41,7 @@ template <class Watch>
 }
 
 template <class Watch>
-[[gnu::noinline]] Innovation InertialWith<Watch>::fuse(const sensor::AirPressure& air, base::Micros stamp,
-                                                       const Context& ctx) {
+Innovation InertialWith<Watch>::fuse(const sensor::AirPressure& air, base::Micros stamp, const Context& ctx) {
   const FilterView filter = view(stamp, ctx);
   Barometer& barometer = sources_.barometer;
   if (!Barometer::starting_conditions(filter)) return {};

@@ -44,8 +44,7 @@ class HeadingMonitor {
 
   /// Sigmas by which a heading (the filter's or a magnetometer's) is another one than the motion's; 0: it is not.
   /// Velocities pull round what is less than half a radian off.
-  [[nodiscard, gnu::noinline]] float contradicts(float yaw_rad, float sigma_rad, float apart_rad = 0.5F,
-                                                 float least = kSigmas) const {
+  [[nodiscard]] float contradicts(float yaw_rad, float sigma_rad, float apart_rad = 0.5F, float least = kSigmas) const {
     if (!runs_) return 0.0F;
     const float sigmas = finder_.against(yaw_rad, sigma_rad);
     const bool is = sigmas > least && finder_.apart_rad(yaw_rad) > apart_rad;
@@ -100,7 +99,7 @@ class HeadingMonitor {
 
 /// A magnetometer that is not trusted may have led the heading astray. Velocities alone may not pull so sure a heading
 /// round: then a smaller difference counts.
-[[gnu::noinline]] inline bool HeadingMonitor::contradicted_by_motion(const FilterView& filter) const {
+inline bool HeadingMonitor::contradicted_by_motion(const FilterView& filter) const {
   constexpr float kSuspectMagnetometer_rad = 0.1F, kSuspectMagnetometerSigmas = 3.0F;
   const float yaw_rad = nav::euler(filter.x().q_nb).yaw_rad, sigma_rad = base::sqrt(filter.heading_rad2());
   const float sigmas = filter.magnetometer_is_suspect()
@@ -110,8 +109,8 @@ class HeadingMonitor {
 }
 
 /// Nothing drives half a radian sideways: where receiver and wheels agree on the speed, the filter's heading is wrong.
-[[gnu::noinline]] inline bool HeadingMonitor::sideways(const nav::Vector3& v_b_mps, float level_mps, float sigma_mps,
-                                                       const FilterView& filter) {
+inline bool HeadingMonitor::sideways(const nav::Vector3& v_b_mps, float level_mps, float sigma_mps,
+                                     const FilterView& filter) {
   const float wheels = filter.recent_forward_mps();
   const float forward = wheels < 0.0F ? -v_b_mps(0) : v_b_mps(0);
   return level_mps > 4.0F * sigma_mps + 0.3F &&

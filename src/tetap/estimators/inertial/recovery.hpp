@@ -96,7 +96,7 @@ class Recovery {
   bool undoable_ = false;    ///< the last reset of the position may be taken back
 };
 
-[[gnu::noinline]] inline void Recovery::restart(nav::Ins& ins, const nav::InsState& x, const Variances& variances) {
+inline void Recovery::restart(nav::Ins& ins, const nav::InsState& x, const Variances& variances) {
   constexpr std::array<int, 3> kBlocks{nav::InsState::kPosition, nav::InsState::kVelocity, nav::InsState::kAttitude};
   const bool leans = ins.earth.up_n(2) < 1.0F;
   Variances level = variances;
@@ -114,8 +114,8 @@ class Recovery {
 }
 
 /// The coordinates from `first` on are where fixes were for long, and as uncertain as a fix.
-[[gnu::noinline]] inline void Recovery::reset_position(nav::Ins& ins, int first, int count, const nav::Vector3& by_m,
-                                                       const nav::Vector3& variance_m2) {
+inline void Recovery::reset_position(nav::Ins& ins, int first, int count, const nav::Vector3& by_m,
+                                     const nav::Vector3& variance_m2) {
   const std::array<base::Anchored*, 3> coordinates{&ins.x.x, &ins.x.y, &ins.x.z};
   for (int i = first; i < first + count; ++i) {
     nav::move(*coordinates[static_cast<std::size_t>(i)], by_m(i));
@@ -149,7 +149,7 @@ inline float Recovery::turn_of(const nav::Vector3& v_n_mps, float east_mps, floa
 
 /// Nothing is taken out of P, so it stays positive definite without recondition(). The bias of the accelerometer is
 /// that of the limited tilt.
-[[gnu::noinline]] inline void Recovery::widen_imu(nav::Ins& ins, float east_mps2, float north_mps2) {
+inline void Recovery::widen_imu(nav::Ins& ins, float east_mps2, float north_mps2) {
   const float g_mps2 = ins.earth.gravity_mps2;
   const std::array<float, 2> tilt = tilt_of(east_mps2, north_mps2, g_mps2);
   ins.inflate_along({0, 0, 0, 0, 0, 0, tilt[0], tilt[1], 0});
@@ -162,13 +162,13 @@ inline float Recovery::turn_of(const nav::Vector3& v_n_mps, float east_mps, floa
 }
 
 /// The heading may be off by the turn that the corrections made of the velocity.
-[[gnu::noinline]] inline void Recovery::widen_heading(nav::Ins& ins, const nav::VelocityCorrection& sum) {
+inline void Recovery::widen_heading(nav::Ins& ins, const nav::VelocityCorrection& sum) {
   const float yaw_rad = turn_of(ins.x.v_n_mps, sum.east_mps, sum.north_mps);
   inflate_heading(ins, yaw_rad * yaw_rad);
 }
 
 /// The velocity is off by nu. It leapt; or a tilt made it so, since the last agreement; or the heading is wrong.
-[[gnu::noinline]] inline void Recovery::widen_velocity(nav::Ins& ins, const nav::Vector3& nu, float since_s) {
+inline void Recovery::widen_velocity(nav::Ins& ins, const nav::Vector3& nu, float since_s) {
   const float t = since_s > 0.1F ? since_s : 0.1F;
   ins.inflate_along({nu(0) * t, nu(1) * t, nu(2) * t, nu(0), nu(1), nu(2), 0, 0, 0});
   const std::array<float, 2> tilt = tilt_of(nu(0) / t, nu(1) / t, ins.earth.gravity_mps2);
@@ -182,7 +182,7 @@ inline float Recovery::turn_of(const nav::Vector3& v_n_mps, float east_mps, floa
 }
 
 /// The position is off by nu. It leapt; or the velocity was wrong since the last agreement; or a tilt.
-[[gnu::noinline]] inline void Recovery::widen_position(nav::Ins& ins, const nav::Vector3& nu, float since_s) {
+inline void Recovery::widen_position(nav::Ins& ins, const nav::Vector3& nu, float since_s) {
   const float t = since_s > 0.2F ? since_s : 0.2F;
   ins.inflate_along({nu(0), nu(1), nu(2), 0, 0, 0, 0, 0, 0});
   ins.inflate_along({nu(0), nu(1), nu(2), nu(0) / t, nu(1) / t, nu(2) / t, 0, 0, 0});
@@ -194,7 +194,7 @@ inline float Recovery::turn_of(const nav::Vector3& v_n_mps, float east_mps, floa
 
 /// The climb is off, and the height by what came of it: an accelerometer errs along the plumb line. Its error made the
 /// climb in a second or longer.
-[[gnu::noinline]] inline void Recovery::widen_climb(nav::Ins& ins, float climb_mps, float height_m) {
+inline void Recovery::widen_climb(nav::Ins& ins, float climb_mps, float height_m) {
   constexpr float kSince_s = 1;
   const nav::Vector3& up_n = ins.earth.up_n;
   const nav::Vector3 p_m = height_m * up_n, v_mps = climb_mps * up_n;
@@ -207,7 +207,7 @@ inline float Recovery::turn_of(const nav::Vector3& v_n_mps, float east_mps, floa
 /// The heading is at least so uncertain. An error of the gyroscope made what it lacks, in no less than a second: the
 /// bias is off by as many radians a second as the heading by radians. At rest a zero-rate update may show the bias once
 /// the error has ended: the heading keeps its own share. Nothing is taken out of P: no recondition().
-[[gnu::noinline]] inline void Recovery::widen_turn(nav::Ins& ins, float sigma_rad, bool at_rest) {
+inline void Recovery::widen_turn(nav::Ins& ins, float sigma_rad, bool at_rest) {
   constexpr int kYaw = nav::InsState::kYaw, kBias = nav::InsState::kGyroBias;
   const nav::Vector3 up_b = ins.x.q_nb.conjugate().rotate(ins.earth.up_n);
   float shared = 0, bias_radps2 = 0;  // covariance of heading and the bias along up, and the latter's variance
@@ -238,8 +238,8 @@ inline void Recovery::widen(const Assessment& a, nav::Ins& ins, base::Micros sta
   widened_at_ = stamp;
 }
 
-[[gnu::noinline]] inline bool Recovery::apply(const Assessment& a, nav::Ins& ins, base::Micros stamp,
-                                              const param::Parameters& parameters) {
+inline bool Recovery::apply(const Assessment& a, nav::Ins& ins, base::Micros stamp,
+                            const param::Parameters& parameters) {
   inflate(ins, nav::InsState::kPosition,
           {a.remedy.pulled_m[0] * a.remedy.pulled_m[0], a.remedy.pulled_m[1] * a.remedy.pulled_m[1], 0.0F});
   switch (a.action) {
@@ -276,7 +276,7 @@ inline void Recovery::widen(const Assessment& a, nav::Ins& ins, base::Micros sta
 }
 
 /// From the last estimate before the restart to the first after it.
-[[gnu::noinline]] inline void Recovery::measure_step(const nav::InsState& from, const nav::InsState& to) {
+inline void Recovery::measure_step(const nav::InsState& from, const nav::InsState& to) {
   jump_.east_m = nav::difference(to.x, from.x);
   jump_.north_m = nav::difference(to.y, from.y);
   jump_.up_m = nav::difference(to.z, from.z);

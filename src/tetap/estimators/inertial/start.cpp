@@ -31,7 +31,7 @@ void InertialWith<Watch>::set_pose(base::Micros, const SetPose& given, const Con
 
 /// A given heading that does not contradict the filter's own is a measurement: all else that the filter knows stays.
 template <class Watch>
-[[gnu::noinline]] bool InertialWith<Watch>::take_heading(const SetPose& given) {
+bool InertialWith<Watch>::take_heading(const SetPose& given) {
   constexpr float kSmall_rad = 0.3F;  // no linear step turns rightly beyond that
   if (!(ins_.p(nav::InsState::kYaw, nav::InsState::kYaw) < kSmall_rad * kSmall_rad)) return false;
   const model::DirectionMeasurement ahead =
@@ -70,8 +70,7 @@ void InertialWith<Watch>::relocated() {
 /// estimate. When the motion finds the heading once more, a magnetometer that led it astray has to agree first. One
 /// that did not keep the heading from going astray has to agree first, too.
 template <class Watch>
-[[gnu::noinline]] void InertialWith<Watch>::restart_filter(base::Micros t, sensor::ResetCause cause,
-                                                           const Context& ctx) {
+void InertialWith<Watch>::restart_filter(base::Micros t, sensor::ResetCause cause, const Context& ctx) {
   const auto count = static_cast<std::uint8_t>(recovery_.jump().count + 1);
   const nav::InsState last = predictor_.present();
   const HeadingMonitor before = heading_monitor_;

@@ -98,7 +98,7 @@ inline Assessment Barometer::assess_pressure(const sensor::AirPressure& air, con
   return {.action = Action::kSkip, .failed = Check::kStuck, .verdict = sensor::Verdict::kStale};
 }
 
-[[gnu::noinline]] inline Assessment Barometer::assess(const HeightMeasurement& z, const FilterView& filter) {
+inline Assessment Barometer::assess(const HeightMeasurement& z, const FilterView& filter) {
   const param::BaroParameters& n = filter.parameters().baro;
   if (!zero_.known()) {
     set_zero(z, filter);

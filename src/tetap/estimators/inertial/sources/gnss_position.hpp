@@ -153,7 +153,7 @@ inline GnssPositionSource::Converted GnssPositionSource::convert(const sensor::G
               .antenna_b_m = {n.antenna_x_b_m, n.antenna_y_b_m, n.antenna_z_b_m}}};
 }
 
-[[gnu::noinline]] inline Assessment GnssPositionSource::assess(const FixMeasurement& z, const FilterView& filter) {
+inline Assessment GnssPositionSource::assess(const FixMeasurement& z, const FilterView& filter) {
   const param::Parameters& n = filter.parameters();
   Assessment a{.dof = 3, .nis = z.statistics.joint_nis, .gate = fix_gate(n.gnss, 3)};
   const bool inside = a.nis <= a.gate || z.statistics.horizontal_nis <= fix_gate(n.gnss, 2);
@@ -179,7 +179,7 @@ inline GnssPositionSource::Converted GnssPositionSource::convert(const sensor::G
 
 /// Between two fixes the filter moves as the IMU feels, but for the error of its velocity, which the receiver's own
 /// velocity shows. A leap beyond is the receiver's.
-[[gnu::noinline]] inline bool GnssPositionSource::leaps(const FixMeasurement& z, const FilterView& filter) const {
+inline bool GnssPositionSource::leaps(const FixMeasurement& z, const FilterView& filter) const {
   if (!filter.velocity_recent() || filter.recovery().widened_lately(filter.stamp())) return false;
   const nav::Ins::Covariance& p = filter.p();
   constexpr int kEast = nav::InsState::kVelocity, kNorth = nav::InsState::kVelocityNorth;
@@ -202,8 +202,7 @@ inline bool GnssPositionSource::filter_wrong(const FilterView& filter) const {
 }
 
 /// Fixes whose errors are new with each drift away. Errors that last wander themselves.
-[[gnu::noinline]] inline bool GnssPositionSource::drifts(const FixMeasurement& z, const param::GnssParameters& n,
-                                                         Assessment& a) {
+inline bool GnssPositionSource::drifts(const FixMeasurement& z, const param::GnssParameters& n, Assessment& a) {
   if (n.correlation_s > 0.0F) return false;
   drift_.update(z.nu(0), z.nu(1));
   const std::array<float, 2>& expected_m2 = z.statistics.expected_m2;
@@ -231,8 +230,7 @@ inline void GnssPositionSource::confirm(Assessment& a, const param::RecoveryPara
 /// A filter that refuses fixes may have moved otherwise than it thinks, by as much as it is uncertain in any direction.
 /// Twice the least eigenvalue stands for it: a filter that is held to a line is wrong across it, however little it
 /// knows along it.
-[[gnu::noinline]] inline void GnssPositionSource::judge_refused(const FixMeasurement& z, const FilterView& filter,
-                                                                Assessment& a) {
+inline void GnssPositionSource::judge_refused(const FixMeasurement& z, const FilterView& filter, Assessment& a) {
   const param::RecoveryParameters& n = filter.parameters().recovery;
   const nav::Ins::Covariance& p = filter.p();
   const float half = 0.5F * (p(0, 0) - p(1, 1)), both = p(0, 1);

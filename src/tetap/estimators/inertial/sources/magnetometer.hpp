@@ -76,7 +76,7 @@ inline FieldMeasurement Magnetometer::measurement(const sensor::MagneticFlux& fl
   return z;
 }
 
-[[gnu::noinline]] inline Assessment Magnetometer::assess_field(const FieldMeasurement& z, const FilterView& filter) {
+inline Assessment Magnetometer::assess_field(const FieldMeasurement& z, const FilterView& filter) {
   const param::MagneticParameters& n = filter.parameters().magnetic;
   const float horizontal2 = z.level_uT(0) * z.level_uT(0) + z.level_uT(1) * z.level_uT(1);
   if (!(horizontal2 > 0.0F && z.b_uT.squaredNorm() < 1e12F))
@@ -110,7 +110,7 @@ inline Magnetometer::Expected Magnetometer::expected(const model::DirectionMeasu
   return e;
 }
 
-[[gnu::noinline]] inline Assessment Magnetometer::assess(const FieldMeasurement& z, const FilterView& filter) {
+inline Assessment Magnetometer::assess(const FieldMeasurement& z, const FilterView& filter) {
   const param::MagneticParameters& n = filter.parameters().magnetic;
   const auto at = z.direction.linearised(filter.x());
   const float nu = z.direction.residual(at.z_hat)(0);

@@ -61,7 +61,7 @@ class Wheels {
   SourceStatus status_;
 };
 
-[[gnu::noinline]] inline Assessment Wheels::assess(const WheelReading& z, const FilterView& filter) {
+inline Assessment Wheels::assess(const WheelReading& z, const FilterView& filter) {
   const param::InertialParameters& n = filter.parameters().inertial;
   const float track_m = filter.parameters().wheels.drive.track_m;
   if (!filter.tracking() || !(track_m > 0)) return {};
