@@ -18,8 +18,10 @@ constexpr double kScanMostSigma_rad = 0.02, kScanMostSigma_m = 0.05;
 constexpr double kScanLeastPairs = 30;
 constexpr double kScanLeastTurn_rad = 0.015;  ///< RMS of the turn between two scans
 constexpr double kScanFollows = 0.7;          ///< correlation of the turns
-constexpr double kStraight_rad = 0.03;        ///< turn between two scans while the robot drives straight ahead
-constexpr double kStraight_m = 0.04;          ///< least way
+constexpr double kScanCourseSlow_mps = 1;     ///< below, the course of a velocity with 0.1 m/s of noise is loose
+constexpr double kScanCourseLeastWindows = 30, kScanCourseLeastTurn_radps = 0.05;
+constexpr double kStraight_rad = 0.03;  ///< turn between two scans while the robot drives straight ahead
+constexpr double kStraight_m = 0.04;    ///< least way
 constexpr int kLeastStraights = 15;
 constexpr double kSameDirection = 0.8;     ///< length of the sum over the sum of the lengths
 constexpr double kScanTurned_rad = 0.26;   ///< 15 deg: a mount is nearer to its stated angle
@@ -97,6 +99,18 @@ void ScanDetector::sample(base::Micros, const sensor::Sample& sample) {
   roll(time_s, sample);
   for (; !waiting_.empty() && waiting_.front().to_s + kScanWait_s < time_s; waiting_.pop_front())
     hold(waiting_.front());
+}
+
+void ScanDetector::window(const Window& w) {
+  if (before_ && before_->velocity_n_mps && w.velocity_n_mps && before_->wheels && w.wheels &&
+      before_->wheels->difference_mps && w.wheels->difference_mps && w.start_s - before_->start_s < 1.5) {
+    const Vector3 &a = *before_->velocity_n_mps, &b = *w.velocity_n_mps;
+    const double turn = std::atan2(a[0] * b[1] - a[1] * b[0], a[0] * b[0] + a[1] * b[1]);
+    const double wheels = 0.5 * (*before_->wheels->difference_mps + *w.wheels->difference_mps) / scale_.track_m;
+    if (std::min(std::hypot(a[0], a[1]), std::hypot(b[0], b[1])) > kScanCourseSlow_mps)
+      course_.add({wheels, turn / (w.start_s - before_->start_s)});
+  }
+  before_ = w;
 }
 
 void ScanDetector::roll(double time_s, const sensor::Sample& sample) {
@@ -186,6 +200,12 @@ void ScanDetector::finish(Findings& findings) {
     judge_delay(wheels, "wheels'", kWheels, findings);
 }
 
+double ScanDetector::wheels_by_course() const {
+  constexpr double kLeast2 = kScanCourseLeastTurn_radps * kScanCourseLeastTurn_radps;
+  if (course_.count() < kScanCourseLeastWindows || course_.covariance(1, 1) < kLeast2) return 0;
+  return correlation(course_.covariance(0, 1), course_.covariance(0, 0), course_.covariance(1, 1));
+}
+
 void ScanDetector::judge_sense(const std::optional<Fit>& wheels, const std::optional<Fit>& gyroscope,
                                Findings& findings) const {
   std::string words;
@@ -202,7 +222,21 @@ void ScanDetector::judge_sense(const std::optional<Fit>& wheels, const std::opti
   std::optional<Code> beside;
   const bool back = std::abs(direction_rad(true)) > kScanReversed_rad;
   if (uses == kWheels) beside = back ? Code::kWheelsReversed : Code::kWheelsSwapped;
-  const std::string evidence = "The robot turns by its scans against" + words + ".";
+  std::string evidence = "The robot turns by its scans against" + words + ".";
+  const double course = wheels_by_course();
+  if (beside && std::abs(course) > kScanFollows) {
+    evidence += course > 0 ? text(" The course by GNSS turns with the wheels (%.2f).", course)
+                           : text(" The course by GNSS turns against the wheels (%.2f).", course);
+    if (course < 0) {
+      findings.push_back({.code = *beside,
+                          .uses = kScanner | kGnssVelocity,
+                          .certainty = -course,
+                          .evidence = evidence,
+                          .change = {}});
+      return;
+    }
+    beside.reset();
+  }
   findings.push_back({.code = Code::kScanMirrored, .uses = uses, .evidence = evidence, .change = {}, .beside = beside});
   if (back)
     findings.back().change =

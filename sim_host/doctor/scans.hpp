@@ -27,6 +27,7 @@ class ScanDetector : public Detector {
   /// In_ScanHead or In_Scan.
   void scan_frame(const SeenFrame& seen);
   void sample(base::Micros time, const sensor::Sample& sample) override;
+  void window(const Window& w) override;
   void finish(Findings& findings) override;
 
  private:
@@ -55,6 +56,8 @@ class ScanDetector : public Detector {
   void hold(const Pair& pair);
   [[nodiscard]] std::optional<Fit> fit(Reference reference) const;
   void judge_sense(const std::optional<Fit>& wheels, const std::optional<Fit>& gyroscope, Findings& findings) const;
+  /// Correlation of the wheels' turn with that of the course by GNSS; 0 where nothing is known.
+  [[nodiscard]] double wheels_by_course() const;
   void judge_direction(bool mirrored, Findings& findings) const;
   void judge_delay(const std::optional<Fit>& by, const char* device, Devices uses, Findings& findings) const;
   /// Direction in which the robot drives ahead by its scans, from the stated one; 0 where nothing is known.
@@ -73,6 +76,8 @@ class ScanDetector : public Detector {
   double wheels_s_ = 0;
   std::deque<Pair> waiting_;
   std::array<Turns, kReferences> turns_;
+  std::optional<Window> before_;
+  Moments<2> course_;             ///< turn rate by the wheels and by the course of the GNSS velocity [rad/s]
   std::complex<double> ahead_m_;  ///< sum of what the scans move while the wheels drive straight ahead
   double straight_m_ = 0;         ///< sum of the lengths of it
   int straights_ = 0;

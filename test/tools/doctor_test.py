@@ -601,6 +601,12 @@ class Doctor(unittest.TestCase):
                 self.assertEqual([one["code"] for one in found], [code], name)
                 self.assertRegex(found[0]["change"], change)
 
+    def test_the_course_by_gnss_decides_between_scans_and_wheels(self):
+        for mistake, code in ((mirror_scans, "scan_mirrored"), (swap_wheels, "wheels_swapped")):
+            found = self.examine(mistake(self.logs.frames("lab")), "scanner")
+            self.assertEqual([one["code"] for one in found], [code])
+            self.assertIn("The course by GNSS turns", found[0]["evidence"])
+
     def test_a_mistake_gets_the_remedies_of_its_own_devices_alone(self):
         reversed_imu = [("accel_sign", "VelX, VelY and VelZ"), ("gyro_sign", "AngX, AngY and AngZ")]
         for name, mistake, remedies in (

@@ -4,7 +4,7 @@ import { test } from "node:test";
 import assert from "node:assert/strict";
 import { followable, verdictOf } from "../web/log_views.js";
 import { errorsOf, shownRange } from "../web/charts.js";
-import { times } from "../web/run.js";
+import { Run, times } from "../web/run.js";
 
 test("a factor that is rounded to nothing gives way to the code's own advice", () => {
   const codes = [{ name: "wheel_scale", change: "Correct the radii." }], one = { code: "wheel_scale", cause: "c", evidence: "The robot drives 0.00 times as fast.", change: "Multiply the radii by 0.000." };
@@ -45,4 +45,12 @@ test("errors are against the truth of the same epoch, in their band, with no jum
   assert.ok(Math.abs(band[0] - 0.6) < 1e-12);
   for (const one of errorsOf(run, truth, "yaw_rad")[1]) assert.ok(Math.abs(one - (6.2 - 2 * Math.PI)) < 1e-9);
   assert.deepEqual([errorsOf(run, truth, "height_m"), errorsOf(run, null, "x_m")], [null, null]);
+});
+
+test("a source is named where more than outliers of it are refused, the worst first", () => {
+  const of = (refused, all) => Array.from({ length: all }, (_, i) => ({ refused: i < refused }));
+  const named = (...sources) => Run.prototype.mostlyRefused.call({ sources: new Map(sources) });
+  // 88 of 767 landmarks are refused in a good log of the Husky, 1345 of 1500 magnetic headings where the IMU is turned by 90 deg.
+  assert.deepEqual(named(["RangeBearing", of(88, 767)], ["GnssVelocity", of(7, 12)], ["GnssPosition", of(0, 0)]), []);
+  assert.deepEqual(named(["GnssPosition", of(40, 100)], ["Magnetometer", of(1345, 1500)]), [{ source: "Magnetometer", refused: 1345, all: 1500 }, { source: "GnssPosition", refused: 40, all: 100 }]);
 });

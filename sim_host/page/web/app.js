@@ -216,10 +216,15 @@ class App {
     this.view.reset(this.run.span);
     this.render();
     this.status(() => this.title(), "done");
-    $("status").scrollIntoView();
+    this.arrive();
     this.findings = await this.still(this.tasks.run("diagnose", this.task()).catch((error) => ({ failed: error.message })));
     this.renderFindings();
     document.body.dataset.diagnosed = "yes";
+  }
+  /** To what is said of the log, also for the next Tab: the play's buttons lie before it. */
+  arrive() {
+    $("status").scrollIntoView();
+    $("status").focus({ preventScroll: true });
   }
   /** The first picture of a long log; what is refused here is said of the whole log. */
   async showBeginning() {
@@ -232,7 +237,7 @@ class App {
     this.note = say("open.beginning", (part.size / 1e6).toFixed(0), (this.file.size / 1e6).toFixed(0));
     this.view.reset(this.run.span);
     this.render();
-    $("status").scrollIntoView();
+    this.arrive();
     document.body.dataset.beginning = "yes";
     this.note = "";
   }
@@ -395,7 +400,7 @@ class App {
   }
   renderFindings() {
     const body = this.section("findings"), { findings, run } = this;
-    renderFindings(body, findings, run, this.about.codes, this.other(), (remedy) => this.tryRemedy(remedy));
+    renderFindings(body, findings, run, this.about.codes, this.other(), { onTry: (remedy) => this.tryRemedy(remedy), onShow: (source) => this.showSource(source) });
     const places = body.querySelectorAll(".seen"); // one a finding, also where two have one code
     for (const [i, one] of (findings?.findings ?? []).entries()) {
       const seen = evidenceOf(one, findings.seconds, run.fixes), picture = element("div", { class: "evidence" });
@@ -425,6 +430,12 @@ class App {
     if (!errors) return;
     body.append(element("p", { class: "note" }, say("play.error")), box);
     this.charts.push(errorChart(box, this.view, say(`state.${name}`), errors));
+  }
+  showSource(source) {
+    this.source = source;
+    this.render(true);
+    $("innovation").scrollIntoView();
+    $("innovation-source").focus({ preventScroll: true });
   }
   renderInnovations() {
     const body = this.section("innovation", say("innovation.note")), names = [...this.run.sources.keys()];

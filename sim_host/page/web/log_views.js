@@ -47,15 +47,24 @@ function finding({ code, cause, evidence, change, remedies }, onTry) {
     remedies.map((remedy) => element("p", {}, element("button", { "data-try": code, onclick: () => onTry(remedy) }, say("findings.try", settingText(remedy))))));
 }
 
-/** `found` of the doctor, null while it works; `other` {maker, shown, choose()} where the log was made by another robot than is shown; `onTry(remedy)` plays the log with other parameters. */
-export function renderFindings(body, found, run, codes, other, onTry) {
+/** What is said where the doctor finds nothing: a node that refuses much of a source contradicts "agree". */
+function nothingFound(run, onShow) {
+  const sources = run.mostlyRefused();
+  if (sources.length === 0) return [element("p", { class: "good" }, say("findings.none"))];
+  return [element("p", { class: "warning", id: "mostly-refused" }, say("findings.mostly")),
+    element("ol", {}, sources.map(({ source, refused, all }) => element("li", { "data-source": source }, element("strong", {}, say("findings.source", say(`source.${source}`), refused, all)),
+      element("p", { class: "change" }, say("findings.check")), element("p", {}, element("button", { onclick: () => onShow(source) }, say("findings.show"))))))];
+}
+
+/** `found` of the doctor, null while it works; `other` {maker, shown, choose()} where the log was made by another robot than is shown; `onTry(remedy)` plays the log with other parameters, `onShow(source)` shows a source's innovations. */
+export function renderFindings(body, found, run, codes, other, { onTry, onShow }) {
   const [refused, all] = run.refusedOf(), counted = refused === 0 ? null : element("p", { class: "note", id: "refused" }, say(refused <= FEW * all ? "findings.refused" : "findings.many", refused, all));
   const wrong = other ? element("li", { "data-code": "other_robot" }, element("strong", {}, say("findings.robot", other.maker, other.shown)), element("p", {}, element("button", { onclick: other.choose }, say("findings.choose", other.maker)))) : null;
   const untold = found?.untold ? element("p", { class: "note", id: "untold" }, say("findings.untold", doctorText(found.untold).text)) : null;
   const list = (...items) => element("ol", {}, wrong, ...items);
   if (!found) return replace(body, wrong && list(), element("p", { class: "note" }, say("findings.wait")), counted);
   if (found.failed) return replace(body, wrong && list(), element("p", { class: "warning" }, say("findings.failed", found.failed)), counted);
-  if (found.findings.length === 0) return replace(body, wrong ? list() : element("p", { class: "good" }, say("findings.none")), untold, counted);
+  if (found.findings.length === 0) return replace(body, wrong ? list() : nothingFound(run, onShow), untold, counted);
   replace(body, list(found.findings.map((one) => finding(followable(one, codes), onTry))), untold, counted);
 }
 

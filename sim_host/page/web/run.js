@@ -36,6 +36,8 @@ function spans(times, words, end) {
   return found;
 }
 
+/** Refusals of a source from which they are a sign of a mistake: so many, and more than this share. */
+const LEAST_REFUSED = 20, MOST_REFUSED = 0.25;
 /** A node sends one landmark of at most 254 each 0.1 s. */
 const ROUND_S = 30;
 /** Largest ratio that a frame of Est_Innov can say. */
@@ -144,6 +146,11 @@ export class Run {
   /** [refused, all] of its measurements. */
   refusedOf() {
     return [this.refusals.length, [...this.sources.values()].reduce((sum, all) => sum + all.length, 0)];
+  }
+  /** Sources of which more than outliers are refused, the worst first: [{source, refused, all}]. */
+  mostlyRefused() {
+    const counted = [...this.sources].map(([source, all]) => ({ source, refused: all.filter((one) => one.refused).length, all: all.length }));
+    return counted.filter(({ refused, all }) => refused >= LEAST_REFUSED && refused > MOST_REFUSED * all).sort((a, b) => b.refused / b.all - a.refused / a.all);
   }
   /** Bits of Est_Status.Faults at a moment. */
   faults(time) {

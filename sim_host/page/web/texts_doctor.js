@@ -55,6 +55,8 @@ export const DOCTOR_ID = [
   ["Over # pairs of chords the distance by the fixes fits the path of wheels@ to # (RMS of angle and ratio) with @, to # as sent.", "Pada {0} pasang tali busur, jarak menurut posisi GNSS cocok dengan lintasan roda{1} sampai {2} (RMS sudut dan rasio) dengan {3}, sampai {4} seperti dikirim."],
   ["The fixes lie # times as far apart as the path of the wheels is long (median of # chords; half of them from # to #).", "Jarak antarposisi GNSS {0} kali panjang lintasan roda (median {1} tali busur; separuhnya dari {2} sampai {3})."],
   ["The robot turns by its scans against", "Putaran robot menurut scan berlawanan dengan"],
+  ["The course by GNSS turns with the wheels (#).", "Arah menurut GNSS berputar searah dengan roda ({0})."],
+  ["The course by GNSS turns against the wheels (#).", "Arah menurut GNSS berputar berlawanan dengan roda ({0})."],
   ["Negate First and Step of In_ScanHead and set lidar.yaw_rad to #.", "Balik tanda First dan Step di In_ScanHead dan isi lidar.yaw_rad dengan {0}."],
   ["While the wheels drive straight ahead, the scans move at # deg to the left (# pairs, # m).", "Ketika roda berjalan lurus, scan bergeser pada {0} derajat ke kiri ({1} pasang, {2} m)."],
   ["Set lidar.yaw_rad to # (# deg), or turn the scanner.", "Isi lidar.yaw_rad dengan {0} ({1} derajat), atau putar LiDAR-nya."],
