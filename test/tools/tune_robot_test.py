@@ -18,7 +18,7 @@ sys.path.insert(0, os.path.join(ROOT, "tools", "python"))
 import numpy as np  # noqa: E402
 from scipy.stats import multivariate_normal  # noqa: E402
 
-from tetap.tune import likelihood, outcome, rows, search  # noqa: E402
+from tetap.tune import grid, likelihood, outcome, rows, search  # noqa: E402
 from tetap.tune.replays import Replays  # noqa: E402
 
 PROGRAMS = os.environ.get("TETAP_PROGRAMS", os.path.join(ROOT, "build/host/sim_host"))
@@ -82,12 +82,38 @@ class MatchedWorld(unittest.TestCase):
         nis = np.add.reduceat(one.innovation ** 2 / np.exp(one.log_variance), one.first)
         np.testing.assert_allclose(nis, one.nis, rtol=2e-3, atol=1e-4)
 
+    def test_nees_is_that_of_the_file_and_the_grid_is_its_neighbourhood(self):
+        other, out = (os.path.join(self.folder.name, name) for name in ("other", "grid"))
+        subprocess.run([os.path.join(PROGRAMS, "tetap-world"), "--memory", "--robot", ROBOT, "--matched", "--seed", "6", "--duration", "120", "--raw", "--quiet", "--out", other], check=True)
+        truths = [os.path.join(folder, "truth.csv") for folder in (self.folder.name, other)]
+        done = tune(self.log, os.path.join(other, "raw.log"), "--robot", ROBOT, "--rows", "gnss.sigma_scale", "--set", "gnss.sigma_scale=3", "--truth", truths[0], "--truth", truths[1],
+                    "--grid", "gnss.sigma_scale", "--out", out)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        with open(os.path.join(out, "tune.json"), encoding="utf-8") as file:
+            result = json.load(file)
+        played = os.path.join(out, "played")
+        for command in ([os.path.join(PROGRAMS, "tetap-play"), self.log, "--memory", "--robot", ROBOT, "--params", os.path.join(out, "tuned.params"), "--lockstep", "--quiet", "--out", played],
+                        [os.path.join(ROOT, "tools/report/write_report"), played, "--truth", truths[0], "--no-pictures"]):
+            subprocess.run(command, check=True, capture_output=True)
+        with open(os.path.join(played, "summary.json"), encoding="utf-8") as file:
+            wanted = json.load(file)["fused"]
+        before, after = ([one["fused"] for one in some] for some in result["nees"])
+        self.assertAlmostEqual(after[0] / (wanted["nees_mean"] / 3), 1, delta=1e-2)
+        self.assertLess(before[0], 0.6 * after[0])  # three times the sigma makes the covariance too large
+        mean = np.mean(result["grid"][0]["nees"], axis=0)
+        self.assertTrue(np.all(np.diff(mean) < 0), mean)  # a larger sigma, a smaller NEES
+        blocks = [block["nees_mean"] / 3 for block in wanted["blocks"].values()]
+        self.assertAlmostEqual(result["grid"][0]["nees"][0][len(mean) // 2] / np.mean(blocks), 1, delta=0.1)  # a log by the numbers of the other
+        self.assertIn("best at", done.stdout)
+
     def test_bad_input_is_one_line_that_says_where(self):
         bad = os.path.join(self.folder.name, "bad.log")
         with open(bad, "w", encoding="utf-8") as file:
             file.write("(1.000000) can0 301#0900CDA600000000\nno frame\n")
         for words, said in (([bad], "bad.log:2: "), ([bad + "x"], "bad.logx: no such file"), ([self.log, "--rows", "gnss.sigma"], "--rows gnss.sigma: no noise row"),
-                            ([self.log, "--set", "gnss.sigma_scale=0"], "gnss.sigma_scale"), ([self.log, "--robot", "nobody"], "no robot 'nobody'")):
+                            ([self.log, "--set", "gnss.sigma_scale=0"], "gnss.sigma_scale"), ([self.log, "--robot", "nobody"], "no robot 'nobody'"),
+                            ([self.log, "--grid", "gnss.sigma_scale"], "--grid needs two logs"),
+                            ([self.log, self.log, "--truth", bad, "--truth", bad, "--grid", "nothing"], "--grid nothing: not among")):
             done = tune("--robot", ROBOT, *words, "--out", os.path.join(self.folder.name, "none"))
             self.assertEqual(done.returncode, 1, words)
             self.assertIn(said, done.stderr)
@@ -108,6 +134,14 @@ class Laws(unittest.TestCase):
             cost = [0.5 * (-size * np.log(k) + likelihood.tail(gate * 1.001 * k, gate)) for k in (1, 2, 10, 1e3, 1e6)]
             self.assertTrue(np.all(np.diff(cost) > 0), cost)  # S divided by k
             self.assertGreaterEqual(cost[0], 0.5 * gate)
+
+    def test_the_best_factor_is_where_the_mean_nees_is_one_or_nearest_to_it(self):
+        factors = np.array(grid.FACTORS)
+        best, low, high = grid.optimum(np.array([1.5 * (factors / 0.7) ** -0.5, 0.5 * (factors / 0.7) ** -0.5]))
+        self.assertAlmostEqual(best, 0.7, delta=0.02)
+        self.assertTrue(low < 0.7 < high)
+        self.assertAlmostEqual(grid.optimum(np.array([2 * factors ** -0.2]))[0], 4, delta=1e-9)
+        self.assertIsNone(grid.optimum(np.array([1.3 + 0.01 * factors])))
 
     def test_a_pair_that_is_alike_and_a_flat_row_are_no_numbers(self):
         information = np.array([[900.0, 899.9, 0, 0], [899.9, 900, 0, 0], [0, 0, 5, 0], [0, 0, 0, 400]])

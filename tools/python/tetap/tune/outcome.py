@@ -76,21 +76,22 @@ def parts_of(slope, names):
     return [(f"{fold[0] * BLOCK_S:.0f} to {(fold[-1] + 1) * BLOCK_S:.0f} s", 0, fold) for fold in folds]
 
 
-def held_out(objective, point, slope, names):
-    """[(what was left out, cost before, cost after, measurements)]: likelihood of a part by numbers found without it.
+def without(objective, point, slope, log, part):
+    """Logarithms found without a part of a log: a scoring step from those of all, by the scores and the information of the other parts. No score
+    of the part is in it but through the point where it begins."""
+    share = len(part) / len(slope.scores[log])
+    score = sum(one.sum(axis=0) for one in slope.scores) - slope.scores[log][part].sum(axis=0)
+    return objective.clipped(point.x + step_of(sum(slope.information) - share * slope.information[log], score))
 
-    They are a scoring step from the numbers of all, by the scores and the information of the other parts: no score of the part is in it but
-    through the point where it begins.
-    """
+
+def held_out(objective, point, slope, names):
+    """[(what was left out, cost before, cost after, measurements)]: likelihood of a part by numbers found without it."""
     begun, = objective.points([objective.start], "held out")
     objective.reference.most(begun.blocks)
     before, found = objective.costs(begun), []
-    score, information = sum(one.sum(axis=0) for one in slope.scores), sum(slope.information)
     for name, log, part in parts_of(slope, names):
-        share = len(part) / len(slope.scores[log])
-        step = step_of(information - share * slope.information[log], score - slope.scores[log][part].sum(axis=0))
-        without, = objective.points([objective.clipped(point.x + step)], "held out")
+        other, = objective.points([without(objective, point, slope, log, part)], "held out")
         measured = objective.reference.measured_in(log, part)
         take = lambda cost: np.pad(cost, (0, max(0, part[-1] + 1 - len(cost))))[part].sum()  # noqa: E731, B023
-        found.append((name, take(before[log]), take(objective.costs(without)[log]), measured))
+        found.append((name, take(before[log]), take(objective.costs(other)[log]), measured))
     return found

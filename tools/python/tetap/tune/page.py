@@ -52,6 +52,7 @@ def text(result, options):
     lines += [f"  held out {what}: {after:.4f} nat a measurement, before {before:.4f}" for what, before, after, _ in held_lines(result)]
     if result.nees:
         lines += [f"  NEES {name}: {before[name]:.2f} before, {after[name]:.2f} after" for before, after in zip(*result.nees) for name in before]
+    lines += ["  " + one["said"] for one in result.grid]
     return "\n".join([*lines, "", verdict(result)])
 
 
@@ -67,7 +68,7 @@ def params_text(result, options, chosen):
 
 def nees_of(summary):
     """{estimator: mean NEES per degree of freedom} of a summary.json."""
-    return {name: one["nees_mean"] / one["nees_dof"] for name, one in summary.get("estimators", {}).items() if one.get("nees_mean") is not None}
+    return {name: one["nees_mean"] / one["nees_dof"] for name, one in summary.items() if isinstance(one, dict) and one.get("nees_mean") is not None}
 
 
 def picture(result):
@@ -111,6 +112,7 @@ def write(folder, result, options):
     if result.nees:
         parts += ["<h2>NEES per degree of freedom (1 expected)</h2>", table(("log", "estimator", "before", "after"), [
             (os.path.basename(log), name, f"{before[name]:.2f}", f"{after[name]:.2f}") for log, before, after in zip(options.logs, *result.nees) for name in before])]
+    parts += [f"<p>{html.escape(one['said'])}.</p>" for one in result.grid]
     if next_measurement(result):
         parts += ["<h2>What to record next</h2>", table(("row", "why it has no number", "record"), next_measurement(result))]
     title = f"Noise of robot {html.escape(options.robot)}"
@@ -119,4 +121,4 @@ def write(folder, result, options):
     with open(os.path.join(folder, "tune.json"), "w", encoding="utf-8") as file:
         json.dump({"robot": options.robot, "logs": options.logs, "rows": {s.name: {"start": s.start, "value": s.value, "low": s.low, "high": s.high, "why": s.why} for s in result.said},
                    "held_out": [dict(zip(("left_out", "before", "after", "measurements"), one)) for one in result.held_out],
-                   "refused": result.refused, "nees": result.nees, "replays": result.replays}, file, indent=1)
+                   "refused": result.refused, "nees": result.nees, "grid": result.grid, "replays": result.replays}, file, indent=1)

@@ -19,7 +19,9 @@ class Result:
     held_out: list       # (what, cost before, cost after, measurements)
     refused: tuple       # share of refused measurements before and after
     replays: int
+    others: list         # by log the numbers found without it, {path: value}; of several logs alone
     nees: tuple = None   # before, after: a list by log
+    grid: list = dataclasses.field(default_factory=list)  # by row the NEES held out, its best factor, and the words for it
 
 
 def refused_share(point):
@@ -48,7 +50,7 @@ def tune(program, logs, robot, given, chosen, options):
             staying = [place for place in range(len(kept)) if place not in why]
             kept, begin = [kept[place] for place in staying], point.x[staying]
         if not kept:
-            return Result(list(said.values()), [], (refused_share(begun),) * 2, replays.progress.done)
+            return Result(list(said.values()), [], (refused_share(begun),) * 2, replays.progress.done, [{} for _ in logs])
         low, high = outcome.intervals(slope.scores, sum(slope.information), np.random.default_rng(SEED))
         for place, row in enumerate(objective.rows):
             one = said[row.name]
@@ -57,4 +59,6 @@ def tune(program, logs, robot, given, chosen, options):
                 one.low, one.why = 0.0, "an upper bound: a smaller one changes nothing"
         names = [os.path.basename(log) for log in logs]
         held = outcome.held_out(objective, point, slope, names)
-        return Result(list(said.values()), held, (refused_share(begun), refused_share(point)), replays.progress.done)
+        parts = outcome.parts_of(slope, names) if len(logs) > 1 else []
+        others = [objective.settings(outcome.without(objective, point, slope, log, part)) for _, log, part in parts]
+        return Result(list(said.values()), held, (refused_share(begun), refused_share(point)), replays.progress.done, others)
