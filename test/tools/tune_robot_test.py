@@ -152,6 +152,10 @@ class Laws(unittest.TestCase):
         self.assertEqual(sorted(why), [0, 1, 2])
         self.assertIn("separated from b", why[0])
         self.assertIn("flat", why[2])
+        short = [np.array([[1.0, 2, 3, 0], [0, 2, 3, 4], [0, 2, 3, 4]]), np.array([[0, 2, 3, 4.0]])]
+        why = outcome.judge(objective, point, search.Slopes([information], short, np.zeros(4, bool), np.zeros(4, bool)), names)
+        self.assertIn("too short: 1 blocks", why[0])
+        self.assertNotIn(3, why)
 
 
 if __name__ == "__main__":

@@ -11,6 +11,7 @@ from tetap.tune.search import step_of
 UNKNOWN = 0.35        # 1 sigma of a logarithm beyond which 95 % span more than a factor of two either way: no number
 DRAWS = 4000
 INERT = "no effect on these logs"
+LEAST_BLOCKS = 3      # that move with a row: of fewer no interval can be drawn
 FOLD_S = 60.0
 
 
@@ -41,10 +42,13 @@ def judge(objective, point, slope, rows):
     information = sum(slope.information)
     alone = 1 / np.sqrt(np.maximum(np.diag(information), 1e-9))
     together, like = conditional(information)
+    blocks = np.count_nonzero(np.concatenate(slope.scores), axis=0) if slope.scores else np.full(len(rows), LEAST_BLOCKS)
     why = {}
     for k in range(len(rows)):
         if slope.inert[k]:
             why[k] = INERT
+        elif blocks[k] < LEAST_BLOCKS:
+            why[k] = f"too short: {blocks[k]} blocks of {BLOCK_S:.0f} s show it, {LEAST_BLOCKS} are needed"
         elif alone[k] > UNKNOWN:
             why[k] = "flat likelihood: these logs do not show it"
         elif together[k] > UNKNOWN:
