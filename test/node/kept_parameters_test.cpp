@@ -340,7 +340,7 @@ TYPED_TEST(KeptParametersTest, ASetThatBreaksARuleKeepsItsClaim) {
   const std::uint16_t key = firmware::KeptSet::key(row_of("bus.key").index, 0);
   begin_with({{key, 7}, {static_cast<std::uint16_t>(key + 3), 9}});
   EXPECT_EQ(bench.get(row_of("bus.commands").index), 1U) << "commands still need a tag";
-  EXPECT_EQ(bench.get(row_of("landmark.gate_scale").index), word_of(kKept, row_of("landmark.gate_scale"), 0));
+  EXPECT_EQ(bench.get(row_of("landmark.gate_scale").index), sim::word_of(kKept, row_of("landmark.gate_scale"), 0));
   EXPECT_EQ(bench.get(row_of("wheels.drive.track_m").index), std::bit_cast<std::uint32_t>(0.5F));
   EXPECT_EQ(bench.set(row_of("landmark.gate_scale").index, kTwo), ParamAnswer::kRefused);
   std::size_t named = 0;
