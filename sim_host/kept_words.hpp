@@ -36,6 +36,9 @@ struct Begun {
   param::Parameters from, to;       ///< parameters of the node in this process, and those that repeat the log
   param::Parameters built, active;  ///< parameters of the robot, and those of the log's node
   bool exact = false;               ///< the log names all of them
+
+  /// Behind the settings that the log names.
+  [[nodiscard]] const char* rest() const { return exact ? "" : " and more, which the log does not name"; }
 };
 
 /// Nothing where the log's node began as its robot is built, or takes no parameters. `of_node` are those of the node

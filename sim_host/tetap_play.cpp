@@ -28,9 +28,8 @@ std::optional<sim::Begun> begun_of(sim::SurveyedLog& log, sim::PlayOptions& opti
       sim::MemoryNode::for_player(sim::parameters_of(options.robot, settings), options.script.base);
   auto begun = sim::begun_of(log.file, options.script.log_base, sim::robot_named(options.robot), of_node);
   if (!begun) return std::nullopt;
-  const std::string words = sim::settings_between(begun->built, begun->active);
-  std::fprintf(stderr, "tetap-play: %s: its node began with %s%s%s\n", options.log.c_str(), words.c_str(),
-               begun->exact ? "" : " and more, which the log does not name",
+  const std::string words = sim::settings_between(begun->built, begun->active) + begun->rest();
+  std::fprintf(stderr, "tetap-play: %s: its node began with %s%s\n", options.log.c_str(), words.c_str(),
                options.memory ? "" : "; the node that it is played to needs them as well (SET=)");
   options.notes.emplace_back("began_with", sim::quoted(words));
   return begun;

@@ -171,7 +171,7 @@ sim::Result<> tetap_replay::play(std::string_view text, const std::string& name,
   frames.clear();
   sim::MemoryNode node(robot, parameters, version());
   if (begun) {
-    began_with = sim::settings_between(begun->built, begun->active);
+    began_with = sim::settings_between(begun->built, begun->active) + begun->rest();
     if (auto made = sim::make_active(node.link(), begun->from, begun->to); !made)
       return sim::Failure{name + ": its node began with " + began_with + "; " + made.failure().text};
   }

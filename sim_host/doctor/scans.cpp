@@ -192,8 +192,8 @@ void ScanDetector::finish(Findings& findings) {
     return !by || !by->follows() ? 0 : by->correlation > 0 ? 1 : -1;
   };
   const int votes = sign(wheels) + sign(gyroscope);
-  if (votes < 0) judge_sense(wheels, gyroscope, findings);
-  judge_direction(votes < 0, findings);
+  const std::optional<Code> of_wheels = votes < 0 ? judge_sense(wheels, gyroscope, findings) : std::nullopt;
+  if (of_wheels != Code::kWheelsReversed) judge_direction(votes < 0 && !of_wheels, findings);
   if (gyroscope && gyroscope->follows())
     judge_delay(gyroscope, "gyroscope's", kGyroscope, findings);
   else
@@ -206,8 +206,8 @@ double ScanDetector::wheels_by_course() const {
   return correlation(course_.covariance(0, 1), course_.covariance(0, 0), course_.covariance(1, 1));
 }
 
-void ScanDetector::judge_sense(const std::optional<Fit>& wheels, const std::optional<Fit>& gyroscope,
-                               Findings& findings) const {
+std::optional<Code> ScanDetector::judge_sense(const std::optional<Fit>& wheels, const std::optional<Fit>& gyroscope,
+                                              Findings& findings) const {
   std::string words;
   Devices uses = kNoDevice;
   const auto add = [&](const std::optional<Fit>& by, const char* device, Devices of) {
@@ -220,20 +220,21 @@ void ScanDetector::judge_sense(const std::optional<Fit>& wheels, const std::opti
   add(gyroscope, "gyroscope", kGyroscope);
   // Without a third device wheels that turn the other way look the same.
   std::optional<Code> beside;
-  const bool back = std::abs(direction_rad(true)) > kScanReversed_rad;
+  const double course = wheels_by_course();
+  const bool wheels_wrong = uses == kWheels && course < -kScanFollows;
+  const bool back = std::abs(direction_rad(!wheels_wrong)) > kScanReversed_rad;
   if (uses == kWheels) beside = back ? Code::kWheelsReversed : Code::kWheelsSwapped;
   std::string evidence = "The robot turns by its scans against" + words + ".";
-  const double course = wheels_by_course();
   if (beside && std::abs(course) > kScanFollows) {
     evidence += course > 0 ? text(" The course by GNSS turns with the wheels (%.2f).", course)
                            : text(" The course by GNSS turns against the wheels (%.2f).", course);
-    if (course < 0) {
+    if (wheels_wrong) {
       findings.push_back({.code = *beside,
                           .uses = kScanner | kGnssVelocity,
                           .certainty = -course,
                           .evidence = evidence,
                           .change = {}});
-      return;
+      return beside;
     }
     beside.reset();
   }
@@ -248,6 +249,7 @@ void ScanDetector::judge_sense(const std::optional<Fit>& wheels, const std::opti
                         .evidence = evidence,
                         .change = {},
                         .beside = Code::kScanMirrored});
+  return std::nullopt;
 }
 
 void ScanDetector::judge_direction(bool mirrored, Findings& findings) const {

@@ -55,7 +55,9 @@ class ScanDetector : public Detector {
   void roll(double time_s, const sensor::Sample& sample);
   void hold(const Pair& pair);
   [[nodiscard]] std::optional<Fit> fit(Reference reference) const;
-  void judge_sense(const std::optional<Fit>& wheels, const std::optional<Fit>& gyroscope, Findings& findings) const;
+  /// Code of the wheels, where the course by GNSS decides against them: the scans are right then.
+  std::optional<Code> judge_sense(const std::optional<Fit>& wheels, const std::optional<Fit>& gyroscope,
+                                  Findings& findings) const;
   /// Correlation of the wheels' turn with that of the course by GNSS; 0 where nothing is known.
   [[nodiscard]] double wheels_by_course() const;
   void judge_direction(bool mirrored, Findings& findings) const;

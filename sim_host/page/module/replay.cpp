@@ -77,7 +77,7 @@ void put_begun(const sim::LogReport& report, const char* mode, std::uint64_t tic
     for (std::size_t k = 0; k < row.elements; ++k) json.value(row.get(begun->active, k));
     json.end(']').end('}');
   }
-  json.end(']');
+  json.end(']').member("began_exact", !begun || begun->exact);
   put_report(json, report);
   write(Channel::kBegun, json.end('}').text());
 }

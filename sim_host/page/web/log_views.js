@@ -20,7 +20,7 @@ export function renderBits(body, { result }, note) {
   const warnings = [result.first_malformed, result.cut_off, result.first_gap, result.first_wrong_length].filter(Boolean).join("; ");
   replace(body,
     element("p", { class: same ? "good" : compared === 0 ? "note" : "bad", id: "same" }, verdict),
-    result.began_with?.length ? element("p", { class: "note", id: "began" }, say("bits.began", settingText(result.began_with))) : null,
+    result.began_with?.length ? element("p", { class: "note", id: "began" }, say(result.began_exact === false ? "bits.began_part" : "bits.began", settingText(result.began_with))) : null,
     result.other_numbers ? element("p", { class: "warning" }, say("bits.numbers")) : null,
     note ? element("p", { class: "warning" }, note) : null,
     result.wrong && same ? element("p", { class: "warning" }, result.wrong) : null,
