@@ -444,7 +444,8 @@ SHORT_S = "90"
 # name: robot, and how the log is made: arguments of tetap-world, or an importer with its arguments ({DATA} is the folder of the sets)
 WORLDS = {"yard": ("rover", []), "road": ("rover", ["--course", "road"]), "car": ("car", []), "iris": ("iris", []),
           "husky_sim": ("husky_inertial", []),
-          "lab": ("scanner", []), "lab_again": ("scanner", ["--seed", "12"]), "lab_third": ("scanner", ["--seed", "13"]),
+          "lab": ("scanner", []), "lab_again": ("scanner", ["--seed", "12"]), "lab_third": ("scanner", ["--seed", "13"]), "lab_long": ("scanner", ["--duration", "150"]),
+          "lab_turned": ("scanner", ["--duration", "150", "--built", "--set", "lidar.yaw_rad=0.6"]),
           "tour": ("rover", []), "husky_tour": ("husky_inertial", ["--seed", "77"]), "stand": ("rover", ["--course", "stand", "--duration", SHORT_S]),
           "usual": ("rover", ["--seed", "2", "--fault", "wheel_spin@45+3,gnss_outage@80+30,gnss_jump@150+2"])}
 SETS = {"skog": ("car", "import_skog", "skog_gnss_ins"), "husky": ("husky_inertial", "import_husky", "husky"),
@@ -602,10 +603,13 @@ class Doctor(unittest.TestCase):
                 self.assertRegex(found[0]["change"], change)
 
     def test_the_course_by_gnss_decides_between_scans_and_wheels(self):
-        for mistake, code in ((mirror_scans, "scan_mirrored"), (swap_wheels, "wheels_swapped")):
-            found = self.examine(mistake(self.logs.frames("lab")), "scanner")
-            self.assertEqual([one["code"] for one in found], [code])
-            self.assertIn("The course by GNSS turns", found[0]["evidence"])
+        for name, yaw_rad in (("lab_long", 0), ("lab_turned", 0.6)):
+            for mistake, code in ((mirror_scans, "scan_mirrored"), (swap_wheels, "wheels_swapped")):
+                found = self.examine(mistake(self.logs.frames(name)), "scanner", "--set", f"lidar.yaw_rad={yaw_rad}")
+                self.assertEqual(found[0]["code"], code)
+                self.assertIn("The course by GNSS turns", found[0]["evidence"])
+                if yaw_rad == 0 or code != "scan_mirrored":  # mirrored scans of a turned scanner point elsewhere, too
+                    self.assertEqual(len(found), 1, found)
 
     def test_a_mistake_gets_the_remedies_of_its_own_devices_alone(self):
         reversed_imu = [("accel_sign", "VelX, VelY and VelZ"), ("gyro_sign", "AngX, AngY and AngZ")]
