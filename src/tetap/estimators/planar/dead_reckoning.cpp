@@ -196,7 +196,7 @@ Estimate PlanarDeadReckoning<Filter>::estimate(const param::Parameters& n) const
 }
 
 template <class Filter>
-MotionVariance PlanarDeadReckoning<Filter>::motion_variance(const param::Parameters& n) const {
+[[gnu::noinline]] MotionVariance PlanarDeadReckoning<Filter>::motion_variance(const param::Parameters& n) const {
   if (!fresh(n)) return {};
   // Variance of the motion over one period: its share in that of the pose, and the steps of the counters.
   const float period_s = base::seconds(base::Micros{n.loop.period_us});

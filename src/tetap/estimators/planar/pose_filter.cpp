@@ -77,7 +77,7 @@ auto PoseFilter<Filter>::update_by(const Model& model, float gate, base::Micros 
 }
 
 template <class Filter>
-void PoseFilter<Filter>::take_rival(base::Micros stamp) {
+[[gnu::noinline]] void PoseFilter<Filter>::take_rival(base::Micros stamp) {
   motion_.filter.x = relocalisation_.rival().x;
   set_covariance(motion_.filter, relocalisation_.rival().p);
   last_fused_fix_ = relocalisation_.last_fused_fix();

@@ -130,7 +130,7 @@ class PoseFilter {
   [[nodiscard]] bool moves_otherwise() const { return turn_.residual.contradicts() || vote_.contradicts(now_); }
 
   /// A function of its own: the empty filter leaves the stack before a pose is set.
-  void clear() { *this = {}; }
+  [[gnu::noinline]] void clear() { *this = {}; }
 
   enum class Phase : std::uint8_t { kWaiting, kAligning, kTracking };
   using Source = MotionVote::Source;

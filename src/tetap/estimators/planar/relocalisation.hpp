@@ -159,14 +159,16 @@ inline bool Relocalisation::add(const model::RangeBearing& seen, std::uint8_t id
   return false;
 }
 
-inline bool Relocalisation::explains(const model::RangeBearing& seen, const filter::Innovation<float, 2>& judged) {
+[[gnu::noinline]] inline bool Relocalisation::explains(const model::RangeBearing& seen,
+                                                       const filter::Innovation<float, 2>& judged) {
   const filter::Innovation<float, 2> by_rival = rival_.update(seen, judged.gate);
   if (by_rival.verdict != filter::Verdict::kAccepted) return false;
   evidence_ += 0.5F * (cost(judged) - cost(by_rival));
   return true;
 }
 
-inline void Relocalisation::place(const model::RangeBearing& seen, std::uint8_t id, base::Micros stamp) {
+[[gnu::noinline]] inline void Relocalisation::place(const model::RangeBearing& seen, std::uint8_t id,
+                                                    base::Micros stamp) {
   const LandmarkAlignment::Result found = landmarks_.add(seen, id, stamp, rival_.x, rival_.p);
   using Outcome = LandmarkAlignment::Outcome;
   constexpr float kNone_m2 = 0.25e-6F, kNone_rad2 = 1e-8F;
