@@ -33,6 +33,10 @@ test("a chart shows all of its values, but for a few that would make a hairline 
   const excursion = shownRange([...calm, ...Array.from({ length: 30 }, () => 21)]);
   assert.ok(excursion[1] > 21, "3 % of the time is no few");
   assert.deepEqual(shownRange([]), [-1, 1]);
+  for (const values of [[1e20, 1e20 + 16384], [1e300, -1e300], [3, 3 + 5e-16], [5e-324, 0]]) {
+    const [least, most] = shownRange(values); // a chart divides it: a step has to change the sum
+    assert.ok(Number.isFinite(most - least) && least + (most - least) / 1e4 > least, values);
+  }
   const still = shownRange([5, 5, 5]);
   assert.ok(still[0] < 5 && still[1] > 5);
 });

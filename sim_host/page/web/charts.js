@@ -7,7 +7,7 @@ import { decimal, say } from "./texts.js";
 const base = (view, title, height) => ({
   title,
   height,
-  scales: { x: { time: false, range: () => view.span } },
+  scales: { x: { time: false, range: () => wideEnough(view.span) } },
   cursor: { drag: { x: true, y: false, setScale: false }, sync: { key: "t" } },
   legend: { live: true },
   hooks: {},
@@ -22,7 +22,13 @@ export function shownRange(values) {
   const [first, last] = [all[Math.floor(0.01 * n)], all[Math.ceil(0.99 * n) - 1]];
   if (last > first && high - low > 4 * (last - first)) [low, high] = [first, last];
   const space = 0.06 * (high - low) || Math.abs(high) * 0.01 || 1;
-  return [low - space, high + space];
+  return wideEnough([low - space, high + space]);
+}
+/** A range that a scale can be divided in: at least 1e-9 of its values, which have 16 digits, and at most 1e12 beside 0. */
+export function wideEnough([low, high]) {
+  const bound = (v) => Math.min(Math.max(v, -1e12), 1e12), [first, last] = [bound(low), bound(high)];
+  const least = 1e-9 * Math.max(Math.abs(first), Math.abs(last), 1e-6);
+  return last - first >= least ? [first, last] : [first - least, last + least];
 }
 const axis = (more = {}) => ({ stroke: () => colour("faint"), grid: { stroke: () => colour("grid"), width: 1 }, ticks: { stroke: () => colour("grid") }, ...more });
 

@@ -29,7 +29,7 @@ export class TablesView {
     this.parent.hidden = true;
   }
   render() {
-    if (!this.files) return;
+    if (!this.files || this.robot === null) return; // the columns of new files are still looked at
     const nothing = !this.rows.some(({ sensor }) => sensor);
     const robots = element("select", { id: "tables-robot", "aria-label": say("robot.label"), onchange: () => ((this.robot = Number(robots.value)), this.described.clear(), this.render()) },
       this.order.map(({ number, useless }) => element("option", { value: number, selected: number === this.robot }, `${this.about.robots[number].name}${useless ? ` – ${say("ask.useless")}` : ""}`)));
