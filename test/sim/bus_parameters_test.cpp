@@ -281,7 +281,10 @@ TEST(BusParameters, RestartOnlyANodeThatRests) {
             ParamAnswer::kOtherActive);
   EXPECT_EQ(answer(bench, at, bus::CmdParamRestart{.restart_before_crc = name, .restart_after_crc = name ^ 1}),
             ParamAnswer::kOtherStaged);
+  bench.node.reset(bus::ResetWhat::kSnapshot);
   EXPECT_EQ(answer(bench, at, restart), ParamAnswer::kDone);
+  EXPECT_TRUE(bench.node.take_snapshot_request()) << "asked for in the same tick";
+  EXPECT_EQ(answer(bench, at, restart), ParamAnswer::kBusy) << "not for a second after a restart";
   while (at < 2000) bench.epoch(half_a_minute()[at++]);
   EXPECT_EQ(answer(bench, at, restart), ParamAnswer::kBusy) << "it drives";
   param::Parameters locked = kCompiled;

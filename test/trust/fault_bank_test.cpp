@@ -142,7 +142,9 @@ TEST(fault_bank, a_permuted_table_gives_the_same_bits) {
       const trust::LikelyFault a = run.bank.likeliest(), b = other.bank.likeliest();
       ASSERT_EQ(a.code, b.code);
       ASSERT_EQ(a.probability, b.probability);
-      if (a.code != trust::LikelyFault::kNone) ASSERT_EQ(a.size, b.size);
+      if (a.code != trust::LikelyFault::kNone) {
+        ASSERT_EQ(a.size, b.size);
+      }
     }
   }
 }

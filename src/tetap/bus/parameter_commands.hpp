@@ -226,7 +226,12 @@ inline void ParameterCommands::set(const CmdParamSet& command, bool admitted, bo
 }
 
 [[gnu::cold]] inline void ParameterCommands::take_over(Change change) {
-  change == Change::kRestart ? staged_.take_over_all() : staged_.take_over();
+  if (change == Change::kRestart) {
+    staged_.take_over_all();
+    still_ticks_ = 0;
+  } else {
+    staged_.take_over();
+  }
   next_row_ = next_word_ = 0;
   pause_ticks_ = 0;
 }

@@ -125,7 +125,7 @@ class WiredInputs {
 
  private:
   struct Nothing {};
-  /// maker(board), compiled only where the part is there: neither board nor robot need have all three.
+  /// maker(board), compiled only where the part is there: neither board nor robot need have every part.
   template <bool kThere, class Make>
   [[nodiscard]] static auto make(Board& board, Make&& maker) {
     if constexpr (kThere)
@@ -133,44 +133,28 @@ class WiredInputs {
     else
       return Nothing{};
   }
-  template <class B, bool kThere>
-  struct ImuOf {
+  template <class B>
+  using ImuOf = WiredImu<std::remove_reference_t<decltype(std::declval<B&>().imu)>>;
+  template <class B>
+  using EncodersOf = WiredEncoders<std::remove_reference_t<decltype(std::declval<B&>().left_encoder)>,
+                                   std::remove_reference_t<decltype(std::declval<B&>().right_encoder)>>;
+  template <class B>
+  using GnssOf = WiredGnss<std::remove_reference_t<decltype(std::declval<B&>().gnss)>>;
+  template <class B>
+  using LidarOf = WiredLidar<std::remove_reference_t<decltype(std::declval<B&>().gnss)>>;
+  /// Part of the board, named only where it is there.
+  template <bool kThere, template <class> class Of>
+  struct Part {
     using Type = Nothing;
   };
-  template <class B>
-  struct ImuOf<B, true> {
-    using Type = WiredImu<std::remove_reference_t<decltype(std::declval<B&>().imu)>>;
+  template <template <class> class Of>
+  struct Part<true, Of> {
+    using Type = Of<Board>;
   };
-  template <class B, bool kThere>
-  struct EncodersOf {
-    using Type = Nothing;
-    static bool owns(std::uint32_t) { return false; }
-  };
-  template <class B>
-  struct EncodersOf<B, true> {
-    using Type = WiredEncoders<std::remove_reference_t<decltype(std::declval<B&>().left_encoder)>,
-                               std::remove_reference_t<decltype(std::declval<B&>().right_encoder)>>;
-  };
-  template <class B, bool kThere>
-  struct GnssOf {
-    using Type = Nothing;
-  };
-  template <class B>
-  struct GnssOf<B, true> {
-    using Type = WiredGnss<std::remove_reference_t<decltype(std::declval<B&>().gnss)>>;
-  };
-  template <class B, bool kThere>
-  struct LidarOf {
-    using Type = Nothing;
-  };
-  template <class B>
-  struct LidarOf<B, true> {
-    using Type = WiredLidar<std::remove_reference_t<decltype(std::declval<B&>().gnss)>>;
-  };
-  using Imu = typename ImuOf<Board, kImu>::Type;
-  using Encoders = typename EncodersOf<Board, kEncoders>::Type;
-  using Gnss = typename GnssOf<Board, kGnss>::Type;
-  using Lidar = typename LidarOf<Board, kLidar>::Type;
+  using Imu = typename Part<kImu, ImuOf>::Type;
+  using Encoders = typename Part<kEncoders, EncodersOf>::Type;
+  using Gnss = typename Part<kGnss, GnssOf>::Type;
+  using Lidar = typename Part<kLidar, LidarOf>::Type;
 
   std::uint32_t can_base_;
   StampOffset offset_;

@@ -7,6 +7,7 @@
 #include "hal/byte_stream.hpp"
 #include "tetap/bus/codec.hpp"
 #include "tetap/bus/encoder.hpp"
+#include "tetap/firmware/wired_sensors.hpp"
 
 #include <algorithm>
 #include <array>
@@ -42,9 +43,9 @@ class WiredLidar {
     const hal::SerialFaults line = port_.faults();
     page.gnss_state = bus::GnssState::kReadOnly;
     page.gnss_baud = drivers::ld19::kBaud;
-    page.gnss_checksum = static_cast<std::uint8_t>(std::min<std::uint64_t>(driver_.health().crc, 0xFF));
-    page.gnss_framing = static_cast<std::uint8_t>(std::min<std::uint64_t>(line.framing, 0xFF));
-    page.gnss_lost = static_cast<std::uint8_t>(std::min<std::uint64_t>(std::uint64_t{line.overrun} + line.lapped, 63));
+    page.gnss_checksum = saturated<std::uint8_t>(driver_.health().crc, 0xFF);
+    page.gnss_framing = saturated<std::uint8_t>(line.framing, 0xFF);
+    page.gnss_lost = saturated<std::uint8_t>(std::uint64_t{line.overrun} + line.lapped, 63);
   }
   [[nodiscard]] const drivers::ld19::Health& health() const { return driver_.health(); }
   /// Whether frames with this offset in the node's block are made here.

@@ -209,6 +209,7 @@ class Node {
   void consume(base::Micros t);
   void close_window(base::Micros t);
   void apply_parameters(base::Micros before);
+  void begin();
   void begin_anew();
   void forget_inputs();
   void apply_map(base::Micros before);
@@ -276,17 +277,24 @@ class Node {
 };
 
 template <class Estimators, std::size_t Capacity>
-void Node<Estimators, Capacity>::power_on(base::Micros t) {
+[[gnu::cold]] void Node<Estimators, Capacity>::power_on(base::Micros t) {
   base::clear(*this);
   if constexpr (kHasBusParameters<Estimators>) {
     parameter_commands_.power_on();
     publisher_.renew_config();
   }
-  now_ = restarted_at_ = t;
+  now_ = t;
+  begin();
+}
+
+/// Map, origin and estimators as they are at power-on.
+template <class Estimators, std::size_t Capacity>
+[[gnu::cold]] void Node<Estimators, Capacity>::begin() {
+  restarted_at_ = now_;
   landmarks_.power_on(map_frame_);
   origin_.power_on(map_frame_, parameters_.gnss);
-  window_.power_on(t, context());
-  disagreement_.restart(t);
+  window_.power_on(now_, context());
+  disagreement_.restart(now_);
 }
 
 template <class Estimators, std::size_t Capacity>
@@ -470,18 +478,15 @@ void Node<Estimators, Capacity>::forget_inputs() {
 /// As after power-on, but for counts, numbers and tags, which go on: a log goes on, and so does its replay.
 template <class Estimators, std::size_t Capacity>
 [[gnu::cold]] void Node<Estimators, Capacity>::begin_anew() {
-  landmarks_.power_on(map_frame_);
-  origin_.power_on(map_frame_, parameters_.gnss);
   forget_inputs();
-  window_.power_on(now_, context());
+  begin();
   window_.open_from(now_ - base::Micros{parameters_.loop.window_us});
-  disagreement_.restart(now_);
   pending_pose_.reset();
-  pending_reset_ = {};
+  for (const auto what : {bus::ResetWhat::kEstimators, bus::ResetWhat::kLandmarkMap, bus::ResetWhat::kOwnMap})
+    static_cast<void>(take(what));
   jumps_ = 0;
   ++resets_;
   reset_cause_ = sensor::ResetCause::kCommand;
-  restarted_at_ = now_;
 }
 
 /// Makes consumed samples and the time up to t final: nothing from before t is fused any more.

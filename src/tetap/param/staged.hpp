@@ -102,19 +102,17 @@ class StagedParameters {
   /// Whether take_over() may follow. `before` and `after`: names (kName) of the active set that the sender knows, and
   /// of the staged one that it means.
   [[nodiscard]] Answer judge(std::uint32_t before, std::uint32_t after) {
-    if (((before ^ active_crc()) & kName) != 0) return Answer::kOtherActive;
-    if (((after ^ staged_crc()) & kName) != 0) return Answer::kOtherStaged;
-    return judge();
+    const Answer named = compare(before, after);
+    return named == Answer::kDone ? judge() : named;
   }
   /// The same for take_over_all().
   [[nodiscard]] Answer judge_all(std::uint32_t before, std::uint32_t after) const {
-    if (((before ^ active_crc()) & kName) != 0) return Answer::kOtherActive;
-    if (((after ^ staged_crc()) & kName) != 0) return Answer::kOtherStaged;
-    return plausible_together(staged_) ? Answer::kDone : Answer::kNotTogether;
+    const Answer named = compare(before, after);
+    return named == Answer::kDone && !plausible_together(staged_) ? Answer::kNotTogether : named;
   }
   /// Stages the compiled parameters, but for rows of access, and judges them.
   [[nodiscard]] Answer restore(std::uint32_t before) {
-    if (((before ^ active_crc()) & kName) != 0) return Answer::kOtherActive;
+    if (!is_active(before)) return Answer::kOtherActive;
     withdraw_claim();
     for (std::size_t row = 0; row < kStoredRows.size(); ++row)
       if (!kStoredRows[row].access) copy(compiled_, staged_, kStoredRows[row]);
@@ -193,6 +191,11 @@ class StagedParameters {
             needs_tags(offsetof(Parameters, loop.lockstep), Lockstep::kAuthenticated));
   }
 
+  [[nodiscard]] bool is_active(std::uint32_t name) const { return ((name ^ active_crc()) & kName) == 0; }
+  [[nodiscard]] Answer compare(std::uint32_t before, std::uint32_t after) const {
+    if (!is_active(before)) return Answer::kOtherActive;
+    return ((after ^ staged_crc()) & kName) == 0 ? Answer::kDone : Answer::kOtherStaged;
+  }
   [[nodiscard]] Answer judge() {
     const auto live = [](std::size_t row) { return kStoredRows[row].live; };
     if (!plausible_together(staged_) || !exchange(live)) return Answer::kNotTogether;
