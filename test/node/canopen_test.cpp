@@ -368,7 +368,9 @@ TEST(Canopen, BeatsAndTellsOfErrorsTenTimesASecondAtMost) {
   std::vector<int> codes;
   for (std::size_t i = 0; i < told.size(); ++i) {
     codes.push_back(told[i].second.data[0] | told[i].second.data[1] << 8);
-    if (i > 0) EXPECT_GE(told[i].first - told[i - 1].first, 100'000);
+    if (i > 0) {
+      EXPECT_GE(told[i].first - told[i - 1].first, 100'000);
+    }
   }
   std::sort(codes.begin(), codes.end());
   EXPECT_EQ(codes, (std::vector{0, 0x8110, 0x8140, 0x8150}));

@@ -135,11 +135,12 @@ TYPED_TEST(KeptParametersTest, EachRowIsSetRefusedOutOfItsLimitsSavedAndThereAft
     if (param::is_secret(row)) continue;
     Keeping<TypeParam> bench;
     const std::uint32_t compiled = bench.get(row.index);
-    if (row.storage == param::Storage::kFloat)
+    if (row.storage == param::Storage::kFloat) {
       EXPECT_NE(bench.set(row.index,
                           std::bit_cast<std::uint32_t>(std::nextafter(static_cast<float>(row.maximum), 1e30F) * 2 + 1)),
                 ParamAnswer::kDone)
           << row.path;
+    }
     // A neighbour that breaks no rule, as the host's table has it.
     param::Parameters wanted = kKept;
     const double span = row.maximum - row.minimum, before = row.get(kKept, 0);

@@ -138,9 +138,12 @@ std::unique_ptr<Planar> circle(int late) {
   };
   for (int k = 1; k <= 200; ++k) {
     const auto held = [](int i) { return i % 7 == 3 && i < 180; };
-    if (late == 0 || !held(k)) EXPECT_EQ(speed(k), Admission::kTaken);
-    if (late > 0 && k > late && held(k - late))
+    if (late == 0 || !held(k)) {
+      EXPECT_EQ(speed(k), Admission::kTaken);
+    }
+    if (late > 0 && k > late && held(k - late)) {
       EXPECT_EQ(speed(k - late), late < 20 ? Admission::kTaken : Admission::kTooLate);
+    }
     robot->advance({1'000'000 + 10'000 * k});
   }
   return robot;

@@ -49,8 +49,8 @@ struct RoomDrive {
   double angle, cx, cy;
   int beyond = 0;  ///< ticks with a valid pose beyond 3 sigma
 
-  RoomDrive(double angle, double cx, double cy, const param::Parameters& n = robot::scanner::parameters)
-      : node(n), angle(angle), cx(cx), cy(cy) {
+  RoomDrive(double first, double x, double y, const param::Parameters& n = robot::scanner::parameters)
+      : node(n), angle(first), cx(x), cy(y) {
     make_field(kRoom, 0.05, -4.4, -3.4, 11, 10, given());
     OnMap::kField = given().field;
   }

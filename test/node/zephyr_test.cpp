@@ -30,7 +30,7 @@ base::CanFrame zephyr_wheels(std::uint32_t n, std::int64_t time_us) {
 
 void arrives(const base::CanFrame& frame) {
   can_frame out{};
-  out.id = frame.id;
+  out.id = frame.id & CAN_STD_ID_MASK;
   out.dlc = frame.size;
   std::copy_n(frame.data.begin(), frame.size, out.data);
   fake_arrives(out);

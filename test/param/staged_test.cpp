@@ -112,7 +112,9 @@ TEST(StagedParameters, AreAppliedAsAWholeOrNotAtAll) {
 TEST(StagedParameters, DoNotTakeAccessOrIdentityFromTheBus) {
   for (const Row& row : kTable) {
     StagedParameters staged(kCompiled);
-    if (is_access(row)) EXPECT_EQ(staged.set(row.index, 0, 0), Answer::kRefused) << row.path;
+    if (is_access(row)) {
+      EXPECT_EQ(staged.set(row.index, 0, 0), Answer::kRefused) << row.path;
+    }
     EXPECT_EQ(staged.set(row.index, row.size / 4, 0), Answer::kUnknown) << row.path;
   }
   StagedParameters staged(kCompiled);

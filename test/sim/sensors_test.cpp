@@ -487,7 +487,9 @@ TEST(Camera, a_moving_obstacle_goes_to_and_fro_at_its_speed) {
           static_cast<double>(one.sighting.range_m) * std::sin(static_cast<double>(one.sighting.bearing_rad));
       const double step = std::hypot(at_x - x, at_y - y);
       if (i > 0 && std::abs(step - 0.1 * n.mover_mps) > 1e-4) ++turns;  // it turns within the step
-      if (i > 0) EXPECT_LT(step, 0.1 * n.mover_mps + 1e-4);
+      if (i > 0) {
+        EXPECT_LT(step, 0.1 * n.mover_mps + 1e-4);
+      }
       x = at_x, y = at_y;
       least_x = std::min(least_x, x), most_x = std::max(most_x, x);
       least_y = std::min(least_y, y), most_y = std::max(most_y, y);

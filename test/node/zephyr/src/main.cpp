@@ -19,7 +19,7 @@ CAN_MSGQ_DEFINE(received, 128);
 struct MyChip {
   bool send(const base::CanFrame& frame) {
     can_frame out{};
-    out.id = frame.id;
+    out.id = frame.id & CAN_STD_ID_MASK;
     out.dlc = frame.size;
     std::copy_n(frame.data.begin(), frame.size, out.data);
     // With a callback the call does not wait for the bus.
