@@ -25,7 +25,8 @@ TEST(PlayedRun, WhatIsWrittenReadsBackTheSame) {
 }
 
 TEST(PlayedRun, LinesMayBeCommentedAndFaultsOfOneLineBeSeveral) {
-  const auto run = played_run(std::string("# mine\r\n\n") + kWhole + "fault=gnss_jump@5+1,slip_left@7 # both\n", "a");
+  const auto run =
+      played_run(std::string("# mine\r\n\n").append(kWhole).append("fault=gnss_jump@5+1,slip_left@7 # both\n"), "a");
   ASSERT_TRUE(run) << run.failure().text;
   EXPECT_EQ(run->duration, base::Micros{23'480'000});
   ASSERT_EQ(run->faults.size(), 2U);

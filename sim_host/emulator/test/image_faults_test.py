@@ -214,7 +214,7 @@ CASES = {
         "it was never off the bus": lambda r: "can: off the bus" not in r.console,
         "the console says that nobody acknowledges": lambda r: r.console.count("can: nobody acknowledges") == 1,
         "what was not sent is marked": lambda r: r.states("Unlogged")[-1][1] == 1}),
-    "receive_line_stuck": (["--seconds", "5", "--fault", "bus_stuck@1.5+1.5"], False, {
+    "receive_line_stuck": (["--seconds", "6", "--fault", "bus_stuck@1.5+1.5"], False, {
         "the node is on the bus again": lambda r: r.status[-1][0] > 4.9 and r.console.count("can: on the bus") == 2,
         "bus-off is counted": lambda r: r.last("Bus", "BusOff") == 1,
         "what was not sent is marked": lambda r: r.states("Unlogged")[-1][1] == 1,
