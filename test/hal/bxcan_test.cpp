@@ -15,14 +15,15 @@ constexpr std::uint32_t bit_rate(std::uint32_t btr, std::uint32_t clock_hz) {
   const std::uint32_t quanta = 1 + ((btr >> 16 & 15U) + 1) + ((btr >> 20 & 7U) + 1);
   return clock_hz / (((btr & 1023U) + 1) * quanta);
 }
-constexpr double sample_point(std::uint32_t btr) {
-  const double segment1 = (btr >> 16 & 15U) + 1, segment2 = (btr >> 20 & 7U) + 1;
-  return (1 + segment1) / (1 + segment1 + segment2);
+/// The sample point is 7/8 of the bit.
+constexpr bool is_at_875(std::uint32_t btr) {
+  const std::uint32_t before = 1 + (btr >> 16 & 15U) + 1, segment2 = (btr >> 20 & 7U) + 1;
+  return before == 7 * segment2;
 }
 
 constexpr bool samples_at_875(CanBitTiming timing, std::uint32_t clock_hz, std::uint32_t rate) {
   const std::uint32_t btr = timing.btr();
-  return bit_rate(btr, clock_hz) == rate && clock_hz % rate == 0 && sample_point(btr) == 0.875 && btr >> 30 == 0;
+  return bit_rate(btr, clock_hz) == rate && clock_hz % rate == 0 && is_at_875(btr) && btr >> 30 == 0;
 }
 constexpr std::uint32_t kApb_hz = 48'000'000, kInternal_hz = 16'000'000;
 static_assert(samples_at_875(can_bit_timing(kApb_hz, 125'000), kApb_hz, 125'000));

@@ -16,10 +16,9 @@ constexpr std::uint32_t bit_rate(std::uint32_t word, std::uint32_t clock_hz) {
   return clock_hz / (((word >> 16 & 511U) + 1) * quanta(word));
 }
 constexpr bool samples_at_875(std::uint32_t word, std::uint32_t clock_hz, std::uint32_t rate) {
-  const double point = static_cast<double>(2 + (word >> 8 & 255U)) / quanta(word);
+  const bool point = 8 * (2 + (word >> 8 & 255U)) == 7 * quanta(word);
   const std::uint32_t prescaled = ((word >> 16 & 511U) + 1) * quanta(word);
-  return bit_rate(word, clock_hz) == rate && clock_hz % prescaled == 0 && point == 0.875 &&
-         (word >> 25) <= (word & 127U);
+  return bit_rate(word, clock_hz) == rate && clock_hz % prescaled == 0 && point && (word >> 25) <= (word & 127U);
 }
 constexpr std::uint32_t kApb_hz = 160'000'000, kInternal_hz = 16'000'000;
 consteval std::uint32_t word(std::uint32_t clock_hz, std::uint32_t rate) {

@@ -58,8 +58,9 @@ struct MemoryTwin {
     sync(bus::SyncKind::kBegin, 0);
     note();
     for (int k = 1; k < 300; ++k) {
-      if (k == 150)
+      if (k == 150) {
         for (const auto& frame : commands) EXPECT_TRUE(link.send(frame));
+      }
       EXPECT_TRUE(
           link.send(test::body_speed(5'000'000 + 10'000 * k - 1'000, k < from ? 0 : 0.5F, k < from ? 0 : 0.1F, k)));
       sync(bus::SyncKind::kStep, k);

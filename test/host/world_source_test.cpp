@@ -74,7 +74,9 @@ TEST(WorldSource, AnInjectedFaultIsTheSameRunAgainAsASetting) {
     const bool lacks = fault.falls_on == FallsOn::kLandmarks || fault.falls_on == FallsOn::kLidar ||
                        fault.falls_on == FallsOn::kFeatures;
     const bool acts = !lacks && fault.fault != Fault::kGnssFar;
-    if (acts) EXPECT_NE(played, calm) << text;
+    if (acts) {
+      EXPECT_NE(played, calm) << text;
+    }
   }
 }
 
