@@ -86,7 +86,8 @@ class InertialWorld {
     }
   }
   void add_point(int axis, bool high) {
-    Eigen::Vector3d p(uniform(-1, 1), uniform(-1, 1), uniform(-1, 1));
+    const double x = uniform(-1, 1), y = uniform(-1, 1), z = uniform(-1, 1);
+    Eigen::Vector3d p(x, y, z);
     p(axis) = high ? 1 : -1;
     points_.push_back({.at = o_.at_n_m + turn_ * (o_.room_m * p)});
   }

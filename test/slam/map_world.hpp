@@ -36,7 +36,10 @@ class MapWorld : public NoisyDrive {
         o_(options) {
     for (int i = 0; i < o_.posts; ++i)
       posts.push_back(around((i + 0.5) * 2 * kPi_ / o_.posts, i % 2 == 0 ? -2 : 2, 0.4 + 0.3 * (i % 4)));
-    for (int i = 0; i < 400; ++i) points_.push_back({around(uniform(0, 2 * kPi_), uniform(-6, 8), uniform(0, 2))});
+    for (int i = 0; i < 400; ++i) {
+      const double angle = uniform(0, 2 * kPi_), out_m = uniform(-6, 8), z_m = uniform(0, 2);
+      points_.push_back({around(angle, out_m, z_m)});
+    }
     const double lap_s = 2 * kPi_ * o_.radius_m / o_.speed_mps;
     per_lap = static_cast<int>(std::lround(lap_s / o_.step_s));
     for (int k = 0; k <= o_.laps * per_lap; ++k) add_image(k);
