@@ -176,6 +176,22 @@ class StackTest(ImageTest):
         self.assertEqual(status, 1)
         self.assertIn("calls hidden, GCC's graph has no such call", text)
 
+    def test_room_is_what_a_frame_grows_by_until_it_no_longer_fits(self):
+        def frame_of(words):
+            return self.image(f"volatile int s; [[gnu::noinline]] int f(int n) {{ volatile int a[{words}]; a[n] = n; return a[7]; }} void work() {{ s = f(3); }}")
+
+        self.assertEqual(self.stack(frame_of(400))[0], 0)
+        found = self.json("stack.json")["image"]
+        room = found["reservation"] - found["bound"]
+        self.assertEqual(self.stack(frame_of(400 + room // 8 * 2))[0], 0)
+        self.assertEqual(self.json("stack.json")["image"]["bound"], found["bound"] + room // 8 * 8)
+        self.assertEqual(self.stack(frame_of(400 + room // 8 * 2 + 2))[0], 1)
+        elf = frame_of(400)
+        self.assertEqual(self.stack("--room", str(room), elf)[0], 0)
+        status, text = self.stack("--room", str(room + 1), elf)
+        self.assertEqual(status, 1)
+        self.assertIn(f"no room: with {room + 1} bytes more in one frame", text)
+
     def test_a_bound_above_the_reservation_fails(self):
         elf = self.image("volatile int s; [[gnu::noinline]] int f(int n) { volatile int a[3000]; a[n] = n; return a[7]; } void work() { s = f(3); }")
         status, text = self.stack(elf)

@@ -12,7 +12,7 @@ from tetap.proof import costs
 
 REGION = re.compile(r"<!-- figures: (\w+) -->\n.*?<!-- end -->\n", re.S)
 IMAGES = [("tetap-zynqmp_r5-rover", "Cortex-R5F, rover"), ("tetap-mps2_m7-rover", "Cortex-M7, rover"), ("tetap-mps2_m4f-rover", "Cortex-M4F, rover"),
-          ("tetap-zynqmp_r5-mrclam", "Cortex-R5F, mrclam")]
+          ("tetap-zynqmp_r5-mrclam", "Cortex-R5F, mrclam"), ("tetap-ark_cannode-rover", "ARK CANnode (Cortex-M4F), rover with drivers")]
 WORKLOADS = ["sincos", "atan2", "exp", "log", "w1_kf", "w1_kf_conditioned", "w2_textbook", "w2_ekf", "w3_ukf", "w3_ukf_sqrt", "w6_pf1000", "pose_grid_work", "fuse_range_bearing", "w4_ahrs6", "w4_ahrs9", "ahrs9", "ins_strapdown",
              "ins_covariance", "w5_ins", "ins_tick", "ins_tick_rover", "ins_tick_car", "ins_tick_iris", "node_tick", "node_tick_faults", "mrclam_tick"]
 ESTIMATORS = [("`Inertial`, a tick with an IMU of 200 Hz", "ins_tick_rover"), ("`PoseEkf`, a sighting of a landmark", "fuse_range_bearing"),
