@@ -130,7 +130,8 @@ void FlashController::written(std::uint32_t offset, std::uint32_t size) {
 
 std::string FlashController::save(const std::string& path) const {
   const std::string fresh = path + ".new";
-  std::FILE* const out = std::fopen(fresh.c_str(), "wb");
+  std::remove(fresh.c_str());
+  std::FILE* const out = std::fopen(fresh.c_str(), "wbx");  // never through a link
   if (out == nullptr) return fresh + ": cannot be written";
   const auto bytes = memory_.readable(Memory::kFlash, memory_.flash_size());
   bool fine = std::fwrite(bytes.data(), 1, bytes.size(), out) == bytes.size();

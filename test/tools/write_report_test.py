@@ -654,6 +654,17 @@ class Pictures(Case):
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertTrue(os.path.exists(self.path("path.png")))
 
+    def test_no_file_is_written_through_a_link(self):
+        time_s, zero = 1 + 0.01 * np.arange(20), np.zeros(20)
+        self.estimates(time_s, zero, zero, zero)
+        names = ("path.png", "summary.json", "report.html")
+        for name in names:
+            os.symlink(self.path(f"elsewhere.{name}"), self.path(name))
+        self.assertEqual(self.report().returncode, 0)
+        for name in names:
+            self.assertFalse(os.path.exists(self.path(f"elsewhere.{name}")), name)
+            self.assertFalse(os.path.islink(self.path(name)), name)
+
     def test_parameters_that_are_set_take_a_few_lines_of_the_terminal(self):
         def shown(count):
             self.estimates(1 + 0.01 * np.arange(20), *[np.zeros(20)] * 3)

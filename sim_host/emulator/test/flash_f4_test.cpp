@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <cstdio>
+#include <filesystem>
 #include <set>
 #include <string>
 #include <vector>
@@ -351,6 +352,10 @@ TEST_F(FlashF4Test, AFileKeepsTheContent) {
   EXPECT_NE(other.chip.flash.restore(path).find("1048577 bytes are no flash of 1048576 bytes"), std::string::npos);
   EXPECT_NE(other.chip.flash.restore("/nowhere/flash").find("cannot be opened"), std::string::npos);
   EXPECT_NE(other.chip.flash.save("/nowhere/flash").find("cannot be written"), std::string::npos);
+  const std::string elsewhere = path + ".elsewhere";
+  std::filesystem::create_symlink(elsewhere, path + ".new");
+  EXPECT_EQ(other.chip.flash.save(path), "");
+  EXPECT_FALSE(std::filesystem::exists(elsewhere)) << "written through a link";
   std::remove(path.c_str());
 }
 

@@ -3,6 +3,8 @@
 
 Colours: Okabe and Ito, "Color Universal Design" (2008): distinct with every common kind of colour vision.
 """
+import os
+
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import EllipseCollection
@@ -62,7 +64,11 @@ def legend(axes, **arguments):
 
 
 def save(fig, path):
-    fig.savefig(path, dpi=DPI, facecolor="white")
+    """Written beside the path first, in a file that was not there: never through a link."""
+    temporary = f"{path}.part{os.getpid()}"
+    with open(temporary, "xb") as file:
+        fig.savefig(file, format=os.path.splitext(path)[1][1:], dpi=DPI, facecolor="white")
+    os.replace(temporary, path)
 
 
 def shade_faults(axes, run):
