@@ -141,6 +141,9 @@ class Laws(unittest.TestCase):
         self.assertAlmostEqual(best, 0.7, delta=0.02)
         self.assertTrue(low < 0.7 < high)
         self.assertAlmostEqual(grid.optimum(np.array([2 * factors ** -0.2]))[0], 4, delta=1e-9)
+        for power, at_the_end in ((-0.2, True), (0.2, True), (-0.5, False)):
+            curves = np.array([(2 if at_the_end else 1) * factors ** power])
+            self.assertEqual("the grid's end" in grid.words("row", curves, grid.optimum(curves)), at_the_end, power)
         self.assertIsNone(grid.optimum(np.array([1.3 + 0.01 * factors])))
 
     def test_a_pair_that_is_alike_and_a_flat_row_are_no_numbers(self):

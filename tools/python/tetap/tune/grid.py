@@ -55,6 +55,8 @@ def optimum(curves, draws=DRAWS):
 def words(name, curves, best):
     mean = curves.mean(axis=0)
     found = "flat" if best is None else "best at {:.2f} ({:.2f} to {:.2f}) of the number".format(*best)
+    if best is not None and np.isclose(best[0], (FACTORS[0], FACTORS[-1])).any():
+        found += ", which is the grid's end: the best may lie beyond it"
     return (f"NEES held out, {name} times {FACTORS[0]:g} to {FACTORS[-1]:g}: {found}; {mean[len(FACTORS) // 2]:.2f} at the number, "
             f"{mean.min():.2f} to {mean.max():.2f} on the grid")
 
