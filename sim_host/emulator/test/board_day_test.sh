@@ -5,14 +5,8 @@
 # host that gets the same sensors with their noise and delays over CAN, without drivers, lines and machine code.
 set -eu
 seconds=${1:-40} board=${2:-ark_cannode}
-root=$(cd "$(dirname "${BASH_SOURCE[0]}")/../../.." && pwd)
-cd "$root"
-programs=build/host/sim_host
-[ -x "$programs/emulator/tetap-board" ] || { echo "board_day_test: skipped: no $programs/emulator/tetap-board (libunicorn-dev)" >&2; exit 77; }
+. "$(dirname "${BASH_SOURCE[0]}")/board_session.sh"
 image=build/m4f/hal/board/tetap-$board-rover.elf
-out=$(mktemp -d)
-trap 'rm -rf "$out"' EXIT
-fail() { echo "board_day_test: $*" >&2; exit 1; }
 
 TETAP_IMAGE=$image BOARD=$board OUT=$out/day ROBOT=rover SEED=1 FAULT=usual WORLD="--seconds $seconds --twin" REPORT=--no-pictures tools/run/emulate_board >"$out/said" 2>&1 ||
   fail "status $?: $(tail -5 "$out/said")"

@@ -5,18 +5,13 @@
 # A log without one block of a scan does not repeat.
 set -eu
 seconds=${1:-40} board=${2:-ark_cannode}
-root=$(cd "$(dirname "${BASH_SOURCE[0]}")/../../.." && pwd)
-cd "$root"
-programs=build/host/sim_host
-[ -x "$programs/emulator/tetap-board" ] || { echo "board_lidar_test: skipped: no $programs/emulator/tetap-board (libunicorn-dev)" >&2; exit 77; }
+. "$(dirname "${BASH_SOURCE[0]}")/board_session.sh"
 image=build/m4f/hal/board/tetap-$board-scanner.elf
-out=$(mktemp -d)
-trap 'rm -rf "$out"' EXIT
 TETAP_IMAGE=$image BOARD=$board OUT=$out ROBOT=scanner SEED=1 FAULT=none WORLD="--seconds $seconds" REPORT=--no-pictures tools/run/emulate_board >"$out/said" 2>&1 ||
-  { echo "board_lidar_test: status $?: $(tail -5 "$out/said")" >&2; exit 1; }
+  fail "status $?: $(tail -5 "$out/said")"
 awk '/ 34B#/ && ++blocks == 9001 { next } { print }' "$out/raw.log" >"$out/lost.log"
 "$programs/tetap-play" "$out/lost.log" --memory --robot scanner --out "$out/lost" --quiet >"$out/said" 2>&1 &&
-  { echo "board_lidar_test: a lost block is not seen" >&2; exit 1; }
+  fail "a lost block is not seen"
 /usr/bin/python3 - "$out" "$seconds" <<'PYTHON'
 import csv, json, os, sys
 folder, seconds = sys.argv[1], float(sys.argv[2])

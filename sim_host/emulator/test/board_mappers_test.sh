@@ -6,15 +6,10 @@
 set -eu
 seconds=${1:-40}
 [ "$seconds" -ge 60 ] || seconds=60
-root=$(cd "$(dirname "${BASH_SOURCE[0]}")/../../.." && pwd)
-cd "$root"
-programs=build/host/sim_host
-[ -x "$programs/emulator/tetap-board" ] || { echo "board_mappers_test: skipped: no $programs/emulator/tetap-board (libunicorn-dev)" >&2; exit 77; }
-out=$(mktemp -d)
-trap 'rm -rf "$out"' EXIT
+. "$(dirname "${BASH_SOURCE[0]}")/board_session.sh"
 for robot in mapper graph128; do
   TETAP_IMAGE=build/m4f/hal/board/tetap-ark_cannode-$robot.elf OUT=$out/$robot ROBOT=$robot SEED=1 FAULT=wheel_spin@35+3 WORLD="--seconds $seconds" \
-    REPORT=--no-pictures tools/run/emulate_board >"$out/said" 2>&1 || { echo "board_mappers_test: $robot: status $?: $(tail -5 "$out/said")" >&2; exit 1; }
+    REPORT=--no-pictures tools/run/emulate_board >"$out/said" 2>&1 || fail "$robot: status $?: $(tail -5 "$out/said")"
 done
 /usr/bin/python3 - "$out" "$seconds" <<'PYTHON'
 import json, sys
