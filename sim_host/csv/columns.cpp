@@ -216,16 +216,14 @@ std::optional<PartedRows> parted_rows(const Table& table, const Clock& clock, st
   Table sample = table;
   std::vector<std::string_view> cells;
   while (sample.next(cells)) {
-    const std::string_view text = cells[clock.column];
-    if (is_missing(text)) continue;
+    if (is_missing(cells[clock.column])) continue;
     const auto number = parse_whole(cells[column], sample.point(), 6);
-    const auto time = clock.calendar ? parse_calendar(text) : parse_whole(text, sample.point(), clock.power);
+    const auto time = time_of(sample, clock, cells);
     if (!time || !number || *number < 0 || *number % 1'000'000 != 0) return std::nullopt;
-    const auto part = clock.nanoseconds ? parse_whole(cells[*clock.nanoseconds], sample.point(), -3) : 0;
     const auto known = std::find(rows.values.begin(), rows.values.end(), cells[column]);
     if (known == rows.values.end() && rows.values.size() == kMostDevices) return std::nullopt;
     rows.device.push_back(static_cast<std::size_t>(known - rows.values.begin()));
-    rows.time_us.push_back(*time + part.value_or(0));
+    rows.time_us.push_back(*time);
     if (known == rows.values.end()) rows.values.emplace_back(cells[column]);
   }
   return rows;
@@ -270,6 +268,18 @@ bool are_devices(const PartedRows& rows) {
 }
 
 }  // namespace
+
+sim::Result<std::int64_t> time_of(const Table& table, const Clock& clock, const std::vector<std::string_view>& cells) {
+  const std::string_view text = cells[clock.column];
+  const auto time = clock.calendar ? parse_calendar(text) : parse_whole(text, table.point(), clock.power);
+  if (!time) return table.refuse(clock.column, text, "is no time");
+  if (!clock.nanoseconds) return *time;
+  const std::string_view rest = cells[*clock.nanoseconds];
+  const auto part = parse_whole(rest, table.point(), -3);
+  if (!part || *part < 0 || *part > 1'000'000)
+    return table.refuse(*clock.nanoseconds, rest, "is no part of a second in nanoseconds");
+  return *time + *part;
+}
 
 std::optional<std::size_t> instance_column(const Table& table, const Clock& clock) {
   if (const auto stated = find_column(table, [](const std::string& name) { return name == "instance"; })) return stated;

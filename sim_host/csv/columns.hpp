@@ -8,6 +8,7 @@
 #include "sim_host/replay/result.hpp"
 
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <string_view>
 #include <vector>
@@ -37,6 +38,9 @@ struct Clock {
 [[nodiscard]] sim::Result<std::vector<Bound>> bind_columns(const Table& table, const Options& options);
 /// Takes the column of time out of `bound`. Looks at the first rows where no unit is stated.
 [[nodiscard]] sim::Result<Clock> take_clock(const Table& table, std::vector<Bound>& bound);
+/// A row's time [us]; the failure names the cell that is none.
+[[nodiscard]] sim::Result<std::int64_t> time_of(const Table& table, const Clock& clock,
+                                                const std::vector<std::string_view>& cells);
 /// The column whose values part the rows of several like devices, as ArduPilot's I. A column `i` with other values, a
 /// current or the number of the row, is none.
 [[nodiscard]] std::optional<std::size_t> instance_column(const Table& table, const Clock& clock);

@@ -161,14 +161,8 @@ sim::Result<> Reader::rows(Table& table, const Clock& clock, const std::vector<B
       count_left_out(tables_.left_out, "rows of " + table.name() + " without a time");
       continue;
     }
-    auto time = clock.calendar ? parse_calendar(text) : parse_whole(text, table.point(), clock.power);
-    if (!time) return table.refuse(clock.column, text, "is no time");
-    if (clock.nanoseconds) {
-      const auto part = parse_whole(cells[*clock.nanoseconds], table.point(), -3);
-      if (!part || *part < 0 || *part > 1'000'000)
-        return table.refuse(*clock.nanoseconds, cells[*clock.nanoseconds], "is no part of a second in nanoseconds");
-      *time += *part;
-    }
+    const auto time = time_of(table, clock, cells);
+    if (!time) return time.failure();
     if (latest && *time < *latest - kDisorder_us)
       return table.refuse(clock.column, text, "goes back by more than 0.1 s");
     if (latest && *time > *latest + kJump_us) return table.refuse(clock.column, text, "is more than an hour later");
