@@ -101,8 +101,6 @@ class FilterView {
   [[nodiscard]] bool speeds_agree() const;
   /// A velocity contradicts the filter of late, and where two do, they agree with each other.
   [[nodiscard]] bool speeds_contradict() const;
-  /// Stamp of the last IMU sample that was left out, or that leapt; 0: none.
-  [[nodiscard]] base::Micros imu_last_suspect() const { return parts_.imu.last_suspect(); }
   /// Climb rate that the filter lacks, as the receiver's velocities show it; 0 where they fit, or are not there.
   [[nodiscard]] float missing_climb_mps() const;
   /// The barometer agrees with the height, though a climb that is off by so much since then would show. Not for ever:

@@ -20,10 +20,7 @@ Innovation InertialWith<Watch>::fuse(const sensor::ImuSample& sample, base::Micr
   if (sample.clipped_gyro > 0 || sample.clipped_accel > 0) predictor_.note_correction();
   if (found == checks::ImuClass::kStuck) return imu_stuck(increment, was_stuck, ctx);
   imu_.set_unusable(found <= checks::ImuClass::kSaturated);
-  if (imu_.unusable()) {
-    imu_.note_suspect(stamp);
-    return {.verdict = sensor::Verdict::kNotUsed, .failed = Check::kValue};
-  }
+  if (imu_.unusable()) return {.verdict = sensor::Verdict::kNotUsed, .failed = Check::kValue};
   // All that was true at the last sample has been fused: wheels bring the constraint with them, and twice is too sure.
   if (tracking()) fuse_constraint(time_, ctx);
   const nav::Vector3 rate_b_radps = increment.dtheta_b_rad / base::seconds(increment.dt);
@@ -111,7 +108,6 @@ Innovation InertialWith<Watch>::propagate(const sensor::ImuSample& sample, const
   if (sample.clipped_accel > 0 || sample.clipped_gyro > 0) inflate_clipped(sample, dt_s, n);
   if (imu_.health().vibration().leaps()) {
     const checks::Vibration::Leap& leap = imu_.health().vibration().leap();
-    imu_.note_suspect(stamp);
     Recovery::inflate_motion(ins_, leap.force_mps2 * dt_s, leap.rate_radps * dt_s);
   }
   time_ = stamp;

@@ -86,12 +86,10 @@ class GnssVelocitySource {
   void conclude(Assessment& a, const nav::Vector3& nu, const FilterView& filter) {
     const bool rejected = a.action == Action::kReject;
     record_.update(rejected, filter.stamp());
-    if (record_.refused().count() <= 1) speed_off_ = false;
     if (!rejected) return;
     const base::Micros since = record_.since(filter.stamp());
-    const Vote wheels = vote_of_wheels(nu, since, filter);
     if (filter.receiver_leapt() || filter.barometer_vouches(missing_climb_mps(filter), since)) return;
-    judge_velocity(a, nu, wheels, vote_of_fixes(nu, since, filter), record_, filter);
+    judge_velocity(a, nu, filter.wheels_vote(since), vote_of_fixes(nu, since, filter), record_, filter);
   }
   void begin() { record_.begin(); }
 
@@ -107,7 +105,7 @@ class GnssVelocitySource {
   }
   static constexpr auto members(auto& self) {
     return base::members(self.record_, self.difference_mps_, self.climb_mps_, self.sigma_mps_, self.ahead_mps_,
-                         self.step_detected_, self.speed_off_);
+                         self.step_detected_);
   }
 
  private:
@@ -118,17 +116,6 @@ class GnssVelocitySource {
 
   static constexpr float kUnmodelled_mps = 0.05F,
                          kUnmodelled_mps2 = 0.3F;  ///< the IMU's own error between two velocities
-
-  /// Wheels do not see where the robot goes. When the speed is alike all along, they abstain: the heading may be wrong.
-  [[nodiscard]] Vote vote_of_wheels(const nav::Vector3& nu, base::Micros since, const FilterView& filter) {
-    const Vote vote = filter.wheels_vote(since);
-    const nav::Vector3 claimed = filter.x().v_n_mps + nu;
-    const float level = base::sqrt(claimed(0) * claimed(0) + claimed(1) * claimed(1));
-    const float rolled = base::abs(filter.recent_forward_mps());
-    if (base::abs(level - rolled) >= 0.3F + 0.1F * rolled) speed_off_ = true;
-    const bool receiver = step_detected_ && filter.imu_last_suspect() <= record_.last_accepted();
-    return vote == Vote::kFor && !speed_off_ && !receiver ? Vote::kAbstains : vote;
-  }
 
   /// Fixes and velocity are one device: against the filter they add nothing where wheels may still decide.
   [[nodiscard]] static Vote vote_of_fixes(const nav::Vector3& nu, base::Micros since, const FilterView& filter) {
@@ -142,7 +129,6 @@ class GnssVelocitySource {
   float sigma_mps_ = 0;  ///< 1 sigma of the last velocity along a level axis
   float ahead_mps_ = 0;
   bool step_detected_ = false;  ///< the receiver leapt, and is not back
-  bool speed_off_ = false;      ///< one of the refused ones in a row had another speed than the wheels
 };
 
 }  // namespace tetap::estimators
