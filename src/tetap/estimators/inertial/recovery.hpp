@@ -262,7 +262,6 @@ inline bool Recovery::apply(const Assessment& a, nav::Ins& ins, base::Micros sta
       return false;
     case Action::kResetPosition:
       reset_position(ins, 0, 2, a.remedy.step_m, a.remedy.variance_m2);
-      inflate_motion(ins, a.remedy.sigma_mps, 0.0F);
       inflate_heading(ins, parameters.recovery.inflate_yaw_rad * parameters.recovery.inflate_yaw_rad);
       undoable_ = !a.remedy.undoes;
       return true;

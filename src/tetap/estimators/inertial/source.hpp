@@ -45,7 +45,6 @@ struct Remedy {
   float climb_mps = 0;                              ///< kWidenClimb: climb rate that the filter lacks
   float height_m = 0;                               ///< kWidenClimb: height that the filter lacks
   float since_s = 0;                                ///< time in which the innovation grew
-  float sigma_mps = 0;                              ///< 1 sigma of the velocity, beside
   float sigma_rad = 0;                              ///< 1 sigma of the heading, beside
   bool undoes = false;                              ///< kResetPosition: back to where the last reset came from
 };

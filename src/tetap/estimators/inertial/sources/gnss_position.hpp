@@ -260,13 +260,8 @@ inline bool GnssPositionSource::reset_allowed(const FixMeasurement& z, const Fil
   const param::RecoveryParameters& n = filter.parameters().recovery;
   const bool confirmed = offset_.confirmed(n.confirm_fixes);
   a.remedy.undoes = confirmed && undoes_reset(z, filter);
-  const bool is_lost = confirmed && lost(filter);
-  if (is_lost && filter.wheels_timed_out() &&
-      !filter.velocity_recent()) {  // the filter moved otherwise than it thought, all along
-    const float way2_m2 = offset_.east_m() * offset_.east_m() + offset_.north_m() * offset_.north_m();
-    a.remedy.sigma_mps = base::sqrt(way2_m2) / base::seconds(record_.refused().held_for(filter.stamp()));
-  }
-  return a.remedy.undoes || is_lost || offset_.persisted(base::Micros{n.persist_us}, n.persist_fixes);
+  return a.remedy.undoes || (confirmed && lost(filter)) ||
+         offset_.persisted(base::Micros{n.persist_us}, n.persist_fixes);
 }
 
 /// Back to where the last reset came from: dead reckoning before it and fixes after it agree.
