@@ -4,7 +4,6 @@
 #include "tetap/checks/coloured_noise.hpp"
 #include "tetap/checks/frozen_position.hpp"
 #include "tetap/checks/offset_hypothesis.hpp"
-#include "tetap/checks/position_drift.hpp"
 #include "tetap/checks/startup_fix_check.hpp"
 
 #include <gtest/gtest.h>
@@ -142,86 +141,6 @@ TEST(FrozenPosition, StandingStillIsNotFrozenAndEachCoordinateCounts) {
     EXPECT_FALSE(frozen.update(fix_at(kLatitude + i, kLongitude - i - 1), off + 0.9F, 0, 0.5F));
     EXPECT_FALSE(frozen.update(fix_at(kLatitude + i, kLongitude - i - 1, off), off, 0, 0.5F));
   }
-}
-
-/// Fixes in the plane, off by `off` and an error that is new with each.
-class Drifting {
- public:
-  explicit Drifting(float sigma_m) : sigma_m_(sigma_m) {}
-  float add(float off_m, float filter_m2 = 0) {
-    fixes.update(sigma_m_ * normal_(engine_), off_m + sigma_m_ * normal_(engine_));
-    return fixes.statistic(sigma_m_ * sigma_m_, filter_m2, filter_m2);
-  }
-  PositionDrift fixes;
-
- private:
-  float sigma_m_;
-  std::mt19937 engine_{11};
-  std::normal_distribution<float> normal_;
-};
-
-TEST(PositionDrift, IsChiSquareWhereEveryErrorIsNew) {
-  Drifting drifting(1.5F);
-  for (int i = 0; i < 200; ++i) drifting.add(0);
-  constexpr int kFixes = 200'000;
-  double sum = 0;
-  int above = 0;
-  for (int i = 0; i < kFixes; ++i) {
-    const float nis = drifting.add(0);
-    sum += static_cast<double>(nis);
-    above += nis > kChiSquare999Of2 ? 1 : 0;
-  }
-  // One in some ten fixes is independent of the last: 3 sigma of so many.
-  EXPECT_NEAR(sum / kFixes, 2.0, 3 * 2 / std::sqrt(kFixes / 20));
-  EXPECT_NEAR(above, 1e-3 * kFixes, 3 * std::sqrt(1e-3 * kFixes * 10));
-}
-
-TEST(PositionDrift, ARampIsNoticedBeforeOneFixLeavesItsGateAndWhatStaysPassesAway) {
-  Drifting drifting(1.5F);
-  for (int i = 0; i < 200; ++i) drifting.add(0);
-  int noticed = 0;
-  while (noticed < 100 && drifting.add(0.2F * static_cast<float>(noticed)) <= kChiSquare999Of2) ++noticed;
-  EXPECT_GT(noticed, 3) << "at 5 Hz and 1 m/s";
-  EXPECT_LT(noticed, 22) << "4.5 m: the gate of one, 99 %";
-  const float there_m = 0.2F * static_cast<float>(noticed);
-  for (int i = 0; i < 100; ++i) drifting.add(there_m);
-  EXPECT_LT(drifting.add(there_m), kChiSquare999Of2) << "it has been there for 20 s";
-}
-
-TEST(PositionDrift, WhatTheFilterDoesNotKnowMayBeTheReason) {
-  Drifting sure(1.0F), unsure(1.0F);
-  float of_sure = 0, of_unsure = 0;
-  for (int i = 0; i < 20; ++i) {
-    of_sure = sure.add(0.2F * static_cast<float>(i));
-    of_unsure = unsure.add(0.2F * static_cast<float>(i), 4.0F);
-  }
-  EXPECT_GT(of_sure, kChiSquare999Of2);
-  EXPECT_LT(of_unsure, 2.0F);
-}
-
-TEST(PositionDrift, EachAxisIsJudgedByItsOwnVariance) {
-  PositionDrift east, north;
-  for (int i = 0; i < 10; ++i) east.update(3, 0), north.update(0, 3);
-  EXPECT_GT(east.statistic(1, 0.01F, 100), kChiSquare999Of2);
-  EXPECT_LT(east.statistic(1, 100, 0.01F), 1.0F);
-  EXPECT_GT(north.statistic(1, 100, 0.01F), kChiSquare999Of2);
-  EXPECT_LT(north.statistic(1, 0.01F, 100), 1.0F);
-}
-
-TEST(PositionDrift, AVelocityVouchesForAFewFixes) {
-  PositionDrift fixes;
-  EXPECT_FALSE(fixes.consume_velocity_agreement()) << "none was heard";
-  fixes.velocity(true);
-  for (int i = 0; i < 8; ++i) EXPECT_TRUE(fixes.consume_velocity_agreement()) << "one a second, fixes eight: " << i;
-  fixes.velocity(false);
-  EXPECT_FALSE(fixes.consume_velocity_agreement());
-  fixes.velocity(true);
-  int vouched = 0;
-  while (vouched < 100 && fixes.consume_velocity_agreement()) ++vouched;
-  EXPECT_LT(vouched, 16) << "it has ended";
-  fixes.velocity(true);
-  fixes.reset();
-  EXPECT_FALSE(fixes.consume_velocity_agreement());
 }
 
 TEST(StartupFixCheck, CountWhenSoManyFollowEachOther) {

@@ -164,50 +164,6 @@ TEST(Glitch, ARampHasHardlyAnyEffectWhereErrorsLastAndLittleWhereTheyAreNew) {
     }
 }
 
-/// Share of 20 drives with a receiver whose errors are new with each fix, which drift for half a minute.
-struct Ramp {
-  double first_refused_s = 0, nees = 0;  ///< means over the drives
-  int of_drift = 0;                      ///< fixes refused for their drift, not for themselves
-};
-Ramp ramp(
-    double speed_mps, const std::function<void(Drive&)>& ctx = [](Drive&) {}) {
-  constexpr int kDrives = 20;
-  Ramp all;
-  for (unsigned seed = 1; seed <= kDrives; ++seed) {
-    Drive d(parameters(), seed);
-    ctx(d);
-    d.white_m = 1.5;
-    d.place();
-    d.run(60);
-    d.clear();
-    d.tamper = between(d, 60, 90, [speed_mps](Drive::Fix& fix, double t) { fix.north_m += speed_mps * t; });
-    double first_s = 30;
-    for (int i = 0; i < 200; ++i) {
-      d.run(0.2);
-      const bool refused = d.last_fix.verdict == sensor::Verdict::kRejected;
-      if (refused && d.last_fix.failed == sensor::Check::kDrift) {
-        ++all.of_drift;
-        EXPECT_GT(d.last_fix.statistic, d.last_fix.limit) << "by how much";
-      }
-      if (refused && d.counted('R') >= 3) first_s = std::min(first_s, 0.2 * i);
-    }
-    all.first_refused_s += first_s / kDrives;
-    all.nees += d.nees / d.judged / kDrives;
-  }
-  return all;
-}
-
-TEST(Glitch, ARampIsRefusedForItsDriftBeforeItHasLedTheFilterAway) {
-  const Ramp none = ramp(0), of_a_metre = ramp(1);
-  EXPECT_LT(none.of_drift, 20) << "of 4000";
-  EXPECT_GT(of_a_metre.of_drift, 100) << "five in each drive";
-  EXPECT_LT(of_a_metre.first_refused_s, 5) << "by the gate of one fix: 6";
-  EXPECT_GT(of_a_metre.first_refused_s, 2) << "3 of a fix's sigma of 1.5 m";
-  EXPECT_LT(none.nees, 3.0) << "of two";
-  EXPECT_GT(none.nees, 1.0);
-  EXPECT_LT(of_a_metre.nees, none.nees + 0.5) << "as honest as without";
-}
-
 TEST(Glitch, AnOffsetThatStaysInsideItsGateIsFollowedAfterAWhile) {
   Drive d = settled();
   d.tamper = between(d, 60, 1e9, [](Drive::Fix& fix, double t) { fix.north_m += std::min(t, 2.5); });
@@ -216,37 +172,6 @@ TEST(Glitch, AnOffsetThatStaysInsideItsGateIsFollowedAfterAWhile) {
   d.run(30);
   EXPECT_LE(d.counted('R'), 6) << "but for the gate's hundredth: " << d.verdicts;
   EXPECT_EQ(d.estimator.jump().count, 0);
-}
-
-/// After minutes without fixes the first that is believed moves the filter by many of a fix's sigmas. The offset from
-/// before is no drift. The same holds when a pose is given.
-TEST(Glitch, WhatMovedTheFilterIsNoDrift) {
-  for (const bool published : {false, true})
-    for (unsigned seed = 1; seed <= 5; ++seed) {
-      param::Parameters n = parameters();
-      n.inertial.slip_share = 0.5F;
-      Drive d(n, seed);
-      d.white_m = 0.1;
-      d.place();
-      d.run(60);
-      if (published) {
-        d.place(10, 10);
-      } else {
-        d.tamper = [](Drive::Fix&) { return false; };
-        d.run(60);
-        d.unseen_east_m = 1.5 * d.sigma_m();
-        d.tamper = [](Drive::Fix&) { return true; };
-      }
-      d.clear();
-      d.run(20);
-      EXPECT_GE(d.counted('n'), 2) << "more than one fix before it moves: " << d.verdicts;
-      EXPECT_LE(d.counted('R'), 4) << published << seed << ": " << d.verdicts;
-    }
-}
-
-TEST(Glitch, FixesWithoutAVelocityThatVouchesForTheFilterAreJudgedOneByOne) {
-  EXPECT_EQ(ramp(1, [](Drive& d) { d.gnss_velocity = false; }).of_drift, 0) << "the filter may be what drifts";
-  EXPECT_EQ(ramp(1, [](Drive& d) { d.n.gnss.correlation_s = 60; }).of_drift, 0) << "its errors wander themselves";
 }
 
 TEST(Glitch, WhatTheFixesLedItAwayByIsDoubted) {

@@ -19,7 +19,7 @@ enum class Check : std::uint8_t {
   kNone,         ///< no test failed
   kValue,        ///< not finite, or beyond what the model holds for
   kGate,         ///< innovation gate
-  kDrift,        ///< fixes drift away while the receiver's velocity agrees with the filter
+  kDrift,        ///< measurements contradict the IMU for a second
   kFrozen,       ///< fixes keep their coordinates while the filter moves
   kStuck,        ///< readings repeat to the last bit
   kField,        ///< magnetic field of another strength or dip

@@ -81,7 +81,6 @@ struct FixMeasurement {
   nav::Vector3 nu = nav::Vector3::Zero();  ///< innovation: east, north, up
   nav::Vector3 r = nav::Vector3::Zero();   ///< variances of the fix
   FixStatistics statistics;
-  bool drifts = false;  ///< the drift check failed, whatever the joint gate
 };
 
 [[nodiscard]] inline float fix_gate(const param::GnssParameters& n, int dof) {

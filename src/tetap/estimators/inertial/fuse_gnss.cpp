@@ -52,7 +52,6 @@ template <class Watch>
     if (horizontal.verdict == sensor::Verdict::kRejected && !horizontal.fuses())
       static_cast<void>(static_cast<nav::Ins&>(ins_).update(fix, -1.0F, watch_.bank()));
   if (!horizontal.fuses()) return record_of(horizontal);
-  z.drifts = horizontal.failed == Check::kDrift;
   if (horizontal.action == Action::kResetPosition) sources_.height.reset();
   const Assessment vertical = sources_.height.assess(z, filter);
   apply(vertical, filter);
@@ -113,7 +112,6 @@ Innovation InertialWith<Watch>::fuse(const sensor::GnssVelocity& velocity, base:
   const float gate_scale = GnssVelocitySource::gate_scale(z, n);
   Innovation record = measure(model, sources_.velocity, gate_scale, filter);
   if (!z.has_climb && record.dof == 3) record.dof = 2;
-  sources_.position.velocity(record.verdict == sensor::Verdict::kAccepted);
   return record;
 }
 

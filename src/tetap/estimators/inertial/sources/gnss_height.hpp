@@ -18,7 +18,7 @@ class GnssHeightSource {
   [[nodiscard]] Assessment assess(const FixMeasurement& z, const FilterView& filter) {
     const param::Parameters& n = filter.parameters();
     Assessment a{.dof = 3, .nis = z.statistics.joint_nis, .gate = fix_gate(n.gnss, 3)};
-    const bool agrees = a.nis <= a.gate && !z.drifts;
+    const bool agrees = a.nis <= a.gate;
     refused_.update(!agrees, filter.stamp());
     const float p_z = filter.p()(2, 2);
     const bool decides = p_z > FixMeasurement::kDecides * z.r(2);
@@ -55,7 +55,7 @@ class GnssHeightSource {
     a.failed = Check::kUnconfirmed;
   }
   void judge_refused(const FixMeasurement& z, Assessment& a, const param::RecoveryParameters& n) {
-    a.failed = z.drifts ? Check::kDrift : Check::kGate;
+    a.failed = Check::kGate;
     if (!offset_.persisted(base::Micros{n.persist_us}, n.persist_fixes)) {
       a.action = Action::kReject;
       return;

@@ -9,7 +9,6 @@
 #include "tetap/checks/coloured_noise.hpp"
 #include "tetap/checks/frozen_position.hpp"
 #include "tetap/checks/offset_hypothesis.hpp"
-#include "tetap/checks/position_drift.hpp"
 #include "tetap/checks/startup_fix_check.hpp"
 #include "tetap/estimators/inertial/filter_view.hpp"
 #include "tetap/estimators/inertial/fix_measurement.hpp"
@@ -49,7 +48,7 @@ class GnssPositionSource {
     if (frozen) status_.distrusted(Check::kFrozen);
     return !frozen;
   }
-  /// The joint gate; where it fails, that of the horizontal part alone; and the drift of many fixes.
+  /// The joint gate; where it fails, that of the horizontal part alone.
   [[nodiscard]] Assessment assess(const FixMeasurement& z, const FilterView& filter);
   /// Factor of the variance of a fix whose error lasts since the fix before.
   [[nodiscard]] float correlated_inflation(const FilterView& filter) const {
@@ -65,8 +64,6 @@ class GnssPositionSource {
     pull_inflated_ = false;
     status_.fused();
   }
-  /// The receiver's velocity was fused, or not.
-  void velocity(bool fused) { drift_.velocity(fused); }
   /// The filter is elsewhere now: refusals so far were by where it was.
   void relocated(base::Micros time) {
     last_fused_ = time;
@@ -75,7 +72,6 @@ class GnssPositionSource {
   /// A pose from outside ends every offset hypothesis.
   void reset() {
     offset_.reset();
-    drift_.reset();
     leapt_ = false;
     record_.begin();  // the next fix is compared with none before the pose
   }
@@ -106,11 +102,10 @@ class GnssPositionSource {
   }
   static constexpr auto members(auto& self) {
     return base::members(self.startup_, self.offset_, self.record_, self.innovation_, self.last_fused_, self.frozen_,
-                         self.drift_, self.pulled_m_, self.pull_inflated_, self.leapt_, self.status_);
+                         self.pulled_m_, self.pull_inflated_, self.leapt_, self.status_);
   }
 
  private:
-  [[nodiscard]] bool drifts(const FixMeasurement& z, const param::GnssParameters& n, Assessment& a);
   void confirm(Assessment& a, const param::RecoveryParameters& n);
   void judge_refused(const FixMeasurement& z, const FilterView& filter, Assessment& a);
   [[nodiscard]] bool reset_allowed(const FixMeasurement& z, const FilterView& filter, Assessment& a) const;
@@ -125,7 +120,6 @@ class GnssPositionSource {
   LevelInnovation innovation_;  ///< innovation of the last fix
   base::Micros last_fused_;     ///< stamp of the last fix that was fused, or of the last reset; 0: none
   checks::FrozenPosition frozen_;
-  checks::PositionDrift drift_;
   std::array<float, 2> pulled_m_{};  ///< by how much the last fixes moved the position
   bool pull_inflated_ = false;       ///< the position is already less certain by that
   bool leapt_ = false;               ///< fixes are refused since one leapt, all by the same offset
@@ -156,9 +150,8 @@ inline GnssPositionSource::Converted GnssPositionSource::convert(const sensor::G
 inline Assessment GnssPositionSource::assess(const FixMeasurement& z, const FilterView& filter) {
   const param::Parameters& n = filter.parameters();
   Assessment a{.dof = 3, .nis = z.statistics.joint_nis, .gate = fix_gate(n.gnss, 3)};
-  const bool inside = a.nis <= a.gate || z.statistics.horizontal_nis <= fix_gate(n.gnss, 2);
-  const bool agrees = inside && !drifts(z, n.gnss, a);
-  if (!inside) a.failed = Check::kGate;
+  const bool agrees = a.nis <= a.gate || z.statistics.horizontal_nis <= fix_gate(n.gnss, 2);
+  if (!agrees) a.failed = Check::kGate;
   leapt_ = !agrees && (leapt_ || leaps(z, filter));
   record_.update(!agrees, filter.stamp());
   const std::array<float, 2>& expected_m2 = z.statistics.expected_m2;
@@ -201,26 +194,9 @@ inline bool GnssPositionSource::filter_wrong(const FilterView& filter) const {
          filter.wheels_vote(since) != Vote::kFor;
 }
 
-/// Fixes whose errors are new with each drift away. Errors that last wander themselves.
-inline bool GnssPositionSource::drifts(const FixMeasurement& z, const param::GnssParameters& n, Assessment& a) {
-  if (n.correlation_s > 0.0F) return false;
-  drift_.update(z.nu(0), z.nu(1));
-  const std::array<float, 2>& expected_m2 = z.statistics.expected_m2;
-  const float statistic = drift_.statistic(z.r(0), expected_m2[0], expected_m2[1]);
-  const float limit = n.gate_scale * checks::kChiSquare999Of2;
-  if (!drift_.consume_velocity_agreement() || statistic <= limit) return false;
-  a.failed = Check::kDrift;
-  a.statistic = statistic;
-  a.limit = limit;
-  return true;
-}
-
 /// A fix that would decide where the filter is waits for others that agree.
 inline void GnssPositionSource::confirm(Assessment& a, const param::RecoveryParameters& n) {
-  if (offset_.confirmed(n.confirm_fixes)) {
-    drift_.reset();  // the filter is no longer where their drift was measured from
-    return;
-  }
+  if (offset_.confirmed(n.confirm_fixes)) return;
   a.action = Action::kSkip;
   a.verdict = sensor::Verdict::kNotUsed;
   a.failed = Check::kUnconfirmed;
@@ -252,7 +228,6 @@ inline void GnssPositionSource::judge_refused(const FixMeasurement& z, const Fil
   a.remedy.step_m = {offset_.east_m(), offset_.north_m(), 0.0F};
   a.remedy.variance_m2 = z.r;
   record_.reset_refusals();
-  drift_.reset();
 }
 
 /// The refused fixes persist, or agree with where the last reset came from, or the filter is lost.
