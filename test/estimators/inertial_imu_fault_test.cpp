@@ -46,6 +46,25 @@ TEST(InertialImuFault, SamplesWithinTheRangeThatLeapAreDoubted) {
     }
 }
 
+TEST(InertialImuFault, ASampleThatLeapsIsSaidForASecond) {
+  for (const std::size_t axis : {std::size_t{0}, std::size_t{5}}) {
+    Drive d = settled(rover_like());
+    d.run(1);
+    const auto said = [&d] {
+      return (d.estimator.faults() >> static_cast<unsigned>(sensor::Fault::kVibration) & 1U) != 0;
+    };
+    EXPECT_FALSE(said()) << axis;
+    const double from_s = d.time_s();
+    d.tamper_imu = [&](sensor::ImuSample& s) {
+      if (d.time_s() > from_s + 0.1 && d.time_s() < from_s + 0.115) axis_of(s, axis) += axis < 3 ? 0.05F : 0.6F;
+    };
+    d.run(0.9);
+    EXPECT_TRUE(said()) << axis;
+    d.run(1.2);
+    EXPECT_FALSE(said()) << axis;
+  }
+}
+
 TEST(InertialImuFault, ADeadAxisIsALostImuAndWheelsCarryOn) {
   for (std::size_t axis = 0; axis < 6; ++axis) {
     Drive d = settled(rover_like());

@@ -36,6 +36,11 @@ class ImuInput {
   /// The last sample was beyond the sensor's range, or at full scale where wheels show the turn.
   [[nodiscard]] bool unusable() const { return unusable_; }
   void set_unusable(bool unusable) { unusable_ = unusable; }
+  void note_leap(base::Micros stamp) { leapt_at_ = stamp; }
+  /// A sample leapt within the last second.
+  [[nodiscard]] bool leapt_lately(base::Micros time) const {
+    return checks::recent(leapt_at_, time, base::Micros{1'000'000});
+  }
   /// Time to which the filter last went without IMU; 0: never.
   [[nodiscard]] base::Micros bridged_until() const { return bridged_until_; }
   void set_bridged(base::Micros until) { bridged_until_ = until; }
@@ -57,12 +62,14 @@ class ImuInput {
 
   static constexpr auto members(auto& self) {
     return base::members(base::in_turns(self.health_), base::in_turns(self.bridged_until_),
-                         self.rate_b_radps_, base::unhashed(self.end_rate_b_radps_), self.drift_, self.unusable_);
+                         base::in_turns(self.leapt_at_), self.rate_b_radps_, base::unhashed(self.end_rate_b_radps_),
+                         self.drift_, self.unusable_);
   }
 
  private:
   checks::ImuHealth health_;
   base::Micros bridged_until_;  ///< time to which the filter last went without IMU; 0: never
+  base::Micros leapt_at_;       ///< stamp of the last sample that leapt; 0: none
   nav::Vector3 rate_b_radps_ = nav::Vector3::Zero();
   nav::Vector3 end_rate_b_radps_ = nav::Vector3::Zero();  ///< not hashed: the velocity shows it a sample later
   checks::ImuDrift drift_;

@@ -47,7 +47,7 @@ std::uint16_t InertialWith<Watch>::faults() const {
   const bool judged = !detail::stands_on_its_roof(ins_, tracking() ? nullptr : &alignment_.attitude());
   raise(sensor::Fault::kWheelSlip, judged && sources_.wheels.slip() != Wheels::Slip::kNone);
   raise(sensor::Fault::kImuClipped, imu.clipped_lately(time_));
-  raise(sensor::Fault::kVibration, imu.vibration().shaken());
+  raise(sensor::Fault::kVibration, imu.vibration().shaken() || imu_.leapt_lately(time_));
   // Each cause of the mode Degraded has a bit. A slip that is not judged has the row of the IMU, which is distrusted.
   const bool missing = tracking() && imu_.missing_lately(time_), was_stuck = tracking() && imu.stuck_lately(time_);
   raise(sensor::Fault::kSensorStuck, imu.stuck() || was_stuck || sources_.any_stuck(time_));

@@ -108,6 +108,7 @@ Innovation InertialWith<Watch>::propagate(const sensor::ImuSample& sample, const
   if (sample.clipped_accel > 0 || sample.clipped_gyro > 0) inflate_clipped(sample, dt_s, n);
   if (imu_.health().vibration().leaps()) {
     const checks::Vibration::Leap& leap = imu_.health().vibration().leap();
+    imu_.note_leap(stamp);
     Recovery::inflate_motion(ins_, leap.force_mps2 * dt_s, leap.rate_radps * dt_s);
   }
   time_ = stamp;
