@@ -161,7 +161,7 @@ def judged(row):
     return {**{key: row[key] for key in ("robot", "sensor", "axis", "kind", "size", "situation", "seed")}, "promise": promised,
             "worst_ratio": quantities[worst]["worst_ratio"], "beyond_s": max(one["beyond_s"] for one in quantities.values()),
             "clean_ratio": quantities[worst]["clean_ratio"], "inside_after_s": None if None in late else max(late),
-            "valid_while_out_s": max(one["valid_while_out_s"] for one in quantities.values()), "said": sorted(row["said"]),
+            "valid_while_out_s": max(one["valid_while_out_s"] for one in quantities.values()), "said": sorted(row["said"], key=row["said"].get),
             "quantity": worst, "worst_error": quantities[worst]["worst_error"], "clean_error": quantities[worst]["clean_error"],
             "gates": row["gates"], "size_value": row["size_value"], "witnesses": found, "broken": words,
             "wired": {"promise": wired[0], "broken": wired[2]}, **(floor(row, facts) if promised == "held" else {})}
