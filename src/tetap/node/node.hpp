@@ -277,7 +277,7 @@ class Node {
 };
 
 template <class Estimators, std::size_t Capacity>
-[[gnu::cold]] void Node<Estimators, Capacity>::power_on(base::Micros t) {
+void Node<Estimators, Capacity>::power_on(base::Micros t) {
   base::clear(*this);
   if constexpr (kHasBusParameters<Estimators>) {
     parameter_commands_.power_on();
