@@ -53,6 +53,7 @@ endif
 engine := $(if $(ENGINE),--engine $(ENGINE)) $(if $(NODES),--nodes $(NODES))
 node := $(if $(filter memory,$(BUS)),,$(comma)tetap-node)
 page_suffix := $(if $(filter file,$(origin ROBOT)),,.$(module))
+page_file := out/page/tetap$(page_suffix).html
 page_variant := $(if $(page_suffix),TETAP_VARIANT=$(module) TETAP_SETTINGS=-DTETAP_PAGE_ROBOTS=$(module))
 
 .PHONY: help sim board test quick proof replay record doctor export eds tune release firmware flash size heap stack count bits hashes soak matrix swarm mutants laws constants bench costs check docs dbc page page-test setup programs arm
@@ -171,12 +172,12 @@ docs: setup programs ## the generated pages of docs/
 dbc: setup ## docs/reference/messages.md from config/tetap.dbc; the C++ messages are made in each build folder
 	@tools/can/generate_messages config/tetap.dbc --table docs/reference/messages.md
 
-page: setup ## the player as one file for a browser, with all robots: out/page/tetap.html (ROBOT=NAME: with this one alone)
+page: setup ## the player as one file for a browser, with all robots: out/page/tetap.html (ROBOT=NAME: with this one alone, tetap.NAME.html)
 	@$(page_variant) tools/run/build_preset page:page_module
-	@sim_host/page/pack build/page$(page_suffix)/sim_host/page/tetap.wasm out/page/tetap.html
+	@sim_host/page/pack build/page$(page_suffix)/sim_host/page/tetap.wasm $(page_file)
 
 page-test: setup page ## the page in a headless browser against the host's programs, pictures in out/page (its browser is installed for it)
-	@sim_host/page/test/run
+	@TETAP_PAGE=$(page_file) sim_host/page/test/run
 
 setup:
 	@tools/run/install_packages
