@@ -64,7 +64,7 @@ const named = (name, index) => rows.find((e) => e.parameterName === name && e.in
 await write(named('landmark.gate_scale', 0x2000), 2.5);
 const apply = { serverId: ID, index: 0x5F00, subIndex: 1, dataType: DataType.UNSIGNED32, timeout: 5000 };
 const staged = await device.sdo.upload(apply);
-if (await code(device.sdo.download({ ...apply, data: staged ^ 1 })) !== 0x08000022) fail('a foreign set is applied');
+if (await code(device.sdo.download({ ...apply, data: (staged ^ 1) >>> 0 })) !== 0x08000022) fail('a foreign set is applied');
 await device.sdo.download({ ...apply, data: staged });
 if (await read(named('landmark.gate_scale (active)', 0x3000)) !== 2.5) fail('nothing was applied');
 console.log(JSON.stringify(counts));
