@@ -37,7 +37,6 @@ class DeviceRecord {
   /// First refusal of the present run.
   [[nodiscard]] base::Micros since(base::Micros stamp) const { return stamp - refused_.held_for(stamp); }
   [[nodiscard]] base::Micros last_measurement() const { return last_measurement_; }
-  [[nodiscard]] base::Micros last_accepted() const { return last_accepted_; }
   /// Time from the last agreement to `stamp`, at most ten seconds: what the filter is off by has grown in it.
   [[nodiscard]] float disagreement_s(base::Micros stamp) const {
     constexpr base::Micros kMost{10'000'000};
